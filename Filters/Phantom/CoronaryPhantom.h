@@ -1,0 +1,253 @@
+/**
+ * @file CoronaryPhantom.h
+ * @brief A beating heart with both coronary trees, known exactly at every place and moment.
+ *
+ * Anatomy: control points and diameters of Dodge et al. (Circulation 1988;78:1167 and 1992;86:232)
+ * on an epicardial ellipsoid. Motion: one closed-form displacement field of position and time.
+ * Images: tissue values, partial volume, point spread function, temporal window and noise of a
+ * cardiac CT. Nothing here uses the reconstruction code that the phantom is there to judge.
+ * docs/phantom.md has the formulas, their sources, and what the phantom does not model.
+ *
+ * Time t is the fraction of the R-R interval, any real number; the motion is periodic, t modulo 1.
+ * Positions are LPS in mm, with the left coronary ostium of the reference heart at the origin.
+ */
+#ifndef DynamicCoronary_CoronaryPhantom_h
+#define DynamicCoronary_CoronaryPhantom_h
+
+#include "Geometry.h"
+#include "ParallelFor.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// Which artery feeds the posterior descending (PDA) and posterolateral (PLB) branches.
+enum class Dominance : int
+{
+  Right = 0,   ///< both from the right coronary artery
+  Left = 1,    ///< both from the left circumflex
+  Balanced = 2 ///< PDA from the right, PLB from the left
+};
+
+/// Coronary segments. 1 to 18 are the numbers of the SCCT model (Raff et al., J Cardiovasc Comput
+/// Tomogr 2009;3:122); branches that the model does not number follow from 20.
+enum SegmentId : int
+{
+  ProximalRCA = 1,
+  MidRCA = 2,
+  DistalRCA = 3,
+  RightPDA = 4,
+  LeftMain = 5,
+  ProximalLAD = 6,
+  MidLAD = 7,
+  DistalLAD = 8,
+  FirstDiagonal = 9,
+  SecondDiagonal = 10,
+  ProximalLCx = 11,
+  FirstObtuseMarginal = 12,
+  DistalLCx = 13,
+  SecondObtuseMarginal = 14,
+  LeftPDA = 15,
+  RightPLB = 16,
+  RamusIntermedius = 17,
+  LeftPLB = 18,
+  ThirdDiagonal = 20,
+  ThirdObtuseMarginal = 21,
+  FirstSeptal = 22,
+  SecondSeptal = 23,
+  ThirdSeptal = 24,
+  AcuteMarginal = 25,
+  RightVentricularBranch = 26,
+  InferiorRightBranch = 27
+};
+
+/// The SCCT abbreviation: "LM", "pLAD", "mLAD", "dLAD", "D1", "pLCx", "OM1", "pRCA", "R-PDA", ...;
+/// an empty string for a number that is no segment.
+std::string SegmentName(int segmentId);
+
+/// A phase of the cycle in which the vessels are (partly) impossible to track.
+struct LostPhase
+{
+  double time = 0.0;     ///< fraction of the R-R interval
+  double fraction = 1.0; ///< share of the tree's length that is lost, 0 to 1; 1: everything
+};
+
+/// Everything that decides what the phantom is. Defaults give the embedded standard phantom.
+struct PhantomSettings
+{
+  // Anatomy.
+  std::uint64_t seed = 1; ///< 0: the mean anatomy without any random variation
+  Dominance dominance = Dominance::Right;
+  bool ramus = false;              ///< add a ramus intermedius at the left main's end
+  double calibre = 1.0;            ///< factor on all diameters, 0.5 to 2
+  double positionVariation = 5.0;  ///< standard deviation of the course of the vessels, mm, 0 to 10
+  double calibreVariation = 0.10;  ///< relative standard deviation of a vessel's diameter, 0 to 0.3
+  double tortuosity = 1.0;         ///< factor on the lateral waves of the vessels, 0 to 3
+  int stenoses = 0;                ///< number of narrowings, placed by the seed, 0 to 20
+  double stenosisDegree = 0.5;     ///< their diameter reduction, 0 to 0.95
+  int calcifiedPlaques = 0;        ///< number of calcifications, placed by the seed, 0 to 50
+  bool chronicOcclusion = false;   ///< close 15 mm of the mid RCA; filled from its far end on
+
+  // Motion.
+  double cycleLength = 0.8;        ///< R-R interval in seconds, 0.3 to 3
+  double motionAmplitude = 1.0;    ///< factor on the whole displacement field, 0 to 1.3
+  double axialMotionRight = 18.0;  ///< AV-plane excursion on the RCA side, mm, 0 to 24
+  double axialMotionLeft = 12.0;   ///< the same on the LCx side, mm, 0 to 24
+  double regionalLag = 0.02;       ///< greatest regional lead or lag, fraction of R-R, 0 to 0.05
+  double regionalAmplitude = 0.06; ///< relative standard deviation of the regional amplitude, 0 to 0.1
+  double beatVariation = 0.0;      ///< relative amplitude change from beat to beat, 0 to 0.1;
+                                   ///< above 0 the motion is no longer periodic
+  double areaPulse = 0.08;         ///< systolic increase of the lumen area, 0 to 0.3
+
+  // Image.
+  double temporalWindow = 0.066;   ///< seconds: 0 ideal, 0.066 dual source, 0.140 single source
+  double noise = 25.0;             ///< standard deviation in HU at full dose, 0 to 200
+  double noiseCorrelation = 0.4;   ///< standard deviation of the noise's kernel, mm, 0 to 2
+  double systolicNoise = 1.5;      ///< factor on the noise where the tube current is reduced, 1 to 4
+  double pointSpread[3] = { 0.25, 0.25, 0.30 }; ///< standard deviation along the image axes, mm
+  double lumenHU = 420.0;          ///< at the ostia, 0 to 1500
+  double attenuationGradient = -1.5; ///< change of the lumen along the vessel, HU per cm, -20 to 5
+  double veinHU = 150.0;           ///< great cardiac vein (contrast-poor)
+  std::vector<LostPhase> lostPhases;
+
+  // Discretisation of the truth.
+  double centerlineSpacing = 0.5;  ///< mm between tree points, 0.1 to 5
+  double surfaceSpacing = 0.35;    ///< edge length of the truth surface, mm, 0.15 to 1.5
+
+  /// @throws std::invalid_argument that names the first setting out of range or not finite.
+  void Validate() const;
+};
+
+/// One polyline of a tree, from its root-side end to its far end.
+struct PhantomBranch
+{
+  std::vector<std::int64_t> points; ///< indices; the first is shared with the parent's last point
+  int groupId = 0;
+  int parentGroupId = -1;
+  int treeId = 0;     ///< 0 left, 1 right
+  int generation = 0; ///< 0 at a root
+  int strahlerOrder = 1;
+  int segmentId = 0;
+  double length = 0.0;     ///< mm
+  double tortuosity = 0.0; ///< length / chord - 1
+};
+
+/// The vessels' axes at one moment. Ids, order and counts are the same at every moment.
+struct PhantomTree
+{
+  std::vector<Vector3> points;        ///< mm
+  std::vector<double> radius;         ///< lumen radius, mm
+  std::vector<double> abscissa;       ///< mm from the ostium along the reference tree
+  std::vector<int> segmentId;
+  std::vector<Vector3> displacement;  ///< mm from the reference position
+  std::vector<Vector3> velocity;      ///< mm/s
+  std::vector<double> visibility;     ///< 0 lost .. 1 full contrast at this moment: d / (d + blur),
+                                      ///< times 0 where the phase is lost or the vessel occluded
+  std::vector<PhantomBranch> branches;
+};
+
+/// A closed, oriented, 2-manifold triangle mesh around the lumen. One connectivity at all moments.
+struct PhantomSurface
+{
+  std::vector<Vector3> points;       ///< mm
+  std::vector<Vector3> displacement; ///< mm from the reference position
+  std::vector<int> groupId;          ///< branch of the nearest axis point, per point
+  std::vector<double> abscissa;      ///< of the nearest axis point, mm, per point
+  std::vector<Triangle> triangles;
+  std::vector<int> entityId;         ///< per triangle: 1 wall, 2 and 3 the left and right ostium,
+                                     ///< 4.. the ends of the branches
+};
+
+struct PhantomOstium
+{
+  std::string name; ///< "LCA" or "RCA"
+  Vector3 position; ///< mm
+  Vector3 axis;     ///< unit vector into the vessel
+  double radius;    ///< mm
+};
+
+/// How a vessel moves over one cycle.
+struct PhantomMotionSummary
+{
+  std::string name;              ///< "LM", "LAD proximal", ..., "RCA", ...
+  double amplitude = 0.0;        ///< mean over the points of the greatest distance between two moments, mm
+  double meanSpeed = 0.0;        ///< mm/s
+  double peakSpeed = 0.0;        ///< mm/s
+  double systolicRest = 0.0;     ///< ms: longest window in 20..55 % with all displacements < 1 mm
+  double diastolicRest = 0.0;    ///< ms: the same in 55..95 %
+  double systolicStrain = 0.0;   ///< length change from t = 0 to 0.35, relative
+};
+
+/// Immutable after construction, and safe to use from several threads.
+class CoronaryPhantom
+{
+public:
+  /// @throws std::invalid_argument as PhantomSettings::Validate.
+  explicit CoronaryPhantom(const PhantomSettings& settings);
+  ~CoronaryPhantom();
+  CoronaryPhantom(const CoronaryPhantom&) = delete;
+  CoronaryPhantom& operator=(const CoronaryPhantom&) = delete;
+
+  const PhantomSettings& Settings() const;
+
+  /// Where the material point that rests at `reference` is at time t, mm.
+  Vector3 Position(const Vector3& reference, double t) const;
+
+  /// Its velocity, mm/s.
+  Vector3 Velocity(const Vector3& reference, double t) const;
+
+  /// The material point that is at `position` at time t, to 1e-6 mm.
+  Vector3 ReferencePosition(const Vector3& position, double t) const;
+
+  PhantomTree Tree(double t) const;
+
+  /// The great cardiac vein beside the LAD and in the AV groove: one branch, treeId 2.
+  PhantomTree Vein(double t) const;
+
+  std::vector<PhantomOstium> Ostia(double t) const;
+
+  /**
+   * The lumen's wall. The mesh is made once, at the first call; at time t its points are carried
+   * by the motion and then put on the zero of LumenDistance(., t) to 1e-4 mm.
+   * @throws Cancelled
+   */
+  PhantomSurface Surface(double t, const ProgressCallback& progress = {}) const;
+
+  /// Signed distance to the wall at time t in mm, negative inside; exact near the wall, bounded
+  /// by +-`farAway` elsewhere.
+  double LumenDistance(const Vector3& position, double t) const;
+  static constexpr double farAway = 5.0;
+
+  /// A grid around the whole tree over the whole cycle, with `margin` mm on every side.
+  ImageGrid DefaultGrid(double spacing, double margin = 8.0) const;
+
+  /**
+   * Renders the voxels `part` of the image at time t, in HU, rounded and limited to -1024..3071.
+   *
+   * The values do not depend on how the image is cut into parts, nor on the number of threads.
+   * @param grid    the whole image
+   * @param part    inclusive index ranges inside grid.extent
+   * @param values  room for all voxels of `part`, i fastest
+   * @throws Cancelled; std::invalid_argument for a grid that is not one
+   */
+  void Render(const ImageGrid& grid, const std::array<int, 6>& part, double t,
+    std::int16_t* values, const ProgressCallback& progress = {}) const;
+
+  /// Motion of each named vessel, from the tree at 200 moments.
+  std::vector<PhantomMotionSummary> SummarizeMotion() const;
+
+private:
+  struct Internals;
+  std::unique_ptr<Internals> Data;
+};
+
+/// The paper's 20 phases: -5 % to 106 % of the R-R interval in equal steps.
+std::vector<double> PaperPhases();
+
+/// `count` phases from -5 % to 106 % (1 gives 75 %).
+std::vector<double> EvenPhases(int count);
+}
+
+#endif

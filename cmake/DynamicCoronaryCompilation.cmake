@@ -1,0 +1,19 @@
+# Warnings and sanitizers for our own targets; the generated wrapping code is left alone.
+
+add_library(dynamiccoronary_options INTERFACE)
+target_compile_options(dynamiccoronary_options INTERFACE -Wall -Wextra -Wshadow)
+if(DYNAMICCORONARY_WARNINGS_AS_ERRORS)
+  target_compile_options(dynamiccoronary_options INTERFACE -Werror)
+endif()
+
+if(DYNAMICCORONARY_SANITIZE)
+  # On the whole build: a sanitizer must see every allocation of the process.
+  add_compile_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}" -fno-omit-frame-pointer -g)
+  add_link_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}")
+endif()
+
+# dynamiccoronary_module_options(<module> [link ...])
+#   Our warnings on a VTK module, and private links to the plain C++ libraries.
+function(dynamiccoronary_module_options module)
+  vtk_module_link("${module}" PRIVATE "$<BUILD_INTERFACE:dynamiccoronary_options>" ${ARGN})
+endfunction()

@@ -1,0 +1,21 @@
+# Package files: find_package(DynamicCoronary) gives DynamicCoronary::Algorithms (no VTK),
+# DynamicCoronary::Formats and one target per VTK module.
+include(CMakePackageConfigHelpers)
+
+set(package_destination "${CMAKE_INSTALL_LIBDIR}/cmake/DynamicCoronary")
+install(EXPORT DynamicCoronaryLibraries
+  NAMESPACE DynamicCoronary::
+  FILE DynamicCoronaryLibraries-targets.cmake
+  DESTINATION "${package_destination}")
+
+configure_package_config_file(
+  "${CMAKE_CURRENT_LIST_DIR}/dynamiccoronary-config.cmake.in"
+  "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config.cmake"
+  INSTALL_DESTINATION "${package_destination}")
+write_basic_package_version_file(
+  "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config-version.cmake"
+  COMPATIBILITY SameMinorVersion)
+install(FILES
+  "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config.cmake"
+  "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config-version.cmake"
+  DESTINATION "${package_destination}")
