@@ -1,0 +1,52 @@
+/**
+ * @file AtomicFile.h
+ * @brief Files that appear under their name only when they are whole.
+ */
+#ifndef DynamicCoronary_AtomicFile_h
+#define DynamicCoronary_AtomicFile_h
+
+#include <string>
+
+namespace coronary
+{
+/**
+ * A temporary file beside the wanted one, renamed to it by Commit().
+ *
+ * Until Commit() the wanted name is untouched: an older file of that name stays readable. Without
+ * Commit() (an exception, an abort) the destructor removes the temporary file.
+ * The folder must exist. The temporary name keeps the extension, for writers that look at it.
+ */
+class AtomicFile
+{
+public:
+  /// @throws std::runtime_error naming `path` when its folder can not be written to.
+  explicit AtomicFile(const std::string& path);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+
+  /// Where to write: an existing, empty file in the folder of Path().
+  const std::string& TemporaryPath() const { return this->Temporary; }
+
+  /// The name that Commit() gives it.
+  const std::string& Path() const { return this->Final; }
+
+  /**
+   * Renames the temporary file to Path(), replacing what was there. Close it first.
+   * @throws std::runtime_error naming Path() when that fails.
+   */
+  void Commit();
+
+private:
+  std::string Final;
+  std::string Temporary; ///< empty once committed
+};
+
+/**
+ * Writes `contents` to `path` atomically.
+ * @throws std::runtime_error naming `path` and the reason (no such folder, disk full, ...).
+ */
+void WriteFileAtomically(const std::string& path, const std::string& contents);
+}
+
+#endif

@@ -1,0 +1,333 @@
+#include "SeriesDescription.h"
+
+#include "AtomicFile.h"
+
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <system_error>
+
+namespace coronary
+{
+namespace fs = std::filesystem;
+
+namespace
+{
+using Json = nlohmann::ordered_json;
+
+// A description of a thousand phases is a few hundred kilobytes.
+constexpr std::uintmax_t LargestDescription = 64u << 20;
+
+[[noreturn]] void Fail(const std::string& path, const std::string& what)
+{
+  throw std::runtime_error("'" + path + "': " + what + ".");
+}
+
+std::string ReadText(const std::string& path)
+{
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status))
+  {
+    throw std::runtime_error("File '" + path + "' does not exist.");
+  }
+  if (!fs::is_regular_file(status))
+  {
+    Fail(path, "is not a file");
+  }
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error || size > LargestDescription)
+  {
+    Fail(path, "is too large for a description of a series");
+  }
+  if (size == 0)
+  {
+    Fail(path, "is empty");
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
+  if (!file)
+  {
+    Fail(path, "cannot be read");
+  }
+  return text;
+}
+
+// Python's json module writes NaN and Infinity, which are no JSON. As null they reach the checks
+// below, which can name the entry.
+std::string ReplaceNonFinite(const std::string& text)
+{
+  std::string result;
+  result.reserve(text.size());
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size();)
+  {
+    const char c = text[i];
+    if (quoted && c == '\\' && i + 1 < text.size())
+    {
+      result.append(text, i, 2);
+      i += 2;
+      continue;
+    }
+    if (c == '"')
+    {
+      quoted = !quoted;
+    }
+    std::size_t skipped = 0;
+    if (!quoted)
+    {
+      for (const char* word : { "NaN", "nan", "-Infinity", "Infinity" })
+      {
+        const std::string literal(word);
+        if (text.compare(i, literal.size(), literal) == 0)
+        {
+          skipped = literal.size();
+          break;
+        }
+      }
+    }
+    if (skipped > 0)
+    {
+      result += "null";
+      i += skipped;
+    }
+    else
+    {
+      result += c;
+      ++i;
+    }
+  }
+  return result;
+}
+
+double FiniteNumber(const Json& value, const std::string& path, const std::string& name)
+{
+  if (!value.is_number() || !std::isfinite(value.get<double>()))
+  {
+    Fail(path, name + " is not a finite number");
+  }
+  return value.get<double>();
+}
+
+std::string Text(const Json& object, const char* key, const std::string& path,
+  const std::string& owner, bool required)
+{
+  const auto found = object.find(key);
+  if (found == object.end())
+  {
+    if (required)
+    {
+      Fail(path, owner + " has no '" + key + "'");
+    }
+    return {};
+  }
+  if (!found->is_string() || (required && found->get_ref<const std::string&>().empty()))
+  {
+    Fail(path, owner + "." + key + " is not a text");
+  }
+  return found->get<std::string>();
+}
+
+void Check(const SeriesDescription& description, const std::string& path)
+{
+  if (!std::isfinite(description.cycleMs) || description.cycleMs < 0.0)
+  {
+    Fail(path, "cycle_ms is not a positive number");
+  }
+  if (description.phases.empty())
+  {
+    Fail(path, "has no phases");
+  }
+  for (std::size_t p = 0; p < description.phases.size(); ++p)
+  {
+    const std::string name = "phases[" + std::to_string(p) + "]";
+    const SeriesDescription::Phase& phase = description.phases[p];
+    if (!std::isfinite(phase.fraction))
+    {
+      Fail(path, name + ".fraction is not a finite number");
+    }
+    if (phase.image.empty())
+    {
+      Fail(path, name + " has no 'image'");
+    }
+    if (p > 0 && !(phase.fraction > description.phases[p - 1].fraction))
+    {
+      Fail(path, name + ".fraction is not greater than the fraction before it");
+    }
+  }
+  for (std::size_t s = 0; s < description.seeds.size(); ++s)
+  {
+    if (!description.seeds[s].position.allFinite())
+    {
+      Fail(path,
+        "seeds[" + std::to_string(s) + "] ('" + description.seeds[s].name +
+          "'): position is not finite");
+    }
+  }
+}
+
+SeriesDescription::Phase ParsePhase(
+  const Json& entry, const std::string& path, const std::string& name)
+{
+  if (!entry.is_object())
+  {
+    Fail(path, name + " is not an object");
+  }
+  SeriesDescription::Phase phase;
+  if (!entry.contains("fraction"))
+  {
+    Fail(path, name + " has no 'fraction'");
+  }
+  phase.fraction = FiniteNumber(entry["fraction"], path, name + ".fraction");
+  phase.image = Text(entry, "image", path, name, true);
+  const auto truth = entry.find("truth");
+  if (truth != entry.end() && truth->is_object())
+  {
+    phase.surface = Text(*truth, "surface", path, name + ".truth", false);
+    phase.centerline = Text(*truth, "centerline", path, name + ".truth", false);
+  }
+  return phase;
+}
+
+SeriesDescription::Seed ParseSeed(
+  const Json& entry, const std::string& path, const std::string& name)
+{
+  if (!entry.is_object())
+  {
+    Fail(path, name + " is not an object");
+  }
+  SeriesDescription::Seed seed;
+  seed.name = Text(entry, "name", path, name, false);
+  const std::string title = name + " ('" + seed.name + "'): position";
+  const auto position = entry.find("position");
+  if (position == entry.end() || !position->is_array() || position->size() != 3)
+  {
+    Fail(path, title + " is not a list of three numbers");
+  }
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    seed.position[axis] =
+      FiniteNumber((*position)[axis], path, title + "[" + std::to_string(axis) + "]");
+  }
+  return seed;
+}
+
+// The exceptions of the JSON library begin with a code in brackets that says nothing to a user.
+std::string Reason(const std::exception& error)
+{
+  std::string text = error.what();
+  const std::size_t bracket = text.find("] ");
+  if (bracket != std::string::npos)
+  {
+    text.erase(0, bracket + 2);
+  }
+  return text;
+}
+}
+
+SeriesDescription ReadSeriesDescription(const std::string& path)
+{
+  const std::string text = ReplaceNonFinite(ReadText(path));
+  Json root;
+  try
+  {
+    root = Json::parse(text);
+  }
+  catch (const Json::exception& error)
+  {
+    Fail(path, "is not valid JSON: " + Reason(error));
+  }
+  if (!root.is_object())
+  {
+    Fail(path, "is not a JSON object");
+  }
+  SeriesDescription description;
+  if (root.contains("cycle_ms"))
+  {
+    description.cycleMs = FiniteNumber(root["cycle_ms"], path, "cycle_ms");
+    if (!(description.cycleMs > 0.0))
+    {
+      Fail(path, "cycle_ms is not a positive number");
+    }
+  }
+  if (!root.contains("phases") || !root["phases"].is_array())
+  {
+    Fail(path, "has no list 'phases'");
+  }
+  for (const Json& entry : root["phases"])
+  {
+    description.phases.push_back(
+      ParsePhase(entry, path, "phases[" + std::to_string(description.phases.size()) + "]"));
+  }
+  const auto seeds = root.find("seeds");
+  if (seeds != root.end())
+  {
+    if (!seeds->is_array())
+    {
+      Fail(path, "seeds is not a list");
+    }
+    for (const Json& entry : *seeds)
+    {
+      description.seeds.push_back(
+        ParseSeed(entry, path, "seeds[" + std::to_string(description.seeds.size()) + "]"));
+    }
+  }
+  Check(description, path);
+  return description;
+}
+
+void WriteSeriesDescription(const std::string& path, const SeriesDescription& description)
+{
+  Check(description, path);
+  Json root = Json::object();
+  if (description.cycleMs > 0.0)
+  {
+    root["cycle_ms"] = description.cycleMs;
+  }
+  root["phases"] = Json::array();
+  for (const SeriesDescription::Phase& phase : description.phases)
+  {
+    Json entry = { { "fraction", phase.fraction }, { "image", phase.image } };
+    if (!phase.surface.empty())
+    {
+      entry["truth"]["surface"] = phase.surface;
+    }
+    if (!phase.centerline.empty())
+    {
+      entry["truth"]["centerline"] = phase.centerline;
+    }
+    root["phases"].push_back(std::move(entry));
+  }
+  root["seeds"] = Json::array();
+  for (const SeriesDescription::Seed& seed : description.seeds)
+  {
+    const Vector3& p = seed.position;
+    root["seeds"].push_back({ { "name", seed.name }, { "position", { p.x(), p.y(), p.z() } } });
+  }
+  std::string text;
+  try
+  {
+    text = root.dump(2);
+  }
+  catch (const Json::exception& error)
+  {
+    Fail(path, Reason(error));
+  }
+  WriteFileAtomically(path, text + "\n");
+}
+
+std::string ResolveSeriesPath(const std::string& descriptionPath, const std::string& entry)
+{
+  const fs::path path(entry);
+  if (entry.empty() || path.is_absolute())
+  {
+    return entry;
+  }
+  return (fs::path(descriptionPath).parent_path() / path).lexically_normal().string();
+}
+}
