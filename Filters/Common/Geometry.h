@@ -6,6 +6,7 @@
 #define DynamicCoronary_Geometry_h
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <array>
 #include <cstdint>

@@ -1,0 +1,552 @@
+#include "CoronaryPhantom.h"
+
+#include "CounterRandom.h"
+#include "PhantomAnatomy.h"
+#include "PhantomImage.h"
+#include "PhantomLumen.h"
+#include "PhantomMotion.h"
+#include "PhantomSurface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr std::uint64_t LostPurpose = 301;
+/// A phase counts as the lost one within this distance in time: a third of the paper's step.
+constexpr double LostTolerance = 0.02;
+
+void Require(const char* name, double value, double low, double high)
+{
+  if (!(value >= low && value <= high))
+  {
+    throw std::invalid_argument(std::string("PhantomSettings: ") + name + " is " +
+      std::to_string(value) + ", it must lie in [" + std::to_string(low) + ", " +
+      std::to_string(high) + "]");
+  }
+}
+}
+
+std::string SegmentName(int segmentId)
+{
+  switch (segmentId)
+  {
+    case ProximalRCA:
+      return "pRCA";
+    case MidRCA:
+      return "mRCA";
+    case DistalRCA:
+      return "dRCA";
+    case RightPDA:
+      return "R-PDA";
+    case LeftMain:
+      return "LM";
+    case ProximalLAD:
+      return "pLAD";
+    case MidLAD:
+      return "mLAD";
+    case DistalLAD:
+      return "dLAD";
+    case FirstDiagonal:
+      return "D1";
+    case SecondDiagonal:
+      return "D2";
+    case ProximalLCx:
+      return "pLCx";
+    case FirstObtuseMarginal:
+      return "OM1";
+    case DistalLCx:
+      return "dLCx";
+    case SecondObtuseMarginal:
+      return "OM2";
+    case LeftPDA:
+      return "L-PDA";
+    case RightPLB:
+      return "R-PLB";
+    case RamusIntermedius:
+      return "RI";
+    case LeftPLB:
+      return "L-PLB";
+    case ThirdDiagonal:
+      return "D3";
+    case ThirdObtuseMarginal:
+      return "OM3";
+    case FirstSeptal:
+      return "S1";
+    case SecondSeptal:
+      return "S2";
+    case ThirdSeptal:
+      return "S3";
+    case AcuteMarginal:
+      return "AM1";
+    case RightVentricularBranch:
+      return "RV1";
+    case InferiorRightBranch:
+      return "R-INF";
+    default:
+      return "";
+  }
+}
+
+void PhantomSettings::Validate() const
+{
+  Require("dominance", static_cast<double>(static_cast<int>(this->dominance)), 0, 2);
+  Require("calibre", this->calibre, 0.5, 2.0);
+  Require("positionVariation", this->positionVariation, 0.0, 10.0);
+  Require("calibreVariation", this->calibreVariation, 0.0, 0.3);
+  Require("tortuosity", this->tortuosity, 0.0, 3.0);
+  Require("stenoses", this->stenoses, 0, 20);
+  Require("stenosisDegree", this->stenosisDegree, 0.0, 0.95);
+  Require("calcifiedPlaques", this->calcifiedPlaques, 0, 50);
+  Require("cycleLength", this->cycleLength, 0.3, 3.0);
+  Require("motionAmplitude", this->motionAmplitude, 0.0, 1.3);
+  Require("axialMotionRight", this->axialMotionRight, 0.0, 24.0);
+  Require("axialMotionLeft", this->axialMotionLeft, 0.0, 24.0);
+  Require("regionalLag", this->regionalLag, 0.0, 0.05);
+  Require("regionalAmplitude", this->regionalAmplitude, 0.0, 0.1);
+  Require("beatVariation", this->beatVariation, 0.0, 0.1);
+  Require("areaPulse", this->areaPulse, 0.0, 0.3);
+  Require("temporalWindow", this->temporalWindow, 0.0, 0.5 * this->cycleLength);
+  Require("noise", this->noise, 0.0, 200.0);
+  Require("noiseCorrelation", this->noiseCorrelation, 0.0, 2.0);
+  Require("systolicNoise", this->systolicNoise, 1.0, 4.0);
+  for (const double sigma : this->pointSpread)
+  {
+    Require("pointSpread", sigma, 0.0, 3.0);
+  }
+  Require("lumenHU", this->lumenHU, 0.0, 1500.0);
+  Require("attenuationGradient", this->attenuationGradient, -20.0, 5.0);
+  Require("veinHU", this->veinHU, -200.0, 1500.0);
+  for (const LostPhase& phase : this->lostPhases)
+  {
+    Require("lostPhases.time", phase.time, -100.0, 100.0);
+    Require("lostPhases.fraction", phase.fraction, 0.0, 1.0);
+  }
+  Require("centerlineSpacing", this->centerlineSpacing, 0.1, 5.0);
+  Require("surfaceSpacing", this->surfaceSpacing, 0.15, 1.5);
+}
+
+struct CoronaryPhantom::Internals
+{
+  explicit Internals(const PhantomSettings& settings)
+    : Settings(Checked(settings))
+    , Anatomy(this->Settings)
+    , Motion(this->Settings, this->Anatomy.frame)
+    , Image(this->Settings, this->Anatomy, this->Motion)
+  {
+  }
+
+  static const PhantomSettings& Checked(const PhantomSettings& settings)
+  {
+    settings.Validate();
+    return settings;
+  }
+
+  /// Factor on the lumen radius at a moment.
+  double RadiusFactor(double t) const
+  {
+    return std::sqrt(1.0 + this->Settings.areaPulse * PhantomMotion::PressurePulse(t));
+  }
+
+  /// A resting tree, moved to time t.
+  PhantomTree Move(const PhantomTree& rest, double t, double radiusFactor) const
+  {
+    PhantomTree tree = rest;
+    for (std::size_t p = 0; p < tree.points.size(); ++p)
+    {
+      tree.points[p] = this->Motion.Position(rest.points[p], t, &tree.velocity[p]);
+      tree.displacement[p] = tree.points[p] - rest.points[p];
+      tree.radius[p] *= radiusFactor;
+    }
+    return tree;
+  }
+
+  /// Share of the contrast that is lost at each tree point, and over the whole image.
+  std::vector<double> Lost(double t, double& wholePhase) const
+  {
+    const PhantomTree& tree = this->Anatomy.tree;
+    std::vector<double> lost(tree.points.size(), 0.0);
+    wholePhase = 0.0;
+    for (std::size_t n = 0; n < this->Settings.lostPhases.size(); ++n)
+    {
+      const LostPhase& phase = this->Settings.lostPhases[n];
+      if (std::abs(t - phase.time) > LostTolerance || phase.fraction <= 0.0)
+      {
+        continue;
+      }
+      if (phase.fraction >= 1.0)
+      {
+        wholePhase = 1.0;
+        std::fill(lost.begin(), lost.end(), 1.0);
+        continue;
+      }
+      // Connected stretches of the tree: where a smooth random field exceeds its quantile.
+      const SmoothRandomField field(this->Settings.seed, LostPurpose + n, 15.0);
+      std::vector<double> value(tree.points.size());
+      for (std::size_t p = 0; p < value.size(); ++p)
+      {
+        value[p] = field(tree.points[p]);
+      }
+      std::vector<double> sorted = value;
+      const auto rank = static_cast<std::size_t>(
+        (1.0 - phase.fraction) * static_cast<double>(sorted.size() - 1));
+      std::nth_element(sorted.begin(), sorted.begin() + rank, sorted.end());
+      for (std::size_t p = 0; p < value.size(); ++p)
+      {
+        lost[p] = std::max(lost[p], SmoothStep((value[p] - sorted[rank]) / 0.2 + 0.5));
+      }
+    }
+    return lost;
+  }
+
+  PhantomSettings Settings;
+  PhantomAnatomy Anatomy;
+  PhantomMotion Motion;
+  PhantomImage Image;
+
+  std::mutex SurfaceMutex;
+  PhantomSurface RestSurface; ///< empty until the first call of Surface
+};
+
+CoronaryPhantom::CoronaryPhantom(const PhantomSettings& settings)
+  : Data(std::make_unique<Internals>(settings))
+{
+}
+
+CoronaryPhantom::~CoronaryPhantom() = default;
+
+const PhantomSettings& CoronaryPhantom::Settings() const
+{
+  return this->Data->Settings;
+}
+
+Vector3 CoronaryPhantom::Position(const Vector3& reference, double t) const
+{
+  return this->Data->Motion.Position(reference, t);
+}
+
+Vector3 CoronaryPhantom::Velocity(const Vector3& reference, double t) const
+{
+  Vector3 velocity;
+  this->Data->Motion.Position(reference, t, &velocity);
+  return velocity;
+}
+
+Vector3 CoronaryPhantom::ReferencePosition(const Vector3& position, double t) const
+{
+  return this->Data->Motion.ReferencePosition(position, t, position, 1e-7);
+}
+
+PhantomTree CoronaryPhantom::Tree(double t) const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  PhantomTree tree = this->Data->Move(anatomy.tree, t, this->Data->RadiusFactor(t));
+  double wholePhase = 0.0;
+  const std::vector<double> lost = this->Data->Lost(t, wholePhase);
+  const double window = this->Data->Settings.temporalWindow / this->Data->Settings.cycleLength;
+  constexpr int pieces = 4;
+  for (std::size_t p = 0; p < tree.points.size(); ++p)
+  {
+    double blur = 0.0;
+    if (window > 0.0)
+    {
+      Vector3 before = this->Data->Motion.Position(anatomy.tree.points[p], t - 0.5 * window);
+      for (int i = 1; i <= pieces; ++i)
+      {
+        const Vector3 after =
+          this->Data->Motion.Position(anatomy.tree.points[p], t + window * (double(i) / pieces - 0.5));
+        blur += (after - before).norm();
+        before = after;
+      }
+    }
+    const double diameter = 2.0 * tree.radius[p];
+    tree.visibility[p] =
+      anatomy.occluded[p] ? 0.0 : (1.0 - lost[p]) * diameter / (diameter + blur);
+  }
+  return tree;
+}
+
+PhantomTree CoronaryPhantom::Vein(double t) const
+{
+  return this->Data->Move(this->Data->Anatomy.vein, t, 1.0);
+}
+
+std::vector<PhantomOstium> CoronaryPhantom::Ostia(double t) const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  std::vector<PhantomOstium> ostia;
+  for (const VesselEnd& end : anatomy.ends)
+  {
+    if (end.entityId <= 3)
+    {
+      const Vector3 position = this->Position(anatomy.tree.points[end.point], t);
+      const Vector3 inside = this->Position(anatomy.tree.points[end.neighbour], t);
+      ostia.push_back({ end.entityId == 2 ? "LCA" : "RCA", position,
+        (inside - position).normalized(),
+        anatomy.tree.radius[end.point] * this->Data->RadiusFactor(t) });
+    }
+  }
+  return ostia;
+}
+
+PhantomSurface CoronaryPhantom::Surface(double t, const ProgressCallback& progress) const
+{
+  Internals& data = *this->Data;
+  const PhantomAnatomy& anatomy = data.Anatomy;
+  double from = 0.0;
+  {
+    const std::lock_guard<std::mutex> lock(data.SurfaceMutex);
+    if (data.RestSurface.points.empty())
+    {
+      from = 0.7;
+      const PhantomLumen lumen(anatomy, anatomy.tree.points, anatomy.tree.radius, 2.5);
+      data.RestSurface = MeshLumen(anatomy, lumen, data.Settings.surfaceSpacing,
+        progress ? ProgressCallback([&](double f) { return progress(0.7 * f); })
+                 : ProgressCallback());
+    }
+  }
+  PhantomSurface surface = data.RestSurface;
+  const PhantomTree tree = data.Move(anatomy.tree, t, data.RadiusFactor(t));
+  const PhantomLumen lumen(anatomy, tree.points, tree.radius, 2.5);
+  ParallelFor(
+    static_cast<std::int64_t>(surface.points.size()), 512,
+    [&](std::int64_t first, std::int64_t last) {
+      for (std::int64_t p = first; p < last; ++p)
+      {
+        const Vector3 rest = surface.points[p];
+        Vector3 position = data.Motion.Position(rest, t);
+        lumen.Project(position, 1e-4);
+        surface.points[p] = position;
+        surface.displacement[p] = position - rest;
+      }
+    },
+    progress
+      ? ProgressCallback([&](double f) { return progress(from + (1.0 - from) * f); })
+      : ProgressCallback());
+  return surface;
+}
+
+double CoronaryPhantom::LumenDistance(const Vector3& position, double t) const
+{
+  const Internals& data = *this->Data;
+  const PhantomTree tree = data.Move(data.Anatomy.tree, t, data.RadiusFactor(t));
+  const PhantomLumen lumen(data.Anatomy, tree.points, tree.radius, farAway);
+  return std::max(-farAway, lumen.Evaluate(position).distance);
+}
+
+ImageGrid CoronaryPhantom::DefaultGrid(double spacing, double margin) const
+{
+  if (!(spacing > 0.0) || !std::isfinite(spacing) || !std::isfinite(margin))
+  {
+    throw std::invalid_argument("CoronaryPhantom: the spacing must be positive");
+  }
+  Vector3 low = Vector3::Constant(std::numeric_limits<double>::max());
+  Vector3 high = -low;
+  const PhantomTree& rest = this->Data->Anatomy.tree;
+  constexpr int moments = 20;
+  for (int m = 0; m < moments; ++m)
+  {
+    for (std::size_t p = 0; p < rest.points.size(); p += 4)
+    {
+      const Vector3 position = this->Position(rest.points[p], static_cast<double>(m) / moments);
+      low = low.cwiseMin(position);
+      high = high.cwiseMax(position);
+    }
+  }
+  ImageGrid grid;
+  grid.spacing = Vector3::Constant(spacing);
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    // Round numbers are easier to read in an information panel.
+    grid.origin[axis] = std::floor(low[axis] - margin);
+    grid.extent[2 * axis] = 0;
+    grid.extent[2 * axis + 1] =
+      static_cast<int>(std::ceil((high[axis] + margin - grid.origin[axis]) / spacing));
+  }
+  return grid;
+}
+
+void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& part, double t,
+  std::int16_t* values, const ProgressCallback& progress) const
+{
+  const Internals& data = *this->Data;
+  const double window = data.Settings.temporalWindow / data.Settings.cycleLength;
+
+  // Moments through the window, weighted like a half scan: flat, with soft ends, and as wide at
+  // half its height as the window. As many as the fastest point needs for steps of 0.5 mm.
+  int count = 1;
+  if (window > 0.0)
+  {
+    double farthest = 0.0;
+    for (std::size_t p = 0; p < data.Anatomy.tree.points.size(); p += 20)
+    {
+      const Vector3& rest = data.Anatomy.tree.points[p];
+      farthest = std::max(farthest,
+        (data.Motion.Position(rest, t + 0.6 * window) - data.Motion.Position(rest, t)).norm() +
+          (data.Motion.Position(rest, t) - data.Motion.Position(rest, t - 0.6 * window)).norm());
+    }
+    count = std::clamp(2 * static_cast<int>(std::ceil(farthest)) + 1, 5, 15);
+  }
+  std::vector<PhantomMoment> moments;
+  double sum = 0.0;
+  for (int m = 0; m < count; ++m)
+  {
+    const double u = (m + 0.5) / count - 0.5; // of 1.2 windows
+    const double weight = 1.0 - SmoothStep((std::abs(1.2 * u) - 0.4) / 0.2);
+    PhantomMoment moment{ t + 1.2 * u * window, weight, {}, {}, {} };
+    moment.tree = data.Move(data.Anatomy.tree, moment.t, data.RadiusFactor(moment.t));
+    moment.vein = data.Move(data.Anatomy.vein, moment.t, 1.0);
+    for (const Plaque& plaque : data.Anatomy.plaques)
+    {
+      moment.plaques.push_back(data.Motion.Position(plaque.centre, moment.t));
+    }
+    sum += weight;
+    moments.push_back(std::move(moment));
+  }
+  for (PhantomMoment& moment : moments)
+  {
+    moment.weight /= sum;
+  }
+  double wholePhase = 0.0;
+  const std::vector<double> lost = data.Lost(t, wholePhase);
+  data.Image.Render(grid, part, t, moments, lost, wholePhase, values, progress);
+}
+
+std::vector<PhantomMotionSummary> CoronaryPhantom::SummarizeMotion() const
+{
+  const PhantomTree& rest = this->Data->Anatomy.tree;
+  struct Group
+  {
+    const char* name;
+    std::vector<int> segments;
+    double nearest, farthest; // mm from the ostium
+  };
+  const double all = std::numeric_limits<double>::max();
+  const std::vector<Group> groups = { { "LM", { LeftMain }, 0.0, all },
+    { "proximal left tree (5 cm)", { LeftMain, ProximalLAD, MidLAD, ProximalLCx, DistalLCx }, 0.0,
+      50.0 },
+    { "LAD proximal", { ProximalLAD }, 0.0, all }, { "LAD mid", { MidLAD }, 0.0, all },
+    { "LAD distal", { DistalLAD }, 0.0, all },
+    { "diagonals", { FirstDiagonal, SecondDiagonal, ThirdDiagonal }, 0.0, all },
+    { "LCx", { ProximalLCx, DistalLCx }, 0.0, all },
+    { "OM", { FirstObtuseMarginal, SecondObtuseMarginal, ThirdObtuseMarginal }, 0.0, all },
+    { "RCA proximal to mid", { ProximalRCA, MidRCA }, 0.0, all },
+    { "RCA distal", { DistalRCA }, 0.0, all }, { "PDA", { RightPDA, LeftPDA }, 0.0, all },
+    { "PLB", { RightPLB, LeftPLB }, 0.0, all } };
+  constexpr int moments = 200;
+  const double step = 1000.0 * this->Data->Settings.cycleLength / moments; // ms
+
+  std::vector<PhantomMotionSummary> summaries;
+  for (const Group& group : groups)
+  {
+    std::vector<std::size_t> points;
+    for (std::size_t p = 0; p < rest.points.size(); ++p)
+    {
+      if (std::find(group.segments.begin(), group.segments.end(), rest.segmentId[p]) !=
+          group.segments.end() &&
+        rest.abscissa[p] >= group.nearest && rest.abscissa[p] <= group.farthest)
+      {
+        points.push_back(p);
+      }
+    }
+    if (points.empty())
+    {
+      continue;
+    }
+    PhantomMotionSummary summary;
+    summary.name = group.name;
+    double speedSum = 0.0;
+    for (const std::size_t p : points)
+    {
+      std::vector<Vector3> path(moments);
+      for (int m = 0; m < moments; ++m)
+      {
+        Vector3 velocity;
+        path[m] =
+          this->Data->Motion.Position(rest.points[p], static_cast<double>(m) / moments, &velocity);
+        speedSum += velocity.norm();
+        summary.peakSpeed = std::max(summary.peakSpeed, velocity.norm());
+      }
+      double farthest = 0.0;
+      for (int a = 0; a < moments; ++a)
+      {
+        for (int b = a + 1; b < moments; ++b)
+        {
+          farthest = std::max(farthest, (path[a] - path[b]).norm());
+        }
+      }
+      summary.amplitude += farthest / static_cast<double>(points.size());
+      // Longest run of moments that stay pairwise within 1 mm.
+      const auto longest = [&](double from, double to) {
+        int best = 0;
+        const int last = static_cast<int>(to * moments);
+        for (int a = static_cast<int>(from * moments); a < last; ++a)
+        {
+          int b = a + 1;
+          for (bool quiet = true; b < last && quiet; b += quiet ? 1 : 0)
+          {
+            for (int c = a; c < b && quiet; ++c)
+            {
+              quiet = (path[b] - path[c]).norm() < 1.0;
+            }
+          }
+          best = std::max(best, b - 1 - a);
+        }
+        return best * step;
+      };
+      summary.systolicRest += longest(0.20, 0.55) / static_cast<double>(points.size());
+      summary.diastolicRest += longest(0.55, 0.95) / static_cast<double>(points.size());
+    }
+    summary.meanSpeed = speedSum / static_cast<double>(points.size() * moments);
+
+    double lengthAtRest = 0.0;
+    double lengthAtSystole = 0.0;
+    for (const AxisStep& axisStep : this->Data->Anatomy.steps)
+    {
+      const bool member =
+        std::binary_search(points.begin(), points.end(),
+          static_cast<std::size_t>(axisStep.first)) &&
+        std::binary_search(
+          points.begin(), points.end(), static_cast<std::size_t>(axisStep.second));
+      if (member)
+      {
+        const Vector3& p = rest.points[axisStep.first];
+        const Vector3& q = rest.points[axisStep.second];
+        lengthAtRest += (this->Position(q, 0.0) - this->Position(p, 0.0)).norm();
+        lengthAtSystole += (this->Position(q, 0.35) - this->Position(p, 0.35)).norm();
+      }
+    }
+    summary.systolicStrain = lengthAtRest > 0.0 ? lengthAtSystole / lengthAtRest - 1.0 : 0.0;
+    summaries.push_back(summary);
+  }
+  return summaries;
+}
+
+std::vector<double> EvenPhases(int count)
+{
+  if (count < 1)
+  {
+    throw std::invalid_argument("the number of phases must be at least 1");
+  }
+  if (count == 1)
+  {
+    return { 0.75 };
+  }
+  std::vector<double> phases(count);
+  for (int i = 0; i < count; ++i)
+  {
+    phases[i] = -0.05 + 1.11 * i / (count - 1);
+  }
+  return phases;
+}
+
+std::vector<double> PaperPhases()
+{
+  return EvenPhases(20);
+}
+}

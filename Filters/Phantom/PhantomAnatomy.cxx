@@ -1,0 +1,788 @@
+#include "PhantomAnatomy.h"
+
+#include "CounterRandom.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+
+// Streams of the random generator, so that one part of the anatomy does not shift another.
+enum Purpose : std::uint64_t
+{
+  PositionX = 101,
+  PositionY = 102,
+  PositionZ = 103,
+  Calibre = 104,
+  Size = 105,
+  Waves = 106,
+  Stenoses = 107,
+  Plaques = 108
+};
+
+/// A control point of a vessel's course and the lumen diameter there.
+struct Control
+{
+  Vector3 position; ///< world, mm, in the mean heart of size 1
+  double diameter;  ///< mm
+};
+
+/// How much a vessel is drawn to the epicardial surface.
+enum class Course
+{
+  Epicardial,
+  Intramural
+};
+
+struct VesselPlan
+{
+  std::string name;
+  int tree;
+  std::string parent; ///< empty: starts at an ostium
+  Course course;
+  std::vector<Control> controls;
+  /// Segment from the start, then from the origin of the named child vessel on.
+  int segment;
+  std::vector<std::pair<std::string, int>> changes;
+};
+
+Control At(double l, double p, double s, double diameter)
+{
+  return { Vector3(l, p, s), diameter };
+}
+
+/// A control point by azimuth (degrees) and height (mm) on the epicardium of the mean heart.
+Control On(double azimuth, double height, double diameter)
+{
+  static const HeartFrame mean;
+  return { mean.ToWorld(HeartFrame::OnEpicardium(azimuth, height)), diameter };
+}
+
+/// Control points: Dodge 1988 (positions) and 1992 (diameters of right-dominant men), in the order
+/// of the vessel; points that Dodge does not give are placed by azimuth and height.
+std::vector<VesselPlan> PlanVessels(const PhantomSettings& settings)
+{
+  const bool rightDominant = settings.dominance == Dominance::Right;
+  const bool leftDominant = settings.dominance == Dominance::Left;
+  std::vector<VesselPlan> plans;
+
+  plans.push_back({ "LAD", 0, "", Course::Epicardial,
+    { At(0.0, 0.0, 0.0, 4.5), At(6.9, -1.2, 0.5, 4.5), At(10.8, -2.1, 0.0, 4.4),
+      At(15.0, -5.5, -0.8, 3.7), At(20.4, -10.4, -2.0, 3.6), At(25.6, -15.4, -2.6, 3.5),
+      At(30.7, -24.9, -6.3, 2.9), At(36.0, -37.3, -11.0, 2.5), At(39.1, -48.3, -19.0, 2.3),
+      At(40.1, -61.8, -31.3, 2.0), At(42.8, -74.2, -53.5, 1.7), At(46.6, -77.5, -75.8, 1.4),
+      At(44.9, -71.9, -87.8, 1.3), At(42.2, -64.9, -89.1, 1.1), At(39.2, -58.2, -89.8, 0.9) },
+    LeftMain, { { "LCx", ProximalLAD }, { "D1", MidLAD }, { "D3", DistalLAD } } });
+
+  VesselPlan circumflex{ "LCx", 0, "LAD", Course::Epicardial,
+    { At(10.8, -2.1, 0.0, 3.4), At(13.7, -1.0, -2.9, 3.4), At(16.4, 1.1, -7.3, 3.4),
+      At(18.4, 3.9, -11.3, 3.3), At(20.9, 6.4, -14.2, 2.8), At(22.3, 10.9, -18.7, 2.8),
+      At(23.5, 13.6, -23.6, 2.7), At(23.5, 17.0, -29.0, 1.7), At(20.9, 20.9, -36.5, 1.6),
+      At(19.0, 23.5, -44.8, 1.3) },
+    ProximalLCx, { { "OM1", DistalLCx } } };
+  if (rightDominant)
+  {
+    circumflex.controls.push_back(At(18.2, 18.6, -51.8, 1.1));
+  }
+  else
+  {
+    // The circumflex goes on around the groove, and is larger for it.
+    const double larger = leftDominant ? 4.2 / 3.4 : 3.8 / 3.4;
+    for (Control& control : circumflex.controls)
+    {
+      control.diameter = std::max(control.diameter * larger, leftDominant ? 2.6 : 2.3);
+    }
+    circumflex.controls.push_back(On(-50.0, 1.0, leftDominant ? 2.5 : 2.2));
+    circumflex.controls.push_back(On(-68.0, 1.0, leftDominant ? 2.4 : 2.1));
+    if (leftDominant)
+    {
+      for (const Control& control :
+        { On(-88.0, 1.0, 2.3), On(-108.0, 2.0, 2.2), On(-124.0, 7.0, 2.1), On(-126.0, 20.0, 2.0),
+          On(-120.0, 38.0, 1.7), On(-112.0, 59.0, 1.3), On(-106.0, 69.0, 1.0) })
+      {
+        circumflex.controls.push_back(control);
+      }
+      circumflex.changes.emplace_back("L-PLB", LeftPDA);
+    }
+    else
+    {
+      for (const Control& control :
+        { On(-76.0, 8.0, 2.0), On(-78.0, 20.0, 1.7), On(-77.0, 34.0, 1.4), On(-76.0, 46.0, 1.0) })
+      {
+        circumflex.controls.push_back(control);
+      }
+      circumflex.changes.emplace_back("OM3", LeftPLB);
+    }
+  }
+  plans.push_back(circumflex);
+  if (leftDominant)
+  {
+    plans.push_back({ "L-PLB", 0, "LCx", Course::Epicardial,
+      { On(-68.0, 1.0, 1.9), On(-72.0, 10.0, 1.8), On(-74.0, 22.0, 1.6), On(-75.0, 35.0, 1.3),
+        On(-76.0, 46.0, 1.0) },
+      LeftPLB, {} });
+  }
+
+  plans.push_back({ "D1", 0, "LAD", Course::Epicardial,
+    { At(27.7, -15.4, -4.5, 2.1), At(35.8, -19.8, -9.4, 1.9), At(49.9, -27.7, -24.2, 1.5),
+      At(60.4, -33.8, -34.2, 1.2), At(64.8, -39.2, -45.0, 0.9) },
+    FirstDiagonal, {} });
+  plans.push_back({ "D2", 0, "LAD", Course::Epicardial,
+    { At(35.1, -32.7, -10.2, 1.9), At(41.5, -38.7, -16.3, 1.7), At(53.1, -46.1, -31.3, 1.4),
+      At(60.6, -52.2, -42.1, 1.1), At(63.0, -56.1, -53.2, 0.9) },
+    SecondDiagonal, {} });
+  plans.push_back({ "D3", 0, "LAD", Course::Epicardial,
+    { At(41.2, -47.4, -20.4, 1.7), At(45.3, -52.1, -26.5, 1.6), At(55.2, -59.2, -39.5, 1.3),
+      At(60.0, -63.5, -50.5, 0.9) },
+    ThirdDiagonal, {} });
+  plans.push_back({ "S1", 0, "LAD", Course::Intramural,
+    { At(28.5, -20.5, -4.8, 1.4), At(25.3, -24.6, -13.0, 1.2), At(21.1, -30.2, -22.1, 1.0),
+      At(18.5, -35.0, -30.0, 0.9) },
+    FirstSeptal, {} });
+  plans.push_back({ "S2", 0, "LAD", Course::Intramural,
+    { At(36.3, -40.0, -12.5, 1.1), At(31.5, -42.6, -20.5, 1.0), At(27.5, -46.0, -28.0, 0.9) },
+    SecondSeptal, {} });
+  plans.push_back({ "S3", 0, "LAD", Course::Intramural,
+    { At(39.6, -54.5, -24.5, 1.1), At(35.0, -55.5, -32.0, 1.0), At(31.5, -58.0, -39.0, 0.9) },
+    ThirdSeptal, {} });
+  plans.push_back({ "OM1", 0, "LCx", Course::Epicardial,
+    { At(18.4, 3.9, -11.3, 2.1), At(30.3, 5.9, -16.4, 2.0), At(44.1, 0.8, -34.5, 1.5),
+      At(53.6, -3.0, -46.4, 1.2), At(57.4, -10.3, -58.3, 0.9) },
+    FirstObtuseMarginal, {} });
+  plans.push_back({ "OM2", 0, "LCx", Course::Epicardial,
+    { At(22.7, 12.0, -22.3, 2.0), At(28.4, 15.1, -30.0, 1.9), At(35.7, 12.3, -46.6, 1.4),
+      At(38.9, 7.9, -57.8, 1.1), At(40.4, 0.7, -68.9, 0.9) },
+    SecondObtuseMarginal, {} });
+  plans.push_back({ "OM3", 0, "LCx", Course::Epicardial,
+    { At(23.6, 19.8, -35.5, 1.5), At(25.4, 20.5, -41.8, 1.5), At(30.4, 16.2, -55.1, 1.3),
+      At(32.0, 11.0, -64.5, 0.9) },
+    ThirdObtuseMarginal, {} });
+  if (settings.ramus)
+  {
+    plans.push_back({ "RI", 0, "LAD", Course::Epicardial,
+      { At(10.8, -2.1, 0.0, 2.0), At(17.0, -4.0, -3.5, 1.9), On(34.0, 16.0, 1.8),
+        On(26.0, 27.0, 1.6), On(18.0, 40.0, 1.3), On(11.0, 52.0, 1.0) },
+      RamusIntermedius, {} });
+  }
+
+  VesselPlan right{ "RCA", 1, "", Course::Epicardial,
+    { At(-14.4, -30.9, -14.5, 4.0), At(-18.8, -32.4, -16.3, 4.0), At(-28.8, -36.7, -21.4, 3.9),
+      At(-35.0, -40.0, -27.5, 3.8), At(-39.1, -40.3, -35.9, 3.5), At(-43.7, -40.4, -48.6, 3.4),
+      At(-45.7, -38.1, -60.3, 3.2), At(-43.3, -33.9, -69.2, 3.2), At(-37.3, -30.5, -74.2, 3.1) },
+    ProximalRCA, { { "RV1", MidRCA }, { "AM1", DistalRCA } } };
+  if (leftDominant)
+  {
+    for (Control& control : right.controls)
+    {
+      control.diameter *= 2.8 / 4.0;
+    }
+    right.controls.back().diameter = 1.3;
+    right.controls[right.controls.size() - 2].diameter = 1.7;
+  }
+  else
+  {
+    right.controls.push_back(At(-28.9, -16.9, -74.6, 2.9));
+    right.changes.emplace_back("R-PDA", RightPLB);
+    if (rightDominant)
+    {
+      for (const Control& control :
+        { At(-14.8, -5.7, -71.1, 2.3), At(-9.6, 1.8, -67.5, 2.0), At(-5.0, 8.0, -67.6, 1.8),
+          At(1.0, 10.0, -73.5, 1.7), At(11.3, 5.8, -80.8, 1.4), At(21.1, 1.7, -77.5, 1.1),
+          At(36.0, -1.6, -75.0, 0.9) })
+      {
+        right.controls.push_back(control);
+      }
+    }
+    else
+    {
+      right.changes.back().second = InferiorRightBranch;
+      right.controls.push_back(At(-17.0, -6.5, -74.0, 1.7));
+      right.controls.push_back(At(-8.0, -5.5, -79.5, 1.3));
+      right.controls.push_back(At(2.7, -8.1, -84.9, 1.0));
+    }
+  }
+  plans.push_back(right);
+  plans.push_back({ "RV1", 1, "RCA", Course::Epicardial,
+    { At(-35.0, -40.0, -27.5, 1.6), On(136.0, 9.0, 1.5), On(127.0, 22.0, 1.3),
+      On(120.0, 35.0, 1.0) },
+    RightVentricularBranch, {} });
+  plans.push_back({ "AM1", 1, "RCA", Course::Epicardial,
+    { At(-45.7, -38.1, -60.3, 1.9), On(171.0, 10.0, 1.8), On(164.0, 26.0, 1.6),
+      On(158.0, 43.0, 1.2), On(154.0, 55.0, 0.9) },
+    AcuteMarginal, {} });
+  if (!leftDominant)
+  {
+    plans.push_back({ "R-PDA", 1, "RCA", Course::Epicardial,
+      { At(-28.9, -16.9, -74.6, 2.2), On(-131.0, 9.0, 2.1), On(-126.0, 22.0, 2.0),
+        On(-120.0, 38.0, 1.7), On(-112.0, 59.0, 1.3), On(-106.0, 69.0, 1.0) },
+      RightPDA, {} });
+  }
+  if (rightDominant)
+  {
+    plans.push_back({ "RI-inferior", 1, "RCA", Course::Epicardial,
+      { At(-13.6, -4.0, -70.8, 1.5), At(-6.5, -4.5, -77.0, 1.5), At(2.7, -8.1, -84.9, 1.4),
+        At(14.0, -14.0, -90.5, 0.9) },
+      InferiorRightBranch, {} });
+  }
+  return plans;
+}
+
+/// A C2 cubic through points, with natural ends, parametrised by chord length.
+class CubicCurve
+{
+public:
+  CubicCurve(std::vector<Vector3> points)
+    : Points(std::move(points))
+  {
+    const std::size_t n = this->Points.size();
+    this->Knots.assign(n, 0.0);
+    for (std::size_t i = 1; i < n; ++i)
+    {
+      // Centripetal steps keep the curve from overshooting where control points crowd.
+      this->Knots[i] = this->Knots[i - 1] + std::sqrt((this->Points[i] - this->Points[i - 1]).norm());
+    }
+    // Tridiagonal system for the second derivatives.
+    this->Second.assign(n, Vector3::Zero());
+    std::vector<double> upper(n, 0.0);
+    std::vector<Vector3> right(n, Vector3::Zero());
+    for (std::size_t i = 1; i + 1 < n; ++i)
+    {
+      const double h0 = this->Knots[i] - this->Knots[i - 1];
+      const double h1 = this->Knots[i + 1] - this->Knots[i];
+      const Vector3 rhs = 6.0 *
+        ((this->Points[i + 1] - this->Points[i]) / h1 - (this->Points[i] - this->Points[i - 1]) / h0);
+      const double pivot = 2.0 * (h0 + h1) - h0 * upper[i - 1];
+      upper[i] = h1 / pivot;
+      right[i] = (rhs - h0 * right[i - 1]) / pivot;
+    }
+    for (std::size_t i = n - 1; i-- > 1;)
+    {
+      this->Second[i] = right[i] - upper[i] * this->Second[i + 1];
+    }
+  }
+
+  double End() const { return this->Knots.back(); }
+  double Knot(std::size_t i) const { return this->Knots[i]; }
+
+  Vector3 operator()(double u) const
+  {
+    const auto upper = std::upper_bound(this->Knots.begin() + 1, this->Knots.end() - 1, u);
+    const std::size_t i = upper - this->Knots.begin();
+    const double h = this->Knots[i] - this->Knots[i - 1];
+    const double a = (this->Knots[i] - u) / h;
+    const double b = 1.0 - a;
+    return a * this->Points[i - 1] + b * this->Points[i] +
+      ((a * a * a - a) * this->Second[i - 1] + (b * b * b - b) * this->Second[i]) * h * h / 6.0;
+  }
+
+private:
+  std::vector<Vector3> Points;
+  std::vector<double> Knots;
+  std::vector<Vector3> Second;
+};
+
+/// A vessel's axis in fine steps, before it is cut into branches.
+struct DenseVessel
+{
+  std::vector<Vector3> points;
+  std::vector<double> arc;
+  std::vector<double> radius;
+  std::size_t parent = std::numeric_limits<std::size_t>::max();
+  double parentArc = 0.0;
+};
+
+void ComputeArc(DenseVessel& vessel)
+{
+  vessel.arc.assign(vessel.points.size(), 0.0);
+  for (std::size_t i = 1; i < vessel.points.size(); ++i)
+  {
+    vessel.arc[i] = vessel.arc[i - 1] + (vessel.points[i] - vessel.points[i - 1]).norm();
+  }
+}
+
+/// Index and fraction of an arc length.
+template <typename Value>
+Value AtArc(const DenseVessel& vessel, const std::vector<Value>& values, double arc)
+{
+  const auto upper = std::upper_bound(vessel.arc.begin() + 1, vessel.arc.end() - 1, arc);
+  const std::size_t i = upper - vessel.arc.begin();
+  const double f =
+    std::clamp((arc - vessel.arc[i - 1]) / (vessel.arc[i] - vessel.arc[i - 1]), 0.0, 1.0);
+  return values[i - 1] * (1.0 - f) + values[i] * f;
+}
+
+/// The random parts of the anatomy, all zero for seed 0.
+class Variation
+{
+public:
+  explicit Variation(const PhantomSettings& settings)
+    : Sigma(settings.seed == 0 ? 0.0 : settings.positionVariation)
+  {
+    if (this->Sigma > 0.0)
+    {
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        this->Fields[axis] = SmoothRandomField(settings.seed, PositionX + axis, 30.0);
+      }
+    }
+  }
+
+  Vector3 operator()(const Vector3& position) const
+  {
+    return this->Sigma *
+      Vector3(this->Fields[0](position), this->Fields[1](position), this->Fields[2](position));
+  }
+
+private:
+  double Sigma;
+  SmoothRandomField Fields[3];
+};
+
+double HeartSize(const PhantomSettings& settings)
+{
+  if (settings.seed == 0)
+  {
+    return 1.0;
+  }
+  return 1.0 + 0.04 * RandomStream(settings.seed, Size).Normal(2.0);
+}
+
+/// Puts a mean-heart control point where this heart has it.
+Vector3 Place(const Control& control, Course course, const HeartFrame& mean,
+  const Variation& variation, double size)
+{
+  const Vector3 q = mean.ToHeart(control.position);
+  // The ostia and the left main lie above the groove, on the aorta, and vary less.
+  const double below = SmoothStep((q[2] + 10.0) / 12.0);
+  const Vector3 varied = control.position + variation(control.position) * (0.4 + 0.6 * below);
+  Vector3 p = mean.ToHeart(varied);
+  if (course == Course::Epicardial)
+  {
+    const double level = HeartFrame::Level(p);
+    const double wanted = 1.0 + 0.3 * (level - 1.0);
+    const double onSurface = HeartFrame::Level(q) > 0.97 ? below : 0.6 * below;
+    p = HeartFrame::Centre +
+      (p - HeartFrame::Centre) * (1.0 + onSurface * (wanted / level - 1.0));
+  }
+  return mean.ToWorld(p) * size;
+}
+
+/// Lateral waves: coronary arteries wind, more so towards their ends.
+void AddWaves(DenseVessel& vessel, const HeartFrame& frame, double strength, RandomStream& random)
+{
+  struct Wave
+  {
+    double number, phase, phaseNormal;
+  };
+  Wave waves[3];
+  for (Wave& wave : waves)
+  {
+    wave.number = 2.0 * Pi / random.Uniform(14.0, 36.0);
+    wave.phase = random.Uniform(0.0, 2.0 * Pi);
+    wave.phaseNormal = random.Uniform(0.0, 2.0 * Pi);
+  }
+  const double length = vessel.arc.back();
+  const std::vector<Vector3> points = vessel.points;
+  for (std::size_t i = 0; i < points.size(); ++i)
+  {
+    const std::size_t before = i == 0 ? 0 : i - 1;
+    const std::size_t after = std::min(points.size() - 1, i + 1);
+    const Vector3 tangent = (points[after] - points[before]).normalized();
+    const Vector3 heart = frame.ToHeart(points[i]) - HeartFrame::Centre;
+    Vector3 normal = frame.axes.transpose() *
+      heart.cwiseQuotient(HeartFrame::Radii.cwiseProduct(HeartFrame::Radii));
+    normal = (normal - normal.dot(tangent) * tangent).normalized();
+    const Vector3 lateral = normal.cross(tangent);
+    const double s = vessel.arc[i];
+    const double envelope =
+      strength * SmoothStep((s - 2.0) / 14.0) * (0.35 + 0.45 * std::min(1.0, s / std::max(60.0, length)));
+    double along = 0.0;
+    double out = 0.0;
+    for (const Wave& wave : waves)
+    {
+      along += std::sin(wave.number * s + wave.phase);
+      out += std::sin(wave.number * s + wave.phaseNormal);
+    }
+    vessel.points[i] += envelope * (0.8 * along * lateral + 0.25 * out * normal);
+  }
+}
+
+/// Monotone-safe interpolation of the control diameters over the control points' arc lengths.
+double InterpolateDiameter(
+  const std::vector<double>& at, const std::vector<double>& diameter, double s)
+{
+  const auto upper = std::upper_bound(at.begin() + 1, at.end() - 1, s);
+  const std::size_t i = upper - at.begin();
+  const double f = std::clamp((s - at[i - 1]) / (at[i] - at[i - 1]), 0.0, 1.0);
+  return diameter[i - 1] + f * (diameter[i] - diameter[i - 1]);
+}
+
+int Strahler(PhantomTree& tree, std::size_t branch)
+{
+  int highest = 0;
+  int count = 0;
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    if (tree.branches[b].parentGroupId == tree.branches[branch].groupId)
+    {
+      const int order = Strahler(tree, b);
+      count = order == highest ? count + 1 : (order > highest ? 1 : count);
+      highest = std::max(highest, order);
+    }
+  }
+  const int order = highest == 0 ? 1 : (count > 1 ? highest + 1 : highest);
+  tree.branches[branch].strahlerOrder = order;
+  return order;
+}
+}
+
+PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
+  : frame(HeartSize(settings))
+{
+  const HeartFrame mean;
+  const Variation variation(settings);
+  const std::vector<VesselPlan> plans = PlanVessels(settings);
+  std::map<std::string, std::size_t> byName;
+  for (std::size_t v = 0; v < plans.size(); ++v)
+  {
+    byName[plans[v].name] = v;
+    this->vesselNames.push_back(plans[v].name);
+    this->intramural.push_back(plans[v].course == Course::Intramural);
+  }
+
+  // Courses and calibres.
+  RandomStream calibre(settings.seed, Calibre);
+  std::vector<DenseVessel> dense(plans.size());
+  for (std::size_t v = 0; v < plans.size(); ++v)
+  {
+    const VesselPlan& plan = plans[v];
+    DenseVessel& vessel = dense[v];
+    std::vector<Vector3> controls;
+    for (const Control& control : plan.controls)
+    {
+      controls.push_back(Place(control, plan.course, mean, variation, this->frame.size));
+    }
+    double parentRadius = 0.0;
+    if (!plan.parent.empty())
+    {
+      vessel.parent = byName.at(plan.parent);
+      const DenseVessel& parent = dense[vessel.parent];
+      std::size_t nearest = 0;
+      for (std::size_t i = 1; i < parent.points.size(); ++i)
+      {
+        if ((parent.points[i] - controls[0]).squaredNorm() <
+          (parent.points[nearest] - controls[0]).squaredNorm())
+        {
+          nearest = i;
+        }
+      }
+      vessel.parentArc = parent.arc[nearest];
+      parentRadius = parent.radius[nearest];
+      // The parent's waves carry the origin along, and the first part of the side vessel with it.
+      const Vector3 shift = parent.points[nearest] - controls[0];
+      const Vector3 origin = controls[0];
+      for (Vector3& control : controls)
+      {
+        control += shift * std::exp(-(control - origin).norm() / 15.0);
+      }
+      controls[0] = parent.points[nearest];
+    }
+    const CubicCurve curve(controls);
+    const int fine = static_cast<int>(
+      std::ceil(40.0 * static_cast<double>(controls.size())));
+    for (int i = 0; i <= fine; ++i)
+    {
+      vessel.points.push_back(curve(curve.End() * i / fine));
+    }
+    ComputeArc(vessel);
+    if (settings.seed != 0 && settings.tortuosity > 0.0)
+    {
+      RandomStream waves(settings.seed, Waves + 1000 * (v + 1));
+      AddWaves(vessel, this->frame, settings.tortuosity, waves);
+      ComputeArc(vessel);
+    }
+
+    std::vector<double> at;
+    std::vector<double> diameters;
+    const double vesselFactor = settings.calibre *
+      (settings.seed == 0 ? 1.0 : 1.0 + settings.calibreVariation * calibre.Normal(2.0));
+    for (std::size_t c = 0; c < controls.size(); ++c)
+    {
+      const double position = curve.Knot(c) / curve.End() * fine;
+      const auto index = std::min(static_cast<std::size_t>(position), vessel.arc.size() - 2);
+      at.push_back(vessel.arc[index] +
+        (position - static_cast<double>(index)) * (vessel.arc[index + 1] - vessel.arc[index]));
+      diameters.push_back(plan.controls[c].diameter * vesselFactor);
+    }
+    for (double s : vessel.arc)
+    {
+      // Three averaged samples take the corners out of the taper.
+      double diameter = 0.0;
+      for (const double offset : { -2.0, 0.0, 2.0 })
+      {
+        diameter += InterpolateDiameter(at, diameters, s + offset) / 3.0;
+      }
+      // A side vessel is never as wide as the vessel that it leaves.
+      const double widest = parentRadius > 0.0 ? 0.9 * parentRadius : diameter;
+      vessel.radius.push_back(std::min(0.5 * diameter, widest));
+    }
+  }
+
+  // Lesions, away from the bifurcations so that a narrowing is where it is said to be.
+  const std::vector<std::string> hosts = settings.dominance == Dominance::Left
+    ? std::vector<std::string>{ "LAD", "LCx", "D1", "OM1" }
+    : std::vector<std::string>{ "LAD", "RCA", "LCx", "D1" };
+  const auto clearOfJunctions = [&](std::size_t host, double s, double distance) {
+    for (const DenseVessel& child : dense)
+    {
+      if (child.parent == host && std::abs(child.parentArc - s) < distance)
+      {
+        return false;
+      }
+    }
+    return true;
+  };
+  const auto pickPlace = [&](RandomStream& random, int number, double distance) {
+    const std::size_t host = byName.at(hosts[number % hosts.size()]);
+    const double last = std::min(80.0, dense[host].arc.back() - 10.0);
+    double s = random.Uniform(8.0, last);
+    for (int attempt = 0; attempt < 200 && !clearOfJunctions(host, s, distance); ++attempt)
+    {
+      s = random.Uniform(8.0, last);
+    }
+    return std::make_pair(host, s);
+  };
+  RandomStream stenosisRandom(settings.seed, Stenoses);
+  for (int n = 0; n < settings.stenoses; ++n)
+  {
+    const auto [host, position] = pickPlace(stenosisRandom, n, 5.0);
+    const double width = stenosisRandom.Uniform(6.0, 12.0) / 2.3548;
+    DenseVessel& vessel = dense[host];
+    for (std::size_t i = 0; i < vessel.points.size(); ++i)
+    {
+      const double u = (vessel.arc[i] - position) / width;
+      vessel.radius[i] *= 1.0 - settings.stenosisDegree * std::exp(-0.5 * u * u);
+    }
+  }
+  RandomStream plaqueRandom(settings.seed, Plaques);
+  for (int n = 0; n < settings.calcifiedPlaques; ++n)
+  {
+    const auto [host, position] = pickPlace(plaqueRandom, n, 3.0);
+    const DenseVessel& vessel = dense[host];
+    const Vector3 centre = AtArc(vessel, vessel.points, position);
+    const Vector3 tangent =
+      (AtArc(vessel, vessel.points, position + 0.5) - AtArc(vessel, vessel.points, position - 0.5))
+        .normalized();
+    const Vector3 side = tangent.unitOrthogonal();
+    const double angle = plaqueRandom.Uniform(0.0, 2.0 * Pi);
+    const Vector3 out = std::cos(angle) * side + std::sin(angle) * tangent.cross(side);
+    const double radius = plaqueRandom.Uniform(0.5, 1.2);
+    this->plaques.push_back(
+      { centre + out * (AtArc(vessel, vessel.radius, position) + 0.5 * radius), radius });
+  }
+  double occlusionStart = 0.0;
+  double occlusionEnd = 0.0;
+  const std::size_t occludedVessel = byName.at("RCA");
+  if (settings.chronicOcclusion)
+  {
+    const double origin = dense[byName.at("RV1")].parentArc;
+    const double next = dense[byName.at("AM1")].parentArc;
+    const double length = std::min(15.0, next - origin - 8.0);
+    occlusionStart = 0.5 * (origin + next - length);
+    occlusionEnd = occlusionStart + length;
+  }
+
+  // Cut into branches at the origins of the side vessels, and resample evenly in between.
+  std::vector<std::vector<std::pair<double, std::size_t>>> children(plans.size());
+  for (std::size_t v = 0; v < plans.size(); ++v)
+  {
+    if (dense[v].parent < plans.size())
+    {
+      children[dense[v].parent].emplace_back(dense[v].parentArc, v);
+    }
+  }
+  const auto addPoint = [&](std::size_t v, double arc, double abscissa, int segment) {
+    const DenseVessel& vessel = dense[v];
+    this->tree.points.push_back(AtArc(vessel, vessel.points, arc));
+    this->tree.radius.push_back(AtArc(vessel, vessel.radius, arc));
+    this->tree.abscissa.push_back(abscissa);
+    this->tree.segmentId.push_back(segment);
+    this->pointVessel.push_back(static_cast<int>(v));
+    this->occluded.push_back(settings.chronicOcclusion && v == occludedVessel &&
+      arc >= occlusionStart && arc <= occlusionEnd);
+    return static_cast<std::int64_t>(this->tree.points.size()) - 1;
+  };
+  // Depth first, so that a parent has a lower id than its daughters.
+  const std::function<void(std::size_t, std::int64_t, int)> cut =
+    [&](std::size_t v, std::int64_t origin, int parentGroup) {
+      const DenseVessel& vessel = dense[v];
+      const VesselPlan& plan = plans[v];
+      std::sort(children[v].begin(), children[v].end());
+      int segment = plan.segment;
+      double from = 0.0;
+      const double base = origin < 0 ? 0.0 : this->tree.abscissa[origin];
+      std::int64_t last = origin;
+      if (last < 0)
+      {
+        last = addPoint(v, 0.0, 0.0, segment);
+        this->ends.push_back({ static_cast<int>(v), last, last + 1, plan.tree == 0 ? 2 : 3 });
+      }
+      struct Waiting
+      {
+        std::size_t vessel;
+        std::int64_t point;
+        int group;
+      };
+      std::vector<Waiting> waiting;
+      std::size_t next = 0;
+      int group = parentGroup;
+      while (from < vessel.arc.back())
+      {
+        const bool toEnd = next == children[v].size();
+        const double to = toEnd ? vessel.arc.back() : children[v][next].first;
+        PhantomBranch branch;
+        branch.groupId = static_cast<int>(this->tree.branches.size());
+        branch.parentGroupId = group;
+        branch.treeId = plan.tree;
+        branch.generation = group < 0 ? 0 : this->tree.branches[group].generation + 1;
+        branch.segmentId = segment;
+        branch.points.push_back(last);
+        const int count =
+          std::max(2, static_cast<int>(std::lround((to - from) / settings.centerlineSpacing)));
+        for (int i = 1; i <= count; ++i)
+        {
+          const double arc = from + (to - from) * i / count;
+          const std::int64_t point = addPoint(v, arc, base + arc, segment);
+          this->steps.push_back({ last, point, static_cast<int>(v), branch.groupId });
+          branch.points.push_back(point);
+          last = point;
+        }
+        branch.length = to - from;
+        branch.tortuosity = branch.length /
+            (this->tree.points[branch.points.back()] - this->tree.points[branch.points.front()])
+              .norm() -
+          1.0;
+        group = branch.groupId;
+        this->tree.branches.push_back(branch);
+        from = to;
+        while (next < children[v].size() && children[v][next].first <= to)
+        {
+          const std::size_t child = children[v][next].second;
+          waiting.push_back({ child, last, group });
+          this->junctions.push_back({ static_cast<int>(v), static_cast<int>(child), last });
+          for (const auto& change : plan.changes)
+          {
+            if (change.first == plans[child].name)
+            {
+              segment = change.second;
+            }
+          }
+          ++next;
+        }
+      }
+      this->ends.push_back(
+        { static_cast<int>(v), last, last - 1, 4 + static_cast<int>(this->ends.size()) });
+      for (const Waiting& child : waiting)
+      {
+        cut(child.vessel, child.point, child.group);
+      }
+    };
+  for (std::size_t v = 0; v < plans.size(); ++v)
+  {
+    if (dense[v].parent >= plans.size())
+    {
+      cut(v, -1, -1);
+    }
+  }
+  this->tree.displacement.assign(this->tree.points.size(), Vector3::Zero());
+  this->tree.velocity.assign(this->tree.points.size(), Vector3::Zero());
+  this->tree.visibility.assign(this->tree.points.size(), 1.0);
+  for (std::size_t b = 0; b < this->tree.branches.size(); ++b)
+  {
+    if (this->tree.branches[b].parentGroupId < 0)
+    {
+      Strahler(this->tree, b);
+    }
+  }
+
+  // The great cardiac vein: beside the LAD from the apex up, then in the groove beside the LCx.
+  {
+    const Variation shift(settings);
+    const auto beside = [&](const std::string& name, double arc, double away, double out) {
+      const DenseVessel& vessel = dense[byName.at(name)];
+      const Vector3 p = AtArc(vessel, vessel.points, arc);
+      const Vector3 tangent =
+        (AtArc(vessel, vessel.points, arc + 1.0) - AtArc(vessel, vessel.points, arc - 1.0))
+          .normalized();
+      const Vector3 heart = this->frame.ToHeart(p) - HeartFrame::Centre;
+      Vector3 normal = this->frame.axes.transpose() *
+        heart.cwiseQuotient(HeartFrame::Radii.cwiseProduct(HeartFrame::Radii));
+      normal = (normal - normal.dot(tangent) * tangent).normalized();
+      return Vector3(p + away * normal.cross(tangent) + out * normal);
+    };
+    std::vector<Vector3> controls;
+    const DenseVessel& anterior = dense[byName.at("LAD")];
+    const double origin = dense[byName.at("D1")].parentArc;
+    for (double s = std::min(115.0, anterior.arc.back() - 25.0); s > origin + 4.0; s -= 12.0)
+    {
+      const double clearance = AtArc(anterior, anterior.radius, s) + 2.4;
+      controls.push_back(beside("LAD", s, clearance, 0.4));
+    }
+    const DenseVessel& groove = dense[byName.at("LCx")];
+    const double turn = dense[byName.at("OM1")].parentArc;
+    for (double s = turn - 2.0; s < std::min(groove.arc.back() - 2.0, 75.0); s += 9.0)
+    {
+      const double clearance = AtArc(groove, groove.radius, s) + 2.8;
+      controls.push_back(beside("LCx", s, -clearance, 0.6));
+    }
+    const CubicCurve curve(controls);
+    PhantomBranch branch;
+    branch.treeId = 2;
+    const int fine = 400;
+    DenseVessel course;
+    for (int i = 0; i <= fine; ++i)
+    {
+      course.points.push_back(curve(curve.End() * i / fine));
+    }
+    ComputeArc(course);
+    const int count = std::max(
+      2, static_cast<int>(std::lround(course.arc.back() / settings.centerlineSpacing)));
+    for (int i = 0; i <= count; ++i)
+    {
+      const double s = course.arc.back() * i / count;
+      branch.points.push_back(i);
+      this->vein.points.push_back(AtArc(course, course.points, s));
+      this->vein.radius.push_back(0.8 + 0.9 * s / course.arc.back());
+      this->vein.abscissa.push_back(s);
+      this->vein.segmentId.push_back(0);
+    }
+    branch.length = course.arc.back();
+    branch.tortuosity =
+      branch.length / (this->vein.points.back() - this->vein.points.front()).norm() - 1.0;
+    this->vein.branches.push_back(branch);
+    this->vein.displacement.assign(this->vein.points.size(), Vector3::Zero());
+    this->vein.velocity = this->vein.displacement;
+    this->vein.visibility.assign(this->vein.points.size(), 1.0);
+  }
+
+  // The aortic root goes through both ostia.
+  this->leftOstium = dense[byName.at("LAD")].points.front();
+  this->rightOstium = dense[byName.at("RCA")].points.front();
+  this->aorticCentre = 0.5 * (this->leftOstium + this->rightOstium);
+  this->aorticRadius = 0.5 * (this->leftOstium - this->rightOstium).norm();
+  const Vector3 across = (this->leftOstium - this->rightOstium).normalized();
+  const Vector3 up(-0.30, -0.20, 0.93);
+  this->aorticAxis = (up - up.dot(across) * across).normalized();
+  const Vector3 trunk(14.0, -38.0, 8.0);
+  this->pulmonaryBase = (trunk + variation(trunk) * 0.4) * this->frame.size;
+  this->pulmonaryAxis = Vector3(0.15, 0.5, 0.85).normalized();
+}
+}

@@ -1,0 +1,74 @@
+/**
+ * @file PhantomAnatomy.h
+ * @brief The phantom's vessels at rest: courses, calibres, branching, lesions.
+ */
+#ifndef DynamicCoronary_PhantomAnatomy_h
+#define DynamicCoronary_PhantomAnatomy_h
+
+#include "PhantomMotion.h"
+
+namespace coronary
+{
+/// A calcification on a vessel's wall.
+struct Plaque
+{
+  Vector3 centre; ///< mm, at rest
+  double radius;  ///< mm
+};
+
+/// A place where a side vessel leaves its parent.
+struct Junction
+{
+  int parentVessel;
+  int childVessel;
+  std::int64_t point; ///< index of the shared axis point
+};
+
+/// A free end of a vessel: an ostium or a tip.
+struct VesselEnd
+{
+  int vessel;
+  std::int64_t point;    ///< the end
+  std::int64_t neighbour; ///< the axis point beside it; the outward normal is point - neighbour
+  int entityId;
+};
+
+/// One step of the axes, between two consecutive points of a vessel.
+struct AxisStep
+{
+  std::int64_t first;
+  std::int64_t second;
+  int vessel;
+  int branch;
+};
+
+/// Arterial trees at rest. "Vessel" means a smooth tube with a name (the LAD from the left main to
+/// the apex); "branch" means its piece between two bifurcations, as in the output tree.
+struct PhantomAnatomy
+{
+  PhantomAnatomy(const PhantomSettings& settings);
+
+  HeartFrame frame;
+  PhantomTree tree; ///< at rest; displacement and velocity zero
+  std::vector<int> pointVessel;
+  std::vector<char> occluded;      ///< per point
+  std::vector<char> intramural;    ///< per vessel: runs in the myocardium, without fat
+  std::vector<AxisStep> steps;
+  std::vector<Junction> junctions;
+  std::vector<VesselEnd> ends;
+  std::vector<Plaque> plaques;
+  std::vector<std::string> vesselNames;
+
+  PhantomTree vein;
+
+  Vector3 leftOstium;
+  Vector3 rightOstium;
+  Vector3 aorticCentre; ///< centre of the aortic root, mm
+  Vector3 aorticAxis;   ///< unit vector out of the heart
+  double aorticRadius;  ///< mm
+  Vector3 pulmonaryBase; ///< a point on the pulmonary trunk's axis, mm
+  Vector3 pulmonaryAxis;
+};
+}
+
+#endif

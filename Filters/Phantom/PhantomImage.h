@@ -1,0 +1,54 @@
+/**
+ * @file PhantomImage.h
+ * @brief Cardiac CT images of the phantom.
+ */
+#ifndef DynamicCoronary_PhantomImage_h
+#define DynamicCoronary_PhantomImage_h
+
+#include "PhantomLumen.h"
+
+namespace coronary
+{
+/// Everything of one moment inside the temporal window.
+struct PhantomMoment
+{
+  double t;
+  double weight; ///< of all moments together: 1
+  PhantomTree tree;
+  PhantomTree vein;
+  std::vector<Vector3> plaques;
+};
+
+/**
+ * Renders voxels. Blurring by the point spread function and by the voxel's own size is done in
+ * closed form: a wall's profile is the error function, a small vessel's the integral of a Gaussian
+ * over a disc. So there is no sampling error and no filtering pass.
+ */
+class PhantomImage
+{
+public:
+  PhantomImage(
+    const PhantomSettings& settings, const PhantomAnatomy& anatomy, const PhantomMotion& motion);
+
+  /// See CoronaryPhantom::Render. `lost` gives the share of contrast lost at each tree point.
+  void Render(const ImageGrid& grid, const std::array<int, 6>& part, double t,
+    const std::vector<PhantomMoment>& moments, const std::vector<double>& lost,
+    double wholePhaseLost, std::int16_t* values, const ProgressCallback& progress) const;
+
+  /// Standard deviation of the noise at time t, HU.
+  double NoiseLevel(double t, double wholePhaseLost) const;
+
+private:
+  const PhantomSettings& Settings;
+  const PhantomAnatomy& Anatomy;
+  const PhantomMotion& Motion;
+};
+
+/**
+ * Share of a Gaussian, centred at `offset` from the middle of a disc, that lies in the disc; all in
+ * units of the Gaussian's standard deviation. Exact to 1e-3.
+ */
+double DiscResponse(double offset, double discRadius);
+}
+
+#endif

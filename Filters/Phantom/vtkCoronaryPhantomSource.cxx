@@ -1,0 +1,508 @@
+#include "vtkCoronaryPhantomSource.h"
+
+#include "CoronaryPhantom.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
+
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkShortArray.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkTimeStamp.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+using coronary::Vector3;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+struct vtkCoronaryPhantomSource::Internals
+{
+  coronary::PhantomSettings Settings;
+  vtkTimeStamp SettingsTime;
+  std::vector<double> Phases = coronary::PaperPhases();
+
+  const coronary::CoronaryPhantom& Phantom()
+  {
+    if (!this->Built || this->BuiltTime < this->SettingsTime)
+    {
+      this->Built.reset();
+      this->BoxSpacing = 0.0;
+      this->Built = std::make_unique<coronary::CoronaryPhantom>(this->Settings);
+      this->BuiltTime.Modified();
+    }
+    return *this->Built;
+  }
+
+  /// The phantom's own grid at a spacing; it follows the tree over the whole cycle to find it.
+  const coronary::ImageGrid& Box(double spacing)
+  {
+    const coronary::CoronaryPhantom& phantom = this->Phantom();
+    if (spacing != this->BoxSpacing)
+    {
+      this->BoxGrid = phantom.DefaultGrid(spacing);
+      this->BoxSpacing = spacing;
+    }
+    return this->BoxGrid;
+  }
+
+private:
+  std::unique_ptr<coronary::CoronaryPhantom> Built;
+  vtkTimeStamp BuiltTime;
+  coronary::ImageGrid BoxGrid;
+  double BoxSpacing = 0.0;
+};
+
+namespace
+{
+constexpr double SmallestSpacing = 0.05;
+constexpr double GreatestSpacing = 20.0;
+constexpr int GreatestDimension = 16384;
+
+void Require(bool condition, const std::string& requirement)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument(requirement);
+  }
+}
+
+bool AllFinite(const double* values, int count)
+{
+  return std::all_of(values, values + count, [](double value) { return std::isfinite(value); });
+}
+
+void CheckPhases(const std::vector<double>& phases)
+{
+  Require(!phases.empty(), "Phases: at least one is needed");
+  Require(AllFinite(phases.data(), static_cast<int>(phases.size())), "Phases must be finite");
+  Require(std::adjacent_find(phases.begin(), phases.end(), std::greater_equal<>()) == phases.end(),
+    "Phases must be strictly increasing");
+}
+
+/// Covers the box of `inner` by a grid of another spacing and direction.
+coronary::ImageGrid Cover(
+  const coronary::ImageGrid& inner, const Vector3& spacing, const coronary::Matrix3& direction)
+{
+  const std::array<int, 6>& e = inner.extent;
+  Vector3 low = Vector3::Constant(std::numeric_limits<double>::max());
+  Vector3 high = -low;
+  for (int corner = 0; corner < 8; ++corner)
+  {
+    const Vector3 world =
+      inner.IndexToWorld(e[corner & 1], e[2 + (corner >> 1 & 1)], e[4 + (corner >> 2)]);
+    const Vector3 local = direction.transpose() * world;
+    low = low.cwiseMin(local);
+    high = high.cwiseMax(local);
+  }
+  coronary::ImageGrid grid;
+  grid.origin = direction * low;
+  grid.spacing = spacing;
+  grid.direction = direction;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    // Rounding must not add a voxel where the box is a whole number of them.
+    const double steps = std::ceil((high[axis] - low[axis]) / spacing[axis] - 1e-6);
+    Require(steps < GreatestDimension, "Spacing is too small for the automatic grid");
+    grid.extent[2 * axis] = 0;
+    grid.extent[2 * axis + 1] = static_cast<int>(steps);
+  }
+  return grid;
+}
+
+template <typename Array, typename Value>
+void AddValues(vtkFieldData* fields, const char* name, const std::vector<Value>& values)
+{
+  vtkNew<Array> array;
+  array->SetName(name);
+  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    array->SetValue(static_cast<vtkIdType>(i), values[i]);
+  }
+  fields->AddArray(array);
+}
+
+/// One value a branch.
+template <typename Array, typename Function>
+void AddBranchValues(vtkFieldData* fields, const char* name,
+  const std::vector<coronary::PhantomBranch>& branches, const Function& valueOf)
+{
+  std::vector<std::decay_t<decltype(valueOf(branches.front()))>> values;
+  values.reserve(branches.size());
+  for (const coronary::PhantomBranch& branch : branches)
+  {
+    values.push_back(valueOf(branch));
+  }
+  AddValues<Array>(fields, name, values);
+}
+
+vtkSmartPointer<vtkDoubleArray> MakeVectors(const std::vector<Vector3>& vectors)
+{
+  auto array = vtkSmartPointer<vtkDoubleArray>::New();
+  array->SetNumberOfComponents(3);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(vectors.size()));
+  double* values = array->GetPointer(0);
+  for (const Vector3& vector : vectors)
+  {
+    values = std::copy_n(vector.data(), 3, values);
+  }
+  return array;
+}
+
+void AddVectors(vtkFieldData* fields, const char* name, const std::vector<Vector3>& vectors)
+{
+  const vtkSmartPointer<vtkDoubleArray> array = MakeVectors(vectors);
+  array->SetName(name);
+  fields->AddArray(array);
+}
+
+vtkSmartPointer<vtkPoints> MakePoints(const std::vector<Vector3>& positions)
+{
+  auto points = vtkSmartPointer<vtkPoints>::New();
+  points->SetData(MakeVectors(positions));
+  return points;
+}
+
+template <typename Indices>
+void AddCell(vtkCellArray* cells, const Indices& indices)
+{
+  cells->InsertNextCell(static_cast<int>(indices.size()));
+  for (const std::int64_t index : indices)
+  {
+    cells->InsertCellPoint(static_cast<vtkIdType>(index));
+  }
+}
+
+void SetTime(vtkDataObject* data, double time, double cycleLength)
+{
+  data->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+  AddValues<vtkDoubleArray>(
+    data->GetFieldData(), vtkCoronaryArrayNames::CycleLength, std::vector<double>{ cycleLength });
+  AddValues<vtkDoubleArray>(
+    data->GetFieldData(), vtkCoronaryArrayNames::PhaseTime, std::vector<double>{ time });
+}
+
+void FillTree(const coronary::PhantomTree& tree, vtkPolyData* output)
+{
+  using coronary::PhantomBranch;
+  namespace names = vtkCoronaryArrayNames;
+
+  vtkNew<vtkCellArray> lines;
+  for (const PhantomBranch& branch : tree.branches)
+  {
+    AddCell(lines, branch.points);
+  }
+  output->SetPoints(MakePoints(tree.points));
+  output->SetLines(lines);
+
+  vtkPointData* points = output->GetPointData();
+  AddValues<vtkDoubleArray>(points, names::Radius, tree.radius);
+  AddValues<vtkDoubleArray>(points, names::Abscissas, tree.abscissa);
+  AddValues<vtkIntArray>(points, names::SegmentIds, tree.segmentId);
+  AddVectors(points, names::Displacement, tree.displacement);
+  AddVectors(points, names::Velocity, tree.velocity);
+  AddValues<vtkDoubleArray>(points, "Visibility", tree.visibility);
+
+  vtkCellData* cells = output->GetCellData();
+  const auto addInts = [&](const char* name, int PhantomBranch::*member) {
+    AddBranchValues<vtkIntArray>(
+      cells, name, tree.branches, [=](const PhantomBranch& branch) { return branch.*member; });
+  };
+  addInts(names::GroupIds, &PhantomBranch::groupId);
+  addInts(names::ParentGroupIds, &PhantomBranch::parentGroupId);
+  addInts(names::TreeIds, &PhantomBranch::treeId);
+  addInts(names::BranchGeneration, &PhantomBranch::generation);
+  addInts(names::StrahlerOrder, &PhantomBranch::strahlerOrder);
+  addInts(names::SegmentIds, &PhantomBranch::segmentId);
+  AddBranchValues<vtkStringArray>(cells, names::SegmentLabel, tree.branches,
+    [](const PhantomBranch& branch) { return coronary::SegmentName(branch.segmentId); });
+  AddBranchValues<vtkDoubleArray>(cells, names::Length, tree.branches,
+    [](const PhantomBranch& branch) { return branch.length; });
+  AddBranchValues<vtkDoubleArray>(cells, names::Tortuosity, tree.branches,
+    [](const PhantomBranch& branch) { return branch.tortuosity; });
+}
+
+void FillSurface(const coronary::PhantomSurface& surface, const std::vector<Vector3>& velocity,
+  vtkPolyData* output)
+{
+  namespace names = vtkCoronaryArrayNames;
+  vtkNew<vtkCellArray> triangles;
+  triangles->AllocateExact(
+    static_cast<vtkIdType>(surface.triangles.size()), 3 * surface.triangles.size());
+  for (const coronary::Triangle& triangle : surface.triangles)
+  {
+    AddCell(triangles, triangle);
+  }
+  output->SetPoints(MakePoints(surface.points));
+  output->SetPolys(triangles);
+  AddValues<vtkIntArray>(output->GetPointData(), names::GroupIds, surface.groupId);
+  AddValues<vtkDoubleArray>(output->GetPointData(), names::Abscissas, surface.abscissa);
+  AddVectors(output->GetPointData(), names::Displacement, surface.displacement);
+  AddVectors(output->GetPointData(), names::Velocity, velocity);
+  AddValues<vtkIntArray>(output->GetCellData(), names::CellEntityIds, surface.entityId);
+}
+
+void FillOstia(const std::vector<coronary::PhantomOstium>& ostia, vtkPolyData* output)
+{
+  std::vector<Vector3> positions;
+  std::vector<Vector3> axes;
+  std::vector<double> radii;
+  std::vector<std::string> labels;
+  vtkNew<vtkCellArray> vertices;
+  for (const coronary::PhantomOstium& ostium : ostia)
+  {
+    AddCell(vertices, std::array<std::size_t, 1>{ positions.size() });
+    positions.push_back(ostium.position);
+    axes.push_back(ostium.axis);
+    radii.push_back(ostium.radius);
+    labels.push_back(ostium.name);
+  }
+  output->SetPoints(MakePoints(positions));
+  output->SetVerts(vertices);
+  AddValues<vtkStringArray>(output->GetPointData(), "Name", labels);
+  AddVectors(output->GetPointData(), "Axis", axes);
+  AddValues<vtkDoubleArray>(output->GetPointData(), vtkCoronaryArrayNames::Radius, radii);
+}
+
+void FillProbe(const coronary::CoronaryPhantom& phantom, double time, vtkPointSet* input,
+  vtkPointSet* output, const coronary::ProgressCallback& progress)
+{
+  const vtkIdType count = input ? input->GetNumberOfPoints() : 0;
+  std::vector<Vector3> positions(count);
+  std::vector<Vector3> displacement(count);
+  std::vector<Vector3> velocity(count);
+  coronary::ParallelFor(
+    count, 1024,
+    [&](std::int64_t first, std::int64_t last) {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        Vector3 reference;
+        input->GetPoint(static_cast<vtkIdType>(i), reference.data());
+        positions[i] = phantom.Position(reference, time);
+        displacement[i] = positions[i] - reference;
+        velocity[i] = phantom.Velocity(reference, time);
+      }
+    },
+    progress);
+  if (input)
+  {
+    output->ShallowCopy(input);
+  }
+  output->SetPoints(MakePoints(positions));
+  AddVectors(output->GetPointData(), vtkCoronaryArrayNames::Displacement, displacement);
+  AddVectors(output->GetPointData(), vtkCoronaryArrayNames::Velocity, velocity);
+}
+}
+
+vtkStandardNewMacro(vtkCoronaryPhantomSource);
+
+vtkCoronaryPhantomSource::vtkCoronaryPhantomSource()
+  : Data(std::make_unique<Internals>())
+{
+  this->SetNumberOfInputPorts(1);
+  this->SetNumberOfOutputPorts(ProbePort + 1);
+}
+
+vtkCoronaryPhantomSource::~vtkCoronaryPhantomSource() = default;
+
+template <typename Value>
+void vtkCoronaryPhantomSource::Set(Value& setting, Value value)
+{
+  if (setting != value)
+  {
+    setting = value;
+    this->Data->SettingsTime.Modified();
+    this->Modified();
+  }
+}
+
+// Setter and getter of one field of coronary::PhantomSettings.
+#define coronarySettingMacro(Name, type, field)                                                    \
+  void vtkCoronaryPhantomSource::Set##Name(type value)                                             \
+  {                                                                                                \
+    using Field = decltype(this->Data->Settings.field);                                            \
+    this->Set(this->Data->Settings.field, static_cast<Field>(value));                              \
+  }                                                                                                \
+  type vtkCoronaryPhantomSource::Get##Name()                                                       \
+  {                                                                                                \
+    return static_cast<type>(this->Data->Settings.field);                                          \
+  }
+
+coronarySettingMacro(Seed, int, seed);
+coronarySettingMacro(Dominance, int, dominance);
+coronarySettingMacro(Ramus, bool, ramus);
+coronarySettingMacro(Calibre, double, calibre);
+coronarySettingMacro(PositionVariation, double, positionVariation);
+coronarySettingMacro(CalibreVariation, double, calibreVariation);
+coronarySettingMacro(Tortuosity, double, tortuosity);
+coronarySettingMacro(Stenoses, int, stenoses);
+coronarySettingMacro(StenosisDegree, double, stenosisDegree);
+coronarySettingMacro(CalcifiedPlaques, int, calcifiedPlaques);
+coronarySettingMacro(ChronicOcclusion, bool, chronicOcclusion);
+coronarySettingMacro(CycleLength, double, cycleLength);
+coronarySettingMacro(MotionAmplitude, double, motionAmplitude);
+coronarySettingMacro(AxialMotionRight, double, axialMotionRight);
+coronarySettingMacro(AxialMotionLeft, double, axialMotionLeft);
+coronarySettingMacro(RegionalLag, double, regionalLag);
+coronarySettingMacro(RegionalAmplitude, double, regionalAmplitude);
+coronarySettingMacro(BeatVariation, double, beatVariation);
+coronarySettingMacro(AreaPulse, double, areaPulse);
+coronarySettingMacro(TemporalWindow, double, temporalWindow);
+coronarySettingMacro(Noise, double, noise);
+coronarySettingMacro(NoiseCorrelation, double, noiseCorrelation);
+coronarySettingMacro(SystolicNoise, double, systolicNoise);
+coronarySettingMacro(LumenHU, double, lumenHU);
+coronarySettingMacro(AttenuationGradient, double, attenuationGradient);
+coronarySettingMacro(VeinHU, double, veinHU);
+coronarySettingMacro(CenterlineSpacing, double, centerlineSpacing);
+coronarySettingMacro(SurfaceSpacing, double, surfaceSpacing);
+#undef coronarySettingMacro
+
+void vtkCoronaryPhantomSource::SetPointSpread(double i, double j, double k)
+{
+  this->Set(this->Data->Settings.pointSpread[0], i);
+  this->Set(this->Data->Settings.pointSpread[1], j);
+  this->Set(this->Data->Settings.pointSpread[2], k);
+}
+
+double* vtkCoronaryPhantomSource::GetPointSpread()
+{
+  return this->Data->Settings.pointSpread;
+}
+
+void vtkCoronaryPhantomSource::AddLostPhase(double time, double fraction)
+{
+  coronary::LostPhase lost;
+  lost.time = time;
+  lost.fraction = fraction;
+  this->Data->Settings.lostPhases.push_back(lost);
+  this->Data->SettingsTime.Modified();
+  this->Modified();
+}
+
+void vtkCoronaryPhantomSource::ClearLostPhases()
+{
+  if (!this->Data->Settings.lostPhases.empty())
+  {
+    this->Data->Settings.lostPhases.clear();
+    this->Data->SettingsTime.Modified();
+    this->Modified();
+  }
+}
+
+int vtkCoronaryPhantomSource::GetNumberOfLostPhases()
+{
+  return static_cast<int>(this->Data->Settings.lostPhases.size());
+}
+
+void vtkCoronaryPhantomSource::AddPhase(double time)
+{
+  this->Data->Phases.push_back(time);
+  this->Modified();
+}
+
+void vtkCoronaryPhantomSource::ClearPhases()
+{
+  if (!this->Data->Phases.empty())
+  {
+    this->Data->Phases.clear();
+    this->Modified();
+  }
+}
+
+int vtkCoronaryPhantomSource::GetNumberOfPhases()
+{
+  return static_cast<int>(this->Data->Phases.size());
+}
+
+double vtkCoronaryPhantomSource::GetPhase(int index)
+{
+  return index >= 0 && index < this->GetNumberOfPhases() ? this->Data->Phases[index]
+                                                         : std::numeric_limits<double>::quiet_NaN();
+}
+
+int vtkCoronaryPhantomSource::FillInputPortInformation(int, vtkInformation* info)
+{
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkPointSet");
+  info->Set(INPUT_IS_OPTIONAL(), 1);
+  return 1;
+}
+
+int vtkCoronaryPhantomSource::FillOutputPortInformation(int port, vtkInformation* info)
+{
+  const char* type = port == ImagePort ? "vtkImageData" : "vtkPolyData";
+  info->Set(vtkDataObject::DATA_TYPE_NAME(), port == ProbePort ? "vtkPointSet" : type);
+  return 1;
+}
+
+vtkTypeBool vtkCoronaryPhantomSource::ProcessRequest(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA_OBJECT()))
+  {
+    return this->RequestDataObject(inputs, outputs);
+  }
+  if (request->Has(vtkDemandDrivenPipeline::REQUEST_INFORMATION()))
+  {
+    return this->Guarded([&] { this->RequestInformation(outputs); });
+  }
+  if (request->Has(SDDP::REQUEST_UPDATE_EXTENT()))
+  {
+    return this->RequestUpdateExtent(request, inputs);
+  }
+  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA_NOT_GENERATED()))
+  {
+    const int wanted = request->Get(vtkExecutive::FROM_OUTPUT_PORT());
+    for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+    {
+      if (wanted >= 0 && port != wanted)
+      {
+        outputs->GetInformationObject(port)->Set(
+          vtkDemandDrivenPipeline::DATA_NOT_GENERATED(), 1);
+      }
+    }
+    return 1;
+  }
+  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA()))
+  {
+    return this->RequestData(inputs, outputs);
+  }
+  return this->Superclass::ProcessRequest(request, inputs, outputs);
+}
+
+int vtkCoronaryPhantomSource::Guarded(const std::function<void()>& work)
+{
+  try
+  {
+    work();
+    return 1;
+  }
+  catch (const coronary::Cancelled&)
+  {
+    return 1;
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< error.what());
+    return 0;
+  }
+}
