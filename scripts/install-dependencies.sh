@@ -1,0 +1,162 @@
+#!/usr/bin/env bash
+# Installs the Debian packages that DynamicCoronary is configured, built and tested with.
+# Each package and why it is needed: docs/development.md.
+set -euo pipefail
+
+usage() {
+  cat <<'EOF'
+Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--developer]
+  --check      change nothing; name what is missing and exit 1, exit 0 when all is there
+  --tree TREE  packages of one tree only (both without this option)
+  --developer  clang-tidy, shellcheck and Google Benchmark as well
+Runs as root, or through sudo. Run again, it changes nothing.
+EOF
+}
+
+common=(
+  g++ cmake ninja-build ccache
+  libeigen3-dev libgdcm-dev zlib1g-dev nlohmann-json3-dev libcli11-dev
+  libgtest-dev clang-format-14
+)
+paraview=(
+  paraview-dev python3-paraview
+  libopenmpi-dev libdouble-conversion-dev qttools5-dev qtxmlpatterns5-dev-tools
+  xvfb xauth
+)
+# VTK 9.1 itself can not be installed beside python3-paraview: scripts/vtk-prefix.sh unpacks it
+# into a folder of its own, and these are what its libraries load.
+vtk=(
+  libtbb-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libpng16-16 libtiff6
+  patchelf
+)
+developer=(clang-tidy-14 shellcheck libbenchmark-dev)
+
+check_only=no
+tree=all
+with_developer=no
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --check) check_only=yes ;;
+    --tree)
+      tree="${2:-}"
+      shift || true
+      ;;
+    --tree=*) tree="${1#*=}" ;;
+    --developer) with_developer=yes ;;
+    -h | --help)
+      usage
+      exit 0
+      ;;
+    *)
+      echo "install-dependencies: unknown option '$1'" >&2
+      usage >&2
+      exit 2
+      ;;
+  esac
+  shift || true
+done
+
+case "$tree" in
+  all) wanted=("${common[@]}" "${paraview[@]}" "${vtk[@]}") ;;
+  paraview) wanted=("${common[@]}" "${paraview[@]}") ;;
+  vtk) wanted=("${common[@]}" "${vtk[@]}") ;;
+  *)
+    echo "install-dependencies: --tree takes paraview or vtk, not '$tree'" >&2
+    exit 2
+    ;;
+esac
+if [ "$with_developer" = yes ]; then
+  wanted+=("${developer[@]}")
+fi
+
+if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
+  {
+    echo "install-dependencies: this script needs Debian's apt-get and dpkg-query."
+    echo "On another system install the counterparts of: ${wanted[*]}"
+  } >&2
+  exit 1
+fi
+
+list_missing() {
+  local package
+  for package in "${wanted[@]}"; do
+    # "|| true": dpkg-query fails for a package that it has never heard of.
+    if [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)" != installed ]; then
+      echo "$package"
+    fi
+  done
+}
+
+mapfile -t missing < <(list_missing)
+if [ ${#missing[@]} -eq 0 ]; then
+  echo "Nothing to install: all ${#wanted[@]} packages are there."
+  exit 0
+fi
+if [ "$check_only" = yes ]; then
+  echo "Missing packages: ${missing[*]}"
+  exit 1
+fi
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "install-dependencies: run me as root (there is no sudo). Missing: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+  # Without a terminal nobody can type a password: fail at once instead of waiting.
+  if [ ! -t 0 ]; then
+    as_root=(sudo -n)
+    if ! sudo -n true 2>/dev/null; then
+      echo "install-dependencies: sudo asks for a password. Run me as root. Missing: ${missing[*]}" >&2
+      exit 1
+    fi
+  fi
+fi
+
+if ! grep -qs '^VERSION_CODENAME=bookworm$' /etc/os-release; then
+  echo "install-dependencies: made for Debian 12 (bookworm); going on, names may differ here." >&2
+fi
+
+apt_options=(-o DPkg::Lock::Timeout=300 -o Acquire::Retries=3)
+echo "Installing: ${missing[*]}"
+if ! "${as_root[@]}" apt-get "${apt_options[@]}" -qq update; then
+  echo "install-dependencies: 'apt-get update' failed; trying with the package lists of before." >&2
+fi
+
+unavailable=()
+for package in "${missing[@]}"; do
+  policy="$(LC_ALL=C apt-cache policy "$package")"
+  if [[ $policy != *"Candidate: "[!\(]* ]]; then
+    unavailable+=("$package")
+  fi
+done
+if [ ${#unavailable[@]} -gt 0 ]; then
+  echo "install-dependencies: no apt source offers: ${unavailable[*]}" >&2
+  exit 1
+fi
+
+# --no-remove: python3-paraview conflicts with python3-vtk9, and apt would silently take
+# libvtk9-dev away from whoever works with it.
+log="$(mktemp)"
+trap 'rm -f "$log"' EXIT
+if ! "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+  apt-get "${apt_options[@]}" -y --no-remove --no-install-recommends install "${missing[@]}" \
+  </dev/null >"$log" 2>&1; then
+  tail -n 30 "$log" >&2
+  if [ "$(dpkg-query -W -f '${db:Status-Status}' python3-vtk9 2>/dev/null || true)" = installed ]; then
+    {
+      echo "install-dependencies: Debian's python3-vtk9 and python3-paraview exclude each other."
+      echo "Remove it (apt-get remove python3-vtk9), or build the plain VTK tree only (--tree vtk)."
+    } >&2
+  fi
+  echo "install-dependencies: apt-get could not install: ${missing[*]}" >&2
+  exit 1
+fi
+
+mapfile -t missing < <(list_missing)
+if [ ${#missing[@]} -gt 0 ]; then
+  echo "install-dependencies: still missing after the installation: ${missing[*]}" >&2
+  exit 1
+fi
+echo "Installed; all ${#wanted[@]} packages are there."
