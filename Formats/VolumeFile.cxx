@@ -1,0 +1,402 @@
+#include "VolumeFile.h"
+
+#include "VolumeHeaderParsers.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace fs = std::filesystem;
+
+namespace
+{
+// Deflate can not do better than this (zlib's technical details).
+constexpr std::uint64_t LargestDeflateRatio = 1032;
+
+bool EndsWith(const std::string& text, const std::string& end)
+{
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+bool HostIsBigEndian()
+{
+  const std::uint16_t one = 1;
+  unsigned char first = 0;
+  std::memcpy(&first, &one, 1);
+  return first == 0;
+}
+
+void SwapBytes(std::vector<unsigned char>& bytes, std::size_t valueBytes)
+{
+  for (std::size_t i = 0; i + valueBytes <= bytes.size(); i += valueBytes)
+  {
+    std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(i),
+      bytes.begin() + static_cast<std::ptrdiff_t>(i + valueBytes));
+  }
+}
+
+std::uint64_t NumberOfVoxels(const ImageGrid& grid)
+{
+  std::uint64_t count = 1;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    count *= static_cast<std::uint64_t>(grid.extent[2 * axis + 1] + 1);
+  }
+  return count;
+}
+
+std::uint64_t NumberOfBytes(const VolumeHeader& header)
+{
+  return NumberOfVoxels(header.info.grid) * static_cast<std::uint64_t>(header.info.phases) *
+    VoxelBytes(header.type);
+}
+
+// A size is believed only when the files can hold it.
+void CheckSizes(const VolumeHeader& header)
+{
+  const std::string& path = header.info.path;
+  // No product of the sizes below may overflow.
+  double voxels = header.info.phases;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    voxels *= header.info.grid.extent[2 * axis + 1] + 1.0;
+  }
+  if (voxels > 1e15)
+  {
+    FormatError(path, "the image size in the header is impossible");
+  }
+  const std::uint64_t expected = NumberOfBytes(header);
+  const std::uint64_t files = header.dataFiles.size();
+  if (expected % files != 0)
+  {
+    FormatError(path, "its voxels can not be shared by " + std::to_string(files) + " data files");
+  }
+  for (const std::string& file : header.dataFiles)
+  {
+    const std::uint64_t size = CheckedFileSize(file);
+    const std::uint64_t available = size > header.dataOffset ? size - header.dataOffset : 0;
+    if (!header.compressed && available < expected / files)
+    {
+      throw std::runtime_error("'" + file + "' is truncated: expected " +
+        std::to_string(expected / files) + " bytes of voxels, got " + std::to_string(available) +
+        ".");
+    }
+    if (header.compressed && expected / files / LargestDeflateRatio > size)
+    {
+      throw std::runtime_error("'" + file + "' is truncated: the header promises " +
+        std::to_string(expected / files) + " bytes of voxels, more than its " +
+        std::to_string(size) + " bytes can hold.");
+    }
+  }
+}
+
+class VolumeFile : public VolumeSource
+{
+public:
+  explicit VolumeFile(VolumeHeader header)
+    : Layout(std::move(header))
+  {
+    this->Header = this->Layout.info;
+  }
+
+protected:
+  void ReadPlane(int phase, int k, Plane& plane, const Poll& poll) override
+  {
+    const ImageGrid& grid = this->Header.grid;
+    const auto planeVoxels = static_cast<std::uint64_t>(grid.extent[1] + 1) *
+      static_cast<std::uint64_t>(grid.extent[3] + 1);
+    const std::size_t valueBytes = VoxelBytes(this->Layout.type);
+    plane.type = this->Layout.type;
+    plane.slope = this->Layout.slope;
+    plane.intercept = this->Layout.intercept;
+    plane.bytes.resize(planeVoxels * valueBytes);
+    const auto phases = static_cast<std::uint64_t>(this->Header.phases);
+    const auto slices = static_cast<std::uint64_t>(grid.extent[5] + 1);
+    if (this->Layout.phasesFirst)
+    {
+      this->Interleaved.resize(plane.bytes.size() * phases);
+      this->ReadBytes(k * planeVoxels * phases * valueBytes, this->Interleaved, poll);
+      for (std::uint64_t v = 0; v < planeVoxels; ++v)
+      {
+        std::memcpy(plane.bytes.data() + v * valueBytes,
+          this->Interleaved.data() + (v * phases + phase) * valueBytes, valueBytes);
+      }
+    }
+    else
+    {
+      this->ReadBytes((phase * slices + k) * planeVoxels * valueBytes, plane.bytes, poll);
+    }
+    if (this->Layout.bigEndian != HostIsBigEndian() && valueBytes > 1)
+    {
+      SwapBytes(plane.bytes, valueBytes);
+    }
+  }
+
+  void EndOfVolume() override
+  {
+    // Between the phases of a compressed 4-D file the decoder's position is worth keeping.
+    if (!(this->Layout.compressed && this->Header.phases > 1))
+    {
+      this->Stream.reset();
+    }
+  }
+
+private:
+  void ReadBytes(std::uint64_t position, std::vector<unsigned char>& bytes, const Poll& poll)
+  {
+    const std::uint64_t share = NumberOfBytes(this->Layout) / this->Layout.dataFiles.size();
+    for (std::size_t done = 0; done < bytes.size();)
+    {
+      const auto file = static_cast<std::size_t>((position + done) / share);
+      const std::uint64_t inFile = (position + done) % share;
+      const auto size =
+        static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size() - done, share - inFile));
+      if (!this->Stream || this->OpenFile != file)
+      {
+        // The header of a .nii.gz is inside the compressed stream, that of a .mha before it.
+        this->Stream = std::make_unique<ByteStream>(this->Layout.dataFiles[file],
+          this->Layout.wholeFile ? 0 : this->Layout.dataOffset, this->Layout.compressed);
+        this->OpenFile = file;
+      }
+      const std::uint64_t before = this->Layout.wholeFile ? this->Layout.dataOffset : 0;
+      this->Stream->Read(before + inFile, bytes.data() + done, size, before + share, poll);
+      done += size;
+    }
+  }
+
+  VolumeHeader Layout;
+  std::unique_ptr<ByteStream> Stream;
+  std::size_t OpenFile = 0;
+  std::vector<unsigned char> Interleaved;
+};
+
+bool IsIntegral(double value)
+{
+  return value == std::rint(value);
+}
+
+// What follows from the header whatever the format.
+void Complete(VolumeHeader& header)
+{
+  VolumeInfo& info = header.info;
+  if (!info.grid.origin.allFinite())
+  {
+    FormatError(info.path, "the image origin is not finite");
+  }
+  if (!std::isfinite(header.slope) || !std::isfinite(header.intercept))
+  {
+    FormatError(info.path, "the rescale slope or intercept is not finite");
+  }
+  CheckSizes(header);
+  const bool smallInteger = header.type == VoxelType::Int8 || header.type == VoxelType::UInt8 ||
+    header.type == VoxelType::Int16 || header.type == VoxelType::UInt16;
+  info.fitsShort = smallInteger && IsIntegral(header.slope) && IsIntegral(header.intercept);
+  const std::string name = fs::path(info.path).filename().string();
+  for (int phase = 0; phase < info.phases; ++phase)
+  {
+    info.phaseNames.push_back(info.phases == 1 ? name : name + " [" + std::to_string(phase) + "]");
+  }
+}
+}
+
+bool IsVolumeFileName(const std::string& path)
+{
+  const std::string name = LowerCase(path);
+  for (const char* end : { ".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz" })
+  {
+    if (EndsWith(name, end))
+    {
+      return true;
+    }
+  }
+  return false;
+}
+
+VolumeHeader ReadVolumeHeader(const std::string& path)
+{
+  CheckedFileSize(path);
+  const std::string name = LowerCase(path);
+  VolumeHeader header;
+  if (EndsWith(name, ".mha") || EndsWith(name, ".mhd"))
+  {
+    header = ReadMetaImageHeader(path);
+  }
+  else if (EndsWith(name, ".nrrd") || EndsWith(name, ".nhdr"))
+  {
+    header = ReadNrrdHeader(path);
+  }
+  else if (EndsWith(name, ".nii") || EndsWith(name, ".nii.gz"))
+  {
+    header = ReadNiftiHeader(path);
+  }
+  else
+  {
+    FormatError(
+      path, "is of no known format; the extensions are .mha, .mhd, .nrrd, .nhdr, .nii and .nii.gz");
+  }
+  Complete(header);
+  return header;
+}
+
+std::unique_ptr<VolumeSource> OpenVolumeFile(const std::string& path)
+{
+  return std::make_unique<VolumeFile>(ReadVolumeHeader(path));
+}
+
+void FormatError(const std::string& path, const std::string& what)
+{
+  throw std::runtime_error("'" + path + "': " + what + ".");
+}
+
+std::string ReadHeaderText(const std::string& path)
+{
+  std::string text(1u << 20, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (file.gcount() <= 0)
+  {
+    throw std::runtime_error("File '" + path + "' cannot be read.");
+  }
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return text;
+}
+
+std::string NextLine(const std::string& text, std::size_t& position)
+{
+  const std::size_t end = std::min(text.find('\n', position), text.size());
+  std::string line = text.substr(position, end - position);
+  position = std::min(end + 1, text.size());
+  if (!line.empty() && line.back() == '\r')
+  {
+    line.pop_back();
+  }
+  return line;
+}
+
+std::string Trimmed(const std::string& text)
+{
+  const char* const blanks = " \t\r\n\f\v";
+  const std::size_t first = text.find_first_not_of(blanks);
+  if (first == std::string::npos)
+  {
+    return {};
+  }
+  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+std::string LowerCase(std::string text)
+{
+  for (char& c : text)
+  {
+    c = (c >= 'A' && c <= 'Z') ? static_cast<char>(c - 'A' + 'a') : c;
+  }
+  return text;
+}
+
+std::vector<std::string> Words(const std::string& text)
+{
+  std::vector<std::string> words;
+  std::size_t position = 0;
+  for (;;)
+  {
+    const std::size_t first = text.find_first_not_of(" \t\r\n", position);
+    if (first == std::string::npos)
+    {
+      return words;
+    }
+    position = std::min(text.find_first_of(" \t\r\n", first), text.size());
+    words.push_back(text.substr(first, position - first));
+  }
+}
+
+bool ParseNumber(const std::string& text, double& value)
+{
+  const char* first = text.data();
+  const char* last = first + text.size();
+  // from_chars knows no leading plus.
+  if (first != last && *first == '+')
+  {
+    ++first;
+  }
+  const std::from_chars_result result = std::from_chars(first, last, value);
+  return result.ec == std::errc() && result.ptr == last;
+}
+
+std::vector<double> ParseNumbers(
+  const std::string& text, std::size_t count, const std::string& path, const std::string& key)
+{
+  std::vector<double> values;
+  for (const std::string& word : Words(text))
+  {
+    double value = 0.0;
+    if (!ParseNumber(word, value) || !std::isfinite(value))
+    {
+      FormatError(path, key + " holds '" + word.substr(0, 32) + "', which is not a finite number");
+    }
+    values.push_back(value);
+  }
+  if (values.size() != count)
+  {
+    FormatError(path,
+      key + " has " + std::to_string(values.size()) + " values instead of " +
+        std::to_string(count));
+  }
+  return values;
+}
+
+std::vector<int> ParseIntegers(const std::string& text, std::size_t count, int low,
+  const std::string& path, const std::string& key)
+{
+  std::vector<int> result;
+  for (const double value : ParseNumbers(text, count, path, key))
+  {
+    if (!IsIntegral(value) || value < low || value > std::numeric_limits<int>::max())
+    {
+      FormatError(path, key + " is out of range");
+    }
+    result.push_back(static_cast<int>(value));
+  }
+  return result;
+}
+
+bool ArePerpendicular(const Matrix3& axes)
+{
+  for (int a = 0; a < 3; ++a)
+  {
+    const int b = (a + 1) % 3;
+    const double cosine = axes.col(a).normalized().dot(axes.col(b).normalized());
+    // Two unit vectors off by 1e-3 each.
+    if (!(std::abs(cosine) <= 2e-3))
+    {
+      return false;
+    }
+  }
+  return true;
+}
+
+void SetAxes(VolumeHeader& header, const std::vector<int>& size, const Matrix3& axes)
+{
+  ImageGrid& grid = header.info.grid;
+  const std::string& path = header.info.path;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    grid.extent[2 * axis] = 0;
+    grid.extent[2 * axis + 1] = size[axis] - 1;
+    grid.spacing[axis] = axes.col(axis).norm();
+    if (!std::isfinite(grid.spacing[axis]) || !(grid.spacing[axis] > 0.0))
+    {
+      FormatError(
+        path, "the voxel spacing along axis " + std::to_string(axis) + " is not a positive number");
+    }
+    grid.direction.col(axis) = axes.col(axis) / grid.spacing[axis];
+  }
+  grid.direction = Orthonormalised(grid.direction, path);
+}
+}

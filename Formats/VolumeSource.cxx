@@ -1,0 +1,204 @@
+#include "VolumeSource.h"
+
+#include <Eigen/SVD>
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <type_traits>
+
+namespace coronary
+{
+namespace
+{
+// Returns false when a value is no short.
+template <typename Stored>
+bool Convert(
+  const unsigned char* bytes, std::size_t count, double slope, double intercept, short* values)
+{
+  // Integers of up to 16 bits with an integral rescale need no floating point: 65536 * slope is far
+  // inside 64 bits for every slope that can give a short.
+  const bool integral = std::is_integral<Stored>::value && sizeof(Stored) <= 2 &&
+    slope == std::rint(slope) && intercept == std::rint(intercept) && std::abs(slope) < 1e9 &&
+    std::abs(intercept) < 1e12;
+  constexpr double low = std::numeric_limits<short>::min();
+  constexpr double high = std::numeric_limits<short>::max();
+  bool good = true;
+  if (integral)
+  {
+    const auto a = static_cast<std::int64_t>(slope);
+    const auto b = static_cast<std::int64_t>(intercept);
+    for (std::size_t i = 0; i < count; ++i)
+    {
+      Stored stored;
+      std::memcpy(&stored, bytes + i * sizeof(Stored), sizeof(Stored));
+      const std::int64_t value = a * static_cast<std::int64_t>(stored) + b;
+      values[i] = static_cast<short>(value);
+      good = good && value == values[i];
+    }
+    return good;
+  }
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    Stored stored;
+    std::memcpy(&stored, bytes + i * sizeof(Stored), sizeof(Stored));
+    const double value = slope * static_cast<double>(stored) + intercept;
+    if (!(value >= low && value <= high) || value != std::rint(value))
+    {
+      return false;
+    }
+    values[i] = static_cast<short>(value);
+  }
+  return true;
+}
+
+template <typename Stored>
+bool Convert(
+  const unsigned char* bytes, std::size_t count, double slope, double intercept, float* values)
+{
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    Stored stored;
+    std::memcpy(&stored, bytes + i * sizeof(Stored), sizeof(Stored));
+    values[i] = static_cast<float>(slope * static_cast<double>(stored) + intercept);
+  }
+  return true;
+}
+
+template <typename T>
+bool ConvertRow(VoxelType type, const unsigned char* bytes, std::size_t count, double slope,
+  double intercept, T* values)
+{
+  switch (type)
+  {
+    case VoxelType::Int8:
+      return Convert<std::int8_t>(bytes, count, slope, intercept, values);
+    case VoxelType::UInt8:
+      return Convert<std::uint8_t>(bytes, count, slope, intercept, values);
+    case VoxelType::Int16:
+      return Convert<std::int16_t>(bytes, count, slope, intercept, values);
+    case VoxelType::UInt16:
+      return Convert<std::uint16_t>(bytes, count, slope, intercept, values);
+    case VoxelType::Int32:
+      return Convert<std::int32_t>(bytes, count, slope, intercept, values);
+    case VoxelType::UInt32:
+      return Convert<std::uint32_t>(bytes, count, slope, intercept, values);
+    case VoxelType::Int64:
+      return Convert<std::int64_t>(bytes, count, slope, intercept, values);
+    case VoxelType::UInt64:
+      return Convert<std::uint64_t>(bytes, count, slope, intercept, values);
+    case VoxelType::Float32:
+      return Convert<float>(bytes, count, slope, intercept, values);
+    case VoxelType::Float64:
+      return Convert<double>(bytes, count, slope, intercept, values);
+  }
+  return false;
+}
+}
+
+std::size_t VoxelBytes(VoxelType type)
+{
+  switch (type)
+  {
+    case VoxelType::Int8:
+    case VoxelType::UInt8:
+      return 1;
+    case VoxelType::Int16:
+    case VoxelType::UInt16:
+      return 2;
+    case VoxelType::Int32:
+    case VoxelType::UInt32:
+    case VoxelType::Float32:
+      return 4;
+    case VoxelType::Int64:
+    case VoxelType::UInt64:
+    case VoxelType::Float64:
+      return 8;
+  }
+  return 0;
+}
+
+VolumeSource::~VolumeSource() = default;
+
+template <typename T>
+bool VolumeSource::ReadPlanes(
+  int phase, const std::array<int, 6>& extent, T* values, const ProgressCallback& progress)
+{
+  const std::array<int, 6>& whole = this->Header.grid.extent;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    if (extent[2 * axis] < whole[2 * axis] || extent[2 * axis + 1] > whole[2 * axis + 1] ||
+      extent[2 * axis] > extent[2 * axis + 1])
+    {
+      throw std::runtime_error(
+        "'" + this->Header.path + "': the extent asked for is not inside the image.");
+    }
+  }
+  if (phase < 0 || phase >= this->Header.phases)
+  {
+    throw std::runtime_error(
+      "'" + this->Header.path + "' has no phase " + std::to_string(phase) + ".");
+  }
+  struct Closer
+  {
+    VolumeSource* Source;
+    ~Closer() { this->Source->EndOfVolume(); }
+  };
+  const Closer closer{ this };
+
+  const auto rowLength = static_cast<std::size_t>(extent[1] - extent[0] + 1);
+  const auto wholeRow = static_cast<std::size_t>(whole[1] - whole[0] + 1);
+  Plane plane;
+  double done = 0.0;
+  const Poll poll = [&progress, &done] { Report(progress, done); };
+  for (int k = extent[4]; k <= extent[5]; ++k)
+  {
+    done = static_cast<double>(k - extent[4]) / (extent[5] - extent[4] + 1);
+    poll();
+    this->ReadPlane(phase, k, plane, poll);
+    const std::size_t size = VoxelBytes(plane.type);
+    for (int j = extent[2]; j <= extent[3]; ++j)
+    {
+      const std::size_t first = static_cast<std::size_t>(j) * wholeRow + extent[0];
+      if (!ConvertRow(plane.type, plane.bytes.data() + first * size, rowLength, plane.slope,
+            plane.intercept, values))
+      {
+        return false;
+      }
+      values += rowLength;
+    }
+  }
+  Report(progress, 1.0);
+  return true;
+}
+
+bool VolumeSource::Read(
+  int phase, const std::array<int, 6>& extent, short* values, const ProgressCallback& progress)
+{
+  return this->ReadPlanes(phase, extent, values, progress);
+}
+
+void VolumeSource::Read(
+  int phase, const std::array<int, 6>& extent, float* values, const ProgressCallback& progress)
+{
+  this->ReadPlanes(phase, extent, values, progress);
+}
+
+Matrix3 Orthonormalised(const Matrix3& direction, const std::string& path)
+{
+  constexpr double tolerance = 1e-3;
+  // The nearest orthogonal matrix in the sense of least squares, which keeps the handedness.
+  if (direction.allFinite())
+  {
+    const Eigen::JacobiSVD<Matrix3> svd(direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const Matrix3 nearest = svd.matrixU() * svd.matrixV().transpose();
+    if ((nearest - direction).cwiseAbs().maxCoeff() <= tolerance)
+    {
+      return nearest;
+    }
+  }
+  throw std::runtime_error("'" + path + "': the image axes are not perpendicular unit vectors.");
+}
+}
