@@ -7,6 +7,10 @@ install(EXPORT DynamicCoronaryLibraries
   NAMESPACE DynamicCoronary::
   FILE DynamicCoronaryLibraries-targets.cmake
   DESTINATION "${package_destination}")
+# The VTK modules link the libraries, and are exported from the build tree as well.
+export(EXPORT DynamicCoronaryLibraries
+  NAMESPACE DynamicCoronary::
+  FILE "${CMAKE_BINARY_DIR}/${package_destination}/DynamicCoronaryLibraries-targets.cmake")
 
 configure_package_config_file(
   "${CMAKE_CURRENT_LIST_DIR}/dynamiccoronary-config.cmake.in"

@@ -6,6 +6,7 @@
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
+#include "vtkDataObjectTypes.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
@@ -88,6 +89,18 @@ void Require(bool condition, const std::string& requirement)
 bool AllFinite(const double* values, int count)
 {
   return std::all_of(values, values + count, [](double value) { return std::isfinite(value); });
+}
+
+/// The algorithm's complaint, with the setting called by the property's name.
+std::string PropertyMessage(std::string message)
+{
+  const std::string prefix = "PhantomSettings: ";
+  if (message.compare(0, prefix.size(), prefix) == 0)
+  {
+    message.erase(0, prefix.size());
+    message.front() = static_cast<char>(std::toupper(message.front()));
+  }
+  return message;
 }
 
 void CheckPhases(const std::vector<double>& phases)
@@ -223,7 +236,8 @@ void FillTree(const coronary::PhantomTree& tree, vtkPolyData* output)
   AddValues<vtkDoubleArray>(points, "Visibility", tree.visibility);
 
   vtkCellData* cells = output->GetCellData();
-  const auto addInts = [&](const char* name, int PhantomBranch::*member) {
+  const auto addInts = [&](const char* name, int PhantomBranch::*member)
+  {
     AddBranchValues<vtkIntArray>(
       cells, name, tree.branches, [=](const PhantomBranch& branch) { return branch.*member; });
   };
@@ -235,10 +249,27 @@ void FillTree(const coronary::PhantomTree& tree, vtkPolyData* output)
   addInts(names::SegmentIds, &PhantomBranch::segmentId);
   AddBranchValues<vtkStringArray>(cells, names::SegmentLabel, tree.branches,
     [](const PhantomBranch& branch) { return coronary::SegmentName(branch.segmentId); });
-  AddBranchValues<vtkDoubleArray>(cells, names::Length, tree.branches,
-    [](const PhantomBranch& branch) { return branch.length; });
+  AddBranchValues<vtkDoubleArray>(
+    cells, names::Length, tree.branches, [](const PhantomBranch& branch) { return branch.length; });
   AddBranchValues<vtkDoubleArray>(cells, names::Tortuosity, tree.branches,
     [](const PhantomBranch& branch) { return branch.tortuosity; });
+}
+
+std::vector<Vector3> SurfaceVelocity(const coronary::CoronaryPhantom& phantom,
+  const coronary::PhantomSurface& surface, double time, const coronary::ProgressCallback& progress)
+{
+  std::vector<Vector3> velocity(surface.points.size());
+  coronary::ParallelFor(
+    static_cast<std::int64_t>(velocity.size()), 1024,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        velocity[i] = phantom.Velocity(surface.points[i] - surface.displacement[i], time);
+      }
+    },
+    progress);
+  return velocity;
 }
 
 void FillSurface(const coronary::PhantomSurface& surface, const std::vector<Vector3>& velocity,
@@ -292,7 +323,8 @@ void FillProbe(const coronary::CoronaryPhantom& phantom, double time, vtkPointSe
   std::vector<Vector3> velocity(count);
   coronary::ParallelFor(
     count, 1024,
-    [&](std::int64_t first, std::int64_t last) {
+    [&](std::int64_t first, std::int64_t last)
+    {
       for (std::int64_t i = first; i < last; ++i)
       {
         Vector3 reference;
@@ -457,52 +489,293 @@ int vtkCoronaryPhantomSource::FillOutputPortInformation(int port, vtkInformation
 vtkTypeBool vtkCoronaryPhantomSource::ProcessRequest(
   vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA_OBJECT()))
+  if (request->Has(SDDP::REQUEST_DATA_OBJECT()))
   {
     return this->RequestDataObject(inputs, outputs);
   }
-  if (request->Has(vtkDemandDrivenPipeline::REQUEST_INFORMATION()))
+  if (request->Has(SDDP::REQUEST_INFORMATION()))
   {
-    return this->Guarded([&] { this->RequestInformation(outputs); });
+    return this->RequestInformation(outputs);
   }
   if (request->Has(SDDP::REQUEST_UPDATE_EXTENT()))
   {
     return this->RequestUpdateExtent(request, inputs);
   }
-  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA_NOT_GENERATED()))
+  if (request->Has(SDDP::REQUEST_DATA_NOT_GENERATED()))
   {
-    const int wanted = request->Get(vtkExecutive::FROM_OUTPUT_PORT());
-    for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
-    {
-      if (wanted >= 0 && port != wanted)
-      {
-        outputs->GetInformationObject(port)->Set(
-          vtkDemandDrivenPipeline::DATA_NOT_GENERATED(), 1);
-      }
-    }
-    return 1;
+    return this->RequestDataNotGenerated(request, outputs);
   }
-  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA()))
+  if (request->Has(SDDP::REQUEST_DATA()))
   {
     return this->RequestData(inputs, outputs);
   }
   return this->Superclass::ProcessRequest(request, inputs, outputs);
 }
 
-int vtkCoronaryPhantomSource::Guarded(const std::function<void()>& work)
+int vtkCoronaryPhantomSource::RequestDataObject(
+  vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  // The probe's output has its input's type; the other ports have a fixed one.
+  const vtkPointSet* input = vtkPointSet::GetData(inputs[0]);
+  const char* type = input ? input->GetClassName() : "vtkPolyData";
+  vtkInformation* outInfo = outputs->GetInformationObject(ProbePort);
+  const vtkDataObject* output = vtkDataObject::GetData(outInfo);
+  if (!output || std::string(output->GetClassName()) != type)
+  {
+    const auto fresh =
+      vtkSmartPointer<vtkDataObject>::Take(vtkDataObjectTypes::NewDataObject(type));
+    outInfo->Set(vtkDataObject::DATA_OBJECT(), fresh);
+  }
+  return 1;
+}
+
+int vtkCoronaryPhantomSource::RequestInformation(vtkInformationVector* outputs)
 {
   try
   {
-    work();
-    return 1;
-  }
-  catch (const coronary::Cancelled&)
-  {
+    const std::vector<double>& phases = this->Data->Phases;
+    CheckPhases(phases);
+    const double range[2] = { phases.front(), phases.back() };
+    for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+    {
+      vtkInformation* outInfo = outputs->GetInformationObject(port);
+      outInfo->Set(SDDP::TIME_STEPS(), phases.data(), static_cast<int>(phases.size()));
+      outInfo->Set(SDDP::TIME_RANGE(), range, 2);
+      outInfo->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+    }
+
+    const coronary::ImageGrid grid = this->MakeGrid();
+    vtkInformation* image = outputs->GetInformationObject(ImagePort);
+    image->Set(CAN_PRODUCE_SUB_EXTENT(), 1);
+    image->Set(SDDP::WHOLE_EXTENT(), grid.extent.data(), 6);
+    image->Set(vtkDataObject::ORIGIN(), grid.origin.data(), 3);
+    image->Set(vtkDataObject::SPACING(), grid.spacing.data(), 3);
+    image->Set(vtkDataObject::DIRECTION(), this->Direction, 9);
+    vtkDataObject::SetPointDataActiveScalarInfo(image, VTK_SHORT, 1);
     return 1;
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< error.what());
+    vtkErrorMacro(<< PropertyMessage(error.what()));
     return 0;
   }
+}
+
+int vtkCoronaryPhantomSource::RequestUpdateExtent(
+  vtkInformation* request, vtkInformationVector** inputs)
+{
+  // The executive hands the extent of the requested output on to the input, where that of the
+  // image means nothing.
+  vtkInformation* inInfo = inputs[0]->GetInformationObject(0);
+  if (inInfo && inInfo->Has(SDDP::WHOLE_EXTENT()) &&
+    request->Get(vtkExecutive::FROM_OUTPUT_PORT()) != ProbePort)
+  {
+    inInfo->Set(SDDP::UPDATE_EXTENT(), inInfo->Get(SDDP::WHOLE_EXTENT()), 6);
+  }
+  return 1;
+}
+
+int vtkCoronaryPhantomSource::RequestDataNotGenerated(
+  vtkInformation* request, vtkInformationVector* outputs)
+{
+  const int wanted = request->Get(vtkExecutive::FROM_OUTPUT_PORT());
+  for (int port = 0; wanted >= 0 && port < this->GetNumberOfOutputPorts(); ++port)
+  {
+    if (port != wanted)
+    {
+      outputs->GetInformationObject(port)->Set(SDDP::DATA_NOT_GENERATED(), 1);
+    }
+  }
+  return 1;
+}
+
+int vtkCoronaryPhantomSource::RequestData(
+  vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  int result = 1;
+  for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+  {
+    vtkInformation* outInfo = outputs->GetInformationObject(port);
+    vtkDataObject* output = vtkDataObject::GetData(outInfo);
+    if (outInfo->Get(SDDP::DATA_NOT_GENERATED()))
+    {
+      // The executive has put the input's field data into all outputs: give this one its own back.
+      if (output->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
+      {
+        SetTime(output, output->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP()),
+          this->GetCycleLength());
+      }
+      continue;
+    }
+    bool complete = false;
+    try
+    {
+      this->Generate(port, outInfo, inputs);
+      complete = true;
+    }
+    catch (const coronary::Cancelled&)
+    {
+      vtkDebugMacro("aborted");
+    }
+    catch (const std::exception& error)
+    {
+      vtkErrorMacro(<< PropertyMessage(error.what()));
+      result = 0;
+    }
+    if (!complete)
+    {
+      // Not marked as generated, so that the next request executes again.
+      output->Initialize();
+      outInfo->Set(SDDP::DATA_NOT_GENERATED(), 1);
+    }
+  }
+  return result;
+}
+
+void vtkCoronaryPhantomSource::Generate(
+  int port, vtkInformation* outInfo, vtkInformationVector** inputs)
+{
+  const double time = outInfo->Has(SDDP::UPDATE_TIME_STEP())
+    ? outInfo->Get(SDDP::UPDATE_TIME_STEP())
+    : this->Data->Phases.front();
+  Require(std::isfinite(time), "The requested time must be finite");
+
+  const coronary::CoronaryPhantom& phantom = this->Data->Phantom();
+  vtkPolyData* output = vtkPolyData::GetData(outInfo);
+  const bool first = outInfo->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
+  switch (port)
+  {
+    case ImagePort:
+      this->GenerateImage(outInfo, time);
+      break;
+    case TreePort:
+      FillTree(first ? phantom.Tree(time) : coronary::PhantomTree(), output);
+      break;
+    case SurfacePort:
+    {
+      coronary::PhantomSurface surface;
+      if (first)
+      {
+        surface = phantom.Surface(time, vtkCoronary::ProgressOf(this, 0.0, 0.8));
+      }
+      const std::vector<Vector3> velocity =
+        SurfaceVelocity(phantom, surface, time, vtkCoronary::ProgressOf(this, 0.8, 1.0));
+      FillSurface(surface, velocity, output);
+      break;
+    }
+    case OstiaPort:
+      FillOstia(first ? phantom.Ostia(time) : std::vector<coronary::PhantomOstium>(), output);
+      break;
+    case VeinPort:
+      FillTree(first ? phantom.Vein(time) : coronary::PhantomTree(), output);
+      break;
+    default:
+      FillProbe(phantom, time, vtkPointSet::GetData(inputs[0]), vtkPointSet::GetData(outInfo),
+        vtkCoronary::ProgressOf(this));
+  }
+  SetTime(vtkDataObject::GetData(outInfo), time, this->GetCycleLength());
+}
+
+void vtkCoronaryPhantomSource::GenerateImage(vtkInformation* outInfo, double time)
+{
+  vtkImageData* output = vtkImageData::GetData(outInfo);
+  const coronary::ImageGrid grid = this->MakeGrid();
+  std::array<int, 6> part;
+  outInfo->Get(SDDP::UPDATE_EXTENT(), part.data());
+  output->SetExtent(part.data());
+
+  vtkNew<vtkShortArray> values;
+  values->SetName(vtkCoronaryArrayNames::HounsfieldUnits);
+  Require(values->SetNumberOfValues(output->GetNumberOfPoints()),
+    "Not enough memory for the image: Spacing is too small or Dimensions are too large");
+  output->GetPointData()->SetScalars(values);
+  if (output->GetNumberOfPoints() > 0)
+  {
+    this->Data->Phantom().Render(
+      grid, part, time, values->GetPointer(0), vtkCoronary::ProgressOf(this));
+  }
+}
+
+coronary::ImageGrid vtkCoronaryPhantomSource::MakeGrid()
+{
+  Require(std::all_of(this->Spacing, this->Spacing + 3,
+            [](double s) { return s >= SmallestSpacing && s <= GreatestSpacing; }),
+    "Spacing must be 0.05 to 20 mm");
+  Require(AllFinite(this->Origin, 3), "Origin must be finite");
+  Require(std::all_of(this->Dimensions, this->Dimensions + 3,
+            [](int n) { return n >= 1 && n <= GreatestDimension; }),
+    "Dimensions must be 1 to 16384");
+
+  const Vector3 spacing(this->Spacing);
+  const coronary::Matrix3 direction =
+    Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(this->Direction);
+  const coronary::Matrix3 product = direction * direction.transpose();
+  Require(product.isApprox(coronary::Matrix3::Identity(), 1e-6), "Direction must be orthonormal");
+
+  if (this->AutomaticGrid)
+  {
+    return Cover(this->Data->Box(spacing.minCoeff()), spacing, direction);
+  }
+  coronary::ImageGrid grid;
+  grid.extent = { 0, this->Dimensions[0] - 1, 0, this->Dimensions[1] - 1, 0,
+    this->Dimensions[2] - 1 };
+  grid.origin = Vector3(this->Origin);
+  grid.spacing = spacing;
+  grid.direction = direction;
+  return grid;
+}
+
+void vtkCoronaryPhantomSource::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  const coronary::PhantomSettings& settings = this->Data->Settings;
+  const auto print = [&](const char* name, const auto& value)
+  { os << indent << name << ": " << value << "\n"; };
+  const auto printAll = [&](const char* name, const auto* values, int count)
+  {
+    os << indent << name << ":";
+    std::for_each(values, values + count, [&](const auto& value) { os << ' ' << value; });
+    os << "\n";
+  };
+  print("Seed", this->GetSeed());
+  print("Dominance", this->GetDominance());
+  print("Ramus", settings.ramus);
+  print("Calibre", settings.calibre);
+  print("PositionVariation", settings.positionVariation);
+  print("CalibreVariation", settings.calibreVariation);
+  print("Tortuosity", settings.tortuosity);
+  print("Stenoses", settings.stenoses);
+  print("StenosisDegree", settings.stenosisDegree);
+  print("CalcifiedPlaques", settings.calcifiedPlaques);
+  print("ChronicOcclusion", settings.chronicOcclusion);
+  print("CycleLength", settings.cycleLength);
+  print("MotionAmplitude", settings.motionAmplitude);
+  print("AxialMotionRight", settings.axialMotionRight);
+  print("AxialMotionLeft", settings.axialMotionLeft);
+  print("RegionalLag", settings.regionalLag);
+  print("RegionalAmplitude", settings.regionalAmplitude);
+  print("BeatVariation", settings.beatVariation);
+  print("AreaPulse", settings.areaPulse);
+  print("TemporalWindow", settings.temporalWindow);
+  print("Noise", settings.noise);
+  print("NoiseCorrelation", settings.noiseCorrelation);
+  print("SystolicNoise", settings.systolicNoise);
+  printAll("PointSpread", settings.pointSpread, 3);
+  print("LumenHU", settings.lumenHU);
+  print("AttenuationGradient", settings.attenuationGradient);
+  print("VeinHU", settings.veinHU);
+  std::vector<double> lost;
+  for (const coronary::LostPhase& phase : settings.lostPhases)
+  {
+    lost.insert(lost.end(), { phase.time, phase.fraction });
+  }
+  printAll("LostPhases", lost.data(), static_cast<int>(lost.size()));
+  print("CenterlineSpacing", settings.centerlineSpacing);
+  print("SurfaceSpacing", settings.surfaceSpacing);
+  printAll("Phases", this->Data->Phases.data(), this->GetNumberOfPhases());
+  printAll("Spacing", this->Spacing, 3);
+  printAll("Direction", this->Direction, 9);
+  print("AutomaticGrid", this->AutomaticGrid);
+  printAll("Origin", this->Origin, 3);
+  printAll("Dimensions", this->Dimensions, 3);
 }

@@ -56,8 +56,12 @@
 #include "vtkAlgorithm.h"
 #include "vtkCoronaryPhantomModule.h" // for the export macro
 
-#include <functional> // for std::function
-#include <memory>     // for std::unique_ptr
+#include <memory> // for std::unique_ptr
+
+namespace coronary
+{
+struct ImageGrid;
+}
 
 class VTKCORONARYPHANTOM_EXPORT vtkCoronaryPhantomSource : public vtkAlgorithm
 {
@@ -369,11 +373,12 @@ private:
   void Set(Value& setting, Value value);
   int RequestDataObject(vtkInformationVector** inputs, vtkInformationVector* outputs);
   int RequestInformation(vtkInformationVector* outputs);
-  int RequestData(
-    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs);
-  int Guarded(const std::function<void()>& work);
+  int RequestUpdateExtent(vtkInformation* request, vtkInformationVector** inputs);
+  int RequestDataNotGenerated(vtkInformation* request, vtkInformationVector* outputs);
+  int RequestData(vtkInformationVector** inputs, vtkInformationVector* outputs);
   void Generate(int port, vtkInformation* outInfo, vtkInformationVector** inputs);
   void GenerateImage(vtkInformation* outInfo, double time);
+  coronary::ImageGrid MakeGrid();
 
   double Spacing[3] = { 0.8, 0.8, 0.8 };
   double Origin[3] = { -100.0, -100.0, -100.0 };
