@@ -166,6 +166,37 @@ struct CoronaryPhantom::Internals
     return tree;
   }
 
+  /// Normals of the flat ends: the planes move with the tissue.
+  std::vector<Vector3> EndNormals(double t) const
+  {
+    const std::vector<Vector3>& points = this->Anatomy.tree.points;
+    std::vector<Vector3> normals;
+    for (const VesselEnd& end : this->Anatomy.ends)
+    {
+      const Vector3 atRest = (points[end.point] - points[end.neighbour]).normalized();
+      normals.push_back(this->Motion.PlaneNormal(points[end.point], atRest, t));
+    }
+    return normals;
+  }
+
+  PhantomLumen Lumen(double t, double reach) const
+  {
+    const PhantomTree tree = this->Move(this->Anatomy.tree, t, this->RadiusFactor(t));
+    return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach);
+  }
+
+  /// The lumen with every point at its reference position.
+  PhantomLumen RestingLumen(double reach) const
+  {
+    const PhantomTree& tree = this->Anatomy.tree;
+    std::vector<Vector3> normals;
+    for (const VesselEnd& end : this->Anatomy.ends)
+    {
+      normals.push_back((tree.points[end.point] - tree.points[end.neighbour]).normalized());
+    }
+    return PhantomLumen(this->Anatomy, tree.points, tree.radius, normals, reach);
+  }
+
   /// Share of the contrast that is lost at each tree point, and over the whole image.
   std::vector<double> Lost(double t, double& wholePhase) const
   {
@@ -304,15 +335,13 @@ PhantomSurface CoronaryPhantom::Surface(double t, const ProgressCallback& progre
     if (data.RestSurface.points.empty())
     {
       from = 0.7;
-      const PhantomLumen lumen(anatomy, anatomy.tree.points, anatomy.tree.radius, 2.5);
-      data.RestSurface = MeshLumen(anatomy, lumen, data.Settings.surfaceSpacing,
+      data.RestSurface = MeshLumen(anatomy, data.RestingLumen(2.5), data.Settings.surfaceSpacing,
         progress ? ProgressCallback([&](double f) { return progress(0.7 * f); })
                  : ProgressCallback());
     }
   }
   PhantomSurface surface = data.RestSurface;
-  const PhantomTree tree = data.Move(anatomy.tree, t, data.RadiusFactor(t));
-  const PhantomLumen lumen(anatomy, tree.points, tree.radius, 2.5);
+  const PhantomLumen lumen = data.Lumen(t, 2.5);
   ParallelFor(
     static_cast<std::int64_t>(surface.points.size()), 512,
     [&](std::int64_t first, std::int64_t last) {
@@ -333,10 +362,7 @@ PhantomSurface CoronaryPhantom::Surface(double t, const ProgressCallback& progre
 
 double CoronaryPhantom::LumenDistance(const Vector3& position, double t) const
 {
-  const Internals& data = *this->Data;
-  const PhantomTree tree = data.Move(data.Anatomy.tree, t, data.RadiusFactor(t));
-  const PhantomLumen lumen(data.Anatomy, tree.points, tree.radius, farAway);
-  return std::max(-farAway, lumen.Evaluate(position).distance);
+  return std::max(-farAway, this->Data->Lumen(t, farAway).Evaluate(position).distance);
 }
 
 ImageGrid CoronaryPhantom::DefaultGrid(double spacing, double margin) const
@@ -398,7 +424,8 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
   {
     const double u = (m + 0.5) / count - 0.5; // of 1.2 windows
     const double weight = 1.0 - SmoothStep((std::abs(1.2 * u) - 0.4) / 0.2);
-    PhantomMoment moment{ t + 1.2 * u * window, weight, {}, {}, {} };
+    PhantomMoment moment{ t + 1.2 * u * window, weight, {}, {}, {}, {} };
+    moment.endNormals = data.EndNormals(moment.t);
     moment.tree = data.Move(data.Anatomy.tree, moment.t, data.RadiusFactor(moment.t));
     moment.vein = data.Move(data.Anatomy.vein, moment.t, 1.0);
     for (const Plaque& plaque : data.Anatomy.plaques)

@@ -211,12 +211,12 @@ std::vector<VesselPlan> PlanVessels(const PhantomSettings& settings)
   }
   plans.push_back(right);
   plans.push_back({ "RV1", 1, "RCA", Course::Epicardial,
-    { At(-35.0, -40.0, -27.5, 1.6), On(136.0, 9.0, 1.5), On(127.0, 22.0, 1.3),
-      On(120.0, 35.0, 1.0) },
+    { At(-35.0, -40.0, -27.5, 1.6), On(141.0, 9.0, 1.5), On(134.0, 21.0, 1.3),
+      On(127.0, 34.0, 1.0) },
     RightVentricularBranch, {} });
   plans.push_back({ "AM1", 1, "RCA", Course::Epicardial,
-    { At(-45.7, -38.1, -60.3, 1.9), On(171.0, 10.0, 1.8), On(164.0, 26.0, 1.6),
-      On(158.0, 43.0, 1.2), On(154.0, 55.0, 0.9) },
+    { At(-45.7, -38.1, -60.3, 1.9), On(183.0, 9.0, 1.8), On(177.0, 23.0, 1.6),
+      On(169.0, 39.0, 1.2), On(163.0, 53.0, 0.9) },
     AcuteMarginal, {} });
   if (!leftDominant)
   {

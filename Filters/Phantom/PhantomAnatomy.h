@@ -29,7 +29,7 @@ struct VesselEnd
 {
   int vessel;
   std::int64_t point;    ///< the end
-  std::int64_t neighbour; ///< the axis point beside it; the outward normal is point - neighbour
+  std::int64_t neighbour; ///< the axis point beside it; the outward normal at rest is point - neighbour
   int entityId;
 };
 

@@ -566,7 +566,7 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
   for (const PhantomMoment& moment : moments)
   {
     lumens.push_back(std::make_unique<PhantomLumen>(
-      this->Anatomy, moment.tree.points, moment.tree.radius, reach));
+      this->Anatomy, moment.tree.points, moment.tree.radius, moment.endNormals, reach));
     veins.emplace_back();
     const PhantomTree& vein = moment.vein;
     for (std::size_t p = 0; p + 1 < vein.points.size(); p += 2)

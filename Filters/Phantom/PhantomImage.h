@@ -17,6 +17,7 @@ struct PhantomMoment
   PhantomTree tree;
   PhantomTree vein;
   std::vector<Vector3> plaques;
+  std::vector<Vector3> endNormals; ///< as PhantomLumen takes them
 };
 
 /**

@@ -19,7 +19,7 @@ double RoundUnion(double a, double b, double k)
 }
 
 PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vector3>& points,
-  const std::vector<double>& radius, double reach)
+  const std::vector<double>& radius, const std::vector<Vector3>& endNormals, double reach)
   : Limit(reach)
 {
   const auto add = [this](const Vector3& p, const Vector3& q, double rp, double rq, int vessel,
@@ -45,14 +45,15 @@ PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vect
     add(points[step.first], points[step.second], start, radius[step.second], step.vessel,
       static_cast<std::int32_t>(s));
   }
-  for (const VesselEnd& end : anatomy.ends)
+  for (std::size_t e = 0; e < anatomy.ends.size(); ++e)
   {
-    const Vector3 normal = (points[end.point] - points[end.neighbour]).normalized();
+    const VesselEnd& end = anatomy.ends[e];
+    const Vector3 outward = (points[end.point] - points[end.neighbour]).normalized();
     const double r = radius[end.point];
     // The tube goes on behind the plane, so that the cut through it is flat up to its rim.
     const std::int32_t step = stepOfPoint[end.point];
-    add(points[end.point], points[end.point] + normal * (1.5 * r), r, r, end.vessel, step);
-    this->Cuts.push_back({ points[end.point], normal, 2.5 * r + 0.5, end.vessel });
+    add(points[end.point], points[end.point] + outward * (1.5 * r), r, r, end.vessel, step);
+    this->Cuts.push_back({ points[end.point], endNormals[e], 2.5 * r + 0.5, end.vessel });
   }
   for (const Junction& junction : anatomy.junctions)
   {
@@ -236,16 +237,15 @@ double PhantomLumen::Project(Vector3& position, double tolerance) const
   Candidates candidates;
   this->Collect(position, 1.5, candidates);
   const Vector3 start = position;
-  double distance = this->Evaluate(position, candidates).distance;
-  for (int iteration = 0; iteration < 12 && std::abs(distance) > tolerance; ++iteration)
+  const auto distanceAt = [&](const Vector3& p) { return this->Evaluate(p, candidates).distance; };
+  double distance = distanceAt(position);
+  Vector3 gradient = Vector3::Zero();
+  for (int iteration = 0; iteration < 10 && std::abs(distance) > tolerance; ++iteration)
   {
-    Vector3 gradient;
     for (int axis = 0; axis < 3; ++axis)
     {
       const Vector3 step = Vector3::Unit(axis) * h;
-      gradient[axis] = (this->Evaluate(position + step, candidates).distance -
-                         this->Evaluate(position - step, candidates).distance) /
-        (2.0 * h);
+      gradient[axis] = (distanceAt(position + step) - distanceAt(position - step)) / (2.0 * h);
     }
     const double squared = gradient.squaredNorm();
     if (squared < 1e-6)
@@ -264,7 +264,30 @@ double PhantomLumen::Project(Vector3& position, double tolerance) const
     {
       this->Collect(position, 1.5, candidates);
     }
-    distance = this->Evaluate(position, candidates).distance;
+    distance = distanceAt(position);
+  }
+  if (std::abs(distance) > tolerance && gradient.squaredNorm() > 1e-6)
+  {
+    // At a crease Newton's steps go to and fro; the sign still changes along the last normal.
+    const Vector3 direction = gradient.normalized() * (distance > 0.0 ? -1.0 : 1.0);
+    constexpr double stride = 0.02;
+    for (double far = stride; far < 0.6; far += stride)
+    {
+      if ((distanceAt(position + far * direction) > 0.0) != (distance > 0.0))
+      {
+        double near = far - stride;
+        while (far - near > 0.25 * tolerance)
+        {
+          const double middle = 0.5 * (near + far);
+          const bool same =
+            (distanceAt(position + middle * direction) > 0.0) == (distance > 0.0);
+          (same ? near : far) = middle;
+        }
+        position += 0.5 * (near + far) * direction;
+        distance = distanceAt(position);
+        break;
+      }
+    }
   }
   return std::abs(distance);
 }

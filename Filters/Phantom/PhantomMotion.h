@@ -53,6 +53,9 @@ public:
   /// World position of a material point, mm, and its velocity in mm/s when asked for.
   Vector3 Position(const Vector3& reference, double t, Vector3* velocity = nullptr) const;
 
+  /// Unit normal, at time t, of the material plane that rests at `reference` with unit `normal`.
+  Vector3 PlaneNormal(const Vector3& reference, const Vector3& normal, double t) const;
+
   /**
    * Material point at `position`: fixed-point iteration, starting from `guess`.
    * The field's displacement gradient stays below 1, so that the iteration contracts.

@@ -406,6 +406,264 @@ bool IsClosedManifold(const Mesh& mesh)
   return true;
 }
 
+double SmallestAngle(const Vector3& a, const Vector3& b, const Vector3& c)
+{
+  const auto angle = [](const Vector3& p, const Vector3& q, const Vector3& r) {
+    const Vector3 u = q - p;
+    const Vector3 v = r - p;
+    return std::atan2(u.cross(v).norm(), u.dot(v));
+  };
+  return std::min({ angle(a, b, c), angle(b, c, a), angle(c, a, b) });
+}
+
+Vector3 Normal(const Vector3& a, const Vector3& b, const Vector3& c)
+{
+  return (b - a).cross(c - a);
+}
+
+/**
+ * Removes the slivers that the rims of the flat ends and the creases between vessels leave:
+ * edges are flipped where that raises the smallest angle, and collapsed where they are short, as
+ * long as the mesh stays a manifold and no triangle turns over.
+ */
+class Repair
+{
+public:
+  explicit Repair(Mesh& mesh)
+    : M(mesh)
+    , Around(mesh.points.size())
+  {
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    {
+      for (const std::int64_t p : mesh.triangles[t])
+      {
+        this->Around[p].push_back(t);
+      }
+    }
+  }
+
+  void Run(double shortest)
+  {
+    for (int round = 0; round < 4; ++round)
+    {
+      bool changed = false;
+      for (std::size_t t = 0; t < this->M.triangles.size(); ++t)
+      {
+        changed = this->Improve(t, shortest) || changed;
+      }
+      if (!changed)
+      {
+        break;
+      }
+    }
+    this->Compact();
+  }
+
+private:
+  bool Dead(std::size_t t) const { return this->M.triangles[t][0] == this->M.triangles[t][1]; }
+  const Vector3& At(std::int64_t p) const { return this->M.points[p]; }
+  double Quality(std::int64_t a, std::int64_t b, std::int64_t c) const
+  {
+    return SmallestAngle(this->At(a), this->At(b), this->At(c));
+  }
+
+  /// The point across the directed edge, and its triangle.
+  bool Across(std::int64_t a, std::int64_t b, std::int64_t& apex, std::size_t& triangle) const
+  {
+    for (const std::size_t t : this->Around[a])
+    {
+      for (int c = 0; c < 3; ++c)
+      {
+        if (this->M.triangles[t][c] == a && this->M.triangles[t][(c + 1) % 3] == b)
+        {
+          apex = this->M.triangles[t][(c + 2) % 3];
+          triangle = t;
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  std::vector<std::int64_t> Neighbours(std::int64_t p) const
+  {
+    std::vector<std::int64_t> result;
+    for (const std::size_t t : this->Around[p])
+    {
+      for (const std::int64_t q : this->M.triangles[t])
+      {
+        if (q != p)
+        {
+          result.push_back(q);
+        }
+      }
+    }
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+  }
+
+  void Forget(std::int64_t p, std::size_t t)
+  {
+    auto& list = this->Around[p];
+    list.erase(std::find(list.begin(), list.end(), t));
+  }
+
+  bool Improve(std::size_t t, double shortest)
+  {
+    constexpr double poor = 0.42; // 24 degrees
+    if (this->Dead(t))
+    {
+      return false;
+    }
+    const Triangle triangle = this->M.triangles[t];
+    if (this->Quality(triangle[0], triangle[1], triangle[2]) > poor)
+    {
+      return false;
+    }
+    int longest = 0;
+    int least = 0;
+    double length[3];
+    for (int c = 0; c < 3; ++c)
+    {
+      length[c] = (this->At(triangle[c]) - this->At(triangle[(c + 1) % 3])).norm();
+      longest = length[c] > length[longest] ? c : longest;
+      least = length[c] < length[least] ? c : least;
+    }
+    return this->Flip(t, triangle[longest], triangle[(longest + 1) % 3]) ||
+      (length[least] < shortest &&
+        (this->Collapse(triangle[least], triangle[(least + 1) % 3]) ||
+          this->Collapse(triangle[(least + 1) % 3], triangle[least])));
+  }
+
+  bool Flip(std::size_t t, std::int64_t a, std::int64_t b)
+  {
+    std::int64_t c = 0;
+    std::int64_t d = 0;
+    std::size_t self = 0;
+    std::size_t other = 0;
+    if (!this->Across(a, b, c, self) || self != t || !this->Across(b, a, d, other) || c == d)
+    {
+      return false;
+    }
+    const auto fan = this->Neighbours(c);
+    if (std::binary_search(fan.begin(), fan.end(), d))
+    {
+      return false;
+    }
+    const double before = std::min(this->Quality(a, b, c), this->Quality(b, a, d));
+    const double after = std::min(this->Quality(a, d, c), this->Quality(d, b, c));
+    const Vector3 normal =
+      Normal(this->At(a), this->At(b), this->At(c)) + Normal(this->At(b), this->At(a), this->At(d));
+    if (after <= 1.05 * before || Normal(this->At(a), this->At(d), this->At(c)).dot(normal) <= 0.0 ||
+      Normal(this->At(d), this->At(b), this->At(c)).dot(normal) <= 0.0)
+    {
+      return false;
+    }
+    this->M.triangles[t] = { a, d, c };
+    this->M.triangles[other] = { d, b, c };
+    this->Forget(b, t);
+    this->Forget(a, other);
+    this->Around[d].push_back(t);
+    this->Around[c].push_back(other);
+    return true;
+  }
+
+  /// Moves `from` onto `to`.
+  bool Collapse(std::int64_t from, std::int64_t to)
+  {
+    const auto fan = this->Neighbours(from);
+    const auto other = this->Neighbours(to);
+    std::vector<std::int64_t> common;
+    std::set_intersection(
+      fan.begin(), fan.end(), other.begin(), other.end(), std::back_inserter(common));
+    if (common.size() != 2)
+    {
+      return false;
+    }
+    double before = 4.0;
+    double after = 4.0;
+    for (const std::size_t t : this->Around[from])
+    {
+      Triangle moved = this->M.triangles[t];
+      before = std::min(before, this->Quality(moved[0], moved[1], moved[2]));
+      if (std::find(moved.begin(), moved.end(), to) != moved.end())
+      {
+        continue;
+      }
+      const Vector3 normal = Normal(this->At(moved[0]), this->At(moved[1]), this->At(moved[2]));
+      std::replace(moved.begin(), moved.end(), from, to);
+      if (Normal(this->At(moved[0]), this->At(moved[1]), this->At(moved[2])).dot(normal) <= 0.0)
+      {
+        return false;
+      }
+      after = std::min(after, this->Quality(moved[0], moved[1], moved[2]));
+    }
+    if (after <= before)
+    {
+      return false;
+    }
+    const std::vector<std::size_t> triangles = this->Around[from];
+    for (const std::size_t t : triangles)
+    {
+      Triangle& triangle = this->M.triangles[t];
+      if (std::find(triangle.begin(), triangle.end(), to) != triangle.end())
+      {
+        for (const std::int64_t p : triangle)
+        {
+          this->Forget(p, t);
+        }
+        triangle = { 0, 0, 0 };
+      }
+      else
+      {
+        std::replace(triangle.begin(), triangle.end(), from, to);
+        this->Around[to].push_back(t);
+      }
+    }
+    this->Around[from].clear();
+    return true;
+  }
+
+  void Compact()
+  {
+    std::vector<std::int64_t> number(this->M.points.size(), -1);
+    std::vector<Triangle> triangles;
+    for (std::size_t t = 0; t < this->M.triangles.size(); ++t)
+    {
+      if (!this->Dead(t))
+      {
+        triangles.push_back(this->M.triangles[t]);
+        for (const std::int64_t p : triangles.back())
+        {
+          number[p] = 0;
+        }
+      }
+    }
+    std::vector<Vector3> points;
+    for (std::size_t p = 0; p < number.size(); ++p)
+    {
+      if (number[p] == 0)
+      {
+        number[p] = static_cast<std::int64_t>(points.size());
+        points.push_back(this->M.points[p]);
+      }
+    }
+    for (Triangle& triangle : triangles)
+    {
+      for (std::int64_t& p : triangle)
+      {
+        p = number[p];
+      }
+    }
+    this->M.points = std::move(points);
+    this->M.triangles = std::move(triangles);
+  }
+
+  Mesh& M;
+  std::vector<std::vector<std::size_t>> Around;
+};
+
 /// Evens out the triangles: points move to their neighbours' mean, then back onto the wall.
 void Relax(Mesh& mesh, const PhantomLumen& lumen, int rounds, const ProgressCallback& progress)
 {
@@ -485,7 +743,14 @@ PhantomSurface MeshLumen(const PhantomAnatomy& anatomy, const PhantomLumen& lume
         "CoronaryPhantom: no closed surface at this surfaceSpacing, choose a smaller one");
     }
   }
-  Relax(mesh, lumen, 6, part(0.4, 1.0));
+  Relax(mesh, lumen, 6, part(0.4, 0.9));
+  Repair(mesh).Run(0.45 * edgeLength);
+  Relax(mesh, lumen, 1, part(0.9, 1.0));
+  Repair(mesh).Run(0.45 * edgeLength);
+  if (!IsClosedManifold(mesh))
+  {
+    throw std::runtime_error("CoronaryPhantom: the repaired surface is not closed");
+  }
 
   PhantomSurface surface;
   surface.points = std::move(mesh.points);
