@@ -1,5 +1,7 @@
 #include "DicomFile.h"
 
+#include "DicomStructure.h"
+
 #include <gdcmAttribute.h>
 #include <gdcmImageReader.h>
 #include <gdcmReader.h>
@@ -10,8 +12,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
+#include <sstream>
 #include <stdexcept>
 
 namespace coronary
@@ -237,24 +238,6 @@ bool ReadFrame(FrameData& data, const std::string& path, DicomFrame& frame)
   return true;
 }
 
-bool BeginsAsDicom(std::ifstream& stream)
-{
-  std::array<char, 132> start{};
-  stream.read(start.data(), start.size());
-  const std::streamsize got = stream.gcount();
-  stream.clear();
-  stream.seekg(0);
-  if (got == 132 && std::memcmp(start.data() + 128, "DICM", 4) == 0)
-  {
-    return true;
-  }
-  // Old files have no preamble: they begin with group 0008, or 0002, little endian, and a value of
-  // a plausible length.
-  return got >= 16 && (start[0] == 8 || start[0] == 2) && start[1] == 0 && start[3] == 0 &&
-    ((start[4] >= 'A' && start[4] <= 'Z' && start[5] >= 'A' && start[5] <= 'Z') ||
-      (start[6] == 0 && start[7] == 0));
-}
-
 std::string SkipReason(const gdcm::File& file)
 {
   const gdcm::DataSet& data = file.GetDataSet();
@@ -279,20 +262,17 @@ std::string SkipReason(const gdcm::File& file)
   return {};
 }
 
-// Voxels that are not compressed must be there in full.
-void CheckPixelSize(const DicomFile& file, const gdcm::File& header, std::uint64_t available)
+// What decoded voxels take is believed only as far as the file can hold it.
+void CheckPixelSize(const DicomFile& file)
 {
-  const gdcm::TransferSyntax& syntax = header.GetHeader().GetDataSetTransferSyntax();
-  if (syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian)
-  {
-    return;
-  }
+  // Encoders of constant images reach some hundreds.
+  constexpr std::uint64_t largestRatio = 10000;
   const std::uint64_t expected = std::uint64_t(file.rows) * std::uint64_t(file.columns) *
     std::uint64_t(file.frames.size()) * std::uint64_t(file.bitsAllocated) / 8;
-  if (available < expected)
+  if (file.pixelBytes < (file.encapsulated ? expected / largestRatio : expected))
   {
     throw std::runtime_error("'" + file.path + "' is truncated: expected " +
-      std::to_string(expected) + " bytes of voxels, got " + std::to_string(available) + ".");
+      std::to_string(expected) + " bytes of voxels, got " + std::to_string(file.pixelBytes) + ".");
   }
 }
 
@@ -315,6 +295,8 @@ void ReadImageHeader(const gdcm::File& header, DicomFile& file)
   {
     Fail(file.path, std::to_string(file.bitsAllocated) + " bits a voxel are not supported");
   }
+  file.bitsStored = static_cast<int>(BinaryOf<0x0028, 0x0101>(data).value_or(file.bitsAllocated));
+  file.isSigned = BinaryOf<0x0028, 0x0103>(data).value_or(0.0) == 1.0;
   const double samples = BinaryOf<0x0028, 0x0002>(data).value_or(1.0);
   if (samples != 1.0)
   {
@@ -371,19 +353,19 @@ DicomFile ReadDicomHeader(const std::string& path)
   SilenceGdcm();
   DicomFile file;
   file.path = path;
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream || !BeginsAsDicom(stream))
+  DicomStructure structure = ReadDicomStructure(path);
+  if (!structure.isDicom)
   {
     file.skipReason = "files that are not DICOM";
     return file;
   }
-  const std::uint64_t size = std::filesystem::file_size(path);
+  std::istringstream stream(std::move(structure.header));
   gdcm::Reader reader;
   reader.SetStream(stream);
   bool good = false;
   try
   {
-    good = reader.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010), {});
+    good = reader.Read();
   }
   catch (const std::exception&)
   {
@@ -398,104 +380,55 @@ DicomFile ReadDicomHeader(const std::string& path)
   {
     return file;
   }
-  const std::streamoff position = stream.tellg();
+  file.encapsulated = structure.encapsulated;
+  file.bigEndian = structure.bigEndian;
+  file.pixelOffset = structure.pixelOffset;
+  file.pixelBytes = structure.pixelBytes;
   ReadImageHeader(reader.GetFile(), file);
   if (file.skipReason.empty())
   {
-    const auto used = static_cast<std::uint64_t>(std::max<std::streamoff>(0, position));
-    CheckPixelSize(file, reader.GetFile(), position < 0 || used > size ? 0 : size - used);
+    CheckPixelSize(file);
   }
   return file;
 }
 
 struct DicomPixelReader::Internals
 {
-  std::string Path;
-  VoxelType Type = VoxelType::Int16;
-  unsigned BitsStored = 16;
-  std::size_t FrameBytes = 0;
+  std::string Path; ///< the file whose decoded frames are in Values
   std::vector<char> Values;
 
-  void Open(const DicomFile& file);
-  void ClearUnusedBits(std::vector<unsigned char>& bytes) const;
+  void Decode(const DicomFile& file);
 };
 
-void DicomPixelReader::Internals::Open(const DicomFile& file)
+namespace
 {
-  gdcm::ImageReader reader;
-  reader.SetFileName(file.path.c_str());
-  bool good = false;
-  try
+VoxelType TypeOf(const DicomFile& file)
+{
+  switch (file.bitsAllocated)
   {
-    good = reader.Read();
-  }
-  catch (const std::exception&)
-  {
-    good = false;
-  }
-  if (!good)
-  {
-    Fail(file.path, "its pixels cannot be decoded");
-  }
-  const gdcm::Image& image = reader.GetImage();
-  const gdcm::PixelFormat& format = image.GetPixelFormat();
-  switch (format.GetScalarType())
-  {
-    case gdcm::PixelFormat::UINT8:
-      this->Type = VoxelType::UInt8;
-      break;
-    case gdcm::PixelFormat::INT8:
-      this->Type = VoxelType::Int8;
-      break;
-    case gdcm::PixelFormat::UINT16:
-      this->Type = VoxelType::UInt16;
-      break;
-    case gdcm::PixelFormat::INT16:
-      this->Type = VoxelType::Int16;
-      break;
-    case gdcm::PixelFormat::UINT32:
-      this->Type = VoxelType::UInt32;
-      break;
-    case gdcm::PixelFormat::INT32:
-      this->Type = VoxelType::Int32;
-      break;
+    case 8:
+      return file.isSigned ? VoxelType::Int8 : VoxelType::UInt8;
+    case 16:
+      return file.isSigned ? VoxelType::Int16 : VoxelType::UInt16;
     default:
-      Fail(file.path, "its pixel format is not supported");
+      return file.isSigned ? VoxelType::Int32 : VoxelType::UInt32;
   }
-  this->BitsStored = format.GetBitsStored();
-  this->FrameBytes = std::size_t(file.rows) * std::size_t(file.columns) * VoxelBytes(this->Type);
-  const std::size_t expected = this->FrameBytes * file.frames.size();
-  if (image.GetBufferLength() != expected)
-  {
-    Fail(file.path, "its pixels are not of the size that its header says");
-  }
-  this->Values.resize(expected);
-  try
-  {
-    good = image.GetBuffer(this->Values.data());
-  }
-  catch (const std::exception&)
-  {
-    good = false;
-  }
-  if (!good)
-  {
-    Fail(file.path, "its pixels cannot be decoded");
-  }
-  this->Path = file.path;
+}
+
+std::size_t FrameBytes(const DicomFile& file)
+{
+  return std::size_t(file.rows) * std::size_t(file.columns) * VoxelBytes(TypeOf(file));
 }
 
 // Bits above those stored may hold an overlay, and the sign is not always extended into them.
-void DicomPixelReader::Internals::ClearUnusedBits(std::vector<unsigned char>& bytes) const
+void ClearUnusedBits(const DicomFile& file, std::vector<unsigned char>& bytes)
 {
-  const bool isSigned = this->Type == VoxelType::Int16;
-  if ((!isSigned && this->Type != VoxelType::UInt16) || this->BitsStored >= 16 ||
-    this->BitsStored < 1)
+  if (file.bitsAllocated != 16 || file.bitsStored >= 16 || file.bitsStored < 1)
   {
     return;
   }
-  const unsigned mask = (1u << this->BitsStored) - 1u;
-  const unsigned sign = isSigned ? 1u << (this->BitsStored - 1) : 0u;
+  const unsigned mask = (1u << file.bitsStored) - 1u;
+  const unsigned sign = file.isSigned ? 1u << (file.bitsStored - 1) : 0u;
   for (std::size_t i = 0; i + 1 < bytes.size(); i += 2)
   {
     std::uint16_t stored = 0;
@@ -504,6 +437,36 @@ void DicomPixelReader::Internals::ClearUnusedBits(std::vector<unsigned char>& by
     stored = static_cast<std::uint16_t>((value ^ sign) - sign);
     std::memcpy(bytes.data() + i, &stored, 2);
   }
+}
+}
+
+void DicomPixelReader::Internals::Decode(const DicomFile& file)
+{
+  this->Path.clear();
+  bool good = false;
+  const std::size_t expected = FrameBytes(file) * file.frames.size();
+  try
+  {
+    gdcm::ImageReader reader;
+    reader.SetFileName(file.path.c_str());
+    good = reader.Read();
+    const gdcm::Image& image = reader.GetImage();
+    if (good && image.GetBufferLength() != expected)
+    {
+      Fail(file.path, "its pixels are not of the size that its header says");
+    }
+    this->Values.resize(expected);
+    good = good && image.GetBuffer(this->Values.data());
+  }
+  catch (const gdcm::Exception&)
+  {
+    good = false;
+  }
+  if (!good)
+  {
+    Fail(file.path, "its pixels cannot be decoded; the file is truncated or damaged");
+  }
+  this->Path = file.path;
 }
 
 DicomPixelReader::DicomPixelReader()
@@ -517,16 +480,29 @@ VoxelType DicomPixelReader::Read(
   const DicomFile& file, int frame, std::vector<unsigned char>& bytes)
 {
   SilenceGdcm();
-  Internals& impl = *this->Impl;
-  if (impl.Path != file.path)
+  const std::size_t size = FrameBytes(file);
+  const std::size_t first = size * static_cast<std::size_t>(frame);
+  bytes.resize(size);
+  if (file.encapsulated)
   {
-    impl.Open(file);
+    if (this->Impl->Path != file.path)
+    {
+      this->Impl->Decode(file);
+    }
+    std::memcpy(bytes.data(), this->Impl->Values.data() + first, size);
   }
-  const std::size_t first = impl.FrameBytes * static_cast<std::size_t>(frame);
-  bytes.resize(impl.FrameBytes);
-  std::memcpy(bytes.data(), impl.Values.data() + first, impl.FrameBytes);
-  impl.ClearUnusedBits(bytes);
-  return impl.Type;
+  else
+  {
+    ByteStream stream(file.path, file.pixelOffset, false);
+    stream.Read(first, bytes.data(), size, size * file.frames.size());
+    const std::size_t valueBytes = VoxelBytes(TypeOf(file));
+    if (file.bigEndian != HostIsBigEndian() && valueBytes > 1)
+    {
+      SwapBytes(bytes, valueBytes);
+    }
+  }
+  ClearUnusedBits(file, bytes);
+  return TypeOf(file);
 }
 
 void DicomPixelReader::Close()

@@ -42,8 +42,14 @@ struct DicomFile
   std::string frameOfReferenceUid;
   int rows = 0;
   int columns = 0;
-  int bitsAllocated = 0;
-  double sliceSpacing = 0.0; ///< between slices, or their thickness, mm; 0 if not given
+  int bitsAllocated = 0; ///< 8, 16 or 32
+  int bitsStored = 0;
+  bool isSigned = false;
+  bool encapsulated = false; ///< the pixels are compressed
+  bool bigEndian = false;
+  std::uint64_t pixelOffset = 0; ///< in the file
+  std::uint64_t pixelBytes = 0;  ///< in the file, from pixelOffset on
+  double sliceSpacing = 0.0;     ///< between slices, or their thickness, mm; 0 if not given
   std::vector<DicomFrame> frames;
   /// Temporal position, acquisition number, acquisition time, instance number.
   std::tuple<double, double, double, double> acquisitionOrder;

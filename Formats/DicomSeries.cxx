@@ -169,7 +169,8 @@ std::string Difference(const DicomFile& a, const DicomFile& b)
   {
     return "modality " + a.modality + " and " + b.modality;
   }
-  if (a.frameOfReferenceUid != b.frameOfReferenceUid)
+  // Some anonymisers give every file of a series its own frame of reference.
+  if (a.seriesUid != b.seriesUid && a.frameOfReferenceUid != b.frameOfReferenceUid)
   {
     return "different frames of reference";
   }
@@ -785,8 +786,11 @@ DicomSeries::DicomSeries(const std::string& folder, const std::string& seriesUid
   const Files files = this->Select(folder, seriesUid);
   const std::map<std::string, Files> series = GroupBySeries(files);
   std::vector<Image> images;
+  bool oneFrameOfReference = true;
   for (const DicomFile* file : files)
   {
+    oneFrameOfReference =
+      oneFrameOfReference && file->frameOfReferenceUid == files.front()->frameOfReferenceUid;
     const std::string difference = Difference(*files.front(), *file);
     if (!difference.empty())
     {
@@ -800,6 +804,11 @@ DicomSeries::DicomSeries(const std::string& folder, const std::string& seriesUid
       image.frameIndex = static_cast<int>(f);
       images.push_back(image);
     }
+  }
+  if (!oneFrameOfReference)
+  {
+    info.warnings.emplace_back(
+      "The files of one series name different frames of reference; this is ignored.");
   }
   const DicomFrame& first = files.front()->frames.front();
   const Vector3 normal = first.rowAxis.cross(first.columnAxis).normalized();

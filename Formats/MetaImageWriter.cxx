@@ -1,6 +1,7 @@
 #include "MetaImageWriter.h"
 
 #include "AtomicFile.h"
+#include "ByteStream.h"
 
 #include <zlib.h>
 
@@ -13,6 +14,7 @@
 #include <filesystem>
 #include <iomanip>
 #include <limits>
+#include <locale>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
@@ -25,14 +27,6 @@ namespace
 constexpr std::size_t BlockBytes = 1u << 20;
 // Room for any 64-bit number: the size of the compressed data is known only after it is written.
 constexpr int SizeDigits = 20;
-
-bool HostIsBigEndian()
-{
-  const std::uint16_t one = 1;
-  unsigned char first = 0;
-  std::memcpy(&first, &one, 1);
-  return first == 0;
-}
 
 // Letters name the side an axis comes from, as ITK writes them: the axes of LPS are "RAI".
 std::string AnatomicalOrientation(const Matrix3& direction)
@@ -190,6 +184,7 @@ void Write(const std::string& path, const ImageGrid& grid, const void* values,
   }
 
   std::ostringstream header;
+  header.imbue(std::locale::classic());
   header << std::setprecision(std::numeric_limits<double>::max_digits10);
   const Vector3 offset = grid.IndexToWorld(grid.extent[0], grid.extent[2], grid.extent[4]);
   header << "ObjectType = Image\nNDims = 3\nBinaryData = True\n"

@@ -105,15 +105,11 @@ Nifti ParseHeader(const std::string& path, bool compressed, bool& bigEndian)
   Bytes bytes;
   bytes.Data.resize(540);
   const std::size_t got = stream.ReadSome(0, bytes.Data.data(), bytes.Data.size());
-  const std::uint16_t one = 1;
-  unsigned char low = 0;
-  std::memcpy(&low, &one, 1);
-  const bool hostIsBigEndian = low == 0;
   for (const bool swap : { false, true })
   {
     bytes.Swap = swap;
     const auto size = bytes.Get<std::int32_t>(0);
-    bigEndian = hostIsBigEndian != swap;
+    bigEndian = HostIsBigEndian() != swap;
     if (size == 348 && got >= 348)
     {
       if (std::memcmp(bytes.Data.data() + 344, "n+1", 4) == 0)

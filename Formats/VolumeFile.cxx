@@ -25,23 +25,6 @@ bool EndsWith(const std::string& text, const std::string& end)
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-bool HostIsBigEndian()
-{
-  const std::uint16_t one = 1;
-  unsigned char first = 0;
-  std::memcpy(&first, &one, 1);
-  return first == 0;
-}
-
-void SwapBytes(std::vector<unsigned char>& bytes, std::size_t valueBytes)
-{
-  for (std::size_t i = 0; i + valueBytes <= bytes.size(); i += valueBytes)
-  {
-    std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(i),
-      bytes.begin() + static_cast<std::ptrdiff_t>(i + valueBytes));
-  }
-}
-
 std::uint64_t NumberOfVoxels(const ImageGrid& grid)
 {
   std::uint64_t count = 1;

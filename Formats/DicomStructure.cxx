@@ -1,0 +1,316 @@
+#include "DicomStructure.h"
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr std::uint32_t ItemTag = 0xfffee000u;
+constexpr std::uint32_t ItemEnd = 0xfffee00du;
+constexpr std::uint32_t SequenceEnd = 0xfffee0ddu;
+constexpr std::uint32_t PixelDataTag = 0x7fe00010u;
+constexpr std::uint32_t UndefinedLength = 0xffffffffu;
+constexpr int DeepestNesting = 32;
+
+class Walker
+{
+public:
+  Walker(const std::string& path, DicomStructure& structure)
+    : Path(path)
+    , Structure(structure)
+    , Stream(path, std::ios::binary)
+    , Size(std::filesystem::file_size(path))
+  {
+    if (!this->Stream)
+    {
+      throw std::runtime_error("File '" + path + "' cannot be read.");
+    }
+  }
+
+  void Run()
+  {
+    std::uint64_t position = 0;
+    if (this->Has(132) && this->Bytes.compare(128, 4, "DICM") == 0)
+    {
+      position = 132;
+    }
+    else if (!this->BeginsWithoutPreamble())
+    {
+      return;
+    }
+    this->Structure.isDicom = true;
+    position = this->WalkMetaInformation(position);
+    this->SetSyntax(position);
+    position = this->WalkDataSet(position, this->Size, this->Explicit, 0, false);
+    this->Bytes.resize(static_cast<std::size_t>(position));
+    this->Structure.header = std::move(this->Bytes);
+    this->Structure.bigEndian = this->BigEndian;
+  }
+
+private:
+  struct Element
+  {
+    std::uint32_t tag = 0;
+    std::string representation; ///< empty when the encoding has none
+    std::uint64_t value = 0;    ///< position
+    std::uint32_t length = 0;
+  };
+
+  [[noreturn]] void Damaged() const
+  {
+    throw std::runtime_error("'" + this->Path + "' is a DICOM file, but truncated or damaged.");
+  }
+
+  // Makes the first `end` bytes of the file available; false when it is shorter.
+  bool Has(std::uint64_t end)
+  {
+    if (end > this->Size)
+    {
+      return false;
+    }
+    if (end > this->Bytes.size())
+    {
+      const std::size_t old = this->Bytes.size();
+      const auto wanted = static_cast<std::size_t>(
+        std::min<std::uint64_t>(this->Size, std::max<std::uint64_t>(end, old + (16u << 10))));
+      this->Bytes.resize(wanted);
+      this->Stream.read(&this->Bytes[old], static_cast<std::streamsize>(wanted - old));
+      if (static_cast<std::size_t>(this->Stream.gcount()) != wanted - old)
+      {
+        this->Damaged();
+      }
+    }
+    return true;
+  }
+
+  unsigned Byte(std::uint64_t position) const
+  {
+    return static_cast<unsigned char>(this->Bytes[static_cast<std::size_t>(position)]);
+  }
+
+  std::uint32_t Number(std::uint64_t position, unsigned bytes)
+  {
+    if (!this->Has(position + bytes))
+    {
+      this->Damaged();
+    }
+    std::uint32_t value = 0;
+    for (unsigned b = 0; b < bytes; ++b)
+    {
+      value |= this->Byte(position + b) << (8 * (this->BigEndian ? bytes - 1 - b : b));
+    }
+    return value;
+  }
+
+  std::uint32_t Tag(std::uint64_t position)
+  {
+    const std::uint32_t group = this->Number(position, 2);
+    return group << 16 | this->Number(position + 2, 2);
+  }
+
+  bool IsRepresentation(std::uint64_t position) const
+  {
+    const auto isCapital = [this](std::uint64_t p)
+    { return this->Byte(p) >= 'A' && this->Byte(p) <= 'Z'; };
+    return isCapital(position) && isCapital(position + 1);
+  }
+
+  // Old files begin with their first element: of group 0002 or 0008, with a plausible length.
+  bool BeginsWithoutPreamble()
+  {
+    if (!this->Has(8))
+    {
+      return false;
+    }
+    const std::uint32_t group = this->Number(0, 2);
+    return (group == 2 || group == 8) && this->Byte(3) == 0 &&
+      (this->IsRepresentation(4) || (this->Byte(6) == 0 && this->Byte(7) == 0));
+  }
+
+  Element ReadElement(std::uint64_t position, bool isExplicit)
+  {
+    Element element;
+    element.tag = this->Tag(position);
+    if (!isExplicit || element.tag >> 16 == 0xfffeu)
+    {
+      element.length = this->Number(position + 4, 4);
+      element.value = position + 8;
+      return element;
+    }
+    this->Number(position + 4, 4);
+    if (!this->IsRepresentation(position + 4))
+    {
+      this->Damaged();
+    }
+    element.representation = this->Bytes.substr(static_cast<std::size_t>(position) + 4, 2);
+    static const char* const longOnes[] = { "OB", "OD", "OF", "OL", "OV", "OW", "SQ", "SV", "UC",
+      "UN", "UR", "UT", "UV" };
+    const bool isLong = std::any_of(std::begin(longOnes), std::end(longOnes),
+      [&element](const char* name) { return element.representation == name; });
+    element.length = this->Number(position + (isLong ? 8 : 6), isLong ? 4 : 2);
+    element.value = position + (isLong ? 12 : 8);
+    return element;
+  }
+
+  // Group 0002 is explicit little endian whatever follows.
+  std::uint64_t WalkMetaInformation(std::uint64_t position)
+  {
+    while (this->Has(position + 8) && this->Tag(position) >> 16 == 2)
+    {
+      const Element element = this->ReadElement(position, true);
+      const std::uint64_t end = element.value + element.length;
+      if (!this->Has(end))
+      {
+        this->Damaged();
+      }
+      if (element.tag == 0x00020010u)
+      {
+        std::string uid = this->Bytes.substr(
+          static_cast<std::size_t>(element.value), static_cast<std::size_t>(element.length));
+        uid.erase(std::find_if(uid.begin(), uid.end(),
+                    [](char c) { return c != '.' && (c < '0' || c > '9'); }),
+          uid.end());
+        this->Structure.transferSyntax = uid;
+      }
+      position = end;
+    }
+    return position;
+  }
+
+  void SetSyntax(std::uint64_t position)
+  {
+    const std::string& uid = this->Structure.transferSyntax;
+    if (uid == "1.2.840.10008.1.2.1.99")
+    {
+      throw std::runtime_error(
+        "'" + this->Path + "': the deflated transfer syntax of DICOM is not supported.");
+    }
+    this->BigEndian = uid == "1.2.840.10008.1.2.2";
+    this->Explicit = uid.empty() ? this->Has(position + 8) && this->IsRepresentation(position + 4)
+                                 : uid != "1.2.840.10008.1.2";
+  }
+
+  bool BeginsWithItem(const Element& element)
+  {
+    return element.length >= 8 && this->Has(element.value + 4) &&
+      this->Tag(element.value) == ItemTag;
+  }
+
+  // Returns where the data set ends: at `end`, behind its delimiter, or at the pixel data.
+  std::uint64_t WalkDataSet(
+    std::uint64_t position, std::uint64_t end, bool isExplicit, int depth, bool delimited)
+  {
+    if (depth > DeepestNesting)
+    {
+      this->Damaged();
+    }
+    while (position < end)
+    {
+      const Element element = this->ReadElement(position, isExplicit);
+      if (delimited && element.tag == ItemEnd)
+      {
+        return element.value;
+      }
+      if (depth == 0 && element.tag == PixelDataTag)
+      {
+        this->SetPixels(element);
+        return position;
+      }
+      position = this->WalkValue(element, end, isExplicit, depth);
+    }
+    if (delimited)
+    {
+      this->Damaged();
+    }
+    return position;
+  }
+
+  std::uint64_t WalkValue(const Element& element, std::uint64_t end, bool isExplicit, int depth)
+  {
+    const bool mayNest =
+      !isExplicit || element.representation == "SQ" || element.representation == "UN";
+    // The items of an unknown element are implicit little endian.
+    const bool inner = isExplicit && element.representation != "UN";
+    if (element.length == UndefinedLength)
+    {
+      return this->WalkItems(element.value, end, inner, depth + 1, true, mayNest);
+    }
+    const std::uint64_t last = element.value + element.length;
+    if (last > end || last > this->Size)
+    {
+      this->Damaged();
+    }
+    if (mayNest && this->BeginsWithItem(element))
+    {
+      this->WalkItems(element.value, last, inner, depth + 1, false, true);
+    }
+    return last;
+  }
+
+  std::uint64_t WalkItems(std::uint64_t position, std::uint64_t end, bool isExplicit, int depth,
+    bool delimited, bool nested)
+  {
+    while (position < end)
+    {
+      const Element item = this->ReadElement(position, false);
+      if (delimited && item.tag == SequenceEnd)
+      {
+        return item.value;
+      }
+      if (item.tag != ItemTag)
+      {
+        this->Damaged();
+      }
+      if (item.length == UndefinedLength)
+      {
+        position = this->WalkDataSet(item.value, end, isExplicit, depth, true);
+        continue;
+      }
+      const std::uint64_t last = item.value + item.length;
+      if (last > end)
+      {
+        this->Damaged();
+      }
+      if (nested)
+      {
+        this->WalkDataSet(item.value, last, isExplicit, depth, false);
+      }
+      position = last;
+    }
+    if (delimited)
+    {
+      this->Damaged();
+    }
+    return position;
+  }
+
+  void SetPixels(const Element& element)
+  {
+    this->Structure.hasPixels = true;
+    this->Structure.encapsulated = element.length == UndefinedLength;
+    this->Structure.pixelOffset = element.value;
+    this->Structure.pixelBytes = this->Size > element.value ? this->Size - element.value : 0;
+  }
+
+  const std::string& Path;
+  DicomStructure& Structure;
+  std::ifstream Stream;
+  std::uint64_t Size;
+  std::string Bytes; ///< the file up to where it has been read
+  bool BigEndian = false;
+  bool Explicit = true;
+};
+}
+
+DicomStructure ReadDicomStructure(const std::string& path)
+{
+  DicomStructure structure;
+  Walker(path, structure).Run();
+  return structure;
+}
+}
