@@ -8,12 +8,16 @@ endif()
 
 if(DYNAMICCORONARY_SANITIZE)
   # On the whole build: a sanitizer must see every allocation of the process.
-  add_compile_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}" -fno-omit-frame-pointer -g)
+  # What the undefined behaviour sanitizer finds must fail the test, not only be printed.
+  add_compile_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}" -fno-sanitize-recover=all
+    -fno-omit-frame-pointer -g)
   add_link_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}")
 endif()
 
 # dynamiccoronary_module_options(<module> [link ...])
-#   Our warnings on a VTK module, and private links to the plain C++ libraries.
+#   Our warnings and run path on a VTK module, and private links to the plain C++ libraries.
 function(dynamiccoronary_module_options module)
   vtk_module_link("${module}" PRIVATE "$<BUILD_INTERFACE:dynamiccoronary_options>" ${ARGN})
+  # Not all VTK versions do it: installed libraries find each other wherever they lie.
+  vtk_module_set_property("${module}" PROPERTY INSTALL_RPATH VALUE "$ORIGIN")
 endfunction()

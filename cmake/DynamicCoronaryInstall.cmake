@@ -1,5 +1,5 @@
-# Package files: find_package(DynamicCoronary) gives DynamicCoronary::Algorithms (no VTK),
-# DynamicCoronary::Formats and one target per VTK module.
+# Package files: find_package(DynamicCoronary) gives DynamicCoronary::Algorithms and
+# DynamicCoronary::Formats (no VTK), and one target per VTK module.
 include(CMakePackageConfigHelpers)
 
 set(package_destination "${CMAKE_INSTALL_LIBDIR}/cmake/DynamicCoronary")
@@ -12,6 +12,10 @@ export(EXPORT DynamicCoronaryLibraries
   NAMESPACE DynamicCoronary::
   FILE "${CMAKE_BINARY_DIR}/${package_destination}/DynamicCoronaryLibraries-targets.cmake")
 
+# What our modules need of VTK, in find_package's words.
+set(dynamiccoronary_vtk_components ${required_modules})
+list(TRANSFORM dynamiccoronary_vtk_components REPLACE "^VTK::" "")
+string(REPLACE ";" " " dynamiccoronary_vtk_components "${dynamiccoronary_vtk_components}")
 configure_package_config_file(
   "${CMAKE_CURRENT_LIST_DIR}/dynamiccoronary-config.cmake.in"
   "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config.cmake"

@@ -1,0 +1,60 @@
+# Installs the build tree into a fresh prefix, moves that prefix (so that nothing can lean on the
+# place it was installed to), and uses it as a stranger would: from a project of its own, from a
+# shell and, in the ParaView tree, from pvpython.
+#
+# cmake -D BUILD_DIR=... -D SOURCE_DIR=... -D WORK_DIR=... -D GENERATOR=... -D BUILD_TYPE=...
+#       -D CXX_COMPILER=... -D C_COMPILER=... [-D PVPYTHON=...] -P InstallAndConsume.cmake
+cmake_minimum_required(VERSION 3.18)
+
+# run(<what> <command> [args ...]): stops with the whole output when the command fails.
+function(run what)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "${what} failed (${result}):\n${output}")
+  endif()
+  message(STATUS "${what}: passed")
+  set(run_output "${output}" PARENT_SCOPE)
+endfunction()
+
+# The package must work without help from the environment.
+foreach(variable LD_LIBRARY_PATH VTK_DIR CMAKE_PREFIX_PATH PV_PLUGIN_PATH PV_PLUGIN_CONFIG_FILE)
+  unset(ENV{${variable}})
+endforeach()
+
+file(REMOVE_RECURSE "${WORK_DIR}")
+file(MAKE_DIRECTORY "${WORK_DIR}")
+run("installation" "${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${WORK_DIR}/staging")
+set(prefix "${WORK_DIR}/prefix with space")
+file(RENAME "${WORK_DIR}/staging" "${prefix}")
+
+run("configuring the consumer" "${CMAKE_COMMAND}" -S "${SOURCE_DIR}" -B "${WORK_DIR}/consumer"
+  -G "${GENERATOR}"
+  "-DCMAKE_BUILD_TYPE=${BUILD_TYPE}"
+  "-DCMAKE_C_COMPILER=${C_COMPILER}"
+  "-DCMAKE_CXX_COMPILER=${CXX_COMPILER}"
+  "-DCMAKE_PREFIX_PATH=${prefix}")
+run("building the consumer" "${CMAKE_COMMAND}" --build "${WORK_DIR}/consumer")
+run("running the consumer" "${CMAKE_CTEST_COMMAND}" --test-dir "${WORK_DIR}/consumer"
+  --output-on-failure --no-tests=error)
+run("running the installed coronary-pipeline" "${prefix}/bin/coronary-pipeline" --help)
+
+if(PVPYTHON)
+  file(GLOB_RECURSE plugin "${prefix}/*/DynamicCoronaryPlugin.so")
+  file(GLOB_RECURSE plugin_list "${prefix}/*/dynamiccoronary.plugins.xml")
+  list(LENGTH plugin count)
+  if(NOT count EQUAL 1 OR NOT plugin_list)
+    message(FATAL_ERROR "The installation has no plugin, or no dynamiccoronary.plugins.xml:"
+      " '${plugin}', '${plugin_list}'")
+  endif()
+  get_filename_component(plugin_folder "${plugin}" DIRECTORY)
+
+  # ParaView finds a plugin by a search path, or by the list that the installation has.
+  set(ENV{HOME} "${WORK_DIR}/home")
+  set(script "${SOURCE_DIR}/load_installed_plugin.py")
+  set(ENV{PV_PLUGIN_PATH} "${plugin_folder}")
+  run("plugin found through PV_PLUGIN_PATH" "${PVPYTHON}" "${script}")
+  unset(ENV{PV_PLUGIN_PATH})
+  set(ENV{PV_PLUGIN_CONFIG_FILE} "${plugin_list}")
+  run("plugin found through PV_PLUGIN_CONFIG_FILE" "${PVPYTHON}" "${script}")
+endif()
+file(REMOVE_RECURSE "${WORK_DIR}")
