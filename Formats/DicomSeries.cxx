@@ -587,7 +587,30 @@ void CheckComplete(const Stack& stack, const std::string& folder)
   }
 }
 
-// Distances between the slices: regular enough for an image, or an error that says what is missing.
+// Says how far the slices are from even spacing, and where the largest gaps are.
+std::string UnevenSlices(const Stack& stack, const std::vector<double>& sorted, double mean)
+{
+  const double median = sorted[sorted.size() / 2];
+  double largest = 0.0;
+  std::vector<std::string> gaps;
+  for (std::size_t s = 0; s < stack.size(); ++s)
+  {
+    const double even = stack.front().front().along + mean * static_cast<double>(s);
+    largest = std::max(largest, std::abs(stack[s].front().along - even));
+    const double gap = s > 0 ? stack[s].front().along - stack[s - 1].front().along : 0.0;
+    if (gap > 1.5 * median)
+    {
+      gaps.push_back(Text(gap) + " mm after slice " + std::to_string(s - 1));
+    }
+  }
+  return "The slices are " + Text(sorted.front()) + " to " + Text(sorted.back()) +
+    " mm apart; the mean, " + Text(mean) + " mm, is used, which puts slices up to " +
+    Text(largest) + " mm from their true positions." +
+    (gaps.empty() ? "" : " Slices seem to be missing: " + Join(gaps) + ".");
+}
+
+// The mean distance between the slices; their being uneven is a warning, their being sheared an
+// error.
 double SliceSpacing(const Stack& stack, const std::string& folder, const Vector3& normal,
   std::vector<std::string>& warnings)
 {
@@ -608,24 +631,11 @@ double SliceSpacing(const Stack& stack, const std::string& folder, const Vector3
   }
   std::vector<double> sorted = distances;
   std::sort(sorted.begin(), sorted.end());
-  const double median = sorted[sorted.size() / 2];
-  for (std::size_t s = 0; s < distances.size(); ++s)
-  {
-    if (distances[s] > 1.5 * median)
-    {
-      Fail(folder,
-        "slices are missing: there is a gap of " + Text(distances[s]) + " mm between " +
-          Text(stack[s].front().frame->position) + " and " +
-          Text(stack[s + 1].front().frame->position) + ", where the others are " + Text(median) +
-          " mm apart");
-    }
-  }
   const double mean = (stack.back().front().along - stack.front().front().along) /
     static_cast<double>(distances.size());
   if (sorted.front() < 0.99 * mean || sorted.back() > 1.01 * mean)
   {
-    warnings.push_back("The slices are " + Text(sorted.front()) + " to " + Text(sorted.back()) +
-      " mm apart; the mean, " + Text(mean) + " mm, is used.");
+    warnings.push_back(UnevenSlices(stack, sorted, mean));
   }
   const DicomFrame& frame = *stack.front().front().frame;
   const double pixel = std::min(frame.rowSpacing, frame.columnSpacing);

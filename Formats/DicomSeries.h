@@ -24,14 +24,16 @@ namespace coronary
  * Several series become one when they share modality, frame of reference, matrix, spacing and
  * orientation, and either each is one slice position, or each is a whole stack at its own time.
  * Localizers, secondary captures, DICOMDIR and other files are skipped, which the notes say.
+ * Slices that are not evenly spaced are put at their mean distance, with a warning that says how far
+ * this puts them from their true positions.
  * The k axis goes along increasing position on the normal, so the axes are right-handed.
  *
  * @param folder             searched recursively
  * @param seriesInstanceUid  uses this series alone; empty: all
  * @param poll               called between the files
  * @throws std::runtime_error with one sentence: no such folder, no images, several series that do not
- *   belong together (lists them), a damaged file, a slice that is missing at a phase, a gap between
- *   slices, images of more than one component
+ *   belong together (lists them), a damaged file, a slice that is missing at a phase, slices that are
+ *   shifted sideways, images of more than one component
  */
 std::unique_ptr<VolumeSource> OpenDicomSeries(
   const std::string& folder, const std::string& seriesInstanceUid = {}, const Poll& poll = {});

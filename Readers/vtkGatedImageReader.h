@@ -1,0 +1,139 @@
+/**
+ * @class vtkGatedImageReader
+ * @brief Reads a gated image series as a time-dependent image in Hounsfield units.
+ *
+ * What it reads:
+ * - a folder of DICOM files, sorted by series, slice position and time;
+ * - a list of volumes, one a phase: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vti;
+ * - one 4-D NIfTI, NRRD or MetaImage file;
+ * - a JSON file that lists images, R-R fractions, cycle length and seed points.
+ *
+ * Pipeline time is the fraction of the R-R interval. TIME_STEPS are the fractions of the phases,
+ * strictly increasing; a requested time is answered with the nearest phase (the earlier one of two at
+ * the same distance), also outside the range. Without a requested time the first phase is read.
+ *
+ * World coordinates are LPS millimetres; the orientation is the image's direction matrix.
+ *
+ * Output port 0, vtkImageData:
+ * - point scalars `HU`, one component: short when the stored values are integers of at most 16 bits
+ *   with an integral rescale (DICOM slope and intercept, NIfTI scl_slope, ...) and lie within short;
+ *   float otherwise. The type announced before reading assumes that 16-bit values fit.
+ * - field data `CycleLength` (double, seconds) and `PhaseTime` (double, R-R fraction of the phase).
+ *
+ * Output port 1, vtkPolyData: the seed points of a JSON file as vertices in LPS millimetres, with the
+ * point array `Name` (string). Empty without seeds.
+ *
+ * Headers are read once, in RequestInformation, and again only when a file or a property changed.
+ * One volume is in memory at a time: the one that is the output.
+ *
+ * Wrong or damaged input gives one error that names the file or property, and no output.
+ */
+#ifndef vtkGatedImageReader_h
+#define vtkGatedImageReader_h
+
+#include "vtkCoronaryReadersModule.h" // for the export macro
+
+#include "vtkImageAlgorithm.h"
+
+#include <memory> // for the hidden state
+#include <string> // for the summary
+
+class vtkImageData;
+class vtkPolyData;
+
+class VTKCORONARYREADERS_EXPORT vtkGatedImageReader : public vtkImageAlgorithm
+{
+public:
+  static vtkGatedImageReader* New();
+  vtkTypeMacro(vtkGatedImageReader, vtkImageAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /**
+   * The files, in the order of the phases; a folder of DICOM files, a JSON file or a 4-D file stands
+   * alone. AddFileName ignores null and empty names. Default: none.
+   */
+  void AddFileName(const char* name);
+  void RemoveAllFileNames();
+  int GetNumberOfFileNames();
+  /// Null when there is no such file name.
+  const char* GetFileName(int index);
+  ///@}
+
+  /// Reads this file alone: RemoveAllFileNames(), then AddFileName().
+  void SetFileName(const char* name);
+
+  ///@{
+  /// A folder of DICOM files, searched recursively; used when there are no file names. Default: none.
+  vtkSetFilePathMacro(DirectoryName);
+  vtkGetFilePathMacro(DirectoryName);
+  ///@}
+
+  ///@{
+  /// The DICOM series to read from a folder that holds several. Default: none, all of the folder.
+  vtkSetStringMacro(SeriesInstanceUID);
+  vtkGetStringMacro(SeriesInstanceUID);
+  ///@}
+
+  ///@{
+  /**
+   * R-R fractions of the phases, strictly increasing, one a phase. They replace those of the files.
+   * Default: none; phases of files that give no fractions are then spread evenly over [0, 1), phase p
+   * of n at p/n, and the phase of a single file is at 0.
+   */
+  void SetNumberOfPhaseFractions(int number);
+  int GetNumberOfPhaseFractions();
+  /// Grows the list as needed; a negative index is ignored.
+  void SetPhaseFraction(int index, double fraction);
+  /// 0 when there is no such value.
+  double GetPhaseFraction(int index);
+  void RemoveAllPhaseFractions();
+  ///@}
+
+  ///@{
+  /// R-R interval in seconds, positive, for files that do not give it. Default: 1.
+  vtkSetMacro(CycleLength, double);
+  vtkGetMacro(CycleLength, double);
+  ///@}
+
+  /// Number of phases found; 0 before UpdateInformation(), or when that failed.
+  int GetNumberOfPhases();
+
+  /// R-R fraction of a phase; NaN when there is no such phase.
+  double GetPhaseTime(int phase);
+
+  /// File (for DICOM: that of the first slice) of a phase; empty when there is no such phase.
+  std::string GetPhaseFileName(int phase);
+
+  /**
+   * What was found, as lines of text: format, phases and their times, positions, spacing, series,
+   * skipped files, warnings. Empty before UpdateInformation(), or when that failed.
+   */
+  std::string GetSummary();
+
+protected:
+  vtkGatedImageReader();
+  ~vtkGatedImageReader() override;
+
+  int FillOutputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(vtkInformation* request, vtkInformationVector** inputVector,
+    vtkInformationVector* outputVector) override;
+  int RequestData(vtkInformation* request, vtkInformationVector** inputVector,
+    vtkInformationVector* outputVector) override;
+
+private:
+  vtkGatedImageReader(const vtkGatedImageReader&) = delete;
+  void operator=(const vtkGatedImageReader&) = delete;
+
+  void ReadImage(int phase, const int extent[6], vtkImageData* image);
+  void FillSeeds(vtkPolyData* output);
+
+  struct Internals;
+  std::unique_ptr<Internals> State;
+
+  char* DirectoryName = nullptr;
+  char* SeriesInstanceUID = nullptr;
+  double CycleLength = 1.0;
+};
+
+#endif
