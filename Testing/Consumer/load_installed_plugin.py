@@ -3,10 +3,9 @@ from paraview import simple
 
 if not hasattr(simple, "CoronaryPhantom"):
     raise SystemExit("ParaView did not load the plugin by itself")
-phantom = simple.CoronaryPhantom()
-tree = simple.OutputPort(phantom, 1)
-phantom.SMProxy.UpdatePipelineInformation()
-simple.UpdatePipeline(time=0.35, proxy=tree)
+# One port alone: simple.UpdatePipeline() would make the image as well.
+tree = simple.CoronaryPhantom().SMProxy.GetOutputPort(1)
+tree.UpdatePipeline(0.35)
 points = tree.GetDataInformation().GetNumberOfPoints()
 print("centerline points at 35 %% of the cycle: %d" % points)
 if points < 1:
