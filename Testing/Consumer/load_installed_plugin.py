@@ -3,8 +3,8 @@ from paraview import simple
 
 if not hasattr(simple, "CoronaryPhantom"):
     raise SystemExit("ParaView did not load the plugin by itself")
-# One port alone: simple.UpdatePipeline() would make the image as well.
-tree = simple.CoronaryPhantom().SMProxy.GetOutputPort(1)
+# A filter asks for the tree alone; updating the source would make the image as well.
+tree = simple.Calculator(Input=simple.OutputPort(simple.CoronaryPhantom(), 1))
 tree.UpdatePipeline(0.35)
 points = tree.GetDataInformation().GetNumberOfPoints()
 print("centerline points at 35 %% of the cycle: %d" % points)
