@@ -14,25 +14,25 @@ namespace vtkCoronaryArrayNames
 constexpr const char* HounsfieldUnits = "HU";
 
 // Field data of every time-dependent output.
-constexpr const char* CycleLength = "CycleLength";  ///< double, 1 value, seconds
-constexpr const char* PhaseTime = "PhaseTime";      ///< double, 1 value, fraction of the R-R interval
+constexpr const char* CycleLength = "CycleLength"; ///< double, 1 value, seconds
+constexpr const char* PhaseTime = "PhaseTime"; ///< double, 1 value, fraction of the R-R interval
 
 // Centerline tree, point data.
 constexpr const char* Radius = "MaximumInscribedSphereRadius"; ///< double, mm
-constexpr const char* Abscissas = "Abscissas";                 ///< double, mm from the root along the tree
-constexpr const char* SegmentIds = "SegmentIds";               ///< int, coronary::SegmentId
-constexpr const char* Displacement = "Displacement";           ///< double[3], mm from the reference position
-constexpr const char* Velocity = "Velocity";                   ///< double[3], mm/s
+constexpr const char* Abscissas = "Abscissas";       ///< double, mm from the root along the tree
+constexpr const char* SegmentIds = "SegmentIds";     ///< int, coronary::SegmentId
+constexpr const char* Displacement = "Displacement"; ///< double[3], mm from the reference position
+constexpr const char* Velocity = "Velocity";         ///< double[3], mm/s
 
 // Centerline tree, cell data.
-constexpr const char* GroupIds = "GroupIds";                   ///< int, one id a branch
-constexpr const char* ParentGroupIds = "ParentGroupIds";       ///< int, -1 at a root
-constexpr const char* TreeIds = "TreeIds";                     ///< int, 0 left, 1 right
-constexpr const char* BranchGeneration = "BranchGeneration";   ///< int, 0 at a root
-constexpr const char* StrahlerOrder = "StrahlerOrder";         ///< int, 1 at the tips
-constexpr const char* SegmentLabel = "SegmentLabel";           ///< string, SCCT name
-constexpr const char* Length = "Length";                       ///< double, mm
-constexpr const char* Tortuosity = "Tortuosity";               ///< double, length / chord - 1
+constexpr const char* GroupIds = "GroupIds";                 ///< int, one id a branch
+constexpr const char* ParentGroupIds = "ParentGroupIds";     ///< int, -1 at a root
+constexpr const char* TreeIds = "TreeIds";                   ///< int, 0 left, 1 right
+constexpr const char* BranchGeneration = "BranchGeneration"; ///< int, 0 at a root
+constexpr const char* StrahlerOrder = "StrahlerOrder";       ///< int, 1 at the tips
+constexpr const char* SegmentLabel = "SegmentLabel";         ///< string, SCCT name
+constexpr const char* Length = "Length";                     ///< double, mm
+constexpr const char* Tortuosity = "Tortuosity";             ///< double, length / chord - 1
 
 // Surface, cell data.
 constexpr const char* CellEntityIds = "CellEntityIds"; ///< int, 1 wall, 2.. caps

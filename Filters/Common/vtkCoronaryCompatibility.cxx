@@ -13,7 +13,8 @@ bool CheckAbort(vtkAlgorithm* algorithm)
 
 std::function<bool(double)> ProgressOf(vtkAlgorithm* algorithm, double first, double last)
 {
-  return [=](double fraction) {
+  return [=](double fraction)
+  {
     algorithm->UpdateProgress(first + (last - first) * fraction);
     return !CheckAbort(algorithm);
   };

@@ -224,8 +224,8 @@ struct CoronaryPhantom::Internals
         value[p] = field(tree.points[p]);
       }
       std::vector<double> sorted = value;
-      const auto rank = static_cast<std::size_t>(
-        (1.0 - phase.fraction) * static_cast<double>(sorted.size() - 1));
+      const auto rank =
+        static_cast<std::size_t>((1.0 - phase.fraction) * static_cast<double>(sorted.size() - 1));
       std::nth_element(sorted.begin(), sorted.begin() + rank, sorted.end());
       for (std::size_t p = 0; p < value.size(); ++p)
       {
@@ -289,15 +289,14 @@ PhantomTree CoronaryPhantom::Tree(double t) const
       Vector3 before = this->Data->Motion.Position(anatomy.tree.points[p], t - 0.5 * window);
       for (int i = 1; i <= pieces; ++i)
       {
-        const Vector3 after =
-          this->Data->Motion.Position(anatomy.tree.points[p], t + window * (double(i) / pieces - 0.5));
+        const Vector3 after = this->Data->Motion.Position(
+          anatomy.tree.points[p], t + window * (double(i) / pieces - 0.5));
         blur += (after - before).norm();
         before = after;
       }
     }
     const double diameter = 2.0 * tree.radius[p];
-    tree.visibility[p] =
-      anatomy.occluded[p] ? 0.0 : (1.0 - lost[p]) * diameter / (diameter + blur);
+    tree.visibility[p] = anatomy.occluded[p] ? 0.0 : (1.0 - lost[p]) * diameter / (diameter + blur);
   }
   return tree;
 }
@@ -317,9 +316,9 @@ std::vector<PhantomOstium> CoronaryPhantom::Ostia(double t) const
     {
       const Vector3 position = this->Position(anatomy.tree.points[end.point], t);
       const Vector3 inside = this->Position(anatomy.tree.points[end.neighbour], t);
-      ostia.push_back({ end.entityId == 2 ? "LCA" : "RCA", position,
-        (inside - position).normalized(),
-        anatomy.tree.radius[end.point] * this->Data->RadiusFactor(t) });
+      ostia.push_back(
+        { end.entityId == 2 ? "LCA" : "RCA", position, (inside - position).normalized(),
+          anatomy.tree.radius[end.point] * this->Data->RadiusFactor(t) });
     }
   }
   return ostia;
@@ -344,7 +343,8 @@ PhantomSurface CoronaryPhantom::Surface(double t, const ProgressCallback& progre
   const PhantomLumen lumen = data.Lumen(t, 2.5);
   ParallelFor(
     static_cast<std::int64_t>(surface.points.size()), 512,
-    [&](std::int64_t first, std::int64_t last) {
+    [&](std::int64_t first, std::int64_t last)
+    {
       for (std::int64_t p = first; p < last; ++p)
       {
         const Vector3 rest = surface.points[p];
@@ -354,9 +354,8 @@ PhantomSurface CoronaryPhantom::Surface(double t, const ProgressCallback& progre
         surface.displacement[p] = position - rest;
       }
     },
-    progress
-      ? ProgressCallback([&](double f) { return progress(from + (1.0 - from) * f); })
-      : ProgressCallback());
+    progress ? ProgressCallback([&](double f) { return progress(from + (1.0 - from) * f); })
+             : ProgressCallback());
   return surface;
 }
 
@@ -509,7 +508,8 @@ std::vector<PhantomMotionSummary> CoronaryPhantom::SummarizeMotion() const
       }
       summary.amplitude += farthest / static_cast<double>(points.size());
       // Longest run of moments that stay pairwise within 1 mm.
-      const auto longest = [&](double from, double to) {
+      const auto longest = [&](double from, double to)
+      {
         int best = 0;
         const int last = static_cast<int>(to * moments);
         for (int a = static_cast<int>(from * moments); a < last; ++a)
@@ -535,11 +535,9 @@ std::vector<PhantomMotionSummary> CoronaryPhantom::SummarizeMotion() const
     double lengthAtSystole = 0.0;
     for (const AxisStep& axisStep : this->Data->Anatomy.steps)
     {
-      const bool member =
-        std::binary_search(points.begin(), points.end(),
-          static_cast<std::size_t>(axisStep.first)) &&
-        std::binary_search(
-          points.begin(), points.end(), static_cast<std::size_t>(axisStep.second));
+      const bool member = std::binary_search(points.begin(), points.end(),
+                            static_cast<std::size_t>(axisStep.first)) &&
+        std::binary_search(points.begin(), points.end(), static_cast<std::size_t>(axisStep.second));
       if (member)
       {
         const Vector3& p = rest.points[axisStep.first];

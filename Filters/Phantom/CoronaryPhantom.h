@@ -80,41 +80,42 @@ struct PhantomSettings
   // Anatomy.
   std::uint64_t seed = 1; ///< 0: the mean anatomy without any random variation
   Dominance dominance = Dominance::Right;
-  bool ramus = false;              ///< add a ramus intermedius at the left main's end
-  double calibre = 1.0;            ///< factor on all diameters, 0.5 to 2
-  double positionVariation = 5.0;  ///< standard deviation of the course of the vessels, mm, 0 to 10
-  double calibreVariation = 0.10;  ///< relative standard deviation of a vessel's diameter, 0 to 0.3
-  double tortuosity = 1.0;         ///< factor on the lateral waves of the vessels, 0 to 3
-  int stenoses = 0;                ///< number of narrowings, placed by the seed, 0 to 20
-  double stenosisDegree = 0.5;     ///< their diameter reduction, 0 to 0.95
-  int calcifiedPlaques = 0;        ///< number of calcifications, placed by the seed, 0 to 50
-  bool chronicOcclusion = false;   ///< close 15 mm of the mid RCA; filled from its far end on
+  bool ramus = false;             ///< add a ramus intermedius at the left main's end
+  double calibre = 1.0;           ///< factor on all diameters, 0.5 to 2
+  double positionVariation = 5.0; ///< standard deviation of the course of the vessels, mm, 0 to 10
+  double calibreVariation = 0.10; ///< relative standard deviation of a vessel's diameter, 0 to 0.3
+  double tortuosity = 1.0;        ///< factor on the lateral waves of the vessels, 0 to 3
+  int stenoses = 0;               ///< number of narrowings, placed by the seed, 0 to 20
+  double stenosisDegree = 0.5;    ///< their diameter reduction, 0 to 0.95 (radius at least 0.2 mm)
+  int calcifiedPlaques = 0;       ///< number of calcifications, placed by the seed, 0 to 50
+  bool chronicOcclusion = false;  ///< close 15 mm of the mid RCA; filled from its far end on
 
   // Motion.
-  double cycleLength = 0.8;        ///< R-R interval in seconds, 0.3 to 3
-  double motionAmplitude = 1.0;    ///< factor on the whole displacement field, 0 to 1.3
-  double axialMotionRight = 18.0;  ///< AV-plane excursion on the RCA side, mm, 0 to 24
-  double axialMotionLeft = 12.0;   ///< the same on the LCx side, mm, 0 to 24
-  double regionalLag = 0.02;       ///< greatest regional lead or lag, fraction of R-R, 0 to 0.05
-  double regionalAmplitude = 0.06; ///< relative standard deviation of the regional amplitude, 0 to 0.1
-  double beatVariation = 0.0;      ///< relative amplitude change from beat to beat, 0 to 0.1;
-                                   ///< above 0 the motion is no longer periodic
-  double areaPulse = 0.08;         ///< systolic increase of the lumen area, 0 to 0.3
+  double cycleLength = 0.8;       ///< R-R interval in seconds, 0.3 to 3
+  double motionAmplitude = 1.0;   ///< factor on the whole displacement field, 0 to 1.3
+  double axialMotionRight = 18.0; ///< AV-plane excursion on the RCA side, mm, 0 to 24
+  double axialMotionLeft = 12.0;  ///< the same on the LCx side, mm, 0 to 24
+  double regionalLag = 0.02;      ///< greatest regional lead or lag, fraction of R-R, 0 to 0.05
+  double regionalAmplitude =
+    0.06;                     ///< relative standard deviation of the regional amplitude, 0 to 0.1
+  double beatVariation = 0.0; ///< relative amplitude change from beat to beat, 0 to 0.1;
+                              ///< above 0 the motion is no longer periodic
+  double areaPulse = 0.08;    ///< systolic increase of the lumen area, 0 to 0.3
 
   // Image.
-  double temporalWindow = 0.066;   ///< seconds: 0 ideal, 0.066 dual source, 0.140 single source
-  double noise = 25.0;             ///< standard deviation in HU at full dose, 0 to 200
-  double noiseCorrelation = 0.4;   ///< standard deviation of the noise's kernel, mm, 0 to 2
-  double systolicNoise = 1.5;      ///< factor on the noise where the tube current is reduced, 1 to 4
+  double temporalWindow = 0.066; ///< seconds: 0 ideal, 0.066 dual source, 0.140 single source
+  double noise = 25.0;           ///< standard deviation in HU at full dose, 0 to 200
+  double noiseCorrelation = 0.4; ///< standard deviation of the noise's kernel, mm, 0 to 2
+  double systolicNoise = 1.5;    ///< factor on the noise where the tube current is reduced, 1 to 4
   double pointSpread[3] = { 0.25, 0.25, 0.30 }; ///< standard deviation along the image axes, mm
-  double lumenHU = 420.0;          ///< at the ostia, 0 to 1500
+  double lumenHU = 420.0;                       ///< at the ostia, 0 to 1500
   double attenuationGradient = -1.5; ///< change of the lumen along the vessel, HU per cm, -20 to 5
-  double veinHU = 150.0;           ///< great cardiac vein (contrast-poor)
+  double veinHU = 150.0;             ///< great cardiac vein (contrast-poor)
   std::vector<LostPhase> lostPhases;
 
   // Discretisation of the truth.
-  double centerlineSpacing = 0.5;  ///< mm between tree points, 0.1 to 5
-  double surfaceSpacing = 0.35;    ///< edge length of the truth surface, mm, 0.15 to 1.5
+  double centerlineSpacing = 0.5; ///< mm between tree points, 0.1 to 5
+  double surfaceSpacing = 0.35;   ///< edge length of the truth surface, mm, 0.15 to 1.5
 
   /// @throws std::invalid_argument that names the first setting out of range or not finite.
   void Validate() const;
@@ -137,14 +138,14 @@ struct PhantomBranch
 /// The vessels' axes at one moment. Ids, order and counts are the same at every moment.
 struct PhantomTree
 {
-  std::vector<Vector3> points;        ///< mm
-  std::vector<double> radius;         ///< lumen radius, mm
-  std::vector<double> abscissa;       ///< mm from the ostium along the reference tree
+  std::vector<Vector3> points;  ///< mm
+  std::vector<double> radius;   ///< lumen radius, mm
+  std::vector<double> abscissa; ///< mm from the ostium along the reference tree
   std::vector<int> segmentId;
-  std::vector<Vector3> displacement;  ///< mm from the reference position
-  std::vector<Vector3> velocity;      ///< mm/s
-  std::vector<double> visibility;     ///< 0 lost .. 1 full contrast at this moment: d / (d + blur),
-                                      ///< times 0 where the phase is lost or the vessel occluded
+  std::vector<Vector3> displacement; ///< mm from the reference position
+  std::vector<Vector3> velocity;     ///< mm/s
+  std::vector<double> visibility;    ///< 0 lost .. 1 full contrast at this moment: d / (d + blur),
+                                     ///< times 0 where the phase is lost or the vessel occluded
   std::vector<PhantomBranch> branches;
 };
 
@@ -156,8 +157,8 @@ struct PhantomSurface
   std::vector<int> groupId;          ///< branch of the nearest axis point, per point
   std::vector<double> abscissa;      ///< of the nearest axis point, mm, per point
   std::vector<Triangle> triangles;
-  std::vector<int> entityId;         ///< per triangle: 1 wall, 2 and 3 the left and right ostium,
-                                     ///< 4.. the ends of the branches
+  std::vector<int> entityId; ///< per triangle: 1 wall, 2 and 3 the left and right ostium,
+                             ///< 4.. the ends of the branches
 };
 
 struct PhantomOstium
@@ -171,13 +172,13 @@ struct PhantomOstium
 /// How a vessel moves over one cycle.
 struct PhantomMotionSummary
 {
-  std::string name;              ///< "LM", "LAD proximal", ..., "RCA", ...
-  double amplitude = 0.0;        ///< mean over the points of the greatest distance between two moments, mm
-  double meanSpeed = 0.0;        ///< mm/s
-  double peakSpeed = 0.0;        ///< mm/s
-  double systolicRest = 0.0;     ///< ms: longest window in 20..55 % with all displacements < 1 mm
-  double diastolicRest = 0.0;    ///< ms: the same in 55..95 %
-  double systolicStrain = 0.0;   ///< length change from t = 0 to 0.35, relative
+  std::string name;       ///< "LM", "LAD proximal", ..., "RCA", ...
+  double amplitude = 0.0; ///< mean over the points of the greatest distance between two moments, mm
+  double meanSpeed = 0.0; ///< mm/s
+  double peakSpeed = 0.0; ///< mm/s
+  double systolicRest = 0.0;   ///< ms: longest window in 20..55 % with all displacements < 1 mm
+  double diastolicRest = 0.0;  ///< ms: the same in 55..95 %
+  double systolicStrain = 0.0; ///< length change from t = 0 to 0.35, relative
 };
 
 /// Immutable after construction, and safe to use from several threads.
@@ -232,8 +233,8 @@ public:
    * @param values  room for all voxels of `part`, i fastest
    * @throws Cancelled; std::invalid_argument for a grid that is not one
    */
-  void Render(const ImageGrid& grid, const std::array<int, 6>& part, double t,
-    std::int16_t* values, const ProgressCallback& progress = {}) const;
+  void Render(const ImageGrid& grid, const std::array<int, 6>& part, double t, std::int16_t* values,
+    const ProgressCallback& progress = {}) const;
 
   /// Motion of each named vessel, from the tree at 200 moments.
   std::vector<PhantomMotionSummary> SummarizeMotion() const;

@@ -15,6 +15,9 @@ namespace
 {
 constexpr double Pi = 3.14159265358979323846;
 
+/// The lumen's least radius in mm, so that its surface can be meshed however tight a stenosis is.
+constexpr double SmallestRadius = 0.2;
+
 // Streams of the random generator, so that one part of the anatomy does not shift another.
 enum Purpose : std::uint64_t
 {
@@ -193,10 +196,9 @@ std::vector<VesselPlan> PlanVessels(const PhantomSettings& settings)
     right.changes.emplace_back("R-PDA", RightPLB);
     if (rightDominant)
     {
-      for (const Control& control :
-        { At(-14.8, -5.7, -71.1, 2.3), At(-9.6, 1.8, -67.5, 2.0), At(-5.0, 8.0, -67.6, 1.8),
-          At(1.0, 10.0, -73.5, 1.7), At(11.3, 5.8, -80.8, 1.4), At(21.1, 1.7, -77.5, 1.1),
-          At(36.0, -1.6, -75.0, 0.9) })
+      for (const Control& control : { At(-14.8, -5.7, -71.1, 2.3), At(-9.6, 1.8, -67.5, 2.0),
+             At(-5.0, 8.0, -67.6, 1.8), At(1.0, 10.0, -73.5, 1.7), At(11.3, 5.8, -80.8, 1.4),
+             At(21.1, 1.7, -77.5, 1.1), At(36.0, -1.6, -75.0, 0.9) })
       {
         right.controls.push_back(control);
       }
@@ -215,8 +217,8 @@ std::vector<VesselPlan> PlanVessels(const PhantomSettings& settings)
       On(127.0, 34.0, 1.0) },
     RightVentricularBranch, {} });
   plans.push_back({ "AM1", 1, "RCA", Course::Epicardial,
-    { At(-45.7, -38.1, -60.3, 1.9), On(183.0, 9.0, 1.8), On(177.0, 23.0, 1.6),
-      On(169.0, 39.0, 1.2), On(163.0, 53.0, 0.9) },
+    { At(-45.7, -38.1, -60.3, 1.9), On(183.0, 9.0, 1.8), On(177.0, 23.0, 1.6), On(169.0, 39.0, 1.2),
+      On(163.0, 53.0, 0.9) },
     AcuteMarginal, {} });
   if (!leftDominant)
   {
@@ -247,7 +249,8 @@ public:
     for (std::size_t i = 1; i < n; ++i)
     {
       // Centripetal steps keep the curve from overshooting where control points crowd.
-      this->Knots[i] = this->Knots[i - 1] + std::sqrt((this->Points[i] - this->Points[i - 1]).norm());
+      this->Knots[i] =
+        this->Knots[i - 1] + std::sqrt((this->Points[i] - this->Points[i - 1]).norm());
     }
     // Tridiagonal system for the second derivatives.
     this->Second.assign(n, Vector3::Zero());
@@ -258,7 +261,8 @@ public:
       const double h0 = this->Knots[i] - this->Knots[i - 1];
       const double h1 = this->Knots[i + 1] - this->Knots[i];
       const Vector3 rhs = 6.0 *
-        ((this->Points[i + 1] - this->Points[i]) / h1 - (this->Points[i] - this->Points[i - 1]) / h0);
+        ((this->Points[i + 1] - this->Points[i]) / h1 -
+          (this->Points[i] - this->Points[i - 1]) / h0);
       const double pivot = 2.0 * (h0 + h1) - h0 * upper[i - 1];
       upper[i] = h1 / pivot;
       right[i] = (rhs - h0 * right[i - 1]) / pivot;
@@ -369,8 +373,7 @@ Vector3 Place(const Control& control, Course course, const HeartFrame& mean,
     const double level = HeartFrame::Level(p);
     const double wanted = 1.0 + 0.3 * (level - 1.0);
     const double onSurface = HeartFrame::Level(q) > 0.97 ? below : 0.6 * below;
-    p = HeartFrame::Centre +
-      (p - HeartFrame::Centre) * (1.0 + onSurface * (wanted / level - 1.0));
+    p = HeartFrame::Centre + (p - HeartFrame::Centre) * (1.0 + onSurface * (wanted / level - 1.0));
   }
   return mean.ToWorld(p) * size;
 }
@@ -402,8 +405,8 @@ void AddWaves(DenseVessel& vessel, const HeartFrame& frame, double strength, Ran
     normal = (normal - normal.dot(tangent) * tangent).normalized();
     const Vector3 lateral = normal.cross(tangent);
     const double s = vessel.arc[i];
-    const double envelope =
-      strength * SmoothStep((s - 2.0) / 14.0) * (0.35 + 0.45 * std::min(1.0, s / std::max(60.0, length)));
+    const double envelope = strength * SmoothStep((s - 2.0) / 14.0) *
+      (0.35 + 0.45 * std::min(1.0, s / std::max(60.0, length)));
     double along = 0.0;
     double out = 0.0;
     for (const Wave& wave : waves)
@@ -423,6 +426,177 @@ double InterpolateDiameter(
   const std::size_t i = upper - at.begin();
   const double f = std::clamp((s - at[i - 1]) / (at[i] - at[i - 1]), 0.0, 1.0);
   return diameter[i - 1] + f * (diameter[i] - diameter[i - 1]);
+}
+
+/// Where a vessel hangs, from itself up to its root: vessel, and arc at which the path leaves it.
+std::vector<std::pair<std::size_t, double>> PathToRoot(
+  const std::vector<DenseVessel>& vessels, std::size_t v, double arc)
+{
+  std::vector<std::pair<std::size_t, double>> path;
+  for (;;)
+  {
+    path.emplace_back(v, arc);
+    if (vessels[v].parent >= vessels.size())
+    {
+      return path;
+    }
+    arc = vessels[v].parentArc;
+    v = vessels[v].parent;
+  }
+}
+
+/// Length of the way through the tree between two points; infinite between the two trees.
+double TreeDistance(
+  const std::vector<DenseVessel>& vessels, std::size_t u, double arcU, std::size_t v, double arcV)
+{
+  const auto pathU = PathToRoot(vessels, u, arcU);
+  const auto pathV = PathToRoot(vessels, v, arcV);
+  double climbU = 0.0;
+  for (const auto& atU : pathU)
+  {
+    double climbV = 0.0;
+    for (const auto& atV : pathV)
+    {
+      if (atU.first == atV.first)
+      {
+        return climbU + climbV + std::abs(atU.second - atV.second);
+      }
+      climbV += atV.second;
+    }
+    climbU += atU.second;
+  }
+  return std::numeric_limits<double>::max();
+}
+
+/**
+ * Pushes vessels apart that the random courses brought too close: two points of different vessels
+ * keep 0.7 mm between their walls, less only where they have just parted. Without this some seeds
+ * would have vessels that run into each other.
+ */
+void Separate(std::vector<DenseVessel>& vessels)
+{
+  constexpr double gap = 0.7;       // mm between walls
+  constexpr double parting = 0.35;  // tan(half the least angle of departure), 39 degrees
+  constexpr double smoothing = 4.0; // mm along the vessel
+  constexpr int rounds = 60;
+  std::vector<std::vector<double>> attachments(vessels.size());
+  for (const DenseVessel& vessel : vessels)
+  {
+    if (vessel.parent < vessels.size())
+    {
+      attachments[vessel.parent].push_back(vessel.parentArc);
+    }
+  }
+  // Every few samples are enough: about 1 mm.
+  const auto strideOf = [](const DenseVessel& vessel)
+  {
+    return std::max<std::size_t>(
+      1, static_cast<std::size_t>(static_cast<double>(vessel.points.size()) / vessel.arc.back()));
+  };
+  for (int round = 0; round < rounds; ++round)
+  {
+    bool moved = false;
+    for (std::size_t u = 0; u < vessels.size(); ++u)
+    {
+      DenseVessel& vessel = vessels[u];
+      const std::size_t stride = strideOf(vessel);
+      std::vector<std::pair<double, Vector3>> pushes;
+      for (std::size_t v = 0; v < vessels.size(); ++v)
+      {
+        // Of two vessels the one without side vessels gives way, else the later one.
+        const bool gives =
+          attachments[u].empty() != attachments[v].empty() ? attachments[u].empty() : u > v;
+        if (u == v || !gives)
+        {
+          continue;
+        }
+        const DenseVessel& other = vessels[v];
+        const std::size_t otherStride = strideOf(other);
+        for (std::size_t i = 0; i < vessel.points.size(); i += stride)
+        {
+          double nearest = 64.0;
+          std::size_t at = 0;
+          for (std::size_t j = 0; j < other.points.size(); j += otherStride)
+          {
+            const double squared = (vessel.points[i] - other.points[j]).squaredNorm();
+            if (squared < nearest)
+            {
+              nearest = squared;
+              at = j;
+            }
+          }
+          const double full = vessel.radius[i] + other.radius[at] + gap;
+          if (nearest >= full * full)
+          {
+            continue;
+          }
+          const double wanted =
+            std::min(full, parting * TreeDistance(vessels, u, vessel.arc[i], v, other.arc[at]));
+          const double distance = std::sqrt(nearest);
+          if (distance < wanted - 0.02)
+          {
+            pushes.emplace_back(vessel.arc[i],
+              (vessel.points[i] - other.points[at]) *
+                ((wanted - distance) / std::max(0.1, distance)));
+          }
+        }
+      }
+      if (pushes.empty())
+      {
+        continue;
+      }
+      moved = true;
+      for (std::size_t i = 0; i < vessel.points.size(); ++i)
+      {
+        const double s = vessel.arc[i];
+        Vector3 sum = Vector3::Zero();
+        double weights = 0.0;
+        double strongest = 0.0;
+        for (const auto& push : pushes)
+        {
+          const double d = (s - push.first) / smoothing;
+          const double weight = std::exp(-0.5 * d * d);
+          sum += weight * push.second;
+          weights += weight;
+          strongest = std::max(strongest, weight);
+        }
+        // Attachments stay where they are.
+        double free = vessel.parent < vessels.size() ? SmoothStep(s / 4.0) : SmoothStep(s / 20.0);
+        for (const double attachment : attachments[u])
+        {
+          free *= SmoothStep(std::abs(s - attachment) / 5.0);
+        }
+        if (weights > 1e-12)
+        {
+          vessel.points[i] += 0.6 * free * strongest * sum / weights;
+        }
+      }
+      // Arc lengths of attachments move along with their points.
+      const std::vector<double> before = vessel.arc;
+      ComputeArc(vessel);
+      for (DenseVessel& child : vessels)
+      {
+        if (child.parent == u)
+        {
+          const auto index =
+            std::lower_bound(before.begin(), before.end(), child.parentArc - 1e-9) - before.begin();
+          child.parentArc = vessel.arc[std::min<std::size_t>(index, vessel.arc.size() - 1)];
+        }
+      }
+      attachments[u].clear();
+      for (const DenseVessel& child : vessels)
+      {
+        if (child.parent == u)
+        {
+          attachments[u].push_back(child.parentArc);
+        }
+      }
+    }
+    if (!moved)
+    {
+      break;
+    }
+  }
 }
 
 int Strahler(PhantomTree& tree, std::size_t branch)
@@ -496,8 +670,7 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
       controls[0] = parent.points[nearest];
     }
     const CubicCurve curve(controls);
-    const int fine = static_cast<int>(
-      std::ceil(40.0 * static_cast<double>(controls.size())));
+    const int fine = static_cast<int>(std::ceil(40.0 * static_cast<double>(controls.size())));
     for (int i = 0; i <= fine; ++i)
     {
       vessel.points.push_back(curve(curve.End() * i / fine));
@@ -532,15 +705,18 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
       }
       // A side vessel is never as wide as the vessel that it leaves.
       const double widest = parentRadius > 0.0 ? 0.9 * parentRadius : diameter;
-      vessel.radius.push_back(std::min(0.5 * diameter, widest));
+      vessel.radius.push_back(std::max(SmallestRadius, std::min(0.5 * diameter, widest)));
     }
   }
+
+  Separate(dense);
 
   // Lesions, away from the bifurcations so that a narrowing is where it is said to be.
   const std::vector<std::string> hosts = settings.dominance == Dominance::Left
     ? std::vector<std::string>{ "LAD", "LCx", "D1", "OM1" }
     : std::vector<std::string>{ "LAD", "RCA", "LCx", "D1" };
-  const auto clearOfJunctions = [&](std::size_t host, double s, double distance) {
+  const auto clearOfJunctions = [&](std::size_t host, double s, double distance)
+  {
     for (const DenseVessel& child : dense)
     {
       if (child.parent == host && std::abs(child.parentArc - s) < distance)
@@ -550,7 +726,8 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     }
     return true;
   };
-  const auto pickPlace = [&](RandomStream& random, int number, double distance) {
+  const auto pickPlace = [&](RandomStream& random, int number, double distance)
+  {
     const std::size_t host = byName.at(hosts[number % hosts.size()]);
     const double last = std::min(80.0, dense[host].arc.back() - 10.0);
     double s = random.Uniform(8.0, last);
@@ -569,7 +746,8 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     for (std::size_t i = 0; i < vessel.points.size(); ++i)
     {
       const double u = (vessel.arc[i] - position) / width;
-      vessel.radius[i] *= 1.0 - settings.stenosisDegree * std::exp(-0.5 * u * u);
+      vessel.radius[i] = std::max(SmallestRadius,
+        vessel.radius[i] * (1.0 - settings.stenosisDegree * std::exp(-0.5 * u * u)));
     }
   }
   RandomStream plaqueRandom(settings.seed, Plaques);
@@ -609,7 +787,8 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
       children[dense[v].parent].emplace_back(dense[v].parentArc, v);
     }
   }
-  const auto addPoint = [&](std::size_t v, double arc, double abscissa, int segment) {
+  const auto addPoint = [&](std::size_t v, double arc, double abscissa, int segment)
+  {
     const DenseVessel& vessel = dense[v];
     this->tree.points.push_back(AtArc(vessel, vessel.points, arc));
     this->tree.radius.push_back(AtArc(vessel, vessel.radius, arc));
@@ -622,79 +801,80 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
   };
   // Depth first, so that a parent has a lower id than its daughters.
   const std::function<void(std::size_t, std::int64_t, int)> cut =
-    [&](std::size_t v, std::int64_t origin, int parentGroup) {
-      const DenseVessel& vessel = dense[v];
-      const VesselPlan& plan = plans[v];
-      std::sort(children[v].begin(), children[v].end());
-      int segment = plan.segment;
-      double from = 0.0;
-      const double base = origin < 0 ? 0.0 : this->tree.abscissa[origin];
-      std::int64_t last = origin;
-      if (last < 0)
-      {
-        last = addPoint(v, 0.0, 0.0, segment);
-        this->ends.push_back({ static_cast<int>(v), last, last + 1, plan.tree == 0 ? 2 : 3 });
-      }
-      struct Waiting
-      {
-        std::size_t vessel;
-        std::int64_t point;
-        int group;
-      };
-      std::vector<Waiting> waiting;
-      std::size_t next = 0;
-      int group = parentGroup;
-      while (from < vessel.arc.back())
-      {
-        const bool toEnd = next == children[v].size();
-        const double to = toEnd ? vessel.arc.back() : children[v][next].first;
-        PhantomBranch branch;
-        branch.groupId = static_cast<int>(this->tree.branches.size());
-        branch.parentGroupId = group;
-        branch.treeId = plan.tree;
-        branch.generation = group < 0 ? 0 : this->tree.branches[group].generation + 1;
-        branch.segmentId = segment;
-        branch.points.push_back(last);
-        const int count =
-          std::max(2, static_cast<int>(std::lround((to - from) / settings.centerlineSpacing)));
-        for (int i = 1; i <= count; ++i)
-        {
-          const double arc = from + (to - from) * i / count;
-          const std::int64_t point = addPoint(v, arc, base + arc, segment);
-          this->steps.push_back({ last, point, static_cast<int>(v), branch.groupId });
-          branch.points.push_back(point);
-          last = point;
-        }
-        branch.length = to - from;
-        branch.tortuosity = branch.length /
-            (this->tree.points[branch.points.back()] - this->tree.points[branch.points.front()])
-              .norm() -
-          1.0;
-        group = branch.groupId;
-        this->tree.branches.push_back(branch);
-        from = to;
-        while (next < children[v].size() && children[v][next].first <= to)
-        {
-          const std::size_t child = children[v][next].second;
-          waiting.push_back({ child, last, group });
-          this->junctions.push_back({ static_cast<int>(v), static_cast<int>(child), last });
-          for (const auto& change : plan.changes)
-          {
-            if (change.first == plans[child].name)
-            {
-              segment = change.second;
-            }
-          }
-          ++next;
-        }
-      }
-      this->ends.push_back(
-        { static_cast<int>(v), last, last - 1, 4 + static_cast<int>(this->ends.size()) });
-      for (const Waiting& child : waiting)
-      {
-        cut(child.vessel, child.point, child.group);
-      }
+    [&](std::size_t v, std::int64_t origin, int parentGroup)
+  {
+    const DenseVessel& vessel = dense[v];
+    const VesselPlan& plan = plans[v];
+    std::sort(children[v].begin(), children[v].end());
+    int segment = plan.segment;
+    double from = 0.0;
+    const double base = origin < 0 ? 0.0 : this->tree.abscissa[origin];
+    std::int64_t last = origin;
+    if (last < 0)
+    {
+      last = addPoint(v, 0.0, 0.0, segment);
+      this->ends.push_back({ static_cast<int>(v), last, last + 1, plan.tree == 0 ? 2 : 3 });
+    }
+    struct Waiting
+    {
+      std::size_t vessel;
+      std::int64_t point;
+      int group;
     };
+    std::vector<Waiting> waiting;
+    std::size_t next = 0;
+    int group = parentGroup;
+    while (from < vessel.arc.back())
+    {
+      const bool toEnd = next == children[v].size();
+      const double to = toEnd ? vessel.arc.back() : children[v][next].first;
+      PhantomBranch branch;
+      branch.groupId = static_cast<int>(this->tree.branches.size());
+      branch.parentGroupId = group;
+      branch.treeId = plan.tree;
+      branch.generation = group < 0 ? 0 : this->tree.branches[group].generation + 1;
+      branch.segmentId = segment;
+      branch.points.push_back(last);
+      const int count =
+        std::max(2, static_cast<int>(std::lround((to - from) / settings.centerlineSpacing)));
+      for (int i = 1; i <= count; ++i)
+      {
+        const double arc = from + (to - from) * i / count;
+        const std::int64_t point = addPoint(v, arc, base + arc, segment);
+        this->steps.push_back({ last, point, static_cast<int>(v), branch.groupId });
+        branch.points.push_back(point);
+        last = point;
+      }
+      branch.length = to - from;
+      branch.tortuosity = branch.length /
+          (this->tree.points[branch.points.back()] - this->tree.points[branch.points.front()])
+            .norm() -
+        1.0;
+      group = branch.groupId;
+      this->tree.branches.push_back(branch);
+      from = to;
+      while (next < children[v].size() && children[v][next].first <= to)
+      {
+        const std::size_t child = children[v][next].second;
+        waiting.push_back({ child, last, group });
+        this->junctions.push_back({ static_cast<int>(v), static_cast<int>(child), last });
+        for (const auto& change : plan.changes)
+        {
+          if (change.first == plans[child].name)
+          {
+            segment = change.second;
+          }
+        }
+        ++next;
+      }
+    }
+    this->ends.push_back(
+      { static_cast<int>(v), last, last - 1, 4 + static_cast<int>(this->ends.size()) });
+    for (const Waiting& child : waiting)
+    {
+      cut(child.vessel, child.point, child.group);
+    }
+  };
   for (std::size_t v = 0; v < plans.size(); ++v)
   {
     if (dense[v].parent >= plans.size())
@@ -716,7 +896,8 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
   // The great cardiac vein: beside the LAD from the apex up, then in the groove beside the LCx.
   {
     const Variation shift(settings);
-    const auto beside = [&](const std::string& name, double arc, double away, double out) {
+    const auto beside = [&](const std::string& name, double arc, double away, double out)
+    {
       const DenseVessel& vessel = dense[byName.at(name)];
       const Vector3 p = AtArc(vessel, vessel.points, arc);
       const Vector3 tangent =
@@ -753,8 +934,8 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
       course.points.push_back(curve(curve.End() * i / fine));
     }
     ComputeArc(course);
-    const int count = std::max(
-      2, static_cast<int>(std::lround(course.arc.back() / settings.centerlineSpacing)));
+    const int count =
+      std::max(2, static_cast<int>(std::lround(course.arc.back() / settings.centerlineSpacing)));
     for (int i = 0; i <= count; ++i)
     {
       const double s = course.arc.back() * i / count;

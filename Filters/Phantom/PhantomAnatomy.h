@@ -28,8 +28,9 @@ struct Junction
 struct VesselEnd
 {
   int vessel;
-  std::int64_t point;    ///< the end
-  std::int64_t neighbour; ///< the axis point beside it; the outward normal at rest is point - neighbour
+  std::int64_t point; ///< the end
+  std::int64_t
+    neighbour; ///< the axis point beside it; the outward normal at rest is point - neighbour
   int entityId;
 };
 
@@ -51,8 +52,8 @@ struct PhantomAnatomy
   HeartFrame frame;
   PhantomTree tree; ///< at rest; displacement and velocity zero
   std::vector<int> pointVessel;
-  std::vector<char> occluded;      ///< per point
-  std::vector<char> intramural;    ///< per vessel: runs in the myocardium, without fat
+  std::vector<char> occluded;   ///< per point
+  std::vector<char> intramural; ///< per vessel: runs in the myocardium, without fat
   std::vector<AxisStep> steps;
   std::vector<Junction> junctions;
   std::vector<VesselEnd> ends;
@@ -63,9 +64,9 @@ struct PhantomAnatomy
 
   Vector3 leftOstium;
   Vector3 rightOstium;
-  Vector3 aorticCentre; ///< centre of the aortic root, mm
-  Vector3 aorticAxis;   ///< unit vector out of the heart
-  double aorticRadius;  ///< mm
+  Vector3 aorticCentre;  ///< centre of the aortic root, mm
+  Vector3 aorticAxis;    ///< unit vector out of the heart
+  double aorticRadius;   ///< mm
   Vector3 pulmonaryBase; ///< a point on the pulmonary trunk's axis, mm
   Vector3 pulmonaryAxis;
 };

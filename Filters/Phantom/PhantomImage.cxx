@@ -151,9 +151,9 @@ public:
     enum Kind
     {
       Ellipsoid,
-      Capsule,    ///< round cone between two points
-      Slab,       ///< half space
-      Ring        ///< torus around the AV plane's section of the heart
+      Capsule, ///< round cone between two points
+      Slab,    ///< half space
+      Ring     ///< torus around the AV plane's section of the heart
     } kind;
     Vector3 a;      ///< centre | start | outward normal
     Vector3 b;      ///< radii | end | -
@@ -221,8 +221,7 @@ Tissues::Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy)
   const int thorax = worldEllipsoid(Vector3(-35.0, 15.0, -30.0), Vector3(165.0, 112.0, 900.0));
   const int pleura = worldEllipsoid(Vector3(-35.0, 12.0, -30.0), Vector3(142.0, 90.0, 900.0));
   const int spine = capsule(Vector3(-35.0, 84.0, -400.0), Vector3(-35.0, 84.0, 400.0), 19.0, 19.0);
-  const int sternum =
-    worldEllipsoid(Vector3(-35.0, -82.0, -20.0), Vector3(20.0, 6.5, 120.0));
+  const int sternum = worldEllipsoid(Vector3(-35.0, -82.0, -20.0), Vector3(20.0, 6.5, 120.0));
   const int mediastinum = worldEllipsoid(Vector3(-24.0, 22.0, 20.0), Vector3(38.0, 62.0, 110.0));
   const int heartFat = ellipsoid(c, r + Vector3::Constant(5.5));
   const int myocardium = ellipsoid(c, r - Vector3::Constant(3.2));
@@ -285,8 +284,8 @@ Tissues::Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy)
   const double left = settings.lumenHU;
   this->Paint(hu(0.45 * left), 0.3f, true, { rightAtrium, no(groove) });
   this->Paint(hu(left), 0.3f, true, { leftAtrium, no(groove) });
-  this->Paint(hu(0.48 * left), 0.7f, true,
-    { rightVentricle, no(leftVentricleWall), rightInlet, rightApex });
+  this->Paint(
+    hu(0.48 * left), 0.7f, true, { rightVentricle, no(leftVentricleWall), rightInlet, rightApex });
   this->Paint(hu(left), 0.7f, true, { leftVentricle });
   this->Paint(hu(0.6 * left), 0.1f, true, { pulmonary });
   this->Paint(hu(left), 0.3f, true, { outflow });
@@ -313,8 +312,8 @@ float Tissues::Distance(int number, const Vector3& world, const Vector3& heart) 
     {
       const Vector3 axis = shape.b - shape.a;
       const double u = std::clamp((p - shape.a).dot(axis) / axis.squaredNorm(), 0.0, 1.0);
-      return static_cast<float>((p - shape.a - u * axis).norm() -
-        (shape.radius + u * (shape.radius2 - shape.radius)));
+      return static_cast<float>(
+        (p - shape.a - u * axis).norm() - (shape.radius + u * (shape.radius2 - shape.radius)));
     }
     case Shape::Slab:
       return static_cast<float>(p.dot(shape.a) - shape.radius);
@@ -424,8 +423,8 @@ float Gaussian(std::uint64_t key, std::uint64_t counter)
 {
   // Sum of four uniform 16-bit numbers: close to normal, and the kernel's sum closer still.
   const std::uint64_t bits = MixBits(key + counter);
-  const auto sum = static_cast<float>((bits & 0xffff) + ((bits >> 16) & 0xffff) +
-    ((bits >> 32) & 0xffff) + (bits >> 48));
+  const auto sum = static_cast<float>(
+    (bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48));
   // Mean 4 * 32767.5, variance 4 * (65536^2 - 1) / 12.
   return (sum - 131070.0f) * (1.0f / 37837.2f);
 }
@@ -466,14 +465,15 @@ PhantomImage::PhantomImage(
 double PhantomImage::NoiseLevel(double t, double wholePhaseLost) const
 {
   const double cycle = t - std::floor(t);
-  const double fullDose = SmoothStep((cycle - 0.55) / 0.08) * (1.0 - SmoothStep((cycle - 0.88) / 0.08));
+  const double fullDose =
+    SmoothStep((cycle - 0.55) / 0.08) * (1.0 - SmoothStep((cycle - 0.88) / 0.08));
   return this->Settings.noise * (1.0 + (this->Settings.systolicNoise - 1.0) * (1.0 - fullDose)) *
     (1.0 + 1.5 * wholePhaseLost);
 }
 
 void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part, double t,
-  const std::vector<PhantomMoment>& moments, const std::vector<double>& lost,
-  double wholePhaseLost, std::int16_t* values, const ProgressCallback& progress) const
+  const std::vector<PhantomMoment>& moments, const std::vector<double>& lost, double wholePhaseLost,
+  std::int16_t* values, const ProgressCallback& progress) const
 {
   for (int axis = 0; axis < 3; ++axis)
   {
@@ -517,15 +517,15 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
   {
     tile[axis] = std::clamp(static_cast<int>(4.0 / grid.spacing[axis]), 1, 16);
   }
-  const auto tileOf = [&](int axis, int index) {
-    return (index - grid.extent[2 * axis]) / tile[axis];
-  };
+  const auto tileOf = [&](int axis, int index)
+  { return (index - grid.extent[2 * axis]) / tile[axis]; };
   const int firstTile[3] = { tileOf(0, part[0]), tileOf(1, part[2]), tileOf(2, part[4]) };
   const int lastTile[3] = { tileOf(0, part[1]), tileOf(1, part[3]), tileOf(2, part[5]) };
   const int tileCount[3] = { lastTile[0] - firstTile[0] + 1, lastTile[1] - firstTile[1] + 1,
     lastTile[2] - firstTile[2] + 1 };
   const int cornerCount[3] = { tileCount[0] + 1, tileCount[1] + 1, tileCount[2] + 1 };
-  const auto cornerWorld = [&](int i, int j, int k) {
+  const auto cornerWorld = [&](int i, int j, int k)
+  {
     return grid.IndexToWorld(grid.extent[0] + (firstTile[0] + i) * tile[0] - 0.0,
       grid.extent[2] + (firstTile[1] + j) * tile[1], grid.extent[4] + (firstTile[2] + k) * tile[2]);
   };
@@ -537,7 +537,8 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
   std::vector<Eigen::Vector3f> rest(allCorners * momentCount);
   ParallelFor(
     static_cast<std::int64_t>(cornerCount[1]) * cornerCount[2], 1,
-    [&](std::int64_t first, std::int64_t last) {
+    [&](std::int64_t first, std::int64_t last)
+    {
       for (std::int64_t row = first; row < last; ++row)
       {
         const int j = static_cast<int>(row % cornerCount[1]);
@@ -549,15 +550,13 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
           for (std::size_t m = 0; m < momentCount; ++m)
           {
             guess = this->Motion.ReferencePosition(world, moments[m].t, guess, 2e-3);
-            rest[(row * cornerCount[0] + i) * momentCount + m] =
-              (guess - world).cast<float>();
+            rest[(row * cornerCount[0] + i) * momentCount + m] = (guess - world).cast<float>();
           }
         }
       }
     },
-    progress
-      ? ProgressCallback([&progress](double fraction) { return progress(0.15 * fraction); })
-      : ProgressCallback());
+    progress ? ProgressCallback([&progress](double fraction) { return progress(0.15 * fraction); })
+             : ProgressCallback());
 
   // The vessels of each moment.
   const double reach = std::max(3.4, Saturated * widestBlur + 0.5);
@@ -599,11 +598,13 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
   const int bandTiles = std::max(1, 48 / tile[1]);
   const int bandsInY = (tileCount[1] + bandTiles - 1) / bandTiles;
 
-  const auto renderBand = [&](std::int64_t band) {
+  const auto renderBand = [&](std::int64_t band)
+  {
     const int tz = static_cast<int>(band / bandsInY);
     const int ty0 = static_cast<int>(band % bandsInY) * bandTiles;
     const int ty1 = std::min(tileCount[1], ty0 + bandTiles);
-    const auto range = [&](int axis, int t0, int t1, int& low, int& high) {
+    const auto range = [&](int axis, int t0, int t1, int& low, int& high)
+    {
       low = std::max(part[2 * axis], grid.extent[2 * axis] + (firstTile[axis] + t0) * tile[axis]);
       high = std::min(
         part[2 * axis + 1], grid.extent[2 * axis] + (firstTile[axis] + t1) * tile[axis] - 1);
@@ -759,8 +760,8 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
                   for (const Extra& piece : nearVein)
                   {
                     const Vector3 offset = world - piece.start;
-                    const double u = std::clamp(
-                      offset.dot(piece.axis) / piece.axis.squaredNorm(), 0.0, 1.0);
+                    const double u =
+                      std::clamp(offset.dot(piece.axis) / piece.axis.squaredNorm(), 0.0, 1.0);
                     const double d = (offset - u * piece.axis).norm() - piece.radius;
                     if (d < nearest)
                     {
@@ -786,18 +787,14 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
                   const Vector3 axis =
                     (moment.tree.points[step->second] - moment.tree.points[step->first])
                       .normalized();
-                  const double across =
-                    0.5 * (variance.sum() - axis.dot(covariance * axis));
+                  const double across = 0.5 * (variance.sum() - axis.dot(covariance * axis));
                   const auto scale = static_cast<float>(1.0 / std::sqrt(across));
                   const auto radius = static_cast<float>(sample.radius);
-                  const float offset =
-                    std::max(0.0f, radius + static_cast<float>(sample.distance));
+                  const float offset = std::max(0.0f, radius + static_cast<float>(sample.distance));
                   const double u = sample.fraction;
-                  const double path =
-                    moment.tree.abscissa[step->first] * (1.0 - u) +
+                  const double path = moment.tree.abscissa[step->first] * (1.0 - u) +
                     moment.tree.abscissa[step->second] * u;
-                  const double hidden =
-                    lost[step->first] * (1.0 - u) + lost[step->second] * u;
+                  const double hidden = lost[step->first] * (1.0 - u) + lost[step->second] * u;
                   const auto contrast = static_cast<float>(
                     this->Settings.lumenHU + this->Settings.attenuationGradient * path / 10.0);
                   value += static_cast<float>(1.0 - 0.92 * hidden) *
@@ -893,15 +890,15 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
         std::int16_t* out = values + (k - part[4]) * sliceStride + (j - part[2]) * rowStride;
         for (int i = 0; i < nx; ++i)
         {
-          out[i] = static_cast<std::int16_t>(
-            std::lround(std::clamp(in[i], -1024.0f, 3071.0f)));
+          out[i] = static_cast<std::int16_t>(std::lround(std::clamp(in[i], -1024.0f, 3071.0f)));
         }
       }
     }
   };
   ParallelFor(
     static_cast<std::int64_t>(tileCount[2]) * bandsInY, 1,
-    [&](std::int64_t first, std::int64_t last) {
+    [&](std::int64_t first, std::int64_t last)
+    {
       for (std::int64_t band = first; band < last; ++band)
       {
         renderBand(band);

@@ -22,8 +22,9 @@ PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vect
   const std::vector<double>& radius, const std::vector<Vector3>& endNormals, double reach)
   : Limit(reach)
 {
-  const auto add = [this](const Vector3& p, const Vector3& q, double rp, double rq, int vessel,
-                     std::int32_t step) {
+  const auto add =
+    [this](const Vector3& p, const Vector3& q, double rp, double rq, int vessel, std::int32_t step)
+  {
     const Vector3 axis = q - p;
     this->Pieces.push_back({ p, axis, 1.0 / std::max(1e-12, axis.squaredNorm()), rp, rq - rp,
       static_cast<std::int32_t>(vessel), step });
@@ -40,8 +41,8 @@ PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vect
       continue;
     }
     // A side vessel's first point is its parent's, with the parent's radius.
-    const double start = anatomy.pointVessel[step.first] == step.vessel ? radius[step.first]
-                                                                        : radius[step.second];
+    const double start =
+      anatomy.pointVessel[step.first] == step.vessel ? radius[step.first] : radius[step.second];
     add(points[step.first], points[step.second], start, radius[step.second], step.vessel,
       static_cast<std::int32_t>(s));
   }
@@ -74,8 +75,7 @@ PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vect
   for (std::size_t i = 0; i < this->Pieces.size(); ++i)
   {
     const Piece& piece = this->Pieces[i];
-    const double margin =
-      this->Limit + std::max(piece.radius, piece.radius + piece.widening);
+    const double margin = this->Limit + std::max(piece.radius, piece.radius + piece.widening);
     const Vector3 end = piece.start + piece.axis;
     const Vector3 low = piece.start.cwiseMin(end).array() - margin;
     const Vector3 high = piece.start.cwiseMax(end).array() + margin;
@@ -102,8 +102,7 @@ std::int64_t PhantomLumen::Cell(double x, double y, double z) const
     ((static_cast<std::int64_t>(y) + offset) << 21) | (static_cast<std::int64_t>(z) + offset);
 }
 
-void PhantomLumen::Collect(
-  const Vector3& centre, double ballRadius, Candidates& candidates) const
+void PhantomLumen::Collect(const Vector3& centre, double ballRadius, Candidates& candidates) const
 {
   candidates.pieces.clear();
   candidates.junctions.clear();
@@ -119,8 +118,7 @@ void PhantomLumen::Collect(
         const auto bin = this->Bins.find(this->Cell(x, y, z));
         if (bin != this->Bins.end())
         {
-          candidates.pieces.insert(
-            candidates.pieces.end(), bin->second.begin(), bin->second.end());
+          candidates.pieces.insert(candidates.pieces.end(), bin->second.begin(), bin->second.end());
         }
       }
     }
@@ -130,12 +128,13 @@ void PhantomLumen::Collect(
     std::unique(candidates.pieces.begin(), candidates.pieces.end()), candidates.pieces.end());
   candidates.pieces.erase(
     std::remove_if(candidates.pieces.begin(), candidates.pieces.end(),
-      [&](std::int32_t i) {
+      [&](std::int32_t i)
+      {
         const Piece& piece = this->Pieces[i];
-        const double u = std::clamp(
-          (centre - piece.start).dot(piece.axis) * piece.inverseSquaredLength, 0.0, 1.0);
-        const double margin = ballRadius + this->Limit +
-          std::max(piece.radius, piece.radius + piece.widening);
+        const double u =
+          std::clamp((centre - piece.start).dot(piece.axis) * piece.inverseSquaredLength, 0.0, 1.0);
+        const double margin =
+          ballRadius + this->Limit + std::max(piece.radius, piece.radius + piece.widening);
         return (centre - piece.start - u * piece.axis).squaredNorm() > margin * margin;
       }),
     candidates.pieces.end());
@@ -180,8 +179,7 @@ PhantomLumen::Sample PhantomLumen::Evaluate(
   {
     const Piece& piece = this->Pieces[i];
     const Vector3 offset = position - piece.start;
-    const double u =
-      std::clamp(offset.dot(piece.axis) * piece.inverseSquaredLength, 0.0, 1.0);
+    const double u = std::clamp(offset.dot(piece.axis) * piece.inverseSquaredLength, 0.0, 1.0);
     const double radius = piece.radius + u * piece.widening;
     // Compared as squares first: most candidates are not the nearest.
     const double squared = (offset - u * piece.axis).squaredNorm();
@@ -221,8 +219,8 @@ PhantomLumen::Sample PhantomLumen::Evaluate(
         const double k = fillet.radius * SmoothStep(2.5 * (1.0 - away));
         if (k > 0.0)
         {
-          result = std::min(result,
-            RoundUnion(distance[fillet.parentVessel], distance[fillet.childVessel], k));
+          result = std::min(
+            result, RoundUnion(distance[fillet.parentVessel], distance[fillet.childVessel], k));
         }
       }
     }
@@ -279,8 +277,7 @@ double PhantomLumen::Project(Vector3& position, double tolerance) const
         while (far - near > 0.25 * tolerance)
         {
           const double middle = 0.5 * (near + far);
-          const bool same =
-            (distanceAt(position + middle * direction) > 0.0) == (distance > 0.0);
+          const bool same = (distanceAt(position + middle * direction) > 0.0) == (distance > 0.0);
           (same ? near : far) = middle;
         }
         position += 0.5 * (near + far) * direction;

@@ -22,8 +22,8 @@ public:
   /// What lies at a position. Distances are in mm.
   struct Sample
   {
-    double distance; ///< signed distance to the wall, negative inside, at most `reach`
-    double radius;   ///< of the nearest tube, mm
+    double distance;   ///< signed distance to the wall, negative inside, at most `reach`
+    double radius;     ///< of the nearest tube, mm
     std::int32_t step; ///< index of the nearest axis step, -1 when none is within reach
     double fraction;   ///< 0..1 along that step
   };

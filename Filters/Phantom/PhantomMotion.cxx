@@ -181,14 +181,15 @@ Vector3 PhantomMotion::Position(const Vector3& reference, double t, Vector3* vel
   return reference + this->Frame.axes.transpose() * u * far;
 }
 
-Vector3 PhantomMotion::PlaneNormal(
-  const Vector3& reference, const Vector3& normal, double t) const
+Vector3 PhantomMotion::PlaneNormal(const Vector3& reference, const Vector3& normal, double t) const
 {
   constexpr double h = 1e-3;
   const Vector3 u = normal.unitOrthogonal();
   const Vector3 v = normal.cross(u);
-  const Vector3 alongU = this->Position(reference + h * u, t) - this->Position(reference - h * u, t);
-  const Vector3 alongV = this->Position(reference + h * v, t) - this->Position(reference - h * v, t);
+  const Vector3 alongU =
+    this->Position(reference + h * u, t) - this->Position(reference - h * u, t);
+  const Vector3 alongV =
+    this->Position(reference + h * v, t) - this->Position(reference - h * v, t);
   return alongU.cross(alongV).normalized();
 }
 

@@ -35,13 +35,13 @@ struct HeartFrame
   /// The point of the ellipsoid at an azimuth about c (degrees, 0 = a, 90 = b) and height c.
   static Vector3 OnEpicardium(double azimuthDegrees, double c);
 
-  static const Vector3 Centre; ///< of the ellipsoid, heart coordinates, mm
-  static const Vector3 Radii;  ///< mm
+  static const Vector3 Centre;               ///< of the ellipsoid, heart coordinates, mm
+  static const Vector3 Radii;                ///< mm
   static constexpr double ApexHeight = 91.5; ///< c of the apex, mm
 
   double size = 1.0;
-  Vector3 origin;   ///< world, mm
-  Matrix3 axes;     ///< rows a, b, c
+  Vector3 origin; ///< world, mm
+  Matrix3 axes;   ///< rows a, b, c
 };
 
 /// Position and velocity of material points. See docs/phantom.md, "Motion".

@@ -55,16 +55,16 @@ private:
       {
         parent[e] = e;
       }
-      const auto root = [&](int e) {
+      const auto root = [&](int e)
+      {
         while (parent[e] != e)
         {
           e = parent[e];
         }
         return e;
       };
-      const auto crossing = [&](int e) {
-        return ((inside >> Corners(e, 0)) & 1) != ((inside >> Corners(e, 1)) & 1);
-      };
+      const auto crossing = [&](int e)
+      { return ((inside >> Corners(e, 0)) & 1) != ((inside >> Corners(e, 1)) & 1); };
       for (int axis = 0; axis < 3; ++axis)
       {
         for (int side = 0; side < 2; ++side)
@@ -148,7 +148,7 @@ std::int64_t Key(std::int64_t x, std::int64_t y, std::int64_t z)
 
 struct GridBlock
 {
-  std::int64_t x, y, z; // of the first cell
+  std::int64_t x, y, z;      // of the first cell
   std::vector<float> values; // (Block + 1)^3 distances
 
   static int Index(int i, int j, int k) { return i + (Block + 1) * (j + (Block + 1) * k); }
@@ -161,8 +161,7 @@ struct Mesh
 };
 
 /// Blocks of the grid that the wall can pass through.
-std::vector<GridBlock> FindBlocks(
-  const PhantomAnatomy& anatomy, const Vector3& shift, double h)
+std::vector<GridBlock> FindBlocks(const PhantomAnatomy& anatomy, const Vector3& shift, double h)
 {
   std::unordered_map<std::int64_t, char> seen;
   std::vector<GridBlock> blocks;
@@ -190,9 +189,8 @@ std::vector<GridBlock> FindBlocks(
     }
   }
   // One order, whatever the order of the steps.
-  std::sort(blocks.begin(), blocks.end(), [](const GridBlock& a, const GridBlock& b) {
-    return Key(a.x, a.y, a.z) < Key(b.x, b.y, b.z);
-  });
+  std::sort(blocks.begin(), blocks.end(),
+    [](const GridBlock& a, const GridBlock& b) { return Key(a.x, a.y, a.z) < Key(b.x, b.y, b.z); });
   return blocks;
 }
 
@@ -202,7 +200,8 @@ Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vec
   std::vector<GridBlock> blocks = FindBlocks(anatomy, shift, h);
   ParallelFor(
     static_cast<std::int64_t>(blocks.size()), 8,
-    [&](std::int64_t first, std::int64_t last) {
+    [&](std::int64_t first, std::int64_t last)
+    {
       PhantomLumen::Candidates candidates;
       for (std::int64_t b = first; b < last; ++b)
       {
@@ -219,8 +218,8 @@ Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vec
             for (int i = 0; i <= Block; ++i)
             {
               // From the integer coordinates, so that neighbouring blocks agree to the last bit.
-              const Vector3 position = shift +
-                h * Vector3(double(block.x + i), double(block.y + j), double(block.z + k));
+              const Vector3 position =
+                shift + h * Vector3(double(block.x + i), double(block.y + j), double(block.z + k));
               block.values[GridBlock::Index(i, j, k)] =
                 static_cast<float>(lumen.Evaluate(position, candidates).distance);
             }
@@ -234,9 +233,10 @@ Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vec
   const CellSheets& sheets = CellSheets::Instance();
   std::unordered_map<std::int64_t, std::int64_t> firstVertex; // of a cell
   std::unordered_map<std::int64_t, unsigned char> pattern;
-  const auto value = [](const GridBlock& block, int i, int j, int k, int corner) {
-    return block.values[GridBlock::Index(
-      i + (corner & 1), j + ((corner >> 1) & 1), k + (corner >> 2))];
+  const auto value = [](const GridBlock& block, int i, int j, int k, int corner)
+  {
+    return block
+      .values[GridBlock::Index(i + (corner & 1), j + ((corner >> 1) & 1), k + (corner >> 2))];
   };
   for (const GridBlock& block : blocks)
   {
@@ -277,8 +277,9 @@ Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vec
               }
             }
             mesh.points.push_back(shift +
-              h * (Vector3(double(block.x + i), double(block.y + j), double(block.z + k)) +
-                    sum / count));
+              h *
+                (Vector3(double(block.x + i), double(block.y + j), double(block.z + k)) +
+                  sum / count));
           }
         }
       }
@@ -318,17 +319,15 @@ Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vec
                 throw std::runtime_error("CoronaryPhantom: the wall leaves the meshing grid");
               }
               const int corner = (around[n][0] << u) | (around[n][1] << v);
-              quad[n] = found->second +
-                sheets.Sheet(pattern[cell], CellSheets::EdgeFrom(corner, axis));
+              quad[n] =
+                found->second + sheets.Sheet(pattern[cell], CellSheets::EdgeFrom(corner, axis));
             }
             if (d0 >= 0.0f)
             {
               std::swap(quad[1], quad[3]);
             }
-            const double diagonal02 =
-              (mesh.points[quad[0]] - mesh.points[quad[2]]).squaredNorm();
-            const double diagonal13 =
-              (mesh.points[quad[1]] - mesh.points[quad[3]]).squaredNorm();
+            const double diagonal02 = (mesh.points[quad[0]] - mesh.points[quad[2]]).squaredNorm();
+            const double diagonal13 = (mesh.points[quad[1]] - mesh.points[quad[3]]).squaredNorm();
             // The cells lie clockwise as seen from the axis' far end after stepping back.
             if (diagonal02 <= diagonal13)
             {
@@ -354,9 +353,8 @@ bool IsClosedManifold(const Mesh& mesh)
   std::unordered_map<std::uint64_t, int> edges;
   edges.reserve(3 * mesh.triangles.size());
   std::vector<int> degree(mesh.points.size(), 0);
-  const auto key = [](std::int64_t a, std::int64_t b) {
-    return (static_cast<std::uint64_t>(a) << 32) | static_cast<std::uint64_t>(b);
-  };
+  const auto key = [](std::int64_t a, std::int64_t b)
+  { return (static_cast<std::uint64_t>(a) << 32) | static_cast<std::uint64_t>(b); };
   std::unordered_map<std::uint64_t, std::int64_t> opposite; // next point of the fan
   for (const Triangle& t : mesh.triangles)
   {
@@ -408,7 +406,8 @@ bool IsClosedManifold(const Mesh& mesh)
 
 double SmallestAngle(const Vector3& a, const Vector3& b, const Vector3& c)
 {
-  const auto angle = [](const Vector3& p, const Vector3& q, const Vector3& r) {
+  const auto angle = [](const Vector3& p, const Vector3& q, const Vector3& r)
+  {
     const Vector3 u = q - p;
     const Vector3 v = r - p;
     return std::atan2(u.cross(v).norm(), u.dot(v));
@@ -555,7 +554,8 @@ private:
     const double after = std::min(this->Quality(a, d, c), this->Quality(d, b, c));
     const Vector3 normal =
       Normal(this->At(a), this->At(b), this->At(c)) + Normal(this->At(b), this->At(a), this->At(d));
-    if (after <= 1.05 * before || Normal(this->At(a), this->At(d), this->At(c)).dot(normal) <= 0.0 ||
+    if (after <= 1.05 * before ||
+      Normal(this->At(a), this->At(d), this->At(c)).dot(normal) <= 0.0 ||
       Normal(this->At(d), this->At(b), this->At(c)).dot(normal) <= 0.0)
     {
       return false;
@@ -692,24 +692,26 @@ void Relax(Mesh& mesh, const PhantomLumen& lumen, int rounds, const ProgressCall
   std::vector<Vector3> next(n);
   for (int round = 0; round <= rounds; ++round)
   {
-    ParallelFor(static_cast<std::int64_t>(n), 512, [&](std::int64_t first, std::int64_t last) {
-      for (std::int64_t p = first; p < last; ++p)
+    ParallelFor(static_cast<std::int64_t>(n), 512,
+      [&](std::int64_t first, std::int64_t last)
       {
-        Vector3 position = mesh.points[p];
-        if (round > 0)
+        for (std::int64_t p = first; p < last; ++p)
         {
-          Vector3 mean = Vector3::Zero();
-          for (std::int64_t e = offset[p]; e < offset[p + 1]; ++e)
+          Vector3 position = mesh.points[p];
+          if (round > 0)
           {
-            mean += mesh.points[neighbour[e]];
+            Vector3 mean = Vector3::Zero();
+            for (std::int64_t e = offset[p]; e < offset[p + 1]; ++e)
+            {
+              mean += mesh.points[neighbour[e]];
+            }
+            mean /= static_cast<double>(offset[p + 1] - offset[p]);
+            position += 0.6 * (mean - position);
           }
-          mean /= static_cast<double>(offset[p + 1] - offset[p]);
-          position += 0.6 * (mean - position);
+          lumen.Project(position, 1e-4);
+          next[p] = position;
         }
-        lumen.Project(position, 1e-4);
-        next[p] = position;
-      }
-    });
+      });
     mesh.points.swap(next);
     Report(progress, (round + 1.0) / (rounds + 1.0));
   }
@@ -719,13 +721,17 @@ void Relax(Mesh& mesh, const PhantomLumen& lumen, int rounds, const ProgressCall
 PhantomSurface MeshLumen(const PhantomAnatomy& anatomy, const PhantomLumen& lumen,
   double edgeLength, const ProgressCallback& progress)
 {
-  const auto part = [&](double from, double to) -> ProgressCallback {
+  const auto part = [&](double from, double to) -> ProgressCallback
+  {
     if (!progress)
     {
       return {};
     }
     return [&progress, from, to](double f) { return progress(from + (to - from) * f); };
   };
+  // A grid that is coarse for the thinnest vessel would cut it to pieces.
+  edgeLength = std::min(
+    edgeLength, 0.85 * *std::min_element(anatomy.tree.radius.begin(), anatomy.tree.radius.end()));
   Mesh mesh;
   constexpr int attempts = 6;
   for (int attempt = 0;; ++attempt)
@@ -759,15 +765,15 @@ PhantomSurface MeshLumen(const PhantomAnatomy& anatomy, const PhantomLumen& lume
   surface.groupId.resize(surface.points.size());
   surface.abscissa.resize(surface.points.size());
   ParallelFor(static_cast<std::int64_t>(surface.points.size()), 1024,
-    [&](std::int64_t first, std::int64_t last) {
+    [&](std::int64_t first, std::int64_t last)
+    {
       for (std::int64_t p = first; p < last; ++p)
       {
         const PhantomLumen::Sample sample = lumen.Evaluate(surface.points[p]);
         const AxisStep& step = anatomy.steps[std::max(0, sample.step)];
         surface.groupId[p] = step.branch;
         const double from = anatomy.tree.abscissa[step.first];
-        surface.abscissa[p] =
-          from + sample.fraction * (anatomy.tree.abscissa[step.second] - from);
+        surface.abscissa[p] = from + sample.fraction * (anatomy.tree.abscissa[step.second] - from);
       }
     });
 

@@ -15,7 +15,7 @@ namespace coronary
  * 2-manifold: that is checked, and the grid shifted and the work repeated if it is not.
  * Source of the dual cell structure: Nielson, "Dual marching cubes", IEEE Visualization 2004.
  *
- * @param edgeLength  of the grid, mm
+ * @param edgeLength  of the grid, mm; made smaller where the thinnest vessel needs it
  * @throws std::runtime_error when no shift of the grid gives a manifold; Cancelled
  */
 PhantomSurface MeshLumen(const PhantomAnatomy& anatomy, const PhantomLumen& lumen,
