@@ -635,10 +635,13 @@ int vtkCoronaryPhantomSource::RequestData(
 void vtkCoronaryPhantomSource::Generate(
   int port, vtkInformation* outInfo, vtkInformationVector** inputs)
 {
+  // The executive asks for data even when the request for information has failed before.
+  CheckPhases(this->Data->Phases);
+  const coronary::ImageGrid grid = this->MakeGrid();
   const double time = outInfo->Has(SDDP::UPDATE_TIME_STEP())
     ? outInfo->Get(SDDP::UPDATE_TIME_STEP())
     : this->Data->Phases.front();
-  Require(std::isfinite(time), "The requested time must be finite");
+  Require(std::isfinite(time), "UPDATE_TIME_STEP: the time must be finite");
 
   const coronary::CoronaryPhantom& phantom = this->Data->Phantom();
   vtkPolyData* output = vtkPolyData::GetData(outInfo);
@@ -646,7 +649,7 @@ void vtkCoronaryPhantomSource::Generate(
   switch (port)
   {
     case ImagePort:
-      this->GenerateImage(outInfo, time);
+      this->GenerateImage(grid, outInfo, time);
       break;
     case TreePort:
       FillTree(first ? phantom.Tree(time) : coronary::PhantomTree(), output);
@@ -676,10 +679,10 @@ void vtkCoronaryPhantomSource::Generate(
   SetTime(vtkDataObject::GetData(outInfo), time, this->GetCycleLength());
 }
 
-void vtkCoronaryPhantomSource::GenerateImage(vtkInformation* outInfo, double time)
+void vtkCoronaryPhantomSource::GenerateImage(
+  const coronary::ImageGrid& grid, vtkInformation* outInfo, double time)
 {
   vtkImageData* output = vtkImageData::GetData(outInfo);
-  const coronary::ImageGrid grid = this->MakeGrid();
   std::array<int, 6> part;
   outInfo->Get(SDDP::UPDATE_EXTENT(), part.data());
   output->SetExtent(part.data());

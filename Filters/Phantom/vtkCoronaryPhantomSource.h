@@ -377,7 +377,7 @@ private:
   int RequestDataNotGenerated(vtkInformation* request, vtkInformationVector* outputs);
   int RequestData(vtkInformationVector** inputs, vtkInformationVector* outputs);
   void Generate(int port, vtkInformation* outInfo, vtkInformationVector** inputs);
-  void GenerateImage(vtkInformation* outInfo, double time);
+  void GenerateImage(const coronary::ImageGrid& grid, vtkInformation* outInfo, double time);
   coronary::ImageGrid MakeGrid();
 
   double Spacing[3] = { 0.8, 0.8, 0.8 };
