@@ -12,6 +12,8 @@ if(DYNAMICCORONARY_SANITIZE)
   add_compile_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}" -fno-sanitize-recover=all
     -fno-omit-frame-pointer -g)
   add_link_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}")
+  # GCC follows values less well through instrumented code, and warns inside <regex> and Eigen.
+  target_compile_options(dynamiccoronary_options INTERFACE -Wno-maybe-uninitialized)
 endif()
 
 # dynamiccoronary_module_options(<module> [link ...])
