@@ -71,9 +71,13 @@ public:
 
   float operator()(float offset, float radius) const
   {
-    if (radius >= static_cast<float>(LargestRadius))
+    if (radius > static_cast<float>(LargestRadius))
     {
-      return NormalIntegral::Of(radius - offset);
+      // Towards the half space the difference goes with the curvature.
+      const float half = NormalIntegral::Of(radius - offset);
+      const auto largest = static_cast<float>(LargestRadius);
+      return half +
+        ((*this)(std::max(0.0f, offset - radius + largest), largest) - half) * largest / radius;
     }
     float scale = 1.0f;
     if (radius < static_cast<float>(SmallestRadius))
@@ -515,7 +519,7 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
   int tile[3];
   for (int axis = 0; axis < 3; ++axis)
   {
-    tile[axis] = std::clamp(static_cast<int>(4.0 / grid.spacing[axis]), 1, 16);
+    tile[axis] = std::clamp(static_cast<int>(4.0 / grid.spacing[axis]), 3, 16);
   }
   const auto tileOf = [&](int axis, int index)
   { return (index - grid.extent[2 * axis]) / tile[axis]; };

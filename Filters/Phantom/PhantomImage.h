@@ -47,7 +47,7 @@ private:
 
 /**
  * Share of a Gaussian, centred at `offset` from the middle of a disc, that lies in the disc; all in
- * units of the Gaussian's standard deviation. Exact to 1e-3.
+ * units of the Gaussian's standard deviation. Exact to 4e-3.
  */
 double DiscResponse(double offset, double discRadius);
 }
