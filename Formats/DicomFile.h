@@ -45,7 +45,8 @@ struct DicomFile
   int bitsAllocated = 0; ///< 8, 16 or 32
   int bitsStored = 0;
   bool isSigned = false;
-  bool encapsulated = false; ///< the pixels are compressed
+  std::string transferSyntax; ///< UID
+  bool encapsulated = false;  ///< the pixels are compressed
   bool bigEndian = false;
   std::uint64_t pixelOffset = 0; ///< in the file
   std::uint64_t pixelBytes = 0;  ///< in the file, from pixelOffset on

@@ -349,9 +349,21 @@ std::size_t Collisions(const Stack& stack)
   return count;
 }
 
-// Every position has the same number of images, at least two, and nothing tells them apart.
+// Every position has the same number of images of one series, at least two, and nothing tells them
+// apart. Of two series they would be, say, two reconstructions.
 bool OnlyOrderSeparates(const Stack& stack, std::size_t images)
 {
+  const std::string& series = stack.front().front().file->seriesUid;
+  for (const std::vector<Image>& slice : stack)
+  {
+    for (const Image& image : slice)
+    {
+      if (image.file->seriesUid != series)
+      {
+        return false;
+      }
+    }
+  }
   const std::size_t count = stack.front().size();
   const bool equal = std::all_of(stack.begin(), stack.end(),
     [count](const std::vector<Image>& slice) { return slice.size() == count; });

@@ -17,6 +17,18 @@ constexpr std::uint32_t PixelDataTag = 0x7fe00010u;
 constexpr std::uint32_t UndefinedLength = 0xffffffffu;
 constexpr int DeepestNesting = 32;
 
+// What DicomFile reads; nothing else is kept, so that a strange file costs no memory.
+bool IsWanted(std::uint32_t tag)
+{
+  static const std::uint32_t wanted[] = { 0x00080008u, 0x00080016u, 0x00080018u, 0x00080032u,
+    0x00080060u, 0x0008103eu, 0x00180050u, 0x00180088u, 0x00181060u, 0x00181062u, 0x00181088u,
+    0x00189118u, 0x0020000eu, 0x00200012u, 0x00200013u, 0x00200032u, 0x00200037u, 0x00200052u,
+    0x00200100u, 0x00209113u, 0x00209116u, 0x00209153u, 0x00209241u, 0x00209251u, 0x00280002u,
+    0x00280008u, 0x00280010u, 0x00280011u, 0x00280030u, 0x00280100u, 0x00280101u, 0x00280103u,
+    0x00281052u, 0x00281053u, 0x00289110u, 0x00289145u, 0x52009229u, 0x52009230u };
+  return std::binary_search(std::begin(wanted), std::end(wanted), tag);
+}
+
 class Walker
 {
 public:
@@ -46,7 +58,8 @@ public:
     this->Structure.isDicom = true;
     position = this->WalkMetaInformation(position);
     this->SetSyntax(position);
-    position = this->WalkDataSet(position, this->Size, this->Explicit, 0, false);
+    position =
+      this->WalkDataSet(position, this->Size, this->Explicit, 0, false, &this->Structure.data);
     this->Bytes.resize(static_cast<std::size_t>(position));
     this->Structure.header = std::move(this->Bytes);
     this->Structure.bigEndian = this->BigEndian;
@@ -157,6 +170,16 @@ private:
     return element;
   }
 
+  std::string Uid(const Element& element) const
+  {
+    std::string uid = this->Bytes.substr(
+      static_cast<std::size_t>(element.value), static_cast<std::size_t>(element.length));
+    uid.erase(
+      std::find_if(uid.begin(), uid.end(), [](char c) { return c != '.' && (c < '0' || c > '9'); }),
+      uid.end());
+    return uid;
+  }
+
   // Group 0002 is explicit little endian whatever follows.
   std::uint64_t WalkMetaInformation(std::uint64_t position)
   {
@@ -170,12 +193,11 @@ private:
       }
       if (element.tag == 0x00020010u)
       {
-        std::string uid = this->Bytes.substr(
-          static_cast<std::size_t>(element.value), static_cast<std::size_t>(element.length));
-        uid.erase(std::find_if(uid.begin(), uid.end(),
-                    [](char c) { return c != '.' && (c < '0' || c > '9'); }),
-          uid.end());
-        this->Structure.transferSyntax = uid;
+        this->Structure.transferSyntax = this->Uid(element);
+      }
+      if (element.tag == 0x00020002u)
+      {
+        this->Structure.mediaStorage = this->Uid(element);
       }
       position = end;
     }
@@ -202,8 +224,8 @@ private:
   }
 
   // Returns where the data set ends: at `end`, behind its delimiter, or at the pixel data.
-  std::uint64_t WalkDataSet(
-    std::uint64_t position, std::uint64_t end, bool isExplicit, int depth, bool delimited)
+  std::uint64_t WalkDataSet(std::uint64_t position, std::uint64_t end, bool isExplicit, int depth,
+    bool delimited, DicomDataSet* into)
   {
     if (depth > DeepestNesting)
     {
@@ -221,7 +243,13 @@ private:
         this->SetPixels(element);
         return position;
       }
-      position = this->WalkValue(element, end, isExplicit, depth);
+      DicomElement* kept = nullptr;
+      if (into && IsWanted(element.tag))
+      {
+        kept = &into->elements[element.tag];
+        *kept = {};
+      }
+      position = this->WalkValue(element, end, isExplicit, depth, kept);
     }
     if (delimited)
     {
@@ -230,7 +258,8 @@ private:
     return position;
   }
 
-  std::uint64_t WalkValue(const Element& element, std::uint64_t end, bool isExplicit, int depth)
+  std::uint64_t WalkValue(
+    const Element& element, std::uint64_t end, bool isExplicit, int depth, DicomElement* kept)
   {
     const bool mayNest =
       !isExplicit || element.representation == "SQ" || element.representation == "UN";
@@ -238,7 +267,7 @@ private:
     const bool inner = isExplicit && element.representation != "UN";
     if (element.length == UndefinedLength)
     {
-      return this->WalkItems(element.value, end, inner, depth + 1, true, mayNest);
+      return this->WalkItems(element.value, end, inner, depth + 1, true, mayNest, kept);
     }
     const std::uint64_t last = element.value + element.length;
     if (last > end || last > this->Size)
@@ -247,13 +276,18 @@ private:
     }
     if (mayNest && this->BeginsWithItem(element))
     {
-      this->WalkItems(element.value, last, inner, depth + 1, false, true);
+      this->WalkItems(element.value, last, inner, depth + 1, false, true, kept);
+    }
+    else if (kept)
+    {
+      kept->offset = element.value;
+      kept->length = element.length;
     }
     return last;
   }
 
   std::uint64_t WalkItems(std::uint64_t position, std::uint64_t end, bool isExplicit, int depth,
-    bool delimited, bool nested)
+    bool delimited, bool nested, DicomElement* kept)
   {
     while (position < end)
     {
@@ -266,9 +300,14 @@ private:
       {
         this->Damaged();
       }
+      DicomDataSet* into = nullptr;
+      if (kept && nested)
+      {
+        into = &kept->items.emplace_back();
+      }
       if (item.length == UndefinedLength)
       {
-        position = this->WalkDataSet(item.value, end, isExplicit, depth, true);
+        position = this->WalkDataSet(item.value, end, isExplicit, depth, true, into);
         continue;
       }
       const std::uint64_t last = item.value + item.length;
@@ -278,7 +317,7 @@ private:
       }
       if (nested)
       {
-        this->WalkDataSet(item.value, last, isExplicit, depth, false);
+        this->WalkDataSet(item.value, last, isExplicit, depth, false, into);
       }
       position = last;
     }
@@ -291,7 +330,6 @@ private:
 
   void SetPixels(const Element& element)
   {
-    this->Structure.hasPixels = true;
     this->Structure.encapsulated = element.length == UndefinedLength;
     this->Structure.pixelOffset = element.value;
     this->Structure.pixelBytes = this->Size > element.value ? this->Size - element.value : 0;
