@@ -9,6 +9,7 @@
 #include "vtkCommand.h"
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
+#include "vtkExecutive.h"
 #include "vtkFieldData.h"
 #include "vtkFloatArray.h"
 #include "vtkImageData.h"
@@ -118,6 +119,7 @@ private:
     auto reader = vtkSmartPointer<vtkXMLImageDataReader>::New();
     reader->AddObserver("ErrorEvent", this->Observer);
     reader->AddObserver("WarningEvent", this->Observer);
+    reader->GetExecutive()->AddObserver("ErrorEvent", this->Observer);
     reader->SetReaderErrorObserver(this->Observer);
     reader->SetParserErrorObserver(this->Observer);
     reader->SetFileName(this->Header.path.c_str());
@@ -508,7 +510,8 @@ int vtkGatedImageReader::RequestInformation(
       options.openOther = OpenVti;
       const coronary::Poll poll = [this]
       {
-        if (vtkCoronary::CheckAbort(this))
+        // Not CheckAbort: outside RequestData that still sees an abort of the update before.
+        if (this->GetAbortExecute() != 0)
         {
           throw coronary::Cancelled();
         }
@@ -528,6 +531,14 @@ int vtkGatedImageReader::RequestInformation(
   }
   catch (const std::exception& error)
   {
+    // What the outputs hold is of other files.
+    for (int port = 0; port < 2; ++port)
+    {
+      if (vtkDataObject* output = vtkDataObject::GetData(outputVector, port))
+      {
+        output->Initialize();
+      }
+    }
     vtkErrorMacro(<< error.what());
     return 0;
   }
@@ -581,7 +592,13 @@ int vtkGatedImageReader::RequestData(
   std::array<int, 6> extent = series.Grid().extent;
   if (imageInfo->Has(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT()))
   {
-    imageInfo->Get(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), extent.data());
+    std::array<int, 6> wanted{};
+    imageInfo->Get(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), wanted.data());
+    // After a failed update the request may be of the image before.
+    for (std::size_t i = 0; i < 6; ++i)
+    {
+      extent[i] = i % 2 == 0 ? std::max(extent[i], wanted[i]) : std::min(extent[i], wanted[i]);
+    }
   }
 
   vtkImageData* image = vtkImageData::GetData(outputVector, 0);
