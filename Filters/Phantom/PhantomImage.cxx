@@ -54,6 +54,21 @@ private:
   float Values[Count + 2];
 };
 
+/// The same as a polynomial, which the compiler can turn into vector code: exact to 8e-4.
+inline float NormalIntegralPolynomial(float x)
+{
+  constexpr float end = 3.2f;
+  x = x < -end ? -end : x;
+  x = x > end ? end : x;
+  const float y = x * x;
+  return 0.5f +
+    x *
+    (0.39881853f +
+      y *
+        (-0.06597480f +
+          y * (0.00940719f + y * (-9.2600785e-4f + y * (5.4292321e-5f - y * 1.3860833e-6f)))));
+}
+
 /// DiscResponse over disc radius and distance from the disc's rim.
 class DiscTable
 {
@@ -150,6 +165,15 @@ private:
 class Tissues
 {
 public:
+  /// Neighbouring samples of a tile, in steps of four so that the compiler needs no rests.
+  struct Row
+  {
+    static constexpr int Longest = 16;
+    int count;
+    float world[3][Longest];
+    float heart[3][Longest];
+  };
+
   struct Shape
   {
     enum Kind
@@ -178,7 +202,11 @@ public:
 
   Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy);
 
-  float Distance(int shape, const Vector3& world, const Vector3& heart) const;
+  /// Signed distance to a shape, mm, first order.
+  double Distance(int shape, const Vector3& world, const Vector3& heart) const;
+
+  /// The same for all samples of a row, in units of 1 / inverseBlur and with the given sign.
+  void Distances(int shape, const Row& row, float factor, float* result) const;
 
   /// Bounds of the distance within `ball` mm of a point: +1 surely outside, -1 surely inside.
   int Classify(int shape, const Vector3& world, const Vector3& heart, double ball) const;
@@ -299,7 +327,7 @@ Tissues::Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy)
   this->Paint(hu(left), 0.1f, true, { descendingAorta });
 }
 
-float Tissues::Distance(int number, const Vector3& world, const Vector3& heart) const
+double Tissues::Distance(int number, const Vector3& world, const Vector3& heart) const
 {
   const Shape& shape = this->Shapes[number];
   const Vector3& p = shape.heart ? heart : world;
@@ -309,18 +337,16 @@ float Tissues::Distance(int number, const Vector3& world, const Vector3& heart) 
     {
       const Vector3 u = (p - shape.a).cwiseQuotient(shape.b);
       const double level = u.norm();
-      return static_cast<float>(
-        (level - 1.0) * level / std::max(1e-9, u.cwiseQuotient(shape.b).norm()));
+      return (level - 1.0) * level / std::max(1e-9, u.cwiseQuotient(shape.b).norm());
     }
     case Shape::Capsule:
     {
       const Vector3 axis = shape.b - shape.a;
       const double u = std::clamp((p - shape.a).dot(axis) / axis.squaredNorm(), 0.0, 1.0);
-      return static_cast<float>(
-        (p - shape.a - u * axis).norm() - (shape.radius + u * (shape.radius2 - shape.radius)));
+      return (p - shape.a - u * axis).norm() - (shape.radius + u * (shape.radius2 - shape.radius));
     }
     case Shape::Slab:
-      return static_cast<float>(p.dot(shape.a) - shape.radius);
+      return p.dot(shape.a) - shape.radius;
     case Shape::Ring:
     default:
     {
@@ -329,7 +355,82 @@ float Tissues::Distance(int number, const Vector3& world, const Vector3& heart) 
       const double y = (p[1] - shape.a[1]) / (shape.b[1] * section);
       const double mean = 0.5 * section * (shape.b[0] + shape.b[1]);
       const double across = (std::sqrt(x * x + y * y) - 1.0) * mean;
-      return static_cast<float>(std::sqrt(across * across + p[2] * p[2]) - shape.radius);
+      return std::sqrt(across * across + p[2] * p[2]) - shape.radius;
+    }
+  }
+}
+
+void Tissues::Distances(int number, const Row& row, float factor, float* result) const
+{
+  const Shape& shape = this->Shapes[number];
+  const float* x = shape.heart ? row.heart[0] : row.world[0];
+  const float* y = shape.heart ? row.heart[1] : row.world[1];
+  const float* z = shape.heart ? row.heart[2] : row.world[2];
+  const Eigen::Vector3f a = shape.a.cast<float>();
+  switch (shape.kind)
+  {
+    case Shape::Ellipsoid:
+    {
+      const Eigen::Vector3f inverse = shape.b.cwiseInverse().cast<float>();
+      for (int i = 0; i < row.count; ++i)
+      {
+        const float u = (x[i] - a[0]) * inverse[0];
+        const float v = (y[i] - a[1]) * inverse[1];
+        const float w = (z[i] - a[2]) * inverse[2];
+        const float level = std::sqrt(u * u + v * v + w * w);
+        const float gu = u * inverse[0];
+        const float gv = v * inverse[1];
+        const float gw = w * inverse[2];
+        const float slope = std::sqrt(gu * gu + gv * gv + gw * gw) + 1e-12f;
+        result[i] = factor * (level - 1.0f) * level / slope;
+      }
+      break;
+    }
+    case Shape::Capsule:
+    {
+      const Eigen::Vector3f axis = (shape.b - shape.a).cast<float>();
+      const Eigen::Vector3f along = axis / axis.squaredNorm();
+      const auto radius = static_cast<float>(shape.radius);
+      const auto widening = static_cast<float>(shape.radius2 - shape.radius);
+      for (int i = 0; i < row.count; ++i)
+      {
+        const float u = x[i] - a[0];
+        const float v = y[i] - a[1];
+        const float w = z[i] - a[2];
+        float f = u * along[0] + v * along[1] + w * along[2];
+        f = f < 0.0f ? 0.0f : f;
+        f = f > 1.0f ? 1.0f : f;
+        const float du = u - f * axis[0];
+        const float dv = v - f * axis[1];
+        const float dw = w - f * axis[2];
+        result[i] = factor * (std::sqrt(du * du + dv * dv + dw * dw) - radius - f * widening);
+      }
+      break;
+    }
+    case Shape::Slab:
+    {
+      const auto offset = static_cast<float>(shape.radius);
+      for (int i = 0; i < row.count; ++i)
+      {
+        result[i] = factor * (x[i] * a[0] + y[i] * a[1] + z[i] * a[2] - offset);
+      }
+      break;
+    }
+    case Shape::Ring:
+    {
+      const double section = std::sqrt(1.0 - std::pow(shape.a[2] / shape.b[2], 2));
+      const auto scaleX = static_cast<float>(1.0 / (shape.b[0] * section));
+      const auto scaleY = static_cast<float>(1.0 / (shape.b[1] * section));
+      const auto mean = static_cast<float>(0.5 * section * (shape.b[0] + shape.b[1]));
+      const auto radius = static_cast<float>(shape.radius);
+      for (int i = 0; i < row.count; ++i)
+      {
+        const float u = (x[i] - a[0]) * scaleX;
+        const float v = (y[i] - a[1]) * scaleY;
+        const float across = (std::sqrt(u * u + v * v) - 1.0f) * mean;
+        result[i] = factor * (std::sqrt(across * across + z[i] * z[i]) - radius);
+      }
+      break;
     }
   }
 }
@@ -401,17 +502,26 @@ void DecideLayers(const Tissues& tissues, const Vector3& world, const Vector3& h
   }
 }
 
-/// Coverage of one layer at a point, 0 to 1.
-float Coverage(const Tissues& tissues, const TileLayers::Active& layer, const Vector3& world,
-  const Vector3& heart)
+/// Paints one layer over the values of a row.
+void PaintRow(
+  const Tissues& tissues, const TileLayers::Active& layer, const Tissues::Row& row, float* values)
 {
-  float coverage = 1.0f;
-  for (int i = 0; i < layer.count; ++i)
+  float coverage[Tissues::Row::Longest];
+  std::fill(coverage, coverage + row.count, 1.0f);
+  for (int s = 0; s < layer.count; ++s)
   {
-    const float distance = tissues.Distance(layer.shapes[i], world, heart) * layer.inverseBlur;
-    coverage *= NormalIntegral::Of(layer.complement[i] ? distance : -distance);
+    float distance[Tissues::Row::Longest];
+    tissues.Distances(
+      layer.shapes[s], row, layer.complement[s] ? layer.inverseBlur : -layer.inverseBlur, distance);
+    for (int i = 0; i < row.count; ++i)
+    {
+      coverage[i] *= NormalIntegralPolynomial(distance[i]);
+    }
   }
-  return coverage;
+  for (int i = 0; i < row.count; ++i)
+  {
+    values[i] += coverage[i] * (layer.value - values[i]);
+  }
 }
 
 /// A small sphere of calcium, or one step of the vein.
@@ -626,6 +736,7 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
 
     TileLayers layers;
     PhantomLumen::Candidates candidates;
+    Tissues::Row samples;
     std::vector<Extra> nearVein;
     for (int ty = ty0; ty < ty1; ++ty)
     {
@@ -724,39 +835,71 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
                 ends[n] = (1.0 - fz) * ((1.0 - fy) * corner[n] + fy * corner[2 + n]) +
                   fz * ((1.0 - fy) * corner[4 + n] + fy * corner[6 + n]);
               }
+              // All samples of the tile's row, whatever part of it is asked for.
+              const Vector3 firstWorld = grid.IndexToWorld(base[0], j, k);
+              const Vector3 worldStep = grid.direction.col(0) * grid.spacing[0];
+              const Vector3 firstMaterial = firstWorld + ends[0];
+              const Vector3 materialStep = worldStep + (ends[1] - ends[0]) / tile[0];
+              const Vector3 firstHeart = frame.ToHeart(firstMaterial);
+              const Vector3 heartStep = frame.ToHeart(firstMaterial + materialStep) - firstHeart;
+              samples.count = (tile[0] + 3) / 4 * 4;
+              for (int axis = 0; axis < 3; ++axis)
+              {
+                const auto w0 = static_cast<float>(firstMaterial[axis]);
+                const auto w1 = static_cast<float>(materialStep[axis]);
+                const auto h0 = static_cast<float>(firstHeart[axis]);
+                const auto h1 = static_cast<float>(heartStep[axis]);
+                for (int i = 0; i < samples.count; ++i)
+                {
+                  samples.world[axis][i] = w0 + static_cast<float>(i) * w1;
+                  samples.heart[axis][i] = h0 + static_cast<float>(i) * h1;
+                }
+              }
+              float painted[Tissues::Row::Longest];
+              std::fill(painted, painted + samples.count, Tissues::Background);
+              std::size_t layer = 0;
+              for (; layer < layers.layers.size() && !layers.layers[layer].blood; ++layer)
+              {
+                PaintRow(tissues, layers.layers[layer], samples, painted);
+              }
+
+              PhantomLumen::Sample vessel[Tissues::Row::Longest];
+              if (!candidates.Empty())
+              {
+                for (int i = ix0; i <= ix1; ++i)
+                {
+                  PhantomLumen::Sample& sample = vessel[i - base[0]];
+                  sample = lumen.Evaluate(grid.IndexToWorld(i, j, k), candidates);
+                  if (sample.step >= 0 &&
+                    !this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel])
+                  {
+                    // Epicardial vessels lie in fat.
+                    float& value = painted[i - base[0]];
+                    const auto d = static_cast<float>(sample.distance);
+                    value += NormalIntegral::Of((1.9f - d) / 0.35f) * (-95.0f - value);
+                  }
+                }
+              }
+              for (; layer < layers.layers.size(); ++layer)
+              {
+                PaintRow(tissues, layers.layers[layer], samples, painted);
+              }
               float* row = &signal[(static_cast<std::size_t>(k - z0) * ny + (j - y0)) * nx];
+              if (candidates.Empty() && nearVein.empty() && nearPlaque.empty())
+              {
+                for (int i = ix0; i <= ix1; ++i)
+                {
+                  row[i - part[0]] += weight * painted[i - base[0]];
+                }
+                continue;
+              }
               for (int i = ix0; i <= ix1; ++i)
               {
-                const double fx = static_cast<double>(i - base[0]) / tile[0];
                 const Vector3 world = grid.IndexToWorld(i, j, k);
-                const Vector3 material = world + (1.0 - fx) * ends[0] + fx * ends[1];
-                const Vector3 heart = frame.ToHeart(material);
-                float value = Tissues::Background;
-                std::size_t layer = 0;
-                for (; layer < layers.layers.size() && !layers.layers[layer].blood; ++layer)
-                {
-                  const TileLayers::Active& active = layers.layers[layer];
-                  value += Coverage(tissues, active, material, heart) * (active.value - value);
-                }
-
-                PhantomLumen::Sample sample{ reach, 0.0, -1, 0.0 };
-                if (!candidates.Empty())
-                {
-                  sample = lumen.Evaluate(world, candidates);
-                }
+                const PhantomLumen::Sample& sample = vessel[i - base[0]];
                 const AxisStep* step =
                   sample.step >= 0 ? &this->Anatomy.steps[sample.step] : nullptr;
-                if (step && !this->Anatomy.intramural[step->vessel])
-                {
-                  // Epicardial vessels lie in fat.
-                  const auto d = static_cast<float>(sample.distance);
-                  value += NormalIntegral::Of((1.9f - d) / 0.35f) * (-95.0f - value);
-                }
-                for (; layer < layers.layers.size(); ++layer)
-                {
-                  const TileLayers::Active& active = layers.layers[layer];
-                  value += Coverage(tissues, active, material, heart) * (active.value - value);
-                }
+                float value = painted[i - base[0]];
                 if (!nearVein.empty())
                 {
                   double nearest = reach;

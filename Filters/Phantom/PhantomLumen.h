@@ -22,10 +22,10 @@ public:
   /// What lies at a position. Distances are in mm.
   struct Sample
   {
-    double distance;   ///< signed distance to the wall, negative inside, at most `reach`
-    double radius;     ///< of the nearest tube, mm
-    std::int32_t step; ///< index of the nearest axis step, -1 when none is within reach
-    double fraction;   ///< 0..1 along that step
+    double distance = 0.0;  ///< signed distance to the wall, negative inside, at most `reach`
+    double radius = 0.0;    ///< of the nearest tube, mm
+    std::int32_t step = -1; ///< index of the nearest axis step, -1 when none is within reach
+    double fraction = 0.0;  ///< 0..1 along that step
   };
 
   /// A short list of the tube pieces that can matter inside a ball.
