@@ -1,0 +1,45 @@
+/**
+ * @file Command.h
+ * @brief What the program knows about its commands: one file each, listed here.
+ *
+ * To add a command, write <Name>Command.cxx with a function of the type MakeCommand, declare it
+ * below and add it to the list in main.cxx.
+ */
+#ifndef DynamicCoronary_Command_h
+#define DynamicCoronary_Command_h
+
+#include <CLI/CLI.hpp>
+
+#include <functional>
+#include <stdexcept>
+
+namespace coronary
+{
+/// The command line is wrong in a way that only the command itself can see: exit code 2.
+/// The message names the option.
+struct UsageError : std::runtime_error
+{
+  using std::runtime_error::runtime_error;
+};
+
+/// One command of the program.
+struct Command
+{
+  CLI::App* options; ///< its part of the command line; owned by the program's parser
+
+  /**
+   * Does the work, after the command line was read.
+   * @throws UsageError: exit code 2; Cancelled: interrupted; any other exception: exit code 1.
+   */
+  std::function<void()> run;
+};
+
+/// Declares a command and its options.
+using MakeCommand = Command(CLI::App& program);
+
+MakeCommand MakePhantomCommand;
+MakeCommand MakePhantomMotionCommand;
+MakeCommand MakeInspectCommand;
+}
+
+#endif

@@ -1,0 +1,489 @@
+#include "Command.h"
+
+#include "AtomicFile.h"
+#include "CoronaryPhantom.h"
+#include "Interruption.h"
+#include "MetaImageWriter.h"
+#include "OptionChecks.h"
+#include "PhantomOptions.h"
+#include "ProgressDisplay.h"
+#include "SeriesDescription.h"
+#include "StagedFolder.h"
+#include "vtkMessageTrap.h"
+
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryPhantomSource.h"
+#include "vtkDataArray.h"
+#include "vtkImageData.h"
+#include "vtkMatrix3x3.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
+#include "vtkStringArray.h"
+#include "vtkXMLPolyDataWriter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace coronary
+{
+namespace
+{
+constexpr const char* SeriesName = "series.json";
+
+// Share of a phase's time that its parts take, for the progress.
+constexpr double TruthShare = 0.3;
+constexpr double RenderShare = 0.65;
+
+struct PhantomJob
+{
+  PhantomSettings settings;
+  PhaseOptions phases;
+  std::vector<double> spacing = { 0.5 };
+  std::vector<double> origin;
+  std::vector<double> direction;
+  std::vector<int> dimensions;
+  std::string output;
+  int threads = 0;
+  bool compress = false;
+  bool truthOnly = false;
+  bool noTruth = false;
+  bool quiet = false;
+
+  void Declare(CLI::App& app);
+  void Run();
+
+private:
+  void CheckCombinations();
+  void Configure(vtkCoronaryPhantomSource* source, const std::vector<double>& times) const;
+};
+
+void PhantomJob::Declare(CLI::App& app)
+{
+  app.add_option("--output", this->output, "Folder to write to; made when it does not exist")
+    ->type_name("DIR")
+    ->check(CLI::Validator(
+      [](std::string& text) { return text.empty() ? "a name is needed" : std::string(); }, ""))
+    ->required();
+  this->phases.AddTo(app);
+  AddHeartOptions(app, this->settings);
+  AddImagingOptions(app, this->settings);
+
+  const std::string grid = "Image grid";
+  app
+    .add_option(
+      "--spacing", this->spacing, "Voxel size along the image axes, in mm; one number or three")
+    ->expected(1, 3)
+    ->check(Within(0.05, 20.0))
+    ->type_name("MM")
+    ->group(grid)
+    ->default_str("0.5");
+  app
+    .add_option("--origin", this->origin,
+      "World position (LPS) of the first voxel, in mm; together with --dimensions. Without them "
+      "the image holds the whole tree over the whole cycle")
+    ->expected(3)
+    ->check(Within(-1e5, 1e5))
+    ->type_name("MM")
+    ->group(grid);
+  app.add_option("--dimensions", this->dimensions, "Number of voxels along the image axes")
+    ->expected(3)
+    ->check(WholeWithin(1, 16384))
+    ->type_name("N")
+    ->group(grid);
+  app
+    .add_option("--direction", this->direction,
+      "Orthonormal matrix, row by row, whose columns are the world axes (LPS) of the image axes")
+    ->expected(9)
+    ->check(Within(-1.0, 1.0))
+    ->type_name("COSINE")
+    ->group(grid);
+
+  AddTruthOptions(app, this->settings);
+  CLI::Option* truthOnlyFlag =
+    app
+      .add_flag("--truth-only", this->truthOnly, "Write the truth alone: no images, no series.json")
+      ->group("Truth");
+  app.add_flag("--no-truth", this->noTruth, "Write no truth")
+    ->group("Truth")
+    ->excludes(truthOnlyFlag);
+  app.add_flag("--compress", this->compress, "Compress the images (zlib)");
+  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
+    ->check(WholeWithin(0, 1024))
+    ->type_name("N")
+    ->capture_default_str();
+  app.add_flag("--quiet", this->quiet, "Show no progress and no summary");
+}
+
+void PhantomJob::CheckCombinations()
+{
+  if (this->settings.temporalWindow > 0.5 * this->settings.cycleLength)
+  {
+    throw UsageError("--window: " + Format(1000.0 * this->settings.temporalWindow) +
+      " ms is more than half of the cycle (--cycle-ms " +
+      Format(1000.0 * this->settings.cycleLength) + ")");
+  }
+  if (this->spacing.size() == 2)
+  {
+    throw UsageError("--spacing: one number or three, not two");
+  }
+  this->spacing.resize(3, this->spacing.front());
+  if (this->origin.empty() != this->dimensions.empty())
+  {
+    throw UsageError(std::string(this->origin.empty() ? "--dimensions" : "--origin") +
+      ": --origin and --dimensions go together");
+  }
+  if (!this->direction.empty())
+  {
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> matrix(this->direction.data());
+    const auto deviation = [&]
+    { return (matrix.transpose() * matrix - Matrix3::Identity()).cwiseAbs().maxCoeff(); };
+    if (deviation() > 1e-3)
+    {
+      throw UsageError("--direction: the matrix is not orthonormal");
+    }
+    // Cosines are often given with a few digits only: the nearest orthonormal matrix is meant.
+    // Newton's iteration for the polar factor: each step squares the deviation.
+    for (int step = 0; step < 3; ++step)
+    {
+      const Matrix3 next = 0.5 * matrix * (3.0 * Matrix3::Identity() - matrix.transpose() * matrix);
+      matrix = next;
+    }
+  }
+}
+
+void PhantomJob::Configure(vtkCoronaryPhantomSource* source, const std::vector<double>& times) const
+{
+  const PhantomSettings& s = this->settings;
+  source->SetSeed(static_cast<int>(s.seed));
+  source->SetDominance(static_cast<int>(s.dominance));
+  source->SetRamus(s.ramus);
+  source->SetCalibre(s.calibre);
+  source->SetPositionVariation(s.positionVariation);
+  source->SetCalibreVariation(s.calibreVariation);
+  source->SetTortuosity(s.tortuosity);
+  source->SetStenoses(s.stenoses);
+  source->SetStenosisDegree(s.stenosisDegree);
+  source->SetCalcifiedPlaques(s.calcifiedPlaques);
+  source->SetChronicOcclusion(s.chronicOcclusion);
+  source->SetCycleLength(s.cycleLength);
+  source->SetMotionAmplitude(s.motionAmplitude);
+  source->SetAxialMotionRight(s.axialMotionRight);
+  source->SetAxialMotionLeft(s.axialMotionLeft);
+  source->SetRegionalLag(s.regionalLag);
+  source->SetRegionalAmplitude(s.regionalAmplitude);
+  source->SetBeatVariation(s.beatVariation);
+  source->SetAreaPulse(s.areaPulse);
+  source->SetTemporalWindow(s.temporalWindow);
+  source->SetNoise(s.noise);
+  source->SetNoiseCorrelation(s.noiseCorrelation);
+  source->SetSystolicNoise(s.systolicNoise);
+  source->SetPointSpread(s.pointSpread);
+  source->SetLumenHU(s.lumenHU);
+  source->SetAttenuationGradient(s.attenuationGradient);
+  source->SetVeinHU(s.veinHU);
+  source->SetCenterlineSpacing(s.centerlineSpacing);
+  source->SetSurfaceSpacing(s.surfaceSpacing);
+  source->ClearLostPhases();
+  for (const LostPhase& lost : s.lostPhases)
+  {
+    source->AddLostPhase(lost.time, lost.fraction);
+  }
+  source->ClearPhases();
+  for (const double time : times)
+  {
+    source->AddPhase(time);
+  }
+  source->SetSpacing(this->spacing[0], this->spacing[1], this->spacing[2]);
+  if (!this->direction.empty())
+  {
+    source->SetDirection(this->direction.data());
+  }
+  if (!this->origin.empty())
+  {
+    source->AutomaticGridOff();
+    source->SetOrigin(this->origin[0], this->origin[1], this->origin[2]);
+    source->SetDimensions(this->dimensions[0], this->dimensions[1], this->dimensions[2]);
+  }
+}
+
+ImageGrid GridOf(vtkImageData* image)
+{
+  ImageGrid grid;
+  image->GetExtent(grid.extent.data());
+  image->GetOrigin(grid.origin.data());
+  image->GetSpacing(grid.spacing.data());
+  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+    image->GetDirectionMatrix()->GetData());
+  return grid;
+}
+
+void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& messages)
+{
+  // Into memory first: VTK's writer does not notice when the last bytes find no room on the disk.
+  vtkNew<vtkXMLPolyDataWriter> writer;
+  writer->SetInputData(data);
+  writer->WriteToOutputStringOn();
+  writer->SetDataModeToAppended();
+  writer->EncodeAppendedDataOff();
+  const int good = writer->Write();
+  messages.ThrowIfError();
+  if (!good)
+  {
+    throw std::runtime_error("Cannot write '" + path + "'.");
+  }
+  WriteFileAtomically(path, writer->GetOutputString());
+}
+
+std::vector<SeriesDescription::Seed> SeedsOf(vtkPolyData* ostia)
+{
+  std::vector<SeriesDescription::Seed> seeds;
+  auto* names = vtkStringArray::SafeDownCast(ostia->GetPointData()->GetAbstractArray("Name"));
+  for (vtkIdType i = 0; names && i < ostia->GetNumberOfPoints(); ++i)
+  {
+    SeriesDescription::Seed seed;
+    seed.name = names->GetValue(i);
+    ostia->GetPoint(i, seed.position.data());
+    seeds.push_back(std::move(seed));
+  }
+  return seeds;
+}
+
+double MeanSpeed(vtkPolyData* tree)
+{
+  vtkDataArray* velocity = tree->GetPointData()->GetArray(vtkCoronaryArrayNames::Velocity);
+  double sum = 0.0;
+  for (vtkIdType i = 0; i < velocity->GetNumberOfTuples(); ++i)
+  {
+    sum += Eigen::Map<const Vector3>(velocity->GetTuple3(i)).norm();
+  }
+  return sum / static_cast<double>(std::max<vtkIdType>(1, velocity->GetNumberOfTuples()));
+}
+
+/// The times of numbered files, for ParaView.
+std::string Collection(const std::string& stem, const std::vector<std::string>& numbers,
+  const std::vector<double>& times)
+{
+  std::ostringstream text;
+  text.precision(std::numeric_limits<double>::max_digits10);
+  text
+    << "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n";
+  for (std::size_t i = 0; i < times.size(); ++i)
+  {
+    text << "    <DataSet timestep=\"" << times[i] << "\" file=\"" << stem << '_' << numbers[i]
+         << ".vtp\"/>\n";
+  }
+  text << "  </Collection>\n</VTKFile>\n";
+  return text.str();
+}
+
+std::string Number(std::size_t index, std::size_t count)
+{
+  const std::string text = std::to_string(index);
+  const std::size_t width = std::max<std::size_t>(2, std::to_string(count - 1).size());
+  return std::string(width - text.size(), '0') + text;
+}
+
+std::string Percent(double fraction)
+{
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.1f %% R-R", 100.0 * fraction);
+  return text;
+}
+
+/// Makes the files of one series, phase by phase.
+class SeriesWriter
+{
+public:
+  SeriesWriter(
+    const PhantomJob& job, vtkCoronaryPhantomSource* source, const std::vector<double>& times)
+    : Job(job)
+    , Source(source)
+    , Times(times)
+    , Progress("phase", static_cast<int>(times.size()), job.quiet)
+  {
+    for (std::size_t i = 0; i < times.size(); ++i)
+    {
+      this->Numbers.push_back(Number(i, times.size()));
+    }
+    this->Series.cycleMs = 1000.0 * job.settings.cycleLength;
+  }
+
+  void Write(StagedFolder& folder)
+  {
+    for (std::size_t i = 0; i < this->Times.size(); ++i)
+    {
+      this->Progress.BeginStep(static_cast<int>(i), Percent(this->Times[i]));
+      SeriesDescription::Phase phase;
+      phase.fraction = this->Times[i];
+      this->FindSeeds(this->Times[i]);
+      if (!this->Job.noTruth)
+      {
+        this->WriteTruth(folder, i, phase);
+      }
+      if (!this->Job.truthOnly)
+      {
+        this->WriteImage(folder, i, phase);
+      }
+      this->Series.phases.push_back(std::move(phase));
+    }
+    if (!this->Job.noTruth)
+    {
+      for (const char* stem : { "surface", "centerline", "vein" })
+      {
+        WriteFileAtomically(folder.Add("truth/" + std::string(stem) + ".pvd"),
+          Collection(stem, this->Numbers, this->Times));
+      }
+    }
+    if (!this->Job.truthOnly)
+    {
+      WriteSeriesDescription(folder.Add(SeriesName), this->Series);
+    }
+    ThrowIfInterrupted();
+    this->Messages.PrintWarnings();
+  }
+
+  /// What was made, in a line for the user.
+  std::string Summary() const
+  {
+    std::ostringstream text;
+    text << this->Times.size() << (this->Times.size() == 1 ? " phase" : " phases");
+    if (!this->Job.truthOnly)
+    {
+      const auto& e = this->Grid.extent;
+      const Vector3& s = this->Grid.spacing;
+      text << " of " << e[1] - e[0] + 1 << " x " << e[3] - e[2] + 1 << " x " << e[5] - e[4] + 1
+           << " voxels of " << Format(s[0]) << " x " << Format(s[1]) << " x " << Format(s[2])
+           << " mm, cycle " << Format(this->Series.cycleMs) << " ms, seeds at "
+           << Percent(this->ReferenceTime);
+    }
+    return text.str();
+  }
+
+private:
+  /// Brings a port up to date; the progress of the phase goes from `first` to `last`.
+  void Update(int port, double time, double first, double last)
+  {
+    UpdateAtTime(this->Source, port, time, this->Messages,
+      [&](double fraction) { this->Progress.Update(first + (last - first) * fraction); });
+  }
+
+  vtkPolyData* PolyData(int port, double time, double first, double last)
+  {
+    this->Update(port, time, first, last);
+    return vtkPolyData::SafeDownCast(this->Source->GetOutputDataObject(port));
+  }
+
+  /// The seeds are the ostia in the quietest phase that is not lost: there the tree is sought.
+  void FindSeeds(double time)
+  {
+    const auto& lost = this->Job.settings.lostPhases;
+    const bool isLost = std::any_of(
+      lost.begin(), lost.end(), [=](const LostPhase& phase) { return phase.time == time; });
+    const double speed =
+      MeanSpeed(this->PolyData(vtkCoronaryPhantomSource::TreePort, time, 0.0, 0.0));
+    if (this->Series.seeds.empty() || (this->ReferenceIsLost && !isLost) ||
+      (this->ReferenceIsLost == isLost && speed < this->LeastSpeed))
+    {
+      this->Series.seeds =
+        SeedsOf(this->PolyData(vtkCoronaryPhantomSource::OstiaPort, time, 0.0, 0.0));
+      this->ReferenceTime = time;
+      this->ReferenceIsLost = isLost;
+      this->LeastSpeed = speed;
+    }
+  }
+
+  void WriteTruth(StagedFolder& folder, std::size_t index, SeriesDescription::Phase& phase)
+  {
+    const auto write = [&](int port, const std::string& stem)
+    {
+      std::string name = "truth/" + stem + "_" + this->Numbers[index] + ".vtp";
+      vtkPolyData* data =
+        this->PolyData(port, phase.fraction, 0.0, this->Job.truthOnly ? 1.0 : TruthShare);
+      WritePolyData(folder.Add(name), data, this->Messages);
+      return name;
+    };
+    write(vtkCoronaryPhantomSource::VeinPort, "vein");
+    phase.centerline = write(vtkCoronaryPhantomSource::TreePort, "centerline");
+    phase.surface = write(vtkCoronaryPhantomSource::SurfacePort, "surface");
+  }
+
+  void WriteImage(StagedFolder& folder, std::size_t index, SeriesDescription::Phase& phase)
+  {
+    const double first = this->Job.noTruth ? 0.0 : TruthShare;
+    const double written = std::min(1.0, first + RenderShare);
+    phase.image = "phase_" + this->Numbers[index] + ".mha";
+    const std::string path = folder.Add(phase.image);
+    this->Update(vtkCoronaryPhantomSource::ImagePort, phase.fraction, first, written);
+    auto* image = vtkImageData::SafeDownCast(
+      this->Source->GetOutputDataObject(vtkCoronaryPhantomSource::ImagePort));
+    this->Grid = GridOf(image);
+    WriteMetaImage(path, this->Grid, static_cast<const short*>(image->GetScalarPointer()),
+      this->Job.compress,
+      [&](double fraction)
+      {
+        this->Progress.Update(written + (1.0 - written) * fraction);
+        return Interruption() == 0;
+      });
+  }
+
+  const PhantomJob& Job;
+  vtkCoronaryPhantomSource* Source;
+  const std::vector<double>& Times;
+  std::vector<std::string> Numbers;
+  ProgressDisplay Progress;
+  vtkMessageTrap Messages;
+  SeriesDescription Series;
+  ImageGrid Grid;
+  double ReferenceTime = 0.0;
+  bool ReferenceIsLost = false;
+  double LeastSpeed = 0.0;
+};
+
+void PhantomJob::Run()
+{
+  this->CheckCombinations();
+  const std::vector<double> times = this->phases.Phases();
+  this->settings.lostPhases = this->phases.LostPhases(times);
+  SetNumberOfThreads(this->threads);
+
+  vtkNew<vtkCoronaryPhantomSource> source;
+  this->Configure(source, times);
+  StagedFolder folder(this->output);
+  std::string summary;
+  try
+  {
+    SeriesWriter writer(*this, source, times);
+    writer.Write(folder);
+    summary = writer.Summary();
+  }
+  catch (const std::runtime_error& error)
+  {
+    ThrowIfInterrupted();
+    throw std::runtime_error(folder.Translate(error.what()));
+  }
+  folder.Commit();
+  if (!this->quiet)
+  {
+    std::printf("%s: %s\n", this->output.c_str(), summary.c_str());
+  }
+}
+}
+
+Command MakePhantomCommand(CLI::App& program)
+{
+  CLI::App* app = program.add_subcommand(
+    "phantom", "Make a gated CT series of a beating coronary tree, with its exact truth");
+  app->footer("Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp "
+              "and, last, DIR/series.json, with NN from 00.");
+  auto job = std::make_shared<PhantomJob>();
+  job->Declare(*app);
+  return { app, [job] { job->Run(); } };
+}
+}

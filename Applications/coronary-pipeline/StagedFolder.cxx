@@ -1,0 +1,147 @@
+#include "StagedFolder.h"
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+#include <system_error>
+
+#include <cstdlib> // for mkdtemp
+
+namespace coronary
+{
+namespace fs = std::filesystem;
+
+namespace
+{
+[[noreturn]] void Fail(const fs::path& path, const std::string& reason)
+{
+  throw std::runtime_error("Cannot write '" + path.string() + "': " + reason + ".");
+}
+
+// "a/./b/" as "a/b".
+std::string Normalized(const std::string& folder)
+{
+  const fs::path path = fs::path(folder).lexically_normal();
+  return (path.has_filename() || !path.has_relative_path() ? path : path.parent_path()).string();
+}
+
+/// Makes the folder and its parents; gives those that were not there, outermost first.
+std::vector<std::string> MakeFolders(const fs::path& folder)
+{
+  std::vector<std::string> created;
+  fs::path path;
+  for (const fs::path& part : folder)
+  {
+    path /= part;
+    std::error_code error;
+    if (fs::create_directory(path, error))
+    {
+      created.push_back(path.string());
+      continue;
+    }
+    std::error_code ignored;
+    if (!fs::is_directory(path, ignored))
+    {
+      Fail(folder,
+        fs::exists(path, ignored) ? "'" + path.string() + "' is not a folder" : error.message());
+    }
+  }
+  return created;
+}
+
+void RemoveEmptyFolders(const std::vector<std::string>& folders)
+{
+  for (auto folder = folders.rbegin(); folder != folders.rend(); ++folder)
+  {
+    std::error_code ignored;
+    fs::remove(*folder, ignored);
+  }
+}
+}
+
+StagedFolder::StagedFolder(const std::string& folder)
+  : Folder(Normalized(folder))
+  , Created(MakeFolders(this->Folder))
+{
+  std::string name = (fs::path(this->Folder) / ".unfinished-XXXXXX").string();
+  if (!mkdtemp(name.data()))
+  {
+    const std::string reason = std::strerror(errno);
+    RemoveEmptyFolders(this->Created);
+    Fail(this->Folder, reason);
+  }
+  this->Staging = name;
+}
+
+StagedFolder::~StagedFolder()
+{
+  if (!this->Staging.empty())
+  {
+    std::error_code ignored;
+    fs::remove_all(this->Staging, ignored);
+    RemoveEmptyFolders(this->Created);
+  }
+}
+
+std::string StagedFolder::Add(const std::string& name)
+{
+  const fs::path wanted = fs::path(this->Folder) / name;
+  std::error_code ignored;
+  if (fs::is_directory(wanted, ignored))
+  {
+    Fail(wanted, "it is a folder");
+  }
+  const fs::path parent = wanted.parent_path();
+  if (fs::exists(parent, ignored) && !fs::is_directory(parent, ignored))
+  {
+    Fail(wanted, "'" + parent.string() + "' is not a folder");
+  }
+  const fs::path staged = fs::path(this->Staging) / name;
+  std::error_code error;
+  fs::create_directories(staged.parent_path(), error);
+  if (error)
+  {
+    Fail(wanted, error.message());
+  }
+  this->Names.push_back(name);
+  return staged.string();
+}
+
+void StagedFolder::Commit()
+{
+  const fs::path folder(this->Folder);
+  const fs::path staging(this->Staging);
+  std::error_code error;
+  if (!this->Names.empty())
+  {
+    fs::remove(folder / this->Names.back(), error);
+  }
+  for (const std::string& name : this->Names)
+  {
+    fs::create_directory((folder / name).parent_path(), error);
+    fs::rename(staging / name, folder / name, error);
+    if (error)
+    {
+      Fail(folder / name, error.message());
+    }
+  }
+  fs::remove_all(staging, error);
+  this->Staging.clear();
+}
+
+std::string StagedFolder::Translate(const std::string& message) const
+{
+  std::string result = message;
+  if (this->Staging.empty())
+  {
+    return result;
+  }
+  for (std::size_t at = 0; (at = result.find(this->Staging, at)) != std::string::npos;)
+  {
+    result.replace(at, this->Staging.size(), this->Folder);
+    at += this->Folder.size();
+  }
+  return result;
+}
+}

@@ -1,0 +1,54 @@
+/**
+ * @file StagedFolder.h
+ * @brief A set of files that appears in a folder only when all of them are whole.
+ */
+#ifndef DynamicCoronary_StagedFolder_h
+#define DynamicCoronary_StagedFolder_h
+
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/**
+ * Files that belong together are written to a hidden folder inside the wanted one and moved out of
+ * it by Commit(): an older set of the same names is never mixed with half of a new one.
+ * Without Commit() (an exception, an interruption) the destructor removes what was written, and
+ * the folders that were made for it.
+ */
+class StagedFolder
+{
+public:
+  /// Makes the folder, and its parents.
+  /// @throws std::runtime_error naming `folder` when it can not be made or written to.
+  explicit StagedFolder(const std::string& folder);
+  ~StagedFolder();
+  StagedFolder(const StagedFolder&) = delete;
+  StagedFolder& operator=(const StagedFolder&) = delete;
+
+  /**
+   * Where to write the file that is to become folder/name; makes its subfolder.
+   * @throws std::runtime_error naming folder/name when that can not be a file.
+   */
+  std::string Add(const std::string& name);
+
+  /**
+   * Moves the files to their place in the order of their Add(), replacing older ones.
+   * The last one describes the others: an older one of its name is removed first, so that it never
+   * stands beside files that it does not describe.
+   * @throws std::runtime_error naming the file that could not be moved.
+   */
+  void Commit();
+
+  /// A message about a staged file, with the name that the user knows.
+  std::string Translate(const std::string& message) const;
+
+private:
+  std::string Folder;
+  std::string Staging; ///< empty once committed
+  std::vector<std::string> Names;
+  std::vector<std::string> Created; ///< folders to remove again, outermost first
+};
+}
+
+#endif

@@ -1,0 +1,117 @@
+#include "vtkMessageTrap.h"
+
+#include "Interruption.h"
+
+#include "vtkAlgorithm.h"
+#include "vtkCallbackCommand.h"
+#include "vtkCommand.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkLogger.h"
+#include "vtkObjectFactory.h"
+#include "vtkOutputWindow.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+
+#include <cstdio>
+#include <regex>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+class vtkMessageTrap::Window : public vtkOutputWindow
+{
+public:
+  static Window* New();
+  vtkTypeMacro(Window, vtkOutputWindow);
+
+  void DisplayText(const char*) override {}
+  void DisplayErrorText(const char* text) override { this->Errors.push_back(Plain(text)); }
+  void DisplayWarningText(const char* text) override { this->Warnings.push_back(Plain(text)); }
+  void DisplayGenericWarningText(const char* text) override
+  {
+    this->Warnings.push_back(Plain(text));
+  }
+
+  std::vector<std::string> Errors;
+  std::vector<std::string> Warnings;
+
+private:
+  // VTK puts "ERROR: In file, line n" and "vtkClass (address): " before what was said.
+  static std::string Plain(const std::string& text)
+  {
+    static const std::regex preamble(
+      "^(\\w+: )?In [^\\n]*, line \\d+\\n(\\w+ \\(0?x?[0-9a-f]+\\): )?");
+    static const std::regex breaks("\\s*\\n\\s*");
+    std::string plain = std::regex_replace(text, preamble, "");
+    plain.erase(plain.find_last_not_of(" \n") + 1);
+    return std::regex_replace(plain, breaks, " ");
+  }
+};
+
+vtkStandardNewMacro(vtkMessageTrap::Window);
+
+vtkMessageTrap::vtkMessageTrap()
+  : Previous(vtkOutputWindow::GetInstance())
+{
+  vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
+  vtkOutputWindow::SetInstance(this->Trap);
+}
+
+vtkMessageTrap::~vtkMessageTrap()
+{
+  vtkOutputWindow::SetInstance(this->Previous);
+}
+
+void vtkMessageTrap::PrintWarnings()
+{
+  for (const std::string& warning : std::exchange(this->Trap->Warnings, {}))
+  {
+    std::fprintf(stderr, "Warning: %s\n", warning.c_str());
+  }
+}
+
+void vtkMessageTrap::ForgetWarnings()
+{
+  this->Trap->Warnings.clear();
+}
+
+void vtkMessageTrap::ThrowIfError()
+{
+  const std::vector<std::string> errors = std::exchange(this->Trap->Errors, {});
+  if (!errors.empty())
+  {
+    throw std::runtime_error(errors.front());
+  }
+}
+
+void UpdateAtTime(vtkAlgorithm* algorithm, int port, double time, vtkMessageTrap& messages,
+  const std::function<void(double)>& report)
+{
+  vtkNew<vtkCallbackCommand> observer;
+  observer->SetClientData(const_cast<std::function<void(double)>*>(&report));
+  observer->SetCallback(
+    [](vtkObject* caller, unsigned long, void* data, void*)
+    {
+      auto* source = static_cast<vtkAlgorithm*>(caller);
+      (*static_cast<const std::function<void(double)>*>(data))(source->GetProgress());
+      if (coronary::Interruption() != 0)
+      {
+        source->SetAbortExecute(1);
+      }
+    });
+  const unsigned long tag = algorithm->AddObserver(vtkCommand::ProgressEvent, observer);
+
+  vtkNew<vtkInformationVector> requests;
+  requests->SetNumberOfInformationObjects(port + 1);
+  requests->GetInformationObject(port)->Set(
+    vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(), time);
+  const vtkTypeBool good = algorithm->Update(port, requests);
+
+  algorithm->RemoveObserver(tag);
+  coronary::ThrowIfInterrupted();
+  messages.ThrowIfError();
+  if (!good)
+  {
+    throw std::runtime_error(std::string(algorithm->GetClassName()) + " failed");
+  }
+}
