@@ -1,0 +1,318 @@
+#!/bin/sh
+# Runs the program as a user does. Usage: TestCoronaryPipeline.sh PROGRAM CASE
+set -u
+
+program=$1
+case=$2
+work=$(mktemp -d "${TMPDIR:-/tmp}/coronary-pipeline-test.XXXXXX")
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+# run EXPECTED-CODE ARGUMENTS...: leaves what was printed in ./stdout and ./stderr.
+run() {
+  expected=$1
+  shift
+  "$program" "$@" >stdout 2>stderr
+  code=$?
+  if [ "$code" -ne "$expected" ]; then
+    fail "'$*': exit code $code instead of $expected"
+    cat stdout stderr
+  fi
+}
+
+# A failing run says why in one line that begins like $1 and has $2 in it.
+expect_one_line() {
+  if [ "$(wc -l <stderr)" -ne 1 ] || ! grep -q "^$1: " stderr || ! grep -qe "$2" stderr; then
+    fail "not one line '$1: ... $2 ...' but:"
+    cat stderr
+  fi
+}
+
+expect_text() {
+  grep -qaF -e "$2" "$1" || fail "'$2' is not in $1"
+}
+
+expect_nothing_in() {
+  if [ -e "$1" ] && [ -n "$(ls -A "$1")" ]; then
+    fail "left in $1:"
+    ls -lRA "$1"
+  fi
+}
+
+# An image of few voxels, of which some are in the vessels.
+small="--quiet --spacing 3 --window 0 --origin -40 -40 -40 --dimensions 20 20 20"
+coarse="--surface-spacing 1.5 --centerline-spacing 3"
+
+check_files() {
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 --fractions -0.05,0.35 --lost 2:0.5 $small $coarse --output made/here
+  for number in 00 01; do
+    for file in "phase_$number.mha" "truth/surface_$number.vtp" "truth/centerline_$number.vtp" \
+      "truth/vein_$number.vtp"; do
+      [ -s "made/here/$file" ] || fail "no $file"
+    done
+  done
+  [ "$(find made -type f | wc -l)" -eq 12 ] || fail "other files than expected: $(find made)"
+  [ -z "$(find made -name '.*')" ] || fail "hidden files are left: $(find made)"
+
+  for text in '"cycle_ms": 800.0' '"fraction": -0.05' '"fraction": 0.35' '"image": "phase_01.mha"' \
+    '"surface": "truth/surface_01.vtp"' '"centerline": "truth/centerline_00.vtp"' \
+    '"name": "LCA"' '"name": "RCA"' '"position"'; do
+    expect_text made/here/series.json "$text"
+  done
+  expect_text made/here/truth/surface.pvd 'timestep="0.34999999999999998" file="surface_01.vtp"'
+  expect_text made/here/phase_00.mha "DimSize = 20 20 20"
+  expect_text made/here/phase_00.mha "Offset = -40 -40 -40"
+  for array in MaximumInscribedSphereRadius Abscissas SegmentIds Displacement Velocity GroupIds \
+    ParentGroupIds TreeIds BranchGeneration StrahlerOrder SegmentLabel Length Tortuosity \
+    CycleLength PhaseTime; do
+    expect_text made/here/truth/centerline_01.vtp "Name=\"$array\""
+  done
+  for array in GroupIds Abscissas Displacement Velocity CellEntityIds CycleLength PhaseTime; do
+    expect_text made/here/truth/surface_01.vtp "Name=\"$array\""
+  done
+
+  # The same bits again, with another number of threads and over the old files.
+  cp -r made/here first
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 --fractions -0.05,0.35 --lost 2:0.5 $small $coarse --threads 1 \
+    --output made/here/
+  diff -r first made/here || fail "a second run gave other files"
+
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 6 --fractions -0.05,0.35 $small --no-truth --output other
+  [ ! -e other/truth ] || fail "--no-truth wrote truth"
+  cmp -s first/phase_00.mha other/phase_00.mha && fail "another seed gave the same image"
+
+  # Compressed, turned and lying elsewhere; read again.
+  # shellcheck disable=SC2086
+  run 0 phantom --phases 3 $small --no-truth --compress --direction 0 1 0 -1 0 0 0 0 1 \
+    --cycle-ms 1000 --output turned
+  expect_text turned/phase_02.mha "CompressedData = True"
+  expect_text turned/phase_02.mha "TransformMatrix = 0 -1 0 1 0 0 0 0 1"
+  run 0 inspect --all turned/series.json
+  expect_text stdout "Phases: 3, at R-R fractions -0.05 0.505 1.06"
+  expect_text stdout "Cycle length: 1 s"
+  expect_text stdout "Phase 3 (106.0 % R-R)"
+}
+
+check_options() {
+  run 0 --version
+  run 0 --help
+  for command in phantom phantom-motion inspect; do
+    run 0 "$command" --help
+    expect_text stdout "Usage: coronary-pipeline $command"
+  done
+  run 2
+  expect_one_line coronary-pipeline command
+  run 2 nonsense
+  expect_one_line coronary-pipeline nonsense
+  run 2 --nonsense
+  expect_one_line coronary-pipeline --nonsense
+  run 2 phantom
+  expect_one_line "coronary-pipeline phantom" --output
+  run 2 phantom --output ""
+  expect_one_line "coronary-pipeline phantom" --output
+  run 2 inspect
+  expect_one_line "coronary-pipeline inspect" PATH
+  run 2 phantom-motion --cycle-ms 10
+  expect_one_line "coronary-pipeline phantom-motion" --cycle-ms
+  run 2 inspect x --cycle-ms nan
+  expect_one_line "coronary-pipeline inspect" --cycle-ms
+
+  # One a line; the option comes first, and must be named in the message.
+  while read -r option values; do
+    # shellcheck disable=SC2086
+    run 2 phantom --output out $option $values
+    expect_one_line "coronary-pipeline phantom" "$option"
+  done <<END
+--seed -1
+--seed 1.5
+--seed nan
+--seed 99999999999
+--phases 0
+--phases -3
+--phases
+--phases 3 --fractions 0.1
+--fractions 0.5,0.2
+--fractions 0.2,0.2
+--fractions nan
+--spacing 0
+--spacing -1
+--spacing nan
+--spacing inf
+--spacing 1 2
+--spacing 1 2 3 4
+--window -1
+--window 500
+--noise nan
+--noise -nan
+--noise -5
+--point-spread 1 2
+--cycle-ms 0
+--cycle-ms nan
+--dominance up
+--calibre 0
+--stenoses 2.5
+--lost 21
+--lost 0
+--lost 3:2
+--lost 3:nan
+--lost 3:
+--lost x
+--origin 0 0 0
+--origin 0 nan 0
+--dimensions 4 4 4
+--dimensions 0 1 1
+--direction 1 0 0
+--direction 1 0 0 0 1 0 0 0 0
+--direction nan 0 0 0 1 0 0 0 1
+--threads -1
+--truth-only --no-truth
+--nonsense
+END
+  expect_nothing_in out
+}
+
+check_failures() {
+  # An older result, that no failing run may touch.
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 1 --phases 2 $small --no-truth --output old
+  cp -r old copy
+
+  # A full disk: no file may grow beyond 4 kB.
+  # shellcheck disable=SC2086
+  (trap '' XFSZ && ulimit -f 8 && run 1 phantom --seed 2 --phases 2 $small --no-truth --output old \
+    && exit "$failures") || fail "a full disk"
+  expect_one_line "coronary-pipeline phantom" "'old/phase_00.mha'"
+  diff -r copy old || fail "a run that failed changed older files"
+  # shellcheck disable=SC2086
+  (trap '' XFSZ && ulimit -f 8 && run 1 phantom --phases 1 $small $coarse --output new/deep \
+    && exit "$failures") || fail "a full disk"
+  expect_one_line "coronary-pipeline phantom" "'new/deep/truth/[a-z]*_00.vtp'"
+  [ ! -e new ] || fail "the folder of a failed run is left: $(find new)"
+
+  echo text >file
+  # shellcheck disable=SC2086
+  run 1 phantom --phases 1 $small --no-truth --output file
+  expect_one_line "coronary-pipeline phantom" "'file'"
+  # shellcheck disable=SC2086
+  run 1 phantom --phases 1 $small --no-truth --output file/below
+  expect_one_line "coronary-pipeline phantom" "'file/below'"
+  [ "$(cat file)" = text ] || fail "a file was replaced by a folder"
+  mkdir -p taken/phase_00.mha
+  # shellcheck disable=SC2086
+  run 1 phantom --phases 1 $small --no-truth --output taken
+  expect_one_line "coronary-pipeline phantom" "'taken/phase_00.mha'"
+  expect_nothing_in taken/phase_00.mha
+  if [ "$(id -u)" -ne 0 ]; then
+    mkdir locked && chmod a-w locked
+    # shellcheck disable=SC2086
+    run 1 phantom --phases 1 $small --no-truth --output locked
+    expect_one_line "coronary-pipeline phantom" "'locked'"
+  fi
+
+  run 1 phantom-motion --json no/such/folder.json
+  expect_one_line "coronary-pipeline phantom-motion" "'no/such/folder.json'"
+  if [ -c /dev/full ]; then
+    "$program" phantom-motion >/dev/full 2>stderr && fail "a full standard output was not noticed"
+    expect_one_line coronary-pipeline "standard output"
+  fi
+
+  run 1 inspect missing.mha
+  expect_one_line "coronary-pipeline inspect" "'missing.mha'"
+  head -c 1000 old/phase_00.mha >cut.mha
+  run 1 inspect cut.mha
+  expect_one_line "coronary-pipeline inspect" "'cut.mha'"
+  rm old/phase_01.mha
+  run 1 inspect old/series.json
+  expect_one_line "coronary-pipeline inspect" "phase_01.mha"
+}
+
+# interrupt SIGNAL EXPECTED-CODE SECONDS FOLDER: interrupts a run some time after it began to write.
+interrupt() {
+  "$program" phantom --seed 3 --phases 20 --spacing 1 --output "$4" >stdout 2>stderr &
+  process=$!
+  tries=0
+  while [ -z "$(find "$4" -name '.unfinished-*' 2>/dev/null)" ] && [ $tries -lt 100 ]; do
+    sleep 0.1
+    tries=$((tries + 1))
+  done
+  sleep "$3"
+  kill -s "$1" "$process"
+  wait "$process"
+  code=$?
+  [ "$code" -eq "$2" ] || fail "SIG$1 after $3 s: exit code $code instead of $2"
+  [ "$(tail -n 1 stderr)" = "coronary-pipeline phantom: interrupted" ] \
+    || fail "SIG$1 after $3 s: $(cat stderr)"
+}
+
+check_interruption() {
+  for seconds in 0 0.5 2; do
+    interrupt INT 130 "$seconds" new/deep
+    [ ! -e new ] || fail "left after $seconds s: $(find new)"
+  done
+  interrupt TERM 143 0 new
+  [ ! -e new ] || fail "left after SIGTERM: $(find new)"
+
+  # shellcheck disable=SC2086
+  run 0 phantom --phases 2 $small --no-truth --output old
+  cp -r old copy
+  interrupt INT 130 1 old
+  diff -r copy old || fail "an interrupted run changed older files"
+}
+
+check_progress() {
+  # shellcheck disable=SC2086
+  run 0 phantom --phases 2 $small --no-truth --output made
+  if [ -s stdout ] || [ -s stderr ]; then
+    fail "--quiet is not quiet: $(cat stdout stderr)"
+  fi
+  # shellcheck disable=SC2086
+  run 0 phantom --phases 2 ${small#--quiet} --no-truth --output made
+  expect_text stderr "phase 2 of 2 (106.0 % R-R)"
+  expect_text stdout "made: 2 phases of 20 x 20 x 20 voxels of 3 x 3 x 3 mm, cycle 800 ms"
+  if script -qec true /dev/null >/dev/null 2>&1; then
+    script -qec "'$program' phantom --phases 2 ${small#--quiet} --no-truth --output made" \
+      /dev/null >terminal </dev/null
+    expect_text terminal "[############"
+    expect_text terminal "phase 2 of 2"
+  fi
+}
+
+check_motion() {
+  # The mean anatomy moves as the published and recommended values say.
+  run 0 phantom-motion --seed 0 --json motion.json
+  for line in "LM  *amplitude" "LAD mid  *amplitude" "LCx  *amplitude" "RCA proximal to mid  *amplitude" \
+    "proximal left tree (5 cm) *systolic rest" "proximal left tree (5 cm) *diastolic rest" \
+    "RCA proximal to mid  *systolic rest" "RCA proximal to mid  *diastolic rest"; do
+    grep -q "^$line.* within " stdout || fail "not within its range: $(grep "^$line" stdout)"
+  done
+  grep -q " outside " stdout && fail "outside: $(grep " outside " stdout)"
+  expect_text motion.json '"diastolic_rest_ms"'
+  expect_text motion.json '"within": true'
+
+  # At another heart rate nothing is compared.
+  run 0 phantom-motion --cycle-ms 1000
+  grep -qE " (within|outside) " stdout && fail "compared at another heart rate"
+}
+
+check_libraries() {
+  # Neither Python nor ParaView at run time, and nothing is missing.
+  ldd "$program" >libraries
+  grep -iE "python|libQt|pqCore|vtkRemoting|vtkPVServer|not found" libraries \
+    && fail "the program needs libraries that it should not"
+}
+
+"check_$case"
+if [ "$failures" -gt 0 ]; then
+  echo "$failures check(s) failed"
+  exit 1
+fi
+echo "ok: $case"
