@@ -230,8 +230,9 @@ void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& m
   vtkNew<vtkXMLPolyDataWriter> writer;
   writer->SetInputData(data);
   writer->WriteToOutputStringOn();
-  writer->SetDataModeToAppended();
-  writer->EncodeAppendedDataOff();
+  // Not appended: with expat's reparse deferral (in Debian 12's since a security update) neither
+  // VTK 9.1 nor ParaView 5.11 can read the appended data of any VTK XML file.
+  writer->SetDataModeToBinary();
   const int good = writer->Write();
   messages.ThrowIfError();
   if (!good)
