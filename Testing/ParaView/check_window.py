@@ -1,0 +1,62 @@
+"""Runs inside the ParaView window, called by the play-back: looks at what the user would see."""
+import os
+import subprocess
+import sys
+import traceback
+
+from paraview import simple
+
+folder = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
+sys.path.insert(0, os.environ["DYNAMICCORONARY_TEST_SCRIPTS"])
+
+
+def shown_ports(phantom, view):
+    return [rep.Input.Port for rep in view.Representations
+            if getattr(rep, "Input", None) is not None and rep.Input.SMProxy == phantom.SMProxy
+            and rep.Visibility]
+
+
+def look(step):
+    from coronary_testing import (IMAGE, SURFACE, require, require_different_pictures,
+                                  require_picture, show_phantom)
+    phantom = simple.GetActiveSource()
+    view = simple.GetActiveView()
+    scene = simple.GetAnimationScene()
+    require(phantom is not None and phantom.GetXMLName() == "CoronaryPhantomSource",
+            "the menu did not create the phantom")
+    if step == "applied":
+        require(shown_ports(phantom, view) == [SURFACE], "Apply shows the ports %s"
+                % shown_ports(phantom, view))
+        require(len(scene.TimeKeeper.TimestepValues) == 20, "the time slider's steps")
+    elif step == "all":
+        show_phantom(phantom, view)
+        simple.Render(view)
+        require(sorted(shown_ports(phantom, view))[0] == IMAGE, "the image is not shown")
+    else:
+        require(view.ViewTime == scene.TimeKeeper.TimestepValues[int(step)],
+                "the time is %g" % view.ViewTime)
+    picture = os.path.join(folder, "window_%s.png" % step)
+    simple.SaveScreenshot(picture, view)
+    require_picture(picture, 0.005)
+    if step == "19":
+        require_different_pictures(os.path.join(folder, "window_all.png"),
+                                   os.path.join(folder, "window_7.png"))
+
+
+def check(step):
+    # The window's Python shell would print an exception and go on.
+    try:
+        look(step)
+        os.write(1, ("window: %s is right\n" % step).encode())
+    except BaseException:
+        os.write(2, traceback.format_exc().encode())
+        os._exit(1)
+
+
+def photograph(step):
+    """The whole window, for people to look at, where the tool for it is installed."""
+    try:
+        subprocess.run(["import", "-silent", "-window", "root",
+                        os.path.join(folder, "desktop_%s.png" % step)], check=False)
+    except FileNotFoundError:
+        pass

@@ -1,0 +1,105 @@
+"""What the ParaView tests share: the plugin, data, pictures, and the phantom's usual view."""
+import sys
+
+from paraview import servermanager, simple
+from vtkmodules.vtkIOImage import vtkPNGReader
+
+IMAGE, CENTERLINES, SURFACE, OSTIA, VEIN, PROBE = range(6)
+
+
+def require(condition, message):
+    """Ends the test with a message unless the condition holds."""
+    if not condition:
+        sys.exit("FAILED: " + message)
+
+
+def load_plugin(path):
+    simple.LoadPlugin(path, remote=False, ns=vars(simple))
+    require(hasattr(simple, "CoronaryPhantom"), "the plugin did not load: " + path)
+
+
+def quick_phantom(**properties):
+    """A phantom whose image and surface take little time."""
+    phantom = simple.CoronaryPhantom(**properties)
+    phantom.Spacing = [1.5, 1.5, 1.5]
+    phantom.SurfaceSpacing = 0.8
+    return phantom
+
+
+def fetch(source, port, time):
+    """One port's data at a time, on the client; the other ports are not touched."""
+    tap = servermanager.filters.ReductionFilter(Input=simple.OutputPort(source, port))
+    tap.UpdatePipeline(time)
+    data = tap.GetClientSideObject().GetOutputDataObject(0)
+    copy = data.NewInstance()
+    copy.ShallowCopy(data)
+    return copy
+
+
+def content(data):
+    """Points and all point data of a data set, as something that compares."""
+    points = data.GetPoints() if data.IsA("vtkPointSet") else None
+    arrays = {"points": bytes(memoryview(points.GetData()))} if points else {}
+    attributes = data.GetPointData()
+    for index in range(attributes.GetNumberOfArrays()):
+        array = attributes.GetArray(index)
+        if array:
+            arrays[array.GetName()] = bytes(memoryview(array))
+    return arrays
+
+
+def pixels(path):
+    """The colours of a picture, three bytes a pixel."""
+    reader = vtkPNGReader()
+    reader.SetFileName(path)
+    reader.Update()
+    scalars = reader.GetOutput().GetPointData().GetScalars()
+    require(scalars and scalars.GetNumberOfComponents() == 3, "no colour picture: " + path)
+    return bytes(memoryview(scalars))
+
+
+def require_picture(path, share=0.05):
+    """The picture shows something: more than `share` of its bytes are not the most common one."""
+    data = pixels(path)
+    background = max(range(256), key=data.count)
+    require(data.count(background) < (1.0 - share) * len(data), "the picture is empty: " + path)
+
+
+def require_different_pictures(first, second, share=0.005):
+    a, b = pixels(first), pixels(second)
+    require(len(a) == len(b), "pictures of different size: %s, %s" % (first, second))
+    changed = sum(x != y for x, y in zip(a, b)) / len(a)
+    print("%.1f %% of the picture changed from %s to %s" % (100 * changed, first, second))
+    require(changed > share, "the pictures are the same: %s, %s" % (first, second))
+
+
+def show_phantom(phantom, view):
+    """A coronal slice of the image, the surface, and the tree inside it, seen from the front."""
+    image = simple.Show(simple.OutputPort(phantom, IMAGE), view)
+    image.SetRepresentationType("Slice")
+    image.SliceMode = "XZ Plane"
+    extent = phantom.GetDataInformation(IMAGE).GetExtent()
+    image.Slice = (extent[2] + extent[3]) // 2
+    simple.ColorBy(image, ("POINTS", "HU"))
+    transfer = simple.GetColorTransferFunction("HU")
+    transfer.ApplyPreset("Grayscale", True)
+    transfer.RescaleTransferFunction(-200.0, 500.0)
+    image.SetScalarBarVisibility(view, False)
+
+    surface = simple.Show(simple.OutputPort(phantom, SURFACE), view)
+    surface.DiffuseColor = surface.AmbientColor = [0.80, 0.16, 0.16]
+    surface.Opacity = 0.55
+
+    tree = simple.Show(simple.OutputPort(phantom, CENTERLINES), view)
+    tree.DiffuseColor = tree.AmbientColor = [1.0, 0.85, 0.2]
+    tree.LineWidth = 3.0
+
+    bounds = phantom.GetDataInformation(IMAGE).GetBounds()
+    centre = [(low + high) / 2 for low, high in zip(bounds[::2], bounds[1::2])]
+    view.CameraFocalPoint = centre
+    # LPS: the viewer stands before the patient, who stands upright.
+    view.CameraPosition = [centre[0] + 90.0, centre[1] - 380.0, centre[2] + 60.0]
+    view.CameraViewUp = [0.0, 0.0, 1.0]
+    view.CameraViewAngle = 17.0
+    return image, surface, tree
+
