@@ -16,6 +16,8 @@ namespace coronary
 {
 namespace
 {
+const char* const RunLengthSyntax = "1.2.840.10008.1.2.5";
+
 [[noreturn]] void Fail(const std::string& path, const std::string& what)
 {
   throw std::runtime_error("'" + path + "': " + what + ".");
@@ -455,12 +457,18 @@ public:
   }
 };
 
-// The fragments of compressed pixels with their delimiter, every length checked.
-std::string ReadFragments(const DicomFile& file)
+struct Fragment
+{
+  std::uint64_t offset = 0; ///< from the beginning of the pixels
+  std::uint64_t size = 0;
+};
+
+// The fragments of compressed pixels, every length checked; the first is a table of offsets.
+std::vector<Fragment> ListFragments(const DicomFile& file, ByteStream& stream)
 {
   constexpr std::uint32_t item = 0xe000fffeu;
   constexpr std::uint32_t end = 0xe0ddfffeu;
-  ByteStream stream(file.path, file.pixelOffset, false);
+  std::vector<Fragment> fragments;
   const auto number = [&](std::uint64_t position)
   {
     std::array<unsigned char, 4> b{};
@@ -476,17 +484,165 @@ std::string ReadFragments(const DicomFile& file)
     position += 8;
     if (tag == end)
     {
-      break;
+      return fragments;
     }
     if (tag != item || length > file.pixelBytes || position + length > file.pixelBytes)
     {
       Fail(file.path, "its compressed pixels are truncated or damaged");
     }
+    fragments.push_back({ position, length });
     position += length;
   }
-  std::string fragments(static_cast<std::size_t>(position), '\0');
-  stream.Read(0, fragments.data(), fragments.size(), position);
-  return fragments;
+}
+
+/// What the header of a JPEG, JPEG-LS or JPEG 2000 stream says.
+struct CodestreamSize
+{
+  unsigned rows = 0;
+  unsigned columns = 0;
+  unsigned components = 0;
+  unsigned bits = 0;
+};
+
+// All zero when there is no such header in `bytes`.
+CodestreamSize ReadCodestreamSize(const std::string& bytes)
+{
+  const auto number = [&bytes](std::size_t at, std::size_t count)
+  {
+    unsigned value = 0;
+    for (std::size_t b = 0; b < count && at + b < bytes.size(); ++b)
+    {
+      value = value << 8 | static_cast<unsigned char>(bytes[at + b]);
+    }
+    return value;
+  };
+  // JPEG 2000: the size comes first.
+  if (number(0, 4) == 0xff4fff51u)
+  {
+    return { number(12, 4) - number(20, 4), number(8, 4) - number(16, 4), number(40, 2),
+      (number(42, 1) & 127u) + 1 };
+  }
+  for (std::size_t at = 2; at + 10 < bytes.size() && number(at, 1) == 0xff;)
+  {
+    const unsigned marker = number(at + 1, 1);
+    const bool frame = marker == 0xf7 ||
+      (marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc);
+    if (frame)
+    {
+      return { number(at + 5, 2), number(at + 7, 2), number(at + 9, 1), number(at + 4, 1) };
+    }
+    at += 2 + number(at + 2, 2);
+  }
+  return {};
+}
+
+// GDCM's decoders crash when a compressed frame is of another kind than the header of the file says.
+void CheckCodestreams(
+  const DicomFile& file, const std::string& bytes, const std::vector<Fragment>& fragments)
+{
+  std::size_t begins = 0;
+  for (const Fragment& fragment : fragments)
+  {
+    const std::string part = bytes.substr(
+      static_cast<std::size_t>(fragment.offset), static_cast<std::size_t>(fragment.size));
+    // A frame may go on in further fragments, which have no header.
+    if (part.compare(0, 3, "\xff\xd8\xff") != 0 && part.compare(0, 4, "\xff\x4f\xff\x51") != 0)
+    {
+      continue;
+    }
+    ++begins;
+    const CodestreamSize size = ReadCodestreamSize(part);
+    if (size.rows != static_cast<unsigned>(file.rows) ||
+      size.columns != static_cast<unsigned>(file.columns) || size.components != 1 ||
+      size.bits < 2 || size.bits > static_cast<unsigned>(file.bitsAllocated))
+    {
+      Fail(file.path, "its compressed pixels do not agree with its header");
+    }
+  }
+  if (begins != file.frames.size())
+  {
+    Fail(file.path, "its compressed pixels are damaged, or of a kind that is not supported");
+  }
+}
+
+// The fragments as they are in the file, with their delimiter.
+std::string ReadFragments(const DicomFile& file)
+{
+  ByteStream stream(file.path, file.pixelOffset, false);
+  const std::vector<Fragment> fragments = ListFragments(file, stream);
+  const std::uint64_t size =
+    fragments.empty() ? 8 : fragments.back().offset + fragments.back().size + 8;
+  std::string bytes(static_cast<std::size_t>(size), '\0');
+  stream.Read(0, bytes.data(), bytes.size(), size);
+  CheckCodestreams(file, bytes, fragments);
+  return bytes;
+}
+
+// One segment of run-length encoding (PS3.5 annex G) into every `stride`-th byte; false when it ends
+// early.
+bool DecodeSegment(const unsigned char* in, const unsigned char* end, unsigned char* out,
+  std::size_t count, std::size_t stride)
+{
+  std::size_t done = 0;
+  while (done < count && in < end)
+  {
+    const unsigned code = *in++;
+    if (code == 128)
+    {
+      continue;
+    }
+    const std::size_t run = std::min<std::size_t>(code < 128 ? code + 1 : 257 - code, count - done);
+    const bool literal = code < 128;
+    if (static_cast<std::size_t>(end - in) < (literal ? run : 1))
+    {
+      return false;
+    }
+    for (std::size_t i = 0; i < run; ++i)
+    {
+      out[(done + i) * stride] = literal ? in[i] : in[0];
+    }
+    in += literal ? run : 1;
+    done += run;
+  }
+  return done == count;
+}
+
+// GDCM's decoder of run lengths aborts the program when the data is damaged.
+void DecodeRunLength(const DicomFile& file, std::size_t frame, std::vector<unsigned char>& bytes)
+{
+  ByteStream stream(file.path, file.pixelOffset, false);
+  const std::vector<Fragment> fragments = ListFragments(file, stream);
+  const std::size_t valueBytes = VoxelBytes(TypeOf(file));
+  const std::size_t count = bytes.size() / valueBytes;
+  const std::string damaged = "its run-length encoded pixels are truncated or damaged";
+  if (fragments.size() != file.frames.size() + 1 || fragments[frame + 1].size < 64)
+  {
+    Fail(file.path, damaged);
+  }
+  std::vector<unsigned char> in(static_cast<std::size_t>(fragments[frame + 1].size));
+  stream.Read(fragments[frame + 1].offset, in.data(), in.size(), in.size());
+  const auto number = [&in](std::size_t index)
+  {
+    const unsigned char* b = in.data() + 4 * index;
+    return std::size_t(b[0]) | std::size_t(b[1]) << 8 | std::size_t(b[2]) << 16 |
+      std::size_t(b[3]) << 24;
+  };
+  if (number(0) != valueBytes)
+  {
+    Fail(file.path, damaged);
+  }
+  // The segments hold the bytes of all values, the most significant first.
+  for (std::size_t segment = 0; segment < valueBytes; ++segment)
+  {
+    const std::size_t first = number(segment + 1);
+    const std::size_t last = segment + 1 < valueBytes ? number(segment + 2) : in.size();
+    const std::size_t byte = HostIsBigEndian() ? segment : valueBytes - 1 - segment;
+    if (first < 64 || first > last || last > in.size() ||
+      !DecodeSegment(in.data() + first, in.data() + last, bytes.data() + byte, count, valueBytes))
+    {
+      Fail(file.path, damaged);
+    }
+  }
 }
 
 // A file that has nothing but what decoding needs. GDCM aborts the program for some damaged headers:
@@ -578,7 +734,11 @@ VoxelType DicomPixelReader::Read(
   const std::size_t size = FrameBytes(file);
   const std::size_t first = size * static_cast<std::size_t>(frame);
   bytes.resize(size);
-  if (file.encapsulated)
+  if (file.encapsulated && file.transferSyntax == RunLengthSyntax)
+  {
+    DecodeRunLength(file, static_cast<std::size_t>(frame), bytes);
+  }
+  else if (file.encapsulated)
   {
     if (this->Impl->Path != file.path)
     {

@@ -347,8 +347,8 @@ vtkGatedImageReader::vtkGatedImageReader()
 
 vtkGatedImageReader::~vtkGatedImageReader()
 {
-  this->SetDirectoryName(nullptr);
-  this->SetSeriesInstanceUID(nullptr);
+  delete[] this->DirectoryName;
+  delete[] this->SeriesInstanceUID;
 }
 
 void vtkGatedImageReader::PrintSelf(ostream& os, vtkIndent indent)

@@ -2,7 +2,7 @@
 
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
-#include <gdcmImageWriter.h>
+#include <gdcmSequenceOfItems.h>
 #include <gdcmWriter.h>
 
 #include <zlib.h>
@@ -299,6 +299,97 @@ void WriteDicom(const std::string& path, const DicomOptions& o)
   }
 }
 
+namespace
+{
+void SetSequence(gdcm::DataSet& data, const gdcm::Tag& tag, const std::vector<gdcm::DataSet>& items)
+{
+  gdcm::SmartPointer<gdcm::SequenceOfItems> sequence = new gdcm::SequenceOfItems;
+  sequence->SetLengthToUndefined();
+  for (const gdcm::DataSet& nested : items)
+  {
+    gdcm::Item item;
+    item.SetVLToUndefined();
+    item.SetNestedDataSet(nested);
+    sequence->AddItem(item);
+  }
+  gdcm::DataElement element(tag);
+  element.SetVR(gdcm::VR::SQ);
+  element.SetValue(*sequence);
+  element.SetVLToUndefined();
+  data.Replace(element);
+}
+}
+
+void WriteEnhancedDicom(const std::string& path, int phases, int slices)
+{
+  const int rows = 3;
+  const int columns = 4;
+  gdcm::Writer writer;
+  gdcm::File& file = writer.GetFile();
+  file.GetHeader().SetDataSetTransferSyntax(gdcm::TransferSyntax::ExplicitVRLittleEndian);
+  gdcm::DataSet& data = file.GetDataSet();
+  Set(data, { 0x0008, 0x0016 }, gdcm::VR::UI, "1.2.840.10008.5.1.4.1.1.2.1");
+  Set(data, { 0x0008, 0x0018 }, gdcm::VR::UI, "1.2.3.55");
+  Set(data, { 0x0008, 0x0060 }, gdcm::VR::CS, "CT");
+  Set(data, { 0x0020, 0x000e }, gdcm::VR::UI, "1.2.3");
+  const auto us = [&data](std::uint16_t element, int value) {
+    SetNumber(data, { 0x0028, element }, gdcm::VR::US, static_cast<std::uint16_t>(value));
+  };
+  us(0x0002, 1);
+  Set(data, { 0x0028, 0x0004 }, gdcm::VR::CS, "MONOCHROME2");
+  Set(data, { 0x0028, 0x0008 }, gdcm::VR::IS, std::to_string(phases * slices));
+  us(0x0010, rows);
+  us(0x0011, columns);
+  us(0x0100, 16);
+  us(0x0101, 16);
+  us(0x0102, 15);
+  us(0x0103, 1);
+  gdcm::DataSet orientation;
+  Set(orientation, { 0x0020, 0x0037 }, gdcm::VR::DS, "1\\0\\0\\0\\1\\0");
+  gdcm::DataSet measures;
+  Set(measures, { 0x0028, 0x0030 }, gdcm::VR::DS, "0.5\\0.5");
+  gdcm::DataSet transformation;
+  Set(transformation, { 0x0028, 0x1052 }, gdcm::VR::DS, "-7");
+  Set(transformation, { 0x0028, 0x1053 }, gdcm::VR::DS, "1");
+  gdcm::DataSet shared;
+  SetSequence(shared, { 0x0020, 0x9116 }, { orientation });
+  SetSequence(shared, { 0x0028, 0x9110 }, { measures });
+  SetSequence(shared, { 0x0028, 0x9145 }, { transformation });
+  SetSequence(data, { 0x5200, 0x9229 }, { shared });
+  std::vector<gdcm::DataSet> frames;
+  std::string pixels;
+  for (int s = slices - 1; s >= 0; --s)
+  {
+    for (int p = 0; p < phases; ++p)
+    {
+      gdcm::DataSet position;
+      Set(position, { 0x0020, 0x0032 }, gdcm::VR::DS, "10\\20\\" + std::to_string(30 + 2 * s));
+      gdcm::DataSet synchronization;
+      SetNumber(synchronization, { 0x0020, 0x9241 }, gdcm::VR::FL, static_cast<float>(10 + 20 * p));
+      SetNumber(synchronization, { 0x0020, 0x9251 }, gdcm::VR::FD, 800.0);
+      gdcm::DataSet frame;
+      SetSequence(frame, { 0x0018, 0x9118 }, { synchronization });
+      SetSequence(frame, { 0x0020, 0x9113 }, { position });
+      frames.push_back(frame);
+      for (int j = 0; j < rows; ++j)
+      {
+        for (int i = 0; i < columns; ++i)
+        {
+          const auto value = static_cast<short>(Value(i, j, s, p) + 7);
+          pixels.append(reinterpret_cast<const char*>(&value), 2);
+        }
+      }
+    }
+  }
+  SetSequence(data, { 0x5200, 0x9230 }, frames);
+  Set(data, { 0x7fe0, 0x0010 }, gdcm::VR::OW, pixels);
+  writer.SetFileName(path.c_str());
+  if (!writer.Write())
+  {
+    throw std::runtime_error("GDCM cannot write " + path);
+  }
+}
+
 bool CompressDicom(const std::string& path, bool runLength)
 {
   gdcm::ImageReader reader;
@@ -315,9 +406,11 @@ bool CompressDicom(const std::string& path, bool runLength)
   {
     return false;
   }
-  gdcm::ImageWriter writer;
+  // gdcm::ImageWriter would write the functional groups anew.
+  gdcm::Writer writer;
   writer.SetFile(reader.GetFile());
-  writer.SetImage(change.GetOutput());
+  writer.GetFile().GetHeader().SetDataSetTransferSyntax(change.GetOutput().GetTransferSyntax());
+  writer.GetFile().GetDataSet().Replace(change.GetOutput().GetDataElement());
   writer.SetFileName(path.c_str());
   return writer.Write();
 }

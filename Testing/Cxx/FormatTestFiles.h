@@ -101,6 +101,10 @@ struct DicomOptions
 /// Writes one slice with GDCM, explicit little endian.
 void WriteDicom(const std::string& path, const DicomOptions& options);
 
+/// Writes all phases and slices into one enhanced multi-frame file, slice (s) at (10, 20, 30 + 2 s) with
+/// 0.5 mm pixels, phase p at 10 + 20 p per cent of an R-R interval of 800 ms; rescale intercept -7.
+void WriteEnhancedDicom(const std::string& path, int phases, int slices);
+
 /// Rewrites a DICOM file with GDCM in a compressed transfer syntax; false if that fails.
 bool CompressDicom(const std::string& path, bool runLength);
 }
