@@ -378,6 +378,15 @@ Vector3 Place(const Control& control, Course course, const HeartFrame& mean,
   return mean.ToWorld(p) * size;
 }
 
+/// Outward normal of the heart's surface at a vessel, perpendicular to the vessel.
+Vector3 EpicardialNormal(const HeartFrame& frame, const Vector3& position, const Vector3& tangent)
+{
+  const Vector3 heart = frame.ToHeart(position) - HeartFrame::Centre;
+  const Vector3 normal =
+    frame.axes.transpose() * heart.cwiseQuotient(HeartFrame::Radii.cwiseProduct(HeartFrame::Radii));
+  return (normal - normal.dot(tangent) * tangent).normalized();
+}
+
 /// Lateral waves: coronary arteries wind, more so towards their ends.
 void AddWaves(DenseVessel& vessel, const HeartFrame& frame, double strength, RandomStream& random)
 {
@@ -399,10 +408,7 @@ void AddWaves(DenseVessel& vessel, const HeartFrame& frame, double strength, Ran
     const std::size_t before = i == 0 ? 0 : i - 1;
     const std::size_t after = std::min(points.size() - 1, i + 1);
     const Vector3 tangent = (points[after] - points[before]).normalized();
-    const Vector3 heart = frame.ToHeart(points[i]) - HeartFrame::Centre;
-    Vector3 normal = frame.axes.transpose() *
-      heart.cwiseQuotient(HeartFrame::Radii.cwiseProduct(HeartFrame::Radii));
-    normal = (normal - normal.dot(tangent) * tangent).normalized();
+    const Vector3 normal = EpicardialNormal(frame, points[i], tangent);
     const Vector3 lateral = normal.cross(tangent);
     const double s = vessel.arc[i];
     const double envelope = strength * SmoothStep((s - 2.0) / 14.0) *
@@ -597,6 +603,66 @@ void Separate(std::vector<DenseVessel>& vessels)
       break;
     }
   }
+}
+
+/// The great cardiac vein: beside the LAD from the apex up to its first diagonal, then in the groove
+/// beside the circumflex from its first marginal on.
+PhantomTree MakeVein(const HeartFrame& frame, const DenseVessel& anterior, double firstDiagonal,
+  const DenseVessel& circumflex, double firstMarginal, double spacing)
+{
+  const auto beside = [&](const DenseVessel& vessel, double arc, double away, double out)
+  {
+    const Vector3 p = AtArc(vessel, vessel.points, arc);
+    const Vector3 tangent =
+      (AtArc(vessel, vessel.points, arc + 1.0) - AtArc(vessel, vessel.points, arc - 1.0))
+        .normalized();
+    const Vector3 normal = EpicardialNormal(frame, p, tangent);
+    return Vector3(p + away * normal.cross(tangent) + out * normal);
+  };
+  std::vector<Vector3> controls;
+  double arc = std::min(115.0, anterior.arc.back() - 25.0);
+  while (arc > firstDiagonal + 4.0)
+  {
+    controls.push_back(beside(anterior, arc, AtArc(anterior, anterior.radius, arc) + 2.4, 0.4));
+    arc -= 12.0;
+  }
+  arc = firstMarginal - 2.0;
+  while (arc < std::min(circumflex.arc.back() - 2.0, 75.0))
+  {
+    controls.push_back(
+      beside(circumflex, arc, -AtArc(circumflex, circumflex.radius, arc) - 2.8, 0.6));
+    arc += 9.0;
+  }
+  const CubicCurve curve(controls);
+  DenseVessel course;
+  constexpr int fine = 400;
+  for (int i = 0; i <= fine; ++i)
+  {
+    course.points.push_back(curve(curve.End() * i / fine));
+  }
+  ComputeArc(course);
+
+  PhantomTree vein;
+  PhantomBranch branch;
+  branch.treeId = 2;
+  const double length = course.arc.back();
+  const int count = std::max(2, static_cast<int>(std::lround(length / spacing)));
+  for (int i = 0; i <= count; ++i)
+  {
+    const double s = length * i / count;
+    branch.points.push_back(i);
+    vein.points.push_back(AtArc(course, course.points, s));
+    vein.radius.push_back(0.8 + 0.9 * s / length);
+    vein.abscissa.push_back(s);
+    vein.segmentId.push_back(0);
+  }
+  branch.length = length;
+  branch.tortuosity = length / (vein.points.back() - vein.points.front()).norm() - 1.0;
+  vein.branches.push_back(branch);
+  vein.displacement.assign(vein.points.size(), Vector3::Zero());
+  vein.velocity = vein.displacement;
+  vein.visibility.assign(vein.points.size(), 1.0);
+  return vein;
 }
 
 int Strahler(PhantomTree& tree, std::size_t branch)
@@ -893,66 +959,8 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     }
   }
 
-  // The great cardiac vein: beside the LAD from the apex up, then in the groove beside the LCx.
-  {
-    const Variation shift(settings);
-    const auto beside = [&](const std::string& name, double arc, double away, double out)
-    {
-      const DenseVessel& vessel = dense[byName.at(name)];
-      const Vector3 p = AtArc(vessel, vessel.points, arc);
-      const Vector3 tangent =
-        (AtArc(vessel, vessel.points, arc + 1.0) - AtArc(vessel, vessel.points, arc - 1.0))
-          .normalized();
-      const Vector3 heart = this->frame.ToHeart(p) - HeartFrame::Centre;
-      Vector3 normal = this->frame.axes.transpose() *
-        heart.cwiseQuotient(HeartFrame::Radii.cwiseProduct(HeartFrame::Radii));
-      normal = (normal - normal.dot(tangent) * tangent).normalized();
-      return Vector3(p + away * normal.cross(tangent) + out * normal);
-    };
-    std::vector<Vector3> controls;
-    const DenseVessel& anterior = dense[byName.at("LAD")];
-    const double origin = dense[byName.at("D1")].parentArc;
-    for (double s = std::min(115.0, anterior.arc.back() - 25.0); s > origin + 4.0; s -= 12.0)
-    {
-      const double clearance = AtArc(anterior, anterior.radius, s) + 2.4;
-      controls.push_back(beside("LAD", s, clearance, 0.4));
-    }
-    const DenseVessel& groove = dense[byName.at("LCx")];
-    const double turn = dense[byName.at("OM1")].parentArc;
-    for (double s = turn - 2.0; s < std::min(groove.arc.back() - 2.0, 75.0); s += 9.0)
-    {
-      const double clearance = AtArc(groove, groove.radius, s) + 2.8;
-      controls.push_back(beside("LCx", s, -clearance, 0.6));
-    }
-    const CubicCurve curve(controls);
-    PhantomBranch branch;
-    branch.treeId = 2;
-    const int fine = 400;
-    DenseVessel course;
-    for (int i = 0; i <= fine; ++i)
-    {
-      course.points.push_back(curve(curve.End() * i / fine));
-    }
-    ComputeArc(course);
-    const int count =
-      std::max(2, static_cast<int>(std::lround(course.arc.back() / settings.centerlineSpacing)));
-    for (int i = 0; i <= count; ++i)
-    {
-      const double s = course.arc.back() * i / count;
-      branch.points.push_back(i);
-      this->vein.points.push_back(AtArc(course, course.points, s));
-      this->vein.radius.push_back(0.8 + 0.9 * s / course.arc.back());
-      this->vein.abscissa.push_back(s);
-      this->vein.segmentId.push_back(0);
-    }
-    branch.length = course.arc.back();
-    branch.tortuosity =
-      branch.length / (this->vein.points.back() - this->vein.points.front()).norm() - 1.0;
-    this->vein.branches.push_back(branch);
-    this->vein.displacement.assign(this->vein.points.size(), Vector3::Zero());
-    this->vein.velocity = this->vein.displacement;
-    this->vein.visibility.assign(this->vein.points.size(), 1.0);
-  }
+  this->vein = MakeVein(this->frame, dense[byName.at("LAD")], dense[byName.at("D1")].parentArc,
+    dense[byName.at("LCx")], dense[byName.at("OM1")].parentArc, settings.centerlineSpacing);
 
   // The aortic root goes through both ostia.
   this->leftOstium = dense[byName.at("LAD")].points.front();

@@ -8,6 +8,25 @@ namespace coronary
 namespace
 {
 constexpr int MaximumVessels = 32;
+constexpr double CellSize = 4.0; ///< of the bins, mm
+
+/// Calls visit(key) for each bin that a box touches.
+template <typename Visit>
+void ForEachCell(const Vector3& low, const Vector3& high, const Visit& visit)
+{
+  const auto index = [](double x)
+  { return static_cast<std::int64_t>(std::floor(x / CellSize)) + (std::int64_t{ 1 } << 20); };
+  for (std::int64_t z = index(low[2]); z <= index(high[2]); ++z)
+  {
+    for (std::int64_t y = index(low[1]); y <= index(high[1]); ++y)
+    {
+      for (std::int64_t x = index(low[0]); x <= index(high[0]); ++x)
+      {
+        visit((x << 42) | (y << 21) | z);
+      }
+    }
+  }
+}
 
 /// Union with a rounded inner edge of radius k: exact where one of the two is beyond k.
 double RoundUnion(double a, double b, double k)
@@ -71,7 +90,6 @@ PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vect
       junction.parentVessel, junction.childVessel });
   }
 
-  this->CellSize = 4.0;
   for (std::size_t i = 0; i < this->Pieces.size(); ++i)
   {
     const Piece& piece = this->Pieces[i];
@@ -79,27 +97,9 @@ PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vect
     const Vector3 end = piece.start + piece.axis;
     const Vector3 low = piece.start.cwiseMin(end).array() - margin;
     const Vector3 high = piece.start.cwiseMax(end).array() + margin;
-    for (double z = std::floor(low[2] / this->CellSize); z <= std::floor(high[2] / this->CellSize);
-         ++z)
-    {
-      for (double y = std::floor(low[1] / this->CellSize);
-           y <= std::floor(high[1] / this->CellSize); ++y)
-      {
-        for (double x = std::floor(low[0] / this->CellSize);
-             x <= std::floor(high[0] / this->CellSize); ++x)
-        {
-          this->Bins[this->Cell(x, y, z)].push_back(static_cast<std::int32_t>(i));
-        }
-      }
-    }
+    ForEachCell(low, high,
+      [&](std::int64_t cell) { this->Bins[cell].push_back(static_cast<std::int32_t>(i)); });
   }
-}
-
-std::int64_t PhantomLumen::Cell(double x, double y, double z) const
-{
-  constexpr std::int64_t offset = 1 << 20;
-  return ((static_cast<std::int64_t>(x) + offset) << 42) |
-    ((static_cast<std::int64_t>(y) + offset) << 21) | (static_cast<std::int64_t>(z) + offset);
 }
 
 void PhantomLumen::Collect(const Vector3& centre, double ballRadius, Candidates& candidates) const
@@ -107,22 +107,15 @@ void PhantomLumen::Collect(const Vector3& centre, double ballRadius, Candidates&
   candidates.pieces.clear();
   candidates.junctions.clear();
   candidates.ends.clear();
-  const Vector3 low = ((centre.array() - ballRadius) / this->CellSize).floor();
-  const Vector3 high = ((centre.array() + ballRadius) / this->CellSize).floor();
-  for (double z = low[2]; z <= high[2]; ++z)
-  {
-    for (double y = low[1]; y <= high[1]; ++y)
+  ForEachCell(centre.array() - ballRadius, centre.array() + ballRadius,
+    [&](std::int64_t cell)
     {
-      for (double x = low[0]; x <= high[0]; ++x)
+      const auto bin = this->Bins.find(cell);
+      if (bin != this->Bins.end())
       {
-        const auto bin = this->Bins.find(this->Cell(x, y, z));
-        if (bin != this->Bins.end())
-        {
-          candidates.pieces.insert(candidates.pieces.end(), bin->second.begin(), bin->second.end());
-        }
+        candidates.pieces.insert(candidates.pieces.end(), bin->second.begin(), bin->second.end());
       }
-    }
-  }
+    });
   std::sort(candidates.pieces.begin(), candidates.pieces.end());
   candidates.pieces.erase(
     std::unique(candidates.pieces.begin(), candidates.pieces.end()), candidates.pieces.end());
@@ -269,8 +262,9 @@ double PhantomLumen::Project(Vector3& position, double tolerance) const
     // At a crease Newton's steps go to and fro; the sign still changes along the last normal.
     const Vector3 direction = gradient.normalized() * (distance > 0.0 ? -1.0 : 1.0);
     constexpr double stride = 0.02;
-    for (double far = stride; far < 0.6; far += stride)
+    for (int n = 1; n <= 30; ++n)
     {
+      double far = n * stride;
       if ((distanceAt(position + far * direction) > 0.0) != (distance > 0.0))
       {
         double near = far - stride;

@@ -86,14 +86,11 @@ private:
     int vessel;
   };
 
-  std::int64_t Cell(double x, double y, double z) const;
-
   std::vector<Piece> Pieces;
   std::vector<Fillet> Fillets;
   std::vector<Cut> Cuts;
   std::unordered_map<std::int64_t, std::vector<std::int32_t>> Bins;
   double Limit;
-  double CellSize;
   double WidestRadius = 0.0;
 };
 }
