@@ -539,6 +539,10 @@ int vtkGatedImageReader::RequestInformation(
         output->Initialize();
       }
     }
+    // ParaView asks for data even now, and the executive would complain of a missing extent.
+    const std::array<int, 6> empty{ 0, -1, 0, -1, 0, -1 };
+    outputVector->GetInformationObject(0)->Set(
+      vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), empty.data(), 6);
     vtkErrorMacro(<< error.what());
     return 0;
   }
@@ -576,8 +580,8 @@ int vtkGatedImageReader::RequestData(
   Internals& state = *this->State;
   if (!state.Series)
   {
-    // RequestInformation has said why.
-    return 0;
+    // RequestInformation has failed and said why: the outputs stay empty.
+    return 1;
   }
   const coronary::GatedSeries& series = *state.Series;
   vtkInformation* imageInfo = outputVector->GetInformationObject(0);
