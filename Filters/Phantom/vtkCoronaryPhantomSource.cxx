@@ -472,6 +472,11 @@ double vtkCoronaryPhantomSource::GetPhase(int index)
                                                          : std::numeric_limits<double>::quiet_NaN();
 }
 
+vtkExecutive* vtkCoronaryPhantomSource::CreateDefaultExecutive()
+{
+  return SDDP::New();
+}
+
 int vtkCoronaryPhantomSource::FillInputPortInformation(int, vtkInformation* info)
 {
   info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkPointSet");

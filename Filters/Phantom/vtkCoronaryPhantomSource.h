@@ -362,6 +362,9 @@ protected:
   vtkCoronaryPhantomSource();
   ~vtkCoronaryPhantomSource() override;
 
+  /// One that hands blocks over as they are, so that a probe of many blocks is refused: else the
+  /// other outputs would be made once a block.
+  vtkExecutive* CreateDefaultExecutive() override;
   int FillInputPortInformation(int port, vtkInformation* info) override;
   int FillOutputPortInformation(int port, vtkInformation* info) override;
 

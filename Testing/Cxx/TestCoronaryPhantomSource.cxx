@@ -13,6 +13,7 @@
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkMatrix3x3.h"
+#include "vtkMultiBlockDataSet.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
 #include "vtkPoints.h"
@@ -567,6 +568,17 @@ TEST(CoronaryPhantomSource, CarriesProbePoints)
 
   source->SetInputDataObject(nullptr);
   EXPECT_EQ(RequestPoints(source, Source::ProbePort, 0.3)->GetNumberOfPoints(), 0);
+}
+
+TEST(CoronaryPhantomSource, RefusesAProbeOfManyBlocks)
+{
+  vtkNew<vtkMultiBlockDataSet> blocks;
+  blocks->SetBlock(0, vtkNew<vtkPolyData>());
+  const auto source = MakeSource();
+  const Errors errors(source);
+  source->SetInputDataObject(blocks);
+  source->Update(Source::ProbePort);
+  EXPECT_EQ(errors.Echoes.size(), 1U);
 }
 
 TEST(CoronaryPhantomSource, ProbeOfAnotherPhantomKeepsTheTimesApart)
