@@ -286,8 +286,10 @@ void WriteDicom(const std::string& path, const DicomOptions& o)
   {
     for (int i = 0; i < o.columns; ++i)
     {
-      const short value = o.values.empty() ? Value(i, j, o.slice, o.phase)
-                                           : o.values[static_cast<std::size_t>(j * o.columns + i)];
+      const short value = o.values.empty()
+        ? Value(i, j, o.slice, o.phase)
+        : o.values[static_cast<std::size_t>(j) * static_cast<std::size_t>(o.columns) +
+            static_cast<std::size_t>(i)];
       pixels.append(reinterpret_cast<const char*>(&value), 2);
     }
   }

@@ -338,14 +338,8 @@ TEST(Nifti, SformIsTurnedFromRasToLps)
   NiftiOptions o;
   o.sform = 1;
   o.qform = 1; // The sform has precedence; this says something else.
-  for (int row = 0; row < 3; ++row)
-  {
-    for (int column = 0; column < 3; ++column)
-    {
-      o.affine[static_cast<std::size_t>(4 * row + column)] = axes(row, column);
-    }
-    o.affine[static_cast<std::size_t>(4 * row + 3)] = 10.0 * (row + 1);
-  }
+  o.affine = { axes(0, 0), axes(0, 1), axes(0, 2), 10, axes(1, 0), axes(1, 1), axes(1, 2), 20,
+    axes(2, 0), axes(2, 1), axes(2, 2), 30 };
   for (const bool big : { false, true })
   {
     for (const bool version2 : { false, true })
