@@ -408,6 +408,7 @@ private:
       vtkPolyData* data =
         this->PolyData(port, phase.fraction, 0.0, this->Job.truthOnly ? 1.0 : TruthShare);
       WritePolyData(folder.Add(name), data, this->Messages);
+      data->ReleaseData(); // not kept beside the image
       return name;
     };
     write(vtkCoronaryPhantomSource::VeinPort, "vein");
@@ -432,6 +433,7 @@ private:
         this->Progress.Update(written + (1.0 - written) * fraction);
         return Interruption() == 0;
       });
+    image->ReleaseData();
   }
 
   const PhantomJob& Job;
