@@ -20,7 +20,7 @@ common=(
 )
 paraview=(
   paraview-dev python3-paraview
-  libopenmpi-dev libdouble-conversion-dev qttools5-dev qtxmlpatterns5-dev-tools
+  libopenmpi-dev libdouble-conversion-dev libqt5svg5 qttools5-dev qtxmlpatterns5-dev-tools
   xvfb xauth
 )
 # VTK 9.1 itself can not be installed beside python3-paraview: scripts/vtk-prefix.sh unpacks it
