@@ -12,8 +12,8 @@
 #include "vtkOutputWindow.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 
+#include <algorithm>
 #include <cstdio>
-#include <regex>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -37,14 +37,22 @@ public:
 
 private:
   // VTK puts "ERROR: In file, line n" and "vtkClass (address): " before what was said.
-  static std::string Plain(const std::string& text)
+  static std::string Plain(std::string text)
   {
-    static const std::regex preamble(
-      "^(\\w+: )?In [^\\n]*, line \\d+\\n(\\w+ \\(0?x?[0-9a-f]+\\): )?");
-    static const std::regex breaks("\\s*\\n\\s*");
-    std::string plain = std::regex_replace(text, preamble, "");
-    plain.erase(plain.find_last_not_of(" \n") + 1);
-    return std::regex_replace(plain, breaks, " ");
+    const std::size_t preamble = text.find('\n');
+    if (preamble != std::string::npos && text.find("In ") < preamble)
+    {
+      text.erase(0, preamble + 1);
+    }
+    const std::size_t name = text.find(' ');
+    const std::size_t end = text.find("): ");
+    if (end != std::string::npos && text.compare(name, 4, " (0x") == 0)
+    {
+      text.erase(0, end + 3);
+    }
+    text.erase(text.find_last_not_of(" \n") + 1);
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return text;
   }
 };
 
