@@ -707,7 +707,7 @@ void vtkGatedImageReader::FillSeeds(vtkPolyData* output)
   points->SetDataTypeToDouble();
   vtkNew<vtkCellArray> vertices;
   vtkNew<vtkStringArray> names;
-  names->SetName("Name");
+  names->SetName(vtkCoronaryArrayNames::Name);
   for (const auto& seed : this->State->Series->Seeds())
   {
     const vtkIdType id = points->InsertNextPoint(seed.position.data());

@@ -24,6 +24,12 @@ constexpr const char* SegmentIds = "SegmentIds";     ///< int, coronary::Segment
 constexpr const char* Displacement = "Displacement"; ///< double[3], mm from the reference position
 constexpr const char* Velocity = "Velocity";         ///< double[3], mm/s
 
+constexpr const char* Visibility = "Visibility"; ///< double, 0 lost .. 1 full contrast
+
+// Points with a meaning of their own (ostia, seeds), point data.
+constexpr const char* Name = "Name"; ///< string
+constexpr const char* Axis = "Axis"; ///< double[3], unit vector
+
 // Centerline tree, cell data.
 constexpr const char* GroupIds = "GroupIds";                 ///< int, one id a branch
 constexpr const char* ParentGroupIds = "ParentGroupIds";     ///< int, -1 at a root

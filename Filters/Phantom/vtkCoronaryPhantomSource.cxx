@@ -233,7 +233,7 @@ void FillTree(const coronary::PhantomTree& tree, vtkPolyData* output)
   AddValues<vtkIntArray>(points, names::SegmentIds, tree.segmentId);
   AddVectors(points, names::Displacement, tree.displacement);
   AddVectors(points, names::Velocity, tree.velocity);
-  AddValues<vtkDoubleArray>(points, "Visibility", tree.visibility);
+  AddValues<vtkDoubleArray>(points, names::Visibility, tree.visibility);
 
   vtkCellData* cells = output->GetCellData();
   const auto addInts = [&](const char* name, int PhantomBranch::*member)
@@ -309,8 +309,8 @@ void FillOstia(const std::vector<coronary::PhantomOstium>& ostia, vtkPolyData* o
   }
   output->SetPoints(MakePoints(positions));
   output->SetVerts(vertices);
-  AddValues<vtkStringArray>(output->GetPointData(), "Name", labels);
-  AddVectors(output->GetPointData(), "Axis", axes);
+  AddValues<vtkStringArray>(output->GetPointData(), vtkCoronaryArrayNames::Name, labels);
+  AddVectors(output->GetPointData(), vtkCoronaryArrayNames::Axis, axes);
   AddValues<vtkDoubleArray>(output->GetPointData(), vtkCoronaryArrayNames::Radius, radii);
 }
 
