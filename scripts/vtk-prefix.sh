@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Prints the folder of a plain VTK 9.1's CMake package (for VTK_DIR), and makes it when missing.
 #
-# Debian's libvtk9-dev can not be installed beside python3-paraview, so its packages are unpacked
-# into build/vtk-9.1: inside the checkout, because removing the checkout then leaves nothing
-# behind, and because fetching them again takes seconds (28 MB).
+# Debian's libvtk9-dev can not be installed beside python3-paraview, so its packages (28 MB) are
+# unpacked into ~/.cache/dynamiccoronary/vtk-9.1. Not into the build folder: what is installed
+# from the vtk tree must still find its VTK when the checkout is gone, and CMake keeps no run path
+# that leads into the source tree.
 set -euo pipefail
 
-root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 packages=(libvtk9-dev libvtk9.1 python3-vtk9)
 
 if [ -n "${DYNAMICCORONARY_VTK_DIR:-}" ]; then
@@ -23,7 +23,8 @@ if [ -f "$installed/vtk-config.cmake" ] \
   exit 0
 fi
 
-prefix="$root/build/vtk-9.1"
+cache="${XDG_CACHE_HOME:-${HOME:-$(cd ~ && pwd)}/.cache}/dynamiccoronary"
+prefix="$cache/vtk-9.1"
 if [ -f "$prefix/usr/lib/$triplet/cmake/vtk-9.1/vtk-config.cmake" ]; then
   echo "$prefix/usr/lib/$triplet/cmake/vtk-9.1"
   exit 0
@@ -36,8 +37,8 @@ for tool in apt-get dpkg patchelf; do
   fi
 done
 
-mkdir -p "$root/build"
-work="$(mktemp -d "$root/build/vtk-9.1.XXXXXX")"
+mkdir -p "$cache"
+work="$(mktemp -d "$cache/vtk-9.1.XXXXXX")"
 trap 'rm -rf "$work"' EXIT
 
 fetch() {
