@@ -245,7 +245,8 @@ void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& m
 std::vector<SeriesDescription::Seed> SeedsOf(vtkPolyData* ostia)
 {
   std::vector<SeriesDescription::Seed> seeds;
-  auto* names = vtkStringArray::SafeDownCast(ostia->GetPointData()->GetAbstractArray("Name"));
+  auto* names = vtkStringArray::SafeDownCast(
+    ostia->GetPointData()->GetAbstractArray(vtkCoronaryArrayNames::Name));
   for (vtkIdType i = 0; names && i < ostia->GetNumberOfPoints(); ++i)
   {
     SeriesDescription::Seed seed;
