@@ -1,0 +1,104 @@
+/**
+ * @file MultiscaleVesselness.h
+ * @brief Hessian vesselness over several scales, in millimetres, on anisotropic voxels.
+ *
+ * Eq. 1 and 2 of the paper (Frangi et al., MICCAI 1998), and two relatives: Sato et al., Med Image
+ * Anal 1998;2:143, and Jerman et al., IEEE Trans Med Imaging 2016;35:2107.
+ */
+#ifndef DynamicCoronary_MultiscaleVesselness_h
+#define DynamicCoronary_MultiscaleVesselness_h
+
+#include "Geometry.h"
+#include "ParallelFor.h"
+
+namespace coronary
+{
+enum class VesselnessMethod : int
+{
+  Frangi = 0,
+  Sato = 1,
+  Jerman = 2
+};
+
+struct VesselnessSettings
+{
+  VesselnessMethod method = VesselnessMethod::Frangi;
+  std::vector<double> sigmas; ///< standard deviations of the scales, mm, positive
+  bool bright = true;         ///< vessels are brighter than their surroundings
+  double alpha = 0.5;         ///< Frangi: plate against line; Sato: weight where lambda 1 > 0
+  double beta = 0.5;          ///< Frangi: blob against line
+  double c = 100.0;           ///< Frangi: Hessian norm at which structure counts, HU
+  double tau = 0.75;          ///< Jerman: uniformity, 0.5 to 1
+  double jermanCutoff = 0.0;  ///< Jerman: largest |lambda 3| over the sequence, HU
+
+  /// @throws std::invalid_argument that names the first setting that is out of range
+  void Validate() const;
+};
+
+/// `count` scales from low to high in mm, with equal differences or equal ratios.
+std::vector<double> VesselnessScales(double low, double high, int count, bool logarithmic);
+
+/// Part of an image in memory.
+struct VoxelBlock
+{
+  const float* values;       ///< i fastest
+  std::array<int, 6> extent; ///< inclusive
+};
+
+class MultiscaleVesselness
+{
+public:
+  /**
+   * @param settings  see there
+   * @param spacing   mm, positive
+   * @param whole     extent of the whole image: beyond it the border voxels are repeated
+   */
+  MultiscaleVesselness(
+    const VesselnessSettings& settings, const Vector3& spacing, const std::array<int, 6>& whole);
+
+  /// How many voxels around a part its result depends on, along each axis.
+  std::array<int, 3> Halo() const;
+
+  struct Output
+  {
+    float* vesselness = nullptr; ///< 0 to 1 (Frangi, Jerman); Sato: HU
+    float* scale = nullptr;      ///< sigma of the maximum, mm, 0 where there is none; may be null
+    float* direction = nullptr;  ///< 3 values a voxel: unit axis in index directions; may be null
+  };
+
+  /**
+   * Computes the voxels of `part`. The same bits however the image is cut into parts. A voxel that
+   * is not a number gives 0 as far as a kernel reaches from it.
+   *
+   * @param input   must hold `part` grown by Halo(), as far as that lies in the whole image
+   * @param mask    one value for each voxel of `part`, 0: leave out (result 0); may be null
+   * @throws Cancelled
+   */
+  void Compute(const VoxelBlock& input, const std::array<int, 6>& part, const unsigned char* mask,
+    const Output& output, const ProgressCallback& progress = {}) const;
+
+  /**
+   * The largest Frobenius norm of the normalised Hessian over the part and all scales, HU; and the
+   * largest -lambda 3. Half the first is Frangi's usual c.
+   */
+  struct Extremes
+  {
+    double hessianNorm = 0.0;
+    double lambda3 = 0.0;
+  };
+  Extremes Measure(const VoxelBlock& input, const std::array<int, 6>& part,
+    const ProgressCallback& progress = {}) const;
+
+private:
+  template <typename Consumer>
+  void ForEachRow(const VoxelBlock& input, const std::array<int, 6>& part, const Consumer& consume,
+    const ProgressCallback& progress) const;
+
+  VesselnessSettings Settings;
+  Vector3 Spacing;
+  std::array<int, 6> Whole;
+  std::vector<std::array<std::vector<float>, 9>> Taps; ///< [scale][3 * axis + derivative]
+};
+}
+
+#endif
