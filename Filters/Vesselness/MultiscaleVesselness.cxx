@@ -1,38 +1,24 @@
 #include "MultiscaleVesselness.h"
 
+#include "VesselnessKernels.h"
+
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <mutex>
 #include <stdexcept>
 #include <string>
-
-// One build runs on every x86-64, and uses the wide registers of those that have them. Not under
-// sanitizers: their runtime is not there yet when the loader chooses a clone.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) &&                             \
-  !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
-#define CORONARY_CLONES                                                                            \
-  __attribute__((target_clones("arch=skylake-avx512", "arch=haswell", "default")))
-#else
-#define CORONARY_CLONES
-#endif
-// A function that stayed a call would keep the loop around it from becoming vector code.
-#define CORONARY_INLINE __attribute__((always_inline)) inline
 
 namespace coronary
 {
 namespace
 {
-/// Samples that are worked on at a time. Rows are padded to it, so that a voxel goes through the
-/// same instructions wherever a part begins.
-constexpr int Lanes = 16;
 constexpr int BandRows = 48;
 
 int Padded(int n)
 {
-  return (n + Lanes - 1) / Lanes * Lanes;
+  return (n + VesselnessLanes - 1) / VesselnessLanes * VesselnessLanes;
 }
 
 /**
@@ -96,363 +82,25 @@ std::vector<float> HalfKernel(double sigma, double spacing, int order)
   return std::vector<float>(kernel.begin(), kernel.end());
 }
 
-/// out0..2 = smooth, first and second derivative across rows of equal stride.
-CORONARY_CLONES void FilterThree(const float* const* rows, int radius, const float* k0,
-  const float* k1, const float* k2, int width, float* out0, float* out1, float* out2)
+/// The widest loops that this processor runs.
+const VesselnessKernels& Kernels()
 {
-  for (int x = 0; x < width; x += Lanes)
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static const VesselnessKernels& kernels = []() -> const VesselnessKernels&
   {
-    float a0[Lanes];
-    float a1[Lanes];
-    float a2[Lanes];
-    const float* centre = rows[radius] + x;
-    for (int i = 0; i < Lanes; ++i)
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl"))
     {
-      a0[i] = k0[0] * centre[i];
-      a1[i] = 0.0f;
-      a2[i] = k2[0] * centre[i];
+      return VesselnessKernelsAvx512;
     }
-    for (int t = 1; t <= radius; ++t)
-    {
-      const float* plus = rows[radius + t] + x;
-      const float* minus = rows[radius - t] + x;
-      const float w0 = k0[t];
-      const float w1 = k1[t];
-      const float w2 = k2[t];
-      for (int i = 0; i < Lanes; ++i)
-      {
-        const float sum = plus[i] + minus[i];
-        a0[i] += w0 * sum;
-        a1[i] += w1 * (plus[i] - minus[i]);
-        a2[i] += w2 * sum;
-      }
-    }
-    for (int i = 0; i < Lanes; ++i)
-    {
-      out0[x + i] = a0[i];
-      out1[x + i] = a1[i];
-      out2[x + i] = a2[i];
-    }
-  }
-}
-
-/// Smooth and first derivative.
-CORONARY_CLONES void FilterTwo(const float* const* rows, int radius, const float* k0,
-  const float* k1, int width, float* out0, float* out1)
-{
-  for (int x = 0; x < width; x += Lanes)
-  {
-    float a0[Lanes];
-    float a1[Lanes];
-    const float* centre = rows[radius] + x;
-    for (int i = 0; i < Lanes; ++i)
-    {
-      a0[i] = k0[0] * centre[i];
-      a1[i] = 0.0f;
-    }
-    for (int t = 1; t <= radius; ++t)
-    {
-      const float* plus = rows[radius + t] + x;
-      const float* minus = rows[radius - t] + x;
-      const float w0 = k0[t];
-      const float w1 = k1[t];
-      for (int i = 0; i < Lanes; ++i)
-      {
-        a0[i] += w0 * (plus[i] + minus[i]);
-        a1[i] += w1 * (plus[i] - minus[i]);
-      }
-    }
-    for (int i = 0; i < Lanes; ++i)
-    {
-      out0[x + i] = a0[i];
-      out1[x + i] = a1[i];
-    }
-  }
-}
-
-CORONARY_CLONES void FilterOne(
-  const float* const* rows, int radius, const float* k0, int width, float* out0)
-{
-  for (int x = 0; x < width; x += Lanes)
-  {
-    float a0[Lanes];
-    const float* centre = rows[radius] + x;
-    for (int i = 0; i < Lanes; ++i)
-    {
-      a0[i] = k0[0] * centre[i];
-    }
-    for (int t = 1; t <= radius; ++t)
-    {
-      const float* plus = rows[radius + t] + x;
-      const float* minus = rows[radius - t] + x;
-      const float w0 = k0[t];
-      for (int i = 0; i < Lanes; ++i)
-      {
-        a0[i] += w0 * (plus[i] + minus[i]);
-      }
-    }
-    for (int i = 0; i < Lanes; ++i)
-    {
-      out0[x + i] = a0[i];
-    }
-  }
-}
-
-/// Along the row: `in` has `radius` samples before the first and after the last output.
-CORONARY_CLONES void FilterAlong(
-  const float* in, int radius, const float* k, bool odd, int width, float* out)
-{
-  const float sign = odd ? -1.0f : 1.0f;
-  for (int x = 0; x < width; x += Lanes)
-  {
-    float a[Lanes];
-    const float* centre = in + radius + x;
-    for (int i = 0; i < Lanes; ++i)
-    {
-      a[i] = odd ? 0.0f : k[0] * centre[i];
-    }
-    for (int t = 1; t <= radius; ++t)
-    {
-      const float* plus = centre + t;
-      const float* minus = centre - t;
-      const float w = k[t];
-      for (int i = 0; i < Lanes; ++i)
-      {
-        a[i] += w * (plus[i] + sign * minus[i]);
-      }
-    }
-    for (int i = 0; i < Lanes; ++i)
-    {
-      out[x + i] = a[i];
-    }
-  }
-}
-
-/// Second derivatives of the voxels of one row at one scale, times sigma squared.
-struct HessianRow
-{
-  const float* xx;
-  const float* yy;
-  const float* zz;
-  const float* xy;
-  const float* xz;
-  const float* yz;
-};
-
-/// Eigenvalues by the trigonometric formula, ascending; exact to about 1e-4 of the norm.
-CORONARY_INLINE void Eigenvalues(float xx, float yy, float zz, float xy, float xz, float yz,
-  float& low, float& middle, float& high)
-{
-  const float mean = (xx + yy + zz) * (1.0f / 3.0f);
-  const float a = xx - mean;
-  const float b = yy - mean;
-  const float c = zz - mean;
-  const float off = xy * xy + xz * xz + yz * yz;
-  const float p = std::sqrt((a * a + b * b + c * c + 2.0f * off) * (1.0f / 6.0f)) + 1e-20f;
-  const float inverse = 1.0f / p;
-  const float na = a * inverse;
-  const float nb = b * inverse;
-  const float nc = c * inverse;
-  const float nxy = xy * inverse;
-  const float nxz = xz * inverse;
-  const float nyz = yz * inverse;
-  float r = 0.5f *
-    (na * (nb * nc - nyz * nyz) - nxy * (nxy * nc - nyz * nxz) + nxz * (nxy * nyz - nb * nxz));
-  r = r < -1.0f ? -1.0f : (r > 1.0f ? 1.0f : r);
-  // acos: Abramowitz and Stegun 4.4.46, error 2e-8.
-  const float m = std::fabs(r);
-  float angle = -0.0012624911f;
-  angle = angle * m + 0.0066700901f;
-  angle = angle * m - 0.0170881256f;
-  angle = angle * m + 0.0308918810f;
-  angle = angle * m - 0.0501743046f;
-  angle = angle * m + 0.0889789874f;
-  angle = angle * m - 0.2145988016f;
-  angle = angle * m + 1.5707963050f;
-  angle *= std::sqrt(1.0f - m);
-  angle = 1.57079633f - std::copysign(1.57079633f - angle, r);
-  const float f = angle * (1.0f / 3.0f);
-  // Taylor series on [0, pi/3]: error below 1e-7.
-  const float f2 = f * f;
-  const float cosine = 1.0f +
-    f2 *
-      (-0.5f +
-        f2 * (4.16666667e-2f + f2 * (-1.38888889e-3f + f2 * (2.48015873e-5f - f2 * 2.7557e-7f))));
-  const float sine = f *
-    (1.0f +
-      f2 * (-1.66666667e-1f + f2 * (8.33333333e-3f + f2 * (-1.98412698e-4f + f2 * 2.7557e-6f))));
-  high = mean + 2.0f * p * cosine;
-  low = mean - p * (cosine + 1.73205081f * sine);
-  middle = mean - p * (cosine - 1.73205081f * sine);
-}
-
-/// exp(-x) for x >= 0, relative error 3e-7.
-CORONARY_INLINE float ExpMinus(float x)
-{
-  x = x > 80.0f ? 80.0f : x;
-  const float y = -1.44269504f * x;
-  // One below the truncated value: f lies in (0, 1], and needs no floor().
-  const std::int32_t whole = static_cast<std::int32_t>(y) - 1;
-  const float f = y - static_cast<float>(whole);
-  float p = 1.5353362e-4f;
-  p = p * f + 1.3398874e-3f;
-  p = p * f + 9.6184373e-3f;
-  p = p * f + 5.5503324e-2f;
-  p = p * f + 2.4022648e-1f;
-  p = p * f + 6.9314720e-1f;
-  p = p * f + 1.0f;
-  const std::int32_t bits = (whole + 127) << 23;
-  float power;
-  std::memcpy(&power, &bits, sizeof(power));
-  return p * power;
-}
-
-/// Any voxel of the block whose two strongest eigenvalues can both be negative?
-CORONARY_INLINE bool AnyNegativeTrace(const HessianRow& h, int x, float sign)
-{
-  float least = 0.0f;
-  for (int i = 0; i < Lanes; ++i)
-  {
-    const float trace = sign * (h.xx[x + i] + h.yy[x + i] + h.zz[x + i]);
-    least = trace < least ? trace : least;
-  }
-  return least < 0.0f;
-}
-
-struct RowParameters
-{
-  float sign; ///< -1 turns dark vessels into bright ones
-  float minusHalfAlpha;
-  float minusHalfBeta;
-  float halfC;
-};
-
-CORONARY_CLONES void FrangiRow(
-  const HessianRow& h, const RowParameters& parameters, int width, float* result)
-{
-  for (int x = 0; x < width; x += Lanes)
-  {
-    if (!AnyNegativeTrace(h, x, parameters.sign))
-    {
-      std::memset(result + x, 0, Lanes * sizeof(float));
-      continue;
-    }
-    // In steps over small arrays: as one loop the compiler moves work behind the final condition,
-    // and no vector code comes of it.
-    float plate[Lanes];
-    float blob[Lanes];
-    float structure[Lanes];
-    float vessel[Lanes];
-    for (int i = 0; i < Lanes; ++i)
-    {
-      const float s = parameters.sign;
-      const float xx = s * h.xx[x + i];
-      const float yy = s * h.yy[x + i];
-      const float zz = s * h.zz[x + i];
-      const float xy = s * h.xy[x + i];
-      const float xz = s * h.xz[x + i];
-      const float yz = s * h.yz[x + i];
-      float l3;
-      float l2;
-      float l1;
-      Eigenvalues(xx, yy, zz, xy, xz, yz, l3, l2, l1);
-      const float norm = xx * xx + yy * yy + zz * zz + 2.0f * (xy * xy + xz * xz + yz * yz);
-      // Both strong curvatures negative: l1 may be positive, but weaker than l2.
-      vessel[i] = l2 + (l1 > 0.0f ? l1 : 0.0f);
-      const float safe2 = l2 < -1e-15f ? l2 : -1e-15f;
-      const float safe3 = l3 < -1e-15f ? l3 : -1e-15f;
-      const float ra = safe2 / safe3;
-      plate[i] = ra * ra * parameters.minusHalfAlpha;
-      blob[i] = l1 * l1 / (safe2 * safe3) * parameters.minusHalfBeta;
-      structure[i] = norm * parameters.halfC;
-    }
-    for (int i = 0; i < Lanes; ++i)
-    {
-      plate[i] = 1.0f - ExpMinus(plate[i]);
-      structure[i] = 1.0f - ExpMinus(structure[i]);
-      blob[i] = ExpMinus(blob[i]);
-    }
-    for (int i = 0; i < Lanes; ++i)
-    {
-      const float value = plate[i] * blob[i] * structure[i];
-      result[x + i] = vessel[i] <= 0.0f ? value : 0.0f;
-    }
-  }
-}
-
-/// Sato: sqrt(-l3) sqrt(-l2) weakened where l1 is far from 0. In HU.
-CORONARY_CLONES void SatoRow(const HessianRow& h, float sign, float alpha, int width, float* result)
-{
-  for (int x = 0; x < width; x += Lanes)
-  {
-    if (!AnyNegativeTrace(h, x, sign))
-    {
-      std::memset(result + x, 0, Lanes * sizeof(float));
-      continue;
-    }
-    for (int i = x; i < x + Lanes; ++i)
-    {
-      float l3;
-      float l2;
-      float l1;
-      Eigenvalues(sign * h.xx[i], sign * h.yy[i], sign * h.zz[i], sign * h.xy[i], sign * h.xz[i],
-        sign * h.yz[i], l3, l2, l1);
-      const float a = l2 < 0.0f ? -l2 : 0.0f;
-      // l1 <= 0: linear fall; l1 > 0: only up to |l2| / alpha.
-      const float b = l1 > 0.0f ? a - alpha * l1 : a + l1;
-      const float weight = (b > 0.0f ? b : 0.0f);
-      const float lines = std::sqrt(a * (l3 < 0.0f ? -l3 : 0.0f));
-      const float ratio = weight / (a + 1e-20f);
-      result[i] = l1 <= -l2 ? lines * (ratio > 1.0f ? 1.0f : ratio) : 0.0f;
-    }
-  }
-}
-
-/// Jerman 2016, Eq. 13-15.
-CORONARY_CLONES void JermanRow(
-  const HessianRow& h, float sign, float cutoff, int width, float* result)
-{
-  for (int x = 0; x < width; x += Lanes)
-  {
-    if (!AnyNegativeTrace(h, x, sign))
-    {
-      std::memset(result + x, 0, Lanes * sizeof(float));
-      continue;
-    }
-    for (int i = x; i < x + Lanes; ++i)
-    {
-      float low;
-      float middle;
-      float high;
-      Eigenvalues(sign * h.xx[i], sign * h.yy[i], sign * h.zz[i], sign * h.xy[i], sign * h.xz[i],
-        sign * h.yz[i], low, middle, high);
-      const bool vessel = (middle < 0.0f) & (high <= -middle);
-      const float l2 = -middle;
-      const float l3 = -low;
-      const float rho = l3 > cutoff ? l3 : (l3 > 0.0f ? cutoff : 0.0f);
-      const float sum = l2 + rho;
-      const float third = 3.0f / (sum > 1e-20f ? sum : 1.0f);
-      float value = l2 * l2 * (rho - l2) * third * third * third;
-      value = l2 >= 0.5f * rho ? 1.0f : value;
-      result[i] = value * (vessel & (rho > 0.0f) ? 1.0f : 0.0f);
-    }
-  }
-}
-
-CORONARY_CLONES void NormAndLambda3(
-  const HessianRow& h, float sign, int width, float* norm, float* lambda3)
-{
-  for (int i = 0; i < width; ++i)
-  {
-    norm[i] = h.xx[i] * h.xx[i] + h.yy[i] * h.yy[i] + h.zz[i] * h.zz[i] +
-      2.0f * (h.xy[i] * h.xy[i] + h.xz[i] * h.xz[i] + h.yz[i] * h.yz[i]);
-    float low;
-    float middle;
-    float high;
-    Eigenvalues(sign * h.xx[i], sign * h.yy[i], sign * h.zz[i], sign * h.xy[i], sign * h.xz[i],
-      sign * h.yz[i], low, middle, high);
-    lambda3[i] = -low;
-  }
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
+      ? VesselnessKernelsAvx2
+      : VesselnessKernelsBaseline;
+  }();
+  return kernels;
+#else
+  return VesselnessKernelsBaseline;
+#endif
 }
 
 /// Axis of the vessel: eigenvector of the eigenvalue that is the greatest after the sign.
@@ -571,6 +219,7 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
   {
     return;
   }
+  const VesselnessKernels& kernels = Kernels();
   const int bands = (ny + BandRows - 1) / BandRows;
 
   ParallelFor(
@@ -591,6 +240,8 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
         for (std::size_t scale = 0; scale < this->Taps.size(); ++scale)
         {
           const auto& taps = this->Taps[scale];
+          const float* const kernelsY[] = { taps[3].data(), taps[4].data(), taps[5].data() };
+          const float* const kernelsZ[] = { taps[6].data(), taps[7].data(), taps[8].data() };
           const int rx = static_cast<int>(taps[0].size()) - 1;
           const int ry = static_cast<int>(taps[3].size()) - 1;
           const int rz = static_cast<int>(taps[6].size()) - 1;
@@ -627,8 +278,8 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
               rows[t + rz] = source;
             }
             const std::size_t at = static_cast<std::size_t>(y - y0) * stride;
-            FilterThree(rows.data(), rz, taps[6].data(), taps[7].data(), taps[8].data(), stride,
-              &slabs[0][at], &slabs[1][at], &slabs[2][at]);
+            float* const out[] = { &slabs[0][at], &slabs[1][at], &slabs[2][at] };
+            kernels.filterAcross(rows.data(), rz, kernelsZ, 3, stride, out);
           }
 
           // Across the rows, then along them.
@@ -662,16 +313,16 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
             }
             std::copy_n(crossed[from].data(), width, scratch.data() + (x0 - left));
             std::fill(scratch.begin() + (x1 + 1 - left), scratch.end(), crossed[from][width - 1]);
-            FilterAlong(
+            kernels.filterAlong(
               scratch.data(), rx, taps[order].data(), order == 1, packed, results[to].data());
           };
           for (int y = j0; y <= j1; ++y)
           {
-            FilterThree(gather(0, y), ry, taps[3].data(), taps[4].data(), taps[5].data(), stride,
-              crossed[0].data(), crossed[1].data(), crossed[2].data());
-            FilterTwo(gather(1, y), ry, taps[3].data(), taps[4].data(), stride, crossed[3].data(),
-              crossed[4].data());
-            FilterOne(gather(2, y), ry, taps[3].data(), stride, crossed[5].data());
+            float* const out[] = { crossed[0].data(), crossed[1].data(), crossed[2].data(),
+              crossed[3].data(), crossed[4].data(), crossed[5].data() };
+            kernels.filterAcross(gather(0, y), ry, kernelsY, 3, stride, out);
+            kernels.filterAcross(gather(1, y), ry, kernelsY, 2, stride, out + 3);
+            kernels.filterAcross(gather(2, y), ry, kernelsY, 1, stride, out + 5);
             along(0, 2, 0); // xx
             along(2, 0, 1); // yy
             along(5, 0, 2); // zz
@@ -709,13 +360,13 @@ void MultiscaleVesselness::Compute(const VoxelBlock& input, const std::array<int
       switch (this->Settings.method)
       {
         case VesselnessMethod::Frangi:
-          FrangiRow(hessian, frangi, width, response.data());
+          Kernels().frangi(hessian, frangi, width, response.data());
           break;
         case VesselnessMethod::Sato:
-          SatoRow(hessian, sign, alpha, width, response.data());
+          Kernels().sato(hessian, sign, alpha, width, response.data());
           break;
         case VesselnessMethod::Jerman:
-          JermanRow(hessian, sign, cutoff, width, response.data());
+          Kernels().jerman(hessian, sign, cutoff, width, response.data());
           break;
       }
       const std::int64_t row = ((k - part[4]) * static_cast<std::int64_t>(ny) + (j - part[2])) * nx;
@@ -768,12 +419,18 @@ MultiscaleVesselness::Extremes MultiscaleVesselness::Measure(
       thread_local std::vector<float> lambda3;
       norm.resize(width);
       lambda3.resize(width);
-      NormAndLambda3(hessian, sign, width, norm.data(), lambda3.data());
-      const double n = std::sqrt(*std::max_element(norm.begin(), norm.begin() + nx));
-      const double l = *std::max_element(lambda3.begin(), lambda3.begin() + nx);
+      Kernels().normAndLambda3(hessian, sign, width, norm.data(), lambda3.data());
+      // Not max_element: a NaN in front would hide the rest of the row.
+      float squared = 0.0f;
+      float strongest = 0.0f;
+      for (int i = 0; i < nx; ++i)
+      {
+        squared = norm[i] > squared ? norm[i] : squared;
+        strongest = lambda3[i] > strongest ? lambda3[i] : strongest;
+      }
       const std::lock_guard<std::mutex> lock(mutex);
-      extremes.hessianNorm = std::max(extremes.hessianNorm, n);
-      extremes.lambda3 = std::max(extremes.lambda3, l);
+      extremes.hessianNorm = std::max(extremes.hessianNorm, std::sqrt(double{ squared }));
+      extremes.lambda3 = std::max(extremes.lambda3, double{ strongest });
     },
     progress);
   return extremes;

@@ -36,6 +36,7 @@ struct VesselnessSettings
 };
 
 /// `count` scales from low to high in mm, with equal differences or equal ratios.
+/// @throws std::invalid_argument unless 0 < low <= high and count > 0
 std::vector<double> VesselnessScales(double low, double high, int count, bool logarithmic);
 
 /// Part of an image in memory.
@@ -45,6 +46,7 @@ struct VoxelBlock
   std::array<int, 6> extent; ///< inclusive
 };
 
+/// Largest response over the scales, from the eigenvalues of the Hessian times sigma squared.
 class MultiscaleVesselness
 {
 public:
@@ -67,12 +69,14 @@ public:
   };
 
   /**
-   * Computes the voxels of `part`. The same bits however the image is cut into parts. A voxel that
-   * is not a number gives 0 as far as a kernel reaches from it.
+   * Computes the voxels of `part`. The same bits however the image is cut into parts.
+   *
+   * Voxels that are NaN or infinite give 0 as far as the kernels of a scale reach around them.
+   * Frangi's values below 1e-6 are rounding, and become 0.
    *
    * @param input   must hold `part` grown by Halo(), as far as that lies in the whole image
    * @param mask    one value for each voxel of `part`, 0: leave out (result 0); may be null
-   * @throws Cancelled
+   * @throws Cancelled, and std::invalid_argument if the input lacks part of the halo
    */
   void Compute(const VoxelBlock& input, const std::array<int, 6>& part, const unsigned char* mask,
     const Output& output, const ProgressCallback& progress = {}) const;
