@@ -1,0 +1,70 @@
+/**
+ * @file CenterlineTree.h
+ * @brief The axes of a forest of vessels: what the stages after the image pass on.
+ *
+ * Names and conventions are those of PhantomTree (the truth), so that the two compare member by
+ * member. Positions are LPS in mm.
+ */
+#ifndef DynamicCoronary_CenterlineTree_h
+#define DynamicCoronary_CenterlineTree_h
+
+#include "Geometry.h"
+
+namespace coronary
+{
+/**
+ * Polylines over one list of points. Every tree of the forest is connected: the first point of a
+ * branch is a point of its parent, the same index and not a copy.
+ *
+ * A tree is *split* when branches touch at their ends only: the first point of a branch is then
+ * the last of its parent, and a bifurcation is a point where one branch ends and others begin.
+ * Algorithms give split trees, and take any.
+ *
+ * Per-point members other than `points` and `radius` may be empty: not known. Data of a shared
+ * point belong to the parent.
+ */
+struct CenterlineTree
+{
+  struct Branch
+  {
+    std::vector<std::int64_t> points; ///< indices from the root side to the tip, at least 2
+    int groupId = 0;                  ///< unique in the forest
+    int parentGroupId = -1;           ///< -1 at a root
+    int treeId = 0; ///< which tree of the forest; once labelled 0 left, 1 right, as the phantom's
+    // From here on filled by the topology stage.
+    int generation = 0; ///< 0 at a root
+    int strahlerOrder = 1;
+    int segmentId = 0;       ///< SegmentId of CoronaryPhantom.h, 0 unknown
+    double length = 0.0;     ///< mm
+    double tortuosity = 0.0; ///< length / chord - 1
+  };
+
+  std::vector<Vector3> points;    ///< mm
+  std::vector<double> radius;     ///< lumen radius, mm
+  std::vector<double> confidence; ///< of position and radius: 0 a guess .. 1 clearly seen
+  std::vector<double> abscissa;   ///< mm from the root along the tree
+  std::vector<int> segmentId;
+  std::vector<Branch> branches; ///< a parent stands before its daughters
+};
+
+/**
+ * @throws std::invalid_argument that says what is wrong: an array of another length than `points`, an
+ * index out of range, a branch of less than two points, a group id twice, a parent that does not
+ * exist, stands later or does not have the first point, a value that is not finite, a radius < 0.
+ */
+void CheckTree(const CenterlineTree& tree);
+
+/// Fills `abscissa` and the branches' `length` and `tortuosity`.
+/// @throws std::invalid_argument as CheckTree
+void MeasureTree(CenterlineTree& tree);
+
+/**
+ * The same forest with branches that touch at their ends only. Branches are cut where others
+ * begin, get new group ids 0, 1, ... (a parent before its daughters), and keep the other members
+ * of the branch they were cut from; length and tortuosity are measured anew.
+ * @throws std::invalid_argument as CheckTree
+ */
+CenterlineTree SplitAtBifurcations(const CenterlineTree& tree);
+}
+
+#endif

@@ -1,0 +1,136 @@
+// The tree type: what it refuses, lengths along it, cutting at bifurcations.
+
+#include "CenterlineTree.h"
+#include "CoronaryPhantom.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <stdexcept>
+
+using namespace coronary;
+
+namespace
+{
+/// A trunk along x with a side branch at its middle, and a twig on that; not split.
+CenterlineTree Comb()
+{
+  CenterlineTree tree;
+  for (int i = 0; i < 5; ++i)
+  {
+    tree.points.emplace_back(2.0 * i, 0.0, 0.0);
+  }
+  for (int i = 1; i < 4; ++i)
+  {
+    tree.points.emplace_back(4.0, 3.0 * i, 0.0);
+  }
+  tree.points.emplace_back(4.0, 3.0, 1.0);
+  tree.radius.assign(tree.points.size(), 1.5);
+  tree.branches.resize(3);
+  tree.branches[0].points = { 0, 1, 2, 3, 4 };
+  tree.branches[0].groupId = 7;
+  tree.branches[0].treeId = 1;
+  tree.branches[1].points = { 2, 5, 6, 7 };
+  tree.branches[1].groupId = 3;
+  tree.branches[1].parentGroupId = 7;
+  tree.branches[1].treeId = 1;
+  tree.branches[2].points = { 5, 8 };
+  tree.branches[2].groupId = 5;
+  tree.branches[2].parentGroupId = 3;
+  tree.branches[2].treeId = 1;
+  return tree;
+}
+
+std::string Complaint(const std::function<void(CenterlineTree&)>& damage)
+{
+  CenterlineTree tree = Comb();
+  damage(tree);
+  try
+  {
+    CheckTree(tree);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    return error.what();
+  }
+  return "";
+}
+}
+
+TEST(CenterlineTree, DamageIsNamed)
+{
+  EXPECT_EQ(Complaint([](CenterlineTree&) {}), "");
+  const auto expect = [](
+                        const std::string& part, const std::function<void(CenterlineTree&)>& damage)
+  { EXPECT_NE(Complaint(damage).find(part), std::string::npos) << Complaint(damage); };
+  expect("radius has 8", [](CenterlineTree& t) { t.radius.pop_back(); });
+  expect("confidence has 2", [](CenterlineTree& t) { t.confidence.assign(2, 1.0); });
+  expect("point 3 is not finite",
+    [](CenterlineTree& t) { t.points[3].x() = std::numeric_limits<double>::quiet_NaN(); });
+  expect("radius of point 1 is negative", [](CenterlineTree& t) { t.radius[1] = -1.0; });
+  expect("less than two points", [](CenterlineTree& t) { t.branches[2].points.pop_back(); });
+  expect("point 9, which does not exist", [](CenterlineTree& t) { t.branches[2].points[1] = 9; });
+  expect("occurs twice", [](CenterlineTree& t) { t.branches[2].groupId = 7; });
+  expect("parent 12 of branch 5", [](CenterlineTree& t) { t.branches[2].parentGroupId = 12; });
+  expect("stands later", [](CenterlineTree& t) { std::swap(t.branches[0], t.branches[1]); });
+  expect("does not begin on its parent", [](CenterlineTree& t) { t.branches[2].points[0] = 4; });
+}
+
+TEST(CenterlineTree, AbscissasRunOnFromTheParent)
+{
+  CenterlineTree tree = Comb();
+  MeasureTree(tree);
+  EXPECT_DOUBLE_EQ(tree.abscissa[4], 8.0);
+  EXPECT_DOUBLE_EQ(tree.abscissa[7], 4.0 + 9.0);
+  EXPECT_DOUBLE_EQ(tree.abscissa[8], 4.0 + 3.0 + 1.0);
+  EXPECT_DOUBLE_EQ(tree.branches[1].length, 9.0);
+  EXPECT_NEAR(tree.branches[1].tortuosity, 0.0, 1e-15);
+}
+
+TEST(CenterlineTree, SplitBranchesTouchAtTheirEnds)
+{
+  const CenterlineTree split = SplitAtBifurcations(Comb());
+  ASSERT_EQ(split.branches.size(), 5u);
+  const std::vector<std::vector<std::int64_t>> expected = { { 0, 1, 2 }, { 2, 3, 4 }, { 2, 5 },
+    { 5, 6, 7 }, { 5, 8 } };
+  const std::vector<int> parents = { -1, 0, 0, 2, 2 };
+  for (std::size_t b = 0; b < expected.size(); ++b)
+  {
+    EXPECT_EQ(split.branches[b].points, expected[b]) << b;
+    EXPECT_EQ(split.branches[b].groupId, static_cast<int>(b));
+    EXPECT_EQ(split.branches[b].parentGroupId, parents[b]) << b;
+    EXPECT_EQ(split.branches[b].treeId, 1);
+  }
+  EXPECT_DOUBLE_EQ(split.branches[3].length, 6.0);
+  // Splitting what is split changes nothing.
+  const CenterlineTree again = SplitAtBifurcations(split);
+  ASSERT_EQ(again.branches.size(), split.branches.size());
+  for (std::size_t b = 0; b < again.branches.size(); ++b)
+  {
+    EXPECT_EQ(again.branches[b].points, split.branches[b].points);
+    EXPECT_EQ(again.branches[b].parentGroupId, split.branches[b].parentGroupId);
+  }
+}
+
+TEST(CenterlineTree, ThePhantomsTreeIsOne)
+{
+  const CoronaryPhantom phantom{ PhantomSettings{} };
+  const PhantomTree truth = phantom.Tree(0.0);
+  CenterlineTree tree;
+  tree.points = truth.points;
+  tree.radius = truth.radius;
+  for (const PhantomBranch& branch : truth.branches)
+  {
+    tree.branches.emplace_back();
+    tree.branches.back().points = branch.points;
+    tree.branches.back().groupId = branch.groupId;
+    tree.branches.back().parentGroupId = branch.parentGroupId;
+  }
+  MeasureTree(tree);
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    EXPECT_NEAR(tree.branches[b].length, truth.branches[b].length, 1e-9);
+  }
+  EXPECT_EQ(SplitAtBifurcations(tree).branches.size(), tree.branches.size());
+}
