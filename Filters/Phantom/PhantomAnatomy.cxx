@@ -474,6 +474,61 @@ double TreeDistance(
   return std::numeric_limits<double>::max();
 }
 
+/// New arc lengths after the points have moved; the attachments of side vessels move along.
+void UpdateArc(std::vector<DenseVessel>& vessels, std::size_t moved)
+{
+  DenseVessel& vessel = vessels[moved];
+  const std::vector<double> before = vessel.arc;
+  ComputeArc(vessel);
+  for (DenseVessel& child : vessels)
+  {
+    if (child.parent == moved)
+    {
+      const auto index =
+        std::lower_bound(before.begin(), before.end(), child.parentArc - 1e-9) - before.begin();
+      child.parentArc = vessel.arc[std::min<std::size_t>(index, vessel.arc.size() - 1)];
+    }
+  }
+}
+
+/**
+ * Moves what runs through the aortic root, or along its wall, outwards: some random courses of the
+ * left main would have it there. A smooth map of space, so that vessels stay joined; the ostia
+ * stay where they are.
+ */
+void KeepOutOfAorta(std::vector<DenseVessel>& vessels, const AorticRoot& root,
+  const Vector3& leftOstium, const Vector3& rightOstium)
+{
+  constexpr double inner = 6.0;      // mm inside the wall
+  constexpr double outer = 8.0;      // mm outside: nothing moves from there on
+  constexpr double clearance = 4.2;  // mm outside, where `inner` goes
+  constexpr double departure = 10.0; // mm from the ostium to full clearance
+  for (DenseVessel& vessel : vessels)
+  {
+    for (Vector3& p : vessel.points)
+    {
+      const double height =
+        std::clamp((p - root.centre).dot(root.axis), -AorticRoot::Below, AorticRoot::Above);
+      const Vector3 fromAxis = p - root.centre - height * root.axis;
+      const double distance = fromAxis.norm();
+      const double outside = distance - root.radius;
+      if (outside >= outer || distance < 1e-6)
+      {
+        continue;
+      }
+      const double wanted = outside < -inner
+        ? clearance
+        : clearance + (outside + inner) * (outer - clearance) / (outer + inner);
+      const double ostium = std::min((p - leftOstium).norm(), (p - rightOstium).norm());
+      p += SmoothStep(ostium / departure) * (wanted - outside) / distance * fromAxis;
+    }
+  }
+  for (std::size_t v = 0; v < vessels.size(); ++v)
+  {
+    UpdateArc(vessels, v);
+  }
+}
+
 /**
  * Pushes vessels apart that the random courses brought too close: two points of different vessels
  * keep 0.7 mm between their walls, less only where they have just parted. Without this some seeds
@@ -577,18 +632,7 @@ void Separate(std::vector<DenseVessel>& vessels)
           vessel.points[i] += 0.6 * free * strongest * sum / weights;
         }
       }
-      // Arc lengths of attachments move along with their points.
-      const std::vector<double> before = vessel.arc;
-      ComputeArc(vessel);
-      for (DenseVessel& child : vessels)
-      {
-        if (child.parent == u)
-        {
-          const auto index =
-            std::lower_bound(before.begin(), before.end(), child.parentArc - 1e-9) - before.begin();
-          child.parentArc = vessel.arc[std::min<std::size_t>(index, vessel.arc.size() - 1)];
-        }
-      }
+      UpdateArc(vessels, u);
       attachments[u].clear();
       for (const DenseVessel& child : vessels)
       {
@@ -775,6 +819,15 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     }
   }
 
+  // The aortic root goes through both ostia.
+  this->leftOstium = dense[byName.at("LAD")].points.front();
+  this->rightOstium = dense[byName.at("RCA")].points.front();
+  this->root.centre = 0.5 * (this->leftOstium + this->rightOstium);
+  this->root.radius = 0.5 * (this->leftOstium - this->rightOstium).norm();
+  const Vector3 across = (this->leftOstium - this->rightOstium).normalized();
+  const Vector3 up(-0.30, -0.20, 0.93);
+  this->root.axis = (up - up.dot(across) * across).normalized();
+  KeepOutOfAorta(dense, this->root, this->leftOstium, this->rightOstium);
   Separate(dense);
 
   // Lesions, away from the bifurcations so that a narrowing is where it is said to be.
@@ -962,14 +1015,6 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
   this->vein = MakeVein(this->frame, dense[byName.at("LAD")], dense[byName.at("D1")].parentArc,
     dense[byName.at("LCx")], dense[byName.at("OM1")].parentArc, settings.centerlineSpacing);
 
-  // The aortic root goes through both ostia.
-  this->leftOstium = dense[byName.at("LAD")].points.front();
-  this->rightOstium = dense[byName.at("RCA")].points.front();
-  this->aorticCentre = 0.5 * (this->leftOstium + this->rightOstium);
-  this->aorticRadius = 0.5 * (this->leftOstium - this->rightOstium).norm();
-  const Vector3 across = (this->leftOstium - this->rightOstium).normalized();
-  const Vector3 up(-0.30, -0.20, 0.93);
-  this->aorticAxis = (up - up.dot(across) * across).normalized();
   const Vector3 trunk(14.0, -38.0, 8.0);
   this->pulmonaryBase = (trunk + variation(trunk) * 0.4) * this->frame.size;
   this->pulmonaryAxis = Vector3(0.15, 0.5, 0.85).normalized();

@@ -43,6 +43,16 @@ struct AxisStep
   int branch;
 };
 
+/// The aorta where the coronary arteries leave it: a capsule along the axis.
+struct AorticRoot
+{
+  static constexpr double Below = 7.0;   ///< mm from the centre to the capsule's lower focus
+  static constexpr double Above = 160.0; ///< the same for the upper one: beyond any image
+  Vector3 centre;                        ///< mm
+  Vector3 axis;                          ///< unit vector out of the heart
+  double radius;                         ///< mm
+};
+
 /// Arterial trees at rest. "Vessel" means a smooth tube with a name (the LAD from the left main to
 /// the apex); "branch" means its piece between two bifurcations, as in the output tree.
 struct PhantomAnatomy
@@ -64,9 +74,7 @@ struct PhantomAnatomy
 
   Vector3 leftOstium;
   Vector3 rightOstium;
-  Vector3 aorticCentre;  ///< centre of the aortic root, mm
-  Vector3 aorticAxis;    ///< unit vector out of the heart
-  double aorticRadius;   ///< mm
+  AorticRoot root;
   Vector3 pulmonaryBase; ///< a point on the pulmonary trunk's axis, mm
   Vector3 pulmonaryAxis;
 };
