@@ -130,7 +130,8 @@ TEST(CenterlineTree, ThePhantomsTreeIsOne)
   MeasureTree(tree);
   for (std::size_t b = 0; b < tree.branches.size(); ++b)
   {
-    EXPECT_NEAR(tree.branches[b].length, truth.branches[b].length, 1e-9);
+    // The truth's is the length of the smooth axis, at the reference.
+    EXPECT_NEAR(tree.branches[b].length, truth.branches[b].length, 3e-3 * tree.branches[b].length);
   }
   EXPECT_EQ(SplitAtBifurcations(tree).branches.size(), tree.branches.size());
 }
