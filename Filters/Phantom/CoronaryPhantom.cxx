@@ -364,6 +364,45 @@ double CoronaryPhantom::LumenDistance(const Vector3& position, double t) const
   return std::max(-farAway, this->Data->Lumen(t, farAway).Evaluate(position).distance);
 }
 
+void CoronaryPhantom::LumenDistances(const ImageGrid& grid, const std::array<int, 6>& part,
+  double t, double reach, float* distances, const ProgressCallback& progress) const
+{
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    if (part[2 * axis] < grid.extent[2 * axis] || part[2 * axis + 1] > grid.extent[2 * axis + 1] ||
+      !(grid.spacing[axis] > 0.0))
+    {
+      throw std::invalid_argument("CoronaryPhantom: the part must lie in the grid");
+    }
+  }
+  const double limit = std::clamp(reach, 0.0, farAway);
+  const PhantomLumen lumen = this->Data->Lumen(t, limit);
+  const std::int64_t nx = part[1] - part[0] + 1;
+  const std::int64_t ny = part[3] - part[2] + 1;
+  const std::int64_t nz = part[5] - part[4] + 1;
+  if (nx <= 0 || ny <= 0 || nz <= 0)
+  {
+    return;
+  }
+  ParallelFor(
+    ny * nz, 16,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t row = first; row < last; ++row)
+      {
+        const auto j = static_cast<double>(part[2] + row % ny);
+        const auto k = static_cast<double>(part[4] + row / ny);
+        for (std::int64_t i = 0; i < nx; ++i)
+        {
+          const Vector3 p = grid.IndexToWorld(static_cast<double>(part[0] + i), j, k);
+          distances[row * nx + i] =
+            static_cast<float>(std::clamp(lumen.Evaluate(p).distance, -limit, limit));
+        }
+      }
+    },
+    progress);
+}
+
 ImageGrid CoronaryPhantom::DefaultGrid(double spacing, double margin) const
 {
   if (!(spacing > 0.0) || !std::isfinite(spacing) || !std::isfinite(margin))

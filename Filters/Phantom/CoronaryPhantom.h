@@ -221,6 +221,15 @@ public:
   double LumenDistance(const Vector3& position, double t) const;
   static constexpr double farAway = 5.0;
 
+  /**
+   * The same at the centres of all voxels `part` of a grid, limited to +-`reach` mm (at most
+   * `farAway`): what segmentations are compared with.
+   * @param distances  room for all voxels of `part`, i fastest
+   * @throws Cancelled; std::invalid_argument for a grid that is not one
+   */
+  void LumenDistances(const ImageGrid& grid, const std::array<int, 6>& part, double t, double reach,
+    float* distances, const ProgressCallback& progress = {}) const;
+
   /// A grid around the whole tree over the whole cycle, with `margin` mm on every side.
   ImageGrid DefaultGrid(double spacing, double margin = 8.0) const;
 

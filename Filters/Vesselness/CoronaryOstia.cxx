@@ -662,6 +662,7 @@ struct Outlet
   double volume = 0.0;  ///< mm^3 of bright vessel behind it
   double azimuth = 0.0; ///< radians about the aorta: 0 left, pi/2 anterior
   double level = 0.0;   ///< mm along the aorta
+  double tubular = 0.0; ///< mean vesselness along the vessel, 0 to 1
   double shade = 0.0;   ///< mm of dark path within the first 10 mm
 };
 
@@ -765,6 +766,7 @@ private:
   float Half = 0.0f;                ///< HU at a wall
   std::vector<unsigned char> Body;  ///< 1 large body, 2 large body on the aorta
   std::vector<float> Likeness;      ///< 0 to 1: vessel
+  std::vector<float> Tubeness;      ///< vesselness, 0 to 1
   std::vector<float> Length;        ///< mm along the path from the wall; negative: not reached
   std::vector<float> Shade;         ///< mm of darkness along that path
   std::vector<std::int64_t> Root;   ///< voxel of the wall the path starts at
@@ -832,9 +834,10 @@ void OutletSearch::Vessels(const ProgressCallback& progress)
   const std::array<int, 6> extent{ 0, this->Volume.size[0] - 1, 0, this->Volume.size[1] - 1, 0,
     this->Volume.size[2] - 1 };
   const MultiscaleVesselness filter(settings, Vector3::Constant(this->Volume.spacing), extent);
+  this->Tubeness.resize(this->Volume.values.size());
   this->Likeness.resize(this->Volume.values.size());
   MultiscaleVesselness::Output output;
-  output.vesselness = this->Likeness.data();
+  output.vesselness = this->Tubeness.data();
   filter.Compute({ this->Volume.values.data(), extent }, extent, nullptr, output, progress);
   constexpr float tubular = 0.3f; // vesselness of a clear tube
   for (std::size_t p = 0; p < this->Likeness.size(); ++p)
@@ -842,7 +845,7 @@ void OutletSearch::Vessels(const ProgressCallback& progress)
     const float share = (this->Volume.values[p] - soft) / contrast;
     const float blood = std::clamp((share - 0.3f) / 0.45f, 0.0f, 1.0f);
     const float thin =
-      std::clamp((share - 0.1f) / 0.35f, 0.0f, 1.0f) * std::min(1.0f, this->Likeness[p] / tubular);
+      std::clamp((share - 0.1f) / 0.35f, 0.0f, 1.0f) * std::min(1.0f, this->Tubeness[p] / tubular);
     this->Likeness[p] = std::max(blood, thin);
   }
 }
@@ -1030,6 +1033,33 @@ bool OutletSearch::Describe(Outlet& outlet, const std::vector<std::int64_t>& mem
   std::reverse(path.begin(), path.end());
 
   constexpr double start = 10.0;
+  constexpr double least = 4.0;
+  constexpr double most = 45.0;
+  int count = 0;
+  for (const std::int64_t p : path)
+  {
+    if (this->Length[p] < least || this->Length[p] > most)
+    {
+      continue;
+    }
+    // The path need not run in the middle.
+    const std::array<int, 3> at = this->Volume.Place(p);
+    float best = 0.0f;
+    for (int k = std::max(0, at[2] - 1); k <= std::min(this->Volume.size[2] - 1, at[2] + 1); ++k)
+    {
+      for (int j = std::max(0, at[1] - 1); j <= std::min(this->Volume.size[1] - 1, at[1] + 1); ++j)
+      {
+        for (int i = std::max(0, at[0] - 1); i <= std::min(this->Volume.size[0] - 1, at[0] + 1);
+             ++i)
+        {
+          best = std::max(best, this->Tubeness[this->Volume.Index(i, j, k)]);
+        }
+      }
+    }
+    outlet.tubular += best;
+    ++count;
+  }
+  outlet.tubular /= std::max(1, count);
   for (const std::int64_t p : path)
   {
     if (this->Length[p] <= start)
@@ -1374,7 +1404,9 @@ double Suitability(const Outlet& outlet, bool left, const CoronaryOstiaSettings&
     (r > usual ? std::exp(-0.5 * std::pow((r - usual) / 0.7, 2)) : 1.0);
   // A narrow or hidden beginning may be a wall between two vessels.
   const double open = 1.0 - 0.5 * std::clamp((outlet.shade - 1.0) / 3.0, 0.0, 1.0);
-  return length * calibre * direction * open;
+  // The rims of chambers are bright and long as well, but no tubes.
+  const double tubular = std::clamp((outlet.tubular - 0.05) / 0.2, 0.0, 1.0);
+  return length * calibre * direction * open * tubular;
 }
 
 struct Choice

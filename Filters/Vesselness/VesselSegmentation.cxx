@@ -1,0 +1,1023 @@
+#include "VesselSegmentation.h"
+
+#include "DistanceTransform.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+/// What a voxel is found to be.
+enum State : unsigned char
+{
+  Unknown = 0,
+  Body = 1,   ///< aorta, chamber, great vessel
+  Vessel = 2, ///< collected
+  Band = 4    ///< near the wall of what was collected
+};
+
+ProgressCallback Part(const ProgressCallback& progress, double from, double to)
+{
+  if (!progress)
+  {
+    return {};
+  }
+  return [progress, from, to](double f) { return progress(from + (to - from) * f); };
+}
+
+/// Neighbours of a voxel: index differences and offsets.
+struct Neighbour
+{
+  int di;
+  int dj;
+  int dk;
+  std::int64_t offset;
+  float length; ///< mm
+};
+
+/// The voxel grid, and blocks of about 0.7 mm on it for what needs no more detail.
+class Lattice
+{
+public:
+  Lattice(const std::array<int, 3>& size, const Vector3& spacing)
+    : Size(size)
+    , Spacing(spacing)
+  {
+    constexpr double blockSize = 0.75; // mm
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      this->Factor[axis] =
+        std::max(1, static_cast<int>(std::floor(blockSize / spacing[axis] + 0.25)));
+      this->Blocks[axis] = (size[axis] + this->Factor[axis] - 1) / this->Factor[axis];
+      this->BlockSpacing[axis] = spacing[axis] * this->Factor[axis];
+    }
+    for (int dk = -1; dk <= 1; ++dk)
+    {
+      for (int dj = -1; dj <= 1; ++dj)
+      {
+        for (int di = -1; di <= 1; ++di)
+        {
+          if (di != 0 || dj != 0 || dk != 0)
+          {
+            this->Around.push_back({ di, dj, dk, this->Index(di, dj, dk),
+              static_cast<float>(spacing.cwiseProduct(Vector3(di, dj, dk)).norm()) });
+          }
+        }
+      }
+    }
+  }
+
+  std::int64_t Index(int i, int j, int k) const
+  {
+    return (static_cast<std::int64_t>(k) * this->Size[1] + j) * this->Size[0] + i;
+  }
+  std::array<int, 3> Place(std::int64_t p) const
+  {
+    const std::int64_t row = p / this->Size[0];
+    return { static_cast<int>(p % this->Size[0]), static_cast<int>(row % this->Size[1]),
+      static_cast<int>(row / this->Size[1]) };
+  }
+  std::int64_t Block(int a, int b, int c) const
+  {
+    return (static_cast<std::int64_t>(c) * this->Blocks[1] + b) * this->Blocks[0] + a;
+  }
+  std::int64_t BlockOf(const std::array<int, 3>& p) const
+  {
+    return this->Block(p[0] / this->Factor[0], p[1] / this->Factor[1], p[2] / this->Factor[2]);
+  }
+  bool Contains(int i, int j, int k) const
+  {
+    return i >= 0 && j >= 0 && k >= 0 && i < this->Size[0] && j < this->Size[1] &&
+      k < this->Size[2];
+  }
+  double VoxelVolume() const { return this->Spacing.prod(); }
+
+  std::array<int, 3> Size;
+  Vector3 Spacing;
+  std::array<int, 3> Factor;
+  std::array<int, 3> Blocks;
+  Vector3 BlockSpacing;
+  std::vector<Neighbour> Around; ///< the 26 neighbours
+};
+
+/// Steps 1 to 4 of the header for one type of voxel.
+template <typename T>
+class Segmentation
+{
+public:
+  Segmentation(const T* image, const ImageGrid& grid, const std::array<int, 3>& size,
+    const float* vesselness, const VesselSegmentationSettings& settings)
+    : Image(image)
+    , Vesselness(vesselness)
+    , Grid(grid)
+    , Settings(settings)
+    , L(size, grid.spacing)
+  {
+  }
+
+  VesselSegmentationResult Run(
+    const std::vector<VesselSeed>& seeds, bool probability, const ProgressCallback& progress);
+
+private:
+  struct Member
+  {
+    std::int64_t voxel;
+    float path; ///< mm from the seed
+    int seed;
+  };
+
+  float Share(std::int64_t p) const
+  {
+    return (static_cast<float>(this->Image[p]) - this->Tissue) * this->InverseContrast;
+  }
+  /// Bright as blood; or less bright, as thin vessels are, but tubular. NaN gives 0.
+  float Likelihood(std::int64_t p) const
+  {
+    const float share = this->Share(p);
+    const float blood = (share - 0.3f) * (1.0f / 0.45f);
+    const float thin = (share - 0.1f) * (1.0f / 0.35f);
+    const float tube = this->Vesselness[p] * this->InverseTubular;
+    const float dim =
+      std::min(thin > 0.0f ? thin : 0.0f, 1.0f) * std::min(tube > 0.0f ? tube : 0.0f, 1.0f);
+    return std::max(dim, std::min(blood > 0.0f ? blood : 0.0f, 1.0f));
+  }
+  std::array<int, 3> Nearest(const Vector3& world) const
+  {
+    const Vector3 index = this->Grid.spacing.cwiseInverse().cwiseProduct(
+      this->Grid.direction.transpose() * (world - this->Grid.origin));
+    return { static_cast<int>(std::lround(index[0])) - this->Grid.extent[0],
+      static_cast<int>(std::lround(index[1])) - this->Grid.extent[2],
+      static_cast<int>(std::lround(index[2])) - this->Grid.extent[4] };
+  }
+  Vector3 World(const std::array<int, 3>& p) const
+  {
+    return this->Grid.IndexToWorld(
+      p[0] + this->Grid.extent[0], p[1] + this->Grid.extent[2], p[2] + this->Grid.extent[4]);
+  }
+  /// Calls f(voxel, place) for the voxels within `radius` mm of a place.
+  template <typename F>
+  void Ball(const std::array<int, 3>& centre, double radius, const F& f) const
+  {
+    std::array<int, 3> low;
+    std::array<int, 3> high;
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const int reach = static_cast<int>(radius / this->L.Spacing[axis]);
+      low[axis] = std::max(0, centre[axis] - reach);
+      high[axis] = std::min(this->L.Size[axis] - 1, centre[axis] + reach);
+    }
+    for (int k = low[2]; k <= high[2]; ++k)
+    {
+      for (int j = low[1]; j <= high[1]; ++j)
+      {
+        for (int i = low[0]; i <= high[0]; ++i)
+        {
+          const Vector3 d =
+            this->L.Spacing.cwiseProduct(Vector3(i - centre[0], j - centre[1], k - centre[2]));
+          if (d.squaredNorm() <= radius * radius)
+          {
+            f(this->L.Index(i, j, k), std::array<int, 3>{ i, j, k });
+          }
+        }
+      }
+    }
+  }
+
+  BloodWindow MeasureWindow(const std::vector<std::array<int, 3>>& places) const;
+  void FindBodies(const ProgressCallback& progress);
+  void Collect(const std::vector<VesselSeed>& seeds, const std::vector<std::array<int, 3>>& places,
+    const ProgressCallback& progress);
+  void CutLeakage();
+  void RefineWall(std::vector<float>* probability, const ProgressCallback& progress);
+  void DropIslands();
+  void FillHoles();
+
+  const T* Image;
+  const float* Vesselness;
+  const ImageGrid& Grid;
+  const VesselSegmentationSettings& Settings;
+  Lattice L;
+  float Tissue = 0.0f;
+  float InverseContrast = 1.0f;
+  float InverseTubular = 1.0f;
+  std::vector<unsigned char> States;
+  std::vector<Member> Members; ///< in order of their path length
+  double Leakage = 0.0;        ///< mm^3
+};
+
+template <typename T>
+BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>& places) const
+{
+  // Blood: the brightest mean of 3 x 3 x 3 voxels near a seed. Tissue: the median of what is
+  // darker than half of it a little farther away; fat and air count as none.
+  constexpr double near = 2.5;
+  constexpr double far = 12.0;
+  std::vector<double> bloods;
+  std::vector<float> values;
+  for (const std::array<int, 3>& place : places)
+  {
+    double best = -std::numeric_limits<double>::infinity();
+    this->Ball(place, near,
+      [&](std::int64_t, const std::array<int, 3>& at)
+      {
+        double sum = 0.0;
+        int count = 0;
+        for (int dk = -1; dk <= 1; ++dk)
+        {
+          for (int dj = -1; dj <= 1; ++dj)
+          {
+            for (int di = -1; di <= 1; ++di)
+            {
+              if (this->L.Contains(at[0] + di, at[1] + dj, at[2] + dk))
+              {
+                sum += static_cast<double>(
+                  this->Image[this->L.Index(at[0] + di, at[1] + dj, at[2] + dk)]);
+                ++count;
+              }
+            }
+          }
+        }
+        best = std::max(best, sum / count);
+      });
+    bloods.push_back(best);
+    this->Ball(place, far,
+      [&](std::int64_t p, const std::array<int, 3>&)
+      {
+        const auto value = static_cast<float>(this->Image[p]);
+        if (value > 0.0f && value < 0.5 * best)
+        {
+          values.push_back(value);
+        }
+      });
+  }
+  BloodWindow window;
+  std::sort(bloods.begin(), bloods.end());
+  window.blood = bloods[bloods.size() / 2];
+  if (!values.empty())
+  {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    window.tissue = *middle;
+  }
+  return window;
+}
+
+template <typename T>
+void Segmentation<T>::FindBodies(const ProgressCallback& progress)
+{
+  const std::array<int, 3>& blocks = this->L.Blocks;
+  std::vector<unsigned char> blood(static_cast<std::size_t>(blocks[0]) * blocks[1] * blocks[2], 0);
+  ParallelFor(
+    blocks[2], 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      std::vector<float> sums(static_cast<std::size_t>(blocks[0]) * blocks[1]);
+      std::vector<int> counts(sums.size());
+      for (int c = static_cast<int>(first); c < last; ++c)
+      {
+        std::fill(sums.begin(), sums.end(), 0.0f);
+        std::fill(counts.begin(), counts.end(), 0);
+        const int end = std::min(this->L.Size[2], (c + 1) * this->L.Factor[2]);
+        for (int k = c * this->L.Factor[2]; k < end; ++k)
+        {
+          for (int j = 0; j < this->L.Size[1]; ++j)
+          {
+            const T* row = this->Image + this->L.Index(0, j, k);
+            const std::size_t target = static_cast<std::size_t>(j / this->L.Factor[1]) * blocks[0];
+            for (int i = 0; i < this->L.Size[0]; ++i)
+            {
+              sums[target + i / this->L.Factor[0]] += static_cast<float>(row[i]);
+              ++counts[target + i / this->L.Factor[0]];
+            }
+          }
+        }
+        for (std::size_t b = 0; b < sums.size(); ++b)
+        {
+          const float share =
+            (sums[b] / static_cast<float>(counts[b]) - this->Tissue) * this->InverseContrast;
+          blood[static_cast<std::size_t>(c) * sums.size() + b] = share > 0.5f ? 1 : 0;
+        }
+      }
+    },
+    Part(progress, 0.0, 0.3));
+  std::vector<unsigned char> body = OpenWithBall(blood.data(), blocks, this->L.BlockSpacing,
+    this->Settings.largestRadius, Part(progress, 0.3, 0.7));
+  // The rim of a body is bright as well, and no vessel unless it is tubular.
+  for (unsigned char& b : body)
+  {
+    b = b ? 0 : 1;
+  }
+  const std::vector<float> away =
+    SquaredDistanceTransform(body.data(), blocks, this->L.BlockSpacing, Part(progress, 0.7, 0.9));
+  const double rim = 1.1 * this->L.BlockSpacing.maxCoeff();
+  this->States.assign(
+    static_cast<std::size_t>(this->L.Size[0]) * this->L.Size[1] * this->L.Size[2], Unknown);
+  ParallelFor(
+    this->L.Size[2], 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (int k = static_cast<int>(first); k < last; ++k)
+      {
+        for (int j = 0; j < this->L.Size[1]; ++j)
+        {
+          for (int i = 0; i < this->L.Size[0]; ++i)
+          {
+            const std::int64_t p = this->L.Index(i, j, k);
+            const float distance = away[this->L.BlockOf({ i, j, k })];
+            if (distance <= 0.0f ||
+              (distance <= rim * rim && !(this->Vesselness[p] >= this->Settings.tubular)))
+            {
+              this->States[p] = Body;
+            }
+          }
+        }
+      }
+    },
+    Part(progress, 0.9, 1.0));
+}
+
+template <typename T>
+void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
+  const std::vector<std::array<int, 3>>& places, const ProgressCallback& progress)
+{
+  // The rim that belongs to no vessel is Body; around a seed the vessel begins in it.
+  constexpr double mouth = 6.0; // mm
+  const double ballRadius = std::max(2.0, 1.5 * this->L.Spacing.maxCoeff());
+  for (std::size_t s = 0; s < seeds.size(); ++s)
+  {
+    if (seeds[s].axis.squaredNorm() > 0.0)
+    {
+      // A cylinder along the axis, open; what lies before the ostium is aorta.
+      this->Ball(places[s], mouth,
+        [&](std::int64_t p, const std::array<int, 3>& at)
+        {
+          const Vector3 d = this->World(at) - seeds[s].position;
+          const double along = d.dot(seeds[s].axis);
+          const double across = (d - along * seeds[s].axis).norm();
+          if (along < 0.0)
+          {
+            this->States[p] = Body;
+          }
+          else if (across < 0.75 * this->Settings.largestRadius && this->States[p] == Body)
+          {
+            this->States[p] = Unknown;
+          }
+        });
+    }
+    else
+    {
+      this->Ball(places[s], ballRadius,
+        [&](std::int64_t p, const std::array<int, 3>&)
+        {
+          if (this->States[p] == Body)
+          {
+            this->States[p] = Unknown;
+          }
+        });
+    }
+  }
+
+  struct Entry
+  {
+    float path;
+    std::int64_t voxel;
+    int seed;
+    bool operator<(const Entry& other) const
+    {
+      return this->path != other.path ? this->path > other.path : this->voxel > other.voxel;
+    }
+  };
+  std::priority_queue<Entry> queue;
+  const auto weak = static_cast<float>(this->Settings.weak);
+  for (std::size_t s = 0; s < seeds.size(); ++s)
+  {
+    this->Ball(places[s], ballRadius,
+      [&](std::int64_t p, const std::array<int, 3>&)
+      {
+        if (this->States[p] == Unknown && this->Likelihood(p) >= weak)
+        {
+          queue.push({ 0.0f, p, static_cast<int>(s) });
+        }
+      });
+  }
+  const auto longest = static_cast<float>(this->Settings.longestPath);
+  std::int64_t popped = 0;
+  while (!queue.empty())
+  {
+    const Entry top = queue.top();
+    queue.pop();
+    if (this->States[top.voxel] != Unknown)
+    {
+      continue;
+    }
+    this->States[top.voxel] = Vessel;
+    this->Members.push_back({ top.voxel, top.path, top.seed });
+    if (++popped % 65536 == 0)
+    {
+      Report(progress, std::min(1.0f, top.path / longest));
+    }
+    const std::array<int, 3> at = this->L.Place(top.voxel);
+    for (const Neighbour& n : this->L.Around)
+    {
+      if (!this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk))
+      {
+        continue;
+      }
+      const std::int64_t q = top.voxel + n.offset;
+      const float path = top.path + n.length;
+      if (this->States[q] == Unknown && path <= longest && this->Likelihood(q) >= weak)
+      {
+        queue.push({ path, q, top.seed });
+      }
+    }
+  }
+}
+
+/// Slices of equal path length fall into connected pieces; a piece's parents are the pieces of the
+/// slice before that touch it.
+template <typename T>
+void Segmentation<T>::CutLeakage()
+{
+  const double thickness = std::max(1.5, 1.5 * this->L.Spacing.maxCoeff());
+  const double largestArea =
+    1.6 * 3.14159265358979 * this->Settings.largestRadius * this->Settings.largestRadius;
+  struct Piece
+  {
+    int slice = 0;
+    std::int64_t voxels = 0;
+    bool strong = false;
+    bool dropped = false;
+    bool twig = false; ///< dropped for lack of a strong voxel, which is no leakage
+  };
+  // Piece of each member, found through a map from voxels to members.
+  std::vector<std::pair<std::int64_t, std::int32_t>> order(this->Members.size());
+  for (std::size_t m = 0; m < this->Members.size(); ++m)
+  {
+    order[m] = { this->Members[m].voxel, static_cast<std::int32_t>(m) };
+  }
+  std::sort(order.begin(), order.end());
+  const auto find = [&](std::int64_t voxel) -> std::int32_t
+  {
+    const auto place = std::lower_bound(
+      order.begin(), order.end(), std::make_pair(voxel, std::numeric_limits<std::int32_t>::min()));
+    return place != order.end() && place->first == voxel ? place->second : -1;
+  };
+  const auto sliceOf = [&](std::int32_t m)
+  { return static_cast<int>(this->Members[m].path / thickness); };
+  const auto visit = [&](std::int32_t m, const auto& f)
+  {
+    const std::int64_t voxel = this->Members[m].voxel;
+    const std::array<int, 3> at = this->L.Place(voxel);
+    for (const Neighbour& n : this->L.Around)
+    {
+      if (this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk) &&
+        this->States[voxel + n.offset] == Vessel)
+      {
+        f(find(voxel + n.offset));
+      }
+    }
+  };
+  std::vector<std::int32_t> pieceOf(this->Members.size(), -1);
+  std::vector<Piece> pieces;
+  std::vector<std::int32_t> stack;
+  const auto strong = static_cast<float>(this->Settings.strong);
+  for (std::size_t m = 0; m < this->Members.size(); ++m)
+  {
+    if (pieceOf[m] >= 0)
+    {
+      continue;
+    }
+    const auto piece = static_cast<std::int32_t>(pieces.size());
+    pieces.emplace_back();
+    pieces[piece].slice = sliceOf(static_cast<std::int32_t>(m));
+    stack.assign(1, static_cast<std::int32_t>(m));
+    pieceOf[m] = piece;
+    while (!stack.empty())
+    {
+      const std::int32_t n = stack.back();
+      stack.pop_back();
+      ++pieces[piece].voxels;
+      pieces[piece].strong =
+        pieces[piece].strong || this->Likelihood(this->Members[n].voxel) >= strong;
+      visit(n,
+        [&](std::int32_t o)
+        {
+          if (pieceOf[o] < 0 && sliceOf(o) == pieces[piece].slice)
+          {
+            pieceOf[o] = piece;
+            stack.push_back(o);
+          }
+        });
+    }
+  }
+  for (Piece& piece : pieces)
+  {
+    const double area = static_cast<double>(piece.voxels) * this->L.VoxelVolume() / thickness;
+    piece.dropped = area > largestArea && piece.slice > 0;
+  }
+  // Twigs without a single strong voxel.
+  std::vector<std::pair<std::int32_t, std::int32_t>> contacts;
+  for (std::size_t m = 0; m < this->Members.size(); ++m)
+  {
+    visit(static_cast<std::int32_t>(m),
+      [&](std::int32_t o)
+      {
+        if (pieceOf[m] < pieceOf[o])
+        {
+          contacts.emplace_back(pieceOf[m], pieceOf[o]);
+        }
+      });
+  }
+  std::sort(contacts.begin(), contacts.end());
+  contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
+  std::vector<std::vector<std::int32_t>> touching(pieces.size());
+  for (const auto& [a, b] : contacts)
+  {
+    touching[a].push_back(b);
+    touching[b].push_back(a);
+  }
+  std::vector<std::int32_t> tips;
+  std::vector<int> degree(pieces.size());
+  for (std::size_t p = 0; p < pieces.size(); ++p)
+  {
+    degree[p] = static_cast<int>(touching[p].size());
+    if (degree[p] <= 1)
+    {
+      tips.push_back(static_cast<std::int32_t>(p));
+    }
+  }
+  while (!tips.empty())
+  {
+    const std::int32_t tip = tips.back();
+    tips.pop_back();
+    if (pieces[tip].strong || pieces[tip].dropped || pieces[tip].slice == 0)
+    {
+      continue;
+    }
+    pieces[tip].dropped = true;
+    pieces[tip].twig = true;
+    for (const std::int32_t next : touching[tip])
+    {
+      if (--degree[next] == 1)
+      {
+        tips.push_back(next);
+      }
+    }
+  }
+  // What can still be reached from the seeds without the dropped pieces.
+  std::vector<char> reached(this->Members.size(), 0);
+  stack.clear();
+  for (std::size_t m = 0; m < this->Members.size() && this->Members[m].path <= 0.0f; ++m)
+  {
+    reached[m] = 1;
+    stack.push_back(static_cast<std::int32_t>(m));
+  }
+  while (!stack.empty())
+  {
+    const std::int32_t n = stack.back();
+    stack.pop_back();
+    visit(n,
+      [&](std::int32_t o)
+      {
+        if (!reached[o] && !pieces[pieceOf[o]].dropped)
+        {
+          reached[o] = 1;
+          stack.push_back(o);
+        }
+      });
+  }
+  std::vector<Member> kept;
+  for (std::size_t m = 0; m < this->Members.size(); ++m)
+  {
+    if (reached[m])
+    {
+      kept.push_back(this->Members[m]);
+    }
+    else
+    {
+      this->States[this->Members[m].voxel] = Unknown;
+      this->Leakage += pieces[pieceOf[m]].twig ? 0.0 : this->L.VoxelVolume();
+    }
+  }
+  this->Members = std::move(kept);
+}
+
+template <typename T>
+void Segmentation<T>::RefineWall(std::vector<float>* probability, const ProgressCallback& progress)
+{
+  const double bandWidth = std::max(0.8, 1.2 * this->L.Spacing.maxCoeff()); // mm
+  constexpr double surroundings = 1.8; // mm: how far the local values are taken from
+  const std::array<int, 3>& blocks = this->L.Blocks;
+
+  // The band, from the members that have a neighbour outside.
+  std::vector<std::int64_t> candidates;
+  for (const Member& m : this->Members)
+  {
+    candidates.push_back(m.voxel);
+  }
+  for (std::size_t m = 0; m < this->Members.size(); ++m)
+  {
+    const std::array<int, 3> at = this->L.Place(this->Members[m].voxel);
+    const bool rim = std::any_of(this->L.Around.begin(), this->L.Around.end(),
+      [&](const Neighbour& n)
+      {
+        return this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk) &&
+          this->States[this->Members[m].voxel + n.offset] == Unknown;
+      });
+    if (rim)
+    {
+      this->Ball(at, bandWidth,
+        [&](std::int64_t p, const std::array<int, 3>&)
+        {
+          if (this->States[p] == Unknown)
+          {
+            this->States[p] = Band;
+            candidates.push_back(p);
+          }
+        });
+    }
+  }
+
+  // Lumen and surroundings by blocks: the brightest smoothed member, and the mean outside the band.
+  const std::size_t blockCount = static_cast<std::size_t>(blocks[0]) * blocks[1] * blocks[2];
+  constexpr float none = -std::numeric_limits<float>::infinity();
+  std::vector<float> lumen(blockCount, none);
+  std::array<int, 3> reach;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    reach[axis] =
+      std::max(1, static_cast<int>(std::lround(surroundings / this->L.BlockSpacing[axis])));
+  }
+  std::vector<char> wanted(blockCount, 0);
+  for (const Member& m : this->Members)
+  {
+    const std::array<int, 3> at = this->L.Place(m.voxel);
+    float sum = static_cast<float>(this->Image[m.voxel]);
+    int count = 1;
+    for (const Neighbour& n : this->L.Around)
+    {
+      if (std::abs(n.di) + std::abs(n.dj) + std::abs(n.dk) == 1 &&
+        this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk))
+      {
+        sum += static_cast<float>(this->Image[m.voxel + n.offset]);
+        ++count;
+      }
+    }
+    const std::int64_t block = this->L.BlockOf(at);
+    lumen[block] = std::max(lumen[block], sum / static_cast<float>(count));
+    if (wanted[block] == 0)
+    {
+      wanted[block] = 1;
+    }
+  }
+  const auto around = [&](std::int64_t block, int factor, const auto& f)
+  {
+    const int a = static_cast<int>(block % blocks[0]);
+    const int b = static_cast<int>(block / blocks[0] % blocks[1]);
+    const int c = static_cast<int>(block / blocks[0] / blocks[1]);
+    for (int z = std::max(0, c - factor * reach[2]);
+         z <= std::min(blocks[2] - 1, c + factor * reach[2]); ++z)
+    {
+      for (int y = std::max(0, b - factor * reach[1]);
+           y <= std::min(blocks[1] - 1, b + factor * reach[1]); ++y)
+      {
+        for (int x = std::max(0, a - factor * reach[0]);
+             x <= std::min(blocks[0] - 1, a + factor * reach[0]); ++x)
+        {
+          const Vector3 d = this->L.BlockSpacing.cwiseProduct(Vector3(x - a, y - b, z - c));
+          f(this->L.Block(x, y, z), d.squaredNorm());
+        }
+      }
+    }
+  };
+  std::vector<std::int64_t> near;
+  for (std::size_t b = 0; b < blockCount; ++b)
+  {
+    if (wanted[b] == 1)
+    {
+      around(static_cast<std::int64_t>(b), 2,
+        [&](std::int64_t other, double)
+        {
+          if (wanted[other] == 0)
+          {
+            wanted[other] = 2;
+          }
+        });
+    }
+  }
+  for (std::size_t b = 0; b < blockCount; ++b)
+  {
+    if (wanted[b] != 0)
+    {
+      near.push_back(static_cast<std::int64_t>(b));
+    }
+  }
+  std::vector<float> outsideSum(blockCount, 0.0f);
+  std::vector<float> outsideCount(blockCount, 0.0f);
+  ParallelFor(
+    static_cast<std::int64_t>(near.size()), 4096,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const std::int64_t block = near[n];
+        const std::array<int, 3> corner{ static_cast<int>(block % blocks[0]) * this->L.Factor[0],
+          static_cast<int>(block / blocks[0] % blocks[1]) * this->L.Factor[1],
+          static_cast<int>(block / blocks[0] / blocks[1]) * this->L.Factor[2] };
+        for (int k = corner[2]; k < std::min(this->L.Size[2], corner[2] + this->L.Factor[2]); ++k)
+        {
+          for (int j = corner[1]; j < std::min(this->L.Size[1], corner[1] + this->L.Factor[1]); ++j)
+          {
+            for (int i = corner[0]; i < std::min(this->L.Size[0], corner[0] + this->L.Factor[0]);
+                 ++i)
+            {
+              const std::int64_t p = this->L.Index(i, j, k);
+              if (this->States[p] == Unknown && this->Likelihood(p) < 0.5f)
+              {
+                outsideSum[block] += static_cast<float>(this->Image[p]);
+                outsideCount[block] += 1.0f;
+              }
+            }
+          }
+        }
+      }
+    },
+    Part(progress, 0.2, 0.4));
+
+  // Half way between the two, per candidate.
+  if (probability != nullptr)
+  {
+    probability->assign(this->States.size(), 0.0f);
+  }
+  const float blood = this->Tissue + 1.0f / this->InverseContrast;
+  const float softness = 0.12f / this->InverseContrast;
+  std::vector<unsigned char> inside(candidates.size(), 0);
+  ParallelFor(
+    static_cast<std::int64_t>(candidates.size()), 4096,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const std::int64_t p = candidates[n];
+        float brightest = none;
+        float sum = 0.0f;
+        float weights = 0.0f;
+        around(this->L.BlockOf(this->L.Place(p)), 1,
+          [&](std::int64_t block, double squared)
+          {
+            const auto weight = static_cast<float>(std::exp(-0.5 * squared));
+            sum += weight * outsideSum[block];
+            weights += weight * outsideCount[block];
+            if (squared <= 1.5 * 1.5)
+            {
+              brightest = std::max(brightest, lumen[block]);
+            }
+          });
+        brightest = std::min(brightest, blood);
+        const float outside = weights > 0.0f ? std::min(sum / weights, brightest) : this->Tissue;
+        const float value = static_cast<float>(this->Image[p]);
+        const float above = value - 0.5f * (brightest + outside);
+        inside[n] = above > 0.0f ? 1 : 0;
+        if (probability != nullptr && std::isfinite(above))
+        {
+          (*probability)[p] = 1.0f / (1.0f + std::exp(-above / softness));
+        }
+      }
+    },
+    Part(progress, 0.4, 1.0));
+  for (std::size_t n = 0; n < candidates.size(); ++n)
+  {
+    this->States[candidates[n]] = inside[n] ? Vessel : Unknown;
+  }
+}
+
+template <typename T>
+void Segmentation<T>::DropIslands()
+{
+  const auto least =
+    static_cast<std::size_t>(std::ceil(this->Settings.smallestIsland / this->L.VoxelVolume()));
+  constexpr unsigned char seen = 8;
+  std::vector<std::int64_t> piece;
+  for (std::size_t p = 0; p < this->States.size(); ++p)
+  {
+    if (this->States[p] != Vessel)
+    {
+      continue;
+    }
+    piece.assign(1, static_cast<std::int64_t>(p));
+    this->States[p] = seen;
+    for (std::size_t n = 0; n < piece.size(); ++n)
+    {
+      const std::array<int, 3> at = this->L.Place(piece[n]);
+      for (const Neighbour& next : this->L.Around)
+      {
+        const std::int64_t q = piece[n] + next.offset;
+        if (this->L.Contains(at[0] + next.di, at[1] + next.dj, at[2] + next.dk) &&
+          this->States[q] == Vessel)
+        {
+          this->States[q] = seen;
+          piece.push_back(q);
+        }
+      }
+    }
+    if (piece.size() < least)
+    {
+      for (const std::int64_t q : piece)
+      {
+        this->States[q] = Unknown;
+      }
+    }
+  }
+  for (unsigned char& state : this->States)
+  {
+    state = state == seen ? static_cast<unsigned char>(Vessel) : state;
+  }
+}
+
+/// Fills what is closed in on all sides: what a flood along faces from the box's border misses.
+template <typename T>
+void Segmentation<T>::FillHoles()
+{
+  std::array<int, 3> low = this->L.Size;
+  std::array<int, 3> high{ -1, -1, -1 };
+  for (std::size_t p = 0; p < this->States.size(); ++p)
+  {
+    if (this->States[p] == Vessel)
+    {
+      const std::array<int, 3> at = this->L.Place(static_cast<std::int64_t>(p));
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        low[axis] = std::min(low[axis], at[axis]);
+        high[axis] = std::max(high[axis], at[axis]);
+      }
+    }
+  }
+  if (high[0] < 0)
+  {
+    return;
+  }
+  // One voxel of margin, so that the outside is connected.
+  const std::array<int, 3> n{ high[0] - low[0] + 3, high[1] - low[1] + 3, high[2] - low[2] + 3 };
+  std::vector<unsigned char> open(static_cast<std::size_t>(n[0]) * n[1] * n[2], 0);
+  const auto vessel = [&](const std::array<int, 3>& at)
+  {
+    const int i = at[0] + low[0] - 1;
+    const int j = at[1] + low[1] - 1;
+    const int k = at[2] + low[2] - 1;
+    return this->L.Contains(i, j, k) && this->States[this->L.Index(i, j, k)] == Vessel;
+  };
+  const auto index = [&](const std::array<int, 3>& at)
+  { return (static_cast<std::size_t>(at[2]) * n[1] + at[1]) * n[0] + at[0]; };
+  std::vector<std::array<int, 3>> stack{ { 0, 0, 0 } };
+  open[0] = 1;
+  while (!stack.empty())
+  {
+    const std::array<int, 3> at = stack.back();
+    stack.pop_back();
+    for (int face = 0; face < 6; ++face)
+    {
+      std::array<int, 3> next = at;
+      next[face / 2] += face % 2 ? 1 : -1;
+      if (next[face / 2] < 0 || next[face / 2] >= n[face / 2] || open[index(next)] || vessel(next))
+      {
+        continue;
+      }
+      open[index(next)] = 1;
+      stack.push_back(next);
+    }
+  }
+  for (int k = 1; k + 1 < n[2]; ++k)
+  {
+    for (int j = 1; j + 1 < n[1]; ++j)
+    {
+      for (int i = 1; i + 1 < n[0]; ++i)
+      {
+        if (!open[index({ i, j, k })])
+        {
+          this->States[this->L.Index(i + low[0] - 1, j + low[1] - 1, k + low[2] - 1)] = Vessel;
+        }
+      }
+    }
+  }
+}
+
+template <typename T>
+VesselSegmentationResult Segmentation<T>::Run(
+  const std::vector<VesselSeed>& seeds, bool probability, const ProgressCallback& progress)
+{
+  std::vector<std::array<int, 3>> places;
+  for (std::size_t s = 0; s < seeds.size(); ++s)
+  {
+    places.push_back(this->Nearest(seeds[s].position));
+    if (!this->L.Contains(places[s][0], places[s][1], places[s][2]))
+    {
+      throw std::invalid_argument("seed " + std::to_string(s) + " is outside the image");
+    }
+  }
+  VesselSegmentationResult result;
+  result.window = this->Settings.window ? *this->Settings.window : this->MeasureWindow(places);
+  const double contrast = result.window.blood - result.window.tissue;
+  if (!(contrast > 0.0) || !std::isfinite(contrast))
+  {
+    throw std::invalid_argument(this->Settings.window
+        ? "window.blood must be above window.tissue"
+        : "nothing is brighter than its surroundings at the seeds");
+  }
+  this->Tissue = static_cast<float>(result.window.tissue);
+  this->InverseContrast = static_cast<float>(1.0 / contrast);
+  this->InverseTubular = static_cast<float>(1.0 / this->Settings.tubular);
+
+  this->FindBodies(Part(progress, 0.0, 0.3));
+  this->Collect(seeds, places, Part(progress, 0.3, 0.5));
+  result.seedVolume.assign(seeds.size(), 0.0);
+  this->CutLeakage();
+  for (const Member& m : this->Members)
+  {
+    result.seedVolume[m.seed] += this->L.VoxelVolume();
+  }
+  result.leakageVolume = this->Leakage;
+  Report(progress, 0.6);
+  if (this->Settings.refineWall || probability)
+  {
+    const std::vector<unsigned char> collected =
+      this->Settings.refineWall ? std::vector<unsigned char>() : this->States;
+    this->RefineWall(probability ? &result.probability : nullptr, Part(progress, 0.6, 0.9));
+    if (!this->Settings.refineWall)
+    {
+      this->States = collected;
+    }
+  }
+  this->DropIslands();
+  if (this->Settings.fillHoles)
+  {
+    this->FillHoles();
+  }
+  for (unsigned char& state : this->States)
+  {
+    state = state == Vessel ? 1 : 0;
+  }
+  result.mask = std::move(this->States);
+  if (probability)
+  {
+    // A filled hole is vessel; a dropped island is none.
+    for (std::size_t p = 0; p < result.mask.size(); ++p)
+    {
+      float& value = result.probability[p];
+      value = result.mask[p] ? std::max(value, 0.5f) : std::min(value, 0.5f);
+    }
+  }
+  Report(progress, 1.0);
+  return result;
+}
+}
+
+void VesselSegmentationSettings::Validate() const
+{
+  const auto check = [](bool good, const char* what)
+  {
+    if (!good)
+    {
+      throw std::invalid_argument(what);
+    }
+  };
+  check(!this->window || this->window->blood > this->window->tissue,
+    "window.blood must be above window.tissue");
+  check(this->strong >= 0.0 && this->strong <= 1.0, "strong must be 0 to 1");
+  check(this->weak > 0.0 && this->weak <= this->strong, "weak must be above 0, at most strong");
+  check(this->tubular > 0.0 && this->tubular <= 1.0, "tubular must be above 0, at most 1");
+  check(
+    this->largestRadius >= 1.0 && this->largestRadius <= 10.0, "largestRadius must be 1 to 10 mm");
+  check(
+    this->longestPath > 0.0 && std::isfinite(this->longestPath), "longestPath must be positive");
+  check(this->smallestIsland >= 0.0 && std::isfinite(this->smallestIsland),
+    "smallestIsland must not be negative");
+}
+
+VesselSegmentationResult SegmentVessels(const ScalarImage& image, const float* vesselness,
+  const std::vector<VesselSeed>& seeds, const VesselSegmentationSettings& settings,
+  bool probability, const ProgressCallback& progress)
+{
+  settings.Validate();
+  if (seeds.empty())
+  {
+    throw std::invalid_argument("there is no seed");
+  }
+  const std::array<int, 3> size = image.Dimensions();
+  if (size[0] < 1 || size[1] < 1 || size[2] < 1 || !(image.grid.spacing.minCoeff() > 0.0))
+  {
+    throw std::invalid_argument("the image is empty");
+  }
+  return std::visit(
+    [&](const auto* values)
+    {
+      Segmentation segmentation(values, image.grid, size, vesselness, settings);
+      return segmentation.Run(seeds, probability, progress);
+    },
+    image.values);
+}
+}
