@@ -451,6 +451,7 @@ void Segmentation<T>::CutLeakage()
     int slice = 0;
     std::int64_t voxels = 0;
     bool strong = false;
+    float tube = 0.0f; ///< largest vesselness
     bool dropped = false;
     bool twig = false; ///< dropped for lack of a strong voxel, which is no leakage
   };
@@ -502,6 +503,7 @@ void Segmentation<T>::CutLeakage()
       const std::int32_t n = stack.back();
       stack.pop_back();
       ++pieces[piece].voxels;
+      pieces[piece].tube = std::max(pieces[piece].tube, this->Vesselness[this->Members[n].voxel]);
       pieces[piece].strong =
         pieces[piece].strong || this->Likelihood(this->Members[n].voxel) >= strong;
       visit(n,
@@ -515,10 +517,13 @@ void Segmentation<T>::CutLeakage()
         });
     }
   }
+  // Larger than a vessel; or large, and nowhere like a tube, as the rims of chambers are.
   for (Piece& piece : pieces)
   {
     const double area = static_cast<double>(piece.voxels) * this->L.VoxelVolume() / thickness;
-    piece.dropped = area > largestArea && piece.slice > 0;
+    const bool rim = area > 0.15 * largestArea && piece.tube < 0.5 * this->Settings.tubular;
+    piece.dropped = (area > largestArea && piece.slice > 0) ||
+      (rim && thickness * piece.slice > 2.0 * this->Settings.largestRadius);
   }
   // Twigs without a single strong voxel.
   std::vector<std::pair<std::int32_t, std::int32_t>> contacts;
@@ -991,7 +996,7 @@ void VesselSegmentationSettings::Validate() const
   check(this->weak > 0.0 && this->weak <= this->strong, "weak must be above 0, at most strong");
   check(this->tubular > 0.0 && this->tubular <= 1.0, "tubular must be above 0, at most 1");
   check(
-    this->largestRadius >= 1.0 && this->largestRadius <= 10.0, "largestRadius must be 1 to 10 mm");
+    this->largestRadius >= 1.0 && this->largestRadius <= 50.0, "largestRadius must be 1 to 50 mm");
   check(
     this->longestPath > 0.0 && std::isfinite(this->longestPath), "longestPath must be positive");
   check(this->smallestIsland >= 0.0 && std::isfinite(this->smallestIsland),

@@ -44,7 +44,7 @@ struct VesselSegmentationSettings
   double strong = 0.8;         ///< likelihood of vessel that a connected piece must reach, 0 to 1
   double weak = 0.5;           ///< likelihood down to which it goes on, 0 to strong
   double tubular = 0.3;        ///< vesselness of a clear tube: (0, 1]
-  double largestRadius = 4.5;  ///< mm: what is thicker is aorta or chamber, 1 to 10
+  double largestRadius = 4.5;  ///< mm: what is thicker is aorta or chamber, 1 to 50
   double longestPath = 400.0;  ///< mm along the vessels from the seed, > 0
   double smallestIsland = 2.0; ///< mm^3: smaller pieces are dropped, >= 0
   bool fillHoles = true;       ///< fill what is enclosed by vessel
