@@ -13,6 +13,15 @@ namespace vtkCoronaryArrayNames
 // Image.
 constexpr const char* HounsfieldUnits = "HU";
 
+// Vesselness, point data.
+constexpr const char* Vesselness = "Vesselness";           ///< float, 0 to 1
+constexpr const char* VesselScale = "VesselScale";         ///< float, sigma of the maximum, mm
+constexpr const char* VesselDirection = "VesselDirection"; ///< float[3], unit axis, world
+// Vesselness, field data.
+constexpr const char* VesselnessSigmas = "VesselnessSigmas";   ///< double, mm, one value a scale
+constexpr const char* VesselnessC = "VesselnessC";             ///< double, HU
+constexpr const char* VesselnessLambda3 = "VesselnessLambda3"; ///< double, HU, one value a scale
+
 // Field data of every time-dependent output.
 constexpr const char* CycleLength = "CycleLength"; ///< double, 1 value, seconds
 constexpr const char* PhaseTime = "PhaseTime"; ///< double, 1 value, fraction of the R-R interval

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -135,8 +136,15 @@ void VesselnessSettings::Validate() const
   require(this->beta > 0.0 && std::isfinite(this->beta), "beta must be positive");
   require(this->c > 0.0 && std::isfinite(this->c), "c must be positive");
   require(this->tau >= 0.5 && this->tau <= 1.0, "tau must lie in [0.5, 1]");
-  require(this->jermanCutoff >= 0.0 && std::isfinite(this->jermanCutoff),
-    "jermanCutoff must not be negative");
+  if (this->method == VesselnessMethod::Jerman)
+  {
+    require(
+      this->jermanMaxima.size() == this->sigmas.size(), "jermanMaxima needs one value a scale");
+    for (const double maximum : this->jermanMaxima)
+    {
+      require(maximum >= 0.0 && std::isfinite(maximum), "jermanMaxima must not be negative");
+    }
+  }
 }
 
 std::vector<double> VesselnessScales(double low, double high, int count, bool logarithmic)
@@ -314,7 +322,7 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
             std::copy_n(crossed[from].data(), width, scratch.data() + (x0 - left));
             std::fill(scratch.begin() + (x1 + 1 - left), scratch.end(), crossed[from][width - 1]);
             kernels.filterAlong(
-              scratch.data(), rx, taps[order].data(), order == 1, packed, results[to].data());
+              scratch.data(), rx, taps[order].data(), order, packed, results[to].data());
           };
           for (int y = j0; y <= j1; ++y)
           {
@@ -348,7 +356,6 @@ void MultiscaleVesselness::Compute(const VoxelBlock& input, const std::array<int
     static_cast<float>(0.5 / (this->Settings.alpha * this->Settings.alpha)),
     static_cast<float>(0.5 / (this->Settings.beta * this->Settings.beta)),
     static_cast<float>(0.5 / (this->Settings.c * this->Settings.c)) };
-  const auto cutoff = static_cast<float>(this->Settings.tau * this->Settings.jermanCutoff);
   const int nx = part[1] - part[0] + 1;
   const int ny = part[3] - part[2] + 1;
   this->ForEachRow(
@@ -366,7 +373,9 @@ void MultiscaleVesselness::Compute(const VoxelBlock& input, const std::array<int
           Kernels().sato(hessian, sign, alpha, width, response.data());
           break;
         case VesselnessMethod::Jerman:
-          Kernels().jerman(hessian, sign, cutoff, width, response.data());
+          Kernels().jerman(hessian, sign,
+            static_cast<float>(this->Settings.tau * this->Settings.jermanMaxima[scale]), width,
+            response.data());
           break;
       }
       const std::int64_t row = ((k - part[4]) * static_cast<std::int64_t>(ny) + (j - part[2])) * nx;
@@ -404,33 +413,61 @@ void MultiscaleVesselness::Compute(const VoxelBlock& input, const std::array<int
     progress);
 }
 
-MultiscaleVesselness::Extremes MultiscaleVesselness::Measure(
-  const VoxelBlock& input, const std::array<int, 6>& part, const ProgressCallback& progress) const
+void MultiscaleVesselness::Extremes::Merge(const Extremes& other)
+{
+  this->hessianNorm = std::max(this->hessianNorm, other.hessianNorm);
+  this->jermanMaxima.resize(std::max(this->jermanMaxima.size(), other.jermanMaxima.size()));
+  for (std::size_t n = 0; n < other.jermanMaxima.size(); ++n)
+  {
+    this->jermanMaxima[n] = std::max(this->jermanMaxima[n], other.jermanMaxima[n]);
+  }
+}
+
+MultiscaleVesselness::Extremes MultiscaleVesselness::Measure(const VoxelBlock& input,
+  const std::array<int, 6>& part, const unsigned char* mask, const ProgressCallback& progress) const
 {
   const float sign = this->Settings.bright ? 1.0f : -1.0f;
+  const bool jerman = this->Settings.method == VesselnessMethod::Jerman;
   const int nx = part[1] - part[0] + 1;
+  const int ny = part[3] - part[2] + 1;
   std::mutex mutex;
   Extremes extremes;
+  extremes.jermanMaxima.assign(jerman ? this->Taps.size() : 0, 0.0);
   this->ForEachRow(
     input, part,
-    [&](int, int, std::size_t, int width, const HessianRow& hessian)
+    [&](int j, int k, std::size_t scale, int width, const HessianRow& hessian)
     {
-      thread_local std::vector<float> norm;
-      thread_local std::vector<float> lambda3;
-      norm.resize(width);
-      lambda3.resize(width);
-      Kernels().normAndLambda3(hessian, sign, width, norm.data(), lambda3.data());
-      // Not max_element: a NaN in front would hide the rest of the row.
-      float squared = 0.0f;
-      float strongest = 0.0f;
-      for (int i = 0; i < nx; ++i)
+      thread_local std::vector<float> measure;
+      measure.resize(width);
+      const unsigned char* inside = mask
+        ? mask + ((k - part[4]) * static_cast<std::int64_t>(ny) + (j - part[2])) * nx
+        : nullptr;
+      const auto largest = [&]
       {
-        squared = norm[i] > squared ? norm[i] : squared;
-        strongest = lambda3[i] > strongest ? lambda3[i] : strongest;
+        // Not max_element: a NaN in front would hide the rest of the row.
+        float result = 0.0f;
+        for (int i = 0; i < nx; ++i)
+        {
+          const float value = inside && !inside[i] ? 0.0f : measure[i];
+          const bool greater = value > result && value <= std::numeric_limits<float>::max();
+          result = greater ? value : result;
+        }
+        return result;
+      };
+      Kernels().squaredNorm(hessian, width, measure.data());
+      const double norm = std::sqrt(double{ largest() });
+      double strongest = 0.0;
+      if (jerman)
+      {
+        Kernels().lambda3(hessian, sign, width, measure.data());
+        strongest = largest();
       }
       const std::lock_guard<std::mutex> lock(mutex);
-      extremes.hessianNorm = std::max(extremes.hessianNorm, std::sqrt(double{ squared }));
-      extremes.lambda3 = std::max(extremes.lambda3, double{ strongest });
+      extremes.hessianNorm = std::max(extremes.hessianNorm, norm);
+      if (jerman)
+      {
+        extremes.jermanMaxima[scale] = std::max(extremes.jermanMaxima[scale], strongest);
+      }
     },
     progress);
   return extremes;

@@ -29,7 +29,8 @@ struct VesselnessSettings
   double beta = 0.5;          ///< Frangi: blob against line
   double c = 100.0;           ///< Frangi: Hessian norm at which structure counts, HU
   double tau = 0.75;          ///< Jerman: uniformity, 0.5 to 1
-  double jermanCutoff = 0.0;  ///< Jerman: largest |lambda 3| over the sequence, HU
+  /// Jerman: largest |lambda 3| of each scale over the sequence, HU; see Measure()
+  std::vector<double> jermanMaxima;
 
   /// @throws std::invalid_argument that names the first setting that is out of range
   void Validate() const;
@@ -81,17 +82,22 @@ public:
   void Compute(const VoxelBlock& input, const std::array<int, 6>& part, const unsigned char* mask,
     const Output& output, const ProgressCallback& progress = {}) const;
 
-  /**
-   * The largest Frobenius norm of the normalised Hessian over the part and all scales, HU; and the
-   * largest -lambda 3. Half the first is Frangi's usual c.
-   */
   struct Extremes
   {
-    double hessianNorm = 0.0;
-    double lambda3 = 0.0;
+    double hessianNorm = 0.0;          ///< largest Frobenius norm of the Hessian, all scales, HU
+    std::vector<double> jermanMaxima;  ///< largest |lambda 3| of each scale, HU; method Jerman only
+    void Merge(const Extremes& other); ///< of two parts
   };
+
+  /**
+   * What has to be known of a whole sequence before the first voxel of it: half the largest norm of
+   * the normalised Hessian is Frangi's usual c; Jerman's method needs the largest |lambda 3| where
+   * it is that of a bright (or dark) structure. Voxels that are NaN or infinite do not count.
+   *
+   * @param mask    as in Compute()
+   */
   Extremes Measure(const VoxelBlock& input, const std::array<int, 6>& part,
-    const ProgressCallback& progress = {}) const;
+    const unsigned char* mask, const ProgressCallback& progress = {}) const;
 
 private:
   template <typename Consumer>

@@ -29,18 +29,23 @@ INLINE void Store(float* to, const Pack& pack)
   *reinterpret_cast<LoosePack*>(to) = pack;
 }
 
+// The second derivative is taken of the differences from the centre: the same, as its kernel sums to
+// zero, but a constant gives exactly zero.
+
 /// One block of `Packs` registers, from x on; out[n] = derivative n across the rows, n < Orders.
 template <int Orders, int Packs>
 INLINE void AcrossBlock(
   const float* const* rows, int radius, const float* const* kernels, int x, float* const* out)
 {
   Pack sums[Orders][Packs];
+  Pack twice[Packs];
   for (int p = 0; p < Packs; ++p)
   {
     const Pack centre = *reinterpret_cast<const LoosePack*>(rows[radius] + x + p * PackLanes);
+    twice[p] = centre + centre;
     for (int order = 0; order < Orders; ++order)
     {
-      sums[order][p] = order == 1 ? Pack{} : kernels[order][0] * centre;
+      sums[order][p] = order == 0 ? kernels[0][0] * centre : Pack{};
     }
   }
   for (int t = 1; t <= radius; ++t)
@@ -50,9 +55,13 @@ INLINE void AcrossBlock(
       const int at = x + p * PackLanes;
       const Pack plus = *reinterpret_cast<const LoosePack*>(rows[radius + t] + at);
       const Pack minus = *reinterpret_cast<const LoosePack*>(rows[radius - t] + at);
+      const Pack even = plus + minus;
       for (int order = 0; order < Orders; ++order)
       {
-        sums[order][p] += kernels[order][t] * (order == 1 ? plus - minus : plus + minus);
+        sums[order][p] += kernels[order][t] *
+          (order == 0      ? even
+              : order == 1 ? plus - minus
+                           : even - twice[p]);
       }
     }
   }
@@ -82,14 +91,16 @@ INLINE void Across(
   }
 }
 
-template <bool Odd, int Packs>
+template <int Order, int Packs>
 INLINE void AlongBlock(const float* centre, int radius, const float* kernel, float* out)
 {
   Pack sums[Packs];
+  Pack twice[Packs];
   for (int p = 0; p < Packs; ++p)
   {
-    sums[p] =
-      Odd ? Pack{} : kernel[0] * *reinterpret_cast<const LoosePack*>(centre + p * PackLanes);
+    const Pack middle = *reinterpret_cast<const LoosePack*>(centre + p * PackLanes);
+    twice[p] = middle + middle;
+    sums[p] = Order == 0 ? kernel[0] * middle : Pack{};
   }
   for (int t = 1; t <= radius; ++t)
   {
@@ -97,7 +108,10 @@ INLINE void AlongBlock(const float* centre, int radius, const float* kernel, flo
     {
       const Pack plus = *reinterpret_cast<const LoosePack*>(centre + p * PackLanes + t);
       const Pack minus = *reinterpret_cast<const LoosePack*>(centre + p * PackLanes - t);
-      sums[p] += kernel[t] * (Odd ? plus - minus : plus + minus);
+      sums[p] += kernel[t] *
+        (Order == 0      ? plus + minus
+            : Order == 1 ? plus - minus
+                         : plus + minus - twice[p]);
     }
   }
   for (int p = 0; p < Packs; ++p)
@@ -106,17 +120,17 @@ INLINE void AlongBlock(const float* centre, int radius, const float* kernel, flo
   }
 }
 
-template <bool Odd>
+template <int Order>
 INLINE void Along(const float* in, int radius, const float* kernel, int width, float* out)
 {
   int x = 0;
   for (; x + 4 * PackLanes <= width; x += 4 * PackLanes)
   {
-    AlongBlock<Odd, 4>(in + radius + x, radius, kernel, out + x);
+    AlongBlock<Order, 4>(in + radius + x, radius, kernel, out + x);
   }
   for (; x < width; x += PackLanes)
   {
-    AlongBlock<Odd, 1>(in + radius + x, radius, kernel, out + x);
+    AlongBlock<Order, 1>(in + radius + x, radius, kernel, out + x);
   }
 }
 
@@ -136,9 +150,19 @@ void FilterAcross(const float* const* rows, int radius, const float* const* kern
   }
 }
 
-void FilterAlong(const float* in, int radius, const float* kernel, bool odd, int width, float* out)
+void FilterAlong(const float* in, int radius, const float* kernel, int order, int width, float* out)
 {
-  odd ? Along<true>(in, radius, kernel, width, out) : Along<false>(in, radius, kernel, width, out);
+  switch (order)
+  {
+    case 0:
+      Along<0>(in, radius, kernel, width, out);
+      break;
+    case 1:
+      Along<1>(in, radius, kernel, width, out);
+      break;
+    default:
+      Along<2>(in, radius, kernel, width, out);
+  }
 }
 
 /// Eigenvalues by the trigonometric formula, ascending; exact to about 1e-4 of the norm.
@@ -332,18 +356,26 @@ void JermanRow(const HessianRow& h, float sign, float cutoff, int width, float* 
   }
 }
 
-void NormAndLambda3(const HessianRow& h, float sign, int width, float* norm, float* lambda3)
+void SquaredNorm(const HessianRow& h, int width, float* result)
 {
   for (int i = 0; i < width; ++i)
   {
-    norm[i] = h.xx[i] * h.xx[i] + h.yy[i] * h.yy[i] + h.zz[i] * h.zz[i] +
+    result[i] = h.xx[i] * h.xx[i] + h.yy[i] * h.yy[i] + h.zz[i] * h.zz[i] +
       2.0f * (h.xy[i] * h.xy[i] + h.xz[i] * h.xz[i] + h.yz[i] * h.yz[i]);
+  }
+}
+
+/// Positive where the strongest negative curvature is that of a vessel.
+void Lambda3(const HessianRow& h, float sign, int width, float* result)
+{
+  for (int i = 0; i < width; ++i)
+  {
     float low;
     float middle;
     float high;
     Eigenvalues(sign * h.xx[i], sign * h.yy[i], sign * h.zz[i], sign * h.xy[i], sign * h.xz[i],
       sign * h.yz[i], low, middle, high);
-    lambda3[i] = -low;
+    result[i] = -low;
   }
 }
 }
@@ -357,6 +389,6 @@ const VesselnessKernels VesselnessKernelsAvx2
 #else
 const VesselnessKernels VesselnessKernelsBaseline{
 #endif
-  FilterAcross, FilterAlong, FrangiRow, SatoRow, JermanRow, NormAndLambda3
+  FilterAcross, FilterAlong, FrangiRow, SatoRow, JermanRow, SquaredNorm, Lambda3
 };
 }

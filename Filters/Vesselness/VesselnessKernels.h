@@ -35,11 +35,12 @@ struct VesselnessKernels
     int orders, int width, float* const* out);
   /// Along a row; `in` has `radius` samples before the first and after the last output.
   void (*filterAlong)(
-    const float* in, int radius, const float* kernel, bool odd, int width, float* out);
+    const float* in, int radius, const float* kernel, int order, int width, float* out);
   void (*frangi)(const HessianRow& h, const RowParameters& parameters, int width, float* result);
   void (*sato)(const HessianRow& h, float sign, float alpha, int width, float* result);
   void (*jerman)(const HessianRow& h, float sign, float cutoff, int width, float* result);
-  void (*normAndLambda3)(const HessianRow& h, float sign, int width, float* norm, float* lambda3);
+  void (*squaredNorm)(const HessianRow& h, int width, float* result);
+  void (*lambda3)(const HessianRow& h, float sign, int width, float* result);
 };
 
 extern const VesselnessKernels VesselnessKernelsBaseline;

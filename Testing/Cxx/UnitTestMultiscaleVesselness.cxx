@@ -262,7 +262,7 @@ TEST(MultiscaleVesselness, PartsAndThreadsGiveTheSameBits)
   {
     VesselnessSettings settings = Standard();
     settings.method = method;
-    settings.jermanCutoff = 50.0;
+    settings.jermanMaxima.assign(settings.sigmas.size(), 67.0);
     const Result whole = Filter(volume, settings);
     SetNumberOfThreads(1);
     EXPECT_EQ(whole.vesselness, Filter(volume, settings).vesselness);
@@ -325,9 +325,27 @@ TEST(MultiscaleVesselness, MaskMeasureAndConstantImage)
   EXPECT_GT(whole.vesselness[tube.Index(12, 12, 12)], 0.1f);
   EXPECT_EQ(masked[tube.Index(12, 11, 12)], whole.vesselness[tube.Index(12, 11, 12)]);
 
-  const auto extremes = filter.Measure(tube.Block(), tube.extent);
+  const auto extremes = filter.Measure(tube.Block(), tube.extent, nullptr);
   EXPECT_GT(extremes.hessianNorm, 100.0);
-  EXPECT_LE(extremes.lambda3, extremes.hessianNorm * 1.001);
+  VesselnessSettings jerman = settings;
+  jerman.method = VesselnessMethod::Jerman;
+  jerman.jermanMaxima.assign(jerman.sigmas.size(), 0.0);
+  const MultiscaleVesselness other(jerman, spacing, tube.extent);
+  const auto maxima = other.Measure(tube.Block(), tube.extent, nullptr);
+  EXPECT_EQ(maxima.hessianNorm, extremes.hessianNorm);
+  ASSERT_EQ(maxima.jermanMaxima.size(), jerman.sigmas.size());
+  for (const double maximum : maxima.jermanMaxima)
+  {
+    EXPECT_GT(maximum, 10.0);
+    EXPECT_LE(maximum, extremes.hessianNorm * 1.001);
+  }
+  // What the mask leaves out does not count; parts add up.
+  std::vector<unsigned char> none(tube.values.size(), 0);
+  EXPECT_EQ(filter.Measure(tube.Block(), tube.extent, none.data()).hessianNorm, 0.0);
+  auto merged = other.Measure(tube.Block(), { 0, 23, 0, 23, 0, 10 }, nullptr);
+  merged.Merge(other.Measure(tube.Block(), { 0, 23, 0, 23, 11, 23 }, nullptr));
+  EXPECT_EQ(merged.hessianNorm, maxima.hessianNorm);
+  EXPECT_EQ(merged.jermanMaxima, maxima.jermanMaxima);
 
   const Volume constant(20, 9, 9, spacing, [](const Vector3&) { return 37.0; });
   for (const VesselnessMethod method :
@@ -335,7 +353,7 @@ TEST(MultiscaleVesselness, MaskMeasureAndConstantImage)
   {
     VesselnessSettings any = settings;
     any.method = method;
-    any.jermanCutoff = 1.0;
+    any.jermanMaxima.assign(any.sigmas.size(), 1.0);
     for (const float value : Filter(constant, any).vesselness)
     {
       EXPECT_NEAR(value, 0.0f, 1e-3f);
