@@ -189,6 +189,7 @@ private:
   }
 
   BloodWindow MeasureWindow(const std::vector<std::array<int, 3>>& places) const;
+  double MeasureTubular(const std::vector<std::array<int, 3>>& places) const;
   void FindBodies(const ProgressCallback& progress);
   void Collect(const std::vector<VesselSeed>& seeds, const std::vector<std::array<int, 3>>& places,
     const ProgressCallback& progress);
@@ -204,6 +205,7 @@ private:
   Lattice L;
   float Tissue = 0.0f;
   float InverseContrast = 1.0f;
+  float Tubular = 1.0f; ///< vesselness of a clear tube
   float InverseTubular = 1.0f;
   std::vector<unsigned char> States;
   std::vector<Member> Members; ///< in order of their path length
@@ -265,6 +267,36 @@ BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>
     window.tissue = *middle;
   }
   return window;
+}
+
+/// Near the seeds the brightest vesselness of what is bright belongs to the vessels: most of the
+/// rest is inside of the aorta, and gives nearly none.
+template <typename T>
+double Segmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>>& places) const
+{
+  constexpr double radius = 20.0;
+  constexpr double percentile = 0.99;
+  constexpr double share = 0.45;
+  std::vector<float> values;
+  for (const std::array<int, 3>& place : places)
+  {
+    this->Ball(place, radius,
+      [&](std::int64_t p, const std::array<int, 3>&)
+      {
+        if (this->Share(p) > 0.4f && std::isfinite(this->Vesselness[p]))
+        {
+          values.push_back(this->Vesselness[p]);
+        }
+      });
+  }
+  if (values.empty())
+  {
+    return 1.0;
+  }
+  const auto place =
+    values.begin() + static_cast<std::ptrdiff_t>(percentile * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), place, values.end());
+  return *place > 0.0f ? share * *place : 1.0;
 }
 
 template <typename T>
@@ -330,7 +362,7 @@ void Segmentation<T>::FindBodies(const ProgressCallback& progress)
             const std::int64_t p = this->L.Index(i, j, k);
             const float distance = away[this->L.BlockOf({ i, j, k })];
             if (distance <= 0.0f ||
-              (distance <= rim * rim && !(this->Vesselness[p] >= this->Settings.tubular)))
+              (distance <= rim * rim && !(this->Vesselness[p] >= this->Tubular)))
             {
               this->States[p] = Body;
             }
@@ -521,7 +553,7 @@ void Segmentation<T>::CutLeakage()
   for (Piece& piece : pieces)
   {
     const double area = static_cast<double>(piece.voxels) * this->L.VoxelVolume() / thickness;
-    const bool rim = area > 0.15 * largestArea && piece.tube < 0.5 * this->Settings.tubular;
+    const bool rim = area > 0.15 * largestArea && piece.tube < 0.5f * this->Tubular;
     piece.dropped = (area > largestArea && piece.slice > 0) ||
       (rim && thickness * piece.slice > 2.0 * this->Settings.largestRadius);
   }
@@ -935,7 +967,10 @@ VesselSegmentationResult Segmentation<T>::Run(
   }
   this->Tissue = static_cast<float>(result.window.tissue);
   this->InverseContrast = static_cast<float>(1.0 / contrast);
-  this->InverseTubular = static_cast<float>(1.0 / this->Settings.tubular);
+  this->Tubular = static_cast<float>(
+    this->Settings.tubular ? *this->Settings.tubular : this->MeasureTubular(places));
+  this->InverseTubular = 1.0f / this->Tubular;
+  result.tubular = this->Tubular;
 
   this->FindBodies(Part(progress, 0.0, 0.3));
   this->Collect(seeds, places, Part(progress, 0.3, 0.5));
@@ -994,7 +1029,8 @@ void VesselSegmentationSettings::Validate() const
     "window.blood must be above window.tissue");
   check(this->strong >= 0.0 && this->strong <= 1.0, "strong must be 0 to 1");
   check(this->weak > 0.0 && this->weak <= this->strong, "weak must be above 0, at most strong");
-  check(this->tubular > 0.0 && this->tubular <= 1.0, "tubular must be above 0, at most 1");
+  check(!this->tubular || (*this->tubular > 0.0 && std::isfinite(*this->tubular)),
+    "tubular must be positive");
   check(
     this->largestRadius >= 1.0 && this->largestRadius <= 50.0, "largestRadius must be 1 to 50 mm");
   check(

@@ -41,14 +41,14 @@ struct BloodWindow
 struct VesselSegmentationSettings
 {
   std::optional<BloodWindow> window; ///< not given: measured around the seeds
-  double strong = 0.8;         ///< likelihood of vessel that a connected piece must reach, 0 to 1
-  double weak = 0.5;           ///< likelihood down to which it goes on, 0 to strong
-  double tubular = 0.3;        ///< vesselness of a clear tube: (0, 1]
-  double largestRadius = 4.5;  ///< mm: what is thicker is aorta or chamber, 1 to 50
-  double longestPath = 400.0;  ///< mm along the vessels from the seed, > 0
-  double smallestIsland = 2.0; ///< mm^3: smaller pieces are dropped, >= 0
-  bool fillHoles = true;       ///< fill what is enclosed by vessel
-  bool refineWall = true;      ///< step 4; else the collected voxels are the result
+  double strong = 0.8;           ///< likelihood of vessel that a connected piece must reach, 0 to 1
+  double weak = 0.5;             ///< likelihood down to which it goes on, 0 to strong
+  std::optional<double> tubular; ///< vesselness of a clear tube; not given: measured at the seeds
+  double largestRadius = 4.5;    ///< mm: what is thicker is aorta or chamber, 1 to 50
+  double longestPath = 400.0;    ///< mm along the vessels from the seed, > 0
+  double smallestIsland = 2.0;   ///< mm^3: smaller pieces are dropped, >= 0
+  bool fillHoles = true;         ///< fill what is enclosed by vessel
+  bool refineWall = true;        ///< step 4; else the collected voxels are the result
 
   /// @throws std::invalid_argument that names the first setting that is out of range
   void Validate() const;
@@ -59,13 +59,14 @@ struct VesselSegmentationResult
   std::vector<unsigned char> mask; ///< 1 vessel, 0 else; one value a voxel of the image
   std::vector<float> probability;  ///< 0 to 1, 0.5 at the wall; empty unless asked for
   BloodWindow window;              ///< the one that was used
+  double tubular = 0.0;            ///< the same
   std::vector<double> seedVolume;  ///< mm^3 that hang on each seed; 0: the seed reached nothing
   double leakageVolume = 0.0;      ///< mm^3 that step 3 dropped
 };
 
 /**
  * @param image       intensities; HU unless a window is given
- * @param vesselness  0 to 1, on the voxels of the image
+ * @param vesselness  not negative, on the voxels of the image
  * @param seeds       at least one, inside the image; on the wall of the aorta or in the vessel
  * @param probability whether to fill result.probability
  * @throws Cancelled, and std::invalid_argument that names the seed or setting at fault
