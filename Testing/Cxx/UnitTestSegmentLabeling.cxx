@@ -1,0 +1,439 @@
+// SCCT names on the phantom's trees: whole, and degraded as a detector would give them, in hearts of
+// other size, place and orientation.
+
+#include "CoronaryPhantom.h"
+#include "CounterRandom.h"
+#include "SegmentLabeling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <set>
+
+using namespace coronary;
+
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+
+/// What a detector does to a tree.
+struct Degradation
+{
+  double noise = 0.0;        ///< standard deviation of the points' position, mm
+  double calibreNoise = 0.0; ///< relative
+  int twigs = 0;             ///< spurious, 1 to 5 mm long
+  double lostBranches = 0.0; ///< probability that a side branch is missing
+  double lostEnds = 0.0;     ///< greatest share of a last branch that is missing
+  double greatestTurn = 0.0; ///< about each axis, radians
+  bool move = false;         ///< shift by up to 500 mm, scale by 0.8 to 1.25
+};
+
+struct Case
+{
+  CenterlineSet lines;
+  std::vector<int> truth; ///< segment of every point; -1 on a spurious twig
+};
+
+Case Degrade(const PhantomTree& tree, const Degradation& how, std::uint64_t seed)
+{
+  Case result;
+  RandomStream random(seed, 4711);
+  const auto turn = [&]() { return random.Uniform(-how.greatestTurn, how.greatestTurn + 1e-12); };
+  const Matrix3 rotation = (Eigen::AngleAxisd(turn(), Vector3::UnitX()) *
+    Eigen::AngleAxisd(turn(), Vector3::UnitY()) * Eigen::AngleAxisd(turn(), Vector3::UnitZ()))
+                             .toRotationMatrix();
+  const double scale = how.move ? random.Uniform(0.8, 1.25) : 1.0;
+  const Vector3 shift = how.move
+    ? Vector3(random.Uniform(-500, 500), random.Uniform(-500, 500), random.Uniform(-500, 500))
+    : Vector3(Vector3::Zero());
+  for (std::size_t i = 0; i < tree.points.size(); ++i)
+  {
+    result.lines.points.push_back(scale * (rotation * tree.points[i]) + shift +
+      how.noise * Vector3(random.Normal(), random.Normal(), random.Normal()));
+    result.lines.radius.push_back(
+      std::max(0.2, scale * tree.radius[i] * (1.0 + how.calibreNoise * random.Normal(3.0))));
+    result.truth.push_back(tree.segmentId[i]);
+  }
+  std::vector<int> daughters(tree.branches.size(), 0);
+  for (const PhantomBranch& branch : tree.branches)
+  {
+    if (branch.parentGroupId >= 0)
+    {
+      ++daughters[branch.parentGroupId];
+    }
+  }
+  const std::set<int> mains = { ProximalRCA, MidRCA, DistalRCA, RightPDA, LeftMain, ProximalLAD,
+    MidLAD, DistalLAD, ProximalLCx, DistalLCx, LeftPDA, RightPLB, LeftPLB };
+  for (const PhantomBranch& branch : tree.branches)
+  {
+    std::vector<std::int64_t> line = branch.points;
+    if (daughters[branch.groupId] == 0)
+    {
+      if (mains.count(branch.segmentId) == 0 && random.Uniform() < how.lostBranches)
+      {
+        continue;
+      }
+      const double kept = 1.0 - random.Uniform() * how.lostEnds;
+      line.resize(std::max<std::size_t>(
+        3, static_cast<std::size_t>(kept * static_cast<double>(line.size()))));
+    }
+    result.lines.lines.push_back(line);
+  }
+  const std::size_t real = result.lines.lines.size();
+  for (int t = 0; t < how.twigs; ++t)
+  {
+    const std::vector<std::int64_t> host =
+      result.lines.lines[static_cast<std::size_t>(random.Uniform() * static_cast<double>(real))];
+    const std::int64_t from =
+      host[static_cast<std::size_t>(random.Uniform() * static_cast<double>(host.size()))];
+    const Vector3 along = Vector3(random.Normal(), random.Normal(), random.Normal()).normalized();
+    std::vector<std::int64_t> line{ from };
+    const int steps = static_cast<int>(2.0 * random.Uniform(1.0, 5.0));
+    for (int step = 1; step <= steps; ++step)
+    {
+      const double s = 0.5 * step;
+      line.push_back(static_cast<std::int64_t>(result.lines.points.size()));
+      result.lines.points.push_back(result.lines.points[from] + s * along);
+      result.lines.radius.push_back(0.4);
+      result.truth.push_back(-1);
+    }
+    result.lines.lines.push_back(line);
+  }
+  return result;
+}
+
+/// Lengths by true and given segment.
+class Confusion
+{
+public:
+  void Add(const CenterlineTopology& tree, const std::vector<int>& truth)
+  {
+    double right = 0.0;
+    double all = 0.0;
+    for (const auto& branch : tree.branches)
+    {
+      for (std::size_t i = 1; i < branch.points.size(); ++i)
+      {
+        const double step =
+          (tree.points[branch.points[i]] - tree.points[branch.points[i - 1]]).norm();
+        const int wanted = truth[tree.source[branch.points[i]]];
+        const int given = tree.segmentId[branch.points[i]];
+        if (wanted >= 0)
+        {
+          this->Length[wanted][given] += step;
+          all += step;
+          right += wanted == given ? step : 0.0;
+        }
+      }
+    }
+    this->Worst = std::min(this->Worst, right / all);
+  }
+
+  double Right(int lastSegment) const
+  {
+    double right = 0.0;
+    double all = 0.0;
+    for (const auto& [wanted, row] : this->Length)
+    {
+      for (const auto& [given, length] : row)
+      {
+        if (wanted <= lastSegment)
+        {
+          all += length;
+          right += wanted == given ? length : 0.0;
+        }
+      }
+    }
+    return right / all;
+  }
+
+  void Print(const char* title) const
+  {
+    std::printf("%s: %.2f %% of all named length right, %.2f %% of the SCCT segments', worst tree "
+                "%.1f %%\n",
+      title, 100.0 * this->Right(1000), 100.0 * this->Right(18), 100.0 * this->Worst);
+    for (const auto& [wanted, row] : this->Length)
+    {
+      double all = 0.0;
+      for (const auto& [given, length] : row)
+      {
+        all += length;
+      }
+      std::printf("  %-6s %7.0f mm:", SegmentName(wanted).c_str(), all);
+      for (const auto& [given, length] : row)
+      {
+        std::printf(
+          " %s %.1f %%", given == 0 ? "none" : SegmentName(given).c_str(), 100.0 * length / all);
+      }
+      std::printf("\n");
+    }
+  }
+
+  double Worst = 1.0;
+
+private:
+  std::map<int, std::map<int, double>> Length;
+};
+
+PhantomTree MakeTree(std::uint64_t seed, int dominance, bool ramus, double time = 0.75)
+{
+  PhantomSettings settings;
+  settings.seed = seed;
+  settings.dominance = static_cast<Dominance>(dominance);
+  settings.ramus = ramus;
+  settings.calibre = 0.8 + 0.1 * static_cast<double>(seed % 5);
+  return CoronaryPhantom(settings).Tree(time);
+}
+}
+
+TEST(SegmentLabeling, WholeTreesOfAllDominances)
+{
+  Confusion confusion;
+  for (std::uint64_t seed = 101; seed <= 105; ++seed)
+  {
+    for (int dominance = 0; dominance < 3; ++dominance)
+    {
+      const Case whole = Degrade(MakeTree(seed, dominance, seed % 2 == 1), {}, seed);
+      CenterlineTopology tree = BuildTopology(whole.lines);
+      const LabelingResult result = LabelSegments(tree);
+      EXPECT_EQ(static_cast<int>(result.dominance), dominance) << seed;
+      EXPECT_GT(result.margin, 0.0);
+      confusion.Add(tree, whole.truth);
+      for (const auto& branch : tree.branches)
+      {
+        const int segment = whole.truth[tree.source[branch.points[1]]];
+        const bool right = segment <= 4 || segment == RightPLB || segment >= AcuteMarginal;
+        EXPECT_EQ(branch.treeId, right ? 1 : 0);
+      }
+    }
+  }
+  confusion.Print("Whole trees");
+  EXPECT_GE(confusion.Right(18), 0.99);
+  EXPECT_GE(confusion.Worst, 0.95);
+}
+
+TEST(SegmentLabeling, TheTruthOfTheMovingHeart)
+{
+  Confusion confusion;
+  for (const double time : { 0.0, 0.2, 0.35, 0.6 })
+  {
+    const Case moved = Degrade(MakeTree(106, 0, true, time), {}, 1);
+    CenterlineTopology tree = BuildTopology(moved.lines);
+    LabelSegments(tree);
+    confusion.Add(tree, moved.truth);
+  }
+  EXPECT_GE(confusion.Worst, 0.95);
+}
+
+TEST(SegmentLabeling, NoiseTwigsAndOtherPatients)
+{
+  Degradation how;
+  how.noise = 0.4;
+  how.calibreNoise = 0.1;
+  how.twigs = 10;
+  how.greatestTurn = 25.0 * Pi / 180.0;
+  how.move = true;
+  Confusion confusion;
+  for (std::uint64_t seed = 111; seed <= 115; ++seed)
+  {
+    for (int dominance = 0; dominance < 3; ++dominance)
+    {
+      const Case noisy = Degrade(MakeTree(seed, dominance, seed % 2 == 0), how, seed);
+      CenterlineTopology tree = BuildTopology(noisy.lines);
+      EXPECT_EQ(static_cast<int>(LabelSegments(tree).dominance), dominance) << seed;
+      confusion.Add(tree, noisy.truth);
+    }
+  }
+  confusion.Print("Noise, twigs, other size and orientation");
+  EXPECT_GE(confusion.Right(18), 0.97);
+}
+
+TEST(SegmentLabeling, MissingBranchesAndEnds)
+{
+  Degradation how;
+  how.noise = 0.3;
+  how.calibreNoise = 0.1;
+  how.twigs = 10;
+  how.lostBranches = 0.2;
+  how.lostEnds = 0.4;
+  how.greatestTurn = 25.0 * Pi / 180.0;
+  how.move = true;
+  Confusion confusion;
+  int wrong = 0;
+  for (std::uint64_t seed = 121; seed <= 128; ++seed)
+  {
+    for (int dominance = 0; dominance < 3; ++dominance)
+    {
+      const Case noisy = Degrade(MakeTree(seed, dominance, seed % 2 == 0), how, seed);
+      CenterlineTopology tree = BuildTopology(noisy.lines);
+      wrong += static_cast<int>(LabelSegments(tree).dominance) != dominance;
+      confusion.Add(tree, noisy.truth);
+    }
+  }
+  confusion.Print("Missing branches and ends");
+  EXPECT_GE(confusion.Right(18), 0.95);
+  EXPECT_LE(wrong, 3);
+}
+
+TEST(SegmentLabeling, AnyOrientationAndUnit)
+{
+  // The shape decides, not the way in which the patient lies.
+  const Case whole = Degrade(MakeTree(131, 0, true), {}, 1);
+  CenterlineTopology tree = BuildTopology(whole.lines);
+  const LabelingResult reference = LabelSegments(tree);
+  RandomStream random(5);
+  for (int i = 0; i < 6; ++i)
+  {
+    const Vector3 axis = Vector3(random.Normal(), random.Normal(), random.Normal()).normalized();
+    const Matrix3 turn = Eigen::AngleAxisd(random.Uniform(-Pi, Pi), axis).toRotationMatrix();
+    const double unit = i % 2 == 0 ? 1.0 : 1e-3;
+    CenterlineSet moved = whole.lines;
+    for (std::size_t p = 0; p < moved.points.size(); ++p)
+    {
+      moved.points[p] = unit * (turn * moved.points[p] + Vector3(500, -500, 500));
+      moved.radius[p] *= unit;
+    }
+    CenterlineTopology other = BuildTopology(moved);
+    const LabelingResult result = LabelSegments(other);
+    EXPECT_EQ(other.segmentId, tree.segmentId) << i;
+    EXPECT_NEAR(result.heart.size / unit, reference.heart.size, 0.02 * reference.heart.size);
+    // The heart's axes turn along.
+    const Matrix3 between = result.heart.axes * turn * reference.heart.axes.transpose();
+    EXPECT_GT(between.trace(), 1.0 + 2.0 * std::cos(5.0 * Pi / 180.0)) << i;
+  }
+}
+
+TEST(SegmentLabeling, HeartFrameOfTheMeanAnatomy)
+{
+  PhantomSettings settings;
+  settings.seed = 0;
+  const PhantomTree mean = CoronaryPhantom(settings).Tree(0.0);
+  CenterlineTopology tree = BuildTopology(Degrade(mean, {}, 1).lines);
+  const LabelingResult result = LabelSegments(tree);
+  // Axes of Dodge's points (docs/phantom.md).
+  EXPECT_GT(
+    result.heart.axes.row(2).dot(Vector3(0.680, -0.681, -0.273)), std::cos(4.0 * Pi / 180.0));
+  EXPECT_GT(result.heart.axes.row(0).dot(Vector3(0.730, 0.591, 0.343)), std::cos(4.0 * Pi / 180.0));
+  EXPECT_NEAR(result.heart.size, 1.0, 0.04);
+  EXPECT_LT((result.heart.origin - Vector3(-7.8, -9.8, -38.8)).norm(), 4.0);
+  EXPECT_NEAR(result.heart.axes.determinant(), 1.0, 1e-9);
+  EXPECT_LT(result.meanDistance, 4.0);
+}
+
+TEST(SegmentLabeling, OneTreeAlone)
+{
+  Confusion confusion;
+  for (std::uint64_t seed = 141; seed <= 144; ++seed)
+  {
+    for (int side = 0; side < 2; ++side)
+    {
+      const PhantomTree truth = MakeTree(seed, 0, false);
+      Case alone = Degrade(truth, {}, seed);
+      std::vector<std::vector<std::int64_t>> lines;
+      for (std::size_t b = 0; b < truth.branches.size(); ++b)
+      {
+        if (truth.branches[b].treeId == side)
+        {
+          lines.push_back(alone.lines.lines[b]);
+        }
+      }
+      alone.lines.lines = lines;
+      CenterlineTopology tree = BuildTopology(alone.lines);
+      LabelSegments(tree);
+      EXPECT_EQ(tree.branches[0].treeId, side);
+      confusion.Add(tree, alone.truth);
+    }
+  }
+  confusion.Print("One tree alone");
+  EXPECT_GE(confusion.Right(18), 0.95);
+}
+
+TEST(SegmentLabeling, AVeinBesideIsNoArtery)
+{
+  PhantomSettings settings;
+  settings.seed = 151;
+  const CoronaryPhantom phantom(settings);
+  Case both = Degrade(phantom.Tree(0.75), {}, 1);
+  const PhantomTree vein = phantom.Vein(0.75);
+  std::vector<std::int64_t> line;
+  for (std::size_t i = 0; i < vein.points.size(); ++i)
+  {
+    line.push_back(static_cast<std::int64_t>(both.lines.points.size()));
+    both.lines.points.push_back(vein.points[i]);
+    both.lines.radius.push_back(vein.radius[i]);
+    both.truth.push_back(0);
+  }
+  both.lines.lines.push_back(line);
+  CenterlineTopology tree = BuildTopology(both.lines);
+  LabelSegments(tree);
+  Confusion confusion;
+  confusion.Add(tree, both.truth);
+  EXPECT_GE(confusion.Right(1000), 0.97);
+  int veins = 0;
+  for (const auto& branch : tree.branches)
+  {
+    veins += branch.treeId == -1;
+  }
+  EXPECT_GE(veins, 1);
+}
+
+TEST(SegmentLabeling, WhatIsNoCoronaryTree)
+{
+  CenterlineTopology nothing = BuildTopology({});
+  EXPECT_EQ(LabelSegments(nothing).meanDistance, 0.0);
+
+  // A straight vessel of 400 mm, as an aorta has: no crash, and no name for most of it.
+  CenterlineSet aorta;
+  for (int i = 0; i <= 400; ++i)
+  {
+    aorta.points.emplace_back(0.0, 0.0, i);
+    aorta.radius.push_back(12.0);
+  }
+  aorta.lines.emplace_back(401);
+  for (int i = 0; i <= 400; ++i)
+  {
+    aorta.lines[0][i] = i;
+  }
+  CenterlineTopology straight = BuildTopology(aorta);
+  const LabelingResult result = LabelSegments(straight);
+  EXPECT_TRUE(result.heart.axes.allFinite());
+  ASSERT_EQ(straight.branches.size(), 1U);
+
+  LabelingSettings settings;
+  settings.dominance = 3;
+  EXPECT_THROW(LabelSegments(straight, settings), std::invalid_argument);
+  settings = {};
+  settings.orientationWeight = std::nan("");
+  EXPECT_THROW(LabelSegments(straight, settings), std::invalid_argument);
+  EXPECT_THROW(LabelSegments(straight, {}, [](double) { return false; }), Cancelled);
+}
+
+TEST(SegmentLabeling, DominanceCanBeGiven)
+{
+  const Case whole = Degrade(MakeTree(161, 0, false), {}, 1);
+  CenterlineTopology tree = BuildTopology(whole.lines);
+  LabelingSettings settings;
+  settings.dominance = static_cast<int>(Dominance::Right);
+  const LabelingResult result = LabelSegments(tree, settings);
+  EXPECT_EQ(result.dominance, Dominance::Right);
+  Confusion confusion;
+  confusion.Add(tree, whole.truth);
+  EXPECT_GE(confusion.Worst, 0.95);
+}
+
+TEST(SegmentLabeling, SameResultOnAnyNumberOfThreads)
+{
+  const Case whole = Degrade(MakeTree(171, 1, true), {}, 1);
+  CenterlineTopology one = BuildTopology(whole.lines);
+  CenterlineTopology three = one;
+  SetNumberOfThreads(1);
+  const LabelingResult first = LabelSegments(one);
+  SetNumberOfThreads(3);
+  const LabelingResult second = LabelSegments(three);
+  SetNumberOfThreads(0);
+  EXPECT_EQ(one.segmentId, three.segmentId);
+  EXPECT_EQ(first.cost, second.cost);
+  EXPECT_EQ(first.heart.axes, second.heart.axes);
+}
