@@ -3,6 +3,7 @@
 #include "MultiscaleVesselness.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryUpstream.h"
 
 #include "vtkArrayDispatch.h"
 #include "vtkDataArrayRange.h"
@@ -12,7 +13,6 @@
 #include "vtkFloatArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
-#include "vtkInformationExecutivePortKey.h"
 #include "vtkInformationIntegerRequestKey.h"
 #include "vtkInformationVector.h"
 #include "vtkMatrix3x3.h"
@@ -132,15 +132,6 @@ Extent RequestedExtent(vtkInformation* outInfo)
   return e;
 }
 
-/// Not as a piece: those have no halo.
-void AskFor(vtkInformation* info, const Extent& part)
-{
-  info->Set(SDDP::UPDATE_EXTENT(), part.data(), 6);
-  info->Set(SDDP::UPDATE_PIECE_NUMBER(), 0);
-  info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), 1);
-  info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
-}
-
 struct Geometry
 {
   std::array<double, 3> origin = { 0.0, 0.0, 0.0 };
@@ -196,11 +187,11 @@ void ForEachVoxel(Array* array, const Extent& image, const Extent& part, const V
       {
         const std::int64_t k = part[4] + row / rows - image[4];
         const std::int64_t j = part[2] + row % rows - image[2];
-        const std::int64_t source =
+        const vtkIdType source =
           (k * (image[3] - image[2] + 1) + j) * RowLength(image) + part[0] - image[0];
-        for (std::int64_t i = 0; i < width; ++i)
+        for (vtkIdType i = 0; i < width; ++i)
         {
-          visit(values[static_cast<vtkIdType>(source + i)], row * width + i);
+          visit(values[source + i], row * width + i);
         }
       }
     });
@@ -299,9 +290,9 @@ void Insert(
   {
     for (std::int64_t j = part[2]; j <= part[3]; ++j)
     {
-      const std::int64_t at =
+      const vtkIdType voxel =
         ((k - out[4]) * (out[3] - out[2] + 1) + j - out[2]) * RowLength(out) + part[0] - out[0];
-      std::copy_n(source, width, to->GetPointer(static_cast<vtkIdType>(at * components)));
+      std::copy_n(source, width, to->GetPointer(voxel * components));
       source += width;
     }
   }
@@ -333,96 +324,6 @@ std::string PropertyMessage(std::string message)
   return message;
 }
 
-/// A step of the input, or its only time; none when it has no time.
-struct Moment
-{
-  bool exists = false;
-  double time = 0.0;
-
-  bool operator==(const Moment& other) const
-  {
-    return this->exists == other.exists && this->time == other.time;
-  }
-};
-
-Moment NearestStep(vtkInformation* info, bool first, double wanted)
-{
-  Moment moment;
-  if (const int count = info->Has(SDDP::TIME_STEPS()) ? info->Length(SDDP::TIME_STEPS()) : 0)
-  {
-    const double* steps = info->Get(SDDP::TIME_STEPS());
-    moment.exists = true;
-    moment.time = first
-      ? steps[0]
-      : *std::min_element(steps, steps + count,
-          [=](double a, double b) { return std::abs(a - wanted) < std::abs(b - wanted); });
-  }
-  else if (info->Has(SDDP::TIME_RANGE()))
-  {
-    const double* range = info->Get(SDDP::TIME_RANGE());
-    moment.exists = true;
-    moment.time = first ? range[0] : std::min(std::max(wanted, range[0]), range[1]);
-  }
-  return moment;
-}
-
-/// What a connection has been asked for; to ask for something else in between.
-class Request
-{
-public:
-  explicit Request(vtkInformation* info)
-    : Info(info)
-    , Asked(ExtentOf(info, SDDP::UPDATE_EXTENT()))
-  {
-    this->When.exists = info->Has(SDDP::UPDATE_TIME_STEP()) != 0;
-    this->When.time = this->When.exists ? info->Get(SDDP::UPDATE_TIME_STEP()) : 0.0;
-  }
-
-  void Ask(const Extent& part, const Moment& moment)
-  {
-    this->Changed = true;
-    this->Update(part, moment);
-  }
-
-  void Restore()
-  {
-    if (this->Changed)
-    {
-      this->Changed = false;
-      this->Update(this->Asked, this->When);
-    }
-  }
-
-private:
-  void Update(const Extent& part, const Moment& moment)
-  {
-    AskFor(this->Info, part);
-    if (moment.exists)
-    {
-      this->Info->Set(SDDP::UPDATE_TIME_STEP(), moment.time);
-    }
-    else
-    {
-      this->Info->Remove(SDDP::UPDATE_TIME_STEP());
-    }
-    vtkExecutive* producer = vtkExecutive::PRODUCER()->GetExecutive(this->Info);
-    Require(producer->Update(vtkExecutive::PRODUCER()->GetPort(this->Info)) != 0,
-      "the input failed to give the image from which C is measured");
-  }
-
-  vtkInformation* Info;
-  Extent Asked;
-  Moment When;
-  bool Changed = false;
-};
-
-vtkMTimeType PipelineTime(vtkInformation* info)
-{
-  auto* producer =
-    vtkDemandDrivenPipeline::SafeDownCast(vtkExecutive::PRODUCER()->GetExecutive(info));
-  return producer ? producer->GetPipelineMTime() : 0;
-}
-
 /// Name of the array that was chosen, empty: the active scalars.
 std::string ChosenArray(vtkInformation* chosen)
 {
@@ -436,7 +337,7 @@ struct MeasurementKey
 {
   vtkMTimeType image = 0;
   vtkMTimeType mask = 0;
-  Moment moment;
+  vtkCoronary::Moment moment;
   Extent region = EmptyExtent;
   Extent whole = EmptyExtent;
   std::array<double, 3> spacing{};
@@ -576,19 +477,20 @@ int vtkFrangiVesselness::RequestUpdateExtent(
       this->Data->Settings(), Vector3(grid.spacing.data()), whole);
     const Extent part =
       Intersection(RequestedExtent(outputs->GetInformationObject(0)), this->Data->RegionIn(whole));
-    AskFor(inInfo, Grown(part, vesselness.Halo(), whole));
+    vtkCoronary::SetRequest(inInfo, Grown(part, vesselness.Halo(), whole));
     if (maskInfo)
     {
-      AskFor(maskInfo, Intersection(part, ExtentOf(maskInfo, SDDP::WHOLE_EXTENT())));
+      vtkCoronary::SetRequest(
+        maskInfo, Intersection(part, ExtentOf(maskInfo, SDDP::WHOLE_EXTENT())));
     }
   }
   catch (const std::exception&)
   {
     // RequestData says it. Nothing is computed: nothing is needed.
-    AskFor(inInfo, EmptyExtent);
+    vtkCoronary::SetRequest(inInfo, EmptyExtent);
     if (maskInfo)
     {
-      AskFor(maskInfo, EmptyExtent);
+      vtkCoronary::SetRequest(maskInfo, EmptyExtent);
     }
   }
   return 1;
@@ -645,19 +547,21 @@ void vtkFrangiVesselness::Internals::Measure(const MeasurementKey& key,
   this->Measured = false;
   vtkInformation* inInfo = inputs[0]->GetInformationObject(0);
   vtkInformation* maskInfo = inputs[1]->GetInformationObject(0);
-  Request ofImage(inInfo);
-  Request ofMask(maskInfo ? maskInfo : inInfo);
+  vtkCoronary::UpstreamRequest ofImage(inInfo, inInfo);
+  vtkCoronary::UpstreamRequest ofMask(maskInfo ? maskInfo : inInfo, maskInfo ? maskInfo : inInfo);
 
   const Extent& region = key.region;
   const std::array<int, 3> halo = vesselness.Halo();
   Extent slice = region;
   slice[5] = slice[4];
   slice = Grown(slice, { halo[0], halo[1], 0 }, key.whole);
-  const std::int64_t slices = this->Self->MeasurementBlockSize / Size(slice) - 2 * halo[2];
+  // As many slices as fit beside their halo, at least one.
+  const std::int64_t fitting =
+    this->Self->MeasurementBlockSize / std::max<std::int64_t>(1, Size(slice));
   const int depth = region[5] - region[4] + 1;
-  const int step = depth * Size(slice) <= this->Self->MeasurementBlockSize
+  const int step = fitting >= depth
     ? depth
-    : static_cast<int>(std::min<std::int64_t>(depth, std::max<std::int64_t>(1, slices)));
+    : static_cast<int>(std::max<std::int64_t>(1, fitting - 2 * std::int64_t{ halo[2] }));
 
   const auto isThere = [&](vtkImageData* image, const Extent& part)
   {
@@ -676,14 +580,14 @@ void vtkFrangiVesselness::Internals::Measure(const MeasurementKey& key,
     const Extent block = Grown(slab, halo, key.whole);
     if (!isThere(vtkImageData::GetData(inInfo), block))
     {
-      ofImage.Ask(block, key.moment);
+      ofImage.Ask(&block, key.moment);
     }
     std::vector<unsigned char> inside;
     if (maskInfo)
     {
       if (!isThere(vtkImageData::GetData(maskInfo), slab))
       {
-        ofMask.Ask(slab, NearestStep(maskInfo, false, key.moment.time));
+        ofMask.Ask(&slab, vtkCoronary::NearestMoment(maskInfo, false, key.moment.time));
       }
       vtkImageData* mask = vtkImageData::GetData(maskInfo);
       vtkDataArray* array = this->InputArray(inputs, 1, mask);
@@ -753,9 +657,10 @@ void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkI
     if (automatic)
     {
       MeasurementKey key;
-      key.image = PipelineTime(inInfo);
-      key.mask = maskInfo ? PipelineTime(maskInfo) : 0;
-      key.moment = NearestStep(inInfo, self.AutomaticReferenceTime, self.ReferenceTime);
+      key.image = vtkCoronary::UpstreamTime(inInfo);
+      key.mask = maskInfo ? vtkCoronary::UpstreamTime(maskInfo) : 0;
+      key.moment =
+        vtkCoronary::NearestMoment(inInfo, self.AutomaticReferenceTime, self.ReferenceTime);
       key.region = region;
       key.whole = whole;
       key.spacing = grid.spacing;

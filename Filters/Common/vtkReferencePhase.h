@@ -1,0 +1,107 @@
+/**
+ * @class   vtkReferencePhase
+ * @brief   One phase of a time series, as data without time.
+ *
+ * Takes one time of its input and hides the others: TIME_STEPS and TIME_RANGE end here. What
+ * follows is static: moving the time slider executes nothing of it again, nor this filter.
+ *
+ * The phase is given (Time), or found: the quietest one, whose neighbours in time differ least
+ * from it. For that the filter asks its input for every step once: of an image only the middle
+ * slices (at most 16 along k), averaged over 4 x 4 x 4 voxels against noise; of point sets the
+ * positions. The choice is kept until the input pipeline changes. With several MPI ranks every
+ * rank looks at the same data and finds the same phase.
+ *
+ * @par Input port:
+ * 0: any data object. Without time steps it is passed on as it is; with a continuous time range
+ * alone the automatic choice is not possible.
+ *
+ * @par Output:
+ * Type and content of the input at the chosen time, shared, not copied. Field data: that of the
+ * input, among it `CycleLength`; `PhaseTime` (double, fraction of the R-R interval) is added where
+ * the input has none.
+ *
+ * @par Failure:
+ * A Time that is not finite, or not available in the exact mode; an automatic choice among data
+ * that do not compare from phase to phase: one error that says so, and no output.
+ *
+ * @sa coronary::QuietestPhase
+ */
+#ifndef vtkReferencePhase_h
+#define vtkReferencePhase_h
+
+#include "vtkCoronaryCommonModule.h" // for the export macro
+#include "vtkPassInputTypeAlgorithm.h"
+
+#include <memory> // for std::unique_ptr
+
+class VTKCORONARYCOMMON_EXPORT vtkReferencePhase : public vtkPassInputTypeAlgorithm
+{
+public:
+  static vtkReferencePhase* New();
+  vtkTypeMacro(vtkReferencePhase, vtkPassInputTypeAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  enum Selections
+  {
+    Nearest = 0,
+    Exact = 1
+  };
+
+  ///@{
+  /**
+   * Find the quietest phase. Default on.
+   */
+  vtkSetMacro(Automatic, bool);
+  vtkGetMacro(Automatic, bool);
+  vtkBooleanMacro(Automatic, bool);
+  ///@}
+
+  ///@{
+  /**
+   * The phase, when it is not found automatically: fraction of the R-R interval. Default 0.75.
+   */
+  vtkSetMacro(Time, double);
+  vtkGetMacro(Time, double);
+  ///@}
+
+  ///@{
+  /**
+   * Take the step that is nearest to Time; or Time exactly, which fails unless it is a step of the
+   * input, or lies in the time range of an input without steps. Default nearest.
+   */
+  vtkSetMacro(Selection, int);
+  vtkGetMacro(Selection, int);
+  void SetSelectionToNearest() { this->SetSelection(Nearest); }
+  void SetSelectionToExact() { this->SetSelection(Exact); }
+  ///@}
+
+  /// The time of the last execution's output; NaN before it, and for data without time.
+  double GetUsedTime() const { return this->UsedTime; }
+
+  vtkTypeBool ProcessRequest(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+protected:
+  vtkReferencePhase();
+  ~vtkReferencePhase() override;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestData(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+private:
+  vtkReferencePhase(const vtkReferencePhase&) = delete;
+  void operator=(const vtkReferencePhase&) = delete;
+
+  bool Automatic = true;
+  double Time = 0.75;
+  int Selection = Nearest;
+  double UsedTime;
+
+  struct Internals;
+  std::unique_ptr<Internals> Data;
+};
+
+#endif
