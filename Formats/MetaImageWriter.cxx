@@ -238,4 +238,10 @@ void WriteMetaImage(const std::string& path, const ImageGrid& grid, const float*
 {
   Write(path, grid, values, sizeof(float), "MET_FLOAT", compress, progress);
 }
+
+void WriteMetaImage(const std::string& path, const ImageGrid& grid, const unsigned char* values,
+  bool compress, const ProgressCallback& progress)
+{
+  Write(path, grid, values, sizeof(unsigned char), "MET_UCHAR", compress, progress);
+}
 }

@@ -35,6 +35,10 @@ void WriteMetaImage(const std::string& path, const ImageGrid& grid, const short*
 /// The same for single precision values.
 void WriteMetaImage(const std::string& path, const ImageGrid& grid, const float* values,
   bool compress, const ProgressCallback& progress = {});
+
+/// The same for masks.
+void WriteMetaImage(const std::string& path, const ImageGrid& grid, const unsigned char* values,
+  bool compress, const ProgressCallback& progress = {});
 }
 
 #endif

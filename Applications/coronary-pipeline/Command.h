@@ -40,6 +40,7 @@ using MakeCommand = Command(CLI::App& program);
 MakeCommand MakePhantomCommand;
 MakeCommand MakePhantomMotionCommand;
 MakeCommand MakeInspectCommand;
+MakeCommand MakeRunCommand;
 }
 
 #endif

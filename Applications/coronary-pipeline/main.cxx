@@ -25,6 +25,7 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakePhantomCommand,
   coronary::MakePhantomMotionCommand,
   coronary::MakeInspectCommand,
+  coronary::MakeRunCommand,
 };
 
 int Complain(const CLI::App* command, std::string message, int exitCode)

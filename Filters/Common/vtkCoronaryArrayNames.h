@@ -26,6 +26,12 @@ constexpr const char* VesselnessLambda3 = "VesselnessLambda3"; ///< double, HU, 
 constexpr const char* CycleLength = "CycleLength"; ///< double, 1 value, seconds
 constexpr const char* PhaseTime = "PhaseTime"; ///< double, 1 value, fraction of the R-R interval
 
+// Segmentation, point data.
+constexpr const char* VesselMask = "VesselMask";               ///< unsigned char, 0 or 1
+constexpr const char* VesselProbability = "VesselProbability"; ///< float, 0 to 1
+// Segmentation, field data.
+constexpr const char* BloodWindow = "BloodWindow"; ///< double, 2 values: tissue, blood
+
 // Centerline tree, point data.
 constexpr const char* Radius = "MaximumInscribedSphereRadius"; ///< double, mm
 constexpr const char* Abscissas = "Abscissas";       ///< double, mm from the root along the tree
@@ -36,8 +42,10 @@ constexpr const char* Velocity = "Velocity";         ///< double[3], mm/s
 constexpr const char* Visibility = "Visibility"; ///< double, 0 lost .. 1 full contrast
 
 // Points with a meaning of their own (ostia, seeds), point data.
-constexpr const char* Name = "Name"; ///< string
-constexpr const char* Axis = "Axis"; ///< double[3], unit vector
+constexpr const char* Name = "Name";             ///< string
+constexpr const char* Axis = "Axis";             ///< double[3], unit vector
+constexpr const char* Confidence = "Confidence"; ///< double, 0 to 1
+constexpr const char* SeedVolume = "SeedVolume"; ///< double, mm^3 of vessel that hang on a seed
 
 // Centerline tree, cell data.
 constexpr const char* GroupIds = "GroupIds";                 ///< int, one id a branch

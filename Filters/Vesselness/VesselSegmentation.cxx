@@ -221,6 +221,7 @@ BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>
   constexpr double far = 12.0;
   std::vector<double> bloods;
   std::vector<float> values;
+  bool darker = false;
   for (const std::array<int, 3>& place : places)
   {
     double best = -std::numeric_limits<double>::infinity();
@@ -251,6 +252,7 @@ BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>
       [&](std::int64_t p, const std::array<int, 3>&)
       {
         const auto value = static_cast<float>(this->Image[p]);
+        darker = darker || value < 0.5 * best;
         if (value > 0.0f && value < 0.5 * best)
         {
           values.push_back(value);
@@ -260,6 +262,7 @@ BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>
   BloodWindow window;
   std::sort(bloods.begin(), bloods.end());
   window.blood = bloods[bloods.size() / 2];
+  window.tissue = darker ? 0.0 : window.blood;
   if (!values.empty())
   {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

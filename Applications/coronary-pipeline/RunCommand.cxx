@@ -1,0 +1,355 @@
+#include "Command.h"
+
+#include "AtomicFile.h"
+#include "Interruption.h"
+#include "MetaImageWriter.h"
+#include "OptionChecks.h"
+#include "ParallelFor.h"
+#include "ProgressDisplay.h"
+#include "StagedFolder.h"
+#include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
+
+#include "vtkCoronaryArrayNames.h"
+#include "vtkDataArray.h"
+#include "vtkFieldData.h"
+#include "vtkFrangiVesselness.h"
+#include "vtkGatedImageReader.h"
+#include "vtkImageData.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
+#include "vtkStringArray.h"
+#include "vtkVesselSegmentation.h"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+namespace
+{
+constexpr const char* ReportName = "report.json";
+
+/// How far the road is gone; later stages come after earlier ones.
+enum class Stage
+{
+  Vesselness,
+  Segmentation
+};
+const std::vector<std::pair<std::string, Stage>> Stages = {
+  { "vesselness", Stage::Vesselness },
+  { "segmentation", Stage::Segmentation },
+};
+
+struct RunJob
+{
+  std::vector<std::string> paths;
+  std::string output;
+  Stage until = Stages.back().second;
+  double time = 0.75;
+  std::vector<double> fractions;
+  double cycleMs = 1000.0;
+  std::string series;
+  std::vector<double> scales = { 0.5, 2.5 };
+  double c = 100.0; // the largest norm in a clinical CT belongs to bone and metal
+  std::vector<double> seeds;
+  double largestRadius = 4.5;
+  std::vector<double> window;
+  int threads = 0;
+  bool compress = false;
+  bool quiet = false;
+
+  void Declare(CLI::App& app);
+  void Run();
+};
+
+void RunJob::Declare(CLI::App& app)
+{
+  app
+    .add_option("PATH", this->paths,
+      "A folder of DICOM files, a series.json, a 4-D volume, or one volume a phase")
+    ->type_name("")
+    ->required();
+  app.add_option("--output", this->output, "Folder to write to; made when it does not exist")
+    ->type_name("DIR")
+    ->required();
+  app
+    .add_option_function<std::string>(
+      "--until",
+      [this](const std::string& name)
+      {
+        for (const auto& [known, stage] : Stages)
+        {
+          if (name == known)
+          {
+            this->until = stage;
+          }
+        }
+      },
+      "Last stage: vesselness or segmentation (the default)")
+    ->check(CLI::IsMember({ "vesselness", "segmentation" }))
+    ->type_name("STAGE");
+
+  const std::string image = "Image";
+  app
+    .add_option("--time", this->time,
+      "Reference time, fraction of the R-R interval; the nearest phase of the cycle is taken")
+    ->check(Within(-100.0, 100.0))
+    ->type_name("FRACTION")
+    ->capture_default_str()
+    ->group(image);
+  app
+    .add_option("--fractions", this->fractions,
+      "R-R fractions of the phases, instead of those in the files: 0,0.35,0.75")
+    ->check(Within(-100.0, 100.0))
+    ->delimiter(',')
+    ->allow_extra_args(false)
+    ->type_name("LIST")
+    ->group(image);
+  app.add_option("--cycle-ms", this->cycleMs, "R-R interval, in ms, for files that do not give it")
+    ->check(Within(1.0, 60000.0))
+    ->type_name("MS")
+    ->capture_default_str()
+    ->group(image);
+  app.add_option("--series", this->series, "The DICOM series to read from a folder with several")
+    ->type_name("UID")
+    ->group(image);
+
+  const std::string vessels = "Vessels";
+  app.add_option("--scales", this->scales, "Smallest and largest scale of the vesselness, mm")
+    ->check(Within(0.05, 50.0))
+    ->expected(2)
+    ->type_name("MIN MAX")
+    ->capture_default_str()
+    ->group(vessels);
+  app
+    .add_option("--c", this->c,
+      "Norm of the Hessian from which on structure counts, HU; 0: half the largest one")
+    ->check(Within(0.0, 1e6))
+    ->type_name("HU")
+    ->capture_default_str()
+    ->group(vessels);
+  app
+    .add_option("--seed", this->seeds,
+      "A point in a vessel or on its ostium, LPS mm; may be repeated. Without any, aorta and ostia "
+      "are looked for")
+    ->check(Within(-1e5, 1e5))
+    ->expected(3)
+    ->allow_extra_args(true)
+    ->type_name("X Y Z")
+    ->group(vessels);
+  app
+    .add_option("--largest-radius", this->largestRadius,
+      "Blood that a ball of this radius fits into is aorta or chamber, mm")
+    ->check(Within(1.0, 50.0))
+    ->type_name("MM")
+    ->capture_default_str()
+    ->group(vessels);
+  app
+    .add_option("--window", this->window,
+      "Image values of tissue and of undiluted blood, instead of measuring them")
+    ->check(Within(-1e5, 1e5))
+    ->expected(2)
+    ->type_name("TISSUE BLOOD")
+    ->group(vessels);
+  app.add_flag("--compress", this->compress, "Compress the image files");
+  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
+    ->check(WholeWithin(0, 1024))
+    ->type_name("N")
+    ->capture_default_str();
+  app.add_flag("--quiet", this->quiet, "No progress and no summary");
+}
+
+/// The phase that is nearest to a time on the cycle.
+int NearestPhase(vtkGatedImageReader* reader, double time)
+{
+  int best = 0;
+  double least = 2.0;
+  for (int phase = 0; phase < reader->GetNumberOfPhases(); ++phase)
+  {
+    const double distance = std::abs(std::remainder(reader->GetPhaseTime(phase) - time, 1.0));
+    if (distance < least - 1e-9)
+    {
+      least = distance;
+      best = phase;
+    }
+  }
+  return best;
+}
+
+nlohmann::ordered_json Numbers(vtkDataSet* data, const char* name)
+{
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  if (vtkDataArray* array = data->GetFieldData()->GetArray(name))
+  {
+    for (vtkIdType n = 0; n < array->GetNumberOfValues(); ++n)
+    {
+      list.push_back(array->GetTuple1(n));
+    }
+  }
+  return list;
+}
+
+nlohmann::ordered_json DescribeSeeds(vtkPolyData* seeds)
+{
+  vtkPointData* data = seeds->GetPointData();
+  auto* names = vtkStringArray::SafeDownCast(data->GetAbstractArray(vtkCoronaryArrayNames::Name));
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (vtkIdType n = 0; n < seeds->GetNumberOfPoints(); ++n)
+  {
+    const auto value = [&](const char* name) { return data->GetArray(name)->GetTuple1(n); };
+    double position[3];
+    seeds->GetPoint(n, position);
+    list.push_back(
+      { { "name", names->GetValue(n) }, { "position", { position[0], position[1], position[2] } },
+        { "confidence", value(vtkCoronaryArrayNames::Confidence) },
+        { "radius", value(vtkCoronaryArrayNames::Radius) },
+        { "volume", value(vtkCoronaryArrayNames::SeedVolume) } });
+  }
+  return list;
+}
+
+void RunJob::Run()
+{
+  if (this->scales[0] > this->scales[1])
+  {
+    throw UsageError("--scales: the first must not be above the second");
+  }
+  if (!this->window.empty() && this->window[0] >= this->window[1])
+  {
+    throw UsageError("--window: blood must be above tissue");
+  }
+  if (this->seeds.size() % 3 != 0)
+  {
+    throw UsageError("--seed: three coordinates are needed for each point");
+  }
+  SetNumberOfThreads(this->threads);
+  vtkMessageTrap messages;
+  vtkNew<vtkGatedImageReader> reader;
+  for (const std::string& path : this->paths)
+  {
+    reader->AddFileName(path.c_str());
+  }
+  for (std::size_t i = 0; i < this->fractions.size(); ++i)
+  {
+    reader->SetPhaseFraction(static_cast<int>(i), this->fractions[i]);
+  }
+  reader->SetCycleLength(this->cycleMs / 1000.0);
+  if (!this->series.empty())
+  {
+    reader->SetSeriesInstanceUID(this->series.c_str());
+  }
+  reader->UpdateInformation();
+  messages.ThrowIfError();
+  const int phase = NearestPhase(reader, this->time);
+  const double phaseTime = reader->GetPhaseTime(phase);
+  nlohmann::ordered_json report = { { "phase", phase }, { "time", phaseTime },
+    { "image", reader->GetPhaseFileName(phase) } };
+
+  StagedFolder folder(this->output);
+  std::string summary;
+  try
+  {
+    const bool segment = this->until == Stage::Segmentation;
+    ProgressDisplay progress("stage", segment ? 2 : 1, this->quiet);
+    const auto update = [&](vtkAlgorithm* algorithm)
+    {
+      UpdateAtTime(
+        algorithm, 0, phaseTime, messages, [&](double fraction) { progress.Update(fraction); });
+    };
+    const auto keepGoing = [](double) { return Interruption() == 0; };
+
+    progress.BeginStep(0, "vesselness");
+    vtkNew<vtkFrangiVesselness> vesselness;
+    vesselness->SetInputConnection(reader->GetOutputPort());
+    vesselness->SetSigmaMin(this->scales[0]);
+    vesselness->SetSigmaMax(this->scales[1]);
+    vesselness->SetAutomaticC(!(this->c > 0.0));
+    vesselness->SetC(this->c > 0.0 ? this->c : 1.0);
+    vesselness->SetAutomaticReferenceTime(false);
+    vesselness->SetReferenceTime(phaseTime);
+    update(vesselness);
+    vtkImageData* response = vesselness->GetOutput();
+    WriteMetaImage(folder.Add("vesselness.mha"), GridOf(response),
+      static_cast<const float*>(response->GetScalarPointer()), this->compress, keepGoing);
+    report["vesselness"] = { { "file", "vesselness.mha" },
+      { "sigmas", Numbers(response, vtkCoronaryArrayNames::VesselnessSigmas) },
+      { "c", vesselness->GetUsedC() } };
+    summary = "vesselness with c = " + Format(vesselness->GetUsedC());
+
+    if (segment)
+    {
+      progress.BeginStep(1, "segmentation");
+      vtkNew<vtkVesselSegmentation> segmentation;
+      segmentation->SetInputConnection(reader->GetOutputPort());
+      segmentation->SetVesselnessConnection(vesselness->GetOutputPort());
+      for (std::size_t n = 0; n + 2 < this->seeds.size(); n += 3)
+      {
+        segmentation->AddSeed(this->seeds[n], this->seeds[n + 1], this->seeds[n + 2]);
+      }
+      segmentation->SetLargestRadius(this->largestRadius);
+      if (!this->window.empty())
+      {
+        segmentation->AutomaticWindowOff();
+        segmentation->SetTissueValue(this->window[0]);
+        segmentation->SetBloodValue(this->window[1]);
+      }
+      update(segmentation);
+      vtkImageData* mask = segmentation->GetOutput();
+      auto* seedsFound = vtkPolyData::SafeDownCast(
+        segmentation->GetOutputDataObject(vtkVesselSegmentation::SeedsPort));
+      auto* aorta = vtkPolyData::SafeDownCast(
+        segmentation->GetOutputDataObject(vtkVesselSegmentation::AortaPort));
+      WriteMetaImage(folder.Add("mask.mha"), GridOf(mask),
+        static_cast<const unsigned char*>(mask->GetScalarPointer()), this->compress, keepGoing);
+      WritePolyData(folder.Add("ostia.vtp"), seedsFound, messages);
+      WritePolyData(folder.Add("aorta.vtp"), aorta, messages);
+      report["segmentation"] = { { "file", "mask.mha" },
+        { "window", Numbers(mask, vtkCoronaryArrayNames::BloodWindow) },
+        { "seeds", DescribeSeeds(seedsFound) }, { "seeds_file", "ostia.vtp" },
+        { "aorta_file", "aorta.vtp" } };
+      for (const auto& seed : report["segmentation"]["seeds"])
+      {
+        char text[160];
+        std::snprintf(text, sizeof(text), "; %s at %.1f %.1f %.1f (confidence %.2f), %.0f mm^3",
+          seed["name"].get<std::string>().c_str(), seed["position"][0].get<double>(),
+          seed["position"][1].get<double>(), seed["position"][2].get<double>(),
+          seed["confidence"].get<double>(), seed["volume"].get<double>());
+        summary += text;
+      }
+    }
+    WriteFileAtomically(folder.Add(ReportName), report.dump(2) + "\n");
+    ThrowIfInterrupted();
+  }
+  catch (const std::runtime_error& error)
+  {
+    ThrowIfInterrupted();
+    throw std::runtime_error(folder.Translate(error.what()));
+  }
+  folder.Commit();
+  messages.PrintWarnings();
+  if (!this->quiet)
+  {
+    std::printf("%s: phase %d (%.1f %% R-R), %s\n", this->output.c_str(), phase + 1,
+      100.0 * phaseTime, summary.c_str());
+  }
+}
+}
+
+Command MakeRunCommand(CLI::App& program)
+{
+  CLI::App* app = program.add_subcommand(
+    "run", "From a gated image series to the coronary arteries, stage by stage");
+  app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp and, last, report.json.");
+  auto job = std::make_shared<RunJob>();
+  job->Declare(*app);
+  return { app, [job] { job->Run(); } };
+}
+}

@@ -1,0 +1,44 @@
+#include "vtkDataFiles.h"
+
+#include "AtomicFile.h"
+#include "vtkMessageTrap.h"
+
+#include "vtkImageData.h"
+#include "vtkMatrix3x3.h"
+#include "vtkNew.h"
+#include "vtkPolyData.h"
+#include "vtkXMLPolyDataWriter.h"
+
+#include <stdexcept>
+
+namespace coronary
+{
+ImageGrid GridOf(vtkImageData* image)
+{
+  ImageGrid grid;
+  image->GetExtent(grid.extent.data());
+  image->GetOrigin(grid.origin.data());
+  image->GetSpacing(grid.spacing.data());
+  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+    image->GetDirectionMatrix()->GetData());
+  return grid;
+}
+
+void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& messages)
+{
+  // Into memory first: VTK's writer does not notice when the last bytes find no room on the disk.
+  vtkNew<vtkXMLPolyDataWriter> writer;
+  writer->SetInputData(data);
+  writer->WriteToOutputStringOn();
+  // Not appended: with expat's reparse deferral (in Debian 12's since a security update) neither
+  // VTK 9.1 nor ParaView 5.11 can read the appended data of any VTK XML file.
+  writer->SetDataModeToBinary();
+  const int good = writer->Write();
+  messages.ThrowIfError();
+  if (!good)
+  {
+    throw std::runtime_error("Cannot write '" + path + "'.");
+  }
+  WriteFileAtomically(path, writer->GetOutputString());
+}
+}

@@ -1,0 +1,643 @@
+#include "vtkVesselSegmentation.h"
+
+#include "CoronaryOstia.h"
+#include "MultiscaleVesselness.h"
+#include "VesselSegmentation.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
+
+#include "vtkCellArray.h"
+#include "vtkDataArrayRange.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkFloatArray.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkMatrix3x3.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkShortArray.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUnsignedCharArray.h"
+#include "vtkUnsignedShortArray.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <memory>
+#include <new>
+#include <stdexcept>
+
+using coronary::Vector3;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+namespace
+{
+using Extent = std::array<int, 6>;
+
+// Shares of the work, for the progress.
+constexpr double VesselnessShare = 0.35;
+constexpr double OstiaShare = 0.35;
+
+void Require(bool condition, const std::string& requirement)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument(requirement);
+  }
+}
+
+Extent ExtentOf(vtkImageData* image)
+{
+  Extent e;
+  image->GetExtent(e.data());
+  return e;
+}
+
+bool IsEmpty(const Extent& e)
+{
+  return e[0] > e[1] || e[2] > e[3] || e[4] > e[5];
+}
+
+coronary::ImageGrid GridOf(vtkImageData* image)
+{
+  coronary::ImageGrid grid;
+  image->GetExtent(grid.extent.data());
+  image->GetOrigin(grid.origin.data());
+  image->GetSpacing(grid.spacing.data());
+  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+    image->GetDirectionMatrix()->GetData());
+  return grid;
+}
+
+/// The voxels of an array in one of the types that the algorithms take; else as a float copy.
+class Voxels
+{
+public:
+  Voxels(vtkDataArray* array, const coronary::ImageGrid& grid)
+  {
+    this->Image.grid = grid;
+    if (auto* shorts = vtkArrayDownCast<vtkShortArray>(array))
+    {
+      this->Image.values = static_cast<const std::int16_t*>(shorts->GetPointer(0));
+    }
+    else if (auto* unsignedShorts = vtkArrayDownCast<vtkUnsignedShortArray>(array))
+    {
+      this->Image.values = static_cast<const std::uint16_t*>(unsignedShorts->GetPointer(0));
+    }
+    else
+    {
+      this->Image.values = this->Floats(array);
+    }
+  }
+
+  /// The same as float; converted at the first call.
+  const float* Floats(vtkDataArray* array)
+  {
+    if (auto* floats = vtkArrayDownCast<vtkFloatArray>(array))
+    {
+      return floats->GetPointer(0);
+    }
+    if (this->Copy.empty())
+    {
+      const auto values = vtk::DataArrayValueRange<1>(array);
+      this->Copy.resize(static_cast<std::size_t>(values.size()));
+      coronary::ParallelFor(values.size(), 65536,
+        [&](std::int64_t first, std::int64_t last)
+        {
+          for (std::int64_t n = first; n < last; ++n)
+          {
+            this->Copy[n] = static_cast<float>(values[static_cast<vtkIdType>(n)]);
+          }
+        });
+    }
+    return this->Copy.data();
+  }
+
+  void Forget() { this->Copy = std::vector<float>(); }
+
+  coronary::ScalarImage Image;
+
+private:
+  std::vector<float> Copy;
+};
+
+bool IsNear(const coronary::ImageGrid& a, const coronary::ImageGrid& b)
+{
+  const double voxel = a.spacing.minCoeff();
+  return a.extent == b.extent && (a.spacing - b.spacing).cwiseAbs().maxCoeff() <= 1e-4 * voxel &&
+    (a.origin - b.origin).cwiseAbs().maxCoeff() <= 1e-2 * voxel &&
+    (a.direction - b.direction).cwiseAbs().maxCoeff() <= 1e-4;
+}
+
+/// One value a voxel of `part` out of the values of a whole image.
+template <typename Array, typename T>
+void Insert(
+  vtkImageData* output, const std::string& name, const std::vector<T>& values, const Extent& whole)
+{
+  const Extent part = ExtentOf(output);
+  vtkNew<Array> array;
+  array->SetName(name.c_str());
+  if (!array->Resize(output->GetNumberOfPoints()))
+  {
+    throw std::bad_alloc();
+  }
+  array->SetNumberOfTuples(output->GetNumberOfPoints());
+  if (!IsEmpty(part))
+  {
+    T* target = array->GetPointer(0);
+    const std::int64_t nx = whole[1] - whole[0] + 1;
+    const std::int64_t ny = whole[3] - whole[2] + 1;
+    for (std::int64_t k = part[4]; k <= part[5]; ++k)
+    {
+      for (std::int64_t j = part[2]; j <= part[3]; ++j)
+      {
+        const T* row =
+          values.data() + ((k - whole[4]) * ny + j - whole[2]) * nx + part[0] - whole[0];
+        target = std::copy_n(row, part[1] - part[0] + 1, target);
+      }
+    }
+  }
+  output->GetPointData()->AddArray(array);
+}
+
+/// Takes the message's first word as the name of a property.
+std::string PropertyMessage(std::string message)
+{
+  const std::string prefixes[] = { "VesselSegmentationSettings: ", "VesselnessSettings: " };
+  for (const std::string& prefix : prefixes)
+  {
+    if (message.compare(0, prefix.size(), prefix) == 0)
+    {
+      message.erase(0, prefix.size());
+    }
+  }
+  if (!message.empty())
+  {
+    message.front() = static_cast<char>(std::toupper(message.front()));
+  }
+  return message;
+}
+
+/// Smallest and largest scale of the vesselness that is computed here, mm.
+std::vector<double> DefaultScales(const Vector3& spacing)
+{
+  constexpr double smallest = 0.5;
+  constexpr double largest = 2.5;
+  constexpr int count = 5;
+  const double resolved = 0.5 * spacing.maxCoeff();
+  const double low = std::min(largest, std::max(smallest, resolved));
+  return coronary::VesselnessScales(low, largest, low < largest ? count : 1, false);
+}
+}
+
+vtkStandardNewMacro(vtkVesselSegmentation);
+
+vtkVesselSegmentation::vtkVesselSegmentation()
+  : MaskArrayName(vtkCoronaryArrayNames::VesselMask)
+  , ProbabilityArrayName(vtkCoronaryArrayNames::VesselProbability)
+{
+  this->SetNumberOfInputPorts(3);
+  this->SetNumberOfOutputPorts(3);
+  for (int port = 0; port < 2; ++port)
+  {
+    this->SetInputArrayToProcess(
+      port, port, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
+  }
+}
+
+vtkVesselSegmentation::~vtkVesselSegmentation() = default;
+
+vtkExecutive* vtkVesselSegmentation::CreateDefaultExecutive()
+{
+  // Not the composite one: a segmentation belongs to one image.
+  return SDDP::New();
+}
+
+void vtkVesselSegmentation::AddSeed(double x, double y, double z)
+{
+  this->Seeds.push_back({ x, y, z });
+  this->Modified();
+}
+
+void vtkVesselSegmentation::SetSeed(int index, double x, double y, double z)
+{
+  if (index < 0 || index >= this->GetNumberOfSeeds())
+  {
+    vtkErrorMacro("SetSeed: there is no seed " << index);
+    return;
+  }
+  const std::array<double, 3> seed{ x, y, z };
+  if (this->Seeds[index] != seed)
+  {
+    this->Seeds[index] = seed;
+    this->Modified();
+  }
+}
+
+void vtkVesselSegmentation::SetNumberOfSeeds(int count)
+{
+  if (count >= 0 && count != this->GetNumberOfSeeds())
+  {
+    this->Seeds.resize(static_cast<std::size_t>(count), { 0.0, 0.0, 0.0 });
+    this->Modified();
+  }
+}
+
+int vtkVesselSegmentation::FillInputPortInformation(int port, vtkInformation* info)
+{
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), port == 2 ? "vtkPolyData" : "vtkImageData");
+  if (port > 0)
+  {
+    info->Set(INPUT_IS_OPTIONAL(), 1);
+  }
+  return 1;
+}
+
+int vtkVesselSegmentation::FillOutputPortInformation(int port, vtkInformation* info)
+{
+  info->Set(vtkDataObject::DATA_TYPE_NAME(), port == MaskPort ? "vtkImageData" : "vtkPolyData");
+  return 1;
+}
+
+int vtkVesselSegmentation::RequestInformation(
+  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  vtkInformation* outInfo = outputs->GetInformationObject(MaskPort);
+  vtkDataObject::SetPointDataActiveScalarInfo(outInfo, VTK_UNSIGNED_CHAR, 1);
+  outInfo->Set(CAN_PRODUCE_SUB_EXTENT(), 1);
+  for (const int port : { SeedsPort, AortaPort })
+  {
+    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  }
+  return 1;
+}
+
+int vtkVesselSegmentation::RequestUpdateExtent(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
+{
+  for (int port = 0; port < 3; ++port)
+  {
+    if (vtkInformation* info = inputs[port]->GetInformationObject(0))
+    {
+      if (info->Has(SDDP::WHOLE_EXTENT()))
+      {
+        int whole[6];
+        info->Get(SDDP::WHOLE_EXTENT(), whole);
+        info->Set(SDDP::UPDATE_EXTENT(), whole, 6);
+      }
+      info->Set(SDDP::UPDATE_PIECE_NUMBER(), 0);
+      info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), 1);
+      info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+    }
+  }
+  return 1;
+}
+
+vtkDataArray* vtkVesselSegmentation::InputArray(vtkInformationVector** inputs, int port)
+{
+  const std::string whose = port == 0 ? "the image" : "the vesselness";
+  vtkInformation* chosen = this->GetInputArrayInformation(port);
+  const char* wanted =
+    chosen->Has(vtkDataObject::FIELD_NAME()) ? chosen->Get(vtkDataObject::FIELD_NAME()) : nullptr;
+  int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
+  vtkAbstractArray* any = this->GetInputAbstractArrayToProcess(port, inputs, association);
+  Require(any != nullptr,
+    wanted ? whose + " has no point array '" + wanted + "'"
+           : whose + " has no active point scalars");
+  const std::string name =
+    "array '" + std::string(any->GetName() ? any->GetName() : "") + "' of " + whose;
+  Require(association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
+    name + " belongs to the cells: point data are needed");
+  auto* array = vtkArrayDownCast<vtkDataArray>(any);
+  Require(array != nullptr, name + " is not numeric");
+  Require(array->GetNumberOfComponents() == 1,
+    name + " has " + std::to_string(array->GetNumberOfComponents()) +
+      " components: one is needed, an intensity");
+  Require(array->GetNumberOfTuples() ==
+      vtkImageData::GetData(inputs[port]->GetInformationObject(0))->GetNumberOfPoints(),
+    name + " has not one value a voxel");
+  return array;
+}
+
+void vtkVesselSegmentation::Execute(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  coronary::VesselSegmentationSettings settings;
+  Require(!this->AutomaticWindow ? this->BloodValue > this->TissueValue : true,
+    "BloodValue must be above TissueValue");
+  Require(this->WeakThreshold > 0.0 && this->WeakThreshold <= this->StrongThreshold &&
+      this->StrongThreshold <= 1.0,
+    "WeakThreshold and StrongThreshold must satisfy 0 < WeakThreshold <= StrongThreshold <= 1");
+  Require(this->AutomaticTubular ||
+      (this->TubularVesselness > 0.0 && std::isfinite(this->TubularVesselness)),
+    "TubularVesselness must be positive");
+  Require(!this->MaskArrayName.empty() && !this->ProbabilityArrayName.empty(),
+    "MaskArrayName and ProbabilityArrayName need a name");
+  settings.weak = this->WeakThreshold;
+  settings.strong = this->StrongThreshold;
+  settings.largestRadius = this->LargestRadius;
+  settings.longestPath = this->LongestPath;
+  settings.smallestIsland = this->SmallestIsland;
+  settings.fillHoles = this->FillHoles;
+  settings.refineWall = this->RefineWall;
+  if (!this->AutomaticWindow)
+  {
+    settings.window = coronary::BloodWindow{ this->TissueValue, this->BloodValue };
+  }
+  if (!this->AutomaticTubular)
+  {
+    settings.tubular = this->TubularVesselness;
+  }
+  settings.Validate();
+
+  vtkImageData* input = vtkImageData::GetData(inputs[0]->GetInformationObject(0));
+  vtkImageData* output = vtkImageData::GetData(outputs->GetInformationObject(MaskPort));
+  vtkPolyData* seedsOutput = vtkPolyData::GetData(outputs->GetInformationObject(SeedsPort));
+  vtkPolyData* aortaOutput = vtkPolyData::GetData(outputs->GetInformationObject(AortaPort));
+  const coronary::ImageGrid grid = GridOf(input);
+  const Extent& whole = grid.extent;
+
+  // The mask's part; all of it when another output was asked for, so that it need not be made anew.
+  vtkInformation* outInfo = outputs->GetInformationObject(MaskPort);
+  Extent part = whole;
+  if (request->Get(SDDP::FROM_OUTPUT_PORT()) == MaskPort)
+  {
+    outInfo->Get(SDDP::UPDATE_EXTENT(), part.data());
+  }
+  part = IsEmpty(part) ? Extent{ 0, -1, 0, -1, 0, -1 } : part;
+  output->Initialize();
+  output->SetExtent(part.data());
+  output->SetOrigin(input->GetOrigin());
+  output->SetSpacing(input->GetSpacing());
+  output->SetDirectionMatrix(input->GetDirectionMatrix());
+  output->GetFieldData()->PassData(input->GetFieldData());
+  if (IsEmpty(whole))
+  {
+    Insert<vtkUnsignedCharArray>(output, this->MaskArrayName, std::vector<unsigned char>(), whole);
+    output->GetPointData()->SetActiveScalars(this->MaskArrayName.c_str());
+    return;
+  }
+  Require(whole[0] < whole[1] && whole[2] < whole[3] && whole[4] < whole[5],
+    "the image has " + std::to_string(whole[1] - whole[0] + 1) + " x " +
+      std::to_string(whole[3] - whole[2] + 1) + " x " + std::to_string(whole[5] - whole[4] + 1) +
+      " voxels: a three-dimensional image is needed");
+  Require(
+    (grid.direction * grid.direction.transpose()).isApprox(coronary::Matrix3::Identity(), 1e-4),
+    "the image's direction matrix is not orthonormal");
+
+  // Inputs.
+  vtkDataArray* imageArray = this->InputArray(inputs, 0);
+  Voxels image(imageArray, grid);
+  vtkImageData* given = inputs[1]->GetNumberOfInformationObjects() > 0
+    ? vtkImageData::GetData(inputs[1]->GetInformationObject(0))
+    : nullptr;
+  vtkDataArray* givenArray = nullptr;
+  if (given)
+  {
+    givenArray = this->InputArray(inputs, 1);
+    Require(IsNear(grid, GridOf(given)),
+      "the vesselness is on another grid than the image: extent, spacing, origin or direction "
+      "differs");
+  }
+  std::vector<coronary::VesselSeed> seeds;
+  std::vector<coronary::CoronaryOstium> ostia;
+  for (const std::array<double, 3>& seed : this->Seeds)
+  {
+    seeds.push_back({ Vector3(seed.data()) });
+  }
+  if (inputs[2]->GetNumberOfInformationObjects() > 0)
+  {
+    vtkPolyData* points = vtkPolyData::GetData(inputs[2]->GetInformationObject(0));
+    vtkDataArray* axes = points->GetPointData()->GetArray(vtkCoronaryArrayNames::Axis);
+    for (vtkIdType n = 0; n < points->GetNumberOfPoints(); ++n)
+    {
+      coronary::VesselSeed seed;
+      points->GetPoint(n, seed.position.data());
+      if (axes && axes->GetNumberOfComponents() == 3)
+      {
+        axes->GetTuple(n, seed.axis.data());
+        const double length = seed.axis.norm();
+        seed.axis = length > 1e-9 && std::isfinite(length) ? Vector3(seed.axis / length)
+                                                           : Vector3(Vector3::Zero());
+      }
+      seeds.push_back(seed);
+    }
+  }
+
+  // Ostia.
+  coronary::AscendingAorta aorta;
+  if (seeds.empty())
+  {
+    Require(this->AutomaticOstia,
+      "there is no seed: give points on the Seeds input or with AddSeed, or switch AutomaticOstia "
+      "on");
+    const coronary::CoronaryOstia found =
+      coronary::FindCoronaryOstia(image.Image, {}, vtkCoronary::ProgressOf(this, 0.0, OstiaShare));
+    if (found.ostia.empty())
+    {
+      throw std::runtime_error("AutomaticOstia found no ostium (" + found.doubt +
+        "): give points on the Seeds input or with AddSeed");
+    }
+    if (!found.doubt.empty())
+    {
+      vtkWarningMacro(
+        "AutomaticOstia: " << found.doubt << ". Look at output 1 before you trust it.");
+    }
+    aorta = found.aorta;
+    ostia = found.ostia;
+    for (const coronary::CoronaryOstium& ostium : ostia)
+    {
+      seeds.push_back({ ostium.position, ostium.axis });
+    }
+    if (this->AutomaticWindow)
+    {
+      settings.window =
+        coronary::BloodWindow{ coronary::CoronaryOstiaSettings().softTissue, aorta.mean };
+    }
+  }
+
+  // Vesselness, unless given.
+  std::vector<float> computed;
+  const float* vesselness = nullptr;
+  std::unique_ptr<Voxels> givenVoxels;
+  if (given)
+  {
+    givenVoxels = std::make_unique<Voxels>(givenArray, grid);
+    vesselness = givenVoxels->Floats(givenArray);
+  }
+  else
+  {
+    coronary::VesselnessSettings frangi;
+    frangi.sigmas = DefaultScales(grid.spacing);
+    const coronary::MultiscaleVesselness unscaled(frangi, grid.spacing, whole);
+    const float* values = image.Floats(imageArray);
+    const double middle = OstiaShare + 0.4 * VesselnessShare;
+    if (settings.window)
+    {
+      // A vessel of full contrast has about this norm.
+      frangi.c = 0.25 * (settings.window->blood - settings.window->tissue);
+    }
+    else
+    {
+      frangi.c = 0.5 *
+        unscaled
+          .Measure(
+            { values, whole }, whole, nullptr, vtkCoronary::ProgressOf(this, OstiaShare, middle))
+          .hessianNorm;
+    }
+    computed.assign(static_cast<std::size_t>(image.Image.NumberOfVoxels()), 0.0f);
+    if (frangi.c > 0.0)
+    {
+      coronary::MultiscaleVesselness::Output to;
+      to.vesselness = computed.data();
+      coronary::MultiscaleVesselness(frangi, grid.spacing, whole)
+        .Compute({ values, whole }, whole, nullptr, to,
+          vtkCoronary::ProgressOf(this, middle, OstiaShare + VesselnessShare));
+    }
+    vesselness = computed.data();
+  }
+
+  const coronary::VesselSegmentationResult result =
+    coronary::SegmentVessels(image.Image, vesselness, seeds, settings, this->GenerateProbability,
+      vtkCoronary::ProgressOf(this, OstiaShare + VesselnessShare, 0.98));
+  Insert<vtkUnsignedCharArray>(output, this->MaskArrayName, result.mask, whole);
+  output->GetPointData()->SetActiveScalars(this->MaskArrayName.c_str());
+  if (this->GenerateProbability)
+  {
+    Insert<vtkFloatArray>(output, this->ProbabilityArrayName, result.probability, whole);
+  }
+  vtkNew<vtkDoubleArray> window;
+  window->SetName(vtkCoronaryArrayNames::BloodWindow);
+  window->InsertNextValue(result.window.tissue);
+  window->InsertNextValue(result.window.blood);
+  output->GetFieldData()->AddArray(window);
+  for (std::size_t s = 0; s < seeds.size(); ++s)
+  {
+    if (!(result.seedVolume[s] > 0.0))
+    {
+      const std::string name = ostia.empty() ? "seed " + std::to_string(s) : ostia[s].name;
+      vtkWarningMacro(<< "No vessel begins at " << name << " (" << seeds[s].position.transpose()
+                      << "): nothing there looks like one within 2 mm.");
+    }
+  }
+
+  // Seeds and aorta.
+  const auto makeArray = [](vtkPolyData* data, const char* name, int components)
+  {
+    auto array = vtkSmartPointer<vtkDoubleArray>::New();
+    array->SetName(name);
+    array->SetNumberOfComponents(components);
+    data->GetPointData()->AddArray(array);
+    return array;
+  };
+  for (vtkPolyData* data : { seedsOutput, aortaOutput })
+  {
+    data->Initialize();
+    vtkNew<vtkPoints> points;
+    points->SetDataTypeToDouble();
+    data->SetPoints(points);
+    data->GetFieldData()->PassData(input->GetFieldData());
+  }
+  vtkNew<vtkStringArray> names;
+  names->SetName(vtkCoronaryArrayNames::Name);
+  seedsOutput->GetPointData()->AddArray(names);
+  const auto axes = makeArray(seedsOutput, vtkCoronaryArrayNames::Axis, 3);
+  const auto radii = makeArray(seedsOutput, vtkCoronaryArrayNames::Radius, 1);
+  const auto confidence = makeArray(seedsOutput, vtkCoronaryArrayNames::Confidence, 1);
+  const auto volumes = makeArray(seedsOutput, vtkCoronaryArrayNames::SeedVolume, 1);
+  const auto aortaRadii = makeArray(aortaOutput, vtkCoronaryArrayNames::Radius, 1);
+  if (outputs->GetInformationObject(SeedsPort)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
+  {
+    return;
+  }
+  vtkNew<vtkCellArray> vertices;
+  for (std::size_t s = 0; s < seeds.size(); ++s)
+  {
+    const vtkIdType id = seedsOutput->GetPoints()->InsertNextPoint(seeds[s].position.data());
+    vertices->InsertNextCell(1, &id);
+    names->InsertNextValue(ostia.empty() ? std::to_string(s) : ostia[s].name);
+    axes->InsertNextTuple(seeds[s].axis.data());
+    radii->InsertNextValue(ostia.empty() ? 0.0 : ostia[s].radius);
+    confidence->InsertNextValue(ostia.empty() ? 1.0 : ostia[s].confidence);
+    volumes->InsertNextValue(result.seedVolume[s]);
+  }
+  seedsOutput->SetVerts(vertices);
+  vtkNew<vtkCellArray> lines;
+  if (!aorta.sections.empty())
+  {
+    lines->InsertNextCell(static_cast<int>(aorta.sections.size()));
+    for (const coronary::AorticSection& section : aorta.sections)
+    {
+      lines->InsertCellPoint(aortaOutput->GetPoints()->InsertNextPoint(section.centre.data()));
+      aortaRadii->InsertNextValue(section.radius);
+    }
+  }
+  aortaOutput->SetLines(lines);
+}
+
+int vtkVesselSegmentation::RequestData(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  int result = 1;
+  try
+  {
+    this->Execute(request, inputs, outputs);
+    return 1;
+  }
+  catch (const coronary::Cancelled&)
+  {
+    vtkDebugMacro("aborted");
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorMacro("Not enough memory for the segmentation of the image");
+    result = 0;
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< PropertyMessage(error.what()));
+    result = 0;
+  }
+  // Not marked as generated, so that the next request executes again.
+  for (int port = 0; port < 3; ++port)
+  {
+    vtkInformation* outInfo = outputs->GetInformationObject(port);
+    vtkDataObject::GetData(outInfo)->Initialize();
+    outInfo->Set(SDDP::DATA_NOT_GENERATED(), 1);
+  }
+  return result;
+}
+
+void vtkVesselSegmentation::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  const auto print = [&](const char* name, const auto& value)
+  { os << indent << name << ": " << value << "\n"; };
+  for (std::size_t s = 0; s < this->Seeds.size(); ++s)
+  {
+    os << indent << "Seed " << s << ": " << this->Seeds[s][0] << " " << this->Seeds[s][1] << " "
+       << this->Seeds[s][2] << "\n";
+  }
+  print("AutomaticOstia", this->AutomaticOstia);
+  print("AutomaticWindow", this->AutomaticWindow);
+  print("TissueValue", this->TissueValue);
+  print("BloodValue", this->BloodValue);
+  print("WeakThreshold", this->WeakThreshold);
+  print("StrongThreshold", this->StrongThreshold);
+  print("AutomaticTubular", this->AutomaticTubular);
+  print("TubularVesselness", this->TubularVesselness);
+  print("LargestRadius", this->LargestRadius);
+  print("LongestPath", this->LongestPath);
+  print("SmallestIsland", this->SmallestIsland);
+  print("FillHoles", this->FillHoles);
+  print("RefineWall", this->RefineWall);
+  print("GenerateProbability", this->GenerateProbability);
+  print("MaskArrayName", this->MaskArrayName);
+  print("ProbabilityArrayName", this->ProbabilityArrayName);
+}

@@ -1,0 +1,233 @@
+/**
+ * @class   vtkVesselSegmentation
+ * @brief   The coronary lumen as a mask: what hangs on the ostia, without aorta and chambers.
+ *
+ * Voxels that are as bright as blood, or less bright but tubular, are collected from the ostia on;
+ * large bodies of blood and what leaks into them are cut off; then the wall is put half way between
+ * the local lumen and its surroundings. See VesselSegmentation.h for the steps.
+ *
+ * @par Seeds:
+ * The vessels begin at the points of input 2 and those of AddSeed. Without any, and with
+ * AutomaticOstia on (the default), the ascending aorta and the two coronary ostia are looked for in
+ * the image (see CoronaryOstia.h): for that the image must be HU, in LPS, and contrast-enhanced.
+ * When the search is not sure of its result it says so in a warning and in `Confidence`.
+ *
+ * @par Input ports:
+ * - 0: vtkImageData, three-dimensional, one component: the CT image. Array chosen with
+ *   SetInputArrayToProcess(0, ...), by default the active scalars.
+ * - 1, optional: vtkImageData on the same voxels: vesselness, not negative
+ *   (SetInputArrayToProcess(1, ...)). Without it, Frangi's with five scales from 0.5 to 2.5 mm (and
+ *   not below half the largest voxel spacing) is computed here.
+ * - 2, optional: vtkPolyData whose points are seeds, mm. Point data `Axis` (double[3], into the
+ *   vessel), if there, says where the aorta ends.
+ *
+ * @par Output ports:
+ * - 0, vtkImageData: point data `VesselMask` (unsigned char, 0 or 1, the scalars); if asked for
+ *   `VesselProbability` (float, 0 to 1, 0.5 at the wall). Field data: that of the input, and
+ *   `BloodWindow` (double, two values: tissue, blood).
+ * - 1, vtkPolyData: the seeds as vertices. Point data `Name` (string: LCA, RCA, or the seed's
+ *   number), `Axis` (double[3], zero: not known), `MaximumInscribedSphereRadius` (double, mm, 0:
+ *   not known), `Confidence` (double, 0 to 1; 1 for given seeds), `SeedVolume` (double, mm^3 of
+ *   vessel that hang on it).
+ * - 2, vtkPolyData: the ascending aorta as a polyline, upwards; point data
+ *   `MaximumInscribedSphereRadius` (double, mm). Empty when the seeds were given.
+ *
+ * The whole image is needed at once, so every MPI rank works on all of it and gives its piece;
+ * outputs 1 and 2 are in piece 0 only. Time passes through. Same bits on any number of threads.
+ *
+ * @par Failure:
+ * A setting out of its range, a missing or multi-component array, an image of fewer than three
+ * dimensions, a vesselness on another grid, a seed outside the image, no seed and no ostium found:
+ * one error that names it, and no output. A seed that reaches no vessel is a warning. An aborted
+ * execution leaves an empty output and is started anew by the next request.
+ *
+ * @sa coronary::SegmentVessels, coronary::FindCoronaryOstia, vtkFrangiVesselness
+ */
+#ifndef vtkVesselSegmentation_h
+#define vtkVesselSegmentation_h
+
+#include "vtkCoronaryVesselnessModule.h" // for the export macro
+#include "vtkImageAlgorithm.h"
+
+#include <array>  // for std::array
+#include <string> // for std::string
+#include <vector> // for std::vector
+
+class VTKCORONARYVESSELNESS_EXPORT vtkVesselSegmentation : public vtkImageAlgorithm
+{
+public:
+  static vtkVesselSegmentation* New();
+  vtkTypeMacro(vtkVesselSegmentation, vtkImageAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  enum OutputPorts
+  {
+    MaskPort = 0,
+    SeedsPort = 1,
+    AortaPort = 2
+  };
+
+  ///@{
+  /**
+   * Optional vesselness and seeds, inputs 1 and 2.
+   */
+  void SetVesselnessConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(1, output); }
+  void SetVesselnessData(vtkDataObject* data) { this->SetInputData(1, data); }
+  void SetSeedsConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(2, output); }
+  void SetSeedsData(vtkDataObject* data) { this->SetInputData(2, data); }
+  ///@}
+
+  ///@{
+  /**
+   * Seeds beside those of input 2, mm.
+   */
+  void AddSeed(double x, double y, double z);
+  void SetSeed(int index, double x, double y, double z);
+  void SetNumberOfSeeds(int count);
+  int GetNumberOfSeeds() { return static_cast<int>(this->Seeds.size()); }
+  void ClearSeeds() { this->SetNumberOfSeeds(0); }
+  ///@}
+
+  ///@{
+  /**
+   * Look for aorta and ostia when no seed is given. Default on.
+   */
+  vtkSetMacro(AutomaticOstia, bool);
+  vtkGetMacro(AutomaticOstia, bool);
+  vtkBooleanMacro(AutomaticOstia, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Image values of the vessels' surroundings and of undiluted blood, and whether they are measured
+   * instead: in the aorta, or around the given seeds (default on). Defaults 50 and 400 HU.
+   */
+  vtkSetMacro(AutomaticWindow, bool);
+  vtkGetMacro(AutomaticWindow, bool);
+  vtkBooleanMacro(AutomaticWindow, bool);
+  vtkSetMacro(TissueValue, double);
+  vtkGetMacro(TissueValue, double);
+  vtkSetMacro(BloodValue, double);
+  vtkGetMacro(BloodValue, double);
+  ///@}
+
+  ///@{
+  /**
+   * Hysteresis: likelihood of vessel down to which a vessel goes on (default 0.5), and that each
+   * twig must reach somewhere (default 0.8). 0 to 1, Weak at most Strong.
+   */
+  vtkSetMacro(WeakThreshold, double);
+  vtkGetMacro(WeakThreshold, double);
+  vtkSetMacro(StrongThreshold, double);
+  vtkGetMacro(StrongThreshold, double);
+  ///@}
+
+  ///@{
+  /**
+   * Vesselness of a clear tube, positive (default 0.3), and whether it is measured around the seeds
+   * instead (default on).
+   */
+  vtkSetMacro(AutomaticTubular, bool);
+  vtkGetMacro(AutomaticTubular, bool);
+  vtkBooleanMacro(AutomaticTubular, bool);
+  vtkSetMacro(TubularVesselness, double);
+  vtkGetMacro(TubularVesselness, double);
+  ///@}
+
+  ///@{
+  /**
+   * Radius in mm from which on blood counts as aorta or chamber, 1 to 50. Default 4.5.
+   */
+  vtkSetMacro(LargestRadius, double);
+  vtkGetMacro(LargestRadius, double);
+  ///@}
+
+  ///@{
+  /**
+   * Vessels end after so many mm from their seed, positive. Default 400.
+   */
+  vtkSetMacro(LongestPath, double);
+  vtkGetMacro(LongestPath, double);
+  ///@}
+
+  ///@{
+  /**
+   * Pieces below this volume in mm^3 are dropped, 0 or more. Default 2.
+   */
+  vtkSetMacro(SmallestIsland, double);
+  vtkGetMacro(SmallestIsland, double);
+  ///@}
+
+  ///@{
+  /**
+   * Fill what is enclosed by vessel; put the wall at the local half maximum. Default on.
+   */
+  vtkSetMacro(FillHoles, bool);
+  vtkGetMacro(FillHoles, bool);
+  vtkBooleanMacro(FillHoles, bool);
+  vtkSetMacro(RefineWall, bool);
+  vtkGetMacro(RefineWall, bool);
+  vtkBooleanMacro(RefineWall, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Also give the probability array. Default off.
+   */
+  vtkSetMacro(GenerateProbability, bool);
+  vtkGetMacro(GenerateProbability, bool);
+  vtkBooleanMacro(GenerateProbability, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Names of the output arrays. Defaults VesselMask and VesselProbability.
+   */
+  vtkSetStdStringFromCharMacro(MaskArrayName);
+  vtkGetCharFromStdStringMacro(MaskArrayName);
+  vtkSetStdStringFromCharMacro(ProbabilityArrayName);
+  vtkGetCharFromStdStringMacro(ProbabilityArrayName);
+  ///@}
+
+protected:
+  vtkVesselSegmentation();
+  ~vtkVesselSegmentation() override;
+
+  vtkExecutive* CreateDefaultExecutive() override;
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int FillOutputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestUpdateExtent(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestData(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+private:
+  vtkVesselSegmentation(const vtkVesselSegmentation&) = delete;
+  void operator=(const vtkVesselSegmentation&) = delete;
+
+  vtkDataArray* InputArray(vtkInformationVector** inputs, int port);
+  void Execute(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs);
+
+  std::vector<std::array<double, 3>> Seeds;
+  bool AutomaticOstia = true;
+  bool AutomaticWindow = true;
+  double TissueValue = 50.0;
+  double BloodValue = 400.0;
+  double WeakThreshold = 0.5;
+  double StrongThreshold = 0.8;
+  bool AutomaticTubular = true;
+  double TubularVesselness = 0.3;
+  double LargestRadius = 4.5;
+  double LongestPath = 400.0;
+  double SmallestIsland = 2.0;
+  bool FillHoles = true;
+  bool RefineWall = true;
+  bool GenerateProbability = false;
+  std::string MaskArrayName;
+  std::string ProbabilityArrayName;
+};
+
+#endif
