@@ -18,6 +18,7 @@
 #include "vtkImageData.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
+#include "vtkReferencePhase.h"
 #include "vtkStringArray.h"
 #include "vtkVesselSegmentation.h"
 
@@ -26,6 +27,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -53,7 +55,7 @@ struct RunJob
   std::vector<std::string> paths;
   std::string output;
   Stage until = Stages.back().second;
-  double time = 0.75;
+  double time = std::numeric_limits<double>::quiet_NaN(); ///< NaN: the quietest phase
   std::vector<double> fractions;
   double cycleMs = 1000.0;
   std::string series;
@@ -100,10 +102,10 @@ void RunJob::Declare(CLI::App& app)
   const std::string image = "Image";
   app
     .add_option("--time", this->time,
-      "Reference time, fraction of the R-R interval; the nearest phase of the cycle is taken")
+      "Reference time, fraction of the R-R interval: the nearest phase is taken. Without it, the "
+      "quietest phase is found")
     ->check(Within(-100.0, 100.0))
     ->type_name("FRACTION")
-    ->capture_default_str()
     ->group(image);
   app
     .add_option("--fractions", this->fractions,
@@ -167,17 +169,14 @@ void RunJob::Declare(CLI::App& app)
   app.add_flag("--quiet", this->quiet, "No progress and no summary");
 }
 
-/// The phase that is nearest to a time on the cycle.
-int NearestPhase(vtkGatedImageReader* reader, double time)
+/// The number of the phase at a time.
+int PhaseAt(vtkGatedImageReader* reader, double time)
 {
   int best = 0;
-  double least = 2.0;
-  for (int phase = 0; phase < reader->GetNumberOfPhases(); ++phase)
+  for (int phase = 1; phase < reader->GetNumberOfPhases(); ++phase)
   {
-    const double distance = std::abs(std::remainder(reader->GetPhaseTime(phase) - time, 1.0));
-    if (distance < least - 1e-9)
+    if (std::abs(reader->GetPhaseTime(phase) - time) < std::abs(reader->GetPhaseTime(best) - time))
     {
-      least = distance;
       best = phase;
     }
   }
@@ -248,17 +247,16 @@ void RunJob::Run()
   }
   reader->UpdateInformation();
   messages.ThrowIfError();
-  const int phase = NearestPhase(reader, this->time);
-  const double phaseTime = reader->GetPhaseTime(phase);
-  nlohmann::ordered_json report = { { "phase", phase }, { "time", phaseTime },
-    { "image", reader->GetPhaseFileName(phase) } };
+  nlohmann::ordered_json report;
+  int phase = 0;
+  double phaseTime = 0.0;
 
   StagedFolder folder(this->output);
   std::string summary;
   try
   {
     const bool segment = this->until == Stage::Segmentation;
-    ProgressDisplay progress("stage", segment ? 2 : 1, this->quiet);
+    ProgressDisplay progress("stage", segment ? 3 : 2, this->quiet);
     const auto update = [&](vtkAlgorithm* algorithm)
     {
       UpdateAtTime(
@@ -266,15 +264,28 @@ void RunJob::Run()
     };
     const auto keepGoing = [](double) { return Interruption() == 0; };
 
-    progress.BeginStep(0, "vesselness");
+    progress.BeginStep(0, "reference phase");
+    vtkNew<vtkReferencePhase> reference;
+    reference->SetInputConnection(reader->GetOutputPort());
+    reference->SetAutomatic(std::isnan(this->time) && reader->GetNumberOfPhases() > 1);
+    reference->SetTime(std::isnan(this->time) ? reader->GetPhaseTime(0) : this->time);
+    update(reference);
+    phaseTime = reference->GetUsedTime();
+    if (std::isnan(phaseTime))
+    {
+      phaseTime = reader->GetPhaseTime(0);
+    }
+    phase = PhaseAt(reader, phaseTime);
+    report = { { "phase", phase }, { "time", phaseTime },
+      { "image", reader->GetPhaseFileName(phase) } };
+
+    progress.BeginStep(1, "vesselness");
     vtkNew<vtkFrangiVesselness> vesselness;
-    vesselness->SetInputConnection(reader->GetOutputPort());
+    vesselness->SetInputConnection(reference->GetOutputPort());
     vesselness->SetSigmaMin(this->scales[0]);
     vesselness->SetSigmaMax(this->scales[1]);
     vesselness->SetAutomaticC(!(this->c > 0.0));
     vesselness->SetC(this->c > 0.0 ? this->c : 1.0);
-    vesselness->SetAutomaticReferenceTime(false);
-    vesselness->SetReferenceTime(phaseTime);
     update(vesselness);
     vtkImageData* response = vesselness->GetOutput();
     WriteMetaImage(folder.Add("vesselness.mha"), GridOf(response),
@@ -286,9 +297,9 @@ void RunJob::Run()
 
     if (segment)
     {
-      progress.BeginStep(1, "segmentation");
+      progress.BeginStep(2, "segmentation");
       vtkNew<vtkVesselSegmentation> segmentation;
-      segmentation->SetInputConnection(reader->GetOutputPort());
+      segmentation->SetInputConnection(reference->GetOutputPort());
       segmentation->SetVesselnessConnection(vesselness->GetOutputPort());
       for (std::size_t n = 0; n + 2 < this->seeds.size(); n += 3)
       {
