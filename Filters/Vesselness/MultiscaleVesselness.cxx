@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -17,6 +18,10 @@ namespace
 {
 constexpr int BandRows = 48;
 
+/// Of the kernels, in standard deviations. At 4 the second derivative still has half a per cent of
+/// its height, which costs 1e-3 of vesselness and more; here it is 1e-5.
+constexpr double KernelReach = 5.5;
+
 int Padded(int n)
 {
   return (n + VesselnessLanes - 1) / VesselnessLanes * VesselnessLanes;
@@ -28,7 +33,7 @@ int Padded(int n)
  */
 std::vector<float> HalfKernel(double sigma, double spacing, int order)
 {
-  const int radius = std::max(1, static_cast<int>(std::ceil(4.0 * sigma / spacing)));
+  const int radius = std::max(1, static_cast<int>(std::ceil(KernelReach * sigma / spacing)));
   std::vector<double> g(radius + 1);
   double sum = 0.0;
   for (int t = 0; t <= radius; ++t)
@@ -83,25 +88,52 @@ std::vector<float> HalfKernel(double sigma, double spacing, int order)
   return std::vector<float>(kernel.begin(), kernel.end());
 }
 
-/// The widest loops that this processor runs.
+/// The loops of an instruction set, if they are in this library and this processor runs them.
+const VesselnessKernels* Find(VesselnessInstructions instructions)
+{
+  switch (instructions)
+  {
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+    case VesselnessInstructions::Avx512:
+      return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+          __builtin_cpu_supports("avx512vl")
+        ? &VesselnessKernelsAvx512
+        : nullptr;
+    case VesselnessInstructions::Avx2:
+      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
+        ? &VesselnessKernelsAvx2
+        : nullptr;
+#endif
+    case VesselnessInstructions::Baseline:
+      return &VesselnessKernelsBaseline;
+    default:
+      return nullptr;
+  }
+}
+
+/// The widest that this processor runs.
+const VesselnessKernels* FindWidest()
+{
+  for (const VesselnessInstructions wide :
+    { VesselnessInstructions::Avx512, VesselnessInstructions::Avx2 })
+  {
+    if (const VesselnessKernels* kernels = Find(wide))
+    {
+      return kernels;
+    }
+  }
+  return &VesselnessKernelsBaseline;
+}
+
+std::atomic<const VesselnessKernels*>& Selected()
+{
+  static std::atomic<const VesselnessKernels*> selected{ FindWidest() };
+  return selected;
+}
+
 const VesselnessKernels& Kernels()
 {
-#if defined(DYNAMICCORONARY_WIDE_KERNELS)
-  static const VesselnessKernels& kernels = []() -> const VesselnessKernels&
-  {
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl"))
-    {
-      return VesselnessKernelsAvx512;
-    }
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
-      ? VesselnessKernelsAvx2
-      : VesselnessKernelsBaseline;
-  }();
-  return kernels;
-#else
-  return VesselnessKernelsBaseline;
-#endif
+  return *Selected();
 }
 
 /// Axis of the vessel: eigenvector of the eigenvalue that is the greatest after the sign.
@@ -116,6 +148,17 @@ Eigen::Vector3f VesselAxis(const HessianRow& h, int i, float sign)
   axis.cwiseAbs().maxCoeff(&strongest);
   return (axis[strongest] < 0.0 ? Vector3(-axis) : axis).cast<float>();
 }
+}
+
+bool SetVesselnessInstructions(VesselnessInstructions instructions)
+{
+  const VesselnessKernels* found =
+    instructions == VesselnessInstructions::Widest ? FindWidest() : Find(instructions);
+  if (found)
+  {
+    Selected() = found;
+  }
+  return found != nullptr;
 }
 
 void VesselnessSettings::Validate() const

@@ -351,7 +351,7 @@ void JermanRow(const HessianRow& h, float sign, float cutoff, int width, float* 
       const float third = 3.0f / (sum > 1e-20f ? sum : 1.0f);
       float value = l2 * l2 * (rho - l2) * third * third * third;
       value = l2 >= 0.5f * rho ? 1.0f : value;
-      result[i] = vessel & (rho > 0.0f) ? value : 0.0f;
+      result[i] = (vessel & (rho > 0.0f)) ? value : 0.0f;
     }
   }
 }

@@ -43,6 +43,17 @@ struct VesselnessKernels
   void (*lambda3)(const HessianRow& h, float sign, int width, float* result);
 };
 
+enum class VesselnessInstructions
+{
+  Widest, ///< that the processor runs: the default
+  Baseline,
+  Avx2,
+  Avx512
+};
+
+/// For tests: which of the sets of loops runs, in the whole process; false if that can not be.
+bool SetVesselnessInstructions(VesselnessInstructions instructions);
+
 extern const VesselnessKernels VesselnessKernelsBaseline;
 extern const VesselnessKernels VesselnessKernelsAvx2;
 extern const VesselnessKernels VesselnessKernelsAvx512;

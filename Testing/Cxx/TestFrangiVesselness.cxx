@@ -928,7 +928,7 @@ TEST(FrangiVesselness, AnInputThatFailsWhileCIsMeasuredIsAnError)
 TEST(FrangiVesselness, ReportsProgressAndStopsQuickly)
 {
   vtkNew<vtkImageData> image;
-  image->SetDimensions(200, 200, 200);
+  image->SetDimensions(130, 130, 130);
   image->SetSpacing(0.4, 0.4, 0.4);
   image->AllocateScalars(VTK_FLOAT, 1);
   auto* values = vtkFloatArray::SafeDownCast(image->GetPointData()->GetScalars());
