@@ -137,6 +137,7 @@ std::vector<float> SquaredDistanceTransform(const unsigned char* mask,
       }
     },
     part(0.5));
+  Report(progress, 1.0);
   return squared;
 }
 

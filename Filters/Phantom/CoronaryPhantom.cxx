@@ -367,16 +367,8 @@ double CoronaryPhantom::LumenDistance(const Vector3& position, double t) const
 void CoronaryPhantom::LumenDistances(const ImageGrid& grid, const std::array<int, 6>& part,
   double t, double reach, float* distances, const ProgressCallback& progress) const
 {
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    if (part[2 * axis] < grid.extent[2 * axis] || part[2 * axis + 1] > grid.extent[2 * axis + 1] ||
-      !(grid.spacing[axis] > 0.0))
-    {
-      throw std::invalid_argument("CoronaryPhantom: the part must lie in the grid");
-    }
-  }
+  RequireGrid(grid, part);
   const double limit = std::clamp(reach, 0.0, farAway);
-  const PhantomLumen lumen = this->Data->Lumen(t, limit);
   const std::int64_t nx = part[1] - part[0] + 1;
   const std::int64_t ny = part[3] - part[2] + 1;
   const std::int64_t nz = part[5] - part[4] + 1;
@@ -384,6 +376,7 @@ void CoronaryPhantom::LumenDistances(const ImageGrid& grid, const std::array<int
   {
     return;
   }
+  const PhantomLumen lumen = this->Data->Lumen(t, limit);
   ParallelFor(
     ny * nz, 16,
     [&](std::int64_t first, std::int64_t last)
@@ -401,6 +394,7 @@ void CoronaryPhantom::LumenDistances(const ImageGrid& grid, const std::array<int
       }
     },
     progress);
+  Report(progress, 1.0);
 }
 
 ImageGrid CoronaryPhantom::DefaultGrid(double spacing, double margin) const

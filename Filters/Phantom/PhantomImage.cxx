@@ -586,9 +586,7 @@ double PhantomImage::NoiseLevel(double t, double wholePhaseLost) const
     (1.0 + 1.5 * wholePhaseLost);
 }
 
-void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part, double t,
-  const std::vector<PhantomMoment>& moments, const std::vector<double>& lost, double wholePhaseLost,
-  std::int16_t* values, const ProgressCallback& progress) const
+void RequireGrid(const ImageGrid& grid, const std::array<int, 6>& part)
 {
   for (int axis = 0; axis < 3; ++axis)
   {
@@ -606,6 +604,13 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
   {
     throw std::invalid_argument("CoronaryPhantom: the direction matrix is not orthonormal");
   }
+}
+
+void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part, double t,
+  const std::vector<PhantomMoment>& moments, const std::vector<double>& lost, double wholePhaseLost,
+  std::int16_t* values, const ProgressCallback& progress) const
+{
+  RequireGrid(grid, part);
   if (part[1] < part[0] || part[3] < part[2] || part[5] < part[4])
   {
     return;

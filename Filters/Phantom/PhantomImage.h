@@ -45,6 +45,9 @@ private:
   const PhantomMotion& Motion;
 };
 
+/// @throws std::invalid_argument for a grid that is not one, or a part outside its extent
+void RequireGrid(const ImageGrid& grid, const std::array<int, 6>& part);
+
 /**
  * Share of a Gaussian, centred at `offset` from the middle of a disc, that lies in the disc; all in
  * units of the Gaussian's standard deviation. Exact to 4e-3.

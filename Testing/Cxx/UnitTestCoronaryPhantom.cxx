@@ -2,6 +2,7 @@
 
 #include "CoronaryPhantom.h"
 #include "CounterRandom.h"
+#include "PhantomAnatomy.h"
 #include "PhantomImage.h"
 #include "PhantomMotion.h"
 
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -304,6 +306,112 @@ TEST(CoronaryPhantom, LumenDistanceIsMinusTheRadiusOnTheAxis)
     }
   }
   EXPECT_EQ(phantom.LumenDistance(Vector3(500.0, 0.0, 0.0), 0.0), double(CoronaryPhantom::farAway));
+}
+
+TEST(CoronaryPhantom, LumenDistancesAreLumenDistanceAtTheVoxels)
+{
+  const CoronaryPhantom phantom((PhantomSettings()));
+  // Oblique, anisotropic, extent not from 0, about the left main.
+  ImageGrid grid;
+  grid.direction = (Eigen::AngleAxisd(0.4, Vector3(1.0, 2.0, 3.0).normalized())).matrix();
+  grid.spacing = Vector3(0.7, 0.9, 1.3);
+  grid.extent = { -14, 16, -12, 13, -8, 9 };
+  grid.origin = phantom.Ostia(0.3)[0].position + 5.0 * phantom.Ostia(0.3)[0].axis;
+  const std::array<int, 6> part{ -10, 15, -12, 9, -6, 9 };
+  const int nx = part[1] - part[0] + 1;
+  const int ny = part[3] - part[2] + 1;
+  const int nz = part[5] - part[4] + 1;
+  for (const double reach : { 1.5, 100.0 })
+  {
+    const double limit = std::min(reach, CoronaryPhantom::farAway);
+    std::vector<float> distances(static_cast<std::size_t>(nx) * ny * nz, 1e9f);
+    phantom.LumenDistances(grid, part, 0.3, reach, distances.data());
+    int inside = 0;
+    int near = 0;
+    // A single distance takes milliseconds: a sample, and everything that is in the lumen or nearly.
+    for (std::size_t p = 0; p < distances.size(); ++p)
+    {
+      if (p % 61 != 0 && !(std::abs(distances[p]) < 0.15f))
+      {
+        continue;
+      }
+      const auto n = static_cast<int>(p);
+      const Vector3 position =
+        grid.IndexToWorld(part[0] + n % nx, part[2] + n / nx % ny, part[4] + n / (nx * ny));
+      const double expected = std::clamp(phantom.LumenDistance(position, 0.3), -limit, limit);
+      ASSERT_NEAR(distances[p], expected, 1e-4) << position.transpose();
+      inside += expected < 0.0 ? 1 : 0;
+      near += std::abs(expected) < limit ? 1 : 0;
+    }
+    EXPECT_GT(inside, 20);
+    EXPECT_GT(near, inside);
+  }
+
+  std::vector<float> whole(31 * 26 * 18);
+  SetNumberOfThreads(1);
+  phantom.LumenDistances(grid, grid.extent, 0.3, 3.0, whole.data());
+  SetNumberOfThreads(4);
+  std::vector<float> again(whole.size());
+  phantom.LumenDistances(grid, grid.extent, 0.3, 3.0, again.data());
+  SetNumberOfThreads(0);
+  EXPECT_EQ(whole, again);
+
+  const auto stop = [](double) { return false; };
+  EXPECT_THROW(phantom.LumenDistances(grid, grid.extent, 0.3, 3.0, whole.data(), stop), Cancelled);
+  EXPECT_THROW(phantom.LumenDistances(grid, { -15, 16, -12, 13, -8, 9 }, 0.3, 3.0, whole.data()),
+    std::invalid_argument);
+  const auto refused = [&](const std::function<void(ImageGrid&)>& change)
+  {
+    ImageGrid wrong = grid;
+    change(wrong);
+    EXPECT_THROW(
+      phantom.LumenDistances(wrong, wrong.extent, 0.3, 3.0, whole.data()), std::invalid_argument);
+  };
+  refused([](ImageGrid& g) { g.spacing[1] = 0.0; });
+  refused([](ImageGrid& g) { g.spacing[0] = std::numeric_limits<double>::quiet_NaN(); });
+  refused([](ImageGrid& g) { g.origin[2] = std::numeric_limits<double>::infinity(); });
+  refused([](ImageGrid& g) { g.direction(0, 0) = 2.0; });
+}
+
+TEST(CoronaryPhantom, NoVesselRunsThroughTheAorticRoot)
+{
+  constexpr double wall = 1.6;       // mm, of the aorta
+  constexpr double departure = 10.0; // mm from the ostium until a vessel must be clear
+  for (std::uint64_t seed = 1; seed <= 20; ++seed)
+  {
+    for (const Dominance dominance : { Dominance::Right, Dominance::Left, Dominance::Balanced })
+    {
+      PhantomSettings settings;
+      settings.seed = seed;
+      settings.dominance = dominance;
+      settings.ramus = seed % 2 == 0;
+      const PhantomAnatomy anatomy(settings);
+      const AorticRoot& root = anatomy.root;
+      EXPECT_NEAR(root.axis.norm(), 1.0, 1e-12);
+      // Both ostia are on the wall, and the vessels leave outwards.
+      for (const Vector3& ostium : { anatomy.leftOstium, anatomy.rightOstium })
+      {
+        EXPECT_NEAR((ostium - root.centre).norm(), root.radius, 1e-9);
+      }
+      for (std::size_t p = 0; p < anatomy.tree.points.size(); ++p)
+      {
+        const Vector3& point = anatomy.tree.points[p];
+        const double height =
+          std::clamp((point - root.centre).dot(root.axis), -AorticRoot::Below, AorticRoot::Above);
+        const double outside = (point - root.centre - height * root.axis).norm() - root.radius;
+        const double ostium =
+          std::min((point - anatomy.leftOstium).norm(), (point - anatomy.rightOstium).norm());
+        // The axis stays out of the bore everywhere, the lumen out of the wall past the departure.
+        ASSERT_GT(outside, -0.5) << "seed " << seed << ", point " << p;
+        if (ostium > departure)
+        {
+          ASSERT_GT(outside - anatomy.tree.radius[p], wall)
+            << "seed " << seed << ", dominance " << static_cast<int>(dominance) << ", "
+            << SegmentName(anatomy.tree.segmentId[p]) << " " << anatomy.tree.abscissa[p] << " mm";
+        }
+      }
+    }
+  }
 }
 
 TEST(CoronaryPhantom, SurfaceIsClosedOrientedAndOnTheLumen)
