@@ -942,8 +942,10 @@ std::vector<int> NumberInOrder(const std::vector<std::vector<double>>& costs, in
     {
       for (int k = std::min(last + 1, most); k <= most; ++k)
       {
-        // Beyond the last number all further branches share it, which is as unusual.
-        const double repeated = SkippedNumber * (last == most ? 1 : k - last - 1);
+        // When there are more branches than numbers, some share the last one.
+        const double repeated = last < most ? SkippedNumber * (k - last - 1)
+          : static_cast<int>(n) > most      ? SkippedNumber
+                                            : Infinity;
         const double total = best[i][last] + costs[i][k - 1] + repeated;
         if (total < best[i + 1][k])
         {
@@ -1163,12 +1165,13 @@ void Labeler::NameSegments(const Pose& pose, const Assignment& assignment)
   const Border rcaMid =
     border(nearest(acutes, this->Atlas.acuteMarginArc, 25.0), this->Atlas.acuteMarginArc);
 
-  std::map<std::int64_t, char> done;
   const auto passed = [&](const Border& limit, V trunk, std::int64_t point)
   {
     return limit.along >= 0.0 ? this->Tree.abscissa[point] > limit.along * (1.0 + 1e-12)
                               : atlasArc(trunk, point) > limit.arc;
   };
+  // Number of borders passed on the trunk: noise does not lead back over one.
+  std::vector<int> stage(count, 0);
   for (std::size_t c = 0; c < count; ++c)
   {
     const Chunk& chunk = this->Chunks[c];
@@ -1183,6 +1186,17 @@ void Labeler::NameSegments(const Pose& pose, const Assignment& assignment)
     };
     const auto& points = this->Tree.branches[chunk.branch].points;
     const bool root = chunk.parent < 0;
+    if (!root && assignment.vessels[chunk.parent] == vessel)
+    {
+      stage[c] = stage[chunk.parent];
+    }
+    const auto advance = [&](std::int64_t point, const Border& first, const Border& second)
+    {
+      const int reached = passed(second, vessel, point) ? 2 : passed(first, vessel, point) ? 1 : 0;
+      stage[c] = std::max(stage[c], reached);
+      return stage[c];
+    };
+    const Border never{ Infinity, 0.0 };
     for (std::size_t i = chunk.first + (root ? 0 : 1); i <= chunk.last; ++i)
     {
       const std::int64_t point = points[i];
@@ -1193,15 +1207,14 @@ void Labeler::NameSegments(const Pose& pose, const Assignment& assignment)
           segment = LeftMain;
           break;
         case V::AnteriorDescending:
-          segment = !passed(ladProximal, vessel, point) ? ProximalLAD
-            : !passed(ladMid, vessel, point)            ? MidLAD
-                                                        : DistalLAD;
+          segment = ProximalLAD + advance(point, ladProximal, ladMid);
           break;
         case V::Circumflex:
-          segment = !passed(circumflex, vessel, point)            ? ProximalLCx
-            : endsPosterolateral && passed(groove, vessel, point) ? LeftPLB
-                                                                  : DistalLCx;
+        {
+          constexpr int names[] = { ProximalLCx, DistalLCx, LeftPLB };
+          segment = names[advance(point, circumflex, endsPosterolateral ? groove : never)];
           break;
+        }
         case V::Ramus:
           segment = RamusIntermedius;
           break;
@@ -1221,9 +1234,7 @@ void Labeler::NameSegments(const Pose& pose, const Assignment& assignment)
           segment = LeftPDA;
           break;
         case V::RightCoronary:
-          segment = !passed(rcaProximal, vessel, point) ? ProximalRCA
-            : !passed(rcaMid, vessel, point)            ? MidRCA
-                                                        : DistalRCA;
+          segment = ProximalRCA + advance(point, rcaProximal, rcaMid);
           break;
         case V::RightVentricular:
           segment = RightVentricularBranch;
@@ -1378,5 +1389,116 @@ LabelingResult LabelSegments(
   LabelingResult result = labeler.Run(progress);
   Report(progress, 1.0);
   return result;
+}
+
+int SplitAtSegmentBorders(CenterlineTopology& tree)
+{
+  const std::size_t count = tree.branches.size();
+  std::vector<CenterlineTree::Branch> branches;
+  std::vector<double> meanRadius;
+  std::vector<char> inLoop;
+  std::vector<int> first(count, 0);
+  std::vector<int> last(count, 0);
+  int cuts = 0;
+  for (std::size_t b = 0; b < count; ++b)
+  {
+    const CenterlineTree::Branch& branch = tree.branches[b];
+    // Where stretches of one segment start, as indices of steps.
+    std::vector<std::size_t> starts{ 1 };
+    const auto segmentOf = [&](std::size_t step) { return tree.segmentId[branch.points[step]]; };
+    const auto lengthOf = [&](std::size_t from, std::size_t to)
+    {
+      double length = 0.0;
+      for (std::size_t i = from; i < to; ++i)
+      {
+        length += (tree.points[branch.points[i]] - tree.points[branch.points[i - 1]]).norm();
+      }
+      return length;
+    };
+    const double least = 2.0 * tree.meanRadius[b];
+    for (std::size_t i = 2; i < branch.points.size(); ++i)
+    {
+      if (segmentOf(i) == segmentOf(i - 1))
+      {
+        continue;
+      }
+      if (lengthOf(starts.back(), i) >= least)
+      {
+        starts.push_back(i);
+      }
+      else if (starts.size() > 1 && segmentOf(i) == segmentOf(starts[starts.size() - 2]))
+      {
+        starts.pop_back();
+      }
+      // Else the short stretch stays the beginning of the one that follows.
+    }
+    while (starts.size() > 1 && lengthOf(starts.back(), branch.points.size()) < least)
+    {
+      starts.pop_back();
+    }
+    cuts += static_cast<int>(starts.size()) - 1;
+    first[b] = static_cast<int>(branches.size());
+    for (std::size_t p = 0; p < starts.size(); ++p)
+    {
+      const std::size_t end = p + 1 < starts.size() ? starts[p + 1] : branch.points.size();
+      CenterlineTree::Branch piece = branch;
+      piece.points.assign(branch.points.begin() + static_cast<std::ptrdiff_t>(starts[p]) - 1,
+        branch.points.begin() + static_cast<std::ptrdiff_t>(end));
+      piece.groupId = static_cast<int>(branches.size());
+      piece.parentGroupId = p > 0  ? piece.groupId - 1
+        : branch.parentGroupId < 0 ? -1
+                                   : last[branch.parentGroupId];
+      std::vector<Vector3> way;
+      std::map<int, double> lengths;
+      double integral = 0.0;
+      for (std::size_t i = 0; i < piece.points.size(); ++i)
+      {
+        way.push_back(tree.points[piece.points[i]]);
+        if (i > 0)
+        {
+          const double step = (way[i] - way[i - 1]).norm();
+          lengths[tree.segmentId[piece.points[i]]] += step;
+          integral +=
+            0.5 * step * (tree.radius[piece.points[i]] + tree.radius[piece.points[i - 1]]);
+        }
+      }
+      piece.length = PolylineLength(way);
+      piece.tortuosity = PolylineTortuosity(way);
+      piece.segmentId = std::max_element(lengths.begin(), lengths.end(),
+        [](const auto& a, const auto& c) {
+          return a.second < c.second;
+        })->first;
+      meanRadius.push_back(integral / piece.length);
+      inLoop.push_back(tree.inLoop[b]);
+      branches.push_back(piece);
+    }
+    last[b] = static_cast<int>(branches.size()) - 1;
+  }
+  if (cuts == 0)
+  {
+    return 0;
+  }
+  std::vector<int> continuation(branches.size(), -1);
+  for (std::size_t b = 0; b < count; ++b)
+  {
+    for (int piece = first[b]; piece < last[b]; ++piece)
+    {
+      continuation[piece] = piece + 1;
+    }
+    continuation[last[b]] = tree.continuation[b] < 0 ? -1 : first[tree.continuation[b]];
+  }
+  for (Bifurcation& bifurcation : tree.bifurcations)
+  {
+    bifurcation.parent = last[bifurcation.parent];
+    for (int& daughter : bifurcation.daughters)
+    {
+      daughter = first[daughter];
+    }
+  }
+  tree.branches = std::move(branches);
+  tree.meanRadius = std::move(meanRadius);
+  tree.inLoop = std::move(inLoop);
+  tree.continuation = std::move(continuation);
+  return cuts;
 }
 }

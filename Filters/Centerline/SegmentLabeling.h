@@ -66,6 +66,15 @@ struct LabelingResult
  */
 LabelingResult LabelSegments(CenterlineTopology& tree, const LabelingSettings& settings = {},
   const ProgressCallback& progress = {});
+
+/**
+ * Cuts branches where the segment changes inside them, because the side branch that marks the
+ * border was not found: so that a branch's name holds for all of it. The pieces have the
+ * generation and order of the branch, and touch end to end; group ids are numbered anew, also in
+ * the bifurcations. Stretches shorter than two radii are left with their neighbour.
+ * @return number of cuts
+ */
+int SplitAtSegmentBorders(CenterlineTopology& tree);
 }
 
 #endif

@@ -57,6 +57,35 @@ constexpr const char* SegmentLabel = "SegmentLabel";         ///< string, SCCT n
 constexpr const char* Length = "Length";                     ///< double, mm
 constexpr const char* Tortuosity = "Tortuosity";             ///< double, length / chord - 1
 
+// Centerline tree with geometry, point data.
+constexpr const char* FrenetTangent = "FrenetTangent";   ///< double[3], unit, downstream
+constexpr const char* FrenetNormal = "FrenetNormal";     ///< double[3], unit, to the inside
+constexpr const char* FrenetBinormal = "FrenetBinormal"; ///< double[3], tangent x normal
+constexpr const char* Curvature = "Curvature";           ///< double, 1/mm
+constexpr const char* Torsion = "Torsion";               ///< double, 1/mm
+constexpr const char* SectionArea = "SectionArea"; ///< double, mm^2, of the round cross-section
+
+// Centerline tree, field data.
+constexpr const char* Dominance = "Dominance";     ///< string, right, left or balanced
+constexpr const char* HeartFrame = "HeartFrame";   ///< double[16], world to heart, row by row
+constexpr const char* PrunedTwigs = "PrunedTwigs"; ///< int, number
+constexpr const char* ClosedGaps = "ClosedGaps";   ///< int, number
+constexpr const char* LoopLengths = "LoopLengths"; ///< double, mm, one value a loop
+
+// Bifurcations, point data (with ParentGroupIds, TreeIds, SegmentIds of the parent).
+constexpr const char* DaughterGroupIds = "DaughterGroupIds"; ///< int[n], widest first, -1: none
+constexpr const char* BifurcationAngle = "BifurcationAngle"; ///< double, radians
+constexpr const char* DaughterAngles = "DaughterAngles";     ///< double[n], radians, from parent
+constexpr const char* ParentRadius = "ParentRadius";         ///< double, mm
+constexpr const char* DaughterRadii = "DaughterRadii";       ///< double[n], mm
+constexpr const char* AreaRatio = "AreaRatio"; ///< double, daughters' areas over parent's
+constexpr const char* DaughterAreaRatio = "DaughterAreaRatio"; ///< double, second over widest
+constexpr const char* MurrayExponent = "MurrayExponent";       ///< double, the chosen exponent
+constexpr const char* MurrayResidual = "MurrayResidual";       ///< double, relative
+constexpr const char* HuoKassabResidual = "HuoKassabResidual"; ///< double, relative, exponent 7/3
+constexpr const char* FinetRatio = "FinetRatio";               ///< double
+constexpr const char* FittedExponent = "FittedExponent";       ///< double, NaN where none fits
+
 // Surface, cell data.
 constexpr const char* CellEntityIds = "CellEntityIds"; ///< int, 1 wall, 2.. caps
 }

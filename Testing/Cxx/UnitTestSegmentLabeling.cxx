@@ -277,6 +277,53 @@ TEST(SegmentLabeling, MissingBranchesAndEnds)
   EXPECT_LE(wrong, 3);
 }
 
+TEST(SegmentLabeling, BranchesAreCutWhereTheNameChanges)
+{
+  Degradation how;
+  how.noise = 0.2;
+  how.lostBranches = 0.5;
+  int cuts = 0;
+  double right = 0.0;
+  double all = 0.0;
+  for (std::uint64_t seed = 181; seed <= 186; ++seed)
+  {
+    const PhantomTree truth = MakeTree(seed, static_cast<int>(seed % 3), false);
+    const Case lossy = Degrade(truth, how, seed);
+    CenterlineTopology tree = BuildTopology(lossy.lines);
+    LabelSegments(tree);
+    const std::size_t before = tree.branches.size();
+    const std::size_t bifurcations = tree.bifurcations.size();
+    const int here = SplitAtSegmentBorders(tree);
+    cuts += here;
+    EXPECT_EQ(tree.branches.size(), before + here);
+    EXPECT_EQ(tree.bifurcations.size(), bifurcations);
+    CheckTree(tree);
+    for (const Bifurcation& bifurcation : tree.bifurcations)
+    {
+      EXPECT_EQ(tree.branches[bifurcation.parent].points.back(), bifurcation.point);
+      for (const int daughter : bifurcation.daughters)
+      {
+        EXPECT_EQ(tree.branches[daughter].parentGroupId, bifurcation.parent);
+      }
+    }
+    for (const auto& branch : tree.branches)
+    {
+      const int next = tree.continuation[branch.groupId];
+      EXPECT_TRUE(next < 0 || tree.branches[next].parentGroupId == branch.groupId);
+      for (std::size_t i = 1; i < branch.points.size(); ++i)
+      {
+        const double step =
+          (tree.points[branch.points[i]] - tree.points[branch.points[i - 1]]).norm();
+        all += step;
+        right += lossy.truth[tree.source[branch.points[i]]] == branch.segmentId ? step : 0.0;
+      }
+    }
+    EXPECT_EQ(SplitAtSegmentBorders(tree), 0);
+  }
+  EXPECT_GT(cuts, 3);
+  EXPECT_GT(right / all, 0.9);
+}
+
 TEST(SegmentLabeling, AnyOrientationAndUnit)
 {
   // The shape decides, not the way in which the patient lies.

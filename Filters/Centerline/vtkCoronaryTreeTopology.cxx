@@ -1,0 +1,566 @@
+#include "vtkCoronaryTreeTopology.h"
+
+#include "CenterlineTopology.h"
+#include "SegmentLabeling.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
+
+#include "vtkAbstractArray.h"
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkDataArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkIdList.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <stdexcept>
+
+using coronary::CenterlineTopology;
+using coronary::Vector3;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+vtkStandardNewMacro(vtkCoronaryTreeTopology);
+
+namespace
+{
+constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+
+/// As many daughters as the arrays of a bifurcation have room for at least.
+constexpr int LeastDaughters = 3;
+
+template <typename Array, typename Value>
+void Add(vtkFieldData* data, const std::string& name, const std::vector<Value>& values)
+{
+  vtkNew<Array> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    array->SetValue(static_cast<vtkIdType>(i), values[i]);
+  }
+  data->AddArray(array);
+}
+
+void AddVectors(vtkFieldData* data, const std::string& name, const std::vector<Vector3>& values)
+{
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfComponents(3);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    array->SetTypedTuple(static_cast<vtkIdType>(i), values[i].data());
+  }
+  data->AddArray(array);
+}
+
+/// One row of `width` values for each list; what a list does not have is `missing`.
+template <typename Array, typename Value>
+void AddRows(vtkFieldData* data, const std::string& name,
+  const std::vector<std::vector<Value>>& rows, int width, Value missing)
+{
+  vtkNew<Array> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfComponents(width);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+  {
+    for (int k = 0; k < width; ++k)
+    {
+      const bool has = k < static_cast<int>(rows[i].size());
+      array->SetTypedComponent(static_cast<vtkIdType>(i), k, has ? rows[i][k] : missing);
+    }
+  }
+  data->AddArray(array);
+}
+
+template <typename Get>
+auto OfBranches(const CenterlineTopology& tree, const Get& get)
+{
+  std::vector<decltype(get(tree.branches[0]))> values;
+  values.reserve(tree.branches.size());
+  for (const auto& branch : tree.branches)
+  {
+    values.push_back(get(branch));
+  }
+  return values;
+}
+
+template <typename Get>
+auto OfBifurcations(const CenterlineTopology& tree, const Get& get)
+{
+  std::vector<decltype(get(tree.bifurcations[0]))> values;
+  values.reserve(tree.bifurcations.size());
+  for (const auto& bifurcation : tree.bifurcations)
+  {
+    values.push_back(get(bifurcation));
+  }
+  return values;
+}
+
+const char* NameOf(coronary::Dominance dominance)
+{
+  return dominance == coronary::Dominance::Right ? "right"
+    : dominance == coronary::Dominance::Left     ? "left"
+                                                 : "balanced";
+}
+
+std::string Capitalised(std::string message)
+{
+  if (!message.empty())
+  {
+    message.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(message.front())));
+  }
+  return message;
+}
+}
+
+/// The outputs, out of the algorithm's result.
+class vtkCoronaryTreeTopology::Writer
+{
+public:
+  Writer(vtkCoronaryTreeTopology* self, vtkPolyData* input, const CenterlineTopology& tree)
+    : Self(self)
+    , Input(input)
+    , Tree(tree)
+  {
+  }
+
+  void WriteTree(vtkPolyData* output) const
+  {
+    const auto& self = *this->Self;
+    const CenterlineTopology& tree = this->Tree;
+    const auto count = static_cast<vtkIdType>(tree.points.size());
+    vtkNew<vtkPoints> points;
+    points->SetDataType(
+      this->Input->GetPoints() != nullptr ? this->Input->GetPoints()->GetDataType() : VTK_DOUBLE);
+    points->SetNumberOfPoints(count);
+    for (vtkIdType i = 0; i < count; ++i)
+    {
+      points->SetPoint(i, tree.points[i].data());
+    }
+    vtkNew<vtkCellArray> lines;
+    for (const auto& branch : tree.branches)
+    {
+      lines->InsertNextCell(static_cast<int>(branch.points.size()));
+      for (const std::int64_t point : branch.points)
+      {
+        lines->InsertCellPoint(point);
+      }
+    }
+    output->SetPoints(points);
+    output->SetLines(lines);
+
+    vtkPointData* data = output->GetPointData();
+    vtkPointData* given = this->Input->GetPointData();
+    data->CopyAllOn();
+    data->CopyAllocate(given, count);
+    for (vtkIdType i = 0; i < count; ++i)
+    {
+      data->CopyData(given, tree.source[i], i);
+    }
+    Add<vtkDoubleArray>(data, self.RadiusArrayName, tree.radius);
+    Add<vtkDoubleArray>(data, self.AbscissasArrayName, tree.abscissa);
+    AddVectors(data, self.FrenetTangentArrayName, tree.tangent);
+    AddVectors(data, self.FrenetNormalArrayName, tree.normal);
+    AddVectors(data, self.FrenetBinormalArrayName, tree.binormal);
+    Add<vtkDoubleArray>(data, self.CurvatureArrayName, tree.curvature);
+    Add<vtkDoubleArray>(data, self.TorsionArrayName, tree.torsion);
+    Add<vtkDoubleArray>(data, self.SectionAreaArrayName, tree.area);
+    Add<vtkIntArray>(data, self.SegmentIdsArrayName, tree.segmentId);
+
+    using Branch = coronary::CenterlineTree::Branch;
+    vtkCellData* cells = output->GetCellData();
+    const auto ints = [&](const std::string& name, int Branch::*member)
+    {
+      Add<vtkIntArray>(
+        cells, name, OfBranches(tree, [=](const Branch& branch) { return branch.*member; }));
+    };
+    ints(self.GroupIdsArrayName, &Branch::groupId);
+    ints(self.ParentGroupIdsArrayName, &Branch::parentGroupId);
+    ints(self.TreeIdsArrayName, &Branch::treeId);
+    ints(self.BranchGenerationArrayName, &Branch::generation);
+    ints(self.StrahlerOrderArrayName, &Branch::strahlerOrder);
+    ints(self.SegmentIdsArrayName, &Branch::segmentId);
+    Add<vtkStringArray>(cells, self.SegmentLabelArrayName,
+      OfBranches(tree,
+        [](const Branch& branch)
+        { return vtkStdString(coronary::SegmentName(branch.segmentId)); }));
+    Add<vtkDoubleArray>(cells, self.LengthArrayName,
+      OfBranches(tree, [](const Branch& branch) { return branch.length; }));
+    Add<vtkDoubleArray>(cells, self.TortuosityArrayName,
+      OfBranches(tree, [](const Branch& branch) { return branch.tortuosity; }));
+  }
+
+  void WriteBifurcations(vtkPolyData* output) const
+  {
+    namespace names = vtkCoronaryArrayNames;
+    using coronary::Bifurcation;
+    const auto& self = *this->Self;
+    const CenterlineTopology& tree = this->Tree;
+    vtkNew<vtkPoints> points;
+    points->SetDataTypeToDouble();
+    vtkNew<vtkCellArray> vertices;
+    int width = LeastDaughters;
+    for (const Bifurcation& bifurcation : tree.bifurcations)
+    {
+      const vtkIdType id = points->InsertNextPoint(tree.points[bifurcation.point].data());
+      vertices->InsertNextCell(1, &id);
+      width = std::max(width, static_cast<int>(bifurcation.daughters.size()));
+    }
+    output->SetPoints(points);
+    output->SetVerts(vertices);
+    vtkPointData* data = output->GetPointData();
+    Add<vtkIntArray>(data, self.ParentGroupIdsArrayName,
+      OfBifurcations(tree, [](const Bifurcation& b) { return b.parent; }));
+    AddRows<vtkIntArray>(data, names::DaughterGroupIds,
+      OfBifurcations(tree, [](const Bifurcation& b) { return b.daughters; }), width, -1);
+    Add<vtkIntArray>(data, self.TreeIdsArrayName,
+      OfBifurcations(tree, [&](const Bifurcation& b) { return tree.branches[b.parent].treeId; }));
+    Add<vtkIntArray>(data, self.SegmentIdsArrayName,
+      OfBifurcations(
+        tree, [&](const Bifurcation& b) { return tree.branches[b.parent].segmentId; }));
+    AddRows<vtkDoubleArray>(data, names::DaughterAngles,
+      OfBifurcations(tree, [](const Bifurcation& b) { return b.daughterAngles; }), width, NaN);
+    AddRows<vtkDoubleArray>(data, names::DaughterRadii,
+      OfBifurcations(tree, [](const Bifurcation& b) { return b.daughterRadius; }), width, NaN);
+    const auto numbers = [&](const char* name, double Bifurcation::*member)
+    {
+      Add<vtkDoubleArray>(
+        data, name, OfBifurcations(tree, [=](const Bifurcation& b) { return b.*member; }));
+    };
+    numbers(names::BifurcationAngle, &Bifurcation::angle);
+    numbers(names::ParentRadius, &Bifurcation::parentRadius);
+    numbers(names::AreaRatio, &Bifurcation::areaRatio);
+    numbers(names::DaughterAreaRatio, &Bifurcation::daughterAreaRatio);
+    numbers(names::MurrayResidual, &Bifurcation::murrayResidual);
+    numbers(names::HuoKassabResidual, &Bifurcation::huoKassabResidual);
+    numbers(names::FinetRatio, &Bifurcation::finetRatio);
+    numbers(names::FittedExponent, &Bifurcation::fittedExponent);
+    Add<vtkDoubleArray>(data, names::MurrayExponent,
+      std::vector<double>(tree.bifurcations.size(), self.MurrayExponent));
+  }
+
+  void WriteLoops(vtkPolyData* output) const
+  {
+    vtkNew<vtkPoints> points;
+    points->SetDataTypeToDouble();
+    vtkNew<vtkCellArray> lines;
+    std::vector<double> lengths;
+    for (const coronary::CenterlineLoop& loop : this->Tree.loops)
+    {
+      if (loop.points.size() < 3)
+      {
+        continue;
+      }
+      lengths.push_back(loop.length);
+      lines->InsertNextCell(static_cast<int>(loop.points.size()) + 1);
+      const vtkIdType first = points->GetNumberOfPoints();
+      for (const std::int64_t point : loop.points)
+      {
+        lines->InsertCellPoint(points->InsertNextPoint(this->Tree.points[point].data()));
+      }
+      lines->InsertCellPoint(first);
+    }
+    output->SetPoints(points);
+    output->SetLines(lines);
+    Add<vtkDoubleArray>(output->GetCellData(), this->Self->LengthArrayName, lengths);
+  }
+
+  void WriteFieldData(vtkPolyData* output, const coronary::LabelingResult* labels) const
+  {
+    namespace names = vtkCoronaryArrayNames;
+    const CenterlineTopology& tree = this->Tree;
+    vtkFieldData* data = output->GetFieldData();
+    data->PassData(this->Input->GetFieldData());
+    Add<vtkIntArray>(data, names::PrunedTwigs, std::vector<int>{ tree.prunedTwigs });
+    Add<vtkIntArray>(data, names::ClosedGaps, std::vector<int>{ tree.closedGaps });
+    std::vector<double> lengths;
+    for (const coronary::CenterlineLoop& loop : tree.loops)
+    {
+      lengths.push_back(loop.length);
+    }
+    Add<vtkDoubleArray>(data, names::LoopLengths, lengths);
+    Add<vtkDoubleArray>(data, names::FittedExponent, std::vector<double>{ tree.fittedExponent });
+    if (labels != nullptr)
+    {
+      Add<vtkStringArray>(data, names::Dominance,
+        std::vector<vtkStdString>{ vtkStdString(NameOf(labels->dominance)) });
+      const coronary::HeartPose& heart = labels->heart;
+      const Vector3 shift = -(heart.axes * heart.origin) / heart.size;
+      std::vector<std::vector<double>> matrix(1);
+      for (int row = 0; row < 4; ++row)
+      {
+        for (int column = 0; column < 4; ++column)
+        {
+          matrix[0].push_back(row == 3 ? (column == 3 ? 1.0 : 0.0)
+              : column == 3            ? shift[row]
+                                       : heart.axes(row, column) / heart.size);
+        }
+      }
+      AddRows<vtkDoubleArray>(data, names::HeartFrame, matrix, 16, 0.0);
+    }
+  }
+
+private:
+  vtkCoronaryTreeTopology* Self;
+  vtkPolyData* Input;
+  const CenterlineTopology& Tree;
+};
+
+vtkCoronaryTreeTopology::vtkCoronaryTreeTopology()
+  : RadiusArrayName(vtkCoronaryArrayNames::Radius)
+  , AbscissasArrayName(vtkCoronaryArrayNames::Abscissas)
+  , FrenetTangentArrayName(vtkCoronaryArrayNames::FrenetTangent)
+  , FrenetNormalArrayName(vtkCoronaryArrayNames::FrenetNormal)
+  , FrenetBinormalArrayName(vtkCoronaryArrayNames::FrenetBinormal)
+  , CurvatureArrayName(vtkCoronaryArrayNames::Curvature)
+  , TorsionArrayName(vtkCoronaryArrayNames::Torsion)
+  , SectionAreaArrayName(vtkCoronaryArrayNames::SectionArea)
+  , SegmentIdsArrayName(vtkCoronaryArrayNames::SegmentIds)
+  , GroupIdsArrayName(vtkCoronaryArrayNames::GroupIds)
+  , ParentGroupIdsArrayName(vtkCoronaryArrayNames::ParentGroupIds)
+  , TreeIdsArrayName(vtkCoronaryArrayNames::TreeIds)
+  , BranchGenerationArrayName(vtkCoronaryArrayNames::BranchGeneration)
+  , StrahlerOrderArrayName(vtkCoronaryArrayNames::StrahlerOrder)
+  , SegmentLabelArrayName(vtkCoronaryArrayNames::SegmentLabel)
+  , LengthArrayName(vtkCoronaryArrayNames::Length)
+  , TortuosityArrayName(vtkCoronaryArrayNames::Tortuosity)
+{
+  this->SetNumberOfInputPorts(2);
+  this->SetNumberOfOutputPorts(3);
+}
+
+void vtkCoronaryTreeTopology::SetRootData(vtkPolyData* roots)
+{
+  this->SetInputData(1, roots);
+}
+
+int vtkCoronaryTreeTopology::FillInputPortInformation(int port, vtkInformation* info)
+{
+  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), port == 0 ? "vtkPolyData" : "vtkPointSet");
+  if (port == 1)
+  {
+    info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
+  }
+  return 1;
+}
+
+int vtkCoronaryTreeTopology::RequestInformation(
+  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+  {
+    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  }
+  return 1;
+}
+
+int vtkCoronaryTreeTopology::RequestUpdateExtent(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  // A tree is built from all its lines: piece 0 asks for the whole, the others for nothing.
+  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  vtkInformation* outInfo = outputs->GetInformationObject(port);
+  const int piece = outInfo->Get(SDDP::UPDATE_PIECE_NUMBER());
+  for (int input = 0; input < this->GetNumberOfInputPorts(); ++input)
+  {
+    for (int i = 0; i < inputs[input]->GetNumberOfInformationObjects(); ++i)
+    {
+      vtkInformation* info = inputs[input]->GetInformationObject(i);
+      info->Set(SDDP::UPDATE_PIECE_NUMBER(), piece > 0 ? 1 : 0);
+      info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), piece > 0 ? 2 : 1);
+      info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+    }
+  }
+  return 1;
+}
+
+int vtkCoronaryTreeTopology::RequestData(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkPolyData* input = vtkPolyData::GetData(inputs[0], 0);
+  vtkPointSet* roots = vtkPointSet::GetData(inputs[1], 0);
+  vtkPolyData* output[3];
+  for (int port = 0; port < 3; ++port)
+  {
+    output[port] = vtkPolyData::GetData(outputs, port);
+  }
+  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  const bool wanted = outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
+  int result = 1;
+  try
+  {
+    coronary::TopologySettings settings;
+    settings.gapRatio = this->GapRatio;
+    settings.mergeRatio = this->MergeRatio;
+    settings.pruneRatio = this->PruneRatio;
+    settings.murrayExponent = this->MurrayExponent;
+    settings.smoothing.wavelength = this->AutomaticSmoothing ? -1.0 : this->SmoothingWavelength;
+    settings.Validate();
+    if (!this->AutomaticSmoothing &&
+      !(this->SmoothingWavelength >= 0.0 && this->SmoothingWavelength <= 1000.0))
+    {
+      throw std::invalid_argument("The smoothing wavelength must be from 0 to 1000");
+    }
+    coronary::LabelingSettings labeling;
+    labeling.dominance = this->Dominance;
+    labeling.orientationWeight = this->OrientationWeight;
+    labeling.Validate();
+    for (const std::string* name :
+      { &this->RadiusArrayName, &this->AbscissasArrayName, &this->FrenetTangentArrayName,
+        &this->FrenetNormalArrayName, &this->FrenetBinormalArrayName, &this->CurvatureArrayName,
+        &this->TorsionArrayName, &this->SectionAreaArrayName, &this->SegmentIdsArrayName,
+        &this->GroupIdsArrayName, &this->ParentGroupIdsArrayName, &this->TreeIdsArrayName,
+        &this->BranchGenerationArrayName, &this->StrahlerOrderArrayName,
+        &this->SegmentLabelArrayName, &this->LengthArrayName, &this->TortuosityArrayName })
+    {
+      if (name->empty())
+      {
+        throw std::invalid_argument("An output array needs a name");
+      }
+    }
+
+    coronary::CenterlineSet set;
+    const vtkIdType lineCount = wanted ? input->GetNumberOfLines() : 0;
+    if (lineCount > 0)
+    {
+      vtkPointData* data = input->GetPointData();
+      const bool automatic =
+        this->InputRadiusArrayName.empty() || this->InputRadiusArrayName == "Automatic";
+      vtkDataArray* radius = data->GetArray(
+        automatic ? vtkCoronaryArrayNames::Radius : this->InputRadiusArrayName.c_str());
+      if (radius == nullptr && automatic)
+      {
+        radius = data->GetArray("Radius");
+      }
+      if (radius == nullptr)
+      {
+        throw std::invalid_argument(automatic
+            ? "The input has no point array MaximumInscribedSphereRadius or Radius"
+            : "The input has no point array " + this->InputRadiusArrayName);
+      }
+      if (radius->GetNumberOfComponents() != 1 ||
+        radius->GetNumberOfTuples() != input->GetNumberOfPoints())
+      {
+        throw std::invalid_argument("The radius array " +
+          std::string(radius->GetName() != nullptr ? radius->GetName() : "") +
+          " must have one value for each point");
+      }
+      const vtkIdType points = input->GetNumberOfPoints();
+      set.points.resize(points);
+      set.radius.resize(points);
+      for (vtkIdType i = 0; i < points; ++i)
+      {
+        input->GetPoint(i, set.points[i].data());
+        set.radius[i] = radius->GetComponent(i, 0);
+      }
+      vtkNew<vtkIdList> cell;
+      vtkCellArray* lines = input->GetLines();
+      for (lines->InitTraversal(); lines->GetNextCell(cell) != 0;)
+      {
+        set.lines.emplace_back(cell->begin(), cell->end());
+      }
+      for (vtkIdType i = 0; roots != nullptr && i < roots->GetNumberOfPoints(); ++i)
+      {
+        Vector3 root;
+        roots->GetPoint(i, root.data());
+        set.roots.push_back(root);
+      }
+    }
+    CenterlineTopology tree = coronary::BuildTopology(
+      set, settings, vtkCoronary::ProgressOf(this, 0.0, this->LabelSegments ? 0.3 : 1.0));
+    coronary::LabelingResult labels;
+    if (this->LabelSegments)
+    {
+      labels = coronary::LabelSegments(tree, labeling, vtkCoronary::ProgressOf(this, 0.3, 1.0));
+      if (this->SplitAtSegmentBorders)
+      {
+        coronary::SplitAtSegmentBorders(tree);
+      }
+    }
+    const Writer writer(this, input, tree);
+    writer.WriteTree(output[TreePort]);
+    writer.WriteBifurcations(output[BifurcationPort]);
+    writer.WriteLoops(output[LoopPort]);
+    const coronary::LabelingResult* named =
+      this->LabelSegments && !tree.branches.empty() ? &labels : nullptr;
+    writer.WriteFieldData(output[TreePort], named);
+    writer.WriteFieldData(output[BifurcationPort], named);
+    if (!tree.loops.empty())
+    {
+      vtkWarningMacro(<< tree.loops.size() << (tree.loops.size() == 1 ? " loop was" : " loops were")
+                      << " found and cut open; the output Loops shows where");
+    }
+    return 1;
+  }
+  catch (const coronary::Cancelled&)
+  {
+    vtkDebugMacro("aborted");
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorMacro("Not enough memory for the trees");
+    result = 0;
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< Capitalised(error.what()));
+    result = 0;
+  }
+  // Not marked as generated, so that the next request executes again.
+  for (int i = 0; i < 3; ++i)
+  {
+    output[i]->Initialize();
+    outputs->GetInformationObject(i)->Set(SDDP::DATA_NOT_GENERATED(), 1);
+  }
+  return result;
+}
+
+void vtkCoronaryTreeTopology::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "GapRatio: " << this->GapRatio << "\n";
+  os << indent << "MergeRatio: " << this->MergeRatio << "\n";
+  os << indent << "PruneRatio: " << this->PruneRatio << "\n";
+  os << indent << "MurrayExponent: " << this->MurrayExponent << "\n";
+  os << indent << "AutomaticSmoothing: " << this->AutomaticSmoothing << "\n";
+  os << indent << "SmoothingWavelength: " << this->SmoothingWavelength << "\n";
+  os << indent << "LabelSegments: " << this->LabelSegments << "\n";
+  os << indent << "SplitAtSegmentBorders: " << this->SplitAtSegmentBorders << "\n";
+  os << indent << "Dominance: " << this->Dominance << "\n";
+  os << indent << "OrientationWeight: " << this->OrientationWeight << "\n";
+  os << indent << "InputRadiusArrayName: " << this->InputRadiusArrayName << "\n";
+  os << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n";
+  os << indent << "AbscissasArrayName: " << this->AbscissasArrayName << "\n";
+  os << indent << "FrenetTangentArrayName: " << this->FrenetTangentArrayName << "\n";
+  os << indent << "FrenetNormalArrayName: " << this->FrenetNormalArrayName << "\n";
+  os << indent << "FrenetBinormalArrayName: " << this->FrenetBinormalArrayName << "\n";
+  os << indent << "CurvatureArrayName: " << this->CurvatureArrayName << "\n";
+  os << indent << "TorsionArrayName: " << this->TorsionArrayName << "\n";
+  os << indent << "SectionAreaArrayName: " << this->SectionAreaArrayName << "\n";
+  os << indent << "SegmentIdsArrayName: " << this->SegmentIdsArrayName << "\n";
+  os << indent << "GroupIdsArrayName: " << this->GroupIdsArrayName << "\n";
+  os << indent << "ParentGroupIdsArrayName: " << this->ParentGroupIdsArrayName << "\n";
+  os << indent << "TreeIdsArrayName: " << this->TreeIdsArrayName << "\n";
+  os << indent << "BranchGenerationArrayName: " << this->BranchGenerationArrayName << "\n";
+  os << indent << "StrahlerOrderArrayName: " << this->StrahlerOrderArrayName << "\n";
+  os << indent << "SegmentLabelArrayName: " << this->SegmentLabelArrayName << "\n";
+  os << indent << "LengthArrayName: " << this->LengthArrayName << "\n";
+  os << indent << "TortuosityArrayName: " << this->TortuosityArrayName << "\n";
+}

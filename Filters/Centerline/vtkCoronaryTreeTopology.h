@@ -1,0 +1,296 @@
+/**
+ * @class   vtkCoronaryTreeTopology
+ * @brief   Ordered trees with geometry, bifurcations and SCCT names out of any centerlines.
+ *
+ * The input may be branches that share their bifurcation points, whole paths from root to tip that
+ * run on top of each other (VMTK's form, one line per source-target pair), pieces with gaps, twigs
+ * and loops, in any mixture, direction and unit. Lines are merged where they coincide or run
+ * alongside, gaps are closed, loops are found, reported and cut open, spurious twigs are removed;
+ * then branches are split at the bifurcations, ordered, measured and named.
+ *
+ * Curvature and torsion come from a quintic smoothing spline through each vessel, whose smoothness
+ * is found by cross-validation: they are usable on tracked, noisy lines. The points themselves are
+ * not moved, and `Length`, `Abscissas` and `Tortuosity` are those of the polylines.
+ *
+ * Names follow the SCCT model (Raff et al., 2009). They come from the shape of the trees alone: the
+ * trees are fitted onto a mean heart, which also gives the heart's frame. Neither the orientation
+ * of the patient nor the unit is assumed, and branches may be missing. See docs/topology.md.
+ *
+ * @par Input ports:
+ * - 0: vtkPolyData with lines; other cells are ignored. A positive point array with the radius: by
+ *   default `MaximumInscribedSphereRadius`, or `Radius` where there is no such array.
+ * - 1, optional: vtkPolyData whose points are the places where the trees start (ostia). Without it
+ *   a tree starts where all its lines start, or at its widest end.
+ *
+ * @par Output ports:
+ * - 0, vtkPolyData: one polyline a branch, from root to tip; the first point of a branch is the
+ *   last of its parent, whose data it has. Depth first, a vessel's continuation before its side
+ *   branches. Point data: that of the input, and `MaximumInscribedSphereRadius`, `Abscissas` (mm
+ *   along the tree from its root), `FrenetTangent`, `FrenetNormal`, `FrenetBinormal` (double[3],
+ *   unit), `Curvature`, `Torsion` (1/mm), `SectionArea` (mm^2), `SegmentIds` (int,
+ *   coronary::SegmentId, 0 unnamed). Cell data: `GroupIds`, `ParentGroupIds` (-1 at a root),
+ *   `TreeIds` (0 left, 1 right, -1 neither; numbered 0, 1, ... when not labelled),
+ *   `BranchGeneration`, `StrahlerOrder`, `SegmentIds` (int), `SegmentLabel` (string, empty
+ *   unnamed), `Length` (mm), `Tortuosity` (length / chord - 1).
+ * - 1, vtkPolyData: bifurcations as vertices. Point data `ParentGroupIds`, `DaughterGroupIds`
+ *   (int[n], n at least 3, widest first, -1 none), `TreeIds`, `SegmentIds` (of the parent),
+ *   `BifurcationAngle` (between the two widest daughters, radians), `DaughterAngles` (double[n],
+ *   between the parent's course and each daughter), `ParentRadius`, `DaughterRadii` (mm),
+ *   `AreaRatio` (sum of daughters over parent), `DaughterAreaRatio` (second over widest),
+ *   `MurrayExponent` x, `MurrayResidual` (r_p^x - sum r_d^x) / r_p^x (Eq. 3 of the paper: x = 3),
+ *   `HuoKassabResidual` (x = 7/3), `FinetRatio` r_p / (r_1 + r_2), `FittedExponent` (the x without
+ *   residual, NaN where there is none). In doubles[n] a missing daughter is NaN.
+ * - 2, vtkPolyData: the loops that were found, as closed polylines with cell data `Length`.
+ *
+ * Field data of outputs 0 and 1: that of the input, `PrunedTwigs`, `ClosedGaps` (int),
+ * `LoopLengths` (double, mm), `FittedExponent` (double, over all bifurcations), and when labelled
+ * `Dominance` (string) and `HeartFrame` (double[16], 4x4 matrix row by row: from world to heart
+ * coordinates in mm of the mean heart; first axis from the right coronary's to the circumflex'
+ * side, third from base to apex, origin in the atrioventricular groove).
+ *
+ * The output is whole in piece 0 and empty, with all arrays, in every other piece. Blocks of a
+ * composite input are treated one by one.
+ *
+ * @par Failure:
+ * A setting out of range, a missing radius array, a radius that is not a positive number, a
+ * coordinate that is not finite: one error that names it, and no output. An input without lines
+ * gives an empty output. Loops are a warning. An aborted execution leaves an empty output and is
+ * started anew by the next request.
+ *
+ * @sa coronary::BuildTopology, coronary::LabelSegments, docs/topology.md
+ */
+#ifndef vtkCoronaryTreeTopology_h
+#define vtkCoronaryTreeTopology_h
+
+#include "vtkCoronaryCenterlineModule.h" // for the export macro
+#include "vtkPolyDataAlgorithm.h"
+
+#include <string> // for std::string
+
+class VTKCORONARYCENTERLINE_EXPORT vtkCoronaryTreeTopology : public vtkPolyDataAlgorithm
+{
+public:
+  static vtkCoronaryTreeTopology* New();
+  vtkTypeMacro(vtkCoronaryTreeTopology, vtkPolyDataAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  enum OutputPorts
+  {
+    TreePort = 0,
+    BifurcationPort = 1,
+    LoopPort = 2
+  };
+
+  enum DominanceTypes
+  {
+    FindDominance = -1,
+    RightDominance = 0,
+    LeftDominance = 1,
+    BalancedDominance = 2
+  };
+
+  ///@{
+  /**
+   * Optional points at which the trees start.
+   */
+  void SetRootConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(1, output); }
+  void SetRootData(vtkPolyData* roots);
+  ///@}
+
+  ///@{
+  /**
+   * Name of the input's point array with the radius. `Automatic`, the default:
+   * `MaximumInscribedSphereRadius`, or `Radius` where there is no such array.
+   */
+  vtkSetStdStringFromCharMacro(InputRadiusArrayName);
+  vtkGetCharFromStdStringMacro(InputRadiusArrayName);
+  ///@}
+
+  ///@{
+  /**
+   * An end of a line is joined to another piece that is nearer than this many radii, 0 to 20.
+   * Default 2.
+   */
+  vtkSetMacro(GapRatio, double);
+  vtkGetMacro(GapRatio, double);
+  ///@}
+
+  ///@{
+  /**
+   * A line that runs alongside another within this many radii is the same vessel, 0 to 1. With 0
+   * only points that coincide are merged. Default 0.5.
+   */
+  vtkSetMacro(MergeRatio, double);
+  vtkGetMacro(MergeRatio, double);
+  ///@}
+
+  ///@{
+  /**
+   * A twig shorter than this many radii of the vessel that it leaves is removed, 0 to 100.
+   * Default 3.
+   */
+  vtkSetMacro(PruneRatio, double);
+  vtkGetMacro(PruneRatio, double);
+  ///@}
+
+  ///@{
+  /**
+   * Exponent of `MurrayResidual`, 0.5 to 10. Default 3.
+   */
+  vtkSetMacro(MurrayExponent, double);
+  vtkGetMacro(MurrayExponent, double);
+  ///@}
+
+  ///@{
+  /**
+   * Whether the smoothing before differentiation is found from the lines themselves. Default on.
+   */
+  vtkSetMacro(AutomaticSmoothing, bool);
+  vtkGetMacro(AutomaticSmoothing, bool);
+  vtkBooleanMacro(AutomaticSmoothing, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Otherwise: wavelength that the smoothing halves, mm, 0 to 1000. Default 10.
+   */
+  vtkSetMacro(SmoothingWavelength, double);
+  vtkGetMacro(SmoothingWavelength, double);
+  ///@}
+
+  ///@{
+  /**
+   * Whether the segments are named. Off for trees that are not coronary. Default on.
+   */
+  vtkSetMacro(LabelSegments, bool);
+  vtkGetMacro(LabelSegments, bool);
+  vtkBooleanMacro(LabelSegments, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Whether a branch that runs through two segments, because the side branch between them was not
+   * found, is cut at their border: then the name of each line holds for all of it. Default on.
+   */
+  vtkSetMacro(SplitAtSegmentBorders, bool);
+  vtkGetMacro(SplitAtSegmentBorders, bool);
+  vtkBooleanMacro(SplitAtSegmentBorders, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Which artery feeds the posterior wall: found out, right, left, balanced. Default found out.
+   */
+  vtkSetMacro(Dominance, int);
+  vtkGetMacro(Dominance, int);
+  ///@}
+
+  ///@{
+  /**
+   * How much a heart turned away from its usual position in the patient (LPS) counts against a
+   * fit, 0 to 100. It matters only where the shape leaves a choice, as with few branches.
+   * Default 1.
+   */
+  vtkSetMacro(OrientationWeight, double);
+  vtkGetMacro(OrientationWeight, double);
+  ///@}
+
+  ///@{
+  /**
+   * Names of the point arrays of the tree. Defaults as listed above.
+   */
+  vtkSetStdStringFromCharMacro(RadiusArrayName);
+  vtkGetCharFromStdStringMacro(RadiusArrayName);
+  vtkSetStdStringFromCharMacro(AbscissasArrayName);
+  vtkGetCharFromStdStringMacro(AbscissasArrayName);
+  vtkSetStdStringFromCharMacro(FrenetTangentArrayName);
+  vtkGetCharFromStdStringMacro(FrenetTangentArrayName);
+  vtkSetStdStringFromCharMacro(FrenetNormalArrayName);
+  vtkGetCharFromStdStringMacro(FrenetNormalArrayName);
+  vtkSetStdStringFromCharMacro(FrenetBinormalArrayName);
+  vtkGetCharFromStdStringMacro(FrenetBinormalArrayName);
+  vtkSetStdStringFromCharMacro(CurvatureArrayName);
+  vtkGetCharFromStdStringMacro(CurvatureArrayName);
+  vtkSetStdStringFromCharMacro(TorsionArrayName);
+  vtkGetCharFromStdStringMacro(TorsionArrayName);
+  vtkSetStdStringFromCharMacro(SectionAreaArrayName);
+  vtkGetCharFromStdStringMacro(SectionAreaArrayName);
+  vtkSetStdStringFromCharMacro(SegmentIdsArrayName);
+  vtkGetCharFromStdStringMacro(SegmentIdsArrayName);
+  ///@}
+
+  ///@{
+  /**
+   * Names of the cell arrays of the tree. Defaults as listed above.
+   */
+  vtkSetStdStringFromCharMacro(GroupIdsArrayName);
+  vtkGetCharFromStdStringMacro(GroupIdsArrayName);
+  vtkSetStdStringFromCharMacro(ParentGroupIdsArrayName);
+  vtkGetCharFromStdStringMacro(ParentGroupIdsArrayName);
+  vtkSetStdStringFromCharMacro(TreeIdsArrayName);
+  vtkGetCharFromStdStringMacro(TreeIdsArrayName);
+  vtkSetStdStringFromCharMacro(BranchGenerationArrayName);
+  vtkGetCharFromStdStringMacro(BranchGenerationArrayName);
+  vtkSetStdStringFromCharMacro(StrahlerOrderArrayName);
+  vtkGetCharFromStdStringMacro(StrahlerOrderArrayName);
+  vtkSetStdStringFromCharMacro(SegmentLabelArrayName);
+  vtkGetCharFromStdStringMacro(SegmentLabelArrayName);
+  vtkSetStdStringFromCharMacro(LengthArrayName);
+  vtkGetCharFromStdStringMacro(LengthArrayName);
+  vtkSetStdStringFromCharMacro(TortuosityArrayName);
+  vtkGetCharFromStdStringMacro(TortuosityArrayName);
+  ///@}
+
+  vtkPolyData* GetBifurcations() { return this->GetOutput(BifurcationPort); }
+  vtkPolyData* GetLoops() { return this->GetOutput(LoopPort); }
+
+protected:
+  vtkCoronaryTreeTopology();
+  ~vtkCoronaryTreeTopology() override = default;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestUpdateExtent(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestData(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+private:
+  vtkCoronaryTreeTopology(const vtkCoronaryTreeTopology&) = delete;
+  void operator=(const vtkCoronaryTreeTopology&) = delete;
+
+  double GapRatio = 2.0;
+  double MergeRatio = 0.5;
+  double PruneRatio = 3.0;
+  double MurrayExponent = 3.0;
+  bool AutomaticSmoothing = true;
+  double SmoothingWavelength = 10.0;
+  bool LabelSegments = true;
+  bool SplitAtSegmentBorders = true;
+  int Dominance = FindDominance;
+  double OrientationWeight = 1.0;
+
+  std::string InputRadiusArrayName = "Automatic";
+  std::string RadiusArrayName;
+  std::string AbscissasArrayName;
+  std::string FrenetTangentArrayName;
+  std::string FrenetNormalArrayName;
+  std::string FrenetBinormalArrayName;
+  std::string CurvatureArrayName;
+  std::string TorsionArrayName;
+  std::string SectionAreaArrayName;
+  std::string SegmentIdsArrayName;
+  std::string GroupIdsArrayName;
+  std::string ParentGroupIdsArrayName;
+  std::string TreeIdsArrayName;
+  std::string BranchGenerationArrayName;
+  std::string StrahlerOrderArrayName;
+  std::string SegmentLabelArrayName;
+  std::string LengthArrayName;
+  std::string TortuosityArrayName;
+
+  class Writer;
+};
+
+#endif
