@@ -278,8 +278,8 @@ template <typename T>
 double Segmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>>& places) const
 {
   constexpr double radius = 20.0;
-  constexpr double percentile = 0.99;
-  constexpr double share = 0.45;
+  constexpr double percentile = 0.995;
+  constexpr double share = 0.6;
   std::vector<float> values;
   for (const std::array<int, 3>& place : places)
   {
