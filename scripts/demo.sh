@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# From nothing to a beating phantom: installs, builds, makes a gated CT series with its truth, and
-# renders pictures of it. Everything lands in build/ and demo-output/.
+# From nothing to segmented arteries: installs, builds, makes a gated CT series of the phantom with
+# its truth, finds and segments the coronary arteries in its quietest phase, and renders pictures.
+# Everything lands in build/ and demo-output/.
 set -euo pipefail
 
 usage() {
@@ -67,6 +68,9 @@ echo "== The beating phantom: 20 phases of gated CT, and the truth"
 echo "== Its motion beside published values"
 "$pipeline" phantom-motion --seed 1 | tee "$output/phantom-motion.txt"
 
+echo "== From the images to the coronary arteries"
+"$pipeline" run "$output/phantom/series.json" --until segmentation --output "$output/run"
+
 if [ "$pictures" = yes ]; then
   echo "== Pictures"
   # A home of its own: the pictures must not depend on, nor change, the user's ParaView settings.
@@ -74,6 +78,12 @@ if [ "$pictures" = yes ]; then
   trap 'rm -rf "$home"' EXIT
   HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
     pvpython scripts/render-phantom.py "$output/phantom" --output "$output/pictures"
+  # The true surface of the phase that was segmented.
+  phase="$(sed -n 's/^ *"phase": *\([0-9]*\).*/\1/p' "$output/run/report.json" | head -n 1)"
+  truth="$output/phantom/truth/surface_$(printf %02d "$phase").vtp"
+  HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
+    pvpython scripts/render-segmentation.py "$output/run" --truth "$truth" \
+    --output "$output/pictures"
 fi
 
 plugin="$(find "$root/build/paraview" -name DynamicCoronaryPlugin.so -print -quit)"
@@ -86,6 +96,8 @@ What lies where
   $output/phantom/phase_NN.mha        20 CT volumes, -5 % to 106 % of the R-R interval ($(size "$output/phantom"))
   $output/phantom/series.json         phases, R-R fractions, cycle length, ostia
   $output/phantom/truth/              surface, centerlines and vein of every phase (.vtp, .pvd)
+  $output/run/                        vesselness, mask of the arteries, ostia and aorta at the
+                                      quietest phase; report.json says how they came about
   $output/phantom-motion.txt          amplitudes, speeds and rest windows per artery
 EOF
 if [ "$pictures" = yes ]; then

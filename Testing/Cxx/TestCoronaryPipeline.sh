@@ -303,6 +303,42 @@ check_motion() {
   grep -qE " (within|outside) " stdout && fail "compared at another heart rate"
 }
 
+check_run() {
+  run 0 phantom --quiet --seed 2 --fractions 0.15,0.2,0.25,0.7,0.74,0.78 --spacing 1.2 --no-truth --output series
+  run 0 run series/series.json --scales 0.7 2.5 --output result
+  for file in vesselness.mha mask.mha ostia.vtp aorta.vtp report.json; do
+    [ -s "result/$file" ] || fail "no $file"
+  done
+  expect_text stdout "LCA at"
+  expect_text stdout "RCA at"
+  expect_text stderr "stage 3 of 3 (segmentation)"
+  grep -q '"name": "RCA"' result/report.json || fail "no RCA in the report"
+  grep -q '"phase": [345],' result/report.json || fail "not a quiet phase: $(grep phase result/report.json)"
+
+  run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced
+  [ ! -s stdout ] && [ ! -s stderr ] || fail "--quiet is not quiet: $(cat stdout stderr)"
+  [ "$(ls enhanced | tr '\n' ' ')" = "report.json vesselness.mha " ] || fail "$(ls enhanced)"
+  grep -q '"phase": 0,' enhanced/report.json || fail "not the phase that was asked for"
+
+  # Wrong command lines, and a failure that leaves what was there.
+  run 2 run series/series.json --until nowhere --output result
+  expect_one_line "coronary-pipeline run" "--until"
+  run 2 run series/series.json --scales 3 1 --output result
+  expect_one_line "coronary-pipeline run" "--scales"
+  run 2 run series/series.json --window 400 50 --output result
+  expect_one_line "coronary-pipeline run" "--window"
+  run 1 run nothing.json --quiet --output result
+  expect_one_line "coronary-pipeline run" "nothing.json"
+  before=$(cat result/*.mha result/*.vtp result/report.json | cksum)
+  run 1 run series/series.json --quiet --scales 0.7 2.5 --seed 9999 0 0 --output result
+  expect_one_line "coronary-pipeline run" "Seed 0 is outside the image"
+  run 1 run series/series.json --quiet --scales 0.7 2.5 --seed 9999 0 0 --output new/result
+  expect_nothing_in new
+  [ "$before" = "$(cat result/*.mha result/*.vtp result/report.json | cksum)" ] \
+    || fail "a failed run changed its folder: $(ls -lA result)"
+  [ -z "$(find result -name '.*')" ] || fail "hidden files are left: $(find result)"
+}
+
 check_libraries() {
   # Neither Python nor ParaView at run time, and nothing is missing.
   ldd "$program" >libraries
