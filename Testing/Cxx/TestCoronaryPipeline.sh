@@ -316,8 +316,11 @@ check_run() {
   grep -q '"phase": [345],' result/report.json || fail "not a quiet phase: $(grep phase result/report.json)"
 
   run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced
-  [ ! -s stdout ] && [ ! -s stderr ] || fail "--quiet is not quiet: $(cat stdout stderr)"
-  [ "$(ls enhanced | tr '\n' ' ')" = "report.json vesselness.mha " ] || fail "$(ls enhanced)"
+  if [ -s stdout ] || [ -s stderr ]; then
+    fail "--quiet is not quiet: $(cat stdout stderr)"
+  fi
+  [ "$(find enhanced -type f | sort | tr '\n' ' ')" = \
+    "enhanced/report.json enhanced/vesselness.mha " ] || fail "$(find enhanced)"
   grep -q '"phase": 0,' enhanced/report.json || fail "not the phase that was asked for"
 
   # Wrong command lines, and a failure that leaves what was there.
