@@ -1,0 +1,112 @@
+#include "ReferenceVesselness.h"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+
+namespace coronary
+{
+namespace
+{
+using Values = std::vector<double>;
+
+/// Derivative of the given order along one axis; beyond the border the border voxels are repeated.
+Values Differentiate(
+  const Values& in, const std::array<int, 3>& n, int axis, double spacing, double sigma, int order)
+{
+  const int radius = static_cast<int>(std::ceil(8.0 * sigma / spacing));
+  std::vector<double> kernel(2 * radius + 1);
+  for (int t = -radius; t <= radius; ++t)
+  {
+    // Of the value at -t: a convolution. In units of sigma, so gamma is 1.
+    const double x = t * spacing / sigma;
+    const double g =
+      std::exp(-0.5 * x * x) / (std::sqrt(2.0 * 3.14159265358979323846) * sigma) * spacing;
+    kernel[t + radius] = order == 0 ? g : order == 1 ? -x * g : (x * x - 1.0) * g;
+  }
+  const std::int64_t stride =
+    axis == 0 ? 1 : (axis == 1 ? n[0] : static_cast<std::int64_t>(n[0]) * n[1]);
+  Values out(in.size());
+  ParallelFor(n[2], 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t k = first; k < last; ++k)
+      {
+        for (int j = 0; j < n[1]; ++j)
+        {
+          for (int i = 0; i < n[0]; ++i)
+          {
+            const std::int64_t at = (k * n[1] + j) * n[0] + i;
+            const int here = axis == 0 ? i : (axis == 1 ? j : static_cast<int>(k));
+            double sum = 0.0;
+            for (int t = -radius; t <= radius; ++t)
+            {
+              const int there = std::clamp(here - t, 0, n[axis] - 1);
+              sum += kernel[t + radius] * in[at + (there - here) * stride];
+            }
+            out[at] = sum;
+          }
+        }
+      }
+    });
+  return out;
+}
+
+double Frangi(const Matrix3& hessian, const VesselnessSettings& settings)
+{
+  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(hessian, Eigen::EigenvaluesOnly);
+  std::array<double, 3> l = { solver.eigenvalues()[0], solver.eigenvalues()[1],
+    solver.eigenvalues()[2] };
+  std::sort(l.begin(), l.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+  if (!(l[1] < 0.0 && l[2] < 0.0))
+  {
+    return 0.0;
+  }
+  const double ra = l[1] / l[2];
+  const double rbSquared = l[0] * l[0] / (l[1] * l[2]);
+  const double normSquared = l[0] * l[0] + l[1] * l[1] + l[2] * l[2];
+  return (1.0 - std::exp(-0.5 * ra * ra / (settings.alpha * settings.alpha))) *
+    std::exp(-0.5 * rbSquared / (settings.beta * settings.beta)) *
+    (1.0 - std::exp(-0.5 * normSquared / (settings.c * settings.c)));
+}
+}
+
+std::vector<float> ReferenceFrangi(
+  const VoxelBlock& block, const Vector3& spacing, const VesselnessSettings& settings)
+{
+  const std::array<int, 6>& e = block.extent;
+  const std::array<int, 3> n = { e[1] - e[0] + 1, e[3] - e[2] + 1, e[5] - e[4] + 1 };
+  const std::size_t count = static_cast<std::size_t>(n[0]) * n[1] * n[2];
+  const Values input(block.values, block.values + count);
+  std::vector<float> best(count, 0.0f);
+  for (const double sigma : settings.sigmas)
+  {
+    // Orders along the axes of xx, yy, zz, xy, xz, yz.
+    constexpr int orders[6][3] = { { 2, 0, 0 }, { 0, 2, 0 }, { 0, 0, 2 }, { 1, 1, 0 }, { 1, 0, 1 },
+      { 0, 1, 1 } };
+    std::array<Values, 6> h;
+    for (int element = 0; element < 6; ++element)
+    {
+      h[element] = input;
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        h[element] =
+          Differentiate(h[element], n, axis, spacing[axis], sigma, orders[element][axis]);
+      }
+    }
+    const double sign = settings.bright ? 1.0 : -1.0;
+    ParallelFor(static_cast<std::int64_t>(count), 4096,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t p = first; p < last; ++p)
+        {
+          Matrix3 m;
+          m << h[0][p], h[3][p], h[4][p], h[3][p], h[1][p], h[5][p], h[4][p], h[5][p], h[2][p];
+          best[p] = std::max(best[p], static_cast<float>(Frangi(sign * m, settings)));
+        }
+      });
+  }
+  return best;
+}
+}
