@@ -53,11 +53,21 @@ Values Differentiate(
   return out;
 }
 
-double Frangi(const Matrix3& hessian, const VesselnessSettings& settings)
+/// Ascending.
+Vector3 Eigenvalues(const Matrix3& hessian)
 {
-  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(hessian, Eigen::EigenvaluesOnly);
-  std::array<double, 3> l = { solver.eigenvalues()[0], solver.eigenvalues()[1],
-    solver.eigenvalues()[2] };
+  return Eigen::SelfAdjointEigenSolver<Matrix3>(hessian, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+bool AtJump(const Vector3& ascending)
+{
+  return ascending[1] < 0.0 && ascending[2] > 0.0 &&
+    std::abs(ascending[1] + ascending[2]) <= 1e-2 * std::abs(ascending[0]);
+}
+
+double Frangi(const Vector3& ascending, const VesselnessSettings& settings)
+{
+  std::array<double, 3> l = { ascending[0], ascending[1], ascending[2] };
   std::sort(l.begin(), l.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
   if (!(l[1] < 0.0 && l[2] < 0.0))
   {
@@ -72,14 +82,14 @@ double Frangi(const Matrix3& hessian, const VesselnessSettings& settings)
 }
 }
 
-std::vector<float> ReferenceFrangi(
+ReferenceResult ReferenceFrangi(
   const VoxelBlock& block, const Vector3& spacing, const VesselnessSettings& settings)
 {
   const std::array<int, 6>& e = block.extent;
   const std::array<int, 3> n = { e[1] - e[0] + 1, e[3] - e[2] + 1, e[5] - e[4] + 1 };
   const std::size_t count = static_cast<std::size_t>(n[0]) * n[1] * n[2];
   const Values input(block.values, block.values + count);
-  std::vector<float> best(count, 0.0f);
+  ReferenceResult result{ std::vector<float>(count, 0.0f), std::vector<unsigned char>(count, 0) };
   for (const double sigma : settings.sigmas)
   {
     // Orders along the axes of xx, yy, zz, xy, xz, yz.
@@ -103,10 +113,13 @@ std::vector<float> ReferenceFrangi(
         {
           Matrix3 m;
           m << h[0][p], h[3][p], h[4][p], h[3][p], h[1][p], h[5][p], h[4][p], h[5][p], h[2][p];
-          best[p] = std::max(best[p], static_cast<float>(Frangi(sign * m, settings)));
+          const Vector3 eigenvalues = Eigenvalues(sign * m);
+          float& best = result.vesselness[p];
+          best = std::max(best, static_cast<float>(Frangi(eigenvalues, settings)));
+          result.atJump[p] |= AtJump(eigenvalues) ? 1 : 0;
         }
       });
   }
-  return best;
+  return result;
 }
 }
