@@ -258,8 +258,8 @@ double ProcessorSeconds()
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-/// @param contrastC  Frangi's c by the contrast of blood instead of by the largest Hessian norm
-Outcome Run(const Case& test, bool segment, bool contrastC)
+/// @param c  Frangi's, HU; 0: half the largest Hessian norm
+Outcome Run(const Case& test, bool segment, double c)
 {
   Outcome outcome;
   outcome.test = test;
@@ -316,8 +316,8 @@ Outcome Run(const Case& test, bool segment, bool contrastC)
     VesselnessSettings frangi;
     frangi.sigmas = VesselnessScales(0.5, 2.5, 5, true);
     const VoxelBlock block{ input.data(), grid.extent };
-    frangi.c = contrastC ? 0.25 * (window.blood - window.tissue)
-                         : 0.5 *
+    frangi.c = c > 0.0 ? c
+                       : 0.5 *
         MultiscaleVesselness(frangi, grid.spacing, grid.extent)
           .Measure(block, grid.extent, nullptr)
           .hessianNorm;
@@ -654,7 +654,7 @@ int main(int argc, char** argv)
   std::vector<double> noises = { 15.0, 25.0, 40.0 };
   std::vector<std::string> tables = { "sampling", "windows", "ostia" };
   bool quick = false;
-  bool contrastC = false;
+  double c = 100.0;
   bool listCases = false;
   program.add_option("--seeds", seedText, "phantoms to segment: a count or first..last")
     ->capture_default_str();
@@ -674,9 +674,9 @@ int main(int argc, char** argv)
     ->capture_default_str()
     ->check(CLI::IsMember({ "sampling", "windows", "ostia" }));
   program.add_flag("--quick", quick, "one oblique image of one phantom in coarse voxels");
-  program.add_flag("--contrast-c", contrastC,
-    "vesselness with c = a quarter of the contrast of blood, as vtkVesselSegmentation computes it "
-    "when it is given none, instead of half the largest Hessian norm");
+  program.add_option("--c", c, "c of the vesselness, HU; 0: half the largest Hessian norm")
+    ->check(CLI::Range(0.0, 1e6))
+    ->capture_default_str();
   program.add_flag("--cases", listCases, "also print one row for each image");
   std::vector<std::uint64_t> seeds;
   std::vector<std::uint64_t> ostiaSeeds;
@@ -732,9 +732,9 @@ int main(int argc, char** argv)
     "point (by distance\nminus radius) lies within %.1f mm and has a radius below %.2f mm are left "
     "out; all others count, also leaks far\naway. Leak: mask more than %.1f mm from the wall of "
     "any vessel, thin ones included. Seeds and window of the\nsegmentation come from the automatic "
-    "ostia; c of the vesselness is %s.\n",
+    "ostia; c of the vesselness: %s.\n",
     ReferencePhase, LeakDistance, LeastRadius, LeakDistance,
-    contrastC ? "a quarter of the contrast of blood" : "half the largest Hessian norm");
+    c > 0.0 ? Format("%g HU", c).c_str() : "half the largest Hessian norm");
   std::vector<Outcome> outcomes;
   try
   {
@@ -746,7 +746,7 @@ int main(int argc, char** argv)
       {
         return;
       }
-      outcomes.push_back(Run(test, segment, contrastC));
+      outcomes.push_back(Run(test, segment, c));
       const Outcome& o = outcomes.back();
       std::fprintf(stderr, "seed %llu, %.0f ms, %.0f HU, %s: Dice %.3f, ostia %s %s\n",
         static_cast<unsigned long long>(test.seed), 1e3 * test.window, test.noise,
