@@ -43,7 +43,7 @@ struct WorldVolume
   }
 };
 
-/// Trilinear value, or Nothing outside.
+/// Trilinear value of the corners that have one, or Nothing outside and where none has.
 template <typename T>
 float Interpolate(
   const T* values, const std::array<int, 3>& n, const std::array<double, 3>& position)
@@ -68,7 +68,26 @@ float Interpolate(
   const auto row = [&](const T* q)
   { return (1.0f - f[0]) * static_cast<float>(q[0]) + f[0] * static_cast<float>(q[dx]); };
   const auto plane = [&](const T* q) { return (1.0f - f[1]) * row(q) + f[1] * row(q + dy); };
-  return (1.0f - f[2]) * plane(p) + f[2] * plane(p + dz);
+  const float value = (1.0f - f[2]) * plane(p) + f[2] * plane(p + dz);
+  if (std::isfinite(value))
+  {
+    return value;
+  }
+  float sum = 0.0f;
+  float weights = 0.0f;
+  for (int corner = 0; corner < 8; ++corner)
+  {
+    const float at =
+      static_cast<float>(p[(corner & 1 ? dx : 0) + (corner & 2 ? dy : 0) + (corner & 4 ? dz : 0)]);
+    const float weight = (corner & 1 ? f[0] : 1.0f - f[0]) * (corner & 2 ? f[1] : 1.0f - f[1]) *
+      (corner & 4 ? f[2] : 1.0f - f[2]);
+    if (std::isfinite(at))
+    {
+      sum += weight * at;
+      weights += weight;
+    }
+  }
+  return weights > 0.0f ? sum / weights : Nothing;
 }
 
 /// The image on a world grid; each value is the mean of 2 x 2 x 2 samples.
@@ -110,7 +129,6 @@ WorldVolume Resample(const ScalarImage& image, const Vector3& low, const Vector3
                     corner & 4 ? 0.25 : -0.25);
                   const Vector3 index = toIndex * (centre + spacing * offset - grid.origin) - shift;
                   const float value = Interpolate(values, n, { index[0], index[1], index[2] });
-                  // NaN fails the comparison.
                   if (value > Nothing)
                   {
                     sum += value;
@@ -723,7 +741,11 @@ public:
     high[2] += 10.0;
     this->Volume = Resample(image, low.cwiseMax(imageLow), high.cwiseMin(imageHigh), spacing,
       [&](double f) { return !progress || progress(0.4 * f); });
-    this->Blood();
+    this->Blood(tube);
+    if (!(this->BloodMean > settings.softTissue))
+    {
+      return; // and Find() finds nothing
+    }
     this->Bodies([&](double f) { return !progress || progress(0.4 + 0.3 * f); });
     this->Vessels([&](double f) { return !progress || progress(0.7 + 0.2 * f); });
     this->March();
@@ -736,7 +758,7 @@ public:
   std::vector<Outlet> Find() const;
 
 private:
-  void Blood();
+  void Blood(const Tube& tube);
   void Bodies(const ProgressCallback& progress);
   void Vessels(const ProgressCallback& progress);
   void March();
@@ -773,12 +795,18 @@ private:
   std::vector<std::int64_t> Before; ///< previous voxel of the path
 };
 
-void OutletSearch::Blood()
+void OutletSearch::Blood(const Tube& tube)
 {
+  // Where the circles are: beyond them the axis may run out of the image or into the lung.
   std::vector<double> inside;
   for (int k = 0; k < this->Volume.size[2]; ++k)
   {
-    const AorticSection s = this->Axis.At(this->Volume.World({ 0, 0, k })[2]);
+    const double z = this->Volume.World({ 0, 0, k })[2];
+    if (z < tube.sections.front().centre[2] || z > tube.sections.back().centre[2])
+    {
+      continue;
+    }
+    const AorticSection s = this->Axis.At(z);
     const int reach = static_cast<int>(0.6 * s.radius / this->Volume.spacing);
     const Vector3 middle = (s.centre - this->Volume.corner) / this->Volume.spacing;
     for (int j = static_cast<int>(middle[1]) - reach; j <= middle[1] + reach; ++j)
@@ -788,7 +816,11 @@ void OutletSearch::Blood()
         if (i >= 0 && j >= 0 && i < this->Volume.size[0] && j < this->Volume.size[1] &&
           std::hypot(i - middle[0], j - middle[1]) <= reach)
         {
-          inside.push_back(this->Volume.values[this->Volume.Index(i, j, k)]);
+          const float value = this->Volume.values[this->Volume.Index(i, j, k)];
+          if (value > Nothing)
+          {
+            inside.push_back(value);
+          }
         }
       }
     }
@@ -1492,6 +1524,11 @@ CoronaryOstia FindCoronaryOstia(
   {
     throw std::invalid_argument("the image is not three-dimensional");
   }
+  if (!(image.grid.spacing.minCoeff() > 0.0) || !image.grid.spacing.allFinite() ||
+    !image.grid.origin.allFinite() || !image.grid.direction.allFinite())
+  {
+    throw std::invalid_argument("the image needs positive spacing and a finite position");
+  }
   const auto part = [&](double from, double to)
   {
     return [&progress, from, to](double f)
@@ -1508,6 +1545,10 @@ CoronaryOstia FindCoronaryOstia(
     const double share = 0.7 / static_cast<double>(tubes.size());
     const double from = 0.3 + share * static_cast<double>(t);
     const OutletSearch search(image, tube, settings, part(from, from + share));
+    if (!(search.Mean() > settings.softTissue))
+    {
+      continue;
+    }
     const std::vector<Outlet> outlets = search.Find();
     const Choice choice = Choose(outlets, settings);
     // A tube of few or poor circles may be anything.

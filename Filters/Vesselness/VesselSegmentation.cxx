@@ -146,13 +146,22 @@ private:
       std::min(thin > 0.0f ? thin : 0.0f, 1.0f) * std::min(tube > 0.0f ? tube : 0.0f, 1.0f);
     return std::max(dim, std::min(blood > 0.0f ? blood : 0.0f, 1.0f));
   }
-  std::array<int, 3> Nearest(const Vector3& world) const
+  /// The voxel of a place; nothing outside the image, and for what is no number.
+  std::optional<std::array<int, 3>> Nearest(const Vector3& world) const
   {
     const Vector3 index = this->Grid.spacing.cwiseInverse().cwiseProduct(
       this->Grid.direction.transpose() * (world - this->Grid.origin));
-    return { static_cast<int>(std::lround(index[0])) - this->Grid.extent[0],
-      static_cast<int>(std::lround(index[1])) - this->Grid.extent[2],
-      static_cast<int>(std::lround(index[2])) - this->Grid.extent[4] };
+    std::array<int, 3> place;
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const double inside = index[axis] - this->Grid.extent[2 * axis];
+      if (!(inside >= -0.5 && inside <= this->L.Size[axis] - 0.5))
+      {
+        return std::nullopt;
+      }
+      place[axis] = std::clamp(static_cast<int>(std::lround(inside)), 0, this->L.Size[axis] - 1);
+    }
+    return place;
   }
   Vector3 World(const std::array<int, 3>& p) const
   {
@@ -326,16 +335,22 @@ void Segmentation<T>::FindBodies(const ProgressCallback& progress)
             const std::size_t target = static_cast<std::size_t>(j / this->L.Factor[1]) * blocks[0];
             for (int i = 0; i < this->L.Size[0]; ++i)
             {
-              sums[target + i / this->L.Factor[0]] += static_cast<float>(row[i]);
-              ++counts[target + i / this->L.Factor[0]];
+              const auto value = static_cast<float>(row[i]);
+              if (std::isfinite(value))
+              {
+                sums[target + i / this->L.Factor[0]] += value;
+                ++counts[target + i / this->L.Factor[0]];
+              }
             }
           }
         }
         for (std::size_t b = 0; b < sums.size(); ++b)
         {
           const float share =
-            (sums[b] / static_cast<float>(counts[b]) - this->Tissue) * this->InverseContrast;
-          blood[static_cast<std::size_t>(c) * sums.size() + b] = share > 0.5f ? 1 : 0;
+            (sums[b] / static_cast<float>(std::max(1, counts[b])) - this->Tissue) *
+            this->InverseContrast;
+          blood[static_cast<std::size_t>(c) * sums.size() + b] =
+            counts[b] > 0 && share > 0.5f ? 1 : 0;
         }
       }
     },
@@ -387,13 +402,14 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
   {
     if (seeds[s].axis.squaredNorm() > 0.0)
     {
+      const Vector3 axis = seeds[s].axis.normalized();
       // A cylinder along the axis, open; what lies before the ostium is aorta.
       this->Ball(places[s], mouth,
         [&](std::int64_t p, const std::array<int, 3>& at)
         {
           const Vector3 d = this->World(at) - seeds[s].position;
-          const double along = d.dot(seeds[s].axis);
-          const double across = (d - along * seeds[s].axis).norm();
+          const double along = d.dot(axis);
+          const double across = (d - along * axis).norm();
           if (along < 0.0)
           {
             this->States[p] = Body;
@@ -650,7 +666,10 @@ void Segmentation<T>::CutLeakage()
 template <typename T>
 void Segmentation<T>::RefineWall(std::vector<float>* probability, const ProgressCallback& progress)
 {
-  const double bandWidth = std::max(0.8, 1.2 * this->L.Spacing.maxCoeff()); // mm
+  // Wide enough for the next voxel along each axis, mm.
+  const Vector3 band = (1.2 * this->L.Spacing).cwiseMax(0.8);
+  // How far from a voxel its lumen is looked for, mm: a place in the band must find it.
+  const Vector3 lumenReach = (1.2 * this->L.BlockSpacing).cwiseMax(1.5);
   constexpr double surroundings = 1.8; // mm: how far the local values are taken from
   const std::array<int, 3>& blocks = this->L.Blocks;
 
@@ -671,10 +690,12 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
       });
     if (rim)
     {
-      this->Ball(at, bandWidth,
-        [&](std::int64_t p, const std::array<int, 3>&)
+      this->Ball(at, band.maxCoeff(),
+        [&](std::int64_t p, const std::array<int, 3>& place)
         {
-          if (this->States[p] == Unknown)
+          const Vector3 d = this->L.Spacing.cwiseProduct(
+            Vector3(place[0] - at[0], place[1] - at[1], place[2] - at[2]));
+          if (this->States[p] == Unknown && d.cwiseQuotient(band).squaredNorm() <= 1.0)
           {
             this->States[p] = Band;
             candidates.push_back(p);
@@ -730,7 +751,7 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
              x <= std::min(blocks[0] - 1, a + factor * reach[0]); ++x)
         {
           const Vector3 d = this->L.BlockSpacing.cwiseProduct(Vector3(x - a, y - b, z - c));
-          f(this->L.Block(x, y, z), d.squaredNorm());
+          f(this->L.Block(x, y, z), d);
         }
       }
     }
@@ -741,7 +762,7 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
     if (wanted[b] == 1)
     {
       around(static_cast<std::int64_t>(b), 2,
-        [&](std::int64_t other, double)
+        [&](std::int64_t other, const Vector3&)
         {
           if (wanted[other] == 0)
           {
@@ -777,9 +798,10 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
                  ++i)
             {
               const std::int64_t p = this->L.Index(i, j, k);
-              if (this->States[p] == Unknown && this->Likelihood(p) < 0.5f)
+              const auto value = static_cast<float>(this->Image[p]);
+              if (this->States[p] == Unknown && std::isfinite(value) && this->Likelihood(p) < 0.5f)
               {
-                outsideSum[block] += static_cast<float>(this->Image[p]);
+                outsideSum[block] += value;
                 outsideCount[block] += 1.0f;
               }
             }
@@ -808,12 +830,12 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
         float sum = 0.0f;
         float weights = 0.0f;
         around(this->L.BlockOf(this->L.Place(p)), 1,
-          [&](std::int64_t block, double squared)
+          [&](std::int64_t block, const Vector3& d)
           {
-            const auto weight = static_cast<float>(std::exp(-0.5 * squared));
+            const auto weight = static_cast<float>(std::exp(-0.5 * d.squaredNorm()));
             sum += weight * outsideSum[block];
             weights += weight * outsideCount[block];
-            if (squared <= 1.5 * 1.5)
+            if (d.cwiseQuotient(lumenReach).squaredNorm() <= 1.0)
             {
               brightest = std::max(brightest, lumen[block]);
             }
@@ -822,7 +844,7 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
         const float outside = weights > 0.0f ? std::min(sum / weights, brightest) : this->Tissue;
         const float value = static_cast<float>(this->Image[p]);
         const float above = value - 0.5f * (brightest + outside);
-        inside[n] = above > 0.0f ? 1 : 0;
+        inside[n] = above > 0.0f && std::isfinite(above) ? 1 : 0;
         if (probability != nullptr && std::isfinite(above))
         {
           (*probability)[p] = 1.0f / (1.0f + std::exp(-above / softness));
@@ -953,11 +975,16 @@ VesselSegmentationResult Segmentation<T>::Run(
   std::vector<std::array<int, 3>> places;
   for (std::size_t s = 0; s < seeds.size(); ++s)
   {
-    places.push_back(this->Nearest(seeds[s].position));
-    if (!this->L.Contains(places[s][0], places[s][1], places[s][2]))
+    const std::optional<std::array<int, 3>> place = this->Nearest(seeds[s].position);
+    if (!place)
     {
       throw std::invalid_argument("seed " + std::to_string(s) + " is outside the image");
     }
+    if (!seeds[s].axis.allFinite())
+    {
+      throw std::invalid_argument("the axis of seed " + std::to_string(s) + " is not finite");
+    }
+    places.push_back(*place);
   }
   VesselSegmentationResult result;
   result.window = this->Settings.window ? *this->Settings.window : this->MeasureWindow(places);
@@ -1008,10 +1035,11 @@ VesselSegmentationResult Segmentation<T>::Run(
   if (probability)
   {
     // A filled hole is vessel; a dropped island is none.
+    const float justBelow = std::nextafter(0.5f, 0.0f);
     for (std::size_t p = 0; p < result.mask.size(); ++p)
     {
       float& value = result.probability[p];
-      value = result.mask[p] ? std::max(value, 0.5f) : std::min(value, 0.5f);
+      value = result.mask[p] ? std::max(value, 0.5f) : std::min(value, justBelow);
     }
   }
   Report(progress, 1.0);
@@ -1028,7 +1056,9 @@ void VesselSegmentationSettings::Validate() const
       throw std::invalid_argument(what);
     }
   };
-  check(!this->window || this->window->blood > this->window->tissue,
+  check(!this->window ||
+      (this->window->blood > this->window->tissue && std::isfinite(this->window->blood) &&
+        std::isfinite(this->window->tissue)),
     "window.blood must be above window.tissue");
   check(this->strong >= 0.0 && this->strong <= 1.0, "strong must be 0 to 1");
   check(this->weak > 0.0 && this->weak <= this->strong, "weak must be above 0, at most strong");

@@ -28,7 +28,7 @@ namespace coronary
 struct VesselSeed
 {
   Vector3 position;               ///< mm
-  Vector3 axis = Vector3::Zero(); ///< unit vector into the vessel; zero: not known
+  Vector3 axis = Vector3::Zero(); ///< points into the vessel; zero: not known
 };
 
 /// Image values that tell blood from tissue.
@@ -57,7 +57,8 @@ struct VesselSegmentationSettings
 struct VesselSegmentationResult
 {
   std::vector<unsigned char> mask; ///< 1 vessel, 0 else; one value a voxel of the image
-  std::vector<float> probability;  ///< 0 to 1, 0.5 at the wall; empty unless asked for
+  std::vector<float> probability;  ///< 0 to 1, at least 0.5 where the mask is 1, and less where
+                                   ///< it is 0; empty unless asked for
   BloodWindow window;              ///< the one that was used
   double tubular = 0.0;            ///< the same
   std::vector<double> seedVolume;  ///< mm^3 that hang on each seed; 0: the seed reached nothing
