@@ -20,6 +20,7 @@ list_files() {
     done
   else
     find . -type f -not -path './.git/*' -not -path './build/*' -not -path './demo-output/*' \
+      -not -path './validation-output/*' \
       | sed 's#^\./##'
   fi
 }

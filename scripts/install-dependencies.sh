@@ -8,7 +8,7 @@ usage() {
 Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--developer]
   --check      change nothing; name what is missing and exit 1, exit 0 when all is there
   --tree TREE  packages of one tree only (both without this option)
-  --developer  clang-tidy, shellcheck and Google Benchmark as well
+  --developer  clang-tidy, shellcheck and ITK (the benchmarks compare with it) as well
 Runs as root, or through sudo. Run again, it changes nothing.
 EOF
 }
@@ -29,7 +29,7 @@ vtk=(
   libtbb-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libpng16-16 libtiff6
   patchelf
 )
-developer=(clang-tidy-14 shellcheck libbenchmark-dev)
+developer=(clang-tidy-14 shellcheck libinsighttoolkit5-dev)
 
 check_only=no
 tree=all

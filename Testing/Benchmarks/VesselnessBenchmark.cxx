@@ -4,6 +4,7 @@
 #include "MeasuredProcess.h"
 #include "MultiscaleVesselness.h"
 #include "ReferenceVesselness.h"
+#include "VesselnessKernels.h"
 #include "vtkFrangiVesselness.h"
 #if defined(DYNAMICCORONARY_WITH_ITK)
 #include "ItkVesselness.h"
@@ -47,9 +48,12 @@ constexpr double LeastCorrelation = 0.999;
 constexpr double LargestReferenceError = 1e-3;
 constexpr double LeastReferenceCorrelation = 0.9999;
 
+const std::vector<std::string> AllTables = { "itk", "clinical", "methods", "scales", "instructions",
+  "agreement" };
+
 struct Options
 {
-  std::vector<std::string> tables = { "itk", "clinical", "methods", "scales", "agreement" };
+  std::vector<std::string> tables = AllTables;
   int size = 256;
   int agreementSize = 128;
   std::vector<int> clinicalSize = { 512, 512, 220 };
@@ -95,28 +99,38 @@ struct TestImage
   SharedArray<std::int16_t> values;
 };
 
+enum class Centre
+{
+  Heart,
+  LeftMain ///< where it leaves the aorta: vessels of all sizes close together
+};
+
 /// CT of the beating phantom at rest: tubes of 0.5 to 2.3 mm radius, chambers, bone, fat, noise.
 std::unique_ptr<TestImage> RenderPhantom(
-  const Dimensions& n, const Vector3& spacing, const Options& options)
+  const Dimensions& n, const Vector3& spacing, Centre centre, const Options& options)
 {
   auto image =
     std::unique_ptr<TestImage>(new TestImage{ n, spacing, SharedArray<std::int16_t>(CountOf(n)) });
   MeasureInChild([] {},
     [&]
     {
+      constexpr double rest = 0.75;
       SetNumberOfThreads(options.threads);
       PhantomSettings settings;
       settings.seed = options.seed;
       const CoronaryPhantom phantom(settings);
-      const ImageGrid around = phantom.DefaultGrid(1.0);
-      const std::array<int, 6>& e = around.extent;
-      const Vector3 centre =
-        around.IndexToWorld(0.5 * (e[0] + e[1]), 0.5 * (e[2] + e[3]), 0.5 * (e[4] + e[5]));
+      Vector3 middle = phantom.Ostia(rest).front().position;
+      if (centre == Centre::Heart)
+      {
+        const ImageGrid around = phantom.DefaultGrid(1.0);
+        const std::array<int, 6>& e = around.extent;
+        middle = around.IndexToWorld(0.5 * (e[0] + e[1]), 0.5 * (e[2] + e[3]), 0.5 * (e[4] + e[5]));
+      }
       ImageGrid grid;
       grid.extent = ExtentOf(n);
       grid.spacing = spacing;
-      grid.origin = centre - 0.5 * spacing.cwiseProduct(Vector3(n[0] - 1, n[1] - 1, n[2] - 1));
-      phantom.Render(grid, grid.extent, 0.75, image->values.data());
+      grid.origin = middle - 0.5 * spacing.cwiseProduct(Vector3(n[0] - 1, n[1] - 1, n[2] - 1));
+      phantom.Render(grid, grid.extent, rest, image->values.data());
     });
   return image;
 }
@@ -142,6 +156,7 @@ struct Variant
   VesselnessSettings settings = Settings();
   bool scale = false;
   bool direction = false;
+  VesselnessInstructions instructions = VesselnessInstructions::Widest;
 };
 
 std::vector<float> RunOurs(const float* values, const TestImage& image, const Variant& variant)
@@ -167,6 +182,7 @@ Measurement MeasureOurs(const TestImage& image, const Variant& variant, int thre
     [&]
     {
       SetNumberOfThreads(threads);
+      SetVesselnessInstructions(variant.instructions);
       input = ToFloat(image);
     },
     [&] { result = RunOurs(input.data(), image, variant); },
@@ -434,7 +450,8 @@ void TableItk(const Options& options, Verdicts& verdicts)
 {
   const Dimensions n = { options.size, options.size, options.size };
   const std::size_t voxels = CountOf(n);
-  const std::unique_ptr<TestImage> image = RenderPhantom(n, Vector3::Constant(0.4), options);
+  const std::unique_ptr<TestImage> image =
+    RenderPhantom(n, Vector3::Constant(0.4), Centre::Heart, options);
   const Variant variant;
   std::vector<Measurement> algorithm;
   std::vector<Measurement> ours;
@@ -520,7 +537,8 @@ void TableClinical(const Options& options, Verdicts& verdicts)
 {
   const Dimensions n = { options.clinicalSize[0], options.clinicalSize[1],
     options.clinicalSize[2] };
-  const std::unique_ptr<TestImage> image = RenderPhantom(n, Vector3(0.23, 0.23, 0.625), options);
+  const std::unique_ptr<TestImage> image =
+    RenderPhantom(n, Vector3(0.23, 0.23, 0.625), Centre::Heart, options);
   std::printf("\n### vtkFrangiVesselness, %s, 0.23 x 0.23 x 0.625 mm, 5 scales, %s\n\n",
     SizeText(n).c_str(), ThreadsText(options.threads).c_str());
   std::printf(
@@ -557,7 +575,8 @@ void TableClinical(const Options& options, Verdicts& verdicts)
 void TableMethods(const Options& options)
 {
   const Dimensions n = { options.size, options.size, options.size };
-  const std::unique_ptr<TestImage> image = RenderPhantom(n, Vector3::Constant(0.4), options);
+  const std::unique_ptr<TestImage> image =
+    RenderPhantom(n, Vector3::Constant(0.4), Centre::Heart, options);
   std::vector<int> threads = { 1 };
   if (options.threads > 1)
   {
@@ -635,7 +654,8 @@ void TableMethods(const Options& options)
 void TableScales(const Options& options)
 {
   const Dimensions n = { options.size, options.size, options.size };
-  const std::unique_ptr<TestImage> image = RenderPhantom(n, Vector3::Constant(0.4), options);
+  const std::unique_ptr<TestImage> image =
+    RenderPhantom(n, Vector3::Constant(0.4), Centre::Heart, options);
   std::printf("\n### One scale at a time, %s float, 0.4 mm, %s\n\n", SizeText(n).c_str(),
     ThreadsText(options.threads).c_str());
   std::printf("| sigma, mm | taps | wall time, s | processor time, s |\n|---|---|---|---|\n");
@@ -652,6 +672,37 @@ void TableScales(const Options& options)
     std::printf("| %.1f | %d | %s | %s |\n", sigma, 2 * halo + 1, Spread(Each(runs, Wall)).c_str(),
       Spread(Each(runs, Processor)).c_str());
   }
+}
+
+void TableInstructions(const Options& options)
+{
+  const Dimensions n = { options.size, options.size, options.size };
+  const std::unique_ptr<TestImage> image =
+    RenderPhantom(n, Vector3::Constant(0.4), Centre::Heart, options);
+  std::printf("\n### Vector instructions, the algorithm, %s float, 0.4 mm, 5 scales, %s\n\n",
+    SizeText(n).c_str(), ThreadsText(options.threads).c_str());
+  std::printf("| | wall time, s | processor time, s |\n|---|---|---|\n");
+  for (const auto& [name, instructions] :
+    { std::pair("SSE2 or whatever the compiler's default is", VesselnessInstructions::Baseline),
+      std::pair("AVX2", VesselnessInstructions::Avx2),
+      std::pair("AVX-512", VesselnessInstructions::Avx512) })
+  {
+    if (!SetVesselnessInstructions(instructions))
+    {
+      std::printf("| %s | not on this processor | |\n", name);
+      continue;
+    }
+    Variant variant;
+    variant.instructions = instructions;
+    std::vector<Measurement> runs;
+    for (int run = 0; run < options.repeats; ++run)
+    {
+      runs.push_back(MeasureOurs(*image, variant, options.threads));
+    }
+    std::printf("| %s | %s | %s |\n", name, Spread(Each(runs, Wall)).c_str(),
+      Spread(Each(runs, Processor)).c_str());
+  }
+  SetVesselnessInstructions(VesselnessInstructions::Widest);
 }
 
 void TableAgreement(const Options& options, Verdicts& verdicts)
@@ -678,7 +729,8 @@ void TableAgreement(const Options& options, Verdicts& verdicts)
   {
     const int side = options.agreementSize;
     const Dimensions n = { side, side, static_cast<int>(test.depth * side) };
-    const std::unique_ptr<TestImage> image = RenderPhantom(n, test.spacing, options);
+    const std::unique_ptr<TestImage> image =
+      RenderPhantom(n, test.spacing, Centre::LeftMain, options);
     Variant variant;
     variant.settings.bright = test.bright;
     variant.settings.c = test.c;
@@ -766,6 +818,10 @@ int Run(const Options& options)
   {
     TableScales(options);
   }
+  if (options.Has("instructions"))
+  {
+    TableInstructions(options);
+  }
   if (options.Has("agreement"))
   {
     TableAgreement(options, verdicts);
@@ -791,7 +847,7 @@ int main(int argc, char** argv)
   CLI::App app("Time, memory and agreement of the vesselness, beside ITK's in the same run. Each "
                "measurement is a process of its own. Exit code 1 when results disagree.");
   app.add_option("tables", options.tables, "Which tables (default: all)")
-    ->check(CLI::IsMember({ "itk", "clinical", "methods", "scales", "agreement" }));
+    ->check(CLI::IsMember(AllTables));
   app.add_option("--size", options.size, "Voxels along each side")
     ->check(CLI::Range(16, 1024))
     ->capture_default_str();
