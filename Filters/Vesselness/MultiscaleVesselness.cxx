@@ -19,8 +19,8 @@ namespace
 constexpr int BandRows = 48;
 
 /// Of the kernels, in standard deviations. At 4 the second derivative still has half a per cent of
-/// its height, which costs 1e-3 of vesselness and more; here it is 1e-5.
-constexpr double KernelReach = 5.5;
+/// its height, which costs 1e-3 of vesselness and more; here it is 1e-4.
+constexpr double KernelReach = 5.0;
 
 int Padded(int n)
 {

@@ -10,7 +10,7 @@
  * 1998;2:143, and Jerman et al., IEEE Trans Med Imaging 2016;35:2107 (fuller at bifurcations).
  * Derivatives are in mm; spacing may differ along the axes, and direction matrices are honoured.
  *
- * The filter streams: of its input it asks for the requested extent and a halo of 5.5 times
+ * The filter streams: of its input it asks for the requested extent and a halo of 5 times
  * SigmaMax, as far as the image goes; beyond the border the border voxels are repeated. The result
  * has the same bits however the image is cut into extents or pieces, and on any number of threads.
  *
