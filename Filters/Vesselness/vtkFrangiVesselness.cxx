@@ -386,10 +386,6 @@ vtkFrangiVesselness::vtkFrangiVesselness()
 {
   this->Data->Self = this;
   this->SetNumberOfInputPorts(2);
-  this->SetInputArrayToProcess(
-    0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
-  this->SetInputArrayToProcess(
-    1, 1, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
 }
 
 vtkFrangiVesselness::~vtkFrangiVesselness() = default;
@@ -500,9 +496,20 @@ vtkDataArray* vtkFrangiVesselness::Internals::InputArray(
   vtkInformationVector** inputs, int index, vtkImageData* image) const
 {
   const std::string whose = index == 0 ? "the image" : "the mask";
-  const std::string wanted = ChosenArray(this->Self->GetInputArrayInformation(index));
+  const std::string wanted =
+    index == 0 ? ChosenArray(this->Self->GetInputArrayInformation(0)) : this->Self->MaskArrayName;
   int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-  vtkAbstractArray* any = this->Self->GetInputAbstractArrayToProcess(index, inputs, association);
+  vtkAbstractArray* any = nullptr;
+  if (wanted.empty())
+  {
+    // ParaView gives an empty name while it does not know the input's arrays.
+    any = image->GetPointData()->GetScalars();
+  }
+  else
+  {
+    any = index == 0 ? this->Self->GetInputAbstractArrayToProcess(0, inputs, association)
+                     : image->GetPointData()->GetAbstractArray(wanted.c_str());
+  }
   Require(any != nullptr,
     wanted.empty() ? whose + " has no active point scalars"
                    : whose + " has no point array '" + wanted + "'");
@@ -842,6 +849,7 @@ void vtkFrangiVesselness::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Region:";
   std::for_each(this->Region, this->Region + 6, [&](int value) { os << ' ' << value; });
   os << "\n";
+  print("MaskArrayName", this->MaskArrayName);
   print("VesselnessArrayName", this->VesselnessArrayName);
   print("ScaleArrayName", this->ScaleArrayName);
   print("DirectionArrayName", this->DirectionArrayName);

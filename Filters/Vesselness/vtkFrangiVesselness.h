@@ -24,10 +24,10 @@
  *
  * @par Input ports:
  * - 0: vtkImageData, three-dimensional. Any numeric point array of one component: that chosen with
- *   SetInputArrayToProcess(0, ...), by default the active scalars (HU). Computed in float. Voxels
+ *   SetInputArrayToProcess(0, ...), by default or with an empty name the active scalars (HU). Computed in float. Voxels
  *   that are NaN or infinite give 0 as far as the kernels reach around them.
  * - 1, optional: vtkImageData on the same grid; result 0 where its scalars
- *   (SetInputArrayToProcess(1, ...)) are 0 or NaN.
+ *   (MaskArrayName) are 0 or NaN.
  *
  * @par Output:
  * vtkImageData, grid and extent as the input. It carries the result alone, not the image: that
@@ -81,6 +81,15 @@ public:
    */
   void SetMaskConnection(vtkAlgorithmOutput* mask) { this->SetInputConnection(1, mask); }
   void SetMaskData(vtkDataObject* mask) { this->SetInputData(1, mask); }
+  ///@}
+
+  ///@{
+  /**
+   * Point array of the mask. Default empty: the active scalars.
+   */
+  // No SetInputArrayToProcess(1, ...): ParaView 5.11 crashes on arrays of two inputs chosen so.
+  vtkSetStdStringFromCharMacro(MaskArrayName);
+  vtkGetCharFromStdStringMacro(MaskArrayName);
   ///@}
 
   ///@{
@@ -264,6 +273,7 @@ private:
   bool GenerateDirection = false;
   bool UseRegion = false;
   int Region[6] = { 0, 0, 0, 0, 0, 0 };
+  std::string MaskArrayName;
   std::string VesselnessArrayName;
   std::string ScaleArrayName;
   std::string DirectionArrayName;

@@ -886,6 +886,11 @@ TEST(FrangiVesselness, RefusesByName)
     "extent");
   ExpectRefusal(
     ofMask([](vtkImageData* m) { m->GetPointData()->Initialize(); }), "the mask has no");
+  const auto misnamed = ofMask([](vtkImageData*) {});
+  misnamed->SetMaskArrayName("lumen");
+  ExpectRefusal(misnamed, "the mask has no point array 'lumen'");
+  misnamed->SetMaskArrayName("HU");
+  EXPECT_GT(Compute(misnamed)->GetNumberOfPoints(), 0);
   EXPECT_GT(Compute(ofMask([](vtkImageData*) {}))->GetNumberOfPoints(), 0);
 
   // Composite data: C belongs to one image.
