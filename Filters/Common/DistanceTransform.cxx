@@ -91,6 +91,10 @@ std::vector<float> SquaredDistanceTransform(const unsigned char* mask,
   const std::int64_t ny = dimensions[1];
   const std::int64_t nz = dimensions[2];
   std::vector<float> squared(nx * ny * nz);
+  if (squared.empty())
+  {
+    return squared;
+  }
   const auto part = [&](double from)
   {
     return progress
