@@ -25,27 +25,36 @@ Values Differentiate(
       std::exp(-0.5 * x * x) / (std::sqrt(2.0 * 3.14159265358979323846) * sigma) * spacing;
     kernel[t + radius] = order == 0 ? g : order == 1 ? -x * g : (x * x - 1.0) * g;
   }
-  const std::int64_t stride =
-    axis == 0 ? 1 : (axis == 1 ? n[0] : static_cast<std::int64_t>(n[0]) * n[1]);
-  Values out(in.size());
+  const auto row = [&](auto& values, int j, std::int64_t k)
+  { return values.data() + (k * n[1] + j) * n[0]; };
+  Values out(in.size(), 0.0);
   ParallelFor(n[2], 1,
     [&](std::int64_t first, std::int64_t last)
     {
+      Values line(n[0] + 2 * radius);
       for (std::int64_t k = first; k < last; ++k)
       {
         for (int j = 0; j < n[1]; ++j)
         {
-          for (int i = 0; i < n[0]; ++i)
+          if (axis == 0)
           {
-            const std::int64_t at = (k * n[1] + j) * n[0] + i;
-            const int here = axis == 0 ? i : (axis == 1 ? j : static_cast<int>(k));
-            double sum = 0.0;
-            for (int t = -radius; t <= radius; ++t)
+            const double* source = row(in, j, k);
+            for (int i = 0; i < n[0] + 2 * radius; ++i)
             {
-              const int there = std::clamp(here - t, 0, n[axis] - 1);
-              sum += kernel[t + radius] * in[at + (there - here) * stride];
+              line[i] = source[std::clamp(i - radius, 0, n[0] - 1)];
             }
-            out[at] = sum;
+          }
+          double* sum = row(out, j, k);
+          for (int t = -radius; t <= radius; ++t)
+          {
+            const double* there = axis == 0
+              ? line.data() + radius - t
+              : row(in, axis == 1 ? std::clamp(j - t, 0, n[1] - 1) : j,
+                  axis == 2 ? std::clamp<std::int64_t>(k - t, 0, n[2] - 1) : k);
+            for (int i = 0; i < n[0]; ++i)
+            {
+              sum[i] += kernel[t + radius] * there[i];
+            }
           }
         }
       }

@@ -642,9 +642,9 @@ Geometry ParseSpacing(const std::string& text)
   }
   return { text + " mm", spacing };
 }
-}
 
-int main(int argc, char** argv)
+/// @return the exit code
+int Validate(int argc, char** argv)
 {
   CLI::App program("Automatic ostia and vessel segmentation on phantoms, against their truth");
   std::string seedText = "1..10";
@@ -736,55 +736,47 @@ int main(int argc, char** argv)
     ReferencePhase, LeakDistance, LeastRadius, LeakDistance,
     c > 0.0 ? Format("%g HU", c).c_str() : "half the largest Hessian norm");
   std::vector<Outcome> outcomes;
-  try
+  const auto run = [&](const Case& test, bool segment)
   {
-    const auto run = [&](const Case& test, bool segment)
+    const bool done = std::any_of(outcomes.begin(), outcomes.end(),
+      [&](const Outcome& o) { return o.test == test && (o.segmented || !segment); });
+    if (done)
     {
-      const bool done = std::any_of(outcomes.begin(), outcomes.end(),
-        [&](const Outcome& o) { return o.test == test && (o.segmented || !segment); });
-      if (done)
-      {
-        return;
-      }
-      outcomes.push_back(Run(test, segment, c));
-      const Outcome& o = outcomes.back();
-      std::fprintf(stderr, "seed %llu, %.0f ms, %.0f HU, %s: Dice %.3f, ostia %s %s\n",
-        static_cast<unsigned long long>(test.seed), 1e3 * test.window, test.noise,
-        test.geometry.name.c_str(), o.dice, Format("%.2f", o.ostia[0].error).c_str(),
-        Format("%.2f", o.ostia[1].error).c_str());
-    };
-    for (const std::uint64_t seed : seeds)
+      return;
+    }
+    outcomes.push_back(Run(test, segment, c));
+    const Outcome& o = outcomes.back();
+    std::fprintf(stderr, "seed %llu, %.0f ms, %.0f HU, %s: Dice %.3f, ostia %s %s\n",
+      static_cast<unsigned long long>(test.seed), 1e3 * test.window, test.noise,
+      test.geometry.name.c_str(), o.dice, Format("%.2f", o.ostia[0].error).c_str(),
+      Format("%.2f", o.ostia[1].error).c_str());
+  };
+  for (const std::uint64_t seed : seeds)
+  {
+    for (const Geometry& g : geometries)
     {
-      for (const Geometry& g : geometries)
+      if (wanted("sampling"))
       {
-        if (wanted("sampling"))
-        {
-          run({ seed, UsualWindow, UsualNoise, g }, true);
-        }
-      }
-      for (const double window : windows)
-      {
-        for (const double noise : noises)
-        {
-          if (wanted("windows"))
-          {
-            run({ seed, window, noise, usual }, true);
-          }
-        }
+        run({ seed, UsualWindow, UsualNoise, g }, true);
       }
     }
-    for (const std::uint64_t seed : ostiaSeeds)
+    for (const double window : windows)
     {
-      if (wanted("ostia"))
+      for (const double noise : noises)
       {
-        run({ seed, UsualWindow, UsualNoise, usual }, false);
+        if (wanted("windows"))
+        {
+          run({ seed, window, noise, usual }, true);
+        }
       }
     }
   }
-  catch (const std::exception& error)
+  for (const std::uint64_t seed : ostiaSeeds)
   {
-    std::fprintf(stderr, "validate-segmentation: %s\n", error.what());
-    return 2;
+    if (wanted("ostia"))
+    {
+      run({ seed, UsualWindow, UsualNoise, usual }, false);
+    }
   }
 
   std::vector<Outcome> segmented;
@@ -810,4 +802,22 @@ int main(int argc, char** argv)
     PrintCases(segmented);
   }
   return met ? 0 : 1;
+}
+}
+
+int main(int argc, char** argv)
+{
+  try
+  {
+    return Validate(argc, argv);
+  }
+  catch (const std::exception& error)
+  {
+    std::fprintf(stderr, "validate-segmentation: %s\n", error.what());
+  }
+  catch (...)
+  {
+    std::fputs("validate-segmentation: unknown error\n", stderr);
+  }
+  return 2;
 }
