@@ -1,0 +1,1469 @@
+#include "CenterlineExtraction.h"
+
+#include "CurveSmoothing.h"
+#include "DistanceTransform.h"
+#include "FastMarching.h"
+#include "LumenMeasurement.h"
+#include "VoxelRegion.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr std::uint32_t None = VoxelRegion::notAMember;
+constexpr std::int32_t NoOwner = -1;
+
+void Require(bool condition, const std::string& requirement)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument("CenterlineSettings: " + requirement);
+  }
+}
+
+std::string Text(const Vector3& position)
+{
+  std::ostringstream text;
+  text << '(' << position[0] << ", " << position[1] << ", " << position[2] << ')';
+  return text.str();
+}
+
+/// A way through the region, in mm along the axes of the grid (index times spacing).
+struct Way
+{
+  std::vector<Vector3> points;  ///< from the tip down to the source or the tree
+  std::int32_t owner = NoOwner; ///< point of the tree that it met
+  bool closed = true;           ///< met the source or the tree
+};
+
+/// Measured samples of one path, root first.
+struct Course
+{
+  std::vector<Vector3> points; ///< mm, world
+  std::vector<double> radius;
+  std::vector<double> confidence;
+  std::vector<double> lumen;  ///< image value
+  std::vector<double> behind; ///< image value behind the wall
+
+  std::size_t size() const { return points.size(); }
+  void resize(std::size_t count)
+  {
+    points.resize(count);
+    radius.resize(count);
+    confidence.resize(count);
+    lumen.resize(count);
+    behind.resize(count);
+  }
+};
+
+/// Position on a polyline nearest to another one's straight continuation.
+double LineDistance(const Vector3& point, const Vector3& origin, const Vector3& direction)
+{
+  const Vector3 offset = point - origin;
+  return (offset - offset.dot(direction) * direction).norm();
+}
+
+class Extractor
+{
+public:
+  Extractor(const CenterlineInput& input, const CenterlineSettings& settings,
+    const ProgressCallback& progress)
+    : Input(input)
+    , Settings(settings)
+    , Progress(progress)
+    , Start(std::chrono::steady_clock::now())
+    , Spacing(input.grid.spacing)
+    , Finest(input.grid.spacing.minCoeff())
+    , Voxel(std::cbrt(input.grid.spacing.prod()))
+    , Step(settings.resampling > 0.0 ? settings.resampling : 0.6 * Voxel)
+  {
+    const std::array<int, 6>& e = input.grid.extent;
+    this->Size = { e[1] - e[0] + 1, e[3] - e[2] + 1, e[5] - e[4] + 1 };
+  }
+
+  CenterlineResult Run();
+
+private:
+  // Places.
+  Vector3 ToIndex(const Vector3& world) const
+  {
+    return (this->Input.grid.direction.transpose() * (world - this->Input.grid.origin))
+      .cwiseQuotient(this->Spacing);
+  }
+  Vector3 FrameToWorld(const Vector3& frame) const
+  {
+    return this->Input.grid.origin + this->Input.grid.direction * frame;
+  }
+  std::size_t Offset(int i, int j, int k) const
+  {
+    const std::array<int, 6>& e = this->Input.grid.extent;
+    return (static_cast<std::size_t>(k - e[4]) * this->Size[1] +
+             static_cast<std::size_t>(j - e[2])) *
+      this->Size[0] +
+      static_cast<std::size_t>(i - e[0]);
+  }
+  bool InImage(const Vector3& index) const
+  {
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      if (!(index[axis] >= this->Input.grid.extent[2 * axis] - 0.5) ||
+        !(index[axis] <= this->Input.grid.extent[2 * axis + 1] + 0.5))
+      {
+        return false;
+      }
+    }
+    return true;
+  }
+  bool OutOfTime() const
+  {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - this->Start).count() >
+      this->Settings.timeLimit;
+  }
+
+  void PrepareMeasurement();
+  void MakeRegion();
+  std::uint32_t NearestMember(const Vector3& index, double reach, bool reachedOnly) const;
+  bool PlaceSeeds();
+  void MarchFrom();
+  bool Gradient(const Vector3& index, Vector3& gradient) const;
+  Way WayBack(const Vector3& from, std::uint32_t member) const;
+  std::vector<Vector3> Tangents(const std::vector<Vector3>& points) const;
+  void Measure(Course& course, bool move) const;
+  void SmoothPositions(Course& course, double start, double end) const;
+  void SmoothRadii(Course& course) const;
+  void Calibrate(const Course& course);
+  void CorrectRadii();
+  std::size_t SeenUpTo(const Course& course, double parentRadius) const;
+  std::int64_t Append(const Way& way, int treeId, bool wanted);
+  std::size_t JoinParent(Course& course, std::int32_t owner) const;
+  void Own(std::size_t branch);
+  void FindTips();
+  void FollowTargets();
+  void Finish();
+  void SeedsInOneVessel();
+
+  const CenterlineInput& Input;
+  const CenterlineSettings& Settings;
+  const ProgressCallback& Progress;
+  std::chrono::steady_clock::time_point Start;
+  Vector3 Spacing;
+  double Finest;
+  double Voxel;
+  double Step;
+  std::array<int, 3> Size;
+
+  std::vector<std::int16_t> MaskImage;
+  std::vector<float> MaskDistance;
+  ScalarImage MeasuredImage;
+  std::unique_ptr<ImageInterpolator> Image;
+  LumenSettings Lumen;
+  double Blur = 0.0;
+  double SpeedThreshold = 0.0;
+  double SpeedScale = 1.0;
+  double IntensityThreshold = -std::numeric_limits<double>::infinity();
+
+  VoxelRegion Region;
+  std::unique_ptr<FastMarching> Marching;
+  std::vector<std::uint32_t> SeedMembers;
+  std::vector<char> SeedUsed;
+  std::vector<std::int32_t> Owner; ///< of a member: the point of the tree whose lumen it is in
+  std::vector<bool> Covered;       ///< members where no further tip is looked for
+  CenterlineTree Tree;             ///< not split
+  std::vector<double> PointLumen;  ///< image value at a point of the tree
+  bool Calibrated = false;
+  std::vector<std::int32_t> BranchOf; ///< of a point of the tree
+  CenterlineResult Result;
+};
+
+void Extractor::PrepareMeasurement()
+{
+  const std::int64_t voxels =
+    static_cast<std::int64_t>(this->Size[0]) * this->Size[1] * this->Size[2];
+  if (!this->Input.speed && !this->Input.wallDistance)
+  {
+    // A mask alone: fastest where its border is farthest. The border lies half a voxel from the
+    // centres of the outermost voxels.
+    this->MaskDistance = SquaredDistanceTransform(this->Input.mask, this->Size, this->Spacing, {});
+    for (float& distance : this->MaskDistance)
+    {
+      distance = std::min(std::sqrt(distance), 1e6F * static_cast<float>(this->Voxel)) -
+        0.5F * static_cast<float>(this->Voxel);
+    }
+  }
+  if (this->Input.intensity)
+  {
+    this->MeasuredImage = *this->Input.intensity;
+  }
+  else if (this->Input.wallDistance)
+  {
+    this->MeasuredImage = { this->Input.wallDistance, this->Input.grid };
+    this->Lumen.level = 0.0;
+  }
+  else if (this->Input.mask && !this->Input.speed)
+  {
+    this->MaskImage.resize(static_cast<std::size_t>(voxels));
+    std::transform(this->Input.mask, this->Input.mask + voxels, this->MaskImage.begin(),
+      [](unsigned char value) { return static_cast<std::int16_t>(value ? 100 : 0); });
+    this->MeasuredImage = { this->MaskImage.data(), this->Input.grid };
+    this->Lumen.level = 50.0;
+  }
+  else
+  {
+    this->MeasuredImage = { this->Input.speed, this->Input.grid };
+  }
+  this->Image = std::make_unique<ImageInterpolator>(this->MeasuredImage);
+  this->Blur = this->Settings.blur > 0.0 ? this->Settings.blur : 0.8 * this->Voxel;
+
+  // What a lumen looks like: the median of what the seeds show.
+  std::vector<LumenReference> seen;
+  if (std::isnan(this->Lumen.level))
+  {
+    for (const Vector3& seed : this->Input.seeds)
+    {
+      LumenReference reference;
+      if (this->Image->Contains(seed) && MeasureReference(*this->Image, seed, reference))
+      {
+        seen.push_back(reference);
+      }
+    }
+    if (!seen.empty())
+    {
+      const auto median = [&](double LumenReference::*member)
+      {
+        std::vector<double> values;
+        for (const LumenReference& reference : seen)
+        {
+          values.push_back(reference.*member);
+        }
+        std::sort(values.begin(), values.end());
+        return values[values.size() / 2];
+      };
+      this->Lumen.reference = { median(&LumenReference::lumen), 0.0,
+        median(&LumenReference::radius) };
+      this->Lumen.reference.background = std::min_element(seen.begin(), seen.end(),
+        [](const LumenReference& a, const LumenReference& b) {
+          return a.background < b.background;
+        })->background;
+    }
+  }
+  this->Lumen.maximumRadius = this->Settings.maximumRadius;
+  if (this->Lumen.maximumRadius == 0.0)
+  {
+    if (!std::isnan(this->Lumen.level))
+    {
+      const float* distance =
+        this->Input.wallDistance ? this->Input.wallDistance : this->MaskDistance.data();
+      this->Lumen.maximumRadius =
+        1.5 * static_cast<double>(*std::max_element(distance, distance + voxels)) + this->Voxel;
+    }
+    else
+    {
+      this->Lumen.maximumRadius = std::max(2.0 * this->Lumen.reference.radius, 6.0 * this->Voxel);
+    }
+  }
+  if (this->Input.intensity)
+  {
+    this->IntensityThreshold = std::isnan(this->Settings.intensityThreshold)
+      ? this->Lumen.reference.background +
+        0.4 * (this->Lumen.reference.lumen - this->Lumen.reference.background)
+      : this->Settings.intensityThreshold;
+  }
+}
+
+void Extractor::MakeRegion()
+{
+  const std::int64_t voxels =
+    static_cast<std::int64_t>(this->Size[0]) * this->Size[1] * this->Size[2];
+  const float* distance = this->Input.wallDistance ? this->Input.wallDistance
+    : this->Input.speed                            ? nullptr
+                                                   : this->MaskDistance.data();
+  const float* speed = distance ? distance : this->Input.speed;
+  const unsigned char* mask = this->Input.wallDistance ? nullptr : this->Input.mask;
+  if (distance)
+  {
+    // Thin vessels hold together where the wall is within half a voxel.
+    this->SpeedThreshold =
+      this->Input.wallDistance ? -0.5 * this->Voxel : -std::numeric_limits<double>::infinity();
+  }
+  else
+  {
+    this->SpeedThreshold = this->Settings.speedThreshold;
+    if (std::isnan(this->SpeedThreshold))
+    {
+      // A histogram of logarithms: any speed, any unit.
+      float greatest = 0.0F;
+      for (std::int64_t v = 0; v < voxels; ++v)
+      {
+        greatest = std::isfinite(speed[v]) ? std::max(greatest, speed[v]) : greatest;
+      }
+      std::vector<std::int64_t> histogram(1000, 0);
+      if (greatest > 0.0F)
+      {
+        for (std::int64_t v = 0; v < voxels; ++v)
+        {
+          if (std::isfinite(speed[v]) && speed[v] > 1e-3F * greatest)
+          {
+            ++histogram[std::min<std::size_t>(
+              999, static_cast<std::size_t>(1000.0F * speed[v] / greatest))];
+          }
+        }
+      }
+      std::int64_t above = 0;
+      std::size_t bin = 1000;
+      const std::int64_t tail = std::max<std::int64_t>(1, voxels / 10000);
+      while (bin > 1 && above < tail)
+      {
+        above += histogram[--bin];
+      }
+      this->SpeedThreshold =
+        0.02 * static_cast<double>(greatest) * static_cast<double>(bin + 1) / 1000.0;
+    }
+  }
+
+  const float threshold = static_cast<float>(this->SpeedThreshold);
+  const bool gate = this->Input.intensity && std::isfinite(this->IntensityThreshold);
+  this->Region = VoxelRegion(this->Input.grid.extent,
+    [&](int j, int k, unsigned char* flags)
+    {
+      const std::array<int, 6>& e = this->Input.grid.extent;
+      const std::size_t row = this->Offset(e[0], j, k);
+      for (int i = 0; i < this->Size[0]; ++i)
+      {
+        const std::size_t v = row + static_cast<std::size_t>(i);
+        flags[i] = (mask == nullptr || mask[v] != 0) && speed[v] > threshold &&
+          (!gate ||
+            this->Image->At(this->Input.grid.IndexToWorld(i + e[0], j, k)) >
+              this->IntensityThreshold);
+      }
+    });
+  this->Result.regionVoxels = this->Region.Size();
+}
+
+std::uint32_t Extractor::NearestMember(const Vector3& index, double reach, bool reachedOnly) const
+{
+  const std::array<int, 6>& box = this->Region.Box();
+  if (this->Region.Size() == 0)
+  {
+    return None;
+  }
+  std::array<int, 6> range;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const double steps = reach / this->Spacing[axis] + 0.5;
+    range[2 * axis] =
+      static_cast<int>(std::max<double>(box[2 * axis], std::ceil(index[axis] - steps)));
+    range[2 * axis + 1] =
+      static_cast<int>(std::min<double>(box[2 * axis + 1], std::floor(index[axis] + steps)));
+  }
+  std::uint32_t nearest = None;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = range[4]; k <= range[5]; ++k)
+  {
+    for (int j = range[2]; j <= range[3]; ++j)
+    {
+      for (int i = range[0]; i <= range[1]; ++i)
+      {
+        const std::uint32_t number = this->Region.NumberOf(i, j, k);
+        if (number == None || (reachedOnly && !std::isfinite(this->Marching->Arrival()[number])))
+        {
+          continue;
+        }
+        const double distance = (Vector3(i, j, k) - index).cwiseProduct(this->Spacing).norm();
+        if (distance < least)
+        {
+          least = distance;
+          nearest = number;
+        }
+      }
+    }
+  }
+  return nearest;
+}
+
+bool Extractor::PlaceSeeds()
+{
+  const double reach = this->Settings.snapDistance > 0.0
+    ? this->Settings.snapDistance
+    : std::max(3.0 * this->Voxel, this->Lumen.reference.radius);
+  this->SeedMembers.assign(this->Input.seeds.size(), None);
+  this->SeedUsed.assign(this->Input.seeds.size(), 0);
+  bool any = false;
+  for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
+  {
+    CenterlineEnd& end = this->Result.seeds[s];
+    end.treeId = static_cast<int>(s);
+    const Vector3 index = this->ToIndex(this->Input.seeds[s]);
+    const std::string name = "seed " + std::to_string(s) + " at " + Text(this->Input.seeds[s]);
+    if (!this->InImage(index))
+    {
+      end.status = EndStatus::OutsideImage;
+      end.message = name + " lies outside the image";
+      continue;
+    }
+    this->SeedMembers[s] = this->NearestMember(index, reach, false);
+    if (this->SeedMembers[s] == None)
+    {
+      end.status = EndStatus::OutsideRegion;
+      std::ostringstream text;
+      text << name << " has no vessel within " << reach
+           << " mm: no voxel there is above the threshold";
+      end.message = text.str();
+      continue;
+    }
+    end.status = EndStatus::Reached;
+    this->SeedUsed[s] = 1;
+    any = true;
+  }
+  return any;
+}
+
+void Extractor::MarchFrom()
+{
+  const float* distance = this->Input.wallDistance ? this->Input.wallDistance
+    : this->Input.speed                            ? nullptr
+                                                   : this->MaskDistance.data();
+  const float* values = distance ? distance : this->Input.speed;
+  std::vector<float> speed(this->Region.Size());
+  const double shift = distance ? 0.75 * this->Voxel : 0.0;
+  this->Region.ForEach(
+    [&](std::uint32_t number, VoxelRegion::Address address)
+    {
+      const std::array<int, 3> index = this->Region.IndexOf(address);
+      speed[number] = values[this->Offset(index[0], index[1], index[2])];
+    });
+  // Relative to what vessels have here: the upper tenth.
+  std::vector<float> sorted = speed;
+  const std::size_t tenth = sorted.size() - 1 - sorted.size() / 10;
+  std::nth_element(
+    sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(tenth), sorted.end());
+  const double scale = std::max<double>(sorted[tenth] + shift, 1e-30);
+  const LumenReference& reference = this->Lumen.reference;
+  const double contrast = reference.lumen - reference.background;
+  this->Region.ForEach(
+    [&](std::uint32_t number, VoxelRegion::Address address)
+    {
+      const double relative = std::min(100.0, std::max(0.0, (speed[number] + shift) / scale));
+      double value = 0.01 + std::pow(relative, this->Settings.speedExponent);
+      if (this->Input.intensity && contrast > 0.0)
+      {
+        const std::array<int, 3> index = this->Region.IndexOf(address);
+        const double bright =
+          (this->Image->At(this->Input.grid.IndexToWorld(index[0], index[1], index[2])) -
+            reference.background) /
+          contrast;
+        const double likely = std::min(1.0, std::max(0.1, bright / 0.7));
+        value *= likely * likely;
+      }
+      speed[number] = static_cast<float>(value);
+    });
+
+  FastMarchingSettings settings;
+  settings.spacing = this->Spacing;
+  bool timedOut = false;
+  settings.goOn = [&](std::uint32_t)
+  {
+    timedOut = this->OutOfTime();
+    return !timedOut;
+  };
+  std::vector<FastMarchingSource> sources;
+  for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
+  {
+    if (this->SeedUsed[s])
+    {
+      // The fastest way begins at the given point if that is in a vessel, else beside it.
+      const Vector3 index = this->ToIndex(this->Input.seeds[s]);
+      const std::uint32_t here = this->Region.NumberOf(static_cast<int>(std::lround(index[0])),
+        static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])));
+      FastMarchingSource source{ index, static_cast<int>(s) };
+      if (here == None)
+      {
+        this->Region.ForEach(
+          [&](std::uint32_t number, VoxelRegion::Address address)
+          {
+            if (number == this->SeedMembers[s])
+            {
+              const std::array<int, 3> at = this->Region.IndexOf(address);
+              source.index = Vector3(at[0], at[1], at[2]);
+            }
+          });
+      }
+      sources.push_back(source);
+    }
+  }
+  const ProgressCallback progress = this->Progress
+    ? ProgressCallback([&](double fraction) { return this->Progress(0.1 + 0.5 * fraction); })
+    : ProgressCallback();
+  this->Marching =
+    std::make_unique<FastMarching>(this->Region, std::move(speed), settings, progress);
+  this->Marching->March(sources);
+  if (timedOut)
+  {
+    this->Result.complete = false;
+    std::ostringstream text;
+    text << "stopped by the time limit of " << this->Settings.timeLimit
+         << " s while marching: parts of the trees may be missing";
+    this->Result.messages.push_back(text.str());
+  }
+  this->Result.memory = this->Marching->MemorySize() +
+    this->Region.Size() * (sizeof(float) + sizeof(std::int32_t)) +
+    this->MaskImage.size() * sizeof(std::int16_t) + this->MaskDistance.size() * sizeof(float);
+}
+
+bool Extractor::Gradient(const Vector3& index, Vector3& gradient) const
+{
+  const std::vector<float>& arrival = this->Marching->Arrival();
+  gradient.setZero();
+  double total = 0.0;
+  const int base[3] = { static_cast<int>(std::floor(index[0])),
+    static_cast<int>(std::floor(index[1])), static_cast<int>(std::floor(index[2])) };
+  for (int corner = 0; corner < 8; ++corner)
+  {
+    int at[3];
+    double weight = 1.0;
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const int up = corner >> axis & 1;
+      at[axis] = base[axis] + up;
+      const double fraction = index[axis] - base[axis];
+      weight *= up ? fraction : 1.0 - fraction;
+    }
+    if (weight <= 0.0 || !this->Region.InBox(at[0], at[1], at[2]))
+    {
+      continue;
+    }
+    const VoxelRegion::Address address = this->Region.AddressOf(at[0], at[1], at[2]);
+    const std::uint32_t centre = this->Region.Number(address);
+    if (centre == None || !std::isfinite(arrival[centre]))
+    {
+      continue;
+    }
+    total += weight;
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const std::uint32_t below = this->Region.Number(this->Region.Below(address, axis));
+      const std::uint32_t above = this->Region.Number(this->Region.Above(address, axis));
+      const double here = arrival[centre];
+      const bool low = below != None && std::isfinite(arrival[below]);
+      const bool high = above != None && std::isfinite(arrival[above]);
+      const double down = low ? here - arrival[below] : 0.0;
+      const double up = high ? arrival[above] - here : 0.0;
+      gradient[axis] +=
+        weight * (low && high ? 0.5 * (down + up) : down + up) / this->Spacing[axis];
+    }
+  }
+  if (!(total > 0.0) || !(gradient.norm() > 0.0))
+  {
+    return false;
+  }
+  gradient.normalize();
+  return true;
+}
+
+Way Extractor::WayBack(const Vector3& from, std::uint32_t member) const
+{
+  const std::vector<float>& arrival = this->Marching->Arrival();
+  const int label = this->Marching->Source()[member];
+  const Vector3 source =
+    this->ToIndex(this->Input.seeds[static_cast<std::size_t>(label)]).cwiseProduct(this->Spacing);
+  const auto memberAt = [&](const Vector3& frame)
+  {
+    const Vector3 index = frame.cwiseQuotient(this->Spacing);
+    const std::uint32_t number = this->Region.NumberOf(static_cast<int>(std::lround(index[0])),
+      static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])));
+    return number != None && std::isfinite(arrival[number]) ? number : None;
+  };
+
+  Way way;
+  Vector3 at = from.cwiseProduct(this->Spacing);
+  way.points.push_back(at);
+  std::uint32_t here = member;
+  // The earliest voxel on the way so far, and where the way was there.
+  std::uint32_t earliest = member;
+  std::size_t earliestSize = 1;
+  int idle = 0;
+  const double step = 0.3 * this->Finest;
+  const double near = 1.5 * this->Spacing.maxCoeff();
+  for (;;)
+  {
+    if (this->Owner[here] != NoOwner)
+    {
+      way.owner = this->Owner[here];
+      return way;
+    }
+    if ((at - source).norm() < near || arrival[here] <= 0.0F)
+    {
+      way.points.push_back(source);
+      return way;
+    }
+    // Fourth-order Runge-Kutta along the direction of steepest descent.
+    const auto direction = [&](const Vector3& frame, Vector3& result)
+    { return this->Gradient(frame.cwiseQuotient(this->Spacing), result); };
+    Vector3 k1;
+    Vector3 k2;
+    Vector3 k3;
+    Vector3 k4;
+    bool moved = false;
+    if (idle < 10 && direction(at, k1) && direction(at - 0.5 * step * k1, k2) &&
+      direction(at - 0.5 * step * k2, k3) && direction(at - step * k3, k4))
+    {
+      const Vector3 next = at - step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+      const std::uint32_t there = memberAt(next);
+      if (there != None && (next - at).norm() > 0.3 * step)
+      {
+        at = next;
+        here = there;
+        moved = true;
+        ++idle;
+        way.points.push_back(at);
+        if (arrival[here] < arrival[earliest])
+        {
+          earliest = here;
+          earliestSize = way.points.size();
+          idle = 0;
+        }
+      }
+    }
+    if (!moved)
+    {
+      // In a kink or on a plateau the descent goes to and fro: from its earliest voxel to the
+      // earliest neighbour. So every ten steps the way comes to an earlier voxel, and ends.
+      idle = 0;
+      way.points.resize(earliestSize);
+      const Vector3 index = way.points.back().cwiseQuotient(this->Spacing);
+      std::uint32_t best = earliest;
+      for (int k = -1; k <= 1; ++k)
+      {
+        for (int j = -1; j <= 1; ++j)
+        {
+          for (int i = -1; i <= 1; ++i)
+          {
+            const Vector3 next(
+              std::lround(index[0]) + i, std::lround(index[1]) + j, std::lround(index[2]) + k);
+            const std::uint32_t number = this->Region.NumberOf(
+              static_cast<int>(next[0]), static_cast<int>(next[1]), static_cast<int>(next[2]));
+            if (number != None && arrival[number] < arrival[best])
+            {
+              best = number;
+              at = next.cwiseProduct(this->Spacing);
+            }
+          }
+        }
+      }
+      if (best == earliest)
+      {
+        // A source's own voxel, or a hollow that rounding made.
+        way.closed = (way.points.back() - source).norm() < 4.0 * near;
+        way.points.push_back(source);
+        return way;
+      }
+      here = best;
+      earliest = best;
+      way.points.push_back(at);
+      earliestSize = way.points.size();
+    }
+  }
+}
+
+std::vector<Vector3> Extractor::Tangents(const std::vector<Vector3>& points) const
+{
+  std::vector<Vector3> tangents(points.size());
+  const auto last = static_cast<std::ptrdiff_t>(points.size()) - 1;
+  const auto reach = std::max<std::ptrdiff_t>(1, std::lround(1.5 * this->Voxel / this->Step));
+  for (std::ptrdiff_t i = 0; i <= last; ++i)
+  {
+    const Vector3 chord = points[static_cast<std::size_t>(std::min(last, i + reach))] -
+      points[static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, i - reach))];
+    tangents[static_cast<std::size_t>(i)] =
+      chord.norm() > 0.0 ? Vector3(chord.normalized()) : Vector3::UnitX();
+  }
+  return tangents;
+}
+
+void Extractor::Measure(Course& course, bool move) const
+{
+  const std::vector<Vector3> tangents = this->Tangents(course.points);
+  course.radius.resize(course.size(), this->Voxel);
+  course.confidence.resize(course.size(), 0.0);
+  course.lumen.resize(course.size(), 0.0);
+  course.behind.resize(course.size(), 0.0);
+  std::vector<LumenSection> sections(course.size());
+  ParallelFor(static_cast<std::int64_t>(course.size()), 16,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        const auto p = static_cast<std::size_t>(i);
+        sections[p] = MeasureLumen(*this->Image, course.points[p], tangents[p],
+          std::max(course.radius[p], this->Voxel), this->Lumen);
+      }
+    });
+  for (std::size_t i = 0; i < course.size(); ++i)
+  {
+    const LumenSection& section = sections[i];
+    const double shift = (section.centre - course.points[i]).norm();
+    course.confidence[i] = section.confidence;
+    course.lumen[i] = section.lumen;
+    course.behind[i] = section.behind;
+    if (section.confidence > 0.0)
+    {
+      course.radius[i] = section.radius;
+      // A centre that is another vessel's.
+      if (shift > 1.5 * section.radius + this->Voxel)
+      {
+        course.confidence[i] = 0.0;
+      }
+      else if (move)
+      {
+        course.points[i] = section.centre;
+      }
+    }
+  }
+}
+
+void Extractor::SmoothPositions(Course& course, double start, double end) const
+{
+  std::vector<double> weights(course.size());
+  for (std::size_t i = 0; i < course.size(); ++i)
+  {
+    weights[i] = std::max(0.01, course.confidence[i]);
+  }
+  weights.front() = std::max(weights.front(), start);
+  weights.back() = std::max(weights.back(), end);
+  const double wavelength =
+    this->Settings.smoothing > 0.0 ? this->Settings.smoothing : 12.0 * this->Voxel;
+  course.points = SmoothCurve(course.points, weights, wavelength / this->Step);
+}
+
+void Extractor::SmoothRadii(Course& course) const
+{
+  std::vector<double> weights(course.size());
+  for (std::size_t i = 0; i < course.size(); ++i)
+  {
+    weights[i] = course.confidence[i] * course.confidence[i];
+  }
+  if (*std::max_element(weights.begin(), weights.end()) <= 0.0)
+  {
+    return;
+  }
+  const double wavelength =
+    this->Settings.smoothing > 0.0 ? this->Settings.smoothing : 12.0 * this->Voxel;
+  std::vector<double> smooth = SmoothSequence(course.radius, weights, wavelength / this->Step);
+  for (int pass = 0; pass < 2; ++pass)
+  {
+    std::vector<double> robust = weights;
+    for (std::size_t i = 0; i < course.size(); ++i)
+    {
+      const double residual = (course.radius[i] - smooth[i]) / std::max(0.15 * smooth[i], 1e-12);
+      robust[i] /= 1.0 + residual * residual;
+    }
+    smooth = SmoothSequence(course.radius, robust, wavelength / this->Step);
+  }
+  // Ends without a measurement follow a straight line: not beyond what was seen.
+  double low = std::numeric_limits<double>::infinity();
+  double high = 0.0;
+  for (std::size_t i = 0; i < course.size(); ++i)
+  {
+    if (weights[i] > 0.0)
+    {
+      low = std::min(low, course.radius[i]);
+      high = std::max(high, course.radius[i]);
+    }
+  }
+  for (std::size_t i = 0; i < course.size(); ++i)
+  {
+    course.radius[i] = std::min(high, std::max(low, smooth[i]));
+  }
+}
+
+/// An ostium is at the edge of the aorta, its surroundings are not a vessel's: once a whole vessel is
+/// known, its lumen is what others are compared with.
+void Extractor::Calibrate(const Course& course)
+{
+  if (!std::isnan(this->Lumen.level))
+  {
+    return;
+  }
+  std::vector<double> values;
+  std::vector<double> behind;
+  for (std::size_t i = 0; i < course.size(); ++i)
+  {
+    if (course.confidence[i] > 0.8)
+    {
+      values.push_back(course.lumen[i]);
+      behind.push_back(course.behind[i]);
+    }
+  }
+  if (values.size() >= 10)
+  {
+    const auto quartile = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 3 / 4);
+    std::nth_element(values.begin(), quartile, values.end());
+    this->Lumen.reference.lumen = std::max(this->Lumen.reference.lumen, *quartile);
+    // The darkest surroundings: elsewhere muscle may lie against the vessel.
+    const auto dark = behind.begin() + static_cast<std::ptrdiff_t>(behind.size() / 4);
+    std::nth_element(behind.begin(), dark, behind.end());
+    this->Lumen.reference.background = *dark;
+    this->Calibrated = true;
+  }
+}
+
+/// Half-maximum radii to true ones. How blurred the image is shows in the small vessels: the less
+/// of the great vessels' contrast they have at their size, the more.
+void Extractor::CorrectRadii()
+{
+  if (!this->Input.intensity)
+  {
+    return;
+  }
+  const LumenReference& reference = this->Lumen.reference;
+  const double contrast = reference.lumen - reference.background;
+  if (this->Settings.blur == 0.0 && contrast > 0.0)
+  {
+    std::vector<double> blurs;
+    for (std::size_t p = 0; p < this->Tree.points.size(); ++p)
+    {
+      const double share = (this->PointLumen[p] - reference.background) / contrast;
+      if (this->Tree.confidence[p] > 0.8 && share > 0.4 && share < 0.85)
+      {
+        blurs.push_back(BlurFromContrast(this->Tree.radius[p], share));
+      }
+    }
+    if (blurs.size() >= 20)
+    {
+      const auto middle = blurs.begin() + static_cast<std::ptrdiff_t>(blurs.size() / 2);
+      std::nth_element(blurs.begin(), middle, blurs.end());
+      this->Blur = std::min(std::max(*middle, 0.4 * this->Voxel), 2.0 * this->Voxel);
+    }
+  }
+  this->Result.blur = this->Blur;
+  for (double& radius : this->Tree.radius)
+  {
+    radius = RadiusFromHalfMaximum(radius, this->Blur);
+  }
+}
+
+/// @returns the number of samples up to where a vessel is seen, 0 if there is none
+std::size_t Extractor::SeenUpTo(const Course& course, double parentRadius) const
+{
+  const double gap =
+    this->Settings.maximumGap > 0.0 ? this->Settings.maximumGap : 10.0 * this->Voxel;
+  // Next to its parent no section is a vessel of its own.
+  const auto first = static_cast<std::size_t>(parentRadius / this->Step);
+  // Where the sum of what speaks for a vessel and what speaks against it is greatest.
+  std::size_t end = 0;
+  double greatest = 0.0;
+  double sum = 0.0;
+  double unseen = 0.0;
+  for (std::size_t i = first; i < course.size(); ++i)
+  {
+    const double evidence = course.confidence[i] - this->Settings.minimumConfidence;
+    sum += evidence;
+    unseen = evidence < 0.0 ? unseen + this->Step : 0.0;
+    if (unseen > gap)
+    {
+      break;
+    }
+    if (sum > greatest)
+    {
+      greatest = sum;
+      end = i + 1;
+    }
+  }
+  // On the whole a vessel: a quarter of what a perfect one would bring.
+  const double perfect = (1.0 - this->Settings.minimumConfidence) *
+    (static_cast<double>(end) - static_cast<double>(std::min(first, end)));
+  return greatest >= 0.25 * perfect ? end : 0;
+}
+
+/// Replaces the part of a course inside its parent's lumen by the meeting of the two axes.
+/// @returns the index of the parent's point in the tree
+std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
+{
+  const auto parent = static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(owner)]);
+  const std::vector<std::int64_t>& chain = this->Tree.branches[parent].points;
+  const auto meeting = std::find(chain.begin(), chain.end(), owner) - chain.begin();
+  const double parentRadius = this->Tree.radius[static_cast<std::size_t>(owner)];
+  const auto window =
+    static_cast<std::ptrdiff_t>(std::ceil((3.5 * parentRadius + 3.0 * this->Voxel) / this->Step));
+  const auto low = std::max<std::ptrdiff_t>(0, meeting - window);
+  const auto high =
+    std::min<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(chain.size()) - 1, meeting + window);
+
+  const auto outside = [&](const Vector3& point)
+  {
+    // In units of the parent's radius.
+    double least = std::numeric_limits<double>::infinity();
+    for (std::ptrdiff_t i = low; i <= high; ++i)
+    {
+      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      least = std::min(least, (point - this->Tree.points[p]).norm() / this->Tree.radius[p]);
+    }
+    return least;
+  };
+
+  // The first part that is clearly a vessel of its own.
+  std::size_t first = 0;
+  while (first + 1 < course.size() && outside(course.points[first]) < 1.15)
+  {
+    ++first;
+  }
+  std::size_t good = first;
+  while (good < course.size() && course.confidence[good] < this->Settings.minimumConfidence)
+  {
+    ++good;
+  }
+  if (good >= course.size())
+  {
+    good = std::min(first, course.size() - 1);
+  }
+  const double length = 2.5 * std::max(course.radius[good], this->Voxel);
+  std::vector<Vector3> samples;
+  for (std::size_t i = good; i < course.size() && (i - good) * this->Step <= length; ++i)
+  {
+    if (course.confidence[i] >= this->Settings.minimumConfidence || i == good)
+    {
+      samples.push_back(course.points[i]);
+    }
+  }
+  auto best = static_cast<std::size_t>(owner);
+  double least = std::numeric_limits<double>::infinity();
+  if (samples.size() >= 3)
+  {
+    Vector3 mean = Vector3::Zero();
+    for (const Vector3& sample : samples)
+    {
+      mean += sample / static_cast<double>(samples.size());
+    }
+    const Vector3 direction = (samples.back() - samples.front()).normalized();
+    for (std::ptrdiff_t i = low; i <= high; ++i)
+    {
+      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      // Behind the daughter's beginning, and not far away.
+      const double along = (this->Tree.points[p] - samples.front()).dot(direction);
+      const double distance = LineDistance(this->Tree.points[p], mean, direction) +
+        (along > 0.0 ? 2.0 * along : 0.0) - 0.02 * along;
+      if (distance < least)
+      {
+        least = distance;
+        best = p;
+      }
+    }
+  }
+  if (least > 1.2 * parentRadius + this->Voxel)
+  {
+    least = std::numeric_limits<double>::infinity();
+    for (std::ptrdiff_t i = low; i <= high; ++i)
+    {
+      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      const double distance = (this->Tree.points[p] - course.points[good]).norm();
+      if (distance < least)
+      {
+        least = distance;
+        best = p;
+      }
+    }
+  }
+
+  // A straight line from axis to axis; its samples are guesses.
+  Course joined;
+  const std::vector<Vector3> bridge =
+    ResampleCurve({ this->Tree.points[best], course.points[good] }, this->Step);
+  for (std::size_t i = 0; i + 1 < bridge.size(); ++i)
+  {
+    joined.points.push_back(bridge[i]);
+    joined.radius.push_back(course.radius[good]);
+    joined.confidence.push_back(0.0);
+    joined.lumen.push_back(0.0);
+  }
+  joined.points.insert(joined.points.end(),
+    course.points.begin() + static_cast<std::ptrdiff_t>(good), course.points.end());
+  joined.radius.insert(joined.radius.end(),
+    course.radius.begin() + static_cast<std::ptrdiff_t>(good), course.radius.end());
+  joined.confidence.insert(joined.confidence.end(),
+    course.confidence.begin() + static_cast<std::ptrdiff_t>(good), course.confidence.end());
+  joined.lumen.insert(joined.lumen.end(), course.lumen.begin() + static_cast<std::ptrdiff_t>(good),
+    course.lumen.end());
+  course = std::move(joined);
+  return best;
+}
+
+/// @returns the last point of the new branch in the tree, or -1 if there is none
+std::int64_t Extractor::Append(const Way& way, int treeId, bool wanted)
+{
+  if (!way.closed)
+  {
+    return -1;
+  }
+  std::vector<Vector3> points(way.points.rbegin(), way.points.rend());
+  for (Vector3& point : points)
+  {
+    point = this->FrameToWorld(point);
+  }
+  Course course;
+  course.points = ResampleCurve(points, this->Step);
+  if (course.size() < 3)
+  {
+    return -1;
+  }
+  const bool root = way.owner == NoOwner;
+  const double parentRadius = root ? 0.0 : this->Tree.radius[static_cast<std::size_t>(way.owner)];
+  const double least = this->Settings.minimumBranchLength > 0.0
+    ? this->Settings.minimumBranchLength
+    : std::max(10.0 * this->Voxel, 1.5 * parentRadius);
+  if (!wanted && (course.size() - 1) * this->Step < least)
+  {
+    return -1;
+  }
+
+  // Steps of voxels gone; then the sections of a path that is still off the axis.
+  course.confidence.assign(course.size(), 1.0);
+  this->SmoothPositions(course, 10.0, 10.0);
+  this->Measure(course, this->Settings.snap);
+  if (!wanted)
+  {
+    const std::size_t end = this->SeenUpTo(course, root ? this->Lumen.maximumRadius : parentRadius);
+    course.resize(end);
+    if ((static_cast<double>(end) - 1.0) * this->Step < least)
+    {
+      return -1;
+    }
+  }
+  if (root && !this->Calibrated)
+  {
+    this->Calibrate(course);
+  }
+  if (this->Settings.snap)
+  {
+    for (int round = 0; round < 2; ++round)
+    {
+      this->SmoothPositions(course, root ? 0.05 : 0.0, 0.0);
+      course.points = ResampleCurve(course.points, this->Step);
+      course.resize(course.points.size());
+      this->Measure(course, true);
+    }
+  }
+  std::int64_t start = -1;
+  if (!root)
+  {
+    start = static_cast<std::int64_t>(this->JoinParent(course, way.owner));
+  }
+  if (course.size() < 3)
+  {
+    return -1;
+  }
+  if (this->Settings.snap)
+  {
+    this->SmoothPositions(course, root ? 0.05 : 1e3, 0.0);
+  }
+  this->SmoothRadii(course);
+
+  CenterlineTree::Branch branch;
+  branch.groupId = static_cast<int>(this->Tree.branches.size());
+  branch.treeId = treeId;
+  if (!root)
+  {
+    branch.parentGroupId = this->BranchOf[static_cast<std::size_t>(start)];
+    branch.points.push_back(start);
+  }
+  for (std::size_t i = root ? 0 : 1; i < course.size(); ++i)
+  {
+    branch.points.push_back(static_cast<std::int64_t>(this->Tree.points.size()));
+    this->Tree.points.push_back(course.points[i]);
+    this->Tree.radius.push_back(course.radius[i]);
+    this->Tree.confidence.push_back(course.confidence[i]);
+    this->PointLumen.push_back(course.lumen[i]);
+    this->BranchOf.push_back(branch.groupId);
+  }
+  this->Tree.branches.push_back(branch);
+  this->Own(this->Tree.branches.size() - 1);
+  return branch.points.back();
+}
+
+void Extractor::Own(std::size_t index)
+{
+  const CenterlineTree::Branch& branch = this->Tree.branches[index];
+  for (const std::int64_t p : branch.points)
+  {
+    const auto point = static_cast<std::size_t>(p);
+    const Vector3 centre = this->ToIndex(this->Tree.points[point]);
+    const double own = this->Tree.radius[point] + 0.25 * this->Voxel;
+    const double cover = 1.3 * this->Tree.radius[point] + 1.5 * this->Voxel;
+    const std::array<int, 6>& box = this->Region.Box();
+    int range[6];
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const double steps = cover / this->Spacing[axis];
+      range[2 * axis] =
+        static_cast<int>(std::max<double>(box[2 * axis], std::ceil(centre[axis] - steps)));
+      range[2 * axis + 1] =
+        static_cast<int>(std::min<double>(box[2 * axis + 1], std::floor(centre[axis] + steps)));
+    }
+    for (int k = range[4]; k <= range[5]; ++k)
+    {
+      for (int j = range[2]; j <= range[3]; ++j)
+      {
+        for (int i = range[0]; i <= range[1]; ++i)
+        {
+          const std::uint32_t number = this->Region.NumberOf(i, j, k);
+          if (number == None)
+          {
+            continue;
+          }
+          const double distance = (Vector3(i, j, k) - centre).cwiseProduct(this->Spacing).norm();
+          if (distance > cover)
+          {
+            continue;
+          }
+          this->Covered[number] = true;
+          if (distance <= own)
+          {
+            const std::int32_t old = this->Owner[number];
+            if (old == NoOwner ||
+              distance <
+                (Vector3(i, j, k) - this->ToIndex(this->Tree.points[static_cast<std::size_t>(old)]))
+                  .cwiseProduct(this->Spacing)
+                  .norm())
+            {
+              this->Owner[number] = static_cast<std::int32_t>(p);
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+void Extractor::FindTips()
+{
+  // Tips are where the fastest path is longest among all neighbours.
+  const std::vector<float>& length = this->Marching->Length();
+  struct Tip
+  {
+    float length;
+    std::uint32_t number;
+    VoxelRegion::Address address;
+  };
+  std::vector<Tip> tips;
+  const double least = this->Settings.minimumBranchLength > 0.0 ? this->Settings.minimumBranchLength
+                                                                : 10.0 * this->Voxel;
+  this->Region.ForEach(
+    [&](std::uint32_t number, VoxelRegion::Address address)
+    {
+      if (!std::isfinite(length[number]) || length[number] < least)
+      {
+        return;
+      }
+      for (int k = 0; k < 3; ++k)
+      {
+        for (int j = 0; j < 3; ++j)
+        {
+          for (int i = 0; i < 3; ++i)
+          {
+            VoxelRegion::Address near = address;
+            near = i == 0 ? this->Region.Below(near, 0)
+              : i == 2    ? this->Region.Above(near, 0)
+                          : near;
+            near = j == 0 ? this->Region.Below(near, 1)
+              : j == 2    ? this->Region.Above(near, 1)
+                          : near;
+            near = k == 0 ? this->Region.Below(near, 2)
+              : k == 2    ? this->Region.Above(near, 2)
+                          : near;
+            const std::uint32_t other = this->Region.Number(near);
+            if (other != None && std::isfinite(length[other]) && length[other] > length[number])
+            {
+              return;
+            }
+          }
+        }
+      }
+      tips.push_back({ length[number], number, address });
+    });
+  std::sort(tips.begin(), tips.end(),
+    [](const Tip& a, const Tip& b)
+    { return a.length != b.length ? a.length > b.length : a.number < b.number; });
+
+  std::size_t done = 0;
+  for (const Tip& tip : tips)
+  {
+    Report(
+      this->Progress, 0.6 + 0.38 * static_cast<double>(done++) / static_cast<double>(tips.size()));
+    if (this->Covered[tip.number])
+    {
+      continue;
+    }
+    if (this->OutOfTime())
+    {
+      this->Result.complete = false;
+      std::ostringstream text;
+      text << "stopped by the time limit of " << this->Settings.timeLimit
+           << " s while following branches: " << tips.size() - done
+           << " possible tips were not looked at";
+      this->Result.messages.push_back(text.str());
+      return;
+    }
+    const std::array<int, 3> index = this->Region.IndexOf(tip.address);
+    const Way way = this->WayBack(Vector3(index[0], index[1], index[2]), tip.number);
+    if (this->Append(way, this->Marching->Source()[tip.number], false) >= 0)
+    {
+      continue;
+    }
+    // Tips beside this one share its way, and what was seen along it.
+    for (std::size_t p = 0; p < way.points.size() / 2; ++p)
+    {
+      const Vector3 centre = way.points[p].cwiseQuotient(this->Spacing);
+      for (int near = 0; near < 27; ++near)
+      {
+        const std::uint32_t number =
+          this->Region.NumberOf(static_cast<int>(std::lround(centre[0])) + near % 3 - 1,
+            static_cast<int>(std::lround(centre[1])) + near / 3 % 3 - 1,
+            static_cast<int>(std::lround(centre[2])) + near / 9 - 1);
+        if (number != None)
+        {
+          this->Covered[number] = true;
+        }
+      }
+    }
+  }
+}
+
+void Extractor::FollowTargets()
+{
+  const double reach = this->Settings.snapDistance > 0.0
+    ? this->Settings.snapDistance
+    : std::max(3.0 * this->Voxel, this->Lumen.reference.radius);
+  for (std::size_t t = 0; t < this->Input.targets.size(); ++t)
+  {
+    CenterlineEnd& end = this->Result.targets[t];
+    const Vector3 index = this->ToIndex(this->Input.targets[t]);
+    const std::string name = "target " + std::to_string(t) + " at " + Text(this->Input.targets[t]);
+    if (!this->InImage(index))
+    {
+      end.status = EndStatus::OutsideImage;
+      end.message = name + " lies outside the image";
+      continue;
+    }
+    const std::uint32_t nearest = this->NearestMember(index, reach, false);
+    if (nearest == None)
+    {
+      end.status = EndStatus::OutsideRegion;
+      std::ostringstream text;
+      text << name << " has no vessel within " << reach
+           << " mm: no voxel there is above the threshold";
+      end.message = text.str();
+      continue;
+    }
+    const std::uint32_t member = this->NearestMember(index, reach, true);
+    if (member == None)
+    {
+      end.status = this->Result.complete ? EndStatus::NotConnected : EndStatus::LimitReached;
+      end.message = name +
+        (this->Result.complete ? " can not be reached from any seed through vessels"
+                               : " was not reached before the limit");
+      continue;
+    }
+    end.treeId = this->Marching->Source()[member];
+    const std::uint32_t here = this->Region.NumberOf(static_cast<int>(std::lround(index[0])),
+      static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])));
+    Vector3 from = index;
+    if (here != member)
+    {
+      this->Region.ForEach(
+        [&](std::uint32_t number, VoxelRegion::Address address)
+        {
+          if (number == member)
+          {
+            const std::array<int, 3> at = this->Region.IndexOf(address);
+            from = Vector3(at[0], at[1], at[2]);
+          }
+        });
+    }
+    if (this->Owner[member] != NoOwner)
+    {
+      end.status = EndStatus::Reached;
+      end.point = this->Owner[member];
+      continue;
+    }
+    end.point = this->Append(this->WayBack(from, member), end.treeId, true);
+    end.status = end.point >= 0 ? EndStatus::Reached : EndStatus::TooShort;
+    if (end.point < 0)
+    {
+      end.message = name + " lies in the lumen of its seed or branch: there is no path to draw";
+    }
+  }
+}
+
+void Extractor::Finish()
+{
+  for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
+  {
+    for (const CenterlineTree::Branch& branch : this->Tree.branches)
+    {
+      if (branch.parentGroupId == -1 && branch.treeId == static_cast<int>(s))
+      {
+        this->Result.seeds[s].point = branch.points.front();
+        break;
+      }
+    }
+    if (this->SeedUsed[s] && this->Result.seeds[s].point < 0)
+    {
+      this->Result.seeds[s].status = EndStatus::TooShort;
+      this->Result.seeds[s].message = "seed " + std::to_string(s) + " at " +
+        Text(this->Input.seeds[s]) + " has no branch that is long and clear enough";
+    }
+  }
+  this->CorrectRadii();
+  this->Result.tree = SplitAtBifurcations(this->Tree);
+  std::map<std::int64_t, CenterlineBifurcation> joints;
+  for (const CenterlineTree::Branch& branch : this->Result.tree.branches)
+  {
+    if (branch.parentGroupId != -1)
+    {
+      CenterlineBifurcation& joint = joints[branch.points.front()];
+      joint.point = branch.points.front();
+      joint.parentGroupId = branch.parentGroupId;
+      joint.daughterGroupIds.push_back(branch.groupId);
+    }
+  }
+  for (const auto& [point, joint] : joints)
+  {
+    this->Result.bifurcations.push_back(joint);
+  }
+}
+
+CenterlineResult Extractor::Run()
+{
+  this->Result.seeds.resize(this->Input.seeds.size());
+  this->Result.targets.resize(this->Input.targets.size());
+  this->PrepareMeasurement();
+  Report(this->Progress, 0.05);
+  this->MakeRegion();
+  Report(this->Progress, 0.1);
+  if (this->Region.Size() == 0)
+  {
+    this->Result.messages.emplace_back(
+      "there is no voxel above the threshold: nothing to march in");
+  }
+  if (this->Region.Size() > this->Settings.voxelLimit)
+  {
+    this->Result.complete = false;
+    this->Result.messages.push_back("the region has " + std::to_string(this->Region.Size()) +
+      " voxels, more than the limit of " + std::to_string(this->Settings.voxelLimit) +
+      ": raise the threshold, or give a mask");
+    for (std::vector<CenterlineEnd>* ends : { &this->Result.seeds, &this->Result.targets })
+    {
+      for (CenterlineEnd& end : *ends)
+      {
+        end.status = EndStatus::LimitReached;
+        end.message = "not followed: the region is larger than the limit";
+      }
+    }
+    return this->Result;
+  }
+  const bool any = this->PlaceSeeds();
+  if (any)
+  {
+    this->MarchFrom();
+    this->Owner.assign(this->Region.Size(), NoOwner);
+    this->Covered.assign(this->Region.Size(), false);
+    if (this->Settings.findTips || this->Input.targets.empty())
+    {
+      this->FindTips();
+    }
+    this->FollowTargets();
+  }
+  else
+  {
+    for (std::size_t t = 0; t < this->Input.targets.size(); ++t)
+    {
+      this->Result.targets[t].message =
+        "target " + std::to_string(t) + " can not be reached: no seed lies in a vessel";
+    }
+  }
+  this->Finish();
+  Report(this->Progress, 1.0);
+  return this->Result;
+}
+}
+
+void CenterlineSettings::Validate() const
+{
+  const auto length = [](double value, const char* name)
+  { Require(std::isfinite(value) && value >= 0.0, std::string(name) + " must not be negative"); };
+  Require(!std::isinf(this->speedThreshold), "speedThreshold must be finite");
+  Require(!std::isinf(this->intensityThreshold), "intensityThreshold must be finite");
+  Require(
+    this->speedExponent >= 0.5 && this->speedExponent <= 6.0, "speedExponent must be 0.5 to 6");
+  Require(this->minimumConfidence >= 0.0 && this->minimumConfidence <= 1.0,
+    "minimumConfidence must be 0 to 1");
+  length(this->minimumBranchLength, "minimumBranchLength");
+  length(this->maximumGap, "maximumGap");
+  length(this->maximumRadius, "maximumRadius");
+  length(this->resampling, "resampling");
+  length(this->smoothing, "smoothing");
+  length(this->blur, "blur");
+  length(this->snapDistance, "snapDistance");
+  Require(this->timeLimit > 0.0, "timeLimit must be positive");
+  Require(this->voxelLimit > 0, "voxelLimit must be positive");
+}
+
+const char* EndStatusText(EndStatus status)
+{
+  switch (status)
+  {
+    case EndStatus::Reached:
+      return "reached";
+    case EndStatus::OutsideImage:
+      return "outside the image";
+    case EndStatus::OutsideRegion:
+      return "no vessel there";
+    case EndStatus::NotConnected:
+      return "not connected";
+    case EndStatus::InOtherTree:
+      return "in another seed's vessel";
+    case EndStatus::LimitReached:
+      return "limit reached";
+    case EndStatus::TooShort:
+      return "too short";
+  }
+  return "";
+}
+
+CenterlineResult ExtractCenterlines(const CenterlineInput& input,
+  const CenterlineSettings& settings, const ProgressCallback& progress)
+{
+  settings.Validate();
+  const auto require = [](bool condition, const char* requirement)
+  {
+    if (!condition)
+    {
+      throw std::invalid_argument(std::string("CenterlineInput: ") + requirement);
+    }
+  };
+  require(input.speed || input.mask || input.wallDistance,
+    "a speed, a mask or a wall distance is needed");
+  require(!input.seeds.empty(), "at least one seed is needed");
+  require(input.seeds.size() < 255, "at most 254 seeds are possible");
+  require(input.grid.spacing.allFinite() && input.grid.spacing.minCoeff() > 0.0,
+    "spacing must be positive");
+  require(
+    (input.grid.direction.transpose() * input.grid.direction - Matrix3::Identity()).norm() < 1e-6,
+    "direction must be orthonormal");
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    require(input.grid.extent[2 * axis] <= input.grid.extent[2 * axis + 1], "the image is empty");
+  }
+  const auto finite = [](const Vector3& position) { return position.allFinite(); };
+  require(std::all_of(input.seeds.begin(), input.seeds.end(), finite), "seeds must be finite");
+  require(
+    std::all_of(input.targets.begin(), input.targets.end(), finite), "targets must be finite");
+  return Extractor(input, settings, progress).Run();
+}
+}

@@ -1,0 +1,457 @@
+#include "LumenMeasurement.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+
+namespace coronary
+{
+namespace
+{
+/// Fibonacci points on a sphere.
+Vector3 SphereDirection(int index, int count)
+{
+  const double z = 1.0 - (2.0 * index + 1.0) / count;
+  const double angle = index * 2.399963229728653;
+  const double r = std::sqrt(std::max(0.0, 1.0 - z * z));
+  return { r * std::cos(angle), r * std::sin(angle), z };
+}
+
+struct Wall
+{
+  double distance = 0.0; ///< mm; 0 where no wall was found
+  double behind = 0.0;   ///< least value behind it
+};
+
+/// First fall along a ray. Values are sampled every `step` up to `reach`.
+Wall FindWall(const ImageInterpolator& image, const Vector3& from, const Vector3& direction,
+  double lumen, double least, double floor, double step, double reach)
+{
+  constexpr int capacity = 512;
+  double values[capacity];
+  const int count = std::min(capacity, static_cast<int>(std::ceil(reach / step)) + 1);
+  values[0] = lumen;
+  double lowest = lumen;
+  int lowestAt = 0;
+  int known = 1;
+  for (int i = 1; i < count; ++i, ++known)
+  {
+    // Air behind the fat around a vessel is no part of its wall.
+    values[i] = std::max(floor, image.At(from + i * step * direction));
+    if (values[i] < lowest)
+    {
+      lowest = values[i];
+      lowestAt = i;
+    }
+    // Another bright thing behind the wall.
+    else if (lumen - lowest > least && values[i] > lowest + 0.25 * (lumen - lowest))
+    {
+      break;
+    }
+    // The fall is over.
+    else if (lumen - lowest > least && i - lowestAt > 5)
+    {
+      break;
+    }
+  }
+  if (lumen - lowest < least)
+  {
+    return {};
+  }
+  // The least value is the noise's; the wall's other side is the mean of the foot of the fall.
+  int foot = lowestAt;
+  while (foot > 1 && values[foot - 1] < lowest + 0.15 * (lumen - lowest))
+  {
+    --foot;
+  }
+  const int last = std::min(known - 1, lowestAt + 4);
+  double behind = 0.0;
+  int feet = 0;
+  for (int i = foot; i <= last && values[i] < lowest + 0.25 * (lumen - lowest); ++i, ++feet)
+  {
+    behind += values[i];
+  }
+  behind /= feet;
+  const double half = 0.5 * (lumen + behind);
+  for (int i = 1; i <= lowestAt; ++i)
+  {
+    if (values[i] <= half)
+    {
+      const double fraction = (values[i - 1] - half) / std::max(values[i - 1] - values[i], 1e-12);
+      return { (i - 1 + std::min(1.0, std::max(0.0, fraction))) * step, behind };
+    }
+  }
+  return {};
+}
+
+constexpr double TableStep = 0.05;
+
+/// Exponentially scaled modified Bessel function I0. Abramowitz and Stegun 9.8.1, 9.8.2.
+double ScaledBessel(double x)
+{
+  const auto polynomial = [](std::initializer_list<double> coefficients, double t)
+  {
+    double value = 0.0;
+    for (const double coefficient : coefficients)
+    {
+      value = value * t + coefficient;
+    }
+    return value;
+  };
+  if (x < 3.75)
+  {
+    return std::exp(-x) *
+      polynomial(
+        { 0.0045813, 0.0360768, 0.2659732, 1.2067492, 3.0899424, 3.5156229, 1.0 }, x * x / 14.0625);
+  }
+  return polynomial({ 0.00392377, -0.01647633, 0.02635537, -0.02057706, 0.00916281, -0.00157565,
+                      0.00225319, 0.01328592, 0.39894228 },
+           3.75 / x) /
+    std::sqrt(x);
+}
+
+/// Half-maximum radii of discs of radius TableStep, 2 TableStep, ... blurred by a Gaussian of
+/// standard deviation 1.
+const std::vector<double>& HalfMaxima()
+{
+  // The disc is integrated over rings; a ring's blurred profile is a Gaussian times I0.
+  const auto profile = [](double distance, double radius)
+  {
+    constexpr int pieces = 64;
+    double sum = 0.0;
+    for (int i = 0; i < pieces; ++i)
+    {
+      const double r = radius * (i + 0.5) / pieces;
+      sum += r * std::exp(-0.5 * (distance - r) * (distance - r)) * ScaledBessel(distance * r);
+    }
+    return sum * radius / pieces;
+  };
+  static const std::vector<double> table = [&]()
+  {
+    std::vector<double> values;
+    for (int i = 1; i <= 100; ++i)
+    {
+      const double radius = TableStep * i;
+      const double half = 0.5 * profile(0.0, radius);
+      double low = 0.0;
+      double high = radius + 3.0;
+      for (int step = 0; step < 40; ++step)
+      {
+        const double middle = 0.5 * (low + high);
+        (profile(middle, radius) > half ? low : high) = middle;
+      }
+      values.push_back(0.5 * (low + high));
+    }
+    return values;
+  }();
+  return table;
+}
+
+/// Crossing of a fixed level.
+Wall FindLevel(const ImageInterpolator& image, const Vector3& from, const Vector3& direction,
+  double centre, double level, double step, double reach)
+{
+  double previous = centre;
+  for (double s = step; s <= reach; s += step)
+  {
+    const double value = image.At(from + s * direction);
+    if (value <= level && previous > level)
+    {
+      return { s - step + step * (previous - level) / (previous - value), value };
+    }
+    previous = value;
+  }
+  return {};
+}
+}
+
+ImageInterpolator::ImageInterpolator(const ScalarImage& image)
+  : Image(image)
+{
+  const ImageGrid& grid = image.grid;
+  this->Inverse = grid.spacing.cwiseInverse().asDiagonal() * grid.direction.transpose();
+  const std::array<int, 3> size = image.Dimensions();
+  this->Steps = { 1, size[0], static_cast<std::int64_t>(size[0]) * size[1] };
+}
+
+bool ImageInterpolator::Contains(const Vector3& world) const
+{
+  const Vector3 index = this->ToIndex(world);
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    if (!(index[axis] >= this->Image.grid.extent[2 * axis] - 0.5) ||
+      !(index[axis] <= this->Image.grid.extent[2 * axis + 1] + 0.5))
+    {
+      return false;
+    }
+  }
+  return true;
+}
+
+double ImageInterpolator::At(const Vector3& world) const
+{
+  const Vector3 index = this->ToIndex(world);
+  std::int64_t offset = 0;
+  std::int64_t next[3];
+  double fraction[3];
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const int low = this->Image.grid.extent[2 * axis];
+    const int high = this->Image.grid.extent[2 * axis + 1];
+    const double x =
+      std::min(std::max(index[axis], static_cast<double>(low)), static_cast<double>(high));
+    const int floor = std::min(static_cast<int>(x), std::max(low, high - 1));
+    const int base = floor > x ? floor - 1 : floor;
+    fraction[axis] = x - base;
+    offset += (base - low) * this->Steps[axis];
+    next[axis] = base < high ? this->Steps[axis] : 0;
+  }
+  return std::visit(
+    [&](const auto* values)
+    {
+      const auto* v = values + offset;
+      const auto along = [&](std::int64_t o)
+      {
+        const double a = v[o];
+        return a + fraction[0] * (static_cast<double>(v[o + next[0]]) - a);
+      };
+      const auto plane = [&](std::int64_t o)
+      {
+        const double a = along(o);
+        return a + fraction[1] * (along(o + next[1]) - a);
+      };
+      const double a = plane(0);
+      return a + fraction[2] * (plane(next[2]) - a);
+    },
+    this->Image.values);
+}
+
+LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& position,
+  const Vector3& tangent, double radiusGuess, const LumenSettings& settings)
+{
+  const bool fixed = !std::isnan(settings.level);
+  const int rays = settings.rays;
+  const double step = 0.5 * image.SmallestSpacing();
+  const LumenReference& reference = settings.reference;
+  const double contrast = reference.lumen - reference.background;
+  const double floor = reference.background - 0.1 * contrast;
+
+  const Vector3 axis = tangent.normalized();
+  const Vector3 u = axis.unitOrthogonal();
+  const Vector3 v = axis.cross(u);
+  const auto direction = [&](int ray)
+  {
+    const double angle = 2.0 * M_PI * ray / rays;
+    return Vector3(std::cos(angle) * u + std::sin(angle) * v);
+  };
+
+  LumenSection section;
+  section.centre = position;
+  section.radius = radiusGuess;
+  const double reach = settings.maximumRadius + (fixed ? 0.0 : 3.0 * image.SmallestSpacing());
+  std::vector<Wall> walls(rays);
+  std::vector<char> good(rays);
+  double offCentre = 0.0;
+  double spread = 1.0;
+  double behind = 0.0;
+  int found = 0;
+  for (int iteration = 0; iteration < 4; ++iteration)
+  {
+    // The lumen's value over a small disc, which noise moves less than one point.
+    double lumen = image.At(section.centre);
+    const double disc = std::min(0.35 * section.radius, image.SmallestSpacing());
+    for (int ray = 0; ray < 8; ++ray)
+    {
+      const double angle = 2.0 * M_PI * ray / 8;
+      lumen += image.At(section.centre + disc * (std::cos(angle) * u + std::sin(angle) * v));
+    }
+    section.lumen = lumen / 9.0;
+
+    std::vector<double> distances;
+    for (int ray = 0; ray < rays; ++ray)
+    {
+      walls[ray] = fixed ? FindLevel(image, section.centre, direction(ray), section.lumen,
+                             settings.level, step, reach)
+                         : FindWall(image, section.centre, direction(ray), section.lumen,
+                             0.15 * contrast, floor, step, reach);
+      if (walls[ray].distance > 0.0 && walls[ray].distance <= settings.maximumRadius)
+      {
+        distances.push_back(walls[ray].distance);
+      }
+      else
+      {
+        walls[ray].distance = 0.0;
+      }
+    }
+    if (static_cast<int>(distances.size()) < rays / 3)
+    {
+      section.confidence = 0.0;
+      return section;
+    }
+    std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
+    const double median = distances[distances.size() / 2];
+
+    // d(angle) = R + e . direction, without the rays that run far, twice.
+    Vector3 fit(median, 0.0, 0.0);
+    for (int pass = 0; pass < 3; ++pass)
+    {
+      Matrix3 normal = Matrix3::Zero();
+      Vector3 right = Vector3::Zero();
+      found = 0;
+      double sum = 0.0;
+      std::vector<double> lows;
+      for (int ray = 0; ray < rays; ++ray)
+      {
+        const double angle = 2.0 * M_PI * ray / rays;
+        const Vector3 row(1.0, std::cos(angle), std::sin(angle));
+        const double residual = walls[ray].distance - row.dot(fit);
+        good[ray] = walls[ray].distance > 0.0 && std::abs(residual) < 0.45 * fit[0];
+        if (good[ray])
+        {
+          ++found;
+          normal += row * row.transpose();
+          right += walls[ray].distance * row;
+          sum += residual * residual;
+          lows.push_back(walls[ray].behind);
+        }
+      }
+      if (found < rays / 3)
+      {
+        section.confidence = 0.0;
+        return section;
+      }
+      std::nth_element(lows.begin(), lows.begin() + found / 2, lows.end());
+      behind = lows[static_cast<std::size_t>(found) / 2];
+      spread = std::sqrt(sum / found) / fit[0];
+      normal.diagonal() += Vector3(0.0, 1e-3 * rays, 1e-3 * rays);
+      fit = normal.ldlt().solve(right);
+    }
+    section.radius = fit[0];
+    const Vector3 shift = fit[1] * u + fit[2] * v;
+    offCentre = shift.norm();
+    const double most = 0.7 * section.radius;
+    section.centre += offCentre > most ? Vector3(most / offCentre * shift) : shift;
+    if (offCentre < 0.02 * section.radius)
+    {
+      break;
+    }
+  }
+
+  // Around it a wall on all sides, round, and as bright as its size lets it be.
+  const double share = static_cast<double>(found) / rays;
+  const auto ramp = [](double x, double low, double high)
+  { return std::min(1.0, std::max(0.0, (x - low) / (high - low))); };
+  section.behind = behind;
+  section.share = share;
+  section.spread = spread;
+  section.confidence = ramp(share, 0.45, 0.85) * ramp(spread, 0.4, 0.15);
+  if (!fixed)
+  {
+    // A small lumen is blurred: a disc of radius r shows 1 - exp(-r^2 / 2 blur^2) of its contrast.
+    const double relative = (section.lumen - reference.background) / contrast;
+    const double blur = 1.1 * image.SmallestSpacing();
+    const double expected = 1.0 - std::exp(-section.radius * section.radius / (2.0 * blur * blur));
+    section.confidence *= ramp(relative / std::min(1.0, expected + 0.05), 0.45, 0.7) *
+      ramp((section.lumen - behind) / contrast, 0.15, 0.3);
+  }
+  return section;
+}
+
+bool MeasureReference(
+  const ImageInterpolator& image, const Vector3& seed, LumenReference& reference)
+{
+  constexpr int directions = 64;
+  const double spacing = image.SmallestSpacing();
+  std::vector<double> values;
+  for (int i = 0; i < directions; ++i)
+  {
+    values.push_back(image.At(seed + spacing * SphereDirection(i, directions)));
+  }
+  std::nth_element(values.begin(), values.begin() + directions / 2, values.end());
+  reference.lumen = values[directions / 2];
+
+  // Longer and longer rays until half of them have left the lumen for something much darker.
+  double reach = 6.0 * spacing;
+  for (int attempt = 0; attempt < 4; ++attempt, reach *= 2.0)
+  {
+    std::vector<double> lows;
+    for (int i = 0; i < directions; ++i)
+    {
+      const Vector3 direction = SphereDirection(i, directions);
+      double lowest = reference.lumen;
+      for (double s = spacing; s <= reach; s += 0.5 * spacing)
+      {
+        lowest = std::min(lowest, image.At(seed + s * direction));
+      }
+      lows.push_back(lowest);
+    }
+    std::sort(lows.begin(), lows.end());
+    const double background = lows[directions / 4];
+    // Noise makes every minimum a little low; a lumen is a body whose surroundings fall by far more.
+    const double noise = *std::max_element(values.begin(), values.end()) -
+      *std::min_element(values.begin(), values.end());
+    if (reference.lumen - background > 1.5 * noise || attempt == 3)
+    {
+      reference.background = background;
+      std::vector<double> distances;
+      for (int i = 0; i < directions; ++i)
+      {
+        const Wall wall = FindWall(image, seed, SphereDirection(i, directions), reference.lumen,
+          0.6 * (reference.lumen - background), background, 0.5 * spacing, reach);
+        if (wall.distance > 0.0)
+        {
+          distances.push_back(wall.distance);
+        }
+      }
+      if (distances.size() < directions / 4)
+      {
+        continue;
+      }
+      // Rays along the vessel are the long ones.
+      std::nth_element(
+        distances.begin(), distances.begin() + distances.size() / 3, distances.end());
+      reference.radius = distances[distances.size() / 3];
+      return true;
+    }
+  }
+  return false;
+}
+
+double RadiusFromHalfMaximum(double measured, double blur)
+{
+  if (!(blur > 0.0))
+  {
+    return measured;
+  }
+  const double m = measured / blur;
+  if (m > HalfMaxima().back())
+  {
+    // A wall that is nearly straight: its curvature moves the half maximum inwards.
+    return measured + 0.5 * blur / m;
+  }
+  const std::vector<double>& table = HalfMaxima();
+  if (m <= table.front())
+  {
+    return TableStep * blur;
+  }
+  const auto next = std::upper_bound(table.begin(), table.end(), m);
+  const auto index = static_cast<double>(next - table.begin());
+  const double fraction = (m - *(next - 1)) / (*next - *(next - 1));
+  return TableStep * blur * (index + fraction);
+}
+
+double BlurFromContrast(double measured, double contrast)
+{
+  // With less blur the radius is greater and the centre brighter.
+  double low = 0.05 * measured;
+  double high = 0.84 * measured;
+  for (int i = 0; i < 40; ++i)
+  {
+    const double blur = 0.5 * (low + high);
+    const double radius = RadiusFromHalfMaximum(measured, blur) / blur;
+    (1.0 - std::exp(-0.5 * radius * radius) > contrast ? low : high) = blur;
+  }
+  return 0.5 * (low + high);
+}
+}

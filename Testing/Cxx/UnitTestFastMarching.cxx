@@ -1,0 +1,246 @@
+// Regions, and fast marching against closed forms.
+
+#include "CounterRandom.h"
+#include "FastMarching.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+using namespace coronary;
+
+namespace
+{
+using Predicate = std::function<bool(int, int, int)>;
+
+VoxelRegion MakeRegion(const std::array<int, 6>& extent, const Predicate& inside)
+{
+  return VoxelRegion(extent,
+    [&](int j, int k, unsigned char* flags)
+    {
+      for (int i = extent[0]; i <= extent[1]; ++i)
+      {
+        flags[i - extent[0]] = inside(i, j, k);
+      }
+    });
+}
+
+Vector3 Index(const VoxelRegion& region, VoxelRegion::Address address)
+{
+  const std::array<int, 3> index = region.IndexOf(address);
+  return { static_cast<double>(index[0]), static_cast<double>(index[1]),
+    static_cast<double>(index[2]) };
+}
+
+/// Greatest and mean error against `exact` over a ball of radius 10 mm sampled at `h`.
+std::pair<double, double> ErrorsAt(double h, bool secondOrder, const Vector3& aspect)
+{
+  const Vector3 spacing = h * aspect;
+  const int n[3] = { static_cast<int>(std::ceil(10.0 / spacing[0])),
+    static_cast<int>(std::ceil(10.0 / spacing[1])),
+    static_cast<int>(std::ceil(10.0 / spacing[2])) };
+  const VoxelRegion region = MakeRegion({ -n[0], n[0], -n[1], n[1], -n[2], n[2] },
+    [&](int i, int j, int k) { return spacing.cwiseProduct(Vector3(i, j, k)).norm() <= 10.0; });
+  FastMarchingSettings settings;
+  settings.spacing = spacing;
+  settings.sourceRadius = 2.5;
+  settings.secondOrder = secondOrder;
+  const double speed = 2.5;
+  FastMarching marching(
+    region, std::vector<float>(region.Size(), static_cast<float>(speed)), settings);
+  EXPECT_TRUE(marching.March({ { Vector3::Zero(), 3 } }));
+  double greatest = 0.0;
+  double sum = 0.0;
+  double lengthError = 0.0;
+  int others = 0;
+  region.ForEach(
+    [&](std::uint32_t number, VoxelRegion::Address address)
+    {
+      const double distance = spacing.cwiseProduct(Index(region, address)).norm();
+      const double error = std::abs(marching.Arrival()[number] * speed - distance);
+      greatest = std::max(greatest, error);
+      sum += error;
+      // Along straight rays the length is the distance.
+      lengthError = std::max(lengthError, std::abs(marching.Length()[number] - distance));
+      others += marching.Source()[number] != 3;
+    });
+  // The fastest path is straight, so its length is the distance.
+  EXPECT_LT(lengthError, 1.05 * greatest + 1e-4);
+  EXPECT_EQ(others, 0);
+  return { greatest, sum / region.Size() };
+}
+}
+
+TEST(VoxelRegion, NumbersAreTheRankOfTheMembers)
+{
+  const std::array<int, 6> extent{ -7, 60, 11, 40, -3, 9 };
+  const auto inside = [](int i, int j, int k)
+  {
+    return MixBits(static_cast<std::uint64_t>(i + 100 * j + 10000 * k)) % 3 == 0 && i > -4 &&
+      k != 9;
+  };
+  const VoxelRegion region = MakeRegion(extent, inside);
+  std::uint32_t expected = 0;
+  for (int k = extent[4]; k <= extent[5]; ++k)
+  {
+    for (int j = extent[2]; j <= extent[3]; ++j)
+    {
+      for (int i = extent[0]; i <= extent[1]; ++i)
+      {
+        EXPECT_EQ(region.NumberOf(i, j, k) != VoxelRegion::notAMember, inside(i, j, k));
+        if (!inside(i, j, k))
+        {
+          continue;
+        }
+        ++expected;
+        const std::array<int, 3> index{ i, j, k };
+        const VoxelRegion::Address address = region.AddressOf(i, j, k);
+        EXPECT_EQ(region.IndexOf(address), index);
+        EXPECT_EQ(region.Above(address, 0), region.AddressOf(i + 1, j, k));
+        EXPECT_EQ(region.Above(region.Above(address, 1), 1), region.AddressOf(i, j + 2, k));
+        EXPECT_EQ(region.Below(region.Below(address, 2), 2), region.AddressOf(i, j, k - 2));
+      }
+    }
+  }
+  EXPECT_EQ(region.Size(), expected);
+  EXPECT_EQ(region.Box()[0], -3);
+  EXPECT_EQ(region.Box()[5], 8);
+  std::uint32_t visited = 0;
+  region.ForEach(
+    [&](std::uint32_t number, VoxelRegion::Address address)
+    {
+      EXPECT_EQ(number, visited++);
+      EXPECT_EQ(region.Number(address), number);
+    });
+  EXPECT_EQ(visited, expected);
+}
+
+TEST(VoxelRegion, EmptyAndSingle)
+{
+  const VoxelRegion none = MakeRegion({ 0, 9, 0, 9, 0, 0 }, [](int, int, int) { return false; });
+  EXPECT_EQ(none.Size(), 0u);
+  EXPECT_EQ(none.NumberOf(0, 0, 0), VoxelRegion::notAMember);
+  const VoxelRegion noImage({ 0, -1, 0, -1, 0, -1 }, [](int, int, unsigned char*) {});
+  EXPECT_EQ(noImage.Size(), 0u);
+  const VoxelRegion one =
+    MakeRegion({ 0, 9, 0, 9, 0, 0 }, [](int i, int j, int) { return i == 9 && j == 0; });
+  EXPECT_EQ(one.Size(), 1u);
+  EXPECT_EQ(one.NumberOf(9, 0, 0), 0u);
+}
+
+TEST(FastMarching, SecondOrderConvergenceToTheDistance)
+{
+  for (const Vector3& aspect : { Vector3(1.0, 1.0, 1.0), Vector3(0.6, 1.0, 1.4) })
+  {
+    const auto coarse = ErrorsAt(0.5, true, aspect);
+    const auto fine = ErrorsAt(0.25, true, aspect);
+    const double order = std::log2(coarse.second / fine.second);
+    EXPECT_GT(order, 1.8);
+    EXPECT_GT(std::log2(coarse.first / fine.first), 1.5);
+    EXPECT_LT(fine.first, 0.03);
+    std::cout << "greatest " << coarse.first << " -> " << fine.first << " mm, mean "
+              << coarse.second << " -> " << fine.second << " mm, order " << order << '\n';
+    const auto first = ErrorsAt(0.25, false, aspect);
+    EXPECT_GT(first.second, 5.0 * fine.second);
+  }
+}
+
+TEST(FastMarching, LinearSpeedHasAClosedForm)
+{
+  // F = F0 + g x: T = acosh(1 + g^2 d^2 / (2 F F0)) / g (Slotnick 1959).
+  const Vector3 spacing(0.4, 0.25, 0.5);
+  const double g = 0.15;
+  const double f0 = 1.0;
+  const std::array<int, 6> extent{ 0, 40, -30, 30, -15, 15 };
+  const VoxelRegion region = MakeRegion(extent, [](int, int, int) { return true; });
+  std::vector<float> speed(region.Size());
+  region.ForEach([&](std::uint32_t number, VoxelRegion::Address address)
+    { speed[number] = static_cast<float>(f0 + g * spacing[0] * Index(region, address)[0]); });
+  FastMarchingSettings settings;
+  settings.spacing = spacing;
+  settings.sourceRadius = 1.5;
+  FastMarching marching(region, speed, settings);
+  marching.March({ { Vector3::Zero(), 0 } });
+  double greatest = 0.0;
+  region.ForEach(
+    [&](std::uint32_t number, VoxelRegion::Address address)
+    {
+      const double d = spacing.cwiseProduct(Index(region, address)).norm();
+      const double exact =
+        std::acosh(1.0 + g * g * d * d / (2.0 * f0 * static_cast<double>(speed[number]))) / g;
+      greatest = std::max(greatest, std::abs(marching.Arrival()[number] - exact) / (exact + 1.0));
+    });
+  std::cout << "greatest error " << greatest << '\n';
+  EXPECT_LT(greatest, 0.01);
+}
+
+TEST(FastMarching, BendsAroundCornersAndStopsAtGaps)
+{
+  // A corridor of one voxel with a right angle, and a piece beyond a gap.
+  const VoxelRegion region = MakeRegion({ 0, 20, 0, 20, 0, 0 },
+    [](int i, int j, int) { return (j == 0 && i <= 10) || (i == 10 && j != 15); });
+  FastMarchingSettings settings;
+  settings.spacing = Vector3(0.5, 0.5, 2.0);
+  settings.sourceRadius = 1e-9;
+  FastMarching marching(region, std::vector<float>(region.Size(), 1.0F), settings);
+  EXPECT_TRUE(marching.March({ { Vector3(0, 0, 0), 0 } }));
+  EXPECT_NEAR(marching.Arrival()[region.NumberOf(10, 14, 0)], 12.0, 0.6);
+  EXPECT_NEAR(marching.Length()[region.NumberOf(10, 14, 0)], 12.0, 0.6);
+  EXPECT_TRUE(std::isinf(marching.Arrival()[region.NumberOf(10, 16, 0)]));
+  EXPECT_EQ(marching.Source()[region.NumberOf(10, 16, 0)], FastMarching::noSource);
+}
+
+TEST(FastMarching, SourcesShareTheRegion)
+{
+  const VoxelRegion region =
+    MakeRegion({ 0, 30, 0, 10, 0, 10 }, [](int, int, int) { return true; });
+  FastMarching marching(region, std::vector<float>(region.Size(), 1.0F), FastMarchingSettings{});
+  marching.March({ { Vector3(0, 5, 5), 0 }, { Vector3(30, 5, 5), 1 } });
+  region.ForEach(
+    [&](std::uint32_t number, VoxelRegion::Address address)
+    {
+      const double x = Index(region, address)[0];
+      if (x != 15.0)
+      {
+        EXPECT_EQ(marching.Source()[number], x < 15.0 ? 0 : 1);
+      }
+    });
+}
+
+TEST(FastMarching, LimitsAndMemory)
+{
+  const VoxelRegion region =
+    MakeRegion({ 0, 63, 0, 63, 0, 63 }, [](int, int, int) { return true; });
+  FastMarchingSettings settings;
+  settings.stopAtArrival = 10.0;
+  FastMarching marching(region, std::vector<float>(region.Size(), 1.0F), settings);
+  EXPECT_FALSE(marching.March({ { Vector3(32, 32, 32), 0 } }));
+  EXPECT_TRUE(std::isinf(marching.Arrival()[0]));
+  EXPECT_EQ(marching.Source()[0], FastMarching::noSource);
+  EXPECT_NEAR(marching.Arrival()[region.NumberOf(32, 32, 41)], 9.0, 0.05);
+
+  settings = {};
+  std::uint32_t seen = 0;
+  settings.goOn = [&](std::uint32_t reached)
+  {
+    seen = reached;
+    return reached < 50000;
+  };
+  FastMarching limited(region, std::vector<float>(region.Size(), 1.0F), settings);
+  EXPECT_FALSE(limited.March({ { Vector3(32, 32, 32), 0 } }));
+  EXPECT_LT(seen, 70000u);
+  EXPECT_LE(limited.MemorySize(), 24u * region.Size());
+
+  FastMarching cancelled(region, std::vector<float>(region.Size(), 1.0F), FastMarchingSettings{},
+    [](double) { return false; });
+  EXPECT_THROW(cancelled.March({ { Vector3(32, 32, 32), 0 } }), Cancelled);
+  std::vector<float> speed(region.Size(), 1.0F);
+  speed[17] = 0.0F;
+  EXPECT_THROW(FastMarching(region, speed, FastMarchingSettings{}), std::invalid_argument);
+  settings = {};
+  settings.spacing[1] = 0.0;
+  EXPECT_THROW(
+    FastMarching(region, std::vector<float>(region.Size(), 1.0F), settings), std::invalid_argument);
+}
