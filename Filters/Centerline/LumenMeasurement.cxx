@@ -366,56 +366,36 @@ bool MeasureReference(
   std::vector<double> values;
   for (int i = 0; i < directions; ++i)
   {
-    values.push_back(image.At(seed + spacing * SphereDirection(i, directions)));
+    values.push_back(image.At(seed + 0.6 * spacing * SphereDirection(i, directions)));
   }
-  std::nth_element(values.begin(), values.begin() + directions / 2, values.end());
+  std::sort(values.begin(), values.end());
   reference.lumen = values[directions / 2];
+  // What is less than the noise is no wall.
+  const double least = 2.0 * (values[directions * 7 / 8] - values[directions / 8]);
 
-  // Longer and longer rays until half of them have left the lumen for something much darker.
-  double reach = 6.0 * spacing;
-  for (int attempt = 0; attempt < 4; ++attempt, reach *= 2.0)
+  // Rays along the vessel come far, and those across find its wall.
+  std::vector<double> behind;
+  std::vector<double> distances;
+  for (int i = 0; i < directions; ++i)
   {
-    std::vector<double> lows;
-    for (int i = 0; i < directions; ++i)
+    const Wall wall = FindWall(image, seed, SphereDirection(i, directions), reference.lumen,
+      std::max(least, 1e-3 * std::abs(reference.lumen)), -std::numeric_limits<double>::infinity(),
+      0.5 * spacing, 40.0 * spacing);
+    if (wall.distance > 0.0)
     {
-      const Vector3 direction = SphereDirection(i, directions);
-      double lowest = reference.lumen;
-      for (double s = spacing; s <= reach; s += 0.5 * spacing)
-      {
-        lowest = std::min(lowest, image.At(seed + s * direction));
-      }
-      lows.push_back(lowest);
-    }
-    std::sort(lows.begin(), lows.end());
-    const double background = lows[directions / 4];
-    // Noise makes every minimum a little low; a lumen is a body whose surroundings fall by far more.
-    const double noise = *std::max_element(values.begin(), values.end()) -
-      *std::min_element(values.begin(), values.end());
-    if (reference.lumen - background > 1.5 * noise || attempt == 3)
-    {
-      reference.background = background;
-      std::vector<double> distances;
-      for (int i = 0; i < directions; ++i)
-      {
-        const Wall wall = FindWall(image, seed, SphereDirection(i, directions), reference.lumen,
-          0.6 * (reference.lumen - background), background, 0.5 * spacing, reach);
-        if (wall.distance > 0.0)
-        {
-          distances.push_back(wall.distance);
-        }
-      }
-      if (distances.size() < directions / 4)
-      {
-        continue;
-      }
-      // Rays along the vessel are the long ones.
-      std::nth_element(
-        distances.begin(), distances.begin() + distances.size() / 3, distances.end());
-      reference.radius = distances[distances.size() / 3];
-      return true;
+      behind.push_back(wall.behind);
+      distances.push_back(wall.distance);
     }
   }
-  return false;
+  if (distances.size() < directions / 4)
+  {
+    return false;
+  }
+  std::sort(behind.begin(), behind.end());
+  std::sort(distances.begin(), distances.end());
+  reference.background = behind[behind.size() / 4];
+  reference.radius = distances[distances.size() / 3];
+  return reference.background < reference.lumen;
 }
 
 double RadiusFromHalfMaximum(double measured, double blur)

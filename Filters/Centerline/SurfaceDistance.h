@@ -23,8 +23,9 @@ struct SurfaceDistance
 };
 
 /**
- * Distances are exact within two voxels of the wall on both sides and inside; further outside the value is
- * minus two voxels. Inside is what a row of voxels enters before it leaves it.
+ * Distances are exact within two voxels of the wall on both sides, and to a tenth of a voxel further
+ * inside; further outside the value is minus two voxels. Inside is where a row of voxels has entered
+ * the surface more often than it left it.
  *
  * @param spacing     mm; 0 takes an eighth of the mean diameter (4 volume / area), coarser if the box
  *                    has more than maximumVoxels

@@ -343,7 +343,7 @@ TEST(SurfaceDistance, ExactInACylinder)
         }
       }
     }
-    EXPECT_LT(greatest, 0.005) << inverted;
+    EXPECT_LT(greatest, 0.025) << inverted;
     for (Triangle& triangle : triangles)
     {
       std::swap(triangle[0], triangle[1]);
@@ -367,7 +367,8 @@ TEST(CenterlineExtraction, StraightAndHelicalTubesOnObliqueGrids)
     EXPECT_EQ(result.seeds[0].status, EndStatus::Reached);
     const Deviation deviation = Compare(result.tree, tube);
     EXPECT_LT(deviation.axis, 0.08);
-    EXPECT_LT(deviation.greatest, 0.5);
+    // The tube ends round: the tip may be as far beyond the axis.
+    EXPECT_LT(deviation.greatest, tube.radius);
     EXPECT_LT(deviation.radius, 0.1);
     // Neither cut corners nor a smoother may shorten it.
     EXPECT_NEAR(result.tree.branches[0].length, Length(tube.axis), 1.5 + 0.02 * Length(tube.axis));
