@@ -57,6 +57,19 @@ constexpr const char* SegmentLabel = "SegmentLabel";         ///< string, SCCT n
 constexpr const char* Length = "Length";                     ///< double, mm
 constexpr const char* Tortuosity = "Tortuosity";             ///< double, length / chord - 1
 
+// Centerlines in VMTK's form, cell data.
+constexpr const char* CenterlineIds = "CenterlineIds"; ///< int, line from a root to a tip
+constexpr const char* TractIds = "TractIds";           ///< int, place along its line
+constexpr const char* Blanking = "Blanking";           ///< int, 1 inside a bifurcation
+
+// Centerlines, field data.
+constexpr const char* SeedStatus = "SeedStatus";       ///< int, coronary::EndStatus
+constexpr const char* SeedMessage = "SeedMessage";     ///< string
+constexpr const char* TargetStatus = "TargetStatus";   ///< int, coronary::EndStatus
+constexpr const char* TargetMessage = "TargetMessage"; ///< string
+constexpr const char* ImageBlur = "ImageBlur";         ///< double, mm, standard deviation
+constexpr const char* Complete = "Complete";           ///< unsigned char, 0: ended by a limit
+
 // Centerline tree with geometry, point data.
 constexpr const char* FrenetTangent = "FrenetTangent";   ///< double[3], unit, downstream
 constexpr const char* FrenetNormal = "FrenetNormal";     ///< double[3], unit, to the inside

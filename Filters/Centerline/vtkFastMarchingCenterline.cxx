@@ -1,0 +1,642 @@
+#include "vtkFastMarchingCenterline.h"
+
+#include "CenterlineExtraction.h"
+#include "SurfaceDistance.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
+
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkDataArrayRange.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkFloatArray.h"
+#include "vtkIdList.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkMatrix3x3.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkShortArray.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUnsignedCharArray.h"
+#include "vtkUnsignedShortArray.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <new>
+#include <stdexcept>
+
+using coronary::CenterlineTree;
+using coronary::Vector3;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+vtkStandardNewMacro(vtkFastMarchingCenterline);
+
+namespace
+{
+void Require(bool condition, const std::string& requirement)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument(requirement);
+  }
+}
+
+coronary::ImageGrid GridOf(vtkImageData* image)
+{
+  coronary::ImageGrid grid;
+  image->GetExtent(grid.extent.data());
+  image->GetOrigin(grid.origin.data());
+  image->GetSpacing(grid.spacing.data());
+  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+    image->GetDirectionMatrix()->GetData());
+  return grid;
+}
+
+std::string NameOf(vtkAbstractArray* array)
+{
+  return "array '" + std::string(array->GetName() ? array->GetName() : "") + "'";
+}
+
+vtkDataArray* CheckedArray(vtkAbstractArray* any, vtkImageData* image, const std::string& whose)
+{
+  Require(any != nullptr, whose + " has no point array to be used");
+  auto* array = vtkArrayDownCast<vtkDataArray>(any);
+  Require(array != nullptr, NameOf(any) + " of " + whose + " is not numeric");
+  Require(array->GetNumberOfComponents() == 1,
+    NameOf(any) + " of " + whose + " has " + std::to_string(array->GetNumberOfComponents()) +
+      " components: one is needed");
+  Require(array->GetNumberOfTuples() == image->GetNumberOfPoints(),
+    NameOf(any) + " of " + whose + " has not one value a voxel");
+  return array;
+}
+
+/// The values of an array as T: its own memory if it is of that type, else a copy.
+template <typename Array, typename T>
+const T* ValuesAs(vtkDataArray* array, std::vector<T>& copy)
+{
+  if (auto* same = vtkArrayDownCast<Array>(array))
+  {
+    return same->GetPointer(0);
+  }
+  const auto values = vtk::DataArrayValueRange<1>(array);
+  copy.resize(static_cast<std::size_t>(values.size()));
+  for (vtkIdType n = 0; n < values.size(); ++n)
+  {
+    const auto value = static_cast<double>(values[n]);
+    copy[static_cast<std::size_t>(n)] =
+      std::is_same<T, unsigned char>::value ? static_cast<T>(value != 0.0) : static_cast<T>(value);
+  }
+  return copy.data();
+}
+
+std::vector<Vector3> PointsOf(vtkInformationVector* input)
+{
+  std::vector<Vector3> points;
+  vtkPointSet* set = input->GetNumberOfInformationObjects() > 0
+    ? vtkPointSet::GetData(input->GetInformationObject(0))
+    : nullptr;
+  for (vtkIdType n = 0; set && n < set->GetNumberOfPoints(); ++n)
+  {
+    points.emplace_back(set->GetPoint(n));
+  }
+  return points;
+}
+
+vtkImageData* ImageOf(vtkInformationVector* input)
+{
+  return input->GetNumberOfInformationObjects() > 0
+    ? vtkImageData::GetData(input->GetInformationObject(0))
+    : nullptr;
+}
+
+coronary::SurfaceDistance DistanceTo(
+  vtkPolyData* surface, double spacing, const coronary::ProgressCallback& progress)
+{
+  std::vector<Vector3> points;
+  std::vector<coronary::Triangle> triangles;
+  points.reserve(static_cast<std::size_t>(surface->GetNumberOfPoints()));
+  for (vtkIdType n = 0; n < surface->GetNumberOfPoints(); ++n)
+  {
+    points.emplace_back(surface->GetPoint(n));
+  }
+  vtkNew<vtkIdList> ids;
+  vtkCellArray* polys = surface->GetPolys();
+  for (vtkIdType cell = 0; cell < polys->GetNumberOfCells(); ++cell)
+  {
+    // Polygons as fans: what encloses the same volume.
+    polys->GetCellAtId(cell, ids);
+    for (vtkIdType i = 2; i < ids->GetNumberOfIds(); ++i)
+    {
+      triangles.push_back({ ids->GetId(0), ids->GetId(i - 1), ids->GetId(i) });
+    }
+  }
+  vtkCellArray* strips = surface->GetStrips();
+  for (vtkIdType cell = 0; cell < strips->GetNumberOfCells(); ++cell)
+  {
+    strips->GetCellAtId(cell, ids);
+    for (vtkIdType i = 2; i < ids->GetNumberOfIds(); ++i)
+    {
+      const vtkIdType odd = i % 2;
+      triangles.push_back({ ids->GetId(i - 2 + odd), ids->GetId(i - 1 - odd), ids->GetId(i) });
+    }
+  }
+  Require(!triangles.empty(), "the surface has no polygons");
+  return coronary::ComputeSurfaceDistance(points, triangles, spacing, 24000000, progress);
+}
+
+template <typename Array, typename Value>
+void Add(vtkFieldData* data, const std::string& name, const std::vector<Value>& values)
+{
+  vtkNew<Array> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    array->SetValue(static_cast<vtkIdType>(i), values[i]);
+  }
+  data->AddArray(array);
+}
+
+template <typename Array, typename Function>
+void AddBranchValues(vtkFieldData* data, const char* name,
+  const std::vector<CenterlineTree::Branch>& branches, const Function& valueOf)
+{
+  std::vector<std::decay_t<decltype(valueOf(CenterlineTree::Branch()))>> values;
+  for (const CenterlineTree::Branch& branch : branches)
+  {
+    values.push_back(valueOf(branch));
+  }
+  Add<Array>(data, name, values);
+}
+
+void AddPoints(vtkPolyData* output, const std::vector<Vector3>& positions)
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  points->SetNumberOfPoints(static_cast<vtkIdType>(positions.size()));
+  for (std::size_t i = 0; i < positions.size(); ++i)
+  {
+    points->SetPoint(static_cast<vtkIdType>(i), positions[i].data());
+  }
+  output->SetPoints(points);
+}
+
+void AddCell(vtkCellArray* cells, const std::vector<std::int64_t>& ids)
+{
+  cells->InsertNextCell(static_cast<int>(ids.size()));
+  for (const std::int64_t id : ids)
+  {
+    cells->InsertCellPoint(static_cast<vtkIdType>(id));
+  }
+}
+
+/// Takes the message's first word as the name of a property.
+std::string PropertyMessage(std::string message)
+{
+  const std::string prefix = "CenterlineSettings: ";
+  if (message.compare(0, prefix.size(), prefix) == 0)
+  {
+    message.erase(0, prefix.size());
+    const std::map<std::string, std::string> others{ { "resampling", "ResamplingStepLength" },
+      { "smoothing", "SmoothingWavelength" } };
+    const std::string word = message.substr(0, message.find(' '));
+    const auto other = others.find(word);
+    if (other != others.end())
+    {
+      message.replace(0, word.size(), other->second);
+    }
+    message.front() = static_cast<char>(std::toupper(message.front()));
+  }
+  return message;
+}
+}
+
+vtkFastMarchingCenterline::vtkFastMarchingCenterline()
+  : RadiusArrayName(vtkCoronaryArrayNames::Radius)
+  , ConfidenceArrayName(vtkCoronaryArrayNames::Confidence)
+{
+  this->SetNumberOfInputPorts(5);
+  this->SetNumberOfOutputPorts(3);
+  this->SetInputArrayToProcess(
+    0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
+  this->SetInputArrayToProcess(
+    1, 3, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
+}
+
+vtkFastMarchingCenterline::~vtkFastMarchingCenterline() = default;
+
+int vtkFastMarchingCenterline::FillInputPortInformation(int port, vtkInformation* info)
+{
+  info->Remove(INPUT_REQUIRED_DATA_TYPE());
+  if (port == 0)
+  {
+    info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+    info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
+  }
+  else
+  {
+    info->Set(INPUT_REQUIRED_DATA_TYPE(), port < 3 ? "vtkPointSet" : "vtkImageData");
+  }
+  if (port > 1)
+  {
+    info->Set(INPUT_IS_OPTIONAL(), 1);
+  }
+  return 1;
+}
+
+int vtkFastMarchingCenterline::RequestUpdateExtent(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
+{
+  // A tree is made of the whole.
+  for (int port = 0; port < this->GetNumberOfInputPorts(); ++port)
+  {
+    if (inputs[port]->GetNumberOfInformationObjects() == 0)
+    {
+      continue;
+    }
+    vtkInformation* info = inputs[port]->GetInformationObject(0);
+    if (info->Has(SDDP::WHOLE_EXTENT()))
+    {
+      int whole[6];
+      info->Get(SDDP::WHOLE_EXTENT(), whole);
+      info->Set(SDDP::UPDATE_EXTENT(), whole, 6);
+    }
+    info->Set(SDDP::UPDATE_PIECE_NUMBER(), 0);
+    info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), 1);
+    info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+  }
+  return 1;
+}
+
+int vtkFastMarchingCenterline::RequestData(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  try
+  {
+    this->Execute(inputs, outputs);
+    return 1;
+  }
+  catch (const coronary::Cancelled&)
+  {
+    for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+    {
+      vtkPolyData::GetData(outputs, port)->Initialize();
+    }
+    return 1;
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorMacro("Not enough memory for the region to march in.");
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< PropertyMessage(error.what()));
+  }
+  for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+  {
+    vtkPolyData::GetData(outputs, port)->Initialize();
+  }
+  return 0;
+}
+
+void vtkFastMarchingCenterline::Execute(
+  vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  Require(!this->RadiusArrayName.empty() && !this->ConfidenceArrayName.empty(),
+    "RadiusArrayName and ConfidenceArrayName need a name");
+  coronary::CenterlineSettings settings;
+  if (!this->AutomaticSpeedThreshold)
+  {
+    settings.speedThreshold = this->SpeedThreshold;
+  }
+  if (!this->AutomaticIntensityThreshold)
+  {
+    settings.intensityThreshold = this->IntensityThreshold;
+  }
+  settings.speedExponent = this->SpeedExponent;
+  settings.minimumBranchLength = this->MinimumBranchLength;
+  settings.minimumConfidence = this->MinimumConfidence;
+  settings.maximumGap = this->MaximumGap;
+  settings.maximumRadius = this->MaximumRadius;
+  settings.resampling = this->ResamplingStepLength;
+  settings.smoothing = this->SmoothingWavelength;
+  settings.snap = this->Snap;
+  settings.blur = this->Blur;
+  settings.snapDistance = this->SnapDistance;
+  settings.timeLimit = this->TimeLimit;
+  settings.voxelLimit = this->VoxelLimit;
+  settings.Validate();
+  Require(std::isfinite(this->SurfaceSpacing) && this->SurfaceSpacing >= 0.0,
+    "SurfaceSpacing must not be negative");
+
+  coronary::CenterlineInput input;
+  input.seeds = PointsOf(inputs[1]);
+  input.targets = PointsOf(inputs[2]);
+  settings.findTips = this->FindTips || input.targets.empty();
+  vtkDataObject* data = vtkDataObject::GetData(inputs[0]->GetInformationObject(0));
+  auto* image = vtkImageData::SafeDownCast(data);
+  auto* surface = vtkPolyData::SafeDownCast(data);
+  const bool empty = input.seeds.empty() ||
+    (image ? image->GetNumberOfPoints() == 0 : surface->GetNumberOfPoints() == 0);
+
+  coronary::CenterlineResult result;
+  if (!empty)
+  {
+    coronary::SurfaceDistance distance;
+    std::vector<float> speedCopy;
+    std::vector<unsigned char> maskCopy;
+    double begin = 0.0;
+    if (surface)
+    {
+      begin = 0.4;
+      distance =
+        DistanceTo(surface, this->SurfaceSpacing, vtkCoronary::ProgressOf(this, 0.0, begin));
+      if (distance.openEdges > 0 || distance.doubtfulRows > 0)
+      {
+        vtkWarningMacro("The surface is not closed: " << distance.openEdges
+                                                      << " open edges. Close its ends first.");
+      }
+      input.grid = distance.grid;
+      input.wallDistance = distance.values.data();
+    }
+    else
+    {
+      input.grid = GridOf(image);
+      int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
+      vtkAbstractArray* any = this->GetInputAbstractArrayToProcess(0, inputs, association);
+      Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
+        "the image's array belongs to the cells: point data are needed");
+      vtkDataArray* array = CheckedArray(any, image, "the image");
+      if (this->ImageKind == MaskImage)
+      {
+        input.mask = ValuesAs<vtkUnsignedCharArray>(array, maskCopy);
+      }
+      else
+      {
+        input.speed = ValuesAs<vtkFloatArray>(array, speedCopy);
+        if (vtkImageData* mask = ImageOf(inputs[4]))
+        {
+          const coronary::ImageGrid grid = GridOf(mask);
+          Require(grid.extent == input.grid.extent &&
+              grid.origin.isApprox(input.grid.origin, 1e-5) &&
+              grid.spacing.isApprox(input.grid.spacing, 1e-5) &&
+              grid.direction.isApprox(input.grid.direction, 1e-5),
+            "the mask is on another grid than the image: extent, spacing, origin or direction "
+            "differs");
+          input.mask =
+            ValuesAs<vtkUnsignedCharArray>(CheckedArray(mask->GetPointData()->GetScalars()
+                                               ? mask->GetPointData()->GetScalars()
+                                               : mask->GetPointData()->GetAbstractArray(0),
+                                             mask, "the mask"),
+              maskCopy);
+        }
+      }
+    }
+    coronary::ScalarImage intensity;
+    std::vector<float> intensityCopy;
+    vtkImageData* measured = ImageOf(inputs[3]);
+    if (measured && measured->GetNumberOfPoints() > 0)
+    {
+      int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
+      vtkAbstractArray* any = this->GetInputAbstractArrayToProcess(1, inputs, association);
+      Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
+        "the measured image's array belongs to the cells: point data are needed");
+      vtkDataArray* array = CheckedArray(any, measured, "the measured image");
+      intensity.grid = GridOf(measured);
+      if (auto* shorts = vtkArrayDownCast<vtkShortArray>(array))
+      {
+        intensity.values = static_cast<const std::int16_t*>(shorts->GetPointer(0));
+      }
+      else if (auto* unsignedShorts = vtkArrayDownCast<vtkUnsignedShortArray>(array))
+      {
+        intensity.values = static_cast<const std::uint16_t*>(unsignedShorts->GetPointer(0));
+      }
+      else
+      {
+        intensity.values = ValuesAs<vtkFloatArray>(array, intensityCopy);
+      }
+      input.intensity = &intensity;
+    }
+    result =
+      coronary::ExtractCenterlines(input, settings, vtkCoronary::ProgressOf(this, begin, 1.0));
+  }
+  for (const std::string& message : result.messages)
+  {
+    vtkWarningMacro(<< message);
+  }
+  for (const auto* ends : { &result.seeds, &result.targets })
+  {
+    for (const coronary::CenterlineEnd& end : *ends)
+    {
+      if (end.status != coronary::EndStatus::Reached && !end.message.empty())
+      {
+        vtkWarningMacro(<< end.message);
+      }
+    }
+  }
+
+  // The trees.
+  namespace names = vtkCoronaryArrayNames;
+  using Branch = CenterlineTree::Branch;
+  CenterlineTree& tree = result.tree;
+  vtkPolyData* treeOutput = vtkPolyData::GetData(outputs, TreePort);
+  AddPoints(treeOutput, tree.points);
+  vtkNew<vtkCellArray> lines;
+  for (const Branch& branch : tree.branches)
+  {
+    AddCell(lines, branch.points);
+  }
+  treeOutput->SetLines(lines);
+  Add<vtkDoubleArray>(treeOutput->GetPointData(), this->RadiusArrayName, tree.radius);
+  Add<vtkDoubleArray>(treeOutput->GetPointData(), names::Abscissas, tree.abscissa);
+  Add<vtkDoubleArray>(treeOutput->GetPointData(), this->ConfidenceArrayName, tree.confidence);
+  vtkCellData* cells = treeOutput->GetCellData();
+  AddBranchValues<vtkIntArray>(
+    cells, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });
+  AddBranchValues<vtkIntArray>(
+    cells, names::ParentGroupIds, tree.branches, [](const Branch& b) { return b.parentGroupId; });
+  AddBranchValues<vtkIntArray>(
+    cells, names::TreeIds, tree.branches, [](const Branch& b) { return b.treeId; });
+  AddBranchValues<vtkDoubleArray>(
+    cells, names::Length, tree.branches, [](const Branch& b) { return b.length; });
+  AddBranchValues<vtkDoubleArray>(
+    cells, names::Tortuosity, tree.branches, [](const Branch& b) { return b.tortuosity; });
+
+  // VMTK's form: from the root to every tip and every target.
+  std::map<int, const Branch*> byId;
+  std::map<std::int64_t, const Branch*> holder;
+  for (const Branch& branch : tree.branches)
+  {
+    byId[branch.groupId] = &branch;
+    for (std::size_t i = branch.parentGroupId == -1 ? 0 : 1; i < branch.points.size(); ++i)
+    {
+      holder[branch.points[i]] = &branch;
+    }
+  }
+  std::vector<std::int64_t> ends;
+  for (const coronary::CenterlineEnd& target : result.targets)
+  {
+    if (target.point >= 0)
+    {
+      ends.push_back(target.point);
+    }
+  }
+  if (settings.findTips)
+  {
+    for (const Branch& branch : tree.branches)
+    {
+      const bool tip = std::none_of(tree.branches.begin(), tree.branches.end(),
+        [&](const Branch& other) { return other.parentGroupId == branch.groupId; });
+      if (tip && std::find(ends.begin(), ends.end(), branch.points.back()) == ends.end())
+      {
+        ends.push_back(branch.points.back());
+      }
+    }
+  }
+  vtkPolyData* linesOutput = vtkPolyData::GetData(outputs, LinesPort);
+  std::vector<Vector3> positions;
+  std::vector<double> radius;
+  std::vector<double> abscissa;
+  std::vector<double> confidence;
+  std::vector<int> centerlineIds;
+  std::vector<int> tractIds;
+  std::vector<int> groupIds;
+  vtkNew<vtkCellArray> tracts;
+  for (std::size_t line = 0; line < ends.size(); ++line)
+  {
+    std::vector<const Branch*> chain;
+    for (const Branch* branch = holder[ends[line]]; branch;
+         branch = branch->parentGroupId == -1 ? nullptr : byId[branch->parentGroupId])
+    {
+      chain.insert(chain.begin(), branch);
+    }
+    for (std::size_t tract = 0; tract < chain.size(); ++tract)
+    {
+      std::vector<std::int64_t> ids;
+      for (const std::int64_t point : chain[tract]->points)
+      {
+        const auto p = static_cast<std::size_t>(point);
+        ids.push_back(static_cast<std::int64_t>(positions.size()));
+        positions.push_back(tree.points[p]);
+        radius.push_back(tree.radius[p]);
+        abscissa.push_back(tree.abscissa[p]);
+        confidence.push_back(tree.confidence[p]);
+        if (point == ends[line])
+        {
+          break;
+        }
+      }
+      if (ids.size() < 2)
+      {
+        continue;
+      }
+      AddCell(tracts, ids);
+      centerlineIds.push_back(static_cast<int>(line));
+      tractIds.push_back(static_cast<int>(tract));
+      groupIds.push_back(chain[tract]->groupId);
+    }
+  }
+  AddPoints(linesOutput, positions);
+  linesOutput->SetLines(tracts);
+  Add<vtkDoubleArray>(linesOutput->GetPointData(), this->RadiusArrayName, radius);
+  Add<vtkDoubleArray>(linesOutput->GetPointData(), names::Abscissas, abscissa);
+  Add<vtkDoubleArray>(linesOutput->GetPointData(), this->ConfidenceArrayName, confidence);
+  Add<vtkIntArray>(linesOutput->GetCellData(), names::CenterlineIds, centerlineIds);
+  Add<vtkIntArray>(linesOutput->GetCellData(), names::TractIds, tractIds);
+  Add<vtkIntArray>(linesOutput->GetCellData(), names::GroupIds, groupIds);
+  Add<vtkIntArray>(
+    linesOutput->GetCellData(), names::Blanking, std::vector<int>(groupIds.size(), 0));
+
+  // Bifurcations.
+  vtkPolyData* forksOutput = vtkPolyData::GetData(outputs, BifurcationsPort);
+  std::vector<Vector3> forks;
+  std::vector<double> forkRadius;
+  std::vector<int> parents;
+  std::vector<int> trees;
+  std::size_t width = 2;
+  for (const coronary::CenterlineBifurcation& fork : result.bifurcations)
+  {
+    width = std::max(width, fork.daughterGroupIds.size());
+  }
+  vtkNew<vtkIntArray> daughters;
+  daughters->SetName(names::DaughterGroupIds);
+  daughters->SetNumberOfComponents(static_cast<int>(width));
+  vtkNew<vtkCellArray> vertices;
+  for (const coronary::CenterlineBifurcation& fork : result.bifurcations)
+  {
+    AddCell(vertices, { static_cast<std::int64_t>(forks.size()) });
+    forks.push_back(tree.points[static_cast<std::size_t>(fork.point)]);
+    forkRadius.push_back(tree.radius[static_cast<std::size_t>(fork.point)]);
+    parents.push_back(fork.parentGroupId);
+    trees.push_back(byId[fork.parentGroupId]->treeId);
+    std::vector<int> row(fork.daughterGroupIds);
+    row.resize(width, -1);
+    daughters->InsertNextTypedTuple(row.data());
+  }
+  AddPoints(forksOutput, forks);
+  forksOutput->SetVerts(vertices);
+  Add<vtkDoubleArray>(forksOutput->GetPointData(), this->RadiusArrayName, forkRadius);
+  Add<vtkIntArray>(forksOutput->GetPointData(), names::ParentGroupIds, parents);
+  Add<vtkIntArray>(forksOutput->GetPointData(), names::TreeIds, trees);
+  forksOutput->GetPointData()->AddArray(daughters);
+
+  for (const int port : { TreePort, LinesPort, BifurcationsPort })
+  {
+    vtkFieldData* fields = vtkPolyData::GetData(outputs, port)->GetFieldData();
+    fields->PassData(data->GetFieldData());
+    const auto addEnds = [&](const std::vector<coronary::CenterlineEnd>& list,
+                           const char* statusName, const char* messageName)
+    {
+      std::vector<int> status;
+      std::vector<std::string> messages;
+      for (const coronary::CenterlineEnd& end : list)
+      {
+        status.push_back(static_cast<int>(end.status));
+        messages.push_back(end.message.empty() ? coronary::EndStatusText(end.status) : end.message);
+      }
+      Add<vtkIntArray>(fields, statusName, status);
+      Add<vtkStringArray>(fields, messageName, messages);
+    };
+    addEnds(result.seeds, names::SeedStatus, names::SeedMessage);
+    addEnds(result.targets, names::TargetStatus, names::TargetMessage);
+    Add<vtkDoubleArray>(fields, names::ImageBlur, std::vector<double>{ result.blur });
+    Add<vtkUnsignedCharArray>(fields, names::Complete,
+      std::vector<unsigned char>{ static_cast<unsigned char>(result.complete ? 1 : 0) });
+  }
+}
+
+void vtkFastMarchingCenterline::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "ImageKind: " << this->ImageKind << '\n';
+  os << indent << "AutomaticSpeedThreshold: " << this->AutomaticSpeedThreshold << '\n';
+  os << indent << "SpeedThreshold: " << this->SpeedThreshold << '\n';
+  os << indent << "AutomaticIntensityThreshold: " << this->AutomaticIntensityThreshold << '\n';
+  os << indent << "IntensityThreshold: " << this->IntensityThreshold << '\n';
+  os << indent << "SpeedExponent: " << this->SpeedExponent << '\n';
+  os << indent << "FindTips: " << this->FindTips << '\n';
+  os << indent << "MinimumBranchLength: " << this->MinimumBranchLength << '\n';
+  os << indent << "MinimumConfidence: " << this->MinimumConfidence << '\n';
+  os << indent << "MaximumGap: " << this->MaximumGap << '\n';
+  os << indent << "MaximumRadius: " << this->MaximumRadius << '\n';
+  os << indent << "ResamplingStepLength: " << this->ResamplingStepLength << '\n';
+  os << indent << "SmoothingWavelength: " << this->SmoothingWavelength << '\n';
+  os << indent << "Snap: " << this->Snap << '\n';
+  os << indent << "Blur: " << this->Blur << '\n';
+  os << indent << "SnapDistance: " << this->SnapDistance << '\n';
+  os << indent << "SurfaceSpacing: " << this->SurfaceSpacing << '\n';
+  os << indent << "TimeLimit: " << this->TimeLimit << '\n';
+  os << indent << "VoxelLimit: " << this->VoxelLimit << '\n';
+  os << indent << "RadiusArrayName: " << this->RadiusArrayName << '\n';
+  os << indent << "ConfidenceArrayName: " << this->ConfidenceArrayName << '\n';
+}

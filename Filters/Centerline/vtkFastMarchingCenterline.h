@@ -1,0 +1,277 @@
+/**
+ * @class   vtkFastMarchingCenterline
+ * @brief   Trees of centerlines with radii out of an image, a mask or a closed surface.
+ *
+ * A front marches from every seed through the vessels (second-order fast marching in a narrow
+ * region, on the image's own spacing and direction). All tips are found by themselves, or targets are
+ * given; the fastest paths back are put on the axis of the lumen by measured cross-sections, cut
+ * where no vessel is to be seen any more, and joined where a branch's axis meets its parent's.
+ *
+ * What can not be reached is said, by index and reason, in the field data and as a warning; a limit
+ * of time or size ends the work with a message and what was found until then.
+ *
+ * Lengths given as 0 are automatic, and follow voxels and radii: the same data in metres give the
+ * same tree in metres.
+ *
+ * @par Input ports:
+ * - 0: vtkImageData with a speed (any measure that is greatest on the axes: vesselness) or a mask, or a
+ *   vtkPolyData that is a closed surface.
+ * - 1: seeds, any vtkPointSet: one point for each tree, its root.
+ * - 2, optional: targets, any vtkPointSet.
+ * - 3, optional: the vtkImageData in which lumens are measured (HU), on any grid. Without it the radius is
+ *   that of the mask or surface, and on a speed alone a rough one.
+ * - 4, optional: a vtkImageData on the voxels of input 0 whose first point array limits a speed image to
+ *   where it is not 0.
+ *
+ * @par Output ports:
+ * - 0, vtkPolyData: the trees, one polyline a branch from root to tip; the first point of a branch is the
+ *   last of its parent. Point data `MaximumInscribedSphereRadius` (double, mm: of the circle with the
+ *   section's mean wall distance; on masks and surfaces to their wall), `Abscissas` (double, mm from the
+ *   root), `Confidence` (double, 0 a guess to 1 clearly seen). Cell data `GroupIds`,
+ *   `ParentGroupIds` (-1 at a root), `TreeIds` (index of the seed; all int), `Length` (double, mm),
+ *   `Tortuosity` (double, length / chord - 1).
+ * - 1, vtkPolyData: VMTK's form: for each tip or target one line from its root for each piece between bifurcations,
+ *   proximal pieces repeated. Point data as output 0; cell data `CenterlineIds`, `TractIds`,
+ *   `GroupIds`, `Blanking` (all int; Blanking is 0: bifurcations are points here).
+ * - 2, vtkPolyData: bifurcations as vertices. Point data `ParentGroupIds` (int), `TreeIds` (int),
+ *   `DaughterGroupIds` (int, two or more components, -1: none), `MaximumInscribedSphereRadius`.
+ *
+ * Field data of all outputs: what the input has; `SeedStatus`, `TargetStatus` (int,
+ * coronary::EndStatus), `SeedMessage`, `TargetMessage` (string, "reached" or why not), `ImageBlur` (double,
+ * mm), `Complete` (unsigned char, 0 when a limit ended the work).
+ *
+ * @par Failure:
+ * A missing array, seeds that are not there or a setting out of range is one error and no output. An
+ * empty image, surface or seed list is a normal piece of a pipeline: empty outputs, no error.
+ *
+ * @sa coronary::ExtractCenterlines, vtkCoronaryTreeTopology
+ */
+#ifndef vtkFastMarchingCenterline_h
+#define vtkFastMarchingCenterline_h
+
+#include "vtkCoronaryCenterlineModule.h" // for the export macro
+#include "vtkPolyDataAlgorithm.h"
+
+#include <string> // for std::string
+
+class VTKCORONARYCENTERLINE_EXPORT vtkFastMarchingCenterline : public vtkPolyDataAlgorithm
+{
+public:
+  static vtkFastMarchingCenterline* New();
+  vtkTypeMacro(vtkFastMarchingCenterline, vtkPolyDataAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  enum OutputPorts
+  {
+    TreePort = 0,
+    LinesPort = 1,
+    BifurcationsPort = 2
+  };
+
+  enum ImageKinds
+  {
+    SpeedImage = 0,
+    MaskImage = 1
+  };
+
+  ///@{
+  /**
+   * Connections by name: seeds (port 1), targets (port 2), the measured image (port 3), a mask (port 4).
+   */
+  void SetSeedConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(1, output); }
+  void SetTargetConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(2, output); }
+  void SetIntensityConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(3, output); }
+  void SetMaskConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(4, output); }
+  ///@}
+
+  ///@{
+  /**
+   * What the image of input 0 is: a speed or a mask. Default a speed.
+   */
+  vtkSetClampMacro(ImageKind, int, SpeedImage, MaskImage);
+  vtkGetMacro(ImageKind, int);
+  ///@}
+
+  ///@{
+  /**
+   * Speeds at or below are no vessel. Automatic (default): 2 % of the speed's 99.99th percentile.
+   */
+  vtkSetMacro(AutomaticSpeedThreshold, bool);
+  vtkGetMacro(AutomaticSpeedThreshold, bool);
+  vtkBooleanMacro(AutomaticSpeedThreshold, bool);
+  vtkSetMacro(SpeedThreshold, double);
+  vtkGetMacro(SpeedThreshold, double);
+  ///@}
+
+  ///@{
+  /**
+   * Intensities at or below are no vessel. Automatic (default): 40 % of the way from the
+   * surroundings to the lumen as they are at the seeds.
+   */
+  vtkSetMacro(AutomaticIntensityThreshold, bool);
+  vtkGetMacro(AutomaticIntensityThreshold, bool);
+  vtkBooleanMacro(AutomaticIntensityThreshold, bool);
+  vtkSetMacro(IntensityThreshold, double);
+  vtkGetMacro(IntensityThreshold, double);
+  ///@}
+
+  ///@{
+  /**
+   * The front's speed is the given one to this power, 0.5 to 6. Default 2.
+   */
+  vtkSetMacro(SpeedExponent, double);
+  vtkGetMacro(SpeedExponent, double);
+  ///@}
+
+  ///@{
+  /**
+   * Whether tips are looked for also when targets are given. Default off: then only the targets.
+   */
+  vtkSetMacro(FindTips, bool);
+  vtkGetMacro(FindTips, bool);
+  vtkBooleanMacro(FindTips, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Shorter branches are no branches, mm. Default 0: ten voxels, and one and a half radii of the parent.
+   */
+  vtkSetMacro(MinimumBranchLength, double);
+  vtkGetMacro(MinimumBranchLength, double);
+  ///@}
+
+  ///@{
+  /**
+   * Confidence from which on a section speaks for a vessel, 0 to 1. Default 0.5.
+   */
+  vtkSetMacro(MinimumConfidence, double);
+  vtkGetMacro(MinimumConfidence, double);
+  ///@}
+
+  ///@{
+  /**
+   * Length without a visible vessel that a branch may bridge, mm. Default 0: ten voxels.
+   */
+  vtkSetMacro(MaximumGap, double);
+  vtkGetMacro(MaximumGap, double);
+  ///@}
+
+  ///@{
+  /**
+   * Greatest radius that is measured, mm. Default 0: twice the radius at the seeds.
+   */
+  vtkSetMacro(MaximumRadius, double);
+  vtkGetMacro(MaximumRadius, double);
+  ///@}
+
+  ///@{
+  /**
+   * Distance of the points along the branches, mm. Default 0: 0.6 voxels.
+   */
+  vtkSetMacro(ResamplingStepLength, double);
+  vtkGetMacro(ResamplingStepLength, double);
+  ///@}
+
+  ///@{
+  /**
+   * Wavelength that the smoothing halves, mm; twice of it passes. Default 0: 12 voxels.
+   */
+  vtkSetMacro(SmoothingWavelength, double);
+  vtkGetMacro(SmoothingWavelength, double);
+  ///@}
+
+  ///@{
+  /**
+   * Put points on the centre of the measured cross-section. Default on.
+   */
+  vtkSetMacro(Snap, bool);
+  vtkGetMacro(Snap, bool);
+  vtkBooleanMacro(Snap, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Standard deviation of the image's blur, for which radii are corrected, mm. Default 0: measured.
+   */
+  vtkSetMacro(Blur, double);
+  vtkGetMacro(Blur, double);
+  ///@}
+
+  ///@{
+  /**
+   * How far a seed or target may lie from a vessel, mm. Default 0: three voxels or the radius at the seeds.
+   */
+  vtkSetMacro(SnapDistance, double);
+  vtkGetMacro(SnapDistance, double);
+  ///@}
+
+  ///@{
+  /**
+   * Voxel size of the grid in which a surface is marched, mm. Default 0: an eighth of the mean
+   * diameter, limited to 24 million voxels.
+   */
+  vtkSetMacro(SurfaceSpacing, double);
+  vtkGetMacro(SurfaceSpacing, double);
+  ///@}
+
+  ///@{
+  /**
+   * The work ends, with a warning and what was found, after so many seconds (default 120), and does
+   * not begin with more voxels in the region (default 100 million).
+   */
+  vtkSetMacro(TimeLimit, double);
+  vtkGetMacro(TimeLimit, double);
+  vtkSetMacro(VoxelLimit, vtkIdType);
+  vtkGetMacro(VoxelLimit, vtkIdType);
+  ///@}
+
+  ///@{
+  /**
+   * Names of the radius and confidence arrays. Defaults `MaximumInscribedSphereRadius`, `Confidence`.
+   */
+  vtkSetMacro(RadiusArrayName, std::string);
+  vtkGetMacro(RadiusArrayName, std::string);
+  vtkSetMacro(ConfidenceArrayName, std::string);
+  vtkGetMacro(ConfidenceArrayName, std::string);
+  ///@}
+
+protected:
+  vtkFastMarchingCenterline();
+  ~vtkFastMarchingCenterline() override;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestUpdateExtent(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestData(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+private:
+  vtkFastMarchingCenterline(const vtkFastMarchingCenterline&) = delete;
+  void operator=(const vtkFastMarchingCenterline&) = delete;
+
+  void Execute(vtkInformationVector** inputs, vtkInformationVector* outputs);
+
+  int ImageKind = SpeedImage;
+  bool AutomaticSpeedThreshold = true;
+  double SpeedThreshold = 0.01;
+  bool AutomaticIntensityThreshold = true;
+  double IntensityThreshold = 100.0;
+  double SpeedExponent = 2.0;
+  bool FindTips = false;
+  double MinimumBranchLength = 0.0;
+  double MinimumConfidence = 0.5;
+  double MaximumGap = 0.0;
+  double MaximumRadius = 0.0;
+  double ResamplingStepLength = 0.0;
+  double SmoothingWavelength = 0.0;
+  bool Snap = true;
+  double Blur = 0.0;
+  double SnapDistance = 0.0;
+  double SurfaceSpacing = 0.0;
+  double TimeLimit = 120.0;
+  vtkIdType VoxelLimit = 100000000;
+  std::string RadiusArrayName;
+  std::string ConfidenceArrayName;
+};
+
+#endif
