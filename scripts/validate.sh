@@ -16,7 +16,7 @@ EOF
 
 # name: program and its arguments
 tables=(
-  "vesselness-itk: vesselness-benchmark itk --repeats 5 --strict"
+  "vesselness-itk: vesselness-benchmark itk --repeats 3 --strict"
   "vesselness-clinical: vesselness-benchmark clinical --strict"
   "vesselness-methods: vesselness-benchmark methods"
   "vesselness-scales: vesselness-benchmark scales"
