@@ -370,9 +370,11 @@ private:
         const double step = 0.5;
         double steepest = RimGradient;
         double place = -1.0;
-        const double until = 1.35 * disc.radius;
-        for (double rho = 0.65 * disc.radius; rho < until; rho += step)
+        const double from = 0.65 * disc.radius;
+        const int steps = static_cast<int>(std::ceil((1.35 * disc.radius - from) / step));
+        for (int i = 0; i < steps; ++i)
         {
+          const double rho = from + i * step;
           const float inner =
             this->At(disc.x + (rho - 0.75) / h * cosine, disc.y + (rho - 0.75) / h * sine);
           const float outer =
@@ -1277,8 +1279,10 @@ double OutletSearch::Recentre(
     const double cosine = std::cos(2.0 * Pi * ray / rays);
     const double sine = std::sin(2.0 * Pi * ray / rays);
     float before = this->At(centre);
-    for (double rho = step; rho < 1.6 * radius + 0.5; rho += step)
+    const int steps = static_cast<int>(std::ceil((1.6 * radius + 0.5) / step));
+    for (int i = 1; i < steps; ++i)
     {
+      const double rho = i * step;
       const float value = this->At(centre + rho * (cosine * u + sine * v));
       if (value < this->Half)
       {

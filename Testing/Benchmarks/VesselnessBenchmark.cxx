@@ -109,8 +109,9 @@ enum class Centre
 std::unique_ptr<TestImage> RenderPhantom(
   const Dimensions& n, const Vector3& spacing, Centre centre, const Options& options)
 {
-  auto image =
-    std::unique_ptr<TestImage>(new TestImage{ n, spacing, SharedArray<std::int16_t>(CountOf(n)) });
+  // NOLINTNEXTLINE(modernize-make-unique): an aggregate that can not be moved.
+  std::unique_ptr<TestImage> image(
+    new TestImage{ n, spacing, SharedArray<std::int16_t>(CountOf(n)) });
   MeasureInChild([] {},
     [&]
     {
@@ -303,6 +304,7 @@ template <typename Get>
 std::vector<double> Each(const std::vector<Measurement>& runs, Get get)
 {
   std::vector<double> values;
+  values.reserve(runs.size());
   for (const Measurement& run : runs)
   {
     values.push_back(get(run));
@@ -556,6 +558,7 @@ void TableClinical(const Options& options, Verdicts& verdicts)
       Row{ "short input, c measured first", true, true } })
   {
     std::vector<Measurement> runs;
+    runs.reserve(options.repeats);
     for (int run = 0; run < options.repeats; ++run)
     {
       runs.push_back(MeasureFilter(*image, row.shortInput, row.automaticC, options.threads));
@@ -664,6 +667,7 @@ void TableScales(const Options& options)
     Variant variant;
     variant.settings.sigmas = { sigma };
     std::vector<Measurement> runs;
+    runs.reserve(options.repeats);
     for (int run = 0; run < options.repeats; ++run)
     {
       runs.push_back(MeasureOurs(*image, variant, options.threads));
@@ -695,6 +699,7 @@ void TableInstructions(const Options& options)
     Variant variant;
     variant.instructions = instructions;
     std::vector<Measurement> runs;
+    runs.reserve(options.repeats);
     for (int run = 0; run < options.repeats; ++run)
     {
       runs.push_back(MeasureOurs(*image, variant, options.threads));
@@ -839,9 +844,9 @@ int Run(const Options& options)
   }
   return 0;
 }
-}
 
-int main(int argc, char** argv)
+/// @return the exit code
+int Start(int argc, char** argv)
 {
   Options options;
   CLI::App app("Time, memory and agreement of the vesselness, beside ITK's in the same run. Each "
@@ -868,13 +873,23 @@ int main(int argc, char** argv)
   app.add_flag("--without-itk", options.withoutItk, "Do not run ITK");
   app.add_flag("--strict", options.strict, "Exit code 1 when a target of time or memory is missed");
   CLI11_PARSE(app, argc, argv);
+  return Run(options);
+}
+}
+
+int main(int argc, char** argv)
+{
   try
   {
-    return Run(options);
+    return Start(argc, argv);
   }
   catch (const std::exception& e)
   {
     std::fprintf(stderr, "vesselness-benchmark: %s\n", e.what());
-    return 1;
   }
+  catch (...)
+  {
+    std::fputs("vesselness-benchmark: unknown error\n", stderr);
+  }
+  return 1;
 }
