@@ -746,10 +746,10 @@ int Validate(int argc, char** argv)
     }
     outcomes.push_back(Run(test, segment, c));
     const Outcome& o = outcomes.back();
-    std::fprintf(stderr, "seed %llu, %.0f ms, %.0f HU, %s: Dice %.3f, ostia %s %s\n",
+    std::fprintf(stderr, "seed %llu, %.0f ms, %.0f HU, %s: Dice %s, ostia %s %s\n",
       static_cast<unsigned long long>(test.seed), 1e3 * test.window, test.noise,
-      test.geometry.name.c_str(), o.dice, Format("%.2f", o.ostia[0].error).c_str(),
-      Format("%.2f", o.ostia[1].error).c_str());
+      test.geometry.name.c_str(), segment ? Format("%.3f", o.dice).c_str() : "-",
+      Format("%.2f", o.ostia[0].error).c_str(), Format("%.2f", o.ostia[1].error).c_str());
   };
   for (const std::uint64_t seed : seeds)
   {
