@@ -99,6 +99,14 @@ constexpr const char* HuoKassabResidual = "HuoKassabResidual"; ///< double, rela
 constexpr const char* FinetRatio = "FinetRatio";               ///< double
 constexpr const char* FittedExponent = "FittedExponent";       ///< double, NaN where none fits
 
+// Centerlines held against a reference, point data (FromReference also cell data).
+constexpr const char* CenterlineMatch = "CenterlineMatch";       ///< int, 1 true, 2 missed, 3 false
+constexpr const char* CenterlineDistance = "CenterlineDistance"; ///< double, mm
+constexpr const char* FromReference = "FromReference";           ///< int, 0 or 1
+// Field data of their table.
+constexpr const char* LongestFalse = "LongestFalse";   ///< double, mm
+constexpr const char* LongestMissed = "LongestMissed"; ///< double, mm
+
 // Surface, cell data.
 constexpr const char* CellEntityIds = "CellEntityIds"; ///< int, 1 wall, 2.. caps
 }

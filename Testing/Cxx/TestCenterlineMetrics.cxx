@@ -1,0 +1,418 @@
+// vtkCenterlineMetrics through the VTK pipeline: table, lines, names, time, pieces, blocks, refusals.
+#include "vtkCenterlineMetrics.h"
+
+#include "CenterlineOverlap.h"
+#include "ParallelFor.h"
+#include "vtkCoronaryPhantomSource.h"
+
+#include "vtkCallbackCommand.h"
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkCommand.h"
+#include "vtkCompositeDataPipeline.h"
+#include "vtkDoubleArray.h"
+#include "vtkExecutive.h"
+#include "vtkFieldData.h"
+#include "vtkFloatArray.h"
+#include "vtkIdTypeArray.h"
+#include "vtkInformation.h"
+#include "vtkIntArray.h"
+#include "vtkMultiBlockDataSet.h"
+#include "vtkNew.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkTable.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace
+{
+/// Lines along x from 0, at the given heights and of the given lengths.
+vtkSmartPointer<vtkPolyData> MakeLines(const std::vector<std::array<double, 2>>& lines,
+  const char* radiusName = "MaximumInscribedSphereRadius", double radius = 1.5)
+{
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  vtkNew<vtkPoints> points;
+  vtkNew<vtkCellArray> cells;
+  vtkNew<vtkFloatArray> radii;
+  for (const auto& [height, length] : lines)
+  {
+    cells->InsertNextCell(21);
+    for (int i = 0; i <= 20; ++i)
+    {
+      cells->InsertCellPoint(points->InsertNextPoint(length * i / 20.0, height, 0.0));
+      radii->InsertNextValue(static_cast<float>(radius));
+    }
+  }
+  data->SetPoints(points);
+  data->SetLines(cells);
+  if (radiusName != nullptr)
+  {
+    radii->SetName(radiusName);
+    data->GetPointData()->AddArray(radii);
+  }
+  return data;
+}
+
+vtkSmartPointer<vtkPolyData> PhantomTree(int seed, double time = 0.75)
+{
+  vtkNew<vtkCoronaryPhantomSource> source;
+  source->SetSeed(seed);
+  source->UpdateInformation();
+  source->GetOutputInformation(vtkCoronaryPhantomSource::TreePort)
+    ->Set(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(), time);
+  source->Update(vtkCoronaryPhantomSource::TreePort);
+  auto tree = vtkSmartPointer<vtkPolyData>::New();
+  tree->ShallowCopy(source->GetOutputDataObject(vtkCoronaryPhantomSource::TreePort));
+  return tree;
+}
+
+double Cell(vtkTable* table, vtkIdType row, const char* column)
+{
+  EXPECT_NE(table->GetColumnByName(column), nullptr) << column;
+  return table->GetValueByName(row, column).ToDouble();
+}
+
+double Total(vtkTable* table, const char* column)
+{
+  EXPECT_GT(table->GetNumberOfRows(), 0);
+  return Cell(table, table->GetNumberOfRows() - 1, column);
+}
+
+/// Collects errors and warnings while it lives, and keeps them from the console.
+class Messages
+{
+public:
+  explicit Messages(vtkAlgorithm* algorithm)
+  {
+    this->Collect(algorithm, vtkCommand::ErrorEvent, this->Errors);
+    this->Collect(algorithm, vtkCommand::WarningEvent, this->Warnings);
+    // The executive adds that the request failed.
+    this->Collect(algorithm->GetExecutive(), vtkCommand::ErrorEvent, this->Echoes);
+  }
+
+  ~Messages()
+  {
+    for (const auto& [sender, tag] : this->Observers)
+    {
+      sender->RemoveObserver(tag);
+    }
+  }
+
+  Messages(const Messages&) = delete;
+  Messages& operator=(const Messages&) = delete;
+
+  std::vector<std::string> Errors;
+  std::vector<std::string> Warnings;
+  std::vector<std::string> Echoes;
+
+private:
+  void Collect(vtkObject* sender, unsigned long event, std::vector<std::string>& messages)
+  {
+    vtkNew<vtkCallbackCommand> observer;
+    observer->SetClientData(&messages);
+    observer->SetCallback([](vtkObject*, unsigned long, void* list, void* text)
+      { static_cast<std::vector<std::string>*>(list)->emplace_back(static_cast<char*>(text)); });
+    this->Observers.emplace_back(sender, sender->AddObserver(event, observer));
+  }
+
+  std::vector<std::pair<vtkObject*, unsigned long>> Observers;
+};
+
+void ExpectRefusal(vtkCenterlineMetrics* filter, const std::string& part)
+{
+  SCOPED_TRACE(part);
+  Messages messages(filter);
+  filter->Update();
+  ASSERT_EQ(messages.Errors.size(), 1U);
+  EXPECT_NE(messages.Errors[0].find(part), std::string::npos) << messages.Errors[0];
+  EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 0);
+  EXPECT_EQ(filter->GetLines()->GetNumberOfPoints(), 0);
+}
+}
+
+TEST(CenterlineMetrics, TwoLinesAlongTheirOrder)
+{
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(MakeLines({ { 0.4, 60.0 } }, nullptr));
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }));
+  filter->Update();
+  vtkTable* table = filter->GetOutput();
+  ASSERT_EQ(table->GetNumberOfRows(), 2);
+  EXPECT_EQ(table->GetValueByName(0, "Name").ToString(), "path 0");
+  EXPECT_EQ(table->GetValueByName(1, "Name").ToString(), "total");
+  for (vtkIdType row = 0; row < 2; ++row)
+  {
+    for (const char* name : { "OV", "OF", "OT" })
+    {
+      EXPECT_DOUBLE_EQ(Cell(table, row, name), 1.0) << name;
+    }
+    for (const char* name : { "AD", "AI", "AT" })
+    {
+      EXPECT_NEAR(
+        Cell(table, row, name), (2001.0 * 0.4 + 2000.0 * std::hypot(0.4, 0.03)) / 4001.0, 1e-5)
+        << name;
+    }
+    EXPECT_TRUE(std::isnan(Cell(table, row, "RadiusError")));
+    EXPECT_EQ(Cell(table, row, "TPR"), 2001.0);
+    EXPECT_EQ(Cell(table, row, "FN"), 0.0);
+    EXPECT_EQ(Cell(table, row, "TPM"), 2001.0);
+    EXPECT_EQ(Cell(table, row, "FP"), 0.0);
+    EXPECT_NEAR(Cell(table, row, "ReferenceLength"), 60.0, 1e-5);
+  }
+  EXPECT_EQ(Cell(table, 0, "ResultLine"), 0.0);
+  EXPECT_EQ(Cell(table, 1, "ResultLine"), -1.0);
+  EXPECT_NE(vtkIdTypeArray::SafeDownCast(table->GetColumnByName("TPR")), nullptr);
+}
+
+TEST(CenterlineMetrics, LinesSayWhatWasFoundMissedAndFalse)
+{
+  // The result leaves the second half of the upper line, and has one of its own.
+  const auto reference = MakeLines({ { 0.0, 60.0 }, { 20.0, 60.0 } });
+  const auto result = MakeLines({ { 0.0, 60.0 }, { 20.0, 30.0 }, { 40.0, 10.0 } }, "Radius", 1.8);
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(result);
+  filter->SetReferenceData(reference);
+  filter->Update();
+  vtkTable* table = filter->GetOutput();
+  ASSERT_EQ(table->GetNumberOfRows(), 3);
+  EXPECT_EQ(table->GetValueByName(1, "Name").ToString(), "line 1");
+  EXPECT_DOUBLE_EQ(Cell(table, 0, "OV"), 1.0);
+  EXPECT_EQ(Cell(table, 1, "TPR"), 1051.0);
+  EXPECT_EQ(Cell(table, 1, "FN"), 950.0);
+  EXPECT_EQ(Cell(table, 1, "TPM"), 1001.0);
+  EXPECT_NEAR(Cell(table, 1, "FP") * 0.03, 10.0, 0.05);
+  EXPECT_NEAR(Cell(table, 0, "RadiusError"), 0.3, 1e-5);
+  EXPECT_NEAR(Cell(table, 0, "RadiusBias"), 0.3, 1e-5);
+  EXPECT_NEAR(table->GetFieldData()->GetArray("LongestFalse")->GetComponent(0, 0), 10.0, 0.05);
+  EXPECT_NEAR(table->GetFieldData()->GetArray("LongestMissed")->GetComponent(0, 0), 28.5, 0.05);
+
+  vtkPolyData* lines = filter->GetLines();
+  ASSERT_EQ(lines->GetNumberOfLines(), 5);
+  ASSERT_EQ(lines->GetNumberOfPoints(), 5 * 21);
+  auto* match = vtkIntArray::SafeDownCast(lines->GetPointData()->GetArray("CenterlineMatch"));
+  auto* distance =
+    vtkDoubleArray::SafeDownCast(lines->GetPointData()->GetArray("CenterlineDistance"));
+  auto* side = vtkIntArray::SafeDownCast(lines->GetPointData()->GetArray("FromReference"));
+  auto* cellSide = vtkIntArray::SafeDownCast(lines->GetCellData()->GetArray("FromReference"));
+  auto* radius = lines->GetPointData()->GetArray("MaximumInscribedSphereRadius");
+  ASSERT_TRUE(match != nullptr && distance != nullptr && side != nullptr && cellSide != nullptr &&
+    radius != nullptr);
+  EXPECT_EQ(match->GetValue(10), 1);
+  EXPECT_EQ(match->GetValue(21 + 5), 1);
+  EXPECT_EQ(match->GetValue(21 + 20), 2);
+  EXPECT_NEAR(distance->GetValue(21 + 20), 30.0, 1e-5);
+  EXPECT_EQ(match->GetValue(3 * 21 + 20), 1);
+  EXPECT_EQ(match->GetValue(4 * 21 + 3), 3);
+  EXPECT_NEAR(distance->GetValue(4 * 21 + 3), 20.0, 1e-5);
+  EXPECT_EQ(side->GetValue(41), 1);
+  EXPECT_EQ(side->GetValue(42), 0);
+  EXPECT_EQ(cellSide->GetValue(1), 1);
+  EXPECT_EQ(cellSide->GetValue(2), 0);
+  EXPECT_NEAR(radius->GetComponent(60, 0), 1.8, 1e-6);
+  // No input was changed.
+  EXPECT_EQ(reference->GetPointData()->GetNumberOfArrays(), 1);
+  EXPECT_EQ(result->GetPointData()->GetNumberOfArrays(), 1);
+}
+
+TEST(CenterlineMetrics, PhantomTreesByName)
+{
+  const auto reference = PhantomTree(61);
+  const auto result = PhantomTree(61, 0.8);
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(result);
+  filter->SetReferenceData(reference);
+  filter->Update();
+  vtkTable* trees = filter->GetOutput();
+  ASSERT_EQ(trees->GetNumberOfRows(), reference->GetNumberOfLines() + 1);
+  auto* labels =
+    vtkStringArray::SafeDownCast(reference->GetCellData()->GetAbstractArray("SegmentLabel"));
+  ASSERT_NE(labels, nullptr);
+  EXPECT_EQ(trees->GetValueByName(0, "Name").ToString(), "line 0, " + labels->GetValue(0));
+  const double overlap = Total(trees, "OV");
+  EXPECT_GT(overlap, 0.5);
+  EXPECT_GT(Total(trees, "AD"), 0.02);
+  filter->SetMethod(vtkCenterlineMetrics::PathMethod);
+  filter->Update();
+  vtkTable* paths = filter->GetOutput();
+  EXPECT_LT(paths->GetNumberOfRows(), reference->GetNumberOfLines() + 1);
+  EXPECT_EQ(paths->GetValueByName(0, "Name").ToString().find("path 0 "), 0U);
+  // An ordered correspondence is never shorter than the nearest points are.
+  EXPECT_GT(Total(paths, "AD"), 0.02);
+  EXPECT_EQ(paths->GetFieldData()->GetArray("LongestFalse"), nullptr);
+
+  filter->SetMethod(vtkCenterlineMetrics::TreeMethod);
+  coronary::SetNumberOfThreads(1);
+  filter->Update();
+  coronary::SetNumberOfThreads(0);
+  EXPECT_EQ(Total(filter->GetOutput(), "OV"), overlap);
+}
+
+TEST(CenterlineMetrics, FollowsTime)
+{
+  vtkNew<vtkCoronaryPhantomSource> moving;
+  moving->SetSeed(62);
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputConnection(moving->GetOutputPort(vtkCoronaryPhantomSource::TreePort));
+  filter->SetReferenceData(PhantomTree(62, 0.75));
+  filter->UpdateInformation();
+  std::vector<double> distances;
+  for (const double time : { 0.75, 0.35 })
+  {
+    filter->GetOutputInformation(0)->Set(
+      vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(), time);
+    filter->Update();
+    distances.push_back(Total(filter->GetOutput(), "AD"));
+  }
+  EXPECT_LT(distances[0], 0.02);
+  EXPECT_GT(distances[1], 1.0);
+}
+
+TEST(CenterlineMetrics, EmptyInputsAndPieces)
+{
+  vtkNew<vtkPolyData> nothing;
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(nothing);
+  filter->SetReferenceData(nothing);
+  filter->Update();
+  ASSERT_EQ(filter->GetOutput()->GetNumberOfRows(), 1);
+  EXPECT_TRUE(std::isnan(Total(filter->GetOutput(), "OV")));
+  EXPECT_EQ(filter->GetLines()->GetNumberOfPoints(), 0);
+  EXPECT_NE(filter->GetLines()->GetPointData()->GetArray("CenterlineMatch"), nullptr);
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }));
+  filter->Update();
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 0.0);
+  filter->SetReferenceData(nothing);
+  filter->SetInputData(MakeLines({ { 0.0, 60.0 } }));
+  filter->Update();
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 0.0);
+
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }));
+  filter->UpdatePiece(1, 3, 0);
+  EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 0);
+  EXPECT_EQ(filter->GetLines()->GetNumberOfPoints(), 0);
+  filter->UpdatePiece(0, 3, 0);
+  EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 2);
+}
+
+TEST(CenterlineMetrics, BlocksOneByOne)
+{
+  vtkNew<vtkMultiBlockDataSet> blocks;
+  blocks->SetBlock(0, MakeLines({ { 0.0, 60.0 } }));
+  blocks->SetBlock(1, MakeLines({ { 0.0, 30.0 } }));
+  vtkNew<vtkCenterlineMetrics> filter;
+  vtkNew<vtkCompositeDataPipeline> executive;
+  filter->SetExecutive(executive);
+  filter->SetInputDataObject(0, blocks);
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }));
+  filter->Update();
+  auto* output = vtkMultiBlockDataSet::SafeDownCast(filter->GetOutputDataObject(0));
+  ASSERT_NE(output, nullptr);
+  ASSERT_EQ(output->GetNumberOfBlocks(), 2U);
+  EXPECT_DOUBLE_EQ(Total(vtkTable::SafeDownCast(output->GetBlock(0)), "OV"), 1.0);
+  EXPECT_NEAR(Total(vtkTable::SafeDownCast(output->GetBlock(1)), "OV"), 2052.0 / 3002.0, 1e-9);
+}
+
+TEST(CenterlineMetrics, RefusesWhatItCanNotUse)
+{
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(MakeLines({ { 0.0, 60.0 } }));
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }, nullptr));
+  ExpectRefusal(filter, "The reference has no point array MaximumInscribedSphereRadius or Radius");
+  filter->SetRadiusArrayName("Width");
+  ExpectRefusal(filter, "no point array Width");
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }, "Width"));
+  filter->Update();
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);
+  filter->SetRadiusArrayName("Automatic");
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }));
+  const auto bad = MakeLines({ { 0.0, 60.0 } });
+  bad->GetPoints()->SetPoint(3, 0.0, std::numeric_limits<double>::quiet_NaN(), 0.0);
+  filter->SetInputData(bad);
+  ExpectRefusal(filter, "point 3 of the result is not finite");
+  filter->SetInputData(MakeLines({ { 0.0, 60.0 } }, "Radius", -1.0));
+  ExpectRefusal(filter, "radius of point 0 of the result");
+  filter->SetInputData(MakeLines({ { 0.0, 60.0 } }));
+  filter->SetSpacing(0.0);
+  ExpectRefusal(filter, "the spacing must be positive");
+  filter->SetSpacing(0.03);
+  filter->SetRelevantRadius(-1.0);
+  ExpectRefusal(filter, "the relevant radius");
+  filter->SetRelevantRadius(0.75);
+  filter->SetStartLength(-1.0);
+  ExpectRefusal(filter, "the start length");
+  filter->SetStartLength(5.0);
+  filter->SetMethod(7);
+  ExpectRefusal(filter, "There is no method 7");
+  filter->SetMethod(vtkCenterlineMetrics::AutomaticMethod);
+  filter->SetMatchArrayName("");
+  ExpectRefusal(filter, "An output array needs a name");
+  filter->SetMatchArrayName("Match");
+  filter->Update();
+  EXPECT_NE(filter->GetLines()->GetPointData()->GetArray("Match"), nullptr);
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);
+}
+
+TEST(CenterlineMetrics, WarnsOfALineThatRunsTheOtherWay)
+{
+  const auto reversed = MakeLines({ { 0.0, 60.0 } });
+  for (vtkIdType i = 0; i <= 20; ++i)
+  {
+    reversed->GetPoints()->SetPoint(i, 60.0 - 3.0 * static_cast<double>(i), 0.0, 0.0);
+  }
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(reversed);
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }));
+  Messages messages(filter);
+  filter->Update();
+  ASSERT_EQ(messages.Warnings.size(), 1U);
+  EXPECT_NE(messages.Warnings[0].find("against the reference"), std::string::npos);
+  filter->SetMethod(vtkCenterlineMetrics::TreeMethod);
+  filter->Update();
+  EXPECT_EQ(messages.Warnings.size(), 1U);
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);
+}
+
+TEST(CenterlineMetrics, AbortLeavesNothingAndTheNextRequestStartsAnew)
+{
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(PhantomTree(63));
+  filter->SetReferenceData(PhantomTree(63));
+  vtkNew<vtkCallbackCommand> stop;
+  stop->SetCallback([](vtkObject* sender, unsigned long, void*, void*)
+    { static_cast<vtkAlgorithm*>(sender)->SetAbortExecute(1); });
+  const unsigned long tag = filter->AddObserver(vtkCommand::ProgressEvent, stop);
+  filter->Update();
+  EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 0);
+  filter->RemoveObserver(tag);
+  filter->SetAbortExecute(0);
+  filter->Update();
+  EXPECT_GT(filter->GetOutput()->GetNumberOfRows(), 10);
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);
+}
+
+TEST(CenterlineMetrics, PrintsItsSettings)
+{
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetRelevantRadius(0.6);
+  std::ostringstream text;
+  filter->Print(text);
+  for (const char* name :
+    { "Method: 0", "Spacing: 0.03", "RelevantRadius: 0.6", "LeastRadius: 0", "StartLength: 5",
+      "ClipStart: 1", "RadiusArrayName: Automatic", "MatchArrayName: CenterlineMatch",
+      "DistanceArrayName: CenterlineDistance", "FromReferenceArrayName: FromReference" })
+  {
+    EXPECT_NE(text.str().find(name), std::string::npos) << name;
+  }
+}
