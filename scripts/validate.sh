@@ -23,6 +23,7 @@ tables=(
   "vesselness-instructions: vesselness-benchmark instructions"
   "vesselness-agreement: vesselness-benchmark agreement"
   "segmentation: validate-segmentation"
+  "centerline: validate-centerline --details --invariance"
 )
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
