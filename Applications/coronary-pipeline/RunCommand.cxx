@@ -10,8 +10,11 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 
+#include "vtkCellData.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryTreeTopology.h"
 #include "vtkDataArray.h"
+#include "vtkFastMarchingCenterline.h"
 #include "vtkFieldData.h"
 #include "vtkFrangiVesselness.h"
 #include "vtkGatedImageReader.h"
@@ -43,11 +46,13 @@ constexpr const char* ReportName = "report.json";
 enum class Stage
 {
   Vesselness,
-  Segmentation
+  Segmentation,
+  Centerline
 };
 const std::vector<std::pair<std::string, Stage>> Stages = {
   { "vesselness", Stage::Vesselness },
   { "segmentation", Stage::Segmentation },
+  { "centerline", Stage::Centerline },
 };
 
 struct RunJob
@@ -64,6 +69,9 @@ struct RunJob
   std::vector<double> seeds;
   double largestRadius = 4.5;
   std::vector<double> window;
+  bool withinMask = false;
+  double leastBranch = 0.0;
+  double centerlineSeconds = 120.0;
   int threads = 0;
   bool compress = false;
   bool quiet = false;
@@ -95,8 +103,8 @@ void RunJob::Declare(CLI::App& app)
           }
         }
       },
-      "Last stage: vesselness or segmentation (the default)")
-    ->check(CLI::IsMember({ "vesselness", "segmentation" }))
+      "Last stage: vesselness, segmentation or centerline (the default)")
+    ->check(CLI::IsMember({ "vesselness", "segmentation", "centerline" }))
     ->type_name("STAGE");
 
   const std::string image = "Image";
@@ -161,6 +169,27 @@ void RunJob::Declare(CLI::App& app)
     ->expected(2)
     ->type_name("TISSUE BLOOD")
     ->group(vessels);
+
+  const std::string lines = "Centerlines";
+  app
+    .add_flag("--within-mask", this->withinMask,
+      "March only inside the segmented lumen, not wherever a vessel is to be seen: thin vessels "
+      "end "
+      "earlier")
+    ->group(lines);
+  app
+    .add_option("--least-branch", this->leastBranch, "Shorter branches are none, mm; 0: ten voxels")
+    ->check(Within(0.0, 1000.0))
+    ->type_name("MM")
+    ->capture_default_str()
+    ->group(lines);
+  app
+    .add_option("--centerline-seconds", this->centerlineSeconds,
+      "After this time the trees are written as far as they are found")
+    ->check(Within(0.1, 1e6))
+    ->type_name("S")
+    ->capture_default_str()
+    ->group(lines);
   app.add_flag("--compress", this->compress, "Compress the image files");
   app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
     ->check(WholeWithin(0, 1024))
@@ -215,6 +244,67 @@ nlohmann::ordered_json DescribeSeeds(vtkPolyData* seeds)
   return list;
 }
 
+/// Text for one field of a CSV file.
+std::string Quoted(const std::string& text)
+{
+  std::string quoted = "\"";
+  for (const char c : text)
+  {
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return quoted + "\"";
+}
+
+/// What became of each seed: reached, or why not, with the tree that hangs on it.
+nlohmann::ordered_json DescribeTrees(vtkPolyData* lines, vtkPolyData* seeds)
+{
+  vtkFieldData* fields = lines->GetFieldData();
+  vtkDataArray* status = fields->GetArray(vtkCoronaryArrayNames::SeedStatus);
+  auto* messages =
+    vtkStringArray::SafeDownCast(fields->GetAbstractArray(vtkCoronaryArrayNames::SeedMessage));
+  auto* names = vtkStringArray::SafeDownCast(
+    seeds->GetPointData()->GetAbstractArray(vtkCoronaryArrayNames::Name));
+  vtkDataArray* treeIds = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::TreeIds);
+  vtkDataArray* lengths = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::Length);
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (vtkIdType n = 0; n < seeds->GetNumberOfPoints(); ++n)
+  {
+    vtkIdType branches = 0;
+    double length = 0.0;
+    for (vtkIdType cell = 0; cell < lines->GetNumberOfCells(); ++cell)
+    {
+      if (treeIds->GetTuple1(cell) == static_cast<double>(n))
+      {
+        ++branches;
+        length += lengths->GetTuple1(cell);
+      }
+    }
+    double position[3];
+    seeds->GetPoint(n, position);
+    list.push_back(
+      { { "name", names->GetValue(n) }, { "position", { position[0], position[1], position[2] } },
+        { "status", static_cast<int>(status->GetTuple1(n)) }, { "message", messages->GetValue(n) },
+        { "branches", branches }, { "length", length } });
+  }
+  return list;
+}
+
+std::string StatusTable(const nlohmann::ordered_json& trees)
+{
+  std::string table = "name,x_mm,y_mm,z_mm,status,message,branches,length_mm\n";
+  for (const auto& tree : trees)
+  {
+    table += Quoted(tree["name"].get<std::string>());
+    for (const auto& value : tree["position"])
+    {
+      table += "," + value.dump();
+    }
+    table += "," + tree["status"].dump() + "," + Quoted(tree["message"].get<std::string>()) + "," +
+      tree["branches"].dump() + "," + tree["length"].dump() + "\n";
+  }
+  return table;
+}
+
 void RunJob::Run()
 {
   if (this->scales[0] > this->scales[1])
@@ -255,8 +345,9 @@ void RunJob::Run()
   std::string summary;
   try
   {
-    const bool segment = this->until == Stage::Segmentation;
-    ProgressDisplay progress("stage", segment ? 3 : 2, this->quiet);
+    const bool segment = this->until >= Stage::Segmentation;
+    const bool trace = this->until >= Stage::Centerline;
+    ProgressDisplay progress("stage", trace ? 4 : segment ? 3 : 2, this->quiet);
     const auto update = [&](vtkAlgorithm* algorithm)
     {
       UpdateAtTime(
@@ -335,6 +426,61 @@ void RunJob::Run()
           seed["confidence"].get<double>(), seed["volume"].get<double>());
         summary += text;
       }
+
+      if (trace)
+      {
+        progress.BeginStep(3, "centerline");
+        vtkNew<vtkFastMarchingCenterline> centerline;
+        centerline->SetInputConnection(vesselness->GetOutputPort());
+        centerline->SetSeedConnection(
+          segmentation->GetOutputPort(vtkVesselSegmentation::SeedsPort));
+        centerline->SetIntensityConnection(reference->GetOutputPort());
+        if (this->withinMask)
+        {
+          centerline->SetMaskConnection(segmentation->GetOutputPort());
+        }
+        centerline->SetMinimumBranchLength(this->leastBranch);
+        centerline->SetTimeLimit(this->centerlineSeconds);
+        vtkNew<vtkCoronaryTreeTopology> topology;
+        topology->SetInputConnection(centerline->GetOutputPort());
+        topology->SetRootConnection(segmentation->GetOutputPort(vtkVesselSegmentation::SeedsPort));
+        UpdateAtTime(centerline, 0, phaseTime, messages,
+          [&](double fraction) { progress.Update(0.9 * fraction); });
+        UpdateAtTime(topology, 0, phaseTime, messages,
+          [&](double fraction) { progress.Update(0.9 + 0.1 * fraction); });
+        vtkPolyData* raw = centerline->GetOutput();
+        vtkPolyData* tree = topology->GetOutput();
+        auto* lines = vtkPolyData::SafeDownCast(
+          centerline->GetOutputDataObject(vtkFastMarchingCenterline::LinesPort));
+        auto* forks = vtkPolyData::SafeDownCast(
+          topology->GetOutputDataObject(vtkCoronaryTreeTopology::BifurcationPort));
+        WritePolyData(folder.Add("centerline.vtp"), tree, messages);
+        WritePolyData(folder.Add("bifurcations.vtp"), forks, messages);
+        WritePolyData(folder.Add("centerline_lines.vtp"), lines, messages);
+        const nlohmann::ordered_json trees = DescribeTrees(raw, seedsFound);
+        WriteFileAtomically(folder.Add("status.csv"), StatusTable(trees));
+        const auto text = [&](const char* name)
+        {
+          auto* array = vtkStringArray::SafeDownCast(tree->GetFieldData()->GetAbstractArray(name));
+          return array && array->GetNumberOfValues() > 0 ? std::string(array->GetValue(0))
+                                                         : std::string();
+        };
+        vtkDataArray* complete = raw->GetFieldData()->GetArray(vtkCoronaryArrayNames::Complete);
+        double length = 0.0;
+        for (const auto& one : trees)
+        {
+          length += one["length"].get<double>();
+        }
+        report["centerline"] = { { "file", "centerline.vtp" },
+          { "bifurcations_file", "bifurcations.vtp" }, { "lines_file", "centerline_lines.vtp" },
+          { "status_file", "status.csv" }, { "trees", trees },
+          { "complete", complete && complete->GetTuple1(0) != 0.0 },
+          { "branches", tree->GetNumberOfLines() }, { "bifurcations", forks->GetNumberOfPoints() },
+          { "dominance", text(vtkCoronaryArrayNames::Dominance) },
+          { "image_blur", Numbers(raw, vtkCoronaryArrayNames::ImageBlur) } };
+        summary += "; " + std::to_string(tree->GetNumberOfLines()) + " branches, " +
+          Format(std::round(length)) + " mm";
+      }
     }
     WriteFileAtomically(folder.Add(ReportName), report.dump(2) + "\n");
     ThrowIfInterrupted();
@@ -358,7 +504,8 @@ Command MakeRunCommand(CLI::App& program)
 {
   CLI::App* app = program.add_subcommand(
     "run", "From a gated image series to the coronary arteries, stage by stage");
-  app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp and, last, report.json.");
+  app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, centerline.vtp, "
+              "bifurcations.vtp, centerline_lines.vtp, status.csv and, last, report.json.");
   auto job = std::make_shared<RunJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

@@ -239,6 +239,7 @@ void Extractor::PrepareMeasurement()
       const auto median = [&](double LumenReference::*member)
       {
         std::vector<double> values;
+        values.reserve(seen.size());
         for (const LumenReference& reference : seen)
         {
           values.push_back(reference.*member);

@@ -172,6 +172,7 @@ void AddBranchValues(vtkFieldData* data, const char* name,
   const std::vector<CenterlineTree::Branch>& branches, const Function& valueOf)
 {
   std::vector<std::decay_t<decltype(valueOf(CenterlineTree::Branch()))>> values;
+  values.reserve(branches.size());
   for (const CenterlineTree::Branch& branch : branches)
   {
     values.push_back(valueOf(branch));
@@ -254,6 +255,16 @@ int vtkFastMarchingCenterline::FillInputPortInformation(int port, vtkInformation
   return 1;
 }
 
+int vtkFastMarchingCenterline::RequestInformation(
+  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+  {
+    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  }
+  return 1;
+}
+
 int vtkFastMarchingCenterline::RequestUpdateExtent(
   vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
 {
@@ -279,11 +290,13 @@ int vtkFastMarchingCenterline::RequestUpdateExtent(
 }
 
 int vtkFastMarchingCenterline::RequestData(
-  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
+  const int from = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  const bool wanted = outputs->GetInformationObject(from)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
   try
   {
-    this->Execute(inputs, outputs);
+    this->Execute(wanted, inputs, outputs);
     return 1;
   }
   catch (const coronary::Cancelled&)
@@ -310,7 +323,7 @@ int vtkFastMarchingCenterline::RequestData(
 }
 
 void vtkFastMarchingCenterline::Execute(
-  vtkInformationVector** inputs, vtkInformationVector* outputs)
+  bool wanted, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   Require(!this->RadiusArrayName.empty() && !this->ConfidenceArrayName.empty(),
     "RadiusArrayName and ConfidenceArrayName need a name");
@@ -346,7 +359,7 @@ void vtkFastMarchingCenterline::Execute(
   vtkDataObject* data = vtkDataObject::GetData(inputs[0]->GetInformationObject(0));
   auto* image = vtkImageData::SafeDownCast(data);
   auto* surface = vtkPolyData::SafeDownCast(data);
-  const bool empty = input.seeds.empty() ||
+  const bool empty = !wanted || input.seeds.empty() ||
     (image ? image->GetNumberOfPoints() == 0 : surface->GetNumberOfPoints() == 0);
 
   coronary::CenterlineResult result;

@@ -40,6 +40,8 @@
  * coronary::EndStatus), `SeedMessage`, `TargetMessage` (string, "reached" or why not), `ImageBlur` (double,
  * mm), `Complete` (unsigned char, 0 when a limit ended the work).
  *
+ * The output is whole in piece 0 and empty, with all arrays, in every other piece.
+ *
  * @par Failure:
  * A missing array, seeds that are not there or a setting out of range is one error and no output. An
  * empty image, surface or seed list is a normal piece of a pipeline: empty outputs, no error.
@@ -240,6 +242,8 @@ protected:
   ~vtkFastMarchingCenterline() override;
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
   int RequestUpdateExtent(
     vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
   int RequestData(
@@ -249,7 +253,8 @@ private:
   vtkFastMarchingCenterline(const vtkFastMarchingCenterline&) = delete;
   void operator=(const vtkFastMarchingCenterline&) = delete;
 
-  void Execute(vtkInformationVector** inputs, vtkInformationVector* outputs);
+  /// @param wanted  false: only what an output without branches has
+  void Execute(bool wanted, vtkInformationVector** inputs, vtkInformationVector* outputs);
 
   int ImageKind = SpeedImage;
   bool AutomaticSpeedThreshold = true;

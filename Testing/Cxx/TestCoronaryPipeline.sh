@@ -306,14 +306,34 @@ check_motion() {
 check_run() {
   run 0 phantom --quiet --seed 2 --fractions 0.15,0.2,0.25,0.7,0.74,0.78 --spacing 1.2 --no-truth --output series
   run 0 run series/series.json --scales 0.7 2.5 --output result
-  for file in vesselness.mha mask.mha ostia.vtp aorta.vtp report.json; do
+  for file in vesselness.mha mask.mha ostia.vtp aorta.vtp centerline.vtp bifurcations.vtp \
+    centerline_lines.vtp status.csv report.json; do
     [ -s "result/$file" ] || fail "no $file"
   done
   expect_text stdout "LCA at"
   expect_text stdout "RCA at"
-  expect_text stderr "stage 3 of 3 (segmentation)"
+  expect_text stderr "stage 3 of 4 (segmentation)"
+  expect_text stderr "stage 4 of 4 (centerline)"
+  expect_text stdout " branches, "
+  grep -q '"complete": true' result/report.json || fail "the trees are not complete"
+  [ "$(grep -cE '^"(LCA|RCA)",.*,0,"reached",[0-9]+,[0-9.]+$' result/status.csv)" = 2 ] \
+    || fail "status.csv: $(cat result/status.csv)"
+  for name in SegmentLabel MaximumInscribedSphereRadius Confidence SeedStatus Dominance; do
+    grep -q "Name=\"$name\"" result/centerline.vtp || fail "no $name in centerline.vtp"
+  done
+  for name in CenterlineIds TractIds GroupIds Blanking; do
+    grep -q "Name=\"$name\"" result/centerline_lines.vtp || fail "no $name in centerline_lines.vtp"
+  done
   grep -q '"name": "RCA"' result/report.json || fail "no RCA in the report"
   grep -q '"phase": [345],' result/report.json || fail "not a quiet phase: $(grep phase result/report.json)"
+
+  run 0 run series/series.json --quiet --until segmentation --scales 0.7 2.5 --output mask
+  if [ ! -s mask/mask.mha ] || [ -e mask/centerline.vtp ]; then
+    fail "--until segmentation wrote $(ls mask)"
+  fi
+  run 0 run series/series.json --quiet --within-mask --scales 0.7 2.5 --threads 1 --output inside
+  run 0 run series/series.json --quiet --within-mask --scales 0.7 2.5 --threads 2 --output inside2
+  diff -r inside inside2 || fail "another number of threads gave other files"
 
   run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced
   if [ -s stdout ] || [ -s stderr ]; then
