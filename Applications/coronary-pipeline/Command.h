@@ -41,6 +41,7 @@ MakeCommand MakePhantomCommand;
 MakeCommand MakePhantomMotionCommand;
 MakeCommand MakeInspectCommand;
 MakeCommand MakeRunCommand;
+MakeCommand MakeConvertCommand;
 }
 
 #endif

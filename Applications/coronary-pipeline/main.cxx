@@ -26,6 +26,7 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakePhantomMotionCommand,
   coronary::MakeInspectCommand,
   coronary::MakeRunCommand,
+  coronary::MakeConvertCommand,
 };
 
 int Complain(const CLI::App* command, std::string message, int exitCode)

@@ -7,8 +7,10 @@
 #include "vtkMatrix3x3.h"
 #include "vtkNew.h"
 #include "vtkPolyData.h"
+#include "vtkXMLPolyDataReader.h"
 #include "vtkXMLPolyDataWriter.h"
 
+#include <fstream>
 #include <stdexcept>
 
 namespace coronary
@@ -22,6 +24,30 @@ ImageGrid GridOf(vtkImageData* image)
   grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
     image->GetDirectionMatrix()->GetData());
   return grid;
+}
+
+vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages)
+{
+  vtkNew<vtkXMLPolyDataReader> reader;
+  if (!std::ifstream(path))
+  {
+    throw std::runtime_error("Cannot open '" + path + "'.");
+  }
+  if (!reader->CanReadFile(path.c_str()))
+  {
+    throw std::runtime_error("'" + path + "' is not a VTK XML poly data file.");
+  }
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  try
+  {
+    messages.ThrowIfError();
+  }
+  catch (const std::exception& error)
+  {
+    throw std::runtime_error("Cannot read '" + path + "': " + error.what());
+  }
+  return reader->GetOutput();
 }
 
 void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& messages)

@@ -7,6 +7,8 @@
 
 #include "Geometry.h"
 
+#include "vtkSmartPointer.h"
+
 #include <string>
 
 class vtkImageData;
@@ -17,6 +19,10 @@ namespace coronary
 {
 /// The sampling of an image.
 ImageGrid GridOf(vtkImageData* image);
+
+/// Reads a .vtp file.
+/// @throws std::runtime_error naming the file
+vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages);
 
 /// Writes a .vtp file, atomically.
 /// @throws std::runtime_error naming the file

@@ -98,6 +98,7 @@ std::vector<VmtkTract> ToVmtkTracts(const CenterlineTree& given)
       {
         tract.points.push_back(tree.points[point]);
         tract.radius.push_back(tree.radius[point]);
+        tract.source.push_back(point);
       }
       tracts.push_back(std::move(tract));
     }
@@ -106,8 +107,13 @@ std::vector<VmtkTract> ToVmtkTracts(const CenterlineTree& given)
   return tracts;
 }
 
-CenterlineTree FromVmtkTracts(const std::vector<VmtkTract>& tracts, double tolerance)
+CenterlineTree FromVmtkTracts(
+  const std::vector<VmtkTract>& tracts, double tolerance, std::vector<TractPoint>* origins)
 {
+  if (origins != nullptr)
+  {
+    origins->clear();
+  }
   if (!(tolerance >= 0.0 && std::isfinite(tolerance)))
   {
     Fail("the tolerance must be 0 or more");
@@ -174,6 +180,10 @@ CenterlineTree FromVmtkTracts(const std::vector<VmtkTract>& tracts, double toler
         branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
         tree.points.push_back(tract.points[i]);
         tree.radius.push_back(tract.radius[i]);
+        if (origins != nullptr)
+        {
+          origins->push_back({ t, i });
+        }
       }
       branchOf[tract.groupId] = tree.branches.size();
       tree.branches.push_back(std::move(branch));

@@ -27,12 +27,20 @@ namespace coronary
  */
 struct VmtkTract
 {
-  std::vector<Vector3> points; ///< mm; the first is the last of the tract before
-  std::vector<double> radius;  ///< `MaximumInscribedSphereRadius`, mm
-  int centerlineId = 0;        ///< `CenterlineIds`: number of the path
-  int tractId = 0;             ///< `TractIds`: number of the stretch on its path
-  int groupId = 0;             ///< `GroupIds`: of the branch
-  int blanking = 0;            ///< `Blanking`: 1 where VMTK sees a bifurcation; here always 0
+  std::vector<Vector3> points;      ///< mm; the first is the last of the tract before
+  std::vector<double> radius;       ///< `MaximumInscribedSphereRadius`, mm
+  int centerlineId = 0;             ///< `CenterlineIds`: number of the path
+  int tractId = 0;                  ///< `TractIds`: number of the stretch on its path
+  int groupId = 0;                  ///< `GroupIds`: of the branch
+  int blanking = 0;                 ///< `Blanking`: 1 where VMTK sees a bifurcation; here always 0
+  std::vector<std::int64_t> source; ///< of ToVmtkTracts: indices in the tree; not read
+};
+
+/// A point of a tract.
+struct TractPoint
+{
+  std::size_t tract = 0;
+  std::size_t point = 0;
 };
 
 /// @throws std::invalid_argument as CheckTree
@@ -42,11 +50,13 @@ std::vector<VmtkTract> ToVmtkTracts(const CenterlineTree& tree);
  * The tree that the tracts cover: of tracts of one group the first one counts. A tract whose path
  * has none before begins a tree. `points` and `radius` are kept bit by bit. Blanked groups are
  * branches like the others.
+ * @param origins where each point of the tree was taken from
  * @throws std::invalid_argument that names the tract: of less than two points, with another number of
  *         radii, not finite, its path's tract number missing or twice, a group with two parents, or
  *         without a point that its parent has too (within `tolerance`, mm)
  */
-CenterlineTree FromVmtkTracts(const std::vector<VmtkTract>& tracts, double tolerance = 1e-6);
+CenterlineTree FromVmtkTracts(const std::vector<VmtkTract>& tracts, double tolerance = 1e-6,
+  std::vector<TractPoint>* origins = nullptr);
 
 /// Joints and bones.
 struct TgfSkeleton

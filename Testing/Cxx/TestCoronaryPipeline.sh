@@ -49,6 +49,44 @@ expect_nothing_in() {
 small="--quiet --spacing 3 --window 0 --origin -40 -40 -40 --dimensions 20 20 20"
 coarse="--surface-spacing 1.5 --centerline-spacing 3"
 
+check_convert() {
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 --phases 1 $small $coarse --output made
+  tree=made/truth/centerline_00.vtp
+  run 0 convert $tree lines.vtp
+  expect_text lines.vtp CenterlineIds
+  run 0 convert lines.vtp back.vtp
+  expect_text back.vtp ParentGroupIds
+  run 0 convert $tree tree.tgf
+  run 0 convert lines.vtp lines.tgf
+  run 0 convert back.vtp back.tgf
+  # The same joints in the same order, whichever way they went.
+  cmp lines.tgf back.tgf || fail "the tree did not come back from VMTK's lines"
+  run 0 convert tree.tgf skeleton.vtp --radius 0.5
+  run 0 convert skeleton.vtp again.tgf
+  # The joints may be numbered in another order.
+  for file in tree again; do
+    awk 'NF == 4 { print $2, $3, $4 } NF == 2 { ++bones } END { print bones }' "$file.tgf" |
+      sort >"$file.joints"
+  done
+  cmp tree.joints again.joints || fail "the skeleton did not come back"
+  cp tree.tgf kept.tgf
+
+  run 2 convert $tree out.stl
+  expect_one_line "coronary-pipeline convert" "out.stl"
+  run 2 convert $tree out.tgf --form tree
+  expect_one_line "coronary-pipeline convert" "--form"
+  run 1 convert missing.vtp out.vtp
+  expect_one_line "coronary-pipeline convert" "missing.vtp"
+  printf '1 0 0 0\n2 1 0 0\n#\n1 3\n' >bad.tgf
+  run 1 convert bad.tgf out.vtp
+  expect_one_line "coronary-pipeline convert" "bad.tgf"
+  run 1 convert made/truth/surface_00.vtp tree.tgf
+  expect_one_line "coronary-pipeline convert" "surface_00.vtp"
+  cmp tree.tgf kept.tgf || fail "a failed conversion changed its output"
+  [ ! -e out.vtp ] || fail "out.vtp appeared"
+}
+
 check_files() {
   # shellcheck disable=SC2086
   run 0 phantom --seed 5 --fractions -0.05,0.35 --lost 2:0.5 $small $coarse --output made/here
