@@ -22,7 +22,7 @@ vtkTGFReader::vtkTGFReader()
 
 vtkTGFReader::~vtkTGFReader()
 {
-  this->SetFileName(nullptr);
+  delete[] this->FileName;
 }
 
 int vtkTGFReader::RequestInformation(

@@ -15,7 +15,7 @@ vtkStandardNewMacro(vtkTGFWriter);
 
 vtkTGFWriter::~vtkTGFWriter()
 {
-  this->SetFileName(nullptr);
+  delete[] this->FileName;
 }
 
 int vtkTGFWriter::FillInputPortInformation(int, vtkInformation* info)
