@@ -230,8 +230,6 @@ vtkFastMarchingCenterline::vtkFastMarchingCenterline()
   this->SetNumberOfOutputPorts(3);
   this->SetInputArrayToProcess(
     0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
-  this->SetInputArrayToProcess(
-    1, 3, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
 }
 
 vtkFastMarchingCenterline::~vtkFastMarchingCenterline() = default;
@@ -420,10 +418,12 @@ void vtkFastMarchingCenterline::Execute(
     vtkImageData* measured = ImageOf(inputs[3]);
     if (measured && measured->GetNumberOfPoints() > 0)
     {
-      int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-      vtkAbstractArray* any = this->GetInputAbstractArrayToProcess(1, inputs, association);
-      Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
-        "the measured image's array belongs to the cells: point data are needed");
+      vtkPointData* arrays = measured->GetPointData();
+      vtkAbstractArray* any = this->IntensityArrayName.empty()
+        ? arrays->GetScalars()
+        : arrays->GetAbstractArray(this->IntensityArrayName.c_str());
+      Require(any != nullptr || this->IntensityArrayName.empty(),
+        "the measured image has no point array '" + this->IntensityArrayName + "'");
       vtkDataArray* array = CheckedArray(any, measured, "the measured image");
       intensity.grid = GridOf(measured);
       if (auto* shorts = vtkArrayDownCast<vtkShortArray>(array))
@@ -650,6 +650,7 @@ void vtkFastMarchingCenterline::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "SurfaceSpacing: " << this->SurfaceSpacing << '\n';
   os << indent << "TimeLimit: " << this->TimeLimit << '\n';
   os << indent << "VoxelLimit: " << this->VoxelLimit << '\n';
+  os << indent << "IntensityArrayName: " << this->IntensityArrayName << '\n';
   os << indent << "RadiusArrayName: " << this->RadiusArrayName << '\n';
   os << indent << "ConfidenceArrayName: " << this->ConfidenceArrayName << '\n';
 }

@@ -229,6 +229,15 @@ public:
 
   ///@{
   /**
+   * Point array of the image at input 3. Default empty: its active scalars.
+   */
+  // No SetInputArrayToProcess(1, ...): ParaView 5.11 crashes on arrays of two inputs chosen so.
+  vtkSetMacro(IntensityArrayName, std::string);
+  vtkGetMacro(IntensityArrayName, std::string);
+  ///@}
+
+  ///@{
+  /**
    * Names of the radius and confidence arrays. Defaults `MaximumInscribedSphereRadius`, `Confidence`.
    */
   vtkSetMacro(RadiusArrayName, std::string);
@@ -275,6 +284,7 @@ private:
   double SurfaceSpacing = 0.0;
   double TimeLimit = 120.0;
   vtkIdType VoxelLimit = 100000000;
+  std::string IntensityArrayName;
   std::string RadiusArrayName;
   std::string ConfidenceArrayName;
 };

@@ -204,11 +204,8 @@ vtkVesselSegmentation::vtkVesselSegmentation()
 {
   this->SetNumberOfInputPorts(3);
   this->SetNumberOfOutputPorts(3);
-  for (int port = 0; port < 2; ++port)
-  {
-    this->SetInputArrayToProcess(
-      port, port, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
-  }
+  this->SetInputArrayToProcess(
+    0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
 }
 
 vtkVesselSegmentation::~vtkVesselSegmentation() = default;
@@ -302,14 +299,27 @@ int vtkVesselSegmentation::RequestUpdateExtent(
 vtkDataArray* vtkVesselSegmentation::InputArray(vtkInformationVector** inputs, int port)
 {
   const std::string whose = port == 0 ? "the image" : "the vesselness";
-  vtkInformation* chosen = this->GetInputArrayInformation(port);
-  const char* wanted =
-    chosen->Has(vtkDataObject::FIELD_NAME()) ? chosen->Get(vtkDataObject::FIELD_NAME()) : nullptr;
+  vtkImageData* data = vtkImageData::GetData(inputs[port]->GetInformationObject(0));
   int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-  vtkAbstractArray* any = this->GetInputAbstractArrayToProcess(port, inputs, association);
+  vtkAbstractArray* any = nullptr;
+  std::string wanted;
+  if (port == 0)
+  {
+    vtkInformation* chosen = this->GetInputArrayInformation(0);
+    const char* name = chosen->Get(vtkDataObject::FIELD_NAME());
+    wanted = name ? name : "";
+    any = this->GetInputAbstractArrayToProcess(0, inputs, association);
+  }
+  else
+  {
+    wanted = this->InputVesselnessArrayName;
+    any = wanted.empty() ? data->GetPointData()->GetScalars()
+                         : data->GetPointData()->GetAbstractArray(wanted.c_str());
+  }
   Require(any != nullptr,
-    wanted ? whose + " has no point array '" + wanted + "'"
-           : whose + " has no active point scalars");
+    whose +
+      (wanted.empty() ? std::string(" has no active point scalars")
+                      : " has no point array '" + wanted + "'"));
   const std::string name =
     "array '" + std::string(any->GetName() ? any->GetName() : "") + "' of " + whose;
   Require(association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
@@ -319,9 +329,8 @@ vtkDataArray* vtkVesselSegmentation::InputArray(vtkInformationVector** inputs, i
   Require(array->GetNumberOfComponents() == 1,
     name + " has " + std::to_string(array->GetNumberOfComponents()) +
       " components: one is needed, an intensity");
-  Require(array->GetNumberOfTuples() ==
-      vtkImageData::GetData(inputs[port]->GetInformationObject(0))->GetNumberOfPoints(),
-    name + " has not one value a voxel");
+  Require(
+    array->GetNumberOfTuples() == data->GetNumberOfPoints(), name + " has not one value a voxel");
   return array;
 }
 

@@ -16,7 +16,7 @@
  * - 0: vtkImageData, three-dimensional, one component: the CT image. Array chosen with
  *   SetInputArrayToProcess(0, ...), by default the active scalars.
  * - 1, optional: vtkImageData on the same voxels: vesselness, not negative
- *   (SetInputArrayToProcess(1, ...)). Without it, Frangi's with five scales from 0.5 to 2.5 mm (and
+ *   (InputVesselnessArrayName). Without it, Frangi's with five scales from 0.5 to 2.5 mm (and
  *   not below half the largest voxel spacing) is computed here.
  * - 2, optional: vtkPolyData whose points are seeds, mm. Point data `Axis` (double[3], into the
  *   vessel), if there, says where the aorta ends.
@@ -181,6 +181,15 @@ public:
 
   ///@{
   /**
+   * Point array of the vesselness at input 1. Default empty: its active scalars.
+   */
+  // No SetInputArrayToProcess(1, ...): ParaView 5.11 crashes on arrays of two inputs chosen so.
+  vtkSetStdStringFromCharMacro(InputVesselnessArrayName);
+  vtkGetCharFromStdStringMacro(InputVesselnessArrayName);
+  ///@}
+
+  ///@{
+  /**
    * Names of the output arrays. Defaults VesselMask and VesselProbability.
    */
   vtkSetStdStringFromCharMacro(MaskArrayName);
@@ -226,6 +235,7 @@ private:
   bool FillHoles = true;
   bool RefineWall = true;
   bool GenerateProbability = false;
+  std::string InputVesselnessArrayName;
   std::string MaskArrayName;
   std::string ProbabilityArrayName;
 };
