@@ -1,0 +1,124 @@
+"""From the CT to named centerlines, as a user sets the filters up: output, state, trace, picture."""
+import os
+import sys
+
+from paraview import servermanager, simple, smstate, smtrace
+
+from coronary_testing import (CENTERLINES, IMAGE, content, fetch, load_plugin, require,
+                              require_picture)
+
+plugin, folder = sys.argv[1:3]
+TREE, LINES, FORKS = range(3)
+
+
+def make_pipeline():
+    """Phantom, its phase at 0.75, segmentation, vesselness, centerlines, named trees."""
+    # Settings with the creation: a trace of a script records no others.
+    phantom = simple.CoronaryPhantom(registrationName="Phantom", Spacing=[0.8, 0.8, 0.8])
+    phantom.UpdatePipeline(0.75)
+    phase = simple.ReferencePhase(simple.OutputPort(phantom, IMAGE), registrationName="Phase",
+                                  Automatic=0, Time=0.75)
+    phase.UpdatePipeline(0.75)
+    segmentation = simple.VesselSegmentation(phase, registrationName="Segmentation")
+    segmentation.UpdatePipeline(0.75)
+    vesselness = simple.FrangiVesselness(phase, registrationName="Vesselness", AutomaticC=0,
+                                         C=100.0)
+    vesselness.UpdatePipeline(0.75)
+    centerline = simple.FastMarchingCenterline(
+        vesselness, Seeds=simple.OutputPort(segmentation, 1), CTImage=phase, Mask=segmentation,
+        registrationName="Centerline")
+    topology = simple.CoronaryTreeTopology(
+        simple.OutputPort(centerline, TREE), registrationName="Topology")
+    return phantom, centerline, topology
+
+
+def names_of(data):
+    array = data.GetCellData().GetAbstractArray("SegmentLabel")
+    return {array.GetValue(n) for n in range(array.GetNumberOfValues())}
+
+
+def outputs():
+    phantom, centerline, topology = make_pipeline()
+    require(centerline.CTArray == "HU", "the array of the CT: %s" % centerline.CTArray)
+    tree = fetch(topology, 0, 0.75)
+    require({"LM", "pLAD", "mLAD", "dLAD", "pLCx", "pRCA", "mRCA", "dRCA", "D1", "OM1"} <=
+            names_of(tree), "names: %s" % sorted(names_of(tree)))
+    radius = tree.GetPointData().GetArray("MaximumInscribedSphereRadius").GetRange()
+    require(0.1 < radius[0] < 1.0 and 1.5 < radius[1] < 4.0, "radii %s" % (radius,))
+    fields = tree.GetFieldData()
+    status = fields.GetArray("SeedStatus")
+    require(status.GetNumberOfTuples() == 2 and status.GetRange() == (0.0, 0.0), "seeds")
+    require(fetch(centerline, FORKS, 0.75).GetNumberOfPoints() >= 10, "bifurcations")
+
+    # The same lines in VMTK's form, made by the filter itself and by the conversion.
+    lines = fetch(centerline, LINES, 0.75)
+    conversion = simple.CenterlineConversion(simple.OutputPort(centerline, TREE))
+    converted = fetch(conversion, 0, 0.75)
+    require(converted.GetNumberOfCells() == lines.GetNumberOfCells(), "VMTK's lines")
+    skeleton = os.path.join(folder, "tree.tgf")
+    simple.SaveData(skeleton, proxy=topology)
+    read = simple.OpenDataFile(skeleton)
+    require(fetch(read, 0, 0.0).GetNumberOfPoints() == tree.GetNumberOfPoints(), "the skeleton")
+
+    truth = simple.ReferencePhase(simple.OutputPort(phantom, CENTERLINES))
+    truth.Automatic = 0
+    truth.Time = 0.75
+    metrics = simple.CenterlineMetrics(
+        Result=simple.OutputPort(topology, 0), Reference=truth)
+    metrics.LeastRadius = 0.75
+    table = fetch(metrics, 0, 0.75)
+    overlap = table.GetColumnByName("OV")
+    total = overlap.GetValue(overlap.GetNumberOfTuples() - 1)
+    require(total > 0.9, "the overlap with the truth is %g" % total)
+
+
+def round_trips():
+    simple.ResetSession()
+    topology = make_pipeline()[2]
+    view = simple.CreateRenderView()
+    view.ViewSize = [600, 600]
+    shown = simple.Show(topology, view)
+    simple.ColorBy(shown, ("POINTS", "MaximumInscribedSphereRadius"))
+    view.ResetCamera()
+    path = os.path.join(folder, "centerline.png")
+    simple.SaveScreenshot(path, view)
+    require_picture(path, 0.005)
+    expected = content(fetch(topology, 0, 0.75))
+    state = os.path.join(folder, "centerline.pvsm")
+    simple.SaveState(state)
+    script = smstate.get_state()
+
+    def check(where):
+        found = simple.FindSource("Topology")
+        require(found is not None, where + ": the filter is missing")
+        require(simple.FindSource("Centerline").CTImage is not None, where + ": the CT image")
+        require(content(fetch(found, 0, 0.75)) == expected, where + ": other output")
+
+    simple.ResetSession()
+    simple.LoadState(state)
+    check("state file")
+    simple.ResetSession()
+    exec(compile(script, "state", "exec"), {"__name__": "state"})
+    check("Python state")
+
+
+def trace_repeats():
+    simple.ResetSession()
+    smtrace.start_trace(preamble="")
+    make_pipeline()
+    trace = smtrace.stop_trace()
+    expected = content(fetch(simple.FindSource("Topology"), 0, 0.75))
+    simple.ResetSession()
+    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
+    repeated = simple.FindSource("Topology")
+    require(repeated is not None, "the trace does not create the filters")
+    require(content(fetch(repeated, 0, 0.75)) == expected, "trace: other output")
+
+
+load_plugin(plugin)
+# First: a trace started after pictures were saved stays empty.
+trace_repeats()
+simple.ResetSession()
+outputs()
+round_trips()
+require(servermanager.ActiveConnection is not None, "the session is gone")
