@@ -69,7 +69,7 @@ struct RunJob
   std::vector<double> seeds;
   double largestRadius = 4.5;
   std::vector<double> window;
-  bool withinMask = false;
+  bool beyondMask = false;
   double leastBranch = 0.0;
   double centerlineSeconds = 120.0;
   int threads = 0;
@@ -172,10 +172,9 @@ void RunJob::Declare(CLI::App& app)
 
   const std::string lines = "Centerlines";
   app
-    .add_flag("--within-mask", this->withinMask,
-      "March only inside the segmented lumen, not wherever a vessel is to be seen: thin vessels "
-      "end "
-      "earlier")
+    .add_flag("--beyond-mask", this->beyondMask,
+      "March wherever a vessel is to be seen, not only inside the segmented lumen: some thin "
+      "vessels are followed farther, at the risk of others' lumens, and slower")
     ->group(lines);
   app
     .add_option("--least-branch", this->leastBranch, "Shorter branches are none, mm; 0: ten voxels")
@@ -435,7 +434,7 @@ void RunJob::Run()
         centerline->SetSeedConnection(
           segmentation->GetOutputPort(vtkVesselSegmentation::SeedsPort));
         centerline->SetIntensityConnection(reference->GetOutputPort());
-        if (this->withinMask)
+        if (!this->beyondMask)
         {
           centerline->SetMaskConnection(segmentation->GetOutputPort());
         }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -143,6 +144,8 @@ private:
   void CorrectRadii();
   std::size_t SeenUpTo(const Course& course, double parentRadius) const;
   std::int64_t Append(const Way& way, int treeId, bool wanted);
+  std::vector<Vector3> FollowOuterWall(const Course& course, std::size_t good,
+    const std::function<double(const Vector3&)>& outside) const;
   std::size_t JoinParent(Course& course, std::int32_t owner) const;
   void Own(std::size_t branch);
   void FindTips();
@@ -883,6 +886,61 @@ std::size_t Extractor::SeenUpTo(const Course& course, double parentRadius) const
   return greatest >= 0.25 * perfect ? end : 0;
 }
 
+/// Centres of a branch that leaves its parent's lumen, found by the part of its wall that is not the parent's.
+/// @param good     sample of the course that stands alone
+/// @param outside  distance from the parent's axis in its radii
+/// @returns the centres before `good`, nearest to the parent first
+std::vector<Vector3> Extractor::FollowOuterWall(const Course& course, std::size_t good,
+  const std::function<double(const Vector3&)>& outside) const
+{
+  const auto after = [&](double length)
+  { return std::min(course.size() - 1, good + static_cast<std::size_t>(length / this->Step)); };
+  std::vector<double> radii;
+  std::vector<double> values;
+  for (std::size_t i = good; i <= after(3.0 * course.radius[good]); ++i)
+  {
+    if (course.confidence[i] >= this->Settings.minimumConfidence)
+    {
+      radii.push_back(course.radius[i]);
+      values.push_back(course.lumen[i]);
+    }
+  }
+  if (radii.size() < 3)
+  {
+    return {};
+  }
+  std::sort(radii.begin(), radii.end());
+  std::sort(values.begin(), values.end());
+  const double radius = radii[radii.size() / 2];
+  const double lumen = values[values.size() / 2];
+  const auto isOwn = [&](const Vector3& wall) { return outside(wall) > 1.1; };
+
+  // The centre nearest to the parent last.
+  std::vector<Vector3> centres;
+  for (std::size_t i = after(1.5 * radius) + 1; i-- > good;)
+  {
+    centres.push_back(course.points[i]);
+  }
+  const std::size_t known = centres.size();
+  const auto chord = std::max<std::size_t>(2, static_cast<std::size_t>(1.5 * radius / this->Step));
+  while (centres.size() < known + 200)
+  {
+    const Vector3& last = centres.back();
+    const Vector3 back =
+      (last - centres[centres.size() - 1 - std::min(chord, centres.size() - 1)]).normalized();
+    const Vector3 next = last + this->Step * back;
+    Vector3 centre;
+    if (!back.allFinite() || outside(next) < 0.25 || outside(next) >= outside(last) ||
+      !MeasureArc(*this->Image, next, back, radius, lumen, isOwn, this->Lumen, centre) ||
+      (centre - next).norm() > 0.15 * radius)
+    {
+      break;
+    }
+    centres.push_back(centre);
+  }
+  return { centres.rbegin(), centres.rend() - static_cast<std::ptrdiff_t>(known) };
+}
+
 /// Replaces the part of a course inside its parent's lumen by the meeting of the two axes.
 /// @returns the index of the parent's point in the tree
 std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
@@ -924,15 +982,23 @@ std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
   {
     good = std::min(first, course.size() - 1);
   }
-  const double length = 2.5 * std::max(course.radius[good], this->Voxel);
-  std::vector<Vector3> samples;
-  for (std::size_t i = good; i < course.size() && (i - good) * this->Step <= length; ++i)
+  // A great branch stands alone far from the axis only: from there back into the parent's lumen, as far as its outer
+  // wall is to be seen.
+  const std::vector<Vector3> arcs = course.radius[good] > 0.6 * parentRadius
+    ? this->FollowOuterWall(course, good, outside)
+    : std::vector<Vector3>();
+  std::vector<Vector3> samples = arcs;
+  const double length =
+    std::max((arcs.empty() ? 2.5 : 1.5) * course.radius[good], 5.0 * this->Voxel);
+  for (std::size_t i = good; i < course.size() && samples.size() * this->Step <= length; ++i)
   {
     if (course.confidence[i] >= this->Settings.minimumConfidence || i == good)
     {
       samples.push_back(course.points[i]);
     }
   }
+  samples.resize(std::min(
+    samples.size(), std::max<std::size_t>(4, static_cast<std::size_t>(length / this->Step))));
   auto best = static_cast<std::size_t>(owner);
   double least = std::numeric_limits<double>::infinity();
   if (samples.size() >= 3)
@@ -974,14 +1040,22 @@ std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
 
   // A straight line from axis to axis; its samples are guesses.
   Course joined;
-  const std::vector<Vector3> bridge =
-    ResampleCurve({ this->Tree.points[best], course.points[good] }, this->Step);
+  const auto add = [&](const Vector3& point, double confidence)
+  {
+    joined.points.push_back(point);
+    joined.radius.push_back(course.radius[good]);
+    joined.confidence.push_back(confidence);
+    joined.lumen.push_back(0.0);
+  };
+  const std::vector<Vector3> bridge = ResampleCurve(
+    { this->Tree.points[best], arcs.empty() ? course.points[good] : arcs.front() }, this->Step);
   for (std::size_t i = 0; i + 1 < bridge.size(); ++i)
   {
-    joined.points.push_back(bridge[i]);
-    joined.radius.push_back(course.radius[good]);
-    joined.confidence.push_back(0.0);
-    joined.lumen.push_back(0.0);
+    add(bridge[i], 0.0);
+  }
+  for (const Vector3& arc : arcs)
+  {
+    add(arc, 0.5 * course.confidence[good]);
   }
   joined.points.insert(joined.points.end(),
     course.points.begin() + static_cast<std::ptrdiff_t>(good), course.points.end());

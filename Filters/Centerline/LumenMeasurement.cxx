@@ -358,6 +358,64 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
   return section;
 }
 
+bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const Vector3& tangent,
+  double radius, double lumen, const std::function<bool(const Vector3& wall)>& isOwn,
+  const LumenSettings& settings, Vector3& centre)
+{
+  using Vector2 = Eigen::Vector2d;
+  constexpr int rays = 36;
+  const bool fixed = !std::isnan(settings.level);
+  const double step = 0.5 * image.SmallestSpacing();
+  const double contrast = settings.reference.lumen - settings.reference.background;
+  const double floor = settings.reference.background - 0.1 * contrast;
+  const double reach = 1.6 * radius + (fixed ? 0.0 : 3.0 * image.SmallestSpacing());
+  const Vector3 axis = tangent.normalized();
+  const Vector3 u = axis.unitOrthogonal();
+  const Vector3 v = axis.cross(u);
+  centre = position;
+  for (int iteration = 0; iteration < 4; ++iteration)
+  {
+    Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+    Vector2 right = Vector2::Zero();
+    double sum = 0.0;
+    int found = 0;
+    for (int ray = 0; ray < rays; ++ray)
+    {
+      const double angle = 2.0 * M_PI * ray / rays;
+      const Vector2 row(std::cos(angle), std::sin(angle));
+      const Vector3 direction = row[0] * u + row[1] * v;
+      const Wall wall = fixed
+        ? FindLevel(image, centre, direction, lumen, settings.level, step, reach)
+        : FindWall(image, centre, direction, lumen, 0.15 * contrast, floor, step, reach);
+      const double residual = wall.distance - radius;
+      if (wall.distance > 0.0 && std::abs(residual) < 0.5 * radius &&
+        isOwn(centre + wall.distance * direction))
+      {
+        normal += row * row.transpose();
+        right += residual * row;
+        sum += residual * residual;
+        ++found;
+      }
+    }
+    // A sixth of the wall, and not all of it on one line.
+    if (found < rays / 6 || normal.eigenvalues().real().minCoeff() < 0.3)
+    {
+      return false;
+    }
+    if (iteration == 3)
+    {
+      return std::sqrt(sum / found) < 0.25 * radius;
+    }
+    const Vector2 shift = (normal + 0.1 * Eigen::Matrix2d::Identity()).ldlt().solve(right);
+    centre += shift[0] * u + shift[1] * v;
+    if ((centre - position).norm() > 0.6 * radius)
+    {
+      return false;
+    }
+  }
+  return false;
+}
+
 bool MeasureReference(
   const ImageInterpolator& image, const Vector3& seed, LumenReference& reference)
 {

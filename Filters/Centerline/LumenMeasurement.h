@@ -8,6 +8,7 @@
 #include "Geometry.h"
 #include "ScalarImage.h"
 
+#include <functional>
 #include <limits>
 
 namespace coronary
@@ -69,6 +70,17 @@ struct LumenSection
  */
 LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& position,
   const Vector3& tangent, double radiusGuess, const LumenSettings& settings);
+
+/**
+ * The centre of a lumen whose wall is to be seen on one side only, as where a branch leaves another vessel's lumen.
+ *
+ * A circle of the known half-maximum `radius` (mm) is fitted to the walls that `isOwn` accepts, in the plane through
+ * `position` normal to `tangent`; `lumen` is the vessel's image value.
+ * @returns false if too little of the wall is accepted, or if it is no such circle
+ */
+bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const Vector3& tangent,
+  double radius, double lumen, const std::function<bool(const Vector3& wall)>& isOwn,
+  const LumenSettings& settings, Vector3& centre);
 
 /// What the surroundings of a seed look like, by rays in all directions.
 /// @returns false if there is no lumen: nothing darker around it

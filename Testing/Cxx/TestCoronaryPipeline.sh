@@ -369,9 +369,9 @@ check_run() {
   if [ ! -s mask/mask.mha ] || [ -e mask/centerline.vtp ]; then
     fail "--until segmentation wrote $(ls mask)"
   fi
-  run 0 run series/series.json --quiet --within-mask --scales 0.7 2.5 --threads 1 --output inside
-  run 0 run series/series.json --quiet --within-mask --scales 0.7 2.5 --threads 2 --output inside2
-  diff -r inside inside2 || fail "another number of threads gave other files"
+  run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --threads 1 --output beyond
+  run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --threads 2 --output beyond2
+  diff -r beyond beyond2 || fail "another number of threads gave other files"
 
   run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced
   if [ -s stdout ] || [ -s stderr ]; then
