@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# From nothing to segmented arteries: installs, builds, makes a gated CT series of the phantom with
-# its truth, finds and segments the coronary arteries in its quietest phase, and renders pictures.
+# From nothing to named coronary trees: installs, builds, makes a gated CT series of the phantom with
+# its truth, finds and segments the coronary arteries in its quietest phase, traces their
+# centerlines, and renders pictures.
 # Everything lands in build/ and demo-output/.
 set -euo pipefail
 
@@ -69,7 +70,7 @@ echo "== Its motion beside published values"
 "$pipeline" phantom-motion --seed 1 | tee "$output/phantom-motion.txt"
 
 echo "== From the images to the coronary arteries"
-"$pipeline" run "$output/phantom/series.json" --until segmentation --output "$output/run"
+"$pipeline" run "$output/phantom/series.json" --until centerline --output "$output/run"
 
 if [ "$pictures" = yes ]; then
   echo "== Pictures"
@@ -84,6 +85,9 @@ if [ "$pictures" = yes ]; then
   HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
     pvpython scripts/render-segmentation.py "$output/run" --truth "$truth" \
     --output "$output/pictures"
+  HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
+    pvpython scripts/render-centerline.py "$output/run" --truth "$truth" \
+    --output "$output/pictures"
 fi
 
 plugin="$(find "$root/build/paraview" -name DynamicCoronaryPlugin.so -print -quit)"
@@ -96,8 +100,9 @@ What lies where
   $output/phantom/phase_NN.mha        20 CT volumes, -5 % to 106 % of the R-R interval ($(size "$output/phantom"))
   $output/phantom/series.json         phases, R-R fractions, cycle length, ostia
   $output/phantom/truth/              surface, centerlines and vein of every phase (.vtp, .pvd)
-  $output/run/                        vesselness, mask of the arteries, ostia and aorta at the
-                                      quietest phase; report.json says how they came about
+  $output/run/                        vesselness, mask of the arteries, ostia, aorta and the
+                                      named trees of centerlines at the quietest phase; status.csv
+                                      and report.json says how they came about
   $output/phantom-motion.txt          amplitudes, speeds and rest windows per artery
 EOF
 if [ "$pictures" = yes ]; then

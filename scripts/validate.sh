@@ -23,6 +23,7 @@ tables=(
   "vesselness-instructions: vesselness-benchmark instructions"
   "vesselness-agreement: vesselness-benchmark agreement"
   "segmentation: validate-segmentation"
+  "centerline-speed: centerline-benchmark --strict"
   "centerline: validate-centerline --details --invariance"
 )
 

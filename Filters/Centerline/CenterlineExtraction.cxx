@@ -982,11 +982,12 @@ std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
   {
     good = std::min(first, course.size() - 1);
   }
-  // A great branch stands alone far from the axis only: from there back into the parent's lumen, as far as its outer
-  // wall is to be seen.
-  const std::vector<Vector3> arcs = course.radius[good] > 0.6 * parentRadius
-    ? this->FollowOuterWall(course, good, outside)
-    : std::vector<Vector3>();
+  // A great branch stands alone far from the axis only: from there back into the parent's lumen, as
+  // far as its outer wall is to be seen. Not in masks and surfaces: there an axis is that of
+  // inscribed spheres, and a lumen that widens before it divides has no circle.
+  const bool follow = std::isnan(this->Lumen.level) && course.radius[good] > 0.6 * parentRadius;
+  const std::vector<Vector3> arcs =
+    follow ? this->FollowOuterWall(course, good, outside) : std::vector<Vector3>();
   std::vector<Vector3> samples = arcs;
   const double length =
     std::max((arcs.empty() ? 2.5 : 1.5) * course.radius[good], 5.0 * this->Voxel);

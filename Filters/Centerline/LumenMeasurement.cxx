@@ -44,13 +44,9 @@ Wall FindWall(const ImageInterpolator& image, const Vector3& from, const Vector3
       lowest = values[i];
       lowestAt = i;
     }
-    // Another bright thing behind the wall.
-    else if (lumen - lowest > least && values[i] > lowest + 0.25 * (lumen - lowest))
-    {
-      break;
-    }
-    // The fall is over.
-    else if (lumen - lowest > least && i - lowestAt > 5)
+    // Another bright thing behind the wall, or the fall is over.
+    else if (lumen - lowest > least &&
+      (values[i] > lowest + 0.25 * (lumen - lowest) || i - lowestAt > 5))
     {
       break;
     }
@@ -153,8 +149,9 @@ Wall FindLevel(const ImageInterpolator& image, const Vector3& from, const Vector
   double centre, double level, double step, double reach)
 {
   double previous = centre;
-  for (double s = step; s <= reach; s += step)
+  for (int i = 1; i * step <= reach; ++i)
   {
+    const double s = i * step;
     const double value = image.At(from + s * direction);
     if (value <= level && previous > level)
     {
@@ -364,11 +361,10 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
 {
   using Vector2 = Eigen::Vector2d;
   constexpr int rays = 36;
-  const bool fixed = !std::isnan(settings.level);
   const double step = 0.5 * image.SmallestSpacing();
   const double contrast = settings.reference.lumen - settings.reference.background;
   const double floor = settings.reference.background - 0.1 * contrast;
-  const double reach = 1.6 * radius + (fixed ? 0.0 : 3.0 * image.SmallestSpacing());
+  const double reach = 1.6 * radius + 3.0 * image.SmallestSpacing();
   const Vector3 axis = tangent.normalized();
   const Vector3 u = axis.unitOrthogonal();
   const Vector3 v = axis.cross(u);
@@ -384,9 +380,8 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
       const double angle = 2.0 * M_PI * ray / rays;
       const Vector2 row(std::cos(angle), std::sin(angle));
       const Vector3 direction = row[0] * u + row[1] * v;
-      const Wall wall = fixed
-        ? FindLevel(image, centre, direction, lumen, settings.level, step, reach)
-        : FindWall(image, centre, direction, lumen, 0.15 * contrast, floor, step, reach);
+      const Wall wall =
+        FindWall(image, centre, direction, lumen, 0.15 * contrast, floor, step, reach);
       const double residual = wall.distance - radius;
       if (wall.distance > 0.0 && std::abs(residual) < 0.5 * radius &&
         isOwn(centre + wall.distance * direction))
@@ -422,6 +417,7 @@ bool MeasureReference(
   constexpr int directions = 64;
   const double spacing = image.SmallestSpacing();
   std::vector<double> values;
+  values.reserve(directions);
   for (int i = 0; i < directions; ++i)
   {
     values.push_back(image.At(seed + 0.6 * spacing * SphereDirection(i, directions)));

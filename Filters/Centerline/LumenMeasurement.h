@@ -75,7 +75,7 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
  * The centre of a lumen whose wall is to be seen on one side only, as where a branch leaves another vessel's lumen.
  *
  * A circle of the known half-maximum `radius` (mm) is fitted to the walls that `isOwn` accepts, in the plane through
- * `position` normal to `tangent`; `lumen` is the vessel's image value.
+ * `position` normal to `tangent`; `lumen` is the vessel's image value. For images, not for fixed levels.
  * @returns false if too little of the wall is accepted, or if it is no such circle
  */
 bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const Vector3& tangent,
