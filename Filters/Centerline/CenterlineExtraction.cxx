@@ -348,6 +348,11 @@ void Extractor::MakeRegion()
               this->IntensityThreshold);
       }
     });
+  if (!this->Input.wallDistance)
+  {
+    // Thin vessels hang together by corners; the front goes through faces.
+    this->Region.JoinDiagonals();
+  }
   this->Result.regionVoxels = this->Region.Size();
 }
 

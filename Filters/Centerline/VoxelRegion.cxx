@@ -3,6 +3,7 @@
 #include "ParallelFor.h"
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 
 namespace coronary
@@ -108,10 +109,70 @@ VoxelRegion::VoxelRegion(const std::array<int, 6>& extent,
         }
       }
     });
+  this->NumberMembers();
+}
+
+void VoxelRegion::NumberMembers()
+{
+  this->Count = 0;
   for (Word& word : this->Words)
   {
     word.before = this->Count;
     this->Count += static_cast<std::uint32_t>(__builtin_popcountll(word.bits));
   }
+}
+
+void VoxelRegion::JoinDiagonals()
+{
+  const auto isMember = [&](Address address)
+  { return (this->Words[address >> 6].bits >> (address & 63) & 1) != 0; };
+  const auto step = [&](Address address, int axis, int sign)
+  { return sign > 0 ? this->Above(address, axis) : this->Below(address, axis); };
+  std::vector<Address> added;
+  this->ForEach(
+    [&](std::uint32_t, Address here)
+    {
+      Address side[3][2];
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        side[axis][0] = this->Below(here, axis);
+        side[axis][1] = this->Above(here, axis);
+      }
+      // Each pair once: the other one lies above along the last axis in which they differ.
+      for (int last = 1; last < 3; ++last)
+      {
+        for (int axis = 0; axis < last; ++axis)
+        {
+          for (int sign = 0; sign < 2; ++sign)
+          {
+            const Address a = side[last][1];
+            const Address b = side[axis][sign];
+            if (!isMember(a) && !isMember(b) && isMember(step(a, axis, sign * 2 - 1)))
+            {
+              added.push_back(a);
+              added.push_back(b);
+            }
+          }
+        }
+      }
+      for (int corner = 0; corner < 4; ++corner)
+      {
+        const int x = corner % 2;
+        const int y = corner / 2;
+        const Address up = side[2][1];
+        const Address between[6] = { side[0][x], side[1][y], step(side[0][x], 1, y * 2 - 1), up,
+          step(up, 0, x * 2 - 1), step(up, 1, y * 2 - 1) };
+        if (isMember(step(between[4], 1, y * 2 - 1)) &&
+          std::none_of(std::begin(between), std::end(between), isMember))
+        {
+          added.insert(added.end(), std::begin(between), std::end(between));
+        }
+      }
+    });
+  for (const Address address : added)
+  {
+    this->Words[address >> 6].bits |= std::uint64_t{ 1 } << (address & 63);
+  }
+  this->NumberMembers();
 }
 }

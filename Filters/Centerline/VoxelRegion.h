@@ -115,10 +115,18 @@ public:
     }
   }
 
+  /**
+   * Adds the voxels between members that touch by an edge or a corner alone, so that what hangs
+   * together by any of 26 neighbours does so by 6. Members get new numbers.
+   */
+  void JoinDiagonals();
+
   /// Bytes in memory.
   std::size_t MemorySize() const { return Words.capacity() * sizeof(Word); }
 
 private:
+  void NumberMembers();
+
   struct Word
   {
     std::uint64_t bits = 0;
