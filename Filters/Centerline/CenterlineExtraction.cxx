@@ -332,8 +332,14 @@ void Extractor::MakeRegion()
     }
   }
 
-  const float threshold = static_cast<float>(this->SpeedThreshold);
-  const bool gate = this->Input.intensity && std::isfinite(this->IntensityThreshold);
+  // A mask is somebody's decision of what is vessel: automatic thresholds, which cut thin branches off
+  // where the measure is low, at their roots, do not overrule it.
+  const bool decided = mask != nullptr && !distance;
+  const bool anySpeed = decided && std::isnan(this->Settings.speedThreshold);
+  const float threshold =
+    anySpeed ? -std::numeric_limits<float>::infinity() : static_cast<float>(this->SpeedThreshold);
+  const bool gate = this->Input.intensity && std::isfinite(this->IntensityThreshold) &&
+    !(decided && std::isnan(this->Settings.intensityThreshold));
   this->Region = VoxelRegion(this->Input.grid.extent,
     [&](int j, int k, unsigned char* flags)
     {

@@ -39,9 +39,10 @@ struct CenterlineInput
 /// Zero means automatic for all lengths; the automatic ones follow voxels and radii, not millimetres.
 struct CenterlineSettings
 {
-  /// Speeds at or below are no vessel. NaN: 5 % of the 99.99th percentile.
+  /// Speeds at or below are no vessel. NaN: 2 % of the 99.99th percentile; with a mask any speed.
   double speedThreshold = std::numeric_limits<double>::quiet_NaN();
-  /// Intensities at or below are no vessel. NaN: 40 % between background and lumen at the seeds.
+  /// Intensities at or below are no vessel. NaN: 40 % between background and lumen at the seeds; with
+  /// a mask any.
   double intensityThreshold = std::numeric_limits<double>::quiet_NaN();
   double speedExponent = 2.0;       ///< 0.5 to 6
   bool findTips = true;             ///< whether tips are looked for as well when targets are given

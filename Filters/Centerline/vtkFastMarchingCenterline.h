@@ -96,7 +96,8 @@ public:
 
   ///@{
   /**
-   * Speeds at or below are no vessel. Automatic (default): 2 % of the speed's 99.99th percentile.
+   * Speeds at or below are no vessel. Automatic (default): 2 % of the speed's 99.99th percentile;
+   * with a mask none.
    */
   vtkSetMacro(AutomaticSpeedThreshold, bool);
   vtkGetMacro(AutomaticSpeedThreshold, bool);
@@ -108,7 +109,7 @@ public:
   ///@{
   /**
    * Intensities at or below are no vessel. Automatic (default): 40 % of the way from the
-   * surroundings to the lumen as they are at the seeds.
+   * surroundings to the lumen as they are at the seeds; with a mask none.
    */
   vtkSetMacro(AutomaticIntensityThreshold, bool);
   vtkGetMacro(AutomaticIntensityThreshold, bool);

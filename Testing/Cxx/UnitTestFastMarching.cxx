@@ -5,9 +5,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <set>
 #include <stdexcept>
+#include <vector>
 
 using namespace coronary;
 
@@ -243,4 +247,57 @@ TEST(FastMarching, LimitsAndMemory)
   settings.spacing[1] = 0.0;
   EXPECT_THROW(
     FastMarching(region, std::vector<float>(region.Size(), 1.0F), settings), std::invalid_argument);
+}
+
+TEST(VoxelRegion, JoinsWhatTouchesByEdgesAndCorners)
+{
+  // Pairs of voxels apart from each other, one for each of the 13 directions to a neighbour; and two
+  // with a voxel between, which stay apart.
+  const std::array<int, 6> extent{ 0, 59, 0, 5, -3, 3 };
+  std::set<std::array<int, 3>> members;
+  std::vector<std::array<std::array<int, 3>, 2>> pairs;
+  for (int n = 14; n < 27; ++n)
+  {
+    const std::array<int, 3> a{ 2 + 4 * (n - 14), 2, 0 };
+    const std::array<int, 3> b{ a[0] + n % 3 - 1, a[1] + n / 3 % 3 - 1, a[2] + n / 9 - 1 };
+    pairs.push_back({ a, b });
+    members.insert(a);
+    members.insert(b);
+  }
+  members.insert({ 56, 1, 0 });
+  members.insert({ 58, 1, 0 });
+  VoxelRegion region(extent,
+    [&](int j, int k, unsigned char* flags)
+    {
+      for (const auto& [x, y, z] : members)
+      {
+        flags[x] = y == j && z == k ? 1 : flags[x];
+      }
+    });
+  ASSERT_EQ(region.Size(), members.size());
+  region.JoinDiagonals();
+  // Faces: none. 6 edges: 2 each. 4 corners: 6 each.
+  EXPECT_EQ(region.Size(), members.size() + 6 * 2 + 4 * 6);
+  for (const auto& [a, b] : pairs)
+  {
+    // Every voxel of the box that they span is a member, so there are ways through faces.
+    for (int k = std::min(a[2], b[2]); k <= std::max(a[2], b[2]); ++k)
+    {
+      for (int j = std::min(a[1], b[1]); j <= std::max(a[1], b[1]); ++j)
+      {
+        for (int i = std::min(a[0], b[0]); i <= std::max(a[0], b[0]); ++i)
+        {
+          EXPECT_NE(region.NumberOf(i, j, k), VoxelRegion::notAMember) << i << j << k;
+        }
+      }
+    }
+  }
+  EXPECT_EQ(region.NumberOf(57, 1, 0), VoxelRegion::notAMember);
+  std::uint32_t expected = 0;
+  region.ForEach([&](std::uint32_t number, VoxelRegion::Address address)
+    { EXPECT_EQ(region.Number(address), expected++) << number; });
+  // Nothing more to join.
+  const std::uint32_t size = region.Size();
+  region.JoinDiagonals();
+  EXPECT_EQ(region.Size(), size);
 }
