@@ -75,9 +75,11 @@ double LineDistance(const Vector3& point, const Vector3& origin, const Vector3& 
 class Extractor
 {
 public:
-  Extractor(const CenterlineInput& input, const CenterlineSettings& settings,
-    const ProgressCallback& progress)
+  /// @param given  the same input in world coordinates, for messages
+  Extractor(const CenterlineInput& input, const CenterlineInput& given,
+    const CenterlineSettings& settings, const ProgressCallback& progress)
     : Input(input)
+    , Given(given)
     , Settings(settings)
     , Progress(progress)
     , Start(std::chrono::steady_clock::now())
@@ -154,6 +156,7 @@ private:
   void SeedsInOneVessel();
 
   const CenterlineInput& Input;
+  const CenterlineInput& Given;
   const CenterlineSettings& Settings;
   const ProgressCallback& Progress;
   std::chrono::steady_clock::time_point Start;
@@ -416,7 +419,7 @@ bool Extractor::PlaceSeeds()
     CenterlineEnd& end = this->Result.seeds[s];
     end.treeId = static_cast<int>(s);
     const Vector3 index = this->ToIndex(this->Input.seeds[s]);
-    const std::string name = "seed " + std::to_string(s) + " at " + Text(this->Input.seeds[s]);
+    const std::string name = "seed " + std::to_string(s) + " at " + Text(this->Given.seeds[s]);
     if (!this->InImage(index))
     {
       end.status = EndStatus::OutsideImage;
@@ -1330,7 +1333,7 @@ void Extractor::FollowTargets()
   {
     CenterlineEnd& end = this->Result.targets[t];
     const Vector3 index = this->ToIndex(this->Input.targets[t]);
-    const std::string name = "target " + std::to_string(t) + " at " + Text(this->Input.targets[t]);
+    const std::string name = "target " + std::to_string(t) + " at " + Text(this->Given.targets[t]);
     if (!this->InImage(index))
     {
       end.status = EndStatus::OutsideImage;
@@ -1403,7 +1406,7 @@ void Extractor::Finish()
     {
       this->Result.seeds[s].status = EndStatus::TooShort;
       this->Result.seeds[s].message = "seed " + std::to_string(s) + " at " +
-        Text(this->Input.seeds[s]) + " has no branch that is long and clear enough";
+        Text(this->Given.seeds[s]) + " has no branch that is long and clear enough";
     }
   }
   this->CorrectRadii();
@@ -1551,6 +1554,30 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   require(std::all_of(input.seeds.begin(), input.seeds.end(), finite), "seeds must be finite");
   require(
     std::all_of(input.targets.begin(), input.targets.end(), finite), "targets must be finite");
-  return Extractor(input, settings, progress).Run();
+
+  // Along the voxels' axes: rays and planes are the same for the same voxels, however the image lies in
+  // the world.
+  const Matrix3 turn = input.grid.direction.transpose();
+  const Vector3 origin = input.grid.origin;
+  const auto toFrame = [&](const Vector3& world) -> Vector3 { return turn * (world - origin); };
+  CenterlineInput framed = input;
+  framed.grid.origin = Vector3::Zero();
+  framed.grid.direction = Matrix3::Identity();
+  std::transform(framed.seeds.begin(), framed.seeds.end(), framed.seeds.begin(), toFrame);
+  std::transform(framed.targets.begin(), framed.targets.end(), framed.targets.begin(), toFrame);
+  ScalarImage intensity;
+  if (input.intensity)
+  {
+    intensity = *input.intensity;
+    intensity.grid.origin = toFrame(intensity.grid.origin);
+    intensity.grid.direction = turn * intensity.grid.direction;
+    framed.intensity = &intensity;
+  }
+  CenterlineResult result = Extractor(framed, input, settings, progress).Run();
+  for (Vector3& point : result.tree.points)
+  {
+    point = origin + input.grid.direction * point;
+  }
+  return result;
 }
 }
