@@ -38,7 +38,7 @@ constexpr double LargestFalseBranch = 8.0;  // mm
 constexpr double LeastNamedShare = 0.95;    // of the labelled length
 // Of the same voxels' tree in another frame:
 constexpr double LargestMeanDifference = 0.02; // mm
-constexpr double LargestDifference = 0.5;      // voxels
+constexpr double LargestDifference = 0.05;     // voxels
 // In the coarse voxels of the quick run:
 constexpr double LeastQuickOverlap = 0.95;
 
@@ -604,7 +604,7 @@ bool PrintInvariance(const Case& test)
       Number("%.4f", largest, largest <= limit).c_str(), overlap.total.radiusError, same,
       original.branches.size());
   }
-  std::printf("\nLimit: the same branches and names, at most %.2f mm apart in the mean and %.1f "
+  std::printf("\nLimit: the same branches and names, at most %.2f mm apart in the mean and %.2f "
               "voxels anywhere: %s\n",
     LargestMeanDifference, LargestDifference, Verdict(met));
   return met;
