@@ -7,7 +7,6 @@
 #include <limits>
 #include <queue>
 #include <stdexcept>
-#include <unordered_map>
 
 namespace coronary
 {
@@ -19,8 +18,7 @@ enum State : unsigned char
   Unknown = 0,
   Body = 1,   ///< aorta, chamber, great vessel
   Vessel = 2, ///< collected
-  Band = 4,   ///< near the wall of what was collected
-  Faint = 5   ///< less likely, while it is open whether it joins two parts
+  Band = 4    ///< near the wall of what was collected
 };
 
 ProgressCallback Part(const ProgressCallback& progress, double from, double to)
@@ -440,21 +438,13 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
     float path;
     std::int64_t voxel;
     int seed;
-    float faint;       ///< mm since the last voxel above `weak`
-    std::int64_t from; ///< voxel before this one
     bool operator<(const Entry& other) const
     {
       return this->path != other.path ? this->path > other.path : this->voxel > other.voxel;
     }
   };
   std::priority_queue<Entry> queue;
-  // Bridges are looked for when nothing else is left, so that they are built only where needed.
-  std::priority_queue<Entry> bridges;
   const auto weak = static_cast<float>(this->Settings.weak);
-  // Noise interrupts thin vessels: what is fainter may join two parts over a short way.
-  const float faintest = 0.5f * weak;
-  const auto bridge = static_cast<float>(std::max(1.0, 1.8 * this->L.Spacing.maxCoeff()));
-  std::unordered_map<std::int64_t, Entry> faints;
   for (std::size_t s = 0; s < seeds.size(); ++s)
   {
     this->Ball(places[s], ballRadius,
@@ -462,43 +452,22 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
       {
         if (this->States[p] == Unknown && this->Likelihood(p) >= weak)
         {
-          queue.push({ 0.0f, p, static_cast<int>(s), 0.0f, -1 });
+          queue.push({ 0.0f, p, static_cast<int>(s) });
         }
       });
   }
   const auto longest = static_cast<float>(this->Settings.longestPath);
   std::int64_t popped = 0;
-  while (!queue.empty() || !bridges.empty())
+  while (!queue.empty())
   {
-    std::priority_queue<Entry>& next = queue.empty() ? bridges : queue;
-    const Entry top = next.top();
-    next.pop();
+    const Entry top = queue.top();
+    queue.pop();
     if (this->States[top.voxel] != Unknown)
     {
       continue;
     }
-    if (top.faint > 0.0f)
-    {
-      this->States[top.voxel] = Faint;
-      faints.emplace(top.voxel, top);
-    }
-    else
-    {
-      this->States[top.voxel] = Vessel;
-      this->Members.push_back({ top.voxel, top.path, top.seed });
-      // The faint ones on the way here were worth it.
-      for (auto before = faints.find(top.from); before != faints.end();
-           before = faints.find(before->second.from))
-      {
-        const Entry& entry = before->second;
-        if (this->States[entry.voxel] == Vessel)
-        {
-          break;
-        }
-        this->States[entry.voxel] = Vessel;
-        this->Members.push_back({ entry.voxel, entry.path, entry.seed });
-      }
-    }
+    this->States[top.voxel] = Vessel;
+    this->Members.push_back({ top.voxel, top.path, top.seed });
     if (++popped % 65536 == 0)
     {
       Report(progress, std::min(1.0f, top.path / longest));
@@ -512,28 +481,12 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
       }
       const std::int64_t q = top.voxel + n.offset;
       const float path = top.path + n.length;
-      if (this->States[q] != Unknown || path > longest)
+      if (this->States[q] == Unknown && path <= longest && this->Likelihood(q) >= weak)
       {
-        continue;
-      }
-      const float likelihood = this->Likelihood(q);
-      const float faint = likelihood >= weak ? 0.0f : top.faint + n.length;
-      if (likelihood >= faintest && faint < bridge)
-      {
-        (faint > 0.0f ? bridges : queue).push({ path, q, top.seed, faint, top.voxel });
+        queue.push({ path, q, top.seed });
       }
     }
   }
-  for (const auto& [voxel, entry] : faints)
-  {
-    if (this->States[voxel] == Faint)
-    {
-      this->States[voxel] = Unknown;
-    }
-  }
-  // By path, as the stages that follow take them.
-  std::stable_sort(this->Members.begin(), this->Members.end(),
-    [](const Member& a, const Member& b) { return a.path < b.path; });
 }
 
 /// Slices of equal path length fall into connected pieces; a piece's parents are the pieces of the

@@ -277,33 +277,6 @@ TEST(VesselSegmentation, ThickSlices)
   }
 }
 
-TEST(VesselSegmentation, ShortFaintStretchesAreBridged)
-{
-  const auto beyond = [](const Vector3& p) { return InTube(p) && BentTube::Along(p) > 1.05; };
-  const double whole = Plain().Volume(Plain().Run(), beyond);
-  ASSERT_GT(whole, 100.0);
-  // A layer across the tube, at 1 radian: as likely as 0.36 of vessel, or of nothing.
-  const auto run = [&](double thickness, double share)
-  {
-    Case image = Plain();
-    for (std::size_t p = 0; p < image.values.size(); ++p)
-    {
-      const Vector3 at = image.World(p);
-      const double along = (at - BentTube::Axis(1.0)).dot(BentTube::Tangent(1.0));
-      if (InTube(at) && std::abs(along) < 0.5 * thickness)
-      {
-        image.values[p] =
-          std::min(image.values[p], static_cast<float>(Tissue + share * (Blood - Tissue)));
-        image.vesselness[p] = 0.0f;
-      }
-    }
-    return image.Volume(image.Run(), beyond);
-  };
-  EXPECT_NEAR(run(0.8, 0.46), whole, 0.02 * whole);
-  EXPECT_EQ(run(3.0, 0.46), 0.0);
-  EXPECT_EQ(run(1.3, 0.1), 0.0);
-}
-
 TEST(VesselSegmentation, AChamberAtTheFarEndIsCutOff)
 {
   // A ball, which is a large body; and a flat chamber, into which no large ball fits.
