@@ -34,7 +34,8 @@ rm -f display
 mkfifo display
 Xvfb -displayfd 3 -screen 0 1600x1000x24 -nolisten tcp 3>display 2>server.log &
 server=$!
-trap 'kill "$server" 2>/dev/null || true' EXIT
+# Waited for: a server that is still going takes the socket of the next one of its number with it.
+trap 'kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true' EXIT
 trap 'exit 143' INT TERM HUP
 number=
 read -r number <display || true
