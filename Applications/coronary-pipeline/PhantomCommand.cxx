@@ -13,6 +13,7 @@
 #include "vtkMessageTrap.h"
 
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkDataArray.h"
 #include "vtkImageData.h"
@@ -396,7 +397,7 @@ private:
     this->Update(vtkCoronaryPhantomSource::ImagePort, phase.fraction, first, written);
     auto* image = vtkImageData::SafeDownCast(
       this->Source->GetOutputDataObject(vtkCoronaryPhantomSource::ImagePort));
-    this->Grid = GridOf(image);
+    this->Grid = vtkCoronary::GridOf(image);
     WriteMetaImage(path, this->Grid, static_cast<const short*>(image->GetScalarPointer()),
       this->Job.compress,
       [&](double fraction)

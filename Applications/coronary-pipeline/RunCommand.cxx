@@ -12,6 +12,7 @@
 
 #include "vtkCellData.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryTreeTopology.h"
 #include "vtkDataArray.h"
 #include "vtkFastMarchingCenterline.h"
@@ -378,7 +379,7 @@ void RunJob::Run()
     vesselness->SetC(this->c > 0.0 ? this->c : 1.0);
     update(vesselness);
     vtkImageData* response = vesselness->GetOutput();
-    WriteMetaImage(folder.Add("vesselness.mha"), GridOf(response),
+    WriteMetaImage(folder.Add("vesselness.mha"), vtkCoronary::GridOf(response),
       static_cast<const float*>(response->GetScalarPointer()), this->compress, keepGoing);
     report["vesselness"] = { { "file", "vesselness.mha" },
       { "sigmas", Numbers(response, vtkCoronaryArrayNames::VesselnessSigmas) },
@@ -408,7 +409,7 @@ void RunJob::Run()
         segmentation->GetOutputDataObject(vtkVesselSegmentation::SeedsPort));
       auto* aorta = vtkPolyData::SafeDownCast(
         segmentation->GetOutputDataObject(vtkVesselSegmentation::AortaPort));
-      WriteMetaImage(folder.Add("mask.mha"), GridOf(mask),
+      WriteMetaImage(folder.Add("mask.mha"), vtkCoronary::GridOf(mask),
         static_cast<const unsigned char*>(mask->GetScalarPointer()), this->compress, keepGoing);
       WritePolyData(folder.Add("ostia.vtp"), seedsFound, messages);
       WritePolyData(folder.Add("aorta.vtp"), aorta, messages);

@@ -3,8 +3,6 @@
 #include "AtomicFile.h"
 #include "vtkMessageTrap.h"
 
-#include "vtkImageData.h"
-#include "vtkMatrix3x3.h"
 #include "vtkNew.h"
 #include "vtkPolyData.h"
 #include "vtkXMLPolyDataReader.h"
@@ -15,17 +13,6 @@
 
 namespace coronary
 {
-ImageGrid GridOf(vtkImageData* image)
-{
-  ImageGrid grid;
-  image->GetExtent(grid.extent.data());
-  image->GetOrigin(grid.origin.data());
-  image->GetSpacing(grid.spacing.data());
-  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-    image->GetDirectionMatrix()->GetData());
-  return grid;
-}
-
 vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages)
 {
   vtkNew<vtkXMLPolyDataReader> reader;

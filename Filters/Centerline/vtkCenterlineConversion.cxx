@@ -3,6 +3,7 @@
 #include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryUpstream.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -91,14 +92,10 @@ int vtkCenterlineConversion::RequestInformation(
 }
 
 int vtkCenterlineConversion::RequestUpdateExtent(
-  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  // A tree is converted as a whole: piece 0 asks for all of it, the others for nothing.
-  const int piece = outputs->GetInformationObject(0)->Get(SDDP::UPDATE_PIECE_NUMBER());
-  vtkInformation* info = inputs[0]->GetInformationObject(0);
-  info->Set(SDDP::UPDATE_PIECE_NUMBER(), piece > 0 ? 1 : 0);
-  info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), piece > 0 ? 2 : 1);
-  info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+  // A tree is converted as a whole.
+  vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
   return 1;
 }
 

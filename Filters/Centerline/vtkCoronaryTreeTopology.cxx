@@ -4,6 +4,8 @@
 #include "SegmentLabeling.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkCoronaryUpstream.h"
 
 #include "vtkAbstractArray.h"
 #include "vtkCellArray.h"
@@ -24,7 +26,6 @@
 #include "vtkStringArray.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <new>
@@ -42,19 +43,6 @@ constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
 /// As many daughters as the arrays of a bifurcation have room for at least.
 constexpr int LeastDaughters = 3;
-
-template <typename Array, typename Value>
-void Add(vtkFieldData* data, const std::string& name, const std::vector<Value>& values)
-{
-  vtkNew<Array> array;
-  array->SetName(name.c_str());
-  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
-  for (std::size_t i = 0; i < values.size(); ++i)
-  {
-    array->SetValue(static_cast<vtkIdType>(i), values[i]);
-  }
-  data->AddArray(array);
-}
 
 void AddVectors(vtkFieldData* data, const std::string& name, const std::vector<Vector3>& values)
 {
@@ -120,14 +108,6 @@ const char* NameOf(coronary::Dominance dominance)
                                                  : "balanced";
 }
 
-std::string Capitalised(std::string message)
-{
-  if (!message.empty())
-  {
-    message.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(message.front())));
-  }
-  return message;
-}
 }
 
 /// The outputs, out of the algorithm's result.
@@ -174,21 +154,21 @@ public:
     {
       data->CopyData(given, tree.source[i], i);
     }
-    Add<vtkDoubleArray>(data, self.RadiusArrayName, tree.radius);
-    Add<vtkDoubleArray>(data, self.AbscissasArrayName, tree.abscissa);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, self.RadiusArrayName, tree.radius);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, self.AbscissasArrayName, tree.abscissa);
     AddVectors(data, self.FrenetTangentArrayName, tree.tangent);
     AddVectors(data, self.FrenetNormalArrayName, tree.normal);
     AddVectors(data, self.FrenetBinormalArrayName, tree.binormal);
-    Add<vtkDoubleArray>(data, self.CurvatureArrayName, tree.curvature);
-    Add<vtkDoubleArray>(data, self.TorsionArrayName, tree.torsion);
-    Add<vtkDoubleArray>(data, self.SectionAreaArrayName, tree.area);
-    Add<vtkIntArray>(data, self.SegmentIdsArrayName, tree.segmentId);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, self.CurvatureArrayName, tree.curvature);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, self.TorsionArrayName, tree.torsion);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, self.SectionAreaArrayName, tree.area);
+    vtkCoronary::AddArray<vtkIntArray>(data, self.SegmentIdsArrayName, tree.segmentId);
 
     using Branch = coronary::CenterlineTree::Branch;
     vtkCellData* cells = output->GetCellData();
     const auto ints = [&](const std::string& name, int Branch::*member)
     {
-      Add<vtkIntArray>(
+      vtkCoronary::AddArray<vtkIntArray>(
         cells, name, OfBranches(tree, [=](const Branch& branch) { return branch.*member; }));
     };
     ints(self.GroupIdsArrayName, &Branch::groupId);
@@ -197,13 +177,13 @@ public:
     ints(self.BranchGenerationArrayName, &Branch::generation);
     ints(self.StrahlerOrderArrayName, &Branch::strahlerOrder);
     ints(self.SegmentIdsArrayName, &Branch::segmentId);
-    Add<vtkStringArray>(cells, self.SegmentLabelArrayName,
+    vtkCoronary::AddArray<vtkStringArray>(cells, self.SegmentLabelArrayName,
       OfBranches(tree,
         [](const Branch& branch)
         { return vtkStdString(coronary::SegmentName(branch.segmentId)); }));
-    Add<vtkDoubleArray>(cells, self.LengthArrayName,
+    vtkCoronary::AddArray<vtkDoubleArray>(cells, self.LengthArrayName,
       OfBranches(tree, [](const Branch& branch) { return branch.length; }));
-    Add<vtkDoubleArray>(cells, self.TortuosityArrayName,
+    vtkCoronary::AddArray<vtkDoubleArray>(cells, self.TortuosityArrayName,
       OfBranches(tree, [](const Branch& branch) { return branch.tortuosity; }));
   }
 
@@ -226,13 +206,13 @@ public:
     output->SetPoints(points);
     output->SetVerts(vertices);
     vtkPointData* data = output->GetPointData();
-    Add<vtkIntArray>(data, self.ParentGroupIdsArrayName,
+    vtkCoronary::AddArray<vtkIntArray>(data, self.ParentGroupIdsArrayName,
       OfBifurcations(tree, [](const Bifurcation& b) { return b.parent; }));
     AddRows<vtkIntArray>(data, names::DaughterGroupIds,
       OfBifurcations(tree, [](const Bifurcation& b) { return b.daughters; }), width, -1);
-    Add<vtkIntArray>(data, self.TreeIdsArrayName,
+    vtkCoronary::AddArray<vtkIntArray>(data, self.TreeIdsArrayName,
       OfBifurcations(tree, [&](const Bifurcation& b) { return tree.branches[b.parent].treeId; }));
-    Add<vtkIntArray>(data, self.SegmentIdsArrayName,
+    vtkCoronary::AddArray<vtkIntArray>(data, self.SegmentIdsArrayName,
       OfBifurcations(
         tree, [&](const Bifurcation& b) { return tree.branches[b.parent].segmentId; }));
     AddRows<vtkDoubleArray>(data, names::DaughterAngles,
@@ -241,7 +221,7 @@ public:
       OfBifurcations(tree, [](const Bifurcation& b) { return b.daughterRadius; }), width, NaN);
     const auto numbers = [&](const char* name, double Bifurcation::*member)
     {
-      Add<vtkDoubleArray>(
+      vtkCoronary::AddArray<vtkDoubleArray>(
         data, name, OfBifurcations(tree, [=](const Bifurcation& b) { return b.*member; }));
     };
     numbers(names::BifurcationAngle, &Bifurcation::angle);
@@ -252,7 +232,7 @@ public:
     numbers(names::HuoKassabResidual, &Bifurcation::huoKassabResidual);
     numbers(names::FinetRatio, &Bifurcation::finetRatio);
     numbers(names::FittedExponent, &Bifurcation::fittedExponent);
-    Add<vtkDoubleArray>(data, names::MurrayExponent,
+    vtkCoronary::AddArray<vtkDoubleArray>(data, names::MurrayExponent,
       std::vector<double>(tree.bifurcations.size(), self.MurrayExponent));
   }
 
@@ -279,7 +259,8 @@ public:
     }
     output->SetPoints(points);
     output->SetLines(lines);
-    Add<vtkDoubleArray>(output->GetCellData(), this->Self->LengthArrayName, lengths);
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      output->GetCellData(), this->Self->LengthArrayName, lengths);
   }
 
   void WriteFieldData(vtkPolyData* output, const coronary::LabelingResult* labels) const
@@ -288,18 +269,21 @@ public:
     const CenterlineTopology& tree = this->Tree;
     vtkFieldData* data = output->GetFieldData();
     data->PassData(this->Input->GetFieldData());
-    Add<vtkIntArray>(data, names::PrunedTwigs, std::vector<int>{ tree.prunedTwigs });
-    Add<vtkIntArray>(data, names::ClosedGaps, std::vector<int>{ tree.closedGaps });
+    vtkCoronary::AddArray<vtkIntArray>(
+      data, names::PrunedTwigs, std::vector<int>{ tree.prunedTwigs });
+    vtkCoronary::AddArray<vtkIntArray>(
+      data, names::ClosedGaps, std::vector<int>{ tree.closedGaps });
     std::vector<double> lengths;
     for (const coronary::CenterlineLoop& loop : tree.loops)
     {
       lengths.push_back(loop.length);
     }
-    Add<vtkDoubleArray>(data, names::LoopLengths, lengths);
-    Add<vtkDoubleArray>(data, names::FittedExponent, std::vector<double>{ tree.fittedExponent });
+    vtkCoronary::AddArray<vtkDoubleArray>(data, names::LoopLengths, lengths);
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      data, names::FittedExponent, std::vector<double>{ tree.fittedExponent });
     if (labels != nullptr)
     {
-      Add<vtkStringArray>(data, names::Dominance,
+      vtkCoronary::AddArray<vtkStringArray>(data, names::Dominance,
         std::vector<vtkStdString>{ vtkStdString(NameOf(labels->dominance)) });
       const coronary::HeartPose& heart = labels->heart;
       const Vector3 shift = -(heart.axes * heart.origin) / heart.size;
@@ -374,20 +358,8 @@ int vtkCoronaryTreeTopology::RequestInformation(
 int vtkCoronaryTreeTopology::RequestUpdateExtent(
   vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  // A tree is built from all its lines: piece 0 asks for the whole, the others for nothing.
-  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
-  vtkInformation* outInfo = outputs->GetInformationObject(port);
-  const int piece = outInfo->Get(SDDP::UPDATE_PIECE_NUMBER());
-  for (int input = 0; input < this->GetNumberOfInputPorts(); ++input)
-  {
-    for (int i = 0; i < inputs[input]->GetNumberOfInformationObjects(); ++i)
-    {
-      vtkInformation* info = inputs[input]->GetInformationObject(i);
-      info->Set(SDDP::UPDATE_PIECE_NUMBER(), piece > 0 ? 1 : 0);
-      info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), piece > 0 ? 2 : 1);
-      info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
-    }
-  }
+  // A tree is built from all its lines.
+  vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
   return 1;
 }
 
@@ -520,7 +492,7 @@ int vtkCoronaryTreeTopology::RequestData(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< Capitalised(error.what()));
+    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
     result = 0;
   }
   // Not marked as generated, so that the next request executes again.

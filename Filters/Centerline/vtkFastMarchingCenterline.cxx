@@ -4,6 +4,7 @@
 #include "SurfaceDistance.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -16,7 +17,6 @@
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkIntArray.h"
-#include "vtkMatrix3x3.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
@@ -29,7 +29,6 @@
 #include "vtkUnsignedShortArray.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <new>
@@ -43,25 +42,6 @@ vtkStandardNewMacro(vtkFastMarchingCenterline);
 
 namespace
 {
-void Require(bool condition, const std::string& requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(requirement);
-  }
-}
-
-coronary::ImageGrid GridOf(vtkImageData* image)
-{
-  coronary::ImageGrid grid;
-  image->GetExtent(grid.extent.data());
-  image->GetOrigin(grid.origin.data());
-  image->GetSpacing(grid.spacing.data());
-  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-    image->GetDirectionMatrix()->GetData());
-  return grid;
-}
-
 std::string NameOf(vtkAbstractArray* array)
 {
   return "array '" + std::string(array->GetName() ? array->GetName() : "") + "'";
@@ -69,13 +49,13 @@ std::string NameOf(vtkAbstractArray* array)
 
 vtkDataArray* CheckedArray(vtkAbstractArray* any, vtkImageData* image, const std::string& whose)
 {
-  Require(any != nullptr, whose + " has no point array to be used");
+  vtkCoronary::Require(any != nullptr, whose + " has no point array to be used");
   auto* array = vtkArrayDownCast<vtkDataArray>(any);
-  Require(array != nullptr, NameOf(any) + " of " + whose + " is not numeric");
-  Require(array->GetNumberOfComponents() == 1,
+  vtkCoronary::Require(array != nullptr, NameOf(any) + " of " + whose + " is not numeric");
+  vtkCoronary::Require(array->GetNumberOfComponents() == 1,
     NameOf(any) + " of " + whose + " has " + std::to_string(array->GetNumberOfComponents()) +
       " components: one is needed");
-  Require(array->GetNumberOfTuples() == image->GetNumberOfPoints(),
+  vtkCoronary::Require(array->GetNumberOfTuples() == image->GetNumberOfPoints(),
     NameOf(any) + " of " + whose + " has not one value a voxel");
   return array;
 }
@@ -150,21 +130,8 @@ coronary::SurfaceDistance DistanceTo(
       triangles.push_back({ ids->GetId(i - 2 + odd), ids->GetId(i - 1 - odd), ids->GetId(i) });
     }
   }
-  Require(!triangles.empty(), "the surface has no polygons");
+  vtkCoronary::Require(!triangles.empty(), "the surface has no polygons");
   return coronary::ComputeSurfaceDistance(points, triangles, spacing, 24000000, progress);
-}
-
-template <typename Array, typename Value>
-void Add(vtkFieldData* data, const std::string& name, const std::vector<Value>& values)
-{
-  vtkNew<Array> array;
-  array->SetName(name.c_str());
-  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
-  for (std::size_t i = 0; i < values.size(); ++i)
-  {
-    array->SetValue(static_cast<vtkIdType>(i), values[i]);
-  }
-  data->AddArray(array);
 }
 
 template <typename Array, typename Function>
@@ -177,7 +144,7 @@ void AddBranchValues(vtkFieldData* data, const char* name,
   {
     values.push_back(valueOf(branch));
   }
-  Add<Array>(data, name, values);
+  vtkCoronary::AddArray<Array>(data, name, values);
 }
 
 void AddPoints(vtkPolyData* output, const std::vector<Vector3>& positions)
@@ -204,19 +171,13 @@ void AddCell(vtkCellArray* cells, const std::vector<std::int64_t>& ids)
 /// Takes the message's first word as the name of a property.
 std::string PropertyMessage(std::string message)
 {
-  const std::string prefix = "CenterlineSettings: ";
-  if (message.compare(0, prefix.size(), prefix) == 0)
+  message = vtkCoronary::PropertyMessage(message, { "CenterlineSettings: " });
+  const std::map<std::string, std::string> others{ { "Resampling", "ResamplingStepLength" },
+    { "Smoothing", "SmoothingWavelength" } };
+  const auto other = others.find(message.substr(0, message.find(' ')));
+  if (other != others.end())
   {
-    message.erase(0, prefix.size());
-    const std::map<std::string, std::string> others{ { "resampling", "ResamplingStepLength" },
-      { "smoothing", "SmoothingWavelength" } };
-    const std::string word = message.substr(0, message.find(' '));
-    const auto other = others.find(word);
-    if (other != others.end())
-    {
-      message.replace(0, word.size(), other->second);
-    }
-    message.front() = static_cast<char>(std::toupper(message.front()));
+    message.replace(0, other->first.size(), other->second);
   }
   return message;
 }
@@ -323,7 +284,7 @@ int vtkFastMarchingCenterline::RequestData(
 void vtkFastMarchingCenterline::Execute(
   bool wanted, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  Require(!this->RadiusArrayName.empty() && !this->ConfidenceArrayName.empty(),
+  vtkCoronary::Require(!this->RadiusArrayName.empty() && !this->ConfidenceArrayName.empty(),
     "RadiusArrayName and ConfidenceArrayName need a name");
   coronary::CenterlineSettings settings;
   if (!this->AutomaticSpeedThreshold)
@@ -347,7 +308,7 @@ void vtkFastMarchingCenterline::Execute(
   settings.timeLimit = this->TimeLimit;
   settings.voxelLimit = this->VoxelLimit;
   settings.Validate();
-  Require(std::isfinite(this->SurfaceSpacing) && this->SurfaceSpacing >= 0.0,
+  vtkCoronary::Require(std::isfinite(this->SurfaceSpacing) && this->SurfaceSpacing >= 0.0,
     "SurfaceSpacing must not be negative");
 
   coronary::CenterlineInput input;
@@ -382,10 +343,10 @@ void vtkFastMarchingCenterline::Execute(
     }
     else
     {
-      input.grid = GridOf(image);
+      input.grid = vtkCoronary::GridOf(image);
       int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
       vtkAbstractArray* any = this->GetInputAbstractArrayToProcess(0, inputs, association);
-      Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
+      vtkCoronary::Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
         "the image's array belongs to the cells: point data are needed");
       vtkDataArray* array = CheckedArray(any, image, "the image");
       if (this->ImageKind == MaskImage)
@@ -397,8 +358,8 @@ void vtkFastMarchingCenterline::Execute(
         input.speed = ValuesAs<vtkFloatArray>(array, speedCopy);
         if (vtkImageData* mask = ImageOf(inputs[4]))
         {
-          const coronary::ImageGrid grid = GridOf(mask);
-          Require(grid.extent == input.grid.extent &&
+          const coronary::ImageGrid grid = vtkCoronary::GridOf(mask);
+          vtkCoronary::Require(grid.extent == input.grid.extent &&
               grid.origin.isApprox(input.grid.origin, 1e-5) &&
               grid.spacing.isApprox(input.grid.spacing, 1e-5) &&
               grid.direction.isApprox(input.grid.direction, 1e-5),
@@ -422,10 +383,10 @@ void vtkFastMarchingCenterline::Execute(
       vtkAbstractArray* any = this->IntensityArrayName.empty()
         ? arrays->GetScalars()
         : arrays->GetAbstractArray(this->IntensityArrayName.c_str());
-      Require(any != nullptr || this->IntensityArrayName.empty(),
+      vtkCoronary::Require(any != nullptr || this->IntensityArrayName.empty(),
         "the measured image has no point array '" + this->IntensityArrayName + "'");
       vtkDataArray* array = CheckedArray(any, measured, "the measured image");
-      intensity.grid = GridOf(measured);
+      intensity.grid = vtkCoronary::GridOf(measured);
       if (auto* shorts = vtkArrayDownCast<vtkShortArray>(array))
       {
         intensity.values = static_cast<const std::int16_t*>(shorts->GetPointer(0));
@@ -470,9 +431,12 @@ void vtkFastMarchingCenterline::Execute(
     AddCell(lines, branch.points);
   }
   treeOutput->SetLines(lines);
-  Add<vtkDoubleArray>(treeOutput->GetPointData(), this->RadiusArrayName, tree.radius);
-  Add<vtkDoubleArray>(treeOutput->GetPointData(), names::Abscissas, tree.abscissa);
-  Add<vtkDoubleArray>(treeOutput->GetPointData(), this->ConfidenceArrayName, tree.confidence);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    treeOutput->GetPointData(), this->RadiusArrayName, tree.radius);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    treeOutput->GetPointData(), names::Abscissas, tree.abscissa);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    treeOutput->GetPointData(), this->ConfidenceArrayName, tree.confidence);
   vtkCellData* cells = treeOutput->GetCellData();
   AddBranchValues<vtkIntArray>(
     cells, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });
@@ -561,13 +525,15 @@ void vtkFastMarchingCenterline::Execute(
   }
   AddPoints(linesOutput, positions);
   linesOutput->SetLines(tracts);
-  Add<vtkDoubleArray>(linesOutput->GetPointData(), this->RadiusArrayName, radius);
-  Add<vtkDoubleArray>(linesOutput->GetPointData(), names::Abscissas, abscissa);
-  Add<vtkDoubleArray>(linesOutput->GetPointData(), this->ConfidenceArrayName, confidence);
-  Add<vtkIntArray>(linesOutput->GetCellData(), names::CenterlineIds, centerlineIds);
-  Add<vtkIntArray>(linesOutput->GetCellData(), names::TractIds, tractIds);
-  Add<vtkIntArray>(linesOutput->GetCellData(), names::GroupIds, groupIds);
-  Add<vtkIntArray>(
+  vtkCoronary::AddArray<vtkDoubleArray>(linesOutput->GetPointData(), this->RadiusArrayName, radius);
+  vtkCoronary::AddArray<vtkDoubleArray>(linesOutput->GetPointData(), names::Abscissas, abscissa);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    linesOutput->GetPointData(), this->ConfidenceArrayName, confidence);
+  vtkCoronary::AddArray<vtkIntArray>(
+    linesOutput->GetCellData(), names::CenterlineIds, centerlineIds);
+  vtkCoronary::AddArray<vtkIntArray>(linesOutput->GetCellData(), names::TractIds, tractIds);
+  vtkCoronary::AddArray<vtkIntArray>(linesOutput->GetCellData(), names::GroupIds, groupIds);
+  vtkCoronary::AddArray<vtkIntArray>(
     linesOutput->GetCellData(), names::Blanking, std::vector<int>(groupIds.size(), 0));
 
   // Bifurcations.
@@ -598,9 +564,10 @@ void vtkFastMarchingCenterline::Execute(
   }
   AddPoints(forksOutput, forks);
   forksOutput->SetVerts(vertices);
-  Add<vtkDoubleArray>(forksOutput->GetPointData(), this->RadiusArrayName, forkRadius);
-  Add<vtkIntArray>(forksOutput->GetPointData(), names::ParentGroupIds, parents);
-  Add<vtkIntArray>(forksOutput->GetPointData(), names::TreeIds, trees);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    forksOutput->GetPointData(), this->RadiusArrayName, forkRadius);
+  vtkCoronary::AddArray<vtkIntArray>(forksOutput->GetPointData(), names::ParentGroupIds, parents);
+  vtkCoronary::AddArray<vtkIntArray>(forksOutput->GetPointData(), names::TreeIds, trees);
   forksOutput->GetPointData()->AddArray(daughters);
 
   for (const int port : { TreePort, LinesPort, BifurcationsPort })
@@ -617,13 +584,14 @@ void vtkFastMarchingCenterline::Execute(
         status.push_back(static_cast<int>(end.status));
         messages.push_back(end.message.empty() ? coronary::EndStatusText(end.status) : end.message);
       }
-      Add<vtkIntArray>(fields, statusName, status);
-      Add<vtkStringArray>(fields, messageName, messages);
+      vtkCoronary::AddArray<vtkIntArray>(fields, statusName, status);
+      vtkCoronary::AddArray<vtkStringArray>(fields, messageName, messages);
     };
     addEnds(result.seeds, names::SeedStatus, names::SeedMessage);
     addEnds(result.targets, names::TargetStatus, names::TargetMessage);
-    Add<vtkDoubleArray>(fields, names::ImageBlur, std::vector<double>{ result.blur });
-    Add<vtkUnsignedCharArray>(fields, names::Complete,
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      fields, names::ImageBlur, std::vector<double>{ result.blur });
+    vtkCoronary::AddArray<vtkUnsignedCharArray>(fields, names::Complete,
       std::vector<unsigned char>{ static_cast<unsigned char>(result.complete ? 1 : 0) });
   }
 }

@@ -4,6 +4,7 @@
 #include "vtkExecutive.h"
 #include "vtkInformation.h"
 #include "vtkInformationExecutivePortKey.h"
+#include "vtkInformationVector.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <algorithm>
@@ -47,6 +48,23 @@ void SetRequest(vtkInformation* inInfo, const std::array<int, 6>& extent)
   inInfo->Set(SDDP::UPDATE_PIECE_NUMBER(), 0);
   inInfo->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), 1);
   inInfo->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+}
+
+void RequestWholeForFirstPiece(
+  vtkInformation* request, vtkInformationVector** inputs, int ports, vtkInformationVector* outputs)
+{
+  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  const int piece = outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER());
+  for (int input = 0; input < ports; ++input)
+  {
+    for (int i = 0; i < inputs[input]->GetNumberOfInformationObjects(); ++i)
+    {
+      vtkInformation* info = inputs[input]->GetInformationObject(i);
+      info->Set(SDDP::UPDATE_PIECE_NUMBER(), piece > 0 ? 1 : 0);
+      info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), piece > 0 ? 2 : 1);
+      info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+    }
+  }
 }
 
 UpstreamRequest::UpstreamRequest(vtkInformation* inInfo, vtkInformation* original)

@@ -12,6 +12,7 @@
 #include <array>
 
 class vtkInformation;
+class vtkInformationVector;
 
 namespace vtkCoronary
 {
@@ -36,6 +37,11 @@ VTKCORONARYCOMMON_EXPORT vtkMTimeType UpstreamTime(vtkInformation* inInfo);
 
 /// Sets an extent as the request, and whole data instead of a piece.
 VTKCORONARYCOMMON_EXPORT void SetRequest(vtkInformation* inInfo, const std::array<int, 6>& extent);
+
+/// Inside RequestUpdateExtent, for unstructured data that are worked on as a whole: the first piece
+/// asks all connections of the `ports` input ports for all, the others for nothing.
+VTKCORONARYCOMMON_EXPORT void RequestWholeForFirstPiece(
+  vtkInformation* request, vtkInformationVector** inputs, int ports, vtkInformationVector* outputs);
 
 /**
  * Inside RequestData: asks an input connection for something else than what it has been asked for,

@@ -3,6 +3,8 @@
 #include "CenterlineOverlap.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkCoronaryUpstream.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -24,7 +26,6 @@
 #include "vtkTable.h"
 
 #include <algorithm>
-#include <cctype>
 #include <limits>
 #include <new>
 #include <stdexcept>
@@ -43,15 +44,6 @@ vtkStandardNewMacro(vtkCenterlineMetrics);
 namespace
 {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-
-std::string Capitalised(std::string message)
-{
-  if (!message.empty())
-  {
-    message.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(message.front())));
-  }
-  return message;
-}
 
 vtkDataArray* FindRadius(vtkPolyData* data, const std::string& name, bool needed)
 {
@@ -233,20 +225,8 @@ int vtkCenterlineMetrics::RequestInformation(
 int vtkCenterlineMetrics::RequestUpdateExtent(
   vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  // Trees are compared as a whole: piece 0 asks for all of them, the others for nothing.
-  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
-  vtkInformation* outInfo = outputs->GetInformationObject(port);
-  const int piece = outInfo->Get(SDDP::UPDATE_PIECE_NUMBER());
-  for (int input = 0; input < this->GetNumberOfInputPorts(); ++input)
-  {
-    for (int i = 0; i < inputs[input]->GetNumberOfInformationObjects(); ++i)
-    {
-      vtkInformation* info = inputs[input]->GetInformationObject(i);
-      info->Set(SDDP::UPDATE_PIECE_NUMBER(), piece > 0 ? 1 : 0);
-      info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), piece > 0 ? 2 : 1);
-      info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
-    }
-  }
+  // Trees are compared as a whole.
+  vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
   return 1;
 }
 
@@ -389,7 +369,7 @@ int vtkCenterlineMetrics::RequestData(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< Capitalised(error.what()));
+    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
     success = 0;
   }
   // Not marked as generated, so that the next request executes again.

@@ -3,6 +3,7 @@
 #include "CoronaryPhantom.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -24,7 +25,6 @@
 #include "vtkTimeStamp.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -78,36 +78,19 @@ constexpr double SmallestSpacing = 0.05;
 constexpr double GreatestSpacing = 20.0;
 constexpr int GreatestDimension = 16384;
 
-void Require(bool condition, const std::string& requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(requirement);
-  }
-}
-
 bool AllFinite(const double* values, int count)
 {
   return std::all_of(values, values + count, [](double value) { return std::isfinite(value); });
 }
 
 /// The algorithm's complaint, with the setting called by the property's name.
-std::string PropertyMessage(std::string message)
-{
-  const std::string prefix = "PhantomSettings: ";
-  if (message.compare(0, prefix.size(), prefix) == 0)
-  {
-    message.erase(0, prefix.size());
-    message.front() = static_cast<char>(std::toupper(message.front()));
-  }
-  return message;
-}
-
 void CheckPhases(const std::vector<double>& phases)
 {
-  Require(!phases.empty(), "Phases: at least one is needed");
-  Require(AllFinite(phases.data(), static_cast<int>(phases.size())), "Phases must be finite");
-  Require(std::adjacent_find(phases.begin(), phases.end(), std::greater_equal<>()) == phases.end(),
+  vtkCoronary::Require(!phases.empty(), "Phases: at least one is needed");
+  vtkCoronary::Require(
+    AllFinite(phases.data(), static_cast<int>(phases.size())), "Phases must be finite");
+  vtkCoronary::Require(
+    std::adjacent_find(phases.begin(), phases.end(), std::greater_equal<>()) == phases.end(),
     "Phases must be strictly increasing");
 }
 
@@ -134,7 +117,7 @@ coronary::ImageGrid Cover(
   {
     // Rounding must not add a voxel where the box is a whole number of them.
     const double steps = std::ceil((high[axis] - low[axis]) / spacing[axis] - 1e-6);
-    Require(steps < GreatestDimension, "Spacing is too small for the automatic grid");
+    vtkCoronary::Require(steps < GreatestDimension, "Spacing is too small for the automatic grid");
     grid.extent[2 * axis] = 0;
     grid.extent[2 * axis + 1] = static_cast<int>(steps);
   }
@@ -561,7 +544,7 @@ int vtkCoronaryPhantomSource::RequestInformation(vtkInformationVector* outputs)
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< PropertyMessage(error.what()));
+    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what(), { "PhantomSettings: " }));
     return 0;
   }
 }
@@ -624,7 +607,7 @@ int vtkCoronaryPhantomSource::RequestData(
     }
     catch (const std::exception& error)
     {
-      vtkErrorMacro(<< PropertyMessage(error.what()));
+      vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what(), { "PhantomSettings: " }));
       result = 0;
     }
     if (!complete)
@@ -646,7 +629,7 @@ void vtkCoronaryPhantomSource::Generate(
   const double time = outInfo->Has(SDDP::UPDATE_TIME_STEP())
     ? outInfo->Get(SDDP::UPDATE_TIME_STEP())
     : this->Data->Phases.front();
-  Require(std::isfinite(time), "UPDATE_TIME_STEP: the time must be finite");
+  vtkCoronary::Require(std::isfinite(time), "UPDATE_TIME_STEP: the time must be finite");
 
   const coronary::CoronaryPhantom& phantom = this->Data->Phantom();
   vtkPolyData* output = vtkPolyData::GetData(outInfo);
@@ -694,7 +677,7 @@ void vtkCoronaryPhantomSource::GenerateImage(
 
   vtkNew<vtkShortArray> values;
   values->SetName(vtkCoronaryArrayNames::HounsfieldUnits);
-  Require(values->SetNumberOfValues(output->GetNumberOfPoints()),
+  vtkCoronary::Require(values->SetNumberOfValues(output->GetNumberOfPoints()),
     "Not enough memory for the image: Spacing is too small or Dimensions are too large");
   output->GetPointData()->SetScalars(values);
   if (output->GetNumberOfPoints() > 0)
@@ -706,19 +689,20 @@ void vtkCoronaryPhantomSource::GenerateImage(
 
 coronary::ImageGrid vtkCoronaryPhantomSource::MakeGrid()
 {
-  Require(std::all_of(this->Spacing, this->Spacing + 3,
-            [](double s) { return s >= SmallestSpacing && s <= GreatestSpacing; }),
+  vtkCoronary::Require(std::all_of(this->Spacing, this->Spacing + 3,
+                         [](double s) { return s >= SmallestSpacing && s <= GreatestSpacing; }),
     "Spacing must be 0.05 to 20 mm");
-  Require(AllFinite(this->Origin, 3), "Origin must be finite");
-  Require(std::all_of(this->Dimensions, this->Dimensions + 3,
-            [](int n) { return n >= 1 && n <= GreatestDimension; }),
+  vtkCoronary::Require(AllFinite(this->Origin, 3), "Origin must be finite");
+  vtkCoronary::Require(std::all_of(this->Dimensions, this->Dimensions + 3,
+                         [](int n) { return n >= 1 && n <= GreatestDimension; }),
     "Dimensions must be 1 to 16384");
 
   const Vector3 spacing(this->Spacing);
   const coronary::Matrix3 direction =
     Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(this->Direction);
   const coronary::Matrix3 product = direction * direction.transpose();
-  Require(product.isApprox(coronary::Matrix3::Identity(), 1e-6), "Direction must be orthonormal");
+  vtkCoronary::Require(
+    product.isApprox(coronary::Matrix3::Identity(), 1e-6), "Direction must be orthonormal");
 
   if (this->AutomaticGrid)
   {

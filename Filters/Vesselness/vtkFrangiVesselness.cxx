@@ -3,6 +3,7 @@
 #include "MultiscaleVesselness.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
 
 #include "vtkArrayDispatch.h"
@@ -23,7 +24,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <new>
@@ -38,14 +38,6 @@ namespace
 {
 using Extent = std::array<int, 6>;
 constexpr Extent EmptyExtent = { 0, -1, 0, -1, 0, -1 };
-
-void Require(bool condition, const std::string& requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(requirement);
-  }
-}
 
 bool IsEmpty(const Extent& e)
 {
@@ -313,17 +305,6 @@ void Rotate(const coronary::Matrix3& direction, float* vectors, std::int64_t cou
 }
 
 /// The algorithm's complaint, with the setting called by the property's name.
-std::string PropertyMessage(std::string message)
-{
-  const std::string prefix = "VesselnessSettings: ";
-  if (message.compare(0, prefix.size(), prefix) == 0)
-  {
-    message.erase(0, prefix.size());
-    message.front() = static_cast<char>(std::toupper(message.front()));
-  }
-  return message;
-}
-
 /// Name of the array that was chosen, empty: the active scalars.
 std::string ChosenArray(vtkInformation* chosen)
 {
@@ -408,19 +389,21 @@ int vtkFrangiVesselness::FillInputPortInformation(int port, vtkInformation* info
 coronary::VesselnessSettings vtkFrangiVesselness::Internals::Settings() const
 {
   const vtkFrangiVesselness& self = *this->Self;
-  Require(self.Method >= Frangi && self.Method <= Jerman, "Method must be Frangi, Sato or Jerman");
-  Require(self.ScaleSpacing == Linear || self.ScaleSpacing == Logarithmic,
+  vtkCoronary::Require(
+    self.Method >= Frangi && self.Method <= Jerman, "Method must be Frangi, Sato or Jerman");
+  vtkCoronary::Require(self.ScaleSpacing == Linear || self.ScaleSpacing == Logarithmic,
     "ScaleSpacing must be linear or logarithmic");
-  Require(self.SigmaMin > 0.0 && std::isfinite(self.SigmaMin), "SigmaMin must be positive, in mm");
-  Require(self.SigmaMax >= self.SigmaMin && self.SigmaMax <= 100.0,
+  vtkCoronary::Require(
+    self.SigmaMin > 0.0 && std::isfinite(self.SigmaMin), "SigmaMin must be positive, in mm");
+  vtkCoronary::Require(self.SigmaMax >= self.SigmaMin && self.SigmaMax <= 100.0,
     "SigmaMax must lie between SigmaMin and 100 mm");
-  Require(
+  vtkCoronary::Require(
     self.NumberOfScales >= 1 && self.NumberOfScales <= 100, "NumberOfScales must be 1 to 100");
-  Require(self.MeasurementBlockSize > 0, "MeasurementBlockSize must be positive");
+  vtkCoronary::Require(self.MeasurementBlockSize > 0, "MeasurementBlockSize must be positive");
   for (const std::string* name :
     { &self.VesselnessArrayName, &self.ScaleArrayName, &self.DirectionArrayName })
   {
-    Require(
+    vtkCoronary::Require(
       !name->empty(), "VesselnessArrayName, ScaleArrayName and DirectionArrayName need a name");
   }
 
@@ -447,7 +430,8 @@ Extent vtkFrangiVesselness::Internals::RegionIn(const Extent& whole) const
   Extent region;
   std::copy_n(this->Self->Region, 6, region.begin());
   const Extent inside = Intersection(region, whole);
-  Require(!IsEmpty(inside) || IsEmpty(whole), "Region does not meet the extent of the image");
+  vtkCoronary::Require(
+    !IsEmpty(inside) || IsEmpty(whole), "Region does not meet the extent of the image");
   return inside;
 }
 
@@ -510,19 +494,19 @@ vtkDataArray* vtkFrangiVesselness::Internals::InputArray(
     any = index == 0 ? this->Self->GetInputAbstractArrayToProcess(0, inputs, association)
                      : image->GetPointData()->GetAbstractArray(wanted.c_str());
   }
-  Require(any != nullptr,
+  vtkCoronary::Require(any != nullptr,
     wanted.empty() ? whose + " has no active point scalars"
                    : whose + " has no point array '" + wanted + "'");
   const std::string name =
     "array '" + std::string(any->GetName() ? any->GetName() : "") + "' of " + whose;
-  Require(association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
+  vtkCoronary::Require(association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
     name + " belongs to the cells: point data are needed");
   auto* array = vtkArrayDownCast<vtkDataArray>(any);
-  Require(array != nullptr, name + " is not numeric");
-  Require(array->GetNumberOfComponents() == 1,
+  vtkCoronary::Require(array != nullptr, name + " is not numeric");
+  vtkCoronary::Require(array->GetNumberOfComponents() == 1,
     name + " has " + std::to_string(array->GetNumberOfComponents()) +
       " components: one is needed, an intensity");
-  Require(
+  vtkCoronary::Require(
     array->GetNumberOfTuples() == image->GetNumberOfPoints(), name + " has not one value a voxel");
   return array;
 }
@@ -537,8 +521,10 @@ vtkImageData* vtkFrangiVesselness::Internals::Mask(
   }
   vtkImageData* mask = vtkImageData::GetData(info);
   const Geometry other(mask, info);
-  const auto require = [](bool same, const char* what) {
-    Require(same, std::string("the mask is on another grid than the image: ") + what + " differs");
+  const auto require = [](bool same, const char* what)
+  {
+    vtkCoronary::Require(
+      same, std::string("the mask is on another grid than the image: ") + what + " differs");
   };
   const double voxel = *std::min_element(grid.spacing.begin(), grid.spacing.end());
   require(ExtentOf(info, SDDP::WHOLE_EXTENT()) == whole, "its extent");
@@ -598,13 +584,15 @@ void vtkFrangiVesselness::Internals::Measure(const MeasurementKey& key,
       }
       vtkImageData* mask = vtkImageData::GetData(maskInfo);
       vtkDataArray* array = this->InputArray(inputs, 1, mask);
-      Require(Contains(ExtentOf(mask), slab), "the mask lacks part of the requested extent");
+      vtkCoronary::Require(
+        Contains(ExtentOf(mask), slab), "the mask lacks part of the requested extent");
       inside.resize(Size(slab));
       Convert<ToMask>(array, ExtentOf(mask), slab, inside.data());
     }
     vtkImageData* image = vtkImageData::GetData(inInfo);
     vtkDataArray* array = this->InputArray(inputs, 0, image);
-    Require(Contains(ExtentOf(image), block), "the image lacks part of the requested extent");
+    vtkCoronary::Require(
+      Contains(ExtentOf(image), block), "the image lacks part of the requested extent");
     const FloatBlock floats(image, array, block);
     const double done = static_cast<double>(k - region[4]) / depth;
     const double after = static_cast<double>(slab[5] + 1 - region[4]) / depth;
@@ -644,13 +632,15 @@ void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkI
   vtkInformation* maskInfo = inputs[1]->GetInformationObject(0);
   coronary::VesselnessSettings settings = this->Settings();
   const Extent whole = ExtentOf(inInfo, SDDP::WHOLE_EXTENT());
-  Require(IsEmpty(whole) || (whole[0] < whole[1] && whole[2] < whole[3] && whole[4] < whole[5]),
+  vtkCoronary::Require(
+    IsEmpty(whole) || (whole[0] < whole[1] && whole[2] < whole[3] && whole[4] < whole[5]),
     "the image has " + std::to_string(whole[1] - whole[0] + 1) + " x " +
       std::to_string(whole[3] - whole[2] + 1) + " x " + std::to_string(whole[5] - whole[4] + 1) +
       " voxels: a three-dimensional image is needed");
   const Geometry grid(vtkImageData::GetData(inInfo), inInfo);
   const coronary::Matrix3 direction = grid.Direction();
-  Require((direction * direction.transpose()).isApprox(coronary::Matrix3::Identity(), 1e-4),
+  vtkCoronary::Require(
+    (direction * direction.transpose()).isApprox(coronary::Matrix3::Identity(), 1e-4),
     "the image's direction matrix is not orthonormal");
   const Extent region = this->RegionIn(whole);
   this->Mask(inputs, grid, whole);
@@ -753,13 +743,15 @@ void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkI
     const coronary::MultiscaleVesselness vesselness(settings, Vector3(grid.spacing.data()), whole);
     const Extent block = Grown(part, vesselness.Halo(), whole);
     vtkDataArray* array = this->InputArray(inputs, 0, input);
-    Require(Contains(ExtentOf(input), block), "the image lacks part of the requested extent");
+    vtkCoronary::Require(
+      Contains(ExtentOf(input), block), "the image lacks part of the requested extent");
     std::vector<unsigned char> inside;
     if (maskInfo)
     {
       vtkImageData* mask = vtkImageData::GetData(maskInfo);
       vtkDataArray* maskArray = this->InputArray(inputs, 1, mask);
-      Require(Contains(ExtentOf(mask), part), "the mask lacks part of the requested extent");
+      vtkCoronary::Require(
+        Contains(ExtentOf(mask), part), "the mask lacks part of the requested extent");
       inside.resize(Size(part));
       Convert<ToMask>(maskArray, ExtentOf(mask), part, inside.data());
     }
@@ -814,7 +806,7 @@ int vtkFrangiVesselness::RequestData(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< PropertyMessage(error.what()));
+    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what(), { "VesselnessSettings: " }));
     result = 0;
   }
   // Not marked as generated, so that the next request executes again.

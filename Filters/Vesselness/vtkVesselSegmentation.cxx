@@ -5,6 +5,7 @@
 #include "VesselSegmentation.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
 
 #include "vtkCellArray.h"
 #include "vtkDataArrayRange.h"
@@ -14,7 +15,6 @@
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
-#include "vtkMatrix3x3.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
@@ -27,7 +27,6 @@
 #include "vtkUnsignedShortArray.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <memory>
 #include <new>
@@ -44,14 +43,6 @@ using Extent = std::array<int, 6>;
 constexpr double VesselnessShare = 0.35;
 constexpr double OstiaShare = 0.35;
 
-void Require(bool condition, const std::string& requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(requirement);
-  }
-}
-
 Extent ExtentOf(vtkImageData* image)
 {
   Extent e;
@@ -62,17 +53,6 @@ Extent ExtentOf(vtkImageData* image)
 bool IsEmpty(const Extent& e)
 {
   return e[0] > e[1] || e[2] > e[3] || e[4] > e[5];
-}
-
-coronary::ImageGrid GridOf(vtkImageData* image)
-{
-  coronary::ImageGrid grid;
-  image->GetExtent(grid.extent.data());
-  image->GetOrigin(grid.origin.data());
-  image->GetSpacing(grid.spacing.data());
-  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-    image->GetDirectionMatrix()->GetData());
-  return grid;
 }
 
 /// The voxels of an array in one of the types that the algorithms take; else as a float copy.
@@ -167,23 +147,6 @@ void Insert(
 }
 
 /// Takes the message's first word as the name of a property.
-std::string PropertyMessage(std::string message)
-{
-  const std::string prefixes[] = { "VesselSegmentationSettings: ", "VesselnessSettings: " };
-  for (const std::string& prefix : prefixes)
-  {
-    if (message.compare(0, prefix.size(), prefix) == 0)
-    {
-      message.erase(0, prefix.size());
-    }
-  }
-  if (!message.empty())
-  {
-    message.front() = static_cast<char>(std::toupper(message.front()));
-  }
-  return message;
-}
-
 /// Smallest and largest scale of the vesselness that is computed here, mm.
 std::vector<double> DefaultScales(const Vector3& spacing)
 {
@@ -316,20 +279,20 @@ vtkDataArray* vtkVesselSegmentation::InputArray(vtkInformationVector** inputs, i
     any = wanted.empty() ? data->GetPointData()->GetScalars()
                          : data->GetPointData()->GetAbstractArray(wanted.c_str());
   }
-  Require(any != nullptr,
+  vtkCoronary::Require(any != nullptr,
     whose +
       (wanted.empty() ? std::string(" has no active point scalars")
                       : " has no point array '" + wanted + "'"));
   const std::string name =
     "array '" + std::string(any->GetName() ? any->GetName() : "") + "' of " + whose;
-  Require(association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
+  vtkCoronary::Require(association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
     name + " belongs to the cells: point data are needed");
   auto* array = vtkArrayDownCast<vtkDataArray>(any);
-  Require(array != nullptr, name + " is not numeric");
-  Require(array->GetNumberOfComponents() == 1,
+  vtkCoronary::Require(array != nullptr, name + " is not numeric");
+  vtkCoronary::Require(array->GetNumberOfComponents() == 1,
     name + " has " + std::to_string(array->GetNumberOfComponents()) +
       " components: one is needed, an intensity");
-  Require(
+  vtkCoronary::Require(
     array->GetNumberOfTuples() == data->GetNumberOfPoints(), name + " has not one value a voxel");
   return array;
 }
@@ -338,15 +301,15 @@ void vtkVesselSegmentation::Execute(
   vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   coronary::VesselSegmentationSettings settings;
-  Require(!this->AutomaticWindow ? this->BloodValue > this->TissueValue : true,
+  vtkCoronary::Require(!this->AutomaticWindow ? this->BloodValue > this->TissueValue : true,
     "BloodValue must be above TissueValue");
-  Require(this->WeakThreshold > 0.0 && this->WeakThreshold <= this->StrongThreshold &&
+  vtkCoronary::Require(this->WeakThreshold > 0.0 && this->WeakThreshold <= this->StrongThreshold &&
       this->StrongThreshold <= 1.0,
     "WeakThreshold and StrongThreshold must satisfy 0 < WeakThreshold <= StrongThreshold <= 1");
-  Require(this->AutomaticTubular ||
+  vtkCoronary::Require(this->AutomaticTubular ||
       (this->TubularVesselness > 0.0 && std::isfinite(this->TubularVesselness)),
     "TubularVesselness must be positive");
-  Require(!this->MaskArrayName.empty() && !this->ProbabilityArrayName.empty(),
+  vtkCoronary::Require(!this->MaskArrayName.empty() && !this->ProbabilityArrayName.empty(),
     "MaskArrayName and ProbabilityArrayName need a name");
   settings.weak = this->WeakThreshold;
   settings.strong = this->StrongThreshold;
@@ -369,7 +332,7 @@ void vtkVesselSegmentation::Execute(
   vtkImageData* output = vtkImageData::GetData(outputs->GetInformationObject(MaskPort));
   vtkPolyData* seedsOutput = vtkPolyData::GetData(outputs->GetInformationObject(SeedsPort));
   vtkPolyData* aortaOutput = vtkPolyData::GetData(outputs->GetInformationObject(AortaPort));
-  const coronary::ImageGrid grid = GridOf(input);
+  const coronary::ImageGrid grid = vtkCoronary::GridOf(input);
   const Extent& whole = grid.extent;
 
   // The mask's part; all of it when another output was asked for, so that it need not be made anew.
@@ -392,11 +355,11 @@ void vtkVesselSegmentation::Execute(
     output->GetPointData()->SetActiveScalars(this->MaskArrayName.c_str());
     return;
   }
-  Require(whole[0] < whole[1] && whole[2] < whole[3] && whole[4] < whole[5],
+  vtkCoronary::Require(whole[0] < whole[1] && whole[2] < whole[3] && whole[4] < whole[5],
     "the image has " + std::to_string(whole[1] - whole[0] + 1) + " x " +
       std::to_string(whole[3] - whole[2] + 1) + " x " + std::to_string(whole[5] - whole[4] + 1) +
       " voxels: a three-dimensional image is needed");
-  Require(
+  vtkCoronary::Require(
     (grid.direction * grid.direction.transpose()).isApprox(coronary::Matrix3::Identity(), 1e-4),
     "the image's direction matrix is not orthonormal");
 
@@ -410,7 +373,7 @@ void vtkVesselSegmentation::Execute(
   if (given)
   {
     givenArray = this->InputArray(inputs, 1);
-    Require(IsNear(grid, GridOf(given)),
+    vtkCoronary::Require(IsNear(grid, vtkCoronary::GridOf(given)),
       "the vesselness is on another grid than the image: extent, spacing, origin or direction "
       "differs");
   }
@@ -443,7 +406,7 @@ void vtkVesselSegmentation::Execute(
   coronary::AscendingAorta aorta;
   if (seeds.empty())
   {
-    Require(this->AutomaticOstia,
+    vtkCoronary::Require(this->AutomaticOstia,
       "there is no seed: give points on the Seeds input or with AddSeed, or switch AutomaticOstia "
       "on");
     const coronary::CoronaryOstia found =
@@ -610,7 +573,8 @@ int vtkVesselSegmentation::RequestData(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< PropertyMessage(error.what()));
+    vtkErrorMacro(<< vtkCoronary::PropertyMessage(
+                    error.what(), { "VesselSegmentationSettings: ", "VesselnessSettings: " }));
     result = 0;
   }
   // Not marked as generated, so that the next request executes again.

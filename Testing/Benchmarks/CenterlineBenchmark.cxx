@@ -68,34 +68,6 @@ struct Verdicts
   bool missedTarget = false;
 };
 
-double Median(std::vector<double> values)
-{
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
-
-template <typename Get>
-std::vector<double> Each(const std::vector<Measurement>& runs, Get get)
-{
-  std::vector<double> values;
-  values.reserve(runs.size());
-  for (const Measurement& run : runs)
-  {
-    values.push_back(get(run));
-  }
-  return values;
-}
-
-double Wall(const Measurement& m)
-{
-  return m.wall;
-}
-double Processor(const Measurement& m)
-{
-  return m.processor;
-}
-
 std::string Spread(const std::vector<double>& values)
 {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());

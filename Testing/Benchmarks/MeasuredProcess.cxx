@@ -136,4 +136,11 @@ Measurement MeasureInChild(const std::function<void()>& prepare, const std::func
   }
   return outcome->measurement;
 }
+
+double Median(std::vector<double> values)
+{
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
 }

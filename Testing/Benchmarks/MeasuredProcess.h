@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 namespace coronary
 {
@@ -67,6 +68,32 @@ struct Measurement
  */
 Measurement MeasureInChild(const std::function<void()>& prepare, const std::function<void()>& work,
   const std::function<void()>& deliver = {});
+
+/// Of at least one value.
+double Median(std::vector<double> values);
+
+/// get(run) of each run.
+template <typename Get>
+std::vector<double> Each(const std::vector<Measurement>& runs, Get get)
+{
+  std::vector<double> values;
+  values.reserve(runs.size());
+  for (const Measurement& run : runs)
+  {
+    values.push_back(get(run));
+  }
+  return values;
+}
+
+inline double Wall(const Measurement& m)
+{
+  return m.wall;
+}
+
+inline double Processor(const Measurement& m)
+{
+  return m.processor;
+}
 }
 
 #endif

@@ -293,35 +293,6 @@ Measurement MeasureItk(const TestImage& image, const VesselnessSettings& setting
 // Statistics
 // ---------------------------------------------------------------------------------------------
 
-double Median(std::vector<double> values)
-{
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
-
-template <typename Get>
-std::vector<double> Each(const std::vector<Measurement>& runs, Get get)
-{
-  std::vector<double> values;
-  values.reserve(runs.size());
-  for (const Measurement& run : runs)
-  {
-    values.push_back(get(run));
-  }
-  return values;
-}
-
-double Wall(const Measurement& m)
-{
-  return m.wall;
-}
-
-double Processor(const Measurement& m)
-{
-  return m.processor;
-}
-
 std::string Format(const char* format, double value)
 {
   std::array<char, 64> text;

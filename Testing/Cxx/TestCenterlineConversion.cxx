@@ -1,15 +1,13 @@
 // vtkCenterlineConversion, vtkTGFWriter and vtkTGFReader through the VTK pipeline.
+#include "FilterMessages.h"
 #include "vtkCenterlineConversion.h"
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkTGFReader.h"
 #include "vtkTGFWriter.h"
 
-#include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkCommand.h"
 #include "vtkDataArray.h"
-#include "vtkExecutive.h"
 #include "vtkIdList.h"
 #include "vtkInformation.h"
 #include "vtkIntArray.h"
@@ -95,36 +93,10 @@ std::map<int, BranchContents> ContentsOf(vtkPolyData* data)
   return contents;
 }
 
-/// Collects errors while it lives, and keeps them from the console.
-class Errors
+void ExpectOneError(const Messages& messages, const std::string& text)
 {
-public:
-  explicit Errors(vtkAlgorithm* algorithm)
-  {
-    for (vtkObject* sender :
-      { static_cast<vtkObject*>(algorithm), static_cast<vtkObject*>(algorithm->GetExecutive()) })
-    {
-      vtkNew<vtkCallbackCommand> observer;
-      observer->SetClientData(sender == algorithm ? &this->Texts : &this->Echoes);
-      observer->SetCallback(
-        [](vtkObject*, unsigned long, void* data, void* text) {
-          static_cast<std::vector<std::string>*>(data)->emplace_back(
-            static_cast<const char*>(text));
-        });
-      sender->AddObserver(vtkCommand::ErrorEvent, observer);
-    }
-  }
-
-  std::vector<std::string> Texts;
-
-private:
-  std::vector<std::string> Echoes;
-};
-
-void ExpectOneError(const Errors& errors, const std::string& text)
-{
-  ASSERT_EQ(errors.Texts.size(), 1U) << (errors.Texts.empty() ? "" : errors.Texts.back());
-  EXPECT_NE(errors.Texts[0].find(text), std::string::npos) << errors.Texts[0];
+  ASSERT_EQ(messages.Errors.size(), 1U) << (messages.Errors.empty() ? "" : messages.Errors.back());
+  EXPECT_NE(messages.Errors[0].find(text), std::string::npos) << messages.Errors[0];
 }
 
 std::string WorkFile(const std::string& name)
@@ -287,9 +259,9 @@ TEST(CenterlineConversion, RefusesByName)
         ? vtkCenterlineConversion::VmtkForm
         : vtkCenterlineConversion::TreeForm);
     filter->SetTolerance(tolerance);
-    const Errors errors(filter);
+    const Messages messages(filter);
     filter->Update();
-    ExpectOneError(errors, text);
+    ExpectOneError(messages, text);
     EXPECT_EQ(filter->GetOutput()->GetNumberOfCells(), 0);
   };
   const auto without = [](const char* point, const char* cell)
@@ -355,16 +327,16 @@ TEST(TGF, RefusesByName)
   {
     vtkNew<vtkTGFReader> reader;
     reader->SetFileName(path.c_str());
-    const Errors errors(reader);
+    const Messages messages(reader);
     reader->Update();
-    ExpectOneError(errors, path);
+    ExpectOneError(messages, path);
   }
   {
     vtkNew<vtkTGFReader> reader;
     reader->SetFileName("/nowhere/skeleton.tgf");
-    const Errors errors(reader);
+    const Messages messages(reader);
     reader->Update();
-    ExpectOneError(errors, "/nowhere/skeleton.tgf");
+    ExpectOneError(messages, "/nowhere/skeleton.tgf");
   }
   const std::string before = TextOf(path);
   vtkNew<vtkPolyData> nothing;
@@ -373,9 +345,9 @@ TEST(TGF, RefusesByName)
     vtkNew<vtkTGFWriter> writer;
     writer->SetInputData(data);
     writer->SetFileName(file);
-    const Errors errors(writer);
+    const Messages messages(writer);
     EXPECT_EQ(writer->Write(), 0);
-    ExpectOneError(errors, file != nullptr ? file : "FileName");
+    ExpectOneError(messages, file != nullptr ? file : "FileName");
   };
   refuse(nothing, path.c_str());
   EXPECT_EQ(TextOf(path), before);

@@ -2,6 +2,7 @@
 #include "vtkCoronaryTreeTopology.h"
 
 #include "CoronaryPhantom.h"
+#include "FilterMessages.h"
 #include "ParallelFor.h"
 #include "vtkCoronaryPhantomSource.h"
 
@@ -11,7 +12,6 @@
 #include "vtkCommand.h"
 #include "vtkCompositeDataPipeline.h"
 #include "vtkDoubleArray.h"
-#include "vtkExecutive.h"
 #include "vtkFieldData.h"
 #include "vtkFloatArray.h"
 #include "vtkIdList.h"
@@ -93,46 +93,6 @@ vtkSmartPointer<vtkPolyData> MakeFork(const char* radiusName)
   fork->GetPointData()->AddArray(radius);
   return fork;
 }
-
-/// Collects errors and warnings while it lives, and keeps them from the console.
-class Messages
-{
-public:
-  explicit Messages(vtkAlgorithm* algorithm)
-  {
-    this->Collect(algorithm, vtkCommand::ErrorEvent, this->Errors);
-    this->Collect(algorithm, vtkCommand::WarningEvent, this->Warnings);
-    // The executive adds that the request failed.
-    this->Collect(algorithm->GetExecutive(), vtkCommand::ErrorEvent, this->Echoes);
-  }
-
-  ~Messages()
-  {
-    for (const auto& [sender, tag] : this->Observers)
-    {
-      sender->RemoveObserver(tag);
-    }
-  }
-
-  Messages(const Messages&) = delete;
-  Messages& operator=(const Messages&) = delete;
-
-  std::vector<std::string> Errors;
-  std::vector<std::string> Warnings;
-  std::vector<std::string> Echoes;
-
-private:
-  void Collect(vtkObject* sender, unsigned long event, std::vector<std::string>& messages)
-  {
-    vtkNew<vtkCallbackCommand> observer;
-    observer->SetClientData(&messages);
-    observer->SetCallback([](vtkObject*, unsigned long, void* list, void* text)
-      { static_cast<std::vector<std::string>*>(list)->emplace_back(static_cast<char*>(text)); });
-    this->Observers.emplace_back(sender, sender->AddObserver(event, observer));
-  }
-
-  std::vector<std::pair<vtkObject*, unsigned long>> Observers;
-};
 
 void ExpectRefusal(vtkCoronaryTreeTopology* filter, const std::string& part)
 {

@@ -2,13 +2,13 @@
 #include "vtkFrangiVesselness.h"
 
 #include "CounterRandom.h"
+#include "FilterMessages.h"
 #include "MultiscaleVesselness.h"
 #include "ParallelFor.h"
 
 #include "vtkCallbackCommand.h"
 #include "vtkCellData.h"
 #include "vtkDoubleArray.h"
-#include "vtkExecutive.h"
 #include "vtkFieldData.h"
 #include "vtkFloatArray.h"
 #include "vtkImageAlgorithm.h"
@@ -216,37 +216,6 @@ std::vector<double> Field(vtkDataObject* data, const char* name)
     ? std::vector<double>(array->GetPointer(0), array->GetPointer(0) + array->GetNumberOfValues())
     : std::vector<double>();
 }
-
-/// Collects errors and warnings, and keeps them from the console.
-class Messages
-{
-public:
-  explicit Messages(vtkAlgorithm* algorithm)
-  {
-    Collect(algorithm, vtkCommand::ErrorEvent, this->OfErrors, this->Errors);
-    Collect(algorithm, vtkCommand::WarningEvent, this->OfWarnings, this->Warnings);
-    // The executive adds that the request failed.
-    Collect(algorithm->GetExecutive(), vtkCommand::ErrorEvent, this->OfEchoes, this->Echoes);
-  }
-
-  std::vector<std::string> Errors;
-  std::vector<std::string> Warnings;
-  std::vector<std::string> Echoes;
-
-private:
-  static void Collect(vtkObject* sender, unsigned long event, vtkCallbackCommand* observer,
-    std::vector<std::string>& messages)
-  {
-    observer->SetClientData(&messages);
-    observer->SetCallback([](vtkObject*, unsigned long, void* list, void* text)
-      { static_cast<std::vector<std::string>*>(list)->emplace_back(static_cast<char*>(text)); });
-    sender->AddObserver(event, observer);
-  }
-
-  vtkNew<vtkCallbackCommand> OfErrors;
-  vtkNew<vtkCallbackCommand> OfWarnings;
-  vtkNew<vtkCallbackCommand> OfEchoes;
-};
 
 void ExpectRefusal(vtkFrangiVesselness* filter, const std::string& part)
 {

@@ -1,0 +1,49 @@
+/**
+ * @file vtkCoronaryFilterParts.h
+ * @brief What the thin filters have in common: settings checked, grids read, arrays written.
+ */
+#ifndef vtkCoronaryFilterParts_h
+#define vtkCoronaryFilterParts_h
+
+#include "Geometry.h"
+#include "vtkCoronaryCommonModule.h" // for the export macro
+
+#include "vtkFieldData.h"
+#include "vtkNew.h"
+
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+class vtkImageData;
+
+namespace vtkCoronary
+{
+/// Extent, origin, spacing and direction of an image.
+VTKCORONARYCOMMON_EXPORT coronary::ImageGrid GridOf(vtkImageData* image);
+
+/// @throws std::invalid_argument(requirement) when `condition` does not hold
+VTKCORONARYCOMMON_EXPORT void Require(bool condition, const std::string& requirement);
+
+/// The message of an algorithm as the filter's: without the name of the settings' structure that it
+/// begins with, if it is one of `prefixes`, and with a capital letter; so that it begins with the
+/// name of a property.
+VTKCORONARYCOMMON_EXPORT std::string PropertyMessage(
+  std::string message, std::initializer_list<const char*> prefixes = {});
+
+/// Adds `values` as a new array, which replaces one of the same name.
+template <typename Array, typename Value>
+void AddArray(vtkFieldData* data, const std::string& name, const std::vector<Value>& values)
+{
+  vtkNew<Array> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    array->SetValue(static_cast<vtkIdType>(i), values[i]);
+  }
+  data->AddArray(array);
+}
+}
+
+#endif
