@@ -279,8 +279,13 @@ public:
       lengths.push_back(loop.length);
     }
     vtkCoronary::AddArray<vtkDoubleArray>(data, names::LoopLengths, lengths);
-    vtkCoronary::AddArray<vtkDoubleArray>(
-      data, names::FittedExponent, std::vector<double>{ tree.fittedExponent });
+    // No NaN here: VTK gathers the ranks' data in a form of text that cannot hold it.
+    std::vector<double> fitted;
+    if (!std::isnan(tree.fittedExponent))
+    {
+      fitted.push_back(tree.fittedExponent);
+    }
+    vtkCoronary::AddArray<vtkDoubleArray>(data, names::FittedExponent, fitted);
     if (labels != nullptr)
     {
       vtkCoronary::AddArray<vtkStringArray>(data, names::Dominance,

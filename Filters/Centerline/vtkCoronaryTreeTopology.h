@@ -43,10 +43,10 @@
  * - 2, vtkPolyData: the loops that were found, as closed polylines with cell data `Length`.
  *
  * Field data of outputs 0 and 1: that of the input, `PrunedTwigs`, `ClosedGaps` (int),
- * `LoopLengths` (double, mm), `FittedExponent` (double, over all bifurcations), and when labelled
- * `Dominance` (string) and `HeartFrame` (double[16], 4x4 matrix row by row: from world to heart
- * coordinates in mm of the mean heart; first axis from the right coronary's to the circumflex'
- * side, third from base to apex, origin in the atrioventricular groove).
+ * `LoopLengths` (double, mm), `FittedExponent` (double, over all bifurcations; no value where none
+ * fits), and when labelled `Dominance` (string) and `HeartFrame` (double[16], 4x4 matrix row by row:
+ * from world to heart coordinates in mm of the mean heart; first axis from the right coronary's to
+ * the circumflex' side, third from base to apex, origin in the atrioventricular groove).
  *
  * The output is whole in piece 0 and empty, with all arrays, in every other piece. Blocks of a
  * composite input are treated one by one.

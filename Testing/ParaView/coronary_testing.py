@@ -5,6 +5,7 @@ from paraview import servermanager, simple
 from vtkmodules.vtkIOImage import vtkPNGReader
 
 IMAGE, CENTERLINES, SURFACE, OSTIA, VEIN, PROBE = range(6)
+TREE, LINES, FORKS = range(3)
 
 
 def require(condition, message):
@@ -24,6 +25,27 @@ def quick_phantom(**properties):
     phantom.Spacing = [1.5, 1.5, 1.5]
     phantom.SurfaceSpacing = 0.8
     return phantom
+
+
+def centerline_pipeline():
+    """Phantom, its phase at 0.75, segmentation, vesselness, centerlines, named trees."""
+    # Settings with the creation: a trace of a script records no others.
+    phantom = simple.CoronaryPhantom(registrationName="Phantom", Spacing=[0.8, 0.8, 0.8])
+    phantom.UpdatePipeline(0.75)
+    phase = simple.ReferencePhase(simple.OutputPort(phantom, IMAGE), registrationName="Phase",
+                                  Automatic=0, Time=0.75)
+    phase.UpdatePipeline(0.75)
+    segmentation = simple.VesselSegmentation(phase, registrationName="Segmentation")
+    segmentation.UpdatePipeline(0.75)
+    vesselness = simple.FrangiVesselness(phase, registrationName="Vesselness", AutomaticC=0,
+                                         C=100.0)
+    vesselness.UpdatePipeline(0.75)
+    centerline = simple.FastMarchingCenterline(
+        vesselness, Seeds=simple.OutputPort(segmentation, 1), CTImage=phase, Mask=segmentation,
+        registrationName="Centerline")
+    topology = simple.CoronaryTreeTopology(
+        simple.OutputPort(centerline, TREE), registrationName="Topology")
+    return phantom, centerline, topology
 
 
 def fetch(source, port, time):

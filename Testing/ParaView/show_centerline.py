@@ -4,32 +4,10 @@ import sys
 
 from paraview import servermanager, simple, smstate, smtrace
 
-from coronary_testing import (CENTERLINES, IMAGE, content, fetch, load_plugin, require,
-                              require_picture)
+from coronary_testing import (CENTERLINES, FORKS, LINES, TREE, centerline_pipeline, content, fetch,
+                              load_plugin, require, require_picture)
 
 plugin, folder = sys.argv[1:3]
-TREE, LINES, FORKS = range(3)
-
-
-def make_pipeline():
-    """Phantom, its phase at 0.75, segmentation, vesselness, centerlines, named trees."""
-    # Settings with the creation: a trace of a script records no others.
-    phantom = simple.CoronaryPhantom(registrationName="Phantom", Spacing=[0.8, 0.8, 0.8])
-    phantom.UpdatePipeline(0.75)
-    phase = simple.ReferencePhase(simple.OutputPort(phantom, IMAGE), registrationName="Phase",
-                                  Automatic=0, Time=0.75)
-    phase.UpdatePipeline(0.75)
-    segmentation = simple.VesselSegmentation(phase, registrationName="Segmentation")
-    segmentation.UpdatePipeline(0.75)
-    vesselness = simple.FrangiVesselness(phase, registrationName="Vesselness", AutomaticC=0,
-                                         C=100.0)
-    vesselness.UpdatePipeline(0.75)
-    centerline = simple.FastMarchingCenterline(
-        vesselness, Seeds=simple.OutputPort(segmentation, 1), CTImage=phase, Mask=segmentation,
-        registrationName="Centerline")
-    topology = simple.CoronaryTreeTopology(
-        simple.OutputPort(centerline, TREE), registrationName="Topology")
-    return phantom, centerline, topology
 
 
 def names_of(data):
@@ -38,7 +16,7 @@ def names_of(data):
 
 
 def outputs():
-    phantom, centerline, topology = make_pipeline()
+    phantom, centerline, topology = centerline_pipeline()
     require(centerline.CTArray == "HU", "the array of the CT: %s" % centerline.CTArray)
     tree = fetch(topology, 0, 0.75)
     require({"LM", "pLAD", "mLAD", "dLAD", "pLCx", "pRCA", "mRCA", "dRCA", "D1", "OM1"} <=
@@ -74,7 +52,7 @@ def outputs():
 
 def round_trips():
     simple.ResetSession()
-    topology = make_pipeline()[2]
+    topology = centerline_pipeline()[2]
     view = simple.CreateRenderView()
     view.ViewSize = [600, 600]
     shown = simple.Show(topology, view)
@@ -105,7 +83,7 @@ def round_trips():
 def trace_repeats():
     simple.ResetSession()
     smtrace.start_trace(preamble="")
-    make_pipeline()
+    centerline_pipeline()
     trace = smtrace.stop_trace()
     expected = content(fetch(simple.FindSource("Topology"), 0, 0.75))
     simple.ResetSession()
