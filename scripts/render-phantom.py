@@ -72,7 +72,7 @@ RIGHT = (
 
 
 def fail(message):
-    sys.exit("render-phantom: " + message)
+    sys.exit(os.path.splitext(os.path.basename(sys.argv[0]))[0] + ": " + message)
 
 
 # ---------------------------------------------------------------------------------------- input

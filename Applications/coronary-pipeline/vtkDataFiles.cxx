@@ -1,5 +1,6 @@
 #include "vtkDataFiles.h"
 
+#include "AppendedXmlData.h"
 #include "AtomicFile.h"
 #include "vtkMessageTrap.h"
 
@@ -9,6 +10,7 @@
 #include "vtkXMLPolyDataWriter.h"
 
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 namespace coronary
@@ -16,7 +18,8 @@ namespace coronary
 vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages)
 {
   vtkNew<vtkXMLPolyDataReader> reader;
-  if (!std::ifstream(path))
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
   {
     throw std::runtime_error("Cannot open '" + path + "'.");
   }
@@ -24,7 +27,9 @@ vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTra
   {
     throw std::runtime_error("'" + path + "' is not a VTK XML poly data file.");
   }
-  reader->SetFileName(path.c_str());
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  reader->ReadFromInputStringOn();
+  reader->SetInputString(WithInlineXmlData(text));
   reader->Update();
   try
   {

@@ -2,6 +2,7 @@
 // arrays, refusals.
 #include "vtkFastMarchingCenterline.h"
 
+#include "AppendedXmlData.h"
 #include "CenterlineExtraction.h"
 #include "FilterMessages.h"
 #include "Geometry.h"
@@ -81,47 +82,6 @@ vtkSmartPointer<vtkImageData> Vessel()
   return image;
 }
 
-/// The text of a .vtp whose base64 data are appended, with the data in their elements: some builds of
-/// Expat can not read the other.
-std::string WithInlineData(const std::string& text)
-{
-  const std::size_t appended = text.find("<AppendedData encoding=\"base64\"");
-  if (appended == std::string::npos)
-  {
-    return text;
-  }
-  const std::size_t data = text.find('_', appended) + 1;
-  const std::size_t dataEnd = text.find("</AppendedData>", data);
-  const std::string attribute = "offset=\"";
-  struct Element
-  {
-    std::size_t begin;
-    std::size_t end; ///< behind "/>"
-    std::size_t offset;
-  };
-  std::vector<Element> elements;
-  for (std::size_t at = text.find("<DataArray"); at < appended;
-       at = text.find("<DataArray", at + 1))
-  {
-    const std::size_t number = text.find(attribute, at) + attribute.size();
-    elements.push_back({ at, text.find("/>", at) + 2, std::stoul(text.substr(number, 20)) });
-  }
-  std::string result;
-  std::size_t copied = 0;
-  for (std::size_t n = 0; n < elements.size(); ++n)
-  {
-    std::string tag = text.substr(elements[n].begin, elements[n].end - 2 - elements[n].begin);
-    tag.erase(tag.find(attribute)); // the last one
-    tag.replace(tag.find("appended"), 8, "binary");
-    const std::size_t from = data + elements[n].offset;
-    const std::size_t to = n + 1 < elements.size() ? data + elements[n + 1].offset : dataEnd;
-    result += text.substr(copied, elements[n].begin - copied) + tag + ">" +
-      text.substr(from, to - from) + "</DataArray>";
-    copied = elements[n].end;
-  }
-  return result + text.substr(copied, appended - copied) + "</VTKFile>";
-}
-
 vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& name)
 {
   std::ifstream file(std::string(DYNAMICCORONARY_DATA_DIR) + "/" + name, std::ios::binary);
@@ -132,7 +92,7 @@ vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& name)
   const std::string text(std::istreambuf_iterator<char>(file), {});
   vtkNew<vtkXMLPolyDataReader> reader;
   reader->ReadFromInputStringOn();
-  reader->SetInputString(WithInlineData(text));
+  reader->SetInputString(coronary::WithInlineXmlData(text));
   reader->Update();
   return reader->GetOutput();
 }
