@@ -109,6 +109,29 @@ constexpr const char* LongestMissed = "LongestMissed"; ///< double, mm
 
 // Surface, cell data.
 constexpr const char* CellEntityIds = "CellEntityIds"; ///< int, 1 wall, 2.. caps
+
+// Volume, point data: ids of the input's points, vtkIdType, -1 elsewhere.
+constexpr const char* SurfacePointId = "SurfacePointId";
+constexpr const char* SkeletonPointId = "SkeletonPointId";
+// Volume, cell data.
+constexpr const char* RegionIds = "RegionIds";                       ///< int, component, from 0
+constexpr const char* TetrahedronVolume = "TetrahedronVolume";       ///< double, mm^3
+constexpr const char* MinimumDihedralAngle = "MinimumDihedralAngle"; ///< double, radians
+constexpr const char* RadiusEdgeRatio = "RadiusEdgeRatio";           ///< double
+// Its boundary and its edges along the skeleton, cell data, vtkIdType.
+constexpr const char* SurfaceCellId = "SurfaceCellId";
+constexpr const char* TetrahedronId = "TetrahedronId";
+constexpr const char* SkeletonEdgeId = "SkeletonEdgeId";
+// Volume, field data.
+constexpr const char* Backend = "Backend";                       ///< string
+constexpr const char* Tries = "Tries";                           ///< int, 2 after a repair
+constexpr const char* RepairDisplacement = "RepairDisplacement"; ///< double, mm
+constexpr const char* LeastDihedralAngle = "LeastDihedralAngle"; ///< double, radians
+constexpr const char* PoorFraction = "PoorFraction";             ///< double, below 15 degrees
+constexpr const char* LeastVolume = "LeastVolume";               ///< double, mm^3
+constexpr const char* TotalVolume = "TotalVolume";               ///< double, mm^3
+constexpr const char* GreatestRadiusEdgeRatio = "GreatestRadiusEdgeRatio"; ///< double
+constexpr const char* Warnings = "Warnings"; ///< string, one a warning
 }
 
 #endif

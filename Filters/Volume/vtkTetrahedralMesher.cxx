@@ -1,0 +1,409 @@
+#include "vtkTetrahedralMesher.h"
+
+#include "TetrahedralMesh.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
+
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkCellType.h"
+#include "vtkDataArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkIdList.h"
+#include "vtkIdTypeArray.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkMath.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUnstructuredGrid.h"
+
+#include <algorithm>
+#include <cctype>
+#include <new>
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+using coronary::TetrahedralMesh;
+using coronary::TetrahedralMeshInput;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+vtkStandardNewMacro(vtkTetrahedralMesher);
+
+namespace
+{
+std::string Capitalised(std::string message)
+{
+  if (!message.empty())
+  {
+    message.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(message.front())));
+  }
+  return message;
+}
+
+std::vector<coronary::Vector3> ReadPoints(vtkPolyData* data)
+{
+  std::vector<coronary::Vector3> points(data->GetNumberOfPoints());
+  for (std::size_t i = 0; i < points.size(); ++i)
+  {
+    data->GetPoint(static_cast<vtkIdType>(i), points[i].data());
+  }
+  return points;
+}
+
+void ReadSurface(vtkPolyData* surface, TetrahedralMeshInput& input)
+{
+  input.points = ReadPoints(surface);
+  if (surface->GetNumberOfStrips() > 0)
+  {
+    throw std::invalid_argument("The surface has triangle strips; triangulate it first");
+  }
+  vtkNew<vtkIdList> cell;
+  vtkCellArray* polygons = surface->GetPolys();
+  for (polygons->InitTraversal(); polygons->GetNextCell(cell) != 0;)
+  {
+    if (cell->GetNumberOfIds() != 3)
+    {
+      throw std::invalid_argument("Cell " + std::to_string(input.triangles.size()) +
+        " of the surface has " + std::to_string(cell->GetNumberOfIds()) +
+        " corners; triangulate it first");
+    }
+    input.triangles.push_back({ cell->GetId(0), cell->GetId(1), cell->GetId(2) });
+  }
+}
+
+void ReadSkeleton(vtkPolyData* skeleton, const std::string& name, TetrahedralMeshInput& input)
+{
+  input.skeletonPoints = ReadPoints(skeleton);
+  const bool automatic = name.empty() || name == "Automatic";
+  vtkDataArray* radius =
+    skeleton->GetPointData()->GetArray(automatic ? vtkCoronaryArrayNames::Radius : name.c_str());
+  if (radius == nullptr && automatic)
+  {
+    radius = skeleton->GetPointData()->GetArray("Radius");
+  }
+  if (radius == nullptr && !automatic)
+  {
+    throw std::invalid_argument("The skeleton has no point array " + name);
+  }
+  if (radius != nullptr)
+  {
+    if (radius->GetNumberOfComponents() != 1 ||
+      radius->GetNumberOfTuples() != skeleton->GetNumberOfPoints())
+    {
+      throw std::invalid_argument("The radius array " +
+        std::string(radius->GetName() != nullptr ? radius->GetName() : "") +
+        " must have one value for each point");
+    }
+    for (vtkIdType i = 0; i < skeleton->GetNumberOfPoints(); ++i)
+    {
+      input.skeletonRadius.push_back(radius->GetComponent(i, 0));
+    }
+  }
+  vtkNew<vtkIdList> cell;
+  vtkCellArray* lines = skeleton->GetLines();
+  for (lines->InitTraversal(); lines->GetNextCell(cell) != 0;)
+  {
+    for (vtkIdType i = 1; i < cell->GetNumberOfIds(); ++i)
+    {
+      input.skeletonEdges.emplace_back(cell->GetId(i - 1), cell->GetId(i));
+    }
+  }
+}
+
+template <typename Array, typename Value>
+vtkNew<Array> MakeArray(const std::string& name, const std::vector<Value>& values)
+{
+  vtkNew<Array> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    array->SetValue(static_cast<vtkIdType>(i), values[i]);
+  }
+  return array;
+}
+
+void WriteSummary(vtkFieldData* field, const TetrahedralMesh& mesh)
+{
+  const auto number = [field](const char* name, double value)
+  { field->AddArray(MakeArray<vtkDoubleArray>(name, std::vector<double>{ value })); };
+  vtkNew<vtkStringArray> backend;
+  backend->SetName(vtkCoronaryArrayNames::Backend);
+  backend->InsertNextValue(mesh.backend == coronary::TetrahedralBackend::Cgal ? "CGAL" : "TetGen");
+  field->AddArray(backend);
+  field->AddArray(
+    MakeArray<vtkIntArray>(vtkCoronaryArrayNames::Tries, std::vector<int>{ mesh.tries }));
+  number(vtkCoronaryArrayNames::RepairDisplacement, mesh.repairDisplacement);
+  const double poor = vtkMath::RadiansFromDegrees(15.0);
+  number(vtkCoronaryArrayNames::LeastDihedralAngle,
+    *std::min_element(mesh.minimumDihedral.begin(), mesh.minimumDihedral.end()));
+  number(vtkCoronaryArrayNames::PoorFraction,
+    static_cast<double>(std::count_if(mesh.minimumDihedral.begin(), mesh.minimumDihedral.end(),
+      [poor](double angle) { return angle < poor; })) /
+      static_cast<double>(mesh.minimumDihedral.size()));
+  number(
+    vtkCoronaryArrayNames::LeastVolume, *std::min_element(mesh.volume.begin(), mesh.volume.end()));
+  number(vtkCoronaryArrayNames::TotalVolume,
+    std::accumulate(mesh.volume.begin(), mesh.volume.end(), 0.0));
+  number(vtkCoronaryArrayNames::GreatestRadiusEdgeRatio,
+    *std::max_element(mesh.radiusEdgeRatio.begin(), mesh.radiusEdgeRatio.end()));
+  vtkNew<vtkStringArray> warnings;
+  warnings->SetName(vtkCoronaryArrayNames::Warnings);
+  for (const std::string& warning : mesh.warnings)
+  {
+    warnings->InsertNextValue(warning);
+  }
+  field->AddArray(warnings);
+}
+}
+
+vtkTetrahedralMesher::vtkTetrahedralMesher()
+  : EntityArrayName(vtkCoronaryArrayNames::CellEntityIds)
+{
+  this->SetNumberOfInputPorts(2);
+  this->SetNumberOfOutputPorts(3);
+}
+
+void vtkTetrahedralMesher::SetSkeletonData(vtkPolyData* skeleton)
+{
+  this->SetInputData(SkeletonPort, skeleton);
+}
+
+vtkPolyData* vtkTetrahedralMesher::GetBoundary()
+{
+  return vtkPolyData::SafeDownCast(this->GetOutputDataObject(BoundaryPort));
+}
+
+vtkPolyData* vtkTetrahedralMesher::GetEdges()
+{
+  return vtkPolyData::SafeDownCast(this->GetOutputDataObject(EdgesPort));
+}
+
+int vtkTetrahedralMesher::FillInputPortInformation(int port, vtkInformation* info)
+{
+  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
+  if (port == SkeletonPort)
+  {
+    info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
+  }
+  return 1;
+}
+
+int vtkTetrahedralMesher::FillOutputPortInformation(int port, vtkInformation* info)
+{
+  info->Set(
+    vtkDataObject::DATA_TYPE_NAME(), port == VolumePort ? "vtkUnstructuredGrid" : "vtkPolyData");
+  return 1;
+}
+
+int vtkTetrahedralMesher::RequestInformation(
+  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+  {
+    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  }
+  return 1;
+}
+
+int vtkTetrahedralMesher::RequestUpdateExtent(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  // A closed surface has no parts: piece 0 asks for all of it, the others for nothing.
+  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  const int piece = outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER());
+  for (int input = 0; input < this->GetNumberOfInputPorts(); ++input)
+  {
+    for (int i = 0; i < inputs[input]->GetNumberOfInformationObjects(); ++i)
+    {
+      vtkInformation* info = inputs[input]->GetInformationObject(i);
+      info->Set(SDDP::UPDATE_PIECE_NUMBER(), piece > 0 ? 1 : 0);
+      info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), piece > 0 ? 2 : 1);
+      info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+    }
+  }
+  return 1;
+}
+
+int vtkTetrahedralMesher::RequestData(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkPolyData* surface = vtkPolyData::GetData(inputs[SurfacePort], 0);
+  vtkPolyData* skeleton = vtkPolyData::GetData(inputs[SkeletonPort], 0);
+  vtkUnstructuredGrid* volume = vtkUnstructuredGrid::GetData(outputs, VolumePort);
+  vtkPolyData* boundary = vtkPolyData::GetData(outputs, BoundaryPort);
+  vtkPolyData* edges = vtkPolyData::GetData(outputs, EdgesPort);
+  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  if (outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
+  {
+    return 1;
+  }
+  int success = 1;
+  try
+  {
+    coronary::TetrahedralMeshSettings settings;
+    settings.backend = static_cast<coronary::TetrahedralBackend>(this->Backend);
+    settings.radiusEdgeRatio = this->RadiusEdgeRatio;
+    settings.minimumDihedral = vtkMath::RadiansFromDegrees(this->MinimumDihedralAngle);
+    settings.minimumVolume = this->MinimumVolume;
+    settings.unitLength = this->UnitLength;
+    settings.sizeFactor = this->SizeFactor;
+    settings.improve = this->Improve;
+    settings.repair = this->Repair;
+    settings.outside =
+      this->LeaveOutside ? coronary::OutsidePolicy::LeaveOut : coronary::OutsidePolicy::Refuse;
+    settings.timeLimit = this->TimeLimit;
+    settings.workerFolder = this->WorkerFolder;
+    settings.Validate();
+    if (this->EntityArrayName.empty())
+    {
+      throw std::invalid_argument("An output array needs a name");
+    }
+    if (surface->GetNumberOfPoints() == 0)
+    {
+      return 1;
+    }
+    TetrahedralMeshInput input;
+    ReadSurface(surface, input);
+    if (skeleton != nullptr)
+    {
+      ReadSkeleton(skeleton, this->RadiusArrayName, input);
+    }
+    const TetrahedralMesh mesh =
+      coronary::MakeTetrahedralMesh(input, settings, vtkCoronary::ProgressOf(this));
+    for (const std::string& warning : mesh.warnings)
+    {
+      vtkWarningMacro(<< Capitalised(warning));
+    }
+
+    vtkNew<vtkPoints> points;
+    points->SetDataTypeToDouble();
+    points->SetNumberOfPoints(static_cast<vtkIdType>(mesh.points.size()));
+    for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    {
+      points->SetPoint(static_cast<vtkIdType>(i), mesh.points[i].data());
+    }
+    const auto surfacePoint =
+      MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::SurfacePointId, mesh.surfacePoint);
+    const auto skeletonPoint =
+      MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::SkeletonPointId, mesh.skeletonPoint);
+    for (vtkPointSet* output : { static_cast<vtkPointSet*>(volume),
+           static_cast<vtkPointSet*>(boundary), static_cast<vtkPointSet*>(edges) })
+    {
+      output->SetPoints(points);
+      output->GetPointData()->AddArray(surfacePoint);
+      output->GetPointData()->AddArray(skeletonPoint);
+    }
+
+    vtkNew<vtkCellArray> tetrahedra;
+    for (const coronary::Tetrahedron& t : mesh.tetrahedra)
+    {
+      const vtkIdType corners[4] = { t[0], t[1], t[2], t[3] };
+      tetrahedra->InsertNextCell(4, corners);
+    }
+    volume->SetCells(VTK_TETRA, tetrahedra);
+    vtkCellData* cells = volume->GetCellData();
+    cells->AddArray(MakeArray<vtkIntArray>(vtkCoronaryArrayNames::RegionIds, mesh.region));
+    cells->AddArray(
+      MakeArray<vtkIntArray>(this->EntityArrayName, std::vector<int>(mesh.tetrahedra.size(), 0)));
+    cells->AddArray(
+      MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::TetrahedronVolume, mesh.volume));
+    cells->AddArray(
+      MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::MinimumDihedralAngle, mesh.minimumDihedral));
+    cells->AddArray(
+      MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::RadiusEdgeRatio, mesh.radiusEdgeRatio));
+    WriteSummary(volume->GetFieldData(), mesh);
+
+    vtkNew<vtkCellArray> triangles;
+    vtkCellData* faces = boundary->GetCellData();
+    vtkCellData* inputFaces = surface->GetCellData();
+    const auto count = static_cast<vtkIdType>(mesh.boundary.size());
+    // Cells of the surface are counted after its vertices and lines.
+    const vtkIdType firstFace = surface->GetNumberOfVerts() + surface->GetNumberOfLines();
+    faces->CopyAllocate(inputFaces, count);
+    for (vtkIdType i = 0; i < count; ++i)
+    {
+      const coronary::Triangle& t = mesh.boundary[i];
+      const vtkIdType corners[3] = { t[0], t[1], t[2] };
+      triangles->InsertNextCell(3, corners);
+      faces->CopyData(inputFaces, firstFace + mesh.boundaryCell[i], i);
+    }
+    boundary->SetPolys(triangles);
+    if (faces->GetAbstractArray(this->EntityArrayName.c_str()) == nullptr)
+    {
+      faces->AddArray(
+        MakeArray<vtkIntArray>(this->EntityArrayName, std::vector<int>(mesh.boundary.size(), 1)));
+    }
+    std::vector<std::int64_t> surfaceCell = mesh.boundaryCell;
+    for (std::int64_t& cell : surfaceCell)
+    {
+      cell += firstFace;
+    }
+    faces->AddArray(MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::SurfaceCellId, surfaceCell));
+    faces->AddArray(
+      MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::TetrahedronId, mesh.boundaryElement));
+
+    vtkNew<vtkCellArray> lines;
+    std::vector<std::int64_t> source;
+    for (const TetrahedralMesh::Edge& edge : mesh.skeletonEdges)
+    {
+      const vtkIdType ends[2] = { edge.from, edge.to };
+      lines->InsertNextCell(2, ends);
+      source.push_back(edge.skeletonEdge);
+    }
+    edges->SetLines(lines);
+    edges->GetCellData()->AddArray(
+      MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::SkeletonEdgeId, source));
+    return 1;
+  }
+  catch (const coronary::Cancelled&)
+  {
+    vtkDebugMacro("aborted");
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorMacro("Not enough memory to mesh the volume");
+    success = 0;
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< Capitalised(error.what()));
+    success = 0;
+  }
+  // Not marked as generated, so that the next request executes again.
+  volume->Initialize();
+  boundary->Initialize();
+  edges->Initialize();
+  for (int i = 0; i < this->GetNumberOfOutputPorts(); ++i)
+  {
+    outputs->GetInformationObject(i)->Set(SDDP::DATA_NOT_GENERATED(), 1);
+  }
+  return success;
+}
+
+void vtkTetrahedralMesher::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Backend: " << this->Backend << "\n";
+  os << indent << "RadiusEdgeRatio: " << this->RadiusEdgeRatio << "\n";
+  os << indent << "MinimumDihedralAngle: " << this->MinimumDihedralAngle << "\n";
+  os << indent << "MinimumVolume: " << this->MinimumVolume << "\n";
+  os << indent << "UnitLength: " << this->UnitLength << "\n";
+  os << indent << "SizeFactor: " << this->SizeFactor << "\n";
+  os << indent << "Improve: " << this->Improve << "\n";
+  os << indent << "Repair: " << this->Repair << "\n";
+  os << indent << "LeaveOutside: " << this->LeaveOutside << "\n";
+  os << indent << "TimeLimit: " << this->TimeLimit << "\n";
+  os << indent << "WorkerFolder: " << this->WorkerFolder << "\n";
+  os << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n";
+  os << indent << "EntityArrayName: " << this->EntityArrayName << "\n";
+}
