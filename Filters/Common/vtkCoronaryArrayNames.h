@@ -132,6 +132,9 @@ constexpr const char* LeastVolume = "LeastVolume";               ///< double, mm
 constexpr const char* TotalVolume = "TotalVolume";               ///< double, mm^3
 constexpr const char* GreatestRadiusEdgeRatio = "GreatestRadiusEdgeRatio"; ///< double
 constexpr const char* Warnings = "Warnings"; ///< string, one a warning
+// Cleaned surface, field data.
+constexpr const char* Repairs = "Repairs";                           ///< string, a sentence each
+constexpr const char* GreatestDisplacement = "GreatestDisplacement"; ///< double, mm
 }
 
 #endif

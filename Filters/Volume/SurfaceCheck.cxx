@@ -1,6 +1,6 @@
 #include "SurfaceCheck.h"
 
-#include "CuttingTriangles.h"
+#include "TriangleIntersections.h"
 
 #include <algorithm>
 #include <cmath>
@@ -358,7 +358,7 @@ ClosedSurface CheckSurface(
 
 void CheckSelfIntersections(const ClosedSurface& surface)
 {
-  const auto pairs = FindCuttingTriangles(surface.points, surface.triangles);
+  const auto pairs = FindSelfIntersections(surface.points, surface.triangles);
   if (pairs.empty())
   {
     return;

@@ -1,6 +1,6 @@
 #include "TetrahedralMesh.h"
 
-#include "CuttingTriangles.h"
+#include "TriangleIntersections.h"
 #include "TriangleTree.h"
 
 #include <algorithm>
@@ -429,7 +429,7 @@ private:
         points[moved[i]] = places[i];
       }
       cells.clear();
-      for (const auto& [s, t] : FindCuttingTriangles(points, this->Surface.triangles))
+      for (const auto& [s, t] : FindSelfIntersections(points, this->Surface.triangles))
       {
         cells.push_back(s);
         cells.push_back(t);

@@ -3,6 +3,9 @@
 #include "TetrahedralMesh.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkCoronaryUpstream.h"
+#include "vtkTriangleSurface.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -26,7 +29,6 @@
 #include "vtkUnstructuredGrid.h"
 
 #include <algorithm>
-#include <cctype>
 #include <new>
 #include <numeric>
 #include <stdexcept>
@@ -40,49 +42,9 @@ vtkStandardNewMacro(vtkTetrahedralMesher);
 
 namespace
 {
-std::string Capitalised(std::string message)
-{
-  if (!message.empty())
-  {
-    message.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(message.front())));
-  }
-  return message;
-}
-
-std::vector<coronary::Vector3> ReadPoints(vtkPolyData* data)
-{
-  std::vector<coronary::Vector3> points(data->GetNumberOfPoints());
-  for (std::size_t i = 0; i < points.size(); ++i)
-  {
-    data->GetPoint(static_cast<vtkIdType>(i), points[i].data());
-  }
-  return points;
-}
-
-void ReadSurface(vtkPolyData* surface, TetrahedralMeshInput& input)
-{
-  input.points = ReadPoints(surface);
-  if (surface->GetNumberOfStrips() > 0)
-  {
-    throw std::invalid_argument("The surface has triangle strips; triangulate it first");
-  }
-  vtkNew<vtkIdList> cell;
-  vtkCellArray* polygons = surface->GetPolys();
-  for (polygons->InitTraversal(); polygons->GetNextCell(cell) != 0;)
-  {
-    if (cell->GetNumberOfIds() != 3)
-    {
-      throw std::invalid_argument("Cell " + std::to_string(input.triangles.size()) +
-        " of the surface has " + std::to_string(cell->GetNumberOfIds()) +
-        " corners; triangulate it first");
-    }
-    input.triangles.push_back({ cell->GetId(0), cell->GetId(1), cell->GetId(2) });
-  }
-}
-
 void ReadSkeleton(vtkPolyData* skeleton, const std::string& name, TetrahedralMeshInput& input)
 {
-  input.skeletonPoints = ReadPoints(skeleton);
+  input.skeletonPoints = vtkCoronary::ReadPoints(skeleton);
   const bool automatic = name.empty() || name == "Automatic";
   vtkDataArray* radius =
     skeleton->GetPointData()->GetArray(automatic ? vtkCoronaryArrayNames::Radius : name.c_str());
@@ -119,29 +81,16 @@ void ReadSkeleton(vtkPolyData* skeleton, const std::string& name, TetrahedralMes
   }
 }
 
-template <typename Array, typename Value>
-vtkNew<Array> MakeArray(const std::string& name, const std::vector<Value>& values)
-{
-  vtkNew<Array> array;
-  array->SetName(name.c_str());
-  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
-  for (std::size_t i = 0; i < values.size(); ++i)
-  {
-    array->SetValue(static_cast<vtkIdType>(i), values[i]);
-  }
-  return array;
-}
-
 void WriteSummary(vtkFieldData* field, const TetrahedralMesh& mesh)
 {
   const auto number = [field](const char* name, double value)
-  { field->AddArray(MakeArray<vtkDoubleArray>(name, std::vector<double>{ value })); };
+  { vtkCoronary::AddArray<vtkDoubleArray>(field, name, std::vector<double>{ value }); };
   vtkNew<vtkStringArray> backend;
   backend->SetName(vtkCoronaryArrayNames::Backend);
   backend->InsertNextValue(mesh.backend == coronary::TetrahedralBackend::Cgal ? "CGAL" : "TetGen");
   field->AddArray(backend);
-  field->AddArray(
-    MakeArray<vtkIntArray>(vtkCoronaryArrayNames::Tries, std::vector<int>{ mesh.tries }));
+  vtkCoronary::AddArray<vtkIntArray>(
+    field, vtkCoronaryArrayNames::Tries, std::vector<int>{ mesh.tries });
   number(vtkCoronaryArrayNames::RepairDisplacement, mesh.repairDisplacement);
   const double poor = vtkMath::RadiansFromDegrees(15.0);
   number(vtkCoronaryArrayNames::LeastDihedralAngle,
@@ -218,19 +167,7 @@ int vtkTetrahedralMesher::RequestInformation(
 int vtkTetrahedralMesher::RequestUpdateExtent(
   vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  // A closed surface has no parts: piece 0 asks for all of it, the others for nothing.
-  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
-  const int piece = outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER());
-  for (int input = 0; input < this->GetNumberOfInputPorts(); ++input)
-  {
-    for (int i = 0; i < inputs[input]->GetNumberOfInformationObjects(); ++i)
-    {
-      vtkInformation* info = inputs[input]->GetInformationObject(i);
-      info->Set(SDDP::UPDATE_PIECE_NUMBER(), piece > 0 ? 1 : 0);
-      info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), piece > 0 ? 2 : 1);
-      info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
-    }
-  }
+  vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
   return 1;
 }
 
@@ -273,7 +210,8 @@ int vtkTetrahedralMesher::RequestData(
       return 1;
     }
     TetrahedralMeshInput input;
-    ReadSurface(surface, input);
+    input.points = vtkCoronary::ReadPoints(surface);
+    input.triangles = vtkCoronary::ReadTriangles(surface);
     if (skeleton != nullptr)
     {
       ReadSkeleton(skeleton, this->RadiusArrayName, input);
@@ -282,7 +220,7 @@ int vtkTetrahedralMesher::RequestData(
       coronary::MakeTetrahedralMesh(input, settings, vtkCoronary::ProgressOf(this));
     for (const std::string& warning : mesh.warnings)
     {
-      vtkWarningMacro(<< Capitalised(warning));
+      vtkWarningMacro(<< vtkCoronary::PropertyMessage(warning));
     }
 
     vtkNew<vtkPoints> points;
@@ -292,16 +230,14 @@ int vtkTetrahedralMesher::RequestData(
     {
       points->SetPoint(static_cast<vtkIdType>(i), mesh.points[i].data());
     }
-    const auto surfacePoint =
-      MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::SurfacePointId, mesh.surfacePoint);
-    const auto skeletonPoint =
-      MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::SkeletonPointId, mesh.skeletonPoint);
     for (vtkPointSet* output : { static_cast<vtkPointSet*>(volume),
            static_cast<vtkPointSet*>(boundary), static_cast<vtkPointSet*>(edges) })
     {
       output->SetPoints(points);
-      output->GetPointData()->AddArray(surfacePoint);
-      output->GetPointData()->AddArray(skeletonPoint);
+      vtkCoronary::AddArray<vtkIdTypeArray>(
+        output->GetPointData(), vtkCoronaryArrayNames::SurfacePointId, mesh.surfacePoint);
+      vtkCoronary::AddArray<vtkIdTypeArray>(
+        output->GetPointData(), vtkCoronaryArrayNames::SkeletonPointId, mesh.skeletonPoint);
     }
 
     vtkNew<vtkCellArray> tetrahedra;
@@ -312,15 +248,15 @@ int vtkTetrahedralMesher::RequestData(
     }
     volume->SetCells(VTK_TETRA, tetrahedra);
     vtkCellData* cells = volume->GetCellData();
-    cells->AddArray(MakeArray<vtkIntArray>(vtkCoronaryArrayNames::RegionIds, mesh.region));
-    cells->AddArray(
-      MakeArray<vtkIntArray>(this->EntityArrayName, std::vector<int>(mesh.tetrahedra.size(), 0)));
-    cells->AddArray(
-      MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::TetrahedronVolume, mesh.volume));
-    cells->AddArray(
-      MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::MinimumDihedralAngle, mesh.minimumDihedral));
-    cells->AddArray(
-      MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::RadiusEdgeRatio, mesh.radiusEdgeRatio));
+    vtkCoronary::AddArray<vtkIntArray>(cells, vtkCoronaryArrayNames::RegionIds, mesh.region);
+    vtkCoronary::AddArray<vtkIntArray>(
+      cells, this->EntityArrayName, std::vector<int>(mesh.tetrahedra.size(), 0));
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      cells, vtkCoronaryArrayNames::TetrahedronVolume, mesh.volume);
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      cells, vtkCoronaryArrayNames::MinimumDihedralAngle, mesh.minimumDihedral);
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      cells, vtkCoronaryArrayNames::RadiusEdgeRatio, mesh.radiusEdgeRatio);
     WriteSummary(volume->GetFieldData(), mesh);
 
     vtkNew<vtkCellArray> triangles;
@@ -340,17 +276,17 @@ int vtkTetrahedralMesher::RequestData(
     boundary->SetPolys(triangles);
     if (faces->GetAbstractArray(this->EntityArrayName.c_str()) == nullptr)
     {
-      faces->AddArray(
-        MakeArray<vtkIntArray>(this->EntityArrayName, std::vector<int>(mesh.boundary.size(), 1)));
+      vtkCoronary::AddArray<vtkIntArray>(
+        faces, this->EntityArrayName, std::vector<int>(mesh.boundary.size(), 1));
     }
     std::vector<std::int64_t> surfaceCell = mesh.boundaryCell;
     for (std::int64_t& cell : surfaceCell)
     {
       cell += firstFace;
     }
-    faces->AddArray(MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::SurfaceCellId, surfaceCell));
-    faces->AddArray(
-      MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::TetrahedronId, mesh.boundaryElement));
+    vtkCoronary::AddArray<vtkIdTypeArray>(faces, vtkCoronaryArrayNames::SurfaceCellId, surfaceCell);
+    vtkCoronary::AddArray<vtkIdTypeArray>(
+      faces, vtkCoronaryArrayNames::TetrahedronId, mesh.boundaryElement);
 
     vtkNew<vtkCellArray> lines;
     std::vector<std::int64_t> source;
@@ -361,8 +297,8 @@ int vtkTetrahedralMesher::RequestData(
       source.push_back(edge.skeletonEdge);
     }
     edges->SetLines(lines);
-    edges->GetCellData()->AddArray(
-      MakeArray<vtkIdTypeArray>(vtkCoronaryArrayNames::SkeletonEdgeId, source));
+    vtkCoronary::AddArray<vtkIdTypeArray>(
+      edges->GetCellData(), vtkCoronaryArrayNames::SkeletonEdgeId, source);
     return 1;
   }
   catch (const coronary::Cancelled&)
@@ -376,7 +312,7 @@ int vtkTetrahedralMesher::RequestData(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< Capitalised(error.what()));
+    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
     success = 0;
   }
   // Not marked as generated, so that the next request executes again.

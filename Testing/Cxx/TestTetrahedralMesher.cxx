@@ -1,6 +1,7 @@
 // vtkTetrahedralMesher through the VTK pipeline: arrays, ids, summary, pieces, blocks, refusals.
 #include "vtkTetrahedralMesher.h"
 
+#include "FilterMessages.h"
 #include "TetrahedralMesh.h"
 #include "vtkCoronaryPhantomSource.h"
 
@@ -74,46 +75,6 @@ vtkSmartPointer<vtkPolyData> Line(const std::vector<std::array<double, 3>>& plac
   line->SetLines(cells);
   return line;
 }
-
-/// Collects errors and warnings while it lives, and keeps them from the console.
-class Messages
-{
-public:
-  explicit Messages(vtkAlgorithm* algorithm)
-  {
-    this->Collect(algorithm, vtkCommand::ErrorEvent, this->Errors);
-    this->Collect(algorithm, vtkCommand::WarningEvent, this->Warnings);
-    // The executive adds that the request failed.
-    this->Collect(algorithm->GetExecutive(), vtkCommand::ErrorEvent, this->Echoes);
-  }
-
-  ~Messages()
-  {
-    for (const auto& [sender, tag] : this->Observers)
-    {
-      sender->RemoveObserver(tag);
-    }
-  }
-
-  Messages(const Messages&) = delete;
-  Messages& operator=(const Messages&) = delete;
-
-  std::vector<std::string> Errors;
-  std::vector<std::string> Warnings;
-  std::vector<std::string> Echoes;
-
-private:
-  void Collect(vtkObject* sender, unsigned long event, std::vector<std::string>& messages)
-  {
-    vtkNew<vtkCallbackCommand> observer;
-    observer->SetClientData(&messages);
-    observer->SetCallback([](vtkObject*, unsigned long, void* list, void* text)
-      { static_cast<std::vector<std::string>*>(list)->emplace_back(static_cast<char*>(text)); });
-    this->Observers.emplace_back(sender, sender->AddObserver(event, observer));
-  }
-
-  std::vector<std::pair<vtkObject*, unsigned long>> Observers;
-};
 
 void ExpectRefusal(vtkTetrahedralMesher* filter, const std::string& part)
 {

@@ -1,9 +1,9 @@
 /**
- * @file CuttingTriangles.h
+ * @file TriangleIntersections.h
  * @brief Pairs of triangles of one mesh that cut each other.
  */
-#ifndef DynamicCoronary_CuttingTriangles_h
-#define DynamicCoronary_CuttingTriangles_h
+#ifndef DynamicCoronary_TriangleIntersections_h
+#define DynamicCoronary_TriangleIntersections_h
 
 #include "Geometry.h"
 
@@ -18,7 +18,7 @@ namespace coronary
  * @param limit  stop looking after about so many; 0: find all
  * @return pairs of triangle numbers, each with the lower number first, in ascending order
  */
-std::vector<std::pair<std::int64_t, std::int64_t>> FindCuttingTriangles(
+std::vector<std::pair<std::int64_t, std::int64_t>> FindSelfIntersections(
   const std::vector<Vector3>& points, const std::vector<Triangle>& triangles,
   std::size_t limit = 0);
 }

@@ -1,4 +1,4 @@
-#include "CuttingTriangles.h"
+#include "TriangleIntersections.h"
 
 #include "ParallelFor.h"
 
@@ -210,7 +210,7 @@ bool Intersect(const std::vector<Vector3>& points, const Triangle& s, const Tria
 }
 }
 
-std::vector<std::pair<std::int64_t, std::int64_t>> FindCuttingTriangles(
+std::vector<std::pair<std::int64_t, std::int64_t>> FindSelfIntersections(
   const std::vector<Vector3>& points, const std::vector<Triangle>& triangles, std::size_t limit)
 {
   std::vector<std::pair<std::int64_t, std::int64_t>> result;
