@@ -1,18 +1,52 @@
 #include "FastMarching.h"
 
+#include "HugeArray.h"
+#include "MarchingQueue.h"
+
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 #include <string>
+#include <unordered_map>
 
 namespace coronary
 {
 namespace
 {
+using Address = VoxelRegion::Address;
+
 constexpr float Infinite = std::numeric_limits<float>::infinity();
-constexpr std::uint32_t NotOnFront = 0xffffffffU;
-constexpr std::uint32_t Children = 4; ///< of a heap's node: flatter than 2, one cache line
+constexpr double Third = 1.0 / 3.0;
 constexpr std::uint32_t CheckInterval = 16384;
+/// An array over all addresses of the box is faster, and not greater than one over the members
+/// with what finding their numbers needs, up to this many addresses for each member.
+constexpr double MostAddressesPerMember = 1.3;
+
+// While marching the bits of an arrival say what a voxel is. As numbers without sign:
+// final arrivals < not reached < not in the region < on the front (the sign is set).
+constexpr std::uint32_t NotReached = 0x7f800000U; ///< infinity
+constexpr std::uint32_t Outside = 0x7fffffffU;
+constexpr std::uint32_t OnFront = 0x80000000U;
+
+inline std::uint32_t BitsOf(float value)
+{
+  std::uint32_t bits;
+  std::memcpy(&bits, &value, sizeof(bits));
+  return bits;
+}
+
+inline float FromBits(std::uint32_t bits)
+{
+  float value;
+  std::memcpy(&value, &bits, sizeof(value));
+  return value;
+}
+
+inline bool IsFinal(std::uint32_t bits)
+{
+  return bits < NotReached;
+}
 
 void Require(bool condition, const char* requirement)
 {
@@ -22,14 +56,491 @@ void Require(bool condition, const char* requirement)
   }
 }
 
-/// One axis of the discrete equation: alpha (T - beta)^2 summed over the axes is the slowness squared.
-struct Term
+/// Arrays over all addresses.
+struct DenseLayout
 {
-  double alpha;  ///< 1/mm^2
-  double beta;   ///< relative to the newest arrival
-  double first;  ///< the neighbour's arrival, relative as well
-  double length; ///< as beta, of the length
+  std::size_t addresses;
+  std::uint32_t operator()(Address address) const { return address; }
+  std::size_t Size() const { return this->addresses; }
 };
+
+/// Arrays over the members, and one more entry for what is none.
+struct SparseLayout
+{
+  const VoxelRegion* region;
+  std::uint32_t outside;
+  std::uint32_t operator()(Address address) const
+  {
+    const std::uint32_t number = this->region->Number(address);
+    return number == VoxelRegion::notAMember ? this->outside : number;
+  }
+  std::size_t Size() const { return static_cast<std::size_t>(this->outside) + 1; }
+};
+
+/// The discrete equation: alpha (T - beta)^2 summed over the axes is the slowness squared. Axes
+/// without a known neighbour have alpha 0. Values are relative to the newest known arrival, which
+/// keeps the digits where the front is far from its source.
+struct Terms
+{
+  double alpha[3]; ///< 1/mm^2
+  double beta[3];
+  double first[3]; ///< the neighbour's arrival
+};
+
+/// Solves without the latest neighbours, one after the other, that the front passes later.
+__attribute__((noinline)) double SolveWithoutLatest(Terms& terms, double slowness)
+{
+  for (;;)
+  {
+    double a = 0.0;
+    double b = 0.0;
+    double c = -slowness * slowness;
+    int latest = -1;
+    int count = 0;
+    for (int t = 0; t < 3; ++t)
+    {
+      if (terms.alpha[t] > 0.0)
+      {
+        a += terms.alpha[t];
+        b += terms.alpha[t] * terms.beta[t];
+        c += terms.alpha[t] * terms.beta[t] * terms.beta[t];
+        latest = latest < 0 || terms.first[t] > terms.first[latest] ? t : latest;
+        ++count;
+      }
+    }
+    const double discriminant = b * b - a * c;
+    const double value = discriminant >= 0.0 ? (b + std::sqrt(discriminant)) / a
+                                             : -std::numeric_limits<double>::infinity();
+    if (count <= 1 || value >= terms.first[latest])
+    {
+      return value;
+    }
+    // The front passes that neighbour later: it can not have come from there.
+    terms.alpha[latest] = 0.0;
+  }
+}
+
+/// @param latest  greatest of the known terms' first
+inline double Solve(Terms& terms, double slowness, double latest)
+{
+  const double a = terms.alpha[0] + terms.alpha[1] + terms.alpha[2];
+  const double weighted[3] = { terms.alpha[0] * terms.beta[0], terms.alpha[1] * terms.beta[1],
+    terms.alpha[2] * terms.beta[2] };
+  const double b = weighted[0] + weighted[1] + weighted[2];
+  const double c = -slowness * slowness + weighted[0] * terms.beta[0] +
+    weighted[1] * terms.beta[1] + weighted[2] * terms.beta[2];
+  const double discriminant = b * b - a * c;
+  const double value = (b + std::sqrt(discriminant)) / a;
+  if (__builtin_expect(value >= latest, 1)) // false for what is not a number
+  {
+    return value;
+  }
+  return SolveWithoutLatest(terms, slowness);
+}
+
+/// What is read of a neighbour, side by side.
+struct Voxel
+{
+  std::uint32_t bits; ///< arrival, or what the voxel is
+  float
+    speedThenLength; ///< the speed is needed until the arrival is final, the length from then on
+};
+
+/// The march itself.
+template <typename Layout>
+class Front
+{
+public:
+  Front(const VoxelRegion& region, const FastMarchingSettings& settings,
+    const ProgressCallback& progress, const Layout& layout, double bucketWidth, bool oneLabel)
+    : Region(region)
+    , Settings(settings)
+    , Progress(progress)
+    , Place(layout)
+    , Queue(bucketWidth)
+    , Voxels(layout.Size(), { Outside, 1.0F })
+    , Labels(oneLabel ? 0 : layout.Size(), FastMarching::noSource)
+    , OneLabel(oneLabel)
+  {
+  }
+  void Seed(const FastMarchingSource& source);
+  bool Run();
+  std::size_t MemorySize() const
+  {
+    return this->Voxels.MemorySize() + this->Labels.MemorySize() + this->Queue.MemorySize();
+  }
+
+private:
+  template <bool SecondOrder, bool WithLengths>
+  bool RunAs();
+  bool RunAny();
+  bool RunCountingBits();
+
+  const VoxelRegion& Region;
+  const FastMarchingSettings& Settings;
+  const ProgressCallback& Progress;
+  Layout Place;
+
+public:
+  MarchingQueue Queue;
+  HugeArray<Voxel> Voxels;
+  HugeArray<std::uint8_t> Labels; ///< empty if all sources have the same
+
+private:
+  bool OneLabel;
+  /// Lengths of what is on the front and was taken along straight lines from a source.
+  std::unordered_map<std::uint32_t, float> Fixed;
+};
+
+template <typename Layout>
+void Front<Layout>::Seed(const FastMarchingSource& source)
+{
+  const Vector3& spacing = this->Settings.spacing;
+  Voxel* const voxels = this->Voxels.Data();
+  const double reach =
+    this->Settings.sourceRadius > 0.0 ? this->Settings.sourceRadius : 3.0 * spacing.maxCoeff();
+  const std::array<int, 6>& box = this->Region.Box();
+  std::array<int, 6> range;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const double steps = reach / spacing[axis];
+    const double low = std::max<double>(box[2 * axis], std::ceil(source.index[axis] - steps));
+    const double high = std::min<double>(box[2 * axis + 1], std::floor(source.index[axis] + steps));
+    if (high < low)
+    {
+      return;
+    }
+    range[2 * axis] = static_cast<int>(low);
+    range[2 * axis + 1] = static_cast<int>(high);
+  }
+  for (int k = range[4]; k <= range[5]; ++k)
+  {
+    for (int j = range[2]; j <= range[3]; ++j)
+    {
+      for (int i = range[0]; i <= range[1]; ++i)
+      {
+        const Address address = this->Region.AddressOf(i, j, k);
+        const Vector3 offset = Vector3(i, j, k) - source.index;
+        const double distance = spacing.cwiseProduct(offset).norm();
+        if (this->Region.Number(address) == VoxelRegion::notAMember || distance > reach)
+        {
+          continue;
+        }
+        const std::uint32_t voxel = this->Place(address);
+        // The slowness along the straight line, unless that leaves the region. The source itself
+        // may lie beside it.
+        const int pieces =
+          std::max(1, static_cast<int>(std::ceil(2.0 * offset.cwiseAbs().maxCoeff())));
+        double slowness = 0.0;
+        bool inside = true;
+        for (int piece = 0; piece < pieces && inside; ++piece)
+        {
+          const Vector3 step = (piece + 0.5) / pieces * offset;
+          const Vector3 at = source.index + step;
+          const std::array<int, 3> index = { static_cast<int>(std::lround(at[0])),
+            static_cast<int>(std::lround(at[1])), static_cast<int>(std::lround(at[2])) };
+          const bool member =
+            this->Region.NumberOf(index[0], index[1], index[2]) != VoxelRegion::notAMember;
+          inside = member || step.cwiseAbs().maxCoeff() <= 0.75;
+          slowness += 1.0 /
+            static_cast<double>(
+              voxels[member ? this->Place(this->Region.AddressOf(index[0], index[1], index[2]))
+                            : voxel]
+                .speedThenLength);
+        }
+        const auto arrival = static_cast<float>(distance * slowness / pieces);
+        const std::uint32_t before = voxels[voxel].bits;
+        if (!inside || !(arrival < Infinite) ||
+          (before != NotReached && FromBits(before & ~OnFront) <= arrival))
+        {
+          continue;
+        }
+        this->Fixed[voxel] = static_cast<float>(distance);
+        if (!this->OneLabel)
+        {
+          this->Labels.Data()[voxel] = static_cast<std::uint8_t>(source.label);
+        }
+        voxels[voxel].bits = BitsOf(arrival) | OnFront;
+        this->Queue.Push(MarchingQueue::MakeEntry(BitsOf(arrival), address));
+      }
+    }
+  }
+}
+
+template <typename Layout>
+template <bool SecondOrder, bool WithLengths>
+inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
+{
+  const VoxelRegion& region = this->Region;
+  const Layout layout = this->Place;
+  MarchingQueue& queue = this->Queue;
+  Voxel* const voxels = this->Voxels.Data();
+  std::uint8_t* const labels = this->Labels.Data();
+  const bool oneLabel = this->OneLabel;
+  const double limit = this->Settings.stopAtArrival;
+  double weight[3];      // 1/mm^2
+  double distance[2][3]; // mm, of differences of first and second order
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const double spacing = this->Settings.spacing[axis];
+    weight[axis] = 1.0 / (spacing * spacing);
+    distance[0][axis] = spacing;
+    distance[1][axis] = spacing / 1.5;
+  }
+  const auto bitsAt = [voxels](std::uint32_t voxel) { return voxels[voxel].bits; };
+  const auto keep = [&](MarchingQueue::Entry entry)
+  {
+    return bitsAt(layout(MarchingQueue::Address(entry))) ==
+      (MarchingQueue::ArrivalBits(entry) | OnFront);
+  };
+  const auto expect = [&](MarchingQueue::Entry entry)
+  { __builtin_prefetch(voxels + layout(MarchingQueue::Address(entry))); };
+  const auto prepare = [&](MarchingQueue::Entry entry)
+  {
+    const Address address = MarchingQueue::Address(entry);
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const std::array<Address, 4>& steps = region.Steps(address, axis);
+      __builtin_prefetch(voxels + layout(address + steps[0]));
+      __builtin_prefetch(voxels + layout(address + steps[3]));
+    }
+  };
+
+  // Which neighbours are known is as good as random: selections instead of branches.
+  const auto setTerm =
+    [&](Terms& terms, int axis, std::uint32_t nearest, std::uint32_t beyond, double origin)
+  {
+    const bool known = IsFinal(nearest);
+    const float first = FromBits(nearest);
+    terms.first[axis] = known ? first - origin : 0.0;
+    terms.beta[axis] = terms.first[axis];
+    terms.alpha[axis] = known ? weight[axis] : 0.0;
+    if (SecondOrder)
+    {
+      const bool second = known && beyond <= nearest;
+      const float difference = second ? first - FromBits(beyond) : 0.0F;
+      terms.alpha[axis] *= second ? 2.25 : 1.0;
+      terms.beta[axis] += difference * Third;
+    }
+  };
+
+  std::uint32_t reached = 0;
+  while (queue.Find(keep, expect, prepare))
+  {
+    if (reached % CheckInterval == CheckInterval - 1)
+    {
+      Report(this->Progress, static_cast<double>(reached) / region.Size());
+      if (this->Settings.goOn && !this->Settings.goOn(reached))
+      {
+        return false;
+      }
+    }
+    const MarchingQueue::Entry entry = queue.Least();
+    const float arrival = MarchingQueue::Arrival(entry);
+    const std::uint32_t arrivalBits = MarchingQueue::ArrivalBits(entry);
+    const Address address = MarchingQueue::Address(entry);
+    if (arrival > limit)
+    {
+      return false;
+    }
+    queue.RemoveLeast();
+    ++reached;
+    const std::uint32_t voxel = layout(address);
+    voxels[voxel].bits = arrivalBits;
+
+    // Two steps down, one down, one up, two up along each axis.
+    std::uint32_t places[3][4];
+    std::uint32_t bits[3][4];
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const std::array<Address, 4>& steps = region.Steps(address, axis);
+      for (int step = 0; step < 4; ++step)
+      {
+        places[axis][step] = layout(address + steps[step]);
+        bits[axis][step] = bitsAt(places[axis][step]);
+      }
+    }
+
+    const auto fixed = this->Fixed.empty() ? this->Fixed.end() : this->Fixed.find(voxel);
+    if (fixed != this->Fixed.end())
+    {
+      if (WithLengths)
+      {
+        voxels[voxel].speedThenLength = fixed->second;
+      }
+      this->Fixed.erase(fixed);
+    }
+    else
+    {
+      std::uint32_t nearest[3];
+      std::uint32_t earliest = 0;
+      bool up[3];
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        up[axis] = bits[axis][2] < bits[axis][1];
+        nearest[axis] = up[axis] ? bits[axis][2] : bits[axis][1];
+      }
+      earliest = nearest[1] < nearest[0] ? 1 : 0;
+      earliest = nearest[2] < nearest[earliest] ? 2 : earliest;
+      if (!oneLabel)
+      {
+        labels[voxel] = labels[places[earliest][up[earliest] ? 2 : 1]];
+      }
+      if (WithLengths)
+      {
+        std::uint32_t latestBits = 0;
+        for (int axis = 0; axis < 3; ++axis)
+        {
+          latestBits = std::max(latestBits, IsFinal(nearest[axis]) ? nearest[axis] : 0U);
+        }
+        const double origin = FromBits(latestBits);
+        Terms terms;
+        double along[3];
+        for (int axis = 0; axis < 3; ++axis)
+        {
+          const std::uint32_t beyond = up[axis] ? bits[axis][3] : bits[axis][0];
+          setTerm(terms, axis, nearest[axis], beyond, origin);
+          const bool known = IsFinal(nearest[axis]);
+          const double length = voxels[places[axis][up[axis] ? 2 : 1]].speedThenLength;
+          along[axis] = known ? length : 0.0;
+          if (SecondOrder)
+          {
+            const bool second = known && beyond <= nearest[axis];
+            const double former = voxels[places[axis][up[axis] ? 3 : 0]].speedThenLength;
+            along[axis] += second ? (length - former) * Third : 0.0;
+          }
+        }
+        const double value =
+          Solve(terms, 1.0 / static_cast<double>(voxels[voxel].speedThenLength), 0.0);
+        // The path comes along the gradient: the derivative of its length in that direction is 1.
+        double sum = 0.0;
+        double weighted = 0.0;
+        double norm = 0.0;
+        for (int axis = 0; axis < 3; ++axis)
+        {
+          const double rise = std::max(0.0, value - terms.beta[axis]);
+          sum += terms.alpha[axis] * rise;
+          weighted += terms.alpha[axis] * rise * along[axis];
+          norm += terms.alpha[axis] * rise * rise;
+        }
+        voxels[voxel].speedThenLength = sum > 0.0
+          ? static_cast<float>((weighted + std::sqrt(norm)) / sum)
+          : voxels[places[earliest][up[earliest] ? 2 : 1]].speedThenLength;
+      }
+    }
+
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      for (int side = 0; side < 2; ++side)
+      {
+        const std::uint32_t before = bits[axis][1 + side];
+        const std::uint32_t opposite = bits[axis][3 * side];
+        // Final, outside, or known already from its other side: then this one changes nothing.
+        if (IsFinal(before) || before == Outside || opposite < arrivalBits)
+        {
+          continue;
+        }
+        const std::uint32_t other = places[axis][1 + side];
+        const Address otherAddress = address + region.Steps(address, axis)[1 + side];
+        const double slowness = 1.0 / static_cast<double>(voxels[other].speedThenLength);
+        const std::uint32_t behind = bits[axis][2 - side];
+        double value;
+        if (before == NotReached)
+        {
+          // No other neighbour is known.
+          const bool second = SecondOrder && behind <= arrivalBits;
+          const float difference = second ? arrival - FromBits(behind) : 0.0F;
+          value = slowness * distance[second ? 1 : 0][axis] + difference * Third;
+        }
+        else
+        {
+          Terms terms;
+          for (int a = 0; a < 3; ++a)
+          {
+            const std::array<Address, 4>& steps = region.Steps(otherAddress, a);
+            const std::uint32_t below = bitsAt(layout(otherAddress + steps[1]));
+            const std::uint32_t above = bitsAt(layout(otherAddress + steps[2]));
+            const bool up = above < below;
+            const std::uint32_t beyond = bitsAt(layout(otherAddress + (up ? steps[3] : steps[0])));
+            setTerm(terms, a, up ? above : below, beyond, arrival);
+          }
+          value = Solve(terms, slowness, 0.0);
+        }
+        // Never before the voxel that it comes from: rounding, and differences of second order.
+        const auto there = static_cast<float>(value + arrival);
+        const std::uint32_t after = BitsOf(there > arrival ? there : arrival) | OnFront;
+        if (after == before || after == (NotReached | OnFront))
+        {
+          continue;
+        }
+        // A value from more neighbours replaces an earlier one even where it is later; but the
+        // straight lines around a source are better than any difference.
+        if (!this->Fixed.empty())
+        {
+          const auto straight = this->Fixed.find(other);
+          if (straight != this->Fixed.end())
+          {
+            if (after >= before || oneLabel || labels[other] == labels[voxel])
+            {
+              continue;
+            }
+            this->Fixed.erase(straight);
+          }
+        }
+        voxels[other].bits = after;
+        queue.Push(MarchingQueue::MakeEntry(after & ~OnFront, otherAddress));
+      }
+    }
+  }
+  Report(this->Progress, 1.0);
+  return true;
+}
+
+template <typename Layout>
+inline __attribute__((always_inline)) bool Front<Layout>::RunAny()
+{
+  if (this->Settings.secondOrder)
+  {
+    return this->Settings.lengths ? this->RunAs<true, true>() : this->RunAs<true, false>();
+  }
+  return this->Settings.lengths ? this->RunAs<false, true>() : this->RunAs<false, false>();
+}
+
+#if defined(__x86_64__)
+template <typename Layout>
+__attribute__((target("popcnt"))) bool Front<Layout>::RunCountingBits()
+{
+  return this->RunAny();
+}
+#endif
+
+template <typename Layout>
+bool Front<Layout>::Run()
+{
+#if defined(__x86_64__)
+  // Counting the bits of a word is one instruction on any processor since 2008, but the compiler
+  // may not assume it.
+  if (__builtin_cpu_supports("popcnt"))
+  {
+    return this->RunCountingBits();
+  }
+#endif
+  return this->RunAny();
+}
+
+/// A hundredth of the time from voxel to voxel; the queue corrects it.
+double BucketWidth(const std::vector<float>& speeds, const Vector3& spacing)
+{
+  const std::size_t step = speeds.size() / 1000 + 1;
+  double slowness = 0.0;
+  std::size_t count = 0;
+  for (std::size_t number = 0; number < speeds.size(); number += step)
+  {
+    slowness += 1.0 / static_cast<double>(speeds[number]);
+    ++count;
+  }
+  return 0.01 * spacing.minCoeff() * slowness / static_cast<double>(count);
+}
 }
 
 FastMarching::FastMarching(const VoxelRegion& region, std::vector<float> speed,
@@ -50,368 +561,81 @@ FastMarching::FastMarching(const VoxelRegion& region, std::vector<float> speed,
     "speeds must be positive and finite");
 }
 
-inline void FastMarching::Place(std::uint32_t at, const Entry& entry)
-{
-  this->Heap[at] = entry;
-  this->Positions[entry.number] = at;
-}
-
-inline void FastMarching::SiftUp(std::uint32_t at, const Entry& entry)
-{
-  while (at > 0)
-  {
-    const std::uint32_t parent = (at - 1) / Children;
-    if (!(entry.key < this->Heap[parent].key))
-    {
-      break;
-    }
-    this->Place(at, this->Heap[parent]);
-    at = parent;
-  }
-  this->Place(at, entry);
-}
-
-inline void FastMarching::SiftDown(std::uint32_t at, const Entry& entry)
-{
-  const auto size = static_cast<std::uint32_t>(this->Heap.size());
-  for (;;)
-  {
-    const std::uint32_t first = at * Children + 1;
-    if (first >= size)
-    {
-      break;
-    }
-    std::uint32_t least = first;
-    const std::uint32_t end = std::min(first + Children, size);
-    for (std::uint32_t child = first + 1; child < end; ++child)
-    {
-      least = this->Heap[child].key < this->Heap[least].key ? child : least;
-    }
-    if (!(this->Heap[least].key < entry.key))
-    {
-      break;
-    }
-    this->Place(at, this->Heap[least]);
-    at = least;
-  }
-  this->Place(at, entry);
-}
-
-void FastMarching::Seed(const FastMarchingSource& source)
-{
-  const Vector3& spacing = this->Settings.spacing;
-  const double reach =
-    this->Settings.sourceRadius > 0.0 ? this->Settings.sourceRadius : 3.0 * spacing.maxCoeff();
-  const std::array<int, 6>& box = this->Region.Box();
-  std::array<int, 6> range;
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    const double steps = reach / spacing[axis];
-    const double low = std::max<double>(box[2 * axis], std::ceil(source.index[axis] - steps));
-    const double high = std::min<double>(box[2 * axis + 1], std::floor(source.index[axis] + steps));
-    if (high < low)
-    {
-      return;
-    }
-    range[2 * axis] = static_cast<int>(low);
-    range[2 * axis + 1] = static_cast<int>(high);
-  }
-  const auto numberAt = [&](const Vector3& index)
-  {
-    return this->Region.NumberOf(static_cast<int>(std::lround(index[0])),
-      static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])));
-  };
-  for (int k = range[4]; k <= range[5]; ++k)
-  {
-    for (int j = range[2]; j <= range[3]; ++j)
-    {
-      for (int i = range[0]; i <= range[1]; ++i)
-      {
-        const VoxelRegion::Address address = this->Region.AddressOf(i, j, k);
-        const std::uint32_t number = this->Region.Number(address);
-        const Vector3 offset = Vector3(i, j, k) - source.index;
-        const double distance = spacing.cwiseProduct(offset).norm();
-        if (number == VoxelRegion::notAMember || distance > reach)
-        {
-          continue;
-        }
-        // The slowness along the straight line, unless that leaves the region. The source itself
-        // may lie beside it.
-        const int pieces =
-          std::max(1, static_cast<int>(std::ceil(2.0 * offset.cwiseAbs().maxCoeff())));
-        double slowness = 0.0;
-        bool inside = true;
-        for (int piece = 0; piece < pieces && inside; ++piece)
-        {
-          const Vector3 step = (piece + 0.5) / pieces * offset;
-          const std::uint32_t here = numberAt(source.index + step);
-          const bool member = here != VoxelRegion::notAMember;
-          inside = member || step.cwiseAbs().maxCoeff() <= 0.75;
-          slowness += 1.0 / static_cast<double>(this->Speeds[member ? here : number]);
-        }
-        const auto arrival = static_cast<float>(distance * slowness / pieces);
-        const std::uint32_t position = this->Positions[number];
-        if (!inside || (position != NotOnFront && this->Heap[position].key <= arrival))
-        {
-          continue;
-        }
-        this->Labels[number] = static_cast<std::uint8_t>(source.label);
-        this->Fixed[number] = true;
-        if (this->Settings.lengths)
-        {
-          this->Lengths[number] = static_cast<float>(distance);
-        }
-        const Entry entry{ arrival, number, address };
-        if (position == NotOnFront)
-        {
-          this->Heap.push_back(entry);
-        }
-        this->SiftUp(
-          position == NotOnFront ? static_cast<std::uint32_t>(this->Heap.size()) - 1 : position,
-          entry);
-      }
-    }
-  }
-}
-
 bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
 {
-  const std::size_t count = this->Region.Size();
-  this->Times.assign(count + 1, Infinite);
-  this->Labels.assign(count, noSource);
-  this->Lengths.assign(this->Settings.lengths ? count + 1 : 0, Infinite);
-  this->Positions.assign(count, NotOnFront);
-  this->Fixed.assign(count, false);
-  this->Heap.clear();
+  const std::uint32_t count = this->Region.Size();
+  if (this->Speeds.size() != count)
+  {
+    throw std::logic_error("FastMarching: a march can not be repeated");
+  }
   for (const FastMarchingSource& source : sources)
   {
     Require(source.label >= 0 && source.label < noSource, "labels must be 0 to 254");
     Require(source.index.allFinite(), "sources must be finite");
-    this->Seed(source);
   }
-  const bool exhausted = this->RunFastest();
-  // What is still on the front has no final value.
-  for (const Entry& entry : this->Heap)
+  if (count == 0)
   {
-    this->Labels[entry.number] = noSource;
-    if (this->Settings.lengths)
-    {
-      this->Lengths[entry.number] = Infinite;
-    }
+    return true;
   }
+  if (static_cast<double>(this->Region.AddressCount()) <= MostAddressesPerMember * count)
+  {
+    return this->MarchIn(DenseLayout{ this->Region.AddressCount() }, sources);
+  }
+  return this->MarchIn(SparseLayout{ &this->Region, count }, sources);
+}
+
+template <typename Layout>
+bool FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingSource>& sources)
+{
+  const std::uint32_t count = this->Region.Size();
+  const bool oneLabel = std::all_of(sources.begin(), sources.end(),
+    [&](const FastMarchingSource& source) { return source.label == sources.front().label; });
+  Front<Layout> front(this->Region, this->Settings, this->Progress, layout,
+    BucketWidth(this->Speeds, this->Settings.spacing), oneLabel);
+  this->Region.ForEach(
+    [&](std::uint32_t number, Address address) {
+      front.Voxels.Data()[layout(address)] = { NotReached, this->Speeds[number] };
+    });
+  std::vector<float>().swap(this->Speeds);
+  for (const FastMarchingSource& source : sources)
+  {
+    front.Seed(source);
+  }
+  const bool exhausted = front.Run();
+
   this->Times.resize(count);
   this->Lengths.resize(this->Settings.lengths ? count : 0);
-  this->HeapPeak = this->Heap.capacity();
-  std::vector<Entry>().swap(this->Heap);
-  std::vector<std::uint32_t>().swap(this->Positions);
-  std::vector<bool>().swap(this->Fixed);
+  this->Peak =
+    front.MemorySize() + (this->Times.capacity() + this->Lengths.capacity()) * sizeof(float);
+  this->Region.ForEach(
+    [&](std::uint32_t number, Address address)
+    {
+      // What is still on the front has no final value.
+      const Voxel& voxel = front.Voxels.Data()[layout(address)];
+      const bool final = IsFinal(voxel.bits);
+      this->Times[number] = final ? FromBits(voxel.bits) : Infinite;
+      if (this->Settings.lengths)
+      {
+        this->Lengths[number] = final ? voxel.speedThenLength : Infinite;
+      }
+    });
+  front.Voxels.Clear();
+  this->Labels.resize(count);
+  const auto only = static_cast<std::uint8_t>(sources.empty() ? 0 : sources.front().label);
+  this->Region.ForEach(
+    [&](std::uint32_t number, Address address)
+    {
+      const std::uint8_t label = oneLabel ? only : front.Labels.Data()[layout(address)];
+      this->Labels[number] = this->Times[number] < Infinite ? label : noSource;
+    });
   return exhausted;
-}
-
-template <bool SecondOrder, bool WithLengths>
-inline __attribute__((always_inline)) bool FastMarching::Run()
-{
-  using Address = VoxelRegion::Address;
-  constexpr std::uint32_t none = VoxelRegion::notAMember;
-  const VoxelRegion& region = this->Region;
-  float* const times = this->Times.data();
-  float* const lengths = this->Lengths.data();
-  const double limit = this->Settings.stopAtArrival;
-  double weight[3];
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    weight[axis] = 1.0 / (this->Settings.spacing[axis] * this->Settings.spacing[axis]);
-  }
-
-  // A voxel that is no member reads as one that is never reached.
-  const std::uint32_t outside = region.Size();
-  const auto numberOr = [&region, outside](Address address)
-  {
-    const std::uint32_t number = region.Number(address);
-    return number == none ? outside : number;
-  };
-
-  std::uint32_t reached = 0;
-  while (!this->Heap.empty())
-  {
-    if (reached % CheckInterval == CheckInterval - 1)
-    {
-      Report(this->Progress, static_cast<double>(reached) / region.Size());
-      if (this->Settings.goOn && !this->Settings.goOn(reached))
-      {
-        return false;
-      }
-    }
-    const Entry nearest = this->Heap.front();
-    if (nearest.key > limit)
-    {
-      return false;
-    }
-    const Entry last = this->Heap.back();
-    this->Heap.pop_back();
-    if (!this->Heap.empty())
-    {
-      this->SiftDown(0, last);
-    }
-    ++reached;
-    times[nearest.number] = nearest.key;
-    this->Positions[nearest.number] = NotOnFront;
-
-    for (int side = 0; side < 6; ++side)
-    {
-      const Address address = side % 2 == 0 ? region.Below(nearest.address, side / 2)
-                                            : region.Above(nearest.address, side / 2);
-      const std::uint32_t number = region.Number(address);
-      if (number == none || times[number] < Infinite)
-      {
-        continue;
-      }
-
-      // Upwind differences along each axis that has a known neighbour. Values are taken relative
-      // to the newest arrival, which keeps the digits where the front is far from its source.
-      // Which neighbours are known is as good as random: selections instead of branches.
-      const double origin = nearest.key;
-      Term terms[3];
-      int count = 0;
-      for (int axis = 0; axis < 3; ++axis)
-      {
-        const Address before = region.Below(address, axis);
-        const Address after = region.Above(address, axis);
-        const std::uint32_t below = numberOr(before);
-        const std::uint32_t above = numberOr(after);
-        const bool down = times[below] <= times[above];
-        const std::uint32_t neighbour = down ? below : above;
-        const float first = times[neighbour];
-        Term& term = terms[count];
-        term.alpha = weight[axis];
-        term.first = first - origin;
-        term.beta = term.first;
-        term.length = WithLengths ? lengths[neighbour] : 0.0F;
-        if (SecondOrder)
-        {
-          const std::uint32_t beyond =
-            numberOr(down ? region.Below(before, axis) : region.Above(after, axis));
-          const float second = times[beyond];
-          const double known = second <= first ? 1.0 : 0.0;
-          const double difference = second <= first ? first - second : 0.0F;
-          term.alpha *= 1.0 + 1.25 * known;
-          term.beta += difference / 3.0;
-          if (WithLengths)
-          {
-            term.length +=
-              known > 0.0 ? (term.length - static_cast<double>(lengths[beyond])) / 3.0 : 0.0;
-          }
-        }
-        count += first < Infinite ? 1 : 0;
-      }
-
-      const double slowness = 1.0 / static_cast<double>(this->Speeds[number]);
-      double value = 0.0;
-      for (;;)
-      {
-        double a = 0.0;
-        double b = 0.0;
-        double c = -slowness * slowness;
-        int latest = 0;
-        for (int t = 0; t < count; ++t)
-        {
-          a += terms[t].alpha;
-          b += terms[t].alpha * terms[t].beta;
-          c += terms[t].alpha * terms[t].beta * terms[t].beta;
-          latest = terms[t].first > terms[latest].first ? t : latest;
-        }
-        const double discriminant = b * b - a * c;
-        value = discriminant >= 0.0 ? (b + std::sqrt(discriminant)) / a
-                                    : -std::numeric_limits<double>::infinity();
-        if (count == 1 || value >= terms[latest].first)
-        {
-          break;
-        }
-        // The front passes that neighbour later: it can not have come from there.
-        terms[latest] = terms[--count];
-      }
-      // Never before the voxel that it comes from: rounding, and differences of second order.
-      const float arrival = std::max(static_cast<float>(value + origin), nearest.key);
-
-      // A value from more neighbours replaces an earlier one even where it is later; but the
-      // straight lines around a source are better than any difference.
-      const std::uint32_t position = this->Positions[number];
-      const bool sooner = position == NotOnFront || arrival < this->Heap[position].key;
-      if (this->Fixed[number] && (!sooner || this->Labels[number] == this->Labels[nearest.number]))
-      {
-        continue;
-      }
-      this->Labels[number] = this->Labels[nearest.number];
-      if (WithLengths)
-      {
-        // The path comes along the gradient: the derivative of its length in that direction is 1.
-        double sum = 0.0;
-        double weighted = 0.0;
-        double norm = 0.0;
-        for (int t = 0; t < count; ++t)
-        {
-          const double rise = std::max(0.0, value - terms[t].beta);
-          sum += terms[t].alpha * rise;
-          weighted += terms[t].alpha * rise * terms[t].length;
-          norm += terms[t].alpha * rise * rise;
-        }
-        lengths[number] = sum > 0.0 ? static_cast<float>((weighted + std::sqrt(norm)) / sum)
-                                    : lengths[nearest.number];
-      }
-      const Entry entry{ arrival, number, address };
-      if (position == NotOnFront)
-      {
-        this->Heap.push_back(entry);
-        this->SiftUp(static_cast<std::uint32_t>(this->Heap.size()) - 1, entry);
-      }
-      else if (sooner)
-      {
-        this->SiftUp(position, entry);
-      }
-      else
-      {
-        this->SiftDown(position, entry);
-      }
-    }
-  }
-  Report(this->Progress, 1.0);
-  return true;
-}
-
-inline __attribute__((always_inline)) bool FastMarching::RunAny()
-{
-  if (this->Settings.secondOrder)
-  {
-    return this->Settings.lengths ? this->Run<true, true>() : this->Run<true, false>();
-  }
-  return this->Settings.lengths ? this->Run<false, true>() : this->Run<false, false>();
-}
-
-#if defined(__x86_64__)
-__attribute__((target("popcnt"))) bool FastMarching::RunCountingBits()
-{
-  return this->RunAny();
-}
-#endif
-
-bool FastMarching::RunFastest()
-{
-#if defined(__x86_64__)
-  // Counting the bits of a word is one instruction on any processor since 2008, but the compiler
-  // may not assume it.
-  if (__builtin_cpu_supports("popcnt"))
-  {
-    return this->RunCountingBits();
-  }
-#endif
-  return this->RunAny();
 }
 
 std::size_t FastMarching::MemorySize() const
 {
-  return this->Region.MemorySize() + this->Speeds.capacity() * sizeof(float) +
-    this->Times.capacity() * sizeof(float) + this->Lengths.capacity() * sizeof(float) +
-    this->Labels.capacity() + this->Times.capacity() * sizeof(std::uint32_t) +
-    this->Times.capacity() / 8 + this->HeapPeak * sizeof(Entry);
+  return this->Region.MemorySize() +
+    std::max(this->Peak,
+      this->Speeds.capacity() * sizeof(float) + this->Times.capacity() * sizeof(float) +
+        this->Lengths.capacity() * sizeof(float) + this->Labels.capacity());
 }
 }

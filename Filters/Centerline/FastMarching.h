@@ -5,8 +5,9 @@
  * Solves |grad T| = 1 / F. Sources: Sethian, PNAS 1996;93:1591 (the method); Sethian, SIAM Review
  * 1999;41:199 (second-order differences where two known values descend along an axis).
  *
- * A member of the region takes 4 (speed) + 4 (arrival) + 4 (heap position) + 4 (length) + 1 (source)
- * bytes, and 12 while it is on the front.
+ * A voxel takes 4 (speed) + 4 (arrival) + 4 (length) + 1 (source) bytes while marching, and some
+ * tens while it is on the front (MarchingQueue.h); 9 are left. Arrays are over all voxels of the
+ * region's box where that is nearly full, else over its members.
  */
 #ifndef DynamicCoronary_FastMarching_h
 #define DynamicCoronary_FastMarching_h
@@ -54,7 +55,11 @@ public:
   FastMarching(const VoxelRegion& region, std::vector<float> speed,
     const FastMarchingSettings& settings, const ProgressCallback& progress = {});
 
-  /// @returns whether the region is exhausted (false: stopped by a limit)
+  /**
+   * To be called once: the speeds are gone then.
+   * @returns whether the region is exhausted (false: stopped by a limit)
+   * @throws std::invalid_argument for sources out of range; std::logic_error at the second call
+   */
   bool March(const std::vector<FastMarchingSource>& sources);
 
   /// Arrival of each member, infinite where the front has not come.
@@ -66,27 +71,12 @@ public:
   /// Label of the source that the front came from, noSource where it has not come.
   const std::vector<std::uint8_t>& Source() const { return Labels; }
 
-  const std::vector<float>& Speed() const { return Speeds; }
-
-  /// Bytes that the marching itself holds.
+  /// Greatest number of bytes that the region and the marching have held at a time.
   std::size_t MemorySize() const;
 
 private:
-  struct Entry
-  {
-    float key;
-    std::uint32_t number;
-    VoxelRegion::Address address;
-  };
-  void Place(std::uint32_t at, const Entry& entry);
-  void SiftUp(std::uint32_t at, const Entry& entry);
-  void SiftDown(std::uint32_t at, const Entry& entry);
-  void Seed(const FastMarchingSource& source);
-  template <bool SecondOrder, bool WithLengths>
-  bool Run();
-  bool RunAny();
-  bool RunCountingBits();
-  bool RunFastest();
+  template <typename Layout>
+  bool MarchIn(const Layout& layout, const std::vector<FastMarchingSource>& sources);
 
   const VoxelRegion& Region;
   FastMarchingSettings Settings;
@@ -95,10 +85,7 @@ private:
   std::vector<float> Times;
   std::vector<float> Lengths;
   std::vector<std::uint8_t> Labels;
-  std::vector<Entry> Heap;
-  std::vector<std::uint32_t> Positions;
-  std::vector<bool> Fixed; ///< taken along straight lines from a source
-  std::size_t HeapPeak = 0;
+  std::size_t Peak = 0;
 };
 }
 

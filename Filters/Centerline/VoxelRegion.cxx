@@ -80,9 +80,19 @@ VoxelRegion::VoxelRegion(const std::array<int, 6>& extent,
   {
     throw std::invalid_argument("VoxelRegion: the box of the region has too many voxels");
   }
-  this->Axes[0] = { 7, 1, 512 - 7 };
-  this->Axes[1] = { 56, 8, 512 * this->Bricks[0] - 56 };
-  this->Axes[2] = { 448, 64, 512 * this->Bricks[0] * this->Bricks[1] - 448 };
+  const std::array<Address, 3> brick = { 512, 512 * this->Bricks[0],
+    512 * this->Bricks[0] * this->Bricks[1] };
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    // Along one axis, from the brick before to the one behind.
+    const auto at = [&](Address place)
+    { return (place >> 3) * brick[axis] + InBrick(place & 7, axis); };
+    for (Address place = 8; place < 16; ++place)
+    {
+      this->StepTable[axis][place - 8] = { at(place - 2) - at(place), at(place - 1) - at(place),
+        at(place + 1) - at(place), at(place + 2) - at(place) };
+    }
+  }
   this->Words.resize(static_cast<std::size_t>(bricks) * 8);
 
   // A layer of bricks has words of its own.

@@ -19,10 +19,11 @@ namespace coronary
  * Members lie in a box that is two voxels wider than they need, and are found by the *address* of a
  * voxel in that box: from a member, two steps along an axis need no check of bounds.
  *
- * The box is cut into bricks of 8 x 8 x 8 voxels, one after the other in memory, so that a voxel's
- * neighbours along all three axes are near it. Members are numbered in the order of their addresses. The
- * number of a voxel is the count of the members before it: a bit for each voxel, and the count of
- * bits before every 64 voxels.
+ * The box is cut into bricks of 8 x 8 x 8 voxels, one after the other in memory, and these into
+ * cells of 2 x 2 x 2: what is kept for a voxel and for two steps along each axis lies in seven
+ * pieces of memory, a cache line each for eight bytes a voxel. Members are numbered in the order of
+ * their addresses. The number of a voxel is the count of the members before it: a bit for each
+ * voxel, and the count of bits before every 64 voxels.
  */
 class VoxelRegion
 {
@@ -46,19 +47,22 @@ public:
   /// Inclusive index ranges of the members, without the margin.
   const std::array<int, 6>& Box() const { return Bounds; }
 
-  /// Address of the next voxel along an axis.
-  Address Above(Address address, int axis) const
+  /// What to add to an address for two steps down, one down, one up, two up along an axis (modulo
+  /// 2^32).
+  const std::array<Address, 4>& Steps(Address address, int axis) const
   {
-    const Axis& a = Axes[axis];
-    return (address & a.mask) == a.mask ? address + a.carry : address + a.unit;
+    // Bits of a place in a brick, from the lowest: x, y, z in the cell; cell along x, y, z, two each.
+    return StepTable[axis][(address >> (3 + 2 * axis) & 3) << 1 | (address >> axis & 1)];
   }
 
+  /// Address of the next voxel along an axis.
+  Address Above(Address address, int axis) const { return address + Steps(address, axis)[2]; }
+
   /// Address of the voxel before along an axis.
-  Address Below(Address address, int axis) const
-  {
-    const Axis& a = Axes[axis];
-    return (address & a.mask) == 0 ? address - a.carry : address - a.unit;
-  }
+  Address Below(Address address, int axis) const { return address + Steps(address, axis)[1]; }
+
+  /// Addresses are below this.
+  std::size_t AddressCount() const { return Words.size() * 64; }
 
   /// Number of the member at an address, or notAMember.
   std::uint32_t Number(Address address) const
@@ -82,8 +86,8 @@ public:
     const auto x = static_cast<Address>(i - Bounds[0] + 2);
     const auto y = static_cast<Address>(j - Bounds[2] + 2);
     const auto z = static_cast<Address>(k - Bounds[4] + 2);
-    return (((z >> 3) * Bricks[1] + (y >> 3)) * Bricks[0] + (x >> 3)) * 512 + (z & 7) * 64 +
-      (y & 7) * 8 + (x & 7);
+    return (((z >> 3) * Bricks[1] + (y >> 3)) * Bricks[0] + (x >> 3)) * 512 + InBrick(x, 0) +
+      InBrick(y, 1) + InBrick(z, 2);
   }
 
   std::uint32_t NumberOf(int i, int j, int k) const
@@ -94,9 +98,9 @@ public:
   std::array<int, 3> IndexOf(Address address) const
   {
     const Address brick = address >> 9;
-    const Address x = brick % Bricks[0] * 8 + (address & 7);
-    const Address y = brick / Bricks[0] % Bricks[1] * 8 + (address >> 3 & 7);
-    const Address z = brick / Bricks[0] / Bricks[1] * 8 + (address >> 6 & 7);
+    const Address x = brick % Bricks[0] * 8 + Coordinate(address, 0);
+    const Address y = brick / Bricks[0] % Bricks[1] * 8 + Coordinate(address, 1);
+    const Address z = brick / Bricks[0] / Bricks[1] * 8 + Coordinate(address, 2);
     return { static_cast<int>(x) + Bounds[0] - 2, static_cast<int>(y) + Bounds[2] - 2,
       static_cast<int>(z) + Bounds[4] - 2 };
   }
@@ -126,22 +130,24 @@ public:
 
 private:
   void NumberMembers();
+  static Address InBrick(Address coordinate, int axis)
+  {
+    return (coordinate & 1) << axis | (coordinate >> 1 & 3) << (3 + 2 * axis);
+  }
+  static Address Coordinate(Address address, int axis)
+  {
+    return (address >> axis & 1) | (address >> (3 + 2 * axis) & 3) << 1;
+  }
 
   struct Word
   {
     std::uint64_t bits = 0;
     std::uint32_t before = 0;
   };
-  struct Axis
-  {
-    Address mask = 0;  ///< the axis's bits inside a brick
-    Address unit = 0;  ///< to the neighbour in the same brick
-    Address carry = 0; ///< to the neighbour in the next brick
-  };
   std::vector<Word> Words;
   std::array<int, 6> Bounds{ 0, -1, 0, -1, 0, -1 };
   std::array<Address, 3> Bricks{ 0, 0, 0 };
-  std::array<Axis, 3> Axes;
+  std::array<std::array<std::array<Address, 4>, 8>, 3> StepTable{};
   std::uint32_t Count = 0;
 };
 }

@@ -2,13 +2,17 @@
 
 #include "CounterRandom.h"
 #include "FastMarching.h"
+#include "MarchingQueue.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <functional>
+#include <limits>
+#include <queue>
 #include <set>
 #include <stdexcept>
 #include <vector>
@@ -132,6 +136,119 @@ TEST(VoxelRegion, EmptyAndSingle)
     MakeRegion({ 0, 9, 0, 9, 0, 0 }, [](int i, int j, int) { return i == 9 && j == 0; });
   EXPECT_EQ(one.Size(), 1u);
   EXPECT_EQ(one.NumberOf(9, 0, 0), 0u);
+}
+
+TEST(MarchingQueue, LeavesInOrderWhateverTheWidth)
+{
+  // Arrivals that are all the same, that spread over 20 decades, and first guesses far off.
+  for (const double decades : { 0.0, 1.0, 20.0 })
+  {
+    for (const double width : { 1e-320, 1e-9, 0.01, 1e12, 1e308 })
+    {
+      MarchingQueue queue(width);
+      std::priority_queue<MarchingQueue::Entry, std::vector<MarchingQueue::Entry>, std::greater<>>
+        reference;
+      std::set<MarchingQueue::Entry> outdated;
+      RandomStream random(5);
+      std::uint64_t drawn = 0;
+      float now = 0.0F;
+      const auto push = [&]
+      {
+        ++drawn;
+        const double draw = random.Uniform();
+        const auto later = static_cast<float>(
+          decades > 0.0 ? static_cast<double>(now) + std::pow(10.0, decades * (draw - 0.5)) : 1.0);
+        std::uint32_t bits = 0;
+        std::memcpy(&bits, &later, sizeof(bits));
+        const MarchingQueue::Entry entry =
+          MarchingQueue::MakeEntry(bits, static_cast<std::uint32_t>(drawn));
+        EXPECT_EQ(MarchingQueue::Arrival(entry), later);
+        queue.Push(entry);
+        if (random.Uniform() < 0.3)
+        {
+          outdated.insert(entry);
+        }
+        else
+        {
+          reference.push(entry);
+        }
+      };
+      const auto keep = [&](MarchingQueue::Entry entry) { return outdated.count(entry) == 0; };
+      const auto ignore = [](MarchingQueue::Entry) {};
+      for (int entry = 0; entry < 5000; ++entry)
+      {
+        push();
+      }
+      while (!reference.empty())
+      {
+        ASSERT_TRUE(queue.Find(keep, ignore, ignore));
+        ASSERT_EQ(queue.Least(), reference.top());
+        now = MarchingQueue::Arrival(queue.Least());
+        queue.RemoveLeast();
+        reference.pop();
+        for (int more = 0; more < 2 && drawn < 60000; ++more)
+        {
+          push();
+        }
+      }
+      EXPECT_FALSE(queue.Find(keep, ignore, ignore));
+      EXPECT_LT(queue.MemorySize(), std::size_t{ 4 } << 20);
+    }
+  }
+}
+
+TEST(FastMarching, FullBoxAndRegionAreTheSame)
+{
+  // Full boxes are addressed in another way than regions: a far piece makes a region of a box.
+  const int n = 24;
+  const auto march = [&](bool apart, bool lengths, std::vector<float> found[2])
+  {
+    const VoxelRegion region = MakeRegion({ 0, n - 1, 0, n - 1, 0, apart ? 4 * n : n - 1 },
+      [&](int i, int j, int k) { return k < n || (i == 0 && j == 0 && k == 4 * n); });
+    std::vector<float> speed(region.Size());
+    region.ForEach(
+      [&](std::uint32_t number, VoxelRegion::Address address)
+      {
+        const std::array<int, 3> at = region.IndexOf(address);
+        speed[number] = static_cast<float>(
+          RandomStream(11, static_cast<std::uint64_t>((at[2] * n + at[1]) * n + at[0]))
+            .Uniform(0.05, 1.05));
+      });
+    FastMarchingSettings settings;
+    settings.spacing = Vector3(0.3, 0.4, 0.5);
+    settings.lengths = lengths;
+    FastMarching marching(region, speed, settings);
+    EXPECT_TRUE(marching.March({ { Vector3(3.2, 4, 5), 4 }, { Vector3(15, 20, 13), 7 } }));
+    EXPECT_EQ(marching.Length().size(), lengths ? region.Size() : 0U);
+    for (int k = 0; k < n; ++k)
+    {
+      for (int j = 0; j < n; ++j)
+      {
+        for (int i = 0; i < n; ++i)
+        {
+          const std::uint32_t number = region.NumberOf(i, j, k);
+          found[0].push_back(marching.Arrival()[number]);
+          found[0].push_back(marching.Source()[number]);
+          if (lengths)
+          {
+            found[1].push_back(marching.Length()[number]);
+          }
+        }
+      }
+    }
+    EXPECT_THROW(marching.March({ { Vector3(3, 4, 5), 0 } }), std::logic_error);
+  };
+  std::vector<float> box[2];
+  std::vector<float> pieces[2];
+  std::vector<float> without[2];
+  march(false, true, box);
+  march(true, true, pieces);
+  march(false, false, without);
+  EXPECT_EQ(box[0], pieces[0]);
+  EXPECT_EQ(box[1], pieces[1]);
+  EXPECT_EQ(box[0], without[0]);
+  EXPECT_TRUE(std::all_of(
+    box[1].begin(), box[1].end(), [](float length) { return length >= 0.0F && length < 100.0F; }));
 }
 
 TEST(FastMarching, SecondOrderConvergenceToTheDistance)
