@@ -25,6 +25,7 @@ tables=(
   "segmentation: validate-segmentation"
   "centerline-speed: centerline-benchmark --strict"
   "centerline: validate-centerline --details --invariance"
+  "surface: validate-surface"
 )
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"

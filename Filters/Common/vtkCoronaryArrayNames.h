@@ -109,6 +109,15 @@ constexpr const char* LongestMissed = "LongestMissed"; ///< double, mm
 
 // Surface, cell data.
 constexpr const char* CellEntityIds = "CellEntityIds"; ///< int, 1 wall, 2.. caps
+// Surface, point data.
+constexpr const char* WallCurvature = "WallCurvature"; ///< double, 1/mm, greatest principal
+constexpr const char* EdgeLength = "EdgeLength";       ///< double, mm, wanted
+// Structured patches, point data (with the frame of centerlines with geometry).
+constexpr const char* PatchCentre = "PatchCentre"; ///< double[3], mm
+constexpr const char* FrameTwist = "FrameTwist";   ///< double, 1/mm, against least twist
+// Inlets and outlets, point data.
+constexpr const char* CapNormal = "CapNormal"; ///< double[3], unit, outwards
+constexpr const char* IsInlet = "IsInlet";     ///< int, 0 or 1
 
 // Volume, point data: ids of the input's points, vtkIdType, -1 elsewhere.
 constexpr const char* SurfacePointId = "SurfacePointId";

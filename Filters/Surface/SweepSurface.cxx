@@ -1,0 +1,727 @@
+#include "SweepSurface.h"
+
+#include "AdaptiveRemesher.h"
+#include "JunctionMesh.h"
+#include "SweptLumen.h"
+#include "TriangleIntersections.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+/// Retreat of the edges between vessels with which remeshing begins, in radii.
+constexpr double BluntRetreat = 0.6;
+/// Smaller angles are repaired, degrees: a little more than what is promised.
+constexpr double LeastAngle = 12.0;
+constexpr int Repairs = 3;
+constexpr int RemeshingAttempts = 3;
+
+double EdgeLength(const SweepSettings& settings, double curvature, double radius)
+{
+  const double h = settings.minimumEdgeLength +
+    (settings.maximumEdgeLength - settings.minimumEdgeLength) *
+      std::exp(-settings.curvatureWeight * curvature);
+  // Where the wall is more bent than the vessel is thin, its own radius counts.
+  const double bend = std::max(1.0 / curvature, 0.12 * radius);
+  return std::min(h, settings.edgeLengthPerRadius * std::min(radius, bend));
+}
+
+/// The swept wall as the remesher sees it.
+class Wall : public RemeshSurface
+{
+public:
+  Wall(SweptLumen& lumen, const SweepSettings& settings)
+    : Lumen(lumen)
+    , Settings(settings)
+  {
+  }
+
+  void Project(RemeshVertex& vertex) const override
+  {
+    SweptLumen::Sample sample;
+    SweptLumen::Site site{ vertex.part, vertex.piece };
+    if (vertex.patch >= 0)
+    {
+      this->Lumen.ProjectToTip(vertex.position, site, sample, vertex.patch, vertex.rim);
+      vertex.normal = vertex.rim ? Vector3(sample.gradient.normalized())
+                                 : this->Lumen.Tips()[vertex.patch].normal;
+    }
+    else
+    {
+      this->Lumen.Project(vertex.position, site, sample);
+      vertex.normal = sample.gradient.normalized();
+    }
+    vertex.part = site.part;
+    vertex.piece = site.piece;
+    vertex.size = EdgeLength(this->Settings, sample.curvature, sample.radius);
+  }
+
+  void Begin(double done) override
+  {
+    // From blunt edges between vessels, which any mesh can follow, to sharp ones.
+    const double share = std::min(1.0, done / 0.75);
+    this->Lumen.SetEdgeRetreat(
+      BluntRetreat * std::pow(this->Settings.edgeRetreat / BluntRetreat, share));
+  }
+
+private:
+  SweptLumen& Lumen;
+  const SweepSettings& Settings;
+};
+
+/// The first mesh: rings along the spans, junctions between, caps at the ends.
+class FirstMesh
+{
+public:
+  FirstMesh(
+    const SweptLumen& lumen, const SweepSettings& settings, const std::vector<int>& capEntity)
+    : Lumen(lumen)
+    , Settings(settings)
+    , CapEntity(capEntity)
+  {
+  }
+
+  std::vector<RemeshVertex> vertices;
+  std::vector<Triangle> triangles;
+  std::vector<int> entity;
+
+  void Make(const ProgressCallback& progress)
+  {
+    const auto& junctions = this->Lumen.Junctions();
+    std::vector<JunctionMesh> meshes(junctions.size());
+    ParallelFor(
+      static_cast<std::int64_t>(junctions.size()), 1,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t j = first; j < last; ++j)
+        {
+          if (!junctions[j].arms.empty())
+          {
+            meshes[j] = MeshJunction(this->Lumen, static_cast<int>(j));
+          }
+        }
+      },
+      progress);
+    std::vector<std::int64_t> offset(junctions.size(), 0);
+    for (std::size_t j = 0; j < junctions.size(); ++j)
+    {
+      offset[j] = static_cast<std::int64_t>(this->vertices.size());
+      for (const Vector3& p : meshes[j].points)
+      {
+        RemeshVertex vertex;
+        vertex.position = p;
+        vertex.part = -1 - static_cast<std::int32_t>(j);
+        this->vertices.push_back(vertex);
+      }
+      for (const Triangle& t : meshes[j].triangles)
+      {
+        this->Add(t[0] + offset[j], t[1] + offset[j], t[2] + offset[j], 1);
+      }
+    }
+    const auto loopOf = [&](int junction, int span, bool atStart)
+    {
+      std::vector<std::int64_t> loop;
+      const auto& arms = junctions[junction].arms;
+      for (std::size_t a = 0; a < arms.size(); ++a)
+      {
+        if (arms[a].span == span && arms[a].atStart == atStart)
+        {
+          loop = meshes[junction].loops[a];
+        }
+      }
+      for (std::int64_t& p : loop)
+      {
+        p += offset[junction];
+      }
+      return loop;
+    };
+    for (std::size_t i = 0; i < this->Lumen.Spans().size(); ++i)
+    {
+      const SweptLumen::Span& span = this->Lumen.Spans()[i];
+      if (span.inner)
+      {
+        continue;
+      }
+      const int index = static_cast<int>(i);
+      std::vector<std::int64_t> start;
+      std::vector<std::int64_t> end;
+      if (span.startJunction >= 0)
+      {
+        start = loopOf(span.startJunction, index, true);
+      }
+      if (span.endJunction >= 0)
+      {
+        end = loopOf(span.endJunction, index, false);
+      }
+      this->Tube(index, start, end);
+    }
+  }
+
+private:
+  void Add(std::int64_t a, std::int64_t b, std::int64_t c, int e)
+  {
+    this->triangles.push_back({ a, b, c });
+    this->entity.push_back(e);
+  }
+
+  double SizeAt(const VesselAxis& axis, double s) const
+  {
+    const VesselAxis::Station station = axis.At(s);
+    const double bend = station.curvature.norm();
+    const double curvature =
+      std::max(1.0 / station.radius, bend / std::max(0.05, 1.0 - bend * station.radius));
+    return EdgeLength(this->Settings, curvature, station.radius);
+  }
+
+  /// A ring's point moved along the vessel: rings lean like the plane of an end that is near.
+  Vector3 Leaning(int index, double s, Vector3 position) const
+  {
+    const SweptLumen::Span& span = this->Lumen.Spans()[index];
+    const VesselAxis& axis = *this->Lumen.Vessels()[span.vessel].axis;
+    const VesselAxis::Station station = axis.At(s);
+    const Vector3 offset = position - station.point;
+    for (const bool atStart : { true, false })
+    {
+      const int tip = atStart ? span.startTip : span.endTip;
+      if (tip < 0)
+      {
+        continue;
+      }
+      const SweptLumen::Tip& end = this->Lumen.Tips()[tip];
+      const VesselAxis::Station last = axis.At(atStart ? span.from : span.to);
+      const Vector3 outward = atStart ? Vector3(-last.tangent) : last.tangent;
+      const double cosine = end.normal.dot(outward);
+      const double most = end.radius * std::sqrt(std::max(0.0, 1.0 / (cosine * cosine) - 1.0));
+      const double reach = std::min(2.0 * most, 0.9 * (span.cutTo - span.cutFrom));
+      const double share = 1.0 - std::abs(s - last.s) / std::max(1e-12, reach);
+      if (most > 1e-9 * end.radius && share > 0.0)
+      {
+        const Vector3 across = offset - offset.dot(outward) * outward;
+        position -= share * end.normal.dot(across) / cosine * outward;
+      }
+    }
+    return position;
+  }
+
+  std::vector<std::int64_t> Ring(int span, double s, int count, double phase, int tip)
+  {
+    const VesselAxis& axis = *this->Lumen.Vessels()[this->Lumen.Spans()[span].vessel].axis;
+    std::vector<std::int64_t> ring;
+    for (int i = 0; i < count; ++i)
+    {
+      RemeshVertex vertex;
+      vertex.position = this->Leaning(span, s, axis.WallPoint(s, 2.0 * Pi * (i + phase) / count));
+      vertex.part = span;
+      vertex.piece = axis.PieceAt(s);
+      vertex.patch = tip;
+      vertex.rim = tip >= 0;
+      ring.push_back(static_cast<std::int64_t>(this->vertices.size()));
+      this->vertices.push_back(vertex);
+    }
+    return ring;
+  }
+
+  /// Angles around a station, rising from the first point's on.
+  std::vector<double> Angles(
+    const VesselAxis::Station& station, const std::vector<std::int64_t>& ring) const
+  {
+    std::vector<double> angle;
+    for (const std::int64_t p : ring)
+    {
+      const Vector3 offset = this->vertices[p].position - station.point;
+      const double a = std::atan2(offset.dot(station.binormal), offset.dot(station.normal));
+      angle.push_back(
+        angle.empty() ? a : angle.back() + std::remainder(a - angle.back(), 2.0 * Pi));
+    }
+    return angle;
+  }
+
+  /// Triangles between two closed rings, by angle.
+  void Zip(const std::vector<std::int64_t>& low, const std::vector<double>& lowAngle,
+    const std::vector<std::int64_t>& high, const std::vector<double>& highAngle, int e)
+  {
+    const std::size_t n = low.size();
+    const std::size_t m = high.size();
+    // Start where the first point of `low` has its nearest partner.
+    std::size_t shift = 0;
+    double best = 10.0;
+    for (std::size_t k = 0; k < m; ++k)
+    {
+      const double off = std::abs(std::remainder(highAngle[k] - lowAngle[0], 2.0 * Pi));
+      if (off < best)
+      {
+        best = off;
+        shift = k;
+      }
+    }
+    if (n == 0 || m == 0)
+    {
+      return;
+    }
+    const double base =
+      highAngle[shift] - (lowAngle[0] + std::remainder(highAngle[shift] - lowAngle[0], 2.0 * Pi));
+    const auto at = [&](const std::vector<double>& angle, std::size_t i, std::size_t count)
+    {
+      const std::size_t turns = i / count;
+      return angle[i % count] + 2.0 * Pi * static_cast<double>(turns);
+    };
+    std::size_t i = 0;
+    std::size_t j = 0;
+    while (i < n || j < m)
+    {
+      const double nextLow = at(lowAngle, i + 1, n) + at(lowAngle, i, n);
+      const double nextHigh =
+        at(highAngle, shift + j + 1, m) + at(highAngle, shift + j, m) - 2.0 * base;
+      const bool advanceLow = j >= m || (i < n && nextLow <= nextHigh);
+      const std::int64_t a = low[i % n];
+      const std::int64_t b = high[(shift + j) % m];
+      if (advanceLow)
+      {
+        this->Add(a, low[(i + 1) % n], b, e);
+        ++i;
+      }
+      else
+      {
+        this->Add(a, high[(shift + j + 1) % m], b, e);
+        ++j;
+      }
+    }
+  }
+
+  void Tube(int index, const std::vector<std::int64_t>& start, const std::vector<std::int64_t>& end)
+  {
+    const SweptLumen::Span& span = this->Lumen.Spans()[index];
+    const VesselAxis& axis = *this->Lumen.Vessels()[span.vessel].axis;
+    const double from = span.cutFrom;
+    const double to = span.cutTo;
+    // Ring distances in units of the height of an even triangle.
+    constexpr int samples = 400;
+    std::vector<double> rows(1, 0.0);
+    for (int i = 0; i < samples; ++i)
+    {
+      const double s = from + (to - from) * (i + 0.5) / samples;
+      rows.push_back(rows.back() + (to - from) / samples / (0.866 * this->SizeAt(axis, s)));
+    }
+    const int count = std::max(1, static_cast<int>(std::lround(rows.back())));
+    std::vector<std::int64_t> previous = start;
+    VesselAxis::Station previousStation = axis.At(from);
+    int around = 0;
+    std::size_t row = 0;
+    for (int k = 0; k <= count; ++k)
+    {
+      double s = to;
+      if (k < count)
+      {
+        const double wanted = rows.back() * k / count;
+        while (row + 2 < rows.size() && rows[row + 1] < wanted)
+        {
+          ++row;
+        }
+        const double part = (wanted - rows[row]) / std::max(1e-12, rows[row + 1] - rows[row]);
+        s = from + (to - from) * (static_cast<double>(row) + part) / samples;
+      }
+      const VesselAxis::Station station = axis.At(s);
+      double circumference = 0.0;
+      for (int a = 0; a < 32; ++a)
+      {
+        circumference += 2.0 * Pi / 32.0 * axis.WallRadius(s, 2.0 * Pi * a / 32.0);
+      }
+      const int ideal =
+        std::max(7, static_cast<int>(std::lround(circumference / this->SizeAt(axis, s))));
+      if (around == 0 || std::abs(ideal - around) > std::max(1.0, 0.08 * around))
+      {
+        around = ideal;
+      }
+      std::vector<std::int64_t> ring;
+      if (k == 0)
+      {
+        ring = span.startTip >= 0 ? this->Ring(index, s, around, 0.0, span.startTip) : start;
+      }
+      else if (k == count)
+      {
+        ring = span.endTip >= 0 ? this->Ring(index, s, around, 0.5 * (k % 2), span.endTip) : end;
+      }
+      else
+      {
+        ring = this->Ring(index, s, around, 0.5 * (k % 2), -1);
+      }
+      if (k > 0)
+      {
+        this->Zip(
+          previous, this->Angles(previousStation, previous), ring, this->Angles(station, ring), 1);
+      }
+      if (k == 0 && span.startTip >= 0)
+      {
+        this->Cap(ring, station, span.startTip, index, true);
+      }
+      if (k == count && span.endTip >= 0)
+      {
+        this->Cap(ring, station, span.endTip, index, false);
+      }
+      previous = ring;
+      previousStation = station;
+    }
+  }
+
+  /// A flat disc of shrinking rings.
+  void Cap(const std::vector<std::int64_t>& rim, const VesselAxis::Station& station, int tip,
+    int span, bool atStart)
+  {
+    const int e = this->CapEntity[tip];
+    const std::size_t firstTriangle = this->triangles.size();
+    std::vector<std::int64_t> outer = rim;
+    const double size = EdgeLength(this->Settings, 1.0 / station.radius, station.radius);
+    const double step = 0.866 * size / station.radius;
+    const VesselAxis& axis = *this->Lumen.Vessels()[this->Lumen.Spans()[span].vessel].axis;
+    int row = 0;
+    while (1.0 - (row + 1) * step > 0.7 * step)
+    {
+      ++row;
+      const double share = 1.0 - row * step;
+      const int count =
+        std::max(5, static_cast<int>(std::lround(static_cast<double>(rim.size()) * share)));
+      std::vector<std::int64_t> inner;
+      for (int i = 0; i < count; ++i)
+      {
+        RemeshVertex vertex;
+        const Vector3 wall = axis.WallPoint(station.s, 2.0 * Pi * (i + 0.5 * (row % 2)) / count);
+        vertex.position = station.point + share * (wall - station.point);
+        vertex.part = span;
+        vertex.piece = axis.PieceAt(station.s);
+        vertex.patch = tip;
+        inner.push_back(static_cast<std::int64_t>(this->vertices.size()));
+        this->vertices.push_back(vertex);
+      }
+      this->Zip(outer, this->Angles(station, outer), inner, this->Angles(station, inner), e);
+      outer = inner;
+    }
+    RemeshVertex centre;
+    centre.position = station.point;
+    centre.part = span;
+    centre.piece = axis.PieceAt(station.s);
+    centre.patch = tip;
+    const std::int64_t c = static_cast<std::int64_t>(this->vertices.size());
+    this->vertices.push_back(centre);
+    for (std::size_t i = 0; i < outer.size(); ++i)
+    {
+      this->Add(outer[i], outer[(i + 1) % outer.size()], c, e);
+    }
+    // Rings that shrink towards the inside turn counter-clockwise about the tangent.
+    if (atStart)
+    {
+      for (std::size_t t = firstTriangle; t < this->triangles.size(); ++t)
+      {
+        std::swap(this->triangles[t][1], this->triangles[t][2]);
+      }
+    }
+  }
+
+  const SweptLumen& Lumen;
+  const SweepSettings& Settings;
+  const std::vector<int>& CapEntity;
+};
+
+std::vector<SweepPatches> MakePatches(const SweptLumen& lumen, const SweepSettings& settings)
+{
+  std::vector<SweepPatches> result;
+  for (const SweptLumen::Vessel& vessel : lumen.Vessels())
+  {
+    const VesselAxis& axis = *vessel.axis;
+    double from = 0.0;
+    for (std::size_t g = 0; g < vessel.group.size(); ++g)
+    {
+      const double to = vessel.groupEnd[g];
+      SweepPatches patches;
+      patches.groupId = vessel.group[g];
+      patches.samples = settings.patchSamples;
+      // Even in radii.
+      constexpr int samples = 200;
+      std::vector<double> sum(1, 0.0);
+      for (int i = 0; i < samples; ++i)
+      {
+        const double s = from + (to - from) * (i + 0.5) / samples;
+        sum.push_back(
+          sum.back() + (to - from) / samples / (settings.patchSpacing * axis.At(s).radius));
+      }
+      const int count = std::max(1, static_cast<int>(std::lround(sum.back())));
+      std::size_t row = 0;
+      for (int k = 0; k <= count; ++k)
+      {
+        double s = to;
+        if (k < count)
+        {
+          const double wanted = sum.back() * k / count;
+          while (row + 2 < sum.size() && sum[row + 1] < wanted)
+          {
+            ++row;
+          }
+          const double part = (wanted - sum[row]) / std::max(1e-12, sum[row + 1] - sum[row]);
+          s = from + (to - from) * (static_cast<double>(row) + part) / samples;
+        }
+        patches.centres.push_back(axis.At(s));
+        patches.abscissa.push_back(vessel.abscissa + s);
+        for (int i = 0; i < settings.patchSamples; ++i)
+        {
+          patches.contours.push_back(axis.WallPoint(s, 2.0 * Pi * i / settings.patchSamples));
+        }
+      }
+      result.push_back(std::move(patches));
+      from = to;
+    }
+  }
+  return result;
+}
+
+/// Triangles that cut others or have too small an angle.
+std::vector<std::int64_t> FindFaults(const AdaptiveRemesher& mesh)
+{
+  std::vector<Vector3> points;
+  points.reserve(mesh.Vertices().size());
+  for (const RemeshVertex& vertex : mesh.Vertices())
+  {
+    points.push_back(vertex.position);
+  }
+  const std::vector<Triangle> triangles = mesh.Triangles();
+  std::vector<std::int64_t> faults;
+  for (const auto& pair : FindSelfIntersections(points, triangles))
+  {
+    faults.push_back(pair.first);
+    faults.push_back(pair.second);
+  }
+  const double greatest = std::cos(LeastAngle * Pi / 180.0);
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+  {
+    for (int c = 0; c < 3; ++c)
+    {
+      const Vector3& p = points[triangles[t][c]];
+      const Vector3 u = points[triangles[t][(c + 1) % 3]] - p;
+      const Vector3 v = points[triangles[t][(c + 2) % 3]] - p;
+      if (!(u.dot(v) < greatest * u.norm() * v.norm()))
+      {
+        faults.push_back(static_cast<std::int64_t>(t));
+        break;
+      }
+    }
+  }
+  std::sort(faults.begin(), faults.end());
+  faults.erase(std::unique(faults.begin(), faults.end()), faults.end());
+  return faults;
+}
+
+void Require(bool condition, const char* name, const char* range)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument(std::string("SweepSettings: ") + name + " must be " + range);
+  }
+}
+}
+
+void SweepSettings::Validate() const
+{
+  const auto between = [](double x, double low, double high) { return x >= low && x <= high; };
+  Require(std::isfinite(this->minimumEdgeLength) && this->minimumEdgeLength > 0.0,
+    "minimumEdgeLength", "positive");
+  Require(
+    std::isfinite(this->maximumEdgeLength) && this->maximumEdgeLength >= this->minimumEdgeLength,
+    "maximumEdgeLength", "at least minimumEdgeLength");
+  Require(std::isfinite(this->curvatureWeight) && this->curvatureWeight >= 0.0, "curvatureWeight",
+    "at least 0");
+  Require(between(this->edgeLengthPerRadius, 0.1, 0.7), "edgeLengthPerRadius", "0.1 to 0.7");
+  Require(between(this->gradation, 0.05, 1.0), "gradation", "0.05 to 1");
+  Require(between(this->blending, 0.1, 1.0), "blending", "0.1 to 1");
+  Require(between(this->edgeRetreat, 0.1, 2.0), "edgeRetreat", "0.1 to 2");
+  Require(between(this->smoothing, 0.0, 4.0), "smoothing", "0 to 4");
+  Require(between(this->clearance, 0.0, 0.5), "clearance", "0 to 0.5");
+  Require(this->patchSamples >= 6 && this->patchSamples <= 360, "patchSamples", "6 to 360");
+  Require(between(this->patchSpacing, 0.1, 4.0), "patchSpacing", "0.1 to 4");
+}
+
+SweptSurface SweepVesselTree(
+  const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
+{
+  settings.Validate();
+  SweptSurface result;
+  if (tree.branches.empty())
+  {
+    return result;
+  }
+  const auto part = [&](double from, double to) -> ProgressCallback
+  {
+    if (!progress)
+    {
+      return {};
+    }
+    return [&progress, from, to](double f) { return progress(from + (to - from) * f); };
+  };
+  SweptLumen lumen(tree, settings);
+  lumen.SetEdgeRetreat(BluntRetreat);
+  Report(progress, 0.05);
+  result.remarks = lumen.Remarks();
+  result.trees = lumen.Trees();
+
+  // Caps: roots first, then tips, both in the order of the input's branches.
+  const auto& tips = lumen.Tips();
+  std::map<std::int64_t, std::size_t> rank;
+  for (const SweepBranch& branch : tree.branches)
+  {
+    for (const std::int64_t p : { branch.points.front(), branch.points.back() })
+    {
+      rank.emplace(p, rank.size());
+    }
+  }
+  std::vector<int> order(tips.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+  {
+    order[i] = static_cast<int>(i);
+  }
+  std::sort(order.begin(), order.end(),
+    [&](int a, int b)
+    {
+      return tips[a].inlet != tips[b].inlet ? tips[a].inlet
+                                            : rank[tips[a].point] < rank[tips[b].point];
+    });
+  std::vector<int> capEntity(tips.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+  {
+    const SweptLumen::Tip& tip = tips[order[i]];
+    capEntity[order[i]] = static_cast<int>(i) + 2;
+    result.caps.push_back({ static_cast<int>(i) + 2, tip.group, tip.inlet, tip.point, tip.centre,
+      tip.normal, tip.radius });
+  }
+
+  FirstMesh first(lumen, settings, capEntity);
+  first.Make(part(0.05, 0.25));
+  // Edges between vessels that are too sharp for the mesh to follow are made blunter, all of them:
+  // the same everywhere is easier to understand than some that differ.
+  SweepSettings blunted = settings;
+  std::unique_ptr<AdaptiveRemesher> mesh;
+  for (int attempt = 0;; ++attempt)
+  {
+    Wall wall(lumen, blunted);
+    const bool last = attempt + 1 == RemeshingAttempts;
+    mesh =
+      std::make_unique<AdaptiveRemesher>(wall, last ? std::move(first.vertices) : first.vertices,
+        first.triangles, last ? std::move(first.entity) : first.entity, settings.gradation);
+    mesh->Run(part(attempt == 0 ? 0.25 : 0.9, 0.95));
+    std::vector<std::int64_t> faults = FindFaults(*mesh);
+    for (int repair = 0; repair < Repairs && !faults.empty(); ++repair)
+    {
+      mesh->Repair(faults);
+      faults = FindFaults(*mesh);
+    }
+    if (faults.empty())
+    {
+      break;
+    }
+    if (last)
+    {
+      const Vector3& p = mesh->Vertices()[mesh->Triangles()[faults.front()][0]].position;
+      std::ostringstream text;
+      text.precision(6);
+      text << faults.size() << " triangles with angles below " << LeastAngle
+           << " degrees or that cut others are left, the first at (" << p[0] << ", " << p[1] << ", "
+           << p[2] << ")";
+      result.remarks.push_back(text.str());
+      break;
+    }
+    blunted.edgeRetreat = 2.0 * std::max(blunted.edgeRetreat, BluntRetreat);
+    lumen.SetEdgeRetreat(blunted.edgeRetreat);
+  }
+  const AdaptiveRemesher& remesher = *mesh;
+  Report(progress, 0.95);
+
+  const auto& vertices = remesher.Vertices();
+  const std::size_t n = vertices.size();
+  result.points.resize(n);
+  result.normals.resize(n);
+  result.edgeLength.resize(n);
+  result.curvature.resize(n);
+  result.radius.resize(n);
+  result.abscissa.resize(n);
+  result.groupId.resize(n);
+  ParallelFor(static_cast<std::int64_t>(n), 1024,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t v = begin; v < end; ++v)
+      {
+        const RemeshVertex& vertex = vertices[v];
+        SweptLumen::Site site{ vertex.part, vertex.piece };
+        SweptLumen::Sample sample;
+        lumen.Evaluate(vertex.position, site, sample);
+        const SweptLumen::Vessel& vessel = lumen.Vessels()[sample.vessel];
+        const double s = std::clamp(sample.s, 0.0, vessel.axis->Length());
+        result.points[v] = vertex.position;
+        result.normals[v] = vertex.normal;
+        result.edgeLength[v] = vertex.size;
+        result.curvature[v] = sample.curvature;
+        result.radius[v] = sample.radius;
+        result.abscissa[v] = vessel.abscissa + s;
+        result.groupId[v] = lumen.GroupAt(sample.vessel, s);
+      }
+    });
+  result.triangles = remesher.Triangles();
+  result.entityId = remesher.Entities();
+  if (!settings.capped)
+  {
+    // The caps' inner points go with their triangles.
+    std::vector<std::int64_t> number(n, -1);
+    std::vector<Triangle> triangles;
+    std::int64_t count = 0;
+    for (std::size_t t = 0; t < result.triangles.size(); ++t)
+    {
+      if (result.entityId[t] == 1)
+      {
+        triangles.push_back(result.triangles[t]);
+        for (const std::int64_t p : triangles.back())
+        {
+          number[p] = 0;
+        }
+      }
+    }
+    for (std::size_t v = 0; v < n; ++v)
+    {
+      if (number[v] < 0)
+      {
+        continue;
+      }
+      number[v] = count;
+      result.points[count] = result.points[v];
+      result.normals[count] = result.normals[v];
+      result.edgeLength[count] = result.edgeLength[v];
+      result.curvature[count] = result.curvature[v];
+      result.radius[count] = result.radius[v];
+      result.abscissa[count] = result.abscissa[v];
+      result.groupId[count] = result.groupId[v];
+      ++count;
+    }
+    result.points.resize(count);
+    result.normals.resize(count);
+    result.edgeLength.resize(count);
+    result.curvature.resize(count);
+    result.radius.resize(count);
+    result.abscissa.resize(count);
+    result.groupId.resize(count);
+    for (Triangle& t : triangles)
+    {
+      for (std::int64_t& p : t)
+      {
+        p = number[p];
+      }
+    }
+    result.triangles = std::move(triangles);
+    result.entityId.assign(result.triangles.size(), 1);
+  }
+  result.patches = MakePatches(lumen, settings);
+  Report(progress, 1.0);
+  return result;
+}
+}

@@ -1,0 +1,307 @@
+#include "SurfaceMeasures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Degrees = 180.0 / 3.14159265358979323846;
+
+/// Ericson, Real-Time Collision Detection, 5.1.5.
+double DistanceToTriangle(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c)
+{
+  const Vector3 ab = b - a;
+  const Vector3 ac = c - a;
+  const double d1 = ab.dot(p - a);
+  const double d2 = ac.dot(p - a);
+  if (d1 <= 0.0 && d2 <= 0.0)
+  {
+    return (p - a).norm();
+  }
+  const double d3 = ab.dot(p - b);
+  const double d4 = ac.dot(p - b);
+  if (d3 >= 0.0 && d4 <= d3)
+  {
+    return (p - b).norm();
+  }
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0)
+  {
+    return (p - a - d1 / (d1 - d3) * ab).norm();
+  }
+  const double d5 = ab.dot(p - c);
+  const double d6 = ac.dot(p - c);
+  if (d6 >= 0.0 && d5 <= d6)
+  {
+    return (p - c).norm();
+  }
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0)
+  {
+    return (p - a - d2 / (d2 - d6) * ac).norm();
+  }
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0)
+  {
+    return (p - b - (d4 - d3) / (d4 - d3 + d5 - d6) * (c - b)).norm();
+  }
+  const double sum = va + vb + vc;
+  return (p - a - vb / sum * ab - vc / sum * ac).norm();
+}
+}
+
+double SurfaceMeasures::WorstAngle() const
+{
+  return this->smallestAngle.empty()
+    ? 0.0
+    : *std::min_element(this->smallestAngle.begin(), this->smallestAngle.end());
+}
+
+double SurfaceMeasures::ShareBelow(double degrees) const
+{
+  const auto below = std::count_if(this->smallestAngle.begin(), this->smallestAngle.end(),
+    [=](double angle) { return angle < degrees; });
+  return static_cast<double>(below) / std::max<double>(1.0, static_cast<double>(this->triangles));
+}
+
+SurfaceMeasures MeasureSurface(
+  const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
+{
+  SurfaceMeasures result;
+  result.triangles = triangles.size();
+  result.points = points.size();
+  // Half-edges by their two ends, in order, so that partners can be counted.
+  struct Half
+  {
+    std::int64_t low, high;
+    bool forward;
+    std::int64_t triangle;
+  };
+  std::vector<Half> halves;
+  halves.reserve(3 * triangles.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+  {
+    double smallest = 180.0;
+    for (int c = 0; c < 3; ++c)
+    {
+      const std::int64_t a = triangles[t][c];
+      const std::int64_t b = triangles[t][(c + 1) % 3];
+      halves.push_back({ std::min(a, b), std::max(a, b), a < b, static_cast<std::int64_t>(t) });
+      const Vector3 u = points[b] - points[a];
+      const Vector3 v = points[triangles[t][(c + 2) % 3]] - points[a];
+      smallest = std::min(smallest, Degrees * std::atan2(u.cross(v).norm(), u.dot(v)));
+    }
+    result.smallestAngle.push_back(smallest);
+    const Vector3& a = points[triangles[t][0]];
+    const Vector3& b = points[triangles[t][1]];
+    const Vector3& c = points[triangles[t][2]];
+    const Vector3 offset = points[triangles[0][0]];
+    result.volume += (a - offset).dot((b - offset).cross(c - offset)) / 6.0;
+    result.area += 0.5 * (b - a).cross(c - a).norm();
+  }
+  std::sort(halves.begin(), halves.end(),
+    [](const Half& x, const Half& y)
+    {
+      return x.low != y.low ? x.low < y.low
+        : x.high != y.high  ? x.high < y.high
+                            : x.triangle < y.triangle;
+    });
+  // Triangles joined by edges.
+  std::vector<std::int64_t> parent(triangles.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](std::int64_t t)
+  {
+    while (parent[t] != t)
+    {
+      t = parent[t] = parent[parent[t]];
+    }
+    return t;
+  };
+  std::vector<int> ends(points.size(), 0); // open edges of each point
+  std::size_t edges = 0;
+  for (std::size_t i = 0; i < halves.size();)
+  {
+    std::size_t j = i + 1;
+    while (j < halves.size() && halves[j].low == halves[i].low && halves[j].high == halves[i].high)
+    {
+      parent[root(halves[j].triangle)] = root(halves[i].triangle);
+      ++j;
+    }
+    ++edges;
+    if (j - i == 1)
+    {
+      ++result.openEdges;
+      ++ends[halves[i].low];
+      ++ends[halves[i].high];
+    }
+    else
+    {
+      if (j - i > 2 || halves[i].forward == halves[i + 1].forward)
+      {
+        ++result.badEdges;
+      }
+    }
+    i = j;
+  }
+  // n triangles around a point make one fan when n edges join them (closed), or n - 1 with two open
+  std::vector<std::vector<std::int64_t>> around(points.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+  {
+    for (const std::int64_t p : triangles[t])
+    {
+      around[p].push_back(static_cast<std::int64_t>(t));
+    }
+  }
+  for (std::size_t p = 0; p < points.size(); ++p)
+  {
+    if (around[p].empty())
+    {
+      ++result.unusedPoints;
+      continue;
+    }
+    std::vector<std::int64_t> reached{ around[p][0] };
+    std::vector<char> seen(around[p].size(), 0);
+    seen[0] = 1;
+    for (std::size_t r = 0; r < reached.size(); ++r)
+    {
+      for (std::size_t n = 0; n < around[p].size(); ++n)
+      {
+        int shared = 0;
+        for (const std::int64_t a : triangles[reached[r]])
+        {
+          for (const std::int64_t b : triangles[around[p][n]])
+          {
+            shared += a == b ? 1 : 0;
+          }
+        }
+        if (!seen[n] && shared >= 2)
+        {
+          seen[n] = 1;
+          reached.push_back(around[p][n]);
+        }
+      }
+    }
+    result.badPoints += reached.size() != around[p].size() || ends[p] > 2 ? 1 : 0;
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+  {
+    result.components += root(static_cast<std::int64_t>(t)) == static_cast<std::int64_t>(t) ? 1 : 0;
+  }
+  result.eulerCharacteristic = static_cast<std::int64_t>(points.size() - result.unusedPoints) -
+    static_cast<std::int64_t>(edges) + static_cast<std::int64_t>(triangles.size());
+  return result;
+}
+
+std::vector<double> RelativeEdgeLengths(const std::vector<Vector3>& points,
+  const std::vector<Triangle>& triangles, const std::vector<double>& wanted)
+{
+  std::vector<double> result;
+  for (const Triangle& t : triangles)
+  {
+    for (int c = 0; c < 3; ++c)
+    {
+      const std::int64_t a = t[c];
+      const std::int64_t b = t[(c + 1) % 3];
+      if (a < b)
+      {
+        result.push_back((points[a] - points[b]).norm() / (0.5 * (wanted[a] + wanted[b])));
+      }
+    }
+  }
+  return result;
+}
+
+DistanceToSurface::DistanceToSurface(
+  const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
+  : Points(points)
+  , Triangles(triangles)
+{
+  std::vector<Eigen::AlignedBox3d> boxes(triangles.size());
+  double size = 0.0;
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+  {
+    for (const std::int64_t p : triangles[t])
+    {
+      boxes[t].extend(points[p]);
+    }
+    size += boxes[t].diagonal().maxCoeff() / static_cast<double>(triangles.size());
+    this->Box.extend(boxes[t]);
+  }
+  this->Cell = std::max(2.0 * size, 1e-4 * this->Box.diagonal().maxCoeff());
+  const auto index = [&](const Vector3& p, int axis)
+  { return static_cast<int>((p[axis] - this->Box.min()[axis]) / this->Cell); };
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    this->Size[axis] = 1 + index(this->Box.max(), axis);
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+  {
+    for (int k = index(boxes[t].min(), 2); k <= index(boxes[t].max(), 2); ++k)
+    {
+      for (int j = index(boxes[t].min(), 1); j <= index(boxes[t].max(), 1); ++j)
+      {
+        for (int i = index(boxes[t].min(), 0); i <= index(boxes[t].max(), 0); ++i)
+        {
+          this->Entries.emplace_back(this->Key(i, j, k), static_cast<std::int64_t>(t));
+        }
+      }
+    }
+  }
+  std::sort(this->Entries.begin(), this->Entries.end());
+}
+
+std::uint64_t DistanceToSurface::Key(int i, int j, int k) const
+{
+  return (static_cast<std::uint64_t>(k) * this->Size[1] + j) * this->Size[0] + i;
+}
+
+double DistanceToSurface::operator()(const Vector3& position) const
+{
+  double best = std::numeric_limits<double>::infinity();
+  std::array<int, 3> centre;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const double x = (position[axis] - this->Box.min()[axis]) / this->Cell;
+    centre[axis] = static_cast<int>(std::clamp(x, 0.0, this->Size[axis] - 1.0));
+  }
+  // Shells of cells around the position until no further one can be nearer.
+  const int most = *std::max_element(this->Size.begin(), this->Size.end());
+  for (int shell = 0; shell <= most; ++shell)
+  {
+    if ((shell - 1.0) * this->Cell > best)
+    {
+      break;
+    }
+    for (int k = std::max(0, centre[2] - shell);
+         k <= std::min(this->Size[2] - 1, centre[2] + shell); ++k)
+    {
+      for (int j = std::max(0, centre[1] - shell);
+           j <= std::min(this->Size[1] - 1, centre[1] + shell); ++j)
+      {
+        const bool inner = std::max(std::abs(k - centre[2]), std::abs(j - centre[1])) < shell;
+        for (int i = centre[0] - shell; i <= centre[0] + shell; i += inner ? 2 * shell : 1)
+        {
+          if (i >= 0 && i < this->Size[0])
+          {
+            const std::uint64_t key = this->Key(i, j, k);
+            for (auto entry = std::lower_bound(this->Entries.begin(), this->Entries.end(),
+                   std::make_pair(key, std::int64_t(0)));
+                 entry != this->Entries.end() && entry->first == key; ++entry)
+            {
+              const Triangle& t = this->Triangles[entry->second];
+              best = std::min(best,
+                DistanceToTriangle(
+                  position, this->Points[t[0]], this->Points[t[1]], this->Points[t[2]]));
+            }
+          }
+        }
+      }
+    }
+  }
+  return best;
+}
+}
