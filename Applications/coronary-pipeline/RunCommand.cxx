@@ -18,6 +18,7 @@
 #include "vtkFastMarchingCenterline.h"
 #include "vtkFieldData.h"
 #include "vtkFrangiVesselness.h"
+#include "vtkFrenetSweepSurface.h"
 #include "vtkGatedImageReader.h"
 #include "vtkImageData.h"
 #include "vtkPointData.h"
@@ -48,19 +49,21 @@ enum class Stage
 {
   Vesselness,
   Segmentation,
-  Centerline
+  Centerline,
+  Surface
 };
 const std::vector<std::pair<std::string, Stage>> Stages = {
   { "vesselness", Stage::Vesselness },
   { "segmentation", Stage::Segmentation },
   { "centerline", Stage::Centerline },
+  { "surface", Stage::Surface },
 };
 
 struct RunJob
 {
   std::vector<std::string> paths;
   std::string output;
-  Stage until = Stages.back().second;
+  Stage until = Stage::Centerline;
   double time = std::numeric_limits<double>::quiet_NaN(); ///< NaN: the quietest phase
   std::vector<double> fractions;
   double cycleMs = 1000.0;
@@ -73,6 +76,9 @@ struct RunJob
   bool beyondMask = false;
   double leastBranch = 0.0;
   double centerlineSeconds = 120.0;
+  std::vector<double> edges = { 0.15, 0.7 };
+  bool contours = false;
+  bool openEnds = false;
   int threads = 0;
   bool compress = false;
   bool quiet = false;
@@ -104,8 +110,8 @@ void RunJob::Declare(CLI::App& app)
           }
         }
       },
-      "Last stage: vesselness, segmentation or centerline (the default)")
-    ->check(CLI::IsMember({ "vesselness", "segmentation", "centerline" }))
+      "Last stage: vesselness, segmentation, centerline (the default) or surface")
+    ->check(CLI::IsMember({ "vesselness", "segmentation", "centerline", "surface" }))
     ->type_name("STAGE");
 
   const std::string image = "Image";
@@ -190,6 +196,21 @@ void RunJob::Declare(CLI::App& app)
     ->type_name("S")
     ->capture_default_str()
     ->group(lines);
+
+  const std::string walls = "Surface";
+  app
+    .add_option("--edges", this->edges,
+      "Length of the triangles' edges where the wall is most curved and where it is flat, mm")
+    ->check(Within(0.001, 100.0))
+    ->expected(2)
+    ->type_name("MIN MAX")
+    ->capture_default_str()
+    ->group(walls);
+  app
+    .add_flag(
+      "--contours", this->contours, "Cross-sections as the image shows them, instead of round ones")
+    ->group(walls);
+  app.add_flag("--open-ends", this->openEnds, "Inlets and outlets without caps")->group(walls);
   app.add_flag("--compress", this->compress, "Compress the image files");
   app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
     ->check(WholeWithin(0, 1024))
@@ -315,6 +336,10 @@ void RunJob::Run()
   {
     throw UsageError("--window: blood must be above tissue");
   }
+  if (this->edges[0] > this->edges[1])
+  {
+    throw UsageError("--edges: the first must not be above the second");
+  }
   if (this->seeds.size() % 3 != 0)
   {
     throw UsageError("--seed: three coordinates are needed for each point");
@@ -347,7 +372,8 @@ void RunJob::Run()
   {
     const bool segment = this->until >= Stage::Segmentation;
     const bool trace = this->until >= Stage::Centerline;
-    ProgressDisplay progress("stage", trace ? 4 : segment ? 3 : 2, this->quiet);
+    const bool mesh = this->until >= Stage::Surface;
+    ProgressDisplay progress("stage", mesh ? 5 : trace ? 4 : segment ? 3 : 2, this->quiet);
     const auto update = [&](vtkAlgorithm* algorithm)
     {
       UpdateAtTime(
@@ -480,6 +506,29 @@ void RunJob::Run()
           { "image_blur", Numbers(raw, vtkCoronaryArrayNames::ImageBlur) } };
         summary += "; " + std::to_string(tree->GetNumberOfLines()) + " branches, " +
           Format(std::round(length)) + " mm";
+
+        if (mesh)
+        {
+          progress.BeginStep(4, "surface");
+          vtkNew<vtkFrenetSweepSurface> sweep;
+          sweep->SetInputConnection(topology->GetOutputPort());
+          if (this->contours)
+          {
+            sweep->SetImageConnection(reference->GetOutputPort());
+          }
+          sweep->SetMinimumEdgeLength(this->edges[0]);
+          sweep->SetMaximumEdgeLength(this->edges[1]);
+          sweep->SetCapping(!this->openEnds);
+          update(sweep);
+          vtkPolyData* surface = sweep->GetOutput();
+          WritePolyData(folder.Add("surface.vtp"), surface, messages);
+          WritePolyData(folder.Add("caps.vtp"), sweep->GetCaps(), messages);
+          report["surface"] = { { "file", "surface.vtp" }, { "caps_file", "caps.vtp" },
+            { "triangles", surface->GetNumberOfPolys() },
+            { "points", surface->GetNumberOfPoints() },
+            { "caps", sweep->GetCaps()->GetNumberOfPoints() } };
+          summary += "; " + std::to_string(surface->GetNumberOfPolys()) + " triangles";
+        }
       }
     }
     WriteFileAtomically(folder.Add(ReportName), report.dump(2) + "\n");
@@ -505,7 +554,8 @@ Command MakeRunCommand(CLI::App& program)
   CLI::App* app = program.add_subcommand(
     "run", "From a gated image series to the coronary arteries, stage by stage");
   app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, centerline.vtp, "
-              "bifurcations.vtp, centerline_lines.vtp, status.csv and, last, report.json.");
+              "bifurcations.vtp, centerline_lines.vtp, status.csv; with --until surface, "
+              "surface.vtp and caps.vtp; and, last, report.json.");
   auto job = std::make_shared<RunJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };
