@@ -4,6 +4,7 @@
 #include "DistanceTransform.h"
 #include "FastMarching.h"
 #include "LumenMeasurement.h"
+#include "ThinBranches.h"
 #include "VoxelRegion.h"
 
 #include <algorithm>
@@ -151,6 +152,7 @@ private:
   std::size_t JoinParent(Course& course, std::int32_t owner) const;
   void Own(std::size_t branch);
   void FindTips();
+  void FollowThinBranches();
   void FollowTargets();
   void Finish();
   void SeedsInOneVessel();
@@ -1324,6 +1326,51 @@ void Extractor::FindTips()
   }
 }
 
+/// What is too thin for the region, by the image alone.
+void Extractor::FollowThinBranches()
+{
+  const double contrast = this->Lumen.reference.lumen - this->Lumen.reference.background;
+  if (!this->Settings.thinBranches || !this->Input.intensity || !this->Calibrated ||
+    !(contrast > 0.0))
+  {
+    return;
+  }
+  ThinBranchSettings settings;
+  settings.voxel = this->Voxel;
+  settings.step = this->Step;
+  settings.minimumLength = std::max(this->Settings.minimumBranchLength, 15.0 * this->Voxel);
+  settings.maximumLength = 200.0 * this->Voxel;
+  settings.contrast = contrast;
+  std::vector<ThinBranch> branches = FindThinBranches(*this->Image, this->Tree, settings);
+  for (const ThinBranch& branch : branches)
+  {
+    Way way;
+    way.owner = branch.parent;
+    way.points.assign(branch.points.rbegin(), branch.points.rend());
+    // Another spot's path, or one that was followed through the region.
+    std::size_t known = 0;
+    for (const Vector3& point : way.points)
+    {
+      for (std::size_t p = 0; p < this->Tree.points.size(); ++p)
+      {
+        if ((this->Tree.points[p] - point).norm() < this->Tree.radius[p] + this->Voxel)
+        {
+          ++known;
+          break;
+        }
+      }
+    }
+    const std::int64_t tip = 3 * known < way.points.size()
+      ? this->Append(way, this->Tree.branches[static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(branch.parent)])].treeId, false)
+      : -2;
+    if (getenv("THIN"))
+    {
+      const Vector3& e = branch.points.back();
+      std::fprintf(stderr, "thin parent=%d len=%.1f contrast=%.0f z=%.1f tip=%lld known=%zu/%zu end=%.1f %.1f %.1f\n", branch.parent, branch.length, branch.contrast, branch.significance, (long long)tip, known, way.points.size(), e[0], e[1], e[2]);
+    }
+  }
+}
+
 void Extractor::FollowTargets()
 {
   const double reach = this->Settings.snapDistance > 0.0
@@ -1466,6 +1513,7 @@ CenterlineResult Extractor::Run()
     if (this->Settings.findTips || this->Input.targets.empty())
     {
       this->FindTips();
+      this->FollowThinBranches();
     }
     this->FollowTargets();
   }

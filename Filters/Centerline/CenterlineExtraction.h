@@ -55,6 +55,7 @@ struct CenterlineSettings
   double blur = 0.0;                ///< standard deviation of the image's blur, mm; 0: measured
   bool snap = true;                 ///< put points on the measured centre
   double snapDistance = 0.0;        ///< mm between a given seed or target and the region
+  bool thinBranches = true; ///< on images also branches that are too thin for the speed or mask
   double timeLimit = 120.0;         ///< seconds
   std::int64_t voxelLimit = 100000000; ///< voxels in the region
 

@@ -1,0 +1,594 @@
+#include "ThinBranches.h"
+
+#include "ParallelFor.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <unordered_map>
+
+namespace coronary
+{
+namespace
+{
+constexpr int Sectors = 8;
+
+/// The lumens of a tree, for "how far is the nearest wall".
+class TreeLumen
+{
+public:
+  TreeLumen(const CenterlineTree& tree, double reach)
+    : Tree(tree)
+    , Reach(reach)
+  {
+    double widest = 0.0;
+    for (const double radius : tree.radius)
+    {
+      widest = std::max(widest, radius);
+    }
+    this->Cell = widest + reach;
+    for (std::size_t p = 0; p < tree.points.size(); ++p)
+    {
+      this->Cells[this->Key(tree.points[p], 0, 0, 0)].push_back(static_cast<std::int32_t>(p));
+    }
+  }
+
+  struct Nearest
+  {
+    double wall; ///< mm outside of the nearest lumen, at most the reach; negative inside
+    std::int32_t point = -1;
+  };
+
+  Nearest operator()(const Vector3& position) const
+  {
+    Nearest nearest{ this->Reach };
+    for (int near = 0; near < 27; ++near)
+    {
+      const auto cell =
+        this->Cells.find(this->Key(position, near % 3 - 1, near / 3 % 3 - 1, near / 9 - 1));
+      if (cell == this->Cells.end())
+      {
+        continue;
+      }
+      for (const std::int32_t p : cell->second)
+      {
+        const double wall = (this->Tree.points[static_cast<std::size_t>(p)] - position).norm() -
+          this->Tree.radius[static_cast<std::size_t>(p)];
+        if (wall < nearest.wall || (wall == nearest.wall && p < nearest.point))
+        {
+          nearest = { wall, p };
+        }
+      }
+    }
+    return nearest;
+  }
+
+private:
+  std::int64_t Key(const Vector3& position, int i, int j, int k) const
+  {
+    const auto part = [&](int axis, int shift)
+    {
+      return (static_cast<std::int64_t>(std::floor(position[axis] / this->Cell)) + shift +
+               (std::int64_t{ 1 } << 20)) &
+        ((std::int64_t{ 1 } << 21) - 1);
+    };
+    return part(0, i) << 42 | part(1, j) << 21 | part(2, k);
+  }
+
+  const CenterlineTree& Tree;
+  double Reach;
+  double Cell = 1.0;
+  std::unordered_map<std::int64_t, std::vector<std::int32_t>> Cells;
+};
+
+class Finder
+{
+public:
+  Finder(const ImageInterpolator& image, const CenterlineTree& tree,
+    const ThinBranchSettings& settings)
+    : Image(image)
+    , Tree(tree)
+    , Settings(settings)
+    , Lumen(tree, 6.0 * settings.voxel)
+    , Noise(MeasureNoise(image, tree, settings.voxel))
+  {
+  }
+
+  std::vector<ThinBranch> Run() const;
+
+private:
+  struct Spot
+  {
+    Vector3 position;
+    Vector3 outwards;
+    std::int32_t parent;
+  };
+  struct Sample
+  {
+    Vector3 position;
+    double least; ///< core over the second brightest sector around it
+    double core;
+    double wall; ///< mm from the tree's lumen
+  };
+
+  std::vector<Spot> FindSpots() const;
+  double Core(const Vector3& position, const Vector3& u, const Vector3& v) const;
+  double Profile(const Vector3& position, const Vector3& tangent) const;
+  double Ahead(const Vector3& position, const Vector3& direction) const;
+  bool Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const;
+  Vector3 Turn(const Vector3& position, const Vector3& direction) const;
+  Vector3 Centre(const Vector3& position, const Vector3& tangent) const;
+  bool Follow(const Spot& spot, ThinBranch& branch) const;
+
+  const ImageInterpolator& Image;
+  const CenterlineTree& Tree;
+  const ThinBranchSettings& Settings;
+  TreeLumen Lumen;
+  double Noise;
+};
+
+/// Local maxima of the image on surfaces beside the lumens.
+std::vector<Finder::Spot> Finder::FindSpots() const
+{
+  const double voxel = this->Settings.voxel;
+  std::vector<Spot> spots;
+  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  {
+    const std::size_t count = branch.points.size();
+    if (count < 3)
+    {
+      continue;
+    }
+    const auto point = [&](std::size_t i) -> const Vector3&
+    { return this->Tree.points[static_cast<std::size_t>(branch.points[i])]; };
+    // A frame that does not turn about the axis.
+    std::vector<Vector3> across(count);
+    std::vector<Vector3> tangents(count);
+    double length = 0.0;
+    for (std::size_t i = 0; i < count; ++i)
+    {
+      tangents[i] = (point(std::min(count - 1, i + 2)) - point(i > 2 ? i - 2 : 0)).normalized();
+      const Vector3 before = i == 0 ? tangents[i].unitOrthogonal() : across[i - 1];
+      across[i] = (before - before.dot(tangents[i]) * tangents[i]).normalized();
+      length += i == 0 ? 0.0 : (point(i) - point(i - 1)).norm();
+    }
+    const double step = length / static_cast<double>(count - 1);
+    const auto stride =
+      std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(0.75 * voxel / step)));
+    for (const double away : { 1.5, 3.0, 4.5 })
+    {
+      constexpr int around = 48;
+      const std::size_t rows = (count + stride - 1) / stride;
+      std::vector<double> map(rows * around);
+      const auto place = [&](std::size_t row, int angle) -> Vector3
+      {
+        const std::size_t i = row * stride;
+        const double radius =
+          this->Tree.radius[static_cast<std::size_t>(branch.points[i])] + away * voxel;
+        const double a = 2.0 * M_PI * angle / around;
+        return point(i) +
+          radius * (std::cos(a) * across[i] + std::sin(a) * tangents[i].cross(across[i]));
+      };
+      ParallelFor(static_cast<std::int64_t>(rows), 16,
+        [&](std::int64_t first, std::int64_t last)
+        {
+          for (std::int64_t row = first; row < last; ++row)
+          {
+            for (int angle = 0; angle < around; ++angle)
+            {
+              map[static_cast<std::size_t>(row) * around + static_cast<std::size_t>(angle)] =
+                this->Image.At(place(static_cast<std::size_t>(row), angle));
+            }
+          }
+        });
+      for (std::size_t row = 0; row < rows; ++row)
+      {
+        const double radius =
+          this->Tree.radius[static_cast<std::size_t>(branch.points[row * stride])] + away * voxel;
+        const int reach = std::max(
+          1, std::min(around / 6, static_cast<int>(voxel / (2.0 * M_PI * radius / around))));
+        for (int angle = 0; angle < around; ++angle)
+        {
+          const double here = map[row * around + static_cast<std::size_t>(angle)];
+          bool greatest = true;
+          for (std::size_t r = row > 1 ? row - 2 : 0; greatest && r <= std::min(rows - 1, row + 2);
+               ++r)
+          {
+            for (int a = angle - reach; a <= angle + reach; ++a)
+            {
+              const double other =
+                map[r * around + static_cast<std::size_t>((a + around) % around)];
+              const bool before = r < row || (r == row && a < angle);
+              if (before ? other >= here : other > here)
+              {
+                greatest = false;
+                break;
+              }
+            }
+          }
+          if (!greatest)
+          {
+            continue;
+          }
+          const Vector3 position = place(row, angle);
+          // What a branch that is known covers is no new one.
+          const TreeLumen::Nearest nearest = this->Lumen(position);
+          if (nearest.wall < (away - 0.5) * voxel || !this->Image.Contains(position))
+          {
+            continue;
+          }
+          const auto parent = static_cast<std::int32_t>(branch.points[row * stride]);
+          spots.push_back({ position,
+            (position - this->Tree.points[static_cast<std::size_t>(parent)]).normalized(),
+            parent });
+        }
+      }
+    }
+  }
+  return spots;
+}
+
+double Finder::Core(const Vector3& position, const Vector3& u, const Vector3& v) const
+{
+  const double offset = 0.5 * this->Settings.voxel;
+  return 0.2 *
+    (this->Image.At(position) + this->Image.At(position + offset * u) +
+      this->Image.At(position - offset * u) + this->Image.At(position + offset * v) +
+      this->Image.At(position - offset * v));
+}
+
+/// Core over the mean of the ring.
+double Finder::Profile(const Vector3& position, const Vector3& tangent) const
+{
+  const Vector3 u = tangent.unitOrthogonal();
+  const Vector3 v = tangent.cross(u);
+  const double ring = 2.5 * this->Settings.voxel;
+  double sum = 0.0;
+  for (int i = 0; i < 6; ++i)
+  {
+    const double angle = 2.0 * M_PI * i / 6.0;
+    sum += this->Image.At(position + ring * (std::cos(angle) * u + std::sin(angle) * v));
+  }
+  return this->Core(position, u, v) - sum / 6.0;
+}
+
+double Finder::Ahead(const Vector3& position, const Vector3& direction) const
+{
+  double sum = 0.0;
+  for (const double s : { 1.0, 2.0, 3.0, 4.0 })
+  {
+    sum += this->Profile(position + s * this->Settings.voxel * direction, direction);
+  }
+  return 0.25 * sum;
+}
+
+bool Finder::Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const
+{
+  const double voxel = this->Settings.voxel;
+  const Vector3 u = tangent.unitOrthogonal();
+  const Vector3 v = tangent.cross(u);
+  sample.position = position;
+  sample.core = this->Core(position, u, v);
+  std::array<double, Sectors> sectors;
+  int known = 0;
+  for (int i = 0; i < Sectors; ++i)
+  {
+    const double angle = 2.0 * M_PI * i / Sectors;
+    const Vector3 side = std::cos(angle) * u + std::sin(angle) * v;
+    const Vector3 place = position + 3.0 * voxel * side;
+    if (this->Lumen(place).wall < 1.5 * voxel)
+    {
+      continue;
+    }
+    sectors[static_cast<std::size_t>(known++)] =
+      (this->Image.At(place) + this->Image.At(place + voxel * tangent) +
+        this->Image.At(place - voxel * tangent) + this->Image.At(place - 0.5 * voxel * side)) /
+      4.0;
+  }
+  if (known < Sectors / 2)
+  {
+    return false;
+  }
+  // The second brightest: a vessel may cross.
+  double brightest = -std::numeric_limits<double>::infinity();
+  double second = brightest;
+  for (int i = 0; i < known; ++i)
+  {
+    const double value = sectors[static_cast<std::size_t>(i)];
+    second = std::max(second, std::min(value, brightest));
+    brightest = std::max(brightest, value);
+  }
+  sample.least = sample.core - second;
+  return true;
+}
+
+/// The direction near this one along which the tube goes on best.
+Vector3 Finder::Turn(const Vector3& position, const Vector3& direction) const
+{
+  Vector3 best = direction;
+  double greatest = this->Ahead(position, direction);
+  for (const double cone : { 0.3, 0.12 })
+  {
+    const Vector3 from = best;
+    const Vector3 u = from.unitOrthogonal();
+    const Vector3 v = from.cross(u);
+    for (int i = 0; i < 8; ++i)
+    {
+      const double angle = 2.0 * M_PI * i / 8.0;
+      const Vector3 turned =
+        (from + std::tan(cone) * (std::cos(angle) * u + std::sin(angle) * v)).normalized();
+      const double value = this->Ahead(position, turned);
+      if (value > greatest)
+      {
+        greatest = value;
+        best = turned;
+      }
+    }
+  }
+  return best;
+}
+
+/// Towards the top of the parabola through the core's values across.
+Vector3 Finder::Centre(const Vector3& position, const Vector3& tangent) const
+{
+  const Vector3 u = tangent.unitOrthogonal();
+  const Vector3 v = tangent.cross(u);
+  const double h = 0.75 * this->Settings.voxel;
+  const auto value = [&](const Vector3& p)
+  {
+    return this->Core(p, u, v) + this->Core(p + this->Settings.voxel * tangent, u, v) +
+      this->Core(p - this->Settings.voxel * tangent, u, v);
+  };
+  Vector3 centre = position;
+  const double here = value(position);
+  for (const Vector3& side : { u, v })
+  {
+    const double above = value(position + h * side);
+    const double below = value(position - h * side);
+    const double bend = above - 2.0 * here + below;
+    const double shift = bend < 0.0 ? 0.5 * h * (below - above) / bend : 0.0;
+    centre += std::min(0.5 * h, std::max(-0.5 * h, shift)) * side;
+  }
+  return centre;
+}
+
+bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
+{
+  const double voxel = this->Settings.voxel;
+  const double step = 0.75 * voxel;
+  // The first direction: of all that lead away.
+  Vector3 direction = spot.outwards;
+  double greatest = -std::numeric_limits<double>::infinity();
+  constexpr int directions = 80;
+  for (int i = 0; i < directions; ++i)
+  {
+    const double z = 1.0 - (2.0 * i + 1.0) / directions;
+    const double angle = i * 2.399963229728653;
+    const double r = std::sqrt(std::max(0.0, 1.0 - z * z));
+    const Vector3 candidate(r * std::cos(angle), r * std::sin(angle), z);
+    if (candidate.dot(spot.outwards) < 0.25)
+    {
+      continue;
+    }
+    const double value = this->Ahead(spot.position, candidate);
+    if (value > greatest)
+    {
+      greatest = value;
+      direction = candidate;
+    }
+  }
+  const double least = this->Settings.leastContrast * this->Settings.contrast;
+  if (greatest < least)
+  {
+    return false;
+  }
+  direction = this->Turn(spot.position, direction);
+
+  std::vector<Sample> samples;
+  Vector3 position = this->Centre(spot.position, direction);
+  const auto window = static_cast<std::size_t>(8);
+  const auto most = static_cast<std::size_t>(this->Settings.maximumLength / step);
+  while (samples.size() < most && this->Image.Contains(position))
+  {
+    Sample sample;
+    if (!this->Evidence(position, direction, sample))
+    {
+      sample.least = 0.0;
+    }
+    const TreeLumen::Nearest nearest = this->Lumen(position);
+    sample.wall = nearest.wall;
+    if (nearest.wall < 0.0)
+    {
+      // Into a vessel that is known: no branch of its own.
+      return false;
+    }
+    samples.push_back(sample);
+    if (samples.size() >= window)
+    {
+      double recent = 0.0;
+      for (std::size_t i = samples.size() - window; i < samples.size(); ++i)
+      {
+        recent += samples[i].least / static_cast<double>(window);
+      }
+      if (recent < 0.5 * least)
+      {
+        break;
+      }
+    }
+    const Vector3 ahead = this->Turn(position, direction);
+    const Vector3 before = position;
+    position = this->Centre(position + step * ahead, ahead);
+    const Vector3 gone = position - before;
+    if (!(gone.norm() > 0.3 * step))
+    {
+      break;
+    }
+    direction = (0.5 * direction + 0.5 * gone.normalized()).normalized();
+  }
+
+  // As far as the path speaks for a vessel.
+  std::size_t end = 0;
+  double sum = 0.0;
+  double top = 0.0;
+  for (std::size_t i = 0; i < samples.size(); ++i)
+  {
+    sum += samples[i].least - 0.5 * least;
+    if (sum > top)
+    {
+      top = sum;
+      end = i + 1;
+    }
+  }
+  samples.resize(end);
+  if (end < 4 || static_cast<double>(end) * step < this->Settings.minimumLength)
+  {
+    return false;
+  }
+  double mean = 0.0;
+  std::size_t beside = 0;
+  std::size_t clear = 0;
+  for (const Sample& sample : samples)
+  {
+    mean += sample.least / static_cast<double>(end);
+    beside += sample.wall < 2.5 * voxel ? 1 : 0;
+    clear += sample.least > 0.5 * least ? 1 : 0;
+  }
+  // Samples three voxels apart are independent; four in the core, four in a sector.
+  const double independent = std::max(1.0, static_cast<double>(end) * step / (3.0 * voxel));
+  branch.contrast = mean;
+  branch.significance =
+    mean / std::max(this->Noise * std::sqrt(0.5 / independent), 1e-9 * this->Settings.contrast);
+  if (mean < least || branch.significance < this->Settings.significance ||
+    static_cast<double>(beside) > 0.5 * static_cast<double>(end) ||
+    static_cast<double>(clear) < 0.8 * static_cast<double>(end))
+  {
+    return false;
+  }
+
+  // Back to the parent: bright all the way.
+  const Vector3 back = (samples.front().position - samples[3].position).normalized();
+  const auto parent = static_cast<std::size_t>(spot.parent);
+  branch.parent = spot.parent;
+  double dark = 0.0;
+  const Vector3 from = samples.front().position;
+  Vector3 root = this->Tree.points[parent];
+  (void)back;
+  const double distance = (root - from).norm();
+  const int pieces = std::max(2, static_cast<int>(distance / (0.25 * voxel)));
+  double lowest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= pieces; ++i)
+  {
+    lowest = std::min(lowest, this->Image.At(from + (root - from) * (static_cast<double>(i) / pieces)));
+  }
+  dark = samples.front().core - lowest;
+  if (dark > 0.25 * this->Settings.contrast)
+  {
+    return false;
+  }
+  std::vector<Vector3> path = { root };
+  for (const Sample& sample : samples)
+  {
+    path.push_back(sample.position);
+  }
+  branch.points = std::move(path);
+  branch.length = static_cast<double>(end) * step + samples.front().wall;
+  return true;
+}
+
+std::vector<ThinBranch> Finder::Run() const
+{
+  if (this->Tree.points.empty())
+  {
+    return {};
+  }
+  const std::vector<Spot> spots = this->FindSpots();
+  std::vector<ThinBranch> branches(spots.size());
+  std::vector<char> found(spots.size(), 0);
+  ParallelFor(static_cast<std::int64_t>(spots.size()), 4,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t s = first; s < last; ++s)
+      {
+        const auto spot = static_cast<std::size_t>(s);
+        found[spot] = this->Follow(spots[spot], branches[spot]) ? 1 : 0;
+      }
+    });
+  std::vector<ThinBranch> result;
+  for (std::size_t s = 0; s < spots.size(); ++s)
+  {
+    if (found[s] != 0)
+    {
+      result.push_back(std::move(branches[s]));
+    }
+  }
+  std::stable_sort(result.begin(), result.end(), [](const ThinBranch& a, const ThinBranch& b)
+    { return a.significance > b.significance; });
+  return result;
+}
+}
+
+double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+{
+  std::vector<double> differences;
+  for (const CenterlineTree::Branch& branch : tree.branches)
+  {
+    for (std::size_t i = 4; i + 4 < branch.points.size(); i += 4)
+    {
+      const auto p = static_cast<std::size_t>(branch.points[i]);
+      const Vector3 chord = tree.points[static_cast<std::size_t>(branch.points[i + 4])] -
+        tree.points[static_cast<std::size_t>(branch.points[i - 4])];
+      if (!(chord.norm() > 0.0))
+      {
+        continue;
+      }
+      const Vector3 tangent = chord.normalized();
+      const Vector3 u = tangent.unitOrthogonal();
+      const Vector3 v = tangent.cross(u);
+      const double away = tree.radius[p] + 4.0 * voxel;
+      for (int side = 0; side < 6; ++side)
+      {
+        const double angle = M_PI * side / 3.0;
+        const Vector3 place =
+          tree.points[p] + away * (std::cos(angle) * u + std::sin(angle) * v);
+        if (image.Contains(place))
+        {
+          differences.push_back(std::abs(image.At(place - 3.0 * voxel * tangent) -
+            2.0 * image.At(place) + image.At(place + 3.0 * voxel * tangent)));
+        }
+      }
+    }
+  }
+  if (differences.empty())
+  {
+    return 0.0;
+  }
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::nth_element(differences.begin(), middle, differences.end());
+  return *middle * 1.4826 / std::sqrt(6.0);
+}
+
+std::vector<ThinBranch> FindThinBranches(
+  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+{
+  const auto require = [](bool condition, const char* requirement)
+  {
+    if (!condition)
+    {
+      throw std::invalid_argument(std::string("ThinBranchSettings: ") + requirement);
+    }
+  };
+  require(settings.voxel > 0.0, "voxel must be positive");
+  require(settings.step > 0.0, "step must be positive");
+  require(settings.minimumLength > 0.0, "minimumLength must be positive");
+  require(settings.maximumLength >= settings.minimumLength,
+    "maximumLength must not be below minimumLength");
+  require(settings.contrast > 0.0, "contrast must be positive");
+  require(settings.leastContrast >= 0.0 && settings.leastContrast <= 1.0,
+    "leastContrast must be 0 to 1");
+  require(settings.significance >= 0.0, "significance must not be negative");
+  return Finder(image, tree, settings).Run();
+}
+}

@@ -1,0 +1,56 @@
+/**
+ * @file ThinBranches.h
+ * @brief Branches of about one voxel's radius that leave a known tree: too thin for a mask, found on
+ * the image by what their whole path shows.
+ *
+ * Bright spots on the surface that lies beside the tree's lumen are where branches may begin. From each a tube is
+ * followed outwards. It is a branch when along its path the core is brighter than what surrounds it on every side, by many
+ * times what the image's noise could do: noise has no such path, the border of a chamber is as
+ * bright on one side, a plate on two.
+ */
+#ifndef DynamicCoronary_ThinBranches_h
+#define DynamicCoronary_ThinBranches_h
+
+#include "CenterlineTree.h"
+#include "Geometry.h"
+#include "LumenMeasurement.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace coronary
+{
+struct ThinBranchSettings
+{
+  double voxel = 0.4;         ///< edge of a voxel (of its cube), mm, > 0
+  double step = 0.24;         ///< distance of a path's points, mm, > 0
+  double minimumLength = 6.0; ///< mm outside of the parent's lumen, > 0
+  double maximumLength = 80.0; ///< mm
+  double contrast = 500.0;     ///< image value of a great vessel's lumen over its surroundings, > 0
+  double leastContrast = 0.12; ///< share of it that a path must show on every side, mean, 0 to 1
+  double significance = 8.0;   ///< standard errors of noise that the path's mean must exceed
+};
+
+struct ThinBranch
+{
+  std::vector<Vector3> points; ///< mm; from the parent's axis to the tip, at equal distances
+  std::int32_t parent = -1;    ///< point of the tree where the first one is
+  double contrast = 0.0;       ///< mean of the least contrast to any side, image values
+  double significance = 0.0;   ///< it, in standard errors
+  double length = 0.0;         ///< mm outside of the parent's lumen
+};
+
+/// Standard deviation of the image's noise around the vessels, by second differences along them;
+/// robust to edges. 0 if the tree has no room around it.
+double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, double voxel);
+
+/**
+ * @param tree  points, radii (mm) and branches; not changed
+ * @returns the branches, most significant first; several may follow the same vessel. The same on any number of threads.
+ * @throws std::invalid_argument that names the setting out of range
+ */
+std::vector<ThinBranch> FindThinBranches(
+  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings);
+}
+
+#endif
