@@ -1341,33 +1341,28 @@ void Extractor::FollowThinBranches()
   settings.minimumLength = std::max(this->Settings.minimumBranchLength, 15.0 * this->Voxel);
   settings.maximumLength = 200.0 * this->Voxel;
   settings.contrast = contrast;
-  std::vector<ThinBranch> branches = FindThinBranches(*this->Image, this->Tree, settings);
-  for (const ThinBranch& branch : branches)
+  // Several spots lead to one vessel: what was followed once, whether to keep or not, is done.
+  std::vector<Vector3> done;
+  for (const ThinBranch& branch : FindThinBranches(*this->Image, this->Tree, settings))
   {
+    std::size_t known = 0;
+    for (const Vector3& point : branch.points)
+    {
+      known += std::any_of(done.begin(), done.end(),
+        [&](const Vector3& other)
+        { return (other - point).squaredNorm() < 4.0 * this->Voxel * this->Voxel; });
+    }
+    if (2 * known > branch.points.size())
+    {
+      continue;
+    }
+    done.insert(done.end(), branch.points.begin(), branch.points.end());
     Way way;
     way.owner = branch.parent;
     way.points.assign(branch.points.rbegin(), branch.points.rend());
-    // Another spot's path, or one that was followed through the region.
-    std::size_t known = 0;
-    for (const Vector3& point : way.points)
-    {
-      for (std::size_t p = 0; p < this->Tree.points.size(); ++p)
-      {
-        if ((this->Tree.points[p] - point).norm() < this->Tree.radius[p] + this->Voxel)
-        {
-          ++known;
-          break;
-        }
-      }
-    }
-    const std::int64_t tip = 3 * known < way.points.size()
-      ? this->Append(way, this->Tree.branches[static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(branch.parent)])].treeId, false)
-      : -2;
-    if (getenv("THIN"))
-    {
-      const Vector3& e = branch.points.back();
-      std::fprintf(stderr, "thin parent=%d len=%.1f contrast=%.0f z=%.1f tip=%lld known=%zu/%zu end=%.1f %.1f %.1f\n", branch.parent, branch.length, branch.contrast, branch.significance, (long long)tip, known, way.points.size(), e[0], e[1], e[2]);
-    }
+    const auto parent =
+      static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(branch.parent)]);
+    this->Append(way, this->Tree.branches[parent].treeId, false);
   }
 }
 

@@ -56,7 +56,7 @@ struct CenterlineSettings
   bool snap = true;                 ///< put points on the measured centre
   double snapDistance = 0.0;        ///< mm between a given seed or target and the region
   bool thinBranches = true; ///< on images also branches that are too thin for the speed or mask
-  double timeLimit = 120.0;         ///< seconds
+  double timeLimit = 120.0; ///< seconds
   std::int64_t voxelLimit = 100000000; ///< voxels in the region
 
   /// @throws std::invalid_argument that names the first setting out of range

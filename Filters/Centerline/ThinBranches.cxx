@@ -15,6 +15,11 @@ namespace coronary
 namespace
 {
 constexpr int Sectors = 8;
+/// Share of a branch's length by which it must depart from the tree, up to a length in voxels.
+constexpr double LeastDeparture = 0.35;
+constexpr double FullDeparture = 40.0;
+/// Share of the contrast by which the way from the parent may be darker than the branch itself.
+constexpr double DeepestValley = 0.1;
 
 /// The lumens of a tree, for "how far is the nearest wall".
 class TreeLumen
@@ -87,8 +92,8 @@ private:
 class Finder
 {
 public:
-  Finder(const ImageInterpolator& image, const CenterlineTree& tree,
-    const ThinBranchSettings& settings)
+  Finder(
+    const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
     : Image(image)
     , Tree(tree)
     , Settings(settings)
@@ -389,7 +394,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
 
   std::vector<Sample> samples;
   Vector3 position = this->Centre(spot.position, direction);
-  const auto window = static_cast<std::size_t>(8);
+  constexpr std::size_t window = 8;
   const auto most = static_cast<std::size_t>(this->Settings.maximumLength / step);
   while (samples.size() < most && this->Image.Contains(position))
   {
@@ -468,33 +473,53 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
     return false;
   }
 
-  // Back to the parent: bright all the way.
-  const Vector3 back = (samples.front().position - samples[3].position).normalized();
-  const auto parent = static_cast<std::size_t>(spot.parent);
-  branch.parent = spot.parent;
-  double dark = 0.0;
-  const Vector3 from = samples.front().position;
-  Vector3 root = this->Tree.points[parent];
-  (void)back;
-  const double distance = (root - from).norm();
-  const int pieces = std::max(2, static_cast<int>(distance / (0.25 * voxel)));
-  double lowest = std::numeric_limits<double>::infinity();
-  for (int i = 0; i <= pieces; ++i)
+  // Away from the tree: what runs beside a vessel for long is its vein.
+  double farthest = 0.0;
+  for (std::size_t i = 0; i < end; i += 4)
   {
-    lowest = std::min(lowest, this->Image.At(from + (root - from) * (static_cast<double>(i) / pieces)));
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t p = 0; p < this->Tree.points.size(); ++p)
+    {
+      nearest = std::min(
+        nearest, (this->Tree.points[p] - samples[i].position).norm() - this->Tree.radius[p]);
+    }
+    farthest = std::max(farthest, nearest);
   }
-  dark = samples.front().core - lowest;
-  if (dark > 0.25 * this->Settings.contrast)
+  branch.length = static_cast<double>(end) * step + samples.front().wall;
+  if (farthest < LeastDeparture * std::min(branch.length, FullDeparture * voxel))
   {
     return false;
   }
+  // Back to the parent's axis: bright all the way.
+  const auto parent = static_cast<std::size_t>(spot.parent);
+  const Vector3& from = samples.front().position;
+  const Vector3& root = this->Tree.points[parent];
+  const int pieces = std::max(2, static_cast<int>((root - from).norm() / (0.25 * voxel)));
+  double lowest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= pieces; ++i)
+  {
+    lowest =
+      std::min(lowest, this->Image.At(from + (root - from) * (static_cast<double>(i) / pieces)));
+  }
+  std::vector<double> cores;
+  for (std::size_t i = 0; i < std::min<std::size_t>(end, 10); ++i)
+  {
+    cores.push_back(samples[i].core);
+  }
+  std::nth_element(
+    cores.begin(), cores.begin() + static_cast<std::ptrdiff_t>(cores.size() / 2), cores.end());
+  const double begin = cores[cores.size() / 2];
+  if (begin - lowest > DeepestValley * this->Settings.contrast + 2.0 * this->Noise)
+  {
+    return false;
+  }
+  branch.parent = spot.parent;
   std::vector<Vector3> path = { root };
   for (const Sample& sample : samples)
   {
     path.push_back(sample.position);
   }
   branch.points = std::move(path);
-  branch.length = static_cast<double>(end) * step + samples.front().wall;
   return true;
 }
 
@@ -524,8 +549,8 @@ std::vector<ThinBranch> Finder::Run() const
       result.push_back(std::move(branches[s]));
     }
   }
-  std::stable_sort(result.begin(), result.end(), [](const ThinBranch& a, const ThinBranch& b)
-    { return a.significance > b.significance; });
+  std::stable_sort(result.begin(), result.end(),
+    [](const ThinBranch& a, const ThinBranch& b) { return a.significance > b.significance; });
   return result;
 }
 }
@@ -551,8 +576,7 @@ double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, 
       for (int side = 0; side < 6; ++side)
       {
         const double angle = M_PI * side / 3.0;
-        const Vector3 place =
-          tree.points[p] + away * (std::cos(angle) * u + std::sin(angle) * v);
+        const Vector3 place = tree.points[p] + away * (std::cos(angle) * u + std::sin(angle) * v);
         if (image.Contains(place))
         {
           differences.push_back(std::abs(image.At(place - 3.0 * voxel * tangent) -
@@ -586,8 +610,8 @@ std::vector<ThinBranch> FindThinBranches(
   require(settings.maximumLength >= settings.minimumLength,
     "maximumLength must not be below minimumLength");
   require(settings.contrast > 0.0, "contrast must be positive");
-  require(settings.leastContrast >= 0.0 && settings.leastContrast <= 1.0,
-    "leastContrast must be 0 to 1");
+  require(
+    settings.leastContrast >= 0.0 && settings.leastContrast <= 1.0, "leastContrast must be 0 to 1");
   require(settings.significance >= 0.0, "significance must not be negative");
   return Finder(image, tree, settings).Run();
 }

@@ -22,9 +22,9 @@ namespace coronary
 {
 struct ThinBranchSettings
 {
-  double voxel = 0.4;         ///< edge of a voxel (of its cube), mm, > 0
-  double step = 0.24;         ///< distance of a path's points, mm, > 0
-  double minimumLength = 6.0; ///< mm outside of the parent's lumen, > 0
+  double voxel = 0.4;          ///< edge of a voxel (of its cube), mm, > 0
+  double step = 0.24;          ///< distance of a path's points, mm, > 0
+  double minimumLength = 6.0;  ///< mm outside of the parent's lumen, > 0
   double maximumLength = 80.0; ///< mm
   double contrast = 500.0;     ///< image value of a great vessel's lumen over its surroundings, > 0
   double leastContrast = 0.12; ///< share of it that a path must show on every side, mean, 0 to 1

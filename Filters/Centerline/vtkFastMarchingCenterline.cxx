@@ -315,6 +315,7 @@ void vtkFastMarchingCenterline::Execute(
   input.seeds = PointsOf(inputs[1]);
   input.targets = PointsOf(inputs[2]);
   settings.findTips = this->FindTips || input.targets.empty();
+  settings.thinBranches = this->FollowThinBranches;
   vtkDataObject* data = vtkDataObject::GetData(inputs[0]->GetInformationObject(0));
   auto* image = vtkImageData::SafeDownCast(data);
   auto* surface = vtkPolyData::SafeDownCast(data);
@@ -606,6 +607,7 @@ void vtkFastMarchingCenterline::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "IntensityThreshold: " << this->IntensityThreshold << '\n';
   os << indent << "SpeedExponent: " << this->SpeedExponent << '\n';
   os << indent << "FindTips: " << this->FindTips << '\n';
+  os << indent << "FollowThinBranches: " << this->FollowThinBranches << '\n';
   os << indent << "MinimumBranchLength: " << this->MinimumBranchLength << '\n';
   os << indent << "MinimumConfidence: " << this->MinimumConfidence << '\n';
   os << indent << "MaximumGap: " << this->MaximumGap << '\n';

@@ -137,6 +137,16 @@ public:
 
   ///@{
   /**
+   * Whether on images (input 2) also branches of about one voxel's radius are followed that the speed or the mask
+   * does not have. Only with tips. Default on.
+   */
+  vtkSetMacro(FollowThinBranches, bool);
+  vtkGetMacro(FollowThinBranches, bool);
+  vtkBooleanMacro(FollowThinBranches, bool);
+  ///@}
+
+  ///@{
+  /**
    * Shorter branches are no branches, mm. Default 0: ten voxels, and one and a half radii of the parent.
    */
   vtkSetMacro(MinimumBranchLength, double);
@@ -273,6 +283,7 @@ private:
   double IntensityThreshold = 100.0;
   double SpeedExponent = 2.0;
   bool FindTips = false;
+  bool FollowThinBranches = true;
   double MinimumBranchLength = 0.0;
   double MinimumConfidence = 0.5;
   double MaximumGap = 0.0;

@@ -1,0 +1,303 @@
+// Thin branches beside a known vessel, in images in closed form with noise: what is one is followed, and noise, the border
+// of a chamber, a plate and a vein are not.
+
+#include "CenterlineExtraction.h"
+#include "CounterRandom.h"
+#include "ParallelFor.h"
+#include "ThinBranches.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+using namespace coronary;
+
+namespace
+{
+constexpr double Fat = -95.0;
+constexpr double Blood = 420.0;
+constexpr double Blur = 0.28;
+const Vector3 TrunkStart(0.0, 0.0, -16.0);
+const Vector3 TrunkEnd(0.0, 0.0, 16.0);
+constexpr double TrunkRadius = 1.4;
+const Vector3 BranchStart(0.0, 0.0, -2.0);
+const Vector3 BranchEnd(13.0, 2.0, 6.0);
+
+double DistanceToSegment(const Vector3& p, const Vector3& a, const Vector3& b)
+{
+  const Vector3 d = b - a;
+  const double t = std::min(1.0, std::max(0.0, (p - a).dot(d) / d.squaredNorm()));
+  return (a + t * d - p).norm();
+}
+
+/// How much of a blurred wall at this signed distance is inside.
+double Inside(double distance)
+{
+  return 0.5 * std::erfc(-distance / (std::sqrt(2.0) * Blur));
+}
+
+/// A thin tube's centre shows 1 - exp(-r^2 / 2 blur^2) of its contrast.
+double TubeShare(const Vector3& p, const Vector3& a, const Vector3& b, double radius)
+{
+  const double distance = DistanceToSegment(p, a, b);
+  if (radius > 3.0 * Blur)
+  {
+    return Inside(radius - distance);
+  }
+  const double width = Blur * Blur + 0.25 * radius * radius;
+  return (1.0 - std::exp(-0.5 * radius * radius / (Blur * Blur))) *
+    std::exp(-0.5 * distance * distance / width);
+}
+
+struct Scene
+{
+  ScalarImage image;
+  std::vector<float> values;
+  CenterlineTree trunk;
+
+  /// @param add  image value before the trunk is drawn
+  explicit Scene(const std::function<double(const Vector3&)>& add, double noise,
+    const Vector3& spacing = Vector3::Constant(0.4), std::uint64_t seed = 1)
+  {
+    ImageGrid& grid = this->image.grid;
+    grid.spacing = spacing;
+    grid.origin = Vector3(-10.0, -10.0, -18.0);
+    const Vector3 size(26.0, 20.0, 36.0);
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      grid.extent[2 * axis] = 0;
+      grid.extent[2 * axis + 1] = static_cast<int>(size[axis] / spacing[axis]);
+    }
+    RandomStream random(seed);
+    for (int k = 0; k <= grid.extent[5]; ++k)
+    {
+      for (int j = 0; j <= grid.extent[3]; ++j)
+      {
+        for (int i = 0; i <= grid.extent[1]; ++i)
+        {
+          const Vector3 p = grid.IndexToWorld(i, j, k);
+          double value = add(p);
+          value += TubeShare(p, TrunkStart, TrunkEnd, TrunkRadius) * (Blood - value);
+          this->values.push_back(static_cast<float>(value + noise * random.Normal()));
+        }
+      }
+    }
+    this->image.values = static_cast<const float*>(this->values.data());
+    CenterlineTree::Branch branch;
+    for (double z = -15.0; z <= 15.0; z += 0.24)
+    {
+      branch.points.push_back(static_cast<std::int64_t>(this->trunk.points.size()));
+      this->trunk.points.emplace_back(0.0, 0.0, z);
+      this->trunk.radius.push_back(TrunkRadius);
+    }
+    this->trunk.branches.push_back(branch);
+  }
+
+  std::vector<ThinBranch> Find() const
+  {
+    ThinBranchSettings settings;
+    settings.voxel = std::cbrt(this->image.grid.spacing.prod());
+    settings.contrast = Blood - Fat;
+    return FindThinBranches(ImageInterpolator(this->image), this->trunk, settings);
+  }
+};
+
+double WithBranch(const Vector3& p, double radius, double background)
+{
+  return background + TubeShare(p, BranchStart, BranchEnd, radius) * (Blood - background);
+}
+}
+
+TEST(ThinBranches, FollowsATubeOfOneVoxelInNoise)
+{
+  for (const double noise : { 25.0, 40.0 })
+  {
+    for (const double background : { Fat, 110.0 })
+    {
+      SCOPED_TRACE("noise " + std::to_string(noise) + ", in " + std::to_string(background));
+      const Scene scene([&](const Vector3& p) { return WithBranch(p, 0.45, background); }, noise);
+      const std::vector<ThinBranch> found = scene.Find();
+      ASSERT_FALSE(found.empty());
+      for (const ThinBranch& branch : found)
+      {
+        for (const Vector3& p : branch.points)
+        {
+          EXPECT_LT(DistanceToSegment(p, BranchStart, BranchEnd + 0.1 * (BranchEnd - BranchStart)),
+            p == branch.points.front() ? 1.5 * TrunkRadius : 0.65);
+        }
+      }
+      EXPECT_LT((found.front().points.back() - BranchEnd).norm(), 2.5);
+      EXPECT_GT(found.front().significance, 12.0);
+      EXPECT_GT(found.front().length, 10.0);
+    }
+  }
+}
+
+TEST(ThinBranches, OtherVoxels)
+{
+  for (const Vector3& spacing : { Vector3(0.35, 0.35, 0.5), Vector3(0.5, 0.5, 0.5) })
+  {
+    const Scene scene([](const Vector3& p) { return WithBranch(p, 0.5, Fat); }, 25.0, spacing);
+    const std::vector<ThinBranch> found = scene.Find();
+    ASSERT_FALSE(found.empty());
+    EXPECT_LT((found.front().points.back() - BranchEnd).norm(), 3.0);
+  }
+}
+
+TEST(ThinBranches, NothingInNoise)
+{
+  for (std::uint64_t seed = 1; seed <= 3; ++seed)
+  {
+    for (const double noise : { 25.0, 60.0 })
+    {
+      const Scene scene([](const Vector3&) { return Fat; }, noise, Vector3::Constant(0.4), seed);
+      EXPECT_TRUE(scene.Find().empty());
+    }
+  }
+}
+
+TEST(ThinBranches, NoBorderOfAChamber)
+{
+  // A chamber beside the trunk whose border runs away from it, and fat against muscle.
+  const Vector3 normal = Vector3(0.5, 1.0, 0.2).normalized();
+  for (const double inside : { Blood, 200.0 })
+  {
+    const Scene scene([&](const Vector3& p)
+      { return Fat + (inside - Fat) * Inside((p - Vector3(0.0, 1.6, 0.0)).dot(normal)); },
+      25.0);
+    EXPECT_TRUE(scene.Find().empty());
+  }
+}
+
+TEST(ThinBranches, NoPlate)
+{
+  // A thin wall of muscle between fat and fat that comes out of the trunk.
+  const Scene scene(
+    [](const Vector3& p) { return Fat + 300.0 * Inside(0.5 - std::abs(p[1])); }, 25.0);
+  EXPECT_TRUE(scene.Find().empty());
+}
+
+TEST(ThinBranches, NoVeinBeside)
+{
+  const Scene scene([](const Vector3& p)
+    { return Fat + 245.0 * TubeShare(p, Vector3(3.6, 0.5, -16.0), Vector3(3.2, -0.5, 16.0), 0.8); },
+    25.0);
+  EXPECT_TRUE(scene.Find().empty());
+}
+
+TEST(ThinBranches, NoTubeThatIsNotConnected)
+{
+  const Vector3 start = BranchStart + 0.3 * (BranchEnd - BranchStart);
+  const Scene scene(
+    [&](const Vector3& p) { return Fat + 515.0 * TubeShare(p, start, BranchEnd, 0.45); }, 25.0);
+  EXPECT_TRUE(scene.Find().empty());
+}
+
+TEST(ThinBranches, SameOnAnyNumberOfThreads)
+{
+  const Scene scene([](const Vector3& p) { return WithBranch(p, 0.45, Fat); }, 25.0);
+  SetNumberOfThreads(1);
+  const std::vector<ThinBranch> one = scene.Find();
+  SetNumberOfThreads(3);
+  const std::vector<ThinBranch> three = scene.Find();
+  SetNumberOfThreads(0);
+  ASSERT_EQ(one.size(), three.size());
+  for (std::size_t b = 0; b < one.size(); ++b)
+  {
+    EXPECT_EQ(one[b].points, three[b].points);
+    EXPECT_EQ(one[b].parent, three[b].parent);
+    EXPECT_EQ(one[b].significance, three[b].significance);
+  }
+}
+
+TEST(ThinBranches, MeasuresTheNoise)
+{
+  // Interpolation averages: less than in the voxels, and in proportion.
+  const auto flat = [](const Vector3&) { return Fat; };
+  const Scene quiet(flat, 10.0);
+  const Scene loud(flat, 40.0);
+  const double low = MeasureNoise(ImageInterpolator(quiet.image), quiet.trunk, 0.4);
+  const double high = MeasureNoise(ImageInterpolator(loud.image), loud.trunk, 0.4);
+  EXPECT_GT(low, 4.0);
+  EXPECT_LT(low, 10.0);
+  EXPECT_NEAR(high / low, 4.0, 0.2);
+}
+
+TEST(ThinBranches, SettingsOutOfRangeAreNamed)
+{
+  const Scene scene([](const Vector3&) { return Fat; }, 25.0);
+  const ImageInterpolator image(scene.image);
+  const auto message = [&](const std::function<void(ThinBranchSettings&)>& spoil)
+  {
+    ThinBranchSettings settings;
+    spoil(settings);
+    try
+    {
+      FindThinBranches(image, scene.trunk, settings);
+    }
+    catch (const std::invalid_argument& error)
+    {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(message([](ThinBranchSettings& s) { s.voxel = 0.0; }).find("voxel"), std::string::npos);
+  EXPECT_NE(message([](ThinBranchSettings& s) { s.step = -1.0; }).find("step"), std::string::npos);
+  EXPECT_NE(message([](ThinBranchSettings& s) { s.minimumLength = 0.0; }).find("minimumLength"),
+    std::string::npos);
+  EXPECT_NE(message([](ThinBranchSettings& s) { s.maximumLength = 1.0; }).find("maximumLength"),
+    std::string::npos);
+  EXPECT_NE(
+    message([](ThinBranchSettings& s) { s.contrast = 0.0; }).find("contrast"), std::string::npos);
+  EXPECT_NE(message([](ThinBranchSettings& s) { s.leastContrast = 2.0; }).find("leastContrast"),
+    std::string::npos);
+  EXPECT_NE(message([](ThinBranchSettings& s) { s.significance = -1.0; }).find("significance"),
+    std::string::npos);
+  EXPECT_TRUE(message([](ThinBranchSettings&) {}).empty());
+}
+
+TEST(ThinBranches, ExtractionFollowsThemOutsideOfTheMask)
+{
+  const Scene scene([](const Vector3& p) { return WithBranch(p, 0.45, Fat); }, 25.0);
+  const ImageGrid& grid = scene.image.grid;
+  std::vector<unsigned char> mask;
+  std::vector<float> speed;
+  for (int k = 0; k <= grid.extent[5]; ++k)
+  {
+    for (int j = 0; j <= grid.extent[3]; ++j)
+    {
+      for (int i = 0; i <= grid.extent[1]; ++i)
+      {
+        const double distance = DistanceToSegment(grid.IndexToWorld(i, j, k), TrunkStart, TrunkEnd);
+        mask.push_back(distance < TrunkRadius ? 1 : 0);
+        speed.push_back(static_cast<float>(std::exp(-distance * distance)));
+      }
+    }
+  }
+  CenterlineInput input;
+  input.grid = grid;
+  input.speed = speed.data();
+  input.mask = mask.data();
+  input.intensity = &scene.image;
+  input.seeds = { Vector3(0.0, 0.0, -14.0) };
+  CenterlineSettings settings;
+  const CenterlineResult with = ExtractCenterlines(input, settings);
+  settings.thinBranches = false;
+  const CenterlineResult without = ExtractCenterlines(input, settings);
+  EXPECT_EQ(without.tree.branches.size(), 1U);
+  ASSERT_EQ(with.bifurcations.size(), 1U);
+  EXPECT_LT(
+    (with.tree.points[static_cast<std::size_t>(with.bifurcations[0].point)] - BranchStart).norm(),
+    1.0);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Vector3& p : with.tree.points)
+  {
+    nearest = std::min(nearest, (p - BranchEnd).norm());
+  }
+  EXPECT_LT(nearest, 2.5);
+}
