@@ -23,6 +23,7 @@ constexpr double BluntRetreat = 0.6;
 constexpr double LeastAngle = 12.0;
 constexpr int Repairs = 3;
 constexpr int RemeshingAttempts = 3;
+constexpr double GreatestSmoothing = 4.0; ///< of the axes, radii
 
 double EdgeLength(const SweepSettings& settings, double curvature, double radius)
 {
@@ -525,6 +526,12 @@ void Require(bool condition, const char* name, const char* range)
 }
 }
 
+namespace
+{
+SweptSurface SweepOnce(
+  const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress);
+}
+
 void SweepSettings::Validate() const
 {
   const auto between = [](double x, double low, double high) { return x >= low && x <= high; };
@@ -539,7 +546,7 @@ void SweepSettings::Validate() const
   Require(between(this->gradation, 0.05, 1.0), "gradation", "0.05 to 1");
   Require(between(this->blending, 0.1, 1.0), "blending", "0.1 to 1");
   Require(between(this->edgeRetreat, 0.1, 2.0), "edgeRetreat", "0.1 to 2");
-  Require(between(this->smoothing, 0.0, 4.0), "smoothing", "0 to 4");
+  Require(between(this->smoothing, 0.0, GreatestSmoothing), "smoothing", "0 to 4");
   Require(between(this->clearance, 0.0, 0.5), "clearance", "0 to 0.5");
   Require(this->patchSamples >= 6 && this->patchSamples <= 360, "patchSamples", "6 to 360");
   Require(between(this->patchSpacing, 0.1, 4.0), "patchSpacing", "0.1 to 4");
@@ -549,6 +556,54 @@ SweptSurface SweepVesselTree(
   const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
+  double reported = 0.0;
+  ProgressCallback rising;
+  if (progress)
+  {
+    rising = [&](double done)
+    {
+      reported = std::max(reported, done);
+      return progress(reported);
+    };
+  }
+  // Kinks that no tube of that width can follow are smoothed away, the more the worse they are.
+  SweepSettings smoother = settings;
+  std::string remark;
+  for (;;)
+  {
+    try
+    {
+      SweptSurface result = SweepOnce(tree, smoother, rising);
+      if (!remark.empty())
+      {
+        result.remarks.push_back(remark);
+      }
+      return result;
+    }
+    catch (const Cancelled&)
+    {
+      throw;
+    }
+    catch (const std::runtime_error& error)
+    {
+      if (smoother.smoothing >= GreatestSmoothing)
+      {
+        throw;
+      }
+      smoother.smoothing = std::clamp(2.0 * smoother.smoothing, 1.0, GreatestSmoothing);
+      std::ostringstream text;
+      text << error.what() << "; all axes smoothed over " << smoother.smoothing
+           << " radii for that reason";
+      remark = text.str();
+    }
+  }
+}
+
+namespace
+{
+SweptSurface SweepOnce(
+  const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
+{
   SweptSurface result;
   if (tree.branches.empty())
   {
@@ -723,5 +778,6 @@ SweptSurface SweepVesselTree(
   result.patches = MakePatches(lumen, settings);
   Report(progress, 1.0);
   return result;
+}
 }
 }

@@ -22,6 +22,10 @@ constexpr double LeastStraightness = 0.7;
 /// What being next in the input counts against straightness and even radii, when it is asked which
 /// vessel goes on where several leave.
 constexpr double FirstPreference = 0.1;
+/// A free end whose chord is shorter than this share of its length, within so many radii, is a
+/// hairpin.
+constexpr double HairpinRatio = 0.5;
+constexpr double HairpinReach = 6.0;
 /// A junction's arms are cut where other walls are a fillet's radius and this many radii away.
 constexpr double CutMargin = 0.45;
 /// Fillets end this many radii of the greater and of the smaller vessel away from the node, and
@@ -216,6 +220,15 @@ struct SweptLumen::Build
     }
     for (std::size_t b = 0; b < clean.size(); ++b)
     {
+      for (int side = 0; side < 2; ++side)
+      {
+        // Both ends, one after the other.
+        std::reverse(clean[b].begin(), clean[b].end());
+        if (degree[clean[b].front()] == 1)
+        {
+          this->TrimHairpin(clean[b], degree, this->input.branches[b].groupId);
+        }
+      }
       Link link;
       link.group = this->input.branches[b].groupId;
       for (std::size_t i = 0; i < clean[b].size(); ++i)
@@ -232,6 +245,51 @@ struct SweptLumen::Build
         this->links.push_back(link);
       }
     }
+  }
+
+  /// A free start that turns back inside its own tube, as a fastest path from a point at the wall
+  /// does, is left out up to the turn.
+  void TrimHairpin(
+    std::vector<std::int64_t>& list, const std::map<std::int64_t, int>& degree, int group)
+  {
+    std::size_t last = 0;
+    double arc = 0.0;
+    double widest = this->radius[list.front()];
+    const Vector3 start = this->points[list.front()];
+    for (std::size_t i = 1; i + 1 < list.size() && degree.at(list[i]) <= 2; ++i)
+    {
+      arc += (this->points[list[i]] - this->points[list[i - 1]]).norm();
+      widest = std::max(widest, this->radius[list[i]]);
+      if (arc > HairpinReach * widest)
+      {
+        break;
+      }
+      if (arc > 2.0 * widest && (this->points[list[i]] - start).norm() < HairpinRatio * arc &&
+        (this->points[list[i]] - start).norm() < 2.0 * widest)
+      {
+        last = i;
+      }
+    }
+    if (last == 0)
+    {
+      return;
+    }
+    std::size_t turn = 0;
+    double farthest = 0.0;
+    const Vector3 chord = (this->points[list[last]] - start).normalized();
+    for (std::size_t i = 1; i < last; ++i)
+    {
+      const Vector3 offset = this->points[list[i]] - start;
+      const double away = (offset - offset.dot(chord) * chord).norm();
+      if (away > farthest)
+      {
+        farthest = away;
+        turn = i;
+      }
+    }
+    self.RemarkList.push_back("group " + std::to_string(group) + " turns back inside itself at " +
+      Where(this->points[list[turn]]) + "; its end up to there is left out");
+    list.erase(list.begin(), list.begin() + static_cast<std::ptrdiff_t>(turn));
   }
 
   void Connect()

@@ -325,6 +325,40 @@ TEST(SweepSurface, FourDaughtersOfOnePoint)
   EXPECT_EQ(surface.caps.size(), 5U);
 }
 
+TEST(SweepSurface, HairpinAtAnEndIsLeftOut)
+{
+  // From the wall inwards, and back along the vessel.
+  SweepTree tree;
+  SweepBranch branch;
+  const auto add = [&](const Vector3& p)
+  {
+    branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
+    tree.points.push_back(p);
+    tree.radius.push_back(2.0);
+  };
+  for (int i = 0; i < 16; ++i)
+  {
+    add(Vector3(1.2, 0.0, 4.0 - 0.25 * i));
+  }
+  for (int i = 0; i < 80; ++i)
+  {
+    add(Vector3(0.0, 0.0, 0.25 * i));
+  }
+  tree.branches.push_back(branch);
+  const SweptSurface surface = SweepVesselTree(tree, {});
+  ExpectSound(surface, 1, "hairpin");
+  ASSERT_EQ(surface.remarks.size(), 1U);
+  EXPECT_NE(surface.remarks[0].find("turns back"), std::string::npos);
+}
+
+TEST(SweepSurface, KinkOfNinetyDegrees)
+{
+  SweepTree tree;
+  const std::int64_t corner = AddLine(tree, 0, -1, Vector3(0.0, 0.0, -12.0), Vector3::Zero(), 1.5);
+  AddLine(tree, 1, corner, Vector3::Zero(), Vector3(12.0, 0.0, 0.0), 1.5);
+  ExpectSound(SweepVesselTree(tree, {}), 1, "kink");
+}
+
 TEST(SweepSurface, NeighboursDoNotMerge)
 {
   // Half a millimetre between the walls, then less than nothing.
