@@ -26,6 +26,8 @@ tables=(
   "centerline-speed: centerline-benchmark --strict"
   "centerline: validate-centerline --details --invariance"
   "surface: validate-surface"
+  "volume: validate-volume"
+  "volume-cgal: validate-volume --backend CGAL --seeds 3 --variants plain"
 )
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"

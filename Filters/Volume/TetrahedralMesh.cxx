@@ -20,6 +20,10 @@ namespace
 {
 using Edge = std::pair<std::int64_t, std::int64_t>;
 
+/// A skeleton's point so far outside, in local radii, is put on the surface: ends of centerlines are
+/// not exactly on the caps.
+constexpr double endTolerance = 0.1;
+
 const char* WorkerName(TetrahedralBackend backend)
 {
   return backend == TetrahedralBackend::Cgal ? "coronary-cgal-worker" : "coronary-tetgen-worker";
@@ -521,8 +525,10 @@ private:
     };
     std::vector<Place> places(points.size());
     std::map<std::array<double, 3>, std::size_t> first;
-    std::vector<std::size_t> onWall;
+    std::vector<std::pair<std::size_t, Vector3>> onWall;
     std::size_t outside = 0;
+    std::size_t shifted = 0;
+    double shift = 0.0;
     for (std::size_t i = 0; i < points.size(); ++i)
     {
       const auto [same, isNew] = first.try_emplace({ points[i][0], points[i][1], points[i][2] }, i);
@@ -554,9 +560,10 @@ private:
       }
       if (nearest.distance <= 0.01 * radius)
       {
-        onWall.push_back(i);
+        onWall.emplace_back(i, p);
         continue;
       }
+      const int nearestPiece = places[i].piece;
       places[i].piece = -1;
       for (std::size_t k = 0; k < trees.size(); ++k)
       {
@@ -564,6 +571,14 @@ private:
         {
           places[i].piece = static_cast<int>(k);
         }
+      }
+      if (places[i].piece < 0 && nearest.distance <= endTolerance * radius)
+      {
+        ++shifted;
+        shift = std::max(shift, nearest.distance);
+        places[i].piece = nearestPiece;
+        onWall.emplace_back(i, nearest.point);
+        continue;
       }
       if (places[i].piece < 0)
       {
@@ -583,12 +598,12 @@ private:
       piece.skeletonPoint.push_back(static_cast<std::int64_t>(i));
     }
     // Inner points come after the surface's: insert into the surface, then renumber.
-    for (const std::size_t i : onWall)
+    for (const auto& [i, place] : onWall)
     {
       Piece& piece = this->Pieces[places[i].piece];
       const double radius = this->Input.skeletonRadius.empty() ? this->Radii->At(points[i])
                                                                : this->Input.skeletonRadius[i];
-      places[i].point = InsertIntoSurface(piece, points[i] - this->Origin, 0.01 * radius);
+      places[i].point = InsertIntoSurface(piece, place, 0.01 * radius);
       piece.skeletonPoint[places[i].point] = static_cast<std::int64_t>(i);
     }
     for (Place& place : places)
@@ -597,6 +612,12 @@ private:
       {
         place = places[place.point];
       }
+    }
+    if (shifted > 0)
+    {
+      this->Mesh.warnings.push_back(std::to_string(shifted) +
+        " skeleton points outside of the surface were put on it; none was farther than " +
+        Millimetres(shift));
     }
     if (outside > 0)
     {

@@ -99,7 +99,7 @@ bool HasTetrahedralBackend(TetrahedralBackend backend, const std::string& worker
  * improves the worst tetrahedra.
  *
  * Skeleton points within 1 % of the local radius of the surface become points of it (its triangles
- * are split there); edges that are much longer than what is around them are split.
+ * are split there), and so do points up to 10 % outside, with a warning; edges that are much longer than what is around them are split.
  *
  * @throws SurfaceError for a surface that is not closed, cuts itself, or lies within another one;
  *         std::invalid_argument for a setting, a skeleton point outside (its number and position),

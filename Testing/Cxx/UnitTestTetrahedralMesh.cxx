@@ -251,6 +251,21 @@ protected:
   }
 };
 
+class Cgal : public testing::Test
+{
+protected:
+  void SetUp() override
+  {
+    if (!coronary::HasTetrahedralBackend(TetrahedralBackend::Cgal))
+    {
+      GTEST_SKIP() << "built without CGAL";
+    }
+    this->Settings.backend = TetrahedralBackend::Cgal;
+  }
+
+  TetrahedralMeshSettings Settings;
+};
+
 /// A folder with a shell script in the place of TetGen's worker.
 class Impostor
 {
@@ -479,6 +494,64 @@ TEST_F(TetGen, RepairsASmallSelfIntersection)
   // What needs more than the limit stays an error.
   settings.repairLimit = 0.0001;
   EXPECT_SAYS(RefusalOf(sphere, settings), "the surface cuts itself");
+}
+
+TEST_F(Cgal, KeepsTheCenterlineOfATube)
+{
+  const TetrahedralMeshInput tube = Tube(1.5, 20.0, 24, 20);
+  const TetrahedralMesh mesh = MakeTetrahedralMesh(tube, this->Settings);
+  EXPECT_EQ(mesh.backend, TetrahedralBackend::Cgal);
+  EXPECT_GE(*std::min_element(mesh.minimumDihedral.begin(), mesh.minimumDihedral.end()),
+    5.0 * M_PI / 180.0);
+  EXPECT_GT(*std::min_element(mesh.volume.begin(), mesh.volume.end()), 1e-7);
+  const double volume = 20.0 * 12.0 * 1.5 * 1.5 * std::sin(2.0 * M_PI / 24.0);
+  EXPECT_NEAR(std::accumulate(mesh.volume.begin(), mesh.volume.end(), 0.0), volume, 0.02 * volume);
+  // Every point of the skeleton, to the last bit, and all of its length.
+  std::set<std::int64_t> found;
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+  {
+    EXPECT_EQ(mesh.surfacePoint[i], -1);
+    if (mesh.skeletonPoint[i] >= 0)
+    {
+      found.insert(mesh.skeletonPoint[i]);
+      EXPECT_EQ(mesh.points[i], tube.skeletonPoints[mesh.skeletonPoint[i]]);
+    }
+  }
+  EXPECT_EQ(found.size(), tube.skeletonPoints.size());
+  double length = 0.0;
+  for (const TetrahedralMesh::Edge& edge : mesh.skeletonEdges)
+  {
+    length += (mesh.points[edge.from] - mesh.points[edge.to]).norm();
+  }
+  EXPECT_NEAR(length, 20.0, 1e-6);
+  // Each boundary triangle has the nearest given one: those of the caps are on the caps.
+  ASSERT_EQ(mesh.boundary.size(), mesh.boundaryCell.size());
+  for (std::size_t i = 0; i < mesh.boundary.size(); ++i)
+  {
+    const auto height = [](const std::vector<Vector3>& points, const Triangle& t)
+    { return (points[t[0]][2] + points[t[1]][2] + points[t[2]][2]) / 3.0; };
+    EXPECT_NEAR(height(mesh.points, mesh.boundary[i]),
+      height(tube.points, tube.triangles[mesh.boundaryCell[i]]), 0.6);
+  }
+}
+
+TEST_F(TetGen, PutsEndsThatStickOutOntoTheCap)
+{
+  TetrahedralMeshInput tube = Tube(1.5, 20.0, 24, 10);
+  tube.skeletonPoints.front()[2] = -0.05;
+  tube.skeletonPoints.back()[2] = 20.03;
+  const TetrahedralMesh mesh = MakeTetrahedralMesh(tube);
+  ASSERT_EQ(mesh.warnings.size(), 1U);
+  EXPECT_SAYS(mesh.warnings[0], "2 skeleton points outside of the surface were put on it");
+  EXPECT_SAYS(mesh.warnings[0], "0.05 mm");
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+  {
+    if (mesh.skeletonPoint[i] == 0)
+    {
+      EXPECT_NEAR(mesh.points[i][2], 0.0, 1e-12);
+    }
+  }
+  EXPECT_EQ(std::count(mesh.skeletonPoint.begin(), mesh.skeletonPoint.end(), 0), 1);
 }
 
 TEST_F(TetGen, RefusesSkeletonPointsOutside)
