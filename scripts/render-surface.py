@@ -136,7 +136,7 @@ def main():
         common.add_surface(panel, surface, color=WALL)
         if truth:
             common.add_surface(panel, truth, color=TRUE, opacity=0.3)
-        common.look_at(panel, center, eye, up, 0.8 * size)
+        common.look_at(panel, center, eye, up, 0.95 * size)
     common.save(window, arguments.output, "surface.png")
 
     place, radius = bifurcation(surface, forks)
