@@ -25,6 +25,8 @@
 #include "vtkPolyData.h"
 #include "vtkReferencePhase.h"
 #include "vtkStringArray.h"
+#include "vtkTetrahedralMesher.h"
+#include "vtkUnstructuredGrid.h"
 #include "vtkVesselSegmentation.h"
 
 #include <nlohmann/json.hpp>
@@ -50,13 +52,15 @@ enum class Stage
   Vesselness,
   Segmentation,
   Centerline,
-  Surface
+  Surface,
+  Volume
 };
 const std::vector<std::pair<std::string, Stage>> Stages = {
   { "vesselness", Stage::Vesselness },
   { "segmentation", Stage::Segmentation },
   { "centerline", Stage::Centerline },
   { "surface", Stage::Surface },
+  { "volume", Stage::Volume },
 };
 
 struct RunJob
@@ -110,8 +114,8 @@ void RunJob::Declare(CLI::App& app)
           }
         }
       },
-      "Last stage: vesselness, segmentation, centerline (the default) or surface")
-    ->check(CLI::IsMember({ "vesselness", "segmentation", "centerline", "surface" }))
+      "Last stage: vesselness, segmentation, centerline (the default), surface or volume")
+    ->check(CLI::IsMember({ "vesselness", "segmentation", "centerline", "surface", "volume" }))
     ->type_name("STAGE");
 
   const std::string image = "Image";
@@ -340,6 +344,10 @@ void RunJob::Run()
   {
     throw UsageError("--edges: the first must not be above the second");
   }
+  if (this->openEnds && this->until >= Stage::Volume)
+  {
+    throw UsageError("--open-ends: tetrahedra need a closed surface");
+  }
   if (this->seeds.size() % 3 != 0)
   {
     throw UsageError("--seed: three coordinates are needed for each point");
@@ -373,7 +381,14 @@ void RunJob::Run()
     const bool segment = this->until >= Stage::Segmentation;
     const bool trace = this->until >= Stage::Centerline;
     const bool mesh = this->until >= Stage::Surface;
-    ProgressDisplay progress("stage", mesh ? 5 : trace ? 4 : segment ? 3 : 2, this->quiet);
+    const bool fill = this->until >= Stage::Volume;
+    ProgressDisplay progress("stage",
+      fill        ? 6
+        : mesh    ? 5
+        : trace   ? 4
+        : segment ? 3
+                  : 2,
+      this->quiet);
     const auto update = [&](vtkAlgorithm* algorithm)
     {
       UpdateAtTime(
@@ -528,6 +543,31 @@ void RunJob::Run()
             { "points", surface->GetNumberOfPoints() },
             { "caps", sweep->GetCaps()->GetNumberOfPoints() } };
           summary += "; " + std::to_string(surface->GetNumberOfPolys()) + " triangles";
+
+          if (fill)
+          {
+            progress.BeginStep(5, "volume");
+            vtkNew<vtkTetrahedralMesher> mesher;
+            mesher->SetInputConnection(sweep->GetOutputPort());
+            mesher->SetSkeletonConnection(topology->GetOutputPort());
+            // Where the wall was smoothed, the line may leave it.
+            mesher->LeaveOutsideOn();
+            update(mesher);
+            vtkUnstructuredGrid* volume = mesher->GetOutput();
+            WriteUnstructuredGrid(folder.Add("volume.vtu"), volume, messages);
+            WritePolyData(folder.Add("volume_boundary.vtp"), mesher->GetBoundary(), messages);
+            WritePolyData(folder.Add("volume_skeleton.vtp"), mesher->GetEdges(), messages);
+            report["volume"] = { { "file", "volume.vtu" },
+              { "boundary_file", "volume_boundary.vtp" },
+              { "skeleton_file", "volume_skeleton.vtp" },
+              { "tetrahedra", volume->GetNumberOfCells() },
+              { "points", volume->GetNumberOfPoints() },
+              { "least_dihedral_angle_rad",
+                Numbers(volume, vtkCoronaryArrayNames::LeastDihedralAngle) },
+              { "total_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::TotalVolume) },
+              { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) } };
+            summary += "; " + std::to_string(volume->GetNumberOfCells()) + " tetrahedra";
+          }
         }
       }
     }
@@ -555,7 +595,8 @@ Command MakeRunCommand(CLI::App& program)
     "run", "From a gated image series to the coronary arteries, stage by stage");
   app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, centerline.vtp, "
               "bifurcations.vtp, centerline_lines.vtp, status.csv; with --until surface, "
-              "surface.vtp and caps.vtp; and, last, report.json.");
+              "surface.vtp and caps.vtp; with --until volume, volume.vtu, volume_boundary.vtp "
+              "and volume_skeleton.vtp; and, last, report.json.");
   auto job = std::make_shared<RunJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

@@ -6,8 +6,11 @@
 
 #include "vtkNew.h"
 #include "vtkPolyData.h"
+#include "vtkUnstructuredGrid.h"
 #include "vtkXMLPolyDataReader.h"
 #include "vtkXMLPolyDataWriter.h"
+#include "vtkXMLUnstructuredDataWriter.h"
+#include "vtkXMLUnstructuredGridWriter.h"
 
 #include <fstream>
 #include <iterator>
@@ -42,10 +45,12 @@ vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTra
   return reader->GetOutput();
 }
 
-void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& messages)
+namespace
+{
+void WriteXml(const std::string& path, vtkXMLUnstructuredDataWriter* writer, vtkDataSet* data,
+  vtkMessageTrap& messages)
 {
   // Into memory first: VTK's writer does not notice when the last bytes find no room on the disk.
-  vtkNew<vtkXMLPolyDataWriter> writer;
   writer->SetInputData(data);
   writer->WriteToOutputStringOn();
   // Not appended: with expat's reparse deferral (in Debian 12's since a security update) neither
@@ -58,5 +63,19 @@ void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& m
     throw std::runtime_error("Cannot write '" + path + "'.");
   }
   WriteFileAtomically(path, writer->GetOutputString());
+}
+}
+
+void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& messages)
+{
+  vtkNew<vtkXMLPolyDataWriter> writer;
+  WriteXml(path, writer, data, messages);
+}
+
+void WriteUnstructuredGrid(
+  const std::string& path, vtkUnstructuredGrid* data, vtkMessageTrap& messages)
+{
+  vtkNew<vtkXMLUnstructuredGridWriter> writer;
+  WriteXml(path, writer, data, messages);
 }
 }

@@ -11,6 +11,7 @@
 
 class vtkMessageTrap;
 class vtkPolyData;
+class vtkUnstructuredGrid;
 
 namespace coronary
 {
@@ -21,6 +22,11 @@ vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTra
 /// Writes a .vtp file, atomically.
 /// @throws std::runtime_error naming the file
 void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& messages);
+
+/// Writes a .vtu file, atomically.
+/// @throws std::runtime_error naming the file
+void WriteUnstructuredGrid(
+  const std::string& path, vtkUnstructuredGrid* data, vtkMessageTrap& messages);
 }
 
 #endif
