@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # From nothing to named coronary trees: installs, builds, makes a gated CT series of the phantom with
 # its truth, finds and segments the coronary arteries in its quietest phase, traces their
-# centerlines, makes their surface, and renders pictures.
+# centerlines, makes their surface and tetrahedra in it, and renders pictures.
 # Everything lands in build/ and demo-output/.
 set -euo pipefail
 
@@ -70,7 +70,7 @@ echo "== Its motion beside published values"
 "$pipeline" phantom-motion --seed 1 | tee "$output/phantom-motion.txt"
 
 echo "== From the images to the coronary arteries"
-"$pipeline" run "$output/phantom/series.json" --until surface --output "$output/run"
+"$pipeline" run "$output/phantom/series.json" --until volume --output "$output/run"
 
 if [ "$pictures" = yes ]; then
   echo "== Pictures"
@@ -91,6 +91,8 @@ if [ "$pictures" = yes ]; then
   HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
     pvpython scripts/render-surface.py "$output/run" --truth "$truth" \
     --output "$output/pictures"
+  HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
+    pvpython scripts/render-volume.py "$output/run" --output "$output/pictures"
 fi
 
 plugin="$(find "$root/build/paraview" -name DynamicCoronaryPlugin.so -print -quit)"
@@ -105,7 +107,8 @@ What lies where
   $output/phantom/truth/              surface, centerlines and vein of every phase (.vtp, .pvd)
   $output/run/                        vesselness, mask of the arteries, ostia, aorta and the
                                       named trees of centerlines at the quietest phase, their
-                                      closed surface with its caps; status.csv
+                                      closed surface with its caps, and tetrahedra
+                                      with the skeleton inside; status.csv
                                       and report.json says how they came about
   $output/phantom-motion.txt          amplitudes, speeds and rest windows per artery
 EOF

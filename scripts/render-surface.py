@@ -105,6 +105,30 @@ def passing():
                   ([(0.5 * s, 0.87 * s, 3.0) for s in steps], [1.0] * 81)])
 
 
+def built_plugin():
+    found = glob.glob(os.path.join(here, "..", "build", "paraview", "**",
+                                   "DynamicCoronaryPlugin.so"), recursive=True)
+    if not found:
+        common.fail("no plugin in build/paraview; name it with --plugin")
+    return found[0]
+
+
+def close_ups(title, shots, add):
+    """A window of four panels; a shot: name, what `add` puts into it, place, eye, scale."""
+    window, base = common.new_window()
+    across, height = common.SIZE
+    common.add_text(base, title, 20, height - 42, 26, bold=True)
+    for n, (name, mesh, where, eye, scale) in enumerate(shots):
+        left, low = n % 2, 1 - n // 2
+        tall = 0.5 * (height - views.TITLE)
+        panel = common.add_panel(window, left * across / 2.0 + 2, low * tall + 2,
+                                 (left + 1) * across / 2.0 - 2, (low + 1) * tall - 2)
+        add(panel, mesh)
+        common.add_text(panel, name, 16, 16)
+        common.look_at(panel, where, eye, (0.0, 0.1, 1.0) if abs(eye[2]) < 0.8 else (0, 1, 0), scale)
+    return window
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("input", help="folder that coronary-pipeline run wrote")
@@ -117,13 +141,7 @@ def main():
     forks = common.read_poly(os.path.join(arguments.input, "bifurcations.vtp"))
     if surface.GetNumberOfPolys() == 0 or caps.GetNumberOfPoints() == 0:
         common.fail("%s has no surface" % arguments.input)
-    plugin = arguments.plugin
-    if not plugin:
-        found = glob.glob(os.path.join(here, "..", "build", "paraview", "**",
-                                       "DynamicCoronaryPlugin.so"), recursive=True)
-        if not found:
-            common.fail("no plugin in build/paraview; name it with --plugin")
-        plugin = found[0]
+    plugin = arguments.plugin or built_plugin()
     os.makedirs(arguments.output, exist_ok=True)
 
     bounds = surface.GetBounds()
@@ -150,17 +168,7 @@ def main():
         ("stenosis", swept(plugin, stenosis()), (10.0, 0.36, 0.0), (0.15, -0.2, 1.0), 3.6),
         ("two vessels at 0.5 mm", swept(plugin, passing()), (0.0, 0.0, 1.3), (-0.3, -0.95, 0.05), 3.0),
     ]
-    window, base = common.new_window()
-    across, height = common.SIZE
-    common.add_text(base, "Triangles: wall red, caps yellow", 20, height - 42, 26, bold=True)
-    for n, (name, mesh, where, eye, scale) in enumerate(shots):
-        left, low = n % 2, 1 - n // 2
-        tall = 0.5 * (height - views.TITLE)
-        panel = common.add_panel(window, left * across / 2.0 + 2, low * tall + 2,
-                                 (left + 1) * across / 2.0 - 2, (low + 1) * tall - 2)
-        common.add_text(panel, name, 16, 16)
-        add_triangles(panel, mesh)
-        common.look_at(panel, where, eye, (0.0, 0.1, 1.0) if abs(eye[2]) < 0.8 else (0, 1, 0), scale)
+    window = close_ups("Triangles: wall red, caps yellow", shots, add_triangles)
     common.save(window, arguments.output, "surface_mesh.png")
 
 

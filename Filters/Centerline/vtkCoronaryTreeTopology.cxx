@@ -27,7 +27,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <new>
 #include <stdexcept>
 
@@ -39,7 +38,8 @@ vtkStandardNewMacro(vtkCoronaryTreeTopology);
 
 namespace
 {
-constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+// Not NaN, which VTK writes into XML files so that its reader complains.
+constexpr double NoDaughter = -1.0;
 
 /// As many daughters as the arrays of a bifurcation have room for at least.
 constexpr int LeastDaughters = 3;
@@ -216,9 +216,11 @@ public:
       OfBifurcations(
         tree, [&](const Bifurcation& b) { return tree.branches[b.parent].segmentId; }));
     AddRows<vtkDoubleArray>(data, names::DaughterAngles,
-      OfBifurcations(tree, [](const Bifurcation& b) { return b.daughterAngles; }), width, NaN);
+      OfBifurcations(tree, [](const Bifurcation& b) { return b.daughterAngles; }), width,
+      NoDaughter);
     AddRows<vtkDoubleArray>(data, names::DaughterRadii,
-      OfBifurcations(tree, [](const Bifurcation& b) { return b.daughterRadius; }), width, NaN);
+      OfBifurcations(tree, [](const Bifurcation& b) { return b.daughterRadius; }), width,
+      NoDaughter);
     const auto numbers = [&](const char* name, double Bifurcation::*member)
     {
       vtkCoronary::AddArray<vtkDoubleArray>(

@@ -39,7 +39,7 @@
  *   `AreaRatio` (sum of daughters over parent), `DaughterAreaRatio` (second over widest),
  *   `MurrayExponent` x, `MurrayResidual` (r_p^x - sum r_d^x) / r_p^x (Eq. 3 of the paper: x = 3),
  *   `HuoKassabResidual` (x = 7/3), `FinetRatio` r_p / (r_1 + r_2), `FittedExponent` (the x without
- *   residual, NaN where there is none). In doubles[n] a missing daughter is NaN.
+ *   residual, NaN where there is none). In doubles[n] a missing daughter is -1.
  * - 2, vtkPolyData: the loops that were found, as closed polylines with cell data `Length`.
  *
  * Field data of outputs 0 and 1: that of the input, `PrunedTwigs`, `ClosedGaps` (int),

@@ -369,9 +369,13 @@ check_run() {
   if [ ! -s mask/mask.mha ] || [ -e mask/centerline.vtp ]; then
     fail "--until segmentation wrote $(ls mask)"
   fi
-  run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --threads 1 --output beyond
-  run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --threads 2 --output beyond2
+  run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --threads 1 --until volume --edges 0.4 0.8 --output beyond
+  run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --threads 2 --until volume --edges 0.4 0.8 --output beyond2
   diff -r beyond beyond2 || fail "another number of threads gave other files"
+  for file in surface.vtp caps.vtp volume.vtu volume_boundary.vtp volume_skeleton.vtp; do
+    [ -s "beyond/$file" ] || fail "no $file"
+  done
+  grep -q '"tetrahedra": [0-9]\{5,\}' beyond/report.json || fail "few tetrahedra: $(cat beyond/report.json)"
 
   run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced
   if [ -s stdout ] || [ -s stderr ]; then
