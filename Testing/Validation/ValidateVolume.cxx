@@ -1,9 +1,10 @@
-// Tetrahedral meshes of the phantoms' true surfaces with their true centerlines inside, and of foreign
-// surfaces after cleaning. Tables in Markdown on stdout; the exit code is 1 when a limit is missed.
+// Tetrahedral meshes of surfaces swept along the phantoms' true trees, or of the phantoms' true
+// surfaces, with the true centerlines inside, and of foreign surfaces after cleaning. Tables in Markdown on stdout; the exit code is 1 when a limit is missed.
 
 #include "AppendedXmlData.h"
 #include "CoronaryPhantom.h"
 #include "SurfaceCleaning.h"
+#include "SweepSurface.h"
 #include "TetrahedralMesh.h"
 
 #include "vtkCellArray.h"
@@ -16,13 +17,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <sys/resource.h>
@@ -87,7 +91,8 @@ void Measure(const TetrahedralMeshInput& input, const TetrahedralMesh& mesh, Out
   outcome.tetrahedra = mesh.tetrahedra.size();
   outcome.tries = mesh.tries;
   outcome.leastAngle = 180.0;
-  outcome.leastVolume = 1e300;
+  outcome.leastVolume = std::numeric_limits<double>::infinity();
+  Vector3 where = Vector3::Zero();
   std::size_t poor = 0;
   for (const Tetrahedron& t : mesh.tetrahedra)
   {
@@ -98,11 +103,21 @@ void Measure(const TetrahedralMeshInput& input, const TetrahedralMesh& mesh, Out
     const double volume = TetrahedronVolume(a, b, c, d);
     const double angle = MinimumDihedralAngle(a, b, c, d) * 180.0 / M_PI;
     outcome.leastVolume = std::min(outcome.leastVolume, volume);
-    outcome.leastAngle = std::min(outcome.leastAngle, angle);
+    if (angle < outcome.leastAngle)
+    {
+      outcome.leastAngle = angle;
+      where = (a + b + c + d) / 4.0;
+    }
     outcome.inverted += volume <= 0.0 ? 1 : 0;
     poor += angle < PoorAngle ? 1 : 0;
   }
   outcome.poorShare = static_cast<double>(poor) / static_cast<double>(mesh.tetrahedra.size());
+  std::fprintf(stderr, "%s: flattest at (%.3f, %.3f, %.3f), %.2f degrees\n", outcome.name.c_str(),
+    where[0], where[1], where[2], outcome.leastAngle);
+  for (const std::string& warning : mesh.warnings)
+  {
+    std::fprintf(stderr, "  %s\n", warning.c_str());
+  }
   std::set<std::array<double, 3>> places;
   for (const auto& [a, b] : input.skeletonEdges)
   {
@@ -144,7 +159,8 @@ Outcome Mesh(const std::string& name, const TetrahedralMeshInput& input,
   return outcome;
 }
 
-TetrahedralMeshInput PhantomInput(std::uint64_t seed, bool varied, double spacing)
+/// Fed to the mesher: what the pipeline makes from the phantom's tree, or the phantom's own wall.
+TetrahedralMeshInput PhantomInput(std::uint64_t seed, bool varied, bool swept, double spacing)
 {
   PhantomSettings settings;
   settings.seed = seed;
@@ -160,11 +176,27 @@ TetrahedralMeshInput PhantomInput(std::uint64_t seed, bool varied, double spacin
     moment = 0.05 * static_cast<double>(seed % 20);
   }
   const CoronaryPhantom phantom(settings);
-  const PhantomSurface surface = phantom.Surface(moment);
   const PhantomTree tree = phantom.Tree(moment);
   TetrahedralMeshInput input;
-  input.points = surface.points;
-  input.triangles = surface.triangles;
+  if (swept)
+  {
+    SweepTree axes;
+    axes.points = tree.points;
+    axes.radius = tree.radius;
+    for (const PhantomBranch& branch : tree.branches)
+    {
+      axes.branches.push_back({ branch.points, branch.groupId });
+    }
+    SweptSurface surface = SweepVesselTree(axes, {});
+    input.points = std::move(surface.points);
+    input.triangles = std::move(surface.triangles);
+  }
+  else
+  {
+    PhantomSurface surface = phantom.Surface(moment);
+    input.points = std::move(surface.points);
+    input.triangles = std::move(surface.triangles);
+  }
   input.skeletonPoints = tree.points;
   input.skeletonRadius = tree.radius;
   for (const PhantomBranch& branch : tree.branches)
@@ -205,6 +237,27 @@ TetrahedralMeshInput ReadSurface(const std::string& name)
   return input;
 }
 
+/// "20" (1 to 20) or "3..7"
+std::vector<std::uint64_t> ParseSeeds(const std::string& text)
+{
+  unsigned long long first = 1;
+  unsigned long long last = 0;
+  int used = 0;
+  const bool range = text.find("..") != std::string::npos;
+  const int found = range ? std::sscanf(text.c_str(), "%6llu..%6llu%n", &first, &last, &used)
+                          : std::sscanf(text.c_str(), "%6llu%n", &last, &used);
+  if (found != (range ? 2 : 1) || used != static_cast<int>(text.size()) || last < first)
+  {
+    throw CLI::ValidationError("seeds", "'" + text + "' is neither a count nor first..last");
+  }
+  std::vector<std::uint64_t> seeds;
+  for (unsigned long long seed = first; seed <= last; ++seed)
+  {
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
 bool Print(const Outcome& outcome, bool timed)
 {
   const bool reached = outcome.Reached(timed);
@@ -227,17 +280,24 @@ bool Print(const Outcome& outcome, bool timed)
 int main(int argc, char** argv)
 {
   CLI::App program{
-    "Tetrahedral meshes of the phantoms' true surfaces with their centerlines inside, and "
-    "of a foreign surface, against limits of shape and time"
+    "Tetrahedral meshes of the phantoms' surfaces with their centerlines inside, and of a foreign "
+    "surface, against limits of shape and time"
   };
-  int seeds = 20;
+  std::string seedText = "1..20";
+  std::string kind = "swept";
   std::vector<std::string> variants = { "plain", "varied" };
   double spacing = 0.35;
+  bool phantomsOnly = false;
   std::string backend = "TetGen";
   std::string data = DYNAMICCORONARY_DATA_DIR;
   bool quick = false;
-  program.add_option("--seeds", seeds, "phantoms 1 to this")
-    ->check(CLI::Range(0, 1000))
+  program.add_option("--seeds", seedText, "phantoms: a count or first..last")
+    ->capture_default_str();
+  program
+    .add_option("--surface", kind,
+      "swept: made from the phantom's true tree, as the pipeline does; truth: the phantom's own "
+      "wall")
+    ->check(CLI::IsMember({ "swept", "truth" }))
     ->capture_default_str();
   program
     .add_option("--variants", variants,
@@ -245,19 +305,29 @@ int main(int argc, char** argv)
       "tortuosity, calibre and moment change with the seed")
     ->check(CLI::IsMember({ "plain", "varied" }))
     ->capture_default_str();
-  program.add_option("--spacing", spacing, "edge length of the surface, mm")->capture_default_str();
+  program.add_option("--spacing", spacing, "edge length of the phantom's own wall, mm")
+    ->capture_default_str();
   program.add_option("--backend", backend, "who meshes")
     ->check(CLI::IsMember({ "TetGen", "CGAL" }))
     ->capture_default_str();
   program.add_option("--data", data, "folder with hra-coronaries/F_coronary_arteries.vtp")
     ->capture_default_str();
-  program.add_flag("--quick", quick, "one phantom with coarse triangles");
-  CLI11_PARSE(program, argc, argv);
-  if (quick)
+  program.add_flag("--phantoms-only", phantomsOnly, "without the foreign surface");
+  program.add_flag("--quick", quick, "one phantom");
+  std::vector<std::uint64_t> seeds;
+  try
   {
-    seeds = 1;
-    spacing = 0.7;
-    variants = { "plain" };
+    program.parse(argc, argv);
+    if (quick)
+    {
+      seedText = "3..3";
+      variants = { "plain" };
+    }
+    seeds = ParseSeeds(seedText);
+  }
+  catch (const CLI::ParseError& error)
+  {
+    return program.exit(error);
   }
   TetrahedralMeshSettings settings;
   settings.backend = backend == "CGAL" ? TetrahedralBackend::Cgal : TetrahedralBackend::TetGen;
@@ -282,14 +352,24 @@ int main(int argc, char** argv)
   int missed = 0;
   for (const std::string& variant : variants)
   {
-    for (int seed = 1; seed <= seeds; ++seed)
+    for (const std::uint64_t seed : seeds)
     {
-      const Outcome outcome = Mesh(variant + " " + std::to_string(seed),
-        PhantomInput(static_cast<std::uint64_t>(seed), variant == "varied", spacing), settings);
+      const std::string name = variant + " " + std::to_string(seed);
+      Outcome outcome;
+      try
+      {
+        outcome =
+          Mesh(name, PhantomInput(seed, variant == "varied", kind == "swept", spacing), settings);
+      }
+      catch (const std::exception& error)
+      {
+        outcome.name = name;
+        outcome.failure = error.what();
+      }
       missed += Print(outcome, timed) ? 0 : 1;
     }
   }
-  if (!quick)
+  if (!quick && !phantomsOnly)
   {
     TetrahedralMeshInput input = ReadSurface(data + "/hra-coronaries/F_coronary_arteries.vtp");
     if (input.triangles.empty())
