@@ -23,6 +23,11 @@ using Edge = std::pair<std::int64_t, std::int64_t>;
 /// A skeleton's point so far outside, in local radii, is put on the surface: ends of centerlines are
 /// not exactly on the caps.
 constexpr double endTolerance = 0.1;
+/// An end so far below the wall, in edge lengths of it, is put on it too: the tetrahedra between would
+/// be flat, and refinement does not help where the wall has to stay.
+constexpr double endDepth = 0.1;
+/// When a flatter tetrahedron is left, it is tried once more; radians (5 degrees).
+constexpr double flatAngle = 0.0873;
 
 const char* WorkerName(TetrahedralBackend backend)
 {
@@ -114,8 +119,12 @@ double Sized(const Piece& piece, std::int64_t a, std::int64_t b)
   return (piece.points[a] - piece.points[b]).norm();
 }
 
-/// Puts a point into the surface where it is nearest; returns the point's number.
-std::int64_t InsertIntoSurface(Piece& piece, const Vector3& p, double tolerance)
+/**
+ * Puts a point into the surface where it is nearest; returns the point's number.
+ * @param tolerance  how far the surface may move, mm
+ * @param reach      how far the point may move to one of the surface's, mm
+ */
+std::int64_t InsertIntoSurface(Piece& piece, const Vector3& p, double tolerance, double reach)
 {
   std::int64_t nearest = 0;
   double best = std::numeric_limits<double>::infinity();
@@ -142,16 +151,20 @@ std::int64_t InsertIntoSurface(Piece& piece, const Vector3& p, double tolerance)
   for (const std::int64_t corner : found)
   {
     const double distance = (piece.points[corner] - p).norm();
-    if (distance <= tolerance && piece.skeletonPoint[corner] < 0)
-    {
-      return corner;
-    }
-    if (distance > 0.25 * longest || piece.skeletonPoint[corner] >= 0)
+    if (piece.skeletonPoint[corner] >= 0)
     {
       continue;
     }
-    // In the middle of a plane part, as a cap, the point can be shifted and the surface is the same.
-    const Vector3 plane = normal(found).normalized();
+    if (distance <= tolerance)
+    {
+      return corner;
+    }
+    if (distance > 0.25 * longest)
+    {
+      continue;
+    }
+    // In the middle of a plane part, as a cap, the point can be shifted and the surface is the same,
+    // or changes by less than the tolerance.
     bool movable = true;
     const Vector3 before = piece.points[corner];
     for (const Triangle& t : piece.triangles)
@@ -160,7 +173,9 @@ std::int64_t InsertIntoSurface(Piece& piece, const Vector3& p, double tolerance)
       {
         continue;
       }
-      movable = movable && normal(t).normalized().dot(plane) > 1.0 - 1e-8;
+      const Vector3 plane = normal(t).normalized();
+      movable = movable && std::abs(plane.dot(p - before)) <= tolerance &&
+        plane.dot(normal(found).normalized()) > 0.9;
       if (movable)
       {
         const double area = normal(t).norm();
@@ -172,6 +187,14 @@ std::int64_t InsertIntoSurface(Piece& piece, const Vector3& p, double tolerance)
     if (movable)
     {
       piece.points[corner] = p;
+      return corner;
+    }
+  }
+  for (const std::int64_t corner : found)
+  {
+    if (piece.skeletonPoint[corner] < 0 &&
+      (piece.points[corner] - p).norm() <= std::min(reach, 0.1 * longest))
+    {
       return corner;
     }
   }
@@ -301,11 +324,175 @@ public:
       answers = this->RunBackend(Part(this->Progress, 0.4, 0.7));
     }
     this->Assemble(answers);
+    this->TryAgainWhenFlat();
+    this->CheckVolumes();
     Report(this->Progress, 1.0);
     return std::move(this->Mesh);
   }
 
 private:
+  /// The retry when a tetrahedron stayed flat: the surface beside it moves within the repair limit.
+  void TryAgainWhenFlat()
+  {
+    if (!this->Settings.improve || this->LeastAngle() >= flatAngle)
+    {
+      return;
+    }
+    const std::vector<std::int64_t> cells = this->SurfaceBesideFlat();
+    if (this->Settings.repair && this->Mesh.tries == 1 && !cells.empty())
+    {
+      const double before = this->LeastAngle();
+      TetrahedralMesh first = std::move(this->Mesh);
+      this->Mesh = {};
+      this->Mesh.backend = first.backend;
+      this->Mesh.warnings = this->Surface.warnings;
+      bool better = false;
+      try
+      {
+        if (HasInnerSkeleton(first) ? this->Lift(cells) : this->Repair(cells))
+        {
+          this->MakePieces();
+          this->Assemble(this->RunBackend({}));
+          better = this->LeastAngle() > before;
+        }
+      }
+      catch (const MesherFailure&)
+      {
+        better = false;
+      }
+      catch (const std::invalid_argument&)
+      {
+        better = false; // the skeleton leaves the surface that was moved
+      }
+      if (!better)
+      {
+        this->Mesh = std::move(first);
+      }
+    }
+    const auto flattest =
+      std::min_element(this->Mesh.minimumDihedral.begin(), this->Mesh.minimumDihedral.end());
+    if (*flattest < flatAngle)
+    {
+      const Tetrahedron& t = this->Mesh.tetrahedra[flattest - this->Mesh.minimumDihedral.begin()];
+      char text[160];
+      std::snprintf(text, sizeof text,
+        "a flat tetrahedron is left at %s: least dihedral angle %.3g degrees",
+        Describe(this->Mesh.points[t[0]]).c_str(), *flattest * 180.0 / M_PI);
+      this->Mesh.warnings.emplace_back(text);
+    }
+  }
+
+  /// Whether a flat tetrahedron has a point of the skeleton that is not on the surface.
+  static bool HasInnerSkeleton(const TetrahedralMesh& mesh)
+  {
+    std::vector<char> onSurface(mesh.points.size(), 0);
+    for (const Triangle& t : mesh.boundary)
+    {
+      for (const std::int64_t corner : t)
+      {
+        onSurface[corner] = 1;
+      }
+    }
+    for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i)
+    {
+      for (const std::int64_t point : mesh.tetrahedra[i])
+      {
+        if (mesh.minimumDihedral[i] < flatAngle && onSurface[point] == 0 &&
+          mesh.skeletonPoint[point] >= 0)
+        {
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  /**
+   * Moves the triangles' points outwards, away from a skeleton that grazes the wall: who is more than
+   * 1 % of the radius below it is at twice that depth then. False when triangles would cut each other.
+   */
+  bool Lift(const std::vector<std::int64_t>& cells)
+  {
+    this->Mesh.tries = 2;
+    std::vector<Vector3>& points = this->Surface.points;
+    const std::vector<Vector3> before = points;
+    std::vector<char> moves(points.size(), 0);
+    for (const std::int64_t cell : cells)
+    {
+      for (const std::int64_t corner : this->Surface.triangles[cell])
+      {
+        moves[corner] = 1;
+      }
+    }
+    std::vector<Vector3> normals(points.size(), Vector3::Zero());
+    for (const Triangle& t : this->Surface.triangles)
+    {
+      const Vector3 normal = (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]);
+      for (const std::int64_t corner : t)
+      {
+        normals[corner] += normal;
+      }
+    }
+    for (std::size_t i = 0; i < points.size(); ++i)
+    {
+      if (moves[i] != 0)
+      {
+        const double distance = 0.99 * this->Settings.repairLimit * this->Radii->At(before[i]);
+        points[i] += distance * normals[i].normalized();
+      }
+    }
+    if (!FindSelfIntersections(points, this->Surface.triangles).empty())
+    {
+      points = before;
+      return false;
+    }
+    this->SayRepaired(before);
+    return true;
+  }
+
+  void SayRepaired(const std::vector<Vector3>& before)
+  {
+    double greatest = 0.0;
+    for (std::size_t i = 0; i < before.size(); ++i)
+    {
+      greatest = std::max(greatest, (this->Surface.points[i] - before[i]).norm());
+    }
+    this->Mesh.repairDisplacement = greatest;
+    this->Mesh.warnings.push_back(
+      "the surface was repaired; no point moved farther than " + Millimetres(greatest));
+  }
+
+  double LeastAngle() const
+  {
+    return *std::min_element(this->Mesh.minimumDihedral.begin(), this->Mesh.minimumDihedral.end());
+  }
+
+  /// Triangles of the surface that have a point of a flat tetrahedron.
+  std::vector<std::int64_t> SurfaceBesideFlat() const
+  {
+    std::vector<char> flat(this->Mesh.points.size(), 0);
+    for (std::size_t i = 0; i < this->Mesh.tetrahedra.size(); ++i)
+    {
+      if (this->Mesh.minimumDihedral[i] < flatAngle)
+      {
+        for (const std::int64_t point : this->Mesh.tetrahedra[i])
+        {
+          flat[point] = 1;
+        }
+      }
+    }
+    std::vector<std::int64_t> cells;
+    for (std::size_t i = 0; i < this->Mesh.boundary.size(); ++i)
+    {
+      const Triangle& t = this->Mesh.boundary[i];
+      if (flat[t[0]] != 0 || flat[t[1]] != 0 || flat[t[2]] != 0)
+      {
+        cells.push_back(this->Mesh.boundaryCell[i]);
+      }
+    }
+    return cells;
+  }
+
   void CheckSkeletonLists() const
   {
     const auto count = static_cast<std::int64_t>(this->Input.skeletonPoints.size());
@@ -396,7 +583,6 @@ private:
         }
       }
     }
-    double greatest = 0.0;
     bool clean = false;
     for (int round = 0; round < 30 && !clean; ++round)
     {
@@ -445,13 +631,7 @@ private:
       points = before;
       return false;
     }
-    for (std::size_t i = 0; i < points.size(); ++i)
-    {
-      greatest = std::max(greatest, (points[i] - before[i]).norm());
-    }
-    this->Mesh.repairDisplacement = greatest;
-    this->Mesh.warnings.push_back(
-      "the surface was repaired; no point moved farther than " + Millimetres(greatest));
+    this->SayRepaired(before);
     return true;
   }
 
@@ -527,8 +707,7 @@ private:
     std::map<std::array<double, 3>, std::size_t> first;
     std::vector<std::pair<std::size_t, Vector3>> onWall;
     std::size_t outside = 0;
-    std::size_t shifted = 0;
-    double shift = 0.0;
+    const std::vector<char> isEnd = this->SkeletonEnds();
     for (std::size_t i = 0; i < points.size(); ++i)
     {
       const auto [same, isNew] = first.try_emplace({ points[i][0], points[i][1], points[i][2] }, i);
@@ -563,6 +742,12 @@ private:
         onWall.emplace_back(i, p);
         continue;
       }
+      if (isEnd[i] != 0 && nearest.distance <= endTolerance * radius &&
+        nearest.distance <= endDepth * LongestSide(this->Pieces[places[i].piece], nearest.triangle))
+      {
+        onWall.emplace_back(i, nearest.point);
+        continue;
+      }
       const int nearestPiece = places[i].piece;
       places[i].piece = -1;
       for (std::size_t k = 0; k < trees.size(); ++k)
@@ -574,8 +759,6 @@ private:
       }
       if (places[i].piece < 0 && nearest.distance <= endTolerance * radius)
       {
-        ++shifted;
-        shift = std::max(shift, nearest.distance);
         places[i].piece = nearestPiece;
         onWall.emplace_back(i, nearest.point);
         continue;
@@ -597,14 +780,22 @@ private:
       piece.surfacePoint.push_back(-1);
       piece.skeletonPoint.push_back(static_cast<std::int64_t>(i));
     }
-    // Inner points come after the surface's: insert into the surface, then renumber.
+    std::size_t shifted = 0;
+    double shift = 0.0;
     for (const auto& [i, place] : onWall)
     {
       Piece& piece = this->Pieces[places[i].piece];
       const double radius = this->Input.skeletonRadius.empty() ? this->Radii->At(points[i])
                                                                : this->Input.skeletonRadius[i];
-      places[i].point = InsertIntoSurface(piece, place, 0.01 * radius);
+      places[i].point = InsertIntoSurface(
+        piece, place, 0.01 * radius, isEnd[i] != 0 ? endTolerance * radius : 0.01 * radius);
       piece.skeletonPoint[places[i].point] = static_cast<std::int64_t>(i);
+      const double moved = (piece.points[places[i].point] + this->Origin - points[i]).norm();
+      if (moved > 0.01 * radius)
+      {
+        ++shifted;
+        shift = std::max(shift, moved);
+      }
     }
     for (Place& place : places)
     {
@@ -616,7 +807,7 @@ private:
     if (shifted > 0)
     {
       this->Mesh.warnings.push_back(std::to_string(shifted) +
-        " skeleton points outside of the surface were put on it; none was farther than " +
+        " skeleton points beside the surface were put on it; none was farther than " +
         Millimetres(shift));
     }
     if (outside > 0)
@@ -671,6 +862,35 @@ private:
       this->Mesh.warnings.push_back(
         std::to_string(through) + " skeleton edges that leave the surface were left out");
     }
+  }
+
+  /// Per skeleton point: whether one edge only ends at its place.
+  std::vector<char> SkeletonEnds() const
+  {
+    const std::vector<Vector3>& points = this->Input.skeletonPoints;
+    std::map<std::array<double, 3>, int> edges;
+    for (const auto& [a, b] : this->Input.skeletonEdges)
+    {
+      if (points[a] != points[b])
+      {
+        ++edges[{ points[a][0], points[a][1], points[a][2] }];
+        ++edges[{ points[b][0], points[b][1], points[b][2] }];
+      }
+    }
+    std::vector<char> isEnd(points.size(), 0);
+    for (std::size_t i = 0; i < points.size(); ++i)
+    {
+      const auto found = edges.find({ points[i][0], points[i][1], points[i][2] });
+      isEnd[i] = found != edges.end() && found->second == 1 ? 1 : 0;
+    }
+    return isEnd;
+  }
+
+  static double LongestSide(const Piece& piece, std::int64_t triangle)
+  {
+    const Triangle& t = piece.triangles[triangle];
+    return std::max(
+      { Sized(piece, t[0], t[1]), Sized(piece, t[1], t[2]), Sized(piece, t[2], t[0]) });
   }
 
   std::vector<double> WallSizes(const Piece& piece) const
@@ -1227,6 +1447,11 @@ private:
           mesh.radiusEdgeRatio[i] = RadiusEdgeRatio(a, b, c, d);
         }
       });
+  }
+
+  void CheckVolumes() const
+  {
+    const TetrahedralMesh& mesh = this->Mesh;
     const auto least = std::min_element(mesh.volume.begin(), mesh.volume.end());
     const double unit = this->Settings.unitLength;
     if (!(*least * unit * unit * unit > this->Settings.minimumVolume))

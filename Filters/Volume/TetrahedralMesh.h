@@ -36,9 +36,9 @@ struct TetrahedralMeshSettings
   double minimumDihedral = 0.2618; ///< aim, radians (15 degrees), 0 to 0.349; met for most
   double minimumVolume = 1e-7;     ///< mm^3; a smaller tetrahedron is an error
   double unitLength = 1.0;         ///< mm per unit of the coordinates
-  double sizeFactor = 0.0;   ///< edge length inside per local radius; 0: grows from the wall's
-  bool improve = true;       ///< our own improvement after the backend's
-  bool repair = true;        ///< one try to repair what can not be meshed
+  double sizeFactor = 0.0; ///< edge length inside per local radius; 0: grows from the wall's
+  bool improve = true;     ///< our own improvement after the backend's
+  bool repair = true; ///< one try to repair what can not be meshed, or only with flat tetrahedra
   double repairLimit = 0.01; ///< largest displacement by it, in local radii
   OutsidePolicy outside = OutsidePolicy::Refuse;
   double timeLimit = 300.0; ///< seconds for each component and try, positive
@@ -99,7 +99,12 @@ bool HasTetrahedralBackend(TetrahedralBackend backend, const std::string& worker
  * improves the worst tetrahedra.
  *
  * Skeleton points within 1 % of the local radius of the surface become points of it (its triangles
- * are split there), and so do points up to 10 % outside, with a warning; edges that are much longer than what is around them are split.
+ * are split there, or a point of it moves there by at most that much), and so do, with a warning,
+ * points up to 10 % of the radius outside, and ends that are less than a tenth of an edge below it;
+ * edges that are much longer than what is around them are split.
+ *
+ * When a tetrahedron with an angle below 5 degrees is left, the surface beside it is moved within the
+ * repair limit, and it is tried once more; the better mesh counts. A warning names what stays flat.
  *
  * @throws SurfaceError for a surface that is not closed, cuts itself, or lies within another one;
  *         std::invalid_argument for a setting, a skeleton point outside (its number and position),

@@ -542,7 +542,7 @@ TEST_F(TetGen, PutsEndsThatStickOutOntoTheCap)
   tube.skeletonPoints.back()[2] = 20.03;
   const TetrahedralMesh mesh = MakeTetrahedralMesh(tube);
   ASSERT_EQ(mesh.warnings.size(), 1U);
-  EXPECT_SAYS(mesh.warnings[0], "2 skeleton points outside of the surface were put on it");
+  EXPECT_SAYS(mesh.warnings[0], "2 skeleton points beside the surface were put on it");
   EXPECT_SAYS(mesh.warnings[0], "0.05 mm");
   for (std::size_t i = 0; i < mesh.points.size(); ++i)
   {
@@ -552,6 +552,95 @@ TEST_F(TetGen, PutsEndsThatStickOutOntoTheCap)
     }
   }
   EXPECT_EQ(std::count(mesh.skeletonPoint.begin(), mesh.skeletonPoint.end(), 0), 1);
+}
+
+TEST_F(TetGen, LeavesNoFlatTetrahedraBelowACap)
+{
+  // An end a little below the cap, over a corner of the cap's triangles and beside one.
+  for (const double depth : { 0.016, 0.03, 0.05, 0.1, 0.14 })
+  {
+    for (const double aside : { 0.15, 0.153, 0.2, 0.4 })
+    {
+      TetrahedralMeshInput tube = Tube(1.5, 20.0, 24, 10);
+      tube.skeletonPoints.front() = Vector3(aside, 0.0, depth);
+      const TetrahedralMesh mesh = MakeTetrahedralMesh(tube);
+      EXPECT_GE(
+        *std::min_element(mesh.minimumDihedral.begin(), mesh.minimumDihedral.end()), 5.0 * degree)
+        << "depth " << depth << ", " << aside << " from the middle";
+      const auto at = std::find(mesh.skeletonPoint.begin(), mesh.skeletonPoint.end(), 0);
+      ASSERT_NE(at, mesh.skeletonPoint.end());
+      EXPECT_LE(
+        (mesh.points[at - mesh.skeletonPoint.begin()] - tube.skeletonPoints[0]).norm(), 0.15);
+    }
+  }
+}
+
+TEST_F(TetGen, LiftsTheWallOffASkeletonThatGrazesIt)
+{
+  for (const double depth : { 0.016, 0.03, 0.06, 0.15 })
+  {
+    TetrahedralMeshInput tube = Tube(1.5, 20.0, 24, 20);
+    const double angle = M_PI / 24.0;
+    const double distance = 1.5 * std::cos(angle) - depth;
+    for (const std::size_t point : { 9, 10, 11 })
+    {
+      tube.skeletonPoints[point] = Vector3(
+        distance * std::cos(angle), distance * std::sin(angle), tube.skeletonPoints[point][2]);
+    }
+    const TetrahedralMesh mesh = MakeTetrahedralMesh(tube);
+    EXPECT_GE(
+      *std::min_element(mesh.minimumDihedral.begin(), mesh.minimumDihedral.end()), 5.0 * degree)
+      << "depth " << depth;
+    EXPECT_LE(mesh.tries, depth < 0.02 ? 2 : 1);
+    for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    {
+      // On the caps points are shifted within the plane, to the ends of the skeleton.
+      if (mesh.surfacePoint[i] >= 0 && mesh.points[i][2] > 1.0 && mesh.points[i][2] < 19.0)
+      {
+        EXPECT_LE((mesh.points[i] - tube.points[mesh.surfacePoint[i]]).norm(), 0.015 + 1e-9);
+      }
+      if (mesh.skeletonPoint[i] >= 0)
+      {
+        EXPECT_LE((mesh.points[i] - tube.skeletonPoints[mesh.skeletonPoint[i]]).norm(), 0.015);
+      }
+    }
+  }
+  // Without the repair the mesh is given all the same, and says where it is flat.
+  TetrahedralMeshInput tube = Tube(1.5, 20.0, 24, 20);
+  const double angle = M_PI / 24.0;
+  for (const std::size_t point : { 9, 10, 11 })
+  {
+    const double distance = 1.5 * std::cos(angle) - 0.016;
+    tube.skeletonPoints[point] = Vector3(
+      distance * std::cos(angle), distance * std::sin(angle), tube.skeletonPoints[point][2]);
+  }
+  TetrahedralMeshSettings settings;
+  settings.repair = false;
+  const TetrahedralMesh mesh = MakeTetrahedralMesh(tube, settings);
+  EXPECT_LT(
+    *std::min_element(mesh.minimumDihedral.begin(), mesh.minimumDihedral.end()), 5.0 * degree);
+  ASSERT_FALSE(mesh.warnings.empty());
+  EXPECT_SAYS(mesh.warnings.back(), "a flat tetrahedron is left at (");
+}
+
+TEST_F(TetGen, NamesAFlatTetrahedronThatIsLeft)
+{
+  // A wedge of 3 degrees: no tetrahedron at its edge can have more.
+  TetrahedralMeshInput wedge;
+  const double height = std::tan(3.0 * degree);
+  wedge.points = { { 0, 0, 0 }, { 1, 0, 0 }, { 1, 0, height }, { 0, 1, 0 }, { 1, 1, 0 },
+    { 1, 1, height } };
+  wedge.triangles = { { 0, 2, 1 }, { 3, 4, 5 }, { 0, 1, 4 }, { 0, 4, 3 }, { 1, 2, 5 }, { 1, 5, 4 },
+    { 0, 3, 5 }, { 0, 5, 2 } };
+  std::transform(wedge.triangles.begin(), wedge.triangles.end(), wedge.triangles.begin(),
+    [](const Triangle& t) {
+      return Triangle{ t[0], t[2], t[1] };
+    });
+  const TetrahedralMesh mesh = MakeTetrahedralMesh(wedge);
+  ASSERT_FALSE(mesh.warnings.empty());
+  EXPECT_SAYS(mesh.warnings.back(), "a flat tetrahedron is left at (");
+  EXPECT_SAYS(mesh.warnings.back(), "degrees");
+  EXPECT_LE(mesh.tries, 2);
 }
 
 TEST_F(TetGen, RefusesSkeletonPointsOutside)
