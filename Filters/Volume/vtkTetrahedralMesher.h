@@ -146,9 +146,8 @@ public:
 
   ///@{
   /**
-   * Whether a surface that cuts itself, fails, or leaves tetrahedra below 5 degrees is repaired once and
-   * meshed again, with displacements below 1 % of
-   * the local radius. Default on.
+   * Whether a surface that cuts itself, fails, or leaves tetrahedra below 5 degrees is repaired once
+   * and meshed again, with displacements below 1 % of the local radius. Default on.
    */
   vtkSetMacro(Repair, bool);
   vtkGetMacro(Repair, bool);
