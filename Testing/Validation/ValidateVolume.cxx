@@ -275,9 +275,8 @@ bool Print(const Outcome& outcome, bool timed)
   std::fflush(stdout);
   return reached;
 }
-}
 
-int main(int argc, char** argv)
+int Run(int argc, char** argv)
 {
   CLI::App program{
     "Tetrahedral meshes of the phantoms' surfaces with their centerlines inside, and of a foreign "
@@ -386,4 +385,18 @@ int main(int argc, char** argv)
   }
   std::printf("\n%d limits missed.\n", missed);
   return missed > 0 ? 1 : 0;
+}
+}
+
+int main(int argc, char** argv)
+{
+  try
+  {
+    return Run(argc, argv);
+  }
+  catch (const std::exception& error)
+  {
+    std::fprintf(stderr, "validate-volume: %s\n", error.what());
+    return 2;
+  }
 }
