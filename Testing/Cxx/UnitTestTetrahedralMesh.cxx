@@ -18,7 +18,6 @@
 #include <unistd.h>
 
 using coronary::MakeTetrahedralMesh;
-using coronary::MesherFailure;
 using coronary::SurfaceError;
 using coronary::TetrahedralBackend;
 using coronary::TetrahedralMesh;
