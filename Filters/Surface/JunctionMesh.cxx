@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <sstream>
-#include <stdexcept>
 #include <unordered_map>
 
 namespace coronary
@@ -12,6 +12,9 @@ namespace coronary
 namespace
 {
 using Key = std::uint64_t;
+
+/// Grids of more nodes are not tried.
+constexpr std::int64_t MostNodes = 100'000'000;
 
 /// One attempt with one grid.
 class Attempt
@@ -28,7 +31,10 @@ public:
 
   bool Run()
   {
-    this->Sample();
+    if (!this->Sample())
+    {
+      return false;
+    }
     this->March();
     this->PutOnWall();
     this->Cut();
@@ -81,7 +87,8 @@ private:
 
   Vector3 At(int i, int j, int k) const { return this->Low + this->Cell * Vector3(i, j, k); }
 
-  void Sample()
+  /// @return false when the grid would be too large
+  bool Sample()
   {
     Vector3 low = Vector3::Constant(1e300);
     Vector3 high = Vector3::Constant(-1e300);
@@ -110,6 +117,10 @@ private:
     }
     const std::int64_t nodes =
       static_cast<std::int64_t>(this->Size[0]) * this->Size[1] * this->Size[2];
+    if (nodes > MostNodes)
+    {
+      return false;
+    }
     constexpr float unknown = 1e30F;
     this->Values.assign(nodes, unknown);
     // Blocks of cells; those that the wall cannot reach are not looked into.
@@ -155,6 +166,7 @@ private:
         }
       }
     }
+    return true;
   }
 
   std::int64_t EdgePoint(const std::array<int, 3>& p, const std::array<int, 3>& q)
@@ -494,6 +506,33 @@ JunctionMesh MeshJunction(const SweptLumen& lumen, int junction)
   {
     text << " " << lumen.GroupAt(lumen.Spans()[arm.span].vessel, arm.cut);
   }
-  throw std::runtime_error(text.str());
+  JunctionFailure failure(text.str());
+  failure.centre = j.centre;
+  for (const SweptLumen::Range& range : j.ranges)
+  {
+    const VesselAxis& axis = *lumen.Vessels()[range.vessel].axis;
+    for (const double s : { range.low, range.high })
+    {
+      failure.reach = std::max(failure.reach, (axis.At(s).point - j.centre).norm());
+    }
+  }
+  // The thinnest branch that ends after the junction.
+  double thinnest = std::numeric_limits<double>::max();
+  for (const SweptLumen::Arm& arm : j.arms)
+  {
+    const SweptLumen::Span& span = lumen.Spans()[arm.span];
+    const int tip = arm.atStart ? span.endTip : span.startTip;
+    if (tip < 0 || lumen.Tips()[tip].inlet)
+    {
+      continue;
+    }
+    const double radius = lumen.Vessels()[span.vessel].axis->At(arm.cut).radius;
+    if (radius < thinnest)
+    {
+      thinnest = radius;
+      failure.thinnestEnd = lumen.Tips()[tip].point;
+    }
+  }
+  throw failure;
 }
 }

@@ -7,8 +7,20 @@
 
 #include "SweptLumen.h"
 
+#include <stdexcept>
+
 namespace coronary
 {
+/// No grid resolves a junction's wall.
+class JunctionFailure : public std::runtime_error
+{
+public:
+  using std::runtime_error::runtime_error;
+  Vector3 centre = Vector3::Zero();
+  double reach = 0.0;            ///< all of the junction is so near, mm
+  std::int64_t thinnestEnd = -1; ///< of the branches that end after it, as a point of the input
+};
+
 struct JunctionMesh
 {
   std::vector<Vector3> points;
@@ -18,7 +30,7 @@ struct JunctionMesh
 
 /**
  * Marching tetrahedra on a local grid, refined until the result is a sphere with one hole an arm.
- * @throws std::runtime_error naming the place when no grid gives that
+ * @throws JunctionFailure naming the place when no grid gives that
  */
 JunctionMesh MeshJunction(const SweptLumen& lumen, int junction);
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -24,6 +25,9 @@ constexpr double LeastAngle = 12.0;
 constexpr int Repairs = 3;
 constexpr int RemeshingAttempts = 3;
 constexpr double GreatestSmoothing = 4.0; ///< of the axes, radii
+constexpr double LeastBlending = 0.1;
+constexpr int FaultReliefs = 2;    ///< times that faults of the finished mesh are relieved
+constexpr double FaultReach = 4.0; ///< of such a relief, in radii
 
 double EdgeLength(const SweepSettings& settings, double curvature, double radius)
 {
@@ -78,6 +82,12 @@ private:
   const SweepSettings& Settings;
 };
 
+/// Junctions that no grid resolves.
+struct Unresolved
+{
+  std::vector<JunctionFailure> places;
+};
+
 /// The first mesh: rings along the spans, junctions between, caps at the ends.
 class FirstMesh
 {
@@ -98,19 +108,40 @@ public:
   {
     const auto& junctions = this->Lumen.Junctions();
     std::vector<JunctionMesh> meshes(junctions.size());
+    std::vector<std::unique_ptr<JunctionFailure>> failed(junctions.size());
     ParallelFor(
       static_cast<std::int64_t>(junctions.size()), 1,
       [&](std::int64_t first, std::int64_t last)
       {
         for (std::int64_t j = first; j < last; ++j)
         {
-          if (!junctions[j].arms.empty())
+          if (junctions[j].arms.empty())
+          {
+            continue;
+          }
+          try
           {
             meshes[j] = MeshJunction(this->Lumen, static_cast<int>(j));
+          }
+          catch (const JunctionFailure& failure)
+          {
+            failed[j] = std::make_unique<JunctionFailure>(failure);
           }
         }
       },
       progress);
+    Unresolved unresolved;
+    for (const auto& failure : failed)
+    {
+      if (failure)
+      {
+        unresolved.places.push_back(*failure);
+      }
+    }
+    if (!unresolved.places.empty())
+    {
+      throw unresolved;
+    }
     std::vector<std::int64_t> offset(junctions.size(), 0);
     for (std::size_t j = 0; j < junctions.size(); ++j)
     {
@@ -528,8 +559,72 @@ void Require(bool condition, const char* name, const char* range)
 
 namespace
 {
-SweptSurface SweepOnce(
-  const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress);
+/// What is changed where the tree cannot be meshed as it is.
+struct Reliefs
+{
+  std::vector<SweepRelief> places;
+  std::vector<std::string> reasons; ///< one a place
+  std::vector<SweepOmission> leftOut;
+
+  /// More at this place. @return false when no more is to be had
+  bool Add(
+    const Vector3& centre, double reach, const SweepSettings& settings, const std::string& reason)
+  {
+    std::size_t i = 0;
+    while (i < this->places.size() &&
+      (this->places[i].centre - centre).norm() > std::max(this->places[i].reach, reach))
+    {
+      ++i;
+    }
+    if (i == this->places.size())
+    {
+      this->places.push_back({ centre, reach, settings.smoothing, settings.blending });
+      this->reasons.push_back(reason);
+    }
+    SweepRelief& place = this->places[i];
+    if (place.smoothing >= GreatestSmoothing)
+    {
+      return false;
+    }
+    place.reach = std::max(place.reach, reach + (place.centre - centre).norm());
+    place.smoothing = std::clamp(2.0 * place.smoothing, 1.0, GreatestSmoothing);
+    place.blending = std::max(LeastBlending, 0.7 * place.blending);
+    return true;
+  }
+
+  std::vector<std::string> Remarks() const
+  {
+    std::vector<std::string> remarks;
+    for (std::size_t i = 0; i < this->places.size(); ++i)
+    {
+      std::ostringstream text;
+      text.precision(3);
+      text << this->reasons[i] << "; for that reason axes less than " << this->places[i].reach
+           << " mm away are smoothed over " << this->places[i].smoothing
+           << " radii and fillets have " << this->places[i].blending << " radii";
+      remarks.push_back(text.str());
+    }
+    return remarks;
+  }
+};
+
+/// A part of the finished mesh that has faults.
+struct Fault
+{
+  Vector3 position;
+  double radius; ///< of the vessel
+};
+
+SweptSurface SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
+  std::vector<Fault>& faults, const ProgressCallback& progress);
+
+std::string Place(const Vector3& p)
+{
+  std::ostringstream text;
+  text.precision(6);
+  text << "(" << p[0] << ", " << p[1] << ", " << p[2] << ")";
+  return text.str();
+}
 }
 
 void SweepSettings::Validate() const
@@ -566,43 +661,78 @@ SweptSurface SweepVesselTree(
       return progress(reported);
     };
   }
-  // Kinks that no tube of that width can follow are smoothed away, the more the worse they are.
-  SweepSettings smoother = settings;
-  std::string remark;
-  for (;;)
+  // Kinks that no tube of that width can follow are smoothed away, the more the worse they are, and
+  // fillets that run into each other made smaller. Where that does not help a branch has to go.
+  Reliefs reliefs;
+  SweptSurface best;
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  for (int faulty = 0;;)
   {
+    std::vector<Fault> faults;
     try
     {
-      SweptSurface result = SweepOnce(tree, smoother, rising);
-      if (!remark.empty())
+      SweptSurface result = SweepOnce(tree, settings, reliefs, faults, rising);
+      if (faults.size() < fewest)
       {
-        result.remarks.push_back(remark);
+        fewest = faults.size();
+        best = std::move(result);
+        for (const std::string& remark : reliefs.Remarks())
+        {
+          best.remarks.push_back(remark);
+        }
       }
-      return result;
-    }
-    catch (const Cancelled&)
-    {
-      throw;
-    }
-    catch (const std::runtime_error& error)
-    {
-      if (smoother.smoothing >= GreatestSmoothing)
+      bool more = false;
+      if (faulty < FaultReliefs)
       {
-        throw;
+        std::vector<Vector3> seen;
+        for (const Fault& fault : faults)
+        {
+          const double reach = FaultReach * fault.radius;
+          if (std::none_of(seen.begin(), seen.end(),
+                [&](const Vector3& p) { return (p - fault.position).norm() < reach; }))
+          {
+            seen.push_back(fault.position);
+            more =
+              reliefs.Add(fault.position, reach, settings,
+                "the triangles at " + Place(fault.position) + " were too thin or cut each other") ||
+              more;
+          }
+        }
       }
-      smoother.smoothing = std::clamp(2.0 * smoother.smoothing, 1.0, GreatestSmoothing);
-      std::ostringstream text;
-      text << error.what() << "; all axes smoothed over " << smoother.smoothing
-           << " radii for that reason";
-      remark = text.str();
+      if (!more)
+      {
+        return best;
+      }
+      ++faulty;
+    }
+    catch (const Unresolved& unresolved)
+    {
+      for (const JunctionFailure& place : unresolved.places)
+      {
+        if (reliefs.Add(place.centre, place.reach, settings, place.what()))
+        {
+          continue;
+        }
+        if (fewest < std::numeric_limits<std::size_t>::max())
+        {
+          return best; // with few faults, which is better than without a branch
+        }
+        if (place.thinnestEnd < 0 ||
+          std::any_of(reliefs.leftOut.begin(), reliefs.leftOut.end(),
+            [&](const SweepOmission& omission) { return omission.end == place.thinnestEnd; }))
+        {
+          throw std::runtime_error(place.what());
+        }
+        reliefs.leftOut.push_back({ place.thinnestEnd, place.centre, place.reach });
+      }
     }
   }
 }
 
 namespace
 {
-SweptSurface SweepOnce(
-  const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
+SweptSurface SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
+  std::vector<Fault>& faultsLeft, const ProgressCallback& progress)
 {
   SweptSurface result;
   if (tree.branches.empty())
@@ -617,7 +747,7 @@ SweptSurface SweepOnce(
     }
     return [&progress, from, to](double f) { return progress(from + (to - from) * f); };
   };
-  SweptLumen lumen(tree, settings);
+  SweptLumen lumen(tree, settings, reliefs.places, reliefs.leftOut);
   lumen.SetEdgeRetreat(BluntRetreat);
   Report(progress, 0.05);
   result.remarks = lumen.Remarks();
@@ -686,6 +816,15 @@ SweptSurface SweepOnce(
            << " degrees or that cut others are left, the first at (" << p[0] << ", " << p[1] << ", "
            << p[2] << ")";
       result.remarks.push_back(text.str());
+      const std::vector<Triangle> all = mesh->Triangles();
+      for (const std::int64_t t : faults)
+      {
+        const RemeshVertex& vertex = mesh->Vertices()[all[t][0]];
+        SweptLumen::Site site{ vertex.part, vertex.piece };
+        SweptLumen::Sample sample;
+        lumen.Evaluate(vertex.position, site, sample);
+        faultsLeft.push_back({ vertex.position, sample.radius });
+      }
       break;
     }
     blunted.edgeRetreat = 2.0 * std::max(blunted.edgeRetreat, BluntRetreat);

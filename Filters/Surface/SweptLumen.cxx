@@ -87,6 +87,7 @@ struct SweptLumen::Build
 {
   const SweepTree& input;
   const SweepSettings& settings;
+  const std::vector<SweepRelief>& reliefs;
   SweptLumen& self;
 
   std::vector<Vector3> points;
@@ -103,9 +104,11 @@ struct SweptLumen::Build
   };
   std::vector<Node> nodes;
 
-  Build(const SweepTree& tree, const SweepSettings& s, SweptLumen& lumen)
+  Build(const SweepTree& tree, const SweepSettings& s, const std::vector<SweepRelief>& places,
+    SweptLumen& lumen)
     : input(tree)
     , settings(s)
+    , reliefs(places)
     , self(lumen)
     , points(tree.points)
     , radius(tree.radius)
@@ -245,6 +248,71 @@ struct SweptLumen::Build
         this->links.push_back(link);
       }
     }
+  }
+
+  /// A branch's end is left out from the place on; all of it when little would stay.
+  void LeaveOut(const SweepOmission& omission)
+  {
+    for (Link& link : this->links)
+    {
+      std::vector<std::int64_t>& list = link.points;
+      const bool atStart = list.front() == omission.end;
+      if (!link.alive || (!atStart && list.back() != omission.end))
+      {
+        continue;
+      }
+      if (atStart)
+      {
+        std::reverse(list.begin(), list.end());
+      }
+      std::size_t kept = 0;
+      double length = 0.0;
+      while (
+        kept < list.size() && (this->points[list[kept]] - omission.centre).norm() > omission.reach)
+      {
+        length +=
+          kept == 0 ? 0.0 : (this->points[list[kept]] - this->points[list[kept - 1]]).norm();
+        ++kept;
+      }
+      link.alive = kept > 1 && kept < list.size() && length > 3.0 * this->radius[list[kept - 1]];
+      self.RemarkList.push_back("group " + std::to_string(link.group) + " is left out from " +
+        Where(link.alive ? this->points[list[kept - 1]] : this->points[list.front()]) +
+        " to its end at " + Where(this->points[omission.end]));
+      if (link.alive)
+      {
+        list.resize(kept);
+      }
+      if (atStart)
+      {
+        std::reverse(list.begin(), list.end());
+      }
+    }
+  }
+
+  double SmoothingAt(const Vector3& x) const
+  {
+    double smoothing = this->settings.smoothing;
+    for (const SweepRelief& relief : this->reliefs)
+    {
+      if ((x - relief.centre).norm() < relief.reach)
+      {
+        smoothing = std::max(smoothing, relief.smoothing);
+      }
+    }
+    return smoothing;
+  }
+
+  double BlendingAt(const Vector3& x) const
+  {
+    double blending = this->settings.blending;
+    for (const SweepRelief& relief : this->reliefs)
+    {
+      if ((x - relief.centre).norm() < relief.reach)
+      {
+        blending = std::min(blending, relief.blending);
+      }
+    }
+    return blending;
   }
 
   /// A free start that turns back inside its own tube, as a fastest path from a point at the wall
@@ -525,10 +593,12 @@ struct SweptLumen::Build
     const auto degree = [&](std::int64_t p) { return this->incidences[p].size(); };
     std::vector<Vector3> path;
     std::vector<double> r;
+    std::vector<double> smoothing;
     for (const std::int64_t p : course)
     {
       path.push_back(this->points[p]);
       r.push_back(this->radius[p]);
+      smoothing.push_back(this->SmoothingAt(this->points[p]));
     }
     if (degree(course.front()) > 1)
     {
@@ -540,7 +610,7 @@ struct SweptLumen::Build
     vessel.tree = tree;
     vessel.abscissa = abscissa[course.front()];
     vessel.axis = std::make_unique<VesselAxis>(
-      path, r, this->settings.smoothing, degree(course.front()) == 1, degree(course.back()) == 1);
+      path, r, smoothing, degree(course.front()) == 1, degree(course.back()) == 1);
     VesselAxis& axis = *vessel.axis;
     const auto seed = normalOfNode.find(course.front());
     axis.SetFrames(this->settings.frame,
@@ -732,7 +802,7 @@ struct SweptLumen::Build
           });
       }
       fillet.calibre = child;
-      fillet.radius = sides ? 0.0 : this->settings.blending * child;
+      fillet.radius = sides ? 0.0 : this->BlendingAt(node.point) * child;
       fillet.centre = node.point;
       fillet.reach = FilletReachGreater * parent + FilletReachSmaller * child;
     }
@@ -798,6 +868,16 @@ struct SweptLumen::Build
     if (station.curvature.norm() * station.radius > GreatestBend)
     {
       return false;
+    }
+    // Nor may the ring lie in a fold of its own tube, whose inner side belongs to both of its legs.
+    const int last = axis.PieceAt(std::min(axis.Length(), s + share * station.radius));
+    for (int i = axis.PieceAt(std::max(0.0, s - share * station.radius)); i <= last; ++i)
+    {
+      const Station& near = axis.AllStations()[i];
+      if (near.curvature.norm() * near.radius > GreatestBend)
+      {
+        return false;
+      }
     }
     for (const Range& range : others)
     {
@@ -1431,12 +1511,17 @@ struct SweptLumen::Build
   using Station = VesselAxis::Station;
 };
 
-SweptLumen::SweptLumen(const SweepTree& tree, const SweepSettings& settings)
+SweptLumen::SweptLumen(const SweepTree& tree, const SweepSettings& settings,
+  const std::vector<SweepRelief>& reliefs, const std::vector<SweepOmission>& leftOut)
   : Clearance(settings.clearance)
 {
-  Build build(tree, settings, *this);
+  Build build(tree, settings, reliefs, *this);
   build.Check();
   build.FindLinks();
+  for (const SweepOmission& omission : leftOut)
+  {
+    build.LeaveOut(omission);
+  }
   do
   {
     this->VesselList.clear();

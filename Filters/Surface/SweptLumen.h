@@ -12,6 +12,24 @@
 
 namespace coronary
 {
+/// A place that could not be meshed: its axes are smoothed more and its vessels joined more narrowly
+/// than the settings say.
+struct SweepRelief
+{
+  Vector3 centre;
+  double reach = 0.0;     ///< mm
+  double smoothing = 0.0; ///< of the axes, in radii
+  double blending = 0.0;  ///< radius of the fillets in radii of the smaller vessel
+};
+
+/// A branch that is not swept from a place on that could not be meshed.
+struct SweepOmission
+{
+  std::int64_t end = -1; ///< its free end, a point of the input
+  Vector3 centre;
+  double reach = 0.0; ///< mm
+};
+
 /**
  * A forest of vessels, cut into parts that are each simple to describe: spans (one tube between two
  * junctions, or a junction and a tip) and junctions (the tubes that meet there, joined by
@@ -122,7 +140,8 @@ public:
     int tree;
   };
 
-  SweptLumen(const SweepTree& tree, const SweepSettings& settings);
+  SweptLumen(const SweepTree& tree, const SweepSettings& settings,
+    const std::vector<SweepRelief>& reliefs = {}, const std::vector<SweepOmission>& leftOut = {});
 
   const std::vector<Vessel>& Vessels() const { return this->VesselList; }
   const std::vector<Span>& Spans() const { return this->SpanList; }

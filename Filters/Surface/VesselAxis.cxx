@@ -121,7 +121,8 @@ void SolveBanded(std::vector<std::array<double, 4>>& matrix, std::vector<Vector4
  * Least squares fit. The end points are weighted so that they are met; third differences of the
  * coefficients are held small where the points alone do not decide.
  */
-Spline Fit(const std::vector<double>& t, const std::vector<Vector4>& values, double smoothing)
+Spline Fit(const std::vector<double>& t, const std::vector<Vector4>& values,
+  const std::vector<double>& leastKnots)
 {
   Spline spline;
   spline.knots.assign(4, 0.0);
@@ -129,7 +130,7 @@ Spline Fit(const std::vector<double>& t, const std::vector<Vector4>& values, dou
   const double length = t.back();
   for (std::size_t i = 1; i + 1 < t.size(); ++i)
   {
-    const double least = smoothing * values[i][3];
+    const double least = leastKnots[i];
     if (t[i] - last >= least && length - t[i] >= least)
     {
       spline.knots.push_back(t[i]);
@@ -212,11 +213,18 @@ Vector3 NormalPart(const Vector3& direction, const Vector3& tangent)
 
 VesselAxis::VesselAxis(const std::vector<Vector3>& points, const std::vector<double>& radius,
   double smoothing, bool startOpen, bool endOpen)
+  : VesselAxis(points, radius, std::vector<double>(points.size(), smoothing), startOpen, endOpen)
+{
+}
+
+VesselAxis::VesselAxis(const std::vector<Vector3>& points, const std::vector<double>& radius,
+  const std::vector<double>& smoothing, bool startOpen, bool endOpen)
   : StartOpen(startOpen)
   , EndOpen(endOpen)
 {
   std::vector<double> t;
   std::vector<Vector4> values;
+  std::vector<double> leastKnots; // distances, mm
   double smallest = radius.front();
   for (std::size_t i = 0; i < points.size(); ++i)
   {
@@ -226,6 +234,7 @@ VesselAxis::VesselAxis(const std::vector<Vector3>& points, const std::vector<dou
     {
       t.push_back(0.0);
       values.push_back(value);
+      leastKnots.push_back(smoothing[i] * radius[i]);
       continue;
     }
     const double step = (value.head<3>() - values.back().head<3>()).norm();
@@ -233,9 +242,10 @@ VesselAxis::VesselAxis(const std::vector<Vector3>& points, const std::vector<dou
     {
       t.push_back(t.back() + step);
       values.push_back(value);
+      leastKnots.push_back(smoothing[i] * radius[i]);
     }
   }
-  const Spline spline = Fit(t, values, smoothing);
+  const Spline spline = Fit(t, values, leastKnots);
 
   // Stations at a third of the radius, by arc length (three-point Gauss quadrature).
   double s = 0.0;

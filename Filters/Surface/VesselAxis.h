@@ -65,6 +65,10 @@ public:
   VesselAxis(const std::vector<Vector3>& points, const std::vector<double>& radius,
     double smoothing, bool startOpen, bool endOpen);
 
+  /// The same with a smoothing for each point.
+  VesselAxis(const std::vector<Vector3>& points, const std::vector<double>& radius,
+    const std::vector<double>& smoothing, bool startOpen, bool endOpen);
+
   /**
    * Turns the frames along the axis.
    * @param first  direction whose part normal to the axis is the normal at the start (with

@@ -1,6 +1,7 @@
 // The swept surface against closed forms: tubes, tori, forks; the test of triangles that cut each
 // other against exact cases; refusals.
 
+#include "CoronaryPhantom.h"
 #include "SurfaceMeasures.h"
 #include "SweepSurface.h"
 #include "TriangleIntersections.h"
@@ -357,6 +358,79 @@ TEST(SweepSurface, KinkOfNinetyDegrees)
   const std::int64_t corner = AddLine(tree, 0, -1, Vector3(0.0, 0.0, -12.0), Vector3::Zero(), 1.5);
   AddLine(tree, 1, corner, Vector3::Zero(), Vector3(12.0, 0.0, 0.0), 1.5);
   ExpectSound(SweepVesselTree(tree, {}), 1, "kink");
+}
+
+/// Up, down again beside itself by `depth`, and up.
+SweepTree Zigzag(double width, double depth)
+{
+  SweepTree tree;
+  SweepBranch branch;
+  const auto add = [&](const Vector3& p)
+  {
+    branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
+    tree.points.push_back(p);
+    tree.radius.push_back(1.5);
+  };
+  constexpr double top = 12.0;
+  for (int i = 0; i < 40; ++i)
+  {
+    add(Vector3(0.0, 0.0, top * i / 40.0));
+  }
+  for (int i = 0; i < 10; ++i)
+  {
+    add(Vector3(width * i / 10.0, 0.0, top - depth * i / 10.0));
+  }
+  for (int i = 0; i <= 50; ++i)
+  {
+    add(Vector3(width * (1.0 + i / 50.0), 0.0, top - depth + (depth + 12.0) * i / 50.0));
+  }
+  tree.branches.push_back(branch);
+  return tree;
+}
+
+TEST(SweepSurface, ZigzagIsSmoothedWhereItIs)
+{
+  const SweptSurface surface = SweepVesselTree(Zigzag(0.8, 3.0), {});
+  ExpectSound(surface, 1, "zigzag");
+  ASSERT_EQ(surface.remarks.size(), 1U);
+  EXPECT_NE(surface.remarks[0].find("axes less than"), std::string::npos) << surface.remarks[0];
+  double top = 0.0;
+  for (const Vector3& p : surface.points)
+  {
+    top = std::max(top, p[2]);
+  }
+  EXPECT_NEAR(top, 24.0, 0.5);
+}
+
+TEST(SweepSurface, EndBehindAPlaceThatCannotBeMeshedIsLeftOut)
+{
+  const SweptSurface surface = SweepVesselTree(Zigzag(1.5, 4.0), {});
+  ExpectSound(surface, 1, "zigzag");
+  ASSERT_GE(surface.remarks.size(), 1U);
+  EXPECT_NE(surface.remarks[0].find("group 0 is left out from"), std::string::npos)
+    << surface.remarks[0];
+}
+
+TEST(SweepSurface, SideVesselThatTurnsBackAtOnce)
+{
+  // Its fold reaches to where it would be cut.
+  PhantomSettings settings;
+  settings.seed = 26;
+  settings.dominance = static_cast<Dominance>(26 % 3);
+  settings.stenoses = 26 % 4;
+  settings.tortuosity = 1.5;
+  settings.calibre = 0.95;
+  const PhantomTree truth = CoronaryPhantom(settings).Tree(0.3);
+  SweepTree tree;
+  tree.points = truth.points;
+  tree.radius = truth.radius;
+  for (const PhantomBranch& branch : truth.branches)
+  {
+    tree.branches.push_back({ branch.points, branch.groupId });
+  }
+  const SweptSurface surface = SweepVesselTree(tree, {});
+  ExpectSound(surface, 2, "phantom 26");
+  EXPECT_TRUE(surface.remarks.empty()) << surface.remarks.front();
 }
 
 TEST(SweepSurface, NeighboursDoNotMerge)
