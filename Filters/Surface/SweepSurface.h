@@ -106,7 +106,7 @@ struct SweptSurface
 
 /**
  * @throws std::invalid_argument  naming the setting, or the branch and point that is wrong
- *         std::runtime_error     when some junction cannot be resolved, naming its position
+ *         std::runtime_error     when some junction cannot be resolved nor left out, naming it
  *         Cancelled
  */
 SweptSurface SweepVesselTree(
