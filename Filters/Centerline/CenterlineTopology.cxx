@@ -426,7 +426,11 @@ private:
       const bool free = first == 0 || last + 1 == n;
       const double r = this->G.radius[chain[(first + last) / 2]];
       const bool bridge = first > 0 && old[first - 1] && last + 1 < n && old[last + 1] && !between;
-      if (bridge || (!between && !free && arc[last] - arc[first] < OverlapLength * r))
+      // An end that is farther from what is there than it runs along with it does not overlap: the
+      // next bifurcation of the same vessel may be that near. What is a gap is closed later.
+      const bool touch = free && !(first == 0 && last + 1 == n) &&
+        arc[last] - arc[first] < near[first == 0 ? first : last].distance;
+      if (bridge || touch || (!between && !free && arc[last] - arc[first] < OverlapLength * r))
       {
         std::fill(covered.begin() + first, covered.begin() + last + 1, 0);
       }

@@ -24,9 +24,9 @@ struct Wall
   double behind = 0.0;   ///< least value behind it
 };
 
-/// First fall along a ray. Values are sampled every `step` up to `reach`.
+/// First fall along a ray, to `share` of the way up from its foot. Values are sampled every `step` up to `reach`.
 Wall FindWall(const ImageInterpolator& image, const Vector3& from, const Vector3& direction,
-  double lumen, double least, double floor, double step, double reach)
+  double lumen, double least, double floor, double step, double reach, double share)
 {
   constexpr int capacity = 512;
   double values[capacity];
@@ -69,17 +69,22 @@ Wall FindWall(const ImageInterpolator& image, const Vector3& from, const Vector3
     behind += values[i];
   }
   behind /= feet;
-  const double half = 0.5 * (lumen + behind);
+  const double level = behind + share * (lumen - behind);
   for (int i = 1; i <= lowestAt; ++i)
   {
-    if (values[i] <= half)
+    if (values[i] <= level)
     {
-      const double fraction = (values[i - 1] - half) / std::max(values[i - 1] - values[i], 1e-12);
+      const double fraction = (values[i - 1] - level) / std::max(values[i - 1] - values[i], 1e-12);
       return { (i - 1 + std::min(1.0, std::max(0.0, fraction))) * step, behind };
     }
   }
   return {};
 }
+
+/// Where the wall is, for the radius.
+constexpr double HalfMaximum = 0.5;
+/// Higher up the fall, for the centre: what a vein against the wall adds is less there.
+constexpr double CentreLevel = 0.7;
 
 constexpr double TableStep = 0.05;
 
@@ -253,8 +258,11 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
   double spread = 1.0;
   double behind = 0.0;
   int found = 0;
-  for (int iteration = 0; iteration < 4; ++iteration)
+  constexpr int lastRound = 4;
+  bool settled = false; // the centre is; what is left is the radius around it
+  for (int iteration = 0; iteration < (fixed ? lastRound : lastRound + 1); ++iteration)
   {
+    const bool centred = fixed || settled || iteration == lastRound;
     // The lumen's value over a small disc, which noise moves less than one point.
     double lumen = image.At(section.centre);
     const double disc = std::min(0.35 * section.radius, image.SmallestSpacing());
@@ -268,10 +276,11 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
     std::vector<double> distances;
     for (int ray = 0; ray < rays; ++ray)
     {
-      walls[ray] = fixed ? FindLevel(image, section.centre, direction(ray), section.lumen,
-                             settings.level, step, reach)
-                         : FindWall(image, section.centre, direction(ray), section.lumen,
-                             0.15 * contrast, floor, step, reach);
+      walls[ray] = fixed
+        ? FindLevel(
+            image, section.centre, direction(ray), section.lumen, settings.level, step, reach)
+        : FindWall(image, section.centre, direction(ray), section.lumen, 0.15 * contrast, floor,
+            step, reach, centred ? HalfMaximum : CentreLevel);
       if (walls[ray].distance > 0.0 && walls[ray].distance <= settings.maximumRadius)
       {
         distances.push_back(walls[ray].distance);
@@ -325,13 +334,21 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
       fit = normal.ldlt().solve(right);
     }
     section.radius = fit[0];
+    if (!fixed && centred)
+    {
+      break;
+    }
     const Vector3 shift = fit[1] * u + fit[2] * v;
     offCentre = shift.norm();
     const double most = 0.7 * section.radius;
     section.centre += offCentre > most ? Vector3(most / offCentre * shift) : shift;
     if (offCentre < 0.02 * section.radius)
     {
-      break;
+      if (fixed)
+      {
+        break;
+      }
+      settled = true;
     }
   }
 
@@ -381,7 +398,7 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
       const Vector2 row(std::cos(angle), std::sin(angle));
       const Vector3 direction = row[0] * u + row[1] * v;
       const Wall wall =
-        FindWall(image, centre, direction, lumen, 0.15 * contrast, floor, step, reach);
+        FindWall(image, centre, direction, lumen, 0.15 * contrast, floor, step, reach, HalfMaximum);
       const double residual = wall.distance - radius;
       if (wall.distance > 0.0 && std::abs(residual) < 0.5 * radius &&
         isOwn(centre + wall.distance * direction))
@@ -434,7 +451,7 @@ bool MeasureReference(
   {
     const Wall wall = FindWall(image, seed, SphereDirection(i, directions), reference.lumen,
       std::max(least, 1e-3 * std::abs(reference.lumen)), -std::numeric_limits<double>::infinity(),
-      0.5 * spacing, 40.0 * spacing);
+      0.5 * spacing, 40.0 * spacing, HalfMaximum);
     if (wall.distance > 0.0)
     {
       behind.push_back(wall.behind);

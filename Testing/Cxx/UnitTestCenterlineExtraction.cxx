@@ -263,6 +263,36 @@ TEST(LumenMeasurement, RadiusAndCentreOfATube)
   }
 }
 
+TEST(LumenMeasurement, CentreBesideAVein)
+{
+  // Half as bright, and its wall against the artery's.
+  const Tube artery{ Line(Vector3(-20, 0, 0), Vector3(20, 3, 5)), 0.9 };
+  const Vector3 axis = (artery.axis[1] - artery.axis[0]).normalized();
+  const Vector3 aside = 2.3 * axis.unitOrthogonal();
+  const Tube vein{ Line(artery.axis[0] + aside, artery.axis[1] + aside), 1.3 };
+  const Vector3 spacing = Vector3::Constant(0.4);
+  Scene scene({ artery }, spacing, Oblique(), Vector3(0, 1, 2), 6.0);
+  const Scene beside({ vein }, spacing, Oblique(), Vector3(0, 1, 2), 6.0, 1.0, 0.0);
+  for (std::size_t i = 0; i < scene.image.size(); ++i)
+  {
+    scene.image[i] = std::max(scene.image[i], -100.0F + 0.5F * (beside.image[i] + 100.0F));
+  }
+  const ImageInterpolator image(scene.scalar);
+  LumenSettings settings;
+  settings.reference = { 400.0, -100.0, 1.5 };
+  const Vector3 middle = 0.5 * (artery.axis[0] + artery.axis[1]);
+  double error = 0.0;
+  constexpr int sections = 21;
+  for (int i = 0; i < sections; ++i)
+  {
+    const Vector3 centre = middle + (0.4 * i - 4.0) * axis;
+    const LumenSection section = MeasureLumen(image, centre, axis, 1.0, settings);
+    const Vector3 offset = section.centre - centre;
+    error += offset.norm() / sections;
+  }
+  EXPECT_LT(error, 0.05);
+}
+
 TEST(LumenMeasurement, BlurredDiscsGiveTheirRadiusBack)
 {
   // A disc seen through a Gaussian, by brute force.

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -267,6 +268,42 @@ TEST(CenterlineTopology, SharedBranchesGapsAndDuplicates)
   TopologySettings settings;
   settings.gapRatio = 0.5;
   EXPECT_EQ(BuildTopology(maker.set, settings).trees, 2);
+}
+
+TEST(CenterlineTopology, BifurcationsNearEachOtherStayTwo)
+{
+  // Lines that are cut at the bifurcations; the piece between them is shorter than the merge distance.
+  const Vector3 second = Fork + Vector3(0.0, 0.0, 0.8);
+  const std::vector<std::vector<Vector3>> lines = { { Base, Fork }, { Fork, second },
+    { second, Vector3(0.0, 0.0, 45.0) }, { Fork, LeftTip }, { second, RightTip } };
+  for (const std::vector<int>& order : std::vector<std::vector<int>>{ { 0, 1, 2, 3, 4 },
+         { 0, 3, 1, 4, 2 }, { 3, 4, 0, 2, 1 }, { 1, 0, 2, 3, 4 }, { 2, 1, 0, 4, 3 } })
+  {
+    for (const bool reversed : { false, true })
+    {
+      LineMaker maker;
+      for (const int line : order)
+      {
+        std::vector<Vector3> corners = lines[line];
+        if (reversed)
+        {
+          std::reverse(corners.begin(), corners.end());
+        }
+        maker.Add(corners, Constant(2.0), 0.2);
+      }
+      maker.set.roots = { Base };
+      const CenterlineTopology tree = BuildTopology(maker.set);
+      ASSERT_EQ(tree.branches.size(), 5U);
+      ASSERT_EQ(tree.bifurcations.size(), 2U);
+      for (const Bifurcation& bifurcation : tree.bifurcations)
+      {
+        EXPECT_EQ(bifurcation.daughters.size(), 2U);
+        EXPECT_LT(std::min((tree.points[bifurcation.point] - Fork).norm(),
+                    (tree.points[bifurcation.point] - second).norm()),
+          1e-9);
+      }
+    }
+  }
 }
 
 TEST(CenterlineTopology, DirectionsOfTheLinesDoNotMatter)
