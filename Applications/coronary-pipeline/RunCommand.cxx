@@ -552,6 +552,9 @@ void RunJob::Run()
             mesher->SetSkeletonConnection(topology->GetOutputPort());
             // Where the wall was smoothed, the line may leave it.
             mesher->LeaveOutsideOn();
+            // The smallest vessels of a coarse image may need smaller ones than the filter's default
+            // allows; the report has the least.
+            mesher->SetMinimumVolume(0.0);
             update(mesher);
             vtkUnstructuredGrid* volume = mesher->GetOutput();
             WriteUnstructuredGrid(folder.Add("volume.vtu"), volume, messages);
@@ -564,6 +567,7 @@ void RunJob::Run()
               { "points", volume->GetNumberOfPoints() },
               { "least_dihedral_angle_rad",
                 Numbers(volume, vtkCoronaryArrayNames::LeastDihedralAngle) },
+              { "least_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::LeastVolume) },
               { "total_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::TotalVolume) },
               { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) } };
             summary += "; " + std::to_string(volume->GetNumberOfCells()) + " tetrahedra";

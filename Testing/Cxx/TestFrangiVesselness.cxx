@@ -854,10 +854,10 @@ TEST(FrangiVesselness, RefusesByName)
                   }),
     "extent");
   ExpectRefusal(
-    ofMask([](vtkImageData* m) { m->GetPointData()->Initialize(); }), "the mask has no");
+    ofMask([](vtkImageData* m) { m->GetPointData()->Initialize(); }), "The mask has no");
   const auto misnamed = ofMask([](vtkImageData*) {});
   misnamed->SetMaskArrayName("lumen");
-  ExpectRefusal(misnamed, "the mask has no point array 'lumen'");
+  ExpectRefusal(misnamed, "The mask has no point array 'lumen'");
   misnamed->SetMaskArrayName("HU");
   EXPECT_GT(Compute(misnamed)->GetNumberOfPoints(), 0);
   EXPECT_GT(Compute(ofMask([](vtkImageData*) {}))->GetNumberOfPoints(), 0);
@@ -890,7 +890,7 @@ TEST(FrangiVesselness, AnInputThatFailsWhileCIsMeasuredIsAnError)
     Messages messages(filter);
     RunAt(filter, 0.3);
     ASSERT_EQ(messages.Errors.size(), 1u);
-    EXPECT_NE(messages.Errors[0].find("the input failed"), std::string::npos);
+    EXPECT_NE(messages.Errors[0].find("The input failed"), std::string::npos);
     EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
   }
   series->FailsAtTime = false;
