@@ -77,22 +77,19 @@ if [ "$pictures" = yes ]; then
   # A home of its own: the pictures must not depend on, nor change, the user's ParaView settings.
   home="$(mktemp -d)"
   trap 'rm -rf "$home"' EXIT
-  HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
-    pvpython scripts/render-phantom.py "$output/phantom" --output "$output/pictures"
+  render() {
+    HOME="$home" XDG_CONFIG_HOME="$home" \
+      xvfb-run -a -s "-screen 0 1600x1000x24 -noreset" pvpython "scripts/render-$1.py" "${@:2}" \
+      --output "$output/pictures"
+  }
+  render phantom "$output/phantom"
   # The true surface of the phase that was segmented.
   phase="$(sed -n 's/^ *"phase": *\([0-9]*\).*/\1/p' "$output/run/report.json" | head -n 1)"
   truth="$output/phantom/truth/surface_$(printf %02d "$phase").vtp"
-  HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
-    pvpython scripts/render-segmentation.py "$output/run" --truth "$truth" \
-    --output "$output/pictures"
-  HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
-    pvpython scripts/render-centerline.py "$output/run" --truth "$truth" \
-    --output "$output/pictures"
-  HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
-    pvpython scripts/render-surface.py "$output/run" --truth "$truth" \
-    --output "$output/pictures"
-  HOME="$home" XDG_CONFIG_HOME="$home" xvfb-run -a -s "-screen 0 1600x1000x24" \
-    pvpython scripts/render-volume.py "$output/run" --output "$output/pictures"
+  render segmentation "$output/run" --truth "$truth"
+  render centerline "$output/run" --truth "$truth"
+  render surface "$output/run" --truth "$truth"
+  render volume "$output/run"
 fi
 
 plugin="$(find "$root/build/paraview" -name DynamicCoronaryPlugin.so -print -quit)"

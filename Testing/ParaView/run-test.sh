@@ -29,10 +29,12 @@ cd "$work"
 
 # Not through xvfb-run: it looks for a free display number itself, which two tests at once do at the
 # same time, and waits three seconds for the server, which a busy machine does not keep. The server
-# takes a number of its own and tells it when it is ready.
+# takes a number of its own and tells it when it is ready. It must not reset itself when its last
+# client leaves (a window closed before the next one is opened): the reset drops whoever connects
+# meanwhile, one connection of ten, and ParaView aborts.
 rm -f display
 mkfifo display
-Xvfb -displayfd 3 -screen 0 1600x1000x24 -nolisten tcp 3>display 2>server.log &
+Xvfb -displayfd 3 -screen 0 1600x1000x24 -nolisten tcp -noreset 3>display 2>server.log &
 server=$!
 # Waited for: a server that is still going takes the socket of the next one of its number with it.
 trap 'kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true' EXIT
