@@ -1,6 +1,6 @@
 /**
  * @file FilterMessages.h
- * @brief What a filter reports, for the tests.
+ * @brief What a filter reports, and what is expected of every filter, for the tests.
  */
 #ifndef DynamicCoronary_FilterMessages_h
 #define DynamicCoronary_FilterMessages_h
@@ -11,7 +11,10 @@
 #include "vtkExecutive.h"
 #include "vtkNew.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -65,5 +68,35 @@ private:
 
   std::vector<std::pair<vtkObject*, unsigned long>> Observers;
 };
+
+/// The next update is one error that has `part` in it.
+/// @param update  asks the algorithm for its data; without it, Update()
+inline void ExpectError(
+  vtkAlgorithm* algorithm, const std::string& part, const std::function<void()>& update = nullptr)
+{
+  Messages messages(algorithm);
+  if (update)
+  {
+    update();
+  }
+  else
+  {
+    algorithm->Update();
+  }
+  ASSERT_EQ(messages.Errors.size(), 1U);
+  EXPECT_NE(messages.Errors[0].find(part), std::string::npos) << messages.Errors[0];
+}
+
+/// Updates, and aborts at the first report of progress. The next update is to run through again.
+inline void UpdateAborted(vtkAlgorithm* algorithm)
+{
+  vtkNew<vtkCallbackCommand> stop;
+  stop->SetCallback([](vtkObject* sender, unsigned long, void*, void*)
+    { static_cast<vtkAlgorithm*>(sender)->SetAbortExecute(1); });
+  const unsigned long tag = algorithm->AddObserver(vtkCommand::ProgressEvent, stop);
+  algorithm->Update();
+  algorithm->RemoveObserver(tag);
+  algorithm->SetAbortExecute(0);
+}
 
 #endif

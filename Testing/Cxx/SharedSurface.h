@@ -51,10 +51,10 @@ inline vtkSmartPointer<vtkPolyData> FromStl(const std::string& bytes)
   return surface;
 }
 
-/// A .vtp or .stl of the shared data; null when it is not there.
-inline vtkSmartPointer<vtkPolyData> ReadSharedSurface(const std::string& name)
+/// A .vtp or .stl; null when it is not there.
+inline vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& name)
 {
-  std::ifstream file(std::string(DYNAMICCORONARY_DATA_DIR) + "/" + name, std::ios::binary);
+  std::ifstream file(name, std::ios::binary);
   if (!file)
   {
     return nullptr;
@@ -69,6 +69,12 @@ inline vtkSmartPointer<vtkPolyData> ReadSharedSurface(const std::string& name)
   reader->SetInputString(coronary::WithInlineXmlData(text));
   reader->Update();
   return reader->GetOutput();
+}
+
+/// A surface of the shared data; null when it is not there.
+inline vtkSmartPointer<vtkPolyData> ReadSharedSurface(const std::string& name)
+{
+  return ReadSurface(std::string(DYNAMICCORONARY_DATA_DIR) + "/" + name);
 }
 
 #endif

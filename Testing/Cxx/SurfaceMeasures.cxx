@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 namespace coronary
@@ -10,48 +9,6 @@ namespace coronary
 namespace
 {
 constexpr double Degrees = 180.0 / 3.14159265358979323846;
-
-/// Ericson, Real-Time Collision Detection, 5.1.5.
-double DistanceToTriangle(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c)
-{
-  const Vector3 ab = b - a;
-  const Vector3 ac = c - a;
-  const double d1 = ab.dot(p - a);
-  const double d2 = ac.dot(p - a);
-  if (d1 <= 0.0 && d2 <= 0.0)
-  {
-    return (p - a).norm();
-  }
-  const double d3 = ab.dot(p - b);
-  const double d4 = ac.dot(p - b);
-  if (d3 >= 0.0 && d4 <= d3)
-  {
-    return (p - b).norm();
-  }
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0)
-  {
-    return (p - a - d1 / (d1 - d3) * ab).norm();
-  }
-  const double d5 = ab.dot(p - c);
-  const double d6 = ac.dot(p - c);
-  if (d6 >= 0.0 && d5 <= d6)
-  {
-    return (p - c).norm();
-  }
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0)
-  {
-    return (p - a - d2 / (d2 - d6) * ac).norm();
-  }
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0)
-  {
-    return (p - b - (d4 - d3) / (d4 - d3 + d5 - d6) * (c - b)).norm();
-  }
-  const double sum = va + vb + vc;
-  return (p - a - vb / sum * ab - vc / sum * ac).norm();
-}
 }
 
 double SurfaceMeasures::WorstAngle() const
@@ -213,95 +170,5 @@ std::vector<double> RelativeEdgeLengths(const std::vector<Vector3>& points,
     }
   }
   return result;
-}
-
-DistanceToSurface::DistanceToSurface(
-  const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
-  : Points(points)
-  , Triangles(triangles)
-{
-  std::vector<Eigen::AlignedBox3d> boxes(triangles.size());
-  double size = 0.0;
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-  {
-    for (const std::int64_t p : triangles[t])
-    {
-      boxes[t].extend(points[p]);
-    }
-    size += boxes[t].diagonal().maxCoeff() / static_cast<double>(triangles.size());
-    this->Box.extend(boxes[t]);
-  }
-  this->Cell = std::max(2.0 * size, 1e-4 * this->Box.diagonal().maxCoeff());
-  const auto index = [&](const Vector3& p, int axis)
-  { return static_cast<int>((p[axis] - this->Box.min()[axis]) / this->Cell); };
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    this->Size[axis] = 1 + index(this->Box.max(), axis);
-  }
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-  {
-    for (int k = index(boxes[t].min(), 2); k <= index(boxes[t].max(), 2); ++k)
-    {
-      for (int j = index(boxes[t].min(), 1); j <= index(boxes[t].max(), 1); ++j)
-      {
-        for (int i = index(boxes[t].min(), 0); i <= index(boxes[t].max(), 0); ++i)
-        {
-          this->Entries.emplace_back(this->Key(i, j, k), static_cast<std::int64_t>(t));
-        }
-      }
-    }
-  }
-  std::sort(this->Entries.begin(), this->Entries.end());
-}
-
-std::uint64_t DistanceToSurface::Key(int i, int j, int k) const
-{
-  return (static_cast<std::uint64_t>(k) * this->Size[1] + j) * this->Size[0] + i;
-}
-
-double DistanceToSurface::operator()(const Vector3& position) const
-{
-  double best = std::numeric_limits<double>::infinity();
-  std::array<int, 3> centre;
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    const double x = (position[axis] - this->Box.min()[axis]) / this->Cell;
-    centre[axis] = static_cast<int>(std::clamp(x, 0.0, this->Size[axis] - 1.0));
-  }
-  // Shells of cells around the position until no further one can be nearer.
-  const int most = *std::max_element(this->Size.begin(), this->Size.end());
-  for (int shell = 0; shell <= most; ++shell)
-  {
-    if ((shell - 1.0) * this->Cell > best)
-    {
-      break;
-    }
-    for (int k = std::max(0, centre[2] - shell);
-         k <= std::min(this->Size[2] - 1, centre[2] + shell); ++k)
-    {
-      for (int j = std::max(0, centre[1] - shell);
-           j <= std::min(this->Size[1] - 1, centre[1] + shell); ++j)
-      {
-        const bool inner = std::max(std::abs(k - centre[2]), std::abs(j - centre[1])) < shell;
-        for (int i = centre[0] - shell; i <= centre[0] + shell; i += inner ? 2 * shell : 1)
-        {
-          if (i >= 0 && i < this->Size[0])
-          {
-            const std::uint64_t key = this->Key(i, j, k);
-            for (auto entry = std::lower_bound(this->Entries.begin(), this->Entries.end(),
-                   std::make_pair(key, std::int64_t(0)));
-                 entry != this->Entries.end() && entry->first == key; ++entry)
-            {
-              const Triangle& t = this->Triangles[entry->second];
-              best = std::min(best,
-                DistanceToTriangle(
-                  position, this->Points[t[0]], this->Points[t[1]], this->Points[t[2]]));
-            }
-          }
-        }
-      }
-    }
-  }
-  return best;
 }
 }

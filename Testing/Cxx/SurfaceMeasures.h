@@ -40,24 +40,6 @@ SurfaceMeasures MeasureSurface(
 /// Length over wanted length of every edge; wanted is the mean of the values at its ends.
 std::vector<double> RelativeEdgeLengths(const std::vector<Vector3>& points,
   const std::vector<Triangle>& triangles, const std::vector<double>& wanted);
-
-/// Exact distances to a triangle mesh.
-class DistanceToSurface
-{
-public:
-  DistanceToSurface(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles);
-  double operator()(const Vector3& position) const;
-
-private:
-  std::uint64_t Key(int i, int j, int k) const;
-
-  const std::vector<Vector3>& Points;
-  const std::vector<Triangle>& Triangles;
-  Eigen::AlignedBox3d Box;
-  double Cell = 1.0;
-  std::array<int, 3> Size{ 1, 1, 1 };
-  std::vector<std::pair<std::uint64_t, std::int64_t>> Entries; ///< cell and triangle, in order
-};
 }
 
 #endif

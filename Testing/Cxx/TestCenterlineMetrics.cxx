@@ -6,10 +6,8 @@
 #include "ParallelFor.h"
 #include "vtkCoronaryPhantomSource.h"
 
-#include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkCommand.h"
 #include "vtkCompositeDataPipeline.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
@@ -93,10 +91,7 @@ double Total(vtkTable* table, const char* column)
 void ExpectRefusal(vtkCenterlineMetrics* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  Messages messages(filter);
-  filter->Update();
-  ASSERT_EQ(messages.Errors.size(), 1U);
-  EXPECT_NE(messages.Errors[0].find(part), std::string::npos) << messages.Errors[0];
+  ExpectError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 0);
   EXPECT_EQ(filter->GetLines()->GetNumberOfPoints(), 0);
 }
@@ -350,14 +345,8 @@ TEST(CenterlineMetrics, AbortLeavesNothingAndTheNextRequestStartsAnew)
   vtkNew<vtkCenterlineMetrics> filter;
   filter->SetInputData(PhantomTree(63));
   filter->SetReferenceData(PhantomTree(63));
-  vtkNew<vtkCallbackCommand> stop;
-  stop->SetCallback([](vtkObject* sender, unsigned long, void*, void*)
-    { static_cast<vtkAlgorithm*>(sender)->SetAbortExecute(1); });
-  const unsigned long tag = filter->AddObserver(vtkCommand::ProgressEvent, stop);
-  filter->Update();
+  UpdateAborted(filter);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 0);
-  filter->RemoveObserver(tag);
-  filter->SetAbortExecute(0);
   filter->Update();
   EXPECT_GT(filter->GetOutput()->GetNumberOfRows(), 10);
   EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);

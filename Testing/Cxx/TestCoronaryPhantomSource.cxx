@@ -2,13 +2,13 @@
 #include "vtkCoronaryPhantomSource.h"
 
 #include "CoronaryPhantom.h"
+#include "FilterMessages.h"
 #include "ParallelFor.h"
 
 #include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
-#include "vtkExecutive.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -115,34 +115,6 @@ double FieldValue(vtkDataObject* data, const char* name)
   vtkDataArray* array = data->GetFieldData()->GetArray(name);
   return array && array->GetNumberOfValues() == 1 ? array->GetComponent(0, 0) : NaN;
 }
-
-/// Collects the errors of a source and of its executive, and keeps them from the console.
-class Errors
-{
-public:
-  explicit Errors(Source* source)
-  {
-    Collect(source, this->OfSource, this->Messages);
-    // The executive adds that the request failed.
-    Collect(source->GetExecutive(), this->OfExecutive, this->Echoes);
-  }
-
-  std::vector<std::string> Messages;
-  std::vector<std::string> Echoes;
-
-private:
-  static void Collect(
-    vtkObject* sender, vtkCallbackCommand* observer, std::vector<std::string>& messages)
-  {
-    observer->SetClientData(&messages);
-    observer->SetCallback([](vtkObject*, unsigned long, void* list, void* text)
-      { static_cast<std::vector<std::string>*>(list)->emplace_back(static_cast<char*>(text)); });
-    sender->AddObserver(vtkCommand::ErrorEvent, observer);
-  }
-
-  vtkNew<vtkCallbackCommand> OfSource;
-  vtkNew<vtkCallbackCommand> OfExecutive;
-};
 
 struct Column
 {
@@ -575,10 +547,10 @@ TEST(CoronaryPhantomSource, RefusesAProbeOfManyBlocks)
   vtkNew<vtkMultiBlockDataSet> blocks;
   blocks->SetBlock(0, vtkNew<vtkPolyData>());
   const auto source = MakeSource();
-  const Errors errors(source);
+  const Messages messages(source);
   source->SetInputDataObject(blocks);
   source->Update(Source::ProbePort);
-  EXPECT_EQ(errors.Echoes.size(), 1U);
+  EXPECT_EQ(messages.Echoes.size(), 1U);
 }
 
 TEST(CoronaryPhantomSource, ProbeOfAnotherPhantomKeepsTheTimesApart)
@@ -698,18 +670,18 @@ TEST(CoronaryPhantomSource, BadSettingsAreNamed)
   {
     SCOPED_TRACE(name);
     const auto source = MakeSource();
-    const Errors errors(source);
+    const Messages messages(source);
     spoil(source);
     source->Update(Source::TreePort);
-    ASSERT_EQ(errors.Messages.size(), 1U);
-    EXPECT_NE(errors.Messages[0].find(": " + name), std::string::npos) << errors.Messages[0];
+    ASSERT_EQ(messages.Errors.size(), 1U);
+    EXPECT_NE(messages.Errors[0].find(": " + name), std::string::npos) << messages.Errors[0];
     auto* tree = vtkPolyData::SafeDownCast(source->GetOutputDataObject(Source::TreePort));
     EXPECT_TRUE(!tree || tree->GetNumberOfPoints() == 0);
 
     // A second request does not pass in silence.
-    const std::size_t before = errors.Messages.size() + errors.Echoes.size();
+    const std::size_t before = messages.Errors.size() + messages.Echoes.size();
     source->Update(Source::TreePort);
-    EXPECT_GT(errors.Messages.size() + errors.Echoes.size(), before);
+    EXPECT_GT(messages.Errors.size() + messages.Echoes.size(), before);
   }
 }
 
@@ -718,12 +690,12 @@ TEST(CoronaryPhantomSource, RecoversFromABadSetting)
   const auto source = MakeSource();
   const std::vector<double> good = Positions(RequestPoints(source, Source::TreePort, 0.3));
   {
-    const Errors errors(source);
+    const Messages messages(source);
     source->SetNoise(-1.0);
     source->Update(Source::TreePort);
-    EXPECT_EQ(errors.Messages.size(), 1U);
+    EXPECT_EQ(messages.Errors.size(), 1U);
     source->Update(Source::TreePort);
-    EXPECT_EQ(errors.Messages.size(), 2U);
+    EXPECT_EQ(messages.Errors.size(), 2U);
     auto* tree = vtkPolyData::SafeDownCast(source->GetOutputDataObject(Source::TreePort));
     EXPECT_EQ(tree->GetNumberOfPoints(), 0);
   }

@@ -97,10 +97,7 @@ vtkSmartPointer<vtkPolyData> MakeFork(const char* radiusName)
 void ExpectRefusal(vtkCoronaryTreeTopology* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  Messages messages(filter);
-  filter->Update();
-  ASSERT_EQ(messages.Errors.size(), 1U);
-  EXPECT_NE(messages.Errors[0].find(part), std::string::npos) << messages.Errors[0];
+  ExpectError(filter, part);
   for (int port = 0; port < 3; ++port)
   {
     EXPECT_EQ(filter->GetOutput(port)->GetNumberOfPoints(), 0);

@@ -2,10 +2,10 @@
 // arrays, refusals.
 #include "vtkFastMarchingCenterline.h"
 
-#include "AppendedXmlData.h"
 #include "CenterlineExtraction.h"
 #include "FilterMessages.h"
 #include "Geometry.h"
+#include "SharedSurface.h"
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkFrangiVesselness.h"
 
@@ -26,14 +26,11 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkUnsignedCharArray.h"
-#include "vtkXMLPolyDataReader.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <string>
@@ -80,21 +77,6 @@ vtkSmartPointer<vtkImageData> Vessel()
   image->GetPointData()->SetScalars(mask);
   image->GetPointData()->AddArray(hu);
   return image;
-}
-
-vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& name)
-{
-  std::ifstream file(std::string(DYNAMICCORONARY_DATA_DIR) + "/" + name, std::ios::binary);
-  if (!file)
-  {
-    return nullptr;
-  }
-  const std::string text(std::istreambuf_iterator<char>(file), {});
-  vtkNew<vtkXMLPolyDataReader> reader;
-  reader->ReadFromInputStringOn();
-  reader->SetInputString(coronary::WithInlineXmlData(text));
-  reader->Update();
-  return reader->GetOutput();
 }
 
 int Statuses(vtkPolyData* data, const char* name, int index)
@@ -289,7 +271,8 @@ TEST(FastMarchingCenterline, RefusalsAndEmptyInput)
 
 TEST(FastMarchingCenterline, CoronariesOfTheVisibleHuman)
 {
-  vtkSmartPointer<vtkPolyData> surface = ReadSurface("hra-coronaries/F_coronary_arteries.vtp");
+  vtkSmartPointer<vtkPolyData> surface =
+    ReadSharedSurface("hra-coronaries/F_coronary_arteries.vtp");
   if (!surface)
   {
     GTEST_SKIP() << "no data in " << DYNAMICCORONARY_DATA_DIR;
@@ -383,8 +366,8 @@ TEST(FastMarchingCenterline, CoronariesOfTheVisibleHuman)
 
 TEST(FastMarchingCenterline, AortaAgreesWithVmtk)
 {
-  vtkSmartPointer<vtkPolyData> surface = ReadSurface("vmtk-aorta/aorta-surface.vtp");
-  vtkSmartPointer<vtkPolyData> theirs = ReadSurface("vmtk-aorta/aorta-centerline.vtp");
+  vtkSmartPointer<vtkPolyData> surface = ReadSharedSurface("vmtk-aorta/aorta-surface.vtp");
+  vtkSmartPointer<vtkPolyData> theirs = ReadSharedSurface("vmtk-aorta/aorta-centerline.vtp");
   if (!surface || !theirs)
   {
     GTEST_SKIP() << "no data in " << DYNAMICCORONARY_DATA_DIR;

@@ -130,10 +130,7 @@ Array* Get(vtkFieldData* data, const char* name)
 void ExpectRefusal(vtkFrenetSweepSurface* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  Messages messages(filter);
-  filter->Update();
-  ASSERT_EQ(messages.Errors.size(), 1U);
-  EXPECT_NE(messages.Errors[0].find(part), std::string::npos) << messages.Errors[0];
+  ExpectError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
   EXPECT_EQ(filter->GetPatches()->GetNumberOfBlocks(), 0U);
   EXPECT_EQ(filter->GetCaps()->GetNumberOfPoints(), 0);

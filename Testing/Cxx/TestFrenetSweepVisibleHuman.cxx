@@ -6,6 +6,7 @@
 #include "SharedSurface.h"
 #include "SurfaceMeasures.h"
 #include "TriangleIntersections.h"
+#include "TriangleTree.h"
 #include "vtkFastMarchingCenterline.h"
 #include "vtkSurfaceCleaner.h"
 
@@ -133,12 +134,12 @@ void SweepCoronaries(const std::string& name)
   {
     sum += radii->GetTuple1(i) / static_cast<double>(radii->GetNumberOfTuples());
   }
-  const coronary::DistanceToSurface distance(points, triangles);
+  const coronary::TriangleTree tree(points, triangles);
   std::vector<double> away;
   vtkPolyData* clean = cleaner->GetOutput();
   for (vtkIdType i = 0; i < clean->GetNumberOfPoints(); i += 7)
   {
-    away.push_back(distance(Vector3(clean->GetPoint(i))) / sum);
+    away.push_back(tree.Closest(Vector3(clean->GetPoint(i))).distance / sum);
   }
   std::sort(away.begin(), away.end());
   std::cout << name << ": " << triangles.size() << " triangles, smallest angle "

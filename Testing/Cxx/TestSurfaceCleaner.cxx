@@ -110,10 +110,7 @@ void ExpectClean(vtkPolyData* surface)
 void ExpectRefusal(vtkSurfaceCleaner* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  Messages messages(filter);
-  filter->Update();
-  ASSERT_EQ(messages.Errors.size(), 1U);
-  EXPECT_TRUE(messages.HasError(part)) << messages.Errors[0];
+  ExpectError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
 }
 }
@@ -215,14 +212,8 @@ TEST(SurfaceCleaner, AbortLeavesNothingAndTheNextRequestStartsAnew)
 {
   vtkNew<vtkSurfaceCleaner> filter;
   filter->SetInputData(Tube());
-  vtkNew<vtkCallbackCommand> stop;
-  stop->SetCallback([](vtkObject* sender, unsigned long, void*, void*)
-    { static_cast<vtkAlgorithm*>(sender)->SetAbortExecute(1); });
-  const unsigned long tag = filter->AddObserver(vtkCommand::ProgressEvent, stop);
-  filter->Update();
+  UpdateAborted(filter);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfCells(), 0);
-  filter->RemoveObserver(tag);
-  filter->SetAbortExecute(0);
   filter->Update();
   EXPECT_GT(filter->GetOutput()->GetNumberOfCells(), 0);
 }

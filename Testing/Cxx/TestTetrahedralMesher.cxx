@@ -5,10 +5,8 @@
 #include "TetrahedralMesh.h"
 #include "vtkCoronaryPhantomSource.h"
 
-#include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkCommand.h"
 #include "vtkDoubleArray.h"
 #include "vtkExecutive.h"
 #include "vtkFieldData.h"
@@ -79,10 +77,7 @@ vtkSmartPointer<vtkPolyData> Line(const std::vector<std::array<double, 3>>& plac
 void ExpectRefusal(vtkTetrahedralMesher* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  Messages messages(filter);
-  filter->Update();
-  ASSERT_EQ(messages.Errors.size(), 1U);
-  EXPECT_NE(messages.Errors[0].find(part), std::string::npos) << messages.Errors[0];
+  ExpectError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfCells(), 0);
   EXPECT_EQ(filter->GetBoundary()->GetNumberOfPoints(), 0);
   EXPECT_EQ(filter->GetEdges()->GetNumberOfPoints(), 0);
@@ -241,14 +236,8 @@ TEST_F(TetrahedralMesher, AbortLeavesNothingAndTheNextRequestStartsAnew)
 {
   vtkNew<vtkTetrahedralMesher> filter;
   filter->SetInputData(Cube());
-  vtkNew<vtkCallbackCommand> stop;
-  stop->SetCallback([](vtkObject* sender, unsigned long, void*, void*)
-    { static_cast<vtkAlgorithm*>(sender)->SetAbortExecute(1); });
-  const unsigned long tag = filter->AddObserver(vtkCommand::ProgressEvent, stop);
-  filter->Update();
+  UpdateAborted(filter);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfCells(), 0);
-  filter->RemoveObserver(tag);
-  filter->SetAbortExecute(0);
   filter->Update();
   EXPECT_GT(filter->GetOutput()->GetNumberOfCells(), 0);
 }

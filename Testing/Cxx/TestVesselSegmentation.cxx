@@ -2,13 +2,14 @@
 #include "vtkVesselSegmentation.h"
 
 #include "CoronaryPhantom.h"
+#include "FilterMessages.h"
 #include "ParallelFor.h"
 
 #include "vtkCallbackCommand.h"
+#include "vtkCommand.h"
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
-#include "vtkExecutive.h"
 #include "vtkFieldData.h"
 #include "vtkFloatArray.h"
 #include "vtkFrangiVesselness.h"
@@ -41,32 +42,6 @@ using Extent = std::array<int, 6>;
 namespace
 {
 constexpr double ReferenceTime = 0.75;
-
-/// What an algorithm reports.
-class Reports
-{
-public:
-  explicit Reports(vtkAlgorithm* algorithm)
-  {
-    this->Callback->SetClientData(this);
-    this->Callback->SetCallback(
-      [](vtkObject*, unsigned long event, void* self, void* text)
-      {
-        auto& list = event == vtkCommand::ErrorEvent ? static_cast<Reports*>(self)->Errors
-                                                     : static_cast<Reports*>(self)->Warnings;
-        list.emplace_back(static_cast<const char*>(text));
-      });
-    algorithm->AddObserver(vtkCommand::ErrorEvent, this->Callback);
-    algorithm->AddObserver(vtkCommand::WarningEvent, this->Callback);
-    algorithm->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, this->Callback);
-  }
-  std::string Error() const { return this->Errors.empty() ? "" : this->Errors.front(); }
-  std::vector<std::string> Errors;
-  std::vector<std::string> Warnings;
-
-private:
-  vtkNew<vtkCallbackCommand> Callback;
-};
 
 /// A bright ball, the "aorta", with a bent tube on it that tapers, in darkness.
 struct Tube
@@ -132,12 +107,12 @@ TEST(VesselSegmentation, PhantomWithoutAnyClick)
 {
   const auto source = MakePhantom();
   vtkNew<vtkVesselSegmentation> filter;
-  Reports reports(filter);
+  const Messages messages(filter);
   filter->SetInputConnection(source->GetOutputPort(vtkCoronaryPhantomSource::ImagePort));
   filter->GenerateProbabilityOn();
   filter->UpdateTimeStep(ReferenceTime);
-  ASSERT_TRUE(reports.Errors.empty()) << reports.Error();
-  EXPECT_TRUE(reports.Warnings.empty()) << reports.Warnings.front();
+  ASSERT_TRUE(messages.Errors.empty()) << testing::PrintToString(messages.Errors);
+  EXPECT_TRUE(messages.Warnings.empty()) << messages.Warnings.front();
 
   auto* image = vtkImageData::SafeDownCast(filter->GetOutputDataObject(0));
   vtkUnsignedCharArray* mask = MaskOf(filter);
@@ -185,11 +160,11 @@ TEST(VesselSegmentation, TheTubeWithoutTheBall)
   const std::vector<short> before(static_cast<short*>(image->GetScalarPointer()),
     static_cast<short*>(image->GetScalarPointer()) + image->GetNumberOfPoints());
   vtkNew<vtkVesselSegmentation> filter;
-  Reports reports(filter);
+  const Messages messages(filter);
   filter->SetInputData(image);
   filter->AddSeed(tube.ostium[0], tube.ostium[1], tube.ostium[2]);
   filter->Update();
-  ASSERT_TRUE(reports.Errors.empty()) << reports.Error();
+  ASSERT_TRUE(messages.Errors.empty()) << testing::PrintToString(messages.Errors);
   // From the wall of the ball at x = 10 to x = 36; the tube's length by its slope.
   double length = 0.0;
   for (double x = 10.0; x < 36.0; x += 0.01)
@@ -304,10 +279,10 @@ TEST(VesselSegmentation, SaysWhatIsWrong)
     filter->SetInputData(tube.Image());
     filter->AddSeed(tube.ostium[0], tube.ostium[1], tube.ostium[2]);
     change(filter);
-    Reports reports(filter);
+    const Messages messages(filter);
     filter->Update();
-    EXPECT_NE(reports.Error().find(word), std::string::npos)
-      << "wanted '" << word << "', got '" << reports.Error() << "'";
+    EXPECT_TRUE(messages.HasError(word))
+      << "wanted '" << word << "', got " << testing::PrintToString(messages.Errors);
     EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0) << word;
   };
   refuse([](auto* f) { f->SetLargestRadius(0.0); }, "LargestRadius");
@@ -381,15 +356,15 @@ TEST(VesselSegmentation, ASeedInTheDarkIsAWarning)
 {
   const Tube tube;
   vtkNew<vtkVesselSegmentation> filter;
-  Reports reports(filter);
+  const Messages messages(filter);
   filter->SetInputData(tube.Image());
   filter->AddSeed(tube.ostium[0], tube.ostium[1], tube.ostium[2]);
   filter->AddSeed(30.0, 3.0, 3.0);
   filter->AutomaticWindowOff();
   filter->Update();
-  EXPECT_TRUE(reports.Errors.empty()) << reports.Error();
-  ASSERT_EQ(reports.Warnings.size(), 1u);
-  EXPECT_NE(reports.Warnings.front().find("seed 1"), std::string::npos);
+  EXPECT_TRUE(messages.Errors.empty()) << testing::PrintToString(messages.Errors);
+  ASSERT_EQ(messages.Warnings.size(), 1u);
+  EXPECT_NE(messages.Warnings.front().find("seed 1"), std::string::npos);
 }
 
 TEST(VesselSegmentation, NaNVoxelsAreNoVessel)
@@ -409,11 +384,11 @@ TEST(VesselSegmentation, NaNVoxelsAreNoVessel)
   }
   image->GetPointData()->SetScalars(values);
   vtkNew<vtkVesselSegmentation> filter;
-  Reports reports(filter);
+  const Messages messages(filter);
   filter->SetInputData(image);
   filter->AddSeed(tube.ostium[0], tube.ostium[1], tube.ostium[2]);
   filter->Update();
-  EXPECT_TRUE(reports.Errors.empty()) << reports.Error();
+  EXPECT_TRUE(messages.Errors.empty()) << testing::PrintToString(messages.Errors);
   EXPECT_GT(Count(MaskOf(filter)), 500.0);
   for (vtkIdType n = 0; n < shorts->GetNumberOfPoints(); ++n)
   {
@@ -427,14 +402,8 @@ TEST(VesselSegmentation, AbortLeavesNothingAndTheNextRequestWorks)
   vtkNew<vtkVesselSegmentation> filter;
   filter->SetInputData(tube.Image());
   filter->AddSeed(tube.ostium[0], tube.ostium[1], tube.ostium[2]);
-  vtkNew<vtkCallbackCommand> abort;
-  abort->SetCallback([](vtkObject* caller, unsigned long, void*, void*)
-    { static_cast<vtkAlgorithm*>(caller)->SetAbortExecute(1); });
-  const unsigned long tag = filter->AddObserver(vtkCommand::ProgressEvent, abort);
-  filter->Update();
+  UpdateAborted(filter);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
-  filter->RemoveObserver(tag);
-  filter->SetAbortExecute(0);
   filter->Update();
   ASSERT_NE(MaskOf(filter), nullptr);
   EXPECT_GT(Count(MaskOf(filter)), 0.0);

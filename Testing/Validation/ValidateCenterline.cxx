@@ -8,6 +8,7 @@
 #include "CoronaryOstia.h"
 #include "CoronaryPhantom.h"
 #include "MultiscaleVesselness.h"
+#include "PhantomCases.h"
 #include "SegmentLabeling.h"
 #include "VesselSegmentation.h"
 
@@ -609,33 +610,6 @@ bool PrintInvariance(const Case& test)
     LargestMeanDifference, LargestDifference, Verdict(met));
   return met;
 }
-
-/// "101..110" or "3"
-std::vector<std::uint64_t> ParseSeeds(const std::string& text)
-{
-  const std::size_t dots = text.find("..");
-  const auto number = [&](const std::string& part)
-  {
-    if (part.empty() || part.size() > 18 ||
-      part.find_first_not_of("0123456789") != std::string::npos)
-    {
-      throw CLI::ValidationError("seeds", "'" + text + "' is neither a seed nor first..last");
-    }
-    return std::stoull(part);
-  };
-  const std::uint64_t first = number(text.substr(0, dots));
-  const std::uint64_t last = dots == std::string::npos ? first : number(text.substr(dots + 2));
-  if (last < first || last - first >= 10000)
-  {
-    throw CLI::ValidationError("seeds", "'" + text + "' is no range of at most 10000 seeds");
-  }
-  std::vector<std::uint64_t> seeds;
-  for (std::uint64_t seed = first; seed <= last; ++seed)
-  {
-    seeds.push_back(seed);
-  }
-  return seeds;
-}
 }
 
 int main(int argc, char** argv)
@@ -672,7 +646,7 @@ int main(int argc, char** argv)
     try
     {
       program.parse(argc, argv);
-      seeds = ParseSeeds(quick ? "1" : seedText);
+      seeds = ParseSeeds(quick ? "1" : seedText, LoneNumber::Seed);
     }
     catch (const CLI::ParseError& error)
     {

@@ -4,6 +4,7 @@
 #include "CoronaryOstia.h"
 #include "CoronaryPhantom.h"
 #include "MultiscaleVesselness.h"
+#include "PhantomCases.h"
 #include "VesselSegmentation.h"
 
 #include <CLI/CLI.hpp>
@@ -567,47 +568,6 @@ void PrintCases(const std::vector<Outcome>& all)
 // Options
 // ---------------------------------------------------------------------------------------------
 
-/// "20" (1 to 20) or "3..7"
-std::vector<std::uint64_t> ParseSeeds(const std::string& text)
-{
-  const std::size_t dots = text.find("..");
-  unsigned long first = 1;
-  unsigned long last = 0;
-  std::size_t used = 0;
-  try
-  {
-    if (dots != std::string::npos)
-    {
-      first = std::stoul(text.substr(0, dots), &used);
-      if (used != dots)
-      {
-        throw std::invalid_argument(text);
-      }
-      last = std::stoul(text.substr(dots + 2), &used);
-      used += dots + 2;
-    }
-    else
-    {
-      last = std::stoul(text, &used);
-    }
-  }
-  catch (const std::exception&)
-  {
-    used = 0;
-  }
-  if (text.find('-') != std::string::npos || used != text.size() || text.empty() || last < first ||
-    last - first >= 10000)
-  {
-    throw CLI::ValidationError("seeds", "'" + text + "' is neither a count nor first..last");
-  }
-  std::vector<std::uint64_t> seeds;
-  for (unsigned long seed = first; seed <= last; ++seed)
-  {
-    seeds.push_back(seed);
-  }
-  return seeds;
-}
-
 /// "0.5" or "0.35/0.35/0.6"
 Geometry ParseSpacing(const std::string& text)
 {
@@ -690,8 +650,8 @@ int Validate(int argc, char** argv)
       spacings = { "0.8" };
       tables = { "sampling" };
     }
-    seeds = ParseSeeds(seedText);
-    ostiaSeeds = ParseSeeds(ostiaSeedText);
+    seeds = ParseSeeds(seedText, LoneNumber::Count);
+    ostiaSeeds = ParseSeeds(ostiaSeedText, LoneNumber::Count);
     for (const std::string& text : spacings)
     {
       geometries.push_back(ParseSpacing(text));

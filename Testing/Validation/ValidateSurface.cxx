@@ -2,9 +2,11 @@
 // stdout; the exit code is 1 when a limit is missed.
 
 #include "CoronaryPhantom.h"
+#include "PhantomCases.h"
 #include "SurfaceMeasures.h"
 #include "SweepSurface.h"
 #include "TriangleIntersections.h"
+#include "TriangleTree.h"
 
 #include <CLI/CLI.hpp>
 
@@ -15,7 +17,6 @@
 #include <ctime>
 #include <exception>
 #include <fstream>
-#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -78,25 +79,6 @@ struct Outcome
   bool Met() const { return this->Sound() && this->Shapely() && this->Near() && this->Quick(); }
 };
 
-/// The plain phantom, or one of other shape, dominance and moment.
-PhantomSettings SettingsOf(std::uint64_t seed, bool varied, double spacing, double& moment)
-{
-  PhantomSettings settings;
-  settings.seed = seed;
-  settings.surfaceSpacing = spacing;
-  moment = 0.75;
-  if (varied)
-  {
-    settings.dominance = static_cast<Dominance>(seed % 3);
-    settings.ramus = seed % 2 == 1;
-    settings.stenoses = static_cast<int>(seed % 4);
-    settings.tortuosity = 1.0 + 0.25 * static_cast<double>(seed % 3);
-    settings.calibre = 0.9 + 0.05 * static_cast<double>(seed % 5);
-    moment = 0.05 * static_cast<double>(seed % 20);
-  }
-  return settings;
-}
-
 /// The phantom's ends are cut by planes that move with the tissue: they are part of the truth.
 std::vector<Vector3> EndNormals(const SweepTree& tree, const PhantomSurface& wall)
 {
@@ -135,7 +117,7 @@ std::vector<Vector3> EndNormals(const SweepTree& tree, const PhantomSurface& wal
   return normals;
 }
 
-void Distances(const std::vector<Vector3>& from, const DistanceToSurface& to, double& mean,
+void Distances(const std::vector<Vector3>& from, const TriangleTree& to, double& mean,
   double& largest, Vector3& where)
 {
   std::vector<double> distance(from.size());
@@ -144,7 +126,7 @@ void Distances(const std::vector<Vector3>& from, const DistanceToSurface& to, do
     {
       for (std::int64_t i = first; i < last; ++i)
       {
-        distance[i] = to(from[i]);
+        distance[i] = to.Closest(from[i]).distance;
       }
     });
   mean = largest = 0.0;
@@ -178,17 +160,11 @@ Outcome Run(std::uint64_t seed, bool varied, double spacing, bool cut,
   Outcome outcome;
   outcome.seed = seed;
   outcome.variant = varied ? "varied" : "plain";
-  double moment = 0.0;
-  const CoronaryPhantom phantom(SettingsOf(seed, varied, spacing, moment));
-  const PhantomTree truth = phantom.Tree(moment);
-  SweepTree tree;
-  tree.points = truth.points;
-  tree.radius = truth.radius;
-  for (const PhantomBranch& branch : truth.branches)
-  {
-    tree.branches.push_back({ branch.points, branch.groupId });
-  }
-  const PhantomSurface wall = phantom.Surface(moment);
+  PhantomCase which = MakePhantomCase(seed, varied);
+  which.settings.surfaceSpacing = spacing;
+  const CoronaryPhantom phantom(which.settings);
+  SweepTree tree = SweepTreeOf(phantom.Tree(which.moment));
+  const PhantomSurface wall = phantom.Surface(which.moment);
   if (cut)
   {
     tree.endNormals = EndNormals(tree, wall);
@@ -218,9 +194,9 @@ Outcome Run(std::uint64_t seed, bool varied, double spacing, bool cut,
     std::max<double>(1.0, static_cast<double>(edges.size()));
   Vector3 there = Vector3::Zero();
   Vector3 back = Vector3::Zero();
-  Distances(surface.points, DistanceToSurface(wall.points, wall.triangles), outcome.meanThere,
+  Distances(surface.points, TriangleTree(wall.points, wall.triangles), outcome.meanThere,
     outcome.largestThere, there);
-  Distances(wall.points, DistanceToSurface(surface.points, surface.triangles), outcome.meanBack,
+  Distances(wall.points, TriangleTree(surface.points, surface.triangles), outcome.meanBack,
     outcome.largestBack, back);
   outcome.volumeError =
     outcome.measures.volume / MeasureSurface(wall.points, wall.triangles).volume - 1.0;
@@ -274,27 +250,6 @@ void Print(const std::vector<Outcome>& outcomes)
       o.Met() ? "met" : "**MISSED**");
   }
 }
-
-/// "20" (1 to 20) or "3..7"
-std::vector<std::uint64_t> ParseSeeds(const std::string& text)
-{
-  unsigned long long first = 1;
-  unsigned long long last = 0;
-  int used = 0;
-  const bool range = text.find("..") != std::string::npos;
-  const int found = range ? std::sscanf(text.c_str(), "%6llu..%6llu%n", &first, &last, &used)
-                          : std::sscanf(text.c_str(), "%6llu%n", &last, &used);
-  if (found != (range ? 2 : 1) || used != static_cast<int>(text.size()) || last < first)
-  {
-    throw CLI::ValidationError("seeds", "'" + text + "' is neither a count nor first..last");
-  }
-  std::vector<std::uint64_t> seeds;
-  for (unsigned long long seed = first; seed <= last; ++seed)
-  {
-    seeds.push_back(seed);
-  }
-  return seeds;
-}
 }
 
 int main(int argc, char** argv)
@@ -338,7 +293,7 @@ int main(int argc, char** argv)
       seedText = "3..3";
       variants = { "varied" };
     }
-    seeds = ParseSeeds(seedText);
+    seeds = ParseSeeds(seedText, LoneNumber::Count);
   }
   catch (const CLI::ParseError& error)
   {

@@ -1,8 +1,10 @@
 // Tetrahedral meshes of surfaces swept along the phantoms' true trees, or of the phantoms' true
-// surfaces, with the true centerlines inside, and of foreign surfaces after cleaning. Tables in Markdown on stdout; the exit code is 1 when a limit is missed.
+// surfaces, with the true centerlines inside, and of foreign surfaces after cleaning. Tables in
+// Markdown on stdout; the exit code is 1 when a limit is missed.
 
-#include "AppendedXmlData.h"
 #include "CoronaryPhantom.h"
+#include "PhantomCases.h"
+#include "SharedSurface.h"
 #include "SurfaceCleaning.h"
 #include "SweepSurface.h"
 #include "TetrahedralMesh.h"
@@ -11,7 +13,6 @@
 #include "vtkIdList.h"
 #include "vtkNew.h"
 #include "vtkPolyData.h"
-#include "vtkXMLPolyDataReader.h"
 
 #include <CLI/CLI.hpp>
 
@@ -20,8 +21,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <exception>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
@@ -162,38 +161,20 @@ Outcome Mesh(const std::string& name, const TetrahedralMeshInput& input,
 /// Fed to the mesher: what the pipeline makes from the phantom's tree, or the phantom's own wall.
 TetrahedralMeshInput PhantomInput(std::uint64_t seed, bool varied, bool swept, double spacing)
 {
-  PhantomSettings settings;
-  settings.seed = seed;
-  settings.surfaceSpacing = spacing;
-  double moment = 0.75;
-  if (varied)
-  {
-    settings.dominance = static_cast<Dominance>(seed % 3);
-    settings.ramus = seed % 2 == 1;
-    settings.stenoses = static_cast<int>(seed % 4);
-    settings.tortuosity = 1.0 + 0.25 * static_cast<double>(seed % 3);
-    settings.calibre = 0.9 + 0.05 * static_cast<double>(seed % 5);
-    moment = 0.05 * static_cast<double>(seed % 20);
-  }
-  const CoronaryPhantom phantom(settings);
-  const PhantomTree tree = phantom.Tree(moment);
+  PhantomCase which = MakePhantomCase(seed, varied);
+  which.settings.surfaceSpacing = spacing;
+  const CoronaryPhantom phantom(which.settings);
+  const PhantomTree tree = phantom.Tree(which.moment);
   TetrahedralMeshInput input;
   if (swept)
   {
-    SweepTree axes;
-    axes.points = tree.points;
-    axes.radius = tree.radius;
-    for (const PhantomBranch& branch : tree.branches)
-    {
-      axes.branches.push_back({ branch.points, branch.groupId });
-    }
-    SweptSurface surface = SweepVesselTree(axes, {});
+    SweptSurface surface = SweepVesselTree(SweepTreeOf(tree), {});
     input.points = std::move(surface.points);
     input.triangles = std::move(surface.triangles);
   }
   else
   {
-    PhantomSurface surface = phantom.Surface(moment);
+    PhantomSurface surface = phantom.Surface(which.moment);
     input.points = std::move(surface.points);
     input.triangles = std::move(surface.triangles);
   }
@@ -210,19 +191,13 @@ TetrahedralMeshInput PhantomInput(std::uint64_t seed, bool varied, bool swept, d
 }
 
 /// A surface of triangles; without points when the file is not there.
-TetrahedralMeshInput ReadSurface(const std::string& name)
+TetrahedralMeshInput InputOf(vtkPolyData* surface)
 {
   TetrahedralMeshInput input;
-  std::ifstream file(name, std::ios::binary);
-  if (!file)
+  if (surface == nullptr)
   {
     return input;
   }
-  vtkNew<vtkXMLPolyDataReader> reader;
-  reader->ReadFromInputStringOn();
-  reader->SetInputString(WithInlineXmlData(std::string(std::istreambuf_iterator<char>(file), {})));
-  reader->Update();
-  vtkPolyData* surface = reader->GetOutput();
   input.points.resize(static_cast<std::size_t>(surface->GetNumberOfPoints()));
   for (std::size_t i = 0; i < input.points.size(); ++i)
   {
@@ -235,27 +210,6 @@ TetrahedralMeshInput ReadSurface(const std::string& name)
     input.triangles.push_back({ cell->GetId(0), cell->GetId(1), cell->GetId(2) });
   }
   return input;
-}
-
-/// "20" (1 to 20) or "3..7"
-std::vector<std::uint64_t> ParseSeeds(const std::string& text)
-{
-  unsigned long long first = 1;
-  unsigned long long last = 0;
-  int used = 0;
-  const bool range = text.find("..") != std::string::npos;
-  const int found = range ? std::sscanf(text.c_str(), "%6llu..%6llu%n", &first, &last, &used)
-                          : std::sscanf(text.c_str(), "%6llu%n", &last, &used);
-  if (found != (range ? 2 : 1) || used != static_cast<int>(text.size()) || last < first)
-  {
-    throw CLI::ValidationError("seeds", "'" + text + "' is neither a count nor first..last");
-  }
-  std::vector<std::uint64_t> seeds;
-  for (unsigned long long seed = first; seed <= last; ++seed)
-  {
-    seeds.push_back(seed);
-  }
-  return seeds;
 }
 
 bool Print(const Outcome& outcome, bool timed)
@@ -322,7 +276,7 @@ int Run(int argc, char** argv)
       seedText = "3..3";
       variants = { "plain" };
     }
-    seeds = ParseSeeds(seedText);
+    seeds = ParseSeeds(seedText, LoneNumber::Count);
   }
   catch (const CLI::ParseError& error)
   {
@@ -370,7 +324,8 @@ int Run(int argc, char** argv)
   }
   if (!quick && !phantomsOnly)
   {
-    TetrahedralMeshInput input = ReadSurface(data + "/hra-coronaries/F_coronary_arteries.vtp");
+    const auto surface = ReadSurface(data + "/hra-coronaries/F_coronary_arteries.vtp");
+    TetrahedralMeshInput input = InputOf(surface);
     if (input.triangles.empty())
     {
       std::fprintf(stderr, "validate-volume: no F_coronary_arteries.vtp in %s\n", data.c_str());
