@@ -6,10 +6,11 @@ void MarchingQueue::Extend(List& list)
 {
   if (this->Free == nullptr)
   {
-    this->Slabs.push_back(std::make_unique<Slab>());
-    for (Chunk& chunk : *this->Slabs.back())
+    this->Slabs.emplace_back(this->Slabs.size() < 16 ? SmallSlab : LargeSlab, Chunk{});
+    HugeArray<Chunk>& slab = this->Slabs.back();
+    for (std::size_t chunk = slab.Size(); chunk-- > 0;)
     {
-      this->Release(&chunk);
+      this->Release(slab.Data() + chunk);
     }
   }
   Chunk* const chunk = this->Free;

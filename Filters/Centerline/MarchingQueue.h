@@ -14,12 +14,13 @@
 #ifndef DynamicCoronary_MarchingQueue_h
 #define DynamicCoronary_MarchingQueue_h
 
+#include "HugeArray.h"
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <memory>
 #include <vector>
 
 namespace coronary
@@ -107,7 +108,12 @@ public:
   /// Greatest number of bytes that it has held.
   std::size_t MemorySize() const
   {
-    return this->Slabs.size() * sizeof(Slab) + this->Heap.capacity() * sizeof(Entry);
+    std::size_t size = this->Heap.capacity() * sizeof(Entry);
+    for (const HugeArray<Chunk>& slab : this->Slabs)
+    {
+      size += slab.MemorySize();
+    }
+    return size;
   }
 
 private:
@@ -127,7 +133,9 @@ private:
     std::uint32_t count;
     std::array<Entry, capacity> entries;
   };
-  using Slab = std::array<Chunk, 64>;
+  // A small queue takes little; of a great one every list lies in a few pages of memory.
+  static constexpr std::size_t SmallSlab = 64;
+  static constexpr std::size_t LargeSlab = (std::size_t{ 2 } << 20) / sizeof(Chunk);
   struct List
   {
     Chunk* newest = nullptr;
@@ -249,7 +257,7 @@ private:
   std::size_t HeapLimit = SmallHeap;
   std::array<std::array<List, 256>, Levels> Lists;
   std::array<std::array<std::uint64_t, 4>, Levels> Filled{};
-  std::vector<std::unique_ptr<Slab>> Slabs;
+  std::vector<HugeArray<Chunk>> Slabs;
   Chunk* Free = nullptr;
   std::uint64_t Dealt = 0;   ///< entries of the last buckets
   std::uint32_t Buckets = 0; ///< their number
