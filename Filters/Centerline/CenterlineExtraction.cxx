@@ -73,6 +73,12 @@ double LineDistance(const Vector3& point, const Vector3& origin, const Vector3& 
   return (offset - offset.dot(direction) * direction).norm();
 }
 
+/// Between where a great branch's axis can be seen and the parent's axis; mean of phantoms. Radians.
+constexpr double GreatBranchBend = 0.2;
+/// A vessel goes straight on if it bends by no more, and the other one by so much more. Radians.
+constexpr double MostBend = 0.5;
+constexpr double LeastTurn = 0.35;
+
 class Extractor
 {
 public:
@@ -154,6 +160,9 @@ private:
   void FindTips();
   void FollowThinBranches();
   void FollowTargets();
+  void StraightenFork(
+    CenterlineTree& tree, std::size_t parent, std::size_t turning, std::size_t straight) const;
+  void StraightenForks(CenterlineTree& tree) const;
   void Finish();
   void SeedsInOneVessel();
 
@@ -1008,8 +1017,9 @@ std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
   const std::vector<Vector3> arcs =
     follow ? this->FollowOuterWall(course, good, outside) : std::vector<Vector3>();
   std::vector<Vector3> samples = arcs;
+  // Over a short chord: a branch may turn within two radii of its mouth.
   const double length =
-    std::max((arcs.empty() ? 2.5 : 1.5) * course.radius[good], 5.0 * this->Voxel);
+    std::max((arcs.empty() ? 1.4 : 1.0) * course.radius[good], 4.0 * this->Voxel);
   for (std::size_t i = good; i < course.size() && samples.size() * this->Step <= length; ++i)
   {
     if (course.confidence[i] >= this->Settings.minimumConfidence || i == good)
@@ -1023,18 +1033,23 @@ std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
   double least = std::numeric_limits<double>::infinity();
   if (samples.size() >= 3)
   {
-    Vector3 mean = Vector3::Zero();
-    for (const Vector3& sample : samples)
+    Vector3 direction = (samples.back() - samples.front()).normalized();
+    if (!arcs.empty())
     {
-      mean += sample / static_cast<double>(samples.size());
+      // A great branch leaves in the direction of the flow and bends away, inside the lumen too.
+      const auto at = [&](std::ptrdiff_t i) -> const Vector3&
+      {
+        const std::int64_t p = chain[static_cast<std::size_t>(i)];
+        return this->Tree.points[static_cast<std::size_t>(p)];
+      };
+      direction = (direction + GreatBranchBend * (at(high) - at(low)).normalized()).normalized();
     }
-    const Vector3 direction = (samples.back() - samples.front()).normalized();
     for (std::ptrdiff_t i = low; i <= high; ++i)
     {
       const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
       // Behind the daughter's beginning, and not far away.
       const double along = (this->Tree.points[p] - samples.front()).dot(direction);
-      const double distance = LineDistance(this->Tree.points[p], mean, direction) +
+      const double distance = LineDistance(this->Tree.points[p], samples.front(), direction) +
         (along > 0.0 ? 2.0 * along : 0.0) - 0.02 * along;
       if (distance < least)
       {
@@ -1435,6 +1450,149 @@ void Extractor::FollowTargets()
   }
 }
 
+/// Sets `turning` off from the straight axis of `parent` and `straight`, if these two are that.
+void Extractor::StraightenFork(
+  CenterlineTree& tree, std::size_t parent, std::size_t turning, std::size_t straight) const
+{
+  const auto at = [&](std::int64_t point) -> Vector3&
+  { return tree.points[static_cast<std::size_t>(point)]; };
+  const auto radiusAt = [&](std::int64_t point) -> double&
+  { return tree.radius[static_cast<std::size_t>(point)]; };
+  const auto after = [&](const std::vector<std::int64_t>& points, std::size_t from, double length)
+  {
+    std::size_t i = from;
+    for (double passed = 0.0; i + 1 < points.size() && passed < length; ++i)
+    {
+      passed += (at(points[i + 1]) - at(points[i])).norm();
+    }
+    return i;
+  };
+  // All from the fork on.
+  std::vector<std::int64_t> behind = tree.branches[parent].points;
+  std::reverse(behind.begin(), behind.end());
+  const std::vector<std::int64_t>& ahead = tree.branches[straight].points;
+  const std::vector<std::int64_t>& aside = tree.branches[turning].points;
+  const double wide = radiusAt(behind.front());
+
+  // The straight axis is a cubic curve between the parts that the mouth does not reach.
+  const double reach = wide + 0.5 * radiusAt(aside[aside.size() / 2]);
+  const double chord = 1.5 * wide + 2.0 * this->Voxel;
+  const std::size_t low = after(behind, 0, reach);
+  const std::size_t high = after(ahead, 0, reach);
+  const std::size_t lowest = after(behind, low, chord);
+  const std::size_t highest = after(ahead, high, chord);
+  const std::size_t out = after(aside, 0, reach + wide);
+  const std::size_t farthest = after(aside, out, chord);
+  if (lowest + 1 == behind.size() || highest + 1 == ahead.size() || farthest + 1 == aside.size())
+  {
+    return;
+  }
+  const Vector3 from = at(behind[low]);
+  const Vector3 to = at(ahead[high]);
+  const Vector3 forwards = (from - at(behind[lowest])).normalized();
+  const Vector3 onwards = (at(ahead[highest]) - to).normalized();
+  const Vector3 away = (at(aside[farthest]) - at(aside[out])).normalized();
+  const double bend = std::acos(std::min(1.0, std::max(-1.0, forwards.dot(onwards))));
+  if (bend > MostBend || forwards.dot(away) > std::cos(bend + LeastTurn))
+  {
+    return;
+  }
+  const double handle = (to - from).norm() / 3.0;
+  const auto axis = [&](double t) -> Vector3
+  {
+    const double u = 1.0 - t;
+    return u * u * u * from + 3.0 * u * u * t * (from + handle * forwards) +
+      3.0 * u * t * t * (to - handle * onwards) + t * t * t * to;
+  };
+  constexpr int pieces = 100;
+  const auto distance = [&](const Vector3& point)
+  {
+    double least = std::numeric_limits<double>::infinity();
+    for (int piece = 0; piece <= pieces; ++piece)
+    {
+      least = std::min(least, (axis(static_cast<double>(piece) / pieces) - point).norm());
+    }
+    return least;
+  };
+  std::size_t alone = 1;
+  while (alone < out &&
+    (distance(at(aside[alone])) < 1.15 * wide ||
+      tree.confidence[static_cast<std::size_t>(aside[alone])] < this->Settings.minimumConfidence))
+  {
+    ++alone;
+  }
+  const Vector3 origin = at(aside[alone]);
+  const double own = radiusAt(aside[alone]);
+  const std::size_t end = after(aside, alone, std::max(1.4 * own, 4.0 * this->Voxel));
+  const Vector3 direction = (at(aside[end]) - origin).normalized();
+  double least = std::numeric_limits<double>::infinity();
+  double meeting = 0.0;
+  for (int piece = 0; piece <= pieces; ++piece)
+  {
+    const double t = static_cast<double>(piece) / pieces;
+    const double lateral = LineDistance(axis(t), origin, direction);
+    if (lateral < least)
+    {
+      least = lateral;
+      meeting = t;
+    }
+  }
+  if (least > wide || meeting < 0.02 || meeting > 0.98)
+  {
+    return;
+  }
+  const Vector3 fork = axis(meeting);
+  const auto place = [&](const std::vector<std::int64_t>& points, std::size_t last,
+                       const std::function<Vector3(double)>& curve)
+  {
+    for (std::size_t i = 0; i < last; ++i)
+    {
+      at(points[i]) = curve(static_cast<double>(i) / static_cast<double>(last));
+      tree.confidence[static_cast<std::size_t>(points[i])] = 0.0;
+    }
+  };
+  place(aside, alone, [&](double t) -> Vector3 { return fork + t * (origin - fork); });
+  for (std::size_t i = 1; i < alone; ++i)
+  {
+    radiusAt(aside[i]) = std::min(radiusAt(aside[i]), own);
+  }
+  place(behind, low, [&](double t) { return axis(meeting * (1.0 - t)); });
+  place(ahead, high, [&](double t) { return axis(meeting + (1.0 - meeting) * t); });
+}
+
+/// A path that turned off is rounded where it did, and the vessel that went straight on was set on
+/// to that curve. Only the two axes' places change.
+void Extractor::StraightenForks(CenterlineTree& tree) const
+{
+  std::map<std::int64_t, std::vector<std::size_t>> daughters;
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    if (tree.branches[b].parentGroupId >= 0)
+    {
+      daughters[tree.branches[b].points.front()].push_back(b);
+    }
+  }
+  for (const auto& [point, two] : daughters)
+  {
+    if (two.size() != 2)
+    {
+      continue;
+    }
+    const auto parent = static_cast<std::size_t>(tree.branches[two[0]].parentGroupId);
+    const auto pathOf = [&](std::int64_t p) { return this->BranchOf[static_cast<std::size_t>(p)]; };
+    const std::vector<std::int64_t>& before = tree.branches[parent].points;
+    const int path = pathOf(before[before.size() - 2]);
+    for (int turning = 0; turning < 2; ++turning)
+    {
+      // The path that the other one was set on to.
+      if (pathOf(tree.branches[two[turning]].points[1]) == path)
+      {
+        this->StraightenFork(tree, parent, two[turning], two[1 - turning]);
+      }
+    }
+  }
+}
+
 void Extractor::Finish()
 {
   for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
@@ -1456,6 +1614,11 @@ void Extractor::Finish()
   }
   this->CorrectRadii();
   this->Result.tree = SplitAtBifurcations(this->Tree);
+  if (this->Settings.snap)
+  {
+    this->StraightenForks(this->Result.tree);
+    MeasureTree(this->Result.tree);
+  }
   std::map<std::int64_t, CenterlineBifurcation> joints;
   for (const CenterlineTree::Branch& branch : this->Result.tree.branches)
   {
