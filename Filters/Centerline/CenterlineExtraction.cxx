@@ -73,6 +73,7 @@ double LineDistance(const Vector3& point, const Vector3& origin, const Vector3& 
   return (offset - offset.dot(direction) * direction).norm();
 }
 
+constexpr double GreatBranch = 0.6; ///< radius in radii of its parent
 /// Between where a great branch's axis can be seen and the parent's axis; mean of phantoms. Radians.
 constexpr double GreatBranchBend = 0.2;
 /// A vessel goes straight on if it bends by no more, and the other one by so much more. Radians.
@@ -1013,9 +1014,10 @@ std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
   // A great branch stands alone far from the axis only: from there back into the parent's lumen, as
   // far as its outer wall is to be seen. Not in masks and surfaces: there an axis is that of
   // inscribed spheres, and a lumen that widens before it divides has no circle.
-  const bool follow = std::isnan(this->Lumen.level) && course.radius[good] > 0.6 * parentRadius;
+  const bool great =
+    std::isnan(this->Lumen.level) && course.radius[good] > GreatBranch * parentRadius;
   const std::vector<Vector3> arcs =
-    follow ? this->FollowOuterWall(course, good, outside) : std::vector<Vector3>();
+    great ? this->FollowOuterWall(course, good, outside) : std::vector<Vector3>();
   std::vector<Vector3> samples = arcs;
   // Over a short chord: a branch may turn within two radii of its mouth.
   const double length =
@@ -1034,7 +1036,7 @@ std::size_t Extractor::JoinParent(Course& course, std::int32_t owner) const
   if (samples.size() >= 3)
   {
     Vector3 direction = (samples.back() - samples.front()).normalized();
-    if (!arcs.empty())
+    if (great)
     {
       // A great branch leaves in the direction of the flow and bends away, inside the lumen too.
       const auto at = [&](std::ptrdiff_t i) -> const Vector3&
@@ -1483,12 +1485,15 @@ void Extractor::StraightenFork(
   const std::size_t highest = after(ahead, high, chord);
   const std::size_t out = after(aside, 0, reach + wide);
   const std::size_t farthest = after(aside, out, chord);
-  if (lowest + 1 == behind.size() || highest + 1 == ahead.size() || farthest + 1 == aside.size())
+  const Vector3 from = at(behind[low]);
+  const Vector3 to = at(ahead[high]);
+  const auto isShort = [&](const std::vector<std::int64_t>& points, std::size_t i, std::size_t j)
+  { return (at(points[j]) - at(points[i])).norm() < 0.5 * chord; };
+  if (isShort(behind, low, lowest) || isShort(ahead, high, highest) ||
+    isShort(aside, out, farthest))
   {
     return;
   }
-  const Vector3 from = at(behind[low]);
-  const Vector3 to = at(ahead[high]);
   const Vector3 forwards = (from - at(behind[lowest])).normalized();
   const Vector3 onwards = (at(ahead[highest]) - to).normalized();
   const Vector3 away = (at(aside[farthest]) - at(aside[out])).normalized();
@@ -1524,7 +1529,11 @@ void Extractor::StraightenFork(
   const Vector3 origin = at(aside[alone]);
   const double own = radiusAt(aside[alone]);
   const std::size_t end = after(aside, alone, std::max(1.4 * own, 4.0 * this->Voxel));
-  const Vector3 direction = (at(aside[end]) - origin).normalized();
+  Vector3 direction = (at(aside[end]) - origin).normalized();
+  if (own > GreatBranch * wide)
+  {
+    direction = (direction + GreatBranchBend * forwards).normalized();
+  }
   double least = std::numeric_limits<double>::infinity();
   double meeting = 0.0;
   for (int piece = 0; piece <= pieces; ++piece)
