@@ -428,6 +428,52 @@ TEST(CenterlineExtraction, OneSharedPointAtABifurcation)
   EXPECT_NO_THROW(CheckTree(result.tree));
 }
 
+// The longer way turns off by more than a right angle: its path is rounded there, and the vessel that
+// goes straight on is set on to that curve.
+TEST(CenterlineExtraction, TheForkOfALongBranchThatTurnsOffIsWhereTheAxesMeet)
+{
+  for (const double angle : { 1.2, 1.6, 1.9 })
+  {
+    SCOPED_TRACE(angle);
+    const Vector3 fork(1.0, 0.0, 0.0);
+    const Vector3 away = 13.0 * Vector3(std::cos(angle), std::sin(angle), 0.1);
+    const std::vector<Tube> tubes = { { Line({ -13.0, 0.0, 0.0 }, fork), 1.6 },
+      { Line(fork, { 9.0, 0.5, 0.0 }), 1.4 }, { Line(fork, fork + away), 0.9 } };
+    const Scene scene(tubes, Vector3::Constant(0.4), Oblique(), Vector3::Zero(), 14.5);
+    const CenterlineResult result =
+      ExtractCenterlines(scene.Input({ { -12.5, 0.0, 0.0 } }), CenterlineSettings{});
+    ASSERT_EQ(result.bifurcations.size(), 1U);
+    const Vector3& found =
+      result.tree.points[static_cast<std::size_t>(result.bifurcations.front().point)];
+    EXPECT_LT((found - fork).norm(), 0.5);
+    // The straight axis stays one, and no point goes back.
+    for (const CenterlineTree::Branch& branch : result.tree.branches)
+    {
+      for (std::size_t i = 2; i < branch.points.size(); ++i)
+      {
+        const auto at = [&](std::size_t n) -> const Vector3&
+        { return result.tree.points[static_cast<std::size_t>(branch.points[n])]; };
+        EXPECT_GT((at(i) - at(i - 1)).dot(at(i - 1) - at(i - 2)), 0.0);
+      }
+    }
+    for (std::size_t p = 0; p < result.tree.points.size(); ++p)
+    {
+      double least = std::numeric_limits<double>::infinity();
+      for (const Tube& tube : tubes)
+      {
+        least = std::min(least, DistanceToPolyline(result.tree.points[p], tube.axis));
+      }
+      // At its tip a vessel is seen up to a radius farther than its axis.
+      const bool tip = std::any_of(tubes.begin(), tubes.end(),
+        [&](const Tube& tube) {
+          return tube.axis.back() != fork &&
+            (result.tree.points[p] - tube.axis.back()).norm() < 1.6;
+        });
+      EXPECT_TRUE(tip || least < 0.3) << result.tree.points[p].transpose() << ": " << least;
+    }
+  }
+}
+
 TEST(CenterlineExtraction, MetresAndShiftsChangeNothing)
 {
   const Tube tube{ Line(Vector3(-12, -5, -9), Vector3(11, 7, 10)), 1.5 };
