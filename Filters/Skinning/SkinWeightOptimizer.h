@@ -1,0 +1,106 @@
+/**
+ * @file SkinWeightOptimizer.h
+ * @brief Bounded skin weights: alternating directions, then an exact solve on the active set.
+ *
+ * Inside the library only.
+ *
+ * Minimises the sum over bones of 1/2 w'Qw + c'w over weights in a set that is simple at every point:
+ * the simplex over the bones that may have weight there (Joint), or an interval each (Independent).
+ * Douglas-Rachford splitting in its scaled form, with R = rho diag(Q):
+ *   z = projection of s,  x = (Q + R)^-1 (R (2 z - s) - c),  s += relaxation (x - z),
+ * sped up by Anderson acceleration. At its fixed point Qz + c = R (z - s), so that s - z is the
+ * multiplier of the bounds.
+ */
+#ifndef DynamicCoronary_SkinWeightOptimizer_h
+#define DynamicCoronary_SkinWeightOptimizer_h
+
+#include "SkinWeightSystem.h"
+
+#include <memory>
+
+namespace coronary
+{
+class SkinWeightOptimizer
+{
+public:
+  SkinWeightOptimizer(const SkinWeightSystem& system, const SkinWeightSettings& settings);
+
+  void Run(const ProgressCallback& progress);
+
+  /// Convergence, energy and violations.
+  void Describe(SkinWeights& result) const;
+
+  /// Calls function(bone, weight) for the bones that may have weight in a row, ascending.
+  template <typename Function>
+  void ForWeights(std::int64_t row, const Function& function) const
+  {
+    for (std::int64_t p = this->PairOffset[row]; p < this->PairOffset[row + 1]; ++p)
+    {
+      function(this->PairBone[p], this->Weights[this->PairIndex[p]]);
+    }
+  }
+
+private:
+  using Values = std::vector<double>;
+
+  /// Bones that may have weight in the same rows: they share a factor.
+  struct Group
+  {
+    std::vector<std::int32_t> bones;
+    std::vector<std::int32_t> rows; ///< ascending
+    std::int64_t base = 0;          ///< of its first value; then bone by bone
+    std::unique_ptr<SparseCholesky> factor;
+  };
+  /// Columns of one group that one thread solves for at a time.
+  struct Task
+  {
+    std::size_t group;
+    std::int64_t firstColumn;
+    std::int64_t columns;
+    std::unique_ptr<SparseCholesky::Workspace> workspace;
+  };
+  struct Violation
+  {
+    double inside = 0.0;     ///< where bones may have weight
+    double everywhere = 0.0; ///< all bones
+    double energy = 0.0;
+    double gap = 0.0;
+  };
+
+  void MakeGroups();
+  void MakePairs();
+  void Factorize();
+  void Project(const Values& s, Values& z) const;
+  void Solve(const Values& s, const Values& z, Values& x);
+  /// Qz + c for all pairs; `everywhere` judges the other bones too.
+  Violation Judge(const Values& z, Values& gradient, bool everywhere) const;
+  bool Polish(const ProgressCallback& progress);
+  bool PolishJoint(const ProgressCallback& progress);
+  bool PolishIndependent(const ProgressCallback& progress);
+  double Dot(const Values& a, const Values& b) const;
+
+  const SkinWeightSystem& System;
+  const SkinWeightSettings Settings;
+  const bool Joint;
+  std::vector<Group> Groups;
+  std::vector<Task> Tasks;
+  std::int64_t Size = 0; ///< number of pairs of a row and a bone
+  // Pairs by rows.
+  std::vector<std::int64_t> PairOffset;
+  std::vector<std::int32_t> PairBone;
+  std::vector<std::int64_t> PairIndex; ///< into the values
+  // Pairs by values.
+  std::vector<std::int32_t> RowOfValue;
+  Values Linear;
+
+  double Rho = 0.03;
+  Values Weights;
+  Violation Quality;
+  bool Converged = false;
+  int Iterations = 0;
+  int Factorizations = 0;
+  int PolishSteps = 0;
+};
+}
+
+#endif

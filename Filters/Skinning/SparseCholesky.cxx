@@ -1,0 +1,205 @@
+#include "SparseCholesky.h"
+
+#include <cholmod.h>
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+struct Common
+{
+  Common()
+  {
+    cholmod_l_start(&this->c);
+    this->c.print = 0;
+    this->c.error_handler = nullptr;
+    this->c.try_catch = 1;
+    this->c.final_ll = 1;
+    // Else it may be switched to another precision or a device by the environment.
+    this->c.useGPU = 0;
+  }
+  ~Common() { cholmod_l_finish(&this->c); }
+  Common(const Common&) = delete;
+  Common& operator=(const Common&) = delete;
+  cholmod_common c{};
+};
+
+struct LowerTriangle
+{
+  std::vector<SuiteSparse_long> offset;
+  std::vector<SuiteSparse_long> row;
+  std::vector<double> value;
+
+  cholmod_sparse View()
+  {
+    cholmod_sparse view{};
+    view.nrow = view.ncol = this->offset.size() - 1;
+    view.nzmax = this->row.size();
+    view.p = this->offset.data();
+    view.i = this->row.data();
+    view.x = this->value.data();
+    view.stype = -1;
+    view.itype = CHOLMOD_LONG;
+    view.xtype = CHOLMOD_REAL;
+    view.dtype = CHOLMOD_DOUBLE;
+    view.sorted = 1;
+    view.packed = 1;
+    return view;
+  }
+};
+
+LowerTriangle Extract(
+  const SparseMatrix& matrix, const std::vector<std::int32_t>& rows, const double* shift)
+{
+  std::vector<std::int32_t> local(matrix.rows, -1);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+  {
+    local[rows[i]] = static_cast<std::int32_t>(i);
+  }
+  LowerTriangle lower;
+  lower.offset.reserve(rows.size() + 1);
+  lower.offset.push_back(0);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+  {
+    for (std::int64_t k = matrix.offset[rows[i]]; k < matrix.offset[rows[i] + 1]; ++k)
+    {
+      const std::int32_t j = local[matrix.column[k]];
+      if (j >= static_cast<std::int32_t>(i))
+      {
+        lower.row.push_back(j);
+        const bool diagonal = j == static_cast<std::int32_t>(i);
+        lower.value.push_back(
+          matrix.value[k] + (diagonal && shift != nullptr ? shift[i] : 0.0));
+      }
+    }
+    lower.offset.push_back(static_cast<SuiteSparse_long>(lower.row.size()));
+  }
+  return lower;
+}
+}
+
+struct SparseCholesky::Content
+{
+  ~Content()
+  {
+    if (this->factor != nullptr)
+    {
+      cholmod_l_free_factor(&this->factor, &this->common.c);
+    }
+  }
+  Common common;
+  cholmod_factor* factor = nullptr;
+};
+
+struct SparseCholesky::Workspace::Content
+{
+  ~Content()
+  {
+    cholmod_l_free_dense(&this->solution, &this->common.c);
+    cholmod_l_free_dense(&this->y, &this->common.c);
+    cholmod_l_free_dense(&this->e, &this->common.c);
+  }
+  Common common;
+  cholmod_dense* solution = nullptr;
+  cholmod_dense* y = nullptr;
+  cholmod_dense* e = nullptr;
+};
+
+SparseCholesky::Workspace::Workspace()
+  : Inside(std::make_unique<Content>())
+{
+}
+SparseCholesky::Workspace::~Workspace() = default;
+
+SparseCholesky::SparseCholesky(
+  const SparseMatrix& matrix, const std::vector<std::int32_t>& rows, const double* shift)
+  : Inside(std::make_unique<Content>())
+{
+  LowerTriangle lower = Extract(matrix, rows, shift);
+  cholmod_sparse view = lower.View();
+  cholmod_common& c = this->Inside->common.c;
+  c.nmethods = 1;
+  c.method[0].ordering = CHOLMOD_NATURAL;
+  c.postorder = 1;
+  this->Inside->factor = cholmod_l_analyze(&view, &c);
+  if (this->Inside->factor != nullptr)
+  {
+    cholmod_l_factorize(&view, this->Inside->factor, &c);
+  }
+  if (c.status == CHOLMOD_OUT_OF_MEMORY || c.status == CHOLMOD_TOO_LARGE)
+  {
+    throw std::bad_alloc();
+  }
+  if (this->Inside->factor == nullptr || c.status != CHOLMOD_OK ||
+    this->Inside->factor->minor < this->Inside->factor->n)
+  {
+    throw std::runtime_error("the equations of the skin weights cannot be solved: the matrix is not "
+                             "positive definite; some tetrahedra are too flat");
+  }
+}
+
+SparseCholesky::~SparseCholesky() = default;
+
+double SparseCholesky::Entries() const
+{
+  return this->Inside->factor->is_super ? static_cast<double>(this->Inside->factor->xsize)
+                                        : static_cast<double>(this->Inside->factor->nzmax);
+}
+
+void SparseCholesky::Solve(
+  const double* right, double* solution, std::int64_t columns, Workspace& workspace) const
+{
+  const std::size_t n = this->Inside->factor->n;
+  if (n == 0 || columns == 0)
+  {
+    return;
+  }
+  cholmod_dense view{};
+  view.nrow = view.d = n;
+  view.ncol = columns;
+  view.nzmax = n * columns;
+  view.x = const_cast<double*>(right); // CHOLMOD only reads it
+  view.xtype = CHOLMOD_REAL;
+  view.dtype = CHOLMOD_DOUBLE;
+  Workspace::Content& w = *workspace.Inside;
+  if (!cholmod_l_solve2(CHOLMOD_A, this->Inside->factor, &view, nullptr, &w.solution, nullptr, &w.y,
+        &w.e, &w.common.c))
+  {
+    throw std::bad_alloc();
+  }
+  std::memcpy(solution, w.solution->x, n * columns * sizeof(double));
+}
+
+std::vector<std::int32_t> FillReducingOrder(const SparseMatrix& matrix)
+{
+  std::vector<std::int32_t> rows(matrix.rows);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+  {
+    rows[i] = static_cast<std::int32_t>(i);
+  }
+  if (rows.empty())
+  {
+    return rows;
+  }
+  LowerTriangle lower = Extract(matrix, rows, nullptr);
+  cholmod_sparse view = lower.View();
+  Common common;
+  common.c.nmethods = 1;
+  common.c.method[0].ordering = CHOLMOD_AMD;
+  common.c.postorder = 1;
+  cholmod_factor* factor = cholmod_l_analyze(&view, &common.c);
+  if (factor == nullptr)
+  {
+    throw std::bad_alloc();
+  }
+  const auto* order = static_cast<const SuiteSparse_long*>(factor->Perm);
+  std::copy(order, order + rows.size(), rows.begin());
+  cholmod_l_free_factor(&factor, &common.c);
+  return rows;
+}
+}
