@@ -15,7 +15,8 @@ EOF
 
 common=(
   g++ cmake ninja-build ccache
-  libeigen3-dev libgdcm-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev libcgal-dev
+  libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev
+  libcgal-dev
   libgtest-dev clang-format-14
 )
 paraview=(

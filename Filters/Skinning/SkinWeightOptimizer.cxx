@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <numeric>
 
@@ -18,7 +16,11 @@ constexpr std::int64_t ValuesAtOnce = 1 << 15;
 constexpr std::int64_t RowsAtOnce = 1 << 11;
 constexpr double Relaxation = 1.6;
 constexpr int CheckEvery = 10;
-constexpr int Memory = 8; // of the acceleration
+constexpr double LeastRho = 1e-3;
+constexpr double GreatestRho = 10.0;
+constexpr int MostPolishSteps = 10;
+// Beyond it one exact step costs more than what the alternating directions took.
+constexpr std::int64_t MostUnknowns = 60000;
 }
 
 SkinWeightOptimizer::SkinWeightOptimizer(
@@ -29,10 +31,6 @@ SkinWeightOptimizer::SkinWeightOptimizer(
 {
   this->MakeGroups();
   this->MakePairs();
-  if (const char* rho = std::getenv("RHO"))
-  {
-    this->Rho = std::atof(rho);
-  }
 }
 
 void SkinWeightOptimizer::MakeGroups()
@@ -242,7 +240,7 @@ void SkinWeightOptimizer::Solve(const Values& s, const Values& z, Values& x)
     });
 }
 
-double SkinWeightOptimizer::Dot(const Values& a, const Values& b) const
+double SkinWeightOptimizer::Dot(const Values& a, const Values& b)
 {
   const auto count = static_cast<std::int64_t>(a.size());
   Values parts((count + ValuesAtOnce - 1) / ValuesAtOnce, 0.0);
@@ -261,6 +259,107 @@ double SkinWeightOptimizer::Dot(const Values& a, const Values& b) const
     });
   return std::accumulate(parts.begin(), parts.end(), 0.0);
 }
+
+/**
+ * Anderson acceleration of s += f(s), with a way back to the plain step when it made things worse.
+ * Source: Walker and Ni, SIAM J Numer Anal 2011;49:1715.
+ */
+class SkinWeightOptimizer::Acceleration
+{
+public:
+  explicit Acceleration(std::int64_t size)
+    : Size(size)
+    , Plain(size)
+  {
+  }
+
+  void Restart()
+  {
+    this->Steps.clear();
+    this->Residues.clear();
+    this->LastS.clear();
+    this->LastNorm = std::numeric_limits<double>::infinity();
+  }
+
+  void Step(Values& s, const Values& f)
+  {
+    const double norm = Dot(f, f);
+    if (!this->LastS.empty() && !(norm <= 4.0 * this->LastNorm))
+    {
+      s = this->Plain;
+      this->Restart();
+      return;
+    }
+    this->LastNorm = norm;
+    if (!this->LastS.empty())
+    {
+      if (this->Steps.size() == Memory)
+      {
+        std::rotate(this->Steps.begin(), this->Steps.begin() + 1, this->Steps.end());
+        std::rotate(this->Residues.begin(), this->Residues.begin() + 1, this->Residues.end());
+      }
+      else
+      {
+        this->Steps.emplace_back(this->Size);
+        this->Residues.emplace_back(this->Size);
+      }
+      ParallelFor(this->Size, ValuesAtOnce,
+        [&](std::int64_t first, std::int64_t last)
+        {
+          for (std::int64_t i = first; i < last; ++i)
+          {
+            this->Steps.back()[i] = s[i] - this->LastS[i];
+            this->Residues.back()[i] = f[i] - this->LastF[i];
+          }
+        });
+    }
+    this->LastS = s;
+    this->LastF = f;
+    const auto columns = static_cast<Eigen::Index>(this->Steps.size());
+    Eigen::MatrixXd normal(columns, columns);
+    Eigen::VectorXd right(columns);
+    for (Eigen::Index i = 0; i < columns; ++i)
+    {
+      for (Eigen::Index j = 0; j <= i; ++j)
+      {
+        normal(i, j) = normal(j, i) = Dot(this->Residues[i], this->Residues[j]);
+      }
+      right[i] = Dot(this->Residues[i], f);
+    }
+    // Differences that nearly depend on each other must not blow the step up.
+    normal.diagonal() *= 1.0 + 1e-10;
+    Eigen::VectorXd coefficient = Eigen::VectorXd::Zero(columns);
+    if (columns > 0)
+    {
+      const Eigen::VectorXd solved = normal.ldlt().solve(right);
+      coefficient = solved.allFinite() ? solved : coefficient;
+    }
+    ParallelFor(this->Size, ValuesAtOnce,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t i = first; i < last; ++i)
+        {
+          this->Plain[i] = s[i] + f[i];
+          double value = this->Plain[i];
+          for (Eigen::Index k = 0; k < columns; ++k)
+          {
+            value -= coefficient[k] * (this->Steps[k][i] + this->Residues[k][i]);
+          }
+          s[i] = value;
+        }
+      });
+  }
+
+private:
+  static constexpr std::size_t Memory = 8;
+  std::int64_t Size;
+  std::vector<Values> Steps;    ///< differences of s
+  std::vector<Values> Residues; ///< differences of f
+  Values LastS;
+  Values LastF;
+  Values Plain; ///< where the last step would have led without acceleration
+  double LastNorm = std::numeric_limits<double>::infinity();
+};
 
 SkinWeightOptimizer::Violation SkinWeightOptimizer::Judge(
   const Values& z, Values& gradient, bool everywhere) const
@@ -435,11 +534,56 @@ SkinWeightOptimizer::Violation SkinWeightOptimizer::Judge(
   return violation;
 }
 
+void SkinWeightOptimizer::Balance(const Values& x, const Values& z, const Values& previous, Values& s)
+{
+  Values parts[4];
+  for (Values& part : parts)
+  {
+    part.resize(this->Size);
+  }
+  ParallelFor(this->Size, ValuesAtOnce,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        const double d = std::sqrt(this->System.diagonal[this->RowOfValue[i]]);
+        parts[0][i] = d * (x[i] - z[i]);
+        parts[1][i] = d * (z[i] - previous[i]);
+        parts[2][i] = d * z[i];
+        parts[3][i] = d * (s[i] - z[i]);
+      }
+    });
+  const double primal = this->Dot(parts[0], parts[0]) / this->Dot(parts[2], parts[2]);
+  const double dual = this->Dot(parts[1], parts[1]) / this->Dot(parts[3], parts[3]);
+  const double ratio = std::sqrt(primal / dual);
+  if (!(ratio > 0.0) || !std::isfinite(ratio) || (ratio < 3.0 && ratio > 1.0 / 3.0))
+  {
+    return;
+  }
+  const double wanted =
+    std::clamp(this->Rho * std::clamp(ratio, 0.1, 10.0), LeastRho, GreatestRho);
+  if (wanted == this->Rho)
+  {
+    return;
+  }
+  // The multiplier R (s - z) stays.
+  const double change = this->Rho / wanted;
+  ParallelFor(this->Size, ValuesAtOnce,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        s[i] = z[i] + (s[i] - z[i]) * change;
+      }
+    });
+  this->Rho = wanted;
+  this->Factorize();
+}
+
 void SkinWeightOptimizer::Run(const ProgressCallback& progress)
 {
-  const bool verbose = std::getenv("VERBOSE") != nullptr;
-  Values s(this->Size, 0.0);
   // Begins with the nearest bone's weight 1.
+  Values s(this->Size, 0.0);
   for (std::int64_t r = 0; r < this->System.energy.rows; ++r)
   {
     for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
@@ -451,48 +595,50 @@ void SkinWeightOptimizer::Run(const ProgressCallback& progress)
   Values x(this->Size);
   Values previous(this->Size);
   Values gradient(this->Size);
+  Values f(this->Size);
+  Acceleration acceleration(this->Size);
   this->Factorize();
   double reported = 0.05;
   Report(progress, reported);
   double firstResidual = 0.0;
+  double lastResidual = std::numeric_limits<double>::infinity();
+  bool slow = false;
 
-  std::vector<Values> steps;    // differences of s
-  std::vector<Values> residues; // differences of the fixed point's residual
-  Values lastS;
-  Values lastF;
-  Values f(this->Size);
-  double lastNorm = std::numeric_limits<double>::infinity();
-  Values safeS; // where a plain step would have led
-  int lastFactorization = 0;
-
-  for (this->Iterations = 1; this->Iterations <= this->Settings.iterations; ++this->Iterations)
+  for (this->Iterations = 1;; ++this->Iterations)
   {
     this->Project(s, z);
-    if (this->Iterations % CheckEvery == 1)
+    const bool atEnd = this->Iterations >= this->Settings.iterations;
+    if (this->Iterations % CheckEvery == 1 || atEnd)
     {
       const Violation violation = this->Judge(z, gradient, false);
-      if (verbose)
-      {
-        std::fprintf(stderr, "%5d rho %.3g kkt %.3e energy %.9g gap? %.3e\n", this->Iterations,
-          this->Rho, violation.inside, violation.energy, violation.gap);
-      }
-      if (firstResidual == 0.0)
-      {
-        firstResidual = violation.inside;
-      }
       this->Weights = z;
       this->Quality = violation;
-      if (violation.inside <= this->Settings.tolerance)
+      this->Converged = violation.inside <= this->Settings.tolerance;
+      if (this->Converged || atEnd)
       {
-        this->Converged = true;
         break;
       }
+      firstResidual = firstResidual == 0.0 ? violation.inside : firstResidual;
+      slow = violation.inside > 0.5 * lastResidual;
+      lastResidual = violation.inside;
       const double done = std::log(firstResidual / violation.inside) /
         std::log(std::max(1.0 + 1e-9, firstResidual / this->Settings.tolerance));
-      reported = std::max(reported, 0.05 + 0.85 * std::clamp(done, 0.0, 1.0));
+      reported = std::max(reported, 0.05 + 0.8 * std::clamp(done, 0.0, 1.0));
     }
     Report(progress, reported);
     this->Solve(s, z, x);
+    if (this->Iterations % CheckEvery == 0 && slow)
+    {
+      const double before = this->Rho;
+      this->Balance(x, z, previous, s);
+      if (this->Rho != before)
+      {
+        acceleration.Restart();
+        previous = z;
+        continue;
+      }
+    }
+    previous = z;
     ParallelFor(this->Size, ValuesAtOnce,
       [&](std::int64_t first, std::int64_t last)
       {
@@ -501,136 +647,178 @@ void SkinWeightOptimizer::Run(const ProgressCallback& progress)
           f[i] = Relaxation * (x[i] - z[i]);
         }
       });
-
-    // Balance of the two residuals, as OSQP does.
-    if (this->Iterations % CheckEvery == 0 && this->Iterations - lastFactorization >= 20)
-    {
-      double primal = 0.0;
-      double dual = 0.0;
-      double size = 0.0;
-      double force = 0.0;
-      for (std::int64_t i = 0; i < this->Size; ++i)
-      {
-        const double d = this->System.diagonal[this->RowOfValue[i]];
-        primal += d * (x[i] - z[i]) * (x[i] - z[i]);
-        dual += d * (z[i] - previous[i]) * (z[i] - previous[i]);
-        size += d * z[i] * z[i];
-        force += d * (s[i] - z[i]) * (s[i] - z[i]);
-      }
-      const double ratio = std::sqrt((primal / size) / std::max(1e-300, dual / force));
-      if (verbose)
-      {
-        std::fprintf(stderr, "      primal %.3g dual %.3g ratio %.3g\n", std::sqrt(primal / size),
-          std::sqrt(dual / force), ratio);
-      }
-      if (std::getenv("RHO") == nullptr && (ratio > 5.0 || ratio < 0.2))
-      {
-        const double wanted = std::clamp(this->Rho * ratio, 1e-6, 1e3);
-        const double change = this->Rho / wanted;
-        for (std::int64_t i = 0; i < this->Size; ++i)
-        {
-          s[i] = z[i] + (s[i] - z[i]) * change;
-        }
-        this->Rho = wanted;
-        this->Factorize();
-        lastFactorization = this->Iterations;
-        steps.clear();
-        residues.clear();
-        lastS.clear();
-        lastNorm = std::numeric_limits<double>::infinity();
-        previous = z;
-        continue;
-      }
-    }
-    previous = z;
-
-    const bool accelerate = std::getenv("NOAA") == nullptr;
-    if (accelerate)
-    {
-      const double norm = this->Dot(f, f);
-      if (!lastS.empty() && norm > 4.0 * lastNorm)
-      {
-        // The accelerated step made it worse: back to the plain one.
-        s = safeS;
-        steps.clear();
-        residues.clear();
-        lastS.clear();
-        lastNorm = std::numeric_limits<double>::infinity();
-        continue;
-      }
-      lastNorm = norm;
-      if (!lastS.empty())
-      {
-        if (static_cast<int>(steps.size()) == Memory)
-        {
-          std::rotate(steps.begin(), steps.begin() + 1, steps.end());
-          std::rotate(residues.begin(), residues.begin() + 1, residues.end());
-        }
-        else
-        {
-          steps.emplace_back(this->Size);
-          residues.emplace_back(this->Size);
-        }
-        ParallelFor(this->Size, ValuesAtOnce,
-          [&](std::int64_t first, std::int64_t last)
-          {
-            for (std::int64_t i = first; i < last; ++i)
-            {
-              steps.back()[i] = s[i] - lastS[i];
-              residues.back()[i] = f[i] - lastF[i];
-            }
-          });
-      }
-      lastS = s;
-      lastF = f;
-      safeS.resize(this->Size);
-      const auto columns = static_cast<Eigen::Index>(steps.size());
-      Eigen::VectorXd coefficient = Eigen::VectorXd::Zero(columns);
-      if (columns > 0)
-      {
-        Eigen::MatrixXd normal(columns, columns);
-        Eigen::VectorXd right(columns);
-        for (Eigen::Index i = 0; i < columns; ++i)
-        {
-          for (Eigen::Index j = 0; j <= i; ++j)
-          {
-            normal(i, j) = normal(j, i) = this->Dot(residues[i], residues[j]);
-          }
-          right[i] = this->Dot(residues[i], f);
-        }
-        normal.diagonal() *= 1.0 + 1e-10;
-        coefficient = normal.ldlt().solve(right);
-        if (!coefficient.allFinite())
-        {
-          coefficient.setZero();
-        }
-      }
-      ParallelFor(this->Size, ValuesAtOnce,
-        [&](std::int64_t first, std::int64_t last)
-        {
-          for (std::int64_t i = first; i < last; ++i)
-          {
-            safeS[i] = s[i] + f[i];
-            double value = safeS[i];
-            for (Eigen::Index k = 0; k < columns; ++k)
-            {
-              value -= coefficient[k] * (steps[k][i] + residues[k][i]);
-            }
-            s[i] = value;
-          }
-        });
-    }
-    else
-    {
-      for (std::int64_t i = 0; i < this->Size; ++i)
-      {
-        s[i] += f[i];
-      }
-    }
+    acceleration.Step(s, f);
   }
-  this->Iterations = std::min(this->Iterations, this->Settings.iterations);
+  if (this->Settings.polish)
+  {
+    this->Polish([&](double done) { return !progress || progress(0.85 + 0.15 * done); });
+    this->Converged = this->Converged || this->Quality.inside <= this->Settings.tolerance;
+  }
   this->Quality = this->Judge(this->Weights, gradient, true);
   Report(progress, 1.0);
+}
+
+void SkinWeightOptimizer::Polish(const ProgressCallback& progress)
+{
+  enum Status : char
+  {
+    AtZero,
+    Free,
+    AtOne
+  };
+  const SparseMatrix& q = this->System.energy;
+  Values z = this->Weights;
+  std::vector<char> status(this->Size);
+  for (std::int64_t v = 0; v < this->Size; ++v)
+  {
+    status[v] = z[v] <= 0.0 ? AtZero : (!this->Joint && z[v] >= 1.0 ? AtOne : Free);
+  }
+  Values gradient(this->Size);
+  this->Judge(z, gradient, false);
+  // In Joint mode the greatest weight of a row follows from the others.
+  std::vector<std::int64_t> pivot(q.rows, -1); // into the pairs
+  const auto choosePivots = [&]
+  {
+    for (std::int64_t r = 0; this->Joint && r < q.rows; ++r)
+    {
+      pivot[r] = this->PairOffset[r];
+      for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
+      {
+        pivot[r] = z[this->PairIndex[p]] > z[this->PairIndex[pivot[r]]] ? p : pivot[r];
+      }
+    }
+  };
+  const auto boneOfPivot = [&](std::int64_t r)
+  { return pivot[r] < 0 ? -1 : static_cast<int>(this->PairBone[pivot[r]]); };
+
+  for (int step = 0; step < MostPolishSteps; ++step)
+  {
+    Report(progress, static_cast<double>(step) / MostPolishSteps);
+    choosePivots();
+    std::vector<std::int64_t> unknowns; // pairs
+    std::vector<std::int64_t> offset(q.rows + 1, 0);
+    for (std::int64_t r = 0; r < q.rows; ++r)
+    {
+      for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
+      {
+        if (status[this->PairIndex[p]] == Free && p != pivot[r])
+        {
+          unknowns.push_back(p);
+        }
+      }
+      offset[r + 1] = static_cast<std::int64_t>(unknowns.size());
+    }
+    const auto count = static_cast<std::int64_t>(unknowns.size());
+    if (count == 0 || count > MostUnknowns)
+    {
+      return;
+    }
+    SparseMatrix hessian;
+    hessian.rows = count;
+    hessian.offset.assign(1, 0);
+    Values right;
+    for (std::int64_t r = 0; r < q.rows; ++r)
+    {
+      const int ownPivot = boneOfPivot(r);
+      for (std::int64_t e = offset[r]; e < offset[r + 1]; ++e)
+      {
+        const int bone = this->PairBone[unknowns[e]];
+        for (std::int64_t a = q.offset[r]; a < q.offset[r + 1]; ++a)
+        {
+          const std::int32_t u = q.column[a];
+          const int otherPivot = boneOfPivot(u);
+          for (std::int64_t o = offset[u]; o < offset[u + 1]; ++o)
+          {
+            const int other = this->PairBone[unknowns[o]];
+            int factor = bone == other ? 1 : 0;
+            if (this->Joint)
+            {
+              factor += (ownPivot == otherPivot ? 1 : 0) - (bone == otherPivot ? 1 : 0) -
+                (ownPivot == other ? 1 : 0);
+            }
+            if (factor != 0)
+            {
+              hessian.column.push_back(static_cast<std::int32_t>(o));
+              hessian.value.push_back(factor * q.value[a]);
+            }
+          }
+        }
+        hessian.offset.push_back(static_cast<std::int64_t>(hessian.column.size()));
+        right.push_back((this->Joint ? gradient[this->PairIndex[pivot[r]]] : 0.0) -
+          gradient[this->PairIndex[unknowns[e]]]);
+      }
+    }
+    std::vector<std::int32_t> all(count);
+    std::iota(all.begin(), all.end(), 0);
+    Values change(count);
+    {
+      const SparseCholesky factor(hessian, all, nullptr);
+      SparseCholesky::Workspace workspace;
+      factor.Solve(right.data(), change.data(), 1, workspace);
+    }
+    ++this->PolishSteps;
+    // What leaves its bounds is held there in the next step.
+    bool same = true;
+    for (std::int64_t r = 0; r < q.rows; ++r)
+    {
+      double rest = 0.0;
+      for (std::int64_t e = offset[r]; e < offset[r + 1]; ++e)
+      {
+        const std::int64_t v = this->PairIndex[unknowns[e]];
+        const double value = z[v] + change[e];
+        z[v] = std::clamp(value, 0.0, 1.0);
+        if (value < 0.0 || (!this->Joint && value > 1.0))
+        {
+          status[v] = value < 0.0 ? AtZero : AtOne;
+          same = false;
+        }
+      }
+      if (this->Joint)
+      {
+        // Clipped weights may sum to more than 1.
+        const std::int64_t last = this->PairIndex[pivot[r]];
+        for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
+        {
+          rest += p == pivot[r] ? 0.0 : z[this->PairIndex[p]];
+        }
+        if (rest > 1.0)
+        {
+          for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
+          {
+            z[this->PairIndex[p]] /= rest;
+          }
+          rest = 1.0;
+          same = false;
+        }
+        z[last] = 1.0 - rest;
+      }
+    }
+    const Violation violation = this->Judge(z, gradient, false);
+    if (violation.inside < this->Quality.inside)
+    {
+      this->Quality = violation;
+      this->Weights = z;
+    }
+    for (std::int64_t r = 0; r < q.rows; ++r)
+    {
+      const double multiplier = this->Joint ? gradient[this->PairIndex[pivot[r]]] : 0.0;
+      const double slack = 1e-9 * this->System.diagonal[r];
+      for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
+      {
+        const std::int64_t v = this->PairIndex[p];
+        if ((status[v] == AtZero && gradient[v] < multiplier - slack) ||
+          (status[v] == AtOne && gradient[v] > slack))
+        {
+          status[v] = Free;
+          same = false;
+        }
+      }
+    }
+    if (same)
+    {
+      return;
+    }
+  }
 }
 
 void SkinWeightOptimizer::Describe(SkinWeights& result) const

@@ -74,10 +74,13 @@ private:
   void Solve(const Values& s, const Values& z, Values& x);
   /// Qz + c for all pairs; `everywhere` judges the other bones too.
   Violation Judge(const Values& z, Values& gradient, bool everywhere) const;
-  bool Polish(const ProgressCallback& progress);
-  bool PolishJoint(const ProgressCallback& progress);
-  bool PolishIndependent(const ProgressCallback& progress);
-  double Dot(const Values& a, const Values& b) const;
+  /// Another penalty when one of the residuals lags behind, as OSQP does.
+  void Balance(const Values& x, const Values& z, const Values& previous, Values& s);
+  /// Exact solves with the bounds that hold as equations, until these are the right ones.
+  void Polish(const ProgressCallback& progress);
+  static double Dot(const Values& a, const Values& b);
+
+  class Acceleration;
 
   const SkinWeightSystem& System;
   const SkinWeightSettings Settings;
@@ -93,7 +96,7 @@ private:
   std::vector<std::int32_t> RowOfValue;
   Values Linear;
 
-  double Rho = 0.03;
+  double Rho = 0.2;
   Values Weights;
   Violation Quality;
   bool Converged = false;

@@ -2,8 +2,10 @@
 
 #include <cholmod.h>
 
+#include <Eigen/Dense>
+
 #include <algorithm>
-#include <cstring>
+#include <mutex>
 #include <new>
 #include <stdexcept>
 
@@ -53,6 +55,74 @@ struct LowerTriangle
   }
 };
 
+/// Debian's serial OpenBLAS gives wrong results, without a word, when two threads are in it.
+std::mutex& BlasMutex()
+{
+  static std::mutex mutex;
+  return mutex;
+}
+
+/// Solves with a supernodal factor L L', in place; `y` has one row of `columns` values per row of L.
+/// Not CHOLMOD's own: that calls BLAS, which need not be safe to use from several threads.
+template <int Columns>
+void SolveInPlace(
+  const cholmod_factor& factor, double* y, std::int64_t columns, std::vector<double>& below)
+{
+  using Block = Eigen::Matrix<double, Eigen::Dynamic, Columns,
+    Columns == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
+  using Lower = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+  const auto* super = static_cast<const SuiteSparse_long*>(factor.super);
+  const auto* pi = static_cast<const SuiteSparse_long*>(factor.pi);
+  const auto* px = static_cast<const SuiteSparse_long*>(factor.px);
+  const auto* rows = static_cast<const SuiteSparse_long*>(factor.s);
+  const auto* values = static_cast<const double*>(factor.x);
+  below.resize(factor.maxesize * columns);
+  const auto visit = [&](std::int64_t k, bool forward)
+  {
+    const SuiteSparse_long width = super[k + 1] - super[k];
+    const SuiteSparse_long height = pi[k + 1] - pi[k];
+    const SuiteSparse_long rest = height - width;
+    const Lower diagonal(values + px[k], width, width, Eigen::OuterStride<>(height));
+    const Lower under(values + px[k] + width, rest, width, Eigen::OuterStride<>(height));
+    Eigen::Map<Block> x(y + super[k] * columns, width, columns);
+    Eigen::Map<Block> b(below.data(), rest, columns);
+    const SuiteSparse_long* row = rows + pi[k] + width;
+    if (forward)
+    {
+      diagonal.template triangularView<Eigen::Lower>().solveInPlace(x);
+      b.noalias() = under * x;
+      for (SuiteSparse_long i = 0; i < rest; ++i)
+      {
+        for (std::int64_t c = 0; c < columns; ++c)
+        {
+          y[row[i] * columns + c] -= below[i * columns + c];
+        }
+      }
+    }
+    else
+    {
+      for (SuiteSparse_long i = 0; i < rest; ++i)
+      {
+        for (std::int64_t c = 0; c < columns; ++c)
+        {
+          below[i * columns + c] = y[row[i] * columns + c];
+        }
+      }
+      x.noalias() -= under.transpose() * b;
+      diagonal.transpose().template triangularView<Eigen::Upper>().solveInPlace(x);
+    }
+  };
+  const auto blocks = static_cast<std::int64_t>(factor.nsuper);
+  for (std::int64_t k = 0; k < blocks; ++k)
+  {
+    visit(k, true);
+  }
+  for (std::int64_t k = blocks - 1; k >= 0; --k)
+  {
+    visit(k, false);
+  }
+}
+
 LowerTriangle Extract(
   const SparseMatrix& matrix, const std::vector<std::int32_t>& rows, const double* shift)
 {
@@ -98,16 +168,8 @@ struct SparseCholesky::Content
 
 struct SparseCholesky::Workspace::Content
 {
-  ~Content()
-  {
-    cholmod_l_free_dense(&this->solution, &this->common.c);
-    cholmod_l_free_dense(&this->y, &this->common.c);
-    cholmod_l_free_dense(&this->e, &this->common.c);
-  }
-  Common common;
-  cholmod_dense* solution = nullptr;
-  cholmod_dense* y = nullptr;
-  cholmod_dense* e = nullptr;
+  std::vector<double> values; ///< right-hand sides in the order of the factor, row by row
+  std::vector<double> below;  ///< rows under a diagonal block
 };
 
 SparseCholesky::Workspace::Workspace()
@@ -123,12 +185,14 @@ SparseCholesky::SparseCholesky(
   LowerTriangle lower = Extract(matrix, rows, shift);
   cholmod_sparse view = lower.View();
   cholmod_common& c = this->Inside->common.c;
+  c.supernodal = CHOLMOD_SUPERNODAL;
   c.nmethods = 1;
   c.method[0].ordering = CHOLMOD_NATURAL;
   c.postorder = 1;
   this->Inside->factor = cholmod_l_analyze(&view, &c);
   if (this->Inside->factor != nullptr)
   {
+    const std::lock_guard<std::mutex> lock(BlasMutex());
     cholmod_l_factorize(&view, this->Inside->factor, &c);
   }
   if (c.status == CHOLMOD_OUT_OF_MEMORY || c.status == CHOLMOD_TOO_LARGE)
@@ -159,20 +223,32 @@ void SparseCholesky::Solve(
   {
     return;
   }
-  cholmod_dense view{};
-  view.nrow = view.d = n;
-  view.ncol = columns;
-  view.nzmax = n * columns;
-  view.x = const_cast<double*>(right); // CHOLMOD only reads it
-  view.xtype = CHOLMOD_REAL;
-  view.dtype = CHOLMOD_DOUBLE;
+  const cholmod_factor& factor = *this->Inside->factor;
+  const auto* order = static_cast<const SuiteSparse_long*>(factor.Perm);
   Workspace::Content& w = *workspace.Inside;
-  if (!cholmod_l_solve2(CHOLMOD_A, this->Inside->factor, &view, nullptr, &w.solution, nullptr, &w.y,
-        &w.e, &w.common.c))
+  w.values.resize(n * columns);
+  for (std::size_t i = 0; i < n; ++i)
   {
-    throw std::bad_alloc();
+    for (std::int64_t c = 0; c < columns; ++c)
+    {
+      w.values[i * columns + c] = right[c * n + order[i]];
+    }
   }
-  std::memcpy(solution, w.solution->x, n * columns * sizeof(double));
+  if (columns == 1)
+  {
+    SolveInPlace<1>(factor, w.values.data(), columns, w.below);
+  }
+  else
+  {
+    SolveInPlace<Eigen::Dynamic>(factor, w.values.data(), columns, w.below);
+  }
+  for (std::size_t i = 0; i < n; ++i)
+  {
+    for (std::int64_t c = 0; c < columns; ++c)
+    {
+      solution[c * n + order[i]] = w.values[i * columns + c];
+    }
+  }
 }
 
 std::vector<std::int32_t> FillReducingOrder(const SparseMatrix& matrix)
