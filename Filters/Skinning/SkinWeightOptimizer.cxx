@@ -20,7 +20,9 @@ constexpr double LeastRho = 1e-3;
 constexpr double GreatestRho = 10.0;
 constexpr int MostPolishSteps = 10;
 // Beyond it one exact step costs more than what the alternating directions took.
-constexpr std::int64_t MostUnknowns = 60000;
+constexpr std::int64_t MostUnknowns = 20000;
+constexpr double Rounding = 1e-13;
+constexpr double Exact = 1e-10; // residual at which nothing is left to polish
 }
 
 SkinWeightOptimizer::SkinWeightOptimizer(
@@ -767,7 +769,7 @@ void SkinWeightOptimizer::Polish(const ProgressCallback& progress)
         const std::int64_t v = this->PairIndex[unknowns[e]];
         const double value = z[v] + change[e];
         z[v] = std::clamp(value, 0.0, 1.0);
-        if (value < 0.0 || (!this->Joint && value > 1.0))
+        if (value < -Rounding || (!this->Joint && value > 1.0 + Rounding))
         {
           status[v] = value < 0.0 ? AtZero : AtOne;
           same = false;
@@ -814,7 +816,7 @@ void SkinWeightOptimizer::Polish(const ProgressCallback& progress)
         }
       }
     }
-    if (same)
+    if (same || this->Quality.inside <= Exact)
     {
       return;
     }

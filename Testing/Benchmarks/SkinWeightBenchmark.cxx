@@ -1,0 +1,166 @@
+// Skin weights on trees of growing size: time, optimality, and libigl's weights beside them.
+
+#include "TetrahedronTestMeshes.h"
+#ifdef DYNAMICCORONARY_WITH_LIBIGL
+#include "LibiglSkinWeights.h"
+#endif
+
+#include <CLI/CLI.hpp>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <iostream>
+
+using namespace coronary;
+
+namespace
+{
+struct Case
+{
+  int branches;
+  int branchBones;
+  int boneCells;
+  int half;
+};
+
+/// A tree of tubes whose points, but for those on bones, are moved at random.
+SkinWeightInput Tree(const Case& c)
+{
+  SkinWeightInput input = MeshOfComb(c.branches, c.branchBones, c.boneCells, c.half, 0.5);
+  RandomStream random(1);
+  for (Vector3& p : input.points)
+  {
+    const Vector3 by(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1));
+    const bool onBone = std::any_of(input.bones.begin(), input.bones.end(), [&](const auto& bone)
+      { return DistanceToSegment(p, input.joints[bone.first], input.joints[bone.second]) < 1e-9; });
+    p += onBone ? Vector3::Zero() : Vector3(0.06 * by);
+  }
+  return input;
+}
+
+struct Clock
+{
+  std::chrono::steady_clock::time_point wall = std::chrono::steady_clock::now();
+  std::clock_t processor = std::clock();
+
+  double Wall() const
+  {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - this->wall).count();
+  }
+  double Processor() const
+  {
+    return static_cast<double>(std::clock() - this->processor) / CLOCKS_PER_SEC;
+  }
+};
+
+double PeakGigabytes()
+{
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / (1 << 20);
+}
+
+#ifdef DYNAMICCORONARY_WITH_LIBIGL
+/// Greatest difference to libigl's weights, each row divided by its sum.
+double CompareWithLibigl(const SkinWeightInput& input, const SkinWeights& mine, int iterations)
+{
+  std::vector<std::int64_t> fixed;
+  for (std::size_t i = 0; i < input.points.size(); ++i)
+  {
+    for (const auto& bone : input.bones)
+    {
+      if (DistanceToSegment(input.points[i], input.joints[bone.first], input.joints[bone.second]) <
+        1e-9)
+      {
+        fixed.push_back(static_cast<std::int64_t>(i));
+        break;
+      }
+    }
+  }
+  const auto rows = static_cast<Eigen::Index>(fixed.size());
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(rows, mine.bones);
+  for (Eigen::Index r = 0; r < rows; ++r)
+  {
+    for (std::int64_t e = mine.offset[fixed[r]]; e < mine.offset[fixed[r] + 1]; ++e)
+    {
+      values(r, mine.bone[e]) = mine.weight[e];
+    }
+  }
+  const Clock clock;
+  Eigen::MatrixXd theirs = LibiglSkinWeights(input, fixed, values, iterations);
+  std::printf("  libigl: wall %.2f s, processor %.2f s, row sums %.4f to %.4f", clock.Wall(),
+    clock.Processor(), theirs.rowwise().sum().minCoeff(), theirs.rowwise().sum().maxCoeff());
+  theirs = theirs.rowwise().sum().cwiseInverse().asDiagonal() * theirs;
+  for (std::size_t i = 0; i < input.points.size(); ++i)
+  {
+    for (std::int64_t e = mine.offset[i]; e < mine.offset[i + 1]; ++e)
+    {
+      theirs(static_cast<Eigen::Index>(i), mine.bone[e]) -= mine.weight[e];
+    }
+  }
+  const double difference = theirs.cwiseAbs().maxCoeff();
+  std::printf(", greatest difference %.2e\n", difference);
+  return difference;
+}
+#endif
+}
+
+int main(int argc, char** argv)
+{
+  CLI::App app{ "Skin weights on trees of growing size" };
+  std::vector<int> sizes{ 0, 1, 2 };
+  int libiglUpTo = 5000;
+  int libiglIterations = 100;
+  int neighbourhood = 3;
+  app.add_option("--sizes", sizes, "0: 2k points, 13 bones; 1: 9k, 46; 2: 23k, 61; 3: 100k, 61");
+  app.add_option("--libigl-up-to", libiglUpTo, "most points for libigl");
+  app.add_option("--libigl-iterations", libiglIterations, "of its active set");
+  app.add_option("--neighbourhood", neighbourhood, "bones around a bone; 0: everywhere");
+  CLI11_PARSE(app, argc, argv);
+  constexpr std::array<Case, 4> cases{
+    { { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 8, 3 }, { 12, 4, 14, 5 } }
+  };
+  bool good = true;
+  try
+  {
+    for (const int size : sizes)
+    {
+      const SkinWeightInput input = Tree(cases.at(size));
+      std::printf("%zu points, %zu tetrahedra, %zu bones\n", input.points.size(),
+        input.tetrahedra.size(), input.bones.size());
+      for (const SkinWeightMode mode : { SkinWeightMode::Joint, SkinWeightMode::Independent })
+      {
+        SkinWeightSettings settings;
+        settings.mode = mode;
+        settings.neighbourhood = neighbourhood;
+        const Clock clock;
+        const SkinWeights weights = ComputeSkinWeights(input, settings);
+        std::printf("  %s: wall %.2f s, processor %.2f s, %d iterations, %d polish steps, residual "
+                    "%.1e (everywhere %.1e), gap %.1e, row sums %.4f to %.4f, %.2f bones a point, "
+                    "peak %.2f GB\n",
+          mode == SkinWeightMode::Joint ? "Joint" : "Independent", clock.Wall(), clock.Processor(),
+          weights.iterations, weights.polishSteps, weights.residual, weights.residualEverywhere,
+          weights.energyGap, weights.smallestSum, weights.largestSum,
+          static_cast<double>(weights.bone.size()) / static_cast<double>(input.points.size()),
+          PeakGigabytes());
+        std::fflush(stdout);
+        good = good && weights.converged;
+#ifdef DYNAMICCORONARY_WITH_LIBIGL
+        if (mode == SkinWeightMode::Independent &&
+          static_cast<int>(input.points.size()) <= libiglUpTo)
+        {
+          good = CompareWithLibigl(input, weights, libiglIterations) < 1e-3 && good;
+        }
+#endif
+      }
+    }
+  }
+  catch (const std::exception& error)
+  {
+    std::cerr << error.what() << "\n";
+    return 1;
+  }
+  return good ? 0 : 1;
+}
