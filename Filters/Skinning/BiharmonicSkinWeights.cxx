@@ -52,8 +52,8 @@ std::vector<std::vector<double>> SolveWithoutBounds(
         factor.Solve(right.data(), solution.data(), to - from, workspace);
         for (std::int64_t b = from; b < to; ++b)
         {
-          weights[b].assign(solution.begin() + (b - from) * rows,
-            solution.begin() + (b - from + 1) * rows);
+          weights[b].assign(
+            solution.begin() + (b - from) * rows, solution.begin() + (b - from + 1) * rows);
         }
       }
     });
@@ -129,7 +129,8 @@ void SkinWeightSettings::Validate() const
   // Written so that NaN fails.
   Require(this->mode >= SkinWeightMode::Joint && this->mode <= SkinWeightMode::Harmonic,
     "mode must be Joint, Independent, Unbounded or Harmonic");
-  Require(this->tolerance >= 1e-10 && this->tolerance <= 0.01, "tolerance must be within 1e-10 to 0.01");
+  Require(
+    this->tolerance >= 1e-10 && this->tolerance <= 0.01, "tolerance must be within 1e-10 to 0.01");
   Require(
     this->iterations >= 1 && this->iterations <= 1000000, "iterations must be within 1 to 1000000");
   Require(this->neighbourhood >= 0, "neighbourhood must not be negative");
@@ -275,7 +276,8 @@ CompactSkinWeights CompactWeights(const SkinWeights& weights, int influences)
       sum += weights.weight[e];
     }
     // By size, whatever the sign: weights without bounds may be negative.
-    std::stable_sort(row.begin(), row.end(), [](const RowWeight& a, const RowWeight& b)
+    std::stable_sort(row.begin(), row.end(),
+      [](const RowWeight& a, const RowWeight& b)
       { return std::abs(a.weight) > std::abs(b.weight); });
     double kept = 0.0;
     double dropped = 0.0;

@@ -29,14 +29,16 @@ enum class SkinWeightMode
 struct SkinWeightSettings
 {
   SkinWeightMode mode = SkinWeightMode::Joint;
-  double tolerance = 1e-6; ///< of the conditions of optimality, see SkinWeights::residual; 1e-10 to 0.01
-  int iterations = 2000;   ///< limit for the alternating directions, 1 to 1000000
-  bool polish = true;      ///< solve exactly for the set of bounds that was found to hold
+  double tolerance =
+    1e-6; ///< of the conditions of optimality, see SkinWeights::residual; 1e-10 to 0.01
+  int iterations = 2000; ///< limit for the alternating directions, 1 to 1000000
+  bool polish = true;    ///< solve exactly for the set of bounds that was found to hold
   /// Joint and Independent: a bone may have weight only where the nearest bone along the mesh is at
   /// most so many bones away; 0: everywhere. SkinWeights::energyGap says what it costs.
   int neighbourhood = 3;
-  double penalty = 1e4; ///< of a bone's weight that is not 1 where the bone runs between the points,
-                        ///< in units of the energy's diagonal, 1 to 1e8
+  double penalty =
+    1e4; ///< of a bone's weight that is not 1 where the bone runs between the points,
+         ///< in units of the energy's diagonal, 1 to 1e8
 
   /// @throws std::invalid_argument naming the setting.
   void Validate() const;
@@ -44,7 +46,7 @@ struct SkinWeightSettings
 
 struct SkinWeightInput
 {
-  std::vector<Vector3> points; ///< any unit of length
+  std::vector<Vector3> points;                         ///< any unit of length
   std::vector<std::array<std::int64_t, 4>> tetrahedra; ///< either orientation
   std::vector<Vector3> joints;
   std::vector<std::pair<std::int64_t, std::int64_t>> bones; ///< straight, between two joints
@@ -78,10 +80,10 @@ struct SkinWeights
   double smallestSum = 1.0; ///< of a row, before it was divided by it
   /// Greatest distance of a weight on a bone from its wanted value, where bones run between points.
   double constraintResidual = 0.0;
-  std::int64_t fixedPoints = 0;          ///< points of the mesh on bones
-  std::int64_t samples = 0;              ///< places of bones between the points of the mesh
-  std::vector<double> lengthOutside;     ///< per bone: unit of length outside of the mesh
-  double largestDomainShare = 1.0;       ///< of the points in which a bone may have weight
+  std::int64_t fixedPoints = 0;      ///< points of the mesh on bones
+  std::int64_t samples = 0;          ///< places of bones between the points of the mesh
+  std::vector<double> lengthOutside; ///< per bone: unit of length outside of the mesh
+  double largestDomainShare = 1.0;   ///< of the points in which a bone may have weight
 };
 
 /**
@@ -98,16 +100,16 @@ struct SkinWeights
  * of the mesh, a point on two bones that do not meet there, a connected part of the mesh without bone.
  * @throws std::runtime_error when the equations cannot be solved; Cancelled; std::bad_alloc
  */
-SkinWeights ComputeSkinWeights(const SkinWeightInput& input, const SkinWeightSettings& settings = {},
-  const ProgressCallback& progress = {});
+SkinWeights ComputeSkinWeights(const SkinWeightInput& input,
+  const SkinWeightSettings& settings = {}, const ProgressCallback& progress = {});
 
 /// The greatest weights of every point, as a loop over vertices wants them.
 struct CompactSkinWeights
 {
-  int influences = 0;                ///< entries a point
-  std::vector<std::int32_t> bone;    ///< points * influences, greatest weight first; 0 when unused
-  std::vector<float> weight;         ///< the same size; sum 1, 0 when unused
-  std::vector<float> dropped;        ///< per point: weight that was left out (and shared by the rest)
+  int influences = 0;             ///< entries a point
+  std::vector<std::int32_t> bone; ///< points * influences, greatest weight first; 0 when unused
+  std::vector<float> weight;      ///< the same size; sum 1, 0 when unused
+  std::vector<float> dropped;     ///< per point: weight that was left out (and shared by the rest)
   double largestDropped = 0.0;
 };
 

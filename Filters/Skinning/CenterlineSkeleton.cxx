@@ -110,7 +110,8 @@ std::vector<double> PlaceJoints(const Course& course, const CenterlineSkeletonSe
       count[k] + step / std::clamp(wanted, settings.minimumLength, settings.maximumLength);
   }
   std::vector<double> places;
-  for (int bones = std::max(1, static_cast<int>(std::ceil(count.back() - 1e-9))); bones >= 1; --bones)
+  for (int bones = std::max(1, static_cast<int>(std::ceil(count.back() - 1e-9))); bones >= 1;
+       --bones)
   {
     std::vector<double> trial{ 0.0 };
     for (int i = 1; i < bones; ++i)
@@ -156,7 +157,8 @@ void CenterlineSkeletonSettings::Validate() const
   Require(this->minimumLength > 0.0 && this->minimumLength <= 1000.0,
     "minimumLength must be positive and at most 1000 mm");
   Require(this->maximumLength >= 2.0 * this->minimumLength && this->maximumLength <= 10000.0,
-    "maximumLength must be at least twice minimumLength, else there are lengths that cannot be divided");
+    "maximumLength must be at least twice minimumLength, else there are lengths that cannot be "
+    "divided");
   Require(this->radiusFactor >= 0.5 && this->radiusFactor <= 50.0,
     "radiusFactor must be within 0.5 to 50");
   Require(this->sagittaRatio >= 0.01 && this->sagittaRatio <= 1.0,
@@ -234,7 +236,8 @@ Skeleton MakeCenterlineSkeleton(
       daughters[tree.branches[i].parentGroupId].push_back(i);
     }
   }
-  std::stable_sort(stack.begin(), stack.end(), [&](std::size_t a, std::size_t b)
+  std::stable_sort(stack.begin(), stack.end(),
+    [&](std::size_t a, std::size_t b)
     { return tree.branches[a].treeId < tree.branches[b].treeId; });
   std::reverse(stack.begin(), stack.end());
 

@@ -18,8 +18,9 @@ struct CenterlineSkeletonSettings
   double minimumLength = 3.0; ///< mm along the vessel, positive; a shorter branch is one bone
   double maximumLength = 8.0; ///< mm along the vessel, at least twice minimumLength
   double radiusFactor = 3.0;  ///< wanted length of a bone in local radii, 0.5 to 50
-  double sagittaRatio = 0.25; ///< greatest wanted distance of the vessel's axis from the bone in local
-                              ///< radii, 0.01 to 1; shortens bones where the vessel is curved
+  double sagittaRatio =
+    0.25; ///< greatest wanted distance of the vessel's axis from the bone in local
+          ///< radii, 0.01 to 1; shortens bones where the vessel is curved
 
   /// @throws std::invalid_argument naming the setting.
   void Validate() const;
@@ -35,8 +36,8 @@ struct Skeleton
     int id = 0;               ///< number of the bone, from 0
     int groupId = 0;          ///< branch of the tree that was given
     int segmentId = 0;        ///< SegmentId of CoronaryPhantom.h, 0 unknown
-    std::string name;         ///< unique: segment, number along it: "pLAD-2"; "branch5-2" if unnamed
-    double length = 0.0;      ///< mm along the vessel; not less than the distance of the joints
+    std::string name;    ///< unique: segment, number along it: "pLAD-2"; "branch5-2" if unnamed
+    double length = 0.0; ///< mm along the vessel; not less than the distance of the joints
   };
 
   std::vector<Vector3> joints;      ///< mm

@@ -536,7 +536,8 @@ SkinWeightOptimizer::Violation SkinWeightOptimizer::Judge(
   return violation;
 }
 
-void SkinWeightOptimizer::Balance(const Values& x, const Values& z, const Values& previous, Values& s)
+void SkinWeightOptimizer::Balance(
+  const Values& x, const Values& z, const Values& previous, Values& s)
 {
   Values parts[4];
   for (Values& part : parts)
@@ -562,8 +563,7 @@ void SkinWeightOptimizer::Balance(const Values& x, const Values& z, const Values
   {
     return;
   }
-  const double wanted =
-    std::clamp(this->Rho * std::clamp(ratio, 0.1, 10.0), LeastRho, GreatestRho);
+  const double wanted = std::clamp(this->Rho * std::clamp(ratio, 0.1, 10.0), LeastRho, GreatestRho);
   if (wanted == this->Rho)
   {
     return;

@@ -114,8 +114,8 @@ ScaledMesh CheckAndScale(const SkinWeightInput& input)
           (mesh.points[input.tetrahedra[t][a]] - mesh.points[input.tetrahedra[t][b]]).norm());
       }
     }
-    Require(std::abs(SixVolumes(mesh.points, input.tetrahedra[t])) >
-        1e-12 * longest * longest * longest,
+    Require(
+      std::abs(SixVolumes(mesh.points, input.tetrahedra[t])) > 1e-12 * longest * longest * longest,
       "tetrahedron " + std::to_string(t) + " at " + At(input.points[input.tetrahedra[t][0]]) +
         " has no volume");
   }
@@ -186,8 +186,7 @@ SparseMatrix Stiffness(const ScaledMesh& mesh, std::vector<double>& mass)
   {
     const auto first = parts.begin() + offset[i];
     const auto last = parts.begin() + offset[i + 1];
-    std::stable_sort(
-      first, last, [](const Part& a, const Part& b) { return a.column < b.column; });
+    std::stable_sort(first, last, [](const Part& a, const Part& b) { return a.column < b.column; });
     for (auto part = first; part != last; ++part)
     {
       if (static_cast<std::int64_t>(stiffness.column.size()) > stiffness.offset.back() &&
@@ -329,7 +328,8 @@ public:
             corner[b] = b == a ? position : this->Mesh.points[tetrahedron[b]];
           }
           place[a] =
-            (corner[1] - corner[0]).dot((corner[2] - corner[0]).cross(corner[3] - corner[0])) / whole;
+            (corner[1] - corner[0]).dot((corner[2] - corner[0]).cross(corner[3] - corner[0])) /
+            whole;
           least = std::min(least, place[a]);
         }
         if (least > bestLeast)
@@ -422,8 +422,7 @@ void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const Spars
         const double squared = axis.squaredNorm();
         for (std::int64_t i = 0; i < count; ++i)
         {
-          const double along =
-            std::clamp(axis.dot(mesh.points[i] - start) / squared, 0.0, 1.0);
+          const double along = std::clamp(axis.dot(mesh.points[i] - start) / squared, 0.0, 1.0);
           if ((mesh.points[i] - start - along * axis).squaredNorm() <= reach * reach)
           {
             pointsOf[b].push_back({ along, i });
@@ -609,7 +608,8 @@ void CheckComponents(
   }
   for (std::size_t id = 0; id < hasBone.size(); ++id)
   {
-    const auto points = std::count(component.begin(), component.end(), static_cast<std::int32_t>(id));
+    const auto points =
+      std::count(component.begin(), component.end(), static_cast<std::int32_t>(id));
     Require(hasBone[id],
       "a connected part of the mesh has no bone in it: " + std::to_string(points) +
         " points, one of them at " + At(input.points[seeds[id]]));
@@ -711,8 +711,8 @@ SparseMatrix Permute(const SparseMatrix& matrix, const std::vector<std::int64_t>
               row.emplace_back(rowOf[matrix.column[a]], matrix.value[a]);
             }
           }
-          std::sort(row.begin(), row.end(),
-            [](const auto& a, const auto& b) { return a.first < b.first; });
+          std::sort(
+            row.begin(), row.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
           for (const auto& [column, value] : row)
           {
             part.column.push_back(column);
@@ -862,8 +862,8 @@ SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
         entries.push_back({ rowOfPoint[entry.row], entry.value });
       }
     }
-    std::stable_sort(entries.begin(), entries.end(),
-      [](const auto& x, const auto& y) { return x.row < y.row; });
+    std::stable_sort(
+      entries.begin(), entries.end(), [](const auto& x, const auto& y) { return x.row < y.row; });
     std::size_t kept = 0;
     for (std::size_t e = 0; e < entries.size(); ++e)
     {

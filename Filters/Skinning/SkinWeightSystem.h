@@ -49,7 +49,8 @@ struct SkinWeightSystem
   std::vector<std::vector<Entry>> linear; ///< per bone: energy = 1/2 w'Qw + linear'w + constant
   std::vector<double> constant;           ///< per bone
   std::vector<std::int32_t> nearest;      ///< per row: the bone that is nearest along the mesh
-  std::vector<std::vector<std::int32_t>> neighbours; ///< per bone: bones whose regions touch its own
+  std::vector<std::vector<std::int32_t>>
+    neighbours; ///< per bone: bones whose regions touch its own
 };
 
 /// @throws as ComputeSkinWeights

@@ -143,8 +143,7 @@ LowerTriangle Extract(
       {
         lower.row.push_back(j);
         const bool diagonal = j == static_cast<std::int32_t>(i);
-        lower.value.push_back(
-          matrix.value[k] + (diagonal && shift != nullptr ? shift[i] : 0.0));
+        lower.value.push_back(matrix.value[k] + (diagonal && shift != nullptr ? shift[i] : 0.0));
       }
     }
     lower.offset.push_back(static_cast<SuiteSparse_long>(lower.row.size()));
@@ -202,8 +201,9 @@ SparseCholesky::SparseCholesky(
   if (this->Inside->factor == nullptr || c.status != CHOLMOD_OK ||
     this->Inside->factor->minor < this->Inside->factor->n)
   {
-    throw std::runtime_error("the equations of the skin weights cannot be solved: the matrix is not "
-                             "positive definite; some tetrahedra are too flat");
+    throw std::runtime_error(
+      "the equations of the skin weights cannot be solved: the matrix is not "
+      "positive definite; some tetrahedra are too flat");
   }
 }
 

@@ -54,7 +54,8 @@ public:
   };
 
   /// Solves for `columns` right-hand sides, one after the other in memory.
-  void Solve(const double* right, double* solution, std::int64_t columns, Workspace& workspace) const;
+  void Solve(
+    const double* right, double* solution, std::int64_t columns, Workspace& workspace) const;
 
   /// Number of entries of the factor.
   double Entries() const;

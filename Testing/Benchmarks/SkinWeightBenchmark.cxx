@@ -33,7 +33,8 @@ SkinWeightInput Tree(const Case& c)
   for (Vector3& p : input.points)
   {
     const Vector3 by(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1));
-    const bool onBone = std::any_of(input.bones.begin(), input.bones.end(), [&](const auto& bone)
+    const bool onBone = std::any_of(input.bones.begin(), input.bones.end(),
+      [&](const auto& bone)
       { return DistanceToSegment(p, input.joints[bone.first], input.joints[bone.second]) < 1e-9; });
     p += onBone ? Vector3::Zero() : Vector3(0.06 * by);
   }
@@ -119,9 +120,8 @@ int main(int argc, char** argv)
   app.add_option("--libigl-iterations", libiglIterations, "of its active set");
   app.add_option("--neighbourhood", neighbourhood, "bones around a bone; 0: everywhere");
   CLI11_PARSE(app, argc, argv);
-  constexpr std::array<Case, 4> cases{
-    { { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 8, 3 }, { 12, 4, 14, 5 } }
-  };
+  constexpr std::array<Case, 4> cases{ { { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 8, 3 },
+    { 12, 4, 14, 5 } } };
   bool good = true;
   try
   {

@@ -72,9 +72,8 @@ inline SkinWeightInput MeshOfCells(const std::array<int, 3>& low, const std::arr
         {
           for (const int side : { 0, 2 })
           {
-            constexpr std::array<std::array<int, 2>, 5> ring{
-              { { 0, 0 }, { 2, 0 }, { 2, 2 }, { 0, 2 }, { 0, 0 } }
-            };
+            constexpr std::array<std::array<int, 2>, 5> ring{ { { 0, 0 }, { 2, 0 }, { 2, 2 },
+              { 0, 2 }, { 0, 0 } } };
             std::array<int, 3> face{ 1, 1, 1 };
             face[axis] = side;
             for (int n = 0; n < 4; ++n)
@@ -105,7 +104,8 @@ inline double DistanceToSegment(const Vector3& p, const Vector3& a, const Vector
 }
 
 /// Adds the bones of a polyline through grid points; returns its first and last joint.
-inline void AddBones(SkinWeightInput& input, std::int64_t firstJoint, const std::vector<Vector3>& next)
+inline void AddBones(
+  SkinWeightInput& input, std::int64_t firstJoint, const std::vector<Vector3>& next)
 {
   for (const Vector3& p : next)
   {
@@ -134,19 +134,19 @@ inline SkinWeightInput MeshOfComb(int branches, int branchBones, int boneCells, 
   }
   const int reach = branchBones * boneCells + half;
   const double width = (half - 0.25) * h;
-  SkinWeightInput input = MeshOfCells({ -half, -reach, -reach },
-    { trunkBones * boneCells + half, reach, reach }, h,
-    [&](const Vector3& p)
-    {
-      return std::any_of(axes.begin(), axes.end(),
-        [&](const auto& axis)
-        {
-          const Vector3 d = (axis.second - axis.first).normalized();
-          const double along = d.dot(p - axis.first);
-          return along > -width && along < (axis.second - axis.first).norm() + width &&
-            (p - axis.first - along * d).norm() < 1.3 * width;
-        });
-    });
+  SkinWeightInput input =
+    MeshOfCells({ -half, -reach, -reach }, { trunkBones * boneCells + half, reach, reach }, h,
+      [&](const Vector3& p)
+      {
+        return std::any_of(axes.begin(), axes.end(),
+          [&](const auto& axis)
+          {
+            const Vector3 d = (axis.second - axis.first).normalized();
+            const double along = d.dot(p - axis.first);
+            return along > -width && along < (axis.second - axis.first).norm() + width &&
+              (p - axis.first - along * d).norm() < 1.3 * width;
+          });
+      });
   input.joints.push_back(Vector3::Zero());
   std::vector<Vector3> trunk;
   for (int i = 1; i <= trunkBones; ++i)

@@ -56,8 +56,7 @@ Eigen::MatrixXd DenseBilaplacian(const SkinWeightInput& input)
       mass[t[a]] += volume / 4.0;
       for (int b = 0; b < 4; ++b)
       {
-        stiffness(t[a], t[b]) +=
-          volume * inverse.col(a).tail<3>().dot(inverse.col(b).tail<3>());
+        stiffness(t[a], t[b]) += volume * inverse.col(a).tail<3>().dot(inverse.col(b).tail<3>());
       }
     }
   }
@@ -74,8 +73,8 @@ struct FixedPoints
 FixedPoints Constraints(const SkinWeightInput& input)
 {
   FixedPoints fixed;
-  fixed.values = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(input.points.size()),
-    static_cast<Eigen::Index>(input.bones.size()));
+  fixed.values = Eigen::MatrixXd::Zero(
+    static_cast<Eigen::Index>(input.points.size()), static_cast<Eigen::Index>(input.bones.size()));
   for (std::size_t i = 0; i < input.points.size(); ++i)
   {
     const auto row = static_cast<Eigen::Index>(i);
@@ -287,10 +286,10 @@ TEST(BiharmonicSkinWeights, WithoutBoundsAgreesWithDenseSolve)
   const Eigen::MatrixXd q = DenseBilaplacian(input);
   const FixedPoints fixed = Constraints(input);
   Eigen::MatrixXd reference = fixed.values;
-  reference(fixed.free, Eigen::all) = -q(fixed.free, fixed.free)
-                                         .llt()
-                                         .solve(Eigen::MatrixXd(
-                                           q(fixed.free, Eigen::all) * fixed.values));
+  reference(fixed.free, Eigen::all) =
+    -q(fixed.free, fixed.free)
+       .llt()
+       .solve(Eigen::MatrixXd(q(fixed.free, Eigen::all) * fixed.values));
   const SkinWeights weights = ComputeSkinWeights(input, Settings(SkinWeightMode::Unbounded));
   EXPECT_LT((Dense(weights) - reference).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_NEAR(weights.energy / Energy(q, reference), 1.0, 1e-9);
@@ -305,8 +304,8 @@ TEST(BiharmonicSkinWeights, BarIsTheCubicOfABeam)
   // Between two short bones a long thin bar: w'''' = 0 with value and slope 0 at one bone, 1 and 0
   // at the other, so w = 3 t^2 - 2 t^3. The bones' inner ends fix one cross-section's middle only,
   // so the ends are clamped by a bone of two cells.
-  SkinWeightInput input = MeshOfCells({ 0, -1, -1 }, { 60, 1, 1 }, 0.1,
-    [](const Vector3&) { return true; });
+  SkinWeightInput input =
+    MeshOfCells({ 0, -1, -1 }, { 60, 1, 1 }, 0.1, [](const Vector3&) { return true; });
   input.joints = { Vector3(0, 0, 0), Vector3(1, 0, 0), Vector3(5, 0, 0), Vector3(6, 0, 0) };
   input.bones = { { 0, 1 }, { 2, 3 } };
   for (const SkinWeightMode mode : { SkinWeightMode::Joint, SkinWeightMode::Independent })
@@ -319,14 +318,13 @@ TEST(BiharmonicSkinWeights, BarIsTheCubicOfABeam)
     for (std::size_t i = 0; i < input.points.size(); ++i)
     {
       const double t = std::clamp((input.points[i][0] - 1.0) / 4.0, 0.0, 1.0);
-      worst = std::max(worst,
-        std::abs(dense(static_cast<Eigen::Index>(i), 1) - t * t * (3.0 - 2.0 * t)));
+      worst =
+        std::max(worst, std::abs(dense(static_cast<Eigen::Index>(i), 1) - t * t * (3.0 - 2.0 * t)));
     }
     EXPECT_LT(worst, 0.03);
   }
   // Harmonic: a straight line.
-  const Eigen::MatrixXd line =
-    Dense(ComputeSkinWeights(input, Settings(SkinWeightMode::Harmonic)));
+  const Eigen::MatrixXd line = Dense(ComputeSkinWeights(input, Settings(SkinWeightMode::Harmonic)));
   for (std::size_t i = 0; i < input.points.size(); ++i)
   {
     const double t = std::clamp((input.points[i][0] - 1.0) / 4.0, 0.0, 1.0);
@@ -336,8 +334,8 @@ TEST(BiharmonicSkinWeights, BarIsTheCubicOfABeam)
 
 TEST(BiharmonicSkinWeights, SymmetricCaseGivesSymmetricWeights)
 {
-  SkinWeightInput input = MeshOfCells({ -6, -1, -1 }, { 6, 1, 1 }, 0.5,
-    [](const Vector3&) { return true; }, CellSplit::Star);
+  SkinWeightInput input = MeshOfCells(
+    { -6, -1, -1 }, { 6, 1, 1 }, 0.5, [](const Vector3&) { return true; }, CellSplit::Star);
   input.joints = { Vector3(-3, 0, 0), Vector3(-1, 0, 0), Vector3(1, 0, 0), Vector3(3, 0, 0) };
   input.bones = { { 0, 1 }, { 1, 2 }, { 2, 3 } };
   const Eigen::MatrixXd w = Dense(ComputeSkinWeights(input, Settings(SkinWeightMode::Joint)));
@@ -428,11 +426,10 @@ TEST(BiharmonicSkinWeights, NeighbourhoodChangesNothingThatMatters)
 
 TEST(BiharmonicSkinWeights, BonesBetweenThePoints)
 {
-  SkinWeightInput input = MeshOfCells({ 0, -2, -2 }, { 24, 2, 2 }, 0.25,
-    [](const Vector3&) { return true; });
+  SkinWeightInput input =
+    MeshOfCells({ 0, -2, -2 }, { 24, 2, 2 }, 0.25, [](const Vector3&) { return true; });
   const Vector3 off(0.0, 0.11, 0.07);
-  input.joints = { Vector3(0.3, 0, 0) + off, Vector3(3.04, 0, 0) + off,
-    Vector3(5.71, 0, 0) + off };
+  input.joints = { Vector3(0.3, 0, 0) + off, Vector3(3.04, 0, 0) + off, Vector3(5.71, 0, 0) + off };
   input.bones = { { 0, 1 }, { 1, 2 } };
   const SkinWeights weights = ComputeSkinWeights(input, Settings(SkinWeightMode::Joint));
   EXPECT_TRUE(weights.converged);
@@ -553,8 +550,8 @@ TEST(BiharmonicSkinWeights, BadInput)
   EXPECT_TRUE(Contains(damaged([](auto& i) { i.bones[1].second = 99; }), "bone 1"));
   EXPECT_TRUE(Contains(damaged([](auto& i) { i.bones[1].second = i.bones[1].first; }), "bone 1"));
   EXPECT_TRUE(Contains(damaged([](auto& i) { i.bones.push_back(i.bones[0]); }), "same joints"));
-  EXPECT_TRUE(
-    Contains(damaged([](auto& i) { i.points.emplace_back(50, 0, 0); }), "belongs to no tetrahedron"));
+  EXPECT_TRUE(Contains(
+    damaged([](auto& i) { i.points.emplace_back(50, 0, 0); }), "belongs to no tetrahedron"));
   EXPECT_TRUE(Contains(damaged(
                          [](auto& i)
                          {
@@ -595,6 +592,5 @@ TEST(BiharmonicSkinWeights, BadInput)
   EXPECT_TRUE(Contains(refused([](auto& s) { s.iterations = 0; }), "iterations"));
   EXPECT_TRUE(Contains(refused([](auto& s) { s.neighbourhood = -1; }), "neighbourhood"));
   EXPECT_TRUE(Contains(refused([](auto& s) { s.penalty = 0.0; }), "penalty"));
-  EXPECT_TRUE(
-    Contains(refused([](auto& s) { s.mode = static_cast<SkinWeightMode>(9); }), "mode"));
+  EXPECT_TRUE(Contains(refused([](auto& s) { s.mode = static_cast<SkinWeightMode>(9); }), "mode"));
 }

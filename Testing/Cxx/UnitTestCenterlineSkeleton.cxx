@@ -120,7 +120,8 @@ TEST(CenterlineSkeleton, JointsAtRootBifurcationAndEnds)
     const Skeleton::Bone& bone = skeleton.bones[b];
     EXPECT_EQ(bone.id, static_cast<int>(b));
     EXPECT_EQ(skeleton.parent[bone.second], bone.first);
-    EXPECT_NEAR(bone.length, (skeleton.joints[bone.first] - skeleton.joints[bone.second]).norm(), 1e-9);
+    EXPECT_NEAR(
+      bone.length, (skeleton.joints[bone.first] - skeleton.joints[bone.second]).norm(), 1e-9);
     EXPECT_NEAR(skeleton.abscissa[bone.second] - skeleton.abscissa[bone.first], bone.length, 1e-9);
     EXPECT_GE(bone.length, 3.0);
     EXPECT_LE(bone.length, 8.0);
