@@ -141,6 +141,20 @@ constexpr const char* LeastVolume = "LeastVolume";               ///< double, mm
 constexpr const char* TotalVolume = "TotalVolume";               ///< double, mm^3
 constexpr const char* GreatestRadiusEdgeRatio = "GreatestRadiusEdgeRatio"; ///< double
 constexpr const char* Warnings = "Warnings"; ///< string, one a warning
+// Skeleton (with radius and abscissa, GroupIds, TreeIds, SegmentIds, Length), point data.
+constexpr const char* ParentJoint =
+  "ParentJoint"; ///< vtkIdType, next joint rootwards, -1 at a root
+// Skeleton, cell data.
+constexpr const char* BoneId = "BoneId"; ///< int, from 0 in the order of the cells
+// Skeleton, field data; a string array of cells would crash ParaView's parallel XML reader.
+constexpr const char* BoneName = "BoneName"; ///< string, one a bone
+
+// Weights of bones, point data.
+constexpr const char* BoneWeights = "BoneWeights"; ///< double[bones], named components
+constexpr const char* BoneIndices = "BoneIndices"; ///< int[n], -1: none
+constexpr const char* BoneWeightsCompact = "BoneWeightsCompact"; ///< float[n], greatest first
+constexpr const char* DroppedWeight = "DroppedWeight"; ///< float, weight of bones left out
+
 // Cleaned surface, field data.
 constexpr const char* Repairs = "Repairs";                           ///< string, a sentence each
 constexpr const char* GreatestDisplacement = "GreatestDisplacement"; ///< double, mm

@@ -144,6 +144,14 @@ std::vector<double> PlaceJoints(const Course& course, const CenterlineSkeletonSe
   return places;
 }
 
+/// The points of the line, but for those on top of the one before.
+std::vector<double> DistinctStations(const Course& course)
+{
+  std::vector<double> places = course.Stations();
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  return places;
+}
+
 std::string NamePrefix(int segmentId, int groupId)
 {
   const std::string name = SegmentName(segmentId);
@@ -260,7 +268,8 @@ Skeleton MakeCenterlineSkeleton(
     const int groupId = groupOfPoint[branch.points[1]];
     Require(course.Length() > 0.0, "branch " + std::to_string(groupId) + " has no length");
     const double start = tree.abscissa[branch.points.front()];
-    const std::vector<double> places = PlaceJoints(course, settings);
+    const std::vector<double> places =
+      settings.everyStep ? DistinctStations(course) : PlaceJoints(course, settings);
     auto [joint, isNew] = jointOfPoint.try_emplace(branch.points.front(), -1);
     if (isNew)
     {
@@ -274,6 +283,7 @@ Skeleton MakeCenterlineSkeleton(
       bone.second = last = addJoint(course, places[i], start + places[i], last);
       bone.id = static_cast<int>(skeleton.bones.size());
       bone.groupId = groupId;
+      bone.treeId = branch.treeId;
       bone.segmentId = course.SegmentId(0.5 * (places[i - 1] + places[i]));
       const std::string prefix = NamePrefix(bone.segmentId, groupId);
       bone.name = prefix + std::to_string(++counters[prefix]);

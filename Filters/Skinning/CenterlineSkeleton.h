@@ -21,6 +21,9 @@ struct CenterlineSkeletonSettings
   double sagittaRatio =
     0.25; ///< greatest wanted distance of the vessel's axis from the bone in local
           ///< radii, 0.01 to 1; shortens bones where the vessel is curved
+  bool everyStep =
+    false; ///< every step of the lines is a bone, whatever its length: for lines that
+           ///< are a skeleton already
 
   /// @throws std::invalid_argument naming the setting.
   void Validate() const;

@@ -1,0 +1,146 @@
+/**
+ * @class   vtkCenterlineSkeleton
+ * @brief   Joints and bones along the centerlines of a forest of vessels.
+ *
+ * Joints stand at every root, bifurcation and end, and between them so that bones are some radii
+ * long, shorter where the vessel is curved. See docs/skinning.md.
+ *
+ * @par Input port:
+ * - 0: vtkPolyData, a tree of centerlines: polylines with cell arrays `GroupIds`, `ParentGroupIds`,
+ *   as of vtkCoronaryTreeTopology or vtkTGFReader. Point data: radius in mm, by default
+ *   `MaximumInscribedSphereRadius`, or `Radius` where there is no such array; `SegmentIds`
+ *   (optional). Cell data `TreeIds`, `SegmentIds` (optional).
+ *
+ * @par Output port:
+ * - 0: vtkPolyData. Points are joints, a parent before its daughters; cells are lines of two points,
+ *   bones in the order of their ids. Point data: `ParentJoint` (vtkIdType, the next joint towards the
+ *   root, -1 at a root), `MaximumInscribedSphereRadius` (double, mm), `Abscissas` (double, mm from
+ *   the root along the tree). Cell data: `BoneId` (int), `GroupIds` (int, branch of the input that
+ *   the bone is of), `TreeIds`, `SegmentIds` (int, coronary::SegmentId, 0 unnamed), `Length`
+ *   (double, mm along the vessel). Field data: `BoneName` (string, one a bone: `pLAD-2`), and that
+ *   of the input.
+ *
+ * The same tree gives the same joints, ids and names. The output is whole in piece 0, and empty in
+ * every other piece. Blocks of a composite input are treated one by one. An empty input gives an
+ * empty output.
+ *
+ * @par Failure:
+ * A setting out of range, lines that are no tree, a radius array that is missing or unfit, a
+ * coordinate that is not finite, a branch without length: one error that names it, and no output.
+ *
+ * @sa coronary::MakeCenterlineSkeleton, vtkBiharmonicSkinWeights
+ */
+#ifndef vtkCenterlineSkeleton_h
+#define vtkCenterlineSkeleton_h
+
+#include "vtkCoronarySkinningModule.h" // for the export macro
+#include "vtkPolyDataAlgorithm.h"
+
+#include <string> // for std::string
+
+class VTKCORONARYSKINNING_EXPORT vtkCenterlineSkeleton : public vtkPolyDataAlgorithm
+{
+public:
+  static vtkCenterlineSkeleton* New();
+  vtkTypeMacro(vtkCenterlineSkeleton, vtkPolyDataAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /**
+   * Shortest bone in mm along the vessel, positive; a shorter branch is one bone. Default 3.
+   */
+  vtkSetMacro(MinimumLength, double);
+  vtkGetMacro(MinimumLength, double);
+  ///@}
+
+  ///@{
+  /**
+   * Longest bone in mm along the vessel, at least twice the shortest. Default 8.
+   */
+  vtkSetMacro(MaximumLength, double);
+  vtkGetMacro(MaximumLength, double);
+  ///@}
+
+  ///@{
+  /**
+   * Wanted length of a bone in local radii, 0.5 to 50. Default 3.
+   */
+  vtkSetMacro(RadiusFactor, double);
+  vtkGetMacro(RadiusFactor, double);
+  ///@}
+
+  ///@{
+  /**
+   * Greatest wanted distance of the vessel's axis from the bone in local radii, 0.01 to 1. Default
+   * 0.25.
+   */
+  vtkSetMacro(SagittaRatio, double);
+  vtkGetMacro(SagittaRatio, double);
+  ///@}
+
+  ///@{
+  /**
+   * Whether every step of the lines is a bone, whatever its length: for lines that are a skeleton
+   * already, as of vtkTGFReader. Default off.
+   */
+  vtkSetMacro(EveryStep, bool);
+  vtkGetMacro(EveryStep, bool);
+  vtkBooleanMacro(EveryStep, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Name of the input's point array with the radius. `Automatic`, the default:
+   * `MaximumInscribedSphereRadius`, or `Radius` where there is no such array.
+   */
+  vtkSetStdStringFromCharMacro(InputRadiusArrayName);
+  vtkGetCharFromStdStringMacro(InputRadiusArrayName);
+  ///@}
+
+  ///@{
+  /**
+   * Names of the output's arrays. Defaults as listed above.
+   */
+  vtkSetStdStringFromCharMacro(ParentJointArrayName);
+  vtkGetCharFromStdStringMacro(ParentJointArrayName);
+  vtkSetStdStringFromCharMacro(RadiusArrayName);
+  vtkGetCharFromStdStringMacro(RadiusArrayName);
+  vtkSetStdStringFromCharMacro(AbscissasArrayName);
+  vtkGetCharFromStdStringMacro(AbscissasArrayName);
+  vtkSetStdStringFromCharMacro(BoneIdArrayName);
+  vtkGetCharFromStdStringMacro(BoneIdArrayName);
+  vtkSetStdStringFromCharMacro(BoneNameArrayName);
+  vtkGetCharFromStdStringMacro(BoneNameArrayName);
+  ///@}
+
+protected:
+  vtkCenterlineSkeleton();
+  ~vtkCenterlineSkeleton() override = default;
+
+  int RequestInformation(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestUpdateExtent(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestData(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+private:
+  vtkCenterlineSkeleton(const vtkCenterlineSkeleton&) = delete;
+  void operator=(const vtkCenterlineSkeleton&) = delete;
+
+  std::string FindRadius(vtkPolyData* input) const;
+
+  double MinimumLength = 3.0;
+  double MaximumLength = 8.0;
+  double RadiusFactor = 3.0;
+  double SagittaRatio = 0.25;
+  bool EveryStep = false;
+  std::string InputRadiusArrayName = "Automatic";
+  std::string ParentJointArrayName;
+  std::string RadiusArrayName;
+  std::string AbscissasArrayName;
+  std::string BoneIdArrayName;
+  std::string BoneNameArrayName;
+};
+
+#endif
