@@ -33,9 +33,12 @@ struct SkinWeightSettings
     1e-6; ///< of the conditions of optimality, see SkinWeights::residual; 1e-10 to 0.01
   int iterations = 2000; ///< limit for the alternating directions, 1 to 1000000
   bool polish = true;    ///< solve exactly for the set of bounds that was found to hold
-  /// Joint and Independent: a bone may have weight only where the nearest bone along the mesh is at
-  /// most so many bones away; 0: everywhere. SkinWeights::energyGap says what it costs.
-  int neighbourhood = 3;
+  /// Joint and Independent: a bone may have weight only where a bone of its group of eight is at most
+  /// so many bones away along the mesh; 0: everywhere. SkinWeights::energyGap says what it costs.
+  int neighbourhood = 2;
+  /// Adds a bone to the neighbourhood, and solves again, as long as residualEverywhere is above 10
+  /// tolerances.
+  bool widen = true;
   double penalty =
     1e4; ///< of a bone's weight that is not 1 where the bone runs between the points,
          ///< in units of the energy's diagonal, 1 to 1e8
@@ -64,6 +67,7 @@ struct SkinWeights
   int iterations = 0;     ///< of the alternating directions
   int factorizations = 0; ///< of the whole system
   int polishSteps = 0;
+  int neighbourhood = 0;         ///< in the end; 0: everywhere
   double penaltyParameter = 0.0; ///< of the alternating directions, at the end
 
   /// Greatest violation of the conditions of optimality at any point and any bone that may have

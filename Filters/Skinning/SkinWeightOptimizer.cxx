@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -20,7 +21,9 @@ constexpr double LeastRho = 1e-3;
 constexpr double GreatestRho = 10.0;
 constexpr int MostPolishSteps = 10;
 // Beyond it one exact step costs more than what the alternating directions took.
-constexpr std::int64_t MostUnknowns = 20000;
+constexpr std::int64_t MostUnknowns = 8000;
+// What bones that are not allowed somewhere may violate, in tolerances, before they are.
+constexpr double Margin = 10.0;
 constexpr double Rounding = 1e-13;
 constexpr double Exact = 1e-10; // residual at which nothing is left to polish
 }
@@ -30,6 +33,7 @@ SkinWeightOptimizer::SkinWeightOptimizer(
   : System(system)
   , Settings(settings)
   , Joint(settings.mode == SkinWeightMode::Joint)
+  , Reach(settings.neighbourhood)
 {
   this->MakeGroups();
   this->MakePairs();
@@ -38,61 +42,78 @@ SkinWeightOptimizer::SkinWeightOptimizer(
 void SkinWeightOptimizer::MakeGroups()
 {
   const std::int64_t rows = this->System.energy.rows;
-  const std::int64_t bones = this->System.bones;
-  if (this->Settings.neighbourhood == 0)
+  const auto bones = static_cast<std::int32_t>(this->System.bones);
+  this->Groups.clear();
+  this->Tasks.clear();
+  this->Size = 0;
+  // Bones in the order in which a walk along the skeleton meets them, eight to a group.
+  std::vector<char> taken(bones, 0);
+  for (std::int32_t seed = 0; seed < bones; ++seed)
   {
-    this->Groups.resize(1);
-    this->Groups[0].bones.resize(bones);
-    std::iota(this->Groups[0].bones.begin(), this->Groups[0].bones.end(), 0);
-    this->Groups[0].rows.resize(rows);
-    std::iota(this->Groups[0].rows.begin(), this->Groups[0].rows.end(), 0);
-  }
-  else
-  {
-    this->Groups.resize(bones);
-    std::vector<std::vector<std::int32_t>> rowsOf(bones);
-    for (std::int64_t r = 0; r < rows; ++r)
+    if (taken[seed])
     {
-      rowsOf[this->System.nearest[r]].push_back(static_cast<std::int32_t>(r));
+      continue;
     }
-    for (std::int64_t b = 0; b < bones; ++b)
+    taken[seed] = 1;
+    Group group;
+    group.bones = { seed };
+    for (std::size_t i = 0; i < group.bones.size(); ++i)
     {
-      std::vector<int> hops(bones, -1);
-      std::vector<std::int32_t> reached{ static_cast<std::int32_t>(b) };
-      hops[b] = 0;
-      Group& group = this->Groups[b];
-      group.bones = { static_cast<std::int32_t>(b) };
-      for (std::size_t i = 0; i < reached.size(); ++i)
+      for (const std::int32_t next : this->System.neighbours[group.bones[i]])
       {
-        const std::int32_t bone = reached[i];
-        group.rows.insert(group.rows.end(), rowsOf[bone].begin(), rowsOf[bone].end());
-        if (hops[bone] < this->Settings.neighbourhood)
+        if (!taken[next] && (this->Reach == 0 || group.bones.size() < ColumnsAtOnce))
         {
-          for (const std::int32_t next : this->System.neighbours[bone])
-          {
-            if (hops[next] < 0)
-            {
-              hops[next] = hops[bone] + 1;
-              reached.push_back(next);
-            }
-          }
+          taken[next] = 1;
+          group.bones.push_back(next);
         }
       }
-      std::sort(group.rows.begin(), group.rows.end());
     }
+    std::sort(group.bones.begin(), group.bones.end());
+    this->Groups.push_back(std::move(group));
+  }
+  std::vector<std::vector<std::int32_t>> rowsOf(bones);
+  for (std::int64_t r = 0; r < rows; ++r)
+  {
+    rowsOf[this->System.nearest[r]].push_back(static_cast<std::int32_t>(r));
   }
   for (std::size_t g = 0; g < this->Groups.size(); ++g)
   {
     Group& group = this->Groups[g];
+    std::vector<int> hops(bones, -1);
+    std::vector<std::int32_t> reached = group.bones;
+    for (const std::int32_t bone : reached)
+    {
+      hops[bone] = 0;
+    }
+    for (std::size_t i = 0; i < reached.size(); ++i)
+    {
+      const std::int32_t bone = reached[i];
+      group.rows.insert(group.rows.end(), rowsOf[bone].begin(), rowsOf[bone].end());
+      if (this->Reach == 0 || hops[bone] < this->Reach)
+      {
+        for (const std::int32_t next : this->System.neighbours[bone])
+        {
+          if (hops[next] < 0)
+          {
+            hops[next] = hops[bone] + 1;
+            reached.push_back(next);
+          }
+        }
+      }
+    }
+    std::sort(group.rows.begin(), group.rows.end());
     group.base = this->Size;
     const auto columns = static_cast<std::int64_t>(group.bones.size());
     this->Size += columns * static_cast<std::int64_t>(group.rows.size());
     for (std::int64_t first = 0; first < columns; first += ColumnsAtOnce)
     {
-      this->Tasks.push_back({ g, first, std::min(ColumnsAtOnce, columns - first),
-        std::make_unique<SparseCholesky::Workspace>() });
+      this->Tasks.push_back({ g, first, std::min(ColumnsAtOnce, columns - first) });
     }
   }
+  // The longest first, so that threads end together.
+  std::stable_sort(this->Tasks.begin(), this->Tasks.end(),
+    [&](const Task& a, const Task& c)
+    { return this->Groups[a.group].rows.size() > this->Groups[c.group].rows.size(); });
 }
 
 void SkinWeightOptimizer::MakePairs()
@@ -112,29 +133,63 @@ void SkinWeightOptimizer::MakePairs()
   this->RowOfValue.resize(this->Size);
   this->Linear.assign(this->Size, 0.0);
   std::vector<std::int64_t> next(this->PairOffset.begin(), this->PairOffset.end() - 1);
+  // Bones ascending in every row.
+  std::vector<std::pair<const Group*, std::size_t>> place(this->System.bones);
   for (const Group& group : this->Groups)
   {
-    const auto height = static_cast<std::int64_t>(group.rows.size());
     for (std::size_t k = 0; k < group.bones.size(); ++k)
     {
-      const std::int64_t base = group.base + static_cast<std::int64_t>(k) * height;
-      auto entry = this->System.linear[group.bones[k]].begin();
-      const auto end = this->System.linear[group.bones[k]].end();
-      for (std::int64_t i = 0; i < height; ++i)
+      place[group.bones[k]] = { &group, k };
+    }
+  }
+  for (std::int64_t bone = 0; bone < this->System.bones; ++bone)
+  {
+    const auto& [group, k] = place[bone];
+    const auto height = static_cast<std::int64_t>(group->rows.size());
+    const std::int64_t base = group->base + static_cast<std::int64_t>(k) * height;
+    auto entry = this->System.linear[bone].begin();
+    const auto end = this->System.linear[bone].end();
+    for (std::int64_t i = 0; i < height; ++i)
+    {
+      const std::int32_t r = group->rows[i];
+      this->PairBone[next[r]] = static_cast<std::int32_t>(bone);
+      this->PairIndex[next[r]] = base + i;
+      ++next[r];
+      this->RowOfValue[base + i] = r;
+      while (entry != end && entry->row < r)
       {
-        const std::int32_t r = group.rows[i];
-        this->PairBone[next[r]] = group.bones[k];
-        this->PairIndex[next[r]] = base + i;
-        ++next[r];
-        this->RowOfValue[base + i] = r;
-        while (entry != end && entry->row < r)
-        {
-          ++entry;
-        }
-        if (entry != end && entry->row == r)
-        {
-          this->Linear[base + i] = entry->value;
-        }
+        ++entry;
+      }
+      if (entry != end && entry->row == r)
+      {
+        this->Linear[base + i] = entry->value;
+      }
+    }
+  }
+}
+
+void SkinWeightOptimizer::Widen()
+{
+  const std::vector<std::int64_t> offset = this->PairOffset;
+  const std::vector<std::int32_t> bone = this->PairBone;
+  const std::vector<std::int64_t> index = this->PairIndex;
+  const Values weights = this->Weights;
+  ++this->Reach;
+  this->MakeGroups();
+  this->MakePairs();
+  this->Weights.assign(this->Size, 0.0);
+  for (std::int64_t r = 0; r < this->System.energy.rows; ++r)
+  {
+    std::int64_t old = offset[r];
+    for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
+    {
+      while (old < offset[r + 1] && bone[old] < this->PairBone[p])
+      {
+        ++old;
+      }
+      if (old < offset[r + 1] && bone[old] == this->PairBone[p])
+      {
+        this->Weights[this->PairIndex[p]] = weights[index[old]];
       }
     }
   }
@@ -148,18 +203,11 @@ void SkinWeightOptimizer::Factorize()
       for (std::int64_t g = first; g < last; ++g)
       {
         Group& group = this->Groups[g];
-        group.factor.reset();
-        if (group.rows.empty())
+        if (!group.factor)
         {
-          continue;
+          group.factor = std::make_unique<SupernodalFactor>(this->System.energy, group.rows);
         }
-        Values shift(group.rows.size());
-        for (std::size_t i = 0; i < shift.size(); ++i)
-        {
-          shift[i] = this->Rho * this->System.diagonal[group.rows[i]];
-        }
-        group.factor =
-          std::make_unique<SparseCholesky>(this->System.energy, group.rows, shift.data());
+        group.factor->Factorize(this->System.energy, this->Rho);
       }
     });
   ++this->Factorizations;
@@ -214,32 +262,102 @@ void SkinWeightOptimizer::Project(const Values& s, Values& z) const
     });
 }
 
-void SkinWeightOptimizer::Solve(const Values& s, const Values& z, Values& x)
+void SkinWeightOptimizer::Solve(
+  const Values& s, const Values& z, Values& right, Values& x, bool exact) const
 {
+  const SparseMatrix& q = this->System.energy;
   ParallelFor(static_cast<std::int64_t>(this->Tasks.size()), 1,
     [&](std::int64_t first, std::int64_t last)
     {
-      Values right;
+      Values change;
+      Values spread;
+      std::vector<float> scratch;
       for (std::int64_t t = first; t < last; ++t)
       {
-        Task& task = this->Tasks[t];
+        const Task& task = this->Tasks[t];
         const Group& group = this->Groups[task.group];
         const auto height = static_cast<std::int64_t>(group.rows.size());
-        if (height == 0)
-        {
-          continue;
-        }
         const std::int64_t base = group.base + task.firstColumn * height;
-        right.resize(height * task.columns);
+        change.resize(height * task.columns);
         for (std::int64_t i = 0; i < height * task.columns; ++i)
         {
           const std::int64_t v = base + i;
-          right[i] = this->Rho * this->System.diagonal[this->RowOfValue[v]] * (2.0 * z[v] - s[v]) -
+          const double wanted =
+            this->Rho * this->System.diagonal[this->RowOfValue[v]] * (2.0 * z[v] - s[v]) -
             this->Linear[v];
+          change[i] = wanted - right[v];
+          right[v] = wanted;
         }
-        group.factor->Solve(right.data(), x.data() + base, task.columns, *task.workspace);
+        if (exact)
+        {
+          spread.assign(q.rows, 0.0);
+          for (std::int64_t c = 0; c < task.columns; ++c)
+          {
+            const double* column = x.data() + base + c * height;
+            for (std::int64_t i = 0; i < height; ++i)
+            {
+              spread[group.rows[i]] = column[i];
+            }
+            for (std::int64_t i = 0; i < height; ++i)
+            {
+              const std::int32_t row = group.rows[i];
+              double product = this->Rho * this->System.diagonal[row] * column[i];
+              for (std::int64_t a = q.offset[row]; a < q.offset[row + 1]; ++a)
+              {
+                product += q.value[a] * spread[q.column[a]];
+              }
+              change[c * height + i] = right[base + c * height + i] - product;
+            }
+          }
+        }
+        group.factor->AddSolution(change.data(), x.data() + base, task.columns, scratch);
       }
     });
+}
+
+std::vector<double> SkinWeightOptimizer::Dots(
+  const std::vector<const std::vector<float>*>& vectors, const std::vector<float>& b)
+{
+  const auto count = static_cast<std::int64_t>(b.size());
+  const std::int64_t parts = (count + ValuesAtOnce - 1) / ValuesAtOnce;
+  const auto width = static_cast<std::int64_t>(vectors.size());
+  Values sums(parts * width, 0.0);
+  ParallelFor(parts, 1,
+    [&](std::int64_t firstPart, std::int64_t lastPart)
+    {
+      for (std::int64_t p = firstPart; p < lastPart; ++p)
+      {
+        for (std::int64_t k = 0; k < width; ++k)
+        {
+          const float* a = vectors[k]->data();
+          // Several sums, so that the additions need not wait for each other.
+          std::array<double, 8> sum{};
+          const std::int64_t end = std::min(count, (p + 1) * ValuesAtOnce);
+          std::int64_t i = p * ValuesAtOnce;
+          for (; i + 8 <= end; i += 8)
+          {
+            for (int l = 0; l < 8; ++l)
+            {
+              sum[l] += static_cast<double>(a[i + l]) * b[i + l];
+            }
+          }
+          for (; i < end; ++i)
+          {
+            sum[0] += static_cast<double>(a[i]) * b[i];
+          }
+          sums[p * width + k] = std::accumulate(sum.begin(), sum.end(), 0.0);
+        }
+      }
+    });
+  std::vector<double> result(width, 0.0);
+  for (std::int64_t p = 0; p < parts; ++p)
+  {
+    for (std::int64_t k = 0; k < width; ++k)
+    {
+      result[k] += sums[p * width + k];
+    }
+  }
+  return result;
 }
 
 double SkinWeightOptimizer::Dot(const Values& a, const Values& b)
@@ -277,62 +395,40 @@ public:
 
   void Restart()
   {
-    this->Steps.clear();
-    this->Residues.clear();
-    this->LastS.clear();
+    this->Columns = 0;
+    this->HasLast = false;
     this->LastNorm = std::numeric_limits<double>::infinity();
   }
 
   void Step(Values& s, const Values& f)
   {
-    const double norm = Dot(f, f);
-    if (!this->LastS.empty() && !(norm <= 4.0 * this->LastNorm))
+    std::vector<float> residue(f.begin(), f.end());
+    const double norm = Dots({ &residue }, residue)[0];
+    if (this->HasLast && !(norm <= 4.0 * this->LastNorm))
     {
       s = this->Plain;
       this->Restart();
       return;
     }
     this->LastNorm = norm;
-    if (!this->LastS.empty())
+    if (this->HasLast)
     {
-      if (this->Steps.size() == Memory)
-      {
-        std::rotate(this->Steps.begin(), this->Steps.begin() + 1, this->Steps.end());
-        std::rotate(this->Residues.begin(), this->Residues.begin() + 1, this->Residues.end());
-      }
-      else
-      {
-        this->Steps.emplace_back(this->Size);
-        this->Residues.emplace_back(this->Size);
-      }
-      ParallelFor(this->Size, ValuesAtOnce,
-        [&](std::int64_t first, std::int64_t last)
-        {
-          for (std::int64_t i = first; i < last; ++i)
-          {
-            this->Steps.back()[i] = s[i] - this->LastS[i];
-            this->Residues.back()[i] = f[i] - this->LastF[i];
-          }
-        });
+      this->AddColumn(s, f);
     }
-    this->LastS = s;
-    this->LastF = f;
-    const auto columns = static_cast<Eigen::Index>(this->Steps.size());
-    Eigen::MatrixXd normal(columns, columns);
-    Eigen::VectorXd right(columns);
-    for (Eigen::Index i = 0; i < columns; ++i)
+    else
     {
-      for (Eigen::Index j = 0; j <= i; ++j)
-      {
-        normal(i, j) = normal(j, i) = Dot(this->Residues[i], this->Residues[j]);
-      }
-      right[i] = Dot(this->Residues[i], f);
+      this->LastS.resize(this->Size);
+      this->LastF.resize(this->Size);
     }
-    // Differences that nearly depend on each other must not blow the step up.
-    normal.diagonal() *= 1.0 + 1e-10;
+    const auto columns = static_cast<Eigen::Index>(this->Columns);
     Eigen::VectorXd coefficient = Eigen::VectorXd::Zero(columns);
     if (columns > 0)
     {
+      const std::vector<double> products = Dots(this->List(), residue);
+      const Eigen::VectorXd right = Eigen::Map<const Eigen::VectorXd>(products.data(), columns);
+      Eigen::MatrixXd normal = this->Gram.topLeftCorner(columns, columns);
+      // Differences that nearly depend on each other must not blow the step up.
+      normal.diagonal() *= 1.0 + 1e-10;
       const Eigen::VectorXd solved = normal.ldlt().solve(right);
       coefficient = solved.allFinite() ? solved : coefficient;
     }
@@ -341,22 +437,73 @@ public:
       {
         for (std::int64_t i = first; i < last; ++i)
         {
-          this->Plain[i] = s[i] + f[i];
-          double value = this->Plain[i];
-          for (Eigen::Index k = 0; k < columns; ++k)
+          this->LastS[i] = s[i];
+          this->LastF[i] = f[i];
+          s[i] = this->Plain[i] = s[i] + f[i];
+        }
+        for (Eigen::Index k = 0; k < columns; ++k)
+        {
+          const double factor = coefficient[k];
+          const float* image = this->Images[k].data();
+          for (std::int64_t i = first; i < last; ++i)
           {
-            value -= coefficient[k] * (this->Steps[k][i] + this->Residues[k][i]);
+            s[i] -= factor * image[i];
           }
-          s[i] = value;
         }
       });
+    this->HasLast = true;
   }
 
 private:
-  static constexpr std::size_t Memory = 8;
+  static constexpr int Memory = 8;
+
+  std::vector<const std::vector<float>*> List() const
+  {
+    std::vector<const std::vector<float>*> list;
+    for (int k = 0; k < this->Columns; ++k)
+    {
+      list.push_back(&this->Residues[k]);
+    }
+    return list;
+  }
+
+  /// The differences to the last step take the place of the oldest ones.
+  void AddColumn(const Values& s, const Values& f)
+  {
+    if (this->Columns == Memory)
+    {
+      std::rotate(this->Images.begin(), this->Images.begin() + 1, this->Images.end());
+      std::rotate(this->Residues.begin(), this->Residues.begin() + 1, this->Residues.end());
+      const Eigen::MatrixXd kept = this->Gram.bottomRightCorner(Memory - 1, Memory - 1);
+      this->Gram.topLeftCorner(Memory - 1, Memory - 1) = kept;
+      --this->Columns;
+    }
+    const int k = this->Columns++;
+    this->Images[k].resize(this->Size);
+    this->Residues[k].resize(this->Size);
+    ParallelFor(this->Size, ValuesAtOnce,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t i = first; i < last; ++i)
+        {
+          const double change = f[i] - this->LastF[i];
+          this->Images[k][i] = static_cast<float>(s[i] - this->LastS[i] + change);
+          this->Residues[k][i] = static_cast<float>(change);
+        }
+      });
+    const std::vector<double> products = Dots(this->List(), this->Residues[k]);
+    for (int j = 0; j <= k; ++j)
+    {
+      this->Gram(j, k) = this->Gram(k, j) = products[j];
+    }
+  }
+
   std::int64_t Size;
-  std::vector<Values> Steps;    ///< differences of s
-  std::vector<Values> Residues; ///< differences of f
+  int Columns = 0;
+  bool HasLast = false;
+  std::array<std::vector<float>, Memory> Images;   ///< differences of s + f
+  std::array<std::vector<float>, Memory> Residues; ///< differences of f
+  Eigen::Matrix<double, Memory, Memory> Gram = Eigen::Matrix<double, Memory, Memory>::Zero();
   Values LastS;
   Values LastF;
   Values Plain; ///< where the last step would have led without acceleration
@@ -585,32 +732,75 @@ void SkinWeightOptimizer::Balance(
 void SkinWeightOptimizer::Run(const ProgressCallback& progress)
 {
   // Begins with the nearest bone's weight 1.
-  Values s(this->Size, 0.0);
+  this->Weights.assign(this->Size, 0.0);
   for (std::int64_t r = 0; r < this->System.energy.rows; ++r)
   {
     for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
     {
-      s[this->PairIndex[p]] = this->PairBone[p] == this->System.nearest[r] ? 1.0 : 0.0;
+      this->Weights[this->PairIndex[p]] = this->PairBone[p] == this->System.nearest[r] ? 1.0 : 0.0;
     }
   }
-  Values z(this->Size);
-  Values x(this->Size);
-  Values previous(this->Size);
+  Report(progress, 0.02);
+  this->Iterate(progress, 0.02, 0.85);
   Values gradient(this->Size);
+  for (double first = 0.85; this->Converged && this->Reach > 0 && this->Settings.widen;
+       first += 0.3 * (0.95 - first))
+  {
+    const Violation violation = this->Judge(this->Weights, gradient, true);
+    if (violation.everywhere <= Margin * this->Settings.tolerance)
+    {
+      break;
+    }
+    const std::int64_t before = this->Size;
+    this->Widen();
+    gradient.resize(this->Size);
+    if (this->Size == before)
+    {
+      break;
+    }
+    this->Iterate(progress, first, first + 0.3 * (0.95 - first));
+  }
+  if (this->Settings.polish)
+  {
+    this->Polish([&](double done) { return !progress || progress(0.95 + 0.05 * done); });
+    this->Converged = this->Converged || this->Quality.inside <= this->Settings.tolerance;
+  }
+  this->Quality = this->Judge(this->Weights, gradient, true);
+  Report(progress, 1.0);
+}
+
+void SkinWeightOptimizer::Iterate(const ProgressCallback& progress, double first, double last)
+{
+  this->Factorize();
+  Values z = this->Weights;
+  Values gradient(this->Size);
+  this->Judge(z, gradient, false);
+  // Where z is optimal, the fixed point. At first nothing is known of the multipliers.
+  Values s = z;
+  if (this->Iterations > 0)
+  {
+    for (std::int64_t v = 0; v < this->Size; ++v)
+    {
+      s[v] -= gradient[v] / (this->Rho * this->System.diagonal[this->RowOfValue[v]]);
+    }
+  }
+  Values x = z;
+  Values right(this->Size, 0.0);
+  Values previous(this->Size);
   Values f(this->Size);
   Acceleration acceleration(this->Size);
-  this->Factorize();
-  double reported = 0.05;
-  Report(progress, reported);
+  double reported = first;
   double firstResidual = 0.0;
   double lastResidual = std::numeric_limits<double>::infinity();
   bool slow = false;
-
-  for (this->Iterations = 1;; ++this->Iterations)
+  bool exact = true;
+  const int begin = this->Iterations;
+  for (++this->Iterations;; ++this->Iterations)
   {
+    const int step = this->Iterations - begin;
     this->Project(s, z);
     const bool atEnd = this->Iterations >= this->Settings.iterations;
-    if (this->Iterations % CheckEvery == 1 || atEnd)
+    if (step % CheckEvery == 1 || atEnd)
     {
       const Violation violation = this->Judge(z, gradient, false);
       this->Weights = z;
@@ -618,18 +808,20 @@ void SkinWeightOptimizer::Run(const ProgressCallback& progress)
       this->Converged = violation.inside <= this->Settings.tolerance;
       if (this->Converged || atEnd)
       {
-        break;
+        return;
       }
       firstResidual = firstResidual == 0.0 ? violation.inside : firstResidual;
       slow = violation.inside > 0.5 * lastResidual;
       lastResidual = violation.inside;
       const double done = std::log(firstResidual / violation.inside) /
         std::log(std::max(1.0 + 1e-9, firstResidual / this->Settings.tolerance));
-      reported = std::max(reported, 0.05 + 0.8 * std::clamp(done, 0.0, 1.0));
+      reported = std::max(reported, first + (last - first) * std::clamp(done, 0.0, 1.0));
+      exact = true;
     }
     Report(progress, reported);
-    this->Solve(s, z, x);
-    if (this->Iterations % CheckEvery == 0 && slow)
+    this->Solve(s, z, right, x, exact);
+    exact = false;
+    if (step % CheckEvery == 0 && slow)
     {
       const double before = this->Rho;
       this->Balance(x, z, previous, s);
@@ -637,27 +829,21 @@ void SkinWeightOptimizer::Run(const ProgressCallback& progress)
       {
         acceleration.Restart();
         previous = z;
+        exact = true;
         continue;
       }
     }
     previous = z;
     ParallelFor(this->Size, ValuesAtOnce,
-      [&](std::int64_t first, std::int64_t last)
+      [&](std::int64_t firstValue, std::int64_t lastValue)
       {
-        for (std::int64_t i = first; i < last; ++i)
+        for (std::int64_t i = firstValue; i < lastValue; ++i)
         {
           f[i] = Relaxation * (x[i] - z[i]);
         }
       });
     acceleration.Step(s, f);
   }
-  if (this->Settings.polish)
-  {
-    this->Polish([&](double done) { return !progress || progress(0.85 + 0.15 * done); });
-    this->Converged = this->Converged || this->Quality.inside <= this->Settings.tolerance;
-  }
-  this->Quality = this->Judge(this->Weights, gradient, true);
-  Report(progress, 1.0);
 }
 
 void SkinWeightOptimizer::Polish(const ProgressCallback& progress)
@@ -829,6 +1015,7 @@ void SkinWeightOptimizer::Describe(SkinWeights& result) const
   result.iterations = this->Iterations;
   result.factorizations = this->Factorizations;
   result.polishSteps = this->PolishSteps;
+  result.neighbourhood = this->Reach;
   result.penaltyParameter = this->Rho;
   result.residual = this->Quality.inside;
   result.residualEverywhere = this->Quality.everywhere;

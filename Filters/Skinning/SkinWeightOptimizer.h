@@ -15,6 +15,7 @@
 #define DynamicCoronary_SkinWeightOptimizer_h
 
 #include "SkinWeightSystem.h"
+#include "SupernodalFactor.h"
 
 #include <memory>
 
@@ -43,13 +44,13 @@ public:
 private:
   using Values = std::vector<double>;
 
-  /// Bones that may have weight in the same rows: they share a factor.
+  /// Bones near each other, which may have weight in the same rows: they share a factor.
   struct Group
   {
     std::vector<std::int32_t> bones;
     std::vector<std::int32_t> rows; ///< ascending
     std::int64_t base = 0;          ///< of its first value; then bone by bone
-    std::unique_ptr<SparseCholesky> factor;
+    std::unique_ptr<SupernodalFactor> factor;
   };
   /// Columns of one group that one thread solves for at a time.
   struct Task
@@ -57,7 +58,6 @@ private:
     std::size_t group;
     std::int64_t firstColumn;
     std::int64_t columns;
-    std::unique_ptr<SparseCholesky::Workspace> workspace;
   };
   struct Violation
   {
@@ -69,9 +69,14 @@ private:
 
   void MakeGroups();
   void MakePairs();
+  /// Lets the groups have weight in rows one bone further away, and keeps the weights.
+  void Widen();
   void Factorize();
+  void Iterate(const ProgressCallback& progress, double first, double last);
   void Project(const Values& s, Values& z) const;
-  void Solve(const Values& s, const Values& z, Values& x);
+  /// x = (Q + R)^-1 (R (2 z - s) - c), by adding what the change of the right-hand side changes; or,
+  /// when `exact`, what the true residual of x does.
+  void Solve(const Values& s, const Values& z, Values& right, Values& x, bool exact) const;
   /// Qz + c for all pairs; `everywhere` judges the other bones too.
   Violation Judge(const Values& z, Values& gradient, bool everywhere) const;
   /// Another penalty when one of the residuals lags behind, as OSQP does.
@@ -79,6 +84,9 @@ private:
   /// Exact solves with the bounds that hold as equations, until these are the right ones.
   void Polish(const ProgressCallback& progress);
   static double Dot(const Values& a, const Values& b);
+  /// Products of the vectors with `b`, in one go.
+  static std::vector<double> Dots(
+    const std::vector<const std::vector<float>*>& vectors, const std::vector<float>& b);
 
   class Acceleration;
 
@@ -96,6 +104,7 @@ private:
   std::vector<std::int32_t> RowOfValue;
   Values Linear;
 
+  int Reach = 0; ///< bones around a group that it may have weight at; 0: everywhere
   double Rho = 0.2;
   Values Weights;
   Violation Quality;

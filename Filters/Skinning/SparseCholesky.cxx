@@ -251,6 +251,39 @@ void SparseCholesky::Solve(
   }
 }
 
+SupernodalPattern FindSupernodes(const SparseMatrix& matrix, const std::vector<std::int32_t>& rows)
+{
+  SupernodalPattern pattern;
+  if (rows.empty())
+  {
+    pattern.first.assign(1, 0);
+    pattern.rowOffset.assign(1, 0);
+    return pattern;
+  }
+  LowerTriangle lower = Extract(matrix, rows, nullptr);
+  cholmod_sparse view = lower.View();
+  Common common;
+  common.c.supernodal = CHOLMOD_SUPERNODAL;
+  common.c.nmethods = 1;
+  common.c.method[0].ordering = CHOLMOD_AMD;
+  common.c.postorder = 1;
+  cholmod_factor* factor = cholmod_l_analyze(&view, &common.c);
+  if (factor == nullptr)
+  {
+    throw std::bad_alloc();
+  }
+  const auto* order = static_cast<const SuiteSparse_long*>(factor->Perm);
+  const auto* first = static_cast<const SuiteSparse_long*>(factor->super);
+  const auto* offset = static_cast<const SuiteSparse_long*>(factor->pi);
+  const auto* list = static_cast<const SuiteSparse_long*>(factor->s);
+  pattern.order.assign(order, order + rows.size());
+  pattern.first.assign(first, first + factor->nsuper + 1);
+  pattern.rowOffset.assign(offset, offset + factor->nsuper + 1);
+  pattern.rows.assign(list, list + offset[factor->nsuper]);
+  cholmod_l_free_factor(&factor, &common.c);
+  return pattern;
+}
+
 std::vector<std::int32_t> FillReducingOrder(const SparseMatrix& matrix)
 {
   std::vector<std::int32_t> rows(matrix.rows);

@@ -65,6 +65,19 @@ private:
   std::unique_ptr<Content> Inside;
 };
 
+/// Supernodes of a factor: consecutive rows whose entries lie in the same rows below.
+struct SupernodalPattern
+{
+  std::vector<std::int32_t> order;     ///< place in the given rows of each row of the factor
+  std::vector<std::int32_t> first;     ///< first row of each supernode, and the number of rows
+  std::vector<std::int64_t> rowOffset; ///< of the supernode's rows: its own, then those below
+  std::vector<std::int32_t> rows;      ///< ascending in each supernode
+};
+
+/// Analyses the submatrix of `rows` (ascending) in a fill-reducing order. The same on every run.
+/// @throws std::bad_alloc
+SupernodalPattern FindSupernodes(const SparseMatrix& matrix, const std::vector<std::int32_t>& rows);
+
 /// A fill-reducing order of a symmetric matrix: the old row of each new one. The same on every run.
 /// @throws std::bad_alloc
 std::vector<std::int32_t> FillReducingOrder(const SparseMatrix& matrix);

@@ -1,0 +1,237 @@
+// The inner loops of SupernodalFactor. Compiled once for each set of vector instructions, so it may
+// include nothing that emits shared inline functions: the linker could keep the widest of them.
+
+#include "SupernodalKernels.h"
+
+// A function that stayed a call would keep its sums in memory.
+#define INLINE __attribute__((always_inline)) inline
+
+namespace coronary
+{
+namespace
+{
+constexpr int Lanes = 8;
+static_assert(Lanes == SupernodalColumns, "a row of right-hand sides is one pack");
+using Pack [[gnu::vector_size(32)]] = float;
+using LoosePack [[gnu::vector_size(32), gnu::aligned(4), gnu::may_alias]] = float;
+
+/// By reference: a pack returned by value would depend on the registers of the caller.
+INLINE const LoosePack& Load(const float* from)
+{
+  return *reinterpret_cast<const LoosePack*>(from);
+}
+
+INLINE void Store(float* to, const Pack& pack)
+{
+  *reinterpret_cast<LoosePack*>(to) = pack;
+}
+
+/// `Packs` registers of rows and `Columns` columns of c -= a b'.
+template <int Packs, int Columns>
+INLINE void Tile(const float* a, std::int64_t lda, const float* b, std::int64_t ldb, std::int64_t k,
+  float* c, std::int64_t ldc)
+{
+  Pack sum[Columns][Packs] = {};
+  for (std::int64_t l = 0; l < k; ++l)
+  {
+    Pack left[Packs];
+    for (int p = 0; p < Packs; ++p)
+    {
+      left[p] = Load(a + l * lda + p * Lanes);
+    }
+    for (int j = 0; j < Columns; ++j)
+    {
+      for (int p = 0; p < Packs; ++p)
+      {
+        sum[j][p] += left[p] * b[l * ldb + j];
+      }
+    }
+  }
+  for (int j = 0; j < Columns; ++j)
+  {
+    for (int p = 0; p < Packs; ++p)
+    {
+      float* to = c + j * ldc + p * Lanes;
+      Store(to, Load(to) - sum[j][p]);
+    }
+  }
+}
+
+template <int Columns>
+INLINE void Strip(const float* a, std::int64_t lda, const float* b, std::int64_t ldb,
+  std::int64_t m, std::int64_t k, float* c, std::int64_t ldc)
+{
+  std::int64_t i = 0;
+  for (; i + 3 * Lanes <= m; i += 3 * Lanes)
+  {
+    Tile<3, Columns>(a + i, lda, b, ldb, k, c + i, ldc);
+  }
+  for (; i + Lanes <= m; i += Lanes)
+  {
+    Tile<1, Columns>(a + i, lda, b, ldb, k, c + i, ldc);
+  }
+  for (; i < m; ++i)
+  {
+    float sum[Columns] = {};
+    for (std::int64_t l = 0; l < k; ++l)
+    {
+      for (int j = 0; j < Columns; ++j)
+      {
+        sum[j] += a[i + l * lda] * b[l * ldb + j];
+      }
+    }
+    for (int j = 0; j < Columns; ++j)
+    {
+      c[i + j * ldc] -= sum[j];
+    }
+  }
+}
+
+void SubtractProduct(const float* a, std::int64_t lda, const float* b, std::int64_t ldb,
+  std::int64_t m, std::int64_t n, std::int64_t k, float* c, std::int64_t ldc)
+{
+  std::int64_t j = 0;
+  for (; j + 4 <= n; j += 4)
+  {
+    Strip<4>(a, lda, b + j, ldb, m, k, c + j * ldc, ldc);
+  }
+  for (; j < n; ++j)
+  {
+    Strip<1>(a, lda, b + j, ldb, m, k, c + j * ldc, ldc);
+  }
+}
+
+bool FactorPanel(float* panel, std::int64_t height, std::int64_t width)
+{
+  constexpr std::int64_t block = 8;
+  for (std::int64_t start = 0; start < width; start += block)
+  {
+    const std::int64_t end = start + block < width ? start + block : width;
+    if (start > 0)
+    {
+      SubtractProduct(panel + start, height, panel + start, height, height - start, end - start,
+        start, panel + start * height + start, height);
+    }
+    for (std::int64_t j = start; j < end; ++j)
+    {
+      float* column = panel + j * height;
+      for (std::int64_t l = start; l < j; ++l)
+      {
+        const float* other = panel + l * height;
+        const float factor = other[j];
+        for (std::int64_t i = j; i < height; ++i)
+        {
+          column[i] -= factor * other[i];
+        }
+      }
+      if (!(column[j] > 0.0f))
+      {
+        return false;
+      }
+      const float reciprocal = 1.0f / __builtin_sqrtf(column[j]);
+      column[j] = reciprocal;
+      for (std::int64_t i = j + 1; i < height; ++i)
+      {
+        column[i] *= reciprocal;
+      }
+    }
+    // Later blocks multiply with this one's rows only from their own first row on: the
+    // reciprocals on the diagonal are above.
+  }
+  return true;
+}
+
+/// below = rows of `Rows` x
+template <int Rows>
+INLINE void MultiplyRows(
+  const float* rows, std::int64_t height, std::int64_t width, const float* x, float* below)
+{
+  Pack sum[Rows] = {};
+  for (std::int64_t k = 0; k < width; ++k)
+  {
+    const Pack right = Load(x + k * Lanes);
+    for (int r = 0; r < Rows; ++r)
+    {
+      sum[r] += rows[k * height + r] * right;
+    }
+  }
+  for (int r = 0; r < Rows; ++r)
+  {
+    Store(below + r * Lanes, sum[r]);
+  }
+}
+
+void Forward(const float* panel, std::int64_t height, std::int64_t width, float* x, float* below)
+{
+  for (std::int64_t j = 0; j < width; ++j)
+  {
+    const Pack value = Load(x + j * Lanes) * panel[j * height + j];
+    Store(x + j * Lanes, value);
+    for (std::int64_t i = j + 1; i < width; ++i)
+    {
+      Store(x + i * Lanes, Load(x + i * Lanes) - panel[j * height + i] * value);
+    }
+  }
+  std::int64_t i = width;
+  for (; i + 8 <= height; i += 8)
+  {
+    MultiplyRows<8>(panel + i, height, width, x, below + (i - width) * Lanes);
+  }
+  for (; i < height; ++i)
+  {
+    MultiplyRows<1>(panel + i, height, width, x, below + (i - width) * Lanes);
+  }
+}
+
+/// x -= columns' below, for `Columns` columns
+template <int Columns>
+INLINE void SubtractColumns(
+  const float* columns, std::int64_t height, std::int64_t rest, float* x, const float* below)
+{
+  Pack sum[Columns] = {};
+  for (std::int64_t i = 0; i < rest; ++i)
+  {
+    const Pack right = Load(below + i * Lanes);
+    for (int c = 0; c < Columns; ++c)
+    {
+      sum[c] += columns[c * height + i] * right;
+    }
+  }
+  for (int c = 0; c < Columns; ++c)
+  {
+    Store(x + c * Lanes, Load(x + c * Lanes) - sum[c]);
+  }
+}
+
+void Backward(
+  const float* panel, std::int64_t height, std::int64_t width, float* x, const float* below)
+{
+  const std::int64_t rest = height - width;
+  std::int64_t k = 0;
+  for (; k + 8 <= width; k += 8)
+  {
+    SubtractColumns<8>(panel + k * height + width, height, rest, x + k * Lanes, below);
+  }
+  for (; k < width; ++k)
+  {
+    SubtractColumns<1>(panel + k * height + width, height, rest, x + k * Lanes, below);
+  }
+  for (std::int64_t j = width - 1; j >= 0; --j)
+  {
+    Pack value = Load(x + j * Lanes);
+    for (std::int64_t i = j + 1; i < width; ++i)
+    {
+      value -= panel[j * height + i] * Load(x + i * Lanes);
+    }
+    Store(x + j * Lanes, value * panel[j * height + j]);
+  }
+}
+}
+
+#if defined(__AVX2__)
+const SupernodalKernels SupernodalKernelsAvx2
+#else
+const SupernodalKernels SupernodalKernelsBaseline
+#endif
+  = { SubtractProduct, FactorPanel, Forward, Backward };
+}
