@@ -133,7 +133,8 @@ void SkinWeightSettings::Validate() const
     this->tolerance >= 1e-10 && this->tolerance <= 0.01, "tolerance must be within 1e-10 to 0.01");
   Require(
     this->iterations >= 1 && this->iterations <= 1000000, "iterations must be within 1 to 1000000");
-  Require(this->neighbourhood >= 0, "neighbourhood must not be negative");
+  Require(this->neighbourhood >= 0.0 && this->neighbourhood <= 1e6,
+    "neighbourhood must be within 0 to 1000000");
   Require(this->penalty >= 1.0 && this->penalty <= 1e8, "penalty must be within 1 to 1e8");
 }
 

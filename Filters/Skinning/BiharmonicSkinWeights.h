@@ -33,10 +33,11 @@ struct SkinWeightSettings
     1e-6; ///< of the conditions of optimality, see SkinWeights::residual; 1e-10 to 0.01
   int iterations = 2000; ///< limit for the alternating directions, 1 to 1000000
   bool polish = true;    ///< solve exactly for the set of bounds that was found to hold
-  /// Joint and Independent: a bone may have weight only where a bone of its group of eight is at most
-  /// so many bones away along the mesh; 0: everywhere. SkinWeights::energyGap says what it costs.
-  int neighbourhood = 2;
-  /// Adds a bone to the neighbourhood, and solves again, as long as residualEverywhere is above 10
+  /// Joint and Independent: a bone may have weight only where a bone of its group of eight is nearer
+  /// than so many diameters of the vessel, along the bones; 0: everywhere. SkinWeights::energyGap says
+  /// what it costs.
+  double neighbourhood = 1.75;
+  /// Adds a diameter to the neighbourhood, and goes on, as long as residualEverywhere is above 10
   /// tolerances.
   bool widen = true;
   double penalty =
@@ -67,7 +68,7 @@ struct SkinWeights
   int iterations = 0;     ///< of the alternating directions
   int factorizations = 0; ///< of the whole system
   int polishSteps = 0;
-  int neighbourhood = 0;         ///< in the end; 0: everywhere
+  double neighbourhood = 0.0;    ///< in the end; 0: everywhere
   double penaltyParameter = 0.0; ///< of the alternating directions, at the end
 
   /// Greatest violation of the conditions of optimality at any point and any bone that may have

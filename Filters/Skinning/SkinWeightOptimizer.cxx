@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <queue>
 
 namespace coronary
 {
@@ -17,8 +18,8 @@ constexpr std::int64_t ValuesAtOnce = 1 << 15;
 constexpr std::int64_t RowsAtOnce = 1 << 11;
 constexpr double Relaxation = 1.6;
 constexpr int CheckEvery = 10;
-constexpr double LeastRho = 1e-3;
-constexpr double GreatestRho = 10.0;
+constexpr double LeastRho = 0.02;
+constexpr double GreatestRho = 2.0;
 constexpr int MostPolishSteps = 10;
 // Beyond it one exact step costs more than what the alternating directions took.
 constexpr std::int64_t MostUnknowns = 8000;
@@ -35,6 +36,9 @@ SkinWeightOptimizer::SkinWeightOptimizer(
   , Joint(settings.mode == SkinWeightMode::Joint)
   , Reach(settings.neighbourhood)
 {
+  // Between the diagonal and what smooth weights feel of the energy, which falls with the fourth power
+  // of the points across a vessel.
+  this->Rho = std::clamp(0.8 / (system.radius * system.radius), LeastRho, 0.2);
   this->MakeGroups();
   this->MakePairs();
 }
@@ -61,7 +65,7 @@ void SkinWeightOptimizer::MakeGroups()
     {
       for (const std::int32_t next : this->System.neighbours[group.bones[i]])
       {
-        if (!taken[next] && (this->Reach == 0 || group.bones.size() < ColumnsAtOnce))
+        if (!taken[next] && (this->Reach == 0.0 || group.bones.size() < ColumnsAtOnce))
         {
           taken[next] = 1;
           group.bones.push_back(next);
@@ -79,25 +83,35 @@ void SkinWeightOptimizer::MakeGroups()
   for (std::size_t g = 0; g < this->Groups.size(); ++g)
   {
     Group& group = this->Groups[g];
-    std::vector<int> hops(bones, -1);
-    std::vector<std::int32_t> reached = group.bones;
-    for (const std::int32_t bone : reached)
+    // From the group's bones outwards, as long as the bones in between are short enough.
+    std::vector<double> distance(bones, std::numeric_limits<double>::infinity());
+    std::vector<char> inGroup(bones, 0);
+    using Reached = std::pair<double, std::int32_t>;
+    std::priority_queue<Reached, std::vector<Reached>, std::greater<>> queue;
+    for (const std::int32_t bone : group.bones)
     {
-      hops[bone] = 0;
+      distance[bone] = 0.0;
+      inGroup[bone] = 1;
+      queue.push({ 0.0, bone });
     }
-    for (std::size_t i = 0; i < reached.size(); ++i)
+    std::vector<char> done(bones, 0);
+    while (!queue.empty())
     {
-      const std::int32_t bone = reached[i];
-      group.rows.insert(group.rows.end(), rowsOf[bone].begin(), rowsOf[bone].end());
-      if (this->Reach == 0 || hops[bone] < this->Reach)
+      const std::int32_t bone = queue.top().second;
+      queue.pop();
+      if (done[bone])
       {
-        for (const std::int32_t next : this->System.neighbours[bone])
+        continue;
+      }
+      done[bone] = 1;
+      group.rows.insert(group.rows.end(), rowsOf[bone].begin(), rowsOf[bone].end());
+      const double end = distance[bone] + (inGroup[bone] ? 0.0 : this->System.diameters[bone]);
+      for (const std::int32_t next : this->System.neighbours[bone])
+      {
+        if (end < distance[next] && (this->Reach == 0.0 || end < this->Reach))
         {
-          if (hops[next] < 0)
-          {
-            hops[next] = hops[bone] + 1;
-            reached.push_back(next);
-          }
+          distance[next] = end;
+          queue.push({ end, next });
         }
       }
     }
@@ -168,13 +182,21 @@ void SkinWeightOptimizer::MakePairs()
   }
 }
 
+bool SkinWeightOptimizer::CanWiden() const
+{
+  return this->Reach > 0.0 &&
+    std::any_of(this->Groups.begin(), this->Groups.end(),
+      [&](const Group& group)
+      { return static_cast<std::int64_t>(group.rows.size()) < this->System.energy.rows; });
+}
+
 void SkinWeightOptimizer::Widen()
 {
   const std::vector<std::int64_t> offset = this->PairOffset;
   const std::vector<std::int32_t> bone = this->PairBone;
   const std::vector<std::int64_t> index = this->PairIndex;
   const Values weights = this->Weights;
-  ++this->Reach;
+  this->Reach += 1.0;
   this->MakeGroups();
   this->MakePairs();
   this->Weights.assign(this->Size, 0.0);
@@ -741,25 +763,12 @@ void SkinWeightOptimizer::Run(const ProgressCallback& progress)
     }
   }
   Report(progress, 0.02);
-  this->Iterate(progress, 0.02, 0.85);
-  Values gradient(this->Size);
-  for (double first = 0.85; this->Converged && this->Reach > 0 && this->Settings.widen;
-       first += 0.3 * (0.95 - first))
+  for (double done = 0.02; !this->Iterate(progress, done, 0.95);)
   {
-    const Violation violation = this->Judge(this->Weights, gradient, true);
-    if (violation.everywhere <= Margin * this->Settings.tolerance)
-    {
-      break;
-    }
-    const std::int64_t before = this->Size;
     this->Widen();
-    gradient.resize(this->Size);
-    if (this->Size == before)
-    {
-      break;
-    }
-    this->Iterate(progress, first, first + 0.3 * (0.95 - first));
+    done += 0.2 * (0.95 - done);
   }
+  Values gradient(this->Size);
   if (this->Settings.polish)
   {
     this->Polish([&](double done) { return !progress || progress(0.95 + 0.05 * done); });
@@ -769,7 +778,7 @@ void SkinWeightOptimizer::Run(const ProgressCallback& progress)
   Report(progress, 1.0);
 }
 
-void SkinWeightOptimizer::Iterate(const ProgressCallback& progress, double first, double last)
+bool SkinWeightOptimizer::Iterate(const ProgressCallback& progress, double first, double last)
 {
   this->Factorize();
   Values z = this->Weights;
@@ -802,13 +811,19 @@ void SkinWeightOptimizer::Iterate(const ProgressCallback& progress, double first
     const bool atEnd = this->Iterations >= this->Settings.iterations;
     if (step % CheckEvery == 1 || atEnd)
     {
-      const Violation violation = this->Judge(z, gradient, false);
+      const bool widens = this->Settings.widen && this->CanWiden();
+      const Violation violation = this->Judge(z, gradient, widens);
       this->Weights = z;
       this->Quality = violation;
       this->Converged = violation.inside <= this->Settings.tolerance;
+      if (widens && !atEnd && violation.everywhere > Margin * this->Settings.tolerance &&
+        violation.inside < 0.3 * violation.everywhere)
+      {
+        return false;
+      }
       if (this->Converged || atEnd)
       {
-        return;
+        return true;
       }
       firstResidual = firstResidual == 0.0 ? violation.inside : firstResidual;
       slow = violation.inside > 0.5 * lastResidual;

@@ -69,10 +69,12 @@ private:
 
   void MakeGroups();
   void MakePairs();
-  /// Lets the groups have weight in rows one bone further away, and keeps the weights.
+  /// Lets the groups have weight in rows one diameter further away, and keeps the weights.
   void Widen();
   void Factorize();
-  void Iterate(const ProgressCallback& progress, double first, double last);
+  /// @return false when the neighbourhood is too small
+  bool Iterate(const ProgressCallback& progress, double first, double last);
+  bool CanWiden() const;
   void Project(const Values& s, Values& z) const;
   /// x = (Q + R)^-1 (R (2 z - s) - c), by adding what the change of the right-hand side changes; or,
   /// when `exact`, what the true residual of x does.
@@ -104,8 +106,8 @@ private:
   std::vector<std::int32_t> RowOfValue;
   Values Linear;
 
-  int Reach = 0; ///< bones around a group that it may have weight at; 0: everywhere
-  double Rho = 0.2;
+  double Reach; ///< diameters around a group that it may have weight at; 0: everywhere
+  double Rho = 0.0;
   Values Weights;
   Violation Quality;
   bool Converged = false;

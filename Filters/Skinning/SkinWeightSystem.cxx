@@ -617,8 +617,8 @@ void CheckComponents(
 }
 
 /// Distances along the mesh's edges from the bones: which is nearest.
-std::vector<std::int32_t> NearestBones(
-  const ScaledMesh& mesh, const SparseMatrix& k, const SkinWeightSystem& system)
+std::vector<std::int32_t> NearestBones(const ScaledMesh& mesh, const SparseMatrix& k,
+  const SkinWeightSystem& system, std::vector<double>& distance)
 {
   struct Reached
   {
@@ -632,7 +632,7 @@ std::vector<std::int32_t> NearestBones(
     }
   };
   std::priority_queue<Reached, std::vector<Reached>, std::greater<>> queue;
-  std::vector<double> distance(k.rows, std::numeric_limits<double>::infinity());
+  distance.assign(k.rows, std::numeric_limits<double>::infinity());
   std::vector<std::int32_t> nearest(k.rows, -1);
   const auto reach = [&](std::int64_t point, double d, std::int32_t bone)
   {
@@ -681,6 +681,37 @@ std::vector<std::int32_t> NearestBones(
     }
   }
   return nearest;
+}
+
+/// Lengths of the bones in diameters of what is around them.
+void MeasureBones(const SkinWeightInput& input, const ScaledMesh& mesh,
+  const std::vector<std::int32_t>& nearest, std::vector<double>& distance, SkinWeightSystem& system)
+{
+  std::vector<std::vector<double>> distances(system.bones);
+  for (std::size_t i = 0; i < nearest.size(); ++i)
+  {
+    distances[nearest[i]].push_back(distance[i]);
+  }
+  system.diameters.assign(system.bones, 0.0);
+  std::vector<double> radii;
+  for (std::int64_t b = 0; b < system.bones; ++b)
+  {
+    std::vector<double>& own = distances[b];
+    double radius = 1.0;
+    if (!own.empty())
+    {
+      // Half of a cylinder is within 0.71 radii of its axis.
+      const auto middle = own.begin() + static_cast<std::ptrdiff_t>(own.size() / 2);
+      std::nth_element(own.begin(), middle, own.end());
+      radius = std::max(radius, *middle / 0.71);
+    }
+    radii.push_back(radius);
+    const auto [first, second] = input.bones[b];
+    system.diameters[b] = (mesh.joints[second] - mesh.joints[first]).norm() / (2.0 * radius);
+  }
+  const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+  std::nth_element(radii.begin(), middle, radii.end());
+  system.radius = *middle;
 }
 
 /// The rows and columns `order` of a matrix, in that order.
@@ -741,7 +772,9 @@ SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
   Constrain(input, mesh, k, system);
   CheckComponents(input, k, system);
   Report(progress, 0.3);
-  const std::vector<std::int32_t> nearest = NearestBones(mesh, k, system);
+  std::vector<double> distance;
+  const std::vector<std::int32_t> nearest = NearestBones(mesh, k, system, distance);
+  MeasureBones(input, mesh, nearest, distance, system);
   Report(progress, 0.4);
 
   SparseMatrix q = settings.mode == SkinWeightMode::Harmonic ? k : Bilaplacian(k, mass);

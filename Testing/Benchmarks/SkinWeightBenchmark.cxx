@@ -114,14 +114,23 @@ int main(int argc, char** argv)
   std::vector<int> sizes{ 0, 1, 2 };
   int libiglUpTo = 5000;
   int libiglIterations = 100;
-  int neighbourhood = 2;
-  app.add_option("--sizes", sizes, "0: 2k points, 13 bones; 1: 9k, 46; 2: 23k, 61; 3: 100k, 61; 4: 200k, 151");
+  double neighbourhood = 1.75;
+  app.add_option(
+    "--sizes", sizes, "0: 2k points, 13 bones; 1: 9k, 46; 2: 23k, 61; 3: 100k, 61; 4: 200k, 151");
   app.add_option("--libigl-up-to", libiglUpTo, "most points for libigl");
   app.add_option("--libigl-iterations", libiglIterations, "of its active set");
-  app.add_option("--neighbourhood", neighbourhood, "bones around a bone; 0: everywhere");
+  app.add_option("--neighbourhood", neighbourhood, "diameters around a bone; 0: everywhere");
+  std::vector<int> tree;
+  app.add_option("--tree", tree, "instead: branches, their bones, a bone's cells, half a tube's")
+    ->expected(4);
   CLI11_PARSE(app, argc, argv);
-  constexpr std::array<Case, 5> cases{ { { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 6, 3 },
-    { 12, 4, 14, 5 }, { 25, 5, 11, 5 } } };
+  std::vector<Case> cases{ { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 6, 3 }, { 12, 4, 14, 5 },
+    { 25, 5, 11, 5 } };
+  if (!tree.empty())
+  {
+    cases = { { tree[0], tree[1], tree[2], tree[3] } };
+    sizes = { 0 };
+  }
   bool good = true;
   try
   {

@@ -14,7 +14,7 @@ using namespace coronary;
 
 namespace
 {
-SkinWeightSettings Settings(SkinWeightMode mode, int neighbourhood = 0)
+SkinWeightSettings Settings(SkinWeightMode mode, double neighbourhood = 0.0)
 {
   SkinWeightSettings settings;
   settings.mode = mode;
@@ -409,19 +409,29 @@ TEST(BiharmonicSkinWeights, UnitsRotationAndOrderDoNotMatter)
 
 TEST(BiharmonicSkinWeights, NeighbourhoodChangesNothingThatMatters)
 {
-  const SkinWeightInput input = MeshOfComb(3, 3, 4, 1, 0.5);
-  const SkinWeights everywhere = ComputeSkinWeights(input, Settings(SkinWeightMode::Joint, 0));
-  const SkinWeights near = ComputeSkinWeights(input, Settings(SkinWeightMode::Joint, 2));
+  const SkinWeightInput input = MeshOfComb(9, 4, 2, 1, 0.5);
+  const SkinWeights everywhere = ComputeSkinWeights(input, Settings(SkinWeightMode::Joint, 0.0));
+  SkinWeightSettings settings = Settings(SkinWeightMode::Joint, 1.75);
+  const SkinWeights near = ComputeSkinWeights(input, settings);
   EXPECT_LT(near.largestDomainShare, 0.9);
   EXPECT_TRUE(near.converged);
-  // What is reported is what is lost.
-  EXPECT_LE(near.energy - everywhere.energy, (near.energyGap + 1e-9) * near.energy);
+  EXPECT_LE(near.residualEverywhere, 10.0 * settings.tolerance);
   EXPECT_LT(near.energyGap, 1e-3);
-  EXPECT_LT((Dense(near) - Dense(everywhere)).cwiseAbs().maxCoeff(), 1e-3);
-  // Too small a neighbourhood must show.
-  const SkinWeights narrow = ComputeSkinWeights(input, Settings(SkinWeightMode::Joint, 1));
-  EXPECT_GE(narrow.energyGap, near.energyGap - 1e-9);
+  EXPECT_LT((Dense(near) - Dense(everywhere)).cwiseAbs().maxCoeff(), 1e-4);
+  // Too small a neighbourhood must show, what is reported is what is lost,
+  settings.neighbourhood = 0.5;
+  settings.widen = false;
+  const SkinWeights narrow = ComputeSkinWeights(input, settings);
+  EXPECT_LT(narrow.largestDomainShare, near.largestDomainShare);
+  EXPECT_GT(narrow.residualEverywhere, 100.0 * settings.tolerance);
+  EXPECT_GT(narrow.energy, everywhere.energy * (1.0 + 1e-6));
   EXPECT_LE(narrow.energy - everywhere.energy, (narrow.energyGap + 1e-9) * narrow.energy);
+  // and it is widened until it does not matter.
+  settings.widen = true;
+  const SkinWeights widened = ComputeSkinWeights(input, settings);
+  EXPECT_GT(widened.neighbourhood, 0.5);
+  EXPECT_LE(widened.residualEverywhere, 10.0 * settings.tolerance);
+  EXPECT_LT((Dense(widened) - Dense(everywhere)).cwiseAbs().maxCoeff(), 1e-4);
 }
 
 TEST(BiharmonicSkinWeights, BonesBetweenThePoints)
@@ -461,7 +471,7 @@ TEST(BiharmonicSkinWeights, BonesBetweenThePoints)
 TEST(BiharmonicSkinWeights, SameBitsOnOneAndTwoThreads)
 {
   const SkinWeightInput input = MeshOfComb(2, 2, 4, 1, 0.5);
-  for (const int neighbourhood : { 0, 2 })
+  for (const double neighbourhood : { 0.0, 1.75 })
   {
     SetNumberOfThreads(1);
     const SkinWeights one =
