@@ -155,6 +155,16 @@ constexpr const char* BoneIndices = "BoneIndices"; ///< int[n], -1: none
 constexpr const char* BoneWeightsCompact = "BoneWeightsCompact"; ///< float[n], greatest first
 constexpr const char* DroppedWeight = "DroppedWeight"; ///< float, weight of bones left out
 
+// Weights of bones, field data.
+constexpr const char* WeightsConverged = "WeightsConverged";   ///< int, 1 or 0
+constexpr const char* WeightsIterations = "WeightsIterations"; ///< int
+constexpr const char* WeightsResidual = "WeightsResidual";     ///< double[2]: in reach, everywhere
+constexpr const char* WeightsEnergy = "WeightsEnergy";         ///< double, 1/mm
+constexpr const char* WeightsEnergyGap = "WeightsEnergyGap";   ///< double, share of the energy
+constexpr const char* WeightsRowSums = "WeightsRowSums"; ///< double[2], least and greatest, Eq. 7
+constexpr const char* WeightsOnBones = "WeightsOnBones"; ///< double, greatest error there
+constexpr const char* BoneLengthOutside = "BoneLengthOutside"; ///< double, mm, one value a bone
+
 // Cleaned surface, field data.
 constexpr const char* Repairs = "Repairs";                           ///< string, a sentence each
 constexpr const char* GreatestDisplacement = "GreatestDisplacement"; ///< double, mm

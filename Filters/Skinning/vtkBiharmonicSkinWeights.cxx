@@ -1,0 +1,302 @@
+#include "vtkBiharmonicSkinWeights.h"
+
+#include "SkinWeightCache.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkCoronaryUpstream.h"
+
+#include "vtkCellArray.h"
+#include "vtkCellType.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkFloatArray.h"
+#include "vtkIdList.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStringArray.h"
+#include "vtkUnstructuredGrid.h"
+
+#include <algorithm>
+#include <map>
+#include <new>
+#include <stdexcept>
+
+namespace names = vtkCoronaryArrayNames;
+using coronary::SkinWeightInput;
+using coronary::SkinWeights;
+using coronary::Vector3;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+vtkStandardNewMacro(vtkBiharmonicSkinWeights);
+
+namespace
+{
+void ReadMesh(vtkUnstructuredGrid* mesh, SkinWeightInput& input)
+{
+  input.points.resize(mesh->GetNumberOfPoints());
+  for (vtkIdType i = 0; i < mesh->GetNumberOfPoints(); ++i)
+  {
+    mesh->GetPoint(i, input.points[i].data());
+  }
+  input.tetrahedra.resize(mesh->GetNumberOfCells());
+  vtkNew<vtkIdList> corners;
+  for (vtkIdType c = 0; c < mesh->GetNumberOfCells(); ++c)
+  {
+    vtkCoronary::Require(mesh->GetCellType(c) == VTK_TETRA,
+      "Cell " + std::to_string(c) + " of the mesh is no tetrahedron");
+    mesh->GetCellPoints(c, corners);
+    std::copy(corners->begin(), corners->end(), input.tetrahedra[c].begin());
+  }
+}
+
+/// Points at one place are one joint.
+void ReadSkeleton(vtkPolyData* skeleton, SkinWeightInput& input)
+{
+  std::map<std::array<double, 3>, std::int64_t> places;
+  std::vector<std::int64_t> jointOf(skeleton->GetNumberOfPoints());
+  for (vtkIdType i = 0; i < skeleton->GetNumberOfPoints(); ++i)
+  {
+    std::array<double, 3> place{};
+    skeleton->GetPoint(i, place.data());
+    const auto [found, isNew] =
+      places.try_emplace(place, static_cast<std::int64_t>(input.joints.size()));
+    if (isNew)
+    {
+      input.joints.emplace_back(place.data());
+    }
+    jointOf[i] = found->second;
+  }
+  vtkNew<vtkIdList> line;
+  vtkCellArray* lines = skeleton->GetLines();
+  for (vtkIdType l = 0; l < lines->GetNumberOfCells(); ++l)
+  {
+    lines->GetCellAtId(l, line);
+    for (vtkIdType i = 1; i < line->GetNumberOfIds(); ++i)
+    {
+      input.bones.emplace_back(jointOf[line->GetId(i - 1)], jointOf[line->GetId(i)]);
+    }
+  }
+}
+
+std::vector<vtkStdString> BoneNames(
+  vtkPolyData* skeleton, const std::string& name, std::size_t bones)
+{
+  auto* given =
+    vtkStringArray::SafeDownCast(skeleton->GetFieldData()->GetAbstractArray(name.c_str()));
+  const bool fits = given != nullptr && given->GetNumberOfValues() == static_cast<vtkIdType>(bones);
+  std::vector<vtkStdString> list;
+  for (std::size_t b = 0; b < bones; ++b)
+  {
+    list.push_back(
+      fits ? given->GetValue(static_cast<vtkIdType>(b)) : vtkStdString("bone" + std::to_string(b)));
+  }
+  return list;
+}
+
+/// One tuple.
+void AddTuple(vtkFieldData* data, const char* name, const std::vector<double>& values)
+{
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name);
+  array->SetNumberOfComponents(static_cast<int>(values.size()));
+  array->InsertNextTuple(values.data());
+  data->AddArray(array);
+}
+}
+
+vtkBiharmonicSkinWeights::vtkBiharmonicSkinWeights()
+  : BoneWeightsArrayName(names::BoneWeights)
+  , BoneIndicesArrayName(names::BoneIndices)
+  , BoneWeightsCompactArrayName(names::BoneWeightsCompact)
+  , DroppedWeightArrayName(names::DroppedWeight)
+  , BoneNameArrayName(names::BoneName)
+{
+  this->SetNumberOfInputPorts(2);
+}
+
+void vtkBiharmonicSkinWeights::SetSkeletonData(vtkPolyData* skeleton)
+{
+  this->SetInputData(SkeletonPort, skeleton);
+}
+
+int vtkBiharmonicSkinWeights::FillInputPortInformation(int port, vtkInformation* info)
+{
+  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(),
+    port == SkeletonPort ? "vtkPolyData" : "vtkUnstructuredGrid");
+  return 1;
+}
+
+int vtkBiharmonicSkinWeights::RequestInformation(
+  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  outputs->GetInformationObject(0)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  return 1;
+}
+
+int vtkBiharmonicSkinWeights::RequestUpdateExtent(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
+  return 1;
+}
+
+int vtkBiharmonicSkinWeights::RequestData(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkUnstructuredGrid* mesh = vtkUnstructuredGrid::GetData(inputs[MeshPort], 0);
+  vtkPolyData* skeleton = vtkPolyData::GetData(inputs[SkeletonPort], 0);
+  vtkUnstructuredGrid* output = vtkUnstructuredGrid::GetData(outputs, 0);
+  if (outputs->GetInformationObject(0)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
+  {
+    return 1;
+  }
+  int success = 1;
+  try
+  {
+    coronary::SkinWeightSettings settings;
+    settings.mode = static_cast<coronary::SkinWeightMode>(this->Mode);
+    settings.tolerance = this->Tolerance;
+    settings.iterations = this->Iterations;
+    settings.neighbourhood = this->Neighbourhood;
+    settings.widen = this->Widen;
+    settings.Validate();
+    vtkCoronary::Require(
+      this->Influences >= 1 && this->Influences <= 64, "Influences must be within 1 to 64");
+    for (const std::string* name : { &this->BoneWeightsArrayName, &this->BoneIndicesArrayName,
+           &this->BoneWeightsCompactArrayName, &this->DroppedWeightArrayName,
+           &this->BoneNameArrayName })
+    {
+      vtkCoronary::Require(!name->empty(), "An output array needs a name");
+    }
+    if (mesh->GetNumberOfPoints() == 0)
+    {
+      return 1;
+    }
+    SkinWeightInput input;
+    ReadMesh(mesh, input);
+    ReadSkeleton(skeleton, input);
+    std::vector<std::string> warnings;
+    const SkinWeights weights = coronary::CachedSkinWeights(
+      this->CacheFolder, input, settings, vtkCoronary::ProgressOf(this), warnings);
+    for (const std::string& warning : warnings)
+    {
+      vtkWarningMacro(<< vtkCoronary::PropertyMessage(warning));
+    }
+    if (!weights.converged)
+    {
+      vtkWarningMacro(<< "The weights did not converge in " << weights.iterations
+                      << " iterations: violation " << weights.residual);
+    }
+    const std::vector<vtkStdString> boneNames =
+      BoneNames(skeleton, this->BoneNameArrayName, input.bones.size());
+    const auto longest =
+      std::max_element(weights.lengthOutside.begin(), weights.lengthOutside.end());
+    if (*longest > 0.0)
+    {
+      vtkWarningMacro(<< std::count_if(weights.lengthOutside.begin(), weights.lengthOutside.end(),
+                           [](double length) { return length > 0.0; })
+                      << " bones leave the mesh; " << *longest << " of bone "
+                      << boneNames[longest - weights.lengthOutside.begin()] << " are outside");
+    }
+
+    output->ShallowCopy(mesh);
+    const auto points = static_cast<vtkIdType>(input.points.size());
+    vtkPointData* data = output->GetPointData();
+    const coronary::CompactSkinWeights compact =
+      coronary::CompactWeights(weights, this->Influences);
+    vtkNew<vtkIntArray> bone;
+    bone->SetName(this->BoneIndicesArrayName.c_str());
+    bone->SetNumberOfComponents(this->Influences);
+    bone->SetNumberOfTuples(points);
+    vtkNew<vtkFloatArray> weight;
+    weight->SetName(this->BoneWeightsCompactArrayName.c_str());
+    weight->SetNumberOfComponents(this->Influences);
+    weight->SetNumberOfTuples(points);
+    for (std::size_t e = 0; e < compact.bone.size(); ++e)
+    {
+      const auto place = static_cast<vtkIdType>(e);
+      bone->SetValue(place, compact.weight[e] != 0.0f ? compact.bone[e] : -1);
+      weight->SetValue(place, compact.weight[e]);
+    }
+    data->AddArray(bone);
+    data->AddArray(weight);
+    vtkCoronary::AddArray<vtkFloatArray>(data, this->DroppedWeightArrayName, compact.dropped);
+    if (this->Dense)
+    {
+      vtkNew<vtkDoubleArray> dense;
+      dense->SetName(this->BoneWeightsArrayName.c_str());
+      dense->SetNumberOfComponents(static_cast<int>(weights.bones));
+      dense->SetNumberOfTuples(points);
+      dense->Fill(0.0);
+      for (std::int64_t b = 0; b < weights.bones; ++b)
+      {
+        dense->SetComponentName(b, boneNames[b].c_str());
+      }
+      for (vtkIdType i = 0; i < points; ++i)
+      {
+        for (std::int64_t e = weights.offset[i]; e < weights.offset[i + 1]; ++e)
+        {
+          dense->SetTypedComponent(i, weights.bone[e], weights.weight[e]);
+        }
+      }
+      data->AddArray(dense);
+    }
+
+    vtkFieldData* field = output->GetFieldData();
+    vtkCoronary::AddArray<vtkStringArray>(field, this->BoneNameArrayName, boneNames);
+    vtkCoronary::AddArray<vtkIntArray>(
+      field, names::WeightsConverged, std::vector<int>{ weights.converged ? 1 : 0 });
+    vtkCoronary::AddArray<vtkIntArray>(
+      field, names::WeightsIterations, std::vector<int>{ weights.iterations });
+    AddTuple(field, names::WeightsResidual, { weights.residual, weights.residualEverywhere });
+    AddTuple(field, names::WeightsEnergy, { weights.energy });
+    AddTuple(field, names::WeightsEnergyGap, { weights.energyGap });
+    AddTuple(field, names::WeightsRowSums, { weights.smallestSum, weights.largestSum });
+    AddTuple(field, names::WeightsOnBones, { weights.constraintResidual });
+    vtkCoronary::AddArray<vtkDoubleArray>(field, names::BoneLengthOutside, weights.lengthOutside);
+    return 1;
+  }
+  catch (const coronary::Cancelled&)
+  {
+    vtkDebugMacro("aborted");
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorMacro("Not enough memory for the skin weights");
+    success = 0;
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
+    success = 0;
+  }
+  // Not marked as generated, so that the next request executes again.
+  output->Initialize();
+  outputs->GetInformationObject(0)->Set(SDDP::DATA_NOT_GENERATED(), 1);
+  return success;
+}
+
+void vtkBiharmonicSkinWeights::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Mode: " << this->Mode << "\n";
+  os << indent << "Tolerance: " << this->Tolerance << "\n";
+  os << indent << "Iterations: " << this->Iterations << "\n";
+  os << indent << "Neighbourhood: " << this->Neighbourhood << "\n";
+  os << indent << "Widen: " << this->Widen << "\n";
+  os << indent << "Influences: " << this->Influences << "\n";
+  os << indent << "Dense: " << this->Dense << "\n";
+  os << indent << "CacheFolder: " << this->CacheFolder << "\n";
+  os << indent << "BoneWeightsArrayName: " << this->BoneWeightsArrayName << "\n";
+  os << indent << "BoneIndicesArrayName: " << this->BoneIndicesArrayName << "\n";
+  os << indent << "BoneWeightsCompactArrayName: " << this->BoneWeightsCompactArrayName << "\n";
+  os << indent << "DroppedWeightArrayName: " << this->DroppedWeightArrayName << "\n";
+  os << indent << "BoneNameArrayName: " << this->BoneNameArrayName << "\n";
+}
