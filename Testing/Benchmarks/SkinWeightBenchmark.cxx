@@ -91,18 +91,21 @@ double CompareWithLibigl(const SkinWeightInput& input, const SkinWeights& mine, 
   }
   const Clock clock;
   Eigen::MatrixXd theirs = LibiglSkinWeights(input, fixed, values, iterations);
-  std::printf("  libigl: wall %.2f s, processor %.2f s, row sums %.4f to %.4f", clock.Wall(),
-    clock.Processor(), theirs.rowwise().sum().minCoeff(), theirs.rowwise().sum().maxCoeff());
-  theirs = theirs.rowwise().sum().cwiseInverse().asDiagonal() * theirs;
-  for (std::size_t i = 0; i < input.points.size(); ++i)
+  std::printf(
+    "  libigl: wall %.2f s, processor %.2f s, weights %.4f to %.4f, row sums %.4f to %.4f\n",
+    clock.Wall(), clock.Processor(), theirs.minCoeff(), theirs.maxCoeff(),
+    theirs.rowwise().sum().minCoeff(), theirs.rowwise().sum().maxCoeff());
+  double difference = 0.0;
+  for (Eigen::Index i = 0; i < theirs.rows(); ++i)
   {
+    Eigen::RowVectorXd row = theirs.row(i) / theirs.row(i).sum();
     for (std::int64_t e = mine.offset[i]; e < mine.offset[i + 1]; ++e)
     {
-      theirs(static_cast<Eigen::Index>(i), mine.bone[e]) -= mine.weight[e];
+      row[mine.bone[e]] -= mine.weight[e];
     }
+    difference = std::max(difference, row.cwiseAbs().maxCoeff());
   }
-  const double difference = theirs.cwiseAbs().maxCoeff();
-  std::printf(", greatest difference %.2e\n", difference);
+  std::printf("    greatest difference %.2e\n", difference);
   return difference;
 }
 #endif
