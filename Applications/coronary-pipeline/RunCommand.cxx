@@ -10,7 +10,9 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 
+#include "vtkBiharmonicSkinWeights.h"
 #include "vtkCellData.h"
+#include "vtkCenterlineSkeleton.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryTreeTopology.h"
@@ -53,7 +55,8 @@ enum class Stage
   Segmentation,
   Centerline,
   Surface,
-  Volume
+  Volume,
+  Weights
 };
 const std::vector<std::pair<std::string, Stage>> Stages = {
   { "vesselness", Stage::Vesselness },
@@ -61,6 +64,7 @@ const std::vector<std::pair<std::string, Stage>> Stages = {
   { "centerline", Stage::Centerline },
   { "surface", Stage::Surface },
   { "volume", Stage::Volume },
+  { "weights", Stage::Weights },
 };
 
 struct RunJob
@@ -83,6 +87,7 @@ struct RunJob
   std::vector<double> edges = { 0.15, 0.7 };
   bool contours = false;
   bool openEnds = false;
+  std::string weightCache;
   int threads = 0;
   bool compress = false;
   bool quiet = false;
@@ -114,8 +119,9 @@ void RunJob::Declare(CLI::App& app)
           }
         }
       },
-      "Last stage: vesselness, segmentation, centerline (the default), surface or volume")
-    ->check(CLI::IsMember({ "vesselness", "segmentation", "centerline", "surface", "volume" }))
+      "Last stage: vesselness, segmentation, centerline (the default), surface, volume or weights")
+    ->check(
+      CLI::IsMember({ "vesselness", "segmentation", "centerline", "surface", "volume", "weights" }))
     ->type_name("STAGE");
 
   const std::string image = "Image";
@@ -215,6 +221,12 @@ void RunJob::Declare(CLI::App& app)
       "--contours", this->contours, "Cross-sections as the image shows them, instead of round ones")
     ->group(walls);
   app.add_flag("--open-ends", this->openEnds, "Inlets and outlets without caps")->group(walls);
+  app
+    .add_option("--weight-cache", this->weightCache,
+      "Folder in which skin weights are kept; the same mesh, bones and settings are read from "
+      "there")
+    ->type_name("DIR")
+    ->group("Weights");
   app.add_flag("--compress", this->compress, "Compress the image files");
   app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
     ->check(WholeWithin(0, 1024))
@@ -382,8 +394,10 @@ void RunJob::Run()
     const bool trace = this->until >= Stage::Centerline;
     const bool mesh = this->until >= Stage::Surface;
     const bool fill = this->until >= Stage::Volume;
+    const bool bind = this->until >= Stage::Weights;
     ProgressDisplay progress("stage",
-      fill        ? 6
+      bind        ? 7
+        : fill    ? 6
         : mesh    ? 5
         : trace   ? 4
         : segment ? 3
@@ -549,7 +563,11 @@ void RunJob::Run()
             progress.BeginStep(5, "volume");
             vtkNew<vtkTetrahedralMesher> mesher;
             mesher->SetInputConnection(sweep->GetOutputPort());
-            mesher->SetSkeletonConnection(topology->GetOutputPort());
+            // With bones, these are to be edges of the mesh.
+            vtkNew<vtkCenterlineSkeleton> skeleton;
+            skeleton->SetInputConnection(topology->GetOutputPort());
+            mesher->SetSkeletonConnection(
+              bind ? skeleton->GetOutputPort() : topology->GetOutputPort());
             // Where the wall was smoothed, the line may leave it.
             mesher->LeaveOutsideOn();
             // The smallest vessels of a coarse image may need smaller ones than the filter's default
@@ -571,6 +589,29 @@ void RunJob::Run()
               { "total_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::TotalVolume) },
               { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) } };
             summary += "; " + std::to_string(volume->GetNumberOfCells()) + " tetrahedra";
+
+            if (bind)
+            {
+              progress.BeginStep(6, "weights");
+              vtkNew<vtkBiharmonicSkinWeights> weights;
+              weights->SetInputConnection(mesher->GetOutputPort());
+              weights->SetSkeletonConnection(skeleton->GetOutputPort());
+              weights->SetCacheFolder(this->weightCache.c_str());
+              update(weights);
+              vtkUnstructuredGrid* bound = weights->GetOutput();
+              vtkPolyData* bones = skeleton->GetOutput();
+              WritePolyData(folder.Add("skeleton.vtp"), bones, messages);
+              WriteUnstructuredGrid(folder.Add("weights.vtu"), bound, messages);
+              report["weights"] = { { "file", "weights.vtu" }, { "skeleton_file", "skeleton.vtp" },
+                { "bones", bones->GetNumberOfLines() }, { "joints", bones->GetNumberOfPoints() },
+                { "converged", Numbers(bound, vtkCoronaryArrayNames::WeightsConverged) },
+                { "iterations", Numbers(bound, vtkCoronaryArrayNames::WeightsIterations) },
+                { "residual", Numbers(bound, vtkCoronaryArrayNames::WeightsResidual) },
+                { "energy_gap", Numbers(bound, vtkCoronaryArrayNames::WeightsEnergyGap) },
+                { "row_sums", Numbers(bound, vtkCoronaryArrayNames::WeightsRowSums) },
+                { "error_on_bones", Numbers(bound, vtkCoronaryArrayNames::WeightsOnBones) } };
+              summary += "; " + std::to_string(bones->GetNumberOfLines()) + " bones";
+            }
           }
         }
       }
@@ -600,7 +641,8 @@ Command MakeRunCommand(CLI::App& program)
   app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, centerline.vtp, "
               "bifurcations.vtp, centerline_lines.vtp, status.csv; with --until surface, "
               "surface.vtp and caps.vtp; with --until volume, volume.vtu, volume_boundary.vtp "
-              "and volume_skeleton.vtp; and, last, report.json.");
+              "and volume_skeleton.vtp; with --until weights, skeleton.vtp and weights.vtu; and, "
+              "last, report.json.");
   auto job = std::make_shared<RunJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

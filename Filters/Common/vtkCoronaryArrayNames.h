@@ -158,11 +158,11 @@ constexpr const char* DroppedWeight = "DroppedWeight"; ///< float, weight of bon
 // Weights of bones, field data.
 constexpr const char* WeightsConverged = "WeightsConverged";   ///< int, 1 or 0
 constexpr const char* WeightsIterations = "WeightsIterations"; ///< int
-constexpr const char* WeightsResidual = "WeightsResidual";     ///< double[2]: in reach, everywhere
+constexpr const char* WeightsResidual = "WeightsResidual";     ///< double: in reach, everywhere
 constexpr const char* WeightsEnergy = "WeightsEnergy";         ///< double, 1/mm
 constexpr const char* WeightsEnergyGap = "WeightsEnergyGap";   ///< double, share of the energy
-constexpr const char* WeightsRowSums = "WeightsRowSums"; ///< double[2], least and greatest, Eq. 7
-constexpr const char* WeightsOnBones = "WeightsOnBones"; ///< double, greatest error there
+constexpr const char* WeightsRowSums = "WeightsRowSums";       ///< double: least, greatest, Eq. 7
+constexpr const char* WeightsOnBones = "WeightsOnBones";       ///< double, greatest error there
 constexpr const char* BoneLengthOutside = "BoneLengthOutside"; ///< double, mm, one value a bone
 
 // Cleaned surface, field data.

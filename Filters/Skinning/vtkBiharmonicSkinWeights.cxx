@@ -99,16 +99,6 @@ std::vector<vtkStdString> BoneNames(
   }
   return list;
 }
-
-/// One tuple.
-void AddTuple(vtkFieldData* data, const char* name, const std::vector<double>& values)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name);
-  array->SetNumberOfComponents(static_cast<int>(values.size()));
-  array->InsertNextTuple(values.data());
-  data->AddArray(array);
-}
 }
 
 vtkBiharmonicSkinWeights::vtkBiharmonicSkinWeights()
@@ -255,12 +245,14 @@ int vtkBiharmonicSkinWeights::RequestData(
       field, names::WeightsConverged, std::vector<int>{ weights.converged ? 1 : 0 });
     vtkCoronary::AddArray<vtkIntArray>(
       field, names::WeightsIterations, std::vector<int>{ weights.iterations });
-    AddTuple(field, names::WeightsResidual, { weights.residual, weights.residualEverywhere });
-    AddTuple(field, names::WeightsEnergy, { weights.energy });
-    AddTuple(field, names::WeightsEnergyGap, { weights.energyGap });
-    AddTuple(field, names::WeightsRowSums, { weights.smallestSum, weights.largestSum });
-    AddTuple(field, names::WeightsOnBones, { weights.constraintResidual });
-    vtkCoronary::AddArray<vtkDoubleArray>(field, names::BoneLengthOutside, weights.lengthOutside);
+    const auto numbers = [field](const char* name, const std::vector<double>& values)
+    { vtkCoronary::AddArray<vtkDoubleArray>(field, name, values); };
+    numbers(names::WeightsResidual, { weights.residual, weights.residualEverywhere });
+    numbers(names::WeightsEnergy, { weights.energy });
+    numbers(names::WeightsEnergyGap, { weights.energyGap });
+    numbers(names::WeightsRowSums, { weights.smallestSum, weights.largestSum });
+    numbers(names::WeightsOnBones, { weights.constraintResidual });
+    numbers(names::BoneLengthOutside, weights.lengthOutside);
     return 1;
   }
   catch (const coronary::Cancelled&)

@@ -18,10 +18,10 @@
  *   there are fewer), `DroppedWeight` (float, sum of the weights that found no place and that the
  *   others got in proportion), n = Influences; with Dense, `BoneWeights` (double[bones], components
  *   named as the bones). Field data: that of the mesh; `BoneName` (string); `WeightsConverged` (int, 1
- *   or 0), `WeightsIterations` (int), `WeightsResidual` (double[2]: greatest violation of the
+ *   or 0), `WeightsIterations` (int), `WeightsResidual` (double, 2 values: greatest violation of the
  *   conditions of optimality, a weight, where bones may have weight and everywhere), `WeightsEnergy`
  *   (double, 1 / unit of length), `WeightsEnergyGap` (double, bound on the share of the energy above
- *   the least possible one), `WeightsRowSums` (double[2], least and greatest sum before Eq. 7),
+ *   the least possible one), `WeightsRowSums` (double, 2 values, least and greatest sum before Eq. 7),
  *   `WeightsOnBones` (double, greatest distance from the wanted value on bones that are no edges of the
  *   mesh), `BoneLengthOutside` (double, one a bone).
  *

@@ -25,22 +25,6 @@ struct Case
   int half;
 };
 
-/// A tree of tubes whose points, but for those on bones, are moved at random.
-SkinWeightInput Tree(const Case& c)
-{
-  SkinWeightInput input = MeshOfComb(c.branches, c.branchBones, c.boneCells, c.half, 0.5);
-  RandomStream random(1);
-  for (Vector3& p : input.points)
-  {
-    const Vector3 by(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1));
-    const bool onBone = std::any_of(input.bones.begin(), input.bones.end(),
-      [&](const auto& bone)
-      { return DistanceToSegment(p, input.joints[bone.first], input.joints[bone.second]) < 1e-9; });
-    p += onBone ? Vector3::Zero() : Vector3(0.06 * by);
-  }
-  return input;
-}
-
 struct Clock
 {
   std::chrono::steady_clock::time_point wall = std::chrono::steady_clock::now();
@@ -65,7 +49,8 @@ double PeakGigabytes()
 
 #ifdef DYNAMICCORONARY_WITH_LIBIGL
 /// Greatest difference to libigl's weights, each row divided by its sum.
-double CompareWithLibigl(const SkinWeightInput& input, const SkinWeights& mine, int iterations)
+double CompareWithLibigl(
+  const SkinWeightInput& input, const SkinWeights& mine, int iterations, bool print)
 {
   std::vector<std::int64_t> fixed;
   for (std::size_t i = 0; i < input.points.size(); ++i)
@@ -106,6 +91,18 @@ double CompareWithLibigl(const SkinWeightInput& input, const SkinWeights& mine, 
     difference = std::max(difference, row.cwiseAbs().maxCoeff());
   }
   std::printf("    greatest difference %.2e\n", difference);
+  if (print)
+  {
+    // For LibiglReferenceWeights.h.
+    for (Eigen::Index i = 0; i < theirs.rows(); ++i)
+    {
+      for (Eigen::Index b = 0; b < theirs.cols(); ++b)
+      {
+        std::printf(
+          "%.6f,%s", theirs(i, b) / theirs.row(i).sum(), b + 1 < theirs.cols() ? " " : "\n");
+      }
+    }
+  }
   return difference;
 }
 #endif
@@ -117,11 +114,13 @@ int main(int argc, char** argv)
   std::vector<int> sizes{ 0, 1, 2 };
   int libiglUpTo = 5000;
   int libiglIterations = 100;
+  bool printLibigl = false;
   double neighbourhood = 1.75;
   app.add_option(
     "--sizes", sizes, "0: 2k points, 13 bones; 1: 9k, 46; 2: 23k, 61; 3: 100k, 61; 4: 200k, 151");
   app.add_option("--libigl-up-to", libiglUpTo, "most points for libigl");
   app.add_option("--libigl-iterations", libiglIterations, "of its active set");
+  app.add_flag("--print-libigl", printLibigl, "its weights, a line a point");
   app.add_option("--neighbourhood", neighbourhood, "diameters around a bone; 0: everywhere");
   std::vector<int> tree;
   app.add_option("--tree", tree, "instead: branches, their bones, a bone's cells, half a tube's")
@@ -139,7 +138,8 @@ int main(int argc, char** argv)
   {
     for (const int size : sizes)
     {
-      const SkinWeightInput input = Tree(cases.at(size));
+      const Case& c = cases.at(size);
+      const SkinWeightInput input = MovedComb(c.branches, c.branchBones, c.boneCells, c.half);
       std::printf("%zu points, %zu tetrahedra, %zu bones\n", input.points.size(),
         input.tetrahedra.size(), input.bones.size());
       for (const SkinWeightMode mode : { SkinWeightMode::Joint, SkinWeightMode::Independent })
@@ -163,7 +163,7 @@ int main(int argc, char** argv)
         if (mode == SkinWeightMode::Independent &&
           static_cast<int>(input.points.size()) <= libiglUpTo)
         {
-          good = CompareWithLibigl(input, weights, libiglIterations) < 1e-3 && good;
+          good = CompareWithLibigl(input, weights, libiglIterations, printLibigl) < 1e-3 && good;
         }
 #endif
       }

@@ -110,11 +110,11 @@ vtkDataArray* PointArray(vtkDataSet* data, const char* name)
   return array;
 }
 
-double Field(vtkDataObject* data, const char* name, int component = 0)
+double Field(vtkDataObject* data, const char* name, vtkIdType place = 0)
 {
   vtkDataArray* array = data->GetFieldData()->GetArray(name);
   EXPECT_NE(array, nullptr) << name;
-  return array != nullptr ? array->GetComponent(0, component) : std::nan("");
+  return array != nullptr ? array->GetComponent(place, 0) : std::nan("");
 }
 
 std::string BytesOf(vtkDataArray* array)

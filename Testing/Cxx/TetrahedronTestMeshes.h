@@ -165,6 +165,24 @@ inline SkinWeightInput MeshOfComb(int branches, int branchBones, int boneCells, 
   }
   return input;
 }
+
+/// A comb whose points, but for those on bones, are moved at random by up to 0.06 along each axis.
+inline SkinWeightInput MovedComb(int branches, int branchBones, int boneCells, int half)
+{
+  SkinWeightInput input = MeshOfComb(branches, branchBones, boneCells, half, 0.5);
+  RandomStream random(1);
+  for (Vector3& p : input.points)
+  {
+    const double x = random.Uniform(-1, 1);
+    const double y = random.Uniform(-1, 1);
+    const double z = random.Uniform(-1, 1);
+    const bool onBone = std::any_of(input.bones.begin(), input.bones.end(),
+      [&](const auto& bone)
+      { return DistanceToSegment(p, input.joints[bone.first], input.joints[bone.second]) < 1e-9; });
+    p += onBone ? Vector3::Zero() : Vector3(0.06 * Vector3(x, y, z));
+  }
+  return input;
+}
 }
 
 #endif

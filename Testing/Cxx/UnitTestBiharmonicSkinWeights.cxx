@@ -1,6 +1,7 @@
 // Skin weights: against a dense interior-point method, closed forms, symmetry, invariance, bad input.
 
 #include "BiharmonicSkinWeights.h"
+#include "LibiglReferenceWeights.h"
 #include "TetrahedronTestMeshes.h"
 
 #include <Eigen/Dense>
@@ -432,6 +433,27 @@ TEST(BiharmonicSkinWeights, NeighbourhoodChangesNothingThatMatters)
   EXPECT_GT(widened.neighbourhood, 0.5);
   EXPECT_LE(widened.residualEverywhere, 10.0 * settings.tolerance);
   EXPECT_LT((Dense(widened) - Dense(everywhere)).cwiseAbs().maxCoeff(), 1e-4);
+}
+
+TEST(BiharmonicSkinWeights, IndependentModeIsLibigls)
+{
+  const SkinWeightInput input = MovedComb(2, 1, 4, 1);
+  ASSERT_EQ(input.points.size(), std::size(LibiglReferenceWeights));
+  for (const double neighbourhood : { 0.0, 1.75 })
+  {
+    const SkinWeights weights =
+      ComputeSkinWeights(input, Settings(SkinWeightMode::Independent, neighbourhood));
+    EXPECT_GT(weights.largestSum, 1.01); // else the modes would not differ
+    const Eigen::MatrixXd dense = Dense(weights);
+    ASSERT_EQ(dense.cols(), 5);
+    for (Eigen::Index i = 0; i < dense.rows(); ++i)
+    {
+      for (Eigen::Index b = 0; b < 5; ++b)
+      {
+        EXPECT_NEAR(dense(i, b), LibiglReferenceWeights[i][b], 1e-5) << i << " " << b;
+      }
+    }
+  }
 }
 
 TEST(BiharmonicSkinWeights, BonesBetweenThePoints)
