@@ -141,7 +141,7 @@ def main():
         20, height - 42, 26, bold=True)
     panel = common.add_panel(window, 2, 2, width / 2 - 2, tall)
     common.add_surface(panel, surface, color=WALL, opacity=0.3)
-    add_bones(panel, skeleton, 0.35)
+    add_bones(panel, skeleton, 0.25)
     bounds = surface.GetBounds()
     center = [(bounds[2 * i] + bounds[2 * i + 1]) / 2.0 for i in range(3)]
     common.look_at(panel, center, (0.5, -0.8, 0.35), (0.0, 0.0, 1.0),

@@ -341,6 +341,23 @@ check_motion() {
   grep -qE " (within|outside) " stdout && fail "compared at another heart rate"
 }
 
+check_weights() {
+  run 0 phantom --quiet --seed 2 --fractions 0.74 --spacing 1.2 --no-truth --output series
+  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 1 --until weights --edges 0.4 0.8 \
+    --weight-cache weights --output bound
+  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 2 --until weights --edges 0.4 0.8 \
+    --weight-cache weights2 --output bound2
+  diff -r bound bound2 || fail "another number of threads gave other weights"
+  diff -r weights weights2 || fail "another number of threads gave another cache"
+  for name in BoneIndices BoneWeightsCompact DroppedWeight BoneName WeightsResidual; do
+    grep -q "Name=\"$name\"" bound/weights.vtu || fail "no $name in weights.vtu"
+  done
+  for name in ParentJoint BoneId GroupIds BoneName; do
+    grep -q "Name=\"$name\"" bound/skeleton.vtp || fail "no $name in skeleton.vtp"
+  done
+  grep -q '"bones": [0-9]\{2,\}' bound/report.json || fail "few bones: $(cat bound/report.json)"
+}
+
 check_run() {
   run 0 phantom --quiet --seed 2 --fractions 0.15,0.2,0.25,0.7,0.74,0.78 --spacing 1.2 --no-truth --output series
   run 0 run series/series.json --scales 0.7 2.5 --output result
@@ -376,20 +393,6 @@ check_run() {
     [ -s "beyond/$file" ] || fail "no $file"
   done
   grep -q '"tetrahedra": [0-9]\{5,\}' beyond/report.json || fail "few tetrahedra: $(cat beyond/report.json)"
-
-  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 1 --until weights --edges 0.4 0.8 \
-    --weight-cache weights --output bound
-  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 2 --until weights --edges 0.4 0.8 \
-    --weight-cache weights2 --output bound2
-  diff -r bound bound2 || fail "another number of threads gave other weights"
-  diff -r weights weights2 || fail "another number of threads gave another cache"
-  for name in BoneIndices BoneWeightsCompact DroppedWeight BoneName WeightsResidual; do
-    grep -q "Name=\"$name\"" bound/weights.vtu || fail "no $name in weights.vtu"
-  done
-  for name in ParentJoint BoneId GroupIds BoneName; do
-    grep -q "Name=\"$name\"" bound/skeleton.vtp || fail "no $name in skeleton.vtp"
-  done
-  grep -q '"bones": [0-9]\{2,\}' bound/report.json || fail "few bones: $(cat bound/report.json)"
 
   run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced
   if [ -s stdout ] || [ -s stderr ]; then
