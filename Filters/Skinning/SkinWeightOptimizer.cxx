@@ -482,6 +482,7 @@ private:
   std::vector<const std::vector<float>*> List() const
   {
     std::vector<const std::vector<float>*> list;
+    list.reserve(this->Columns);
     for (int k = 0; k < this->Columns; ++k)
     {
       list.push_back(&this->Residues[k]);

@@ -126,16 +126,16 @@ int main(int argc, char** argv)
   app.add_option("--tree", tree, "instead: branches, their bones, a bone's cells, half a tube's")
     ->expected(4);
   CLI11_PARSE(app, argc, argv);
-  std::vector<Case> cases{ { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 6, 3 }, { 12, 4, 14, 5 },
-    { 25, 5, 11, 5 } };
-  if (!tree.empty())
-  {
-    cases = { { tree[0], tree[1], tree[2], tree[3] } };
-    sizes = { 0 };
-  }
   bool good = true;
   try
   {
+    std::vector<Case> cases{ { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 6, 3 }, { 12, 4, 14, 5 },
+      { 25, 5, 11, 5 } };
+    if (!tree.empty())
+    {
+      cases = { { tree[0], tree[1], tree[2], tree[3] } };
+      sizes = { 0 };
+    }
     for (const int size : sizes)
     {
       const Case& c = cases.at(size);

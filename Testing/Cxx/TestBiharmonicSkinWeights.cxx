@@ -381,7 +381,7 @@ TEST(BiharmonicSkinWeightsCache, ReadsWhatItWrote)
 
 TEST(BiharmonicSkinWeightsCache, EverythingThatMattersIsInTheName)
 {
-  const SkinWeightInput input = Comb();
+  const SkinWeightInput& input = Comb();
   const coronary::SkinWeightSettings settings;
   std::vector<std::string> names{ coronary::SkinWeightCachePath("x", input, settings) };
   EXPECT_EQ(coronary::SkinWeightCachePath("x", Comb(), settings), names[0]);
