@@ -106,9 +106,8 @@ double CompareWithLibigl(
   return difference;
 }
 #endif
-}
 
-int main(int argc, char** argv)
+int Run(int argc, char** argv)
 {
   CLI::App app{ "Skin weights on trees of growing size" };
   std::vector<int> sizes{ 0, 1, 2 };
@@ -127,52 +126,58 @@ int main(int argc, char** argv)
     ->expected(4);
   CLI11_PARSE(app, argc, argv);
   bool good = true;
+  std::vector<Case> cases{ { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 6, 3 }, { 12, 4, 14, 5 },
+    { 25, 5, 11, 5 } };
+  if (!tree.empty())
+  {
+    cases = { { tree[0], tree[1], tree[2], tree[3] } };
+    sizes = { 0 };
+  }
+  for (const int size : sizes)
+  {
+    const Case& c = cases.at(size);
+    const SkinWeightInput input = MovedComb(c.branches, c.branchBones, c.boneCells, c.half);
+    std::printf("%zu points, %zu tetrahedra, %zu bones\n", input.points.size(),
+      input.tetrahedra.size(), input.bones.size());
+    for (const SkinWeightMode mode : { SkinWeightMode::Joint, SkinWeightMode::Independent })
+    {
+      SkinWeightSettings settings;
+      settings.mode = mode;
+      settings.neighbourhood = neighbourhood;
+      const Clock clock;
+      const SkinWeights weights = ComputeSkinWeights(input, settings);
+      std::printf("  %s: wall %.2f s, processor %.2f s, %d iterations, %d polish steps, residual "
+                  "%.1e (everywhere %.1e), gap %.1e, row sums %.4f to %.4f, %.2f bones a point, "
+                  "peak %.2f GB\n",
+        mode == SkinWeightMode::Joint ? "Joint" : "Independent", clock.Wall(), clock.Processor(),
+        weights.iterations, weights.polishSteps, weights.residual, weights.residualEverywhere,
+        weights.energyGap, weights.smallestSum, weights.largestSum,
+        static_cast<double>(weights.bone.size()) / static_cast<double>(input.points.size()),
+        PeakGigabytes());
+      std::fflush(stdout);
+      good = good && weights.converged;
+#ifdef DYNAMICCORONARY_WITH_LIBIGL
+      if (mode == SkinWeightMode::Independent &&
+        static_cast<int>(input.points.size()) <= libiglUpTo)
+      {
+        good = CompareWithLibigl(input, weights, libiglIterations, printLibigl) < 1e-3 && good;
+      }
+#endif
+    }
+  }
+  return good ? 0 : 1;
+}
+}
+
+int main(int argc, char** argv)
+{
   try
   {
-    std::vector<Case> cases{ { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 6, 3 }, { 12, 4, 14, 5 },
-      { 25, 5, 11, 5 } };
-    if (!tree.empty())
-    {
-      cases = { { tree[0], tree[1], tree[2], tree[3] } };
-      sizes = { 0 };
-    }
-    for (const int size : sizes)
-    {
-      const Case& c = cases.at(size);
-      const SkinWeightInput input = MovedComb(c.branches, c.branchBones, c.boneCells, c.half);
-      std::printf("%zu points, %zu tetrahedra, %zu bones\n", input.points.size(),
-        input.tetrahedra.size(), input.bones.size());
-      for (const SkinWeightMode mode : { SkinWeightMode::Joint, SkinWeightMode::Independent })
-      {
-        SkinWeightSettings settings;
-        settings.mode = mode;
-        settings.neighbourhood = neighbourhood;
-        const Clock clock;
-        const SkinWeights weights = ComputeSkinWeights(input, settings);
-        std::printf("  %s: wall %.2f s, processor %.2f s, %d iterations, %d polish steps, residual "
-                    "%.1e (everywhere %.1e), gap %.1e, row sums %.4f to %.4f, %.2f bones a point, "
-                    "peak %.2f GB\n",
-          mode == SkinWeightMode::Joint ? "Joint" : "Independent", clock.Wall(), clock.Processor(),
-          weights.iterations, weights.polishSteps, weights.residual, weights.residualEverywhere,
-          weights.energyGap, weights.smallestSum, weights.largestSum,
-          static_cast<double>(weights.bone.size()) / static_cast<double>(input.points.size()),
-          PeakGigabytes());
-        std::fflush(stdout);
-        good = good && weights.converged;
-#ifdef DYNAMICCORONARY_WITH_LIBIGL
-        if (mode == SkinWeightMode::Independent &&
-          static_cast<int>(input.points.size()) <= libiglUpTo)
-        {
-          good = CompareWithLibigl(input, weights, libiglIterations, printLibigl) < 1e-3 && good;
-        }
-#endif
-      }
-    }
+    return Run(argc, argv);
   }
   catch (const std::exception& error)
   {
     std::cerr << error.what() << "\n";
     return 1;
   }
-  return good ? 0 : 1;
 }
