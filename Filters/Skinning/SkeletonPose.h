@@ -1,0 +1,173 @@
+/**
+ * @file SkeletonPose.h
+ * @brief Moved joints of a skeleton, what that does to its bones, and posing by hand.
+ *
+ * Stretch and twist along a bone follow Jacobson & Sorkine, "Stretchable and twistable bones for
+ * skeletal shape deformation", SIGGRAPH Asia 2011. docs/deformation.md has the equations.
+ */
+#ifndef DynamicCoronary_SkeletonPose_h
+#define DynamicCoronary_SkeletonPose_h
+
+#include "CenterlineSkeleton.h"
+#include "Geometry.h"
+
+#include <vector>
+
+namespace coronary
+{
+using Quaternion = Eigen::Quaterniond;
+
+/// Where the joints of a skeleton are. Whatever is optional may be empty.
+struct SkeletonPose
+{
+  std::vector<Vector3> joints; ///< mm, as many as the rest skeleton has
+  /// Optional, per bone: its rotation from rest at its first joint. What is missing to carry the bone's
+  /// rest direction to the posed one is added by the least rotation. Without: least twist.
+  std::vector<Quaternion> rotation;
+  /// Optional, per bone: radians by which its second end is turned about the bone against its first
+  /// one, evenly along the bone. Without rotations, what hangs on the bone is turned with it.
+  std::vector<double> twist;
+  std::vector<double> calibre; ///< optional, per joint: factor of the cross-section's radius, > 0
+};
+
+/// What happens to a bone. A point p whose coordinate along the bone is x = d.(p - head), and t = x/L
+/// limited to 0 .. 1, goes to
+///     posedHead + R [ (x + (stretch - 1) L t) d + c(t) Turn(d, twist t) (p - head - x d) ]
+/// with d, L the rest direction and length, R the rotation, c from calibreFirst to calibreSecond.
+struct BoneTransform
+{
+  Quaternion rotation = Quaternion::Identity(); ///< carries the rest direction to the posed one
+  Vector3 posedHead = Vector3::Zero();          ///< posed first joint, mm
+  double stretch = 1.0;                         ///< posed length / rest length, > 0
+  double twist = 0.0;                           ///< radians
+  double calibreFirst = 1.0;                    ///< > 0
+  double calibreSecond = 1.0;                   ///< > 0
+};
+
+/// The rotation by the least angle that carries `from` to `to` (any lengths but 0). Opposite
+/// directions: half a turn about an axis that depends on `from` only.
+Quaternion LeastRotation(const Vector3& from, const Vector3& to);
+
+/**
+ * What follows from a rest skeleton alone, for poses frame by frame.
+ *
+ * Twist is least from bone to bone: a bone has the rotation of the bone before it, and the least
+ * rotation that is still missing. A root bone's twist is that of the joints nearest to it that are
+ * beside its line (least squares): so a rigid motion of the joints gives its rotation to every bone, and
+ * the rotations depend on nothing but the pose.
+ */
+class SkeletonRig
+{
+public:
+  /// @throws std::invalid_argument as CheckSkeleton, or for a skeleton without bones.
+  explicit SkeletonRig(const Skeleton& rest);
+
+  const Skeleton& Rest() const { return this->Skeleton_; }
+  std::int64_t NumberOfJoints() const { return static_cast<std::int64_t>(this->Heads.size()); }
+  std::int64_t NumberOfBones() const { return static_cast<std::int64_t>(this->Axes.size()); }
+  const Vector3& Head(std::int64_t bone) const
+  {
+    return this->Skeleton_.joints[this->Skeleton_.bones[bone].first];
+  }
+  const Vector3& Direction(std::int64_t bone) const { return this->Axes[bone]; } ///< unit
+  double Length(std::int64_t bone) const { return this->Lengths[bone]; } ///< of the straight bone
+  std::int64_t ParentBone(std::int64_t bone) const { return this->Parents[bone]; } ///< -1: none
+
+  /// Joints and bones on the tips' side of a joint, the joint itself included.
+  void Beyond(
+    std::int64_t joint, std::vector<std::int64_t>& joints, std::vector<std::int64_t>& bones) const;
+
+  /// The rest pose: all optional parts are there.
+  SkeletonPose RestPose() const;
+
+  /**
+   * Allocates nothing once `transforms` has been used before.
+   * @throws std::invalid_argument: a wrong number of joints, rotations, twists or calibre factors; a
+   * value that is not finite; a rotation that is zero; a factor that is not positive; a bone without
+   * length.
+   */
+  void Transform(const SkeletonPose& pose, std::vector<BoneTransform>& transforms) const;
+
+  /**
+   * Cross-sections that answer to the stretch: the calibre factors at a joint are multiplied by the
+   * mean of stretch^(-share/2) over its bones, weighted by their lengths. Share 1 keeps the volume.
+   * @param share  0 (nothing) to 1
+   */
+  void ConserveVolume(double share, std::vector<BoneTransform>& transforms) const;
+
+private:
+  struct Root
+  {
+    std::int64_t bone;
+    std::vector<std::int64_t> joints; ///< that fix its twist; none when all are on its line
+    std::vector<Vector3> beside;      ///< their rest positions, less their part along the bone
+  };
+
+  Skeleton Skeleton_;
+  std::vector<Vector3> Axes;
+  std::vector<double> Lengths;
+  std::vector<std::int64_t> Parents;
+  std::vector<std::int64_t> Order;              ///< bones, parents first
+  std::vector<Root> Roots;                      ///< in the order in which they come in Order
+  std::vector<std::vector<std::int64_t>> Heads; ///< per joint: bones that begin there
+  std::vector<std::vector<std::int64_t>> Tails; ///< per joint: bones that end there
+};
+
+/// One step of posing by hand. Its parts are done in the order: twist, rotation, translation, calibre.
+struct PoseEdit
+{
+  std::int64_t joint = 0;
+  /// Radians. Turns all beyond the joint about the bone that ends in it; the turn is spread evenly
+  /// along that bone.
+  double twist = 0.0;
+  /// Of all beyond the joint about its position (forward kinematics), or, with `alone`, of nothing.
+  Quaternion rotation = Quaternion::Identity();
+  Vector3 translation = Vector3::Zero(); ///< mm
+  bool alone = false;                    ///< translate only the joint, and not what is beyond it
+  double calibre = 1.0; ///< factor of the radius, > 0: below 1 a stenosis, above 1 a dilatation
+  /// mm along the skeleton at rest, 0 or more: the change of calibre falls to nothing within it on
+  /// both sides of the joint (raised cosine of its logarithm). 0: at the joint alone.
+  double reach = 0.0;
+};
+
+/// A list of edits on a skeleton, with undo and redo.
+class PoseEditor
+{
+public:
+  /// Begins at rest. @throws std::invalid_argument as SkeletonRig.
+  explicit PoseEditor(const Skeleton& rest);
+  /// Begins at a pose. @throws std::invalid_argument as SkeletonRig::Transform.
+  PoseEditor(const Skeleton& rest, const SkeletonPose& start);
+
+  const SkeletonRig& Rig() const { return this->Rig_; }
+  const SkeletonPose& Pose() const { return this->Current; }
+
+  /// Forgets what was undone before it.
+  /// @throws std::invalid_argument: no such joint, a value that is not finite or out of range, a bone
+  /// that would lose its length. The pose stays as it was.
+  void Apply(const PoseEdit& edit);
+  bool Undo();  ///< false when there is nothing to undo
+  bool Redo();  ///< false when there is nothing to redo
+  void Reset(); ///< back to the start; Redo brings the edits back one by one
+
+  /// Those that are in effect.
+  std::vector<PoseEdit> Edits() const
+  {
+    return { this->List.begin(), this->List.begin() + static_cast<std::ptrdiff_t>(this->Done) };
+  }
+
+private:
+  void Replay();
+
+  SkeletonRig Rig_;
+  SkeletonPose Start;
+  SkeletonPose Current;
+  std::vector<PoseEdit> List;
+  std::size_t Done = 0;
+};
+
+/// The pose after one edit. @throws std::invalid_argument as PoseEditor::Apply.
+void ApplyPoseEdit(const SkeletonRig& rig, const PoseEdit& edit, SkeletonPose& pose);
+}
+
+#endif

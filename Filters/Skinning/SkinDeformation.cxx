@@ -1,0 +1,960 @@
+#include "SkinDeformation.h"
+
+#include "ParallelFor.h"
+#include "SkinKernels.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <new>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+namespace coronary
+{
+namespace
+{
+constexpr std::int64_t BlockGrain = 64;
+constexpr std::int64_t PointGrain = 4096;
+constexpr int RepairSweeps = 60;
+constexpr int SweepsPerRing = 4;
+
+void Require(bool condition, const std::string& message)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument(message);
+  }
+}
+
+const SkinKernels* Find(SkinInstructions instructions)
+{
+  switch (instructions)
+  {
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+    case SkinInstructions::Avx512:
+      return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+          __builtin_cpu_supports("avx512vl")
+        ? &SkinKernelsAvx512
+        : nullptr;
+    case SkinInstructions::Avx2:
+      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &SkinKernelsAvx2
+                                                                             : nullptr;
+#endif
+    case SkinInstructions::Baseline:
+      return &SkinKernelsBaseline;
+    default:
+      return nullptr;
+  }
+}
+
+const SkinKernels* FindWidest()
+{
+  for (const SkinInstructions wide : { SkinInstructions::Avx512, SkinInstructions::Avx2 })
+  {
+    if (const SkinKernels* kernels = Find(wide))
+    {
+      return kernels;
+    }
+  }
+  return &SkinKernelsBaseline;
+}
+
+std::atomic<const SkinKernels*>& Selected()
+{
+  static std::atomic<const SkinKernels*> selected{ FindWidest() };
+  return selected;
+}
+
+/// Memory in whole cache lines, as wide registers want it.
+template <typename T>
+struct LineAllocator
+{
+  using value_type = T;
+  static constexpr std::align_val_t Line{ 64 };
+
+  LineAllocator() = default;
+  template <typename Other>
+  explicit LineAllocator(const LineAllocator<Other>&)
+  {
+  }
+  T* allocate(std::size_t count)
+  {
+    return static_cast<T*>(::operator new(count * sizeof(T), Line));
+  }
+  void deallocate(T* memory, std::size_t) { ::operator delete(memory, Line); }
+  bool operator==(const LineAllocator&) const { return true; }
+  bool operator!=(const LineAllocator&) const { return false; }
+};
+
+using Floats = std::vector<float, LineAllocator<float>>;
+
+using Affine = Eigen::Matrix<double, 3, 4>;
+
+/// A bone's motion in double precision.
+struct Motion
+{
+  Matrix3 rotation;
+  Vector3 translation; ///< rotation and translation carry the bone's rest head to the posed one
+  Quaternion real;
+  Quaternion dual;
+  double stretch = 1.0; ///< 1 when bones are rigid
+  double twist = 0.0;
+  double calibreFirst = 1.0;
+  double calibreSecond = 1.0;
+};
+
+/// Everything but the rotation and translation, around one place of the bone at rest.
+struct Local
+{
+  Vector3 point;
+  Matrix3 gradient; ///< with calibre and twist as they are at the place
+};
+
+template <typename Real>
+Vector3 PointAt(const Real* values, std::int64_t index)
+{
+  const Real* at = values + 3 * index;
+  return { static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2]) };
+}
+
+template <typename Real>
+void StorePoint(Real* values, std::int64_t index, const Vector3& point)
+{
+  for (int c = 0; c < 3; ++c)
+  {
+    values[3 * index + c] = static_cast<Real>(point[c]);
+  }
+}
+
+/// Lists by rows: those of i are item[offset[i]] to item[offset[i + 1] - 1].
+struct Rows
+{
+  std::vector<std::int64_t> offset;
+  std::vector<std::int64_t> item;
+};
+
+/// Which cells a point is a corner of.
+template <typename Cell>
+Rows CellsOfPoints(const std::vector<Cell>& cells, std::int64_t points)
+{
+  Rows rows;
+  rows.offset.assign(points + 1, 0);
+  for (const Cell& cell : cells)
+  {
+    for (const std::int64_t corner : cell)
+    {
+      ++rows.offset[corner + 1];
+    }
+  }
+  std::partial_sum(rows.offset.begin(), rows.offset.end(), rows.offset.begin());
+  rows.item.resize(rows.offset.back());
+  std::vector<std::int64_t> next(rows.offset.begin(), rows.offset.end() - 1);
+  for (std::size_t n = 0; n < cells.size(); ++n)
+  {
+    for (const std::int64_t corner : cells[n])
+    {
+      rows.item[next[corner]++] = static_cast<std::int64_t>(n);
+    }
+  }
+  return rows;
+}
+
+template <typename Cell>
+void RequireCorners(const std::vector<Cell>& cells, std::int64_t points, const char* what)
+{
+  for (std::size_t n = 0; n < cells.size(); ++n)
+  {
+    for (const std::int64_t corner : cells[n])
+    {
+      if (corner < 0 || corner >= points)
+      {
+        throw std::invalid_argument(std::string(what) + " " + std::to_string(n) +
+          " has the corner " + std::to_string(corner) + ", there are " + std::to_string(points) +
+          " points");
+      }
+    }
+  }
+}
+}
+
+bool SetSkinInstructions(SkinInstructions instructions)
+{
+  const SkinKernels* found =
+    instructions == SkinInstructions::Widest ? FindWidest() : Find(instructions);
+  if (found)
+  {
+    Selected() = found;
+  }
+  return found != nullptr;
+}
+
+struct SkinDeformation::Internals
+{
+  SkinDeformationSettings Settings;
+  SkeletonRig Rig;
+  std::vector<Vector3> Points;
+
+  // By points in the order given: the double precision path.
+  std::vector<std::int64_t> Offset;
+  std::vector<std::int32_t> Bone; ///< greatest weight first
+  std::vector<double> Weight;
+
+  // By blocks: the single precision path.
+  Vector3 Centre = Vector3::Zero();
+  Floats X;
+  Floats Y;
+  Floats Z;
+  Floats BlockWeight;
+  std::vector<std::int32_t> BlockOffset;
+  std::vector<std::int32_t> BlockBone;
+  std::vector<std::int32_t> Pivot;
+  std::vector<std::int32_t> Point;
+  SkinBlocks Blocks{};
+
+  // Of the frame.
+  std::vector<BoneTransform> Transforms;
+  std::vector<Motion> Motions;
+  std::vector<SkinBone, LineAllocator<SkinBone>> Bones;
+  bool Sections = false;
+
+  std::vector<Triangle> Triangles;
+  Rows TrianglesOf;
+  std::vector<Vector3> TriangleNormals;
+
+  std::vector<std::array<std::int64_t, 4>> Tetrahedra;
+  Rows TetrahedraOf;
+  std::vector<double> RestVolume; ///< six times
+  std::vector<double> Ratio;      ///< of the last check
+
+  Internals(const std::vector<Vector3>& points, const CompactSkinWeights& weights,
+    const Skeleton& rest, const SkinDeformationSettings& settings)
+    : Settings(settings)
+    , Rig(rest)
+    , Points(points)
+  {
+    this->ReadWeights(weights);
+    this->MakeBlocks();
+    this->Transforms.resize(this->Rig.NumberOfBones());
+    this->Motions.resize(this->Rig.NumberOfBones());
+    this->Bones.resize(this->Rig.NumberOfBones());
+  }
+
+  void ReadWeights(const CompactSkinWeights& weights);
+  void MakeBlocks();
+  void SetFrame(const std::vector<BoneTransform>& bones);
+  void SetFloatFrame(const Vector3& posedCentre);
+  Local LocalAt(std::int64_t bone, const Vector3& point) const;
+  Affine AffineAt(std::int64_t point) const;
+  Vector3 Deformed(std::int64_t point) const;
+
+  template <typename Real>
+  void DisplacementsOf(const Real* positions, Real* displacements) const;
+  template <typename Real>
+  void NormalsOf(const Real* positions, Real* normals);
+  template <typename Real>
+  double RatioOf(const Real* positions, std::int64_t tetrahedron) const;
+  template <typename Real>
+  void Check(const Real* positions, InversionReport& report, double leastRatio);
+  template <typename Real>
+  void Repair(Real* positions, InversionReport& report, double leastRatio);
+};
+
+void SkinDeformation::Internals::ReadWeights(const CompactSkinWeights& weights)
+{
+  const std::size_t count = this->Points.size();
+  Require(count <= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max() / SkinLanes),
+    "The mesh has too many points");
+  Require(weights.influences >= 1 || count == 0, "The skin weights have no bone a point");
+  const auto width = static_cast<std::size_t>(std::max(0, weights.influences));
+  Require(weights.bone.size() == count * width && weights.weight.size() == count * width,
+    "The skin weights are " + std::to_string(weights.weight.size()) + " and their bones " +
+      std::to_string(weights.bone.size()) + ", not " + std::to_string(width) + " for each of " +
+      std::to_string(count) + " points");
+  this->Offset.assign(1, 0);
+  std::vector<std::pair<double, std::int32_t>> row;
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    const std::string name = "Point " + std::to_string(i);
+    Require(this->Points[i].allFinite(), name + " has a coordinate that is not finite");
+    double sum = 0.0;
+    row.clear();
+    for (std::size_t n = i * width; n < (i + 1) * width; ++n)
+    {
+      const double weight = static_cast<double>(weights.weight[n]);
+      Require(std::isfinite(weight), name + " has a skin weight that is not finite");
+      if (weight == 0.0)
+      {
+        continue;
+      }
+      Require(weights.bone[n] >= 0 && weights.bone[n] < this->Rig.NumberOfBones(),
+        name + " hangs on bone " + std::to_string(weights.bone[n]) + ", the skeleton has " +
+          std::to_string(this->Rig.NumberOfBones()));
+      const auto same = std::find_if(
+        row.begin(), row.end(), [&](const auto& entry) { return entry.second == weights.bone[n]; });
+      if (same == row.end())
+      {
+        row.emplace_back(weight, weights.bone[n]);
+      }
+      else
+      {
+        same->first += weight;
+      }
+      sum += weight;
+    }
+    Require(sum > 1e-3, name + " has no skin weight: the sum must be 1");
+    std::sort(row.begin(), row.end(),
+      [](const auto& a, const auto& b)
+      { return a.first != b.first ? a.first > b.first : a.second < b.second; });
+    for (const auto& [weight, bone] : row)
+    {
+      this->Bone.push_back(bone);
+      this->Weight.push_back(weight / sum);
+    }
+    this->Offset.push_back(static_cast<std::int64_t>(this->Bone.size()));
+  }
+}
+
+void SkinDeformation::Internals::MakeBlocks()
+{
+  const auto count = static_cast<std::int64_t>(this->Points.size());
+  Vector3 low = Vector3::Zero();
+  Vector3 high = Vector3::Zero();
+  if (count > 0)
+  {
+    low = high = this->Points[0];
+  }
+  for (const Vector3& point : this->Points)
+  {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  this->Centre = 0.5 * (low + high);
+
+  // Points that hang on the same bones go into the same blocks.
+  std::vector<std::int32_t> order(count);
+  std::iota(order.begin(), order.end(), 0);
+  std::vector<std::vector<std::int32_t>> key(count);
+  for (std::int64_t i = 0; i < count; ++i)
+  {
+    key[i].assign(this->Bone.begin() + this->Offset[i], this->Bone.begin() + this->Offset[i + 1]);
+    std::sort(key[i].begin(), key[i].end());
+    key[i].insert(key[i].begin(), this->Bone[this->Offset[i]]);
+  }
+  std::sort(order.begin(), order.end(),
+    [&](std::int32_t a, std::int32_t b) { return key[a] != key[b] ? key[a] < key[b] : a < b; });
+
+  const std::int64_t blocks = (count + SkinLanes - 1) / SkinLanes;
+  const std::int64_t padded = blocks * SkinLanes;
+  this->X.assign(padded, 0.0F);
+  this->Y.assign(padded, 0.0F);
+  this->Z.assign(padded, 0.0F);
+  this->Point.assign(padded, 0);
+  this->Pivot.assign(padded, 0);
+  this->BlockOffset.assign(1, 0);
+  std::vector<std::int32_t> entryOf(this->Rig.NumberOfBones(), -1);
+  for (std::int64_t block = 0; block < blocks; ++block)
+  {
+    const auto begin = static_cast<std::int32_t>(this->BlockBone.size());
+    for (int lane = 0; lane < SkinLanes; ++lane)
+    {
+      const std::int64_t at = block * SkinLanes + lane;
+      // What fills the last block is its last point, so that no lane divides by zero.
+      const std::int64_t i = order[std::min(at, count - 1)];
+      const Vector3 point = this->Points[i] - this->Centre;
+      this->X[at] = static_cast<float>(point.x());
+      this->Y[at] = static_cast<float>(point.y());
+      this->Z[at] = static_cast<float>(point.z());
+      this->Point[at] = static_cast<std::int32_t>(i);
+      this->Pivot[at] = this->Bone[this->Offset[i]];
+      for (std::int64_t n = this->Offset[i]; n < this->Offset[i + 1]; ++n)
+      {
+        std::int32_t& entry = entryOf[this->Bone[n]];
+        if (entry < begin)
+        {
+          entry = static_cast<std::int32_t>(this->BlockBone.size());
+          this->BlockBone.push_back(this->Bone[n]);
+          this->BlockWeight.resize(this->BlockWeight.size() + SkinLanes, 0.0F);
+        }
+        this->BlockWeight[static_cast<std::size_t>(entry) * SkinLanes + lane] =
+          static_cast<float>(this->Weight[n]);
+      }
+    }
+    this->BlockOffset.push_back(static_cast<std::int32_t>(this->BlockBone.size()));
+  }
+  this->Blocks = { this->X.data(), this->Y.data(), this->Z.data(), this->BlockOffset.data(),
+    this->BlockBone.data(), this->BlockWeight.data(), this->Pivot.data(), this->Point.data(),
+    count };
+}
+
+void SkinDeformation::Internals::SetFrame(const std::vector<BoneTransform>& bones)
+{
+  if (bones.size() != this->Motions.size())
+  {
+    throw std::invalid_argument("There are " + std::to_string(bones.size()) +
+      " moved bones, the rest skeleton has " + std::to_string(this->Motions.size()));
+  }
+  this->Sections = false;
+  for (std::size_t b = 0; b < bones.size(); ++b)
+  {
+    const BoneTransform& bone = bones[b];
+    Motion& motion = this->Motions[b];
+    motion.rotation = bone.rotation.toRotationMatrix();
+    motion.translation =
+      bone.posedHead - motion.rotation * this->Rig.Head(static_cast<std::int64_t>(b));
+    motion.real = bone.rotation;
+    const Vector3 half = 0.5 * motion.translation;
+    motion.dual = Quaternion(0.0, half.x(), half.y(), half.z()) * motion.real;
+    motion.stretch = this->Settings.stretch ? bone.stretch : 1.0;
+    motion.twist = bone.twist;
+    motion.calibreFirst = bone.calibreFirst;
+    motion.calibreSecond = bone.calibreSecond;
+    this->Sections =
+      this->Sections || bone.twist != 0.0 || bone.calibreFirst != 1.0 || bone.calibreSecond != 1.0;
+  }
+}
+
+void SkinDeformation::Internals::SetFloatFrame(const Vector3& posedCentre)
+{
+  const auto storeAffine = [](float* to, const Matrix3& linear, const Vector3& shift)
+  {
+    for (int row = 0; row < 3; ++row)
+    {
+      for (int column = 0; column < 3; ++column)
+      {
+        to[4 * row + column] = static_cast<float>(linear(row, column));
+      }
+      to[4 * row + 3] = static_cast<float>(shift[row]);
+    }
+  };
+  const bool dual = this->Settings.blend == SkinBlend::DualQuaternion;
+  for (std::size_t b = 0; b < this->Motions.size(); ++b)
+  {
+    const auto number = static_cast<std::int64_t>(b);
+    const Motion& motion = this->Motions[b];
+    SkinBone& bone = this->Bones[b];
+    const Vector3& axis = this->Rig.Direction(number);
+    const Vector3 head = this->Rig.Head(number) - this->Centre;
+    const double length = this->Rig.Length(number);
+    // From the middle of the mesh at rest to the middle of the posed skeleton.
+    const Vector3 shift = motion.translation + motion.rotation * this->Centre - posedCentre;
+    const Vector3 stretch = (motion.stretch - 1.0) * length * axis;
+    const Matrix3 beside = Matrix3::Identity() - axis * axis.transpose();
+    Matrix3 cross;
+    cross << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
+    if (dual)
+    {
+      const Vector3 half = 0.5 * shift;
+      const Quaternion second = Quaternion(0.0, half.x(), half.y(), half.z()) * motion.real;
+      const double values[8] = { motion.real.w(), motion.real.x(), motion.real.y(), motion.real.z(),
+        second.w(), second.x(), second.y(), second.z() };
+      std::transform(std::begin(values), std::end(values), std::begin(bone.rigid),
+        [](double value) { return static_cast<float>(value); });
+    }
+    else
+    {
+      storeAffine(bone.rigid, motion.rotation, shift);
+    }
+    const Matrix3 to = dual ? Matrix3(Matrix3::Identity()) : motion.rotation;
+    const Vector3 posedStretch = to * stretch;
+    for (int c = 0; c < 3; ++c)
+    {
+      bone.stretch[c] = static_cast<float>(posedStretch[c]);
+      bone.along[c] = static_cast<float>(axis[c] / length);
+    }
+    bone.stretch[3] = 0.0F;
+    bone.along[3] = static_cast<float>(-axis.dot(head) / length);
+    storeAffine(bone.section, to * beside, -(to * beside * head));
+    storeAffine(bone.turned, to * cross, -(to * cross * head));
+    bone.calibre[0] = static_cast<float>(motion.calibreFirst);
+    bone.calibre[1] = static_cast<float>(motion.calibreSecond - motion.calibreFirst);
+    bone.twist = static_cast<float>(motion.twist);
+    bone.unused = 0.0F;
+  }
+}
+
+Local SkinDeformation::Internals::LocalAt(std::int64_t bone, const Vector3& point) const
+{
+  const Motion& motion = this->Motions[bone];
+  const Vector3& axis = this->Rig.Direction(bone);
+  const double length = this->Rig.Length(bone);
+  const Vector3 arm = point - this->Rig.Head(bone);
+  const double x = axis.dot(arm);
+  const double t = std::clamp(x / length, 0.0, 1.0);
+  const Vector3 beside = arm - x * axis;
+  Local local{ point + (motion.stretch - 1.0) * length * t * axis, Matrix3::Identity() };
+  if (x > 0.0 && x < length)
+  {
+    local.gradient += (motion.stretch - 1.0) * axis * axis.transpose();
+  }
+  if (this->Sections)
+  {
+    const double calibre = motion.calibreFirst + (motion.calibreSecond - motion.calibreFirst) * t;
+    const double along = calibre * std::cos(motion.twist * t) - 1.0;
+    const double across = calibre * std::sin(motion.twist * t);
+    local.point += along * beside + across * axis.cross(beside);
+    Matrix3 cross;
+    cross << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
+    local.gradient += along * (Matrix3::Identity() - axis * axis.transpose()) + across * cross;
+  }
+  return local;
+}
+
+Affine SkinDeformation::Internals::AffineAt(std::int64_t point) const
+{
+  const Vector3& rest = this->Points[point];
+  const std::int64_t first = this->Offset[point];
+  const std::int64_t last = this->Offset[point + 1];
+  Matrix3 linear = Matrix3::Zero();
+  Vector3 place = Vector3::Zero();
+  if (this->Settings.blend == SkinBlend::Linear)
+  {
+    for (std::int64_t n = first; n < last; ++n)
+    {
+      const Motion& motion = this->Motions[this->Bone[n]];
+      const Local local = this->LocalAt(this->Bone[n], rest);
+      linear += this->Weight[n] * motion.rotation * local.gradient;
+      place += this->Weight[n] * (motion.rotation * local.point + motion.translation);
+    }
+  }
+  else
+  {
+    const Quaternion& pivot = this->Motions[this->Bone[first]].real;
+    Eigen::Vector4d real = Eigen::Vector4d::Zero(); // x y z w
+    Eigen::Vector4d dual = Eigen::Vector4d::Zero();
+    for (std::int64_t n = first; n < last; ++n)
+    {
+      const Motion& motion = this->Motions[this->Bone[n]];
+      const Local local = this->LocalAt(this->Bone[n], rest);
+      linear += this->Weight[n] * local.gradient;
+      place += this->Weight[n] * local.point;
+      const double weight = motion.real.dot(pivot) < 0.0 ? -this->Weight[n] : this->Weight[n];
+      real += weight * motion.real.coeffs();
+      dual += weight * motion.dual.coeffs();
+    }
+    const double norm = real.norm();
+    const Quaternion turn(Eigen::Vector4d(real / norm));
+    // The translation is what a motion does to the origin.
+    const Quaternion shift = Quaternion(Eigen::Vector4d(dual / norm)) * turn.conjugate();
+    const Matrix3 rotation = turn.toRotationMatrix();
+    linear = rotation * linear;
+    place = rotation * place + 2.0 * shift.vec();
+  }
+  Affine affine;
+  affine.leftCols<3>() = linear;
+  affine.col(3) = place - linear * rest;
+  return affine;
+}
+
+Vector3 SkinDeformation::Internals::Deformed(std::int64_t point) const
+{
+  const Affine affine = this->AffineAt(point);
+  return affine.leftCols<3>() * this->Points[point] + affine.col(3);
+}
+
+template <typename Real>
+void SkinDeformation::Internals::DisplacementsOf(const Real* positions, Real* displacements) const
+{
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t i = first; i < last; ++i)
+    {
+      StorePoint(displacements, i, PointAt(positions, i) - this->Points[i]);
+    }
+  };
+  ParallelFor(static_cast<std::int64_t>(this->Points.size()), PointGrain, std::ref(body));
+}
+
+template <typename Real>
+void SkinDeformation::Internals::NormalsOf(const Real* positions, Real* normals)
+{
+  const auto ofTriangles = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t n = first; n < last; ++n)
+    {
+      const Vector3 a = PointAt(positions, this->Triangles[n][0]);
+      const Vector3 b = PointAt(positions, this->Triangles[n][1]);
+      const Vector3 c = PointAt(positions, this->Triangles[n][2]);
+      this->TriangleNormals[n] = (b - a).cross(c - a);
+    }
+  };
+  ParallelFor(static_cast<std::int64_t>(this->Triangles.size()), PointGrain, std::ref(ofTriangles));
+  const auto ofPoints = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t i = first; i < last; ++i)
+    {
+      Vector3 sum = Vector3::Zero();
+      if (!this->TrianglesOf.offset.empty())
+      {
+        for (std::int64_t n = this->TrianglesOf.offset[i]; n < this->TrianglesOf.offset[i + 1]; ++n)
+        {
+          sum += this->TriangleNormals[this->TrianglesOf.item[n]];
+        }
+      }
+      StorePoint(normals, i, sum.stableNormalized());
+    }
+  };
+  ParallelFor(static_cast<std::int64_t>(this->Points.size()), PointGrain, std::ref(ofPoints));
+}
+
+template <typename Real>
+double SkinDeformation::Internals::RatioOf(const Real* positions, std::int64_t tetrahedron) const
+{
+  const std::array<std::int64_t, 4>& corners = this->Tetrahedra[tetrahedron];
+  const Vector3 a = PointAt(positions, corners[0]);
+  const double volume = (PointAt(positions, corners[1]) - a)
+                          .cross(PointAt(positions, corners[2]) - a)
+                          .dot(PointAt(positions, corners[3]) - a);
+  return volume / this->RestVolume[tetrahedron];
+}
+
+template <typename Real>
+void SkinDeformation::Internals::Check(
+  const Real* positions, InversionReport& report, double leastRatio)
+{
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t n = first; n < last; ++n)
+    {
+      this->Ratio[n] = this->RatioOf(positions, n);
+    }
+  };
+  const auto count = static_cast<std::int64_t>(this->Tetrahedra.size());
+  ParallelFor(count, PointGrain, std::ref(body));
+  report.tetrahedra.clear();
+  report.leastRatio = count > 0 ? std::numeric_limits<double>::infinity() : 1.0;
+  for (std::int64_t n = 0; n < count; ++n)
+  {
+    report.leastRatio = std::min(report.leastRatio, this->Ratio[n]);
+    if (!(this->Ratio[n] > leastRatio))
+    {
+      report.tetrahedra.push_back(n);
+    }
+  }
+  report.found = static_cast<std::int64_t>(report.tetrahedra.size());
+  report.movedPoints = 0;
+  report.largestMove = 0.0;
+  report.sweeps = 0;
+}
+
+template <typename Real>
+void SkinDeformation::Internals::Repair(Real* positions, InversionReport& report, double leastRatio)
+{
+  this->Check(positions, report, leastRatio);
+  if (report.found == 0)
+  {
+    return;
+  }
+  const auto count = static_cast<std::int64_t>(this->Points.size());
+  std::vector<Affine> maps(count);
+  const auto makeMaps = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t i = first; i < last; ++i)
+    {
+      maps[i] = this->AffineAt(i);
+    }
+  };
+  ParallelFor(count, PointGrain, std::ref(makeMaps));
+
+  const auto forNeighbours = [&](std::int64_t point, const auto& body)
+  {
+    for (std::int64_t n = this->TetrahedraOf.offset[point];
+         n < this->TetrahedraOf.offset[point + 1]; ++n)
+    {
+      for (const std::int64_t other : this->Tetrahedra[this->TetrahedraOf.item[n]])
+      {
+        if (other != point)
+        {
+          body(other);
+        }
+      }
+    }
+  };
+  std::vector<char> moves(count, 0);
+  std::vector<std::int64_t> region;
+  const auto take = [&](std::int64_t point)
+  {
+    if (!moves[point])
+    {
+      moves[point] = 1;
+      region.push_back(point);
+    }
+  };
+  std::vector<Affine> next;
+  std::vector<char> touched(this->Tetrahedra.size(), 0);
+  while (!report.tetrahedra.empty() && report.sweeps < RepairSweeps)
+  {
+    const bool ring = report.sweeps > 0 && report.sweeps % SweepsPerRing == 0;
+    for (const std::int64_t tetrahedron : report.tetrahedra)
+    {
+      for (const std::int64_t corner : this->Tetrahedra[tetrahedron])
+      {
+        take(corner);
+      }
+    }
+    if (ring)
+    {
+      // Around all that move next to what is left.
+      std::vector<char> near(count, 0);
+      std::vector<std::int64_t> front;
+      for (const std::int64_t tetrahedron : report.tetrahedra)
+      {
+        for (const std::int64_t corner : this->Tetrahedra[tetrahedron])
+        {
+          if (!near[corner])
+          {
+            near[corner] = 1;
+            front.push_back(corner);
+          }
+        }
+      }
+      for (std::size_t n = 0; n < front.size(); ++n)
+      {
+        const std::int64_t at = front[n];
+        forNeighbours(at,
+          [&](std::int64_t other)
+          {
+            if (moves[other] && !near[other])
+            {
+              near[other] = 1;
+              front.push_back(other);
+            }
+          });
+      }
+      for (const std::int64_t at : front)
+      {
+        forNeighbours(at, take);
+      }
+    }
+    // An edge counts once for each of its tetrahedra: long and thin ones in proportion.
+    next.resize(region.size());
+    for (std::size_t n = 0; n < region.size(); ++n)
+    {
+      Affine sum = Affine::Zero();
+      std::int64_t parts = 0;
+      forNeighbours(region[n],
+        [&](std::int64_t other)
+        {
+          sum += maps[other];
+          ++parts;
+        });
+      next[n] = 0.5 * maps[region[n]] + (0.5 / static_cast<double>(parts)) * sum;
+    }
+    std::vector<std::int64_t> around;
+    for (std::size_t n = 0; n < region.size(); ++n)
+    {
+      const std::int64_t i = region[n];
+      maps[i] = next[n];
+      StorePoint(positions, i, maps[i].leftCols<3>() * this->Points[i] + maps[i].col(3));
+      for (std::int64_t k = this->TetrahedraOf.offset[i]; k < this->TetrahedraOf.offset[i + 1]; ++k)
+      {
+        const std::int64_t tetrahedron = this->TetrahedraOf.item[k];
+        if (!touched[tetrahedron])
+        {
+          touched[tetrahedron] = 1;
+          around.push_back(tetrahedron);
+        }
+      }
+    }
+    std::sort(around.begin(), around.end());
+    report.tetrahedra.clear();
+    for (const std::int64_t tetrahedron : around)
+    {
+      touched[tetrahedron] = 0;
+      this->Ratio[tetrahedron] = this->RatioOf(positions, tetrahedron);
+      if (!(this->Ratio[tetrahedron] > leastRatio))
+      {
+        report.tetrahedra.push_back(tetrahedron);
+      }
+    }
+    ++report.sweeps;
+  }
+  report.leastRatio = *std::min_element(this->Ratio.begin(), this->Ratio.end());
+  report.movedPoints = static_cast<std::int64_t>(region.size());
+  for (const std::int64_t i : region)
+  {
+    report.largestMove =
+      std::max(report.largestMove, (PointAt(positions, i) - this->Deformed(i)).norm());
+  }
+}
+
+SkinDeformation::SkinDeformation(const std::vector<Vector3>& points,
+  const CompactSkinWeights& weights, const Skeleton& rest, const SkinDeformationSettings& settings)
+  : Data(std::make_unique<Internals>(points, weights, rest, settings))
+{
+}
+
+SkinDeformation::~SkinDeformation() = default;
+SkinDeformation::SkinDeformation(SkinDeformation&&) noexcept = default;
+SkinDeformation& SkinDeformation::operator=(SkinDeformation&&) noexcept = default;
+
+const SkeletonRig& SkinDeformation::Rig() const
+{
+  return this->Data->Rig;
+}
+
+std::int64_t SkinDeformation::NumberOfPoints() const
+{
+  return static_cast<std::int64_t>(this->Data->Points.size());
+}
+
+void SkinDeformation::Deform(const std::vector<BoneTransform>& bones, float* positions)
+{
+  Internals& data = *this->Data;
+  data.SetFrame(bones);
+  // Near to where the mesh will be: single precision is best around it.
+  Vector3 posedCentre = Vector3::Zero();
+  for (const BoneTransform& bone : bones)
+  {
+    posedCentre += bone.posedHead / static_cast<double>(bones.size());
+  }
+  const float centre[3] = { static_cast<float>(posedCentre.x()),
+    static_cast<float>(posedCentre.y()), static_cast<float>(posedCentre.z()) };
+  data.SetFloatFrame(Vector3(static_cast<double>(centre[0]), static_cast<double>(centre[1]),
+    static_cast<double>(centre[2])));
+  const SkinKernels* kernels = Selected();
+  const bool dual = data.Settings.blend == SkinBlend::DualQuaternion;
+  const auto kernel = data.Sections ? (dual ? kernels->dualSections : kernels->linearSections)
+                                    : (dual ? kernels->dual : kernels->linear);
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  { kernel(data.Blocks, data.Bones.data(), centre, first, last, positions); };
+  ParallelFor(static_cast<std::int64_t>(data.BlockOffset.size()) - 1, BlockGrain, std::ref(body));
+}
+
+void SkinDeformation::Deform(const std::vector<BoneTransform>& bones, double* positions)
+{
+  Internals& data = *this->Data;
+  data.SetFrame(bones);
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t i = first; i < last; ++i)
+    {
+      StorePoint(positions, i, data.Deformed(i));
+    }
+  };
+  ParallelFor(static_cast<std::int64_t>(data.Points.size()), PointGrain, std::ref(body));
+}
+
+void SkinDeformation::Deform(const SkeletonPose& pose, float* positions)
+{
+  this->Data->Rig.Transform(pose, this->Data->Transforms);
+  this->Deform(this->Data->Transforms, positions);
+}
+
+void SkinDeformation::Deform(const SkeletonPose& pose, double* positions)
+{
+  this->Data->Rig.Transform(pose, this->Data->Transforms);
+  this->Deform(this->Data->Transforms, positions);
+}
+
+void SkinDeformation::Displacements(const float* positions, float* displacements) const
+{
+  this->Data->DisplacementsOf(positions, displacements);
+}
+
+void SkinDeformation::Displacements(const double* positions, double* displacements) const
+{
+  this->Data->DisplacementsOf(positions, displacements);
+}
+
+void SkinDeformation::SetTriangles(const std::vector<Triangle>& triangles)
+{
+  RequireCorners(triangles, this->NumberOfPoints(), "Triangle");
+  this->Data->Triangles = triangles;
+  this->Data->TrianglesOf = CellsOfPoints(triangles, this->NumberOfPoints());
+  this->Data->TriangleNormals.resize(triangles.size());
+}
+
+void SkinDeformation::NormalsOf(const float* positions, float* normals) const
+{
+  this->Data->NormalsOf(positions, normals);
+}
+
+void SkinDeformation::NormalsOf(const double* positions, double* normals) const
+{
+  this->Data->NormalsOf(positions, normals);
+}
+
+void SkinDeformation::SetTetrahedra(const std::vector<std::array<std::int64_t, 4>>& tetrahedra)
+{
+  RequireCorners(tetrahedra, this->NumberOfPoints(), "Tetrahedron");
+  std::vector<double> volumes(tetrahedra.size());
+  for (std::size_t n = 0; n < tetrahedra.size(); ++n)
+  {
+    const Vector3& a = this->Data->Points[tetrahedra[n][0]];
+    volumes[n] = (this->Data->Points[tetrahedra[n][1]] - a)
+                   .cross(this->Data->Points[tetrahedra[n][2]] - a)
+                   .dot(this->Data->Points[tetrahedra[n][3]] - a);
+    Require(volumes[n] != 0.0, "Tetrahedron " + std::to_string(n) + " has no volume at rest");
+  }
+  this->Data->Tetrahedra = tetrahedra;
+  this->Data->TetrahedraOf = CellsOfPoints(tetrahedra, this->NumberOfPoints());
+  this->Data->RestVolume = std::move(volumes);
+  this->Data->Ratio.assign(tetrahedra.size(), 1.0);
+}
+
+void SkinDeformation::CheckTetrahedra(
+  const float* positions, InversionReport& report, double leastRatio) const
+{
+  this->Data->Check(positions, report, leastRatio);
+}
+
+void SkinDeformation::CheckTetrahedra(
+  const double* positions, InversionReport& report, double leastRatio) const
+{
+  this->Data->Check(positions, report, leastRatio);
+}
+
+void SkinDeformation::RepairTetrahedra(float* positions, InversionReport& report, double leastRatio)
+{
+  this->Data->Repair(positions, report, leastRatio);
+}
+
+void SkinDeformation::RepairTetrahedra(
+  double* positions, InversionReport& report, double leastRatio)
+{
+  this->Data->Repair(positions, report, leastRatio);
+}
+
+double SkinDeformation::EntriesPerBlock() const
+{
+  const std::size_t blocks = this->Data->BlockOffset.size() - 1;
+  return blocks == 0
+    ? 0.0
+    : static_cast<double>(this->Data->BlockBone.size()) / static_cast<double>(blocks);
+}
+
+namespace
+{
+template <typename Real>
+void Velocities(
+  const Real* now, const Real* before, double seconds, std::int64_t values, Real* velocities)
+{
+  Require(std::isfinite(seconds) && seconds != 0.0, "The time between two poses must not be 0");
+  const Real factor = static_cast<Real>(1.0 / seconds);
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t n = first; n < last; ++n)
+    {
+      velocities[n] = (now[n] - before[n]) * factor;
+    }
+  };
+  ParallelFor(values, 3 * PointGrain, std::ref(body));
+}
+}
+
+void SkinVelocities(
+  const float* now, const float* before, double seconds, std::int64_t values, float* velocities)
+{
+  Velocities(now, before, seconds, values, velocities);
+}
+
+void SkinVelocities(
+  const double* now, const double* before, double seconds, std::int64_t values, double* velocities)
+{
+  Velocities(now, before, seconds, values, velocities);
+}
+}

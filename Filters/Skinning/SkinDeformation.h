@@ -1,0 +1,141 @@
+/**
+ * @file SkinDeformation.h
+ * @brief Moves the points of a mesh with the bones that they hang on.
+ *
+ * Sources: Kavan, Collins, Zara, O'Sullivan, "Geometric skinning with approximate dual quaternion
+ * blending", ACM TOG 2008; Jacobson & Sorkine, "Stretchable and twistable bones for skeletal shape
+ * deformation", SIGGRAPH Asia 2011. docs/deformation.md has the equations.
+ */
+#ifndef DynamicCoronary_SkinDeformation_h
+#define DynamicCoronary_SkinDeformation_h
+
+#include "BiharmonicSkinWeights.h"
+#include "Geometry.h"
+#include "SkeletonPose.h"
+
+#include <array>
+#include <memory>
+#include <vector>
+
+namespace coronary
+{
+enum class SkinBlend
+{
+  Linear = 0, ///< mean of the bones' maps: shrinks where bones turn a lot against each other
+  DualQuaternion = 1, ///< mean of their rigid motions: keeps the calibre in strong bends and twists
+};
+
+struct SkinDeformationSettings
+{
+  SkinBlend blend = SkinBlend::Linear;
+  /// Points follow the stretch of a bone evenly along it. Off: bones are rigid from their first joints
+  /// on, and gaps between a bone and the next one are blended.
+  bool stretch = true;
+};
+
+/// Tetrahedra whose volume against rest is at or below a limit.
+struct InversionReport
+{
+  std::int64_t found = 0;               ///< before a repair
+  std::vector<std::int64_t> tetrahedra; ///< that are left, ascending
+  double leastRatio = 1.0;              ///< of signed volume to that at rest, at the end
+  std::int64_t movedPoints = 0;         ///< by the repair
+  double largestMove = 0.0;             ///< mm
+  int sweeps = 0;
+};
+
+/**
+ * Set up once for a mesh at rest; then every frame is one pass over the points, without allocation.
+ *
+ * Not to be called from two threads at once: an object holds the frame it is at work on. The same
+ * input gives the same bits on any number of threads. Results in single precision differ in the last
+ * bits between processors with and without fused multiplication.
+ */
+class SkinDeformation
+{
+public:
+  /**
+   * @param points   at rest, mm
+   * @param weights  of as many points; negative ones are taken as they are, the sum of a point is made 1
+   * @param rest     the skeleton that the weights were made for
+   * @throws std::invalid_argument: arrays of wrong size, a point without weight, an index of a bone that
+   * does not exist, a value that is not finite; as SkeletonRig
+   */
+  SkinDeformation(const std::vector<Vector3>& points, const CompactSkinWeights& weights,
+    const Skeleton& rest, const SkinDeformationSettings& settings = {});
+  ~SkinDeformation();
+  SkinDeformation(SkinDeformation&&) noexcept;
+  SkinDeformation& operator=(SkinDeformation&&) noexcept;
+
+  const SkeletonRig& Rig() const;
+  std::int64_t NumberOfPoints() const;
+
+  ///@{
+  /**
+   * Positions of all points, x y z after each other, in the order given, mm. Single precision is the fast
+   * way: its error is about 1e-6 of the mesh's size. Double precision reproduces a rigid motion to
+   * rounding.
+   * @param bones  one for each bone: SkeletonRig::Transform
+   * @throws std::invalid_argument  as SkeletonRig::Transform, or a wrong number of bones
+   */
+  void Deform(const std::vector<BoneTransform>& bones, float* positions);
+  void Deform(const std::vector<BoneTransform>& bones, double* positions);
+  void Deform(const SkeletonPose& pose, float* positions);
+  void Deform(const SkeletonPose& pose, double* positions);
+  ///@}
+
+  ///@{
+  /// positions - rest positions, mm.
+  void Displacements(const float* positions, float* displacements) const;
+  void Displacements(const double* positions, double* displacements) const;
+  ///@}
+
+  /// For NormalsOf. @throws std::invalid_argument: an index that does not exist
+  void SetTriangles(const std::vector<Triangle>& triangles);
+  ///@{
+  /// Unit normals of the points: mean of the triangles around, weighted by their areas; 0 where there
+  /// are none.
+  void NormalsOf(const float* positions, float* normals) const;
+  void NormalsOf(const double* positions, double* normals) const;
+  ///@}
+
+  /// For the check and the repair; either orientation.
+  /// @throws std::invalid_argument: an index that does not exist, a tetrahedron without volume at rest
+  void SetTetrahedra(const std::vector<std::array<std::int64_t, 4>>& tetrahedra);
+  ///@{
+  /// @param leastRatio  tetrahedra at or below this share of their volume at rest are reported
+  void CheckTetrahedra(
+    const float* positions, InversionReport& report, double leastRatio = 0.0) const;
+  void CheckTetrahedra(
+    const double* positions, InversionReport& report, double leastRatio = 0.0) const;
+  ///@}
+  ///@{
+  /**
+   * Moves the corners of such tetrahedra until there are none. Every point has an affine map, the blend
+   * of its bones' maps; those of the corners are replaced by the mean of their own and their
+   * neighbours', sweep by sweep; every fourth sweep takes one more ring of points around those that
+   * are left. Nothing is moved where nothing is inverted. A region that moves by one map is not
+   * inverted as long as the map is not; what is left after 60 sweeps is reported.
+   * @param positions  of the last call of Deform
+   */
+  void RepairTetrahedra(float* positions, InversionReport& report, double leastRatio = 0.0);
+  void RepairTetrahedra(double* positions, InversionReport& report, double leastRatio = 0.0);
+  ///@}
+
+  /// For tests and benchmarks: bones looked at per block of 16 points, on average.
+  double EntriesPerBlock() const;
+
+private:
+  struct Internals;
+  std::unique_ptr<Internals> Data;
+};
+
+/// (now - before) / seconds for `values` values, mm/s. @throws std::invalid_argument: seconds are 0 or not
+/// finite
+void SkinVelocities(
+  const float* now, const float* before, double seconds, std::int64_t values, float* velocities);
+void SkinVelocities(
+  const double* now, const double* before, double seconds, std::int64_t values, double* velocities);
+}
+
+#endif

@@ -1,0 +1,68 @@
+// Inner loops of SkinDeformation, one set for each generation of processors.
+#ifndef DynamicCoronary_SkinKernels_h
+#define DynamicCoronary_SkinKernels_h
+
+#include <cstdint>
+
+namespace coronary
+{
+/// Points go through the loops in blocks of so many.
+constexpr int SkinLanes = 16;
+
+/// Points in blocks, each with the bones that any of its points hangs on.
+struct SkinBlocks
+{
+  const float* x; ///< SkinLanes a block, from the middle of the mesh; the same for y, z
+  const float* y;
+  const float* z;
+  const std::int32_t* offset; ///< blocks + 1: where a block's entries begin
+  const std::int32_t* bone;   ///< of every entry
+  const float* weight;        ///< SkinLanes an entry
+  const std::int32_t* pivot;  ///< SkinLanes a block: the bone of the greatest weight
+  const std::int32_t* point;  ///< SkinLanes a block: where the result goes
+  std::int64_t points;        ///< all blocks but the last one are full
+};
+
+/// What the loops need of a bone. Affine maps are three rows of four.
+struct SkinBone
+{
+  float rigid[12];   ///< LinearBlend: rotation and translation; DualQuaternion: 4 real, 4 dual
+  float stretch[4];  ///< times t: what the stretch adds
+  float along[4];    ///< affine: t before it is limited to 0 .. 1
+  float section[12]; ///< of the part beside the bone
+  float turned[12];  ///< of the same, turned by a quarter about the bone
+  float calibre[2];  ///< factor at t = 0, its change to t = 1
+  float twist;       ///< radians at t = 1
+  float unused;
+};
+
+struct SkinKernels
+{
+  /// Blocks first to last - 1; `centre` is added to the results, which go to 3 point, 3 point + 1, ...
+  void (*linear)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
+    std::int64_t first, std::int64_t last, float* result);
+  void (*linearSections)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
+    std::int64_t first, std::int64_t last, float* result);
+  void (*dual)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
+    std::int64_t first, std::int64_t last, float* result);
+  void (*dualSections)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
+    std::int64_t first, std::int64_t last, float* result);
+};
+
+enum class SkinInstructions
+{
+  Widest, ///< that the processor runs: the default
+  Baseline,
+  Avx2,
+  Avx512
+};
+
+/// For tests: which of the sets of loops runs, in the whole process; false if that can not be.
+bool SetSkinInstructions(SkinInstructions instructions);
+
+extern const SkinKernels SkinKernelsBaseline;
+extern const SkinKernels SkinKernelsAvx2;
+extern const SkinKernels SkinKernelsAvx512;
+}
+
+#endif
