@@ -19,6 +19,15 @@ void Require(bool condition, const std::string& message)
   }
 }
 
+/// Without making a string: for what is called in every frame.
+void Require(bool condition, const char* message)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument(message);
+  }
+}
+
 void RequireNumber(std::size_t is, std::size_t wanted, const char* what, const char* of)
 {
   if (is != wanted)

@@ -3,6 +3,9 @@
 #include "ParallelFor.h"
 #include "SkinKernels.h"
 
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -19,10 +22,21 @@ namespace
 {
 constexpr std::int64_t BlockGrain = 64;
 constexpr std::int64_t PointGrain = 4096;
-constexpr int RepairSweeps = 60;
-constexpr int SweepsPerRing = 4;
+constexpr int RepairSweeps = 400;
+constexpr double GreatestLeastRatio = 0.5;
+constexpr double RepairMargin = 0.01;
+constexpr double LeastRepairStretch = 0.2;
 
 void Require(bool condition, const std::string& message)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument(message);
+  }
+}
+
+/// Without making a string: for what is called in every frame.
+void Require(bool condition, const char* message)
 {
   if (!condition)
   {
@@ -261,6 +275,9 @@ struct SkinDeformation::Internals
   void Check(const Real* positions, InversionReport& report, double leastRatio);
   template <typename Real>
   void Repair(Real* positions, InversionReport& report, double leastRatio);
+  /// Gives one tetrahedron the nearest shape that has the wanted share of its volume at rest.
+  template <typename Real>
+  void Unfold(Real* positions, std::int64_t tetrahedron, double wantedRatio) const;
 };
 
 void SkinDeformation::Internals::ReadWeights(const CompactSkinWeights& weights)
@@ -643,141 +660,118 @@ void SkinDeformation::Internals::Check(
 template <typename Real>
 void SkinDeformation::Internals::Repair(Real* positions, InversionReport& report, double leastRatio)
 {
+  Require(leastRatio >= 0.0 && leastRatio <= GreatestLeastRatio,
+    "The least ratio of volumes that a repair can reach is 0 to 0.5");
   this->Check(positions, report, leastRatio);
   if (report.found == 0)
   {
     return;
   }
-  const auto count = static_cast<std::int64_t>(this->Points.size());
-  std::vector<Affine> maps(count);
-  const auto makeMaps = [&](std::int64_t first, std::int64_t last)
+  // Rounding of the positions must not undo it.
+  const double wanted = 1.05 * leastRatio + RepairMargin;
+  std::vector<char> moves(this->Points.size(), 0);
+  std::vector<std::int64_t> moved;
+  std::vector<char> queued(this->Tetrahedra.size(), 0);
+  std::vector<std::int64_t> next = report.tetrahedra;
+  while (!next.empty() && report.sweeps < RepairSweeps)
   {
-    for (std::int64_t i = first; i < last; ++i)
+    report.tetrahedra.swap(next);
+    next.clear();
+    for (const std::int64_t n : report.tetrahedra)
     {
-      maps[i] = this->AffineAt(i);
+      queued[n] = 0;
     }
-  };
-  ParallelFor(count, PointGrain, std::ref(makeMaps));
-
-  const auto forNeighbours = [&](std::int64_t point, const auto& body)
-  {
-    for (std::int64_t n = this->TetrahedraOf.offset[point];
-         n < this->TetrahedraOf.offset[point + 1]; ++n)
+    for (const std::int64_t n : report.tetrahedra)
     {
-      for (const std::int64_t other : this->Tetrahedra[this->TetrahedraOf.item[n]])
+      if (this->RatioOf(positions, n) > leastRatio)
       {
-        if (other != point)
+        continue; // a neighbour's repair was its own
+      }
+      this->Unfold(positions, n, wanted);
+      for (const std::int64_t corner : this->Tetrahedra[n])
+      {
+        if (!moves[corner])
         {
-          body(other);
+          moves[corner] = 1;
+          moved.push_back(corner);
         }
-      }
-    }
-  };
-  std::vector<char> moves(count, 0);
-  std::vector<std::int64_t> region;
-  const auto take = [&](std::int64_t point)
-  {
-    if (!moves[point])
-    {
-      moves[point] = 1;
-      region.push_back(point);
-    }
-  };
-  std::vector<Affine> next;
-  std::vector<char> touched(this->Tetrahedra.size(), 0);
-  while (!report.tetrahedra.empty() && report.sweeps < RepairSweeps)
-  {
-    const bool ring = report.sweeps > 0 && report.sweeps % SweepsPerRing == 0;
-    for (const std::int64_t tetrahedron : report.tetrahedra)
-    {
-      for (const std::int64_t corner : this->Tetrahedra[tetrahedron])
-      {
-        take(corner);
-      }
-    }
-    if (ring)
-    {
-      // Around all that move next to what is left.
-      std::vector<char> near(count, 0);
-      std::vector<std::int64_t> front;
-      for (const std::int64_t tetrahedron : report.tetrahedra)
-      {
-        for (const std::int64_t corner : this->Tetrahedra[tetrahedron])
+        for (std::int64_t k = this->TetrahedraOf.offset[corner];
+             k < this->TetrahedraOf.offset[corner + 1]; ++k)
         {
-          if (!near[corner])
+          const std::int64_t near = this->TetrahedraOf.item[k];
+          if (!queued[near])
           {
-            near[corner] = 1;
-            front.push_back(corner);
+            queued[near] = 1;
+            next.push_back(near);
           }
         }
       }
-      for (std::size_t n = 0; n < front.size(); ++n)
-      {
-        const std::int64_t at = front[n];
-        forNeighbours(at,
-          [&](std::int64_t other)
-          {
-            if (moves[other] && !near[other])
-            {
-              near[other] = 1;
-              front.push_back(other);
-            }
-          });
-      }
-      for (const std::int64_t at : front)
-      {
-        forNeighbours(at, take);
-      }
     }
-    // An edge counts once for each of its tetrahedra: long and thin ones in proportion.
-    next.resize(region.size());
-    for (std::size_t n = 0; n < region.size(); ++n)
-    {
-      Affine sum = Affine::Zero();
-      std::int64_t parts = 0;
-      forNeighbours(region[n],
-        [&](std::int64_t other)
-        {
-          sum += maps[other];
-          ++parts;
-        });
-      next[n] = 0.5 * maps[region[n]] + (0.5 / static_cast<double>(parts)) * sum;
-    }
-    std::vector<std::int64_t> around;
-    for (std::size_t n = 0; n < region.size(); ++n)
-    {
-      const std::int64_t i = region[n];
-      maps[i] = next[n];
-      StorePoint(positions, i, maps[i].leftCols<3>() * this->Points[i] + maps[i].col(3));
-      for (std::int64_t k = this->TetrahedraOf.offset[i]; k < this->TetrahedraOf.offset[i + 1]; ++k)
-      {
-        const std::int64_t tetrahedron = this->TetrahedraOf.item[k];
-        if (!touched[tetrahedron])
-        {
-          touched[tetrahedron] = 1;
-          around.push_back(tetrahedron);
-        }
-      }
-    }
-    std::sort(around.begin(), around.end());
-    report.tetrahedra.clear();
-    for (const std::int64_t tetrahedron : around)
-    {
-      touched[tetrahedron] = 0;
-      this->Ratio[tetrahedron] = this->RatioOf(positions, tetrahedron);
-      if (!(this->Ratio[tetrahedron] > leastRatio))
-      {
-        report.tetrahedra.push_back(tetrahedron);
-      }
-    }
+    next.erase(std::remove_if(next.begin(), next.end(),
+                 [&](std::int64_t n)
+                 {
+                   const bool fine = this->RatioOf(positions, n) > leastRatio;
+                   queued[n] = fine ? 0 : queued[n];
+                   return fine;
+                 }),
+      next.end());
     ++report.sweeps;
   }
-  report.leastRatio = *std::min_element(this->Ratio.begin(), this->Ratio.end());
-  report.movedPoints = static_cast<std::int64_t>(region.size());
-  for (const std::int64_t i : region)
+  const std::int64_t found = report.found;
+  const int sweeps = report.sweeps;
+  this->Check(positions, report, leastRatio);
+  report.found = found;
+  report.sweeps = sweeps;
+  report.movedPoints = static_cast<std::int64_t>(moved.size());
+  for (const std::int64_t i : moved)
   {
     report.largestMove =
       std::max(report.largestMove, (PointAt(positions, i) - this->Deformed(i)).norm());
+  }
+}
+
+template <typename Real>
+void SkinDeformation::Internals::Unfold(
+  Real* positions, std::int64_t tetrahedron, double wantedRatio) const
+{
+  const std::array<std::int64_t, 4>& corners = this->Tetrahedra[tetrahedron];
+  Vector3 restCentre = Vector3::Zero();
+  Vector3 centre = Vector3::Zero();
+  for (const std::int64_t corner : corners)
+  {
+    restCentre += 0.25 * this->Points[corner];
+    centre += 0.25 * PointAt(positions, corner);
+  }
+  Matrix3 restEdges;
+  Matrix3 edges;
+  for (int c = 0; c < 3; ++c)
+  {
+    restEdges.col(c) = this->Points[corners[c + 1]] - this->Points[corners[0]];
+    edges.col(c) = PointAt(positions, corners[c + 1]) - PointAt(positions, corners[0]);
+  }
+  const Eigen::JacobiSVD<Matrix3> svd(
+    edges * restEdges.inverse(), Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Matrix3 u = svd.matrixU();
+  Vector3 stretches = svd.singularValues();
+  if (u.determinant() * svd.matrixV().determinant() < 0.0)
+  {
+    // The least stretch is the one that is turned over.
+    u.col(2) = -u.col(2);
+    stretches[2] = -stretches[2];
+  }
+  Vector3 wanted = stretches;
+  for (double least = LeastRepairStretch; least < 2.0; least *= 1.1)
+  {
+    wanted = stretches.cwiseMax(least);
+    if (wanted.prod() >= wantedRatio)
+    {
+      break;
+    }
+  }
+  const Matrix3 gradient = u * wanted.asDiagonal() * svd.matrixV().transpose();
+  for (const std::int64_t corner : corners)
+  {
+    StorePoint(positions, corner, centre + gradient * (this->Points[corner] - restCentre));
   }
 }
 
@@ -884,11 +878,15 @@ void SkinDeformation::SetTetrahedra(const std::vector<std::array<std::int64_t, 4
   std::vector<double> volumes(tetrahedra.size());
   for (std::size_t n = 0; n < tetrahedra.size(); ++n)
   {
-    const Vector3& a = this->Data->Points[tetrahedra[n][0]];
-    volumes[n] = (this->Data->Points[tetrahedra[n][1]] - a)
-                   .cross(this->Data->Points[tetrahedra[n][2]] - a)
-                   .dot(this->Data->Points[tetrahedra[n][3]] - a);
-    Require(volumes[n] != 0.0, "Tetrahedron " + std::to_string(n) + " has no volume at rest");
+    const std::vector<Vector3>& points = this->Data->Points;
+    const Vector3 a = points[tetrahedra[n][1]] - points[tetrahedra[n][0]];
+    const Vector3 b = points[tetrahedra[n][2]] - points[tetrahedra[n][0]];
+    const Vector3 c = points[tetrahedra[n][3]] - points[tetrahedra[n][0]];
+    volumes[n] = a.cross(b).dot(c);
+    if (!(std::abs(volumes[n]) > 1e-14 * a.norm() * b.norm() * c.norm()))
+    {
+      throw std::invalid_argument("Tetrahedron " + std::to_string(n) + " has no volume at rest");
+    }
   }
   this->Data->Tetrahedra = tetrahedra;
   this->Data->TetrahedraOf = CellsOfPoints(tetrahedra, this->NumberOfPoints());

@@ -111,12 +111,14 @@ public:
   ///@}
   ///@{
   /**
-   * Moves the corners of such tetrahedra until there are none. Every point has an affine map, the blend
-   * of its bones' maps; those of the corners are replaced by the mean of their own and their
-   * neighbours', sweep by sweep; every fourth sweep takes one more ring of points around those that
-   * are left. Nothing is moved where nothing is inverted. A region that moves by one map is not
-   * inverted as long as the map is not; what is left after 60 sweeps is reported.
-   * @param positions  of the last call of Deform
+   * Moves the corners of such tetrahedra until there are none. Sweep by sweep, and in it one after the
+   * other, each is given the nearest shape that is not inverted: of the singular values of its deformation
+   * gradient those below 0.2 (the least of them negative when it is inverted) are raised to 0.2, or
+   * further where the wanted volume asks for it; its middle stays. Nothing else is moved. What is left
+   * after 400 sweeps is reported. May allocate where something is inverted.
+   * @param positions   of the last call of Deform
+   * @param leastRatio  0 to 0.5
+   * @throws std::invalid_argument: leastRatio is out of range
    */
   void RepairTetrahedra(float* positions, InversionReport& report, double leastRatio = 0.0);
   void RepairTetrahedra(double* positions, InversionReport& report, double leastRatio = 0.0);
