@@ -164,6 +164,17 @@ constexpr const char* WeightsEnergyGap = "WeightsEnergyGap";   ///< double, shar
 constexpr const char* WeightsRowSums = "WeightsRowSums";       ///< double: least, greatest, Eq. 7
 constexpr const char* WeightsOnBones = "WeightsOnBones";       ///< double, greatest error there
 constexpr const char* BoneLengthOutside = "BoneLengthOutside"; ///< double, mm, one value a bone
+// Posed skeleton, cell data.
+constexpr const char* BoneRotation = "BoneRotation"; ///< double[4], w x y z, from rest, first joint
+constexpr const char* BoneTwist = "BoneTwist";       ///< double, radians along the bone
+constexpr const char* AxialStrain = "AxialStrain";   ///< double, posed length / rest length - 1
+// Posed skeleton, point data.
+constexpr const char* CalibreFactor = "CalibreFactor"; ///< double, of the radius
+// Deformed mesh, cell data.
+constexpr const char* VolumeRatio = "VolumeRatio"; ///< double, against rest, below 0 inverted
+// Deformed mesh, field data.
+constexpr const char* InvertedTetrahedra = "InvertedTetrahedra"; ///< vtkIdType, ids of cells left
+constexpr const char* RepairedTetrahedra = "RepairedTetrahedra"; ///< vtkIdType, number
 
 // Cleaned surface, field data.
 constexpr const char* Repairs = "Repairs";                           ///< string, a sentence each

@@ -917,6 +917,11 @@ void SkinDeformation::RepairTetrahedra(
   this->Data->Repair(positions, report, leastRatio);
 }
 
+const std::vector<double>& SkinDeformation::VolumeRatios() const
+{
+  return this->Data->Ratio;
+}
+
 double SkinDeformation::EntriesPerBlock() const
 {
   const std::size_t blocks = this->Data->BlockOffset.size() - 1;

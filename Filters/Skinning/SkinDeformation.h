@@ -109,6 +109,8 @@ public:
   void CheckTetrahedra(
     const double* positions, InversionReport& report, double leastRatio = 0.0) const;
   ///@}
+  /// Signed volume against rest of every tetrahedron, of the last check or repair.
+  const std::vector<double>& VolumeRatios() const;
   ///@{
   /**
    * Moves the corners of such tetrahedra until there are none. Sweep by sweep, and in it one after the

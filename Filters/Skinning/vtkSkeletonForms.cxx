@@ -1,0 +1,186 @@
+#include "vtkSkeletonForms.h"
+
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
+
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkDataArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkNew.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+
+#include <stdexcept>
+
+using coronary::Quaternion;
+using coronary::Skeleton;
+using coronary::SkeletonPose;
+using vtkCoronary::Require;
+
+namespace
+{
+/// The array of that name, or null; its form is checked. Cell data begin with the vertices' cells.
+vtkDataArray* FindArray(
+  vtkDataSetAttributes* data, const std::string& name, int components, vtkIdType tuples)
+{
+  vtkAbstractArray* any = data->GetAbstractArray(name.c_str());
+  if (any == nullptr)
+  {
+    return nullptr;
+  }
+  auto* array = vtkArrayDownCast<vtkDataArray>(any);
+  Require(array != nullptr && array->GetNumberOfComponents() == components &&
+      array->GetNumberOfTuples() >= tuples,
+    "Array '" + name + "' of the posed skeleton has not " + std::to_string(components) +
+      (components == 1 ? " number" : " numbers") + " for each joint or bone");
+  return array;
+}
+
+std::vector<double> ValuesOf(vtkDataArray* array, vtkIdType first, vtkIdType count)
+{
+  std::vector<double> values;
+  for (vtkIdType n = 0; array != nullptr && n < count; ++n)
+  {
+    values.push_back(array->GetComponent(first + n, 0));
+  }
+  return values;
+}
+
+/// Cell data of poly data begin with the vertices.
+vtkIdType FirstLine(vtkPolyData* data)
+{
+  return data->GetNumberOfVerts();
+}
+}
+
+namespace vtkSkeletonForms
+{
+void PoseArrays::Validate() const
+{
+  for (const std::string* name : { &this->rotation, &this->twist, &this->strain, &this->calibre })
+  {
+    Require(!name->empty(), "An array needs a name");
+  }
+}
+
+Skeleton SkeletonOf(vtkPolyData* data, const std::string& whose)
+{
+  Skeleton skeleton;
+  for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
+  {
+    skeleton.joints.emplace_back(data->GetPoint(n));
+  }
+  vtkDataArray* parents = data->GetPointData()->GetArray(vtkCoronaryArrayNames::ParentJoint);
+  vtkCellArray* lines = data->GetLines();
+  for (vtkIdType cell = 0; cell < lines->GetNumberOfCells(); ++cell)
+  {
+    vtkIdType count = 0;
+    const vtkIdType* ids = nullptr;
+    lines->GetCellAtId(cell, count, ids);
+    Require(count == 2,
+      "Line " + std::to_string(cell) + " of " + whose + " has " + std::to_string(count) +
+        " points: a bone has two (vtkCenterlineSkeleton makes bones of centerlines)");
+    Skeleton::Bone bone;
+    bone.first = ids[0];
+    bone.second = ids[1];
+    bone.id = static_cast<int>(cell);
+    if (parents != nullptr && static_cast<vtkIdType>(parents->GetComponent(ids[0], 0)) == ids[1])
+    {
+      std::swap(bone.first, bone.second);
+    }
+    skeleton.bones.push_back(bone);
+  }
+  try
+  {
+    Require(!skeleton.bones.empty(), "no bones: lines of two points");
+    coronary::CheckSkeleton(skeleton);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::invalid_argument("In " + whose + ": " + error.what());
+  }
+  return skeleton;
+}
+
+SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const PoseArrays& names)
+{
+  const Skeleton& rest = rig.Rest();
+  Require(data->GetNumberOfPoints() == rig.NumberOfJoints() &&
+      data->GetNumberOfLines() == rig.NumberOfBones(),
+    "The posed skeleton has " + std::to_string(data->GetNumberOfPoints()) + " joints and " +
+      std::to_string(data->GetNumberOfLines()) + " bones, the rest skeleton " +
+      std::to_string(rig.NumberOfJoints()) + " and " + std::to_string(rig.NumberOfBones()));
+  SkeletonPose pose;
+  for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
+  {
+    pose.joints.emplace_back(data->GetPoint(n));
+  }
+  vtkCellArray* lines = data->GetLines();
+  for (vtkIdType cell = 0; cell < lines->GetNumberOfCells(); ++cell)
+  {
+    vtkIdType count = 0;
+    const vtkIdType* ids = nullptr;
+    lines->GetCellAtId(cell, count, ids);
+    const Skeleton::Bone& bone = rest.bones[cell];
+    Require(count == 2 && bone.first + bone.second == ids[0] + ids[1] &&
+        (ids[0] == bone.first || ids[0] == bone.second),
+      "Bone " + std::to_string(cell) + " of the posed skeleton has other joints than at rest");
+  }
+  const vtkIdType first = FirstLine(data);
+  const vtkIdType bones = rig.NumberOfBones();
+  if (vtkDataArray* rotations = FindArray(data->GetCellData(), names.rotation, 4, first + bones))
+  {
+    for (vtkIdType n = first; n < first + bones; ++n)
+    {
+      pose.rotation.emplace_back(rotations->GetComponent(n, 0), rotations->GetComponent(n, 1),
+        rotations->GetComponent(n, 2), rotations->GetComponent(n, 3));
+    }
+  }
+  pose.twist =
+    ValuesOf(FindArray(data->GetCellData(), names.twist, 1, first + bones), first, bones);
+  pose.calibre = ValuesOf(FindArray(data->GetPointData(), names.calibre, 1, rig.NumberOfJoints()),
+    0, rig.NumberOfJoints());
+  return pose;
+}
+
+void SetPose(vtkPolyData* rest, const SkeletonPose& pose,
+  const std::vector<coronary::BoneTransform>& bones, const PoseArrays& names, vtkPolyData* output)
+{
+  output->ShallowCopy(rest);
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  points->SetNumberOfPoints(static_cast<vtkIdType>(pose.joints.size()));
+  for (std::size_t n = 0; n < pose.joints.size(); ++n)
+  {
+    points->SetPoint(static_cast<vtkIdType>(n), pose.joints[n].data());
+  }
+  output->SetPoints(points);
+  const vtkIdType first = FirstLine(rest);
+  const auto makeArray = [&](const std::string& name, int components)
+  {
+    vtkNew<vtkDoubleArray> array;
+    array->SetName(name.c_str());
+    array->SetNumberOfComponents(components);
+    array->SetNumberOfTuples(rest->GetNumberOfCells());
+    array->Fill(0.0);
+    output->GetCellData()->AddArray(array);
+    return array.Get();
+  };
+  vtkDoubleArray* rotation = makeArray(names.rotation, 4);
+  vtkDoubleArray* twist = makeArray(names.twist, 1);
+  vtkDoubleArray* strain = makeArray(names.strain, 1);
+  for (std::size_t n = 0; n < bones.size(); ++n)
+  {
+    const vtkIdType cell = first + static_cast<vtkIdType>(n);
+    const Quaternion& q = bones[n].rotation;
+    rotation->SetTuple4(cell, q.w(), q.x(), q.y(), q.z());
+    twist->SetValue(cell, bones[n].twist);
+    strain->SetValue(cell, bones[n].stretch - 1.0);
+  }
+  std::vector<double> calibre = pose.calibre;
+  calibre.resize(pose.joints.size(), 1.0);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names.calibre, calibre);
+}
+}

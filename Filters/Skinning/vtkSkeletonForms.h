@@ -1,0 +1,49 @@
+/**
+ * @file vtkSkeletonForms.h
+ * @brief Skeletons and their poses as poly data: points are joints, lines of two points are bones.
+ */
+#ifndef vtkSkeletonForms_h
+#define vtkSkeletonForms_h
+
+#include "SkeletonPose.h"
+
+#include <string>
+#include <vector>
+
+class vtkPolyData;
+
+namespace vtkSkeletonForms
+{
+/// Names of the arrays of a pose.
+struct PoseArrays
+{
+  std::string rotation;
+  std::string twist;
+  std::string strain;
+  std::string calibre;
+
+  /// @throws std::invalid_argument when one of them is empty
+  void Validate() const;
+};
+
+/**
+ * Bones are the lines in their order. `ParentJoint`, where it is there, says which end is on the root's side;
+ * else it is the first one.
+ * @param whose  for messages: "the rest skeleton"
+ * @throws std::invalid_argument: a cell that is no line of two points, as coronary::CheckSkeleton
+ */
+coronary::Skeleton SkeletonOf(vtkPolyData* data, const std::string& whose);
+
+/**
+ * The points, and of the arrays of `names` what is there.
+ * @throws std::invalid_argument: other bones than the rest skeleton's, an array of wrong form
+ */
+coronary::SkeletonPose PoseOf(
+  vtkPolyData* data, const coronary::SkeletonRig& rig, const PoseArrays& names);
+
+/// Makes `output` the skeleton `rest`, posed: its cells and arrays, other points, arrays of the pose.
+void SetPose(vtkPolyData* rest, const coronary::SkeletonPose& pose,
+  const std::vector<coronary::BoneTransform>& bones, const PoseArrays& names, vtkPolyData* output);
+}
+
+#endif

@@ -1,0 +1,216 @@
+#include "vtkSkeletonPose.h"
+
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkCoronaryUpstream.h"
+#include "vtkSkeletonForms.h"
+
+#include "vtkFieldData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkMath.h"
+#include "vtkObjectFactory.h"
+#include "vtkPolyData.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+
+#include <cmath>
+#include <new>
+#include <stdexcept>
+
+namespace names = vtkCoronaryArrayNames;
+using coronary::PoseEdit;
+using coronary::Vector3;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+vtkStandardNewMacro(vtkSkeletonPose);
+
+namespace
+{
+PoseEdit EditOf(const std::array<double, 10>& values)
+{
+  PoseEdit edit;
+  // Not finite: refused as no joint.
+  edit.joint = std::isfinite(values[0]) && std::abs(values[0]) < 1e15
+    ? static_cast<std::int64_t>(std::llround(values[0]))
+    : -1;
+  edit.twist = vtkMath::RadiansFromDegrees(values[1]);
+  const Vector3 turn(vtkMath::RadiansFromDegrees(values[2]), vtkMath::RadiansFromDegrees(values[3]),
+    vtkMath::RadiansFromDegrees(values[4]));
+  const double angle = turn.norm();
+  if (angle != 0.0)
+  {
+    edit.rotation = coronary::Quaternion(Eigen::AngleAxisd(angle, turn / angle));
+  }
+  edit.translation = { values[5], values[6], values[7] };
+  edit.calibre = values[8];
+  edit.reach = values[9];
+  return edit;
+}
+
+bool Connected(vtkInformationVector* input)
+{
+  return input->GetNumberOfInformationObjects() > 0;
+}
+}
+
+vtkSkeletonPose::vtkSkeletonPose()
+  : RotationArrayName(names::BoneRotation)
+  , TwistArrayName(names::BoneTwist)
+  , StrainArrayName(names::AxialStrain)
+  , CalibreArrayName(names::CalibreFactor)
+{
+  this->SetNumberOfInputPorts(2);
+}
+
+void vtkSkeletonPose::AddEdit(double joint, double twist, double rotationX, double rotationY,
+  double rotationZ, double translationX, double translationY, double translationZ, double calibre,
+  double reach)
+{
+  this->Edits.push_back({ joint, twist, rotationX, rotationY, rotationZ, translationX, translationY,
+    translationZ, calibre, reach });
+  this->Modified();
+}
+
+void vtkSkeletonPose::RemoveAllEdits()
+{
+  if (!this->Edits.empty())
+  {
+    this->Edits.clear();
+    this->Modified();
+  }
+}
+
+int vtkSkeletonPose::FillInputPortInformation(int port, vtkInformation* info)
+{
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
+  if (port == 1)
+  {
+    info->Set(INPUT_IS_OPTIONAL(), 1);
+  }
+  return 1;
+}
+
+int vtkSkeletonPose::RequestInformation(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkInformation* outInfo = outputs->GetInformationObject(0);
+  outInfo->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  if (Connected(inputs[1]))
+  {
+    outInfo->CopyEntry(inputs[1]->GetInformationObject(0), SDDP::TIME_STEPS());
+    outInfo->CopyEntry(inputs[1]->GetInformationObject(0), SDDP::TIME_RANGE());
+  }
+  return 1;
+}
+
+int vtkSkeletonPose::RequestUpdateExtent(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
+  return 1;
+}
+
+int vtkSkeletonPose::RequestData(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkPolyData* input = vtkPolyData::GetData(inputs[0], 0);
+  vtkPolyData* output = vtkPolyData::GetData(outputs, 0);
+  vtkPolyData* start = Connected(inputs[1]) ? vtkPolyData::GetData(inputs[1], 0) : nullptr;
+  if (outputs->GetInformationObject(0)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
+  {
+    return 1;
+  }
+  try
+  {
+    const vtkSkeletonForms::PoseArrays arrays{ this->RotationArrayName, this->TwistArrayName,
+      this->StrainArrayName, this->CalibreArrayName };
+    arrays.Validate();
+    if (input->GetNumberOfPoints() == 0)
+    {
+      return 1;
+    }
+    const coronary::SkeletonRig rig(vtkSkeletonForms::SkeletonOf(input, "the skeleton"));
+    coronary::SkeletonPose pose =
+      start ? vtkSkeletonForms::PoseOf(start, rig, arrays) : rig.RestPose();
+    for (std::size_t n = 0; n < this->Edits.size(); ++n)
+    {
+      try
+      {
+        coronary::ApplyPoseEdit(rig, EditOf(this->Edits[n]), pose);
+      }
+      catch (const std::invalid_argument& error)
+      {
+        throw std::invalid_argument("Edit " + std::to_string(n) + " of Edits: " + error.what());
+      }
+    }
+    if (this->MoveJoint)
+    {
+      vtkCoronary::Require(this->Joint >= 0 && this->Joint < rig.NumberOfJoints(),
+        "Joint must be 0 to " + std::to_string(rig.NumberOfJoints() - 1) + ", it is " +
+          std::to_string(this->Joint));
+      PoseEdit edit;
+      edit.joint = this->Joint;
+      const Vector3 wanted(this->JointPosition);
+      vtkCoronary::Require(wanted.allFinite(), "JointPosition must be finite");
+      std::int64_t bone = -1;
+      for (std::int64_t b = 0; b < rig.NumberOfBones(); ++b)
+      {
+        bone = bone < 0 && rig.Rest().bones[b].second == edit.joint ? b : bone;
+      }
+      if (this->MoveMode == TurnBone && bone >= 0)
+      {
+        // About its first joint, with all that is on the bone's far side.
+        const Vector3 head = pose.joints[rig.Rest().bones[bone].first];
+        vtkCoronary::Require((wanted - head).norm() > 0.0,
+          "JointPosition is that of the joint before: the bone would lose its length");
+        edit.rotation = coronary::LeastRotation(pose.joints[edit.joint] - head, wanted - head);
+      }
+      edit.translation = wanted - pose.joints[edit.joint];
+      edit.alone = this->MoveMode == MoveAlone;
+      coronary::ApplyPoseEdit(rig, edit, pose);
+    }
+    std::vector<coronary::BoneTransform> bones;
+    rig.Transform(pose, bones);
+    vtkSkeletonForms::SetPose(input, pose, bones, arrays, output);
+    if (start)
+    {
+      output->GetFieldData()->PassData(start->GetFieldData());
+    }
+    this->UpdateProgress(1.0);
+    return 1;
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorMacro("Not enough memory for the pose");
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< error.what());
+  }
+  output->Initialize();
+  return 0;
+}
+
+void vtkSkeletonPose::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Edits: " << this->Edits.size() << '\n';
+  for (const std::array<double, 10>& edit : this->Edits)
+  {
+    os << indent.GetNextIndent();
+    for (const double value : edit)
+    {
+      os << value << ' ';
+    }
+    os << '\n';
+  }
+  os << indent << "MoveJoint: " << this->MoveJoint << '\n';
+  os << indent << "Joint: " << this->Joint << '\n';
+  os << indent << "JointPosition: " << this->JointPosition[0] << ' ' << this->JointPosition[1]
+     << ' ' << this->JointPosition[2] << '\n';
+  os << indent << "MoveMode: " << this->MoveMode << '\n';
+  os << indent << "RotationArrayName: " << this->RotationArrayName << '\n';
+  os << indent << "TwistArrayName: " << this->TwistArrayName << '\n';
+  os << indent << "StrainArrayName: " << this->StrainArrayName << '\n';
+  os << indent << "CalibreArrayName: " << this->CalibreArrayName << '\n';
+}

@@ -1,0 +1,541 @@
+#include "vtkSkinDeformation.h"
+
+#include "SkinDeformation.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkCoronaryUpstream.h"
+#include "vtkSkeletonForms.h"
+
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkCellType.h"
+#include "vtkCompositeDataIterator.h"
+#include "vtkCompositeDataSet.h"
+#include "vtkDataArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkFloatArray.h"
+#include "vtkIdTypeArray.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPointSet.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkUnstructuredGrid.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <list>
+#include <new>
+#include <stdexcept>
+#include <type_traits>
+#include <vector>
+
+namespace names = vtkCoronaryArrayNames;
+using coronary::Vector3;
+using vtkCoronary::Moment;
+using vtkCoronary::Require;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+namespace
+{
+/// Blocks of a composite mesh that are remembered.
+constexpr std::size_t RememberedSetups = 32;
+
+/// What a setup was made of: the objects are kept, so that their addresses stay their own.
+struct Origin
+{
+  std::vector<vtkSmartPointer<vtkObject>> objects;
+  std::vector<vtkMTimeType> times;
+  std::array<int, 2> settings{};
+
+  void Add(vtkObject* object)
+  {
+    this->objects.emplace_back(object);
+    this->times.push_back(object ? object->GetMTime() : 0);
+  }
+
+  bool operator==(const Origin& other) const
+  {
+    return this->settings == other.settings && this->objects == other.objects &&
+      this->times == other.times;
+  }
+};
+
+/// One mesh at rest with its weights.
+struct Setup
+{
+  Origin origin;
+  std::unique_ptr<coronary::SkinDeformation> skin;
+  bool hasTriangles = false;
+  bool hasTetrahedra = false;
+  std::vector<vtkIdType> cells; ///< of the tetrahedra
+  coronary::InversionReport report;
+  std::vector<coronary::BoneTransform> bones;
+};
+
+vtkDataArray* WeightArray(vtkPointSet* mesh, const std::string& name)
+{
+  auto* any = mesh->GetPointData()->GetAbstractArray(name.c_str());
+  Require(any != nullptr, "The mesh has no point array '" + name + "': weights of its bones");
+  auto* array = vtkArrayDownCast<vtkDataArray>(any);
+  Require(array != nullptr && array->GetNumberOfTuples() == mesh->GetNumberOfPoints(),
+    "Point array '" + name + "' of the mesh has not numbers for every point");
+  return array;
+}
+
+coronary::CompactSkinWeights WeightsOf(
+  vtkPointSet* mesh, const std::string& indicesName, const std::string& weightsName)
+{
+  vtkDataArray* indices = WeightArray(mesh, indicesName);
+  vtkDataArray* weights = WeightArray(mesh, weightsName);
+  Require(indices->GetNumberOfComponents() == weights->GetNumberOfComponents(),
+    "Point array '" + indicesName + "' has " + std::to_string(indices->GetNumberOfComponents()) +
+      " components, '" + weightsName + "' has " + std::to_string(weights->GetNumberOfComponents()));
+  coronary::CompactSkinWeights compact;
+  compact.influences = weights->GetNumberOfComponents();
+  const auto size = static_cast<std::size_t>(mesh->GetNumberOfPoints()) * compact.influences;
+  compact.bone.reserve(size);
+  compact.weight.reserve(size);
+  for (vtkIdType n = 0; n < mesh->GetNumberOfPoints(); ++n)
+  {
+    for (int c = 0; c < compact.influences; ++c)
+    {
+      const double index = indices->GetComponent(n, c);
+      // No bone, where an index is no number: the algorithm says of which point.
+      compact.bone.push_back(
+        std::abs(index) < 1e9 ? static_cast<std::int32_t>(index) : std::int32_t{ -1 });
+      compact.weight.push_back(static_cast<float>(weights->GetComponent(n, c)));
+    }
+  }
+  return compact;
+}
+
+std::vector<coronary::Triangle> TrianglesOf(vtkPolyData* surface)
+{
+  std::vector<coronary::Triangle> triangles;
+  vtkIdType count = 0;
+  const vtkIdType* ids = nullptr;
+  for (vtkIdType cell = 0; cell < surface->GetNumberOfPolys(); ++cell)
+  {
+    surface->GetPolys()->GetCellAtId(cell, count, ids);
+    for (vtkIdType i = 2; i < count; ++i)
+    {
+      triangles.push_back({ ids[0], ids[i - 1], ids[i] });
+    }
+  }
+  for (vtkIdType cell = 0; cell < surface->GetNumberOfStrips(); ++cell)
+  {
+    surface->GetStrips()->GetCellAtId(cell, count, ids);
+    for (vtkIdType i = 2; i < count; ++i)
+    {
+      const vtkIdType odd = i % 2;
+      triangles.push_back({ ids[i - 2 + odd], ids[i - 1 - odd], ids[i] });
+    }
+  }
+  return triangles;
+}
+
+std::vector<std::array<std::int64_t, 4>> TetrahedraOf(
+  vtkUnstructuredGrid* grid, std::vector<vtkIdType>& cells)
+{
+  std::vector<std::array<std::int64_t, 4>> tetrahedra;
+  for (vtkIdType cell = 0; cell < grid->GetNumberOfCells(); ++cell)
+  {
+    if (grid->GetCellType(cell) == VTK_TETRA)
+    {
+      vtkIdType count = 0;
+      const vtkIdType* ids = nullptr;
+      grid->GetCells()->GetCellAtId(cell, count, ids);
+      tetrahedra.push_back({ ids[0], ids[1], ids[2], ids[3] });
+      cells.push_back(cell);
+    }
+  }
+  return tetrahedra;
+}
+
+/// The times before and after one, between which the velocity is taken.
+bool TimesAround(vtkInformation* inInfo, double time, double& before, double& after)
+{
+  const int count = inInfo->Has(SDDP::TIME_STEPS()) ? inInfo->Length(SDDP::TIME_STEPS()) : 0;
+  if (count > 1)
+  {
+    const double* steps = inInfo->Get(SDDP::TIME_STEPS());
+    int nearest = 0;
+    for (int n = 1; n < count; ++n)
+    {
+      nearest = std::abs(steps[n] - time) < std::abs(steps[nearest] - time) ? n : nearest;
+    }
+    before = steps[std::max(0, nearest - 1)];
+    after = steps[std::min(count - 1, nearest + 1)];
+    return after != before;
+  }
+  if (count == 0 && inInfo->Has(SDDP::TIME_RANGE()))
+  {
+    const double* range = inInfo->Get(SDDP::TIME_RANGE());
+    const double step = 0.01 * (range[1] - range[0]);
+    before = std::max(range[0], time - step);
+    after = std::min(range[1], time + step);
+    return after != before;
+  }
+  return false;
+}
+}
+
+struct vtkSkinDeformation::Internals
+{
+  std::list<Setup> Setups; ///< the one that was used last comes first
+  int NumberOfSetups = 0;
+
+  Setup& Of(vtkSkinDeformation* self, vtkPointSet* mesh, vtkPolyData* rest);
+};
+
+Setup& vtkSkinDeformation::Internals::Of(
+  vtkSkinDeformation* self, vtkPointSet* mesh, vtkPolyData* rest)
+{
+  auto* surface = vtkPolyData::SafeDownCast(mesh);
+  auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh);
+  Origin origin;
+  origin.settings = { self->Blend, self->Stretch ? 1 : 0 };
+  origin.Add(mesh->GetPoints());
+  origin.Add(WeightArray(mesh, self->IndicesArrayName));
+  origin.Add(WeightArray(mesh, self->WeightsArrayName));
+  origin.Add(rest->GetPoints());
+  origin.Add(rest->GetLines());
+  origin.Add(rest->GetPointData()->GetAbstractArray(names::ParentJoint));
+  origin.Add(grid ? grid->GetCells() : nullptr);
+  origin.Add(surface ? surface->GetPolys() : nullptr);
+  origin.Add(surface ? surface->GetStrips() : nullptr);
+  auto found = std::find_if(this->Setups.begin(), this->Setups.end(),
+    [&](const Setup& setup) { return setup.origin == origin; });
+  if (found == this->Setups.end())
+  {
+    Setup setup;
+    setup.origin = origin;
+    std::vector<Vector3> points;
+    points.reserve(mesh->GetNumberOfPoints());
+    for (vtkIdType n = 0; n < mesh->GetNumberOfPoints(); ++n)
+    {
+      points.emplace_back(mesh->GetPoint(n));
+    }
+    coronary::SkinDeformationSettings settings;
+    settings.blend = static_cast<coronary::SkinBlend>(self->Blend);
+    settings.stretch = self->Stretch;
+    setup.skin = std::make_unique<coronary::SkinDeformation>(points,
+      WeightsOf(mesh, self->IndicesArrayName, self->WeightsArrayName),
+      vtkSkeletonForms::SkeletonOf(rest, "the skeleton at rest"), settings);
+    this->Setups.push_front(std::move(setup));
+    ++this->NumberOfSetups;
+    if (this->Setups.size() > RememberedSetups)
+    {
+      this->Setups.pop_back();
+    }
+  }
+  else
+  {
+    this->Setups.splice(this->Setups.begin(), this->Setups, found);
+  }
+  Setup& setup = this->Setups.front();
+  if (surface && self->ComputeNormals && !setup.hasTriangles)
+  {
+    setup.skin->SetTriangles(TrianglesOf(surface));
+    setup.hasTriangles = true;
+  }
+  if (grid && self->Tetrahedra != IgnoreTetrahedra && !setup.hasTetrahedra)
+  {
+    setup.cells.clear();
+    setup.skin->SetTetrahedra(TetrahedraOf(grid, setup.cells));
+    setup.hasTetrahedra = true;
+  }
+  return setup;
+}
+
+vtkStandardNewMacro(vtkSkinDeformation);
+
+vtkSkinDeformation::vtkSkinDeformation()
+  : IndicesArrayName(names::BoneIndices)
+  , WeightsArrayName(names::BoneWeightsCompact)
+  , RotationArrayName(names::BoneRotation)
+  , TwistArrayName(names::BoneTwist)
+  , CalibreArrayName(names::CalibreFactor)
+  , DisplacementArrayName(names::Displacement)
+  , VelocityArrayName(names::Velocity)
+  , Data(new Internals)
+{
+  this->SetNumberOfInputPorts(3);
+}
+
+vtkSkinDeformation::~vtkSkinDeformation() = default;
+
+int vtkSkinDeformation::GetNumberOfSetups() const
+{
+  return this->Data->NumberOfSetups;
+}
+
+int vtkSkinDeformation::FillInputPortInformation(int port, vtkInformation* info)
+{
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), port == 0 ? "vtkPointSet" : "vtkPolyData");
+  if (port == 0)
+  {
+    // Not left to the executive: after its loop over blocks it forgets the time of the pose.
+    info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkCompositeDataSet");
+  }
+  return 1;
+}
+
+int vtkSkinDeformation::RequestInformation(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkInformation* outInfo = outputs->GetInformationObject(0);
+  vtkInformation* pose = inputs[2]->GetInformationObject(0);
+  // The mesh is that at rest, whatever its time: only the pose moves.
+  outInfo->Remove(SDDP::TIME_STEPS());
+  outInfo->Remove(SDDP::TIME_RANGE());
+  outInfo->CopyEntry(pose, SDDP::TIME_STEPS());
+  outInfo->CopyEntry(pose, SDDP::TIME_RANGE());
+  return 1;
+}
+
+int vtkSkinDeformation::RequestUpdateExtent(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*)
+{
+  // Every piece of the mesh needs the whole skeleton.
+  for (const int port : { 1, 2 })
+  {
+    vtkInformation* info = inputs[port]->GetInformationObject(0);
+    info->Set(SDDP::UPDATE_PIECE_NUMBER(), 0);
+    info->Set(SDDP::UPDATE_NUMBER_OF_PIECES(), 1);
+    info->Set(SDDP::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+  }
+  return 1;
+}
+
+template <typename Array>
+void vtkSkinDeformation::Execute(
+  vtkPointSet* mesh, vtkInformationVector** inputs, vtkPointSet* output)
+{
+  vtkPolyData* rest = vtkPolyData::GetData(inputs[1], 0);
+  vtkInformation* poseInfo = inputs[2]->GetInformationObject(0);
+  const vtkIdType count = mesh->GetNumberOfPoints();
+  Setup& setup = this->Data->Of(this, mesh, rest);
+  coronary::SkinDeformation& skin = *setup.skin;
+  const vtkSkeletonForms::PoseArrays arrays{ this->RotationArrayName, this->TwistArrayName,
+    names::AxialStrain, this->CalibreArrayName };
+  arrays.Validate();
+
+  const auto makeArray = [&](const char* name)
+  {
+    auto array = vtkSmartPointer<Array>::New();
+    array->SetName(name);
+    array->SetNumberOfComponents(3);
+    array->SetNumberOfTuples(count);
+    return array;
+  };
+  const auto deform = [&](vtkPolyData* pose, Array* positions)
+  {
+    skin.Rig().Transform(vtkSkeletonForms::PoseOf(pose, skin.Rig(), arrays), setup.bones);
+    skin.Rig().ConserveVolume(this->VolumeConservation, setup.bones);
+    skin.Deform(setup.bones, positions->GetPointer(0));
+  };
+
+  vtkSmartPointer<Array> velocity;
+  if (this->ComputeVelocity)
+  {
+    Moment moment;
+    moment.exists = true;
+    moment.time =
+      poseInfo->Has(SDDP::UPDATE_TIME_STEP()) ? poseInfo->Get(SDDP::UPDATE_TIME_STEP()) : 0.0;
+    Moment before{ true, 0.0 };
+    Moment after{ true, 0.0 };
+    if (TimesAround(poseInfo, moment.time, before.time, after.time))
+    {
+      vtkPolyData* pose = vtkPolyData::GetData(inputs[2], 0);
+      vtkDataArray* cycle = pose->GetFieldData()->GetArray(names::CycleLength);
+      const double seconds = (after.time - before.time) *
+        (cycle && cycle->GetNumberOfValues() > 0 ? cycle->GetComponent(0, 0) : 1.0);
+      const auto earlier = makeArray(nullptr);
+      velocity = makeArray(this->VelocityArrayName.c_str());
+      vtkCoronary::UpstreamRequest request(poseInfo, poseInfo);
+      request.Ask(nullptr, before);
+      deform(vtkPolyData::GetData(inputs[2], 0), earlier);
+      request.Ask(nullptr, after);
+      deform(vtkPolyData::GetData(inputs[2], 0), velocity);
+      request.Restore();
+      coronary::SkinVelocities(velocity->GetPointer(0), earlier->GetPointer(0), seconds, 3 * count,
+        velocity->GetPointer(0));
+    }
+    else
+    {
+      vtkWarningMacro("The pose has no times around this one: no velocity");
+    }
+  }
+
+  vtkPolyData* pose = vtkPolyData::GetData(inputs[2], 0);
+  const auto positions = makeArray("Points");
+  deform(pose, positions);
+  output->ShallowCopy(mesh);
+  vtkNew<vtkPoints> points;
+  points->SetData(positions);
+  output->SetPoints(points);
+  for (vtkDataSetAttributes* attributes :
+    { static_cast<vtkDataSetAttributes*>(output->GetPointData()),
+      static_cast<vtkDataSetAttributes*>(output->GetCellData()) })
+  {
+    if (attributes->GetNormals() != nullptr)
+    {
+      const std::string name =
+        attributes->GetNormals()->GetName() ? attributes->GetNormals()->GetName() : "";
+      attributes->SetNormals(nullptr);
+      attributes->RemoveArray(name.c_str());
+    }
+  }
+  output->GetFieldData()->PassData(pose->GetFieldData());
+
+  if (setup.hasTetrahedra && this->Tetrahedra != IgnoreTetrahedra)
+  {
+    if (this->Tetrahedra == RepairTetrahedra)
+    {
+      skin.RepairTetrahedra(positions->GetPointer(0), setup.report, this->LeastVolumeRatio);
+    }
+    else
+    {
+      skin.CheckTetrahedra(positions->GetPointer(0), setup.report, this->LeastVolumeRatio);
+    }
+    const coronary::InversionReport& report = setup.report;
+    vtkNew<vtkDoubleArray> ratios;
+    ratios->SetName(names::VolumeRatio);
+    ratios->SetNumberOfValues(mesh->GetNumberOfCells());
+    ratios->Fill(std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t n = 0; n < setup.cells.size(); ++n)
+    {
+      ratios->SetValue(setup.cells[n], skin.VolumeRatios()[n]);
+    }
+    output->GetCellData()->AddArray(ratios);
+    std::vector<vtkIdType> left;
+    for (const std::int64_t n : report.tetrahedra)
+    {
+      left.push_back(setup.cells[n]);
+    }
+    vtkCoronary::AddArray<vtkIdTypeArray>(output->GetFieldData(), names::InvertedTetrahedra, left);
+    const auto gone = static_cast<vtkIdType>(report.found) - static_cast<vtkIdType>(left.size());
+    vtkCoronary::AddArray<vtkIdTypeArray>(output->GetFieldData(), names::RepairedTetrahedra,
+      std::vector<vtkIdType>{ std::max<vtkIdType>(0, gone) });
+    if (!left.empty())
+    {
+      vtkWarningMacro(<< left.size() << " tetrahedra are inverted, the first one is cell "
+                      << left[0] << ": see the field array InvertedTetrahedra");
+    }
+  }
+  const auto displacement = makeArray(this->DisplacementArrayName.c_str());
+  skin.Displacements(positions->GetPointer(0), displacement->GetPointer(0));
+  output->GetPointData()->AddArray(displacement);
+  if (velocity)
+  {
+    output->GetPointData()->AddArray(velocity);
+  }
+  if (this->ComputeNormals && setup.hasTriangles)
+  {
+    const auto normals = makeArray("Normals");
+    skin.NormalsOf(positions->GetPointer(0), normals->GetPointer(0));
+    output->GetPointData()->SetNormals(normals);
+  }
+}
+
+void vtkSkinDeformation::Execute(
+  vtkDataObject* mesh, vtkInformationVector** inputs, vtkDataObject* output)
+{
+  auto* points = vtkPointSet::SafeDownCast(mesh);
+  if (points == nullptr || points->GetNumberOfPoints() == 0)
+  {
+    output->ShallowCopy(mesh);
+  }
+  else if (this->DoublePrecision)
+  {
+    this->Execute<vtkDoubleArray>(points, inputs, vtkPointSet::SafeDownCast(output));
+  }
+  else
+  {
+    this->Execute<vtkFloatArray>(points, inputs, vtkPointSet::SafeDownCast(output));
+  }
+}
+
+int vtkSkinDeformation::RequestData(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkDataObject* mesh = vtkDataObject::GetData(inputs[0], 0);
+  vtkDataObject* output = vtkDataObject::GetData(outputs, 0);
+  try
+  {
+    Require(this->VolumeConservation >= 0.0 && this->VolumeConservation <= 1.0,
+      "VolumeConservation must be 0 to 1");
+    Require(this->LeastVolumeRatio >= 0.0 && this->LeastVolumeRatio <= 0.5,
+      "LeastVolumeRatio must be 0 to 0.5");
+    for (const std::string* name : { &this->DisplacementArrayName, &this->VelocityArrayName })
+    {
+      Require(!name->empty(), "An output array needs a name");
+    }
+    if (auto* blocks = vtkCompositeDataSet::SafeDownCast(mesh))
+    {
+      auto* moved = vtkCompositeDataSet::SafeDownCast(output);
+      moved->CopyStructure(blocks);
+      moved->GetFieldData()->PassData(blocks->GetFieldData());
+      const auto leaf = vtkSmartPointer<vtkCompositeDataIterator>::Take(blocks->NewIterator());
+      for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem())
+      {
+        vtkDataObject* block = leaf->GetCurrentDataObject();
+        const auto result = vtkSmartPointer<vtkDataObject>::Take(block->NewInstance());
+        this->Execute(block, inputs, result);
+        moved->SetDataSet(leaf, result);
+      }
+    }
+    else
+    {
+      this->Execute(mesh, inputs, output);
+    }
+    vtkDataObject* pose = vtkDataObject::GetData(inputs[2], 0);
+    if (pose->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
+    {
+      output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(),
+        pose->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP()));
+    }
+    this->UpdateProgress(1.0);
+    return 1;
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorMacro("Not enough memory for the deformation");
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< error.what());
+  }
+  output->Initialize();
+  return 0;
+}
+
+void vtkSkinDeformation::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Blend: " << this->Blend << '\n';
+  os << indent << "Stretch: " << this->Stretch << '\n';
+  os << indent << "VolumeConservation: " << this->VolumeConservation << '\n';
+  os << indent << "DoublePrecision: " << this->DoublePrecision << '\n';
+  os << indent << "ComputeVelocity: " << this->ComputeVelocity << '\n';
+  os << indent << "ComputeNormals: " << this->ComputeNormals << '\n';
+  os << indent << "Tetrahedra: " << this->Tetrahedra << '\n';
+  os << indent << "LeastVolumeRatio: " << this->LeastVolumeRatio << '\n';
+  os << indent << "IndicesArrayName: " << this->IndicesArrayName << '\n';
+  os << indent << "WeightsArrayName: " << this->WeightsArrayName << '\n';
+  os << indent << "RotationArrayName: " << this->RotationArrayName << '\n';
+  os << indent << "TwistArrayName: " << this->TwistArrayName << '\n';
+  os << indent << "CalibreArrayName: " << this->CalibreArrayName << '\n';
+  os << indent << "DisplacementArrayName: " << this->DisplacementArrayName << '\n';
+  os << indent << "VelocityArrayName: " << this->VelocityArrayName << '\n';
+}

@@ -1,0 +1,187 @@
+/**
+ * @file SkeletonTestData.h
+ * @brief Skeletons and meshes that hang on them as VTK data, for the tests of posing and deformation.
+ */
+#ifndef DynamicCoronary_SkeletonTestData_h
+#define DynamicCoronary_SkeletonTestData_h
+
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkFloatArray.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkPolyDataAlgorithm.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+/// A chain of bones of 5 mm along z.
+inline vtkSmartPointer<vtkPolyData> ChainSkeleton(int bones)
+{
+  auto chain = vtkSmartPointer<vtkPolyData>::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> lines;
+  vtkNew<vtkIntArray> ids;
+  ids->SetName("BoneId");
+  for (vtkIdType j = 0; j <= bones; ++j)
+  {
+    points->InsertNextPoint(0.0, 0.0, 5.0 * static_cast<double>(j));
+    if (j > 0)
+    {
+      const vtkIdType ends[2] = { j - 1, j };
+      lines->InsertNextCell(2, ends);
+      ids->InsertNextValue(static_cast<int>(j) - 1);
+    }
+  }
+  chain->SetPoints(points);
+  chain->SetLines(lines);
+  chain->GetCellData()->AddArray(ids);
+  return chain;
+}
+
+/// Gives every point the bone of the chain beside it, and the next one where it is near to a joint.
+inline void HangOnChain(vtkPointSet* mesh, int bones)
+{
+  vtkNew<vtkIntArray> indices;
+  indices->SetName("BoneIndices");
+  indices->SetNumberOfComponents(2);
+  vtkNew<vtkFloatArray> weights;
+  weights->SetName("BoneWeightsCompact");
+  weights->SetNumberOfComponents(2);
+  for (vtkIdType n = 0; n < mesh->GetNumberOfPoints(); ++n)
+  {
+    const double at = mesh->GetPoint(n)[2] / 5.0;
+    const int bone = std::clamp(static_cast<int>(std::floor(at)), 0, bones - 1);
+    const int other = at - bone < 0.5 ? bone - 1 : bone + 1;
+    const bool exists = other >= 0 && other < bones;
+    const double share = exists ? std::abs(at - bone - 0.5) : 0.0;
+    indices->InsertNextTuple2(bone, exists ? other : -1);
+    weights->InsertNextTuple2(1.0 - share, share);
+  }
+  mesh->GetPointData()->AddArray(indices);
+  mesh->GetPointData()->AddArray(weights);
+}
+
+/// A tube of triangles around the chain, with normals, weights and an array of its own.
+inline vtkSmartPointer<vtkPolyData> ChainTube(int bones, double radius)
+{
+  auto tube = vtkSmartPointer<vtkPolyData>::New();
+  vtkNew<vtkPoints> points;
+  vtkNew<vtkCellArray> polys;
+  vtkNew<vtkFloatArray> normals;
+  normals->SetName("Normals");
+  normals->SetNumberOfComponents(3);
+  vtkNew<vtkIntArray> rings;
+  rings->SetName("Ring");
+  const int around = 16;
+  const int along = 10 * bones;
+  for (int k = 0; k <= along; ++k)
+  {
+    for (int n = 0; n < around; ++n)
+    {
+      const double angle = 2.0 * 3.14159265358979 * n / around;
+      points->InsertNextPoint(radius * std::cos(angle), radius * std::sin(angle), 0.5 * k);
+      normals->InsertNextTuple3(std::cos(angle), std::sin(angle), 0.0);
+      rings->InsertNextValue(k);
+      if (k > 0)
+      {
+        const vtkIdType a = (k - 1) * around + n;
+        const vtkIdType b = (k - 1) * around + (n + 1) % around;
+        const vtkIdType lower[3] = { a, b, b + around };
+        const vtkIdType upper[3] = { a, b + around, a + around };
+        polys->InsertNextCell(3, lower);
+        polys->InsertNextCell(3, upper);
+      }
+    }
+  }
+  tube->SetPoints(points);
+  tube->SetPolys(polys);
+  tube->GetPointData()->SetNormals(normals);
+  tube->GetPointData()->AddArray(rings);
+  HangOnChain(tube, bones);
+  return tube;
+}
+
+/// The chain bent to a circle's arc: curvature = 0.1 t per mm at time t, steps 0, 0.1 .. 1.
+class BendingChain : public vtkPolyDataAlgorithm
+{
+public:
+  static BendingChain* New();
+  vtkTypeMacro(BendingChain, vtkPolyDataAlgorithm);
+
+  int Bones = 4;
+  bool Continuous = false;
+  int Executions = 0;
+
+  static std::array<double, 3> Bent(double z, double time)
+  {
+    const double curvature = 0.1 * time;
+    if (curvature == 0.0)
+    {
+      return { 0.0, 0.0, z };
+    }
+    return { (1.0 - std::cos(curvature * z)) / curvature, 0.0,
+      std::sin(curvature * z) / curvature };
+  }
+
+protected:
+  BendingChain() { this->SetNumberOfInputPorts(0); }
+
+  int RequestInformation(
+    vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
+  {
+    vtkInformation* info = outputs->GetInformationObject(0);
+    const double range[2] = { 0.0, 1.0 };
+    info->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
+    if (!this->Continuous)
+    {
+      std::vector<double> steps;
+      for (int n = 0; n <= 10; ++n)
+      {
+        steps.push_back(0.1 * n);
+      }
+      info->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), steps.data(), 11);
+    }
+    return 1;
+  }
+
+  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
+  {
+    ++this->Executions;
+    vtkInformation* info = outputs->GetInformationObject(0);
+    vtkPolyData* output = vtkPolyData::GetData(info);
+    const double time = info->Has(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())
+      ? info->Get(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())
+      : 0.0;
+    output->ShallowCopy(ChainSkeleton(this->Bones));
+    vtkNew<vtkPoints> points;
+    points->SetDataTypeToDouble();
+    for (int j = 0; j <= this->Bones; ++j)
+    {
+      points->InsertNextPoint(Bent(5.0 * j, time).data());
+    }
+    output->SetPoints(points);
+    vtkNew<vtkDoubleArray> cycle;
+    cycle->SetName("CycleLength");
+    cycle->InsertNextValue(0.8);
+    output->GetFieldData()->AddArray(cycle);
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+    return 1;
+  }
+};
+vtkStandardNewMacro(BendingChain);
+
+#endif

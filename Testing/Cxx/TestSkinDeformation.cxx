@@ -1,0 +1,409 @@
+// vtkSkinDeformation through the VTK pipeline: data types, time, what is shared, refusals.
+
+#include "vtkSkinDeformation.h"
+
+#include "FilterMessages.h"
+#include "SkeletonTestData.h"
+#include "TetrahedronTestMeshes.h"
+
+#include "vtkDataArray.h"
+#include "vtkIdTypeArray.h"
+#include "vtkMultiBlockDataSet.h"
+#include "vtkObjectFactory.h"
+#include "vtkStructuredGrid.h"
+#include "vtkTrivialProducer.h"
+#include "vtkUnstructuredGrid.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace
+{
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+vtkPointSet* Output(vtkSkinDeformation* filter)
+{
+  return vtkPointSet::SafeDownCast(filter->GetOutputDataObject(0));
+}
+
+vtkSmartPointer<vtkPolyData> Moved(int bones, const std::function<void(vtkIdType, double*)>& move)
+{
+  auto pose = ChainSkeleton(bones);
+  for (vtkIdType j = 0; j <= bones; ++j)
+  {
+    double point[3];
+    pose->GetPoint(j, point);
+    move(j, point);
+    pose->GetPoints()->SetPoint(j, point);
+  }
+  return pose;
+}
+
+vtkSmartPointer<vtkUnstructuredGrid> Bar(int half)
+{
+  const coronary::SkinWeightInput bar = coronary::MeshOfCells(
+    { -half, -4, 0 }, { half, 4, 20 }, 0.5, [](const coronary::Vector3&) { return true; });
+  auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const coronary::Vector3& point : bar.points)
+  {
+    points->InsertNextPoint(point.data());
+  }
+  grid->SetPoints(points);
+  const vtkIdType vertex = 0;
+  grid->InsertNextCell(VTK_VERTEX, 1, &vertex); // ids of cells are not those of tetrahedra
+  for (const auto& tetrahedron : bar.tetrahedra)
+  {
+    const vtkIdType ids[4] = { tetrahedron[0], tetrahedron[1], tetrahedron[2], tetrahedron[3] };
+    grid->InsertNextCell(VTK_TETRA, 4, ids);
+  }
+  HangOnChain(grid, 2);
+  return grid;
+}
+
+vtkSmartPointer<vtkPolyData> Folded(double angle)
+{
+  return Moved(2,
+    [&](vtkIdType j, double* point)
+    {
+      if (j == 2)
+      {
+        point[0] = 5.0 * std::sin(angle);
+        point[2] = 5.0 + 5.0 * std::cos(angle);
+      }
+    });
+}
+}
+
+TEST(SkinDeformation, SharesWhatDoesNotChange)
+{
+  const auto tube = ChainTube(4, 1.0);
+  vtkNew<vtkSkinDeformation> filter;
+  filter->SetInputData(0, tube);
+  filter->SetInputData(1, ChainSkeleton(4));
+  filter->SetInputData(2, Moved(4, [](vtkIdType, double* p) { p[0] += 3.0; }));
+  filter->Update();
+  auto* output = vtkPolyData::SafeDownCast(Output(filter));
+  ASSERT_NE(output, nullptr);
+  EXPECT_EQ(output->GetPolys(), tube->GetPolys());
+  EXPECT_EQ(output->GetPointData()->GetArray("Ring"), tube->GetPointData()->GetArray("Ring"));
+  EXPECT_NE(output->GetPoints(), tube->GetPoints());
+  EXPECT_EQ(output->GetPoints()->GetDataType(), VTK_FLOAT);
+  EXPECT_EQ(output->GetPointData()->GetArray("Normals"), nullptr); // they would be wrong
+  EXPECT_NE(tube->GetPointData()->GetNormals(), nullptr);
+  EXPECT_EQ(tube->GetPointData()->GetNumberOfArrays(), 4);
+  vtkDataArray* displacement = output->GetPointData()->GetArray("Displacement");
+  ASSERT_NE(displacement, nullptr);
+  EXPECT_EQ(output->GetPointData()->GetArray("Velocity"), nullptr);
+  for (vtkIdType n = 0; n < output->GetNumberOfPoints(); ++n)
+  {
+    EXPECT_NEAR(displacement->GetComponent(n, 0), 3.0, 1e-5);
+    EXPECT_NEAR(output->GetPoint(n)[0], tube->GetPoint(n)[0] + 3.0, 1e-5);
+    EXPECT_NEAR(output->GetPoint(n)[2], tube->GetPoint(n)[2], 1e-5);
+  }
+  filter->DoublePrecisionOn();
+  filter->Update();
+  EXPECT_EQ(Output(filter)->GetPoints()->GetDataType(), VTK_DOUBLE);
+  EXPECT_NEAR(Output(filter)->GetPoint(5)[0], tube->GetPoint(5)[0] + 3.0, 1e-12);
+}
+
+TEST(SkinDeformation, FollowsTheTimeOfThePoseWithOneSetup)
+{
+  vtkNew<BendingChain> motion;
+  vtkNew<vtkSkinDeformation> filter;
+  const auto tube = ChainTube(4, 1.0);
+  filter->SetInputData(0, tube);
+  filter->SetInputData(1, ChainSkeleton(4));
+  filter->SetPoseConnection(motion->GetOutputPort());
+  filter->SetBlend(vtkSkinDeformation::DualQuaternion);
+  filter->UpdateInformation();
+  vtkInformation* info = filter->GetOutputInformation(0);
+  ASSERT_EQ(info->Length(SDDP::TIME_STEPS()), 11);
+  for (const double time : { 0.0, 0.3, 0.5, 0.3 })
+  {
+    filter->UpdateTimeStep(time);
+    EXPECT_EQ(Output(filter)->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP()), time);
+    // The axis follows the arc: of bones of 5 mm with the sagitta of a chord.
+    for (int k = 0; k <= 40; ++k)
+    {
+      double middle[3] = { 0.0, 0.0, 0.0 };
+      for (int n = 0; n < 16; ++n)
+      {
+        for (int c = 0; c < 3; ++c)
+        {
+          middle[c] += Output(filter)->GetPoint(16 * k + n)[c] / 16.0;
+        }
+      }
+      const std::array<double, 3> wanted = BendingChain::Bent(0.5 * k, time);
+      const double off = std::hypot(middle[0] - wanted[0], middle[2] - wanted[2]);
+      EXPECT_LT(off, 0.05 + 0.1 * time * 25.0 / 8.0) << k;
+    }
+  }
+  EXPECT_EQ(filter->GetNumberOfSetups(), 1);
+  EXPECT_EQ(motion->Executions, 4);
+  // Other weights, another setup.
+  tube->GetPointData()->GetArray("BoneWeightsCompact")->Modified();
+  tube->Modified();
+  filter->UpdateTimeStep(0.3);
+  EXPECT_EQ(filter->GetNumberOfSetups(), 2);
+}
+
+TEST(SkinDeformation, VelocityIsTheDerivativeInSeconds)
+{
+  for (const bool continuous : { false, true })
+  {
+    vtkNew<BendingChain> motion;
+    motion->Continuous = continuous;
+    vtkNew<vtkSkinDeformation> filter;
+    filter->SetInputData(0, ChainTube(4, 0.5));
+    filter->SetInputData(1, ChainSkeleton(4));
+    filter->SetPoseConnection(motion->GetOutputPort());
+    filter->ComputeVelocityOn();
+    filter->UpdateTimeStep(0.4);
+    vtkDataArray* velocity = Output(filter)->GetPointData()->GetArray("Velocity");
+    ASSERT_NE(velocity, nullptr);
+    // The end of the tube, where its middle is that of the last joint; the cycle takes 0.8 s.
+    const double step = continuous ? 0.01 : 0.1;
+    const std::array<double, 3> before = BendingChain::Bent(20.0, 0.4 - step);
+    const std::array<double, 3> after = BendingChain::Bent(20.0, 0.4 + step);
+    double middle[3] = { 0.0, 0.0, 0.0 };
+    for (vtkIdType n = 40 * 16; n < 41 * 16; ++n)
+    {
+      for (int c = 0; c < 3; ++c)
+      {
+        middle[c] += velocity->GetComponent(n, c) / 16.0;
+      }
+    }
+    EXPECT_NEAR(middle[0], (after[0] - before[0]) / (2.0 * step * 0.8), 0.01);
+    EXPECT_NEAR(middle[2], (after[2] - before[2]) / (2.0 * step * 0.8), 0.01);
+    EXPECT_GT(std::abs(middle[0]), 10.0);
+    // The mesh itself is that of the time that was asked for.
+    filter->ComputeVelocityOff();
+    vtkNew<vtkPoints> with;
+    with->DeepCopy(Output(filter)->GetPoints());
+    filter->Modified();
+    filter->UpdateTimeStep(0.4);
+    EXPECT_EQ(with->GetPoint(100)[0], Output(filter)->GetPoint(100)[0]);
+  }
+  // No time, no velocity, and a word about it.
+  vtkNew<vtkSkinDeformation> filter;
+  filter->SetInputData(0, ChainTube(2, 0.5));
+  filter->SetInputData(1, ChainSkeleton(2));
+  filter->SetInputData(2, ChainSkeleton(2));
+  filter->ComputeVelocityOn();
+  Messages messages(filter);
+  filter->Update();
+  EXPECT_TRUE(messages.HasWarning("no velocity"));
+  EXPECT_TRUE(messages.Errors.empty());
+  EXPECT_EQ(Output(filter)->GetPointData()->GetArray("Velocity"), nullptr);
+}
+
+TEST(SkinDeformation, NormalsOfTheMovedTriangles)
+{
+  vtkNew<vtkSkinDeformation> filter;
+  filter->SetInputData(0, ChainTube(4, 1.0));
+  filter->SetInputData(1, ChainSkeleton(4));
+  // Turned by a quarter about x: z goes to -y.
+  filter->SetInputData(2,
+    Moved(4,
+      [](vtkIdType, double* p)
+      {
+        p[1] = -p[2];
+        p[2] = 0.0;
+      }));
+  filter->ComputeNormalsOn();
+  filter->Update();
+  vtkDataArray* normals = Output(filter)->GetPointData()->GetNormals();
+  ASSERT_NE(normals, nullptr);
+  for (vtkIdType n = 16; n < 40 * 16; ++n)
+  {
+    const double* at = Output(filter)->GetPoint(n);
+    EXPECT_NEAR(normals->GetComponent(n, 0), at[0], 0.01);
+    EXPECT_NEAR(normals->GetComponent(n, 1), 0.0, 0.01);
+    EXPECT_NEAR(normals->GetComponent(n, 2), at[2], 0.01);
+  }
+}
+
+TEST(SkinDeformation, VolumeIsConservedWhereWanted)
+{
+  vtkNew<vtkSkinDeformation> filter;
+  filter->SetInputData(0, ChainTube(4, 1.0));
+  filter->SetInputData(1, ChainSkeleton(4));
+  filter->SetInputData(2, Moved(4, [](vtkIdType, double* p) { p[2] *= 1.44; }));
+  filter->Update();
+  EXPECT_NEAR(Output(filter)->GetPoint(0)[0], 1.0, 1e-5);
+  filter->SetVolumeConservation(1.0);
+  filter->Update();
+  EXPECT_NEAR(Output(filter)->GetPoint(0)[0], 1.0 / 1.2, 1e-5);
+  EXPECT_NEAR(Output(filter)->GetPoint(640)[2], 28.8, 1e-4);
+}
+
+TEST(SkinDeformation, TetrahedraAreCheckedAndRepaired)
+{
+  vtkNew<vtkSkinDeformation> filter;
+  filter->SetInputData(0, Bar(3));
+  filter->SetInputData(1, ChainSkeleton(2));
+  filter->SetInputData(2, Folded(2.4));
+  filter->SetTetrahedra(vtkSkinDeformation::CheckTetrahedra);
+  {
+    Messages messages(filter);
+    filter->Update();
+    EXPECT_TRUE(messages.HasWarning("inverted"));
+  }
+  vtkDataArray* left = Output(filter)->GetFieldData()->GetArray("InvertedTetrahedra");
+  ASSERT_NE(left, nullptr);
+  ASSERT_GT(left->GetNumberOfTuples(), 0);
+  vtkDataArray* ratio = Output(filter)->GetCellData()->GetArray("VolumeRatio");
+  ASSERT_NE(ratio, nullptr);
+  EXPECT_TRUE(std::isnan(ratio->GetComponent(0, 0)));
+  for (vtkIdType n = 0; n < left->GetNumberOfTuples(); ++n)
+  {
+    EXPECT_LE(ratio->GetComponent(static_cast<vtkIdType>(left->GetComponent(n, 0)), 0), 0.0);
+  }
+  const vtkIdType found = left->GetNumberOfTuples();
+  filter->SetTetrahedra(vtkSkinDeformation::RepairTetrahedra);
+  Messages messages(filter);
+  filter->Update();
+  EXPECT_TRUE(messages.Warnings.empty());
+  vtkFieldData* fields = Output(filter)->GetFieldData();
+  EXPECT_EQ(fields->GetArray("InvertedTetrahedra")->GetNumberOfTuples(), 0);
+  EXPECT_EQ(fields->GetArray("RepairedTetrahedra")->GetComponent(0, 0), found);
+  filter->SetTetrahedra(vtkSkinDeformation::IgnoreTetrahedra);
+  filter->Update();
+  EXPECT_EQ(Output(filter)->GetCellData()->GetArray("VolumeRatio"), nullptr);
+}
+
+TEST(SkinDeformation, AnyPointSetAndBlocks)
+{
+  vtkNew<vtkStructuredGrid> grid;
+  grid->SetDimensions(2, 2, 21);
+  vtkNew<vtkPoints> points;
+  for (int k = 0; k < 21; ++k)
+  {
+    for (int n = 0; n < 4; ++n)
+    {
+      points->InsertNextPoint(n % 2, n / 2, k);
+    }
+  }
+  grid->SetPoints(points);
+  HangOnChain(grid, 4);
+  vtkNew<vtkMultiBlockDataSet> blocks;
+  blocks->SetBlock(0, ChainTube(4, 1.0));
+  blocks->SetBlock(1, grid);
+  vtkNew<vtkSkinDeformation> filter;
+  filter->SetInputDataObject(0, blocks);
+  filter->SetInputData(1, ChainSkeleton(4));
+  vtkNew<BendingChain> motion;
+  filter->SetPoseConnection(motion->GetOutputPort());
+  for (const double time : { 0.5, 0.2, 0.7 })
+  {
+    filter->UpdateTimeStep(time);
+    auto* output = vtkMultiBlockDataSet::SafeDownCast(filter->GetOutputDataObject(0));
+    ASSERT_NE(output, nullptr);
+    ASSERT_NE(vtkPolyData::SafeDownCast(output->GetBlock(0)), nullptr);
+    auto* moved = vtkStructuredGrid::SafeDownCast(output->GetBlock(1));
+    ASSERT_NE(moved, nullptr);
+    EXPECT_NEAR(moved->GetPoint(80)[0], BendingChain::Bent(20.0, time)[0], 0.2 + time);
+  }
+  // Both blocks are remembered.
+  EXPECT_EQ(filter->GetNumberOfSetups(), 2);
+}
+
+TEST(SkinDeformation, EmptyMeshIsNoError)
+{
+  vtkNew<vtkPolyData> nothing;
+  vtkNew<vtkSkinDeformation> filter;
+  filter->SetInputData(0, nothing);
+  filter->SetInputData(1, ChainSkeleton(2));
+  filter->SetInputData(2, ChainSkeleton(2));
+  Messages messages(filter);
+  filter->Update();
+  EXPECT_TRUE(messages.Errors.empty());
+  EXPECT_EQ(Output(filter)->GetNumberOfPoints(), 0);
+}
+
+TEST(SkinDeformation, RefusesWithOneMessage)
+{
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  vtkNew<vtkSkinDeformation> filter;
+  const auto refuse = [&](const std::string& part, const auto& damage)
+  {
+    const auto tube = ChainTube(3, 1.0);
+    const auto rest = ChainSkeleton(3);
+    const auto pose = ChainSkeleton(3);
+    damage(tube, rest, pose);
+    filter->SetInputData(0, tube);
+    filter->SetInputData(1, rest);
+    filter->SetInputData(2, pose);
+    ExpectError(filter, part);
+    EXPECT_EQ(Output(filter)->GetNumberOfPoints(), 0);
+  };
+  using Data = vtkSmartPointer<vtkPolyData>;
+  refuse("no point array 'BoneIndices'",
+    [](const Data& mesh, const Data&, const Data&)
+    { mesh->GetPointData()->RemoveArray("BoneIndices"); });
+  refuse("has 1 components",
+    [](const Data& mesh, const Data&, const Data&)
+    {
+      vtkNew<vtkIntArray> other;
+      other->SetName("BoneIndices");
+      other->SetNumberOfValues(mesh->GetNumberOfPoints());
+      other->Fill(0);
+      mesh->GetPointData()->AddArray(other);
+    });
+  refuse("hangs on bone 3",
+    [](const Data& mesh, const Data&, const Data&)
+    { mesh->GetPointData()->GetArray("BoneIndices")->SetComponent(7, 0, 3); });
+  refuse("Point 7 has a skin weight that is not finite",
+    [&](const Data& mesh, const Data&, const Data&)
+    { mesh->GetPointData()->GetArray("BoneWeightsCompact")->SetComponent(7, 0, nan); });
+  refuse("Point 7 has no skin weight",
+    [](const Data& mesh, const Data&, const Data&)
+    { mesh->GetPointData()->GetArray("BoneWeightsCompact")->SetTuple2(7, 0.0, 0.0); });
+  refuse("skeleton at rest",
+    [](const Data&, const Data& rest, const Data&)
+    { rest->SetLines(vtkSmartPointer<vtkCellArray>::New()); });
+  refuse("4 joints and 3 bones",
+    [](const Data&, const Data& rest, const Data&) { rest->ShallowCopy(ChainSkeleton(4)); });
+  refuse("Joint 1 of the pose",
+    [&](const Data&, const Data&, const Data& pose)
+    { pose->GetPoints()->SetPoint(1, nan, 0.0, 0.0); });
+  refuse("Bone 0 of the pose",
+    [](const Data&, const Data&, const Data& pose)
+    { pose->GetPoints()->SetPoint(1, 0.0, 0.0, 0.0); });
+  refuse("other joints than at rest",
+    [](const Data&, const Data&, const Data& pose)
+    {
+      vtkNew<vtkCellArray> lines;
+      for (const vtkIdType first : { 1, 0, 2 })
+      {
+        const vtkIdType ends[2] = { first, first + 1 };
+        lines->InsertNextCell(2, ends);
+      }
+      pose->SetLines(lines);
+    });
+  refuse("'BoneRotation'",
+    [](const Data&, const Data&, const Data& pose)
+    {
+      vtkNew<vtkDoubleArray> rotation;
+      rotation->SetName("BoneRotation");
+      rotation->SetNumberOfValues(3);
+      rotation->Fill(1.0);
+      pose->GetCellData()->AddArray(rotation);
+    });
+  const auto whole = [](const Data&, const Data&, const Data&) {};
+  filter->SetVolumeConservation(2.0);
+  refuse("VolumeConservation", whole);
+  filter->SetVolumeConservation(0.0);
+  filter->SetLeastVolumeRatio(0.7);
+  refuse("LeastVolumeRatio", whole);
+  filter->SetLeastVolumeRatio(0.0);
+  filter->SetDisplacementArrayName("");
+  refuse("name", whole);
+  filter->SetDisplacementArrayName("Displacement");
+  filter->Modified();
+  filter->Update();
+  EXPECT_GT(Output(filter)->GetNumberOfPoints(), 0);
+}
