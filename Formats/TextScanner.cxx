@@ -1,0 +1,176 @@
+#include "TextScanner.h"
+
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+bool IsBlank(char c)
+{
+  return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v' || c == '\0';
+}
+
+/// For messages: what is in a damaged file may be anything.
+std::string Quoted(std::string_view word)
+{
+  std::string shown;
+  for (const char c : word.substr(0, 40))
+  {
+    shown += c >= ' ' && c <= '~' ? c : '?';
+  }
+  return "'" + shown + (word.size() > 40 ? "..'" : "'");
+}
+
+template <typename Value>
+bool Parse(std::string_view word, Value& value)
+{
+  if (!word.empty() && word.front() == '+')
+  {
+    word.remove_prefix(1);
+  }
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc() && end == word.data() + word.size();
+}
+}
+
+TextScanner::TextScanner(const std::string& path)
+  : Name(path)
+{
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
+    std::fopen(path.c_str(), "rb"), &std::fclose);
+  bool good = file != nullptr;
+  char buffer[1 << 16];
+  while (good)
+  {
+    const std::size_t count = std::fread(buffer, 1, sizeof(buffer), file.get());
+    this->Contents.append(buffer, count);
+    if (count < sizeof(buffer))
+    {
+      good = std::ferror(file.get()) == 0;
+      break;
+    }
+  }
+  if (!good)
+  {
+    throw std::runtime_error("Cannot read '" + path + "': " + std::strerror(errno) + ".");
+  }
+}
+
+void TextScanner::SkipBlanks(bool overLines)
+{
+  while (this->At < this->Contents.size())
+  {
+    const char c = this->Contents[this->At];
+    if (this->Comment != 0 && c == this->Comment)
+    {
+      const std::size_t end = this->Contents.find('\n', this->At);
+      this->At = end == std::string::npos ? this->Contents.size() : end;
+    }
+    else if (c == '\n' && overLines)
+    {
+      ++this->Line;
+      ++this->At;
+    }
+    else if (IsBlank(c))
+    {
+      ++this->At;
+    }
+    else
+    {
+      return;
+    }
+  }
+}
+
+bool TextScanner::AtEnd()
+{
+  this->SkipBlanks(true);
+  return this->At == this->Contents.size();
+}
+
+bool TextScanner::AtLineEnd()
+{
+  this->SkipBlanks(false);
+  return this->At == this->Contents.size() || this->Contents[this->At] == '\n';
+}
+
+void TextScanner::SkipLine()
+{
+  const std::size_t end = this->Contents.find('\n', this->At);
+  this->At = end == std::string::npos ? this->Contents.size() : end;
+}
+
+std::string_view TextScanner::Word()
+{
+  if (this->AtEnd())
+  {
+    this->Fail("the file ends too early");
+  }
+  const std::size_t first = this->At;
+  while (this->At < this->Contents.size() && this->Contents[this->At] != '\n' &&
+    !IsBlank(this->Contents[this->At]))
+  {
+    ++this->At;
+  }
+  return std::string_view(this->Contents).substr(first, this->At - first);
+}
+
+double TextScanner::Number()
+{
+  const std::string_view word = this->Word();
+  double value = 0.0;
+  if (!Parse(word, value))
+  {
+    this->Fail(Quoted(word) + " is no number");
+  }
+  return value;
+}
+
+double TextScanner::Coordinate()
+{
+  const double value = this->Number();
+  if (!std::isfinite(value))
+  {
+    this->Fail("a coordinate is not finite");
+  }
+  return value;
+}
+
+std::int64_t TextScanner::Integer()
+{
+  const std::string_view word = this->Word();
+  std::int64_t value = 0;
+  if (!Parse(word, value))
+  {
+    this->Fail(Quoted(word) + " is no integer");
+  }
+  return value;
+}
+
+void TextScanner::Fail(const std::string& what) const
+{
+  throw std::runtime_error(
+    "'" + this->Name + "', line " + std::to_string(this->Line) + ": " + what + ".");
+}
+
+void AppendNumber(std::string& text, double value)
+{
+  char buffer[40];
+  const auto [end, error] = std::to_chars(std::begin(buffer), std::end(buffer), value);
+  text.append(std::begin(buffer), error == std::errc() ? end : std::begin(buffer));
+}
+
+void AppendNumber(std::string& text, std::int64_t value)
+{
+  char buffer[24];
+  const auto [end, error] = std::to_chars(std::begin(buffer), std::end(buffer), value);
+  text.append(std::begin(buffer), error == std::errc() ? end : std::begin(buffer));
+}
+}
