@@ -2,6 +2,7 @@
 
 #include "OptionChecks.h"
 #include "vtkDataFiles.h"
+#include "vtkMeshConversion.h"
 #include "vtkMessageTrap.h"
 
 #include "vtkCenterlineConversion.h"
@@ -26,6 +27,8 @@ struct ConvertJob
   std::string input;
   std::string output;
   std::string form;
+  std::string array = "BoneWeights";
+  bool binary = false;
   double radius = 1.0;
   double tolerance = 1e-6;
 
@@ -41,16 +44,28 @@ bool EndsWith(const std::string& text, const std::string& end)
 
 void ConvertJob::Declare(CLI::App& app)
 {
-  app.add_option("INPUT", this->input, "Centerlines: .vtp (a tree, or VMTK's branches) or .tgf")
+  app
+    .add_option("INPUT", this->input,
+      "Centerlines: .vtp (a tree, or VMTK's branches) or .tgf. Meshes: .obj, .off, .mesh, .vtp, "
+      ".vtu. "
+      "Matrices: .dmat")
     ->type_name("")
     ->required();
-  app.add_option("OUTPUT", this->output, "File to write: .vtp or .tgf")->type_name("")->required();
+  app.add_option("OUTPUT", this->output, "File to write, of the same kinds")
+    ->type_name("")
+    ->required();
   app
     .add_option("--form", this->form,
       "Form of a .vtp file: tree (one line a branch) or vmtk (lines from a root to every tip). "
       "Default: of a .vtp file the other one, of a .tgf file a tree")
     ->check(CLI::IsMember({ "tree", "vmtk" }))
     ->type_name("FORM");
+  app
+    .add_option(
+      "--array", this->array, "Point array that is written to a .dmat file, a row a point")
+    ->type_name("NAME")
+    ->capture_default_str();
+  app.add_flag("--binary", this->binary, "Write a .dmat file in its binary form");
   app.add_option("--radius", this->radius, "Radius for the points of a .tgf file, in mm")
     ->check(Within(0.0, 1e6))
     ->type_name("MM")
@@ -65,6 +80,13 @@ void ConvertJob::Declare(CLI::App& app)
 
 void ConvertJob::Run() const
 {
+  if (IsMeshConversion(this->input, this->output))
+  {
+    vtkMessageTrap messages;
+    std::printf(
+      "%s\n", ConvertMesh(this->input, this->output, this->array, this->binary, messages).c_str());
+    return;
+  }
   const bool fromTgf = EndsWith(this->input, ".tgf");
   const bool toTgf = EndsWith(this->output, ".tgf");
   if (!fromTgf && !EndsWith(this->input, ".vtp"))
@@ -130,8 +152,8 @@ void ConvertJob::Run() const
 
 Command MakeConvertCommand(CLI::App& program)
 {
-  CLI::App* app = program.add_subcommand(
-    "convert", "Convert centerlines between trees, VMTK's lines and TGF skeletons");
+  CLI::App* app = program.add_subcommand("convert",
+    "Convert centerlines between trees, VMTK's lines and TGF skeletons; meshes and matrices");
   auto job = std::make_shared<ConvertJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

@@ -7,9 +7,11 @@
 #include "vtkNew.h"
 #include "vtkPolyData.h"
 #include "vtkUnstructuredGrid.h"
+#include "vtkXMLDataReader.h"
 #include "vtkXMLPolyDataReader.h"
 #include "vtkXMLPolyDataWriter.h"
 #include "vtkXMLUnstructuredDataWriter.h"
+#include "vtkXMLUnstructuredGridReader.h"
 #include "vtkXMLUnstructuredGridWriter.h"
 
 #include <fstream>
@@ -18,9 +20,11 @@
 
 namespace coronary
 {
-vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages)
+namespace
 {
-  vtkNew<vtkXMLPolyDataReader> reader;
+void ReadXml(
+  const std::string& path, vtkXMLDataReader* reader, const char* what, vtkMessageTrap& messages)
+{
   std::ifstream file(path, std::ios::binary);
   if (!file)
   {
@@ -28,7 +32,7 @@ vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTra
   }
   if (!reader->CanReadFile(path.c_str()))
   {
-    throw std::runtime_error("'" + path + "' is not a VTK XML poly data file.");
+    throw std::runtime_error("'" + path + "' is not a VTK XML " + what + " file.");
   }
   const std::string text(std::istreambuf_iterator<char>(file), {});
   reader->ReadFromInputStringOn();
@@ -42,6 +46,21 @@ vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTra
   {
     throw std::runtime_error("Cannot read '" + path + "': " + error.what());
   }
+}
+}
+
+vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages)
+{
+  vtkNew<vtkXMLPolyDataReader> reader;
+  ReadXml(path, reader, "poly data", messages);
+  return reader->GetOutput();
+}
+
+vtkSmartPointer<vtkUnstructuredGrid> ReadUnstructuredGrid(
+  const std::string& path, vtkMessageTrap& messages)
+{
+  vtkNew<vtkXMLUnstructuredGridReader> reader;
+  ReadXml(path, reader, "unstructured grid", messages);
   return reader->GetOutput();
 }
 

@@ -19,6 +19,11 @@ namespace coronary
 /// @throws std::runtime_error naming the file
 vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages);
 
+/// Reads a .vtu file.
+/// @throws std::runtime_error naming the file
+vtkSmartPointer<vtkUnstructuredGrid> ReadUnstructuredGrid(
+  const std::string& path, vtkMessageTrap& messages);
+
 /// Writes a .vtp file, atomically.
 /// @throws std::runtime_error naming the file
 void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& messages);

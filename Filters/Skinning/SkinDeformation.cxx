@@ -749,8 +749,12 @@ void SkinDeformation::Internals::Unfold(
     restEdges.col(c) = this->Points[corners[c + 1]] - this->Points[corners[0]];
     edges.col(c) = PointAt(positions, corners[c + 1]) - PointAt(positions, corners[0]);
   }
-  const Eigen::JacobiSVD<Matrix3> svd(
-    edges * restEdges.inverse(), Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Matrix3 deformation = edges * restEdges.inverse();
+  if (!deformation.allFinite())
+  {
+    return;
+  }
+  const Eigen::JacobiSVD<Matrix3> svd(deformation, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Matrix3 u = svd.matrixU();
   Vector3 stretches = svd.singularValues();
   if (u.determinant() * svd.matrixV().determinant() < 0.0)
@@ -759,14 +763,12 @@ void SkinDeformation::Internals::Unfold(
     u.col(2) = -u.col(2);
     stretches[2] = -stretches[2];
   }
-  Vector3 wanted = stretches;
-  for (double least = LeastRepairStretch; least < 2.0; least *= 1.1)
+  double least = LeastRepairStretch;
+  Vector3 wanted = stretches.cwiseMax(least);
+  while (wanted.prod() < wantedRatio)
   {
+    least *= 1.1;
     wanted = stretches.cwiseMax(least);
-    if (wanted.prod() >= wantedRatio)
-    {
-      break;
-    }
   }
   const Matrix3 gradient = u * wanted.asDiagonal() * svd.matrixV().transpose();
   for (const std::int64_t corner : corners)

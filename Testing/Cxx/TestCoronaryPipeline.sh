@@ -83,6 +83,32 @@ check_convert() {
   expect_one_line "coronary-pipeline convert" "bad.tgf"
   run 1 convert made/truth/surface_00.vtp tree.tgf
   expect_one_line "coronary-pipeline convert" "surface_00.vtp"
+
+  # Meshes go round through every format, and come back to the same numbers.
+  run 0 convert made/truth/surface_00.vtp surface.obj
+  run 0 convert surface.obj surface.off
+  run 0 convert surface.off surface.mesh
+  run 0 convert surface.mesh surface.vtp
+  run 0 convert surface.vtp again.obj
+  cmp surface.obj again.obj || fail "the surface did not come back"
+  printf 'MeshVersionFormatted 2\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 0.1 0\nTetrahedra 1\n1 2 3 4 0\nEnd\n' >one.mesh
+  run 0 convert one.mesh one.vtu
+  run 0 convert one.vtu two.mesh
+  grep -q '^1 2 3 4 0$' two.mesh || fail "the tetrahedron did not come back"
+  run 1 convert one.mesh out.vtp
+  expect_one_line "coronary-pipeline convert" "one.mesh"
+  run 0 convert $tree radius.dmat --array MaximumInscribedSphereRadius
+  run 0 convert radius.dmat binary.dmat --binary
+  run 0 convert binary.dmat text.dmat
+  cmp radius.dmat text.dmat || fail "the matrix did not come back"
+  run 1 convert $tree out.dmat --array Nothing
+  expect_one_line "coronary-pipeline convert" "Nothing"
+  run 2 convert one.mesh out.dmat
+  expect_one_line "coronary-pipeline convert" "one.mesh"
+  printf '2 2\n1\n2\n' >bad.dmat
+  run 1 convert bad.dmat out.dmat
+  expect_one_line "coronary-pipeline convert" "bad.dmat"
+  [ ! -e out.dmat ] || fail "out.dmat appeared"
   cmp tree.tgf kept.tgf || fail "a failed conversion changed its output"
   [ ! -e out.vtp ] || fail "out.vtp appeared"
 }
