@@ -30,7 +30,7 @@ vtk=(
   libtbb-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libpng16-16 libtiff6
   patchelf
 )
-developer=(clang-tidy-14 shellcheck libinsighttoolkit5-dev)
+developer=(clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev)
 
 check_only=no
 tree=all
