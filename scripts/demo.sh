@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # From nothing to named coronary trees: installs, builds, makes a gated CT series of the phantom with
 # its truth, finds and segments the coronary arteries in its quietest phase, traces their
-# centerlines, makes their surface and tetrahedra in it, and renders pictures.
+# centerlines, makes their surface, tetrahedra and skin weights in it, and renders pictures.
 # Everything lands in build/ and demo-output/.
 set -euo pipefail
 
@@ -70,7 +70,7 @@ echo "== Its motion beside published values"
 "$pipeline" phantom-motion --seed 1 | tee "$output/phantom-motion.txt"
 
 echo "== From the images to the coronary arteries"
-"$pipeline" run "$output/phantom/series.json" --until volume --output "$output/run"
+"$pipeline" run "$output/phantom/series.json" --until weights --output "$output/run"
 
 if [ "$pictures" = yes ]; then
   echo "== Pictures"
@@ -90,6 +90,7 @@ if [ "$pictures" = yes ]; then
   render centerline "$output/run" --truth "$truth"
   render surface "$output/run" --truth "$truth"
   render volume "$output/run"
+  render skinning "$output/run"
 fi
 
 plugin="$(find "$root/build/paraview" -name DynamicCoronaryPlugin.so -print -quit)"
@@ -104,9 +105,9 @@ What lies where
   $output/phantom/truth/              surface, centerlines and vein of every phase (.vtp, .pvd)
   $output/run/                        vesselness, mask of the arteries, ostia, aorta and the
                                       named trees of centerlines at the quietest phase, their
-                                      closed surface with its caps, and tetrahedra
-                                      with the skeleton inside; status.csv
-                                      and report.json says how they came about
+                                      closed surface with its caps, skeleton, tetrahedra
+                                      with the skeleton inside and their skin weights;
+                                      status.csv and report.json say how they came about
   $output/phantom-motion.txt          amplitudes, speeds and rest windows per artery
 EOF
 if [ "$pictures" = yes ]; then

@@ -6,8 +6,9 @@
 deformation.png  a straight tube: bent by both blends, twisted, stretched without and with kept volume, narrowed
 pose.png         a coronary tree at rest, and after two successive edits by hand
 
-The weights are made here, for the pictures: of the bones of a tube by the distance from its joints, of those of
-the tree from the distance to the bones.
+The tube's weights are made here, by the distance from its joints. The tree is tetrahedra with biharmonic weights: of the
+phantom, or of a closed surface that is given. docs/pictures/pose.png: --surface F.obj, which coronary-pipeline convert makes
+of the Visible Human's F_coronary_arteries.vtp.
 """
 import argparse
 import math
@@ -212,19 +213,44 @@ def draw_tubes(simple, folder):
     join(files, 4, os.path.join(folder, "deformation.png"))
 
 
-def nearest_bones(mesh, skeleton, count=4):
-    """Weights by the distance to the bones, its fourth power."""
-    points = numpy_support.vtk_to_numpy(mesh.GetPoints().GetData()).astype(float)
-    joints = numpy.array([skeleton.GetPoint(n) for n in range(skeleton.GetNumberOfPoints())])
-    cells = numpy_support.vtk_to_numpy(skeleton.GetLines().GetConnectivityArray()).reshape(-1, 2)
-    distance = numpy.empty((len(points), len(cells)))
-    for number, (first, second) in enumerate(cells):
-        along = joints[second] - joints[first]
-        t = numpy.clip((points - joints[first]) @ along / (along @ along), 0.0, 1.0)
-        distance[:, number] = numpy.linalg.norm(points - joints[first] - numpy.outer(t, along), axis=1)
-    indices = numpy.argsort(distance, axis=1)[:, :count]
-    weights = numpy.take_along_axis(distance, indices, 1) ** -4.0
-    return indices, weights / weights.sum(axis=1, keepdims=True)
+def highest_points(surface):
+    """Of each connected part, as a data set of points."""
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkPolyData
+    from vtkmodules.vtkFiltersCore import vtkPolyDataConnectivityFilter
+    parts = vtkPolyDataConnectivityFilter()
+    parts.SetInputData(surface)
+    parts.SetExtractionModeToAllRegions()
+    parts.ColorRegionsOn()
+    parts.Update()
+    output = parts.GetOutput()
+    region = numpy_support.vtk_to_numpy(output.GetPointData().GetArray("RegionId"))
+    points = numpy_support.vtk_to_numpy(output.GetPoints().GetData())
+    tops = vtkPoints()
+    for number in range(parts.GetNumberOfExtractedRegions()):
+        part = points[region == number]
+        tops.InsertNextPoint(part[part[:, 2].argmax()].astype(float))
+    seeds = vtkPolyData()
+    seeds.SetPoints(tops)
+    return seeds
+
+
+def posable(simple, name):
+    """The skeleton, and tetrahedra with weights, of a closed surface or of the phantom."""
+    if name is None:
+        tree = simple.OutputPort(simple.CoronaryPhantom(), 1)
+        surface = simple.FrenetSweepSurface(tree)
+    else:
+        opened = fetched(simple.OpenDataFile(name))
+        surface = simple.SurfaceCleaner(Surface=producer(simple, opened))
+        lines = simple.FastMarchingCenterline(Input=surface,
+                                              Seeds=producer(simple, highest_points(opened)))
+        tree = simple.CoronaryTreeTopology(Input=simple.OutputPort(lines, 0))
+    skeleton = simple.CenterlineSkeleton(Centerlines=tree)
+    tetrahedra = simple.TetrahedralMesher(Surface=surface, Skeleton=skeleton,
+                                          LeaveOutPointsOutside=1, Repair=1)
+    weights = simple.BiharmonicSkinWeights(Mesh=tetrahedra, Skeleton=skeleton)
+    return fetched(skeleton), fetched(weights)
 
 
 def subtree(skeleton, joint):
@@ -235,13 +261,8 @@ def subtree(skeleton, joint):
     return found
 
 
-def draw_tree(simple, folder):
-    phantom = simple.CoronaryPhantom()
-    tree = simple.CenterlineSkeleton(Centerlines=simple.OutputPort(phantom, 1))
-    rest = fetched(tree)
-    mesh = fetched(phantom, 2)
-    indices, weights = nearest_bones(mesh, rest)
-    set_weights(mesh, indices, weights)
+def draw_tree(simple, folder, surface):
+    rest, mesh = posable(simple, surface)
     sizes = [len(subtree(rest, n)) for n in range(rest.GetNumberOfPoints())]
     # Two joints in the middle of the largest tree, one far beyond the other.
     largest = max(range(len(sizes)), key=lambda n: sizes[n])
@@ -292,13 +313,15 @@ def main():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("plugin")
     parser.add_argument("--output", required=True)
+    parser.add_argument("--surface", help="closed surface of coronary arteries that is posed, "
+                                          ".obj, .stl or .vtp (default: the phantom's)")
     arguments = parser.parse_args()
     os.makedirs(arguments.output, exist_ok=True)
     from paraview import simple
     simple._DisableFirstRenderCameraReset()
     simple.LoadPlugin(arguments.plugin, ns=simple.__dict__)
     draw_tubes(simple, arguments.output)
-    draw_tree(simple, arguments.output)
+    draw_tree(simple, arguments.output, arguments.surface)
 
 
 if __name__ == "__main__":
