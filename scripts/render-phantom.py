@@ -5,7 +5,7 @@
 
 tree.png           lumen and great cardiac vein at two phases, one colour a branch
 slices.png         axial, coronal and sagittal slices at the same phases, truth outlined
-volume.png         volume rendering, and a maximum intensity projection of a slab
+rendering.png      volume rendering, and a maximum intensity projection of a slab
 contact-sheet.png  one axial slice over all phases
 """
 import argparse
@@ -584,7 +584,7 @@ def picture_volume(phase, title, folder):
              bold=True)
     add_text(panel, "around z = %.1f mm" % cut.position, 14, height - 58, 16, FAINT)
     add_text(base, "%s, %s" % (title, phase.label()), 24, SIZE[1] - 48, 28, bold=True)
-    save(window, folder, "volume.png")
+    save(window, folder, "rendering.png")
 
 
 def picture_contact_sheet(phases, title, folder):
