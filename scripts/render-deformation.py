@@ -215,8 +215,6 @@ def draw_tubes(simple, folder):
 
 def highest_points(surface):
     """Of each connected part, as a data set of points."""
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkPolyData
     from vtkmodules.vtkFiltersCore import vtkPolyDataConnectivityFilter
     parts = vtkPolyDataConnectivityFilter()
     parts.SetInputData(surface)

@@ -36,12 +36,6 @@ struct ConvertJob
   void Run() const;
 };
 
-bool EndsWith(const std::string& text, const std::string& end)
-{
-  return text.size() >= end.size() &&
-    text.compare(text.size() - end.size(), std::string::npos, end) == 0;
-}
-
 void ConvertJob::Declare(CLI::App& app)
 {
   app

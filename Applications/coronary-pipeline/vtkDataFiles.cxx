@@ -49,6 +49,12 @@ void ReadXml(
 }
 }
 
+bool EndsWith(const std::string& path, const std::string& end)
+{
+  return path.size() >= end.size() &&
+    path.compare(path.size() - end.size(), std::string::npos, end) == 0;
+}
+
 vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages)
 {
   vtkNew<vtkXMLPolyDataReader> reader;

@@ -22,12 +22,6 @@ namespace coronary
 {
 namespace
 {
-bool EndsWith(const std::string& text, const std::string& end)
-{
-  return text.size() >= end.size() &&
-    text.compare(text.size() - end.size(), std::string::npos, end) == 0;
-}
-
 bool IsVtk(const std::string& path)
 {
   return EndsWith(path, ".vtp") || EndsWith(path, ".vtu");

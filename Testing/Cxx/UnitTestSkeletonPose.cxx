@@ -1,11 +1,12 @@
 #include "SkeletonPose.h"
 
+#include "Refusals.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <random>
-#include <stdexcept>
 
 using coronary::BoneTransform;
 using coronary::PoseEdit;
@@ -91,20 +92,6 @@ std::vector<BoneTransform> Transforms(const SkeletonRig& rig, const SkeletonPose
   std::vector<BoneTransform> transforms;
   rig.Transform(pose, transforms);
   return transforms;
-}
-
-template <typename Function>
-void ExpectRefusal(const Function& function, const std::string& part)
-{
-  try
-  {
-    function();
-    ADD_FAILURE() << "nothing was thrown, wanted: " << part;
-  }
-  catch (const std::invalid_argument& error)
-  {
-    EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
-  }
 }
 }
 

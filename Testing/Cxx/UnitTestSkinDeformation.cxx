@@ -1,6 +1,7 @@
 // Deformation against closed forms, both precisions, all instruction sets, without allocation.
 
 #include "ParallelFor.h"
+#include "Refusals.h"
 #include "SkinDeformation.h"
 #include "SkinKernels.h"
 #include "TetrahedronTestMeshes.h"
@@ -13,7 +14,6 @@
 #include <limits>
 #include <new>
 #include <random>
-#include <stdexcept>
 
 namespace
 {
@@ -251,20 +251,6 @@ SkinDeformationSettings With(SkinBlend blend)
   SkinDeformationSettings settings;
   settings.blend = blend;
   return settings;
-}
-
-template <typename Function>
-void ExpectRefusal(const Function& function, const std::string& part)
-{
-  try
-  {
-    function();
-    ADD_FAILURE() << "nothing was thrown, wanted: " << part;
-  }
-  catch (const std::invalid_argument& error)
-  {
-    EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
-  }
 }
 }
 
