@@ -169,7 +169,9 @@ constexpr const char* BoneRotation = "BoneRotation"; ///< double[4], w x y z, fr
 constexpr const char* BoneTwist = "BoneTwist";       ///< double, radians along the bone
 constexpr const char* AxialStrain = "AxialStrain";   ///< double, posed length / rest length - 1
 // Posed skeleton, point data.
-constexpr const char* CalibreFactor = "CalibreFactor"; ///< double, of the radius
+constexpr const char* CalibreFactor = "CalibreFactor";           ///< double, of the radius
+constexpr const char* TrackingConfidence = "TrackingConfidence"; ///< double, 0 to 1
+constexpr const char* TrackingStatus = "TrackingStatus";         ///< int, coronary::TrackingStatus
 // Deformed mesh, cell data.
 constexpr const char* VolumeRatio = "VolumeRatio"; ///< double, against rest, below 0 inverted
 // Deformed mesh, field data.
