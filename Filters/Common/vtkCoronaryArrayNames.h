@@ -172,6 +172,14 @@ constexpr const char* AxialStrain = "AxialStrain";   ///< double, posed length /
 constexpr const char* CalibreFactor = "CalibreFactor";           ///< double, of the radius
 constexpr const char* TrackingConfidence = "TrackingConfidence"; ///< double, 0 to 1
 constexpr const char* TrackingStatus = "TrackingStatus";         ///< int, coronary::TrackingStatus
+// Interpolated pose, point data.
+constexpr const char* AreaStrain = "AreaStrain";     ///< double, eps_r of the cross-section's area
+constexpr const char* EllipseMajor = "EllipseMajor"; ///< double, semi-axis, mm
+constexpr const char* EllipseMinor = "EllipseMinor"; ///< double, semi-axis, mm
+// Interpolated pose, field data.
+constexpr const char* ClampedSections = "ClampedSections"; ///< vtkIdType, number of points
+constexpr const char* Repeatability = "Repeatability"; ///< double, mm, of phases that come twice
+constexpr const char* LowNoiseFit = "LowNoiseFit"; ///< double: rank, order, ridge, left-out error
 // Deformed mesh, cell data.
 constexpr const char* VolumeRatio = "VolumeRatio"; ///< double, against rest, below 0 inverted
 // Deformed mesh, field data.
