@@ -1,5 +1,6 @@
 #include "BiharmonicSkinWeights.h"
 
+#include "PartialProgress.h"
 #include "SkinWeightOptimizer.h"
 #include "SkinWeightSystem.h"
 
@@ -142,15 +143,7 @@ SkinWeights ComputeSkinWeights(const SkinWeightInput& input, const SkinWeightSet
   const ProgressCallback& progress)
 {
   settings.Validate();
-  const auto part = [&](double first, double last) -> ProgressCallback
-  {
-    if (!progress)
-    {
-      return {};
-    }
-    return [&progress, first, last](double done)
-    { return progress(first + (last - first) * done); };
-  };
+  const auto part = [&](double first, double last) { return PartOf(progress, first, last); };
   const SkinWeightSystem system = MakeSkinWeightSystem(input, settings, part(0.0, 0.1));
   SkinWeights result;
   result.bones = system.bones;

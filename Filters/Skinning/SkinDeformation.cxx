@@ -1,6 +1,6 @@
 #include "SkinDeformation.h"
 
-#include "ParallelFor.h"
+#include "PartialProgress.h"
 #include "SkinKernels.h"
 
 #include <Eigen/LU>
@@ -144,6 +144,15 @@ void StorePoint(Real* values, std::int64_t index, const Vector3& point)
   }
 }
 
+/// ParallelFor that allocates nothing for its body.
+template <typename Body>
+void For(std::int64_t count, std::int64_t grain, const Body& body, const ProgressCallback& progress)
+{
+  ParallelFor(count, ReportingGrain(progress, count, grain), std::ref(body), progress);
+  // The thread that reports may have been asleep while the others did it all.
+  Report(progress, 1.0);
+}
+
 /// Lists by rows: those of i are item[offset[i]] to item[offset[i + 1] - 1].
 struct Rows
 {
@@ -153,13 +162,17 @@ struct Rows
 
 /// Which cells a point is a corner of.
 template <typename Cell>
-Rows CellsOfPoints(const std::vector<Cell>& cells, std::int64_t points)
+Rows CellsOfPoints(
+  const std::vector<Cell>& cells, std::int64_t points, const ProgressCallback& progress)
 {
+  const auto count = static_cast<std::int64_t>(cells.size());
+  LoopReport report(progress, 2 * count);
   Rows rows;
   rows.offset.assign(points + 1, 0);
-  for (const Cell& cell : cells)
+  for (std::int64_t n = 0; n < count; ++n)
   {
-    for (const std::int64_t corner : cell)
+    report(n);
+    for (const std::int64_t corner : cells[n])
     {
       ++rows.offset[corner + 1];
     }
@@ -167,21 +180,25 @@ Rows CellsOfPoints(const std::vector<Cell>& cells, std::int64_t points)
   std::partial_sum(rows.offset.begin(), rows.offset.end(), rows.offset.begin());
   rows.item.resize(rows.offset.back());
   std::vector<std::int64_t> next(rows.offset.begin(), rows.offset.end() - 1);
-  for (std::size_t n = 0; n < cells.size(); ++n)
+  for (std::int64_t n = 0; n < count; ++n)
   {
+    report(count + n);
     for (const std::int64_t corner : cells[n])
     {
-      rows.item[next[corner]++] = static_cast<std::int64_t>(n);
+      rows.item[next[corner]++] = n;
     }
   }
   return rows;
 }
 
 template <typename Cell>
-void RequireCorners(const std::vector<Cell>& cells, std::int64_t points, const char* what)
+void RequireCorners(const std::vector<Cell>& cells, std::int64_t points, const char* what,
+  const ProgressCallback& progress)
 {
+  LoopReport report(progress, static_cast<std::int64_t>(cells.size()));
   for (std::size_t n = 0; n < cells.size(); ++n)
   {
+    report(static_cast<std::int64_t>(n));
     for (const std::int64_t corner : cells[n])
     {
       if (corner < 0 || corner >= points)
@@ -245,20 +262,21 @@ struct SkinDeformation::Internals
   std::vector<double> Ratio;      ///< of the last check
 
   Internals(const std::vector<Vector3>& points, const CompactSkinWeights& weights,
-    const Skeleton& rest, const SkinDeformationSettings& settings)
+    const Skeleton& rest, const SkinDeformationSettings& settings, const ProgressCallback& progress)
     : Settings(settings)
     , Rig(rest)
     , Points(points)
   {
-    this->ReadWeights(weights);
-    this->MakeBlocks();
+    const WorkParts parts(progress, { 0.35, 0.65 });
+    this->ReadWeights(weights, parts(0));
+    this->MakeBlocks(parts(1));
     this->Transforms.resize(this->Rig.NumberOfBones());
     this->Motions.resize(this->Rig.NumberOfBones());
     this->Bones.resize(this->Rig.NumberOfBones());
   }
 
-  void ReadWeights(const CompactSkinWeights& weights);
-  void MakeBlocks();
+  void ReadWeights(const CompactSkinWeights& weights, const ProgressCallback& progress);
+  void MakeBlocks(const ProgressCallback& progress);
   void SetFrame(const std::vector<BoneTransform>& bones);
   void SetFloatFrame(const Vector3& posedCentre);
   Local LocalAt(std::int64_t bone, const Vector3& point) const;
@@ -266,21 +284,25 @@ struct SkinDeformation::Internals
   Vector3 Deformed(std::int64_t point) const;
 
   template <typename Real>
-  void DisplacementsOf(const Real* positions, Real* displacements) const;
+  void DisplacementsOf(
+    const Real* positions, Real* displacements, const ProgressCallback& progress) const;
   template <typename Real>
-  void NormalsOf(const Real* positions, Real* normals);
+  void NormalsOf(const Real* positions, Real* normals, const ProgressCallback& progress);
   template <typename Real>
   double RatioOf(const Real* positions, std::int64_t tetrahedron) const;
   template <typename Real>
-  void Check(const Real* positions, InversionReport& report, double leastRatio);
+  void Check(const Real* positions, InversionReport& report, double leastRatio,
+    const ProgressCallback& progress);
   template <typename Real>
-  void Repair(Real* positions, InversionReport& report, double leastRatio);
+  void Repair(
+    Real* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress);
   /// Gives one tetrahedron the nearest shape that has the wanted share of its volume at rest.
   template <typename Real>
   void Unfold(Real* positions, std::int64_t tetrahedron, double wantedRatio) const;
 };
 
-void SkinDeformation::Internals::ReadWeights(const CompactSkinWeights& weights)
+void SkinDeformation::Internals::ReadWeights(
+  const CompactSkinWeights& weights, const ProgressCallback& progress)
 {
   const std::size_t count = this->Points.size();
   Require(count <= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max() / SkinLanes),
@@ -293,8 +315,10 @@ void SkinDeformation::Internals::ReadWeights(const CompactSkinWeights& weights)
       std::to_string(count) + " points");
   this->Offset.assign(1, 0);
   std::vector<std::pair<double, std::int32_t>> row;
+  LoopReport report(progress, static_cast<std::int64_t>(count));
   for (std::size_t i = 0; i < count; ++i)
   {
+    report(static_cast<std::int64_t>(i));
     const std::string name = "Point " + std::to_string(i);
     Require(this->Points[i].allFinite(), name + " has a coordinate that is not finite");
     double sum = 0.0;
@@ -335,8 +359,9 @@ void SkinDeformation::Internals::ReadWeights(const CompactSkinWeights& weights)
   }
 }
 
-void SkinDeformation::Internals::MakeBlocks()
+void SkinDeformation::Internals::MakeBlocks(const ProgressCallback& progress)
 {
+  const WorkParts parts(progress, { 0.2, 0.55, 0.25 });
   const auto count = static_cast<std::int64_t>(this->Points.size());
   Vector3 low = Vector3::Zero();
   Vector3 high = Vector3::Zero();
@@ -355,14 +380,27 @@ void SkinDeformation::Internals::MakeBlocks()
   std::vector<std::int32_t> order(count);
   std::iota(order.begin(), order.end(), 0);
   std::vector<std::vector<std::int32_t>> key(count);
+  const ProgressCallback keyProgress = parts(0);
+  LoopReport keyReport(keyProgress, count);
   for (std::int64_t i = 0; i < count; ++i)
   {
+    keyReport(i);
     key[i].assign(this->Bone.begin() + this->Offset[i], this->Bone.begin() + this->Offset[i + 1]);
     std::sort(key[i].begin(), key[i].end());
     key[i].insert(key[i].begin(), this->Bone[this->Offset[i]]);
   }
+  // A sort takes about n log n comparisons; what it takes beyond that is the end of its part.
+  const ProgressCallback sortProgress = parts(1);
+  LoopReport sortReport(sortProgress,
+    static_cast<std::int64_t>(static_cast<double>(count) *
+      std::log2(static_cast<double>(std::max<std::int64_t>(2, count)))));
+  std::int64_t comparisons = 0;
   std::sort(order.begin(), order.end(),
-    [&](std::int32_t a, std::int32_t b) { return key[a] != key[b] ? key[a] < key[b] : a < b; });
+    [&](std::int32_t a, std::int32_t b)
+    {
+      sortReport(++comparisons);
+      return key[a] != key[b] ? key[a] < key[b] : a < b;
+    });
 
   const std::int64_t blocks = (count + SkinLanes - 1) / SkinLanes;
   const std::int64_t padded = blocks * SkinLanes;
@@ -373,8 +411,11 @@ void SkinDeformation::Internals::MakeBlocks()
   this->Pivot.assign(padded, 0);
   this->BlockOffset.assign(1, 0);
   std::vector<std::int32_t> entryOf(this->Rig.NumberOfBones(), -1);
+  const ProgressCallback blockProgress = parts(2);
+  LoopReport blockReport(blockProgress, blocks);
   for (std::int64_t block = 0; block < blocks; ++block)
   {
+    blockReport(block);
     const auto begin = static_cast<std::int32_t>(this->BlockBone.size());
     for (int lane = 0; lane < SkinLanes; ++lane)
     {
@@ -573,7 +614,8 @@ Vector3 SkinDeformation::Internals::Deformed(std::int64_t point) const
 }
 
 template <typename Real>
-void SkinDeformation::Internals::DisplacementsOf(const Real* positions, Real* displacements) const
+void SkinDeformation::Internals::DisplacementsOf(
+  const Real* positions, Real* displacements, const ProgressCallback& progress) const
 {
   const auto body = [&](std::int64_t first, std::int64_t last)
   {
@@ -582,11 +624,12 @@ void SkinDeformation::Internals::DisplacementsOf(const Real* positions, Real* di
       StorePoint(displacements, i, PointAt(positions, i) - this->Points[i]);
     }
   };
-  ParallelFor(static_cast<std::int64_t>(this->Points.size()), PointGrain, std::ref(body));
+  For(static_cast<std::int64_t>(this->Points.size()), PointGrain, body, progress);
 }
 
 template <typename Real>
-void SkinDeformation::Internals::NormalsOf(const Real* positions, Real* normals)
+void SkinDeformation::Internals::NormalsOf(
+  const Real* positions, Real* normals, const ProgressCallback& progress)
 {
   const auto ofTriangles = [&](std::int64_t first, std::int64_t last)
   {
@@ -598,7 +641,8 @@ void SkinDeformation::Internals::NormalsOf(const Real* positions, Real* normals)
       this->TriangleNormals[n] = (b - a).cross(c - a);
     }
   };
-  ParallelFor(static_cast<std::int64_t>(this->Triangles.size()), PointGrain, std::ref(ofTriangles));
+  For(static_cast<std::int64_t>(this->Triangles.size()), PointGrain, ofTriangles,
+    PartOf(progress, 0.0, 0.5));
   const auto ofPoints = [&](std::int64_t first, std::int64_t last)
   {
     for (std::int64_t i = first; i < last; ++i)
@@ -614,7 +658,8 @@ void SkinDeformation::Internals::NormalsOf(const Real* positions, Real* normals)
       StorePoint(normals, i, sum.stableNormalized());
     }
   };
-  ParallelFor(static_cast<std::int64_t>(this->Points.size()), PointGrain, std::ref(ofPoints));
+  For(static_cast<std::int64_t>(this->Points.size()), PointGrain, ofPoints,
+    PartOf(progress, 0.5, 1.0));
 }
 
 template <typename Real>
@@ -629,8 +674,8 @@ double SkinDeformation::Internals::RatioOf(const Real* positions, std::int64_t t
 }
 
 template <typename Real>
-void SkinDeformation::Internals::Check(
-  const Real* positions, InversionReport& report, double leastRatio)
+void SkinDeformation::Internals::Check(const Real* positions, InversionReport& report,
+  double leastRatio, const ProgressCallback& progress)
 {
   const auto body = [&](std::int64_t first, std::int64_t last)
   {
@@ -640,7 +685,7 @@ void SkinDeformation::Internals::Check(
     }
   };
   const auto count = static_cast<std::int64_t>(this->Tetrahedra.size());
-  ParallelFor(count, PointGrain, std::ref(body));
+  For(count, PointGrain, body, progress);
   report.tetrahedra.clear();
   report.leastRatio = count > 0 ? std::numeric_limits<double>::infinity() : 1.0;
   for (std::int64_t n = 0; n < count; ++n)
@@ -658,13 +703,15 @@ void SkinDeformation::Internals::Check(
 }
 
 template <typename Real>
-void SkinDeformation::Internals::Repair(Real* positions, InversionReport& report, double leastRatio)
+void SkinDeformation::Internals::Repair(
+  Real* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress)
 {
   Require(leastRatio >= 0.0 && leastRatio <= GreatestLeastRatio,
     "The least ratio of volumes that a repair can reach is 0 to 0.5");
-  this->Check(positions, report, leastRatio);
+  this->Check(positions, report, leastRatio, PartOf(progress, 0.0, 0.3));
   if (report.found == 0)
   {
+    SkipProgress(progress, 0.3, 1.0);
     return;
   }
   // Rounding of the positions must not undo it.
@@ -681,8 +728,14 @@ void SkinDeformation::Internals::Repair(Real* positions, InversionReport& report
     {
       queued[n] = 0;
     }
-    for (const std::int64_t n : report.tetrahedra)
+    // How many sweeps it will be is not known: each one takes a tenth of what is left.
+    const double left = 0.6 * std::pow(0.9, report.sweeps);
+    const ProgressCallback sweepProgress = PartOf(progress, 0.9 - left, 0.9 - 0.9 * left);
+    LoopReport sweepReport(sweepProgress, static_cast<std::int64_t>(report.tetrahedra.size()));
+    for (std::size_t at = 0; at < report.tetrahedra.size(); ++at)
     {
+      const std::int64_t n = report.tetrahedra[at];
+      sweepReport(static_cast<std::int64_t>(at));
       if (this->RatioOf(positions, n) > leastRatio)
       {
         continue; // a neighbour's repair was its own
@@ -717,9 +770,10 @@ void SkinDeformation::Internals::Repair(Real* positions, InversionReport& report
       next.end());
     ++report.sweeps;
   }
+  SkipProgress(progress, 0.9 - 0.6 * std::pow(0.9, report.sweeps), 0.9);
   const std::int64_t found = report.found;
   const int sweeps = report.sweeps;
-  this->Check(positions, report, leastRatio);
+  this->Check(positions, report, leastRatio, PartOf(progress, 0.9, 1.0));
   report.found = found;
   report.sweeps = sweeps;
   report.movedPoints = static_cast<std::int64_t>(moved.size());
@@ -778,8 +832,9 @@ void SkinDeformation::Internals::Unfold(
 }
 
 SkinDeformation::SkinDeformation(const std::vector<Vector3>& points,
-  const CompactSkinWeights& weights, const Skeleton& rest, const SkinDeformationSettings& settings)
-  : Data(std::make_unique<Internals>(points, weights, rest, settings))
+  const CompactSkinWeights& weights, const Skeleton& rest, const SkinDeformationSettings& settings,
+  const ProgressCallback& progress)
+  : Data(std::make_unique<Internals>(points, weights, rest, settings, progress))
 {
 }
 
@@ -797,7 +852,8 @@ std::int64_t SkinDeformation::NumberOfPoints() const
   return static_cast<std::int64_t>(this->Data->Points.size());
 }
 
-void SkinDeformation::Deform(const std::vector<BoneTransform>& bones, float* positions)
+void SkinDeformation::Deform(
+  const std::vector<BoneTransform>& bones, float* positions, const ProgressCallback& progress)
 {
   Internals& data = *this->Data;
   data.SetFrame(bones);
@@ -817,10 +873,11 @@ void SkinDeformation::Deform(const std::vector<BoneTransform>& bones, float* pos
                                     : (dual ? kernels->dual : kernels->linear);
   const auto body = [&](std::int64_t first, std::int64_t last)
   { kernel(data.Blocks, data.Bones.data(), centre, first, last, positions); };
-  ParallelFor(static_cast<std::int64_t>(data.BlockOffset.size()) - 1, BlockGrain, std::ref(body));
+  For(static_cast<std::int64_t>(data.BlockOffset.size()) - 1, BlockGrain, body, progress);
 }
 
-void SkinDeformation::Deform(const std::vector<BoneTransform>& bones, double* positions)
+void SkinDeformation::Deform(
+  const std::vector<BoneTransform>& bones, double* positions, const ProgressCallback& progress)
 {
   Internals& data = *this->Data;
   data.SetFrame(bones);
@@ -831,7 +888,7 @@ void SkinDeformation::Deform(const std::vector<BoneTransform>& bones, double* po
       StorePoint(positions, i, data.Deformed(i));
     }
   };
-  ParallelFor(static_cast<std::int64_t>(data.Points.size()), PointGrain, std::ref(body));
+  For(static_cast<std::int64_t>(data.Points.size()), PointGrain, body, progress);
 }
 
 void SkinDeformation::Deform(const SkeletonPose& pose, float* positions)
@@ -846,40 +903,51 @@ void SkinDeformation::Deform(const SkeletonPose& pose, double* positions)
   this->Deform(this->Data->Transforms, positions);
 }
 
-void SkinDeformation::Displacements(const float* positions, float* displacements) const
+void SkinDeformation::Displacements(
+  const float* positions, float* displacements, const ProgressCallback& progress) const
 {
-  this->Data->DisplacementsOf(positions, displacements);
+  this->Data->DisplacementsOf(positions, displacements, progress);
 }
 
-void SkinDeformation::Displacements(const double* positions, double* displacements) const
+void SkinDeformation::Displacements(
+  const double* positions, double* displacements, const ProgressCallback& progress) const
 {
-  this->Data->DisplacementsOf(positions, displacements);
+  this->Data->DisplacementsOf(positions, displacements, progress);
 }
 
-void SkinDeformation::SetTriangles(const std::vector<Triangle>& triangles)
+void SkinDeformation::SetTriangles(
+  const std::vector<Triangle>& triangles, const ProgressCallback& progress)
 {
-  RequireCorners(triangles, this->NumberOfPoints(), "Triangle");
+  const WorkParts parts(progress, { 0.2, 0.8 });
+  RequireCorners(triangles, this->NumberOfPoints(), "Triangle", parts(0));
+  this->Data->TrianglesOf = CellsOfPoints(triangles, this->NumberOfPoints(), parts(1));
   this->Data->Triangles = triangles;
-  this->Data->TrianglesOf = CellsOfPoints(triangles, this->NumberOfPoints());
   this->Data->TriangleNormals.resize(triangles.size());
 }
 
-void SkinDeformation::NormalsOf(const float* positions, float* normals) const
+void SkinDeformation::NormalsOf(
+  const float* positions, float* normals, const ProgressCallback& progress) const
 {
-  this->Data->NormalsOf(positions, normals);
+  this->Data->NormalsOf(positions, normals, progress);
 }
 
-void SkinDeformation::NormalsOf(const double* positions, double* normals) const
+void SkinDeformation::NormalsOf(
+  const double* positions, double* normals, const ProgressCallback& progress) const
 {
-  this->Data->NormalsOf(positions, normals);
+  this->Data->NormalsOf(positions, normals, progress);
 }
 
-void SkinDeformation::SetTetrahedra(const std::vector<std::array<std::int64_t, 4>>& tetrahedra)
+void SkinDeformation::SetTetrahedra(
+  const std::vector<std::array<std::int64_t, 4>>& tetrahedra, const ProgressCallback& progress)
 {
-  RequireCorners(tetrahedra, this->NumberOfPoints(), "Tetrahedron");
+  const WorkParts parts(progress, { 0.1, 0.4, 0.5 });
+  RequireCorners(tetrahedra, this->NumberOfPoints(), "Tetrahedron", parts(0));
   std::vector<double> volumes(tetrahedra.size());
+  const ProgressCallback volumeProgress = parts(1);
+  LoopReport report(volumeProgress, static_cast<std::int64_t>(tetrahedra.size()));
   for (std::size_t n = 0; n < tetrahedra.size(); ++n)
   {
+    report(static_cast<std::int64_t>(n));
     const std::vector<Vector3>& points = this->Data->Points;
     const Vector3 a = points[tetrahedra[n][1]] - points[tetrahedra[n][0]];
     const Vector3 b = points[tetrahedra[n][2]] - points[tetrahedra[n][0]];
@@ -890,33 +958,34 @@ void SkinDeformation::SetTetrahedra(const std::vector<std::array<std::int64_t, 4
       throw std::invalid_argument("Tetrahedron " + std::to_string(n) + " has no volume at rest");
     }
   }
+  this->Data->TetrahedraOf = CellsOfPoints(tetrahedra, this->NumberOfPoints(), parts(2));
   this->Data->Tetrahedra = tetrahedra;
-  this->Data->TetrahedraOf = CellsOfPoints(tetrahedra, this->NumberOfPoints());
   this->Data->RestVolume = std::move(volumes);
   this->Data->Ratio.assign(tetrahedra.size(), 1.0);
 }
 
-void SkinDeformation::CheckTetrahedra(
-  const float* positions, InversionReport& report, double leastRatio) const
+void SkinDeformation::CheckTetrahedra(const float* positions, InversionReport& report,
+  double leastRatio, const ProgressCallback& progress) const
 {
-  this->Data->Check(positions, report, leastRatio);
+  this->Data->Check(positions, report, leastRatio, progress);
 }
 
-void SkinDeformation::CheckTetrahedra(
-  const double* positions, InversionReport& report, double leastRatio) const
+void SkinDeformation::CheckTetrahedra(const double* positions, InversionReport& report,
+  double leastRatio, const ProgressCallback& progress) const
 {
-  this->Data->Check(positions, report, leastRatio);
-}
-
-void SkinDeformation::RepairTetrahedra(float* positions, InversionReport& report, double leastRatio)
-{
-  this->Data->Repair(positions, report, leastRatio);
+  this->Data->Check(positions, report, leastRatio, progress);
 }
 
 void SkinDeformation::RepairTetrahedra(
-  double* positions, InversionReport& report, double leastRatio)
+  float* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress)
 {
-  this->Data->Repair(positions, report, leastRatio);
+  this->Data->Repair(positions, report, leastRatio, progress);
+}
+
+void SkinDeformation::RepairTetrahedra(
+  double* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress)
+{
+  this->Data->Repair(positions, report, leastRatio, progress);
 }
 
 const std::vector<double>& SkinDeformation::VolumeRatios() const
@@ -935,8 +1004,8 @@ double SkinDeformation::EntriesPerBlock() const
 namespace
 {
 template <typename Real>
-void Velocities(
-  const Real* now, const Real* before, double seconds, std::int64_t values, Real* velocities)
+void Velocities(const Real* now, const Real* before, double seconds, std::int64_t values,
+  Real* velocities, const ProgressCallback& progress)
 {
   Require(std::isfinite(seconds) && seconds != 0.0, "The time between two poses must not be 0");
   const Real factor = static_cast<Real>(1.0 / seconds);
@@ -947,19 +1016,19 @@ void Velocities(
       velocities[n] = (now[n] - before[n]) * factor;
     }
   };
-  ParallelFor(values, 3 * PointGrain, std::ref(body));
+  For(values, 3 * PointGrain, body, progress);
 }
 }
 
-void SkinVelocities(
-  const float* now, const float* before, double seconds, std::int64_t values, float* velocities)
+void SkinVelocities(const float* now, const float* before, double seconds, std::int64_t values,
+  float* velocities, const ProgressCallback& progress)
 {
-  Velocities(now, before, seconds, values, velocities);
+  Velocities(now, before, seconds, values, velocities, progress);
 }
 
-void SkinVelocities(
-  const double* now, const double* before, double seconds, std::int64_t values, double* velocities)
+void SkinVelocities(const double* now, const double* before, double seconds, std::int64_t values,
+  double* velocities, const ProgressCallback& progress)
 {
-  Velocities(now, before, seconds, values, velocities);
+  Velocities(now, before, seconds, values, velocities, progress);
 }
 }

@@ -11,6 +11,7 @@
 
 #include "BiharmonicSkinWeights.h"
 #include "Geometry.h"
+#include "ParallelFor.h"
 #include "SkeletonPose.h"
 
 #include <array>
@@ -47,6 +48,7 @@ struct InversionReport
 /**
  * Set up once for a mesh at rest; then every frame is one pass over the points, without allocation.
  *
+ * Whatever takes a ProgressCallback throws Cancelled when that says stop; the object may be used again.
  * Not to be called from two threads at once: an object holds the frame it is at work on. The same
  * input gives the same bits on any number of threads. Results in single precision differ in the last
  * bits between processors with and without fused multiplication.
@@ -62,7 +64,8 @@ public:
    * does not exist, a value that is not finite; as SkeletonRig
    */
   SkinDeformation(const std::vector<Vector3>& points, const CompactSkinWeights& weights,
-    const Skeleton& rest, const SkinDeformationSettings& settings = {});
+    const Skeleton& rest, const SkinDeformationSettings& settings = {},
+    const ProgressCallback& progress = {});
   ~SkinDeformation();
   SkinDeformation(SkinDeformation&&) noexcept;
   SkinDeformation& operator=(SkinDeformation&&) noexcept;
@@ -78,36 +81,43 @@ public:
    * @param bones  one for each bone: SkeletonRig::Transform
    * @throws std::invalid_argument  as SkeletonRig::Transform, or a wrong number of bones
    */
-  void Deform(const std::vector<BoneTransform>& bones, float* positions);
-  void Deform(const std::vector<BoneTransform>& bones, double* positions);
+  void Deform(const std::vector<BoneTransform>& bones, float* positions,
+    const ProgressCallback& progress = {});
+  void Deform(const std::vector<BoneTransform>& bones, double* positions,
+    const ProgressCallback& progress = {});
   void Deform(const SkeletonPose& pose, float* positions);
   void Deform(const SkeletonPose& pose, double* positions);
   ///@}
 
   ///@{
   /// positions - rest positions, mm.
-  void Displacements(const float* positions, float* displacements) const;
-  void Displacements(const double* positions, double* displacements) const;
+  void Displacements(
+    const float* positions, float* displacements, const ProgressCallback& progress = {}) const;
+  void Displacements(
+    const double* positions, double* displacements, const ProgressCallback& progress = {}) const;
   ///@}
 
   /// For NormalsOf. @throws std::invalid_argument: an index that does not exist
-  void SetTriangles(const std::vector<Triangle>& triangles);
+  void SetTriangles(const std::vector<Triangle>& triangles, const ProgressCallback& progress = {});
   ///@{
   /// Unit normals of the points: mean of the triangles around, weighted by their areas; 0 where there
   /// are none.
-  void NormalsOf(const float* positions, float* normals) const;
-  void NormalsOf(const double* positions, double* normals) const;
+  void NormalsOf(
+    const float* positions, float* normals, const ProgressCallback& progress = {}) const;
+  void NormalsOf(
+    const double* positions, double* normals, const ProgressCallback& progress = {}) const;
   ///@}
 
   /// For the check and the repair; either orientation.
   /// @throws std::invalid_argument: an index that does not exist, a tetrahedron without volume at rest
-  void SetTetrahedra(const std::vector<std::array<std::int64_t, 4>>& tetrahedra);
+  void SetTetrahedra(const std::vector<std::array<std::int64_t, 4>>& tetrahedra,
+    const ProgressCallback& progress = {});
   ///@{
   /// @param leastRatio  tetrahedra at or below this share of their volume at rest are reported
-  void CheckTetrahedra(
-    const float* positions, InversionReport& report, double leastRatio = 0.0) const;
-  void CheckTetrahedra(
-    const double* positions, InversionReport& report, double leastRatio = 0.0) const;
+  void CheckTetrahedra(const float* positions, InversionReport& report, double leastRatio = 0.0,
+    const ProgressCallback& progress = {}) const;
+  void CheckTetrahedra(const double* positions, InversionReport& report, double leastRatio = 0.0,
+    const ProgressCallback& progress = {}) const;
   ///@}
   /// Signed volume against rest of every tetrahedron, of the last check or repair.
   const std::vector<double>& VolumeRatios() const;
@@ -122,8 +132,10 @@ public:
    * @param leastRatio  0 to 0.5
    * @throws std::invalid_argument: leastRatio is out of range
    */
-  void RepairTetrahedra(float* positions, InversionReport& report, double leastRatio = 0.0);
-  void RepairTetrahedra(double* positions, InversionReport& report, double leastRatio = 0.0);
+  void RepairTetrahedra(float* positions, InversionReport& report, double leastRatio = 0.0,
+    const ProgressCallback& progress = {});
+  void RepairTetrahedra(double* positions, InversionReport& report, double leastRatio = 0.0,
+    const ProgressCallback& progress = {});
   ///@}
 
   /// For tests and benchmarks: bones looked at per block of 16 points, on average.
@@ -136,10 +148,10 @@ private:
 
 /// (now - before) / seconds for `values` values, mm/s. @throws std::invalid_argument: seconds are 0 or not
 /// finite
-void SkinVelocities(
-  const float* now, const float* before, double seconds, std::int64_t values, float* velocities);
-void SkinVelocities(
-  const double* now, const double* before, double seconds, std::int64_t values, double* velocities);
+void SkinVelocities(const float* now, const float* before, double seconds, std::int64_t values,
+  float* velocities, const ProgressCallback& progress = {});
+void SkinVelocities(const double* now, const double* before, double seconds, std::int64_t values,
+  double* velocities, const ProgressCallback& progress = {});
 }
 
 #endif

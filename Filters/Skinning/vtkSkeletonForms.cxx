@@ -1,5 +1,6 @@
 #include "vtkSkeletonForms.h"
 
+#include "PartialProgress.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 
@@ -65,11 +66,14 @@ void PoseArrays::Validate() const
   }
 }
 
-Skeleton SkeletonOf(vtkPolyData* data, const std::string& whose)
+Skeleton SkeletonOf(
+  vtkPolyData* data, const std::string& whose, const coronary::ProgressCallback& progress)
 {
   Skeleton skeleton;
+  coronary::LoopReport report(progress, data->GetNumberOfPoints() + data->GetNumberOfLines());
   for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
   {
+    report(n);
     skeleton.joints.emplace_back(data->GetPoint(n));
   }
   vtkDataArray* parents = data->GetPointData()->GetArray(vtkCoronaryArrayNames::ParentJoint);
@@ -78,6 +82,7 @@ Skeleton SkeletonOf(vtkPolyData* data, const std::string& whose)
   {
     vtkIdType count = 0;
     const vtkIdType* ids = nullptr;
+    report(data->GetNumberOfPoints() + cell);
     lines->GetCellAtId(cell, count, ids);
     Require(count == 2,
       "Line " + std::to_string(cell) + " of " + whose + " has " + std::to_string(count) +
@@ -104,7 +109,8 @@ Skeleton SkeletonOf(vtkPolyData* data, const std::string& whose)
   return skeleton;
 }
 
-SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const PoseArrays& names)
+SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const PoseArrays& names,
+  const coronary::ProgressCallback& progress)
 {
   const Skeleton& rest = rig.Rest();
   Require(data->GetNumberOfPoints() == rig.NumberOfJoints() &&
@@ -113,8 +119,10 @@ SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const P
       std::to_string(data->GetNumberOfLines()) + " bones, the rest skeleton " +
       std::to_string(rig.NumberOfJoints()) + " and " + std::to_string(rig.NumberOfBones()));
   SkeletonPose pose;
+  coronary::LoopReport report(progress, data->GetNumberOfPoints() + data->GetNumberOfLines());
   for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
   {
+    report(n);
     pose.joints.emplace_back(data->GetPoint(n));
   }
   vtkCellArray* lines = data->GetLines();
@@ -122,6 +130,7 @@ SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const P
   {
     vtkIdType count = 0;
     const vtkIdType* ids = nullptr;
+    report(data->GetNumberOfPoints() + cell);
     lines->GetCellAtId(cell, count, ids);
     const Skeleton::Bone& bone = rest.bones[cell];
     Require(count == 2 && bone.first + bone.second == ids[0] + ids[1] &&
@@ -146,15 +155,19 @@ SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const P
 }
 
 void SetPose(vtkPolyData* rest, const SkeletonPose& pose,
-  const std::vector<coronary::BoneTransform>& bones, const PoseArrays& names, vtkPolyData* output)
+  const std::vector<coronary::BoneTransform>& bones, const PoseArrays& names, vtkPolyData* output,
+  const coronary::ProgressCallback& progress)
 {
+  const auto joints = static_cast<vtkIdType>(pose.joints.size());
+  coronary::LoopReport report(progress, joints + static_cast<vtkIdType>(bones.size()));
   output->ShallowCopy(rest);
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
-  points->SetNumberOfPoints(static_cast<vtkIdType>(pose.joints.size()));
-  for (std::size_t n = 0; n < pose.joints.size(); ++n)
+  points->SetNumberOfPoints(joints);
+  for (vtkIdType n = 0; n < joints; ++n)
   {
-    points->SetPoint(static_cast<vtkIdType>(n), pose.joints[n].data());
+    report(n);
+    points->SetPoint(n, pose.joints[n].data());
   }
   output->SetPoints(points);
   const vtkIdType first = FirstLine(rest);
@@ -174,6 +187,7 @@ void SetPose(vtkPolyData* rest, const SkeletonPose& pose,
   for (std::size_t n = 0; n < bones.size(); ++n)
   {
     const vtkIdType cell = first + static_cast<vtkIdType>(n);
+    report(joints + static_cast<vtkIdType>(n));
     const Quaternion& q = bones[n].rotation;
     rotation->SetTuple4(cell, q.w(), q.x(), q.y(), q.z());
     twist->SetValue(cell, bones[n].twist);

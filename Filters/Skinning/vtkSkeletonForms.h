@@ -5,6 +5,7 @@
 #ifndef vtkSkeletonForms_h
 #define vtkSkeletonForms_h
 
+#include "ParallelFor.h"
 #include "SkeletonPose.h"
 
 #include <string>
@@ -32,18 +33,20 @@ struct PoseArrays
  * @param whose  for messages: "the rest skeleton"
  * @throws std::invalid_argument: a cell that is no line of two points, as coronary::CheckSkeleton
  */
-coronary::Skeleton SkeletonOf(vtkPolyData* data, const std::string& whose);
+coronary::Skeleton SkeletonOf(
+  vtkPolyData* data, const std::string& whose, const coronary::ProgressCallback& progress = {});
 
 /**
  * The points, and of the arrays of `names` what is there.
  * @throws std::invalid_argument: other bones than the rest skeleton's, an array of wrong form
  */
-coronary::SkeletonPose PoseOf(
-  vtkPolyData* data, const coronary::SkeletonRig& rig, const PoseArrays& names);
+coronary::SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig,
+  const PoseArrays& names, const coronary::ProgressCallback& progress = {});
 
 /// Makes `output` the skeleton `rest`, posed: its cells and arrays, other points, arrays of the pose.
 void SetPose(vtkPolyData* rest, const coronary::SkeletonPose& pose,
-  const std::vector<coronary::BoneTransform>& bones, const PoseArrays& names, vtkPolyData* output);
+  const std::vector<coronary::BoneTransform>& bones, const PoseArrays& names, vtkPolyData* output,
+  const coronary::ProgressCallback& progress = {});
 }
 
 #endif

@@ -1,6 +1,8 @@
 #include "vtkSkeletonPose.h"
 
+#include "PartialProgress.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
 #include "vtkSkeletonForms.h"
@@ -120,6 +122,7 @@ int vtkSkeletonPose::RequestData(
   {
     return 1;
   }
+  int success = 1;
   try
   {
     const vtkSkeletonForms::PoseArrays arrays{ this->RotationArrayName, this->TwistArrayName,
@@ -129,11 +132,17 @@ int vtkSkeletonPose::RequestData(
     {
       return 1;
     }
-    const coronary::SkeletonRig rig(vtkSkeletonForms::SkeletonOf(input, "the skeleton"));
+    const coronary::ProgressCallback progress = vtkCoronary::ProgressOf(this);
+    const coronary::WorkParts parts(
+      progress, { 4.0, start ? 2.0 : 0.0, static_cast<double>(this->Edits.size()), 4.0 });
+    const coronary::SkeletonRig rig(vtkSkeletonForms::SkeletonOf(input, "the skeleton", parts(0)));
     coronary::SkeletonPose pose =
-      start ? vtkSkeletonForms::PoseOf(start, rig, arrays) : rig.RestPose();
+      start ? vtkSkeletonForms::PoseOf(start, rig, arrays, parts(1)) : rig.RestPose();
+    const coronary::ProgressCallback editProgress = parts(2);
+    coronary::LoopReport report(editProgress, static_cast<std::int64_t>(this->Edits.size()));
     for (std::size_t n = 0; n < this->Edits.size(); ++n)
     {
+      report(static_cast<std::int64_t>(n));
       try
       {
         coronary::ApplyPoseEdit(rig, EditOf(this->Edits[n]), pose);
@@ -171,7 +180,7 @@ int vtkSkeletonPose::RequestData(
     }
     std::vector<coronary::BoneTransform> bones;
     rig.Transform(pose, bones);
-    vtkSkeletonForms::SetPose(input, pose, bones, arrays, output);
+    vtkSkeletonForms::SetPose(input, pose, bones, arrays, output, parts(3));
     if (start)
     {
       output->GetFieldData()->PassData(start->GetFieldData());
@@ -179,16 +188,24 @@ int vtkSkeletonPose::RequestData(
     this->UpdateProgress(1.0);
     return 1;
   }
+  catch (const coronary::Cancelled&)
+  {
+    vtkDebugMacro("aborted");
+  }
   catch (const std::bad_alloc&)
   {
     vtkErrorMacro("Not enough memory for the pose");
+    success = 0;
   }
   catch (const std::exception& error)
   {
     vtkErrorMacro(<< error.what());
+    success = 0;
   }
+  // Not marked as generated, so that the next request executes again.
   output->Initialize();
-  return 0;
+  outputs->GetInformationObject(0)->Set(SDDP::DATA_NOT_GENERATED(), 1);
+  return success;
 }
 
 void vtkSkeletonPose::PrintSelf(ostream& os, vtkIndent indent)

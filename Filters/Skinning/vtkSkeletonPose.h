@@ -23,6 +23,7 @@
  * @par Failure:
  * A joint that does not exist, a number that is not finite, a calibre that is not positive, a bone that
  * would lose its length, lines that are no bones, a posed skeleton with other bones: one error and no output.
+ * An aborted execution leaves an empty output and is started anew by the next request.
  *
  * @sa coronary::PoseEditor, vtkSkinDeformation
  */

@@ -1,7 +1,9 @@
 #include "vtkSkinDeformation.h"
 
+#include "PartialProgress.h"
 #include "SkinDeformation.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
 #include "vtkSkeletonForms.h"
@@ -39,6 +41,8 @@
 #include <vector>
 
 namespace names = vtkCoronaryArrayNames;
+using coronary::LoopReport;
+using coronary::ProgressCallback;
 using coronary::Vector3;
 using vtkCoronary::Moment;
 using vtkCoronary::Require;
@@ -91,8 +95,8 @@ vtkDataArray* WeightArray(vtkPointSet* mesh, const std::string& name)
   return array;
 }
 
-coronary::CompactSkinWeights WeightsOf(
-  vtkPointSet* mesh, const std::string& indicesName, const std::string& weightsName)
+coronary::CompactSkinWeights WeightsOf(vtkPointSet* mesh, const std::string& indicesName,
+  const std::string& weightsName, const ProgressCallback& progress)
 {
   vtkDataArray* indices = WeightArray(mesh, indicesName);
   vtkDataArray* weights = WeightArray(mesh, weightsName);
@@ -104,8 +108,10 @@ coronary::CompactSkinWeights WeightsOf(
   const auto size = static_cast<std::size_t>(mesh->GetNumberOfPoints()) * compact.influences;
   compact.bone.reserve(size);
   compact.weight.reserve(size);
+  LoopReport report(progress, mesh->GetNumberOfPoints());
   for (vtkIdType n = 0; n < mesh->GetNumberOfPoints(); ++n)
   {
+    report(n);
     for (int c = 0; c < compact.influences; ++c)
     {
       const double index = indices->GetComponent(n, c);
@@ -118,13 +124,15 @@ coronary::CompactSkinWeights WeightsOf(
   return compact;
 }
 
-std::vector<coronary::Triangle> TrianglesOf(vtkPolyData* surface)
+std::vector<coronary::Triangle> TrianglesOf(vtkPolyData* surface, const ProgressCallback& progress)
 {
   std::vector<coronary::Triangle> triangles;
+  LoopReport report(progress, surface->GetNumberOfPolys() + surface->GetNumberOfStrips());
   vtkIdType count = 0;
   const vtkIdType* ids = nullptr;
   for (vtkIdType cell = 0; cell < surface->GetNumberOfPolys(); ++cell)
   {
+    report(cell);
     surface->GetPolys()->GetCellAtId(cell, count, ids);
     for (vtkIdType i = 2; i < count; ++i)
     {
@@ -133,6 +141,7 @@ std::vector<coronary::Triangle> TrianglesOf(vtkPolyData* surface)
   }
   for (vtkIdType cell = 0; cell < surface->GetNumberOfStrips(); ++cell)
   {
+    report(surface->GetNumberOfPolys() + cell);
     surface->GetStrips()->GetCellAtId(cell, count, ids);
     for (vtkIdType i = 2; i < count; ++i)
     {
@@ -144,11 +153,13 @@ std::vector<coronary::Triangle> TrianglesOf(vtkPolyData* surface)
 }
 
 std::vector<std::array<std::int64_t, 4>> TetrahedraOf(
-  vtkUnstructuredGrid* grid, std::vector<vtkIdType>& cells)
+  vtkUnstructuredGrid* grid, std::vector<vtkIdType>& cells, const ProgressCallback& progress)
 {
   std::vector<std::array<std::int64_t, 4>> tetrahedra;
+  LoopReport report(progress, grid->GetNumberOfCells());
   for (vtkIdType cell = 0; cell < grid->GetNumberOfCells(); ++cell)
   {
+    report(cell);
     if (grid->GetCellType(cell) == VTK_TETRA)
     {
       vtkIdType count = 0;
@@ -194,67 +205,52 @@ struct vtkSkinDeformation::Internals
   std::list<Setup> Setups; ///< the one that was used last comes first
   int NumberOfSetups = 0;
 
-  Setup& Of(vtkSkinDeformation* self, vtkPointSet* mesh, vtkPolyData* rest);
+  /// The setup of that origin, which then is the first one; null when there is none.
+  Setup* Find(const Origin& origin);
+  Setup& Make(const Origin& origin, vtkSkinDeformation* self, vtkPointSet* mesh, vtkPolyData* rest,
+    const ProgressCallback& progress);
 };
 
-Setup& vtkSkinDeformation::Internals::Of(
-  vtkSkinDeformation* self, vtkPointSet* mesh, vtkPolyData* rest)
+Setup* vtkSkinDeformation::Internals::Find(const Origin& origin)
 {
-  auto* surface = vtkPolyData::SafeDownCast(mesh);
-  auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh);
-  Origin origin;
-  origin.settings = { self->Blend, self->Stretch ? 1 : 0 };
-  origin.Add(mesh->GetPoints());
-  origin.Add(WeightArray(mesh, self->IndicesArrayName));
-  origin.Add(WeightArray(mesh, self->WeightsArrayName));
-  origin.Add(rest->GetPoints());
-  origin.Add(rest->GetLines());
-  origin.Add(rest->GetPointData()->GetAbstractArray(names::ParentJoint));
-  origin.Add(grid ? grid->GetCells() : nullptr);
-  origin.Add(surface ? surface->GetPolys() : nullptr);
-  origin.Add(surface ? surface->GetStrips() : nullptr);
-  auto found = std::find_if(this->Setups.begin(), this->Setups.end(),
+  const auto found = std::find_if(this->Setups.begin(), this->Setups.end(),
     [&](const Setup& setup) { return setup.origin == origin; });
   if (found == this->Setups.end())
   {
-    Setup setup;
-    setup.origin = origin;
-    std::vector<Vector3> points;
-    points.reserve(mesh->GetNumberOfPoints());
-    for (vtkIdType n = 0; n < mesh->GetNumberOfPoints(); ++n)
-    {
-      points.emplace_back(mesh->GetPoint(n));
-    }
-    coronary::SkinDeformationSettings settings;
-    settings.blend = static_cast<coronary::SkinBlend>(self->Blend);
-    settings.stretch = self->Stretch;
-    setup.skin = std::make_unique<coronary::SkinDeformation>(points,
-      WeightsOf(mesh, self->IndicesArrayName, self->WeightsArrayName),
-      vtkSkeletonForms::SkeletonOf(rest, "the skeleton at rest"), settings);
-    this->Setups.push_front(std::move(setup));
-    ++this->NumberOfSetups;
-    if (this->Setups.size() > RememberedSetups)
-    {
-      this->Setups.pop_back();
-    }
+    return nullptr;
   }
-  else
+  this->Setups.splice(this->Setups.begin(), this->Setups, found);
+  return &this->Setups.front();
+}
+
+Setup& vtkSkinDeformation::Internals::Make(const Origin& origin, vtkSkinDeformation* self,
+  vtkPointSet* mesh, vtkPolyData* rest, const ProgressCallback& progress)
+{
+  const coronary::WorkParts parts(progress, { 0.1, 0.2, 0.7 });
+  Setup setup;
+  setup.origin = origin;
+  const ProgressCallback pointProgress = parts(0);
+  LoopReport report(pointProgress, mesh->GetNumberOfPoints());
+  std::vector<Vector3> points;
+  points.reserve(mesh->GetNumberOfPoints());
+  for (vtkIdType n = 0; n < mesh->GetNumberOfPoints(); ++n)
   {
-    this->Setups.splice(this->Setups.begin(), this->Setups, found);
+    report(n);
+    points.emplace_back(mesh->GetPoint(n));
   }
-  Setup& setup = this->Setups.front();
-  if (surface && self->ComputeNormals && !setup.hasTriangles)
+  coronary::SkinDeformationSettings settings;
+  settings.blend = static_cast<coronary::SkinBlend>(self->Blend);
+  settings.stretch = self->Stretch;
+  setup.skin = std::make_unique<coronary::SkinDeformation>(points,
+    WeightsOf(mesh, self->IndicesArrayName, self->WeightsArrayName, parts(1)),
+    vtkSkeletonForms::SkeletonOf(rest, "the skeleton at rest"), settings, parts(2));
+  this->Setups.push_front(std::move(setup));
+  ++this->NumberOfSetups;
+  if (this->Setups.size() > RememberedSetups)
   {
-    setup.skin->SetTriangles(TrianglesOf(surface));
-    setup.hasTriangles = true;
+    this->Setups.pop_back();
   }
-  if (grid && self->Tetrahedra != IgnoreTetrahedra && !setup.hasTetrahedra)
-  {
-    setup.cells.clear();
-    setup.skin->SetTetrahedra(TetrahedraOf(grid, setup.cells));
-    setup.hasTetrahedra = true;
-  }
-  return setup;
+  return this->Setups.front();
 }
 
 vtkStandardNewMacro(vtkSkinDeformation);
@@ -318,14 +314,66 @@ int vtkSkinDeformation::RequestUpdateExtent(
 }
 
 template <typename Array>
-void vtkSkinDeformation::Execute(
-  vtkPointSet* mesh, vtkInformationVector** inputs, vtkPointSet* output)
+void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** inputs,
+  vtkPointSet* output, const ProgressCallback& progress)
 {
   vtkPolyData* rest = vtkPolyData::GetData(inputs[1], 0);
   vtkInformation* poseInfo = inputs[2]->GetInformationObject(0);
   const vtkIdType count = mesh->GetNumberOfPoints();
-  Setup& setup = this->Data->Of(this, mesh, rest);
+  auto* surface = vtkPolyData::SafeDownCast(mesh);
+  auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh);
+  Origin origin;
+  origin.settings = { this->Blend, this->Stretch ? 1 : 0 };
+  origin.Add(mesh->GetPoints());
+  origin.Add(WeightArray(mesh, this->IndicesArrayName));
+  origin.Add(WeightArray(mesh, this->WeightsArrayName));
+  origin.Add(rest->GetPoints());
+  origin.Add(rest->GetLines());
+  origin.Add(rest->GetPointData()->GetAbstractArray(names::ParentJoint));
+  origin.Add(grid ? grid->GetCells() : nullptr);
+  origin.Add(surface ? surface->GetPolys() : nullptr);
+  origin.Add(surface ? surface->GetStrips() : nullptr);
+  Setup* known = this->Data->Find(origin);
+
+  const bool withTriangles = surface && this->ComputeNormals;
+  const bool withTetrahedra = grid && this->Tetrahedra != IgnoreTetrahedra;
+  const bool newTriangles = withTriangles && !(known && known->hasTriangles);
+  const bool newTetrahedra = withTetrahedra && !(known && known->hasTetrahedra);
+  enum Part
+  {
+    SettingUp,
+    ReadingTriangles,
+    ReadingTetrahedra,
+    Earlier,
+    Later,
+    Difference,
+    Deforming,
+    Checking,
+    Displacing,
+    Shading
+  };
+  const coronary::WorkParts parts(progress,
+    { known ? 0.0 : 8.0, newTriangles ? 2.0 : 0.0, newTetrahedra ? 4.0 : 0.0,
+      this->ComputeVelocity ? 2.0 : 0.0, this->ComputeVelocity ? 2.0 : 0.0,
+      this->ComputeVelocity ? 0.5 : 0.0, 2.0, withTetrahedra ? 3.0 : 0.0, 0.5,
+      withTriangles ? 1.0 : 0.0 });
+  Setup& setup = known ? *known : this->Data->Make(origin, this, mesh, rest, parts(SettingUp));
   coronary::SkinDeformation& skin = *setup.skin;
+  if (newTriangles)
+  {
+    const ProgressCallback part = parts(ReadingTriangles);
+    skin.SetTriangles(
+      TrianglesOf(surface, coronary::PartOf(part, 0.0, 0.4)), coronary::PartOf(part, 0.4, 1.0));
+    setup.hasTriangles = true;
+  }
+  if (newTetrahedra)
+  {
+    const ProgressCallback part = parts(ReadingTetrahedra);
+    setup.cells.clear();
+    skin.SetTetrahedra(TetrahedraOf(grid, setup.cells, coronary::PartOf(part, 0.0, 0.3)),
+      coronary::PartOf(part, 0.3, 1.0));
+    setup.hasTetrahedra = true;
+  }
   const vtkSkeletonForms::PoseArrays arrays{ this->RotationArrayName, this->TwistArrayName,
     names::AxialStrain, this->CalibreArrayName };
   arrays.Validate();
@@ -338,11 +386,11 @@ void vtkSkinDeformation::Execute(
     array->SetNumberOfTuples(count);
     return array;
   };
-  const auto deform = [&](vtkPolyData* pose, Array* positions)
+  const auto deform = [&](vtkPolyData* pose, Array* positions, Part part)
   {
     skin.Rig().Transform(vtkSkeletonForms::PoseOf(pose, skin.Rig(), arrays), setup.bones);
     skin.Rig().ConserveVolume(this->VolumeConservation, setup.bones);
-    skin.Deform(setup.bones, positions->GetPointer(0));
+    skin.Deform(setup.bones, positions->GetPointer(0), parts(part));
   };
 
   vtkSmartPointer<Array> velocity;
@@ -364,12 +412,12 @@ void vtkSkinDeformation::Execute(
       velocity = makeArray(this->VelocityArrayName.c_str());
       vtkCoronary::UpstreamRequest request(poseInfo, poseInfo);
       request.Ask(nullptr, before);
-      deform(vtkPolyData::GetData(inputs[2], 0), earlier);
+      deform(vtkPolyData::GetData(inputs[2], 0), earlier, Earlier);
       request.Ask(nullptr, after);
-      deform(vtkPolyData::GetData(inputs[2], 0), velocity);
+      deform(vtkPolyData::GetData(inputs[2], 0), velocity, Later);
       request.Restore();
       coronary::SkinVelocities(velocity->GetPointer(0), earlier->GetPointer(0), seconds, 3 * count,
-        velocity->GetPointer(0));
+        velocity->GetPointer(0), parts(Difference));
     }
     else
     {
@@ -379,7 +427,7 @@ void vtkSkinDeformation::Execute(
 
   vtkPolyData* pose = vtkPolyData::GetData(inputs[2], 0);
   const auto positions = makeArray("Points");
-  deform(pose, positions);
+  deform(pose, positions, Deforming);
   output->ShallowCopy(mesh);
   vtkNew<vtkPoints> points;
   points->SetData(positions);
@@ -398,15 +446,17 @@ void vtkSkinDeformation::Execute(
   }
   output->GetFieldData()->PassData(pose->GetFieldData());
 
-  if (setup.hasTetrahedra && this->Tetrahedra != IgnoreTetrahedra)
+  if (withTetrahedra)
   {
     if (this->Tetrahedra == RepairTetrahedra)
     {
-      skin.RepairTetrahedra(positions->GetPointer(0), setup.report, this->LeastVolumeRatio);
+      skin.RepairTetrahedra(
+        positions->GetPointer(0), setup.report, this->LeastVolumeRatio, parts(Checking));
     }
     else
     {
-      skin.CheckTetrahedra(positions->GetPointer(0), setup.report, this->LeastVolumeRatio);
+      skin.CheckTetrahedra(
+        positions->GetPointer(0), setup.report, this->LeastVolumeRatio, parts(Checking));
     }
     const coronary::InversionReport& report = setup.report;
     vtkNew<vtkDoubleArray> ratios;
@@ -434,22 +484,22 @@ void vtkSkinDeformation::Execute(
     }
   }
   const auto displacement = makeArray(this->DisplacementArrayName.c_str());
-  skin.Displacements(positions->GetPointer(0), displacement->GetPointer(0));
+  skin.Displacements(positions->GetPointer(0), displacement->GetPointer(0), parts(Displacing));
   output->GetPointData()->AddArray(displacement);
   if (velocity)
   {
     output->GetPointData()->AddArray(velocity);
   }
-  if (this->ComputeNormals && setup.hasTriangles)
+  if (withTriangles)
   {
     const auto normals = makeArray("Normals");
-    skin.NormalsOf(positions->GetPointer(0), normals->GetPointer(0));
+    skin.NormalsOf(positions->GetPointer(0), normals->GetPointer(0), parts(Shading));
     output->GetPointData()->SetNormals(normals);
   }
 }
 
-void vtkSkinDeformation::Execute(
-  vtkDataObject* mesh, vtkInformationVector** inputs, vtkDataObject* output)
+void vtkSkinDeformation::Execute(vtkDataObject* mesh, vtkInformationVector** inputs,
+  vtkDataObject* output, const ProgressCallback& progress)
 {
   auto* points = vtkPointSet::SafeDownCast(mesh);
   if (points == nullptr || points->GetNumberOfPoints() == 0)
@@ -458,11 +508,11 @@ void vtkSkinDeformation::Execute(
   }
   else if (this->DoublePrecision)
   {
-    this->Execute<vtkDoubleArray>(points, inputs, vtkPointSet::SafeDownCast(output));
+    this->Execute<vtkDoubleArray>(points, inputs, vtkPointSet::SafeDownCast(output), progress);
   }
   else
   {
-    this->Execute<vtkFloatArray>(points, inputs, vtkPointSet::SafeDownCast(output));
+    this->Execute<vtkFloatArray>(points, inputs, vtkPointSet::SafeDownCast(output), progress);
   }
 }
 
@@ -471,6 +521,7 @@ int vtkSkinDeformation::RequestData(
 {
   vtkDataObject* mesh = vtkDataObject::GetData(inputs[0], 0);
   vtkDataObject* output = vtkDataObject::GetData(outputs, 0);
+  int success = 1;
   try
   {
     Require(this->VolumeConservation >= 0.0 && this->VolumeConservation <= 1.0,
@@ -487,17 +538,23 @@ int vtkSkinDeformation::RequestData(
       moved->CopyStructure(blocks);
       moved->GetFieldData()->PassData(blocks->GetFieldData());
       const auto leaf = vtkSmartPointer<vtkCompositeDataIterator>::Take(blocks->NewIterator());
+      const auto total = static_cast<double>(std::max<vtkIdType>(1, blocks->GetNumberOfPoints()));
+      double done = 0.0;
       for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem())
       {
         vtkDataObject* block = leaf->GetCurrentDataObject();
+        const double next =
+          done + static_cast<double>(block->GetNumberOfElements(vtkDataObject::POINT)) / total;
+        const ProgressCallback progress = vtkCoronary::ProgressOf(this, done, next);
         const auto result = vtkSmartPointer<vtkDataObject>::Take(block->NewInstance());
-        this->Execute(block, inputs, result);
+        this->Execute(block, inputs, result, progress);
         moved->SetDataSet(leaf, result);
+        done = next;
       }
     }
     else
     {
-      this->Execute(mesh, inputs, output);
+      this->Execute(mesh, inputs, output, vtkCoronary::ProgressOf(this));
     }
     vtkDataObject* pose = vtkDataObject::GetData(inputs[2], 0);
     if (pose->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
@@ -508,16 +565,24 @@ int vtkSkinDeformation::RequestData(
     this->UpdateProgress(1.0);
     return 1;
   }
+  catch (const coronary::Cancelled&)
+  {
+    vtkDebugMacro("aborted");
+  }
   catch (const std::bad_alloc&)
   {
     vtkErrorMacro("Not enough memory for the deformation");
+    success = 0;
   }
   catch (const std::exception& error)
   {
     vtkErrorMacro(<< error.what());
+    success = 0;
   }
+  // Not marked as generated, so that the next request executes again.
   output->Initialize();
-  return 0;
+  outputs->GetInformationObject(0)->Set(SDDP::DATA_NOT_GENERATED(), 1);
+  return success;
 }
 
 void vtkSkinDeformation::PrintSelf(ostream& os, vtkIndent indent)

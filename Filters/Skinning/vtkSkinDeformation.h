@@ -31,7 +31,8 @@
  * @par Failure:
  * A missing or wrong array, a point without weights, an index of a bone that does not exist, a pose
  * with other bones, with values that are not finite or with a bone without length: one error and no output. An
- * empty mesh gives an empty output.
+ * empty mesh gives an empty output. An aborted execution leaves an empty output and is started anew by
+ * the next request.
  *
  * @sa coronary::SkinDeformation, vtkSkeletonPose, vtkBiharmonicSkinWeights
  */
@@ -41,8 +42,9 @@
 #include "vtkCoronarySkinningModule.h" // for the export macro
 #include "vtkPassInputTypeAlgorithm.h"
 
-#include <memory> // for std::unique_ptr
-#include <string> // for std::string
+#include <functional> // for std::function
+#include <memory>     // for std::unique_ptr
+#include <string>     // for std::string
 
 class vtkPointSet;
 
@@ -194,8 +196,10 @@ private:
 
   struct Internals;
   template <typename Array>
-  void Execute(vtkPointSet* mesh, vtkInformationVector** inputs, vtkPointSet* output);
-  void Execute(vtkDataObject* mesh, vtkInformationVector** inputs, vtkDataObject* output);
+  void Execute(vtkPointSet* mesh, vtkInformationVector** inputs, vtkPointSet* output,
+    const std::function<bool(double)>& progress);
+  void Execute(vtkDataObject* mesh, vtkInformationVector** inputs, vtkDataObject* output,
+    const std::function<bool(double)>& progress);
 
   int Blend = LinearBlend;
   bool Stretch = true;

@@ -3,6 +3,7 @@
 #include "vtkSkeletonPose.h"
 
 #include "FilterMessages.h"
+#include "ProgressChecks.h"
 #include "SkeletonTestData.h"
 
 #include "vtkDataArray.h"
@@ -109,6 +110,30 @@ TEST(SkeletonPose, BeginsAtAPoseInTime)
   const std::array<double, 3> tip = BendingChain::Bent(20.0, 0.5);
   ExpectPoint(filter->GetOutput(), 4, 100 + tip[0], 0, tip[2]);
   EXPECT_NE(filter->GetOutput()->GetFieldData()->GetArray("CycleLength"), nullptr);
+}
+
+TEST(SkeletonPose, ReportsOftenAndStopsAtOnce)
+{
+  const auto posed = ChainSkeleton(400);
+  vtkNew<vtkSkeletonPose> filter;
+  filter->SetInputData(ChainSkeleton(400));
+  EXPECT_LT(LargestProgressStep(filter), 0.02);
+  filter->SetInputData(1, posed);
+  for (int n = 0; n < 300; ++n)
+  {
+    filter->AddEdit(n, 0, 0, 1, 0, 0, 0, 0, 1.1, 50);
+  }
+  EXPECT_LT(LargestProgressStep(filter), 0.02);
+  for (const double share : { 0.0, 0.005, 0.5, 0.99 })
+  {
+    Messages messages(filter);
+    filter->Modified();
+    EXPECT_LT(SecondsToAbort(filter, share), 0.5) << share;
+    EXPECT_TRUE(messages.Errors.empty());
+    EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0) << share;
+    filter->Update();
+    EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 401) << share;
+  }
 }
 
 TEST(SkeletonPose, NothingAndOtherPieces)

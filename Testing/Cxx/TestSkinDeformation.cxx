@@ -3,6 +3,7 @@
 #include "vtkSkinDeformation.h"
 
 #include "FilterMessages.h"
+#include "ProgressChecks.h"
 #include "SkeletonTestData.h"
 #include "TetrahedronTestMeshes.h"
 
@@ -309,6 +310,63 @@ TEST(SkinDeformation, AnyPointSetAndBlocks)
   }
   // Both blocks are remembered.
   EXPECT_EQ(filter->GetNumberOfSetups(), 2);
+}
+
+TEST(SkinDeformation, ReportsOftenAndStopsAtOnce)
+{
+  // Large and small, surface and tetrahedra, with everything that may be computed.
+  vtkNew<BendingChain> motion;
+  motion->Bones = 400;
+  vtkNew<vtkSkinDeformation> surface;
+  surface->SetInputData(0, ChainTube(400, 1.0));
+  surface->SetInputData(1, ChainSkeleton(400));
+  surface->SetPoseConnection(motion->GetOutputPort());
+  surface->ComputeVelocityOn();
+  surface->ComputeNormalsOn();
+  vtkNew<vtkSkinDeformation> grid;
+  grid->SetInputData(0, Bar(3));
+  grid->SetInputData(1, ChainSkeleton(2));
+  grid->SetInputData(2, Folded(2.4));
+  vtkNew<vtkMultiBlockDataSet> twoBlocks;
+  twoBlocks->SetBlock(0, ChainTube(2, 1.0));
+  twoBlocks->SetBlock(1, Bar(2));
+  vtkNew<vtkSkinDeformation> blocks;
+  blocks->SetInputDataObject(0, twoBlocks);
+  blocks->SetInputData(1, ChainSkeleton(2));
+  blocks->SetInputData(2, Folded(0.3));
+  blocks->DoublePrecisionOn();
+  for (const auto& filter : { surface.Get(), grid.Get(), blocks.Get() })
+  {
+    EXPECT_LT(LargestProgressStep(filter), 0.02);
+    filter->Modified(); // the mesh is remembered: other shares of the time
+    EXPECT_LT(LargestProgressStep(filter), 0.02);
+    const vtkIdType points =
+      filter->GetOutputDataObject(0)->GetNumberOfElements(vtkDataObject::POINT);
+    EXPECT_GT(points, 100);
+    for (const double share : { 0.0, 0.1, 0.35, 0.6, 0.8, 0.97 })
+    {
+      Messages messages(filter);
+      filter->SetBlend(filter->GetBlend() == 0 ? 1 : 0); // the setup, too
+      EXPECT_LT(SecondsToAbort(filter, share), 0.5) << share;
+      EXPECT_TRUE(messages.Errors.empty());
+      EXPECT_EQ(filter->GetOutputDataObject(0)->GetNumberOfElements(vtkDataObject::POINT), 0)
+        << share;
+      filter->Update();
+      EXPECT_EQ(filter->GetOutputDataObject(0)->GetNumberOfElements(vtkDataObject::POINT), points)
+        << share;
+    }
+  }
+  // What was stopped half-way has left nothing behind.
+  vtkNew<vtkSkinDeformation> fresh;
+  fresh->SetInputData(0, Bar(3));
+  fresh->SetInputData(1, ChainSkeleton(2));
+  fresh->SetInputData(2, Folded(2.4));
+  fresh->SetBlend(grid->GetBlend());
+  fresh->Update();
+  for (vtkIdType n = 0; n < Output(fresh)->GetNumberOfPoints(); ++n)
+  {
+    ASSERT_EQ(Output(fresh)->GetPoint(n)[0], Output(grid)->GetPoint(n)[0]) << n;
+  }
 }
 
 TEST(SkinDeformation, EmptyMeshIsNoError)
