@@ -3,17 +3,70 @@
 #include "CenterlineConversion.h"
 #include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
 
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkDoubleArray.h"
+#include "vtkIdTypeArray.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
+#include "vtkIntArray.h"
+#include "vtkNew.h"
 #include "vtkObjectFactory.h"
+#include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <fstream>
+#include <numeric>
 #include <stdexcept>
+#include <vector>
+
+namespace names = vtkCoronaryArrayNames;
 
 vtkStandardNewMacro(vtkTGFReader);
+
+namespace
+{
+/// Bones instead of the branches of the tree that was found in them.
+void SetBones(
+  vtkPolyData* output, const coronary::TgfSkeleton& skeleton, const coronary::CenterlineTree& tree)
+{
+  std::vector<vtkIdType> parent(skeleton.joints.size(), -1);
+  std::vector<const coronary::CenterlineTree::Branch*> branchTo(skeleton.joints.size(), nullptr);
+  for (const auto& branch : tree.branches)
+  {
+    for (std::size_t i = 1; i < branch.points.size(); ++i)
+    {
+      parent[branch.points[i]] = branch.points[i - 1];
+      branchTo[branch.points[i]] = &branch;
+    }
+  }
+  vtkNew<vtkCellArray> lines;
+  std::vector<int> groups;
+  std::vector<int> trees;
+  std::vector<double> lengths;
+  for (const auto& [from, to] : skeleton.bones)
+  {
+    const vtkIdType far = parent[to] == from ? to : from;
+    const vtkIdType ends[2] = { parent[far], far };
+    lines->InsertNextCell(2, ends);
+    groups.push_back(branchTo[far]->groupId);
+    trees.push_back(branchTo[far]->treeId);
+    lengths.push_back((skeleton.joints[to] - skeleton.joints[from]).norm());
+  }
+  std::vector<int> ids(skeleton.bones.size());
+  std::iota(ids.begin(), ids.end(), 0);
+  output->SetLines(lines);
+  output->GetCellData()->Initialize();
+  vtkCoronary::AddArray<vtkIdTypeArray>(output->GetPointData(), names::ParentJoint, parent);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::BoneId, ids);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::GroupIds, groups);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::TreeIds, trees);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetCellData(), names::Length, lengths);
+}
+}
 
 vtkTGFReader::vtkTGFReader()
 {
@@ -57,8 +110,13 @@ int vtkTGFReader::RequestData(
     {
       throw std::invalid_argument("can not be read to its end");
     }
-    vtkCoronary::SetTree(vtkPolyData::GetData(outputs, 0),
-      coronary::FromSkeleton(skeleton, this->Radius), vtkCoronaryArrayNames::Radius);
+    vtkPolyData* output = vtkPolyData::GetData(outputs, 0);
+    const coronary::CenterlineTree tree = coronary::FromSkeleton(skeleton, this->Radius);
+    vtkCoronary::SetTree(output, tree, names::Radius);
+    if (this->OutputForm == SkeletonForm)
+    {
+      SetBones(output, skeleton, tree);
+    }
     return 1;
   }
   catch (const std::exception& error)
@@ -73,4 +131,5 @@ void vtkTGFReader::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << '\n';
   os << indent << "Radius: " << this->Radius << '\n';
+  os << indent << "OutputForm: " << this->OutputForm << '\n';
 }

@@ -1,13 +1,16 @@
 /**
  * @class vtkTGFReader
- * @brief Reads a skeleton in Trivial Graph Format (.tgf, libigl and Blender) as a tree of centerlines.
+ * @brief Reads a skeleton in Trivial Graph Format (.tgf, libigl and Blender) as centerlines or bones.
  *
- * Output, vtkPolyData: a polyline for each way between roots, forks and ends; a point for each joint,
- * in the order of the file (joints without bones are points without a line). A root is a joint at
- * which bones only begin; where bones go both ways, the first joint that is an end.
- * - point data `MaximumInscribedSphereRadius` (double, mm): `Radius` everywhere, as the format has
- *   none; `Abscissas` (double, mm from the root)
- * - cell data `GroupIds`, `ParentGroupIds`, `TreeIds` (int), `Length` (double, mm), `Tortuosity` (double)
+ * Output, vtkPolyData: a point for each joint, in the order of the file (joints without bones are
+ * points without a line). A root is a joint at which bones only begin; where bones go both ways, the
+ * first joint that is an end. Point data `MaximumInscribedSphereRadius` (double, mm): `Radius`
+ * everywhere, as the format has none; `Abscissas` (double, mm from the root).
+ * - TreeForm: a polyline for each way between roots, forks and ends. Cell data `GroupIds`,
+ *   `ParentGroupIds`, `TreeIds` (int), `Length` (double, mm), `Tortuosity` (double)
+ * - SkeletonForm: a line of two points for each bone, in the order of the file, as of
+ *   vtkCenterlineSkeleton. Point data `ParentJoint` (vtkIdType, -1 at a root); cell data `BoneId` (int,
+ *   the place in the file, from 0), `GroupIds`, `TreeIds` (int, those of TreeForm), `Length` (double, mm)
  *
  * The output is whole in piece 0 and empty in every other piece.
  *
@@ -42,6 +45,18 @@ public:
   vtkGetMacro(Radius, double);
   ///@}
 
+  enum OutputForms
+  {
+    TreeForm = 0,
+    SkeletonForm = 1
+  };
+
+  ///@{
+  /// What the lines are: branches (default) or bones.
+  vtkSetClampMacro(OutputForm, int, TreeForm, SkeletonForm);
+  vtkGetMacro(OutputForm, int);
+  ///@}
+
 protected:
   vtkTGFReader();
   ~vtkTGFReader() override;
@@ -57,6 +72,7 @@ private:
 
   char* FileName = nullptr;
   double Radius = 1.0;
+  int OutputForm = TreeForm;
 };
 
 #endif

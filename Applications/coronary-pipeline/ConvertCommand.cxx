@@ -40,7 +40,8 @@ void ConvertJob::Declare(CLI::App& app)
 {
   app
     .add_option("INPUT", this->input,
-      "Centerlines: .vtp (a tree, or VMTK's branches) or .tgf. Meshes: .obj, .off, .mesh, .vtp, "
+      "Centerlines: .vtp (a tree, VMTK's branches, or a skeleton) or .tgf. Meshes: .obj, .off, "
+      ".mesh, .vtp, "
       ".vtu. "
       "Matrices: .dmat")
     ->type_name("")
@@ -50,9 +51,12 @@ void ConvertJob::Declare(CLI::App& app)
     ->required();
   app
     .add_option("--form", this->form,
-      "Form of a .vtp file: tree (one line a branch) or vmtk (lines from a root to every tip). "
-      "Default: of a .vtp file the other one, of a .tgf file a tree")
-    ->check(CLI::IsMember({ "tree", "vmtk" }))
+      "Form of a .vtp file: tree (one line a branch), vmtk (lines from a root to every tip), or, "
+      "of a "
+      ".tgf file, skeleton (one line a bone). Default: of a .vtp file the other one, of a .tgf "
+      "file "
+      "a tree")
+    ->check(CLI::IsMember({ "tree", "vmtk", "skeleton" }))
     ->type_name("FORM");
   app
     .add_option(
@@ -95,6 +99,11 @@ void ConvertJob::Run() const
   {
     throw UsageError("--form is for .vtp files, a .tgf file has one form");
   }
+  const bool bones = this->form == "skeleton";
+  if (bones && !fromTgf)
+  {
+    throw UsageError("--form skeleton is for .tgf files: they have bones");
+  }
 
   vtkMessageTrap messages;
   vtkSmartPointer<vtkPolyData> lines;
@@ -103,6 +112,7 @@ void ConvertJob::Run() const
     vtkNew<vtkTGFReader> reader;
     reader->SetFileName(this->input.c_str());
     reader->SetRadius(this->radius);
+    reader->SetOutputForm(bones ? vtkTGFReader::SkeletonForm : vtkTGFReader::TreeForm);
     reader->Update();
     messages.ThrowIfError();
     lines = reader->GetOutput();
@@ -123,6 +133,10 @@ void ConvertJob::Run() const
     writer->SetTolerance(this->tolerance);
     writer->Write();
     messages.ThrowIfError();
+  }
+  else if (bones)
+  {
+    WritePolyData(this->output, lines, messages);
   }
   else
   {

@@ -3,6 +3,9 @@
 
 #include "FilterMessages.h"
 #include "vtkCoronaryPhantomSource.h"
+#include "vtkSkeletonPose.h"
+#include "vtkTGFReader.h"
+#include "vtkTGFWriter.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -23,6 +26,8 @@
 
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <fstream>
 #include <limits>
 #include <set>
 #include <sstream>
@@ -157,6 +162,111 @@ TEST(CenterlineSkeleton, EveryStepOfASkeletonIsABone)
   vtkDataArray* length = CellArray(skeleton, "Length");
   EXPECT_EQ(length->GetComponent(0, 0), 8.0);
   EXPECT_EQ(length->GetComponent(1, 0), 12.0);
+}
+
+TEST(CenterlineSkeleton, ComesBackFromATgfFileBoneByBone)
+{
+  vtkNew<vtkCenterlineSkeleton> filter;
+  filter->SetInputData(PhantomTree(5));
+  vtkNew<vtkSkeletonPose> pose;
+  pose->SetInputConnection(filter->GetOutputPort());
+  pose->AddEdit(30, 20, 10, 0, 30, 1, 0, 0, 0.5, 10);
+  pose->Update();
+  const std::string path = testing::TempDir() + "/TestCenterlineSkeleton.tgf";
+  for (vtkPolyData* skeleton : { filter->GetOutput(), pose->GetOutput() })
+  {
+    const vtkIdType bones = skeleton->GetNumberOfLines();
+    ASSERT_GT(bones, 50);
+    // Cells in another order, and one of them backwards: the ids count.
+    vtkNew<vtkPolyData> shuffled;
+    shuffled->ShallowCopy(skeleton);
+    vtkNew<vtkCellArray> lines;
+    vtkNew<vtkIntArray> ids;
+    ids->SetName("BoneId");
+    for (vtkIdType n = 0; n < bones; ++n)
+    {
+      const vtkIdType b = (n * 7 + 3) % bones;
+      vtkCell* bone = skeleton->GetCell(b);
+      const vtkIdType ends[2] = { bone->GetPointId(n == 4 ? 1 : 0),
+        bone->GetPointId(n == 4 ? 0 : 1) };
+      lines->InsertNextCell(2, ends);
+      ids->InsertNextValue(static_cast<int>(b));
+    }
+    ASSERT_NE(bones % 7, 0);
+    shuffled->SetLines(lines);
+    shuffled->GetCellData()->Initialize();
+    shuffled->GetCellData()->AddArray(ids);
+    for (vtkPolyData* written : { skeleton, shuffled.Get() })
+    {
+      vtkNew<vtkTGFWriter> writer;
+      writer->SetInputData(written);
+      writer->SetFileName(path.c_str());
+      ASSERT_EQ(writer->Write(), 1);
+      vtkNew<vtkTGFReader> reader;
+      reader->SetFileName(path.c_str());
+      reader->SetOutputForm(vtkTGFReader::SkeletonForm);
+      reader->Update();
+      vtkPolyData* read = reader->GetOutput();
+      ASSERT_EQ(read->GetNumberOfPoints(), skeleton->GetNumberOfPoints());
+      ASSERT_EQ(read->GetNumberOfLines(), bones);
+      for (vtkIdType j = 0; j < read->GetNumberOfPoints(); ++j)
+      {
+        for (int c = 0; c < 3; ++c)
+        {
+          ASSERT_EQ(read->GetPoint(j)[c], skeleton->GetPoint(j)[c]) << j;
+        }
+        ASSERT_EQ(PointArray(read, "ParentJoint")->GetComponent(j, 0),
+          PointArray(skeleton, "ParentJoint")->GetComponent(j, 0));
+      }
+      for (vtkIdType b = 0; b < bones; ++b)
+      {
+        ASSERT_EQ(read->GetCell(b)->GetPointId(0), skeleton->GetCell(b)->GetPointId(0)) << b;
+        ASSERT_EQ(read->GetCell(b)->GetPointId(1), skeleton->GetCell(b)->GetPointId(1)) << b;
+        ASSERT_EQ(CellArray(read, "BoneId")->GetComponent(b, 0), b);
+      }
+      EXPECT_EQ(read->GetCellData()->GetArray("ParentGroupIds"), nullptr);
+      // A pose may begin with it.
+      vtkNew<vtkSkeletonPose> again;
+      again->SetInputData(filter->GetOutput());
+      again->SetInputData(1, read);
+      again->Update();
+      EXPECT_EQ(again->GetOutput()->GetNumberOfLines(), bones);
+    }
+  }
+  // Without ids, in the order of the lines; a loop is refused, and the old file stays.
+  vtkNew<vtkPolyData> foreign;
+  foreign->SetPoints(filter->GetOutput()->GetPoints());
+  vtkNew<vtkCellArray> lines;
+  for (const std::array<vtkIdType, 2>& bone :
+    std::vector<std::array<vtkIdType, 2>>{ { 2, 5 }, { 5, 1 } })
+  {
+    lines->InsertNextCell(2, bone.data());
+  }
+  foreign->SetLines(lines);
+  vtkNew<vtkTGFWriter> writer;
+  writer->SetInputData(foreign);
+  writer->SetFileName(path.c_str());
+  EXPECT_EQ(writer->Write(), 1);
+  const auto lastLines = [&]
+  {
+    std::ifstream file(path);
+    std::string text;
+    std::string line;
+    while (std::getline(file, line))
+    {
+      text = line == "#" ? "" : text + line + ";";
+    }
+    return text;
+  };
+  EXPECT_EQ(lastLines(), "3 6;6 2;");
+  const vtkIdType closing[2] = { 1, 2 };
+  lines->InsertNextCell(2, closing);
+  foreign->Modified();
+  Messages messages(writer);
+  EXPECT_EQ(writer->Write(), 0);
+  EXPECT_TRUE(messages.HasError("bone 2"));
+  EXPECT_EQ(lastLines(), "3 6;6 2;");
+  std::remove(path.c_str());
 }
 
 TEST(CenterlineSkeleton, PhantomTreesHaveNamedBonesOfTheWantedLength)

@@ -64,6 +64,11 @@ check_convert() {
   cmp lines.tgf back.tgf || fail "the tree did not come back from VMTK's lines"
   run 0 convert tree.tgf skeleton.vtp --radius 0.5
   run 0 convert skeleton.vtp again.tgf
+  run 0 convert tree.tgf bones.vtp --form skeleton
+  run 0 convert bones.vtp bones.tgf
+  cmp tree.tgf bones.tgf || fail "bones have changed"
+  run 2 convert $tree out.vtp --form skeleton
+  expect_one_line "coronary-pipeline convert" "--form"
   # The joints may be numbered in another order.
   for file in tree again; do
     awk 'NF == 4 { print $2, $3, $4 } NF == 2 { ++bones } END { print bones }' "$file.tgf" |
