@@ -7,6 +7,7 @@
 #include "vtkCoronaryUpstream.h"
 #include "vtkSkeletonForms.h"
 
+#include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -28,6 +29,21 @@ vtkStandardNewMacro(vtkSkeletonPose);
 
 namespace
 {
+/// @param degrees  along the axis, as long as the angle
+coronary::Quaternion RotationOf(const Vector3& degrees)
+{
+  const double angle = vtkMath::RadiansFromDegrees(degrees.norm());
+  return angle != 0.0 ? coronary::Quaternion(Eigen::AngleAxisd(angle, degrees.normalized()))
+                      : coronary::Quaternion::Identity();
+}
+
+/// What RotationOf makes that rotation of; at most half a turn.
+Vector3 DegreesOf(const coronary::Quaternion& rotation)
+{
+  const Eigen::AngleAxisd turn(rotation);
+  return vtkMath::DegreesFromRadians(turn.angle()) * turn.axis();
+}
+
 PoseEdit EditOf(const std::array<double, 10>& values)
 {
   PoseEdit edit;
@@ -36,13 +52,7 @@ PoseEdit EditOf(const std::array<double, 10>& values)
     ? static_cast<std::int64_t>(std::llround(values[0]))
     : -1;
   edit.twist = vtkMath::RadiansFromDegrees(values[1]);
-  const Vector3 turn(vtkMath::RadiansFromDegrees(values[2]), vtkMath::RadiansFromDegrees(values[3]),
-    vtkMath::RadiansFromDegrees(values[4]));
-  const double angle = turn.norm();
-  if (angle != 0.0)
-  {
-    edit.rotation = coronary::Quaternion(Eigen::AngleAxisd(angle, turn / angle));
-  }
+  edit.rotation = RotationOf({ values[2], values[3], values[4] });
   edit.translation = { values[5], values[6], values[7] };
   edit.calibre = values[8];
   edit.reach = values[9];
@@ -53,6 +63,18 @@ bool Connected(vtkInformationVector* input)
 {
   return input->GetNumberOfInformationObjects() > 0;
 }
+}
+
+vtkSkeletonPose::~vtkSkeletonPose() = default;
+
+vtkDoubleArray* vtkSkeletonPose::GetJointPlaces()
+{
+  return this->JointPlaces;
+}
+
+vtkDoubleArray* vtkSkeletonPose::GetMoveAsEdit()
+{
+  return this->MoveAsEdit;
 }
 
 vtkSkeletonPose::vtkSkeletonPose()
@@ -112,6 +134,54 @@ int vtkSkeletonPose::RequestUpdateExtent(
   return 1;
 }
 
+void vtkSkeletonPose::Move(const coronary::SkeletonRig& rig, coronary::SkeletonPose& pose)
+{
+  vtkCoronary::Require(this->Joint >= 0 && this->Joint < rig.NumberOfJoints(),
+    "Joint must be 0 to " + std::to_string(rig.NumberOfJoints() - 1) + ", it is " +
+      std::to_string(this->Joint));
+  PoseEdit edit;
+  edit.joint = this->Joint;
+  edit.alone = this->MoveMode == MoveAlone;
+  Vector3 wanted(this->JointPosition);
+  vtkCoronary::Require(wanted.allFinite(), "JointPosition must be finite");
+  const Vector3 turn(this->JointRotation);
+  vtkCoronary::Require(turn.allFinite(), "JointRotation must be finite");
+  std::int64_t bone = -1;
+  for (std::int64_t b = 0; b < rig.NumberOfBones(); ++b)
+  {
+    bone = bone < 0 && rig.Rest().bones[b].second == edit.joint ? b : bone;
+  }
+  const Vector3 here = pose.joints[edit.joint];
+  if (this->MoveMode >= TurnBone && bone >= 0)
+  {
+    // About its first joint, with all that is on the bone's far side.
+    const Vector3 head = pose.joints[rig.Rest().bones[bone].first];
+    vtkCoronary::Require((wanted - head).norm() > 0.0,
+      "JointPosition is that of the joint before: the bone would lose its length");
+    edit.rotation = coronary::LeastRotation(here - head, wanted - head);
+    if (this->MoveMode == TurnBoneOnly)
+    {
+      wanted = head + (here - head).norm() * (wanted - head).normalized();
+    }
+  }
+  edit.translation = wanted - here;
+  if (!edit.alone)
+  {
+    edit.rotation = RotationOf(turn) * edit.rotation;
+  }
+  coronary::ApplyPoseEdit(rig, edit, pose);
+  if (!edit.alone)
+  {
+    const Vector3 degrees = DegreesOf(edit.rotation);
+    const Vector3& shift = edit.translation;
+    for (const double value : { static_cast<double>(edit.joint), 0.0, degrees.x(), degrees.y(),
+           degrees.z(), shift.x(), shift.y(), shift.z(), 1.0, 0.0 })
+    {
+      this->MoveAsEdit->InsertNextValue(value);
+    }
+  }
+}
+
 int vtkSkeletonPose::RequestData(
   vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
@@ -123,6 +193,8 @@ int vtkSkeletonPose::RequestData(
     return 1;
   }
   int success = 1;
+  this->JointPlaces->SetNumberOfValues(0);
+  this->MoveAsEdit->SetNumberOfValues(0);
   try
   {
     const vtkSkeletonForms::PoseArrays arrays{ this->RotationArrayName, this->TwistArrayName,
@@ -152,31 +224,10 @@ int vtkSkeletonPose::RequestData(
         throw std::invalid_argument("Edit " + std::to_string(n) + " of Edits: " + error.what());
       }
     }
+    const std::vector<Vector3> places = pose.joints;
     if (this->MoveJoint)
     {
-      vtkCoronary::Require(this->Joint >= 0 && this->Joint < rig.NumberOfJoints(),
-        "Joint must be 0 to " + std::to_string(rig.NumberOfJoints() - 1) + ", it is " +
-          std::to_string(this->Joint));
-      PoseEdit edit;
-      edit.joint = this->Joint;
-      const Vector3 wanted(this->JointPosition);
-      vtkCoronary::Require(wanted.allFinite(), "JointPosition must be finite");
-      std::int64_t bone = -1;
-      for (std::int64_t b = 0; b < rig.NumberOfBones(); ++b)
-      {
-        bone = bone < 0 && rig.Rest().bones[b].second == edit.joint ? b : bone;
-      }
-      if (this->MoveMode == TurnBone && bone >= 0)
-      {
-        // About its first joint, with all that is on the bone's far side.
-        const Vector3 head = pose.joints[rig.Rest().bones[bone].first];
-        vtkCoronary::Require((wanted - head).norm() > 0.0,
-          "JointPosition is that of the joint before: the bone would lose its length");
-        edit.rotation = coronary::LeastRotation(pose.joints[edit.joint] - head, wanted - head);
-      }
-      edit.translation = wanted - pose.joints[edit.joint];
-      edit.alone = this->MoveMode == MoveAlone;
-      coronary::ApplyPoseEdit(rig, edit, pose);
+      this->Move(rig, pose);
     }
     std::vector<coronary::BoneTransform> bones;
     rig.Transform(pose, bones);
@@ -184,6 +235,13 @@ int vtkSkeletonPose::RequestData(
     if (start)
     {
       output->GetFieldData()->PassData(start->GetFieldData());
+    }
+    for (const Vector3& place : places)
+    {
+      for (int c = 0; c < 3; ++c)
+      {
+        this->JointPlaces->InsertNextValue(place[c]);
+      }
     }
     this->UpdateProgress(1.0);
     return 1;
@@ -202,6 +260,7 @@ int vtkSkeletonPose::RequestData(
     vtkErrorMacro(<< error.what());
     success = 0;
   }
+  this->MoveAsEdit->SetNumberOfValues(0);
   // Not marked as generated, so that the next request executes again.
   output->Initialize();
   outputs->GetInformationObject(0)->Set(SDDP::DATA_NOT_GENERATED(), 1);
@@ -226,6 +285,8 @@ void vtkSkeletonPose::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "JointPosition: " << this->JointPosition[0] << ' ' << this->JointPosition[1]
      << ' ' << this->JointPosition[2] << '\n';
   os << indent << "MoveMode: " << this->MoveMode << '\n';
+  os << indent << "JointRotation: " << this->JointRotation[0] << ' ' << this->JointRotation[1]
+     << ' ' << this->JointRotation[2] << '\n';
   os << indent << "RotationArrayName: " << this->RotationArrayName << '\n';
   os << indent << "TwistArrayName: " << this->TwistArrayName << '\n';
   os << indent << "StrainArrayName: " << this->StrainArrayName << '\n';

@@ -5,7 +5,7 @@
  * Forward kinematics: what is beyond a joint turns and moves with it. Every edit has a joint, a twist
  * along the bone that ends in it, a rotation, a translation, and a change of the cross-section (a
  * stenosis or a dilatation). Then one joint, the chosen one, may be put at a place, with what is beyond it
- * or alone: that is what ParaView's handle moves. Undo and redo are those of the properties.
+ * or alone, and turned: that is what ParaView's handle does. Undo and redo are those of the properties.
  *
  * @par Input ports:
  * - 0: vtkPolyData, the skeleton at rest, as of vtkCenterlineSkeleton: points are joints, lines of two points
@@ -31,11 +31,20 @@
 #define vtkSkeletonPose_h
 
 #include "vtkCoronarySkinningModule.h" // for the export macro
+#include "vtkNew.h"                    // for vtkNew
 #include "vtkPolyDataAlgorithm.h"
 
 #include <array>  // for std::array
 #include <string> // for std::string
 #include <vector> // for std::vector
+
+class vtkDoubleArray;
+
+namespace coronary
+{
+class SkeletonRig;
+struct SkeletonPose;
+}
 
 class VTKCORONARYSKINNING_EXPORT vtkSkeletonPose : public vtkPolyDataAlgorithm
 {
@@ -88,17 +97,41 @@ public:
   {
     MoveAlone = 0,
     MoveBeyond = 1,
-    TurnBone = 2
+    TurnBone = 2,
+    TurnBoneOnly = 3
   };
 
   ///@{
   /**
-   * What moves with the chosen joint: nothing (0), what is beyond it without turning (1), or the bone
-   * that ends in it turns towards the place, and stretches to it, with all that is beyond it (2). Default 1.
+   * What moves with the chosen joint: nothing (0), what is beyond it without turning (1), the bone that ends in
+   * it turns towards the place, and stretches to it, with all that is beyond it (2), or turns and keeps
+   * its length, so that the joint comes to lie on the line to the place (3). Default 1. At a root, which no
+   * bone ends in, 2 and 3 are 1.
    */
-  vtkSetClampMacro(MoveMode, int, MoveAlone, TurnBone);
+  vtkSetClampMacro(MoveMode, int, MoveAlone, TurnBoneOnly);
   vtkGetMacro(MoveMode, int);
   ///@}
+
+  ///@{
+  /**
+   * Rotation of all beyond the chosen joint about it, after it was put at its place: a vector along the axis with
+   * the angle in degrees as its length. Not with MoveAlone. Default 0 0 0.
+   */
+  vtkSetVector3Macro(JointRotation, double);
+  vtkGetVector3Macro(JointRotation, double);
+  ///@}
+
+  /**
+   * Of the last execution: places of all joints, x y z after each other, mm, when the edits were done and
+   * before the chosen joint was moved. Where a handle begins. Empty after an error.
+   */
+  vtkDoubleArray* GetJointPlaces();
+
+  /**
+   * Of the last execution: the move of the chosen joint as an edit, 10 values as of AddEdit. Empty
+   * when there was none, or one that is no edit (MoveAlone).
+   */
+  vtkDoubleArray* GetMoveAsEdit();
 
   ///@{
   /**
@@ -116,7 +149,7 @@ public:
 
 protected:
   vtkSkeletonPose();
-  ~vtkSkeletonPose() override = default;
+  ~vtkSkeletonPose() override;
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
   int RequestInformation(
@@ -130,11 +163,16 @@ private:
   vtkSkeletonPose(const vtkSkeletonPose&) = delete;
   void operator=(const vtkSkeletonPose&) = delete;
 
+  void Move(const coronary::SkeletonRig& rig, coronary::SkeletonPose& pose);
+
   std::vector<std::array<double, 10>> Edits;
   bool MoveJoint = false;
   vtkIdType Joint = 0;
   double JointPosition[3] = { 0.0, 0.0, 0.0 };
   int MoveMode = MoveBeyond;
+  double JointRotation[3] = { 0.0, 0.0, 0.0 };
+  vtkNew<vtkDoubleArray> JointPlaces;
+  vtkNew<vtkDoubleArray> MoveAsEdit;
   std::string RotationArrayName;
   std::string TwistArrayName;
   std::string StrainArrayName;

@@ -94,6 +94,90 @@ TEST(SkeletonPose, TheChosenJointGoesWhereItIsPut)
   ExpectPoint(filter->GetOutput(), 1, 0, 0, 5);
   ExpectPoint(filter->GetOutput(), 2, 5, 0, 5);
   ExpectPoint(filter->GetOutput(), 4, 15, 0, 5);
+  // Towards the place, and no further.
+  filter->SetMoveMode(vtkSkeletonPose::TurnBoneOnly);
+  filter->SetJointPosition(30, 0, 5);
+  filter->Update();
+  ExpectPoint(filter->GetOutput(), 2, 5, 0, 5);
+  ExpectPoint(filter->GetOutput(), 4, 15, 0, 5);
+  // A root has no bone that could turn.
+  filter->SetJoint(0);
+  filter->SetJointPosition(0, 1, 0);
+  filter->Update();
+  ExpectPoint(filter->GetOutput(), 4, 0, 1, 20);
+}
+
+TEST(SkeletonPose, TheChosenJointTurnsWhatIsBeyond)
+{
+  vtkNew<vtkSkeletonPose> filter;
+  filter->SetInputData(ChainSkeleton(4));
+  filter->SetJoint(2);
+  filter->SetJointPosition(1, 0, 10);
+  filter->SetJointRotation(0, 90, 0);
+  filter->MoveJointOn();
+  filter->Update();
+  ExpectPoint(filter->GetOutput(), 1, 0, 0, 5);
+  ExpectPoint(filter->GetOutput(), 2, 1, 0, 10);
+  ExpectPoint(filter->GetOutput(), 4, 11, 0, 10);
+  filter->SetMoveMode(vtkSkeletonPose::MoveAlone);
+  filter->Update();
+  ExpectPoint(filter->GetOutput(), 4, 0, 0, 20);
+}
+
+TEST(SkeletonPose, AMoveIsAnEditToo)
+{
+  vtkNew<vtkSkeletonPose> filter;
+  filter->SetInputData(ChainSkeleton(6));
+  filter->AddEdit(2, 0, 0, 40, 10, 0, 1, 0, 1, 0);
+  filter->Update();
+  EXPECT_EQ(filter->GetMoveAsEdit()->GetNumberOfValues(), 0);
+  vtkNew<vtkPoints> before;
+  before->SetDataTypeToDouble();
+  before->DeepCopy(filter->GetOutput()->GetPoints());
+  for (const int mode :
+    { vtkSkeletonPose::MoveBeyond, vtkSkeletonPose::TurnBone, vtkSkeletonPose::TurnBoneOnly })
+  {
+    filter->SetMoveMode(mode);
+    filter->SetJoint(4);
+    filter->SetJointPosition(3, 4, 12);
+    filter->SetJointRotation(20, -30, 50);
+    filter->MoveJointOn();
+    filter->Update();
+    vtkNew<vtkPolyData> moved;
+    moved->DeepCopy(filter->GetOutput());
+    // Where the handle begins: not yet moved.
+    ASSERT_EQ(filter->GetJointPlaces()->GetNumberOfValues(), 21);
+    for (int n = 0; n < 21; ++n)
+    {
+      EXPECT_EQ(filter->GetJointPlaces()->GetValue(n), before->GetPoint(n / 3)[n % 3]);
+    }
+    ASSERT_EQ(filter->GetMoveAsEdit()->GetNumberOfValues(), 10);
+    std::array<double, 10> e{};
+    std::copy_n(filter->GetMoveAsEdit()->GetPointer(0), 10, e.begin());
+    filter->MoveJointOff();
+    filter->AddEdit(e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7], e[8], e[9]);
+    filter->Update();
+    for (vtkIdType n = 0; n < 7; ++n)
+    {
+      const double* p = moved->GetPoint(n);
+      ExpectPoint(filter->GetOutput(), n, p[0], p[1], p[2]);
+    }
+    for (vtkIdType b = 0; b < 6; ++b)
+    {
+      for (int c = 0; c < 4; ++c)
+      {
+        EXPECT_NEAR(
+          filter->GetOutput()->GetCellData()->GetArray("BoneRotation")->GetComponent(b, c),
+          moved->GetCellData()->GetArray("BoneRotation")->GetComponent(b, c), 1e-12);
+      }
+    }
+    filter->RemoveAllEdits();
+    filter->AddEdit(2, 0, 0, 40, 10, 0, 1, 0, 1, 0);
+  }
+  filter->SetMoveMode(vtkSkeletonPose::MoveAlone);
+  filter->MoveJointOn();
+  filter->Update();
+  EXPECT_EQ(filter->GetMoveAsEdit()->GetNumberOfValues(), 0);
 }
 
 TEST(SkeletonPose, BeginsAtAPoseInTime)
