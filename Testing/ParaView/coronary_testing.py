@@ -1,4 +1,5 @@
 """What the ParaView tests share: the plugin, data, pictures, and the phantom's usual view."""
+import os
 import sys
 
 from paraview import servermanager, simple
@@ -46,6 +47,42 @@ def centerline_pipeline():
     topology = simple.CoronaryTreeTopology(
         simple.OutputPort(centerline, TREE), registrationName="Topology")
     return phantom, centerline, topology
+
+
+def write_skeleton(folder):
+    """A chain of four bones of 5 mm along z with a fifth one beside its end, as a .tgf file."""
+    joints = [(0, 0, -10), (0, 0, -5), (0, 0, 0), (0, 0, 5), (0, 0, 10), (2, 0, 7)]
+    bones = [(1, 2), (2, 3), (3, 4), (4, 5), (4, 6)]
+    path = os.path.join(folder, "skeleton.tgf")
+    with open(path, "w") as file:
+        for number, place in enumerate(joints, 1):
+            file.write("%d %g %g %g\n" % (number, *place))
+        file.write("#\n")
+        for bone in bones:
+            file.write("%d %d\n" % bone)
+    return path
+
+
+def skinning_pipeline(skeleton_file):
+    """A bar of tetrahedra around the skeleton of write_skeleton, posed and moved: four filters."""
+    # Settings with the creation: a trace of a script records no others.
+    bar = simple.Wavelet(registrationName="Image", WholeExtent=[-3, 3, -3, 3, -11, 11])
+    mesh = simple.Tetrahedralize(bar, registrationName="Mesh")
+    lines = simple.TGFSkeletonReader(registrationName="Lines", FileName=skeleton_file, Radius=1.5)
+    skeleton = simple.CenterlineSkeleton(lines, registrationName="Skeleton", EveryStepIsABone=1,
+                                         LengthPerRadius=2.5)
+    weights = simple.BiharmonicSkinWeights(mesh, Skeleton=skeleton, registrationName="Weights",
+                                           Influences=4, AllWeights=1, Neighbourhood=2.0)
+    # Joint, twist, turn, move, calibre, reach.
+    pose = simple.SkeletonPose(skeleton, registrationName="Pose", MoveTheChosenJoint=1, ChosenJoint=4,
+                               JointPosition=[1, 2, 9], MovesWithIt="The Bone Turns",
+                               JointRotation=[0, 10, 0],
+                               Edits=[1, 0, 0, 20, 0, 0, 0, 0, 1, 0,
+                                      2, 30, 0, 0, 0, 0, 0, 1, 0.8, 4])
+    moved = simple.SkinDeformation(weights, SkeletonAtRest=skeleton, PosedSkeleton=pose,
+                                   registrationName="Moved", Blend="Dual Quaternion",
+                                   VolumeConservation=0.5, InvertedTetrahedra="Report")
+    return weights, pose, moved
 
 
 def fetch(source, port, time):
