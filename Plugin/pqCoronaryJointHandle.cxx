@@ -52,6 +52,13 @@ pqCoronaryJointHandle::~pqCoronaryJointHandle()
   this->proxy()->RemoveObserver(this->UpdateTag);
 }
 
+void pqCoronaryJointHandle::showEvent(QShowEvent* event)
+{
+  this->Superclass::showEvent(event);
+  // ParaView forgets that it was visible when another filter was chosen meanwhile.
+  this->setWidgetVisible(true);
+}
+
 bool pqCoronaryJointHandle::moves() const
 {
   return vtkSMUncheckedPropertyHelper(this->proxy(), "MoveJoint").GetAsInt() != 0;
@@ -62,7 +69,7 @@ bool pqCoronaryJointHandle::placeOfJoint(double* place)
   this->proxy()->UpdatePropertyInformation(this->proxy()->GetProperty("JointPlaces"));
   const std::vector<double> places =
     vtkSMPropertyHelper(this->proxy(), "JointPlaces").GetDoubleArray();
-  const vtkIdType joint = vtkSMUncheckedPropertyHelper(this->proxy(), "Joint").GetAsIdType();
+  const int joint = vtkSMUncheckedPropertyHelper(this->proxy(), "Joint").GetAsInt();
   if (joint < 0 || 3 * static_cast<std::size_t>(joint) + 3 > places.size())
   {
     return false;

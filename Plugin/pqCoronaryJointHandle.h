@@ -22,6 +22,9 @@ public:
   pqCoronaryJointHandle(vtkSMProxy* proxy, vtkSMPropertyGroup* group, QWidget* parent = nullptr);
   ~pqCoronaryJointHandle() override;
 
+  /// Shows the handle, too.
+  void showEvent(QShowEvent* event) override;
+
 protected Q_SLOTS:
   /// To the joint instead of to the middle of the data.
   void placeWidget() override;

@@ -63,7 +63,7 @@ def write_skeleton(folder):
     return path
 
 
-def skinning_pipeline(skeleton_file):
+def skinning_pipeline(skeleton_file, **pose_settings):
     """A bar of tetrahedra around the skeleton of write_skeleton, posed and moved: four filters."""
     # Settings with the creation: a trace of a script records no others.
     bar = simple.Wavelet(registrationName="Image", WholeExtent=[-3, 3, -3, 3, -11, 11])
@@ -74,11 +74,11 @@ def skinning_pipeline(skeleton_file):
     weights = simple.BiharmonicSkinWeights(mesh, Skeleton=skeleton, registrationName="Weights",
                                            Influences=4, AllWeights=1, Neighbourhood=2.0)
     # Joint, twist, turn, move, calibre, reach.
-    pose = simple.SkeletonPose(skeleton, registrationName="Pose", MoveTheChosenJoint=1, ChosenJoint=4,
-                               JointPosition=[1, 2, 9], MovesWithIt="The Bone Turns",
-                               JointRotation=[0, 10, 0],
-                               Edits=[1, 0, 0, 20, 0, 0, 0, 0, 1, 0,
-                                      2, 30, 0, 0, 0, 0, 0, 1, 0.8, 4])
+    pose_settings = pose_settings or dict(
+        MoveTheChosenJoint=1, ChosenJoint=4, JointPosition=[1, 2, 9], MovesWithIt="The Bone Turns",
+        JointRotation=[0, 10, 0],
+        Edits=[1, 0, 0, 20, 0, 0, 0, 0, 1, 0, 2, 30, 0, 0, 0, 0, 0, 1, 0.8, 4])
+    pose = simple.SkeletonPose(skeleton, registrationName="Pose", **pose_settings)
     moved = simple.SkinDeformation(weights, SkeletonAtRest=skeleton, PosedSkeleton=pose,
                                    registrationName="Moved", Blend="Dual Quaternion",
                                    VolumeConservation=0.5, InvertedTetrahedra="Report")
