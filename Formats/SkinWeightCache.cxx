@@ -2,6 +2,7 @@
 
 #include "AtomicFile.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -15,7 +16,7 @@ namespace coronary
 namespace
 {
 // The second half tells byte orders apart. Another number whenever the solver or this format changes.
-constexpr std::array<char, 8> Magic{ 'D', 'C', 'W', 'G', 'H', 'T', 'S', '1' };
+constexpr std::array<char, 8> Magic{ 'D', 'C', 'W', 'G', 'H', 'T', 'S', '2' };
 constexpr std::uint64_t ByteOrder = 0x0102030405060708;
 
 /// Of eight bytes at a time; for telling contents apart, not against intent.
@@ -93,6 +94,7 @@ void AddContents(
   hash.Add(settings.polish);
   hash.Add(settings.neighbourhood);
   hash.Add(settings.widen);
+  hash.Add(settings.leaveOutside);
   hash.Add(settings.penalty);
 }
 
@@ -121,6 +123,7 @@ void ForMembers(Weights& w, const Visit& visit)
   visit(w.fixedPoints);
   visit(w.samples);
   visit(w.largestDomainShare);
+  visit(w.leftOut);
 }
 
 struct Writer
@@ -194,7 +197,9 @@ bool Fits(const SkinWeights& w, const SkinWeightInput& input)
   bool fits = w.bones == static_cast<std::int64_t>(input.bones.size()) &&
     w.lengthOutside.size() == input.bones.size() && w.offset.size() == input.points.size() + 1 &&
     w.offset.front() == 0 && w.offset.back() == static_cast<std::int64_t>(w.bone.size()) &&
-    w.bone.size() == w.weight.size();
+    w.bone.size() == w.weight.size() &&
+    std::all_of(w.leftOut.begin(), w.leftOut.end(),
+      [&](std::int64_t bone) { return bone >= 0 && bone < w.bones; });
   for (std::size_t i = 1; fits && i < w.offset.size(); ++i)
   {
     fits = w.offset[i] >= w.offset[i - 1];

@@ -88,6 +88,7 @@ struct RunJob
   bool contours = false;
   bool openEnds = false;
   std::string weightCache;
+  bool leaveBonesOutside = false;
   int threads = 0;
   bool compress = false;
   bool quiet = false;
@@ -226,6 +227,10 @@ void RunJob::Declare(CLI::App& app)
       "Folder in which skin weights are kept; the same mesh, bones and settings are read from "
       "there")
     ->type_name("DIR")
+    ->group("Weights");
+  app
+    .add_flag("--leave-bones-outside", this->leaveBonesOutside,
+      "Leave out bones that lie wholly outside of the mesh, with a warning, instead of failing")
     ->group("Weights");
   app.add_flag("--compress", this->compress, "Compress the image files");
   app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
@@ -597,6 +602,7 @@ void RunJob::Run()
               weights->SetInputConnection(mesher->GetOutputPort());
               weights->SetSkeletonConnection(skeleton->GetOutputPort());
               weights->SetCacheFolder(this->weightCache.c_str());
+              weights->SetLeaveOutside(this->leaveBonesOutside);
               update(weights);
               vtkUnstructuredGrid* bound = weights->GetOutput();
               vtkPolyData* bones = skeleton->GetOutput();
@@ -610,6 +616,11 @@ void RunJob::Run()
                 { "energy_gap", Numbers(bound, vtkCoronaryArrayNames::WeightsEnergyGap) },
                 { "row_sums", Numbers(bound, vtkCoronaryArrayNames::WeightsRowSums) },
                 { "error_on_bones", Numbers(bound, vtkCoronaryArrayNames::WeightsOnBones) } };
+              if (this->leaveBonesOutside)
+              {
+                report["weights"]["left_out_bones"] =
+                  Numbers(bound, vtkCoronaryArrayNames::LeftOutBones);
+              }
               summary += "; " + std::to_string(bones->GetNumberOfLines()) + " bones";
             }
           }

@@ -164,6 +164,8 @@ constexpr const char* WeightsEnergyGap = "WeightsEnergyGap";   ///< double, shar
 constexpr const char* WeightsRowSums = "WeightsRowSums";       ///< double: least, greatest, Eq. 7
 constexpr const char* WeightsOnBones = "WeightsOnBones";       ///< double, greatest error there
 constexpr const char* BoneLengthOutside = "BoneLengthOutside"; ///< double, mm, one value a bone
+constexpr const char* LeftOutBones = "LeftOutBones";           ///< int, bones without weights
+constexpr const char* LeftOutBoneNames = "LeftOutBoneNames";   ///< string, of these
 // Posed skeleton, cell data.
 constexpr const char* BoneRotation = "BoneRotation"; ///< double[4], w x y z, from rest, first joint
 constexpr const char* BoneTwist = "BoneTwist";       ///< double, radians along the bone

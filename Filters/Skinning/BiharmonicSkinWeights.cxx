@@ -139,12 +139,52 @@ void SkinWeightSettings::Validate() const
   Require(this->penalty >= 1.0 && this->penalty <= 1e8, "penalty must be within 1 to 1e8");
 }
 
+namespace
+{
+/// The weights of the bones that are not outside, numbered as all bones are.
+SkinWeights ComputeWithout(const std::vector<std::int64_t>& outside,
+  const std::vector<double>& lengthOutside, const SkinWeightInput& input,
+  const SkinWeightSettings& settings, const ProgressCallback& progress)
+{
+  Require(outside.size() < input.bones.size(), "all bones lie outside of the mesh");
+  SkinWeightInput inside = input;
+  inside.bones.clear();
+  std::vector<std::int32_t> number;
+  for (std::size_t b = 0; b < input.bones.size(); ++b)
+  {
+    if (!std::binary_search(outside.begin(), outside.end(), static_cast<std::int64_t>(b)))
+    {
+      inside.bones.push_back(input.bones[b]);
+      number.push_back(static_cast<std::int32_t>(b));
+    }
+  }
+  SkinWeights result = ComputeSkinWeights(inside, settings, progress);
+  for (std::int32_t& bone : result.bone)
+  {
+    bone = number[bone];
+  }
+  const std::vector<double> lengths = std::move(result.lengthOutside);
+  result.lengthOutside = lengthOutside;
+  for (std::size_t n = 0; n < number.size(); ++n)
+  {
+    result.lengthOutside[number[n]] = lengths[n];
+  }
+  result.bones = static_cast<std::int64_t>(input.bones.size());
+  result.leftOut = outside;
+  return result;
+}
+}
+
 SkinWeights ComputeSkinWeights(const SkinWeightInput& input, const SkinWeightSettings& settings,
   const ProgressCallback& progress)
 {
   settings.Validate();
   const auto part = [&](double first, double last) { return PartOf(progress, first, last); };
   const SkinWeightSystem system = MakeSkinWeightSystem(input, settings, part(0.0, 0.1));
+  if (!system.outside.empty())
+  {
+    return ComputeWithout(system.outside, system.lengthOutside, input, settings, part(0.1, 1.0));
+  }
   SkinWeights result;
   result.bones = system.bones;
   result.samples = static_cast<std::int64_t>(system.samples.size());

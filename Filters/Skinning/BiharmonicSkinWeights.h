@@ -40,6 +40,9 @@ struct SkinWeightSettings
   /// Adds a diameter to the neighbourhood, and goes on, as long as residualEverywhere is above 10
   /// tolerances.
   bool widen = true;
+  /// Bones wholly outside of the mesh have no weight anywhere, and are told in SkinWeights::leftOut; else they
+  /// are refused.
+  bool leaveOutside = false;
   double penalty =
     1e4; ///< of a bone's weight that is not 1 where the bone runs between the points,
          ///< in units of the energy's diagonal, 1 to 1e8
@@ -88,6 +91,7 @@ struct SkinWeights
   std::int64_t fixedPoints = 0;      ///< points of the mesh on bones
   std::int64_t samples = 0;          ///< places of bones between the points of the mesh
   std::vector<double> lengthOutside; ///< per bone: unit of length outside of the mesh
+  std::vector<std::int64_t> leftOut; ///< bones wholly outside of the mesh, ascending
   double largestDomainShare = 1.0;   ///< of the points in which a bone may have weight
 };
 
@@ -102,7 +106,7 @@ struct SkinWeights
  * The same input and settings give the same bits, on any number of threads.
  * @throws std::invalid_argument naming the setting, tetrahedron, point or bone at fault: an index out
  * of range, a tetrahedron without volume, a point without tetrahedron, a bone without length or outside
- * of the mesh, a point on two bones that do not meet there, a connected part of the mesh without bone.
+ * of the mesh (with `leaveOutside`: all bones outside), a point on two bones that do not meet there, a connected part of the mesh without bone.
  * @throws std::runtime_error when the equations cannot be solved; Cancelled; std::bad_alloc
  */
 SkinWeights ComputeSkinWeights(const SkinWeightInput& input,

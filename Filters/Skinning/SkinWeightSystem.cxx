@@ -390,7 +390,7 @@ struct OnBone
 
 /// Fixes the points on bones, and puts samples where bones run between points.
 void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const SparseMatrix& k,
-  SkinWeightSystem& system)
+  bool leaveOutside, SkinWeightSystem& system)
 {
   const auto count = static_cast<std::int64_t>(mesh.points.size());
   const auto bones = static_cast<std::int64_t>(input.bones.size());
@@ -562,7 +562,14 @@ void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const Spars
         }
       }
     }
-    Require(constraints > 0 && system.lengthOutside[b] < 0.999 * length * mesh.unit,
+    const bool isOutside =
+      constraints == 0 || system.lengthOutside[b] >= 0.999 * length * mesh.unit;
+    if (isOutside && leaveOutside)
+    {
+      system.outside.push_back(b);
+      continue;
+    }
+    Require(!isOutside,
       "bone " + std::to_string(b) + " at " + At(input.joints[input.bones[b].first]) +
         " lies outside of the mesh");
   }
@@ -769,7 +776,11 @@ SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
   std::vector<double> mass;
   const SparseMatrix k = Stiffness(mesh, mass);
   Report(progress, 0.2);
-  Constrain(input, mesh, k, system);
+  Constrain(input, mesh, k, settings.leaveOutside, system);
+  if (!system.outside.empty())
+  {
+    return system;
+  }
   CheckComponents(input, k, system);
   Report(progress, 0.3);
   std::vector<double> distance;

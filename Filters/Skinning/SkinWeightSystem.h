@@ -41,8 +41,10 @@ struct SkinWeightSystem
   std::vector<std::vector<Target>> fixed; ///< per point; empty where it is free
   std::vector<Sample> samples;
   std::vector<double> lengthOutside; ///< per bone, in the input's unit
-  double radius = 1.0;               ///< median over the bones of what is around them
-  std::vector<double> diameters;     ///< per bone: its length in diameters of what is around it
+  /// Bones wholly outside, where they may be left out: then nothing that follows is filled.
+  std::vector<std::int64_t> outside;
+  double radius = 1.0;           ///< median over the bones of what is around them
+  std::vector<double> diameters; ///< per bone: its length in diameters of what is around it
 
   // Rows are the free points.
   std::vector<std::int64_t> pointOfRow;

@@ -156,6 +156,7 @@ int vtkBiharmonicSkinWeights::RequestData(
     settings.iterations = this->Iterations;
     settings.neighbourhood = this->Neighbourhood;
     settings.widen = this->Widen;
+    settings.leaveOutside = this->LeaveOutside;
     settings.Validate();
     vtkCoronary::Require(
       this->Influences >= 1 && this->Influences <= 64, "Influences must be within 1 to 64");
@@ -186,14 +187,27 @@ int vtkBiharmonicSkinWeights::RequestData(
     }
     const std::vector<vtkStdString> boneNames =
       BoneNames(skeleton, this->BoneNameArrayName, input.bones.size());
-    const auto longest =
-      std::max_element(weights.lengthOutside.begin(), weights.lengthOutside.end());
+    std::vector<vtkStdString> leftOutNames;
+    std::string listed;
+    std::vector<double> partlyOutside = weights.lengthOutside;
+    for (const std::int64_t bone : weights.leftOut)
+    {
+      leftOutNames.push_back(boneNames[bone]);
+      listed += (listed.empty() ? "" : ", ") + boneNames[bone];
+      partlyOutside[bone] = 0.0;
+    }
+    if (!leftOutNames.empty())
+    {
+      vtkWarningMacro(<< leftOutNames.size()
+                      << " bones lie outside of the mesh and are left out: " << listed);
+    }
+    const auto longest = std::max_element(partlyOutside.begin(), partlyOutside.end());
     if (*longest > 0.0)
     {
-      vtkWarningMacro(<< std::count_if(weights.lengthOutside.begin(), weights.lengthOutside.end(),
+      vtkWarningMacro(<< std::count_if(partlyOutside.begin(), partlyOutside.end(),
                            [](double length) { return length > 0.0; })
                       << " bones leave the mesh; " << *longest << " of bone "
-                      << boneNames[longest - weights.lengthOutside.begin()] << " are outside");
+                      << boneNames[longest - partlyOutside.begin()] << " are outside");
     }
 
     output->ShallowCopy(mesh);
@@ -253,6 +267,12 @@ int vtkBiharmonicSkinWeights::RequestData(
     numbers(names::WeightsRowSums, { weights.smallestSum, weights.largestSum });
     numbers(names::WeightsOnBones, { weights.constraintResidual });
     numbers(names::BoneLengthOutside, weights.lengthOutside);
+    if (this->LeaveOutside)
+    {
+      vtkCoronary::AddArray<vtkIntArray>(field, names::LeftOutBones,
+        std::vector<int>(weights.leftOut.begin(), weights.leftOut.end()));
+      vtkCoronary::AddArray<vtkStringArray>(field, names::LeftOutBoneNames, leftOutNames);
+    }
     return 1;
   }
   catch (const coronary::Cancelled&)
@@ -283,6 +303,7 @@ void vtkBiharmonicSkinWeights::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Iterations: " << this->Iterations << "\n";
   os << indent << "Neighbourhood: " << this->Neighbourhood << "\n";
   os << indent << "Widen: " << this->Widen << "\n";
+  os << indent << "LeaveOutside: " << this->LeaveOutside << "\n";
   os << indent << "Influences: " << this->Influences << "\n";
   os << indent << "Dense: " << this->Dense << "\n";
   os << indent << "CacheFolder: " << this->CacheFolder << "\n";

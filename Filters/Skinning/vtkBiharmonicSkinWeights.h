@@ -23,7 +23,7 @@
  *   (double, 1 / unit of length), `WeightsEnergyGap` (double, bound on the share of the energy above
  *   the least possible one), `WeightsRowSums` (double, 2 values, least and greatest sum before Eq. 7),
  *   `WeightsOnBones` (double, greatest distance from the wanted value on bones that are no edges of the
- *   mesh), `BoneLengthOutside` (double, one a bone).
+ *   mesh), `BoneLengthOutside` (double, one a bone); with LeaveOutside `LeftOutBones` (int) and `LeftOutBoneNames` (string).
  *
  * The output is whole in piece 0, and empty in every other piece. Blocks of a composite mesh are
  * treated one by one. An empty mesh gives an empty output. The same bits on any number of threads.
@@ -123,6 +123,16 @@ public:
 
   ///@{
   /**
+   * Whether bones wholly outside of the mesh are left out, with a warning: they have no weight anywhere, and
+   * the bones keep their numbers. Else they are an error. Default off.
+   */
+  vtkSetMacro(LeaveOutside, bool);
+  vtkGetMacro(LeaveOutside, bool);
+  vtkBooleanMacro(LeaveOutside, bool);
+  ///@}
+
+  ///@{
+  /**
    * Bones a point in the compact form, 1 to 64. Default 8.
    */
   vtkSetMacro(Influences, int);
@@ -184,6 +194,7 @@ private:
   int Iterations = 2000;
   double Neighbourhood = 1.75;
   bool Widen = true;
+  bool LeaveOutside = false;
   int Influences = 8;
   bool Dense = false;
   std::string CacheFolder;

@@ -398,6 +398,7 @@ TEST(BiharmonicSkinWeightsCache, EverythingThatMattersIsInTheName)
   changed([](auto& i, auto&) { std::swap(i.bones[0].first, i.bones[0].second); });
   changed([](auto&, auto& s) { s.mode = coronary::SkinWeightMode::Independent; });
   changed([](auto&, auto& s) { s.tolerance = 1e-5; });
+  changed([](auto&, auto& s) { s.leaveOutside = true; });
   changed([](auto&, auto& s) { s.iterations = 9; });
   changed([](auto&, auto& s) { s.polish = false; });
   changed([](auto&, auto& s) { s.neighbourhood = 3.0; });
@@ -420,6 +421,108 @@ TEST(BiharmonicSkinWeightsCache, FolderThatCannotBeIsAWarning)
   ASSERT_EQ(messages.Warnings.size(), 1U);
   EXPECT_NE(messages.Warnings[0].find("not kept"), std::string::npos) << messages.Warnings[0];
   EXPECT_EQ(Field(filter->GetOutput(), "WeightsConverged"), 1.0);
+}
+
+TEST(BiharmonicSkinWeightsFilter, BonesOutsideAreLeftOutWhereWanted)
+{
+  // One far away, in the middle of the list, and one that goes on where a twig has left the mesh.
+  SkinWeightInput input = Comb();
+  const std::int64_t tip = input.bones.back().second;
+  const Vector3 away =
+    (input.joints[tip] - input.joints[input.bones.back().first]).normalized() * 3.0;
+  input.joints.push_back(input.joints[tip] + away);
+  input.joints.push_back(input.joints[tip] + 2.0 * away);
+  const auto outer = static_cast<std::int64_t>(input.joints.size()) - 1;
+  input.bones.emplace_back(outer - 1, outer);
+  input.joints.emplace_back(100, 0, 0);
+  input.joints.emplace_back(101, 0, 0);
+  const std::int64_t far = 2;
+  input.bones.insert(input.bones.begin() + far,
+    { static_cast<std::int64_t>(input.joints.size()) - 2,
+      static_cast<std::int64_t>(input.joints.size()) - 1 });
+  const auto twig = static_cast<std::int64_t>(input.bones.size()) - 1;
+  const auto skeleton = SkeletonOf(input);
+  vtkNew<vtkStringArray> names;
+  names->SetName("BoneName");
+  for (std::size_t b = 0; b < input.bones.size(); ++b)
+  {
+    names->InsertNextValue("LAD-" + std::to_string(b));
+  }
+  skeleton->GetFieldData()->AddArray(names);
+  vtkNew<vtkBiharmonicSkinWeights> plain;
+  SetComb(plain);
+  plain->DenseOn();
+  const auto folder =
+    std::filesystem::path(testing::TempDir()) / "TestBiharmonicSkinWeights-outside";
+  std::filesystem::remove_all(folder);
+  for (const int mode :
+    { vtkBiharmonicSkinWeights::JointMode, vtkBiharmonicSkinWeights::HarmonicMode })
+  {
+    plain->SetMode(mode);
+    plain->Update();
+    vtkDataArray* expected = PointArray(plain->GetOutput(), "BoneWeights");
+    vtkNew<vtkBiharmonicSkinWeights> filter;
+    filter->SetMode(mode);
+    filter->SetInputData(MeshOf(Comb()));
+    filter->SetSkeletonData(skeleton);
+    filter->DenseOn();
+    ExpectRefusal(filter, "outside of the mesh");
+    filter->LeaveOutsideOn();
+    filter->SetCacheFolder(folder.c_str());
+    // Computed, and read again.
+    for (int time = 0; time < 2; ++time)
+    {
+      filter->Modified();
+      const Messages messages(filter);
+      filter->Update();
+      ASSERT_TRUE(messages.Errors.empty());
+      ASSERT_EQ(messages.Warnings.size(), 1U);
+      const std::string list = "LAD-2, LAD-" + std::to_string(twig);
+      EXPECT_NE(messages.Warnings[0].find("2 bones lie outside"), std::string::npos);
+      EXPECT_NE(messages.Warnings[0].find(list), std::string::npos) << messages.Warnings[0];
+      vtkFieldData* field = filter->GetOutput()->GetFieldData();
+      vtkDataArray* left = field->GetArray("LeftOutBones");
+      ASSERT_NE(left, nullptr);
+      ASSERT_EQ(left->GetNumberOfTuples(), 2);
+      EXPECT_EQ(left->GetComponent(0, 0), far);
+      EXPECT_EQ(left->GetComponent(1, 0), twig);
+      auto* leftNames = vtkStringArray::SafeDownCast(field->GetAbstractArray("LeftOutBoneNames"));
+      ASSERT_NE(leftNames, nullptr);
+      EXPECT_EQ(leftNames->GetValue(1), "LAD-" + std::to_string(twig));
+      EXPECT_NEAR(field->GetArray("BoneLengthOutside")->GetComponent(far, 0), 1.0, 1e-9);
+      EXPECT_EQ(field->GetArray("BoneLengthOutside")->GetComponent(0, 0), 0.0);
+      // The weights are those without these bones, in their old columns.
+      vtkDataArray* weights = PointArray(filter->GetOutput(), "BoneWeights");
+      ASSERT_EQ(weights->GetNumberOfComponents(), expected->GetNumberOfComponents() + 2);
+      for (vtkIdType i = 0; i < weights->GetNumberOfTuples(); ++i)
+      {
+        for (int b = 0; b < weights->GetNumberOfComponents(); ++b)
+        {
+          const double value =
+            b == far || b == twig ? 0.0 : expected->GetComponent(i, b > far ? b - 1 : b);
+          ASSERT_EQ(weights->GetComponent(i, b), value) << i << ' ' << b;
+        }
+      }
+    }
+  }
+  std::filesystem::remove_all(folder);
+  // Nothing is left out, and nothing is said.
+  plain->LeaveOutsideOn();
+  const Messages messages(plain);
+  plain->Update();
+  EXPECT_TRUE(messages.Warnings.empty());
+  EXPECT_EQ(plain->GetOutput()->GetFieldData()->GetArray("LeftOutBones")->GetNumberOfTuples(), 0);
+  // All outside.
+  SkinWeightInput nowhere = Comb();
+  for (Vector3& joint : nowhere.joints)
+  {
+    joint += Vector3(100, 0, 0);
+  }
+  vtkNew<vtkBiharmonicSkinWeights> filter;
+  filter->SetInputData(MeshOf(Comb()));
+  filter->SetSkeletonData(SkeletonOf(nowhere));
+  filter->LeaveOutsideOn();
+  ExpectRefusal(filter, "All bones lie outside of the mesh");
 }
 
 TEST(BiharmonicSkinWeightsFilter, PiecesEmptyInputsAndAborts)
