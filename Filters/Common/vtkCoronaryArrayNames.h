@@ -182,6 +182,21 @@ constexpr const char* EllipseMinor = "EllipseMinor"; ///< double, semi-axis, mm
 constexpr const char* ClampedSections = "ClampedSections"; ///< vtkIdType, number of points
 constexpr const char* Repeatability = "Repeatability"; ///< double, mm, of phases that come twice
 constexpr const char* LowNoiseFit = "LowNoiseFit"; ///< double: rank, order, ridge, left-out error
+// Regularised motion, cell data (with AxialStrain).
+constexpr const char* AxialStress = "AxialStress"; ///< double, MPa, Young's modulus times strain
+// Regularised motion, point data.
+constexpr const char* MotionClamps = "MotionClamps"; ///< int, bits of coronary::MotionClamp
+constexpr const char* RegularizationMove =
+  "RegularizationMove"; ///< double[3], mm, from where the point was
+// Regularised motion, field data; energies before and after, mm^2.
+constexpr const char* TemporalEnergy = "TemporalEnergy";   ///< double[2]
+constexpr const char* SpatialEnergy = "SpatialEnergy";     ///< double[2]
+constexpr const char* TotalEnergy = "TotalEnergy";         ///< double[2]
+constexpr const char* MotionObjective = "MotionObjective"; ///< double[2], what is minimised
+constexpr const char* ClampedPoints = "ClampedPoints";     ///< vtkIdType[5], one a limit
+constexpr const char* LimitViolations = "LimitViolations"; ///< vtkIdType, that are left
+constexpr const char* LimitIterations = "LimitIterations"; ///< int
+constexpr const char* GreatestMove = "GreatestMove";       ///< double, mm
 // Deformed mesh, cell data.
 constexpr const char* VolumeRatio = "VolumeRatio"; ///< double, against rest, below 0 inverted
 // Deformed mesh, field data.

@@ -416,6 +416,21 @@ void Write(vtkPointSet* like, const Moment& moment, const PoseArrays& names, vtk
   output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), moment.time);
 }
 
+void WriteVarying(const Sequence& sequence, std::size_t k, vtkPointSet* output)
+{
+  for (const VaryingArray& array : sequence.varying)
+  {
+    if (array.cell)
+    {
+      output->GetCellData()->AddArray(array.steps[k]);
+    }
+    else
+    {
+      output->GetPointData()->AddArray(array.steps[k]);
+    }
+  }
+}
+
 coronary::MovingLines LinesOf(vtkPolyData* data, const std::string& radiusName)
 {
   coronary::MovingLines lines;

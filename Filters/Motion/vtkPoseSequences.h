@@ -122,6 +122,9 @@ Moment MomentOf(const coronary::PoseSequence& sequence, std::size_t k);
  */
 void Write(vtkPointSet* like, const Moment& moment, const PoseArrays& names, vtkPointSet* output);
 
+/// Gives `output` the arrays of step `k` that are not the same at all steps.
+void WriteVarying(const Sequence& sequence, std::size_t k, vtkPointSet* output);
+
 /**
  * Lines, vertices at rest and radii of poly data.
  * @param radiusName  point array with radii, mm; empty or not there: no radii
