@@ -26,7 +26,7 @@ constexpr double Pi = 3.14159265358979323846;
 constexpr std::int64_t Grain = 8192;
 /// Of the Fourier fit, relative to its diagonal: enough to be solvable at any set of phases.
 constexpr double LeastRidge = 1e-9;
-constexpr double Ridges[] = { 0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2 };
+constexpr double Ridges[] = { 0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3 };
 /// End of the weighted fit: the greatest change of a fitted position in one iteration, mm.
 constexpr double FitTolerance = 1e-3;
 constexpr int FitIterations = 200;
@@ -108,7 +108,7 @@ VectorXd Penalty(int order, double ridge, double samples)
   VectorXd penalty = VectorXd::Zero(2 * order + 1);
   for (int m = 1; m <= order; ++m)
   {
-    const double strength = 0.5 * samples * (ridge * std::pow(m, 4) + LeastRidge);
+    const double strength = 0.5 * samples * (ridge * (std::pow(m, 4) - 1.0) + LeastRidge);
     penalty[2 * m - 1] = strength;
     penalty[2 * m] = strength;
   }
