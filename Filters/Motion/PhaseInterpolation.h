@@ -54,7 +54,7 @@ struct LowNoiseFit
 {
   int rank = 0;           ///< spatial modes
   int order = 0;          ///< harmonics
-  double ridge = 0.0; ///< against the harmonic m: (m^4 - 1) times this
+  double ridge = 0.0;     ///< against the harmonic m: (m^4 - 1) times this
   double predicted = 0.0; ///< mm, root mean square error of phases that were left out
   double residual = 0.0;  ///< mm, root mean square distance to the phases
   int iterations = 0;     ///< of the weighted fit; 0 when all confidences are equal
