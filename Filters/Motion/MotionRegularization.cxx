@@ -33,6 +33,8 @@ constexpr double LeastGap = 0.1;
 constexpr double FirstPenalty = 10.0;
 /// Where they are not kept after so many iterations, it becomes ten times as much.
 constexpr int PatientIterations = 150;
+/// Without progress in so many, the limits stand against each other.
+constexpr int StaleIterations = 40;
 constexpr double Relaxation = 1.6;
 /// A corner that is beyond a limit at rest may become sharper by this share.
 constexpr double RestSlack = 0.1;
@@ -805,6 +807,8 @@ RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const MovingLin
           });
       };
       local(true);
+      int stale = 0;
+      double best = std::numeric_limits<double>::infinity();
       for (int iteration = 1; iteration <= settings.iterations; ++iteration)
       {
         Positions right = pull;
@@ -844,8 +848,17 @@ RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const MovingLin
         {
           break;
         }
-        if (iteration == PatientIterations)
+        stale = violation < 0.98 * best ? 0 : stale + 1;
+        best = std::min(best, violation);
+        const bool raised = penalty > FirstPenalty;
+        if (stale >= StaleIterations && raised)
         {
+          break;
+        }
+        if (!raised && (stale >= StaleIterations || iteration == PatientIterations))
+        {
+          stale = 0;
+          best = std::numeric_limits<double>::infinity();
           penalty *= 10.0;
           for (std::array<Vector3, 2>& forces : force)
           {

@@ -102,7 +102,8 @@ struct RegularizedMotion
  * @throws Cancelled
  *
  * Ends when all limits are kept to the precision and no point moves by more than it in an iteration, or
- * after the given number of iterations: `violations` says what is left then.
+ * after the given number of iterations, or when limits that stand against each other come no nearer:
+ * `violations` says what is left then.
  *
  * The same input gives the same bits on any number of threads.
  */
