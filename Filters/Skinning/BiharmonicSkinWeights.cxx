@@ -28,7 +28,8 @@ std::vector<std::vector<double>> SolveWithoutBounds(
   const std::int64_t rows = system.energy.rows;
   std::vector<std::int32_t> all(rows);
   std::iota(all.begin(), all.end(), 0);
-  const SparseCholesky factor(system.energy, all, nullptr);
+  SupernodalFactor<double> factor(system.energy, all, EliminationOrder::Given);
+  factor.Factorize(system.energy, 0.0);
   result.factorizations = 1;
   Report(progress, 0.5);
   std::vector<std::vector<double>> weights(system.bones);
@@ -36,7 +37,7 @@ std::vector<std::vector<double>> SolveWithoutBounds(
   ParallelFor((system.bones + block - 1) / block, 1,
     [&](std::int64_t first, std::int64_t last)
     {
-      SparseCholesky::Workspace workspace;
+      std::vector<double> scratch;
       for (std::int64_t group = first; group < last; ++group)
       {
         const std::int64_t from = group * block;
@@ -50,7 +51,7 @@ std::vector<std::vector<double>> SolveWithoutBounds(
           }
         }
         std::vector<double> solution(right.size());
-        factor.Solve(right.data(), solution.data(), to - from, workspace);
+        factor.AddSolution(right.data(), solution.data(), to - from, scratch);
         for (std::int64_t b = from; b < to; ++b)
         {
           weights[b].assign(

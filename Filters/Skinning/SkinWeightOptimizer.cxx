@@ -227,7 +227,7 @@ void SkinWeightOptimizer::Factorize()
         Group& group = this->Groups[g];
         if (!group.factor)
         {
-          group.factor = std::make_unique<SupernodalFactor>(this->System.energy, group.rows);
+          group.factor = std::make_unique<SupernodalFactor<float>>(this->System.energy, group.rows);
         }
         group.factor->Factorize(this->System.energy, this->Rho);
       }
@@ -956,9 +956,10 @@ void SkinWeightOptimizer::Polish(const ProgressCallback& progress)
     std::iota(all.begin(), all.end(), 0);
     Values change(count);
     {
-      const SparseCholesky factor(hessian, all, nullptr);
-      SparseCholesky::Workspace workspace;
-      factor.Solve(right.data(), change.data(), 1, workspace);
+      SupernodalFactor<double> factor(hessian, all, EliminationOrder::Given);
+      factor.Factorize(hessian, 0.0);
+      std::vector<double> scratch;
+      factor.AddSolution(right.data(), change.data(), 1, scratch);
     }
     ++this->PolishSteps;
     // What leaves its bounds is held there in the next step.

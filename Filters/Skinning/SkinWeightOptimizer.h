@@ -50,7 +50,7 @@ private:
     std::vector<std::int32_t> bones;
     std::vector<std::int32_t> rows; ///< ascending
     std::int64_t base = 0;          ///< of its first value; then bone by bone
-    std::unique_ptr<SupernodalFactor> factor;
+    std::unique_ptr<SupernodalFactor<float>> factor;
   };
   /// Columns of one group that one thread solves for at a time.
   struct Task

@@ -9,7 +9,7 @@
 #define DynamicCoronary_SkinWeightSystem_h
 
 #include "BiharmonicSkinWeights.h"
-#include "SparseCholesky.h"
+#include "SupernodalPattern.h"
 
 namespace coronary
 {

@@ -2,173 +2,205 @@
 
 #include "SupernodalKernels.h"
 
-#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <stdexcept>
+#include <type_traits>
 
 namespace coronary
 {
 namespace
 {
-const SupernodalKernels& Kernels()
+const SupernodalKernels* FindKernels(bool wide)
 {
 #if defined(DYNAMICCORONARY_WIDE_KERNELS)
-  static const bool wide = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  return wide ? SupernodalKernelsAvx2 : SupernodalKernelsBaseline;
-#else
-  return SupernodalKernelsBaseline;
+  if (wide)
+  {
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &SupernodalKernelsAvx2
+                                                                           : nullptr;
+  }
 #endif
+  return wide ? nullptr : &SupernodalKernelsBaseline;
+}
+
+std::atomic<const SupernodalKernels*>& Selected()
+{
+  static std::atomic<const SupernodalKernels*> selected{ FindKernels(true) ? FindKernels(true)
+                                                                           : FindKernels(false) };
+  return selected;
+}
+
+template <typename Real>
+const PanelKernels<Real>& Kernels()
+{
+  if constexpr (std::is_same_v<Real, float>)
+  {
+    return Selected().load()->single;
+  }
+  else
+  {
+    return Selected().load()->twice;
+  }
 }
 }
 
-SupernodalFactor::SupernodalFactor(
-  const SparseMatrix& matrix, const std::vector<std::int32_t>& rows)
+bool SetSupernodalWide(bool wide)
 {
-  SupernodalPattern pattern = FindSupernodes(matrix, rows);
-  this->Source = std::move(pattern.order);
-  this->First = std::move(pattern.first);
-  this->RowOffset = std::move(pattern.rowOffset);
-  this->RowList = std::move(pattern.rows);
+  const SupernodalKernels* kernels = FindKernels(wide);
+  if (kernels)
+  {
+    Selected() = kernels;
+  }
+  return kernels != nullptr;
+}
+
+template <typename Real>
+SupernodalFactor<Real>::SupernodalFactor(
+  const SparseMatrix& matrix, const std::vector<std::int32_t>& rows, EliminationOrder order)
+  : Pattern(FindSupernodes(matrix, rows, order))
+{
   this->Rows.reserve(rows.size());
-  for (const std::int32_t i : this->Source)
+  for (const std::int32_t i : this->Pattern.order)
   {
     this->Rows.push_back(rows[i]);
   }
-  this->SupernodeOf.resize(rows.size());
-  this->ValueOffset.assign(1, 0);
-  for (std::size_t s = 0; s + 1 < this->First.size(); ++s)
-  {
-    std::fill(this->SupernodeOf.begin() + this->First[s],
-      this->SupernodeOf.begin() + this->First[s + 1], static_cast<std::int32_t>(s));
-    const std::int64_t width = this->First[s + 1] - this->First[s];
-    const std::int64_t height = this->RowOffset[s + 1] - this->RowOffset[s];
-    this->MostBelow = std::max(this->MostBelow, height - width);
-    this->ValueOffset.push_back(this->ValueOffset.back() + width * height);
-  }
 }
 
-SupernodalFactor::~SupernodalFactor() = default;
-
-void SupernodalFactor::Factorize(const SparseMatrix& matrix, double shift)
+template <typename Real>
+void SupernodalFactor<Real>::Assemble(const SparseMatrix& matrix)
 {
-  const auto count = static_cast<std::int64_t>(this->Rows.size());
+  const SupernodalPattern& pattern = this->Pattern;
   std::vector<std::int32_t> local(matrix.rows, -1);
-  this->Scale.resize(count);
-  for (std::int64_t i = 0; i < count; ++i)
+  for (std::size_t i = 0; i < this->Rows.size(); ++i)
   {
-    const std::int32_t row = this->Rows[i];
-    local[row] = static_cast<std::int32_t>(i);
-    const auto first = matrix.column.begin() + matrix.offset[row];
-    const auto last = matrix.column.begin() + matrix.offset[row + 1];
-    const double diagonal =
-      matrix.value[std::lower_bound(first, last, row) - matrix.column.begin()];
-    this->Scale[i] = static_cast<float>(1.0 / std::sqrt(diagonal * (1.0 + shift)));
+    local[this->Rows[i]] = static_cast<std::int32_t>(i);
   }
-  this->Values.assign(this->ValueOffset.back(), 0.0f);
-
-  const SupernodalKernels& kernels = Kernels();
-  std::vector<std::int32_t> place(count, -1);
-  std::vector<std::int32_t> targets;
-  std::vector<float> update;
-  const auto supernodes = static_cast<std::int32_t>(this->First.size()) - 1;
-  for (std::int32_t s = 0; s < supernodes; ++s)
+  this->Values.assign(pattern.valueOffset.back(), Real(0));
+  std::vector<std::int32_t> place(this->Rows.size(), -1);
+  for (std::int32_t s = 0; s < pattern.Supernodes(); ++s)
   {
-    const std::int32_t* list = this->RowList.data() + this->RowOffset[s];
-    const std::int64_t height = this->RowOffset[s + 1] - this->RowOffset[s];
+    const std::int64_t height = pattern.Height(s);
     for (std::int64_t i = 0; i < height; ++i)
     {
-      place[list[i]] = static_cast<std::int32_t>(i);
+      place[pattern.RowsOf(s)[i]] = static_cast<std::int32_t>(i);
     }
-    for (std::int32_t j = this->First[s]; j < this->First[s + 1]; ++j)
+    for (std::int32_t j = pattern.first[s]; j < pattern.first[s + 1]; ++j)
     {
-      float* column = this->Values.data() + this->ValueOffset[s] + (j - this->First[s]) * height;
+      Real* column = this->Values.data() + pattern.valueOffset[s] + (j - pattern.first[s]) * height;
       const std::int32_t row = this->Rows[j];
       for (std::int64_t a = matrix.offset[row]; a < matrix.offset[row + 1]; ++a)
       {
         const std::int32_t i = local[matrix.column[a]];
         if (i > j)
         {
-          column[place[i]] += static_cast<float>(matrix.value[a] * this->Scale[i] * this->Scale[j]);
+          column[place[i]] += static_cast<Real>(matrix.value[a] * this->Scale[i] * this->Scale[j]);
         }
       }
-      column[place[j]] += 1.0f;
-    }
-  }
-  for (std::int32_t s = 0; s < supernodes; ++s)
-  {
-    const std::int32_t* list = this->RowList.data() + this->RowOffset[s];
-    const std::int64_t height = this->RowOffset[s + 1] - this->RowOffset[s];
-    const std::int64_t width = this->First[s + 1] - this->First[s];
-    float* panel = this->Values.data() + this->ValueOffset[s];
-    if (!kernels.factorPanel(panel, height, width))
-    {
-      throw std::runtime_error("the equations of the skin weights cannot be solved: the matrix is "
-                               "not positive definite; some tetrahedra are too flat");
-    }
-    // What it takes from the supernodes of the rows below.
-    for (std::int64_t first = width; first < height;)
-    {
-      const std::int32_t target = this->SupernodeOf[list[first]];
-      std::int64_t last = first + 1;
-      while (last < height && this->SupernodeOf[list[last]] == target)
-      {
-        ++last;
-      }
-      const std::int64_t m = height - first;
-      const std::int64_t n = last - first;
-      const std::int32_t* other = this->RowList.data() + this->RowOffset[target];
-      const std::int64_t otherHeight = this->RowOffset[target + 1] - this->RowOffset[target];
-      targets.resize(m);
-      std::int32_t at = 0;
-      for (std::int64_t i = 0; i < m; ++i)
-      {
-        while (other[at] != list[first + i])
-        {
-          ++at;
-        }
-        targets[i] = at;
-      }
-      update.assign(m * n, 0.0f);
-      kernels.subtractProduct(
-        panel + first, height, panel + first, height, m, n, width, update.data(), m);
-      float* to = this->Values.data() + this->ValueOffset[target];
-      for (std::int64_t j = 0; j < n; ++j)
-      {
-        float* column = to + static_cast<std::int64_t>(targets[j]) * otherHeight;
-        for (std::int64_t i = j; i < m; ++i)
-        {
-          column[targets[i]] += update[j * m + i];
-        }
-      }
-      first = last;
+      column[place[j]] += Real(1);
     }
   }
 }
 
-void SupernodalFactor::AddSolution(
-  const double* right, double* solution, std::int64_t columns, std::vector<float>& scratch) const
+template <typename Real>
+void SupernodalFactor<Real>::Update(
+  std::int32_t supernode, std::vector<std::int32_t>& targets, std::vector<Real>& update)
+{
+  const SupernodalPattern& pattern = this->Pattern;
+  const std::int32_t* list = pattern.RowsOf(supernode);
+  const std::int64_t height = pattern.Height(supernode);
+  const std::int64_t width = pattern.Width(supernode);
+  const Real* panel = this->Values.data() + pattern.valueOffset[supernode];
+  for (std::int64_t first = width; first < height;)
+  {
+    const std::int32_t target = pattern.supernodeOf[list[first]];
+    std::int64_t last = first + 1;
+    while (last < height && pattern.supernodeOf[list[last]] == target)
+    {
+      ++last;
+    }
+    const std::int64_t m = height - first;
+    const std::int64_t n = last - first;
+    const std::int32_t* other = pattern.RowsOf(target);
+    const std::int64_t otherHeight = pattern.Height(target);
+    targets.resize(m);
+    std::int32_t at = 0;
+    for (std::int64_t i = 0; i < m; ++i)
+    {
+      while (other[at] != list[first + i])
+      {
+        ++at;
+      }
+      targets[i] = at;
+    }
+    update.assign(m * n, Real(0));
+    Kernels<Real>().subtractProduct(
+      panel + first, height, panel + first, height, m, n, width, update.data(), m);
+    Real* to = this->Values.data() + pattern.valueOffset[target];
+    for (std::int64_t j = 0; j < n; ++j)
+    {
+      Real* column = to + static_cast<std::int64_t>(targets[j]) * otherHeight;
+      for (std::int64_t i = j; i < m; ++i)
+      {
+        column[targets[i]] += update[j * m + i];
+      }
+    }
+    first = last;
+  }
+}
+
+template <typename Real>
+void SupernodalFactor<Real>::Factorize(const SparseMatrix& matrix, double shift)
+{
+  this->Scale.clear();
+  for (const std::int32_t row : this->Rows)
+  {
+    double diagonal = 0.0;
+    for (std::int64_t a = matrix.offset[row]; a < matrix.offset[row + 1]; ++a)
+    {
+      diagonal += matrix.column[a] == row ? matrix.value[a] : 0.0;
+    }
+    this->Scale.push_back(static_cast<Real>(1.0 / std::sqrt(diagonal * (1.0 + shift))));
+  }
+  this->Assemble(matrix);
+  std::vector<std::int32_t> targets;
+  std::vector<Real> update;
+  for (std::int32_t s = 0; s < this->Pattern.Supernodes(); ++s)
+  {
+    if (!Kernels<Real>().factorPanel(this->Values.data() + this->Pattern.valueOffset[s],
+          this->Pattern.Height(s), this->Pattern.Width(s)))
+    {
+      throw std::runtime_error("the equations of the skin weights cannot be solved: the matrix is "
+                               "not positive definite; some tetrahedra are too flat");
+    }
+    this->Update(s, targets, update);
+  }
+}
+
+template <typename Real>
+void SupernodalFactor<Real>::AddSolution(
+  const double* right, double* solution, std::int64_t columns, std::vector<Real>& scratch) const
 {
   constexpr std::int64_t lanes = SupernodalColumns;
+  const SupernodalPattern& pattern = this->Pattern;
   const auto count = static_cast<std::int64_t>(this->Rows.size());
-  scratch.assign((count + this->MostBelow) * lanes, 0.0f);
-  float* y = scratch.data();
-  float* below = y + count * lanes;
+  scratch.assign((count + pattern.mostBelow) * lanes, Real(0));
+  Real* y = scratch.data();
+  Real* below = y + count * lanes;
   for (std::int64_t i = 0; i < count; ++i)
   {
     for (std::int64_t c = 0; c < columns; ++c)
     {
-      y[i * lanes + c] = static_cast<float>(right[c * count + this->Source[i]] * this->Scale[i]);
+      y[i * lanes + c] = static_cast<Real>(right[c * count + pattern.order[i]] * this->Scale[i]);
     }
   }
-  const SupernodalKernels& kernels = Kernels();
-  const auto supernodes = static_cast<std::int32_t>(this->First.size()) - 1;
-  for (std::int32_t s = 0; s < supernodes; ++s)
+  const PanelKernels<Real>& kernels = Kernels<Real>();
+  for (std::int32_t s = 0; s < pattern.Supernodes(); ++s)
   {
-    const std::int32_t* list = this->RowList.data() + this->RowOffset[s];
-    const std::int64_t height = this->RowOffset[s + 1] - this->RowOffset[s];
-    const std::int64_t width = this->First[s + 1] - this->First[s];
-    kernels.forward(
-      this->Values.data() + this->ValueOffset[s], height, width, y + this->First[s] * lanes, below);
+    const std::int32_t* list = pattern.RowsOf(s);
+    const std::int64_t height = pattern.Height(s);
+    const std::int64_t width = pattern.Width(s);
+    kernels.forward(this->Values.data() + pattern.valueOffset[s], height, width,
+      y + pattern.first[s] * lanes, below);
     for (std::int64_t i = width; i < height; ++i)
     {
       for (std::int64_t c = 0; c < lanes; ++c)
@@ -177,11 +209,11 @@ void SupernodalFactor::AddSolution(
       }
     }
   }
-  for (std::int32_t s = supernodes - 1; s >= 0; --s)
+  for (std::int32_t s = pattern.Supernodes() - 1; s >= 0; --s)
   {
-    const std::int32_t* list = this->RowList.data() + this->RowOffset[s];
-    const std::int64_t height = this->RowOffset[s + 1] - this->RowOffset[s];
-    const std::int64_t width = this->First[s + 1] - this->First[s];
+    const std::int32_t* list = pattern.RowsOf(s);
+    const std::int64_t height = pattern.Height(s);
+    const std::int64_t width = pattern.Width(s);
     for (std::int64_t i = width; i < height; ++i)
     {
       for (std::int64_t c = 0; c < lanes; ++c)
@@ -189,16 +221,19 @@ void SupernodalFactor::AddSolution(
         below[(i - width) * lanes + c] = y[list[i] * lanes + c];
       }
     }
-    kernels.backward(
-      this->Values.data() + this->ValueOffset[s], height, width, y + this->First[s] * lanes, below);
+    kernels.backward(this->Values.data() + pattern.valueOffset[s], height, width,
+      y + pattern.first[s] * lanes, below);
   }
   for (std::int64_t i = 0; i < count; ++i)
   {
     for (std::int64_t c = 0; c < columns; ++c)
     {
-      solution[c * count + this->Source[i]] +=
+      solution[c * count + pattern.order[i]] +=
         static_cast<double>(y[i * lanes + c]) * this->Scale[i];
     }
   }
 }
+
+template class SupernodalFactor<float>;
+template class SupernodalFactor<double>;
 }

@@ -1,19 +1,18 @@
 /**
  * @file SupernodalFactor.h
- * @brief Cholesky factor in single precision, for solves that are corrected from outside.
+ * @brief Cholesky factor of a symmetric sparse matrix, in single or double precision. Inside the library only.
  *
- * Inside the library only. The symbolic analysis is CHOLMOD's; factorisation and solves are our own:
- * they need no BLAS, whichever is installed, and may run in several threads at once.
+ * No BLAS is called, whichever is installed; several threads may be at work at once.
  */
 #ifndef DynamicCoronary_SupernodalFactor_h
 #define DynamicCoronary_SupernodalFactor_h
 
-#include "SparseCholesky.h"
-
-#include <memory>
+#include "SupernodalPattern.h"
 
 namespace coronary
 {
+/// @tparam Real  float, for solves that are corrected from outside, or double
+template <typename Real>
 class SupernodalFactor
 {
 public:
@@ -21,10 +20,8 @@ public:
    * Finds an order and the pattern of the factor of the submatrix of `rows` (ascending).
    * @throws std::bad_alloc
    */
-  SupernodalFactor(const SparseMatrix& matrix, const std::vector<std::int32_t>& rows);
-  ~SupernodalFactor();
-  SupernodalFactor(const SupernodalFactor&) = delete;
-  SupernodalFactor& operator=(const SupernodalFactor&) = delete;
+  SupernodalFactor(const SparseMatrix& matrix, const std::vector<std::int32_t>& rows,
+    EliminationOrder order = EliminationOrder::FillReducing);
 
   /**
    * Factors D (A + shift diag(A)) D, D scaling the diagonal to 1: single precision is enough as long
@@ -35,26 +32,29 @@ public:
 
   /**
    * Adds the solution for `columns` (at most 8) right-hand sides, one after the other in memory, to
-   * `solution`; to about six digits. @param scratch  kept from call to call, one for each thread
+   * `solution`; to about six digits in single precision. Changes nothing in the factor.
+   * @param scratch  kept from call to call, one for each thread
    */
   void AddSolution(
-    const double* right, double* solution, std::int64_t columns, std::vector<float>& scratch) const;
+    const double* right, double* solution, std::int64_t columns, std::vector<Real>& scratch) const;
 
   /// Number of entries of the factor.
   std::int64_t Entries() const { return static_cast<std::int64_t>(this->Values.size()); }
 
 private:
-  std::vector<std::int32_t> Rows;        ///< of the matrix, in the order of the factor
-  std::vector<std::int32_t> Source;      ///< place in `rows`, in the order of the factor
-  std::vector<std::int32_t> First;       ///< first row of a supernode, and the end
-  std::vector<std::int64_t> RowOffset;   ///< of a supernode's list of rows
-  std::vector<std::int32_t> RowList;     ///< rows of the supernodes, ascending in each
-  std::vector<std::int64_t> ValueOffset; ///< of a supernode's panel
-  std::vector<std::int32_t> SupernodeOf; ///< per row
-  std::int64_t MostBelow = 0;
-  std::vector<float> Values;
-  std::vector<float> Scale;
+  void Assemble(const SparseMatrix& matrix);
+  /// Takes what a supernode changes from the supernodes of the rows below it.
+  void Update(
+    std::int32_t supernode, std::vector<std::int32_t>& targets, std::vector<Real>& update);
+
+  SupernodalPattern Pattern;
+  std::vector<std::int32_t> Rows; ///< of the matrix, in the order of the factor
+  std::vector<Real> Values;
+  std::vector<Real> Scale;
 };
+
+extern template class SupernodalFactor<float>;
+extern template class SupernodalFactor<double>;
 }
 
 #endif

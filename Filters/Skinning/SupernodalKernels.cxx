@@ -12,36 +12,64 @@ namespace
 {
 constexpr int Lanes = 8;
 static_assert(Lanes == SupernodalColumns, "a row of right-hand sides is one pack");
-using Pack [[gnu::vector_size(32)]] = float;
-using LoosePack [[gnu::vector_size(32), gnu::aligned(4), gnu::may_alias]] = float;
+template <typename Real>
+struct Packs;
+template <>
+struct Packs<float>
+{
+  using Pack [[gnu::vector_size(32)]] = float;
+  using LoosePack [[gnu::vector_size(32), gnu::aligned(4), gnu::may_alias]] = float;
+  static constexpr int Tile = 3; ///< that fit into the registers with four columns
+};
+template <>
+struct Packs<double>
+{
+  using Pack [[gnu::vector_size(64)]] = double;
+  using LoosePack [[gnu::vector_size(64), gnu::aligned(8), gnu::may_alias]] = double;
+  static constexpr int Tile = 1;
+};
+template <typename Real>
+using PackOf = typename Packs<Real>::Pack;
 
 /// By reference: a pack returned by value would depend on the registers of the caller.
-INLINE const LoosePack& Load(const float* from)
+template <typename Real>
+INLINE const typename Packs<Real>::LoosePack& Load(const Real* from)
 {
-  return *reinterpret_cast<const LoosePack*>(from);
+  return *reinterpret_cast<const typename Packs<Real>::LoosePack*>(from);
 }
 
-INLINE void Store(float* to, const Pack& pack)
+template <typename Real>
+INLINE void Store(Real* to, const PackOf<Real>& pack)
 {
-  *reinterpret_cast<LoosePack*>(to) = pack;
+  *reinterpret_cast<typename Packs<Real>::LoosePack*>(to) = pack;
 }
 
-/// `Packs` registers of rows and `Columns` columns of c -= a b'.
-template <int Packs, int Columns>
-INLINE void Tile(const float* a, std::int64_t lda, const float* b, std::int64_t ldb, std::int64_t k,
-  float* c, std::int64_t ldc)
+INLINE float Root(float square)
 {
-  Pack sum[Columns][Packs] = {};
+  return __builtin_sqrtf(square);
+}
+
+INLINE double Root(double square)
+{
+  return __builtin_sqrt(square);
+}
+
+/// `Count` packs of rows and `Columns` columns of c -= a b'.
+template <int Count, int Columns, typename Real>
+INLINE void Tile(const Real* a, std::int64_t lda, const Real* b, std::int64_t ldb, std::int64_t k,
+  Real* c, std::int64_t ldc)
+{
+  PackOf<Real> sum[Columns][Count] = {};
   for (std::int64_t l = 0; l < k; ++l)
   {
-    Pack left[Packs];
-    for (int p = 0; p < Packs; ++p)
+    PackOf<Real> left[Count];
+    for (int p = 0; p < Count; ++p)
     {
       left[p] = Load(a + l * lda + p * Lanes);
     }
     for (int j = 0; j < Columns; ++j)
     {
-      for (int p = 0; p < Packs; ++p)
+      for (int p = 0; p < Count; ++p)
       {
         sum[j][p] += left[p] * b[l * ldb + j];
       }
@@ -49,22 +77,23 @@ INLINE void Tile(const float* a, std::int64_t lda, const float* b, std::int64_t 
   }
   for (int j = 0; j < Columns; ++j)
   {
-    for (int p = 0; p < Packs; ++p)
+    for (int p = 0; p < Count; ++p)
     {
-      float* to = c + j * ldc + p * Lanes;
+      Real* to = c + j * ldc + p * Lanes;
       Store(to, Load(to) - sum[j][p]);
     }
   }
 }
 
-template <int Columns>
-INLINE void Strip(const float* a, std::int64_t lda, const float* b, std::int64_t ldb,
-  std::int64_t m, std::int64_t k, float* c, std::int64_t ldc)
+template <int Columns, typename Real>
+INLINE void Strip(const Real* a, std::int64_t lda, const Real* b, std::int64_t ldb, std::int64_t m,
+  std::int64_t k, Real* c, std::int64_t ldc)
 {
+  constexpr std::int64_t tile = Packs<Real>::Tile * Lanes;
   std::int64_t i = 0;
-  for (; i + 3 * Lanes <= m; i += 3 * Lanes)
+  for (; i + tile <= m; i += tile)
   {
-    Tile<3, Columns>(a + i, lda, b, ldb, k, c + i, ldc);
+    Tile<Packs<Real>::Tile, Columns>(a + i, lda, b, ldb, k, c + i, ldc);
   }
   for (; i + Lanes <= m; i += Lanes)
   {
@@ -72,7 +101,7 @@ INLINE void Strip(const float* a, std::int64_t lda, const float* b, std::int64_t
   }
   for (; i < m; ++i)
   {
-    float sum[Columns] = {};
+    Real sum[Columns] = {};
     for (std::int64_t l = 0; l < k; ++l)
     {
       for (int j = 0; j < Columns; ++j)
@@ -87,8 +116,9 @@ INLINE void Strip(const float* a, std::int64_t lda, const float* b, std::int64_t
   }
 }
 
-void SubtractProduct(const float* a, std::int64_t lda, const float* b, std::int64_t ldb,
-  std::int64_t m, std::int64_t n, std::int64_t k, float* c, std::int64_t ldc)
+template <typename Real>
+void SubtractProduct(const Real* a, std::int64_t lda, const Real* b, std::int64_t ldb,
+  std::int64_t m, std::int64_t n, std::int64_t k, Real* c, std::int64_t ldc)
 {
   std::int64_t j = 0;
   for (; j + 4 <= n; j += 4)
@@ -101,7 +131,8 @@ void SubtractProduct(const float* a, std::int64_t lda, const float* b, std::int6
   }
 }
 
-bool FactorPanel(float* panel, std::int64_t height, std::int64_t width)
+template <typename Real>
+bool FactorPanel(Real* panel, std::int64_t height, std::int64_t width)
 {
   constexpr std::int64_t block = 8;
   for (std::int64_t start = 0; start < width; start += block)
@@ -114,21 +145,21 @@ bool FactorPanel(float* panel, std::int64_t height, std::int64_t width)
     }
     for (std::int64_t j = start; j < end; ++j)
     {
-      float* column = panel + j * height;
+      Real* column = panel + j * height;
       for (std::int64_t l = start; l < j; ++l)
       {
-        const float* other = panel + l * height;
-        const float factor = other[j];
+        const Real* other = panel + l * height;
+        const Real factor = other[j];
         for (std::int64_t i = j; i < height; ++i)
         {
           column[i] -= factor * other[i];
         }
       }
-      if (!(column[j] > 0.0f))
+      if (!(column[j] > Real(0)))
       {
         return false;
       }
-      const float reciprocal = 1.0f / __builtin_sqrtf(column[j]);
+      const Real reciprocal = Real(1) / Root(column[j]);
       column[j] = reciprocal;
       for (std::int64_t i = j + 1; i < height; ++i)
       {
@@ -142,14 +173,14 @@ bool FactorPanel(float* panel, std::int64_t height, std::int64_t width)
 }
 
 /// below = rows of `Rows` x
-template <int Rows>
+template <int Rows, typename Real>
 INLINE void MultiplyRows(
-  const float* rows, std::int64_t height, std::int64_t width, const float* x, float* below)
+  const Real* rows, std::int64_t height, std::int64_t width, const Real* x, Real* below)
 {
-  Pack sum[Rows] = {};
+  PackOf<Real> sum[Rows] = {};
   for (std::int64_t k = 0; k < width; ++k)
   {
-    const Pack right = Load(x + k * Lanes);
+    const PackOf<Real> right = Load(x + k * Lanes);
     for (int r = 0; r < Rows; ++r)
     {
       sum[r] += rows[k * height + r] * right;
@@ -161,11 +192,12 @@ INLINE void MultiplyRows(
   }
 }
 
-void Forward(const float* panel, std::int64_t height, std::int64_t width, float* x, float* below)
+template <typename Real>
+void Forward(const Real* panel, std::int64_t height, std::int64_t width, Real* x, Real* below)
 {
   for (std::int64_t j = 0; j < width; ++j)
   {
-    const Pack value = Load(x + j * Lanes) * panel[j * height + j];
+    const PackOf<Real> value = Load(x + j * Lanes) * panel[j * height + j];
     Store(x + j * Lanes, value);
     for (std::int64_t i = j + 1; i < width; ++i)
     {
@@ -184,14 +216,14 @@ void Forward(const float* panel, std::int64_t height, std::int64_t width, float*
 }
 
 /// x -= columns' below, for `Columns` columns
-template <int Columns>
+template <int Columns, typename Real>
 INLINE void SubtractColumns(
-  const float* columns, std::int64_t height, std::int64_t rest, float* x, const float* below)
+  const Real* columns, std::int64_t height, std::int64_t rest, Real* x, const Real* below)
 {
-  Pack sum[Columns] = {};
+  PackOf<Real> sum[Columns] = {};
   for (std::int64_t i = 0; i < rest; ++i)
   {
-    const Pack right = Load(below + i * Lanes);
+    const PackOf<Real> right = Load(below + i * Lanes);
     for (int c = 0; c < Columns; ++c)
     {
       sum[c] += columns[c * height + i] * right;
@@ -203,8 +235,9 @@ INLINE void SubtractColumns(
   }
 }
 
+template <typename Real>
 void Backward(
-  const float* panel, std::int64_t height, std::int64_t width, float* x, const float* below)
+  const Real* panel, std::int64_t height, std::int64_t width, Real* x, const Real* below)
 {
   const std::int64_t rest = height - width;
   std::int64_t k = 0;
@@ -218,7 +251,7 @@ void Backward(
   }
   for (std::int64_t j = width - 1; j >= 0; --j)
   {
-    Pack value = Load(x + j * Lanes);
+    PackOf<Real> value = Load(x + j * Lanes);
     for (std::int64_t i = j + 1; i < width; ++i)
     {
       value -= panel[j * height + i] * Load(x + i * Lanes);
@@ -233,5 +266,6 @@ const SupernodalKernels SupernodalKernelsAvx2
 #else
 const SupernodalKernels SupernodalKernelsBaseline
 #endif
-  = { SubtractProduct, FactorPanel, Forward, Backward };
+  = { { SubtractProduct<float>, FactorPanel<float>, Forward<float>, Backward<float> },
+      { SubtractProduct<double>, FactorPanel<double>, Forward<double>, Backward<double> } };
 }

@@ -115,8 +115,9 @@ int Run(int argc, char** argv)
   int libiglIterations = 100;
   bool printLibigl = false;
   double neighbourhood = 1.75;
-  app.add_option(
-    "--sizes", sizes, "0: 2k points, 13 bones; 1: 9k, 46; 2: 23k, 61; 3: 100k, 61; 4: 200k, 151");
+  app.add_option("--sizes", sizes,
+    "0: 2k points, 13 bones; 1: 9k, 46; 2: 23k, 61; 3: 125k, 61; 4: 242k, 151; "
+    "5: 24k, 61, 115k tetrahedra");
   app.add_option("--libigl-up-to", libiglUpTo, "most points for libigl");
   app.add_option("--libigl-iterations", libiglIterations, "of its active set");
   app.add_flag("--print-libigl", printLibigl, "its weights, a line a point");
@@ -127,7 +128,7 @@ int Run(int argc, char** argv)
   CLI11_PARSE(app, argc, argv);
   bool good = true;
   std::vector<Case> cases{ { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 6, 3 }, { 12, 4, 14, 5 },
-    { 25, 5, 11, 5 } };
+    { 25, 5, 11, 5 }, { 12, 4, 4, 4 } };
   if (!tree.empty())
   {
     cases = { { tree[0], tree[1], tree[2], tree[3] } };
