@@ -27,6 +27,8 @@ tables=(
   "centerline: validate-centerline --details --invariance"
   "surface: validate-surface"
   "volume: validate-volume"
+  "skin-weights: skin-weight-benchmark --sizes 0 1 2 5 3 4"
+  "skin-deformation: skin-deformation-benchmark --benchmark_repetitions=5 --benchmark_report_aggregates_only=true"
   "volume-cgal: validate-volume --backend CGAL --seeds 3 --variants plain"
 )
 
@@ -83,6 +85,15 @@ for name in ${wanted[@]+"${wanted[@]}"}; do
     exit 2
   fi
 done
+# Needs Google's benchmark library, which only developers have.
+if [ ${#wanted[@]} -eq 0 ] && [ ! -x "$build/bin/skin-deformation-benchmark" ]; then
+  echo "validate: without skin-deformation, its program was not built" >&2
+  kept=()
+  for table in "${chosen[@]}"; do
+    [ "${table%%:*}" = skin-deformation ] || kept+=("$table")
+  done
+  chosen=("${kept[@]}")
+fi
 # All of them first: nobody wants to hear of it after an hour.
 for table in "${chosen[@]}"; do
   read -r program _ <<<"${table#*: }"

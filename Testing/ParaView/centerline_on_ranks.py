@@ -1,35 +1,13 @@
 """The filters from the image to named centerlines give on two ranks what they give on one."""
-import hashlib
 import os
 import sys
 
 from paraview import servermanager, simple
 
-from coronary_testing import (CENTERLINES, FORKS, LINES, TREE, centerline_pipeline, fetch,
-                              load_plugin, require)
+from coronary_testing import (CENTERLINES, FORKS, LINES, TREE, centerline_pipeline, digest,
+                              fetch, load_plugin, require)
 
 plugin, folder, ranks = sys.argv[1], sys.argv[2], int(sys.argv[3])
-
-
-def digest(data):
-    """Points, lines and all arrays, a line of text each."""
-    lines = ["%d points, %d cells" % (data.GetNumberOfPoints(), data.GetNumberOfCells())]
-
-    def add(name, array):
-        values = bytes(memoryview(array))
-        lines.append("%s %s" % (name, hashlib.sha256(values).hexdigest()))
-
-    add("points", data.GetPoints().GetData())
-    add("lines", data.GetLines().GetConnectivityArray())
-    for where, attributes in (("point", data.GetPointData()), ("cell", data.GetCellData())):
-        for index in range(attributes.GetNumberOfArrays()):
-            array = attributes.GetAbstractArray(index)
-            if array.IsA("vtkStringArray"):
-                values = [array.GetValue(n) for n in range(array.GetNumberOfValues())]
-                lines.append("%s %s %s" % (where, array.GetName(), values))
-            else:
-                add("%s %s" % (where, array.GetName()), array)
-    return lines
 
 
 load_plugin(plugin)

@@ -1,4 +1,5 @@
 """What the ParaView tests share: the plugin, data, pictures, and the phantom's usual view."""
+import hashlib
 import os
 import sys
 
@@ -105,6 +106,44 @@ def content(data):
         if array:
             arrays[array.GetName()] = bytes(memoryview(array))
     return arrays
+
+
+def digest(data):
+    """Points, lines and all arrays, a line of text each."""
+    lines = ["%d points, %d cells" % (data.GetNumberOfPoints(), data.GetNumberOfCells())]
+
+    def add(name, array):
+        values = bytes(memoryview(array))
+        lines.append("%s %s" % (name, hashlib.sha256(values).hexdigest()))
+
+    add("points", data.GetPoints().GetData())
+    cells = data.GetLines() if data.IsA("vtkPolyData") else data.GetCells()
+    add("cells", cells.GetConnectivityArray())
+    for where, attributes in (("point", data.GetPointData()), ("cell", data.GetCellData())):
+        for index in range(attributes.GetNumberOfArrays()):
+            array = attributes.GetAbstractArray(index)
+            if array.IsA("vtkStringArray"):
+                values = [array.GetValue(n) for n in range(array.GetNumberOfValues())]
+                lines.append("%s %s %s" % (where, array.GetName(), values))
+            else:
+                add("%s %s" % (where, array.GetName()), array)
+    return lines
+
+
+def places(data):
+    """Where a mesh on whole millimetres was at rest, and how it moved, whatever the order of its points."""
+    displacement = data.GetPointData().GetArray("Displacement")
+    found = {}
+    for n in range(data.GetNumberOfPoints()):
+        moved = displacement.GetTuple3(n)
+        rest = tuple(round(a - b) + 0.0 for a, b in zip(data.GetPoint(n), moved))
+        found[rest] = moved
+    return sorted(found.items())
+
+
+def largest_difference(ones, twos):
+    """Between two lists of places, of the movements."""
+    return max(abs(a - b) for one, two in zip(ones, twos) for a, b in zip(one[1], two[1]))
 
 
 def pixels(path):
