@@ -42,6 +42,7 @@ MakeCommand MakePhantomMotionCommand;
 MakeCommand MakeInspectCommand;
 MakeCommand MakeRunCommand;
 MakeCommand MakeConvertCommand;
+MakeCommand MakeSequenceCommand;
 }
 
 #endif

@@ -26,6 +26,7 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakePhantomMotionCommand,
   coronary::MakeInspectCommand,
   coronary::MakeRunCommand,
+  coronary::MakeSequenceCommand,
   coronary::MakeConvertCommand,
 };
 

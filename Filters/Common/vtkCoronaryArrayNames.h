@@ -203,6 +203,11 @@ constexpr const char* VolumeRatio = "VolumeRatio"; ///< double, against rest, be
 constexpr const char* InvertedTetrahedra = "InvertedTetrahedra"; ///< vtkIdType, ids of cells left
 constexpr const char* RepairedTetrahedra = "RepairedTetrahedra"; ///< vtkIdType, number
 
+// Surface of a sequence of meshes, point data.
+constexpr const char* MeshPointId = "MeshPointId"; ///< vtkIdType, point of the tetrahedra
+// Sequence of meshes, field data.
+constexpr const char* SurfaceArea = "SurfaceArea"; ///< double, mm^2
+
 // Cleaned surface, field data.
 constexpr const char* Repairs = "Repairs";                           ///< string, a sentence each
 constexpr const char* GreatestDisplacement = "GreatestDisplacement"; ///< double, mm

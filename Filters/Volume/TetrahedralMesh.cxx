@@ -1,5 +1,6 @@
 #include "TetrahedralMesh.h"
 
+#include "TetrahedralBoundary.h"
 #include "TriangleIntersections.h"
 #include "TriangleTree.h"
 
@@ -9,7 +10,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <tuple>
 #include <unordered_map>
 
 #include <unistd.h>
@@ -1153,7 +1153,7 @@ private:
         }
         std::fill_n(part.fixed.begin(), piece.points.size(), 1);
       }
-      for (const auto& [face, cell] : BoundaryOf(part.cells))
+      for (const auto& [face, cell] : BoundaryFaces(part.cells))
       {
         for (const std::int64_t corner : face)
         {
@@ -1192,48 +1192,6 @@ private:
     }
     Report(this->Progress, 0.95);
     this->Measure();
-  }
-
-  /// Faces of one tetrahedron only, looking outwards, with that tetrahedron; in the order of cells.
-  static std::vector<std::pair<Triangle, std::int64_t>> BoundaryOf(
-    const std::vector<Tetrahedron>& cells)
-  {
-    struct Face
-    {
-      Triangle sorted;
-      Triangle face;
-      std::int64_t cell;
-    };
-    std::vector<Face> faces;
-    faces.reserve(4 * cells.size());
-    for (std::size_t i = 0; i < cells.size(); ++i)
-    {
-      const Tetrahedron& t = cells[i];
-      for (const Triangle& face : { Triangle{ t[1], t[2], t[3] }, Triangle{ t[0], t[3], t[2] },
-             Triangle{ t[0], t[1], t[3] }, Triangle{ t[0], t[2], t[1] } })
-      {
-        Triangle sorted = face;
-        std::sort(sorted.begin(), sorted.end());
-        faces.push_back({ sorted, face, static_cast<std::int64_t>(i) });
-      }
-    }
-    std::sort(faces.begin(), faces.end(),
-      [](const Face& a, const Face& b)
-      { return std::tie(a.sorted, a.cell) < std::tie(b.sorted, b.cell); });
-    std::vector<std::pair<Triangle, std::int64_t>> boundary;
-    for (std::size_t i = 0; i < faces.size(); ++i)
-    {
-      const bool before = i > 0 && faces[i - 1].sorted == faces[i].sorted;
-      const bool after = i + 1 < faces.size() && faces[i + 1].sorted == faces[i].sorted;
-      if (!before && !after)
-      {
-        boundary.emplace_back(faces[i].face, faces[i].cell);
-      }
-    }
-    std::sort(boundary.begin(), boundary.end(),
-      [](const auto& a, const auto& b)
-      { return std::tie(a.second, a.first) < std::tie(b.second, b.first); });
-    return boundary;
   }
 
   void Append(const MesherAnswer& answer, const Piece& piece, const std::vector<Vector3>& points,
@@ -1335,7 +1293,7 @@ private:
       tree = std::make_unique<TriangleTree>(piece.points, piece.triangles);
     }
     std::size_t kept = 0;
-    for (const auto& [face, cell] : BoundaryOf(cells))
+    for (const auto& [face, cell] : BoundaryFaces(cells))
     {
       std::int64_t origin = -1;
       if (keepsSurface)

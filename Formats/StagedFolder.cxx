@@ -119,7 +119,7 @@ void StagedFolder::Commit()
   }
   for (const std::string& name : this->Names)
   {
-    fs::create_directory((folder / name).parent_path(), error);
+    fs::create_directories((folder / name).parent_path(), error);
     fs::rename(staging / name, folder / name, error);
     if (error)
     {

@@ -1,0 +1,343 @@
+#include "Command.h"
+
+#include "Interruption.h"
+#include "OptionChecks.h"
+#include "ParallelFor.h"
+#include "ProgressDisplay.h"
+#include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
+#include "vtkTimedPolyData.h"
+
+#include "vtkCallbackCommand.h"
+#include "vtkCardiacPhaseInterpolator.h"
+#include "vtkCommand.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkDataArray.h"
+#include "vtkMeshSequenceWriter.h"
+#include "vtkNew.h"
+#include "vtkPolyData.h"
+#include "vtkSkinDeformation.h"
+#include "vtkSmartPointer.h"
+#include "vtkTable.h"
+#include "vtkUnstructuredGrid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+namespace
+{
+namespace fs = std::filesystem;
+
+const std::map<std::string, int> Modes = {
+  { "linear", vtkCardiacPhaseInterpolator::Linear },
+  { "cubic", vtkCardiacPhaseInterpolator::PeriodicCubic },
+  { "low-noise", vtkCardiacPhaseInterpolator::LowNoise },
+};
+const std::map<std::string, int> Blends = {
+  { "linear", vtkSkinDeformation::LinearBlend },
+  { "dual-quaternion", vtkSkinDeformation::DualQuaternion },
+};
+
+struct SequenceJob
+{
+  std::string result;
+  std::vector<std::string> poses;
+  std::vector<double> poseTimes;
+  std::string output;
+  int phases = 0; ///< 0: those of the poses
+  std::vector<double> times;
+  std::string mode = "cubic";
+  std::string blend = "linear";
+  double volumeConservation = 0.0;
+  bool repair = true;
+  bool velocity = false;
+  std::vector<std::string> formats = { "series" };
+  std::string unit = "mm";
+  double poor = 15.0;
+  int threads = 0;
+  bool quiet = false;
+
+  void Declare(CLI::App& app);
+  void Run() const;
+
+private:
+  std::vector<std::string> PoseFiles() const;
+  void Choose(vtkMeshSequenceWriter* writer) const;
+  std::string Summary(vtkTable* quality) const;
+};
+
+void SequenceJob::Declare(CLI::App& app)
+{
+  app
+    .add_option("RESULT", this->result,
+      "Folder of 'run --until weights': weights.vtu, skeleton.vtp, and, when they are there, "
+      "volume_boundary.vtp and caps.vtp")
+    ->type_name("")
+    ->required();
+  app.add_option("--output", this->output, "Folder to write to; made when it does not exist")
+    ->type_name("DIR")
+    ->required();
+
+  const std::string motion = "Motion";
+  app
+    .add_option("--poses", this->poses,
+      "The skeleton over time: a .series or .pvd file, or .vtp files with --pose-times. Default: "
+      "RESULT/motion/skeleton.vtp.series")
+    ->type_name("FILE")
+    ->group(motion);
+  app
+    .add_option(
+      "--pose-times", this->poseTimes, "Times of the .vtp files, fractions of R-R: 0,0.2,0.4")
+    ->check(Within(-100.0, 100.0))
+    ->delimiter(',')
+    ->allow_extra_args(false)
+    ->type_name("LIST")
+    ->group(motion);
+  app
+    .add_option("--mode", this->mode,
+      "Interpolation between the poses: linear, cubic (periodic) or low-noise")
+    ->check(CLI::IsMember({ "linear", "cubic", "low-noise" }))
+    ->type_name("MODE")
+    ->capture_default_str()
+    ->group(motion);
+  auto* phasesOption =
+    app
+      .add_option("--phases", this->phases,
+        "Number of even phases of one cycle, from time 0. Default: the times of the poses")
+      ->check(WholeWithin(1, 100000))
+      ->type_name("N")
+      ->group(motion);
+  app.add_option("--times", this->times, "Times of the phases, fractions of R-R: 0,0.05,0.1")
+    ->check(Within(-100.0, 100.0))
+    ->delimiter(',')
+    ->allow_extra_args(false)
+    ->type_name("LIST")
+    ->excludes(phasesOption)
+    ->group(motion);
+
+  const std::string deformation = "Deformation";
+  app.add_option("--blend", this->blend, "Blending of bones: linear or dual-quaternion")
+    ->check(CLI::IsMember({ "linear", "dual-quaternion" }))
+    ->type_name("BLEND")
+    ->capture_default_str()
+    ->group(deformation);
+  app
+    .add_option("--volume-conservation", this->volumeConservation,
+      "How far cross-sections answer to stretch: 0 not at all, 1 the volume is kept")
+    ->check(Within(0.0, 1.0))
+    ->type_name("SHARE")
+    ->capture_default_str()
+    ->group(deformation);
+  app
+    .add_flag(
+      "!--no-repair", this->repair, "Leave inverted tetrahedra as they are, and report them")
+    ->group(deformation);
+  app.add_flag("--velocity", this->velocity, "Write the velocity of the points, mm/s")
+    ->group(deformation);
+
+  const std::string files = "Files";
+  app
+    .add_option("--formats", this->formats,
+      "series (ParaView: .pvd and .series), simvascular (mesh-complete folders), vmtk; several "
+      "with "
+      "commas")
+    ->check(CLI::IsMember({ "series", "simvascular", "vmtk" }))
+    ->delimiter(',')
+    ->allow_extra_args(false)
+    ->type_name("LIST")
+    ->capture_default_str()
+    ->group(files);
+  app
+    .add_option("--simvascular-unit", this->unit,
+      "Unit of length in the mesh-complete folders: mm, or cm as SimVascular's examples have")
+    ->check(CLI::IsMember({ "mm", "cm" }))
+    ->type_name("UNIT")
+    ->capture_default_str()
+    ->group(files);
+  app
+    .add_option("--poor", this->poor,
+      "Tetrahedra with a smaller dihedral angle are reported as poor, degrees")
+    ->check(Within(0.0, 70.0))
+    ->type_name("DEG")
+    ->capture_default_str()
+    ->group(files);
+  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
+    ->check(WholeWithin(0, 1024))
+    ->type_name("N")
+    ->capture_default_str();
+  app.add_flag("--quiet", this->quiet, "No progress and no summary");
+}
+
+std::vector<std::string> SequenceJob::PoseFiles() const
+{
+  if (!this->poses.empty())
+  {
+    return this->poses;
+  }
+  const std::string usual = (fs::path(this->result) / "motion" / "skeleton.vtp.series").string();
+  std::error_code ignored;
+  if (!fs::exists(usual, ignored))
+  {
+    throw UsageError("--poses is needed: there is no '" + usual + "'");
+  }
+  return { usual };
+}
+
+void SequenceJob::Choose(vtkMeshSequenceWriter* writer) const
+{
+  if (this->phases > 0)
+  {
+    writer->SetPhases(vtkMeshSequenceWriter::EvenPhases);
+    writer->SetNumberOfPhases(this->phases);
+  }
+  else if (!this->times.empty())
+  {
+    writer->SetPhases(vtkMeshSequenceWriter::ListedTimes);
+    std::vector<double> sorted = this->times;
+    std::sort(sorted.begin(), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+    for (const double time : sorted)
+    {
+      writer->AddTime(time);
+    }
+  }
+  const auto wanted = [&](const char* format)
+  { return std::find(this->formats.begin(), this->formats.end(), format) != this->formats.end(); };
+  writer->SetWriteSeries(wanted("series"));
+  writer->SetWriteSimVascular(wanted("simvascular"));
+  writer->SetWriteVmtk(wanted("vmtk"));
+  writer->SetSimVascularUnit(this->unit == "cm" ? 10.0 : 1.0);
+  writer->SetPoorDihedralAngle(this->poor);
+}
+
+std::string SequenceJob::Summary(vtkTable* quality) const
+{
+  const auto column = [&](const char* name)
+  { return vtkDataArray::SafeDownCast(quality->GetColumnByName(name)); };
+  double inverted = 0.0;
+  for (vtkIdType k = 0; k < quality->GetNumberOfRows(); ++k)
+  {
+    inverted += column(vtkCoronaryArrayNames::InvertedTetrahedra)->GetTuple1(k);
+  }
+  double angle[2];
+  double volume[2];
+  double poorest[2];
+  column(vtkCoronaryArrayNames::LeastDihedralAngle)->GetRange(angle);
+  column(vtkCoronaryArrayNames::TotalVolume)->GetRange(volume);
+  column(vtkCoronaryArrayNames::PoorFraction)->GetRange(poorest);
+  char text[240];
+  std::snprintf(text, sizeof(text),
+    "%lld phases, %.0f inverted tetrahedra, at most %.3f %% poor, least dihedral angle %.2f "
+    "degrees, "
+    "volume %.1f to %.1f mm^3",
+    static_cast<long long>(quality->GetNumberOfRows()), inverted, 100.0 * poorest[1],
+    angle[0] * 180.0 / M_PI, volume[0], volume[1]);
+  return text;
+}
+
+/// Of a folder, when it is there.
+vtkSmartPointer<vtkPolyData> ReadOptional(
+  const std::string& folder, const char* name, vtkMessageTrap& messages)
+{
+  const fs::path path = fs::path(folder) / name;
+  std::error_code ignored;
+  return fs::exists(path, ignored) ? ReadPolyData(path.string(), messages) : nullptr;
+}
+
+void SequenceJob::Run() const
+{
+  SetNumberOfThreads(this->threads);
+  const std::vector<std::string> poseFiles = this->PoseFiles();
+  vtkMessageTrap messages;
+  ProgressDisplay progress("step", 2, this->quiet);
+  progress.BeginStep(0, "reading");
+  const auto mesh =
+    ReadUnstructuredGrid((fs::path(this->result) / "weights.vtu").string(), messages);
+  const auto rest = ReadPolyData((fs::path(this->result) / "skeleton.vtp").string(), messages);
+  const auto boundary = ReadOptional(this->result, "volume_boundary.vtp", messages);
+  const auto caps = ReadOptional(this->result, "caps.vtp", messages);
+  const auto source = ReadTimedPolyData(poseFiles, this->poseTimes, messages);
+  if (mesh->GetNumberOfCells() == 0)
+  {
+    throw std::runtime_error("'" + this->result + "/weights.vtu' is empty.");
+  }
+
+  vtkNew<vtkCardiacPhaseInterpolator> interpolator;
+  interpolator->SetInputConnection(source->GetOutputPort());
+  interpolator->SetMode(Modes.at(this->mode));
+  interpolator->SetSteps(vtkCardiacPhaseInterpolator::InputSteps);
+  vtkNew<vtkSkinDeformation> deformation;
+  deformation->SetInputData(0, mesh);
+  deformation->SetInputData(1, rest);
+  deformation->SetPoseConnection(interpolator->GetOutputPort());
+  deformation->SetBlend(Blends.at(this->blend));
+  deformation->SetVolumeConservation(this->volumeConservation);
+  // Thin tetrahedra far from the origin are better off, and files take longer than this.
+  deformation->DoublePrecisionOn();
+  deformation->SetComputeVelocity(this->velocity);
+  deformation->SetTetrahedra(
+    this->repair ? vtkSkinDeformation::RepairTetrahedra : vtkSkinDeformation::CheckTetrahedra);
+  vtkNew<vtkMeshSequenceWriter> writer;
+  writer->SetInputConnection(deformation->GetOutputPort());
+  if (boundary)
+  {
+    writer->SetInputData(1, boundary);
+  }
+  if (caps)
+  {
+    writer->SetInputData(2, caps);
+  }
+  this->Choose(writer);
+  writer->SetFileName((fs::path(this->output) / "mesh.json").string().c_str());
+
+  progress.BeginStep(1, "phases");
+  const std::function<void(double)> show = [&](double fraction) { progress.Update(fraction); };
+  vtkNew<vtkCallbackCommand> observer;
+  observer->SetClientData(const_cast<std::function<void(double)>*>(&show));
+  observer->SetCallback(
+    [](vtkObject* caller, unsigned long, void* data, void*)
+    {
+      auto* algorithm = static_cast<vtkAlgorithm*>(caller);
+      (*static_cast<const std::function<void(double)>*>(data))(algorithm->GetProgress());
+      if (Interruption() != 0)
+      {
+        algorithm->SetAbortExecute(1);
+      }
+    });
+  writer->AddObserver(vtkCommand::ProgressEvent, observer);
+  const int good = writer->Write();
+  ThrowIfInterrupted();
+  messages.ThrowIfError();
+  if (!good)
+  {
+    throw std::runtime_error("Nothing was written to '" + this->output + "'.");
+  }
+  messages.PrintWarnings();
+  if (!this->quiet)
+  {
+    std::printf("%s: %s\n", this->output.c_str(), this->Summary(writer->GetQuality()).c_str());
+  }
+}
+}
+
+Command MakeSequenceCommand(CLI::App& program)
+{
+  CLI::App* app = program.add_subcommand(
+    "sequence", "One mesh over the heart cycle, for simulations: series, SimVascular, VMTK");
+  app->footer("Writes DIR/mesh.json and mesh_quality.csv; series: mesh_volume_000.vtu .., "
+              "mesh_surface_000.vtp .., their .pvd and .series; simvascular: "
+              "mesh_simvascular/phase_000/mesh-complete ..; vmtk: mesh_vmtk_000.vtu ...");
+  auto job = std::make_shared<SequenceJob>();
+  job->Declare(*app);
+  return { app, [job] { job->Run(); } };
+}
+}

@@ -1,0 +1,281 @@
+#include "FileSeries.h"
+
+#include <nlohmann/json.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+namespace coronary
+{
+namespace fs = std::filesystem;
+
+namespace
+{
+// A list of a hundred thousand files has some megabytes.
+constexpr std::uintmax_t LargestList = 64u << 20;
+
+[[noreturn]] void Fail(const std::string& path, const std::string& what)
+{
+  throw std::runtime_error("'" + path + "': " + what + ".");
+}
+
+std::string ReadText(const std::string& path)
+{
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status))
+  {
+    throw std::runtime_error("File '" + path + "' does not exist.");
+  }
+  if (!fs::is_regular_file(status))
+  {
+    Fail(path, "is not a file");
+  }
+  const std::uintmax_t size = fs::file_size(path, error);
+  if (error || size > LargestList)
+  {
+    Fail(path, "is too large for a list of files");
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
+  if (file.bad() || text.size() != size)
+  {
+    Fail(path, "cannot be read");
+  }
+  return text;
+}
+
+std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text)
+{
+  nlohmann::json list;
+  try
+  {
+    list = nlohmann::json::parse(text);
+  }
+  catch (const nlohmann::json::exception& error)
+  {
+    Fail(path, std::string("is not JSON: ") + error.what());
+  }
+  const auto entries = list.find("files");
+  if (entries == list.end() || !entries->is_array())
+  {
+    Fail(path, "has no list 'files'");
+  }
+  std::vector<TimedFile> files;
+  for (const auto& entry : *entries)
+  {
+    const std::string owner = "files[" + std::to_string(files.size()) + "]";
+    if (!entry.is_object() || !entry.contains("name") || !entry["name"].is_string())
+    {
+      Fail(path, owner + " has no 'name'");
+    }
+    if (!entry.contains("time") || !entry["time"].is_number())
+    {
+      Fail(path, owner + " has no 'time' that is a number");
+    }
+    files.push_back({ entry["name"].get<std::string>(), entry["time"].get<double>() });
+  }
+  return files;
+}
+
+constexpr std::array<std::pair<const char*, char>, 5> Entities{ { { "&lt;", '<' }, { "&gt;", '>' },
+  { "&quot;", '"' }, { "&apos;", '\'' }, { "&amp;", '&' } } };
+
+std::string Decoded(const std::string& path, const std::string& text)
+{
+  std::string result;
+  for (std::size_t i = 0; i < text.size();)
+  {
+    if (text[i] != '&')
+    {
+      result += text[i++];
+      continue;
+    }
+    bool known = false;
+    for (const auto& [entity, character] : Entities)
+    {
+      const std::string name(entity);
+      if (text.compare(i, name.size(), name) == 0)
+      {
+        result += character;
+        i += name.size();
+        known = true;
+        break;
+      }
+    }
+    if (!known)
+    {
+      Fail(path, "has an entity that is not known in '" + text + "'");
+    }
+  }
+  return result;
+}
+
+std::string Encoded(const std::string& text)
+{
+  std::string result;
+  for (const char c : text)
+  {
+    std::string written(1, c);
+    for (const auto& [entity, character] : Entities)
+    {
+      written = c == character ? entity : written;
+    }
+    result += written;
+  }
+  return result;
+}
+
+bool IsSpace(char c)
+{
+  return c == ' ' || c == '\t' || c == '\n' || c == '\r';
+}
+
+/// The attributes of the element whose name ends at `at`; leaves `at` behind it.
+std::map<std::string, std::string> Attributes(
+  const std::string& path, const std::string& text, std::size_t& at)
+{
+  std::map<std::string, std::string> attributes;
+  while (true)
+  {
+    while (at < text.size() && (IsSpace(text[at]) || text[at] == '/'))
+    {
+      ++at;
+    }
+    if (at < text.size() && text[at] == '>')
+    {
+      ++at;
+      return attributes;
+    }
+    const std::size_t equals = text.find('=', at);
+    const std::size_t open =
+      equals == std::string::npos ? equals : text.find_first_of("\"'", equals);
+    const std::size_t close = open == std::string::npos ? open : text.find(text[open], open + 1);
+    if (close == std::string::npos)
+    {
+      Fail(path, "ends in the middle of an element");
+    }
+    std::string name = text.substr(at, equals - at);
+    while (!name.empty() && IsSpace(name.back()))
+    {
+      name.pop_back();
+    }
+    attributes[name] = Decoded(path, text.substr(open + 1, close - open - 1));
+    at = close + 1;
+  }
+}
+
+std::vector<TimedFile> ReadPvd(const std::string& path, std::string text)
+{
+  for (std::size_t open = 0; (open = text.find("<!--", open)) != std::string::npos;)
+  {
+    const std::size_t close = text.find("-->", open);
+    if (close == std::string::npos)
+    {
+      Fail(path, "has a comment without end");
+    }
+    text.erase(open, close + 3 - open);
+  }
+  if (text.find("<VTKFile") == std::string::npos || text.find("<Collection") == std::string::npos)
+  {
+    Fail(path, "is not a .pvd file");
+  }
+  if (text.find("</VTKFile") == std::string::npos)
+  {
+    Fail(path, "is not whole");
+  }
+  std::vector<TimedFile> files;
+  const std::string element = "<DataSet";
+  for (std::size_t at = 0; (at = text.find(element, at)) != std::string::npos;)
+  {
+    at += element.size();
+    const std::map<std::string, std::string> attributes = Attributes(path, text, at);
+    const std::string owner = "DataSet " + std::to_string(files.size());
+    const auto file = attributes.find("file");
+    if (file == attributes.end())
+    {
+      Fail(path, owner + " has no file");
+    }
+    const auto step = attributes.find("timestep");
+    if (step == attributes.end())
+    {
+      Fail(path, owner + " has no timestep");
+    }
+    char* end = nullptr;
+    const double time = std::strtod(step->second.c_str(), &end);
+    if (step->second.empty() || *end != '\0')
+    {
+      Fail(path, owner + " has no timestep that is a number");
+    }
+    if (!files.empty() && files.back().time == time)
+    {
+      Fail(path, "has several files at the time " + step->second);
+    }
+    files.push_back({ file->second, time });
+  }
+  return files;
+}
+}
+
+std::vector<TimedFile> ReadFileSeries(const std::string& path)
+{
+  const std::string text = ReadText(path);
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  const char kind = first == std::string::npos ? '\0' : text[first];
+  if (kind != '{' && kind != '<')
+  {
+    Fail(path, "is neither a .series nor a .pvd file");
+  }
+  std::vector<TimedFile> files = kind == '{' ? ReadJson(path, text) : ReadPvd(path, text);
+  if (files.empty())
+  {
+    Fail(path, "lists no files");
+  }
+  const fs::path folder = fs::path(path).parent_path();
+  for (std::size_t n = 0; n < files.size(); ++n)
+  {
+    if (files[n].path.empty())
+    {
+      Fail(path, "file " + std::to_string(n) + " has no name");
+    }
+    if (!std::isfinite(files[n].time) || (n > 0 && !(files[n].time > files[n - 1].time)))
+    {
+      Fail(path, "the time of '" + files[n].path + "' is not finite and after the one before");
+    }
+    files[n].path = (folder / files[n].path).lexically_normal().string();
+  }
+  return files;
+}
+
+std::string FileSeriesText(const std::vector<TimedFile>& files)
+{
+  nlohmann::ordered_json list = { { "file-series-version", "1.0" },
+    { "files", nlohmann::ordered_json::array() } };
+  for (const TimedFile& file : files)
+  {
+    list["files"].push_back({ { "name", file.path }, { "time", file.time } });
+  }
+  return list.dump(2) + "\n";
+}
+
+std::string PvdText(const std::vector<TimedFile>& files)
+{
+  std::string text = "<?xml version=\"1.0\"?>\n"
+                     "<VTKFile type=\"Collection\" version=\"0.1\">\n"
+                     "  <Collection>\n";
+  for (const TimedFile& file : files)
+  {
+    text += "    <DataSet timestep=\"" + nlohmann::json(file.time).dump() +
+      "\" group=\"\" part=\"0\" file=\"" + Encoded(file.path) + "\"/>\n";
+  }
+  return text + "  </Collection>\n</VTKFile>\n";
+}
+}

@@ -1,0 +1,186 @@
+// Lists of files over time, .series and .pvd: there and back, and what is wrong with them; the report of a sequence.
+#include "AtomicFile.h"
+#include "FileSeries.h"
+#include "MeshSequenceReport.h"
+#include "StagedFolder.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+
+namespace
+{
+class UnitTestFileSeries : public ::testing::Test
+{
+protected:
+  void SetUp() override
+  {
+    this->Folder = fs::temp_directory_path() / ("file-series." + std::to_string(getpid()));
+    fs::create_directories(this->Folder);
+  }
+  void TearDown() override { fs::remove_all(this->Folder); }
+
+  std::string Put(const std::string& name, const std::string& text)
+  {
+    const std::string path = (this->Folder / name).string();
+    coronary::WriteFileAtomically(path, text);
+    return path;
+  }
+
+  void ExpectFailure(const std::string& text, const std::string& part)
+  {
+    const std::string path = this->Put("list", text);
+    try
+    {
+      coronary::ReadFileSeries(path);
+      ADD_FAILURE() << "nothing was thrown, wanted: " << part;
+    }
+    catch (const std::runtime_error& error)
+    {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
+    }
+  }
+
+  fs::path Folder;
+};
+
+const std::vector<coronary::TimedFile> Files = { { "a_000.vtp", -0.05 },
+  { "a & <b> \"1\".vtp", 0.1 }, { "sub/a_002.vtp", 0.30000000000000004 } };
+}
+
+TEST_F(UnitTestFileSeries, ComesBack)
+{
+  for (const std::string& text : { coronary::FileSeriesText(Files), coronary::PvdText(Files) })
+  {
+    const auto read = coronary::ReadFileSeries(this->Put("list", text));
+    ASSERT_EQ(read.size(), Files.size());
+    for (std::size_t n = 0; n < read.size(); ++n)
+    {
+      EXPECT_EQ(read[n].path, (this->Folder / Files[n].path).string());
+      EXPECT_EQ(read[n].time, Files[n].time);
+    }
+  }
+}
+
+TEST_F(UnitTestFileSeries, ReadsWhatParaViewWrites)
+{
+  const auto pvd = coronary::ReadFileSeries(this->Put("list",
+    "<?xml version=\"1.0\"?>\n<VTKFile type='Collection' version='0.1' compressor=''>\n"
+    "<Collection>\n<!-- <DataSet timestep=\"9\" file=\"no\"/> -->\n"
+    "<DataSet timestep='0' group='' part='0'\n file='/x/y.vtp' ></DataSet>"
+    "<DataSet file=\"z.vtp\" timestep=\"1e-1\"/></Collection></VTKFile>"));
+  ASSERT_EQ(pvd.size(), 2U);
+  EXPECT_EQ(pvd[0].path, "/x/y.vtp");
+  EXPECT_EQ(pvd[1].time, 0.1);
+  const auto series = coronary::ReadFileSeries(this->Put("list",
+    "{\"file-series-version\":\"1.0\",\"files\":[{\"name\":\"a.vtp\",\"time\":0},{\"time\":2,"
+    "\"name\":\"./b.vtp\"}]}"));
+  ASSERT_EQ(series.size(), 2U);
+  EXPECT_EQ(series[1].path, (this->Folder / "b.vtp").string());
+}
+
+TEST_F(UnitTestFileSeries, SaysWhatIsWrong)
+{
+  this->ExpectFailure("", "neither a .series nor a .pvd");
+  this->ExpectFailure("hello", "neither a .series nor a .pvd");
+  this->ExpectFailure("{\"files\": [", "is not JSON");
+  this->ExpectFailure("{\"file\": []}", "no list 'files'");
+  this->ExpectFailure("{\"files\": []}", "lists no files");
+  this->ExpectFailure("{\"files\": [{\"time\": 1}]}", "files[0] has no 'name'");
+  this->ExpectFailure(
+    "{\"files\": [{\"name\": \"a\", \"time\": \"1\"}]}", "files[0] has no 'time'");
+  this->ExpectFailure("{\"files\": [{\"name\": \"\", \"time\": 1}]}", "file 0 has no name");
+  this->ExpectFailure(
+    "{\"files\": [{\"name\": \"a\", \"time\": 1}, {\"name\": \"b\", \"time\": 1}]}",
+    "the time of 'b'");
+  const std::string open = "<VTKFile><Collection>";
+  const std::string close = "</Collection></VTKFile>";
+  this->ExpectFailure("<html></html>", "is not a .pvd");
+  this->ExpectFailure(open, "is not whole");
+  this->ExpectFailure(open + close, "lists no files");
+  this->ExpectFailure(open + "<!-- " + close, "comment without end");
+  this->ExpectFailure(open + "<DataSet timestep='0'/>" + close, "DataSet 0 has no file");
+  this->ExpectFailure(open + "<DataSet file='a'/>" + close, "DataSet 0 has no timestep");
+  this->ExpectFailure(open + "<DataSet file='a' timestep='x'/>" + close, "is a number");
+  this->ExpectFailure(open + "<DataSet file='a' timestep='nan'/>" + close, "not finite");
+  this->ExpectFailure(open + "<DataSet file='&bad;' timestep='0'/>" + close, "entity");
+  this->ExpectFailure(open + close + "<DataSet file='a", "middle of an element");
+  this->ExpectFailure(open + "<DataSet file='a' timestep='0' part='0'/>" +
+      "<DataSet file='b' timestep='0' part='1'/>" + close,
+    "several files at the time");
+  EXPECT_THROW(coronary::ReadFileSeries((this->Folder / "none").string()), std::runtime_error);
+  EXPECT_THROW(coronary::ReadFileSeries(this->Folder.string()), std::runtime_error);
+}
+
+TEST_F(UnitTestFileSeries, StagedFilesAppearTogetherInDeepFolders)
+{
+  const fs::path folder = this->Folder / "made";
+  {
+    coronary::StagedFolder staged(folder.string());
+    coronary::WriteFileAtomically(staged.Add("a/b/c.txt"), "deep");
+    EXPECT_FALSE(fs::exists(folder / "a"));
+  }
+  EXPECT_FALSE(fs::exists(folder));
+  coronary::StagedFolder staged(folder.string());
+  coronary::WriteFileAtomically(staged.Add("a/b/c.txt"), "deep");
+  coronary::WriteFileAtomically(staged.Add("last.txt"), "last");
+  staged.Commit();
+  EXPECT_TRUE(fs::is_regular_file(folder / "a/b/c.txt"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
+}
+
+TEST(UnitTestMeshSequenceReport, NumbersAndNames)
+{
+  coronary::MeshSequenceReport report;
+  report.points = 5;
+  report.tetrahedra = 4;
+  report.triangles = 6;
+  report.faces = { { 1, "wall", 4 }, { 2, "inlet\xff", 2 } };
+  report.files = { { "volume", "m_volume.pvd" } };
+  report.phases.resize(2);
+  report.phases[0].time = 0.1;
+  report.phases[1].time = 0.6;
+  report.phases[1].tetrahedra.inverted = { 1, 3 };
+  report.phases[1].tetrahedra.poor = 3;
+  report.phases[1].tetrahedra.greatestRadiusEdgeRatio = std::numeric_limits<double>::infinity();
+  report.phases[1].files = { { "volume", "m_volume_001.vtu" } };
+
+  const auto json = nlohmann::json::parse(coronary::MeshSequenceJson(report));
+  EXPECT_EQ(json["poor_below_deg"].get<double>(), 15.0);
+  EXPECT_EQ(json["faces"][0]["type"], "wall");
+  EXPECT_EQ(json["faces"][1]["type"], "cap");
+  EXPECT_EQ(json["files"]["volume"], "m_volume.pvd");
+  ASSERT_EQ(json["phases"].size(), 2U);
+  EXPECT_EQ(json["phases"][1]["phase"], 1);
+  EXPECT_EQ(json["phases"][1]["inverted_ids"], (std::vector<int>{ 1, 3 }));
+  EXPECT_EQ(json["phases"][1]["quality"]["poor_fraction"], 0.75);
+  EXPECT_TRUE(json["phases"][1]["quality"]["greatest_radius_edge_ratio"].is_null());
+  EXPECT_EQ(json["phases"][1]["files"]["volume"], "m_volume_001.vtu");
+
+  std::istringstream csv(coronary::MeshSequenceCsv(report));
+  std::string head;
+  std::string first;
+  std::string second;
+  std::string rest;
+  ASSERT_TRUE(std::getline(csv, head) && std::getline(csv, first) && std::getline(csv, second));
+  EXPECT_FALSE(std::getline(csv, rest));
+  EXPECT_EQ(head.rfind("phase,time,inverted_tetrahedra,poor_tetrahedra,poor_fraction,", 0), 0U);
+  EXPECT_EQ(first.rfind("0,0.1,0,0,0.0,", 0), 0U) << first;
+  EXPECT_EQ(second.rfind("1,0.6,2,3,0.75,", 0), 0U) << second;
+  EXPECT_NE(second.find(",inf,"), std::string::npos);
+  EXPECT_EQ(second.substr(second.rfind(',')), ",1 3");
+  EXPECT_EQ(std::count(head.begin(), head.end(), ','), std::count(first.begin(), first.end(), ','));
+
+  report.tetrahedra = 0;
+  EXPECT_NE(coronary::MeshSequenceCsv(report).find("enclosed_volume_mm3"), std::string::npos);
+}
