@@ -107,8 +107,8 @@ vtkSmartPointer<vtkCellArray> MakeCells(
   const std::vector<std::array<std::int64_t, Corners>>& elements)
 {
   auto cells = vtkSmartPointer<vtkCellArray>::New();
-  cells->AllocateExact(
-    static_cast<vtkIdType>(elements.size()), static_cast<vtkIdType>(Corners * elements.size()));
+  const auto count = static_cast<vtkIdType>(elements.size());
+  cells->AllocateExact(count, static_cast<vtkIdType>(Corners) * count);
   for (const auto& element : elements)
   {
     std::array<vtkIdType, Corners> ids{};
@@ -126,6 +126,17 @@ std::vector<coronary::Vector3> ReadPoints(vtkPointSet* data)
     data->GetPoint(static_cast<vtkIdType>(n), points[n].data());
   }
   return points;
+}
+
+/// @throws std::invalid_argument(complaint) when there is no such array
+vtkDataArray* NeededArray(vtkFieldData* data, const std::string& name, const std::string& complaint)
+{
+  vtkDataArray* array = data->GetArray(name.c_str());
+  if (!array)
+  {
+    throw std::invalid_argument(complaint);
+  }
+  return array;
 }
 
 /// Ids of faces out of an array of any numbers.
@@ -248,8 +259,8 @@ std::vector<std::int64_t> PointsInMesh(vtkPolyData* boundary, vtkIdType points)
 void TakeBoundary(vtkPolyData* boundary, Topology& topology)
 {
   std::vector<Triangle> given = ReadCells<3>(OnlyTriangles(boundary, "The boundary"));
-  vtkDataArray* ids = boundary->GetCellData()->GetArray(topology.entityIdsName.c_str());
-  Require(ids != nullptr, "The boundary has no cell array " + topology.entityIdsName);
+  vtkDataArray* ids = NeededArray(boundary->GetCellData(), topology.entityIdsName,
+    "The boundary has no cell array " + topology.entityIdsName);
   const std::vector<int> entity =
     ReadFaceIds(ids, "Array " + topology.entityIdsName + " of the boundary");
   const std::vector<std::int64_t> map = PointsInMesh(boundary, topology.points);
@@ -411,8 +422,8 @@ std::map<int, std::string> NamesOfCaps(vtkPolyData* caps, const std::string& ent
   {
     return result;
   }
-  vtkDataArray* array = caps->GetPointData()->GetArray(entityIdsName.c_str());
-  Require(array != nullptr, "The caps have no point array " + entityIdsName);
+  vtkDataArray* array = NeededArray(
+    caps->GetPointData(), entityIdsName, "The caps have no point array " + entityIdsName);
   const std::vector<int> ids = ReadFaceIds(array, "Array " + entityIdsName + " of the caps");
   vtkDataArray* inlet = caps->GetPointData()->GetArray(names::IsInlet);
   auto* label =
