@@ -60,6 +60,7 @@ struct SequenceJob
   double volumeConservation = 0.0;
   bool repair = true;
   bool velocity = false;
+  double cycleMs = 0.0; ///< 0: that of the poses
   std::vector<std::string> formats = { "series" };
   std::string unit = "mm";
   double poor = 15.0;
@@ -71,6 +72,7 @@ struct SequenceJob
 
 private:
   std::vector<std::string> PoseFiles() const;
+  std::vector<double> PhaseTimes(const std::vector<double>& ofPoses) const;
   void Choose(vtkMeshSequenceWriter* writer) const;
   std::string Summary(vtkTable* quality) const;
 };
@@ -144,6 +146,13 @@ void SequenceJob::Declare(CLI::App& app)
   app.add_flag("--velocity", this->velocity, "Write the velocity of the points, mm/s")
     ->group(deformation);
 
+  app
+    .add_option("--cycle-ms", this->cycleMs,
+      "R-R interval in ms, for the velocity, where the poses do not give it (CycleLength)")
+    ->check(Within(1.0, 60000.0))
+    ->type_name("MS")
+    ->group(deformation);
+
   const std::string files = "Files";
   app
     .add_option("--formats", this->formats,
@@ -192,24 +201,47 @@ std::vector<std::string> SequenceJob::PoseFiles() const
   return { usual };
 }
 
-void SequenceJob::Choose(vtkMeshSequenceWriter* writer) const
+std::vector<double> SequenceJob::PhaseTimes(const std::vector<double>& ofPoses) const
 {
   if (this->phases > 0)
   {
-    writer->SetPhases(vtkMeshSequenceWriter::EvenPhases);
-    writer->SetNumberOfPhases(this->phases);
-  }
-  else if (!this->times.empty())
-  {
-    writer->SetPhases(vtkMeshSequenceWriter::ListedTimes);
-    std::vector<double> sorted = this->times;
-    std::sort(sorted.begin(), sorted.end());
-    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
-    for (const double time : sorted)
+    std::vector<double> even(static_cast<std::size_t>(this->phases));
+    for (int k = 0; k < this->phases; ++k)
     {
-      writer->AddTime(time);
+      even[static_cast<std::size_t>(k)] = static_cast<double>(k) / this->phases;
     }
+    return even;
   }
+  if (this->times.empty())
+  {
+    return ofPoses;
+  }
+  std::vector<double> sorted = this->times;
+  std::sort(sorted.begin(), sorted.end());
+  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+  return sorted;
+}
+
+/// The deformation takes velocities between the time steps around a moment: these are close to it, and on
+/// both sides of the first and of the last one too.
+void OfferMomentsAround(const std::vector<double>& times, vtkCardiacPhaseInterpolator* interpolator)
+{
+  double step = 0.002;
+  for (std::size_t k = 1; k < times.size(); ++k)
+  {
+    step = std::min(step, 0.25 * (times[k] - times[k - 1]));
+  }
+  interpolator->SetSteps(vtkCardiacPhaseInterpolator::ListedSteps);
+  for (const double time : times)
+  {
+    interpolator->AddStep(time - step);
+    interpolator->AddStep(time);
+    interpolator->AddStep(time + step);
+  }
+}
+
+void SequenceJob::Choose(vtkMeshSequenceWriter* writer) const
+{
   const auto wanted = [&](const char* format)
   { return std::find(this->formats.begin(), this->formats.end(), format) != this->formats.end(); };
   writer->SetWriteSeries(wanted("series"));
@@ -271,10 +303,21 @@ void SequenceJob::Run() const
     throw std::runtime_error("'" + this->result + "/weights.vtu' is empty.");
   }
 
+  const bool cycleKnown = source->Find(vtkCoronaryArrayNames::CycleLength);
+  if (this->velocity && !cycleKnown && !(this->cycleMs > 0.0))
+  {
+    throw UsageError(
+      "--velocity: the poses do not say how long a cycle takes, --cycle-ms is needed");
+  }
   vtkNew<vtkCardiacPhaseInterpolator> interpolator;
   interpolator->SetInputConnection(source->GetOutputPort());
   interpolator->SetMode(Modes.at(this->mode));
-  interpolator->SetSteps(vtkCardiacPhaseInterpolator::InputSteps);
+  const std::vector<double> phaseTimes = this->PhaseTimes(source->GetTimes());
+  OfferMomentsAround(phaseTimes, interpolator);
+  if (this->cycleMs > 0.0)
+  {
+    interpolator->SetCycleLength(this->cycleMs / 1000.0);
+  }
   vtkNew<vtkSkinDeformation> deformation;
   deformation->SetInputData(0, mesh);
   deformation->SetInputData(1, rest);
@@ -297,6 +340,11 @@ void SequenceJob::Run() const
     writer->SetInputData(2, caps);
   }
   this->Choose(writer);
+  writer->SetPhases(vtkMeshSequenceWriter::ListedTimes);
+  for (const double time : phaseTimes)
+  {
+    writer->AddTime(time);
+  }
   writer->SetFileName((fs::path(this->output) / "mesh.json").string().c_str());
 
   progress.BeginStep(1, "phases");

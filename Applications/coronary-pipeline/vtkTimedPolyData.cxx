@@ -6,6 +6,7 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 
+#include "vtkFieldData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkObjectFactory.h"
@@ -30,6 +31,11 @@ void vtkTimedPolyData::Add(double time, vtkPolyData* data)
   this->Times.push_back(time);
   this->Steps.emplace_back(data);
   this->Modified();
+}
+
+bool vtkTimedPolyData::Find(const char* fieldArray) const
+{
+  return !this->Steps.empty() && this->Steps.front()->GetFieldData()->HasArray(fieldArray) != 0;
 }
 
 int vtkTimedPolyData::RequestInformation(

@@ -28,6 +28,9 @@ public:
 
   const std::vector<double>& GetTimes() const { return this->Times; }
 
+  /// Whether the data of the first time have a field array.
+  bool Find(const char* fieldArray) const;
+
 protected:
   vtkTimedPolyData();
   ~vtkTimedPolyData() override;

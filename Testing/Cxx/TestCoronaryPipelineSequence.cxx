@@ -110,7 +110,7 @@ protected:
 TEST_F(TestCoronaryPipelineSequence, PhasesOfOneTopologyInAllFormats)
 {
   ASSERT_EQ(this->Run("result --phases 20 --formats series,simvascular,vmtk --simvascular-unit cm "
-                      "--velocity --threads 1 --output out"),
+                      "--velocity --cycle-ms 800 --threads 1 --output out"),
     0)
     << ReadText(this->Folder / "stderr");
   EXPECT_NE(ReadText(this->Folder / "stdout").find("out: 20 phases, 0 inverted tetrahedra"),
@@ -135,11 +135,10 @@ TEST_F(TestCoronaryPipelineSequence, PhasesOfOneTopologyInAllFormats)
   vtkNew<vtkXMLUnstructuredGridReader> reader;
   reader->SetFileName((this->Folder / "out/mesh_volume_005.vtu").c_str());
   reader->Update();
-  EXPECT_TRUE(reader->GetOutput()->GetPointData()->GetArray("Velocity"));
   EXPECT_EQ(reader->GetOutput()->GetPoints()->GetDataType(), VTK_DOUBLE);
 
   ASSERT_EQ(this->Run("result --phases 20 --formats series,simvascular,vmtk --simvascular-unit cm "
-                      "--velocity --threads 3 --quiet --output out3"),
+                      "--velocity --cycle-ms 800 --threads 3 --quiet --output out3"),
     0);
   EXPECT_EQ(ReadText(this->Folder / "stdout") + ReadText(this->Folder / "stderr"), "");
   EXPECT_EQ(std::system(("diff -r '" + (this->Folder / "out").string() + "' '" +
@@ -147,6 +146,37 @@ TEST_F(TestCoronaryPipelineSequence, PhasesOfOneTopologyInAllFormats)
                           .c_str()),
     0)
     << "another number of threads gave other files";
+}
+
+TEST_F(TestCoronaryPipelineSequence, VelocityIsThatOfThePoints)
+{
+  ASSERT_EQ(
+    this->Run("result --quiet --times 0.29,0.3,0.31 --velocity --cycle-ms 500 --output out"), 0)
+    << ReadText(this->Folder / "stderr");
+  std::vector<vtkSmartPointer<vtkUnstructuredGrid>> phases;
+  for (int k = 0; k < 3; ++k)
+  {
+    vtkNew<vtkXMLUnstructuredGridReader> reader;
+    reader->SetFileName(
+      (this->Folder / ("out/mesh_volume_00" + std::to_string(k) + ".vtu")).c_str());
+    reader->Update();
+    phases.emplace_back(reader->GetOutput());
+  }
+  vtkDataArray* velocity = phases[1]->GetPointData()->GetArray("Velocity");
+  ASSERT_TRUE(velocity);
+  double greatest = 0.0;
+  double error = 0.0;
+  for (vtkIdType n = 0; n < phases[1]->GetNumberOfPoints(); ++n)
+  {
+    for (int c = 0; c < 3; ++c)
+    {
+      const double wanted = (phases[2]->GetPoint(n)[c] - phases[0]->GetPoint(n)[c]) / (0.02 * 0.5);
+      greatest = std::max(greatest, std::abs(wanted));
+      error = std::max(error, std::abs(velocity->GetComponent(n, c) - wanted));
+    }
+  }
+  EXPECT_GT(greatest, 5.0);
+  EXPECT_LT(error, 0.02 * greatest);
 }
 
 TEST_F(TestCoronaryPipelineSequence, PosesInAllForms)
@@ -200,6 +230,7 @@ TEST_F(TestCoronaryPipelineSequence, SaysWhatIsWrong)
 {
   this->ExpectFailure(1, "nowhere --poses result/motion/skeleton.pvd", "nowhere/weights.vtu");
   this->ExpectFailure(2, "nowhere", "--poses is needed");
+  this->ExpectFailure(2, "result --velocity", "--cycle-ms is needed");
   this->ExpectFailure(2, "result --phases 0", "--phases");
   this->ExpectFailure(2, "result --phases 5 --times 0,1", "--times");
   this->ExpectFailure(2, "result --mode quintic", "--mode");
