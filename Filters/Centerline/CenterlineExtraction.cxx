@@ -1,5 +1,6 @@
 #include "CenterlineExtraction.h"
 
+#include "BifurcationFit.h"
 #include "CurveSmoothing.h"
 #include "DistanceTransform.h"
 #include "FastMarching.h"
@@ -164,6 +165,18 @@ private:
   void StraightenFork(
     CenterlineTree& tree, std::size_t parent, std::size_t turning, std::size_t straight) const;
   void StraightenForks(CenterlineTree& tree) const;
+  struct ForkFit
+  {
+    BifurcationFit fit;
+    std::vector<std::int64_t> through; ///< points of the tree
+    std::size_t fork = 0;              ///< number in `through`
+    std::vector<std::size_t> joints;   ///< numbers of the other forks
+    std::vector<std::int64_t> side;
+  };
+  void FitFork(const CenterlineTree& tree, std::size_t parent, std::size_t turning,
+    std::size_t straight, double leastTurn, ForkFit& result) const;
+  void MoveFork(CenterlineTree& tree, const ForkFit& fork) const;
+  void FitForks(CenterlineTree& tree) const;
   void Finish();
   void SeedsInOneVessel();
 
@@ -1602,6 +1615,212 @@ void Extractor::StraightenForks(CenterlineTree& tree) const
   }
 }
 
+void Extractor::FitFork(const CenterlineTree& tree, std::size_t parent, std::size_t turning,
+  std::size_t straight, double leastTurn, ForkFit& result) const
+{
+  std::vector<std::size_t> byGroup;
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    const auto group = static_cast<std::size_t>(tree.branches[b].groupId);
+    byGroup.resize(std::max(byGroup.size(), group + 1));
+    byGroup[group] = b;
+  }
+  // As far as the fit looks; the vessel that goes straight on also across its other forks.
+  const double wide = tree.radius[static_cast<std::size_t>(tree.branches[parent].points.back())];
+  const double reach = 8.0 * wide + 16.0 * this->Voxel;
+  const auto follow = [&](std::vector<std::int64_t>& points, std::vector<std::size_t>& joints,
+                        std::size_t branch, bool down)
+  {
+    double length = 0.0;
+    for (;;)
+    {
+      std::vector<std::int64_t> next = tree.branches[branch].points;
+      if (!down)
+      {
+        std::reverse(next.begin(), next.end());
+      }
+      if (points.empty())
+      {
+        points.push_back(next.front());
+      }
+      for (std::size_t i = 1; i < next.size(); ++i)
+      {
+        length += (tree.points[static_cast<std::size_t>(next[i])] -
+          tree.points[static_cast<std::size_t>(points.back())])
+                    .norm();
+        points.push_back(next[i]);
+        if (length > reach)
+        {
+          return;
+        }
+      }
+      if (!down)
+      {
+        if (tree.branches[branch].parentGroupId < 0)
+        {
+          return;
+        }
+        branch = byGroup[static_cast<std::size_t>(tree.branches[branch].parentGroupId)];
+      }
+      else
+      {
+        // The widest goes on.
+        double widest = 0.0;
+        const int group = tree.branches[branch].groupId;
+        for (std::size_t b = 0; b < tree.branches.size(); ++b)
+        {
+          const std::vector<std::int64_t>& own = tree.branches[b].points;
+          const double radius = tree.radius[static_cast<std::size_t>(own[own.size() / 2])];
+          if (tree.branches[b].parentGroupId == group && radius > widest)
+          {
+            widest = radius;
+            branch = b;
+          }
+        }
+        if (widest == 0.0)
+        {
+          return;
+        }
+      }
+      joints.push_back(points.size() - 1);
+    }
+  };
+  std::vector<std::int64_t> back;
+  std::vector<std::size_t> backJoints;
+  follow(back, backJoints, parent, false);
+  result.through.assign(back.rbegin(), back.rend());
+  result.fork = back.size() - 1;
+  result.joints.clear();
+  for (const std::size_t joint : backJoints)
+  {
+    result.joints.push_back(result.fork - joint);
+  }
+  std::vector<std::int64_t> ahead;
+  std::vector<std::size_t> aheadJoints;
+  follow(ahead, aheadJoints, straight, true);
+  result.through.insert(result.through.end(), ahead.begin() + 1, ahead.end());
+  for (const std::size_t joint : aheadJoints)
+  {
+    result.joints.push_back(result.fork + joint);
+  }
+  result.side = tree.branches[turning].points;
+
+  BifurcationAxes axes;
+  axes.fork = result.fork;
+  for (const std::int64_t point : result.through)
+  {
+    axes.through.push_back(tree.points[static_cast<std::size_t>(point)]);
+    axes.throughRadius.push_back(tree.radius[static_cast<std::size_t>(point)]);
+  }
+  double length = 0.0;
+  for (const std::int64_t point : result.side)
+  {
+    axes.side.push_back(tree.points[static_cast<std::size_t>(point)]);
+    axes.sideRadius.push_back(tree.radius[static_cast<std::size_t>(point)]);
+    if (axes.side.size() > 1)
+    {
+      length += (axes.side.back() - axes.side[axes.side.size() - 2]).norm();
+    }
+    if (length > reach)
+    {
+      break;
+    }
+  }
+  result.fit = FitBifurcation(*this->Image, axes, this->Lumen, leastTurn);
+}
+
+/// Puts the axes of a bifurcation where the fit has them; other forks stay where they are along theirs.
+void Extractor::MoveFork(CenterlineTree& tree, const ForkFit& fork) const
+{
+  const BifurcationFit& fit = fork.fit;
+  std::map<std::size_t, double> knots{ { fit.first, 0.0 }, { fork.fork, fit.meeting },
+    { fit.last, 1.0 } };
+  for (const std::size_t joint : fork.joints)
+  {
+    if (joint > fit.first && joint < fit.last)
+    {
+      const Vector3& point = tree.points[static_cast<std::size_t>(fork.through[joint])];
+      double least = std::numeric_limits<double>::infinity();
+      constexpr int pieces = 100;
+      for (int i = 0; i <= pieces; ++i)
+      {
+        const double t = static_cast<double>(i) / pieces;
+        const double distance = (BezierPoint(fit.through, t) - point).norm();
+        if (distance < least)
+        {
+          least = distance;
+          knots[joint] = t;
+        }
+      }
+    }
+  }
+  for (auto knot = knots.begin(); std::next(knot) != knots.end(); ++knot)
+  {
+    if (std::next(knot)->second <= knot->second)
+    {
+      return;
+    }
+  }
+  const auto place = [&](const std::vector<std::int64_t>& points, std::size_t from, std::size_t to,
+                       const std::vector<Vector3>& curve, double start, double end)
+  {
+    for (std::size_t i = from; i <= to; ++i)
+    {
+      const double f = static_cast<double>(i - from) / static_cast<double>(to - from);
+      tree.points[static_cast<std::size_t>(points[i])] =
+        BezierPoint(curve, start + f * (end - start));
+    }
+  };
+  for (auto knot = knots.begin(); std::next(knot) != knots.end(); ++knot)
+  {
+    place(fork.through, knot->first, std::next(knot)->first, fit.through, knot->second,
+      std::next(knot)->second);
+  }
+  place(fork.side, 0, fit.end, fit.side, 0.0, 1.0);
+}
+
+/// The axes at the mouths of branches, as the wall around them has it.
+void Extractor::FitForks(CenterlineTree& tree) const
+{
+  std::map<std::int64_t, std::vector<std::size_t>> daughters;
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    if (tree.branches[b].parentGroupId >= 0)
+    {
+      daughters[tree.branches[b].points.front()].push_back(b);
+    }
+  }
+  for (const auto& [point, two] : daughters)
+  {
+    if (two.size() != 2)
+    {
+      continue;
+    }
+    const auto parent = static_cast<std::size_t>(tree.branches[two[0]].parentGroupId);
+    // Which one goes straight on is seen by the angles, or else by the wall.
+    ForkFit fits[2];
+    for (const double leastTurn : { LeastTurn, -2.0 * LeastTurn })
+    {
+      for (std::size_t t = 0; t < 2; ++t)
+      {
+        this->FitFork(tree, parent, two[t], two[1 - t], leastTurn, fits[t]);
+      }
+      if (fits[0].fit.found || fits[1].fit.found)
+      {
+        break;
+      }
+    }
+    for (std::size_t t = 0; t < 2; ++t)
+    {
+      const BifurcationFit& other = fits[1 - t].fit;
+      if (fits[t].fit.found && (!other.found || fits[t].fit.misfit < 0.9 * other.misfit))
+      {
+        this->MoveFork(tree, fits[t]);
+      }
+    }
+  }
+}
+
 void Extractor::Finish()
 {
   for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
@@ -1626,6 +1845,10 @@ void Extractor::Finish()
   if (this->Settings.snap)
   {
     this->StraightenForks(this->Result.tree);
+    if (std::isnan(this->Lumen.level))
+    {
+      this->FitForks(this->Result.tree);
+    }
     MeasureTree(this->Result.tree);
   }
   std::map<std::int64_t, CenterlineBifurcation> joints;

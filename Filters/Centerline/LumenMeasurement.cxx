@@ -428,6 +428,32 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
   return false;
 }
 
+std::vector<Vector3> MeasureWall(const ImageInterpolator& image, const Vector3& position,
+  const Vector3& tangent, double radius, double lumen, const LumenSettings& settings)
+{
+  const double step = 0.5 * image.SmallestSpacing();
+  const double contrast = settings.reference.lumen - settings.reference.background;
+  const double floor = settings.reference.background - 0.1 * contrast;
+  const double reach = 1.8 * radius + 4.0 * image.SmallestSpacing();
+  const Vector3 axis = tangent.normalized();
+  const Vector3 u = axis.unitOrthogonal();
+  const Vector3 v = axis.cross(u);
+  std::vector<Vector3> points;
+  for (int ray = 0; ray < settings.rays; ++ray)
+  {
+    const double angle = 2.0 * M_PI * ray / settings.rays;
+    const Vector3 direction = std::cos(angle) * u + std::sin(angle) * v;
+    // A fall of less than this is a neighbour's side.
+    const Wall wall =
+      FindWall(image, position, direction, lumen, 0.4 * contrast, floor, step, reach, HalfMaximum);
+    if (wall.distance > 0.0)
+    {
+      points.emplace_back(position + wall.distance * direction);
+    }
+  }
+  return points;
+}
+
 bool MeasureReference(
   const ImageInterpolator& image, const Vector3& seed, LumenReference& reference)
 {

@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <limits>
+#include <vector>
 
 namespace coronary
 {
@@ -81,6 +82,15 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
 bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const Vector3& tangent,
   double radius, double lumen, const std::function<bool(const Vector3& wall)>& isOwn,
   const LumenSettings& settings, Vector3& centre);
+
+/**
+ * Points on the wall in the plane through `position` normal to `tangent`, at the half maximum of each ray.
+ *
+ * `radius` (mm) is about what the wall's distance is, `lumen` the vessel's image value. Rays without a clear fall give
+ * no point: fewer than LumenSettings::rays. For images, not for fixed levels.
+ */
+std::vector<Vector3> MeasureWall(const ImageInterpolator& image, const Vector3& position,
+  const Vector3& tangent, double radius, double lumen, const LumenSettings& settings);
 
 /// What the surroundings of a seed look like, by rays in all directions.
 /// @returns false if there is no lumen: nothing darker around it

@@ -1,5 +1,6 @@
 // Lumen measurement, smoothing, surface distance and whole trees against tubes in closed form.
 
+#include "BifurcationFit.h"
 #include "CenterlineExtraction.h"
 #include "CounterRandom.h"
 #include "CurveSmoothing.h"
@@ -406,6 +407,121 @@ TEST(CenterlineExtraction, StraightAndHelicalTubesOnObliqueGrids)
     std::cout << "axis " << deviation.axis << " radius " << deviation.radius << " length "
               << result.tree.branches[0].length << " of " << Length(tube.axis) << '\n';
   }
+}
+
+// As at the end of a left main: both daughters are great, one of them bends away from the other.
+struct WideFork
+{
+  std::vector<Vector3> through;
+  std::vector<Vector3> side;
+  Vector3 fork = Vector3::Zero();
+
+  explicit WideFork(double angle)
+  {
+    for (int i = -60; i <= 60; ++i)
+    {
+      const double x = 0.2 * i;
+      through.emplace_back(x, -0.012 * x * x, 0.004 * x * x);
+    }
+    side.push_back(fork);
+    for (int i = 0; i < 60; ++i)
+    {
+      const double bent = angle + 0.004 * i;
+      side.emplace_back(side.back() + 0.2 * Vector3(std::cos(bent), std::sin(bent), 0.1));
+    }
+  }
+};
+
+TEST(BifurcationFit, TheWallTellsWhereWideAxesMeet)
+{
+  for (const double angle : { 0.9, 1.2, 1.5 })
+  {
+    SCOPED_TRACE(angle);
+    const WideFork truth(angle);
+    const Scene scene({ { truth.through, 2.2 }, { truth.side, 1.7 } }, Vector3::Constant(0.4),
+      Oblique(), Vector3::Zero(), 13.0);
+    const ImageInterpolator image(scene.scalar);
+    LumenSettings settings;
+    settings.reference = { 400.0, -100.0, 2.0 };
+    for (const double along : { -1.2, 1.2 })
+    {
+      SCOPED_TRACE(along);
+      // What sections give: the axis drawn to the mouth and too wide there, the fork off.
+      BifurcationAxes axes;
+      for (const Vector3& point : truth.through)
+      {
+        const double mouth = std::exp(-0.5 * std::pow((point[0] - 1.5) / 1.5, 2.0));
+        axes.through.emplace_back(point + 0.3 * mouth * Vector3::UnitY());
+        axes.throughRadius.push_back(2.2 + 0.25 * mouth);
+      }
+      axes.fork = 60 + static_cast<std::size_t>(along < 0.0 ? 0 : 6) - (along < 0.0 ? 6 : 0);
+      for (std::size_t i = 0; i < truth.side.size(); ++i)
+      {
+        const double hidden = std::max(0.0, 1.0 - static_cast<double>(i) / 16.0);
+        axes.side.emplace_back((1.0 - hidden) * truth.side[i] +
+          hidden *
+            (axes.through[axes.fork] +
+              0.2 * static_cast<double>(i) * Vector3(std::cos(angle), std::sin(angle), 0.1)));
+        axes.sideRadius.push_back(1.7);
+      }
+      axes.side.front() = axes.through[axes.fork];
+      const BifurcationFit fit = FitBifurcation(image, axes, settings, -0.35);
+      ASSERT_TRUE(fit.found);
+      const Vector3 fork = BezierPoint(fit.through, fit.meeting);
+      EXPECT_EQ(fork, fit.side.front());
+      EXPECT_LT((fork - truth.fork).norm(), 0.5) << fork.transpose();
+      EXPECT_LT(DistanceToPolyline(fork, truth.through), 0.1);
+      EXPECT_NEAR(fit.radius, 2.2, 0.06);
+      EXPECT_NEAR(fit.sideRadius, 1.7, 0.1);
+      EXPECT_LT(fit.rounding, 0.6); // The image's blur, the edge is sharp.
+      EXPECT_LT(fit.misfit, 0.2);
+      EXPECT_GT(fit.deviation, 0.05);
+      EXPECT_LT(fit.deviation, 0.6);
+
+      // The wrong one of the two is not what goes straight on.
+      EXPECT_FALSE(FitBifurcation(image, axes, settings, 2.0).found);
+    }
+  }
+}
+
+TEST(BifurcationFit, WhatIsNoForkIsNotFitted)
+{
+  const WideFork truth(1.0);
+  const Scene scene({ { truth.through, 2.2 }, { truth.side, 1.7 } }, Vector3::Constant(0.4),
+    Matrix3::Identity(), Vector3::Zero(), 13.0);
+  const ImageInterpolator image(scene.scalar);
+  LumenSettings settings;
+  settings.reference = { 400.0, -100.0, 2.0 };
+  BifurcationAxes axes;
+  axes.through = truth.through;
+  axes.throughRadius.assign(truth.through.size(), 2.2);
+  axes.fork = 60;
+  axes.side = truth.side;
+  axes.sideRadius.assign(truth.side.size(), 1.7);
+  ASSERT_TRUE(FitBifurcation(image, axes, settings, -0.35).found);
+
+  BifurcationAxes shortSide = axes;
+  shortSide.side.resize(20);
+  shortSide.sideRadius.resize(20);
+  EXPECT_FALSE(FitBifurcation(image, shortSide, settings, -0.35).found);
+
+  BifurcationAxes atItsEnd = axes;
+  atItsEnd.through.resize(64);
+  atItsEnd.throughRadius.resize(64);
+  EXPECT_FALSE(FitBifurcation(image, atItsEnd, settings, -0.35).found);
+
+  // Axes in empty fat: there is no wall.
+  BifurcationAxes elsewhere = axes;
+  for (std::vector<Vector3>* line : { &elsewhere.through, &elsewhere.side })
+  {
+    for (Vector3& point : *line)
+    {
+      point += Vector3(0.0, 0.0, 9.0);
+    }
+  }
+  EXPECT_FALSE(FitBifurcation(image, elsewhere, settings, -0.35).found);
+
+  EXPECT_FALSE(FitBifurcation(image, {}, settings, -0.35).found);
 }
 
 TEST(CenterlineExtraction, OneSharedPointAtABifurcation)
