@@ -24,15 +24,6 @@ constexpr double ForkDeviation = 0.4; ///< of the given fork along its parent, i
 constexpr double TangentDeviation = 0.2; ///< of a chord beside the mouth, radians
 constexpr double OutlierLimit = 2.5;     ///< standard deviations of a point on the wall
 
-using Curve = std::array<Vector3, 4>;
-
-Vector3 At(const Curve& curve, double t)
-{
-  const double u = 1.0 - t;
-  return u * u * u * curve[0] + 3.0 * u * u * t * curve[1] + 3.0 * u * t * t * curve[2] +
-    t * t * t * curve[3];
-}
-
 /// Nearest place on a polyline: distance, and number of the segment plus fraction.
 struct Foot
 {
@@ -116,8 +107,8 @@ private:
   Eigen::MatrixXd Minimize(
     const Eigen::VectorXd& scale, Eigen::VectorXd& p, Eigen::VectorXd& r) const;
   Eigen::VectorXd Residuals(const Eigen::VectorXd& p) const;
-  void Curves(const Eigen::VectorXd& p, Curve& through, Curve& side) const;
-  void Sample(const Curve& curve, double extension, std::vector<Vector3>& line) const;
+  void Curves(const Eigen::VectorXd& p, BezierCurve& through, BezierCurve& side) const;
+  void Sample(const BezierCurve& curve, double extension, std::vector<Vector3>& line) const;
 
   const ImageInterpolator& Image;
   const BifurcationAxes& Axes;
@@ -133,8 +124,8 @@ private:
   double SideRadius = 0.0;
   Vector3 Inwards; ///< seen tangents at both ends of `through`
   Vector3 Outwards;
-  Curve Through;
-  Curve Side;
+  BezierCurve Through;
+  BezierCurve Side;
   std::vector<Vector3> Walls;
   double GivenFork = std::numeric_limits<double>::infinity(); ///< its deviation, daughter's radii
 
@@ -271,13 +262,13 @@ void Fit::CollectWalls()
   }
 }
 
-void Fit::Curves(const Eigen::VectorXd& p, Curve& through, Curve& side) const
+void Fit::Curves(const Eigen::VectorXd& p, BezierCurve& through, BezierCurve& side) const
 {
   through = { this->Through[0], p.segment<3>(7), p.segment<3>(10), this->Through[3] };
-  side = { At(through, p[0]), p.segment<3>(1), p.segment<3>(4), this->Side[3] };
+  side = { BezierPoint(through, p[0]), p.segment<3>(1), p.segment<3>(4), this->Side[3] };
 }
 
-void Fit::Sample(const Curve& curve, double extension, std::vector<Vector3>& line) const
+void Fit::Sample(const BezierCurve& curve, double extension, std::vector<Vector3>& line) const
 {
   line.clear();
   if (extension > 0.0)
@@ -286,7 +277,7 @@ void Fit::Sample(const Curve& curve, double extension, std::vector<Vector3>& lin
   }
   for (int i = 0; i <= Pieces; ++i)
   {
-    line.push_back(At(curve, static_cast<double>(i) / Pieces));
+    line.push_back(BezierPoint(curve, static_cast<double>(i) / Pieces));
   }
   if (extension > 0.0)
   {
@@ -296,8 +287,8 @@ void Fit::Sample(const Curve& curve, double extension, std::vector<Vector3>& lin
 
 Eigen::VectorXd Fit::Residuals(const Eigen::VectorXd& p) const
 {
-  Curve through;
-  Curve side;
+  BezierCurve through;
+  BezierCurve side;
   this->Curves(p, through, side);
   const double radius = p[13];
   const double difference = p[14];
@@ -323,9 +314,9 @@ Eigen::VectorXd Fit::Residuals(const Eigen::VectorXd& p) const
     r[i] = e / std::sqrt(1.0 + e * e / (OutlierLimit * OutlierLimit));
   }
   // Axes are smooth: the daughter's bends little, the other one's bend changes little.
-  const auto second = [](const Curve& c, int i) -> Vector3
+  const auto second = [](const BezierCurve& c, int i) -> Vector3
   { return c[i] - 2.0 * c[i + 1] + c[i + 2]; };
-  const auto steps = [](const Curve& c)
+  const auto steps = [](const BezierCurve& c)
   { return Vector3((c[1] - c[0]).norm(), (c[2] - c[1]).norm(), (c[3] - c[2]).norm()); };
   const double bend =
     6.0 * this->SideRadius / (BendDeviation * std::max(1e-12, (side[3] - side[0]).squaredNorm()));
@@ -458,14 +449,10 @@ BifurcationFit Fit::Run(double leastTurn)
   this->GivenFork = ForkDeviation;
   const Eigen::MatrixXd normal = this->Minimize(scale, p, r);
 
-  Curve through;
-  Curve side;
-  this->Curves(p, through, side);
+  this->Curves(p, result.through, result.side);
   result.first = this->First;
   result.last = this->Last;
   result.end = this->End;
-  result.through.assign(through.begin(), through.end());
-  result.side.assign(side.begin(), side.end());
   result.meeting = p[0];
   result.radius = this->FirstRadius + p[14];
   result.sideRadius = p[13];
@@ -478,9 +465,11 @@ BifurcationFit Fit::Run(double leastTurn)
 }
 }
 
-Vector3 BezierPoint(const std::vector<Vector3>& points, double t)
+Vector3 BezierPoint(const BezierCurve& curve, double t)
 {
-  return At({ points[0], points[1], points[2], points[3] }, t);
+  const double u = 1.0 - t;
+  return u * u * u * curve[0] + 3.0 * u * u * t * curve[1] + 3.0 * u * t * t * curve[2] +
+    t * t * t * curve[3];
 }
 
 BifurcationFit FitBifurcation(const ImageInterpolator& image, const BifurcationAxes& axes,

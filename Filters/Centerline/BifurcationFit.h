@@ -13,6 +13,7 @@
 
 #include "LumenMeasurement.h"
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -28,6 +29,12 @@ struct BifurcationAxes
   std::vector<double> sideRadius;
 };
 
+/// Four points of a cubic Bezier curve.
+using BezierCurve = std::array<Vector3, 4>;
+
+/// t is 0 to 1.
+Vector3 BezierPoint(const BezierCurve& curve, double t);
+
 struct BifurcationFit
 {
   bool found = false;
@@ -35,19 +42,16 @@ struct BifurcationFit
   std::size_t first = 0;
   std::size_t last = 0;
   std::size_t end = 0;
-  std::vector<Vector3> through; ///< four points of a cubic Bezier curve, from `first` to `last`
-  std::vector<Vector3> side;    ///< the same, from the fork to `end`
-  double meeting = 0.0;         ///< of the fork, parameter of `through`
-  double radius = 0.0;          ///< of the parent, mm
-  double sideRadius = 0.0;      ///< of the daughter at the side, mm
-  double rounding = 0.0;        ///< radius of the edge in daughter's radii
-  double deviation = 0.0;       ///< of the fork along `through`, standard deviation by the fit, mm
-  double turn = 0.0;            ///< of the side daughter more than of the other one, radians
-  double misfit = 0.0;          ///< root of the mean of squares, outliers limited, voxels
+  BezierCurve through;     ///< from `first` to `last`
+  BezierCurve side;        ///< from the fork to `end`
+  double meeting = 0.0;    ///< of the fork, parameter of `through`
+  double radius = 0.0;     ///< of the parent, mm
+  double sideRadius = 0.0; ///< of the daughter at the side, mm
+  double rounding = 0.0;   ///< radius of the edge in daughter's radii
+  double deviation = 0.0;  ///< of the fork along `through`, standard deviation by the fit, mm
+  double turn = 0.0;       ///< of the side daughter more than of the other one, radians
+  double misfit = 0.0;     ///< root of the mean of squares, outliers limited, voxels
 };
-
-/// Point of the cubic Bezier curve of four points, t 0 to 1.
-Vector3 BezierPoint(const std::vector<Vector3>& points, double t);
 
 /**
  * Fits both axes around a bifurcation to the wall, for images and not for fixed levels.

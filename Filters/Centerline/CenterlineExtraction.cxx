@@ -74,6 +74,111 @@ double LineDistance(const Vector3& point, const Vector3& origin, const Vector3& 
   return (offset - offset.dot(direction) * direction).norm();
 }
 
+/// Points of a tree one after the other, across forks.
+struct Strand
+{
+  std::vector<std::int64_t> points;
+  std::vector<std::size_t> joints; ///< numbers of the forks between its ends
+  double length = 0.0;             ///< mm
+
+  /// @returns false when it has become longer than `reach`: the rest is left out
+  bool Append(const CenterlineTree& tree, const std::vector<std::int64_t>& branch, double reach);
+};
+
+bool Strand::Append(
+  const CenterlineTree& tree, const std::vector<std::int64_t>& branch, double reach)
+{
+  if (this->points.empty())
+  {
+    this->points.push_back(branch.front());
+  }
+  else
+  {
+    this->joints.push_back(this->points.size() - 1);
+  }
+  for (std::size_t i = 1; i < branch.size(); ++i)
+  {
+    this->length += (tree.points[static_cast<std::size_t>(branch[i])] -
+      tree.points[static_cast<std::size_t>(branch[i - 1])])
+                      .norm();
+    this->points.push_back(branch[i]);
+    if (this->length > reach)
+    {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// A branch from its end on against the flow.
+Strand Upstream(const CenterlineTree& tree, std::size_t branch, double reach)
+{
+  Strand strand;
+  for (int at = static_cast<int>(branch); at >= 0;
+       at = tree.branches[static_cast<std::size_t>(at)].parentGroupId)
+  {
+    std::vector<std::int64_t> points = tree.branches[static_cast<std::size_t>(at)].points;
+    std::reverse(points.begin(), points.end());
+    if (!strand.Append(tree, points, reach))
+    {
+      break;
+    }
+  }
+  return strand;
+}
+
+/// A branch and the widest ones that follow.
+Strand Downstream(const CenterlineTree& tree, std::size_t branch, double reach)
+{
+  Strand strand;
+  double widest = 1.0;
+  while (widest > 0.0 && strand.Append(tree, tree.branches[branch].points, reach))
+  {
+    widest = 0.0;
+    const int group = tree.branches[branch].groupId;
+    for (std::size_t b = 0; b < tree.branches.size(); ++b)
+    {
+      const std::vector<std::int64_t>& own = tree.branches[b].points;
+      const double radius = tree.radius[static_cast<std::size_t>(own[own.size() / 2])];
+      if (tree.branches[b].parentGroupId == group && radius > widest)
+      {
+        widest = radius;
+        branch = b;
+      }
+    }
+  }
+  return strand;
+}
+
+struct Fork
+{
+  std::size_t parent = 0; ///< branches
+  std::array<std::size_t, 2> daughters{};
+};
+
+/// Forks of two daughters, in the order of their points. Branches are split there, and numbered by their groups.
+std::vector<Fork> ForksOfTwo(const CenterlineTree& tree)
+{
+  std::map<std::int64_t, std::vector<std::size_t>> daughters;
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    if (tree.branches[b].parentGroupId >= 0)
+    {
+      daughters[tree.branches[b].points.front()].push_back(b);
+    }
+  }
+  std::vector<Fork> forks;
+  for (const auto& [point, branches] : daughters)
+  {
+    if (branches.size() == 2)
+    {
+      const int parent = tree.branches[branches[0]].parentGroupId;
+      forks.push_back({ static_cast<std::size_t>(parent), { branches[0], branches[1] } });
+    }
+  }
+  return forks;
+}
+
 constexpr double GreatBranch = 0.6; ///< radius in radii of its parent
 /// Between where a great branch's axis can be seen and the parent's axis; mean of phantoms. Radians.
 constexpr double GreatBranchBend = 0.2;
@@ -168,13 +273,12 @@ private:
   struct ForkFit
   {
     BifurcationFit fit;
-    std::vector<std::int64_t> through; ///< points of the tree
-    std::size_t fork = 0;              ///< number in `through`
-    std::vector<std::size_t> joints;   ///< numbers of the other forks
-    std::vector<std::int64_t> side;
+    Strand through;
+    std::size_t fork = 0; ///< number in `through`
+    Strand side;
   };
-  void FitFork(const CenterlineTree& tree, std::size_t parent, std::size_t turning,
-    std::size_t straight, double leastTurn, ForkFit& result) const;
+  ForkFit FitFork(const CenterlineTree& tree, std::size_t parent, std::size_t turning,
+    std::size_t straight, double leastTurn) const;
   void MoveFork(CenterlineTree& tree, const ForkFit& fork) const;
   void FitForks(CenterlineTree& tree) const;
   void Finish();
@@ -1516,12 +1620,8 @@ void Extractor::StraightenFork(
     return;
   }
   const double handle = (to - from).norm() / 3.0;
-  const auto axis = [&](double t) -> Vector3
-  {
-    const double u = 1.0 - t;
-    return u * u * u * from + 3.0 * u * u * t * (from + handle * forwards) +
-      3.0 * u * t * t * (to - handle * onwards) + t * t * t * to;
-  };
+  const BezierCurve bezier{ from, from + handle * forwards, to - handle * onwards, to };
+  const auto axis = [&](double t) { return BezierPoint(bezier, t); };
   constexpr int pieces = 100;
   const auto distance = [&](const Vector3& point)
   {
@@ -1586,25 +1686,12 @@ void Extractor::StraightenFork(
 /// to that curve. Only the two axes' places change.
 void Extractor::StraightenForks(CenterlineTree& tree) const
 {
-  std::map<std::int64_t, std::vector<std::size_t>> daughters;
-  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  for (const auto& [parent, two] : ForksOfTwo(tree))
   {
-    if (tree.branches[b].parentGroupId >= 0)
-    {
-      daughters[tree.branches[b].points.front()].push_back(b);
-    }
-  }
-  for (const auto& [point, two] : daughters)
-  {
-    if (two.size() != 2)
-    {
-      continue;
-    }
-    const auto parent = static_cast<std::size_t>(tree.branches[two[0]].parentGroupId);
     const auto pathOf = [&](std::int64_t p) { return this->BranchOf[static_cast<std::size_t>(p)]; };
     const std::vector<std::int64_t>& before = tree.branches[parent].points;
     const int path = pathOf(before[before.size() - 2]);
-    for (int turning = 0; turning < 2; ++turning)
+    for (std::size_t turning = 0; turning < 2; ++turning)
     {
       // The path that the other one was set on to.
       if (pathOf(tree.branches[two[turning]].points[1]) == path)
@@ -1615,118 +1702,43 @@ void Extractor::StraightenForks(CenterlineTree& tree) const
   }
 }
 
-void Extractor::FitFork(const CenterlineTree& tree, std::size_t parent, std::size_t turning,
-  std::size_t straight, double leastTurn, ForkFit& result) const
+Extractor::ForkFit Extractor::FitFork(const CenterlineTree& tree, std::size_t parent,
+  std::size_t turning, std::size_t straight, double leastTurn) const
 {
-  std::vector<std::size_t> byGroup;
-  for (std::size_t b = 0; b < tree.branches.size(); ++b)
-  {
-    const auto group = static_cast<std::size_t>(tree.branches[b].groupId);
-    byGroup.resize(std::max(byGroup.size(), group + 1));
-    byGroup[group] = b;
-  }
   // As far as the fit looks; the vessel that goes straight on also across its other forks.
   const double wide = tree.radius[static_cast<std::size_t>(tree.branches[parent].points.back())];
   const double reach = 8.0 * wide + 16.0 * this->Voxel;
-  const auto follow = [&](std::vector<std::int64_t>& points, std::vector<std::size_t>& joints,
-                        std::size_t branch, bool down)
+  const Strand before = Upstream(tree, parent, reach);
+  const Strand behind = Downstream(tree, straight, reach);
+  ForkFit result;
+  result.fork = before.points.size() - 1;
+  result.through.points.assign(before.points.rbegin(), before.points.rend());
+  result.through.points.insert(
+    result.through.points.end(), behind.points.begin() + 1, behind.points.end());
+  for (const std::size_t joint : before.joints)
   {
-    double length = 0.0;
-    for (;;)
-    {
-      std::vector<std::int64_t> next = tree.branches[branch].points;
-      if (!down)
-      {
-        std::reverse(next.begin(), next.end());
-      }
-      if (points.empty())
-      {
-        points.push_back(next.front());
-      }
-      for (std::size_t i = 1; i < next.size(); ++i)
-      {
-        length += (tree.points[static_cast<std::size_t>(next[i])] -
-          tree.points[static_cast<std::size_t>(points.back())])
-                    .norm();
-        points.push_back(next[i]);
-        if (length > reach)
-        {
-          return;
-        }
-      }
-      if (!down)
-      {
-        if (tree.branches[branch].parentGroupId < 0)
-        {
-          return;
-        }
-        branch = byGroup[static_cast<std::size_t>(tree.branches[branch].parentGroupId)];
-      }
-      else
-      {
-        // The widest goes on.
-        double widest = 0.0;
-        const int group = tree.branches[branch].groupId;
-        for (std::size_t b = 0; b < tree.branches.size(); ++b)
-        {
-          const std::vector<std::int64_t>& own = tree.branches[b].points;
-          const double radius = tree.radius[static_cast<std::size_t>(own[own.size() / 2])];
-          if (tree.branches[b].parentGroupId == group && radius > widest)
-          {
-            widest = radius;
-            branch = b;
-          }
-        }
-        if (widest == 0.0)
-        {
-          return;
-        }
-      }
-      joints.push_back(points.size() - 1);
-    }
-  };
-  std::vector<std::int64_t> back;
-  std::vector<std::size_t> backJoints;
-  follow(back, backJoints, parent, false);
-  result.through.assign(back.rbegin(), back.rend());
-  result.fork = back.size() - 1;
-  result.joints.clear();
-  for (const std::size_t joint : backJoints)
-  {
-    result.joints.push_back(result.fork - joint);
+    result.through.joints.push_back(result.fork - joint);
   }
-  std::vector<std::int64_t> ahead;
-  std::vector<std::size_t> aheadJoints;
-  follow(ahead, aheadJoints, straight, true);
-  result.through.insert(result.through.end(), ahead.begin() + 1, ahead.end());
-  for (const std::size_t joint : aheadJoints)
+  for (const std::size_t joint : behind.joints)
   {
-    result.joints.push_back(result.fork + joint);
+    result.through.joints.push_back(result.fork + joint);
   }
-  result.side = tree.branches[turning].points;
+  result.side.Append(tree, tree.branches[turning].points, reach);
 
   BifurcationAxes axes;
   axes.fork = result.fork;
-  for (const std::int64_t point : result.through)
+  for (const std::int64_t point : result.through.points)
   {
     axes.through.push_back(tree.points[static_cast<std::size_t>(point)]);
     axes.throughRadius.push_back(tree.radius[static_cast<std::size_t>(point)]);
   }
-  double length = 0.0;
-  for (const std::int64_t point : result.side)
+  for (const std::int64_t point : result.side.points)
   {
     axes.side.push_back(tree.points[static_cast<std::size_t>(point)]);
     axes.sideRadius.push_back(tree.radius[static_cast<std::size_t>(point)]);
-    if (axes.side.size() > 1)
-    {
-      length += (axes.side.back() - axes.side[axes.side.size() - 2]).norm();
-    }
-    if (length > reach)
-    {
-      break;
-    }
   }
   result.fit = FitBifurcation(*this->Image, axes, this->Lumen, leastTurn);
+  return result;
 }
 
 /// Puts the axes of a bifurcation where the fit has them; other forks stay where they are along theirs.
@@ -1735,11 +1747,11 @@ void Extractor::MoveFork(CenterlineTree& tree, const ForkFit& fork) const
   const BifurcationFit& fit = fork.fit;
   std::map<std::size_t, double> knots{ { fit.first, 0.0 }, { fork.fork, fit.meeting },
     { fit.last, 1.0 } };
-  for (const std::size_t joint : fork.joints)
+  for (const std::size_t joint : fork.through.joints)
   {
     if (joint > fit.first && joint < fit.last)
     {
-      const Vector3& point = tree.points[static_cast<std::size_t>(fork.through[joint])];
+      const Vector3& point = tree.points[static_cast<std::size_t>(fork.through.points[joint])];
       double least = std::numeric_limits<double>::infinity();
       constexpr int pieces = 100;
       for (int i = 0; i <= pieces; ++i)
@@ -1762,7 +1774,7 @@ void Extractor::MoveFork(CenterlineTree& tree, const ForkFit& fork) const
     }
   }
   const auto place = [&](const std::vector<std::int64_t>& points, std::size_t from, std::size_t to,
-                       const std::vector<Vector3>& curve, double start, double end)
+                       const BezierCurve& curve, double start, double end)
   {
     for (std::size_t i = from; i <= to; ++i)
     {
@@ -1773,49 +1785,38 @@ void Extractor::MoveFork(CenterlineTree& tree, const ForkFit& fork) const
   };
   for (auto knot = knots.begin(); std::next(knot) != knots.end(); ++knot)
   {
-    place(fork.through, knot->first, std::next(knot)->first, fit.through, knot->second,
+    place(fork.through.points, knot->first, std::next(knot)->first, fit.through, knot->second,
       std::next(knot)->second);
   }
-  place(fork.side, 0, fit.end, fit.side, 0.0, 1.0);
+  place(fork.side.points, 0, fit.end, fit.side, 0.0, 1.0);
 }
 
 /// The axes at the mouths of branches, as the wall around them has it.
 void Extractor::FitForks(CenterlineTree& tree) const
 {
-  std::map<std::int64_t, std::vector<std::size_t>> daughters;
-  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  for (const auto& [parent, two] : ForksOfTwo(tree))
   {
-    if (tree.branches[b].parentGroupId >= 0)
-    {
-      daughters[tree.branches[b].points.front()].push_back(b);
-    }
-  }
-  for (const auto& [point, two] : daughters)
-  {
-    if (two.size() != 2)
-    {
-      continue;
-    }
-    const auto parent = static_cast<std::size_t>(tree.branches[two[0]].parentGroupId);
     // Which one goes straight on is seen by the angles, or else by the wall.
-    ForkFit fits[2];
+    std::array<ForkFit, 2> fits;
     for (const double leastTurn : { LeastTurn, -2.0 * LeastTurn })
     {
-      for (std::size_t t = 0; t < 2; ++t)
+      for (std::size_t turning = 0; turning < 2; ++turning)
       {
-        this->FitFork(tree, parent, two[t], two[1 - t], leastTurn, fits[t]);
+        fits[turning] = this->FitFork(tree, parent, two[turning], two[1 - turning], leastTurn);
       }
       if (fits[0].fit.found || fits[1].fit.found)
       {
         break;
       }
     }
-    for (std::size_t t = 0; t < 2; ++t)
+    // Two that are as good as one another tell nothing.
+    for (std::size_t turning = 0; turning < 2; ++turning)
     {
-      const BifurcationFit& other = fits[1 - t].fit;
-      if (fits[t].fit.found && (!other.found || fits[t].fit.misfit < 0.9 * other.misfit))
+      const BifurcationFit& own = fits[turning].fit;
+      const BifurcationFit& other = fits[1 - turning].fit;
+      if (own.found && (!other.found || own.misfit < 0.9 * other.misfit))
       {
-        this->MoveFork(tree, fits[t]);
+        this->MoveFork(tree, fits[turning]);
       }
     }
   }
