@@ -13,16 +13,20 @@ namespace coronary
 {
 namespace
 {
-// What is known before the wall is seen. Standard deviations.
-constexpr double WallDeviation = 0.25;    ///< of a point on the wall, voxels
-constexpr double MeanBend = 0.25;         ///< of the daughter's axis over its radius, radians
-constexpr double BendDeviation = 0.3;     ///< the same
-constexpr double RadiusDeviation = 0.2;   ///< of the daughter's radius, relative
-constexpr double Rounding = 0.5;          ///< of the edge, in daughter's radii
-constexpr double RoundingDeviation = 0.3; ///< the same
-constexpr double ForkDeviation = 0.4; ///< of the given fork along its parent, in daughter's radii
+// What is expected before the wall is seen, and how surely. Standard deviations.
+/// Of a point on the wall, voxels: twice what two tubes miss it by, as neighbours share their voxels.
+constexpr double WallDeviation = 0.25;
+constexpr double OutlierLimit = 2.5; ///< of a point on the wall, its deviations
+/// Of the daughter's axis over its radius, radians; away from the flow, as GreatBranchBend is.
+constexpr double MeanBend = 0.25;
+constexpr double BendDeviation = 0.3;
 constexpr double TangentDeviation = 0.2; ///< of a chord beside the mouth, radians
-constexpr double OutlierLimit = 2.5;     ///< standard deviations of a point on the wall
+constexpr double RadiusDeviation = 0.2;  ///< of the daughter's radius, relative
+/// Of the edge, in daughter's radii: the image's blur rounds a sharp one, too.
+constexpr double Rounding = 0.5;
+constexpr double RoundingDeviation = 0.3;
+/// Of the given fork across the daughter's axis, in its radii: 0.4 to 0.5 in phantoms, whatever the angle.
+constexpr double ForkDeviation = 0.4;
 
 /// Nearest place on a polyline: distance, and number of the segment plus fraction.
 struct Foot
@@ -157,6 +161,7 @@ bool Fit::FindExtent()
       std::find_if(outside.begin(), outside.end(), [&](double o) { return o > radii; }) -
       outside.begin());
   };
+  // From where the daughter's sections are its own; to where they are so all around.
   this->Alone = firstBeyond(1.3);
   this->End = firstBeyond(2.0);
   if (this->End >= side.size() || this->Alone >= this->End)
@@ -446,7 +451,11 @@ BifurcationFit Fit::Run(double leastTurn)
   // A fork that was given far off may hold the axes in another minimum: first the wall alone.
   Eigen::VectorXd r;
   this->Minimize(scale, p, r);
-  this->GivenFork = ForkDeviation;
+  // It was found where the daughter's axis comes to the parent's: the more these are parallel the
+  // farther along it an error across takes it.
+  const Vector3 away = (this->Axes.side[this->End] - this->Axes.side[this->Alone]).normalized();
+  const Vector3 flow = (this->Through[3] - this->Through[0]).normalized();
+  this->GivenFork = ForkDeviation / flow.cross(away).norm();
   const Eigen::MatrixXd normal = this->Minimize(scale, p, r);
 
   this->Curves(p, result.through, result.side);
