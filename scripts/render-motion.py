@@ -127,3 +127,178 @@ for view in (first, second):
 path = os.path.join(arguments.output, "motion.png")
 simple.SaveScreenshot(path, layout, ImageResolution=[1600, 900])
 print("wrote", path)
+"""Pictures of a tracked coronary tree: centerlines over time by branch, trajectories, meshes.
+
+Usage: pvpython scripts/render-motion.py RUN [--output DIR]
+RUN is the folder of `coronary-pipeline run --until motion`.
+"""
+
+import argparse
+import json
+import os
+import sys
+
+from vtkmodules.vtkCommonCore import vtkLookupTable, vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkFiltersCore import vtkTubeFilter
+from vtkmodules.vtkFiltersSources import vtkSphereSource
+from vtkmodules.vtkFiltersCore import vtkGlyph3D
+from vtkmodules.vtkIOImage import vtkPNGWriter
+from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
+from vtkmodules.vtkRenderingCore import (vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow,
+                                         vtkTextActor, vtkWindowToImageFilter)
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401, the renderer's implementation
+import vtkmodules.vtkRenderingFreeType  # noqa: F401
+
+
+def read(path):
+    reader = vtkXMLPolyDataReader()
+    reader.SetFileName(path)
+    reader.Update()
+    return reader.GetOutput()
+
+
+def series(run, name):
+    """Times and data of one series."""
+    path = os.path.join(run, "motion", name)
+    with open(path, encoding="utf-8") as file:
+        files = json.load(file)["files"]
+    return [(one["time"], read(os.path.join(run, "motion", one["name"]))) for one in files]
+
+
+def tubes(data, radius):
+    filter_ = vtkTubeFilter()
+    filter_.SetInputData(data)
+    filter_.SetRadius(radius)
+    filter_.SetNumberOfSides(10)
+    filter_.CappingOn()
+    filter_.Update()
+    return filter_.GetOutput()
+
+
+def actor(data, color=None, opacity=1.0, array=None, table=None):
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(data)
+    mapper.ScalarVisibilityOff()
+    if array is not None:
+        mapper.ScalarVisibilityOn()
+        mapper.SetScalarModeToUseCellFieldData()
+        mapper.SelectColorArray(array)
+        mapper.SetLookupTable(table)
+        mapper.UseLookupTableScalarRangeOn()
+    result = vtkActor()
+    result.SetMapper(mapper)
+    if color is not None:
+        result.GetProperty().SetColor(*color)
+    result.GetProperty().SetOpacity(opacity)
+    return result
+
+
+def save(actors, title, path, size=(1100, 900)):
+    renderer = vtkRenderer()
+    renderer.SetBackground(1.0, 1.0, 1.0)
+    for one in actors:
+        renderer.AddActor(one)
+    text = vtkTextActor()
+    text.SetInput(title)
+    text.GetTextProperty().SetColor(0.1, 0.1, 0.1)
+    text.GetTextProperty().SetFontSize(20)
+    text.SetPosition(16, 16)
+    renderer.AddActor(text)
+    window = vtkRenderWindow()
+    window.OffScreenRenderingOn()
+    window.SetMultiSamples(4)
+    window.SetSize(*size)
+    window.AddRenderer(renderer)
+    renderer.GetActiveCamera().SetPosition(0.4, -1.0, 0.25)  # from the front, patient's head up
+    renderer.GetActiveCamera().SetFocalPoint(0.0, 0.0, 0.0)
+    renderer.GetActiveCamera().SetViewUp(0.0, 0.0, 1.0)
+    renderer.ResetCamera()
+    renderer.GetActiveCamera().Zoom(1.35)
+    window.Render()
+    grab = vtkWindowToImageFilter()
+    grab.SetInput(window)
+    grab.ReadFrontBufferOff()
+    writer = vtkPNGWriter()
+    writer.SetFileName(path)
+    writer.SetInputConnection(grab.GetOutputPort())
+    writer.Write()
+    print(path)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("run", help="folder of `coronary-pipeline run --until motion`")
+    parser.add_argument("--output", default=".", help="folder for the pictures")
+    arguments = parser.parse_args()
+    os.makedirs(arguments.output, exist_ok=True)
+
+    lines = series(arguments.run, "centerline.vtp.series")
+    surfaces = series(arguments.run, "surface.vtp.series")
+    if len(lines) < 3:
+        sys.exit(f"{arguments.run}: a motion of three moments or more is needed")
+
+    # Centerlines at all moments, a colour a branch.
+    branches = int(lines[0][1].GetCellData().GetArray("GroupIds").GetRange()[1]) + 1
+    table = vtkLookupTable()
+    table.SetNumberOfTableValues(branches)
+    table.SetTableRange(-0.5, branches - 0.5)
+    for n in range(branches):
+        hue = vtkLookupTable()
+        hue.SetHueRange(0.0, 1.0)
+        hue.SetValueRange(0.85, 0.85)
+        hue.SetTableRange(0.0, 1.0)
+        hue.Build()
+        color = [0.0, 0.0, 0.0]
+        hue.GetColor((n * 0.381966) % 1.0, color)
+        table.SetTableValue(n, *color, 1.0)
+    actors = [actor(tubes(data, 0.25), array="GroupIds", table=table) for _, data in lines]
+    save(actors, f"Centerlines at {len(lines)} moments, by branch",
+         os.path.join(arguments.output, "motion_centerlines.png"))
+
+    # Ways of some points.
+    start = lines[0][1]
+    ways = vtkPolyData()
+    points = vtkPoints()
+    cells = vtkCellArray()
+    chosen = range(0, start.GetNumberOfPoints(), max(1, start.GetNumberOfPoints() // 120))
+    for p in chosen:
+        # One cycle only: phases beyond it come back to where they began.
+        path = [data.GetPoint(p) for time, data in lines if time < lines[0][0] + 1.0]
+        cells.InsertNextCell(len(path) + 1)
+        first = points.GetNumberOfPoints()
+        for n, place in enumerate(path):
+            points.InsertNextPoint(place)
+            cells.InsertCellPoint(first + n)
+        cells.InsertCellPoint(first)
+    ways.SetPoints(points)
+    ways.SetLines(cells)
+    places = vtkPolyData()
+    initial = vtkPoints()
+    for p in chosen:
+        initial.InsertNextPoint(start.GetPoint(p))
+    places.SetPoints(initial)
+    ball = vtkSphereSource()
+    ball.SetRadius(0.8)
+    glyph = vtkGlyph3D()
+    glyph.SetInputData(places)
+    glyph.SetSourceConnection(ball.GetOutputPort())
+    glyph.ScalingOff()
+    glyph.Update()
+    save([actor(tubes(start, 0.3), (0.6, 0.6, 0.6)), actor(glyph.GetOutput(), (0.85, 0.1, 0.1)),
+          actor(tubes(ways, 0.3), (0.1, 0.35, 0.8), 0.45)],
+         "Positions at the first moment, and their ways through one cycle",
+         os.path.join(arguments.output, "motion_trajectories.png"))
+
+    # The wall at three moments.
+    third = max(1, len(surfaces) // 3)
+    picks = [surfaces[0], surfaces[third], surfaces[min(2 * third, len(surfaces) - 1)]]
+    colors = [(0.85, 0.2, 0.2), (0.2, 0.55, 0.25), (0.2, 0.35, 0.85)]
+    save([actor(data, color, 0.75) for (_, data), color in zip(picks, colors)],
+         "Wall at " + ", ".join(f"{100.0 * time:.0f} %" for time, _ in picks)
+         + " of the R-R interval: red, green, blue",
+         os.path.join(arguments.output, "motion_surfaces.png"))
+
+
+if __name__ == "__main__":
+    main()

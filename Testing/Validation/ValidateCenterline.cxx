@@ -2,15 +2,11 @@
 // ostia, vesselness, segmentation, extraction and topology to named branches, nothing given by
 // hand. Tables in Markdown on stdout; the exit code is 1 when a limit is missed.
 
-#include "CenterlineExtraction.h"
 #include "CenterlineOverlap.h"
 #include "CenterlineTopology.h"
-#include "CoronaryOstia.h"
 #include "CoronaryPhantom.h"
-#include "MultiscaleVesselness.h"
 #include "PhantomCases.h"
-#include "SegmentLabeling.h"
-#include "VesselSegmentation.h"
+#include "PhantomScan.h"
 
 #include <CLI/CLI.hpp>
 
@@ -18,7 +14,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <exception>
 #include <limits>
 #include <map>
@@ -58,15 +53,6 @@ struct Case
   bool trueOstia; ///< seeds from the truth, to tell the stages' errors apart
 };
 
-struct Image
-{
-  ImageGrid grid;
-  std::vector<std::int16_t> values;
-  std::vector<float> vesselness;
-  std::vector<unsigned char> mask;
-  std::vector<Vector3> seeds;
-};
-
 struct Outcome
 {
   std::string failure;             ///< empty, or why there is no tree
@@ -92,102 +78,6 @@ struct Outcome
       this->namedShare >= LeastNamedShare;
   }
 };
-
-double ProcessorSeconds()
-{
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
-
-// ---------------------------------------------------------------------------------------------
-// From the image to the tree
-// ---------------------------------------------------------------------------------------------
-
-Image MakeImage(const CoronaryPhantom& phantom, const Case& test, Outcome& outcome)
-{
-  Image result;
-  result.grid = phantom.DefaultGrid(test.spacing);
-  ScalarImage image;
-  image.grid = result.grid;
-  const auto voxels = static_cast<std::size_t>(image.NumberOfVoxels());
-  result.values.resize(voxels);
-  phantom.Render(result.grid, result.grid.extent, ReferencePhase, result.values.data());
-  image.values = static_cast<const std::int16_t*>(result.values.data());
-
-  double start = ProcessorSeconds();
-  const CoronaryOstia ostia = FindCoronaryOstia(image);
-  std::vector<VesselSeed> seeds;
-  if (test.trueOstia)
-  {
-    for (const PhantomOstium& ostium : phantom.Ostia(ReferencePhase))
-    {
-      seeds.push_back({ ostium.position, ostium.axis });
-    }
-  }
-  else
-  {
-    for (const CoronaryOstium& ostium : ostia.ostia)
-    {
-      seeds.push_back({ ostium.position, ostium.axis });
-    }
-  }
-  if (seeds.empty())
-  {
-    throw std::runtime_error("no ostium found: " + ostia.doubt);
-  }
-  for (const VesselSeed& seed : seeds)
-  {
-    result.seeds.push_back(seed.position);
-  }
-  VesselnessSettings frangi;
-  frangi.sigmas = VesselnessScales(0.5, 2.5, 5, true);
-  frangi.c = 100.0;
-  result.vesselness.resize(voxels);
-  {
-    const std::vector<float> input(result.values.begin(), result.values.end());
-    MultiscaleVesselness::Output output;
-    output.vesselness = result.vesselness.data();
-    MultiscaleVesselness(frangi, result.grid.spacing, result.grid.extent)
-      .Compute({ input.data(), result.grid.extent }, result.grid.extent, nullptr, output);
-  }
-  outcome.seconds[0] = ProcessorSeconds() - start;
-  start = ProcessorSeconds();
-  VesselSegmentationSettings settings;
-  settings.window = BloodWindow{ CoronaryOstiaSettings().softTissue, ostia.aorta.mean };
-  result.mask = SegmentVessels(image, result.vesselness.data(), seeds, settings).mask;
-  outcome.seconds[1] = ProcessorSeconds() - start;
-  return result;
-}
-
-CenterlineTopology MakeTree(const Image& image, Outcome& outcome)
-{
-  double start = ProcessorSeconds();
-  ScalarImage intensity;
-  intensity.grid = image.grid;
-  intensity.values = static_cast<const std::int16_t*>(image.values.data());
-  CenterlineInput input;
-  input.grid = image.grid;
-  input.speed = image.vesselness.data();
-  input.mask = image.mask.data();
-  input.intensity = &intensity;
-  input.seeds = image.seeds;
-  CenterlineSettings settings;
-  settings.timeLimit = 3600.0; // A slow machine is no other result.
-  const CenterlineResult extracted = ExtractCenterlines(input, settings);
-  outcome.seconds[2] = ProcessorSeconds() - start;
-  start = ProcessorSeconds();
-  CenterlineSet set;
-  set.points = extracted.tree.points;
-  set.radius = extracted.tree.radius;
-  set.roots = image.seeds;
-  for (const CenterlineTree::Branch& branch : extracted.tree.branches)
-  {
-    set.lines.push_back(branch.points);
-  }
-  CenterlineTopology tree = BuildTopology(set);
-  LabelSegments(tree);
-  outcome.seconds[3] = ProcessorSeconds() - start;
-  return tree;
-}
 
 // ---------------------------------------------------------------------------------------------
 // Against the truth
@@ -373,6 +263,12 @@ void CompareWithTruth(
   CompareNames(truth, tree, all.reference, outcome);
 }
 
+PhantomScan MakeScan(const CoronaryPhantom& phantom, const Case& test, Outcome& outcome)
+{
+  return ScanPhantom(phantom, phantom.DefaultGrid(test.spacing), ReferencePhase, test.trueOstia,
+    outcome.seconds.data());
+}
+
 Outcome Run(const Case& test)
 {
   Outcome outcome;
@@ -383,8 +279,8 @@ Outcome Run(const Case& test)
   const CoronaryPhantom phantom(settings);
   try
   {
-    const Image image = MakeImage(phantom, test, outcome);
-    CompareWithTruth(phantom, MakeTree(image, outcome), outcome);
+    const PhantomScan scan = MakeScan(phantom, test, outcome);
+    CompareWithTruth(phantom, TreeOf(scan, outcome.seconds.data() + 2), outcome);
   }
   catch (const std::exception& error)
   {
@@ -546,8 +442,8 @@ bool PrintInvariance(const Case& test)
   settings.noise = test.noise;
   const CoronaryPhantom phantom(settings);
   Outcome outcome;
-  const Image image = MakeImage(phantom, test, outcome);
-  const CenterlineTopology original = MakeTree(image, outcome);
+  const PhantomScan scan = MakeScan(phantom, test, outcome);
+  const CenterlineTopology original = TreeOf(scan, outcome.seconds.data() + 2);
   const CenterlineSet originalSet = SetOf(original);
   const Matrix3 turn =
     Eigen::AngleAxisd(0.7, Vector3(0.4, -1.0, 0.6).normalized()).toRotationMatrix();
@@ -562,15 +458,15 @@ bool PrintInvariance(const Case& test)
   bool met = true;
   for (const Frame& frame : frames)
   {
-    Image moved = image;
-    moved.grid.origin = frame.Apply(image.grid.origin);
-    moved.grid.spacing = frame.scale * image.grid.spacing;
-    moved.grid.direction = frame.turn * image.grid.direction;
+    PhantomScan moved = scan;
+    moved.grid.origin = frame.Apply(scan.grid.origin);
+    moved.grid.spacing = frame.scale * scan.grid.spacing;
+    moved.grid.direction = frame.turn * scan.grid.direction;
     for (Vector3& seed : moved.seeds)
     {
       seed = frame.Apply(seed);
     }
-    const CenterlineTopology tree = MakeTree(moved, outcome);
+    const CenterlineTopology tree = TreeOf(moved, outcome.seconds.data() + 2);
     CenterlineSet back = SetOf(tree);
     for (Vector3& p : back.points)
     {

@@ -1,0 +1,890 @@
+#include "CenterlineTracking.h"
+
+#include "DisplacementLabels.h"
+#include "SparseVolume.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+namespace coronary
+{
+namespace
+{
+constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+/// Nearer in time than this, modulo the cycle, two phases show the same moment.
+constexpr double SameMoment = 0.02;
+/// Beyond the patch, the search and the smearing: what the places may still move, mm.
+constexpr double Spare = 3.0;
+
+void RequireRange(const char* name, double value, double least, double greatest)
+{
+  if (!(value >= least && value <= greatest))
+  {
+    throw std::invalid_argument(std::string("CenterlineTrackingSettings: ") + name +
+      " must be from " + std::to_string(least) + " to " + std::to_string(greatest));
+  }
+}
+
+/// Distance of two times modulo the cycle.
+double CyclicDistance(double a, double b)
+{
+  const double apart = std::abs(a - b);
+  return std::abs(apart - std::round(apart));
+}
+
+/// Places of a sphere around a node, on a lattice, with weights that fall off outwards.
+struct Patch
+{
+  std::vector<std::array<int, 3>> places;
+  std::vector<float> weights;
+  int reach = 0;
+  double step = 1.0;
+
+  Patch(double radius, double spacing)
+    : reach(static_cast<int>(radius / spacing))
+    , step(spacing)
+  {
+    for (int k = -this->reach; k <= this->reach; ++k)
+    {
+      for (int j = -this->reach; j <= this->reach; ++j)
+      {
+        for (int i = -this->reach; i <= this->reach; ++i)
+        {
+          const double apart = spacing * std::sqrt(i * i + j * j + k * k) / radius;
+          if (apart <= 1.0)
+          {
+            this->places.push_back({ i, j, k });
+            this->weights.push_back(static_cast<float>(std::exp(-1.5 * apart * apart)));
+          }
+        }
+      }
+    }
+    const float sum = std::accumulate(this->weights.begin(), this->weights.end(), 0.0F);
+    for (float& weight : this->weights)
+    {
+      weight /= sum;
+    }
+  }
+};
+
+/// Weighted mean squared difference of `wanted` and the block, for every shift of the lattice.
+void SumsOfSquares(const std::vector<float>& block, int blockSide, const Patch& patch,
+  const std::vector<float>& weights, const std::vector<float>& wanted, int labelReach,
+  std::vector<float>& costs)
+{
+  const int side = 2 * labelReach + 1;
+  costs.assign(static_cast<std::size_t>(side) * side * side, 0.0F);
+  for (std::size_t p = 0; p < patch.places.size(); ++p)
+  {
+    const std::array<int, 3>& place = patch.places[p];
+    const float weight = weights[p];
+    if (weight <= 0.0F)
+    {
+      continue;
+    }
+    const float value = wanted[p];
+    // The block's corner is -(patch reach + label reach).
+    const float* corner = block.data() +
+      ((place[2] + patch.reach) * blockSide + place[1] + patch.reach) * blockSide + place[0] +
+      patch.reach;
+    for (int k = 0; k < side; ++k)
+    {
+      for (int j = 0; j < side; ++j)
+      {
+        const float* row = corner + (k * blockSide + j) * blockSide;
+        float* out = costs.data() + (k * side + j) * side;
+        for (int i = 0; i < side; ++i)
+        {
+          const float difference = row[i] - value;
+          out[i] += weight * difference * difference;
+        }
+      }
+    }
+  }
+}
+
+/// What the sums of squares say, in natural logarithms: 0 for the best candidate, limited, since a
+/// patch may show something that the reference does not.
+void ToLikelihoods(std::vector<std::vector<float>>& costs, double independent, double limit)
+{
+  std::vector<float> least;
+  least.reserve(costs.size());
+  for (const std::vector<float>& one : costs)
+  {
+    least.push_back(*std::min_element(one.begin(), one.end()));
+  }
+  std::vector<float> sorted = least;
+  std::nth_element(
+    sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const float typical = std::max(sorted[sorted.size() / 2], 1.0F);
+  for (std::size_t n = 0; n < costs.size(); ++n)
+  {
+    const float scale = static_cast<float>(0.5 * independent) / std::max(least[n], typical);
+    for (float& value : costs[n])
+    {
+      value = std::min((value - least[n]) * scale, static_cast<float>(limit));
+    }
+  }
+}
+
+struct Window
+{
+  float low = 0.0F;
+  float high = 0.0F;
+  float operator()(float value) const { return std::clamp(value, this->low, this->high); }
+};
+
+double Correlation(const std::vector<float>& a, const std::vector<float>& b)
+{
+  const auto count = static_cast<double>(a.size());
+  const double meanA = std::accumulate(a.begin(), a.end(), 0.0) / count;
+  const double meanB = std::accumulate(b.begin(), b.end(), 0.0) / count;
+  double aa = 0.0;
+  double bb = 0.0;
+  double ab = 0.0;
+  for (std::size_t n = 0; n < a.size(); ++n)
+  {
+    aa += (a[n] - meanA) * (a[n] - meanA);
+    bb += (b[n] - meanB) * (b[n] - meanB);
+    ab += (a[n] - meanA) * (b[n] - meanB);
+  }
+  return ab / std::sqrt(std::max(aa * bb, 1e-9));
+}
+
+/// An inverse covariance after the method's own error, mm, was added.
+Matrix3 Limited(const Matrix3& information, double deviation)
+{
+  const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(information);
+  const Vector3 limited = eigen.eigenvalues().unaryExpr(
+    [&](double value) { return value > 0.0 ? 1.0 / (1.0 / value + deviation * deviation) : 0.0; });
+  return eigen.eigenvectors() * limited.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+class Tracker
+{
+public:
+  Tracker(const MovingLines& lines, double referenceTime, const std::vector<double>& times,
+    const std::function<ScalarImage(double time)>& imageAt,
+    const CenterlineTrackingSettings& settings, CenterlineTrackingReport& report,
+    const ProgressCallback& progress)
+    : Lines(lines)
+    , ReferenceTime(referenceTime)
+    , Times(times)
+    , ImageAt(imageAt)
+    , Settings(settings)
+    , Result(report)
+    , Progress(progress)
+    , Nodes(PlaceNodes(lines, settings.nodeSpacing))
+    , Coarse(settings.coarseRadius, settings.coarseSpacing)
+    , Fine(settings.fineRadius, 1.0)
+    , Core(3.0, 0.5)
+  {
+  }
+
+  PoseSequence Run();
+
+private:
+  using PerPhase = std::vector<std::vector<Vector3>>;
+  using Measurements = std::vector<std::vector<TrajectoryMeasurement>>;
+
+  struct Seen
+  {
+    PerPhase displacement;                         ///< per phase and node, mm
+    std::vector<std::vector<Matrix3>> information; ///< of each, 1/mm^2
+    double robustScale = 1.0;                      ///< mm
+  };
+
+  ScalarImage Read(double time);
+  void SearchCoarsely();
+  /// Looks for the surroundings of the nodes without the vessels, which may be invisible, or with
+  /// them.
+  Seen SearchFinely(bool vessels, double progressFrom);
+  /// Per node: the patch's weights without what is nearer to a vessel's wall than `margin`, sum 1; all 0
+  /// where too little is left.
+  std::vector<std::vector<float>> WithoutVessels(const Patch& patch, double margin) const;
+  void Align(double robustScale);
+  void Finish(PoseSequence& sequence);
+  /// Fits the trajectories to what was measured; what does not agree counts less.
+  void Fit(const std::vector<const Seen*>& seen);
+  double Keep() const { return this->Settings.fineRadius + this->Settings.fineRange + Spare; }
+  double WindowOfCycle() const
+  {
+    return this->Settings.temporalWindow / this->Settings.cycleLength;
+  }
+  /// How far the node moves from its place at `time` over the window, at even moments of it.
+  std::vector<Vector3> Smear(int node, double time) const;
+  /// The rotation from the reference to the phase, without a twist about the vessel.
+  Matrix3 Turn(int node, const std::vector<Vector3>& displacement) const;
+  std::vector<Vector3> PlacesAt(const std::vector<Vector3>& displacement) const;
+
+  const MovingLines& Lines;
+  const double ReferenceTime;
+  const std::vector<double>& Times;
+  const std::function<ScalarImage(double time)>& ImageAt;
+  const CenterlineTrackingSettings& Settings;
+  CenterlineTrackingReport& Result;
+  const ProgressCallback& Progress;
+
+  LineNodes Nodes;
+  Patch Coarse;
+  Patch Fine;
+  Patch Core;
+  Vector3 Low;
+  Vector3 High;
+  Window Limits;
+  SparseVolume Reference;
+  std::vector<SparseVolume> Volumes; ///< per phase
+  PerPhase Displacement;             ///< per phase and node: the present trajectories
+  Trajectories Motion;
+  Seen Surroundings;                         ///< where the tissue around the nodes was found
+  std::vector<std::vector<double>> Likeness; ///< per phase and node: correlation of the core
+  std::vector<std::vector<double>> Offset;   ///< mm between what was seen and the trajectories
+};
+
+ScalarImage Tracker::Read(double time)
+{
+  ++this->Result.imagesRead;
+  ScalarImage image = this->ImageAt(time);
+  const std::array<int, 3> size = image.Dimensions();
+  if (size[0] < 1 || size[1] < 1 || size[2] < 1 ||
+    std::visit([](const auto* values) { return values == nullptr; }, image.values))
+  {
+    throw std::invalid_argument("The image at " + std::to_string(time) + " has no voxels");
+  }
+  return image;
+}
+
+std::vector<Vector3> Tracker::PlacesAt(const std::vector<Vector3>& displacement) const
+{
+  std::vector<Vector3> places(this->Nodes.size());
+  for (std::size_t n = 0; n < places.size(); ++n)
+  {
+    places[n] = this->Nodes.position[n] + displacement[n];
+  }
+  return places;
+}
+
+Matrix3 Tracker::Turn(int node, const std::vector<Vector3>& displacement) const
+{
+  // The tangent's change by the displacements of the neighbours.
+  const int parent = this->Nodes.parent[node];
+  if (parent < 0)
+  {
+    return Matrix3::Identity();
+  }
+  const Vector3 rest = this->Nodes.position[node] - this->Nodes.position[parent];
+  const Vector3 moved = rest + displacement[node] - displacement[parent];
+  if (rest.norm() < 1e-6 || moved.norm() < 1e-6)
+  {
+    return Matrix3::Identity();
+  }
+  return Eigen::Quaterniond::FromTwoVectors(rest, moved).toRotationMatrix();
+}
+
+std::vector<Vector3> Tracker::Smear(int node, double time) const
+{
+  const double window = this->WindowOfCycle();
+  if (window <= 0.0)
+  {
+    return { Vector3::Zero() };
+  }
+  const Vector3 now = this->Motion.Displacement(node, time);
+  const double length = (this->Motion.Displacement(node, time + 0.5 * window) - now).norm() +
+    (now - this->Motion.Displacement(node, time - 0.5 * window)).norm();
+  const int count = std::clamp(2 * static_cast<int>(std::ceil(length / 1.2)) + 1, 1, 13);
+  std::vector<Vector3> result;
+  for (int n = 0; n < count; ++n)
+  {
+    const double at = time + window * ((n + 0.5) / count - 0.5);
+    result.push_back(this->Motion.Displacement(node, at) - now);
+  }
+  return result;
+}
+
+void Tracker::SearchCoarsely()
+{
+  const std::size_t phases = this->Times.size();
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  const LabelLattice lattice{ static_cast<int>(std::ceil(
+                                this->Settings.captureRange / this->Settings.coarseSpacing)),
+    this->Settings.coarseSpacing };
+  const int blockReach = this->Coarse.reach + lattice.reach;
+  const int blockSide = 2 * blockReach + 1;
+
+  this->Low = Vector3::Constant(std::numeric_limits<double>::infinity());
+  this->High = -this->Low;
+  for (const Vector3& place : this->Nodes.position)
+  {
+    this->Low = this->Low.cwiseMin(place);
+    this->High = this->High.cwiseMax(place);
+  }
+  const Vector3 margin = Vector3::Constant(
+    std::max(30.0, 2.0 * this->Settings.captureRange) + this->Settings.coarseRadius);
+  this->Low -= margin;
+  this->High += margin;
+
+  // The reference.
+  AveragedVolume averaged;
+  {
+    const ScalarImage image = this->Read(this->ReferenceTime);
+    averaged = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
+    this->Reference = SparseVolume(
+      image, this->Nodes.position, this->Settings.fineRadius + this->Settings.fineRange + Spare);
+  }
+  const std::vector<std::vector<float>> weights =
+    this->WithoutVessels(this->Coarse, 0.5 * this->Settings.coarseSpacing);
+  std::vector<std::vector<float>> wanted(nodes);
+  std::vector<float> all;
+  for (std::int64_t n = 0; n < nodes; ++n)
+  {
+    for (const std::array<int, 3>& place : this->Coarse.places)
+    {
+      wanted[n].push_back(averaged.Sample(
+        this->Nodes.position[n] + this->Coarse.step * Vector3(place[0], place[1], place[2])));
+      all.push_back(wanted[n].back());
+    }
+  }
+  // Air and bone would outvote the rest.
+  std::sort(all.begin(), all.end());
+  const float median = all[all.size() / 2];
+  const float spread = std::max(all[all.size() * 9 / 10] - all[all.size() / 10], 1.0F);
+  this->Limits = { median - spread, median + spread };
+  for (std::vector<float>& one : wanted)
+  {
+    std::transform(one.begin(), one.end(), one.begin(), this->Limits);
+  }
+
+  // Outwards from the reference, so that a neighbour in time is known.
+  std::vector<std::size_t> order(phases);
+  std::iota(order.begin(), order.end(), std::size_t{ 0 });
+  std::stable_sort(order.begin(), order.end(),
+    [&](std::size_t a, std::size_t b)
+    {
+      return CyclicDistance(this->Times[a], this->ReferenceTime) <
+        CyclicDistance(this->Times[b], this->ReferenceTime);
+    });
+  this->Displacement.assign(phases, {});
+  this->Volumes.resize(phases);
+  std::vector<std::size_t> done;
+  for (std::size_t step = 0; step < phases; ++step)
+  {
+    const std::size_t phase = order[step];
+    std::vector<Vector3> guess(nodes, Vector3::Zero());
+    double nearest = CyclicDistance(this->Times[phase], this->ReferenceTime);
+    for (const std::size_t other : done)
+    {
+      const double apart = CyclicDistance(this->Times[phase], this->Times[other]);
+      if (apart < nearest)
+      {
+        nearest = apart;
+        guess = this->Displacement[other];
+      }
+    }
+    const ScalarImage image = this->Read(this->Times[phase]);
+    const AveragedVolume moved =
+      AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
+    std::vector<std::vector<float>> costs(nodes);
+    ParallelFor(nodes, 4,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        std::vector<float> block(static_cast<std::size_t>(blockSide) * blockSide * blockSide);
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          const Vector3 centre = this->Nodes.position[n] + guess[n];
+          std::size_t at = 0;
+          for (int k = -blockReach; k <= blockReach; ++k)
+          {
+            for (int j = -blockReach; j <= blockReach; ++j)
+            {
+              for (int i = -blockReach; i <= blockReach; ++i)
+              {
+                block[at++] = this->Limits(moved.Sample(centre + lattice.step * Vector3(i, j, k)));
+              }
+            }
+          }
+          SumsOfSquares(
+            block, blockSide, this->Coarse, weights[n], wanted[n], lattice.reach, costs[n]);
+        }
+      });
+    ToLikelihoods(costs, 30.0, 20.0);
+    const std::vector<Vector3> best = BestDisplacements(this->Nodes, lattice, costs, 0.5);
+    for (std::int64_t n = 0; n < nodes; ++n)
+    {
+      guess[n] += best[n];
+    }
+    this->Displacement[phase] = std::move(guess);
+    done.push_back(phase);
+    this->Volumes[phase] =
+      SparseVolume(image, this->PlacesAt(this->Displacement[phase]), this->Keep());
+    Report(this->Progress, 0.6 * static_cast<double>(step + 1) / static_cast<double>(phases));
+  }
+  const Seen seen{ this->Displacement,
+    std::vector<std::vector<Matrix3>>(
+      phases, std::vector<Matrix3>(nodes, Matrix3::Identity() / (1.5 * 1.5))),
+    2.5 };
+  this->Fit({ &seen });
+}
+
+void Tracker::Fit(const std::vector<const Seen*>& seen)
+{
+  const std::size_t phases = this->Times.size();
+  const std::size_t nodes = this->Nodes.size();
+  std::vector<double> times = this->Times;
+  times.push_back(this->ReferenceTime);
+  // At the reference the lines are where they are.
+  const TrajectoryMeasurement fixed{ static_cast<int>(phases), Vector3::Zero(),
+    Matrix3::Identity() / (0.05 * 0.05) };
+  for (int round = 0; round < 6; ++round)
+  {
+    Measurements measurements(nodes, { fixed });
+    for (const Seen* one : seen)
+    {
+      const double scale = one->robustScale * std::max(1.0, 3.0 - round);
+      for (std::size_t n = 0; n < nodes; ++n)
+      {
+        for (std::size_t k = 0; k < phases; ++k)
+        {
+          const Vector3& displacement = one->displacement[k][n];
+          double share = 1.0;
+          if (round > 0)
+          {
+            const double apart =
+              (this->Motion.Displacement(static_cast<int>(n), times[k]) - displacement).norm();
+            share = 1.0 / (1.0 + apart * apart / (scale * scale));
+          }
+          measurements[n].push_back({ static_cast<int>(k), displacement,
+            one->information[k][n] * share * share }); // Geman & McClure
+        }
+      }
+    }
+    this->Motion = FitTrajectories(this->Nodes, times, measurements, this->Settings.prior);
+  }
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    for (std::size_t n = 0; n < nodes; ++n)
+    {
+      this->Displacement[k][n] = this->Motion.Displacement(static_cast<int>(n), times[k]);
+    }
+  }
+}
+
+std::vector<std::vector<float>> Tracker::WithoutVessels(const Patch& patch, double margin) const
+{
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  std::vector<std::vector<float>> weights(nodes, patch.weights);
+  const double reach = patch.reach * patch.step;
+  ParallelFor(nodes, 4,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const Vector3& centre = this->Nodes.position[n];
+        for (std::int64_t other = 0; other < nodes; ++other)
+        {
+          const int parent = this->Nodes.parent[other];
+          const Vector3& a = this->Nodes.position[other];
+          const Vector3 way = (parent >= 0 ? this->Nodes.position[parent] : a) - a;
+          const double wall =
+            (this->Nodes.radius.empty() ? 1.5 : this->Nodes.radius[other]) + margin;
+          if ((a - centre).norm() > reach + wall + way.norm())
+          {
+            continue;
+          }
+          for (std::size_t p = 0; p < patch.places.size(); ++p)
+          {
+            const std::array<int, 3>& place = patch.places[p];
+            const Vector3 from = centre + patch.step * Vector3(place[0], place[1], place[2]) - a;
+            const double at =
+              std::clamp(from.dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
+            if ((from - at * way).squaredNorm() < wall * wall)
+            {
+              weights[n][p] = 0.0F;
+            }
+          }
+        }
+        const float sum = std::accumulate(weights[n].begin(), weights[n].end(), 0.0F);
+        for (float& weight : weights[n])
+        {
+          weight = sum > 0.1F ? weight / sum : 0.0F;
+        }
+      }
+    });
+  return weights;
+}
+
+Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
+{
+  const std::size_t phases = this->Times.size();
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  const LabelLattice lattice{ static_cast<int>(std::ceil(this->Settings.fineRange)), 1.0 };
+  const int blockReach = this->Fine.reach + lattice.reach;
+  const int blockSide = 2 * blockReach + 1;
+  const std::size_t samples = this->Fine.places.size();
+  const std::vector<std::vector<float>> weights = vessels
+    ? std::vector<std::vector<float>>(nodes, this->Fine.weights)
+    : this->WithoutVessels(this->Fine, 0.8);
+  Seen seen{ PerPhase(phases),
+    std::vector<std::vector<Matrix3>>(phases, std::vector<Matrix3>(nodes, Matrix3::Zero())), 1.5 };
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    const std::vector<Vector3> places = this->PlacesAt(this->Displacement[k]);
+    if (!std::all_of(places.begin(), places.end(),
+          [&](const Vector3& place)
+          { return this->Volumes[k].Covers(place, this->Keep() - Spare); }))
+    {
+      this->Volumes[k] = SparseVolume(this->Read(this->Times[k]), places, this->Keep());
+    }
+    std::vector<std::vector<float>> costs(nodes);
+    std::vector<std::vector<float>> blocks(nodes);
+    std::vector<std::vector<float>> expected(nodes);
+    std::vector<Matrix3> curvature(nodes, Matrix3::Zero());
+    ParallelFor(nodes, 4,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          const Matrix3 back = this->Turn(static_cast<int>(n), this->Displacement[k]).transpose();
+          const std::vector<Vector3> smear = this->Smear(static_cast<int>(n), this->Times[k]);
+          const auto expect = [&](const Vector3& offset)
+          {
+            float sum = 0.0F;
+            int count = 0;
+            for (const Vector3& moved : smear)
+            {
+              const float value =
+                this->Reference.Sample(this->Nodes.position[n] + back * (offset - moved));
+              if (!std::isnan(value))
+              {
+                sum += this->Limits(value);
+                ++count;
+              }
+            }
+            return count > 0 ? sum / static_cast<float>(count) : this->Limits.low;
+          };
+          std::vector<float>& wanted = expected[n];
+          wanted.resize(samples);
+          for (std::size_t p = 0; p < samples; ++p)
+          {
+            if (weights[n][p] <= 0.0F)
+            {
+              continue;
+            }
+            const std::array<int, 3>& place = this->Fine.places[p];
+            const Vector3 offset = this->Fine.step * Vector3(place[0], place[1], place[2]);
+            wanted[p] = expect(offset);
+            if (!vessels)
+            {
+              Vector3 gradient;
+              for (int axis = 0; axis < 3; ++axis)
+              {
+                const Vector3 away = 0.5 * Vector3::Unit(axis);
+                gradient[axis] = expect(offset + away) - expect(offset - away);
+              }
+              curvature[n] += weights[n][p] * gradient * gradient.transpose();
+            }
+          }
+          std::vector<float>& block = blocks[n];
+          block.reserve(static_cast<std::size_t>(blockSide) * blockSide * blockSide);
+          for (int c = -blockReach; c <= blockReach; ++c)
+          {
+            for (int b = -blockReach; b <= blockReach; ++b)
+            {
+              for (int a = -blockReach; a <= blockReach; ++a)
+              {
+                const float value = this->Volumes[k].Sample(places[n] + Vector3(a, b, c));
+                block.push_back(std::isnan(value) ? this->Limits.low : this->Limits(value));
+              }
+            }
+          }
+          SumsOfSquares(block, blockSide, this->Fine, weights[n], wanted, lattice.reach, costs[n]);
+        }
+      });
+    std::vector<float> least(nodes);
+    for (std::int64_t n = 0; n < nodes; ++n)
+    {
+      least[n] = *std::min_element(costs[n].begin(), costs[n].end());
+    }
+    ToLikelihoods(costs, 30.0, 15.0);
+    seen.displacement[k] = BestDisplacements(this->Nodes, lattice, costs, 0.25);
+    for (std::int64_t n = 0; n < nodes; ++n)
+    {
+      if (vessels)
+      {
+        // Is there a vessel where it was found?
+        const Vector3& shift = seen.displacement[k][n];
+        const int at[3] = { static_cast<int>(std::lround(shift[0])),
+          static_cast<int>(std::lround(shift[1])), static_cast<int>(std::lround(shift[2])) };
+        std::vector<float> there;
+        std::vector<float> wanted;
+        for (std::size_t p = 0; p < samples; ++p)
+        {
+          const std::array<int, 3>& place = this->Fine.places[p];
+          if (place[0] * place[0] + place[1] * place[1] + place[2] * place[2] <= 9)
+          {
+            there.push_back(blocks[n][((place[2] + at[2] + blockReach) * blockSide + place[1] +
+                                        at[1] + blockReach) *
+                blockSide +
+              place[0] + at[0] + blockReach]);
+            wanted.push_back(expected[n][p]);
+          }
+        }
+        const double trust = std::clamp((Correlation(there, wanted) - 0.4) / 0.4, 0.0, 1.0);
+        seen.information[k][n] = Matrix3::Identity() * (trust * trust / (0.6 * 0.6));
+      }
+      else
+      {
+        seen.information[k][n] =
+          Limited(curvature[n] * (30.0 / std::max<double>(least[n], 400.0)), 0.5);
+      }
+      seen.displacement[k][n] += this->Displacement[k][n];
+    }
+    Report(this->Progress,
+      progressFrom + 0.1 * static_cast<double>(k + 1) / static_cast<double>(phases));
+  }
+  return seen;
+}
+
+void Tracker::Align(double robustScale)
+{
+  const std::size_t phases = this->Times.size();
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  const double h = 0.25;
+  PerPhase measured(phases, std::vector<Vector3>(nodes, Vector3::Zero()));
+  std::vector<std::vector<Matrix3>> information(
+    phases, std::vector<Matrix3>(nodes, Matrix3::Zero()));
+  this->Likeness.assign(phases, std::vector<double>(nodes, 0.0));
+  this->Offset.assign(phases, std::vector<double>(nodes, 0.0));
+  const std::size_t samples = this->Core.places.size();
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    ParallelFor(nodes, 4,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        std::vector<float> wanted(samples);
+        std::vector<Eigen::Vector3f> gradient(samples);
+        std::vector<float> weight(samples);
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          const Matrix3 turn = this->Turn(static_cast<int>(n), this->Displacement[k]);
+          const Matrix3 back = turn.transpose();
+          const std::vector<Vector3> smear = this->Smear(static_cast<int>(n), this->Times[k]);
+          const auto expected = [&](const Vector3& offset)
+          {
+            float sum = 0.0F;
+            for (const Vector3& moved : smear)
+            {
+              sum += this->Reference.Sample(this->Nodes.position[n] + back * (offset - moved));
+            }
+            return sum / static_cast<float>(smear.size());
+          };
+          for (std::size_t p = 0; p < samples; ++p)
+          {
+            const std::array<int, 3>& place = this->Core.places[p];
+            const Vector3 offset = this->Core.step * Vector3(place[0], place[1], place[2]);
+            wanted[p] = expected(offset);
+            for (int axis = 0; axis < 3; ++axis)
+            {
+              const Vector3 away = h * Vector3::Unit(axis);
+              gradient[p][axis] =
+                (expected(offset + away) - expected(offset - away)) / static_cast<float>(2.0 * h);
+            }
+            weight[p] = std::isfinite(wanted[p] + gradient[p].sum()) ? this->Core.weights[p] : 0.0F;
+          }
+          // Gauss-Newton on the shift and a constant difference of brightness.
+          Vector3 shift = Vector3::Zero();
+          Matrix3 curvature = Matrix3::Zero();
+          double noise = 0.0;
+          double likeness = 0.0;
+          const Vector3 centre = this->Nodes.position[n] + this->Displacement[k][n];
+          std::vector<float> seen(samples);
+          for (int round = 0; round < 8; ++round)
+          {
+            double sum = 0.0;
+            double sumSeen = 0.0;
+            double sumWanted = 0.0;
+            for (std::size_t p = 0; p < samples; ++p)
+            {
+              const std::array<int, 3>& place = this->Core.places[p];
+              seen[p] = this->Volumes[k].Sample(
+                centre + shift + this->Core.step * Vector3(place[0], place[1], place[2]));
+              if (weight[p] > 0.0F && !std::isnan(seen[p]))
+              {
+                sum += weight[p];
+                sumSeen += weight[p] * seen[p];
+                sumWanted += weight[p] * wanted[p];
+              }
+            }
+            if (sum < 0.3)
+            {
+              curvature.setZero();
+              break;
+            }
+            const double meanSeen = sumSeen / sum;
+            const double meanWanted = sumWanted / sum;
+            Vector3 meanGradient = Vector3::Zero();
+            for (std::size_t p = 0; p < samples; ++p)
+            {
+              if (weight[p] > 0.0F && !std::isnan(seen[p]))
+              {
+                meanGradient += weight[p] / sum * gradient[p].cast<double>();
+              }
+            }
+            curvature.setZero();
+            Vector3 pull = Vector3::Zero();
+            double varSeen = 0.0;
+            double varWanted = 0.0;
+            double both = 0.0;
+            double squares = 0.0;
+            for (std::size_t p = 0; p < samples; ++p)
+            {
+              if (!(weight[p] > 0.0F) || std::isnan(seen[p]))
+              {
+                continue;
+              }
+              const double a = seen[p] - meanSeen;
+              const double b = wanted[p] - meanWanted;
+              const Vector3 g = gradient[p].cast<double>() - meanGradient;
+              const double w = weight[p] / sum;
+              varSeen += w * a * a;
+              varWanted += w * b * b;
+              both += w * a * b;
+              squares += w * (a - b) * (a - b);
+              curvature += w * g * g.transpose();
+              pull += w * (a - b) * g;
+            }
+            likeness = both / std::sqrt(std::max(varSeen * varWanted, 1e-9));
+            noise = squares;
+            const Matrix3 damped =
+              curvature + Matrix3::Identity() * (1e-3 * curvature.trace() + 1e-3);
+            // The image moved by +shift shows what was expected: seen(x + shift) = wanted(x).
+            Vector3 change = -(damped.ldlt().solve(pull));
+            const double length = change.norm();
+            if (length > 0.7)
+            {
+              change *= 0.7 / length;
+            }
+            shift += change;
+            if (length < 0.01 || shift.norm() > 2.5)
+            {
+              break;
+            }
+          }
+          this->Likeness[k][n] = likeness;
+          this->Offset[k][n] = shift.norm();
+          measured[k][n] = this->Displacement[k][n] + shift;
+          // Of the samples about one in eight says something of its own; patches of neighbours overlap.
+          const double trust = std::clamp((likeness - 0.4) / 0.4, 0.0, 1.0);
+          if (trust > 0.0 && curvature.trace() > 0.0)
+          {
+            information[k][n] =
+              trust * trust * Limited(curvature * (60.0 / std::max(noise, 400.0)), 0.15);
+          }
+        }
+      });
+  }
+  const Seen seen{ std::move(measured), std::move(information), robustScale };
+  this->Fit({ &seen, &this->Surroundings });
+}
+
+void Tracker::Finish(PoseSequence& sequence)
+{
+  const std::size_t phases = this->Times.size();
+  const std::size_t nodes = this->Nodes.size();
+  sequence.times = this->Times;
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    std::vector<double> confidence(nodes);
+    for (std::size_t n = 0; n < nodes; ++n)
+    {
+      const double certain = this->Motion.Deviation(static_cast<int>(n), this->Times[k]);
+      confidence[n] = std::clamp((this->Likeness[k][n] - 0.3) / 0.6, 0.0, 1.0) *
+        std::exp(-certain * certain / 0.5);
+    }
+    std::vector<Vector3> moved = this->Nodes.AtPoints(this->Displacement[k]);
+    for (std::size_t p = 0; p < moved.size(); ++p)
+    {
+      moved[p] += this->Lines.rest[p];
+    }
+    sequence.points.push_back(std::move(moved));
+    sequence.confidence.push_back(this->Nodes.AtPoints(confidence));
+    std::vector<TrackingStatus> status;
+    double tracked = 0.0;
+    for (const double value : sequence.confidence.back())
+    {
+      status.push_back(value > 0.5 ? TrackingStatus::Tracked
+          : value > 0.25           ? TrackingStatus::Weak
+                                   : TrackingStatus::Filled);
+      tracked += value > 0.5 ? 1.0 : 0.0;
+    }
+    this->Result.trackedShare.push_back(tracked / static_cast<double>(status.size()));
+    sequence.status.push_back(std::move(status));
+  }
+  this->Result.repeatability = NaN;
+  for (const SparseVolume& volume : this->Volumes)
+  {
+    this->Result.keptBytes += volume.Bytes();
+  }
+}
+
+PoseSequence Tracker::Run()
+{
+  this->SearchCoarsely();
+  this->Surroundings = this->SearchFinely(false, 0.6);
+  this->Fit({ &this->Surroundings });
+  {
+    const Seen vessels = this->SearchFinely(true, 0.7);
+    this->Fit({ &vessels, &this->Surroundings });
+  }
+  for (int round = 0; round < 4; ++round)
+  {
+    this->Align(round < 2 ? 1.0 : 0.5);
+    Report(this->Progress, 0.8 + 0.05 * (round + 1));
+  }
+  PoseSequence sequence;
+  this->Finish(sequence);
+  return sequence;
+}
+}
+
+void CenterlineTrackingSettings::Validate() const
+{
+  RequireRange("temporalWindow", this->temporalWindow, 0.0, 1.0);
+  RequireRange("cycleLength", this->cycleLength, 0.2, 5.0);
+  RequireRange("nodeSpacing", this->nodeSpacing, 0.5, 10.0);
+  RequireRange("coarseSpacing", this->coarseSpacing, 1.0, 4.0);
+  RequireRange("coarseRadius", this->coarseRadius, 4.0, 30.0);
+  RequireRange("captureRange", this->captureRange, 2.0, 40.0);
+  RequireRange("fineRadius", this->fineRadius, 2.0, 12.0);
+  RequireRange("fineRange", this->fineRange, 1.0, 12.0);
+  RequireRange("trackedDeviation", this->trackedDeviation, 0.05, 10.0);
+  this->prior.Validate();
+}
+
+PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
+  const std::vector<double>& times, const std::function<ScalarImage(double time)>& imageAt,
+  const CenterlineTrackingSettings& settings, CenterlineTrackingReport* report,
+  const ProgressCallback& progress)
+{
+  settings.Validate();
+  CenterlineTrackingReport own;
+  CenterlineTrackingReport& result = report != nullptr ? *report : own;
+  result = {};
+  if (lines.rest.empty())
+  {
+    throw std::invalid_argument("The lines to track have no points");
+  }
+  if (times.empty())
+  {
+    throw std::invalid_argument("There is no phase to track");
+  }
+  Tracker tracker(lines, referenceTime, times, imageAt, settings, result, progress);
+  return tracker.Run();
+}
+}

@@ -1,0 +1,39 @@
+/**
+ * @file PhantomScan.h
+ * @brief From a phantom to the tree that the stages find in its image, nothing given by hand.
+ */
+#ifndef DynamicCoronary_PhantomScan_h
+#define DynamicCoronary_PhantomScan_h
+
+#include "CenterlineTopology.h"
+#include "CoronaryPhantom.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace coronary
+{
+/// The image of one moment, and what the stages before the centerlines make of it.
+struct PhantomScan
+{
+  ImageGrid grid;
+  std::vector<std::int16_t> values;
+  std::vector<float> vesselness;
+  std::vector<unsigned char> mask;
+  std::vector<Vector3> seeds;
+};
+
+/**
+ * @param moment     fraction of R-R
+ * @param trueOstia  seeds from the truth instead of those found
+ * @param seconds    null, or room for 2 processor times: ostia and vesselness, mask
+ * @throws std::runtime_error  no ostium was found
+ */
+PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, double moment,
+  bool trueOstia, double* seconds = nullptr);
+
+/// @param seconds  null, or room for 2 processor times: extraction, topology and names
+CenterlineTopology TreeOf(const PhantomScan& image, double* seconds = nullptr);
+}
+
+#endif

@@ -1,0 +1,355 @@
+// Centerlines tracked through series of images of phantoms, against their exact motion: the tree is
+// found in the image of the reference phase, tracked at some phases, and compared at all of them.
+// Tables in Markdown on stdout; the exit code is 1 when a limit is missed.
+
+#include "CenterlineTracking.h"
+#include "CoronaryPhantom.h"
+#include "PhantomCases.h"
+#include "PhantomScan.h"
+
+#include <CLI/CLI.hpp>
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <string>
+#include <vector>
+
+namespace
+{
+using namespace coronary;
+
+constexpr double ReferencePhase = 0.75;
+constexpr double LeastRadius = 0.75; // mm
+constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+
+struct Case
+{
+  std::uint64_t seed = 1;
+  double window = 0.066; ///< s
+  double noise = 25.0;   ///< HU
+  double spacing = 0.4;  ///< mm
+  double margin = 8.0;   ///< mm, of the image around the tree's whole way
+  bool trueTree = false;
+  bool lost = false; ///< a systolic phase, and 40 % of the nodes in two others
+  bool allPhases = false;
+  std::string cache; ///< folder for images, or empty
+};
+
+struct Errors
+{
+  std::vector<double> values;
+  void Add(double value) { this->values.push_back(value); }
+  double Mean() const
+  {
+    return this->values.empty() ? NaN
+                                : std::accumulate(this->values.begin(), this->values.end(), 0.0) /
+        static_cast<double>(this->values.size());
+  }
+  double Percentile(double share)
+  {
+    if (this->values.empty())
+    {
+      return NaN;
+    }
+    const auto rank =
+      static_cast<std::ptrdiff_t>(share * static_cast<double>(this->values.size() - 1));
+    std::nth_element(this->values.begin(), this->values.begin() + rank, this->values.end());
+    return this->values[rank];
+  }
+};
+
+struct Outcome
+{
+  std::string failure;
+  Errors between;  ///< distance to the true axis, phases not tracked, mm
+  Errors tracked;  ///< the same at the phases tracked
+  Errors material; ///< distance to where the same material is, phases not tracked
+  Errors materialTracked;
+  std::map<std::string, Errors> bySegment;
+  std::vector<double> byPhase; ///< mean, all phases
+  std::vector<double> trackedShare;
+  int called = 0;     ///< nodes called tracked
+  int calledNear = 0; ///< of them within 1 mm
+  double seconds = NaN;
+  double repeatability = NaN;
+  int imagesRead = 0;
+};
+
+std::vector<std::int16_t> ImageAt(
+  const CoronaryPhantom& phantom, const ImageGrid& grid, double t, const Case& test)
+{
+  const auto size = static_cast<std::size_t>(grid.extent[1] - grid.extent[0] + 1) *
+    (grid.extent[3] - grid.extent[2] + 1) * (grid.extent[5] - grid.extent[4] + 1);
+  std::vector<std::int16_t> values(size);
+  std::array<char, 160> name;
+  std::snprintf(name.data(), name.size(), "/%llu-%.0f-%.0f-%.3f-%.1f-%d-%.5f.raw",
+    static_cast<unsigned long long>(test.seed), 1e3 * test.window, test.noise, test.spacing,
+    test.margin, test.lost ? 1 : 0, t);
+  const std::string path = test.cache + name.data();
+  if (!test.cache.empty() && std::filesystem::exists(path))
+  {
+    std::ifstream(path, std::ios::binary)
+      .read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(2 * size));
+    return values;
+  }
+  phantom.Render(grid, grid.extent, t, values.data());
+  if (!test.cache.empty())
+  {
+    std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(2 * size));
+  }
+  return values;
+}
+
+double DistanceToAxis(const PhantomTree& tree, const Vector3& point)
+{
+  double least = std::numeric_limits<double>::infinity();
+  for (const PhantomBranch& branch : tree.branches)
+  {
+    for (std::size_t n = 0; n + 1 < branch.points.size(); ++n)
+    {
+      const Vector3& a = tree.points[branch.points[n]];
+      const Vector3 way = tree.points[branch.points[n + 1]] - a;
+      const double at =
+        std::clamp((point - a).dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
+      least = std::min(least, (a + at * way - point).squaredNorm());
+    }
+  }
+  return std::sqrt(least);
+}
+
+Outcome Run(const Case& test)
+{
+  Outcome outcome;
+  PhantomSettings settings;
+  settings.seed = test.seed;
+  settings.temporalWindow = test.window;
+  settings.noise = test.noise;
+  const std::vector<double> all = PaperPhases();
+  std::vector<double> times;
+  for (std::size_t k = 0; k < all.size(); k += test.allPhases ? 1 : 2)
+  {
+    times.push_back(all[k]);
+  }
+  if (test.lost)
+  {
+    settings.lostPhases = { { all[6], 1.0 }, { all[4], 0.4 }, { all[8], 0.4 } };
+  }
+  const CoronaryPhantom phantom(settings);
+  const ImageGrid grid = phantom.DefaultGrid(test.spacing, test.margin);
+  MovingLines lines;
+  std::vector<std::string> name;
+  if (test.trueTree)
+  {
+    const PhantomTree truth = phantom.Tree(ReferencePhase);
+    lines.rest = truth.points;
+    lines.radius = truth.radius;
+    for (const PhantomBranch& branch : truth.branches)
+    {
+      lines.lines.push_back(branch.points);
+    }
+    for (const int id : truth.segmentId)
+    {
+      name.push_back(SegmentName(id));
+    }
+  }
+  else
+  {
+    const CenterlineTopology tree = TreeOf(ScanPhantom(phantom, grid, ReferencePhase, false));
+    lines.rest = tree.points;
+    lines.radius = tree.radius;
+    for (const CenterlineTree::Branch& branch : tree.branches)
+    {
+      lines.lines.push_back(branch.points);
+    }
+    for (const int id : tree.segmentId)
+    {
+      name.push_back(SegmentName(id));
+    }
+  }
+
+  CenterlineTrackingSettings tracking;
+  tracking.temporalWindow = settings.temporalWindow;
+  tracking.cycleLength = settings.cycleLength;
+  CenterlineTrackingReport report;
+  std::vector<std::int16_t> voxels;
+  double inImages = 0.0;
+  const auto now = []() { return std::chrono::steady_clock::now(); };
+  const auto since = [&](auto start)
+  { return std::chrono::duration<double>(now() - start).count(); };
+  const auto start = now();
+  const PoseSequence poses = TrackCenterlines(
+    lines, ReferencePhase, times,
+    [&](double time)
+    {
+      const auto before = now();
+      voxels = ImageAt(phantom, grid, time, test);
+      inImages += since(before);
+      ScalarImage image;
+      image.grid = grid;
+      image.values = static_cast<const std::int16_t*>(voxels.data());
+      return image;
+    },
+    tracking, &report);
+  outcome.seconds = since(start) - inImages;
+  outcome.repeatability = report.repeatability;
+  outcome.imagesRead = report.imagesRead;
+  outcome.trackedShare = report.trackedShare;
+
+  std::vector<Vector3> material(lines.rest.size());
+  for (std::size_t p = 0; p < material.size(); ++p)
+  {
+    material[p] = phantom.ReferencePosition(lines.rest[p], ReferencePhase);
+  }
+  for (std::size_t k = 0; k < all.size(); ++k)
+  {
+    const PhantomTree truth = phantom.Tree(all[k]);
+    const auto own = std::find(times.begin(), times.end(), all[k]);
+    const bool isTracked = own != times.end();
+    std::vector<Vector3> points;
+    if (isTracked)
+    {
+      points = poses.points[own - times.begin()];
+    }
+    else
+    {
+      const auto after = std::upper_bound(times.begin(), times.end(), all[k]);
+      const std::size_t b = after == times.end() ? 1 : after - times.begin();
+      const std::size_t a = after == times.end() ? times.size() - 1 : b - 1;
+      const double share = after == times.end() ? (all[k] - times[a]) / (1.0 + times[b] - times[a])
+                                                : (all[k] - times[a]) / (times[b] - times[a]);
+      for (std::size_t p = 0; p < material.size(); ++p)
+      {
+        points.push_back((1.0 - share) * poses.points[a][p] + share * poses.points[b][p]);
+      }
+    }
+    Errors here;
+    for (std::size_t p = 0; p < points.size(); ++p)
+    {
+      if (lines.radius[p] < LeastRadius)
+      {
+        continue;
+      }
+      const double distance = DistanceToAxis(truth, points[p]);
+      const double carried = (points[p] - phantom.Position(material[p], all[k])).norm();
+      here.Add(distance);
+      outcome.bySegment[name[p]].Add(carried);
+      (isTracked ? outcome.tracked : outcome.between).Add(distance);
+      if (isTracked)
+      {
+        outcome.materialTracked.Add(carried);
+        const std::size_t phase = own - times.begin();
+        if (poses.status[phase][p] == TrackingStatus::Tracked)
+        {
+          ++outcome.called;
+          outcome.calledNear += carried <= 1.0 ? 1 : 0;
+        }
+      }
+      else
+      {
+        outcome.material.Add(carried);
+      }
+    }
+    outcome.byPhase.push_back(here.Mean());
+  }
+  return outcome;
+}
+}
+
+int main(int argc, char** argv)
+{
+  try
+  {
+    CLI::App program(
+      "Centerlines tracked through series of images of phantoms, against their truth");
+    std::string seedText = "101..110";
+    double window = 66.0;
+    bool quick = false;
+    bool details = false;
+    Case test;
+    program.add_option("--seeds", seedText, "phantoms: one seed, or first..last")
+      ->capture_default_str();
+    program.add_option("--spacing", test.spacing, "voxel size, mm")
+      ->check(CLI::Range(0.2, 2.0))
+      ->capture_default_str();
+    program.add_option("--window", window, "temporal window, ms")
+      ->check(CLI::Range(0.0, 400.0))
+      ->capture_default_str();
+    program.add_option("--noise", test.noise, "standard deviation, HU")
+      ->check(CLI::Range(0.0, 200.0))
+      ->capture_default_str();
+    program.add_flag("--lost", test.lost,
+      "one systolic phase is lost wholly, and 40 % of the nodes in two others");
+    program.add_flag("--all-phases", test.allPhases, "track all phases, not every other one");
+    program.add_flag("--true-tree", test.trueTree, "the true tree, not the one found");
+    program
+      .add_option("--cache", test.cache, "existing folder that keeps the images for other runs")
+      ->check(CLI::ExistingDirectory);
+    program.add_flag("--details", details, "also tables by segment and by phase");
+    program.add_flag("--quick", quick, "one phantom in coarse voxels, with limits of its own");
+    std::vector<std::uint64_t> seeds;
+    try
+    {
+      program.parse(argc, argv);
+      seeds = ParseSeeds(quick ? "1" : seedText, LoneNumber::Seed);
+    }
+    catch (const CLI::ParseError& error)
+    {
+      return program.exit(error);
+    }
+    test.spacing = quick ? 0.8 : test.spacing;
+    test.window = 1e-3 * window;
+    std::printf(
+      "| seed | mean between, mm | 95 %% | material, mm | mean tracked, mm | 95 %% | called "
+      "tracked | of them near | repeat, mm | images | s |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+    for (const std::uint64_t seed : seeds)
+    {
+      test.seed = seed;
+      Outcome o = Run(test);
+      const double all = static_cast<double>(o.tracked.values.size());
+      std::printf("| %llu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | %d | %.1f |\n",
+        static_cast<unsigned long long>(seed), o.between.Mean(), o.between.Percentile(0.95),
+        o.material.Mean(), o.tracked.Mean(), o.tracked.Percentile(0.95), o.materialTracked.Mean(), o.materialTracked.Percentile(0.95), o.called / all,
+        static_cast<double>(o.calledNear) / std::max(o.called, 1), o.repeatability, o.imagesRead,
+        o.seconds);
+      if (details)
+      {
+        std::printf("by phase:");
+        for (const double value : o.byPhase)
+        {
+          std::printf(" %.2f", value);
+        }
+        std::printf("\ntracked share:");
+        for (const double value : o.trackedShare)
+        {
+          std::printf(" %.2f", value);
+        }
+        std::printf("\nmaterial by segment:");
+        for (auto& [segment, errors] : o.bySegment)
+        {
+          std::printf(" %s %.2f/%.2f", segment.c_str(), errors.Mean(), errors.Percentile(0.95));
+        }
+        std::printf("\n");
+      }
+      std::fflush(stdout);
+    }
+    return 0;
+  }
+  catch (const std::exception& error)
+  {
+    std::fprintf(stderr, "validate-motion: %s\n", error.what());
+    return 2;
+  }
+}
