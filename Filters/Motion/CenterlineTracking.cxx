@@ -20,6 +20,11 @@ namespace
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 /// Nearer in time than this, modulo the cycle, two phases show the same moment.
 constexpr double SameMoment = 0.02;
+/// Correlation of a vessel with what was expected, above which it counts as seen.
+constexpr double TrackedLikeness = 0.65;
+constexpr double TrackedConfidence = 0.5;
+constexpr double WeakConfidence = 0.2;
+constexpr double LostDeviation = 2.0; ///< mm
 /// Beyond the patch, the search and the smearing: what the places may still move, mm.
 constexpr double Spare = 3.0;
 
@@ -112,7 +117,8 @@ void SumsOfSquares(const std::vector<float>& block, int blockSide, const Patch& 
 
 /// What the sums of squares say, in natural logarithms: 0 for the best candidate, limited, since a
 /// patch may show something that the reference does not.
-void ToLikelihoods(std::vector<std::vector<float>>& costs, double independent, double limit)
+void ToLikelihoods(
+  std::vector<std::vector<float>>& costs, double independent, double limit, double floor)
 {
   std::vector<float> least;
   least.reserve(costs.size());
@@ -123,7 +129,7 @@ void ToLikelihoods(std::vector<std::vector<float>>& costs, double independent, d
   std::vector<float> sorted = least;
   std::nth_element(
     sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const float typical = std::max(sorted[sorted.size() / 2], 1.0F);
+  const float typical = std::max(sorted[sorted.size() / 2], static_cast<float>(floor));
   for (std::size_t n = 0; n < costs.size(); ++n)
   {
     const float scale = static_cast<float>(0.5 * independent) / std::max(least[n], typical);
@@ -202,6 +208,7 @@ private:
   };
 
   ScalarImage Read(double time);
+  void MeasureContrast();
   void SearchCoarsely();
   /// Looks for the surroundings of the nodes without the vessels, which may be invisible, or with
   /// them.
@@ -211,9 +218,20 @@ private:
   std::vector<std::vector<float>> WithoutVessels(const Patch& patch, double margin) const;
   void Align(double robustScale);
   void Finish(PoseSequence& sequence);
+  /// Per phase: factor of the radius, of all vessels together.
+  std::vector<double> MeasureCalibre() const;
+  /// Mean distance, across the vessels, of what was seen in phases that show the same moment.
+  void MeasureRepeatability();
   /// Fits the trajectories to what was measured; what does not agree counts less.
   void Fit(const std::vector<const Seen*>& seen);
+  std::vector<const Seen*> WithSurroundings(const Seen& seen) const
+  {
+    return this->Settings.tissue ? std::vector<const Seen*>{ &seen, &this->Surroundings }
+                                 : std::vector<const Seen*>{ &seen };
+  }
   double Keep() const { return this->Settings.fineRadius + this->Settings.fineRange + Spare; }
+  /// Squared difference that is not worth mentioning: of 4 % of a vessel's contrast.
+  double NoiseFloor() const { return 0.0016 * this->Contrast * this->Contrast; }
   double WindowOfCycle() const
   {
     return this->Settings.temporalWindow / this->Settings.cycleLength;
@@ -239,13 +257,14 @@ private:
   Vector3 Low;
   Vector3 High;
   Window Limits;
+  double Contrast = 1.0; ///< of the vessels in the reference
   SparseVolume Reference;
   std::vector<SparseVolume> Volumes; ///< per phase
   PerPhase Displacement;             ///< per phase and node: the present trajectories
   Trajectories Motion;
-  Seen Surroundings;                         ///< where the tissue around the nodes was found
+  Seen Surroundings; ///< where the tissue around the nodes was found; empty: not looked for
+  Seen Vessels;      ///< by the last alignment
   std::vector<std::vector<double>> Likeness; ///< per phase and node: correlation of the core
-  std::vector<std::vector<double>> Offset;   ///< mm between what was seen and the trajectories
 };
 
 ScalarImage Tracker::Read(double time)
@@ -308,6 +327,42 @@ std::vector<Vector3> Tracker::Smear(int node, double time) const
   return result;
 }
 
+void Tracker::MeasureContrast()
+{
+  std::vector<float> contrasts;
+  for (const Vector3& centre : this->Nodes.position)
+  {
+    std::vector<float> values;
+    for (const std::array<int, 3>& place : this->Core.places)
+    {
+      const float value =
+        this->Reference.Sample(centre + this->Core.step * Vector3(place[0], place[1], place[2]));
+      if (!std::isnan(value))
+      {
+        values.push_back(value);
+      }
+    }
+    if (2 * values.size() > this->Core.places.size())
+    {
+      std::sort(values.begin(), values.end());
+      contrasts.push_back(values[values.size() * 19 / 20] - values[values.size() / 20]);
+    }
+  }
+  if (2 * contrasts.size() < this->Nodes.size())
+  {
+    throw std::invalid_argument(
+      "Most of the lines are outside of the image at the reference time " +
+      std::to_string(this->ReferenceTime));
+  }
+  std::sort(contrasts.begin(), contrasts.end());
+  this->Contrast = contrasts[contrasts.size() / 2];
+  if (!(this->Contrast > 0.0))
+  {
+    throw std::invalid_argument("The image at the reference time " +
+      std::to_string(this->ReferenceTime) + " is the same everywhere along the lines");
+  }
+}
+
 void Tracker::SearchCoarsely()
 {
   const std::size_t phases = this->Times.size();
@@ -338,8 +393,10 @@ void Tracker::SearchCoarsely()
     this->Reference = SparseVolume(
       image, this->Nodes.position, this->Settings.fineRadius + this->Settings.fineRange + Spare);
   }
-  const std::vector<std::vector<float>> weights =
-    this->WithoutVessels(this->Coarse, 0.5 * this->Settings.coarseSpacing);
+  this->MeasureContrast();
+  const std::vector<std::vector<float>> weights = this->Settings.tissue
+    ? this->WithoutVessels(this->Coarse, 0.5 * this->Settings.coarseSpacing)
+    : std::vector<std::vector<float>>(nodes, this->Coarse.weights);
   std::vector<std::vector<float>> wanted(nodes);
   std::vector<float> all;
   for (std::int64_t n = 0; n < nodes; ++n)
@@ -354,7 +411,8 @@ void Tracker::SearchCoarsely()
   // Air and bone would outvote the rest.
   std::sort(all.begin(), all.end());
   const float median = all[all.size() / 2];
-  const float spread = std::max(all[all.size() * 9 / 10] - all[all.size() / 10], 1.0F);
+  const float spread =
+    std::max(all[all.size() * 9 / 10] - all[all.size() / 10], static_cast<float>(this->Contrast));
   this->Limits = { median - spread, median + spread };
   for (std::vector<float>& one : wanted)
   {
@@ -413,7 +471,7 @@ void Tracker::SearchCoarsely()
             block, blockSide, this->Coarse, weights[n], wanted[n], lattice.reach, costs[n]);
         }
       });
-    ToLikelihoods(costs, 30.0, 20.0);
+    ToLikelihoods(costs, 30.0, 20.0, 0.1 * this->NoiseFloor());
     const std::vector<Vector3> best = BestDisplacements(this->Nodes, lattice, costs, 0.5);
     for (std::int64_t n = 0; n < nodes; ++n)
     {
@@ -611,7 +669,7 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
     {
       least[n] = *std::min_element(costs[n].begin(), costs[n].end());
     }
-    ToLikelihoods(costs, 30.0, 15.0);
+    ToLikelihoods(costs, 30.0, 15.0, 0.1 * this->NoiseFloor());
     seen.displacement[k] = BestDisplacements(this->Nodes, lattice, costs, 0.25);
     for (std::int64_t n = 0; n < nodes; ++n)
     {
@@ -641,7 +699,7 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
       else
       {
         seen.information[k][n] =
-          Limited(curvature[n] * (30.0 / std::max<double>(least[n], 400.0)), 0.5);
+          Limited(curvature[n] * (30.0 / std::max<double>(least[n], this->NoiseFloor())), 0.5);
       }
       seen.displacement[k][n] += this->Displacement[k][n];
     }
@@ -660,7 +718,6 @@ void Tracker::Align(double robustScale)
   std::vector<std::vector<Matrix3>> information(
     phases, std::vector<Matrix3>(nodes, Matrix3::Zero()));
   this->Likeness.assign(phases, std::vector<double>(nodes, 0.0));
-  this->Offset.assign(phases, std::vector<double>(nodes, 0.0));
   const std::size_t samples = this->Core.places.size();
   for (std::size_t k = 0; k < phases; ++k)
   {
@@ -777,35 +834,208 @@ void Tracker::Align(double robustScale)
             }
           }
           this->Likeness[k][n] = likeness;
-          this->Offset[k][n] = shift.norm();
           measured[k][n] = this->Displacement[k][n] + shift;
           // Of the samples about one in eight says something of its own; patches of neighbours overlap.
           const double trust = std::clamp((likeness - 0.4) / 0.4, 0.0, 1.0);
           if (trust > 0.0 && curvature.trace() > 0.0)
           {
-            information[k][n] =
-              trust * trust * Limited(curvature * (60.0 / std::max(noise, 400.0)), 0.15);
+            information[k][n] = trust * trust *
+              Limited(curvature * (60.0 / std::max(noise, this->NoiseFloor())), 0.15);
           }
         }
       });
   }
-  const Seen seen{ std::move(measured), std::move(information), robustScale };
-  this->Fit({ &seen, &this->Surroundings });
+  Seen seen{ std::move(measured), std::move(information), robustScale };
+  this->Fit(this->WithSurroundings(seen));
+  this->Vessels = std::move(seen);
+}
+
+std::vector<double> Tracker::MeasureCalibre() const
+{
+  const std::size_t phases = this->Times.size();
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  const std::size_t samples = this->Core.places.size();
+  std::vector<double> widening(phases, 0.0);
+  std::vector<double> trust(phases, 0.0);
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    // Least squares for the widening w in seen = constant + expected + w d(expected)/d(log radius).
+    std::vector<double> pull(nodes, 0.0);
+    std::vector<double> weight(nodes, 0.0);
+    ParallelFor(nodes, 4,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        std::vector<Vector3> rows(samples); // seen - expected, change, weight
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          if (this->Likeness[k][n] < 0.7)
+          {
+            continue;
+          }
+          const Matrix3 back = this->Turn(static_cast<int>(n), this->Displacement[k]).transpose();
+          const std::vector<Vector3> smear = this->Smear(static_cast<int>(n), this->Times[k]);
+          const Vector3& tangent = this->Nodes.tangent[n];
+          const auto expected = [&](const Vector3& offset, double wider)
+          {
+            float sum = 0.0F;
+            for (const Vector3& moved : smear)
+            {
+              const Vector3 rest = back * (offset - moved);
+              const Vector3 along = rest.dot(tangent) * tangent;
+              sum += this->Reference.Sample(
+                this->Nodes.position[n] + along + (rest - along) / (1.0 + wider));
+            }
+            return sum / static_cast<float>(smear.size());
+          };
+          const Vector3 centre = this->Nodes.position[n] + this->Displacement[k][n];
+          const double wall = (this->Nodes.radius.empty() ? 1.5 : this->Nodes.radius[n]) + 0.8;
+          Vector3 mean = Vector3::Zero();
+          double sum = 0.0;
+          for (std::size_t p = 0; p < samples; ++p)
+          {
+            const std::array<int, 3>& place = this->Core.places[p];
+            const Vector3 offset = this->Core.step * Vector3(place[0], place[1], place[2]);
+            const Vector3 rest = back * offset;
+            const double beside = (rest - rest.dot(tangent) * tangent).norm();
+            rows[p].setZero();
+            if (beside > wall && smear.size() == 1)
+            {
+              continue;
+            }
+            const double seen = this->Volumes[k].Sample(centre + offset);
+            const double wanted = expected(offset, 0.0);
+            const double change = (expected(offset, 0.05) - expected(offset, -0.05)) / 0.1;
+            if (std::isfinite(seen + wanted + change))
+            {
+              rows[p] = { seen - wanted, change, this->Core.weights[p] };
+              mean += rows[p][2] * rows[p];
+              sum += rows[p][2];
+            }
+          }
+          if (sum < 0.1)
+          {
+            continue;
+          }
+          mean /= sum;
+          for (const Vector3& row : rows)
+          {
+            pull[n] += row[2] * (row[0] - mean[0]) * (row[1] - mean[1]);
+            weight[n] += row[2] * (row[1] - mean[1]) * (row[1] - mean[1]);
+          }
+          // Where a vessel is smeared over several of its diameters little is left to be measured.
+          const double smeared = (smear.back() - smear.front()).norm() / (2.0 * wall);
+          const double clear = 1.0 / ((1.0 + smeared * smeared) * (1.0 + smeared * smeared));
+          pull[n] *= clear;
+          weight[n] *= clear;
+        }
+      });
+    // A node alone is too noisy: the weighted median of all.
+    std::vector<std::pair<double, double>> ratios;
+    double total = 0.0;
+    for (std::int64_t n = 0; n < nodes; ++n)
+    {
+      if (weight[n] > 0.0)
+      {
+        ratios.emplace_back(pull[n] / weight[n], weight[n]);
+        total += weight[n];
+      }
+    }
+    std::sort(ratios.begin(), ratios.end());
+    double sum = 0.0;
+    for (const auto& [ratio, own] : ratios)
+    {
+      sum += own;
+      if (sum >= 0.5 * total)
+      {
+        widening[k] = std::clamp(ratio, -0.2, 0.2);
+        trust[k] = total;
+        break;
+      }
+    }
+  }
+  // A pulse: two harmonics of the cycle, nothing at the reference.
+  constexpr int harmonics = 2;
+  constexpr int size = 2 * harmonics;
+  const Eigen::VectorXd zero = PeriodicBasis(this->ReferenceTime, harmonics).tail(size);
+  const double most = *std::max_element(trust.begin(), trust.end());
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(size, size) * 0.1;
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
+  for (std::size_t k = 0; k < phases && most > 0.0; ++k)
+  {
+    const Eigen::VectorXd row = PeriodicBasis(this->Times[k], harmonics).tail(size) - zero;
+    matrix += trust[k] / most * row * row.transpose();
+    right += trust[k] / most * widening[k] * row;
+  }
+  const Eigen::VectorXd pulse = matrix.ldlt().solve(right);
+  std::vector<double> calibre;
+  for (const double time : this->Times)
+  {
+    calibre.push_back(1.0 + pulse.dot(PeriodicBasis(time, harmonics).tail(size) - zero));
+  }
+  return calibre;
+}
+
+void Tracker::MeasureRepeatability()
+{
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t a = 0; a < this->Times.size(); ++a)
+  {
+    for (std::size_t b = a + 1; b < this->Times.size(); ++b)
+    {
+      if (CyclicDistance(this->Times[a], this->Times[b]) > SameMoment)
+      {
+        continue;
+      }
+      ++this->Result.repeatedPhases;
+      for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+      {
+        if (std::min(this->Likeness[a][n], this->Likeness[b][n]) < TrackedLikeness)
+        {
+          continue;
+        }
+        // What moves between the two moments is known better from all phases.
+        const auto node = static_cast<int>(n);
+        const Vector3 apart =
+          (this->Vessels.displacement[a][n] - this->Motion.Displacement(node, this->Times[a])) -
+          (this->Vessels.displacement[b][n] - this->Motion.Displacement(node, this->Times[b]));
+        const Vector3& tangent = this->Nodes.tangent[n];
+        sum += (apart - apart.dot(tangent) * tangent).norm();
+        count += 1.0;
+      }
+    }
+  }
+  this->Result.repeatability = count > 0.0 ? sum / count : NaN;
 }
 
 void Tracker::Finish(PoseSequence& sequence)
 {
+  const std::vector<double> calibre = this->MeasureCalibre();
+  this->MeasureRepeatability();
   const std::size_t phases = this->Times.size();
   const std::size_t nodes = this->Nodes.size();
   sequence.times = this->Times;
+  double best = 0.0;
   for (std::size_t k = 0; k < phases; ++k)
   {
     std::vector<double> confidence(nodes);
+    std::vector<double> deviation(nodes);
+    double tracked = 0.0;
     for (std::size_t n = 0; n < nodes; ++n)
     {
-      const double certain = this->Motion.Deviation(static_cast<int>(n), this->Times[k]);
-      confidence[n] = std::clamp((this->Likeness[k][n] - 0.3) / 0.6, 0.0, 1.0) *
-        std::exp(-certain * certain / 0.5);
+      deviation[n] = this->Motion.Deviation(static_cast<int>(n), this->Times[k]);
+      const double sure = deviation[n] / this->Settings.trackedDeviation;
+      confidence[n] =
+        std::clamp((this->Likeness[k][n] - 0.3) / (2.0 * (TrackedLikeness - 0.3)), 0.0, 1.0) /
+        std::max(1.0, sure * sure);
+      tracked += confidence[n] >= TrackedConfidence ? 1.0 : 0.0;
+    }
+    this->Result.trackedShare.push_back(tracked / static_cast<double>(nodes));
+    best = std::max(best, this->Result.trackedShare.back());
+    if (this->Result.trackedShare.back() < 0.05)
+    {
+      this->Result.warnings.push_back("The phase at " + std::to_string(this->Times[k]) +
+        " was lost: its pose is filled from its neighbours");
     }
     std::vector<Vector3> moved = this->Nodes.AtPoints(this->Displacement[k]);
     for (std::size_t p = 0; p < moved.size(); ++p)
@@ -814,19 +1044,23 @@ void Tracker::Finish(PoseSequence& sequence)
     }
     sequence.points.push_back(std::move(moved));
     sequence.confidence.push_back(this->Nodes.AtPoints(confidence));
-    std::vector<TrackingStatus> status;
-    double tracked = 0.0;
-    for (const double value : sequence.confidence.back())
+    const std::vector<double> spread = this->Nodes.AtPoints(deviation);
+    std::vector<TrackingStatus> status(spread.size());
+    for (std::size_t p = 0; p < spread.size(); ++p)
     {
-      status.push_back(value > 0.5 ? TrackingStatus::Tracked
-          : value > 0.25           ? TrackingStatus::Weak
-                                   : TrackingStatus::Filled);
-      tracked += value > 0.5 ? 1.0 : 0.0;
+      const double sure = sequence.confidence.back()[p];
+      status[p] = sure >= TrackedConfidence ? TrackingStatus::Tracked
+        : sure >= WeakConfidence            ? TrackingStatus::Weak
+        : spread[p] > LostDeviation         ? TrackingStatus::Lost
+                                            : TrackingStatus::Filled;
     }
-    this->Result.trackedShare.push_back(tracked / static_cast<double>(status.size()));
     sequence.status.push_back(std::move(status));
+    sequence.calibre.emplace_back(this->Lines.rest.size(), calibre[k]);
   }
-  this->Result.repeatability = NaN;
+  if (best < 0.05)
+  {
+    throw std::runtime_error("The lines were found in none of the phases");
+  }
   for (const SparseVolume& volume : this->Volumes)
   {
     this->Result.keptBytes += volume.Bytes();
@@ -836,11 +1070,14 @@ void Tracker::Finish(PoseSequence& sequence)
 PoseSequence Tracker::Run()
 {
   this->SearchCoarsely();
-  this->Surroundings = this->SearchFinely(false, 0.6);
-  this->Fit({ &this->Surroundings });
+  if (this->Settings.tissue)
+  {
+    this->Surroundings = this->SearchFinely(false, 0.6);
+    this->Fit({ &this->Surroundings });
+  }
   {
     const Seen vessels = this->SearchFinely(true, 0.7);
-    this->Fit({ &vessels, &this->Surroundings });
+    this->Fit(this->WithSurroundings(vessels));
   }
   for (int round = 0; round < 4; ++round)
   {
@@ -883,6 +1120,18 @@ PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
   if (times.empty())
   {
     throw std::invalid_argument("There is no phase to track");
+  }
+  if (!std::isfinite(referenceTime))
+  {
+    throw std::invalid_argument("The reference time is not finite");
+  }
+  for (std::size_t k = 0; k < times.size(); ++k)
+  {
+    if (!std::isfinite(times[k]) || (k > 0 && times[k] <= times[k - 1]))
+    {
+      throw std::invalid_argument(
+        "The times of the phases do not increase: number " + std::to_string(k));
+    }
   }
   Tracker tracker(lines, referenceTime, times, imageAt, settings, result, progress);
   return tracker.Run();

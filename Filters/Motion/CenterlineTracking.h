@@ -26,6 +26,9 @@ struct CenterlineTrackingSettings
   double temporalWindow = 0.066;
   double cycleLength = 0.8; ///< R-R interval, s, 0.2 to 5
 
+  /// Images show the tissue around the vessels too, which moves with them; false: vessels alone (masks).
+  bool tissue = true;
+
   double nodeSpacing = 2.0;   ///< mm along the vessels, 0.5 to 10
   double coarseSpacing = 2.0; ///< mm, of the averaged images of the first search, 1 to 4
   double coarseRadius = 10.0; ///< mm, of the surroundings that are compared in it
@@ -33,7 +36,7 @@ struct CenterlineTrackingSettings
   double fineRadius = 5.0;    ///< mm, of the surroundings in the second search
   double fineRange = 5.0;     ///< mm
 
-  double trackedDeviation = 0.5; ///< mm: nodes less certain than that are not called tracked
+  double trackedDeviation = 0.6; ///< mm: nodes less certain than that have less confidence
   TrajectoryPrior prior;
 
   /// @throws std::invalid_argument naming the setting.
@@ -60,7 +63,7 @@ struct CenterlineTrackingReport
  * @param imageAt        gives the image of a time; one that was given before need not stay
  * @return positions at `times`, with confidence, status and calibre
  * @throws std::invalid_argument naming a setting or what is wrong with the lines, times or images;
- * Cancelled; what imageAt throws
+ * std::runtime_error: the lines were found in none of the phases; Cancelled; what imageAt throws
  */
 PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
   const std::vector<double>& times, const std::function<ScalarImage(double time)>& imageAt,

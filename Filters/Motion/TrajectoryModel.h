@@ -21,7 +21,7 @@ struct TrajectoryPrior
   int harmonics = 6;       ///< of the cycle, 1 to 12
   double amplitude = 15.0; ///< standard deviation of the first harmonic, mm; the m-th: / m^decay
   double decay = 2.0;      ///< 0 to 4
-  double neighbourChange = 0.2; ///< of the first harmonic from node to node, mm per square root of
+  double neighbourChange = 0.1; ///< of the first harmonic from node to node, mm per square root of
                                 ///< mm along the vessel; the m-th: / m^neighbourDecay
   double neighbourDecay = 1.0;  ///< 0 to 4
 

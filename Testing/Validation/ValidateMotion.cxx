@@ -79,8 +79,10 @@ struct Outcome
   std::map<std::string, Errors> bySegment;
   std::vector<double> byPhase; ///< mean, all phases
   std::vector<double> trackedShare;
-  int called = 0;     ///< nodes called tracked
-  int calledNear = 0; ///< of them within 1 mm
+  std::vector<std::array<double, 2>> calibre;        ///< per tracked phase: found, true, means
+  std::array<std::array<int, 2>, 10> byConfidence{}; ///< nodes, of them within 1 mm
+  int called = 0;                                    ///< nodes called tracked
+  int calledNear = 0;                                ///< of them within 1 mm
   double seconds = NaN;
   double repeatability = NaN;
   int imagesRead = 0;
@@ -212,6 +214,7 @@ Outcome Run(const Case& test)
   {
     material[p] = phantom.ReferencePosition(lines.rest[p], ReferencePhase);
   }
+  const PhantomTree reference = phantom.Tree(ReferencePhase);
   for (std::size_t k = 0; k < all.size(); ++k)
   {
     const PhantomTree truth = phantom.Tree(all[k]);
@@ -250,6 +253,10 @@ Outcome Run(const Case& test)
       {
         outcome.materialTracked.Add(carried);
         const std::size_t phase = own - times.begin();
+        auto& bin = outcome.byConfidence[std::min<std::size_t>(
+          static_cast<std::size_t>(10.0 * poses.confidence[phase][p]), 9)];
+        ++bin[0];
+        bin[1] += carried <= 1.0 ? 1 : 0;
         if (poses.status[phase][p] == TrackingStatus::Tracked)
         {
           ++outcome.called;
@@ -262,6 +269,18 @@ Outcome Run(const Case& test)
       }
     }
     outcome.byPhase.push_back(here.Mean());
+    if (isTracked)
+    {
+      const std::vector<double>& found = poses.calibre[own - times.begin()];
+      double ratio = 0.0;
+      for (std::size_t n = 0; n < truth.radius.size(); ++n)
+      {
+        ratio += truth.radius[n] / reference.radius[n] / static_cast<double>(truth.radius.size());
+      }
+      outcome.calibre.push_back(
+        { std::accumulate(found.begin(), found.end(), 0.0) / static_cast<double>(found.size()),
+          ratio });
+    }
   }
   return outcome;
 }
@@ -319,9 +338,11 @@ int main(int argc, char** argv)
       test.seed = seed;
       Outcome o = Run(test);
       const double all = static_cast<double>(o.tracked.values.size());
-      std::printf("| %llu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | %d | %.1f |\n",
+      std::printf("| %llu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | "
+                  "%d | %.1f |\n",
         static_cast<unsigned long long>(seed), o.between.Mean(), o.between.Percentile(0.95),
-        o.material.Mean(), o.tracked.Mean(), o.tracked.Percentile(0.95), o.materialTracked.Mean(), o.materialTracked.Percentile(0.95), o.called / all,
+        o.material.Mean(), o.tracked.Mean(), o.tracked.Percentile(0.95), o.materialTracked.Mean(),
+        o.materialTracked.Percentile(0.95), o.called / all,
         static_cast<double>(o.calledNear) / std::max(o.called, 1), o.repeatability, o.imagesRead,
         o.seconds);
       if (details)
@@ -335,6 +356,16 @@ int main(int argc, char** argv)
         for (const double value : o.trackedShare)
         {
           std::printf(" %.2f", value);
+        }
+        std::printf("\ncalibre:");
+        for (const std::array<double, 2>& value : o.calibre)
+        {
+          std::printf(" %.3f/%.3f", value[0], value[1]);
+        }
+        std::printf("\nwithin 1 mm, by confidence:");
+        for (const std::array<int, 2>& bin : o.byConfidence)
+        {
+          std::printf(" %.3f of %d,", bin[1] / std::max(1.0, 1.0 * bin[0]), bin[0]);
         }
         std::printf("\nmaterial by segment:");
         for (auto& [segment, errors] : o.bySegment)

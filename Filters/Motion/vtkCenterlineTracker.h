@@ -1,0 +1,228 @@
+/**
+ * @class   vtkCenterlineTracker
+ * @brief   Carries a tree of centerlines through all phases of a gated series.
+ *
+ * The tree was found once, at the reference phase. Its motion is found in the images of the other phases:
+ * surroundings of every place along the vessels are looked for, first coarsely and far, then finely, then
+ * the vessel itself, compared with the reference smeared along its motion; and one robust fit over all
+ * places and phases, periodic in time, decides. What is not visible is filled from its neighbours in space
+ * and time. The tree keeps all its branches at all phases. docs/motion.md has the equations.
+ *
+ * The first request reads every tracked phase, one volume in memory at a time; then any time is answered
+ * without reading an image again.
+ *
+ * @par Input ports:
+ * - 0: vtkImageData with time steps (fractions of R-R), the series: short, unsigned short, float or any
+ *   other scalars. Grids may differ from phase to phase. Masks work as well (ImageContent). Or vtkPolyData
+ *   with time steps: the lines of every phase with radii, as found in it by whatever means; they need
+ *   neither the same points nor the same branches.
+ * - 1: vtkPolyData, lines to track, at the reference phase. Point data `MaximumInscribedSphereRadius` or `Radius`
+ *   (optional). Field data `PhaseTime` (optional): the reference phase.
+ * - 2, optional: vtkPolyData, a skeleton made of the same lines, of which the second output is made.
+ *
+ * @par Output ports:
+ * - 0: vtkPolyData, the lines with points moved; cells and other arrays are the input's own. Point data
+ *   `TrackingConfidence` (double, 0 to 1), `TrackingStatus` (int, coronary::TrackingStatus: 0 tracked, 1 weak, 2 lost,
+ *   3 filled), `CalibreFactor` (double, of the radius), `Displacement` (double[3], mm, from the
+ *   reference). Cell data `AxialStrain` (double: length / length at the reference - 1).
+ * - 1: vtkPolyData, the skeleton with the same arrays, as vtkSkinDeformation takes it.
+ * Both have TIME_STEPS and TIME_RANGE of the tracked phases; another time gives the nearest one. Field data:
+ * that of the lines, `CycleLength` (s), `ReferenceTime`, `TrackedShare` (double, one value a tracked phase: share of
+ * places that were tracked), `Repeatability` (double, mm: phases that show the same moment against each
+ * other; NaN when there are none).
+ *
+ * The output is whole in piece 0, and empty in every other piece. Lines without points give an empty output.
+ *
+ * @par Failure:
+ * An input without time steps or with one only, times that do not increase, lines outside the image, a
+ * reference that is not known, no phase in which anything was found: one error and no output. Phases in which
+ * nothing was found are filled, with a warning.
+ *
+ * @sa coronary::TrackCenterlines, vtkMotionRegularizer, vtkCardiacPhaseInterpolator
+ */
+#ifndef vtkCenterlineTracker_h
+#define vtkCenterlineTracker_h
+
+#include "vtkCoronaryMotionModule.h" // for the export macro
+#include "vtkPolyDataAlgorithm.h"
+
+#include <memory> // for std::unique_ptr
+#include <string> // for std::string
+#include <vector> // for std::vector
+
+class VTKCORONARYMOTION_EXPORT vtkCenterlineTracker : public vtkPolyDataAlgorithm
+{
+public:
+  static vtkCenterlineTracker* New();
+  vtkTypeMacro(vtkCenterlineTracker, vtkPolyDataAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /**
+   * Connections by name: lines (port 1), skeleton (port 2).
+   */
+  void SetLinesConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(1, output); }
+  void SetSkeletonConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(2, output); }
+  ///@}
+
+  ///@{
+  /**
+   * Take the reference phase from the field array `PhaseTime` of the lines. Default on.
+   */
+  vtkSetMacro(AutomaticReference, bool);
+  vtkGetMacro(AutomaticReference, bool);
+  vtkBooleanMacro(AutomaticReference, bool);
+  ///@}
+
+  ///@{
+  /**
+   * The phase that the lines were found at, when it is not automatic. Default 0.75.
+   */
+  vtkSetMacro(ReferenceTime, double);
+  vtkGetMacro(ReferenceTime, double);
+  ///@}
+
+  enum PhaseSelections
+  {
+    AllPhases = 0,
+    EvenPhases = 1,
+    ListedPhases = 2
+  };
+
+  ///@{
+  /**
+   * Which phases are tracked: all time steps (default), every other one from the first on (as the paper
+   * does, to judge the others by), or those of the list, each the nearest time step.
+   */
+  vtkSetClampMacro(TrackedPhases, int, AllPhases, ListedPhases);
+  vtkGetMacro(TrackedPhases, int);
+  void AddTrackedTime(double time);
+  void RemoveAllTrackedTimes();
+  int GetNumberOfTrackedTimes() const { return static_cast<int>(this->TrackedTimes.size()); }
+  ///@}
+
+  enum ImageContents
+  {
+    Tomogram = 0,
+    Mask = 1
+  };
+
+  ///@{
+  /**
+   * Whether images show the tissue around the vessels too (CT, default), or the vessels alone (masks,
+   * probabilities).
+   */
+  vtkSetClampMacro(ImageContent, int, Tomogram, Mask);
+  vtkGetMacro(ImageContent, int);
+  ///@}
+
+  ///@{
+  /**
+   * The point array of the images; empty (default): their active scalars.
+   */
+  vtkSetMacro(ImageArrayName, std::string);
+  vtkGetMacro(ImageArrayName, std::string);
+  ///@}
+
+  ///@{
+  /**
+   * Seconds over which an image was taken: half a turn of the gantry, a quarter with two sources; 0 for masks.
+   * Default 0.066.
+   */
+  vtkSetMacro(TemporalWindow, double);
+  vtkGetMacro(TemporalWindow, double);
+  ///@}
+
+  ///@{
+  /**
+   * R-R interval in seconds where the input has no field array `CycleLength`. Default 0.8.
+   */
+  vtkSetMacro(CycleLength, double);
+  vtkGetMacro(CycleLength, double);
+  ///@}
+
+  ///@{
+  /**
+   * Greatest distance of the places that are tracked, along the vessels, mm. Default 2.
+   */
+  vtkSetMacro(NodeSpacing, double);
+  vtkGetMacro(NodeSpacing, double);
+  ///@}
+
+  ///@{
+  /**
+   * How far a vessel may move between tracked phases that are neighbours in time, along each axis, mm.
+   * Default 16.
+   */
+  vtkSetMacro(CaptureRange, double);
+  vtkGetMacro(CaptureRange, double);
+  ///@}
+
+  ///@{
+  /**
+   * Name of the radius array of lines; empty (default): `MaximumInscribedSphereRadius`, or `Radius`.
+   */
+  vtkSetMacro(RadiusArrayName, std::string);
+  vtkGetMacro(RadiusArrayName, std::string);
+  ///@}
+
+  ///@{
+  /**
+   * Names of the arrays made. Defaults `TrackingConfidence`, `TrackingStatus`, `CalibreFactor`,
+   * `Displacement`, `AxialStrain`.
+   */
+  vtkSetMacro(ConfidenceArrayName, std::string);
+  vtkGetMacro(ConfidenceArrayName, std::string);
+  vtkSetMacro(StatusArrayName, std::string);
+  vtkGetMacro(StatusArrayName, std::string);
+  vtkSetMacro(CalibreArrayName, std::string);
+  vtkGetMacro(CalibreArrayName, std::string);
+  vtkSetMacro(DisplacementArrayName, std::string);
+  vtkGetMacro(DisplacementArrayName, std::string);
+  vtkSetMacro(StrainArrayName, std::string);
+  vtkGetMacro(StrainArrayName, std::string);
+  ///@}
+
+  /// For tests: how often the series was read.
+  int GetNumberOfTrackings() const;
+
+protected:
+  vtkCenterlineTracker();
+  ~vtkCenterlineTracker() override;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestUpdateExtent(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestData(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+private:
+  vtkCenterlineTracker(const vtkCenterlineTracker&) = delete;
+  void operator=(const vtkCenterlineTracker&) = delete;
+
+  std::vector<double> Selected(const std::vector<double>& steps) const;
+  void Track(vtkInformationVector** inputs);
+
+  bool AutomaticReference = true;
+  double ReferenceTime = 0.75;
+  int TrackedPhases = AllPhases;
+  std::vector<double> TrackedTimes;
+  int ImageContent = Tomogram;
+  std::string ImageArrayName;
+  double TemporalWindow = 0.066;
+  double CycleLength = 0.8;
+  double NodeSpacing = 2.0;
+  double CaptureRange = 16.0;
+  std::string RadiusArrayName;
+  std::string ConfidenceArrayName;
+  std::string StatusArrayName;
+  std::string CalibreArrayName;
+  std::string DisplacementArrayName;
+  std::string StrainArrayName;
+  struct Internals;
+  std::unique_ptr<Internals> Data;
+};
+
+#endif
