@@ -22,11 +22,9 @@
 #include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
-#include "vtkShortArray.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkUnsignedCharArray.h"
-#include "vtkUnsignedShortArray.h"
 
 #include <algorithm>
 #include <cmath>
@@ -387,19 +385,7 @@ void vtkFastMarchingCenterline::Execute(
       vtkCoronary::Require(any != nullptr || this->IntensityArrayName.empty(),
         "the measured image has no point array '" + this->IntensityArrayName + "'");
       vtkDataArray* array = CheckedArray(any, measured, "the measured image");
-      intensity.grid = vtkCoronary::GridOf(measured);
-      if (auto* shorts = vtkArrayDownCast<vtkShortArray>(array))
-      {
-        intensity.values = static_cast<const std::int16_t*>(shorts->GetPointer(0));
-      }
-      else if (auto* unsignedShorts = vtkArrayDownCast<vtkUnsignedShortArray>(array))
-      {
-        intensity.values = static_cast<const std::uint16_t*>(unsignedShorts->GetPointer(0));
-      }
-      else
-      {
-        intensity.values = ValuesAs<vtkFloatArray>(array, intensityCopy);
-      }
+      intensity = vtkCoronary::ScalarImageOf(measured, array, intensityCopy);
       input.intensity = &intensity;
     }
     result =

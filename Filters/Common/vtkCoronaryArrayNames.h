@@ -174,6 +174,10 @@ constexpr const char* AxialStrain = "AxialStrain";   ///< double, posed length /
 constexpr const char* CalibreFactor = "CalibreFactor";           ///< double, of the radius
 constexpr const char* TrackingConfidence = "TrackingConfidence"; ///< double, 0 to 1
 constexpr const char* TrackingStatus = "TrackingStatus";         ///< int, coronary::TrackingStatus
+// Tracked lines, field data.
+constexpr const char* ReferenceTime = "ReferenceTime"; ///< double, fraction of the R-R interval
+constexpr const char* TrackedShare = "TrackedShare";   ///< double, 0 to 1, one value a phase
+constexpr const char* TrackingRepeatability = "TrackingRepeatability"; ///< double, mm
 // Interpolated pose, point data.
 constexpr const char* AreaStrain = "AreaStrain";     ///< double, eps_r of the cross-section's area
 constexpr const char* EllipseMajor = "EllipseMajor"; ///< double, semi-axis, mm

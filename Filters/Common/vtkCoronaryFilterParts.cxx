@@ -1,7 +1,12 @@
 #include "vtkCoronaryFilterParts.h"
 
+#include "vtkDataArray.h"
+#include "vtkDataArrayRange.h"
+#include "vtkFloatArray.h"
 #include "vtkImageData.h"
 #include "vtkMatrix3x3.h"
+#include "vtkShortArray.h"
+#include "vtkUnsignedShortArray.h"
 
 #include <cctype>
 #include <stdexcept>
@@ -17,6 +22,32 @@ coronary::ImageGrid GridOf(vtkImageData* image)
   grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
     image->GetDirectionMatrix()->GetData());
   return grid;
+}
+
+coronary::ScalarImage ScalarImageOf(
+  vtkImageData* image, vtkDataArray* array, std::vector<float>& copy)
+{
+  coronary::ScalarImage result;
+  result.grid = GridOf(image);
+  if (auto* shorts = vtkArrayDownCast<vtkShortArray>(array))
+  {
+    result.values = static_cast<const std::int16_t*>(shorts->GetPointer(0));
+  }
+  else if (auto* unsignedShorts = vtkArrayDownCast<vtkUnsignedShortArray>(array))
+  {
+    result.values = static_cast<const std::uint16_t*>(unsignedShorts->GetPointer(0));
+  }
+  else if (auto* floats = vtkArrayDownCast<vtkFloatArray>(array))
+  {
+    result.values = static_cast<const float*>(floats->GetPointer(0));
+  }
+  else
+  {
+    const auto range = vtk::DataArrayValueRange<1>(array);
+    copy.assign(range.begin(), range.end());
+    result.values = static_cast<const float*>(copy.data());
+  }
+  return result;
 }
 
 void Require(bool condition, const std::string& requirement)

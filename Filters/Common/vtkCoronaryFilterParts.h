@@ -6,6 +6,7 @@
 #define vtkCoronaryFilterParts_h
 
 #include "Geometry.h"
+#include "ScalarImage.h"
 #include "vtkCoronaryCommonModule.h" // for the export macro
 
 #include "vtkFieldData.h"
@@ -15,12 +16,18 @@
 #include <string>
 #include <vector>
 
+class vtkDataArray;
 class vtkImageData;
 
 namespace vtkCoronary
 {
 /// Extent, origin, spacing and direction of an image.
 VTKCORONARYCOMMON_EXPORT coronary::ImageGrid GridOf(vtkImageData* image);
+
+/// One array of an image, of one value a voxel, as the algorithms take it. Types that they do not know
+/// are copied into `copy`; the result is valid as long as the image and the copy are.
+VTKCORONARYCOMMON_EXPORT coronary::ScalarImage ScalarImageOf(
+  vtkImageData* image, vtkDataArray* array, std::vector<float>& copy);
 
 /// @throws std::invalid_argument(requirement) when `condition` does not hold
 VTKCORONARYCOMMON_EXPORT void Require(bool condition, const std::string& requirement);

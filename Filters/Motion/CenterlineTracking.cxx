@@ -923,7 +923,8 @@ std::vector<double> Tracker::MeasureCalibre() const
             weight[n] += row[2] * (row[1] - mean[1]) * (row[1] - mean[1]);
           }
           // Where a vessel is smeared over several of its diameters little is left to be measured.
-          const double smeared = (smear.back() - smear.front()).norm() / (2.0 * wall);
+          const double smeared = (smear.back() - smear.front()).norm() /
+            (this->Nodes.radius.empty() ? 1.5 : std::max(this->Nodes.radius[n], 0.3));
           const double clear = 1.0 / ((1.0 + smeared * smeared) * (1.0 + smeared * smeared));
           pull[n] *= clear;
           weight[n] *= clear;

@@ -28,7 +28,7 @@
  * - 1: vtkPolyData, the skeleton with the same arrays, as vtkSkinDeformation takes it.
  * Both have TIME_STEPS and TIME_RANGE of the tracked phases; another time gives the nearest one. Field data:
  * that of the lines, `CycleLength` (s), `ReferenceTime`, `TrackedShare` (double, one value a tracked phase: share of
- * places that were tracked), `Repeatability` (double, mm: phases that show the same moment against each
+ * places that were tracked), `TrackingRepeatability` (double, mm: phases that show the same moment against each
  * other; NaN when there are none).
  *
  * The output is whole in piece 0, and empty in every other piece. Lines without points give an empty output.

@@ -11,10 +11,8 @@
 #include "vtkCellData.h"
 #include "vtkCompositeDataSet.h"
 #include "vtkDataArray.h"
-#include "vtkDataArrayRange.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
-#include "vtkFloatArray.h"
 #include "vtkIdList.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -26,11 +24,9 @@
 #include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
-#include "vtkShortArray.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkStructuredGrid.h"
-#include "vtkUnsignedShortArray.h"
 
 #include <algorithm>
 #include <array>
@@ -466,27 +462,8 @@ void vtkFrenetSweepSurface::MeasureContoursIn(vtkInformationVector* images, Read
       values->GetNumberOfTuples() == image->GetNumberOfPoints(),
     "The image's array " + std::string(values->GetName() ? values->GetName() : "") +
       " must have one value a voxel");
-  coronary::ScalarImage scalars;
-  scalars.grid = vtkCoronary::GridOf(image);
   std::vector<float> copy;
-  if (auto* shorts = vtkArrayDownCast<vtkShortArray>(values))
-  {
-    scalars.values = static_cast<const std::int16_t*>(shorts->GetPointer(0));
-  }
-  else if (auto* unsignedShorts = vtkArrayDownCast<vtkUnsignedShortArray>(values))
-  {
-    scalars.values = static_cast<const std::uint16_t*>(unsignedShorts->GetPointer(0));
-  }
-  else if (auto* floats = vtkArrayDownCast<vtkFloatArray>(values))
-  {
-    scalars.values = static_cast<const float*>(floats->GetPointer(0));
-  }
-  else
-  {
-    const auto range = vtk::DataArrayValueRange<1>(values);
-    copy.assign(range.begin(), range.end());
-    scalars.values = static_cast<const float*>(copy.data());
-  }
+  const coronary::ScalarImage scalars = vtkCoronary::ScalarImageOf(image, values, copy);
   const coronary::ImageInterpolator interpolator(scalars);
   const double share = coronary::MeasureContours(
     interpolator, {}, reader.tree, vtkCoronary::ProgressOf(this, 0.0, 0.1));

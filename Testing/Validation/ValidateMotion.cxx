@@ -6,6 +6,7 @@
 #include "CoronaryPhantom.h"
 #include "PhantomCases.h"
 #include "PhantomScan.h"
+#include "PhaseInterpolation.h"
 
 #include <CLI/CLI.hpp>
 
@@ -31,6 +32,7 @@ using namespace coronary;
 
 constexpr double ReferencePhase = 0.75;
 constexpr double LeastRadius = 0.75; // mm
+constexpr double LeastLength = 5.0;  // mm, of branches whose volumes are compared
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
 struct Case
@@ -43,6 +45,7 @@ struct Case
   bool trueTree = false;
   bool lost = false; ///< a systolic phase, and 40 % of the nodes in two others
   bool allPhases = false;
+  PhaseInterpolationMode mode = PhaseInterpolationMode::PeriodicCubic;
   std::string cache; ///< folder for images, or empty
 };
 
@@ -76,6 +79,7 @@ struct Outcome
   Errors tracked;  ///< the same at the phases tracked
   Errors material; ///< distance to where the same material is, phases not tracked
   Errors materialTracked;
+  Errors volume; ///< of branches, relative, all phases
   std::map<std::string, Errors> bySegment;
   std::vector<double> byPhase; ///< mean, all phases
   std::vector<double> trackedShare;
@@ -215,6 +219,10 @@ Outcome Run(const Case& test)
     material[p] = phantom.ReferencePosition(lines.rest[p], ReferencePhase);
   }
   const PhantomTree reference = phantom.Tree(ReferencePhase);
+  PhaseInterpolationSettings between;
+  between.mode = test.mode;
+  const PhaseInterpolation interpolation(poses, between);
+  InterpolatedPose pose;
   for (std::size_t k = 0; k < all.size(); ++k)
   {
     const PhantomTree truth = phantom.Tree(all[k]);
@@ -227,15 +235,8 @@ Outcome Run(const Case& test)
     }
     else
     {
-      const auto after = std::upper_bound(times.begin(), times.end(), all[k]);
-      const std::size_t b = after == times.end() ? 1 : after - times.begin();
-      const std::size_t a = after == times.end() ? times.size() - 1 : b - 1;
-      const double share = after == times.end() ? (all[k] - times[a]) / (1.0 + times[b] - times[a])
-                                                : (all[k] - times[a]) / (times[b] - times[a]);
-      for (std::size_t p = 0; p < material.size(); ++p)
-      {
-        points.push_back((1.0 - share) * poses.points[a][p] + share * poses.points[b][p]);
-      }
+      interpolation.Evaluate(all[k], pose);
+      points = pose.points;
     }
     Errors here;
     for (std::size_t p = 0; p < points.size(); ++p)
@@ -269,6 +270,33 @@ Outcome Run(const Case& test)
       }
     }
     outcome.byPhase.push_back(here.Mean());
+    // Volumes: what the tracking makes of them, against the true motion of the same lines.
+    double widening = 0.0;
+    for (std::size_t n = 0; n < truth.radius.size(); ++n)
+    {
+      widening += truth.radius[n] / reference.radius[n] / static_cast<double>(truth.radius.size());
+    }
+    const double calibre = isTracked ? poses.calibre[own - times.begin()][0] : pose.calibre[0];
+    for (const std::vector<std::int64_t>& line : lines.lines)
+    {
+      double length = 0.0;
+      double found = 0.0;
+      double right = 0.0;
+      for (std::size_t n = 0; n + 1 < line.size(); ++n)
+      {
+        const std::int64_t p = line[n];
+        const std::int64_t q = line[n + 1];
+        const double area = lines.radius[p] * lines.radius[p] + lines.radius[q] * lines.radius[q];
+        length += (lines.rest[q] - lines.rest[p]).norm();
+        found += area * calibre * calibre * (points[q] - points[p]).norm();
+        right += area * widening * widening *
+          (phantom.Position(material[q], all[k]) - phantom.Position(material[p], all[k])).norm();
+      }
+      if (length >= LeastLength && lines.radius[line[line.size() / 2]] >= LeastRadius)
+      {
+        outcome.volume.Add(std::abs(found / right - 1.0));
+      }
+    }
     if (isTracked)
     {
       const std::vector<double>& found = poses.calibre[own - times.begin()];
@@ -311,6 +339,12 @@ int main(int argc, char** argv)
     program.add_flag("--lost", test.lost,
       "one systolic phase is lost wholly, and 40 % of the nodes in two others");
     program.add_flag("--all-phases", test.allPhases, "track all phases, not every other one");
+    const std::map<std::string, PhaseInterpolationMode> modes{ { "linear",
+                                                                 PhaseInterpolationMode::Linear },
+      { "cubic", PhaseInterpolationMode::PeriodicCubic },
+      { "low-noise", PhaseInterpolationMode::LowNoise } };
+    program.add_option("--mode", test.mode, "interpolation: linear, cubic or low-noise")
+      ->transform(CLI::CheckedTransformer(modes));
     program.add_flag("--true-tree", test.trueTree, "the true tree, not the one found");
     program
       .add_option("--cache", test.cache, "existing folder that keeps the images for other runs")
@@ -331,20 +365,20 @@ int main(int argc, char** argv)
     test.window = 1e-3 * window;
     std::printf(
       "| seed | mean between, mm | 95 %% | material, mm | mean tracked, mm | 95 %% | called "
-      "tracked | of them near | repeat, mm | images | s |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "tracked | of them near | repeat, mm | volume error | greatest | images | s |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (const std::uint64_t seed : seeds)
     {
       test.seed = seed;
       Outcome o = Run(test);
       const double all = static_cast<double>(o.tracked.values.size());
       std::printf("| %llu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | "
-                  "%d | %.1f |\n",
+                  "%.3f | %.3f | %d | %.1f |\n",
         static_cast<unsigned long long>(seed), o.between.Mean(), o.between.Percentile(0.95),
         o.material.Mean(), o.tracked.Mean(), o.tracked.Percentile(0.95), o.materialTracked.Mean(),
         o.materialTracked.Percentile(0.95), o.called / all,
-        static_cast<double>(o.calledNear) / std::max(o.called, 1), o.repeatability, o.imagesRead,
-        o.seconds);
+        static_cast<double>(o.calledNear) / std::max(o.called, 1), o.repeatability, o.volume.Mean(),
+        o.volume.Percentile(1.0), o.imagesRead, o.seconds);
       if (details)
       {
         std::printf("by phase:");

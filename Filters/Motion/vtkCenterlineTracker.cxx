@@ -1,0 +1,564 @@
+#include "vtkCenterlineTracker.h"
+
+#include "CenterlineTracking.h"
+#include "LineImage.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkCoronaryUpstream.h"
+#include "vtkPoseSequences.h"
+
+#include "vtkCellArray.h"
+#include "vtkCellArrayIterator.h"
+#include "vtkCellData.h"
+#include "vtkDataArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <stdexcept>
+
+namespace names = vtkCoronaryArrayNames;
+using coronary::PoseSequence;
+using coronary::Vector3;
+using SDDP = vtkStreamingDemandDrivenPipeline;
+
+vtkStandardNewMacro(vtkCenterlineTracker);
+
+namespace
+{
+enum InputPorts
+{
+  SeriesPort = 0,
+  LinesPort = 1,
+  SkeletonPort = 2
+};
+
+/// mm: voxels of images of lines, and their margin. As fine as a CT's.
+constexpr double LineSpacing = 0.5;
+constexpr double LineMargin = 3.0;
+
+vtkInformation* Connection(vtkInformationVector** inputs, int port)
+{
+  return inputs[port] != nullptr && inputs[port]->GetNumberOfInformationObjects() > 0
+    ? inputs[port]->GetInformationObject(0)
+    : nullptr;
+}
+
+double FieldValue(vtkDataObject* data, const char* name, double otherwise)
+{
+  vtkDataArray* array = data != nullptr ? data->GetFieldData()->GetArray(name) : nullptr;
+  return array != nullptr && array->GetNumberOfTuples() == 1 ? array->GetComponent(0, 0)
+                                                             : otherwise;
+}
+
+/// Where a point is nearest to the lines.
+struct Foot
+{
+  std::int64_t first = 0;
+  std::int64_t second = 0;
+  double fraction = 0.0;
+};
+
+std::vector<Foot> FeetOf(const coronary::MovingLines& lines, vtkPolyData* points)
+{
+  std::vector<Foot> feet;
+  for (vtkIdType n = 0; n < points->GetNumberOfPoints(); ++n)
+  {
+    const Vector3 place(points->GetPoint(n));
+    double least = std::numeric_limits<double>::infinity();
+    Foot best;
+    for (const std::vector<std::int64_t>& line : lines.lines)
+    {
+      for (std::size_t i = 0; i + 1 < line.size(); ++i)
+      {
+        const Vector3& a = lines.rest[line[i]];
+        const Vector3 way = lines.rest[line[i + 1]] - a;
+        const double at =
+          std::clamp((place - a).dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
+        const double apart = (a + at * way - place).squaredNorm();
+        if (apart < least)
+        {
+          least = apart;
+          best = { line[i], line[i + 1], at };
+        }
+      }
+    }
+    feet.push_back(best);
+  }
+  return feet;
+}
+
+double LengthOf(vtkIdType count, const vtkIdType* points, const std::vector<Vector3>& positions)
+{
+  double length = 0.0;
+  for (vtkIdType i = 0; i + 1 < count; ++i)
+  {
+    length += (positions[points[i + 1]] - positions[points[i]]).norm();
+  }
+  return length;
+}
+}
+
+struct vtkCenterlineTracker::Internals
+{
+  // What was tracked, and of what.
+  bool Known = false;
+  vtkMTimeType KnownOf = 0;
+  vtkMTimeType SeriesTime = 0;
+  vtkMTimeType LinesTime = 0;
+  vtkCoronary::Moment LastAsked;
+  int Trackings = 0;
+
+  coronary::MovingLines Lines;
+  PoseSequence Poses;
+  coronary::CenterlineTrackingReport Report;
+  double Reference = 0.0;
+  double Cycle = 0.0;
+
+  bool Knows(vtkCenterlineTracker* self, vtkInformationVector** inputs) const
+  {
+    return this->Known && this->KnownOf == self->GetMTime() &&
+      this->SeriesTime == vtkCoronary::UpstreamTime(Connection(inputs, SeriesPort)) &&
+      this->LinesTime == vtkCoronary::UpstreamTime(Connection(inputs, LinesPort));
+  }
+};
+
+vtkCenterlineTracker::vtkCenterlineTracker()
+  : ConfidenceArrayName(names::TrackingConfidence)
+  , StatusArrayName(names::TrackingStatus)
+  , CalibreArrayName(names::CalibreFactor)
+  , DisplacementArrayName(names::Displacement)
+  , StrainArrayName(names::AxialStrain)
+  , Data(new Internals)
+{
+  this->SetNumberOfInputPorts(3);
+  this->SetNumberOfOutputPorts(2);
+}
+
+vtkCenterlineTracker::~vtkCenterlineTracker() = default;
+
+int vtkCenterlineTracker::GetNumberOfTrackings() const
+{
+  return this->Data->Trackings;
+}
+
+void vtkCenterlineTracker::AddTrackedTime(double time)
+{
+  this->TrackedTimes.push_back(time);
+  this->Modified();
+}
+
+void vtkCenterlineTracker::RemoveAllTrackedTimes()
+{
+  if (!this->TrackedTimes.empty())
+  {
+    this->TrackedTimes.clear();
+    this->Modified();
+  }
+}
+
+int vtkCenterlineTracker::FillInputPortInformation(int port, vtkInformation* info)
+{
+  if (port == SeriesPort)
+  {
+    info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+    info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
+    return 1;
+  }
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
+  if (port == SkeletonPort)
+  {
+    info->Set(INPUT_IS_OPTIONAL(), 1);
+  }
+  return 1;
+}
+
+std::vector<double> vtkCenterlineTracker::Selected(const std::vector<double>& steps) const
+{
+  std::vector<double> result;
+  if (this->TrackedPhases == ListedPhases)
+  {
+    for (const double time : this->TrackedTimes)
+    {
+      if (!std::isfinite(time))
+      {
+        throw std::invalid_argument("TrackedTimes must be finite");
+      }
+      result.push_back(*std::min_element(steps.begin(), steps.end(),
+        [time](double a, double b) { return std::abs(a - time) < std::abs(b - time); }));
+    }
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    if (result.empty())
+    {
+      throw std::invalid_argument("TrackedTimes is empty: there is no phase to track");
+    }
+    return result;
+  }
+  for (std::size_t k = 0; k < steps.size(); k += this->TrackedPhases == EvenPhases ? 2 : 1)
+  {
+    result.push_back(steps[k]);
+  }
+  return result;
+}
+
+int vtkCenterlineTracker::RequestInformation(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  std::vector<double> times = vtkPoseSequences::StepsOf(Connection(inputs, SeriesPort));
+  try
+  {
+    if (!times.empty())
+    {
+      times = this->Selected(times);
+    }
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< error.what());
+    return 0;
+  }
+  for (int port = 0; port < 2; ++port)
+  {
+    vtkInformation* outInfo = outputs->GetInformationObject(port);
+    outInfo->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+    outInfo->Remove(SDDP::TIME_STEPS());
+    outInfo->Remove(SDDP::TIME_RANGE());
+    if (!times.empty())
+    {
+      double range[2] = { times.front(), times.back() };
+      outInfo->Set(SDDP::TIME_STEPS(), times.data(), static_cast<int>(times.size()));
+      outInfo->Set(SDDP::TIME_RANGE(), range, 2);
+    }
+  }
+  return 1;
+}
+
+int vtkCenterlineTracker::RequestUpdateExtent(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
+  // Of the series what it has already, or else a step that will be read: the slider's time is not
+  // what is needed.
+  vtkInformation* series = Connection(inputs, SeriesPort);
+  const std::vector<double> steps = vtkPoseSequences::StepsOf(series);
+  if (this->Data->Known && this->Data->LastAsked.exists)
+  {
+    series->Set(SDDP::UPDATE_TIME_STEP(), this->Data->LastAsked.time);
+  }
+  else if (!steps.empty())
+  {
+    series->Set(SDDP::UPDATE_TIME_STEP(), steps.front());
+  }
+  for (int port = LinesPort; port <= SkeletonPort; ++port)
+  {
+    vtkInformation* info = Connection(inputs, port);
+    if (info != nullptr && !info->Has(SDDP::TIME_STEPS()))
+    {
+      info->Remove(SDDP::UPDATE_TIME_STEP());
+    }
+  }
+  return 1;
+}
+
+void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
+{
+  using vtkCoronary::Require;
+  vtkInformation* series = Connection(inputs, SeriesPort);
+  vtkPolyData* input = vtkPolyData::GetData(inputs[LinesPort], 0);
+  Internals& data = *this->Data;
+  data.Known = false;
+  const vtkMTimeType seriesTime = vtkCoronary::UpstreamTime(series);
+  const vtkMTimeType linesTime = vtkCoronary::UpstreamTime(Connection(inputs, LinesPort));
+
+  const std::vector<double> steps = vtkPoseSequences::StepsOf(series);
+  Require(!steps.empty(), "The series has no time steps");
+  Require(steps.size() > 1, "The series has one phase only: there is no motion to track");
+  for (std::size_t k = 1; k < steps.size(); ++k)
+  {
+    Require(steps[k] > steps[k - 1], "The time steps of the series do not increase");
+  }
+  const std::vector<double> times = this->Selected(steps);
+  data.Reference = this->ReferenceTime;
+  if (this->AutomaticReference)
+  {
+    data.Reference = FieldValue(input, names::PhaseTime, std::numeric_limits<double>::quiet_NaN());
+    Require(std::isfinite(data.Reference),
+      "The lines have no field array PhaseTime, which says at which phase they were found: switch "
+      "AutomaticReference off and give ReferenceTime");
+  }
+  Require(std::isfinite(data.Reference), "ReferenceTime must be finite");
+  std::string radius = this->RadiusArrayName;
+  if (radius.empty())
+  {
+    radius = input->GetPointData()->GetArray(names::Radius) != nullptr ? names::Radius : "Radius";
+  }
+  data.Lines = vtkPoseSequences::LinesOf(input, radius);
+
+  coronary::CenterlineTrackingSettings settings;
+  settings.temporalWindow = this->TemporalWindow;
+  settings.nodeSpacing = this->NodeSpacing;
+  settings.captureRange = this->CaptureRange;
+  vtkDataObject* first = vtkDataObject::GetData(series);
+  const bool images = vtkImageData::SafeDownCast(first) != nullptr;
+  settings.tissue = images && this->ImageContent == Tomogram;
+  if (!images)
+  {
+    settings.temporalWindow = 0.0;
+  }
+  data.Cycle =
+    FieldValue(first, names::CycleLength, FieldValue(input, names::CycleLength, this->CycleLength));
+  settings.cycleLength = data.Cycle;
+
+  vtkCoronary::UpstreamRequest request(series, series);
+  std::array<int, 6> whole{ 0, -1, 0, -1, 0, -1 };
+  if (series->Has(SDDP::WHOLE_EXTENT()))
+  {
+    series->Get(SDDP::WHOLE_EXTENT(), whole.data());
+  }
+  std::vector<float> copy;
+  coronary::LineImage drawn;
+  const auto imageAt = [&](double time)
+  {
+    coronary::ScalarImage image;
+    if (!images && time == data.Reference)
+    {
+      drawn = coronary::RenderLines(data.Lines, LineSpacing, LineMargin);
+      return drawn.View();
+    }
+    vtkCoronary::Moment moment;
+    moment.exists = true;
+    moment.time = *std::min_element(steps.begin(), steps.end(),
+      [time](double a, double b) { return std::abs(a - time) < std::abs(b - time); });
+    data.LastAsked = moment;
+    request.Ask(images ? &whole : nullptr, moment);
+    vtkDataObject* now = vtkDataObject::GetData(series);
+    const std::string where = " at the time " + std::to_string(moment.time);
+    if (auto* voxels = vtkImageData::SafeDownCast(now))
+    {
+      Require(voxels->GetNumberOfPoints() > 0, "The image" + where + " has no voxels");
+      vtkDataArray* array = this->ImageArrayName.empty()
+        ? voxels->GetPointData()->GetScalars()
+        : voxels->GetPointData()->GetArray(this->ImageArrayName.c_str());
+      Require(array != nullptr && array->GetNumberOfComponents() == 1,
+        "The image" + where + " has no point array " +
+          (this->ImageArrayName.empty() ? "of scalars" : "'" + this->ImageArrayName + "'") +
+          " with one value a voxel");
+      return vtkCoronary::ScalarImageOf(voxels, array, copy);
+    }
+    auto* lines = vtkPolyData::SafeDownCast(now);
+    Require(lines != nullptr && lines->GetNumberOfLines() > 0, "The series has no lines" + where);
+    const char* radii =
+      lines->GetPointData()->GetArray(names::Radius) != nullptr ? names::Radius : "Radius";
+    drawn = coronary::RenderLines(vtkPoseSequences::LinesOf(lines, radii), LineSpacing, LineMargin);
+    return drawn.View();
+  };
+  if (images)
+  {
+    const double nearest = *std::min_element(steps.begin(), steps.end(),
+      [&](double a, double b)
+      { return std::abs(a - data.Reference) < std::abs(b - data.Reference); });
+    Require(std::abs(nearest - data.Reference) < 1e-3,
+      "The reference time " + std::to_string(data.Reference) +
+        " is none of the time steps of the series");
+  }
+  data.Poses = coronary::TrackCenterlines(data.Lines, data.Reference, times, imageAt, settings,
+    &data.Report, vtkCoronary::ProgressOf(this));
+  ++data.Trackings;
+  data.Known = true;
+  data.KnownOf = this->GetMTime();
+  data.SeriesTime = seriesTime;
+  data.LinesTime = linesTime;
+  for (const std::string& warning : data.Report.warnings)
+  {
+    vtkWarningMacro(<< warning);
+  }
+}
+
+int vtkCenterlineTracker::RequestData(
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  vtkInformation* outInfo = outputs->GetInformationObject(0);
+  vtkPolyData* input = vtkPolyData::GetData(inputs[LinesPort], 0);
+  vtkPolyData* output[2] = { vtkPolyData::GetData(outputs, 0), vtkPolyData::GetData(outputs, 1) };
+  if (outInfo->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0 || input->GetNumberOfPoints() == 0)
+  {
+    return 1;
+  }
+  Internals& data = *this->Data;
+  int result = 1;
+  try
+  {
+    for (const std::string* name : { &this->ConfidenceArrayName, &this->StatusArrayName,
+           &this->CalibreArrayName, &this->DisplacementArrayName, &this->StrainArrayName })
+    {
+      vtkCoronary::Require(!name->empty(), "An output array needs a name");
+    }
+    if (!data.Knows(this, inputs))
+    {
+      this->Track(inputs);
+    }
+    const std::vector<double>& times = data.Poses.times;
+    std::size_t phase = 0;
+    // Ports may be asked for by different consumers; the executive asks for one time.
+    for (int port = 0; port < 2; ++port)
+    {
+      vtkInformation* info = outputs->GetInformationObject(port);
+      if (info->Has(SDDP::UPDATE_TIME_STEP()))
+      {
+        const double wanted = info->Get(SDDP::UPDATE_TIME_STEP());
+        phase =
+          std::min_element(times.begin(), times.end(),
+            [wanted](double a, double b) { return std::abs(a - wanted) < std::abs(b - wanted); }) -
+          times.begin();
+        break;
+      }
+    }
+    vtkPoseSequences::PoseArrays arrays;
+    arrays.confidence = this->ConfidenceArrayName;
+    arrays.status = this->StatusArrayName;
+    arrays.calibre = this->CalibreArrayName;
+    const auto write =
+      [&](vtkPolyData* like, const vtkPoseSequences::Moment& moment, vtkPolyData* out)
+    {
+      vtkPoseSequences::Write(like, moment, arrays, out);
+      std::vector<Vector3> rest;
+      vtkNew<vtkDoubleArray> displacement;
+      displacement->SetName(this->DisplacementArrayName.c_str());
+      displacement->SetNumberOfComponents(3);
+      displacement->SetNumberOfTuples(like->GetNumberOfPoints());
+      for (vtkIdType n = 0; n < like->GetNumberOfPoints(); ++n)
+      {
+        rest.emplace_back(like->GetPoint(n));
+        const Vector3 moved = (*moment.points)[n] - rest.back();
+        displacement->SetTuple(n, moved.data());
+      }
+      out->GetPointData()->AddArray(displacement);
+      // Cells of poly data: vertices, lines, polygons, strips.
+      vtkNew<vtkDoubleArray> strain;
+      strain->SetName(this->StrainArrayName.c_str());
+      strain->SetNumberOfValues(like->GetNumberOfCells());
+      strain->FillValue(0.0);
+      vtkIdType cell = like->GetNumberOfVerts();
+      const auto lines =
+        vtkSmartPointer<vtkCellArrayIterator>::Take(like->GetLines()->NewIterator());
+      for (lines->GoToFirstCell(); !lines->IsDoneWithTraversal(); lines->GoToNextCell(), ++cell)
+      {
+        vtkIdType count = 0;
+        const vtkIdType* points = nullptr;
+        lines->GetCurrentCell(count, points);
+        const double before = LengthOf(count, points, rest);
+        strain->SetValue(
+          cell, before > 0.0 ? LengthOf(count, points, *moment.points) / before - 1.0 : 0.0);
+      }
+      out->GetCellData()->AddArray(strain);
+      vtkFieldData* fields = out->GetFieldData();
+      fields->PassData(input->GetFieldData());
+      fields->PassData(like->GetFieldData());
+      vtkCoronary::AddArray<vtkDoubleArray>(
+        fields, names::PhaseTime, std::vector<double>{ moment.time });
+      vtkCoronary::AddArray<vtkDoubleArray>(
+        fields, names::CycleLength, std::vector<double>{ data.Cycle });
+      vtkCoronary::AddArray<vtkDoubleArray>(
+        fields, names::ReferenceTime, std::vector<double>{ data.Reference });
+      vtkCoronary::AddArray<vtkDoubleArray>(fields, names::TrackedShare, data.Report.trackedShare);
+      if (data.Report.repeatedPhases > 0)
+      {
+        vtkCoronary::AddArray<vtkDoubleArray>(
+          fields, names::TrackingRepeatability, std::vector<double>{ data.Report.repeatability });
+      }
+    };
+    const vtkPoseSequences::Moment moment = vtkPoseSequences::MomentOf(data.Poses, phase);
+    write(input, moment, output[0]);
+
+    vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
+    vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;
+    if (skeleton != nullptr && skeleton->GetNumberOfPoints() > 0)
+    {
+      const std::vector<Foot> feet = FeetOf(data.Lines, skeleton);
+      std::vector<Vector3> joints;
+      std::vector<double> confidence;
+      std::vector<coronary::TrackingStatus> status;
+      std::vector<double> calibre;
+      for (std::size_t n = 0; n < feet.size(); ++n)
+      {
+        const Foot& foot = feet[n];
+        const auto between = [&foot](const auto& values)
+        { return values[foot.first] + foot.fraction * (values[foot.second] - values[foot.first]); };
+        const Vector3 shift = between(data.Poses.points[phase]) - between(data.Lines.rest);
+        joints.push_back(Vector3(skeleton->GetPoint(static_cast<vtkIdType>(n))) + shift);
+        confidence.push_back(between(data.Poses.confidence[phase]));
+        calibre.push_back(between(data.Poses.calibre[phase]));
+        status.push_back(data.Poses.status[phase][foot.fraction < 0.5 ? foot.first : foot.second]);
+      }
+      vtkPoseSequences::Moment posed;
+      posed.time = moment.time;
+      posed.points = &joints;
+      posed.confidence = &confidence;
+      posed.status = &status;
+      posed.calibre = &calibre;
+      write(skeleton, posed, output[1]);
+    }
+    return 1;
+  }
+  catch (const coronary::Cancelled&)
+  {
+    vtkDebugMacro("aborted");
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorMacro("Out of memory");
+    result = 0;
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorMacro(<< vtkCoronary::PropertyMessage(
+                    error.what(), { "CenterlineTrackingSettings: ", "TrajectoryPrior: " }));
+    result = 0;
+  }
+  for (int port = 0; port < 2; ++port)
+  {
+    output[port]->Initialize();
+    outputs->GetInformationObject(port)->Set(SDDP::DATA_NOT_GENERATED(), 1);
+  }
+  return result;
+}
+
+void vtkCenterlineTracker::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "AutomaticReference: " << this->AutomaticReference << "\n"
+     << indent << "ReferenceTime: " << this->ReferenceTime << "\n"
+     << indent << "TrackedPhases: " << this->TrackedPhases << "\n"
+     << indent << "TrackedTimes:";
+  for (const double time : this->TrackedTimes)
+  {
+    os << " " << time;
+  }
+  os << "\n"
+     << indent << "ImageContent: " << this->ImageContent << "\n"
+     << indent << "ImageArrayName: " << this->ImageArrayName << "\n"
+     << indent << "TemporalWindow: " << this->TemporalWindow << "\n"
+     << indent << "CycleLength: " << this->CycleLength << "\n"
+     << indent << "NodeSpacing: " << this->NodeSpacing << "\n"
+     << indent << "CaptureRange: " << this->CaptureRange << "\n"
+     << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n"
+     << indent << "ConfidenceArrayName: " << this->ConfidenceArrayName << "\n"
+     << indent << "StatusArrayName: " << this->StatusArrayName << "\n"
+     << indent << "CalibreArrayName: " << this->CalibreArrayName << "\n"
+     << indent << "DisplacementArrayName: " << this->DisplacementArrayName << "\n"
+     << indent << "StrainArrayName: " << this->StrainArrayName << "\n";
+}
