@@ -1,0 +1,528 @@
+// What tracking is made of, against closed forms: nodes, trajectories, labels, kept voxels, images of
+// lines; and the tracking of a tube whose motion is known.
+
+#include "CenterlineTracking.h"
+#include "DisplacementLabels.h"
+#include "LineImage.h"
+#include "LineNodes.h"
+#include "Refusals.h"
+#include "SparseVolume.h"
+#include "TrajectoryModel.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+using namespace coronary;
+
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+
+/// A trunk of 40 mm along z, and a branch from its middle along x.
+MovingLines Fork()
+{
+  MovingLines lines;
+  for (int n = 0; n <= 80; ++n)
+  {
+    lines.rest.emplace_back(0.0, 0.0, 0.5 * n);
+  }
+  for (int n = 1; n <= 40; ++n)
+  {
+    lines.rest.emplace_back(0.5 * n, 0.0, 20.0);
+  }
+  lines.radius.assign(lines.rest.size(), 1.5);
+  lines.lines.resize(3);
+  for (int n = 0; n <= 80; ++n)
+  {
+    lines.lines[n <= 40 ? 0 : 1].push_back(n);
+    if (n == 40)
+    {
+      lines.lines[1].push_back(n);
+    }
+  }
+  lines.lines[2].push_back(40);
+  for (int n = 81; n <= 120; ++n)
+  {
+    lines.lines[2].push_back(n);
+  }
+  return lines;
+}
+
+LineNodes Chain(int count, double step)
+{
+  MovingLines lines;
+  lines.lines.emplace_back();
+  for (int n = 0; n < count; ++n)
+  {
+    lines.rest.emplace_back(step * n, 0.0, 0.0);
+    lines.lines[0].push_back(n);
+  }
+  return PlaceNodes(lines, step * 1.001);
+}
+}
+
+TEST(LineNodes, AreEvenAndShareTheFork)
+{
+  const MovingLines lines = Fork();
+  const LineNodes nodes = PlaceNodes(lines, 2.0);
+  EXPECT_EQ(nodes.size(), 1u + 10u + 10u + 10u);
+  ASSERT_EQ(nodes.points.size(), lines.rest.size());
+  int roots = 0;
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    roots += nodes.parent[n] < 0 ? 1 : 0;
+    if (nodes.parent[n] >= 0)
+    {
+      EXPECT_NEAR(nodes.step[n], 2.0, 1e-12);
+      EXPECT_NEAR((nodes.position[n] - nodes.position[nodes.parent[n]]).norm(), 2.0, 1e-12);
+    }
+    EXPECT_NEAR(nodes.tangent[n].norm(), 1.0, 1e-12);
+  }
+  EXPECT_EQ(roots, 1);
+  // A linear function of position is reproduced at every point.
+  std::vector<double> values;
+  for (const Vector3& place : nodes.position)
+  {
+    values.push_back(3.0 * place[0] - 2.0 * place[2] + 1.0);
+  }
+  const std::vector<double> at = nodes.AtPoints(values);
+  for (std::size_t p = 0; p < at.size(); ++p)
+  {
+    EXPECT_NEAR(at[p], 3.0 * lines.rest[p][0] - 2.0 * lines.rest[p][2] + 1.0, 1e-9);
+  }
+}
+
+TEST(LineNodes, TakeRingsLonePointsAndLinesWithoutLength)
+{
+  MovingLines lines;
+  for (int n = 0; n < 12; ++n)
+  {
+    lines.rest.emplace_back(10.0 * std::cos(Pi * n / 6.0), 10.0 * std::sin(Pi * n / 6.0), 0.0);
+  }
+  lines.rest.emplace_back(50.0, 0.0, 0.0); // alone
+  lines.rest.emplace_back(60.0, 0.0, 0.0); // a line of
+  lines.rest.emplace_back(60.0, 0.0, 0.0); // no length
+  lines.lines = { { 0, 1, 2, 3, 4, 5, 6 }, { 6, 7, 8, 9, 10, 11, 0 }, { 13, 14 } };
+  const LineNodes nodes = PlaceNodes(lines, 1.0);
+  EXPECT_EQ(nodes.order.size(), nodes.size());
+  int roots = 0;
+  for (const int parent : nodes.parent)
+  {
+    roots += parent < 0 ? 1 : 0;
+  }
+  EXPECT_EQ(roots, 3);
+  for (const double value : nodes.AtPoints(std::vector<double>(nodes.size(), 7.0)))
+  {
+    EXPECT_DOUBLE_EQ(value, 7.0);
+  }
+}
+
+TEST(Trajectories, FollowPreciseMeasurementsOfAPeriodicMotion)
+{
+  const LineNodes nodes = Chain(8, 2.0);
+  const auto motion = [](double t, std::size_t n)
+  {
+    return Vector3(5.0 * (1.0 - std::cos(2.0 * Pi * t)), 2.0 * std::sin(4.0 * Pi * t),
+      0.1 * static_cast<double>(n) * std::sin(2.0 * Pi * t));
+  };
+  std::vector<double> times;
+  for (int k = 0; k < 16; ++k)
+  {
+    times.push_back(-0.05 + k / 16.0);
+  }
+  std::vector<std::vector<TrajectoryMeasurement>> measurements(nodes.size());
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    for (std::size_t k = 0; k < times.size(); ++k)
+    {
+      measurements[n].push_back(
+        { static_cast<int>(k), motion(times[k], n), Matrix3::Identity() * 1e6 });
+    }
+  }
+  const Trajectories result = FitTrajectories(nodes, times, measurements);
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    for (double t = -0.4; t < 1.7; t += 0.0137)
+    {
+      EXPECT_LT((result.Displacement(static_cast<int>(n), t) - motion(t, n)).norm(), 2e-3);
+      const Vector3 slope = (motion(t + 1e-4, n) - motion(t - 1e-4, n)) / 2e-4;
+      EXPECT_LT((result.Derivative(static_cast<int>(n), t) - slope).norm(), 0.1);
+      EXPECT_LT(result.Deviation(static_cast<int>(n), t), 0.05);
+    }
+  }
+}
+
+TEST(Trajectories, AreTheDenseSolution)
+{
+  // Five nodes on a fork: the tree's elimination against one dense system.
+  MovingLines lines;
+  lines.rest = { { 0, 0, 0 }, { 0, 0, 3 }, { 0, 0, 5 }, { 2, 0, 4 }, { 4, 0, 4 } };
+  lines.lines = { { 0, 1 }, { 1, 2 }, { 1, 3 }, { 3, 4 } };
+  const LineNodes nodes = PlaceNodes(lines, 10.0);
+  ASSERT_EQ(nodes.size(), 5u);
+  TrajectoryPrior prior;
+  prior.harmonics = 2;
+  const std::vector<double> times = { 0.1, 0.35, 0.8 };
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  std::vector<std::vector<TrajectoryMeasurement>> measurements(5);
+  for (std::size_t n = 0; n < 5; ++n)
+  {
+    for (int k = n == 4 ? 3 : 0; k < 3; ++k)
+    {
+      Matrix3 root;
+      Vector3 place;
+      for (int i = 0; i < 9; ++i)
+      {
+        root(i % 3, i / 3) = normal(random);
+      }
+      for (int i = 0; i < 3; ++i)
+      {
+        place[i] = 3.0 * normal(random);
+      }
+      measurements[n].push_back({ k, place, root * root.transpose() });
+    }
+  }
+  const Trajectories result = FitTrajectories(nodes, times, measurements, prior);
+  const Eigen::Index size = 15;
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(5 * size, 5 * size);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(5 * size);
+  Eigen::VectorXd change(size);
+  for (Eigen::Index b = 0; b < 5; ++b)
+  {
+    const double m = b == 0 ? 1.0 : static_cast<double>((b + 1) / 2);
+    const double own = prior.amplitude / std::pow(m, prior.decay);
+    const double walk = prior.neighbourChange / std::pow(m, prior.neighbourDecay);
+    change.segment<3>(3 * b).setConstant(1.0 / (walk * walk));
+    for (Eigen::Index n = 0; n < 5; ++n)
+    {
+      matrix.diagonal().segment<3>(n * size + 3 * b).array() += 1.0 / (own * own);
+    }
+  }
+  for (Eigen::Index n = 0; n < 5; ++n)
+  {
+    for (const TrajectoryMeasurement& one : measurements[n])
+    {
+      const Eigen::VectorXd phi = PeriodicBasis(times[one.phase], 2);
+      for (Eigen::Index a = 0; a < 5; ++a)
+      {
+        right.segment<3>(n * size + 3 * a) += phi[a] * one.information * one.displacement;
+        for (Eigen::Index b = 0; b < 5; ++b)
+        {
+          matrix.block<3, 3>(n * size + 3 * a, n * size + 3 * b) +=
+            phi[a] * phi[b] * one.information;
+        }
+      }
+    }
+    const int parent = nodes.parent[n];
+    for (Eigen::Index i = 0; parent >= 0 && i < size; ++i)
+    {
+      const double stiff = change[i] / nodes.step[n];
+      matrix(n * size + i, n * size + i) += stiff;
+      matrix(parent * size + i, parent * size + i) += stiff;
+      matrix(n * size + i, parent * size + i) -= stiff;
+      matrix(parent * size + i, n * size + i) -= stiff;
+    }
+  }
+  const Eigen::MatrixXd inverse = matrix.inverse();
+  const Eigen::VectorXd solution = inverse * right;
+  for (Eigen::Index n = 0; n < 5; ++n)
+  {
+    EXPECT_LT((result.covariance[n] - inverse.block(n * size, n * size, size, size)).norm(), 1e-8);
+    for (Eigen::Index b = 0; b < 5; ++b)
+    {
+      const Vector3 own = result.coefficients[n].row(b).transpose();
+      EXPECT_LT((own - solution.segment<3>(n * size + 3 * b)).norm(), 1e-8);
+    }
+  }
+}
+
+TEST(Trajectories, SayHowLittleIsKnownOfAGap)
+{
+  const LineNodes nodes = Chain(20, 2.0);
+  const std::vector<double> times = { 0.0, 0.25, 0.5, 0.75 };
+  std::vector<std::vector<TrajectoryMeasurement>> measurements(nodes.size());
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    for (int k = 0; k < 4 && (n < 5 || n > 14); ++k)
+    {
+      measurements[n].push_back({ k, Vector3(1.0, 0.0, 0.0), Matrix3::Identity() * 100.0 });
+    }
+  }
+  const Trajectories result = FitTrajectories(nodes, times, measurements);
+  EXPECT_GT(result.Deviation(10, 0.5), 2.0 * result.Deviation(1, 0.5));
+  EXPECT_LT((result.Displacement(10, 0.5) - Vector3(1.0, 0.0, 0.0)).norm(), 0.02);
+}
+
+TEST(Trajectories, RefuseWhatIsWrong)
+{
+  const LineNodes nodes = Chain(3, 2.0);
+  TrajectoryPrior prior;
+  prior.harmonics = 0;
+  ExpectRefusal([&] { FitTrajectories(nodes, { 0.0 }, { {}, {}, {} }, prior); }, "harmonics");
+  ExpectRefusal([&] { FitTrajectories(nodes, { 0.0 }, { {} }); }, "1 nodes instead of 3");
+  ExpectRefusal(
+    [&] {
+      FitTrajectories(nodes, { 0.0 }, { { { 1, Vector3::Zero(), Matrix3::Identity() } }, {}, {} });
+    },
+    "no phase 1");
+}
+
+TEST(DisplacementLabels, AreTheBestOfAll)
+{
+  // Three nodes, 27 candidates each: all combinations.
+  const LineNodes nodes = Chain(3, 2.0);
+  const LabelLattice lattice{ 1, 1.0 };
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> uniform(0.0F, 6.0F);
+  for (int trial = 0; trial < 20; ++trial)
+  {
+    std::vector<std::vector<float>> costs(3, std::vector<float>(27));
+    for (std::vector<float>& one : costs)
+    {
+      for (float& value : one)
+      {
+        value = uniform(random);
+      }
+    }
+    const double stiffness = 0.6;
+    const auto place = [](int label)
+    { return Vector3(label % 3 - 1, label / 3 % 3 - 1, label / 9 - 1); };
+    double least = std::numeric_limits<double>::infinity();
+    int best[3] = { 0, 0, 0 };
+    for (int a = 0; a < 27; ++a)
+    {
+      for (int b = 0; b < 27; ++b)
+      {
+        for (int c = 0; c < 27; ++c)
+        {
+          const double sum = costs[0][a] + costs[1][b] + costs[2][c] +
+            ((place(a) - place(b)).squaredNorm() + (place(b) - place(c)).squaredNorm()) /
+              (2.0 * stiffness * stiffness * 2.0);
+          if (sum < least)
+          {
+            least = sum;
+            best[0] = a;
+            best[1] = b;
+            best[2] = c;
+          }
+        }
+      }
+    }
+    const std::vector<Vector3> found = BestDisplacements(nodes, lattice, costs, stiffness);
+    for (int n = 0; n < 3; ++n)
+    {
+      // Between candidates by at most half a step.
+      EXPECT_LE((found[n] - place(best[n])).cwiseAbs().maxCoeff(), 0.5 + 1e-6);
+    }
+  }
+}
+
+TEST(SparseVolume, SamplesAsTheImageDoes)
+{
+  ScalarImage image;
+  image.grid.extent = { 3, 32, -2, 20, 0, 17 };
+  image.grid.origin = Vector3(5.0, -7.0, 2.0);
+  image.grid.spacing = Vector3(0.7, 0.8, 1.1);
+  image.grid.direction =
+    Eigen::AngleAxisd(0.4, Vector3(1.0, 2.0, -1.0).normalized()).toRotationMatrix();
+  // A linear function is exact between voxels.
+  const auto value = [&](const Vector3& world)
+  { return 40.0 * world[0] - 25.0 * world[1] + world[2]; };
+  std::vector<float> values;
+  std::vector<std::int16_t> shorts;
+  for (int k = 0; k <= 17; ++k)
+  {
+    for (int j = -2; j <= 20; ++j)
+    {
+      for (int i = 3; i <= 32; ++i)
+      {
+        values.push_back(static_cast<float>(value(image.grid.IndexToWorld(i, j, k))));
+        shorts.push_back(static_cast<std::int16_t>(std::lround(values.back())));
+      }
+    }
+  }
+  const Vector3 middle = image.grid.IndexToWorld(17.0, 9.0, 8.0);
+  for (const bool isShort : { false, true })
+  {
+    if (isShort)
+    {
+      image.values = static_cast<const std::int16_t*>(shorts.data());
+    }
+    else
+    {
+      image.values = static_cast<const float*>(values.data());
+    }
+    const SparseVolume volume(image, { middle }, 3.0);
+    EXPECT_TRUE(volume.Covers(middle, 3.0));
+    EXPECT_FALSE(volume.Covers(middle, 9.0));
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> uniform(-1.7, 1.7);
+    for (int n = 0; n < 500; ++n)
+    {
+      const Vector3 place = middle + Vector3(uniform(random), uniform(random), uniform(random));
+      EXPECT_NEAR(volume.Sample(place), value(place), isShort ? 0.6 : 0.1);
+    }
+    EXPECT_TRUE(std::isnan(volume.Sample(image.grid.IndexToWorld(2.9, 9.0, 8.0))));
+    EXPECT_TRUE(std::isnan(volume.Sample(image.grid.IndexToWorld(32.0, 20.0, 17.0))));
+    const AveragedVolume averaged = AverageBlocks(
+      image, 1.5, middle - Vector3::Constant(100.0), middle + Vector3::Constant(100.0));
+    EXPECT_NEAR(averaged.Sample(middle), value(middle), 1.0);
+  }
+}
+
+TEST(LineImage, IsOneInsideAndHalfAtTheWall)
+{
+  const LineImage image = RenderLines(Fork(), 0.4, 2.0);
+  const ScalarImage view = image.View();
+  const SparseVolume volume(view, { Vector3(0.0, 0.0, 10.0) }, 6.0);
+  EXPECT_NEAR(volume.Sample({ 0.0, 0.0, 10.0 }), 1.0, 1e-3);
+  EXPECT_NEAR(volume.Sample({ 0.0, 1.5, 10.0 }), 0.5, 0.06);
+  EXPECT_NEAR(volume.Sample({ 0.0, 2.5, 10.0 }), 0.0, 1e-3);
+  ExpectRefusal([] { RenderLines({}, 0.4, 2.0); }, "no lines");
+}
+
+namespace
+{
+/// An image of the fork, moved by `shift`.
+LineImage Moved(const Vector3& shift)
+{
+  MovingLines lines = Fork();
+  for (Vector3& point : lines.rest)
+  {
+    point += shift;
+  }
+  return RenderLines(lines, 0.6, 4.0);
+}
+
+Vector3 Way(double t)
+{
+  return { 6.0 * std::sin(2.0 * Pi * t), 3.0 * (1.0 - std::cos(2.0 * Pi * t)),
+    2.0 * std::sin(4.0 * Pi * t) };
+}
+}
+
+TEST(CenterlineTracking, FollowsImagesOfVesselsAlone)
+{
+  const MovingLines lines = Fork();
+  std::vector<double> times;
+  for (int k = 0; k < 10; ++k)
+  {
+    times.push_back(0.1 * k);
+  }
+  LineImage image;
+  int reads = 0;
+  const auto imageAt = [&](double t)
+  {
+    ++reads;
+    image = Moved(Way(t));
+    return image.View();
+  };
+  CenterlineTrackingSettings settings;
+  settings.tissue = false;
+  settings.temporalWindow = 0.0;
+  CenterlineTrackingReport report;
+  const PoseSequence poses = TrackCenterlines(lines, 0.0, times, imageAt, settings, &report);
+  ASSERT_EQ(poses.points.size(), times.size());
+  CheckPoseSequence(poses, lines.rest.size());
+  EXPECT_EQ(report.imagesRead, reads);
+  for (std::size_t k = 0; k < times.size(); ++k)
+  {
+    double mean = 0.0;
+    for (std::size_t p = 0; p < lines.rest.size(); ++p)
+    {
+      mean += (poses.points[k][p] - lines.rest[p] - Way(times[k])).norm() /
+        static_cast<double>(lines.rest.size());
+    }
+    EXPECT_LT(mean, 0.3) << "phase " << k;
+    EXPECT_GT(report.trackedShare[k], 0.8);
+  }
+}
+
+TEST(CenterlineTracking, FillsAPhaseWithoutVessels)
+{
+  const MovingLines lines = Fork();
+  std::vector<double> times;
+  for (int k = 0; k < 10; ++k)
+  {
+    times.push_back(0.1 * k);
+  }
+  LineImage image;
+  const auto imageAt = [&](double t)
+  {
+    image = Moved(Way(t));
+    if (t == times[4])
+    {
+      std::fill(image.values.begin(), image.values.end(), 0.0F);
+    }
+    return image.View();
+  };
+  CenterlineTrackingSettings settings;
+  settings.tissue = false;
+  settings.temporalWindow = 0.0;
+  CenterlineTrackingReport report;
+  const PoseSequence poses = TrackCenterlines(lines, 0.0, times, imageAt, settings, &report);
+  EXPECT_LT(report.trackedShare[4], 0.01);
+  ASSERT_EQ(report.warnings.size(), 1u);
+  EXPECT_NE(report.warnings[0].find("lost"), std::string::npos);
+  for (std::size_t p = 0; p < lines.rest.size(); ++p)
+  {
+    EXPECT_NE(poses.status[4][p], TrackingStatus::Tracked);
+    EXPECT_LT((poses.points[4][p] - lines.rest[p] - Way(times[4])).norm(), 1.5);
+  }
+}
+
+TEST(CenterlineTracking, MeasuresPhasesThatShowTheSameMoment)
+{
+  const MovingLines lines = Fork();
+  const std::vector<double> times = { 0.0, 0.25, 0.5, 0.75, 1.005 };
+  LineImage image;
+  const auto imageAt = [&](double t)
+  {
+    image = Moved(Way(t));
+    return image.View();
+  };
+  CenterlineTrackingSettings settings;
+  settings.tissue = false;
+  settings.temporalWindow = 0.0;
+  CenterlineTrackingReport report;
+  TrackCenterlines(lines, 0.0, times, imageAt, settings, &report);
+  EXPECT_EQ(report.repeatedPhases, 1);
+  EXPECT_LT(report.repeatability, 0.3);
+  EXPECT_GE(report.repeatability, 0.0);
+}
+
+TEST(CenterlineTracking, RefusesWhatIsWrong)
+{
+  const MovingLines lines = Fork();
+  LineImage image = Moved(Vector3::Zero());
+  const auto imageAt = [&](double) { return image.View(); };
+  const auto track = [&](const std::vector<double>& times, double reference = 0.0)
+  { TrackCenterlines(lines, reference, times, imageAt); };
+  ExpectRefusal([&] { track({}); }, "no phase");
+  ExpectRefusal([&] { track({ 0.0, 0.5, 0.5 }); }, "do not increase: number 2");
+  ExpectRefusal([&] { track({ 0.0, std::nan("") }); }, "do not increase: number 1");
+  ExpectRefusal([&] { track({ 0.0, 0.5 }, std::nan("")); }, "reference time");
+  CenterlineTrackingSettings settings;
+  settings.nodeSpacing = 0.0;
+  ExpectRefusal([&] { TrackCenterlines(lines, 0.0, { 0.0 }, imageAt, settings); }, "nodeSpacing");
+  ExpectRefusal([&] { TrackCenterlines({}, 0.0, { 0.0 }, imageAt); }, "no points");
+  image = Moved(Vector3(500.0, 0.0, 0.0));
+  ExpectRefusal([&] { track({ 0.0, 0.5 }); }, "outside of the image");
+  image = Moved(Vector3::Zero());
+  std::fill(image.values.begin(), image.values.end(), 3.0F);
+  ExpectRefusal([&] { track({ 0.0, 0.5 }); }, "same everywhere");
+  EXPECT_THROW(TrackCenterlines(
+                 lines, 0.0, { 0.0, 0.5 },
+                 [&](double)
+                 {
+                   image = Moved(Vector3::Zero());
+                   return image.View();
+                 },
+                 {}, nullptr, [](double) { return false; }),
+    Cancelled);
+}
