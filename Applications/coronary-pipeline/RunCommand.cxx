@@ -11,12 +11,15 @@
 #include "vtkMessageTrap.h"
 
 #include "vtkBiharmonicSkinWeights.h"
+#include "vtkCardiacPhaseInterpolator.h"
 #include "vtkCellData.h"
 #include "vtkCenterlineSkeleton.h"
+#include "vtkCenterlineTracker.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryTreeTopology.h"
 #include "vtkDataArray.h"
+#include "vtkDataSetSurfaceFilter.h"
 #include "vtkFastMarchingCenterline.h"
 #include "vtkFieldData.h"
 #include "vtkFrangiVesselness.h"
@@ -26,6 +29,7 @@
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkReferencePhase.h"
+#include "vtkSkinDeformation.h"
 #include "vtkStringArray.h"
 #include "vtkTetrahedralMesher.h"
 #include "vtkUnstructuredGrid.h"
@@ -34,8 +38,10 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -56,7 +62,8 @@ enum class Stage
   Centerline,
   Surface,
   Volume,
-  Weights
+  Weights,
+  Motion
 };
 const std::vector<std::pair<std::string, Stage>> Stages = {
   { "vesselness", Stage::Vesselness },
@@ -65,6 +72,7 @@ const std::vector<std::pair<std::string, Stage>> Stages = {
   { "surface", Stage::Surface },
   { "volume", Stage::Volume },
   { "weights", Stage::Weights },
+  { "motion", Stage::Motion },
 };
 
 struct RunJob
@@ -88,6 +96,10 @@ struct RunJob
   bool contours = false;
   bool openEnds = false;
   std::string weightCache;
+  double temporalWindowMs = 66.0;
+  bool evenPhases = false;
+  std::vector<double> moments; ///< empty: the phases of the series
+  std::string interpolation = "cubic";
   bool leaveBonesOutside = false;
   int threads = 0;
   bool compress = false;
@@ -95,6 +107,9 @@ struct RunJob
 
   void Declare(CLI::App& app);
   void Run();
+  nlohmann::ordered_json WriteMotion(vtkCenterlineTracker* tracker, vtkAlgorithm* mesh,
+    vtkAlgorithm* skeleton, const std::vector<double>& times, StagedFolder& folder,
+    vtkMessageTrap& messages, const std::function<void(double)>& progress);
 };
 
 void RunJob::Declare(CLI::App& app)
@@ -120,9 +135,10 @@ void RunJob::Declare(CLI::App& app)
           }
         }
       },
-      "Last stage: vesselness, segmentation, centerline (the default), surface, volume or weights")
-    ->check(
-      CLI::IsMember({ "vesselness", "segmentation", "centerline", "surface", "volume", "weights" }))
+      "Last stage: vesselness, segmentation, centerline (the default), surface, volume, weights or "
+      "motion")
+    ->check(CLI::IsMember(
+      { "vesselness", "segmentation", "centerline", "surface", "volume", "weights", "motion" }))
     ->type_name("STAGE");
 
   const std::string image = "Image";
@@ -228,6 +244,35 @@ void RunJob::Declare(CLI::App& app)
       "there")
     ->type_name("DIR")
     ->group("Weights");
+
+  const std::string motion = "Motion";
+  app
+    .add_option("--temporal-window-ms", this->temporalWindowMs,
+      "Time over which an image was taken, ms: half a turn of the gantry, a quarter with two "
+      "sources")
+    ->check(Within(0.0, 1000.0))
+    ->type_name("MS")
+    ->capture_default_str()
+    ->group(motion);
+  app
+    .add_flag(
+      "--even-phases", this->evenPhases, "Track every other phase only, and interpolate the others")
+    ->group(motion);
+  app
+    .add_option("--moments", this->moments,
+      "R-R fractions at which the moved meshes are written; without it, at the phases of the "
+      "series")
+    ->check(Within(-100.0, 100.0))
+    ->delimiter(',')
+    ->allow_extra_args(false)
+    ->type_name("LIST")
+    ->group(motion);
+  app
+    .add_option("--interpolation", this->interpolation,
+      "Between the tracked phases: linear, cubic or low-noise")
+    ->check(CLI::IsMember({ "linear", "cubic", "low-noise" }))
+    ->capture_default_str()
+    ->group(motion);
   app
     .add_flag("--leave-bones-outside", this->leaveBonesOutside,
       "Leave out bones that lie wholly outside of the mesh, with a warning, instead of failing")
@@ -347,6 +392,83 @@ std::string StatusTable(const nlohmann::ordered_json& trees)
   return table;
 }
 
+/// A list of files and their times, as ParaView opens it.
+std::string SeriesList(const std::vector<std::string>& names, const std::vector<double>& times)
+{
+  nlohmann::ordered_json files = nlohmann::ordered_json::array();
+  for (std::size_t n = 0; n < names.size(); ++n)
+  {
+    files.push_back({ { "name", names[n] }, { "time", times[n] } });
+  }
+  const nlohmann::ordered_json list = { { "file-series-version", "1.0" }, { "files", files } };
+  return list.dump(2) + "\n";
+}
+
+nlohmann::ordered_json RunJob::WriteMotion(vtkCenterlineTracker* tracker, vtkAlgorithm* mesh,
+  vtkAlgorithm* skeleton, const std::vector<double>& times, StagedFolder& folder,
+  vtkMessageTrap& messages, const std::function<void(double)>& progress)
+{
+  const auto mode = this->interpolation == "linear" ? vtkCardiacPhaseInterpolator::Linear
+    : this->interpolation == "cubic"                ? vtkCardiacPhaseInterpolator::PeriodicCubic
+                                                    : vtkCardiacPhaseInterpolator::LowNoise;
+  vtkNew<vtkCardiacPhaseInterpolator> lines;
+  vtkNew<vtkCardiacPhaseInterpolator> poses;
+  lines->SetInputConnection(tracker->GetOutputPort(0));
+  poses->SetInputConnection(tracker->GetOutputPort(1));
+  lines->SetMode(mode);
+  poses->SetMode(mode);
+  vtkNew<vtkSkinDeformation> deformation;
+  deformation->SetInputConnection(mesh->GetOutputPort());
+  deformation->SetRestConnection(skeleton->GetOutputPort());
+  deformation->SetPoseConnection(poses->GetOutputPort());
+  vtkNew<vtkDataSetSurfaceFilter> wall;
+  wall->SetInputConnection(deformation->GetOutputPort());
+
+  // The images are read now.
+  UpdateAtTime(
+    tracker, 0, times.front(), messages, [&](double fraction) { progress(0.8 * fraction); });
+  const std::vector<std::string> stems = { "centerline", "skeleton", "volume", "surface" };
+  const std::vector<std::string> ends = { ".vtp", ".vtp", ".vtu", ".vtp" };
+  std::vector<std::vector<std::string>> names(stems.size());
+  nlohmann::ordered_json inverted = nlohmann::ordered_json::array();
+  for (std::size_t n = 0; n < times.size(); ++n)
+  {
+    std::vector<std::string> files;
+    for (std::size_t what = 0; what < stems.size(); ++what)
+    {
+      std::array<char, 16> number;
+      std::snprintf(number.data(), number.size(), "_%03d", static_cast<int>(n));
+      names[what].push_back(stems[what] + number.data() + ends[what]);
+      files.push_back(folder.Add("motion/" + names[what].back()));
+    }
+    const auto nothing = [](double) {};
+    UpdateAtTime(lines, 0, times[n], messages, nothing);
+    WritePolyData(files[0], vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), messages);
+    UpdateAtTime(poses, 0, times[n], messages, nothing);
+    WritePolyData(files[1], vtkPolyData::SafeDownCast(poses->GetOutputDataObject(0)), messages);
+    UpdateAtTime(deformation, 0, times[n], messages, nothing);
+    auto* moved = vtkUnstructuredGrid::SafeDownCast(deformation->GetOutputDataObject(0));
+    WriteUnstructuredGrid(files[2], moved, messages);
+    vtkDataArray* left = moved->GetFieldData()->GetArray(vtkCoronaryArrayNames::InvertedTetrahedra);
+    inverted.push_back(left != nullptr ? left->GetNumberOfTuples() : 0);
+    UpdateAtTime(wall, 0, times[n], messages, nothing);
+    WritePolyData(files[3], wall->GetOutput(), messages);
+    progress(0.8 + 0.2 * static_cast<double>(n + 1) / static_cast<double>(times.size()));
+  }
+  nlohmann::ordered_json lists;
+  for (std::size_t what = 0; what < stems.size(); ++what)
+  {
+    const std::string name = "motion/" + stems[what] + ends[what] + ".series";
+    WriteFileAtomically(folder.Add(name), SeriesList(names[what], times));
+    lists[stems[what]] = name;
+  }
+  vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
+  return { { "series", lists }, { "times", times },
+    { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
+    { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
+    { "inverted_tetrahedra", inverted } };
+}
+
 void RunJob::Run()
 {
   if (this->scales[0] > this->scales[1])
@@ -400,8 +522,10 @@ void RunJob::Run()
     const bool mesh = this->until >= Stage::Surface;
     const bool fill = this->until >= Stage::Volume;
     const bool bind = this->until >= Stage::Weights;
+    const bool move = this->until >= Stage::Motion;
     ProgressDisplay progress("stage",
-      bind        ? 7
+      move        ? 8
+        : bind    ? 7
         : fill    ? 6
         : mesh    ? 5
         : trace   ? 4
@@ -622,6 +746,31 @@ void RunJob::Run()
                   Numbers(bound, vtkCoronaryArrayNames::LeftOutBones);
               }
               summary += "; " + std::to_string(bones->GetNumberOfLines()) + " bones";
+
+              if (move)
+              {
+                progress.BeginStep(7, "motion");
+                vtkNew<vtkCenterlineTracker> tracker;
+                tracker->SetInputConnection(reader->GetOutputPort());
+                tracker->SetLinesConnection(topology->GetOutputPort());
+                tracker->SetSkeletonConnection(skeleton->GetOutputPort());
+                tracker->SetTemporalWindow(this->temporalWindowMs / 1000.0);
+                tracker->SetTrackedPhases(this->evenPhases ? vtkCenterlineTracker::EvenPhases
+                                                           : vtkCenterlineTracker::AllPhases);
+                std::vector<double> times;
+                for (int n = 0; n < reader->GetNumberOfPhases(); ++n)
+                {
+                  times.push_back(reader->GetPhaseTime(n));
+                }
+                if (!this->moments.empty())
+                {
+                  times = this->moments;
+                  std::sort(times.begin(), times.end());
+                }
+                report["motion"] = this->WriteMotion(tracker, weights, skeleton, times, folder,
+                  messages, [&](double fraction) { progress.Update(fraction); });
+                summary += "; " + std::to_string(times.size()) + " moments";
+              }
             }
           }
         }
@@ -652,8 +801,9 @@ Command MakeRunCommand(CLI::App& program)
   app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, centerline.vtp, "
               "bifurcations.vtp, centerline_lines.vtp, status.csv; with --until surface, "
               "surface.vtp and caps.vtp; with --until volume, volume.vtu, volume_boundary.vtp "
-              "and volume_skeleton.vtp; with --until weights, skeleton.vtp and weights.vtu; and, "
-              "last, report.json.");
+              "and volume_skeleton.vtp; with --until weights, skeleton.vtp and weights.vtu; with "
+              "--until motion, motion/ with series of centerlines, skeletons, tetrahedra and "
+              "surfaces; and, last, report.json.");
   auto job = std::make_shared<RunJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

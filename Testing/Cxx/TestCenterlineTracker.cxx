@@ -38,7 +38,7 @@ struct Scene
   vtkNew<vtkCenterlineTracker> tracker;
   int images = 0;
 
-  explicit Scene(std::vector<double> phases = { 0.05, 0.2, 0.35, 0.5, 0.62, 0.75, 0.9 })
+  explicit Scene(const std::vector<double>& phases = { 0.05, 0.25, 0.5, 0.75 })
   {
     this->phantom->ClearPhases();
     for (const double phase : phases)
@@ -51,6 +51,7 @@ struct Scene
     this->reference->SetTime(0.75);
     this->tracker->SetInputConnection(this->phantom->GetOutputPort(Phantom::ImagePort));
     this->tracker->SetLinesConnection(this->reference->GetOutputPort());
+    this->tracker->SetNodeSpacing(5.0);
   }
 
   vtkPolyData* At(double time)
@@ -98,10 +99,10 @@ std::vector<double> StepsOf(vtkAlgorithm* algorithm)
 TEST(CenterlineTracker, FollowsThePhantomAndReadsItOnce)
 {
   Scene scene;
-  EXPECT_EQ(StepsOf(scene.tracker).size(), 7u);
-  for (const double time : { 0.2, 0.35, 0.62, 0.75 })
+  EXPECT_EQ(StepsOf(scene.tracker).size(), 4u);
+  for (const double time : { 0.05, 0.25, 0.5, 0.75 })
   {
-    // Voxels of 1 mm, and the way along the vessels counts too.
+    // Voxels of 1 mm, a place every 5 mm, and the way along the vessels counts too.
     EXPECT_LT(scene.Error(time), 0.8) << time;
   }
   EXPECT_EQ(scene.tracker->GetNumberOfTrackings(), 1);
@@ -131,18 +132,18 @@ TEST(CenterlineTracker, FollowsThePhantomAndReadsItOnce)
   ASSERT_NE(output->GetCellData()->GetArray("AxialStrain"), nullptr);
   EXPECT_DOUBLE_EQ(output->GetFieldData()->GetArray("PhaseTime")->GetTuple1(0), 0.5);
   EXPECT_DOUBLE_EQ(output->GetFieldData()->GetArray("ReferenceTime")->GetTuple1(0), 0.75);
-  EXPECT_EQ(output->GetFieldData()->GetArray("TrackedShare")->GetNumberOfTuples(), 7);
+  EXPECT_EQ(output->GetFieldData()->GetArray("TrackedShare")->GetNumberOfTuples(), 4);
   EXPECT_DOUBLE_EQ(output->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP()), 0.5);
 
-  // A setting of the phantom makes it another series.
-  scene.phantom->SetSeed(2);
+  // A setting of its own makes another result.
+  scene.tracker->SetTrackedPhases(vtkCenterlineTracker::EvenPhases);
   scene.At(0.5);
   EXPECT_EQ(scene.tracker->GetNumberOfTrackings(), 2);
 }
 
 TEST(CenterlineTracker, MovesTheSkeleton)
 {
-  Scene scene({ 0.35, 0.5, 0.75 });
+  Scene scene({ 0.35, 0.75 });
   vtkNew<vtkCenterlineSkeleton> skeleton;
   skeleton->SetInputConnection(scene.reference->GetOutputPort());
   scene.tracker->SetSkeletonConnection(skeleton->GetOutputPort());
@@ -173,7 +174,7 @@ TEST(CenterlineTracker, MovesTheSkeleton)
 
 TEST(CenterlineTracker, TracksWhatIsChosen)
 {
-  Scene scene;
+  Scene scene({ 0.05, 0.2, 0.35, 0.5, 0.62, 0.75, 0.9 });
   scene.tracker->SetTrackedPhases(vtkCenterlineTracker::EvenPhases);
   EXPECT_EQ(StepsOf(scene.tracker), (std::vector<double>{ 0.05, 0.35, 0.62, 0.9 }));
   scene.tracker->SetTrackedPhases(vtkCenterlineTracker::ListedPhases);
@@ -189,7 +190,7 @@ TEST(CenterlineTracker, TakesLinesOfEveryPhase)
 {
   Scene scene;
   scene.tracker->SetInputConnection(scene.phantom->GetOutputPort(Phantom::TreePort));
-  for (const double time : { 0.2, 0.35, 0.62 })
+  for (const double time : { 0.25, 0.5 })
   {
     EXPECT_LT(scene.Error(time), 1.2) << time;
   }
@@ -201,7 +202,7 @@ TEST(CenterlineTracker, GivesTheSameOnAnyNumberOfThreads)
   for (const int threads : { 1, 3 })
   {
     coronary::SetNumberOfThreads(threads);
-    Scene scene({ 0.35, 0.55, 0.75 });
+    Scene scene({ 0.35, 0.75 });
     vtkPolyData* output = scene.At(0.35);
     std::vector<double> points;
     for (vtkIdType n = 0; n < output->GetNumberOfPoints(); ++n)
@@ -286,10 +287,10 @@ TEST(CenterlineTracker, TakesLinesWithoutPoints)
 
 TEST(CenterlineTracker, Stops)
 {
-  Scene scene({ 0.35, 0.55, 0.75 });
+  Scene scene({ 0.35, 0.75 });
   scene.phantom->Update();
   UpdateAborted(scene.tracker);
   EXPECT_EQ(scene.tracker->GetOutput()->GetNumberOfPoints(), 0);
   EXPECT_EQ(scene.tracker->GetNumberOfTrackings(), 0);
-  EXPECT_GT(scene.At(0.55)->GetNumberOfPoints(), 0);
+  EXPECT_GT(scene.At(0.35)->GetNumberOfPoints(), 0);
 }
