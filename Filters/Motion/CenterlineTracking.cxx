@@ -24,7 +24,8 @@ constexpr double SameMoment = 0.02;
 constexpr double TrackedLikeness = 0.65;
 constexpr double TrackedConfidence = 0.5;
 constexpr double WeakConfidence = 0.2;
-constexpr double LostDeviation = 2.0; ///< mm
+constexpr double FilledConfidence = 0.3; ///< at most
+constexpr double LostDeviation = 2.0;    ///< mm
 /// Beyond the patch, the search and the smearing: what the places may still move, mm.
 constexpr double Spare = 3.0;
 
@@ -1019,17 +1020,20 @@ void Tracker::Finish(PoseSequence& sequence)
   double best = 0.0;
   for (std::size_t k = 0; k < phases; ++k)
   {
+    std::vector<double> seen(nodes);
     std::vector<double> confidence(nodes);
     std::vector<double> deviation(nodes);
     double tracked = 0.0;
     for (std::size_t n = 0; n < nodes; ++n)
     {
       deviation[n] = this->Motion.Deviation(static_cast<int>(n), this->Times[k]);
-      const double sure = deviation[n] / this->Settings.trackedDeviation;
-      confidence[n] =
-        std::clamp((this->Likeness[k][n] - 0.3) / (2.0 * (TrackedLikeness - 0.3)), 0.0, 1.0) /
-        std::max(1.0, sure * sure);
-      tracked += confidence[n] >= TrackedConfidence ? 1.0 : 0.0;
+      const double sure = this->Settings.trackedDeviation / deviation[n];
+      const double certain = std::min(1.0, sure * sure);
+      seen[n] = certain *
+        std::clamp((this->Likeness[k][n] - 0.3) / (2.0 * (TrackedLikeness - 0.3)), 0.0, 1.0);
+      // What was filled well is worth something to those who smooth the motion.
+      confidence[n] = std::max(seen[n], FilledConfidence * certain);
+      tracked += seen[n] >= TrackedConfidence ? 1.0 : 0.0;
     }
     this->Result.trackedShare.push_back(tracked / static_cast<double>(nodes));
     best = std::max(best, this->Result.trackedShare.back());
@@ -1046,14 +1050,14 @@ void Tracker::Finish(PoseSequence& sequence)
     sequence.points.push_back(std::move(moved));
     sequence.confidence.push_back(this->Nodes.AtPoints(confidence));
     const std::vector<double> spread = this->Nodes.AtPoints(deviation);
+    const std::vector<double> sight = this->Nodes.AtPoints(seen);
     std::vector<TrackingStatus> status(spread.size());
     for (std::size_t p = 0; p < spread.size(); ++p)
     {
-      const double sure = sequence.confidence.back()[p];
-      status[p] = sure >= TrackedConfidence ? TrackingStatus::Tracked
-        : sure >= WeakConfidence            ? TrackingStatus::Weak
-        : spread[p] > LostDeviation         ? TrackingStatus::Lost
-                                            : TrackingStatus::Filled;
+      status[p] = sight[p] >= TrackedConfidence ? TrackingStatus::Tracked
+        : sight[p] >= WeakConfidence            ? TrackingStatus::Weak
+        : spread[p] > LostDeviation             ? TrackingStatus::Lost
+                                                : TrackingStatus::Filled;
     }
     sequence.status.push_back(std::move(status));
     sequence.calibre.emplace_back(this->Lines.rest.size(), calibre[k]);

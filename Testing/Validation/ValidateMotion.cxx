@@ -4,6 +4,7 @@
 
 #include "CenterlineTracking.h"
 #include "CoronaryPhantom.h"
+#include "MotionRegularization.h"
 #include "PhantomCases.h"
 #include "PhantomScan.h"
 #include "PhaseInterpolation.h"
@@ -45,6 +46,7 @@ struct Case
   bool trueTree = false;
   bool lost = false; ///< a systolic phase, and 40 % of the nodes in two others
   bool allPhases = false;
+  bool regularize = false;
   PhaseInterpolationMode mode = PhaseInterpolationMode::PeriodicCubic;
   std::string cache; ///< folder for images, or empty
 };
@@ -195,7 +197,7 @@ Outcome Run(const Case& test)
   const auto since = [&](auto start)
   { return std::chrono::duration<double>(now() - start).count(); };
   const auto start = now();
-  const PoseSequence poses = TrackCenterlines(
+  PoseSequence poses = TrackCenterlines(
     lines, ReferencePhase, times,
     [&](double time)
     {
@@ -209,6 +211,10 @@ Outcome Run(const Case& test)
     },
     tracking, &report);
   outcome.seconds = since(start) - inImages;
+  if (test.regularize)
+  {
+    poses = RegularizeMotion(poses, lines).poses;
+  }
   outcome.repeatability = report.repeatability;
   outcome.imagesRead = report.imagesRead;
   outcome.trackedShare = report.trackedShare;
@@ -345,6 +351,8 @@ int main(int argc, char** argv)
       { "low-noise", PhaseInterpolationMode::LowNoise } };
     program.add_option("--mode", test.mode, "interpolation: linear, cubic or low-noise")
       ->transform(CLI::CheckedTransformer(modes));
+    program.add_flag(
+      "--regularize", test.regularize, "with the limits and smoothing of the motion");
     program.add_flag("--true-tree", test.trueTree, "the true tree, not the one found");
     program
       .add_option("--cache", test.cache, "existing folder that keeps the images for other runs")
