@@ -389,7 +389,7 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
 }
 
 int vtkCenterlineTracker::RequestData(
-  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   vtkInformation* outInfo = outputs->GetInformationObject(0);
   vtkPolyData* input = vtkPolyData::GetData(inputs[LinesPort], 0);
@@ -412,21 +412,15 @@ int vtkCenterlineTracker::RequestData(
       this->Track(inputs);
     }
     const std::vector<double>& times = data.Poses.times;
-    std::size_t phase = 0;
-    // Ports may be asked for by different consumers; the executive asks for one time.
-    for (int port = 0; port < 2; ++port)
-    {
-      vtkInformation* info = outputs->GetInformationObject(port);
-      if (info->Has(SDDP::UPDATE_TIME_STEP()))
-      {
-        const double wanted = info->Get(SDDP::UPDATE_TIME_STEP());
-        phase =
-          std::min_element(times.begin(), times.end(),
-            [wanted](double a, double b) { return std::abs(a - wanted) < std::abs(b - wanted); }) -
-          times.begin();
-        break;
-      }
-    }
+    // The executive takes all outputs for those of the time that one of them was asked for.
+    vtkInformation* asked = outputs->GetInformationObject(
+      std::max(0, request->Get(vtkDemandDrivenPipeline::FROM_OUTPUT_PORT())));
+    const double wanted =
+      asked->Has(SDDP::UPDATE_TIME_STEP()) ? asked->Get(SDDP::UPDATE_TIME_STEP()) : times.front();
+    const std::size_t phase =
+      std::min_element(times.begin(), times.end(),
+        [wanted](double a, double b) { return std::abs(a - wanted) < std::abs(b - wanted); }) -
+      times.begin();
     vtkPoseSequences::PoseArrays arrays;
     arrays.confidence = this->ConfidenceArrayName;
     arrays.status = this->StatusArrayName;
@@ -481,8 +475,7 @@ int vtkCenterlineTracker::RequestData(
           fields, names::TrackingRepeatability, std::vector<double>{ data.Report.repeatability });
       }
     };
-    const vtkPoseSequences::Moment moment = vtkPoseSequences::MomentOf(data.Poses, phase);
-    write(input, moment, output[0]);
+    write(input, vtkPoseSequences::MomentOf(data.Poses, phase), output[0]);
 
     vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;
@@ -505,7 +498,7 @@ int vtkCenterlineTracker::RequestData(
         status.push_back(data.Poses.status[phase][foot.fraction < 0.5 ? foot.first : foot.second]);
       }
       vtkPoseSequences::Moment posed;
-      posed.time = moment.time;
+      posed.time = times[phase];
       posed.points = &joints;
       posed.confidence = &confidence;
       posed.status = &status;

@@ -13,6 +13,7 @@
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
+#include "vtkInformationVector.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
@@ -170,6 +171,27 @@ TEST(CenterlineTracker, MovesTheSkeleton)
     }
     EXPECT_LT(least, 0.5);
   }
+
+  // The two outputs may be asked for different times.
+  double before[3];
+  posed->GetPoint(0, before);
+  scene.At(0.75);
+  vtkNew<vtkInformationVector> request;
+  request->SetNumberOfInformationObjects(2);
+  request->GetInformationObject(1)->Set(SDDP::UPDATE_TIME_STEP(), 0.75);
+  scene.tracker->Update(1, request);
+  double atRest[3];
+  posed->GetPoint(0, atRest);
+  EXPECT_GT(std::hypot(atRest[0] - before[0], atRest[1] - before[1], atRest[2] - before[2]), 3.0);
+  request->GetInformationObject(1)->Set(SDDP::UPDATE_TIME_STEP(), 0.35);
+  scene.tracker->Update(1, request);
+  double again[3];
+  posed->GetPoint(0, again);
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    EXPECT_DOUBLE_EQ(again[axis], before[axis]);
+  }
+  EXPECT_EQ(scene.tracker->GetNumberOfTrackings(), 1);
 }
 
 TEST(CenterlineTracker, TracksWhatIsChosen)
