@@ -70,7 +70,7 @@ echo "== Its motion beside published values"
 "$pipeline" phantom-motion --seed 1 | tee "$output/phantom-motion.txt"
 
 echo "== From the images to the coronary arteries"
-"$pipeline" run "$output/phantom/series.json" --until weights --output "$output/run"
+"$pipeline" run "$output/phantom/series.json" --until motion --output "$output/run"
 
 if [ "$pictures" = yes ]; then
   echo "== Pictures"
@@ -91,6 +91,7 @@ if [ "$pictures" = yes ]; then
   render surface "$output/run" --truth "$truth"
   render volume "$output/run"
   render skinning "$output/run"
+  render tracking "$output/run"
 fi
 
 plugin="$(find "$root/build/paraview" -name DynamicCoronaryPlugin.so -print -quit)"
@@ -107,6 +108,7 @@ What lies where
                                       named trees of centerlines at the quietest phase, their
                                       closed surface with its caps, skeleton, tetrahedra
                                       with the skeleton inside and their skin weights;
+                                      motion/ has all of it at every phase (.series);
                                       status.csv and report.json say how they came about
   $output/phantom-motion.txt          amplitudes, speeds and rest windows per artery
 EOF
