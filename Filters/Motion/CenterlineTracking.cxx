@@ -259,6 +259,7 @@ private:
   Vector3 High;
   Window Limits;
   double Contrast = 1.0; ///< of the vessels in the reference
+  double Voxel = 0.4;    ///< largest edge of the reference's voxels, mm
   SparseVolume Reference;
   std::vector<SparseVolume> Volumes; ///< per phase
   PerPhase Displacement;             ///< per phase and node: the present trajectories
@@ -390,6 +391,7 @@ void Tracker::SearchCoarsely()
   AveragedVolume averaged;
   {
     const ScalarImage image = this->Read(this->ReferenceTime);
+    this->Voxel = image.grid.spacing.maxCoeff();
     averaged = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
     this->Reference = SparseVolume(
       image, this->Nodes.position, this->Settings.fineRadius + this->Settings.fineRange + Spare);
@@ -700,7 +702,8 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
       else
       {
         seen.information[k][n] =
-          Limited(curvature[n] * (30.0 / std::max<double>(least[n], this->NoiseFloor())), 0.5);
+          Limited(curvature[n] * (30.0 / std::max<double>(least[n], this->NoiseFloor())),
+            std::max(TissueDeviation, 0.8 * this->Voxel));
       }
       seen.displacement[k][n] += this->Displacement[k][n];
     }
@@ -841,7 +844,8 @@ void Tracker::Align(double robustScale)
           if (trust > 0.0 && curvature.trace() > 0.0)
           {
             information[k][n] = trust * trust *
-              Limited(curvature * (60.0 / std::max(noise, this->NoiseFloor())), 0.15);
+              Limited(curvature * (60.0 / std::max(noise, this->NoiseFloor())),
+                std::max(VesselDeviation, 0.35 * this->Voxel));
           }
         }
       });
