@@ -1,6 +1,7 @@
 #include "Command.h"
 
 #include "AtomicFile.h"
+#include "FileSeries.h"
 #include "Interruption.h"
 #include "MetaImageWriter.h"
 #include "OptionChecks.h"
@@ -392,18 +393,6 @@ std::string StatusTable(const nlohmann::ordered_json& trees)
   return table;
 }
 
-/// A list of files and their times, as ParaView opens it.
-std::string SeriesList(const std::vector<std::string>& names, const std::vector<double>& times)
-{
-  nlohmann::ordered_json files = nlohmann::ordered_json::array();
-  for (std::size_t n = 0; n < names.size(); ++n)
-  {
-    files.push_back({ { "name", names[n] }, { "time", times[n] } });
-  }
-  const nlohmann::ordered_json list = { { "file-series-version", "1.0" }, { "files", files } };
-  return list.dump(2) + "\n";
-}
-
 nlohmann::ordered_json RunJob::WriteMotion(vtkCenterlineTracker* tracker, vtkAlgorithm* mesh,
   vtkAlgorithm* skeleton, const std::vector<double>& times, StagedFolder& folder,
   vtkMessageTrap& messages, const std::function<void(double)>& progress)
@@ -429,7 +418,7 @@ nlohmann::ordered_json RunJob::WriteMotion(vtkCenterlineTracker* tracker, vtkAlg
     tracker, 0, times.front(), messages, [&](double fraction) { progress(0.8 * fraction); });
   const std::vector<std::string> stems = { "centerline", "skeleton", "volume", "surface" };
   const std::vector<std::string> ends = { ".vtp", ".vtp", ".vtu", ".vtp" };
-  std::vector<std::vector<std::string>> names(stems.size());
+  std::vector<std::vector<TimedFile>> written(stems.size());
   nlohmann::ordered_json inverted = nlohmann::ordered_json::array();
   for (std::size_t n = 0; n < times.size(); ++n)
   {
@@ -438,8 +427,8 @@ nlohmann::ordered_json RunJob::WriteMotion(vtkCenterlineTracker* tracker, vtkAlg
     {
       std::array<char, 16> number;
       std::snprintf(number.data(), number.size(), "_%03d", static_cast<int>(n));
-      names[what].push_back(stems[what] + number.data() + ends[what]);
-      files.push_back(folder.Add("motion/" + names[what].back()));
+      written[what].push_back({ stems[what] + number.data() + ends[what], times[n] });
+      files.push_back(folder.Add("motion/" + written[what].back().path));
     }
     const auto nothing = [](double) {};
     UpdateAtTime(lines, 0, times[n], messages, nothing);
@@ -459,7 +448,7 @@ nlohmann::ordered_json RunJob::WriteMotion(vtkCenterlineTracker* tracker, vtkAlg
   for (std::size_t what = 0; what < stems.size(); ++what)
   {
     const std::string name = "motion/" + stems[what] + ends[what] + ".series";
-    WriteFileAtomically(folder.Add(name), SeriesList(names[what], times));
+    WriteFileAtomically(folder.Add(name), FileSeriesText(written[what]));
     lists[stems[what]] = name;
   }
   vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));

@@ -26,6 +26,9 @@ constexpr double TrackedConfidence = 0.5;
 constexpr double WeakConfidence = 0.2;
 constexpr double FilledConfidence = 0.3; ///< at most
 constexpr double LostDeviation = 2.0;    ///< mm
+/// Nothing is found better than that, or than a share of a voxel, mm.
+constexpr double TissueDeviation = 0.5;
+constexpr double VesselDeviation = 0.15;
 /// Beyond the patch, the search and the smearing: what the places may still move, mm.
 constexpr double Spare = 3.0;
 
