@@ -111,7 +111,7 @@ def main():
 
     def look(target):
         common.look_at(target, center, (0.5, -0.8, 0.35), (0.0, 0.0, 1.0),
-                       0.4 * surfaces[0][1].GetLength())
+                       0.62 * surfaces[0][1].GetLength())
 
     start = lines[0][1]
     target = panel(0, "centerlines over time, by branch")

@@ -30,6 +30,10 @@ tables=(
   "skin-weights: skin-weight-benchmark --sizes 0 1 2 5 3 4"
   "skin-deformation: skin-deformation-benchmark --benchmark_repetitions=5 --benchmark_report_aggregates_only=true"
   "volume-cgal: validate-volume --backend CGAL --seeds 3 --variants plain"
+  "motion: validate-motion --seeds 101..110 --details"
+  "motion-ideal: validate-motion --seeds 101..110 --window 0"
+  "motion-140ms: validate-motion --seeds 101..110 --window 140"
+  "motion-lost: validate-motion --seeds 101..110 --lost"
 )
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"

@@ -373,10 +373,10 @@ check_motion() {
 }
 
 check_weights() {
-  run 0 phantom --quiet --seed 2 --fractions 0.74 --spacing 1.2 --no-truth --output series
-  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 1 --until weights --edges 0.4 0.8 \
+  run 0 phantom --quiet --seed 2 --fractions 0.45,0.74 --spacing 1.2 --no-truth --output series
+  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 1 --until motion --time 0.74 --edges 0.4 0.8 \
     --weight-cache weights --output bound
-  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 2 --until weights --edges 0.4 0.8 \
+  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 2 --until motion --time 0.74 --edges 0.4 0.8 \
     --weight-cache weights2 --output bound2
   diff -r bound bound2 || fail "another number of threads gave other weights"
   diff -r weights weights2 || fail "another number of threads gave another cache"
@@ -387,6 +387,21 @@ check_weights() {
     grep -q "Name=\"$name\"" bound/skeleton.vtp || fail "no $name in skeleton.vtp"
   done
   grep -q '"bones": [0-9]\{2,\}' bound/report.json || fail "few bones: $(cat bound/report.json)"
+
+  # The same mesh at every phase, moved.
+  for name in centerline.vtp skeleton.vtp surface.vtp volume.vtu; do
+    [ "$(grep -c '"time": 0\.[47]' "bound/motion/$name.series")" = 2 ] \
+      || fail "$name.series: $(cat "bound/motion/$name.series")"
+    [ "$(grep -o 'NumberOfPoints="[0-9]*"' "bound/motion/${name%.*}_000.${name##*.}")" = \
+      "$(grep -o 'NumberOfPoints="[0-9]*"' "bound/motion/${name%.*}_001.${name##*.}")" ] \
+      || fail "$name has other points at another phase"
+    cmp -s "bound/motion/${name%.*}_000.${name##*.}" "bound/motion/${name%.*}_001.${name##*.}" \
+      && fail "$name does not move"
+  done
+  for name in TrackingConfidence TrackingStatus CalibreFactor AxialStrain TrackedShare; do
+    grep -q "Name=\"$name\"" bound/motion/centerline_000.vtp || fail "no $name in centerline_000.vtp"
+  done
+  expect_text bound/report.json '"tracked_share"'
 }
 
 check_run() {
