@@ -211,6 +211,8 @@ private:
     double robustScale = 1.0;                      ///< mm
   };
 
+  /// A part of the whole progress.
+  ProgressCallback Part(double from, double to) const;
   ScalarImage Read(double time);
   void MeasureContrast();
   void SearchCoarsely();
@@ -220,7 +222,7 @@ private:
   /// Per node: the patch's weights without what is nearer to a vessel's wall than `margin`, sum 1; all 0
   /// where too little is left.
   std::vector<std::vector<float>> WithoutVessels(const Patch& patch, double margin) const;
-  void Align(double robustScale);
+  void Align(double robustScale, double progressFrom);
   void Finish(PoseSequence& sequence);
   /// Per phase: factor of the radius, of all vessels together.
   std::vector<double> MeasureCalibre() const;
@@ -271,6 +273,13 @@ private:
   Seen Vessels;      ///< by the last alignment
   std::vector<std::vector<double>> Likeness; ///< per phase and node: correlation of the core
 };
+
+ProgressCallback Tracker::Part(double from, double to) const
+{
+  return this->Progress ? ProgressCallback([this, from, to](double done)
+                            { return this->Progress(from + done * (to - from)); })
+                        : ProgressCallback();
+}
 
 ScalarImage Tracker::Read(double time)
 {
@@ -455,7 +464,8 @@ void Tracker::SearchCoarsely()
     const AveragedVolume moved =
       AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
     std::vector<std::vector<float>> costs(nodes);
-    ParallelFor(nodes, 4,
+    ParallelFor(
+      nodes, 4,
       [&](std::int64_t first, std::int64_t last)
       {
         std::vector<float> block(static_cast<std::size_t>(blockSide) * blockSide * blockSide);
@@ -476,7 +486,9 @@ void Tracker::SearchCoarsely()
           SumsOfSquares(
             block, blockSide, this->Coarse, weights[n], wanted[n], lattice.reach, costs[n]);
         }
-      });
+      },
+      this->Part(0.6 * (static_cast<double>(step) + 0.3) / static_cast<double>(phases),
+        0.6 * static_cast<double>(step + 1) / static_cast<double>(phases)));
     ToLikelihoods(costs, 30.0, 20.0, 0.1 * this->NoiseFloor());
     const std::vector<Vector3> best = BestDisplacements(this->Nodes, lattice, costs, 0.5);
     for (std::int64_t n = 0; n < nodes; ++n)
@@ -487,7 +499,6 @@ void Tracker::SearchCoarsely()
     done.push_back(phase);
     this->Volumes[phase] =
       SparseVolume(image, this->PlacesAt(this->Displacement[phase]), this->Keep());
-    Report(this->Progress, 0.6 * static_cast<double>(step + 1) / static_cast<double>(phases));
   }
   const Seen seen{ this->Displacement,
     std::vector<std::vector<Matrix3>>(
@@ -609,7 +620,8 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
     std::vector<std::vector<float>> blocks(nodes);
     std::vector<std::vector<float>> expected(nodes);
     std::vector<Matrix3> curvature(nodes, Matrix3::Zero());
-    ParallelFor(nodes, 4,
+    ParallelFor(
+      nodes, 4,
       [&](std::int64_t first, std::int64_t last)
       {
         for (std::int64_t n = first; n < last; ++n)
@@ -669,7 +681,9 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
           }
           SumsOfSquares(block, blockSide, this->Fine, weights[n], wanted, lattice.reach, costs[n]);
         }
-      });
+      },
+      this->Part(progressFrom + 0.1 * static_cast<double>(k) / static_cast<double>(phases),
+        progressFrom + 0.1 * static_cast<double>(k + 1) / static_cast<double>(phases)));
     std::vector<float> least(nodes);
     for (std::int64_t n = 0; n < nodes; ++n)
     {
@@ -710,13 +724,11 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
       }
       seen.displacement[k][n] += this->Displacement[k][n];
     }
-    Report(this->Progress,
-      progressFrom + 0.1 * static_cast<double>(k + 1) / static_cast<double>(phases));
   }
   return seen;
 }
 
-void Tracker::Align(double robustScale)
+void Tracker::Align(double robustScale, double progressFrom)
 {
   const std::size_t phases = this->Times.size();
   const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
@@ -728,7 +740,8 @@ void Tracker::Align(double robustScale)
   const std::size_t samples = this->Core.places.size();
   for (std::size_t k = 0; k < phases; ++k)
   {
-    ParallelFor(nodes, 4,
+    ParallelFor(
+      nodes, 4,
       [&](std::int64_t first, std::int64_t last)
       {
         std::vector<float> wanted(samples);
@@ -851,7 +864,9 @@ void Tracker::Align(double robustScale)
                 std::max(VesselDeviation, 0.35 * this->Voxel));
           }
         }
-      });
+      },
+      this->Part(progressFrom + 0.05 * static_cast<double>(k) / static_cast<double>(phases),
+        progressFrom + 0.05 * static_cast<double>(k + 1) / static_cast<double>(phases)));
   }
   Seen seen{ std::move(measured), std::move(information), robustScale };
   this->Fit(this->WithSurroundings(seen));
@@ -1093,8 +1108,7 @@ PoseSequence Tracker::Run()
   }
   for (int round = 0; round < 4; ++round)
   {
-    this->Align(round < 2 ? 1.0 : 0.5);
-    Report(this->Progress, 0.8 + 0.05 * (round + 1));
+    this->Align(round < 2 ? 1.0 : 0.5, 0.8 + 0.05 * round);
   }
   PoseSequence sequence;
   this->Finish(sequence);
