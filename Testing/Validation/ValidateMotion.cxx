@@ -413,10 +413,10 @@ int main(int argc, char** argv)
     {
       test.seed = seed;
       Outcome o = Run(test);
-      sumOfMeans += o.between.Mean();
+      Errors& judged = test.allPhases ? o.tracked : o.between;
+      sumOfMeans += judged.Mean();
       met = met && o.calledNear >= LeastCalledNear * o.called &&
-        (quick || test.lost || test.window > 0.07 ||
-          o.between.Percentile(0.95) <= LargestPercentile);
+        (quick || test.lost || test.window > 0.07 || judged.Percentile(0.95) <= LargestPercentile);
       volumes = std::max(volumes, o.volume.Percentile(1.0));
       const double all = static_cast<double>(o.tracked.values.size());
       std::printf("| %llu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | "
