@@ -97,6 +97,7 @@ Trajectories FitTrajectories(const LineNodes& nodes, const std::vector<double>& 
       std::to_string(measurements.size()) + " nodes instead of " + std::to_string(count));
   }
   std::vector<Eigen::VectorXd> basis;
+  basis.reserve(times.size());
   for (const double time : times)
   {
     basis.push_back(PeriodicBasis(time, prior.harmonics));
