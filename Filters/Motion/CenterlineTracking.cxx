@@ -56,6 +56,12 @@ struct Patch
   int reach = 0;
   double step = 1.0;
 
+  /// From the node, mm.
+  Vector3 Offset(std::size_t p) const
+  {
+    return this->step * Vector3(this->places[p][0], this->places[p][1], this->places[p][2]);
+  }
+
   Patch(double radius, double spacing)
     : reach(static_cast<int>(radius / spacing))
     , step(spacing)
@@ -347,10 +353,9 @@ void Tracker::MeasureContrast()
   for (const Vector3& centre : this->Nodes.position)
   {
     std::vector<float> values;
-    for (const std::array<int, 3>& place : this->Core.places)
+    for (std::size_t p = 0; p < this->Core.places.size(); ++p)
     {
-      const float value =
-        this->Reference.Sample(centre + this->Core.step * Vector3(place[0], place[1], place[2]));
+      const float value = this->Reference.Sample(centre + this->Core.Offset(p));
       if (!std::isnan(value))
       {
         values.push_back(value);
@@ -405,8 +410,7 @@ void Tracker::SearchCoarsely()
     const ScalarImage image = this->Read(this->ReferenceTime);
     this->Voxel = image.grid.spacing.maxCoeff();
     averaged = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
-    this->Reference = SparseVolume(
-      image, this->Nodes.position, this->Settings.fineRadius + this->Settings.fineRange + Spare);
+    this->Reference = SparseVolume(image, this->Nodes.position, this->Keep());
   }
   this->MeasureContrast();
   const std::vector<std::vector<float>> weights = this->Settings.tissue
@@ -416,10 +420,9 @@ void Tracker::SearchCoarsely()
   std::vector<float> all;
   for (std::int64_t n = 0; n < nodes; ++n)
   {
-    for (const std::array<int, 3>& place : this->Coarse.places)
+    for (std::size_t p = 0; p < this->Coarse.places.size(); ++p)
     {
-      wanted[n].push_back(averaged.Sample(
-        this->Nodes.position[n] + this->Coarse.step * Vector3(place[0], place[1], place[2])));
+      wanted[n].push_back(averaged.Sample(this->Nodes.position[n] + this->Coarse.Offset(p)));
       all.push_back(wanted[n].back());
     }
   }
@@ -574,8 +577,7 @@ std::vector<std::vector<float>> Tracker::WithoutVessels(const Patch& patch, doub
           }
           for (std::size_t p = 0; p < patch.places.size(); ++p)
           {
-            const std::array<int, 3>& place = patch.places[p];
-            const Vector3 from = centre + patch.step * Vector3(place[0], place[1], place[2]) - a;
+            const Vector3 from = centre + patch.Offset(p) - a;
             const double at =
               std::clamp(from.dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
             if ((from - at * way).squaredNorm() < wall * wall)
@@ -652,8 +654,7 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
             {
               continue;
             }
-            const std::array<int, 3>& place = this->Fine.places[p];
-            const Vector3 offset = this->Fine.step * Vector3(place[0], place[1], place[2]);
+            const Vector3 offset = this->Fine.Offset(p);
             wanted[p] = expect(offset);
             if (!vessels)
             {
@@ -763,8 +764,7 @@ void Tracker::Align(double robustScale, double progressFrom)
           };
           for (std::size_t p = 0; p < samples; ++p)
           {
-            const std::array<int, 3>& place = this->Core.places[p];
-            const Vector3 offset = this->Core.step * Vector3(place[0], place[1], place[2]);
+            const Vector3 offset = this->Core.Offset(p);
             wanted[p] = expected(offset);
             for (int axis = 0; axis < 3; ++axis)
             {
@@ -788,9 +788,7 @@ void Tracker::Align(double robustScale, double progressFrom)
             double sumWanted = 0.0;
             for (std::size_t p = 0; p < samples; ++p)
             {
-              const std::array<int, 3>& place = this->Core.places[p];
-              seen[p] = this->Volumes[k].Sample(
-                centre + shift + this->Core.step * Vector3(place[0], place[1], place[2]));
+              seen[p] = this->Volumes[k].Sample(centre + shift + this->Core.Offset(p));
               if (weight[p] > 0.0F && !std::isnan(seen[p]))
               {
                 sum += weight[p];
@@ -916,8 +914,7 @@ std::vector<double> Tracker::MeasureCalibre() const
           double sum = 0.0;
           for (std::size_t p = 0; p < samples; ++p)
           {
-            const std::array<int, 3>& place = this->Core.places[p];
-            const Vector3 offset = this->Core.step * Vector3(place[0], place[1], place[2]);
+            const Vector3 offset = this->Core.Offset(p);
             const Vector3 rest = back * offset;
             const double beside = (rest - rest.dot(tangent) * tangent).norm();
             rows[p].setZero();

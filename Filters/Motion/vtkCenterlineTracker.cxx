@@ -64,6 +64,13 @@ double FieldValue(vtkDataObject* data, const char* name, double otherwise)
                                                              : otherwise;
 }
 
+std::size_t NearestIndex(const std::vector<double>& times, double wanted)
+{
+  return std::min_element(times.begin(), times.end(),
+           [wanted](double a, double b) { return std::abs(a - wanted) < std::abs(b - wanted); }) -
+    times.begin();
+}
+
 /// Where a point is nearest to the lines.
 struct Foot
 {
@@ -197,8 +204,7 @@ std::vector<double> vtkCenterlineTracker::Selected(const std::vector<double>& st
       {
         throw std::invalid_argument("TrackedTimes must be finite");
       }
-      result.push_back(*std::min_element(steps.begin(), steps.end(),
-        [time](double a, double b) { return std::abs(a - time) < std::abs(b - time); }));
+      result.push_back(steps[NearestIndex(steps, time)]);
     }
     std::sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
@@ -339,10 +345,7 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
       drawn = coronary::RenderLines(data.Lines, LineSpacing, LineMargin);
       return drawn.View();
     }
-    vtkCoronary::Moment moment;
-    moment.exists = true;
-    moment.time = *std::min_element(steps.begin(), steps.end(),
-      [time](double a, double b) { return std::abs(a - time) < std::abs(b - time); });
+    const vtkCoronary::Moment moment = vtkCoronary::NearestMoment(series, false, time);
     data.LastAsked = moment;
     request.Ask(images ? &whole : nullptr, moment);
     vtkDataObject* now = vtkDataObject::GetData(series);
@@ -368,9 +371,7 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
   };
   if (images)
   {
-    const double nearest = *std::min_element(steps.begin(), steps.end(),
-      [&](double a, double b)
-      { return std::abs(a - data.Reference) < std::abs(b - data.Reference); });
+    const double nearest = vtkCoronary::NearestMoment(series, false, data.Reference).time;
     Require(std::abs(nearest - data.Reference) < 1e-3,
       "The reference time " + std::to_string(data.Reference) +
         " is none of the time steps of the series");
@@ -417,10 +418,7 @@ int vtkCenterlineTracker::RequestData(
       std::max(0, request->Get(vtkDemandDrivenPipeline::FROM_OUTPUT_PORT())));
     const double wanted =
       asked->Has(SDDP::UPDATE_TIME_STEP()) ? asked->Get(SDDP::UPDATE_TIME_STEP()) : times.front();
-    const std::size_t phase =
-      std::min_element(times.begin(), times.end(),
-        [wanted](double a, double b) { return std::abs(a - wanted) < std::abs(b - wanted); }) -
-      times.begin();
+    const std::size_t phase = NearestIndex(times, wanted);
     vtkPoseSequences::PoseArrays arrays;
     arrays.confidence = this->ConfidenceArrayName;
     arrays.status = this->StatusArrayName;
