@@ -1,0 +1,311 @@
+// Distances between two surfaces beside CGAL's Hausdorff distance and VTK's distance filter in the
+// same run: time, and that the values agree. Tables in Markdown.
+
+#include "CoronaryPhantom.h"
+#include "MeasuredProcess.h"
+#include "MeshDistance.h"
+#include "SmoothRandomField.h"
+#include "TriangleBvh.h"
+#if defined(DYNAMICCORONARY_WITH_CGAL)
+#include "CgalMeshDistance.h"
+#endif
+
+#include "vtkCellArray.h"
+#include "vtkDataArray.h"
+#include "vtkDistancePolyDataFilter.h"
+#include "vtkNew.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace
+{
+using namespace coronary;
+
+// What has to be reached.
+constexpr double LeastSpeedUpCgal = 8.0;
+constexpr double LeastSpeedUpVtk = 15.0;
+constexpr double MostRefitSeconds = 0.5e-3;
+constexpr double ErrorBound = 1e-3;
+
+struct Options
+{
+  double spacing = 0.0;
+  int repeats = 5;
+  int threads = 2;
+  std::uint64_t seed = 1;
+  bool withoutCgal = false;
+  bool strict = false;
+};
+
+/// The lumen of a phantom, every point moved by a smooth random displacement of so many mm.
+SurfaceMesh MakeLumen(const Options& options, double spacing, double displacement)
+{
+  PhantomSettings settings;
+  settings.seed = options.seed;
+  settings.surfaceSpacing = spacing;
+  const PhantomSurface lumen = CoronaryPhantom(settings).Surface(0.75);
+  SurfaceMesh mesh;
+  mesh.points = lumen.points;
+  mesh.triangles = lumen.triangles;
+  if (displacement > 0.0)
+  {
+    std::array<SmoothRandomField, 3> fields;
+    for (std::uint64_t k = 0; k < 3; ++k)
+    {
+      fields[k] = SmoothRandomField(options.seed, 70 + k, 8.0);
+    }
+    for (Vector3& p : mesh.points)
+    {
+      p += displacement * Vector3(fields[0](p), fields[1](p), fields[2](p));
+    }
+  }
+  return mesh;
+}
+
+vtkSmartPointer<vtkPolyData> PolyDataOf(const SurfaceMesh& mesh)
+{
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const Vector3& p : mesh.points)
+  {
+    points->InsertNextPoint(p.data());
+  }
+  vtkNew<vtkCellArray> cells;
+  for (const Triangle& t : mesh.triangles)
+  {
+    cells->InsertNextCell({ t[0], t[1], t[2] });
+  }
+  data->SetPoints(points);
+  data->SetPolys(cells);
+  return data;
+}
+
+double Seconds(const std::function<void()>& work)
+{
+  const auto begin = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+struct Timed
+{
+  const char* name;
+  std::function<void()> work;
+  std::vector<double> seconds;
+
+  double Least() const { return *std::min_element(this->seconds.begin(), this->seconds.end()); }
+};
+
+const char* Verdict(bool met)
+{
+  return met ? "met" : "**MISSED**";
+}
+
+int Run(const Options& options)
+{
+  SetNumberOfThreads(options.threads);
+  const double spacing = options.spacing > 0.0 ? options.spacing : 0.235;
+  const SurfaceMesh a = MakeLumen(options, spacing, 0.27);
+  const SurfaceMesh b = MakeLumen(options, 1.03 * spacing, 0.0);
+  const vtkSmartPointer<vtkPolyData> dataA = PolyDataOf(a);
+  const vtkSmartPointer<vtkPolyData> dataB = PolyDataOf(b);
+
+  MeshDistanceSettings onlyHausdorff;
+  onlyHausdorff.errorBound = ErrorBound;
+  onlyHausdorff.areaMeasures = false;
+  onlyHausdorff.signedDistances = false;
+  MeshDistanceSettings everything;
+  everything.errorBound = ErrorBound;
+  MeshDistance hausdorff;
+  MeshDistance all;
+  double vtkMean = 0.0;
+  double vtkMaximum = 0.0;
+  std::vector<Timed> timed;
+  timed.push_back({ "Hausdorff distance, both ways",
+    [&] { hausdorff = CompareSurfaces(a, b, onlyHausdorff); }, {} });
+  timed.push_back({ "all measures, signed distances of all points",
+    [&] { all = CompareSurfaces(a, b, everything); }, {} });
+  timed.push_back({ "vtkDistancePolyDataFilter, both ways (vertices only)",
+    [&]
+    {
+      vtkNew<vtkDistancePolyDataFilter> filter;
+      filter->SetInputData(0, dataA);
+      filter->SetInputData(1, dataB);
+      filter->ComputeCellCenterDistanceOff();
+      filter->ComputeSecondDistanceOn();
+      filter->SignedDistanceOff();
+      filter->Update();
+      vtkDataArray* distance = filter->GetOutput()->GetPointData()->GetArray("Distance");
+      vtkMean = 0.0;
+      for (vtkIdType i = 0; i < distance->GetNumberOfTuples(); ++i)
+      {
+        vtkMean +=
+          distance->GetComponent(i, 0) / static_cast<double>(distance->GetNumberOfTuples());
+      }
+      vtkMaximum = distance->GetRange()[1];
+    },
+    {} });
+#if defined(DYNAMICCORONARY_WITH_CGAL)
+  double cgal = 0.0;
+  if (!options.withoutCgal)
+  {
+    timed.push_back({ "CGAL bounded_error_symmetric_Hausdorff_distance",
+      [&] { cgal = CgalHausdorffDistance(a, b, ErrorBound); }, {} });
+  }
+#endif
+  // In turns, so that a busy machine is busy for all of them.
+  for (int repeat = 0; repeat < options.repeats; ++repeat)
+  {
+    for (Timed& one : timed)
+    {
+      one.seconds.push_back(Seconds(one.work));
+    }
+  }
+
+  std::printf(
+    "\n### Two surfaces of %zu and %zu triangles, %d threads\n\nA phantom's lumen, and the "
+    "same meshed anew and displaced; error bound %g mm.\n\n| | wall time, s: median (least to "
+    "greatest) |\n|---|---|\n",
+    a.triangles.size(), b.triangles.size(), NumberOfThreads(), ErrorBound);
+  for (const Timed& one : timed)
+  {
+    std::printf("| %s | %.3f (%.3f to %.3f) |\n", one.name, Median(one.seconds), one.Least(),
+      *std::max_element(one.seconds.begin(), one.seconds.end()));
+  }
+  std::printf(
+    "\n| mm | HD | MSD | MSD_area | HD95 | RMS | vertices only |\n|---|---|---|---|---|---|---|\n"
+    "| ours | %.5f (+ at most %.5f) | %.5f | %.5f (error %.1e) | %.5f | %.5f | %.5f |\n",
+    all.hausdorff, all.hausdorffError, all.ab.vertexMean, all.mean, all.quadratureError,
+    all.hausdorff95, all.rms, all.ab.vertexMaximum);
+  std::printf("| vtkDistancePolyDataFilter | | %.5f | | | | %.5f |\n", vtkMean, vtkMaximum);
+
+  bool agree = std::abs(vtkMean - all.ab.vertexMean) < 1e-4 * all.ab.vertexMean + 1e-9 &&
+    hausdorff.hausdorff <= all.hausdorff + ErrorBound &&
+    all.hausdorff <= hausdorff.hausdorff + ErrorBound;
+  bool met = true;
+  const double vtkRatio = Median(timed[2].seconds) / Median(timed[1].seconds);
+#if defined(DYNAMICCORONARY_WITH_CGAL)
+  if (!options.withoutCgal)
+  {
+    std::printf("| CGAL | %.5f | | | | | |\n", cgal);
+    agree = agree && std::abs(cgal - all.hausdorff) <= ErrorBound;
+  }
+#endif
+  std::printf("\n| | measured | target | |\n|---|---|---|---|\n");
+#if defined(DYNAMICCORONARY_WITH_CGAL)
+  if (!options.withoutCgal)
+  {
+    const double ratio = Median(timed[3].seconds) / Median(timed[0].seconds);
+    met = met && ratio >= LeastSpeedUpCgal;
+    std::printf("| CGAL's time over that of our Hausdorff distance | %.1f | >= %.0f | %s |\n",
+      ratio, LeastSpeedUpCgal, Verdict(ratio >= LeastSpeedUpCgal));
+  }
+#endif
+  met = met && vtkRatio >= LeastSpeedUpVtk;
+  std::printf("| VTK's time over that of all our measures | %.1f | >= %.0f | %s |\n", vtkRatio,
+    LeastSpeedUpVtk, Verdict(vtkRatio >= LeastSpeedUpVtk));
+
+  // The tree alone.
+  const SurfaceMesh small = MakeLumen(options, 1.62 * spacing, 0.0);
+  TriangleBvh tree(small.points, small.triangles);
+  std::vector<double> refit;
+  std::vector<double> build;
+  std::vector<float> moved;
+  for (const Vector3& p : small.points)
+  {
+    for (int k = 0; k < 3; ++k)
+    {
+      moved.push_back(static_cast<float>(p[k]));
+    }
+  }
+  for (int repeat = 0; repeat < 20 * options.repeats; ++repeat)
+  {
+    refit.push_back(Seconds([&] { tree.Refit(moved); }));
+  }
+  for (int repeat = 0; repeat < options.repeats; ++repeat)
+  {
+    build.push_back(Seconds([&] { tree = TriangleBvh(a.points, a.triangles); }));
+  }
+  const TriangleBvh large(b.points, b.triangles);
+  std::vector<double> cold;
+  std::vector<double> warm;
+  std::vector<std::int64_t> hints(a.points.size());
+  for (int repeat = 0; repeat < options.repeats; ++repeat)
+  {
+    const auto query = [&](bool hinted)
+    {
+      return Seconds(
+        [&]
+        {
+          ParallelFor(static_cast<std::int64_t>(a.points.size()), 1024,
+            [&](std::int64_t first, std::int64_t last)
+            {
+              for (std::int64_t i = first; i < last; ++i)
+              {
+                hints[i] = large
+                             .Closest(a.points[i], std::numeric_limits<double>::infinity(),
+                               hinted ? hints[i] : -1)
+                             .triangle;
+              }
+            });
+        });
+    };
+    cold.push_back(query(false));
+    warm.push_back(query(true));
+  }
+  const double refitTime = Median(refit);
+  met = met && refitTime <= MostRefitSeconds;
+  const auto rate = [&](double seconds)
+  { return static_cast<double>(a.points.size()) / seconds / 1e6; };
+  std::printf("| refit of %zu triangles, ms | %.3f | <= %.1f | %s |\n", small.triangles.size(),
+    1e3 * refitTime, 1e3 * MostRefitSeconds, Verdict(refitTime <= MostRefitSeconds));
+  std::printf(
+    "| build of %zu triangles, ms | %.1f | | |\n", a.triangles.size(), 1e3 * Median(build));
+  std::printf("| nearest points of %zu triangles, 10^6 a second: without hint, with the last "
+              "time's | %.2f, %.2f | | |\n",
+    b.triangles.size(), rate(Median(cold)), rate(Median(warm)));
+  if (!agree)
+  {
+    std::printf("\n**The values do not agree.**\n");
+    return 1;
+  }
+  return options.strict && !met ? 1 : 0;
+}
+}
+
+int main(int argc, char** argv)
+{
+  CLI::App app("Distances between surfaces beside CGAL's and VTK's.", "mesh-distance-benchmark");
+  Options options;
+  app.add_option(
+    "--spacing", options.spacing, "Edge length of the surfaces, mm; 0: about 100,000 triangles");
+  app.add_option("--repeats", options.repeats, "Repetitions")->check(CLI::Range(1, 100));
+  app.add_option("--threads", options.threads, "Threads")->check(CLI::Range(1, 64));
+  app.add_option("--seed", options.seed, "Of the phantom");
+  app.add_flag("--without-cgal", options.withoutCgal, "Leave CGAL out");
+  app.add_flag("--strict", options.strict, "Exit code 1 when a target is missed");
+  CLI11_PARSE(app, argc, argv);
+  try
+  {
+    return Run(options);
+  }
+  catch (const std::exception& error)
+  {
+    std::fprintf(stderr, "mesh-distance-benchmark: %s\n", error.what());
+    return 1;
+  }
+}
