@@ -81,9 +81,9 @@ Frame MakeFrame()
     for (std::int64_t n = 0; n < bones; ++n)
     {
       const Vector3& head = frame.skeleton.joints[frame.skeleton.bones[n].first];
-      const Vector3 along = frame.skeleton.joints[frame.skeleton.bones[n].second] - head;
-      const double s = std::clamp(along.dot(point - head) / along.squaredNorm(), 0.0, 1.0);
-      near.emplace_back((point - head - s * along).norm(), static_cast<std::int32_t>(n));
+      const Vector3& tail = frame.skeleton.joints[frame.skeleton.bones[n].second];
+      near.emplace_back(std::sqrt(NearestOnSegment(point, head, tail).squaredDistance),
+        static_cast<std::int32_t>(n));
     }
     std::partial_sort(near.begin(), near.begin() + influences, near.end());
     double sum = 0.0;

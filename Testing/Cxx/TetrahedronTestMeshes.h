@@ -98,9 +98,7 @@ inline SkinWeightInput MeshOfCells(const std::array<int, 3>& low, const std::arr
 
 inline double DistanceToSegment(const Vector3& p, const Vector3& a, const Vector3& b)
 {
-  const Vector3 axis = b - a;
-  const double t = std::clamp(axis.dot(p - a) / axis.squaredNorm(), 0.0, 1.0);
-  return (p - a - t * axis).norm();
+  return std::sqrt(NearestOnSegment(p, a, b).squaredDistance);
 }
 
 /// Adds the bones of a polyline through grid points; returns its first and last joint.

@@ -1,6 +1,7 @@
 // The pool of threads, the random numbers and the random fields that everything else uses.
 
 #include "CounterRandom.h"
+#include "Geometry.h"
 #include "ParallelFor.h"
 #include "SmoothRandomField.h"
 
@@ -194,4 +195,21 @@ TEST(SmoothRandomField, HasUnitVarianceAndItsCorrelationLength)
   EXPECT_NEAR(covariance, std::exp(-0.5), 0.15);
   EXPECT_EQ(SmoothRandomField()(Vector3(1, 2, 3)), 0.0);
   EXPECT_THROW(SmoothRandomField(1, 1, 0.0), std::invalid_argument);
+}
+
+TEST(Geometry, NearestPlaceOfASegment)
+{
+  using coronary::NearestOnSegment;
+  using coronary::Vector3;
+  const Vector3 a(1.0, 2.0, 3.0);
+  const Vector3 b(5.0, 2.0, 3.0);
+  const coronary::SegmentPlace beside = NearestOnSegment({ 2.0, 5.0, 7.0 }, a, b);
+  EXPECT_DOUBLE_EQ(beside.fraction, 0.25);
+  EXPECT_EQ(beside.position, Vector3(2.0, 2.0, 3.0));
+  EXPECT_DOUBLE_EQ(beside.squaredDistance, 25.0);
+  EXPECT_DOUBLE_EQ(NearestOnSegment({ -9.0, 2.0, 4.0 }, a, b).fraction, 0.0);
+  EXPECT_DOUBLE_EQ(NearestOnSegment({ 9.0, 2.0, 4.0 }, a, b).squaredDistance, 17.0);
+  const coronary::SegmentPlace point = NearestOnSegment({ 1.0, 2.0, 5.0 }, a, a);
+  EXPECT_DOUBLE_EQ(point.fraction, 0.0);
+  EXPECT_DOUBLE_EQ(point.squaredDistance, 4.0);
 }
