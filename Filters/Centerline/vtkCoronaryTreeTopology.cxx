@@ -27,7 +27,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <new>
 #include <stdexcept>
 
 using coronary::CenterlineTopology;
@@ -382,7 +381,6 @@ int vtkCoronaryTreeTopology::RequestData(
   }
   const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
   const bool wanted = outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
-  int result = 1;
   try
   {
     coronary::TopologySettings settings;
@@ -488,27 +486,10 @@ int vtkCoronaryTreeTopology::RequestData(
     }
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the trees");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the trees");
-    result = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
-    result = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  for (int i = 0; i < 3; ++i)
-  {
-    output[i]->Initialize();
-    outputs->GetInformationObject(i)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  }
-  return result;
 }
 
 void vtkCoronaryTreeTopology::PrintSelf(ostream& os, vtkIndent indent)

@@ -1,14 +1,22 @@
 #include "vtkCoronaryFilterParts.h"
 
+#include "ParallelFor.h"
+
+#include "vtkAlgorithm.h"
 #include "vtkDataArray.h"
 #include "vtkDataArrayRange.h"
+#include "vtkDataObject.h"
+#include "vtkDemandDrivenPipeline.h"
 #include "vtkFloatArray.h"
 #include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
 #include "vtkMatrix3x3.h"
 #include "vtkShortArray.h"
 #include "vtkUnsignedShortArray.h"
 
 #include <cctype>
+#include <new>
 #include <stdexcept>
 
 namespace vtkCoronary
@@ -72,5 +80,38 @@ std::string PropertyMessage(std::string message, std::initializer_list<const cha
     message.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(message.front())));
   }
   return message;
+}
+
+int FinishFailedRequest(vtkAlgorithm* filter, vtkInformationVector* outputs,
+  const std::string& memory, std::initializer_list<const char*> prefixes)
+{
+  int result = 0;
+  try
+  {
+    throw;
+  }
+  catch (const coronary::Cancelled&)
+  {
+    vtkDebugWithObjectMacro(filter, "aborted");
+    result = 1;
+  }
+  catch (const std::bad_alloc&)
+  {
+    vtkErrorWithObjectMacro(filter, << "Not enough memory " << memory);
+  }
+  catch (const std::exception& error)
+  {
+    vtkErrorWithObjectMacro(filter, << PropertyMessage(error.what(), prefixes));
+  }
+  for (int port = 0; port < outputs->GetNumberOfInformationObjects(); ++port)
+  {
+    vtkInformation* info = outputs->GetInformationObject(port);
+    if (vtkDataObject* output = vtkDataObject::GetData(info))
+    {
+      output->Initialize();
+    }
+    info->Set(vtkDemandDrivenPipeline::DATA_NOT_GENERATED(), 1);
+  }
+  return result;
 }
 }

@@ -16,8 +16,10 @@
 #include <string>
 #include <vector>
 
+class vtkAlgorithm;
 class vtkDataArray;
 class vtkImageData;
+class vtkInformationVector;
 
 namespace vtkCoronary
 {
@@ -37,6 +39,18 @@ VTKCORONARYCOMMON_EXPORT void Require(bool condition, const std::string& require
 /// name of a property.
 VTKCORONARYCOMMON_EXPORT std::string PropertyMessage(
   std::string message, std::initializer_list<const char*> prefixes = {});
+
+/**
+ * For the end of RequestData, inside of `catch (...)`: reports the exception that is being handled as an error of
+ * the filter (a cancellation is none), empties all outputs, and marks them as not generated, so that the next
+ * request executes again.
+ * @param memory    what memory was wanted for: "for the motion"
+ * @param prefixes  as of PropertyMessage
+ * @return what RequestData has to return: 1 after a cancellation, 0 after an error
+ */
+VTKCORONARYCOMMON_EXPORT int FinishFailedRequest(vtkAlgorithm* filter,
+  vtkInformationVector* outputs, const std::string& memory,
+  std::initializer_list<const char*> prefixes = {});
 
 /// Adds `values` as a new array, which replaces one of the same name.
 template <typename Array, typename Value>

@@ -4,6 +4,7 @@
 #include "QuietestPhase.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
 
 #include "vtkCompositeDataIterator.h"
@@ -227,7 +228,6 @@ int vtkReferencePhase::RequestData(
   vtkInformation* inInfo = inputs[0]->GetInformationObject(0);
   vtkInformation* outInfo = outputs->GetInformationObject(0);
   vtkDataObject* output = vtkDataObject::GetData(outInfo);
-  int result = 1;
   try
   {
     const std::vector<double> steps = Steps(inInfo);
@@ -295,19 +295,10 @@ int vtkReferencePhase::RequestData(
     }
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the phase");
   }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< error.what());
-    result = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  output->Initialize();
-  outInfo->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  return result;
 }
 
 void vtkReferencePhase::PrintSelf(ostream& os, vtkIndent indent)

@@ -27,7 +27,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <new>
 #include <stdexcept>
 #include <vector>
 
@@ -239,7 +238,6 @@ int vtkCenterlineMetrics::RequestData(
   vtkPolyData* linesOutput = vtkPolyData::GetData(outputs, LinesPort);
   const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
   const bool wanted = outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
-  int success = 1;
   try
   {
     coronary::CenterlineOverlapSettings settings;
@@ -358,28 +356,10 @@ int vtkCenterlineMetrics::RequestData(
     linesOutput->GetCellData()->AddArray(cellSide);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "to compare the lines");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory to compare the lines");
-    success = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
-    success = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  table->Initialize();
-  linesOutput->Initialize();
-  for (int i = 0; i < 2; ++i)
-  {
-    outputs->GetInformationObject(i)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  }
-  return success;
 }
 
 void vtkCenterlineMetrics::PrintSelf(ostream& os, vtkIndent indent)

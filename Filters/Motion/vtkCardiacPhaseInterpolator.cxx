@@ -25,7 +25,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <new>
 #include <stdexcept>
 
 namespace names = vtkCoronaryArrayNames;
@@ -484,7 +483,6 @@ int vtkCardiacPhaseInterpolator::RequestData(
   {
     return 1;
   }
-  int result = 1;
   try
   {
     Require(output != nullptr, "The input is composite data: a single point set is needed");
@@ -579,25 +577,11 @@ int vtkCardiacPhaseInterpolator::RequestData(
     this->UpdateProgress(1.0);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    this->Data->Motion.reset();
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the motion");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the motion");
-    result = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< error.what());
-    result = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  this->Data->Motion.reset();
-  generated->Initialize();
-  outInfo->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  return result;
 }
 
 void vtkCardiacPhaseInterpolator::PrintSelf(ostream& os, vtkIndent indent)

@@ -25,7 +25,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <new>
 #include <stdexcept>
 
 namespace names = vtkCoronaryArrayNames;
@@ -164,7 +163,6 @@ int vtkMotionRegularizer::RequestData(
   {
     return 1;
   }
-  int result = 1;
   try
   {
     Require(vtkPolyData::GetData(inInfo) != nullptr,
@@ -297,24 +295,10 @@ int vtkMotionRegularizer::RequestData(
     this->UpdateProgress(1.0);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the motion");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the motion");
-    result = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< error.what());
-    result = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  output->Initialize();
-  outInfo->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  return result;
 }
 
 void vtkMotionRegularizer::PrintSelf(ostream& os, vtkIndent indent)

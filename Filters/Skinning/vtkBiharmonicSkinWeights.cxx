@@ -25,7 +25,6 @@
 
 #include <algorithm>
 #include <map>
-#include <new>
 #include <stdexcept>
 
 namespace names = vtkCoronaryArrayNames;
@@ -147,7 +146,6 @@ int vtkBiharmonicSkinWeights::RequestData(
   {
     return 1;
   }
-  int success = 1;
   try
   {
     coronary::SkinWeightSettings settings;
@@ -275,24 +273,10 @@ int vtkBiharmonicSkinWeights::RequestData(
     }
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the skin weights");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the skin weights");
-    success = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
-    success = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  output->Initialize();
-  outputs->GetInformationObject(0)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  return success;
 }
 
 void vtkBiharmonicSkinWeights::PrintSelf(ostream& os, vtkIndent indent)

@@ -23,7 +23,6 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 
-#include <new>
 #include <stdexcept>
 
 namespace names = vtkCoronaryArrayNames;
@@ -162,16 +161,10 @@ int vtkCenterlineSkeleton::RequestData(
     this->UpdateProgress(1.0);
     return 1;
   }
-  catch (const std::bad_alloc&)
+  catch (...)
   {
-    vtkErrorMacro("Not enough memory for the skeleton");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the skeleton");
   }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
-  }
-  output->Initialize();
-  return 0;
 }
 
 void vtkCenterlineSkeleton::PrintSelf(ostream& os, vtkIndent indent)

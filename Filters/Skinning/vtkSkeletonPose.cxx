@@ -17,7 +17,6 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <cmath>
-#include <new>
 #include <stdexcept>
 
 namespace names = vtkCoronaryArrayNames;
@@ -192,7 +191,6 @@ int vtkSkeletonPose::RequestData(
   {
     return 1;
   }
-  int success = 1;
   this->JointPlaces->SetNumberOfValues(0);
   this->MoveAsEdit->SetNumberOfValues(0);
   try
@@ -246,25 +244,11 @@ int vtkSkeletonPose::RequestData(
     this->UpdateProgress(1.0);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    this->MoveAsEdit->SetNumberOfValues(0);
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the pose");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the pose");
-    success = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< error.what());
-    success = 0;
-  }
-  this->MoveAsEdit->SetNumberOfValues(0);
-  // Not marked as generated, so that the next request executes again.
-  output->Initialize();
-  outputs->GetInformationObject(0)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  return success;
 }
 
 void vtkSkeletonPose::PrintSelf(ostream& os, vtkIndent indent)

@@ -35,7 +35,6 @@
 #include <cmath>
 #include <limits>
 #include <list>
-#include <new>
 #include <stdexcept>
 #include <type_traits>
 #include <vector>
@@ -521,7 +520,6 @@ int vtkSkinDeformation::RequestData(
 {
   vtkDataObject* mesh = vtkDataObject::GetData(inputs[0], 0);
   vtkDataObject* output = vtkDataObject::GetData(outputs, 0);
-  int success = 1;
   try
   {
     Require(this->VolumeConservation >= 0.0 && this->VolumeConservation <= 1.0,
@@ -565,24 +563,10 @@ int vtkSkinDeformation::RequestData(
     this->UpdateProgress(1.0);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the deformation");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the deformation");
-    success = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< error.what());
-    success = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  output->Initialize();
-  outputs->GetInformationObject(0)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  return success;
 }
 
 void vtkSkinDeformation::PrintSelf(ostream& os, vtkIndent indent)

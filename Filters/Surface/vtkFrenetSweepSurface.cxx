@@ -32,7 +32,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <new>
 #include <stdexcept>
 #include <utility>
 
@@ -529,7 +528,6 @@ int vtkFrenetSweepSurface::RequestData(
   vtkPolyData* capOutput = vtkPolyData::GetData(outputs, CapPort);
   const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
   const bool wanted = outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
-  int result = 1;
   try
   {
     coronary::SweepSettings settings;
@@ -584,30 +582,11 @@ int vtkFrenetSweepSurface::RequestData(
     this->UpdateProgress(1.0);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(
+      this, outputs, "for the surface", { "SweepSettings: ", "SweepVesselTree: " });
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the surface");
-    result = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(
-                    error.what(), { "SweepSettings: ", "SweepVesselTree: " }));
-    result = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  surfaceOutput->Initialize();
-  patchOutput->Initialize();
-  capOutput->Initialize();
-  for (int i = 0; i < this->GetNumberOfOutputPorts(); ++i)
-  {
-    outputs->GetInformationObject(i)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  }
-  return result;
 }
 
 void vtkFrenetSweepSurface::PrintSelf(ostream& os, vtkIndent indent)

@@ -789,30 +789,16 @@ int vtkFrangiVesselness::RequestData(
   vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   vtkInformation* outInfo = outputs->GetInformationObject(0);
-  int result = 1;
   try
   {
     this->Data->Execute(inputs, outInfo);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(
+      this, outputs, "for the vesselness of the requested extent", { "VesselnessSettings: " });
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the vesselness of the requested extent");
-    result = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what(), { "VesselnessSettings: " }));
-    result = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  vtkDataObject::GetData(outInfo)->Initialize();
-  outInfo->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  return result;
 }
 
 void vtkFrangiVesselness::PrintSelf(ostream& os, vtkIndent indent)

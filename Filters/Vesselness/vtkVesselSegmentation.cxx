@@ -556,35 +556,16 @@ void vtkVesselSegmentation::Execute(
 int vtkVesselSegmentation::RequestData(
   vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  int result = 1;
   try
   {
     this->Execute(request, inputs, outputs);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the segmentation of the image",
+      { "VesselSegmentationSettings: ", "VesselnessSettings: " });
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory for the segmentation of the image");
-    result = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(
-                    error.what(), { "VesselSegmentationSettings: ", "VesselnessSettings: " }));
-    result = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  for (int port = 0; port < 3; ++port)
-  {
-    vtkInformation* outInfo = outputs->GetInformationObject(port);
-    vtkDataObject::GetData(outInfo)->Initialize();
-    outInfo->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  }
-  return result;
 }
 
 void vtkVesselSegmentation::PrintSelf(ostream& os, vtkIndent indent)

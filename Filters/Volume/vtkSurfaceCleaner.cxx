@@ -29,7 +29,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <new>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -153,7 +152,6 @@ int vtkSurfaceCleaner::RequestData(
   {
     return 1;
   }
-  int success = 1;
   try
   {
     coronary::SurfaceCleaningSettings settings;
@@ -221,24 +219,10 @@ int vtkSurfaceCleaner::RequestData(
     WriteSummary(output->GetFieldData(), surface);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "to clean the surface");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory to clean the surface");
-    success = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
-    success = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  output->Initialize();
-  outputs->GetInformationObject(0)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  return success;
 }
 
 void vtkSurfaceCleaner::PrintSelf(ostream& os, vtkIndent indent)

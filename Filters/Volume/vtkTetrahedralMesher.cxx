@@ -29,7 +29,6 @@
 #include "vtkUnstructuredGrid.h"
 
 #include <algorithm>
-#include <new>
 #include <numeric>
 #include <stdexcept>
 #include <vector>
@@ -184,7 +183,6 @@ int vtkTetrahedralMesher::RequestData(
   {
     return 1;
   }
-  int success = 1;
   try
   {
     coronary::TetrahedralMeshSettings settings;
@@ -301,29 +299,10 @@ int vtkTetrahedralMesher::RequestData(
       edges->GetCellData(), vtkCoronaryArrayNames::SkeletonEdgeId, source);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(this, outputs, "to mesh the volume");
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory to mesh the volume");
-    success = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
-    success = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  volume->Initialize();
-  boundary->Initialize();
-  edges->Initialize();
-  for (int i = 0; i < this->GetNumberOfOutputPorts(); ++i)
-  {
-    outputs->GetInformationObject(i)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  }
-  return success;
 }
 
 void vtkTetrahedralMesher::PrintSelf(ostream& os, vtkIndent indent)

@@ -4,10 +4,10 @@
 #include "FilterMessages.h"
 #include "ParallelFor.h"
 #include "SkeletonTestData.h"
+#include "TimedTestSource.h"
 #include "vtkCoronaryPhantomSource.h"
 
 #include "vtkMultiBlockDataSet.h"
-#include "vtkPassInputTypeAlgorithm.h"
 #include "vtkUnstructuredGrid.h"
 
 #include <gtest/gtest.h>
@@ -25,15 +25,13 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 
 /// Lines that move, with what can go wrong.
-class MovingSource : public vtkPassInputTypeAlgorithm
+class MovingSource : public TimedTestSource
 {
 public:
   static MovingSource* New();
-  vtkTypeMacro(MovingSource, vtkPassInputTypeAlgorithm);
+  vtkTypeMacro(MovingSource, TimedTestSource);
 
-  std::vector<double> Steps = { 0.0, 0.2, 0.4, 0.6, 0.8 };
   vtkIdType Points = 6;
-  int Executions = 0;
   bool Grid = false;
   bool Radius = false;
   bool Calibre = false;
@@ -58,16 +56,9 @@ public:
   static double Factor(double t) { return 1.0 + 0.02 * std::sin(2.0 * Pi * t); }
 
 protected:
-  MovingSource() { this->SetNumberOfInputPorts(0); }
+  MovingSource() { this->Steps = { 0.0, 0.2, 0.4, 0.6, 0.8 }; }
 
-  int FillOutputPortInformation(int, vtkInformation* info) override
-  {
-    info->Set(vtkDataObject::DATA_TYPE_NAME(), "vtkDataObject");
-    return 1;
-  }
-
-  int RequestDataObject(
-    vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
+  vtkSmartPointer<vtkDataObject> NewOutput() override
   {
     vtkSmartPointer<vtkDataObject> data;
     if (this->Blocks)
@@ -82,36 +73,16 @@ protected:
     {
       data = vtkSmartPointer<vtkPolyData>::New();
     }
-    outputs->GetInformationObject(0)->Set(vtkDataObject::DATA_OBJECT(), data);
-    return 1;
+    return data;
   }
 
-  int RequestInformation(
-    vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
+  bool Make(double time, vtkDataObject* output) override
   {
-    vtkInformation* info = outputs->GetInformationObject(0);
-    info->Remove(SDDP::TIME_STEPS());
-    if (!this->Steps.empty())
-    {
-      info->Set(SDDP::TIME_STEPS(), this->Steps.data(), static_cast<int>(this->Steps.size()));
-      const double range[2] = { this->Steps.front(), this->Steps.back() };
-      info->Set(SDDP::TIME_RANGE(), range, 2);
-    }
-    info->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
-    return 1;
-  }
-
-  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
-  {
-    ++this->Executions;
-    vtkInformation* info = outputs->GetInformationObject(0);
-    const double time =
-      info->Has(SDDP::UPDATE_TIME_STEP()) ? info->Get(SDDP::UPDATE_TIME_STEP()) : 0.0;
     const bool spoiled = time == this->SpoiledTime;
     if (spoiled && this->Spoil == Fail)
     {
       vtkErrorMacro("no such data");
-      return 0;
+      return false;
     }
     vtkSmartPointer<vtkPointSet> data;
     if (this->Grid)
@@ -214,7 +185,6 @@ protected:
     cycle->InsertNextValue(0.5);
     data->GetFieldData()->AddArray(cycle);
     data->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
-    vtkDataObject* output = vtkDataObject::GetData(info);
     if (auto* blocks = vtkMultiBlockDataSet::SafeDownCast(output))
     {
       blocks->SetBlock(0, data);
@@ -223,7 +193,7 @@ protected:
     {
       output->ShallowCopy(data);
     }
-    return 1;
+    return true;
   }
 };
 vtkStandardNewMacro(MovingSource);
@@ -555,7 +525,7 @@ TEST(CardiacPhaseInterpolator, RefusesWithOneMessage)
   source->Spoil = MovingSource::Fail;
   {
     Messages upstream(source);
-    refuse("the input failed");
+    refuse("The input failed");
   }
   source->Spoil = MovingSource::Nothing;
   source->Modified();

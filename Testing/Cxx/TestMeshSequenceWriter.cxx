@@ -5,10 +5,10 @@
 #include "FilterMessages.h"
 #include "MeshQuality.h"
 #include "SequenceTestData.h"
+#include "TimedTestSource.h"
 #include "vtkCardiacPhaseInterpolator.h"
 #include "vtkSkinDeformation.h"
 
-#include "vtkPassInputTypeAlgorithm.h"
 #include "vtkTable.h"
 #include "vtkXMLPolyDataReader.h"
 #include "vtkXMLUnstructuredGridReader.h"
@@ -30,11 +30,11 @@ namespace
 constexpr int Bones = 2;
 
 /// The bar at rest at time 0, 0.25 .. 1, bent by shear, and with what can go wrong at one time.
-class MovingBar : public vtkPassInputTypeAlgorithm
+class MovingBar : public TimedTestSource
 {
 public:
   static MovingBar* New();
-  vtkTypeMacro(MovingBar, vtkPassInputTypeAlgorithm);
+  vtkTypeMacro(MovingBar, TimedTestSource);
 
   enum Spoils
   {
@@ -48,7 +48,6 @@ public:
     Fail
   };
 
-  std::vector<double> Steps = { 0.0, 0.25, 0.5, 0.75, 1.0 };
   vtkSmartPointer<vtkUnstructuredGrid> Rest = ChainVolume(Bones);
   Spoils Spoil = Nothing;
   double SpoiledTime = 0.5;
@@ -56,52 +55,26 @@ public:
   bool SameCells = true; ///< shared between phases, or copies
 
 protected:
-  MovingBar() { this->SetNumberOfInputPorts(0); }
+  MovingBar() { this->Steps = { 0.0, 0.25, 0.5, 0.75, 1.0 }; }
 
-  int FillOutputPortInformation(int, vtkInformation* info) override
+  vtkSmartPointer<vtkDataObject> NewOutput() override
   {
-    info->Set(vtkDataObject::DATA_TYPE_NAME(), "vtkUnstructuredGrid");
-    return 1;
+    return vtkSmartPointer<vtkUnstructuredGrid>::New();
   }
 
-  int RequestDataObject(
-    vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
+  bool Make(double time, vtkDataObject* data) override
   {
-    vtkNew<vtkUnstructuredGrid> data;
-    outputs->GetInformationObject(0)->Set(vtkDataObject::DATA_OBJECT(), data);
-    return 1;
-  }
-
-  int RequestInformation(
-    vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
-  {
-    vtkInformation* info = outputs->GetInformationObject(0);
-    info->Remove(SDDP::TIME_STEPS());
-    info->Remove(SDDP::TIME_RANGE());
-    if (!this->Steps.empty())
-    {
-      info->Set(SDDP::TIME_STEPS(), this->Steps.data(), static_cast<int>(this->Steps.size()));
-      const double range[2] = { this->Steps.front(), this->Steps.back() };
-      info->Set(SDDP::TIME_RANGE(), range, 2);
-    }
-    return 1;
-  }
-
-  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
-  {
-    vtkInformation* info = outputs->GetInformationObject(0);
-    double time = info->Has(SDDP::UPDATE_TIME_STEP()) ? info->Get(SDDP::UPDATE_TIME_STEP()) : 0.0;
     if (!this->Steps.empty()) // a reader gives the step before
     {
       const auto after = std::upper_bound(this->Steps.begin(), this->Steps.end(), time);
       time = after == this->Steps.begin() ? this->Steps.front() : *(after - 1);
     }
-    auto* output = vtkUnstructuredGrid::GetData(info);
+    auto* output = vtkUnstructuredGrid::SafeDownCast(data);
     const bool spoiled = this->Spoil != Nothing && time == this->SpoiledTime;
     if (spoiled && this->Spoil == Fail)
     {
       vtkErrorMacro("no such data");
-      return 0;
+      return false;
     }
     output->ShallowCopy(this->Rest);
     vtkNew<vtkPoints> points;
@@ -152,7 +125,7 @@ protected:
       output->Initialize();
     }
     output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
-    return 1;
+    return true;
   }
 };
 vtkStandardNewMacro(MovingBar);

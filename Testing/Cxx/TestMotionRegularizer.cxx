@@ -4,6 +4,7 @@
 #include "FilterMessages.h"
 #include "ParallelFor.h"
 #include "SkeletonTestData.h"
+#include "TimedTestSource.h"
 #include "vtkCardiacPhaseInterpolator.h"
 
 #include "vtkIdTypeArray.h"
@@ -24,19 +25,17 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 
 /// A line of ten points that swings, with a spike at one of them at time 0.4.
-class SwingingLine : public vtkPolyDataAlgorithm
+class SwingingLine : public TimedTestSource
 {
 public:
   static SwingingLine* New();
-  vtkTypeMacro(SwingingLine, vtkPolyDataAlgorithm);
+  vtkTypeMacro(SwingingLine, TimedTestSource);
 
-  std::vector<double> Steps = { 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9 };
   vtkIdType Points = 10;
   double Spike = 9.0;
   bool Bones = false;
   bool Vertex = false;
   bool Confidence = true;
-  int Executions = 0;
 
   static double Z(vtkIdType n, double t)
   {
@@ -44,30 +43,11 @@ public:
   }
 
 protected:
-  SwingingLine() { this->SetNumberOfInputPorts(0); }
+  SwingingLine() { this->Steps = { 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9 }; }
 
-  int RequestInformation(
-    vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
+  bool Make(double time, vtkDataObject* data) override
   {
-    vtkInformation* info = outputs->GetInformationObject(0);
-    info->Remove(SDDP::TIME_STEPS());
-    if (!this->Steps.empty())
-    {
-      info->Set(SDDP::TIME_STEPS(), this->Steps.data(), static_cast<int>(this->Steps.size()));
-      const double range[2] = { this->Steps.front(), this->Steps.back() };
-      info->Set(SDDP::TIME_RANGE(), range, 2);
-    }
-    info->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
-    return 1;
-  }
-
-  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override
-  {
-    ++this->Executions;
-    vtkInformation* info = outputs->GetInformationObject(0);
-    const double time =
-      info->Has(SDDP::UPDATE_TIME_STEP()) ? info->Get(SDDP::UPDATE_TIME_STEP()) : 0.0;
-    vtkPolyData* output = vtkPolyData::GetData(info);
+    auto* output = vtkPolyData::SafeDownCast(data);
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
     vtkNew<vtkCellArray> lines;
@@ -113,7 +93,7 @@ protected:
     {
       output->GetCellData()->AddArray(rotation);
     }
-    return 1;
+    return true;
   }
 };
 vtkStandardNewMacro(SwingingLine);
@@ -177,10 +157,10 @@ TEST(MotionRegularizer, InputStaysAsItIs)
   filter->SetInputConnection(source->GetOutputPort());
   filter->UpdateTimeStep(0.4);
   source->UpdateTimeStep(0.4);
-  EXPECT_EQ(source->GetOutput()->GetPoint(5)[1], 9.0);
-  EXPECT_EQ(source->GetOutput()->GetPointData()->GetNumberOfArrays(), 2);
-  EXPECT_EQ(source->GetOutput()->GetFieldData()->GetNumberOfArrays(), 0);
-  EXPECT_EQ(source->GetOutput()->GetCellData()->GetNumberOfArrays(), 0);
+  EXPECT_EQ(source->GetPolyDataOutput()->GetPoint(5)[1], 9.0);
+  EXPECT_EQ(source->GetPolyDataOutput()->GetPointData()->GetNumberOfArrays(), 2);
+  EXPECT_EQ(source->GetPolyDataOutput()->GetFieldData()->GetNumberOfArrays(), 0);
+  EXPECT_EQ(source->GetPolyDataOutput()->GetCellData()->GetNumberOfArrays(), 0);
 }
 
 TEST(MotionRegularizer, StrainAndStressAgainstRest)
@@ -190,7 +170,7 @@ TEST(MotionRegularizer, StrainAndStressAgainstRest)
   source->Spike = 0.0;
   vtkNew<vtkPolyData> rest;
   source->UpdateTimeStep(0.0);
-  rest->DeepCopy(source->GetOutput());
+  rest->DeepCopy(source->GetPolyDataOutput());
   for (vtkIdType n = 0; n < 10; ++n)
   {
     rest->GetPoints()->SetPoint(n, 3.6 * n, 0.0, 0.0);
