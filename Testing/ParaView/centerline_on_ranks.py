@@ -1,19 +1,17 @@
 """The filters from the image to named centerlines give on two ranks what they give on one."""
-import os
 import sys
 
-from paraview import servermanager, simple
+from paraview import simple
 
-from coronary_testing import (CENTERLINES, FORKS, LINES, TREE, centerline_pipeline, digest,
-                              fetch, load_plugin, require)
+from coronary_testing import (CENTERLINES, FORKS, LINES, TREE, centerline_pipeline,
+                              compare_with_one_rank, digest, fetch, fetch_whole, load_plugin,
+                              require, require_ranks)
 
 plugin, folder, ranks = sys.argv[1], sys.argv[2], int(sys.argv[3])
 
 
 load_plugin(plugin)
-process = servermanager.vtkProcessModule.GetProcessModule()
-require(process.GetNumberOfLocalPartitions() == ranks, "%d ranks, not %d"
-        % (process.GetNumberOfLocalPartitions(), ranks))
+require_ranks(ranks)
 phantom, centerline, topology = centerline_pipeline()
 truth = simple.ReferencePhase(simple.OutputPort(phantom, CENTERLINES), Automatic=0, Time=0.75)
 metrics = simple.CenterlineMetrics(Result=simple.OutputPort(topology, 0), Reference=truth)
@@ -22,26 +20,10 @@ found = []
 for name, source, port in (("tree", centerline, TREE), ("lines", centerline, LINES),
                            ("bifurcations", centerline, FORKS), ("names", topology, 0),
                            ("conversion", conversion, 0)):
-    # Of the first rank, where all of it has to be.
-    data = fetch(source, port, 0.75)
-    require(data.GetNumberOfPoints() > 0, name + ": nothing")
-    everywhere = source.GetDataInformation(port).GetNumberOfPoints()
-    require(everywhere == data.GetNumberOfPoints(), "%s: %d points on all ranks, %d on the first"
-            % (name, everywhere, data.GetNumberOfPoints()))
-    found += [name] + digest(data)
+    found += [name] + digest(fetch_whole(source, port, 0.75))
 table = fetch(metrics, 0, 0.75)
 overlap = table.GetColumnByName("OV")
 require(overlap is not None and overlap.GetNumberOfTuples() > 0, "no overlap")
 found += ["overlap %r" % overlap.GetValue(n) for n in range(overlap.GetNumberOfTuples())]
 
-os.makedirs(folder, exist_ok=True)
-path = os.path.join(folder, "one-rank.txt")
-if ranks == 1:
-    with open(path, "w") as file:
-        file.write("\n".join(found))
-else:
-    with open(path) as file:
-        expected = file.read().split("\n")
-    for one, two in zip(expected, found):
-        require(one == two, "one rank: %s; %d ranks: %s" % (one, ranks, two))
-    require(len(expected) == len(found), "%d lines, not %d" % (len(found), len(expected)))
+compare_with_one_rank(folder, ranks, found)

@@ -3,11 +3,12 @@ import hashlib
 import os
 import sys
 
-from paraview import servermanager, simple
+from paraview import servermanager, simple, smstate, smtrace
 from vtkmodules.vtkIOImage import vtkPNGReader
 
 IMAGE, CENTERLINES, SURFACE, OSTIA, VEIN, PROBE = range(6)
 TREE, LINES, FORKS = range(3)
+TRACKED_LINES, TRACKED_SKELETON = range(2)
 
 
 def require(condition, message):
@@ -48,6 +49,25 @@ def centerline_pipeline():
     topology = simple.CoronaryTreeTopology(
         simple.OutputPort(centerline, TREE), registrationName="Topology")
     return phantom, centerline, topology
+
+
+def tracking_pipeline():
+    """A tree tracked through five coarse phases of a phantom, then regularised, then at any moment."""
+    phantom = simple.CoronaryPhantom(registrationName="Phantom", Spacing=[1.2, 1.2, 1.2],
+                                     CenterlineSpacing=2.0, Phases=[0.05, 0.2, 0.35, 0.5, 0.75])
+    lines = simple.ReferencePhase(simple.OutputPort(phantom, CENTERLINES),
+                                  registrationName="Lines", Automatic=0, Time=0.75)
+    skeleton = simple.CenterlineSkeleton(lines, registrationName="Skeleton")
+    tracker = simple.CenterlineTracker(
+        simple.OutputPort(phantom, IMAGE), Centerlines=lines, Skeleton=skeleton,
+        registrationName="Tracker", NodeSpacing=5.0, CaptureRange=14.0, TrackedPhases="List",
+        TrackedTimes=[0.05, 0.2, 0.36, 0.75])
+    regularized = simple.MotionRegularizer(
+        Motion=simple.OutputPort(tracker, TRACKED_LINES), registrationName="Regularized",
+        GreatestBending=50.0)
+    moment = simple.CardiacPhaseInterpolator(
+        regularized, registrationName="Moment", Mode="Low Noise", Ellipses=1)
+    return phantom, tracker, regularized, moment
 
 
 def write_skeleton(folder):
@@ -94,6 +114,35 @@ def fetch(source, port, time):
     copy = data.NewInstance()
     copy.ShallowCopy(data)
     return copy
+
+
+def fetch_whole(source, port, time):
+    """Data that have to be on the first rank, all of them."""
+    data = fetch(source, port, time)
+    everywhere = source.GetDataInformation(port).GetNumberOfPoints()
+    require(data.GetNumberOfPoints() == everywhere > 0, "%s: %d points on all ranks, %d on the "
+            "first" % (source.GetXMLName(), everywhere, data.GetNumberOfPoints()))
+    return data
+
+
+def require_ranks(ranks):
+    partitions = servermanager.vtkProcessModule.GetProcessModule().GetNumberOfLocalPartitions()
+    require(partitions == ranks, "%d ranks, not %d" % (partitions, ranks))
+
+
+def compare_with_one_rank(folder, ranks, found):
+    """Lines of text that a test on one rank leaves for the same test on more ranks."""
+    os.makedirs(folder, exist_ok=True)
+    path = os.path.join(folder, "one-rank.txt")
+    if ranks == 1:
+        with open(path, "w") as file:
+            file.write("\n".join(found))
+        return
+    with open(path) as file:
+        expected = file.read().split("\n")
+    for one, two in zip(expected, found):
+        require(one == two, "one rank: %s; %d ranks: %s" % (one, ranks, two))
+    require(len(expected) == len(found), "%d lines, not %d" % (len(found), len(expected)))
 
 
 def content(data):
@@ -144,6 +193,47 @@ def places(data):
 def largest_difference(ones, twos):
     """Between two lists of places, of the movements."""
     return max(abs(a - b) for one, two in zip(ones, twos) for a, b in zip(one[1], two[1]))
+
+
+def find(name):
+    """A source by its name, which a state, or a trace, has to have made again."""
+    source = simple.FindSource(name)
+    require(source is not None, "there is no " + name)
+    return source
+
+
+def require_repeats(output, expected, where):
+    print("compared with", where, flush=True)
+    require(output() == expected, where + ": other output")
+
+
+def require_trace_repeats(build, output):
+    """What `build` does, traced and run in a new session, gives the same.
+
+    `output` finds sources by name, and returns what is compared. To be called before any picture is saved: a
+    trace that is started after that stays empty.
+    """
+    simple.ResetSession()
+    smtrace.start_trace(preamble="")
+    build()
+    trace = smtrace.stop_trace()
+    expected = output()
+    simple.ResetSession()
+    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
+    require_repeats(output, expected, "the trace")
+
+
+def require_states_restore(output, state):
+    """The present session, from a state file and from a Python script, gives the same `output`."""
+    expected = output()
+    simple.SaveState(state)
+    script = smstate.get_state()
+    simple.ResetSession()
+    simple.LoadState(state)
+    require_repeats(output, expected, "the state file")
+    simple.ResetSession()
+    exec(compile(script, "state", "exec"), {"__name__": "state"})
+    require_repeats(output, expected, "the Python state")
 
 
 def pixels(path):

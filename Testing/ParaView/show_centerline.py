@@ -2,10 +2,11 @@
 import os
 import sys
 
-from paraview import servermanager, simple, smstate, smtrace
+from paraview import servermanager, simple
 
 from coronary_testing import (CENTERLINES, FORKS, LINES, TREE, centerline_pipeline, content, fetch,
-                              load_plugin, require, require_picture)
+                              find, load_plugin, require, require_picture,
+                              require_states_restore, require_trace_repeats)
 
 plugin, folder = sys.argv[1:3]
 
@@ -13,6 +14,11 @@ plugin, folder = sys.argv[1:3]
 def names_of(data):
     array = data.GetCellData().GetAbstractArray("SegmentLabel")
     return {array.GetValue(n) for n in range(array.GetNumberOfValues())}
+
+
+def named():
+    require(find("Centerline").CTImage is not None, "the CT image")
+    return content(fetch(find("Topology"), 0, 0.75))
 
 
 def outputs():
@@ -61,41 +67,11 @@ def round_trips():
     path = os.path.join(folder, "centerline.png")
     simple.SaveScreenshot(path, view)
     require_picture(path, 0.005)
-    expected = content(fetch(topology, 0, 0.75))
-    state = os.path.join(folder, "centerline.pvsm")
-    simple.SaveState(state)
-    script = smstate.get_state()
-
-    def check(where):
-        found = simple.FindSource("Topology")
-        require(found is not None, where + ": the filter is missing")
-        require(simple.FindSource("Centerline").CTImage is not None, where + ": the CT image")
-        require(content(fetch(found, 0, 0.75)) == expected, where + ": other output")
-
-    simple.ResetSession()
-    simple.LoadState(state)
-    check("state file")
-    simple.ResetSession()
-    exec(compile(script, "state", "exec"), {"__name__": "state"})
-    check("Python state")
-
-
-def trace_repeats():
-    simple.ResetSession()
-    smtrace.start_trace(preamble="")
-    centerline_pipeline()
-    trace = smtrace.stop_trace()
-    expected = content(fetch(simple.FindSource("Topology"), 0, 0.75))
-    simple.ResetSession()
-    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
-    repeated = simple.FindSource("Topology")
-    require(repeated is not None, "the trace does not create the filters")
-    require(content(fetch(repeated, 0, 0.75)) == expected, "trace: other output")
+    require_states_restore(named, os.path.join(folder, "centerline.pvsm"))
 
 
 load_plugin(plugin)
-# First: a trace started after pictures were saved stays empty.
-trace_repeats()
+require_trace_repeats(centerline_pipeline, named)
 simple.ResetSession()
 outputs()
 round_trips()

@@ -2,10 +2,11 @@
 import os
 import sys
 
-from paraview import servermanager, simple, smstate, smtrace
+from paraview import servermanager, simple
 
-from coronary_testing import (CENTERLINES, content, fetch, load_plugin, require,
-                              require_different_pictures, require_picture)
+from coronary_testing import (CENTERLINES, content, fetch, find, load_plugin, require,
+                              require_different_pictures, require_picture,
+                              require_states_restore, require_trace_repeats)
 
 plugin, folder = sys.argv[1:3]
 
@@ -19,6 +20,11 @@ def motion_pipeline():
     moment = simple.CardiacPhaseInterpolator(
         regularized, registrationName="Moment", Mode="Periodic Cubic", Ellipses=1)
     return phantom, regularized, moment
+
+
+def moved():
+    require(find("Regularized").GreatestBending == 50.0, "the limit")
+    return content(fetch(find("Moment"), 0, 0.41))
 
 
 def outputs():
@@ -73,41 +79,11 @@ def round_trips():
         simple.SaveScreenshot(pictures[-1], view)
         require_picture(pictures[-1], 0.002)
     require_different_pictures(*pictures, share=0.002)
-    expected = content(fetch(moment, 0, 0.41))
-    state = os.path.join(folder, "motion.pvsm")
-    simple.SaveState(state)
-    script = smstate.get_state()
-
-    def check(where):
-        found = simple.FindSource("Moment")
-        require(found is not None, where + ": the filter is missing")
-        require(simple.FindSource("Regularized").GreatestBending == 50.0, where + ": the limit")
-        require(content(fetch(found, 0, 0.41)) == expected, where + ": other output")
-
-    simple.ResetSession()
-    simple.LoadState(state)
-    check("state file")
-    simple.ResetSession()
-    exec(compile(script, "state", "exec"), {"__name__": "state"})
-    check("Python state")
-
-
-def trace_repeats():
-    simple.ResetSession()
-    smtrace.start_trace(preamble="")
-    motion_pipeline()
-    trace = smtrace.stop_trace()
-    expected = content(fetch(simple.FindSource("Moment"), 0, 0.41))
-    simple.ResetSession()
-    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
-    repeated = simple.FindSource("Moment")
-    require(repeated is not None, "the trace does not create the filters")
-    require(content(fetch(repeated, 0, 0.41)) == expected, "trace: other output")
+    require_states_restore(moved, os.path.join(folder, "motion.pvsm"))
 
 
 load_plugin(plugin)
-# First: a trace started after pictures were saved stays empty.
-trace_repeats()
+require_trace_repeats(motion_pipeline, moved)
 simple.ResetSession()
 outputs()
 round_trips()

@@ -2,11 +2,12 @@
 import os
 import sys
 
-from paraview import simple, smstate, smtrace
+from paraview import simple
 
-from coronary_testing import (CENTERLINES, IMAGE, PROBE, SURFACE, content, fetch, load_plugin,
-                              quick_phantom, require, require_different_pictures,
-                              require_picture, show_phantom)
+from coronary_testing import (CENTERLINES, IMAGE, PROBE, SURFACE, content, fetch, find,
+                              load_plugin, quick_phantom, require, require_different_pictures,
+                              require_picture, require_states_restore, require_trace_repeats,
+                              show_phantom)
 
 plugin, folder = sys.argv[1:3]
 
@@ -44,10 +45,6 @@ def pictures():
     require(times == steps, "the buttons step through %s" % times)
 
 
-def outputs(phantom):
-    return [content(fetch(phantom, port, 0.35)) for port in (CENTERLINES, SURFACE, IMAGE)]
-
-
 def make_special():
     """A phantom that differs from the default in every kind of property."""
     probe = simple.Sphere(registrationName="Points", Radius=30.0)
@@ -67,13 +64,13 @@ def make_special():
     return phantom
 
 
-def check_special(phantom, expected, where):
-    require(phantom is not None, where + ": the phantom is missing")
+def special():
+    phantom = find("Special")
     phantom.UpdatePipelineInformation()
-    require(phantom.Seed == 5 and phantom.Dominance == "Balanced", where + ": settings")
-    require(list(phantom.TimestepValues) == [0.0, 0.25, 0.35, 0.75], where + ": phases")
-    require(outputs(phantom) == expected, where + ": other output")
-    require(fetch(phantom, PROBE, 0.35).GetNumberOfPoints() > 0, where + ": the probe's input")
+    require(phantom.Seed == 5 and phantom.Dominance == "Balanced", "settings")
+    require(list(phantom.TimestepValues) == [0.0, 0.25, 0.35, 0.75], "phases")
+    require(fetch(phantom, PROBE, 0.35).GetNumberOfPoints() > 0, "the probe's input")
+    return [content(fetch(phantom, port, 0.35)) for port in (CENTERLINES, SURFACE, IMAGE)]
 
 
 def round_trips():
@@ -81,32 +78,13 @@ def round_trips():
     phantom = make_special()
     view = simple.CreateRenderView()
     simple.Show(simple.OutputPort(phantom, SURFACE), view)
-    expected = outputs(phantom)
-    state = os.path.join(folder, "phantom.pvsm")
-    simple.SaveState(state)
-    script = smstate.get_state()
-
-    simple.ResetSession()
-    simple.LoadState(state)
-    check_special(simple.FindSource("Special"), expected, "state file")
-
-    simple.ResetSession()
-    exec(compile(script, "state", "exec"), {"__name__": "state"})
-    check_special(simple.FindSource("Special"), expected, "Python state")
+    require_states_restore(special, os.path.join(folder, "phantom.pvsm"))
 
 
 def trace_repeats():
     # A script's trace records creations; property changes are recorded by the window's panel.
-    simple.ResetSession()
-    smtrace.start_trace(preamble="")
-    traced = simple.CoronaryPhantom(registrationName="Traced")
-    trace = smtrace.stop_trace()
-    expected = content(fetch(traced, CENTERLINES, 0.35))
-    simple.ResetSession()
-    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
-    repeated = simple.FindSource("Traced")
-    require(repeated is not None, "the trace does not create the phantom")
-    require(content(fetch(repeated, CENTERLINES, 0.35)) == expected, "trace: other output")
+    require_trace_repeats(lambda: simple.CoronaryPhantom(registrationName="Traced"),
+                          lambda: content(fetch(find("Traced"), CENTERLINES, 0.35)))
 
 
 def scripts_do_not_connect_by_accident():
@@ -117,7 +95,6 @@ def scripts_do_not_connect_by_accident():
 
 
 load_plugin(plugin)
-# First: a trace started after pictures were saved stays empty.
 trace_repeats()
 simple.ResetSession()
 pictures()

@@ -2,10 +2,11 @@
 import os
 import sys
 
-from paraview import servermanager, simple, smstate, smtrace
+from paraview import servermanager, simple
 
-from coronary_testing import (content, fetch, load_plugin, require, require_picture,
-                              skinning_pipeline, write_skeleton)
+from coronary_testing import (content, fetch, find, load_plugin, require, require_picture,
+                              require_states_restore, require_trace_repeats, skinning_pipeline,
+                              write_skeleton)
 
 plugin, folder = sys.argv[1:3]
 TIME = 0.0
@@ -23,26 +24,19 @@ def cells(data):
 
 
 def everything():
+    weights, pose, moved = find("Weights"), find("Pose"), find("Moved")
+    require((weights.Influences, weights.AllWeights, weights.Neighbourhood) == (4, 1, 2.0),
+            "settings of the weights")
+    require(len(pose.Edits) == 20 and pose.MovesWithIt == "The Bone Turns", "the edits")
+    require((pose.MoveTheChosenJoint, pose.ChosenJoint) == (1, 4), "the chosen joint")
+    require(moved.Blend == "Dual Quaternion" and moved.VolumeConservation == 0.5 and
+            moved.InvertedTetrahedra == "Report", "settings of the deformation")
     found = []
     for name in ("Skeleton", "Weights", "Pose", "Moved"):
-        source = simple.FindSource(name)
-        require(source is not None, "there is no " + name)
-        data = fetch(source, 0, TIME)
+        data = fetch(find(name), 0, TIME)
         require(data.GetNumberOfPoints() > 5, name + " is empty")
         found.append((name, content(data), cells(data)))
     return found
-
-
-def check(expected, where):
-    weights, pose, moved = (simple.FindSource(name) for name in ("Weights", "Pose", "Moved"))
-    for one, two in zip(expected, everything()):
-        require(one == two, "%s: other %s" % (where, one[0]))
-    require((weights.Influences, weights.AllWeights, weights.Neighbourhood) == (4, 1, 2.0),
-            where + ": settings of the weights")
-    require(len(pose.Edits) == 20 and pose.MovesWithIt == "The Bone Turns", where + ": the edits")
-    require((pose.MoveTheChosenJoint, pose.ChosenJoint) == (1, 4), where + ": the chosen joint")
-    require(moved.Blend == "Dual Quaternion" and moved.VolumeConservation == 0.5 and
-            moved.InvertedTetrahedra == "Report", where + ": settings of the deformation")
 
 
 def outputs(skeleton_file):
@@ -94,34 +88,12 @@ def round_trips(skeleton_file):
     moved = skinning_pipeline(skeleton_file)[2]
     view = simple.CreateRenderView()
     simple.Show(moved, view)
-    expected = everything()
-    state = os.path.join(folder, "skinning.pvsm")
-    simple.SaveState(state)
-    script = smstate.get_state()
-
-    simple.ResetSession()
-    simple.LoadState(state)
-    check(expected, "state file")
-    simple.ResetSession()
-    exec(compile(script, "state", "exec"), {"__name__": "state"})
-    check(expected, "Python state")
-
-
-def trace_repeats(skeleton_file):
-    simple.ResetSession()
-    smtrace.start_trace(preamble="")
-    skinning_pipeline(skeleton_file)
-    trace = smtrace.stop_trace()
-    expected = everything()
-    simple.ResetSession()
-    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
-    check(expected, "trace")
+    require_states_restore(everything, os.path.join(folder, "skinning.pvsm"))
 
 
 load_plugin(plugin)
 path = write_skeleton(folder)
-# First: a trace started after pictures were saved stays empty.
-trace_repeats(path)
+require_trace_repeats(lambda: skinning_pipeline(path), everything)
 simple.ResetSession()
 outputs(path)
 round_trips(path)

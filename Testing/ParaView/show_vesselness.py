@@ -2,10 +2,10 @@
 import os
 import sys
 
-from paraview import servermanager, simple, smstate, smtrace
+from paraview import servermanager, simple
 
-from coronary_testing import (IMAGE, content, fetch, load_plugin, quick_phantom, require,
-                              require_picture)
+from coronary_testing import (IMAGE, content, fetch, find, load_plugin, quick_phantom, require,
+                              require_picture, require_states_restore, require_trace_repeats)
 
 plugin, folder = sys.argv[1:3]
 
@@ -37,11 +37,11 @@ def make_pipeline():
     return phantom, phase, vesselness
 
 
-def check(vesselness, expected, where):
-    require(vesselness is not None, where + ": the filter is missing")
-    require(list(vesselness.Region) == [2, 35, 3, 36, 4, 38], where + ": the region")
-    require(vesselness.ScaleSpacing == "Logarithmic", where + ": the spacing of the scales")
-    require(content(fetch(vesselness, 0, 0.35)) == expected, where + ": other output")
+def response():
+    vesselness = find("Vesselness")
+    require(list(vesselness.Region) == [2, 35, 3, 36, 4, 38], "the region")
+    require(vesselness.ScaleSpacing == "Logarithmic", "the spacing of the scales")
+    return content(fetch(vesselness, 0, 0.35))
 
 
 def arrays_and_time():
@@ -103,36 +103,22 @@ def round_trips():
     vesselness = make_pipeline()[2]
     view = simple.CreateRenderView()
     simple.Show(vesselness, view)
-    expected = content(fetch(vesselness, 0, 0.35))
-    state = os.path.join(folder, "vesselness.pvsm")
-    simple.SaveState(state)
-    script = smstate.get_state()
-
-    simple.ResetSession()
-    simple.LoadState(state)
-    check(simple.FindSource("Vesselness"), expected, "state file")
-
-    simple.ResetSession()
-    exec(compile(script, "state", "exec"), {"__name__": "state"})
-    check(simple.FindSource("Vesselness"), expected, "Python state")
+    require_states_restore(response, os.path.join(folder, "vesselness.pvsm"))
 
 
 def trace_repeats():
-    simple.ResetSession()
-    smtrace.start_trace(preamble="")
-    phantom = simple.CoronaryPhantom(registrationName="Source", Dimensions=[30, 30, 30],
-                                     AutomaticGrid=0, Spacing=[2.0, 2.0, 2.0],
-                                     Origin=[-30.0, -30.0, -50.0])
-    phase = simple.ReferencePhase(phantom, registrationName="Pinned", Automatic=0)
-    simple.FrangiVesselness(phase, registrationName="Traced", Method="Jerman", SigmaMin=1.0)
-    trace = smtrace.stop_trace()
-    expected = content(fetch(simple.FindSource("Traced"), 0, 0.35))
-    simple.ResetSession()
-    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
-    repeated = simple.FindSource("Traced")
-    require(repeated is not None, "the trace does not create the filter")
-    require(repeated.Method == "Jerman", "trace: the method")
-    require(content(fetch(repeated, 0, 0.35)) == expected, "trace: other output")
+    def build():
+        phantom = simple.CoronaryPhantom(registrationName="Source", Dimensions=[30, 30, 30],
+                                         AutomaticGrid=0, Spacing=[2.0, 2.0, 2.0],
+                                         Origin=[-30.0, -30.0, -50.0])
+        phase = simple.ReferencePhase(phantom, registrationName="Pinned", Automatic=0)
+        simple.FrangiVesselness(phase, registrationName="Traced", Method="Jerman", SigmaMin=1.0)
+
+    def traced():
+        require(find("Traced").Method == "Jerman", "the method")
+        return content(fetch(find("Traced"), 0, 0.35))
+
+    require_trace_repeats(build, traced)
 
 
 def picture():
@@ -151,7 +137,6 @@ def picture():
 
 
 load_plugin(plugin)
-# First: a trace started after pictures were saved stays empty.
 trace_repeats()
 simple.ResetSession()
 arrays_and_time()

@@ -13,21 +13,12 @@ plugin, folder, ranks = sys.argv[1], sys.argv[2], int(sys.argv[3])
 
 
 load_plugin(plugin)
-process = servermanager.vtkProcessModule.GetProcessModule()
-partitions = process.GetNumberOfLocalPartitions()
-coronary_testing.require(partitions == ranks, "%d ranks, not %d" % (partitions, ranks))
+coronary_testing.require_ranks(ranks)
 os.makedirs(folder, exist_ok=True)
 weights, pose, moved = skinning_pipeline(write_skeleton(folder))
 found = []
 for name, source in (("weights", weights), ("pose", pose), ("moved", moved)):
-    # Whole on the first rank, nothing on the others.
-    data = fetch(source, 0, 0.0)
-    everywhere = source.GetDataInformation(0).GetNumberOfPoints()
-    coronary_testing.require(
-        data.GetNumberOfPoints() == everywhere > 0, "%s: %d points on all ranks, %d on the first"
-        % (name, everywhere, data.GetNumberOfPoints()))
-    found += [name] + digest(data)
-
+    found += [name] + digest(coronary_testing.fetch_whole(source, 0, 0.0))
 # A mesh whose pieces are on all ranks, with weights that follow from the place: each rank moves its own.
 BIND = """
 import numpy
@@ -59,20 +50,12 @@ coronary_testing.require(cells == data.GetNumberOfCells() == wanted,
                          "%d cells on all ranks, not %d" % (cells, wanted))
 here = coronary_testing.places(data)
 
-path = os.path.join(folder, "one-rank.txt")
+coronary_testing.compare_with_one_rank(folder, ranks, found)
 places_path = os.path.join(folder, "one-rank.json")
 if ranks == 1:
-    with open(path, "w") as file:
-        file.write("\n".join(found))
     with open(places_path, "w") as file:
         json.dump(here, file)
 else:
-    with open(path) as file:
-        expected = file.read().split("\n")
-    for one, two in zip(expected, found):
-        coronary_testing.require(one == two, "one rank: %s; %d ranks: %s" % (one, ranks, two))
-    coronary_testing.require(len(expected) == len(found),
-                             "%d lines, not %d" % (len(found), len(expected)))
     # Single precision is centred on the piece: equal to its rounding.
     with open(places_path) as file:
         there = json.load(file)
