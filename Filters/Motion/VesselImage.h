@@ -1,9 +1,9 @@
 /**
- * @file LineImage.h
- * @brief Lines with radii as an image of the vessels, for stages that compare images.
+ * @file VesselImage.h
+ * @brief Lines with radii, or closed surfaces, as an image of the vessels, for stages that compare images.
  */
-#ifndef DynamicCoronary_LineImage_h
-#define DynamicCoronary_LineImage_h
+#ifndef DynamicCoronary_VesselImage_h
+#define DynamicCoronary_VesselImage_h
 
 #include "PoseSequence.h"
 #include "ScalarImage.h"
@@ -12,8 +12,8 @@
 
 namespace coronary
 {
-/// 1 inside of the vessels, 0 outside, with walls as wide as two voxels.
-struct LineImage
+/// 1 inside of the vessels, 0 outside, and between at the walls.
+struct VesselImage
 {
   ImageGrid grid;
   std::vector<float> values;
@@ -28,12 +28,24 @@ struct LineImage
 };
 
 /**
+ * Walls are as wide as two voxels.
  * @param spacing  of the voxels, mm, positive; made larger where the image would have more than 64
  *                 million voxels
  * @param margin   mm around the vessels, 0 or more
  * @throws std::invalid_argument  no lines, or as CheckMovingLines
  */
-LineImage RenderLines(const MovingLines& lines, double spacing, double margin);
+VesselImage RenderLines(const MovingLines& lines, double spacing, double margin);
+
+/**
+ * The share of each voxel that is inside: exact along the first axis, four samples across it. What more
+ * than one closed part encloses is inside; the order of the corners may be either one, the same everywhere.
+ * @param points   mm; points at the same place count as one
+ * @param spacing, margin  as above
+ * @throws std::invalid_argument  no triangles, corners that are none of the points, places that are not
+ * finite, a surface with open or turned edges (with their number), or without an inside
+ */
+VesselImage RenderSurface(const std::vector<Vector3>& points,
+  const std::vector<Triangle>& triangles, double spacing, double margin);
 }
 
 #endif

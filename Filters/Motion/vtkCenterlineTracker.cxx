@@ -1,7 +1,7 @@
 #include "vtkCenterlineTracker.h"
 
 #include "CenterlineTracking.h"
-#include "LineImage.h"
+#include "VesselImage.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
@@ -27,7 +27,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <new>
 #include <stdexcept>
 
 namespace names = vtkCoronaryArrayNames;
@@ -46,9 +45,9 @@ enum InputPorts
   SkeletonPort = 2
 };
 
-/// mm: voxels of images of lines, and their margin. As fine as a CT's.
-constexpr double LineSpacing = 0.5;
-constexpr double LineMargin = 3.0;
+/// mm: voxels of images of lines and surfaces, and their margin. As fine as a CT's.
+constexpr double DrawnSpacing = 0.5;
+constexpr double DrawnMargin = 3.0;
 
 vtkInformation* Connection(vtkInformationVector** inputs, int port)
 {
@@ -91,21 +90,73 @@ std::vector<Foot> FeetOf(const coronary::MovingLines& lines, vtkPolyData* points
     {
       for (std::size_t i = 0; i + 1 < line.size(); ++i)
       {
-        const Vector3& a = lines.rest[line[i]];
-        const Vector3 way = lines.rest[line[i + 1]] - a;
-        const double at =
-          std::clamp((place - a).dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
-        const double apart = (a + at * way - place).squaredNorm();
-        if (apart < least)
+        const coronary::SegmentPlace nearest =
+          coronary::NearestOnSegment(place, lines.rest[line[i]], lines.rest[line[i + 1]]);
+        if (nearest.squaredDistance < least)
         {
-          least = apart;
-          best = { line[i], line[i + 1], at };
+          least = nearest.squaredDistance;
+          best = { line[i], line[i + 1], nearest.fraction };
         }
       }
     }
     feet.push_back(best);
   }
   return feet;
+}
+
+bool IsSurface(vtkPolyData* shapes)
+{
+  return shapes != nullptr && shapes->GetNumberOfPolys() + shapes->GetNumberOfStrips() > 0;
+}
+
+/// Polygons and strips as triangles, turned as they are.
+std::vector<coronary::Triangle> TrianglesOf(vtkPolyData* surface)
+{
+  std::vector<coronary::Triangle> triangles;
+  vtkIdType count = 0;
+  const vtkIdType* points = nullptr;
+  const auto polygons =
+    vtkSmartPointer<vtkCellArrayIterator>::Take(surface->GetPolys()->NewIterator());
+  for (polygons->GoToFirstCell(); !polygons->IsDoneWithTraversal(); polygons->GoToNextCell())
+  {
+    polygons->GetCurrentCell(count, points);
+    for (vtkIdType n = 2; n < count; ++n)
+    {
+      triangles.push_back({ points[0], points[n - 1], points[n] });
+    }
+  }
+  const auto strips =
+    vtkSmartPointer<vtkCellArrayIterator>::Take(surface->GetStrips()->NewIterator());
+  for (strips->GoToFirstCell(); !strips->IsDoneWithTraversal(); strips->GoToNextCell())
+  {
+    strips->GetCurrentCell(count, points);
+    for (vtkIdType n = 2; n < count; ++n)
+    {
+      const vtkIdType odd = n % 2;
+      triangles.push_back({ points[n - 2 + odd], points[n - 1 - odd], points[n] });
+    }
+  }
+  return triangles;
+}
+
+/// An image of what is in poly data: closed surfaces, or else lines.
+coronary::VesselImage Drawn(vtkPolyData* shapes)
+{
+  if (IsSurface(shapes))
+  {
+    std::vector<Vector3> points;
+    for (vtkIdType n = 0; n < shapes->GetNumberOfPoints(); ++n)
+    {
+      points.emplace_back(shapes->GetPoint(n));
+    }
+    return coronary::RenderSurface(points, TrianglesOf(shapes), DrawnSpacing, DrawnMargin);
+  }
+  vtkCoronary::Require(shapes != nullptr && shapes->GetNumberOfLines() > 0,
+    "The series has neither lines nor surfaces");
+  const char* radius =
+    shapes->GetPointData()->GetArray(names::Radius) != nullptr ? names::Radius : "Radius";
+  return coronary::RenderLines(
+    vtkPoseSequences::LinesOf(shapes, radius), DrawnSpacing, DrawnMargin);
 }
 
 double LengthOf(vtkIdType count, const vtkIdType* points, const std::vector<Vector3>& positions)
@@ -321,10 +372,15 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
   vtkDataObject* first = vtkDataObject::GetData(series);
   const bool images = vtkImageData::SafeDownCast(first) != nullptr;
   settings.tissue = images && this->ImageContent == Tomogram;
-  if (!images)
+  if (!settings.tissue)
   {
     settings.temporalWindow = 0.0;
   }
+  // Surfaces show walls that the lines do not know of.
+  const bool hasReference =
+    std::abs(vtkCoronary::NearestMoment(series, false, data.Reference).time - data.Reference) <
+    1e-3;
+  const bool fromLines = !images && !(hasReference && IsSurface(vtkPolyData::SafeDownCast(first)));
   data.Cycle =
     FieldValue(first, names::CycleLength, FieldValue(input, names::CycleLength, this->CycleLength));
   settings.cycleLength = data.Cycle;
@@ -336,13 +392,13 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
     series->Get(SDDP::WHOLE_EXTENT(), whole.data());
   }
   std::vector<float> copy;
-  coronary::LineImage drawn;
+  coronary::VesselImage drawn;
   const auto imageAt = [&](double time)
   {
     coronary::ScalarImage image;
-    if (!images && time == data.Reference)
+    if (fromLines && time == data.Reference)
     {
-      drawn = coronary::RenderLines(data.Lines, LineSpacing, LineMargin);
+      drawn = coronary::RenderLines(data.Lines, DrawnSpacing, DrawnMargin);
       return drawn.View();
     }
     const vtkCoronary::Moment moment = vtkCoronary::NearestMoment(series, false, time);
@@ -362,20 +418,19 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
           " with one value a voxel");
       return vtkCoronary::ScalarImageOf(voxels, array, copy);
     }
-    auto* lines = vtkPolyData::SafeDownCast(now);
-    Require(lines != nullptr && lines->GetNumberOfLines() > 0, "The series has no lines" + where);
-    const char* radii =
-      lines->GetPointData()->GetArray(names::Radius) != nullptr ? names::Radius : "Radius";
-    drawn = coronary::RenderLines(vtkPoseSequences::LinesOf(lines, radii), LineSpacing, LineMargin);
+    try
+    {
+      drawn = Drawn(vtkPolyData::SafeDownCast(now));
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw std::invalid_argument(error.what() + where);
+    }
     return drawn.View();
   };
-  if (images)
-  {
-    const double nearest = vtkCoronary::NearestMoment(series, false, data.Reference).time;
-    Require(std::abs(nearest - data.Reference) < 1e-3,
-      "The reference time " + std::to_string(data.Reference) +
-        " is none of the time steps of the series");
-  }
+  Require(!images || hasReference,
+    "The reference time " + std::to_string(data.Reference) +
+      " is none of the time steps of the series");
   data.Poses = coronary::TrackCenterlines(data.Lines, data.Reference, times, imageAt, settings,
     &data.Report, vtkCoronary::ProgressOf(this));
   ++data.Trackings;
@@ -400,7 +455,6 @@ int vtkCenterlineTracker::RequestData(
     return 1;
   }
   Internals& data = *this->Data;
-  int result = 1;
   try
   {
     for (const std::string* name : { &this->ConfidenceArrayName, &this->StatusArrayName,
@@ -505,27 +559,11 @@ int vtkCenterlineTracker::RequestData(
     }
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(
+      this, outputs, "to track the lines", { "CenterlineTrackingSettings: ", "TrajectoryPrior: " });
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Out of memory");
-    result = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(
-                    error.what(), { "CenterlineTrackingSettings: ", "TrajectoryPrior: " }));
-    result = 0;
-  }
-  for (int port = 0; port < 2; ++port)
-  {
-    output[port]->Initialize();
-    outputs->GetInformationObject(port)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  }
-  return result;
 }
 
 void vtkCenterlineTracker::PrintSelf(ostream& os, vtkIndent indent)

@@ -14,8 +14,9 @@
  * @par Input ports:
  * - 0: vtkImageData with time steps (fractions of R-R), the series: short, unsigned short, float or any
  *   other scalars. Grids may differ from phase to phase. Masks work as well (ImageContent). Or vtkPolyData
- *   with time steps: the lines of every phase with radii, as found in it by whatever means; they need
- *   neither the same points nor the same branches.
+ *   with time steps: closed surfaces of the vessels at every phase (polygons or strips, turned the same way), or
+ *   the lines of every phase with radii, as found in it by whatever means. Neither need the same points nor
+ *   the same branches at all phases.
  * - 1: vtkPolyData, lines to track, at the reference phase. Point data `MaximumInscribedSphereRadius` or `Radius`
  *   (optional). Field data `PhaseTime` (optional): the reference phase.
  * - 2, optional: vtkPolyData, a skeleton made of the same lines, of which the second output is made.
@@ -35,7 +36,8 @@
  *
  * @par Failure:
  * An input without time steps or with one only, times that do not increase, lines outside the image, a
- * reference that is not known, no phase in which anything was found: one error and no output. Phases in which
+ * reference that is not known, a phase without voxels or shapes, a surface that is not closed, no phase in which
+ * anything was found: one error and no output. Phases in which
  * nothing was found are filled, with a warning.
  *
  * @sa coronary::TrackCenterlines, vtkMotionRegularizer, vtkCardiacPhaseInterpolator
@@ -126,8 +128,8 @@ public:
 
   ///@{
   /**
-   * Seconds over which an image was taken: half a turn of the gantry, a quarter with two sources; 0 for masks.
-   * Default 0.066.
+   * Seconds over which an image was taken: half a turn of the gantry, a quarter with two sources. Default 0.066.
+   * Not used for masks, surfaces and lines, which are taken for those of one moment.
    */
   vtkSetMacro(TemporalWindow, double);
   vtkGetMacro(TemporalWindow, double);

@@ -1,16 +1,21 @@
-// vtkCenterlineTracker through the VTK pipeline: the phantom's series, time keys, what is read and
-// when, refusals.
+// vtkCenterlineTracker through the VTK pipeline: the phantom's series, masks, surfaces, time keys, what is
+// read and when, refusals.
 #include "vtkCenterlineTracker.h"
 
+#include "CoronaryPhantom.h"
 #include "FilterMessages.h"
 #include "ParallelFor.h"
+#include "TimedTestSource.h"
+#include "vtkCardiacPhaseInterpolator.h"
 #include "vtkCenterlineSkeleton.h"
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkReferencePhase.h"
 
+#include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
 #include "vtkFieldData.h"
+#include "vtkFloatArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -18,19 +23,119 @@
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
+#include "vtkStripper.h"
 #include "vtkTrivialProducer.h"
+#include "vtkUnsignedCharArray.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <vector>
 
+using coronary::ImageGrid;
+using coronary::Vector3;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 using Phantom = vtkCoronaryPhantomSource;
 
 namespace
 {
+/// What a function gives at every time step; nothing for one at which it fails.
+class GivenSeries : public TimedTestSource
+{
+public:
+  static GivenSeries* New();
+  vtkTypeMacro(GivenSeries, TimedTestSource);
+
+  std::function<vtkSmartPointer<vtkDataObject>(double time)> Give;
+  std::array<int, 6> Whole{ 0, -1, 0, -1, 0, -1 }; ///< of images
+
+protected:
+  vtkSmartPointer<vtkDataObject> NewOutput() override
+  {
+    if (this->Whole[1] < 0)
+    {
+      return vtkSmartPointer<vtkPolyData>::New();
+    }
+    return vtkSmartPointer<vtkImageData>::New();
+  }
+
+  int RequestInformation(
+    vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override
+  {
+    if (this->Whole[1] >= 0)
+    {
+      outputs->GetInformationObject(0)->Set(SDDP::WHOLE_EXTENT(), this->Whole.data(), 6);
+    }
+    return TimedTestSource::RequestInformation(request, inputs, outputs);
+  }
+
+  bool Make(double time, vtkDataObject* output) override
+  {
+    const vtkSmartPointer<vtkDataObject> data = this->Give(time);
+    if (data == nullptr)
+    {
+      vtkErrorMacro("cannot read the file of " << time);
+      return false;
+    }
+    output->ShallowCopy(data);
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+    return true;
+  }
+};
+vtkStandardNewMacro(GivenSeries);
+
+/// The phantom's lumen as users have it from a segmentation: 1 inside, 0 outside, 8 bits.
+vtkSmartPointer<vtkImageData> MaskAt(
+  const coronary::CoronaryPhantom& phantom, const ImageGrid& grid, double time)
+{
+  auto image = vtkSmartPointer<vtkImageData>::New();
+  std::array<int, 6> extent = grid.extent;
+  image->SetExtent(extent.data());
+  image->SetSpacing(grid.spacing.data());
+  image->SetOrigin(grid.origin.data());
+  std::vector<float> distances(image->GetNumberOfPoints());
+  phantom.LumenDistances(grid, grid.extent, time, 1.0, distances.data());
+  vtkNew<vtkUnsignedCharArray> mask;
+  mask->SetName("Lumen");
+  mask->SetNumberOfValues(image->GetNumberOfPoints());
+  std::transform(distances.begin(), distances.end(), mask->GetPointer(0),
+    [](float distance) { return static_cast<unsigned char>(distance < 0.0F ? 1 : 0); });
+  image->GetPointData()->SetScalars(mask);
+  return image;
+}
+
+/// Mean distance of points to the axes of a phantom's tree, of vessels of 0.75 mm and more.
+double AxisError(vtkPolyData* found, const coronary::PhantomTree& truth)
+{
+  double sum = 0.0;
+  vtkIdType count = 0;
+  for (vtkIdType n = 0; n < found->GetNumberOfPoints(); ++n)
+  {
+    if (truth.radius[n] < 0.75)
+    {
+      continue;
+    }
+    const Vector3 place(found->GetPoint(n));
+    double least = std::numeric_limits<double>::infinity();
+    for (const coronary::PhantomBranch& branch : truth.branches)
+    {
+      for (std::size_t p = 0; p + 1 < branch.points.size(); ++p)
+      {
+        least = std::min(least,
+          coronary::NearestOnSegment(
+            place, truth.points[branch.points[p]], truth.points[branch.points[p + 1]])
+            .squaredDistance);
+      }
+    }
+    sum += std::sqrt(least);
+    ++count;
+  }
+  return sum / static_cast<double>(count);
+}
+
 /// A phantom in coarse voxels with few phases, its true tree at the reference, and the tracker.
 struct Scene
 {
@@ -218,6 +323,122 @@ TEST(CenterlineTracker, TakesLinesOfEveryPhase)
   }
 }
 
+TEST(CenterlineTracker, TakesMasksOfEveryPhase)
+{
+  // Every other one of sixteen phases is tracked, the others are judged too.
+  coronary::PhantomSettings settings;
+  settings.seed = 2;
+  const coronary::CoronaryPhantom phantom(settings);
+  const ImageGrid grid = phantom.DefaultGrid(1.0, 6.0);
+  vtkNew<GivenSeries> masks;
+  masks->Whole = grid.extent;
+  for (int k = 0; k < 16; ++k)
+  {
+    masks->Steps.push_back(k / 16.0);
+  }
+  masks->Give = [&](double time) { return MaskAt(phantom, grid, time); };
+  vtkNew<Phantom> tree;
+  tree->SetSeed(2);
+  vtkNew<vtkReferencePhase> lines;
+  lines->SetInputConnection(tree->GetOutputPort(Phantom::TreePort));
+  lines->AutomaticOff();
+  lines->SetTime(masks->Steps[12]);
+  tree->ClearPhases();
+  tree->AddPhase(masks->Steps[12]);
+  vtkNew<vtkCenterlineTracker> tracker;
+  tracker->SetInputConnection(masks->GetOutputPort());
+  tracker->SetLinesConnection(lines->GetOutputPort());
+  tracker->SetImageContent(vtkCenterlineTracker::Mask);
+  tracker->SetImageArrayName("Lumen");
+  tracker->SetTrackedPhases(vtkCenterlineTracker::EvenPhases);
+  vtkNew<vtkCardiacPhaseInterpolator> motion;
+  motion->SetInputConnection(tracker->GetOutputPort());
+  double tracked = 0.0;
+  double between = 0.0;
+  for (int k = 0; k < 16; ++k)
+  {
+    const double time = masks->Steps[k];
+    motion->UpdateTimeStep(time);
+    auto* found = vtkPolyData::SafeDownCast(motion->GetOutputDataObject(0));
+    ASSERT_GT(found->GetNumberOfPoints(), 0);
+    const double error = AxisError(found, phantom.Tree(time));
+    EXPECT_LT(error, 0.5) << "at " << time;
+    (k % 2 == 0 ? tracked : between) += error / 8.0;
+  }
+  std::printf("masks: tracked phases %.3f mm, between %.3f mm\n", tracked, between);
+  EXPECT_LT(tracked, 0.15);
+  EXPECT_LT(between, 0.25);
+  // Every tracked phase and, once more, the reference.
+  EXPECT_EQ(tracker->GetNumberOfTrackings(), 1);
+  EXPECT_LE(masks->Executions, 11);
+}
+
+TEST(CenterlineTracker, TakesClosedSurfacesOfEveryPhase)
+{
+  Scene scene;
+  scene.phantom->SetSurfaceSpacing(0.8);
+  scene.tracker->SetInputConnection(scene.phantom->GetOutputPort(Phantom::SurfacePort));
+  const coronary::CoronaryPhantom phantom{ coronary::PhantomSettings() };
+  std::vector<double> errors;
+  for (const double time : { 0.25, 0.5 })
+  {
+    errors.push_back(AxisError(scene.At(time), phantom.Tree(time)));
+    EXPECT_LT(errors.back(), 0.2) << time;
+  }
+
+  // Strips show the same.
+  vtkNew<vtkStripper> strips;
+  strips->SetInputConnection(scene.phantom->GetOutputPort(Phantom::SurfacePort));
+  scene.tracker->SetInputConnection(strips->GetOutputPort());
+  EXPECT_NEAR(AxisError(scene.At(0.5), phantom.Tree(0.5)), errors[1], 0.01);
+  EXPECT_GT(strips->GetOutput()->GetNumberOfStrips(), 0);
+
+  // A reference between the phases: the lines say what the vessels look like.
+  scene.tracker->SetInputConnection(scene.phantom->GetOutputPort(Phantom::SurfacePort));
+  scene.phantom->ClearPhases();
+  for (const double phase : { 0.05, 0.25, 0.5, 0.7 })
+  {
+    scene.phantom->AddPhase(phase);
+  }
+  vtkNew<Phantom> tree;
+  tree->ClearPhases();
+  tree->AddPhase(0.75);
+  scene.reference->SetInputConnection(tree->GetOutputPort(Phantom::TreePort));
+  EXPECT_LT(AxisError(scene.At(0.5), phantom.Tree(0.5)), 0.3);
+}
+
+TEST(CenterlineTracker, TakesOtherGridsAndNumbersOfPhases)
+{
+  // Every phase on a grid of its own, one of them turned and in other voxels.
+  const coronary::CoronaryPhantom phantom{ coronary::PhantomSettings() };
+  vtkNew<GivenSeries> masks;
+  masks->Steps = { 0.05, 0.25, 0.5, 0.75 };
+  masks->Whole = phantom.DefaultGrid(1.0, 6.0).extent;
+  masks->Give = [&](double time)
+  {
+    ImageGrid grid = phantom.DefaultGrid(time == 0.25 ? 0.8 : 1.0, 6.0 + 8.0 * time);
+    if (time == 0.5)
+    {
+      // The axes in another order.
+      const std::array<int, 6> e = grid.extent;
+      grid.extent = { e[2], e[3], e[4], e[5], e[0], e[1] };
+      grid.direction << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+    }
+    auto image = MaskAt(phantom, grid, time);
+    image->SetDirectionMatrix(grid.direction(0, 0), grid.direction(0, 1), grid.direction(0, 2),
+      grid.direction(1, 0), grid.direction(1, 1), grid.direction(1, 2), grid.direction(2, 0),
+      grid.direction(2, 1), grid.direction(2, 2));
+    return image;
+  };
+  Scene scene;
+  scene.tracker->SetInputConnection(masks->GetOutputPort());
+  scene.tracker->SetImageContent(vtkCenterlineTracker::Mask);
+  for (const double time : { 0.25, 0.5 })
+  {
+    EXPECT_LT(AxisError(scene.At(time), phantom.Tree(time)), 0.25) << time;
+  }
+}
+
 TEST(CenterlineTracker, GivesTheSameOnAnyNumberOfThreads)
 {
   std::vector<double> first;
@@ -292,6 +513,155 @@ TEST(CenterlineTracker, RefusesWhatIsWrong)
     producer->Modified();
     ExpectError(scene.tracker, "no field array PhaseTime");
   }
+}
+
+TEST(CenterlineTracker, RefusesSeriesThatAreNone)
+{
+  Scene scene({ 0.35, 0.5, 0.75 });
+  vtkNew<GivenSeries> images;
+  images->Steps = { 0.35, 0.5, 0.75 };
+  images->Whole = { 0, 9, 0, 9, 0, 9 };
+  const auto blank = []
+  {
+    auto image = vtkSmartPointer<vtkImageData>::New();
+    image->SetExtent(0, 9, 0, 9, 0, 9);
+    image->AllocateScalars(VTK_SHORT, 1);
+    image->GetPointData()->GetScalars()->Fill(0.0);
+    return image;
+  };
+  scene.tracker->SetInputConnection(images->GetOutputPort());
+  images->Give = [&](double) { return blank(); };
+  const auto steps = [&](const std::vector<double>& times, const char* message)
+  {
+    images->Steps = times;
+    images->Modified();
+    ExpectError(scene.tracker, message);
+  };
+  steps({ 0.35, 0.35, 0.75 }, "do not increase");
+  steps({ 0.75, 0.5, 0.35 }, "do not increase");
+  steps({ 0.35, std::nan(""), 0.75 }, "do not increase");
+  steps({ 0.75 }, "one phase only");
+  steps({ 0.35, 0.5, 0.75 }, "Most of the lines are outside of the image");
+
+  // A phase that is missing in the middle: no voxels, no array, or its file cannot be read.
+  const coronary::CoronaryPhantom phantom{ coronary::PhantomSettings() };
+  const ImageGrid grid = phantom.DefaultGrid(1.5, 6.0);
+  images->Whole = grid.extent;
+  const auto atHalf = [&](const std::function<vtkSmartPointer<vtkDataObject>()>& other)
+  {
+    images->Give = [&phantom, grid, other](double time) -> vtkSmartPointer<vtkDataObject>
+    {
+      if (time == 0.5)
+      {
+        return other();
+      }
+      return MaskAt(phantom, grid, time);
+    };
+    images->Modified();
+  };
+  atHalf([] { return vtkSmartPointer<vtkImageData>::New(); });
+  ExpectError(scene.tracker, "The image at the time 0.5");
+  atHalf(
+    [&]
+    {
+      auto image = blank();
+      image->GetPointData()->Initialize();
+      return image;
+    });
+  ExpectError(scene.tracker, "no point array of scalars");
+  {
+    atHalf([] { return nullptr; });
+    Messages upstream(images);
+    ExpectError(scene.tracker, "failed");
+    EXPECT_TRUE(upstream.HasError("cannot read the file of 0.5"));
+  }
+  // It can be left out.
+  scene.tracker->SetTrackedPhases(vtkCenterlineTracker::ListedPhases);
+  scene.tracker->AddTrackedTime(0.35);
+  scene.tracker->AddTrackedTime(0.75);
+  scene.tracker->SetImageContent(vtkCenterlineTracker::Mask);
+  EXPECT_GT(scene.At(0.35)->GetNumberOfPoints(), 0);
+
+  // Nothing to be seen in one phase: filled, with a warning. In none: an error.
+  atHalf(
+    [&]
+    {
+      auto image = MaskAt(phantom, grid, 0.5);
+      image->GetPointData()->GetScalars()->Fill(0.0);
+      return image;
+    });
+  scene.tracker->SetTrackedPhases(vtkCenterlineTracker::AllPhases);
+  {
+    Messages messages(scene.tracker);
+    EXPECT_GT(scene.At(0.5)->GetNumberOfPoints(), 0);
+    EXPECT_TRUE(messages.HasWarning("The phase at 0.5"));
+    EXPECT_TRUE(messages.Errors.empty());
+  }
+  scene.tracker->SetTrackedPhases(vtkCenterlineTracker::ListedPhases);
+  scene.tracker->RemoveAllTrackedTimes();
+  scene.tracker->AddTrackedTime(0.5);
+  ExpectError(scene.tracker, "found in none of the phases");
+}
+
+TEST(CenterlineTracker, RefusesShapesThatAreNone)
+{
+  Scene scene({ 0.35, 0.5, 0.75 });
+  scene.phantom->SetSurfaceSpacing(1.2);
+  std::vector<vtkSmartPointer<vtkPolyData>> surfaces;
+  vtkNew<GivenSeries> shapes;
+  shapes->Steps = { 0.35, 0.5, 0.75 };
+  for (const double time : shapes->Steps)
+  {
+    scene.phantom->GetOutputInformation(Phantom::SurfacePort)->Set(SDDP::UPDATE_TIME_STEP(), time);
+    scene.phantom->Update(Phantom::SurfacePort);
+    surfaces.push_back(vtkSmartPointer<vtkPolyData>::New());
+    surfaces.back()->DeepCopy(scene.phantom->GetOutputDataObject(Phantom::SurfacePort));
+  }
+  vtkSmartPointer<vtkPolyData> middle;
+  shapes->Give = [&](double time) -> vtkSmartPointer<vtkDataObject> {
+    return time == 0.35 ? surfaces[0] : time == 0.75 ? surfaces[2] : middle;
+  };
+  scene.tracker->SetInputConnection(shapes->GetOutputPort());
+  const auto refuse = [&](const char* message)
+  {
+    shapes->Modified();
+    ExpectError(scene.tracker, message);
+  };
+  middle = vtkSmartPointer<vtkPolyData>::New();
+  refuse("neither lines nor surfaces at the time 0.5");
+  middle->SetPoints(surfaces[1]->GetPoints());
+  refuse("neither lines nor surfaces at the time 0.5");
+
+  // One triangle is missing, or turned.
+  for (const bool turned : { false, true })
+  {
+    vtkNew<vtkCellArray> cells;
+    cells->DeepCopy(surfaces[1]->GetPolys());
+    if (turned)
+    {
+      cells->ReverseCellAtId(5);
+    }
+    else
+    {
+      vtkNew<vtkCellArray> fewer;
+      for (vtkIdType n = 1; n < cells->GetNumberOfCells(); ++n)
+      {
+        vtkIdType count = 0;
+        const vtkIdType* ids = nullptr;
+        cells->GetCellAtId(n, count, ids);
+        fewer->InsertNextCell(count, ids);
+      }
+      cells->DeepCopy(fewer);
+    }
+    middle->SetPolys(cells);
+    refuse("not turned the same way: at 3 edges at the time 0.5");
+  }
+  vtkNew<vtkPoints> points;
+  points->DeepCopy(surfaces[1]->GetPoints());
+  points->SetPoint(7, std::nan(""), 0.0, 0.0);
+  middle->SetPoints(points);
+  middle->SetPolys(surfaces[1]->GetPolys());
+  refuse("Point 7 is not finite at the time 0.5");
 }
 
 TEST(CenterlineTracker, TakesLinesWithoutPoints)

@@ -3,11 +3,11 @@
 
 #include "CenterlineTracking.h"
 #include "DisplacementLabels.h"
-#include "LineImage.h"
 #include "LineNodes.h"
 #include "Refusals.h"
 #include "SparseVolume.h"
 #include "TrajectoryModel.h"
+#include "VesselImage.h"
 
 #include <gtest/gtest.h>
 
@@ -375,9 +375,9 @@ TEST(SparseVolume, SamplesAsTheImageDoes)
   }
 }
 
-TEST(LineImage, IsOneInsideAndHalfAtTheWall)
+TEST(VesselImage, IsOneInsideAndHalfAtTheWall)
 {
-  const LineImage image = RenderLines(Fork(), 0.4, 2.0);
+  const VesselImage image = RenderLines(Fork(), 0.4, 2.0);
   const ScalarImage view = image.View();
   const SparseVolume volume(view, { Vector3(0.0, 0.0, 10.0) }, 6.0);
   EXPECT_NEAR(volume.Sample({ 0.0, 0.0, 10.0 }), 1.0, 1e-3);
@@ -388,8 +388,138 @@ TEST(LineImage, IsOneInsideAndHalfAtTheWall)
 
 namespace
 {
+struct Box
+{
+  std::vector<Vector3> points;
+  std::vector<Triangle> triangles;
+
+  /// A box, outwards or inwards.
+  void Add(const Vector3& low, const Vector3& high, bool outwards = true)
+  {
+    const auto first = static_cast<std::int64_t>(this->points.size());
+    for (int n = 0; n < 8; ++n)
+    {
+      this->points.emplace_back((n & 1) != 0 ? high[0] : low[0], (n & 2) != 0 ? high[1] : low[1],
+        (n & 4) != 0 ? high[2] : low[2]);
+    }
+    const std::array<std::array<int, 4>, 6> faces{ { { 0, 2, 3, 1 }, { 4, 5, 7, 6 }, { 0, 1, 5, 4 },
+      { 2, 6, 7, 3 }, { 0, 4, 6, 2 }, { 1, 3, 7, 5 } } };
+    for (const std::array<int, 4>& f : faces)
+    {
+      this->triangles.push_back({ first + f[0], first + f[1], first + f[2] });
+      this->triangles.push_back({ first + f[0], first + f[2], first + f[3] });
+      if (!outwards)
+      {
+        std::swap(this->triangles.back()[1], this->triangles.back()[2]);
+        Triangle& other = this->triangles[this->triangles.size() - 2];
+        std::swap(other[1], other[2]);
+      }
+    }
+  }
+
+  VesselImage Image(double spacing = 0.5, double margin = 1.0) const
+  {
+    return RenderSurface(this->points, this->triangles, spacing, margin);
+  }
+};
+
+double VolumeOf(const VesselImage& image)
+{
+  double sum = 0.0;
+  for (const float value : image.values)
+  {
+    EXPECT_GE(value, 0.0F);
+    EXPECT_LE(value, 1.0F + 1e-6F);
+    sum += value;
+  }
+  return sum * image.grid.spacing.prod();
+}
+}
+
+TEST(VesselImage, HasTheVolumeOfASurface)
+{
+  Box box;
+  box.Add({ -3.1, 2.0, 7.3 }, { 4.2, 6.5, 9.9 });
+  const double volume = 7.3 * 4.5 * 2.6;
+  // Exact along x; across, a wall is anywhere between two samples.
+  EXPECT_NEAR(VolumeOf(box.Image(0.1)), volume, 0.05 * volume);
+  EXPECT_NEAR(VolumeOf(box.Image(0.5)), volume, 0.15 * volume);
+  // Walls that run through the samples, and edges that do, are counted once.
+  Box even;
+  even.Add({ 0.0, 0.0, 0.0 }, { 4.0, 4.0, 4.0 });
+  EXPECT_NEAR(VolumeOf(even.Image(1.0, 0.75)), 64.0, 1e-9);
+  EXPECT_NEAR(VolumeOf(even.Image(1.0, 1.25)), 64.0, 1e-9);
+  // Two boxes that overlap are one volume; inside out as well.
+  for (const bool outwards : { true, false })
+  {
+    Box two;
+    two.Add({ 0.0, 0.0, 0.0 }, { 4.0, 4.0, 4.0 }, outwards);
+    two.Add({ 2.0, 0.0, 0.0 }, { 6.0, 4.0, 4.0 }, outwards);
+    EXPECT_NEAR(VolumeOf(two.Image(1.0, 1.25)), 96.0, 1e-9);
+  }
+  // A ball.
+  Box ball;
+  constexpr int around = 40;
+  for (int j = 0; j <= around; ++j)
+  {
+    for (int i = 0; i < 2 * around; ++i)
+    {
+      const double polar = Pi * j / around;
+      const double angle = Pi * (i % (2 * around)) / around;
+      ball.points.emplace_back(5.0 * std::sin(polar) * std::cos(angle),
+        5.0 * std::sin(polar) * std::sin(angle), 5.0 * std::cos(polar));
+      const std::int64_t next = (i + 1) % (2 * around);
+      if (j > 0)
+      {
+        const std::int64_t row = 2 * around;
+        ball.triangles.push_back({ (j - 1) * row + i, j * row + i, j * row + next });
+        ball.triangles.push_back({ (j - 1) * row + i, j * row + next, (j - 1) * row + next });
+      }
+    }
+  }
+  // All points of the poles are at one place, but for the rounding of a sine.
+  for (int i = 0; i < 2 * around; ++i)
+  {
+    ball.points[i] = { 0.0, 0.0, 5.0 };
+    ball.points[around * 2 * around + i] = { 0.0, 0.0, -5.0 };
+  }
+  const double volumeOfBall = 4.0 / 3.0 * Pi * 125.0;
+  EXPECT_NEAR(VolumeOf(ball.Image(0.4)), volumeOfBall, 0.01 * volumeOfBall);
+  const VesselImage once = ball.Image(0.4);
+  SetNumberOfThreads(3);
+  EXPECT_EQ(ball.Image(0.4).values, once.values);
+  SetNumberOfThreads(0);
+}
+
+TEST(VesselImage, RefusesSurfacesThatEncloseNothing)
+{
+  Box box;
+  ExpectRefusal([&] { box.Image(); }, "no triangles");
+  box.Add({ 0.0, 0.0, 0.0 }, { 4.0, 4.0, 4.0 });
+  ExpectRefusal([&] { box.Image(0.0); }, "spacing");
+  Box other = box;
+  other.triangles.pop_back();
+  ExpectRefusal(
+    [&] { other.Image(); }, "not closed, or its triangles are not turned the same way: at 3 edges");
+  other = box;
+  std::swap(other.triangles[3][0], other.triangles[3][1]);
+  ExpectRefusal([&] { other.Image(); }, "at 3 edges");
+  other = box;
+  other.triangles[2][1] = 8;
+  ExpectRefusal([&] { other.Image(); }, "the corner 8");
+  other = box;
+  other.points[6][1] = std::nan("");
+  ExpectRefusal([&] { other.Image(); }, "Point 6 is not finite");
+  // A sheet that is gone there and back.
+  other = box;
+  other.triangles = { { 0, 1, 3 }, { 0, 3, 1 } };
+  ExpectRefusal([&] { other.Image(); }, "encloses nothing");
+}
+
+namespace
+{
 /// An image of the fork, moved by `shift`.
-LineImage Moved(const Vector3& shift)
+VesselImage Moved(const Vector3& shift)
 {
   MovingLines lines = Fork();
   for (Vector3& point : lines.rest)
@@ -414,7 +544,7 @@ TEST(CenterlineTracking, FollowsImagesOfVesselsAlone)
   {
     times.push_back(0.1 * k);
   }
-  LineImage image;
+  VesselImage image;
   int reads = 0;
   const auto imageAt = [&](double t)
   {
@@ -451,7 +581,7 @@ TEST(CenterlineTracking, FillsAPhaseWithoutVessels)
   {
     times.push_back(0.1 * k);
   }
-  LineImage image;
+  VesselImage image;
   const auto imageAt = [&](double t)
   {
     image = Moved(Way(t));
@@ -480,7 +610,7 @@ TEST(CenterlineTracking, MeasuresPhasesThatShowTheSameMoment)
 {
   const MovingLines lines = Fork();
   const std::vector<double> times = { 0.0, 0.25, 0.5, 0.75, 1.005 };
-  LineImage image;
+  VesselImage image;
   const auto imageAt = [&](double t)
   {
     image = Moved(Way(t));
@@ -499,7 +629,7 @@ TEST(CenterlineTracking, MeasuresPhasesThatShowTheSameMoment)
 TEST(CenterlineTracking, RefusesWhatIsWrong)
 {
   const MovingLines lines = Fork();
-  LineImage image = Moved(Vector3::Zero());
+  VesselImage image = Moved(Vector3::Zero());
   const auto imageAt = [&](double) { return image.View(); };
   const auto track = [&](const std::vector<double>& times, double reference = 0.0)
   { TrackCenterlines(lines, reference, times, imageAt); };
