@@ -33,12 +33,12 @@ struct SkinWeightSettings
     1e-6; ///< of the conditions of optimality, see SkinWeights::residual; 1e-10 to 0.01
   int iterations = 2000; ///< limit for the alternating directions, 1 to 1000000
   bool polish = true;    ///< solve exactly for the set of bounds that was found to hold
-  /// Joint and Independent: a bone may have weight only where a bone of its group of eight is nearer
-  /// than so many diameters of the vessel, along the bones; 0: everywhere. SkinWeights::energyGap says
-  /// what it costs.
+  /// Joint and Independent: a bone may have weight only where a bone that it is solved together with is
+  /// nearer than so many diameters of the vessel, along the bones; 0: everywhere.
+  /// SkinWeights::energyGap says what it costs.
   double neighbourhood = 1.75;
-  /// Adds a diameter to the neighbourhood, and goes on, as long as residualEverywhere is above 10
-  /// tolerances.
+  /// Makes sure that `neighbourhood` changes nothing: it is only where the solver begins (Joint: with 0.75 at
+  /// most), bones get weight wherever they would have some, until residualEverywhere is at most 10 tolerances.
   bool widen = true;
   /// Bones wholly outside of the mesh have no weight anywhere, and are told in SkinWeights::leftOut; else they
   /// are refused.
@@ -71,7 +71,8 @@ struct SkinWeights
   int iterations = 0;     ///< of the alternating directions
   int factorizations = 0; ///< of the whole system
   int polishSteps = 0;
-  double neighbourhood = 0.0;    ///< in the end; 0: everywhere
+  double neighbourhood =
+    0.0; ///< in the end, but for what the weights themselves asked for; 0: everywhere
   double penaltyParameter = 0.0; ///< of the alternating directions, at the end
 
   /// Greatest violation of the conditions of optimality at any point and any bone that may have

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <queue>
@@ -25,6 +26,13 @@ constexpr int MostPolishSteps = 10;
 constexpr std::int64_t MostUnknowns = 8000;
 // What bones that are not allowed somewhere may violate, in tolerances, before they are.
 constexpr double Margin = 10.0;
+// Diameters around a bone where it may have weight until the weights themselves show where.
+constexpr double FirstReach = 0.75;
+constexpr int FollowAt = 11;
+constexpr double WorthFollowing = 0.85; // of the time of an iteration
+constexpr int MostChanges = 8;
+// Where a new factor costs about as much as the iterations to the end, in tolerances.
+constexpr double NearEnd = 4.0;
 constexpr double Rounding = 1e-13;
 constexpr double Exact = 1e-10; // residual at which nothing is left to polish
 }
@@ -39,62 +47,35 @@ SkinWeightOptimizer::SkinWeightOptimizer(
   // Between the diagonal and what smooth weights feel of the energy, which falls with the fourth power
   // of the points across a vessel.
   this->Rho = std::clamp(0.8 / (system.radius * system.radius), LeastRho, 0.2);
+  if (this->Joint && settings.widen && this->Reach > FirstReach)
+  {
+    this->Reach = FirstReach;
+  }
+  this->ReachDomains();
   this->MakeGroups();
   this->MakePairs();
 }
 
-void SkinWeightOptimizer::MakeGroups()
+void SkinWeightOptimizer::ReachDomains()
 {
   const std::int64_t rows = this->System.energy.rows;
   const auto bones = static_cast<std::int32_t>(this->System.bones);
-  this->Groups.clear();
-  this->Tasks.clear();
-  this->Size = 0;
-  // Bones in the order in which a walk along the skeleton meets them, eight to a group.
-  std::vector<char> taken(bones, 0);
-  for (std::int32_t seed = 0; seed < bones; ++seed)
-  {
-    if (taken[seed])
-    {
-      continue;
-    }
-    taken[seed] = 1;
-    Group group;
-    group.bones = { seed };
-    for (std::size_t i = 0; i < group.bones.size(); ++i)
-    {
-      for (const std::int32_t next : this->System.neighbours[group.bones[i]])
-      {
-        if (!taken[next] && (this->Reach == 0.0 || group.bones.size() < ColumnsAtOnce))
-        {
-          taken[next] = 1;
-          group.bones.push_back(next);
-        }
-      }
-    }
-    std::sort(group.bones.begin(), group.bones.end());
-    this->Groups.push_back(std::move(group));
-  }
-  std::vector<std::vector<std::int32_t>> rowsOf(bones);
+  std::vector<Rows> rowsOf(bones);
   for (std::int64_t r = 0; r < rows; ++r)
   {
     rowsOf[this->System.nearest[r]].push_back(static_cast<std::int32_t>(r));
   }
-  for (std::size_t g = 0; g < this->Groups.size(); ++g)
+  this->Domains.resize(bones);
+  for (std::int32_t b = 0; b < bones; ++b)
   {
-    Group& group = this->Groups[g];
-    // From the group's bones outwards, as long as the bones in between are short enough.
+    // From the bone outwards, as long as the bones in between are short enough.
     std::vector<double> distance(bones, std::numeric_limits<double>::infinity());
-    std::vector<char> inGroup(bones, 0);
     using Reached = std::pair<double, std::int32_t>;
     std::priority_queue<Reached, std::vector<Reached>, std::greater<>> queue;
-    for (const std::int32_t bone : group.bones)
-    {
-      distance[bone] = 0.0;
-      inGroup[bone] = 1;
-      queue.push({ 0.0, bone });
-    }
+    distance[b] = 0.0;
+    queue.push({ 0.0, b });
     std::vector<char> done(bones, 0);
+    Rows domain = std::move(this->Domains[b]);
     while (!queue.empty())
     {
       const std::int32_t bone = queue.top().second;
@@ -104,8 +85,8 @@ void SkinWeightOptimizer::MakeGroups()
         continue;
       }
       done[bone] = 1;
-      group.rows.insert(group.rows.end(), rowsOf[bone].begin(), rowsOf[bone].end());
-      const double end = distance[bone] + (inGroup[bone] ? 0.0 : this->System.diameters[bone]);
+      domain.insert(domain.end(), rowsOf[bone].begin(), rowsOf[bone].end());
+      const double end = distance[bone] + (bone == b ? 0.0 : this->System.diameters[bone]);
       for (const std::int32_t next : this->System.neighbours[bone])
       {
         if (end < distance[next] && (this->Reach == 0.0 || end < this->Reach))
@@ -115,7 +96,189 @@ void SkinWeightOptimizer::MakeGroups()
         }
       }
     }
+    std::sort(domain.begin(), domain.end());
+    domain.erase(std::unique(domain.begin(), domain.end()), domain.end());
+    this->Domains[b] = std::move(domain);
+  }
+}
+
+namespace
+{
+/// Time of an iteration for a group, in that of one value outside of the solves.
+double EffortOf(std::int64_t rows, std::size_t bones)
+{
+  // A pass of the factor for up to eight bones at a time, and a share of making the factor.
+  const auto passes = static_cast<double>((bones + ColumnsAtOnce - 1) / ColumnsAtOnce);
+  return static_cast<double>(rows) * (9.0 * passes + static_cast<double>(bones) + 2.0);
+}
+
+/// Bones put together, and about how many rows of every bone's surroundings they need.
+struct Cluster
+{
+  std::vector<std::int32_t> bones;
+  std::vector<std::pair<std::int32_t, std::int64_t>> rows; ///< (nearest bone, rows), ascending
+  std::int64_t sum = 0;
+  // The best one after it to be put together with.
+  std::size_t partner = 0;
+  double saving = 0.0;
+
+  double Effort() const { return EffortOf(this->sum, this->bones.size()); }
+};
+
+std::vector<std::pair<std::int32_t, std::int64_t>> Together(const Cluster& a, const Cluster& b)
+{
+  std::vector<std::pair<std::int32_t, std::int64_t>> rows;
+  auto i = a.rows.begin();
+  auto j = b.rows.begin();
+  while (i != a.rows.end() || j != b.rows.end())
+  {
+    if (j == b.rows.end() || (i != a.rows.end() && i->first < j->first))
+    {
+      rows.push_back(*i++);
+    }
+    else if (i == a.rows.end() || j->first < i->first)
+    {
+      rows.push_back(*j++);
+    }
+    else
+    {
+      rows.emplace_back(i->first, std::max(i->second, j->second));
+      ++i;
+      ++j;
+    }
+  }
+  return rows;
+}
+
+std::int64_t SumOf(const std::vector<std::pair<std::int32_t, std::int64_t>>& rows)
+{
+  std::int64_t sum = 0;
+  for (const auto& entry : rows)
+  {
+    sum += entry.second;
+  }
+  return sum;
+}
+
+/// Puts together what saves most, as long as that saves anything.
+void Agglomerate(std::vector<Cluster>& clusters)
+{
+  const auto find = [&](std::size_t a)
+  {
+    Cluster& cluster = clusters[a];
+    cluster.saving = 0.0;
+    for (std::size_t b = a + 1; b < clusters.size(); ++b)
+    {
+      if (clusters[b].bones.empty())
+      {
+        continue;
+      }
+      const double saving = cluster.Effort() + clusters[b].Effort() -
+        EffortOf(
+          SumOf(Together(cluster, clusters[b])), cluster.bones.size() + clusters[b].bones.size());
+      if (saving > cluster.saving)
+      {
+        cluster.saving = saving;
+        cluster.partner = b;
+      }
+    }
+  };
+  for (std::size_t a = 0; a < clusters.size(); ++a)
+  {
+    find(a);
+  }
+  while (true)
+  {
+    std::size_t best = 0;
+    for (std::size_t a = 1; a < clusters.size(); ++a)
+    {
+      best = clusters[a].saving > clusters[best].saving ? a : best;
+    }
+    Cluster& kept = clusters[best];
+    if (!(kept.saving > 0.0))
+    {
+      break;
+    }
+    const std::size_t gone = kept.partner;
+    kept.rows = Together(kept, clusters[gone]);
+    kept.sum = SumOf(kept.rows);
+    kept.bones.insert(kept.bones.end(), clusters[gone].bones.begin(), clusters[gone].bones.end());
+    clusters[gone] = {};
+    for (std::size_t a = 0; a < clusters.size(); ++a)
+    {
+      const bool concerned =
+        a == best || clusters[a].partner == best || clusters[a].partner == gone;
+      if (!clusters[a].bones.empty() && (a < best || a == best) && !concerned)
+      {
+        // It may suit better now than what was best.
+        const double saving = clusters[a].Effort() + kept.Effort() -
+          EffortOf(
+            SumOf(Together(clusters[a], kept)), clusters[a].bones.size() + kept.bones.size());
+        if (saving > clusters[a].saving)
+        {
+          clusters[a].saving = saving;
+          clusters[a].partner = best;
+        }
+      }
+      else if (!clusters[a].bones.empty() && concerned)
+      {
+        find(a);
+      }
+    }
+  }
+  clusters.erase(std::remove_if(clusters.begin(), clusters.end(),
+                   [](const Cluster& cluster) { return cluster.bones.empty(); }),
+    clusters.end());
+}
+}
+
+void SkinWeightOptimizer::MakeGroups()
+{
+  std::vector<Cluster> clusters(this->System.bones);
+  std::vector<std::int64_t> count(this->System.bones, 0);
+  for (std::int64_t b = 0; b < this->System.bones; ++b)
+  {
+    Cluster& cluster = clusters[b];
+    cluster.bones = { static_cast<std::int32_t>(b) };
+    for (const std::int32_t r : this->Domains[b])
+    {
+      ++count[this->System.nearest[r]];
+    }
+    for (std::int64_t other = 0; other < this->System.bones; ++other)
+    {
+      if (count[other] > 0)
+      {
+        cluster.rows.emplace_back(static_cast<std::int32_t>(other), count[other]);
+        count[other] = 0;
+      }
+    }
+    cluster.sum = SumOf(cluster.rows);
+  }
+  Agglomerate(clusters);
+  this->Groups.clear();
+  for (Cluster& cluster : clusters)
+  {
+    Group group;
+    group.bones = std::move(cluster.bones);
+    std::sort(group.bones.begin(), group.bones.end());
+    for (const std::int32_t bone : group.bones)
+    {
+      group.rows.insert(group.rows.end(), this->Domains[bone].begin(), this->Domains[bone].end());
+    }
     std::sort(group.rows.begin(), group.rows.end());
+    group.rows.erase(std::unique(group.rows.begin(), group.rows.end()), group.rows.end());
+    this->Groups.push_back(std::move(group));
+  }
+}
+
+void SkinWeightOptimizer::MakePairs()
+{
+  const std::int64_t rows = this->System.energy.rows;
+  this->Tasks.clear();
+  this->Size = 0;
+  for (std::size_t g = 0; g < this->Groups.size(); ++g)
+  {
+    Group& group = this->Groups[g];
     group.base = this->Size;
     const auto columns = static_cast<std::int64_t>(group.bones.size());
     this->Size += columns * static_cast<std::int64_t>(group.rows.size());
@@ -128,11 +291,6 @@ void SkinWeightOptimizer::MakeGroups()
   std::stable_sort(this->Tasks.begin(), this->Tasks.end(),
     [&](const Task& a, const Task& c)
     { return this->Groups[a.group].rows.size() > this->Groups[c.group].rows.size(); });
-}
-
-void SkinWeightOptimizer::MakePairs()
-{
-  const std::int64_t rows = this->System.energy.rows;
   this->PairOffset.assign(rows + 1, 0);
   for (const Group& group : this->Groups)
   {
@@ -190,31 +348,174 @@ bool SkinWeightOptimizer::CanWiden() const
       { return static_cast<std::int64_t>(group.rows.size()) < this->System.energy.rows; });
 }
 
-void SkinWeightOptimizer::Widen()
+void SkinWeightOptimizer::Rearrange(
+  const std::function<void()>& change, const std::vector<Values*>& values)
 {
   const std::vector<std::int64_t> offset = this->PairOffset;
   const std::vector<std::int32_t> bone = this->PairBone;
   const std::vector<std::int64_t> index = this->PairIndex;
-  const Values weights = this->Weights;
-  this->Reach += 1.0;
-  this->MakeGroups();
-  this->MakePairs();
-  this->Weights.assign(this->Size, 0.0);
+  change();
+  std::vector<Values> old;
+  for (Values* const v : values)
+  {
+    old.push_back(std::move(*v));
+    v->assign(this->Size, 0.0);
+  }
   for (std::int64_t r = 0; r < this->System.energy.rows; ++r)
   {
-    std::int64_t old = offset[r];
+    std::int64_t o = offset[r];
     for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
     {
-      while (old < offset[r + 1] && bone[old] < this->PairBone[p])
+      while (o < offset[r + 1] && bone[o] < this->PairBone[p])
       {
-        ++old;
+        ++o;
       }
-      if (old < offset[r + 1] && bone[old] == this->PairBone[p])
+      for (std::size_t k = 0; o < offset[r + 1] && bone[o] == this->PairBone[p] && k < old.size();
+           ++k)
       {
-        this->Weights[this->PairIndex[p]] = weights[index[old]];
+        (*values[k])[this->PairIndex[p]] = old[k][index[o]];
       }
     }
   }
+}
+
+void SkinWeightOptimizer::Widen()
+{
+  this->Rearrange(
+    [&]
+    {
+      this->Reach += 1.0;
+      this->ReachDomains();
+      this->MakeGroups();
+      this->MakePairs();
+    },
+    { &this->Weights });
+}
+
+double SkinWeightOptimizer::Effort() const
+{
+  double effort = 0.0;
+  for (const Group& group : this->Groups)
+  {
+    effort += EffortOf(static_cast<std::int64_t>(group.rows.size()), group.bones.size());
+  }
+  return effort;
+}
+
+std::vector<SkinWeightOptimizer::Rows> SkinWeightOptimizer::Support(
+  const Values& z, const std::vector<Violator>& violators, int rings) const
+{
+  const SparseMatrix& q = this->System.energy;
+  std::vector<Rows> support(this->System.bones);
+  for (const Violator& violator : violators)
+  {
+    support[violator.bone].push_back(violator.row);
+  }
+  for (const Group& group : this->Groups)
+  {
+    const auto height = static_cast<std::int64_t>(group.rows.size());
+    for (std::size_t k = 0; k < group.bones.size(); ++k)
+    {
+      const double* w = z.data() + group.base + static_cast<std::int64_t>(k) * height;
+      for (std::int64_t i = 0; i < height; ++i)
+      {
+        if (w[i] > 0.0)
+        {
+          support[group.bones[k]].push_back(group.rows[i]);
+        }
+      }
+    }
+  }
+  ParallelFor(this->System.bones, 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      std::vector<char> marked(q.rows, 0);
+      for (std::int64_t b = first; b < last; ++b)
+      {
+        Rows all;
+        const auto add = [&](std::int32_t row)
+        {
+          if (!marked[row])
+          {
+            marked[row] = 1;
+            all.push_back(row);
+          }
+        };
+        std::for_each(support[b].begin(), support[b].end(), add);
+        std::size_t begin = 0;
+        for (int ring = 0; ring < rings; ++ring)
+        {
+          const std::size_t end = all.size();
+          for (; begin < end; ++begin)
+          {
+            const std::int32_t row = all[begin];
+            std::for_each(
+              q.column.begin() + q.offset[row], q.column.begin() + q.offset[row + 1], add);
+          }
+        }
+        for (const std::int32_t row : all)
+        {
+          marked[row] = 0;
+        }
+        std::sort(all.begin(), all.end());
+        support[b] = std::move(all);
+      }
+    });
+  return support;
+}
+
+bool SkinWeightOptimizer::Follow(
+  const Values& z, const std::vector<Violator>& violators, bool needed, Values& s, Values& x)
+{
+  std::vector<Rows> domains = this->Support(z, violators, 2);
+  const auto positive = std::count_if(z.begin(), z.end(), [](double w) { return w > 0.0; });
+  needed = needed || 100 * violators.size() > static_cast<std::size_t>(positive);
+  const double before = this->Effort();
+  std::vector<Group> groups = std::move(this->Groups);
+  std::swap(this->Domains, domains);
+  this->MakeGroups();
+  if (!needed && this->Effort() > WorthFollowing * before)
+  {
+    std::swap(this->Domains, domains);
+    this->Groups = std::move(groups);
+    return false;
+  }
+  this->Rearrange([&] { this->MakePairs(); }, { &s, &x });
+  this->Follows = true;
+  return true;
+}
+
+bool SkinWeightOptimizer::Grow(
+  const Values& z, const std::vector<Violator>& violators, Values& s, Values& x)
+{
+  const std::vector<Rows> support = this->Support(z, violators, 1);
+  const auto add = [](const Rows& from, Rows& to)
+  {
+    Rows both;
+    both.reserve(to.size());
+    std::set_union(from.begin(), from.end(), to.begin(), to.end(), std::back_inserter(both));
+    to = std::move(both);
+  };
+  this->Rearrange(
+    [&]
+    {
+      for (Group& group : this->Groups)
+      {
+        const std::size_t before = group.rows.size();
+        for (const std::int32_t bone : group.bones)
+        {
+          add(support[bone], this->Domains[bone]);
+          add(support[bone], group.rows);
+        }
+        if (group.rows.size() != before)
+        {
+          group.factor.reset();
+        }
+      }
+      this->MakePairs();
+    },
+    { &s, &x });
+  return true;
 }
 
 void SkinWeightOptimizer::Factorize()
@@ -228,8 +529,13 @@ void SkinWeightOptimizer::Factorize()
         if (!group.factor)
         {
           group.factor = std::make_unique<SupernodalFactor<float>>(this->System.energy, group.rows);
+          group.factorRho = 0.0;
         }
-        group.factor->Factorize(this->System.energy, this->Rho);
+        if (group.factorRho != this->Rho)
+        {
+          group.factor->Factorize(this->System.energy, this->Rho);
+          group.factorRho = this->Rho;
+        }
       }
     });
   ++this->Factorizations;
@@ -253,15 +559,27 @@ void SkinWeightOptimizer::Project(const Values& s, Values& z) const
   ParallelFor(this->System.energy.rows, RowsAtOnce,
     [&](std::int64_t firstRow, std::int64_t lastRow)
     {
+      Values row;
       Values sorted;
       for (std::int64_t r = firstRow; r < lastRow; ++r)
       {
         const std::int64_t first = this->PairOffset[r];
         const std::int64_t last = this->PairOffset[r + 1];
+        row.clear();
         sorted.clear();
+        double highest = -std::numeric_limits<double>::infinity();
         for (std::int64_t p = first; p < last; ++p)
         {
-          sorted.push_back(s[this->PairIndex[p]]);
+          row.push_back(s[this->PairIndex[p]]);
+          highest = std::max(highest, row.back());
+        }
+        // What makes the sum 1 is not below the highest minus 1.
+        for (const double value : row)
+        {
+          if (value >= highest - 1.0)
+          {
+            sorted.push_back(value);
+          }
         }
         std::sort(sorted.begin(), sorted.end(), std::greater<>());
         double sum = 0.0;
@@ -278,7 +596,7 @@ void SkinWeightOptimizer::Project(const Values& s, Values& z) const
         }
         for (std::int64_t p = first; p < last; ++p)
         {
-          z[this->PairIndex[p]] = std::max(0.0, s[this->PairIndex[p]] - threshold);
+          z[this->PairIndex[p]] = std::max(0.0, row[p - first] - threshold);
         }
       }
     });
@@ -534,7 +852,7 @@ private:
 };
 
 SkinWeightOptimizer::Violation SkinWeightOptimizer::Judge(
-  const Values& z, Values& gradient, bool everywhere) const
+  const Values& z, Values& gradient, bool everywhere, std::vector<Violator>* violators) const
 {
   const SparseMatrix& q = this->System.energy;
   struct Outside
@@ -687,12 +1005,18 @@ SkinWeightOptimizer::Violation SkinWeightOptimizer::Judge(
       violation.gap += std::max(0.0, -g);
     }
   };
-  for (const std::vector<Outside>& list : outside)
+  for (std::size_t bone = 0; bone < outside.size(); ++bone)
   {
-    for (const Outside& o : list)
+    for (const Outside& o : outside[bone])
     {
       ++known[o.row];
       judge(o.row, o.gradient);
+      if (violators &&
+        (this->Joint ? multiplier[o.row] : 0.0) - o.gradient >
+          this->Settings.tolerance * this->System.diagonal[o.row])
+      {
+        violators->push_back({ o.row, static_cast<std::int32_t>(bone) });
+      }
     }
   }
   for (std::int64_t r = 0; r < q.rows; ++r)
@@ -734,7 +1058,8 @@ void SkinWeightOptimizer::Balance(
     return;
   }
   const double wanted = std::clamp(this->Rho * std::clamp(ratio, 0.1, 10.0), LeastRho, GreatestRho);
-  if (wanted == this->Rho)
+  // A new factor costs as much as several iterations.
+  if (std::max(wanted, this->Rho) < 1.5 * std::min(wanted, this->Rho))
   {
     return;
   }
@@ -813,22 +1138,42 @@ bool SkinWeightOptimizer::Iterate(const ProgressCallback& progress, double first
     if (step % CheckEvery == 1 || atEnd)
     {
       const bool widens = this->Settings.widen && this->CanWiden();
-      const Violation violation = this->Judge(z, gradient, widens);
+      std::vector<Violator> violators;
+      const Violation violation = this->Judge(z, gradient, widens, &violators);
       this->Weights = z;
       this->Quality = violation;
       this->Converged = violation.inside <= this->Settings.tolerance;
-      if (widens && !atEnd && violation.everywhere > Margin * this->Settings.tolerance &&
-        violation.inside < 0.3 * violation.everywhere)
-      {
-        return false;
-      }
-      if (this->Converged || atEnd)
+      const bool lags = widens && !atEnd &&
+        violation.everywhere > Margin * this->Settings.tolerance &&
+        violation.inside < 0.5 * violation.everywhere;
+      if (!lags && (this->Converged || atEnd))
       {
         return true;
       }
       firstResidual = firstResidual == 0.0 ? violation.inside : firstResidual;
-      slow = violation.inside > 0.5 * lastResidual;
+      slow = violation.inside > std::max(0.5 * lastResidual, NearEnd * this->Settings.tolerance);
       lastResidual = violation.inside;
+      const bool begins = this->Joint && widens && !this->Follows && (lags || step == FollowAt);
+      const bool grows = lags && this->Follows && !violators.empty();
+      if (lags && (this->Changes >= MostChanges || (!begins && !grows)))
+      {
+        return false;
+      }
+      if ((begins && this->Follow(z, violators, lags, s, x)) ||
+        (grows && this->Grow(z, violators, s, x)))
+      {
+        ++this->Changes;
+        for (Values* const values : { &gradient, &right, &previous, &f, &z })
+        {
+          values->assign(this->Size, 0.0);
+        }
+        acceleration = Acceleration(this->Size);
+        slow = false;
+        lastResidual = std::numeric_limits<double>::infinity();
+        this->Factorize();
+        this->Project(s, z);
+        this->Weights = z;
+      }
       const double done = std::log(firstResidual / violation.inside) /
         std::log(std::max(1.0 + 1e-9, firstResidual / this->Settings.tolerance));
       reported = std::max(reported, first + (last - first) * std::clamp(done, 0.0, 1.0));
@@ -849,7 +1194,6 @@ bool SkinWeightOptimizer::Iterate(const ProgressCallback& progress, double first
         continue;
       }
     }
-    previous = z;
     ParallelFor(this->Size, ValuesAtOnce,
       [&](std::int64_t firstValue, std::int64_t lastValue)
       {
@@ -858,6 +1202,7 @@ bool SkinWeightOptimizer::Iterate(const ProgressCallback& progress, double first
           f[i] = Relaxation * (x[i] - z[i]);
         }
       });
+    std::swap(previous, z);
     acceleration.Step(s, f);
   }
 }

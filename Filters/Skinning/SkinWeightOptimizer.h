@@ -17,6 +17,7 @@
 #include "SkinWeightSystem.h"
 #include "SupernodalFactor.h"
 
+#include <functional>
 #include <memory>
 
 namespace coronary
@@ -44,13 +45,14 @@ public:
 private:
   using Values = std::vector<double>;
 
-  /// Bones near each other, which may have weight in the same rows: they share a factor.
+  /// Bones that may have weight in about the same rows: they share a factor.
   struct Group
   {
     std::vector<std::int32_t> bones;
     std::vector<std::int32_t> rows; ///< ascending
     std::int64_t base = 0;          ///< of its first value; then bone by bone
     std::unique_ptr<SupernodalFactor<float>> factor;
+    double factorRho = 0.0; ///< that the factor is for; 0: not yet
   };
   /// Columns of one group that one thread solves for at a time.
   struct Task
@@ -67,10 +69,36 @@ private:
     double gap = 0.0;
   };
 
+  /// A place where a bone would have weight, were it allowed to.
+  struct Violator
+  {
+    std::int32_t row;
+    std::int32_t bone;
+  };
+  using Rows = std::vector<std::int32_t>; ///< ascending
+
+  /// Adds to the domains what is within `Reach` of their bones.
+  void ReachDomains();
+  /// Bones whose domains are about the same share a group.
   void MakeGroups();
+  /// Of all groups as they are: tasks, pairs, and what goes with them.
   void MakePairs();
-  /// Lets the groups have weight in rows one diameter further away, and keeps the weights.
+  /// The rows where bones have weight or violate, and those that the energy ties to them, `rings` times.
+  std::vector<Rows> Support(
+    const Values& z, const std::vector<Violator>& violators, int rings) const;
+  /// The domains become what the weights need.
+  /// @return false when they stay, since that is not `needed` and would not make iterations shorter
+  bool Follow(
+    const Values& z, const std::vector<Violator>& violators, bool needed, Values& s, Values& x);
+  /// Lets the bones have weight where they would.
+  /// @return true
+  bool Grow(const Values& z, const std::vector<Violator>& violators, Values& s, Values& x);
+  /// Lets the bones have weight in rows one diameter further away, and keeps the weights.
   void Widen();
+  /// Calls `change`, which makes other pairs, and carries the values over; 0 where there were none.
+  void Rearrange(const std::function<void()>& change, const std::vector<Values*>& values);
+  /// Estimate of the time that an iteration takes.
+  double Effort() const;
   void Factorize();
   /// @return false when the neighbourhood is too small
   bool Iterate(const ProgressCallback& progress, double first, double last);
@@ -79,8 +107,9 @@ private:
   /// x = (Q + R)^-1 (R (2 z - s) - c), by adding what the change of the right-hand side changes; or,
   /// when `exact`, what the true residual of x does.
   void Solve(const Values& s, const Values& z, Values& right, Values& x, bool exact) const;
-  /// Qz + c for all pairs; `everywhere` judges the other bones too.
-  Violation Judge(const Values& z, Values& gradient, bool everywhere) const;
+  /// Qz + c for all pairs; `everywhere` judges the other bones too, and lists where they violate.
+  Violation Judge(const Values& z, Values& gradient, bool everywhere,
+    std::vector<Violator>* violators = nullptr) const;
   /// Another penalty when one of the residuals lags behind, as OSQP does.
   void Balance(const Values& x, const Values& z, const Values& previous, Values& s);
   /// Exact solves with the bounds that hold as equations, until these are the right ones.
@@ -95,6 +124,9 @@ private:
   const SkinWeightSystem& System;
   const SkinWeightSettings Settings;
   const bool Joint;
+  std::vector<Rows> Domains; ///< per bone: where it may have weight, at least
+  bool Follows = false;      ///< the domains follow the weights, no longer `Reach`
+  int Changes = 0;           ///< of the domains
   std::vector<Group> Groups;
   std::vector<Task> Tasks;
   std::int64_t Size = 0; ///< number of pairs of a row and a bone

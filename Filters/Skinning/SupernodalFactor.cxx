@@ -2,6 +2,7 @@
 
 #include "SupernodalKernels.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <stdexcept>
@@ -148,6 +149,30 @@ void SupernodalFactor<Real>::Update(
   }
 }
 
+namespace
+{
+/// From column by column to SupernodalRows rows at a time.
+template <typename Real>
+void Pack(Real* panel, std::int64_t height, std::int64_t width, std::vector<Real>& columns)
+{
+  columns.assign(panel, panel + height * width);
+  const auto pack = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t start = first; start < last; start += SupernodalRows)
+    {
+      const std::int64_t rows = std::min<std::int64_t>(SupernodalRows, last - start);
+      Real* to = panel + start * width;
+      for (std::int64_t k = 0; k < width; ++k)
+      {
+        to = std::copy_n(columns.data() + k * height + start, rows, to);
+      }
+    }
+  };
+  pack(0, width);
+  pack(width, height);
+}
+}
+
 template <typename Real>
 void SupernodalFactor<Real>::Factorize(const SparseMatrix& matrix, double shift)
 {
@@ -173,6 +198,8 @@ void SupernodalFactor<Real>::Factorize(const SparseMatrix& matrix, double shift)
                                "not positive definite; some tetrahedra are too flat");
     }
     this->Update(s, targets, update);
+    Pack(this->Values.data() + this->Pattern.valueOffset[s], this->Pattern.Height(s),
+      this->Pattern.Width(s), update);
   }
 }
 
@@ -183,9 +210,8 @@ void SupernodalFactor<Real>::AddSolution(
   constexpr std::int64_t lanes = SupernodalColumns;
   const SupernodalPattern& pattern = this->Pattern;
   const auto count = static_cast<std::int64_t>(this->Rows.size());
-  scratch.assign((count + pattern.mostBelow) * lanes, Real(0));
+  scratch.assign(count * lanes, Real(0));
   Real* y = scratch.data();
-  Real* below = y + count * lanes;
   for (std::int64_t i = 0; i < count; ++i)
   {
     for (std::int64_t c = 0; c < columns; ++c)
@@ -196,33 +222,13 @@ void SupernodalFactor<Real>::AddSolution(
   const PanelKernels<Real>& kernels = Kernels<Real>();
   for (std::int32_t s = 0; s < pattern.Supernodes(); ++s)
   {
-    const std::int32_t* list = pattern.RowsOf(s);
-    const std::int64_t height = pattern.Height(s);
-    const std::int64_t width = pattern.Width(s);
-    kernels.forward(this->Values.data() + pattern.valueOffset[s], height, width,
-      y + pattern.first[s] * lanes, below);
-    for (std::int64_t i = width; i < height; ++i)
-    {
-      for (std::int64_t c = 0; c < lanes; ++c)
-      {
-        y[list[i] * lanes + c] -= below[(i - width) * lanes + c];
-      }
-    }
+    kernels.forward(this->Values.data() + pattern.valueOffset[s], pattern.Height(s),
+      pattern.Width(s), pattern.RowsOf(s), y);
   }
   for (std::int32_t s = pattern.Supernodes() - 1; s >= 0; --s)
   {
-    const std::int32_t* list = pattern.RowsOf(s);
-    const std::int64_t height = pattern.Height(s);
-    const std::int64_t width = pattern.Width(s);
-    for (std::int64_t i = width; i < height; ++i)
-    {
-      for (std::int64_t c = 0; c < lanes; ++c)
-      {
-        below[(i - width) * lanes + c] = y[list[i] * lanes + c];
-      }
-    }
-    kernels.backward(this->Values.data() + pattern.valueOffset[s], height, width,
-      y + pattern.first[s] * lanes, below);
+    kernels.backward(this->Values.data() + pattern.valueOffset[s], pattern.Height(s),
+      pattern.Width(s), pattern.RowsOf(s), y);
   }
   for (std::int64_t i = 0; i < count; ++i)
   {

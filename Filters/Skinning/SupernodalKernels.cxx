@@ -11,6 +11,11 @@ namespace coronary
 namespace
 {
 constexpr int Lanes = 8;
+template <int Value>
+struct Constant
+{
+  static constexpr int value = Value;
+};
 static_assert(Lanes == SupernodalColumns, "a row of right-hand sides is one pack");
 template <typename Real>
 struct Packs;
@@ -20,6 +25,7 @@ struct Packs<float>
   using Pack [[gnu::vector_size(32)]] = float;
   using LoosePack [[gnu::vector_size(32), gnu::aligned(4), gnu::may_alias]] = float;
   static constexpr int Tile = 3; ///< that fit into the registers with four columns
+  static constexpr int RowTile = 8;
 };
 template <>
 struct Packs<double>
@@ -27,6 +33,7 @@ struct Packs<double>
   using Pack [[gnu::vector_size(64)]] = double;
   using LoosePack [[gnu::vector_size(64), gnu::aligned(8), gnu::may_alias]] = double;
   static constexpr int Tile = 1;
+  static constexpr int RowTile = 4;
 };
 template <typename Real>
 using PackOf = typename Packs<Real>::Pack;
@@ -172,91 +179,150 @@ bool FactorPanel(Real* panel, std::int64_t height, std::int64_t width)
   return true;
 }
 
-/// below = rows of `Rows` x
+/// sum -= `Rows` rows of a block of `stride` rows, times x; the first `count` columns.
 template <int Rows, typename Real>
-INLINE void MultiplyRows(
-  const Real* rows, std::int64_t height, std::int64_t width, const Real* x, Real* below)
+INLINE void SubtractRows(const Real* block, std::int64_t stride, std::int64_t count, const Real* x,
+  PackOf<Real> (&sum)[Rows])
 {
-  PackOf<Real> sum[Rows] = {};
-  for (std::int64_t k = 0; k < width; ++k)
+  for (std::int64_t k = 0; k < count; ++k)
   {
     const PackOf<Real> right = Load(x + k * Lanes);
     for (int r = 0; r < Rows; ++r)
     {
-      sum[r] += rows[k * height + r] * right;
+      sum[r] -= block[k * stride + r] * right;
     }
   }
-  for (int r = 0; r < Rows; ++r)
+}
+
+/// x -= (`Rows` rows of a block of `stride` rows)' values; the first `count` columns.
+template <int Rows, typename Real>
+INLINE void SubtractTransposed(const Real* block, std::int64_t stride, std::int64_t count, Real* x,
+  const PackOf<Real> (&values)[Rows])
+{
+  for (std::int64_t k = 0; k < count; ++k)
   {
-    Store(below + r * Lanes, sum[r]);
+    // Two sums, so that the additions wait less for each other.
+    PackOf<Real> sum = block[k * stride] * values[0];
+    PackOf<Real> other = {};
+    for (int r = 1; r < Rows; ++r)
+    {
+      (r % 2 == 0 ? sum : other) += block[k * stride + r] * values[r];
+    }
+    Store(x + k * Lanes, Load(x + k * Lanes) - (sum + other));
+  }
+}
+
+/// What a loop over `rows` rows does at once: what fits into the registers.
+template <typename Real, typename Function>
+INLINE void ForTiles(std::int64_t rows, const Function& function)
+{
+  constexpr int tile = Packs<Real>::RowTile;
+  std::int64_t r = 0;
+  for (; r + tile <= rows; r += tile)
+  {
+    function(r, Constant<tile>{});
+  }
+  for (; r < rows; ++r)
+  {
+    function(r, Constant<1>{});
   }
 }
 
 template <typename Real>
-void Forward(const Real* panel, std::int64_t height, std::int64_t width, Real* x, Real* below)
+void Forward(
+  const Real* panel, std::int64_t height, std::int64_t width, const std::int32_t* list, Real* all)
 {
-  for (std::int64_t j = 0; j < width; ++j)
+  Real* x = all + list[0] * Lanes;
+  for (std::int64_t start = 0; start < width; start += SupernodalRows)
   {
-    const PackOf<Real> value = Load(x + j * Lanes) * panel[j * height + j];
-    Store(x + j * Lanes, value);
-    for (std::int64_t i = j + 1; i < width; ++i)
+    const std::int64_t rows = start + SupernodalRows < width ? SupernodalRows : width - start;
+    const Real* block = panel + start * width;
+    ForTiles<Real>(
+      rows, [&](std::int64_t r, auto size) __attribute__((always_inline)) {
+        PackOf<Real> sum[size.value];
+        for (int t = 0; t < size.value; ++t)
+        {
+          sum[t] = Load(x + (start + r + t) * Lanes);
+        }
+        SubtractRows(block + r, rows, start, x, sum);
+        for (int t = 0; t < size.value; ++t)
+        {
+          Store(x + (start + r + t) * Lanes, sum[t]);
+        }
+      });
+    const Real* triangle = block + start * rows;
+    for (std::int64_t j = 0; j < rows; ++j)
     {
-      Store(x + i * Lanes, Load(x + i * Lanes) - panel[j * height + i] * value);
+      Real* to = x + (start + j) * Lanes;
+      const PackOf<Real> value = Load(to) * triangle[j * rows + j];
+      Store(to, value);
+      for (std::int64_t i = j + 1; i < rows; ++i)
+      {
+        Real* other = x + (start + i) * Lanes;
+        Store(other, Load(other) - triangle[j * rows + i] * value);
+      }
     }
   }
-  std::int64_t i = width;
-  for (; i + 8 <= height; i += 8)
+  for (std::int64_t start = width; start < height; start += SupernodalRows)
   {
-    MultiplyRows<8>(panel + i, height, width, x, below + (i - width) * Lanes);
-  }
-  for (; i < height; ++i)
-  {
-    MultiplyRows<1>(panel + i, height, width, x, below + (i - width) * Lanes);
-  }
-}
-
-/// x -= columns' below, for `Columns` columns
-template <int Columns, typename Real>
-INLINE void SubtractColumns(
-  const Real* columns, std::int64_t height, std::int64_t rest, Real* x, const Real* below)
-{
-  PackOf<Real> sum[Columns] = {};
-  for (std::int64_t i = 0; i < rest; ++i)
-  {
-    const PackOf<Real> right = Load(below + i * Lanes);
-    for (int c = 0; c < Columns; ++c)
-    {
-      sum[c] += columns[c * height + i] * right;
-    }
-  }
-  for (int c = 0; c < Columns; ++c)
-  {
-    Store(x + c * Lanes, Load(x + c * Lanes) - sum[c]);
+    const std::int64_t rows = start + SupernodalRows < height ? SupernodalRows : height - start;
+    ForTiles<Real>(
+      rows, [&](std::int64_t r, auto size) __attribute__((always_inline)) {
+        const std::int32_t* place = list + start + r;
+        PackOf<Real> sum[size.value];
+        for (int t = 0; t < size.value; ++t)
+        {
+          sum[t] = Load(all + place[t] * Lanes);
+        }
+        SubtractRows(panel + start * width + r, rows, width, x, sum);
+        for (int t = 0; t < size.value; ++t)
+        {
+          Store(all + place[t] * Lanes, sum[t]);
+        }
+      });
   }
 }
 
 template <typename Real>
 void Backward(
-  const Real* panel, std::int64_t height, std::int64_t width, Real* x, const Real* below)
+  const Real* panel, std::int64_t height, std::int64_t width, const std::int32_t* list, Real* all)
 {
-  const std::int64_t rest = height - width;
-  std::int64_t k = 0;
-  for (; k + 8 <= width; k += 8)
+  Real* x = all + list[0] * Lanes;
+  const auto subtract = [&](const Real* block, std::int64_t rows, std::int64_t count,
+    const std::int32_t* place) __attribute__((always_inline))
   {
-    SubtractColumns<8>(panel + k * height + width, height, rest, x + k * Lanes, below);
+    ForTiles<Real>(
+      rows, [&](std::int64_t r, auto size) __attribute__((always_inline)) {
+        PackOf<Real> pack[size.value];
+        for (int t = 0; t < size.value; ++t)
+        {
+          pack[t] = Load(all + place[r + t] * Lanes);
+        }
+        SubtractTransposed(block + r, rows, count, x, pack);
+      });
+  };
+  for (std::int64_t start = width; start < height; start += SupernodalRows)
+  {
+    const std::int64_t rows = start + SupernodalRows < height ? SupernodalRows : height - start;
+    subtract(panel + start * width, rows, width, list + start);
   }
-  for (; k < width; ++k)
+  for (std::int64_t start = (width - 1) / SupernodalRows * SupernodalRows; start >= 0;
+       start -= SupernodalRows)
   {
-    SubtractColumns<1>(panel + k * height + width, height, rest, x + k * Lanes, below);
-  }
-  for (std::int64_t j = width - 1; j >= 0; --j)
-  {
-    PackOf<Real> value = Load(x + j * Lanes);
-    for (std::int64_t i = j + 1; i < width; ++i)
+    const std::int64_t rows = start + SupernodalRows < width ? SupernodalRows : width - start;
+    const Real* block = panel + start * width;
+    const Real* triangle = block + start * rows;
+    for (std::int64_t j = rows - 1; j >= 0; --j)
     {
-      value -= panel[j * height + i] * Load(x + i * Lanes);
+      Real* to = x + (start + j) * Lanes;
+      PackOf<Real> value = Load(to);
+      for (std::int64_t i = j + 1; i < rows; ++i)
+      {
+        value -= triangle[j * rows + i] * Load(x + (start + i) * Lanes);
+      }
+      Store(to, value * triangle[j * rows + j]);
     }
-    Store(x + j * Lanes, value * panel[j * height + j]);
+    subtract(block, rows, start, list + start);
   }
 }
 }

@@ -9,7 +9,13 @@ namespace coronary
 /// Right-hand sides that are solved for together.
 constexpr int SupernodalColumns = 8;
 
-/// Matrices are stored column by column, `ld` values from one column to the next.
+/// Rows of a finished panel that lie together: block by block of so many rows, column by column in a
+/// block; the triangle's last block and the last one below have what is left. Solves run through it
+/// from front to back.
+constexpr int SupernodalRows = 8;
+
+/// Matrices are stored column by column, `ld` values from one column to the next, but for the panels
+/// that `forward` and `backward` take.
 template <typename Real>
 struct PanelKernels
 {
@@ -20,12 +26,13 @@ struct PanelKernels
   /// Diagonals become their reciprocals.
   /// @return false where a pivot is not positive
   bool (*factorPanel)(Real* panel, std::int64_t height, std::int64_t width);
-  /// Solves with the panel's triangle: x of width x SupernodalColumns, row by row; then
-  /// below = (rows below) x.
-  void (*forward)(const Real* panel, std::int64_t height, std::int64_t width, Real* x, Real* below);
-  /// x -= (rows below)' below, then solves with the triangle's transpose.
-  void (*backward)(
-    const Real* panel, std::int64_t height, std::int64_t width, Real* x, const Real* below);
+  /// Solves with the panel's triangle for the rows `list[0]` and the next, as many as it is wide, and
+  /// takes what the other rows of the list get from them. `all` has SupernodalColumns values a row.
+  void (*forward)(const Real* panel, std::int64_t height, std::int64_t width,
+    const std::int32_t* list, Real* all);
+  /// The same backwards, with the transpose: first takes what those rows get from the others.
+  void (*backward)(const Real* panel, std::int64_t height, std::int64_t width,
+    const std::int32_t* list, Real* all);
 };
 
 struct SupernodalKernels

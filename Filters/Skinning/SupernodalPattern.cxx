@@ -362,7 +362,6 @@ void FindRows(const Graph& graph, SupernodalPattern& pattern)
     {
       daughters[pattern.supernodeOf[pattern.rows[begin + width]]].push_back(s);
     }
-    pattern.mostBelow = std::max(pattern.mostBelow, height - width);
     pattern.rowOffset.push_back(begin + height);
     pattern.valueOffset.push_back(pattern.valueOffset.back() + width * height);
   }

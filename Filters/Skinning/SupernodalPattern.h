@@ -35,7 +35,6 @@ struct SupernodalPattern
   std::vector<std::int32_t> rows;        ///< ascending in each supernode
   std::vector<std::int64_t> valueOffset; ///< of the supernode's panel: its rows times its columns
   std::vector<std::int32_t> supernodeOf; ///< per row of the factor
-  std::int64_t mostBelow = 0;            ///< rows below a supernode
 
   std::int32_t Supernodes() const { return static_cast<std::int32_t>(this->first.size()) - 1; }
   std::int64_t Width(std::int32_t s) const { return this->first[s + 1] - this->first[s]; }

@@ -1,5 +1,7 @@
 // Skin weights on trees of growing size: time, optimality, and libigl's weights beside them.
 
+#include "SweepSurface.h"
+#include "TetrahedralMesh.h"
 #include "TetrahedronTestMeshes.h"
 #ifdef DYNAMICCORONARY_WITH_LIBIGL
 #include "LibiglSkinWeights.h"
@@ -24,6 +26,72 @@ struct Case
   int boneCells;
   int half;
 };
+
+/// Two trees of five branches with six straight bones each, 2.2 to 0.8 mm in radius, as the mesher makes
+/// tetrahedra of them: about the case of the published time of libigl.
+SkinWeightInput MeshedTrees(double boneLength, double edgeLength, double sizeFactor)
+{
+  constexpr int branchBones = 6;
+  SweepTree tree;
+  std::vector<std::pair<std::int64_t, std::int64_t>> bones;
+  RandomStream random(1);
+  const auto grow = [&](std::int64_t from, Vector3 direction, double last)
+  {
+    SweepBranch branch;
+    branch.groupId = static_cast<int>(tree.branches.size());
+    branch.points = { from };
+    const double first = tree.radius[from];
+    for (int i = 1; i <= branchBones; ++i)
+    {
+      const double x = random.Uniform(-0.15, 0.15);
+      const double y = random.Uniform(-0.15, 0.15);
+      const double z = random.Uniform(-0.15, 0.15);
+      direction = (direction + Vector3(x, y, z)).normalized();
+      const Vector3 next = tree.points[branch.points.back()] + boneLength * direction;
+      tree.points.push_back(next);
+      tree.radius.push_back(first + (last - first) * i / branchBones);
+      const auto point = static_cast<std::int64_t>(tree.points.size()) - 1;
+      bones.emplace_back(branch.points.back(), point);
+      branch.points.push_back(point);
+    }
+    tree.branches.push_back(branch);
+    return branch.points.back();
+  };
+  for (const double side : { -1.0, 1.0 })
+  {
+    tree.points.emplace_back(side * 15.0, 0.0, 0.0);
+    tree.radius.push_back(2.2);
+    const std::int64_t root = static_cast<std::int64_t>(tree.points.size()) - 1;
+    const std::int64_t fork = grow(root, Vector3(side, 0.0, 0.3), 1.7);
+    const std::int64_t front = grow(fork, Vector3(side, 0.8, 0.0), 1.2);
+    grow(fork, Vector3(side, -0.8, 0.0), 0.9);
+    grow(front, Vector3(side, 0.3, 0.8), 0.8);
+    grow(front, Vector3(side, 0.3, -0.8), 0.8);
+  }
+  SweepSettings sweep;
+  sweep.minimumEdgeLength = edgeLength;
+  sweep.maximumEdgeLength = edgeLength;
+  const SweptSurface surface = SweepVesselTree(tree, sweep);
+  TetrahedralMeshInput meshInput;
+  meshInput.points = surface.points;
+  meshInput.triangles = surface.triangles;
+  meshInput.skeletonPoints = tree.points;
+  meshInput.skeletonRadius = tree.radius;
+  meshInput.skeletonEdges = bones;
+  TetrahedralMeshSettings settings;
+  settings.sizeFactor = sizeFactor;
+  settings.outside = OutsidePolicy::LeaveOut;
+  const TetrahedralMesh mesh = MakeTetrahedralMesh(meshInput, settings);
+  SkinWeightInput input;
+  input.points = mesh.points;
+  for (const Tetrahedron& t : mesh.tetrahedra)
+  {
+    input.tetrahedra.push_back({ t[0], t[1], t[2], t[3] });
+  }
+  input.joints = tree.points;
+  input.bones = bones;
+  return input;
+}
 
 struct Clock
 {
@@ -107,6 +175,8 @@ double CompareWithLibigl(
 }
 #endif
 
+constexpr int MeshedSize = 6;
+
 int Run(int argc, char** argv)
 {
   CLI::App app{ "Skin weights on trees of growing size" };
@@ -117,7 +187,7 @@ int Run(int argc, char** argv)
   double neighbourhood = 1.75;
   app.add_option("--sizes", sizes,
     "0: 2k points, 13 bones; 1: 9k, 46; 2: 23k, 61; 3: 125k, 61; 4: 242k, 151; "
-    "5: 24k, 61, 115k tetrahedra");
+    "5: 24k, 61, 115k tetrahedra; 6: as the mesher makes them, 24k, 60, 114k tetrahedra");
   app.add_option("--libigl-up-to", libiglUpTo, "most points for libigl");
   app.add_option("--libigl-iterations", libiglIterations, "of its active set");
   app.add_flag("--print-libigl", printLibigl, "its weights, a line a point");
@@ -125,6 +195,11 @@ int Run(int argc, char** argv)
   std::vector<int> tree;
   app.add_option("--tree", tree, "instead: branches, their bones, a bone's cells, half a tube's")
     ->expected(4);
+  std::vector<double> trees{ 3.5, 0.41, 0.2 };
+  app
+    .add_option(
+      "--trees", trees, "of size 6: bone's length and edges' in mm, edges inside in radii")
+    ->expected(3);
   CLI11_PARSE(app, argc, argv);
   bool good = true;
   std::vector<Case> cases{ { 3, 3, 6, 2 }, { 9, 4, 8, 2 }, { 12, 4, 6, 3 }, { 12, 4, 14, 5 },
@@ -136,8 +211,11 @@ int Run(int argc, char** argv)
   }
   for (const int size : sizes)
   {
-    const Case& c = cases.at(size);
-    const SkinWeightInput input = MovedComb(c.branches, c.branchBones, c.boneCells, c.half);
+    const bool isMeshed = size == MeshedSize && tree.empty();
+    const Case& c = cases.at(isMeshed ? 0 : size);
+    const SkinWeightInput input = isMeshed
+      ? MeshedTrees(trees[0], trees[1], trees[2])
+      : MovedComb(c.branches, c.branchBones, c.boneCells, c.half);
     std::printf("%zu points, %zu tetrahedra, %zu bones\n", input.points.size(),
       input.tetrahedra.size(), input.bones.size());
     for (const SkinWeightMode mode : { SkinWeightMode::Joint, SkinWeightMode::Independent })

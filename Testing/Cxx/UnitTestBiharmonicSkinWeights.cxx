@@ -430,9 +430,41 @@ TEST(BiharmonicSkinWeights, NeighbourhoodChangesNothingThatMatters)
   // and it is widened until it does not matter.
   settings.widen = true;
   const SkinWeights widened = ComputeSkinWeights(input, settings);
-  EXPECT_GT(widened.neighbourhood, 0.5);
   EXPECT_LE(widened.residualEverywhere, 10.0 * settings.tolerance);
   EXPECT_LT((Dense(widened) - Dense(everywhere)).cwiseAbs().maxCoeff(), 1e-4);
+  settings.mode = SkinWeightMode::Independent;
+  const SkinWeights alone = ComputeSkinWeights(input, settings);
+  EXPECT_GT(alone.neighbourhood, 0.5);
+  EXPECT_LE(alone.residualEverywhere, 10.0 * settings.tolerance);
+  EXPECT_LT(
+    (Dense(alone) - Dense(ComputeSkinWeights(input, Settings(SkinWeightMode::Independent, 0.0))))
+      .cwiseAbs()
+      .maxCoeff(),
+    1e-4);
+}
+
+TEST(BiharmonicSkinWeights, WeightsFindWhereTheyLive)
+{
+  // Bones shorter than the vessel is thick reach over several others, long ones not to the next but one.
+  for (const auto& [branches, bones, cells, half] : { std::array<int, 4>{ 9, 3, 2, 2 },
+         std::array<int, 4>{ 5, 4, 3, 2 }, std::array<int, 4>{ 4, 4, 8, 1 } })
+  {
+    const SkinWeightInput input = MovedComb(branches, bones, cells, half);
+    const SkinWeights everywhere = ComputeSkinWeights(input, Settings(SkinWeightMode::Joint, 0.0));
+    EXPECT_EQ(everywhere.largestDomainShare, 1.0);
+    for (const double neighbourhood : { 0.01, 0.5, 1.75 })
+    {
+      SCOPED_TRACE(std::to_string(cells) + " cells, " + std::to_string(neighbourhood));
+      const SkinWeightSettings settings = Settings(SkinWeightMode::Joint, neighbourhood);
+      const SkinWeights w = ComputeSkinWeights(input, settings);
+      EXPECT_TRUE(w.converged);
+      EXPECT_LE(w.residual, settings.tolerance);
+      EXPECT_LE(w.residualEverywhere, 10.0 * settings.tolerance);
+      EXPECT_LT(w.largestDomainShare, cells == 8 ? 0.8 : 1.01);
+      EXPECT_NEAR(w.energy, everywhere.energy, 2e-4 * everywhere.energy);
+      EXPECT_LT((Dense(w) - Dense(everywhere)).cwiseAbs().maxCoeff(), 3e-4);
+    }
+  }
 }
 
 TEST(BiharmonicSkinWeights, IndependentModeIsLibigls)

@@ -325,6 +325,27 @@ TEST(SupernodalFactor, SolvesInBothPrecisionsWithEveryLoop)
   }
 }
 
+/// As the loops want a finished panel: SupernodalRows rows at a time.
+template <typename Matrix>
+std::vector<typename Matrix::Scalar> InRowBlocks(const Matrix& panel, Eigen::Index width)
+{
+  std::vector<typename Matrix::Scalar> packed;
+  for (Eigen::Index i = 0; i < panel.rows();)
+  {
+    const Eigen::Index end = i < width ? width : panel.rows();
+    const Eigen::Index rows = std::min<Eigen::Index>(SupernodalRows, end - i);
+    for (Eigen::Index k = 0; k < width; ++k)
+    {
+      for (Eigen::Index r = 0; r < rows; ++r)
+      {
+        packed.push_back(panel(i + r, k));
+      }
+    }
+    i += rows;
+  }
+  return packed;
+}
+
 TEST(SupernodalFactor, LoopsAgreeWithPlainOnes)
 {
   for (const SupernodalKernels* kernels : {
@@ -377,26 +398,54 @@ TEST(SupernodalFactor, LoopsAgreeWithPlainOnes)
               EXPECT_NEAR(panel(i, j), lower(i, j), tolerance * lower.norm());
             }
           }
-          const Lanes right = Lanes::Random(width, SupernodalColumns);
-          Lanes x = right;
-          Lanes below = Lanes::Random(height - width, SupernodalColumns);
-          loops.forward(panel.data(), height, width, x.data(), below.data());
-          const Matrix solved = low.template triangularView<Eigen::Lower>().solve(Matrix(right));
-          const Matrix under = lower.bottomRows(height - width) * solved;
-          EXPECT_LT((x - solved).norm(), tolerance * solved.norm());
-          EXPECT_LE((below - under).norm(), tolerance * under.norm());
-          const Lanes beneath = Lanes::Random(height - width, SupernodalColumns);
-          Lanes y = right;
-          loops.backward(panel.data(), height, width, y.data(), beneath.data());
+          const std::vector<Real> packed = InRowBlocks(panel, width);
+          // The panel's rows, with others in between; only those below the triangle need not follow each other.
+          std::vector<std::int32_t> list(height);
+          for (int i = 0; i < height; ++i)
+          {
+            list[i] = i < width ? 2 + i : 2 * i + 5;
+          }
+          const Lanes before = Lanes::Random(2 * height + 9, SupernodalColumns);
+          const auto below = [&](const Lanes& all)
+          {
+            Matrix rows(height - width, SupernodalColumns);
+            for (int i = width; i < height; ++i)
+            {
+              rows.row(i - width) = all.row(list[i]);
+            }
+            return rows;
+          };
+          Lanes after = before;
+          loops.forward(packed.data(), height, width, list.data(), after.data());
+          const Matrix right = before.middleRows(2, width);
+          const Matrix solved = low.template triangularView<Eigen::Lower>().solve(right);
+          EXPECT_LT((after.middleRows(2, width) - solved).norm(), tolerance * solved.norm());
           // Eigen's products of empty matrices take references through null.
           Matrix minuend = right;
           if (height > width)
           {
-            minuend -= lower.bottomRows(height - width).transpose() * Matrix(beneath);
+            const Matrix under = below(before) - lower.bottomRows(height - width) * solved;
+            EXPECT_LE((below(after) - under).norm(), tolerance * under.norm());
+            minuend -= lower.bottomRows(height - width).transpose() * below(before);
           }
+          const auto othersStay = [&](bool belowMoves)
+          {
+            for (int i = 0; i < before.rows(); ++i)
+            {
+              const auto place = std::find(list.begin(), list.end(), i);
+              if (place == list.end() || (!belowMoves && place - list.begin() >= width))
+              {
+                EXPECT_EQ(after.row(i), before.row(i)) << i;
+              }
+            }
+          };
+          othersStay(true);
+          after = before;
+          loops.backward(packed.data(), height, width, list.data(), after.data());
           const Matrix back =
             low.transpose().template triangularView<Eigen::Upper>().solve(minuend);
-          EXPECT_LT((y - back).norm(), tolerance * back.norm());
+          EXPECT_LT((after.middleRows(2, width) - back).norm(), tolerance * back.norm());
+          othersStay(false);
         }
       }
       Matrix indefinite = Matrix::Identity(12, 12);
