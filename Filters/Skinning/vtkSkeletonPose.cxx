@@ -233,6 +233,12 @@ int vtkSkeletonPose::RequestData(
     if (start)
     {
       output->GetFieldData()->PassData(start->GetFieldData());
+      // The executive passes that of the first port.
+      if (start->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
+      {
+        output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(),
+          start->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP()));
+      }
     }
     for (const Vector3& place : places)
     {

@@ -43,7 +43,6 @@ namespace names = vtkCoronaryArrayNames;
 using coronary::LoopReport;
 using coronary::ProgressCallback;
 using coronary::Vector3;
-using vtkCoronary::Moment;
 using vtkCoronary::Require;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -171,38 +170,104 @@ std::vector<std::array<std::int64_t, 4>> TetrahedraOf(
   return tetrahedra;
 }
 
-/// The times before and after one, between which the velocity is taken.
-bool TimesAround(vtkInformation* inInfo, double time, double& before, double& after)
+/// Share of the source's range of times between the poses that a velocity is taken from. Small against the
+/// fastest waves of the motion, large against the rounding of coordinates in single precision.
+constexpr double ContinuousStep = 1e-3;
+
+/// The time steps before and after the nearest one.
+bool StepsAround(vtkInformation* inInfo, double time, double& before, double& after)
 {
   const int count = inInfo->Has(SDDP::TIME_STEPS()) ? inInfo->Length(SDDP::TIME_STEPS()) : 0;
-  if (count > 1)
+  if (count < 2)
   {
-    const double* steps = inInfo->Get(SDDP::TIME_STEPS());
-    int nearest = 0;
-    for (int n = 1; n < count; ++n)
+    return false;
+  }
+  const double* steps = inInfo->Get(SDDP::TIME_STEPS());
+  int nearest = 0;
+  for (int n = 1; n < count; ++n)
+  {
+    nearest = std::abs(steps[n] - time) < std::abs(steps[nearest] - time) ? n : nearest;
+  }
+  before = steps[std::max(0, nearest - 1)];
+  after = steps[std::min(count - 1, nearest + 1)];
+  return after != before;
+}
+
+bool SamePoints(vtkPointSet* a, vtkPointSet* b)
+{
+  if (a->GetNumberOfPoints() != b->GetNumberOfPoints())
+  {
+    return false;
+  }
+  for (vtkIdType n = 0; n < a->GetNumberOfPoints(); ++n)
+  {
+    std::array<double, 3> here{};
+    std::array<double, 3> there{};
+    a->GetPoint(n, here.data());
+    b->GetPoint(n, there.data());
+    if (here != there)
     {
-      nearest = std::abs(steps[n] - time) < std::abs(steps[nearest] - time) ? n : nearest;
+      return false;
     }
-    before = steps[std::max(0, nearest - 1)];
-    after = steps[std::min(count - 1, nearest + 1)];
-    return after != before;
   }
-  if (count == 0 && inInfo->Has(SDDP::TIME_RANGE()))
+  return true;
+}
+
+/// A pose at another time, copied: the connection's data object is filled anew by each request.
+struct OtherPose
+{
+  vtkSmartPointer<vtkPolyData> pose;
+  double time = 0.0;
+  bool isOfThatTime = false; ///< not of the nearest one that there is
+
+  explicit operator bool() const { return this->pose != nullptr && this->isOfThatTime; }
+};
+
+OtherPose PoseAt(vtkCoronary::UpstreamRequest& request, vtkInformation* inInfo, double time)
+{
+  request.Ask(nullptr, { true, time });
+  vtkDataObject* data = inInfo->Get(vtkDataObject::DATA_OBJECT());
+  OtherPose other;
+  other.pose = vtkSmartPointer<vtkPolyData>::New();
+  other.pose->DeepCopy(data);
+  other.time = time;
+  const double* range = inInfo->Get(SDDP::TIME_RANGE());
+  if (data->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
   {
-    const double* range = inInfo->Get(SDDP::TIME_RANGE());
-    const double step = 0.01 * (range[1] - range[0]);
-    before = std::max(range[0], time - step);
-    after = std::min(range[1], time + step);
-    return after != before;
+    const double actual = data->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
+    other.isOfThatTime = std::abs(actual - time) <= 1e-9 * (1.0 + std::abs(time));
   }
-  return false;
+  else
+  {
+    other.isOfThatTime = range && time >= range[0] && time <= range[1];
+  }
+  return other;
+}
+
+/// Whether the pose says itself what time it is of, beside what the pipeline says.
+bool NamesItsTime(const OtherPose& other)
+{
+  vtkDataArray* phase = other.pose->GetFieldData()->GetArray(names::PhaseTime);
+  return phase && phase->GetNumberOfValues() == 1 && phase->GetComponent(0, 0) == other.time;
 }
 }
+
+/// Poses that the velocity is taken from: between two, or from the one asked for to two on one side.
+struct vtkSkinDeformation::Stencil
+{
+  OtherPose first;
+  OtherPose second;
+  bool oneSided = false;
+  double now = 0.0;
+  double cycle = 1.0; ///< seconds per unit of time
+  bool Exists() const { return this->first.pose != nullptr; }
+};
 
 struct vtkSkinDeformation::Internals
 {
   std::list<Setup> Setups; ///< the one that was used last comes first
   int NumberOfSetups = 0;
+  vtkMTimeType StepsOnly = 0; ///< upstream's, that has poses at its steps only
 
   /// The setup of that origin, which then is the first one; null when there is none.
   Setup* Find(const Origin& origin);
@@ -312,12 +377,69 @@ int vtkSkinDeformation::RequestUpdateExtent(
   return 1;
 }
 
+void vtkSkinDeformation::FindStencil(vtkInformation* poseInfo, Stencil& stencil)
+{
+  vtkPolyData* pose = vtkPolyData::GetData(poseInfo);
+  if (pose->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
+  {
+    stencil.now = pose->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
+  }
+  else if (poseInfo->Has(SDDP::UPDATE_TIME_STEP()))
+  {
+    stencil.now = poseInfo->Get(SDDP::UPDATE_TIME_STEP());
+  }
+  vtkDataArray* cycle = pose->GetFieldData()->GetArray(names::CycleLength);
+  stencil.cycle = cycle && cycle->GetNumberOfValues() > 0 ? cycle->GetComponent(0, 0) : 1.0;
+  // At the end every pose is that of the request again.
+  vtkCoronary::UpstreamRequest request(poseInfo, poseInfo);
+  const vtkMTimeType upstream = vtkCoronary::UpstreamTime(poseInfo);
+  const double* range = poseInfo->Get(SDDP::TIME_RANGE());
+  const double step = range ? ContinuousStep * (range[1] - range[0]) : 0.0;
+  if (range && step > 0.0 && (upstream == 0 || upstream != this->Data->StepsOnly))
+  {
+    const auto ask = [&](double steps)
+    { return PoseAt(request, poseInfo, stencil.now + steps * step); };
+    // Beyond its range a periodic source answers too.
+    stencil.second = ask(1.0);
+    if (stencil.second || stencil.now + step > range[1])
+    {
+      stencil.first = ask(-1.0);
+    }
+    if (!stencil.second != !stencil.first)
+    {
+      // The end of the range.
+      const double side = stencil.second ? 1.0 : -1.0;
+      stencil.oneSided = true;
+      stencil.first = stencil.second ? stencil.second : stencil.first;
+      stencil.second = ask(2.0 * side);
+    }
+    // A source may call the nearest step by the name of the time that it was asked for.
+    if (stencil.first && stencil.second &&
+      (!SamePoints(stencil.first.pose, stencil.second.pose) || NamesItsTime(stencil.first)))
+    {
+      request.Restore();
+      return;
+    }
+    this->Data->StepsOnly = upstream;
+  }
+  stencil.first = {};
+  stencil.second = {};
+  stencil.oneSided = false;
+  double before = 0.0;
+  double after = 0.0;
+  if (StepsAround(poseInfo, stencil.now, before, after))
+  {
+    stencil.first = PoseAt(request, poseInfo, before);
+    stencil.second = PoseAt(request, poseInfo, after);
+  }
+  request.Restore();
+}
+
 template <typename Array>
 void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** inputs,
-  vtkPointSet* output, const ProgressCallback& progress)
+  const Stencil& stencil, vtkPointSet* output, const ProgressCallback& progress)
 {
   vtkPolyData* rest = vtkPolyData::GetData(inputs[1], 0);
-  vtkInformation* poseInfo = inputs[2]->GetInformationObject(0);
   const vtkIdType count = mesh->GetNumberOfPoints();
   auto* surface = vtkPolyData::SafeDownCast(mesh);
   auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh);
@@ -345,17 +467,16 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
     ReadingTetrahedra,
     Earlier,
     Later,
-    Difference,
     Deforming,
+    Difference,
     Checking,
     Displacing,
     Shading
   };
   const coronary::WorkParts parts(progress,
     { known ? 0.0 : 8.0, newTriangles ? 2.0 : 0.0, newTetrahedra ? 4.0 : 0.0,
-      this->ComputeVelocity ? 2.0 : 0.0, this->ComputeVelocity ? 2.0 : 0.0,
-      this->ComputeVelocity ? 0.5 : 0.0, 2.0, withTetrahedra ? 3.0 : 0.0, 0.5,
-      withTriangles ? 1.0 : 0.0 });
+      stencil.Exists() ? 2.0 : 0.0, stencil.Exists() ? 2.0 : 0.0, 2.0, stencil.Exists() ? 0.5 : 0.0,
+      withTetrahedra ? 3.0 : 0.0, 0.5, withTriangles ? 1.0 : 0.0 });
   Setup& setup = known ? *known : this->Data->Make(origin, this, mesh, rest, parts(SettingUp));
   coronary::SkinDeformation& skin = *setup.skin;
   if (newTriangles)
@@ -392,41 +513,42 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
     skin.Deform(setup.bones, positions->GetPointer(0), parts(part));
   };
 
+  vtkPolyData* pose = vtkPolyData::GetData(inputs[2], 0);
+  const auto positions = makeArray("Points");
   vtkSmartPointer<Array> velocity;
-  if (this->ComputeVelocity)
+  if (stencil.Exists())
   {
-    Moment moment;
-    moment.exists = true;
-    moment.time =
-      poseInfo->Has(SDDP::UPDATE_TIME_STEP()) ? poseInfo->Get(SDDP::UPDATE_TIME_STEP()) : 0.0;
-    Moment before{ true, 0.0 };
-    Moment after{ true, 0.0 };
-    if (TimesAround(poseInfo, moment.time, before.time, after.time))
+    const auto other = makeArray(nullptr);
+    velocity = makeArray(this->VelocityArrayName.c_str());
+    deform(stencil.first.pose, other, Earlier);
+    deform(stencil.second.pose, velocity, Later);
+    deform(pose, positions, Deforming);
+    const ProgressCallback whole = parts(Difference);
+    const coronary::WorkParts differences(whole, { 1.0, 1.0 });
+    if (stencil.oneSided)
     {
-      vtkPolyData* pose = vtkPolyData::GetData(inputs[2], 0);
-      vtkDataArray* cycle = pose->GetFieldData()->GetArray(names::CycleLength);
-      const double seconds = (after.time - before.time) *
-        (cycle && cycle->GetNumberOfValues() > 0 ? cycle->GetComponent(0, 0) : 1.0);
-      const auto earlier = makeArray(nullptr);
-      velocity = makeArray(this->VelocityArrayName.c_str());
-      vtkCoronary::UpstreamRequest request(poseInfo, poseInfo);
-      request.Ask(nullptr, before);
-      deform(vtkPolyData::GetData(inputs[2], 0), earlier, Earlier);
-      request.Ask(nullptr, after);
-      deform(vtkPolyData::GetData(inputs[2], 0), velocity, Later);
-      request.Restore();
-      coronary::SkinVelocities(velocity->GetPointer(0), earlier->GetPointer(0), seconds, 3 * count,
-        velocity->GetPointer(0), parts(Difference));
+      // The parabola through three poses.
+      const double seconds = (stencil.first.time - stencil.now) * stencil.cycle;
+      coronary::SkinVelocities(other->GetPointer(0), positions->GetPointer(0), 0.5 * seconds,
+        3 * count, other->GetPointer(0), differences(0));
+      coronary::SkinVelocities(velocity->GetPointer(0), positions->GetPointer(0), 2.0 * seconds,
+        3 * count, velocity->GetPointer(0), differences(1));
+      for (vtkIdType n = 0; n < 3 * count; ++n)
+      {
+        velocity->SetValue(n, other->GetValue(n) - velocity->GetValue(n));
+      }
     }
     else
     {
-      vtkWarningMacro("The pose has no times around this one: no velocity");
+      coronary::SkinVelocities(velocity->GetPointer(0), other->GetPointer(0),
+        (stencil.second.time - stencil.first.time) * stencil.cycle, 3 * count,
+        velocity->GetPointer(0), parts(Difference));
     }
   }
-
-  vtkPolyData* pose = vtkPolyData::GetData(inputs[2], 0);
-  const auto positions = makeArray("Points");
-  deform(pose, positions, Deforming);
+  else
+  {
+    deform(pose, positions, Deforming);
+  }
   output->ShallowCopy(mesh);
   vtkNew<vtkPoints> points;
   points->SetData(positions);
@@ -498,7 +620,7 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
 }
 
 void vtkSkinDeformation::Execute(vtkDataObject* mesh, vtkInformationVector** inputs,
-  vtkDataObject* output, const ProgressCallback& progress)
+  const Stencil& stencil, vtkDataObject* output, const ProgressCallback& progress)
 {
   auto* points = vtkPointSet::SafeDownCast(mesh);
   if (points == nullptr || points->GetNumberOfPoints() == 0)
@@ -507,11 +629,13 @@ void vtkSkinDeformation::Execute(vtkDataObject* mesh, vtkInformationVector** inp
   }
   else if (this->DoublePrecision)
   {
-    this->Execute<vtkDoubleArray>(points, inputs, vtkPointSet::SafeDownCast(output), progress);
+    this->Execute<vtkDoubleArray>(
+      points, inputs, stencil, vtkPointSet::SafeDownCast(output), progress);
   }
   else
   {
-    this->Execute<vtkFloatArray>(points, inputs, vtkPointSet::SafeDownCast(output), progress);
+    this->Execute<vtkFloatArray>(
+      points, inputs, stencil, vtkPointSet::SafeDownCast(output), progress);
   }
 }
 
@@ -530,6 +654,15 @@ int vtkSkinDeformation::RequestData(
     {
       Require(!name->empty(), "An output array needs a name");
     }
+    Stencil stencil;
+    if (this->ComputeVelocity && mesh->GetNumberOfElements(vtkDataObject::POINT) > 0)
+    {
+      this->FindStencil(inputs[2]->GetInformationObject(0), stencil);
+      if (!stencil.Exists())
+      {
+        vtkWarningMacro("The pose has no times around this one: no velocity");
+      }
+    }
     if (auto* blocks = vtkCompositeDataSet::SafeDownCast(mesh))
     {
       auto* moved = vtkCompositeDataSet::SafeDownCast(output);
@@ -545,14 +678,14 @@ int vtkSkinDeformation::RequestData(
           done + static_cast<double>(block->GetNumberOfElements(vtkDataObject::POINT)) / total;
         const ProgressCallback progress = vtkCoronary::ProgressOf(this, done, next);
         const auto result = vtkSmartPointer<vtkDataObject>::Take(block->NewInstance());
-        this->Execute(block, inputs, result, progress);
+        this->Execute(block, inputs, stencil, result, progress);
         moved->SetDataSet(leaf, result);
         done = next;
       }
     }
     else
     {
-      this->Execute(mesh, inputs, output, vtkCoronary::ProgressOf(this));
+      this->Execute(mesh, inputs, stencil, output, vtkCoronary::ProgressOf(this));
     }
     vtkDataObject* pose = vtkDataObject::GetData(inputs[2], 0);
     if (pose->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))

@@ -106,9 +106,12 @@ public:
 
   ///@{
   /**
-   * Whether the velocity is computed, out of the poses at the time steps before and after (of poses at any
-   * time of a range: a hundredth of it before and after). Seconds by the pose's field array
-   * `CycleLength`, without it time itself is taken for seconds. Default off.
+   * Whether the velocity is computed. Where poses come at any time (of vtkCardiacPhaseInterpolator, of a source
+   * with TIME_RANGE that gives what it is asked for), it is the central difference over two thousandths of the
+   * range, beyond the range's ends too when the source is periodic, else at its ends that of the parabola through
+   * the next three poses. Where they come at steps only, it is the difference of the steps before and after. Seconds by
+   * the pose's field array `CycleLength`, those of a unit of time; without it time itself is taken for seconds.
+   * Default off.
    */
   vtkSetMacro(ComputeVelocity, bool);
   vtkGetMacro(ComputeVelocity, bool);
@@ -195,11 +198,14 @@ private:
   void operator=(const vtkSkinDeformation&) = delete;
 
   struct Internals;
+  struct Stencil;
+  /// Asks for the poses around the one that is there, which is there again in the end.
+  void FindStencil(vtkInformation* poseInfo, Stencil& stencil);
   template <typename Array>
-  void Execute(vtkPointSet* mesh, vtkInformationVector** inputs, vtkPointSet* output,
-    const std::function<bool(double)>& progress);
-  void Execute(vtkDataObject* mesh, vtkInformationVector** inputs, vtkDataObject* output,
-    const std::function<bool(double)>& progress);
+  void Execute(vtkPointSet* mesh, vtkInformationVector** inputs, const Stencil& stencil,
+    vtkPointSet* output, const std::function<bool(double)>& progress);
+  void Execute(vtkDataObject* mesh, vtkInformationVector** inputs, const Stencil& stencil,
+    vtkDataObject* output, const std::function<bool(double)>& progress);
 
   int Blend = LinearBlend;
   bool Stretch = true;

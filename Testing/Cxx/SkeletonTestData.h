@@ -13,6 +13,7 @@
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkIntArray.h"
+#include "vtkMath.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
@@ -115,7 +116,8 @@ inline vtkSmartPointer<vtkPolyData> ChainTube(int bones, double radius)
   return tube;
 }
 
-/// The chain bent to a circle's arc: curvature = 0.1 t per mm at time t, steps 0, 0.1 .. 1.
+/// The chain bent to a circle's arc: curvature = 0.1 t per mm at time t, or 0.1 + 0.03 sin(2 pi t) when it beats.
+/// Steps 0, 0.1 .. 1, of which it gives the nearest one when it snaps, and its first or last beyond them when it ends.
 class BendingChain : public vtkPolyDataAlgorithm
 {
 public:
@@ -123,18 +125,38 @@ public:
   vtkTypeMacro(BendingChain, vtkPolyDataAlgorithm);
 
   int Bones = 4;
-  bool Continuous = false;
+  bool HasSteps = true;
+  bool Snaps = false;
+  bool Ends = false;
+  bool Beats = false;
+  bool CallsItByTheTimeAskedFor = false;
   int Executions = 0;
 
-  static std::array<double, 3> Bent(double z, double time)
+  static double Curvature(double time, bool beats)
   {
-    const double curvature = 0.1 * time;
+    return beats ? 0.1 + 0.03 * std::sin(2.0 * vtkMath::Pi() * time) : 0.1 * time;
+  }
+
+  /// The place z of the axis, and its derivative by time.
+  static std::array<double, 3> Bent(double z, double time, bool beats = false)
+  {
+    const double curvature = Curvature(time, beats);
     if (curvature == 0.0)
     {
       return { 0.0, 0.0, z };
     }
     return { (1.0 - std::cos(curvature * z)) / curvature, 0.0,
       std::sin(curvature * z) / curvature };
+  }
+  static std::array<double, 3> Speed(double z, double time, bool beats = false)
+  {
+    const double k = Curvature(time, beats);
+    const double rate = beats ? 0.06 * vtkMath::Pi() * std::cos(2.0 * vtkMath::Pi() * time) : 0.1;
+    // At k = 0 by the series.
+    return k == 0.0
+      ? std::array<double, 3>{ 0.5 * z * z * rate, 0.0, 0.0 }
+      : std::array<double, 3>{ rate * (k * z * std::sin(k * z) - 1.0 + std::cos(k * z)) / (k * k),
+          0.0, rate * (k * z * std::cos(k * z) - std::sin(k * z)) / (k * k) };
   }
 
 protected:
@@ -146,7 +168,7 @@ protected:
     vtkInformation* info = outputs->GetInformationObject(0);
     const double range[2] = { 0.0, 1.0 };
     info->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
-    if (!this->Continuous)
+    if (this->HasSteps)
     {
       std::vector<double> steps;
       for (int n = 0; n <= 10; ++n)
@@ -163,22 +185,25 @@ protected:
     ++this->Executions;
     vtkInformation* info = outputs->GetInformationObject(0);
     vtkPolyData* output = vtkPolyData::GetData(info);
-    const double time = info->Has(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())
+    const double asked = info->Has(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())
       ? info->Get(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP())
       : 0.0;
+    const double within = this->Ends ? std::min(1.0, std::max(0.0, asked)) : asked;
+    const double time = this->Snaps ? 0.1 * std::round(10.0 * within) : within;
     output->ShallowCopy(ChainSkeleton(this->Bones));
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
     for (int j = 0; j <= this->Bones; ++j)
     {
-      points->InsertNextPoint(Bent(5.0 * j, time).data());
+      points->InsertNextPoint(Bent(5.0 * j, time, this->Beats).data());
     }
     output->SetPoints(points);
     vtkNew<vtkDoubleArray> cycle;
     cycle->SetName("CycleLength");
     cycle->InsertNextValue(0.8);
     output->GetFieldData()->AddArray(cycle);
-    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+    output->GetInformation()->Set(
+      vtkDataObject::DATA_TIME_STEP(), this->CallsItByTheTimeAskedFor ? asked : time);
     return 1;
   }
 };
