@@ -27,6 +27,7 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakeInspectCommand,
   coronary::MakeRunCommand,
   coronary::MakeSequenceCommand,
+  coronary::MakeMetricsCommand,
   coronary::MakeConvertCommand,
 };
 

@@ -49,7 +49,7 @@ inline void VisitLeaf(BvhQuery& query, const BvhLeaf& leaf)
   const Doubles aa = ab[0] * ab[0] + ab[1] * ab[1] + ab[2] * ab[2];
   const Doubles bb = ac[0] * ac[0] + ac[1] * ac[1] + ac[2] * ac[2];
   const Doubles mixed = ab[0] * ac[0] + ab[1] * ac[1] + ab[2] * ac[2];
-  const Doubles zero = d1 - d1;
+  const Doubles zero = {};
   const Doubles one = zero + 1.0;
 
   // The point a + v ab + w ac that is nearest on each edge and in the plane. What is compared is the

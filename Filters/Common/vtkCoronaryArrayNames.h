@@ -107,6 +107,16 @@ constexpr const char* FromReference = "FromReference";           ///< int, 0 or 
 constexpr const char* LongestFalse = "LongestFalse";   ///< double, mm
 constexpr const char* LongestMissed = "LongestMissed"; ///< double, mm
 
+// Surfaces held against each other, point data.
+constexpr const char* SurfaceDistance = "SurfaceDistance"; ///< double, mm, NaN: not compared
+// Field data of both and of their table: HD, HD95, MSD, ..., see vtkMeshDistanceMetrics.
+constexpr const char* HausdorffPoints = "HausdorffPoints"; ///< double[3], mm, four: see there
+constexpr const char* SignedDistance = "SignedDistance";   ///< int, 1 when inside is negative
+
+// Branches held against each other, cell data (with FromReference, GroupIds, Length).
+constexpr const char* BranchMatch = "BranchMatch"; ///< vtkIdType, on the other side, -1: none
+constexpr const char* Covered = "Covered";         ///< double, share of the length, 0 to 1
+
 // Surface, cell data.
 constexpr const char* CellEntityIds = "CellEntityIds"; ///< int, 1 wall, 2.. caps
 // Surface, point data.

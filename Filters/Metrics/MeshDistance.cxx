@@ -1250,9 +1250,10 @@ void MeasureVertices(const Side& side, const SurfaceMesh& mesh,
   }
 }
 
-std::string UnitWarning(const SurfaceMesh& a, const SurfaceMesh& b)
+std::string UnitWarning(
+  const SurfaceMesh& a, const SurfaceMesh& b, const std::array<std::string, 2>& names)
 {
-  double size[2];
+  std::array<double, 2> size = { 0.0, 0.0 };
   int n = 0;
   for (const SurfaceMesh* mesh : { &a, &b })
   {
@@ -1275,7 +1276,7 @@ std::string UnitWarning(const SurfaceMesh& a, const SurfaceMesh& b)
     {
       if (ratio > 0.8 * unit && ratio < 1.25 * unit)
       {
-        return std::string(size[0] > size[1] ? "A" : "B") + " is about " +
+        return names[size[0] > size[1] ? 0 : 1] + " is about " +
           std::to_string(static_cast<int>(unit)) +
           " times as large as the other surface: they seem to be in different units";
       }
@@ -1299,7 +1300,7 @@ MeshDistance CompareSurfaces(const SurfaceMesh& a, const SurfaceMesh& b,
 {
   settings.Validate();
   const std::array<const SurfaceMesh*, 2> meshes = { &a, &b };
-  const std::array<std::string, 2> names = { "surface A", "surface B" };
+  const std::array<std::string, 2>& names = settings.names;
   for (int s = 0; s < 2; ++s)
   {
     Check(*meshes[s], names[s]);
@@ -1310,7 +1311,7 @@ MeshDistance CompareSurfaces(const SurfaceMesh& a, const SurfaceMesh& b,
     progress, { 1.0, 1.5, 1.5, areaShare, areaShare, searchShare, searchShare, 1.5 });
   Report(progress, 0.0);
   MeshDistance result;
-  const std::string units = UnitWarning(a, b);
+  const std::string units = UnitWarning(a, b, names);
   if (!units.empty())
   {
     result.warnings.push_back(units);

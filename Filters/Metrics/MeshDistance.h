@@ -20,6 +20,7 @@
 #include "Geometry.h"
 #include "ParallelFor.h"
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -56,6 +57,9 @@ struct MeshDistanceSettings
 
   /// How far beyond an end something still counts as belonging to it. What is further away is compared.
   double endLength = 3.0;
+
+  /// What messages call A and B.
+  std::array<std::string, 2> names = { "surface A", "surface B" };
 
   /// Branch and bound stops after so many pieces for each side; the error is then known, but greater.
   std::int64_t maximumPieces = 50000000;

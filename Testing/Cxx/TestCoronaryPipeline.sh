@@ -49,6 +49,43 @@ expect_nothing_in() {
 small="--quiet --spacing 3 --window 0 --origin -40 -40 -40 --dimensions 20 20 20"
 coarse="--surface-spacing 1.5 --centerline-spacing 3"
 
+check_metrics() {
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 --phases 2 $small $coarse --output made
+  a=made/truth/surface_00.vtp
+  b=made/truth/surface_01.vtp
+  run 0 metrics $a $b --json
+  for key in HD HD_AB HD_BA HD95 MSD MSD_area RMS error_bound seconds; do
+    grep -Eq "\"$key\": [0-9]" stdout || fail "no number $key in: $(cat stdout)"
+  done
+  expect_text stdout '"branches"'
+  run 0 metrics $a $a
+  grep -Eq '^HD +0\.00000$' stdout || fail "a surface is not at 0 from itself: $(cat stdout)"
+  run 0 convert $a a.obj
+  run 0 metrics a.obj $a --clip-ends
+  grep -Eq '^HD +0\.00000$' stdout || fail "the same as .obj: $(cat stdout)"
+
+  run 2 metrics $a
+  run 2 metrics $a b.stl
+  expect_one_line "coronary-pipeline metrics" "'b.stl' does not"
+  run 1 metrics $a nowhere.vtp
+  expect_one_line "coronary-pipeline metrics" "nowhere.vtp"
+  printf 'v 0 0 0\n' >empty.obj
+  run 1 metrics empty.obj $a
+  expect_one_line "coronary-pipeline metrics" "'empty.obj' has no triangles"
+  run 1 metrics $a made/truth/centerline_00.vtp --json
+  expect_one_line "coronary-pipeline metrics" "no triangles"
+  printf 'v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n' >nan.obj
+  run 1 metrics nan.obj $a
+  expect_one_line "coronary-pipeline metrics" "nan.obj"
+  run 2 metrics $a $b --error-bound 0
+  expect_one_line "coronary-pipeline metrics" "--error-bound"
+  printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n' >one.obj
+  sed 's/ 1/ 100/g;s/^f 100/f 1/' one.obj >large.obj
+  run 0 metrics one.obj large.obj
+  expect_text stderr "100 times"
+}
+
 check_convert() {
   # shellcheck disable=SC2086
   run 0 phantom --seed 5 --phases 1 $small $coarse --output made

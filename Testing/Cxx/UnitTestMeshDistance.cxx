@@ -469,7 +469,7 @@ TEST(MeshDistance, UnitsThatDifferAreNoticed)
   SurfaceMesh centimetres = Sphere(0.11, 3);
   const MeshDistance d = CompareSurfaces(Sphere(1.0, 3), centimetres);
   ASSERT_EQ(d.warnings.size(), 1U);
-  EXPECT_NE(d.warnings[0].find("A is about 10 times"), std::string::npos) << d.warnings[0];
+  EXPECT_NE(d.warnings[0].find("surface A is about 10 times"), std::string::npos) << d.warnings[0];
   EXPECT_TRUE(CompareSurfaces(Sphere(1.0, 3), Sphere(0.3, 3)).warnings.empty());
 }
 

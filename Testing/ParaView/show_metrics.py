@@ -1,0 +1,109 @@
+"""Two surfaces and two trees held against each other as a user does: state, trace, picture, time."""
+import os
+import sys
+
+from paraview import servermanager, simple, smstate, smtrace
+
+from coronary_testing import (CENTERLINES, SURFACE, content, fetch, load_plugin, require,
+                              require_picture)
+
+plugin, folder = sys.argv[1:3]
+TIME = 0.35
+
+
+def metrics_pipeline():
+    """A phantom against one with other radii, by its surface and by its tree."""
+    # Settings with the creation: a trace of a script records no others.
+    result = simple.CoronaryPhantom(registrationName="Result", SurfaceSpacing=1.0)
+    reference = simple.CoronaryPhantom(registrationName="Truth", SurfaceSpacing=1.1,
+                                       Tortuosity=0.9)
+    distance = simple.MeshDistanceMetrics(
+        Result=simple.OutputPort(result, SURFACE), Reference=simple.OutputPort(reference, SURFACE),
+        registrationName="Distance", ErrorBound=0.01, ClipEnds=1, EndLength=2.0)
+    branches = simple.BranchMetrics(
+        Result=simple.OutputPort(result, CENTERLINES),
+        Reference=simple.OutputPort(reference, CENTERLINES), registrationName="Branches",
+        LeastLength=2.0, DetectedShare=0.7)
+    return distance, branches
+
+
+def table_of(source, port, time=TIME):
+    source.UpdatePipeline(time)
+    return servermanager.Fetch(simple.OutputPort(source, port))
+
+
+def everything():
+    distance, branches = simple.FindSource("Distance"), simple.FindSource("Branches")
+    require(distance is not None and branches is not None, "the filters are missing")
+    require((distance.ErrorBound, distance.ClipEnds, distance.EndLength) == (0.01, 1, 2.0),
+            "settings of the distances")
+    require((branches.LeastLength, branches.DetectedShare) == (2.0, 0.7),
+            "settings of the branches")
+    table = table_of(distance, 2)
+    last = table.GetNumberOfRows() - 1
+    numbers = [table.GetColumnByName(name).GetValue(last) for name in ("HD", "MSD", "RMS", "HD95")]
+    field = table_of(branches, 0).GetFieldData()
+    numbers += [field.GetArray(name).GetValue(0) for name in ("BCR", "BCS", "BCR_bounded", "OV")]
+    return numbers, content(fetch(distance, 0, TIME)), content(fetch(distance, 1, TIME))
+
+
+def outputs():
+    distance, branches = metrics_pipeline()
+    numbers = everything()[0]
+    hd, msd, rms, hd95, bcr, bcs, bounded, overlap = numbers
+    require(0.0 < msd < rms < hd95 < hd < 5.0, "distances %s" % numbers)
+    require(0.5 < bcr < 1.5 and 0.5 < bcs < 1.5, "ratios %s" % numbers)
+    require(0.5 < bounded <= 1.0 and 0.5 < overlap <= 1.0, "bounded measures %s" % numbers)
+    times = list(distance.TimestepValues)
+    require(len(times) == 20, "%d time steps" % len(times))
+    require(table_of(distance, 2).GetNumberOfRows() > 10, "no rows of branches")
+    require(table_of(branches, 0).GetNumberOfRows() > 8, "no branches")
+    lines = fetch(branches, 1, TIME)
+    require(lines.GetNumberOfCells() > 16 and
+            lines.GetCellData().GetArray("Covered") is not None, "no lines")
+    # Another phase is another comparison.
+    phase = table_of(distance, 2, times[3])
+    require(phase.GetColumnByName("HD").GetValue(phase.GetNumberOfRows() - 1) != hd, "no time")
+
+
+def round_trips():
+    distance = simple.FindSource("Distance")
+    expected = everything()
+    view = simple.CreateRenderView()
+    view.ViewSize = [600, 400]
+    view.ViewTime = TIME
+    display = simple.Show(distance, view)
+    simple.ColorBy(display, ("POINTS", "SurfaceDistance"))
+    view.ResetCamera()
+    path = os.path.join(folder, "metrics.png")
+    simple.SaveScreenshot(path, view)
+    require_picture(path, 0.005)
+    state = os.path.join(folder, "metrics.pvsm")
+    simple.SaveState(state)
+    script = smstate.get_state()
+    simple.ResetSession()
+    simple.LoadState(state)
+    require(everything() == expected, "state file: other output")
+    simple.ResetSession()
+    exec(compile(script, "state", "exec"), {"__name__": "state"})
+    require(everything() == expected, "Python state: other output")
+
+
+def trace_repeats():
+    simple.ResetSession()
+    smtrace.start_trace(preamble="")
+    metrics_pipeline()
+    trace = smtrace.stop_trace()
+    expected = everything()
+    simple.ResetSession()
+    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
+    require(everything() == expected, "trace: other output")
+
+
+load_plugin(plugin)
+# First: a trace started after pictures were saved stays empty.
+trace_repeats()
+simple.ResetSession()
+outputs()
+round_trips()
+require(servermanager.ActiveConnection is not None, "the session is gone")
