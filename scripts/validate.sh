@@ -29,6 +29,7 @@ tables=(
   "volume: validate-volume"
   "skin-weights: skin-weight-benchmark --sizes 0 1 2 5 3 4"
   "skin-deformation: skin-deformation-benchmark --benchmark_repetitions=5 --benchmark_report_aggregates_only=true"
+  "mesh-distance: mesh-distance-benchmark --strict"
   "volume-cgal: validate-volume --backend CGAL --seeds 3 --variants plain"
   "motion: validate-motion --seeds 101..110 --details"
   "motion-ideal: validate-motion --seeds 101..110 --window 0"
