@@ -29,7 +29,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <new>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -342,7 +341,6 @@ int vtkBranchMetrics::RequestData(
   {
     return 1;
   }
-  int success = 1;
   try
   {
     coronary::BranchMetricsSettings settings;
@@ -370,28 +368,11 @@ int vtkBranchMetrics::RequestData(
     vtkCoronary::SetCommonTime(inputs, outputs);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(
+      this, outputs, "to compare the branches", { "BranchMetricsSettings: " });
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory to compare the branches");
-    success = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what(), { "BranchMetricsSettings: " }));
-    success = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  table->Initialize();
-  branches->Initialize();
-  for (int i = 0; i < this->GetNumberOfOutputPorts(); ++i)
-  {
-    outputs->GetInformationObject(i)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  }
-  return success;
 }
 
 void vtkBranchMetrics::PrintSelf(ostream& os, vtkIndent indent)

@@ -24,7 +24,6 @@
 
 #include <cmath>
 #include <limits>
-#include <new>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -191,7 +190,6 @@ int vtkMeshDistanceMetrics::RequestData(
   {
     return 1;
   }
-  int success = 1;
   try
   {
     coronary::MeshDistanceSettings settings;
@@ -242,31 +240,11 @@ int vtkMeshDistanceMetrics::RequestData(
     vtkCoronary::SetCommonTime(inputs, outputs);
     return 1;
   }
-  catch (const coronary::Cancelled&)
+  catch (...)
   {
-    vtkDebugMacro("aborted");
+    return vtkCoronary::FinishFailedRequest(
+      this, outputs, "to compare the surfaces", { "MeshDistanceSettings: " });
   }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory to compare the surfaces");
-    success = 0;
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what(), { "MeshDistanceSettings: " }));
-    success = 0;
-  }
-  // Not marked as generated, so that the next request executes again.
-  for (vtkPolyData* surface : surfaces)
-  {
-    surface->Initialize();
-  }
-  table->Initialize();
-  for (int i = 0; i < this->GetNumberOfOutputPorts(); ++i)
-  {
-    outputs->GetInformationObject(i)->Set(SDDP::DATA_NOT_GENERATED(), 1);
-  }
-  return success;
 }
 
 void vtkMeshDistanceMetrics::PrintSelf(ostream& os, vtkIndent indent)

@@ -2,10 +2,10 @@
 import os
 import sys
 
-from paraview import servermanager, simple, smstate, smtrace
+from paraview import servermanager, simple
 
-from coronary_testing import (CENTERLINES, SURFACE, content, fetch, load_plugin, require,
-                              require_picture)
+from coronary_testing import (CENTERLINES, SURFACE, content, fetch, find, load_plugin, require,
+                              require_picture, require_states_restore, require_trace_repeats)
 
 plugin, folder = sys.argv[1:3]
 TIME = 0.35
@@ -33,8 +33,7 @@ def table_of(source, port, time=TIME):
 
 
 def everything():
-    distance, branches = simple.FindSource("Distance"), simple.FindSource("Branches")
-    require(distance is not None and branches is not None, "the filters are missing")
+    distance, branches = find("Distance"), find("Branches")
     require((distance.ErrorBound, distance.ClipEnds, distance.EndLength) == (0.01, 1, 2.0),
             "settings of the distances")
     require((branches.LeastLength, branches.DetectedShare) == (2.0, 0.7),
@@ -67,42 +66,21 @@ def outputs():
 
 
 def round_trips():
-    distance = simple.FindSource("Distance")
-    expected = everything()
+    distance = find("Distance")
     view = simple.CreateRenderView()
     view.ViewSize = [600, 400]
     view.ViewTime = TIME
-    display = simple.Show(distance, view)
-    simple.ColorBy(display, ("POINTS", "SurfaceDistance"))
+    shown = simple.Show(distance, view)
+    simple.ColorBy(shown, ("POINTS", "SurfaceDistance"))
     view.ResetCamera()
     path = os.path.join(folder, "metrics.png")
     simple.SaveScreenshot(path, view)
     require_picture(path, 0.005)
-    state = os.path.join(folder, "metrics.pvsm")
-    simple.SaveState(state)
-    script = smstate.get_state()
-    simple.ResetSession()
-    simple.LoadState(state)
-    require(everything() == expected, "state file: other output")
-    simple.ResetSession()
-    exec(compile(script, "state", "exec"), {"__name__": "state"})
-    require(everything() == expected, "Python state: other output")
-
-
-def trace_repeats():
-    simple.ResetSession()
-    smtrace.start_trace(preamble="")
-    metrics_pipeline()
-    trace = smtrace.stop_trace()
-    expected = everything()
-    simple.ResetSession()
-    exec(compile(trace, "trace", "exec"), {"__name__": "trace"})
-    require(everything() == expected, "trace: other output")
+    require_states_restore(everything, os.path.join(folder, "metrics.pvsm"))
 
 
 load_plugin(plugin)
-# First: a trace started after pictures were saved stays empty.
-trace_repeats()
+require_trace_repeats(metrics_pipeline, everything)
 simple.ResetSession()
 outputs()
 round_trips()
