@@ -189,23 +189,71 @@ void Prepare(Side& side, const SurfaceMesh& mesh, const std::vector<SurfaceEnd>*
   }
 }
 
-void MeasurePoints(Side& side, const TriangleBvh& other, const ProgressCallback& progress)
+/**
+ * @param all  whether every distance is wanted; else those that can not be the greatest one are only known
+ *             to be no greater than what is stored, and `nearest` is a triangle at that distance
+ */
+void MeasurePoints(Side& side, const TriangleBvh& other, bool all, const ProgressCallback& progress)
 {
   const auto count = static_cast<std::int64_t>(side.surface.points.size());
   side.distance.assign(count, 0.0);
   side.nearest.resize(count);
-  ParallelFor(
-    count, ReportingGrain(progress, count, Chunk),
-    [&](std::int64_t first, std::int64_t last)
-    {
-      std::int64_t hint = -1;
-      for (std::int64_t i = first; i < last; ++i)
+  const auto measure = [&](std::int32_t point, std::int64_t hint)
+  {
+    side.nearest[point] =
+      other.Closest(side.surface.points[point], std::numeric_limits<double>::infinity(), hint);
+    side.distance[point] = side.nearest[point].distance;
+  };
+  double least = -1.0;
+  // One in so many shows how great the greatest distance is at least.
+  constexpr std::int64_t sampling = 16;
+  if (!all)
+  {
+    ParallelFor(count / sampling, ReportingGrain(progress, count / sampling, Chunk),
+      [&](std::int64_t first, std::int64_t last)
       {
-        const std::int32_t point = side.pointOrder[i];
-        side.nearest[point] =
-          other.Closest(side.surface.points[point], std::numeric_limits<double>::infinity(), hint);
-        side.distance[point] = side.nearest[point].distance;
-        hint = side.nearest[point].triangle;
+        for (std::int64_t i = first; i < last; ++i)
+        {
+          const std::int32_t point = side.pointOrder[sampling * i];
+          measure(
+            point, i > first ? side.nearest[side.pointOrder[sampling * (i - 1)]].triangle : -1);
+        }
+      });
+    for (std::int64_t i = 0; i < count / sampling; ++i)
+    {
+      least = std::max(least, side.distance[side.pointOrder[sampling * i]]);
+    }
+  }
+  // Ranges that begin at a sample, so that what is stored does not depend on them.
+  const std::int64_t ranges = (count + Chunk - 1) / Chunk;
+  ParallelFor(
+    ranges, 1,
+    [&](std::int64_t firstRange, std::int64_t lastRange)
+    {
+      for (std::int64_t range = firstRange; range < lastRange; ++range)
+      {
+        std::int64_t hint = -1;
+        for (std::int64_t i = Chunk * range; i < std::min(count, Chunk * (range + 1)); ++i)
+        {
+          const std::int32_t point = side.pointOrder[i];
+          const bool known = !all && i % sampling == 0 && i / sampling < count / sampling;
+          if (!known)
+          {
+            const TrianglePoint near = !all && hint >= 0
+              ? other.NearestOn(hint, side.surface.points[point])
+              : TrianglePoint();
+            if (near.squaredDistance <= least * least && least > 0.0)
+            {
+              side.nearest[point].triangle = hint;
+              side.distance[point] = std::sqrt(near.squaredDistance);
+            }
+            else
+            {
+              measure(point, hint);
+            }
+          }
+          hint = side.nearest[point].triangle;
+        }
       }
     },
     progress);
@@ -867,6 +915,7 @@ void BranchAndBound::Run(const std::vector<Part>& parts, const ProgressCallback&
     return piece;
   };
   std::vector<double> upper(count);
+  std::vector<Piece> corrected; // in the order of their triangles
   ParallelFor(
     count, ReportingGrain(progress, count, 1024),
     [&](std::int64_t first, std::int64_t last)
@@ -879,6 +928,47 @@ void BranchAndBound::Run(const std::vector<Part>& parts, const ProgressCallback&
       }
     },
     progress);
+  if (!this->Settings.pointMeasures)
+  {
+    // What is left over needs the true distances of its corners.
+    std::vector<std::int32_t> left;
+    for (std::int64_t i = 0; i < count; ++i)
+    {
+      if (upper[i] > this->Best[side.groupOf[i]].distance + bound)
+      {
+        left.push_back(static_cast<std::int32_t>(i));
+      }
+    }
+    corrected.resize(left.size());
+    ParallelFor(static_cast<std::int64_t>(left.size()), 64,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          Piece piece = pieceOf(left[n]);
+          for (int k = 0; k < 3; ++k)
+          {
+            const TriangleBvh::Nearest nearest = this->To.tree.Closest(
+              piece.corner[k], std::numeric_limits<double>::infinity(), piece.nearest[k]);
+            piece.distance[k] = nearest.distance;
+            piece.nearest[k] = static_cast<std::int32_t>(nearest.triangle);
+          }
+          piece.upper =
+            this->UpperBound(piece, -1, this->Best[side.groupOf[left[n]]].distance + bound);
+          upper[left[n]] = std::min(upper[left[n]], piece.upper);
+          piece.upper = upper[left[n]];
+          corrected[n] = piece;
+        }
+      });
+    for (const Piece& piece : corrected)
+    {
+      for (int k = 0; k < 3; ++k)
+      {
+        this->Offer(
+          side.groupOf[piece.triangle], piece.distance[k], piece.corner[k], piece.triangle);
+      }
+    }
+  }
   std::vector<Piece> pieces;
   const auto keep = [&](const Piece& piece)
   {
@@ -892,12 +982,18 @@ void BranchAndBound::Run(const std::vector<Part>& parts, const ProgressCallback&
       this->Discarded[group] = std::max(this->Discarded[group], piece.upper);
     }
   };
+  std::size_t next = 0;
   for (std::int64_t i = 0; i < count; ++i)
   {
     const std::int32_t group = side.groupOf[i];
+    while (next < corrected.size() && corrected[next].triangle < i)
+    {
+      ++next;
+    }
     if (upper[i] > this->Best[group].distance + bound)
     {
-      pieces.push_back(pieceOf(i));
+      const bool known = next < corrected.size() && corrected[next].triangle == i;
+      pieces.push_back(known ? corrected[next] : pieceOf(i));
       pieces.back().upper = upper[i];
     }
     else
@@ -1213,6 +1309,10 @@ std::vector<double> ToInput(const Side& side, const std::vector<double>& distanc
 void MeasureVertices(const Side& side, const SurfaceMesh& mesh,
   const std::vector<std::int64_t>& groups, std::int64_t group, SideDistance& result)
 {
+  if (side.distance.empty())
+  {
+    return;
+  }
   Sum sum;
   std::vector<std::uint8_t> mine;
   if (group >= 0 && mesh.pointGroups.empty())
@@ -1340,11 +1440,13 @@ MeshDistance CompareSurfaces(const SurfaceMesh& a, const SurfaceMesh& b,
       }
     });
   SkipProgress(work(0), 0.0, 1.0);
+  const bool onlyHausdorff = !settings.pointMeasures && !settings.areaMeasures;
   std::array<SideDistance*, 2> totals = { &result.ab, &result.ba };
   std::array<std::vector<Part>, 2> parts;
   for (int s = 0; s < 2; ++s)
   {
-    MeasurePoints(sides[s], sides[1 - s].tree, work(1 + s));
+    MeasurePoints(
+      sides[s], sides[1 - s].tree, !onlyHausdorff || sides[s].groups.size() > 1, work(1 + s));
   }
   for (int s = 0; s < 2 && settings.areaMeasures; ++s)
   {
@@ -1391,9 +1493,13 @@ MeshDistance CompareSurfaces(const SurfaceMesh& a, const SurfaceMesh& b,
   }
 
   SkipProgress(work(7), 0.0, 1.0);
-  std::array<std::vector<double>, 2> distances = { sides[0].distance, sides[1].distance };
+  std::array<std::vector<double>, 2> distances;
+  if (settings.pointMeasures)
+  {
+    distances = { sides[0].distance, sides[1].distance };
+  }
   std::array<bool, 2> isSigned = { false, false };
-  if (settings.signedDistances)
+  if (settings.signedDistances && settings.pointMeasures)
   {
     ParallelFor(2, 1,
       [&](std::int64_t first, std::int64_t last)
@@ -1405,8 +1511,11 @@ MeshDistance CompareSurfaces(const SurfaceMesh& a, const SurfaceMesh& b,
         }
       });
   }
-  result.pointDistancesA = ToInput(sides[0], distances[0]);
-  result.pointDistancesB = ToInput(sides[1], distances[1]);
+  if (settings.pointMeasures)
+  {
+    result.pointDistancesA = ToInput(sides[0], distances[0]);
+    result.pointDistancesB = ToInput(sides[1], distances[1]);
+  }
   result.signedA = isSigned[0];
   result.signedB = isSigned[1];
 
@@ -1414,6 +1523,11 @@ MeshDistance CompareSurfaces(const SurfaceMesh& a, const SurfaceMesh& b,
   for (int s = 0; s < 2; ++s)
   {
     const std::vector<std::int64_t> groups = GroupsOfTriangles(*meshes[s]);
+    if (!settings.pointMeasures)
+    {
+      // Not all of them are exact.
+      sides[s].distance.clear();
+    }
     MeasureVertices(sides[s], *meshes[s], groups, -1, *totals[s]);
     std::vector<const Part*> own;
     std::vector<std::vector<const Part*>> ofGroup(sides[s].groups.size());

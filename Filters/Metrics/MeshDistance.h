@@ -47,8 +47,11 @@ struct MeshDistanceSettings
   /// be. Positive.
   double errorBound = 1e-3;
 
-  bool hausdorff = true;       ///< HD; without it only that of the vertices is known
-  bool areaMeasures = true;    ///< area-weighted mean, RMS, percentiles
+  bool hausdorff = true;    ///< HD; without it only that of the vertices is known
+  bool areaMeasures = true; ///< area-weighted mean, RMS, percentiles
+
+  /// Eq. 16 and the distances of points. Without them and all others, HD is found faster.
+  bool pointMeasures = true;
   bool signedDistances = true; ///< negative inside of the other surface, where that is closed
 
   /// Whether the ends of vessels are left out: caps, and on both surfaces what lies beyond an end of
@@ -153,11 +156,11 @@ struct SurfaceEnd
 };
 
 /**
- * The ends of an open surface's vessels: closed rims of the triangles that are no caps, with the wall
+ * The ends of a surface's vessels: closed rims of the triangles that are no caps, with the wall
  * on one side. What has its wall all around it (a hole in a wall) is none.
  *
- * What lies beyond an end: points x with 0 < normal . (x - centre) <= length, and no further from the
- * axis than two radii in two directions across it.
+ * What lies beyond an end: points x with -radius / 100 < normal . (x - centre) <= length, and no further
+ * from the axis than two radii in two directions across it. The hundredth is for caps without a mark.
  */
 std::vector<SurfaceEnd> FindSurfaceEnds(const SurfaceMesh& mesh);
 }

@@ -76,7 +76,7 @@ struct EndBox
     const Vector3 v = end.normal.cross(u);
     this->normals = { end.normal, -end.normal, u, -u, v, -v };
     const double wide = 2.0 * end.radius;
-    const std::array<double, 6> reach = { 0.0, -length, -wide, -wide, -wide, -wide };
+    const std::array<double, 6> reach = { -0.01 * end.radius, -length, -wide, -wide, -wide, -wide };
     for (std::size_t i = 0; i < 6; ++i)
     {
       this->offsets[i] = this->normals[i].dot(end.centre) + reach[i];

@@ -154,6 +154,7 @@ int Run(const Options& options)
   MeshDistanceSettings onlyHausdorff;
   onlyHausdorff.errorBound = ErrorBound;
   onlyHausdorff.areaMeasures = false;
+  onlyHausdorff.pointMeasures = false;
   onlyHausdorff.signedDistances = false;
   MeshDistanceSettings everything;
   everything.errorBound = ErrorBound;

@@ -210,6 +210,40 @@ TEST(MeshDistance, HausdorffAgainstDenseSamples)
   }
 }
 
+TEST(MeshDistance, HausdorffAloneIsTheSame)
+{
+  MeshDistanceSettings alone;
+  alone.areaMeasures = false;
+  alone.pointMeasures = false;
+  MeshDistanceSettings settings;
+  for (unsigned int seed = 1; seed <= 25; ++seed)
+  {
+    SurfaceMesh a = Blob(seed, 3 + static_cast<int>(seed % 3));
+    const SurfaceMesh b = seed == 5 ? a : Blob(seed + 200, 4);
+    if (seed % 4 == 0)
+    {
+      for (std::size_t i = 0; i < a.triangles.size(); ++i)
+      {
+        a.triangleGroups.push_back(static_cast<std::int64_t>(i % 3));
+      }
+    }
+    const MeshDistance d = CompareSurfaces(a, b, settings);
+    const MeshDistance h = CompareSurfaces(a, b, alone);
+    EXPECT_NEAR(h.ab.hausdorff, d.ab.hausdorff, Bound) << seed;
+    EXPECT_NEAR(h.ba.hausdorff, d.ba.hausdorff, Bound) << seed;
+    EXPECT_LE(h.hausdorffError, Bound);
+    EXPECT_GE(h.hausdorff + h.hausdorffError, d.hausdorff - 1e-12);
+    EXPECT_NEAR((h.ab.at - h.ab.nearest).norm(), h.ab.hausdorff, 1e-12);
+    EXPECT_TRUE(std::isnan(h.ab.vertexMean));
+    EXPECT_TRUE(h.pointDistancesA.empty());
+    SetNumberOfThreads(3);
+    const MeshDistance threads = CompareSurfaces(a, b, alone);
+    SetNumberOfThreads(0);
+    EXPECT_EQ(threads.hausdorff, h.hausdorff);
+    EXPECT_EQ(threads.hausdorffError, h.hausdorffError);
+  }
+}
+
 TEST(MeshDistance, IntegralsConverge)
 {
   for (unsigned int seed = 1; seed <= 3; ++seed)
@@ -398,8 +432,8 @@ TEST(MeshDistance, EndsCutAtDifferentPlaces)
   const MeshDistance clipped = CompareSurfaces(open, capped, settings);
   EXPECT_LT(clipped.hausdorff, 1e-9);
   EXPECT_LT(clipped.mean, 1e-9);
-  // What is compared are 19.5 mm of a prism's wall.
-  const double wall = 24 * 2.0 * 1.5 * std::sin(M_PI / 24) * 19.5;
+  // What is compared are 19.5 mm of a prism's wall, less a hundredth of the radius at both ends.
+  const double wall = 24 * 2.0 * 1.5 * std::sin(M_PI / 24) * (19.5 - 2.0 * 0.015);
   EXPECT_NEAR(clipped.ab.area, wall, 1e-9);
   EXPECT_NEAR(clipped.ba.area, wall, 1e-9);
   // Points that are left out have no distance.
@@ -413,6 +447,11 @@ TEST(MeshDistance, EndsCutAtDifferentPlaces)
   const MeshDistance longer =
     CompareSurfaces(Tube(1.5, 0.0, 28.0, 24, 31, false), capped, settings);
   EXPECT_NEAR(longer.ab.hausdorff, 7.0, 1e-9);
+
+  // Caps that are not marked, on the plane of an end that is known.
+  SurfaceMesh unmarked = Tube(1.5, 0.0, 20.0, 24, 31, true);
+  unmarked.caps.clear();
+  EXPECT_LT(CompareSurfaces(unmarked, open, settings).hausdorff, 1e-9);
 
   // Nothing to clip.
   const MeshDistance closed = CompareSurfaces(Sphere(1, 2), Sphere(1.1, 2), settings);

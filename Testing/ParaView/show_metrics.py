@@ -27,21 +27,16 @@ def metrics_pipeline():
     return distance, branches
 
 
-def table_of(source, port, time=TIME):
-    source.UpdatePipeline(time)
-    return servermanager.Fetch(simple.OutputPort(source, port))
-
-
 def everything():
     distance, branches = find("Distance"), find("Branches")
     require((distance.ErrorBound, distance.ClipEnds, distance.EndLength) == (0.01, 1, 2.0),
             "settings of the distances")
     require((branches.LeastLength, branches.DetectedShare) == (2.0, 0.7),
             "settings of the branches")
-    table = table_of(distance, 2)
+    table = fetch(distance, 2, TIME)
     last = table.GetNumberOfRows() - 1
     numbers = [table.GetColumnByName(name).GetValue(last) for name in ("HD", "MSD", "RMS", "HD95")]
-    field = table_of(branches, 0).GetFieldData()
+    field = fetch(branches, 0, TIME).GetFieldData()
     numbers += [field.GetArray(name).GetValue(0) for name in ("BCR", "BCS", "BCR_bounded", "OV")]
     return numbers, content(fetch(distance, 0, TIME)), content(fetch(distance, 1, TIME))
 
@@ -55,13 +50,13 @@ def outputs():
     require(0.5 < bounded <= 1.0 and 0.5 < overlap <= 1.0, "bounded measures %s" % numbers)
     times = list(distance.TimestepValues)
     require(len(times) == 20, "%d time steps" % len(times))
-    require(table_of(distance, 2).GetNumberOfRows() > 10, "no rows of branches")
-    require(table_of(branches, 0).GetNumberOfRows() > 8, "no branches")
+    require(fetch(distance, 2, TIME).GetNumberOfRows() > 10, "no rows of branches")
+    require(fetch(branches, 0, TIME).GetNumberOfRows() > 8, "no branches")
     lines = fetch(branches, 1, TIME)
     require(lines.GetNumberOfCells() > 16 and
             lines.GetCellData().GetArray("Covered") is not None, "no lines")
     # Another phase is another comparison.
-    phase = table_of(distance, 2, times[3])
+    phase = fetch(distance, 2, times[3])
     require(phase.GetColumnByName("HD").GetValue(phase.GetNumberOfRows() - 1) != hd, "no time")
 
 
