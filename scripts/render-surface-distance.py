@@ -26,7 +26,7 @@ import vtkmodules.vtkRenderingOpenGL2  # noqa: F401
 SIZE = (1500, 900)
 VIEW = (0.50, -0.80, 0.33)  # from the front, the left and a little above
 TIME, SURFACE, SEED = 0.75, 2, 7
-RANGE = 1.0  # mm
+RANGE = 0.5  # mm
 
 
 def fetch(source, port):
@@ -37,7 +37,7 @@ def fetch(source, port):
 
 simple.LoadPlugin(sys.argv[1], remote=False, ns=vars(simple))
 truth = simple.CoronaryPhantom(Seed=SEED, SurfaceSpacing=0.4)
-other = simple.CoronaryPhantom(Seed=SEED, SurfaceSpacing=0.4, Tortuosity=0.85)
+other = simple.CoronaryPhantom(Seed=SEED, SurfaceSpacing=0.4, Tortuosity=0.6)
 metrics = simple.MeshDistanceMetrics(Result=simple.OutputPort(other, SURFACE),
                                      Reference=simple.OutputPort(truth, SURFACE))
 surface = fetch(metrics, 0)

@@ -209,7 +209,7 @@ int Run(const Options& options)
   std::printf(
     "\n### Two surfaces of %zu and %zu triangles, %d threads\n\nTen winding tubes, and the same "
     "meshed anew and displaced; error bound %g mm.\n\n| | wall time, s: median (least to "
-    "greatest) |\n|---|---|\n",
+    "greatest) | processor time, s |\n|---|---|---|\n",
     a.triangles.size(), b.triangles.size(), NumberOfThreads(), ErrorBound);
   for (const Timed& one : timed)
   {
