@@ -568,12 +568,13 @@ BranchTree TreeOfSurface(const std::vector<Vector3>& points, const std::vector<s
       where.push_back(slice.abscissa / count);
     }
     // The slices' middles lie half a slice inside of the ends: the line goes on straight to these.
-    const auto extend = [&](bool atEnd)
+    const auto [least, greatest] = ends[id];
+    const auto extend = [&, first = least, last = greatest](bool atEnd)
     {
       const std::int64_t size = static_cast<std::int64_t>(tree.lines.points.size()) - firstPoint;
       const std::int64_t a = atEnd ? size - 1 : 0;
       const std::int64_t b = atEnd ? size - 2 : 1;
-      const double gap = atEnd ? ends[id].second - where[a] : where[a] - ends[id].first;
+      const double gap = atEnd ? last - where[a] : where[a] - first;
       const double apart = std::abs(where[a] - where[b]);
       const Vector3 end = tree.lines.points[firstPoint + a];
       return apart > 0.0 ? Vector3(end + gap / apart * (end - tree.lines.points[firstPoint + b]))

@@ -173,6 +173,7 @@ void WriteTable(vtkTable* table, const BranchMetrics& metrics)
   const auto numbers = [&](const char* name, auto get)
   {
     std::vector<double> values;
+    values.reserve(metrics.rows.size());
     for (const BranchAgreement& row : metrics.rows)
     {
       values.push_back(get(row));
@@ -182,6 +183,7 @@ void WriteTable(vtkTable* table, const BranchMetrics& metrics)
   const auto ids = [&](const char* name, auto get)
   {
     std::vector<vtkIdType> values;
+    values.reserve(metrics.rows.size());
     for (const BranchAgreement& row : metrics.rows)
     {
       values.push_back(static_cast<vtkIdType>(get(row)));
@@ -222,6 +224,7 @@ void WriteTable(vtkTable* table, const BranchMetrics& metrics)
   numbers("Continuity", [](const BranchAgreement& row) { return row.continuity; });
   numbers("LongestGap", [](const BranchAgreement& row) { return row.longestGap; });
   std::vector<int> detected;
+  detected.reserve(metrics.rows.size());
   for (const BranchAgreement& row : metrics.rows)
   {
     detected.push_back(row.detected ? 1 : 0);

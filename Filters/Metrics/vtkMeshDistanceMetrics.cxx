@@ -93,6 +93,7 @@ void WriteTable(vtkTable* table, const MeshDistance& distances)
   for (std::size_t c = 0; c < rows.front().size(); ++c)
   {
     std::vector<double> values;
+    values.reserve(rows.size());
     for (const Row& row : rows)
     {
       values.push_back(row[c].second);
