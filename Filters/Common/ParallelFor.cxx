@@ -238,5 +238,10 @@ void ParallelFor(std::int64_t count, std::int64_t grain,
   {
     throw Cancelled();
   }
+  // The helpers may have done it all before this thread came to its first range.
+  if (reported < 1.0)
+  {
+    Report(progress, 1.0);
+  }
 }
 }

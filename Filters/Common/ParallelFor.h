@@ -44,7 +44,7 @@ void SetNumberOfThreads(int threads);
  *
  * Which thread runs which range is not fixed, so a body may write only what belongs to its range;
  * then the result does not depend on the number of threads. Progress is reported by the calling
- * thread only. An exception in a body stops the loop and is thrown again here.
+ * thread only, 1 at the end at the latest: every loop can be cancelled. An exception in a body stops the loop and is thrown again here.
  * A loop inside a body runs on the body's own thread.
  *
  * @throws Cancelled when progress returned false.

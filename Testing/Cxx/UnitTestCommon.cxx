@@ -107,6 +107,7 @@ TEST(ParallelFor, ProgressGrowsAndStops)
       last = fraction;
       return true;
     });
+  EXPECT_EQ(last, 1.0);
 
   std::atomic<int> visits{ 0 };
   const auto slow = [&](std::int64_t, std::int64_t)
