@@ -174,6 +174,68 @@ double Correlation(const std::vector<float>& a, const std::vector<float>& b)
   return ab / std::sqrt(std::max(aa * bb, 1e-9));
 }
 
+/**
+ * Mean outer products of an image's gradients, of which a part is the image's noise: what is left
+ * without it. Noise has gradients along an even vessel too, which say nothing about the way along it.
+ */
+class SignalCurvature
+{
+public:
+  SignalCurvature(const Matrix3& curvature, double noise)
+    : Eigen(curvature)
+    , Left(this->Eigen.eigenvalues().unaryExpr(
+        [&](double value) { return std::max(value - noise, 0.0); }))
+    , Noise(noise)
+  {
+  }
+
+  /// The noise takes part in the error: l^2 / (l + noise) instead of l.
+  Matrix3 Information() const
+  {
+    return this->Along(this->Left.unaryExpr(
+      [&](double value) { return value > 0.0 ? value * value / (value + this->Noise) : 0.0; }));
+  }
+
+  Vector3 Solve(const Vector3& pull) const
+  {
+    const double damping = 0.2 * this->Noise + 1e-3 * this->Left.sum() + 1e-3;
+    return this->Along((this->Left.array() + damping).inverse()) * pull;
+  }
+
+  /// Of nodes with as many images averaged in each: the noise in one, when the third of them that has the
+  /// least to be seen in some direction has nothing there but noise.
+  static double NoiseOf(const std::vector<Matrix3>& curvatures, const std::vector<int>& averaged)
+  {
+    std::vector<double> least;
+    for (std::size_t n = 0; n < curvatures.size(); ++n)
+    {
+      if (curvatures[n].trace() > 0.0)
+      {
+        least.push_back(
+          averaged[n] * Eigen::SelfAdjointEigenSolver<Matrix3>(curvatures[n]).eigenvalues()[0]);
+      }
+    }
+    if (least.empty())
+    {
+      return 0.0;
+    }
+    const auto third = least.begin() + static_cast<std::ptrdiff_t>(least.size() / 3);
+    std::nth_element(least.begin(), third, least.end());
+    return std::max(*third, 0.0);
+  }
+
+private:
+  Matrix3 Along(const Vector3& values) const
+  {
+    return this->Eigen.eigenvectors() * values.asDiagonal() *
+      this->Eigen.eigenvectors().transpose();
+  }
+
+  Eigen::SelfAdjointEigenSolver<Matrix3> Eigen;
+  Vector3 Left;
+  double Noise;
+};
+
 /// An inverse covariance after the method's own error, mm, was added.
 Matrix3 Limited(const Matrix3& information, double deviation)
 {
@@ -182,6 +244,132 @@ Matrix3 Limited(const Matrix3& information, double deviation)
     [&](double value) { return value > 0.0 ? 1.0 / (1.0 / value + deviation * deviation) : 0.0; });
   return eigen.eigenvectors() * limited.asDiagonal() * eigen.eigenvectors().transpose();
 }
+
+std::vector<std::vector<int>> Daughters(const LineNodes& nodes)
+{
+  std::vector<std::vector<int>> daughters(nodes.size());
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    if (nodes.parent[n] >= 0)
+    {
+      daughters[nodes.parent[n]].push_back(static_cast<int>(n));
+    }
+  }
+  return daughters;
+}
+
+double NodeRadius(const LineNodes& nodes, int node)
+{
+  return nodes.radius.empty() ? 1.5 : nodes.radius[node];
+}
+
+/**
+ * Where things around a node go when all vessels widen: outwards from the nearest axis by its distance
+ * from it, beyond the wall less and less. On a lattice, mm per unit of the logarithm of the radius.
+ */
+class WideningField
+{
+public:
+  WideningField(const LineNodes& nodes, const std::vector<std::vector<int>>& daughters, int node)
+  {
+    struct Step
+    {
+      Vector3 start;
+      Vector3 way;
+      double radius;
+      double wider;
+    };
+    std::vector<Step> steps;
+    const Vector3& centre = nodes.position[node];
+    // Vessels that are near in space are near in the tree, but for crossings.
+    std::vector<std::pair<int, int>> open{ { node, -1 } };
+    while (!open.empty())
+    {
+      const auto [at, from] = open.back();
+      open.pop_back();
+      const auto go = [&](int next, int upper, int lower)
+      {
+        if (next < 0 || next == from)
+        {
+          return;
+        }
+        const double wide = NodeRadius(nodes, upper);
+        steps.push_back({ nodes.position[upper] - centre,
+          nodes.position[lower] - nodes.position[upper], wide, NodeRadius(nodes, lower) - wide });
+        if ((nodes.position[next] - centre).norm() < 2.0 * Reach)
+        {
+          open.emplace_back(next, at);
+        }
+      };
+      go(nodes.parent[at], nodes.parent[at], at);
+      for (const int daughter : daughters[at])
+      {
+        go(daughter, at, daughter);
+      }
+    }
+    this->Values.resize(static_cast<std::size_t>(Side) * Side * Side, Eigen::Vector3f::Zero());
+    std::size_t index = 0;
+    for (int k = 0; k < Side; ++k)
+    {
+      for (int j = 0; j < Side; ++j)
+      {
+        for (int i = 0; i < Side; ++i, ++index)
+        {
+          const Vector3 place = Spacing * Vector3(i, j, k) - Vector3::Constant(Reach);
+          double least = Beyond;
+          Vector3 out = Vector3::Zero();
+          for (const Step& step : steps)
+          {
+            const double along = std::clamp(
+              (place - step.start).dot(step.way) / std::max(step.way.squaredNorm(), 1e-12), 0.0,
+              1.0);
+            const Vector3 across = place - step.start - along * step.way;
+            const double fromWall = across.norm() - step.radius - along * step.wider;
+            if (fromWall < least)
+            {
+              least = fromWall;
+              out = across;
+            }
+          }
+          const double share = std::clamp((Beyond - least) / (Beyond - Within), 0.0, 1.0);
+          this->Values[index] = (share * out).cast<float>();
+        }
+      }
+    }
+  }
+
+  /// @param place  mm from the node, at rest
+  Vector3 At(const Vector3& place) const
+  {
+    const Vector3 index = (place + Vector3::Constant(Reach)) / Spacing;
+    if (!((index.array() >= 0.0).all() && (index.array() < Side - 1).all()))
+    {
+      return Vector3::Zero();
+    }
+    const Eigen::Vector3i corner = index.cast<int>();
+    const Vector3 part = index - corner.cast<double>();
+    Vector3 sum = Vector3::Zero();
+    for (int c = 0; c < 8; ++c)
+    {
+      const int i = corner[0] + (c & 1);
+      const int j = corner[1] + ((c >> 1) & 1);
+      const int k = corner[2] + (c >> 2);
+      const double share = ((c & 1) != 0 ? part[0] : 1.0 - part[0]) *
+        ((c & 2) != 0 ? part[1] : 1.0 - part[1]) * ((c & 4) != 0 ? part[2] : 1.0 - part[2]);
+      sum += share * this->Values[(k * Side + j) * Side + i].cast<double>();
+    }
+    return sum;
+  }
+
+private:
+  static constexpr double Spacing = 0.5;
+  static constexpr double Reach = 4.5; // mm, of the core and what it is smeared by
+  static constexpr int Side = 19;
+  // Things move with the wall as far as it is blurred, and not at all further out, mm from it.
+  static constexpr double Within = 0.4;
+  static constexpr double Beyond = 1.2;
+  std::vector<Eigen::Vector3f> Values;
+};
 
 class Tracker
 {
@@ -622,6 +810,7 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
     std::vector<std::vector<float>> blocks(nodes);
     std::vector<std::vector<float>> expected(nodes);
     std::vector<Matrix3> curvature(nodes, Matrix3::Zero());
+    std::vector<int> averaged(nodes, 1);
     ParallelFor(
       nodes, 4,
       [&](std::int64_t first, std::int64_t last)
@@ -630,6 +819,7 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
         {
           const Matrix3 back = this->Turn(static_cast<int>(n), this->Displacement[k]).transpose();
           const std::vector<Vector3> smear = this->Smear(static_cast<int>(n), this->Times[k]);
+          averaged[n] = static_cast<int>(smear.size());
           const auto expect = [&](const Vector3& offset)
           {
             float sum = 0.0F;
@@ -685,6 +875,7 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
       },
       this->Part(progressFrom + 0.1 * static_cast<double>(k) / static_cast<double>(phases),
         progressFrom + 0.1 * static_cast<double>(k + 1) / static_cast<double>(phases)));
+    const double noise = SignalCurvature::NoiseOf(curvature, averaged);
     std::vector<float> least(nodes);
     for (std::int64_t n = 0; n < nodes; ++n)
     {
@@ -720,7 +911,8 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
       else
       {
         seen.information[k][n] =
-          Limited(curvature[n] * (30.0 / std::max<double>(least[n], this->NoiseFloor())),
+          Limited(SignalCurvature(curvature[n], noise / averaged[n]).Information() *
+              (30.0 / std::max<double>(least[n], this->NoiseFloor())),
             std::max(TissueDeviation, 0.8 * this->Voxel));
       }
       seen.displacement[k][n] += this->Displacement[k][n];
@@ -739,19 +931,37 @@ void Tracker::Align(double robustScale, double progressFrom)
     phases, std::vector<Matrix3>(nodes, Matrix3::Zero()));
   this->Likeness.assign(phases, std::vector<double>(nodes, 0.0));
   const std::size_t samples = this->Core.places.size();
+  // What is expected to be seen of a node.
+  struct Sight
+  {
+    std::vector<float> wanted;
+    std::vector<Eigen::Vector3f> gradient;
+    std::vector<float> weight;
+  };
+  std::vector<Sight> sights(nodes);
   for (std::size_t k = 0; k < phases; ++k)
   {
+    std::vector<Matrix3> expectedCurvature(nodes, Matrix3::Zero());
+    std::vector<int> averaged(nodes, 1);
+    const auto part = [&](double from, double to)
+    {
+      const double share = 0.05 / static_cast<double>(phases);
+      return this->Part(progressFrom + share * (static_cast<double>(k) + from),
+        progressFrom + share * (static_cast<double>(k) + to));
+    };
     ParallelFor(
       nodes, 4,
       [&](std::int64_t first, std::int64_t last)
       {
-        std::vector<float> wanted(samples);
-        std::vector<Eigen::Vector3f> gradient(samples);
-        std::vector<float> weight(samples);
         for (std::int64_t n = first; n < last; ++n)
         {
-          const Matrix3 turn = this->Turn(static_cast<int>(n), this->Displacement[k]);
-          const Matrix3 back = turn.transpose();
+          std::vector<float>& wanted = sights[n].wanted;
+          std::vector<Eigen::Vector3f>& gradient = sights[n].gradient;
+          std::vector<float>& weight = sights[n].weight;
+          wanted.resize(samples);
+          gradient.resize(samples);
+          weight.resize(samples);
+          const Matrix3 back = this->Turn(static_cast<int>(n), this->Displacement[k]).transpose();
           const std::vector<Vector3> smear = this->Smear(static_cast<int>(n), this->Times[k]);
           const auto expected = [&](const Vector3& offset)
           {
@@ -774,6 +984,37 @@ void Tracker::Align(double robustScale, double progressFrom)
             }
             weight[p] = std::isfinite(wanted[p] + gradient[p].sum()) ? this->Core.weights[p] : 0.0F;
           }
+          Vector3 mean = Vector3::Zero();
+          double sum = 0.0;
+          for (std::size_t p = 0; p < samples; ++p)
+          {
+            if (weight[p] > 0.0F)
+            {
+              const Vector3 g = gradient[p].cast<double>();
+              mean += weight[p] * g;
+              expectedCurvature[n] += weight[p] * g * g.transpose();
+              sum += weight[p];
+            }
+          }
+          if (sum > 0.0)
+          {
+            expectedCurvature[n] =
+              expectedCurvature[n] / sum - mean * mean.transpose() / (sum * sum);
+          }
+          averaged[n] = static_cast<int>(smear.size());
+        }
+      },
+      part(0.0, 0.5));
+    const double imageNoise = SignalCurvature::NoiseOf(expectedCurvature, averaged);
+    ParallelFor(
+      nodes, 4,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          const std::vector<float>& wanted = sights[n].wanted;
+          const std::vector<Eigen::Vector3f>& gradient = sights[n].gradient;
+          const std::vector<float>& weight = sights[n].weight;
           // Gauss-Newton on the shift and a constant difference of brightness.
           Vector3 shift = Vector3::Zero();
           Matrix3 curvature = Matrix3::Zero();
@@ -836,10 +1077,8 @@ void Tracker::Align(double robustScale, double progressFrom)
             }
             likeness = both / std::sqrt(std::max(varSeen * varWanted, 1e-9));
             noise = squares;
-            const Matrix3 damped =
-              curvature + Matrix3::Identity() * (1e-3 * curvature.trace() + 1e-3);
             // The image moved by +shift shows what was expected: seen(x + shift) = wanted(x).
-            Vector3 change = -(damped.ldlt().solve(pull));
+            Vector3 change = -SignalCurvature(curvature, imageNoise / averaged[n]).Solve(pull);
             const double length = change.norm();
             if (length > 0.7)
             {
@@ -858,13 +1097,13 @@ void Tracker::Align(double robustScale, double progressFrom)
           if (trust > 0.0 && curvature.trace() > 0.0)
           {
             information[k][n] = trust * trust *
-              Limited(curvature * (60.0 / std::max(noise, this->NoiseFloor())),
+              Limited(SignalCurvature(curvature, imageNoise / averaged[n]).Information() *
+                  (60.0 / std::max(noise, this->NoiseFloor())),
                 std::max(VesselDeviation, 0.35 * this->Voxel));
           }
         }
       },
-      this->Part(progressFrom + 0.05 * static_cast<double>(k) / static_cast<double>(phases),
-        progressFrom + 0.05 * static_cast<double>(k + 1) / static_cast<double>(phases)));
+      part(0.5, 1.0));
   }
   Seen seen{ std::move(measured), std::move(information), robustScale };
   this->Fit(this->WithSurroundings(seen));
@@ -874,112 +1113,139 @@ void Tracker::Align(double robustScale, double progressFrom)
 std::vector<double> Tracker::MeasureCalibre() const
 {
   const std::size_t phases = this->Times.size();
-  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  const std::size_t nodes = this->Nodes.size();
   const std::size_t samples = this->Core.places.size();
-  std::vector<double> widening(phases, 0.0);
-  std::vector<double> trust(phases, 0.0);
-  for (std::size_t k = 0; k < phases; ++k)
+  // Least squares for the widening w in seen = constant + expected + w d(expected)/d(log radius), and a
+  // shift and a blur that the alignment and the smearing may have left.
+  constexpr int unknowns = 6;
+  using Row = Eigen::Matrix<double, unknowns, 1>;
+  struct Estimate
   {
-    // Least squares for the widening w in seen = constant + expected + w d(expected)/d(log radius).
-    std::vector<double> pull(nodes, 0.0);
-    std::vector<double> weight(nodes, 0.0);
-    ParallelFor(nodes, 4,
-      [&](std::int64_t first, std::int64_t last)
+    double widening = 0.0;
+    double information = 0.0;
+  };
+  std::vector<std::vector<Estimate>> estimates(phases, std::vector<Estimate>(nodes));
+  const std::vector<std::vector<int>> daughters = Daughters(this->Nodes);
+  ParallelFor(static_cast<std::int64_t>(nodes), 4,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (auto n = static_cast<int>(first); n < last; ++n)
       {
-        std::vector<Vector3> rows(samples); // seen - expected, change, weight
-        for (std::int64_t n = first; n < last; ++n)
+        const WideningField field(this->Nodes, daughters, n);
+        const Vector3& position = this->Nodes.position[n];
+        const double radius = NodeRadius(this->Nodes, n);
+        for (std::size_t k = 0; k < phases; ++k)
         {
-          if (this->Likeness[k][n] < 0.7)
+          // Where a vessel is smeared over several of its diameters nothing is left to be measured.
+          const std::vector<Vector3> smear = this->Smear(n, this->Times[k]);
+          const double smeared = (smear.back() - smear.front()).norm() / std::max(radius, 0.3);
+          if (this->Likeness[k][n] < 0.7 || smeared > 3.0)
           {
             continue;
           }
-          const Matrix3 back = this->Turn(static_cast<int>(n), this->Displacement[k]).transpose();
-          const std::vector<Vector3> smear = this->Smear(static_cast<int>(n), this->Times[k]);
-          const Vector3& tangent = this->Nodes.tangent[n];
-          const auto expected = [&](const Vector3& offset, double wider)
+          const Matrix3 back = this->Turn(n, this->Displacement[k]).transpose();
+          const Vector3 centre = position + this->Displacement[k][n];
+          // Expected at an offset from the centre, and its change by widening.
+          const auto expected = [&](const Vector3& offset, bool widening)
           {
             float sum = 0.0F;
             for (const Vector3& moved : smear)
             {
               const Vector3 rest = back * (offset - moved);
-              const Vector3 along = rest.dot(tangent) * tangent;
-              sum += this->Reference.Sample(
-                this->Nodes.position[n] + along + (rest - along) / (1.0 + wider));
+              if (!widening)
+              {
+                sum += this->Reference.Sample(position + rest);
+              }
+              else if (const Vector3 out = field.At(rest); out.squaredNorm() > 0.0)
+              {
+                constexpr double part = 0.05;
+                sum += (this->Reference.Sample(position + rest - part * out) -
+                         this->Reference.Sample(position + rest + part * out)) /
+                  static_cast<float>(2.0 * part);
+              }
             }
-            return sum / static_cast<float>(smear.size());
+            return static_cast<double>(sum / static_cast<float>(smear.size()));
           };
-          const Vector3 centre = this->Nodes.position[n] + this->Displacement[k][n];
-          const double wall = (this->Nodes.radius.empty() ? 1.5 : this->Nodes.radius[n]) + 0.8;
-          Vector3 mean = Vector3::Zero();
+          Eigen::Matrix<double, unknowns, unknowns> normal;
+          normal.setZero();
+          Row right = Row::Zero();
           double sum = 0.0;
           for (std::size_t p = 0; p < samples; ++p)
           {
             const Vector3 offset = this->Core.Offset(p);
-            const Vector3 rest = back * offset;
-            const double beside = (rest - rest.dot(tangent) * tangent).norm();
-            rows[p].setZero();
-            if (beside > wall && smear.size() == 1)
-            {
-              continue;
-            }
             const double seen = this->Volumes[k].Sample(centre + offset);
-            const double wanted = expected(offset, 0.0);
-            const double change = (expected(offset, 0.05) - expected(offset, -0.05)) / 0.1;
-            if (std::isfinite(seen + wanted + change))
+            const double wanted = expected(offset, false);
+            Row row;
+            row << expected(offset, true), 1.0, 0.0, 0.0, 0.0, -6.0 * wanted;
+            for (int axis = 0; axis < 3; ++axis)
             {
-              rows[p] = { seen - wanted, change, this->Core.weights[p] };
-              mean += rows[p][2] * rows[p];
-              sum += rows[p][2];
+              const Vector3 step = this->Core.step * Vector3::Unit(axis);
+              const double above = expected(offset + step, false);
+              const double below = expected(offset - step, false);
+              row[2 + axis] = above - below;
+              row[5] += above + below;
+            }
+            if (std::isfinite(seen + row.sum()))
+            {
+              const double weight = this->Core.weights[p];
+              normal += weight * row * row.transpose();
+              right += weight * (seen - wanted) * row;
+              sum += weight;
             }
           }
-          if (sum < 0.1)
+          if (sum < 0.3 || !(normal(0, 0) > 0.0))
           {
             continue;
           }
-          mean /= sum;
-          for (const Vector3& row : rows)
+          const auto others = normal.bottomRightCorner<unknowns - 1, unknowns - 1>();
+          const Eigen::Matrix<double, unknowns - 1, 1> share =
+            others.completeOrthogonalDecomposition().solve(normal.col(0).tail<unknowns - 1>());
+          const double information = normal(0, 0) - share.dot(normal.col(0).tail<unknowns - 1>());
+          if (information > 0.01 * normal(0, 0))
           {
-            pull[n] += row[2] * (row[0] - mean[0]) * (row[1] - mean[1]);
-            weight[n] += row[2] * (row[1] - mean[1]) * (row[1] - mean[1]);
+            const double clear = 1.0 / ((1.0 + smeared * smeared) * (1.0 + smeared * smeared));
+            estimates[k][n].widening =
+              (right[0] - share.dot(right.tail<unknowns - 1>())) / information;
+            estimates[k][n].information = clear * information;
           }
-          // Where a vessel is smeared over several of its diameters little is left to be measured.
-          const double smeared = (smear.back() - smear.front()).norm() /
-            (this->Nodes.radius.empty() ? 1.5 : std::max(this->Nodes.radius[n], 0.3));
-          const double clear = 1.0 / ((1.0 + smeared * smeared) * (1.0 + smeared * smeared));
-          pull[n] *= clear;
-          weight[n] *= clear;
         }
-      });
-    // A node alone is too noisy: the weighted median of all.
-    std::vector<std::pair<double, double>> ratios;
-    double total = 0.0;
-    for (std::int64_t n = 0; n < nodes; ++n)
-    {
-      if (weight[n] > 0.0)
-      {
-        ratios.emplace_back(pull[n] / weight[n], weight[n]);
-        total += weight[n];
       }
-    }
-    std::sort(ratios.begin(), ratios.end());
-    double sum = 0.0;
-    for (const auto& [ratio, own] : ratios)
+    });
+  // A node alone is too noisy: the weighted median of all.
+  std::vector<double> widening(phases, 0.0);
+  std::vector<double> trust(phases, 0.0);
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    std::vector<Estimate>& all = estimates[k];
+    std::sort(all.begin(), all.end(),
+      [](const Estimate& a, const Estimate& b) { return a.widening < b.widening; });
+    for (const Estimate& one : all)
     {
-      sum += own;
-      if (sum >= 0.5 * total)
+      trust[k] += one.information;
+    }
+    double sum = 0.0;
+    for (const Estimate& one : all)
+    {
+      sum += one.information;
+      if (sum >= 0.5 * trust[k])
       {
-        widening[k] = std::clamp(ratio, -0.2, 0.2);
-        trust[k] = total;
+        widening[k] = std::clamp(one.widening, -0.2, 0.2);
         break;
       }
     }
   }
-  // A pulse: two harmonics of the cycle, nothing at the reference.
-  constexpr int harmonics = 2;
+  // A pulse: three harmonics of the cycle, nothing at the reference.
+  constexpr int harmonics = 3;
   constexpr int size = 2 * harmonics;
   const Eigen::VectorXd zero = PeriodicBasis(this->ReferenceTime, harmonics).tail(size);
   const double most = *std::max_element(trust.begin(), trust.end());
-  Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(size, size) * 0.1;
+  // The m-th is expected to be 0.03 / m; the phase that is seen best has an error of about 0.003.
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
+  for (int row = 0; row < size; ++row)
+  {
+    const double harmonic = 1.0 + row / 2;
+    matrix(row, row) = 0.01 * harmonic * harmonic;
+  }
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
   for (std::size_t k = 0; k < phases && most > 0.0; ++k)
   {

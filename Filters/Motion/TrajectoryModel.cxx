@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -25,6 +27,117 @@ int Harmonic(Eigen::Index basis)
 {
   return static_cast<int>((basis + 1) / 2);
 }
+
+/// Per node: monomials up to the degree, scaled so that their products add up to the sum over d of
+/// (sd_d)^2 (x . x')^d, which no rotation changes. sd: 1, 1, 1/2, 1/4, 1/8.
+Eigen::MatrixXd Monomials(const std::vector<Vector3>& positions, int degree)
+{
+  Vector3 centre = Vector3::Zero();
+  for (const Vector3& place : positions)
+  {
+    centre += place / static_cast<double>(positions.size());
+  }
+  double radius = 1e-6;
+  for (const Vector3& place : positions)
+  {
+    radius = std::max(radius, (place - centre).norm());
+  }
+  constexpr std::array<double, 5> factorial{ 1.0, 1.0, 2.0, 6.0, 24.0 };
+  const Eigen::Index size = (degree + 1) * (degree + 2) * (degree + 3) / 6;
+  Eigen::MatrixXd result(static_cast<Eigen::Index>(positions.size()), size);
+  for (std::size_t n = 0; n < positions.size(); ++n)
+  {
+    const Vector3 x = (positions[n] - centre) / radius;
+    Eigen::Index column = 0;
+    for (int d = 0; d <= degree; ++d)
+    {
+      const double deviation = d < 2 ? 1.0 : std::pow(0.5, d - 1);
+      for (int a = 0; a <= d; ++a)
+      {
+        for (int b = 0; a + b <= d; ++b)
+        {
+          const int c = d - a - b;
+          result(static_cast<Eigen::Index>(n), column++) = deviation *
+            std::sqrt(factorial[d] / (factorial[a] * factorial[b] * factorial[c])) *
+            std::pow(x[0], a) * std::pow(x[1], b) * std::pow(x[2], c);
+        }
+      }
+    }
+  }
+  return result;
+}
+
+using Measurements = std::vector<std::vector<TrajectoryMeasurement>>;
+
+/// Per node: the common motion's coefficients, basis x 3.
+std::vector<Eigen::MatrixXd> FitCommonMotion(const LineNodes& nodes,
+  const std::vector<Eigen::VectorXd>& basis, const Measurements& measurements,
+  const TrajectoryPrior& prior)
+{
+  const Eigen::Index size = 2 * std::min(prior.harmonics, prior.commonHarmonics) + 1;
+  const Eigen::Index own = 3 * size;
+  const Eigen::MatrixXd monomials = Monomials(nodes.position, prior.commonDegree);
+  const Eigen::Index functions = monomials.cols();
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(functions * own, functions * own);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(functions * own);
+  const Matrix3 beside = Matrix3::Identity() * (prior.commonDeviation * prior.commonDeviation);
+  Eigen::MatrixXd atNode(own, own);
+  Eigen::VectorXd pull(own);
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    atNode.setZero();
+    pull.setZero();
+    for (const TrajectoryMeasurement& one : measurements[n])
+    {
+      // (L^-1 + s^2)^-1 = (1 + L s^2)^-1 L, also where L is singular.
+      const Matrix3 information =
+        (Matrix3::Identity() + one.information * beside).inverse() * one.information;
+      const Eigen::VectorXd& phi = basis[one.phase];
+      const Vector3 weighted = information * one.displacement;
+      for (Eigen::Index a = 0; a < size; ++a)
+      {
+        pull.segment<3>(3 * a) += phi[a] * weighted;
+        for (Eigen::Index b = 0; b < size; ++b)
+        {
+          atNode.block<3, 3>(3 * a, 3 * b) += phi[a] * phi[b] * information;
+        }
+      }
+    }
+    for (Eigen::Index f = 0; f < functions; ++f)
+    {
+      const double here = monomials(static_cast<Eigen::Index>(n), f);
+      right.segment(f * own, own) += here * pull;
+      for (Eigen::Index g = 0; g <= f; ++g)
+      {
+        matrix.block(f * own, g * own, own, own) +=
+          here * monomials(static_cast<Eigen::Index>(n), g) * atNode;
+      }
+    }
+  }
+  for (Eigen::Index f = 0; f < functions; ++f)
+  {
+    for (Eigen::Index b = 0; b < size; ++b)
+    {
+      const double sd = prior.amplitude / std::pow(std::max(1, Harmonic(b)), prior.decay);
+      matrix.diagonal().segment<3>(f * own + 3 * b).array() += 1.0 / (sd * sd);
+    }
+  }
+  const Eigen::VectorXd solution = matrix.selfadjointView<Eigen::Lower>().llt().solve(right);
+  std::vector<Eigen::MatrixXd> result;
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(own);
+    for (Eigen::Index f = 0; f < functions; ++f)
+    {
+      sum += monomials(static_cast<Eigen::Index>(n), f) * solution.segment(f * own, own);
+    }
+    result.emplace_back(Eigen::MatrixXd::Zero(2 * prior.harmonics + 1, 3));
+    result.back().topRows(size) =
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>(
+        sum.data(), size, 3);
+  }
+  return result;
+}
 }
 
 void TrajectoryPrior::Validate() const
@@ -34,6 +147,9 @@ void TrajectoryPrior::Validate() const
   RequireRange("decay", this->decay, 0.0, 4.0);
   RequireRange("neighbourChange", this->neighbourChange, 1e-4, 1e2);
   RequireRange("neighbourDecay", this->neighbourDecay, 0.0, 4.0);
+  RequireRange("commonDegree", this->commonDegree, 0, 4);
+  RequireRange("commonHarmonics", this->commonHarmonics, 1, 12);
+  RequireRange("commonDeviation", this->commonDeviation, 0.1, 100.0);
 }
 
 Eigen::VectorXd PeriodicBasis(double time, int harmonics)
@@ -102,6 +218,22 @@ Trajectories FitTrajectories(const LineNodes& nodes, const std::vector<double>& 
   {
     basis.push_back(PeriodicBasis(time, prior.harmonics));
   }
+  for (const std::vector<TrajectoryMeasurement>& own : measurements)
+  {
+    for (const TrajectoryMeasurement& one : own)
+    {
+      if (one.phase < 0 || one.phase >= static_cast<int>(times.size()))
+      {
+        throw std::invalid_argument(
+          "FitTrajectories: there is no phase " + std::to_string(one.phase));
+      }
+    }
+  }
+  std::vector<Eigen::MatrixXd> common;
+  if (prior.commonDegree > 0)
+  {
+    common = FitCommonMotion(nodes, basis, measurements, prior);
+  }
   const Eigen::Index size = 2 * prior.harmonics + 1;
   const Eigen::Index unknowns = 3 * size;
   // Precisions of the coefficients themselves, and of their change along one mm.
@@ -124,13 +256,13 @@ Trajectories FitTrajectories(const LineNodes& nodes, const std::vector<double>& 
     right[n].setZero(unknowns);
     for (const TrajectoryMeasurement& one : measurements[n])
     {
-      if (one.phase < 0 || one.phase >= static_cast<int>(times.size()))
-      {
-        throw std::invalid_argument(
-          "FitTrajectories: there is no phase " + std::to_string(one.phase));
-      }
       const Eigen::VectorXd& phi = basis[one.phase];
-      const Vector3 pull = one.information * one.displacement;
+      Vector3 beside = one.displacement;
+      if (!common.empty())
+      {
+        beside -= common[n].transpose() * phi;
+      }
+      const Vector3 pull = one.information * beside;
       for (Eigen::Index a = 0; a < size; ++a)
       {
         right[n].segment<3>(3 * a) += phi[a] * pull;
@@ -189,6 +321,10 @@ Trajectories FitTrajectories(const LineNodes& nodes, const std::vector<double>& 
     result.coefficients[n] =
       Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>(
         solution[n].data(), size, 3);
+    if (!common.empty())
+    {
+      result.coefficients[n] += common[n];
+    }
   }
   return result;
 }

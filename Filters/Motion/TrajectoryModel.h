@@ -2,10 +2,11 @@
  * @file TrajectoryModel.h
  * @brief Periodic trajectories of all nodes of a forest at once, from uncertain measurements.
  *
- * A Gaussian process: in time a Fourier series with shrinking harmonics, along the vessels a random
- * walk of its coefficients. The most probable trajectories and their uncertainty are exact: the tree
- * is eliminated from its tips to its root, and back (Rauch, Tung & Striebel, AIAA Journal 1965, on a
- * tree instead of a chain).
+ * A heart moves as one: first a motion that all vessels have in common, a polynomial of the place
+ * whose coefficients are Fourier series in time. What a vessel does beside it is a Gaussian process: in
+ * time a Fourier series with shrinking harmonics, along the vessels a random walk of its coefficients.
+ * Its most probable trajectories and their uncertainty are exact: the tree is eliminated from its tips
+ * to its root, and back (Rauch, Tung & Striebel, AIAA Journal 1965, on a tree instead of a chain).
  */
 #ifndef DynamicCoronary_TrajectoryModel_h
 #define DynamicCoronary_TrajectoryModel_h
@@ -21,9 +22,13 @@ struct TrajectoryPrior
   int harmonics = 6;       ///< of the cycle, 1 to 12
   double amplitude = 15.0; ///< standard deviation of the first harmonic, mm; the m-th: / m^decay
   double decay = 2.0;      ///< 0 to 4
-  double neighbourChange = 0.1; ///< of the first harmonic from node to node, mm per square root of
-                                ///< mm along the vessel; the m-th: / m^neighbourDecay
-  double neighbourDecay = 1.0;  ///< 0 to 4
+  double neighbourChange = 0.08; ///< of the first harmonic from node to node, mm per square root of
+                                 ///< mm along the vessel; the m-th: / m^neighbourDecay
+  double neighbourDecay = 1.0;   ///< 0 to 4
+
+  int commonDegree = 3;    ///< of the common motion's polynomial, 0 to 4; 0: there is none
+  int commonHarmonics = 3; ///< 1 to 12; with more, phases without images would be guessed badly
+  double commonDeviation = 2.0; ///< mm that vessels are expected beside it, 0.1 to 100
 
   /// @throws std::invalid_argument naming the setting.
   void Validate() const;

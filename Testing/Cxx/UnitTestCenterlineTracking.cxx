@@ -166,6 +166,7 @@ TEST(Trajectories, AreTheDenseSolution)
   ASSERT_EQ(nodes.size(), 5u);
   TrajectoryPrior prior;
   prior.harmonics = 2;
+  prior.commonDegree = 0;
   const std::vector<double> times = { 0.1, 0.35, 0.8 };
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
@@ -256,6 +257,54 @@ TEST(Trajectories, SayHowLittleIsKnownOfAGap)
   const Trajectories result = FitTrajectories(nodes, times, measurements);
   EXPECT_GT(result.Deviation(10, 0.5), 2.0 * result.Deviation(1, 0.5));
   EXPECT_LT((result.Displacement(10, 0.5) - Vector3(1.0, 0.0, 0.0)).norm(), 0.02);
+}
+
+TEST(Trajectories, TakeFromOtherVesselsWhatTheirOwnDoesNotShow)
+{
+  // The heart shortens along x. A vessel along x is seen across its way only; another tree, farther along
+  // x, lies across and shows how much.
+  MovingLines lines;
+  for (int n = 0; n <= 10; ++n)
+  {
+    lines.rest.emplace_back(4.0 * n, 0.0, 0.0);
+  }
+  for (int n = 0; n <= 10; ++n)
+  {
+    lines.rest.emplace_back(40.0, 5.0 + 4.0 * n, 3.0);
+  }
+  lines.lines = { { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10 },
+    { 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 } };
+  const LineNodes nodes = PlaceNodes(lines, 4.0);
+  const auto motion = [](const Vector3& rest, double t)
+  { return Vector3(-0.1 * rest[0] * 0.5 * (1.0 - std::cos(2.0 * Pi * t)), 0.0, 0.0); };
+  const std::vector<double> times = { 0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875 };
+  std::vector<std::vector<TrajectoryMeasurement>> measurements(nodes.size());
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    // The root of the vessel along x is seen in all directions.
+    const Vector3& rest = nodes.position[n];
+    const Vector3 seen(rest[1] == 0.0 && rest[0] > 0.0 ? 0 : 1, rest[1] > 0.0 ? 0 : 1, 1);
+    for (std::size_t k = 0; k < times.size(); ++k)
+    {
+      measurements[n].push_back(
+        { static_cast<int>(k), motion(rest, times[k]), Matrix3(100.0 * seen.asDiagonal()) });
+    }
+  }
+  TrajectoryPrior alone;
+  alone.commonDegree = 0;
+  const Trajectories with = FitTrajectories(nodes, times, measurements);
+  const Trajectories without = FitTrajectories(nodes, times, measurements, alone);
+  int tips = 0;
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    if ((nodes.position[n] - Vector3(40.0, 0.0, 0.0)).norm() < 1e-9)
+    {
+      ++tips;
+      EXPECT_NEAR(with.Displacement(static_cast<int>(n), 0.5)[0], -4.0, 1.0);
+      EXPECT_GT(without.Displacement(static_cast<int>(n), 0.5)[0], -1.0);
+    }
+  }
+  EXPECT_EQ(tips, 1);
 }
 
 TEST(Trajectories, RefuseWhatIsWrong)

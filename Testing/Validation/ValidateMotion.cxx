@@ -85,14 +85,25 @@ struct Errors
   }
 };
 
+/// Of one branch at one phase: found over true.
+struct BranchVolume
+{
+  std::string segment;
+  double time = 0.0;
+  double volume = 1.0;
+  double length = 1.0;
+  double calibre = 1.0;
+  double stretch = 1.0; ///< true length over that at the reference
+};
+
 struct Outcome
 {
-  std::string failure;
   Errors between;  ///< distance to the true axis, phases not tracked, mm
   Errors tracked;  ///< the same at the phases tracked
   Errors material; ///< distance to where the same material is, phases not tracked
   Errors materialTracked;
   Errors volume; ///< of branches, relative, all phases
+  std::vector<BranchVolume> branchVolumes;
   std::map<std::string, Errors> bySegment;
   std::vector<double> byPhase; ///< mean, all phases
   std::vector<double> trackedShare;
@@ -299,19 +310,27 @@ Outcome Run(const Case& test)
       double length = 0.0;
       double found = 0.0;
       double right = 0.0;
+      double lengthFound = 0.0;
+      double lengthRight = 0.0;
       for (std::size_t n = 0; n + 1 < line.size(); ++n)
       {
         const std::int64_t p = line[n];
         const std::int64_t q = line[n + 1];
         const double area = lines.radius[p] * lines.radius[p] + lines.radius[q] * lines.radius[q];
         length += (lines.rest[q] - lines.rest[p]).norm();
-        found += area * calibre * calibre * (points[q] - points[p]).norm();
-        right += area * widening * widening *
+        const double carried = (points[q] - points[p]).norm();
+        const double truly =
           (phantom.Position(material[q], all[k]) - phantom.Position(material[p], all[k])).norm();
+        lengthFound += carried;
+        lengthRight += truly;
+        found += area * calibre * calibre * carried;
+        right += area * widening * widening * truly;
       }
       if (length >= LeastLength && lines.radius[line[line.size() / 2]] >= LeastRadius)
       {
         outcome.volume.Add(std::abs(found / right - 1.0));
+        outcome.branchVolumes.push_back({ name[line[line.size() / 2]], all[k], found / right,
+          lengthFound / lengthRight, calibre / widening, lengthRight / length });
       }
     }
     if (isTracked)
@@ -447,6 +466,16 @@ int main(int argc, char** argv)
         for (const std::array<int, 2>& bin : o.byConfidence)
         {
           std::printf(" %.3f of %d,", bin[1] / std::max(1.0, 1.0 * bin[0]), bin[0]);
+        }
+        std::printf("\nvolumes that are off most:");
+        std::sort(o.branchVolumes.begin(), o.branchVolumes.end(),
+          [](const BranchVolume& a, const BranchVolume& b)
+          { return std::abs(a.volume - 1.0) > std::abs(b.volume - 1.0); });
+        for (std::size_t n = 0; n < std::min<std::size_t>(o.branchVolumes.size(), 8); ++n)
+        {
+          const BranchVolume& own = o.branchVolumes[n];
+          std::printf(" %s at %.3f %.3f (length %.3f of %.3f, calibre %.3f),", own.segment.c_str(),
+            own.time, own.volume, own.length, own.stretch, own.calibre);
         }
         std::printf("\nmaterial by segment:");
         for (auto& [segment, errors] : o.bySegment)
