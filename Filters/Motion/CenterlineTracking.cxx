@@ -275,7 +275,7 @@ public:
     struct Step
     {
       Vector3 start;
-      Vector3 way;
+      Vector3 end;
       double radius;
       double wider;
     };
@@ -294,8 +294,8 @@ public:
           return;
         }
         const double wide = NodeRadius(nodes, upper);
-        steps.push_back({ nodes.position[upper] - centre,
-          nodes.position[lower] - nodes.position[upper], wide, NodeRadius(nodes, lower) - wide });
+        steps.push_back({ nodes.position[upper] - centre, nodes.position[lower] - centre, wide,
+          NodeRadius(nodes, lower) - wide });
         if ((nodes.position[next] - centre).norm() < 2.0 * Reach)
         {
           open.emplace_back(next, at);
@@ -320,15 +320,13 @@ public:
           Vector3 out = Vector3::Zero();
           for (const Step& step : steps)
           {
-            const double along = std::clamp(
-              (place - step.start).dot(step.way) / std::max(step.way.squaredNorm(), 1e-12), 0.0,
-              1.0);
-            const Vector3 across = place - step.start - along * step.way;
-            const double fromWall = across.norm() - step.radius - along * step.wider;
+            const SegmentPlace near = NearestOnSegment(place, step.start, step.end);
+            const double fromWall =
+              std::sqrt(near.squaredDistance) - step.radius - near.fraction * step.wider;
             if (fromWall < least)
             {
               least = fromWall;
-              out = across;
+              out = place - near.position;
             }
           }
           const double share = std::clamp((Beyond - least) / (Beyond - Within), 0.0, 1.0);
@@ -756,19 +754,15 @@ std::vector<std::vector<float>> Tracker::WithoutVessels(const Patch& patch, doub
         {
           const int parent = this->Nodes.parent[other];
           const Vector3& a = this->Nodes.position[other];
-          const Vector3 way = (parent >= 0 ? this->Nodes.position[parent] : a) - a;
-          const double wall =
-            (this->Nodes.radius.empty() ? 1.5 : this->Nodes.radius[other]) + margin;
-          if ((a - centre).norm() > reach + wall + way.norm())
+          const Vector3& b = this->Nodes.position[parent >= 0 ? parent : other];
+          const double wall = NodeRadius(this->Nodes, static_cast<int>(other)) + margin;
+          if ((a - centre).norm() > reach + wall + (b - a).norm())
           {
             continue;
           }
           for (std::size_t p = 0; p < patch.places.size(); ++p)
           {
-            const Vector3 from = centre + patch.Offset(p) - a;
-            const double at =
-              std::clamp(from.dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
-            if ((from - at * way).squaredNorm() < wall * wall)
+            if (NearestOnSegment(centre + patch.Offset(p), a, b).squaredDistance < wall * wall)
             {
               weights[n][p] = 0.0F;
             }

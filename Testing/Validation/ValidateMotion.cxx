@@ -150,10 +150,8 @@ double DistanceToAxis(const PhantomTree& tree, const Vector3& point)
     for (std::size_t n = 0; n + 1 < branch.points.size(); ++n)
     {
       const Vector3& a = tree.points[branch.points[n]];
-      const Vector3 way = tree.points[branch.points[n + 1]] - a;
-      const double at =
-        std::clamp((point - a).dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
-      least = std::min(least, (a + at * way - point).squaredNorm());
+      const Vector3& b = tree.points[branch.points[n + 1]];
+      least = std::min(least, NearestOnSegment(point, a, b).squaredDistance);
     }
   }
   return std::sqrt(least);
