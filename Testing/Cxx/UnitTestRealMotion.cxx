@@ -1,13 +1,12 @@
 // A real heart: lines carried on its epicardial surface, every other frame held out, frames lost.
+#include "MeasuredHeart.h"
 #include "MotionRegularization.h"
 #include "PhaseInterpolation.h"
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <limits>
 #include <queue>
 #include <random>
@@ -22,7 +21,7 @@ using coronary::Vector3;
 
 namespace
 {
-constexpr int Frames = 25;
+constexpr int Frames = coronary::MeasuredFrames;
 
 struct Surface
 {
@@ -30,38 +29,24 @@ struct Surface
   std::vector<std::vector<int>> neighbours;
 };
 
-/// Points and edges of a legacy VTK file of version 5 with triangles, ASCII.
 bool Read(int frame, Surface& surface)
 {
-  char name[64];
-  std::snprintf(name, sizeof name, "/biv-motion/patient1_EPICARDIAL_%03d.vtk", frame);
-  std::ifstream file(std::string(DYNAMICCORONARY_DATA_DIR) + name);
-  std::string word;
-  while (file >> word && word != "POINTS")
-  {
-  }
-  std::size_t count = 0;
-  if (!(file >> count >> word))
+  coronary::HeartSurface heart;
+  if (!coronary::ReadHeartSurface(
+        DYNAMICCORONARY_DATA_DIR "/biv-motion", "EPICARDIAL", frame, heart))
   {
     return false;
   }
-  surface.points.resize(count);
-  for (Vector3& point : surface.points)
-  {
-    file >> point.x() >> point.y() >> point.z();
-  }
-  while (file >> word && word != "CONNECTIVITY")
-  {
-  }
-  file >> word;
-  surface.neighbours.resize(count);
-  std::array<int, 3> corner{};
-  while (file >> corner[0] >> corner[1] >> corner[2])
+  surface.points = std::move(heart.points);
+  surface.neighbours.resize(surface.points.size());
+  for (const coronary::Triangle& corner : heart.triangles)
   {
     for (int n = 0; n < 3; ++n)
     {
-      surface.neighbours[corner[n]].push_back(corner[(n + 1) % 3]);
-      surface.neighbours[corner[(n + 1) % 3]].push_back(corner[n]);
+      const auto a = static_cast<int>(corner[n]);
+      const auto b = static_cast<int>(corner[(n + 1) % 3]);
+      surface.neighbours[a].push_back(b);
+      surface.neighbours[b].push_back(a);
     }
   }
   return true;
