@@ -2,6 +2,7 @@
 // lines; and the tracking of a tube whose motion is known.
 
 #include "CenterlineTracking.h"
+#include "CoronaryPhantom.h"
 #include "DisplacementLabels.h"
 #include "LineNodes.h"
 #include "Refusals.h"
@@ -11,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -619,6 +621,101 @@ TEST(CenterlineTracking, FollowsImagesOfVesselsAlone)
     }
     EXPECT_LT(mean, 0.3) << "phase " << k;
     EXPECT_GT(report.trackedShare[k], 0.8);
+  }
+}
+
+namespace
+{
+double DistanceToAxes(const PhantomTree& tree, const Vector3& place)
+{
+  double least = std::numeric_limits<double>::infinity();
+  for (const PhantomBranch& branch : tree.branches)
+  {
+    for (std::size_t n = 0; n + 1 < branch.points.size(); ++n)
+    {
+      least = std::min(least,
+        NearestOnSegment(place, tree.points[branch.points[n]], tree.points[branch.points[n + 1]])
+          .squaredDistance);
+    }
+  }
+  return std::sqrt(least);
+}
+
+/// How many of the places, given as they were found, are nearer to the vein than to the arteries.
+int AtTheVein(
+  const PhantomTree& arteries, const PhantomTree& vein, const std::vector<Vector3>& found)
+{
+  return static_cast<int>(std::count_if(found.begin(), found.end(),
+    [&](const Vector3& place)
+    { return DistanceToAxes(arteries, place) >= DistanceToAxes(vein, place); }));
+}
+}
+
+TEST(CenterlineTracking, DoesNotJumpToAVein)
+{
+  // The great cardiac vein runs beside the anterior descending and the circumflex artery; here it is as bright as
+  // they are, so that brightness does not tell them apart.
+  PhantomSettings anatomy;
+  anatomy.veinHU = 400.0;
+  const CoronaryPhantom phantom(anatomy);
+  const double reference = 0.75;
+  const PhantomTree rest = phantom.Tree(reference);
+  const PhantomTree veinAtRest = phantom.Vein(reference);
+  MovingLines lines;
+  lines.rest = rest.points;
+  lines.radius = rest.radius;
+  for (const PhantomBranch& branch : rest.branches)
+  {
+    lines.lines.push_back(branch.points);
+  }
+  // Beside the vein: nearer than the search reaches, and not where the two cross.
+  std::vector<std::size_t> beside;
+  for (std::size_t n = 0; n < rest.points.size(); ++n)
+  {
+    const double apart = DistanceToAxes(veinAtRest, rest.points[n]);
+    if (apart > 1.5 && apart < 8.0)
+    {
+      beside.push_back(n);
+    }
+  }
+  ASSERT_GT(beside.size(), 300u);
+  const ImageGrid grid = phantom.DefaultGrid(1.0, 6.0);
+  std::vector<std::int16_t> voxels;
+  const auto imageAt = [&](double time)
+  {
+    ScalarImage image;
+    image.grid = grid;
+    voxels.resize(static_cast<std::size_t>(image.NumberOfVoxels()));
+    phantom.Render(grid, grid.extent, time, voxels.data());
+    image.values = static_cast<const std::int16_t*>(voxels.data());
+    return image;
+  };
+  CenterlineTrackingSettings settings;
+  settings.nodeSpacing = 4.0;
+  const std::vector<double> times = { 0.05, 0.2, 0.35, 0.5, 0.75 };
+  const PoseSequence poses = TrackCenterlines(lines, reference, times, imageAt, settings);
+  for (std::size_t k = 0; k < times.size(); ++k)
+  {
+    const PhantomTree arteries = phantom.Tree(times[k]);
+    const PhantomTree vein = phantom.Vein(times[k]);
+    std::vector<Vector3> found;
+    std::vector<Vector3> jumped;
+    for (const std::size_t n : beside)
+    {
+      found.push_back(poses.points[k][n]);
+      const Vector3* nearest = &vein.points.front();
+      for (const Vector3& place : vein.points)
+      {
+        if ((place - arteries.points[n]).norm() < (*nearest - arteries.points[n]).norm())
+        {
+          nearest = &place;
+        }
+      }
+      jumped.push_back(*nearest);
+    }
+    EXPECT_EQ(AtTheVein(arteries, vein, found), 0) << "at " << times[k];
+    // The same count of places that did jump.
+    EXPECT_GT(AtTheVein(arteries, vein, jumped), static_cast<int>(0.9 * beside.size()));
   }
 }
 
