@@ -129,8 +129,8 @@ public:
 
   ///@{
   /**
-   * E of Eq. 12, MPa. Default 1.55: healthy human coronary arteries under axial tension (Karimi et al., Mater Sci
-   * Eng C 2013;33:2550).
+   * E of Eq. 12, MPa. Default 1.55, a nominal value of the order of tensile tests of human coronary arteries (Karimi
+   * et al., Mater Sci Eng C 2013;33:2550), to be set by who needs stress. Only AxialStress depends on it.
    */
   vtkSetMacro(YoungsModulus, double);
   vtkGetMacro(YoungsModulus, double);
