@@ -2,7 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <sstream>
 
 namespace coronary
@@ -130,5 +133,77 @@ std::string MeshSequenceCsv(const MeshSequenceReport& report)
          << '\n';
   }
   return text.str();
+}
+
+std::vector<std::string> MeshSequenceFiles(const std::string& path)
+{
+  const std::filesystem::path file(path);
+  const std::string stem = file.stem().string();
+  std::vector<std::string> names;
+  std::ifstream stream(path, std::ios::binary);
+  const Json json = Json::parse(stream, nullptr, false);
+  const auto object = [](const Json& parent, const char* name) -> Json
+  {
+    const auto found = parent.is_object() ? parent.find(name) : parent.end();
+    return parent.is_object() && found != parent.end() ? *found : Json();
+  };
+  const auto each = [](const Json& list, const auto& use)
+  {
+    for (const auto& [kind, name] : list.items())
+    {
+      if (name.is_string())
+      {
+        use(kind, name.template get<std::string>());
+      }
+    }
+  };
+  std::vector<std::string> faces;
+  for (const Json& face : object(json, "faces"))
+  {
+    const Json name = object(face, "name");
+    if (name.is_string())
+    {
+      faces.push_back(name.get<std::string>());
+    }
+  }
+  for (const Json& phase : object(json, "phases"))
+  {
+    each(object(phase, "files"),
+      [&](const std::string& kind, const std::string& name)
+      {
+        if (kind != "simvascular")
+        {
+          names.push_back(name);
+          return;
+        }
+        for (const char* part :
+          { "/mesh-complete.mesh.vtu", "/mesh-complete.exterior.vtp", "/walls_combined.vtp" })
+        {
+          names.push_back(name + part);
+        }
+        for (const std::string& face : faces)
+        {
+          names.push_back(name + "/mesh-surfaces/" + face + ".vtp");
+        }
+      });
+  }
+  each(object(json, "files"),
+    [&](const std::string& kind, const std::string& name)
+    {
+      names.push_back(name);
+      const std::filesystem::path list(name);
+      if (list.extension() == ".pvd")
+      {
+        names.push_back(list.stem().string() + (kind == "surface" ? ".vtp" : ".vtu") + ".series");
+      }
+    });
+  names.erase(std::remove_if(names.begin(), names.end(),
+                [&](const std::string& name) { return name.rfind(stem + "_", 0) != 0; }),
+    names.end());
+  if (!names.empty())
+  {
+    names.push_back(file.filename().string());
+  }
+  return names;
 }
 }

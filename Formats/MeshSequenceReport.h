@@ -45,6 +45,12 @@ std::string MeshSequenceJson(const MeshSequenceReport& report);
 
 /// One line a phase; ids are separated by spaces.
 std::string MeshSequenceCsv(const MeshSequenceReport& report);
+
+/**
+ * The files that a report in JSON stands for, itself the last, relative to its folder; none when it is not
+ * there, or no such report. Names that do not begin with the report's own are left out.
+ */
+std::vector<std::string> MeshSequenceFiles(const std::string& path);
 }
 
 #endif

@@ -1,5 +1,6 @@
 #include "StagedFolder.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -128,6 +129,38 @@ void StagedFolder::Commit()
   }
   fs::remove_all(staging, error);
   this->Staging.clear();
+  for (const std::string& name : this->Older)
+  {
+    if (std::find(this->Names.begin(), this->Names.end(), name) != this->Names.end())
+    {
+      continue;
+    }
+    const fs::path old = folder / name;
+    if (fs::is_regular_file(fs::symlink_status(old, error)))
+    {
+      fs::remove(old, error);
+      for (fs::path below = fs::path(name).parent_path(); !below.empty();
+           below = below.parent_path())
+      {
+        if (!fs::remove(folder / below, error))
+        {
+          break;
+        }
+      }
+    }
+  }
+}
+
+void StagedFolder::TakePlaceOf(const std::vector<std::string>& names)
+{
+  for (const std::string& name : names)
+  {
+    const fs::path path = fs::path(name).lexically_normal();
+    if (path.is_relative() && !path.empty() && *path.begin() != "..")
+    {
+      this->Older.push_back(path.string());
+    }
+  }
 }
 
 std::string StagedFolder::Translate(const std::string& message) const

@@ -40,6 +40,12 @@ public:
    */
   void Commit();
 
+  /**
+   * Files of an older set that this one takes the place of: Commit() removes those that it does not replace, and the
+   * folders that are empty then. Only plain files below the folder are removed, whatever the names say.
+   */
+  void TakePlaceOf(const std::vector<std::string>& names);
+
   /// A message about a staged file, with the name that the user knows.
   std::string Translate(const std::string& message) const;
 
@@ -47,6 +53,7 @@ private:
   std::string Folder;
   std::string Staging; ///< empty once committed
   std::vector<std::string> Names;
+  std::vector<std::string> Older;
   std::vector<std::string> Created; ///< folders to remove again, outermost first
 };
 }

@@ -1136,6 +1136,7 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
     files->Write(files->Name + "_quality.csv", coronary::MeshSequenceCsv(result));
     result.files.emplace_back("quality", files->Name + "_quality.csv");
     files->Write(files->Name + ".json", coronary::MeshSequenceJson(result));
+    files->GetFolder().TakePlaceOf(coronary::MeshSequenceFiles(this->FileName));
     request.Restore();
     coronary::Report(report, 1.0);
     files->GetFolder().Commit();

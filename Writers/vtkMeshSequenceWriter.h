@@ -28,7 +28,8 @@
  * `GreatestRadiusEdgeRatio`, `TotalVolume`, `SurfaceArea`. A mesh whose tetrahedra are nearly all inside out at the
  * first phase has another order of corners, and is turned over at all phases.
  *
- * All files appear together when the last one is whole; older ones stay until then.
+ * All files appear together when the last one is whole; older ones stay until then. Then those that an older
+ * NAME.json stands for are gone: nothing of a longer sequence stays among the new one.
  *
  * @par Failure:
  * Other points or cells at one phase, cells of other kinds, a position that is not finite, a boundary that is not

@@ -3,6 +3,7 @@
 #include "AtomicFile.h"
 #include "FileSeries.h"
 #include "Interruption.h"
+#include "MeshSequenceReport.h"
 #include "MetaImageWriter.h"
 #include "OptionChecks.h"
 #include "ParallelFor.h"
@@ -10,6 +11,7 @@
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
+#include "vtkMovingMesh.h"
 
 #include "vtkBiharmonicSkinWeights.h"
 #include "vtkCardiacPhaseInterpolator.h"
@@ -20,18 +22,19 @@
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryTreeTopology.h"
 #include "vtkDataArray.h"
-#include "vtkDataSetSurfaceFilter.h"
 #include "vtkFastMarchingCenterline.h"
 #include "vtkFieldData.h"
 #include "vtkFrangiVesselness.h"
 #include "vtkFrenetSweepSurface.h"
 #include "vtkGatedImageReader.h"
 #include "vtkImageData.h"
+#include "vtkMeshSequenceWriter.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkReferencePhase.h"
 #include "vtkSkinDeformation.h"
 #include "vtkStringArray.h"
+#include "vtkTable.h"
 #include "vtkTetrahedralMesher.h"
 #include "vtkUnstructuredGrid.h"
 #include "vtkVesselSegmentation.h"
@@ -42,6 +45,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -108,9 +112,10 @@ struct RunJob
 
   void Declare(CLI::App& app);
   void Run();
-  nlohmann::ordered_json WriteMotion(vtkCenterlineTracker* tracker, vtkAlgorithm* mesh,
-    vtkAlgorithm* skeleton, const std::vector<double>& times, StagedFolder& folder,
-    vtkMessageTrap& messages, const std::function<void(double)>& progress);
+  nlohmann::ordered_json WriteMotion(vtkCenterlineTracker* tracker, MovingMesh& moving,
+    const std::vector<double>& times, StagedFolder& folder, vtkMessageTrap& messages,
+    const std::function<void(double)>& progress);
+  void TakePlaceOfOlderMotion(StagedFolder& folder) const;
 };
 
 void RunJob::Declare(CLI::App& app)
@@ -271,7 +276,7 @@ void RunJob::Declare(CLI::App& app)
   app
     .add_option("--interpolation", this->interpolation,
       "Between the tracked phases: linear, cubic or low-noise")
-    ->check(CLI::IsMember({ "linear", "cubic", "low-noise" }))
+    ->check(CLI::IsMember(InterpolationModes()))
     ->capture_default_str()
     ->group(motion);
   app
@@ -393,66 +398,94 @@ std::string StatusTable(const nlohmann::ordered_json& trees)
   return table;
 }
 
-nlohmann::ordered_json RunJob::WriteMotion(vtkCenterlineTracker* tracker, vtkAlgorithm* mesh,
-  vtkAlgorithm* skeleton, const std::vector<double>& times, StagedFolder& folder,
-  vtkMessageTrap& messages, const std::function<void(double)>& progress)
+/// The lines or the skeleton at every moment, and their list.
+std::string WriteMovingLines(vtkAlgorithm* lines, const std::string& stem,
+  const std::vector<double>& times, StagedFolder& folder, vtkMessageTrap& messages)
 {
-  const auto mode = this->interpolation == "linear" ? vtkCardiacPhaseInterpolator::Linear
-    : this->interpolation == "cubic"                ? vtkCardiacPhaseInterpolator::PeriodicCubic
-                                                    : vtkCardiacPhaseInterpolator::LowNoise;
+  std::vector<TimedFile> files;
+  for (std::size_t n = 0; n < times.size(); ++n)
+  {
+    std::array<char, 16> number;
+    std::snprintf(number.data(), number.size(), "_%03d", static_cast<int>(n));
+    files.push_back({ stem + number.data() + ".vtp", times[n] });
+    UpdateAtTime(lines, 0, times[n], messages, [](double) {});
+    WritePolyData(folder.Add("motion/" + files.back().path),
+      vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), messages);
+  }
+  std::string list = "motion/" + stem + ".vtp.series";
+  WriteFileAtomically(folder.Add(list), FileSeriesText(files));
+  return list;
+}
+
+void RunJob::TakePlaceOfOlderMotion(StagedFolder& folder) const
+{
+  std::vector<std::string> older = MeshSequenceFiles(this->output + "/motion/mesh.json");
+  for (const char* stem : { "centerline", "skeleton" })
+  {
+    const std::string list = this->output + "/motion/" + stem + ".vtp.series";
+    try
+    {
+      for (const TimedFile& file : ReadFileSeries(list))
+      {
+        const std::string name = std::filesystem::path(file.path).filename().string();
+        if (name.rfind(std::string(stem) + "_", 0) == 0)
+        {
+          older.push_back(name);
+        }
+      }
+    }
+    catch (const std::runtime_error&)
+    {
+      // There is none.
+    }
+  }
+  for (std::string& name : older)
+  {
+    name.insert(0, "motion/");
+  }
+  folder.TakePlaceOf(older);
+}
+
+nlohmann::ordered_json RunJob::WriteMotion(vtkCenterlineTracker* tracker, MovingMesh& moving,
+  const std::vector<double>& times, StagedFolder& folder, vtkMessageTrap& messages,
+  const std::function<void(double)>& progress)
+{
+  const int mode = InterpolationMode(this->interpolation);
   vtkNew<vtkCardiacPhaseInterpolator> lines;
-  vtkNew<vtkCardiacPhaseInterpolator> poses;
   lines->SetInputConnection(tracker->GetOutputPort(0));
-  poses->SetInputConnection(tracker->GetOutputPort(1));
   lines->SetMode(mode);
-  poses->SetMode(mode);
-  vtkNew<vtkSkinDeformation> deformation;
-  deformation->SetInputConnection(mesh->GetOutputPort());
-  deformation->SetRestConnection(skeleton->GetOutputPort());
-  deformation->SetPoseConnection(poses->GetOutputPort());
-  vtkNew<vtkDataSetSurfaceFilter> wall;
-  wall->SetInputConnection(deformation->GetOutputPort());
+  moving.Interpolator->SetInputConnection(tracker->GetOutputPort(1));
+  moving.Interpolator->SetMode(mode);
 
   // The images are read now.
   UpdateAtTime(
     tracker, 0, times.front(), messages, [&](double fraction) { progress(0.8 * fraction); });
-  const std::vector<std::string> stems = { "centerline", "skeleton", "volume", "surface" };
-  const std::vector<std::string> ends = { ".vtp", ".vtp", ".vtu", ".vtp" };
-  std::vector<std::vector<TimedFile>> written(stems.size());
-  nlohmann::ordered_json inverted = nlohmann::ordered_json::array();
-  for (std::size_t n = 0; n < times.size(); ++n)
-  {
-    std::vector<std::string> files;
-    for (std::size_t what = 0; what < stems.size(); ++what)
-    {
-      std::array<char, 16> number;
-      std::snprintf(number.data(), number.size(), "_%03d", static_cast<int>(n));
-      written[what].push_back({ stems[what] + number.data() + ends[what], times[n] });
-      files.push_back(folder.Add("motion/" + written[what].back().path));
-    }
-    const auto nothing = [](double) {};
-    UpdateAtTime(lines, 0, times[n], messages, nothing);
-    WritePolyData(files[0], vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), messages);
-    UpdateAtTime(poses, 0, times[n], messages, nothing);
-    WritePolyData(files[1], vtkPolyData::SafeDownCast(poses->GetOutputDataObject(0)), messages);
-    UpdateAtTime(deformation, 0, times[n], messages, nothing);
-    auto* moved = vtkUnstructuredGrid::SafeDownCast(deformation->GetOutputDataObject(0));
-    WriteUnstructuredGrid(files[2], moved, messages);
-    vtkDataArray* left = moved->GetFieldData()->GetArray(vtkCoronaryArrayNames::InvertedTetrahedra);
-    inverted.push_back(left != nullptr ? left->GetNumberOfTuples() : 0);
-    UpdateAtTime(wall, 0, times[n], messages, nothing);
-    WritePolyData(files[3], wall->GetOutput(), messages);
-    progress(0.8 + 0.2 * static_cast<double>(n + 1) / static_cast<double>(times.size()));
-  }
   nlohmann::ordered_json lists;
-  for (std::size_t what = 0; what < stems.size(); ++what)
+  lists["centerline"] = WriteMovingLines(lines, "centerline", times, folder, messages);
+  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, folder, messages);
+  const std::string name = "motion/mesh.json";
+  const std::string path = folder.Add(name);
+  moving.Write(path, times, messages, [&](double fraction) { progress(0.8 + 0.2 * fraction); });
+  for (const std::string& file : MeshSequenceFiles(path))
   {
-    const std::string name = "motion/" + stems[what] + ends[what] + ".series";
-    WriteFileAtomically(folder.Add(name), FileSeriesText(written[what]));
-    lists[stems[what]] = name;
+    if ("motion/" + file != name)
+    {
+      folder.Add("motion/" + file);
+    }
   }
+  lists["volume"] = "motion/mesh_volume.vtu.series";
+  lists["surface"] = "motion/mesh_surface.vtp.series";
+  this->TakePlaceOfOlderMotion(folder);
+
   vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
-  return { { "series", lists }, { "times", times },
+  nlohmann::ordered_json inverted = nlohmann::ordered_json::array();
+  vtkTable* quality = moving.Writer->GetQuality();
+  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
+  {
+    inverted.push_back(
+      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
+  }
+  return { { "series", lists }, { "quality", name }, { "times", times },
     { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
     { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
     { "inverted_tetrahedra", inverted } };
@@ -498,6 +531,12 @@ void RunJob::Run()
   }
   reader->UpdateInformation();
   messages.ThrowIfError();
+  if (this->until >= Stage::Motion && reader->GetNumberOfPhases() < (this->evenPhases ? 3 : 2))
+  {
+    throw std::runtime_error("'" + this->paths.front() + "' has " +
+      (reader->GetNumberOfPhases() < 2 ? "one phase only" : "two phases, of which one is tracked") +
+      ": there is no motion to track.");
+  }
   nlohmann::ordered_json report;
   int phase = 0;
   double phaseTime = 0.0;
@@ -755,9 +794,15 @@ void RunJob::Run()
                 {
                   times = this->moments;
                   std::sort(times.begin(), times.end());
+                  times.erase(std::unique(times.begin(), times.end()), times.end());
                 }
-                report["motion"] = this->WriteMotion(tracker, weights, skeleton, times, folder,
-                  messages, [&](double fraction) { progress.Update(fraction); });
+                MovingMesh moving;
+                moving.Deformation->SetInputConnection(weights->GetOutputPort());
+                moving.Deformation->SetRestConnection(skeleton->GetOutputPort());
+                moving.Writer->SetInputData(1, mesher->GetBoundary());
+                moving.Writer->SetInputData(2, sweep->GetCaps());
+                report["motion"] = this->WriteMotion(tracker, moving, times, folder, messages,
+                  [&](double fraction) { progress.Update(fraction); });
                 summary += "; " + std::to_string(times.size()) + " moments";
               }
             }

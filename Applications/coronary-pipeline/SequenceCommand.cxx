@@ -1,16 +1,14 @@
 #include "Command.h"
 
-#include "Interruption.h"
 #include "OptionChecks.h"
 #include "ParallelFor.h"
 #include "ProgressDisplay.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
+#include "vtkMovingMesh.h"
 #include "vtkTimedPolyData.h"
 
-#include "vtkCallbackCommand.h"
 #include "vtkCardiacPhaseInterpolator.h"
-#include "vtkCommand.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkDataArray.h"
 #include "vtkMeshSequenceWriter.h"
@@ -37,11 +35,6 @@ namespace
 {
 namespace fs = std::filesystem;
 
-const std::map<std::string, int> Modes = {
-  { "linear", vtkCardiacPhaseInterpolator::Linear },
-  { "cubic", vtkCardiacPhaseInterpolator::PeriodicCubic },
-  { "low-noise", vtkCardiacPhaseInterpolator::LowNoise },
-};
 const std::map<std::string, int> Blends = {
   { "linear", vtkSkinDeformation::LinearBlend },
   { "dual-quaternion", vtkSkinDeformation::DualQuaternion },
@@ -107,7 +100,7 @@ void SequenceJob::Declare(CLI::App& app)
   app
     .add_option("--mode", this->mode,
       "Interpolation between the poses: linear, cubic (periodic) or low-noise")
-    ->check(CLI::IsMember({ "linear", "cubic", "low-noise" }))
+    ->check(CLI::IsMember(InterpolationModes()))
     ->type_name("MODE")
     ->capture_default_str()
     ->group(motion);
@@ -222,24 +215,6 @@ std::vector<double> SequenceJob::PhaseTimes(const std::vector<double>& ofPoses) 
   return sorted;
 }
 
-/// The deformation takes velocities between the time steps around a moment: these are close to it, and on
-/// both sides of the first and of the last one too.
-void OfferMomentsAround(const std::vector<double>& times, vtkCardiacPhaseInterpolator* interpolator)
-{
-  double step = 0.002;
-  for (std::size_t k = 1; k < times.size(); ++k)
-  {
-    step = std::min(step, 0.25 * (times[k] - times[k - 1]));
-  }
-  interpolator->SetSteps(vtkCardiacPhaseInterpolator::ListedSteps);
-  for (const double time : times)
-  {
-    interpolator->AddStep(time - step);
-    interpolator->AddStep(time);
-    interpolator->AddStep(time + step);
-  }
-}
-
 void SequenceJob::Choose(vtkMeshSequenceWriter* writer) const
 {
   const auto wanted = [&](const char* format)
@@ -309,70 +284,38 @@ void SequenceJob::Run() const
     throw UsageError(
       "--velocity: the poses do not say how long a cycle takes, --cycle-ms is needed");
   }
-  vtkNew<vtkCardiacPhaseInterpolator> interpolator;
-  interpolator->SetInputConnection(source->GetOutputPort());
-  interpolator->SetMode(Modes.at(this->mode));
-  const std::vector<double> phaseTimes = this->PhaseTimes(source->GetTimes());
-  OfferMomentsAround(phaseTimes, interpolator);
+  MovingMesh moving;
+  moving.Interpolator->SetInputConnection(source->GetOutputPort());
+  moving.Interpolator->SetMode(InterpolationMode(this->mode));
   if (this->cycleMs > 0.0)
   {
-    interpolator->SetCycleLength(this->cycleMs / 1000.0);
+    moving.Interpolator->SetCycleLength(this->cycleMs / 1000.0);
   }
-  vtkNew<vtkSkinDeformation> deformation;
-  deformation->SetInputData(0, mesh);
-  deformation->SetInputData(1, rest);
-  deformation->SetPoseConnection(interpolator->GetOutputPort());
-  deformation->SetBlend(Blends.at(this->blend));
-  deformation->SetVolumeConservation(this->volumeConservation);
-  // Thin tetrahedra far from the origin are better off, and files take longer than this.
-  deformation->DoublePrecisionOn();
-  deformation->SetComputeVelocity(this->velocity);
-  deformation->SetTetrahedra(
+  moving.Deformation->SetInputData(0, mesh);
+  moving.Deformation->SetInputData(1, rest);
+  moving.Deformation->SetBlend(Blends.at(this->blend));
+  moving.Deformation->SetVolumeConservation(this->volumeConservation);
+  moving.Deformation->SetComputeVelocity(this->velocity);
+  moving.Deformation->SetTetrahedra(
     this->repair ? vtkSkinDeformation::RepairTetrahedra : vtkSkinDeformation::CheckTetrahedra);
-  vtkNew<vtkMeshSequenceWriter> writer;
-  writer->SetInputConnection(deformation->GetOutputPort());
   if (boundary)
   {
-    writer->SetInputData(1, boundary);
+    moving.Writer->SetInputData(1, boundary);
   }
   if (caps)
   {
-    writer->SetInputData(2, caps);
+    moving.Writer->SetInputData(2, caps);
   }
-  this->Choose(writer);
-  writer->SetPhases(vtkMeshSequenceWriter::ListedTimes);
-  for (const double time : phaseTimes)
-  {
-    writer->AddTime(time);
-  }
-  writer->SetFileName((fs::path(this->output) / "mesh.json").string().c_str());
-
+  this->Choose(moving.Writer);
   progress.BeginStep(1, "phases");
-  const std::function<void(double)> show = [&](double fraction) { progress.Update(fraction); };
-  vtkNew<vtkCallbackCommand> observer;
-  observer->SetClientData(const_cast<std::function<void(double)>*>(&show));
-  observer->SetCallback(
-    [](vtkObject* caller, unsigned long, void* data, void*)
-    {
-      auto* algorithm = static_cast<vtkAlgorithm*>(caller);
-      (*static_cast<const std::function<void(double)>*>(data))(algorithm->GetProgress());
-      if (Interruption() != 0)
-      {
-        algorithm->SetAbortExecute(1);
-      }
-    });
-  writer->AddObserver(vtkCommand::ProgressEvent, observer);
-  const int good = writer->Write();
-  ThrowIfInterrupted();
-  messages.ThrowIfError();
-  if (!good)
-  {
-    throw std::runtime_error("Nothing was written to '" + this->output + "'.");
-  }
+  moving.Write((fs::path(this->output) / "mesh.json").string(),
+    this->PhaseTimes(source->GetTimes()), messages,
+    [&](double fraction) { progress.Update(fraction); });
   messages.PrintWarnings();
   if (!this->quiet)
   {
-    std::printf("%s: %s\n", this->output.c_str(), this->Summary(writer->GetQuality()).c_str());
+    std::printf(
+      "%s: %s\n", this->output.c_str(), this->Summary(moving.Writer->GetQuality()).c_str());
   }
 }
 }

@@ -92,8 +92,8 @@ void vtkMessageTrap::ThrowIfError()
   }
 }
 
-void UpdateAtTime(vtkAlgorithm* algorithm, int port, double time, vtkMessageTrap& messages,
-  const std::function<void(double)>& report)
+void WithProgress(vtkAlgorithm* algorithm, const std::function<void(double)>& report,
+  const std::function<void()>& run)
 {
   vtkNew<vtkCallbackCommand> observer;
   observer->SetClientData(const_cast<std::function<void(double)>*>(&report));
@@ -108,15 +108,20 @@ void UpdateAtTime(vtkAlgorithm* algorithm, int port, double time, vtkMessageTrap
       }
     });
   const unsigned long tag = algorithm->AddObserver(vtkCommand::ProgressEvent, observer);
+  run();
+  algorithm->RemoveObserver(tag);
+  coronary::ThrowIfInterrupted();
+}
 
+void UpdateAtTime(vtkAlgorithm* algorithm, int port, double time, vtkMessageTrap& messages,
+  const std::function<void(double)>& report)
+{
   vtkNew<vtkInformationVector> requests;
   requests->SetNumberOfInformationObjects(port + 1);
   requests->GetInformationObject(port)->Set(
     vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(), time);
-  const vtkTypeBool good = algorithm->Update(port, requests);
-
-  algorithm->RemoveObserver(tag);
-  coronary::ThrowIfInterrupted();
+  vtkTypeBool good = 0;
+  WithProgress(algorithm, report, [&] { good = algorithm->Update(port, requests); });
   messages.ThrowIfError();
   if (!good)
   {

@@ -38,6 +38,13 @@ private:
 };
 
 /**
+ * Reports the progress of an algorithm, 0 to 1, while `run` makes it work, and aborts it when the program is interrupted.
+ * @throws coronary::Cancelled when the program was interrupted
+ */
+void WithProgress(vtkAlgorithm* algorithm, const std::function<void(double)>& report,
+  const std::function<void()>& run);
+
+/**
  * Brings one output port up to date for one time.
  *
  * @param report  gets the algorithm's progress, 0 to 1

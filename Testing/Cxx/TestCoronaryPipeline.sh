@@ -426,7 +426,7 @@ check_weights() {
   grep -q '"bones": [0-9]\{2,\}' bound/report.json || fail "few bones: $(cat bound/report.json)"
 
   # The same mesh at every phase, moved.
-  for name in centerline.vtp skeleton.vtp surface.vtp volume.vtu; do
+  for name in centerline.vtp skeleton.vtp mesh_surface.vtp mesh_volume.vtu; do
     [ "$(grep -c '"time": 0\.[47]' "bound/motion/$name.series")" = 2 ] \
       || fail "$name.series: $(cat "bound/motion/$name.series")"
     [ "$(grep -o 'NumberOfPoints="[0-9]*"' "bound/motion/${name%.*}_000.${name##*.}")" = \
@@ -439,6 +439,25 @@ check_weights() {
     grep -q "Name=\"$name\"" bound/motion/centerline_000.vtp || fail "no $name in centerline_000.vtp"
   done
   expect_text bound/report.json '"tracked_share"'
+  expect_text bound/motion/mesh.json '"inlet_'
+  [ ! -e bound/motion/mesh_volume_002.vtu ] || fail "a third phase"
+
+  # A shorter sequence takes the place of a longer one, and of nothing else.
+  touch bound/motion/mesh_volume_extra.txt
+  run 0 run series/series.json --quiet --scales 0.7 2.5 --until motion --time 0.74 --edges 0.4 0.8 \
+    --weight-cache weights --moments 0.5 --output bound
+  for name in centerline_001.vtp skeleton_001.vtp mesh_surface_001.vtp mesh_volume_001.vtu; do
+    [ ! -e "bound/motion/$name" ] || fail "$name of the longer sequence is left"
+  done
+  for name in centerline_000.vtp mesh_volume_000.vtu mesh_volume_extra.txt; do
+    [ -e "bound/motion/$name" ] || fail "$name is gone"
+  done
+
+  # One phase has no motion: said before any work.
+  run 0 phantom --quiet --seed 2 --phases 1 --spacing 4 --no-truth --output still
+  run 1 run still/series.json --quiet --until motion --output none
+  expect_one_line "coronary-pipeline run" "one phase only"
+  [ ! -e none ] || fail "a folder was made for nothing"
 }
 
 check_run() {

@@ -739,6 +739,49 @@ TEST_F(TestMeshSequenceWriter, RefusesSettingsOutOfRange)
   this->Write();
 }
 
+TEST_F(TestMeshSequenceWriter, AShorterSequenceTakesThePlaceOfALongerOne)
+{
+  this->Connect();
+  this->Writer->WriteSimVascularOn();
+  this->Writer->WriteVmtkOn();
+  this->Write();
+  std::ofstream(this->Folder / "bar_mine.txt") << "mine";
+  std::ofstream(this->Folder / "bar_simvascular/phase_004/mine.txt") << "mine";
+  const auto files = [&]
+  {
+    std::set<std::string> names;
+    for (const auto& entry : fs::recursive_directory_iterator(this->Folder))
+    {
+      if (entry.is_regular_file())
+      {
+        names.insert(fs::relative(entry.path(), this->Folder).string());
+      }
+    }
+    return names;
+  };
+  const std::set<std::string> longer = files();
+  ASSERT_EQ(longer.count("bar_simvascular/phase_004/mesh-complete/mesh-surfaces/wall.vtp"), 1U);
+  // The same, shorter: what is left is what a new folder would have, and what is not ours.
+  this->Writer->WriteVmtkOff();
+  this->Writer->SetPhases(vtkMeshSequenceWriter::ListedTimes);
+  this->Writer->AddTime(0.0);
+  this->Writer->AddTime(0.5);
+  this->Write();
+  const std::set<std::string> shorter = files();
+  const fs::path old = this->Folder;
+  this->Folder = fs::path(old.string() + ".new");
+  fs::create_directories(this->Folder);
+  this->Writer->SetFileName((this->Folder / "bar.json").c_str());
+  this->Write();
+  std::set<std::string> fresh = files();
+  fs::remove_all(this->Folder);
+  this->Folder = old;
+  EXPECT_LT(fresh.size(), longer.size());
+  fresh.insert("bar_mine.txt");
+  fresh.insert("bar_simvascular/phase_004/mine.txt");
+  EXPECT_EQ(shorter, fresh);
+}
+
 TEST_F(TestMeshSequenceWriter, OlderFilesStayUntilAllIsWritten)
 {
   this->Connect();

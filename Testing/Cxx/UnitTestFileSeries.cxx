@@ -139,6 +139,31 @@ TEST_F(UnitTestFileSeries, StagedFilesAppearTogetherInDeepFolders)
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
 }
 
+TEST_F(UnitTestFileSeries, AShorterSetTakesThePlaceOfALongerOne)
+{
+  const fs::path folder = this->Folder / "set";
+  fs::create_directories(folder / "below/deep");
+  for (const char* name :
+    { "set/a_000", "set/a_001", "set/below/deep/b", "set/below/mine", "set/mine", "outside" })
+  {
+    coronary::WriteFileAtomically((this->Folder / name).string(), "old");
+  }
+  fs::create_symlink(this->Folder / "outside", folder / "link");
+  coronary::StagedFolder staged(folder.string());
+  coronary::WriteFileAtomically(staged.Add("a_000"), "new");
+  staged.TakePlaceOf({ "a_000", "a_001", "./below//deep/b", "../outside", "below/../../outside",
+    (this->Folder / "outside").string(), "link", "below", "none", "" });
+  EXPECT_TRUE(fs::exists(folder / "a_001"));
+  staged.Commit();
+  EXPECT_EQ(fs::file_size(folder / "a_000"), 3u);
+  EXPECT_FALSE(fs::exists(folder / "a_001"));
+  EXPECT_FALSE(fs::exists(folder / "below/deep"));
+  EXPECT_TRUE(fs::exists(folder / "below/mine"));
+  EXPECT_TRUE(fs::exists(folder / "mine"));
+  EXPECT_TRUE(fs::is_symlink(folder / "link"));
+  EXPECT_TRUE(fs::exists(this->Folder / "outside"));
+}
+
 TEST(UnitTestMeshSequenceReport, NumbersAndNames)
 {
   coronary::MeshSequenceReport report;
