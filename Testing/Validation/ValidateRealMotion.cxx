@@ -769,6 +769,7 @@ struct Settings
   double spacing = 0.8;
   double window = 0.066;
   double captureRange = CenterlineTrackingSettings().captureRange;
+  double fineRange = CenterlineTrackingSettings().fineRange;
   bool asMeasured = false;
   bool quick = false;
 };
@@ -820,6 +821,7 @@ bool Run(const Settings& options)
   settings.temporalWindow = options.window;
   settings.cycleLength = CycleSeconds;
   settings.captureRange = options.captureRange;
+  settings.fineRange = options.fineRange;
   CenterlineTrackingReport report;
   const PoseSequence poses = TrackCenterlines(
     lines, TimeOf(ReferenceFrame), times,
@@ -935,6 +937,9 @@ int main(int argc, char** argv)
       ->capture_default_str();
     program.add_option("--capture-range", options.captureRange, "mm between tracked phases")
       ->check(CLI::Range(2.0, 40.0))
+      ->capture_default_str();
+    program.add_option("--fine-range", options.fineRange, "mm around what the first search found")
+      ->check(CLI::Range(1.0, 12.0))
       ->capture_default_str();
     program.add_flag("--frames-as-they-are", options.asMeasured,
       "With the scatter of the frames, which were measured one by one; judged at tracked frames");
