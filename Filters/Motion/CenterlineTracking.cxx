@@ -1195,11 +1195,12 @@ std::vector<double> Tracker::MeasureCalibre() const
           const Eigen::Matrix<double, unknowns - 1, 1> share =
             others.completeOrthogonalDecomposition().solve(normal.col(0).tail<unknowns - 1>());
           const double information = normal(0, 0) - share.dot(normal.col(0).tail<unknowns - 1>());
-          if (information > 0.01 * normal(0, 0))
+          const double widening = (right[0] - share.dot(right.tail<unknowns - 1>())) / information;
+          // No artery widens so much: it is not there, or it is another one.
+          if (information > 0.01 * normal(0, 0) && std::abs(widening) < 0.25)
           {
             const double clear = 1.0 / ((1.0 + smeared * smeared) * (1.0 + smeared * smeared));
-            estimates[k][n].widening =
-              (right[0] - share.dot(right.tail<unknowns - 1>())) / information;
+            estimates[k][n].widening = widening;
             estimates[k][n].information = clear * information;
           }
         }
@@ -1223,7 +1224,7 @@ std::vector<double> Tracker::MeasureCalibre() const
       sum += one.information;
       if (sum >= 0.5 * trust[k])
       {
-        widening[k] = std::clamp(one.widening, -0.2, 0.2);
+        widening[k] = one.widening;
         break;
       }
     }
@@ -1233,12 +1234,12 @@ std::vector<double> Tracker::MeasureCalibre() const
   constexpr int size = 2 * harmonics;
   const Eigen::VectorXd zero = PeriodicBasis(this->ReferenceTime, harmonics).tail(size);
   const double most = *std::max_element(trust.begin(), trust.end());
-  // The m-th is expected to be 0.03 / m; the phase that is seen best has an error of about 0.003.
+  // The m-th is expected to be 0.03 / m^2; the phase that is seen best has an error of about 0.003.
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
   for (int row = 0; row < size; ++row)
   {
     const double harmonic = 1.0 + row / 2;
-    matrix(row, row) = 0.01 * harmonic * harmonic;
+    matrix(row, row) = 0.01 * std::pow(harmonic, 4);
   }
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
   for (std::size_t k = 0; k < phases && most > 0.0; ++k)
