@@ -26,6 +26,7 @@ constexpr int RepairSweeps = 400;
 constexpr double GreatestLeastRatio = 0.5;
 constexpr double RepairMargin = 0.01;
 constexpr double LeastRepairStretch = 0.2;
+constexpr int RepairPatience = 80; // sweeps
 
 void Require(bool condition, const std::string& message)
 {
@@ -298,7 +299,7 @@ struct SkinDeformation::Internals
     Real* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress);
   /// Gives one tetrahedron the nearest shape that has the wanted share of its volume at rest.
   template <typename Real>
-  void Unfold(Real* positions, std::int64_t tetrahedron, double wantedRatio) const;
+  void Unfold(Real* positions, std::int64_t tetrahedron, double wantedRatio, double least) const;
 };
 
 void SkinDeformation::Internals::ReadWeights(
@@ -728,6 +729,9 @@ void SkinDeformation::Internals::Repair(
     {
       queued[n] = 0;
     }
+    // What has come to no end by now turns each other over: less is asked of each.
+    const double stretch =
+      LeastRepairStretch * std::pow(0.5, static_cast<double>(report.sweeps / RepairPatience));
     // How many sweeps it will be is not known: each one takes a tenth of what is left.
     const double left = 0.6 * std::pow(0.9, report.sweeps);
     const ProgressCallback sweepProgress = PartOf(progress, 0.9 - left, 0.9 - 0.9 * left);
@@ -740,7 +744,7 @@ void SkinDeformation::Internals::Repair(
       {
         continue; // a neighbour's repair was its own
       }
-      this->Unfold(positions, n, wanted);
+      this->Unfold(positions, n, wanted, stretch);
       for (const std::int64_t corner : this->Tetrahedra[n])
       {
         if (!moves[corner])
@@ -786,7 +790,7 @@ void SkinDeformation::Internals::Repair(
 
 template <typename Real>
 void SkinDeformation::Internals::Unfold(
-  Real* positions, std::int64_t tetrahedron, double wantedRatio) const
+  Real* positions, std::int64_t tetrahedron, double wantedRatio, double least) const
 {
   const std::array<std::int64_t, 4>& corners = this->Tetrahedra[tetrahedron];
   Vector3 restCentre = Vector3::Zero();
@@ -817,7 +821,6 @@ void SkinDeformation::Internals::Unfold(
     u.col(2) = -u.col(2);
     stretches[2] = -stretches[2];
   }
-  double least = LeastRepairStretch;
   Vector3 wanted = stretches.cwiseMax(least);
   while (wanted.prod() < wantedRatio)
   {

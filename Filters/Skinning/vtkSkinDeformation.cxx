@@ -600,8 +600,12 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
       std::vector<vtkIdType>{ std::max<vtkIdType>(0, gone) });
     if (!left.empty())
     {
-      vtkWarningMacro(<< left.size() << " tetrahedra are inverted, the first one is cell "
-                      << left[0] << ": see the field array InvertedTetrahedra");
+      vtkWarningMacro(<< left.size() << " tetrahedra are inverted"
+                      << (this->Tetrahedra == RepairTetrahedra ? " after the repair, " +
+                               std::to_string(report.found) + " were before it"
+                                                               : std::string())
+                      << "; the first one is cell " << left[0]
+                      << ": see the field array InvertedTetrahedra");
     }
   }
   const auto displacement = makeArray(this->DisplacementArrayName.c_str());

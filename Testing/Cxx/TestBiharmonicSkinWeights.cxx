@@ -314,6 +314,54 @@ TEST(BiharmonicSkinWeightsFilter, PhantomTreesWithTheBonesAmongTheEdges)
     }
     EXPECT_NEAR(sum, 1.0, 1e-6);
   }
+
+  // The same without bounds, and with the harmonic energy.
+  for (const int mode :
+    { vtkBiharmonicSkinWeights::UnboundedMode, vtkBiharmonicSkinWeights::HarmonicMode })
+  {
+    SCOPED_TRACE(mode);
+    const bool bounded = mode == vtkBiharmonicSkinWeights::HarmonicMode;
+    filter->SetMode(mode);
+    filter->DenseOn();
+    const Messages messages(filter);
+    filter->Update();
+    EXPECT_TRUE(messages.Errors.empty());
+    EXPECT_EQ(Field(output, "WeightsConverged"), 1.0);
+    EXPECT_LE(Field(output, "WeightsOnBones"), 0.05);
+    EXPECT_GT(Field(output, "WeightsEnergy"), 0.0);
+    vtkDataArray* all = PointArray(output, "BoneWeights");
+    vtkDataArray* few = PointArray(output, "BoneWeightsCompact");
+    double least = 0.0;
+    double greatest = 0.0;
+    double worst = 0.0;
+    for (vtkIdType i = 0; i < all->GetNumberOfTuples(); ++i)
+    {
+      double sum = 0.0;
+      for (int b = 0; b < all->GetNumberOfComponents(); ++b)
+      {
+        const double w = all->GetComponent(i, b);
+        ASSERT_TRUE(std::isfinite(w));
+        least = std::min(least, w);
+        greatest = std::max(greatest, w);
+        sum += w;
+      }
+      worst = std::max(worst, std::abs(sum - 1.0));
+      double kept = 0.0;
+      for (int k = 0; k < few->GetNumberOfComponents(); ++k)
+      {
+        kept += few->GetComponent(i, k);
+      }
+      EXPECT_NEAR(kept, 1.0, 1e-5);
+    }
+    EXPECT_LE(worst, 1e-6);
+    // They overshoot without bounds, but stay weights.
+    EXPECT_EQ(least < -0.01, !bounded);
+    EXPECT_EQ(greatest > 1.01, !bounded);
+    EXPECT_GT(least, -5.0);
+    EXPECT_LT(greatest, 5.0);
+    RecordProperty("least" + std::to_string(mode), std::to_string(least));
+    RecordProperty("greatest" + std::to_string(mode), std::to_string(greatest));
+  }
 }
 
 TEST(BiharmonicSkinWeightsCache, ReadsWhatItWrote)

@@ -254,7 +254,13 @@ TEST(CenterlineSkeleton, ComesBackFromATgfFileBoneByBone)
     std::string line;
     while (std::getline(file, line))
     {
-      text = line == "#" ? "" : text + line + ";";
+      if (line == "#")
+      {
+        text.clear();
+        continue;
+      }
+      text += line;
+      text += ";";
     }
     return text;
   };

@@ -425,6 +425,14 @@ check_weights() {
   done
   grep -q '"bones": [0-9]\{2,\}' bound/report.json || fail "few bones: $(cat bound/report.json)"
 
+  # Where no bone is outside, leaving those out changes nothing; the report says that none was.
+  run 0 run series/series.json --quiet --scales 0.7 2.5 --until weights --time 0.74 --edges 0.4 0.8 \
+    --leave-bones-outside --output left
+  grep -q '"left_out_bones": \[\]' left/report.json || fail "left_out_bones: $(cat left/report.json)"
+  grep -q 'Name="LeftOutBones"' left/weights.vtu || fail "no LeftOutBones in weights.vtu"
+  grep -q 'left_out_bones' bound/report.json && fail "left_out_bones without --leave-bones-outside"
+  cmp -s bound/skeleton.vtp left/skeleton.vtp || fail "--leave-bones-outside changed the skeleton"
+
   # The same mesh at every phase, moved.
   for name in centerline.vtp skeleton.vtp mesh_surface.vtp mesh_volume.vtu; do
     [ "$(grep -c '"time": 0\.[47]' "bound/motion/$name.series")" = 2 ] \

@@ -385,6 +385,53 @@ TEST(SkinDeformation, TetrahedraAreCheckedAndRepaired)
   EXPECT_EQ(Output(filter)->GetCellData()->GetArray("VolumeRatio"), nullptr);
 }
 
+TEST(SkinDeformation, TetrahedraThatCanNotBeRepairedAreTold)
+{
+  // Folded flat: both halves want the same place.
+  vtkNew<vtkSkinDeformation> filter;
+  filter->SetInputData(0, Bar(4));
+  filter->SetInputData(1, ChainSkeleton(2));
+  filter->SetInputData(2, Folded(3.14));
+  filter->SetTetrahedra(vtkSkinDeformation::CheckTetrahedra);
+  filter->Update();
+  const auto inverted = [&]
+  {
+    vtkFieldData* fields = Output(filter)->GetFieldData();
+    vtkDataArray* left = fields->GetArray("InvertedTetrahedra");
+    vtkDataArray* ratio = Output(filter)->GetCellData()->GetArray("VolumeRatio");
+    std::vector<vtkIdType> listed;
+    std::vector<vtkIdType> found;
+    for (vtkIdType n = 0; n < left->GetNumberOfTuples(); ++n)
+    {
+      listed.push_back(static_cast<vtkIdType>(left->GetComponent(n, 0)));
+    }
+    for (vtkIdType cell = 0; cell < ratio->GetNumberOfTuples(); ++cell)
+    {
+      if (ratio->GetComponent(cell, 0) <= 0.0)
+      {
+        found.push_back(cell);
+      }
+    }
+    EXPECT_EQ(listed, found);
+    return listed.size();
+  };
+  const std::size_t before = inverted();
+  filter->SetTetrahedra(vtkSkinDeformation::RepairTetrahedra);
+  Messages messages(filter);
+  filter->Update();
+  const std::size_t after = inverted();
+  ASSERT_GT(after, 0U);
+  ASSERT_LT(after, before);
+  EXPECT_TRUE(messages.Errors.empty());
+  ASSERT_EQ(messages.Warnings.size(), 1U);
+  EXPECT_TRUE(messages.HasWarning((std::to_string(after) +
+    " tetrahedra are inverted after the repair, " + std::to_string(before) + " were before it")
+                                    .c_str()))
+    << messages.Warnings[0];
+  EXPECT_EQ(Output(filter)->GetFieldData()->GetArray("RepairedTetrahedra")->GetComponent(0, 0),
+    static_cast<double>(before - after));
+}
+
 TEST(SkinDeformation, AnyPointSetAndBlocks)
 {
   vtkNew<vtkStructuredGrid> grid;

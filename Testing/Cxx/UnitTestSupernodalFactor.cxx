@@ -386,9 +386,13 @@ TEST(SupernodalFactor, LoopsAgreeWithPlainOnes)
           const Matrix low = top.llt().matrixL();
           Matrix lower(height, width);
           lower.topRows(width) = low;
-          const Matrix rest = panel.bottomRows(height - width);
-          lower.bottomRows(height - width) =
-            low.template triangularView<Eigen::Lower>().solve(rest.transpose()).transpose();
+          // Eigen's solves with and products of empty matrices take references through null.
+          if (height > width)
+          {
+            const Matrix rest = panel.bottomRows(height - width);
+            lower.bottomRows(height - width) =
+              low.template triangularView<Eigen::Lower>().solve(rest.transpose()).transpose();
+          }
           ASSERT_TRUE(loops.factorPanel(panel.data(), height, width));
           for (int j = 0; j < width; ++j)
           {
@@ -420,7 +424,6 @@ TEST(SupernodalFactor, LoopsAgreeWithPlainOnes)
           const Matrix right = before.middleRows(2, width);
           const Matrix solved = low.template triangularView<Eigen::Lower>().solve(right);
           EXPECT_LT((after.middleRows(2, width) - solved).norm(), tolerance * solved.norm());
-          // Eigen's products of empty matrices take references through null.
           Matrix minuend = right;
           if (height > width)
           {
