@@ -183,7 +183,8 @@ std::vector<std::string> MeshSequenceFiles(const std::string& path)
         }
         for (const std::string& face : faces)
         {
-          names.push_back(name + "/mesh-surfaces/" + face + ".vtp");
+          names.push_back(name + "/mesh-surfaces/");
+          names.back().append(face).append(".vtp");
         }
       });
   }

@@ -47,6 +47,7 @@ int InterpolationMode(const std::string& name)
 std::vector<std::string> InterpolationModes()
 {
   std::vector<std::string> names;
+  names.reserve(Modes.size());
   for (const auto& [name, mode] : Modes)
   {
     names.push_back(name);
