@@ -143,13 +143,11 @@ coronary::SurfaceMesh SurfaceOf(
   }
   vtkCellArray* polygons = triangles->GetPolys();
   mesh.triangles.reserve(polygons->GetNumberOfCells());
-  vtkIdType size = 0;
-  const vtkIdType* ids = nullptr;
-  vtkNew<vtkIdList> scratch;
+  vtkNew<vtkIdList> ids;
   for (vtkIdType cell = 0; cell < polygons->GetNumberOfCells(); ++cell)
   {
-    polygons->GetCellAtId(cell, size, ids, scratch);
-    mesh.triangles.push_back({ ids[0], ids[1], ids[2] });
+    polygons->GetCellAtId(cell, ids);
+    mesh.triangles.push_back({ ids->GetId(0), ids->GetId(1), ids->GetId(2) });
   }
   const vtkIdType cells = triangles->GetNumberOfCells();
   if (!groupName.empty())
