@@ -82,7 +82,7 @@ Frame MakeFrame()
     {
       const Vector3& head = frame.skeleton.joints[frame.skeleton.bones[n].first];
       const Vector3& tail = frame.skeleton.joints[frame.skeleton.bones[n].second];
-      near.emplace_back(std::sqrt(NearestOnSegment(point, head, tail).squaredDistance),
+      near.emplace_back(std::sqrt(coronary::NearestOnSegment(point, head, tail).squaredDistance),
         static_cast<std::int32_t>(n));
     }
     std::partial_sort(near.begin(), near.begin() + influences, near.end());
