@@ -1,0 +1,112 @@
+/**
+ * @file Evaluation.h
+ * @brief A moving model held against the truth, phase by phase: Table 1 of the paper.
+ *
+ * The paper's protocol: a model is tracked in the even phases of a series only, the odd ones are
+ * interpolated; surfaces are compared in all of them, and the mean over the interpolated phases is
+ * reported. Part A of its Table 1 has a row a phase of one case, Part B a row a case.
+ */
+#ifndef DynamicCoronary_Evaluation_h
+#define DynamicCoronary_Evaluation_h
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// The measures of a phase, or their means. Lengths in mm; NaN: not known.
+struct EvaluationMeasures
+{
+  static constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+
+  double hausdorff = NaN;           ///< HD, Eq. 15
+  double hausdorff95 = NaN;         ///< HD95
+  double msd = NaN;                 ///< MSD, Eq. 16: from the model's vertices to the truth
+  double msdArea = NaN;             ///< area-weighted, both ways
+  double rms = NaN;                 ///< area-weighted, both ways
+  double completenessRatio = NaN;   ///< BCR, Eq. 17
+  double continuityScore = NaN;     ///< BCS, Eq. 17
+  double boundedCompleteness = NaN; ///< share of the truth's branches that are detected
+  double boundedContinuity = NaN;   ///< mean of their continuity
+  double lengthDetected = NaN;      ///< share of the truth's length
+  double centerlineMean = NaN;      ///< from the model's centerline to the truth's, where both are
+  double centerline95 = NaN;        ///< 95th percentile of the same distances
+};
+
+/// One of the measures: what tables and plots call it, and where it is.
+struct EvaluationColumn
+{
+  const char* key;  ///< in files, "HD95"
+  const char* unit; ///< "mm", or "" for a ratio
+  double EvaluationMeasures::*value;
+  double best; ///< 0 for distances, 1 for ratios
+};
+
+/// All measures, in the order of the tables.
+const std::vector<EvaluationColumn>& EvaluationColumns();
+
+/// A branch of the truth in one phase.
+struct BranchEvaluation
+{
+  std::int64_t group = -1;
+  std::string label;                           ///< SCCT name; empty: not known
+  double length = EvaluationMeasures::NaN;     ///< mm
+  double covered = EvaluationMeasures::NaN;    ///< share of its length that the model has
+  double continuity = EvaluationMeasures::NaN; ///< bounded
+  double hausdorff = EvaluationMeasures::NaN;  ///< of its surface from the model, mm
+  double mean = EvaluationMeasures::NaN;       ///< area-weighted, mm
+};
+
+struct PhaseEvaluation
+{
+  int phase = 0;             ///< number in the series, from 0
+  double fraction = 0.0;     ///< of the R-R interval
+  bool interpolated = false; ///< not tracked, by choice
+  bool lost = false;         ///< to be tracked, but more than half of the tree was not to be seen
+  EvaluationMeasures measures;
+  std::vector<BranchEvaluation> branches;
+};
+
+struct CaseEvaluation
+{
+  std::string name;
+  std::vector<PhaseEvaluation> phases;
+  std::vector<std::string> warnings; ///< a sentence each
+};
+
+/// Mean and standard deviation (with n - 1, as the paper's table) of a list of measures; values that are NaN do
+/// not count. The deviation of a single value is NaN.
+struct MeasureSummary
+{
+  EvaluationMeasures mean;
+  EvaluationMeasures deviation;
+  std::int64_t count = 0;
+};
+MeasureSummary Summarize(const std::vector<EvaluationMeasures>& list);
+
+/// Of the phases that are interpolated, or tracked.
+MeasureSummary SummarizePhases(const CaseEvaluation& one, bool interpolated);
+
+/// The paper's Table 1: HD, MSD, BCR and BCS only. Phases of Part A have no fractions there: NaN.
+const CaseEvaluation& PaperPartA();
+/// Name and means over the interpolated phases of its five cases.
+struct PaperCase
+{
+  const char* name;
+  EvaluationMeasures mean;
+};
+const std::vector<PaperCase>& PaperPartB();
+
+/// Part A of every case and Part B over all, as fields separated by commas.
+std::string EvaluationCsv(const std::vector<CaseEvaluation>& cases);
+
+/// A LaTeX document's part: two tabular environments like the paper's Table 1.
+std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases);
+
+/// For a terminal: Part A and B, beside the paper's.
+std::string EvaluationText(const std::vector<CaseEvaluation>& cases);
+}
+
+#endif
