@@ -1,0 +1,71 @@
+/**
+ * @file vtkEvaluationPictures.h
+ * @brief The pictures of an evaluation: the paper's Figs. 5 and 6, distances in colours, the beating tree.
+ *
+ * All of them need a display, or a VTK that needs none: ask CanDraw first.
+ */
+#ifndef vtkEvaluationPictures_h
+#define vtkEvaluationPictures_h
+
+#include "Evaluation.h"
+
+#include "vtkSmartPointer.h"
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+class vtkPolyData;
+
+namespace coronary
+{
+struct PictureStore;
+
+/// What is drawn. Indices are those of evaluation->phases.
+struct EvaluationScene
+{
+  using Source = std::function<vtkSmartPointer<vtkPolyData>(int index)>;
+
+  const CaseEvaluation* evaluation = nullptr;
+  Source model;      ///< closed surface, triangles, mm
+  Source truth;      ///< closed surface, triangles, mm
+  Source centerline; ///< the model's tree: lines with the cell array GroupIds; empty, or returns null: there is none
+
+  /// Points, triangles and lines that were asked for already, in single precision: 4 MB a surface of
+  /// 120000 triangles. Made with the first picture; pictures of one scene read each file once.
+  mutable std::shared_ptr<PictureStore> store;
+};
+
+/**
+ * Whether pictures can be drawn here. VTK ends the process when it finds no X server, so this asks for one
+ * before; a VTK made for EGL or OSMesa needs none.
+ * @param why  what is missing, a sentence
+ */
+bool CanDraw(std::string& why);
+
+/**
+ * Fig. 6: model (red) over truth (green) in every phase, seen from one place; dashed frames around interpolated
+ * phases, solid ones around tracked; beneath, the lost phase with the greatest HD (the phase with the greatest HD where
+ * none is lost) and its neighbours, magnified. PNG, at least 2400 pixels wide.
+ * @throws std::invalid_argument for a scene without phases or without points; std::runtime_error naming a
+ *         file that can not be written; what the scene's functions throw. So do all of the following.
+ */
+void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path);
+
+/// The model coloured by its distance from the truth in four phases, one of them that with the greatest HD. PNG.
+void DrawDistances(const EvaluationScene& scene, const std::string& path);
+
+/// Fig. 5: centerlines of all phases by branch, paths of points of the tree over the cycle, meshes of three phases.
+/// Without centerlines only the last. PNG.
+void DrawSequence(const EvaluationScene& scene, const std::string& path);
+
+/**
+ * The beating tree, a picture a phase, phases in the order of their fractions: `folder`/beating_NN.png, and
+ * `folder`/beating.gif where the program was built with giflib.
+ * @return the PNG files' paths, in order
+ */
+std::vector<std::string> DrawBeating(const EvaluationScene& scene, const std::string& folder);
+}
+
+#endif
