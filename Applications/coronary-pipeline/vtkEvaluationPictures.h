@@ -28,9 +28,10 @@ struct EvaluationScene
   using Source = std::function<vtkSmartPointer<vtkPolyData>(int index)>;
 
   const CaseEvaluation* evaluation = nullptr;
-  Source model;      ///< closed surface, triangles, mm
-  Source truth;      ///< closed surface, triangles, mm
-  Source centerline; ///< the model's tree: lines with the cell array GroupIds; empty, or returns null: there is none
+  Source model; ///< closed surface, triangles, mm
+  Source truth; ///< closed surface, triangles, mm
+  Source
+    centerline; ///< the model's tree: lines with the cell array GroupIds; empty, or returns null: there is none
 
   /// Points, triangles and lines that were asked for already, in single precision: 4 MB a surface of
   /// 120000 triangles. Made with the first picture; pictures of one scene read each file once.

@@ -1,0 +1,311 @@
+#include "vtkEvaluationPlots.h"
+
+#include "Interruption.h"
+
+#include "vtkAxis.h"
+#include "vtkBrush.h"
+#include "vtkChartLegend.h"
+#include "vtkChartXY.h"
+#include "vtkContextScene.h"
+#include "vtkContextView.h"
+#include "vtkDoubleArray.h"
+#include "vtkErrorCode.h"
+#include "vtkNew.h"
+#include "vtkPNGWriter.h"
+#include "vtkPen.h"
+#include "vtkPlot.h"
+#include "vtkPlotPoints.h"
+#include "vtkRenderWindow.h"
+#include "vtkRenderer.h"
+#include "vtkSVGExporter.h"
+#include "vtkSmartPointer.h"
+#include "vtkTable.h"
+#include "vtkTextProperty.h"
+#include "vtkWindowToImageFilter.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+using Rgb = std::array<unsigned char, 3>;
+// Told apart also by those who do not see all colours (Okabe and Ito).
+constexpr std::array<Rgb, 7> CaseColours = { { { 0, 114, 178 }, { 213, 94, 0 }, { 0, 158, 115 },
+  { 204, 121, 167 }, { 230, 159, 0 }, { 86, 180, 233 }, { 90, 90, 90 } } };
+constexpr int Width = 1200;
+constexpr int Height = 720;
+
+enum Mark
+{
+  Tracked,
+  Interpolated,
+  Lost,
+  MarkCount
+};
+
+Mark MarkOf(const PhaseEvaluation& phase)
+{
+  return phase.lost ? Lost : (phase.interpolated ? Interpolated : Tracked);
+}
+
+const char* MarkName(Mark mark)
+{
+  constexpr std::array<const char*, MarkCount> Names = { "tracked", "interpolated", "lost" };
+  return Names[mark];
+}
+
+bool FractionsAreKnown(const std::vector<CaseEvaluation>& cases)
+{
+  for (const CaseEvaluation& one : cases)
+  {
+    for (const PhaseEvaluation& phase : one.phases)
+    {
+      if (!std::isfinite(phase.fraction))
+      {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+vtkSmartPointer<vtkTable> TableOf(
+  const std::vector<std::array<double, 2>>& points, const std::string& name)
+{
+  auto table = vtkSmartPointer<vtkTable>::New();
+  vtkNew<vtkDoubleArray> x;
+  x->SetName("x");
+  vtkNew<vtkDoubleArray> y;
+  y->SetName(name.c_str());
+  for (const std::array<double, 2>& point : points)
+  {
+    x->InsertNextValue(point[0]);
+    y->InsertNextValue(point[1]);
+  }
+  table->AddColumn(x);
+  table->AddColumn(y);
+  return table;
+}
+
+/// The paper's mean of a measure over interpolated phases, and what it is called.
+std::pair<double, std::string> PaperMean(const EvaluationColumn& column, std::size_t cases)
+{
+  if (cases == 1)
+  {
+    return { SummarizePhases(PaperPartA(), true).mean.*(column.value), "paper, case 1" };
+  }
+  std::vector<EvaluationMeasures> list;
+  for (const PaperCase& one : PaperPartB())
+  {
+    list.push_back(one.mean);
+  }
+  return { Summarize(list).mean.*(column.value), "paper, five cases" };
+}
+
+void SetRange(vtkAxis* axis, double low, double high)
+{
+  axis->SetBehavior(vtkAxis::FIXED);
+  axis->SetRange(low, high);
+}
+
+class Chart
+{
+public:
+  Chart()
+  {
+    this->View->GetRenderWindow()->OffScreenRenderingOn();
+    this->View->GetRenderWindow()->SetMultiSamples(8);
+    this->View->GetRenderWindow()->SetSize(Width, Height);
+    this->View->GetRenderer()->SetBackground(1.0, 1.0, 1.0);
+    this->View->GetScene()->AddItem(this->Plot);
+    this->Plot->SetShowLegend(true);
+    this->Plot->GetLegend()->SetInline(false);
+    this->Plot->GetLegend()->SetHorizontalAlignment(vtkChartLegend::RIGHT);
+    this->Plot->GetLegend()->SetVerticalAlignment(vtkChartLegend::TOP);
+    this->Plot->GetLegend()->SetLabelSize(17);
+    this->Plot->GetLegend()->GetPen()->SetColor(200, 200, 200, 255);
+    this->Plot->GetTitleProperties()->SetFontSize(24);
+    this->Plot->GetTitleProperties()->BoldOn();
+    for (const int side : { vtkAxis::BOTTOM, vtkAxis::LEFT })
+    {
+      vtkAxis* axis = this->Plot->GetAxis(side);
+      axis->GetTitleProperties()->SetFontSize(20);
+      axis->GetTitleProperties()->BoldOff();
+      axis->GetLabelProperties()->SetFontSize(17);
+      axis->GetGridPen()->SetColor(226, 226, 226, 255);
+    }
+  }
+
+  void Line(const std::vector<std::array<double, 2>>& points, const std::string& name,
+    const Rgb& colour, double width, bool dashed, bool inLegend)
+  {
+    vtkPlot* plot = this->Plot->AddPlot(vtkChart::LINE);
+    plot->SetInputData(TableOf(points, name), 0, 1);
+    plot->GetPen()->SetColor(colour[0], colour[1], colour[2], 255);
+    plot->SetWidth(static_cast<float>(width));
+    plot->GetPen()->SetLineType(dashed ? vtkPen::DASH_LINE : vtkPen::SOLID_LINE);
+    plot->SetLabel(name);
+    plot->SetLegendVisibility(inLegend);
+  }
+
+  void Points(const std::vector<std::array<double, 2>>& points, const std::string& name,
+    const Rgb& colour, Mark mark, bool inLegend)
+  {
+    if (points.empty())
+    {
+      return;
+    }
+    vtkPlot* plot = this->Plot->AddPlot(vtkChart::POINTS);
+    plot->SetInputData(TableOf(points, name), 0, 1);
+    plot->GetPen()->SetColor(colour[0], colour[1], colour[2], 255);
+    plot->SetWidth(mark == Lost ? 3.0F : 1.0F);
+    plot->SetLabel(name);
+    plot->SetLegendVisibility(inLegend);
+    auto* marks = vtkPlotPoints::SafeDownCast(plot);
+    constexpr std::array<int, MarkCount> Styles = { vtkPlotPoints::CIRCLE, vtkPlotPoints::DIAMOND,
+      vtkPlotPoints::CROSS };
+    marks->SetMarkerStyle(Styles[mark]);
+    constexpr std::array<float, MarkCount> Sizes = { 12.0F, 16.0F, 18.0F };
+    marks->SetMarkerSize(Sizes[mark]);
+  }
+
+  void Write(const std::string& title, const std::string& stem)
+  {
+    this->Plot->SetTitle(title);
+    this->View->Update();
+    this->View->GetRenderWindow()->Render();
+    vtkNew<vtkWindowToImageFilter> grabber;
+    grabber->SetInput(this->View->GetRenderWindow());
+    grabber->SetInputBufferTypeToRGB();
+    grabber->ReadFrontBufferOff();
+    vtkNew<vtkPNGWriter> writer;
+    writer->SetInputConnection(grabber->GetOutputPort());
+    const std::string picture = stem + ".png";
+    writer->SetFileName(picture.c_str());
+    writer->Write();
+    if (writer->GetErrorCode() != vtkErrorCode::NoError)
+    {
+      throw std::runtime_error("Can not write '" + picture + "'.");
+    }
+    const std::string drawing = stem + ".svg";
+    std::error_code ignored;
+    std::filesystem::remove(drawing, ignored);
+    vtkNew<vtkSVGExporter> exporter;
+    exporter->SetRenderWindow(this->View->GetRenderWindow());
+    exporter->SetFileName(drawing.c_str());
+    exporter->SetTitle(title.c_str());
+    exporter->Write();
+    if (!std::filesystem::exists(drawing, ignored))
+    {
+      throw std::runtime_error("Can not write '" + drawing + "'.");
+    }
+  }
+
+  vtkNew<vtkContextView> View;
+  vtkNew<vtkChartXY> Plot;
+};
+
+std::string AxisTitle(const EvaluationColumn& column)
+{
+  return *column.unit ? std::string(column.key) + " (" + column.unit + ")" : column.key;
+}
+
+void DrawPlot(
+  const std::vector<CaseEvaluation>& cases, const EvaluationColumn& column, const std::string& stem)
+{
+  const bool fractions = FractionsAreKnown(cases);
+  double lowX = std::numeric_limits<double>::infinity();
+  double highX = -lowX;
+  double low = column.best;
+  double high = column.best;
+  std::array<bool, MarkCount> named = { false, false, false };
+  Chart chart;
+  for (std::size_t c = 0; c < cases.size(); ++c)
+  {
+    std::vector<std::array<double, 2>> line;
+    std::array<std::vector<std::array<double, 2>>, MarkCount> points;
+    for (const PhaseEvaluation& phase : cases[c].phases)
+    {
+      const double value = phase.measures.*(column.value);
+      if (std::isfinite(value))
+      {
+        const double x = fractions ? 100.0 * phase.fraction : phase.phase;
+        line.push_back({ x, value });
+        points[MarkOf(phase)].push_back({ x, value });
+        lowX = std::min(lowX, x);
+        highX = std::max(highX, x);
+        low = std::min(low, value);
+        high = std::max(high, value);
+      }
+    }
+    if (line.empty())
+    {
+      continue;
+    }
+    std::sort(line.begin(), line.end());
+    const Rgb& colour = CaseColours[c % CaseColours.size()];
+    chart.Line(line, cases[c].name, colour, 1.5, false, cases.size() > 1);
+    for (int mark = 0; mark < MarkCount; ++mark)
+    {
+      // What the marks mean is said once.
+      chart.Points(points[mark], MarkName(Mark(mark)), colour, Mark(mark),
+        !points[mark].empty() && !named[mark]);
+      named[mark] = named[mark] || !points[mark].empty();
+    }
+  }
+  const double marginX = std::max(0.03 * (highX - lowX), 1e-3);
+  const auto [paper, paperName] = PaperMean(column, cases.size());
+  if (std::isfinite(paper))
+  {
+    low = std::min(low, paper);
+    high = std::max(high, paper);
+    char number[32];
+    std::snprintf(number, sizeof(number), ": %.2f", paper);
+    chart.Line({ { lowX - marginX, paper }, { highX + marginX, paper } }, paperName + number,
+      { 60, 60, 60 }, 2.5, true, true);
+  }
+  const double span = std::max(high - low, 0.02 * std::max(1.0, std::abs(column.best)));
+  SetRange(chart.Plot->GetAxis(vtkAxis::LEFT),
+    column.best == 0.0 ? std::min(0.0, low) : low - 0.1 * span, high + 0.1 * span);
+  SetRange(chart.Plot->GetAxis(vtkAxis::BOTTOM), lowX - marginX, highX + marginX);
+  chart.Plot->GetAxis(vtkAxis::BOTTOM)->SetTitle(fractions ? "% of the R-R interval" : "phase");
+  chart.Plot->GetAxis(vtkAxis::LEFT)->SetTitle(AxisTitle(column));
+  chart.Write(cases.size() == 1 ? column.key + (", " + cases[0].name) : column.key, stem);
+}
+}
+
+std::vector<std::string> DrawPlots(
+  const std::vector<CaseEvaluation>& cases, const std::string& folder)
+{
+  if (cases.empty())
+  {
+    throw std::invalid_argument("There is no case to plot.");
+  }
+  std::vector<std::string> written;
+  for (const EvaluationColumn& column : EvaluationColumns())
+  {
+    const bool known = std::any_of(cases.begin(), cases.end(),
+      [&](const CaseEvaluation& one)
+      {
+        return std::any_of(one.phases.begin(), one.phases.end(),
+          [&](const PhaseEvaluation& phase)
+          { return std::isfinite(phase.measures.*(column.value)); });
+      });
+    if (known)
+    {
+      ThrowIfInterrupted();
+      const std::string stem = folder + "/" + column.key;
+      DrawPlot(cases, column, stem);
+      written.push_back(stem + ".svg");
+    }
+  }
+  return written;
+}
+}
