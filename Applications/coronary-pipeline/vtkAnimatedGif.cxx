@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <new>
 #include <stdexcept>
 
@@ -173,49 +174,54 @@ Quantized Quantize(const std::vector<PictureCanvas>& frames)
   return result;
 }
 
-/// Closes the file, also when something was thrown.
-class GifFile
+int Append(GifFileType* file, const GifByteType* bytes, int count)
+{
+  static_cast<std::string*>(file->UserData)->append(reinterpret_cast<const char*>(bytes), count);
+  return count;
+}
+
+/// A GIF in memory: giflib makes files that only their owner may read.
+class GifStream
 {
 public:
-  explicit GifFile(const std::string& path)
-    : Path(path)
+  GifStream()
+    : File(EGifOpen(&this->Bytes, Append, nullptr))
   {
-    int error = 0;
-    this->File = EGifOpenFileName(path.c_str(), false, &error);
     if (!this->File)
     {
-      throw std::runtime_error("Can not write '" + path + "'.");
+      throw std::bad_alloc();
     }
     EGifSetGifVersion(this->File, true);
   }
-  ~GifFile()
+  ~GifStream()
   {
     if (this->File)
     {
       EGifCloseFile(this->File, nullptr);
     }
   }
-  GifFile(const GifFile&) = delete;
-  GifFile& operator=(const GifFile&) = delete;
+  GifStream(const GifStream&) = delete;
+  GifStream& operator=(const GifStream&) = delete;
 
   GifFileType* Get() const { return this->File; }
-  void Require(int result) const
+  static void Require(int result)
   {
     if (result != GIF_OK)
     {
-      throw std::runtime_error("Can not write '" + this->Path + "'.");
+      throw std::runtime_error("An animation could not be encoded.");
     }
   }
-  void Close()
+  const std::string& Finish()
   {
     GifFileType* file = this->File;
     this->File = nullptr;
-    this->Require(EGifCloseFile(file, nullptr));
+    Require(EGifCloseFile(file, nullptr));
+    return this->Bytes;
   }
 
 private:
-  std::string Path;
-  GifFileType* File = nullptr;
+  std::string Bytes;
+  GifFileType* File;
 };
 }
 #endif
@@ -257,7 +263,7 @@ void WriteAnimatedGif(
   {
     throw std::bad_alloc();
   }
-  GifFile file(path);
+  GifStream file;
   const int described = EGifPutScreenDesc(file.Get(), width, height, 8, 0, map);
   GifFreeMapObject(map);
   file.Require(described);
@@ -286,7 +292,13 @@ void WriteAnimatedGif(
       file.Require(EGifPutLine(file.Get(), line.data(), width));
     }
   }
-  file.Close();
+  std::ofstream stream(path, std::ios::binary);
+  stream << file.Finish();
+  stream.close();
+  if (!stream)
+  {
+    throw std::runtime_error("Can not write '" + path + "'.");
+  }
 #else
   throw std::runtime_error("Can not write '" + path + "': built without giflib.");
 #endif

@@ -12,7 +12,6 @@
 #include "vtkCellArrayIterator.h"
 #include "vtkCellData.h"
 #include "vtkColorTransferFunction.h"
-#include "vtkDoubleArray.h"
 #include "vtkFloatArray.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
@@ -262,6 +261,12 @@ std::string PhaseName(const PhaseEvaluation& phase)
   return "Phase " + std::to_string(phase.phase);
 }
 
+std::string PhaseTitle(const PhaseEvaluation& phase)
+{
+  return PhaseName(phase) +
+    (phase.lost ? ", tracking lost" : (phase.interpolated ? ", interpolated" : ", tracked"));
+}
+
 std::string Distances(const PhaseEvaluation& phase)
 {
   return "HD " + Number(phase.measures.hausdorff, 2) + "   MSD " + Number(phase.measures.msd, 2) +
@@ -499,10 +504,8 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
       const int left = Margin + k * (largeWidth + Gap);
       page.Draw(PaintOverlay(stage, first + k, close, largeWidth - 2 * inside, largeInside),
         left + inside, top + Band);
-      page.Write(left + 22, top + 32,
-        PhaseName(phase) +
-          (phase.lost ? ", tracking lost" : (phase.interpolated ? ", interpolated" : ", tracked")),
-        30, phase.lost ? Orange : Black, Anchor::Left, true);
+      page.Write(left + 22, top + 32, PhaseTitle(phase), 30, phase.lost ? Orange : Black,
+        Anchor::Left, true);
       page.Write(left + largeWidth - 22, top + 32, Percent(phase), 26, Black, Anchor::Right);
       page.Write(left + 22, top + largeHeight - 32, Distances(phase), 26, Black);
       DrawFrame(page, left, top, largeWidth, largeHeight, phase);
@@ -511,5 +514,500 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
       close, largeInside);
   }
   page.WritePng(path);
+}
+
+namespace
+{
+/// Dark to bright, even steps to the eye (viridis), in the order of the distance.
+vtkSmartPointer<vtkColorTransferFunction> DistanceColours(double greatest)
+{
+  constexpr std::array<std::array<double, 3>, 6> Viridis = { { { 0.267, 0.005, 0.329 },
+    { 0.254, 0.265, 0.530 }, { 0.164, 0.471, 0.558 }, { 0.135, 0.659, 0.518 },
+    { 0.478, 0.821, 0.318 }, { 0.993, 0.906, 0.144 } } };
+  auto map = vtkSmartPointer<vtkColorTransferFunction>::New();
+  for (std::size_t k = 0; k < Viridis.size(); ++k)
+  {
+    const double at = greatest * static_cast<double>(k) / (Viridis.size() - 1);
+    map->AddRGBPoint(at, Viridis[k][0], Viridis[k][1], Viridis[k][2]);
+  }
+  map->SetNanColor(0.7, 0.7, 0.7);
+  return map;
+}
+
+/// 1, 2 or 5 times a power of ten, not below the value.
+double RoundUp(double value)
+{
+  const double power = std::pow(10.0, std::floor(std::log10(std::max(value, 1e-6))));
+  for (const double factor : { 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0 })
+  {
+    if (factor * power >= value * (1.0 - 1e-9))
+    {
+      return factor * power;
+    }
+  }
+  return 10.0 * power;
+}
+
+void DrawColourBar(PictureCanvas& page, int x, int y, int width, int height,
+  vtkColorTransferFunction* map, double greatest)
+{
+  for (int column = 0; column < width; ++column)
+  {
+    double rgb[3];
+    map->GetColor(greatest * (column + 0.5) / width, rgb);
+    page.Fill(x + column, y, 1, height,
+      { static_cast<unsigned char>(255.0 * rgb[0] + 0.5),
+        static_cast<unsigned char>(255.0 * rgb[1] + 0.5),
+        static_cast<unsigned char>(255.0 * rgb[2] + 0.5) });
+  }
+  page.Frame(x, y, width, height, 2, Black);
+  constexpr int Ticks = 5;
+  for (int k = 0; k <= Ticks; ++k)
+  {
+    const int at = x + (width - 2) * k / Ticks;
+    page.Fill(at, y + height, 2, 8, Black);
+    char text[32];
+    std::snprintf(
+      text, sizeof(text), "%s%.3g", k == Ticks ? "\xE2\x89\xA5 " : "", greatest * k / Ticks);
+    page.Write(at, y + height + 26, text, 26, Black, Anchor::Centre);
+  }
+}
+
+/// Four phases that are evenly spread, the nearest of them replaced by that with the greatest HD.
+std::vector<int> FourPhases(const Stage& stage)
+{
+  const int count = stage.Count();
+  std::vector<int> chosen;
+  for (int k = 0; k < std::min(4, count); ++k)
+  {
+    chosen.push_back(count <= 4 ? k : k * count / 4);
+  }
+  const int worst = stage.Worst(false);
+  if (worst >= 0 && std::find(chosen.begin(), chosen.end(), worst) == chosen.end())
+  {
+    *std::min_element(chosen.begin(), chosen.end(),
+      [&](int a, int b) { return std::abs(a - worst) < std::abs(b - worst); }) = worst;
+  }
+  return chosen;
+}
+}
+
+void DrawDistances(const EvaluationScene& scene, const std::string& path)
+{
+  const Stage stage(scene);
+  const std::vector<int> phases = FourPhases(stage);
+  std::vector<MeshDistance> distances;
+  std::vector<double> all;
+  for (const int k : phases)
+  {
+    distances.push_back(stage.Distance(k));
+    for (const double distance : distances.back().pointDistancesA)
+    {
+      if (std::isfinite(distance))
+      {
+        all.push_back(std::abs(distance));
+      }
+    }
+  }
+  // A few points far away must not take the colours from all others.
+  double greatest = 1.0;
+  if (!all.empty())
+  {
+    const auto place = all.begin() + static_cast<std::ptrdiff_t>(0.995 * (all.size() - 1));
+    std::nth_element(all.begin(), place, all.end());
+    greatest = RoundUp(std::max(*place, 1e-3));
+  }
+  const vtkSmartPointer<vtkColorTransferFunction> map = DistanceColours(greatest);
+
+  constexpr int Gap = 14;
+  constexpr int Header = 90;
+  constexpr int Footer = 130;
+  constexpr int Band = 56;
+  const int columns = phases.size() == 1 ? 1 : 2;
+  const int rows = (static_cast<int>(phases.size()) + 1) / 2;
+  const int width = (PageWidth - 2 * Margin - (columns - 1) * Gap) / columns;
+  const int height = std::min(width * 3 / 4, 1000);
+  PictureCanvas page(PageWidth, 2 * Margin + Header + rows * (height + Gap) + Footer);
+  const int inside = FrameThickness + 2;
+  const PictureView view = stage.View(double(width - 2 * inside) / (height - 2 * Band), 0.02);
+  page.Write(Margin, Margin + 20, stage.Name() + ": distance of the model from the truth", 40,
+    Black, Anchor::Left, true);
+  page.Write(PageWidth - Margin, Margin + 20, "view " + view.Name(), 28, Grey, Anchor::Right);
+  for (std::size_t k = 0; k < phases.size(); ++k)
+  {
+    const PhaseEvaluation& phase = stage.Phase(phases[k]);
+    vtkNew<vtkPolyData> coloured;
+    coloured->ShallowCopy(stage.Model(phases[k]));
+    vtkNew<vtkFloatArray> values;
+    values->SetName(vtkCoronaryArrayNames::SurfaceDistance);
+    values->SetNumberOfTuples(coloured->GetNumberOfPoints());
+    for (vtkIdType point = 0; point < coloured->GetNumberOfPoints(); ++point)
+    {
+      values->SetValue(
+        point, static_cast<float>(std::abs(distances[k].pointDistancesA[std::size_t(point)])));
+    }
+    coloured->GetPointData()->SetScalars(values);
+    const int left = Margin + static_cast<int>(k % 2) * (width + Gap);
+    const int top = Margin + Header + static_cast<int>(k / 2) * (height + Gap);
+    PictureItem item{ coloured, Grey };
+    item.map = map;
+    page.Draw(stage.Painter().Paint({ item }, view, width - 2 * inside, height - 2 * Band),
+      left + inside, top + Band);
+    page.Write(
+      left + 22, top + 32, PhaseTitle(phase), 30, phase.lost ? Orange : Black, Anchor::Left, true);
+    page.Write(left + width - 22, top + 32, Percent(phase), 26, Black, Anchor::Right);
+    page.Write(left + 22, top + height - 30, Distances(phase), 26, Black);
+    DrawFrame(page, left, top, width, height, phase);
+    if (k + 1 == phases.size())
+    {
+      DrawScaleBar(page, left + width - 30, top + height - 18, view, height - 2 * Band);
+    }
+  }
+  const int bar = Margin + Header + rows * (height + Gap) + 40;
+  page.Write(PageWidth / 2 - 520, bar + 20, "distance (mm)", 30, Black, Anchor::Right);
+  DrawColourBar(page, PageWidth / 2 - 480, bar, 960, 40, map, greatest);
+  page.WritePng(path);
+}
+
+namespace
+{
+// Told apart by lightness as well (Tableau's twenty, the darker ones first).
+constexpr std::array<Colour, 16> BranchColours = { { { 31, 119, 180 }, { 214, 39, 40 },
+  { 44, 160, 44 }, { 255, 127, 14 }, { 148, 103, 189 }, { 140, 86, 75 }, { 227, 119, 194 },
+  { 23, 190, 207 }, { 188, 189, 34 }, { 90, 90, 90 }, { 0, 80, 120 }, { 255, 152, 150 },
+  { 90, 200, 120 }, { 255, 187, 80 }, { 180, 160, 220 }, { 120, 60, 20 } } };
+
+/// Lines coloured by their branch.
+vtkSmartPointer<vtkPolyData> ColouredLines(
+  vtkPolyData* lines, const std::map<long long, std::size_t>& ranks)
+{
+  auto coloured = vtkSmartPointer<vtkPolyData>::New();
+  coloured->SetPoints(lines->GetPoints());
+  coloured->SetLines(lines->GetLines());
+  vtkDataArray* groups = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
+  vtkNew<vtkUnsignedCharArray> colours;
+  colours->SetNumberOfComponents(3);
+  for (vtkIdType cell = 0; cell < lines->GetNumberOfLines(); ++cell)
+  {
+    const long long id = groups ? static_cast<long long>(groups->GetComponent(cell, 0)) : cell;
+    const auto rank = ranks.find(id);
+    colours->InsertNextTypedTuple(
+      BranchColours[(rank == ranks.end() ? 0 : rank->second) % BranchColours.size()].data());
+  }
+  coloured->GetCellData()->SetScalars(colours);
+  return coloured;
+}
+
+/// Branches in the order of their ids get colours in the order of the palette.
+std::map<long long, std::size_t> RanksOf(vtkPolyData* lines)
+{
+  std::map<long long, std::size_t> ranks;
+  vtkDataArray* groups = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
+  for (vtkIdType cell = 0; cell < lines->GetNumberOfLines(); ++cell)
+  {
+    ranks[groups ? static_cast<long long>(groups->GetComponent(cell, 0)) : cell] = 0;
+  }
+  std::size_t next = 0;
+  for (auto& [id, rank] : ranks)
+  {
+    rank = next++;
+  }
+  return ranks;
+}
+
+/// Points of the tree, spaced along its lines and with both of a line's ends.
+std::vector<vtkIdType> SpacedPoints(vtkPolyData* lines, double spacing)
+{
+  std::vector<vtkIdType> chosen;
+  auto cells = vtkSmartPointer<vtkCellArrayIterator>::Take(lines->GetLines()->NewIterator());
+  for (cells->GoToFirstCell(); !cells->IsDoneWithTraversal(); cells->GoToNextCell())
+  {
+    vtkIdType count = 0;
+    const vtkIdType* ids = nullptr;
+    cells->GetCurrentCell(count, ids);
+    double length = 0.0;
+    double last = -spacing;
+    Vector3 before = Vector3::Zero();
+    for (vtkIdType k = 0; k < count; ++k)
+    {
+      Vector3 point;
+      lines->GetPoint(ids[k], point.data());
+      length += k > 0 ? (point - before).norm() : 0.0;
+      before = point;
+      if (length >= last + spacing)
+      {
+        chosen.push_back(ids[k]);
+        last = length;
+      }
+    }
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+/// Where points of the tree go, one tube each.
+vtkSmartPointer<vtkPolyData> PathTubes(
+  const std::vector<vtkPolyData*>& trees, const std::vector<vtkIdType>& chosen, double radius)
+{
+  vtkNew<vtkPoints> points;
+  vtkNew<vtkCellArray> lines;
+  for (const vtkIdType id : chosen)
+  {
+    lines->InsertNextCell(static_cast<int>(trees.size()));
+    for (vtkPolyData* tree : trees)
+    {
+      lines->InsertCellPoint(points->InsertNextPoint(tree->GetPoint(id)));
+    }
+  }
+  vtkNew<vtkPolyData> paths;
+  paths->SetPoints(points);
+  paths->SetLines(lines);
+  vtkNew<vtkTubeFilter> tubes;
+  tubes->SetInputData(paths);
+  tubes->SetRadius(radius);
+  tubes->SetNumberOfSides(10);
+  tubes->CappingOn();
+  tubes->Update();
+  vtkSmartPointer<vtkPolyData> tube = vtkSmartPointer<vtkPolyData>::New();
+  tube->ShallowCopy(tubes->GetOutput());
+  return tube;
+}
+
+vtkSmartPointer<vtkPolyData> Spheres(
+  vtkPolyData* tree, const std::vector<vtkIdType>& chosen, double radius)
+{
+  vtkNew<vtkAppendPolyData> all;
+  for (const vtkIdType id : chosen)
+  {
+    vtkNew<vtkSphereSource> sphere;
+    sphere->SetCenter(tree->GetPoint(id));
+    sphere->SetRadius(radius);
+    sphere->SetThetaResolution(14);
+    sphere->SetPhiResolution(10);
+    sphere->Update();
+    all->AddInputData(sphere->GetOutput());
+  }
+  vtkSmartPointer<vtkPolyData> result = vtkSmartPointer<vtkPolyData>::New();
+  if (!chosen.empty())
+  {
+    all->Update();
+    result->ShallowCopy(all->GetOutput());
+  }
+  return result;
+}
+
+/// Root of the mean squared move between two phases, of points that correspond; of the middle, where none do.
+double MoveBetween(vtkPolyData* a, vtkPolyData* b)
+{
+  if (a->GetNumberOfPoints() != b->GetNumberOfPoints() || a->GetNumberOfPoints() == 0)
+  {
+    Vector3 first;
+    Vector3 second;
+    a->GetCenter(first.data());
+    b->GetCenter(second.data());
+    return (first - second).norm();
+  }
+  double sum = 0.0;
+  for (vtkIdType k = 0; k < a->GetNumberOfPoints(); ++k)
+  {
+    Vector3 first;
+    Vector3 second;
+    a->GetPoint(k, first.data());
+    b->GetPoint(k, second.data());
+    sum += (first - second).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(a->GetNumberOfPoints()));
+}
+
+/// The two phases that are furthest apart, and the one that is furthest from both.
+std::vector<int> ThreePhases(const Stage& stage)
+{
+  const int count = stage.Count();
+  if (count <= 3)
+  {
+    std::vector<int> all(count);
+    for (int k = 0; k < count; ++k)
+    {
+      all[k] = k;
+    }
+    return all;
+  }
+  std::vector<std::vector<double>> moves(count, std::vector<double>(count, 0.0));
+  int first = 0;
+  int second = 1;
+  for (int a = 0; a < count; ++a)
+  {
+    for (int b = a + 1; b < count; ++b)
+    {
+      moves[a][b] = moves[b][a] = MoveBetween(stage.Model(a), stage.Model(b));
+      if (moves[a][b] > moves[first][second])
+      {
+        first = a;
+        second = b;
+      }
+    }
+  }
+  int third = -1;
+  for (int k = 0; k < count; ++k)
+  {
+    if (k != first && k != second &&
+      (third < 0 ||
+        std::min(moves[k][first], moves[k][second]) >
+          std::min(moves[third][first], moves[third][second])))
+    {
+      third = k;
+    }
+  }
+  std::vector<int> three = { first, second, third };
+  std::sort(three.begin(), three.end());
+  return three;
+}
+
+void DrawPanelTitle(PictureCanvas& page, int x, int y, const char* letter, const std::string& text)
+{
+  const int after = x + page.Write(x, y, letter, 38, Black, Anchor::Left, true);
+  page.Write(after + 16, y, text, 32, Black);
+}
+}
+
+void DrawSequence(const EvaluationScene& scene, const std::string& path)
+{
+  const Stage stage(scene);
+  std::vector<vtkPolyData*> trees;
+  for (int k = 0; k < stage.Count(); ++k)
+  {
+    if (vtkPolyData* tree = stage.Centerline(k))
+    {
+      trees.push_back(tree);
+    }
+  }
+  const bool correspond = std::all_of(trees.begin(), trees.end(),
+    [&](vtkPolyData* tree) { return tree->GetNumberOfPoints() == trees[0]->GetNumberOfPoints(); });
+  const bool paths = correspond && trees.size() > 1;
+  const int panels = 1 + (trees.empty() ? 0 : 1) + (paths ? 1 : 0);
+
+  constexpr int Gap = 20;
+  constexpr int Header = 150;
+  const int width = (PageWidth - 2 * Margin - (panels - 1) * Gap) / panels;
+  const int height = std::min(width, 1000);
+  PictureCanvas page(PageWidth, 2 * Margin + Header + height);
+  const PictureView view = stage.View(double(width) / height, 0.02);
+  // As wide as it is seen well, whatever the tree's size.
+  const double unit = view.height / 1000.0;
+  page.Write(Margin, Margin + 16, stage.Name(), 40, Black, Anchor::Left, true);
+  page.Write(PageWidth - Margin, Margin + 16, "view " + view.Name(), 28, Grey, Anchor::Right);
+  const int titles = Margin + 100;
+  const int top = Margin + Header;
+  int left = Margin;
+  char letter[] = "(a)";
+
+  if (!trees.empty())
+  {
+    const auto ranks = RanksOf(trees[0]);
+    std::vector<vtkSmartPointer<vtkPolyData>> kept;
+    std::vector<PictureItem> items;
+    for (vtkPolyData* tree : trees)
+    {
+      kept.push_back(ColouredLines(tree, ranks));
+      PictureItem item{ kept.back(), Grey };
+      item.lineWidth = 2.0;
+      item.cellColours = true;
+      items.push_back(item);
+    }
+    page.Draw(stage.Painter().Paint(items, view, width, height), left, top);
+    DrawPanelTitle(page, left, titles, letter,
+      "centerlines of " + std::to_string(trees.size()) + " phases, by branch");
+    left += width + Gap;
+    ++letter[1];
+  }
+  if (paths)
+  {
+    const std::vector<vtkIdType> chosen = SpacedPoints(trees[0], 28.0 * unit);
+    const auto tubes = PathTubes(trees, chosen, 2.2 * unit);
+    const auto spheres = Spheres(trees[0], chosen, 6.0 * unit);
+    PictureItem trail{ tubes, { 40, 110, 200 } };
+    trail.opacity = 0.45;
+    PictureItem line{ trees[0], { 150, 150, 150 } };
+    line.lineWidth = 1.5;
+    page.Draw(
+      stage.Painter().Paint({ line, { spheres, Red }, trail }, view, width, height), left, top);
+    DrawPanelTitle(page, left, titles, letter, "paths from the first phase (red) on");
+    left += width + Gap;
+    ++letter[1];
+  }
+  const std::vector<int> three = ThreePhases(stage);
+  constexpr std::array<Colour, 3> PhaseColours = { { { 66, 120, 190 }, { 236, 150, 40 },
+    { 190, 60, 110 } } };
+  std::vector<PictureItem> items;
+  for (std::size_t k = 0; k < three.size(); ++k)
+  {
+    items.push_back({ stage.Model(three[k]), PhaseColours[k] });
+  }
+  page.Draw(stage.Painter().Paint(items, view, width, height), left, top);
+  DrawPanelTitle(page, left, titles, letter,
+    "mesh at " + std::to_string(three.size()) + (three.size() == 1 ? " phase" : " phases"));
+  int y = top + 20;
+  for (std::size_t k = 0; k < three.size(); ++k, y += 36)
+  {
+    const std::string percent = Percent(stage.Phase(three[k]));
+    const int keyLeft = left + width - 190;
+    page.Fill(keyLeft - 44, y - 11, 32, 22, PhaseColours[k]);
+    page.Write(keyLeft, y, percent.empty() ? PhaseName(stage.Phase(three[k])) : percent, 26, Black);
+  }
+  DrawScaleBar(page, PageWidth - Margin - 4, top + height - 10, view, height);
+  page.WritePng(path);
+}
+
+std::vector<std::string> DrawBeating(const EvaluationScene& scene, const std::string& folder)
+{
+  const Stage stage(scene);
+  constexpr int Side = 640;
+  constexpr int Band = 44;
+  std::vector<int> order(stage.Count());
+  for (int k = 0; k < stage.Count(); ++k)
+  {
+    order[k] = k;
+  }
+  const bool fractions = std::all_of(
+    order.begin(), order.end(), [&](int k) { return std::isfinite(stage.Phase(k).fraction); });
+  if (fractions)
+  {
+    std::stable_sort(order.begin(), order.end(),
+      [&](int a, int b) { return stage.Phase(a).fraction < stage.Phase(b).fraction; });
+  }
+  const PictureView view = stage.View(double(Side) / (Side - 2 * Band), 0.02);
+  std::vector<PictureCanvas> frames;
+  std::vector<int> delays;
+  std::vector<std::string> written;
+  for (std::size_t k = 0; k < order.size(); ++k)
+  {
+    const PhaseEvaluation& phase = stage.Phase(order[k]);
+    PictureCanvas frame(Side, Side);
+    frame.Draw(PaintOverlay(stage, order[k], view, Side, Side - 2 * Band), 0, Band);
+    frame.Write(
+      14, Band / 2, PhaseTitle(phase), 22, phase.lost ? Orange : Black, Anchor::Left, true);
+    frame.Write(Side - 14, Band / 2, Percent(phase), 22, Black, Anchor::Right);
+    frame.Fill(14, Side - Band / 2 - 9, 28, 18, Red);
+    const int after = 50 + frame.Write(50, Side - Band / 2, "model", 20, Black) + 24;
+    frame.Fill(after, Side - Band / 2 - 9, 28, 18, Green);
+    frame.Write(after + 36, Side - Band / 2, "truth", 20, Black);
+    frame.Write(Side - 14, Side - Band / 2, Distances(phase), 18, Grey, Anchor::Right);
+    char name[48];
+    std::snprintf(name, sizeof(name), "/beating_%02zu.png", k);
+    written.push_back(folder + name);
+    frame.WritePng(written.back());
+    // Two seconds a cycle; what follows the last phase is as far away as the first from its next.
+    const double step = !fractions || order.size() < 2 ? 1.0 / static_cast<double>(order.size())
+      : k + 1 < order.size() ? stage.Phase(order[k + 1]).fraction - phase.fraction
+                             : phase.fraction - stage.Phase(order[k - 1]).fraction;
+    delays.push_back(std::clamp(static_cast<int>(std::lround(200.0 * step)), 3, 100));
+    frames.push_back(std::move(frame));
+  }
+  if (CanWriteGif())
+  {
+    WriteAnimatedGif(frames, delays, folder + "/beating.gif");
+  }
+  return written;
 }
 }

@@ -193,9 +193,10 @@ PictureCanvas ScenePainter::Paint(
     property->SetColor(item.colour[0] / 255.0, item.colour[1] / 255.0, item.colour[2] / 255.0);
     property->SetOpacity(item.opacity);
     property->SetLineWidth(static_cast<float>(Oversampling * item.lineWidth));
-    property->SetAmbient(0.18);
-    property->SetDiffuse(0.82);
-    property->SetSpecular(0.12);
+    // Colours that are read off must not be hidden by shade.
+    property->SetAmbient(item.map ? 0.4 : 0.18);
+    property->SetDiffuse(item.map ? 0.65 : 0.82);
+    property->SetSpecular(item.map ? 0.04 : 0.12);
     property->SetSpecularPower(25.0);
     if (item.data->GetNumberOfPolys() == 0)
     {
