@@ -17,18 +17,18 @@ common=(
   g++ cmake ninja-build ccache
   libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev
   libcgal-dev
-  libgtest-dev clang-format-14
+  libfreetype-dev libgif-dev libglew-dev libx11-dev
+  libgtest-dev clang-format-14 xvfb xauth
 )
 paraview=(
   paraview-dev python3-paraview
   libopenmpi-dev libdouble-conversion-dev libqt5svg5 qttools5-dev qtxmlpatterns5-dev-tools
-  xvfb xauth
 )
 # VTK 9.1 itself can not be installed beside python3-paraview: scripts/vtk-prefix.sh unpacks it
 # into a folder of its own, and these are what its libraries load.
 vtk=(
-  libtbb-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libpng16-16 libtiff6
-  patchelf
+  libtbb-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libopenmpi3 libpng16-16
+  libtiff6 patchelf
 )
 developer=(clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev)
 
