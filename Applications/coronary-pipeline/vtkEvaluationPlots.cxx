@@ -28,7 +28,11 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
+#include <regex>
+#include <sstream>
 #include <stdexcept>
 
 namespace coronary
@@ -41,6 +45,8 @@ constexpr std::array<Rgb, 7> CaseColours = { { { 0, 114, 178 }, { 213, 94, 0 }, 
   { 204, 121, 167 }, { 230, 159, 0 }, { 86, 180, 233 }, { 90, 90, 90 } } };
 constexpr int Width = 1200;
 constexpr int Height = 720;
+// Of the size of a mark.
+constexpr double MarkStroke = 0.16;
 
 enum Mark
 {
@@ -113,6 +119,114 @@ void SetRange(vtkAxis* axis, double low, double high)
 {
   axis->SetBehavior(vtkAxis::FIXED);
   axis->SetRange(low, high);
+}
+
+std::string Short(double value)
+{
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.6g", value);
+  return text;
+}
+
+std::string ReadText(const std::string& path)
+{
+  std::ifstream file(path, std::ios::binary);
+  return { std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
+}
+
+/// x' = a x + e, y' = d y + f
+struct SvgScale
+{
+  double a = 1.0;
+  double d = 1.0;
+  double e = 0.0;
+  double f = 0.0;
+
+  /// What VTK takes for a pixel's size when it writes line widths and marks.
+  double Pixel() const { return 2.0 * a * d / (a + d); }
+};
+
+/// A group's content, its coordinates no longer those of the data.
+std::string Applied(const SvgScale& scale, const std::string& content)
+{
+  static const std::regex Parts(
+    R"re(points="([^"]*)"|<use x="([^"]*)" y="([^"]*)" width="([^"]*)" height="[^"]*"|stroke-width="([^"]*)")re");
+  std::string result;
+  auto last = content.cbegin();
+  for (std::sregex_iterator part(content.begin(), content.end(), Parts), end; part != end; ++part)
+  {
+    const std::smatch& match = *part;
+    result.append(last, match[0].first);
+    last = match[0].second;
+    if (match[1].matched)
+    {
+      std::string numbers = match[1].str();
+      std::replace(numbers.begin(), numbers.end(), ',', ' ');
+      std::istringstream stream(numbers);
+      result += "points=\"";
+      double x = 0.0;
+      double y = 0.0;
+      while (stream >> x >> y)
+      {
+        result += "\n" + Short(scale.a * x + scale.e) + "," + Short(scale.d * y + scale.f);
+      }
+      result += "\n\"";
+    }
+    else if (match[2].matched)
+    {
+      const double width = std::stod(match[4]);
+      const double size = width * scale.Pixel();
+      const double x = scale.a * (std::stod(match[2]) + 0.5 * width) + scale.e - 0.5 * size;
+      const double y = scale.d * (std::stod(match[3]) + 0.5 * width) + scale.f - 0.5 * size;
+      result += "<use x=\"" + Short(x) + "\" y=\"" + Short(y) + "\" width=\"" + Short(size) +
+        "\" height=\"" + Short(size) + "\"";
+    }
+    else
+    {
+      // Of a line; that of marks is in shares of their size.
+      const bool line = last != content.cend() && *last == ' ';
+      result +=
+        "stroke-width=\"" + Short(line ? std::stod(match[5]) * scale.Pixel() : MarkStroke) + "\"";
+    }
+  }
+  result.append(last, content.cend());
+  return result;
+}
+
+/**
+ * VTK draws in the coordinates of the data and stretches: marks would be as wide as the axes differ, and
+ * its clipping rectangles are upside down besides. All that is drawn lies inside the axes, which need no clipping.
+ */
+std::string WithoutTransforms(std::string drawing)
+{
+  drawing = std::regex_replace(drawing, std::regex(R"re( clip-path="[^"]*")re"), "");
+  drawing = std::regex_replace(drawing, std::regex(R"re(\s*<clipPath[^]*?</clipPath>)re"), "");
+  const std::regex head(
+    R"re(<g transform="matrix\(([^,]*),0,0,([^,]*),([^,]*),([^)]*)\)"[^>]*>)re");
+  std::smatch match;
+  while (std::regex_search(drawing, match, head))
+  {
+    const SvgScale scale{ std::stod(match[1]), std::stod(match[2]), std::stod(match[3]),
+      std::stod(match[4]) };
+    const std::size_t begin = static_cast<std::size_t>(match.position(0) + match.length(0));
+    // The end of this group, not of one inside.
+    std::size_t end = begin;
+    for (int depth = 1; depth > 0; ++end)
+    {
+      const std::size_t close = drawing.find("</g>", end);
+      const std::size_t open = drawing.find("<g", end);
+      if (close == std::string::npos)
+      {
+        throw std::runtime_error("A group of an SVG file has no end.");
+      }
+      depth += open < close ? 1 : -1;
+      end = std::min(open, close);
+    }
+    --end;
+    drawing = drawing.substr(0, static_cast<std::size_t>(match.position(0))) + "<g>" +
+      Applied(scale, drawing.substr(begin, end - begin)) + drawing.substr(end);
+  }
+  return drawing;
 }
 
 class Chart
@@ -202,7 +316,11 @@ public:
     exporter->SetFileName(drawing.c_str());
     exporter->SetTitle(title.c_str());
     exporter->Write();
-    if (!std::filesystem::exists(drawing, ignored))
+    const std::string text = WithoutTransforms(ReadText(drawing));
+    std::ofstream file(drawing, std::ios::binary);
+    file << text;
+    file.close();
+    if (!file || text.empty())
     {
       throw std::runtime_error("Can not write '" + drawing + "'.");
     }
