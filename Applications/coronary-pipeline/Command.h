@@ -44,6 +44,7 @@ MakeCommand MakeRunCommand;
 MakeCommand MakeConvertCommand;
 MakeCommand MakeSequenceCommand;
 MakeCommand MakeMetricsCommand;
+MakeCommand MakeEvaluateCommand;
 }
 
 #endif

@@ -28,6 +28,7 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakeRunCommand,
   coronary::MakeSequenceCommand,
   coronary::MakeMetricsCommand,
+  coronary::MakeEvaluateCommand,
   coronary::MakeConvertCommand,
 };
 

@@ -265,7 +265,9 @@ private:
   std::size_t JoinParent(Course& course, std::int32_t owner) const;
   void Own(std::size_t branch);
   void FindTips();
+  bool ThinBranchesFor(ThinBranchSettings& settings) const;
   void FollowThinBranches();
+  void LengthenTips();
   void FollowTargets();
   void StraightenFork(
     CenterlineTree& tree, std::size_t parent, std::size_t turning, std::size_t straight) const;
@@ -1463,21 +1465,31 @@ void Extractor::FindTips()
   }
 }
 
-/// What is too thin for the region, by the image alone.
-void Extractor::FollowThinBranches()
+/// @returns false if none are to be followed
+bool Extractor::ThinBranchesFor(ThinBranchSettings& settings) const
 {
   const double contrast = this->Lumen.reference.lumen - this->Lumen.reference.background;
   if (!this->Settings.thinBranches || !this->Input.intensity || !this->Calibrated ||
     !(contrast > 0.0))
   {
-    return;
+    return false;
   }
-  ThinBranchSettings settings;
   settings.voxel = this->Voxel;
   settings.step = this->Step;
   settings.minimumLength = std::max(this->Settings.minimumBranchLength, 15.0 * this->Voxel);
   settings.maximumLength = 200.0 * this->Voxel;
   settings.contrast = contrast;
+  return true;
+}
+
+/// What is too thin for the region, by the image alone.
+void Extractor::FollowThinBranches()
+{
+  ThinBranchSettings settings;
+  if (!this->ThinBranchesFor(settings))
+  {
+    return;
+  }
   // Several spots lead to one vessel: what was followed once, whether to keep or not, is done.
   std::vector<Vector3> done;
   for (const ThinBranch& branch : FindThinBranches(*this->Image, this->Tree, settings))
@@ -1500,6 +1512,52 @@ void Extractor::FollowThinBranches()
     const auto parent =
       static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(branch.parent)]);
     this->Append(way, this->Tree.branches[parent].treeId, false);
+  }
+}
+
+/// What goes on beyond a tip, by the image alone.
+void Extractor::LengthenTips()
+{
+  ThinBranchSettings settings;
+  if (!this->ThinBranchesFor(settings) || this->Tree.points.empty())
+  {
+    return;
+  }
+  const std::vector<std::vector<Vector3>> paths = FollowTips(*this->Image, this->Tree, settings);
+  for (std::size_t b = 0; b < paths.size(); ++b)
+  {
+    if (paths[b].empty())
+    {
+      continue;
+    }
+    CenterlineTree::Branch& branch = this->Tree.branches[b];
+    // With a part of what is known, for the sake of the ends of tangents and smoothing.
+    const std::size_t known = std::min<std::size_t>(branch.points.size(), 12);
+    std::vector<Vector3> points;
+    double before = 0.0;
+    for (std::size_t i = branch.points.size() - known; i < branch.points.size(); ++i)
+    {
+      points.push_back(this->Tree.points[static_cast<std::size_t>(branch.points[i])]);
+      before += points.size() > 1 ? (points.back() - points[points.size() - 2]).norm() : 0.0;
+    }
+    points.insert(points.end(), paths[b].begin(), paths[b].end());
+    Course course;
+    course.points = ResampleCurve(points, this->Step);
+    course.confidence.assign(course.size(), 1.0);
+    this->SmoothPositions(course, 1e3, 0.0);
+    this->Measure(course, false);
+    this->SmoothRadii(course);
+    const auto first = static_cast<std::size_t>(std::ceil(before / this->Step + 0.5));
+    for (std::size_t i = first; i < course.size(); ++i)
+    {
+      branch.points.push_back(static_cast<std::int64_t>(this->Tree.points.size()));
+      this->Tree.points.push_back(course.points[i]);
+      this->Tree.radius.push_back(course.radius[i]);
+      this->Tree.confidence.push_back(course.confidence[i]);
+      this->PointLumen.push_back(course.lumen[i]);
+      this->BranchOf.push_back(static_cast<std::int32_t>(b));
+    }
+    this->Own(b);
   }
 }
 
@@ -1908,6 +1966,7 @@ CenterlineResult Extractor::Run()
     {
       this->FindTips();
       this->FollowThinBranches();
+      this->LengthenTips();
     }
     this->FollowTargets();
   }

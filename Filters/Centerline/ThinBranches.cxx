@@ -20,6 +20,10 @@ constexpr double LeastDeparture = 0.35;
 constexpr double FullDeparture = 40.0;
 /// Share of the contrast by which the way from the parent may be darker than the branch itself.
 constexpr double DeepestValley = 0.1;
+/// Distance of a path's samples, in voxels.
+constexpr double Stride = 0.75;
+/// How far a tip is followed, in voxels.
+constexpr double MostBeyondTip = 30.0;
 
 /// The lumens of a tree, for "how far is the nearest wall".
 class TreeLumen
@@ -103,6 +107,7 @@ public:
   }
 
   std::vector<ThinBranch> Run() const;
+  std::vector<Vector3> FollowTip(const CenterlineTree::Branch& branch) const;
 
 private:
   struct Spot
@@ -126,6 +131,18 @@ private:
   bool Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const;
   Vector3 Turn(const Vector3& position, const Vector3& direction) const;
   Vector3 Centre(const Vector3& position, const Vector3& tangent) const;
+  /// What a path must show.
+  struct Bar
+  {
+    double least;        ///< contrast to any side, mean of the path
+    double going;        ///< contrast that speaks neither for going on nor against it
+    double unknown;      ///< taken for the contrast where it can not be seen
+    double significance; ///< standard errors
+  };
+  bool Walk(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
+    const Bar& bar, std::vector<Sample>& samples) const;
+  bool IsVessel(const std::vector<Sample>& samples, const Bar& bar, double& contrast,
+    double& significance) const;
   bool Follow(const Spot& spot, ThinBranch& branch) const;
 
   const ImageInterpolator& Image;
@@ -360,10 +377,90 @@ Vector3 Finder::Centre(const Vector3& position, const Vector3& tangent) const
   return centre;
 }
 
+/// Follows the tube, as far as the path speaks for a vessel.
+/// @param ownLumen  so many samples may lie in the tree's lumen
+/// @returns false if it leads into a vessel that is known
+bool Finder::Walk(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
+  const Bar& bar, std::vector<Sample>& samples) const
+{
+  const double step = Stride * this->Settings.voxel;
+  constexpr std::size_t window = 8;
+  while (samples.size() < most && this->Image.Contains(position))
+  {
+    Sample sample;
+    if (!this->Evidence(position, direction, sample))
+    {
+      sample.least = bar.unknown;
+    }
+    sample.wall = this->Lumen(position).wall;
+    if (sample.wall < 0.0 && samples.size() >= ownLumen)
+    {
+      return false;
+    }
+    samples.push_back(sample);
+    if (samples.size() >= window)
+    {
+      double recent = 0.0;
+      for (std::size_t i = samples.size() - window; i < samples.size(); ++i)
+      {
+        recent += samples[i].least / static_cast<double>(window);
+      }
+      if (recent < bar.going)
+      {
+        break;
+      }
+    }
+    const Vector3 ahead = this->Turn(position, direction);
+    const Vector3 before = position;
+    position = this->Centre(position + step * ahead, ahead);
+    const Vector3 gone = position - before;
+    if (!(gone.norm() > 0.3 * step))
+    {
+      break;
+    }
+    direction = (0.5 * direction + 0.5 * gone.normalized()).normalized();
+  }
+
+  std::size_t end = 0;
+  double sum = 0.0;
+  double top = 0.0;
+  for (std::size_t i = 0; i < samples.size(); ++i)
+  {
+    sum += samples[i].least - bar.going;
+    if (sum > top)
+    {
+      top = sum;
+      end = i + 1;
+    }
+  }
+  samples.resize(end);
+  return true;
+}
+
+/// Whether noise could not have made it.
+bool Finder::IsVessel(
+  const std::vector<Sample>& samples, const Bar& bar, double& contrast, double& significance) const
+{
+  const auto count = static_cast<double>(samples.size());
+  contrast = 0.0;
+  std::size_t clear = 0;
+  for (const Sample& sample : samples)
+  {
+    contrast += sample.least / count;
+    clear += sample.least >= bar.going ? 1 : 0;
+  }
+  // Samples three voxels apart are independent; four in the core, four in a sector.
+  const double independent = std::max(1.0, count * Stride / 3.0);
+  significance =
+    contrast / std::max(this->Noise * std::sqrt(0.5 / independent), 1e-9 * this->Settings.contrast);
+  return contrast >= bar.least && significance >= bar.significance &&
+    static_cast<double>(clear) >= 0.8 * count;
+}
+
 bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
 {
   const double voxel = this->Settings.voxel;
-  const double step = 0.75 * voxel;
+  const double step = Stride * voxel;
   // The first direction: of all that lead away.
   Vector3 direction = spot.outwards;
   double greatest = -std::numeric_limits<double>::infinity();
@@ -393,82 +490,22 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   direction = this->Turn(spot.position, direction);
 
   std::vector<Sample> samples;
-  Vector3 position = this->Centre(spot.position, direction);
-  constexpr std::size_t window = 8;
+  const Vector3 position = this->Centre(spot.position, direction);
   const auto most = static_cast<std::size_t>(this->Settings.maximumLength / step);
-  while (samples.size() < most && this->Image.Contains(position))
+  const Bar bar{ least, 0.5 * least, 0.0, this->Settings.significance };
+  if (!this->Walk(position, direction, most, 0, bar, samples))
   {
-    Sample sample;
-    if (!this->Evidence(position, direction, sample))
-    {
-      sample.least = 0.0;
-    }
-    const TreeLumen::Nearest nearest = this->Lumen(position);
-    sample.wall = nearest.wall;
-    if (nearest.wall < 0.0)
-    {
-      // Into a vessel that is known: no branch of its own.
-      return false;
-    }
-    samples.push_back(sample);
-    if (samples.size() >= window)
-    {
-      double recent = 0.0;
-      for (std::size_t i = samples.size() - window; i < samples.size(); ++i)
-      {
-        recent += samples[i].least / static_cast<double>(window);
-      }
-      if (recent < 0.5 * least)
-      {
-        break;
-      }
-    }
-    const Vector3 ahead = this->Turn(position, direction);
-    const Vector3 before = position;
-    position = this->Centre(position + step * ahead, ahead);
-    const Vector3 gone = position - before;
-    if (!(gone.norm() > 0.3 * step))
-    {
-      break;
-    }
-    direction = (0.5 * direction + 0.5 * gone.normalized()).normalized();
+    return false;
   }
-
-  // As far as the path speaks for a vessel.
-  std::size_t end = 0;
-  double sum = 0.0;
-  double top = 0.0;
-  for (std::size_t i = 0; i < samples.size(); ++i)
-  {
-    sum += samples[i].least - 0.5 * least;
-    if (sum > top)
-    {
-      top = sum;
-      end = i + 1;
-    }
-  }
-  samples.resize(end);
+  const std::size_t end = samples.size();
   if (end < 4 || static_cast<double>(end) * step < this->Settings.minimumLength)
   {
     return false;
   }
-  double mean = 0.0;
-  std::size_t beside = 0;
-  std::size_t clear = 0;
-  for (const Sample& sample : samples)
-  {
-    mean += sample.least / static_cast<double>(end);
-    beside += sample.wall < 2.5 * voxel ? 1 : 0;
-    clear += sample.least > 0.5 * least ? 1 : 0;
-  }
-  // Samples three voxels apart are independent; four in the core, four in a sector.
-  const double independent = std::max(1.0, static_cast<double>(end) * step / (3.0 * voxel));
-  branch.contrast = mean;
-  branch.significance =
-    mean / std::max(this->Noise * std::sqrt(0.5 / independent), 1e-9 * this->Settings.contrast);
-  if (mean < least || branch.significance < this->Settings.significance ||
-    static_cast<double>(beside) > 0.5 * static_cast<double>(end) ||
-    static_cast<double>(clear) < 0.8 * static_cast<double>(end))
+  const auto beside = std::count_if(samples.begin(), samples.end(),
+    [&](const Sample& sample) { return sample.wall < 2.5 * voxel; });
+  if (!this->IsVessel(samples, bar, branch.contrast, branch.significance) ||
+    static_cast<double>(beside) > 0.5 * static_cast<double>(end))
   {
     return false;
   }
@@ -521,6 +558,75 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   }
   branch.points = std::move(path);
   return true;
+}
+
+std::vector<Vector3> Finder::FollowTip(const CenterlineTree::Branch& branch) const
+{
+  const double voxel = this->Settings.voxel;
+  const auto point = [&](std::size_t i) -> const Vector3&
+  { return this->Tree.points[static_cast<std::size_t>(branch.points[i])]; };
+  // The very end may have been drawn into a corner of the region.
+  const Vector3& tip = point(branch.points.size() - 1);
+  const auto passed = [&](std::size_t i) { return (point(i) - tip).norm(); };
+  std::size_t near = branch.points.size() - 1;
+  while (near > 0 && passed(near) < 2.0 * voxel)
+  {
+    --near;
+  }
+  std::size_t far = near;
+  while (far > 0 && passed(far) < 8.0 * voxel)
+  {
+    --far;
+  }
+  const Vector3 back = point(near) - point(far);
+  if (!(back.norm() > 0.0))
+  {
+    return {};
+  }
+  // What the vessel shows before its tip; beyond it goes on like that.
+  std::vector<double> contrasts;
+  for (std::size_t i = far; i < near; ++i)
+  {
+    Sample sample;
+    if (this->Evidence(point(i), back.normalized(), sample))
+    {
+      contrasts.push_back(sample.least);
+    }
+  }
+  const double least = this->Settings.leastContrast * this->Settings.contrast;
+  double usual = least;
+  if (!contrasts.empty())
+  {
+    const auto middle = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 2);
+    std::nth_element(contrasts.begin(), middle, contrasts.end());
+    usual = *middle;
+  }
+  Bar bar;
+  bar.going = std::max(0.25 * least, 0.5 * usual);
+  bar.least = std::max(0.5 * least, 0.6 * usual);
+  bar.unknown = bar.going;
+  bar.significance = 0.5 * this->Settings.significance;
+  const Vector3 direction = this->Turn(point(near), back.normalized());
+  const double radius = this->Tree.radius[static_cast<std::size_t>(branch.points.back())];
+  const auto own = static_cast<std::size_t>((passed(near) + radius) / (Stride * voxel)) + 3;
+  std::vector<Sample> samples;
+  double contrast = 0.0;
+  double significance = 0.0;
+  if (!this->Walk(this->Centre(point(near), direction), direction,
+        own + static_cast<std::size_t>(MostBeyondTip / Stride), own, bar, samples) ||
+    samples.size() < 4 || !this->IsVessel(samples, bar, contrast, significance))
+  {
+    return {};
+  }
+  std::vector<Vector3> beyond;
+  for (const Sample& sample : samples)
+  {
+    if ((sample.position - tip).dot(direction) > 0.5 * Stride * voxel || !beyond.empty())
+    {
+      beyond.push_back(sample.position);
+    }
+  }
+  return beyond;
 }
 
 std::vector<ThinBranch> Finder::Run() const
@@ -594,8 +700,9 @@ double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, 
   return *middle * 1.4826 / std::sqrt(6.0);
 }
 
-std::vector<ThinBranch> FindThinBranches(
-  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+namespace
+{
+void Check(const ThinBranchSettings& settings)
 {
   const auto require = [](bool condition, const char* requirement)
   {
@@ -613,6 +720,31 @@ std::vector<ThinBranch> FindThinBranches(
   require(
     settings.leastContrast >= 0.0 && settings.leastContrast <= 1.0, "leastContrast must be 0 to 1");
   require(settings.significance >= 0.0, "significance must not be negative");
+}
+}
+
+std::vector<ThinBranch> FindThinBranches(
+  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+{
+  Check(settings);
   return Finder(image, tree, settings).Run();
+}
+
+std::vector<std::vector<Vector3>> FollowTips(
+  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+{
+  Check(settings);
+  const Finder finder(image, tree, settings);
+  std::vector<std::vector<Vector3>> paths(tree.branches.size());
+  ParallelFor(static_cast<std::int64_t>(paths.size()), 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t b = first; b < last; ++b)
+      {
+        const auto branch = static_cast<std::size_t>(b);
+        paths[branch] = finder.FollowTip(tree.branches[branch]);
+      }
+    });
+  return paths;
 }
 }

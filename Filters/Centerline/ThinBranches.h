@@ -51,6 +51,18 @@ double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, 
  */
 std::vector<ThinBranch> FindThinBranches(
   const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings);
+
+/**
+ * What goes on beyond the tips of a tree: a vessel is to be seen there for longer than it stands out
+ * enough for a mask.
+ * @param tree  every branch ends in a tip
+ * @returns one path a branch, from its last point (not included) outwards, 0.75 voxels a step; empty where nothing
+ *          goes on, or where it leads into another vessel. `minimumLength` does not apply, half of
+ *          `significance` is enough. The same on any number of threads.
+ * @throws std::invalid_argument that names the setting out of range
+ */
+std::vector<std::vector<Vector3>> FollowTips(
+  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings);
 }
 
 #endif

@@ -9,8 +9,12 @@
 #ifndef DynamicCoronary_Evaluation_h
 #define DynamicCoronary_Evaluation_h
 
+#include "BranchMetrics.h"
+#include "MeshDistance.h"
+
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -31,8 +35,8 @@ struct EvaluationMeasures
   double boundedCompleteness = NaN; ///< share of the truth's branches that are detected
   double boundedContinuity = NaN;   ///< mean of their continuity
   double lengthDetected = NaN;      ///< share of the truth's length
-  double centerlineMean = NaN;      ///< from the model's centerline to the truth's, where both are
-  double centerline95 = NaN;        ///< 95th percentile of the same distances
+  double centerlineMean = NaN; ///< from the truth's centerline to the model's, see relevantRadius
+  double centerline95 = NaN;   ///< 95th percentile of the same distances
 };
 
 /// One of the measures: what tables and plots call it, and where it is.
@@ -76,6 +80,34 @@ struct CaseEvaluation
   std::vector<std::string> warnings; ///< a sentence each
 };
 
+struct EvaluationSettings
+{
+  MeshDistanceSettings distance;
+  BranchMetricsSettings branches;
+
+  /// Distances of centerlines are taken where the truth's radius is this large; mm, 0 or more.
+  double relevantRadius = 0.75;
+};
+
+/// What is compared in one phase. Trees may be empty: their measures are then not known.
+struct EvaluationInput
+{
+  SurfaceMesh model;
+  SurfaceMesh truth;
+  BranchTree modelTree;
+  BranchTree truthTree;
+  std::map<std::int64_t, std::string> labels; ///< names of the truth's groups
+};
+
+/**
+ * Fills the measures and branches of a phase.
+ * @param warnings  sentences are added
+ * @throws as CompareSurfaces and CompareBranches; std::invalid_argument if relevantRadius is out of range
+ */
+void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& settings,
+  PhaseEvaluation& phase, std::vector<std::string>& warnings,
+  const ProgressCallback& progress = {});
+
 /// Mean and standard deviation (with n - 1, as the paper's table) of a list of measures; values that are NaN do
 /// not count. The deviation of a single value is NaN.
 struct MeasureSummary
@@ -101,6 +133,9 @@ const std::vector<PaperCase>& PaperPartB();
 
 /// Part A of every case and Part B over all, as fields separated by commas.
 std::string EvaluationCsv(const std::vector<CaseEvaluation>& cases);
+
+/// The truth's branches: a row each in every phase, as fields separated by commas.
+std::string BranchCsv(const std::vector<CaseEvaluation>& cases);
 
 /// A LaTeX document's part: two tabular environments like the paper's Table 1.
 std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases);

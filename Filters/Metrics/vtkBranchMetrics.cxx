@@ -45,96 +45,6 @@ namespace
 {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
-struct ArrayNames
-{
-  std::string radius;
-  std::string group;
-  std::string abscissa;
-};
-
-vtkDataArray* RadiusOf(vtkPolyData* data, const std::string& name)
-{
-  const bool automatic = name.empty() || name == "Automatic";
-  vtkDataArray* radius =
-    data->GetPointData()->GetArray(automatic ? vtkCoronaryArrayNames::Radius : name.c_str());
-  return radius == nullptr && automatic ? data->GetPointData()->GetArray("Radius") : radius;
-}
-
-/// Cells of the groups' array count in VTK's order: vertices come before lines.
-BranchTree TreeOfLines(vtkPolyData* data, const ArrayNames& names, const std::string& side)
-{
-  BranchTree tree;
-  vtkDataArray* radius = RadiusOf(data, names.radius);
-  if (radius != nullptr &&
-    (radius->GetNumberOfComponents() != 1 ||
-      radius->GetNumberOfTuples() != data->GetNumberOfPoints()))
-  {
-    throw std::invalid_argument("The radius array " + std::string(radius->GetName()) + " of " +
-      side + " must have one value for each point");
-  }
-  tree.lines.points.resize(data->GetNumberOfPoints());
-  for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i)
-  {
-    data->GetPoint(i, tree.lines.points[i].data());
-    if (radius != nullptr)
-    {
-      tree.lines.radius.push_back(radius->GetComponent(i, 0));
-    }
-  }
-  const std::vector<std::int64_t> groups = vtkCoronary::IdsOf(
-    data->GetCellData()->GetArray(names.group.c_str()), data->GetNumberOfCells(), "cell");
-  vtkNew<vtkIdList> cell;
-  vtkCellArray* lines = data->GetLines();
-  vtkIdType number = data->GetNumberOfVerts();
-  for (lines->InitTraversal(); lines->GetNextCell(cell) != 0; ++number)
-  {
-    tree.lines.lines.emplace_back(cell->begin(), cell->end());
-    if (!groups.empty())
-    {
-      tree.groups.push_back(groups[number]);
-    }
-  }
-  return tree;
-}
-
-BranchTree ReadTree(vtkPolyData* data, const ArrayNames& names, const std::string& side)
-{
-  if (data == nullptr || data->GetNumberOfCells() == 0)
-  {
-    return {};
-  }
-  if (data->GetNumberOfLines() > 0)
-  {
-    return TreeOfLines(data, names, side);
-  }
-  if (data->GetNumberOfPolys() + data->GetNumberOfStrips() == 0)
-  {
-    return {};
-  }
-  vtkDataArray* group = data->GetPointData()->GetArray(names.group.c_str());
-  vtkDataArray* abscissa = data->GetPointData()->GetArray(names.abscissa.c_str());
-  if (group == nullptr || abscissa == nullptr)
-  {
-    const std::string& missing = group == nullptr ? names.group : names.abscissa;
-    throw std::invalid_argument("The " + side + " is a surface without the point array " + missing +
-      ": its branches are not known; give its centerline instead");
-  }
-  const vtkIdType count = data->GetNumberOfPoints();
-  const std::vector<std::int64_t> groups = vtkCoronary::IdsOf(group, count, "point");
-  if (abscissa->GetNumberOfComponents() != 1 || abscissa->GetNumberOfTuples() != count)
-  {
-    throw std::invalid_argument("The point array " + names.abscissa + " must have one value each");
-  }
-  std::vector<coronary::Vector3> points(count);
-  std::vector<double> along(count);
-  for (vtkIdType i = 0; i < count; ++i)
-  {
-    data->GetPoint(i, points[i].data());
-    along[i] = abscissa->GetComponent(i, 0);
-  }
-  return coronary::TreeOfSurface(points, groups, along);
-}
-
 std::vector<std::pair<const char*, double>> Totals(const BranchMetrics& m)
 {
   return { { "BCR", m.completenessRatio }, { "BCS", m.continuityScore },
@@ -357,13 +267,13 @@ int vtkBranchMetrics::RequestData(
     vtkCoronary::Require(this->TimeTolerance >= 0.0, "TimeTolerance must be 0 or more");
     const std::string mismatch = vtkCoronary::TimeMismatch(inputs, this->TimeTolerance);
     vtkCoronary::Require(mismatch.empty(), mismatch);
-    const ArrayNames names = { this->RadiusArrayName, this->GroupArrayName,
+    const vtkCoronary::TreeArrayNames names = { this->RadiusArrayName, this->GroupArrayName,
       this->AbscissaArrayName };
-    const BranchTree result = ReadTree(
+    const BranchTree result = vtkCoronary::TreeOf(
       vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ResultPort], 0)), names, "result");
     const BranchTree reference =
-      ReadTree(vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ReferencePort], 0)), names,
-        "reference");
+      vtkCoronary::TreeOf(vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ReferencePort], 0)),
+        names, "reference");
     const BranchMetrics metrics =
       coronary::CompareBranches(result, reference, settings, vtkCoronary::ProgressOf(this));
     WriteTable(table, metrics);

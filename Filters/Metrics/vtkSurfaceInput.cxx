@@ -1,5 +1,6 @@
 #include "vtkSurfaceInput.h"
 
+#include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryUpstream.h"
 
 #include "vtkAppendPolyData.h"
@@ -267,5 +268,92 @@ void SetCommonTime(vtkInformationVector** inputs, vtkInformationVector* outputs)
       return;
     }
   }
+}
+
+namespace
+{
+vtkDataArray* RadiusOf(vtkPolyData* data, const std::string& name)
+{
+  const bool automatic = name.empty() || name == "Automatic";
+  vtkDataArray* radius =
+    data->GetPointData()->GetArray(automatic ? vtkCoronaryArrayNames::Radius : name.c_str());
+  return radius == nullptr && automatic ? data->GetPointData()->GetArray("Radius") : radius;
+}
+
+/// Cells of the groups' array count in VTK's order: vertices come before lines.
+coronary::BranchTree TreeOfLines(
+  vtkPolyData* data, const TreeArrayNames& names, const std::string& side)
+{
+  coronary::BranchTree tree;
+  vtkDataArray* radius = RadiusOf(data, names.radius);
+  if (radius != nullptr &&
+    (radius->GetNumberOfComponents() != 1 ||
+      radius->GetNumberOfTuples() != data->GetNumberOfPoints()))
+  {
+    throw std::invalid_argument("The radius array " + std::string(radius->GetName()) + " of " +
+      side + " must have one value for each point");
+  }
+  tree.lines.points.resize(data->GetNumberOfPoints());
+  for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i)
+  {
+    data->GetPoint(i, tree.lines.points[i].data());
+    if (radius != nullptr)
+    {
+      tree.lines.radius.push_back(radius->GetComponent(i, 0));
+    }
+  }
+  const std::vector<std::int64_t> groups =
+    IdsOf(data->GetCellData()->GetArray(names.group.c_str()), data->GetNumberOfCells(), "cell");
+  vtkNew<vtkIdList> cell;
+  vtkCellArray* lines = data->GetLines();
+  vtkIdType number = data->GetNumberOfVerts();
+  for (lines->InitTraversal(); lines->GetNextCell(cell) != 0; ++number)
+  {
+    tree.lines.lines.emplace_back(cell->begin(), cell->end());
+    if (!groups.empty())
+    {
+      tree.groups.push_back(groups[number]);
+    }
+  }
+  return tree;
+}
+}
+
+coronary::BranchTree TreeOf(vtkPolyData* data, const TreeArrayNames& names, const std::string& side)
+{
+  if (data == nullptr || data->GetNumberOfCells() == 0)
+  {
+    return {};
+  }
+  if (data->GetNumberOfLines() > 0)
+  {
+    return TreeOfLines(data, names, side);
+  }
+  if (data->GetNumberOfPolys() + data->GetNumberOfStrips() == 0)
+  {
+    return {};
+  }
+  vtkDataArray* group = data->GetPointData()->GetArray(names.group.c_str());
+  vtkDataArray* abscissa = data->GetPointData()->GetArray(names.abscissa.c_str());
+  if (group == nullptr || abscissa == nullptr)
+  {
+    const std::string& missing = group == nullptr ? names.group : names.abscissa;
+    throw std::invalid_argument("The " + side + " is a surface without the point array " + missing +
+      ": its branches are not known; give its centerline instead");
+  }
+  const vtkIdType count = data->GetNumberOfPoints();
+  const std::vector<std::int64_t> groups = IdsOf(group, count, "point");
+  if (abscissa->GetNumberOfComponents() != 1 || abscissa->GetNumberOfTuples() != count)
+  {
+    throw std::invalid_argument("The point array " + names.abscissa + " must have one value each");
+  }
+  std::vector<coronary::Vector3> points(count);
+  std::vector<double> along(count);
+  for (vtkIdType i = 0; i < count; ++i)
+  {
+    data->GetPoint(i, points[i].data());
+    along[i] = abscissa->GetComponent(i, 0);
+  }
+  return coronary::TreeOfSurface(points, groups, along);
 }
 }

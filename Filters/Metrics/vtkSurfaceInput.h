@@ -1,10 +1,11 @@
 /**
  * @file vtkSurfaceInput.h
- * @brief Surfaces of a pipeline for the metrics, and times of two inputs.
+ * @brief Surfaces and trees of a pipeline for the metrics, and times of two inputs.
  */
 #ifndef vtkSurfaceInput_h
 #define vtkSurfaceInput_h
 
+#include "BranchMetrics.h"
 #include "MeshDistance.h"
 #include "vtkCoronaryMetricsModule.h" // for the export macro
 
@@ -62,6 +63,23 @@ VTKCORONARYMETRICS_EXPORT std::string TimeMismatch(vtkInformationVector** inputs
 /// Inside RequestData: writes the time that was compared into the outputs.
 VTKCORONARYMETRICS_EXPORT void SetCommonTime(
   vtkInformationVector** inputs, vtkInformationVector* outputs);
+
+/// Arrays of a tree. A radius that is empty or "Automatic" is that of an inscribed sphere, or "Radius".
+struct TreeArrayNames
+{
+  std::string radius;
+  std::string group;
+  std::string abscissa;
+};
+
+/**
+ * The lines of poly data as a tree; of a surface whose points have a group and an abscissa, the middles of
+ * its slices; nothing of null or empty data.
+ * @param side  "result" or "reference", for messages
+ * @throws std::invalid_argument naming an array that is missing or does not fit
+ */
+VTKCORONARYMETRICS_EXPORT coronary::BranchTree TreeOf(
+  vtkPolyData* data, const TreeArrayNames& names, const std::string& side);
 }
 
 #endif

@@ -1,0 +1,403 @@
+#include "Command.h"
+
+#include "AtomicFile.h"
+#include "Evaluation.h"
+#include "Interruption.h"
+#include "MovingModel.h"
+#include "OptionChecks.h"
+#include "ParallelFor.h"
+#include "ProgressDisplay.h"
+#include "StagedFolder.h"
+#include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
+#include "vtkSurfaceInput.h"
+
+#include "vtkCellData.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
+#include "vtkStringArray.h"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+namespace
+{
+/// A phase that more of the tree was lost in was not tracked really.
+constexpr double LeastTrackedShare = 0.5;
+
+struct EvaluateJob
+{
+  std::vector<std::string> results;
+  std::vector<std::string> truths;
+  std::vector<std::string> names;
+  std::string output;
+  std::string untracked = "auto"; ///< "auto", "odd" or "none"
+  bool clipEnds = false;
+  double endLength = 3.0;
+  double errorBound = 1e-3;
+  double timeTolerance = 1e-3;
+  int threads = 0;
+  bool quiet = false;
+
+  void Declare(CLI::App& app);
+  void Run() const;
+
+private:
+  /// The phases of both sides: what is compared with what.
+  struct PhaseFiles
+  {
+    PhaseEvaluation phase;
+    std::string model;
+    std::string truth;
+    std::string modelLines; ///< may be empty
+    std::string truthLines;
+  };
+  struct CaseFiles
+  {
+    CaseEvaluation evaluation; ///< without phases yet
+    std::vector<PhaseFiles> phases;
+  };
+  CaseFiles FindCase(std::size_t number) const;
+  std::vector<bool> WhichAreInterpolated(
+    const MovingModel& model, const std::vector<TimedFile>& truth, CaseFiles& files) const;
+};
+
+void EvaluateJob::Declare(CLI::App& app)
+{
+  app
+    .add_option("--result", this->results,
+      "Folder that run wrote, or a .pvd or .series file of surfaces; once for each case")
+    ->allow_extra_args(false)
+    ->type_name("DIR")
+    ->required();
+  app
+    .add_option("--truth", this->truths,
+      "Folder of the true surfaces (surface.pvd, truth/surface.pvd), or such a file; once for each "
+      "case")
+    ->allow_extra_args(false)
+    ->type_name("DIR")
+    ->required();
+  app.add_option("--name", this->names, "Name of a case; by default that of the result's folder")
+    ->allow_extra_args(false)
+    ->type_name("TEXT");
+  app.add_option("--output", this->output, "Folder to write to; made when it does not exist")
+    ->type_name("DIR")
+    ->required();
+  app
+    .add_option("--interpolated", this->untracked,
+      "Phases that were not tracked: auto (as the result's report says, else odd), odd or none")
+    ->check(CLI::IsMember({ "auto", "odd", "none" }))
+    ->capture_default_str();
+  app.add_flag("--clip-ends", this->clipEnds,
+    "Leave out caps, and on both surfaces what lies beyond an end of either one");
+  app
+    .add_option(
+      "--end-length", this->endLength, "How far beyond an end something still belongs to it, in mm")
+    ->check(Within(1e-9, 1e6))
+    ->type_name("MM")
+    ->capture_default_str();
+  app
+    .add_option(
+      "--error-bound", this->errorBound, "What the Hausdorff distance may be too small by, in mm")
+    ->check(Within(1e-9, 1e6))
+    ->type_name("MM")
+    ->capture_default_str();
+  app
+    .add_option("--time-tolerance", this->timeTolerance,
+      "How far apart two times may be to be one phase, R-R")
+    ->check(Within(0.0, 1.0))
+    ->type_name("FRACTION")
+    ->capture_default_str();
+  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
+    ->check(WholeWithin(0, 1024))
+    ->type_name("N")
+    ->capture_default_str();
+  app.add_flag("--quiet", this->quiet, "No progress and no table");
+}
+
+std::vector<bool> EvaluateJob::WhichAreInterpolated(
+  const MovingModel& model, const std::vector<TimedFile>& truth, CaseFiles& files) const
+{
+  std::vector<bool> interpolated(truth.size(), false);
+  const bool known = this->untracked == "auto" && model.tracksKnown;
+  if (this->untracked == "auto" && !known)
+  {
+    files.evaluation.warnings.push_back("'" + model.path +
+      "' does not say which phases were tracked: the odd ones count as interpolated");
+  }
+  for (std::size_t n = 0; n < truth.size(); ++n)
+  {
+    if (known)
+    {
+      interpolated[n] = std::none_of(model.trackedTimes.begin(), model.trackedTimes.end(),
+        [&](double time) { return std::abs(time - truth[n].time) <= this->timeTolerance; });
+    }
+    else
+    {
+      interpolated[n] = this->untracked != "none" && n % 2 == 1;
+    }
+  }
+  return interpolated;
+}
+
+std::string FolderName(const std::string& path)
+{
+  std::filesystem::path folder = std::filesystem::absolute(path).lexically_normal();
+  if (folder.filename().empty())
+  {
+    folder = folder.parent_path();
+  }
+  return folder.filename().string();
+}
+
+EvaluateJob::CaseFiles EvaluateJob::FindCase(std::size_t number) const
+{
+  const MovingModel model = FindMovingModel(this->results[number]);
+  const MovingModel truth = FindMovingModel(this->truths[number]);
+  CaseFiles files;
+  files.evaluation.name =
+    this->names.empty() ? FolderName(this->results[number]) : this->names[number];
+  const std::vector<bool> interpolated = this->WhichAreInterpolated(model, truth.surfaces, files);
+  std::string unmatched;
+  for (std::size_t n = 0; n < truth.surfaces.size(); ++n)
+  {
+    const TimedFile& reference = truth.surfaces[n];
+    const TimedFile* own = MovingModel::At(model.surfaces, reference.time, this->timeTolerance);
+    if (!own)
+    {
+      unmatched += (unmatched.empty() ? "" : ", ") + Format(reference.time);
+      continue;
+    }
+    PhaseFiles one;
+    one.phase.phase = static_cast<int>(n);
+    one.phase.fraction = reference.time;
+    one.phase.interpolated = interpolated[n];
+    for (std::size_t k = 0; k < model.trackedShare.size(); ++k)
+    {
+      if (std::abs(model.trackedTimes[k] - reference.time) <= this->timeTolerance)
+      {
+        one.phase.lost = !interpolated[n] && model.trackedShare[k] < LeastTrackedShare;
+      }
+    }
+    one.model = own->path;
+    one.truth = reference.path;
+    const TimedFile* modelLines =
+      MovingModel::At(model.centerlines, reference.time, this->timeTolerance);
+    const TimedFile* truthLines =
+      MovingModel::At(truth.centerlines, reference.time, this->timeTolerance);
+    one.modelLines = modelLines ? modelLines->path : std::string();
+    one.truthLines = truthLines ? truthLines->path : std::string();
+    files.phases.push_back(one);
+  }
+  if (files.phases.empty())
+  {
+    throw std::runtime_error("No time of '" + model.path + "' (" +
+      Format(model.surfaces.front().time) + " to " + Format(model.surfaces.back().time) +
+      ") is one of '" + truth.path + "' (" + Format(truth.surfaces.front().time) + " to " +
+      Format(truth.surfaces.back().time) + ") within " + Format(this->timeTolerance) + ".");
+  }
+  if (!unmatched.empty())
+  {
+    files.evaluation.warnings.push_back("'" + model.path + "' has nothing at the truth's times " +
+      unmatched + ": these phases are left out");
+  }
+  return files;
+}
+
+SurfaceMesh ReadSurface(
+  const std::string& path, vtkMessageTrap& messages, vtkSmartPointer<vtkPolyData>& data)
+{
+  data = vtkCoronary::TrianglesOf(ReadPolyData(path, messages));
+  SurfaceMesh mesh = vtkCoronary::SurfaceOf(
+    data, vtkCoronaryArrayNames::GroupIds, vtkCoronaryArrayNames::CellEntityIds);
+  if (mesh.triangles.empty())
+  {
+    throw std::runtime_error("'" + path + "' has no triangles.");
+  }
+  return mesh;
+}
+
+/// The tree of a phase: its centerline, or what the surface knows of its branches.
+BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* side,
+  vtkMessageTrap& messages, std::map<std::int64_t, std::string>* labels)
+{
+  const vtkCoronary::TreeArrayNames names = { "Automatic", vtkCoronaryArrayNames::GroupIds,
+    vtkCoronaryArrayNames::Abscissas };
+  if (path.empty())
+  {
+    vtkPointData* arrays = surface->GetPointData();
+    const bool known =
+      arrays->HasArray(names.group.c_str()) != 0 && arrays->HasArray(names.abscissa.c_str()) != 0;
+    return known ? vtkCoronary::TreeOf(surface, names, side) : BranchTree();
+  }
+  vtkSmartPointer<vtkPolyData> lines = ReadPolyData(path, messages);
+  auto* texts = vtkStringArray::SafeDownCast(
+    lines->GetCellData()->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
+  vtkDataArray* groups = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
+  if (labels && texts && groups)
+  {
+    for (vtkIdType n = 0; n < texts->GetNumberOfValues(); ++n)
+    {
+      labels->emplace(static_cast<std::int64_t>(groups->GetTuple1(n)), texts->GetValue(n));
+    }
+  }
+  return vtkCoronary::TreeOf(lines, names, side);
+}
+
+nlohmann::ordered_json JsonOf(const EvaluationMeasures& measures)
+{
+  nlohmann::ordered_json all;
+  for (const EvaluationColumn& column : EvaluationColumns())
+  {
+    const double value = measures.*column.value;
+    all[column.key] = std::isfinite(value) ? nlohmann::ordered_json(value) : nullptr;
+  }
+  return all;
+}
+
+nlohmann::ordered_json JsonOf(const std::vector<CaseEvaluation>& cases)
+{
+  nlohmann::ordered_json all;
+  std::vector<EvaluationMeasures> means;
+  all["cases"] = nlohmann::ordered_json::array();
+  for (const CaseEvaluation& one : cases)
+  {
+    nlohmann::ordered_json entry = { { "name", one.name } };
+    entry["phases"] = nlohmann::ordered_json::array();
+    for (const PhaseEvaluation& phase : one.phases)
+    {
+      nlohmann::ordered_json row = { { "phase", phase.phase }, { "fraction", phase.fraction },
+        { "interpolated", phase.interpolated }, { "lost", phase.lost } };
+      row.update(JsonOf(phase.measures));
+      entry["phases"].push_back(row);
+    }
+    for (const bool interpolated : { true, false })
+    {
+      const std::string kind = interpolated ? "interpolated" : "tracked";
+      const MeasureSummary summary = SummarizePhases(one, interpolated);
+      entry[kind + "_mean"] = JsonOf(summary.mean);
+      entry[kind + "_deviation"] = JsonOf(summary.deviation);
+      if (interpolated && summary.count > 0)
+      {
+        means.push_back(summary.mean);
+      }
+    }
+    entry["warnings"] = one.warnings;
+    all["cases"].push_back(entry);
+  }
+  const MeasureSummary over = Summarize(means);
+  all["mean"] = JsonOf(over.mean);
+  all["deviation"] = JsonOf(over.deviation);
+  return all;
+}
+
+void EvaluateJob::Run() const
+{
+  if (this->results.size() != this->truths.size())
+  {
+    throw UsageError("--result and --truth: one of each for every case, not " +
+      std::to_string(this->results.size()) + " and " + std::to_string(this->truths.size()));
+  }
+  if (!this->names.empty() && this->names.size() != this->results.size())
+  {
+    throw UsageError("--name: one for every case, or none");
+  }
+  SetNumberOfThreads(this->threads);
+  std::vector<CaseFiles> cases;
+  int steps = 0;
+  for (std::size_t n = 0; n < this->results.size(); ++n)
+  {
+    cases.push_back(this->FindCase(n));
+    steps += static_cast<int>(cases.back().phases.size());
+  }
+
+  EvaluationSettings settings;
+  settings.distance.errorBound = this->errorBound;
+  settings.distance.clipEnds = this->clipEnds;
+  settings.distance.endLength = this->endLength;
+  settings.distance.signedDistances = false;
+  StagedFolder folder(this->output);
+  vtkMessageTrap messages;
+  std::vector<CaseEvaluation> evaluations;
+  {
+    ProgressDisplay progress("phase", steps, this->quiet);
+    int step = 0;
+    for (CaseFiles& files : cases)
+    {
+      for (PhaseFiles& one : files.phases)
+      {
+        ThrowIfInterrupted();
+        progress.BeginStep(
+          step++, files.evaluation.name + ", phase " + std::to_string(one.phase.phase));
+        settings.distance.names = { "'" + one.model + "'", "'" + one.truth + "'" };
+        EvaluationInput input;
+        vtkSmartPointer<vtkPolyData> model;
+        vtkSmartPointer<vtkPolyData> truth;
+        input.model = ReadSurface(one.model, messages, model);
+        input.truth = ReadSurface(one.truth, messages, truth);
+        input.modelTree = ReadTree(one.modelLines, model, "result", messages, nullptr);
+        input.truthTree = ReadTree(one.truthLines, truth, "reference", messages, &input.labels);
+        std::vector<std::string> warnings;
+        EvaluatePhase(input, settings, one.phase, warnings,
+          [&](double fraction)
+          {
+            progress.Update(fraction);
+            return Interruption() == 0;
+          });
+        for (std::string& warning : warnings)
+        {
+          files.evaluation.warnings.push_back(std::move(warning));
+        }
+        files.evaluation.phases.push_back(one.phase);
+      }
+      if (std::isnan(files.evaluation.phases.front().measures.completenessRatio))
+      {
+        files.evaluation.warnings.push_back("'" + files.evaluation.name +
+          "' has no branches on one of the sides: there is neither BCR nor BCS");
+      }
+      evaluations.push_back(files.evaluation);
+    }
+  }
+
+  WriteFileAtomically(folder.Add("table1.csv"), EvaluationCsv(evaluations));
+  WriteFileAtomically(folder.Add("table1.tex"), EvaluationLatex(evaluations));
+  WriteFileAtomically(folder.Add("branches.csv"), BranchCsv(evaluations));
+  WriteFileAtomically(folder.Add("table1.json"), JsonOf(evaluations).dump(2) + "\n");
+  ThrowIfInterrupted();
+  folder.Commit();
+  messages.PrintWarnings();
+  for (const CaseEvaluation& one : evaluations)
+  {
+    for (const std::string& warning : one.warnings)
+    {
+      std::fprintf(stderr, "Warning: %s.\n", warning.c_str());
+    }
+  }
+  if (!this->quiet)
+  {
+    std::printf("%s", EvaluationText(evaluations).c_str());
+  }
+}
+}
+
+Command MakeEvaluateCommand(CLI::App& program)
+{
+  CLI::App* app = program.add_subcommand(
+    "evaluate", "A moving model against the truth, phase by phase: Table 1 of the paper");
+  app->footer("Writes DIR/table1.csv, table1.tex, table1.json and branches.csv.");
+  auto job = std::make_shared<EvaluateJob>();
+  job->Declare(*app);
+  return { app, [job] { job->Run(); } };
+}
+}

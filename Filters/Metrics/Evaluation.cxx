@@ -1,0 +1,591 @@
+#include "Evaluation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+using Measures = EvaluationMeasures;
+
+constexpr double SampleDistance = 0.25; // mm
+
+/// From samples of lines, where they are wide enough, to the nearest point of other lines.
+std::vector<double> DistancesFrom(
+  const CenterlineSet& lines, const CenterlineSet& others, double leastRadius)
+{
+  struct Segment
+  {
+    Vector3 a;
+    Vector3 b;
+  };
+  std::vector<Segment> segments;
+  for (const auto& line : others.lines)
+  {
+    for (std::size_t i = 1; i < line.size(); ++i)
+    {
+      segments.push_back({ others.points[static_cast<std::size_t>(line[i - 1])],
+        others.points[static_cast<std::size_t>(line[i])] });
+    }
+  }
+  std::vector<Vector3> samples;
+  for (const auto& line : lines.lines)
+  {
+    for (std::size_t i = 1; i < line.size(); ++i)
+    {
+      const auto a = static_cast<std::size_t>(line[i - 1]);
+      const auto b = static_cast<std::size_t>(line[i]);
+      const int parts = std::max(1,
+        static_cast<int>(std::ceil((lines.points[b] - lines.points[a]).norm() / SampleDistance)));
+      for (int part = 0; part < parts; ++part)
+      {
+        const double t = (part + 0.5) / parts;
+        if (lines.radius.empty() ||
+          (1.0 - t) * lines.radius[a] + t * lines.radius[b] >= leastRadius)
+        {
+          samples.emplace_back((1.0 - t) * lines.points[a] + t * lines.points[b]);
+        }
+      }
+    }
+  }
+  if (segments.empty())
+  {
+    return {};
+  }
+  std::vector<double> distances(samples.size());
+  ParallelFor(static_cast<std::int64_t>(samples.size()), 64,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        double least = std::numeric_limits<double>::infinity();
+        for (const Segment& segment : segments)
+        {
+          least = std::min(least,
+            NearestOnSegment(samples[static_cast<std::size_t>(i)], segment.a, segment.b)
+              .squaredDistance);
+        }
+        distances[static_cast<std::size_t>(i)] = std::sqrt(least);
+      }
+    });
+  return distances;
+}
+
+EvaluationMeasures PaperMeasures(double hd, double msd, double bcr, double bcs)
+{
+  EvaluationMeasures m;
+  m.hausdorff = hd;
+  m.msd = msd;
+  m.completenessRatio = bcr;
+  m.continuityScore = bcs;
+  return m;
+}
+
+/// A number with so many digits behind the point; nothing where there is none.
+std::string Number(double value, int digits, const char* nothing = "")
+{
+  if (!std::isfinite(value))
+  {
+    return nothing;
+  }
+  char text[64];
+  std::snprintf(text, sizeof(text), "%.*f", digits, value);
+  return text;
+}
+
+std::string Csv(const std::string& text)
+{
+  std::string quoted = "\"";
+  for (const char c : text)
+  {
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return quoted + "\"";
+}
+
+std::string Tex(const std::string& text)
+{
+  std::string escaped;
+  for (const char c : text)
+  {
+    switch (c)
+    {
+      case '\\':
+        escaped += "\\textbackslash{}";
+        break;
+      case '~':
+        escaped += "\\textasciitilde{}";
+        break;
+      case '^':
+        escaped += "\\textasciicircum{}";
+        break;
+      case '#':
+      case '$':
+      case '%':
+      case '&':
+      case '_':
+      case '{':
+      case '}':
+        escaped += '\\';
+        escaped += c;
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+const char* KindOf(const PhaseEvaluation& phase)
+{
+  return phase.interpolated ? "interpolated" : phase.lost ? "lost" : "tracked";
+}
+
+void AddCsvRow(std::string& table, const std::string& part, const std::string& name,
+  const std::string& phase, const std::string& fraction, const std::string& kind,
+  const EvaluationMeasures& measures)
+{
+  table += part + "," + Csv(name) + "," + phase + "," + fraction + "," + kind;
+  for (const EvaluationColumn& column : EvaluationColumns())
+  {
+    table += "," + Number(measures.*column.value, 6);
+  }
+  table += "\n";
+}
+
+std::vector<EvaluationMeasures> InterpolatedMeans(const std::vector<CaseEvaluation>& cases)
+{
+  std::vector<EvaluationMeasures> means;
+  for (const CaseEvaluation& one : cases)
+  {
+    const MeasureSummary summary = SummarizePhases(one, true);
+    if (summary.count > 0)
+    {
+      means.push_back(summary.mean);
+    }
+  }
+  return means;
+}
+
+/// The four measures of the paper.
+std::string TexCells(const EvaluationMeasures& m)
+{
+  return " & " + Number(m.hausdorff, 2, "--") + " & " + Number(m.msd, 2, "--") + " & " +
+    Number(m.completenessRatio, 2, "--") + " & " + Number(m.continuityScore, 2, "--");
+}
+
+std::string TextCells(const EvaluationMeasures& m)
+{
+  std::string line;
+  for (const EvaluationColumn& column : EvaluationColumns())
+  {
+    char cell[32];
+    std::snprintf(cell, sizeof(cell), " %11s", Number(m.*column.value, 3, "-").c_str());
+    line += cell;
+  }
+  return line;
+}
+
+std::string PaperCells(const EvaluationMeasures& m)
+{
+  char line[96];
+  std::snprintf(line, sizeof(line), "   | %5s %5s %5s %5s", Number(m.hausdorff, 2, "-").c_str(),
+    Number(m.msd, 2, "-").c_str(), Number(m.completenessRatio, 2, "-").c_str(),
+    Number(m.continuityScore, 2, "-").c_str());
+  return line;
+}
+
+std::string TextHead(const char* first)
+{
+  char cell[128];
+  std::snprintf(cell, sizeof(cell), "%-28s", first);
+  std::string line = cell;
+  for (const EvaluationColumn& column : EvaluationColumns())
+  {
+    std::snprintf(cell, sizeof(cell), " %11s", column.key);
+    line += cell;
+  }
+  return line + "   |    HD   MSD   BCR   BCS (paper)\n";
+}
+
+std::string TextRow(
+  const std::string& name, const EvaluationMeasures& m, const EvaluationMeasures& paper)
+{
+  char cell[128];
+  std::snprintf(cell, sizeof(cell), "%-28s", name.c_str());
+  return cell + TextCells(m) + PaperCells(paper) + "\n";
+}
+
+std::vector<EvaluationMeasures> MeasuresOf(const std::vector<PaperCase>& cases)
+{
+  std::vector<EvaluationMeasures> list;
+  for (const PaperCase& one : cases)
+  {
+    list.push_back(one.mean);
+  }
+  return list;
+}
+}
+
+void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& settings,
+  PhaseEvaluation& phase, std::vector<std::string>& warnings, const ProgressCallback& progress)
+{
+  if (!(settings.relevantRadius >= 0.0))
+  {
+    throw std::invalid_argument("EvaluationSettings: relevantRadius must not be negative");
+  }
+  EvaluationMeasures& m = phase.measures;
+  const MeshDistance distance = CompareSurfaces(input.model, input.truth, settings.distance,
+    [&](double fraction) { return !progress || progress(0.6 * fraction); });
+  m.hausdorff = distance.hausdorff;
+  m.hausdorff95 = distance.hausdorff95;
+  m.msd = distance.ab.vertexMean;
+  m.msdArea = distance.mean;
+  m.rms = distance.rms;
+  warnings.insert(warnings.end(), distance.warnings.begin(), distance.warnings.end());
+
+  std::map<std::int64_t, BranchEvaluation> branches;
+  for (const BranchDistance& one : distance.branches)
+  {
+    if (one.side == 1)
+    {
+      branches[one.group].hausdorff = one.distance.hausdorff;
+      branches[one.group].mean = one.distance.mean;
+    }
+  }
+  if (!input.truthTree.lines.lines.empty() && !input.modelTree.lines.lines.empty())
+  {
+    const BranchMetrics trees = CompareBranches(input.modelTree, input.truthTree, settings.branches,
+      [&](double fraction) { return !progress || progress(0.6 + 0.3 * fraction); });
+    m.completenessRatio = trees.completenessRatio;
+    m.continuityScore = trees.continuityScore;
+    m.boundedCompleteness = trees.boundedCompleteness;
+    m.boundedContinuity = trees.boundedContinuity;
+    m.lengthDetected = trees.lengthDetected;
+    for (const BranchAgreement& row : trees.rows)
+    {
+      if (row.reference >= 0)
+      {
+        const TreeBranch& reference = trees.reference[static_cast<std::size_t>(row.reference)];
+        BranchEvaluation& branch = branches[reference.group];
+        // A group's line may be cut by forks: its parts together.
+        const bool first = std::isnan(branch.length);
+        const double length = (first ? 0.0 : branch.length) + reference.length;
+        branch.covered =
+          ((first ? 0.0 : branch.covered * branch.length) + row.covered * reference.length) /
+          length;
+        branch.continuity =
+          ((first ? 0.0 : branch.continuity * branch.length) + row.continuity * reference.length) /
+          length;
+        branch.length = length;
+      }
+    }
+    std::vector<double> distances =
+      DistancesFrom(input.truthTree.lines, input.modelTree.lines, settings.relevantRadius);
+    if (!distances.empty())
+    {
+      double sum = 0.0;
+      for (const double one : distances)
+      {
+        sum += one;
+      }
+      m.centerlineMean = sum / static_cast<double>(distances.size());
+      const auto place = distances.begin() +
+        static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(distances.size() - 1));
+      std::nth_element(distances.begin(), place, distances.end());
+      m.centerline95 = *place;
+    }
+  }
+  for (auto& [group, branch] : branches)
+  {
+    branch.group = group;
+    const auto label = input.labels.find(group);
+    branch.label = label == input.labels.end() ? std::string() : label->second;
+    phase.branches.push_back(branch);
+  }
+  if (progress && !progress(1.0))
+  {
+    throw Cancelled();
+  }
+}
+
+const std::vector<EvaluationColumn>& EvaluationColumns()
+{
+  static const std::vector<EvaluationColumn> columns = {
+    { "HD", "mm", &Measures::hausdorff, 0.0 },
+    { "HD95", "mm", &Measures::hausdorff95, 0.0 },
+    { "MSD", "mm", &Measures::msd, 0.0 },
+    { "MSD_area", "mm", &Measures::msdArea, 0.0 },
+    { "RMS", "mm", &Measures::rms, 0.0 },
+    { "BCR", "", &Measures::completenessRatio, 1.0 },
+    { "BCS", "", &Measures::continuityScore, 1.0 },
+    { "BCR_bounded", "", &Measures::boundedCompleteness, 1.0 },
+    { "BCS_bounded", "", &Measures::boundedContinuity, 1.0 },
+    { "length_detected", "", &Measures::lengthDetected, 1.0 },
+    { "centerline_mean", "mm", &Measures::centerlineMean, 0.0 },
+    { "centerline_p95", "mm", &Measures::centerline95, 0.0 },
+  };
+  return columns;
+}
+
+MeasureSummary Summarize(const std::vector<EvaluationMeasures>& list)
+{
+  MeasureSummary summary;
+  summary.count = static_cast<std::int64_t>(list.size());
+  for (const EvaluationColumn& column : EvaluationColumns())
+  {
+    double sum = 0.0;
+    std::int64_t known = 0;
+    for (const EvaluationMeasures& m : list)
+    {
+      if (!std::isnan(m.*column.value))
+      {
+        sum += m.*column.value;
+        ++known;
+      }
+    }
+    if (known == 0)
+    {
+      continue;
+    }
+    const double mean = sum / static_cast<double>(known);
+    summary.mean.*column.value = mean;
+    double squares = 0.0;
+    for (const EvaluationMeasures& m : list)
+    {
+      const double value = m.*column.value;
+      squares += std::isnan(value) ? 0.0 : (value - mean) * (value - mean);
+    }
+    if (known > 1)
+    {
+      summary.deviation.*column.value = std::sqrt(squares / static_cast<double>(known - 1));
+    }
+  }
+  return summary;
+}
+
+MeasureSummary SummarizePhases(const CaseEvaluation& one, bool interpolated)
+{
+  std::vector<EvaluationMeasures> list;
+  for (const PhaseEvaluation& phase : one.phases)
+  {
+    if (phase.interpolated == interpolated)
+    {
+      list.push_back(phase.measures);
+    }
+  }
+  return Summarize(list);
+}
+
+const CaseEvaluation& PaperPartA()
+{
+  static const CaseEvaluation part = []
+  {
+    CaseEvaluation a;
+    a.name = "Dataset #1 of the paper";
+    const double rows[10][5] = { { 1, 5.75, 1.49, 2.5, 0.83 }, { 3, 7.70, 3.39, 1.66, 0.76 },
+      { 5, 6.79, 2.75, 5.0, 0.71 }, { 7, 8.20, 2.97, 2.5, 0.75 }, { 9, 2.27, 0.93, 1.25, 0.89 },
+      { 11, 5.88, 2.36, 1.0, 0.85 }, { 13, 5.00, 2.55, 1.66, 0.82 }, { 15, 0.79, 0.11, 1.0, 0.95 },
+      { 17, 3.47, 0.97, 1.66, 0.87 }, { 19, 8.34, 2.39, 1.25, 0.77 } };
+    for (const auto& row : rows)
+    {
+      PhaseEvaluation phase;
+      phase.phase = static_cast<int>(row[0]);
+      phase.fraction = EvaluationMeasures::NaN;
+      phase.interpolated = true;
+      phase.measures = PaperMeasures(row[1], row[2], row[3], row[4]);
+      a.phases.push_back(phase);
+    }
+    return a;
+  }();
+  return part;
+}
+
+const std::vector<PaperCase>& PaperPartB()
+{
+  static const std::vector<PaperCase> part = { { "#1", PaperMeasures(6.23, 2.16, 2.00, 0.81) },
+    { "#2", PaperMeasures(3.89, 1.28, 1.50, 0.88) },
+    { "#3", PaperMeasures(7.16, 2.89, 2.50, 0.75) },
+    { "#4", PaperMeasures(4.57, 1.56, 1.80, 0.84) },
+    { "#5", PaperMeasures(2.95, 0.99, 1.30, 0.90) } };
+  return part;
+}
+
+std::string EvaluationCsv(const std::vector<CaseEvaluation>& cases)
+{
+  std::string table = "part,case,phase,fraction,kind";
+  for (const EvaluationColumn& column : EvaluationColumns())
+  {
+    table += std::string(",") + column.key + (*column.unit ? "_" + std::string(column.unit) : "");
+  }
+  table += "\n";
+  for (const CaseEvaluation& one : cases)
+  {
+    for (const PhaseEvaluation& phase : one.phases)
+    {
+      AddCsvRow(table, "A", one.name, std::to_string(phase.phase), Number(phase.fraction, 6),
+        KindOf(phase), phase.measures);
+    }
+    for (const bool interpolated : { true, false })
+    {
+      const MeasureSummary summary = SummarizePhases(one, interpolated);
+      if (summary.count > 0)
+      {
+        const char* kind = interpolated ? "interpolated" : "tracked";
+        AddCsvRow(table, "A", one.name, "mean", "", kind, summary.mean);
+        AddCsvRow(table, "A", one.name, "deviation", "", kind, summary.deviation);
+      }
+    }
+  }
+  const std::vector<EvaluationMeasures> means = InterpolatedMeans(cases);
+  for (const CaseEvaluation& one : cases)
+  {
+    const MeasureSummary summary = SummarizePhases(one, true);
+    if (summary.count > 0)
+    {
+      AddCsvRow(table, "B", one.name, "", "", "interpolated", summary.mean);
+    }
+  }
+  const MeasureSummary all = Summarize(means);
+  AddCsvRow(table, "B", "all", "mean", "", "interpolated", all.mean);
+  AddCsvRow(table, "B", "all", "deviation", "", "interpolated", all.deviation);
+  return table;
+}
+
+std::string BranchCsv(const std::vector<CaseEvaluation>& cases)
+{
+  std::string table =
+    "case,phase,fraction,kind,group,label,length_mm,covered,continuity,HD_mm,mean_mm\n";
+  for (const CaseEvaluation& one : cases)
+  {
+    for (const PhaseEvaluation& phase : one.phases)
+    {
+      for (const BranchEvaluation& branch : phase.branches)
+      {
+        table += Csv(one.name) + "," + std::to_string(phase.phase) + "," +
+          Number(phase.fraction, 6) + "," + KindOf(phase) + "," + std::to_string(branch.group) +
+          "," + Csv(branch.label) + "," + Number(branch.length, 4) + "," +
+          Number(branch.covered, 6) + "," + Number(branch.continuity, 6) + "," +
+          Number(branch.hausdorff, 6) + "," + Number(branch.mean, 6) + "\n";
+      }
+    }
+  }
+  return table;
+}
+
+std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases)
+{
+  const std::string head = "\\hline\n";
+  std::string text =
+    "% Made by coronary-pipeline evaluate. Paper: values of Table 1 of the paper.\n";
+  const MeasureSummary paperA = SummarizePhases(PaperPartA(), true);
+  for (const CaseEvaluation& one : cases)
+  {
+    text += "% Part A\n\\begin{tabular}{rrlrrrrrrrr}\n\\hline\n"
+            " & & & \\multicolumn{4}{c}{" +
+      Tex(one.name) +
+      "} & \\multicolumn{4}{c}{Paper, dataset \\#1} \\\\\n"
+      "Phase & \\% R-R & & HD (mm) & MSD (mm) & BCR & BCS & HD (mm) & MSD (mm) & BCR & BCS \\\\\n" +
+      head;
+    for (const PhaseEvaluation& phase : one.phases)
+    {
+      EvaluationMeasures paper;
+      for (const PhaseEvaluation& known : PaperPartA().phases)
+      {
+        if (known.phase == phase.phase && phase.interpolated)
+        {
+          paper = known.measures;
+        }
+      }
+      char first[64];
+      std::snprintf(first, sizeof(first), "%02d & %s & %s", phase.phase,
+        Number(100.0 * phase.fraction, 1).c_str(), KindOf(phase));
+      text += first + TexCells(phase.measures) + TexCells(paper) + " \\\\\n";
+    }
+    text += head;
+    const MeasureSummary interpolated = SummarizePhases(one, true);
+    const MeasureSummary tracked = SummarizePhases(one, false);
+    if (interpolated.count > 0)
+    {
+      text += "Mean & & interpolated" + TexCells(interpolated.mean) + TexCells(paperA.mean) +
+        " \\\\\nSTD & & interpolated" + TexCells(interpolated.deviation) +
+        TexCells(paperA.deviation) + " \\\\\n";
+    }
+    if (tracked.count > 0)
+    {
+      text += "Mean & & tracked" + TexCells(tracked.mean) + TexCells({}) + " \\\\\n";
+    }
+    text += "\\hline\n\\end{tabular}\n\n";
+  }
+  text += "% Part B: means over the interpolated phases\n\\begin{tabular}{lrrrr}\n\\hline\n"
+          "Dataset & HD (mm) & MSD (mm) & BCR & BCS \\\\\n" +
+    head;
+  for (const CaseEvaluation& one : cases)
+  {
+    text += Tex(one.name) + TexCells(SummarizePhases(one, true).mean) + " \\\\\n";
+  }
+  const MeasureSummary all = Summarize(InterpolatedMeans(cases));
+  const MeasureSummary paperB = Summarize(MeasuresOf(PaperPartB()));
+  text += head + "Mean" + TexCells(all.mean) + " \\\\\nSTD" + TexCells(all.deviation) +
+    " \\\\\n\\hline\nPaper, mean of five" + TexCells(paperB.mean) + " \\\\\nPaper, STD" +
+    TexCells(paperB.deviation) + " \\\\\n\\hline\n\\end{tabular}\n";
+  return text;
+}
+
+std::string EvaluationText(const std::vector<CaseEvaluation>& cases)
+{
+  std::string text;
+  const MeasureSummary paperA = SummarizePhases(PaperPartA(), true);
+  for (const CaseEvaluation& one : cases)
+  {
+    text += "Table 1, Part A: " + one.name + "\n" + TextHead("phase");
+    for (const PhaseEvaluation& phase : one.phases)
+    {
+      EvaluationMeasures paper;
+      for (const PhaseEvaluation& known : PaperPartA().phases)
+      {
+        if (known.phase == phase.phase && phase.interpolated)
+        {
+          paper = known.measures;
+        }
+      }
+      char name[64];
+      std::snprintf(name, sizeof(name), "%02d %6s %%  %s", phase.phase,
+        Number(100.0 * phase.fraction, 1).c_str(), KindOf(phase));
+      text += TextRow(name, phase.measures, paper);
+    }
+    const MeasureSummary interpolated = SummarizePhases(one, true);
+    const MeasureSummary tracked = SummarizePhases(one, false);
+    if (interpolated.count > 0)
+    {
+      text += TextRow("mean, interpolated", interpolated.mean, paperA.mean) +
+        TextRow("deviation", interpolated.deviation, paperA.deviation);
+    }
+    if (tracked.count > 0)
+    {
+      text +=
+        TextRow("mean, tracked", tracked.mean, {}) + TextRow("deviation", tracked.deviation, {});
+    }
+    text += "\n";
+  }
+  const std::vector<EvaluationMeasures> means = InterpolatedMeans(cases);
+  if (means.empty())
+  {
+    return text + "No phase is interpolated: there is no Part B.\n";
+  }
+  text += "Table 1, Part B: means over the interpolated phases\n" + TextHead("case");
+  const std::vector<PaperCase>& paper = PaperPartB();
+  for (std::size_t n = 0; n < cases.size(); ++n)
+  {
+    text += TextRow(cases[n].name, SummarizePhases(cases[n], true).mean,
+      n < paper.size() ? paper[n].mean : EvaluationMeasures());
+  }
+  const MeasureSummary all = Summarize(means);
+  const MeasureSummary paperB = Summarize(MeasuresOf(paper));
+  return text + TextRow("mean", all.mean, paperB.mean) +
+    TextRow("deviation", all.deviation, paperB.deviation);
+}
+}
