@@ -177,14 +177,23 @@ std::string TexCells(const EvaluationMeasures& m)
     Number(m.completenessRatio, 2, "--") + " & " + Number(m.continuityScore, 2, "--");
 }
 
+int WidthOf(const EvaluationColumn& column)
+{
+  return std::max(6, static_cast<int>(std::string(column.key).size()));
+}
+
 std::string TextCells(const EvaluationMeasures& m)
 {
   std::string line;
   for (const EvaluationColumn& column : EvaluationColumns())
   {
-    char cell[32];
-    std::snprintf(cell, sizeof(cell), " %11s", Number(m.*column.value, 3, "-").c_str());
-    line += cell;
+    if (column.brief)
+    {
+      char cell[32];
+      std::snprintf(
+        cell, sizeof(cell), " %*s", WidthOf(column), Number(m.*column.value, 3, "-").c_str());
+      line += cell;
+    }
   }
   return line;
 }
@@ -205,8 +214,11 @@ std::string TextHead(const char* first)
   std::string line = cell;
   for (const EvaluationColumn& column : EvaluationColumns())
   {
-    std::snprintf(cell, sizeof(cell), " %11s", column.key);
-    line += cell;
+    if (column.brief)
+    {
+      std::snprintf(cell, sizeof(cell), " %*s", WidthOf(column), column.key);
+      line += cell;
+    }
   }
   return line + "   |    HD   MSD   BCR   BCS (paper)\n";
 }
@@ -217,16 +229,6 @@ std::string TextRow(
   char cell[128];
   std::snprintf(cell, sizeof(cell), "%-28s", name.c_str());
   return cell + TextCells(m) + PaperCells(paper) + "\n";
-}
-
-std::vector<EvaluationMeasures> MeasuresOf(const std::vector<PaperCase>& cases)
-{
-  std::vector<EvaluationMeasures> list;
-  for (const PaperCase& one : cases)
-  {
-    list.push_back(one.mean);
-  }
-  return list;
 }
 }
 
@@ -315,18 +317,18 @@ void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& setti
 const std::vector<EvaluationColumn>& EvaluationColumns()
 {
   static const std::vector<EvaluationColumn> columns = {
-    { "HD", "mm", &Measures::hausdorff, 0.0 },
-    { "HD95", "mm", &Measures::hausdorff95, 0.0 },
-    { "MSD", "mm", &Measures::msd, 0.0 },
-    { "MSD_area", "mm", &Measures::msdArea, 0.0 },
-    { "RMS", "mm", &Measures::rms, 0.0 },
-    { "BCR", "", &Measures::completenessRatio, 1.0 },
-    { "BCS", "", &Measures::continuityScore, 1.0 },
-    { "BCR_bounded", "", &Measures::boundedCompleteness, 1.0 },
-    { "BCS_bounded", "", &Measures::boundedContinuity, 1.0 },
-    { "length_detected", "", &Measures::lengthDetected, 1.0 },
-    { "centerline_mean", "mm", &Measures::centerlineMean, 0.0 },
-    { "centerline_p95", "mm", &Measures::centerline95, 0.0 },
+    { "HD", true, "mm", &Measures::hausdorff, 0.0 },
+    { "HD95", true, "mm", &Measures::hausdorff95, 0.0 },
+    { "MSD", true, "mm", &Measures::msd, 0.0 },
+    { "MSD_area", true, "mm", &Measures::msdArea, 0.0 },
+    { "RMS", false, "mm", &Measures::rms, 0.0 },
+    { "BCR", true, "", &Measures::completenessRatio, 1.0 },
+    { "BCS", true, "", &Measures::continuityScore, 1.0 },
+    { "BCR_bounded", true, "", &Measures::boundedCompleteness, 1.0 },
+    { "BCS_bounded", true, "", &Measures::boundedContinuity, 1.0 },
+    { "length_detected", false, "", &Measures::lengthDetected, 1.0 },
+    { "centerline_mean", true, "mm", &Measures::centerlineMean, 0.0 },
+    { "centerline_p95", false, "mm", &Measures::centerline95, 0.0 },
   };
   return columns;
 }
@@ -414,6 +416,20 @@ const std::vector<PaperCase>& PaperPartB()
   return part;
 }
 
+const MeasureSummary& PaperSummaryA()
+{
+  static const MeasureSummary summary{ PaperMeasures(5.42, 1.99, 1.95, 0.82),
+    PaperMeasures(2.60, 1.03, 1.18, 0.07), 10 };
+  return summary;
+}
+
+const MeasureSummary& PaperSummaryB()
+{
+  static const MeasureSummary summary{ PaperMeasures(4.96, 1.78, 1.82, 0.84),
+    PaperMeasures(1.78, 0.75, 0.46, 0.06), 5 };
+  return summary;
+}
+
 std::string EvaluationCsv(const std::vector<CaseEvaluation>& cases)
 {
   std::string table = "part,case,phase,fraction,kind";
@@ -481,7 +497,7 @@ std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases)
   const std::string head = "\\hline\n";
   std::string text =
     "% Made by coronary-pipeline evaluate. Paper: values of Table 1 of the paper.\n";
-  const MeasureSummary paperA = SummarizePhases(PaperPartA(), true);
+  const MeasureSummary& paperA = PaperSummaryA();
   for (const CaseEvaluation& one : cases)
   {
     text += "% Part A\n\\begin{tabular}{rrlrrrrrrrr}\n\\hline\n"
@@ -528,7 +544,7 @@ std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases)
     text += Tex(one.name) + TexCells(SummarizePhases(one, true).mean) + " \\\\\n";
   }
   const MeasureSummary all = Summarize(InterpolatedMeans(cases));
-  const MeasureSummary paperB = Summarize(MeasuresOf(PaperPartB()));
+  const MeasureSummary& paperB = PaperSummaryB();
   text += head + "Mean" + TexCells(all.mean) + " \\\\\nSTD" + TexCells(all.deviation) +
     " \\\\\n\\hline\nPaper, mean of five" + TexCells(paperB.mean) + " \\\\\nPaper, STD" +
     TexCells(paperB.deviation) + " \\\\\n\\hline\n\\end{tabular}\n";
@@ -538,7 +554,7 @@ std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases)
 std::string EvaluationText(const std::vector<CaseEvaluation>& cases)
 {
   std::string text;
-  const MeasureSummary paperA = SummarizePhases(PaperPartA(), true);
+  const MeasureSummary& paperA = PaperSummaryA();
   for (const CaseEvaluation& one : cases)
   {
     text += "Table 1, Part A: " + one.name + "\n" + TextHead("phase");
@@ -584,7 +600,7 @@ std::string EvaluationText(const std::vector<CaseEvaluation>& cases)
       n < paper.size() ? paper[n].mean : EvaluationMeasures());
   }
   const MeasureSummary all = Summarize(means);
-  const MeasureSummary paperB = Summarize(MeasuresOf(paper));
+  const MeasureSummary& paperB = PaperSummaryB();
   return text + TextRow("mean", all.mean, paperB.mean) +
     TextRow("deviation", all.deviation, paperB.deviation);
 }

@@ -43,6 +43,7 @@ struct EvaluationMeasures
 struct EvaluationColumn
 {
   const char* key;  ///< in files, "HD95"
+  bool brief;       ///< also in tables for people
   const char* unit; ///< "mm", or "" for a ratio
   double EvaluationMeasures::*value;
   double best; ///< 0 for distances, 1 for ratios
@@ -123,6 +124,7 @@ MeasureSummary SummarizePhases(const CaseEvaluation& one, bool interpolated);
 
 /// The paper's Table 1: HD, MSD, BCR and BCS only. Phases of Part A have no fractions there: NaN.
 const CaseEvaluation& PaperPartA();
+
 /// Name and means over the interpolated phases of its five cases.
 struct PaperCase
 {
@@ -130,6 +132,10 @@ struct PaperCase
   EvaluationMeasures mean;
 };
 const std::vector<PaperCase>& PaperPartB();
+
+/// Means and deviations as printed there (of the rows above they would be 0.04 off).
+const MeasureSummary& PaperSummaryA();
+const MeasureSummary& PaperSummaryB();
 
 /// Part A of every case and Part B over all, as fields separated by commas.
 std::string EvaluationCsv(const std::vector<CaseEvaluation>& cases);

@@ -86,6 +86,57 @@ check_metrics() {
   expect_text stderr "100 times"
 }
 
+check_evaluate() {
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 --phases 3 --truth-only --quiet $coarse --output truth
+  # The truth as a result of its own: all distances are 0, all branches there.
+  run 0 evaluate --result truth --truth truth --output itself
+  for file in table1.csv table1.tex table1.json branches.csv; do
+    [ -s itself/$file ] || fail "no itself/$file"
+  done
+  for key in HD HD95 MSD MSD_area RMS centerline_mean; do
+    [ "$(grep -c "\"$key\": \(0.0\|[0-9.]*e-1[0-9]\),*$" itself/table1.json)" -ge 6 ] || fail "$key is not 0 everywhere"
+  done
+  for key in BCR BCS BCR_bounded BCS_bounded; do
+    [ "$(grep -c "\"$key\": \(1.0,\|0.9999999\|1.0000000\)" itself/table1.json)" -ge 6 ] \
+      || fail "$key is not 1 everywhere"
+  done
+  [ "$(grep -c '"interpolated": true' itself/table1.json)" -eq 1 ] || fail "not every other phase"
+  expect_text stdout "4.96  1.78  1.82  0.84"
+  expect_text stderr "does not say which phases were tracked"
+
+  # Another heart, two cases, of which one lacks a phase.
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 6 --phases 3 --truth-only --quiet $coarse --output other
+  mkdir fewer
+  sed '/file="surface_01/d' other/truth/surface.pvd >fewer/surface.pvd
+  cp other/truth/surface_0[02].vtp fewer
+  run 0 evaluate --result other --truth truth --result fewer --truth truth --name one --name two \
+    --interpolated none --output both --quiet
+  grep -q '"HD": [1-9]' both/table1.json || fail "two hearts are the same"
+  [ "$(grep -c '"phase": ' both/table1.json)" -eq 5 ] || fail "not 3 + 2 phases"
+  expect_text stderr "these phases are left out"
+  expect_text both/table1.csv 'A,"two",2,'
+
+  run 2 evaluate --result truth --truth truth --truth other --output out
+  expect_one_line "coronary-pipeline evaluate" "--result and --truth"
+  run 1 evaluate --result nowhere --truth truth --output out
+  expect_one_line "coronary-pipeline evaluate" "'nowhere' does not exist"
+  mkdir empty
+  run 1 evaluate --result empty --truth truth --output out
+  expect_one_line "coronary-pipeline evaluate" "'empty' has no list of surfaces"
+  printf '{"phase": 1}' >empty/report.json
+  run 1 evaluate --result empty --truth truth --output out
+  expect_one_line "coronary-pipeline evaluate" "'empty' is a run without motion"
+  rm fewer/surface_02.vtp
+  run 1 evaluate --result fewer --truth truth --output out
+  expect_one_line "coronary-pipeline evaluate" "surface_02.vtp' is missing"
+  sed 's/timestep="-*/timestep="7/' other/truth/surface.pvd >other/truth/late.pvd
+  run 1 evaluate --result other/truth/late.pvd --truth truth --output out
+  expect_one_line "coronary-pipeline evaluate" "No time of 'other/truth/late.pvd'"
+  expect_nothing_in out
+}
+
 check_convert() {
   # shellcheck disable=SC2086
   run 0 phantom --seed 5 --phases 1 $small $coarse --output made
