@@ -215,6 +215,100 @@ TEST(ThinBranches, SameOnAnyNumberOfThreads)
   }
 }
 
+/// A tree of the trunk and the first `known` mm of the branch.
+CenterlineTree TreeWithTip(const Scene& scene, double known)
+{
+  CenterlineTree tree = scene.trunk;
+  const Vector3 direction = (BranchEnd - BranchStart).normalized();
+  CenterlineTree::Branch branch;
+  branch.groupId = 1;
+  branch.parentGroupId = 0;
+  for (double s = 2.0; s <= known; s += 0.24)
+  {
+    branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
+    tree.points.emplace_back(BranchStart + s * direction);
+    tree.radius.push_back(0.5);
+  }
+  tree.branches.push_back(branch);
+  return tree;
+}
+
+std::vector<Vector3> FollowTip(const Scene& scene, const CenterlineTree& tree)
+{
+  ThinBranchSettings settings;
+  settings.voxel = 0.4;
+  settings.contrast = Blood - Fat;
+  return FollowTips(ImageInterpolator(scene.image), tree, settings).at(1);
+}
+
+TEST(ThinBranches, TipsGoOnToTheEndOfTheVessel)
+{
+  const double length = (BranchEnd - BranchStart).norm();
+  for (const double background : { Fat, 110.0 })
+  {
+    for (const double radius : { 0.4, 0.5 })
+    {
+      for (const double known : { 6.0, length - 3.0, length - 1.5 })
+      {
+        SCOPED_TRACE("r " + std::to_string(radius) + ", in " + std::to_string(background) +
+          ", known " + std::to_string(known));
+        const Scene scene(
+          [&](const Vector3& p) { return WithBranch(p, radius, background); }, 25.0);
+        const CenterlineTree tree = TreeWithTip(scene, known);
+        const std::vector<Vector3> path = FollowTip(scene, tree);
+        ASSERT_FALSE(path.empty());
+        EXPECT_LT((path.front() - tree.points.back()).norm(), 0.8);
+        EXPECT_LT((path.back() - BranchEnd).norm(), 0.8);
+        for (const Vector3& p : path)
+        {
+          EXPECT_LT(DistanceToSegment(p, BranchStart, BranchEnd), 0.8);
+        }
+      }
+    }
+  }
+}
+
+TEST(ThinBranches, TipsEndWhereTheVesselDoes)
+{
+  for (std::uint64_t seed = 1; seed <= 8; ++seed)
+  {
+    for (const double background : { Fat, 110.0 })
+    {
+      const Scene scene([&](const Vector3& p) { return WithBranch(p, 0.5, background); }, 40.0,
+        Vector3::Constant(0.4), seed);
+      const CenterlineTree tree = TreeWithTip(scene, (BranchEnd - BranchStart).norm());
+      for (const Vector3& p : FollowTip(scene, tree))
+      {
+        EXPECT_LT((p - BranchEnd).norm(), 1.2) << "seed " << seed << " in " << background;
+      }
+    }
+  }
+}
+
+TEST(ThinBranches, TipsDoNotGoOnIntoAnotherVessel)
+{
+  // It ends in the lumen of a third one: a loop, or a vein, but no tip.
+  const Vector3 across(0.0, 6.0, 0.0);
+  const Scene scene(
+    [&](const Vector3& p)
+    {
+      const double thin = WithBranch(p, 0.5, Fat);
+      return thin + TubeShare(p, BranchEnd - across, BranchEnd + across, 1.2) * (Blood - thin);
+    },
+    25.0);
+  CenterlineTree tree = TreeWithTip(scene, 9.0);
+  CenterlineTree::Branch other;
+  other.groupId = 2;
+  for (double s = -1.0; s <= 1.0; s += 0.04)
+  {
+    other.points.push_back(static_cast<std::int64_t>(tree.points.size()));
+    tree.points.emplace_back(BranchEnd + s * across);
+    tree.radius.push_back(1.2);
+  }
+  tree.branches.push_back(other);
+  EXPECT_TRUE(FollowTip(scene, tree).empty());
+}
+
 TEST(ThinBranches, MeasuresTheNoise)
 {
   // Interpolation averages: less than in the voxels, and in proportion.
