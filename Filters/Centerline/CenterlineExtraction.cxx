@@ -254,6 +254,7 @@ private:
   Way WayBack(const Vector3& from, std::uint32_t member) const;
   std::vector<Vector3> Tangents(const std::vector<Vector3>& points) const;
   void Measure(Course& course, bool move) const;
+  void Recentre(Course& course) const;
   void SmoothPositions(Course& course, double start, double end) const;
   void SmoothRadii(Course& course) const;
   void Calibrate(const Course& course);
@@ -877,6 +878,69 @@ void Extractor::Measure(Course& course, bool move) const
   }
 }
 
+/// Beside something much darker or brighter the speed is greatest off the axis, so that no section is found from
+/// there: sections are looked for around the points of longer parts that have none.
+void Extractor::Recentre(Course& course) const
+{
+  const std::vector<Vector3> tangents = this->Tangents(course.points);
+  const auto unseen = [&](std::size_t i)
+  { return course.confidence[i] < this->Settings.minimumConfidence; };
+  const auto longest = static_cast<std::size_t>(5.0 * this->Voxel / this->Step);
+  for (std::size_t begin = 0; begin < course.size();)
+  {
+    std::size_t end = begin;
+    while (end < course.size() && unseen(end))
+    {
+      ++end;
+    }
+    if (end - begin > longest)
+    {
+      std::vector<LumenSection> best(end - begin);
+      ParallelFor(static_cast<std::int64_t>(end - begin), 4,
+        [&](std::int64_t first, std::int64_t last)
+        {
+          for (std::int64_t n = first; n < last; ++n)
+          {
+            LumenSection& found = best[static_cast<std::size_t>(n)];
+            const std::size_t i = begin + static_cast<std::size_t>(n);
+            const Vector3 u = tangents[i].unitOrthogonal();
+            const Vector3 v = tangents[i].cross(u);
+            for (const double away : { 1.25, 2.5 })
+            {
+              for (int side = 0; side < 8; ++side)
+              {
+                const double angle = 0.25 * M_PI * side;
+                const Vector3 place = course.points[i] +
+                  away * this->Voxel * (std::cos(angle) * u + std::sin(angle) * v);
+                const LumenSection section =
+                  MeasureLumen(*this->Image, place, tangents[i], this->Voxel, this->Lumen);
+                // The same lumen: the point is in it.
+                if (section.confidence > std::max(found.confidence, course.confidence[i]) &&
+                  (section.centre - course.points[i]).norm() <= section.radius + 0.5 * this->Voxel)
+                {
+                  found = section;
+                }
+              }
+            }
+          }
+        });
+      for (std::size_t i = begin; i < end; ++i)
+      {
+        const LumenSection& section = best[i - begin];
+        if (section.confidence > 0.0)
+        {
+          course.points[i] = section.centre;
+          course.radius[i] = section.radius;
+          course.confidence[i] = section.confidence;
+          course.lumen[i] = section.lumen;
+          course.behind[i] = section.behind;
+        }
+      }
+    }
+    begin = std::max(end, begin + 1);
+  }
+}
+
 void Extractor::SmoothPositions(Course& course, double start, double end) const
 {
   std::vector<double> weights(course.size());
@@ -1257,6 +1321,10 @@ std::int64_t Extractor::Append(const Way& way, int treeId, bool wanted)
   course.confidence.assign(course.size(), 1.0);
   this->SmoothPositions(course, 10.0, 10.0);
   this->Measure(course, this->Settings.snap);
+  if (this->Settings.snap)
+  {
+    this->Recentre(course);
+  }
   if (!wanted)
   {
     const std::size_t end = this->SeenUpTo(course, root ? this->Lumen.maximumRadius : parentRadius);
