@@ -2,6 +2,7 @@
 
 #include "AtomicFile.h"
 #include "Evaluation.h"
+#include "EvaluationReport.h"
 #include "Interruption.h"
 #include "MovingModel.h"
 #include "OptionChecks.h"
@@ -9,6 +10,8 @@
 #include "ProgressDisplay.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
+#include "vtkEvaluationPictures.h"
+#include "vtkEvaluationPlots.h"
 #include "vtkMessageTrap.h"
 #include "vtkSurfaceInput.h"
 
@@ -24,6 +27,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -47,6 +51,7 @@ struct EvaluateJob
   double endLength = 3.0;
   double errorBound = 1e-3;
   double timeTolerance = 1e-3;
+  bool noPictures = false;
   int threads = 0;
   bool quiet = false;
 
@@ -69,6 +74,14 @@ private:
     std::vector<PhaseFiles> phases;
   };
   CaseFiles FindCase(std::size_t number) const;
+  void Evaluate(CaseFiles& files, vtkMessageTrap& messages,
+    const std::function<void(const PhaseFiles&)>& begin,
+    const std::function<void(double)>& progress) const;
+  ReportCase Draw(const CaseFiles& files, const std::string& subfolder, StagedFolder& folder,
+    vtkMessageTrap& messages, const std::function<void(double)>& progress) const;
+  void WriteReport(const std::vector<CaseEvaluation>& evaluations,
+    std::vector<ReportCase> illustrations, std::vector<std::string> plots,
+    const std::string& withoutPictures, const std::string& path) const;
   std::vector<bool> WhichAreInterpolated(
     const MovingModel& model, const std::vector<TimedFile>& truth, CaseFiles& files) const;
 };
@@ -119,6 +132,7 @@ void EvaluateJob::Declare(CLI::App& app)
     ->check(Within(0.0, 1.0))
     ->type_name("FRACTION")
     ->capture_default_str();
+  app.add_flag("--no-pictures", this->noPictures, "Tables and report only");
   app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
     ->check(WholeWithin(0, 1024))
     ->type_name("N")
@@ -302,6 +316,117 @@ nlohmann::ordered_json JsonOf(const std::vector<CaseEvaluation>& cases)
   return all;
 }
 
+void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
+  const std::function<void(const PhaseFiles&)>& begin,
+  const std::function<void(double)>& progress) const
+{
+  EvaluationSettings settings;
+  settings.distance.errorBound = this->errorBound;
+  settings.distance.clipEnds = this->clipEnds;
+  settings.distance.endLength = this->endLength;
+  settings.distance.signedDistances = false;
+  std::vector<std::string>& warnings = files.evaluation.warnings;
+  for (PhaseFiles& one : files.phases)
+  {
+    ThrowIfInterrupted();
+    begin(one);
+    settings.distance.names = { "'" + one.model + "'", "'" + one.truth + "'" };
+    EvaluationInput input;
+    vtkSmartPointer<vtkPolyData> model;
+    vtkSmartPointer<vtkPolyData> truth;
+    input.model = ReadSurface(one.model, messages, model);
+    input.truth = ReadSurface(one.truth, messages, truth);
+    input.modelTree = ReadTree(one.modelLines, model, "result", messages, nullptr);
+    input.truthTree = ReadTree(one.truthLines, truth, "reference", messages, &input.labels);
+    EvaluatePhase(input, settings, one.phase, warnings,
+      [&](double fraction)
+      {
+        progress(fraction);
+        return Interruption() == 0;
+      });
+    files.evaluation.phases.push_back(one.phase);
+  }
+  if (std::isnan(files.evaluation.phases.front().measures.completenessRatio))
+  {
+    warnings.push_back("'" + files.evaluation.name +
+      "' has no branches on one of the sides: there is neither BCR nor BCS");
+  }
+}
+
+ReportCase EvaluateJob::Draw(const CaseFiles& files, const std::string& subfolder,
+  StagedFolder& folder, vtkMessageTrap& messages, const std::function<void(double)>& progress) const
+{
+  const auto read = [&](const std::string& path)
+  { return path.empty() ? vtkSmartPointer<vtkPolyData>() : ReadPolyData(path, messages); };
+  EvaluationScene scene;
+  scene.evaluation = &files.evaluation;
+  scene.model = [&](int index)
+  { return read(files.phases[static_cast<std::size_t>(index)].model); };
+  scene.truth = [&](int index)
+  { return read(files.phases[static_cast<std::size_t>(index)].truth); };
+  scene.centerline = [&](int index)
+  { return read(files.phases[static_cast<std::size_t>(index)].modelLines); };
+
+  ReportCase pictures;
+  const auto add =
+    [&](auto draw, const char* name, const char* title, const char* caption, double done)
+  {
+    ThrowIfInterrupted();
+    const std::string path = folder.Add(subfolder + name);
+    draw(scene, path);
+    pictures.pictures.push_back({ path, title, caption });
+    progress(done);
+  };
+  add(DrawOverlayGrid, "overlay.png", "Model over truth in every phase",
+    "Model red, truth green. Dashed frames: interpolated phases.", 0.4);
+  add(DrawDistances, "distances.png", "Distance of the model from the truth", "", 0.5);
+  add(DrawSequence, "sequence.png", "The moving tree",
+    "Centerlines of all phases by branch; paths of points over the cycle; meshes of three phases.",
+    0.7);
+  ThrowIfInterrupted();
+  const std::filesystem::path beating =
+    std::filesystem::path(pictures.pictures.front().path).parent_path();
+  pictures.beating = DrawBeating(scene, beating.string());
+  for (const std::string& path : pictures.beating)
+  {
+    folder.Add(subfolder + std::filesystem::path(path).filename().string());
+  }
+  if (std::filesystem::exists(beating / "beating.gif"))
+  {
+    folder.Add(subfolder + "beating.gif");
+  }
+  progress(1.0);
+  return pictures;
+}
+
+void EvaluateJob::WriteReport(const std::vector<CaseEvaluation>& evaluations,
+  std::vector<ReportCase> illustrations, std::vector<std::string> plots,
+  const std::string& withoutPictures, const std::string& path) const
+{
+  EvaluationReport report;
+  report.title = "A moving model against the truth";
+  for (std::size_t n = 0; n < evaluations.size(); ++n)
+  {
+    report.settings.emplace_back(evaluations[n].name + ": model", this->results[n]);
+    report.settings.emplace_back(evaluations[n].name + ": truth", this->truths[n]);
+  }
+  report.settings.emplace_back("Interpolated phases", this->untracked);
+  report.settings.emplace_back(
+    "Hausdorff distance at most too small by", Format(this->errorBound) + " mm");
+  report.settings.emplace_back("Ends of vessels",
+    this->clipEnds ? "left out, up to " + Format(this->endLength) + " mm beyond the end"
+                   : "compared as they are");
+  report.settings.emplace_back("Program", "coronary-pipeline " DYNAMICCORONARY_VERSION);
+  report.cases = evaluations;
+  report.illustrations = std::move(illustrations);
+  report.plots = std::move(plots);
+  if (!withoutPictures.empty())
+  {
+    report.warnings.push_back(withoutPictures);
+  }
+  WriteEvaluationReport(report, path);
+}
+
 void EvaluateJob::Run() const
 {
   if (this->results.size() != this->truths.size())
@@ -315,66 +440,74 @@ void EvaluateJob::Run() const
   }
   SetNumberOfThreads(this->threads);
   std::vector<CaseFiles> cases;
-  int steps = 0;
+  std::size_t steps = 0;
   for (std::size_t n = 0; n < this->results.size(); ++n)
   {
     cases.push_back(this->FindCase(n));
-    steps += static_cast<int>(cases.back().phases.size());
+    steps += cases.back().phases.size();
   }
+  std::string why;
+  const bool draw = !this->noPictures && CanDraw(why);
+  const std::string withoutPictures =
+    draw || this->noPictures ? "" : "there are no pictures and plots: " + why;
 
-  EvaluationSettings settings;
-  settings.distance.errorBound = this->errorBound;
-  settings.distance.clipEnds = this->clipEnds;
-  settings.distance.endLength = this->endLength;
-  settings.distance.signedDistances = false;
   StagedFolder folder(this->output);
   vtkMessageTrap messages;
   std::vector<CaseEvaluation> evaluations;
+  std::vector<ReportCase> illustrations;
+  std::vector<std::string> plots;
+  try
   {
-    ProgressDisplay progress("phase", steps, this->quiet);
+    ProgressDisplay progress(
+      "step", static_cast<int>(steps + (draw ? cases.size() : 0)), this->quiet);
+    const auto update = [&](double fraction) { progress.Update(fraction); };
     int step = 0;
     for (CaseFiles& files : cases)
     {
-      for (PhaseFiles& one : files.phases)
-      {
-        ThrowIfInterrupted();
-        progress.BeginStep(
-          step++, files.evaluation.name + ", phase " + std::to_string(one.phase.phase));
-        settings.distance.names = { "'" + one.model + "'", "'" + one.truth + "'" };
-        EvaluationInput input;
-        vtkSmartPointer<vtkPolyData> model;
-        vtkSmartPointer<vtkPolyData> truth;
-        input.model = ReadSurface(one.model, messages, model);
-        input.truth = ReadSurface(one.truth, messages, truth);
-        input.modelTree = ReadTree(one.modelLines, model, "result", messages, nullptr);
-        input.truthTree = ReadTree(one.truthLines, truth, "reference", messages, &input.labels);
-        std::vector<std::string> warnings;
-        EvaluatePhase(input, settings, one.phase, warnings,
-          [&](double fraction)
-          {
-            progress.Update(fraction);
-            return Interruption() == 0;
-          });
-        for (std::string& warning : warnings)
+      this->Evaluate(
+        files, messages,
+        [&](const PhaseFiles& one)
         {
-          files.evaluation.warnings.push_back(std::move(warning));
-        }
-        files.evaluation.phases.push_back(one.phase);
-      }
-      if (std::isnan(files.evaluation.phases.front().measures.completenessRatio))
-      {
-        files.evaluation.warnings.push_back("'" + files.evaluation.name +
-          "' has no branches on one of the sides: there is neither BCR nor BCS");
-      }
+          progress.BeginStep(
+            step++, files.evaluation.name + ", phase " + std::to_string(one.phase.phase));
+        },
+        update);
       evaluations.push_back(files.evaluation);
     }
+    const std::string table = folder.Add("table1.csv");
+    WriteFileAtomically(table, EvaluationCsv(evaluations));
+    WriteFileAtomically(folder.Add("table1.tex"), EvaluationLatex(evaluations));
+    WriteFileAtomically(folder.Add("branches.csv"), BranchCsv(evaluations));
+    for (std::size_t n = 0; draw && n < cases.size(); ++n)
+    {
+      progress.BeginStep(step++, cases[n].evaluation.name + ", pictures");
+      const std::string subfolder =
+        cases.size() == 1 ? "pictures/" : "pictures/" + std::to_string(n + 1) + "/";
+      illustrations.push_back(this->Draw(cases[n], subfolder, folder, messages, update));
+    }
+    if (draw)
+    {
+      const std::filesystem::path place = std::filesystem::path(table).parent_path() / "plots";
+      std::filesystem::create_directories(place);
+      plots = DrawPlots(evaluations, place.string());
+      for (const std::string& plot : plots)
+      {
+        const std::filesystem::path name = std::filesystem::path(plot).filename();
+        folder.Add("plots/" + name.string());
+        folder.Add("plots/" + std::filesystem::path(name).replace_extension(".png").string());
+      }
+    }
+    this->WriteReport(evaluations, std::move(illustrations), std::move(plots), withoutPictures,
+      folder.Add("report.html"));
+    WriteFileAtomically(folder.Add("table1.json"), JsonOf(evaluations).dump(2) + "\n");
+    messages.ThrowIfError();
+    ThrowIfInterrupted();
   }
-
-  WriteFileAtomically(folder.Add("table1.csv"), EvaluationCsv(evaluations));
-  WriteFileAtomically(folder.Add("table1.tex"), EvaluationLatex(evaluations));
-  WriteFileAtomically(folder.Add("branches.csv"), BranchCsv(evaluations));
-  WriteFileAtomically(folder.Add("table1.json"), JsonOf(evaluations).dump(2) + "\n");
-  ThrowIfInterrupted();
+  catch (const std::runtime_error& error)
+  {
+    ThrowIfInterrupted();
+    throw std::runtime_error(folder.Translate(error.what()));
+  }
   folder.Commit();
   messages.PrintWarnings();
   for (const CaseEvaluation& one : evaluations)
@@ -383,6 +516,10 @@ void EvaluateJob::Run() const
     {
       std::fprintf(stderr, "Warning: %s.\n", warning.c_str());
     }
+  }
+  if (!withoutPictures.empty())
+  {
+    std::fprintf(stderr, "Warning: %s.\n", withoutPictures.c_str());
   }
   if (!this->quiet)
   {
@@ -395,7 +532,10 @@ Command MakeEvaluateCommand(CLI::App& program)
 {
   CLI::App* app = program.add_subcommand(
     "evaluate", "A moving model against the truth, phase by phase: Table 1 of the paper");
-  app->footer("Writes DIR/table1.csv, table1.tex, table1.json and branches.csv.");
+  app->footer(
+    "Writes DIR/table1.csv, table1.tex, branches.csv, report.html, table1.json; and with a display "
+    "pictures/ (of several cases pictures/1/, ...) and plots/. On a machine without one: "
+    "xvfb-run -a coronary-pipeline evaluate ...");
   auto job = std::make_shared<EvaluateJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

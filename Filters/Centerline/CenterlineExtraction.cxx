@@ -1591,40 +1591,47 @@ void Extractor::LengthenTips()
   {
     return;
   }
-  const std::vector<std::vector<Vector3>> paths = FollowTips(*this->Image, this->Tree, settings);
+  const std::vector<TipPath> paths = FollowTips(*this->Image, this->Tree, settings);
   for (std::size_t b = 0; b < paths.size(); ++b)
   {
-    if (paths[b].empty())
+    if (paths[b].points.empty())
     {
       continue;
     }
-    CenterlineTree::Branch& branch = this->Tree.branches[b];
-    // With a part of what is known, for the sake of the ends of tangents and smoothing.
-    const std::size_t known = std::min<std::size_t>(branch.points.size(), 12);
-    std::vector<Vector3> points;
-    double before = 0.0;
-    for (std::size_t i = branch.points.size() - known; i < branch.points.size(); ++i)
-    {
-      points.push_back(this->Tree.points[static_cast<std::size_t>(branch.points[i])]);
-      before += points.size() > 1 ? (points.back() - points[points.size() - 2]).norm() : 0.0;
-    }
-    points.insert(points.end(), paths[b].begin(), paths[b].end());
+    std::vector<std::int64_t>& chain = this->Tree.branches[b].points;
+    // With a part of what is known, so that it goes on smoothly.
+    const std::size_t known = std::min<std::size_t>(paths[b].known, 12);
     Course course;
-    course.points = ResampleCurve(points, this->Step);
-    course.confidence.assign(course.size(), 1.0);
+    for (std::size_t i = paths[b].known - known; i < paths[b].known; ++i)
+    {
+      course.points.push_back(this->Tree.points[static_cast<std::size_t>(chain[i])]);
+    }
+    course.points.insert(course.points.end(), paths[b].points.begin(), paths[b].points.end());
+    course.points = ResampleCurve(course.points, this->Step);
+    course.confidence.assign(course.size(), 0.2);
+    std::fill_n(course.confidence.begin(), std::min(known, course.size()), 1.0);
     this->SmoothPositions(course, 1e3, 0.0);
     this->Measure(course, false);
     this->SmoothRadii(course);
-    const auto first = static_cast<std::size_t>(std::ceil(before / this->Step + 0.5));
-    for (std::size_t i = first; i < course.size(); ++i)
+    std::size_t at = paths[b].known;
+    for (std::size_t i = known; i < course.size(); ++i, ++at)
     {
-      branch.points.push_back(static_cast<std::int64_t>(this->Tree.points.size()));
-      this->Tree.points.push_back(course.points[i]);
-      this->Tree.radius.push_back(course.radius[i]);
-      this->Tree.confidence.push_back(course.confidence[i]);
-      this->PointLumen.push_back(course.lumen[i]);
-      this->BranchOf.push_back(static_cast<std::int32_t>(b));
+      if (at == chain.size())
+      {
+        chain.push_back(static_cast<std::int64_t>(this->Tree.points.size()));
+        this->Tree.points.emplace_back();
+        this->Tree.radius.emplace_back();
+        this->Tree.confidence.emplace_back();
+        this->PointLumen.emplace_back();
+        this->BranchOf.push_back(static_cast<std::int32_t>(b));
+      }
+      const auto point = static_cast<std::size_t>(chain[at]);
+      this->Tree.points[point] = course.points[i];
+      this->Tree.radius[point] = course.radius[i];
+      this->Tree.confidence[point] = course.confidence[i];
+      this->PointLumen[point] = course.lumen[i];
     }
+    chain.resize(at);
     this->Own(b);
   }
 }

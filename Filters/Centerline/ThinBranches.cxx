@@ -103,11 +103,16 @@ public:
     , Settings(settings)
     , Lumen(tree, 6.0 * settings.voxel)
     , Noise(MeasureNoise(image, tree, settings.voxel))
+    , Joint(tree.points.size(), 0)
   {
+    for (const CenterlineTree::Branch& branch : tree.branches)
+    {
+      this->Joint[static_cast<std::size_t>(branch.points.front())] = 1;
+    }
   }
 
   std::vector<ThinBranch> Run() const;
-  std::vector<Vector3> FollowTip(const CenterlineTree::Branch& branch) const;
+  TipPath FollowTip(const CenterlineTree::Branch& branch) const;
 
 private:
   struct Spot
@@ -150,6 +155,7 @@ private:
   const ThinBranchSettings& Settings;
   TreeLumen Lumen;
   double Noise;
+  std::vector<char> Joint; ///< of a point of the tree: a branch begins there
 };
 
 /// Local maxima of the image on surfaces beside the lumens.
@@ -560,16 +566,16 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   return true;
 }
 
-std::vector<Vector3> Finder::FollowTip(const CenterlineTree::Branch& branch) const
+TipPath Finder::FollowTip(const CenterlineTree::Branch& branch) const
 {
   const double voxel = this->Settings.voxel;
-  const auto point = [&](std::size_t i) -> const Vector3&
-  { return this->Tree.points[static_cast<std::size_t>(branch.points[i])]; };
+  const auto index = [&](std::size_t i) { return static_cast<std::size_t>(branch.points[i]); };
+  const auto point = [&](std::size_t i) -> const Vector3& { return this->Tree.points[index(i)]; };
   // The very end may have been drawn into a corner of the region.
   const Vector3& tip = point(branch.points.size() - 1);
   const auto passed = [&](std::size_t i) { return (point(i) - tip).norm(); };
   std::size_t near = branch.points.size() - 1;
-  while (near > 0 && passed(near) < 2.0 * voxel)
+  while (near > 0 && passed(near) < 2.0 * voxel && !this->Joint[index(near)])
   {
     --near;
   }
@@ -618,15 +624,20 @@ std::vector<Vector3> Finder::FollowTip(const CenterlineTree::Branch& branch) con
   {
     return {};
   }
-  std::vector<Vector3> beyond;
+  TipPath path;
+  path.known = near + 1;
   for (const Sample& sample : samples)
   {
-    if ((sample.position - tip).dot(direction) > 0.5 * Stride * voxel || !beyond.empty())
+    if ((sample.position - point(near)).dot(direction) > 0.5 * Stride * voxel ||
+      !path.points.empty())
     {
-      beyond.push_back(sample.position);
+      path.points.push_back(sample.position);
     }
   }
-  return beyond;
+  // Farther than before, or it is none.
+  const bool beyond =
+    !path.points.empty() && (path.points.back() - tip).dot(direction) > 0.5 * Stride * voxel;
+  return beyond ? path : TipPath();
 }
 
 std::vector<ThinBranch> Finder::Run() const
@@ -730,12 +741,12 @@ std::vector<ThinBranch> FindThinBranches(
   return Finder(image, tree, settings).Run();
 }
 
-std::vector<std::vector<Vector3>> FollowTips(
+std::vector<TipPath> FollowTips(
   const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
 {
   Check(settings);
   const Finder finder(image, tree, settings);
-  std::vector<std::vector<Vector3>> paths(tree.branches.size());
+  std::vector<TipPath> paths(tree.branches.size());
   ParallelFor(static_cast<std::int64_t>(paths.size()), 1,
     [&](std::int64_t first, std::int64_t last)
     {

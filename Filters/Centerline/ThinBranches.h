@@ -52,16 +52,22 @@ double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, 
 std::vector<ThinBranch> FindThinBranches(
   const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings);
 
+/// How a branch goes on beyond its tip.
+struct TipPath
+{
+  std::size_t known = 0; ///< points of the branch that it goes on from; the others are replaced
+  std::vector<Vector3> points; ///< mm, 0.75 voxels a step; empty: nothing goes on
+};
+
 /**
  * What goes on beyond the tips of a tree: a vessel is to be seen there for longer than it stands out
- * enough for a mask.
+ * enough for a mask. The last two voxels before a tip are followed anew: they may lead into a corner of a mask.
  * @param tree  every branch ends in a tip
- * @returns one path a branch, from its last point (not included) outwards, 0.75 voxels a step; empty where nothing
- *          goes on, or where it leads into another vessel. `minimumLength` does not apply, half of
- *          `significance` is enough. The same on any number of threads.
+ * @returns one path a branch; empty also where it leads into another vessel. `minimumLength` does not
+ *          apply, half of `significance` is enough. The same on any number of threads.
  * @throws std::invalid_argument that names the setting out of range
  */
-std::vector<std::vector<Vector3>> FollowTips(
+std::vector<TipPath> FollowTips(
   const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings);
 }
 

@@ -1320,6 +1320,10 @@ struct SweptLumen::Build
         {
           continue; // nothing straight is left between two junctions; rings have to do
         }
+        if (!(high > span.cutFrom))
+        {
+          continue; // what is left before the tip is too short to be cut
+        }
         moveArm(span.startJunction, true, high);
         self.SpanList[i].cutFrom = high;
         --i;
@@ -1327,6 +1331,10 @@ struct SweptLumen::Build
       }
       if (span.endJunction >= 0 && high > span.cutTo - 0.5 * r)
       {
+        if (!(low < span.cutTo))
+        {
+          continue;
+        }
         moveArm(span.endJunction, false, low);
         self.SpanList[i].cutTo = low;
         --i;
