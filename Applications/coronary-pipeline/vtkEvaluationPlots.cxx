@@ -1,6 +1,7 @@
 #include "vtkEvaluationPlots.h"
 
 #include "Interruption.h"
+#include "vtkPictureCanvas.h"
 
 #include "vtkAxis.h"
 #include "vtkBrush.h"
@@ -9,9 +10,8 @@
 #include "vtkContextScene.h"
 #include "vtkContextView.h"
 #include "vtkDoubleArray.h"
-#include "vtkErrorCode.h"
+#include "vtkImageData.h"
 #include "vtkNew.h"
-#include "vtkPNGWriter.h"
 #include "vtkPen.h"
 #include "vtkPlot.h"
 #include "vtkPlotPoints.h"
@@ -299,15 +299,8 @@ public:
     grabber->SetInput(this->View->GetRenderWindow());
     grabber->SetInputBufferTypeToRGB();
     grabber->ReadFrontBufferOff();
-    vtkNew<vtkPNGWriter> writer;
-    writer->SetInputConnection(grabber->GetOutputPort());
-    const std::string picture = stem + ".png";
-    writer->SetFileName(picture.c_str());
-    writer->Write();
-    if (writer->GetErrorCode() != vtkErrorCode::NoError)
-    {
-      throw std::runtime_error("Can not write '" + picture + "'.");
-    }
+    grabber->Update();
+    WritePngFile(grabber->GetOutput(), stem + ".png");
     const std::string drawing = stem + ".svg";
     std::error_code ignored;
     std::filesystem::remove(drawing, ignored);

@@ -1,16 +1,17 @@
 #include "vtkPictureCanvas.h"
 
-#include "vtkErrorCode.h"
 #include "vtkImageData.h"
 #include "vtkNew.h"
 #include "vtkPNGWriter.h"
 #include "vtkStdString.h"
 #include "vtkTextProperty.h"
 #include "vtkTextRenderer.h"
+#include "vtkUnsignedCharArray.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <stdexcept>
 
 namespace coronary
@@ -169,14 +170,27 @@ void PictureCanvas::WritePng(const std::string& path) const
     std::memcpy(image->GetScalarPointer(0, this->Rows - 1 - y, 0), this->Row(y),
       3 * std::size_t(this->Columns));
   }
+  WritePngFile(image, path);
+}
+
+void WritePngFile(vtkImageData* image, const std::string& path)
+{
+  // By way of memory: the writer itself says that the disk is full, whatever is wrong with a file.
   vtkNew<vtkPNGWriter> writer;
-  writer->SetFileName(path.c_str());
   writer->SetInputData(image);
+  writer->WriteToMemoryOn();
   writer->Write();
-  if (writer->GetErrorCode() != vtkErrorCode::NoError)
+  vtkUnsignedCharArray* bytes = writer->GetResult();
+  if (!bytes || bytes->GetNumberOfValues() == 0)
   {
-    throw std::runtime_error("Can not write '" + path +
-      "': " + vtkErrorCode::GetStringFromErrorCode(writer->GetErrorCode()) + ".");
+    throw std::runtime_error("'" + path + "' could not be encoded.");
+  }
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes->GetPointer(0)), bytes->GetNumberOfValues());
+  file.close();
+  if (!file)
+  {
+    throw std::runtime_error("Can not write '" + path + "'.");
   }
 }
 }

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+class vtkImageData;
+
 namespace coronary
 {
 using Colour = std::array<unsigned char, 3>;
@@ -59,6 +61,9 @@ private:
   int Rows = 0;
   std::vector<unsigned char> Pixels;
 };
+
+/// @throws std::runtime_error naming the file
+void WritePngFile(vtkImageData* image, const std::string& path);
 }
 
 #endif
