@@ -22,9 +22,10 @@ background:#fff;margin:0 auto;max-width:76rem;padding:1rem}
 h1{font-size:1.7rem;line-height:1.2;margin:.4rem 0 1rem}
 h2{font-size:1.3rem;border-bottom:2px solid #ddd;padding-bottom:.2rem;margin:2.2rem 0 .8rem}
 h3{font-size:1.05rem;margin:1.6rem 0 .5rem}
-nav ul{padding:0;list-style:none;display:flex;flex-wrap:wrap;gap:.2rem 1.2rem}
+nav ul{padding:0;list-style:none;display:flex;flex-wrap:wrap;gap:.2rem 0}
+nav li{margin-right:1.2rem}
 .scroll{overflow-x:auto;-webkit-overflow-scrolling:touch}
-table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.9rem}
+table{border-collapse:collapse;margin-bottom:1rem;font-variant-numeric:tabular-nums;font-size:.9rem}
 caption{text-align:left;color:#555;padding:.2rem 0 .4rem}
 th,td{padding:.22rem .6rem;text-align:right;white-space:nowrap;border-bottom:1px solid #e6e6e6}
 th:first-child,td:first-child{text-align:left;position:sticky;left:0;background:#fff}
@@ -214,7 +215,7 @@ std::vector<const EvaluationColumn*> PaperColumns()
   std::vector<const EvaluationColumn*> known;
   for (const EvaluationColumn& column : EvaluationColumns())
   {
-    if (std::isfinite(SummarizePhases(PaperPartA(), true).mean.*(column.value)))
+    if (std::isfinite(PaperSummaryA().mean.*(column.value)))
     {
       known.push_back(&column);
     }
@@ -281,14 +282,12 @@ std::string PartB(const std::vector<CaseEvaluation>& cases)
     html += "<th scope=\"col\">" + Heading(*column) + "</th>";
   }
   html += "</tr></thead>\n<tbody>\n";
-  std::vector<EvaluationMeasures> paper;
   for (const PaperCase& one : PaperPartB())
   {
-    paper.push_back(one.mean);
     html +=
       "<tr><td>" + Escaped(one.name) + "</td>" + Cells(one.mean, paperColumns, "", 2) + "</tr>\n";
   }
-  const MeasureSummary all = Summarize(paper);
+  const MeasureSummary& all = PaperSummaryB();
   html += "<tr class=\"sum\"><td>Mean</td>" + Cells(all.mean, paperColumns, "", 2) + "</tr>\n" +
     "<tr class=\"after\"><td>STD</td>" + Cells(all.deviation, paperColumns, "", 2) +
     "</tr>\n</tbody></table></div>\n";
@@ -329,7 +328,7 @@ std::string PartA(const CaseEvaluation& one)
       "</td>" + Cells(phase.measures, columns) + Cells(paper, paperColumns, " class=\"paper\"", 2) +
       "</tr>\n";
   }
-  const MeasureSummary paper = SummarizePhases(PaperPartA(), true);
+  const MeasureSummary& paper = PaperSummaryA();
   const auto row = [&](const char* kind, const char* name, const EvaluationMeasures& measures,
                      const EvaluationMeasures& beside)
   {

@@ -556,9 +556,9 @@ void DrawColourBar(PictureCanvas& page, int x, int y, int width, int height,
     double rgb[3];
     map->GetColor(greatest * (column + 0.5) / width, rgb);
     page.Fill(x + column, y, 1, height,
-      { static_cast<unsigned char>(255.0 * rgb[0] + 0.5),
-        static_cast<unsigned char>(255.0 * rgb[1] + 0.5),
-        static_cast<unsigned char>(255.0 * rgb[2] + 0.5) });
+      { static_cast<unsigned char>(std::lround(255.0 * rgb[0])),
+        static_cast<unsigned char>(std::lround(255.0 * rgb[1])),
+        static_cast<unsigned char>(std::lround(255.0 * rgb[2])) });
   }
   page.Frame(x, y, width, height, 2, Black);
   constexpr int Ticks = 5;

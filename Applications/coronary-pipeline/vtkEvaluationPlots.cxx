@@ -103,16 +103,9 @@ vtkSmartPointer<vtkTable> TableOf(
 /// The paper's mean of a measure over interpolated phases, and what it is called.
 std::pair<double, std::string> PaperMean(const EvaluationColumn& column, std::size_t cases)
 {
-  if (cases == 1)
-  {
-    return { SummarizePhases(PaperPartA(), true).mean.*(column.value), "paper, case 1" };
-  }
-  std::vector<EvaluationMeasures> list;
-  for (const PaperCase& one : PaperPartB())
-  {
-    list.push_back(one.mean);
-  }
-  return { Summarize(list).mean.*(column.value), "paper, five cases" };
+  return cases == 1
+    ? std::make_pair(PaperSummaryA().mean.*(column.value), std::string("paper, case 1"))
+    : std::make_pair(PaperSummaryB().mean.*(column.value), std::string("paper, five cases"));
 }
 
 void SetRange(vtkAxis* axis, double low, double high)

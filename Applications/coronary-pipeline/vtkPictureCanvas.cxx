@@ -38,15 +38,6 @@ void PictureCanvas::Fill(int x, int y, int width, int height, const Colour& colo
   }
 }
 
-void PictureCanvas::Disc(int x, int y, int radius, const Colour& colour)
-{
-  for (int row = -radius; row <= radius; ++row)
-  {
-    const int half = static_cast<int>(std::sqrt(double(radius * radius - row * row)) + 0.5);
-    this->Fill(x - half, y + row, 2 * half + 1, 1, colour);
-  }
-}
-
 void PictureCanvas::Draw(const PictureCanvas& other, int x, int y)
 {
   const int left = std::max(0, -x);

@@ -38,7 +38,6 @@ public:
   }
 
   void Fill(int x, int y, int width, int height, const Colour& colour);
-  void Disc(int x, int y, int radius, const Colour& colour);
   void Draw(const PictureCanvas& other, int x, int y);
 
   /// Inside of the rectangle; dash 0: solid.

@@ -72,8 +72,9 @@ std::size_t CoveredCells(const std::vector<Vector3>& points, const PictureView& 
   for (const Vector3& point : points)
   {
     const Vector3 from = point - view.centre;
-    const int x = std::clamp(static_cast<int>(from.dot(view.right) / cell + side / 2), 0, side - 1);
-    const int y = std::clamp(static_cast<int>(from.dot(view.up) / cell + side / 2), 0, side - 1);
+    const int x =
+      std::clamp(static_cast<int>(from.dot(view.right) / cell + 0.5 * side), 0, side - 1);
+    const int y = std::clamp(static_cast<int>(from.dot(view.up) / cell + 0.5 * side), 0, side - 1);
     const std::size_t index = std::size_t(y) * side + x;
     if (!covered[index])
     {

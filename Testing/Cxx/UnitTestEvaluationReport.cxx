@@ -166,6 +166,9 @@ TEST_F(EvaluationReportTest, ShowsTheNumbersBesideThePapers)
     html.find("<td>Mean, interpolated</td><td></td><td></td><td>3.000</td>"), std::string::npos);
   EXPECT_NE(html.find("<td class=\"paper\">5.42</td>"), std::string::npos) << "Part A's mean";
   EXPECT_NE(html.find("<tr class=\"sum\"><td>Mean</td><td>4.96</td>"), std::string::npos);
+  // As printed, and not as computed from the rows.
+  EXPECT_NE(html.find("<td class=\"paper\">2.60</td>"), std::string::npos);
+  EXPECT_NE(html.find("<tr class=\"after\"><td>STD</td><td>1.78</td>"), std::string::npos);
   // A branch: group, phases, length, covered in the mean and at least.
   EXPECT_NE(
     html.find("<td>7</td><td>4</td><td>80.0</td><td>0.875</td><td>0.500</td>"), std::string::npos);
