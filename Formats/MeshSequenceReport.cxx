@@ -62,6 +62,16 @@ Json QualityOf(const MeshSequenceReport& report, const MeshSequenceReport::Phase
   return row;
 }
 
+/// Of a file without prefix: a kind that there is, and then what tells files of a kind apart.
+bool IsBareName(const std::string& name)
+{
+  const std::size_t end = name.find_first_of("_./");
+  const std::string kind = name.substr(0, end);
+  return end != std::string::npos && name.find("..") == std::string::npos &&
+    (kind == "volume" || kind == "surface" || kind == "vmtk" || kind == "simvascular" ||
+      kind == "quality");
+}
+
 std::string Joined(const std::vector<std::int64_t>& ids)
 {
   std::string text;
@@ -88,6 +98,7 @@ std::string MeshSequenceJson(const MeshSequenceReport& report)
     json["faces"].push_back({ { "id", face.id }, { "name", face.name },
       { "type", face.id == 1 ? "wall" : "cap" }, { "triangles", face.triangles } });
   }
+  json["prefix"] = report.prefix;
   json["files"] = ByKind(report.files);
   json["phases"] = Json::array();
   for (const MeshSequenceReport::Phase& phase : report.phases)
@@ -198,8 +209,11 @@ std::vector<std::string> MeshSequenceFiles(const std::string& path)
         names.push_back(list.stem().string() + (kind == "surface" ? ".vtp" : ".vtu") + ".series");
       }
     });
+  const Json given = object(json, "prefix");
+  const bool bare = given.is_string() && given.get<std::string>().empty();
   names.erase(std::remove_if(names.begin(), names.end(),
-                [&](const std::string& name) { return name.rfind(stem + "_", 0) != 0; }),
+                [&](const std::string& name)
+                { return bare ? !IsBareName(name) : name.rfind(stem + "_", 0) != 0; }),
     names.end());
   if (!names.empty())
   {

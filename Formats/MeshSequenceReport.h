@@ -38,6 +38,7 @@ struct MeshSequenceReport
   std::vector<Face> faces;
   std::vector<Phase> phases;
   std::vector<std::pair<std::string, std::string>> files; ///< of all phases: kind, path
+  std::string prefix; ///< what the files' names begin with; may be empty
 };
 
 /// Angles in degrees; what is not finite is null.
@@ -48,7 +49,9 @@ std::string MeshSequenceCsv(const MeshSequenceReport& report);
 
 /**
  * The files that a report in JSON stands for, itself the last, relative to its folder; none when it is not
- * there, or no such report. Names that do not begin with the report's own are left out.
+ * there, or no such report. Names of another form than such a report's are left out: without the report's
+ * prefix (that of a report which has none is its own name), and with an empty prefix, without a kind of file
+ * before `_` or `.`.
  */
 std::vector<std::string> MeshSequenceFiles(const std::string& path);
 }

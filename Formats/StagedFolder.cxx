@@ -109,6 +109,11 @@ std::string StagedFolder::Add(const std::string& name)
   return staged.string();
 }
 
+std::string StagedFolder::PathOf(const std::string& name) const
+{
+  return (fs::path(this->Staging.empty() ? this->Folder : this->Staging) / name).string();
+}
+
 void StagedFolder::Commit()
 {
   const fs::path folder(this->Folder);

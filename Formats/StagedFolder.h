@@ -32,6 +32,9 @@ public:
    */
   std::string Add(const std::string& name);
 
+  /// Where a file is now that was added.
+  std::string PathOf(const std::string& name) const;
+
   /**
    * Moves the files to their place in the order of their Add(), replacing older ones.
    * The last one describes the others: an older one of its name is removed first, so that it never

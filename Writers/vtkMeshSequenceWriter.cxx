@@ -590,12 +590,16 @@ struct PhaseMesh
 class SequenceFiles
 {
 public:
-  SequenceFiles(const std::string& path, std::size_t phases, Topology topology)
+  /// @param prefix  what the names of files other than the report begin with
+  SequenceFiles(
+    const std::string& path, std::string prefix, int digits, std::size_t phases, Topology topology)
     : Name(fs::path(path).stem().string())
+    , Prefix(std::move(prefix))
     , Folder(fs::path(path).parent_path().empty() ? "." : fs::path(path).parent_path().string())
     , Topo(std::move(topology))
     , Surface(this->Topo.PatchOf(0))
-    , Width(std::max<std::size_t>(3, std::to_string(phases - 1).size()))
+    , Width(
+        std::max<std::size_t>(static_cast<std::size_t>(digits), std::to_string(phases - 1).size()))
   {
     if (!this->Topo.tetrahedra.empty())
     {
@@ -630,6 +634,7 @@ public:
     const std::vector<coronary::MeshSequenceReport::Face>& faces, double unit);
 
   const std::string Name;
+  const std::string Prefix;
 
 private:
   void AddFields(const PhaseMesh& phase, vtkDataSet* data) const;
@@ -934,6 +939,7 @@ void vtkMeshSequenceWriter::Validate() const
     "SimVascularUnit must be positive");
   Require(this->PoorDihedralAngle >= 0.0 && this->PoorDihedralAngle <= 70.0,
     "PoorDihedralAngle must be 0 to 70 degrees");
+  Require(this->Digits >= 1 && this->Digits <= 9, "Digits must be 1 to 9");
   Require(!this->EntityIdsArrayName.empty(), "EntityIdsArrayName is empty");
   for (const auto& [id, name] : this->FaceNames)
   {
@@ -1056,7 +1062,11 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
         result.triangles = static_cast<std::int64_t>(topology.triangles.size());
         result.faces =
           FacesOf(topology, this->FaceNames, NamesOfCaps(caps, this->EntityIdsArrayName));
-        files = std::make_unique<SequenceFiles>(this->FileName, times.size(), std::move(topology));
+        const std::string stem = fs::path(this->FileName).stem().string();
+        files = std::make_unique<SequenceFiles>(this->FileName,
+          this->PrefixFiles ? stem + "_" : std::string(), this->Digits, times.size(),
+          std::move(topology));
+        result.prefix = files->Prefix;
         result.surfacePoints = files->SurfacePoints();
         if (this->WriteSeries && result.tetrahedra > 0)
         {
@@ -1094,7 +1104,7 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
         coronary::Report(
           report, (static_cast<double>(k) + 0.5) / static_cast<double>(times.size()));
         const std::string file =
-          files->Name + "_" + one.kind + "_" + files->Number(k) + "." + one.extension;
+          files->Prefix + one.kind + "_" + files->Number(k) + "." + one.extension;
         vtkSmartPointer<vtkDataSet> data;
         if (one.kind == "volume")
         {
@@ -1115,7 +1125,7 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
       if (this->WriteSimVascular)
       {
         const std::string folder =
-          files->Name + "_simvascular/phase_" + files->Number(k) + "/mesh-complete";
+          files->Prefix + "simvascular/phase_" + files->Number(k) + "/mesh-complete";
         files->WriteSimVascular(folder, phase, result.faces, this->SimVascularUnit);
         entry.files.emplace_back("simvascular", folder);
       }
@@ -1128,13 +1138,13 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
     }
     for (const Series& one : series)
     {
-      const std::string stem = files->Name + "_" + one.kind;
+      const std::string stem = files->Prefix + one.kind;
       files->Write(stem + ".pvd", coronary::PvdText(one.files));
       files->Write(stem + "." + one.extension + ".series", coronary::FileSeriesText(one.files));
       result.files.emplace_back(one.kind, stem + ".pvd");
     }
-    files->Write(files->Name + "_quality.csv", coronary::MeshSequenceCsv(result));
-    result.files.emplace_back("quality", files->Name + "_quality.csv");
+    files->Write(files->Prefix + "quality.csv", coronary::MeshSequenceCsv(result));
+    result.files.emplace_back("quality", files->Prefix + "quality.csv");
     files->Write(files->Name + ".json", coronary::MeshSequenceJson(result));
     files->GetFolder().TakePlaceOf(coronary::MeshSequenceFiles(this->FileName));
     request.Restore();
@@ -1184,6 +1194,8 @@ void vtkMeshSequenceWriter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "WriteVmtk: " << this->WriteVmtk << '\n';
   os << indent << "SimVascularUnit: " << this->SimVascularUnit << '\n';
   os << indent << "KeepWeights: " << this->KeepWeights << '\n';
+  os << indent << "PrefixFiles: " << this->PrefixFiles << '\n';
+  os << indent << "Digits: " << this->Digits << '\n';
   os << indent << "PoorDihedralAngle: " << this->PoorDihedralAngle << '\n';
   for (const auto& [id, name] : this->FaceNames)
   {

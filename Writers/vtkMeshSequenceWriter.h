@@ -28,6 +28,8 @@
  * `GreatestRadiusEdgeRatio`, `TotalVolume`, `SurfaceArea`. A mesh whose tetrahedra are nearly all inside out at the
  * first phase has another order of corners, and is turned over at all phases.
  *
+ * With PrefixFiles off, `NAME_` is left out: surface_000.vtp. Digits is the least number of digits of a phase.
+ *
  * All files appear together when the last one is whole; older ones stay until then. Then those that an older
  * NAME.json stands for are gone: nothing of a longer sequence stays among the new one.
  *
@@ -144,6 +146,22 @@ public:
   ///@}
 
   ///@{
+  /**
+   * Whether the names of the other files begin with the report's: NAME_surface_000.vtp; else surface_000.vtp. Default
+   * on.
+   */
+  vtkSetMacro(PrefixFiles, bool);
+  vtkGetMacro(PrefixFiles, bool);
+  vtkBooleanMacro(PrefixFiles, bool);
+  ///@}
+
+  ///@{
+  /// Least number of digits of a phase in the names of files, 1 to 9. Default 3.
+  vtkSetMacro(Digits, int);
+  vtkGetMacro(Digits, int);
+  ///@}
+
+  ///@{
   /// A tetrahedron with a smaller dihedral angle is poor; degrees, 0 to 70. Default 15.
   vtkSetMacro(PoorDihedralAngle, double);
   vtkGetMacro(PoorDihedralAngle, double);
@@ -200,6 +218,8 @@ private:
   bool WriteVmtk = false;
   double SimVascularUnit = 1.0;
   bool KeepWeights = false;
+  bool PrefixFiles = true;
+  int Digits = 3;
   double PoorDihedralAngle = 15.0;
   std::map<int, std::string> FaceNames;
   std::string EntityIdsArrayName;

@@ -70,7 +70,7 @@ echo "== Its motion beside published values"
 "$pipeline" phantom-motion --seed 1 | tee "$output/phantom-motion.txt"
 
 echo "== From the images to the coronary arteries"
-"$pipeline" run "$output/phantom/series.json" --until motion --output "$output/run"
+"$pipeline" run "$output/phantom/series.json" --output "$output/run"
 
 if [ "$pictures" = yes ]; then
   echo "== Pictures"

@@ -91,7 +91,7 @@ def main():
     arguments = parser.parse_args()
     os.makedirs(arguments.output, exist_ok=True)
     lines = series(arguments.input, "centerline.vtp.series")
-    surfaces = series(arguments.input, "mesh_surface.vtp.series")
+    surfaces = series(arguments.input, "surface.vtp.series")
     if len(lines) < 3:
         common.fail("three moments or more are needed")
 

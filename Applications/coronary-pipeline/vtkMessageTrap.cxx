@@ -78,6 +78,11 @@ void vtkMessageTrap::PrintWarnings()
   }
 }
 
+std::vector<std::string> vtkMessageTrap::TakeWarnings()
+{
+  return std::exchange(this->Trap->Warnings, {});
+}
+
 void vtkMessageTrap::ForgetWarnings()
 {
   this->Trap->Warnings.clear();

@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 class vtkAlgorithm;
 class vtkOutputWindow;
@@ -27,6 +28,9 @@ public:
   void PrintWarnings();
 
   void ForgetWarnings();
+
+  /// The warnings that came since the last call.
+  std::vector<std::string> TakeWarnings();
 
   /// @throws std::runtime_error with the text of the first error, and forgets all of them.
   void ThrowIfError();

@@ -460,13 +460,22 @@ check_motion() {
   grep -qE " (within|outside) " stdout && fail "compared at another heart rate"
 }
 
+# Files of two results, but for times and memory.
+expect_same_results() {
+  diff -rq -x report.json "$1" "$2" || fail "$3"
+}
+
 check_weights() {
   run 0 phantom --quiet --seed 2 --fractions 0.45,0.74 --spacing 1.2 --no-truth --output series
-  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 1 --until motion --time 0.74 --edges 0.4 0.8 \
-    --weight-cache weights --output bound
-  run 0 run series/series.json --quiet --scales 0.7 2.5 --threads 2 --until motion --time 0.74 --edges 0.4 0.8 \
-    --weight-cache weights2 --output bound2
-  diff -r bound bound2 || fail "another number of threads gave other weights"
+  options="--quiet --scales 0.7 2.5 --time 0.74 --edges 0.4 0.8"
+  # shellcheck disable=SC2086
+  run 0 run --input series/series.json $options --threads 1 --weight-cache weights --output bound
+  # In pieces, by another number of threads.
+  for until in segmentation volume motion; do
+    # shellcheck disable=SC2086
+    run 0 run series/series.json $options --threads 2 --weight-cache weights2 --until $until --resume --output bound2
+  done
+  expect_same_results bound bound2 "another number of threads, or resuming, gave another result"
   diff -r weights weights2 || fail "another number of threads gave another cache"
   for name in BoneIndices BoneWeightsCompact DroppedWeight BoneName WeightsResidual; do
     grep -q "Name=\"$name\"" bound/weights.vtu || fail "no $name in weights.vtu"
@@ -475,53 +484,151 @@ check_weights() {
     grep -q "Name=\"$name\"" bound/skeleton.vtp || fail "no $name in skeleton.vtp"
   done
   grep -q '"bones": [0-9]\{2,\}' bound/report.json || fail "few bones: $(cat bound/report.json)"
+  # A column a bone, a row a point; the skeleton's graph has as many bones.
+  bones=$(sed -n 's/.*"bones": \([0-9]*\).*/\1/p' bound/report.json)
+  points=$(grep -o 'NumberOfPoints="[0-9]*"' bound/weights.vtu | tr -dc 0-9)
+  [ "$(head -n 1 bound/weights.dmat)" = "$bones $points" ] || fail "weights.dmat: $(head -n 1 bound/weights.dmat)"
+  [ "$(sed '1,/#/d' bound/skeleton.tgf | wc -l)" = "$bones" ] || fail "skeleton.tgf has not $bones bones"
 
   # Where no bone is outside, leaving those out changes nothing; the report says that none was.
-  run 0 run series/series.json --quiet --scales 0.7 2.5 --until weights --time 0.74 --edges 0.4 0.8 \
-    --leave-bones-outside --output left
+  # shellcheck disable=SC2086
+  run 0 run series/series.json $options --until weights --leave-bones-outside --output left
   grep -q '"left_out_bones": \[\]' left/report.json || fail "left_out_bones: $(cat left/report.json)"
   grep -q 'Name="LeftOutBones"' left/weights.vtu || fail "no LeftOutBones in weights.vtu"
   grep -q 'left_out_bones' bound/report.json && fail "left_out_bones without --leave-bones-outside"
   cmp -s bound/skeleton.vtp left/skeleton.vtp || fail "--leave-bones-outside changed the skeleton"
 
   # The same mesh at every phase, moved.
-  for name in centerline.vtp skeleton.vtp mesh_surface.vtp mesh_volume.vtu; do
+  for name in centerline.vtp skeleton.vtp surface.vtp volume.vtu; do
     [ "$(grep -c '"time": 0\.[47]' "bound/motion/$name.series")" = 2 ] \
       || fail "$name.series: $(cat "bound/motion/$name.series")"
-    [ "$(grep -o 'NumberOfPoints="[0-9]*"' "bound/motion/${name%.*}_000.${name##*.}")" = \
-      "$(grep -o 'NumberOfPoints="[0-9]*"' "bound/motion/${name%.*}_001.${name##*.}")" ] \
+    [ "$(grep -c 'timestep="0\.[47]' "bound/motion/${name%.*}.pvd")" = 2 ] \
+      || fail "${name%.*}.pvd: $(cat "bound/motion/${name%.*}.pvd")"
+    [ "$(grep -o 'NumberOfPoints="[0-9]*"' "bound/motion/${name%.*}_00.${name##*.}")" = \
+      "$(grep -o 'NumberOfPoints="[0-9]*"' "bound/motion/${name%.*}_01.${name##*.}")" ] \
       || fail "$name has other points at another phase"
-    cmp -s "bound/motion/${name%.*}_000.${name##*.}" "bound/motion/${name%.*}_001.${name##*.}" \
+    cmp -s "bound/motion/${name%.*}_00.${name##*.}" "bound/motion/${name%.*}_01.${name##*.}" \
       && fail "$name does not move"
   done
+  grep -q 'timestep="0.45".*file="motion/surface_00.vtp"' bound/motion.pvd || fail "motion.pvd: $(cat bound/motion.pvd)"
+  grep -q 'timestep="0.74".*file="motion/surface_01.vtp"' bound/motion.pvd || fail "motion.pvd: $(cat bound/motion.pvd)"
   for name in TrackingConfidence TrackingStatus CalibreFactor AxialStrain TrackedShare; do
-    grep -q "Name=\"$name\"" bound/motion/centerline_000.vtp || fail "no $name in centerline_000.vtp"
+    grep -q "Name=\"$name\"" bound/motion/centerline_00.vtp || fail "no $name in centerline_00.vtp"
   done
   expect_text bound/report.json '"tracked_share"'
   expect_text bound/motion/mesh.json '"inlet_'
-  [ ! -e bound/motion/mesh_volume_002.vtu ] || fail "a third phase"
+  [ ! -e bound/motion/volume_02.vtu ] || fail "a third phase"
 
-  # A shorter sequence takes the place of a longer one, and of nothing else.
-  touch bound/motion/mesh_volume_extra.txt
-  run 0 run series/series.json --quiet --scales 0.7 2.5 --until motion --time 0.74 --edges 0.4 0.8 \
-    --weight-cache weights --moments 0.5 --output bound
-  for name in centerline_001.vtp skeleton_001.vtp mesh_surface_001.vtp mesh_volume_001.vtu; do
+  # A shorter sequence takes the place of a longer one, and of nothing else; only the motion is made anew.
+  touch bound/motion/volume_extra.txt
+  before=$(cat bound/*.vt? bound/*.mha | cksum)
+  # shellcheck disable=SC2086
+  run 0 run series/series.json ${options#--quiet} --resume --moments 0.5 --output bound
+  expect_text stderr "from stage motion on: 'moments' was [] and is [0.5]"
+  expect_text stderr "stage 1 of 1 (motion)"
+  [ "$before" = "$(cat bound/*.vt? bound/*.mha | cksum)" ] || fail "resuming changed the stages before"
+  for name in centerline_01.vtp skeleton_01.vtp surface_01.vtp volume_01.vtu; do
     [ ! -e "bound/motion/$name" ] || fail "$name of the longer sequence is left"
   done
-  for name in centerline_000.vtp mesh_volume_000.vtu mesh_volume_extra.txt; do
+  for name in centerline_00.vtp volume_00.vtu volume_extra.txt; do
     [ -e "bound/motion/$name" ] || fail "$name is gone"
   done
+  rm -f bound/weights.vtu
+  # shellcheck disable=SC2086
+  run 0 run series/series.json ${options#--quiet} --resume --until weights --weight-cache weights --output bound
+  expect_text stderr "from stage weights on: 'weights.vtu' is not there"
+  # The motion was of weights that have been made anew: it is gone.
+  [ ! -e bound/motion.pvd ] || fail "motion of older weights is left"
+  [ "$(find bound/motion -type f)" = bound/motion/volume_extra.txt ] || fail "left: $(ls bound/motion)"
+  touch -d 2001-01-01 series/phase_00.mha
+  # shellcheck disable=SC2086
+  run 0 run series/series.json ${options#--quiet} --resume --until vesselness --output bound
+  expect_text stderr "from stage vesselness on: the result is of another input"
+  [ "$(find bound -type f | sort | tr '\n' ' ')" = \
+    "bound/motion/volume_extra.txt bound/report.json bound/vesselness.mha " ] || fail "left: $(find bound)"
 
-  # One phase has no motion: said before any work.
-  run 0 phantom --quiet --seed 2 --phases 1 --spacing 4 --no-truth --output still
-  run 1 run still/series.json --quiet --until motion --output none
-  expect_one_line "coronary-pipeline run" "one phase only"
-  [ ! -e none ] || fail "a folder was made for nothing"
+  # One phase has no motion: the static model is made.
+  run 0 run series/phase_01.mha --quiet --scales 0.7 2.5 --edges 0.8 1.6 --output still
+  expect_text stderr "Warning: motion is not possible: one phase only"
+  expect_text still/report.json '"reason": "one phase only"'
+  [ -s still/weights.vtu ] || fail "no static model: $(ls still)"
+  [ ! -e still/motion.pvd ] || fail "motion of one phase"
+}
+
+check_settings() {
+  run 0 run --print-settings series.json --output result --seed 1 2 3 --seed 4 5 6.25 --scales 0.75 2.5 --no-labels \
+    --tracked even --moments 0.1,0.30000000000000004 --threads 3
+  mv stdout settings.json
+  run 0 run --print-settings --settings settings.json
+  cmp stdout settings.json || fail "the settings are not what was printed"
+  # The command line counts more, for what it names.
+  run 0 run --print-settings --settings settings.json --tracked all --seed 7 8 9
+  diff stdout settings.json | grep -q '"tracked": "all"' || fail "--tracked does not count more"
+  [ "$(grep -c '^ *[0-9.]*,\{0,1\}$' settings.json)" -gt "$(grep -c '^ *[0-9.]*,\{0,1\}$' stdout)" ] || fail "--seed adds to the file's"
+  run 0 run --print-settings
+  expect_text stdout '"until": "motion"'
+
+  for wrong in '{ "scals": [1, 2] }/scals' '{ "scales": [1] }/scales' '{ "c": "much" }/c' '{ "labels": 1 }/labels' \
+    '{ "threads": 1.5 }/threads' '{ "until": "nowhere" }/until' '{ "seed": [1, 2, 3] }/seed' \
+    '{ "largest_radius": 0 }/largest_radius' '{ "time": [] }/time'; do
+    echo "${wrong%/*}" >wrong.json
+    run 1 run --settings wrong.json --print-settings
+    expect_one_line "coronary-pipeline run" "'wrong.json': '${wrong##*/}'"
+  done
+  echo '{ "c": 1' >wrong.json
+  run 1 run --settings wrong.json --print-settings
+  expect_one_line "coronary-pipeline run" "'wrong.json' is not JSON"
+  run 1 run --settings nowhere.json
+  expect_one_line "coronary-pipeline run" "nowhere.json"
+  run 2 run --settings settings.json --scales 3 1
+  expect_one_line "coronary-pipeline run" "--scales"
+  run 2 run --output result
+  expect_one_line "coronary-pipeline run" "--input"
+  run 2 run series.json
+  expect_one_line "coronary-pipeline run" "--output"
+  [ ! -e result ] || fail "a folder was made for nothing"
+}
+
+check_surface() {
+  run 0 phantom --quiet --seed 5 --fractions 0.74 --truth-only --surface-spacing 0.8 --output made
+  cp made/truth/surface_00.vtp given.vtp
+  run 0 run given.vtp --edges 0.8 1.6 --output swept
+  expect_text stderr "stage 1 of 4 (centerline)"
+  expect_text stderr "Warning: motion is not possible: a surface has no images to track"
+  for file in given_surface.vtp centerline.vtp surface.vtp volume.vtu skeleton.tgf weights.dmat report.json; do
+    [ -s "swept/$file" ] || fail "no $file: $(ls swept)"
+  done
+  [ ! -e swept/vesselness.mha ] || fail "a surface has no vesselness"
+  grep -q '"branches": [0-9]\{2\}' swept/report.json || fail "few branches: $(cat swept/report.json)"
+  run 0 metrics swept/surface.vtp given.vtp --json
+  # The swept surface follows the given one, but for what is too short to be a branch.
+  awk '/"MSD"/ { found = 1; if ($2 + 0 > 0.3) exit 1 } END { exit !found }' stdout || fail "far away: $(cat stdout)"
+
+  run 0 convert given.vtp given.obj
+  run 0 run given.obj --quiet --surface given --until volume --output given
+  run 0 metrics given/surface.vtp given.vtp --json
+  awk '/"HD"/ { found = 1; if ($2 + 0 > 0.1) exit 1 } END { exit !found }' stdout || fail "not the given one: $(cat stdout)"
+
+  run 1 run nowhere.stl --output none
+  expect_one_line "coronary-pipeline run" "nowhere.stl"
+  run 1 run given.vtp given.obj --output none
+  expect_one_line "coronary-pipeline run" "only input"
+  run 1 run made/truth/centerline_00.vtp --quiet --output none
+  expect_one_line "coronary-pipeline run" "centerline_00.vtp' has no triangles"
+  run 2 run given.vtp --until segmentation --output none
+  expect_one_line "coronary-pipeline run" "--until"
+  # No seed in a vessel: said at the stage that can not go on.
+  run 1 run given.vtp --quiet --seed 900 900 900 --output lost
+  expect_one_line "coronary-pipeline run" "has no branches"
+  expect_text lost/report.json '"stage": "surface"'
+  expect_nothing_in none
 }
 
 check_run() {
   run 0 phantom --quiet --seed 2 --fractions 0.15,0.2,0.25,0.7,0.74,0.78 --spacing 1.2 --no-truth --output series
-  run 0 run series/series.json --scales 0.7 2.5 --output result
+  head -c 2000 series/phase_00.mha >series/cut.mha
+  sed 's/phase_00/cut/' series/series.json >series/broken.json
+  run 0 run series/series.json --scales 0.7 2.5 --until centerline --output result
   for file in vesselness.mha mask.mha ostia.vtp aorta.vtp centerline.vtp bifurcations.vtp \
     centerline_lines.vtp status.csv report.json; do
     [ -s "result/$file" ] || fail "no $file"
@@ -549,7 +656,7 @@ check_run() {
   fi
   run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --threads 1 --until volume --edges 0.4 0.8 --output beyond
   run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --threads 2 --until volume --edges 0.4 0.8 --output beyond2
-  diff -r beyond beyond2 || fail "another number of threads gave other files"
+  expect_same_results beyond beyond2 "another number of threads gave other files"
   for file in surface.vtp caps.vtp volume.vtu volume_boundary.vtp volume_skeleton.vtp; do
     [ -s "beyond/$file" ] || fail "no $file"
   done
@@ -573,12 +680,22 @@ check_run() {
   run 1 run nothing.json --quiet --output result
   expect_one_line "coronary-pipeline run" "nothing.json"
   before=$(cat result/*.mha result/*.vtp result/report.json | cksum)
-  run 1 run series/series.json --quiet --scales 0.7 2.5 --seed 9999 0 0 --output result
-  expect_one_line "coronary-pipeline run" "Seed 0 is outside the image"
-  run 1 run series/series.json --quiet --scales 0.7 2.5 --seed 9999 0 0 --output new/result
-  expect_nothing_in new
+  run 1 run series/broken.json --quiet --output result
   [ "$before" = "$(cat result/*.mha result/*.vtp result/report.json | cksum)" ] \
     || fail "a failed run changed its folder: $(ls -lA result)"
+  # What is finished stays, of this run alone, and can be gone on from.
+  run 1 run series/series.json --quiet --scales 0.7 2.5 --seed 9999 0 0 --output result
+  expect_one_line "coronary-pipeline run" "Seed 0 is outside the image"
+  expect_text result/report.json '"stage": "segmentation"'
+  expect_text result/report.json 'Seed 0 is outside the image'
+  [ "$(find result -type f | sort | tr '\n' ' ')" = "result/report.json result/vesselness.mha " ] \
+    || fail "not the finished stage alone: $(find result)"
+  run 0 run series/series.json --scales 0.7 2.5 --until centerline --resume --output result
+  expect_text stderr "stage 1 of 2 (segmentation)"
+  [ "$before" = "$(cat result/*.mha result/*.vtp result/report.json | cksum)" ] && fail "the report says nothing of resuming"
+  expect_text result/report.json '"stopped": null'
+  run 1 run series/broken.json --quiet --scales 0.7 2.5 --output new/result
+  expect_nothing_in new
   [ -z "$(find result -name '.*')" ] || fail "hidden files are left: $(find result)"
 }
 

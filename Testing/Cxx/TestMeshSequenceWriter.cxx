@@ -4,6 +4,7 @@
 #include "FileSeries.h"
 #include "FilterMessages.h"
 #include "MeshQuality.h"
+#include "MeshSequenceReport.h"
 #include "SequenceTestData.h"
 #include "TimedTestSource.h"
 #include "vtkCardiacPhaseInterpolator.h"
@@ -16,6 +17,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -722,6 +724,8 @@ TEST_F(TestMeshSequenceWriter, RefusesSettingsOutOfRange)
   refuses("SimVascularUnit must", [&] { w->SetSimVascularUnit(1.0); });
   w->SetPoorDihedralAngle(71.0);
   refuses("PoorDihedralAngle must", [&] { w->SetPoorDihedralAngle(15.0); });
+  w->SetDigits(0);
+  refuses("Digits must", [&] { w->SetDigits(3); });
   w->WriteSeriesOff();
   refuses("nothing to write", [&] { w->WriteSeriesOn(); });
   w->SetEntityIdsArrayName("");
@@ -780,6 +784,35 @@ TEST_F(TestMeshSequenceWriter, AShorterSequenceTakesThePlaceOfALongerOne)
   fresh.insert("bar_mine.txt");
   fresh.insert("bar_simvascular/phase_004/mine.txt");
   EXPECT_EQ(shorter, fresh);
+}
+
+TEST_F(TestMeshSequenceWriter, FilesWithoutThePrefix)
+{
+  this->Connect();
+  this->Writer->PrefixFilesOff();
+  this->Writer->SetDigits(2);
+  this->Write();
+  std::ofstream(this->Folder / "surface_mine.txt") << "mine";
+  const auto surfaces = coronary::ReadFileSeries((this->Folder / "surface.pvd").string());
+  ASSERT_GT(surfaces.size(), 1U);
+  EXPECT_EQ(fs::path(surfaces[1].path).filename(), "surface_01.vtp");
+  EXPECT_TRUE(fs::exists(this->Folder / "volume_01.vtu"));
+  EXPECT_TRUE(fs::exists(this->Folder / "quality.csv"));
+  const auto listed = coronary::MeshSequenceFiles((this->Folder / "bar.json").string());
+  EXPECT_EQ(std::count(listed.begin(), listed.end(), "surface_01.vtp"), 1);
+  // One phase takes their place.
+  this->Writer->SetPhases(vtkMeshSequenceWriter::ListedTimes);
+  this->Writer->AddTime(0.0);
+  this->Write();
+  EXPECT_TRUE(fs::exists(this->Folder / "surface_00.vtp"));
+  EXPECT_TRUE(fs::exists(this->Folder / "surface_mine.txt"));
+  EXPECT_FALSE(fs::exists(this->Folder / "surface_01.vtp"));
+  EXPECT_FALSE(fs::exists(this->Folder / "volume_01.vtu"));
+  // And names of a report that are not such a report's are nobody's to remove.
+  std::ofstream(this->Folder / "bar.json")
+    << R"({"prefix": "", "files": {"surface": "surface.pvd", "mine": "mine.txt", "up": "surface_/../../a"}})";
+  EXPECT_EQ(coronary::MeshSequenceFiles((this->Folder / "bar.json").string()),
+    (std::vector<std::string>{ "surface.pvd", "surface.vtp.series", "bar.json" }));
 }
 
 TEST_F(TestMeshSequenceWriter, OlderFilesStayUntilAllIsWritten)

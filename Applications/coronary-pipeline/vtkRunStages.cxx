@@ -1,0 +1,880 @@
+#include "vtkRunStages.h"
+
+#include "AtomicFile.h"
+#include "FileSeries.h"
+#include "Interruption.h"
+#include "MatrixFile.h"
+#include "MeshSequenceReport.h"
+#include "MetaImageWriter.h"
+#include "OptionChecks.h"
+#include "StagedFolder.h"
+#include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
+#include "vtkMovingMesh.h"
+#include "vtkRunSurface.h"
+
+#include "vtkBiharmonicSkinWeights.h"
+#include "vtkCardiacPhaseInterpolator.h"
+#include "vtkCellData.h"
+#include "vtkCenterlineSkeleton.h"
+#include "vtkCenterlineTracker.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkCoronaryTreeTopology.h"
+#include "vtkDataArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkFastMarchingCenterline.h"
+#include "vtkFieldData.h"
+#include "vtkFrangiVesselness.h"
+#include "vtkFrenetSweepSurface.h"
+#include "vtkGatedImageReader.h"
+#include "vtkImageData.h"
+#include "vtkInformation.h"
+#include "vtkMatrix3x3.h"
+#include "vtkMeshSequenceWriter.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
+#include "vtkReferencePhase.h"
+#include "vtkSkinDeformation.h"
+#include "vtkStringArray.h"
+#include "vtkSurfaceCleaner.h"
+#include "vtkTGFWriter.h"
+#include "vtkTable.h"
+#include "vtkTetrahedralMesher.h"
+#include "vtkUnstructuredGrid.h"
+#include "vtkVesselSegmentation.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// How far a place on the wall may be from the axis, mm.
+constexpr double SurfaceSnapDistance = 3.0;
+
+/// The number of the phase at a time.
+int PhaseAt(vtkGatedImageReader* reader, double time)
+{
+  int best = 0;
+  for (int phase = 1; phase < reader->GetNumberOfPhases(); ++phase)
+  {
+    if (std::abs(reader->GetPhaseTime(phase) - time) < std::abs(reader->GetPhaseTime(best) - time))
+    {
+      best = phase;
+    }
+  }
+  return best;
+}
+
+Json Numbers(vtkDataSet* data, const char* name)
+{
+  Json list = Json::array();
+  if (vtkDataArray* array = data->GetFieldData()->GetArray(name))
+  {
+    for (vtkIdType n = 0; n < array->GetNumberOfValues(); ++n)
+    {
+      list.push_back(array->GetTuple1(n));
+    }
+  }
+  return list;
+}
+
+Json DescribeSeeds(vtkPolyData* seeds)
+{
+  vtkPointData* data = seeds->GetPointData();
+  auto* names = vtkStringArray::SafeDownCast(data->GetAbstractArray(vtkCoronaryArrayNames::Name));
+  Json list = Json::array();
+  for (vtkIdType n = 0; n < seeds->GetNumberOfPoints(); ++n)
+  {
+    // Seeds of a surface have neither radius nor volume.
+    const auto value = [&](const char* name)
+    { return data->HasArray(name) ? data->GetArray(name)->GetTuple1(n) : 0.0; };
+    double position[3];
+    seeds->GetPoint(n, position);
+    list.push_back(
+      { { "name", names->GetValue(n) }, { "position", { position[0], position[1], position[2] } },
+        { "confidence", value(vtkCoronaryArrayNames::Confidence) },
+        { "radius", value(vtkCoronaryArrayNames::Radius) },
+        { "volume", value(vtkCoronaryArrayNames::SeedVolume) } });
+  }
+  return list;
+}
+
+/// Text for one field of a CSV file.
+std::string Quoted(const std::string& text)
+{
+  std::string quoted = "\"";
+  for (const char c : text)
+  {
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return quoted + "\"";
+}
+
+/// What became of each seed: reached, or why not, with the tree that hangs on it.
+Json DescribeTrees(vtkPolyData* lines, vtkPolyData* seeds)
+{
+  vtkFieldData* fields = lines->GetFieldData();
+  vtkDataArray* status = fields->GetArray(vtkCoronaryArrayNames::SeedStatus);
+  auto* messages =
+    vtkStringArray::SafeDownCast(fields->GetAbstractArray(vtkCoronaryArrayNames::SeedMessage));
+  auto* names = vtkStringArray::SafeDownCast(
+    seeds->GetPointData()->GetAbstractArray(vtkCoronaryArrayNames::Name));
+  vtkDataArray* treeIds = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::TreeIds);
+  vtkDataArray* lengths = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::Length);
+  Json list = Json::array();
+  for (vtkIdType n = 0; n < seeds->GetNumberOfPoints(); ++n)
+  {
+    vtkIdType branches = 0;
+    double length = 0.0;
+    for (vtkIdType cell = 0; cell < lines->GetNumberOfCells(); ++cell)
+    {
+      if (treeIds->GetTuple1(cell) == static_cast<double>(n))
+      {
+        ++branches;
+        length += lengths->GetTuple1(cell);
+      }
+    }
+    double position[3];
+    seeds->GetPoint(n, position);
+    list.push_back(
+      { { "name", names->GetValue(n) }, { "position", { position[0], position[1], position[2] } },
+        { "status", static_cast<int>(status->GetTuple1(n)) }, { "message", messages->GetValue(n) },
+        { "branches", branches }, { "length", length } });
+  }
+  return list;
+}
+
+std::string StatusTable(const Json& trees)
+{
+  std::string table = "name,x_mm,y_mm,z_mm,status,message,branches,length_mm\n";
+  for (const auto& tree : trees)
+  {
+    table += Quoted(tree["name"].get<std::string>());
+    for (const auto& value : tree["position"])
+    {
+      table += "," + value.dump();
+    }
+    table += "," + tree["status"].dump() + "," + Quoted(tree["message"].get<std::string>()) + "," +
+      tree["branches"].dump() + "," + tree["length"].dump() + "\n";
+  }
+  return table;
+}
+
+template <typename Data>
+vtkSmartPointer<Data> Detached(Data* data)
+{
+  auto copy = vtkSmartPointer<Data>::New();
+  copy->ShallowCopy(data);
+  // What follows is static, whether it comes from memory or from a file.
+  copy->GetInformation()->Remove(vtkDataObject::DATA_TIME_STEP());
+  return copy;
+}
+
+std::string PathOf(const RunStep& step, const std::string& name)
+{
+  return (fs::path(step.input.Settings.output) / name).string();
+}
+
+vtkSmartPointer<vtkPolyData> ReadLines(const RunStep& step, const std::string& name)
+{
+  return ReadPolyData(PathOf(step, name), step.input.Messages);
+}
+
+/// A volume that an earlier stage wrote, on the grid of the reference phase.
+vtkSmartPointer<vtkImageData> ReadVolume(
+  const RunStep& step, const std::string& name, const char* array)
+{
+  const std::string path = PathOf(step, name);
+  vtkNew<vtkGatedImageReader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  step.input.Messages.ThrowIfError();
+  auto volume = Detached(reader->GetOutput());
+  vtkImageData* reference = step.input.Reference;
+  int dimensions[3];
+  int wanted[3];
+  volume->GetDimensions(dimensions);
+  reference->GetDimensions(wanted);
+  if (!std::equal(wanted, wanted + 3, dimensions))
+  {
+    throw std::runtime_error("'" + path + "' has another size than the reference phase.");
+  }
+  // The file has the same grid, but not in the same bits.
+  volume->SetExtent(reference->GetExtent());
+  volume->SetOrigin(reference->GetOrigin());
+  volume->SetSpacing(reference->GetSpacing());
+  volume->SetDirectionMatrix(reference->GetDirectionMatrix());
+  volume->GetPointData()->GetScalars()->SetName(array);
+  volume->SetFieldData(vtkSmartPointer<vtkFieldData>::New());
+  volume->GetFieldData()->PassData(reference->GetFieldData());
+  return volume;
+}
+
+void LoadReference(const RunStep& step, bool automatic, double time)
+{
+  RunInput& input = step.input;
+  if (input.Reference)
+  {
+    return;
+  }
+  vtkNew<vtkReferencePhase> reference;
+  reference->SetInputConnection(input.Reader->GetOutputPort());
+  reference->SetAutomatic(automatic);
+  reference->SetTime(time);
+  UpdateAtTime(reference, 0, time, input.Messages, step.progress);
+  input.Reference = Detached(vtkImageData::SafeDownCast(reference->GetOutputDataObject(0)));
+}
+
+void NeedReference(const RunStep& step)
+{
+  LoadReference(step, false, step.report.Of("time").get<double>());
+}
+
+void NeedVesselness(const RunStep& step)
+{
+  NeedReference(step);
+  RunInput& input = step.input;
+  if (!input.Vesselness)
+  {
+    input.Vesselness = ReadVolume(step, "vesselness.mha", vtkCoronaryArrayNames::Vesselness);
+    vtkCoronary::AddArray<vtkDoubleArray>(input.Vesselness->GetFieldData(),
+      vtkCoronaryArrayNames::VesselnessSigmas,
+      step.report.Of("vesselness")["sigmas"].get<std::vector<double>>());
+    vtkCoronary::AddArray<vtkDoubleArray>(input.Vesselness->GetFieldData(),
+      vtkCoronaryArrayNames::VesselnessC,
+      std::vector<double>{ step.report.Of("vesselness")["c"].get<double>() });
+  }
+}
+
+void NeedMask(const RunStep& step)
+{
+  NeedReference(step);
+  if (!step.input.Mask)
+  {
+    step.input.Mask = ReadVolume(step, "mask.mha", vtkCoronaryArrayNames::VesselMask);
+  }
+}
+
+bool KeepGoing(double)
+{
+  return Interruption() == 0;
+}
+
+void Update(vtkAlgorithm* algorithm, const RunStep& step)
+{
+  UpdateAtTime(algorithm, 0, 0.0, step.input.Messages, step.progress);
+}
+
+Json MakeVesselness(RunStep& step)
+{
+  const RunSettings& settings = step.input.Settings;
+  NeedReference(step);
+  vtkNew<vtkFrangiVesselness> vesselness;
+  vesselness->SetInputData(step.input.Reference);
+  vesselness->SetSigmaMin(settings.scales[0]);
+  vesselness->SetSigmaMax(settings.scales[1]);
+  vesselness->SetAutomaticC(!(settings.c > 0.0));
+  vesselness->SetC(settings.c > 0.0 ? settings.c : 1.0);
+  Update(vesselness, step);
+  step.input.Vesselness = Detached(vesselness->GetOutput());
+  vtkImageData* response = step.input.Vesselness;
+  WriteMetaImage(step.Add("vesselness.mha"), vtkCoronary::GridOf(response),
+    static_cast<const float*>(response->GetScalarPointer()), settings.compress, KeepGoing);
+  step.summary = "vesselness with c = " + Format(vesselness->GetUsedC());
+  return { { "file", "vesselness.mha" },
+    { "sigmas", Numbers(response, vtkCoronaryArrayNames::VesselnessSigmas) },
+    { "c", vesselness->GetUsedC() } };
+}
+
+Json MakeSegmentation(RunStep& step)
+{
+  const RunSettings& settings = step.input.Settings;
+  NeedVesselness(step);
+  vtkNew<vtkVesselSegmentation> segmentation;
+  segmentation->SetInputData(step.input.Reference);
+  segmentation->SetVesselnessData(step.input.Vesselness);
+  for (std::size_t n = 0; n + 2 < settings.seeds.size(); n += 3)
+  {
+    segmentation->AddSeed(settings.seeds[n], settings.seeds[n + 1], settings.seeds[n + 2]);
+  }
+  segmentation->SetLargestRadius(settings.largestRadius);
+  if (!settings.window.empty())
+  {
+    segmentation->AutomaticWindowOff();
+    segmentation->SetTissueValue(settings.window[0]);
+    segmentation->SetBloodValue(settings.window[1]);
+  }
+  Update(segmentation, step);
+  step.input.Mask = Detached(segmentation->GetOutput());
+  vtkImageData* mask = step.input.Mask;
+  auto* seeds =
+    vtkPolyData::SafeDownCast(segmentation->GetOutputDataObject(vtkVesselSegmentation::SeedsPort));
+  auto* aorta =
+    vtkPolyData::SafeDownCast(segmentation->GetOutputDataObject(vtkVesselSegmentation::AortaPort));
+  WriteMetaImage(step.Add("mask.mha"), vtkCoronary::GridOf(mask),
+    static_cast<const unsigned char*>(mask->GetScalarPointer()), settings.compress, KeepGoing);
+  WritePolyData(step.Add("ostia.vtp"), seeds, step.input.Messages);
+  WritePolyData(step.Add("aorta.vtp"), aorta, step.input.Messages);
+  Json described = DescribeSeeds(seeds);
+  for (const auto& seed : described)
+  {
+    char text[160];
+    std::snprintf(text, sizeof(text), "%s%s at %.1f %.1f %.1f (confidence %.2f), %.0f mm^3",
+      step.summary.empty() ? "" : "; ", seed["name"].get<std::string>().c_str(),
+      seed["position"][0].get<double>(), seed["position"][1].get<double>(),
+      seed["position"][2].get<double>(), seed["confidence"].get<double>(),
+      seed["volume"].get<double>());
+    step.summary += text;
+  }
+  return { { "file", "mask.mha" }, { "window", Numbers(mask, vtkCoronaryArrayNames::BloodWindow) },
+    { "seeds", described }, { "seeds_file", "ostia.vtp" }, { "aorta_file", "aorta.vtp" } };
+}
+
+/// A closed surface in place of images; gives the seeds.
+vtkSmartPointer<vtkPolyData> PrepareSurface(
+  RunStep& step, vtkFastMarchingCenterline* centerline, Json& numbers)
+{
+  const RunSettings& settings = step.input.Settings;
+  vtkNew<vtkSurfaceCleaner> cleaner;
+  cleaner->SetInputData(ReadSurfaceInput(settings.input.front(), step.input.Messages));
+  UpdateAtTime(
+    cleaner, 0, 0.0, step.input.Messages, [&](double fraction) { step.progress(0.2 * fraction); });
+  vtkPolyData* surface = cleaner->GetOutput();
+  if (surface->GetNumberOfPolys() == 0)
+  {
+    throw std::runtime_error(
+      "'" + settings.input.front() + "' has no surface that could be closed.");
+  }
+  auto seeds = SeedsOfSurface(surface, settings.seeds);
+  WritePolyData(step.Add("given_surface.vtp"), surface, step.input.Messages);
+  WritePolyData(step.Add("ostia.vtp"), seeds, step.input.Messages);
+  centerline->SetInputDataObject(0, surface);
+  centerline->SetSnapDistance(SurfaceSnapDistance);
+  numbers["given_surface_file"] = "given_surface.vtp";
+  numbers["seeds_file"] = "ostia.vtp";
+  numbers["seeds"] = DescribeSeeds(seeds);
+  Json repairs = Json::array();
+  if (auto* list = vtkStringArray::SafeDownCast(
+        surface->GetFieldData()->GetAbstractArray(vtkCoronaryArrayNames::Repairs)))
+  {
+    for (vtkIdType n = 0; n < list->GetNumberOfValues(); ++n)
+    {
+      repairs.push_back(list->GetValue(n));
+    }
+  }
+  numbers["repairs"] = repairs;
+  return seeds;
+}
+
+Json MakeCenterline(RunStep& step)
+{
+  const RunSettings& settings = step.input.Settings;
+  Json numbers = { { "file", "centerline.vtp" }, { "bifurcations_file", "bifurcations.vtp" },
+    { "lines_file", "centerline_lines.vtp" }, { "status_file", "status.csv" } };
+  vtkNew<vtkFastMarchingCenterline> centerline;
+  vtkSmartPointer<vtkPolyData> seeds;
+  if (step.input.IsSurface())
+  {
+    seeds = PrepareSurface(step, centerline, numbers);
+  }
+  else
+  {
+    NeedVesselness(step);
+    seeds = ReadLines(step, "ostia.vtp");
+    centerline->SetInputDataObject(0, step.input.Vesselness);
+    centerline->SetInputDataObject(3, step.input.Reference);
+    if (!settings.beyondMask)
+    {
+      NeedMask(step);
+      centerline->SetInputDataObject(4, step.input.Mask);
+    }
+  }
+  centerline->SetInputDataObject(1, seeds);
+  centerline->SetMinimumBranchLength(settings.leastBranch);
+  centerline->SetTimeLimit(settings.centerlineSeconds);
+  vtkNew<vtkCoronaryTreeTopology> topology;
+  topology->SetInputConnection(centerline->GetOutputPort());
+  topology->SetRootData(seeds);
+  topology->SetLabelSegments(settings.labels);
+  UpdateAtTime(centerline, 0, 0.0, step.input.Messages,
+    [&](double fraction) { step.progress(0.2 + 0.7 * fraction); });
+  UpdateAtTime(topology, 0, 0.0, step.input.Messages,
+    [&](double fraction) { step.progress(0.9 + 0.1 * fraction); });
+  vtkPolyData* raw = centerline->GetOutput();
+  vtkPolyData* tree = topology->GetOutput();
+  auto* lines = vtkPolyData::SafeDownCast(
+    centerline->GetOutputDataObject(vtkFastMarchingCenterline::LinesPort));
+  auto* forks = vtkPolyData::SafeDownCast(
+    topology->GetOutputDataObject(vtkCoronaryTreeTopology::BifurcationPort));
+  WritePolyData(step.Add("centerline.vtp"), tree, step.input.Messages);
+  WritePolyData(step.Add("bifurcations.vtp"), forks, step.input.Messages);
+  WritePolyData(step.Add("centerline_lines.vtp"), lines, step.input.Messages);
+  const Json trees = DescribeTrees(raw, seeds);
+  WriteFileAtomically(step.Add("status.csv"), StatusTable(trees));
+  auto* dominance = vtkStringArray::SafeDownCast(
+    tree->GetFieldData()->GetAbstractArray(vtkCoronaryArrayNames::Dominance));
+  vtkDataArray* complete = raw->GetFieldData()->GetArray(vtkCoronaryArrayNames::Complete);
+  double length = 0.0;
+  for (const auto& one : trees)
+  {
+    length += one["length"].get<double>();
+  }
+  numbers["trees"] = trees;
+  numbers["complete"] = complete && complete->GetTuple1(0) != 0.0;
+  numbers["branches"] = tree->GetNumberOfLines();
+  numbers["bifurcations"] = forks->GetNumberOfPoints();
+  numbers["dominance"] = dominance && dominance->GetNumberOfValues() > 0
+    ? std::string(dominance->GetValue(0))
+    : std::string();
+  numbers["image_blur"] = Numbers(raw, vtkCoronaryArrayNames::ImageBlur);
+  step.summary =
+    std::to_string(tree->GetNumberOfLines()) + " branches, " + Format(std::round(length)) + " mm";
+  return numbers;
+}
+
+/// The tree, which must not be empty.
+vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
+{
+  auto tree = ReadLines(step, "centerline.vtp");
+  if (tree->GetNumberOfLines() == 0)
+  {
+    std::string reasons;
+    for (const auto& one : step.report.Of("centerline")["trees"])
+    {
+      reasons += (reasons.empty() ? ": " : "; ") + one["name"].get<std::string>() + " " +
+        one["message"].get<std::string>();
+    }
+    throw std::runtime_error("'" + PathOf(step, "centerline.vtp") +
+      "' has no branches to make a surface of" + reasons + ".");
+  }
+  return tree;
+}
+
+Json MakeSurface(RunStep& step)
+{
+  const RunSettings& settings = step.input.Settings;
+  vtkSmartPointer<vtkPolyData> surface;
+  auto caps = vtkSmartPointer<vtkPolyData>::New();
+  const bool given = step.input.IsSurface() && settings.surface == "given";
+  const auto tree = ReadTree(step);
+  if (given)
+  {
+    surface = ReadLines(step, "given_surface.vtp");
+  }
+  else
+  {
+    vtkNew<vtkFrenetSweepSurface> sweep;
+    sweep->SetInputData(tree);
+    if (settings.contours && !step.input.IsSurface())
+    {
+      NeedReference(step);
+      sweep->SetImageData(step.input.Reference);
+    }
+    sweep->SetMinimumEdgeLength(settings.edges[0]);
+    sweep->SetMaximumEdgeLength(settings.edges[1]);
+    sweep->SetCapping(!settings.openEnds);
+    Update(sweep, step);
+    surface = sweep->GetOutput();
+    caps = sweep->GetCaps();
+  }
+  WritePolyData(step.Add("surface.vtp"), surface, step.input.Messages);
+  WritePolyData(step.Add("caps.vtp"), caps, step.input.Messages);
+  step.summary = std::to_string(surface->GetNumberOfPolys()) + " triangles";
+  return { { "file", "surface.vtp" }, { "caps_file", "caps.vtp" },
+    { "kind", given ? "given" : "swept" }, { "triangles", surface->GetNumberOfPolys() },
+    { "points", surface->GetNumberOfPoints() }, { "caps", caps->GetNumberOfPoints() } };
+}
+
+Json MakeVolume(RunStep& step)
+{
+  vtkMessageTrap& messages = step.input.Messages;
+  vtkNew<vtkCenterlineSkeleton> skeleton;
+  skeleton->SetInputData(ReadTree(step));
+  UpdateAtTime(skeleton, 0, 0.0, messages, [](double) {});
+  vtkPolyData* bones = skeleton->GetOutput();
+  vtkNew<vtkTetrahedralMesher> mesher;
+  mesher->SetInputData(ReadLines(step, "surface.vtp"));
+  mesher->SetSkeletonData(bones);
+  // Where the wall was smoothed, the line may leave it.
+  mesher->LeaveOutsideOn();
+  // The smallest vessels of a coarse image may need smaller ones than the filter's default allows; the report
+  // has the least.
+  mesher->SetMinimumVolume(0.0);
+  Update(mesher, step);
+  vtkUnstructuredGrid* volume = mesher->GetOutput();
+  WritePolyData(step.Add("skeleton.vtp"), bones, messages);
+  vtkNew<vtkTGFWriter> graph;
+  graph->SetInputData(bones);
+  graph->SetFileName(step.Add("skeleton.tgf").c_str());
+  graph->Write();
+  messages.ThrowIfError();
+  WriteUnstructuredGrid(step.Add("volume.vtu"), volume, messages);
+  WritePolyData(step.Add("volume_boundary.vtp"), mesher->GetBoundary(), messages);
+  WritePolyData(step.Add("volume_skeleton.vtp"), mesher->GetEdges(), messages);
+  auto* backend = vtkStringArray::SafeDownCast(
+    volume->GetFieldData()->GetAbstractArray(vtkCoronaryArrayNames::Backend));
+  step.summary = std::to_string(volume->GetNumberOfCells()) + " tetrahedra";
+  return { { "file", "volume.vtu" }, { "boundary_file", "volume_boundary.vtp" },
+    { "skeleton_file", "volume_skeleton.vtp" },
+    { "backend",
+      backend && backend->GetNumberOfValues() > 0 ? std::string(backend->GetValue(0))
+                                                  : std::string() },
+    { "tetrahedra", volume->GetNumberOfCells() }, { "points", volume->GetNumberOfPoints() },
+    { "least_dihedral_angle_rad", Numbers(volume, vtkCoronaryArrayNames::LeastDihedralAngle) },
+    { "least_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::LeastVolume) },
+    { "total_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::TotalVolume) },
+    { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) } };
+}
+
+/// A row a point, a column a bone, out of the compact form that moves the mesh.
+Eigen::MatrixXd WeightMatrix(vtkUnstructuredGrid* mesh, vtkIdType bones)
+{
+  vtkDataArray* indices = mesh->GetPointData()->GetArray(vtkCoronaryArrayNames::BoneIndices);
+  vtkDataArray* weights = mesh->GetPointData()->GetArray(vtkCoronaryArrayNames::BoneWeightsCompact);
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(mesh->GetNumberOfPoints(), bones);
+  for (vtkIdType point = 0; point < mesh->GetNumberOfPoints(); ++point)
+  {
+    for (int n = 0; n < indices->GetNumberOfComponents(); ++n)
+    {
+      const auto bone = static_cast<vtkIdType>(indices->GetComponent(point, n));
+      if (bone >= 0)
+      {
+        matrix(point, bone) = weights->GetComponent(point, n);
+      }
+    }
+  }
+  return matrix;
+}
+
+Json MakeWeights(RunStep& step)
+{
+  const RunSettings& settings = step.input.Settings;
+  const auto bones = ReadLines(step, "skeleton.vtp");
+  vtkNew<vtkBiharmonicSkinWeights> weights;
+  weights->SetInputData(ReadUnstructuredGrid(PathOf(step, "volume.vtu"), step.input.Messages));
+  weights->SetSkeletonData(bones);
+  weights->SetCacheFolder(settings.weightCache.c_str());
+  weights->SetLeaveOutside(settings.leaveBonesOutside);
+  Update(weights, step);
+  vtkUnstructuredGrid* bound = weights->GetOutput();
+  WriteUnstructuredGrid(step.Add("weights.vtu"), bound, step.input.Messages);
+  WriteMatrixFile(step.Add("weights.dmat"), WeightMatrix(bound, bones->GetNumberOfLines()));
+  Json numbers = { { "file", "weights.vtu" }, { "matrix_file", "weights.dmat" },
+    { "skeleton_file", "skeleton.vtp" }, { "skeleton_graph_file", "skeleton.tgf" },
+    { "bones", bones->GetNumberOfLines() }, { "joints", bones->GetNumberOfPoints() },
+    { "converged", Numbers(bound, vtkCoronaryArrayNames::WeightsConverged) },
+    { "iterations", Numbers(bound, vtkCoronaryArrayNames::WeightsIterations) },
+    { "residual", Numbers(bound, vtkCoronaryArrayNames::WeightsResidual) },
+    { "energy_gap", Numbers(bound, vtkCoronaryArrayNames::WeightsEnergyGap) },
+    { "row_sums", Numbers(bound, vtkCoronaryArrayNames::WeightsRowSums) },
+    { "error_on_bones", Numbers(bound, vtkCoronaryArrayNames::WeightsOnBones) } };
+  if (settings.leaveBonesOutside)
+  {
+    numbers["left_out_bones"] = Numbers(bound, vtkCoronaryArrayNames::LeftOutBones);
+  }
+  step.summary = std::to_string(bones->GetNumberOfLines()) + " bones";
+  return numbers;
+}
+
+constexpr int PhaseDigits = 2;
+
+/// The lines or the skeleton at every moment, and their lists; gives the name of one of these.
+std::string WriteMovingLines(
+  vtkAlgorithm* lines, const std::string& stem, const std::vector<double>& times, RunStep& step)
+{
+  std::vector<TimedFile> files;
+  const std::size_t width =
+    std::max<std::size_t>(PhaseDigits, std::to_string(times.size() - 1).size());
+  for (std::size_t n = 0; n < times.size(); ++n)
+  {
+    const std::string digits = std::to_string(n);
+    files.push_back(
+      { stem + "_" + std::string(width - digits.size(), '0') + digits + ".vtp", times[n] });
+    UpdateAtTime(lines, 0, times[n], step.input.Messages, [](double) {});
+    WritePolyData(step.Add("motion/" + files.back().path),
+      vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), step.input.Messages);
+  }
+  const std::string list = "motion/" + stem + ".vtp.series";
+  WriteFileAtomically(step.Add(list), FileSeriesText(files));
+  WriteFileAtomically(step.Add("motion/" + stem + ".pvd"), PvdText(files));
+  return list;
+}
+
+std::vector<double> Moments(const RunInput& input)
+{
+  std::vector<double> times = input.Settings.moments;
+  if (times.empty())
+  {
+    for (int n = 0; n < input.Reader->GetNumberOfPhases(); ++n)
+    {
+      times.push_back(input.Reader->GetPhaseTime(n));
+    }
+  }
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
+}
+
+Json MakeMotion(RunStep& step)
+{
+  const RunSettings& settings = step.input.Settings;
+  vtkMessageTrap& messages = step.input.Messages;
+  const auto skeleton = ReadLines(step, "skeleton.vtp");
+  vtkNew<vtkCenterlineTracker> tracker;
+  tracker->SetInputConnection(step.input.Reader->GetOutputPort());
+  tracker->SetInputDataObject(1, ReadTree(step));
+  tracker->SetInputDataObject(2, skeleton);
+  tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
+  tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
+                                                       : vtkCenterlineTracker::AllPhases);
+  const std::vector<double> times = Moments(step.input);
+  const int mode = InterpolationMode(settings.interpolation);
+  vtkNew<vtkCardiacPhaseInterpolator> lines;
+  lines->SetInputConnection(tracker->GetOutputPort(0));
+  lines->SetMode(mode);
+  MovingMesh moving;
+  moving.Interpolator->SetInputConnection(tracker->GetOutputPort(1));
+  moving.Interpolator->SetMode(mode);
+  moving.Deformation->SetInputData(0, ReadUnstructuredGrid(PathOf(step, "weights.vtu"), messages));
+  moving.Deformation->SetInputData(1, skeleton);
+  moving.Writer->SetInputData(1, ReadLines(step, "volume_boundary.vtp"));
+  moving.Writer->SetInputData(2, ReadLines(step, "caps.vtp"));
+  moving.Writer->PrefixFilesOff();
+  moving.Writer->SetDigits(PhaseDigits);
+
+  // The images are read now.
+  UpdateAtTime(
+    tracker, 0, times.front(), messages, [&](double fraction) { step.progress(0.8 * fraction); });
+  Json lists;
+  lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
+  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
+  const std::string name = "motion/mesh.json";
+  const std::string path = step.Add(name);
+  moving.Write(
+    path, times, messages, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); });
+  for (const std::string& file : MeshSequenceFiles(path))
+  {
+    if ("motion/" + file != name)
+    {
+      step.Add("motion/" + file);
+    }
+  }
+  lists["volume"] = "motion/volume.vtu.series";
+  lists["surface"] = "motion/surface.vtp.series";
+  std::vector<TimedFile> surfaces =
+    ReadFileSeries((fs::path(path).parent_path() / "surface.pvd").string());
+  for (TimedFile& file : surfaces)
+  {
+    file.path = "motion/" + fs::path(file.path).filename().string();
+  }
+  WriteFileAtomically(step.Add("motion.pvd"), PvdText(surfaces));
+
+  vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
+  Json inverted = Json::array();
+  vtkTable* quality = moving.Writer->GetQuality();
+  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
+  {
+    inverted.push_back(
+      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
+  }
+  step.summary = std::to_string(times.size()) + " moments";
+  return { { "possible", true }, { "file", "motion.pvd" }, { "series", lists }, { "quality", name },
+    { "times", times }, { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
+    { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
+    { "inverted_tetrahedra", inverted } };
+}
+}
+
+bool IsSurfaceInput(const std::string& path)
+{
+  return EndsWith(path, ".vtp") || EndsWith(path, ".obj") || EndsWith(path, ".off") ||
+    EndsWith(path, ".stl");
+}
+
+RunInput::RunInput(const RunSettings& settings, vtkMessageTrap& messages)
+  : Settings(settings)
+  , Messages(messages)
+{
+  const auto surfaces = std::count_if(settings.input.begin(), settings.input.end(), IsSurfaceInput);
+  if (surfaces > 0)
+  {
+    if (settings.input.size() > 1)
+    {
+      throw std::runtime_error("'" + settings.input[0] + "' and " +
+        std::to_string(settings.input.size() - 1) + " more: a surface is the only input of a run.");
+    }
+    if (!std::ifstream(settings.input.front()))
+    {
+      throw std::runtime_error("Cannot open '" + settings.input.front() + "'.");
+    }
+    return;
+  }
+  this->Reader = vtkSmartPointer<vtkGatedImageReader>::New();
+  for (const std::string& path : settings.input)
+  {
+    this->Reader->AddFileName(path.c_str());
+  }
+  for (std::size_t i = 0; i < settings.fractions.size(); ++i)
+  {
+    this->Reader->SetPhaseFraction(static_cast<int>(i), settings.fractions[i]);
+  }
+  this->Reader->SetCycleLength(settings.cycleMs / 1000.0);
+  if (!settings.series.empty())
+  {
+    this->Reader->SetSeriesInstanceUID(settings.series.c_str());
+  }
+  this->Reader->UpdateInformation();
+  messages.ThrowIfError();
+}
+
+RunInput::~RunInput() = default;
+
+std::vector<std::string> RunInput::Files() const
+{
+  std::vector<std::string> files = this->Settings.input;
+  const fs::path folder = fs::path(files.front()).parent_path();
+  for (int n = 0; this->Reader && n < this->Reader->GetNumberOfPhases(); ++n)
+  {
+    // Those of a series.json are named as in it.
+    const std::string name = this->Reader->GetPhaseFileName(n);
+    std::error_code error;
+    files.push_back(fs::exists(folder / name, error) ? (folder / name).string() : name);
+  }
+  return files;
+}
+
+std::string RunInput::WhyStill() const
+{
+  if (this->IsSurface())
+  {
+    return "a surface has no images to track";
+  }
+  const int phases = this->Reader->GetNumberOfPhases();
+  if (phases < 2)
+  {
+    return "one phase only";
+  }
+  return phases < 3 && this->Settings.tracked == "even" ? "two phases, of which one is tracked"
+                                                        : std::string();
+}
+
+std::string RunStep::Add(const std::string& name)
+{
+  this->files.push_back(name);
+  return this->folder.Add(name);
+}
+
+void FindReference(RunStep& step)
+{
+  RunInput& input = step.input;
+  vtkGatedImageReader* reader = input.Reader;
+  const bool automatic = std::isnan(input.Settings.time) && reader->GetNumberOfPhases() > 1;
+  LoadReference(step, automatic,
+    std::isnan(input.Settings.time) ? reader->GetPhaseTime(0) : input.Settings.time);
+  double time = reader->GetPhaseTime(0);
+  if (vtkDataArray* found =
+        input.Reference->GetFieldData()->GetArray(vtkCoronaryArrayNames::PhaseTime))
+  {
+    time = found->GetTuple1(0);
+  }
+  const int phase = PhaseAt(reader, time);
+  step.report.Set("phase", phase);
+  step.report.Set("time", reader->GetPhaseTime(phase));
+  step.report.Set("image", reader->GetPhaseFileName(phase));
+}
+
+Json MakeStage(RunStage stage, RunStep& step)
+{
+  switch (stage)
+  {
+    case RunStage::Vesselness:
+      return MakeVesselness(step);
+    case RunStage::Segmentation:
+      return MakeSegmentation(step);
+    case RunStage::Centerline:
+      return MakeCenterline(step);
+    case RunStage::Surface:
+      return MakeSurface(step);
+    case RunStage::Volume:
+      return MakeVolume(step);
+    case RunStage::Weights:
+      return MakeWeights(step);
+    case RunStage::Motion:
+      return MakeMotion(step);
+  }
+  return {};
+}
+
+void ReleaseImages(RunInput& input, RunStage next)
+{
+  if (next > RunStage::Centerline)
+  {
+    input.Vesselness = nullptr;
+    input.Mask = nullptr;
+    if (next > RunStage::Surface || !input.Settings.contours)
+    {
+      input.Reference = nullptr;
+      if (input.Reader)
+      {
+        input.Reader->GetOutput()->ReleaseData();
+      }
+    }
+  }
+}
+
+std::vector<std::string> UsualFiles(const std::string& folder, RunStage from)
+{
+  const std::vector<std::vector<std::string>> byStage = {
+    { "vesselness.mha" },
+    { "mask.mha", "ostia.vtp", "aorta.vtp" },
+    { "given_surface.vtp", "centerline.vtp", "bifurcations.vtp", "centerline_lines.vtp",
+      "status.csv" },
+    { "surface.vtp", "caps.vtp" },
+    { "skeleton.vtp", "skeleton.tgf", "volume.vtu", "volume_boundary.vtp", "volume_skeleton.vtp" },
+    { "weights.vtu", "weights.dmat" },
+    { "motion.pvd" },
+  };
+  std::vector<std::string> names;
+  for (auto n = static_cast<std::size_t>(from); n < byStage.size(); ++n)
+  {
+    names.insert(names.end(), byStage[n].begin(), byStage[n].end());
+  }
+  for (const std::string& name : MeshSequenceFiles(folder + "/motion/mesh.json"))
+  {
+    names.push_back("motion/" + name);
+  }
+  for (const std::string stem : { "centerline", "skeleton" })
+  {
+    const std::string list = "motion/" + stem + ".vtp.series";
+    try
+    {
+      for (const TimedFile& file : ReadFileSeries(folder + "/" + list))
+      {
+        const std::string name = fs::path(file.path).filename().string();
+        if (name.rfind(stem + "_", 0) == 0)
+        {
+          names.push_back("motion/" + name);
+        }
+      }
+      names.push_back(list);
+      names.push_back("motion/" + stem + ".pvd");
+    }
+    catch (const std::runtime_error&)
+    {
+      // There is none.
+    }
+  }
+  return names;
+}
+}

@@ -1,0 +1,89 @@
+/**
+ * @file vtkRunStages.h
+ * @brief The stages of `run`: each makes its files from those of the stages before it.
+ *
+ * What a stage hands to a later one are its files: a stage reads what it needs from the folder, whether that was
+ * written just now or by an earlier run. Images alone are also kept in memory, as long as they are needed.
+ */
+#ifndef vtkRunStages_h
+#define vtkRunStages_h
+
+#include "RunReport.h"
+#include "RunSettings.h"
+
+#include "vtkSmartPointer.h"
+
+#include <nlohmann/json.hpp>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+class vtkGatedImageReader;
+class vtkImageData;
+class vtkMessageTrap;
+class vtkPolyData;
+
+namespace coronary
+{
+class StagedFolder;
+
+/// Whether a path is that of a surface that `run` starts from: .vtp, .obj, .off or .stl.
+bool IsSurfaceInput(const std::string& path);
+
+/// What the stages work on.
+class RunInput
+{
+public:
+  /// Opens the images, or nothing for a surface. @throws std::runtime_error naming the input
+  RunInput(const RunSettings& settings, vtkMessageTrap& messages);
+  ~RunInput();
+
+  bool IsSurface() const { return this->Reader == nullptr; }
+
+  /// All files of which the input is, for DescribeInput().
+  std::vector<std::string> Files() const;
+
+  /// Why there is no motion in it; empty when there is.
+  std::string WhyStill() const;
+
+  const RunSettings& Settings;
+  vtkMessageTrap& Messages;
+  vtkSmartPointer<vtkGatedImageReader> Reader;
+
+  ///@{
+  /// Of the reference phase; null: not in memory.
+  vtkSmartPointer<vtkImageData> Reference;
+  vtkSmartPointer<vtkImageData> Vesselness;
+  vtkSmartPointer<vtkImageData> Mask;
+  ///@}
+};
+
+/// One stage at work.
+struct RunStep
+{
+  RunInput& input;
+  RunReport& report;               ///< of the stages before
+  StagedFolder& folder;            ///< for the stage's files
+  std::vector<std::string>& files; ///< names of those
+  std::function<void(double)> progress;
+  std::string summary; ///< a few words for the user
+
+  /// Where to write a file of the stage.
+  std::string Add(const std::string& name);
+};
+
+/// The reference phase: number, time and file into the report, the image into the input.
+void FindReference(RunStep& step);
+
+/// Makes the files of a stage. @return what the report tells of it @throws std::runtime_error, Cancelled
+nlohmann::ordered_json MakeStage(RunStage stage, RunStep& step);
+
+/// Lets images go that the stages from `next` on do not need.
+void ReleaseImages(RunInput& input, RunStage next);
+
+/// Files that a stage and those after it may have left in a folder, with those of older versions of the program.
+std::vector<std::string> UsualFiles(const std::string& folder, RunStage from);
+}
+
+#endif

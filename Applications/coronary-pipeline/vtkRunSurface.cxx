@@ -1,0 +1,147 @@
+#include "vtkRunSurface.h"
+
+#include "MeshFile.h"
+#include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
+
+#include "vtkCellArray.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkDataArray.h"
+#include "vtkDoubleArray.h"
+#include "vtkNew.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkPolyDataConnectivityFilter.h"
+#include "vtkSTLReader.h"
+#include "vtkStringArray.h"
+
+#include <array>
+#include <fstream>
+#include <map>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+/// That the highest point is the ostium is a guess.
+constexpr double GuessedConfidence = 0.5;
+
+vtkSmartPointer<vtkPolyData> Triangles(const FileMesh& mesh)
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const Vector3& point : mesh.points)
+  {
+    points->InsertNextPoint(point.data());
+  }
+  vtkNew<vtkCellArray> polys;
+  for (const Triangle& triangle : mesh.triangles)
+  {
+    const vtkIdType ids[3] = { triangle[0], triangle[1], triangle[2] };
+    polys->InsertNextCell(3, ids);
+  }
+  auto surface = vtkSmartPointer<vtkPolyData>::New();
+  surface->SetPoints(points);
+  surface->SetPolys(polys);
+  return surface;
+}
+
+std::vector<std::array<double, 3>> HighestPoints(vtkPolyData* surface)
+{
+  vtkNew<vtkPolyDataConnectivityFilter> components;
+  components->SetInputData(surface);
+  components->SetExtractionModeToAllRegions();
+  components->ColorRegionsOn();
+  components->Update();
+  vtkPolyData* colored = components->GetOutput();
+  vtkDataArray* region = colored->GetPointData()->GetArray("RegionId");
+  std::map<int, std::array<double, 3>> highest;
+  for (vtkIdType n = 0; n < colored->GetNumberOfPoints(); ++n)
+  {
+    std::array<double, 3> point;
+    colored->GetPoint(n, point.data());
+    auto& top = highest.emplace(static_cast<int>(region->GetTuple1(n)), point).first->second;
+    top = point[2] > top[2] ? point : top;
+  }
+  std::vector<std::array<double, 3>> points;
+  points.reserve(highest.size());
+  for (const auto& [id, point] : highest)
+  {
+    points.push_back(point);
+  }
+  return points;
+}
+}
+
+vtkSmartPointer<vtkPolyData> ReadSurfaceInput(const std::string& path, vtkMessageTrap& messages)
+{
+  vtkSmartPointer<vtkPolyData> surface;
+  if (EndsWith(path, ".vtp"))
+  {
+    surface = ReadPolyData(path, messages);
+  }
+  else if (EndsWith(path, ".stl"))
+  {
+    if (!std::ifstream(path))
+    {
+      throw std::runtime_error("Cannot open '" + path + "'.");
+    }
+    vtkNew<vtkSTLReader> reader;
+    reader->SetFileName(path.c_str());
+    reader->Update();
+    try
+    {
+      messages.ThrowIfError();
+    }
+    catch (const std::exception& error)
+    {
+      throw std::runtime_error("Cannot read '" + path + "': " + error.what());
+    }
+    surface = reader->GetOutput();
+  }
+  else
+  {
+    surface = Triangles(ReadMeshFile(path));
+  }
+  if (surface->GetNumberOfPolys() == 0 && surface->GetNumberOfStrips() == 0)
+  {
+    throw std::runtime_error("'" + path + "' has no triangles: it is no surface.");
+  }
+  return surface;
+}
+
+vtkSmartPointer<vtkPolyData> SeedsOfSurface(vtkPolyData* surface, const std::vector<double>& given)
+{
+  std::vector<std::array<double, 3>> positions;
+  for (std::size_t n = 0; n + 2 < given.size(); n += 3)
+  {
+    positions.push_back({ given[n], given[n + 1], given[n + 2] });
+  }
+  if (given.empty())
+  {
+    positions = HighestPoints(surface);
+  }
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> vertices;
+  vtkNew<vtkStringArray> names;
+  names->SetName(vtkCoronaryArrayNames::Name);
+  vtkNew<vtkDoubleArray> confidence;
+  confidence->SetName(vtkCoronaryArrayNames::Confidence);
+  for (const auto& position : positions)
+  {
+    const vtkIdType id = points->InsertNextPoint(position.data());
+    vertices->InsertNextCell(1, &id);
+    names->InsertNextValue(std::to_string(id));
+    confidence->InsertNextValue(given.empty() ? GuessedConfidence : 1.0);
+  }
+  auto seeds = vtkSmartPointer<vtkPolyData>::New();
+  seeds->SetPoints(points);
+  seeds->SetVerts(vertices);
+  seeds->GetPointData()->AddArray(names);
+  seeds->GetPointData()->AddArray(confidence);
+  return seeds;
+}
+}
