@@ -139,6 +139,7 @@ void RunJob::Make(
     const nlohmann::ordered_json numbers = MakeStage(stage, step);
     ThrowIfInterrupted();
     std::vector<std::pair<std::string, std::string>> sizes;
+    sizes.reserve(files.size());
     for (const std::string& file : files)
     {
       sizes.emplace_back(file, folder.PathOf(file));
@@ -161,9 +162,9 @@ void RunJob::Stop(RunStage stage, const std::string& reason, RunReport& report) 
 {
   // What was there stays as it is when this run has made nothing that takes its place.
   std::error_code error;
-  const bool report_there =
+  const bool there =
     std::filesystem::exists(std::filesystem::path(this->Settings.output) / ReportName, error);
-  if (this->Changed || (this->Resume && report_there && !report.OlderHas(stage)))
+  if (this->Changed || (this->Resume && there && !report.OlderHas(stage)))
   {
     report.Stop(stage, reason);
     WriteFileAtomically(

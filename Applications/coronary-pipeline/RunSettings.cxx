@@ -377,26 +377,28 @@ void RunOptions::Read(const std::string& path)
   {
     throw std::runtime_error("'" + path + "' is not a JSON object of settings.");
   }
-  for (const auto& [name, value] : json.items())
+  for (const auto& item : json.items())
   {
-    const std::string where = "'" + path + "': '" + name + "'";
+    const std::string where =
+      std::string("'").append(path).append("': '").append(item.key()).append("'");
+    const Json& value = item.value();
     const auto found = std::find_if(this->List.begin(), this->List.end(),
-      [&, &known = name](const Setting& setting) { return setting.name == known; });
+      [&](const Setting& setting) { return setting.name == item.key(); });
     if (found == this->List.end())
     {
       Refuse(where, "is no setting of run; --print-settings shows all of them");
     }
-    // What is wrong is said even when the command line has another value.
-    Setting setting = *found;
     if (found->option->count() == 0)
     {
-      Assign(setting, value, where);
+      Assign(*found, value, where);
       continue;
     }
+    // What is wrong is said even when the command line has another value.
     std::visit(
       [&](auto* variable)
       {
         auto copy = *variable;
+        Setting setting = *found;
         setting.value = &copy;
         Assign(setting, value, where);
       },

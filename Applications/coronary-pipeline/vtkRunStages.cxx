@@ -599,13 +599,14 @@ std::string WriteMovingLines(
   for (std::size_t n = 0; n < times.size(); ++n)
   {
     const std::string digits = std::to_string(n);
-    files.push_back(
-      { stem + "_" + std::string(width - digits.size(), '0') + digits + ".vtp", times[n] });
+    std::string name = stem + "_";
+    name.append(width - digits.size(), '0').append(digits).append(".vtp");
+    files.push_back({ name, times[n] });
     UpdateAtTime(lines, 0, times[n], step.input.Messages, [](double) {});
     WritePolyData(step.Add("motion/" + files.back().path),
       vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), step.input.Messages);
   }
-  const std::string list = "motion/" + stem + ".vtp.series";
+  std::string list = "motion/" + stem + ".vtp.series";
   WriteFileAtomically(step.Add(list), FileSeriesText(files));
   WriteFileAtomically(step.Add("motion/" + stem + ".pvd"), PvdText(files));
   return list;
@@ -854,21 +855,22 @@ std::vector<std::string> UsualFiles(const std::string& folder, RunStage from)
   {
     names.push_back("motion/" + name);
   }
-  for (const std::string stem : { "centerline", "skeleton" })
+  for (const char* stem : { "centerline", "skeleton" })
   {
-    const std::string list = "motion/" + stem + ".vtp.series";
+    const std::string begin = std::string("motion/").append(stem);
+    const std::string list = begin + ".vtp.series";
     try
     {
-      for (const TimedFile& file : ReadFileSeries(folder + "/" + list))
+      for (const TimedFile& file : ReadFileSeries((fs::path(folder) / list).string()))
       {
-        const std::string name = fs::path(file.path).filename().string();
-        if (name.rfind(stem + "_", 0) == 0)
+        const std::string name = (fs::path("motion") / fs::path(file.path).filename()).string();
+        if (name.rfind(begin + "_", 0) == 0)
         {
-          names.push_back("motion/" + name);
+          names.push_back(name);
         }
       }
       names.push_back(list);
-      names.push_back("motion/" + stem + ".pvd");
+      names.push_back(begin + ".pvd");
     }
     catch (const std::runtime_error&)
     {
