@@ -397,7 +397,17 @@ bool CanDraw(std::string& why)
       {
         why = std::string("the X server '") + (name ? name : "") + "' has no GLX";
       }
-      close(display);
+      // One connection stays until the end of the process: xvfb-run's server resets itself when its last
+      // client leaves, and whoever connects meanwhile, as between two windows of VTK's, is dropped.
+      static void* kept = nullptr;
+      if (there && !kept)
+      {
+        kept = display;
+      }
+      else
+      {
+        close(display);
+      }
     }
   }
   else

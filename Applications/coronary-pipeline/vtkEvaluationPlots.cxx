@@ -7,8 +7,8 @@
 #include "vtkBrush.h"
 #include "vtkChartLegend.h"
 #include "vtkChartXY.h"
+#include "vtkContextActor.h"
 #include "vtkContextScene.h"
-#include "vtkContextView.h"
 #include "vtkDoubleArray.h"
 #include "vtkImageData.h"
 #include "vtkNew.h"
@@ -227,11 +227,15 @@ class Chart
 public:
   Chart()
   {
-    this->View->GetRenderWindow()->OffScreenRenderingOn();
-    this->View->GetRenderWindow()->SetMultiSamples(8);
-    this->View->GetRenderWindow()->SetSize(Width, Height);
-    this->View->GetRenderer()->SetBackground(1.0, 1.0, 1.0);
-    this->View->GetScene()->AddItem(this->Plot);
+    // Not vtkContextView: that wants an interactor.
+    this->Window->OffScreenRenderingOn();
+    this->Window->SetMultiSamples(8);
+    this->Window->SetSize(Width, Height);
+    this->Window->AddRenderer(this->Renderer);
+    this->Renderer->SetBackground(1.0, 1.0, 1.0);
+    this->Renderer->AddActor(this->Actor);
+    this->Actor->GetScene()->SetRenderer(this->Renderer);
+    this->Actor->GetScene()->AddItem(this->Plot);
     this->Plot->SetShowLegend(true);
     this->Plot->GetLegend()->SetInline(false);
     this->Plot->GetLegend()->SetHorizontalAlignment(vtkChartLegend::RIGHT);
@@ -286,10 +290,8 @@ public:
   void Write(const std::string& title, const std::string& stem)
   {
     this->Plot->SetTitle(title);
-    this->View->Update();
-    this->View->GetRenderWindow()->Render();
     vtkNew<vtkWindowToImageFilter> grabber;
-    grabber->SetInput(this->View->GetRenderWindow());
+    grabber->SetInput(this->Window);
     grabber->SetInputBufferTypeToRGB();
     grabber->ReadFrontBufferOff();
     grabber->Update();
@@ -298,7 +300,7 @@ public:
     std::error_code ignored;
     std::filesystem::remove(drawing, ignored);
     vtkNew<vtkSVGExporter> exporter;
-    exporter->SetRenderWindow(this->View->GetRenderWindow());
+    exporter->SetRenderWindow(this->Window);
     exporter->SetFileName(drawing.c_str());
     exporter->SetTitle(title.c_str());
     exporter->Write();
@@ -312,7 +314,9 @@ public:
     }
   }
 
-  vtkNew<vtkContextView> View;
+  vtkNew<vtkRenderWindow> Window;
+  vtkNew<vtkRenderer> Renderer;
+  vtkNew<vtkContextActor> Actor;
   vtkNew<vtkChartXY> Plot;
 };
 
