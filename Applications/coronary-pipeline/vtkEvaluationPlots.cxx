@@ -19,6 +19,7 @@
 #include "vtkRenderer.h"
 #include "vtkSVGExporter.h"
 #include "vtkSmartPointer.h"
+#include "vtkStringArray.h"
 #include "vtkTable.h"
 #include "vtkTextProperty.h"
 #include "vtkWindowToImageFilter.h"
@@ -34,6 +35,7 @@
 #include <regex>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -82,24 +84,6 @@ bool FractionsAreKnown(const std::vector<CaseEvaluation>& cases)
   return true;
 }
 
-vtkSmartPointer<vtkTable> TableOf(
-  const std::vector<std::array<double, 2>>& points, const std::string& name)
-{
-  auto table = vtkSmartPointer<vtkTable>::New();
-  vtkNew<vtkDoubleArray> x;
-  x->SetName("x");
-  vtkNew<vtkDoubleArray> y;
-  y->SetName(name.c_str());
-  for (const std::array<double, 2>& point : points)
-  {
-    x->InsertNextValue(point[0]);
-    y->InsertNextValue(point[1]);
-  }
-  table->AddColumn(x);
-  table->AddColumn(y);
-  return table;
-}
-
 /// The paper's mean of a measure over interpolated phases, and what it is called.
 std::pair<double, std::string> PaperMean(const EvaluationColumn& column, std::size_t cases)
 {
@@ -108,10 +92,61 @@ std::pair<double, std::string> PaperMean(const EvaluationColumn& column, std::si
     : std::make_pair(PaperSummaryB().mean.*(column.value), std::string("paper, five cases"));
 }
 
-void SetRange(vtkAxis* axis, double low, double high)
+/**
+ * Values along an axis. The chart is drawn in `Length` units from low to high, about pixels: VTK's SVG files have six
+ * digits, and their offsets would lose the last three of values that differ little.
+ */
+struct ChartRange
 {
+  static constexpr double Length = 1000.0;
+  double low = 0.0;
+  double high = 1.0;
+
+  double Place(double value) const
+  {
+    return Length * (value - this->low) / (this->high - this->low);
+  }
+};
+
+/// Labels at round values.
+void SetRange(vtkAxis* axis, const ChartRange& range)
+{
+  const double rough = (range.high - range.low) / 8.0;
+  const double power = std::pow(10.0, std::floor(std::log10(rough)));
+  const double share = rough / power;
+  const double step = power * (share <= 1.0 ? 1.0 : share <= 2.0 ? 2.0 : share <= 5.0 ? 5.0 : 10.0);
+  const int digits = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
+  vtkNew<vtkDoubleArray> places;
+  vtkNew<vtkStringArray> labels;
+  const auto last = static_cast<long>(std::floor(range.high / step + 1e-9));
+  for (auto k = static_cast<long>(std::ceil(range.low / step - 1e-9)); k <= last; ++k)
+  {
+    char text[64];
+    std::snprintf(text, sizeof(text), "%.*f", digits, static_cast<double>(k) * step);
+    places->InsertNextValue(range.Place(static_cast<double>(k) * step));
+    labels->InsertNextValue(text);
+  }
   axis->SetBehavior(vtkAxis::FIXED);
-  axis->SetRange(low, high);
+  axis->SetRange(0.0, ChartRange::Length);
+  axis->SetCustomTickPositions(places, labels);
+}
+
+vtkSmartPointer<vtkTable> TableOf(const std::vector<std::array<double, 2>>& points,
+  const std::string& name, const ChartRange& across, const ChartRange& upwards)
+{
+  auto table = vtkSmartPointer<vtkTable>::New();
+  vtkNew<vtkDoubleArray> x;
+  x->SetName("x");
+  vtkNew<vtkDoubleArray> y;
+  y->SetName(name.c_str());
+  for (const std::array<double, 2>& point : points)
+  {
+    x->InsertNextValue(across.Place(point[0]));
+    y->InsertNextValue(upwards.Place(point[1]));
+  }
+  table->AddColumn(x);
+  table->AddColumn(y);
+  return table;
 }
 
 std::string Short(double value)
@@ -193,6 +228,9 @@ std::string Applied(const SvgScale& scale, const std::string& content)
 std::string WithoutTransforms(std::string drawing)
 {
   drawing = std::regex_replace(drawing, std::regex(R"re( clip-path="[^"]*")re"), "");
+  // Lines that are not to be drawn; some browsers do.
+  drawing = std::regex_replace(
+    drawing, std::regex(R"re(\s*<polyline[^>]*stroke-dasharray="0,10"[^>]*/>)re"), "");
   drawing = std::regex_replace(drawing, std::regex(R"re(\s*<clipPath[^]*?</clipPath>)re"), "");
   const std::regex head(
     R"re(<g transform="matrix\(([^,]*),0,0,([^,]*),([^,]*),([^)]*)\)"[^>]*>)re");
@@ -225,7 +263,9 @@ std::string WithoutTransforms(std::string drawing)
 class Chart
 {
 public:
-  Chart()
+  Chart(const ChartRange& across, const ChartRange& upwards)
+    : Across(across)
+    , Upwards(upwards)
   {
     // Not vtkContextView: that wants an interactor.
     this->Window->OffScreenRenderingOn();
@@ -251,6 +291,7 @@ public:
       axis->GetTitleProperties()->BoldOff();
       axis->GetLabelProperties()->SetFontSize(17);
       axis->GetGridPen()->SetColor(226, 226, 226, 255);
+      SetRange(axis, side == vtkAxis::BOTTOM ? across : upwards);
     }
   }
 
@@ -258,7 +299,7 @@ public:
     const Rgb& colour, double width, bool dashed, bool inLegend)
   {
     vtkPlot* plot = this->Plot->AddPlot(vtkChart::LINE);
-    plot->SetInputData(TableOf(points, name), 0, 1);
+    plot->SetInputData(TableOf(points, name, this->Across, this->Upwards), 0, 1);
     plot->GetPen()->SetColor(colour[0], colour[1], colour[2], 255);
     plot->SetWidth(static_cast<float>(width));
     plot->GetPen()->SetLineType(dashed ? vtkPen::DASH_LINE : vtkPen::SOLID_LINE);
@@ -274,7 +315,7 @@ public:
       return;
     }
     vtkPlot* plot = this->Plot->AddPlot(vtkChart::POINTS);
-    plot->SetInputData(TableOf(points, name), 0, 1);
+    plot->SetInputData(TableOf(points, name, this->Across, this->Upwards), 0, 1);
     plot->GetPen()->SetColor(colour[0], colour[1], colour[2], 255);
     plot->SetWidth(mark == Lost ? 3.0F : 1.0F);
     plot->SetLabel(name);
@@ -314,6 +355,8 @@ public:
     }
   }
 
+  ChartRange Across;
+  ChartRange Upwards;
   vtkNew<vtkRenderWindow> Window;
   vtkNew<vtkRenderer> Renderer;
   vtkNew<vtkContextActor> Actor;
@@ -325,64 +368,83 @@ std::string AxisTitle(const EvaluationColumn& column)
   return *column.unit ? std::string(column.key) + " (" + column.unit + ")" : column.key;
 }
 
+/// One case in a chart.
+struct ChartSeries
+{
+  std::string name;
+  std::vector<std::array<double, 2>> line;
+  std::array<std::vector<std::array<double, 2>>, MarkCount> points;
+};
+
 void DrawPlot(
   const std::vector<CaseEvaluation>& cases, const EvaluationColumn& column, const std::string& stem)
 {
   const bool fractions = FractionsAreKnown(cases);
-  double lowX = std::numeric_limits<double>::infinity();
-  double highX = -lowX;
-  double low = column.best;
-  double high = column.best;
-  std::array<bool, MarkCount> named = { false, false, false };
-  Chart chart;
-  for (std::size_t c = 0; c < cases.size(); ++c)
+  const auto [paper, paperName] = PaperMean(column, cases.size());
+  std::vector<ChartSeries> all;
+  ChartRange across{ std::numeric_limits<double>::infinity(),
+    -std::numeric_limits<double>::infinity() };
+  ChartRange upwards{ column.best, column.best };
+  const auto include = [](ChartRange& range, double value)
   {
-    std::vector<std::array<double, 2>> line;
-    std::array<std::vector<std::array<double, 2>>, MarkCount> points;
-    for (const PhaseEvaluation& phase : cases[c].phases)
+    range.low = std::min(range.low, value);
+    range.high = std::max(range.high, value);
+  };
+  for (const CaseEvaluation& one : cases)
+  {
+    ChartSeries series;
+    series.name = one.name;
+    for (const PhaseEvaluation& phase : one.phases)
     {
       const double value = phase.measures.*(column.value);
       if (std::isfinite(value))
       {
         const double x = fractions ? 100.0 * phase.fraction : phase.phase;
-        line.push_back({ x, value });
-        points[MarkOf(phase)].push_back({ x, value });
-        lowX = std::min(lowX, x);
-        highX = std::max(highX, x);
-        low = std::min(low, value);
-        high = std::max(high, value);
+        series.line.push_back({ x, value });
+        series.points[MarkOf(phase)].push_back({ x, value });
+        include(across, x);
+        include(upwards, value);
       }
     }
-    if (line.empty())
+    std::sort(series.line.begin(), series.line.end());
+    all.push_back(std::move(series));
+  }
+  if (std::isfinite(paper))
+  {
+    include(upwards, paper);
+  }
+  const double marginX = std::max(0.03 * (across.high - across.low), 1e-3);
+  across = { across.low - marginX, across.high + marginX };
+  const double span =
+    std::max(upwards.high - upwards.low, 0.02 * std::max(1.0, std::abs(column.best)));
+  upwards = { column.best == 0.0 ? std::min(0.0, upwards.low) : upwards.low - 0.1 * span,
+    upwards.high + 0.1 * span };
+
+  Chart chart(across, upwards);
+  std::array<bool, MarkCount> named = { false, false, false };
+  for (std::size_t c = 0; c < all.size(); ++c)
+  {
+    const ChartSeries& series = all[c];
+    if (series.line.empty())
     {
       continue;
     }
-    std::sort(line.begin(), line.end());
     const Rgb& colour = CaseColours[c % CaseColours.size()];
-    chart.Line(line, cases[c].name, colour, 1.5, false, cases.size() > 1);
+    chart.Line(series.line, series.name, colour, 1.5, false, all.size() > 1);
     for (int mark = 0; mark < MarkCount; ++mark)
     {
       // What the marks mean is said once.
-      chart.Points(points[mark], MarkName(Mark(mark)), colour, Mark(mark),
-        !points[mark].empty() && !named[mark]);
-      named[mark] = named[mark] || !points[mark].empty();
+      chart.Points(series.points[mark], MarkName(Mark(mark)), colour, Mark(mark), !named[mark]);
+      named[mark] = named[mark] || !series.points[mark].empty();
     }
   }
-  const double marginX = std::max(0.03 * (highX - lowX), 1e-3);
-  const auto [paper, paperName] = PaperMean(column, cases.size());
   if (std::isfinite(paper))
   {
-    low = std::min(low, paper);
-    high = std::max(high, paper);
     char number[32];
     std::snprintf(number, sizeof(number), ": %.2f", paper);
-    chart.Line({ { lowX - marginX, paper }, { highX + marginX, paper } }, paperName + number,
+    chart.Line({ { across.low, paper }, { across.high, paper } }, paperName + number,
       { 60, 60, 60 }, 2.5, true, true);
   }
-  const double span = std::max(high - low, 0.02 * std::max(1.0, std::abs(column.best)));
-  SetRange(chart.Plot->GetAxis(vtkAxis::LEFT),
-    column.best == 0.0 ? std::min(0.0, low) : low - 0.1 * span, high + 0.1 * span);
-  SetRange(chart.Plot->GetAxis(vtkAxis::BOTTOM), lowX - marginX, highX + marginX);
   chart.Plot->GetAxis(vtkAxis::BOTTOM)->SetTitle(fractions ? "% of the R-R interval" : "phase");
   chart.Plot->GetAxis(vtkAxis::LEFT)->SetTitle(AxisTitle(column));
   chart.Write(cases.size() == 1 ? column.key + (", " + cases[0].name) : column.key, stem);

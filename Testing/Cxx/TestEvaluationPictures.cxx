@@ -27,6 +27,7 @@
 #include <functional>
 #include <iterator>
 #include <regex>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -164,6 +165,7 @@ protected:
       phase.measures.hausdorff = 2.0 + 0.1 * k;
       phase.measures.msd = 1.0;
       phase.measures.completenessRatio = 1.0;
+      phase.measures.lengthDetected = 0.999 + 0.0002 * k;
       this->Case.phases.push_back(phase);
     }
     this->Scene.evaluation = &this->Case;
@@ -341,7 +343,7 @@ std::string ReadText(const std::string& path)
 TEST_F(EvaluationPictures, PlotsAreDrawnWhereValuesAre)
 {
   const std::vector<std::string> plots = DrawPlots({ this->Case }, this->Folder);
-  ASSERT_EQ(plots.size(), 3U) << "measures that are known";
+  ASSERT_EQ(plots.size(), 4U) << "measures that are known";
   EXPECT_EQ(plots[0], this->Path("HD.svg"));
   for (const std::string& plot : plots)
   {
@@ -355,45 +357,71 @@ TEST_F(EvaluationPictures, PlotsAreDrawnWhereValuesAre)
     const std::string svg = ReadText(plot);
     EXPECT_EQ(svg.find("matrix"), std::string::npos) << "the data's coordinates";
     EXPECT_EQ(svg.find("clip-path"), std::string::npos);
-    EXPECT_NE(svg.find("stroke-dasharray=\"8\""), std::string::npos) << "the paper's mean";
+    EXPECT_EQ(svg.find("stroke-dasharray=\"8\"") != std::string::npos,
+      plot.find("length") == std::string::npos)
+      << "the paper's mean";
   }
-  // HD is 2.0, 2.1, 2.2, 2.3: discs for the first, diamonds for the second and fourth, a cross; marks in
-  // the legend are of 8 pixels.
-  const std::string svg = ReadText(plots[0]);
-  std::vector<std::array<double, 2>> places;
-  for (const char* mark : { "Circle", "Diamond", "Cross" })
+}
+
+// HD is 2.0, 2.1, 2.2, 2.3, the detected length nearly the same in all: discs for the first, diamonds for the second and
+// fourth, a cross; marks in the legend are of 8 pixels.
+TEST_F(EvaluationPictures, MarksOfPlotsAreWhereTheirValuesAre)
+{
+  DrawPlots({ this->Case }, this->Folder);
+  for (const char* key : { "HD", "length_detected" })
   {
-    const std::regex use(
-      std::string("<use x=\"([^\"]*)\" y=\"([^\"]*)\" width=\"([^\"]*)\" height=\"([^\"]*)\" "
-                  "xlink:href=\"#") +
-      mark + "\"");
-    for (std::sregex_iterator at(svg.begin(), svg.end(), use), end; at != end; ++at)
+    SCOPED_TRACE(key);
+    const std::string svg = ReadText(this->Path(std::string(key) + ".svg"));
+    std::vector<std::array<double, 2>> places;
+    for (const char* mark : { "Circle", "Diamond", "Cross" })
     {
-      const double size = std::stod((*at)[3]);
-      EXPECT_NEAR(size, std::stod((*at)[4]), 1e-6) << "as wide as high";
-      if (size > 9.0)
+      const std::regex use(
+        std::string("<use x=\"([^\"]*)\" y=\"([^\"]*)\" width=\"([^\"]*)\" height=\"([^\"]*)\" "
+                    "xlink:href=\"#") +
+        mark + "\"");
+      for (std::sregex_iterator at(svg.begin(), svg.end(), use), end; at != end; ++at)
       {
-        EXPECT_LT(size, 20.0);
-        places.push_back({ std::stod((*at)[1]) + 0.5 * size, std::stod((*at)[2]) + 0.5 * size });
+        const double size = std::stod((*at)[3]);
+        EXPECT_NEAR(size, std::stod((*at)[4]), 1e-6) << "as wide as high";
+        if (size > 9.0)
+        {
+          EXPECT_LT(size, 20.0);
+          places.push_back({ std::stod((*at)[1]) + 0.5 * size, std::stod((*at)[2]) + 0.5 * size });
+        }
       }
     }
-  }
-  ASSERT_EQ(places.size(), 4U) << "one disc, two diamonds, one cross";
-  std::sort(places.begin(), places.end());
-  // Evenly spaced in both directions, upwards.
-  for (int k = 2; k < 4; ++k)
-  {
-    EXPECT_NEAR(places[k][0] - places[k - 1][0], places[1][0] - places[0][0], 0.1);
-    EXPECT_NEAR(places[k][1] - places[k - 1][1], places[1][1] - places[0][1], 0.1);
-  }
-  EXPECT_LT(places[1][1], places[0][1] - 2.0);
-  // The picture has the marks at the same places.
-  const Picture picture(this->Path("HD.png"));
-  for (int k : { 0, 1, 3 })
-  {
-    const std::array<int, 3> pixel = picture.At(int(places[k][0]), int(places[k][1]));
-    EXPECT_LT(pixel[0], 60) << k;
-    EXPECT_GT(pixel[2], 140) << k;
+    ASSERT_EQ(places.size(), 4U) << "one disc, two diamonds, one cross";
+    std::sort(places.begin(), places.end());
+    // Evenly spaced in both directions, upwards.
+    for (int k = 2; k < 4; ++k)
+    {
+      EXPECT_NEAR(places[k][0] - places[k - 1][0], places[1][0] - places[0][0], 0.1);
+      EXPECT_NEAR(places[k][1] - places[k - 1][1], places[1][1] - places[0][1], 0.1);
+    }
+    // The line goes through the middles of the marks.
+    std::smatch line;
+    ASSERT_TRUE(std::regex_search(
+      svg, line, std::regex("stroke=\"#0072b2\" stroke-width=\"1.5\"[^>]* points=\"([^\"]*)\"")));
+    std::string numbers = line[1];
+    std::replace(numbers.begin(), numbers.end(), ',', ' ');
+    std::istringstream stream(numbers);
+    for (const std::array<double, 2>& place : places)
+    {
+      double x = 0.0;
+      double y = 0.0;
+      ASSERT_TRUE(stream >> x >> y);
+      EXPECT_NEAR(x, place[0], 0.1);
+      EXPECT_NEAR(y, place[1], 0.1);
+    }
+    EXPECT_LT(places[1][1], places[0][1] - 2.0);
+    // The picture has the marks at the same places.
+    const Picture picture(this->Path(std::string(key) + ".png"));
+    for (int k : { 0, 1, 3 })
+    {
+      const std::array<int, 3> pixel = picture.At(int(places[k][0]), int(places[k][1]));
+      EXPECT_LT(pixel[0], 60) << k;
+      EXPECT_GT(pixel[2], 140) << k;
+    }
   }
 }
 
