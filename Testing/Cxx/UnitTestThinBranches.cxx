@@ -89,8 +89,9 @@ struct Scene
     }
     this->image.values = static_cast<const float*>(this->values.data());
     CenterlineTree::Branch branch;
-    for (double z = -15.0; z <= 15.0; z += 0.24)
+    for (int i = 0; i <= 125; ++i)
     {
+      const double z = -15.0 + 0.24 * i;
       branch.points.push_back(static_cast<std::int64_t>(this->trunk.points.size()));
       this->trunk.points.emplace_back(0.0, 0.0, z);
       this->trunk.radius.push_back(TrunkRadius);
@@ -223,10 +224,10 @@ CenterlineTree TreeWithTip(const Scene& scene, double known)
   CenterlineTree::Branch branch;
   branch.groupId = 1;
   branch.parentGroupId = 0;
-  for (double s = 2.0; s <= known; s += 0.24)
+  for (int i = 0; 2.0 + 0.24 * i <= known; ++i)
   {
     branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
-    tree.points.emplace_back(BranchStart + s * direction);
+    tree.points.emplace_back(BranchStart + (2.0 + 0.24 * i) * direction);
     tree.radius.push_back(0.5);
   }
   tree.branches.push_back(branch);
@@ -299,10 +300,10 @@ TEST(ThinBranches, TipsDoNotGoOnIntoAnotherVessel)
   CenterlineTree tree = TreeWithTip(scene, 9.0);
   CenterlineTree::Branch other;
   other.groupId = 2;
-  for (double s = -1.0; s <= 1.0; s += 0.04)
+  for (int i = -25; i <= 25; ++i)
   {
     other.points.push_back(static_cast<std::int64_t>(tree.points.size()));
-    tree.points.emplace_back(BranchEnd + s * across);
+    tree.points.emplace_back(BranchEnd + 0.04 * i * across);
     tree.radius.push_back(1.2);
   }
   tree.branches.push_back(other);
