@@ -140,9 +140,17 @@ private:
   struct Bar
   {
     double least;        ///< contrast to any side, mean of the path
+    double significance; ///< standard errors, mean of the path
     double going;        ///< contrast that speaks neither for going on nor against it
-    double unknown;      ///< taken for the contrast where it can not be seen
-    double significance; ///< standard errors
+    /// The same where the core is this bright: what is beside the vessel changes, not the vessel.
+    double goingBright = 0.0;
+    double bright = std::numeric_limits<double>::infinity();
+    bool unknownGoesOn = false; ///< where the contrast can not be seen
+
+    double Going(const Sample& sample) const
+    {
+      return sample.core >= this->bright ? this->goingBright : this->going;
+    }
   };
   bool Walk(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
     const Bar& bar, std::vector<Sample>& samples) const;
@@ -396,7 +404,7 @@ bool Finder::Walk(Vector3 position, Vector3 direction, std::size_t most, std::si
     Sample sample;
     if (!this->Evidence(position, direction, sample))
     {
-      sample.least = bar.unknown;
+      sample.least = bar.unknownGoesOn ? bar.Going(sample) : 0.0;
     }
     sample.wall = this->Lumen(position).wall;
     if (sample.wall < 0.0 && samples.size() >= ownLumen)
@@ -409,9 +417,9 @@ bool Finder::Walk(Vector3 position, Vector3 direction, std::size_t most, std::si
       double recent = 0.0;
       for (std::size_t i = samples.size() - window; i < samples.size(); ++i)
       {
-        recent += samples[i].least / static_cast<double>(window);
+        recent += (samples[i].least - bar.Going(samples[i])) / static_cast<double>(window);
       }
-      if (recent < bar.going)
+      if (recent < 0.0)
       {
         break;
       }
@@ -432,7 +440,7 @@ bool Finder::Walk(Vector3 position, Vector3 direction, std::size_t most, std::si
   double top = 0.0;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {
-    sum += samples[i].least - bar.going;
+    sum += samples[i].least - bar.Going(samples[i]);
     if (sum > top)
     {
       top = sum;
@@ -453,7 +461,7 @@ bool Finder::IsVessel(
   for (const Sample& sample : samples)
   {
     contrast += sample.least / count;
-    clear += sample.least >= bar.going ? 1 : 0;
+    clear += sample.least >= bar.Going(sample) ? 1 : 0;
   }
   // Samples three voxels apart are independent; four in the core, four in a sector.
   const double independent = std::max(1.0, count * Stride / 3.0);
@@ -498,7 +506,10 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   std::vector<Sample> samples;
   const Vector3 position = this->Centre(spot.position, direction);
   const auto most = static_cast<std::size_t>(this->Settings.maximumLength / step);
-  const Bar bar{ least, 0.5 * least, 0.0, this->Settings.significance };
+  Bar bar;
+  bar.least = least;
+  bar.significance = this->Settings.significance;
+  bar.going = 0.5 * least;
   if (!this->Walk(position, direction, most, 0, bar, samples))
   {
     return false;
@@ -591,27 +602,34 @@ TipPath Finder::FollowTip(const CenterlineTree::Branch& branch) const
   }
   // What the vessel shows before its tip; beyond it goes on like that.
   std::vector<double> contrasts;
+  std::vector<double> cores;
   for (std::size_t i = far; i < near; ++i)
   {
     Sample sample;
     if (this->Evidence(point(i), back.normalized(), sample))
     {
       contrasts.push_back(sample.least);
+      cores.push_back(sample.core);
     }
   }
-  const double least = this->Settings.leastContrast * this->Settings.contrast;
-  double usual = least;
-  if (!contrasts.empty())
+  const auto median = [](std::vector<double>& values)
   {
-    const auto middle = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 2);
-    std::nth_element(contrasts.begin(), middle, contrasts.end());
-    usual = *middle;
-  }
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  const double least = this->Settings.leastContrast * this->Settings.contrast;
+  const double usual = contrasts.empty() ? least : median(contrasts);
   Bar bar;
-  bar.going = std::max(0.25 * least, 0.5 * usual);
-  bar.least = std::max(0.5 * least, 0.6 * usual);
-  bar.unknown = bar.going;
+  bar.least = 0.5 * least;
   bar.significance = 0.5 * this->Settings.significance;
+  bar.going = std::max(0.25 * least, 0.5 * usual);
+  bar.goingBright = std::min(bar.going, 0.5 * least);
+  if (!cores.empty())
+  {
+    bar.bright = median(cores) - 0.5 * usual;
+  }
+  bar.unknownGoesOn = true;
   const Vector3 direction = this->Turn(point(near), back.normalized());
   const double radius = this->Tree.radius[static_cast<std::size_t>(branch.points.back())];
   const auto own = static_cast<std::size_t>((passed(near) + radius) / (Stride * voxel)) + 3;

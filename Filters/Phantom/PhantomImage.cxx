@@ -157,6 +157,8 @@ private:
   std::vector<float> Values;
 };
 
+constexpr float Muscle = 110.0f; // HU, enhanced myocardium
+
 /**
  * The tissues around the vessels as a stack of layers in material coordinates. A shape gives a
  * signed distance (first order) and bounds of it over a ball, so that whole tiles inside or outside
@@ -306,7 +308,7 @@ Tissues::Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy)
   this->Paint(-95.0f, 0.5f, false, { heartFat });
   this->Paint(95.0f, 0.3f, false, { leftAtriumWall });
   this->Paint(90.0f, 0.3f, false, { rightAtriumWall });
-  this->Paint(110.0f, 0.3f, false, { myocardium, basal });
+  this->Paint(Muscle, 0.3f, false, { myocardium, basal });
   this->Paint(60.0f, 0.1f, false, { pulmonaryWall });
   this->Paint(60.0f, 0.1f, false, { descendingWall });
   this->Paint(-95.0f, 0.4f, false, { groove });
@@ -889,6 +891,18 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
               for (; layer < layers.layers.size(); ++layer)
               {
                 PaintRow(tissues, layers.layers[layer], samples, painted);
+              }
+              for (int i = ix0; i <= ix1; ++i)
+              {
+                // Intramural vessels lie in muscle: blood of a chamber gives way.
+                const PhantomLumen::Sample& sample = vessel[i - base[0]];
+                float& value = painted[i - base[0]];
+                if (sample.step >= 0 && value > Muscle &&
+                  this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel])
+                {
+                  const auto d = static_cast<float>(sample.distance);
+                  value += NormalIntegral::Of((2.0f - d) / 0.45f) * (Muscle - value);
+                }
               }
               float* row = &signal[(static_cast<std::size_t>(k - z0) * ny + (j - y0)) * nx];
               if (candidates.Empty() && nearVein.empty() && nearPlaque.empty())
