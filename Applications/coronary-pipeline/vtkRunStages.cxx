@@ -30,12 +30,14 @@
 #include "vtkGatedImageReader.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
+#include "vtkInformationDoubleVectorKey.h"
 #include "vtkMatrix3x3.h"
 #include "vtkMeshSequenceWriter.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkReferencePhase.h"
 #include "vtkSkinDeformation.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkSurfaceCleaner.h"
 #include "vtkTGFWriter.h"
@@ -627,6 +629,14 @@ std::vector<double> Moments(const RunInput& input)
   return times;
 }
 
+std::vector<double> TimeSteps(vtkAlgorithm* algorithm)
+{
+  vtkInformation* info = algorithm->GetOutputInformation(0);
+  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
+  const double* steps = info->Get(key);
+  return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
+}
+
 Json MakeMotion(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
@@ -691,7 +701,8 @@ Json MakeMotion(RunStep& step)
   }
   step.summary = std::to_string(times.size()) + " moments";
   return { { "possible", true }, { "file", "motion.pvd" }, { "series", lists }, { "quality", name },
-    { "times", times }, { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
+    { "times", times }, { "tracked_times", TimeSteps(tracker) },
+    { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
     { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
     { "inverted_tetrahedra", inverted } };
 }
