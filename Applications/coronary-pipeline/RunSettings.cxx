@@ -177,11 +177,12 @@ RunOptions::RunOptions(CLI::App& app, RunSettings& settings)
             vesselness),
     0.0, 1e6)
     .option->capture_default_str();
-  Setting& seed = between(add(group, "--seed", "seed", settings.seeds, "X Y Z",
-                            "A point in a vessel or on its ostium, LPS mm; may be repeated. "
-                            "Without any, aorta and ostia are looked for",
-                            segmentation),
-    -1e5, 1e5);
+  Setting& seed =
+    between(add(group, "--seed", "seed", settings.seeds, "X Y Z",
+              "A point in a vessel or on its ostium, LPS mm; may be repeated. "
+              "Without any, aorta and ostia, or the widest ends of a surface, are looked for",
+              segmentation),
+      -1e5, 1e5);
   seed.option->type_size(3)->expected(1, 100000)->allow_extra_args(false);
   seed.optional = true;
   seed.points = true;

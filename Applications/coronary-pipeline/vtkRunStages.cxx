@@ -64,6 +64,9 @@ using Json = nlohmann::ordered_json;
 /// How far a place on the wall may be from the axis, mm.
 constexpr double SurfaceSnapDistance = 3.0;
 
+/// What is wider than so many times the largest radius of a vessel is none; aneurysms are narrower.
+constexpr double WidestVessel = 2.0;
+
 /// The number of the phase at a time.
 int PhaseAt(vtkGatedImageReader* reader, double time)
 {
@@ -359,10 +362,21 @@ vtkSmartPointer<vtkPolyData> PrepareSurface(
       "'" + settings.input.front() + "' has no surface that could be closed.");
   }
   auto seeds = SeedsOfSurface(surface, settings.seeds);
-  WritePolyData(step.Add("given_surface.vtp"), surface, step.input.Messages);
-  WritePolyData(step.Add("ostia.vtp"), seeds, step.input.Messages);
   centerline->SetInputDataObject(0, surface);
   centerline->SetSnapDistance(SurfaceSnapDistance);
+  if (settings.seeds.empty())
+  {
+    // Which end of its vessels a tree begins at is known when they are.
+    centerline->SetInputDataObject(1, seeds);
+    UpdateAtTime(centerline, 0, 0.0, step.input.Messages,
+      [&](double fraction) { step.progress(0.2 + 0.3 * fraction); });
+    if (centerline->GetOutput()->GetNumberOfCells() > 0)
+    {
+      seeds = WidestEnds(centerline->GetOutput());
+    }
+  }
+  WritePolyData(step.Add("given_surface.vtp"), surface, step.input.Messages);
+  WritePolyData(step.Add("ostia.vtp"), seeds, step.input.Messages);
   numbers["given_surface_file"] = "given_surface.vtp";
   numbers["seeds_file"] = "ostia.vtp";
   numbers["seeds"] = DescribeSeeds(seeds);
@@ -385,6 +399,8 @@ Json MakeCenterline(RunStep& step)
   Json numbers = { { "file", "centerline.vtp" }, { "bifurcations_file", "bifurcations.vtp" },
     { "lines_file", "centerline_lines.vtp" }, { "status_file", "status.csv" } };
   vtkNew<vtkFastMarchingCenterline> centerline;
+  centerline->SetMinimumBranchLength(settings.leastBranch);
+  centerline->SetTimeLimit(settings.centerlineSeconds);
   vtkSmartPointer<vtkPolyData> seeds;
   if (step.input.IsSurface())
   {
@@ -403,14 +419,12 @@ Json MakeCenterline(RunStep& step)
     }
   }
   centerline->SetInputDataObject(1, seeds);
-  centerline->SetMinimumBranchLength(settings.leastBranch);
-  centerline->SetTimeLimit(settings.centerlineSeconds);
   vtkNew<vtkCoronaryTreeTopology> topology;
   topology->SetInputConnection(centerline->GetOutputPort());
   topology->SetRootData(seeds);
   topology->SetLabelSegments(settings.labels);
   UpdateAtTime(centerline, 0, 0.0, step.input.Messages,
-    [&](double fraction) { step.progress(0.2 + 0.7 * fraction); });
+    [&](double fraction) { step.progress(0.5 + 0.4 * fraction); });
   UpdateAtTime(topology, 0, 0.0, step.input.Messages,
     [&](double fraction) { step.progress(0.9 + 0.1 * fraction); });
   vtkPolyData* raw = centerline->GetOutput();
@@ -463,6 +477,30 @@ vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
   return tree;
 }
 
+/// A tree in images that runs into a chamber has no wall that could be swept in finite time.
+void RequireVessels(const RunStep& step, vtkPolyData* tree)
+{
+  vtkDataArray* radii = tree->GetPointData()->GetArray(vtkCoronaryArrayNames::Radius);
+  vtkIdType widest = 0;
+  for (vtkIdType n = 1; n < radii->GetNumberOfTuples(); ++n)
+  {
+    widest = radii->GetTuple1(n) > radii->GetTuple1(widest) ? n : widest;
+  }
+  const double limit = WidestVessel * step.input.Settings.largestRadius;
+  if (radii->GetTuple1(widest) > limit)
+  {
+    double p[3];
+    tree->GetPoint(widest, p);
+    char text[200];
+    std::snprintf(text, sizeof(text),
+      "' has a radius of %.1f mm at (%.1f, %.1f, %.1f), more than twice --largest-radius (%g mm): "
+      "the tree runs into a chamber or a great vessel",
+      radii->GetTuple1(widest), p[0], p[1], p[2], step.input.Settings.largestRadius);
+    throw std::runtime_error("'" + PathOf(step, "centerline.vtp") + text +
+      "; give seeds, a window, larger scales or another --largest-radius.");
+  }
+}
+
 Json MakeSurface(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
@@ -470,6 +508,10 @@ Json MakeSurface(RunStep& step)
   auto caps = vtkSmartPointer<vtkPolyData>::New();
   const bool given = step.input.IsSurface() && settings.surface == "given";
   const auto tree = ReadTree(step);
+  if (!step.input.IsSurface())
+  {
+    RequireVessels(step, tree);
+  }
   if (given)
   {
     surface = ReadLines(step, "given_surface.vtp");

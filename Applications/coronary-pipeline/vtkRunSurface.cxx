@@ -5,9 +5,11 @@
 #include "vtkMessageTrap.h"
 
 #include "vtkCellArray.h"
+#include "vtkCellData.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
+#include "vtkIdList.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
 #include "vtkPoints.h"
@@ -16,16 +18,20 @@
 #include "vtkSTLReader.h"
 #include "vtkStringArray.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <map>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
 namespace
 {
-/// That the highest point is the ostium is a guess.
+/// That a tree begins at its widest end is a guess.
 constexpr double GuessedConfidence = 0.5;
 
 vtkSmartPointer<vtkPolyData> Triangles(const FileMesh& mesh)
@@ -46,6 +52,34 @@ vtkSmartPointer<vtkPolyData> Triangles(const FileMesh& mesh)
   surface->SetPoints(points);
   surface->SetPolys(polys);
   return surface;
+}
+
+/// How much of a vessel an end is, mm: at its very tip it is rounded off.
+constexpr double EndLength = 5.0;
+
+vtkSmartPointer<vtkPolyData> MakeSeeds(
+  const std::vector<std::array<double, 3>>& positions, double confidenceOfAll)
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> vertices;
+  vtkNew<vtkStringArray> names;
+  names->SetName(vtkCoronaryArrayNames::Name);
+  vtkNew<vtkDoubleArray> confidence;
+  confidence->SetName(vtkCoronaryArrayNames::Confidence);
+  for (const auto& position : positions)
+  {
+    const vtkIdType id = points->InsertNextPoint(position.data());
+    vertices->InsertNextCell(1, &id);
+    names->InsertNextValue(std::to_string(id));
+    confidence->InsertNextValue(confidenceOfAll);
+  }
+  auto seeds = vtkSmartPointer<vtkPolyData>::New();
+  seeds->SetPoints(points);
+  seeds->SetVerts(vertices);
+  seeds->GetPointData()->AddArray(names);
+  seeds->GetPointData()->AddArray(confidence);
+  return seeds;
 }
 
 std::vector<std::array<double, 3>> HighestPoints(vtkPolyData* surface)
@@ -123,25 +157,55 @@ vtkSmartPointer<vtkPolyData> SeedsOfSurface(vtkPolyData* surface, const std::vec
   {
     positions = HighestPoints(surface);
   }
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  vtkNew<vtkCellArray> vertices;
-  vtkNew<vtkStringArray> names;
-  names->SetName(vtkCoronaryArrayNames::Name);
-  vtkNew<vtkDoubleArray> confidence;
-  confidence->SetName(vtkCoronaryArrayNames::Confidence);
-  for (const auto& position : positions)
+  return MakeSeeds(positions, given.empty() ? GuessedConfidence : 1.0);
+}
+
+vtkSmartPointer<vtkPolyData> WidestEnds(vtkPolyData* trees)
+{
+  vtkDataArray* radii = trees->GetPointData()->GetArray(vtkCoronaryArrayNames::Radius);
+  vtkDataArray* abscissas = trees->GetPointData()->GetArray(vtkCoronaryArrayNames::Abscissas);
+  vtkDataArray* parents = trees->GetCellData()->GetArray(vtkCoronaryArrayNames::ParentGroupIds);
+  vtkDataArray* groups = trees->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
+  vtkDataArray* treeIds = trees->GetCellData()->GetArray(vtkCoronaryArrayNames::TreeIds);
+  std::set<double> inner;
+  for (vtkIdType cell = 0; cell < trees->GetNumberOfCells(); ++cell)
   {
-    const vtkIdType id = points->InsertNextPoint(position.data());
-    vertices->InsertNextCell(1, &id);
-    names->InsertNextValue(std::to_string(id));
-    confidence->InsertNextValue(given.empty() ? GuessedConfidence : 1.0);
+    inner.insert(parents->GetTuple1(cell));
   }
-  auto seeds = vtkSmartPointer<vtkPolyData>::New();
-  seeds->SetPoints(points);
-  seeds->SetVerts(vertices);
-  seeds->GetPointData()->AddArray(names);
-  seeds->GetPointData()->AddArray(confidence);
-  return seeds;
+  std::map<double, std::pair<double, vtkIdType>> widest; // by tree
+  vtkNew<vtkIdList> ids;
+  const auto offer = [&](vtkIdType cell, bool first)
+  {
+    const vtkIdType count = ids->GetNumberOfIds();
+    const vtkIdType end = ids->GetId(first ? 0 : count - 1);
+    double width = 0.0;
+    for (vtkIdType n = 0; n < count; ++n)
+    {
+      const vtkIdType point = ids->GetId(n);
+      const double away = std::abs(abscissas->GetTuple1(point) - abscissas->GetTuple1(end));
+      width = away <= EndLength ? std::max(width, radii->GetTuple1(point)) : width;
+    }
+    auto& best = widest.emplace(treeIds->GetTuple1(cell), std::pair(width, end)).first->second;
+    best = width > best.first ? std::pair(width, end) : best;
+  };
+  for (vtkIdType cell = 0; cell < trees->GetNumberOfCells(); ++cell)
+  {
+    trees->GetCellPoints(cell, ids);
+    if (parents->GetTuple1(cell) < 0.0)
+    {
+      offer(cell, true);
+    }
+    if (inner.count(groups->GetTuple1(cell)) == 0)
+    {
+      offer(cell, false);
+    }
+  }
+  std::vector<std::array<double, 3>> positions;
+  for (const auto& [tree, best] : widest)
+  {
+    positions.emplace_back();
+    trees->GetPoint(best.second, positions.back().data());
+  }
+  return MakeSeeds(positions, GuessedConfidence);
 }
 }

@@ -19,11 +19,16 @@ namespace coronary
 vtkSmartPointer<vtkPolyData> ReadSurfaceInput(const std::string& path, vtkMessageTrap& messages);
 
 /**
- * The roots of the trees of a surface, as vtkVesselSegmentation gives seeds.
- * @param given  coordinates, three a point; none: the highest point of every component, where coronary arteries
- *   leave the aorta, with a low confidence
+ * Seeds in a surface, as vtkVesselSegmentation gives them.
+ * @param given  coordinates, three a point; none: a point of every component, which is only good to find its vessels
  */
 vtkSmartPointer<vtkPolyData> SeedsOfSurface(vtkPolyData* surface, const std::vector<double>& given);
+
+/**
+ * Of every tree its widest end, where it most probably begins, with a low confidence.
+ * @param trees  as of vtkFastMarchingCenterline, from any seeds
+ */
+vtkSmartPointer<vtkPolyData> WidestEnds(vtkPolyData* trees);
 }
 
 #endif
