@@ -158,6 +158,7 @@ private:
 };
 
 constexpr float Muscle = 110.0f; // HU, enhanced myocardium
+constexpr float Fat = -95.0f;
 
 /**
  * The tissues around the vessels as a stack of layers in material coordinates. A shape gives a
@@ -191,6 +192,14 @@ public:
     double radius2; ///< - | end radius | - | -
     bool heart;     ///< in heart coordinates (else world)
   };
+  /// What a layer is of. Coronary arteries have a coat of fat or muscle that goes over the first two.
+  enum class Content
+  {
+    Tissue,
+    Chamber,
+    GreatVessel
+  };
+
   /// Product of shapes, each possibly its complement, painted with one value.
   struct Layer
   {
@@ -199,7 +208,7 @@ public:
     int count;
     float value;
     float softness; ///< mm, added to the blur: trabeculae, fat septa
-    bool blood;
+    Content content;
   };
 
   Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy);
@@ -223,10 +232,10 @@ private:
     this->Shapes.push_back(shape);
     return static_cast<int>(this->Shapes.size()) - 1;
   }
-  void Paint(float value, float softness, bool blood, std::initializer_list<int> shapes)
+  void Paint(float value, float softness, Content content, std::initializer_list<int> shapes)
   {
     // A negative number -1 - n stands for "not inside shape n".
-    Layer layer{ {}, {}, 0, value, softness, blood };
+    Layer layer{ {}, {}, 0, value, softness, content };
     for (const int shape : shapes)
     {
       layer.complement[layer.count] = shape < 0;
@@ -300,34 +309,34 @@ Tissues::Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy)
 
   const auto no = [](int shape) { return -1 - shape; };
   const auto hu = [](double value) { return static_cast<float>(value); };
-  this->Paint(-95.0f, 1.0f, false, { thorax, no(pleura) });
-  this->Paint(55.0f, 1.0f, false, { thorax, no(pleura), sternum });
-  this->Paint(480.0f, 0.5f, false, { sternum });
-  this->Paint(-90.0f, 1.0f, false, { mediastinum });
-  this->Paint(330.0f, 0.6f, false, { spine });
-  this->Paint(-95.0f, 0.5f, false, { heartFat });
-  this->Paint(95.0f, 0.3f, false, { leftAtriumWall });
-  this->Paint(90.0f, 0.3f, false, { rightAtriumWall });
-  this->Paint(Muscle, 0.3f, false, { myocardium, basal });
-  this->Paint(60.0f, 0.1f, false, { pulmonaryWall });
-  this->Paint(60.0f, 0.1f, false, { descendingWall });
-  this->Paint(-95.0f, 0.4f, false, { groove });
-  this->Paint(60.0f, 0.1f, false, { sinusWall });
-  this->Paint(60.0f, 0.1f, false, { tubularWall });
-  this->Paint(60.0f, 0.1f, false, { ascendingWall });
+  this->Paint(Fat, 1.0f, Content::Tissue, { thorax, no(pleura) });
+  this->Paint(55.0f, 1.0f, Content::Tissue, { thorax, no(pleura), sternum });
+  this->Paint(480.0f, 0.5f, Content::Tissue, { sternum });
+  this->Paint(-90.0f, 1.0f, Content::Tissue, { mediastinum });
+  this->Paint(330.0f, 0.6f, Content::Tissue, { spine });
+  this->Paint(Fat, 0.5f, Content::Tissue, { heartFat });
+  this->Paint(95.0f, 0.3f, Content::Tissue, { leftAtriumWall });
+  this->Paint(90.0f, 0.3f, Content::Tissue, { rightAtriumWall });
+  this->Paint(Muscle, 0.3f, Content::Tissue, { myocardium, basal });
+  this->Paint(60.0f, 0.1f, Content::Tissue, { pulmonaryWall });
+  this->Paint(60.0f, 0.1f, Content::Tissue, { descendingWall });
+  this->Paint(Fat, 0.4f, Content::Tissue, { groove });
+  this->Paint(60.0f, 0.1f, Content::Tissue, { sinusWall });
+  this->Paint(60.0f, 0.1f, Content::Tissue, { tubularWall });
+  this->Paint(60.0f, 0.1f, Content::Tissue, { ascendingWall });
 
   const double left = settings.lumenHU;
-  this->Paint(hu(0.45 * left), 0.3f, true, { rightAtrium, no(groove) });
-  this->Paint(hu(left), 0.3f, true, { leftAtrium, no(groove) });
-  this->Paint(
-    hu(0.48 * left), 0.7f, true, { rightVentricle, no(leftVentricleWall), rightInlet, rightApex });
-  this->Paint(hu(left), 0.7f, true, { leftVentricle });
-  this->Paint(hu(0.6 * left), 0.1f, true, { pulmonary });
-  this->Paint(hu(left), 0.3f, true, { outflow });
-  this->Paint(hu(left + 10.0), 0.1f, true, { sinus });
-  this->Paint(hu(left + 10.0), 0.1f, true, { tubular });
-  this->Paint(hu(left + 10.0), 0.1f, true, { ascending });
-  this->Paint(hu(left), 0.1f, true, { descendingAorta });
+  this->Paint(hu(0.45 * left), 0.3f, Content::Chamber, { rightAtrium, no(groove) });
+  this->Paint(hu(left), 0.3f, Content::Chamber, { leftAtrium, no(groove) });
+  this->Paint(hu(0.48 * left), 0.7f, Content::Chamber,
+    { rightVentricle, no(leftVentricleWall), rightInlet, rightApex });
+  this->Paint(hu(left), 0.7f, Content::Chamber, { leftVentricle });
+  this->Paint(hu(0.6 * left), 0.1f, Content::GreatVessel, { pulmonary });
+  this->Paint(hu(left), 0.3f, Content::GreatVessel, { outflow });
+  this->Paint(hu(left + 10.0), 0.1f, Content::GreatVessel, { sinus });
+  this->Paint(hu(left + 10.0), 0.1f, Content::GreatVessel, { tubular });
+  this->Paint(hu(left + 10.0), 0.1f, Content::GreatVessel, { ascending });
+  this->Paint(hu(left), 0.1f, Content::GreatVessel, { descendingAorta });
 }
 
 double Tissues::Distance(int number, const Vector3& world, const Vector3& heart) const
@@ -467,7 +476,7 @@ struct TileLayers
     int count; ///< 0: covers the whole tile
     float value;
     float inverseBlur;
-    bool blood;
+    Tissues::Content content;
   };
   std::vector<Active> layers;
 };
@@ -480,7 +489,7 @@ void DecideLayers(const Tissues& tissues, const Vector3& world, const Vector3& h
   {
     const double sigma = std::sqrt(blur * blur + layer.softness * layer.softness);
     TileLayers::Active active{ {}, {}, 0, layer.value, static_cast<float>(1.0 / sigma),
-      layer.blood };
+      layer.content };
     bool outside = false;
     for (int i = 0; i < layer.count && !outside; ++i)
     {
@@ -497,7 +506,7 @@ void DecideLayers(const Tissues& tissues, const Vector3& world, const Vector3& h
     {
       continue;
     }
-    if (active.count == 0 && !layer.blood)
+    if (active.count == 0 && layer.content == Tissues::Content::Tissue)
     {
       result.layers.clear(); // hides all below
     }
@@ -866,7 +875,9 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
               float painted[Tissues::Row::Longest];
               std::fill(painted, painted + samples.count, Tissues::Background);
               std::size_t layer = 0;
-              for (; layer < layers.layers.size() && !layers.layers[layer].blood; ++layer)
+              for (; layer < layers.layers.size() &&
+                   layers.layers[layer].content != Tissues::Content::GreatVessel;
+                   ++layer)
               {
                 PaintRow(tissues, layers.layers[layer], samples, painted);
               }
@@ -878,31 +889,26 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
                 {
                   PhantomLumen::Sample& sample = vessel[i - base[0]];
                   sample = lumen.Evaluate(grid.IndexToWorld(i, j, k), candidates);
-                  if (sample.step >= 0 &&
-                    !this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel])
+                  if (sample.step < 0)
                   {
-                    // Epicardial vessels lie in fat.
-                    float& value = painted[i - base[0]];
-                    const auto d = static_cast<float>(sample.distance);
-                    value += NormalIntegral::Of((1.9f - d) / 0.35f) * (-95.0f - value);
+                    continue;
+                  }
+                  // Epicardial vessels lie in fat, intramural ones in muscle: where they touch a chamber, too.
+                  const bool inMuscle =
+                    this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel];
+                  float& value = painted[i - base[0]];
+                  const auto d = static_cast<float>(sample.distance);
+                  if (!inMuscle || value > Muscle)
+                  {
+                    const float coat =
+                      NormalIntegral::Of(inMuscle ? (2.0f - d) / 0.45f : (1.9f - d) / 0.35f);
+                    value += coat * ((inMuscle ? Muscle : Fat) - value);
                   }
                 }
               }
               for (; layer < layers.layers.size(); ++layer)
               {
                 PaintRow(tissues, layers.layers[layer], samples, painted);
-              }
-              for (int i = ix0; i <= ix1; ++i)
-              {
-                // Intramural vessels lie in muscle: blood of a chamber gives way.
-                const PhantomLumen::Sample& sample = vessel[i - base[0]];
-                float& value = painted[i - base[0]];
-                if (sample.step >= 0 && value > Muscle &&
-                  this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel])
-                {
-                  const auto d = static_cast<float>(sample.distance);
-                  value += NormalIntegral::Of((2.0f - d) / 0.45f) * (Muscle - value);
-                }
               }
               float* row = &signal[(static_cast<std::size_t>(k - z0) * ny + (j - y0)) * nx];
               if (candidates.Empty() && nearVein.empty() && nearPlaque.empty())
