@@ -2,16 +2,12 @@
 
 #include "Interruption.h"
 #include "MeshDistance.h"
-#include "MeshFile.h"
 #include "OptionChecks.h"
-#include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
+#include "vtkSurfaceFile.h"
 #include "vtkSurfaceInput.h"
 
-#include "vtkGeometryFilter.h"
-#include "vtkNew.h"
 #include "vtkPolyData.h"
-#include "vtkUnstructuredGrid.h"
 
 #include <nlohmann/json.hpp>
 
@@ -48,7 +44,7 @@ private:
 
 void MetricsJob::Declare(CLI::App& app)
 {
-  app.add_option("A", this->result, "The result: a surface, .vtp, .vtu, .obj, .off or .mesh")
+  app.add_option("A", this->result, std::string("The result: a surface, ") + SurfaceFileKinds)
     ->type_name("FILE")
     ->required();
   app.add_option("B", this->reference, "The reference, of the same kinds")
@@ -81,32 +77,13 @@ void MetricsJob::Declare(CLI::App& app)
 
 SurfaceMesh MetricsJob::Read(const std::string& path, vtkMessageTrap& messages) const
 {
-  SurfaceMesh mesh;
-  if (IsMeshFile(path))
-  {
-    FileMesh file = ReadMeshFile(path);
-    mesh.points = std::move(file.points);
-    mesh.triangles = std::move(file.triangles);
-  }
-  else if (EndsWith(path, ".vtp"))
-  {
-    mesh = vtkCoronary::SurfaceOf(
-      vtkCoronary::TrianglesOf(ReadPolyData(path, messages)), this->groups, this->caps);
-  }
-  else if (EndsWith(path, ".vtu"))
-  {
-    vtkNew<vtkGeometryFilter> boundary;
-    boundary->SetInputData(ReadUnstructuredGrid(path, messages));
-    boundary->Update();
-    messages.ThrowIfError();
-    mesh = vtkCoronary::SurfaceOf(
-      vtkCoronary::TrianglesOf(boundary->GetOutput()), this->groups, this->caps);
-  }
-  else
+  if (!IsSurfaceFile(path))
   {
     throw UsageError(
-      "a surface must end in .vtp, .vtu, .obj, .off or .mesh, '" + path + "' does not");
+      std::string("a surface must end in ") + SurfaceFileKinds + ", '" + path + "' does not");
   }
+  SurfaceMesh mesh = vtkCoronary::SurfaceOf(
+    vtkCoronary::TrianglesOf(ReadSurface(path, messages)), this->groups, this->caps);
   if (mesh.triangles.empty())
   {
     throw std::runtime_error("'" + path + "' has no triangles.");

@@ -139,7 +139,7 @@ RunOptions::RunOptions(CLI::App& app, RunSettings& settings)
 
   add("", "PATH,--input", "input", settings.input, "PATH",
     "A folder of DICOM files, a series.json, a 4-D volume, or one volume a phase; or a closed "
-    "surface (.vtp, .obj, .off, .stl)",
+    "surface: .vtp, .vtu, .obj, .off, .mesh, .stl or .ply",
     none);
   add("", "--output", "output", settings.output, "DIR",
     "Folder to write to; made when it does not exist", none);

@@ -12,6 +12,7 @@
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
 #include "vtkRunSurface.h"
+#include "vtkSurfaceFile.h"
 
 #include "vtkBiharmonicSkinWeights.h"
 #include "vtkCardiacPhaseInterpolator.h"
@@ -352,7 +353,7 @@ vtkSmartPointer<vtkPolyData> PrepareSurface(
 {
   const RunSettings& settings = step.input.Settings;
   vtkNew<vtkSurfaceCleaner> cleaner;
-  cleaner->SetInputData(ReadSurfaceInput(settings.input.front(), step.input.Messages));
+  cleaner->SetInputData(ReadSurface(settings.input.front(), step.input.Messages));
   UpdateAtTime(
     cleaner, 0, 0.0, step.input.Messages, [&](double fraction) { step.progress(0.2 * fraction); });
   vtkPolyData* surface = cleaner->GetOutput();
@@ -750,17 +751,11 @@ Json MakeMotion(RunStep& step)
 }
 }
 
-bool IsSurfaceInput(const std::string& path)
-{
-  return EndsWith(path, ".vtp") || EndsWith(path, ".obj") || EndsWith(path, ".off") ||
-    EndsWith(path, ".stl");
-}
-
 RunInput::RunInput(const RunSettings& settings, vtkMessageTrap& messages)
   : Settings(settings)
   , Messages(messages)
 {
-  const auto surfaces = std::count_if(settings.input.begin(), settings.input.end(), IsSurfaceInput);
+  const auto surfaces = std::count_if(settings.input.begin(), settings.input.end(), IsSurfaceFile);
   if (surfaces > 0)
   {
     if (settings.input.size() > 1)

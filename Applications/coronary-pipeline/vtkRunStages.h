@@ -28,9 +28,6 @@ namespace coronary
 {
 class StagedFolder;
 
-/// Whether a path is that of a surface that `run` starts from: .vtp, .obj, .off or .stl.
-bool IsSurfaceInput(const std::string& path);
-
 /// What the stages work on.
 class RunInput
 {

@@ -1,9 +1,5 @@
 #include "vtkRunSurface.h"
 
-#include "MeshFile.h"
-#include "vtkDataFiles.h"
-#include "vtkMessageTrap.h"
-
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkCoronaryArrayNames.h"
@@ -15,13 +11,11 @@
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkPolyDataConnectivityFilter.h"
-#include "vtkSTLReader.h"
 #include "vtkStringArray.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -33,26 +27,6 @@ namespace
 {
 /// That a tree begins at its widest end is a guess.
 constexpr double GuessedConfidence = 0.5;
-
-vtkSmartPointer<vtkPolyData> Triangles(const FileMesh& mesh)
-{
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (const Vector3& point : mesh.points)
-  {
-    points->InsertNextPoint(point.data());
-  }
-  vtkNew<vtkCellArray> polys;
-  for (const Triangle& triangle : mesh.triangles)
-  {
-    const vtkIdType ids[3] = { triangle[0], triangle[1], triangle[2] };
-    polys->InsertNextCell(3, ids);
-  }
-  auto surface = vtkSmartPointer<vtkPolyData>::New();
-  surface->SetPoints(points);
-  surface->SetPolys(polys);
-  return surface;
-}
 
 /// How much of a vessel an end is, mm: at its very tip it is rounded off.
 constexpr double EndLength = 5.0;
@@ -107,43 +81,6 @@ std::vector<std::array<double, 3>> HighestPoints(vtkPolyData* surface)
   }
   return points;
 }
-}
-
-vtkSmartPointer<vtkPolyData> ReadSurfaceInput(const std::string& path, vtkMessageTrap& messages)
-{
-  vtkSmartPointer<vtkPolyData> surface;
-  if (EndsWith(path, ".vtp"))
-  {
-    surface = ReadPolyData(path, messages);
-  }
-  else if (EndsWith(path, ".stl"))
-  {
-    if (!std::ifstream(path))
-    {
-      throw std::runtime_error("Cannot open '" + path + "'.");
-    }
-    vtkNew<vtkSTLReader> reader;
-    reader->SetFileName(path.c_str());
-    reader->Update();
-    try
-    {
-      messages.ThrowIfError();
-    }
-    catch (const std::exception& error)
-    {
-      throw std::runtime_error("Cannot read '" + path + "': " + error.what());
-    }
-    surface = reader->GetOutput();
-  }
-  else
-  {
-    surface = Triangles(ReadMeshFile(path));
-  }
-  if (surface->GetNumberOfPolys() == 0 && surface->GetNumberOfStrips() == 0)
-  {
-    throw std::runtime_error("'" + path + "' has no triangles: it is no surface.");
-  }
-  return surface;
 }
 
 vtkSmartPointer<vtkPolyData> SeedsOfSurface(vtkPolyData* surface, const std::vector<double>& given)

@@ -1,23 +1,18 @@
 /**
  * @file vtkRunSurface.h
- * @brief Surfaces that `run` starts from: read, made fit, and with the places where their trees begin.
+ * @brief Surfaces that `run` starts from: made fit, and with the places where their trees begin.
  */
 #ifndef vtkRunSurface_h
 #define vtkRunSurface_h
 
 #include "vtkSmartPointer.h"
 
-#include <string>
 #include <vector>
 
-class vtkMessageTrap;
 class vtkPolyData;
 
 namespace coronary
 {
-/// Reads a .vtp, .obj, .off or .stl file. @throws std::runtime_error naming the file
-vtkSmartPointer<vtkPolyData> ReadSurfaceInput(const std::string& path, vtkMessageTrap& messages);
-
 /**
  * Seeds in a surface, as vtkVesselSegmentation gives them.
  * @param given  coordinates, three a point; none: a point of every component, which is only good to find its vessels

@@ -66,8 +66,13 @@ check_metrics() {
   grep -Eq '^HD +0\.00000$' stdout || fail "the same as .obj: $(cat stdout)"
 
   run 2 metrics $a
-  run 2 metrics $a b.stl
-  expect_one_line "coronary-pipeline metrics" "'b.stl' does not"
+  printf 'solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n' >one.stl
+  printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n' >two.ply
+  printf 'element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 2\n1 0 2\n0 1 2\n3 0 1 2\n' >>two.ply
+  run 0 metrics one.stl two.ply
+  grep -Eq '^HD +2\.00000$' stdout || fail "not 2 mm apart: $(cat stdout)"
+  run 2 metrics $a b.txt
+  expect_one_line "coronary-pipeline metrics" "'b.txt' does not"
   run 1 metrics $a nowhere.vtp
   expect_one_line "coronary-pipeline metrics" "nowhere.vtp"
   printf 'v 0 0 0\n' >empty.obj

@@ -1,0 +1,105 @@
+#include "vtkSurfaceFile.h"
+
+#include "MeshFile.h"
+#include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
+
+#include "vtkCellArray.h"
+#include "vtkGeometryFilter.h"
+#include "vtkNew.h"
+#include "vtkPLYReader.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkSTLReader.h"
+#include "vtkUnstructuredGrid.h"
+
+#include <algorithm>
+#include <fstream>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+vtkSmartPointer<vtkPolyData> Triangles(const FileMesh& mesh)
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const Vector3& point : mesh.points)
+  {
+    points->InsertNextPoint(point.data());
+  }
+  vtkNew<vtkCellArray> polys;
+  for (const Triangle& triangle : mesh.triangles)
+  {
+    const vtkIdType ids[3] = { triangle[0], triangle[1], triangle[2] };
+    polys->InsertNextCell(3, ids);
+  }
+  auto surface = vtkSmartPointer<vtkPolyData>::New();
+  surface->SetPoints(points);
+  surface->SetPolys(polys);
+  return surface;
+}
+
+template <typename Reader>
+vtkSmartPointer<vtkPolyData> ReadWith(const std::string& path, vtkMessageTrap& messages)
+{
+  if (!std::ifstream(path))
+  {
+    throw std::runtime_error("Cannot open '" + path + "'.");
+  }
+  vtkNew<Reader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  try
+  {
+    messages.ThrowIfError();
+  }
+  catch (const std::exception& error)
+  {
+    throw std::runtime_error("Cannot read '" + path + "': " + error.what());
+  }
+  return reader->GetOutput();
+}
+}
+
+bool IsSurfaceFile(const std::string& path)
+{
+  const auto ends = [&](const char* end) { return EndsWith(path, end); };
+  return IsMeshFile(path) || ends(".vtp") || ends(".vtu") || ends(".stl") || ends(".ply");
+}
+
+vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& path, vtkMessageTrap& messages)
+{
+  vtkSmartPointer<vtkPolyData> surface;
+  if (EndsWith(path, ".vtp"))
+  {
+    surface = ReadPolyData(path, messages);
+  }
+  else if (EndsWith(path, ".vtu"))
+  {
+    vtkNew<vtkGeometryFilter> boundary;
+    boundary->SetInputData(ReadUnstructuredGrid(path, messages));
+    boundary->Update();
+    messages.ThrowIfError();
+    surface = boundary->GetOutput();
+  }
+  else if (EndsWith(path, ".stl"))
+  {
+    surface = ReadWith<vtkSTLReader>(path, messages);
+  }
+  else if (EndsWith(path, ".ply"))
+  {
+    surface = ReadWith<vtkPLYReader>(path, messages);
+  }
+  else
+  {
+    surface = Triangles(ReadMeshFile(path));
+  }
+  if (surface->GetNumberOfPolys() == 0 && surface->GetNumberOfStrips() == 0)
+  {
+    throw std::runtime_error("'" + path + "' has no triangles: it is no surface.");
+  }
+  return surface;
+}
+}
