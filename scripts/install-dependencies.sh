@@ -27,8 +27,8 @@ paraview=(
 # VTK 9.1 itself can not be installed beside python3-paraview: scripts/vtk-prefix.sh unpacks it
 # into a folder of its own, and these are what its libraries load.
 vtk=(
-  libtbb-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libopenmpi3 libpng16-16
-  libtiff6 patchelf
+  libtbb-dev libjsoncpp-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libopenmpi3
+  libpng16-16 libtiff6 patchelf
 )
 developer=(clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev)
 
