@@ -10,6 +10,7 @@ Usage: scripts/validate.sh [--build DIR] [--output DIR] [--list] [TABLE ...]
   --output DIR  where the tables go, one Markdown file each (default: validation-output)
   --list        name the tables with their commands, run nothing
 Without TABLE all of them, which takes an hour or so. Times are worth something on a quiet machine only.
+Table 1 of the paper on ten phantoms: scripts/validate-evaluation.sh.
 Exit code 1 when a program fails or a target is missed.
 EOF
 }
