@@ -26,6 +26,7 @@ tables=(
   "segmentation: validate-segmentation"
   "centerline-speed: centerline-benchmark --strict"
   "centerline: validate-centerline --details --invariance"
+  "centerline-coarse: validate-centerline --seeds 205..214 --spacing 0.6"
   "surface: validate-surface"
   "volume: validate-volume"
   "skin-weights: skin-weight-benchmark --sizes 0 1 2 5 3 4"

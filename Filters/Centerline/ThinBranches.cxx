@@ -139,9 +139,9 @@ private:
   /// What a path must show.
   struct Bar
   {
-    double least;        ///< contrast to any side, mean of the path
-    double significance; ///< standard errors, mean of the path
-    double going;        ///< contrast that speaks neither for going on nor against it
+    double least = 0.0;        ///< contrast to any side, mean of the path
+    double significance = 0.0; ///< standard errors, mean of the path
+    double going = 0.0;        ///< contrast that speaks neither for going on nor against it
     /// The same where the core is this bright: what is beside the vessel changes, not the vessel.
     double goingBright = 0.0;
     double bright = std::numeric_limits<double>::infinity();
