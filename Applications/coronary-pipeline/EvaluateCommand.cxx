@@ -1,6 +1,7 @@
 #include "Command.h"
 
 #include "AtomicFile.h"
+#include "DistanceOptions.h"
 #include "Evaluation.h"
 #include "EvaluationReport.h"
 #include "Interruption.h"
@@ -13,6 +14,7 @@
 #include "vtkEvaluationPictures.h"
 #include "vtkEvaluationPlots.h"
 #include "vtkMessageTrap.h"
+#include "vtkSurfaceFile.h"
 #include "vtkSurfaceInput.h"
 
 #include "vtkCellData.h"
@@ -47,9 +49,7 @@ struct EvaluateJob
   std::vector<std::string> names;
   std::string output;
   std::string untracked = "auto"; ///< "auto", "odd" or "none"
-  bool clipEnds = false;
-  double endLength = 3.0;
-  double errorBound = 1e-3;
+  MeshDistanceSettings distance;
   double timeTolerance = 1e-3;
   bool noPictures = false;
   int threads = 0;
@@ -112,20 +112,7 @@ void EvaluateJob::Declare(CLI::App& app)
       "Phases that were not tracked: auto (as the result's report says, else odd), odd or none")
     ->check(CLI::IsMember({ "auto", "odd", "none" }))
     ->capture_default_str();
-  app.add_flag("--clip-ends", this->clipEnds,
-    "Leave out caps, and on both surfaces what lies beyond an end of either one");
-  app
-    .add_option(
-      "--end-length", this->endLength, "How far beyond an end something still belongs to it, in mm")
-    ->check(Within(1e-9, 1e6))
-    ->type_name("MM")
-    ->capture_default_str();
-  app
-    .add_option(
-      "--error-bound", this->errorBound, "What the Hausdorff distance may be too small by, in mm")
-    ->check(Within(1e-9, 1e6))
-    ->type_name("MM")
-    ->capture_default_str();
+  AddDistanceOptions(app, this->distance);
   app
     .add_option("--time-tolerance", this->timeTolerance,
       "How far apart two times may be to be one phase, R-R")
@@ -229,19 +216,6 @@ EvaluateJob::CaseFiles EvaluateJob::FindCase(std::size_t number) const
   return files;
 }
 
-SurfaceMesh ReadSurface(
-  const std::string& path, vtkMessageTrap& messages, vtkSmartPointer<vtkPolyData>& data)
-{
-  data = vtkCoronary::TrianglesOf(ReadPolyData(path, messages));
-  SurfaceMesh mesh = vtkCoronary::SurfaceOf(
-    data, vtkCoronaryArrayNames::GroupIds, vtkCoronaryArrayNames::CellEntityIds);
-  if (mesh.triangles.empty())
-  {
-    throw std::runtime_error("'" + path + "' has no triangles.");
-  }
-  return mesh;
-}
-
 /// The tree of a phase: its centerline, or what the surface knows of its branches.
 BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* side,
   vtkMessageTrap& messages, std::map<std::int64_t, std::string>* labels)
@@ -283,7 +257,6 @@ nlohmann::ordered_json JsonOf(const EvaluationMeasures& measures)
 nlohmann::ordered_json JsonOf(const std::vector<CaseEvaluation>& cases)
 {
   nlohmann::ordered_json all;
-  std::vector<EvaluationMeasures> means;
   all["cases"] = nlohmann::ordered_json::array();
   for (const CaseEvaluation& one : cases)
   {
@@ -302,15 +275,11 @@ nlohmann::ordered_json JsonOf(const std::vector<CaseEvaluation>& cases)
       const MeasureSummary summary = SummarizePhases(one, interpolated);
       entry[kind + "_mean"] = JsonOf(summary.mean);
       entry[kind + "_deviation"] = JsonOf(summary.deviation);
-      if (interpolated && summary.count > 0)
-      {
-        means.push_back(summary.mean);
-      }
     }
     entry["warnings"] = one.warnings;
     all["cases"].push_back(entry);
   }
-  const MeasureSummary over = Summarize(means);
+  const MeasureSummary over = SummarizeCases(cases);
   all["mean"] = JsonOf(over.mean);
   all["deviation"] = JsonOf(over.deviation);
   return all;
@@ -321,9 +290,7 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
   const std::function<void(double)>& progress) const
 {
   EvaluationSettings settings;
-  settings.distance.errorBound = this->errorBound;
-  settings.distance.clipEnds = this->clipEnds;
-  settings.distance.endLength = this->endLength;
+  settings.distance = this->distance;
   settings.distance.signedDistances = false;
   std::vector<std::string>& warnings = files.evaluation.warnings;
   for (PhaseFiles& one : files.phases)
@@ -332,12 +299,17 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
     begin(one);
     settings.distance.names = { "'" + one.model + "'", "'" + one.truth + "'" };
     EvaluationInput input;
-    vtkSmartPointer<vtkPolyData> model;
-    vtkSmartPointer<vtkPolyData> truth;
-    input.model = ReadSurface(one.model, messages, model);
-    input.truth = ReadSurface(one.truth, messages, truth);
-    input.modelTree = ReadTree(one.modelLines, model, "result", messages, nullptr);
-    input.truthTree = ReadTree(one.truthLines, truth, "reference", messages, &input.labels);
+    const auto read = [&](const std::string& path)
+    {
+      return ReadTriangles(
+        path, vtkCoronaryArrayNames::GroupIds, vtkCoronaryArrayNames::CellEntityIds, messages);
+    };
+    SurfaceTriangles model = read(one.model);
+    SurfaceTriangles truth = read(one.truth);
+    input.model = std::move(model.mesh);
+    input.truth = std::move(truth.mesh);
+    input.modelTree = ReadTree(one.modelLines, model.data, "result", messages, nullptr);
+    input.truthTree = ReadTree(one.truthLines, truth.data, "reference", messages, &input.labels);
     EvaluatePhase(input, settings, one.phase, warnings,
       [&](double fraction)
       {
@@ -412,10 +384,11 @@ void EvaluateJob::WriteReport(const std::vector<CaseEvaluation>& evaluations,
   }
   report.settings.emplace_back("Interpolated phases", this->untracked);
   report.settings.emplace_back(
-    "Hausdorff distance at most too small by", Format(this->errorBound) + " mm");
+    "Hausdorff distance at most too small by", Format(this->distance.errorBound) + " mm");
   report.settings.emplace_back("Ends of vessels",
-    this->clipEnds ? "left out, up to " + Format(this->endLength) + " mm beyond the end"
-                   : "compared as they are");
+    this->distance.clipEnds
+      ? "left out, up to " + Format(this->distance.endLength) + " mm beyond the end"
+      : "compared as they are");
   report.settings.emplace_back("Program", "coronary-pipeline " DYNAMICCORONARY_VERSION);
   report.cases = evaluations;
   report.illustrations = std::move(illustrations);

@@ -260,18 +260,15 @@ std::string PartB(const std::vector<CaseEvaluation>& cases)
     html += "<th scope=\"col\">" + Heading(*column) + "</th>";
   }
   html += "</tr></thead>\n<tbody>\n";
-  std::vector<EvaluationMeasures> means;
   for (const CaseEvaluation& one : cases)
   {
-    const MeasureSummary summary = SummarizePhases(one, true);
-    means.push_back(summary.mean);
-    html +=
-      "<tr><td>" + Escaped(one.name) + "</td>" + MeanAndDeviation(summary, columns) + "</tr>\n";
+    html += "<tr><td>" + Escaped(one.name) + "</td>" +
+      MeanAndDeviation(SummarizePhases(one, true), columns) + "</tr>\n";
   }
   if (cases.size() > 1)
   {
     html += "<tr class=\"sum\"><td>Mean of the cases</td>" +
-      MeanAndDeviation(Summarize(means), columns) + "</tr>\n";
+      MeanAndDeviation(SummarizeCases(cases), columns) + "</tr>\n";
   }
   html += "</tbody></table></div>\n"
           "<div class=\"scroll\"><table class=\"paper-table\">\n"
@@ -314,15 +311,8 @@ std::string PartA(const CaseEvaluation& one)
   html += "</tr></thead>\n<tbody>\n";
   for (const PhaseEvaluation& phase : one.phases)
   {
-    const char* kind = phase.lost ? "lost" : (phase.interpolated ? "interpolated" : "tracked");
-    EvaluationMeasures paper;
-    for (const PhaseEvaluation& known : PaperPartA().phases)
-    {
-      if (known.phase == phase.phase)
-      {
-        paper = known.measures;
-      }
-    }
+    const char* kind = KindOf(phase);
+    const EvaluationMeasures paper = PaperMeasuresOf(phase);
     html += std::string("<tr class=\"") + kind + "\"><td>" + std::to_string(phase.phase) +
       "</td><td>" + Number(100.0 * phase.fraction, 1) + "</td><td class=\"text\">" + kind +
       "</td>" + Cells(phase.measures, columns) + Cells(paper, paperColumns, " class=\"paper\"", 2) +

@@ -1,13 +1,10 @@
 #include "Command.h"
 
+#include "DistanceOptions.h"
 #include "Interruption.h"
 #include "MeshDistance.h"
-#include "OptionChecks.h"
 #include "vtkMessageTrap.h"
 #include "vtkSurfaceFile.h"
-#include "vtkSurfaceInput.h"
-
-#include "vtkPolyData.h"
 
 #include <nlohmann/json.hpp>
 
@@ -29,9 +26,7 @@ struct MetricsJob
   std::string result;
   std::string reference;
   bool json = false;
-  bool clipEnds = false;
-  double endLength = 3.0;
-  double errorBound = 1e-3;
+  MeshDistanceSettings distance;
   std::string groups = "GroupIds";
   std::string caps = "CellEntityIds";
 
@@ -51,20 +46,7 @@ void MetricsJob::Declare(CLI::App& app)
     ->type_name("FILE")
     ->required();
   app.add_flag("--json", this->json, "Print JSON instead of a table");
-  app
-    .add_option(
-      "--error-bound", this->errorBound, "What the Hausdorff distance may be too small by, in mm")
-    ->check(Within(1e-9, 1e6))
-    ->type_name("MM")
-    ->capture_default_str();
-  app.add_flag("--clip-ends", this->clipEnds,
-    "Leave out caps, and on both surfaces what lies beyond an end of either one");
-  app
-    .add_option(
-      "--end-length", this->endLength, "How far beyond an end something still belongs to it, in mm")
-    ->check(Within(1e-9, 1e6))
-    ->type_name("MM")
-    ->capture_default_str();
+  AddDistanceOptions(app, this->distance);
   app
     .add_option(
       "--groups", this->groups, "Point or cell array with the branches of a .vtp or .vtu file")
@@ -82,13 +64,7 @@ SurfaceMesh MetricsJob::Read(const std::string& path, vtkMessageTrap& messages) 
     throw UsageError(
       std::string("a surface must end in ") + SurfaceFileKinds + ", '" + path + "' does not");
   }
-  SurfaceMesh mesh = vtkCoronary::SurfaceOf(
-    vtkCoronary::TrianglesOf(ReadSurface(path, messages)), this->groups, this->caps);
-  if (mesh.triangles.empty())
-  {
-    throw std::runtime_error("'" + path + "' has no triangles.");
-  }
-  return mesh;
+  return ReadTriangles(path, this->groups, this->caps, messages).mesh;
 }
 
 std::vector<std::pair<const char*, double>> Measures(const MeshDistance& d)
@@ -157,10 +133,7 @@ void MetricsJob::Run() const
   vtkMessageTrap messages;
   const SurfaceMesh a = this->Read(this->result, messages);
   const SurfaceMesh b = this->Read(this->reference, messages);
-  MeshDistanceSettings settings;
-  settings.errorBound = this->errorBound;
-  settings.clipEnds = this->clipEnds;
-  settings.endLength = this->endLength;
+  MeshDistanceSettings settings = this->distance;
   settings.signedDistances = false;
   settings.names = { "'" + this->result + "'", "'" + this->reference + "'" };
   const auto begin = std::chrono::steady_clock::now();

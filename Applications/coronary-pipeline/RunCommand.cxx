@@ -85,7 +85,7 @@ std::vector<RunStage> RunJob::Plan(const RunInput& input, RunReport& report) con
       {
         next = static_cast<RunStage>(static_cast<int>(next) + 1);
       }
-      std::fprintf(stderr, "%s from stage %s on: %s\n", "made anew",
+      std::fprintf(stderr, "made anew from stage %s on: %s\n",
         RunStageNames()[static_cast<std::size_t>(next)].c_str(), reason.c_str());
     }
   }

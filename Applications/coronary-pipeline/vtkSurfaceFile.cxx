@@ -3,17 +3,16 @@
 #include "MeshFile.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
+#include "vtkSurfaceInput.h"
 
 #include "vtkCellArray.h"
 #include "vtkGeometryFilter.h"
 #include "vtkNew.h"
 #include "vtkPLYReader.h"
 #include "vtkPoints.h"
-#include "vtkPolyData.h"
 #include "vtkSTLReader.h"
 #include "vtkUnstructuredGrid.h"
 
-#include <algorithm>
 #include <fstream>
 #include <stdexcept>
 
@@ -99,6 +98,19 @@ vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& path, vtkMessageTrap
   if (surface->GetNumberOfPolys() == 0 && surface->GetNumberOfStrips() == 0)
   {
     throw std::runtime_error("'" + path + "' has no triangles: it is no surface.");
+  }
+  return surface;
+}
+
+SurfaceTriangles ReadTriangles(const std::string& path, const std::string& groups,
+  const std::string& caps, vtkMessageTrap& messages)
+{
+  SurfaceTriangles surface;
+  surface.data = vtkCoronary::TrianglesOf(ReadSurface(path, messages));
+  surface.mesh = vtkCoronary::SurfaceOf(surface.data, groups, caps);
+  if (surface.mesh.triangles.empty())
+  {
+    throw std::runtime_error("'" + path + "' has no triangles.");
   }
   return surface;
 }

@@ -5,12 +5,14 @@
 #ifndef vtkSurfaceFile_h
 #define vtkSurfaceFile_h
 
+#include "MeshDistance.h"
+
+#include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
 
 #include <string>
 
 class vtkMessageTrap;
-class vtkPolyData;
 
 namespace coronary
 {
@@ -25,6 +27,22 @@ bool IsSurfaceFile(const std::string& path);
  * @throws std::runtime_error naming the file, also if it has no polygons
  */
 vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& path, vtkMessageTrap& messages);
+
+/// A surface to be compared, and where its arrays are.
+struct SurfaceTriangles
+{
+  vtkSmartPointer<vtkPolyData> data; ///< triangles
+  SurfaceMesh mesh;
+};
+
+/**
+ * The same in triangles.
+ * @param groups  point or cell array with the branches
+ * @param caps    cell array whose values above 1 are caps
+ * @throws as ReadSurface; std::invalid_argument naming an array that does not fit
+ */
+SurfaceTriangles ReadTriangles(const std::string& path, const std::string& groups,
+  const std::string& caps, vtkMessageTrap& messages);
 }
 
 #endif

@@ -139,11 +139,6 @@ std::string Tex(const std::string& text)
   return escaped;
 }
 
-const char* KindOf(const PhaseEvaluation& phase)
-{
-  return phase.interpolated ? "interpolated" : phase.lost ? "lost" : "tracked";
-}
-
 void AddCsvRow(std::string& table, const std::string& part, const std::string& name,
   const std::string& phase, const std::string& fraction, const std::string& kind,
   const EvaluationMeasures& measures)
@@ -154,20 +149,6 @@ void AddCsvRow(std::string& table, const std::string& part, const std::string& n
     table += "," + Number(measures.*column.value, 6);
   }
   table += "\n";
-}
-
-std::vector<EvaluationMeasures> InterpolatedMeans(const std::vector<CaseEvaluation>& cases)
-{
-  std::vector<EvaluationMeasures> means;
-  for (const CaseEvaluation& one : cases)
-  {
-    const MeasureSummary summary = SummarizePhases(one, true);
-    if (summary.count > 0)
-    {
-      means.push_back(summary.mean);
-    }
-  }
-  return means;
 }
 
 /// The four measures of the paper.
@@ -382,6 +363,37 @@ MeasureSummary SummarizePhases(const CaseEvaluation& one, bool interpolated)
   return Summarize(list);
 }
 
+MeasureSummary SummarizeCases(const std::vector<CaseEvaluation>& cases)
+{
+  std::vector<EvaluationMeasures> means;
+  for (const CaseEvaluation& one : cases)
+  {
+    const MeasureSummary summary = SummarizePhases(one, true);
+    if (summary.count > 0)
+    {
+      means.push_back(summary.mean);
+    }
+  }
+  return Summarize(means);
+}
+
+const char* KindOf(const PhaseEvaluation& phase)
+{
+  return phase.lost ? "lost" : phase.interpolated ? "interpolated" : "tracked";
+}
+
+EvaluationMeasures PaperMeasuresOf(const PhaseEvaluation& phase)
+{
+  for (const PhaseEvaluation& known : PaperPartA().phases)
+  {
+    if (known.phase == phase.phase && phase.interpolated)
+    {
+      return known.measures;
+    }
+  }
+  return {};
+}
+
 const CaseEvaluation& PaperPartA()
 {
   static const CaseEvaluation part = []
@@ -456,7 +468,6 @@ std::string EvaluationCsv(const std::vector<CaseEvaluation>& cases)
       }
     }
   }
-  const std::vector<EvaluationMeasures> means = InterpolatedMeans(cases);
   for (const CaseEvaluation& one : cases)
   {
     const MeasureSummary summary = SummarizePhases(one, true);
@@ -465,7 +476,7 @@ std::string EvaluationCsv(const std::vector<CaseEvaluation>& cases)
       AddCsvRow(table, "B", one.name, "", "", "interpolated", summary.mean);
     }
   }
-  const MeasureSummary all = Summarize(means);
+  const MeasureSummary all = SummarizeCases(cases);
   AddCsvRow(table, "B", "all", "mean", "", "interpolated", all.mean);
   AddCsvRow(table, "B", "all", "deviation", "", "interpolated", all.deviation);
   return table;
@@ -508,14 +519,7 @@ std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases)
       head;
     for (const PhaseEvaluation& phase : one.phases)
     {
-      EvaluationMeasures paper;
-      for (const PhaseEvaluation& known : PaperPartA().phases)
-      {
-        if (known.phase == phase.phase && phase.interpolated)
-        {
-          paper = known.measures;
-        }
-      }
+      const EvaluationMeasures paper = PaperMeasuresOf(phase);
       char first[64];
       std::snprintf(first, sizeof(first), "%02d & %s & %s", phase.phase,
         Number(100.0 * phase.fraction, 1).c_str(), KindOf(phase));
@@ -543,7 +547,7 @@ std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases)
   {
     text += Tex(one.name) + TexCells(SummarizePhases(one, true).mean) + " \\\\\n";
   }
-  const MeasureSummary all = Summarize(InterpolatedMeans(cases));
+  const MeasureSummary all = SummarizeCases(cases);
   const MeasureSummary& paperB = PaperSummaryB();
   text += head + "Mean" + TexCells(all.mean) + " \\\\\nSTD" + TexCells(all.deviation) +
     " \\\\\n\\hline\nPaper, mean of five" + TexCells(paperB.mean) + " \\\\\nPaper, STD" +
@@ -560,14 +564,7 @@ std::string EvaluationText(const std::vector<CaseEvaluation>& cases)
     text += "Table 1, Part A: " + one.name + "\n" + TextHead("phase");
     for (const PhaseEvaluation& phase : one.phases)
     {
-      EvaluationMeasures paper;
-      for (const PhaseEvaluation& known : PaperPartA().phases)
-      {
-        if (known.phase == phase.phase && phase.interpolated)
-        {
-          paper = known.measures;
-        }
-      }
+      const EvaluationMeasures paper = PaperMeasuresOf(phase);
       char name[64];
       std::snprintf(name, sizeof(name), "%02d %6s %%  %s", phase.phase,
         Number(100.0 * phase.fraction, 1).c_str(), KindOf(phase));
@@ -587,8 +584,8 @@ std::string EvaluationText(const std::vector<CaseEvaluation>& cases)
     }
     text += "\n";
   }
-  const std::vector<EvaluationMeasures> means = InterpolatedMeans(cases);
-  if (means.empty())
+  const MeasureSummary all = SummarizeCases(cases);
+  if (all.count == 0)
   {
     return text + "No phase is interpolated: there is no Part B.\n";
   }
@@ -599,7 +596,6 @@ std::string EvaluationText(const std::vector<CaseEvaluation>& cases)
     text += TextRow(cases[n].name, SummarizePhases(cases[n], true).mean,
       n < paper.size() ? paper[n].mean : EvaluationMeasures());
   }
-  const MeasureSummary all = Summarize(means);
   const MeasureSummary& paperB = PaperSummaryB();
   return text + TextRow("mean", all.mean, paperB.mean) +
     TextRow("deviation", all.deviation, paperB.deviation);

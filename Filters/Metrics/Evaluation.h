@@ -122,8 +122,17 @@ MeasureSummary Summarize(const std::vector<EvaluationMeasures>& list);
 /// Of the phases that are interpolated, or tracked.
 MeasureSummary SummarizePhases(const CaseEvaluation& one, bool interpolated);
 
+/// Over the cases, of their means over the interpolated phases: the last row of Part B.
+MeasureSummary SummarizeCases(const std::vector<CaseEvaluation>& cases);
+
+/// "interpolated", "tracked" or "lost".
+const char* KindOf(const PhaseEvaluation& phase);
+
 /// The paper's Table 1: HD, MSD, BCR and BCS only. Phases of Part A have no fractions there: NaN.
 const CaseEvaluation& PaperPartA();
+
+/// What the paper has for an interpolated phase of the same number; else NaN.
+EvaluationMeasures PaperMeasuresOf(const PhaseEvaluation& phase);
 
 /// Name and means over the interpolated phases of its five cases.
 struct PaperCase
