@@ -1,0 +1,67 @@
+/**
+ * @file Instrument.h
+ * @brief Guidewires and guide catheters as their mechanics.
+ */
+#ifndef DynamicCoronary_Instrument_h
+#define DynamicCoronary_Instrument_h
+
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// A piece of a guidewire, counted from its tip.
+struct WireSection
+{
+  double length = 0.0;             ///< mm, positive
+  double bendingStiffness1 = 0.0;  ///< EI about the first transverse axis, N mm^2, positive
+  double bendingStiffness2 = 0.0;  ///< EI about the second transverse axis, N mm^2, positive
+  double torsionalStiffness = 0.0; ///< GJ, N mm^2, positive
+  double axialStiffness = 0.0;     ///< EA, N, positive
+  double radius = 0.0;             ///< mm, positive
+  double density = 0.0;            ///< kg/m^3, positive
+  double friction = 0.0;           ///< coefficient against the vessel's wall, 0 to 2
+  double restCurvature = 0.0; ///< of the shape at rest, 1/mm, in the plane of all curved sections
+};
+
+/// A guidewire. Stiffness goes linearly from the middle of one section to that of the next one.
+struct Guidewire
+{
+  std::string name;
+  std::string source;                ///< where its values are from
+  double length = 1800.0;            ///< mm
+  std::vector<WireSection> sections; ///< from the tip; the last one goes on to the wire's end
+
+  /// @throws std::invalid_argument naming the wire, the section and the property
+  void Validate() const;
+};
+
+/// A piece of a guide catheter's shape, counted from its tip.
+struct CatheterArc
+{
+  double length = 0.0;    ///< mm, positive
+  double curvature = 0.0; ///< 1/mm; 0: straight
+  double planeAngle =
+    0.0; ///< radians by which the plane of curvature is turned against the first one
+};
+
+/// A guide catheter. Proximal of its last arc it is straight.
+struct GuideCatheter
+{
+  std::string name;
+  std::string source;
+  double innerRadius = 0.0;       ///< mm, positive
+  double outerRadius = 0.0;       ///< mm, greater than innerRadius
+  double length = 1000.0;         ///< mm
+  double friction = 0.0;          ///< coefficient of a wire against its inside, 0 to 2
+  std::vector<CatheterArc> shape; ///< from the tip
+
+  /// Angle by which the catheter turns in all from its tip to `behind` mm behind it, radians.
+  double TurnedAngle(double behind) const;
+
+  /// @throws std::invalid_argument naming the catheter and the property
+  void Validate() const;
+};
+}
+
+#endif

@@ -1,0 +1,111 @@
+/**
+ * @file Intervention.h
+ * @brief A guidewire, driven from outside through a guide catheter, in the beating coronary arteries.
+ */
+#ifndef DynamicCoronary_Intervention_h
+#define DynamicCoronary_Intervention_h
+
+#include "Geometry.h"
+#include "Instrument.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+class WallMotion;
+
+/// What hands do, in one tick: where the proximal ends of the instruments are.
+struct DriveInput
+{
+  double wirePosition = 0.0; ///< mm advanced since the start
+  double wireAngle = 0.0;    ///< radians turned since the start, right-handed about the way forward
+  double catheterPosition =
+    0.0;                      ///< mm the catheter's tip is advanced into the vessel since the start
+  double catheterAngle = 0.0; ///< radians
+};
+
+struct InterventionSettings
+{
+  double tickRate = 2000.0;     ///< Hz, 500 to 20000
+  int ticksPerFrame = 33;       ///< between key frames of the wall: 60.6 Hz at 2 kHz
+  double heartRate = 75.0;      ///< beats a minute, 0 (pause) to 240
+  double startPhase = 0.0;      ///< fraction of the R-R interval
+  double segmentLength = 1.5;   ///< mm of the simulated wire, 0.5 to 4
+  int capacity = 140;           ///< simulated segments at most, 20 to 1000
+  double insideCatheter = 12.0; ///< mm of the wire that are simulated inside the catheter
+  int rootBranch = -1;       ///< branch of WallTopology whose ostium is engaged; -1: the first root
+  double engagement = 3.0;   ///< mm from the ostium to the catheter's tip along the vessel
+  double wallFriction = 1.0; ///< factor on the wire's friction against the wall, 0 to 10
+  double wallStiffness = 20.0; ///< N/mm of a sample's contact
+  double drag = 0.025;         ///< Pa s: of blood, per length, across and along the wire
+  double largestSpeed = 300.0; ///< mm/s by which hands can advance; more is clamped, with a message
+  double largestTurning = 30.0; ///< rad/s, likewise
+
+  /// @throws std::invalid_argument naming the setting
+  void Validate() const;
+};
+
+/// Of one tick.
+struct TickReport
+{
+  std::uint64_t tick = 0;
+  double phase = 0.0;              ///< fraction of the R-R interval, 0 to 1
+  double inserted = 0.0;           ///< mm of the wire beyond the catheter's tip
+  double proximalForce = 0.0;      ///< N, against advancing
+  double proximalTorque = 0.0;     ///< N mm, against turning
+  double tipForce = 0.0;           ///< N between the wire's last 3 mm and the wall
+  double greatestForce = 0.0;      ///< N of a sample's contact
+  int contacts = 0;                ///< samples that press on the wall
+  double largestPenetration = 0.0; ///< mm into the wall
+  double meanPenetration = 0.0;    ///< mm, over the samples that touch
+  double jointGap = 0.0;           ///< mm, greatest
+  int outside = 0; ///< samples whose centre was outside of the lumen and was put back
+  int branch = -1; ///< group of the wall next to the wire's tip; -1 in the catheter
+};
+
+/**
+ * Runs at a fixed step, on one thread, and allocates nothing after the first ticks. The same binary,
+ * model and input give the same bits.
+ */
+class Intervention
+{
+public:
+  /// @throws std::invalid_argument naming what is wrong: instruments, settings, an instrument that does not fit
+  /// into the vessel or the other one
+  Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wire,
+    const GuideCatheter& catheter, const InterventionSettings& settings = {});
+  ~Intervention();
+  Intervention(Intervention&&) noexcept;
+  Intervention& operator=(Intervention&&) noexcept;
+
+  /// One step of 1 / tickRate. Impossible input (not finite, too fast) is clamped, with a message.
+  const TickReport& Step(const DriveInput& input);
+
+  const TickReport& Report() const;
+
+  void SetHeartRate(double beatsPerMinute); ///< 0: the heart stands still
+
+  std::int64_t NumberOfSegments() const; ///< simulated now
+  /// Ends of the simulated segments from the tip (first) to inside the catheter, one more than segments, mm.
+  const std::vector<Vector3>& Centerline() const;
+  /// The catheter from its tip back, mm.
+  const std::vector<Vector3>& CatheterLine() const;
+  /// The wall now, mm.
+  const std::vector<Vector3>& WallPoints() const;
+
+  /// FNV-1a over the bits of all that decides how it goes on.
+  std::uint64_t StateHash() const;
+
+  /// What was clamped or reset since the last call, one sentence each, every kind at most once a second.
+  std::vector<std::string> TakeMessages();
+
+private:
+  struct Internals;
+  std::unique_ptr<Internals> Data;
+};
+}
+
+#endif
