@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -478,7 +479,7 @@ void CosseratRod::AssembleBodies(double seconds)
   }
 }
 
-void CosseratRod::AssembleJoints(double seconds)
+void CosseratRod::AssembleJoints(double seconds, bool exact)
 {
   const std::int64_t joints = this->Size() - 1;
   for (std::int64_t j = 0; j < joints; ++j)
@@ -506,11 +507,29 @@ void CosseratRod::AssembleJoints(double seconds)
     bend.noalias() = state.map.transpose() * weighted;
     const Vector3 turn = state.map.transpose() * moment;
 
-    // The change of D x force with the segment's own turn, where it holds the segment up (under tension):
-    // where it pushes it over, leaving it out keeps the matrix positive definite.
+    // How force and moment of the joint change their arms with the turns of the segments. Where that makes the
+    // matrix indefinite (something is about to buckle) only what holds the segments up is kept.
     const Vector3& pull = state.force;
-    const double ga = std::max(0.0, pull.dot(da));
-    const double gb = std::max(0.0, -pull.dot(db));
+    Matrix3 levelA;
+    Matrix3 levelB;
+    Matrix3 twist = Matrix3::Zero();
+    if (exact)
+    {
+      const Matrix3 armA = 0.5 * da * pull.transpose();
+      const Matrix3 armB = -0.5 * db * pull.transpose();
+      levelA = -armA - armA.transpose();
+      levelA.diagonal().array() += pull.dot(da);
+      levelB = -armB - armB.transpose();
+      levelB.diagonal().array() -= pull.dot(db);
+      twist = 0.5 * Cross(turn);
+    }
+    else
+    {
+      const double ga = std::max(0.0, pull.dot(da));
+      const double gb = std::max(0.0, -pull.dot(db));
+      levelA = ga * (Matrix3::Identity() - a.axis * a.axis.transpose());
+      levelB = gb * (Matrix3::Identity() - b.axis * b.axis.transpose());
+    }
 
     const Matrix3 crossA = k * Cross(da);
     const Matrix3 crossB = k * Cross(db);
@@ -520,9 +539,8 @@ void CosseratRod::AssembleJoints(double seconds)
       a.matrix.diagonal().head<3>().array() += k;
       a.matrix.topRightCorner<3, 3>() -= crossA;
       a.matrix.bottomLeftCorner<3, 3>() += crossA;
-      a.matrix.bottomRightCorner<3, 3>() +=
-        bend - k * da * da.transpose() - ga * a.axis * a.axis.transpose();
-      a.matrix.diagonal().tail<3>().array() += k * da.squaredNorm() + ga;
+      a.matrix.bottomRightCorner<3, 3>() += bend + levelA - k * da * da.transpose();
+      a.matrix.diagonal().tail<3>().array() += k * da.squaredNorm();
       a.right.head<3>() += force;
       a.right.tail<3>() += da.cross(force) + turn;
     }
@@ -531,9 +549,8 @@ void CosseratRod::AssembleJoints(double seconds)
       b.matrix.diagonal().head<3>().array() += k;
       b.matrix.topRightCorner<3, 3>() -= crossB;
       b.matrix.bottomLeftCorner<3, 3>() += crossB;
-      b.matrix.bottomRightCorner<3, 3>() +=
-        bend - k * db * db.transpose() - gb * b.axis * b.axis.transpose();
-      b.matrix.diagonal().tail<3>().array() += k * db.squaredNorm() + gb;
+      b.matrix.bottomRightCorner<3, 3>() += bend + levelB - k * db * db.transpose();
+      b.matrix.diagonal().tail<3>().array() += k * db.squaredNorm();
       b.right.head<3>() -= force;
       b.right.tail<3>() -= db.cross(force) + turn;
     }
@@ -547,7 +564,7 @@ void CosseratRod::AssembleJoints(double seconds)
       a.coupling.topRightCorner<3, 3>() = crossB;
       a.coupling.bottomLeftCorner<3, 3>() = -crossA;
       // [da][db] = db da' - (da.db) I
-      a.coupling.bottomRightCorner<3, 3>() = k * db * da.transpose() - bend;
+      a.coupling.bottomRightCorner<3, 3>() = k * db * da.transpose() - bend + twist;
       a.coupling.diagonal().tail<3>().array() -= k * da.dot(db);
     }
   }
@@ -616,7 +633,7 @@ void CosseratRod::AssembleContacts(bool first)
   }
 }
 
-void CosseratRod::Solve()
+bool CosseratRod::Solve()
 {
   // Block Cholesky factorization; `matrix` becomes the triangular factor L, `coupling` L^-1 of itself.
   const std::int64_t count = this->Size();
@@ -635,6 +652,10 @@ void CosseratRod::Solve()
         {
           column[r] -= factor * other[r];
         }
+      }
+      if (!(column[c] > 0.0))
+      {
+        return false;
       }
       const double inverse = 1.0 / std::sqrt(column[c]);
       for (int r = c; r < 6; ++r)
@@ -693,24 +714,29 @@ void CosseratRod::Solve()
       x[c] *= column[c];
     }
   }
+  return true;
 }
 
 double CosseratRod::Update(double& scale)
 {
   double move = 0.0;
   double turn = 0.0;
+  double sum = 0.0; // of all: a maximum passes over what is not a number
   for (const Body& body : this->Bodies)
   {
-    move = std::max(move, body.right.head<3>().squaredNorm());
-    turn = std::max(turn, body.right.tail<3>().squaredNorm());
+    const double moved = body.right.head<3>().squaredNorm();
+    const double turned = body.right.tail<3>().squaredNorm();
+    move = std::max(move, moved);
+    turn = std::max(turn, turned);
+    sum += moved + turned;
+  }
+  if (!std::isfinite(sum))
+  {
+    return std::numeric_limits<double>::infinity();
   }
   move = std::sqrt(move);
   turn = std::sqrt(turn);
   const double largest = std::max(move, 2.0 * turn);
-  if (!std::isfinite(largest))
-  {
-    return largest;
-  }
   scale = largest > this->Settings.largestMove ? this->Settings.largestMove / largest : 1.0;
   for (std::int64_t j = 0; j + 1 < this->Size(); ++j)
   {
@@ -845,12 +871,22 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
   }
   for (int iteration = 0; iteration < this->Settings.iterations; ++iteration)
   {
-    this->AssembleBodies(seconds);
-    this->AssembleJoints(seconds);
-    this->AssembleContacts(iteration == 0);
-    this->Solve();
+    bool solved = false;
+    for (const bool exact : { true, false })
+    {
+      this->AssembleBodies(seconds);
+      this->AssembleJoints(seconds, exact);
+      this->AssembleContacts(iteration == 0);
+      solved = this->Solve();
+      if (solved)
+      {
+        break;
+      }
+      ++this->Last.indefinite;
+    }
     double scale = 1.0;
-    this->Last.largestUpdate = this->Update(scale);
+    this->Last.largestUpdate =
+      solved ? this->Update(scale) : std::numeric_limits<double>::infinity();
     if (!std::isfinite(this->Last.largestUpdate))
     {
       this->Last.finite = false;

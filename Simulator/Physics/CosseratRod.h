@@ -69,6 +69,7 @@ struct RodStep
   double meanPenetration = 0.0;    ///< mm, over all contacts with a force
   int touching = 0;                ///< contacts with a force
   double largestUpdate = 0.0;      ///< mm, of the last iteration
+  int indefinite = 0;              ///< iterations whose exact matrix was not positive definite
   double frictionWork = 0.0;       ///< N mm that friction took away in this step
   double wallWork = 0.0;           ///< N mm that the moving wall did on the rod in this step
   bool finite = true;              ///< false: the step failed, and the rod is as it was before
@@ -249,9 +250,9 @@ private:
   void Predict(double seconds);
   void FindContacts(double seconds, ContactSurface& surface);
   void AssembleBodies(double seconds);
-  void AssembleJoints(double seconds);
+  void AssembleJoints(double seconds, bool exact);
   void AssembleContacts(bool first);
-  void Solve();
+  bool Solve(); ///< false: the matrix is not positive definite
   double Update(double& scale);
   void Finish(double seconds);
   void Restore();
