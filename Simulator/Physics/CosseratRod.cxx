@@ -380,6 +380,10 @@ void CosseratRod::Predict(double seconds)
           RotationOf((share / length) * body.axis.cross(difference)) * body.orientation;
       }
     }
+    if (this->Settings.mediumFollowsWalls)
+    {
+      body.medium = this->Carried[i] / seconds;
+    }
     body.position += share * this->Carried[i];
     body.axis = body.orientation * Vector3::UnitZ();
   }
@@ -871,6 +875,10 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
   }
   for (int iteration = 0; iteration < this->Settings.iterations; ++iteration)
   {
+    if (surface && iteration > 0 && this->Last.largestUpdate > 0.05)
+    {
+      this->FindContacts(seconds, *surface); // planes do not follow a bent wall far
+    }
     bool solved = false;
     for (const bool exact : { true, false })
     {

@@ -83,7 +83,9 @@ struct RodSettings
   double softness = 0.02;          ///< mm: distance over which a contact comes into force, positive
   double frictionStiffness = 20.0; ///< N/mm of a contact that sticks, positive
   double largestMove = 0.4;        ///< mm and, for turns, half as many rad: limit of an iteration
-  int samples = 2;       ///< of a segment that are asked for contacts, 1 to 4, evenly spread
+  int samples = 2; ///< of a segment that are asked for contacts, 1 to 4, evenly spread
+  bool mediumFollowsWalls =
+    false;               ///< the medium moves as the walls around it, not as SetMedium says
   bool tipSample = true; ///< and the free end of the first segment
 
   /// @throws std::invalid_argument naming the setting
