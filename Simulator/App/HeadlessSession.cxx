@@ -35,6 +35,7 @@ using Json = nlohmann::json;
 
 constexpr std::uint64_t ForceInterval = 40;        // ticks between recorded forces: 50 Hz at 2 kHz
 constexpr std::uint64_t InterruptionInterval = 64; // ticks between looks at signals
+constexpr std::uint64_t MostPrinted = 50; // messages on the console; statistics.json has more
 
 std::string Hexadecimal(std::uint64_t value)
 {
