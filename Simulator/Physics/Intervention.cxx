@@ -1,0 +1,806 @@
+#include "Intervention.h"
+
+#include "CatheterPath.h"
+#include "CosseratRod.h"
+#include "VesselWall.h"
+#include "WallMotion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr double ShortTip = 12.0; // mm from the tip on which segments are half as long
+constexpr double StartInside =
+  2.0; // mm of the catheter between its tip and the wire's, at the beginning
+constexpr int LeastSegments = 4;
+constexpr double CatheterReach = 10.0; // mm into the vessel
+
+void RequireWithin(double value, double low, double high, const char* name)
+{
+  if (!(value >= low && value <= high))
+  {
+    char text[160];
+    std::snprintf(text, sizeof(text), "%s must be within %g .. %g, not %g", name, low, high, value);
+    throw std::invalid_argument(text);
+  }
+}
+
+/// A wire's property at a distance from its tip: linear from the middle of one section to that of the next.
+template <typename Property>
+double AlongWire(const Guidewire& wire, double distance, Property property)
+{
+  double from = 0.0;
+  double lastMiddle = 0.0;
+  double lastValue = 0.0;
+  for (std::size_t i = 0; i < wire.sections.size(); ++i)
+  {
+    const WireSection& section = wire.sections[i];
+    const double middle = from + 0.5 * section.length;
+    const double value = property(section);
+    if (distance < middle)
+    {
+      if (i == 0)
+      {
+        return value;
+      }
+      const double share = (distance - lastMiddle) / (middle - lastMiddle);
+      return (1.0 - share) * lastValue + share * value;
+    }
+    from += section.length;
+    lastMiddle = middle;
+    lastValue = value;
+  }
+  return lastValue;
+}
+
+/// Curvature at rest is that of the section, all along it.
+double RestCurvature(const Guidewire& wire, double distance)
+{
+  double from = 0.0;
+  for (const WireSection& section : wire.sections)
+  {
+    from += section.length;
+    if (distance < from)
+    {
+      return section.restCurvature;
+    }
+  }
+  return 0.0;
+}
+
+std::uint64_t HashValue(std::uint64_t hash, double value)
+{
+  std::uint64_t bits;
+  std::memcpy(&bits, &value, sizeof(bits));
+  for (int byte = 0; byte < 8; ++byte)
+  {
+    hash = (hash ^ ((bits >> (8 * byte)) & 0xff)) * 0x100000001b3ULL;
+  }
+  return hash;
+}
+
+enum class Notice : int
+{
+  NotFinite = 0,
+  TooFast,
+  TurnedTooFast,
+  CatheterLimit,
+  WireAtTip,
+  WireAtEnd,
+  Reset,
+  PutBack,
+  Count
+};
+
+const char* const NoticeText[] = { "the input is not finite: the instruments are held",
+  "the wire is driven faster than hands can: its speed is limited",
+  "the wire is turned faster than hands can: its speed is limited",
+  "the catheter is at the end of its way", "the wire is drawn back to the end of its way",
+  "no more of the wire can be simulated: it is advanced no further",
+  "the wire's equations could not be solved: it is set back to where it was last sane",
+  "the wire left the lumen and was put back" };
+}
+
+void InterventionSettings::Validate() const
+{
+  RequireWithin(this->tickRate, 500.0, 20000.0, "tickRate");
+  RequireWithin(this->ticksPerFrame, 1, 1000, "ticksPerFrame");
+  RequireWithin(this->heartRate, 0.0, 240.0, "heartRate");
+  RequireWithin(this->startPhase, -10.0, 10.0, "startPhase");
+  RequireWithin(this->segmentLength, 0.5, 4.0, "segmentLength");
+  RequireWithin(this->capacity, 20, 1000, "capacity");
+  RequireWithin(this->insideCatheter, 5.0, 100.0, "insideCatheter");
+  RequireWithin(this->rootBranch, -1, 1e6, "rootBranch");
+  RequireWithin(this->engagement, 0.5, CatheterReach, "engagement");
+  RequireWithin(this->wallFriction, 0.0, 10.0, "wallFriction");
+  RequireWithin(this->wallStiffness, 0.1, 1000.0, "wallStiffness");
+  RequireWithin(this->drag, 0.0, 10.0, "drag");
+  RequireWithin(this->largestSpeed, 1.0, 2000.0, "largestSpeed");
+  RequireWithin(this->largestTurning, 1.0, 1000.0, "largestTurning");
+}
+
+struct Intervention::Internals : ContactSurface
+{
+  std::shared_ptr<WallMotion> Motion;
+  Guidewire Wire;
+  GuideCatheter Catheter;
+  InterventionSettings Settings;
+
+  double Step = 0.0; // s
+  std::uint64_t Tick = 0;
+  double Phase = 0.0;
+  double FrameSeconds = 0.0;
+  int TickInFrame = 0;
+  int Root = 0;
+  std::size_t RootFirst = 0; // of the axis' points
+  std::size_t RootCount = 0;
+  std::int64_t InletTriangle = -1;
+  std::vector<Vector3> NextPoints;
+  std::vector<Vector3> Axis;
+  std::vector<Vector3> RootAxis;
+
+  std::unique_ptr<VesselWall> Wall;
+  std::unique_ptr<CatheterPath> Path;
+  std::unique_ptr<CosseratRod> Rod;
+
+  // All segments that there can be, from the tip.
+  std::vector<RodSegment> Segments;
+  std::vector<RodJoint> Joints;
+  std::vector<double> Places; // of their centres from the tip, mm
+  std::vector<char> InVessel; // per sample
+
+  double Fed = 0.0; // mm, where the tip would be on the straightened way: its u without bends
+  double StartFed = 0.0;
+  double HandPosition = 0.0; // as accepted
+  double HandAngle = 0.0;
+  double Roll = 0.0;        // of the segment that is held, rad
+  double CatheterTip = 0.0; // u
+  double CatheterAngle = 0.0;
+  double HandSpeed = 0.0;
+  double Torque = 0.0; // N mm, of the last step
+
+  struct Sane
+  {
+    std::vector<Vector3> position;
+    std::vector<Eigen::Quaterniond> orientation;
+    std::vector<Vector3> offset; // from the wall's place that it is nearest to
+    double fed = 0.0;
+    double roll = 0.0;
+  };
+  Sane Last;
+
+  TickReport Report;
+  std::vector<Vector3> Line;
+  std::vector<Vector3> CatheterPoints;
+  std::array<std::uint64_t, static_cast<int>(Notice::Count)> NoticeTick{};
+  std::vector<std::string> Messages;
+
+  void Say(Notice notice)
+  {
+    std::uint64_t& last = this->NoticeTick[static_cast<int>(notice)];
+    if (last == 0 || this->Tick - last >= static_cast<std::uint64_t>(this->Settings.tickRate))
+    {
+      last = this->Tick;
+      char text[192];
+      std::snprintf(text, sizeof(text), "%.3f s: %s", static_cast<double>(this->Tick) * this->Step,
+        NoticeText[static_cast<int>(notice)]);
+      if (this->Messages.size() < 1000)
+      {
+        this->Messages.emplace_back(text);
+      }
+    }
+  }
+
+  void Find(const ContactSample& sample, double reach, SampleContacts& contacts) override
+  {
+    const int perSegment = this->Rod->SamplesPerSegment();
+    const std::int64_t segment = sample.index / perSegment;
+    const double expected = this->Fed - this->Places[segment];
+    char& inVessel = this->InVessel[sample.index];
+    contacts.count = 0;
+    if (expected < this->CatheterTip + 15.0)
+    {
+      const double u = this->Path->Nearest(
+        sample.centre, expected - 6.0, std::min(expected + 6.0, this->CatheterTip));
+      if (u < this->CatheterTip - 1e-9)
+      {
+        if (inVessel)
+        {
+          inVessel = 0;
+          this->Wall->Forget(sample.index);
+        }
+        const PathPlace place = this->Path->At(u);
+        Vector3 across = sample.centre - place.position;
+        across -= place.tangent * place.tangent.dot(across);
+        const double distance = across.norm();
+        const double gap = this->Catheter.innerRadius - sample.radius - distance;
+        if (gap < reach && distance > 1e-9)
+        {
+          contacts.count = 1;
+          ContactPlane& plane = contacts.plane[0];
+          plane = ContactPlane();
+          plane.normal = across / -distance;
+          plane.gap = gap;
+          plane.wallVelocity = place.velocity;
+          plane.friction = this->Catheter.friction;
+          plane.stiffness = this->Settings.wallStiffness;
+        }
+        return;
+      }
+    }
+    if (!inVessel)
+    {
+      inVessel = 1;
+      // What comes out of the catheter is in the vessel that the wire before it is in.
+      const std::int64_t before = sample.index - perSegment;
+      if (before < 0 || !this->InVessel[before] || !this->Wall->PlaceBeside(sample.index, before))
+      {
+        this->Wall->Place(sample.index, this->InletTriangle);
+      }
+    }
+    this->Wall->Find(sample, reach, contacts);
+  }
+
+  void MakeSegments();
+  void Engage(const std::vector<Vector3>& points);
+  Eigen::Quaterniond HeldOrientation(const PathPlace& place) const;
+  void AppendSegment();
+  void PlaceOnPath();
+  void BeginFrame();
+  void Drive(const DriveInput& input);
+  void Feed();
+  void PutBack();
+  void Reset();
+  void KeepSane();
+  void Measure();
+};
+
+void Intervention::Internals::MakeSegments()
+{
+  const double whole = this->Settings.segmentLength;
+  double from = 0.0;
+  for (int i = 0; i < this->Settings.capacity; ++i)
+  {
+    const double length = from < ShortTip ? 0.5 * whole : whole;
+    const double middle = from + 0.5 * length;
+    const auto value = [&](double at, auto property)
+    { return AlongWire(this->Wire, at, property); };
+    RodSegment segment =
+      MakeRodSegment(length, value(middle, [](const WireSection& s) { return s.radius; }),
+        value(middle, [](const WireSection& s) { return s.density; }));
+    segment.friction = value(middle, [](const WireSection& s) { return s.friction; });
+    // 1 Pa s = 1e-6 N s/mm^2
+    segment.drag = this->Settings.drag * 1e-6 * length;
+    // A cylinder that spins in a fluid: 4 pi eta r^2 per length; eta is about a sixth of the drag.
+    segment.rotationalDrag = 2.0 * segment.drag * segment.radius * segment.radius;
+    this->Segments.push_back(segment);
+    this->Places.push_back(middle);
+    RodJoint joint;
+    if (i > 0)
+    {
+      const double distance = middle - this->Places[i - 1];
+      joint.angularStiffness =
+        Vector3(value(from, [](const WireSection& s) { return s.bendingStiffness1; }),
+          value(from, [](const WireSection& s) { return s.bendingStiffness2; }),
+          value(from, [](const WireSection& s) { return s.torsionalStiffness; })) /
+        distance;
+      joint.stretchStiffness =
+        value(from, [](const WireSection& s) { return s.axialStiffness; }) / distance;
+      joint.restAngle = Vector3(distance * RestCurvature(this->Wire, from), 0.0, 0.0);
+      joint.lossTime = this->Step;
+    }
+    this->Joints.push_back(joint);
+    from += length;
+  }
+}
+
+void Intervention::Internals::Engage(const std::vector<Vector3>& points)
+{
+  const WallTopology& topology = this->Motion->Topology();
+  if (topology.axis.empty())
+  {
+    throw std::invalid_argument("the vessels have no axis, so there is no ostium to engage");
+  }
+  this->Root = this->Settings.rootBranch;
+  if (this->Root < 0)
+  {
+    for (std::size_t b = 0; b < topology.axis.size() && this->Root < 0; ++b)
+    {
+      if (b >= topology.parent.size() || topology.parent[b] < 0)
+      {
+        this->Root = static_cast<int>(b);
+      }
+    }
+  }
+  if (this->Root < 0 || this->Root >= static_cast<int>(topology.axis.size()))
+  {
+    throw std::invalid_argument(
+      "rootBranch " + std::to_string(this->Root) + " is not a branch of the vessels");
+  }
+  for (int b = 0; b < this->Root; ++b)
+  {
+    this->RootFirst += topology.axis[b].size();
+  }
+  this->RootCount = topology.axis[this->Root].size();
+  this->Motion->AxisPositions(this->Phase, this->Axis);
+  this->RootAxis.assign(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst),
+    this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst + this->RootCount));
+  this->Path = std::make_unique<CatheterPath>(this->RootAxis, this->Catheter,
+    this->Settings.engagement, this->Settings.insideCatheter + 25.0, CatheterReach);
+  this->CatheterTip = std::min(this->Settings.engagement, this->Path->Last());
+
+  // Do the instruments fit?
+  double narrowest = std::numeric_limits<double>::infinity();
+  double along = 0.0;
+  const std::vector<Vector3>& axis = topology.axis[this->Root];
+  const std::vector<double>* radius =
+    static_cast<std::size_t>(this->Root) < topology.axisRadius.size()
+    ? &topology.axisRadius[this->Root]
+    : nullptr;
+  for (std::size_t i = 0; radius && i < axis.size() && i < radius->size(); ++i)
+  {
+    along += i > 0 ? (axis[i] - axis[i - 1]).norm() : 0.0;
+    if (along <= this->CatheterTip)
+    {
+      narrowest = std::min(narrowest, (*radius)[i]);
+    }
+  }
+  const auto refuse =
+    [](const std::string& what, double thick, const std::string& where, double room)
+  {
+    char text[256];
+    std::snprintf(text, sizeof(text), "%s is thicker (radius %.3f mm) than %s (radius %.3f mm)",
+      what.c_str(), thick, where.c_str(), room);
+    throw std::invalid_argument(text);
+  };
+  if (this->Catheter.outerRadius > narrowest)
+  {
+    refuse("the catheter '" + this->Catheter.name + "'", this->Catheter.outerRadius,
+      "the lumen at the ostium", narrowest);
+  }
+  for (const WireSection& section : this->Wire.sections)
+  {
+    if (section.radius >= this->Catheter.innerRadius)
+    {
+      refuse("the wire '" + this->Wire.name + "'", section.radius,
+        "the inside of the catheter '" + this->Catheter.name + "'", this->Catheter.innerRadius);
+    }
+  }
+
+  // The cap through which the catheter comes in.
+  const Vector3 ostium = this->RootAxis.front();
+  const Vector3 tip = this->Path->At(this->CatheterTip).position;
+  double nearestCap = std::numeric_limits<double>::infinity();
+  double nearestWall = std::numeric_limits<double>::infinity();
+  int inlet = 0;
+  for (std::size_t t = 0; t < topology.triangles.size(); ++t)
+  {
+    const Triangle& corners = topology.triangles[t];
+    const Vector3 middle = (points[corners[0]] + points[corners[1]] + points[corners[2]]) / 3.0;
+    const bool cap = !topology.entity.empty() && topology.entity[t] > 1;
+    if (cap && (middle - ostium).squaredNorm() < nearestCap)
+    {
+      nearestCap = (middle - ostium).squaredNorm();
+      inlet = topology.entity[t];
+    }
+    if (!cap && (middle - tip).squaredNorm() < nearestWall)
+    {
+      nearestWall = (middle - tip).squaredNorm();
+      this->InletTriangle = static_cast<std::int64_t>(t);
+    }
+  }
+  VesselWallSettings settings;
+  settings.friction = this->Settings.wallFriction;
+  settings.stiffness = this->Settings.wallStiffness;
+  if (inlet > 1)
+  {
+    settings.openCaps.push_back(inlet);
+  }
+  this->Wall = std::make_unique<VesselWall>(topology, points, settings);
+}
+
+Eigen::Quaterniond Intervention::Internals::HeldOrientation(const PathPlace& place) const
+{
+  const Vector3 first =
+    std::cos(this->Roll) * place.side + std::sin(this->Roll) * place.tangent.cross(place.side);
+  Matrix3 frame;
+  frame.col(2) = -place.tangent; // from the tip backwards
+  frame.col(0) = first;
+  frame.col(1) = frame.col(2).cross(frame.col(0));
+  return Eigen::Quaterniond(frame);
+}
+
+void Intervention::Internals::AppendSegment()
+{
+  const std::int64_t i = this->Rod->Size();
+  const PathPlace place = this->Path->At(this->Fed - this->Places[i]);
+  this->Rod->Append(
+    this->Segments[i], this->Joints[i], place.position, this->HeldOrientation(place));
+}
+
+void Intervention::Internals::PlaceOnPath()
+{
+  while (this->Rod->Size() > 0)
+  {
+    this->Rod->RemoveLast();
+  }
+  const double datum = this->CatheterTip - this->Settings.insideCatheter;
+  while (
+    this->Rod->Size() < LeastSegments || this->Fed - this->Places[this->Rod->Size() - 1] > datum)
+  {
+    this->AppendSegment();
+  }
+  const std::int64_t last = this->Rod->Size() - 1;
+  this->Rod->Prescribe(last, this->Rod->Position(last), this->Rod->Orientation(last));
+  std::fill(this->InVessel.begin(), this->InVessel.end(), 0);
+  this->Wall->ForgetAll();
+}
+
+void Intervention::Internals::BeginFrame()
+{
+  const double next = this->Phase + this->FrameSeconds * this->Settings.heartRate / 60.0;
+  this->Motion->Positions(next, this->NextPoints);
+  this->Wall->BeginFrame(this->NextPoints, this->FrameSeconds);
+  this->Motion->AxisPositions(next, this->Axis);
+  std::copy_n(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst), this->RootCount,
+    this->RootAxis.begin());
+  this->Path->SetAngle(this->CatheterAngle);
+  this->Path->BeginFrame(this->RootAxis, this->FrameSeconds);
+  this->TickInFrame = 0;
+}
+
+void Intervention::Internals::Drive(const DriveInput& input)
+{
+  if (!std::isfinite(input.wirePosition) || !std::isfinite(input.wireAngle) ||
+    !std::isfinite(input.catheterPosition) || !std::isfinite(input.catheterAngle))
+  {
+    this->Say(Notice::NotFinite);
+    this->HandSpeed = 0.0;
+    return;
+  }
+  const double most = this->Settings.largestSpeed * this->Step;
+  double way = input.wirePosition - this->HandPosition;
+  if (std::abs(way) > most * (1.0 + 1e-9))
+  {
+    this->Say(Notice::TooFast);
+    way = std::clamp(way, -most, most);
+  }
+  const double mostTurn = this->Settings.largestTurning * this->Step;
+  double turn = input.wireAngle - this->HandAngle;
+  if (std::abs(turn) > mostTurn * (1.0 + 1e-9))
+  {
+    this->Say(Notice::TurnedTooFast);
+    turn = std::clamp(turn, -mostTurn, mostTurn);
+  }
+  this->HandAngle += turn;
+  this->HandPosition += way;
+  this->HandSpeed = way / this->Step;
+  this->Fed += way;
+
+  // The catheter is moved by a hand, too: slowly.
+  const double mostTip = 50.0 * this->Step;
+  const double wanted = this->Settings.engagement + input.catheterPosition;
+  const double allowed = std::clamp(wanted, 0.5, this->Path->Last());
+  if (wanted != allowed)
+  {
+    this->Say(Notice::CatheterLimit);
+  }
+  this->CatheterTip += std::clamp(allowed - this->CatheterTip, -mostTip, mostTip);
+  this->CatheterAngle +=
+    std::clamp(input.catheterAngle - this->CatheterAngle, -2.0 * this->Step, 2.0 * this->Step);
+}
+
+void Intervention::Internals::Feed()
+{
+  // The wire within the catheter, up to the hand, is a torsion spring with a lag: the simulated part is turned by
+  // what arrives. Its change with the turn is estimated high, which keeps the coupling stable.
+  const double inside = this->Catheter.length;
+  const double spring = AlongWire(this->Wire, 0.5 * this->Wire.length,
+                          [](const WireSection& s) { return s.torsionalStiffness; }) /
+    inside;
+  const double answer = this->Joints.back().angularStiffness.z() / 5.0;
+  const double share = this->Step / 0.02;
+  this->Roll += share * (this->HandAngle - this->Roll - this->Torque / spring) /
+    (1.0 + share * (1.0 + answer / spring));
+
+  const double datum = this->CatheterTip - this->Settings.insideCatheter;
+  const double least = datum + this->Places[LeastSegments - 1];
+  if (this->Fed < least)
+  {
+    this->Say(Notice::WireAtTip);
+    this->Fed = least;
+  }
+  const double most = datum + this->Places[this->Settings.capacity - 1];
+  if (this->Fed > most)
+  {
+    this->Say(Notice::WireAtEnd);
+    this->Fed = most;
+  }
+  while (this->Fed - this->Places[this->Rod->Size() - 1] > datum &&
+    this->Rod->Size() < this->Settings.capacity)
+  {
+    this->Rod->Release(this->Rod->Size() - 1);
+    this->AppendSegment();
+  }
+  while (
+    this->Rod->Size() > LeastSegments && this->Fed - this->Places[this->Rod->Size() - 2] < datum)
+  {
+    this->Rod->RemoveLast();
+  }
+  const std::int64_t last = this->Rod->Size() - 1;
+  const PathPlace place = this->Path->At(this->Fed - this->Places[last]);
+  this->Rod->Prescribe(last, place.position, this->HeldOrientation(place));
+}
+
+void Intervention::Internals::PutBack()
+{
+  // A sample whose centre is outside of the lumen: its segment is moved in. Rare; counted and told.
+  for (const RodContact& contact : this->Rod->Contacts())
+  {
+    const std::int64_t i = contact.segment;
+    const double radius = this->Segments[i].radius;
+    const std::int64_t index = i * this->Rod->SamplesPerSegment() + contact.sample;
+    if (contact.gap > -0.9 * radius || !this->InVessel[index] || i + 1 == this->Rod->Size())
+    {
+      continue;
+    }
+    ContactSample sample;
+    sample.index = index;
+    sample.centre = this->Rod->SamplePoint(i, contact.sample);
+    sample.radius = radius;
+    WallPlace place;
+    if (this->Wall->Outside(sample, place))
+    {
+      const Vector3 inward = place.point - sample.centre;
+      const double distance = inward.norm();
+      const Vector3 move = distance > 1e-9
+        ? Vector3(inward * ((distance + 0.5 * radius) / distance))
+        : Vector3::Zero();
+      const Vector3 velocity = this->Wall->Velocity(place);
+      this->Rod->Place(i, this->Rod->Position(i) + move, this->Rod->Orientation(i));
+      this->Rod->SetVelocity(i, velocity, Vector3::Zero());
+      ++this->Report.outside;
+      this->Say(Notice::PutBack);
+    }
+  }
+}
+
+void Intervention::Internals::KeepSane()
+{
+  this->Last.position.clear();
+  this->Last.orientation.clear();
+  for (std::int64_t i = 0; i < this->Rod->Size(); ++i)
+  {
+    this->Last.position.push_back(this->Rod->Position(i));
+    this->Last.orientation.push_back(this->Rod->Orientation(i));
+  }
+  this->Last.fed = this->Fed;
+  this->Last.roll = this->Roll;
+}
+
+void Intervention::Internals::Reset()
+{
+  this->Say(Notice::Reset);
+  this->Fed = this->Last.fed;
+  this->Roll = this->Last.roll;
+  this->Torque = 0.0;
+  const std::int64_t count = static_cast<std::int64_t>(this->Last.position.size());
+  while (this->Rod->Size() > count)
+  {
+    this->Rod->RemoveLast();
+  }
+  while (this->Rod->Size() < count)
+  {
+    this->Rod->Release(this->Rod->Size() - 1);
+    this->AppendSegment();
+  }
+  for (std::int64_t i = 0; i < count; ++i)
+  {
+    this->Rod->Place(i, this->Last.position[i], this->Last.orientation[i]);
+  }
+}
+
+void Intervention::Internals::Measure()
+{
+  const RodStep& step = this->Rod->LastStep();
+  TickReport& report = this->Report;
+  report.tick = this->Tick;
+  report.phase = this->Phase - std::floor(this->Phase);
+  report.inserted = std::max(0.0, this->Fed - this->CatheterTip);
+  report.jointGap = step.largestGap;
+  report.tipForce = 0.0;
+  report.greatestForce = 0.0;
+  report.contacts = 0;
+  report.largestPenetration = 0.0;
+  report.meanPenetration = 0.0;
+  for (const RodContact& contact : this->Rod->Contacts())
+  {
+    const std::int64_t index = contact.segment * this->Rod->SamplesPerSegment() + contact.sample;
+    if (!this->InVessel[index])
+    {
+      continue;
+    }
+    const double force = std::hypot(contact.force, contact.friction.norm());
+    const double depth = std::max(0.0, -contact.gap);
+    ++report.contacts;
+    report.greatestForce = std::max(report.greatestForce, force);
+    report.largestPenetration = std::max(report.largestPenetration, depth);
+    report.meanPenetration += depth;
+    if (this->Places[contact.segment] < 3.0)
+    {
+      report.tipForce += force;
+    }
+  }
+  if (report.contacts > 0)
+  {
+    report.meanPenetration /= report.contacts;
+  }
+
+  const std::int64_t last = this->Rod->Size() - 1;
+  Vector3 force;
+  Vector3 torque;
+  this->Rod->Reaction(last, force, torque);
+  const Vector3 forward = -this->Rod->Axis(last);
+  this->Torque = torque.dot(forward);
+  report.proximalTorque = this->Torque;
+  // The catheter's bends multiply what the hand feels (capstan), against the way that it moves.
+  const double sense = std::clamp(this->HandSpeed, -1.0, 1.0); // mm/s
+  report.proximalForce = force.dot(forward) *
+    std::exp(sense * this->Catheter.friction * this->Catheter.TurnedAngle(this->Catheter.length));
+  if (report.inserted <= 0.0)
+  {
+    report.branch = -1;
+  }
+  else if (this->Tick % 20 == 0)
+  {
+    ContactSample tip;
+    tip.index = this->Rod->SamplesPerSegment() - 1;
+    tip.centre = this->Rod->FirstEnd(0);
+    tip.radius = this->Segments[0].radius;
+    report.branch = this->InVessel[tip.index] ? this->Wall->BranchAt(tip) : -1;
+  }
+}
+
+Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wire,
+  const GuideCatheter& catheter, const InterventionSettings& settings)
+  : Data(std::make_unique<Internals>())
+{
+  settings.Validate();
+  wire.Validate();
+  catheter.Validate();
+  if (!wall)
+  {
+    throw std::invalid_argument("an intervention needs vessels");
+  }
+  Internals& data = *this->Data;
+  data.Motion = std::move(wall);
+  data.Wire = wire;
+  data.Catheter = catheter;
+  data.Settings = settings;
+  data.Step = 1.0 / settings.tickRate;
+  data.FrameSeconds = data.Step * settings.ticksPerFrame;
+  data.Phase = settings.startPhase - std::floor(settings.startPhase);
+  data.MakeSegments();
+  data.Motion->Positions(data.Phase, data.NextPoints);
+  data.Engage(data.NextPoints);
+  RodSettings rod;
+  rod.mediumFollowsWalls = true;
+  data.Rod = std::make_unique<CosseratRod>(settings.capacity, rod);
+  data.InVessel.assign(settings.capacity * data.Rod->SamplesPerSegment(), 0);
+  data.Line.reserve(settings.capacity + 1);
+  data.Last.position.reserve(settings.capacity);
+  data.Last.orientation.reserve(settings.capacity);
+  data.StartFed = data.CatheterTip - StartInside;
+  data.Fed = data.StartFed;
+  data.PlaceOnPath();
+  data.KeepSane();
+}
+
+Intervention::~Intervention() = default;
+Intervention::Intervention(Intervention&&) noexcept = default;
+Intervention& Intervention::operator=(Intervention&&) noexcept = default;
+
+const TickReport& Intervention::Step(const DriveInput& input)
+{
+  Internals& data = *this->Data;
+  if (data.TickInFrame == 0 || data.TickInFrame >= data.Settings.ticksPerFrame)
+  {
+    data.BeginFrame();
+  }
+  ++data.Tick;
+  ++data.TickInFrame;
+  data.Report.outside = 0;
+  const double inFrame = data.Step * data.TickInFrame;
+  data.Wall->SetTime(inFrame);
+  data.Path->SetTime(inFrame);
+  data.Phase += data.Step * data.Settings.heartRate / 60.0;
+  data.Phase -= std::floor(data.Phase);
+  data.Drive(input);
+  data.Feed();
+  const RodStep& step = data.Rod->Step(data.Step, &data);
+  if (!step.finite || step.largestGap > 5.0)
+  {
+    data.Reset();
+  }
+  else
+  {
+    data.PutBack();
+    if (data.Tick % 200 == 0 && step.largestGap < 0.05 && data.Report.outside == 0)
+    {
+      data.KeepSane();
+    }
+  }
+  data.Measure();
+  return data.Report;
+}
+
+const TickReport& Intervention::Report() const
+{
+  return this->Data->Report;
+}
+
+void Intervention::SetHeartRate(double beatsPerMinute)
+{
+  if (beatsPerMinute >= 0.0 && beatsPerMinute <= 240.0)
+  {
+    this->Data->Settings.heartRate = beatsPerMinute;
+  }
+}
+
+std::int64_t Intervention::NumberOfSegments() const
+{
+  return this->Data->Rod->Size();
+}
+
+const std::vector<Vector3>& Intervention::Centerline() const
+{
+  Internals& data = *this->Data;
+  data.Line.clear();
+  const std::int64_t count = data.Rod->Size();
+  data.Line.push_back(data.Rod->FirstEnd(0));
+  for (std::int64_t i = 0; i + 1 < count; ++i)
+  {
+    data.Line.push_back(0.5 * (data.Rod->LastEnd(i) + data.Rod->FirstEnd(i + 1)));
+  }
+  data.Line.push_back(data.Rod->LastEnd(count - 1));
+  return data.Line;
+}
+
+const std::vector<Vector3>& Intervention::CatheterLine() const
+{
+  Internals& data = *this->Data;
+  data.Path->Line(data.CatheterTip, 150.0, data.CatheterPoints);
+  return data.CatheterPoints;
+}
+
+const std::vector<Vector3>& Intervention::WallPoints() const
+{
+  return this->Data->Wall->Points();
+}
+
+std::uint64_t Intervention::StateHash() const
+{
+  const Internals& data = *this->Data;
+  std::uint64_t hash = data.Rod->Hash();
+  for (const double value : { data.Fed, data.Roll, data.HandAngle, data.CatheterTip,
+         data.CatheterAngle, data.Phase, static_cast<double>(data.Tick) })
+  {
+    hash = HashValue(hash, value);
+  }
+  return hash;
+}
+
+std::vector<std::string> Intervention::TakeMessages()
+{
+  std::vector<std::string> taken;
+  taken.swap(this->Data->Messages);
+  return taken;
+}
+}
