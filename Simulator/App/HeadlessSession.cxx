@@ -272,6 +272,7 @@ void CheckRecording(
   }
 }
 
+/// Before anything is put in its place: what is not verified leaves nothing.
 void FinishComparison(
   const HeadlessOptions& options, const Hands& hands, const Comparison& comparison)
 {
@@ -485,6 +486,10 @@ void RunHeadless(const HeadlessOptions& options)
     }
   }
   ThrowIfInterrupted();
+  if (hands.Recording())
+  {
+    FinishComparison(options, hands, comparison);
+  }
   const std::uint64_t lastHash = intervention.StateHash();
   if (recording)
   {
@@ -551,10 +556,6 @@ void RunHeadless(const HeadlessOptions& options)
         static_cast<unsigned long long>(comparison.equal),
         static_cast<unsigned long long>(comparison.compared));
     }
-  }
-  if (hands.Recording())
-  {
-    FinishComparison(options, hands, comparison);
   }
 }
 

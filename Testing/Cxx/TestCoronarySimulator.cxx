@@ -300,7 +300,7 @@ TEST_F(TestCoronarySimulator, LeavesNothingWhenInterrupted)
 {
   EXPECT_EQ(this->Run("--headless --scenario s.json --ticks 1000000000 --output bad --record "
                       "bad.pcirec",
-              "timeout --preserve-status -s INT 2"),
+              "timeout --foreground --preserve-status -s INT 2"),
     130);
   EXPECT_NE(this->Said().find("coronary-simulator: interrupted"), std::string::npos);
   EXPECT_FALSE(fs::exists(this->Folder / "bad"));
