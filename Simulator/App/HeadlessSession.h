@@ -1,0 +1,51 @@
+/**
+ * @file HeadlessSession.h
+ * @brief A session on one thread with a clock of ticks: no window, no device, as fast as the machine can.
+ */
+#ifndef DynamicCoronary_HeadlessSession_h
+#define DynamicCoronary_HeadlessSession_h
+
+#include "Scenario.h"
+
+#include <cstdint>
+#include <string>
+
+namespace coronary
+{
+struct HeadlessOptions
+{
+  std::string scenario;     ///< file or built-in name; may be empty with replay
+  std::string vessels;      ///< folder in place of the scenario's vessels
+  std::string wire;         ///< of the built-in catalogue, in place of the scenario's
+  std::string catheter;     ///< likewise
+  std::string replay;       ///< recording to go through
+  std::string script;       ///< or script
+  std::string record;       ///< recording to write
+  std::string output;       ///< folder
+  std::uint64_t ticks = 0;  ///< 0: to the end of replay or script
+  double outputRate = 20.0; ///< Hz
+  double heartRate = -1.0;  ///< beats a minute; negative: the scenario's
+  bool verify = false;      ///< hashes have to be those of the recording
+  bool writeWall = false;
+  bool quiet = false;
+};
+
+/// The scenario with what the options change.
+/// @throws UsageError, as LoadScenario
+Scenario ScenarioOf(const HeadlessOptions& options);
+
+/**
+ * Runs, writes, and prints a summary on standard output.
+ * @throws UsageError, Cancelled; std::exception with one sentence otherwise
+ */
+void RunHeadless(const HeadlessOptions& options);
+
+/// A recording as JSON, a line an item, on standard output.
+/// @throws std::runtime_error  when it is torn or damaged, after all that is good was printed
+void DumpRecording(const std::string& path);
+
+/// The instruments that are built in, a line each, on standard output.
+void ListInstruments();
+}
+
+#endif

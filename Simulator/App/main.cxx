@@ -1,0 +1,235 @@
+/**
+ * coronary-simulator: a guidewire in beating coronary arteries.
+ *
+ * Exit codes: 0 done; 1 failed, with one line that says why; 2 the command line is wrong;
+ * 128 + n ended by signal n (130: Ctrl-C).
+ */
+#include "Command.h"
+#include "HeadlessSession.h"
+#include "Interruption.h"
+#include "OptionChecks.h"
+#include "ParallelFor.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <new>
+#include <string>
+
+namespace
+{
+constexpr int Failed = 1;
+constexpr int WrongUsage = 2;
+
+int Complain(std::string message, int exitCode)
+{
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::fprintf(stderr, "coronary-simulator: %s\n", message.c_str());
+  return exitCode;
+}
+
+/// What the program is asked to do.
+struct Request
+{
+  coronary::HeadlessOptions session;
+  std::string dump;
+  bool headless = false;
+  bool printScenario = false;
+  bool listScenarios = false;
+  bool listInstruments = false;
+  int threads = 0;
+
+  void Declare(CLI::App& app);
+  void Run() const;
+};
+
+void Request::Declare(CLI::App& app)
+{
+  using coronary::WholeWithin;
+  using coronary::Within;
+  app.add_flag("--headless", this->headless,
+    "Run without window on one thread, as fast as the machine can; required to run a session");
+
+  const std::string what = "Session";
+  app
+    .add_option("--scenario", this->session.scenario,
+      "Scenario: a JSON file, or a built-in name; default: that of the recording to replay")
+    ->type_name("FILE|NAME")
+    ->group(what);
+  app
+    .add_option("--vessels", this->session.vessels,
+      "Folder of 'coronary-pipeline run' in place of the scenario's vessels")
+    ->type_name("DIR")
+    ->group(what);
+  app
+    .add_option(
+      "--wire", this->session.wire, "Wire of the built-in catalogue in place of the scenario's")
+    ->type_name("NAME")
+    ->group(what);
+  app
+    .add_option("--catheter", this->session.catheter,
+      "Guide catheter of the built-in catalogue in place of the scenario's")
+    ->type_name("NAME")
+    ->group(what);
+  auto* heartRate = app
+                      .add_option("--heart-rate", this->session.heartRate,
+                        "Heart rate at the start in place of the scenario's, beats a minute; 0: "
+                        "the heart stands still")
+                      ->check(Within(0.0, 240.0))
+                      ->type_name("BPM")
+                      ->group(what);
+
+  const std::string hands = "Hands";
+  auto* replay =
+    app.add_option("--replay", this->session.replay, "Recording (.pcirec) to go through")
+      ->type_name("FILE")
+      ->excludes(heartRate)
+      ->group(hands);
+  app.add_option("--script", this->session.script, "Driving that is written down, JSON")
+    ->type_name("FILE")
+    ->excludes(replay)
+    ->group(hands);
+  app
+    .add_option("--ticks", this->session.ticks,
+      "Number of steps; default: to the end of the script or the recording")
+    ->check(WholeWithin(1, 1000000000000))
+    ->type_name("N")
+    ->group(hands);
+  app
+    .add_flag("--verify", this->session.verify,
+      "Fail when a state is not that of the recording, bit for bit")
+    ->needs(replay)
+    ->group(hands);
+
+  const std::string files = "Files";
+  auto* output = app
+                   .add_option("--output", this->session.output,
+                     "Folder to write to; made when it does not exist")
+                   ->type_name("DIR")
+                   ->group(files);
+  app
+    .add_option("--output-rate", this->session.outputRate, "Moments a second that are written, Hz")
+    ->check(Within(0.01, 20000.0))
+    ->type_name("HZ")
+    ->capture_default_str()
+    ->needs(output)
+    ->group(files);
+  app.add_flag("--write-wall", this->session.writeWall, "Write the moving wall as well")
+    ->needs(output)
+    ->group(files);
+  app.add_option("--record", this->session.record, "Recording (.pcirec) to write")
+    ->type_name("FILE")
+    ->group(files);
+
+  const std::string questions = "Instead of a session";
+  app.add_flag("--print-scenario", this->printScenario, "Print the scenario in effect as JSON")
+    ->group(questions);
+  app.add_flag("--list-scenarios", this->listScenarios, "List the built-in scenarios")
+    ->group(questions);
+  app.add_flag("--list-instruments", this->listInstruments, "List the built-in catalogue")
+    ->group(questions);
+  app.add_option("--dump", this->dump, "Print a recording (.pcirec) as JSON, a line an item")
+    ->type_name("FILE")
+    ->group(questions);
+
+  app
+    .add_option("--threads", this->threads,
+      "Number of threads for what is made before the start; 0: all cores. A session has one")
+    ->check(WholeWithin(0, 1024))
+    ->type_name("N")
+    ->capture_default_str();
+  app.add_flag("--quiet", this->session.quiet, "No progress, no messages and no summary");
+}
+
+void Request::Run() const
+{
+  coronary::SetNumberOfThreads(this->threads);
+  if (this->listScenarios)
+  {
+    for (const coronary::BuiltInScenario& one : coronary::BuiltInScenarios())
+    {
+      std::printf("%-12s %s\n", one.name.c_str(), one.description.c_str());
+    }
+    return;
+  }
+  if (this->listInstruments)
+  {
+    coronary::ListInstruments();
+    return;
+  }
+  if (!this->dump.empty())
+  {
+    coronary::DumpRecording(this->dump);
+    return;
+  }
+  if (this->printScenario)
+  {
+    std::fputs(coronary::ScenarioText(coronary::ScenarioOf(this->session)).c_str(), stdout);
+    return;
+  }
+  if (!this->headless)
+  {
+    throw coronary::UsageError("--headless is required");
+  }
+  coronary::RunHeadless(this->session);
+}
+
+int Run(int argc, char** argv)
+{
+  CLI::App program("A guidewire in beating coronary arteries.", "coronary-simulator");
+  program.set_version_flag("--version", "coronary-simulator " DYNAMICCORONARY_VERSION);
+  Request request;
+  request.Declare(program);
+  try
+  {
+    program.parse(argc, argv);
+  }
+  catch (const CLI::Success& wanted) // --help, --version
+  {
+    return program.exit(wanted);
+  }
+  catch (const CLI::ParseError& error)
+  {
+    return Complain(error.what(), WrongUsage);
+  }
+  try
+  {
+    coronary::CatchInterruptions();
+    request.Run();
+    return 0;
+  }
+  catch (const coronary::UsageError& error)
+  {
+    return Complain(error.what(), WrongUsage);
+  }
+  catch (const coronary::Cancelled&)
+  {
+    return Complain("interrupted", 128 + coronary::Interruption());
+  }
+  catch (const std::bad_alloc&)
+  {
+    return Complain("not enough memory", Failed);
+  }
+}
+}
+
+int main(int argc, char** argv)
+{
+  int exitCode = Failed;
+  try
+  {
+    exitCode = Run(argc, argv);
+  }
+  catch (const std::exception& error)
+  {
+    return Complain(error.what(), Failed);
+  }
+  // What was printed must have arrived: the reader may be a full disk.
+  std::cout.flush();
+  if (exitCode == 0 && (!std::cout || std::fflush(stdout) != 0))
+  {
+    return Complain("cannot write to the standard output", Failed);
+  }
+  return exitCode;
+}

@@ -1,0 +1,47 @@
+/**
+ * @file vtkSessionFiles.h
+ * @brief Instruments and wall of one moment as files for ParaView.
+ */
+#ifndef vtkSessionFiles_h
+#define vtkSessionFiles_h
+
+#include "Intervention.h"
+#include "WallMotion.h"
+
+#include "vtkSmartPointer.h"
+
+#include <string>
+
+class vtkMessageTrap;
+class vtkPolyData;
+
+namespace coronary
+{
+/**
+ * The wire from its tip and the catheter from its tip as two polylines. Point data: MaximumInscribedSphereRadius
+ * (that of the instrument, mm), Abscissas (mm from its tip). Cell data: Instrument (0 wire, 1 catheter). Field data:
+ * Tick, PhaseTime, Inserted, and the forces of TickReport.
+ * @throws std::runtime_error naming the file
+ */
+void WriteInstruments(const std::string& path, const Intervention& intervention,
+  const Guidewire& wire, const GuideCatheter& catheter, vtkMessageTrap& messages);
+
+/// The wall, written moment by moment with the same cells: CellEntityIds, and GroupIds of the points.
+class vtkWallFiles
+{
+public:
+  explicit vtkWallFiles(const WallTopology& topology);
+  ~vtkWallFiles();
+  vtkWallFiles(const vtkWallFiles&) = delete;
+  vtkWallFiles& operator=(const vtkWallFiles&) = delete;
+
+  /// @throws std::runtime_error naming the file
+  void Write(
+    const std::string& path, const std::vector<Vector3>& points, vtkMessageTrap& messages) const;
+
+private:
+  vtkSmartPointer<vtkPolyData> Cells;
+};
+}
+
+#endif

@@ -1,0 +1,365 @@
+#include "InstrumentCatalogue.h"
+
+#include "EmbeddedFiles.h"
+#include "InstrumentJson.h"
+#include "JsonFields.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+using Json = nlohmann::json;
+
+constexpr double GramForce = 9.80665e-3; // N
+constexpr double Any = std::numeric_limits<double>::max();
+constexpr double Degree = M_PI / 180.0;
+constexpr double CorePoisson = 0.3;
+constexpr double JacketPoisson = 0.45;
+constexpr std::size_t MostInstruments = 1000;
+
+ValueSources SourcesOf(JsonFields& fields)
+{
+  ValueSources sources;
+  if (fields.Has("sources"))
+  {
+    JsonFields texts(fields.Object("sources"), fields.Where() + ", sources");
+    for (const auto& entry : fields.Object("sources").items())
+    {
+      sources[entry.key()] = texts.Text(entry.key().c_str());
+    }
+  }
+  return sources;
+}
+
+WireCore CoreOf(JsonFields& section)
+{
+  WireCore core;
+  if (!section.Has("core"))
+  {
+    return core;
+  }
+  JsonFields fields(section.Object("core"), section.Where() + ", core");
+  if (fields.Has("ribbon_mm"))
+  {
+    const Json& sides = fields.List("ribbon_mm");
+    if (sides.size() != 2 || !sides[0].is_number() || !sides[1].is_number() ||
+      !(sides[1].get<double>() > 0.0) || !(sides[0].get<double>() >= sides[1].get<double>()))
+    {
+      fields.Refuse("has 'ribbon_mm' that is not [width, thickness]");
+    }
+    core.ribbonWidth = sides[0].get<double>();
+    core.ribbonThickness = sides[1].get<double>();
+  }
+  else
+  {
+    core.diameter = fields.Number("diameter_mm", 1e-3, 2.0);
+  }
+  core.modulus = 1e3 * fields.Number("modulus_GPa", 1e-3, 1000.0);
+  core.jacketModulus = fields.Number("jacket_modulus_MPa", 0.0, 1e5, 0.0);
+  fields.Done();
+  return core;
+}
+
+/// Ranges are those of Guidewire::Validate; here the sign is what a slip gets wrong.
+WireSection SectionOf(JsonFields& fields)
+{
+  WireSection section;
+  section.length = fields.Number("length_mm", 0.0, Any);
+  const Json& bending = fields.Any("bending_stiffness_N_mm2");
+  if (bending.is_array())
+  {
+    const bool numbers = bending.size() == 2 && bending[0].is_number() && bending[1].is_number();
+    if (!numbers)
+    {
+      fields.Refuse("has 'bending_stiffness_N_mm2' that is neither a number nor two");
+    }
+    section.bendingStiffness1 = bending[0].get<double>();
+    section.bendingStiffness2 = bending[1].get<double>();
+    if (!(section.bendingStiffness1 >= 0.0 && section.bendingStiffness2 >= 0.0))
+    {
+      fields.Refuse("has a negative 'bending_stiffness_N_mm2': " + bending.dump());
+    }
+  }
+  else
+  {
+    section.bendingStiffness1 = fields.Number("bending_stiffness_N_mm2", 0.0, Any);
+    section.bendingStiffness2 = section.bendingStiffness1;
+  }
+  section.torsionalStiffness = fields.Number("torsional_stiffness_N_mm2", 0.0, Any);
+  section.axialStiffness = fields.Number("axial_stiffness_N", 0.0, Any);
+  section.radius = 0.5 * fields.Number("diameter_mm", 0.0, Any);
+  section.density = fields.Number("density_kg_m3", 0.0, Any);
+  section.friction = fields.Number("friction", 0.0, Any);
+  section.restCurvature = fields.Number("rest_curvature_per_mm", -Any, Any, 0.0);
+  return section;
+}
+
+template <typename Instrument>
+void Check(const Instrument& instrument, const std::string& where)
+{
+  try
+  {
+    instrument.Validate();
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::invalid_argument(where + ": " + error.what());
+  }
+}
+
+template <typename List, typename Name>
+auto& Named(const List& list, const std::string& wanted, const char* what,
+  const std::string& origin, const Name& nameOf)
+{
+  std::string names;
+  for (const auto& one : list)
+  {
+    if (nameOf(one) == wanted)
+    {
+      return one;
+    }
+    names += (names.empty() ? "" : ", ") + nameOf(one);
+  }
+  throw std::invalid_argument(origin + " has no " + what + " '" + wanted + "'; it has " +
+    (names.empty() ? "none" : names) + ".");
+}
+
+/// EI of the softer axis at `s` mm from the tip: linear between the middles of the sections.
+double SofterStiffness(const Guidewire& wire, double s)
+{
+  double start = 0.0;
+  double lastMiddle = 0.0;
+  double lastValue = 0.0;
+  for (std::size_t n = 0; n < wire.sections.size(); ++n)
+  {
+    const WireSection& section = wire.sections[n];
+    const double middle = start + 0.5 * section.length;
+    const double value = std::min(section.bendingStiffness1, section.bendingStiffness2);
+    if (s <= middle)
+    {
+      return n == 0 ? value
+                    : lastValue + (value - lastValue) * (s - lastMiddle) / (middle - lastMiddle);
+    }
+    start += section.length;
+    lastMiddle = middle;
+    lastValue = value;
+  }
+  return lastValue;
+}
+}
+
+CatalogueWire WireFromJson(const Json& object, const std::string& where)
+{
+  CatalogueWire result;
+  const std::string name =
+    object.is_object() && object.contains("name") && object["name"].is_string()
+    ? " '" + object["name"].get<std::string>() + "'"
+    : "";
+  JsonFields fields(object, where + ": wire" + name);
+  result.wire.name = fields.Text("name");
+  result.wire.source = fields.Text("source", "");
+  result.description = fields.Text("description", "");
+  result.wire.length = fields.Number("length_mm", 0.0, Any);
+  result.tipLoad = GramForce * fields.Number("tip_load_gf", 0.0, 100.0, 0.0);
+  const ValueSources common = SourcesOf(fields);
+  for (const Json& entry : fields.List("sections"))
+  {
+    JsonFields section(
+      entry, fields.Where() + ", section " + std::to_string(result.wire.sections.size() + 1));
+    result.sectionNames.push_back(section.Text("name", ""));
+    result.wire.sections.push_back(SectionOf(section));
+    result.cores.push_back(CoreOf(section));
+    ValueSources sources = SourcesOf(section);
+    sources.insert(common.begin(), common.end());
+    result.sources.push_back(std::move(sources));
+    section.Done();
+  }
+  fields.Done();
+  Check(result.wire, where);
+  return result;
+}
+
+CatalogueCatheter CatheterFromJson(const Json& object, const std::string& where)
+{
+  CatalogueCatheter result;
+  GuideCatheter& catheter = result.catheter;
+  const std::string name =
+    object.is_object() && object.contains("name") && object["name"].is_string()
+    ? " '" + object["name"].get<std::string>() + "'"
+    : "";
+  JsonFields fields(object, where + ": catheter" + name);
+  catheter.name = fields.Text("name");
+  catheter.source = fields.Text("source", "");
+  result.description = fields.Text("description", "");
+  catheter.innerRadius = 0.5 * fields.Number("inner_diameter_mm", 0.0, Any);
+  catheter.outerRadius = 0.5 * fields.Number("outer_diameter_mm", 0.0, Any);
+  catheter.length = fields.Number("length_mm", 0.0, Any);
+  catheter.friction = fields.Number("friction", 0.0, Any);
+  for (const Json& entry : fields.List("shape"))
+  {
+    JsonFields piece(entry, fields.Where() + ", arc " + std::to_string(catheter.shape.size() + 1));
+    CatheterArc arc;
+    arc.length = piece.Number("length_mm", 0.1, 3000.0);
+    if (piece.Has("curvature_per_mm"))
+    {
+      arc.curvature = piece.Number("curvature_per_mm", -10.0, 10.0);
+    }
+    else
+    {
+      arc.curvature = Degree * piece.Number("turn_deg", -720.0, 720.0) / arc.length;
+    }
+    arc.planeAngle = piece.Has("plane_rad")
+      ? piece.Number("plane_rad", -2.0 * M_PI, 2.0 * M_PI)
+      : Degree * piece.Number("plane_deg", -360.0, 360.0, 0.0);
+    piece.Done();
+    catheter.shape.push_back(arc);
+  }
+  result.sources = SourcesOf(fields);
+  fields.Done();
+  Check(catheter, where);
+  return result;
+}
+
+Json WireToJson(const Guidewire& wire)
+{
+  Json sections = Json::array();
+  for (const WireSection& section : wire.sections)
+  {
+    sections.push_back({ { "length_mm", section.length },
+      { "bending_stiffness_N_mm2", { section.bendingStiffness1, section.bendingStiffness2 } },
+      { "torsional_stiffness_N_mm2", section.torsionalStiffness },
+      { "axial_stiffness_N", section.axialStiffness }, { "diameter_mm", 2.0 * section.radius },
+      { "density_kg_m3", section.density }, { "friction", section.friction },
+      { "rest_curvature_per_mm", section.restCurvature } });
+  }
+  return { { "name", wire.name }, { "source", wire.source }, { "length_mm", wire.length },
+    { "sections", sections } };
+}
+
+Json CatheterToJson(const GuideCatheter& catheter)
+{
+  Json shape = Json::array();
+  for (const CatheterArc& arc : catheter.shape)
+  {
+    shape.push_back({ { "length_mm", arc.length }, { "curvature_per_mm", arc.curvature },
+      { "plane_rad", arc.planeAngle } });
+  }
+  return { { "name", catheter.name }, { "source", catheter.source },
+    { "inner_diameter_mm", 2.0 * catheter.innerRadius },
+    { "outer_diameter_mm", 2.0 * catheter.outerRadius }, { "length_mm", catheter.length },
+    { "friction", catheter.friction }, { "shape", shape } };
+}
+
+const CatalogueWire& InstrumentCatalogue::Wire(const std::string& name) const
+{
+  return Named(this->wires, name, "wire", this->origin,
+    [](const CatalogueWire& one) { return one.wire.name; });
+}
+
+const CatalogueCatheter& InstrumentCatalogue::Catheter(const std::string& name) const
+{
+  return Named(this->catheters, name, "catheter", this->origin,
+    [](const CatalogueCatheter& one) { return one.catheter.name; });
+}
+
+InstrumentCatalogue CatalogueFromText(const std::string& text, const std::string& origin)
+{
+  const Json json = ParseJson(text, origin);
+  JsonFields fields(json, origin);
+  if (fields.Text("format") != "dynamiccoronary instruments")
+  {
+    fields.Refuse("is no catalogue of instruments: its 'format' is another one");
+  }
+  if (fields.Whole("version", 0, INT32_MAX, 0) != 1)
+  {
+    fields.Refuse("has another 'version' than 1, the only one that is known");
+  }
+  InstrumentCatalogue catalogue;
+  catalogue.origin = origin;
+  std::set<std::string> names;
+  const auto isNew = [&](const std::string& name)
+  {
+    if (name.empty() || !names.insert(name).second || names.size() > MostInstruments)
+    {
+      fields.Refuse(name.empty()           ? "has an instrument without name"
+          : names.size() > MostInstruments ? "has too many instruments"
+                                           : "has two instruments '" + name + "'");
+    }
+  };
+  for (const Json& entry : fields.List("wires"))
+  {
+    catalogue.wires.push_back(WireFromJson(entry, origin));
+    isNew(catalogue.wires.back().wire.name);
+  }
+  for (const Json& entry : fields.List("catheters"))
+  {
+    catalogue.catheters.push_back(CatheterFromJson(entry, origin));
+    isNew(catalogue.catheters.back().catheter.name);
+  }
+  fields.Done();
+  return catalogue;
+}
+
+InstrumentCatalogue ReadCatalogue(const std::string& path)
+{
+  return CatalogueFromText(ReadTextFile(path), "'" + path + "'");
+}
+
+const InstrumentCatalogue& BuiltInCatalogue()
+{
+  static const InstrumentCatalogue catalogue =
+    CatalogueFromText(embedded::Instruments, "The built-in catalogue");
+  return catalogue;
+}
+
+void SetStiffness(const WireCore& core, WireSection& section)
+{
+  const double young = core.modulus;
+  const double shear = young / (2.0 * (1.0 + CorePoisson));
+  double second1 = 0.0; // of area, mm^4
+  double second2 = 0.0;
+  double torsion = 0.0; // mm^4
+  double area = 0.0;
+  if (core.diameter > 0.0)
+  {
+    second1 = second2 = M_PI * std::pow(core.diameter, 4) / 64.0;
+    torsion = 2.0 * second1;
+    area = M_PI * core.diameter * core.diameter / 4.0;
+  }
+  else
+  {
+    const double w = core.ribbonWidth;
+    const double t = core.ribbonThickness;
+    second1 = w * t * t * t / 12.0;
+    second2 = t * w * w * w / 12.0;
+    torsion = w * t * t * t * (1.0 - 0.63 * t / w * (1.0 - std::pow(t / w, 4) / 12.0)) / 3.0;
+    area = w * t;
+  }
+  const double round = M_PI * std::pow(section.radius, 4) / 4.0;
+  const double rest = std::max(0.0, round - 0.5 * (second1 + second2));
+  const double jacketShear = core.jacketModulus / (2.0 * (1.0 + JacketPoisson));
+  section.bendingStiffness1 = young * second1 + core.jacketModulus * rest;
+  section.bendingStiffness2 = young * second2 + core.jacketModulus * rest;
+  section.torsionalStiffness = shear * torsion + jacketShear * 2.0 * rest;
+  section.axialStiffness = young * area +
+    core.jacketModulus * std::max(0.0, M_PI * section.radius * section.radius - area);
+}
+
+double TipLoad(const Guidewire& wire, double length, double deflection)
+{
+  constexpr int Steps = 2000;
+  double sum = 0.0;
+  for (int n = 0; n < Steps; ++n)
+  {
+    const double s = length * (n + 0.5) / Steps;
+    sum += s * s / SofterStiffness(wire, s) * (length / Steps);
+  }
+  return deflection / sum;
+}
+}

@@ -1,0 +1,32 @@
+/**
+ * @file InstrumentJson.h
+ * @brief One instrument from and to JSON, for catalogues and scenarios.
+ */
+#ifndef DynamicCoronary_InstrumentJson_h
+#define DynamicCoronary_InstrumentJson_h
+
+#include "InstrumentCatalogue.h"
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+
+namespace coronary
+{
+///@{
+/**
+ * @param where  for messages, in front of the instrument's name: "'file.json'"
+ * @throws std::invalid_argument naming instrument, section and property
+ */
+CatalogueWire WireFromJson(const nlohmann::json& object, const std::string& where);
+CatalogueCatheter CatheterFromJson(const nlohmann::json& object, const std::string& where);
+///@}
+
+///@{
+/// Values only; reading it gives the same bits.
+nlohmann::json WireToJson(const Guidewire& wire);
+nlohmann::json CatheterToJson(const GuideCatheter& catheter);
+///@}
+}
+
+#endif

@@ -1,0 +1,198 @@
+/**
+ * @file Recording.h
+ * @brief What happened in a session, tick by tick, in a .pcirec file. docs/simulator-files.md has the bytes.
+ *
+ * Tick t is the t-th step of an Intervention, counted from 0: an input of tick t is what step t gets, an event of
+ * tick t comes before step t, a hash of tick t is that of the state after t steps.
+ */
+#ifndef DynamicCoronary_Recording_h
+#define DynamicCoronary_Recording_h
+
+#include "Intervention.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <iosfwd>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// CRC-32/ISO-HDLC (polynomial 0x04C11DB7 reflected, all ones before and after): of "123456789" 0xCBF43926.
+/// @param before  the value of what comes before, to go on from
+std::uint32_t Crc32(const void* data, std::size_t size, std::uint32_t before = 0);
+
+/// FNV-1a, 64 bits.
+std::uint64_t Fnv1a(
+  const void* data, std::size_t size, std::uint64_t before = 14695981039346656037U);
+
+enum class RecordType : std::uint8_t
+{
+  Input = 1,
+  Force = 2,
+  Event = 3,
+  StateHash = 4,
+  ImageHash = 5,
+  Annotation = 6,
+  End = 7
+};
+
+/// In front of a recording.
+struct RecordingHeader
+{
+  std::string build;          ///< program and its version
+  std::string scenario;       ///< JSON of Scenario, complete
+  std::uint64_t meshHash = 0; ///< WallHash of the wall
+  std::uint64_t seed = 0;
+  double tickRate = 0.0; ///< Hz
+  std::string started;   ///< UTC, ISO 8601; may be empty
+};
+
+struct RecordedForces
+{
+  float proximalForce = 0.0F;  ///< N
+  float proximalTorque = 0.0F; ///< N mm
+  float tipForce = 0.0F;       ///< N
+  float greatestForce = 0.0F;  ///< N
+};
+
+/// What the user did beside driving.
+struct RecordedEvent
+{
+  enum Kind : std::uint8_t
+  {
+    HeartRate = 1 ///< value: beats a minute
+  };
+  std::uint8_t kind = 0;
+  double value = 0.0;
+};
+
+constexpr std::uint64_t RecordedHashInterval = 1000; ///< ticks between state hashes
+
+/**
+ * Writes a recording beside its name, flushed with every state hash, so that after a crash all but the last moments
+ * are in a file that can be read; Finish() puts it under its name. Without Finish() it is removed.
+ * Ticks must not decrease from call to call.
+ * All throw std::runtime_error naming the file when it can not be written, std::invalid_argument for ticks that
+ * decrease, numbers that are not finite, texts above MostText bytes.
+ */
+class RecordingWriter
+{
+public:
+  static constexpr std::size_t MostText = 65536;
+
+  RecordingWriter(const std::string& path, const RecordingHeader& header);
+  /// Into a stream, which has to live longer; Finish() flushes it.
+  RecordingWriter(std::ostream& stream, const RecordingHeader& header);
+  ~RecordingWriter();
+  RecordingWriter(const RecordingWriter&) = delete;
+  RecordingWriter& operator=(const RecordingWriter&) = delete;
+
+  /// Every tick; written when its bits are others than at the tick before (at first: all 0).
+  void Input(std::uint64_t tick, const DriveInput& input);
+  void Force(std::uint64_t tick, const RecordedForces& forces);
+  void Event(std::uint64_t tick, const RecordedEvent& event);
+  void StateHash(std::uint64_t tick, std::uint64_t hash);
+  void ImageHash(std::uint64_t tick, std::uint64_t hash);
+  void Annotation(std::uint64_t tick, const std::string& text);
+
+  /// @param ticks  steps in all
+  void Finish(std::uint64_t ticks);
+
+private:
+  struct Internals;
+  std::unique_ptr<Internals> Data;
+};
+
+/// One thing that was recorded.
+struct RecordedItem
+{
+  RecordType type = RecordType::End;
+  std::uint64_t tick = 0;
+  DriveInput input;       ///< of Input
+  RecordedForces forces;  ///< of Force
+  RecordedEvent event;    ///< of Event
+  std::uint64_t hash = 0; ///< of StateHash, ImageHash
+  std::string text;       ///< of Annotation
+  std::array<std::uint64_t, 8>
+    counts{}; ///< of End: ticks at [0], then what was written of each type
+};
+
+/**
+ * Reads item by item, and holds no more than one chunk. A file that breaks off, or whose bytes are damaged, is good up
+ * to there.
+ */
+class RecordingReader
+{
+public:
+  enum class Ending
+  {
+    NotYet,   ///< Next() has not come to the end
+    Complete, ///< with its end and all that it counts
+    Torn,     ///< the file stops too early
+    Damaged   ///< a chunk is not what it should be; all before it was good
+  };
+
+  /// @throws std::runtime_error naming the file: not there, no recording, of another version, a broken header
+  explicit RecordingReader(const std::string& path);
+  /// @param origin  for messages, in quotes
+  RecordingReader(std::unique_ptr<std::istream> stream, const std::string& origin);
+  ~RecordingReader();
+  RecordingReader(RecordingReader&&) noexcept;
+  RecordingReader& operator=(RecordingReader&&) noexcept;
+
+  const RecordingHeader& Header() const;
+
+  /// @return false at the end, whichever it is
+  bool Next(RecordedItem& item);
+
+  Ending HowEnded() const;
+  std::string EndingText() const; ///< for people
+  std::uint64_t Unknown() const;  ///< chunks of unknown type, skipped
+  std::uint64_t Bytes() const;    ///< that were good
+
+private:
+  struct Internals;
+  std::unique_ptr<Internals> Data;
+};
+
+/// Goes through a recording tick by tick.
+class RecordingReplay
+{
+public:
+  explicit RecordingReplay(RecordingReader reader);
+
+  const RecordingReader& Reader() const { return this->Source; }
+
+  /**
+   * What step `tick` gets; call it with 0, 1, 2, ...
+   * @param events  those before the step; cleared first
+   * @return false when the recording has nothing for this tick any more: it has ended
+   */
+  bool At(std::uint64_t tick, DriveInput& input, std::vector<RecordedEvent>& events);
+
+  /// Whether a hash was recorded of the state after `tick` steps; call it after At(tick - 1).
+  bool ExpectedHash(std::uint64_t tick, std::uint64_t& hash);
+
+private:
+  void ReadUpTo(std::uint64_t tick);
+
+  RecordingReader Source;
+  RecordedItem Ahead;
+  bool HasAhead = false;
+  bool Over = false;
+  bool Ended = false;      ///< with an end that says how many ticks there are
+  std::uint64_t Ticks = 0; ///< of the end; without one: after the last good item
+  DriveInput Current;
+  std::vector<RecordedEvent> Pending;
+  std::map<std::uint64_t, std::uint64_t> Hashes; ///< that nobody has asked for yet
+};
+
+/// FNV-1a over the topology and the points at a few phases: tells models apart.
+std::uint64_t WallHash(WallMotion& wall);
+}
+
+#endif

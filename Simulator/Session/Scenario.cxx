@@ -1,0 +1,419 @@
+#include "Scenario.h"
+
+#include "EmbeddedFiles.h"
+#include "InstrumentJson.h"
+#include "JsonFields.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr double Degree = M_PI / 180.0;
+constexpr double GreatestSeed = 9007199254740992.0; // 2^53: every JSON reader holds it exactly
+
+const char* const DominanceNames[] = { "right", "left", "balanced" };
+const char* const MotionNames[] = { "automatic", "tracked", "still", "contraction" };
+
+/// A number of the file, its range, and where it goes; one list for reading and writing.
+struct NumberEntry
+{
+  const char* name;
+  double* value;
+  double low;
+  double high;
+};
+
+std::vector<NumberEntry> NumbersOf(InterventionSettings& s)
+{
+  return { { "tick_rate_hz", &s.tickRate, 500.0, 20000.0 },
+    { "heart_rate_bpm", &s.heartRate, 0.0, 240.0 }, { "start_phase", &s.startPhase, 0.0, 1.0 },
+    { "segment_length_mm", &s.segmentLength, 0.5, 4.0 },
+    { "inside_catheter_mm", &s.insideCatheter, 0.0, 200.0 },
+    { "engagement_mm", &s.engagement, 0.0, 50.0 },
+    { "wall_friction_factor", &s.wallFriction, 0.0, 10.0 },
+    { "wall_stiffness_N_per_mm", &s.wallStiffness, 1e-3, 1e4 }, { "drag_Pa_s", &s.drag, 0.0, 10.0 },
+    { "largest_speed_mm_s", &s.largestSpeed, 1.0, 1e4 },
+    { "largest_turning_rad_s", &s.largestTurning, 0.1, 1e3 } };
+}
+
+std::vector<NumberEntry> NumbersOf(PhantomSettings& s)
+{
+  return { { "calibre", &s.calibre, 0.5, 2.0 },
+    { "position_variation_mm", &s.positionVariation, 0.0, 10.0 },
+    { "calibre_variation", &s.calibreVariation, 0.0, 0.3 },
+    { "tortuosity", &s.tortuosity, 0.0, 3.0 }, { "stenosis_degree", &s.stenosisDegree, 0.0, 0.95 },
+    { "motion_amplitude", &s.motionAmplitude, 0.0, 1.3 },
+    { "axial_motion_right_mm", &s.axialMotionRight, 0.0, 24.0 },
+    { "axial_motion_left_mm", &s.axialMotionLeft, 0.0, 24.0 },
+    { "regional_lag", &s.regionalLag, 0.0, 0.05 },
+    { "regional_amplitude", &s.regionalAmplitude, 0.0, 0.1 },
+    { "area_pulse", &s.areaPulse, 0.0, 0.3 },
+    { "centerline_spacing_mm", &s.centerlineSpacing, 0.1, 5.0 },
+    { "surface_spacing_mm", &s.surfaceSpacing, 0.15, 1.5 } };
+}
+
+std::vector<NumberEntry> NumbersOf(ContractionSettings& s)
+{
+  return { { "axial_mm", &s.axial, 0.0, 25.0 }, { "radial", &s.radial, 0.0, 0.3 },
+    { "systole", &s.systole, 0.2, 0.5 }, { "peak_speed_mm_s", &s.peakSpeed, 1.0, 300.0 } };
+}
+
+void ReadNumbers(JsonFields& fields, const std::vector<NumberEntry>& entries)
+{
+  for (const NumberEntry& entry : entries)
+  {
+    *entry.value = fields.Number(entry.name, entry.low, entry.high, *entry.value);
+  }
+}
+
+Json WriteNumbers(const std::vector<NumberEntry>& entries)
+{
+  Json json = Json::object();
+  for (const NumberEntry& entry : entries)
+  {
+    json[entry.name] = *entry.value;
+  }
+  return json;
+}
+
+template <std::size_t Count>
+int OneOf(JsonFields& fields, const char* name, const char* const (&names)[Count])
+{
+  const std::string text = fields.Text(name);
+  std::string list;
+  for (std::size_t n = 0; n < Count; ++n)
+  {
+    if (text == names[n])
+    {
+      return static_cast<int>(n);
+    }
+    list += (n > 0 ? ", " : "") + std::string(names[n]);
+  }
+  fields.Refuse(std::string("has '") + name + "': '" + text.substr(0, 60) + "' is none of " + list);
+}
+
+Vector3 PointOf(JsonFields& fields, const char* name)
+{
+  const Json& list = fields.List(name);
+  Vector3 point = Vector3::Zero();
+  bool good = list.size() == 3;
+  for (std::size_t n = 0; good && n < 3; ++n)
+  {
+    good = list[n].is_number() && std::abs(list[n].get<double>()) <= 1e5;
+    point[static_cast<Eigen::Index>(n)] = good ? list[n].get<double>() : 0.0;
+  }
+  if (!good)
+  {
+    fields.Refuse(std::string("has '") + name + "' that is not three coordinates in mm");
+  }
+  return point;
+}
+
+PhantomSettings PhantomOf(const Json& object, const std::string& where)
+{
+  PhantomSettings phantom;
+  JsonFields fields(object, where);
+  phantom.seed = static_cast<std::uint64_t>(
+    fields.Whole("seed", 0, INT32_MAX, static_cast<std::int64_t>(phantom.seed)));
+  if (fields.Has("dominance"))
+  {
+    phantom.dominance = static_cast<Dominance>(OneOf(fields, "dominance", DominanceNames));
+  }
+  phantom.ramus = fields.Flag("ramus", phantom.ramus);
+  phantom.chronicOcclusion = fields.Flag("chronic_occlusion", phantom.chronicOcclusion);
+  phantom.stenoses = static_cast<int>(fields.Whole("stenoses", 0, 20, phantom.stenoses));
+  ReadNumbers(fields, NumbersOf(phantom));
+  fields.Done();
+  return phantom;
+}
+
+void MotionOf(const Json& object, const std::string& where, VesselSource& vessels)
+{
+  JsonFields fields(object, where);
+  vessels.motion = static_cast<VesselMotion>(OneOf(fields, "model", MotionNames));
+  if (vessels.motion == VesselMotion::Contraction)
+  {
+    ReadNumbers(fields, NumbersOf(vessels.contraction));
+    if (fields.Has("twist_rad"))
+    {
+      vessels.contraction.twist = fields.Number("twist_rad", -0.5, 0.5);
+    }
+    else
+    {
+      vessels.contraction.twist =
+        Degree * fields.Number("twist_deg", -28.0, 28.0, vessels.contraction.twist / Degree);
+    }
+    if (fields.Has("base_mm") != fields.Has("apex_mm"))
+    {
+      fields.Refuse("has only one of 'base_mm' and 'apex_mm'");
+    }
+    if (fields.Has("base_mm"))
+    {
+      vessels.contraction.base = PointOf(fields, "base_mm");
+      vessels.contraction.apex = PointOf(fields, "apex_mm");
+    }
+  }
+  fields.Done();
+}
+
+/// As it can be opened from anywhere.
+std::string FullPath(const std::string& path, const std::string& folder)
+{
+  return path.empty() ? path : fs::absolute(fs::path(folder) / path).lexically_normal().string();
+}
+
+VesselSource VesselsOf(const Json& object, const std::string& where, const std::string& folder)
+{
+  VesselSource vessels;
+  JsonFields fields(object, where);
+  const int kinds = static_cast<int>(fields.Has("phantom")) + static_cast<int>(fields.Has("run")) +
+    static_cast<int>(fields.Has("surface"));
+  if (kinds != 1)
+  {
+    fields.Refuse("has to have one of 'phantom', 'run' and 'surface'");
+  }
+  if (fields.Has("phantom"))
+  {
+    vessels.kind = VesselSource::Kind::Phantom;
+    vessels.phantom = PhantomOf(fields.Object("phantom"), where + ", phantom");
+  }
+  else if (fields.Has("run"))
+  {
+    vessels.kind = VesselSource::Kind::Run;
+    vessels.path = FullPath(fields.Text("run"), folder);
+  }
+  else
+  {
+    vessels.kind = VesselSource::Kind::Surface;
+    vessels.path = FullPath(fields.Text("surface"), folder);
+    vessels.centerline = FullPath(fields.Text("centerline"), folder);
+  }
+  if (fields.Has("motion"))
+  {
+    MotionOf(fields.Object("motion"), where + ", motion", vessels);
+  }
+  if (vessels.motion == VesselMotion::Tracked && vessels.kind == VesselSource::Kind::Surface)
+  {
+    fields.Refuse("asks for a tracked motion, which only a run has");
+  }
+  fields.Done();
+  return vessels;
+}
+
+Json VesselsToJson(const VesselSource& given)
+{
+  VesselSource vessels = given;
+  Json json;
+  switch (vessels.kind)
+  {
+    case VesselSource::Kind::Phantom:
+    {
+      Json phantom = WriteNumbers(NumbersOf(vessels.phantom));
+      phantom["seed"] = vessels.phantom.seed;
+      phantom["dominance"] = DominanceNames[static_cast<int>(vessels.phantom.dominance)];
+      phantom["ramus"] = vessels.phantom.ramus;
+      phantom["chronic_occlusion"] = vessels.phantom.chronicOcclusion;
+      phantom["stenoses"] = vessels.phantom.stenoses;
+      json["phantom"] = phantom;
+      break;
+    }
+    case VesselSource::Kind::Run:
+      json["run"] = vessels.path;
+      break;
+    case VesselSource::Kind::Surface:
+      json["surface"] = vessels.path;
+      json["centerline"] = vessels.centerline;
+      break;
+  }
+  Json motion = Json::object();
+  if (vessels.motion == VesselMotion::Contraction)
+  {
+    motion = WriteNumbers(NumbersOf(vessels.contraction));
+    motion["twist_rad"] = vessels.contraction.twist;
+    if (vessels.contraction.base != vessels.contraction.apex)
+    {
+      const Vector3& base = vessels.contraction.base;
+      const Vector3& apex = vessels.contraction.apex;
+      motion["base_mm"] = { base.x(), base.y(), base.z() };
+      motion["apex_mm"] = { apex.x(), apex.y(), apex.z() };
+    }
+  }
+  motion["model"] = MotionNames[static_cast<int>(vessels.motion)];
+  json["motion"] = motion;
+  return json;
+}
+
+InterventionSettings SettingsOf(const Json& object, const std::string& where)
+{
+  InterventionSettings settings;
+  JsonFields fields(object, where);
+  ReadNumbers(fields, NumbersOf(settings));
+  settings.ticksPerFrame =
+    static_cast<int>(fields.Whole("ticks_per_frame", 1, 10000, settings.ticksPerFrame));
+  settings.capacity = static_cast<int>(fields.Whole("capacity", 20, 1000, settings.capacity));
+  settings.rootBranch =
+    static_cast<int>(fields.Whole("root_branch", -1, 100000, settings.rootBranch));
+  fields.Done();
+  try
+  {
+    settings.Validate();
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::invalid_argument(where + ": " + error.what());
+  }
+  return settings;
+}
+
+Json SettingsToJson(const InterventionSettings& given)
+{
+  InterventionSettings settings = given;
+  Json json = WriteNumbers(NumbersOf(settings));
+  json["ticks_per_frame"] = settings.ticksPerFrame;
+  json["capacity"] = settings.capacity;
+  json["root_branch"] = settings.rootBranch;
+  return json;
+}
+
+bool StartsWith(const std::string& text, const char* start)
+{
+  return text.rfind(start, 0) == 0;
+}
+
+/// Names of the segments that an artery can begin with, as SegmentName() has them.
+bool BeginsArtery(const std::string& name, const std::string& artery)
+{
+  if (artery == "RCA")
+  {
+    return StartsWith(name, "pRCA") || StartsWith(name, "RCA");
+  }
+  return StartsWith(name, "LM") || StartsWith(name, "LCA") || StartsWith(name, "pLAD") ||
+    StartsWith(name, "pLCx");
+}
+}
+
+Scenario ScenarioFromText(
+  const std::string& text, const std::string& origin, const std::string& folder)
+{
+  const Json json = ParseJson(text, origin);
+  JsonFields fields(json, origin);
+  if (fields.Text("format") != "dynamiccoronary scenario")
+  {
+    fields.Refuse("is no scenario: its 'format' is another one");
+  }
+  if (fields.Whole("version", 0, INT32_MAX, 0) != 1)
+  {
+    fields.Refuse("has another 'version' than 1, the only one that is known");
+  }
+  Scenario scenario;
+  scenario.name = fields.Text("name");
+  scenario.description = fields.Text("description", "");
+  scenario.vessels = VesselsOf(fields.Object("vessels"), origin + ", vessels", folder);
+  static const char* const arteries[] = { "LCA", "RCA", "any" };
+  scenario.artery = arteries[OneOf(fields, "artery", arteries)];
+  InstrumentCatalogue own;
+  const InstrumentCatalogue* catalogue = &BuiltInCatalogue();
+  if (fields.Has("catalogue"))
+  {
+    own = ReadCatalogue(FullPath(fields.Text("catalogue"), folder));
+    catalogue = &own;
+  }
+  const auto byName = [&](const char* what, const auto& find)
+  {
+    try
+    {
+      return find(fields.Text(what));
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw std::invalid_argument(origin + ": " + error.what());
+    }
+  };
+  scenario.wire = fields.Any("wire").is_string()
+    ? byName("wire", [&](const std::string& name) { return catalogue->Wire(name).wire; })
+    : WireFromJson(fields.Object("wire"), origin).wire;
+  scenario.catheter = fields.Any("catheter").is_string()
+    ? byName(
+        "catheter", [&](const std::string& name) { return catalogue->Catheter(name).catheter; })
+    : CatheterFromJson(fields.Object("catheter"), origin).catheter;
+  scenario.settings = SettingsOf(
+    fields.Has("settings") ? fields.Object("settings") : Json::object(), origin + ", settings");
+  scenario.seed =
+    static_cast<std::uint64_t>(fields.Whole("seed", 0, static_cast<std::int64_t>(GreatestSeed), 1));
+  fields.Done();
+  return scenario;
+}
+
+std::string ScenarioText(const Scenario& scenario)
+{
+  const Json json = { { "format", "dynamiccoronary scenario" }, { "version", 1 },
+    { "name", scenario.name }, { "description", scenario.description },
+    { "vessels", VesselsToJson(scenario.vessels) }, { "artery", scenario.artery },
+    { "wire", WireToJson(scenario.wire) }, { "catheter", CatheterToJson(scenario.catheter) },
+    { "settings", SettingsToJson(scenario.settings) }, { "seed", scenario.seed } };
+  return json.dump(2) + "\n";
+}
+
+std::vector<BuiltInScenario> BuiltInScenarios()
+{
+  std::vector<BuiltInScenario> list;
+  for (const embedded::NamedText* one = embedded::Scenarios; one->name; ++one)
+  {
+    const std::string where = std::string("The built-in scenario '") + one->name + "'";
+    const Json json = ParseJson(one->text, where);
+    JsonFields fields(json, where);
+    list.push_back({ one->name, fields.Text("description") });
+  }
+  return list;
+}
+
+Scenario LoadScenario(const std::string& name)
+{
+  std::string names;
+  for (const embedded::NamedText* one = embedded::Scenarios; one->name; ++one)
+  {
+    if (name == one->name)
+    {
+      return ScenarioFromText(
+        one->text, std::string("The built-in scenario '") + one->name + "'", ".");
+    }
+    names += (names.empty() ? "" : ", ") + std::string(one->name);
+  }
+  std::error_code ignored;
+  if (!fs::is_regular_file(name, ignored))
+  {
+    throw std::runtime_error("'" + name +
+      "' is neither a scenario file nor a built-in scenario; built in are " + names + ".");
+  }
+  const std::string folder = fs::path(name).parent_path().string();
+  return ScenarioFromText(ReadTextFile(name), "'" + name + "'", folder.empty() ? "." : folder);
+}
+
+int RootBranch(const WallTopology& topology, const std::string& artery)
+{
+  std::string roots;
+  for (std::size_t n = 0; n < topology.axis.size(); ++n)
+  {
+    if (n < topology.parent.size() && topology.parent[n] >= 0)
+    {
+      continue;
+    }
+    const std::string name = n < topology.groupName.size() ? topology.groupName[n] : "";
+    if (artery == "any" || BeginsArtery(name, artery))
+    {
+      return static_cast<int>(n);
+    }
+    roots += (roots.empty() ? "'" : ", '") + (name.empty() ? std::to_string(n) : name) + "'";
+  }
+  throw std::invalid_argument("The vessels have no root of the " + artery + "; their roots are " +
+    (roots.empty() ? "none" : roots) + ".");
+}
+}

@@ -1,0 +1,325 @@
+// coronary-simulator as a user runs it: sessions, recordings and their replay, messages, exit codes.
+#include "AtomicFile.h"
+#include "FileSeries.h"
+#include "VesselTestData.h"
+
+#include "vtkXMLPolyDataReader.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace
+{
+constexpr int Bones = 12;
+
+std::string ReadText(const fs::path& path)
+{
+  std::ifstream file(path, std::ios::binary);
+  return { std::istreambuf_iterator<char>(file), {} };
+}
+
+class TestCoronarySimulator : public ::testing::Test
+{
+protected:
+  void SetUp() override
+  {
+    this->Folder = fs::temp_directory_path() / ("simulator test." + std::to_string(getpid()));
+    SaveChainRun(this->Folder / "result", Bones);
+    this->Put("s.json", TestScenario());
+    this->Put("drive.json",
+      { { "format", "dynamiccoronary script" }, { "version", 1 },
+        { "pieces",
+          { { { "seconds", 0.5 }, { "wire_mm", 8 } }, { { "seconds", 0.2 }, { "wire_deg", 60 } },
+            { { "seconds", 0.3 }, { "wire_mm", 3 }, { "heart_rate_bpm", 100 } } } } });
+  }
+
+  void TearDown() override { fs::remove_all(this->Folder); }
+
+  static json TestScenario()
+  {
+    return { { "format", "dynamiccoronary scenario" }, { "version", 1 }, { "name", "bar" },
+      { "vessels", { { "run", "result" } } }, { "artery", "RCA" }, { "wire", "workhorse" },
+      { "catheter", "JR4-6F" }, { "settings", { { "heart_rate_bpm", 60 } } } };
+  }
+
+  void Put(const std::string& name, const json& content) const
+  {
+    coronary::WriteFileAtomically((this->Folder / name).string(), content.dump());
+  }
+
+  /// Runs the program in the folder.
+  int Run(const std::string& options, const std::string& before = "") const
+  {
+    const std::string command = "cd '" + this->Folder.string() + "' && " + before +
+      " '" DYNAMICCORONARY_SIMULATOR "' " + options + " >stdout 2>stderr";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+  std::string Said() const { return ReadText(this->Folder / "stderr"); }
+
+  json Statistics(const std::string& folder) const
+  {
+    return json::parse(ReadText(this->Folder / folder / "statistics.json"));
+  }
+
+  /// Exit code and one line that says why; nothing is written.
+  void ExpectFailure(int code, const std::string& options, const std::string& part) const
+  {
+    EXPECT_EQ(this->Run("--headless --quiet --output bad " + options), code) << options;
+    const std::string text = this->Said();
+    EXPECT_EQ(text.rfind("coronary-simulator: ", 0), 0U) << options << ": " << text;
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << options << ": " << text;
+    EXPECT_NE(text.find(part), std::string::npos) << options << ": " << text;
+    EXPECT_FALSE(fs::exists(this->Folder / "bad")) << options;
+  }
+
+  /// A scenario that is changed somewhere.
+  template <typename Change>
+  void ExpectBadScenario(const Change& change, const std::string& part) const
+  {
+    json scenario = TestScenario();
+    change(scenario);
+    this->Put("changed.json", scenario);
+    this->ExpectFailure(1, "--scenario changed.json --ticks 10", part);
+  }
+
+  fs::path Folder;
+};
+}
+
+TEST_F(TestCoronarySimulator, RecordsAndReplaysToTheBit)
+{
+  ASSERT_EQ(this->Run("--headless --scenario s.json --script drive.json --record a.pcirec "
+                      "--output a --write-wall"),
+    0)
+    << this->Said();
+  EXPECT_NE(ReadText(this->Folder / "stdout").find("bar: 2000 ticks, 1 s;"), std::string::npos)
+    << ReadText(this->Folder / "stdout");
+  const json statistics = this->Statistics("a");
+  EXPECT_EQ(statistics["ticks"], 2000);
+  EXPECT_EQ(statistics["seconds"], 1.0);
+  EXPECT_EQ(statistics["scenario"], "bar");
+  EXPECT_EQ(statistics["motion"], "tracked at 5 moments");
+  EXPECT_EQ(statistics["state_hashes"].size(), 2U);
+  EXPECT_EQ(statistics["state_hashes"][1], statistics["last_state_hash"]);
+  EXPECT_NE(statistics["state_hashes"][0], statistics["state_hashes"][1]);
+  EXPECT_GT(statistics["inserted"]["last_mm"].get<double>(), 5.0);
+  EXPECT_EQ(statistics["branches"][0]["name"], "pRCA");
+  EXPECT_EQ(statistics.dump().find("real"), std::string::npos)
+    << "nothing that depends on the clock";
+
+  // 20 Hz.
+  const auto files = coronary::ReadFileSeries((this->Folder / "a/trajectory.pvd").string());
+  ASSERT_EQ(files.size(), 20U);
+  EXPECT_NEAR(files[1].time - files[0].time, 0.05, 1e-12);
+  EXPECT_EQ(coronary::ReadFileSeries((this->Folder / "a/wall.pvd").string()).size(), 20U);
+  vtkNew<vtkXMLPolyDataReader> reader;
+  reader->SetFileName(files.back().path.c_str());
+  reader->Update();
+  EXPECT_EQ(reader->GetOutput()->GetNumberOfLines(), 2);
+  const std::string forces = ReadText(this->Folder / "a/forces.csv");
+  EXPECT_EQ(std::count(forces.begin(), forces.end(), '\n'), 21);
+  const std::string tips = ReadText(this->Folder / "a/tip.csv");
+  EXPECT_EQ(std::count(tips.begin(), tips.end(), '\n'), 21);
+
+  // The same again: by the script, by the recording with its own scenario and with the file.
+  const auto same = [&](const char* folder)
+  {
+    for (const auto& entry : fs::directory_iterator(this->Folder / "a"))
+    {
+      const std::string name = entry.path().filename().string();
+      if (name != "statistics.json")
+      {
+        EXPECT_EQ(ReadText(entry.path()), ReadText(this->Folder / folder / name)) << name;
+      }
+    }
+    EXPECT_EQ(this->Statistics(folder)["state_hashes"], statistics["state_hashes"]);
+  };
+  ASSERT_EQ(this->Run("--headless --scenario s.json --script drive.json --output b --write-wall "
+                      "--threads 1 --quiet"),
+    0);
+  EXPECT_EQ(ReadText(this->Folder / "stdout") + this->Said(), "");
+  same("b");
+  ASSERT_EQ(
+    this->Run("--headless --replay a.pcirec --verify --output c --write-wall --record c.pcirec"), 0)
+    << this->Said();
+  EXPECT_NE(ReadText(this->Folder / "stdout").find("2 of 2 hashes are equal"), std::string::npos);
+  same("c");
+  EXPECT_EQ(this->Statistics("c")["replay"]["equal"], 2);
+  ASSERT_EQ(
+    this->Run("--headless --scenario s.json --replay c.pcirec --verify --output d --write-wall"), 0)
+    << this->Said();
+  same("d");
+  // Only the beginning.
+  ASSERT_EQ(this->Run("--headless --replay a.pcirec --verify --ticks 1200 --quiet"), 0);
+}
+
+TEST_F(TestCoronarySimulator, NoticesAnotherState)
+{
+  ASSERT_EQ(
+    this->Run("--headless --quiet --scenario s.json --script drive.json --record a.pcirec"), 0)
+    << this->Said();
+  json other = TestScenario();
+  other["settings"]["heart_rate_bpm"] = 61;
+  this->Put("other.json", other);
+  this->ExpectFailure(1, "--scenario other.json --replay a.pcirec --verify --ticks 1500",
+    "The state after tick 1000 is another one than in 'a.pcirec'");
+  EXPECT_EQ(this->Run("--headless --scenario other.json --replay a.pcirec --output e"), 0);
+  EXPECT_EQ(this->Statistics("e")["replay"]["first_different_tick"], 1000);
+  EXPECT_NE(this->Said().find("another one than in"), std::string::npos);
+
+  // Other vessels.
+  other = TestScenario();
+  other["vessels"]["motion"] = { { "model", "still" } };
+  this->Put("other.json", other);
+  this->ExpectFailure(
+    1, "--scenario other.json --replay a.pcirec --verify", "recorded with other vessels");
+  // Torn.
+  const std::string bytes = ReadText(this->Folder / "a.pcirec");
+  std::ofstream(this->Folder / "torn.pcirec", std::ios::binary)
+    << bytes.substr(0, bytes.size() - 100);
+  this->ExpectFailure(1, "--replay torn.pcirec --verify", "is good up to tick");
+  EXPECT_EQ(this->Run("--headless --replay torn.pcirec --output f"), 0) << this->Said();
+  EXPECT_GT(this->Statistics("f")["ticks"], 1000);
+}
+
+TEST_F(TestCoronarySimulator, DumpsRecordings)
+{
+  ASSERT_EQ(this->Run("--headless --quiet --scenario s.json --script drive.json --ticks 1600 "
+                      "--record a.pcirec"),
+    0);
+  ASSERT_EQ(this->Run("--dump a.pcirec"), 0);
+  std::istringstream lines(ReadText(this->Folder / "stdout"));
+  std::string line;
+  std::vector<json> items;
+  while (std::getline(lines, line))
+  {
+    items.push_back(json::parse(line));
+  }
+  ASSERT_GT(items.size(), 1000U);
+  EXPECT_EQ(items.front()["type"], "header");
+  EXPECT_EQ(items.front()["scenario"]["name"], "bar");
+  EXPECT_EQ(items.back()["type"], "end");
+  EXPECT_EQ(items.back()["ticks"], 1600);
+  const auto event = std::find_if(
+    items.begin(), items.end(), [](const json& item) { return item["type"] == "event"; });
+  ASSERT_NE(event, items.end());
+  EXPECT_EQ((*event)["value"], 100.0);
+  EXPECT_EQ((*event)["tick"], 1400);
+  std::ofstream(this->Folder / "noise.pcirec") << "PCIREC? no";
+  EXPECT_EQ(this->Run("--dump noise.pcirec"), 1);
+  EXPECT_NE(this->Said().find("is no recording"), std::string::npos);
+}
+
+TEST_F(TestCoronarySimulator, SaysWhatIsWrong)
+{
+  this->ExpectFailure(2, "--ticks 10", "--scenario is required");
+  this->ExpectFailure(2, "--scenario s.json", "--ticks is required");
+  this->ExpectFailure(2, "--scenario s.json --ticks 0", "--ticks");
+  this->ExpectFailure(2, "--scenario s.json --ticks ten", "--ticks");
+  this->ExpectFailure(2, "--scenario s.json --ticks 10 --heart-rate nan", "--heart-rate");
+  this->ExpectFailure(2, "--scenario s.json --ticks 10 --verify", "--verify");
+  this->ExpectFailure(2, "--scenario s.json --ticks 10 --speed 3", "--speed");
+  this->ExpectFailure(2, "--scenario hra-lca --ticks 10", "--vessels is required");
+  this->ExpectFailure(1, "--scenario none.json --ticks 10", "'none.json' is neither");
+  this->ExpectFailure(1, "--scenario s.json --vessels nowhere --ticks 10", "is no folder");
+  this->ExpectFailure(1, "--scenario s.json --wire rope --ticks 10", "no wire 'rope'");
+  this->ExpectFailure(1, "--scenario s.json --script none.json", "Cannot open 'none.json'");
+  this->ExpectFailure(1, "--scenario s.json --script s.json", "is no script");
+  this->ExpectFailure(1, "--scenario drive.json --ticks 10", "is no scenario");
+  this->ExpectFailure(1, "--replay none.pcirec", "Cannot open 'none.pcirec'");
+  this->ExpectFailure(1, "--replay s.json", "is no recording");
+  this->ExpectFailure(
+    1, "--scenario s.json --ticks 10 --record no/such/folder/a.pcirec", "no/such/folder");
+  this->ExpectBadScenario([](json& s) { s["vessels"]["run"] = "away"; }, "is no folder");
+  this->ExpectBadScenario([](json& s) { s["artery"] = "LCA"; }, "no root of the LCA");
+  this->ExpectBadScenario([](json& s) { s["catalogue"] = "own.json"; }, "own.json");
+  this->ExpectBadScenario(
+    [](json& s)
+    {
+      s["wire"] = { { "name", "weak" }, { "length_mm", 1800 },
+        { "sections",
+          json::array({ { { "length_mm", 10 }, { "bending_stiffness_N_mm2", -3 } } }) } };
+    },
+    "wire 'weak', section 1 has a negative 'bending_stiffness_N_mm2'");
+  this->ExpectBadScenario(
+    [](json& s) { s["settings"]["tick_rate_hz"] = 1e9; }, "settings has 'tick_rate_hz'");
+  EXPECT_EQ(this->Run("--scenario s.json --ticks 10"), 2);
+  EXPECT_NE(this->Said().find("--headless is required"), std::string::npos);
+  fs::remove(this->Folder / "result/weights.vtu");
+  this->ExpectFailure(1, "--scenario s.json --ticks 10", "weights.vtu' is missing");
+}
+
+TEST_F(TestCoronarySimulator, RefusesInstrumentsThatDoNotFit)
+{
+  // A wire as thick as the catheter, and a catheter as thick as the vessel.
+  ASSERT_EQ(this->Run("--scenario s.json --print-scenario"), 0);
+  json scenario = json::parse(ReadText(this->Folder / "stdout"));
+  for (json& section : scenario["wire"]["sections"])
+  {
+    section["diameter_mm"] = 1.9;
+    section["rest_curvature_per_mm"] = 0.0;
+  }
+  this->Put("thick.json", scenario);
+  EXPECT_EQ(this->Run("--headless --quiet --scenario thick.json --ticks 10"), 1) << this->Said();
+  EXPECT_EQ(this->Run("--scenario s.json --print-scenario"), 0);
+  scenario = json::parse(ReadText(this->Folder / "stdout"));
+  scenario["catheter"]["outer_diameter_mm"] = 8.0;
+  scenario["catheter"]["shape"] = json::array();
+  this->Put("thick.json", scenario);
+  EXPECT_EQ(this->Run("--headless --quiet --scenario thick.json --ticks 10"), 1) << this->Said();
+}
+
+TEST_F(TestCoronarySimulator, ClampsAbsurdDriving)
+{
+  this->Put("absurd.json",
+    { { "format", "dynamiccoronary script" }, { "version", 1 },
+      { "pieces",
+        { { { "seconds", 0.1 }, { "wire_mm", 10000 } }, { { "seconds", 0 }, { "wire_mm", -1e6 } },
+          { { "seconds", 0.1 }, { "wire_deg", 1e7 }, { "catheter_mm", -1e5 } } } } });
+  ASSERT_EQ(this->Run("--headless --quiet --scenario s.json --script absurd.json --output a"), 0)
+    << this->Said();
+  const json statistics = this->Statistics("a");
+  EXPECT_GT(statistics["number_of_messages"], 0);
+  EXPECT_LT(statistics["inserted"]["largest_mm"].get<double>(), 100.0);
+}
+
+TEST_F(TestCoronarySimulator, LeavesNothingWhenInterrupted)
+{
+  EXPECT_EQ(this->Run("--headless --scenario s.json --ticks 1000000000 --output bad --record "
+                      "bad.pcirec",
+              "timeout --foreground --preserve-status -s INT 2"),
+    130);
+  EXPECT_NE(this->Said().find("coronary-simulator: interrupted"), std::string::npos);
+  EXPECT_FALSE(fs::exists(this->Folder / "bad"));
+  EXPECT_FALSE(fs::exists(this->Folder / "bad.pcirec"));
+}
+
+TEST_F(TestCoronarySimulator, PrintsWhatItKnows)
+{
+  ASSERT_EQ(this->Run("--list-scenarios"), 0);
+  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca" })
+  {
+    EXPECT_NE(ReadText(this->Folder / "stdout").find(name), std::string::npos);
+  }
+  ASSERT_EQ(this->Run("--list-instruments"), 0);
+  EXPECT_NE(ReadText(this->Folder / "stdout").find("cto-9gf"), std::string::npos);
+  ASSERT_EQ(this->Run("--scenario phantom-lca --heart-rate 99 --wire cto-9gf --print-scenario"), 0);
+  const json scenario = json::parse(ReadText(this->Folder / "stdout"));
+  EXPECT_EQ(scenario["settings"]["heart_rate_bpm"], 99.0);
+  EXPECT_EQ(scenario["wire"]["name"], "cto-9gf");
+  EXPECT_EQ(this->Run("--help"), 0);
+  EXPECT_EQ(this->Run("--version"), 0);
+}

@@ -1,0 +1,322 @@
+// Scenarios, scripts of driving, and the heart that contracts by formula.
+#include "ContractionMotion.h"
+#include "DriveScript.h"
+#include "InstrumentCatalogue.h"
+#include "Scenario.h"
+
+#include "Refusals.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <unistd.h>
+
+using coronary::LoadScenario;
+using coronary::Scenario;
+using coronary::ScenarioFromText;
+using coronary::ScenarioText;
+using coronary::Vector3;
+using coronary::VesselSource;
+using nlohmann::json;
+
+namespace
+{
+template <typename Change>
+void Refused(const Change& change, const std::string& part)
+{
+  json changed = json::parse(ScenarioText(LoadScenario("phantom-lca")));
+  change(changed);
+  ExpectRefusal([&] { ScenarioFromText(changed.dump(), "'own.json'", "."); }, part);
+  ExpectRefusal([&] { ScenarioFromText(changed.dump(), "'own.json'", "."); }, "'own.json'");
+}
+
+/// A tube of points around a curved axis of 100 mm.
+class RestingVessel : public coronary::WallMotion
+{
+public:
+  RestingVessel()
+  {
+    std::vector<Vector3> axis;
+    for (int n = 0; n <= 50; ++n)
+    {
+      axis.emplace_back(20.0 * std::sin(0.06 * n), 5.0, 2.0 * n);
+      for (int k = 0; k < 6; ++k)
+      {
+        this->Points.push_back(axis.back() + Vector3(std::cos(k), std::sin(k), 0.0));
+      }
+    }
+    this->Still.points = static_cast<std::int64_t>(this->Points.size());
+    this->Still.axis = { axis };
+    this->Still.parent = { -1 };
+    this->Still.groupName = { "LM" };
+  }
+  const coronary::WallTopology& Topology() const override { return this->Still; }
+  void Positions(double, std::vector<Vector3>& positions) override { positions = this->Points; }
+  void AxisPositions(double, std::vector<Vector3>& positions) override
+  {
+    positions = this->Still.axis[0];
+  }
+
+  coronary::WallTopology Still;
+  std::vector<Vector3> Points;
+};
+}
+
+TEST(UnitTestScenario, BuiltInOnesAreGood)
+{
+  const auto list = coronary::BuiltInScenarios();
+  ASSERT_EQ(list.size(), 3U);
+  for (const auto& one : list)
+  {
+    const Scenario scenario = LoadScenario(one.name);
+    EXPECT_EQ(scenario.name, one.name);
+    EXPECT_FALSE(one.description.empty());
+    EXPECT_NO_THROW(scenario.wire.Validate());
+    EXPECT_NO_THROW(scenario.catheter.Validate());
+  }
+  EXPECT_EQ(LoadScenario("phantom-rca").artery, "RCA");
+  const Scenario atlas = LoadScenario("hra-lca");
+  EXPECT_EQ(atlas.vessels.kind, VesselSource::Kind::Run);
+  EXPECT_TRUE(atlas.vessels.path.empty());
+  EXPECT_EQ(atlas.vessels.motion, coronary::VesselMotion::Contraction);
+}
+
+TEST(UnitTestScenario, TextSaysEverythingToTheBit)
+{
+  for (const auto& one : coronary::BuiltInScenarios())
+  {
+    const Scenario scenario = LoadScenario(one.name);
+    const std::string text = ScenarioText(scenario);
+    const Scenario again = ScenarioFromText(text, "'text'", "/elsewhere");
+    EXPECT_EQ(ScenarioText(again), text);
+    ASSERT_EQ(again.wire.sections.size(), scenario.wire.sections.size());
+    for (std::size_t n = 0; n < scenario.wire.sections.size(); ++n)
+    {
+      EXPECT_EQ(
+        again.wire.sections[n].bendingStiffness1, scenario.wire.sections[n].bendingStiffness1);
+      EXPECT_EQ(again.wire.sections[n].radius, scenario.wire.sections[n].radius);
+    }
+    for (std::size_t n = 0; n < scenario.catheter.shape.size(); ++n)
+    {
+      EXPECT_EQ(again.catheter.shape[n].curvature, scenario.catheter.shape[n].curvature);
+    }
+    EXPECT_EQ(again.vessels.contraction.twist, scenario.vessels.contraction.twist);
+  }
+}
+
+TEST(UnitTestScenario, EverySettingArrives)
+{
+  json text = json::parse(ScenarioText(LoadScenario("phantom-lca")));
+  text["settings"] = { { "tick_rate_hz", 1000 }, { "ticks_per_frame", 17 }, { "heart_rate_bpm", 0 },
+    { "start_phase", 0.25 }, { "segment_length_mm", 2 }, { "capacity", 99 },
+    { "inside_catheter_mm", 11 }, { "root_branch", 4 }, { "engagement_mm", 5 },
+    { "wall_friction_factor", 2.5 }, { "wall_stiffness_N_per_mm", 7 }, { "drag_Pa_s", 0.5 },
+    { "largest_speed_mm_s", 50 }, { "largest_turning_rad_s", 6 } };
+  text["vessels"]["phantom"] = { { "seed", 9 }, { "dominance", "left" }, { "stenoses", 3 },
+    { "surface_spacing_mm", 0.5 } };
+  text["wire"] = "cto-9gf";
+  text["seed"] = 77;
+  const Scenario s = ScenarioFromText(text.dump(), "'own.json'", ".");
+  EXPECT_EQ(s.settings.tickRate, 1000.0);
+  EXPECT_EQ(s.settings.ticksPerFrame, 17);
+  EXPECT_EQ(s.settings.heartRate, 0.0);
+  EXPECT_EQ(s.settings.startPhase, 0.25);
+  EXPECT_EQ(s.settings.segmentLength, 2.0);
+  EXPECT_EQ(s.settings.capacity, 99);
+  EXPECT_EQ(s.settings.insideCatheter, 11.0);
+  EXPECT_EQ(s.settings.rootBranch, 4);
+  EXPECT_EQ(s.settings.engagement, 5.0);
+  EXPECT_EQ(s.settings.wallFriction, 2.5);
+  EXPECT_EQ(s.settings.wallStiffness, 7.0);
+  EXPECT_EQ(s.settings.drag, 0.5);
+  EXPECT_EQ(s.settings.largestSpeed, 50.0);
+  EXPECT_EQ(s.settings.largestTurning, 6.0);
+  EXPECT_EQ(s.vessels.phantom.seed, 9U);
+  EXPECT_EQ(s.vessels.phantom.dominance, coronary::Dominance::Left);
+  EXPECT_EQ(s.vessels.phantom.stenoses, 3);
+  EXPECT_EQ(s.vessels.phantom.surfaceSpacing, 0.5);
+  EXPECT_EQ(s.wire.name, "cto-9gf");
+  EXPECT_EQ(s.seed, 77U);
+}
+
+TEST(UnitTestScenario, RefusesWithThePlace)
+{
+  Refused([](json& s) { s["wire"] = "spaghetti"; }, "no wire 'spaghetti'");
+  Refused([](json& s) { s["catheter"] = 7; }, "'catheter': 7 is no object");
+  Refused([](json& s) { s["wire"]["sections"][0]["torsional_stiffness_N_mm2"] = -1; },
+    "wire 'workhorse', section 1 has a negative 'torsional_stiffness_N_mm2'");
+  Refused([](json& s) { s["settings"]["tick_rate_hz"] = 1; }, "settings has 'tick_rate_hz'");
+  Refused([](json& s) { s["settings"]["heartrate"] = 60; }, "'heartrate', which means nothing");
+  Refused([](json& s) { s["settings"]["capacity"] = 1.5; }, "'capacity'");
+  Refused([](json& s) { s["artery"] = "aorta"; }, "'aorta' is none of LCA, RCA, any");
+  Refused([](json& s) { s["vessels"]["run"] = "x"; }, "one of 'phantom', 'run' and 'surface'");
+  Refused([](json& s) { s["vessels"] = json::object(); }, "one of 'phantom', 'run' and 'surface'");
+  Refused([](json& s) { s["vessels"]["phantom"]["seed"] = -1; }, "'seed'");
+  Refused([](json& s) { s["vessels"]["phantom"]["dominance"] = "up"; }, "none of right, left");
+  Refused([](json& s) { s["vessels"]["motion"] = { { "model", "jump" } }; }, "none of automatic");
+  Refused(
+    [](json& s)
+    {
+      s["vessels"] = { { "surface", "a.vtp" }, { "centerline", "b.vtp" },
+        { "motion", { { "model", "tracked" } } } };
+    },
+    "tracked motion, which only a run has");
+  Refused(
+    [](json& s) {
+      s["vessels"]["motion"] = { { "model", "contraction" }, { "axial_mm", -1 } };
+    },
+    "negative 'axial_mm'");
+  Refused(
+    [](json& s) {
+      s["vessels"]["motion"] = { { "model", "contraction" }, { "base_mm", { 1, 2, 3 } } };
+    },
+    "only one of");
+  Refused([](json& s) { s["version"] = 3; }, "another 'version'");
+  Refused([](json& s) { s.erase("name"); }, "has no 'name'");
+  EXPECT_THROW(LoadScenario("no-such-scenario"), std::runtime_error);
+  EXPECT_THROW(ScenarioFromText("[1, 2", "'x'", "."), std::runtime_error);
+}
+
+TEST(UnitTestScenario, PathsAreThoseBesideTheFile)
+{
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::temp_directory_path() / ("scenario test." + std::to_string(getpid()));
+  fs::create_directories(folder);
+  json text = json::parse(ScenarioText(LoadScenario("phantom-lca")));
+  text["vessels"] = { { "run", "results/1" } };
+  text["catalogue"] = "own.json";
+  text["wire"] = "mine";
+  std::ofstream(folder / "s.json") << text.dump();
+  EXPECT_THROW(LoadScenario((folder / "s.json").string()), std::runtime_error) << "no catalogue";
+  std::ifstream file(DYNAMICCORONARY_INSTRUMENTS);
+  json catalogue = json::parse(file);
+  catalogue["wires"][0]["name"] = "mine";
+  std::ofstream(folder / "own.json") << catalogue.dump();
+  const Scenario scenario = LoadScenario((folder / "s.json").string());
+  EXPECT_EQ(scenario.vessels.path, (folder / "results/1").string());
+  EXPECT_EQ(scenario.wire.name, "mine");
+  EXPECT_EQ(scenario.vessels.motion, coronary::VesselMotion::Automatic);
+  fs::remove_all(folder);
+}
+
+TEST(UnitTestScenario, RootsAreFoundByName)
+{
+  coronary::WallTopology topology;
+  topology.axis.resize(3);
+  topology.parent = { -1, 0, -1 };
+  topology.groupName = { "LM", "pLAD", "pRCA" };
+  EXPECT_EQ(coronary::RootBranch(topology, "LCA"), 0);
+  EXPECT_EQ(coronary::RootBranch(topology, "RCA"), 2);
+  EXPECT_EQ(coronary::RootBranch(topology, "any"), 0);
+  topology.groupName = { "LM", "pLAD", "x" };
+  ExpectRefusal([&] { coronary::RootBranch(topology, "RCA"); }, "their roots are 'LM', 'x'");
+}
+
+TEST(UnitTestScenario, ScriptsAreEvenPieces)
+{
+  const auto script =
+    coronary::DriveScriptFromText(R"({ "format": "dynamiccoronary script", "version": 1,
+    "pieces": [ { "seconds": 4, "wire_mm": 20 }, { "seconds": 0, "wire_deg": 90 },
+      { "seconds": 2, "wire_mm": -10, "catheter_mm": 1, "heart_rate_bpm": 90 } ] })",
+      "'script'");
+  EXPECT_EQ(script.Duration(), 6.0);
+  EXPECT_EQ(script.At(-1.0).wirePosition, 0.0);
+  EXPECT_EQ(script.At(1.0).wirePosition, 5.0);
+  EXPECT_EQ(script.At(3.999).wireAngle, 0.0);
+  EXPECT_NEAR(script.At(4.0).wireAngle, M_PI / 2.0, 1e-15);
+  EXPECT_EQ(script.At(5.0).wirePosition, 15.0);
+  EXPECT_EQ(script.At(5.0).catheterPosition, 0.5);
+  EXPECT_EQ(script.At(100.0).wirePosition, 10.0);
+  EXPECT_TRUE(script.HeartRates(0.0, 4.0).empty());
+  EXPECT_EQ(script.HeartRates(4.0, 4.0005), std::vector<double>{ 90.0 });
+  EXPECT_TRUE(script.HeartRates(4.0005, 9.0).empty());
+  EXPECT_EQ(coronary::DriveScript().At(1.0).wirePosition, 0.0);
+  const auto refused = [](const std::string& pieces, const std::string& part)
+  {
+    ExpectRefusal(
+      [&]
+      {
+        coronary::DriveScriptFromText(
+          R"({ "format": "dynamiccoronary script", "version": 1, "pieces": )" + pieces + "}",
+          "'s.json'");
+      },
+      part);
+  };
+  refused(R"([ { "seconds": -1 } ])", "'s.json', piece 1 has a negative 'seconds'");
+  refused(R"([ { "seconds": 1 }, { "seconds": 1, "wire": 3 } ])", "piece 2 has 'wire'");
+  refused(R"([ { "seconds": 1, "heart_rate_bpm": 900 } ])", "'heart_rate_bpm'");
+  refused(R"([ { "wire_mm": 1 } ])", "has no 'seconds'");
+  refused("3", "is no list");
+}
+
+TEST(UnitTestScenario, TheContractionIsSmoothAndPeriodic)
+{
+  const double systole = 0.35;
+  EXPECT_NEAR(coronary::ContractionCurve(0.0, systole), 0.0, 1e-15);
+  EXPECT_NEAR(coronary::ContractionCurve(systole, systole), 1.0, 1e-15);
+  EXPECT_NEAR(coronary::ContractionCurve(0.7, systole), 0.2, 1e-12);
+  const double h = 1e-4;
+  for (int n = 0; n < 10000; ++n)
+  {
+    const double t = n * h;
+    const double now = coronary::ContractionCurve(t, systole);
+    EXPECT_GE(now, -1e-12);
+    EXPECT_LE(now, 1.0 + 1e-12);
+    EXPECT_NEAR(coronary::ContractionCurve(t + 7.0, systole), now, 1e-9);
+    // The second derivative does not jump, not at the cycle's end either.
+    const double bend = (coronary::ContractionCurve(t + h, systole) - 2.0 * now +
+                          coronary::ContractionCurve(t - h, systole)) /
+      (h * h);
+    const double bendAfter = (coronary::ContractionCurve(t + 2.0 * h, systole) -
+                               2.0 * coronary::ContractionCurve(t + h, systole) + now) /
+      (h * h);
+    EXPECT_LT(std::abs(bend - bendAfter), 1.5) << t;
+  }
+}
+
+TEST(UnitTestScenario, TheContractionIsAsFastAsItMayBe)
+{
+  const auto rest = std::make_shared<RestingVessel>();
+  coronary::ContractionSettings settings;
+  settings.axial = 25.0;
+  coronary::ContractionMotion motion(rest, settings);
+  EXPECT_LE(motion.PeakSpeed(), 108.6);
+  EXPECT_GT(motion.PeakSpeed(), 107.0);
+  EXPECT_LT(motion.Settings().axial, 25.0);
+  std::vector<Vector3> now;
+  std::vector<Vector3> later;
+  double fastest = 0.0;
+  for (int n = 0; n < 800; ++n)
+  {
+    motion.Positions(n / 800.0, now);
+    motion.Positions((n + 1) / 800.0, later);
+    for (std::size_t k = 0; k < now.size(); ++k)
+    {
+      fastest = std::max(fastest, (later[k] - now[k]).norm() * 1000.0);
+    }
+  }
+  EXPECT_NEAR(fastest, 108.6, 1.5);
+  motion.Positions(0.0, now);
+  for (std::size_t k = 0; k < now.size(); ++k)
+  {
+    EXPECT_LT((now[k] - rest->Points[k]).norm(), 1e-12);
+  }
+  motion.AxisPositions(0.35, later);
+  // The base comes down, the apex stays.
+  EXPECT_GT((later.front() - rest->Still.axis[0].front()).norm(), 5.0);
+  EXPECT_LT((later.back() - rest->Still.axis[0].back()).norm(), 1e-9);
+
+  settings.axial = 3.0;
+  settings.radial = 0.0;
+  settings.twist = 0.0;
+  coronary::ContractionMotion slow(rest, settings);
+  EXPECT_EQ(slow.Settings().axial, 3.0) << "nothing to scale down";
+  settings.base = Vector3(0, 0, 0);
+  settings.apex = Vector3(0, 0, 5);
+  ExpectRefusal([&] { coronary::ContractionMotion(rest, settings); }, "less than 20 mm");
+  settings.radial = 0.9;
+  ExpectRefusal([&] { coronary::ContractionMotion(rest, settings); }, "radial is 0.9");
+}
