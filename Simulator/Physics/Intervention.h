@@ -40,7 +40,9 @@ struct InterventionSettings
   double engagement = 3.0;   ///< mm from the ostium to the catheter's tip along the vessel
   double wallFriction = 1.0; ///< factor on the wire's friction against the wall, 0 to 10
   double wallStiffness = 20.0; ///< N/mm of a sample's contact
-  double drag = 0.025;         ///< Pa s: of blood, per length, across and along the wire
+  /// Pa s: per length, across and along the wire, against blood that moves with the walls. Blood's own is about
+  /// 0.025; a hundred times that calms the jumps of the light tip, and is still nothing against friction.
+  double drag = 2.5;
   double largestSpeed = 300.0; ///< mm/s by which hands can advance; more is clamped, with a message
   double largestTurning = 30.0; ///< rad/s, likewise
 

@@ -105,6 +105,13 @@ struct Memory
   double clearance = 0.0; ///< mm of the path in which there is none
   std::vector<Candidate> list;
 
+  // Where it was seen last, and how far from the wall at least: a sample that is inside by more than it has moved
+  // can not have come to be outside.
+  bool seen = false;
+  Vector3 seenAt = Vector3::Zero();
+  double seenDistance = 0.0;
+  double seenTime = 0.0;
+
   double range = 0.0; ///< mm, that contacts were last looked for in
   int planes = 0;
   std::array<Vector3, 2> normal;
@@ -117,6 +124,7 @@ struct Memory
     this->nearest = -1;
     this->side = Side::Inside;
     this->frame = -2;
+    this->seen = false;
     this->range = 0.0;
     this->planes = 0;
     this->list.clear();
@@ -472,6 +480,7 @@ struct VesselWall::Internals
   // Time.
   std::int64_t Frame = 0;
   double Seconds = 1.0;
+  double FrameBegin = 0.0; ///< s since the first frame would have begun
   double Rate = 1.0; ///< 1 / Seconds
   double Time = 0.0;
   double Fraction = 0.0;
@@ -732,6 +741,10 @@ struct VesselWall::Internals
   /// Since triangles were looked up, and how far the sample may be from its path against the wall.
   bool Valid(const Memory& memory, const Vector3& p, double& drift) const;
   void Search(Memory& memory, const Vector3& p, double range);
+  /// SideOf, unless the sample can not have got there since it was seen: next to slivers of the mesh the side of
+  /// a place may be told wrongly.
+  Side Judge(Memory& memory, const Hit& hit, const Vector3& p);
+  void See(Memory& memory, const Vector3& p, double distance);
   /// Fills the list for the path that begins at p and moves with the wall at `hit`; the least distance now.
   double Collect(Memory& memory, const Hit& hit, const Vector3& p, double radius);
   /// The nearest places of all triangles that matter; false if there is no wall within `range` (and then
@@ -1336,6 +1349,31 @@ double VesselWall::Internals::Collect(
   return least;
 }
 
+void VesselWall::Internals::See(Memory& memory, const Vector3& p, double distance)
+{
+  memory.seen = true;
+  memory.seenAt = p;
+  memory.seenDistance = distance;
+  memory.seenTime = this->FrameBegin + this->Time;
+}
+
+Side VesselWall::Internals::Judge(Memory& memory, const Hit& hit, const Vector3& p)
+{
+  constexpr double Slack = 0.03; // mm, for what the wall near it moves unevenly
+  Side side = this->SideOf(hit, p);
+  if (side == Side::Outside && memory.seen && memory.side == Side::Inside)
+  {
+    const double passed = this->FrameBegin + this->Time - memory.seenTime;
+    const double moved = (p - memory.seenAt - passed * memory.velocity).norm();
+    if (moved + Slack < memory.seenDistance + hit.distance)
+    {
+      side = Side::Inside;
+    }
+  }
+  this->See(memory, p, hit.distance);
+  return side;
+}
+
 void VesselWall::Internals::Search(Memory& memory, const Vector3& p, double range)
 {
   ++this->Searches;
@@ -1349,7 +1387,7 @@ void VesselWall::Internals::Search(Memory& memory, const Vector3& p, double rang
   {
     memory.nearest = hit.triangle;
     memory.patch = this->Triangles[hit.triangle].patch;
-    memory.side = this->SideOf(hit, from);
+    memory.side = this->Judge(memory, hit, from);
   };
   const double radius = range + this->Blend + this->Settings.margin;
   // Far from the wall it is not worth while to know which place is the nearest (in the middle of a vessel all its
@@ -1435,7 +1473,7 @@ bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double ra
     const bool found = nearest.distance + drift <= memory.radius;
     if (found)
     {
-      memory.side = this->SideOf(nearest, p);
+      memory.side = this->Judge(memory, nearest, p);
       memory.nearest = nearest.triangle;
       memory.patch = this->Triangles[nearest.triangle].patch;
     }
@@ -1566,6 +1604,7 @@ void VesselWall::BeginFrame(const std::vector<Vector3>& next, double seconds)
   data.VelocityChange = std::sqrt(change) * (1.0 + 1e-12) + 1e-12;
   data.Now = 1 - data.Now;
   data.Extent[1 - data.Now] = extent.maxCoeff();
+  data.FrameBegin += data.Seconds;
   data.Seconds = seconds;
   data.Rate = rate;
   data.Time = 0.0;
@@ -1597,6 +1636,7 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
   if (data.Valid(memory, sample.centre, drift) && memory.side != Side::Outside &&
     drift + range < memory.clearance)
   {
+    data.See(memory, sample.centre, memory.clearance - drift);
     memory.planes = 0;
     return;
   }
@@ -1721,7 +1761,7 @@ WallPlace VesselWall::Locate(const ContactSample& sample)
   const Hit nearest = data.ClosestTo(sample.centre, memory.patch, memory.nearest);
   memory.nearest = nearest.triangle;
   memory.patch = data.Triangles[nearest.triangle].patch;
-  return data.PlaceFrom(nearest, data.SideOf(nearest, sample.centre));
+  return data.PlaceFrom(nearest, data.Judge(memory, nearest, sample.centre));
 }
 
 void VesselWall::Place(std::int64_t sample, std::int64_t triangle)
