@@ -11,8 +11,10 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-constexpr int MostRounds = 10;       // in which contacts are added to an iteration
+constexpr int MostRounds = 12;       // in which contacts are added to an iteration
 constexpr double PressDepth = 0.005; // mm
+constexpr double LeastCalm = 0.02;   // N/mm
+constexpr double MostCalm = 100.0;   // N/mm
 
 Matrix3 Cross(const Vector3& v)
 {
@@ -455,6 +457,7 @@ void CosseratRod::FindContacts(double seconds, ContactSurface& surface)
 void CosseratRod::AssembleBodies(double seconds)
 {
   const double rate = 1.0 / seconds;
+  const double calm = this->Calm;
   for (Body& body : this->Bodies)
   {
     if (body.held)
@@ -472,6 +475,12 @@ void CosseratRod::AssembleBodies(double seconds)
         (segment.axialInertia - segment.transverseInertia) * body.axis * body.axis.transpose());
     body.matrix.bottomRightCorner<3, 3>() =
       inertia + segment.rotationalDrag * rate * Matrix3::Identity();
+    if (calm > 0.0)
+    {
+      // Against moves across, from where the walls carry it: what is fed in along the rod is not held back.
+      body.matrix.topLeftCorner<3, 3>() +=
+        calm * (Matrix3::Identity() - body.axis * body.axis.transpose());
+    }
     const Vector3 moved = body.position - body.oldPosition;
     body.right.head<3>() = body.force - inertial * (body.position - body.freePosition) -
       segment.drag * (rate * moved - body.medium);
@@ -725,6 +734,18 @@ bool CosseratRod::Solve()
   return true;
 }
 
+double CosseratRod::SidewaysMove() const
+{
+  double most = 0.0;
+  for (const Body& body : this->Bodies)
+  {
+    const Vector3 move = body.right.head<3>();
+    const double along = move.dot(body.axis);
+    most = std::max(most, move.squaredNorm() - along * along);
+  }
+  return std::sqrt(std::max(0.0, most));
+}
+
 bool CosseratRod::ChangeContacts()
 {
   // What the linear equations let go into a wall is taken for a contact in earnest within this step, and let go
@@ -921,10 +942,17 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
       solved = this->Solve();
       if (solved)
       {
-        if (!this->ChangeContacts())
+        if (this->ChangeContacts())
+        {
+          continue;
+        }
+        const bool far = this->Settings.trust > 0.0 && this->SidewaysMove() > this->Settings.trust;
+        if (!far || this->Calm >= MostCalm)
         {
           break;
         }
+        this->Calm = std::max(LeastCalm, 8.0 * this->Calm);
+        ++this->Last.calmed;
       }
       else if (exact)
       {
@@ -951,6 +979,7 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
     }
   }
   this->Finish(seconds);
+  this->Calm = this->Calm > LeastCalm ? 0.25 * this->Calm : 0.0;
   return this->Last;
 }
 
@@ -1020,7 +1049,7 @@ double CosseratRod::ContactEnergy() const
 
 std::uint64_t CosseratRod::Hash(std::uint64_t seed) const
 {
-  std::uint64_t hash = seed;
+  std::uint64_t hash = HashBits(seed, &this->Calm, 1);
   for (const Body& body : this->Bodies)
   {
     hash = HashBits(hash, body.position.data(), 3);

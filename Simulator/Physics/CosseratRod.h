@@ -70,6 +70,7 @@ struct RodStep
   int touching = 0;                ///< contacts with a force
   double largestUpdate = 0.0;      ///< mm, of the last iteration
   int pressed = 0;                 ///< planes that came to be contacts within the step
+  int calmed = 0;     ///< times that the equations were damped more, to keep moves across within trust
   int indefinite = 0;              ///< iterations whose exact matrix was not positive definite
   double frictionWork = 0.0;       ///< N mm that friction took away in this step
   double wallWork = 0.0;           ///< N mm that the moving wall did on the rod in this step
@@ -85,6 +86,9 @@ struct RodSettings
   double frictionStiffness = 20.0; ///< N/mm of a contact that sticks, positive
   double largestMove = 0.4;        ///< mm and, for turns, half as many rad: limit of an iteration
   int samples = 2; ///< of a segment that are asked for contacts, 1 to 4, evenly spread
+  /// mm by which a segment may move across in a step, beside what the walls carry it: a rod that snaps over takes
+  /// several steps for it. 0: any way. For rods that are so light that nothing else slows them down.
+  double trust = 0.0;
   bool mediumFollowsWalls =
     false;               ///< the medium moves as the walls around it, not as SetMedium says
   bool tipSample = true; ///< and the free end of the first segment
@@ -258,6 +262,7 @@ private:
   void AssembleJoints(double seconds, bool exact);
   void AssembleContacts(bool first);
   bool Solve();          ///< false: the matrix is not positive definite
+  double SidewaysMove() const; ///< mm, greatest, of the solution
   bool ChangeContacts(); ///< true: the equations have changed
   double Update(double& scale);
   void Finish(double seconds);
@@ -272,6 +277,7 @@ private:
   std::vector<Plane> Planes;
   std::vector<RodContact> Touched;
   RodStep Last;
+  double Calm = 0.0; ///< N/mm against moves across
 };
 
 ///@{

@@ -698,6 +698,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   rod.mediumFollowsWalls = true;
   rod.reach = 0.4;
   rod.largestMove = 1.0;
+  rod.trust = 0.1;
   data.Rod = std::make_unique<CosseratRod>(settings.capacity, rod);
   data.InVessel.assign(settings.capacity * data.Rod->SamplesPerSegment(), 0);
   data.Line.reserve(settings.capacity + 1);

@@ -105,12 +105,16 @@ struct Memory
   double clearance = 0.0; ///< mm of the path in which there is none
   std::vector<Candidate> list;
 
-  // Where it was seen last, and how far from the wall at least: a sample that is inside by more than it has moved
-  // can not have come to be outside.
-  bool seen = false;
-  Vector3 seenAt = Vector3::Zero();
-  double seenDistance = 0.0;
+  // Where its distance was known last, and how far from the wall it was at least: a sample that is inside by more
+  // than it has moved can not have come to be outside.
+  bool known = false;
+  Vector3 knownAt = Vector3::Zero();
+  double knownDistance = 0.0;
+  double knownTime = 0.0;
+  // The last place that was evaluated.
+  std::int64_t seenFrame = -2;
   double seenTime = 0.0;
+  Vector3 seen = Vector3::Zero();
 
   double range = 0.0; ///< mm, that contacts were last looked for in
   int planes = 0;
@@ -124,7 +128,8 @@ struct Memory
     this->nearest = -1;
     this->side = Side::Inside;
     this->frame = -2;
-    this->seen = false;
+    this->known = false;
+    this->seenFrame = -2;
     this->range = 0.0;
     this->planes = 0;
     this->list.clear();
@@ -499,7 +504,11 @@ struct VesselWall::Internals
   std::size_t Known = 0;
   std::uint64_t Searches = 0;
 
+  // Of the evaluation that was last.
   std::vector<Hit> Hits;
+  std::vector<std::int32_t> Later; ///< candidates within range that do not turn the first plane
+  float Passed = 0.0f;             ///< s since triangles were looked up
+  float Offset[3] = { 0.0f, 0.0f, 0.0f };
   std::vector<Vector3> AllPoints;
   std::vector<Vector3> AllNormals;
 
@@ -744,14 +753,19 @@ struct VesselWall::Internals
   /// SideOf, unless the sample can not have got there since it was seen: next to slivers of the mesh the side of
   /// a place may be told wrongly.
   Side Judge(Memory& memory, const Hit& hit, const Vector3& p);
-  void See(Memory& memory, const Vector3& p, double distance);
+  void Know(Memory& memory, const Vector3& p, double distance);
   /// Fills the list for the path that begins at p and moves with the wall at `hit`; the least distance now.
   double Collect(Memory& memory, const Hit& hit, const Vector3& p, double radius);
   /// The nearest places of all triangles that matter; false if there is no wall within `range` (and then
   /// the side is the one that it was).
   bool Evaluate(Memory& memory, const Vector3& p, double range, Hit& nearest);
+  Hit Look(Candidate& candidate, const Vector3& p) const;
+  /// Adds the hits within range that may be of another side than `first`.
+  void EvaluateLater(Memory& memory, const Vector3& p, double range, const Vector3* first);
+  /// @param first  normal of the plane that this one is another side of; null: there is none
   /// @param limit  mm: triangles up to this distance are known
-  ContactPlane MakePlane(const ContactSample& sample, Hit& hit, Side side, double limit);
+  ContactPlane MakePlane(
+    const ContactSample& sample, Hit& hit, Side side, double limit, const Vector3* first);
   WallPlace PlaceFrom(const Hit& hit, Side side) const;
 };
 
@@ -905,6 +919,7 @@ void VesselWall::Internals::Build(const WallTopology& topology, const std::vecto
   this->Table.assign(256, -1);
   this->Memories.reserve(128);
   this->Hits.reserve(256);
+  this->Later.reserve(256);
 }
 
 void VesselWall::Internals::BuildPatches()
@@ -1349,28 +1364,28 @@ double VesselWall::Internals::Collect(
   return least;
 }
 
-void VesselWall::Internals::See(Memory& memory, const Vector3& p, double distance)
+void VesselWall::Internals::Know(Memory& memory, const Vector3& p, double distance)
 {
-  memory.seen = true;
-  memory.seenAt = p;
-  memory.seenDistance = distance;
-  memory.seenTime = this->FrameBegin + this->Time;
+  memory.known = true;
+  memory.knownAt = p;
+  memory.knownDistance = distance;
+  memory.knownTime = this->FrameBegin + this->Time;
 }
 
 Side VesselWall::Internals::Judge(Memory& memory, const Hit& hit, const Vector3& p)
 {
   constexpr double Slack = 0.03; // mm, for what the wall near it moves unevenly
   Side side = this->SideOf(hit, p);
-  if (side == Side::Outside && memory.seen && memory.side == Side::Inside)
+  if (side == Side::Outside && memory.known && memory.side == Side::Inside)
   {
-    const double passed = this->FrameBegin + this->Time - memory.seenTime;
-    const double moved = (p - memory.seenAt - passed * memory.velocity).norm();
-    if (moved + Slack < memory.seenDistance + hit.distance)
+    const double passed = this->FrameBegin + this->Time - memory.knownTime;
+    const double moved = (p - memory.knownAt - passed * memory.velocity).norm();
+    if (moved + Slack < memory.knownDistance + hit.distance)
     {
       side = Side::Inside;
     }
   }
-  this->See(memory, p, hit.distance);
+  this->Know(memory, p, hit.distance);
   return side;
 }
 
@@ -1418,6 +1433,9 @@ void VesselWall::Internals::Search(Memory& memory, const Vector3& p, double rang
 
 bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double range, Hit& nearest)
 {
+  memory.seenFrame = this->Frame;
+  memory.seenTime = this->Time;
+  memory.seen = p;
   double drift = 0.0;
   if (!this->Valid(memory, p, drift) || drift + range + this->Blend > memory.radius)
   {
@@ -1431,9 +1449,11 @@ bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double ra
     const bool stale = memory.frame != this->Frame;
     const double passed = stale ? memory.rest + this->Time : this->Time - memory.begin;
     const Vector3 offset = p - memory.place - passed * memory.velocity;
-    const float at[3] = { static_cast<float>(offset[0]), static_cast<float>(offset[1]),
-      static_cast<float>(offset[2]) };
+    const float* at = this->Offset;
+    std::copy(offset.data(), offset.data() + 3, this->Offset);
     const auto now = static_cast<float>(passed);
+    this->Passed = now;
+    this->Later.clear();
     const auto change = static_cast<float>(stale ? this->VelocityChange : 0.0);
     // What was nearest the last time tells how far one has to look.
     double known = Infinity;
@@ -1441,7 +1461,9 @@ bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double ra
     {
       known = std::sqrt(this->Nearest(memory.nearest, p).squared);
     }
-    const auto limit = static_cast<float>(std::max(known + this->Blend, range)) * 1.00001f + 1e-5f;
+    const double wanted = memory.side == Side::Outside ? known : std::min(known, range);
+    const auto limit = static_cast<float>(wanted + this->Blend) * 1.00001f + 1e-5f;
+    const auto further = std::max(0.0f, static_cast<float>(range) * 1.00001f + 1e-5f - limit);
     for (Candidate& candidate : memory.list)
     {
       const float slack =
@@ -1449,23 +1471,22 @@ bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double ra
       const float x = at[0] - candidate.place[0];
       const float y = at[1] - candidate.place[1];
       const float z = at[2] - candidate.place[2];
-      if (slack > 0.0f && slack * slack > x * x + y * y + z * z)
+      const float moved = x * x + y * y + z * z;
+      if (slack > 0.0f && slack * slack > moved)
       {
+        if (!(slack > further && (slack - further) * (slack - further) > moved))
+        {
+          this->Later.push_back(static_cast<std::int32_t>(&candidate - memory.list.data()));
+        }
         continue;
       }
-      Hit hit;
-      hit.triangle = candidate.triangle;
-      hit.on = this->Nearest(candidate.triangle, p);
-      hit.distance = std::sqrt(hit.on.squared);
-      candidate.distance = static_cast<float>(hit.distance) * 0.999999f - 2e-6f;
-      candidate.passed = now;
-      std::copy(at, at + 3, candidate.place);
+      const Hit hit = this->Look(candidate, p);
       if (hit.distance < nearest.distance ||
         (hit.distance == nearest.distance && hit.triangle < nearest.triangle))
       {
         nearest = hit;
       }
-      if (candidate.distance <= limit)
+      if (candidate.distance <= limit + further)
       {
         this->Hits.push_back(hit);
       }
@@ -1479,7 +1500,8 @@ bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double ra
     }
     // Outside, all that is almost as near has to be known.
     const bool complete = memory.side != Side::Outside ||
-      (found && nearest.distance + this->Blend + drift <= memory.radius);
+      (found && nearest.distance <= wanted &&
+        nearest.distance + this->Blend + drift <= memory.radius);
     if (complete || attempt > 0)
     {
       return found && (memory.side == Side::Outside || nearest.distance <= range);
@@ -1489,8 +1511,43 @@ bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double ra
   }
 }
 
+Hit VesselWall::Internals::Look(Candidate& candidate, const Vector3& p) const
+{
+  Hit hit;
+  hit.triangle = candidate.triangle;
+  hit.on = this->Nearest(candidate.triangle, p);
+  hit.distance = std::sqrt(hit.on.squared);
+  candidate.distance = static_cast<float>(hit.distance) * 0.999999f - 2e-6f;
+  candidate.passed = this->Passed;
+  std::copy(this->Offset, this->Offset + 3, candidate.place);
+  return hit;
+}
+
+void VesselWall::Internals::EvaluateLater(
+  Memory& memory, const Vector3& p, double range, const Vector3* first)
+{
+  for (const std::int32_t i : this->Later)
+  {
+    Candidate& candidate = memory.list[i];
+    const Corners& t = this->Triangles[candidate.triangle];
+    // Where the corners' normals are within 60 degrees, those of all places between them are.
+    if (first != nullptr && t.wall && this->NormalAt(t.vertex[0]).dot(*first) > 0.5 &&
+      this->NormalAt(t.vertex[1]).dot(*first) > 0.5 &&
+      this->NormalAt(t.vertex[2]).dot(*first) > 0.5)
+    {
+      continue;
+    }
+    const Hit hit = this->Look(candidate, p);
+    if (hit.distance <= range)
+    {
+      this->Hits.push_back(hit);
+    }
+  }
+  this->Later.clear();
+}
+
 ContactPlane VesselWall::Internals::MakePlane(
-  const ContactSample& sample, Hit& hit, Side side, double limit)
+  const ContactSample& sample, Hit& hit, Side side, double limit, const Vector3* first)
 {
   const Corners& triangle = this->Triangles[hit.triangle];
   const Vector3 reference = this->SmoothNormal(hit);
@@ -1508,7 +1565,8 @@ ContactPlane VesselWall::Internals::MakePlane(
     const Vector3& normal = this->SmoothNormal(other);
     const double weight = 1.0 - std::max(0.0, further);
     // A wall of another side is another plane.
-    sum += weight * weight * Ramp(normal.dot(reference), 0.5, 0.766) * normal;
+    const double aside = first != nullptr ? 1.0 - Ramp(normal.dot(*first), 0.25, 0.5) : 1.0;
+    sum += weight * weight * aside * Ramp(normal.dot(reference), 0.5, 0.766) * normal;
   }
   Vector3 normal = sum.norm() > 1e-6 ? Vector3(sum.normalized()) : reference;
   // On ridges (flow dividers) and flat parts beside them vertex normals are wrong: there the direction
@@ -1636,7 +1694,7 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
   if (data.Valid(memory, sample.centre, drift) && memory.side != Side::Outside &&
     drift + range < memory.clearance)
   {
-    data.See(memory, sample.centre, memory.clearance - drift);
+    data.Know(memory, sample.centre, memory.clearance - drift);
     memory.planes = 0;
     return;
   }
@@ -1651,6 +1709,7 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
   if (data.Triangles[nearest.triangle].open)
   {
     // Before an open cap: the wall around it.
+    data.EvaluateLater(memory, sample.centre, range, nullptr);
     nearest = Hit();
     for (const Hit& hit : data.Hits)
     {
@@ -1667,11 +1726,12 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
       return;
     }
   }
-  contacts.plane[0] = data.MakePlane(sample, nearest, side, limit);
+  contacts.plane[0] = data.MakePlane(sample, nearest, side, limit, nullptr);
   contacts.count = 1;
   // Of another side: the direction to it has to be that of its normal (a nearest place, not one on
   // the way around), and of several the one that is most opposite.
   const Vector3 first = contacts.plane[0].normal;
+  data.EvaluateLater(memory, sample.centre, range, &first);
   Hit second;
   double best = Infinity;
   for (Hit& hit : data.Hits)
@@ -1698,7 +1758,7 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
   }
   if (second.triangle >= 0)
   {
-    contacts.plane[1] = data.MakePlane(sample, second, Side::Inside, limit);
+    contacts.plane[1] = data.MakePlane(sample, second, Side::Inside, limit, &first);
     contacts.count = 2;
   }
   // The identity of the former plane that is most alike, or the one that is not in use.
@@ -1735,6 +1795,11 @@ bool VesselWall::Outside(const ContactSample& sample, WallPlace& place)
     return false;
   }
   Memory& memory = data.Of(sample.index);
+  if (memory.side != Side::Outside && memory.seenFrame == data.Frame &&
+    memory.seenTime == data.Time && memory.seen == sample.centre)
+  {
+    return false;
+  }
   double drift = 0.0;
   if (data.Valid(memory, sample.centre, drift) && memory.side != Side::Outside &&
     drift < memory.clearance)
