@@ -11,6 +11,8 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
+constexpr int MostRounds = 10;       // in which contacts are added to an iteration
+constexpr double PressDepth = 0.005; // mm
 
 Matrix3 Cross(const Vector3& v)
 {
@@ -586,7 +588,9 @@ void CosseratRod::AssembleContacts(bool first)
     plane.arm = offset * body.axis;
     plane.contact.point = body.position + plane.arm;
     plane.gapLinear = plane.gapThere + n.dot(plane.contact.point - plane.guess);
-    const ContactForce law = ContactLaw(plane.gapLinear, plane.stiffness, softness);
+    const ContactForce law = plane.pressed
+      ? ContactForce{ plane.stiffness * (0.5 * softness - plane.gapLinear), plane.stiffness }
+      : ContactLaw(plane.gapLinear, plane.stiffness, softness);
     plane.law = law.force;
     plane.slope = law.slope;
     plane.lever = plane.arm - plane.radius * n;
@@ -598,7 +602,7 @@ void CosseratRod::AssembleContacts(bool first)
       continue;
     }
     const Matrix3 tangential = Matrix3::Identity() - n * n.transpose();
-    if (plane.friction > 0.0)
+    if (plane.friction > 0.0 && law.force > 0.0)
     {
       // How far the rod's surface has slid over the wall in this step, beside what was sheared before.
       const Vector3 turned = RotationVector(body.orientation * body.oldOrientation.conjugate());
@@ -721,6 +725,33 @@ bool CosseratRod::Solve()
   return true;
 }
 
+bool CosseratRod::ChangeContacts()
+{
+  // What the linear equations let go into a wall is taken for a contact in earnest within this step, and let go
+  // again where it would hold the rod back: a light rod can cross the lumen within one step when a wall that held it
+  // gives way.
+  bool changed = false;
+  for (Plane& plane : this->Planes)
+  {
+    if (plane.changes >= 4 || (!plane.pressed && plane.slope >= plane.stiffness))
+    {
+      continue;
+    }
+    const Body& body = this->Bodies[plane.contact.segment];
+    const double change =
+      plane.contact.normal.dot(body.right.head<3>() + body.right.tail<3>().cross(plane.arm));
+    const double gap = plane.gapLinear + change;
+    if (plane.pressed ? gap > this->Settings.softness : gap < -PressDepth)
+    {
+      plane.pressed = !plane.pressed;
+      ++plane.changes;
+      changed = true;
+      ++this->Last.pressed;
+    }
+  }
+  return changed;
+}
+
 double CosseratRod::Update(double& scale)
 {
   double move = 0.0;
@@ -758,10 +789,11 @@ double CosseratRod::Update(double& scale)
   }
   for (Body& body : this->Bodies)
   {
+    body.right *= scale;
     if (!body.held)
     {
-      body.position += scale * body.right.head<3>();
-      body.orientation = (RotationOf(scale * body.right.tail<3>()) * body.orientation).normalized();
+      body.position += body.right.head<3>();
+      body.orientation = (RotationOf(body.right.tail<3>()) * body.orientation).normalized();
       body.axis = body.orientation * Vector3::UnitZ();
     }
   }
@@ -875,12 +907,13 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
   }
   for (int iteration = 0; iteration < this->Settings.iterations; ++iteration)
   {
-    if (surface && iteration > 0 && this->Last.largestUpdate > 0.05)
+    if (surface && iteration > 0 && this->Last.largestUpdate > this->Settings.tolerance)
     {
       this->FindContacts(seconds, *surface); // planes do not follow a bent wall far
     }
     bool solved = false;
-    for (const bool exact : { true, false })
+    bool exact = true;
+    for (int round = 0; round < MostRounds; ++round)
     {
       this->AssembleBodies(seconds);
       this->AssembleJoints(seconds, exact);
@@ -888,9 +921,20 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
       solved = this->Solve();
       if (solved)
       {
+        if (!this->ChangeContacts())
+        {
+          break;
+        }
+      }
+      else if (exact)
+      {
+        exact = false;
+        ++this->Last.indefinite;
+      }
+      else
+      {
         break;
       }
-      ++this->Last.indefinite;
     }
     double scale = 1.0;
     this->Last.largestUpdate =

@@ -69,6 +69,7 @@ struct RodStep
   double meanPenetration = 0.0;    ///< mm, over all contacts with a force
   int touching = 0;                ///< contacts with a force
   double largestUpdate = 0.0;      ///< mm, of the last iteration
+  int pressed = 0;                 ///< planes that came to be contacts within the step
   int indefinite = 0;              ///< iterations whose exact matrix was not positive definite
   double frictionWork = 0.0;       ///< N mm that friction took away in this step
   double wallWork = 0.0;           ///< N mm that the moving wall did on the rod in this step
@@ -238,8 +239,10 @@ private:
     Vector3 wallMotion = Vector3::Zero(); ///< in this step, mm
     Memory* memory = nullptr;
     int identity = 0;
-    double law = 0.0;   ///< N at the last linearization
-    double slope = 0.0; ///< N/mm
+    bool pressed = false; ///< taken for a contact in earnest
+    int changes = 0;      ///< of that in this step
+    double law = 0.0;     ///< N at the last linearization
+    double slope = 0.0;   ///< N/mm
     double gapLinear = 0.0;
     Matrix3 tangent = Matrix3::Zero();
     Vector3 shear = Vector3::Zero(); ///< mm, at the last linearization
@@ -254,7 +257,8 @@ private:
   void AssembleBodies(double seconds);
   void AssembleJoints(double seconds, bool exact);
   void AssembleContacts(bool first);
-  bool Solve(); ///< false: the matrix is not positive definite
+  bool Solve();          ///< false: the matrix is not positive definite
+  bool ChangeContacts(); ///< true: the equations have changed
   double Update(double& scale);
   void Finish(double seconds);
   void Restore();

@@ -19,6 +19,8 @@ namespace
 constexpr double ShortTip = 12.0; // mm from the tip on which segments are half as long
 constexpr double StartInside =
   2.0; // mm of the catheter between its tip and the wire's, at the beginning
+constexpr double SoftTip = 3.0;   // mm of the catheter
+constexpr double LossTime = 2e-3; // s
 constexpr int LeastSegments = 4;
 constexpr double CatheterReach = 10.0; // mm into the vessel
 
@@ -230,7 +232,9 @@ struct Intervention::Internals : ContactSurface
           plane.gap = gap;
           plane.wallVelocity = place.velocity;
           plane.friction = this->Catheter.friction;
-          plane.stiffness = this->Settings.wallStiffness;
+          // Its tip is soft: the wire's load goes over from place to place as they leave it.
+          plane.stiffness =
+            this->Settings.wallStiffness * std::clamp((this->CatheterTip - u) / SoftTip, 0.01, 1.0);
         }
         return;
       }
@@ -294,7 +298,7 @@ void Intervention::Internals::MakeSegments()
       joint.stretchStiffness =
         value(from, [](const WireSection& s) { return s.axialStiffness; }) / distance;
       joint.restAngle = Vector3(distance * RestCurvature(this->Wire, from), 0.0, 0.0);
-      joint.lossTime = this->Step;
+      joint.lossTime = LossTime;
     }
     this->Joints.push_back(joint);
     from += length;

@@ -65,6 +65,8 @@ struct Hit
   std::int32_t triangle = -1;
   double distance = Infinity;
   OnTriangle on;
+  bool hasNormal = false;
+  Vector3 normal = Vector3::Zero();
 };
 
 enum class Side
@@ -74,10 +76,15 @@ enum class Side
   Free ///< beyond an open cap
 };
 
+/// A triangle that may matter, and where it was last: until sample and triangle have moved by what it was too far,
+/// it need not be looked at.
 struct Candidate
 {
-  double bound; ///< the triangle does not come nearer to the path while the list is valid, mm
   std::int32_t triangle;
+  float distance; ///< then, rounded down, mm
+  float speed;    ///< mm/s: greatest of its corners against the path
+  float passed;   ///< s since triangles were looked up
+  float place[3]; ///< of the sample against the path, mm
 };
 
 /// What is kept for a sample. The path is that of a point that moves with the wall next to the sample.
@@ -116,94 +123,10 @@ struct Memory
   }
 };
 
-OnTriangle NearestOn(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c)
+OnTriangle NearestOnSliver(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c)
 {
-  const Vector3 ab = b - a;
-  const Vector3 ac = c - a;
-  const Vector3 ap = p - a;
-  const double d00 = ab.squaredNorm();
-  const double d01 = ab.dot(ac);
-  const double d11 = ac.squaredNorm();
-  const double d1 = ab.dot(ap);
-  const double d2 = ac.dot(ap);
-  const double area = d00 * d11 - d01 * d01;
-  const double v = d11 * d1 - d01 * d2;
-  const double w = d00 * d2 - d01 * d1;
-  OnTriangle on;
-  if (area > 1e-8 * d00 * d11)
-  {
-    if (v > 0.0 && w > 0.0 && v + w < area)
-    {
-      on.b = v / area;
-      on.c = w / area;
-      on.point = a + on.b * ab + on.c * ac;
-      on.squared = (p - on.point).squaredNorm();
-      return on;
-    }
-    // The nearest point is on an edge that p sees.
-    const auto offer = [&](double x, double y, TriangleFeature feature)
-    {
-      const Vector3 point = a + x * ab + y * ac;
-      const double squared = (p - point).squaredNorm();
-      if (squared < on.squared)
-      {
-        on.point = point;
-        on.squared = squared;
-        on.b = x;
-        on.c = y;
-        on.feature = feature;
-      }
-    };
-    if (w <= 0.0)
-    {
-      if (d1 <= 0.0)
-      {
-        offer(0.0, 0.0, TriangleFeature::A);
-      }
-      else if (d1 >= d00)
-      {
-        offer(1.0, 0.0, TriangleFeature::B);
-      }
-      else
-      {
-        offer(d1 / d00, 0.0, TriangleFeature::EdgeAB);
-      }
-    }
-    if (v <= 0.0)
-    {
-      if (d2 <= 0.0)
-      {
-        offer(0.0, 0.0, TriangleFeature::A);
-      }
-      else if (d2 >= d11)
-      {
-        offer(0.0, 1.0, TriangleFeature::C);
-      }
-      else
-      {
-        offer(0.0, d2 / d11, TriangleFeature::EdgeCA);
-      }
-    }
-    if (v + w >= area)
-    {
-      const double along = (d2 - d01) - (d1 - d00);
-      const double length = d00 + d11 - 2.0 * d01;
-      if (along <= 0.0)
-      {
-        offer(1.0, 0.0, TriangleFeature::B);
-      }
-      else if (along >= length)
-      {
-        offer(0.0, 1.0, TriangleFeature::C);
-      }
-      else
-      {
-        offer(1.0 - along / length, along / length, TriangleFeature::EdgeBC);
-      }
-    }
-    return on;
-  }
   const TrianglePoint robust = NearestOnTriangle(p, a, b, c);
+  OnTriangle on;
   on.point = robust.point;
   on.squared = robust.squaredDistance;
   on.feature = robust.feature;
@@ -215,9 +138,13 @@ OnTriangle NearestOn(const Vector3& p, const Vector3& a, const Vector3& b, const
   switch (robust.feature)
   {
     case TriangleFeature::Face:
-      on.b = std::clamp(v / area, 0.0, 1.0);
-      on.c = std::clamp(w / area, 0.0, 1.0 - on.b);
+    {
+      const Vector3 normal = (b - a).cross(c - a);
+      const double area = normal.squaredNorm();
+      on.b = std::clamp((on.point - a).cross(c - a).dot(normal) / area, 0.0, 1.0);
+      on.c = std::clamp((b - a).cross(on.point - a).dot(normal) / area, 0.0, 1.0 - on.b);
       break;
+    }
     case TriangleFeature::EdgeAB:
       on.b = fraction(a, b);
       break;
@@ -237,6 +164,96 @@ OnTriangle NearestOn(const Vector3& p, const Vector3& a, const Vector3& b, const
       on.c = 1.0;
       break;
   }
+  return on;
+}
+
+/// @param beyond  mm; if the triangle is certainly further, its square may be infinite
+inline OnTriangle NearestOn(
+  const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c, double beyond = Infinity)
+{
+  const Vector3 ab = b - a;
+  const Vector3 ac = c - a;
+  const Vector3 ap = p - a;
+  const double d00 = ab.squaredNorm();
+  const double d01 = ab.dot(ac);
+  const double d11 = ac.squaredNorm();
+  OnTriangle on;
+  if (beyond < Infinity)
+  {
+    const double longest = std::max(d00, d11);
+    const double distance = ap.squaredNorm();
+    // (beyond + longest)^2 is at most 2 beyond^2 + 2 longest^2.
+    if (distance > 2.0 * (beyond * beyond + longest))
+    {
+      return on;
+    }
+  }
+  const double d1 = ab.dot(ap);
+  const double d2 = ac.dot(ap);
+  const double area = d00 * d11 - d01 * d01;
+  if (!(area > 1e-8 * d00 * d11))
+  {
+    return NearestOnSliver(p, a, b, c);
+  }
+  const double v = d11 * d1 - d01 * d2;
+  const double w = d00 * d2 - d01 * d1;
+  if (v > 0.0 && w > 0.0 && v + w < area)
+  {
+    const double scale = 1.0 / area;
+    on.b = scale * v;
+    on.c = scale * w;
+    on.point = a + on.b * ab + on.c * ac;
+    on.squared = (p - on.point).squaredNorm();
+    return on;
+  }
+  // The nearest point is on an edge that p sees: one or two of them.
+  double x = 0.0;
+  double y = 0.0;
+  double squared = Infinity; // less that of ap
+  TriangleFeature feature = TriangleFeature::A;
+  if (w <= 0.0)
+  {
+    x = d1 <= 0.0 ? 0.0 : d1 >= d00 ? 1.0 : d1 / d00;
+    feature = d1 <= 0.0 ? TriangleFeature::A
+      : d1 >= d00       ? TriangleFeature::B
+                        : TriangleFeature::EdgeAB;
+    squared = x * (x * d00 - 2.0 * d1);
+  }
+  if (v <= 0.0)
+  {
+    const double t = d2 <= 0.0 ? 0.0 : d2 >= d11 ? 1.0 : d2 / d11;
+    const double other = t * (t * d11 - 2.0 * d2);
+    if (other < squared)
+    {
+      squared = other;
+      x = 0.0;
+      y = t;
+      feature = d2 <= 0.0 ? TriangleFeature::A
+        : d2 >= d11       ? TriangleFeature::C
+                          : TriangleFeature::EdgeCA;
+    }
+  }
+  if (v + w >= area)
+  {
+    const double along = (d2 - d01) - (d1 - d00);
+    const double length = d00 + d11 - 2.0 * d01;
+    const double t = along <= 0.0 ? 0.0 : along >= length ? 1.0 : along / length;
+    const double u = 1.0 - t;
+    const double other = u * (u * d00 - 2.0 * d1) + t * (t * d11 - 2.0 * d2) + 2.0 * u * t * d01;
+    if (other < squared)
+    {
+      x = u;
+      y = t;
+      feature = along <= 0.0 ? TriangleFeature::B
+        : along >= length    ? TriangleFeature::C
+                             : TriangleFeature::EdgeBC;
+    }
+  }
+  on.b = x;
+  on.c = y;
+  on.point = a + x * ab + y * ac;
+  on.squared = (p - on.point).squaredNorm();
+  on.feature = feature;
   return on;
 }
 
@@ -455,6 +472,7 @@ struct VesselWall::Internals
   // Time.
   std::int64_t Frame = 0;
   double Seconds = 1.0;
+  double Rate = 1.0; ///< 1 / Seconds
   double Time = 0.0;
   double Fraction = 0.0;
   double VelocityChange = 0.0; ///< mm/s, greatest of any vertex from the last frame to this one
@@ -486,12 +504,12 @@ struct VesselWall::Internals
   Vector3 VelocityOf(std::int32_t vertex) const
   {
     const Vertex& v = this->Vertices[vertex];
-    return (v.next - v.now) / this->Seconds;
+    return this->Rate * (v.next - v.now);
   }
-  OnTriangle Nearest(std::int32_t triangle, const Vector3& p) const
+  OnTriangle Nearest(std::int32_t triangle, const Vector3& p, double beyond = Infinity) const
   {
     const std::array<std::int32_t, 3>& v = this->Triangles[triangle].vertex;
-    return NearestOn(p, this->At(v[0]), this->At(v[1]), this->At(v[2]));
+    return NearestOn(p, this->At(v[0]), this->At(v[1]), this->At(v[2]), beyond);
   }
   /// Outwards, as long as twice the area.
   Vector3 FaceNormal(std::int32_t triangle) const
@@ -617,20 +635,24 @@ struct VesselWall::Internals
   }
 
   /// Of a place, into the lumen: smooth on the wall.
-  Vector3 SmoothNormal(std::int32_t triangle, const OnTriangle& on)
+  const Vector3& SmoothNormal(Hit& hit)
   {
-    const Corners& t = this->Triangles[triangle];
-    if (t.wall)
+    if (!hit.hasNormal)
     {
-      const Vector3 normal = (1.0 - on.b - on.c) * this->NormalAt(t.vertex[0]) +
-        on.b * this->NormalAt(t.vertex[1]) + on.c * this->NormalAt(t.vertex[2]);
-      const double length = normal.norm();
-      if (length > 1e-3)
+      hit.hasNormal = true;
+      const Corners& t = this->Triangles[hit.triangle];
+      double length = 0.0;
+      if (t.wall)
       {
-        return normal / length;
+        hit.normal = (1.0 - hit.on.b - hit.on.c) * this->NormalAt(t.vertex[0]) +
+          hit.on.b * this->NormalAt(t.vertex[1]) + hit.on.c * this->NormalAt(t.vertex[2]);
+        length = hit.normal.norm();
       }
+      hit.normal = length > 1e-3
+        ? Vector3(hit.normal / length)
+        : Vector3(-UnitOrZero(this->PseudoNormal(hit.triangle, hit.on.feature)));
     }
-    return -UnitOrZero(this->PseudoNormal(triangle, on.feature));
+    return hit.normal;
   }
 
   // ---- Set up.
@@ -710,10 +732,13 @@ struct VesselWall::Internals
   /// Since triangles were looked up, and how far the sample may be from its path against the wall.
   bool Valid(const Memory& memory, const Vector3& p, double& drift) const;
   void Search(Memory& memory, const Vector3& p, double range);
+  /// Fills the list for the path that begins at p and moves with the wall at `hit`; the least distance now.
+  double Collect(Memory& memory, const Hit& hit, const Vector3& p, double radius);
   /// The nearest places of all triangles that matter; false if there is no wall within `range` (and then
   /// the side is the one that it was).
   bool Evaluate(Memory& memory, const Vector3& p, double range, Hit& nearest);
-  ContactPlane MakePlane(const ContactSample& sample, const Hit& hit, Side side);
+  /// @param limit  mm: triangles up to this distance are known
+  ContactPlane MakePlane(const ContactSample& sample, Hit& hit, Side side, double limit);
   WallPlace PlaceFrom(const Hit& hit, Side side) const;
 };
 
@@ -1274,32 +1299,17 @@ bool VesselWall::Internals::Valid(const Memory& memory, const Vector3& p, double
   return true;
 }
 
-void VesselWall::Internals::Search(Memory& memory, const Vector3& p, double range)
+double VesselWall::Internals::Collect(
+  Memory& memory, const Hit& hit, const Vector3& p, double radius)
 {
-  ++this->Searches;
-  const Hit nearest = this->ClosestTo(p, memory.patch, memory.nearest);
-  memory.nearest = nearest.triangle;
-  memory.patch = this->Triangles[nearest.triangle].patch;
-  memory.side = this->SideOf(nearest, p);
-  memory.frame = this->Frame;
-  memory.begin = this->Time;
-  memory.rest = this->Seconds - this->Time;
-  // Samples are not all looked up in the first tick of a frame.
-  const double later = static_cast<double>((static_cast<std::uint64_t>(memory.index) * 7) & 15);
-  memory.window = memory.rest + this->Seconds * later / 32.0;
   memory.place = p;
-  memory.velocity = this->VelocityAt(nearest.triangle, nearest.on.b, nearest.on.c);
-  memory.radius =
-    (memory.side == Side::Outside ? std::max(range, nearest.distance) : range) + this->Blend;
-  memory.radius += this->Settings.margin;
-  if (memory.side != Side::Outside)
-  {
-    memory.radius = std::max(memory.radius, range + 0.75 * (nearest.distance - range));
-  }
-  memory.clearance = memory.radius;
+  memory.velocity = this->VelocityAt(hit.triangle, hit.on.b, hit.on.c);
+  memory.radius = radius;
+  memory.clearance = radius;
   memory.list.clear();
+  double least = Infinity;
   this->MarkAround(memory.patch);
-  this->ForEachNear(p, memory.velocity, memory.window, memory.radius,
+  this->ForEachNear(p, memory.velocity, memory.window, radius,
     [&](std::int32_t triangle)
     {
       if (!this->IsMarked(triangle))
@@ -1311,17 +1321,61 @@ void VesselWall::Internals::Search(Memory& memory, const Vector3& p, double rang
       {
         fastest = std::max(fastest, (this->VelocityOf(v) - memory.velocity).squaredNorm());
       }
-      const double bound =
-        std::sqrt(this->Nearest(triangle, p).squared) - memory.window * std::sqrt(fastest) - 1e-9;
-      if (bound < memory.radius)
+      const double speed = std::sqrt(fastest) * (1.0 + 1e-6) + 1e-6;
+      const double further = radius + memory.window * speed + 1e-5;
+      const double squared = this->Nearest(triangle, p, further).squared;
+      if (squared < further * further)
       {
-        memory.list.push_back({ bound, triangle });
-        memory.clearance = std::min(memory.clearance, bound);
+        const double distance = std::sqrt(squared) * (1.0 - 1e-6) - 1e-6;
+        memory.list.push_back({ triangle, static_cast<float>(distance), static_cast<float>(speed),
+          0.0f, { 0.0f, 0.0f, 0.0f } });
+        memory.clearance = std::min(memory.clearance, distance - memory.window * speed);
+        least = std::min(least, distance);
       }
     });
-  std::sort(memory.list.begin(), memory.list.end(),
-    [](const Candidate& s, const Candidate& t)
-    { return s.bound != t.bound ? s.bound < t.bound : s.triangle < t.triangle; });
+  return least;
+}
+
+void VesselWall::Internals::Search(Memory& memory, const Vector3& p, double range)
+{
+  ++this->Searches;
+  memory.frame = this->Frame;
+  memory.begin = this->Time;
+  memory.rest = this->Seconds - this->Time;
+  // Samples are not all looked up in the first tick of a frame.
+  const double later = static_cast<double>((static_cast<std::uint64_t>(memory.index) * 7) & 15);
+  memory.window = memory.rest + this->Seconds * later / 32.0;
+  const auto remember = [&](const Hit& hit, const Vector3& from)
+  {
+    memory.nearest = hit.triangle;
+    memory.patch = this->Triangles[hit.triangle].patch;
+    memory.side = this->SideOf(hit, from);
+  };
+  const double radius = range + this->Blend + this->Settings.margin;
+  // Far from the wall it is not worth while to know which place is the nearest (in the middle of a vessel all its
+  // walls are as near). The side is that of a place on the way to the wall, with nothing in between.
+  if (memory.nearest >= 0)
+  {
+    Hit known;
+    known.triangle = memory.nearest;
+    known.on = this->Nearest(memory.nearest, p);
+    known.distance = std::sqrt(known.on.squared);
+    const double empty = 0.6 * known.distance;
+    if (empty > radius && this->Collect(memory, known, p, empty) >= empty)
+    {
+      const Vector3 nearer = p + 0.59 * (known.on.point - p);
+      remember(this->ClosestTo(nearer, memory.patch, known.triangle), nearer);
+      if (memory.side != Side::Outside)
+      {
+        return;
+      }
+    }
+  }
+  const Hit nearest = this->ClosestTo(p, memory.patch, memory.nearest);
+  remember(nearest, p);
+  this->Collect(memory, nearest, p,
+    memory.side == Side::Outside ? radius + std::max(0.0, nearest.distance - range)
+                                 : std::max(radius, range + 0.5 * (nearest.distance - range)));
 }
 
 bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double range, Hit& nearest)
@@ -1336,22 +1390,47 @@ bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double ra
   {
     this->Hits.clear();
     nearest = Hit();
-    for (const Candidate& candidate : memory.list)
+    const bool stale = memory.frame != this->Frame;
+    const double passed = stale ? memory.rest + this->Time : this->Time - memory.begin;
+    const Vector3 offset = p - memory.place - passed * memory.velocity;
+    const float at[3] = { static_cast<float>(offset[0]), static_cast<float>(offset[1]),
+      static_cast<float>(offset[2]) };
+    const auto now = static_cast<float>(passed);
+    const auto change = static_cast<float>(stale ? this->VelocityChange : 0.0);
+    // What was nearest the last time tells how far one has to look.
+    double known = Infinity;
+    if (memory.nearest >= 0)
     {
-      if (candidate.bound - drift > std::max(nearest.distance + this->Blend, range))
+      known = std::sqrt(this->Nearest(memory.nearest, p).squared);
+    }
+    const auto limit = static_cast<float>(std::max(known + this->Blend, range)) * 1.00001f + 1e-5f;
+    for (Candidate& candidate : memory.list)
+    {
+      const float slack =
+        candidate.distance - (candidate.speed + change) * std::abs(now - candidate.passed) - limit;
+      const float x = at[0] - candidate.place[0];
+      const float y = at[1] - candidate.place[1];
+      const float z = at[2] - candidate.place[2];
+      if (slack > 0.0f && slack * slack > x * x + y * y + z * z)
       {
-        break;
+        continue;
       }
       Hit hit;
       hit.triangle = candidate.triangle;
       hit.on = this->Nearest(candidate.triangle, p);
       hit.distance = std::sqrt(hit.on.squared);
+      candidate.distance = static_cast<float>(hit.distance) * 0.999999f - 2e-6f;
+      candidate.passed = now;
+      std::copy(at, at + 3, candidate.place);
       if (hit.distance < nearest.distance ||
         (hit.distance == nearest.distance && hit.triangle < nearest.triangle))
       {
         nearest = hit;
       }
-      this->Hits.push_back(hit);
+      if (candidate.distance <= limit)
+      {
+        this->Hits.push_back(hit);
+      }
     }
     const bool found = nearest.distance + drift <= memory.radius;
     if (found)
@@ -1373,21 +1452,22 @@ bool VesselWall::Internals::Evaluate(Memory& memory, const Vector3& p, double ra
 }
 
 ContactPlane VesselWall::Internals::MakePlane(
-  const ContactSample& sample, const Hit& hit, Side side)
+  const ContactSample& sample, Hit& hit, Side side, double limit)
 {
   const Corners& triangle = this->Triangles[hit.triangle];
-  const Vector3 reference = this->SmoothNormal(hit.triangle, hit.on);
+  const Vector3 reference = this->SmoothNormal(hit);
   // The mean over the triangles that are almost as near: each of its terms is continuous when the
   // sample moves, and so is the sum.
+  const double width = std::max(1e-9, std::min(this->Blend, limit - hit.distance));
   Vector3 sum = Vector3::Zero();
-  for (const Hit& other : this->Hits)
+  for (Hit& other : this->Hits)
   {
-    const double further = (other.distance - hit.distance) / this->Blend;
+    const double further = (other.distance - hit.distance) / width;
     if (further >= 1.0 || this->Triangles[other.triangle].open)
     {
       continue;
     }
-    const Vector3 normal = this->SmoothNormal(other.triangle, other.on);
+    const Vector3& normal = this->SmoothNormal(other);
     const double weight = 1.0 - std::max(0.0, further);
     // A wall of another side is another plane.
     sum += weight * weight * Ramp(normal.dot(reference), 0.5, 0.766) * normal;
@@ -1487,6 +1567,7 @@ void VesselWall::BeginFrame(const std::vector<Vector3>& next, double seconds)
   data.Now = 1 - data.Now;
   data.Extent[1 - data.Now] = extent.maxCoeff();
   data.Seconds = seconds;
+  data.Rate = rate;
   data.Time = 0.0;
   data.Fraction = 0.0;
   ++data.Frame;
@@ -1526,6 +1607,7 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
     return;
   }
   const Side side = memory.side;
+  const double limit = std::max(nearest.distance + data.Blend, range);
   if (data.Triangles[nearest.triangle].open)
   {
     // Before an open cap: the wall around it.
@@ -1545,23 +1627,25 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
       return;
     }
   }
-  contacts.plane[0] = data.MakePlane(sample, nearest, side);
+  contacts.plane[0] = data.MakePlane(sample, nearest, side, limit);
   contacts.count = 1;
   // Of another side: the direction to it has to be that of its normal (a nearest place, not one on
   // the way around), and of several the one that is most opposite.
   const Vector3 first = contacts.plane[0].normal;
   Hit second;
   double best = Infinity;
-  for (const Hit& hit : data.Hits)
+  for (Hit& hit : data.Hits)
   {
-    if (hit.distance > range || data.Triangles[hit.triangle].open ||
-      hit.triangle == nearest.triangle)
+    const Vector3 away = sample.centre - hit.on.point;
+    // Where the direction is within 30 degrees of the first normal, one of the two conditions fails.
+    if (hit.distance > range || away.dot(first) > 0.8661 * hit.distance ||
+      data.Triangles[hit.triangle].open || hit.triangle == nearest.triangle)
     {
       continue;
     }
-    const Vector3 normal = data.SmoothNormal(hit.triangle, hit.on);
+    const Vector3& normal = data.SmoothNormal(hit);
     const double along = normal.dot(first);
-    if (along > 0.5 || normal.dot(sample.centre - hit.on.point) < 0.866 * hit.distance)
+    if (along > 0.5 || normal.dot(away) < 0.866 * hit.distance)
     {
       continue;
     }
@@ -1574,7 +1658,7 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
   }
   if (second.triangle >= 0)
   {
-    contacts.plane[1] = data.MakePlane(sample, second, Side::Inside);
+    contacts.plane[1] = data.MakePlane(sample, second, Side::Inside, limit);
     contacts.count = 2;
   }
   // The identity of the former plane that is most alike, or the one that is not in use.
