@@ -37,7 +37,7 @@ std::vector<NumberEntry> NumbersOf(InterventionSettings& s)
     { "heart_rate_bpm", &s.heartRate, 0.0, 240.0 }, { "start_phase", &s.startPhase, 0.0, 1.0 },
     { "segment_length_mm", &s.segmentLength, 0.5, 4.0 },
     { "inside_catheter_mm", &s.insideCatheter, 5.0, 100.0 },
-    { "engagement_mm", &s.engagement, 0.5, 50.0 },
+    { "engagement_mm", &s.engagement, 0.5, 10.0 },
     { "wall_friction_factor", &s.wallFriction, 0.0, 10.0 },
     { "wall_stiffness_N_per_mm", &s.wallStiffness, 0.1, 1000.0 },
     { "drag_Pa_s", &s.drag, 0.0, 10.0 }, { "largest_speed_mm_s", &s.largestSpeed, 1.0, 2000.0 },
