@@ -36,12 +36,12 @@ std::vector<NumberEntry> NumbersOf(InterventionSettings& s)
   return { { "tick_rate_hz", &s.tickRate, 500.0, 20000.0 },
     { "heart_rate_bpm", &s.heartRate, 0.0, 240.0 }, { "start_phase", &s.startPhase, 0.0, 1.0 },
     { "segment_length_mm", &s.segmentLength, 0.5, 4.0 },
-    { "inside_catheter_mm", &s.insideCatheter, 0.0, 200.0 },
-    { "engagement_mm", &s.engagement, 0.0, 50.0 },
+    { "inside_catheter_mm", &s.insideCatheter, 5.0, 100.0 },
+    { "engagement_mm", &s.engagement, 0.5, 10.0 },
     { "wall_friction_factor", &s.wallFriction, 0.0, 10.0 },
-    { "wall_stiffness_N_per_mm", &s.wallStiffness, 1e-3, 1e4 }, { "drag_Pa_s", &s.drag, 0.0, 10.0 },
-    { "largest_speed_mm_s", &s.largestSpeed, 1.0, 1e4 },
-    { "largest_turning_rad_s", &s.largestTurning, 0.1, 1e3 } };
+    { "wall_stiffness_N_per_mm", &s.wallStiffness, 0.1, 1000.0 },
+    { "drag_Pa_s", &s.drag, 0.0, 10.0 }, { "largest_speed_mm_s", &s.largestSpeed, 1.0, 2000.0 },
+    { "largest_turning_rad_s", &s.largestTurning, 1.0, 1000.0 } };
 }
 
 std::vector<NumberEntry> NumbersOf(PhantomSettings& s)
@@ -257,7 +257,7 @@ InterventionSettings SettingsOf(const Json& object, const std::string& where)
   JsonFields fields(object, where);
   ReadNumbers(fields, NumbersOf(settings));
   settings.ticksPerFrame =
-    static_cast<int>(fields.Whole("ticks_per_frame", 1, 10000, settings.ticksPerFrame));
+    static_cast<int>(fields.Whole("ticks_per_frame", 1, 1000, settings.ticksPerFrame));
   settings.capacity = static_cast<int>(fields.Whole("capacity", 20, 1000, settings.capacity));
   settings.rootBranch =
     static_cast<int>(fields.Whole("root_branch", -1, 100000, settings.rootBranch));
