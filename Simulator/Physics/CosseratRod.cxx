@@ -11,10 +11,12 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-constexpr int MostRounds = 12;       // in which contacts are added to an iteration
-constexpr double PressDepth = 0.005; // mm
-constexpr double LeastCalm = 0.02;   // N/mm
-constexpr double MostCalm = 100.0;   // N/mm
+constexpr int MostRounds = 12;        // in which contacts are added to an iteration
+constexpr double PressDepth = 0.005;  // mm
+constexpr double LeastCalm = 0.02;    // N/mm
+constexpr double MostCalm = 100.0;    // N/mm
+constexpr double HoldStiffness = 1e8; // N/mm and N mm/rad
+constexpr double TurnArm = 0.25;      // mm, at which a turn counts as a move across
 
 Matrix3 Cross(const Vector3& v)
 {
@@ -298,9 +300,16 @@ void CosseratRod::Prescribe(
   body.heldOrientation = orientation.normalized();
 }
 
+void CosseratRod::HangOnSpring(std::int64_t i, double stiffness, double lag)
+{
+  this->Bodies[i].spring = stiffness;
+  this->Bodies[i].lag = lag;
+}
+
 void CosseratRod::Release(std::int64_t i)
 {
   this->Bodies[i].held = false;
+  this->Bodies[i].spring = 0.0;
 }
 
 void CosseratRod::SetVelocity(std::int64_t i, const Vector3& velocity, const Vector3& turning)
@@ -363,7 +372,8 @@ void CosseratRod::Predict(double seconds)
     if (body.held)
     {
       body.position = body.heldPosition;
-      body.orientation = body.heldOrientation;
+      body.orientation =
+        body.heldOrientation * Eigen::Quaterniond(Eigen::AngleAxisd(body.lag, Vector3::UnitZ()));
       body.axis = body.orientation * Vector3::UnitZ();
       body.freePosition = body.position;
       body.freeOrientation = body.orientation;
@@ -464,6 +474,15 @@ void CosseratRod::AssembleBodies(double seconds)
     {
       body.matrix.setIdentity();
       body.right.setZero();
+      if (body.spring > 0.0)
+      {
+        // Free to turn about its axis only.
+        const Matrix3 about = body.axis * body.axis.transpose();
+        body.matrix *= HoldStiffness;
+        body.matrix.bottomRightCorner<3, 3>() +=
+          (body.spring + body.segment.rotationalDrag * rate - HoldStiffness) * about;
+        body.right.tail<3>() = -body.spring * body.lag * body.axis;
+      }
       continue;
     }
     const RodSegment& segment = body.segment;
@@ -480,6 +499,7 @@ void CosseratRod::AssembleBodies(double seconds)
       // Against moves across, from where the walls carry it: what is fed in along the rod is not held back.
       body.matrix.topLeftCorner<3, 3>() +=
         calm * (Matrix3::Identity() - body.axis * body.axis.transpose());
+      body.matrix.diagonal().tail<3>().array() += calm * TurnArm * TurnArm;
     }
     const Vector3 moved = body.position - body.oldPosition;
     body.right.head<3>() = body.force - inertial * (body.position - body.freePosition) -
@@ -549,7 +569,9 @@ void CosseratRod::AssembleJoints(double seconds, bool exact)
     const Matrix3 crossA = k * Cross(da);
     const Matrix3 crossB = k * Cross(db);
     // -[d][d] = |d|^2 I - d d'
-    if (!a.held)
+    const bool fixedA = a.held && a.spring <= 0.0;
+    const bool fixedB = b.held && b.spring <= 0.0;
+    if (!fixedA)
     {
       a.matrix.diagonal().head<3>().array() += k;
       a.matrix.topRightCorner<3, 3>() -= crossA;
@@ -559,7 +581,7 @@ void CosseratRod::AssembleJoints(double seconds, bool exact)
       a.right.head<3>() += force;
       a.right.tail<3>() += da.cross(force) + turn;
     }
-    if (!b.held)
+    if (!fixedB)
     {
       b.matrix.diagonal().head<3>().array() += k;
       b.matrix.topRightCorner<3, 3>() -= crossB;
@@ -569,7 +591,7 @@ void CosseratRod::AssembleJoints(double seconds, bool exact)
       b.right.head<3>() -= force;
       b.right.tail<3>() -= db.cross(force) + turn;
     }
-    if (a.held || b.held)
+    if (fixedA || fixedB)
     {
       a.coupling.setZero();
     }
@@ -742,6 +764,7 @@ double CosseratRod::SidewaysMove() const
     const Vector3 move = body.right.head<3>();
     const double along = move.dot(body.axis);
     most = std::max(most, move.squaredNorm() - along * along);
+    most = std::max(most, TurnArm * TurnArm * body.right.tail<3>().squaredNorm());
   }
   return std::sqrt(std::max(0.0, most));
 }
@@ -816,6 +839,12 @@ double CosseratRod::Update(double& scale)
       body.position += body.right.head<3>();
       body.orientation = (RotationOf(body.right.tail<3>()) * body.orientation).normalized();
       body.axis = body.orientation * Vector3::UnitZ();
+    }
+    else if (body.spring > 0.0)
+    {
+      body.lag += body.right.tail<3>().dot(body.axis);
+      body.orientation =
+        body.heldOrientation * Eigen::Quaterniond(Eigen::AngleAxisd(body.lag, Vector3::UnitZ()));
     }
   }
   return scale * move;
@@ -1056,6 +1085,7 @@ std::uint64_t CosseratRod::Hash(std::uint64_t seed) const
     hash = HashBits(hash, body.orientation.coeffs().data(), 4);
     hash = HashBits(hash, body.velocity.data(), 3);
     hash = HashBits(hash, body.turning.data(), 3);
+    hash = HashBits(hash, &body.lag, 1);
     for (const auto& sample : body.memory)
     {
       for (const Memory& memory : sample)

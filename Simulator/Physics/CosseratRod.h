@@ -70,11 +70,11 @@ struct RodStep
   int touching = 0;                ///< contacts with a force
   double largestUpdate = 0.0;      ///< mm, of the last iteration
   int pressed = 0;                 ///< planes that came to be contacts within the step
-  int calmed = 0;     ///< times that the equations were damped more, to keep moves across within trust
-  int indefinite = 0;              ///< iterations whose exact matrix was not positive definite
-  double frictionWork = 0.0;       ///< N mm that friction took away in this step
-  double wallWork = 0.0;           ///< N mm that the moving wall did on the rod in this step
-  bool finite = true;              ///< false: the step failed, and the rod is as it was before
+  int calmed = 0; ///< times that the equations were damped more, to keep moves across within trust
+  int indefinite = 0;        ///< iterations whose exact matrix was not positive definite
+  double frictionWork = 0.0; ///< N mm that friction took away in this step
+  double wallWork = 0.0;     ///< N mm that the moving wall did on the rod in this step
+  bool finite = true;        ///< false: the step failed, and the rod is as it was before
 };
 
 struct RodSettings
@@ -136,6 +136,14 @@ public:
   void Place(std::int64_t i, const Vector3& position, const Eigen::Quaterniond& orientation);
   /// From now on the segment is held; at the end of the next step it is there.
   void Prescribe(std::int64_t i, const Vector3& position, const Eigen::Quaterniond& orientation);
+  /**
+   * A segment that is held is so but for turns about its own axis: it hangs on a torsion spring whose other end is
+   * turned as Prescribe says. The spring may be wound up by any number of turns.
+   * @param stiffness  N mm/rad; 0: it is held altogether
+   * @param lag        by which it is turned against the spring's other end, about its axis, rad
+   */
+  void HangOnSpring(std::int64_t i, double stiffness, double lag);
+  double Lag(std::int64_t i) const { return this->Bodies[i].lag; } ///< rad, see HangOnSpring
   /// From now on the segment moves by the forces on it.
   void Release(std::int64_t i);
   void SetVelocity(std::int64_t i, const Vector3& velocity, const Vector3& turning);
@@ -203,6 +211,8 @@ private:
     Vector3 torque = Vector3::Zero();
     Vector3 medium = Vector3::Zero();
     bool held = false;
+    double spring = 0.0; ///< N mm/rad, of a held segment that hangs on one
+    double lag = 0.0;    ///< rad
     Vector3 heldPosition = Vector3::Zero();
     Eigen::Quaterniond heldOrientation = Eigen::Quaterniond::Identity();
     std::array<std::array<Memory, 2>, 5> memory;
@@ -261,9 +271,9 @@ private:
   void AssembleBodies(double seconds);
   void AssembleJoints(double seconds, bool exact);
   void AssembleContacts(bool first);
-  bool Solve();          ///< false: the matrix is not positive definite
+  bool Solve();                ///< false: the matrix is not positive definite
   double SidewaysMove() const; ///< mm, greatest, of the solution
-  bool ChangeContacts(); ///< true: the equations have changed
+  bool ChangeContacts();       ///< true: the equations have changed
   double Update(double& scale);
   void Finish(double seconds);
   void Restore();

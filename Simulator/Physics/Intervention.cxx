@@ -21,6 +21,7 @@ constexpr double StartInside =
   2.0; // mm of the catheter between its tip and the wire's, at the beginning
 constexpr double SoftTip = 3.0;   // mm of the catheter
 constexpr double LossTime = 2e-3; // s
+constexpr double SpinDrag = 1e-6; // N s
 constexpr int LeastSegments = 4;
 constexpr double CatheterReach = 10.0; // mm into the vessel
 
@@ -162,11 +163,10 @@ struct Intervention::Internals : ContactSurface
   double StartFed = 0.0;
   double HandPosition = 0.0; // as accepted
   double HandAngle = 0.0;
-  double Roll = 0.0;        // of the segment that is held, rad
+  double Spring = 0.0;      // N mm/rad, of the wire in the catheter
   double CatheterTip = 0.0; // u
   double CatheterAngle = 0.0;
   double HandSpeed = 0.0;
-  double Torque = 0.0; // N mm, of the last step
 
   struct Sane
   {
@@ -174,7 +174,7 @@ struct Intervention::Internals : ContactSurface
     std::vector<Eigen::Quaterniond> orientation;
     std::vector<Vector3> offset; // from the wall's place that it is nearest to
     double fed = 0.0;
-    double roll = 0.0;
+    double lag = 0.0;
   };
   Sane Last;
 
@@ -282,8 +282,8 @@ void Intervention::Internals::MakeSegments()
     segment.friction = value(middle, [](const WireSection& s) { return s.friction; });
     // 1 Pa s = 1e-6 N s/mm^2
     segment.drag = this->Settings.drag * 1e-6 * length;
-    // A cylinder that spins in a fluid: 4 pi eta r^2 per length; eta is about a sixth of the drag.
-    segment.rotationalDrag = 2.0 * segment.drag * segment.radius * segment.radius;
+    // More than blood would, too: a twisted wire that comes free spins within its lumen, not within a tick.
+    segment.rotationalDrag = SpinDrag * length;
     this->Segments.push_back(segment);
     this->Places.push_back(middle);
     RodJoint joint;
@@ -412,8 +412,8 @@ void Intervention::Internals::Engage(const std::vector<Vector3>& points)
 
 Eigen::Quaterniond Intervention::Internals::HeldOrientation(const PathPlace& place) const
 {
-  const Vector3 first =
-    std::cos(this->Roll) * place.side + std::sin(this->Roll) * place.tangent.cross(place.side);
+  const Vector3 first = std::cos(this->HandAngle) * place.side +
+    std::sin(this->HandAngle) * place.tangent.cross(place.side);
   Matrix3 frame;
   frame.col(2) = -place.tangent; // from the tip backwards
   frame.col(0) = first;
@@ -425,8 +425,9 @@ void Intervention::Internals::AppendSegment()
 {
   const std::int64_t i = this->Rod->Size();
   const PathPlace place = this->Path->At(this->Fed - this->Places[i]);
-  this->Rod->Append(
-    this->Segments[i], this->Joints[i], place.position, this->HeldOrientation(place));
+  const double lag = i > 0 ? this->Rod->Lag(i - 1) : 0.0;
+  this->Rod->Append(this->Segments[i], this->Joints[i], place.position,
+    this->HeldOrientation(place) * Eigen::Quaterniond(Eigen::AngleAxisd(lag, Vector3::UnitZ())));
 }
 
 void Intervention::Internals::PlaceOnPath()
@@ -503,17 +504,7 @@ void Intervention::Internals::Drive(const DriveInput& input)
 
 void Intervention::Internals::Feed()
 {
-  // The wire within the catheter, up to the hand, is a torsion spring with a lag: the simulated part is turned by
-  // what arrives. Its change with the turn is estimated high, which keeps the coupling stable.
-  const double inside = this->Catheter.length;
-  const double spring = AlongWire(this->Wire, 0.5 * this->Wire.length,
-                          [](const WireSection& s) { return s.torsionalStiffness; }) /
-    inside;
-  const double answer = this->Joints.back().angularStiffness.z() / 5.0;
-  const double share = this->Step / 0.02;
-  this->Roll += share * (this->HandAngle - this->Roll - this->Torque / spring) /
-    (1.0 + share * (1.0 + answer / spring));
-
+  const double lag = this->Rod->Lag(this->Rod->Size() - 1);
   const double datum = this->CatheterTip - this->Settings.insideCatheter;
   const double least = datum + this->Places[LeastSegments - 1];
   if (this->Fed < least)
@@ -541,6 +532,8 @@ void Intervention::Internals::Feed()
   const std::int64_t last = this->Rod->Size() - 1;
   const PathPlace place = this->Path->At(this->Fed - this->Places[last]);
   this->Rod->Prescribe(last, place.position, this->HeldOrientation(place));
+  // The wire between there and the hand, inside of the catheter, is a torsion spring.
+  this->Rod->HangOnSpring(last, this->Spring, lag);
 }
 
 void Intervention::Internals::PutBack()
@@ -586,15 +579,13 @@ void Intervention::Internals::KeepSane()
     this->Last.orientation.push_back(this->Rod->Orientation(i));
   }
   this->Last.fed = this->Fed;
-  this->Last.roll = this->Roll;
+  this->Last.lag = this->Rod->Lag(this->Rod->Size() - 1);
 }
 
 void Intervention::Internals::Reset()
 {
   this->Say(Notice::Reset);
   this->Fed = this->Last.fed;
-  this->Roll = this->Last.roll;
-  this->Torque = 0.0;
   const std::int64_t count = static_cast<std::int64_t>(this->Last.position.size());
   while (this->Rod->Size() > count)
   {
@@ -609,6 +600,7 @@ void Intervention::Internals::Reset()
   {
     this->Rod->Place(i, this->Last.position[i], this->Last.orientation[i]);
   }
+  this->Rod->HangOnSpring(count - 1, this->Spring, this->Last.lag);
 }
 
 void Intervention::Internals::Measure()
@@ -652,8 +644,7 @@ void Intervention::Internals::Measure()
   Vector3 torque;
   this->Rod->Reaction(last, force, torque);
   const Vector3 forward = -this->Rod->Axis(last);
-  this->Torque = torque.dot(forward);
-  report.proximalTorque = this->Torque;
+  report.proximalTorque = this->Spring * this->Rod->Lag(last);
   // The catheter's bends multiply what the hand feels (capstan), against the way that it moves.
   const double sense = std::clamp(this->HandSpeed, -1.0, 1.0); // mm/s
   report.proximalForce = force.dot(forward) *
@@ -692,6 +683,9 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.FrameSeconds = data.Step * settings.ticksPerFrame;
   data.Phase = settings.startPhase - std::floor(settings.startPhase);
   data.MakeSegments();
+  data.Spring =
+    AlongWire(wire, 0.5 * wire.length, [](const WireSection& s) { return s.torsionalStiffness; }) /
+    catheter.length;
   data.Motion->Positions(data.Phase, data.NextPoints);
   data.Engage(data.NextPoints);
   RodSettings rod;
@@ -796,8 +790,8 @@ std::uint64_t Intervention::StateHash() const
 {
   const Internals& data = *this->Data;
   std::uint64_t hash = data.Rod->Hash();
-  for (const double value : { data.Fed, data.Roll, data.HandAngle, data.CatheterTip,
-         data.CatheterAngle, data.Phase, static_cast<double>(data.Tick) })
+  for (const double value : { data.Fed, data.HandAngle, data.CatheterTip, data.CatheterAngle,
+         data.Phase, static_cast<double>(data.Tick) })
   {
     hash = HashValue(hash, value);
   }

@@ -486,7 +486,7 @@ struct VesselWall::Internals
   std::int64_t Frame = 0;
   double Seconds = 1.0;
   double FrameBegin = 0.0; ///< s since the first frame would have begun
-  double Rate = 1.0; ///< 1 / Seconds
+  double Rate = 1.0;       ///< 1 / Seconds
   double Time = 0.0;
   double Fraction = 0.0;
   double VelocityChange = 0.0; ///< mm/s, greatest of any vertex from the last frame to this one

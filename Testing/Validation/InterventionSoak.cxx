@@ -70,8 +70,9 @@ int main(int argc, char** argv)
   double widest = 0.0;
   double depths = 0.0;
   double seconds = 0.0;
-  std::printf("phantom,artery,ticks,seconds,us_per_tick,penetration_max_mm,penetration_mean_mm,joint_gap_mm,"
-              "force_max_N,inserted_max_mm,outside,resets\n");
+  std::printf(
+    "phantom,artery,ticks,seconds,us_per_tick,penetration_max_mm,penetration_mean_mm,joint_gap_mm,"
+    "force_max_N,inserted_max_mm,outside,resets\n");
   for (int p = 0; p < phantoms; ++p)
   {
     PhantomSettings settings;
@@ -148,9 +149,9 @@ int main(int argc, char** argv)
     const double passed =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     std::printf("%d,%s,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,%.3f,%.1f,%ld,%ld\n", settings.seed,
-      topology.groupName.empty() ? "" : topology.groupName[options.rootBranch].c_str(), ticks, passed,
-      1e6 * passed / static_cast<double>(ticks), deep, sum / static_cast<double>(ticks), gap, force,
-      inserted, lost, reset);
+      topology.groupName.empty() ? "" : topology.groupName[options.rootBranch].c_str(), ticks,
+      passed, 1e6 * passed / static_cast<double>(ticks), deep, sum / static_cast<double>(ticks),
+      gap, force, inserted, lost, reset);
     std::fflush(stdout);
     outside += lost;
     resets += reset;
@@ -161,7 +162,7 @@ int main(int argc, char** argv)
     widest = std::max(widest, gap);
   }
   std::printf("all,,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,,,%ld,%ld\n", total, seconds,
-    1e6 * seconds / static_cast<double>(total), deepest, depths / static_cast<double>(total), widest,
-    outside, resets);
+    1e6 * seconds / static_cast<double>(total), deepest, depths / static_cast<double>(total),
+    widest, outside, resets);
   return outside == 0 && resets == 0 && deepest <= 0.1 && widest <= 0.01 ? 0 : 1;
 }
