@@ -690,7 +690,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Engage(data.NextPoints);
   RodSettings rod;
   rod.mediumFollowsWalls = true;
-  rod.reach = 0.4;
+  rod.reach = 0.15;
   rod.largestMove = 1.0;
   rod.trust = 0.1;
   data.Rod = std::make_unique<CosseratRod>(settings.capacity, rod);
