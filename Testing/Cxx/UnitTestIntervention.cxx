@@ -1,18 +1,19 @@
 // A wire in beating phantoms: where scripted hands bring it, what is refused, and that it repeats.
-#include "DriveScript.h"
 #include "FixedStepClock.h"
 #include "InstrumentCatalogue.h"
 #include "Intervention.h"
+#include "Recording.h"
 #include "Scenario.h"
 #include "WallMotions.h"
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 using namespace coronary;
 
@@ -25,7 +26,7 @@ std::shared_ptr<WallMotion> Phantom()
   {
     const Scenario scenario = LoadScenario("phantom-lca");
     return MakePhantomWallMotion(
-      scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 20);
+      scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
   }();
   return wall;
 }
@@ -104,6 +105,69 @@ TEST(Intervention, FollowsTheBeatingWall)
   EXPECT_GT(travelled, 10.0);
   EXPECT_LT((last - before).norm(), 8.0) << "after two beats it is back, but for what slid";
 }
+
+// Recorded hands: where they bring the wire, and that it stays in the lumen on the way.
+class Replay : public testing::TestWithParam<std::array<const char*, 4>>
+{
+};
+
+TEST_P(Replay, ReachesItsBranch)
+{
+  const auto& [file, wire, artery, wanted] = this->GetParam();
+  RecordingReplay replay(
+    RecordingReader(std::string(DYNAMICCORONARY_DRIVING) + "/" + file + ".pcirec"));
+  Intervention intervention(Phantom(), Wire(wire),
+    Catheter(std::string(artery) == "RCA" ? "JR4-6F" : "EBU3.5-6F"), SettingsFor(artery));
+  DriveInput input;
+  std::vector<RecordedEvent> events;
+  double deepest = 0.0;
+  double widest = 0.0;
+  double sum = 0.0;
+  std::uint64_t tick = 0;
+  for (; replay.At(tick, input, events); ++tick)
+  {
+    const TickReport& report = intervention.Step(input);
+    deepest = std::max(deepest, report.largestPenetration);
+    widest = std::max(widest, report.jointGap);
+    sum += report.meanPenetration;
+    ASSERT_EQ(0, report.outside) << "tick " << tick;
+  }
+  ASSERT_EQ(RecordingReader::Ending::Complete, replay.Reader().HowEnded());
+  EXPECT_LE(deepest, 0.1);
+  EXPECT_LE(sum / static_cast<double>(tick), 0.02);
+  EXPECT_LE(widest, 0.01);
+  const WallTopology& topology = Phantom()->Topology();
+  const int branch = intervention.Report().branch;
+  ASSERT_GE(branch, 0);
+  EXPECT_EQ(wanted, topology.groupName[branch]);
+  // Well into it: the tip is nearest to a place in the last half of its axis.
+  std::vector<Vector3> axis;
+  Phantom()->AxisPositions(intervention.Report().phase, axis);
+  std::size_t first = 0;
+  for (int b = 0; b < branch; ++b)
+  {
+    first += topology.axis[b].size();
+  }
+  double best = std::numeric_limits<double>::infinity();
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < topology.axis[branch].size(); ++i)
+  {
+    const double distance = (axis[first + i] - intervention.Centerline().front()).norm();
+    if (distance < best)
+    {
+      best = distance;
+      at = i;
+    }
+  }
+  EXPECT_LT(best, 1.5);
+  EXPECT_GT(at, topology.axis[branch].size() / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Intervention, Replay,
+  testing::Values(std::array<const char*, 4>{ "lad-apex", "workhorse", "LCA", "dLAD" },
+    std::array<const char*, 4>{ "diagonal", "workhorse", "LCA", "D1" },
+    std::array<const char*, 4>{ "marginal", "workhorse-long-j", "LCA", "OM1" },
+    std::array<const char*, 4>{ "rca-pda", "workhorse", "RCA", "R-PDA" }));
 
 TEST(Intervention, RepeatsBitForBit)
 {
