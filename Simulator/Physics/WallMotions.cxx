@@ -393,6 +393,25 @@ void SkinnedWallMotion::AxisPositions(double phase, std::vector<Vector3>& positi
   this->AxisSkin->Deform(this->Bones, positions.front().data());
 }
 
+std::shared_ptr<WallMotion> SampleWallMotion(WallMotion& motion, int phases)
+{
+  if (phases < 4 || phases > 200)
+  {
+    throw std::invalid_argument(
+      "a motion is sampled at 4 to 200 phases, not " + std::to_string(phases));
+  }
+  std::vector<double> times(phases);
+  std::vector<std::vector<Vector3>> positions(phases);
+  std::vector<std::vector<Vector3>> axis(phases);
+  for (int i = 0; i < phases; ++i)
+  {
+    times[i] = static_cast<double>(i) / phases;
+    motion.Positions(times[i], positions[i]);
+    motion.AxisPositions(times[i], axis[i]);
+  }
+  return std::make_shared<SampledWallMotion>(motion.Topology(), times, positions, axis);
+}
+
 std::shared_ptr<WallMotion> MakePhantomWallMotion(
   const PhantomSettings& settings, double edgeLength, int phases, const ProgressCallback& progress)
 {

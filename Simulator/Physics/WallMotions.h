@@ -126,6 +126,14 @@ private:
 };
 
 /**
+ * A motion at even phases of the cycle, for when it is too slow to be asked for at every key frame: skinning
+ * 65,000 points takes as long as a whole key frame, reading them out of samples a hundredth of it.
+ * @param phases  4 to 200
+ * @throws std::invalid_argument as SampledWallMotion
+ */
+std::shared_ptr<WallMotion> SampleWallMotion(WallMotion& motion, int phases);
+
+/**
  * The phantom's true lumen: both coronary trees, as components of one surface. Entities 2 and 3 are the left and
  * right ostium, 4.. the ends of the branches; a point's group is the place of its branch in Topology().axis.
  * @param edgeLength  mm, instead of settings.surfaceSpacing

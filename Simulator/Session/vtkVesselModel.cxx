@@ -33,6 +33,7 @@ namespace fs = std::filesystem;
 namespace names = vtkCoronaryArrayNames;
 
 constexpr int PhantomPhases = 40;
+constexpr int SampledPhases = 40; // of a motion that hangs on a skeleton
 
 [[noreturn]] void Fail(const std::string& path, const std::string& what)
 {
@@ -388,8 +389,9 @@ std::shared_ptr<WallMotion> TrackedWall(
   return About(folder,
     [&]() -> std::shared_ptr<WallMotion>
     {
-      return std::make_shared<SkinnedWallMotion>(
+      SkinnedWallMotion skinned(
         wall.topology, wall.boundary.points, weights, wall.boundary.origin, skeleton, poses);
+      return SampleWallMotion(skinned, SampledPhases);
     });
 }
 

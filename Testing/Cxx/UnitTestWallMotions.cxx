@@ -203,6 +203,20 @@ TEST(WallMotions, SkinFollowsARigidSkeleton)
       ASSERT_NEAR((found[i] - rigid(mesh.topology.axis[0][i], k / 20.0)).norm(), 0.0, 1e-5);
     }
   }
+  // Sampled, it is the same at the samples and nearly so between them.
+  const std::shared_ptr<WallMotion> sampled = SampleWallMotion(motion, 40);
+  std::vector<Vector3> exact;
+  for (const double phase : { 0.1, 0.3375, 0.8125 })
+  {
+    motion.Positions(phase, exact);
+    sampled->Positions(phase, found);
+    const double tolerance = phase == 0.1 ? 1e-5 : 0.02;
+    for (std::size_t i = 0; i < found.size(); ++i)
+    {
+      ASSERT_LT((found[i] - exact[i]).norm(), tolerance) << phase;
+    }
+  }
+  EXPECT_THROW(SampleWallMotion(motion, 3), std::invalid_argument);
   skinned[5] = 1000000;
   ExpectRefusal([&]
     { SkinnedWallMotion(mesh.topology, mesh.points, weights, skinned, chain, poses); },

@@ -9,8 +9,11 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <string>
 #include <vector>
+
+#include <unistd.h>
 
 using namespace coronary;
 
@@ -45,6 +48,16 @@ Guidewire RandomWire(RandomStream& random)
   return wire;
 }
 
+/// MB of memory that the process has.
+double Resident()
+{
+  std::ifstream file("/proc/self/statm");
+  double pages = 0.0;
+  double resident = 0.0;
+  file >> pages >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
 GuideCatheter Catheter()
 {
   GuideCatheter catheter;
@@ -72,7 +85,8 @@ int main(int argc, char** argv)
   double seconds = 0.0;
   std::printf(
     "phantom,artery,ticks,seconds,us_per_tick,penetration_max_mm,penetration_mean_mm,joint_gap_mm,"
-    "force_max_N,inserted_max_mm,outside,resets\n");
+    "force_max_N,inserted_max_mm,outside,resets,"
+    "memory_early_MB,memory_end_MB\n");
   for (int p = 0; p < phantoms; ++p)
   {
     PhantomSettings settings;
@@ -106,9 +120,15 @@ int main(int argc, char** argv)
     double gap = 0.0;
     double force = 0.0;
     double inserted = 0.0;
+    double early =
+      0.0; // after what is made once: a tenth of the way, or a minute of simulated time
     const auto begin = std::chrono::steady_clock::now();
     for (long k = 0; k < ticks; ++k)
     {
+      if (k == std::min(ticks / 10, 120000L))
+      {
+        early = Resident();
+      }
       if (k % 800 == 0)
       {
         // Mostly forwards, sometimes to and fro, sometimes as fast as hands can.
@@ -148,11 +168,11 @@ int main(int argc, char** argv)
     }
     const double passed =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::printf("%d,%s,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,%.3f,%.1f,%ld,%ld\n",
+    std::printf("%d,%s,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,%.3f,%.1f,%ld,%ld,%.1f,%.1f\n",
       static_cast<int>(settings.seed),
       topology.groupName.empty() ? "" : topology.groupName[options.rootBranch].c_str(), ticks,
       passed, 1e6 * passed / static_cast<double>(ticks), deep, sum / static_cast<double>(ticks),
-      gap, force, inserted, lost, reset);
+      gap, force, inserted, lost, reset, early, Resident());
     std::fflush(stdout);
     outside += lost;
     resets += reset;
@@ -162,7 +182,7 @@ int main(int argc, char** argv)
     deepest = std::max(deepest, deep);
     widest = std::max(widest, gap);
   }
-  std::printf("all,,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,,,%ld,%ld\n", total, seconds,
+  std::printf("all,,%ld,%.1f,%.1f,%.4f,%.5f,%.4f,,,%ld,%ld,,\n", total, seconds,
     1e6 * seconds / static_cast<double>(total), deepest, depths / static_cast<double>(total),
     widest, outside, resets);
   return outside == 0 && resets == 0 ? 0 : 1;
