@@ -111,9 +111,21 @@ Vector3 RotationVector(const Eigen::Quaterniond& rotation)
   const Vector3 imaginary = sign * rotation.vec();
   const double sine = imaginary.norm();
   const double cosine = sign * rotation.w();
-  if (sine < 1e-8)
+  const double square = sine * sine;
+  if (square < 4e-3)
   {
-    return (2.0 / cosine) * imaginary;
+    // 2 asin(s) / s for a unit quaternion, to the last digits, and without a transcendental function.
+    const double series = 1.0 +
+      square *
+        (1.0 / 6.0 +
+          square *
+            (3.0 / 40.0 +
+              square *
+                (15.0 / 336.0 +
+                  square *
+                    (105.0 / 3456.0 +
+                      square * (945.0 / 42240.0 + square * (10395.0 / 599040.0))))));
+    return (2.0 * series) * imaginary;
   }
   return (2.0 * std::atan2(sine, cosine) / sine) * imaginary;
 }
@@ -121,13 +133,15 @@ Vector3 RotationVector(const Eigen::Quaterniond& rotation)
 Eigen::Quaterniond RotationOf(const Vector3& vector)
 {
   const double square = vector.squaredNorm();
-  if (square < 1e-8)
+  if (square < 1e-2)
   {
-    // Two terms of each series: exact to the last bit here.
-    const double half = 0.5 - square / 48.0;
-    return Eigen::Quaterniond(
-      1.0 - square / 8.0, half * vector.x(), half * vector.y(), half * vector.z())
-      .normalized();
+    // By their series, to the last digits.
+    const double half = 0.25 * square;
+    const double cosine =
+      1.0 - half * (0.5 - half * (1.0 / 24.0 - half * (1.0 / 720.0 - half * (1.0 / 40320.0))));
+    const double sine = 0.5 *
+      (1.0 - half * (1.0 / 6.0 - half * (1.0 / 120.0 - half * (1.0 / 5040.0 - half / 362880.0))));
+    return Eigen::Quaterniond(cosine, sine * vector.x(), sine * vector.y(), sine * vector.z());
   }
   const double angle = std::sqrt(square);
   const double factor = std::sin(0.5 * angle) / angle;
@@ -257,6 +271,12 @@ Vector3 CosseratRod::LastEnd(std::int64_t i) const
   return body.position + 0.5 * body.segment.length * body.axis;
 }
 
+int CosseratRod::SamplesOf(std::int64_t i) const
+{
+  const int own = this->Bodies[i].segment.samples;
+  return own > 0 ? std::min(own, this->Settings.samples) : this->Settings.samples;
+}
+
 double CosseratRod::SampleOffset(std::int64_t i, int sample) const
 {
   const double length = this->Bodies[i].segment.length;
@@ -264,7 +284,7 @@ double CosseratRod::SampleOffset(std::int64_t i, int sample) const
   {
     return -0.5 * length; // the free end of the first segment
   }
-  return ((sample + 0.5) / this->Settings.samples - 0.5) * length;
+  return ((sample + 0.5) / this->SamplesOf(i) - 0.5) * length;
 }
 
 Vector3 CosseratRod::SamplePoint(std::int64_t i, int sample) const
@@ -413,9 +433,11 @@ void CosseratRod::FindContacts(double seconds, ContactSurface& surface)
     Body& body = this->Bodies[i];
     body.nearWalls = 0;
     body.wallVelocity.setZero();
-    const int samples = this->Settings.samples + (i == 0 && this->Settings.tipSample ? 1 : 0);
-    for (int s = 0; s < samples; ++s)
+    const int along = this->SamplesOf(i);
+    const int samples = along + (i == 0 && this->Settings.tipSample ? 1 : 0);
+    for (int k = 0; k < samples; ++k)
     {
+      const int s = k < along ? k : this->Settings.samples; // the free end comes last
       const Vector3 arm = this->SampleOffset(i, s) * body.axis;
       ContactSample sample;
       sample.index = i * perSegment + s;

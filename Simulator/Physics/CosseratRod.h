@@ -34,6 +34,7 @@ struct RodSegment
   double friction = 0.0;            ///< handed to the ContactSurface
   double drag = 0.0;                ///< N s/mm, against the medium
   double rotationalDrag = 0.0;      ///< N mm s
+  int samples = 0;                  ///< fewer of them than RodSettings::samples; 0: as many
 };
 
 /// Of homogeneous round material. @param density  kg/m^3 @param radius  mm, of the mass
@@ -277,6 +278,7 @@ private:
   double Update(double& scale);
   void Finish(double seconds);
   void Restore();
+  int SamplesOf(std::int64_t i) const;
   double SampleOffset(std::int64_t i, int sample) const;
 
   RodSettings Settings;

@@ -284,6 +284,7 @@ void Intervention::Internals::MakeSegments()
     segment.drag = this->Settings.drag * 1e-6 * length;
     // More than blood would, too: a twisted wire that comes free spins within its lumen, not within a tick.
     segment.rotationalDrag = SpinDrag * length;
+    segment.samples = length < whole ? 1 : 0;
     this->Segments.push_back(segment);
     this->Places.push_back(middle);
     RodJoint joint;
@@ -690,7 +691,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Engage(data.NextPoints);
   RodSettings rod;
   rod.mediumFollowsWalls = true;
-  rod.reach = 0.15;
+  rod.reach = 0.08; // a little less than `trust`: what comes nearer is seen in the next tick
   rod.largestMove = 1.0;
   rod.trust = 0.1;
   data.Rod = std::make_unique<CosseratRod>(settings.capacity, rod);

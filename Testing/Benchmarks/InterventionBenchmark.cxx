@@ -8,6 +8,8 @@
 
 #include <benchmark/benchmark.h>
 
+#include <cstdint>
+#include <map>
 #include <memory>
 
 using namespace coronary;
@@ -44,7 +46,14 @@ void Tick(benchmark::State& state)
   state.counters["ticks/s"] =
     benchmark::Counter(static_cast<double>(k), benchmark::Counter::kIsRate);
 }
-BENCHMARK(Tick)->Arg(30)->Arg(60)->Arg(100)->MinTime(2.0)->Unit(benchmark::kMicrosecond);
+BENCHMARK(Tick)
+  ->ArgNames({ "segments", "edge_um" })
+  ->Args({ 30, 500 })
+  ->Args({ 60, 500 })
+  ->Args({ 100, 500 })
+  ->Args({ 100, 1000 })
+  ->MinTime(2.0)
+  ->Unit(benchmark::kMicrosecond);
 
 void RodAlone(benchmark::State& state)
 {
