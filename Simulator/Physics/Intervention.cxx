@@ -145,7 +145,12 @@ struct Intervention::Internals : ContactSurface
   std::size_t RootFirst = 0; // of the axis' points
   std::size_t RootCount = 0;
   std::int64_t InletTriangle = -1;
+  std::vector<Vector3> LastPoints; // of the whole wall at the frame's beginning and end
   std::vector<Vector3> NextPoints;
+  std::vector<Vector3> NowPoints;
+  std::vector<std::int64_t>
+    TreePoints; // the points of the engaged tree: no wire comes to another one
+  std::vector<Vector3> NextTreePoints;
   std::vector<Vector3> Axis;
   std::vector<Vector3> RootAxis;
 
@@ -254,6 +259,7 @@ struct Intervention::Internals : ContactSurface
 
   void MakeSegments();
   void Engage(const std::vector<Vector3>& points);
+  WallTopology EngagedTree();
   Eigen::Quaterniond HeldOrientation(const PathPlace& place) const;
   void AppendSegment();
   void PlaceOnPath();
@@ -401,6 +407,12 @@ void Intervention::Internals::Engage(const std::vector<Vector3>& points)
       this->InletTriangle = static_cast<std::int64_t>(t);
     }
   }
+  const WallTopology tree = this->EngagedTree();
+  this->NextTreePoints.clear();
+  for (const std::int64_t point : this->TreePoints)
+  {
+    this->NextTreePoints.push_back(points[point]);
+  }
   VesselWallSettings settings;
   settings.friction = this->Settings.wallFriction;
   settings.stiffness = this->Settings.wallStiffness;
@@ -408,7 +420,67 @@ void Intervention::Internals::Engage(const std::vector<Vector3>& points)
   {
     settings.openCaps.push_back(inlet);
   }
-  this->Wall = std::make_unique<VesselWall>(topology, points, settings);
+  this->Wall = std::make_unique<VesselWall>(tree, this->NextTreePoints, settings);
+}
+
+WallTopology Intervention::Internals::EngagedTree()
+{
+  // What is connected with the place where the catheter's tip is.
+  const WallTopology& topology = this->Motion->Topology();
+  std::vector<std::int64_t> root(topology.points);
+  for (std::size_t i = 0; i < root.size(); ++i)
+  {
+    root[i] = static_cast<std::int64_t>(i);
+  }
+  const auto find = [&root](std::int64_t i)
+  {
+    while (root[i] != i)
+    {
+      root[i] = root[root[i]];
+      i = root[i];
+    }
+    return i;
+  };
+  for (const Triangle& corners : topology.triangles)
+  {
+    root[find(corners[1])] = find(corners[0]);
+    root[find(corners[2])] = find(corners[0]);
+  }
+  const std::int64_t wanted = find(topology.triangles[this->InletTriangle][0]);
+  std::vector<std::int64_t> place(root.size(), -1);
+  WallTopology tree;
+  for (std::size_t i = 0; i < root.size(); ++i)
+  {
+    if (find(static_cast<std::int64_t>(i)) == wanted)
+    {
+      place[i] = tree.points++;
+      this->TreePoints.push_back(static_cast<std::int64_t>(i));
+      if (!topology.group.empty())
+      {
+        tree.group.push_back(topology.group[i]);
+      }
+    }
+  }
+  std::int64_t inlet = -1;
+  for (std::size_t t = 0; t < topology.triangles.size(); ++t)
+  {
+    const Triangle& corners = topology.triangles[t];
+    if (place[corners[0]] < 0)
+    {
+      continue;
+    }
+    if (static_cast<std::int64_t>(t) == this->InletTriangle)
+    {
+      inlet = static_cast<std::int64_t>(tree.triangles.size());
+    }
+    tree.triangles.push_back({ place[corners[0]], place[corners[1]], place[corners[2]] });
+    if (!topology.entity.empty())
+    {
+      tree.entity.push_back(topology.entity[t]);
+    }
+  }
+  this->InletTriangle = inlet;
+  return tree;
 }
 
 Eigen::Quaterniond Intervention::Internals::HeldOrientation(const PathPlace& place) const
@@ -452,8 +524,13 @@ void Intervention::Internals::PlaceOnPath()
 void Intervention::Internals::BeginFrame()
 {
   const double next = this->Phase + this->FrameSeconds * this->Settings.heartRate / 60.0;
+  this->LastPoints.swap(this->NextPoints);
   this->Motion->Positions(next, this->NextPoints);
-  this->Wall->BeginFrame(this->NextPoints, this->FrameSeconds);
+  for (std::size_t i = 0; i < this->TreePoints.size(); ++i)
+  {
+    this->NextTreePoints[i] = this->NextPoints[this->TreePoints[i]];
+  }
+  this->Wall->BeginFrame(this->NextTreePoints, this->FrameSeconds);
   this->Motion->AxisPositions(next, this->Axis);
   std::copy_n(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst), this->RootCount,
     this->RootAxis.begin());
@@ -688,6 +765,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
     AlongWire(wire, 0.5 * wire.length, [](const WireSection& s) { return s.torsionalStiffness; }) /
     catheter.length;
   data.Motion->Positions(data.Phase, data.NextPoints);
+  data.LastPoints = data.NextPoints;
   data.Engage(data.NextPoints);
   RodSettings rod;
   rod.mediumFollowsWalls = true;
@@ -784,7 +862,15 @@ const std::vector<Vector3>& Intervention::CatheterLine() const
 
 const std::vector<Vector3>& Intervention::WallPoints() const
 {
-  return this->Data->Wall->Points();
+  Internals& data = *this->Data;
+  const double share =
+    static_cast<double>(data.TickInFrame) / static_cast<double>(data.Settings.ticksPerFrame);
+  data.NowPoints.resize(data.NextPoints.size());
+  for (std::size_t i = 0; i < data.NowPoints.size(); ++i)
+  {
+    data.NowPoints[i] = (1.0 - share) * data.LastPoints[i] + share * data.NextPoints[i];
+  }
+  return data.NowPoints;
 }
 
 std::uint64_t Intervention::StateHash() const
