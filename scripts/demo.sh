@@ -81,6 +81,10 @@ else
   "${evaluate[@]}" --no-pictures
 fi
 
+echo "== A guidewire in that model, driven by a script"
+"$root/build/paraview/bin/coronary-simulator" --headless --scenario phantom-lca --vessels "$output/run" \
+  --script "$root/Testing/Data/Driving/lad-apex.json" --output "$output/simulator" --output-rate 2 --write-wall
+
 if [ "$pictures" = yes ]; then
   echo "== Pictures"
   # A home of its own: the pictures must not depend on, nor change, the user's ParaView settings.
@@ -101,6 +105,7 @@ if [ "$pictures" = yes ]; then
   render volume "$output/run"
   render skinning "$output/run"
   render tracking "$output/run"
+  render simulator "$output/simulator"
 fi
 
 plugin="$(find "$root/build/paraview" -name DynamicCoronaryPlugin.so -print -quit)"
@@ -119,6 +124,7 @@ What lies where
                                       with the skeleton inside and their skin weights;
                                       motion/ has all of it at every phase (.series);
                                       status.csv and report.json say how they came about
+  $output/simulator/                  trajectory.pvd, forces.csv, tip.csv, statistics.json: a session of the simulator
   $output/evaluation/                 table1.csv, .json and .tex, report.html (tables, plots, pictures,
                                       the beating tree), branches.csv, pictures/, plots/
   $output/phantom-motion.txt          amplitudes, speeds and rest windows per artery

@@ -4,13 +4,23 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <functional>
+#include <string>
 
 using namespace coronary;
 
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
+
+// A line of the table in docs/simulator.md; scripts/validate-simulator.sh collects them.
+void Row(const char* what, double wanted, double measured, const char* tolerance)
+{
+  std::printf("| %s | %.6g | %.6g | %s | %s |\n", what, wanted, measured,
+    wanted != 0.0 ? (std::to_string(100.0 * (measured / wanted - 1.0)) + " %").c_str() : "",
+    tolerance);
+}
 
 struct Material
 {
@@ -193,6 +203,9 @@ TEST(CosseratRod, CantileverBendsAsFL3Over3EI)
   const double error20 = CantileverDeflection(20) / exact - 1.0;
   const double error40 = CantileverDeflection(40) / exact - 1.0;
   EXPECT_LT(std::abs(error20), 1e-3);
+  Row("cantilever, small tip load, 20 joints: deflection, mm", exact, exact * (1.0 + error20),
+    "0.1 %");
+  Row("the same, 40 joints", exact, exact * (1.0 + error40), "second order");
   EXPECT_NEAR(std::log2(error20 / error40), 2.0, 0.1) << error20 << ' ' << error40;
 }
 
@@ -206,6 +219,8 @@ TEST(CosseratRod, ElasticaUnderAGreatTipLoad)
     rod.SetForce(20, Vector3(5.0 / (length * length) * k / 20.0, 0.0, 0.0));
     Settle(rod);
   }
+  Row("elastica, F L^2 / EI = 5: w / L", 0.71379, rod.Position(20).x() / length, "0.2 %");
+  Row("elastica: u / L", 0.38763, 1.0 - rod.Position(20).z() / length, "0.2 %");
   EXPECT_NEAR(rod.Position(20).x() / length, 0.71379, 0.002 * 0.71379);
   EXPECT_NEAR(1.0 - rod.Position(20).z() / length, 0.38763, 0.002 * 0.38763);
 }
@@ -223,6 +238,7 @@ TEST(CosseratRod, EulerColumnBuckles)
         rod, [](const CosseratRod& r) { return std::abs(r.Position(40).x()); }, 4000);
     });
   EXPECT_NEAR(found, 1.0, 0.005);
+  Row("Euler column, clamped and free: P / (pi^2 EI / 4 L^2)", 1.0, found, "0.5 %");
 }
 
 TEST(CosseratRod, TorsionBetweenTwoHeldEnds)
@@ -241,6 +257,8 @@ TEST(CosseratRod, TorsionBetweenTwoHeldEnds)
     Settle(rod);
     const double exact = material.torsion * 2.0 * Pi * turns / length;
     EXPECT_NEAR(rod.JointMoment(25).z(), exact, 1e-6 * exact);
+    Row(turns < 1.0 ? "torsion, a quarter of a turn: N mm" : "torsion, one turn: N mm", exact,
+      rod.JointMoment(25).z(), "0.5 %");
     Vector3 force, torque;
     rod.Reaction(50, force, torque);
     EXPECT_NEAR(torque.z(), exact, 1e-6 * exact);
@@ -257,6 +275,8 @@ TEST(CosseratRod, TakesItsShapeAtRest)
   CosseratRod rod = StraightRod(15, length, material);
   Settle(rod);
   const Vector3 tangent = rod.Axis(15);
+  Row("shaped tip: angle of its end, rad", 0.5 * Pi, std::atan2(-tangent.y(), tangent.z()),
+    "1e-8 rad");
   EXPECT_NEAR(std::atan2(-tangent.y(), tangent.z()), 0.5 * Pi, 1e-8);
 }
 
@@ -275,6 +295,8 @@ TEST(CosseratRod, EndMomentAndEndTorque)
     }
     const double angle = std::atan2(rod.Axis(joints).x(), rod.Axis(joints).z());
     EXPECT_NEAR(angle, 0.5 * Pi, 1e-6);
+    Row(joints == 10 ? "end moment, 10 joints: deflection of the tip, mm" : "the same, 40 joints",
+      2.0 * length / Pi, rod.Position(joints).x(), joints == 10 ? "0.5 %" : "0.05 %");
     // The tip of a quarter of a circle.
     EXPECT_NEAR(rod.Position(joints).x(), 2.0 * length / Pi,
       (joints == 10 ? 0.005 : 0.0005) * 2.0 * length / Pi);
@@ -283,6 +305,8 @@ TEST(CosseratRod, EndMomentAndEndTorque)
     twisted.SetTorque(joints, Vector3(0.0, 0.0, material.torsion / length));
     Settle(twisted);
     EXPECT_NEAR(RotationVector(twisted.Orientation(joints)).z(), 1.0, 1e-6);
+    Row(joints == 10 ? "end torque, 10 joints: rad" : "the same, 40 joints", 1.0,
+      RotationVector(twisted.Orientation(joints)).z(), joints == 10 ? "0.5 %" : "0.05 %");
   }
 }
 
@@ -303,6 +327,7 @@ TEST(CosseratRod, HeldHalfCircle)
   Vector3 force, torque;
   rod.Reaction(0, force, torque);
   EXPECT_NEAR(-torque.y(), 1.0 / radius, 0.005 / radius);
+  Row("held half circle: moment at the clamp, N mm", 1.0 / radius, -torque.y(), "0.5 %");
   EXPECT_NEAR(rod.JointMoment(20).y(), 1.0 / radius, 0.005 / radius);
 }
 
@@ -323,8 +348,10 @@ TEST(CosseratRod, HelixFromCurvatureAndTorsion)
   const Vector3 axis = RotationVector(turn).normalized();
   const double angle = RotationVector(turn).norm();
   const Vector3 step = rod.Position(61) - rod.Position(60);
+  Row("helix: pitch, mm", pitch, std::abs(step.dot(axis)) * 2.0 * Pi / angle, "0.5 %");
   EXPECT_NEAR(std::abs(step.dot(axis)) * 2.0 * Pi / angle, pitch, 0.005 * pitch);
   const Vector3 across = step - axis * axis.dot(step);
+  Row("helix: radius, mm", radius, across.norm() / (2.0 * std::sin(0.5 * angle)), "0.5 %");
   EXPECT_NEAR(across.norm() / (2.0 * std::sin(0.5 * angle)), radius, 0.005 * radius);
 }
 
@@ -369,6 +396,7 @@ TEST(CosseratRod, TwistedRingLeavesItsPlane)
         2000);
     });
   EXPECT_NEAR(found, exact, 0.02 * exact);
+  Row("twisted ring (Michell, Zajac): critical twist, rad", exact, found, "2 %");
 }
 
 TEST(CosseratRod, StraightRodUnderTorqueBuckles)
@@ -405,6 +433,7 @@ TEST(CosseratRod, StraightRodUnderTorqueBuckles)
         rod, [&](const CosseratRod& r) { return r.Position(segments / 2).head<2>().norm(); }, 2000);
     });
   EXPECT_NEAR(found, exact, 0.03 * exact);
+  Row("straight rod under torque (Greenhill): N mm", exact, found, "3 %");
 }
 
 TEST(CosseratRod, LiesOnAPlaneWithItsWeight)
@@ -428,6 +457,7 @@ TEST(CosseratRod, LiesOnAPlaneWithItsWeight)
     sum += contact.force;
   }
   EXPECT_NEAR(sum, weight, 1e-6 * weight);
+  Row("rod on a plane: sum of the normal forces, N", weight, sum, "1e-6");
 }
 
 TEST(CosseratRod, SlipsOnAPlaneAtMuTimesN)
@@ -457,6 +487,8 @@ TEST(CosseratRod, SlipsOnAPlaneAtMuTimesN)
       rod.Step(5e-4, &plane);
     }
     const double moved = rod.Position(10).z() - before;
+    Row(share < 1.0 ? "pulled on a plane with 0.98 mu N: moved, mm" : "with 1.02 mu N: moved, mm",
+      0.0, moved, share < 1.0 ? "sticks (< 0.001)" : "slips (> 1)");
     if (share < 1.0)
     {
       EXPECT_LT(moved, 1e-3);
@@ -532,6 +564,11 @@ TEST(CosseratRod, CapstanEquation)
       ratio /= averaged;
       const double angle = std::acos(rod.Axis(3).dot(rod.Axis(count - 4)));
       const double exact = std::exp(test.friction * angle);
+      char what[128];
+      std::snprintf(what, sizeof(what),
+        "capstan, mu %.1f, %.0f degrees, %.2f mm, %.1f mm/s, dt %.1f ms, %d iterations: T2 / T1",
+        test.friction, angle * 180.0 / Pi, test.step, test.speed, 1e3 * test.seconds, iterations);
+      Row(what, exact, ratio, test.friction > 0.0 ? "3 %" : "0.5 %");
       EXPECT_NEAR(ratio, exact, (test.friction > 0.0 ? 0.03 : 0.005) * exact)
         << "mu " << test.friction << " wrap " << test.wrap << " step " << test.step << " speed "
         << test.speed << " iterations " << iterations;
@@ -555,6 +592,8 @@ TEST(CosseratRod, KeepsInAShakenTube)
     const double seconds = 5e-4;
     const double rate = 2.0 * Pi * 2.0;
     double mean = 0.0;
+    double deepest = 0.0;
+    double widest = 0.0;
     int touched = 0;
     for (int k = 1; k <= 4000; ++k)
     {
@@ -570,6 +609,8 @@ TEST(CosseratRod, KeepsInAShakenTube)
       }
       ASSERT_LT(step.largestPenetration, 0.1);
       ASSERT_LT(step.largestGap, 0.005);
+      deepest = std::max(deepest, step.largestPenetration);
+      widest = std::max(widest, step.largestGap);
       mean += step.meanPenetration;
       touched += step.touching;
       for (int i = 0; i < 60; ++i)
@@ -577,6 +618,11 @@ TEST(CosseratRod, KeepsInAShakenTube)
         ASSERT_LT(tube.Outside(rod.Position(i)), 0.0);
       }
     }
+    const std::string name =
+      "tube shaken at 108.6 mm/s, EI " + std::to_string(bending).substr(0, 5) + " N mm^2: ";
+    Row((name + "greatest penetration, mm").c_str(), 0.0, deepest, "0.1 mm");
+    Row((name + "mean, mm").c_str(), 0.0, mean / 3800, "0.02 mm");
+    Row((name + "joint gap, mm").c_str(), 0.0, widest, "0.005 mm");
     EXPECT_LT(mean / 3800, 0.02);
     EXPECT_GT(touched, 1000) << "it does not touch: nothing was tested";
   }
@@ -594,6 +640,7 @@ TEST(CosseratRod, GainsNoEnergyWhenNothingMoves)
   const Eigen::Quaterniond turned = rod.Orientation(59);
   const double seconds = 5e-4;
   double before = 0.0;
+  double growth = 0.0;
   for (int k = 1; k <= 2000; ++k)
   {
     // Shaken, then stopped at once.
@@ -605,11 +652,13 @@ TEST(CosseratRod, GainsNoEnergyWhenNothingMoves)
     const double energy = rod.KineticEnergy() + rod.ElasticEnergy() + rod.ContactEnergy();
     if (k > 501)
     {
+      growth = std::max(growth, energy - before);
       // 1e-9 J
       ASSERT_LT(energy, before + 1e-6) << k;
     }
     before = energy;
   }
+  Row("after the tube stops: greatest growth of energy in a step, J", 0.0, 1e-3 * growth, "1e-9 J");
 }
 
 TEST(CosseratRod, WorkOfTheHandIsAccountedFor)
@@ -678,6 +727,7 @@ TEST(CosseratRod, WorkOfTheHandIsAccountedFor)
   EXPECT_GT(work, 0.05);
   EXPECT_GT(friction, 0.05 * work);
   EXPECT_NEAR(work, stored + friction, 0.02 * work) << stored << ' ' << friction;
+  Row("work of the hand = elastic + friction + contact, N mm", work, stored + friction, "2 %");
 }
 
 TEST(CosseratRod, ConvergesInTime)
@@ -706,6 +756,7 @@ TEST(CosseratRod, ConvergesInTime)
   const double a = tip(4e-6);
   const double b = tip(2e-6);
   const double c = tip(1e-6);
+  Row("order of convergence in time", 0.0, std::log2(std::abs((a - b) / (b - c))), "at least 1");
   EXPECT_GT(std::log2(std::abs((a - b) / (b - c))), 0.9) << a << ' ' << b << ' ' << c;
 }
 

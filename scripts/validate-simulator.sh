@@ -1,0 +1,54 @@
+#!/usr/bin/env bash
+# The simulator's physics against closed forms (docs/simulator.md), and random driving in beating phantoms.
+set -euo pipefail
+
+usage() {
+  cat <<'TEXT'
+Usage: scripts/validate-simulator.sh [--quick] [BUILD_FOLDER]
+  --quick       without the soak: 20 phantoms of 50,000 ticks take five to ten minutes
+  BUILD_FOLDER  default: build/paraview
+Prints the table of the rod, and that of the soak as CSV. Exit code 1 when anything misses its limit.
+TEXT
+}
+
+quick=no
+build=""
+for argument in "$@"; do
+  case "$argument" in
+    --quick) quick=yes ;;
+    -h | --help)
+      usage
+      exit 0
+      ;;
+    -*)
+      echo "validate-simulator: unknown option '$argument'" >&2
+      exit 2
+      ;;
+    *) build="$argument" ;;
+  esac
+done
+build="${build:-$(dirname "${BASH_SOURCE[0]}")/../build/paraview}"
+rod="$build/bin/UnitTestCosseratRod"
+soak="$build/bin/soak-intervention"
+for program in "$rod" "$soak"; do
+  if [ ! -x "$program" ]; then
+    echo "validate-simulator: $program is not there; build first (README.md)" >&2
+    exit 1
+  fi
+done
+
+log="$(mktemp)"
+trap 'rm -f "$log"' EXIT
+status=0
+"$rod" >"$log" 2>&1 || status=1
+echo "| test | closed form | measured | off by | tolerance |"
+echo "|---|---|---|---|---|"
+grep '^|' "$log" || status=1
+if [ "$status" -ne 0 ]; then
+  grep -A3 'Failure' "$log" >&2 || true
+fi
+if [ "$quick" = no ]; then
+  echo
+  "$soak" 20 50000 || status=1
+fi
+exit "$status"
