@@ -38,7 +38,8 @@ void Refused(const Change& change, const std::string& part)
 TEST(UnitTestInstrumentCatalogue, HasTheKindsThatAreUsed)
 {
   const coronary::InstrumentCatalogue& catalogue = BuiltInCatalogue();
-  for (const char* name : { "workhorse", "workhorse-long-j", "extra-support", "polymer-jacket", "cto-9gf" })
+  for (const char* name :
+    { "workhorse", "workhorse-long-j", "extra-support", "polymer-jacket", "cto-9gf" })
   {
     EXPECT_NO_THROW(catalogue.Wire(name)) << name;
   }
