@@ -165,7 +165,6 @@ struct Intervention::Internals : ContactSurface
   std::vector<char> InVessel; // per sample
 
   double Fed = 0.0; // mm, where the tip would be on the straightened way: its u without bends
-  double StartFed = 0.0;
   double HandPosition = 0.0; // as accepted
   double HandAngle = 0.0;
   double Spring = 0.0;      // N mm/rad, of the wire in the catheter
@@ -177,7 +176,6 @@ struct Intervention::Internals : ContactSurface
   {
     std::vector<Vector3> position;
     std::vector<Eigen::Quaterniond> orientation;
-    std::vector<Vector3> offset; // from the wall's place that it is nearest to
     double fed = 0.0;
     double lag = 0.0;
   };
@@ -777,8 +775,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Line.reserve(settings.capacity + 1);
   data.Last.position.reserve(settings.capacity);
   data.Last.orientation.reserve(settings.capacity);
-  data.StartFed = data.CatheterTip - StartInside;
-  data.Fed = data.StartFed;
+  data.Fed = data.CatheterTip - StartInside;
   data.PlaceOnPath();
   data.KeepSane();
 }
