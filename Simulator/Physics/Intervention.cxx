@@ -16,7 +16,8 @@ namespace coronary
 {
 namespace
 {
-constexpr double ShortTip = 12.0; // mm from the tip on which segments are half as long
+constexpr double FloppyTip = 35.0; // mm from the tip in which segments have two samples
+constexpr double ShortTip = 12.0;  // mm from the tip on which segments are half as long
 constexpr double StartInside =
   2.0; // mm of the catheter between its tip and the wire's, at the beginning
 constexpr double SoftTip = 3.0;   // mm of the catheter
@@ -288,7 +289,8 @@ void Intervention::Internals::MakeSegments()
     segment.drag = this->Settings.drag * 1e-6 * length;
     // More than blood would, too: a twisted wire that comes free spins within its lumen, not within a tick.
     segment.rotationalDrag = SpinDrag * length;
-    segment.samples = length < whole ? 1 : 0;
+    // Where segments are short, or too stiff to bend between samples, one is enough.
+    segment.samples = length < whole || middle > FloppyTip ? 1 : 0;
     this->Segments.push_back(segment);
     this->Places.push_back(middle);
     RodJoint joint;
