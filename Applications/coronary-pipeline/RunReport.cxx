@@ -1,5 +1,8 @@
 #include "RunReport.h"
 
+#include "Fnv1a.h"
+#include "UtcTime.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -21,16 +24,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* FinishedState = "finished";
 const std::vector<const char*> HeadNames = { "phase", "time", "image", "surface_input" };
-
-std::string UtcTime()
-{
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  gmtime_r(&now, &parts);
-  char text[32];
-  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text;
-}
 
 Json Versions()
 {
@@ -134,13 +127,11 @@ std::vector<fs::path> AllFiles(const std::vector<std::string>& paths, const fs::
 
 Json DescribeInput(const std::vector<std::string>& files, const std::string& except)
 {
-  std::uint64_t digest = 14695981039346656037ULL; // FNV-1a
+  std::uint64_t digest = Fnv1a(nullptr, 0);
   const auto add = [&](const std::string& text)
   {
-    for (const char c : text + '\n')
-    {
-      digest = (digest ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-    }
+    digest = Fnv1a(text.data(), text.size(), digest);
+    digest = Fnv1a("\n", 1, digest);
   };
   std::uintmax_t bytes = 0;
   std::time_t latest = 0;

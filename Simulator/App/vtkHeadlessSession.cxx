@@ -10,6 +10,7 @@
 #include "Recording.h"
 #include "SessionStatistics.h"
 #include "StagedFolder.h"
+#include "UtcTime.h"
 #include "vtkMessageTrap.h"
 #include "vtkSessionFiles.h"
 #include "vtkVesselModel.h"
@@ -19,7 +20,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -36,23 +36,6 @@ using Json = nlohmann::json;
 constexpr std::uint64_t ForceInterval = 40;        // ticks between recorded forces: 50 Hz at 2 kHz
 constexpr std::uint64_t InterruptionInterval = 64; // ticks between looks at signals
 constexpr std::uint64_t MostPrinted = 50; // messages on the console; statistics.json has more
-
-std::string Hexadecimal(std::uint64_t value)
-{
-  char text[24];
-  std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(value));
-  return text;
-}
-
-std::string NowInUtc()
-{
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  gmtime_r(&now, &parts);
-  char text[32];
-  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text;
-}
 
 /// Where the hands' movements come from.
 class Hands
@@ -399,7 +382,7 @@ void RunHeadless(const HeadlessOptions& options)
     header.meshHash = wallHash;
     header.seed = scenario.seed;
     header.tickRate = rate;
-    header.started = NowInUtc();
+    header.started = UtcTime();
     recording = std::make_unique<RecordingWriter>(options.record, header);
   }
 

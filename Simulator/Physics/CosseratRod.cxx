@@ -1,7 +1,8 @@
 #include "CosseratRod.h"
 
+#include "Fnv1a.h"
+
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -90,19 +91,6 @@ void RequirePositive(double value, const char* name)
   }
 }
 
-std::uint64_t HashBits(std::uint64_t hash, const double* values, int count)
-{
-  for (int i = 0; i < count; ++i)
-  {
-    std::uint64_t bits;
-    std::memcpy(&bits, values + i, sizeof(bits));
-    for (int byte = 0; byte < 8; ++byte)
-    {
-      hash = (hash ^ ((bits >> (8 * byte)) & 0xff)) * 0x100000001b3ULL;
-    }
-  }
-  return hash;
-}
 }
 
 Vector3 RotationVector(const Eigen::Quaterniond& rotation)
@@ -452,12 +440,9 @@ void CosseratRod::FindContacts(double seconds, ContactSurface& surface)
       std::array<bool, 2> kept{ false, false };
       for (int p = 0; p < found.count; ++p)
       {
-        ++body.nearWalls;
-        body.wallVelocity += (found.plane[p].wallVelocity - body.wallVelocity) / body.nearWalls;
-      }
-      for (int p = 0; p < found.count; ++p)
-      {
         const ContactPlane& plane = found.plane[p];
+        ++body.nearWalls;
+        body.wallVelocity += (plane.wallVelocity - body.wallVelocity) / body.nearWalls;
         const int identity = plane.identity == 0 ? 0 : 1;
         kept[identity] = true;
         Plane state;
@@ -1100,22 +1085,22 @@ double CosseratRod::ContactEnergy() const
 
 std::uint64_t CosseratRod::Hash(std::uint64_t seed) const
 {
-  std::uint64_t hash = HashBits(seed, &this->Calm, 1);
+  std::uint64_t hash = Fnv1a(&this->Calm, sizeof(double), seed);
   for (const Body& body : this->Bodies)
   {
-    hash = HashBits(hash, body.position.data(), 3);
-    hash = HashBits(hash, body.orientation.coeffs().data(), 4);
-    hash = HashBits(hash, body.velocity.data(), 3);
-    hash = HashBits(hash, body.turning.data(), 3);
-    hash = HashBits(hash, &body.lag, 1);
+    hash = Fnv1a(body.position.data(), 3 * sizeof(double), hash);
+    hash = Fnv1a(body.orientation.coeffs().data(), 4 * sizeof(double), hash);
+    hash = Fnv1a(body.velocity.data(), 3 * sizeof(double), hash);
+    hash = Fnv1a(body.turning.data(), 3 * sizeof(double), hash);
+    hash = Fnv1a(&body.lag, sizeof(double), hash);
     for (const auto& sample : body.memory)
     {
       for (const Memory& memory : sample)
       {
         if (memory.force > 0.0)
         {
-          hash = HashBits(hash, memory.spring.data(), 3);
-          hash = HashBits(hash, memory.slide.data(), 3);
+          hash = Fnv1a(memory.spring.data(), 3 * sizeof(double), hash);
+          hash = Fnv1a(memory.slide.data(), 3 * sizeof(double), hash);
         }
       }
     }

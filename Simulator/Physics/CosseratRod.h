@@ -253,7 +253,6 @@ private:
     double friction = 0.0;
     Vector3 wallMotion = Vector3::Zero(); ///< in this step, mm
     Memory* memory = nullptr;
-    int identity = 0;
     bool pressed = false; ///< taken for a contact in earnest
     int changes = 0;      ///< of that in this step
     double law = 0.0;     ///< N at the last linearization

@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_Instrument_h
 #define DynamicCoronary_Instrument_h
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,35 @@ struct Guidewire
   /// @throws std::invalid_argument naming the wire, the section and the property
   void Validate() const;
 };
+
+/// A property of a wire at a distance from its tip, mm: linear from the middle of one section to that of the next.
+/// @param property  of a WireSection
+template <typename Property>
+double AlongWire(const Guidewire& wire, double distance, Property property)
+{
+  double from = 0.0;
+  double lastMiddle = 0.0;
+  double lastValue = 0.0;
+  for (std::size_t i = 0; i < wire.sections.size(); ++i)
+  {
+    const WireSection& section = wire.sections[i];
+    const double middle = from + 0.5 * section.length;
+    const double value = property(section);
+    if (distance < middle)
+    {
+      if (i == 0)
+      {
+        return value;
+      }
+      const double share = (distance - lastMiddle) / (middle - lastMiddle);
+      return (1.0 - share) * lastValue + share * value;
+    }
+    from += section.length;
+    lastMiddle = middle;
+    lastValue = value;
+  }
+  return lastValue;
+}
 
 /// A piece of a guide catheter's shape, counted from its tip.
 struct CatheterArc

@@ -2,13 +2,13 @@
 
 #include "CatheterPath.h"
 #include "CosseratRod.h"
+#include "Fnv1a.h"
 #include "VesselWall.h"
 #include "WallMotion.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <limits>
 #include <stdexcept>
 
@@ -36,34 +36,6 @@ void RequireWithin(double value, double low, double high, const char* name)
   }
 }
 
-/// A wire's property at a distance from its tip: linear from the middle of one section to that of the next.
-template <typename Property>
-double AlongWire(const Guidewire& wire, double distance, Property property)
-{
-  double from = 0.0;
-  double lastMiddle = 0.0;
-  double lastValue = 0.0;
-  for (std::size_t i = 0; i < wire.sections.size(); ++i)
-  {
-    const WireSection& section = wire.sections[i];
-    const double middle = from + 0.5 * section.length;
-    const double value = property(section);
-    if (distance < middle)
-    {
-      if (i == 0)
-      {
-        return value;
-      }
-      const double share = (distance - lastMiddle) / (middle - lastMiddle);
-      return (1.0 - share) * lastValue + share * value;
-    }
-    from += section.length;
-    lastMiddle = middle;
-    lastValue = value;
-  }
-  return lastValue;
-}
-
 /// Curvature at rest is that of the section, all along it.
 double RestCurvature(const Guidewire& wire, double distance)
 {
@@ -77,17 +49,6 @@ double RestCurvature(const Guidewire& wire, double distance)
     }
   }
   return 0.0;
-}
-
-std::uint64_t HashValue(std::uint64_t hash, double value)
-{
-  std::uint64_t bits;
-  std::memcpy(&bits, &value, sizeof(bits));
-  for (int byte = 0; byte < 8; ++byte)
-  {
-    hash = (hash ^ ((bits >> (8 * byte)) & 0xff)) * 0x100000001b3ULL;
-  }
-  return hash;
 }
 
 enum class Notice : int
@@ -142,7 +103,6 @@ struct Intervention::Internals : ContactSurface
   double Phase = 0.0;
   double FrameSeconds = 0.0;
   int TickInFrame = 0;
-  int Root = 0;
   std::size_t RootFirst = 0; // of the axis' points
   std::size_t RootCount = 0;
   std::int64_t InletTriangle = -1;
@@ -172,6 +132,7 @@ struct Intervention::Internals : ContactSurface
   double CatheterTip = 0.0; // u
   double CatheterAngle = 0.0;
   double HandSpeed = 0.0;
+  double Wound = 0.0; // exponent of the capstan equation for the whole catheter
 
   struct Sane
   {
@@ -319,27 +280,27 @@ void Intervention::Internals::Engage(const std::vector<Vector3>& points)
   {
     throw std::invalid_argument("the vessels have no axis, so there is no ostium to engage");
   }
-  this->Root = this->Settings.rootBranch;
-  if (this->Root < 0)
+  int root = this->Settings.rootBranch;
+  if (root < 0)
   {
-    for (std::size_t b = 0; b < topology.axis.size() && this->Root < 0; ++b)
+    for (std::size_t b = 0; b < topology.axis.size() && root < 0; ++b)
     {
       if (b >= topology.parent.size() || topology.parent[b] < 0)
       {
-        this->Root = static_cast<int>(b);
+        root = static_cast<int>(b);
       }
     }
   }
-  if (this->Root < 0 || this->Root >= static_cast<int>(topology.axis.size()))
+  if (root < 0 || root >= static_cast<int>(topology.axis.size()))
   {
     throw std::invalid_argument(
-      "rootBranch " + std::to_string(this->Root) + " is not a branch of the vessels");
+      "rootBranch " + std::to_string(root) + " is not a branch of the vessels");
   }
-  for (int b = 0; b < this->Root; ++b)
+  for (int b = 0; b < root; ++b)
   {
     this->RootFirst += topology.axis[b].size();
   }
-  this->RootCount = topology.axis[this->Root].size();
+  this->RootCount = topology.axis[root].size();
   this->Motion->AxisPositions(this->Phase, this->Axis);
   this->RootAxis.assign(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst),
     this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst + this->RootCount));
@@ -350,10 +311,9 @@ void Intervention::Internals::Engage(const std::vector<Vector3>& points)
   // Do the instruments fit?
   double narrowest = std::numeric_limits<double>::infinity();
   double along = 0.0;
-  const std::vector<Vector3>& axis = topology.axis[this->Root];
-  const std::vector<double>* radius =
-    static_cast<std::size_t>(this->Root) < topology.axisRadius.size()
-    ? &topology.axisRadius[this->Root]
+  const std::vector<Vector3>& axis = topology.axis[root];
+  const std::vector<double>* radius = static_cast<std::size_t>(root) < topology.axisRadius.size()
+    ? &topology.axisRadius[root]
     : nullptr;
   for (std::size_t i = 0; radius && i < axis.size() && i < radius->size(); ++i)
   {
@@ -406,6 +366,10 @@ void Intervention::Internals::Engage(const std::vector<Vector3>& points)
       nearestWall = (middle - tip).squaredNorm();
       this->InletTriangle = static_cast<std::int64_t>(t);
     }
+  }
+  if (this->InletTriangle < 0)
+  {
+    throw std::invalid_argument("the vessels have no wall, only caps");
   }
   const WallTopology tree = this->EngagedTree();
   this->NextTreePoints.clear();
@@ -505,10 +469,6 @@ void Intervention::Internals::AppendSegment()
 
 void Intervention::Internals::PlaceOnPath()
 {
-  while (this->Rod->Size() > 0)
-  {
-    this->Rod->RemoveLast();
-  }
   const double datum = this->CatheterTip - this->Settings.insideCatheter;
   while (
     this->Rod->Size() < LeastSegments || this->Fed - this->Places[this->Rod->Size() - 1] > datum)
@@ -517,8 +477,6 @@ void Intervention::Internals::PlaceOnPath()
   }
   const std::int64_t last = this->Rod->Size() - 1;
   this->Rod->Prescribe(last, this->Rod->Position(last), this->Rod->Orientation(last));
-  std::fill(this->InVessel.begin(), this->InVessel.end(), 0);
-  this->Wall->ForgetAll();
 }
 
 void Intervention::Internals::BeginFrame()
@@ -725,8 +683,7 @@ void Intervention::Internals::Measure()
   report.proximalTorque = this->Spring * this->Rod->Lag(last);
   // The catheter's bends multiply what the hand feels (capstan), against the way that it moves.
   const double sense = std::clamp(this->HandSpeed, -1.0, 1.0); // mm/s
-  report.proximalForce = force.dot(forward) *
-    std::exp(sense * this->Catheter.friction * this->Catheter.TurnedAngle(this->Catheter.length));
+  report.proximalForce = force.dot(forward) * std::exp(sense * this->Wound);
   if (report.inserted <= 0.0)
   {
     report.branch = -1;
@@ -757,6 +714,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Wire = wire;
   data.Catheter = catheter;
   data.Settings = settings;
+  data.Wound = catheter.friction * catheter.TurnedAngle(catheter.length);
   data.Step = 1.0 / settings.tickRate;
   data.FrameSeconds = data.Step * settings.ticksPerFrame;
   data.Phase = settings.startPhase - std::floor(settings.startPhase);
@@ -879,7 +837,7 @@ std::uint64_t Intervention::StateHash() const
   for (const double value : { data.Fed, data.HandAngle, data.CatheterTip, data.CatheterAngle,
          data.Phase, static_cast<double>(data.Tick) })
   {
-    hash = HashValue(hash, value);
+    hash = Fnv1a(&value, sizeof(value), hash);
   }
   return hash;
 }

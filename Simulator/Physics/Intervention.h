@@ -98,7 +98,8 @@ public:
   /// The wall now, mm.
   const std::vector<Vector3>& WallPoints() const;
 
-  /// FNV-1a over the bits of all that decides how it goes on.
+  /// FNV-1a over the bits of the wire's, the hands' and the heart's state. What the wall keeps to be faster, and the
+  /// forces in the joints, follow from these and the ticks before.
   std::uint64_t StateHash() const;
 
   /// What was clamped or reset since the last call, one sentence each, every kind at most once a second.

@@ -84,14 +84,7 @@ DriveScript DriveScriptFromText(const std::string& text, const std::string& orig
 {
   const nlohmann::json json = ParseJson(text, origin);
   JsonFields fields(json, origin);
-  if (fields.Text("format") != "dynamiccoronary script")
-  {
-    fields.Refuse("is no script of driving: its 'format' is another one");
-  }
-  if (fields.Whole("version", 0, INT32_MAX, 0) != 1)
-  {
-    fields.Refuse("has another 'version' than 1, the only one that is known");
-  }
+  fields.RequireFormat("dynamiccoronary script", "script of driving");
   fields.Text("description", "");
   std::vector<DrivePiece> pieces;
   for (const nlohmann::json& entry : fields.List("pieces"))

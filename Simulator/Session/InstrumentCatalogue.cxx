@@ -129,29 +129,6 @@ auto& Named(const List& list, const std::string& wanted, const char* what,
   throw std::invalid_argument(origin + " has no " + what + " '" + wanted + "'; it has " +
     (names.empty() ? "none" : names) + ".");
 }
-
-/// EI of the softer axis at `s` mm from the tip: linear between the middles of the sections.
-double SofterStiffness(const Guidewire& wire, double s)
-{
-  double start = 0.0;
-  double lastMiddle = 0.0;
-  double lastValue = 0.0;
-  for (std::size_t n = 0; n < wire.sections.size(); ++n)
-  {
-    const WireSection& section = wire.sections[n];
-    const double middle = start + 0.5 * section.length;
-    const double value = std::min(section.bendingStiffness1, section.bendingStiffness2);
-    if (s <= middle)
-    {
-      return n == 0 ? value
-                    : lastValue + (value - lastValue) * (s - lastMiddle) / (middle - lastMiddle);
-    }
-    start += section.length;
-    lastMiddle = middle;
-    lastValue = value;
-  }
-  return lastValue;
-}
 }
 
 CatalogueWire WireFromJson(const Json& object, const std::string& where)
@@ -272,14 +249,7 @@ InstrumentCatalogue CatalogueFromText(const std::string& text, const std::string
 {
   const Json json = ParseJson(text, origin);
   JsonFields fields(json, origin);
-  if (fields.Text("format") != "dynamiccoronary instruments")
-  {
-    fields.Refuse("is no catalogue of instruments: its 'format' is another one");
-  }
-  if (fields.Whole("version", 0, INT32_MAX, 0) != 1)
-  {
-    fields.Refuse("has another 'version' than 1, the only one that is known");
-  }
+  fields.RequireFormat("dynamiccoronary instruments", "catalogue of instruments");
   InstrumentCatalogue catalogue;
   catalogue.origin = origin;
   std::set<std::string> names;
@@ -358,7 +328,10 @@ double TipLoad(const Guidewire& wire, double length, double deflection)
   for (int n = 0; n < Steps; ++n)
   {
     const double s = length * (n + 0.5) / Steps;
-    sum += s * s / SofterStiffness(wire, s) * (length / Steps);
+    const double stiffness = AlongWire(wire, s,
+      [](const WireSection& section)
+      { return std::min(section.bendingStiffness1, section.bendingStiffness2); });
+    sum += s * s / stiffness * (length / Steps);
   }
   return deflection / sum;
 }

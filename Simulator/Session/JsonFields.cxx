@@ -214,6 +214,18 @@ const nlohmann::json& JsonFields::List(const char* name)
   return value;
 }
 
+void JsonFields::RequireFormat(const char* format, const char* what)
+{
+  if (this->Text("format") != format)
+  {
+    this->Refuse(std::string("is no ") + what + ": its 'format' is another one");
+  }
+  if (this->Whole("version", 0, INT32_MAX, 0) != 1)
+  {
+    this->Refuse("has another 'version' than 1, the only one that is known");
+  }
+}
+
 void JsonFields::Done() const
 {
   for (const auto& member : this->Members.items())

@@ -42,6 +42,8 @@ public:
   const nlohmann::json& Object(const char* name);
   const nlohmann::json& List(const char* name);
   const nlohmann::json& Any(const char* name);
+  /// Members 'format' and 'version' 1 of a file of ours. @param what  it is, for the message: "scenario"
+  void RequireFormat(const char* format, const char* what);
   void Done() const;
 
   [[noreturn]] void Refuse(const std::string& what) const;

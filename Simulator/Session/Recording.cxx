@@ -133,13 +133,6 @@ struct AxisPredictor
   }
 };
 
-std::string Hexadecimal(std::uint64_t value)
-{
-  char text[24];
-  std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(value));
-  return text;
-}
-
 std::uint64_t HexadecimalOf(JsonFields& fields, const char* name)
 {
   const std::string text = fields.Text(name);
@@ -229,15 +222,11 @@ std::uint32_t Crc32(const void* data, std::size_t size, std::uint32_t before)
   return ~crc;
 }
 
-std::uint64_t Fnv1a(const void* data, std::size_t size, std::uint64_t before)
+std::string Hexadecimal(std::uint64_t value)
 {
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  std::uint64_t hash = before;
-  for (std::size_t n = 0; n < size; ++n)
-  {
-    hash = (hash ^ bytes[n]) * 1099511628211U;
-  }
-  return hash;
+  char text[24];
+  std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(value));
+  return text;
 }
 
 struct RecordingWriter::Internals

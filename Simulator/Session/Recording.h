@@ -8,6 +8,7 @@
 #ifndef DynamicCoronary_Recording_h
 #define DynamicCoronary_Recording_h
 
+#include "Fnv1a.h"
 #include "Intervention.h"
 
 #include <array>
@@ -25,9 +26,8 @@ namespace coronary
 /// @param before  the value of what comes before, to go on from
 std::uint32_t Crc32(const void* data, std::size_t size, std::uint32_t before = 0);
 
-/// FNV-1a, 64 bits.
-std::uint64_t Fnv1a(
-  const void* data, std::size_t size, std::uint64_t before = 14695981039346656037U);
+/// 16 digits, as hashes are written.
+std::string Hexadecimal(std::uint64_t value);
 
 enum class RecordType : std::uint8_t
 {

@@ -305,14 +305,7 @@ Scenario ScenarioFromText(
 {
   const Json json = ParseJson(text, origin);
   JsonFields fields(json, origin);
-  if (fields.Text("format") != "dynamiccoronary scenario")
-  {
-    fields.Refuse("is no scenario: its 'format' is another one");
-  }
-  if (fields.Whole("version", 0, INT32_MAX, 0) != 1)
-  {
-    fields.Refuse("has another 'version' than 1, the only one that is known");
-  }
+  fields.RequireFormat("dynamiccoronary scenario", "scenario");
   Scenario scenario;
   scenario.name = fields.Text("name");
   scenario.description = fields.Text("description", "");
