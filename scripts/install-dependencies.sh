@@ -16,7 +16,7 @@ EOF
 common=(
   g++ cmake ninja-build ccache
   libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev
-  libcgal-dev
+  libcgal-dev libxrl-dev libevdev-dev
   libfreetype-dev libgif-dev libglew-dev libx11-dev
   libgtest-dev clang-format-14 xvfb xauth
 )
@@ -30,7 +30,7 @@ vtk=(
   libtbb-dev libjsoncpp-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libopenmpi3
   libpng16-16 libtiff6 patchelf
 )
-developer=(clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev)
+developer=(clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev plastimatch)
 
 check_only=no
 tree=all

@@ -1,0 +1,88 @@
+#include "CArm.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+
+void Require(bool possible, const char* name, double value, const char* range)
+{
+  if (!possible)
+  {
+    throw std::invalid_argument(
+      std::string("C-arm: ") + name + " is " + std::to_string(value) + "; it has to be " + range);
+  }
+}
+}
+
+bool CArmPose::operator==(const CArmPose& other) const
+{
+  return this->primary == other.primary && this->secondary == other.secondary &&
+    this->sourceToDetector == other.sourceToDetector &&
+    this->sourceToIsocentre == other.sourceToIsocentre && this->isocentre == other.isocentre;
+}
+
+bool DetectorFormat::operator==(const DetectorFormat& other) const
+{
+  return this->columns == other.columns && this->rows == other.rows && this->width == other.width &&
+    this->height == other.height;
+}
+
+CArmGeometry::CArmGeometry(const CArmPose& pose, const DetectorFormat& format)
+  : Pose_(pose)
+  , Format_(format)
+{
+  // What is not finite fails every comparison.
+  Require(std::abs(pose.primary) <= Pi, "primary angle", pose.primary, "within -pi to pi");
+  Require(
+    std::abs(pose.secondary) <= Pi / 2, "secondary angle", pose.secondary, "within -pi/2 to pi/2");
+  Require(pose.sourceToIsocentre >= 100.0 && pose.sourceToIsocentre <= 5000.0,
+    "source to isocentre", pose.sourceToIsocentre, "within 100 to 5000 mm");
+  Require(pose.sourceToDetector > pose.sourceToIsocentre && pose.sourceToDetector <= 10000.0,
+    "source to detector", pose.sourceToDetector,
+    "more than source to isocentre, and at most 10000 mm");
+  Require(pose.isocentre.norm() < 1e6, "isocentre", pose.isocentre.norm(), "near the patient");
+  Require(format.columns >= 1 && format.columns <= 8192, "columns", format.columns, "1 to 8192");
+  Require(format.rows >= 1 && format.rows <= 8192, "rows", format.rows, "1 to 8192");
+  Require(format.width > 0.0 && format.width <= 2000.0, "width", format.width, "up to 2000 mm");
+  Require(format.height > 0.0 && format.height <= 2000.0, "height", format.height, "up to 2000 mm");
+
+  const double sinA = std::sin(pose.primary);
+  const double cosA = std::cos(pose.primary);
+  const double sinB = std::sin(pose.secondary);
+  const double cosB = std::cos(pose.secondary);
+  // The arm's tilt towards the head happens in its own plane, which the primary angle has turned.
+  this->Forward = Vector3(sinA * cosB, -cosA * cosB, sinB);
+  this->Right = Vector3(cosA, sinA, 0.0);
+  this->Down = Vector3(sinA * sinB, -cosA * sinB, -cosB);
+  this->Source_ = pose.isocentre - pose.sourceToIsocentre * this->Forward;
+  this->DetectorCentre_ = this->Source_ + pose.sourceToDetector * this->Forward;
+  this->ColumnSpacing = format.width / format.columns;
+  this->RowSpacing = format.height / format.rows;
+}
+
+Vector3 CArmGeometry::PixelPosition(double column, double row) const
+{
+  const double across = (column - 0.5 * (this->Format_.columns - 1)) * this->ColumnSpacing;
+  const double down = (row - 0.5 * (this->Format_.rows - 1)) * this->RowSpacing;
+  return this->DetectorCentre_ + across * this->Right + down * this->Down;
+}
+
+Vector3 CArmGeometry::Project(const Vector3& point) const
+{
+  const Vector3 from = point - this->Source_;
+  const double depth = from.dot(this->Forward);
+  const double scale = this->Pose_.sourceToDetector / depth;
+  if (!(depth > 0.0))
+  {
+    return { NAN, NAN, depth };
+  }
+  return { from.dot(this->Right) * scale / this->ColumnSpacing + 0.5 * (this->Format_.columns - 1),
+    from.dot(this->Down) * scale / this->RowSpacing + 0.5 * (this->Format_.rows - 1), depth };
+}
+}
