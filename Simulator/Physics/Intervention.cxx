@@ -646,6 +646,7 @@ void Intervention::Internals::Measure()
   report.tick = this->Tick;
   report.phase = this->Phase - std::floor(this->Phase);
   report.inserted = std::max(0.0, this->Fed - this->CatheterTip);
+  report.catheterTip = this->CatheterTip;
   report.jointGap = step.largestGap;
   report.tipForce = 0.0;
   report.greatestForce = 0.0;

@@ -56,6 +56,7 @@ struct TickReport
   std::uint64_t tick = 0;
   double phase = 0.0;              ///< fraction of the R-R interval, 0 to 1
   double inserted = 0.0;           ///< mm of the wire beyond the catheter's tip
+  double catheterTip = 0.0;        ///< mm of the catheter beyond the ostium; negative: in the aorta
   double proximalForce = 0.0;      ///< N, against advancing
   double proximalTorque = 0.0;     ///< N mm, against turning
   double tipForce = 0.0;           ///< N between the wire's last 3 mm and the wall

@@ -18,46 +18,131 @@ constexpr double FurthestAdvance =
   1e6; // mm: what is absurd is clamped by the simulation, with a message
 constexpr double GreatestTurn = 1e7; // degrees
 constexpr double GreatestHeartRate = 240.0;
+constexpr double MostContrast = 1000.0;  // mL
+constexpr double GreatestAngle = 360.0;  // degrees, of the C-arm
+constexpr double FurthestTable = 1000.0; // mm
+
+std::uint32_t PedalsOf(JsonFields& fields)
+{
+  std::uint32_t pedals = 0;
+  for (const nlohmann::json& entry : fields.List("pedals"))
+  {
+    const std::string name = entry.is_string() ? entry.get<std::string>() : entry.dump();
+    if (name == "fluoroscopy")
+    {
+      pedals |= FluoroscopyPedal;
+    }
+    else if (name == "cine")
+    {
+      pedals |= CinePedal;
+    }
+    else if (name == "mask")
+    {
+      pedals |= MaskPedal;
+    }
+    else
+    {
+      fields.Refuse(
+        "has 'pedals' with '" + name.substr(0, 60) + "', which is none of fluoroscopy, cine, mask");
+    }
+  }
+  return pedals;
+}
+
+DrivePiece PieceOf(JsonFields& member)
+{
+  DrivePiece piece;
+  piece.seconds = member.Number("seconds", 0.0, LongestPiece);
+  const auto advance = [&](const char* name, double most)
+  { return member.Number(name, -most, most, 0.0); };
+  piece.wireAdvance = advance("wire_mm", FurthestAdvance);
+  piece.wireTurn = Degree * advance("wire_deg", GreatestTurn);
+  piece.catheterAdvance = advance("catheter_mm", FurthestAdvance);
+  piece.catheterTurn = Degree * advance("catheter_deg", GreatestTurn);
+  piece.inject = member.Number("inject_mL", 0.0, MostContrast, 0.0);
+  piece.primaryTurn = Degree * advance("primary_deg", GreatestAngle);
+  piece.secondaryTurn = Degree * advance("secondary_deg", GreatestAngle);
+  piece.detectorLift = advance("source_to_detector_mm", FurthestTable);
+  piece.tableMove = { advance("table_x_mm", FurthestTable), advance("table_y_mm", FurthestTable),
+    advance("table_z_mm", FurthestTable) };
+  piece.setsPedals = member.Has("pedals");
+  piece.pedals = piece.setsPedals ? PedalsOf(member) : 0U;
+  piece.setsHeartRate = member.Has("heart_rate_bpm");
+  piece.heartRate = member.Number("heart_rate_bpm", 0.0, GreatestHeartRate, 0.0);
+  member.Done();
+  return piece;
+}
+}
+
+namespace
+{
+void Move(SessionInput& input, const DrivePiece& piece, double share)
+{
+  input.drive.wirePosition += share * piece.wireAdvance;
+  input.drive.wireAngle += share * piece.wireTurn;
+  input.drive.catheterPosition += share * piece.catheterAdvance;
+  input.drive.catheterAngle += share * piece.catheterTurn;
+  input.syringe += share * piece.inject;
+  input.primary += share * piece.primaryTurn;
+  input.secondary += share * piece.secondaryTurn;
+  input.sourceToDetector += share * piece.detectorLift;
+  input.table += share * piece.tableMove;
+}
+
+SessionInput Nothing()
+{
+  SessionInput nothing;
+  nothing.sourceToDetector = 0.0;
+  return nothing;
+}
+
+SessionInput Sum(SessionInput start, const SessionInput& moved)
+{
+  start.drive.wirePosition += moved.drive.wirePosition;
+  start.drive.wireAngle += moved.drive.wireAngle;
+  start.drive.catheterPosition += moved.drive.catheterPosition;
+  start.drive.catheterAngle += moved.drive.catheterAngle;
+  start.syringe += moved.syringe;
+  start.primary += moved.primary;
+  start.secondary += moved.secondary;
+  start.sourceToDetector += moved.sourceToDetector;
+  start.table += moved.table;
+  start.pedals |= moved.pedals;
+  return start;
+}
 }
 
 DriveScript::DriveScript(std::vector<DrivePiece> pieces)
   : Pieces(std::move(pieces))
 {
-  Start start{ 0.0, {} };
-  this->Starts.push_back(start);
+  Start start{ 0.0, Nothing() };
   for (const DrivePiece& piece : this->Pieces)
   {
-    start.time += piece.seconds;
-    start.input.wirePosition += piece.wireAdvance;
-    start.input.wireAngle += piece.wireTurn;
-    start.input.catheterPosition += piece.catheterAdvance;
-    start.input.catheterAngle += piece.catheterTurn;
+    start.moved.pedals = piece.setsPedals ? piece.pedals : start.moved.pedals;
     this->Starts.push_back(start);
+    start.time += piece.seconds;
+    Move(start.moved, piece, 1.0);
   }
+  start.moved.pedals = 0;
+  this->Starts.push_back(start);
   this->Total = start.time;
 }
 
-DriveInput DriveScript::At(double seconds) const
+SessionInput DriveScript::At(double seconds, const SessionInput& start) const
 {
-  if (this->Starts.empty())
-  {
-    return {};
-  }
   const auto after = std::upper_bound(this->Starts.begin(), this->Starts.end(), seconds,
-    [](double time, const Start& start) { return time < start.time; });
-  if (after == this->Starts.begin() || after == this->Starts.end())
+    [](double time, const Start& piece) { return time < piece.time; });
+  if (after == this->Starts.begin())
   {
-    return after == this->Starts.begin() ? DriveInput{} : this->Starts.back().input;
+    return start;
   }
   const auto n = static_cast<std::size_t>(after - this->Starts.begin() - 1);
-  const DrivePiece& piece = this->Pieces[n];
-  const double share = (seconds - this->Starts[n].time) / piece.seconds;
-  DriveInput input = this->Starts[n].input;
-  input.wirePosition += share * piece.wireAdvance;
-  input.wireAngle += share * piece.wireTurn;
-  input.catheterPosition += share * piece.catheterAdvance;
-  input.catheterAngle += share * piece.catheterTurn;
-  return input;
+  SessionInput moved = this->Starts[n].moved;
+  if (n < this->Pieces.size())
+  {
+    Move(moved, this->Pieces[n], (seconds - this->Starts[n].time) / this->Pieces[n].seconds);
+  }
+  return Sum(start, moved);
 }
 
 std::vector<double> DriveScript::HeartRates(double from, double to) const
@@ -94,16 +179,7 @@ DriveScript DriveScriptFromText(const std::string& text, const std::string& orig
       fields.Refuse("has more than " + std::to_string(MostPieces) + " pieces");
     }
     JsonFields member(entry, origin + ", piece " + std::to_string(pieces.size() + 1));
-    DrivePiece piece;
-    piece.seconds = member.Number("seconds", 0.0, LongestPiece);
-    piece.wireAdvance = member.Number("wire_mm", -FurthestAdvance, FurthestAdvance, 0.0);
-    piece.wireTurn = Degree * member.Number("wire_deg", -GreatestTurn, GreatestTurn, 0.0);
-    piece.catheterAdvance = member.Number("catheter_mm", -FurthestAdvance, FurthestAdvance, 0.0);
-    piece.catheterTurn = Degree * member.Number("catheter_deg", -GreatestTurn, GreatestTurn, 0.0);
-    piece.setsHeartRate = member.Has("heart_rate_bpm");
-    piece.heartRate = member.Number("heart_rate_bpm", 0.0, GreatestHeartRate, 0.0);
-    member.Done();
-    pieces.push_back(piece);
+    pieces.push_back(PieceOf(member));
   }
   fields.Done();
   return DriveScript(std::move(pieces));

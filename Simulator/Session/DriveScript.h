@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_DriveScript_h
 #define DynamicCoronary_DriveScript_h
 
-#include "Intervention.h"
+#include "SessionInput.h"
 
 #include <string>
 #include <vector>
@@ -15,13 +15,20 @@ namespace coronary
 /// Even motion for some seconds; changes are against the end of the piece before.
 struct DrivePiece
 {
-  double seconds = 0.0;         ///< 0: at once
-  double wireAdvance = 0.0;     ///< mm
-  double wireTurn = 0.0;        ///< radians
-  double catheterAdvance = 0.0; ///< mm
-  double catheterTurn = 0.0;    ///< radians
-  bool setsHeartRate = false;   ///< when the piece begins
-  double heartRate = 0.0;       ///< beats a minute
+  double seconds = 0.0;                 ///< 0: at once
+  double wireAdvance = 0.0;             ///< mm
+  double wireTurn = 0.0;                ///< radians
+  double catheterAdvance = 0.0;         ///< mm
+  double catheterTurn = 0.0;            ///< radians
+  double inject = 0.0;                  ///< mL
+  double primaryTurn = 0.0;             ///< of the C-arm, radians towards LAO
+  double secondaryTurn = 0.0;           ///< radians towards cranial
+  double detectorLift = 0.0;            ///< mm of the source to the detector
+  Vector3 tableMove{ Vector3::Zero() }; ///< mm of the isocentre in the patient
+  bool setsPedals = false;              ///< when the piece begins
+  std::uint32_t pedals = 0;             ///< bits of Pedal; until they are set again
+  bool setsHeartRate = false;           ///< when the piece begins
+  double heartRate = 0.0;               ///< beats a minute
 };
 
 class DriveScript
@@ -32,8 +39,9 @@ public:
 
   double Duration() const { return this->Total; } ///< s
 
-  /// Where the hands are, `seconds` after the start; after the end they rest.
-  DriveInput At(double seconds) const;
+  /// Where hands, feet and C-arm are, `seconds` after the start; after the end they rest, off the pedals.
+  /// @param start  where they are before
+  SessionInput At(double seconds, const SessionInput& start = {}) const;
 
   /// Heart rates that are set at or after `from` and before `to`, s.
   std::vector<double> HeartRates(double from, double to) const;
@@ -42,7 +50,7 @@ private:
   struct Start
   {
     double time;
-    DriveInput input;
+    SessionInput moved; ///< by all pieces before; the pedals of this one
   };
 
   std::vector<DrivePiece> Pieces;

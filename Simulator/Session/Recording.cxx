@@ -26,30 +26,52 @@ constexpr std::uint32_t MostHeader = 16U << 20;
 constexpr std::uint32_t MostPayload = 1U << 20;
 constexpr std::uint64_t MostTicks = std::uint64_t{ 1 } << 40; // 17 years at 2 kHz
 constexpr std::size_t FramesOfChunk = 100;
-constexpr std::size_t Axes = 4;
-
 struct AxisInfo
 {
   const char* name;
   const char* unit;
 };
-constexpr std::array<AxisInfo, Axes> AxisTable{ { { "wire_position", "mm" },
-  { "wire_angle", "rad" }, { "catheter_position", "mm" }, { "catheter_angle", "rad" } } };
 
-std::array<std::uint64_t, Axes> BitsOf(const DriveInput& input)
+/// In the order of their bits in the mask of a frame: what moves often comes first.
+constexpr std::array AxisTable{ AxisInfo{ "wire_position", "mm" }, AxisInfo{ "wire_angle", "rad" },
+  AxisInfo{ "catheter_position", "mm" }, AxisInfo{ "catheter_angle", "rad" },
+  AxisInfo{ "syringe", "mL" }, AxisInfo{ "pedals", "bits" }, AxisInfo{ "primary", "rad" },
+  AxisInfo{ "secondary", "rad" }, AxisInfo{ "source_to_detector", "mm" },
+  AxisInfo{ "table_x", "mm" }, AxisInfo{ "table_y", "mm" }, AxisInfo{ "table_z", "mm" } };
+constexpr std::size_t Axes = AxisTable.size();
+constexpr std::size_t DriveAxes = 4; ///< recordings may have only these, the first ones
+
+std::array<std::uint64_t, Axes> BitsOf(const SessionInput& input)
 {
-  const std::array<double, Axes> values{ input.wirePosition, input.wireAngle,
-    input.catheterPosition, input.catheterAngle };
+  const DriveInput& drive = input.drive;
+  const std::array<double, Axes> values{ drive.wirePosition, drive.wireAngle,
+    drive.catheterPosition, drive.catheterAngle, input.syringe, static_cast<double>(input.pedals),
+    input.primary, input.secondary, input.sourceToDetector, input.table.x(), input.table.y(),
+    input.table.z() };
   std::array<std::uint64_t, Axes> bits{};
   std::memcpy(bits.data(), values.data(), sizeof(bits));
   return bits;
 }
 
-DriveInput InputOf(const std::array<std::uint64_t, Axes>& bits)
+/// A number of pedals that no pedals have is no pedal.
+std::uint32_t PedalsOf(double value)
+{
+  return value >= 0.0 && value <= 4294967295.0 ? static_cast<std::uint32_t>(value) : 0U;
+}
+
+SessionInput InputOf(const std::array<std::uint64_t, Axes>& bits)
 {
   std::array<double, Axes> values{};
   std::memcpy(values.data(), bits.data(), sizeof(values));
-  return { values[0], values[1], values[2], values[3] };
+  SessionInput input;
+  input.drive = { values[0], values[1], values[2], values[3] };
+  input.syringe = values[4];
+  input.pedals = PedalsOf(values[5]);
+  input.primary = values[6];
+  input.secondary = values[7];
+  input.sourceToDetector = values[8];
+  input.table = { values[9], values[10], values[11] };
+  return input;
 }
 
 /// Files are little-endian, whatever the machine is.
@@ -114,7 +136,7 @@ std::uint64_t UnZigZag(std::uint64_t code)
 /// Bits of the axes are predicted from the last two frames as if they went on evenly, which steady driving nearly does.
 struct AxisPredictor
 {
-  std::array<std::uint64_t, Axes> last{};
+  std::array<std::uint64_t, Axes> last = BitsOf(SessionInput());
   std::array<std::uint64_t, Axes> step{};
 
   std::uint64_t Encode(std::size_t axis, std::uint64_t bits)
@@ -160,7 +182,7 @@ std::string HeaderText(const RecordingHeader& header)
   return json.dump();
 }
 
-RecordingHeader HeaderOf(const std::string& text, const std::string& origin)
+RecordingHeader HeaderOf(const std::string& text, const std::string& origin, std::size_t& axisCount)
 {
   const std::string where = "The header of " + origin;
   const Json json = ParseJson(text, where);
@@ -182,15 +204,16 @@ RecordingHeader HeaderOf(const std::string& text, const std::string& origin)
   header.tickRate = fields.Number("tick_hz", 1.0, 1e6);
   header.started = fields.Text("start_utc");
   const Json& axes = fields.List("axes");
-  bool same = axes.size() == Axes;
-  for (std::size_t n = 0; same && n < Axes; ++n)
+  bool same = axes.size() == Axes || axes.size() == DriveAxes;
+  for (std::size_t n = 0; same && n < axes.size(); ++n)
   {
     same = axes[n] == Json{ { "name", AxisTable[n].name }, { "unit", AxisTable[n].unit } };
   }
   if (!same)
   {
-    fields.Refuse("has other axes than wire and catheter, position and angle");
+    fields.Refuse("has other axes than those of wire, catheter, syringe, pedals and C-arm");
   }
+  axisCount = axes.size();
   return header;
 }
 
@@ -325,7 +348,7 @@ RecordingWriter::RecordingWriter(std::ostream& stream, const RecordingHeader& he
 
 RecordingWriter::~RecordingWriter() = default;
 
-void RecordingWriter::Input(std::uint64_t tick, const DriveInput& input)
+void RecordingWriter::Input(std::uint64_t tick, const SessionInput& input)
 {
   Internals& data = *this->Data;
   data.Advance(tick);
@@ -340,12 +363,12 @@ void RecordingWriter::Input(std::uint64_t tick, const DriveInput& input)
   }
   PutVarint(data.frames, tick - data.lastFrameTick);
   data.lastFrameTick = tick;
-  char mask = 0;
+  std::uint64_t mask = 0;
   for (std::size_t axis = 0; axis < Axes; ++axis)
   {
-    mask = static_cast<char>(mask | (bits[axis] != data.axes.last[axis] ? 1 << axis : 0));
+    mask |= std::uint64_t{ bits[axis] != data.axes.last[axis] ? 1U : 0U } << axis;
   }
-  data.frames.push_back(mask);
+  PutVarint(data.frames, mask);
   for (std::size_t axis = 0; axis < Axes; ++axis)
   {
     if ((mask >> axis & 1) != 0)
@@ -441,6 +464,7 @@ struct RecordingReader::Internals
   std::uint64_t bytes = 0;
   std::uint64_t lastTick = 0;
   AxisPredictor axes;
+  std::size_t axisCount = Axes; ///< of the file
   std::array<std::uint64_t, 8> counts{};
   // The input chunk that is being read.
   std::string frames;
@@ -507,7 +531,7 @@ struct RecordingReader::Internals
     }
     try
     {
-      this->header = HeaderOf(text, this->origin);
+      this->header = HeaderOf(text, this->origin, this->axisCount);
     }
     catch (const std::invalid_argument& error)
     {
@@ -519,12 +543,13 @@ struct RecordingReader::Internals
   bool NextFrame(RecordedItem& item)
   {
     std::uint64_t gap = 0;
-    if (!TakeVarint(this->frames, this->at, gap) || this->at >= this->frames.size())
+    std::uint64_t mask = 0;
+    if (!TakeVarint(this->frames, this->at, gap) || !TakeVarint(this->frames, this->at, mask))
     {
       return this->Damaged("an input frame breaks off");
     }
-    const auto mask = static_cast<unsigned char>(this->frames[this->at++]);
-    if (gap >= MostTicks || this->frameTick + gap >= MostTicks || mask == 0 || mask >> Axes != 0)
+    if (gap >= MostTicks || this->frameTick + gap >= MostTicks || mask == 0 ||
+      mask >> this->axisCount != 0)
     {
       return this->Damaged("an input frame has no sense");
     }
@@ -780,7 +805,8 @@ void RecordingReplay::ReadUpTo(std::uint64_t tick)
   }
 }
 
-bool RecordingReplay::At(std::uint64_t tick, DriveInput& input, std::vector<RecordedEvent>& events)
+bool RecordingReplay::At(
+  std::uint64_t tick, SessionInput& input, std::vector<RecordedEvent>& events)
 {
   this->ReadUpTo(tick);
   events.clear();

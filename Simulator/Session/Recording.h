@@ -9,7 +9,7 @@
 #define DynamicCoronary_Recording_h
 
 #include "Fnv1a.h"
-#include "Intervention.h"
+#include "SessionInput.h"
 
 #include <array>
 #include <cstddef>
@@ -64,7 +64,9 @@ struct RecordedEvent
 {
   enum Kind : std::uint8_t
   {
-    HeartRate = 1 ///< value: beats a minute
+    HeartRate = 1,  ///< value: beats a minute
+    FrameRate = 2,  ///< frames a second of the X-ray images: 7.5, 15 or 30
+    FieldOfView = 3 ///< mm of the detector that are used, across
   };
   std::uint8_t kind = 0;
   double value = 0.0;
@@ -91,8 +93,8 @@ public:
   RecordingWriter(const RecordingWriter&) = delete;
   RecordingWriter& operator=(const RecordingWriter&) = delete;
 
-  /// Every tick; written when its bits are others than at the tick before (at first: all 0).
-  void Input(std::uint64_t tick, const DriveInput& input);
+  /// Every tick; written when its bits are others than at the tick before (at first: those of SessionInput()).
+  void Input(std::uint64_t tick, const SessionInput& input);
   void Force(std::uint64_t tick, const RecordedForces& forces);
   void Event(std::uint64_t tick, const RecordedEvent& event);
   void StateHash(std::uint64_t tick, std::uint64_t hash);
@@ -112,7 +114,7 @@ struct RecordedItem
 {
   RecordType type = RecordType::End;
   std::uint64_t tick = 0;
-  DriveInput input;       ///< of Input
+  SessionInput input;     ///< of Input
   RecordedForces forces;  ///< of Force
   RecordedEvent event;    ///< of Event
   std::uint64_t hash = 0; ///< of StateHash, ImageHash
@@ -172,7 +174,7 @@ public:
    * @param events  those before the step; cleared first
    * @return false when the recording has nothing for this tick any more: it has ended
    */
-  bool At(std::uint64_t tick, DriveInput& input, std::vector<RecordedEvent>& events);
+  bool At(std::uint64_t tick, SessionInput& input, std::vector<RecordedEvent>& events);
 
   /// Whether a hash was recorded of the state after `tick` steps; call it after At(tick - 1).
   bool ExpectedHash(std::uint64_t tick, std::uint64_t& hash);
@@ -186,7 +188,7 @@ private:
   bool Over = false;
   bool Ended = false;      ///< with an end that says how many ticks there are
   std::uint64_t Ticks = 0; ///< of the end; without one: after the last good item
-  DriveInput Current;
+  SessionInput Current;
   std::vector<RecordedEvent> Pending;
   std::map<std::uint64_t, std::uint64_t> Hashes; ///< that nobody has asked for yet
 };

@@ -66,6 +66,22 @@ std::vector<NumberEntry> NumbersOf(ContractionSettings& s)
     { "systole", &s.systole, 0.2, 0.5 }, { "peak_speed_mm_s", &s.peakSpeed, 1.0, 300.0 } };
 }
 
+std::vector<NumberEntry> NumbersOf(ContrastSettings& s)
+{
+  return { { "viscosity_mPa_s", &s.flow.viscosity, 0.5, 20.0 },
+    { "systolic_pressure_mmHg", &s.flow.systolicPressure, 20.0, 300.0 },
+    { "diastolic_pressure_mmHg", &s.flow.diastolicPressure, 10.0, 300.0 },
+    { "left_axial_speed_cm_s", &s.flow.leftAxialSpeed, 1.0, 200.0 },
+    { "right_axial_speed_cm_s", &s.flow.rightAxialSpeed, 1.0, 200.0 },
+    { "left_diastolic_ratio", &s.flow.leftDiastolicRatio, 0.3, 5.0 },
+    { "right_diastolic_ratio", &s.flow.rightDiastolicRatio, 0.3, 5.0 },
+    { "outlet_exponent", &s.flow.outletExponent, 1.0, 4.0 },
+    { "tracer_volume_mL", &s.tracers.volume, 1e-7, 0.1 },
+    { "radial_diffusivity_mm2_s", &s.tracers.radialDiffusivity, 0.0, 100.0 },
+    { "smoothing_mm", &s.smoothing, 0.0, 20.0 },
+    { "flow_depression", &s.flowDepression, 0.0, 1.0 } };
+}
+
 void ReadNumbers(JsonFields& fields, const std::vector<NumberEntry>& entries)
 {
   for (const NumberEntry& entry : entries)
@@ -283,6 +299,103 @@ Json SettingsToJson(const InterventionSettings& given)
   return json;
 }
 
+/// Degrees of the file are radians here; both are tried when reading, so that what was written gives the same bits.
+double AngleOf(JsonFields& fields, const std::string& name, double most, double otherwise)
+{
+  const std::string exact = name + "_rad";
+  if (fields.Has(exact.c_str()))
+  {
+    return fields.Number(exact.c_str(), -most * Degree, most * Degree);
+  }
+  return Degree * fields.Number((name + "_deg").c_str(), -most, most, otherwise / Degree);
+}
+
+ImagingSettings ImagingOf(const Json& object, const std::string& where, const std::string& folder)
+{
+  ImagingSettings imaging;
+  JsonFields fields(object, where);
+  imaging.background = FullPath(fields.Text("background", ""), folder);
+  if (fields.Has("background_offset_mm"))
+  {
+    imaging.backgroundOffset = PointOf(fields, "background_offset_mm");
+  }
+  imaging.thoraxSeed = static_cast<std::uint64_t>(fields.Whole(
+    "thorax_seed", 0, INT32_MAX, static_cast<std::int64_t>(imaging.thoraxSeed)));
+  CArmPose& pose = imaging.pose;
+  pose.primary = AngleOf(fields, "primary", 100.0, pose.primary);
+  pose.secondary = AngleOf(fields, "secondary", 50.0, pose.secondary);
+  pose.sourceToIsocentre =
+    fields.Number("source_to_isocentre_mm", 400.0, 1200.0, pose.sourceToIsocentre);
+  pose.sourceToDetector = fields.Number(
+    "source_to_detector_mm", pose.sourceToIsocentre + 50.0, 1500.0, pose.sourceToDetector);
+  imaging.hasIsocentre = fields.Has("isocentre_mm");
+  if (imaging.hasIsocentre)
+  {
+    pose.isocentre = PointOf(fields, "isocentre_mm");
+  }
+  imaging.fieldOfView = fields.Number("field_of_view_mm", 80.0, 400.0, imaging.fieldOfView);
+  imaging.columns = static_cast<int>(fields.Whole("columns", 64, 2048, imaging.columns));
+  imaging.energy = fields.Number("energy_keV", 30.0, 120.0, imaging.energy);
+  imaging.iodine = fields.Number("iodine_mg_mL", 0.0, 500.0, imaging.iodine);
+  for (const auto& [name, rate] : { std::pair("frame_rate_hz", &imaging.frameRate),
+         std::pair("cine_rate_hz", &imaging.cineRate) })
+  {
+    *rate = fields.Number(name, 0.0, 1000.0, *rate);
+    if (*rate != 7.5 && *rate != 15.0 && *rate != 30.0)
+    {
+      fields.Refuse(std::string("has '") + name + "' that is none of 7.5, 15, 30");
+    }
+  }
+  fields.Done();
+  return imaging;
+}
+
+Json ImagingToJson(const ImagingSettings& imaging)
+{
+  const auto list = [](const Vector3& point) { return Json{ point.x(), point.y(), point.z() }; };
+  Json json = { { "background", imaging.background },
+    { "background_offset_mm", list(imaging.backgroundOffset) },
+    { "thorax_seed", imaging.thoraxSeed }, { "primary_rad", imaging.pose.primary },
+    { "secondary_rad", imaging.pose.secondary },
+    { "source_to_isocentre_mm", imaging.pose.sourceToIsocentre },
+    { "source_to_detector_mm", imaging.pose.sourceToDetector },
+    { "field_of_view_mm", imaging.fieldOfView }, { "columns", imaging.columns },
+    { "energy_keV", imaging.energy }, { "iodine_mg_mL", imaging.iodine },
+    { "frame_rate_hz", imaging.frameRate }, { "cine_rate_hz", imaging.cineRate } };
+  if (imaging.hasIsocentre)
+  {
+    json["isocentre_mm"] = list(imaging.pose.isocentre);
+  }
+  return json;
+}
+
+ContrastSettings ContrastOf(const Json& object, const std::string& where)
+{
+  ContrastSettings contrast;
+  JsonFields fields(object, where);
+  ReadNumbers(fields, NumbersOf(contrast));
+  contrast.tracers.capacity =
+    fields.Whole("tracers", 100, 10000000, contrast.tracers.capacity);
+  fields.Done();
+  try
+  {
+    contrast.Validate();
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::invalid_argument(where + ": " + error.what());
+  }
+  return contrast;
+}
+
+Json ContrastToJson(const ContrastSettings& given)
+{
+  ContrastSettings contrast = given;
+  Json json = WriteNumbers(NumbersOf(contrast));
+  json["tracers"] = contrast.tracers.capacity;
+  return json;
+}
+
 bool StartsWith(const std::string& text, const char* start)
 {
   return text.rfind(start, 0) == 0;
@@ -337,8 +450,11 @@ Scenario ScenarioFromText(
     ? byName(
         "catheter", [&](const std::string& name) { return catalogue->Catheter(name).catheter; })
     : CatheterFromJson(fields.Object("catheter"), origin).catheter;
-  scenario.settings = SettingsOf(
-    fields.Has("settings") ? fields.Object("settings") : Json::object(), origin + ", settings");
+  const auto part = [&](const char* name)
+  { return fields.Has(name) ? fields.Object(name) : Json::object(); };
+  scenario.settings = SettingsOf(part("settings"), origin + ", settings");
+  scenario.imaging = ImagingOf(part("imaging"), origin + ", imaging", folder);
+  scenario.contrast = ContrastOf(part("contrast"), origin + ", contrast");
   scenario.seed =
     static_cast<std::uint64_t>(fields.Whole("seed", 0, static_cast<std::int64_t>(GreatestSeed), 1));
   fields.Done();
@@ -351,7 +467,9 @@ std::string ScenarioText(const Scenario& scenario)
     { "name", scenario.name }, { "description", scenario.description },
     { "vessels", VesselsToJson(scenario.vessels) }, { "artery", scenario.artery },
     { "wire", WireToJson(scenario.wire) }, { "catheter", CatheterToJson(scenario.catheter) },
-    { "settings", SettingsToJson(scenario.settings) }, { "seed", scenario.seed } };
+    { "settings", SettingsToJson(scenario.settings) },
+    { "imaging", ImagingToJson(scenario.imaging) },
+    { "contrast", ContrastToJson(scenario.contrast) }, { "seed", scenario.seed } };
   return json.dump(2) + "\n";
 }
 

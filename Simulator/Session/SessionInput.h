@@ -19,7 +19,8 @@ enum Pedal : std::uint32_t
   MaskPedal = 4U ///< takes the mask of a subtracted image, or of a roadmap
 };
 
-/// Places are against the start of the session, so that an input that is lost loses nothing.
+/// Places, not movements, so that an input that is lost loses nothing: those of the instruments and the syringe are
+/// counted from the start of the session, those of C-arm and table are what they are.
 struct SessionInput
 {
   DriveInput drive;

@@ -113,7 +113,7 @@ TEST_P(Replay, ReachesItsBranch)
     RecordingReader(std::string(DYNAMICCORONARY_DRIVING) + "/" + file + ".pcirec"));
   Intervention intervention(Phantom(), Wire(wire),
     Catheter(std::string(artery) == "RCA" ? "JR4-6F" : "EBU3.5-6F"), SettingsFor(artery));
-  DriveInput input;
+  coronary::SessionInput input;
   std::vector<RecordedEvent> events;
   double deepest = 0.0;
   double widest = 0.0;
@@ -121,7 +121,7 @@ TEST_P(Replay, ReachesItsBranch)
   std::uint64_t tick = 0;
   for (; replay.At(tick, input, events); ++tick)
   {
-    const TickReport& report = intervention.Step(input);
+    const TickReport& report = intervention.Step(input.drive);
     deepest = std::max(deepest, report.largestPenetration);
     widest = std::max(widest, report.jointGap);
     sum += report.meanPenetration;

@@ -223,17 +223,17 @@ TEST(UnitTestScenario, ScriptsAreEvenPieces)
       { "seconds": 2, "wire_mm": -10, "catheter_mm": 1, "heart_rate_bpm": 90 } ] })",
       "'script'");
   EXPECT_EQ(script.Duration(), 6.0);
-  EXPECT_EQ(script.At(-1.0).wirePosition, 0.0);
-  EXPECT_EQ(script.At(1.0).wirePosition, 5.0);
-  EXPECT_EQ(script.At(3.999).wireAngle, 0.0);
-  EXPECT_NEAR(script.At(4.0).wireAngle, M_PI / 2.0, 1e-15);
-  EXPECT_EQ(script.At(5.0).wirePosition, 15.0);
-  EXPECT_EQ(script.At(5.0).catheterPosition, 0.5);
-  EXPECT_EQ(script.At(100.0).wirePosition, 10.0);
+  EXPECT_EQ(script.At(-1.0).drive.wirePosition, 0.0);
+  EXPECT_EQ(script.At(1.0).drive.wirePosition, 5.0);
+  EXPECT_EQ(script.At(3.999).drive.wireAngle, 0.0);
+  EXPECT_NEAR(script.At(4.0).drive.wireAngle, M_PI / 2.0, 1e-15);
+  EXPECT_EQ(script.At(5.0).drive.wirePosition, 15.0);
+  EXPECT_EQ(script.At(5.0).drive.catheterPosition, 0.5);
+  EXPECT_EQ(script.At(100.0).drive.wirePosition, 10.0);
   EXPECT_TRUE(script.HeartRates(0.0, 4.0).empty());
   EXPECT_EQ(script.HeartRates(4.0, 4.0005), std::vector<double>{ 90.0 });
   EXPECT_TRUE(script.HeartRates(4.0005, 9.0).empty());
-  EXPECT_EQ(coronary::DriveScript().At(1.0).wirePosition, 0.0);
+  EXPECT_EQ(coronary::DriveScript().At(1.0).drive.wirePosition, 0.0);
   const auto refused = [](const std::string& pieces, const std::string& part)
   {
     ExpectRefusal(

@@ -1,0 +1,252 @@
+#include "SessionImager.h"
+
+#include "BackgroundVolume.h"
+#include "Fnv1a.h"
+#include "PhantomMotion.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr double CoilLength = 30.0;     // mm from the tip: a coil of platinum, which shows best
+constexpr double BlushSigma = 7.0;      // mm of the myocardium behind an outlet
+constexpr double FaintestBlush = 1e-5;  // mL
+
+/// Where a branch leaves its parent: number of the nearest point of the parent's axis.
+std::size_t Attachment(const WallTopology& topology, std::size_t branch)
+{
+  const std::vector<Vector3>& parent =
+    topology.axis[static_cast<std::size_t>(topology.parent[branch])];
+  const Vector3& start = topology.axis[branch].front();
+  const auto nearest = std::min_element(parent.begin(), parent.end(),
+    [&](const Vector3& a, const Vector3& b)
+    { return (a - start).squaredNorm() < (b - start).squaredNorm(); });
+  return static_cast<std::size_t>(nearest - parent.begin());
+}
+
+/**
+ * The medium there is in the parent's column. At a parent's end the widest branch goes on from it without a gap;
+ * the others begin at the wall, as side branches do.
+ */
+std::vector<double> HiddenLengths(const WallTopology& topology)
+{
+  const std::size_t count = topology.axis.size();
+  std::vector<double> hidden(count, 0.0);
+  std::vector<std::size_t> goesOn(count, count); // per parent: its widest branch at its end
+  for (std::size_t b = 0; b < count; ++b)
+  {
+    if (topology.parent[b] < 0)
+    {
+      continue;
+    }
+    const auto parent = static_cast<std::size_t>(topology.parent[b]);
+    const std::size_t at = Attachment(topology, b);
+    hidden[b] = topology.axisRadius[parent][at];
+    std::size_t& widest = goesOn[parent];
+    const auto radius = [&](std::size_t branch) { return topology.axisRadius[branch].front(); };
+    if (at + 1 == topology.axis[parent].size() && (widest == count || radius(b) > radius(widest)))
+    {
+      widest = b;
+    }
+  }
+  for (const std::size_t widest : goesOn)
+  {
+    if (widest < count)
+    {
+      hidden[widest] = 0.0;
+    }
+  }
+  return hidden;
+}
+}
+
+Vector3 MiddleOfVessels(const WallTopology& topology)
+{
+  constexpr double Far = std::numeric_limits<double>::max();
+  Vector3 low = Vector3::Constant(Far);
+  Vector3 high = Vector3::Constant(-Far);
+  for (const std::vector<Vector3>& branch : topology.axis)
+  {
+    for (const Vector3& point : branch)
+    {
+      low = low.cwiseMin(point);
+      high = high.cwiseMax(point);
+    }
+  }
+  if (low.x() > high.x())
+  {
+    throw std::invalid_argument("The vessels have no axis: there is nothing to aim the C-arm at.");
+  }
+  return 0.5 * (low + high);
+}
+
+CArmPose StartPose(const WallTopology& topology, const ImagingSettings& imaging)
+{
+  CArmPose pose = imaging.pose;
+  if (!imaging.hasIsocentre)
+  {
+    pose.isocentre = MiddleOfVessels(topology);
+  }
+  return pose;
+}
+
+HounsfieldVolume LoadBackground(
+  const Scenario& scenario, const WallTopology& topology, const ProgressCallback& progress)
+{
+  const ImagingSettings& imaging = scenario.imaging;
+  if (!imaging.background.empty())
+  {
+    return ReadBackgroundVolume(imaging.background, { imaging.backgroundOffset }, progress);
+  }
+  ThoraxSettings settings;
+  settings.seed = imaging.thoraxSeed;
+  HounsfieldVolume thorax = MakeThoraxPhantom(settings, progress);
+  Vector3 offset = imaging.backgroundOffset;
+  if (scenario.vessels.kind != VesselSource::Kind::Phantom)
+  {
+    offset += MiddleOfVessels(topology) - HeartFrame().ToWorld(HeartFrame::Centre);
+  }
+  thorax.grid.origin += offset;
+  return thorax;
+}
+
+SessionImager::SessionImager(const WallTopology& topology, const Scenario& scenario,
+  const HounsfieldVolume& background, bool worker)
+  : Scenario_(scenario)
+  , Radii(topology.axisRadius)
+  , Hidden(HiddenLengths(topology))
+  , Materials(scenario.imaging.energy)
+  , NeatContrast(this->Materials.OfContrastMedium(scenario.imaging.iodine))
+  , Images_({}, scenario.seed)
+{
+  const auto projector = std::make_shared<VolumeProjector>(background.View(),
+    [this](double hounsfield) { return this->Materials.OfHounsfield(hounsfield); });
+  BackgroundCacheSettings settings;
+  settings.worker = worker;
+  this->Background = std::make_unique<BackgroundCache>(projector, settings);
+  this->InstrumentLayer = LineIntegrals(scenario.imaging.columns, scenario.imaging.columns);
+  this->ContrastLayer = this->InstrumentLayer;
+  this->NoBackground = this->InstrumentLayer;
+}
+
+SessionImager::~SessionImager() = default;
+
+CArmGeometry SessionImager::GeometryOf(const CArmPose& pose, double fieldOfView) const
+{
+  DetectorFormat format;
+  format.columns = format.rows = this->Scenario_.imaging.columns;
+  format.width = format.height = fieldOfView;
+  return this->Background->Rounded(CArmGeometry(pose, format));
+}
+
+void SessionImager::Aim(const CArmPose& pose, double fieldOfView)
+{
+  this->Background->SetGeometry(this->GeometryOf(pose, fieldOfView));
+}
+
+const GreyImage& SessionImager::Expose(const SessionSnapshot& snapshot)
+{
+  const CArmGeometry geometry = this->GeometryOf(snapshot.pose, snapshot.fieldOfView);
+  this->Background->SetGeometry(geometry);
+  this->ProjectInstruments(snapshot, geometry);
+  this->ProjectContrast(snapshot, geometry);
+  const auto background = this->Background->Current(&this->Completeness);
+  return this->Images_.Expose(background ? *background : this->NoBackground,
+    this->InstrumentLayer, this->ContrastLayer, snapshot.exposure);
+}
+
+void SessionImager::ProjectInstruments(
+  const SessionSnapshot& snapshot, const CArmGeometry& geometry)
+{
+  std::fill(this->InstrumentLayer.values.begin(), this->InstrumentLayer.values.end(), 0.0F);
+  const double steel = this->Materials.Of(XRayMaterial::StainlessSteel);
+  const double platinum = this->Materials.Of(XRayMaterial::Platinum);
+  if (snapshot.wire.size() > 1)
+  {
+    InstrumentChain wire;
+    wire.points = snapshot.wire;
+    double along = 0.0;
+    for (std::size_t n = 0; n + 1 < snapshot.wire.size(); ++n)
+    {
+      const double length = (snapshot.wire[n + 1] - snapshot.wire[n]).norm();
+      const double middle = along + 0.5 * length;
+      InstrumentSegment segment;
+      segment.outerRadius = AlongWire(this->Scenario_.wire, middle,
+        [](const WireSection& section) { return section.radius; });
+      // The coil of the tip is a tube of platinum wire, about a third of its radius thick.
+      const bool coil = middle < CoilLength;
+      segment.innerRadius = coil ? 0.65 * segment.outerRadius : 0.0;
+      segment.attenuation = coil ? platinum : steel;
+      wire.segments.push_back(segment);
+      along += length;
+    }
+    AddInstrument(wire, geometry, this->InstrumentLayer);
+  }
+  if (snapshot.catheter.size() > 1)
+  {
+    const GuideCatheter& guide = this->Scenario_.catheter;
+    InstrumentChain catheter;
+    catheter.points = snapshot.catheter;
+    catheter.segments.assign(snapshot.catheter.size() - 1,
+      { guide.outerRadius, guide.innerRadius, this->Materials.Of(XRayMaterial::BariumPolymer) });
+    AddInstrument(catheter, geometry, this->InstrumentLayer);
+  }
+}
+
+void SessionImager::ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry)
+{
+  std::fill(this->ContrastLayer.values.begin(), this->ContrastLayer.values.end(), 0.0F);
+  this->Branches.resize(this->Radii.size());
+  std::vector<ContrastBlush> clouds;
+  std::size_t point = 0;
+  std::size_t slab = 0;
+  bool any = false;
+  for (std::size_t b = 0; b < this->Radii.size(); ++b)
+  {
+    const std::vector<double>& radii = this->Radii[b];
+    const std::size_t count = radii.size();
+    const auto first = snapshot.axis.begin() + static_cast<std::ptrdiff_t>(point);
+    const auto last = first + static_cast<std::ptrdiff_t>(count);
+    std::size_t skip = 0;
+    for (double along = 0.0; skip + 2 < count && along < this->Hidden[b]; ++skip)
+    {
+      const auto at = first + static_cast<std::ptrdiff_t>(skip);
+      along += (at[1] - at[0]).norm();
+    }
+    ContrastBranch& branch = this->Branches[b];
+    branch.points.assign(first + static_cast<std::ptrdiff_t>(skip), last);
+    branch.radii.assign(radii.begin() + static_cast<std::ptrdiff_t>(skip), radii.end());
+    const auto slabs = snapshot.concentration.begin() + static_cast<std::ptrdiff_t>(slab);
+    branch.concentrations.assign(slabs + static_cast<std::ptrdiff_t>(skip),
+      slabs + static_cast<std::ptrdiff_t>(count) - 1);
+    any = any ||
+      std::any_of(branch.concentrations.begin(), branch.concentrations.end(),
+        [](double value) { return value > 0.0; });
+    if (b < snapshot.blush.size() && snapshot.blush[b] > FaintestBlush)
+    {
+      clouds.push_back({ *(last - 1), snapshot.blush[b], BlushSigma });
+    }
+    point += count;
+    slab += count - 1;
+  }
+  if (any)
+  {
+    AddContrast(this->Branches, this->NeatContrast, geometry, this->ContrastLayer);
+  }
+  if (!clouds.empty())
+  {
+    AddBlush(clouds, this->NeatContrast, geometry, this->ContrastLayer);
+  }
+}
+
+std::uint64_t SessionImager::HashOf(const GreyImage& image)
+{
+  std::uint64_t hash = Fnv1a(&image.columns, sizeof(image.columns));
+  hash = Fnv1a(&image.rows, sizeof(image.rows), hash);
+  return Fnv1a(image.values.data(), image.values.size(), hash);
+}
+}

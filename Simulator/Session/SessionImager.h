@@ -1,0 +1,94 @@
+/**
+ * @file SessionImager.h
+ * @brief From a moment of a session to its X-ray image.
+ */
+#ifndef DynamicCoronary_SessionImager_h
+#define DynamicCoronary_SessionImager_h
+
+#include "Attenuation.h"
+#include "BackgroundCache.h"
+#include "ContrastProjector.h"
+#include "FluoroscopyImager.h"
+#include "InstrumentProjector.h"
+#include "Scenario.h"
+#include "ThoraxPhantom.h"
+#include "TrainingSession.h"
+#include "WallMotion.h"
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace coronary
+{
+/// The middle of the vessels at rest: of the box about their axes, mm. Where the isocentre is unless a scenario says so.
+/// @throws std::invalid_argument  the vessels have no axis
+Vector3 MiddleOfVessels(const WallTopology& topology);
+
+/// The scenario's pose, with an isocentre.
+CArmPose StartPose(const WallTopology& topology, const ImagingSettings& imaging);
+
+/**
+ * The patient around the vessels: the scenario's CT, or the thorax phantom. About vessels that are not the
+ * coronary phantom's the thorax is moved so that its heart has their middle.
+ * @throws as ReadBackgroundVolume, MakeThoraxPhantom
+ */
+HounsfieldVolume LoadBackground(
+  const Scenario& scenario, const WallTopology& topology, const ProgressCallback& progress = {});
+
+/**
+ * Background, instruments and contrast medium are line integrals of their own and are added before the exponential.
+ * Used by one thread.
+ */
+class SessionImager
+{
+public:
+  /**
+   * @param background  not needed afterwards
+   * @param worker      the background is refined beside the images (not deterministic in time); false: it is finished before
+   *                    an image is made
+   */
+  SessionImager(const WallTopology& topology, const Scenario& scenario,
+    const HounsfieldVolume& background, bool worker);
+  ~SessionImager();
+
+  /// Where the C-arm will be looked from next: the background is begun.
+  void Aim(const CArmPose& pose, double fieldOfView);
+
+  /// The snapshot's last exposure. @return the image to be shown
+  const GreyImage& Expose(const SessionSnapshot& snapshot);
+
+  FluoroscopyImager& Images() { return this->Images_; }
+  const FluoroscopyImager& Images() const { return this->Images_; }
+
+  ///@{
+  /// The layers of the last image.
+  const LineIntegrals& Instruments() const { return this->InstrumentLayer; }
+  const LineIntegrals& Contrast() const { return this->ContrastLayer; }
+  ///@}
+  double BackgroundCompleteness() const { return this->Completeness; } ///< 0 to 1, of the last image
+
+  /// FNV-1a over an image's size and pixels.
+  static std::uint64_t HashOf(const GreyImage& image);
+
+private:
+  CArmGeometry GeometryOf(const CArmPose& pose, double fieldOfView) const;
+  void ProjectInstruments(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
+  void ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
+
+  Scenario Scenario_;
+  std::vector<std::vector<double>> Radii; ///< of the axis
+  std::vector<double> Hidden;             ///< mm at each branch's beginning that lie in its parent
+  Attenuation Materials;
+  double NeatContrast; ///< 1/mm
+  std::unique_ptr<BackgroundCache> Background;
+  FluoroscopyImager Images_;
+  LineIntegrals InstrumentLayer;
+  LineIntegrals ContrastLayer;
+  LineIntegrals NoBackground;
+  double Completeness = 0.0;
+  std::vector<ContrastBranch> Branches;
+};
+}
+
+#endif

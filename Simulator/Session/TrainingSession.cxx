@@ -1,0 +1,340 @@
+#include "TrainingSession.h"
+
+#include "Fnv1a.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace coronary
+{
+namespace
+{
+constexpr double ContrastStep = 0.005;        // s
+constexpr double FastestInjection = 12.0;     // mL/s: no hand and no injector of a laboratory does more
+constexpr double SteepestPrimary = 1.9;       // radians: what the arm of a laboratory can do
+constexpr double SteepestSecondary = 0.9;     // radians
+constexpr double NearestDetector = 50.0;      // mm behind the isocentre
+constexpr double FurthestDetector = 1500.0;   // mm from the source
+constexpr double FurthestTable = 500.0;       // mm
+constexpr double SmallestField = 80.0;        // mm
+constexpr double GreatestField = 400.0;       // mm
+
+double Limited(double value, double low, double high, double otherwise)
+{
+  return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
+}
+
+InterventionSettings WithRoot(const WallMotion& wall, const Scenario& scenario)
+{
+  InterventionSettings settings = scenario.settings;
+  if (settings.rootBranch < 0)
+  {
+    settings.rootBranch = RootBranch(wall.Topology(), scenario.artery);
+  }
+  return settings;
+}
+
+AcquisitionSettings AcquisitionOf(const Scenario& scenario)
+{
+  AcquisitionSettings settings;
+  settings.tickRate = static_cast<int>(std::lround(scenario.settings.tickRate));
+  settings.fluoroscopyRate = FrameRateOf(scenario.imaging.frameRate);
+  settings.cineRate = FrameRateOf(scenario.imaging.cineRate);
+  return settings;
+}
+}
+
+struct TrainingSession::Internals
+{
+  Internals(std::shared_ptr<WallMotion> motion, const Scenario& scenario)
+    : Wall(std::move(motion))
+    , Settings(WithRoot(*this->Wall, scenario))
+    , Imaging(scenario.imaging)
+    , Physics(this->Wall, scenario.wire, scenario.catheter, this->Settings)
+    , Medium(this->Wall->Topology(), scenario.contrast, scenario.seed)
+    , Clock(AcquisitionOf(scenario))
+    , HeartRate(this->Settings.heartRate)
+    , TicksOfContrast(
+        std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::lround(this->Settings.tickRate * ContrastStep))))
+    , Field(scenario.imaging.fieldOfView)
+  {
+    this->Pose = scenario.imaging.pose;
+    this->SetField();
+  }
+
+  void SetView(const SessionInput& input);
+  void SetField();
+  void StepContrast(const SessionInput& input);
+  void Measure(const SessionInput& input);
+
+  std::shared_ptr<WallMotion> Wall;
+  InterventionSettings Settings;
+  ImagingSettings Imaging;
+  Intervention Physics;
+  ContrastModel Medium;
+  ExposureClock Clock;
+  double HeartRate;
+  std::uint64_t TicksOfContrast;
+  double Field;
+  CArmPose Pose;
+  SessionReport Report;
+  SessionMetrics Metrics;
+  SessionInput Last;
+  double Delivered = 0.0; // mL that have left the syringe, follows the plunger
+  bool FarTooFast = false;
+  std::vector<std::string> Messages;
+  std::uint64_t Tick = 0;
+};
+
+void TrainingSession::Internals::SetField()
+{
+  DetectorFormat format;
+  format.columns = format.rows = this->Imaging.columns;
+  format.width = format.height = this->Field;
+  this->Clock.SetFieldArea(ReferenceFieldArea(this->Pose, format));
+}
+
+void TrainingSession::Internals::SetView(const SessionInput& input)
+{
+  const CArmPose before = this->Pose;
+  const CArmPose& start = this->Imaging.pose;
+  this->Pose.primary =
+    Limited(input.primary, -SteepestPrimary, SteepestPrimary, before.primary);
+  this->Pose.secondary =
+    Limited(input.secondary, -SteepestSecondary, SteepestSecondary, before.secondary);
+  this->Pose.sourceToDetector = Limited(input.sourceToDetector,
+    start.sourceToIsocentre + NearestDetector, FurthestDetector, before.sourceToDetector);
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    this->Pose.isocentre[axis] = start.isocentre[axis] +
+      Limited(input.table[axis], -FurthestTable, FurthestTable,
+        before.isocentre[axis] - start.isocentre[axis]);
+  }
+  if (this->Pose.sourceToDetector != before.sourceToDetector)
+  {
+    this->SetField();
+  }
+}
+
+void TrainingSession::Internals::StepContrast(const SessionInput& input)
+{
+  const double seconds = static_cast<double>(this->TicksOfContrast) / this->Settings.tickRate;
+  const double plunger = std::isfinite(input.syringe) ? input.syringe : this->Delivered;
+  const double wanted = plunger - this->Delivered;
+  const double pushed = std::clamp(wanted, 0.0, FastestInjection * seconds);
+  // Drawing back fills the syringe: it goes on from there.
+  this->Delivered = wanted < 0.0 ? plunger : this->Delivered + pushed;
+  if (wanted > 2.0 && !this->FarTooFast)
+  {
+    this->Messages.emplace_back("The syringe is pushed faster than contrast medium can flow.");
+  }
+  this->FarTooFast = wanted > 2.0;
+  this->Report.injection = pushed / seconds;
+  const double place = this->Report.tick.catheterTip;
+  this->Medium.Step(seconds, this->Report.tick.phase, this->HeartRate, this->Report.injection,
+    { place >= 0.0 ? this->Settings.rootBranch : -1, std::max(0.0, place) });
+}
+
+void TrainingSession::Internals::Measure(const SessionInput& input)
+{
+  SessionMetrics& metrics = this->Metrics;
+  const TickReport& tick = this->Report.tick;
+  const double seconds = 1.0 / this->Settings.tickRate;
+  metrics.procedureSeconds = static_cast<double>(this->Tick) * seconds;
+  const DoseCounters total = this->Clock.Total();
+  metrics.fluoroscopySeconds = total.seconds;
+  metrics.cineSeconds = this->Clock.Cine().seconds;
+  metrics.frames = total.frames;
+  metrics.airKerma = total.airKerma;
+  metrics.doseAreaProduct = total.doseAreaProduct;
+  metrics.contrast = this->Medium.Balance().injected;
+  metrics.greatestWallForce = std::max(metrics.greatestWallForce, tick.greatestForce);
+  metrics.greatestTipForce = std::max(metrics.greatestTipForce, tick.tipForce);
+  metrics.forcefulSeconds += tick.tipForce > ForcefulTip ? seconds : 0.0;
+  const double travel = std::abs(input.drive.wirePosition - this->Last.drive.wirePosition);
+  const double turn = std::abs(input.drive.wireAngle - this->Last.drive.wireAngle);
+  metrics.wireTravel += std::isfinite(travel) ? travel : 0.0;
+  metrics.wireTurning += std::isfinite(turn) ? turn : 0.0;
+  metrics.deepest = std::max(metrics.deepest, tick.inserted);
+  if (tick.branch >= 0 &&
+    std::find(metrics.branches.begin(), metrics.branches.end(), tick.branch) ==
+      metrics.branches.end())
+  {
+    metrics.branches.push_back(tick.branch);
+  }
+}
+
+TrainingSession::TrainingSession(std::shared_ptr<WallMotion> wall, const Scenario& scenario)
+  : Data(std::make_unique<Internals>(std::move(wall), scenario))
+{
+  this->Data->Last = this->StartInput();
+}
+
+TrainingSession::~TrainingSession() = default;
+
+SessionInput TrainingSession::StartInput() const
+{
+  const CArmPose& pose = this->Data->Imaging.pose;
+  SessionInput input;
+  input.primary = pose.primary;
+  input.secondary = pose.secondary;
+  input.sourceToDetector = pose.sourceToDetector;
+  return input;
+}
+
+const SessionReport& TrainingSession::Step(const SessionInput& input)
+{
+  Internals& data = *this->Data;
+  data.SetView(input);
+  data.Report.tick = data.Physics.Step(input.drive);
+  if (data.Tick % data.TicksOfContrast == 0)
+  {
+    data.StepContrast(input);
+  }
+  ++data.Tick;
+  data.Report.exposed = data.Clock.Step((input.pedals & FluoroscopyPedal) != 0,
+    (input.pedals & CinePedal) != 0, (input.pedals & MaskPedal) != 0);
+  data.Measure(input);
+  data.Last = input;
+  return data.Report;
+}
+
+bool TrainingSession::Apply(const RecordedEvent& event)
+{
+  Internals& data = *this->Data;
+  if (!std::isfinite(event.value))
+  {
+    return false;
+  }
+  switch (event.kind)
+  {
+    case RecordedEvent::HeartRate:
+      data.HeartRate = std::clamp(event.value, 0.0, 240.0);
+      data.Physics.SetHeartRate(data.HeartRate);
+      return true;
+    case RecordedEvent::FrameRate:
+      if (event.value != 7.5 && event.value != 15.0 && event.value != 30.0)
+      {
+        return false;
+      }
+      data.Clock.SetFluoroscopyRate(FrameRateOf(event.value));
+      return true;
+    case RecordedEvent::FieldOfView:
+      data.Field = std::clamp(event.value, SmallestField, GreatestField);
+      data.SetField();
+      return true;
+    default:
+      return false;
+  }
+}
+
+const SessionReport& TrainingSession::Report() const
+{
+  return this->Data->Report;
+}
+
+const Exposure& TrainingSession::LastExposure() const
+{
+  return this->Data->Clock.Last();
+}
+
+const SessionMetrics& TrainingSession::Metrics() const
+{
+  return this->Data->Metrics;
+}
+
+const Intervention& TrainingSession::Instruments() const
+{
+  return this->Data->Physics;
+}
+
+const ContrastModel& TrainingSession::Contrast() const
+{
+  return this->Data->Medium;
+}
+
+const WallTopology& TrainingSession::Topology() const
+{
+  return this->Data->Wall->Topology();
+}
+
+const CArmPose& TrainingSession::Pose() const
+{
+  return this->Data->Pose;
+}
+
+double TrainingSession::FieldOfView() const
+{
+  return this->Data->Field;
+}
+
+double TrainingSession::TickRate() const
+{
+  return this->Data->Settings.tickRate;
+}
+
+std::uint64_t TrainingSession::Ticks() const
+{
+  return this->Data->Tick;
+}
+
+std::uint64_t TrainingSession::StateHash() const
+{
+  const Internals& data = *this->Data;
+  std::uint64_t hash = data.Physics.StateHash();
+  const auto add = [&hash](std::uint64_t more) { hash = Fnv1a(&more, sizeof(more), hash); };
+  if (!data.Medium.Empty())
+  {
+    add(data.Medium.StateHash());
+  }
+  if (data.Metrics.frames > 0)
+  {
+    add(data.Clock.StateHash());
+  }
+  return hash;
+}
+
+std::vector<std::string> TrainingSession::TakeMessages()
+{
+  std::vector<std::string> messages = this->Data->Physics.TakeMessages();
+  for (std::string& own : this->Data->Messages)
+  {
+    messages.push_back(std::move(own));
+  }
+  this->Data->Messages.clear();
+  return messages;
+}
+
+void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
+{
+  const Internals& data = *this->Data;
+  snapshot.tick = data.Tick;
+  snapshot.seconds = static_cast<double>(data.Tick) / data.Settings.tickRate;
+  snapshot.heartRate = data.HeartRate;
+  snapshot.report = data.Report.tick;
+  snapshot.metrics = data.Metrics;
+  snapshot.contrast = data.Medium.Balance();
+  snapshot.injection = data.Report.injection;
+  snapshot.aorticPressure = data.Medium.AorticPressure();
+  snapshot.input = data.Last;
+  snapshot.pose = data.Pose;
+  snapshot.fieldOfView = data.Field;
+  snapshot.frameRate = FramesPerSecond(data.Clock.Settings().fluoroscopyRate);
+  snapshot.radiating = data.Clock.Radiating();
+  snapshot.exposure = data.Clock.Last();
+  snapshot.wire = data.Physics.Centerline();
+  snapshot.catheter = data.Physics.CatheterLine();
+  data.Wall->AxisPositions(data.Report.tick.phase, snapshot.axis);
+  snapshot.concentration = data.Medium.Concentration();
+  snapshot.blush = data.Medium.BlushVolume();
+}
+
+void TrainingSession::SnapshotOfScene(SessionSnapshot& snapshot) const
+{
+  this->SnapshotOfImage(snapshot);
+  snapshot.wall = this->Data->Physics.WallPoints();
+  this->Data->Medium.TracerPositions(
+    snapshot.axis, snapshot.tracers, snapshot.tracerVolumes);
+}
+}

@@ -1,0 +1,130 @@
+/**
+ * @file TrainingSession.h
+ * @brief A procedure as a whole, tick by tick: instruments, contrast medium, exposures, and what is measured of the
+ * trainee. Everything but the images.
+ */
+#ifndef DynamicCoronary_TrainingSession_h
+#define DynamicCoronary_TrainingSession_h
+
+#include "Acquisition.h"
+#include "CArm.h"
+#include "ContrastModel.h"
+#include "Intervention.h"
+#include "Recording.h"
+#include "Scenario.h"
+#include "SessionInput.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// What distinguishes trainees.
+struct SessionMetrics
+{
+  double procedureSeconds = 0.0;
+  double fluoroscopySeconds = 0.0;   ///< pedal down, cine included
+  double cineSeconds = 0.0;
+  std::int64_t frames = 0;           ///< exposed
+  double airKerma = 0.0;             ///< mGy at the reference point
+  double doseAreaProduct = 0.0;      ///< Gy cm^2
+  double contrast = 0.0;             ///< mL of contrast medium
+  double greatestWallForce = 0.0;    ///< N of one contact
+  double greatestTipForce = 0.0;     ///< N
+  double forcefulSeconds = 0.0;      ///< tip force above ForcefulTip
+  double wireTravel = 0.0;           ///< mm, forth and back together
+  double wireTurning = 0.0;          ///< radians, left and right together
+  double deepest = 0.0;              ///< mm of wire beyond the catheter's tip
+  std::vector<int> branches;         ///< in which the tip has been, in the order in which they were reached
+};
+
+/// N: what a tip that is pushed against a wall should not do for long. The tips of workhorse wires buckle below it.
+constexpr double ForcefulTip = 0.1;
+
+struct SessionReport
+{
+  TickReport tick;
+  double injection = 0.0; ///< mL/s that leave the catheter
+  bool exposed = false;   ///< a frame is exposed at this tick: Exposure()
+};
+
+/// What the displays need of one moment. Vectors keep their memory from use to use.
+struct SessionSnapshot
+{
+  std::uint64_t tick = 0;
+  double seconds = 0.0;
+  double heartRate = 0.0;
+  TickReport report;
+  SessionMetrics metrics;
+  ContrastBalance contrast;
+  double injection = 0.0;      ///< mL/s
+  double aorticPressure = 0.0; ///< mmHg
+  SessionInput input;
+  CArmPose pose;
+  double fieldOfView = 0.0; ///< mm
+  double frameRate = 0.0;   ///< Hz, of fluoroscopy
+  bool radiating = false;
+  Exposure exposure; ///< the last one
+  std::vector<Vector3> wire;              ///< from its tip, mm
+  std::vector<Vector3> catheter;          ///< from its tip, mm
+  std::vector<Vector3> axis;              ///< as WallMotion::AxisPositions
+  std::vector<double> concentration;      ///< as ContrastModel::Concentration
+  std::vector<double> blush;              ///< per branch, mL
+  std::vector<Vector3> wall;              ///< only of SnapshotOfScene
+  std::vector<Vector3> tracers;           ///< only of SnapshotOfScene, mm
+  std::vector<float> tracerVolumes;       ///< mL of contrast medium
+};
+
+/**
+ * Deterministic: the same binary, vessels, scenario, inputs and events give the same bits. One thread.
+ */
+class TrainingSession
+{
+public:
+  /// @throws std::invalid_argument naming what is wrong with vessels, scenario, instruments
+  TrainingSession(std::shared_ptr<WallMotion> wall, const Scenario& scenario);
+  ~TrainingSession();
+  TrainingSession(const TrainingSession&) = delete;
+  TrainingSession& operator=(const TrainingSession&) = delete;
+
+  /// What SessionInput says at the start: the scenario's view.
+  SessionInput StartInput() const;
+
+  /// One step of 1 / tickRate.
+  const SessionReport& Step(const SessionInput& input);
+
+  /// Before the next step. @return false: not known, nothing is changed
+  bool Apply(const RecordedEvent& event);
+
+  const SessionReport& Report() const;
+  const coronary::Exposure& LastExposure() const; ///< meaningful once a frame was exposed
+  const SessionMetrics& Metrics() const;
+  const Intervention& Instruments() const;
+  const ContrastModel& Contrast() const;
+  const WallTopology& Topology() const;
+  const CArmPose& Pose() const;
+  double FieldOfView() const; ///< mm of the detector, across
+  double TickRate() const;
+  std::uint64_t Ticks() const;
+
+  /// Of the instruments; of contrast medium and exposures as well when there have been any.
+  std::uint64_t StateHash() const;
+
+  /// What was clamped or reset since the last call, a sentence each.
+  std::vector<std::string> TakeMessages();
+
+  ///@{
+  /// What an X-ray image, what the view of the anatomy needs.
+  void SnapshotOfImage(SessionSnapshot& snapshot) const;
+  void SnapshotOfScene(SessionSnapshot& snapshot) const;
+  ///@}
+
+private:
+  struct Internals;
+  std::unique_ptr<Internals> Data;
+};
+}
+
+#endif
