@@ -831,6 +831,20 @@ const std::vector<Vector3>& Intervention::WallPoints() const
   return data.NowPoints;
 }
 
+void Intervention::SomeWallPoints(
+  const std::vector<std::int64_t>& which, std::vector<Vector3>& positions) const
+{
+  const Internals& data = *this->Data;
+  const double share =
+    static_cast<double>(data.TickInFrame) / static_cast<double>(data.Settings.ticksPerFrame);
+  positions.resize(which.size());
+  for (std::size_t n = 0; n < which.size(); ++n)
+  {
+    const auto i = static_cast<std::size_t>(which[n]);
+    positions[n] = (1.0 - share) * data.LastPoints[i] + share * data.NextPoints[i];
+  }
+}
+
 std::uint64_t Intervention::StateHash() const
 {
   const Internals& data = *this->Data;

@@ -98,6 +98,9 @@ public:
   const std::vector<Vector3>& CatheterLine() const;
   /// The wall now, mm.
   const std::vector<Vector3>& WallPoints() const;
+  /// Some of its points now. @param which  numbers of points, in range
+  void SomeWallPoints(
+    const std::vector<std::int64_t>& which, std::vector<Vector3>& positions) const;
 
   /// FNV-1a over the bits of the wire's, the hands' and the heart's state. What the wall keeps to be faster, and the
   /// forces in the joints, follow from these and the ticks before.

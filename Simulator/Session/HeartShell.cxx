@@ -12,8 +12,9 @@ namespace
 constexpr int Rings = 22;   // between the poles
 constexpr int Around = 36;  // points of a ring
 constexpr int Samples = 20; // phases
-constexpr double Inside = 0.97; // of the way from the middle to the vessels' axes: vessels lie upon it
-constexpr double Bell = 0.35;   // radians
+constexpr double Inside =
+  0.97; // of the way from the middle to the vessels' axes: vessels lie upon it
+constexpr double Bell = 0.35; // radians
 
 /// Of a sphere: the first pole, rings, the last pole.
 std::vector<Vector3> Directions()
@@ -25,8 +26,8 @@ std::vector<Vector3> Directions()
     for (int k = 0; k < Around; ++k)
     {
       const double azimuth = 2.0 * M_PI * k / Around;
-      directions.emplace_back(std::sin(polar) * std::cos(azimuth),
-        std::sin(polar) * std::sin(azimuth), std::cos(polar));
+      directions.emplace_back(
+        std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
     }
   }
   directions.emplace_back(-Vector3::UnitZ());
@@ -51,8 +52,8 @@ HeartShell::HeartShell(const PhantomSettings& phantom)
   std::vector<Vector3> rest;
   for (const Vector3& direction : Directions())
   {
-    rest.push_back(frame.ToWorld(
-      HeartFrame::Centre + Inside * HeartFrame::Radii.cwiseProduct(direction)));
+    rest.push_back(
+      frame.ToWorld(HeartFrame::Centre + Inside * HeartFrame::Radii.cwiseProduct(direction)));
   }
   std::vector<std::vector<Vector3>> samples;
   for (const double phase : EvenPhases())

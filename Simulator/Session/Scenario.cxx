@@ -319,8 +319,8 @@ ImagingSettings ImagingOf(const Json& object, const std::string& where, const st
   {
     imaging.backgroundOffset = PointOf(fields, "background_offset_mm");
   }
-  imaging.thoraxSeed = static_cast<std::uint64_t>(fields.Whole(
-    "thorax_seed", 0, INT32_MAX, static_cast<std::int64_t>(imaging.thoraxSeed)));
+  imaging.thoraxSeed = static_cast<std::uint64_t>(
+    fields.Whole("thorax_seed", 0, INT32_MAX, static_cast<std::int64_t>(imaging.thoraxSeed)));
   CArmPose& pose = imaging.pose;
   pose.primary = AngleOf(fields, "primary", 100.0, pose.primary);
   pose.secondary = AngleOf(fields, "secondary", 50.0, pose.secondary);
@@ -374,8 +374,7 @@ ContrastSettings ContrastOf(const Json& object, const std::string& where)
   ContrastSettings contrast;
   JsonFields fields(object, where);
   ReadNumbers(fields, NumbersOf(contrast));
-  contrast.tracers.capacity =
-    fields.Whole("tracers", 100, 10000000, contrast.tracers.capacity);
+  contrast.tracers.capacity = fields.Whole("tracers", 100, 10000000, contrast.tracers.capacity);
   fields.Done();
   try
   {

@@ -49,17 +49,17 @@ struct VesselSource
 /// What the C-arm sees, and how it stands at the start.
 struct ImagingSettings
 {
-  std::string background;        ///< CT file or folder; empty: the thorax phantom about the heart
+  std::string background; ///< CT file or folder; empty: the thorax phantom about the heart
   Vector3 backgroundOffset{ Vector3::Zero() }; ///< mm that the CT is moved to fit the vessels
   std::uint64_t thoraxSeed = 1;
-  CArmPose pose;                 ///< with the isocentre in the middle of the vessels, unless it is given
-  bool hasIsocentre = false;     ///< pose.isocentre is given, LPS, mm
-  double fieldOfView = 200.0;    ///< mm of the detector, across, 80 to 400
-  int columns = 512;             ///< of the image, and rows, 64 to 2048
-  double energy = 60.0;          ///< keV, effective, 30 to 120
-  double iodine = 350.0;         ///< mg/mL of the contrast medium, 0 to 500
-  double frameRate = 15.0;       ///< Hz of fluoroscopy: 7.5, 15 or 30
-  double cineRate = 15.0;        ///< Hz of cine
+  CArmPose pose; ///< with the isocentre in the middle of the vessels, unless it is given
+  bool hasIsocentre = false;  ///< pose.isocentre is given, LPS, mm
+  double fieldOfView = 200.0; ///< mm of the detector, across, 80 to 400
+  int columns = 512;          ///< of the image, and rows, 64 to 2048
+  double energy = 60.0;       ///< keV, effective, 30 to 120
+  double iodine = 350.0;      ///< mg/mL of the contrast medium, 0 to 500
+  double frameRate = 15.0;    ///< Hz of fluoroscopy: 7.5, 15 or 30
+  double cineRate = 15.0;     ///< Hz of cine
 };
 
 struct Scenario

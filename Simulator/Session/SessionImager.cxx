@@ -12,9 +12,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double CoilLength = 30.0;     // mm from the tip: a coil of platinum, which shows best
-constexpr double BlushSigma = 7.0;      // mm of the myocardium behind an outlet
-constexpr double FaintestBlush = 1e-5;  // mL
+constexpr double CoilLength = 30.0;    // mm from the tip: a coil of platinum, which shows best
+constexpr double BlushSigma = 7.0;     // mm of the myocardium behind an outlet
+constexpr double FaintestBlush = 1e-5; // mL
 
 /// Where a branch leaves its parent: number of the nearest point of the parent's axis.
 std::size_t Attachment(const WallTopology& topology, std::size_t branch)
@@ -114,8 +114,16 @@ HounsfieldVolume LoadBackground(
   return thorax;
 }
 
+std::shared_ptr<const VolumeProjector> MakeProjector(
+  const HounsfieldVolume& background, const ImagingSettings& imaging)
+{
+  const Attenuation materials(imaging.energy);
+  return std::make_shared<VolumeProjector>(background.View(),
+    [&materials](double hounsfield) { return materials.OfHounsfield(hounsfield); });
+}
+
 SessionImager::SessionImager(const WallTopology& topology, const Scenario& scenario,
-  const HounsfieldVolume& background, bool worker)
+  std::shared_ptr<const VolumeProjector> background, bool worker)
   : Scenario_(scenario)
   , Radii(topology.axisRadius)
   , Hidden(HiddenLengths(topology))
@@ -123,11 +131,9 @@ SessionImager::SessionImager(const WallTopology& topology, const Scenario& scena
   , NeatContrast(this->Materials.OfContrastMedium(scenario.imaging.iodine))
   , Images_({}, scenario.seed)
 {
-  const auto projector = std::make_shared<VolumeProjector>(background.View(),
-    [this](double hounsfield) { return this->Materials.OfHounsfield(hounsfield); });
   BackgroundCacheSettings settings;
   settings.worker = worker;
-  this->Background = std::make_unique<BackgroundCache>(projector, settings);
+  this->Background = std::make_unique<BackgroundCache>(std::move(background), settings);
   this->InstrumentLayer = LineIntegrals(scenario.imaging.columns, scenario.imaging.columns);
   this->ContrastLayer = this->InstrumentLayer;
   this->NoBackground = this->InstrumentLayer;
@@ -155,8 +161,8 @@ const GreyImage& SessionImager::Expose(const SessionSnapshot& snapshot)
   this->ProjectInstruments(snapshot, geometry);
   this->ProjectContrast(snapshot, geometry);
   const auto background = this->Background->Current(&this->Completeness);
-  return this->Images_.Expose(background ? *background : this->NoBackground,
-    this->InstrumentLayer, this->ContrastLayer, snapshot.exposure);
+  return this->Images_.Expose(background ? *background : this->NoBackground, this->InstrumentLayer,
+    this->ContrastLayer, snapshot.exposure);
 }
 
 void SessionImager::ProjectInstruments(
@@ -175,8 +181,8 @@ void SessionImager::ProjectInstruments(
       const double length = (snapshot.wire[n + 1] - snapshot.wire[n]).norm();
       const double middle = along + 0.5 * length;
       InstrumentSegment segment;
-      segment.outerRadius = AlongWire(this->Scenario_.wire, middle,
-        [](const WireSection& section) { return section.radius; });
+      segment.outerRadius = AlongWire(
+        this->Scenario_.wire, middle, [](const WireSection& section) { return section.radius; });
       // The coil of the tip is a tube of platinum wire, about a third of its radius thick.
       const bool coil = middle < CoilLength;
       segment.innerRadius = coil ? 0.65 * segment.outerRadius : 0.0;
@@ -221,8 +227,8 @@ void SessionImager::ProjectContrast(const SessionSnapshot& snapshot, const CArmG
     branch.points.assign(first + static_cast<std::ptrdiff_t>(skip), last);
     branch.radii.assign(radii.begin() + static_cast<std::ptrdiff_t>(skip), radii.end());
     const auto slabs = snapshot.concentration.begin() + static_cast<std::ptrdiff_t>(slab);
-    branch.concentrations.assign(slabs + static_cast<std::ptrdiff_t>(skip),
-      slabs + static_cast<std::ptrdiff_t>(count) - 1);
+    branch.concentrations.assign(
+      slabs + static_cast<std::ptrdiff_t>(skip), slabs + static_cast<std::ptrdiff_t>(count) - 1);
     any = any ||
       std::any_of(branch.concentrations.begin(), branch.concentrations.end(),
         [](double value) { return value > 0.0; });

@@ -36,6 +36,10 @@ CArmPose StartPose(const WallTopology& topology, const ImagingSettings& imaging)
 HounsfieldVolume LoadBackground(
   const Scenario& scenario, const WallTopology& topology, const ProgressCallback& progress = {});
 
+/// What SessionImager needs of it.
+std::shared_ptr<const VolumeProjector> MakeProjector(
+  const HounsfieldVolume& background, const ImagingSettings& imaging);
+
 /**
  * Background, instruments and contrast medium are line integrals of their own and are added before the exponential.
  * Used by one thread.
@@ -44,12 +48,11 @@ class SessionImager
 {
 public:
   /**
-   * @param background  not needed afterwards
    * @param worker      the background is refined beside the images (not deterministic in time); false: it is finished before
    *                    an image is made
    */
   SessionImager(const WallTopology& topology, const Scenario& scenario,
-    const HounsfieldVolume& background, bool worker);
+    std::shared_ptr<const VolumeProjector> background, bool worker);
   ~SessionImager();
 
   /// Where the C-arm will be looked from next: the background is begun.
@@ -66,7 +69,10 @@ public:
   const LineIntegrals& Instruments() const { return this->InstrumentLayer; }
   const LineIntegrals& Contrast() const { return this->ContrastLayer; }
   ///@}
-  double BackgroundCompleteness() const { return this->Completeness; } ///< 0 to 1, of the last image
+  double BackgroundCompleteness() const
+  {
+    return this->Completeness;
+  } ///< 0 to 1, of the last image
 
   /// FNV-1a over an image's size and pixels.
   static std::uint64_t HashOf(const GreyImage& image);

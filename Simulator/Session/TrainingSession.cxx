@@ -10,15 +10,15 @@ namespace coronary
 {
 namespace
 {
-constexpr double ContrastStep = 0.005;        // s
-constexpr double FastestInjection = 12.0;     // mL/s: no hand and no injector of a laboratory does more
-constexpr double SteepestPrimary = 1.9;       // radians: what the arm of a laboratory can do
-constexpr double SteepestSecondary = 0.9;     // radians
-constexpr double NearestDetector = 50.0;      // mm behind the isocentre
-constexpr double FurthestDetector = 1500.0;   // mm from the source
-constexpr double FurthestTable = 500.0;       // mm
-constexpr double SmallestField = 80.0;        // mm
-constexpr double GreatestField = 400.0;       // mm
+constexpr double ContrastStep = 0.005;    // s
+constexpr double FastestInjection = 12.0; // mL/s: no hand and no injector of a laboratory does more
+constexpr double SteepestPrimary = 1.9;   // radians: what the arm of a laboratory can do
+constexpr double SteepestSecondary = 0.9; // radians
+constexpr double NearestDetector = 50.0;  // mm behind the isocentre
+constexpr double FurthestDetector = 1500.0; // mm from the source
+constexpr double FurthestTable = 500.0;     // mm
+constexpr double SmallestField = 80.0;      // mm
+constexpr double GreatestField = 400.0;     // mm
 
 double Limited(double value, double low, double high, double otherwise)
 {
@@ -55,8 +55,8 @@ struct TrainingSession::Internals
     , Medium(this->Wall->Topology(), scenario.contrast, scenario.seed)
     , Clock(AcquisitionOf(scenario))
     , HeartRate(this->Settings.heartRate)
-    , TicksOfContrast(
-        std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::lround(this->Settings.tickRate * ContrastStep))))
+    , TicksOfContrast(std::max<std::uint64_t>(
+        1, static_cast<std::uint64_t>(std::lround(this->Settings.tickRate * ContrastStep))))
     , Field(scenario.imaging.fieldOfView)
   {
     this->Pose = scenario.imaging.pose;
@@ -99,8 +99,7 @@ void TrainingSession::Internals::SetView(const SessionInput& input)
 {
   const CArmPose before = this->Pose;
   const CArmPose& start = this->Imaging.pose;
-  this->Pose.primary =
-    Limited(input.primary, -SteepestPrimary, SteepestPrimary, before.primary);
+  this->Pose.primary = Limited(input.primary, -SteepestPrimary, SteepestPrimary, before.primary);
   this->Pose.secondary =
     Limited(input.secondary, -SteepestSecondary, SteepestSecondary, before.secondary);
   this->Pose.sourceToDetector = Limited(input.sourceToDetector,
@@ -330,11 +329,11 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.blush = data.Medium.BlushVolume();
 }
 
-void TrainingSession::SnapshotOfScene(SessionSnapshot& snapshot) const
+void TrainingSession::SnapshotOfScene(
+  const std::vector<std::int64_t>& wallPoints, SessionSnapshot& snapshot) const
 {
   this->SnapshotOfImage(snapshot);
-  snapshot.wall = this->Data->Physics.WallPoints();
-  this->Data->Medium.TracerPositions(
-    snapshot.axis, snapshot.tracers, snapshot.tracerVolumes);
+  this->Data->Physics.SomeWallPoints(wallPoints, snapshot.wall);
+  this->Data->Medium.TracerPositions(snapshot.axis, snapshot.tracers, snapshot.tracerVolumes);
 }
 }

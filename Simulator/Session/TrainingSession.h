@@ -25,19 +25,19 @@ namespace coronary
 struct SessionMetrics
 {
   double procedureSeconds = 0.0;
-  double fluoroscopySeconds = 0.0;   ///< pedal down, cine included
+  double fluoroscopySeconds = 0.0; ///< pedal down, cine included
   double cineSeconds = 0.0;
-  std::int64_t frames = 0;           ///< exposed
-  double airKerma = 0.0;             ///< mGy at the reference point
-  double doseAreaProduct = 0.0;      ///< Gy cm^2
-  double contrast = 0.0;             ///< mL of contrast medium
-  double greatestWallForce = 0.0;    ///< N of one contact
-  double greatestTipForce = 0.0;     ///< N
-  double forcefulSeconds = 0.0;      ///< tip force above ForcefulTip
-  double wireTravel = 0.0;           ///< mm, forth and back together
-  double wireTurning = 0.0;          ///< radians, left and right together
-  double deepest = 0.0;              ///< mm of wire beyond the catheter's tip
-  std::vector<int> branches;         ///< in which the tip has been, in the order in which they were reached
+  std::int64_t frames = 0;        ///< exposed
+  double airKerma = 0.0;          ///< mGy at the reference point
+  double doseAreaProduct = 0.0;   ///< Gy cm^2
+  double contrast = 0.0;          ///< mL of contrast medium
+  double greatestWallForce = 0.0; ///< N of one contact
+  double greatestTipForce = 0.0;  ///< N
+  double forcefulSeconds = 0.0;   ///< tip force above ForcefulTip
+  double wireTravel = 0.0;        ///< mm, forth and back together
+  double wireTurning = 0.0;       ///< radians, left and right together
+  double deepest = 0.0;           ///< mm of wire beyond the catheter's tip
+  std::vector<int> branches; ///< in which the tip has been, in the order in which they were reached
 };
 
 /// N: what a tip that is pushed against a wall should not do for long. The tips of workhorse wires buckle below it.
@@ -66,15 +66,15 @@ struct SessionSnapshot
   double fieldOfView = 0.0; ///< mm
   double frameRate = 0.0;   ///< Hz, of fluoroscopy
   bool radiating = false;
-  Exposure exposure; ///< the last one
-  std::vector<Vector3> wire;              ///< from its tip, mm
-  std::vector<Vector3> catheter;          ///< from its tip, mm
-  std::vector<Vector3> axis;              ///< as WallMotion::AxisPositions
-  std::vector<double> concentration;      ///< as ContrastModel::Concentration
-  std::vector<double> blush;              ///< per branch, mL
-  std::vector<Vector3> wall;              ///< only of SnapshotOfScene
-  std::vector<Vector3> tracers;           ///< only of SnapshotOfScene, mm
-  std::vector<float> tracerVolumes;       ///< mL of contrast medium
+  Exposure exposure;                 ///< the last one
+  std::vector<Vector3> wire;         ///< from its tip, mm
+  std::vector<Vector3> catheter;     ///< from its tip, mm
+  std::vector<Vector3> axis;         ///< as WallMotion::AxisPositions
+  std::vector<double> concentration; ///< as ContrastModel::Concentration
+  std::vector<double> blush;         ///< per branch, mL
+  std::vector<Vector3> wall;         ///< only of SnapshotOfScene
+  std::vector<Vector3> tracers;      ///< only of SnapshotOfScene, mm
+  std::vector<float> tracerVolumes;  ///< mL of contrast medium
 };
 
 /**
@@ -118,7 +118,9 @@ public:
   ///@{
   /// What an X-ray image, what the view of the anatomy needs.
   void SnapshotOfImage(SessionSnapshot& snapshot) const;
-  void SnapshotOfScene(SessionSnapshot& snapshot) const;
+  /// @param wallPoints  numbers of the wall's points that SessionSnapshot::wall is of
+  void SnapshotOfScene(
+    const std::vector<std::int64_t>& wallPoints, SessionSnapshot& snapshot) const;
   ///@}
 
 private:

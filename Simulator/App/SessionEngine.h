@@ -1,0 +1,196 @@
+/**
+ * @file SessionEngine.h
+ * @brief A session in real time: one thread for the physics, one for the X-ray images.
+ */
+#ifndef DynamicCoronary_SessionEngine_h
+#define DynamicCoronary_SessionEngine_h
+
+#include "DeviceMux.h"
+#include "FixedStepClock.h"
+#include "Recording.h"
+#include "SessionImager.h"
+#include "TrainingSession.h"
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace coronary
+{
+/// What is made once, and shared by the sessions of a window.
+struct SessionWorld
+{
+  Scenario scenario; ///< with the pose that the C-arm starts at
+  std::shared_ptr<WallMotion> wall;
+  std::uint64_t wallHash = 0;
+  std::shared_ptr<const VolumeProjector> background;
+};
+
+struct EngineOptions
+{
+  std::string record; ///< recording to write; empty: none
+  std::string replay; ///< recording that takes the place of all hands; empty: none
+  std::vector<std::int64_t> wallPoints; ///< of SessionSnapshot::wall
+  double sceneRate = 30.0;              ///< snapshots for the scene a second
+};
+
+/// How well real time is kept.
+struct EngineRates
+{
+  double ticks = 0.0;             ///< a second, over the last second
+  double load = 0.0;              ///< part of that second that the physics worked
+  double images = 0.0;            ///< X-ray images a second, over the last second
+  double imageMilliseconds = 0.0; ///< mean time to make one
+  std::uint64_t lateImages =
+    0;                      ///< exposures that were overtaken by the next one before they were made
+  double lostSeconds = 0.0; ///< by which the simulation is behind real time for good
+};
+
+/// An X-ray image with what belongs around it.
+struct ShownImage
+{
+  GreyImage image;
+  std::uint64_t number = 0;  ///< goes up with every image
+  double completeness = 0.0; ///< of the background
+  SessionSnapshot moment;    ///< that was exposed; without scene
+};
+
+/**
+ * The devices' input goes to the session tick by tick, in real time; what it says is kept for whoever draws. All
+ * functions are for one thread, that of the window.
+ */
+class SessionEngine
+{
+public:
+  /// @param mux  its Next(), Command(), Heartbeat() are this engine's until it is destroyed; null with replay
+  /// @throws as TrainingSession, RecordingWriter, RecordingReader
+  SessionEngine(const SessionWorld& world, std::shared_ptr<DeviceMux> mux, EngineOptions options);
+  /// Ends the session; a recording that was not finished by Stop() is thrown away.
+  ~SessionEngine();
+  SessionEngine(const SessionEngine&) = delete;
+  SessionEngine& operator=(const SessionEngine&) = delete;
+
+  void Start();
+
+  /// Ends the session and finishes its recording.
+  /// @throws std::runtime_error  the recording could not be written, or the session had failed
+  void Stop();
+
+  /// Simulated time stands still.
+  void SetPaused(bool paused) { this->Paused = paused; }
+  bool IsPaused() const { return this->Paused; }
+  bool IsOver() const { return this->Over; } ///< the replay has ended, or the session failed
+
+  /// Comes before the next tick.
+  void Post(const RecordedEvent& event);
+
+  ///@{
+  /// Of the images; from the next one on.
+  void SetImageMode(ImageMode mode) { this->WantedMode = static_cast<int>(mode); }
+  void TakeMask() { this->MaskWanted = true; }
+  ///@}
+
+  /// @return false: nothing new since the last call
+  bool LatestScene(SessionSnapshot& snapshot);
+  bool LatestImage(ShownImage& image);
+
+  /// What the session said since the last call, a sentence each, with its second.
+  std::vector<std::string> TakeMessages();
+
+  EngineRates Rates() const;
+
+  /// Cine runs, while nothing is exposed. @return false: no such frame
+  bool CineFrame(std::size_t run, std::size_t frame, GreyImage& image, std::size_t& runs,
+    std::size_t& frames) const;
+
+  /// Compared and equal state hashes of a replay.
+  std::pair<std::uint64_t, std::uint64_t> ReplayHashes() const
+  {
+    return { this->HashesCompared, this->HashesEqual };
+  }
+
+private:
+  /// What P hands on to others; the lock is held for a swap.
+  template <typename T>
+  struct Mailbox
+  {
+    std::mutex mutex;
+    T waiting;
+    bool fresh = false;
+  };
+
+  /// What the C-arm looks at while nothing is exposed.
+  struct View
+  {
+    CArmPose pose;
+    double fieldOfView = 0.0;
+  };
+
+  void RunPhysics();
+  void RunImages();
+  bool Tick();
+  void ReadHands(bool ignored);
+  void ApplyEvents();
+  void Say(std::uint64_t tick, const std::string& text);
+  void PublishScene();
+  void PublishExposure();
+  void Fail(const std::string& why);
+  bool Sound() const;
+
+  EngineOptions Options;
+  double TickRate;
+  std::shared_ptr<DeviceMux> Mux;
+  TrainingSession Session;
+  SessionImager Imager;
+  std::unique_ptr<RecordingWriter> Recorder;
+  std::unique_ptr<RecordingReplay> Replay;
+  SessionInput Input;
+  SessionInput Raw;     ///< of the mux
+  SessionInput Ignored; ///< what hands moved while time stood still
+  std::uint64_t MuxTick = 0;
+  std::vector<RecordedEvent> Events;
+  std::uint64_t TickNumber = 0;
+  std::uint64_t TicksPerScene;
+
+  std::thread Physics;
+  std::thread Images;
+  std::atomic<bool> Quit{ false };
+  std::atomic<bool> Paused{ false };
+  std::atomic<bool> Over{ false };
+  std::atomic<int> WantedMode{ 0 };
+  std::atomic<bool> MaskWanted{ false };
+
+  std::mutex EventMutex;
+  std::vector<RecordedEvent> Posted;
+  std::mutex MessageMutex;
+  std::vector<std::string> Messages;
+  std::string Failure;
+
+  SessionSnapshot SceneBuffer;
+  Mailbox<SessionSnapshot> Scene;
+  SessionSnapshot ExposureBuffer;
+  Mailbox<SessionSnapshot> Exposed;
+  std::condition_variable ExposedCondition;
+  TripleBuffer<View> Aim;
+  mutable std::mutex ImagerMutex;
+  ShownImage ImageBuffer;
+  Mailbox<ShownImage> Image;
+  std::uint64_t ImageNumber = 0;
+
+  std::atomic<double> RateOfTicks{ 0.0 };
+  std::atomic<double> Load{ 0.0 };
+  std::atomic<double> RateOfImages{ 0.0 };
+  std::atomic<double> ImageTime{ 0.0 };
+  std::atomic<std::uint64_t> LateImages{ 0 };
+  std::atomic<double> Lost{ 0.0 };
+  std::atomic<std::uint64_t> HashesCompared{ 0 };
+  std::atomic<std::uint64_t> HashesEqual{ 0 };
+};
+}
+
+#endif

@@ -1,0 +1,286 @@
+#include "vtkSimulatorScene.h"
+
+#include "vtkActor.h"
+#include "vtkCamera.h"
+#include "vtkCellArray.h"
+#include "vtkDecimatePro.h"
+#include "vtkIdTypeArray.h"
+#include "vtkLight.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkPolyData.h"
+#include "vtkPolyDataMapper.h"
+#include "vtkPolyDataNormals.h"
+#include "vtkProperty.h"
+#include "vtkRenderer.h"
+#include "vtkTubeFilter.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace coronary
+{
+namespace
+{
+constexpr double RestPhase = 0.75;
+constexpr double WireThickness = 1.4; // of the true radius: to be seen
+
+void SetPoints(vtkPolyData* data, const std::vector<Vector3>& positions)
+{
+  vtkPoints* points = data->GetPoints();
+  const auto count = static_cast<vtkIdType>(positions.size());
+  points->SetNumberOfPoints(count);
+  for (vtkIdType n = 0; n < count; ++n)
+  {
+    points->SetPoint(n, positions[static_cast<std::size_t>(n)].data());
+  }
+  points->Modified();
+  data->Modified();
+}
+
+void SetLine(vtkPolyData* data, const std::vector<Vector3>& positions)
+{
+  const auto count = static_cast<vtkIdType>(positions.size());
+  if (data->GetNumberOfLines() == 0 || data->GetNumberOfPoints() != count)
+  {
+    vtkNew<vtkCellArray> lines;
+    if (count > 1)
+    {
+      lines->InsertNextCell(count);
+      for (vtkIdType n = 0; n < count; ++n)
+      {
+        lines->InsertCellPoint(n);
+      }
+    }
+    data->SetLines(lines);
+  }
+  SetPoints(data, positions);
+}
+
+void UsePoints(vtkPolyData* data)
+{
+  vtkNew<vtkPoints> points;
+  data->SetPoints(points);
+}
+
+void SetTriangles(vtkPolyData* data, const std::vector<Triangle>& triangles)
+{
+  vtkNew<vtkCellArray> cells;
+  for (const Triangle& triangle : triangles)
+  {
+    const vtkIdType ids[3] = { triangle[0], triangle[1], triangle[2] };
+    cells->InsertNextCell(3, ids);
+  }
+  data->SetPolys(cells);
+}
+
+void Draw(vtkRenderer* renderer, vtkActor* actor, vtkPolyDataMapper* mapper)
+{
+  mapper->ScalarVisibilityOff();
+  actor->SetMapper(mapper);
+  renderer->AddActor(actor);
+}
+}
+
+vtkSimulatorScene::vtkSimulatorScene(WallMotion& wall, const Scenario& scenario,
+  std::shared_ptr<const HeartShell> heart, const SceneSettings& settings)
+  : Heart(std::move(heart))
+{
+  this->Renderer_->SetBackground(0.06, 0.07, 0.09);
+  this->Renderer_->SetBackground2(0.16, 0.18, 0.22);
+  this->Renderer_->GradientBackgroundOn();
+  if (this->Heart)
+  {
+    this->MakeHeart();
+  }
+  this->MakeInstruments(scenario);
+  this->MakeTracers();
+  this->MakeWall(wall, settings.triangles);
+  this->LookFromFront();
+}
+
+vtkSimulatorScene::~vtkSimulatorScene() = default;
+
+void vtkSimulatorScene::MakeWall(WallMotion& wall, std::int64_t triangles)
+{
+  std::vector<Vector3> rest;
+  wall.Positions(RestPhase, rest);
+  vtkNew<vtkPolyData> whole;
+  UsePoints(whole);
+  SetPoints(whole, rest);
+  SetTriangles(whole, wall.Topology().triangles);
+  vtkNew<vtkIdTypeArray> origin;
+  origin->SetName("Origin");
+  origin->SetNumberOfValues(static_cast<vtkIdType>(rest.size()));
+  std::iota(origin->Begin(), origin->End(), 0);
+  whole->GetPointData()->AddArray(origin);
+  // It takes points away and moves none, so that those that stay are known at every moment.
+  vtkNew<vtkDecimatePro> fewer;
+  fewer->SetInputData(whole);
+  const double share = static_cast<double>(triangles) /
+    static_cast<double>(std::max<vtkIdType>(1, whole->GetNumberOfPolys()));
+  fewer->SetTargetReduction(std::clamp(1.0 - share, 0.0, 0.999));
+  fewer->PreserveTopologyOn();
+  fewer->SplittingOff();
+  fewer->BoundaryVertexDeletionOff();
+  fewer->Update();
+  this->WallMesh->ShallowCopy(fewer->GetOutput());
+  auto* kept = vtkIdTypeArray::SafeDownCast(this->WallMesh->GetPointData()->GetArray("Origin"));
+  this->Drawn.clear();
+  for (vtkIdType n = 0; n < this->WallMesh->GetNumberOfPoints(); ++n)
+  {
+    this->Drawn.push_back(kept->GetValue(n));
+  }
+  vtkNew<vtkPoints> points;
+  points->DeepCopy(this->WallMesh->GetPoints());
+  this->WallMesh->SetPoints(points);
+  this->WallMesh->GetPointData()->Initialize();
+  vtkNew<vtkPolyDataNormals> normals;
+  normals->SetInputData(this->WallMesh);
+  normals->SplittingOff();
+  normals->ConsistencyOff();
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputConnection(normals->GetOutputPort());
+  Draw(this->Renderer_, this->WallActor, mapper);
+  vtkProperty* look = this->WallActor->GetProperty();
+  look->SetColor(0.86, 0.24, 0.22);
+  look->SetOpacity(0.38);
+  look->SetSpecular(0.3);
+  look->SetSpecularPower(30.0);
+  look->BackfaceCullingOn(); // half of what is translucent, and quicker
+}
+
+void vtkSimulatorScene::MakeHeart()
+{
+  UsePoints(this->HeartMesh);
+  this->Heart->Positions(RestPhase, this->HeartPoints);
+  SetPoints(this->HeartMesh, this->HeartPoints);
+  SetTriangles(this->HeartMesh, this->Heart->Triangles());
+  vtkNew<vtkPolyDataNormals> normals;
+  normals->SetInputData(this->HeartMesh);
+  normals->SplittingOff();
+  normals->ConsistencyOff();
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputConnection(normals->GetOutputPort());
+  Draw(this->Renderer_, this->HeartActor, mapper);
+  vtkProperty* look = this->HeartActor->GetProperty();
+  look->SetColor(0.62, 0.42, 0.38);
+  look->SetAmbient(0.12);
+  look->SetDiffuse(0.75);
+  look->SetSpecular(0.08);
+}
+
+void vtkSimulatorScene::MakeInstruments(const Scenario& scenario)
+{
+  const auto make =
+    [this](vtkPolyData* line, vtkTubeFilter* tube, vtkActor* actor, double radius, int sides)
+  {
+    UsePoints(line);
+    tube->SetInputData(line);
+    tube->SetRadius(radius);
+    tube->SetNumberOfSides(sides);
+    tube->CappingOn();
+    vtkNew<vtkPolyDataMapper> mapper;
+    mapper->SetInputConnection(tube->GetOutputPort());
+    Draw(this->Renderer_, actor, mapper);
+  };
+  const double wire = WireThickness * scenario.wire.sections.front().radius;
+  make(this->WireLine, this->WireTube, this->WireActor, wire, 6);
+  this->WireActor->GetProperty()->SetColor(0.75, 0.95, 1.0);
+  this->WireActor->GetProperty()->SetAmbient(0.5);
+  make(
+    this->CatheterLine, this->CatheterTube, this->CatheterActor, scenario.catheter.outerRadius, 10);
+  this->CatheterActor->GetProperty()->SetColor(0.93, 0.8, 0.3);
+}
+
+void vtkSimulatorScene::MakeTracers()
+{
+  UsePoints(this->TracerPoints);
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputData(this->TracerPoints);
+  Draw(this->Renderer_, this->TracerActor, mapper);
+  vtkProperty* look = this->TracerActor->GetProperty();
+  look->SetColor(1.0, 0.95, 0.55);
+  look->SetPointSize(2.0F);
+  look->LightingOff();
+}
+
+std::int64_t vtkSimulatorScene::NumberOfTriangles() const
+{
+  return this->WallMesh->GetNumberOfPolys() + this->HeartMesh->GetNumberOfPolys();
+}
+
+void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
+{
+  if (snapshot.wall.size() == this->Drawn.size())
+  {
+    SetPoints(this->WallMesh, snapshot.wall);
+  }
+  if (this->Heart && this->HeartActor->GetVisibility() != 0)
+  {
+    this->Heart->Positions(snapshot.report.phase, this->HeartPoints);
+    SetPoints(this->HeartMesh, this->HeartPoints);
+  }
+  SetLine(this->WireLine, snapshot.wire);
+  SetLine(this->CatheterLine, snapshot.catheter);
+  if (this->TracerActor->GetVisibility() != 0)
+  {
+    const auto count = static_cast<vtkIdType>(snapshot.tracers.size());
+    if (this->TracerPoints->GetNumberOfVerts() != 1 ||
+      this->TracerPoints->GetNumberOfPoints() != count)
+    {
+      vtkNew<vtkCellArray> all;
+      if (count > 0)
+      {
+        all->InsertNextCell(count);
+        for (vtkIdType n = 0; n < count; ++n)
+        {
+          all->InsertCellPoint(n);
+        }
+      }
+      this->TracerPoints->SetVerts(all);
+    }
+    SetPoints(this->TracerPoints, snapshot.tracers);
+  }
+}
+
+void vtkSimulatorScene::ShowHeart(bool shown)
+{
+  this->HeartActor->SetVisibility(shown);
+}
+
+void vtkSimulatorScene::ShowTracers(bool shown)
+{
+  this->TracerActor->SetVisibility(shown);
+}
+
+void vtkSimulatorScene::SetWallOpacity(double opacity)
+{
+  this->WallActor->GetProperty()->SetOpacity(std::clamp(opacity, 0.0, 1.0));
+}
+
+void vtkSimulatorScene::LookAsCArm(const CArmPose& pose)
+{
+  const CArmGeometry geometry(pose, {});
+  vtkCamera* camera = this->Renderer_->GetActiveCamera();
+  // The image is as if seen from the detector: towards the source, the patient's left on the right.
+  const Vector3 from = geometry.DetectorCentre();
+  const Vector3 up = -geometry.RowDirection();
+  camera->SetFocalPoint(pose.isocentre.data());
+  camera->SetPosition(from.data());
+  camera->SetViewUp(up.data());
+  this->Renderer_->ResetCamera();
+  camera->Zoom(1.35);
+  this->Renderer_->ResetCameraClippingRange();
+}
+
+void vtkSimulatorScene::LookFromFront()
+{
+  CArmPose front;
+  std::array<double, 6> box{};
+  this->WallMesh->GetPoints()->GetBounds(box.data());
+  front.isocentre = { 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]), 0.5 * (box[4] + box[5]) };
+  front.primary = 0.5;
+  this->LookAsCArm(front);
+}
+}

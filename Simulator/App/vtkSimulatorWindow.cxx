@@ -1,0 +1,1162 @@
+#include "vtkSimulatorWindow.h"
+
+#include "FluoroscopyWidget.h"
+#include "HeartShell.h"
+#include "InstrumentCatalogue.h"
+#include "Interruption.h"
+#include "KeyboardDevice.h"
+#include "PanelDevice.h"
+#include "TraceWidget.h"
+#include "vtkEvaluationPictures.h"
+#include "vtkSimulatorScene.h"
+#include "vtkVideoFile.h"
+
+#include "QVTKOpenGLNativeWidget.h"
+#include "vtkGenericOpenGLRenderWindow.h"
+#include "vtkNew.h"
+#include "vtkRenderer.h"
+
+#include <QApplication>
+#include <QCheckBox>
+#include <QCloseEvent>
+#include <QComboBox>
+#include <QDateTime>
+#include <QDir>
+#include <QDockWidget>
+#include <QDoubleSpinBox>
+#include <QElapsedTimer>
+#include <QFileDialog>
+#include <QFormLayout>
+#include <QGridLayout>
+#include <QGroupBox>
+#include <QKeyEvent>
+#include <QLabel>
+#include <QMainWindow>
+#include <QMessageBox>
+#include <QOffscreenSurface>
+#include <QOpenGLContext>
+#include <QPlainTextEdit>
+#include <QPushButton>
+#include <QScrollArea>
+#include <QSlider>
+#include <QSplitter>
+#include <QStatusBar>
+#include <QSurfaceFormat>
+#include <QTimer>
+#include <QToolBar>
+#include <QVBoxLayout>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Degree = 3.14159265358979323846 / 180.0;
+constexpr double WheelAdvance = 2.0;        // mm a notch
+constexpr double WheelTurn = 15.0 * Degree; // a notch
+constexpr double DragTurn = 0.3 * Degree;   // of the C-arm, a pixel
+constexpr int PollInterval = 15;            // ms
+constexpr double VideoRate = 15.0;          // Hz
+
+struct StandardView
+{
+  const char* name;
+  double primary; // degrees
+  double secondary;
+};
+
+/// Views that coronary angiography is taught with.
+constexpr StandardView StandardViews[] = { { "AP", 0.0, 0.0 }, { "RAO 30", -30.0, 0.0 },
+  { "RAO 30 CRA 25", -30.0, 25.0 }, { "RAO 20 CAU 20", -20.0, -20.0 }, { "AP CRA 35", 0.0, 35.0 },
+  { "AP CAU 30", 0.0, -30.0 }, { "LAO 40", 40.0, 0.0 }, { "LAO 40 CRA 25", 40.0, 25.0 },
+  { "LAO 45 CAU 25 (spider)", 45.0, -25.0 }, { "LAO 90", 90.0, 0.0 } };
+
+QDoubleSpinBox* Number(
+  double low, double high, double step, int decimals, const QString& unit, const QString& help)
+{
+  auto* box = new QDoubleSpinBox;
+  box->setRange(low, high);
+  box->setSingleStep(step);
+  box->setDecimals(decimals);
+  box->setSuffix(unit.isEmpty() ? unit : " " + unit);
+  box->setToolTip(help);
+  box->setKeyboardTracking(false);
+  box->setFocusPolicy(Qt::ClickFocus);
+  return box;
+}
+
+QPushButton* Button(const QString& text, const QString& help)
+{
+  auto* button = new QPushButton(text);
+  button->setToolTip(help);
+  button->setFocusPolicy(Qt::NoFocus);
+  return button;
+}
+
+/// X11's name of a key, as the key map has it.
+std::string KeyName(const QKeyEvent& event)
+{
+  switch (event.key())
+  {
+    case Qt::Key_Up:
+      return "Up";
+    case Qt::Key_Down:
+      return "Down";
+    case Qt::Key_Left:
+      return "Left";
+    case Qt::Key_Right:
+      return "Right";
+    case Qt::Key_Space:
+      return "space";
+    case Qt::Key_Shift:
+      return "Shift_L";
+    case Qt::Key_Control:
+      return "Control_L";
+    case Qt::Key_PageUp:
+      return "Prior";
+    case Qt::Key_PageDown:
+      return "Next";
+    case Qt::Key_Home:
+      return "Home";
+    case Qt::Key_End:
+      return "End";
+    case Qt::Key_Return:
+      return "Return";
+    case Qt::Key_Plus:
+      return "plus";
+    case Qt::Key_Minus:
+      return "minus";
+    case Qt::Key_Comma:
+      return "comma";
+    case Qt::Key_Period:
+      return "period";
+    default:
+      break;
+  }
+  if (event.key() >= Qt::Key_A && event.key() <= Qt::Key_Z)
+  {
+    return { static_cast<char>('a' + event.key() - Qt::Key_A) };
+  }
+  if (event.key() >= Qt::Key_0 && event.key() <= Qt::Key_9)
+  {
+    return { static_cast<char>('0' + event.key() - Qt::Key_0) };
+  }
+  return {};
+}
+
+class Window : public QMainWindow
+{
+public:
+  Window(const SessionWorld& world, const WindowOptions& options);
+  ~Window() override;
+
+  /// @throws as SessionEngine, OpenDevice
+  void Begin(const std::string& record, const std::string& replay);
+
+  bool Failed() const { return this->HasFailed; }
+
+protected:
+  void keyPressEvent(QKeyEvent* event) override;
+  void keyReleaseEvent(QKeyEvent* event) override;
+  void closeEvent(QCloseEvent* event) override;
+  void changeEvent(QEvent* event) override;
+
+private:
+  QWidget* MakePanel();
+  QGroupBox* MakeInstrumentGroup();
+  QGroupBox* MakeViewGroup();
+  QGroupBox* MakeXRayGroup();
+  QGroupBox* MakeContrastGroup();
+  QGroupBox* MakeHeartGroup();
+  QGroupBox* MakeAnatomyGroup();
+  QGroupBox* MakeMetricsGroup();
+  void MakeToolBar();
+  void ConnectMouse();
+
+  void Poll();
+  void ShowScene();
+  void ShowImage();
+  void ShowNumbers(const SessionSnapshot& now);
+  void ShowDevices();
+  void ShowRates();
+  void ShowCine();
+  void TakeDueScreenshots();
+  void RecordVideo();
+
+  void PlaceView();
+  void Restart(const std::string& record, const std::string& replay);
+  void End();
+  void Problem(const QString& text);
+  void SaveScreenshot(const QString& path);
+  void ToggleVideo(bool on);
+
+  SessionWorld World;
+  WindowOptions Options;
+  std::vector<std::shared_ptr<Device>> Hardware;
+  std::shared_ptr<KeyboardDevice> Keys;
+  std::shared_ptr<PanelDevice> Panel;
+  std::shared_ptr<DeviceMux> Mux;
+  std::unique_ptr<SessionEngine> Engine;
+  std::unique_ptr<vtkSimulatorScene> Scene;
+  std::unique_ptr<vtkVideoFile> Video;
+  SessionSnapshot Now;
+  ShownImage Shown;
+  ImageMode Mode = ImageMode::Plain;
+  std::size_t NextScreenshot = 0;
+  bool HasFailed = false;
+  bool Replaying = false;
+  bool ViewIsOurs = false; ///< the panel's values are being set to what devices made of the view
+  double Primary = 0.0;    ///< that the panel asked for, radians
+  double Secondary = 0.0;
+  int DrawnFrames = 0;
+  double SceneFrameRate = 0.0;
+  QElapsedTimer Second;
+  QElapsedTimer VideoClock;
+  QTimer Timer;
+
+  FluoroscopyWidget* Monitor = nullptr;
+  QVTKOpenGLNativeWidget* Anatomy = nullptr;
+  vtkNew<vtkGenericOpenGLRenderWindow> AnatomyWindow;
+  TraceWidget* Traces = nullptr;
+  QComboBox* WireChoice = nullptr;
+  QComboBox* CatheterChoice = nullptr;
+  QLabel* InstrumentText = nullptr;
+  QComboBox* ViewChoice = nullptr;
+  QDoubleSpinBox* PrimaryBox = nullptr;
+  QDoubleSpinBox* SecondaryBox = nullptr;
+  QDoubleSpinBox* DistanceBox = nullptr;
+  QDoubleSpinBox* TableBoxes[3] = { nullptr, nullptr, nullptr };
+  QComboBox* FieldChoice = nullptr;
+  QComboBox* RateChoice = nullptr;
+  QComboBox* ModeChoice = nullptr;
+  QSlider* RunSlider = nullptr;
+  QSlider* FrameSlider = nullptr;
+  QDoubleSpinBox* InjectionBox = nullptr;
+  QLabel* ContrastText = nullptr;
+  QSlider* HeartSlider = nullptr;
+  QLabel* HeartText = nullptr;
+  QCheckBox* HeartPause = nullptr;
+  QLabel* MetricsText = nullptr;
+  QPlainTextEdit* Log = nullptr;
+  QLabel* DeviceText = nullptr;
+  QPushButton* ForceButton = nullptr;
+  QAction* PauseAction = nullptr;
+  QAction* VideoAction = nullptr;
+};
+
+Window::Window(const SessionWorld& world, const WindowOptions& options)
+  : World(world)
+  , Options(options)
+{
+  this->setWindowTitle(
+    "DynamicCoronary simulator - " + QString::fromStdString(world.scenario.name));
+  this->resize(options.width, options.height);
+  std::shared_ptr<const HeartShell> heart;
+  if (options.heart)
+  {
+    heart = world.scenario.vessels.kind == VesselSource::Kind::Phantom &&
+        world.scenario.vessels.motion == VesselMotion::Automatic
+      ? std::make_shared<HeartShell>(world.scenario.vessels.phantom)
+      : std::make_shared<HeartShell>(*world.wall);
+  }
+  this->Scene = std::make_unique<vtkSimulatorScene>(
+    *world.wall, world.scenario, heart, SceneSettings{ options.triangles });
+  for (const std::string& uri : options.devices)
+  {
+    this->Hardware.push_back(OpenDevice(uri));
+  }
+
+  this->Monitor = new FluoroscopyWidget;
+  this->Anatomy = new QVTKOpenGLNativeWidget;
+  this->Anatomy->setRenderWindow(this->AnatomyWindow);
+  this->Anatomy->setMinimumSize(256, 256);
+  this->AnatomyWindow->SetMultiSamples(0);
+  this->AnatomyWindow->AddRenderer(this->Scene->Renderer());
+  auto* views = new QSplitter(Qt::Horizontal);
+  views->addWidget(this->Monitor);
+  views->addWidget(this->Anatomy);
+  views->setSizes({ 1000, 1000 });
+  views->setChildrenCollapsible(false);
+  this->Traces = new TraceWidget;
+  auto* centre = new QWidget;
+  auto* column = new QVBoxLayout(centre);
+  column->setContentsMargins(0, 0, 0, 0);
+  column->setSpacing(2);
+  column->addWidget(views, 1);
+  column->addWidget(this->Traces);
+  this->setCentralWidget(centre);
+
+  auto* dock = new QDockWidget("Panel");
+  dock->setFeatures(QDockWidget::DockWidgetMovable | QDockWidget::DockWidgetFloatable);
+  dock->setWidget(this->MakePanel());
+  this->addDockWidget(Qt::RightDockWidgetArea, dock);
+  this->MakeToolBar();
+  this->DeviceText = new QLabel;
+  this->statusBar()->addPermanentWidget(this->DeviceText);
+  this->ConnectMouse();
+  QObject::connect(&this->Timer, &QTimer::timeout, [this] { this->Poll(); });
+  this->setFocusPolicy(Qt::StrongFocus);
+}
+
+Window::~Window()
+{
+  // The scene's renderer goes before the window that draws it.
+  this->AnatomyWindow->RemoveRenderer(this->Scene->Renderer());
+}
+
+QWidget* Window::MakePanel()
+{
+  auto* inside = new QWidget;
+  auto* column = new QVBoxLayout(inside);
+  column->setContentsMargins(6, 6, 6, 6);
+  column->addWidget(this->MakeInstrumentGroup());
+  column->addWidget(this->MakeViewGroup());
+  column->addWidget(this->MakeXRayGroup());
+  column->addWidget(this->MakeContrastGroup());
+  column->addWidget(this->MakeHeartGroup());
+  column->addWidget(this->MakeAnatomyGroup());
+  column->addWidget(this->MakeMetricsGroup());
+  this->Log = new QPlainTextEdit;
+  this->Log->setReadOnly(true);
+  this->Log->setMaximumBlockCount(500);
+  this->Log->setMinimumHeight(60);
+  this->Log->setFocusPolicy(Qt::ClickFocus);
+  column->addWidget(this->Log, 1);
+  auto* scroll = new QScrollArea;
+  scroll->setWidget(inside);
+  scroll->setWidgetResizable(true);
+  scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  scroll->setMinimumWidth(300);
+  return scroll;
+}
+
+QGroupBox* Window::MakeInstrumentGroup()
+{
+  auto* group = new QGroupBox("Instruments");
+  auto* form = new QFormLayout(group);
+  this->WireChoice = new QComboBox;
+  this->CatheterChoice = new QComboBox;
+  for (const CatalogueWire& one : BuiltInCatalogue().wires)
+  {
+    this->WireChoice->addItem(QString::fromStdString(one.wire.name));
+  }
+  for (const CatalogueCatheter& one : BuiltInCatalogue().catheters)
+  {
+    this->CatheterChoice->addItem(QString::fromStdString(one.catheter.name));
+  }
+  const auto choose = [](QComboBox* box, const std::string& name)
+  {
+    const QString text = QString::fromStdString(name);
+    if (box->findText(text) < 0)
+    {
+      box->addItem(text); // the scenario's own
+    }
+    box->setCurrentText(text);
+    box->setFocusPolicy(Qt::NoFocus);
+    box->setToolTip("Taken at the next new session");
+  };
+  choose(this->WireChoice, this->World.scenario.wire.name);
+  choose(this->CatheterChoice, this->World.scenario.catheter.name);
+  this->InstrumentText = new QLabel;
+  this->InstrumentText->setTextFormat(Qt::PlainText);
+  form->addRow("Wire", this->WireChoice);
+  form->addRow("Catheter", this->CatheterChoice);
+  form->addRow(this->InstrumentText);
+  return group;
+}
+
+QGroupBox* Window::MakeViewGroup()
+{
+  auto* group = new QGroupBox("C-arm and table");
+  auto* form = new QFormLayout(group);
+  this->ViewChoice = new QComboBox;
+  this->ViewChoice->addItem("Standard view ...");
+  for (const StandardView& view : StandardViews)
+  {
+    this->ViewChoice->addItem(view.name);
+  }
+  this->ViewChoice->setFocusPolicy(Qt::NoFocus);
+  this->PrimaryBox = Number(-105.0, 105.0, 5.0, 0, QChar(0x00B0), "LAO positive, RAO negative");
+  this->SecondaryBox =
+    Number(-50.0, 50.0, 5.0, 0, QChar(0x00B0), "Cranial positive, caudal negative");
+  this->DistanceBox = Number(850.0, 1300.0, 10.0, 0, "mm", "Source to detector");
+  form->addRow(this->ViewChoice);
+  form->addRow("LAO / RAO", this->PrimaryBox);
+  form->addRow("CRA / CAU", this->SecondaryBox);
+  form->addRow("SID", this->DistanceBox);
+  auto* table = new QHBoxLayout;
+  const char* const help[] = { "Towards the patient's left", "Backwards", "Towards the head" };
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    this->TableBoxes[axis] = Number(-300.0, 300.0, 5.0, 0, "", help[axis]);
+    table->addWidget(this->TableBoxes[axis]);
+  }
+  form->addRow("Table (mm)", table);
+  const auto place = [this](double) { this->PlaceView(); };
+  for (QDoubleSpinBox* box : { this->PrimaryBox, this->SecondaryBox, this->DistanceBox,
+         this->TableBoxes[0], this->TableBoxes[1], this->TableBoxes[2] })
+  {
+    QObject::connect(box, QOverload<double>::of(&QDoubleSpinBox::valueChanged), place);
+  }
+  QObject::connect(this->ViewChoice, QOverload<int>::of(&QComboBox::activated),
+    [this](int index)
+    {
+      if (index > 0)
+      {
+        const StandardView& view = StandardViews[index - 1];
+        this->PrimaryBox->setValue(view.primary);
+        this->SecondaryBox->setValue(view.secondary);
+        this->ViewChoice->setCurrentIndex(0);
+      }
+    });
+  return group;
+}
+
+QGroupBox* Window::MakeXRayGroup()
+{
+  auto* group = new QGroupBox("X-ray");
+  auto* form = new QFormLayout(group);
+  auto* row = new QHBoxLayout;
+  auto* fluoroscopy = Button("Fluoroscopy", "Radiation while it is held; key: see Help");
+  auto* cine = Button("Cine", "A run that is stored, while it is held");
+  auto* mask = Button("Mask", "The next frame becomes the mask of subtraction and roadmap");
+  row->addWidget(fluoroscopy);
+  row->addWidget(cine);
+  row->addWidget(mask);
+  form->addRow(row);
+  auto* hold = new QCheckBox("Hold the pedal down");
+  hold->setFocusPolicy(Qt::NoFocus);
+  form->addRow(hold);
+  const auto pedal = [this](QPushButton* button, std::uint32_t bit)
+  {
+    QObject::connect(
+      button, &QPushButton::pressed, [this, bit] { this->Panel->SetPedal(bit, true); });
+    QObject::connect(
+      button, &QPushButton::released, [this, bit] { this->Panel->SetPedal(bit, false); });
+  };
+  pedal(fluoroscopy, FluoroscopyPedal);
+  pedal(cine, CinePedal);
+  pedal(mask, MaskPedal);
+  QObject::connect(
+    hold, &QCheckBox::toggled, [this](bool on) { this->Panel->SetPedal(FluoroscopyPedal, on); });
+  this->RateChoice = new QComboBox;
+  this->RateChoice->addItem("7.5 frames/s", 7.5);
+  this->RateChoice->addItem("15 frames/s", 15.0);
+  this->RateChoice->addItem("30 frames/s", 30.0);
+  this->RateChoice->setCurrentIndex(
+    this->RateChoice->findData(this->World.scenario.imaging.frameRate));
+  this->ModeChoice = new QComboBox;
+  this->ModeChoice->addItems({ "Plain", "Subtraction (DSA)", "Roadmap" });
+  this->FieldChoice = new QComboBox;
+  for (const double field : { 130.0, 170.0, 200.0, 250.0, 300.0 })
+  {
+    this->FieldChoice->addItem(QString("%1 mm").arg(field), field);
+  }
+  this->FieldChoice->setCurrentIndex(
+    std::max(0, this->FieldChoice->findData(this->World.scenario.imaging.fieldOfView)));
+  for (QComboBox* box : { this->RateChoice, this->ModeChoice, this->FieldChoice })
+  {
+    box->setFocusPolicy(Qt::NoFocus);
+  }
+  form->addRow("Rate", this->RateChoice);
+  form->addRow("Image", this->ModeChoice);
+  form->addRow("Field", this->FieldChoice);
+  QObject::connect(this->RateChoice, QOverload<int>::of(&QComboBox::activated),
+    [this](int) {
+      this->Engine->Post({ RecordedEvent::FrameRate, this->RateChoice->currentData().toDouble() });
+    });
+  QObject::connect(this->FieldChoice, QOverload<int>::of(&QComboBox::activated),
+    [this](int)
+    {
+      this->Engine->Post(
+        { RecordedEvent::FieldOfView, this->FieldChoice->currentData().toDouble() });
+    });
+  QObject::connect(this->ModeChoice, QOverload<int>::of(&QComboBox::activated),
+    [this](int index)
+    {
+      this->Mode = static_cast<ImageMode>(index);
+      this->Engine->SetImageMode(this->Mode);
+    });
+  this->RunSlider = new QSlider(Qt::Horizontal);
+  this->FrameSlider = new QSlider(Qt::Horizontal);
+  for (QSlider* slider : { this->RunSlider, this->FrameSlider })
+  {
+    slider->setEnabled(false);
+    slider->setFocusPolicy(Qt::NoFocus);
+    QObject::connect(slider, &QSlider::sliderMoved, [this](int) { this->ShowCine(); });
+  }
+  this->RunSlider->setToolTip("Stored cine runs");
+  this->FrameSlider->setToolTip("Frames of the run");
+  form->addRow("Cine run", this->RunSlider);
+  form->addRow("Frame", this->FrameSlider);
+  return group;
+}
+
+QGroupBox* Window::MakeContrastGroup()
+{
+  auto* group = new QGroupBox("Contrast medium");
+  auto* form = new QFormLayout(group);
+  auto* inject = Button("Inject", "Pushes the syringe while it is held; key: see Help");
+  this->InjectionBox = Number(0.5, 10.0, 0.5, 1, "mL/s", "How fast the button pushes");
+  this->InjectionBox->setValue(3.0);
+  auto* row = new QHBoxLayout;
+  row->addWidget(inject);
+  row->addWidget(this->InjectionBox);
+  form->addRow(row);
+  this->ContrastText = new QLabel;
+  form->addRow(this->ContrastText);
+  QObject::connect(inject, &QPushButton::pressed,
+    [this] { this->Panel->SetInjection(this->InjectionBox->value()); });
+  QObject::connect(inject, &QPushButton::released, [this] { this->Panel->SetInjection(0.0); });
+  return group;
+}
+
+QGroupBox* Window::MakeHeartGroup()
+{
+  auto* group = new QGroupBox("Heart");
+  auto* form = new QFormLayout(group);
+  this->HeartSlider = new QSlider(Qt::Horizontal);
+  this->HeartSlider->setRange(40, 140);
+  this->HeartSlider->setFocusPolicy(Qt::NoFocus);
+  this->HeartSlider->setValue(static_cast<int>(this->World.scenario.settings.heartRate));
+  this->HeartText = new QLabel;
+  this->HeartPause = new QCheckBox("Standing still");
+  this->HeartPause->setFocusPolicy(Qt::NoFocus);
+  form->addRow(this->HeartText, this->HeartSlider);
+  form->addRow(this->HeartPause);
+  const auto set = [this]
+  {
+    const int rate = this->HeartPause->isChecked() ? 0 : this->HeartSlider->value();
+    this->HeartText->setText(QString("%1 /min").arg(this->HeartSlider->value()));
+    if (this->Engine)
+    {
+      this->Engine->Post({ RecordedEvent::HeartRate, static_cast<double>(rate) });
+    }
+  };
+  set();
+  QObject::connect(this->HeartSlider, &QSlider::valueChanged, [set](int) { set(); });
+  QObject::connect(this->HeartPause, &QCheckBox::toggled, [set](bool) { set(); });
+  return group;
+}
+
+QGroupBox* Window::MakeAnatomyGroup()
+{
+  auto* group = new QGroupBox("Anatomy");
+  auto* grid = new QGridLayout(group);
+  auto* heart = new QCheckBox("Heart");
+  auto* medium = new QCheckBox("Contrast");
+  auto* opacity = new QSlider(Qt::Horizontal);
+  opacity->setRange(0, 100);
+  opacity->setValue(38);
+  opacity->setToolTip("Opacity of the arteries");
+  auto* asCArm = Button("As the C-arm", "Looks at the anatomy from the detector");
+  auto* front = Button("Front", "Looks at all of it from the front");
+  for (QCheckBox* box : { heart, medium })
+  {
+    box->setChecked(true);
+    box->setFocusPolicy(Qt::NoFocus);
+  }
+  heart->setChecked(this->Options.heart);
+  heart->setEnabled(this->Options.heart);
+  opacity->setFocusPolicy(Qt::NoFocus);
+  grid->addWidget(heart, 0, 0);
+  grid->addWidget(medium, 0, 1);
+  grid->addWidget(opacity, 1, 0, 1, 2);
+  grid->addWidget(asCArm, 2, 0);
+  grid->addWidget(front, 2, 1);
+  QObject::connect(heart, &QCheckBox::toggled, [this](bool on) { this->Scene->ShowHeart(on); });
+  QObject::connect(medium, &QCheckBox::toggled, [this](bool on) { this->Scene->ShowTracers(on); });
+  QObject::connect(opacity, &QSlider::valueChanged,
+    [this](int value) { this->Scene->SetWallOpacity(0.01 * value); });
+  QObject::connect(
+    asCArm, &QPushButton::clicked, [this] { this->Scene->LookAsCArm(this->Now.pose); });
+  QObject::connect(front, &QPushButton::clicked, [this] { this->Scene->LookFromFront(); });
+  return group;
+}
+
+QGroupBox* Window::MakeMetricsGroup()
+{
+  auto* group = new QGroupBox("Procedure");
+  auto* column = new QVBoxLayout(group);
+  this->MetricsText = new QLabel;
+  this->MetricsText->setTextFormat(Qt::PlainText);
+  this->MetricsText->setWordWrap(true);
+  this->ForceButton = Button("Confirm forces", "Hands are on the device and ready to feel forces");
+  this->ForceButton->hide();
+  QObject::connect(this->ForceButton, &QPushButton::clicked,
+    [this]
+    {
+      for (const std::shared_ptr<Device>& device : this->Hardware)
+      {
+        device->ConfirmForces();
+      }
+    });
+  column->addWidget(this->MetricsText);
+  column->addWidget(this->ForceButton);
+  return group;
+}
+
+void Window::MakeToolBar()
+{
+  QToolBar* bar = this->addToolBar("Session");
+  bar->setMovable(false);
+  const auto add = [&](const QString& text, const QString& help, auto action)
+  {
+    QAction* one = bar->addAction(text);
+    one->setToolTip(help);
+    QObject::connect(one, &QAction::triggered, action);
+    return one;
+  };
+  add("New session", "From the beginning, with the chosen instruments",
+    [this](bool) { this->Restart({}, {}); });
+  add("Record ...", "A new session that is recorded",
+    [this](bool)
+    {
+      const QString path = QFileDialog::getSaveFileName(
+        this, "Record a new session", "session.pcirec", "Recordings (*.pcirec)");
+      if (!path.isEmpty())
+      {
+        this->Restart(path.toStdString(), {});
+      }
+    });
+  add("Replay ...", "Goes through a recording",
+    [this](bool)
+    {
+      const QString path =
+        QFileDialog::getOpenFileName(this, "Replay", {}, "Recordings (*.pcirec)");
+      if (!path.isEmpty())
+      {
+        this->Restart({}, path.toStdString());
+      }
+    });
+  add("Stop", "Ends the session and finishes its recording", [this](bool) { this->End(); });
+  this->PauseAction = add("Pause", "Time stands still",
+    [this](bool on)
+    {
+      if (this->Engine)
+      {
+        this->Engine->SetPaused(on);
+      }
+    });
+  this->PauseAction->setCheckable(true);
+  bar->addSeparator();
+  add("Screenshot", "Saves a picture of the window in the current folder",
+    [this](bool)
+    {
+      this->SaveScreenshot(
+        "simulator-" + QDateTime::currentDateTime().toString("yyyyMMdd-HHmmss-zzz") + ".png");
+    });
+  this->VideoAction =
+    add("Video", "Films the window into a file", [this](bool on) { this->ToggleVideo(on); });
+  this->VideoAction->setCheckable(true);
+  bar->addSeparator();
+  add("Help", "Keys and mouse",
+    [this](bool)
+    {
+      QString text = "<table>";
+      for (const KeyBinding& binding : KeyboardDevice::KeyMap())
+      {
+        text +=
+          QString("<tr><td><b>%1</b>&nbsp;&nbsp;</td><td>%2</td></tr>")
+            .arg(QString(binding.key).toHtmlEscaped(), QString(binding.meaning).toHtmlEscaped());
+      }
+      text += "</table><p>Wheel on the X-ray image: the wire forth and back; with Shift it turns; "
+              "with Control the catheter. Right button drags the C-arm.</p>";
+      QMessageBox::information(this, "Keys and mouse", text);
+    });
+}
+
+void Window::ConnectMouse()
+{
+  this->Monitor->wheelTurned = [this](double steps, Qt::KeyboardModifiers modifiers)
+  {
+    if ((modifiers & Qt::ShiftModifier) != 0)
+    {
+      this->Panel->TurnWire(steps * WheelTurn);
+    }
+    else if ((modifiers & Qt::ControlModifier) != 0)
+    {
+      this->Panel->AdvanceCatheter(0.5 * steps);
+    }
+    else
+    {
+      this->Panel->AdvanceWire(steps * WheelAdvance);
+    }
+  };
+  this->Monitor->dragged = [this](QPoint moved)
+  {
+    this->Primary =
+      std::clamp(this->Primary + moved.x() * DragTurn, -105.0 * Degree, 105.0 * Degree);
+    this->Secondary =
+      std::clamp(this->Secondary + moved.y() * DragTurn, -50.0 * Degree, 50.0 * Degree);
+    this->PrimaryBox->setValue(this->Primary / Degree);
+    this->SecondaryBox->setValue(this->Secondary / Degree);
+  };
+}
+
+void Window::PlaceView()
+{
+  if (this->ViewIsOurs || !this->Mux)
+  {
+    return;
+  }
+  ViewPlace view;
+  view.primary = this->PrimaryBox->value() * Degree;
+  view.secondary = this->SecondaryBox->value() * Degree;
+  view.sourceToDetector = this->DistanceBox->value();
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    view.table[axis] = this->TableBoxes[axis]->value();
+  }
+  this->Mux->PlaceView(view);
+}
+
+void Window::Begin(const std::string& record, const std::string& replay)
+{
+  Scenario& scenario = this->World.scenario;
+  if (replay.empty())
+  {
+    const auto wire = this->WireChoice->currentText().toStdString();
+    const auto catheter = this->CatheterChoice->currentText().toStdString();
+    if (wire != scenario.wire.name)
+    {
+      scenario.wire = BuiltInCatalogue().Wire(wire).wire;
+    }
+    if (catheter != scenario.catheter.name)
+    {
+      scenario.catheter = BuiltInCatalogue().Catheter(catheter).catheter;
+    }
+  }
+  this->Engine.reset();
+  this->Keys = std::make_shared<KeyboardDevice>();
+  this->Panel = std::make_shared<PanelDevice>();
+  this->Mux = std::make_shared<DeviceMux>();
+  if (!this->Options.script.empty())
+  {
+    this->Mux->Add(OpenDevice("script:" + this->Options.script));
+  }
+  for (const std::shared_ptr<Device>& device : this->Hardware)
+  {
+    this->Mux->Add(device);
+  }
+  this->Mux->Add(this->Panel);
+  this->Mux->Add(this->Keys);
+  const CArmPose& pose = scenario.imaging.pose;
+  this->Mux->Start({ pose.primary, pose.secondary, pose.sourceToDetector, Vector3::Zero() });
+  EngineOptions options;
+  options.record = record;
+  options.replay = replay;
+  options.wallPoints = this->Scene->WallPoints();
+  this->Engine =
+    std::make_unique<SessionEngine>(this->World, replay.empty() ? this->Mux : nullptr, options);
+  this->Replaying = !replay.empty();
+  this->Engine->SetImageMode(this->Mode);
+  this->Traces->Clear();
+  this->PauseAction->setChecked(false);
+  this->Engine->Start();
+  this->Second.start();
+  this->Timer.start(PollInterval);
+}
+
+void Window::Restart(const std::string& record, const std::string& replay)
+{
+  this->End();
+  try
+  {
+    this->Begin(record, replay);
+  }
+  catch (const std::exception& error)
+  {
+    this->Problem(error.what());
+  }
+}
+
+void Window::End()
+{
+  this->ToggleVideo(false);
+  if (!this->Engine)
+  {
+    return;
+  }
+  try
+  {
+    this->Engine->Stop();
+    if (this->Replaying)
+    {
+      const auto [compared, equal] = this->Engine->ReplayHashes();
+      this->Log->appendPlainText(
+        QString("%1 of %2 state hashes of the recording are equal.").arg(equal).arg(compared));
+    }
+  }
+  catch (const std::exception& error)
+  {
+    this->Problem(error.what());
+  }
+  this->Engine.reset();
+  this->Timer.stop();
+}
+
+void Window::Problem(const QString& text)
+{
+  this->HasFailed = true;
+  std::fprintf(stderr, "coronary-simulator: %s\n", text.toUtf8().constData());
+  this->Log->appendPlainText(text);
+  this->Monitor->SetBanner(text);
+}
+
+void Window::Poll()
+{
+  if (Interruption() != 0)
+  {
+    this->close();
+    return;
+  }
+  if (!this->Engine)
+  {
+    return;
+  }
+  this->ShowImage();
+  this->ShowScene();
+  for (const std::string& message : this->Engine->TakeMessages())
+  {
+    this->Log->appendPlainText(QString::fromStdString(message));
+  }
+  this->ShowRates();
+  this->TakeDueScreenshots();
+  this->RecordVideo();
+  const bool timeIsUp =
+    this->Options.quitAfter > 0.0 && this->Now.seconds >= this->Options.quitAfter;
+  if (this->Engine->IsOver() || timeIsUp)
+  {
+    this->End();
+    if (this->Options.quitAfter > 0.0)
+    {
+      this->close();
+    }
+  }
+}
+
+void Window::ShowScene()
+{
+  if (!this->Engine->LatestScene(this->Now))
+  {
+    return;
+  }
+  this->Scene->Update(this->Now);
+  this->AnatomyWindow->Render();
+  ++this->DrawnFrames;
+  this->Traces->Add(this->Now);
+  this->ShowNumbers(this->Now);
+  this->ShowDevices();
+  this->Monitor->SetState(this->Now, this->Shown.completeness, this->Mode);
+}
+
+void Window::ShowImage()
+{
+  if (!this->Engine->LatestImage(this->Shown))
+  {
+    return;
+  }
+  this->Monitor->SetRunText({});
+  this->Monitor->SetImage(this->Shown.image);
+}
+
+void Window::ShowNumbers(const SessionSnapshot& now)
+{
+  const TickReport& report = now.report;
+  const auto& names = this->World.wall->Topology().groupName;
+  const auto nameOf = [&](int branch)
+  {
+    const auto n = static_cast<std::size_t>(branch);
+    return branch < 0                         ? QString("catheter")
+      : n < names.size() && !names[n].empty() ? QString::fromStdString(names[n])
+                                              : QString::number(branch);
+  };
+  this->InstrumentText->setText(
+    QString("Beyond the catheter  %1 mm, in %2\nCatheter beyond ostium  %3 mm\n"
+            "Hand  %4 N, %5 N mm    Tip  %6 N")
+      .arg(report.inserted, 0, 'f', 1)
+      .arg(nameOf(report.branch))
+      .arg(report.catheterTip, 0, 'f', 1)
+      .arg(report.proximalForce, 0, 'f', 2)
+      .arg(report.proximalTorque, 0, 'f', 2)
+      .arg(report.tipForce, 0, 'f', 2));
+  this->ContrastText->setText(
+    QString("%1 mL injected, %2 mL in the arteries,\n%3 mL in the myocardium, %4 mL spilled")
+      .arg(now.contrast.injected, 0, 'f', 1)
+      .arg(now.contrast.inTree, 0, 'f', 2)
+      .arg(now.contrast.blush, 0, 'f', 2)
+      .arg(now.contrast.spilled, 0, 'f', 2));
+  const SessionMetrics& metrics = now.metrics;
+  QString branches;
+  for (const int branch : metrics.branches)
+  {
+    branches += (branches.isEmpty() ? "" : ", ") + nameOf(branch);
+  }
+  this->MetricsText->setText(
+    QString("Time  %1 s    Fluoroscopy  %2 s (cine %3 s)\nDose  %4 mGy, %5 Gy cm%6, %7 frames\n"
+            "Contrast  %8 mL    Greatest wall force  %9 N\n")
+      .arg(metrics.procedureSeconds, 0, 'f', 0)
+      .arg(metrics.fluoroscopySeconds, 0, 'f', 1)
+      .arg(metrics.cineSeconds, 0, 'f', 1)
+      .arg(metrics.airKerma, 0, 'f', 1)
+      .arg(metrics.doseAreaProduct, 0, 'f', 2)
+      .arg(QChar(0x00B2))
+      .arg(metrics.frames)
+      .arg(metrics.contrast, 0, 'f', 1)
+      .arg(metrics.greatestWallForce, 0, 'f', 2) +
+    QString("Wire moved  %1 mm, turned %2, deepest %3 mm\nPath  %4")
+      .arg(metrics.wireTravel, 0, 'f', 0)
+      .arg(QString::number(metrics.wireTurning / (2.0 * M_PI), 'f', 1) + " turns")
+      .arg(metrics.deepest, 0, 'f', 0)
+      .arg(branches));
+  // The panel follows what devices make of the view, but not while somebody types into it.
+  this->ViewIsOurs = true;
+  const auto follow = [](QDoubleSpinBox* box, double value)
+  {
+    if (!box->hasFocus() && std::abs(box->value() - value) >= 0.5)
+    {
+      box->setValue(value);
+    }
+  };
+  follow(this->PrimaryBox, now.pose.primary / Degree);
+  follow(this->SecondaryBox, now.pose.secondary / Degree);
+  follow(this->DistanceBox, now.pose.sourceToDetector);
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    follow(this->TableBoxes[axis], now.input.table[axis]);
+  }
+  this->ViewIsOurs = false;
+  if (std::abs(this->Primary - now.pose.primary) > 2.0 * Degree)
+  {
+    this->Primary = now.pose.primary;
+  }
+  if (std::abs(this->Secondary - now.pose.secondary) > 2.0 * Degree)
+  {
+    this->Secondary = now.pose.secondary;
+  }
+}
+
+void Window::ShowDevices()
+{
+  QString banner;
+  bool awaits = false;
+  for (const std::shared_ptr<Device>& device : this->Hardware)
+  {
+    const DeviceStatus status = device->Status();
+    awaits = awaits || status.awaitsForces;
+    if (status.state != DeviceState::Running && status.state != DeviceState::Ended)
+    {
+      banner += (banner.isEmpty() ? "" : "\n") + QString::fromStdString(status.text);
+    }
+  }
+  this->Monitor->SetBanner(banner);
+  this->ForceButton->setVisible(awaits);
+}
+
+void Window::ShowRates()
+{
+  if (this->Second.elapsed() < 1000)
+  {
+    return;
+  }
+  this->SceneFrameRate = 1000.0 * this->DrawnFrames / static_cast<double>(this->Second.restart());
+  this->DrawnFrames = 0;
+  const EngineRates rates = this->Engine->Rates();
+  this->DeviceText->setText(
+    QString("Physics %1 Hz, load %2 %, behind %3 s    X-ray %4 f/s, %5 ms, late %6    "
+            "Anatomy %7 f/s, %8 triangles")
+      .arg(rates.ticks, 0, 'f', 0)
+      .arg(100.0 * rates.load, 0, 'f', 0)
+      .arg(rates.lostSeconds, 0, 'f', 1)
+      .arg(rates.images, 0, 'f', 1)
+      .arg(rates.imageMilliseconds, 0, 'f', 1)
+      .arg(rates.lateImages)
+      .arg(this->SceneFrameRate, 0, 'f', 1)
+      .arg(this->Scene->NumberOfTriangles()));
+  std::size_t runs = 0;
+  std::size_t frames = 0;
+  GreyImage unused;
+  this->Engine->CineFrame(0, SIZE_MAX, unused, runs, frames);
+  this->RunSlider->setEnabled(runs > 0);
+  this->FrameSlider->setEnabled(runs > 0);
+  this->RunSlider->setMaximum(runs > 0 ? static_cast<int>(runs) - 1 : 0);
+}
+
+void Window::ShowCine()
+{
+  if (!this->Engine || this->Now.radiating)
+  {
+    return;
+  }
+  std::size_t runs = 0;
+  std::size_t frames = 0;
+  GreyImage image;
+  const auto run = static_cast<std::size_t>(this->RunSlider->value());
+  this->Engine->CineFrame(run, SIZE_MAX, image, runs, frames);
+  this->FrameSlider->setMaximum(frames > 0 ? static_cast<int>(frames) - 1 : 0);
+  const auto frame = static_cast<std::size_t>(this->FrameSlider->value());
+  if (this->Engine->CineFrame(run, frame, image, runs, frames))
+  {
+    this->Monitor->SetImage(image);
+    this->Monitor->SetRunText(
+      QString("RUN %1/%2  FRAME %3/%4").arg(run + 1).arg(runs).arg(frame + 1).arg(frames));
+  }
+}
+
+void Window::TakeDueScreenshots()
+{
+  while (this->NextScreenshot < this->Options.screenshotSeconds.size() &&
+    this->Now.seconds >= this->Options.screenshotSeconds[this->NextScreenshot])
+  {
+    char name[48];
+    std::snprintf(name, sizeof(name), "window_%06.2fs.png",
+      this->Options.screenshotSeconds[this->NextScreenshot]);
+    this->SaveScreenshot(QDir(QString::fromStdString(this->Options.screenshots)).filePath(name));
+    ++this->NextScreenshot;
+  }
+}
+
+void Window::SaveScreenshot(const QString& path)
+{
+  if (!this->grab().save(path, "PNG"))
+  {
+    this->Problem("Cannot write '" + path + "'.");
+    return;
+  }
+  this->Log->appendPlainText("Saved " + path);
+}
+
+void Window::ToggleVideo(bool on)
+{
+  if (!on)
+  {
+    if (this->Video)
+    {
+      try
+      {
+        this->Video->Finish();
+      }
+      catch (const std::exception& error)
+      {
+        this->Problem(error.what());
+      }
+      this->Video.reset();
+    }
+    this->VideoAction->setChecked(false);
+    return;
+  }
+  const QString path = this->Options.video.empty()
+    ? "simulator-" + QDateTime::currentDateTime().toString("yyyyMMdd-HHmmss") + ".ogv"
+    : QString::fromStdString(this->Options.video);
+  try
+  {
+    this->Video = std::make_unique<vtkVideoFile>(path.toStdString(), VideoRate);
+    this->VideoClock.start();
+    this->VideoAction->setChecked(true);
+    this->Log->appendPlainText("Filming into " + path);
+  }
+  catch (const std::exception& error)
+  {
+    this->Problem(error.what());
+  }
+}
+
+void Window::RecordVideo()
+{
+  if (!this->Options.video.empty() && !this->Video && this->Now.tick > 0 &&
+    !this->VideoClock.isValid())
+  {
+    this->ToggleVideo(true);
+  }
+  if (!this->Video || this->VideoClock.elapsed() < 1000.0 / VideoRate)
+  {
+    return;
+  }
+  this->VideoClock.restart();
+  const QImage picture = this->grab().toImage().convertToFormat(QImage::Format_RGB888);
+  this->Video->Add(picture.constBits(), picture.width(), picture.height(),
+    static_cast<std::size_t>(picture.bytesPerLine()));
+}
+
+void Window::keyPressEvent(QKeyEvent* event)
+{
+  const std::string key = KeyName(*event);
+  if (event->isAutoRepeat() || key.empty() || !this->Keys || !this->Keys->Press(key))
+  {
+    QMainWindow::keyPressEvent(event);
+  }
+}
+
+void Window::keyReleaseEvent(QKeyEvent* event)
+{
+  const std::string key = KeyName(*event);
+  if (event->isAutoRepeat() || key.empty() || !this->Keys || !this->Keys->Release(key))
+  {
+    QMainWindow::keyReleaseEvent(event);
+  }
+}
+
+void Window::changeEvent(QEvent* event)
+{
+  // A key that is released in another window would be held for ever.
+  if (event->type() == QEvent::ActivationChange && !this->isActiveWindow() && this->Keys)
+  {
+    this->Keys->ReleaseAll();
+  }
+  QMainWindow::changeEvent(event);
+}
+
+void Window::closeEvent(QCloseEvent* event)
+{
+  this->End();
+  event->accept();
+}
+
+/// @throws std::runtime_error
+void RequireOpenGL()
+{
+  QOffscreenSurface surface;
+  surface.setFormat(QSurfaceFormat::defaultFormat());
+  surface.create();
+  QOpenGLContext context;
+  context.setFormat(QSurfaceFormat::defaultFormat());
+  if (!surface.isValid() || !context.create() || !context.makeCurrent(&surface) ||
+    context.format().version() < qMakePair(3, 2))
+  {
+    throw std::runtime_error("The display has no OpenGL 3.2, which the view of the anatomy needs; "
+                             "sessions without a window run with --headless.");
+  }
+  context.doneCurrent();
+}
+}
+
+int RunWindow(const SessionWorld& world, const WindowOptions& options)
+{
+  std::string why;
+  if (!CanDraw(why))
+  {
+    throw std::runtime_error("There is no display for the window (" + why +
+      "); sessions without one run with --headless.");
+  }
+  QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
+  int count = 1;
+  std::string name = "coronary-simulator";
+  char* arguments[] = { name.data(), nullptr };
+  QApplication application(count, arguments);
+  QApplication::setApplicationDisplayName("DynamicCoronary simulator");
+  RequireOpenGL();
+  Window window(world, options);
+  window.Begin(options.record, options.replay);
+  window.show();
+  QApplication::exec();
+  ThrowIfInterrupted();
+  return window.Failed() ? 1 : 0;
+}
+}

@@ -1,0 +1,40 @@
+/**
+ * @file vtkSimulatorWindow.h
+ * @brief The program a trainee sits at: X-ray monitor, anatomy, panel, traces.
+ */
+#ifndef vtkSimulatorWindow_h
+#define vtkSimulatorWindow_h
+
+#include "SessionEngine.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+struct WindowOptions
+{
+  std::vector<std::string> devices; ///< URIs, in the order of their priority
+  std::string script;               ///< of driving; empty: none
+  std::string replay;               ///< recording to begin with; empty: none
+  std::string record;               ///< recording of the first session; empty: none
+  std::string screenshots;          ///< folder of pictures of the window; empty: none by itself
+  std::vector<double> screenshotSeconds; ///< of simulated time, at which pictures are made
+  std::string video;                     ///< .ogv of the first session; empty: none
+  double quitAfter = 0.0;                ///< s of simulated time; 0: when it is closed
+  int width = 1500;
+  int height = 860;
+  std::int64_t triangles = 9000; ///< of the wall in the anatomy
+  bool heart = true;
+};
+
+/**
+ * Returns when the window has been closed. Needs a display with OpenGL 3.2.
+ * @return 0; 1 when a session failed: the reason was printed
+ * @throws std::runtime_error: no display or no OpenGL; devices, files as SessionEngine
+ */
+int RunWindow(const SessionWorld& world, const WindowOptions& options);
+}
+
+#endif
