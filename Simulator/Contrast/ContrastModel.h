@@ -7,6 +7,7 @@
 
 #include "ContrastTracers.h"
 #include "CoronaryFlow.h"
+#include "VesselFrames.h"
 
 #include <cstdint>
 #include <vector>
@@ -117,19 +118,29 @@ public:
   const ContrastTracers& Tracers() const { return this->Tracers_; }
 
 private:
-  void DepressFlow(double dt);
   void MakeSlabs();
+  void DepressFlow(double dt);
+  void UpdateBlush();
+  /// The slab of a place along a branch, mL from its beginning.
+  std::size_t SlabAt(int branch, double volume) const;
+  void SmoothBranch(std::size_t branch) const;
+  void LimitBranch(std::size_t branch) const;
 
   ContrastSettings Settings_;
   CoronaryFlow Flow_;
   ContrastTracers Tracers_;
   std::vector<ContrastSlab> Slabs_;
+  std::vector<double> SlabLength;       ///< mm
+  std::vector<double> SlabBegin;        ///< mL along the branch
+  std::vector<std::size_t> BranchSlab;  ///< per branch: its first slab; and one more
+  std::vector<std::int32_t> SlabOfCell; ///< cells of equal volume, as many a branch as it has slabs
   std::vector<double> BlushVolume_;
   std::vector<double>
-    Arrived; ///< per tree: how much of the flow into the myocardium is contrast medium, filtered
+    Arrived; ///< per tree: part of contrast medium in what flows into the myocardium, filtered
   std::vector<double> Depressed; ///< per tree: Arrived, filtered again
   mutable std::vector<double> Concentration_;
   mutable std::vector<double> Scratch;
+  mutable std::vector<VesselFrame> Frames;
   mutable bool Current = false;
 };
 }

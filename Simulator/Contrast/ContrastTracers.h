@@ -14,14 +14,14 @@ namespace coronary
 {
 struct ContrastTracerSettings
 {
-  std::int64_t capacity = 20000; ///< greatest number of tracers, 100 to 10,000,000
+  std::int64_t capacity = 20000; ///< greatest number of tracers, 1000 to 10,000,000
   /// mL of contrast medium a tracer, 1e-7 to 0.1. Doubled while there are too many, halved again when there are few.
   double volume = 2.5e-4;
   /// Of the radial random walk, mm^2/s, 0 to 100: what secondary flow in bends and the pulse mix. At 0.5 a
   /// cross-section of 1.5 mm radius is mixed in r^2 / (14.7 D) = 0.3 s.
   double radialDiffusivity = 0.5;
   /// Along the axis, mm^2/s, 0 to 100. Little against what the velocity profile disperses; above 0 medium also creeps
-  /// upstream of the tip.
+  /// upstream of the tip, within its segment.
   double axialDiffusivity = 0.0;
   /// Time constant of the myocardium's wash-out, s, 0.05 to 100. A normal blush is gone within three cycles (TIMI
   /// myocardial perfusion grade 3; Gibson et al., Circulation 2000;101:125).
@@ -81,13 +81,84 @@ public:
   std::uint64_t StateHash() const;
 
 private:
+  enum class Way
+  {
+    Inside,
+    Outside,
+    None
+  };
+  struct Tracer
+  {
+    int segment;
+    double lumen;
+    double x;
+    double y;
+    double volume;
+  };
+  struct Stretch
+  {
+    int above;     ///< node
+    int below;     ///< node
+    double volume; ///< mL
+    double radius; ///< mm
+  };
+  /// What a node's blood can go into, in the order in which it leaves along `parting`; -1: out of the tree.
+  struct Junction
+  {
+    std::vector<int> segments;
+    double partingX = 1.0;
+    double partingY = 0.0;
+    bool tip = false;
+    bool root = false;
+  };
+  /// What the moving loop needs of a segment.
+  struct Motion
+  {
+    float above;    ///< 2 Q dt above the injector, mL
+    float below;    ///< and below it
+    float injector; ///< mL from the segment's beginning
+    float radial;   ///< half width of a step of (x, y)
+    float axial;    ///< half width of a step of the lumen, mL
+    float volume;
+  };
+
+  void MakeJunctions(const FlowNetwork& network);
+  void PrepareMotion(double dt, const TracerFlow& flow);
+  void WashOut(double dt);
+  void Move();
+  template <bool Axial>
+  void MoveAll();
+  bool Cross(Tracer& tracer);
+  Way Route(Tracer& tracer, int node);
+  double OutOf(int node, int segment) const;
+  void Inject(double volume);
+  void Emit(double volume, bool down);
+  void MakeRoom(std::int64_t count);
+  void Thin(bool anywhere);
+  void Copy(std::int64_t from, std::int64_t to);
+
   ContrastTracerSettings Settings_;
+  std::uint64_t Key;
+  std::uint64_t Steps = 0;
+  std::uint64_t Emitted = 0;
+  double TracerVolume; ///< mL, now
+  std::vector<Stretch> Segments;
+  std::vector<Junction> Junctions;
+  std::vector<Motion> Motions;
+  std::vector<double> FlowTop;    ///< mL/s per segment, at its beginning
+  std::vector<double> FlowBottom; ///< at its end
+  TracerFlow Flow;
+
   std::int64_t Size_ = 0;
   std::vector<std::int32_t> Segment_;
   std::vector<float> Lumen_;
   std::vector<float> X_;
   std::vector<float> Y_;
   std::vector<double> Volume_;
+  std::vector<std::int32_t> Leaving; ///< tracers that crossed an end of their segment
+  std::vector<std::int32_t> Order;   ///< for thinning
+  std::vector<std::int32_t> CellBegin;
+
   double Injected_ = 0.0;
   double Spilled_ = 0.0;
   double WashedOut_ = 0.0;

@@ -124,8 +124,10 @@ public:
   const FlowNetwork::Place& Injector() const { return this->Injector_; }
   double Injection() const { return this->Injection_; } ///< mL/s at Injector()
 
-  double SegmentResistance(int segment) const { return this->Resistance[segment]; }
-  double OutletResistance(int node) const; ///< of a tip: R1 + R2
+  /// Without the quadratic loss of its stenoses.
+  double SegmentResistance(int segment) const { return this->Losses[segment].linear; }
+  /// Of a tip: R1 + R2.
+  double OutletResistance(int node) const { return this->OutletResistance_[node]; }
   double CompliancePressure(int node) const { return this->Compartment[node]; } ///< mmHg
   double MyocardialFraction(int tree) const
   {
@@ -138,38 +140,82 @@ public:
   /// All outlets' resistances of a tree times this from the next step on (> 0).
   void SetOutletFactor(int tree, double factor);
 
+  /// Over the bits of all that the next step depends on. @param before  the digest to go on from
+  std::uint64_t StateHash(std::uint64_t before) const;
+
 private:
   struct Stenosis
   {
     int segment;
     double abscissa;
-    double quadratic; ///< mmHg s^2/mL^2
     double linear;    ///< mmHg s/mL, beyond the axis' own
+    double quadratic; ///< mmHg s^2/mL^2
   };
-  struct Outlet
+  /// Of a branch's axis without its stenoses, and with them.
+  struct BranchResistance
   {
-    double resistance = 0.0; ///< R1 + R2
-    double compliance = 0.0;
+    std::vector<double> healthy; ///< mmHg s/mL from the branch's beginning, per axis point
+    std::vector<double> actual;
+  };
+  /// Pressure loss along a part of a segment: linear Q + quadratic |Q| Q.
+  struct Loss
+  {
+    double linear = 0.0;
+    double quadratic = 0.0;
+  };
+  /// What a tip, or all that is beyond a place, takes: conductance times pressure - offset.
+  struct Demand
+  {
+    double conductance = 0.0;
+    double offset = 0.0;
   };
 
-  double ResistanceBetween(int branch, double from, double to) const;
+  void FindStenoses();
+  void AddStatedStenosis(const StatedStenosis& stenosis);
+  void MeasureResistances();
+  double ResistanceTo(int branch, double abscissa) const;
+  Loss LossBetween(int segment, double from, double to) const;
+  void ChooseOutletWeights();
+  void ChoosePaths();
+  double AxialSpeed(int tree) const;
+  void CalibrateMean(int tree, double target);
+  void CalibrateRatio(int tree, double target);
+  double PeriodicRatioParts(int tree, double fraction, double& systole);
+  int CyclesToSettle() const;
+  void SettleAtRest();
+  void SolveSteady(double aortic);
+  void Advance(double dt, double aortic, double ventricular);
+  void SolveTrees(double aortic);
+  void SetInjector(double injection, const CatheterTip& tip);
 
   CoronaryFlowSettings Settings_;
   FlowNetwork Network_;
+  std::vector<std::vector<double>> HealthyRadius; ///< mm, per branch and axis point
+  std::vector<BranchResistance> AlongBranch;
   std::vector<Stenosis> Stenoses;
-  std::vector<double> Resistance;
-  std::vector<double> Quadratic;
-  std::vector<Outlet> Outlets;      ///< per node
-  std::vector<double> Fraction;     ///< per tree
-  std::vector<double> OutletFactor; ///< per tree
+  std::vector<Loss> Losses; ///< per segment; the calibration's are without stenoses
+  // Per node; of tips.
+  std::vector<double> Weight;
+  std::vector<double> OutletResistance_; ///< R1 + R2
+  std::vector<double> Compliance;
+  std::vector<double> Compartment; ///< pressure at the compliance
+  std::vector<Demand> Demands;     ///< of the node and all beyond it
+  std::vector<Demand> AtTop;       ///< per segment, at its root-side end
+  // Per tree.
+  std::vector<double> Fraction;
+  std::vector<double> OutletFactor;
   std::vector<std::vector<int>> Path;
+  std::vector<double> PathLength;
+
   std::vector<double> Flow_;
   std::vector<double> Pressure_;
-  std::vector<double> Compartment; ///< per node: pressure of its compliance
   FlowNetwork::Place Injector_;
   double Injection_ = 0.0;
+  Loss AboveInjector;
+  Loss BelowInjector;
   double Aortic = 0.0;
   double Ventricular = 0.0;
+  bool Started = false;
 };
 }
 

@@ -82,6 +82,8 @@ public:
   const std::vector<int>& Roots() const { return this->Roots_; } ///< node
   const std::vector<bool>& RightSide() const { return this->RightSide_; }
   const WallTopology& Topology() const { return this->Topology_; }
+  /// The point of its parent's axis (in the list of all branches' points) that a branch leaves from; -1 at a root.
+  std::int64_t AttachmentPoint(int branch) const { return this->Attachment[branch]; }
   bool IsTip(int node) const { return this->Nodes_[node].below.empty(); }
 
   /// The segment at a place, and how far into it.
@@ -110,6 +112,7 @@ private:
   std::vector<FlowNode> Nodes_;
   std::vector<int> Roots_;
   std::vector<bool> RightSide_;
+  std::vector<std::int64_t> Attachment;
 };
 }
 
