@@ -1,0 +1,314 @@
+#include "ContrastModel.h"
+
+#include "Fnv1a.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+// Flow falls to 45 % at 1.9 s.
+constexpr double DepressedFlow = 0.45;
+constexpr double DepressionTime = 1.9; // s, also where t exp(-t / T) is greatest
+
+void Require(bool possible, const char* name, double value, const char* range)
+{
+  if (!possible)
+  {
+    throw std::invalid_argument(std::string("contrast: ") + name + " is " + std::to_string(value) +
+      "; it has to be " + range);
+  }
+}
+
+bool Within(double value, double low, double high)
+{
+  return value >= low && value <= high; // not for NaN
+}
+
+const ContrastSettings& Checked(const ContrastSettings& settings)
+{
+  settings.Validate();
+  return settings;
+}
+}
+
+void ContrastSettings::Validate() const
+{
+  this->flow.Validate();
+  this->tracers.Validate();
+  Require(Within(this->smoothing, 0.0, 20.0), "smoothing", this->smoothing, "0 to 20 mm");
+  Require(Within(this->flowDepression, 0.0, 1.0), "flowDepression", this->flowDepression, "0 to 1");
+}
+
+ContrastModel::ContrastModel(
+  const WallTopology& topology, const ContrastSettings& settings, std::uint64_t seed)
+  : Settings_(Checked(settings))
+  , Flow_(topology, settings.flow)
+  , Tracers_(this->Flow_.Network(), settings.tracers, seed)
+{
+  this->MakeSlabs();
+  this->BlushVolume_.assign(this->Flow_.Network().Branches().size(), 0.0);
+  this->Arrived.assign(this->Flow_.Network().Roots().size(), 0.0);
+  this->Depressed = this->Arrived;
+}
+
+void ContrastModel::MakeSlabs()
+{
+  for (std::size_t b = 0; b < this->Flow_.Network().Branches().size(); ++b)
+  {
+    const FlowBranch& branch = this->Flow_.Network().Branches()[b];
+    const std::size_t count = branch.abscissa.size() - 1;
+    this->BranchSlab.push_back(this->Slabs_.size());
+    for (std::size_t k = 0; k < count; ++k)
+    {
+      this->Slabs_.push_back(
+        { static_cast<int>(b), branch.firstPoint + static_cast<std::int64_t>(k),
+          branch.volume[k + 1] - branch.volume[k] });
+      this->SlabLength.push_back(branch.abscissa[k + 1] - branch.abscissa[k]);
+      this->SlabBegin.push_back(branch.volume[k]);
+    }
+    std::size_t slab = 0;
+    for (std::size_t cell = 0; cell < count; ++cell)
+    {
+      const double from =
+        branch.volume.back() * static_cast<double>(cell) / static_cast<double>(count);
+      while (slab + 1 < count && branch.volume[slab + 1] <= from)
+      {
+        ++slab;
+      }
+      this->SlabOfCell.push_back(static_cast<std::int32_t>(slab));
+    }
+  }
+  this->BranchSlab.push_back(this->Slabs_.size());
+  this->Concentration_.assign(this->Slabs_.size(), 0.0);
+  this->Scratch.assign(this->Slabs_.size(), 0.0);
+}
+
+std::size_t ContrastModel::SlabAt(int branch, double volume) const
+{
+  const std::size_t first = this->BranchSlab[branch];
+  const auto count = static_cast<int>(this->BranchSlab[branch + 1] - first);
+  const double whole = this->Flow_.Network().Branches()[branch].volume.back();
+  const int cell = std::clamp(static_cast<int>(volume / whole * count), 0, count - 1);
+  std::size_t slab = first + static_cast<std::size_t>(this->SlabOfCell[first + cell]);
+  while (slab + 1 < this->BranchSlab[branch + 1] && this->SlabBegin[slab + 1] <= volume)
+  {
+    ++slab;
+  }
+  return slab;
+}
+
+void ContrastModel::Step(
+  double dt, double phase, double heartRate, double injection, const CatheterTip& tip)
+{
+  Require(Within(dt, 0.0005, 0.02), "time step", dt, "0.0005 to 0.02 s");
+  Require(std::isfinite(phase), "phase", phase, "finite");
+  Require(Within(heartRate, 0.0, 300.0), "heart rate", heartRate, "0 to 300 per minute");
+  Require(Within(injection, 0.0, 50.0), "injection", injection, "0 to 50 mL/s");
+  if (injection > 0.0 && tip.branch != -1)
+  {
+    this->Flow_.Network().Locate(tip);
+  }
+  this->Flow_.Step(dt, phase, heartRate, injection, tip);
+  TracerFlow flow;
+  flow.flow = &this->Flow_.Flow();
+  flow.injector = this->Flow_.Injector();
+  flow.injection = injection;
+  if (flow.injector.segment >= 0)
+  {
+    flow.flowAbove = this->Flow_.FlowAtBeginning(flow.injector.segment);
+  }
+  this->Tracers_.Step(dt, flow);
+  this->UpdateBlush();
+  if (this->Settings_.flowDepression > 0.0)
+  {
+    this->DepressFlow(dt);
+  }
+  this->Current = false;
+}
+
+void ContrastModel::UpdateBlush()
+{
+  for (const FlowSegment& segment : this->Flow_.Network().Segments())
+  {
+    if (this->Flow_.Network().IsTip(segment.below))
+    {
+      this->BlushVolume_[segment.branch] = this->Tracers_.Blush()[segment.below];
+    }
+  }
+}
+
+void ContrastModel::DepressFlow(double dt)
+{
+  const FlowNetwork& network = this->Flow_.Network();
+  for (std::size_t t = 0; t < this->Arrived.size(); ++t)
+  {
+    double medium = 0.0;
+    double blood = 0.0;
+    for (std::size_t s = 0; s < network.Segments().size(); ++s)
+    {
+      const FlowSegment& segment = network.Segments()[s];
+      if (network.IsTip(segment.below) &&
+        network.Nodes()[segment.below].tree == static_cast<int>(t))
+      {
+        medium += this->Tracers_.Outflow()[segment.below];
+        blood += dt * std::max(this->Flow_.Flow()[s], 0.0);
+      }
+    }
+    const double part = blood > 0.0 ? std::min(medium / blood, 1.0) : 0.0;
+    const double share = -std::expm1(-dt / DepressionTime);
+    this->Arrived[t] += share * (part - this->Arrived[t]);
+    this->Depressed[t] += share * (this->Arrived[t] - this->Depressed[t]);
+    const double fall = this->Settings_.flowDepression * (1.0 - DepressedFlow) * this->Depressed[t];
+    this->Flow_.SetOutletFactor(static_cast<int>(t), 1.0 / (1.0 - fall));
+  }
+}
+
+const std::vector<double>& ContrastModel::Concentration() const
+{
+  if (this->Current)
+  {
+    return this->Concentration_;
+  }
+  this->Current = true;
+  std::fill(this->Concentration_.begin(), this->Concentration_.end(), 0.0);
+  const std::vector<FlowSegment>& segments = this->Flow_.Network().Segments();
+  for (std::int64_t i = 0; i < this->Tracers_.Size(); ++i)
+  {
+    const FlowSegment& segment = segments[this->Tracers_.Segment(i)];
+    const std::size_t slab =
+      this->SlabAt(segment.branch, segment.volumeFrom + this->Tracers_.Lumen(i));
+    this->Concentration_[slab] += this->Tracers_.Volume(i);
+  }
+  for (std::size_t b = 0; b + 1 < this->BranchSlab.size(); ++b)
+  {
+    this->SmoothBranch(b);
+    this->LimitBranch(b);
+  }
+  return this->Concentration_;
+}
+
+/// From mL to fractions: (V + L) c = mL, L the conductances between neighbours (Thomas algorithm).
+void ContrastModel::SmoothBranch(std::size_t branch) const
+{
+  const std::size_t first = this->BranchSlab[branch];
+  const std::size_t last = this->BranchSlab[branch + 1];
+  const double square = this->Settings_.smoothing * this->Settings_.smoothing;
+  // Slabs without volume take their neighbours' fraction.
+  const auto volume = [this](std::size_t k) { return std::max(this->Slabs_[k].volume, 1e-12); };
+  const auto conductance = [&](std::size_t k) // between k and k + 1
+  {
+    const double apart = std::max(0.5 * (this->SlabLength[k] + this->SlabLength[k + 1]), 1e-6);
+    const double area = (volume(k) + volume(k + 1)) / (2.0 * apart);
+    return square * area / apart;
+  };
+  double before = 0.0; // conductance to the slab before
+  double ratio = 0.0;  // of the eliminated equation before
+  for (std::size_t k = first; k < last; ++k)
+  {
+    const double behind = k + 1 < last ? conductance(k) : 0.0;
+    const double pivot = volume(k) + before + behind - before * ratio;
+    const double carried = k > first ? before * this->Concentration_[k - 1] : 0.0;
+    this->Concentration_[k] = (this->Concentration_[k] + carried) / pivot;
+    ratio = behind / pivot;
+    this->Scratch[k] = ratio;
+    before = behind;
+  }
+  for (std::size_t k = last - 1; k-- > first;)
+  {
+    this->Concentration_[k] += this->Scratch[k] * this->Concentration_[k + 1];
+  }
+}
+
+/// The tracers' number is random, a fraction is at most 1: what is above goes to the neighbours.
+void ContrastModel::LimitBranch(std::size_t branch) const
+{
+  const std::size_t first = this->BranchSlab[branch];
+  const std::size_t last = this->BranchSlab[branch + 1];
+  double excess = 0.0; // mL
+  const auto limit = [&](std::size_t k)
+  {
+    const double volume = std::max(this->Slabs_[k].volume, 1e-12);
+    const double whole = this->Concentration_[k] + excess / volume;
+    this->Concentration_[k] = std::min(whole, 1.0);
+    excess = (whole - this->Concentration_[k]) * volume;
+  };
+  for (std::size_t k = first; k < last; ++k)
+  {
+    limit(k);
+  }
+  for (std::size_t k = last; k-- > first && excess > 0.0;)
+  {
+    limit(k);
+  }
+}
+
+void ContrastModel::TracerPositions(const std::vector<Vector3>& axis,
+  std::vector<Vector3>& positions, std::vector<float>& volumes) const
+{
+  const FlowNetwork& network = this->Flow_.Network();
+  ComputeVesselFrames(network, axis, this->Frames);
+  const auto count = static_cast<std::size_t>(this->Tracers_.Size());
+  positions.resize(count);
+  volumes.resize(count);
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    const auto tracer = static_cast<std::int64_t>(i);
+    const FlowSegment& segment = network.Segments()[this->Tracers_.Segment(tracer)];
+    const double along = segment.volumeFrom + this->Tracers_.Lumen(tracer);
+    const std::size_t slab = this->SlabAt(segment.branch, along);
+    const double t = std::clamp(
+      (along - this->SlabBegin[slab]) / std::max(this->Slabs_[slab].volume, 1e-12), 0.0, 1.0);
+    const std::int64_t p = this->Slabs_[slab].point;
+    const std::vector<double>& radii = network.Topology().axisRadius[segment.branch];
+    const auto k = static_cast<std::size_t>(p - network.Branches()[segment.branch].firstPoint);
+    const double radius = radii[k] + t * (radii[k + 1] - radii[k]);
+    const VesselFrame& a = this->Frames[p];
+    const VesselFrame& b = this->Frames[p + 1];
+    const Vector3 normal = a.normal + t * (b.normal - a.normal);
+    const Vector3 binormal = a.binormal + t * (b.binormal - a.binormal);
+    positions[i] = axis[p] + t * (axis[p + 1] - axis[p]) +
+      radius * (this->Tracers_.X(tracer) * normal + this->Tracers_.Y(tracer) * binormal);
+    volumes[i] = static_cast<float>(this->Tracers_.Volume(tracer));
+  }
+}
+
+double ContrastModel::Flow(int branch) const
+{
+  return this->Flow_.FlowAtBeginning(this->Flow_.Network().Branches().at(branch).segments.front());
+}
+
+double ContrastModel::Speed(int branch) const
+{
+  const int first = this->Flow_.Network().Branches().at(branch).segments.front();
+  const double radius = this->Flow_.Network().Segments()[first].Radius();
+  return 100.0 * this->Flow(branch) / (Pi * radius * radius); // mL/s / mm^2 = m/s
+}
+
+ContrastBalance ContrastModel::Balance() const
+{
+  ContrastBalance balance;
+  balance.injected = this->Tracers_.Injected();
+  balance.inTree = this->Tracers_.InTree();
+  for (const double blush : this->Tracers_.Blush())
+  {
+    balance.blush += blush;
+  }
+  balance.washedOut = this->Tracers_.WashedOut();
+  balance.spilled = this->Tracers_.Spilled();
+  return balance;
+}
+
+std::uint64_t ContrastModel::StateHash() const
+{
+  std::uint64_t hash = this->Tracers_.StateHash();
+  hash = Fnv1a(this->Arrived.data(), this->Arrived.size() * sizeof(double), hash);
+  hash = Fnv1a(this->Depressed.data(), this->Depressed.size() * sizeof(double), hash);
+  return this->Flow_.StateHash(hash);
+}
+}

@@ -1,0 +1,636 @@
+#include "ContrastTracers.h"
+
+#include "CounterRandom.h"
+#include "Fnv1a.h"
+#include "VesselFrames.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+constexpr double DirectionLength = 3.0; // mm over which a branch's direction at a node is taken
+constexpr int CellsOfSegment = 64;      // for thinning
+constexpr int Crossings = 1000;         // of segments in a step; more are short of a fault
+
+void Require(bool possible, const char* name, double value, const char* range)
+{
+  if (!possible)
+  {
+    throw std::invalid_argument(std::string("contrast tracers: ") + name + " is " +
+      std::to_string(value) + "; it has to be " + range);
+  }
+}
+
+bool Within(double value, double low, double high)
+{
+  return value >= low && value <= high; // not for NaN
+}
+
+double Square(double a)
+{
+  return a * a;
+}
+
+/// Part of the flux of laminar flow through the unit circle that is on the side of x below h.
+double FluxBelow(double h)
+{
+  const double x = std::clamp(h, -1.0, 1.0);
+  return 0.5 + (x * (5.0 - 2.0 * x * x) * std::sqrt(1.0 - x * x) + 3.0 * std::asin(x)) / (3.0 * Pi);
+}
+
+/// The inverse of FluxBelow.
+class ChordTable
+{
+public:
+  ChordTable()
+  {
+    for (int k = 0; k <= Size; ++k)
+    {
+      const double wanted = static_cast<double>(k) / Size;
+      double low = -1.0;
+      double high = 1.0;
+      for (int step = 0; step < 60; ++step)
+      {
+        const double middle = 0.5 * (low + high);
+        (FluxBelow(middle) < wanted ? low : high) = middle;
+      }
+      this->Chord[k] = 0.5 * (low + high);
+    }
+  }
+  double operator()(double flux) const
+  {
+    const double place = std::clamp(flux, 0.0, 1.0) * Size;
+    const int k = std::min(static_cast<int>(place), Size - 1);
+    const double x = this->Chord[k] + (place - k) * (this->Chord[k + 1] - this->Chord[k]);
+    // One step of Newton where the density is not small.
+    const double density = 8.0 / (3.0 * Pi) * (1.0 - x * x) * std::sqrt(1.0 - x * x);
+    return density > 0.02 ? x - (FluxBelow(x) - flux) / density : x;
+  }
+
+private:
+  static constexpr int Size = 4096;
+  std::array<double, Size + 1> Chord{};
+};
+
+double ChordOf(double flux)
+{
+  static const ChordTable table;
+  return table(flux);
+}
+
+/// The same along a chord, as a fraction of its half length: the inverse of (2 + 3 y - y^3) / 4.
+double PlaceOnChord(double flux)
+{
+  return 2.0 * std::sin(std::asin(2.0 * flux - 1.0) / 3.0);
+}
+
+double FractionalPart(double a)
+{
+  return a - std::floor(a);
+}
+
+Vector3 AxisPoint(const FlowNetwork& network, int branch, double abscissa)
+{
+  const std::vector<double>& s = network.Branches()[branch].abscissa;
+  const std::vector<Vector3>& axis = network.Topology().axis[branch];
+  const auto k =
+    std::clamp<std::ptrdiff_t>(std::upper_bound(s.begin(), s.end(), abscissa) - s.begin(), 1,
+      static_cast<std::ptrdiff_t>(s.size()) - 1);
+  const double length = s[k] - s[k - 1];
+  const double t = length > 0.0 ? std::clamp((abscissa - s[k - 1]) / length, 0.0, 1.0) : 0.0;
+  return axis[k - 1] + t * (axis[k] - axis[k - 1]);
+}
+}
+
+void ContrastTracerSettings::Validate() const
+{
+  Require(Within(static_cast<double>(this->capacity), 1000.0, 1e7), "capacity",
+    static_cast<double>(this->capacity), "1000 to 10000000");
+  Require(Within(this->volume, 1e-7, 0.1), "volume", this->volume, "1e-7 to 0.1 mL");
+  Require(Within(this->radialDiffusivity, 0.0, 100.0), "radialDiffusivity", this->radialDiffusivity,
+    "0 to 100 mm^2/s");
+  Require(Within(this->axialDiffusivity, 0.0, 100.0), "axialDiffusivity", this->axialDiffusivity,
+    "0 to 100 mm^2/s");
+  Require(Within(this->blushTime, 0.05, 100.0), "blushTime", this->blushTime, "0.05 to 100 s");
+}
+
+ContrastTracers::ContrastTracers(
+  const FlowNetwork& network, const ContrastTracerSettings& settings, std::uint64_t seed)
+  : Settings_(settings)
+  , Key(MixBits(seed))
+  , TracerVolume(settings.volume)
+{
+  settings.Validate();
+  for (const FlowSegment& segment : network.Segments())
+  {
+    this->Segments.push_back({ segment.above, segment.below, segment.volume, segment.Radius() });
+  }
+  this->MakeJunctions(network);
+  const std::size_t segments = this->Segments.size();
+  this->Motions.resize(segments);
+  this->FlowTop.assign(segments, 0.0);
+  this->FlowBottom.assign(segments, 0.0);
+  const auto capacity = static_cast<std::size_t>(settings.capacity);
+  this->Segment_.resize(capacity);
+  this->Lumen_.resize(capacity);
+  this->X_.resize(capacity);
+  this->Y_.resize(capacity);
+  this->Volume_.resize(capacity);
+  this->Leaving.reserve(capacity);
+  this->Order.resize(capacity);
+  this->CellBegin.resize(segments * CellsOfSegment + 1);
+  this->Blush_.assign(network.Nodes().size(), 0.0);
+  this->Outflow_.assign(network.Nodes().size(), 0.0);
+}
+
+void ContrastTracers::MakeJunctions(const FlowNetwork& network)
+{
+  std::vector<Vector3> points;
+  for (const std::vector<Vector3>& axis : network.Topology().axis)
+  {
+    points.insert(points.end(), axis.begin(), axis.end());
+  }
+  std::vector<VesselFrame> frames;
+  ComputeVesselFrames(network, points, frames);
+  for (std::size_t n = 0; n < network.Nodes().size(); ++n)
+  {
+    const FlowNode& node = network.Nodes()[n];
+    Junction junction;
+    junction.tip = node.below.empty();
+    junction.root = node.above < 0;
+    // The frame of the cross-section that is cut.
+    const FlowSegment& cut = network.Segments()[junction.root ? node.below[0] : node.above];
+    const FlowBranch& branch = network.Branches()[cut.branch];
+    const double place = junction.root ? cut.from : cut.to;
+    const auto k = std::clamp<std::ptrdiff_t>(
+      std::lower_bound(branch.abscissa.begin(), branch.abscissa.end(), place) -
+        branch.abscissa.begin(),
+      0, static_cast<std::ptrdiff_t>(branch.abscissa.size()) - 1);
+    const VesselFrame& frame = frames[branch.firstPoint + k];
+    std::vector<Eigen::Vector2d> ways;
+    for (const int s : node.below)
+    {
+      const FlowSegment& segment = network.Segments()[s];
+      const double end = std::min(segment.to, segment.from + DirectionLength);
+      const Vector3 way =
+        (AxisPoint(network, segment.branch, end) - AxisPoint(network, segment.branch, segment.from))
+          .stableNormalized();
+      ways.emplace_back(way.dot(frame.normal), way.dot(frame.binormal));
+    }
+    Eigen::Vector2d parting = Eigen::Vector2d::Zero();
+    for (std::size_t a = 0; a < ways.size(); ++a)
+    {
+      for (std::size_t b = a + 1; b < ways.size(); ++b)
+      {
+        const Eigen::Vector2d apart = ways[b] - ways[a];
+        parting = apart.squaredNorm() > parting.squaredNorm() ? apart : parting;
+      }
+    }
+    parting = parting.norm() > 1e-6 ? Eigen::Vector2d(parting.normalized())
+                                    : Eigen::Vector2d(Eigen::Vector2d::UnitX());
+    junction.partingX = parting.x();
+    junction.partingY = parting.y();
+    std::vector<std::pair<double, int>> order;
+    for (std::size_t a = 0; a < ways.size(); ++a)
+    {
+      order.emplace_back(ways[a].dot(parting), node.below[a]);
+    }
+    if (!junction.root)
+    {
+      order.emplace_back(0.0, node.above);
+    }
+    if (junction.root || junction.tip)
+    {
+      order.emplace_back(0.0, -1);
+    }
+    std::sort(order.begin(), order.end());
+    for (const auto& [along, segment] : order)
+    {
+      junction.segments.push_back(segment);
+    }
+    this->Junctions.push_back(std::move(junction));
+  }
+}
+
+void ContrastTracers::PrepareMotion(double dt, const TracerFlow& flow)
+{
+  this->Flow = flow;
+  for (std::size_t s = 0; s < this->Segments.size(); ++s)
+  {
+    const Stretch& segment = this->Segments[s];
+    const bool here = static_cast<int>(s) == flow.injector.segment;
+    this->FlowBottom[s] = (*flow.flow)[s];
+    this->FlowTop[s] = here ? flow.flowAbove : this->FlowBottom[s];
+    Motion& motion = this->Motions[s];
+    motion.above = static_cast<float>(2.0 * dt * this->FlowTop[s]);
+    motion.below = static_cast<float>(2.0 * dt * this->FlowBottom[s]);
+    motion.injector = here ? static_cast<float>(flow.injector.volume) : 0.0F;
+    motion.volume = static_cast<float>(segment.volume);
+    // Uniform steps of variance 2 D dt.
+    motion.radial =
+      static_cast<float>(std::sqrt(6.0 * this->Settings_.radialDiffusivity * dt) / segment.radius);
+    motion.axial = static_cast<float>(
+      std::sqrt(6.0 * this->Settings_.axialDiffusivity * dt) * 1e-3 * Pi * Square(segment.radius));
+  }
+}
+
+void ContrastTracers::WashOut(double dt)
+{
+  const double gone = -std::expm1(-dt / this->Settings_.blushTime);
+  for (double& blush : this->Blush_)
+  {
+    const double washed = blush * gone;
+    blush -= washed;
+    this->WashedOut_ += washed;
+  }
+}
+
+template <bool Axial>
+void ContrastTracers::MoveAll()
+{
+  const std::uint64_t base = MixBits(this->Key + 2 * this->Steps);
+  const std::uint64_t second = MixBits(this->Key + 2 * this->Steps + 1);
+  const Motion* motions = this->Motions.data();
+  const std::int32_t* segments = this->Segment_.data();
+  float* lumens = this->Lumen_.data();
+  float* xs = this->X_.data();
+  float* ys = this->Y_.data();
+  for (std::int64_t i = 0; i < this->Size_; ++i)
+  {
+    const Motion& motion = motions[segments[i]];
+    const std::uint64_t bits = MixBits(base + static_cast<std::uint64_t>(i));
+    const float stepX = static_cast<float>(static_cast<std::int32_t>(bits)) * 0x1p-31F;
+    const float stepY = static_cast<float>(static_cast<std::int32_t>(bits >> 32)) * 0x1p-31F;
+    const float x = xs[i] + motion.radial * stepX;
+    const float y = ys[i] + motion.radial * stepY;
+    const float square = x * x + y * y;
+    const bool inside = square < 1.0F;
+    const float old = xs[i] * xs[i] + ys[i] * ys[i];
+    xs[i] = inside ? x : xs[i];
+    ys[i] = inside ? y : ys[i];
+    const float lumen = lumens[i];
+    const float rate = lumen < motion.injector ? motion.above : motion.below;
+    float moved = lumen + rate * (1.0F - (inside ? square : old));
+    if (Axial)
+    {
+      const auto third =
+        static_cast<std::int32_t>(MixBits(second + static_cast<std::uint64_t>(i)) >> 32);
+      moved += motion.axial * static_cast<float>(third) * 0x1p-31F;
+    }
+    lumens[i] = moved;
+    if (moved < 0.0F || moved > motion.volume)
+    {
+      this->Leaving.push_back(static_cast<std::int32_t>(i));
+    }
+  }
+}
+
+void ContrastTracers::Move()
+{
+  this->Leaving.clear();
+  if (this->Settings_.axialDiffusivity > 0.0)
+  {
+    this->MoveAll<true>();
+  }
+  else
+  {
+    this->MoveAll<false>();
+  }
+  bool gone = false;
+  for (const std::int32_t i : this->Leaving)
+  {
+    Tracer tracer{ this->Segment_[i], this->Lumen_[i], this->X_[i], this->Y_[i], this->Volume_[i] };
+    if (!this->Cross(tracer))
+    {
+      tracer.segment = -1;
+      gone = true;
+    }
+    this->Segment_[i] = tracer.segment;
+    this->Lumen_[i] = static_cast<float>(tracer.lumen);
+    this->X_[i] = static_cast<float>(tracer.x);
+    this->Y_[i] = static_cast<float>(tracer.y);
+  }
+  if (gone)
+  {
+    // From the last one on, the place of one that left is taken by the last one there is.
+    for (auto i = this->Leaving.rbegin(); i != this->Leaving.rend(); ++i)
+    {
+      if (this->Segment_[*i] < 0)
+      {
+        this->Copy(--this->Size_, *i);
+      }
+    }
+  }
+}
+
+void ContrastTracers::Copy(std::int64_t from, std::int64_t to)
+{
+  this->Segment_[to] = this->Segment_[from];
+  this->Lumen_[to] = this->Lumen_[from];
+  this->X_[to] = this->X_[from];
+  this->Y_[to] = this->Y_[from];
+  this->Volume_[to] = this->Volume_[from];
+}
+
+/// mL/s that leave a node through one of its ways.
+double ContrastTracers::OutOf(int node, int segment) const
+{
+  if (segment >= 0)
+  {
+    return this->Segments[segment].above == node ? this->FlowTop[segment]
+                                                 : -this->FlowBottom[segment];
+  }
+  double flow = 0.0;
+  for (const int other : this->Junctions[node].segments)
+  {
+    flow -= other >= 0 ? this->OutOf(node, other) : 0.0;
+  }
+  return flow;
+}
+
+/// A tracer whose lumen is beyond an end of its segment goes on for what is left of the step. False: it left the
+/// tree, and has been counted.
+bool ContrastTracers::Cross(Tracer& tracer)
+{
+  for (int k = 0; k < Crossings; ++k)
+  {
+    const double volume = this->Segments[tracer.segment].volume;
+    const bool atBeginning = tracer.lumen < 0.0;
+    if (!atBeginning && tracer.lumen <= volume)
+    {
+      return true;
+    }
+    const double beyond = atBeginning ? -tracer.lumen : tracer.lumen - volume;
+    const double flow =
+      atBeginning ? -this->FlowTop[tracer.segment] : this->FlowBottom[tracer.segment];
+    if (flow <= 0.0)
+    {
+      // Against the flow only diffusion leads, and it is reflected.
+      tracer.lumen = std::clamp(atBeginning ? beyond : volume - beyond, 0.0, volume);
+      return true;
+    }
+    // Twice the time left, mL of lumen for each mL/s.
+    const double left = beyond / (flow * (1.0 - Square(tracer.x) - Square(tracer.y)));
+    const int node =
+      atBeginning ? this->Segments[tracer.segment].above : this->Segments[tracer.segment].below;
+    const Way way = this->Route(tracer, node);
+    if (way == Way::None)
+    {
+      break;
+    }
+    if (way == Way::Outside)
+    {
+      return false;
+    }
+    const double inside = 1.0 - Square(tracer.x) - Square(tracer.y);
+    const Stretch& next = this->Segments[tracer.segment];
+    tracer.lumen = next.above == node
+      ? left * this->FlowTop[tracer.segment] * inside
+      : next.volume + left * this->FlowBottom[tracer.segment] * inside;
+  }
+  tracer.lumen = std::clamp(tracer.lumen, 0.0, this->Segments[tracer.segment].volume);
+  return true;
+}
+
+/// The tracer's next segment after a node, and its place in that cross-section.
+ContrastTracers::Way ContrastTracers::Route(Tracer& tracer, int node)
+{
+  const Junction& junction = this->Junctions[node];
+  double total = 0.0;
+  int ways = 0;
+  int chosen = -2;
+  for (const int way : junction.segments)
+  {
+    const double flow = way == tracer.segment ? 0.0 : this->OutOf(node, way);
+    if (flow > 0.0)
+    {
+      total += flow;
+      ++ways;
+      chosen = way;
+    }
+  }
+  if (ways > 1)
+  {
+    const double along = tracer.x * junction.partingX + tracer.y * junction.partingY;
+    const double across = tracer.y * junction.partingX - tracer.x * junction.partingY;
+    const double flux = total * FluxBelow(along);
+    double before = 0.0;
+    double taken = 0.0;
+    for (const int way : junction.segments)
+    {
+      const double flow = way == tracer.segment ? 0.0 : this->OutOf(node, way);
+      if (flow > 0.0)
+      {
+        before += taken;
+        taken = flow;
+        chosen = way;
+        if (flux < before + taken)
+        {
+          break;
+        }
+      }
+    }
+    const double x = ChordOf((flux - before) / taken);
+    const double wide = std::sqrt(std::max(1.0 - along * along, 1e-12));
+    const double y = across / wide * std::sqrt(std::max(1.0 - x * x, 0.0));
+    // Not onto the wall itself, where nothing moves.
+    const double scale = std::min(1.0, 0.9999 / std::sqrt(x * x + y * y + 1e-12));
+    tracer.x = scale * (x * junction.partingX - y * junction.partingY);
+    tracer.y = scale * (x * junction.partingY + y * junction.partingX);
+  }
+  if (chosen == -2)
+  {
+    return Way::None; // what comes in does not go out: round-off of a flow that stops
+  }
+  tracer.segment = chosen;
+  if (chosen >= 0)
+  {
+    return Way::Inside;
+  }
+  if (junction.tip)
+  {
+    this->Blush_[node] += tracer.volume;
+    this->Outflow_[node] += tracer.volume;
+  }
+  else
+  {
+    this->Spilled_ += tracer.volume;
+  }
+  return Way::Outside;
+}
+
+void ContrastTracers::Step(double dt, const TracerFlow& flow)
+{
+  this->PrepareMotion(dt, flow);
+  std::fill(this->Outflow_.begin(), this->Outflow_.end(), 0.0);
+  this->WashOut(dt);
+  this->Move();
+  if (flow.injection > 0.0)
+  {
+    this->Inject(flow.injection * dt);
+  }
+  else if (this->TracerVolume > this->Settings_.volume && this->Size_ == 0)
+  {
+    this->TracerVolume = this->Settings_.volume;
+  }
+  ++this->Steps;
+}
+
+void ContrastTracers::Inject(double volume)
+{
+  this->Injected_ += volume;
+  const int segment = this->Flow.injector.segment;
+  if (segment < 0)
+  {
+    this->Spilled_ += volume;
+    return;
+  }
+  const double down = std::max(this->FlowBottom[segment], 0.0);
+  const double up = std::max(-this->FlowTop[segment], 0.0);
+  const double share = up > 0.0 ? up / (up + down) : 0.0;
+  if (share < 1.0)
+  {
+    this->Emit((1.0 - share) * volume, true);
+  }
+  if (share > 0.0)
+  {
+    this->Emit(share * volume, false);
+  }
+}
+
+void ContrastTracers::Emit(double volume, bool down)
+{
+  // Even over step and flux: additive recurrence with the plastic constant (Roberts 2018), shifted by the seed.
+  constexpr double alphaX = 0.75487766624669276;
+  constexpr double alphaY = 0.56984029099805327;
+  RandomStream shift(this->Key, 1);
+  const double shiftX = shift.Uniform();
+  const double shiftY = shift.Uniform();
+  const double shiftTime = shift.Uniform();
+  const double wanted = std::ceil(volume / this->TracerVolume);
+  const auto count = static_cast<std::int64_t>(
+    std::clamp(wanted, 1.0, static_cast<double>(this->Settings_.capacity / 16)));
+  this->MakeRoom(count);
+  const int segment = this->Flow.injector.segment;
+  const double rate = down ? this->Motions[segment].below : this->Motions[segment].above;
+  for (std::int64_t k = 0; k < count; ++k)
+  {
+    const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
+    const double x = ChordOf(FractionalPart(shiftX + alphaX * number));
+    const double y = PlaceOnChord(FractionalPart(shiftY + alphaY * number)) *
+      std::sqrt(std::max(1.0 - x * x, 0.0));
+    const double time = (static_cast<double>(k) + shiftTime) / static_cast<double>(count);
+    const double scale = std::min(1.0, 0.9999 / std::sqrt(x * x + y * y + 1e-12));
+    Tracer tracer{ segment, 0.0, scale * x, scale * y, volume / static_cast<double>(count) };
+    tracer.lumen = this->Flow.injector.volume +
+      rate * (1.0 - time) * (1.0 - Square(tracer.x) - Square(tracer.y));
+    if (this->Cross(tracer))
+    {
+      const std::int64_t i = this->Size_++;
+      this->Segment_[i] = tracer.segment;
+      this->Lumen_[i] = static_cast<float>(tracer.lumen);
+      this->X_[i] = static_cast<float>(tracer.x);
+      this->Y_[i] = static_cast<float>(tracer.y);
+      this->Volume_[i] = tracer.volume;
+    }
+  }
+}
+
+void ContrastTracers::MakeRoom(std::int64_t count)
+{
+  if (this->Size_ + count > this->Settings_.capacity)
+  {
+    this->TracerVolume *= 2.0;
+    this->Thin(false);
+  }
+  if (this->Size_ + count > this->Settings_.capacity)
+  {
+    this->Thin(true); // so many segments that few tracers have a neighbour
+  }
+}
+
+/// Of two neighbours one stays, with the volume of both; the greater one rather, so that the mean place is kept.
+void ContrastTracers::Thin(bool anywhere)
+{
+  const auto cellOf = [this](std::int64_t i)
+  {
+    const Motion& motion = this->Motions[this->Segment_[i]];
+    const float part = this->Lumen_[i] / motion.volume;
+    return this->Segment_[i] * CellsOfSegment +
+      std::clamp(static_cast<int>(part * CellsOfSegment), 0, CellsOfSegment - 1);
+  };
+  std::fill(this->CellBegin.begin(), this->CellBegin.end(), 0);
+  for (std::int64_t i = 0; i < this->Size_; ++i)
+  {
+    ++this->CellBegin[cellOf(i) + 1];
+  }
+  for (std::size_t c = 1; c < this->CellBegin.size(); ++c)
+  {
+    this->CellBegin[c] += this->CellBegin[c - 1];
+  }
+  for (std::int64_t i = 0; i < this->Size_; ++i)
+  {
+    this->Order[this->CellBegin[cellOf(i)]++] = static_cast<std::int32_t>(i);
+  }
+  RandomStream random(this->Key + this->Steps, 2);
+  for (std::int64_t k = 0; k + 1 < this->Size_; ++k)
+  {
+    const std::int32_t a = this->Order[k];
+    const std::int32_t b = this->Order[k + 1];
+    if (this->Segment_[a] == this->Segment_[b] || anywhere)
+    {
+      const double sum = this->Volume_[a] + this->Volume_[b];
+      const bool first = random.Uniform() * sum < this->Volume_[a];
+      this->Volume_[first ? a : b] = sum;
+      this->Volume_[first ? b : a] = 0.0;
+      ++k;
+    }
+  }
+  std::int64_t kept = 0;
+  for (std::int64_t i = 0; i < this->Size_; ++i)
+  {
+    if (this->Volume_[i] > 0.0)
+    {
+      this->Copy(i, kept++);
+    }
+  }
+  this->Size_ = kept;
+}
+
+double ContrastTracers::InTree() const
+{
+  double sum = 0.0;
+  for (std::int64_t i = 0; i < this->Size_; ++i)
+  {
+    sum += this->Volume_[i];
+  }
+  return sum;
+}
+
+std::uint64_t ContrastTracers::StateHash() const
+{
+  const auto size = static_cast<std::size_t>(this->Size_);
+  std::uint64_t hash = Fnv1a(&this->Size_, sizeof(this->Size_));
+  const auto add = [&hash](const auto& list, std::size_t count)
+  { hash = Fnv1a(list.data(), count * sizeof(list[0]), hash); };
+  add(this->Segment_, size);
+  add(this->Lumen_, size);
+  add(this->X_, size);
+  add(this->Y_, size);
+  add(this->Volume_, size);
+  add(this->Blush_, this->Blush_.size());
+  add(
+    std::array<double, 4>{ this->Injected_, this->Spilled_, this->WashedOut_, this->TracerVolume },
+    4);
+  add(std::array<std::uint64_t, 3>{ this->Key, this->Steps, this->Emitted }, 3);
+  return hash;
+}
+}

@@ -1,0 +1,170 @@
+/**
+ * @file ContrastTracers.h
+ * @brief Contrast medium as particles that the blood carries along.
+ */
+#ifndef DynamicCoronary_ContrastTracers_h
+#define DynamicCoronary_ContrastTracers_h
+
+#include "CoronaryFlow.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace coronary
+{
+struct ContrastTracerSettings
+{
+  std::int64_t capacity = 20000; ///< greatest number of tracers, 1000 to 10,000,000
+  /// mL of contrast medium a tracer, 1e-7 to 0.1. Doubled while there are too many, halved again when there are few.
+  double volume = 2.5e-4;
+  /// Of the radial random walk, mm^2/s, 0 to 100: what secondary flow in bends and the pulse mix. At 0.5 a
+  /// cross-section of 1.5 mm radius is mixed in r^2 / (14.7 D) = 0.3 s.
+  double radialDiffusivity = 0.5;
+  /// Along the axis, mm^2/s, 0 to 100. Little against what the velocity profile disperses; above 0 medium also creeps
+  /// upstream of the tip, within its segment.
+  double axialDiffusivity = 0.0;
+  /// Time constant of the myocardium's wash-out, s, 0.05 to 100. A normal blush is gone within three cycles (TIMI
+  /// myocardial perfusion grade 3; Gibson et al., Circulation 2000;101:125).
+  double blushTime = 1.5;
+
+  /// @throws std::invalid_argument that names the first setting out of range or not finite
+  void Validate() const;
+};
+
+/// Flow that carries tracers during one step.
+struct TracerFlow
+{
+  const std::vector<double>* flow = nullptr; ///< mL/s per segment, below the injector
+  FlowNetwork::Place injector;               ///< segment -1: none
+  double flowAbove = 0.0;                    ///< mL/s in the injector's segment above it
+  double injection = 0.0;                    ///< mL/s of contrast medium
+};
+
+/**
+ * A tracer is at a segment, a volume v of the segment's lumen from its beginning, and a point (x, y) of the unit
+ * circle that stands for the cross-section. It moves by dv/dt = 2 Q (1 - x^2 - y^2), which is laminar flow in a tube of
+ * any taper, and by a random walk of (x, y) whose steps out of the circle are not taken: a uniform cross-section stays
+ * uniform exactly. The incoming flow of a node is cut into stream-tubes by chords across the direction in which the
+ * branches part; a branch gets the side that it leaves from, with as much of the flux as it takes, and the stream-tube
+ * is mapped onto the branch's whole circle so that flux is kept.
+ *
+ * Structure of arrays, all of it allocated at construction. Random numbers are functions of seed, step and place in the
+ * arrays.
+ */
+class ContrastTracers
+{
+public:
+  /// @throws std::invalid_argument as ContrastTracerSettings::Validate
+  ContrastTracers(
+    const FlowNetwork& network, const ContrastTracerSettings& settings, std::uint64_t seed);
+
+  /// Injects, moves and washes out. An injector of segment -1 with injection above 0: into the aorta.
+  void Step(double dt, const TracerFlow& flow);
+
+  std::int64_t Size() const { return this->Size_; }
+  int Segment(std::int64_t i) const { return this->Segment_[i]; }
+  double Lumen(std::int64_t i) const
+  {
+    return this->Lumen_[i];
+  } ///< mL of the segment that are before it
+  double X(std::int64_t i) const { return this->X_[i]; }
+  double Y(std::int64_t i) const { return this->Y_[i]; }
+  double Volume(std::int64_t i) const { return this->Volume_[i]; } ///< mL of contrast medium
+
+  double Injected() const { return this->Injected_; }               ///< mL so far
+  double Spilled() const { return this->Spilled_; }                 ///< mL so far
+  double WashedOut() const { return this->WashedOut_; }             ///< mL so far
+  double InTree() const;                                            ///< mL
+  const std::vector<double>& Blush() const { return this->Blush_; } ///< mL per node
+  /// mL of contrast medium that came through the node's outlet in the last step.
+  const std::vector<double>& Outflow() const { return this->Outflow_; }
+  std::uint64_t StateHash() const;
+
+private:
+  enum class Way
+  {
+    Inside,
+    Outside,
+    None
+  };
+  struct Tracer
+  {
+    int segment;
+    double lumen;
+    double x;
+    double y;
+    double volume;
+  };
+  struct Stretch
+  {
+    int above;     ///< node
+    int below;     ///< node
+    double volume; ///< mL
+    double radius; ///< mm
+  };
+  /// What a node's blood can go into, in the order in which it leaves along `parting`; -1: out of the tree.
+  struct Junction
+  {
+    std::vector<int> segments;
+    double partingX = 1.0;
+    double partingY = 0.0;
+    bool tip = false;
+    bool root = false;
+  };
+  /// What the moving loop needs of a segment.
+  struct Motion
+  {
+    float above;    ///< 2 Q dt above the injector, mL
+    float below;    ///< and below it
+    float injector; ///< mL from the segment's beginning
+    float radial;   ///< half width of a step of (x, y)
+    float axial;    ///< half width of a step of the lumen, mL
+    float volume;
+  };
+
+  void MakeJunctions(const FlowNetwork& network);
+  void PrepareMotion(double dt, const TracerFlow& flow);
+  void WashOut(double dt);
+  void Move();
+  template <bool Axial>
+  void MoveAll();
+  bool Cross(Tracer& tracer);
+  Way Route(Tracer& tracer, int node);
+  double OutOf(int node, int segment) const;
+  void Inject(double volume);
+  void Emit(double volume, bool down);
+  void MakeRoom(std::int64_t count);
+  void Thin(bool anywhere);
+  void Copy(std::int64_t from, std::int64_t to);
+
+  ContrastTracerSettings Settings_;
+  std::uint64_t Key;
+  std::uint64_t Steps = 0;
+  std::uint64_t Emitted = 0;
+  double TracerVolume; ///< mL, now
+  std::vector<Stretch> Segments;
+  std::vector<Junction> Junctions;
+  std::vector<Motion> Motions;
+  std::vector<double> FlowTop;    ///< mL/s per segment, at its beginning
+  std::vector<double> FlowBottom; ///< at its end
+  TracerFlow Flow;
+
+  std::int64_t Size_ = 0;
+  std::vector<std::int32_t> Segment_;
+  std::vector<float> Lumen_;
+  std::vector<float> X_;
+  std::vector<float> Y_;
+  std::vector<double> Volume_;
+  std::vector<std::int32_t> Leaving; ///< tracers that crossed an end of their segment
+  std::vector<std::int32_t> Order;   ///< for thinning
+  std::vector<std::int32_t> CellBegin;
+
+  double Injected_ = 0.0;
+  double Spilled_ = 0.0;
+  double WashedOut_ = 0.0;
+  std::vector<double> Blush_;
+  std::vector<double> Outflow_;
+};
+}
+
+#endif

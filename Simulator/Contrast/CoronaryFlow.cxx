@@ -1,0 +1,710 @@
+#include "CoronaryFlow.h"
+
+#include "Fnv1a.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+constexpr double PascalPerMmHg = 133.322387415;
+constexpr double EndDiastolicPressure = 8.0;   // left ventricle, mmHg
+constexpr double EarlyDiastolicPressure = 5.0; // mmHg
+constexpr double RelaxationTime = 0.08;        // isovolumic, fraction of R-R
+constexpr double NotchHeight = 0.6; // of the pulse pressure, that is left when the valve closes
+constexpr double RunOff = 1.5;      // exponent of the aorta's fall over diastole
+constexpr double ReferenceLength = 100.0; // mm
+constexpr double OutletLength = 10.0;     // mm before a tip whose mean radius is the outlet's
+constexpr double FlowReserve = 4.0;       // Gould, Lipscomb, Hamilton, Am J Cardiol 1974;33:87
+constexpr double ExpansionLoss = 1.52;    // K_t of Seeley and Young
+constexpr int StepsOfCycle = 160;
+
+void Require(bool possible, const char* name, double value, const char* range)
+{
+  if (!possible)
+  {
+    throw std::invalid_argument(std::string("coronary flow: ") + name + " is " +
+      std::to_string(value) + "; it has to be " + range);
+  }
+}
+
+bool Within(double value, double low, double high)
+{
+  return value >= low && value <= high; // not for NaN
+}
+
+/// From `a` at t = 0 to `b` at t = 1, level at both.
+double HalfCosine(double a, double b, double t)
+{
+  return a + (b - a) * 0.5 * (1.0 - std::cos(Pi * t));
+}
+
+double ModuloOne(double phase)
+{
+  const double part = phase - std::floor(phase);
+  return part < 1.0 ? part : 0.0;
+}
+
+/// When the valve closes.
+double NotchPressure(const CoronaryFlowSettings& settings)
+{
+  return settings.diastolicPressure +
+    NotchHeight * (settings.systolicPressure - settings.diastolicPressure);
+}
+
+/// integral ds / r^4 where r goes from a to b over a length, 1/mm^3.
+double InverseFourth(double length, double a, double b)
+{
+  return length * (a * a + a * b + b * b) / (3.0 * a * a * a * b * b * b);
+}
+
+/// mmHg s/mL for 1/mm^3.
+double PoiseuilleFactor(double viscosity)
+{
+  return 8.0 / Pi * (1e-3 * viscosity) * 1e3 / PascalPerMmHg;
+}
+
+/// Kinetic energy that a jet through `throat` loses in a vessel of `area` (mm^2): mmHg s^2/mL^2.
+double JetLoss(double density, double area, double throat)
+{
+  const double widening = area / throat - 1.0;
+  return ExpansionLoss * 0.5 * density * widening * widening / (area * area) / PascalPerMmHg;
+}
+
+const CoronaryFlowSettings& Checked(const CoronaryFlowSettings& settings)
+{
+  settings.Validate();
+  return settings;
+}
+
+double GreatestRadius(const std::vector<double>& abscissa, const std::vector<double>& radius,
+  std::size_t k, double from, double to)
+{
+  double greatest = radius[k];
+  for (std::size_t i = k; i > 0 && abscissa[i - 1] >= from; --i)
+  {
+    greatest = std::max(greatest, radius[i - 1]);
+  }
+  for (std::size_t i = k + 1; i < abscissa.size() && abscissa[i] <= to; ++i)
+  {
+    greatest = std::max(greatest, radius[i]);
+  }
+  return greatest;
+}
+}
+
+void CoronaryFlowSettings::Validate() const
+{
+  Require(Within(this->viscosity, 0.5, 20.0), "viscosity", this->viscosity, "0.5 to 20 mPa s");
+  Require(Within(this->density, 500.0, 2000.0), "density", this->density, "500 to 2000 kg/m^3");
+  Require(Within(this->systolicPressure, 20.0, 300.0), "systolicPressure", this->systolicPressure,
+    "20 to 300 mmHg");
+  Require(Within(this->diastolicPressure, 10.0, this->systolicPressure), "diastolicPressure",
+    this->diastolicPressure, "10 mmHg to systolicPressure");
+  Require(this->venousPressure >= -10.0 && this->venousPressure <= 30.0 &&
+      this->venousPressure < this->diastolicPressure,
+    "venousPressure", this->venousPressure, "-10 to 30 mmHg and below diastolicPressure");
+  Require(
+    Within(this->ejectionBegin, 0.01, 0.15), "ejectionBegin", this->ejectionBegin, "0.01 to 0.15");
+  Require(Within(this->systoleEnd, 0.2, 0.6), "systoleEnd", this->systoleEnd, "0.2 to 0.6");
+  Require(Within(this->leftAxialSpeed, 1.0, 200.0), "leftAxialSpeed", this->leftAxialSpeed,
+    "1 to 200 cm/s");
+  Require(Within(this->rightAxialSpeed, 1.0, 200.0), "rightAxialSpeed", this->rightAxialSpeed,
+    "1 to 200 cm/s");
+  Require(Within(this->leftDiastolicRatio, 0.3, 5.0), "leftDiastolicRatio",
+    this->leftDiastolicRatio, "0.3 to 5");
+  Require(Within(this->rightDiastolicRatio, 0.3, 5.0), "rightDiastolicRatio",
+    this->rightDiastolicRatio, "0.3 to 5");
+  Require(Within(this->outletExponent, 1.0, 4.0), "outletExponent", this->outletExponent, "1 to 4");
+  Require(
+    Within(this->arterialShare, 0.05, 0.95), "arterialShare", this->arterialShare, "0.05 to 0.95");
+  Require(Within(this->outletTime, 0.02, 5.0), "outletTime", this->outletTime, "0.02 to 5 s");
+  Require(Within(this->referenceHeartRate, 30.0, 200.0), "referenceHeartRate",
+    this->referenceHeartRate, "30 to 200 per minute");
+  Require(Within(this->stenosisThreshold, 0.05, 0.9), "stenosisThreshold", this->stenosisThreshold,
+    "0.05 to 0.9");
+  Require(Within(this->stenosisNeighbourhood, 1.0, 100.0), "stenosisNeighbourhood",
+    this->stenosisNeighbourhood, "1 to 100 mm");
+  for (const StatedStenosis& stenosis : this->stenoses)
+  {
+    Require(Within(stenosis.diameterReduction, 0.0, 0.95), "diameterReduction of a stenosis",
+      stenosis.diameterReduction, "0 to 0.95");
+    Require(Within(stenosis.length, 0.5, 100.0), "length of a stenosis", stenosis.length,
+      "0.5 to 100 mm");
+  }
+}
+
+double AorticPressure(const CoronaryFlowSettings& settings, double phase)
+{
+  const double length = settings.systoleEnd - settings.ejectionBegin;
+  const double since = ModuloOne(ModuloOne(phase) - settings.ejectionBegin);
+  const double notch = NotchPressure(settings);
+  if (since < 0.5 * length)
+  {
+    return HalfCosine(
+      settings.diastolicPressure, settings.systolicPressure, since / (0.5 * length));
+  }
+  if (since < length)
+  {
+    return HalfCosine(settings.systolicPressure, notch, since / (0.5 * length) - 1.0);
+  }
+  const double t = (since - length) / (1.0 - length);
+  const double last = std::exp(-RunOff);
+  return settings.diastolicPressure +
+    (notch - settings.diastolicPressure) * (std::exp(-RunOff * t) - last) / (1.0 - last);
+}
+
+double VentricularPressure(const CoronaryFlowSettings& settings, double phase)
+{
+  const double u = ModuloOne(phase);
+  if (u < settings.ejectionBegin)
+  {
+    return HalfCosine(EndDiastolicPressure, settings.diastolicPressure, u / settings.ejectionBegin);
+  }
+  if (u < settings.systoleEnd)
+  {
+    return AorticPressure(settings, u);
+  }
+  const double relaxed = settings.systoleEnd + RelaxationTime;
+  if (u < relaxed)
+  {
+    return HalfCosine(
+      NotchPressure(settings), EarlyDiastolicPressure, (u - settings.systoleEnd) / RelaxationTime);
+  }
+  return EarlyDiastolicPressure +
+    (EndDiastolicPressure - EarlyDiastolicPressure) * (u - relaxed) / (1.0 - relaxed);
+}
+
+CoronaryFlow::CoronaryFlow(const WallTopology& topology, const CoronaryFlowSettings& settings)
+  : Settings_(settings)
+  , Network_(topology, Checked(settings).sides)
+{
+  const std::size_t segments = this->Network_.Segments().size();
+  const std::size_t nodes = this->Network_.Nodes().size();
+  const std::size_t trees = this->Network_.Roots().size();
+  this->Flow_.assign(segments, 0.0);
+  this->AtTop.resize(segments);
+  this->Pressure_.assign(nodes, 0.0);
+  this->OutletResistance_.assign(nodes, 0.0);
+  this->Compliance.assign(nodes, 0.0);
+  this->Compartment.assign(nodes, 0.0);
+  this->Demands.resize(nodes);
+  this->Fraction.assign(trees, 0.0);
+  this->OutletFactor.assign(trees, 1.0);
+
+  this->FindStenoses();
+  for (const StatedStenosis& stenosis : settings.stenoses)
+  {
+    this->AddStatedStenosis(stenosis);
+  }
+  this->MeasureResistances();
+  this->ChooseOutletWeights();
+  this->ChoosePaths();
+  for (std::size_t t = 0; t < trees; ++t)
+  {
+    const bool right = this->Network_.RightSide()[t];
+    this->CalibrateMean(
+      static_cast<int>(t), right ? settings.rightAxialSpeed : settings.leftAxialSpeed);
+  }
+  for (std::size_t t = 0; t < trees; ++t)
+  {
+    const bool right = this->Network_.RightSide()[t];
+    this->CalibrateRatio(
+      static_cast<int>(t), right ? settings.rightDiastolicRatio : settings.leftDiastolicRatio);
+  }
+  for (std::size_t s = 0; s < segments; ++s)
+  {
+    const FlowSegment& segment = this->Network_.Segments()[s];
+    this->Losses[s] = this->LossBetween(static_cast<int>(s), segment.from, segment.to);
+  }
+  this->SettleAtRest();
+}
+
+void CoronaryFlow::FindStenoses()
+{
+  const FlowNetwork& network = this->Network_;
+  const double near = this->Settings_.stenosisNeighbourhood;
+  for (std::size_t b = 0; b < network.Branches().size(); ++b)
+  {
+    const std::vector<double>& s = network.Branches()[b].abscissa;
+    const std::vector<double>& radius = network.Topology().axisRadius[b];
+    std::vector<double> healthy = radius;
+    std::size_t narrowest = s.size(); // of the stretch that we are in
+    const auto close = [&]
+    {
+      if (narrowest < s.size())
+      {
+        const double area = Pi * healthy[narrowest] * healthy[narrowest];
+        const double throat = Pi * radius[narrowest] * radius[narrowest];
+        this->Stenoses.push_back({ network.Locate({ static_cast<int>(b), s[narrowest] }).segment,
+          s[narrowest], 0.0, JetLoss(this->Settings_.density, area, throat) });
+        narrowest = s.size();
+      }
+    };
+    for (std::size_t k = 0; k < s.size(); ++k)
+    {
+      const double reference = std::min(GreatestRadius(s, radius, k, s[k] - near, s[k]),
+        GreatestRadius(s, radius, k, s[k], s[k] + near));
+      if (radius[k] >= (1.0 - this->Settings_.stenosisThreshold) * reference)
+      {
+        close();
+        continue;
+      }
+      healthy[k] = reference;
+      if (narrowest == s.size() || radius[k] < radius[narrowest])
+      {
+        narrowest = k;
+      }
+    }
+    close();
+    this->HealthyRadius.push_back(std::move(healthy));
+  }
+}
+
+void CoronaryFlow::AddStatedStenosis(const StatedStenosis& stenosis)
+{
+  const FlowNetwork::Place place = this->Network_.Locate(stenosis.place);
+  const double radius = this->Network_.RadiusAt(stenosis.place.branch, place.abscissa);
+  const double area = Pi * radius * radius;
+  const double diameter = 2.0 * radius;
+  const double open = 1.0 - stenosis.diameterReduction;
+  // Seeley and Young's viscous loss, less the loss of the vessel that the axis shows.
+  const double length = 0.83 * stenosis.length + 1.64 * open * diameter;
+  const double viscous = std::max(0.0, length / std::pow(open, 4.0) - stenosis.length);
+  const double linear = 32.0 * viscous / (diameter * diameter) *
+    (1e-3 * this->Settings_.viscosity) * 1e3 / area / PascalPerMmHg;
+  this->Stenoses.push_back({ place.segment, place.abscissa, linear,
+    JetLoss(this->Settings_.density, area, open * open * area) });
+}
+
+void CoronaryFlow::MeasureResistances()
+{
+  const double factor = PoiseuilleFactor(this->Settings_.viscosity);
+  for (std::size_t b = 0; b < this->Network_.Branches().size(); ++b)
+  {
+    const std::vector<double>& s = this->Network_.Branches()[b].abscissa;
+    const std::vector<double>& radius = this->Network_.Topology().axisRadius[b];
+    const std::vector<double>& healthy = this->HealthyRadius[b];
+    BranchResistance along;
+    along.actual.push_back(0.0);
+    along.healthy.push_back(0.0);
+    for (std::size_t k = 1; k < s.size(); ++k)
+    {
+      const double length = s[k] - s[k - 1];
+      along.actual.push_back(
+        along.actual.back() + factor * InverseFourth(length, radius[k - 1], radius[k]));
+      along.healthy.push_back(
+        along.healthy.back() + factor * InverseFourth(length, healthy[k - 1], healthy[k]));
+    }
+    this->AlongBranch.push_back(std::move(along));
+  }
+}
+
+double CoronaryFlow::ResistanceTo(int branch, double abscissa) const
+{
+  const std::vector<double>& s = this->Network_.Branches()[branch].abscissa;
+  const std::vector<double>& along = this->AlongBranch[branch].actual;
+  if (abscissa >= s.back())
+  {
+    return along.back();
+  }
+  const std::size_t k =
+    static_cast<std::size_t>(std::upper_bound(s.begin() + 1, s.end(), abscissa) - s.begin()) - 1;
+  return along[k] +
+    PoiseuilleFactor(this->Settings_.viscosity) *
+    InverseFourth(abscissa - s[k], this->Network_.Topology().axisRadius[branch][k],
+      this->Network_.RadiusAt(branch, abscissa));
+}
+
+CoronaryFlow::Loss CoronaryFlow::LossBetween(int segment, double from, double to) const
+{
+  const int branch = this->Network_.Segments()[segment].branch;
+  Loss loss;
+  loss.linear = this->ResistanceTo(branch, to) - this->ResistanceTo(branch, from);
+  for (const Stenosis& stenosis : this->Stenoses)
+  {
+    if (stenosis.segment == segment && stenosis.abscissa > from && stenosis.abscissa <= to)
+    {
+      loss.linear += stenosis.linear;
+      loss.quadratic += stenosis.quadratic;
+    }
+  }
+  return loss;
+}
+
+void CoronaryFlow::ChooseOutletWeights()
+{
+  const std::vector<FlowSegment>& segments = this->Network_.Segments();
+  this->Weight.assign(this->Network_.Nodes().size(), 0.0);
+  for (std::size_t s = segments.size(); s-- > 0;)
+  {
+    const FlowSegment& segment = segments[s];
+    if (this->Network_.IsTip(segment.below))
+    {
+      const double from = std::max(segment.from, segment.to - OutletLength);
+      const double volume = this->Network_.VolumeAt(segment.branch, segment.to) -
+        this->Network_.VolumeAt(segment.branch, from);
+      const double radius = std::sqrt(1e3 * volume / (Pi * (segment.to - from)));
+      this->Weight[segment.below] = std::pow(2.0 * radius, this->Settings_.outletExponent);
+    }
+    this->Weight[segment.above] += this->Weight[segment.below];
+  }
+}
+
+void CoronaryFlow::ChoosePaths()
+{
+  const std::vector<FlowSegment>& segments = this->Network_.Segments();
+  const auto isLad = [&](int s)
+  {
+    return this->Network_.Topology().groupName[segments[s].branch].find("LAD") != std::string::npos;
+  };
+  for (std::size_t t = 0; t < this->Network_.Roots().size(); ++t)
+  {
+    int node = this->Network_.Roots()[t];
+    for (std::size_t s = 0; s < segments.size(); ++s)
+    {
+      if (this->Network_.Nodes()[segments[s].above].tree == static_cast<int>(t) &&
+        isLad(static_cast<int>(s)))
+      {
+        node = segments[s].above;
+        break;
+      }
+    }
+    std::vector<int> path;
+    double length = 0.0;
+    while (!this->Network_.IsTip(node) && length < ReferenceLength)
+    {
+      const std::vector<int>& below = this->Network_.Nodes()[node].below;
+      const int next = *std::max_element(below.begin(), below.end(),
+        [&](int a, int b)
+        {
+          return std::make_pair(isLad(a), this->Weight[segments[a].below]) <
+            std::make_pair(isLad(b), this->Weight[segments[b].below]);
+        });
+      path.push_back(next);
+      length += segments[next].to - segments[next].from;
+      node = segments[next].below;
+    }
+    this->Path.push_back(std::move(path));
+    this->PathLength.push_back(std::min(length, ReferenceLength));
+  }
+}
+
+double CoronaryFlow::AxialSpeed(int tree) const
+{
+  double left = this->PathLength[tree];
+  double time = 0.0;
+  for (const int s : this->Path[tree])
+  {
+    const FlowSegment& segment = this->Network_.Segments()[s];
+    const double length = std::min(left, segment.to - segment.from);
+    const double volume =
+      this->Network_.VolumeAt(segment.branch, segment.from + length) - segment.volumeFrom;
+    time += volume / (2.0 * this->Flow_[s]);
+    left -= length;
+  }
+  return 0.1 * this->PathLength[tree] / time;
+}
+
+void CoronaryFlow::CalibrateMean(int tree, double target)
+{
+  const std::size_t nodes = this->Network_.Nodes().size();
+  const std::vector<FlowSegment>& segments = this->Network_.Segments();
+  double aortic = 0.0;
+  for (int k = 0; k < StepsOfCycle; ++k)
+  {
+    aortic += AorticPressure(this->Settings_, (k + 1.0) / StepsOfCycle) / StepsOfCycle;
+  }
+  const auto speed = [&](double scale)
+  {
+    for (std::size_t n = 0; n < nodes; ++n)
+    {
+      if (this->Network_.Nodes()[n].tree == tree || this->OutletResistance_[n] == 0.0)
+      {
+        this->OutletResistance_[n] = scale / this->Weight[n];
+      }
+    }
+    this->SolveSteady(aortic);
+    return this->AxialSpeed(tree);
+  };
+  const auto bisect = [&](double low, double high)
+  {
+    for (int k = 0; k < 60 && high / low > 1.0 + 1e-14; ++k)
+    {
+      const double middle = std::sqrt(low * high);
+      (speed(middle) > target ? low : high) = middle;
+    }
+    return std::sqrt(low * high);
+  };
+  this->Losses.assign(segments.size(), Loss());
+  const double ideal = bisect(1e-6, 1e12); // nothing is lost on the way to the outlets
+  for (std::size_t s = 0; s < segments.size(); ++s)
+  {
+    const FlowBranch& branch = this->Network_.Branches()[segments[s].branch];
+    const std::vector<double>& along = this->AlongBranch[segments[s].branch].healthy;
+    const auto healthyTo = [&](double abscissa)
+    {
+      const auto k = std::clamp<std::ptrdiff_t>(
+        std::lower_bound(branch.abscissa.begin(), branch.abscissa.end(), abscissa) -
+          branch.abscissa.begin(),
+        1, static_cast<std::ptrdiff_t>(along.size()) - 1);
+      const double length = branch.abscissa[k] - branch.abscissa[k - 1];
+      const double t = length > 0.0 ? (abscissa - branch.abscissa[k - 1]) / length : 1.0;
+      return along[k - 1] + t * (along[k] - along[k - 1]);
+    };
+    this->Losses[s].linear = healthyTo(segments[s].to) - healthyTo(segments[s].from);
+  }
+  speed(bisect(ideal / FlowReserve, ideal));
+  for (std::size_t n = 0; n < nodes; ++n)
+  {
+    const double before = this->Settings_.arterialShare;
+    this->Compliance[n] =
+      this->Settings_.outletTime / (before * (1.0 - before) * this->OutletResistance_[n]);
+  }
+}
+
+int CoronaryFlow::CyclesToSettle() const
+{
+  // To exp(-10) of what it was.
+  return static_cast<int>(
+    std::ceil(10.0 * this->Settings_.outletTime * this->Settings_.referenceHeartRate / 60.0));
+}
+
+double CoronaryFlow::PeriodicRatioParts(int tree, double fraction, double& systole)
+{
+  this->Fraction[tree] = fraction;
+  double diastole = 0.0;
+  const double dt = 60.0 / this->Settings_.referenceHeartRate / StepsOfCycle;
+  const int cycles = 2 + this->CyclesToSettle();
+  int inSystole = 0;
+  systole = 0.0;
+  this->Ventricular = VentricularPressure(this->Settings_, 0.0);
+  for (int k = 0; k < cycles * StepsOfCycle; ++k)
+  {
+    const double phase = ModuloOne((k + 1.0) / StepsOfCycle);
+    this->Advance(
+      dt, AorticPressure(this->Settings_, phase), VentricularPressure(this->Settings_, phase));
+    if (k >= (cycles - 1) * StepsOfCycle)
+    {
+      const double flow = this->Flow_[this->Path[tree].front()];
+      const bool early = phase < this->Settings_.systoleEnd;
+      (early ? systole : diastole) += flow;
+      inSystole += early ? 1 : 0;
+    }
+  }
+  systole /= inSystole;
+  return diastole / (StepsOfCycle - inSystole);
+}
+
+void CoronaryFlow::CalibrateRatio(int tree, double target)
+{
+  double systole0 = 0.0;
+  double systole1 = 0.0;
+  const double diastole0 = this->PeriodicRatioParts(tree, 0.0, systole0);
+  const double diastole1 = this->PeriodicRatioParts(tree, 1.0, systole1) - diastole0;
+  systole1 -= systole0;
+  // (diastole0 + f diastole1) = target (systole0 + f systole1)
+  const double slope = diastole1 - target * systole1;
+  this->Fraction[tree] =
+    slope > 0.0 ? std::clamp((target * systole0 - diastole0) / slope, 0.0, 1.0) : 0.0;
+}
+
+void CoronaryFlow::SettleAtRest()
+{
+  std::fill(this->Compartment.begin(), this->Compartment.end(), this->Settings_.venousPressure);
+  this->Ventricular = VentricularPressure(this->Settings_, 0.0);
+  const double dt = 60.0 / this->Settings_.referenceHeartRate / StepsOfCycle;
+  for (int k = 0; k < this->CyclesToSettle() * StepsOfCycle; ++k)
+  {
+    const double phase = ModuloOne((k + 1.0) / StepsOfCycle);
+    this->Advance(
+      dt, AorticPressure(this->Settings_, phase), VentricularPressure(this->Settings_, phase));
+  }
+}
+
+void CoronaryFlow::SetOutletFactor(int tree, double factor)
+{
+  Require(factor > 0.0 && factor < 1e6, "factor of the outlets' resistance", factor, "above 0");
+  this->OutletFactor[tree] = factor;
+}
+
+void CoronaryFlow::SolveSteady(double aortic)
+{
+  for (std::size_t n = 0; n < this->Demands.size(); ++n)
+  {
+    const bool tip = this->Network_.IsTip(static_cast<int>(n));
+    const double conductance = tip ? 1.0 / this->OutletResistance_[n] : 0.0;
+    this->Demands[n] = { conductance, conductance * this->Settings_.venousPressure };
+  }
+  this->SolveTrees(aortic);
+}
+
+void CoronaryFlow::Advance(double dt, double aortic, double ventricular)
+{
+  const std::vector<FlowNode>& nodes = this->Network_.Nodes();
+  const double share = this->Settings_.arterialShare;
+  const auto parts = [&](std::size_t n, double& before, double& behind, double& storage)
+  {
+    const double whole = this->OutletResistance_[n] * this->OutletFactor[nodes[n].tree];
+    before = 1.0 / (share * whole);
+    behind = 1.0 / ((1.0 - share) * whole);
+    storage = this->Compliance[n] / dt;
+  };
+  const auto supply = [&](std::size_t n, double behind, double storage)
+  {
+    const double squeeze = this->Fraction[nodes[n].tree] * (ventricular - this->Ventricular);
+    return behind * this->Settings_.venousPressure + storage * (this->Compartment[n] + squeeze);
+  };
+  double before = 0.0;
+  double behind = 0.0;
+  double storage = 0.0;
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    this->Demands[n] = Demand();
+    if (this->Network_.IsTip(static_cast<int>(n)))
+    {
+      parts(n, before, behind, storage);
+      const double sum = before + behind + storage;
+      this->Demands[n] = { before * (behind + storage) / sum,
+        before * supply(n, behind, storage) / sum };
+    }
+  }
+  this->SolveTrees(aortic);
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+  {
+    if (this->Network_.IsTip(static_cast<int>(n)))
+    {
+      parts(n, before, behind, storage);
+      this->Compartment[n] =
+        (before * this->Pressure_[n] + supply(n, behind, storage)) / (before + behind + storage);
+    }
+  }
+  this->Aortic = aortic;
+  this->Ventricular = ventricular;
+}
+
+void CoronaryFlow::SolveTrees(double aortic)
+{
+  // A demand seen through a loss, which is linear about the flow of the step before.
+  struct Linear
+  {
+    double resistance;
+    double offset; // pressure loss = resistance Q - offset
+    Linear(const Loss& loss, double flow)
+      : resistance(loss.linear + 2.0 * loss.quadratic * std::abs(flow))
+      , offset(loss.quadratic * std::abs(flow) * flow)
+    {
+    }
+    Demand Through(const Demand& behind) const
+    {
+      const double scale = 1.0 / (1.0 + behind.conductance * this->resistance);
+      return { scale * behind.conductance,
+        scale * (behind.offset - behind.conductance * this->offset) };
+    }
+    double Lost(double flow) const { return this->resistance * flow - this->offset; }
+  };
+  const std::vector<FlowSegment>& segments = this->Network_.Segments();
+  const int injected = this->Injector_.segment;
+  const double injection = this->Injection_;
+  const double flowBelow = injected >= 0 ? this->Flow_[injected] : 0.0;
+  const Linear upper(this->AboveInjector, flowBelow - injection);
+  const Linear lower(this->BelowInjector, flowBelow);
+
+  // `Demands` are those of the tips now, and become those of all that is beyond a node.
+  for (std::size_t s = segments.size(); s-- > 0;)
+  {
+    Demand demand = this->Demands[segments[s].below];
+    if (static_cast<int>(s) == injected)
+    {
+      demand = lower.Through(demand);
+      demand.offset += injection;
+      demand = upper.Through(demand);
+    }
+    else
+    {
+      demand = Linear(this->Losses[s], this->Flow_[s]).Through(demand);
+    }
+    this->AtTop[s] = demand;
+    this->Demands[segments[s].above].conductance += demand.conductance;
+    this->Demands[segments[s].above].offset += demand.offset;
+  }
+  for (const int root : this->Network_.Roots())
+  {
+    this->Pressure_[root] = aortic;
+  }
+  for (std::size_t s = 0; s < segments.size(); ++s)
+  {
+    const double above = this->Pressure_[segments[s].above];
+    const double flow = this->AtTop[s].conductance * above - this->AtTop[s].offset;
+    const bool here = static_cast<int>(s) == injected;
+    const double lost = here ? upper.Lost(flow) + lower.Lost(flow + injection)
+                             : Linear(this->Losses[s], this->Flow_[s]).Lost(flow);
+    this->Pressure_[segments[s].below] = above - lost;
+    this->Flow_[s] = here ? flow + injection : flow;
+  }
+}
+
+void CoronaryFlow::SetInjector(double injection, const CatheterTip& tip)
+{
+  this->Injector_ = FlowNetwork::Place();
+  this->Injection_ = 0.0;
+  if (injection > 0.0 && tip.branch >= 0)
+  {
+    this->Injector_ = this->Network_.Locate(tip);
+    this->Injection_ = injection;
+    const int s = this->Injector_.segment;
+    const FlowSegment& segment = this->Network_.Segments()[s];
+    this->AboveInjector = this->LossBetween(s, segment.from, this->Injector_.abscissa);
+    this->BelowInjector = this->LossBetween(s, this->Injector_.abscissa, segment.to);
+  }
+}
+
+void CoronaryFlow::Step(
+  double dt, double phase, double heartRate, double injection, const CatheterTip& tip)
+{
+  Require(dt > 0.0 && dt < 1e6, "time step", dt, "above 0 s");
+  Require(std::isfinite(phase), "phase", phase, "finite");
+  Require(Within(heartRate, 0.0, 1000.0), "heart rate", heartRate, "0 to 1000 per minute");
+  Require(Within(injection, 0.0, 1000.0), "injection", injection, "0 to 1000 mL/s");
+  this->SetInjector(injection, tip);
+  const double ventricular = VentricularPressure(this->Settings_, phase);
+  if (heartRate == 0.0 || !this->Started)
+  {
+    this->Ventricular = ventricular;
+  }
+  this->Started = true;
+  this->Advance(dt, AorticPressure(this->Settings_, phase), ventricular);
+}
+
+double CoronaryFlow::FlowAtBeginning(int segment) const
+{
+  return this->Flow_[segment] - (segment == this->Injector_.segment ? this->Injection_ : 0.0);
+}
+
+double CoronaryFlow::TreeFlow(int tree) const
+{
+  double flow = 0.0;
+  for (const int s : this->Network_.Nodes()[this->Network_.Roots()[tree]].below)
+  {
+    flow += this->FlowAtBeginning(s);
+  }
+  return flow;
+}
+
+std::uint64_t CoronaryFlow::StateHash(std::uint64_t before) const
+{
+  std::uint64_t hash = before;
+  for (const std::vector<double>* list :
+    { &this->Flow_, &this->Pressure_, &this->Compartment, &this->OutletFactor })
+  {
+    hash = Fnv1a(list->data(), list->size() * sizeof(double), hash);
+  }
+  return Fnv1a(&this->Ventricular, sizeof(this->Ventricular), hash);
+}
+}
