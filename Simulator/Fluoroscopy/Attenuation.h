@@ -9,6 +9,7 @@
 #define DynamicCoronary_Attenuation_h
 
 #include <array>
+#include <vector>
 
 namespace coronary
 {
@@ -35,15 +36,22 @@ constexpr std::array<XRayMaterial, 13> AllXRayMaterials{ XRayMaterial::Water,
   XRayMaterial::SoftTissue, XRayMaterial::Lung, XRayMaterial::Ptfe, XRayMaterial::Nylon,
   XRayMaterial::BariumPolymer };
 
-/// What it is made of, in xraylib's words.
+/// What a material is made of.
 struct XRayMaterialData
 {
-  const char* name;        ///< English
-  const char* composition; ///< a chemical formula, or the name of a compound in xraylib's NIST table
-  double density;          ///< g/cm^3
+  struct Part
+  {
+    const char* formula; ///< chemical
+    double share;        ///< of the mass, 0 to 1
+  };
+  const char* name; ///< English
+  double density;   ///< g/cm^3
+  std::vector<Part> parts;
 };
 
-/// Of the contrast medium: the formula and density are those of its water; the iodine comes on top.
+/**
+ * Tissues: ICRU report 44. The contrast medium is iodine in water, OfContrastMedium().
+ */
 const XRayMaterialData& DataOf(XRayMaterial material);
 
 /// Linear attenuation coefficients at one energy, which stands for a tube's spectrum.
@@ -78,7 +86,7 @@ private:
   double Energy_;
   std::array<double, AllXRayMaterials.size()> Coefficients; ///< 1/mm
   double Iodine;                                            ///< mass attenuation, cm^2/g
-  double BoneHounsfield;
+  double BoneHounsfield;                                    ///< of cortical bone in the CT
 };
 }
 

@@ -17,11 +17,11 @@ namespace coronary
 {
 struct BackgroundCacheSettings
 {
-  bool worker = true;        ///< false: SetGeometry() makes the whole image itself
-  int previewSize = 128;     ///< columns and rows of the coarse image at most
-  int bandRows = 32;         ///< rows that are refined between two images handed out
-  double angleStep = 3.5e-4; ///< radians (0.02 degrees): poses are rounded to whole steps
-  double lengthStep = 0.1;   ///< mm, of distances and of the isocentre
+  bool worker = true;               ///< false: SetGeometry() makes the whole image itself
+  int previewSize = 128;            ///< columns and rows of the coarse image at most
+  int bandRows = 32;                ///< rows that are refined between two images handed out
+  double angleStep = 3.5e-4;        ///< radians (0.02 degrees): poses are rounded to whole steps
+  double lengthStep = 0.1;          ///< mm, of distances and of the isocentre
   std::size_t memory = 128U << 20U; ///< bytes of finished images that are kept
 };
 
