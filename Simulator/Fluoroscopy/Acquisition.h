@@ -89,8 +89,8 @@ public:
   const Exposure& Last() const { return this->Last_; }
   bool Radiating() const { return this->Beam != Off; } ///< a pedal was down at the last tick
 
-  void SetFluoroscopyRate(FrameRate rate) { this->Settings_.fluoroscopyRate = rate; }
-  void SetCineRate(FrameRate rate) { this->Settings_.cineRate = rate; }
+  void SetFluoroscopyRate(FrameRate rate);
+  void SetCineRate(FrameRate rate);
   /// cm^2 at the reference point. @throws std::invalid_argument
   void SetFieldArea(double area);
   /// Output of the tube relative to the settings, 0.1 to 10: for thicker patients or steeper angles.
@@ -98,8 +98,8 @@ public:
   void SetDoseFactor(double factor);
 
   const AcquisitionSettings& Settings() const { return this->Settings_; }
-  const DoseCounters& Fluoroscopy() const { return this->Counters[0]; }
-  const DoseCounters& Cine() const { return this->Counters[1]; }
+  DoseCounters Fluoroscopy() const { return this->Counted(0); }
+  DoseCounters Cine() const { return this->Counted(1); }
   DoseCounters Total() const;
   std::int64_t Runs() const { return this->Runs_; } ///< cine runs that were begun
 
@@ -115,6 +115,7 @@ private:
   };
   void Switch(BeamState wanted);
   void Expose(bool cine);
+  DoseCounters Counted(int kind) const;
 
   AcquisitionSettings Settings_;
   double DoseFactor = 1.0;
@@ -128,7 +129,7 @@ private:
   std::int64_t FrameOfSequence = 0;
   std::int64_t Runs_ = 0;
   std::int64_t PedalTicks[2] = { 0, 0 };
-  DoseCounters Counters[2];
+  DoseCounters Counters[2]; ///< fluoroscopy, cine; their seconds are not kept
   Exposure Last_;
 };
 

@@ -90,11 +90,16 @@ public:
 
 private:
   void Resize(int columns, int rows);
-  void MakeShutters();
+  void Prepare();
   void Transmit(
     const LineIntegrals& first, const LineIntegrals* second, const LineIntegrals* third);
   void MakeVeil();
+  void InterpolateVeil(int row);
   void DetectRow(int row, float photons, std::uint64_t key);
+  void BlurAcrossRows(float lag);
+  void BlurRow(const float* in, int width, const std::vector<float>& half, float* result);
+  void PointToRows(const std::vector<float>& image, int columns, int rows, int row,
+    const std::vector<float>& half);
 
   DetectorSettings Settings_;
   std::uint64_t Seed;
@@ -105,13 +110,16 @@ private:
   int CellRows = 1;
   std::vector<float> ShutterColumns; ///< open share of each column, and row
   std::vector<float> ShutterRows;
-  std::vector<float> Transmission;  ///< exp(-A) between the shutters
-  std::vector<float> Veil;          ///< one value a cell
-  std::vector<float> VeilRows;      ///< scratch of the veil's blur
-  std::vector<float> VeilKernel[2]; ///< across, down: right halves from the centre on
-  std::vector<float> BlurKernel;    ///< right half
-  std::vector<float> Photons;       ///< ring of rows that the vertical blur needs
-  std::vector<float> Expected;      ///< of one row
+  std::vector<float> BlurKernel; ///< right halves of symmetric kernels
+  std::vector<float> VeilAlong;
+  std::vector<float> VeilAcross;
+  std::vector<float> Transmission; ///< exp(-A) between the shutters; then photons
+  std::vector<float> Veil;         ///< one value a cell
+  std::vector<float> VeilScratch;
+  std::vector<float> VeilRow; ///< of one row of pixels
+  std::vector<float> Padded;  ///< a row with what its blur needs beyond its ends
+  std::vector<float> Blurred; ///< along rows
+  std::vector<const float*> RowPointers;
   std::vector<float> Signal_;
 };
 
@@ -124,7 +132,7 @@ float PoissonPhotons(float mean, std::uint64_t bits);
 /// exp(x), relative error below 3e-7, for x in -87 to 87; limited to the values there.
 float FastExp(float x);
 
-/// ln(x), absolute error below 2e-6 for normal x in 1e-30 to 1e30.
+/// ln(x), absolute error below 2e-6 for x in 1e-6 to 1e8.
 float FastLog(float x);
 }
 

@@ -98,14 +98,17 @@ public:
   std::size_t StoredBytes() const { return this->Stored; }
 
 private:
+  void FitTo(int columns, int rows);
   void FollowBrightness(const LineIntegrals& background, const Exposure& exposure);
   void Begin(const Exposure& exposure);
+  void ShowPlain();
+  void ShowSubtracted();
   void AddToMask();
   void GatherRoadmap();
-  void ShowPlain();
-  void ShowDifference(bool overlay);
+  void FinishRoadmap();
+  void AddRoadmap();
   void Store(const Exposure& exposure);
-  void DropOldest();
+  void KeepWithinMemory();
 
   ImagerSettings Settings_;
   Detector Detector_;
@@ -114,13 +117,14 @@ private:
   std::int64_t Sequence = 0;
   double DisplayLevel_ = 0.0;
   bool Bright = false;          ///< DisplayLevel_ has been set
-  std::vector<float> LogSignal; ///< ln(photons / photons of the unattenuated beam)
+  std::vector<float> LogSignal; ///< ln(photons / photons of the unattenuated beam), less the mask
   std::vector<float> Mask;      ///< the mean of MaskCount frames of LogSignal
   int MaskCount = 0;
+  bool MaskIsOpen = true; ///< the next frame belongs to it
   bool RoadmapReady = false;
-  bool RoadmapHasMap = false;
-  std::vector<float> Smoothed; ///< opacification, low-pass over the frames
-  std::vector<float> Roadmap;  ///< greatest opacification, ln(photons)
+  std::int64_t RoadmapSequence = -1; ///< in which vessels are gathered; negative: not begun
+  std::vector<float> Smoothed;       ///< opacification, low-pass over the frames
+  std::vector<float> Roadmap;        ///< greatest opacification, ln(photons)
   std::deque<Run> Runs_;
   std::int64_t Dropped = 0;
   std::size_t Stored = 0;
