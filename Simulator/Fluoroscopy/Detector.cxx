@@ -1,0 +1,597 @@
+#include "Detector.h"
+
+#include "CounterRandom.h"
+#include "DetectorKernels.h"
+#include "FastMath.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+namespace coronary
+{
+namespace
+{
+void Require(bool possible, const char* name, double value, const char* range)
+{
+  if (!possible)
+  {
+    throw std::invalid_argument(std::string("detector: ") + name + " is " + std::to_string(value) +
+      "; it has to be " + range);
+  }
+}
+
+/// Right half of a sampled Gaussian whose both halves sum to 1.
+std::vector<float> GaussianHalf(double sigma)
+{
+  if (!(sigma > 0.0))
+  {
+    return { 1.0F };
+  }
+  const int radius = static_cast<int>(std::ceil(4.0 * sigma));
+  std::vector<double> weights;
+  double sum = 0.0;
+  for (int r = 0; r <= radius; ++r)
+  {
+    weights.push_back(std::exp(-0.5 * r * r / (sigma * sigma)));
+    sum += (r == 0 ? 1.0 : 2.0) * weights.back();
+  }
+  std::vector<float> half;
+  for (const double weight : weights)
+  {
+    half.push_back(static_cast<float>(weight / sum));
+  }
+  return half;
+}
+
+/// Where a sample outside 0 .. count - 1 is taken from: the image is continued as in a mirror at its edge, so that a
+/// symmetric kernel loses nothing there.
+int Mirrored(int i, int count)
+{
+  const int period = 2 * count;
+  const int place = ((i % period) + period) % period;
+  return place < count ? place : period - 1 - place;
+}
+
+/// Pixels a cell of the veil's grid: cells have to be whole, and narrow against the veil.
+int CellSize(int pixels, double sigma)
+{
+  for (const int size : { 8, 4, 2 })
+  {
+    if (pixels % size == 0 && sigma >= 2.0 * size)
+    {
+      return size;
+    }
+  }
+  return 1;
+}
+
+/// Where, relative to the centre of a cell, its first pixel is that is not before the centre.
+double FirstFraction(int cell)
+{
+  return (cell / 2 - 0.5 * (cell - 1)) / cell;
+}
+
+/// The Gaussian between cells that together with averaging over cells and interpolation between them has the
+/// standard deviation sigma.
+std::vector<float> VeilKernelOf(double sigma, int cell)
+{
+  const double averaging = (cell * cell - 1.0) / 12.0;
+  double interpolation = 0.0;
+  for (int j = 0; j < cell; ++j)
+  {
+    // From both sides of the centre.
+    const double fraction = FirstFraction(cell) + static_cast<double>(j) / cell;
+    interpolation += 2.0 * fraction * fraction * (1.0 - fraction) * cell;
+  }
+  return GaussianHalf(std::sqrt(sigma * sigma - averaging - interpolation) / cell);
+}
+
+std::vector<float> OpenShares(int count, double before, double after, double transmission)
+{
+  std::vector<float> shares(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i)
+  {
+    // Partly covered pixels at the edges.
+    const double open = std::clamp(i + 1.0 - before * count, 0.0, 1.0) *
+      std::clamp(count * (1.0 - after) - i, 0.0, 1.0);
+    shares[static_cast<std::size_t>(i)] =
+      static_cast<float>(transmission + (1.0 - transmission) * open);
+  }
+  return shares;
+}
+
+/// x with P(normal < x) = p, by bisection: only for tables.
+double NormalQuantile(double p)
+{
+  double low = -10.0;
+  double high = 10.0;
+  for (int k = 0; k < 60; ++k)
+  {
+    const double middle = 0.5 * (low + high);
+    (0.5 * std::erfc(-middle / std::sqrt(2.0)) < p ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+/// Equally probable values of a distribution near to the normal one, of variance 1/2: two make a deviate.
+class NormalTable
+{
+public:
+  static constexpr int Bits = 11;
+  static constexpr int Count = 1 << Bits;
+
+  NormalTable()
+  {
+    double square = 0.0;
+    std::array<double, Count> quantiles{};
+    for (int i = 0; i < Count / 2; ++i)
+    {
+      const double quantile = NormalQuantile((i + 0.5) / Count);
+      quantiles[static_cast<std::size_t>(i)] = quantile;
+      quantiles[static_cast<std::size_t>(Count - 1 - i)] = -quantile;
+      square += 2.0 * quantile * quantile;
+    }
+    const double scale = std::sqrt(0.5 * Count / square);
+    for (std::size_t i = 0; i < Count; ++i)
+    {
+      this->Values[i] = static_cast<float>(scale * quantiles[i]);
+    }
+  }
+
+  float operator()(std::uint64_t bits) const
+  {
+    return this->Values[bits >> (64 - Bits)] + this->Values[(bits >> (64 - 2 * Bits)) % Count];
+  }
+
+private:
+  std::array<float, Count> Values{};
+};
+
+/// Poisson numbers of means 0, 1/4, 2/4 ... by Walker's alias method: one look-up each.
+/// Source: Walker, "An efficient method for generating discrete random variables", ACM TOMS 3 (1977) 253.
+class PoissonTable
+{
+public:
+  static constexpr float Largest = 32.0F; ///< mean
+  static constexpr float PerUnit = 4.0F;  ///< tables
+
+  PoissonTable()
+  {
+    for (int row = 0; row < RowCount; ++row)
+    {
+      this->MakeRow(row);
+    }
+  }
+
+  /// Of mean row / PerUnit; uses the upper 31 bits.
+  int operator()(int row, std::uint64_t bits) const
+  {
+    const auto slot = static_cast<std::uint32_t>(bits >> 57);
+    const auto fraction = static_cast<std::uint32_t>(bits >> 33) & 0xffffffU;
+    const std::uint32_t entry = this->Entries[static_cast<std::size_t>(row) * SlotCount + slot];
+    return static_cast<int>(fraction < (entry >> 8) ? slot : entry & 0xffU);
+  }
+
+private:
+  static constexpr int RowCount = static_cast<int>(Largest * PerUnit);
+  static constexpr int SlotCount = 128; ///< numbers from 0 to 127: 128 photons of 32 never come
+
+  /// Probabilities of a mean, times SlotCount.
+  static std::array<double, SlotCount> Heights(double mean)
+  {
+    std::array<double, SlotCount> heights{};
+    double probability = std::exp(-mean);
+    for (int n = 0; n < SlotCount; ++n)
+    {
+      heights[static_cast<std::size_t>(n)] = probability * SlotCount;
+      probability *= mean / (n + 1);
+    }
+    return heights;
+  }
+
+  void MakeRow(int row)
+  {
+    std::array<double, SlotCount> heights = Heights(static_cast<double>(row) / PerUnit);
+    std::vector<std::size_t> low;
+    std::vector<std::size_t> high;
+    for (std::size_t n = 0; n < SlotCount; ++n)
+    {
+      (heights[n] < 1.0 ? low : high).push_back(n);
+    }
+    std::uint32_t* entries = this->Entries.data() + static_cast<std::size_t>(row) * SlotCount;
+    while (!low.empty())
+    {
+      const std::size_t n = low.back();
+      low.pop_back();
+      if (high.empty())
+      {
+        entries[n] = Entry(1.0, n);
+        continue;
+      }
+      const std::size_t donor = high.back();
+      entries[n] = Entry(heights[n], donor);
+      heights[donor] -= 1.0 - heights[n];
+      if (heights[donor] < 1.0)
+      {
+        high.pop_back();
+        low.push_back(donor);
+      }
+    }
+    for (const std::size_t n : high)
+    {
+      entries[n] = Entry(1.0, n);
+    }
+  }
+
+  static std::uint32_t Entry(double share, std::size_t alias)
+  {
+    const double limited = std::clamp(share, 0.0, 1.0) * 0xffffff;
+    return (static_cast<std::uint32_t>(std::lround(limited)) << 8) |
+      static_cast<std::uint32_t>(alias);
+  }
+
+  std::array<std::uint32_t, static_cast<std::size_t>(RowCount) * SlotCount> Entries{};
+};
+
+struct NoiseTables
+{
+  PoissonTable poisson;
+  NormalTable normal;
+};
+
+const NoiseTables& Tables()
+{
+  static const std::unique_ptr<const NoiseTables> tables = std::make_unique<NoiseTables>();
+  return *tables;
+}
+
+/// Poisson of a mean below 1/4, by inversion: how many partial sums a uniform number exceeds.
+inline int FewPhotons(float mean, std::uint32_t bits)
+{
+  const float uniform = static_cast<float>(bits >> 8) * 0x1p-24F;
+  const float none = 1.0F -
+    mean *
+      (1.0F -
+        mean * (0.5F - mean * (1.0F / 6.0F - mean * (1.0F / 24.0F - mean * (1.0F / 120.0F)))));
+  float term = none;
+  float sum = none;
+  int count = 0;
+  for (const float reciprocal : { 1.0F, 1.0F / 2.0F, 1.0F / 3.0F, 1.0F / 4.0F })
+  {
+    count += uniform >= sum ? 1 : 0;
+    term *= mean * reciprocal;
+    sum += term;
+  }
+  return count + (uniform >= sum ? 1 : 0);
+}
+
+/// The sum of two Poisson numbers is one of the sum of their means.
+inline float Photons(const NoiseTables& tables, float mean, std::uint64_t bits)
+{
+  if (mean < PoissonTable::Largest)
+  {
+    const float positive = mean > 0.0F ? mean : 0.0F;
+    const int row = static_cast<int>(positive * PoissonTable::PerUnit);
+    const float rest = positive - static_cast<float>(row) / PoissonTable::PerUnit;
+    return static_cast<float>(
+      tables.poisson(row, bits) + FewPhotons(rest, static_cast<std::uint32_t>(bits)));
+  }
+  return mean + std::sqrt(mean) * tables.normal(bits);
+}
+
+std::atomic<bool> OnlyBaseline{ false };
+
+void RequireSameSize(const LineIntegrals& first, const LineIntegrals* other)
+{
+  if (other &&
+    (other->columns != first.columns || other->rows != first.rows ||
+      other->values.size() != first.values.size()))
+  {
+    throw std::invalid_argument("detector: layers are " + std::to_string(first.columns) + " x " +
+      std::to_string(first.rows) + " and " + std::to_string(other->columns) + " x " +
+      std::to_string(other->rows) + " pixels; they have to be of one size");
+  }
+}
+
+void RequireImage(const LineIntegrals& image)
+{
+  if (image.columns < 1 || image.rows < 1 || image.columns > 8192 || image.rows > 8192 ||
+    image.values.size() !=
+      static_cast<std::size_t>(image.columns) * static_cast<std::size_t>(image.rows))
+  {
+    throw std::invalid_argument("detector: a layer of " + std::to_string(image.columns) + " x " +
+      std::to_string(image.rows) + " pixels with " + std::to_string(image.values.size()) +
+      " values; it has to be 1 to 8192 each way, and full");
+  }
+}
+}
+
+const DetectorKernels& DetectorLoops()
+{
+#ifdef DYNAMICCORONARY_WIDE_KERNELS
+  static const bool wide = __builtin_cpu_supports("avx2") != 0;
+  if (wide && !OnlyBaseline)
+  {
+    return DetectorKernelsAvx2;
+  }
+#endif
+  return DetectorKernelsBaseline;
+}
+
+void UseBaselineDetectorLoops(bool baseline)
+{
+  OnlyBaseline = baseline;
+}
+
+float PoissonPhotons(float mean, std::uint64_t bits)
+{
+  return Photons(Tables(), mean, bits);
+}
+
+float FastExp(float x)
+{
+  return fastmath::Exp(x);
+}
+
+float FastLog(float x)
+{
+  return fastmath::Log(x);
+}
+
+void DetectorSettings::Validate() const
+{
+  // What is not finite fails every comparison.
+  Require(this->glareFraction >= 0.0 && this->glareFraction <= 0.5, "share of glare",
+    this->glareFraction, "0 to 0.5");
+  Require(this->glareSigma >= 4.0 && this->glareSigma <= 200.0, "width of glare", this->glareSigma,
+    "4 to 200 pixels");
+  Require(
+    this->blurSigma >= 0.0 && this->blurSigma <= 3.0, "blur", this->blurSigma, "0 to 3 pixels");
+  Require(this->fluoroscopyLag >= 0.0 && this->fluoroscopyLag <= 0.95, "lag in fluoroscopy",
+    this->fluoroscopyLag, "0 to 0.95");
+  Require(this->cineLag >= 0.0 && this->cineLag <= 0.95, "lag in cine", this->cineLag, "0 to 0.95");
+  const auto shutter = [](const char* name, double value)
+  { Require(value >= 0.0 && value <= 0.45, name, value, "0 to 0.45 of the image"); };
+  shutter("left shutter", this->shutters.left);
+  shutter("right shutter", this->shutters.right);
+  shutter("top shutter", this->shutters.top);
+  shutter("bottom shutter", this->shutters.bottom);
+  Require(this->shutters.transmission >= 0.0 && this->shutters.transmission <= 1.0,
+    "transmission of the shutters", this->shutters.transmission, "0 to 1");
+}
+
+Detector::Detector(const DetectorSettings& settings, std::uint64_t seed)
+  : Settings_(settings)
+  , Seed(seed)
+{
+  this->SetSettings(settings);
+}
+
+void Detector::SetSettings(const DetectorSettings& settings)
+{
+  settings.Validate();
+  this->Settings_ = settings;
+  this->BlurKernel = GaussianHalf(settings.blurSigma);
+  if (this->Columns_ > 0)
+  {
+    this->Prepare();
+  }
+}
+
+void Detector::Resize(int columns, int rows)
+{
+  this->Columns_ = columns;
+  this->Rows_ = rows;
+  this->Filled = false;
+  const std::size_t pixels = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  this->Transmission.assign(pixels, 0.0F);
+  this->Blurred.assign(pixels, 0.0F);
+  this->Signal_.assign(pixels, 0.0F);
+  this->VeilRow.assign(static_cast<std::size_t>(columns), 0.0F);
+  this->Prepare();
+}
+
+void Detector::Prepare()
+{
+  const Collimation& shutters = this->Settings_.shutters;
+  this->ShutterColumns =
+    OpenShares(this->Columns_, shutters.left, shutters.right, shutters.transmission);
+  this->ShutterRows = OpenShares(this->Rows_, shutters.top, shutters.bottom, shutters.transmission);
+
+  const double sigma = this->Settings_.glareSigma;
+  this->CellColumns = CellSize(this->Columns_, sigma);
+  this->CellRows = CellSize(this->Rows_, sigma);
+  this->VeilAlong = VeilKernelOf(sigma, this->CellColumns);
+  this->VeilAcross = VeilKernelOf(sigma, this->CellRows);
+  const auto cells = static_cast<std::size_t>(this->Columns_ / this->CellColumns) *
+    static_cast<std::size_t>(this->Rows_ / this->CellRows);
+  this->Veil.assign(cells, 0.0F);
+  this->VeilScratch.assign(cells, 0.0F);
+  const auto padding = [this](const std::vector<float>& half, int width)
+  { return static_cast<std::size_t>(width) + 2 * half.size(); };
+  this->Padded.assign(std::max(padding(this->BlurKernel, this->Columns_),
+                        padding(this->VeilAlong, this->Columns_ / this->CellColumns)),
+    0.0F);
+}
+
+const std::vector<float>& Detector::Expose(const LineIntegrals& first, const LineIntegrals* second,
+  const LineIntegrals* third, double photons, std::uint64_t frame, double lag)
+{
+  RequireImage(first);
+  RequireSameSize(first, second);
+  RequireSameSize(first, third);
+  Require(photons > 0.0 && photons <= 1e7, "photons a pixel", photons, "above 0, to 1e7");
+  Require(lag >= 0.0 && lag < 1.0, "lag", lag, "0 to below 1");
+  if (first.columns != this->Columns_ || first.rows != this->Rows_)
+  {
+    this->Resize(first.columns, first.rows);
+  }
+  this->Transmit(first, second, third);
+  this->MakeVeil();
+  // Seeds that are near to each other shall not share frames.
+  const std::uint64_t key = MixBits(MixBits(this->Seed) + frame);
+  for (int row = 0; row < this->Rows_; ++row)
+  {
+    this->DetectRow(row, static_cast<float>(photons), key);
+  }
+  this->BlurAcrossRows(static_cast<float>(this->Filled ? lag : 0.0));
+  this->Filled = true;
+  return this->Signal_;
+}
+
+void Detector::Transmit(
+  const LineIntegrals& first, const LineIntegrals* second, const LineIntegrals* third)
+{
+  const DetectorKernels& loops = DetectorLoops();
+  const auto width = static_cast<std::size_t>(this->Columns_);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(this->Rows_); ++row)
+  {
+    const std::size_t begin = row * width;
+    loops.transmit(first.values.data() + begin, second ? second->values.data() + begin : nullptr,
+      third ? third->values.data() + begin : nullptr, this->ShutterColumns.data(),
+      this->ShutterRows[row], this->Columns_, this->Transmission.data() + begin);
+  }
+}
+
+void Detector::MakeVeil()
+{
+  if (this->Settings_.glareFraction == 0.0)
+  {
+    return;
+  }
+  const int columns = this->Columns_ / this->CellColumns;
+  const int rows = this->Rows_ / this->CellRows;
+  const float share = 1.0F / static_cast<float>(this->CellColumns * this->CellRows);
+  std::fill(this->Veil.begin(), this->Veil.end(), 0.0F);
+  for (int row = 0; row < this->Rows_; ++row)
+  {
+    const float* in = this->Transmission.data() + static_cast<std::size_t>(row) * this->Columns_;
+    float* cells = this->Veil.data() + static_cast<std::size_t>(row / this->CellRows) * columns;
+    for (int cell = 0; cell < columns; ++cell)
+    {
+      float sum = 0.0F;
+      for (int i = 0; i < this->CellColumns; ++i)
+      {
+        sum += in[cell * this->CellColumns + i];
+      }
+      cells[cell] += share * sum;
+    }
+  }
+  for (int row = 0; row < rows; ++row)
+  {
+    const std::size_t begin = static_cast<std::size_t>(row) * columns;
+    this->BlurRow(
+      this->Veil.data() + begin, columns, this->VeilAlong, this->VeilScratch.data() + begin);
+  }
+  this->RowPointers.resize(2 * this->VeilAcross.size() - 1);
+  for (int row = 0; row < rows; ++row)
+  {
+    this->PointToRows(this->VeilScratch, columns, rows, row, this->VeilAcross);
+    DetectorLoops().blurAcross(this->RowPointers.data(), this->VeilAcross.data(),
+      static_cast<int>(this->VeilAcross.size()) - 1, columns,
+      this->Veil.data() + static_cast<std::size_t>(row) * columns);
+  }
+}
+
+/// Blurs along a row that is continued as in mirrors.
+void Detector::BlurRow(const float* in, int width, const std::vector<float>& half, float* result)
+{
+  const int radius = static_cast<int>(half.size()) - 1;
+  float* middle = this->Padded.data() + radius;
+  std::copy(in, in + width, middle);
+  for (int r = 1; r <= radius; ++r)
+  {
+    middle[-r] = in[Mirrored(-r, width)];
+    middle[width - 1 + r] = in[Mirrored(width - 1 + r, width)];
+  }
+  DetectorLoops().blurAlong(middle, half.data(), radius, width, result);
+}
+
+/// RowPointers: the rows from `row` - radius to `row` + radius, continued as in mirrors.
+void Detector::PointToRows(
+  const std::vector<float>& image, int columns, int rows, int row, const std::vector<float>& half)
+{
+  const int radius = static_cast<int>(half.size()) - 1;
+  for (int r = -radius; r <= radius; ++r)
+  {
+    this->RowPointers[static_cast<std::size_t>(r + radius)] =
+      image.data() + static_cast<std::size_t>(Mirrored(row + r, rows)) * columns;
+  }
+}
+
+/// The veil in the pixels of a row: linear between the cells' centres, level outside them.
+void Detector::InterpolateVeil(int row)
+{
+  const int columns = this->Columns_ / this->CellColumns;
+  const int rows = this->Rows_ / this->CellRows;
+  const double place = (row + 0.5) / this->CellRows - 0.5;
+  const int above = std::clamp(static_cast<int>(std::floor(place)), 0, rows - 1);
+  const int below = std::min(above + 1, rows - 1);
+  const auto down = static_cast<float>(std::clamp(place - above, 0.0, 1.0));
+  const float* a = this->Veil.data() + static_cast<std::size_t>(above) * columns;
+  const float* b = this->Veil.data() + static_cast<std::size_t>(below) * columns;
+  const auto value = [=](int cell) { return a[cell] + down * (b[cell] - a[cell]); };
+
+  const int size = this->CellColumns;
+  const int first = size / 2;
+  const auto start = static_cast<float>(FirstFraction(size));
+  const float step = 1.0F / static_cast<float>(size);
+  float* out = this->VeilRow.data();
+  float left = value(0);
+  std::fill(out, out + first, left);
+  for (int cell = 0; cell + 1 < columns; ++cell)
+  {
+    const float right = value(cell + 1);
+    float* pixels = out + cell * size + first;
+    for (int j = 0; j < size; ++j)
+    {
+      pixels[j] = left + (start + step * static_cast<float>(j)) * (right - left);
+    }
+    left = right;
+  }
+  std::fill(out + (columns - 1) * size + first, out + this->Columns_, left);
+}
+
+void Detector::DetectRow(int row, float photons, std::uint64_t key)
+{
+  const std::size_t begin = static_cast<std::size_t>(row) * this->Columns_;
+  const auto glare = static_cast<float>(this->Settings_.glareFraction);
+  if (glare > 0.0F)
+  {
+    this->InterpolateVeil(row);
+  }
+  float* detected = this->Transmission.data() + begin;
+  DetectorLoops().mix(detected, this->VeilRow.data(), photons * (1.0F - glare), photons * glare,
+    this->Columns_, detected);
+  if (this->Settings_.noise)
+  {
+    const NoiseTables& tables = Tables();
+    for (int i = 0; i < this->Columns_; ++i)
+    {
+      detected[i] =
+        Photons(tables, detected[i], MixBits(key + begin + static_cast<std::uint64_t>(i)));
+    }
+  }
+  this->BlurRow(detected, this->Columns_, this->BlurKernel, this->Blurred.data() + begin);
+}
+
+void Detector::BlurAcrossRows(float lag)
+{
+  const DetectorKernels& loops = DetectorLoops();
+  const int radius = static_cast<int>(this->BlurKernel.size()) - 1;
+  this->RowPointers.resize(2 * this->BlurKernel.size() - 1);
+  for (int row = 0; row < this->Rows_; ++row)
+  {
+    this->PointToRows(this->Blurred, this->Columns_, this->Rows_, row, this->BlurKernel);
+    float* held = this->Signal_.data() + static_cast<std::size_t>(row) * this->Columns_;
+    loops.blurAcross(this->RowPointers.data(), this->BlurKernel.data(), radius, this->Columns_,
+      this->VeilRow.data());
+    loops.lag(this->VeilRow.data(), lag, this->Columns_, held);
+  }
+}
+}

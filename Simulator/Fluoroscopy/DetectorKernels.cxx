@@ -1,0 +1,136 @@
+#include "DetectorKernels.h"
+
+#include "FastMath.h"
+
+namespace coronary
+{
+namespace
+{
+/// Air noise of a CT can make a line integral a little negative; more is taken as this.
+constexpr float LeastIntegral = -1.0F;
+
+template <typename Sum>
+void TransmitRow(
+  const Sum& sum, const float* columnShutter, float rowShutter, int width, float* result)
+{
+  for (int i = 0; i < width; ++i)
+  {
+    const float integral = sum(i);
+    // What is no number passes nothing.
+    const float x =
+      integral >= LeastIntegral ? -integral : (integral < 0.0F ? -LeastIntegral : -87.0F);
+    result[i] = fastmath::Exp(x) * (columnShutter[i] * rowShutter);
+  }
+}
+
+void Transmit(const float* first, const float* second, const float* third,
+  const float* columnShutter, float rowShutter, int width, float* result)
+{
+  if (second && third)
+  {
+    TransmitRow([=](int i) { return first[i] + second[i] + third[i]; }, columnShutter, rowShutter,
+      width, result);
+  }
+  else if (second || third)
+  {
+    const float* other = second ? second : third;
+    TransmitRow(
+      [=](int i) { return first[i] + other[i]; }, columnShutter, rowShutter, width, result);
+  }
+  else
+  {
+    TransmitRow([=](int i) { return first[i]; }, columnShutter, rowShutter, width, result);
+  }
+}
+
+void Mix(const float* transmission, const float* veil, float direct, float veiled, int width,
+  float* result)
+{
+  for (int i = 0; i < width; ++i)
+  {
+    result[i] = direct * transmission[i] + veiled * veil[i];
+  }
+}
+
+void BlurAlong(const float* in, const float* kernel, int radius, int width, float* result)
+{
+  if (radius == 3)
+  {
+    // The default's: everything in registers.
+    for (int i = 0; i < width; ++i)
+    {
+      result[i] = ((kernel[0] * in[i] + kernel[1] * (in[i - 1] + in[i + 1])) +
+                    kernel[2] * (in[i - 2] + in[i + 2])) +
+        kernel[3] * (in[i - 3] + in[i + 3]);
+    }
+    return;
+  }
+  for (int i = 0; i < width; ++i)
+  {
+    result[i] = kernel[0] * in[i];
+  }
+  for (int r = 1; r <= radius; ++r)
+  {
+    const float weight = kernel[r];
+    for (int i = 0; i < width; ++i)
+    {
+      result[i] += weight * (in[i - r] + in[i + r]);
+    }
+  }
+}
+
+void BlurAcross(const float* const* rows, const float* kernel, int radius, int width, float* result)
+{
+  const float* const* middle = rows + radius;
+  for (int i = 0; i < width; ++i)
+  {
+    result[i] = kernel[0] * middle[0][i];
+  }
+  for (int r = 1; r <= radius; ++r)
+  {
+    const float weight = kernel[r];
+    const float* above = middle[-r];
+    const float* below = middle[r];
+    for (int i = 0; i < width; ++i)
+    {
+      result[i] += weight * (above[i] + below[i]);
+    }
+  }
+}
+
+void Lag(const float* fresh, float lag, int width, float* held)
+{
+  for (int i = 0; i < width; ++i)
+  {
+    held[i] = fresh[i] + lag * (held[i] - fresh[i]);
+  }
+}
+
+void Logarithm(
+  const float* signal, float least, float unattenuated, std::int64_t count, float* result)
+{
+  for (std::int64_t i = 0; i < count; ++i)
+  {
+    result[i] = fastmath::Log(signal[i] > least ? signal[i] : least) - unattenuated;
+  }
+}
+
+void Grey(const float* values, float scale, float offset, std::int64_t count, std::uint8_t* grey)
+{
+  for (std::int64_t i = 0; i < count; ++i)
+  {
+    float value = scale * values[i] + offset + 0.5F;
+    value = value > 0.0F ? value : 0.0F;
+    value = value < 255.0F ? value : 255.0F;
+    grey[i] = static_cast<std::uint8_t>(static_cast<std::int32_t>(value));
+  }
+}
+}
+
+#if defined(__AVX2__)
+const DetectorKernels DetectorKernelsAvx2
+#else
+const DetectorKernels DetectorKernelsBaseline
+#endif
+  { Transmit, Mix, BlurAlong, BlurAcross, Lag, Logarithm, Grey };
+}

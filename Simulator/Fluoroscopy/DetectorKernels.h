@@ -1,0 +1,42 @@
+// Inner loops of the image chain, one set for each generation of processors; all give the same bits.
+#ifndef DynamicCoronary_DetectorKernels_h
+#define DynamicCoronary_DetectorKernels_h
+
+#include <cstdint>
+
+namespace coronary
+{
+struct DetectorKernels
+{
+  /// result = exp(-(first + second + third)) * columnShutter * rowShutter; second and third may be null.
+  void (*transmit)(const float* first, const float* second, const float* third,
+    const float* columnShutter, float rowShutter, int width, float* result);
+  /// result = direct * transmission + veiled * veil
+  void (*mix)(const float* transmission, const float* veil, float direct, float veiled, int width,
+    float* result);
+  /// Symmetric kernel along a row that has `radius` samples before the first and after the last.
+  void (*blurAlong)(const float* in, const float* kernel, int radius, int width, float* result);
+  /// The same across 2 radius + 1 rows.
+  void (*blurAcross)(
+    const float* const* rows, const float* kernel, int radius, int width, float* result);
+  /// held = fresh + lag * (held - fresh)
+  void (*lag)(const float* fresh, float lag, int width, float* held);
+  /// result = ln(max(signal, least)) - unattenuated
+  void (*logarithm)(
+    const float* signal, float least, float unattenuated, std::int64_t count, float* result);
+  /// grey = scale * value + offset, rounded and limited to 0 .. 255
+  void (*grey)(
+    const float* values, float scale, float offset, std::int64_t count, std::uint8_t* grey);
+};
+
+/// The widest that this processor runs.
+const DetectorKernels& DetectorLoops();
+
+/// For tests: only the baseline's, in the whole process.
+void UseBaselineDetectorLoops(bool baseline);
+
+extern const DetectorKernels DetectorKernelsBaseline;
+extern const DetectorKernels DetectorKernelsAvx2;
+}
+
+#endif

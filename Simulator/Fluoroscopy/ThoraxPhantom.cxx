@@ -1,0 +1,361 @@
+#include "ThoraxPhantom.h"
+
+#include "CounterRandom.h"
+#include "ThoraxAnatomy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Below = -208.0; ///< world z of the volume's ends, mm
+constexpr double Above = 148.0;
+constexpr int SlabThickness = 4; ///< slices that are made together
+
+constexpr float Outside = -1000.0F;
+constexpr float Skin = 40.0F;
+constexpr float Fat = -95.0F;
+constexpr float Muscle = 52.0F;
+constexpr float Lung = -830.0F;
+constexpr float Heart = 48.0F;
+constexpr float Abdomen = 38.0F;
+constexpr float Liver = 60.0F;
+constexpr float Gas = -980.0F;
+
+void Require(bool possible, const char* name, double value, const char* range)
+{
+  if (!possible)
+  {
+    throw std::invalid_argument(
+      std::string("thorax: ") + name + " is " + std::to_string(value) + "; it has to be " + range);
+  }
+}
+
+/// Smooth noise of mean 0 and amplitude about 1: random values on a lattice, linear between them, periodic.
+class LatticeNoise
+{
+public:
+  LatticeNoise(std::uint64_t seed, double spacing)
+    : PerMillimetre(1.0 / spacing)
+    , Values(static_cast<std::size_t>(Side) * Side * Side)
+  {
+    RandomStream random(seed, 600);
+    for (float& value : this->Values)
+    {
+      value = static_cast<float>(random.Uniform(-1.0, 1.0));
+    }
+  }
+
+  float operator()(const Vector3& p) const
+  {
+    const Vector3 place = p * this->PerMillimetre;
+    const Vector3 floor = place.array().floor();
+    const Eigen::Vector3f f = (place - floor).cast<float>();
+    const Eigen::Vector3i i = floor.cast<int>();
+    const auto at = [&](int x, int y, int z)
+    {
+      return this->Values[(static_cast<std::size_t>((i.z() + z) & Mask) * Side +
+                            static_cast<std::size_t>((i.y() + y) & Mask)) *
+          Side +
+        static_cast<std::size_t>((i.x() + x) & Mask)];
+    };
+    const auto along = [&](int y, int z)
+    { return at(0, y, z) + f.x() * (at(1, y, z) - at(0, y, z)); };
+    const auto plane = [&](int z) { return along(0, z) + f.y() * (along(1, z) - along(0, z)); };
+    return plane(0) + f.z() * (plane(1) - plane(0));
+  }
+
+private:
+  static constexpr int Side = 64;
+  static constexpr int Mask = Side - 1;
+  double PerMillimetre;
+  std::vector<float> Values;
+};
+
+/// Share of a voxel that is inside a surface at a distance.
+float Covered(double distance, double spacing)
+{
+  return static_cast<float>(std::clamp(0.5 - distance / spacing, 0.0, 1.0));
+}
+
+float Mixed(float outside, float inside, float share)
+{
+  return outside + share * (inside - outside);
+}
+
+class ThoraxRaster
+{
+public:
+  ThoraxRaster(const ThoraxSettings& settings, HounsfieldVolume& volume)
+    : Anatomy(settings)
+    , Fine(settings.seed + 1000, 5.0)
+    , Coarse(settings.seed + 2000, 21.0)
+    , FatThickness(settings.fat)
+    , Spacing(settings.spacing)
+    , Volume(volume)
+  {
+    for (const auto* group :
+      { &this->Anatomy.vessels, &this->Anatomy.airways, &this->Anatomy.bones })
+    {
+      for (const ThoraxTissue& tissue : *group)
+      {
+        this->Tissues.push_back({ &tissue, {}, {} });
+        for (const ThoraxPart& part : tissue.parts)
+        {
+          this->Tissues.back().boxes.push_back(BoxOf(part));
+          this->Tissues.back().box.Add(this->Tissues.back().boxes.back());
+        }
+      }
+    }
+  }
+
+  /// Slices first to last - 1.
+  void Make(int first, int last)
+  {
+    const ScalarImage view = this->Volume.View();
+    const std::array<int, 3> n = view.Dimensions();
+    Slab slab;
+    slab.first = first;
+    slab.columns = n[0];
+    slab.rows = n[1];
+    slab.slices = last - first;
+    slab.values.resize(static_cast<std::size_t>(n[0]) * n[1] * slab.slices);
+    slab.distances.resize(slab.values.size());
+    std::size_t index = 0;
+    for (int k = first; k < last; ++k)
+    {
+      for (int j = 0; j < n[1]; ++j)
+      {
+        for (int i = 0; i < n[0]; ++i)
+        {
+          slab.values[index++] = this->SoftTissue(this->Volume.grid.IndexToWorld(i, j, k));
+        }
+      }
+    }
+    for (const BoxedTissue& tissue : this->Tissues)
+    {
+      this->Paint(tissue, slab);
+    }
+    std::int16_t* out = this->Volume.values.data() + static_cast<std::size_t>(first) * n[0] * n[1];
+    std::transform(slab.values.begin(), slab.values.end(), out,
+      [](float value)
+      { return static_cast<std::int16_t>(std::lround(std::clamp(value, -1024.0F, 3071.0F))); });
+  }
+
+private:
+  struct BoxedTissue
+  {
+    const ThoraxTissue* tissue;
+    std::vector<ThoraxBox> boxes; ///< of the parts
+    ThoraxBox box;
+  };
+  struct Slab
+  {
+    int first;
+    int columns;
+    int rows;
+    int slices;
+    std::vector<float> values;
+    std::vector<float> distances; ///< scratch, of one tissue
+    std::size_t Index(int i, int j, int k) const
+    {
+      return (static_cast<std::size_t>(k - this->first) * this->rows + j) * this->columns + i;
+    }
+  };
+  using Range = std::array<int, 6>;
+
+  float SoftTissue(const Vector3& p) const
+  {
+    const double skin = this->Anatomy.SkinDistance(p);
+    if (skin > this->Spacing)
+    {
+      return Outside;
+    }
+    const double wall = this->Anatomy.WallDistance(p);
+    // Fat is thicker at the flanks, and lies between muscles.
+    const float rough = this->Coarse(p);
+    const double fat = this->FatThickness * (1.0 + 0.25 * rough);
+    const float muscle =
+      Muscle + (rough > 0.45F ? 90.0F * (0.45F - rough) : 0.0F) + 8.0F * this->Fine(p);
+    float value =
+      Mixed(Fat + 10.0F * this->Fine(p), muscle, Covered(skin + fat, 2.0 * this->Spacing));
+    value = Mixed(value, Skin, 1.0F - Covered(skin + 1.6, this->Spacing));
+    value = Mixed(Outside, value, Covered(skin, this->Spacing));
+    if (wall < 0.5 * this->Spacing)
+    {
+      value = Mixed(value, this->Inside(p, wall), Covered(wall, this->Spacing));
+    }
+    return value;
+  }
+
+  /// Within the ribs.
+  float Inside(const Vector3& p, double wall) const
+  {
+    constexpr double pleura = 5.5; ///< lungs begin so far inside of the ribs' middle
+    const double below = p.z() - this->Anatomy.DiaphragmHeight(p);
+    const double apart = this->Anatomy.MediastinumDistance(p);
+    const double heart = this->Anatomy.HeartDistance(p);
+    const float fine = this->Fine(p);
+    // Fat and vessels between the lungs; fat around the heart.
+    float value = -15.0F + 30.0F * this->Coarse(p) + 8.0F * fine;
+    value = Mixed(value, Fat, Covered(heart - 7.0, this->Spacing));
+    value = Mixed(value, Heart + 4.0F * fine, Covered(heart, this->Spacing));
+    if (below < this->Spacing)
+    {
+      value = Mixed(value, this->Organs(p), Covered(below, this->Spacing));
+    }
+    const double lung = std::max(
+      { wall + pleura, -below, 2.5 - apart, 7.0 - heart - 2.0, p.z() - this->Anatomy.LungTop(p) });
+    if (lung < this->Spacing)
+    {
+      // Lying on the back: denser behind.
+      const auto behind = static_cast<float>(p.y() + 20.0) * 0.45F;
+      const float air = Lung + behind + 22.0F * fine + 18.0F * this->Coarse(p);
+      value = Mixed(value, air, Covered(lung, this->Spacing));
+    }
+    return value;
+  }
+
+  float Organs(const Vector3& p) const
+  {
+    const double x = p.x() - this->Anatomy.MidX(p.z());
+    const float fine = this->Fine(p);
+    const float mixed = Abdomen + 28.0F * this->Coarse(p) + 6.0F * fine;
+    float value =
+      Mixed(mixed, Liver + 5.0F * fine, Covered(x - 25.0 + 0.35 * (p.z() + 100.0), 12.0));
+    // The bubble of the stomach under the left dome.
+    const Vector3 q = (Vector3(x, p.y(), p.z()) - Vector3(72.0, -18.0, -112.0))
+                        .cwiseQuotient(Vector3(33.0, 30.0, 14.0));
+    return Mixed(value, Gas, Covered(14.0 * (q.norm() - 1.0), this->Spacing));
+  }
+
+  /// Voxels of a slab that a box may touch; empty when first > last.
+  Range Voxels(const ThoraxBox& box, const Slab& slab) const
+  {
+    const Vector3 margin = Vector3::Constant(this->Spacing);
+    const Vector3 low = (box.low - margin - this->Volume.grid.origin) / this->Spacing;
+    const Vector3 high = (box.high + margin - this->Volume.grid.origin) / this->Spacing;
+    const auto first = [](double value, int least)
+    { return std::max(least, static_cast<int>(std::floor(std::max(value, -1e6)))); };
+    const auto last = [](double value, int most)
+    { return std::min(most, static_cast<int>(std::ceil(std::min(value, 1e6)))); };
+    return { first(low.x(), 0), last(high.x(), slab.columns - 1), first(low.y(), 0),
+      last(high.y(), slab.rows - 1), first(low.z(), slab.first),
+      last(high.z(), slab.first + slab.slices - 1) };
+  }
+
+  template <typename Function>
+  static void ForRows(const Range& range, const Slab& slab, const Function& function)
+  {
+    for (int k = range[4]; k <= range[5]; ++k)
+    {
+      for (int j = range[2]; j <= range[3]; ++j)
+      {
+        function(j, k, slab.Index(range[0], j, k));
+      }
+    }
+  }
+
+  void Paint(const BoxedTissue& boxed, Slab& slab) const
+  {
+    const Range whole = this->Voxels(boxed.box, slab);
+    if (whole[0] > whole[1] || whole[2] > whole[3] || whole[4] > whole[5])
+    {
+      return;
+    }
+    const int width = whole[1] - whole[0] + 1;
+    ForRows(whole, slab,
+      [&](int, int, std::size_t index)
+      { std::fill_n(slab.distances.begin() + static_cast<std::ptrdiff_t>(index), width, 1e9F); });
+    for (std::size_t part = 0; part < boxed.boxes.size(); ++part)
+    {
+      const Range range = this->Voxels(boxed.boxes[part], slab);
+      ForRows(range, slab,
+        [&](int j, int k, std::size_t index)
+        {
+          for (int i = range[0]; i <= range[1]; ++i, ++index)
+          {
+            const Vector3 p = this->Volume.grid.IndexToWorld(i, j, k);
+            slab.distances[index] = std::min(
+              slab.distances[index], static_cast<float>(DistanceTo(boxed.tissue->parts[part], p)));
+          }
+        });
+    }
+    const ThoraxTissue& tissue = *boxed.tissue;
+    ForRows(whole, slab,
+      [&](int, int, std::size_t index)
+      {
+        for (int i = 0; i < width; ++i, ++index)
+        {
+          const float distance = slab.distances[index];
+          if (distance < this->Spacing)
+          {
+            float& value = slab.values[index];
+            value = this->Painted(tissue, distance, value);
+          }
+        }
+      });
+  }
+
+  float Painted(const ThoraxTissue& tissue, float distance, float before) const
+  {
+    const float whole = Covered(distance, this->Spacing);
+    if (tissue.shell <= 0.0)
+    {
+      return Mixed(before, tissue.coreValue, whole);
+    }
+    // A shell thinner than a voxel has the share of it that it fills.
+    const float core = Covered(distance + tissue.shell, this->Spacing);
+    return (1.0F - whole) * before + (whole - core) * tissue.shellValue + core * tissue.coreValue;
+  }
+
+  ThoraxAnatomy Anatomy;
+  LatticeNoise Fine;
+  LatticeNoise Coarse;
+  double FatThickness;
+  double Spacing;
+  HounsfieldVolume& Volume;
+  std::vector<BoxedTissue> Tissues;
+};
+}
+
+void ThoraxSettings::Validate() const
+{
+  Require(this->spacing >= 0.8 && this->spacing <= 6.0, "spacing", this->spacing, "0.8 to 6 mm");
+  Require(this->width >= 260.0 && this->width <= 420.0, "width", this->width, "260 to 420 mm");
+  Require(this->fat >= 4.0 && this->fat <= 40.0, "fat", this->fat, "4 to 40 mm");
+}
+
+HounsfieldVolume MakeThoraxPhantom(const ThoraxSettings& settings, const ProgressCallback& progress)
+{
+  settings.Validate();
+  HounsfieldVolume volume;
+  const double spacing = settings.spacing;
+  const double half = 0.5 * settings.width * 1.12 + settings.fat + 4.0;
+  const double depth = 0.5 * settings.width + settings.fat;
+  const auto count = [spacing](double length)
+  { return static_cast<int>(std::ceil(length / spacing)) + 1; };
+  volume.grid.spacing = Vector3::Constant(spacing);
+  volume.grid.origin = Vector3(-20.0 - half, 8.0 - 0.82 * depth, Below);
+  volume.grid.extent = { 0, count(2.0 * half) - 1, 0, count(1.64 * depth) - 1, 0,
+    count(Above - Below) - 1 };
+  volume.values.resize(static_cast<std::size_t>(volume.View().NumberOfVoxels()));
+  ThoraxRaster raster(settings, volume);
+  const int slices = volume.grid.extent[5] + 1;
+  ParallelFor((slices + SlabThickness - 1) / SlabThickness, 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t slab = first; slab < last; ++slab)
+      {
+        const int begin = static_cast<int>(slab) * SlabThickness;
+        raster.Make(begin, std::min(begin + SlabThickness, slices));
+      }
+    },
+    progress);
+  return volume;
+}
+}
