@@ -1,0 +1,127 @@
+/**
+ * @file Device.h
+ * @brief What a trainee's hands are on: hardware, a game controller, keys, a recording or a script.
+ */
+#ifndef DynamicCoronary_Device_h
+#define DynamicCoronary_Device_h
+
+#include "SessionInput.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace coronary
+{
+enum class DeviceState : std::uint8_t
+{
+  Connecting,   ///< never was there, and may come
+  Running,      ///< its input is good
+  Stale,        ///< silent or disturbed for a moment: its pose is held, no forces
+  Disconnected, ///< was there and may come back: pose held, pedals released, no injection
+  Refused,      ///< not ours, of another version, or not allowed; tried again now and then
+  Ended         ///< a recording or a script that is over: its pose is held
+};
+
+/// "running", as in a status line.
+const char* DeviceStateName(DeviceState state);
+
+/// Bits of InputFrame::axes: what one source moves at a time.
+enum DeviceAxes : std::uint32_t
+{
+  WireAxes = 1U,
+  CatheterAxes = 2U,
+  SyringeAxis = 4U,
+  ViewAxes = 8U, ///< C-arm and table
+  AllAxes = 15U
+};
+
+/// What a device says at one tick. Places are of its own: they start somewhere, and never jump.
+struct InputFrame
+{
+  SessionInput input;        ///< pedals are 0 unless state is Running or Stale
+  double inflation = 0.0;    ///< atm, of an indeflator
+  std::uint32_t buttons = 0; ///< as the device numbers them
+  std::uint32_t axes = 0;    ///< bits of DeviceAxes that it has
+  DeviceState state = DeviceState::Connecting;
+};
+
+/// What the hands are to feel, along the same directions as the places of DriveInput: resistance has the other sign
+/// than the movement. A device without motors takes no notice.
+struct ForceFrame
+{
+  std::uint64_t tick = 0;
+  double wireForce = 0.0;               ///< N
+  double wireTorque = 0.0;              ///< N mm
+  double catheterForce = 0.0;           ///< N
+  double catheterTorque = 0.0;          ///< N mm
+  std::uint16_t validMilliseconds = 20; ///< after which the device relaxes by itself, 1 to 1000
+};
+
+struct DeviceStatus
+{
+  DeviceState state = DeviceState::Connecting;
+  std::string text;             ///< a sentence for people
+  bool awaitsForces = false;    ///< there are motors, which rest until ConfirmForces()
+  double errorsPerSecond = 0.0; ///< frames that were lost or damaged
+  std::uint64_t glitches = 0;   ///< steps of counts that nobody's hand makes
+};
+
+/**
+ * Read(), Command() and Heartbeat() are for the thread of the physics: they do not wait, lock, allocate or make system
+ * calls. All else is for any other thread.
+ */
+class Device
+{
+public:
+  virtual ~Device() = default;
+
+  /// What the device says at `tick`; call it with ticks that go up by one. @param secondsPerTick  positive
+  virtual void Read(std::uint64_t tick, double secondsPerTick, InputFrame& frame) = 0;
+
+  /// The last one counts. What is not finite, or above what the device can do, does not reach it.
+  virtual void Command(const ForceFrame& /*forces*/) {}
+
+  /// The state after `tick` is sound. The device relaxes its motors soon after this is not said any more: do not call
+  /// it when a number is not finite.
+  virtual void Heartbeat(std::uint64_t /*tick*/) {}
+
+  virtual DeviceStatus Status() const = 0;
+
+  /// The trainee is ready to feel forces: asked for anew with every connection, and after the device has relaxed.
+  virtual void ConfirmForces() {}
+
+  /// Whether its places are those of a whole session from tick 0 on, and not of hands that may already have moved.
+  virtual bool IsScripted() const { return false; }
+};
+
+/// "serial:/dev/ttyACM0": how a device is named on a command line.
+struct DeviceUri
+{
+  std::string scheme; ///< serial, keyboard, gamepad, replay, script, null
+  std::string path;   ///< of the device or the file; empty: none, or to be found
+};
+
+/// @throws std::invalid_argument: another scheme, a path that is missing or not wanted
+DeviceUri ParseDeviceUri(const std::string& text);
+
+/**
+ * serial:PATH, keyboard:, gamepad: or gamepad:PATH, replay:FILE, script:FILE, null:.
+ * Hardware that is not there is no error: Status() says what is wrong, and the device is waited for.
+ * @throws std::invalid_argument for the name, std::runtime_error for a file that can not be read
+ */
+std::shared_ptr<Device> OpenDevice(const std::string& uri);
+
+/// Waits until the state is another than Connecting, for so many s at most.
+DeviceStatus WaitWhileConnecting(const Device& device, double seconds);
+
+/// Nobody's hands.
+class NullDevice : public Device
+{
+public:
+  void Read(std::uint64_t tick, double secondsPerTick, InputFrame& frame) override;
+  DeviceStatus Status() const override;
+};
+}
+
+#endif

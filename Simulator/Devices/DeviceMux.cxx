@@ -1,0 +1,241 @@
+#include "DeviceMux.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Degree = M_PI / 180.0;
+constexpr std::size_t ViewGroup = 3;
+
+struct GroupPlaces
+{
+  std::uint32_t axes;
+  std::size_t first;
+  std::size_t end;
+};
+constexpr std::array<GroupPlaces, DeviceMux::Groups> GroupTable{ { { WireAxes, 0, 2 },
+  { CatheterAxes, 2, 4 }, { SyringeAxis, 4, 5 }, { ViewAxes, 5, 11 } } };
+
+struct PlaceTraits
+{
+  double noise; ///< what hands at rest, and encoders, may move
+  double low;
+  double high;
+};
+constexpr double Anywhere = 1e300;
+constexpr std::array<PlaceTraits, 11> Traits{ { { 0.2, -Anywhere, Anywhere },
+  { 0.02, -Anywhere, Anywhere }, { 0.2, -Anywhere, Anywhere }, { 0.02, -Anywhere, Anywhere },
+  { 0.05, -Anywhere, Anywhere }, { 0.005, -120.0 * Degree, 120.0 * Degree },
+  { 0.005, -55.0 * Degree, 55.0 * Degree }, { 1.0, 900.0, 1300.0 }, { 1.0, -200.0, 200.0 },
+  { 1.0, -200.0, 200.0 }, { 1.0, -200.0, 200.0 } } };
+
+std::array<double, 11> PlacesOf(const SessionInput& input)
+{
+  return { input.drive.wirePosition, input.drive.wireAngle, input.drive.catheterPosition,
+    input.drive.catheterAngle, input.syringe, input.primary, input.secondary,
+    input.sourceToDetector, input.table[0], input.table[1], input.table[2] };
+}
+
+double Limited(double value, const PlaceTraits& traits)
+{
+  return std::clamp(value, traits.low, traits.high);
+}
+}
+
+void DeviceMux::Add(std::shared_ptr<Device> device)
+{
+  if (!device)
+  {
+    throw std::invalid_argument("A mux needs devices that exist.");
+  }
+  this->All.push_back(std::move(device));
+  this->Sources.resize(this->All.size());
+}
+
+void DeviceMux::Start(const ViewPlace& view)
+{
+  this->Place(view);
+}
+
+void DeviceMux::Place(const ViewPlace& view)
+{
+  const PlaceArray wanted{ 0, 0, 0, 0, 0, view.primary, view.secondary, view.sourceToDetector,
+    view.table[0], view.table[1], view.table[2] };
+  const GroupPlaces& places = GroupTable[ViewGroup];
+  for (std::size_t n = places.first; n < places.end; ++n)
+  {
+    if (std::isfinite(wanted[n]))
+    {
+      const double place = Limited(wanted[n], Traits[n]);
+      this->Offset[n] += place - this->Now[n];
+      this->Now[n] = place;
+    }
+  }
+}
+
+const SessionInput& DeviceMux::Next(std::uint64_t tick, double secondsPerTick)
+{
+  this->RestTicks = static_cast<std::uint64_t>(RestSeconds / secondsPerTick);
+  this->ReadAll(tick, secondsPerTick);
+  for (std::size_t group = 0; group < Groups; ++group)
+  {
+    for (Source& source : this->Sources)
+    {
+      this->NoteMovement(source, group, tick);
+    }
+    this->Arbitrate(group, tick);
+    this->Follow(group);
+  }
+  ViewPlace view;
+  if (this->WantedView.Read(view))
+  {
+    this->Place(view);
+  }
+  this->Finish();
+  return this->Output;
+}
+
+void DeviceMux::ReadAll(std::uint64_t tick, double secondsPerTick)
+{
+  for (std::size_t n = 0; n < this->All.size(); ++n)
+  {
+    this->All[n]->Read(tick, secondsPerTick, this->Sources[n].frame);
+    this->Sources[n].places = PlacesOf(this->Sources[n].frame.input);
+  }
+}
+
+bool DeviceMux::Source::Drives(std::size_t group) const
+{
+  return this->frame.state == DeviceState::Running &&
+    (this->frame.axes & GroupTable[group].axes) != 0;
+}
+
+void DeviceMux::NoteMovement(Source& source, std::size_t group, std::uint64_t tick)
+{
+  Hand& hand = source.hands[group];
+  const GroupPlaces& places = GroupTable[group];
+  bool moved = false;
+  for (std::size_t n = places.first; n < places.end; ++n)
+  {
+    moved = moved || std::abs(source.places[n] - hand.reference[n]) > Traits[n].noise;
+  }
+  if (!hand.seen || moved)
+  {
+    std::copy(source.places.begin(), source.places.end(), hand.reference.begin());
+    hand.restsAt = hand.seen ? tick + this->RestTicks : tick;
+    hand.seen = true;
+  }
+  hand.moves = tick < hand.restsAt && source.Drives(group);
+  hand.fresh = hand.fresh || tick >= hand.restsAt;
+}
+
+void DeviceMux::Arbitrate(std::size_t group, std::uint64_t tick)
+{
+  const int owner = this->Owner[group].load(std::memory_order_relaxed);
+  const bool lost = owner >= 0 && !this->Sources[static_cast<std::size_t>(owner)].Drives(group);
+  if (lost && !this->Held[group])
+  {
+    this->RestAnew(group, tick);
+  }
+  this->Held[group] = lost;
+  const bool free =
+    owner < 0 || lost || !this->Sources[static_cast<std::size_t>(owner)].hands[group].moves;
+  for (std::size_t n = 0; n < this->Sources.size(); ++n)
+  {
+    Source& source = this->Sources[n];
+    Hand& hand = source.hands[group];
+    if (static_cast<int>(n) == owner || !source.Drives(group))
+    {
+      continue;
+    }
+    const bool mayTake = hand.fresh && (free || static_cast<int>(n) < owner);
+    if (owner < 0 || (hand.moves && mayTake))
+    {
+      this->TakeOver(group, n);
+      return;
+    }
+    hand.fresh = hand.fresh && !hand.moves;
+  }
+}
+
+void DeviceMux::RestAnew(std::size_t group, std::uint64_t tick)
+{
+  for (Source& source : this->Sources)
+  {
+    Hand& hand = source.hands[group];
+    hand.fresh = false;
+    hand.moves = false;
+    hand.restsAt = std::max(hand.restsAt, tick + this->RestTicks);
+  }
+}
+
+void DeviceMux::TakeOver(std::size_t group, std::size_t source)
+{
+  const GroupPlaces& places = GroupTable[group];
+  const bool asItIs = !this->Begun[group] && this->All[source]->IsScripted();
+  for (std::size_t n = places.first; n < places.end; ++n)
+  {
+    this->Offset[n] = asItIs ? 0.0 : this->Now[n] - this->Sources[source].places[n];
+  }
+  this->Begun[group] = true;
+  this->Held[group] = false;
+  this->Owner[group].store(static_cast<int>(source), std::memory_order_relaxed);
+}
+
+void DeviceMux::Follow(std::size_t group)
+{
+  const int owner = this->Owner[group].load(std::memory_order_relaxed);
+  if (owner < 0 || this->Held[group])
+  {
+    return;
+  }
+  const Source& source = this->Sources[static_cast<std::size_t>(owner)];
+  const GroupPlaces& places = GroupTable[group];
+  for (std::size_t n = places.first; n < places.end; ++n)
+  {
+    const double wanted = source.places[n] + this->Offset[n];
+    this->Now[n] = Limited(wanted, Traits[n]);
+    if (this->Now[n] != wanted) // turning back at the end works at once
+    {
+      this->Offset[n] = this->Now[n] - source.places[n];
+    }
+  }
+}
+
+void DeviceMux::Finish()
+{
+  SessionInput& output = this->Output;
+  output.drive = { this->Now[0], this->Now[1], this->Now[2], this->Now[3] };
+  output.syringe = this->Now[4];
+  output.primary = this->Now[5];
+  output.secondary = this->Now[6];
+  output.sourceToDetector = this->Now[7];
+  output.table = { this->Now[8], this->Now[9], this->Now[10] };
+  output.pedals = 0;
+  for (const Source& source : this->Sources)
+  {
+    output.pedals |= source.frame.input.pedals;
+  }
+}
+
+void DeviceMux::Command(const ForceFrame& forces)
+{
+  for (const std::shared_ptr<Device>& device : this->All)
+  {
+    device->Command(forces);
+  }
+}
+
+void DeviceMux::Heartbeat(std::uint64_t tick)
+{
+  for (const std::shared_ptr<Device>& device : this->All)
+  {
+    device->Heartbeat(tick);
+  }
+}
+}
