@@ -18,10 +18,10 @@ constexpr double Midline =
 constexpr float Blood = 45.0F;
 constexpr float Air = -985.0F;
 constexpr float Cartilage = 110.0F;
-constexpr float RibCortex = 1150.0F;
-constexpr float RibMarrow = 120.0F;
-constexpr float VertebraCortex = 900.0F;
-constexpr float VertebraMarrow = 190.0F;
+constexpr float RibCortex = 1350.0F;
+constexpr float RibMarrow = 160.0F;
+constexpr float VertebraCortex = 1050.0F;
+constexpr float VertebraMarrow = 220.0F;
 constexpr float FlatBoneMarrow = 110.0F;
 
 /// The wall's cross-section when its half width, and its depths behind and before its centre are 1: outwards, back.
@@ -46,64 +46,11 @@ double EllipticDistance(double level, double gradient)
   return gradient > 1e-12 ? level * (level - 1.0) / gradient : -1e9;
 }
 
-double Distance(const ThoraxRod& rod, const Vector3& p)
-{
-  const Vector3 way = rod.to - rod.from;
-  const double length = way.norm();
-  const Vector3 forward = way / length;
-  const Vector3 from = p - rod.from;
-  const double along = from.dot(forward);
-  const double fraction = std::clamp(along / length, 0.0, 1.0);
-  const double radius = rod.radii[0] + fraction * (rod.radii[1] - rod.radii[0]);
-  const double height = rod.heights[0] + fraction * (rod.heights[1] - rod.heights[0]);
-  const double u = from.dot(rod.across);
-  const double v = from.dot(forward.cross(rod.across));
-  // Beyond the ends: half an ellipsoid, as long as it is thin.
-  const double w = along - fraction * length;
-  const double end = std::min(radius, height);
-  const Vector3 level(u / radius, v / height, w / end);
-  const Vector3 gradient(u / (radius * radius), v / (height * height), w / (end * end));
-  return EllipticDistance(level.norm(), gradient.norm());
-}
-
-double Distance(const ThoraxDrum& drum, const Vector3& p)
-{
-  const Vector3 q = drum.axes * (p - drum.centre);
-  const double up = std::min(1.0, std::abs(q.z()) / drum.half.z());
-  const double narrow = 1.0 - drum.waist * (1.0 - up * up);
-  const double width = drum.half.x() * narrow;
-  const double depth = drum.half.y() * narrow;
-  const double level = std::hypot(q.x() / width, q.y() / depth);
-  const double gradient = std::hypot(q.x() / (width * width), q.y() / (depth * depth));
-  const double side = level > 1e-6 ? EllipticDistance(level, gradient) : -std::min(width, depth);
-  const double end = std::abs(q.z()) - drum.half.z();
-  if (side > 0.0 && end > 0.0)
-  {
-    return std::hypot(side, end);
-  }
-  return std::max(side, end);
-}
-
-double Distance(const ThoraxPlate& plate, const Vector3& p)
-{
-  // To the triangle: its plane when the foot is inside, else the nearest edge.
-  const auto& [a, b, c] = plate.corners;
-  const Vector3 normal = (b - a).cross(c - a).normalized();
-  const bool inside = (b - a).cross(p - a).dot(normal) >= 0.0 &&
-    (c - b).cross(p - b).dot(normal) >= 0.0 && (a - c).cross(p - c).dot(normal) >= 0.0;
-  if (inside)
-  {
-    return std::abs((p - a).dot(normal)) - plate.half;
-  }
-  const double square = std::min({ NearestOnSegment(p, a, b).squaredDistance,
-    NearestOnSegment(p, b, c).squaredDistance, NearestOnSegment(p, c, a).squaredDistance });
-  return std::sqrt(square) - plate.half;
-}
-
 ThoraxBox Box(const ThoraxRod& rod)
 {
   const double reach = std::max({ rod.radii[0], rod.radii[1], rod.heights[0], rod.heights[1] });
-  return { rod.from.cwiseMin(rod.to).array() - reach, rod.from.cwiseMax(rod.to).array() + reach };
+  const Vector3 to = rod.from + rod.length * rod.forward;
+  return { rod.from.cwiseMin(to).array() - reach, rod.from.cwiseMax(to).array() + reach };
 }
 
 ThoraxBox Box(const ThoraxDrum& drum)
@@ -119,20 +66,22 @@ ThoraxBox Box(const ThoraxPlate& plate)
     a.cwiseMax(b).cwiseMax(c).array() + plate.half };
 }
 
-ThoraxRod Round(const Vector3& from, const Vector3& to, double first, double last)
-{
-  const Vector3 way = (to - from).normalized();
-  const Vector3 other = std::abs(way.x()) < 0.8 ? Vector3::UnitX() : Vector3::UnitY();
-  return { from, to, (other - other.dot(way) * way).normalized(), { first, last },
-    { first, last } };
-}
-
 /// @param across  need not be at a right angle to the way
 ThoraxRod Flat(const Vector3& from, const Vector3& to, const Vector3& across,
   const std::array<double, 2>& radii, const std::array<double, 2>& heights)
 {
-  const Vector3 way = (to - from).normalized();
-  return { from, to, (across - across.dot(way) * way).normalized(), radii, heights };
+  const double length = (to - from).norm();
+  const Vector3 forward = (to - from) / length;
+  return { from, forward, length, (across - across.dot(forward) * forward).normalized(), radii,
+    heights };
+}
+
+ThoraxRod Round(const Vector3& from, const Vector3& to, double first, double last)
+{
+  const Vector3 way = to - from;
+  const bool sideways = std::abs(way.x()) > 0.8 * way.norm();
+  return Flat(
+    from, to, sideways ? Vector3::UnitY() : Vector3::UnitX(), { first, last }, { first, last });
 }
 
 /// A smooth line through points (Catmull-Rom, centripetal enough for evenly spaced ones).
@@ -188,9 +137,55 @@ double Varied(std::uint64_t seed, std::uint64_t purpose, double deviation)
 }
 }
 
-double DistanceTo(const ThoraxPart& part, const Vector3& p)
+double DistanceTo(const ThoraxRod& rod, const Vector3& p)
 {
-  return std::visit([&p](const auto& shape) { return Distance(shape, p); }, part);
+  const Vector3 from = p - rod.from;
+  const double along = from.dot(rod.forward);
+  const double fraction = std::clamp(along / rod.length, 0.0, 1.0);
+  const double radius = rod.radii[0] + fraction * (rod.radii[1] - rod.radii[0]);
+  const double height = rod.heights[0] + fraction * (rod.heights[1] - rod.heights[0]);
+  const double u = from.dot(rod.across);
+  const double v = from.dot(rod.forward.cross(rod.across));
+  // Beyond the ends: half an ellipsoid, as long as it is thin.
+  const double w = along - fraction * rod.length;
+  const double end = std::min(radius, height);
+  const Vector3 level(u / radius, v / height, w / end);
+  const Vector3 gradient(u / (radius * radius), v / (height * height), w / (end * end));
+  return EllipticDistance(level.norm(), gradient.norm());
+}
+
+double DistanceTo(const ThoraxDrum& drum, const Vector3& p)
+{
+  const Vector3 q = drum.axes * (p - drum.centre);
+  const double up = std::min(1.0, std::abs(q.z()) / drum.half.z());
+  const double narrow = 1.0 - drum.waist * (1.0 - up * up);
+  const double width = drum.half.x() * narrow;
+  const double depth = drum.half.y() * narrow;
+  const double level = std::hypot(q.x() / width, q.y() / depth);
+  const double gradient = std::hypot(q.x() / (width * width), q.y() / (depth * depth));
+  const double side = level > 1e-6 ? EllipticDistance(level, gradient) : -std::min(width, depth);
+  const double end = std::abs(q.z()) - drum.half.z();
+  if (side > 0.0 && end > 0.0)
+  {
+    return std::hypot(side, end);
+  }
+  return std::max(side, end);
+}
+
+double DistanceTo(const ThoraxPlate& plate, const Vector3& p)
+{
+  // To the triangle: its plane when the foot is inside, else the nearest edge.
+  const auto& [a, b, c] = plate.corners;
+  const Vector3 normal = (b - a).cross(c - a).normalized();
+  const bool inside = (b - a).cross(p - a).dot(normal) >= 0.0 &&
+    (c - b).cross(p - b).dot(normal) >= 0.0 && (a - c).cross(p - c).dot(normal) >= 0.0;
+  if (inside)
+  {
+    return std::abs((p - a).dot(normal)) - plate.half;
+  }
+  const double square = std::min({ NearestOnSegment(p, a, b).squaredDistance,
+    NearestOnSegment(p, b, c).squaredDistance, NearestOnSegment(p, c, a).squaredDistance });
+  return std::sqrt(square) - plate.half;
 }
 
 ThoraxBox BoxOf(const ThoraxPart& part)
@@ -252,36 +247,7 @@ ThoraxAnatomy::ThoraxAnatomy(const ThoraxSettings& settings)
   , SkinWidths({ { -210, 152 }, { -150, 158 }, { -90, 166 }, { -30, 170 }, { 30, 173 }, { 70, 181 },
       { 95, 186 }, { 112, 168 }, { 130, 98 }, { 150, 66 } })
 {
-  this->WallRadii.resize(WallSteps + 1);
-  std::size_t k = 0;
-  for (int i = 0; i <= WallSteps; ++i)
-  {
-    const double angle = Pi * i / WallSteps;
-    const auto angleOf = [](const std::array<double, 2>& q) { return std::atan2(q[0], q[1]); };
-    while (k + 2 < WallOutline.size() && angleOf(WallOutline[k + 1]) < angle)
-    {
-      ++k;
-    }
-    const double a = angleOf(WallOutline[k]);
-    const double b = angleOf(WallOutline[k + 1]);
-    const double t = std::clamp((angle - a) / (b - a), 0.0, 1.0);
-    const auto radius = [](const std::array<double, 2>& q) { return std::hypot(q[0], q[1]); };
-    this->WallRadii[static_cast<std::size_t>(i)] =
-      static_cast<float>(radius(WallOutline[k]) * (1.0 - t) + radius(WallOutline[k + 1]) * t);
-  }
-  // Without corners.
-  const std::vector<float> raw = this->WallRadii;
-  for (int i = 0; i <= WallSteps; ++i)
-  {
-    float sum = 0.0F;
-    for (int j = i - 12; j <= i + 12; ++j)
-    {
-      const int place = std::abs(j) > WallSteps ? 2 * WallSteps - j : std::abs(j);
-      sum += raw[static_cast<std::size_t>(place)];
-    }
-    this->WallRadii[static_cast<std::size_t>(i)] = sum / 25.0F;
-  }
-
+  this->MakeWall();
   this->MakeVertebrae();
   this->AddGreatVessels();
   for (const int side : { -1, 1 })
@@ -303,6 +269,39 @@ ThoraxAnatomy::ThoraxAnatomy(const ThoraxSettings& settings)
   this->AddSternum();
 }
 
+/// The outline as radii over the angle, without corners.
+void ThoraxAnatomy::MakeWall()
+{
+  this->WallRadii.resize(WallSteps + 1);
+  std::size_t k = 0;
+  for (int i = 0; i <= WallSteps; ++i)
+  {
+    const double angle = Pi * i / WallSteps;
+    const auto angleOf = [](const std::array<double, 2>& q) { return std::atan2(q[0], q[1]); };
+    while (k + 2 < WallOutline.size() && angleOf(WallOutline[k + 1]) < angle)
+    {
+      ++k;
+    }
+    const double a = angleOf(WallOutline[k]);
+    const double b = angleOf(WallOutline[k + 1]);
+    const double t = std::clamp((angle - a) / (b - a), 0.0, 1.0);
+    const auto radius = [](const std::array<double, 2>& q) { return std::hypot(q[0], q[1]); };
+    this->WallRadii[static_cast<std::size_t>(i)] =
+      static_cast<float>(radius(WallOutline[k]) * (1.0 - t) + radius(WallOutline[k + 1]) * t);
+  }
+  const std::vector<float> raw = this->WallRadii;
+  for (int i = 0; i <= WallSteps; ++i)
+  {
+    float sum = 0.0F;
+    for (int j = i - 12; j <= i + 12; ++j)
+    {
+      const int place = std::abs(j) > WallSteps ? 2 * WallSteps - j : std::abs(j);
+      sum += raw[static_cast<std::size_t>(place)];
+    }
+    this->WallRadii[static_cast<std::size_t>(i)] = sum / 25.0F;
+  }
+}
+
 double ThoraxAnatomy::MidX(double z) const
 {
   return Midline + this->Scoliosis * std::sin((z + 20.0) / 70.0);
@@ -319,14 +318,18 @@ double ThoraxAnatomy::FrontY(double z) const
   return this->Sagittal * this->Fronts(z);
 }
 
-double ThoraxAnatomy::BackY(double z) const
+ThoraxSlice ThoraxAnatomy::Slice(double z) const
 {
-  return this->SpineY(z) + 34.0 * this->Sagittal;
-}
-
-double ThoraxAnatomy::HalfWidth(double z) const
-{
-  return this->Lateral * this->HalfWidths(z);
+  const double more = this->Settings.fat - 12.0;
+  ThoraxSlice slice{};
+  slice.middleX = this->MidX(z);
+  slice.front = this->FrontY(z);
+  slice.back = this->SpineY(z) + 34.0 * this->Sagittal;
+  slice.halfWidth = this->Lateral * this->HalfWidths(z);
+  slice.skinFront = slice.front - 23.0 - more;
+  slice.skinBack = slice.back + 36.0 + more;
+  slice.skinHalfWidth = this->Lateral * this->SkinWidths(z) + more;
+  return slice;
 }
 
 Vector3 ThoraxAnatomy::OnWall(double angle, double z, int side) const
@@ -337,52 +340,44 @@ Vector3 ThoraxAnatomy::OnWall(double angle, double z, int side) const
     (step - i) *
       (this->WallRadii[static_cast<std::size_t>(i) + 1] -
         this->WallRadii[static_cast<std::size_t>(i)]);
-  const double front = this->FrontY(z);
-  const double back = this->BackY(z);
-  const double middle = 0.5 * (front + back);
-  return { this->MidX(z) + side * this->HalfWidth(z) * radius * std::sin(angle),
-    middle + 0.5 * (back - front) * radius * std::cos(angle), z };
+  const ThoraxSlice slice = this->Slice(z);
+  return { slice.middleX + side * slice.halfWidth * radius * std::sin(angle),
+    0.5 * (slice.front + slice.back) + 0.5 * (slice.back - slice.front) * radius * std::cos(angle),
+    z };
 }
 
-double ThoraxAnatomy::Level(const Vector3& p, double& radius) const
+double ThoraxAnatomy::WallLevel(const ThoraxSlice& slice, const Vector3& p, double& radius) const
 {
-  const double front = this->FrontY(p.z());
-  const double back = this->BackY(p.z());
-  const double dx = std::abs(p.x() - this->MidX(p.z()));
-  const double dy = p.y() - 0.5 * (front + back);
-  const double x = dx / this->HalfWidth(p.z());
-  const double y = dy / (0.5 * (back - front));
-  const double angle = std::atan2(x, y);
-  const auto i = static_cast<std::size_t>(angle / Pi * WallSteps + 0.5);
+  const double dx = std::abs(p.x() - slice.middleX);
+  const double dy = p.y() - 0.5 * (slice.front + slice.back);
+  const double x = dx / slice.halfWidth;
+  const double y = dy / (0.5 * (slice.back - slice.front));
   radius = std::hypot(dx, dy);
+  const auto i = static_cast<std::size_t>(std::atan2(x, y) / Pi * WallSteps + 0.5);
   return std::hypot(x, y) / this->WallRadii[i];
 }
 
-double ThoraxAnatomy::WallDistance(const Vector3& p) const
+double ThoraxAnatomy::WallDistance(double level, double radius)
 {
-  double radius = 0.0;
-  const double level = this->Level(p, radius);
-  return level > 1e-6 ? radius * (1.0 - 1.0 / level) : -this->HalfWidth(p.z());
+  return level > 0.05 ? radius * (1.0 - 1.0 / level) : -1e3;
 }
 
-double ThoraxAnatomy::SkinDistance(const Vector3& p) const
+double ThoraxAnatomy::SkinDistance(const ThoraxSlice& slice, const Vector3& p)
 {
-  const double more = this->Settings.fat - 12.0;
-  const double front = this->FrontY(p.z()) - 23.0 - more;
-  const double back = this->BackY(p.z()) + 36.0 + more;
-  const double width = this->Lateral * this->SkinWidths(p.z()) + more;
-  const double dx = std::abs(p.x() - this->MidX(p.z()));
-  const double dy = std::abs(p.y() - 0.5 * (front + back));
-  const double level =
-    std::pow(std::pow(dx / width, 2.6) + std::pow(2.0 * dy / (back - front), 2.6), 1.0 / 2.6);
-  return level > 1e-6 ? std::hypot(dx, dy) * (1.0 - 1.0 / level) : -width;
+  // A superellipse of exponent 2.5.
+  const double dx = std::abs(p.x() - slice.middleX);
+  const double dy = std::abs(p.y() - 0.5 * (slice.skinFront + slice.skinBack));
+  const double x = dx / slice.skinHalfWidth;
+  const double y = 2.0 * dy / (slice.skinBack - slice.skinFront);
+  const double level = std::pow(x * x * std::sqrt(x) + y * y * std::sqrt(y), 0.4);
+  return WallDistance(level, std::sqrt(dx * dx + dy * dy));
 }
 
-double ThoraxAnatomy::DiaphragmHeight(const Vector3& p) const
+double ThoraxAnatomy::DiaphragmHeight(const ThoraxSlice& slice, const Vector3& p) const
 {
-  const double x = (p.x() - this->MidX(p.z())) / this->Lateral;
+  const double x = (p.x() - slice.middleX) / this->Lateral;
   const double y = p.y() / this->Sagittal;
-  const auto dome = [&](double middleX, double middleY, double top, double halfX, double halfY)
+  const auto dome = [x, y](double middleX, double middleY, double top, double halfX, double halfY)
   {
     const double u = (x - middleX) / halfX;
     const double v = (y - middleY) / halfY;
@@ -390,35 +385,21 @@ double ThoraxAnatomy::DiaphragmHeight(const Vector3& p) const
     const double steep = std::max(0.0, q - 0.5);
     return top - 26.0 * q - 38.0 * steep * steep;
   };
-  const double right = dome(-70.0, -8.0, -72.0, 62.0, 82.0);
-  const double left = dome(72.0, -8.0, -85.0, 60.0, 82.0);
-  const double tendon = dome(15.0, -35.0, -92.0, 70.0, 62.0);
-  return std::max({ right, left, tendon });
+  return std::max({ dome(-70.0, -8.0, -83.0, 62.0, 82.0), dome(72.0, -8.0, -95.0, 60.0, 82.0),
+    dome(15.0, -35.0, -95.0, 70.0, 62.0) });
 }
 
-double ThoraxAnatomy::LungTop(const Vector3& p) const
+double ThoraxAnatomy::LungTop(double wallLevel)
 {
-  double radius = 0.0;
-  const double level = this->Level(p, radius);
-  return 116.0 - 30.0 * level * level;
+  return 116.0 - 30.0 * wallLevel * wallLevel;
 }
 
-double ThoraxAnatomy::HeartDistance(const Vector3& p) const
+double ThoraxAnatomy::HeartDistance(const Vector3& p)
 {
   static const HeartFrame frame;
   const Vector3 q = frame.ToHeart(p);
   const Vector3 u = (q - HeartFrame::Centre).cwiseQuotient(HeartFrame::Radii);
   return EllipticDistance(u.norm(), u.cwiseQuotient(HeartFrame::Radii).norm());
-}
-
-double ThoraxAnatomy::MediastinumDistance(const Vector3& p) const
-{
-  double nearest = 1e9;
-  for (const ThoraxPart& part : this->Mediastinum)
-  {
-    nearest = std::min(nearest, DistanceTo(part, p));
-  }
-  return nearest;
 }
 
 void ThoraxAnatomy::MakeVertebrae()
@@ -668,8 +649,8 @@ void ThoraxAnatomy::AddShoulder(int side)
   humerus.shell = 2.5;
   humerus.shellValue = RibCortex;
   humerus.coreValue = 200.0F;
-  AddTube(humerus.parts, { place(174, 28, 86), place(184, 24, 60), place(188, 20, -20) },
-    { 20.0, 13.0, 11.0 });
+  AddTube(humerus.parts, { place(168, 28, 88), place(182, 20, 118), place(192, 10, 160) },
+    { 19.0, 14.0, 11.0 });
   this->bones.push_back(std::move(humerus));
 }
 
@@ -727,17 +708,17 @@ void ThoraxAnatomy::AddGreatVessels()
   {
     const Vertebra& upper = this->Vertebrae[k];
     const Vertebra& lower = this->Vertebrae[k + 1];
-    this->Mediastinum.emplace_back(Flat(upper.At(0, 18, 0), lower.At(0, 18, 0), Vector3::UnitX(),
-      { upper.halfWidth + 10.0, lower.halfWidth + 10.0 }, { 30.0, 30.0 }));
+    this->mediastinum.emplace_back(Flat(upper.At(0, 18, 0), lower.At(0, 18, 0), Vector3::UnitX(),
+      { upper.halfWidth + 6.0, lower.halfWidth + 6.0 }, { 28.0, 28.0 }));
   }
-  this->Mediastinum.emplace_back(Flat(Vector3(mid - 2, 6, 118), Vector3(mid - 4, 0, 50),
-    Vector3::UnitX(), { 26.0, 27.0 }, { 30.0, 36.0 }));
-  this->Mediastinum.emplace_back(Flat(Vector3(mid - 2, 2, 50), Vector3(mid + 8, -5, -60),
-    Vector3::UnitX(), { 26.0, 38.0 }, { 38.0, 52.0 }));
-  this->Mediastinum.emplace_back(
+  this->mediastinum.emplace_back(Flat(Vector3(mid - 2, 6, 118), Vector3(mid - 4, 0, 50),
+    Vector3::UnitX(), { 21.0, 20.0 }, { 28.0, 32.0 }));
+  this->mediastinum.emplace_back(Flat(Vector3(mid - 2, 2, 50), Vector3(mid + 8, -5, -60),
+    Vector3::UnitX(), { 18.0, 24.0 }, { 36.0, 52.0 }));
+  this->mediastinum.emplace_back(
     Flat(Vector3(mid, this->FrontY(70) + 14.0, 70), Vector3(mid + 6, this->FrontY(-80) + 14.0, -80),
       Vector3::UnitX(), { 20.0, 22.0 }, { 20.0, 20.0 }));
-  this->Mediastinum.insert(this->Mediastinum.end(), blood.parts.begin(), blood.parts.end());
+  this->mediastinum.insert(this->mediastinum.end(), blood.parts.begin(), blood.parts.end());
 }
 
 void ThoraxAnatomy::AddLungVessels(int side)
@@ -764,8 +745,11 @@ void ThoraxAnatomy::Branch(ThoraxTissue& tissue, const Vector3& from, const Vect
 {
   const double length = (5.5 + 2.0 * random.Uniform()) * std::pow(radius, 0.75) + 4.0;
   const Vector3 to = from + length * direction;
-  const bool inLung = this->WallDistance(to) < -8.0 && to.z() > this->DiaphragmHeight(to) + 3.0 &&
-    to.z() < this->LungTop(to) - 5.0;
+  const ThoraxSlice slice = this->Slice(to.z());
+  double outwards = 0.0;
+  const double level = this->WallLevel(slice, to, outwards);
+  const bool inLung = WallDistance(level, outwards) < -8.0 &&
+    to.z() > this->DiaphragmHeight(slice, to) + 3.0 && to.z() < LungTop(level) - 5.0;
   if (radius < 0.65 || generation > 11 || !inLung)
   {
     return;

@@ -14,7 +14,8 @@ namespace coronary
 struct ThoraxRod
 {
   Vector3 from;
-  Vector3 to;
+  Vector3 forward;                       ///< unit, to the other end
+  double length;                         ///< mm
   Vector3 across;                        ///< unit, first axis of the cross-section
   std::array<double, 2> radii{ 1, 1 };   ///< along `across` at both ends, mm
   std::array<double, 2> heights{ 1, 1 }; ///< along the other axis, mm
@@ -39,7 +40,9 @@ struct ThoraxPlate
 using ThoraxPart = std::variant<ThoraxRod, ThoraxDrum, ThoraxPlate>;
 
 /// Signed distance, negative inside, mm: exact at the surface, to first order near it.
-double DistanceTo(const ThoraxPart& part, const Vector3& p);
+double DistanceTo(const ThoraxRod& rod, const Vector3& p);
+double DistanceTo(const ThoraxDrum& drum, const Vector3& p);
+double DistanceTo(const ThoraxPlate& plate, const Vector3& p);
 
 struct ThoraxBox
 {
@@ -75,34 +78,40 @@ private:
   std::vector<std::array<double, 2>> Knots;
 };
 
-/// Where everything is. Heights z are world mm; lateral distances are from the midline.
+/// The cross-section of chest and skin at a height, world mm.
+struct ThoraxSlice
+{
+  double middleX; ///< the patient's midline
+  double front;   ///< of the chest wall, where ribs run: y at the sternum
+  double back;    ///< beside the spine
+  double halfWidth;
+  double skinFront;
+  double skinBack;
+  double skinHalfWidth;
+};
+
+/// Where everything is.
 class ThoraxAnatomy
 {
 public:
   explicit ThoraxAnatomy(const ThoraxSettings& settings);
 
-  // The chest wall: where ribs run.
-  double MidX(double z) const;   ///< the patient's midline, world x
-  double SpineY(double z) const; ///< centre of the vertebral bodies, world y
-  double FrontY(double z) const; ///< of the chest wall at the sternum
-  double BackY(double z) const;  ///< of the chest wall beside the spine
-  double HalfWidth(double z) const;
-  /// The wall at an angle from the back (0) over the side (pi / 2) to the front (pi); side -1 right, 1 left.
-  Vector3 OnWall(double angle, double z, int side) const;
-  /// Distance from the wall, first order, mm; negative inside.
-  double WallDistance(const Vector3& p) const;
+  ThoraxSlice Slice(double z) const;
   /// Distance from the skin, first order, mm; negative inside.
-  double SkinDistance(const Vector3& p) const;
-  /// Height of the diaphragm at a place, world z.
-  double DiaphragmHeight(const Vector3& p) const;
-  /// Top of the lung over a place.
-  double LungTop(const Vector3& p) const;
-  /// Distance from what is between the lungs, mm; negative inside.
-  double MediastinumDistance(const Vector3& p) const;
-  /// 1 inside the ventricles, 0 outside; in the fat around them between: first order distance of the epicardium, mm.
-  double HeartDistance(const Vector3& p) const;
+  static double SkinDistance(const ThoraxSlice& slice, const Vector3& p);
+  /// 1 on the chest wall, below inside; `radius`: from its middle, mm.
+  double WallLevel(const ThoraxSlice& slice, const Vector3& p, double& radius) const;
+  /// Distance from the chest wall, first order, mm; negative inside.
+  static double WallDistance(double level, double radius);
+  /// Height of the diaphragm over or below a place, world z.
+  double DiaphragmHeight(const ThoraxSlice& slice, const Vector3& p) const;
+  /// The same of the lungs' upper end.
+  static double LungTop(double wallLevel);
+  /// Distance from the epicardium of the ventricles, first order, mm.
+  static double HeartDistance(const Vector3& p);
 
-  std::vector<ThoraxTissue> vessels; ///< of mediastinum and lungs
+  std::vector<ThoraxPart> mediastinum; ///< what the lungs do not reach
+  std::vector<ThoraxTissue> vessels;   ///< of mediastinum and lungs
   std::vector<ThoraxTissue> airways;
   std::vector<ThoraxTissue> bones;
 
@@ -122,7 +131,12 @@ private:
     double HalfHeight() const { return 0.5 * (this->spacing - this->disc); }
   };
 
-  double Level(const Vector3& p, double& radius) const;
+  double MidX(double z) const;
+  double SpineY(double z) const; ///< centre of the vertebral bodies
+  double FrontY(double z) const;
+  /// The chest wall at an angle from the back (0) over the side (pi / 2) to the front (pi); side -1 right, 1 left.
+  Vector3 OnWall(double angle, double z, int side) const;
+  void MakeWall();
   void MakeVertebrae();
   void AddVertebra(int number);
   void AddRib(int number, int side);
@@ -146,7 +160,6 @@ private:
   std::vector<float>
     WallRadii; ///< of the cross-section of size 1, over the angle from back to front
   std::vector<Vertebra> Vertebrae; ///< from C7 (0) to L2 (14)
-  std::vector<ThoraxPart> Mediastinum;
 };
 }
 

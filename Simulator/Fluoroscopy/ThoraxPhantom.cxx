@@ -16,6 +16,8 @@ constexpr double Below = -208.0; ///< world z of the volume's ends, mm
 constexpr double Above = 148.0;
 constexpr int SlabThickness = 4; ///< slices that are made together
 
+constexpr float Far = 1e9F;               ///< mm
+constexpr double MediastinumMargin = 2.5; ///< fat between it and the lungs, mm
 constexpr float Outside = -1000.0F;
 constexpr float Skin = 40.0F;
 constexpr float Fat = -95.0F;
@@ -126,13 +128,17 @@ public:
     slab.values.resize(static_cast<std::size_t>(n[0]) * n[1] * slab.slices);
     slab.distances.resize(slab.values.size());
     std::size_t index = 0;
+    this->MeasureMediastinum(slab);
     for (int k = first; k < last; ++k)
     {
+      const ThoraxSlice slice =
+        this->Anatomy.Slice(this->Volume.grid.origin.z() + k * this->Spacing);
       for (int j = 0; j < n[1]; ++j)
       {
         for (int i = 0; i < n[0]; ++i)
         {
-          slab.values[index++] = this->SoftTissue(this->Volume.grid.IndexToWorld(i, j, k));
+          slab.values[index] = this->SoftTissue(slice, this->Place(i, j, k), slab.distances[index]);
+          ++index;
         }
       }
     }
@@ -168,14 +174,21 @@ private:
   };
   using Range = std::array<int, 6>;
 
-  float SoftTissue(const Vector3& p) const
+  /// @param apart  from the mediastinum, mm
+  float SoftTissue(const ThoraxSlice& slice, const Vector3& p, float apart) const
   {
-    const double skin = this->Anatomy.SkinDistance(p);
+    const double skin = ThoraxAnatomy::SkinDistance(slice, p);
     if (skin > this->Spacing)
     {
       return Outside;
     }
-    const double wall = this->Anatomy.WallDistance(p);
+    double radius = 0.0;
+    const double level = this->Anatomy.WallLevel(slice, p, radius);
+    const double wall = ThoraxAnatomy::WallDistance(level, radius);
+    if (wall < -this->Spacing)
+    {
+      return this->Inside(slice, p, level, wall, apart);
+    }
     // Fat is thicker at the flanks, and lies between muscles.
     const float rough = this->Coarse(p);
     const double fat = this->FatThickness * (1.0 + 0.25 * rough);
@@ -187,18 +200,19 @@ private:
     value = Mixed(Outside, value, Covered(skin, this->Spacing));
     if (wall < 0.5 * this->Spacing)
     {
-      value = Mixed(value, this->Inside(p, wall), Covered(wall, this->Spacing));
+      value =
+        Mixed(value, this->Inside(slice, p, level, wall, apart), Covered(wall, this->Spacing));
     }
     return value;
   }
 
   /// Within the ribs.
-  float Inside(const Vector3& p, double wall) const
+  float Inside(
+    const ThoraxSlice& slice, const Vector3& p, double level, double wall, double apart) const
   {
     constexpr double pleura = 5.5; ///< lungs begin so far inside of the ribs' middle
-    const double below = p.z() - this->Anatomy.DiaphragmHeight(p);
-    const double apart = this->Anatomy.MediastinumDistance(p);
-    const double heart = this->Anatomy.HeartDistance(p);
+    const double below = p.z() - this->Anatomy.DiaphragmHeight(slice, p);
+    const double heart = ThoraxAnatomy::HeartDistance(p);
     const float fine = this->Fine(p);
     // Fat and vessels between the lungs; fat around the heart.
     float value = -15.0F + 30.0F * this->Coarse(p) + 8.0F * fine;
@@ -206,10 +220,10 @@ private:
     value = Mixed(value, Heart + 4.0F * fine, Covered(heart, this->Spacing));
     if (below < this->Spacing)
     {
-      value = Mixed(value, this->Organs(p), Covered(below, this->Spacing));
+      value = Mixed(value, this->Organs(slice, p), Covered(below, this->Spacing));
     }
-    const double lung = std::max(
-      { wall + pleura, -below, 2.5 - apart, 7.0 - heart - 2.0, p.z() - this->Anatomy.LungTop(p) });
+    const double lung = std::max({ wall + pleura, -below, MediastinumMargin - apart,
+      7.0 - heart - 2.0, p.z() - ThoraxAnatomy::LungTop(level) });
     if (lung < this->Spacing)
     {
       // Lying on the back: denser behind.
@@ -220,17 +234,18 @@ private:
     return value;
   }
 
-  float Organs(const Vector3& p) const
+  float Organs(const ThoraxSlice& slice, const Vector3& p) const
   {
-    const double x = p.x() - this->Anatomy.MidX(p.z());
+    const double x = p.x() - slice.middleX;
     const float fine = this->Fine(p);
     const float mixed = Abdomen + 28.0F * this->Coarse(p) + 6.0F * fine;
     float value =
       Mixed(mixed, Liver + 5.0F * fine, Covered(x - 25.0 + 0.35 * (p.z() + 100.0), 12.0));
     // The bubble of the stomach under the left dome.
-    const Vector3 q = (Vector3(x, p.y(), p.z()) - Vector3(72.0, -18.0, -112.0))
-                        .cwiseQuotient(Vector3(33.0, 30.0, 14.0));
-    return Mixed(value, Gas, Covered(14.0 * (q.norm() - 1.0), this->Spacing));
+    const Vector3 q = (Vector3(x, p.y(), p.z()) - Vector3(66.0, -30.0, -117.0))
+                        .cwiseQuotient(Vector3(30.0, 17.0, 13.0));
+    return Mixed(
+      value, Gas, Covered(13.0 * (q.norm() - 1.0 + 0.2F * this->Coarse(p)), 3.0 * this->Spacing));
   }
 
   /// Voxels of a slab that a box may touch; empty when first > last.
@@ -260,6 +275,42 @@ private:
     }
   }
 
+  Vector3 Place(int i, int j, int k) const
+  {
+    return this->Volume.grid.origin + this->Spacing * Vector3(i, j, k);
+  }
+
+  /// Makes distances less where a part is nearer.
+  void Measure(const ThoraxPart& part, const Range& range, Slab& slab) const
+  {
+    std::visit(
+      [&](const auto& shape)
+      {
+        ForRows(range, slab,
+          [&](int j, int k, std::size_t index)
+          {
+            for (int i = range[0]; i <= range[1]; ++i, ++index)
+            {
+              slab.distances[index] = std::min(
+                slab.distances[index], static_cast<float>(DistanceTo(shape, this->Place(i, j, k))));
+            }
+          });
+      },
+      part);
+  }
+
+  void MeasureMediastinum(Slab& slab) const
+  {
+    std::fill(slab.distances.begin(), slab.distances.end(), Far);
+    for (const ThoraxPart& part : this->Anatomy.mediastinum)
+    {
+      ThoraxBox box = BoxOf(part);
+      box.low.array() -= MediastinumMargin;
+      box.high.array() += MediastinumMargin;
+      this->Measure(part, this->Voxels(box, slab), slab);
+    }
+  }
+
   void Paint(const BoxedTissue& boxed, Slab& slab) const
   {
     const Range whole = this->Voxels(boxed.box, slab);
@@ -270,20 +321,10 @@ private:
     const int width = whole[1] - whole[0] + 1;
     ForRows(whole, slab,
       [&](int, int, std::size_t index)
-      { std::fill_n(slab.distances.begin() + static_cast<std::ptrdiff_t>(index), width, 1e9F); });
+      { std::fill_n(slab.distances.begin() + static_cast<std::ptrdiff_t>(index), width, Far); });
     for (std::size_t part = 0; part < boxed.boxes.size(); ++part)
     {
-      const Range range = this->Voxels(boxed.boxes[part], slab);
-      ForRows(range, slab,
-        [&](int j, int k, std::size_t index)
-        {
-          for (int i = range[0]; i <= range[1]; ++i, ++index)
-          {
-            const Vector3 p = this->Volume.grid.IndexToWorld(i, j, k);
-            slab.distances[index] = std::min(
-              slab.distances[index], static_cast<float>(DistanceTo(boxed.tissue->parts[part], p)));
-          }
-        });
+      this->Measure(boxed.tissue->parts[part], this->Voxels(boxed.boxes[part], slab), slab);
     }
     const ThoraxTissue& tissue = *boxed.tissue;
     ForRows(whole, slab,
