@@ -27,12 +27,19 @@ struct HeadlessOptions
   double heartRate = -1.0;  ///< beats a minute; negative: the scenario's
   bool verify = false;      ///< hashes have to be those of the recording
   bool writeWall = false;
+  bool xray = false;  ///< X-ray frames as pictures
+  bool scene = false; ///< the anatomy as pictures
   bool quiet = false;
 };
 
 /// The scenario with what the options change.
 /// @throws UsageError, as LoadScenario
 Scenario ScenarioOf(const HeadlessOptions& options);
+
+/// What a recording has to have in common with the session that replays it.
+/// @throws std::runtime_error  another tick rate; other vessels, if that is not allowed
+void CheckRecording(const std::string& path, const Scenario& scenario, std::uint64_t wallHash,
+  bool otherVesselsAllowed);
 
 /**
  * Runs, writes, and prints a summary on standard output.

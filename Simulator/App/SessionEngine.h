@@ -9,6 +9,7 @@
 #include "FixedStepClock.h"
 #include "Recording.h"
 #include "SessionImager.h"
+#include "SessionWorld.h"
 #include "TrainingSession.h"
 
 #include <atomic>
@@ -22,15 +23,6 @@
 
 namespace coronary
 {
-/// What is made once, and shared by the sessions of a window.
-struct SessionWorld
-{
-  Scenario scenario; ///< with the pose that the C-arm starts at
-  std::shared_ptr<WallMotion> wall;
-  std::uint64_t wallHash = 0;
-  std::shared_ptr<const VolumeProjector> background;
-};
-
 struct EngineOptions
 {
   std::string record; ///< recording to write; empty: none

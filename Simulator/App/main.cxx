@@ -1,5 +1,6 @@
 /**
- * coronary-simulator: a guidewire in beating coronary arteries.
+ * coronary-simulator: a guidewire in beating coronary arteries, contrast medium and X-ray images, in a window or
+ * without.
  *
  * Exit codes: 0 done; 1 failed, with one line that says why; 2 the command line is wrong;
  * 128 + n ended by signal n (130: Ctrl-C).
@@ -9,6 +10,11 @@
 #include "Interruption.h"
 #include "OptionChecks.h"
 #include "ParallelFor.h"
+#include "ProgressDisplay.h"
+#include "SessionWorld.h"
+#ifdef DYNAMICCORONARY_WITH_WINDOW
+#include "vtkSimulatorWindow.h"
+#endif
 
 #include <algorithm>
 #include <cstdio>
@@ -33,6 +39,12 @@ int Complain(std::string message, int exitCode)
 struct Request
 {
   coronary::HeadlessOptions session;
+#ifdef DYNAMICCORONARY_WITH_WINDOW
+  coronary::WindowOptions window;
+  std::string size;
+  void DeclareWindow(CLI::App& app);
+  void RunWindow() const;
+#endif
   std::string dump;
   bool headless = false;
   bool printScenario = false;
@@ -48,8 +60,8 @@ void Request::Declare(CLI::App& app)
 {
   using coronary::WholeWithin;
   using coronary::Within;
-  app.add_flag("--headless", this->headless,
-    "Run without window on one thread, as fast as the machine can; required to run a session");
+  app.add_flag(
+    "--headless", this->headless, "Run without window on one thread, as fast as the machine can");
 
   const std::string what = "Session";
   app
@@ -118,10 +130,22 @@ void Request::Declare(CLI::App& app)
   app.add_flag("--write-wall", this->session.writeWall, "Write the moving wall as well")
     ->needs(output)
     ->group(files);
+  app
+    .add_flag("--xray", this->session.xray,
+      "Make the X-ray frames; with --output they are written as pictures. Without window only")
+    ->group(files);
+  app
+    .add_flag("--scene", this->session.scene,
+      "Write pictures of the anatomy, at the output's rate; needs a display (xvfb-run gives one)")
+    ->needs(output)
+    ->group(files);
   app.add_option("--record", this->session.record, "Recording (.pcirec) to write")
     ->type_name("FILE")
     ->group(files);
 
+#ifdef DYNAMICCORONARY_WITH_WINDOW
+  this->DeclareWindow(app);
+#endif
   const std::string questions = "Instead of a session";
   app.add_flag("--print-scenario", this->printScenario, "Print the scenario in effect as JSON")
     ->group(questions);
@@ -168,16 +192,127 @@ void Request::Run() const
     std::fputs(coronary::ScenarioText(coronary::ScenarioOf(this->session)).c_str(), stdout);
     return;
   }
-  if (!this->headless)
+  if (this->headless)
   {
-    throw coronary::UsageError("--headless is required");
+    coronary::RunHeadless(this->session);
+    return;
   }
-  coronary::RunHeadless(this->session);
+#ifdef DYNAMICCORONARY_WITH_WINDOW
+  this->RunWindow();
+#else
+  throw coronary::UsageError(
+    "--headless is required: this program was built without its window (Qt5 and VTK's "
+    "GUISupportQt were not found)");
+#endif
 }
+
+#ifdef DYNAMICCORONARY_WITH_WINDOW
+void Request::DeclareWindow(CLI::App& app)
+{
+  using coronary::WholeWithin;
+  using coronary::Within;
+  const std::string what = "Window";
+  app
+    .add_option("--device", this->window.devices,
+      "Hardware: serial:PATH, gamepad:, gamepad:PATH; may be given again, the first one has "
+      "priority. Keys and mouse are always there")
+    ->type_name("URI")
+    ->group(what);
+  app
+    .add_option("--triangles", this->window.triangles,
+      "Of the arteries in the view of the anatomy at most; fewer are drawn faster")
+    ->check(WholeWithin(500, 2000000))
+    ->capture_default_str()
+    ->type_name("N")
+    ->group(what);
+  app.add_option("--size", this->size, "Of the window in pixels, as 1500x860")
+    ->check(
+      [](const std::string& text)
+      {
+        int width = 0;
+        int height = 0;
+        char rest = 0;
+        const bool good = std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) == 2 &&
+          width >= 640 && width <= 8192 && height >= 480 && height <= 8192;
+        return good ? std::string() : "'" + text + "' is no size from 640x480 to 8192x8192";
+      })
+    ->type_name("WxH")
+    ->group(what);
+  auto* screenshots = app
+                        .add_option("--screenshots", this->window.screenshots,
+                          "Folder for pictures of the window; it has to exist")
+                        ->check(CLI::ExistingDirectory)
+                        ->type_name("DIR")
+                        ->group(what);
+  app
+    .add_option("--screenshot-at", this->window.screenshotSeconds,
+      "Seconds of simulated time at which they are made, rising")
+    ->check(Within(0.0, 1e6))
+    ->type_name("S")
+    ->needs(screenshots)
+    ->group(what);
+  app.add_option("--video", this->window.video, "Film of the first session, .ogv")
+    ->type_name("FILE")
+    ->group(what);
+  app
+    .add_option("--quit-after", this->window.quitAfter,
+      "Close the window after so many seconds of simulated time, or at the end of the replay")
+    ->check(Within(0.01, 1e6))
+    ->type_name("S")
+    ->group(what);
+}
+
+void Request::RunWindow() const
+{
+  coronary::HeadlessOptions chosen = this->session;
+  const auto onlyHeadless = [](bool used, const char* option)
+  {
+    if (used)
+    {
+      throw coronary::UsageError(std::string(option) + " is for sessions with --headless");
+    }
+  };
+  onlyHeadless(!chosen.output.empty(), "--output");
+  onlyHeadless(chosen.ticks > 0, "--ticks");
+  onlyHeadless(chosen.verify, "--verify");
+  onlyHeadless(chosen.xray, "--xray");
+  if (chosen.scenario.empty() && chosen.replay.empty())
+  {
+    chosen.scenario = "phantom-lca";
+  }
+  coronary::WindowOptions options = this->window;
+  options.script = chosen.script;
+  options.replay = chosen.replay;
+  options.record = chosen.record;
+  if (!this->size.empty())
+  {
+    std::sscanf(this->size.c_str(), "%dx%d", &options.width, &options.height);
+  }
+  coronary::RequireDisplay();
+  coronary::SessionWorld world;
+  {
+    coronary::ProgressDisplay progress("step", 2, chosen.quiet);
+    world = coronary::LoadWorld(coronary::ScenarioOf(chosen), true, progress);
+  }
+  if (!chosen.replay.empty())
+  {
+    coronary::CheckRecording(chosen.replay, world.scenario, world.wallHash, true);
+  }
+  for (const std::string& note : world.notes)
+  {
+    std::fprintf(stderr, "Warning: %s\n", note.c_str());
+  }
+  if (coronary::RunWindow(world, options) != 0)
+  {
+    throw std::runtime_error("the session failed");
+  }
+}
+#endif
 
 int Run(int argc, char** argv)
 {
-  CLI::App program("A guidewire in beating coronary arteries.", "coronary-simulator");
+  CLI::App program("A guidewire in beating coronary arteries, contrast medium and X-ray images.",
+    "coronary-simulator");
   program.set_version_flag("--version", "coronary-simulator " DYNAMICCORONARY_VERSION);
   Request request;
   request.Declare(program);

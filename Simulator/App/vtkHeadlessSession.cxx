@@ -8,12 +8,14 @@
 #include "Interruption.h"
 #include "ProgressDisplay.h"
 #include "Recording.h"
+#include "SessionImager.h"
+#include "SessionPictures.h"
 #include "SessionStatistics.h"
 #include "StagedFolder.h"
+#include "TrainingSession.h"
 #include "UtcTime.h"
 #include "vtkMessageTrap.h"
 #include "vtkSessionFiles.h"
-#include "vtkVesselModel.h"
 
 #include <nlohmann/json.hpp>
 
@@ -57,6 +59,9 @@ public:
 
   const RecordingReplay* Recording() const { return this->Replay.get(); }
 
+  /// Where they are before the first tick.
+  void SetStart(const SessionInput& start) { this->Start = start; }
+
   /// Known before the start; 0: not known.
   std::uint64_t Expected(double rate) const
   {
@@ -65,7 +70,7 @@ public:
   }
 
   /// @return false when it is over
-  bool At(std::uint64_t tick, double rate, DriveInput& input, std::vector<RecordedEvent>& events)
+  bool At(std::uint64_t tick, double rate, SessionInput& input, std::vector<RecordedEvent>& events)
   {
     if (this->Most > 0 && tick >= this->Most)
     {
@@ -81,7 +86,7 @@ public:
       // The place at the end of the step, so that a piece is over when its ticks are.
       const double begin = static_cast<double>(tick) / rate;
       const double end = static_cast<double>(tick + 1) / rate;
-      input = this->Script.At(end);
+      input = this->Script.At(end, this->Start);
       for (const double heartRate : this->Script.HeartRates(begin, end))
       {
         events.push_back({ RecordedEvent::HeartRate, heartRate });
@@ -100,6 +105,7 @@ private:
   bool HasScript;
   std::uint64_t Most;
   DriveScript Script;
+  SessionInput Start;
   std::unique_ptr<RecordingReplay> Replay;
 };
 
@@ -121,6 +127,34 @@ struct Comparison
   }
 };
 
+/// Whether it is a name as wire_00012.vtp.
+bool IsNumbered(const std::string& name, const std::string& start, const std::string& end)
+{
+  const std::size_t digits = start.size();
+  return name.size() > digits + end.size() && name.rfind(start, 0) == 0 &&
+    name.compare(name.size() - end.size(), end.size(), end) == 0 &&
+    name.find_first_not_of("0123456789", digits) == name.size() - end.size();
+}
+
+Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
+{
+  Json branches = Json::array();
+  for (const int branch : metrics.branches)
+  {
+    const auto n = static_cast<std::size_t>(branch);
+    branches.push_back(n < topology.groupName.size() ? topology.groupName[n] : "");
+  }
+  return { { "procedure_s", metrics.procedureSeconds },
+    { "fluoroscopy_s", metrics.fluoroscopySeconds }, { "cine_s", metrics.cineSeconds },
+    { "frames", metrics.frames }, { "air_kerma_mGy", metrics.airKerma },
+    { "dose_area_Gy_cm2", metrics.doseAreaProduct }, { "contrast_mL", metrics.contrast },
+    { "greatest_wall_force_N", metrics.greatestWallForce },
+    { "greatest_tip_force_N", metrics.greatestTipForce },
+    { "forceful_tip_s", metrics.forcefulSeconds }, { "wire_travel_mm", metrics.wireTravel },
+    { "wire_turning_rad", metrics.wireTurning }, { "deepest_mm", metrics.deepest },
+    { "path", branches } };
+}
+
 /// Everything that goes into the folder.
 class OutputFiles
 {
@@ -141,14 +175,17 @@ public:
       "tick,seconds,phase,inserted_mm,proximal_force_N,proximal_torque_N_mm,tip_force_N,"
       "greatest_force_N,contacts,largest_penetration_mm,mean_penetration_mm,joint_gap_mm,"
       "outside,branch\n";
+    this->Flows = "tick,seconds,injection_mL_s,injected_mL,in_tree_mL,blush_mL,washed_out_mL,"
+                  "spilled_mL,aortic_pressure_mmHg,air_kerma_mGy,dose_area_Gy_cm2\n";
     this->Tips = "tick,seconds,x_mm,y_mm,z_mm,direction_x,direction_y,direction_z\n";
   }
 
   explicit operator bool() const { return this->Folder != nullptr; }
 
-  void Add(const Intervention& intervention, const Scenario& scenario, const WallTopology& topology,
-    vtkMessageTrap& messages)
+  void Add(const TrainingSession& session, const Scenario& scenario, vtkMessageTrap& messages)
   {
+    const Intervention& intervention = session.Instruments();
+    const WallTopology& topology = session.Topology();
     const TickReport& report = intervention.Report();
     const double seconds = static_cast<double>(this->Tick) / scenario.settings.tickRate;
     char name[40];
@@ -172,6 +209,13 @@ public:
       report.contacts, report.largestPenetration, report.meanPenetration, report.jointGap,
       report.outside, named ? topology.groupName[branch].c_str() : "");
     this->Forces += text;
+    const ContrastBalance medium = session.Contrast().Balance();
+    std::snprintf(text, sizeof(text), "%llu,%.9g,%.6g,%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g\n",
+      static_cast<unsigned long long>(this->Tick), seconds, session.Report().injection,
+      medium.injected, medium.inTree, medium.blush, medium.washedOut, medium.spilled,
+      session.Contrast().AorticPressure(), session.Metrics().airKerma,
+      session.Metrics().doseAreaProduct);
+    this->Flows += text;
     const std::vector<Vector3>& line = intervention.Centerline();
     if (line.size() > 1)
     {
@@ -185,8 +229,16 @@ public:
 
   void SetTick(std::uint64_t tick) { this->Tick = tick; }
 
-  void Finish(const Json& statistics)
+  /// For files that others write.
+  std::string Place(const std::string& name) { return this->Folder->Add(name); }
+
+  void Finish(const Json& statistics, const SessionPictures& pictures)
   {
+    if (pictures.Frames() > 0)
+    {
+      WriteFileAtomically(this->Folder->Add("frames.csv"), pictures.FrameTable());
+    }
+    WriteFileAtomically(this->Folder->Add("contrast.csv"), this->Flows);
     WriteFileAtomically(this->Folder->Add("trajectory.pvd"), PvdText(this->WireFiles));
     if (this->Wall)
     {
@@ -207,10 +259,9 @@ private:
     for (const auto& entry : fs::directory_iterator(folder, ignored))
     {
       const std::string name = entry.path().filename().string();
-      const bool numbered = name.size() > 9 && name.compare(name.size() - 4, 4, ".vtp") == 0 &&
-        (name.rfind("wire_", 0) == 0 || name.rfind("wall_", 0) == 0) &&
-        name.find_first_not_of("0123456789", 5) == name.size() - 4;
-      if (numbered || name == "wall.pvd")
+      if (IsNumbered(name, "wire_", ".vtp") || IsNumbered(name, "wall_", ".vtp") ||
+        IsNumbered(name, "xray_", ".png") || IsNumbered(name, "scene_", ".png") ||
+        name == "wall.pvd" || name == "frames.csv")
       {
         older.push_back(name);
       }
@@ -223,6 +274,7 @@ private:
   std::vector<TimedFile> WireFiles;
   std::vector<TimedFile> WallFiles;
   std::string Forces;
+  std::string Flows;
   std::string Tips;
   std::uint64_t Tick = 0;
 };
@@ -230,29 +282,6 @@ private:
 void Warn(const std::string& text)
 {
   std::fprintf(stderr, "Warning: %s\n", text.c_str());
-}
-
-/// What a recording has to have in common with the session that replays it.
-void CheckRecording(
-  const HeadlessOptions& options, const Scenario& scenario, std::uint64_t wallHash)
-{
-  const RecordingReader reader(options.replay);
-  const RecordingHeader& header = reader.Header();
-  if (header.tickRate != scenario.settings.tickRate)
-  {
-    throw std::runtime_error("'" + options.replay + "' was recorded at " +
-      std::to_string(header.tickRate) + " Hz, the scenario has another tick rate.");
-  }
-  if (header.meshHash != wallHash)
-  {
-    const std::string text =
-      "'" + options.replay + "' was recorded with other vessels or another motion of them";
-    if (options.verify)
-    {
-      throw std::runtime_error(text + ".");
-    }
-    Warn(text + ".");
-  }
 }
 
 /// Before anything is put in its place: what is not verified leaves nothing.
@@ -288,6 +317,28 @@ void FinishComparison(
   }
   Warn(problem);
 }
+}
+
+void CheckRecording(const std::string& path, const Scenario& scenario, std::uint64_t wallHash,
+  bool otherVesselsAllowed)
+{
+  const RecordingReader reader(path);
+  const RecordingHeader& header = reader.Header();
+  if (header.tickRate != scenario.settings.tickRate)
+  {
+    throw std::runtime_error("'" + path + "' was recorded at " + std::to_string(header.tickRate) +
+      " Hz, the scenario has another tick rate.");
+  }
+  if (header.meshHash != wallHash)
+  {
+    const std::string text =
+      "'" + path + "' was recorded with other vessels or another motion of them";
+    if (!otherVesselsAllowed)
+    {
+      throw std::runtime_error(text + ".");
+    }
+    Warn(text + ".");
+  }
 }
 
 Scenario ScenarioOf(const HeadlessOptions& options)
@@ -336,210 +387,292 @@ Scenario ScenarioOf(const HeadlessOptions& options)
   return scenario;
 }
 
-void RunHeadless(const HeadlessOptions& options)
+namespace
 {
-  Scenario scenario = ScenarioOf(options);
-  Hands hands(options);
-  const double rate = scenario.settings.tickRate;
-  const std::uint64_t expected = hands.Expected(rate);
-  if (expected == 0 && !hands.Recording())
+/// A session from its first tick to its last.
+class HeadlessRun
+{
+public:
+  HeadlessRun(const HeadlessOptions& options, const SessionWorld& world, Hands& hands)
+    : Options(options)
+    , World(world)
+    , Hands_(hands)
+    , Rate(world.scenario.settings.tickRate)
+    , Session(world.wall, world.scenario)
+    , Pictures({ options.xray, options.scene }, world)
+    , Files(options, world.wall->Topology())
+    , Statistics(world.wall->Topology())
+    , Interval(
+        static_cast<std::uint64_t>(std::max(1.0, std::round(this->Rate / options.outputRate))))
   {
-    throw UsageError(
-      "--ticks is required where neither --script nor --replay says how long it takes");
-  }
-  vtkMessageTrap messages;
-  auto progress = std::make_unique<ProgressDisplay>("step", 2, options.quiet);
-  progress->BeginStep(0, "vessels");
-  VesselModel model = LoadVessels(scenario.vessels, messages,
-    [&](double fraction)
+    hands.SetStart(this->Session.StartInput());
+    if (!options.record.empty())
     {
-      progress->Update(fraction);
-      return Interruption() == 0;
-    });
-  ThrowIfInterrupted();
-  messages.ForgetWarnings();
-  const WallTopology& topology = model.wall->Topology();
-  InterventionSettings settings = scenario.settings;
-  if (settings.rootBranch < 0)
-  {
-    settings.rootBranch = RootBranch(topology, scenario.artery);
-  }
-  const std::uint64_t wallHash = WallHash(*model.wall);
-  if (hands.Recording())
-  {
-    CheckRecording(options, scenario, wallHash);
-  }
-  Intervention intervention(model.wall, scenario.wire, scenario.catheter, settings);
-  OutputFiles files(options, topology);
-  const auto interval =
-    static_cast<std::uint64_t>(std::max(1.0, std::round(rate / options.outputRate)));
-  std::unique_ptr<RecordingWriter> recording;
-  if (!options.record.empty())
-  {
-    RecordingHeader header;
-    header.build = "coronary-simulator " DYNAMICCORONARY_VERSION;
-    header.scenario = ScenarioText(scenario);
-    header.meshHash = wallHash;
-    header.seed = scenario.seed;
-    header.tickRate = rate;
-    header.started = UtcTime();
-    recording = std::make_unique<RecordingWriter>(options.record, header);
+      RecordingHeader header;
+      header.build = "coronary-simulator " DYNAMICCORONARY_VERSION;
+      header.scenario = ScenarioText(world.scenario);
+      header.meshHash = world.wallHash;
+      header.seed = world.scenario.seed;
+      header.tickRate = this->Rate;
+      header.started = UtcTime();
+      this->Recording = std::make_unique<RecordingWriter>(options.record, header);
+    }
   }
 
-  progress->BeginStep(1, "simulation");
-  SessionStatistics statistics(topology);
-  Comparison comparison;
-  Json hashes = Json::array();
-  DriveInput input;
-  std::vector<RecordedEvent> events;
-  std::uint64_t unknownEvents = 0;
-  std::uint64_t tick = 0;
-  std::chrono::steady_clock::duration simulating{};
-  while (hands.At(tick, rate, input, events))
+  void Run(ProgressDisplay& progress)
   {
-    if (tick % InterruptionInterval == 0)
+    const std::uint64_t expected = this->Hands_.Expected(this->Rate);
+    while (this->Hands_.At(this->Tick, this->Rate, this->Input, this->Events))
     {
-      ThrowIfInterrupted();
-      if (expected > 0)
+      if (this->Tick % InterruptionInterval == 0)
       {
-        progress->Update(static_cast<double>(tick) / static_cast<double>(expected));
+        ThrowIfInterrupted();
+        if (expected > 0)
+        {
+          progress.Update(static_cast<double>(this->Tick) / static_cast<double>(expected));
+        }
       }
+      this->Step();
     }
-    for (const RecordedEvent& event : events)
-    {
-      if (event.kind == RecordedEvent::HeartRate)
-      {
-        intervention.SetHeartRate(event.value);
-      }
-      else
-      {
-        ++unknownEvents;
-      }
-      if (recording)
-      {
-        recording->Event(tick, event);
-      }
-    }
-    if (recording)
-    {
-      recording->Input(tick, input);
-    }
-    const auto before = std::chrono::steady_clock::now();
-    const TickReport& report = intervention.Step(input);
-    simulating += std::chrono::steady_clock::now() - before;
-    ++tick; // what follows is of the state after this many steps
-    statistics.Add(report);
-    for (const std::string& text : intervention.TakeMessages())
-    {
-      statistics.AddMessage(tick, text);
-      if (!options.quiet)
-      {
-        std::fprintf(
-          stderr, "tick %llu: %s\n", static_cast<unsigned long long>(tick), text.c_str());
-      }
-      if (recording)
-      {
-        recording->Annotation(tick, text);
-      }
-    }
-    if (tick % RecordedHashInterval == 0)
-    {
-      const std::uint64_t hash = intervention.StateHash();
-      hashes.push_back(Hexadecimal(hash));
-      if (recording)
-      {
-        recording->StateHash(tick, hash);
-      }
-    }
-    std::uint64_t wanted = 0;
-    if (hands.ExpectedHash(tick, wanted))
-    {
-      comparison.Add(tick, wanted == intervention.StateHash());
-    }
-    if (recording && tick % ForceInterval == 0)
-    {
-      recording->Force(tick,
-        { static_cast<float>(report.proximalForce), static_cast<float>(report.proximalTorque),
-          static_cast<float>(report.tipForce), static_cast<float>(report.greatestForce) });
-    }
-    if (files && (tick - 1) % interval == 0)
-    {
-      files.SetTick(tick);
-      files.Add(intervention, scenario, topology, messages);
-    }
-  }
-  ThrowIfInterrupted();
-  if (hands.Recording())
-  {
-    FinishComparison(options, hands, comparison);
-  }
-  const std::uint64_t lastHash = intervention.StateHash();
-  if (recording)
-  {
-    if (tick % RecordedHashInterval != 0)
-    {
-      recording->StateHash(tick, lastHash);
-    }
-    recording->Finish(tick);
+    ThrowIfInterrupted();
   }
 
-  Json result = statistics.ToJson();
-  result["program"] = "coronary-simulator " DYNAMICCORONARY_VERSION;
-  result["scenario"] = scenario.name;
-  result["motion"] = model.motion;
-  result["notes"] = model.notes;
-  result["wire"] = scenario.wire.name;
-  result["catheter"] = scenario.catheter.name;
-  result["tick_hz"] = rate;
-  result["seconds"] = static_cast<double>(tick) / rate;
-  result["wall"] = { { "points", topology.points }, { "triangles", topology.triangles.size() },
-    { "hash", Hexadecimal(wallHash) } };
-  result["state_hash_interval"] = RecordedHashInterval;
-  result["state_hashes"] = hashes;
-  result["last_state_hash"] = Hexadecimal(lastHash);
-  if (hands.Recording())
+  void Finish()
   {
-    result["replay"] = { { "compared", comparison.compared }, { "equal", comparison.equal },
-      { "first_different_tick",
-        comparison.firstDifference > 0 ? Json(comparison.firstDifference) : Json(nullptr) },
-      { "unknown_chunks", hands.Recording()->Reader().Unknown() },
-      { "unknown_events", unknownEvents } };
+    if (this->Hands_.Recording())
+    {
+      FinishComparison(this->Options, this->Hands_, this->Compared);
+    }
+    if (this->Recording)
+    {
+      if (this->Tick % RecordedHashInterval != 0)
+      {
+        this->Recording->StateHash(this->Tick, this->Session.StateHash());
+      }
+      this->Recording->Finish(this->Tick);
+    }
+    if (this->Files)
+    {
+      this->Files.Finish(this->Result(), this->Pictures);
+    }
   }
-  if (files)
+
+  void PrintSummary() const
   {
-    files.Finish(result);
-  }
-  progress.reset();
-  if (!options.quiet)
-  {
-    for (const std::string& note : model.notes)
+    for (const std::string& note : this->World.notes)
     {
       Warn(note);
     }
-    const double seconds = std::chrono::duration<double>(simulating).count();
     std::string branches;
-    for (const std::string& name : statistics.Branches())
+    for (const std::string& name : this->Statistics.Branches())
     {
       branches += (branches.empty() ? "" : ", ") + name;
     }
     std::printf(
       "%s: %llu ticks, %.3g s; greatest penetration %.3g mm; %llu messages; branches: %s\n",
-      scenario.name.c_str(), static_cast<unsigned long long>(tick),
-      static_cast<double>(tick) / rate, statistics.LargestPenetration(),
-      static_cast<unsigned long long>(statistics.Messages()),
+      this->World.scenario.name.c_str(), static_cast<unsigned long long>(this->Tick),
+      static_cast<double>(this->Tick) / this->Rate, this->Statistics.LargestPenetration(),
+      static_cast<unsigned long long>(this->Statistics.Messages()),
       branches.empty() ? "none" : branches.c_str());
-    if (tick > 0 && seconds > 0.0)
+    const SessionMetrics& metrics = this->Session.Metrics();
+    if (metrics.frames > 0 || metrics.contrast > 0.0)
+    {
+      std::printf("%lld X-ray frames, %.3g mGy, %.3g Gy cm2; %.3g mL of contrast medium\n",
+        static_cast<long long>(metrics.frames), metrics.airKerma, metrics.doseAreaProduct,
+        metrics.contrast);
+    }
+    const double seconds = std::chrono::duration<double>(this->Simulating).count();
+    if (this->Tick > 0 && seconds > 0.0)
     {
       std::printf("%.3g us a tick, %.3g times real time\n",
-        1e6 * seconds / static_cast<double>(tick), static_cast<double>(tick) / rate / seconds);
+        1e6 * seconds / static_cast<double>(this->Tick),
+        static_cast<double>(this->Tick) / this->Rate / seconds);
     }
-    if (hands.Recording())
+    if (this->Hands_.Recording())
     {
       std::printf("%llu of %llu hashes are equal\n",
-        static_cast<unsigned long long>(comparison.equal),
-        static_cast<unsigned long long>(comparison.compared));
+        static_cast<unsigned long long>(this->Compared.equal),
+        static_cast<unsigned long long>(this->Compared.compared));
     }
   }
+
+private:
+  void Step()
+  {
+    for (const RecordedEvent& event : this->Events)
+    {
+      this->UnknownEvents += this->Session.Apply(event) ? 0 : 1;
+      if (this->Recording)
+      {
+        this->Recording->Event(this->Tick, event);
+      }
+    }
+    if (this->Recording)
+    {
+      this->Recording->Input(this->Tick, this->Input);
+    }
+    const auto before = std::chrono::steady_clock::now();
+    const SessionReport& report = this->Session.Step(this->Input);
+    this->Simulating += std::chrono::steady_clock::now() - before;
+    ++this->Tick; // what follows is of the state after this many steps
+    this->Statistics.Add(report.tick);
+    this->TellMessages();
+    this->KeepHash();
+    if (this->Recording && this->Tick % ForceInterval == 0)
+    {
+      const TickReport& forces = report.tick;
+      this->Recording->Force(this->Tick,
+        { static_cast<float>(forces.proximalForce), static_cast<float>(forces.proximalTorque),
+          static_cast<float>(forces.tipForce), static_cast<float>(forces.greatestForce) });
+    }
+    SessionPictures::FolderCallback folder;
+    if (this->Files)
+    {
+      folder = [this](const std::string& name) { return this->Files.Place(name); };
+    }
+    if (report.exposed)
+    {
+      this->Pictures.AddFrame(this->Session, folder, this->Recording.get());
+    }
+    if (this->Files && (this->Tick - 1) % this->Interval == 0)
+    {
+      this->Files.SetTick(this->Tick);
+      this->Files.Add(this->Session, this->World.scenario, this->Trap);
+      this->Pictures.AddScene(this->Session, folder);
+    }
+  }
+
+  void TellMessages()
+  {
+    for (const std::string& text : this->Session.TakeMessages())
+    {
+      this->Statistics.AddMessage(this->Tick, text);
+      if (!this->Options.quiet)
+      {
+        std::fprintf(
+          stderr, "tick %llu: %s\n", static_cast<unsigned long long>(this->Tick), text.c_str());
+      }
+      if (this->Recording)
+      {
+        this->Recording->Annotation(this->Tick, text);
+      }
+    }
+  }
+
+  void KeepHash()
+  {
+    if (this->Tick % RecordedHashInterval == 0)
+    {
+      const std::uint64_t hash = this->Session.StateHash();
+      this->Hashes.push_back(Hexadecimal(hash));
+      if (this->Recording)
+      {
+        this->Recording->StateHash(this->Tick, hash);
+      }
+    }
+    std::uint64_t wanted = 0;
+    if (this->Hands_.ExpectedHash(this->Tick, wanted))
+    {
+      this->Compared.Add(this->Tick, wanted == this->Session.StateHash());
+    }
+  }
+
+  Json Result() const
+  {
+    const WallTopology& topology = this->Session.Topology();
+    const Scenario& scenario = this->World.scenario;
+    Json result = this->Statistics.ToJson();
+    result["program"] = "coronary-simulator " DYNAMICCORONARY_VERSION;
+    result["scenario"] = scenario.name;
+    result["motion"] = this->World.motion;
+    result["notes"] = this->World.notes;
+    result["wire"] = scenario.wire.name;
+    result["catheter"] = scenario.catheter.name;
+    result["tick_hz"] = this->Rate;
+    result["seconds"] = static_cast<double>(this->Tick) / this->Rate;
+    result["wall"] = { { "points", topology.points }, { "triangles", topology.triangles.size() },
+      { "hash", Hexadecimal(this->World.wallHash) } };
+    result["metrics"] = MetricsToJson(this->Session.Metrics(), topology);
+    result["state_hash_interval"] = RecordedHashInterval;
+    result["state_hashes"] = this->Hashes;
+    result["last_state_hash"] = Hexadecimal(this->Session.StateHash());
+    if (this->Hands_.Recording())
+    {
+      result["replay"] = { { "compared", this->Compared.compared },
+        { "equal", this->Compared.equal },
+        { "first_different_tick",
+          this->Compared.firstDifference > 0 ? Json(this->Compared.firstDifference)
+                                             : Json(nullptr) },
+        { "unknown_chunks", this->Hands_.Recording()->Reader().Unknown() },
+        { "unknown_events", this->UnknownEvents } };
+    }
+    return result;
+  }
+
+  const HeadlessOptions& Options;
+  const SessionWorld& World;
+  Hands& Hands_;
+  double Rate;
+  TrainingSession Session;
+  SessionPictures Pictures;
+  OutputFiles Files;
+  SessionStatistics Statistics;
+  std::uint64_t Interval;
+  vtkMessageTrap Trap;
+  std::unique_ptr<RecordingWriter> Recording;
+  Comparison Compared;
+  Json Hashes = Json::array();
+  SessionInput Input;
+  std::vector<RecordedEvent> Events;
+  std::uint64_t UnknownEvents = 0;
+  std::uint64_t Tick = 0;
+  std::chrono::steady_clock::duration Simulating{};
+};
+}
+
+void RunHeadless(const HeadlessOptions& options)
+{
+  const Scenario scenario = ScenarioOf(options);
+  Hands hands(options);
+  if (hands.Expected(scenario.settings.tickRate) == 0 && !hands.Recording())
+  {
+    throw UsageError(
+      "--ticks is required where neither --script nor --replay says how long it takes");
+  }
+  const int preparations = options.xray ? 2 : 1;
+  auto progress = std::make_unique<ProgressDisplay>("step", preparations + 1, options.quiet);
+  const SessionWorld world = LoadWorld(scenario, options.xray, *progress);
+  if (hands.Recording())
+  {
+    CheckRecording(options.replay, scenario, world.wallHash, !options.verify);
+  }
+  HeadlessRun run(options, world, hands);
+  progress->BeginStep(preparations, "simulation");
+  run.Run(*progress);
+  run.Finish();
+  progress.reset();
+  if (!options.quiet)
+  {
+    run.PrintSummary();
+  }
+}
+
+namespace
+{
+Json NameOfEvent(std::uint8_t kind)
+{
+  switch (kind)
+  {
+    case RecordedEvent::HeartRate:
+      return "heart_rate_bpm";
+    case RecordedEvent::FrameRate:
+      return "frame_rate_hz";
+    case RecordedEvent::FieldOfView:
+      return "field_of_view_mm";
+    default:
+      return static_cast<int>(kind);
+  }
+}
 }
 
 void DumpRecording(const std::string& path)
@@ -560,10 +693,16 @@ void DumpRecording(const std::string& path)
     {
       case RecordType::Input:
         json["type"] = "input";
-        json["wire_mm"] = item.input.wirePosition;
-        json["wire_rad"] = item.input.wireAngle;
-        json["catheter_mm"] = item.input.catheterPosition;
-        json["catheter_rad"] = item.input.catheterAngle;
+        json["wire_mm"] = item.input.drive.wirePosition;
+        json["wire_rad"] = item.input.drive.wireAngle;
+        json["catheter_mm"] = item.input.drive.catheterPosition;
+        json["catheter_rad"] = item.input.drive.catheterAngle;
+        json["syringe_mL"] = item.input.syringe;
+        json["pedals"] = item.input.pedals;
+        json["primary_rad"] = item.input.primary;
+        json["secondary_rad"] = item.input.secondary;
+        json["source_to_detector_mm"] = item.input.sourceToDetector;
+        json["table_mm"] = { item.input.table.x(), item.input.table.y(), item.input.table.z() };
         break;
       case RecordType::Force:
         json["type"] = "force";
@@ -574,9 +713,7 @@ void DumpRecording(const std::string& path)
         break;
       case RecordType::Event:
         json["type"] = "event";
-        json["kind"] = item.event.kind == RecordedEvent::HeartRate
-          ? Json("heart_rate_bpm")
-          : Json(static_cast<int>(item.event.kind));
+        json["kind"] = NameOfEvent(item.event.kind);
         json["value"] = item.event.value;
         break;
       case RecordType::StateHash:

@@ -260,10 +260,7 @@ Window::Window(const SessionWorld& world, const WindowOptions& options)
   std::shared_ptr<const HeartShell> heart;
   if (options.heart)
   {
-    heart = world.scenario.vessels.kind == VesselSource::Kind::Phantom &&
-        world.scenario.vessels.motion == VesselMotion::Automatic
-      ? std::make_shared<HeartShell>(world.scenario.vessels.phantom)
-      : std::make_shared<HeartShell>(*world.wall);
+    heart = MakeHeartShell(*world.wall, world.scenario.vessels);
   }
   this->Scene = std::make_unique<vtkSimulatorScene>(
     *world.wall, world.scenario, heart, SceneSettings{ options.triangles });

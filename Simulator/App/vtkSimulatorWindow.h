@@ -29,6 +29,9 @@ struct WindowOptions
   bool heart = true;
 };
 
+/// @throws std::runtime_error: there is no display; quick, so that it can be asked first
+void RequireDisplay();
+
 /**
  * Returns when the window has been closed. Needs a display with OpenGL 3.2.
  * @return 0; 1 when a session failed: the reason was printed

@@ -146,4 +146,11 @@ void HeartShell::Positions(double phase, std::vector<Vector3>& positions) const
 {
   this->Motion->Evaluate(phase, positions);
 }
+
+std::shared_ptr<const HeartShell> MakeHeartShell(WallMotion& wall, const VesselSource& vessels)
+{
+  return vessels.kind == VesselSource::Kind::Phantom && vessels.motion == VesselMotion::Automatic
+    ? std::make_shared<HeartShell>(vessels.phantom)
+    : std::make_shared<HeartShell>(wall);
+}
 }

@@ -6,6 +6,7 @@
 #define DynamicCoronary_HeartShell_h
 
 #include "CoronaryPhantom.h"
+#include "Scenario.h"
 #include "WallMotion.h"
 #include "WallMotions.h"
 
@@ -39,6 +40,10 @@ private:
   std::vector<Triangle> Triangles_;
   std::unique_ptr<PeriodicPositions> Motion;
 };
+
+/// The phantom's if the vessels are the phantom's and move as it does, else one that lies under them.
+/// @throws std::invalid_argument  the vessels have no axis
+std::shared_ptr<const HeartShell> MakeHeartShell(WallMotion& wall, const VesselSource& vessels);
 }
 
 #endif

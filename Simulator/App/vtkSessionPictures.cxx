@@ -1,0 +1,138 @@
+#include "SessionPictures.h"
+
+#include "HeartShell.h"
+#include "SessionImager.h"
+#include "vtkEvaluationPictures.h"
+#include "vtkPictureCanvas.h"
+#include "vtkScenePicture.h"
+#include "vtkSimulatorScene.h"
+
+#include "vtkImageData.h"
+#include "vtkNew.h"
+
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr int SceneSize = 768;
+constexpr std::int64_t SceneTriangles = 40000; // there is no hurry
+constexpr double Degree = 3.14159265358979323846 / 180.0;
+
+void WriteGrey(const GreyImage& image, const std::string& path)
+{
+  vtkNew<vtkImageData> data;
+  data->SetDimensions(image.columns, image.rows, 1);
+  data->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
+  const auto row = static_cast<std::size_t>(image.columns);
+  for (int y = 0; y < image.rows; ++y)
+  {
+    std::memcpy(data->GetScalarPointer(0, image.rows - 1 - y, 0),
+      &image.values[static_cast<std::size_t>(y) * row], row);
+  }
+  WritePngFile(data, path);
+}
+}
+
+struct SessionPictures::Internals
+{
+  std::unique_ptr<SessionImager> Imager;
+  std::unique_ptr<vtkSimulatorScene> Scene;
+  std::unique_ptr<vtkScenePicture> Picture;
+  SessionSnapshot Moment;
+  std::size_t Frames = 0;
+  std::size_t Scenes = 0;
+  std::string Table = "file,tick,seconds,primary_deg,secondary_deg,phase,cine_run,photons,"
+                      "air_kerma_mGy,contrast_mL,image_hash\n";
+};
+
+SessionPictures::SessionPictures(const PictureOptions& options, const SessionWorld& world)
+  : Data(std::make_unique<Internals>())
+{
+  const Scenario& scenario = world.scenario;
+  if (options.xray)
+  {
+    this->Data->Imager =
+      std::make_unique<SessionImager>(world.wall->Topology(), scenario, world.background, false);
+  }
+  if (options.scene)
+  {
+    std::string why;
+    if (!CanDraw(why))
+    {
+      throw std::runtime_error("The anatomy can not be drawn: " + why +
+        ". X-ray images need no display; xvfb-run gives one to programs.");
+    }
+    this->Data->Scene = std::make_unique<vtkSimulatorScene>(*world.wall, scenario,
+      MakeHeartShell(*world.wall, scenario.vessels), SceneSettings{ SceneTriangles });
+    this->Data->Picture =
+      std::make_unique<vtkScenePicture>(*this->Data->Scene, SceneSize, SceneSize);
+  }
+}
+
+SessionPictures::~SessionPictures() = default;
+
+void SessionPictures::AddFrame(
+  const TrainingSession& session, const FolderCallback& folder, RecordingWriter* recording)
+{
+  Internals& data = *this->Data;
+  if (!data.Imager)
+  {
+    return;
+  }
+  session.SnapshotOfImage(data.Moment);
+  const GreyImage& image = data.Imager->Expose(data.Moment);
+  const std::uint64_t hash = SessionImager::HashOf(image);
+  if (recording)
+  {
+    recording->ImageHash(session.Ticks(), hash);
+  }
+  if (!folder)
+  {
+    return;
+  }
+  char name[48];
+  std::snprintf(name, sizeof(name), "xray_%05zu.png", data.Frames);
+  WriteGrey(image, folder(name));
+  const SessionSnapshot& now = data.Moment;
+  char line[320];
+  std::snprintf(line, sizeof(line), "%s,%llu,%.9g,%.6g,%.6g,%.6g,%lld,%.6g,%.6g,%.6g,%s\n", name,
+    static_cast<unsigned long long>(now.tick), now.seconds, now.pose.primary / Degree,
+    now.pose.secondary / Degree, now.report.phase, static_cast<long long>(now.exposure.run),
+    now.exposure.photons, now.metrics.airKerma, now.contrast.injected, Hexadecimal(hash).c_str());
+  data.Table += line;
+  ++data.Frames;
+}
+
+void SessionPictures::AddScene(const TrainingSession& session, const FolderCallback& folder)
+{
+  Internals& data = *this->Data;
+  if (!data.Picture)
+  {
+    return;
+  }
+  session.SnapshotOfScene(data.Scene->WallPoints(), data.Moment);
+  data.Scene->Update(data.Moment);
+  if (data.Scenes == 0)
+  {
+    data.Scene->LookAsCArm(data.Moment.pose);
+  }
+  char name[48];
+  std::snprintf(name, sizeof(name), "scene_%05zu.png", data.Scenes);
+  data.Picture->Write(folder(name));
+  ++data.Scenes;
+}
+
+std::size_t SessionPictures::Frames() const
+{
+  return this->Data->Frames;
+}
+
+const std::string& SessionPictures::FrameTable() const
+{
+  return this->Data->Table;
+}
+}

@@ -1,0 +1,40 @@
+#include "SessionWorld.h"
+
+#include "Interruption.h"
+#include "ProgressDisplay.h"
+#include "Recording.h"
+#include "SessionImager.h"
+#include "vtkMessageTrap.h"
+#include "vtkVesselModel.h"
+
+namespace coronary
+{
+SessionWorld LoadWorld(const Scenario& scenario, bool background, ProgressDisplay& progress)
+{
+  const auto report = [&progress](double fraction)
+  {
+    progress.Update(fraction);
+    return Interruption() == 0;
+  };
+  SessionWorld world;
+  world.scenario = scenario;
+  vtkMessageTrap messages;
+  progress.BeginStep(0, "vessels");
+  VesselModel model = LoadVessels(scenario.vessels, messages, report);
+  ThrowIfInterrupted();
+  messages.ForgetWarnings();
+  world.wall = model.wall;
+  world.motion = model.motion;
+  world.notes = model.notes;
+  world.wallHash = WallHash(*world.wall);
+  const WallTopology& topology = world.wall->Topology();
+  world.scenario.imaging.pose = StartPose(topology, scenario.imaging);
+  if (background)
+  {
+    progress.BeginStep(1, "patient");
+    world.background = MakeProjector(LoadBackground(scenario, topology, report), scenario.imaging);
+    ThrowIfInterrupted();
+  }
+  return world;
+}
+}
