@@ -61,6 +61,7 @@ public:
   /// Injects, moves and washes out. An injector of segment -1 with injection above 0: into the aorta.
   void Step(double dt, const TracerFlow& flow);
 
+  const ContrastTracerSettings& Settings() const { return this->Settings_; }
   std::int64_t Size() const { return this->Size_; }
   int Segment(std::int64_t i) const { return this->Segment_[i]; }
   double Lumen(std::int64_t i) const
@@ -127,7 +128,7 @@ private:
   void WashOut(double dt);
   void Move();
   template <bool Axial>
-  void MoveAll();
+  std::size_t MoveAll();
   bool Cross(Tracer& tracer);
   Way Route(Tracer& tracer, int node);
   double OutOf(int node, int segment) const;

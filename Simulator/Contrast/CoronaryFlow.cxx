@@ -223,7 +223,7 @@ CoronaryFlow::CoronaryFlow(const WallTopology& topology, const CoronaryFlowSetti
     const FlowSegment& segment = this->Network_.Segments()[s];
     this->Losses[s] = this->LossBetween(static_cast<int>(s), segment.from, segment.to);
   }
-  this->SettleAtRest();
+  this->Settle(0.0);
 }
 
 void CoronaryFlow::FindStenoses()
@@ -515,16 +515,17 @@ void CoronaryFlow::CalibrateRatio(int tree, double target)
     slope > 0.0 ? std::clamp((target * systole0 - diastole0) / slope, 0.0, 1.0) : 0.0;
 }
 
-void CoronaryFlow::SettleAtRest()
+/// Into the periodic flow's state at a phase.
+void CoronaryFlow::Settle(double phase)
 {
-  std::fill(this->Compartment.begin(), this->Compartment.end(), this->Settings_.venousPressure);
-  this->Ventricular = VentricularPressure(this->Settings_, 0.0);
   const double dt = 60.0 / this->Settings_.referenceHeartRate / StepsOfCycle;
-  for (int k = 0; k < this->CyclesToSettle() * StepsOfCycle; ++k)
+  const int steps = this->CyclesToSettle() * StepsOfCycle;
+  this->Ventricular = VentricularPressure(this->Settings_, phase);
+  for (int k = 1 - steps; k <= 0; ++k)
   {
-    const double phase = ModuloOne((k + 1.0) / StepsOfCycle);
+    const double then = phase + static_cast<double>(k) / StepsOfCycle;
     this->Advance(
-      dt, AorticPressure(this->Settings_, phase), VentricularPressure(this->Settings_, phase));
+      dt, AorticPressure(this->Settings_, then), VentricularPressure(this->Settings_, then));
   }
 }
 
@@ -672,13 +673,18 @@ void CoronaryFlow::Step(
   Require(std::isfinite(phase), "phase", phase, "finite");
   Require(Within(heartRate, 0.0, 1000.0), "heart rate", heartRate, "0 to 1000 per minute");
   Require(Within(injection, 0.0, 1000.0), "injection", injection, "0 to 1000 mL/s");
+  if (!this->Started)
+  {
+    this->SetInjector(0.0, tip);
+    this->Settle(phase - dt * heartRate / 60.0);
+    this->Started = true;
+  }
   this->SetInjector(injection, tip);
   const double ventricular = VentricularPressure(this->Settings_, phase);
-  if (heartRate == 0.0 || !this->Started)
+  if (heartRate == 0.0)
   {
     this->Ventricular = ventricular;
   }
-  this->Started = true;
   this->Advance(dt, AorticPressure(this->Settings_, phase), ventricular);
 }
 

@@ -104,6 +104,7 @@ public:
   const CoronaryFlowSettings& Settings() const { return this->Settings_; }
 
   /**
+   * The first step begins in the periodic flow of the reference heart rate.
    * @param dt         s, above 0
    * @param phase      any finite number, modulo 1
    * @param heartRate  1/min; 0: the heart stands still, pressures are those of the phase, and a phase that jumps
@@ -182,7 +183,7 @@ private:
   void CalibrateRatio(int tree, double target);
   double PeriodicRatioParts(int tree, double fraction, double& systole);
   int CyclesToSettle() const;
-  void SettleAtRest();
+  void Settle(double phase);
   void SolveSteady(double aortic);
   void Advance(double dt, double aortic, double ventricular);
   void SolveTrees(double aortic);

@@ -1,0 +1,86 @@
+// Vessels for the tests of flow and contrast medium, and the rows of docs/contrast.md.
+#ifndef ContrastTestData_h
+#define ContrastTestData_h
+
+#include "CoronaryPhantom.h"
+#include "WallMotion.h"
+
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+// A line of the table in docs/contrast.md; scripts/validate-simulator.sh collects them.
+inline void Row(const std::string& what, double wanted, double measured, const char* tolerance)
+{
+  std::printf("| %s | %.6g | %.6g | %s | %s |\n", what.c_str(), wanted, measured,
+    wanted != 0.0 ? (std::to_string(100.0 * (measured / wanted - 1.0)) + " %").c_str() : "",
+    tolerance);
+}
+
+/// A straight branch along `direction`, radius linear from `begin` to `end` mm; returns its index.
+inline int AddBranch(WallTopology& topology, int parent, const Vector3& from,
+  const Vector3& direction, double length, double begin, double end, int intervals,
+  const std::string& name = "")
+{
+  topology.axis.emplace_back();
+  topology.axisRadius.emplace_back();
+  for (int k = 0; k <= intervals; ++k)
+  {
+    const double t = static_cast<double>(k) / intervals;
+    topology.axis.back().push_back(from + t * length * direction.normalized());
+    topology.axisRadius.back().push_back(begin + t * (end - begin));
+  }
+  topology.parent.push_back(parent);
+  topology.groupName.push_back(name);
+  return static_cast<int>(topology.axis.size()) - 1;
+}
+
+inline WallTopology Tube(double length, double begin, double end, int intervals)
+{
+  WallTopology topology;
+  AddBranch(topology, -1, Vector3::Zero(), Vector3::UnitZ(), length, begin, end, intervals);
+  return topology;
+}
+
+/// 40 mm of 2 mm radius, which parts into two branches of 60 mm in the plane of x and z.
+inline WallTopology Fork(double radiusA, double radiusB)
+{
+  WallTopology topology;
+  AddBranch(topology, -1, Vector3::Zero(), Vector3::UnitZ(), 40.0, 2.0, 2.0, 40);
+  const Vector3 end(0.0, 0.0, 40.0);
+  AddBranch(topology, 0, end, Vector3(1.0, 0.0, 1.0), 60.0, radiusA, radiusA, 60);
+  AddBranch(topology, 0, end, Vector3(-1.0, 0.0, 1.0), 60.0, radiusB, radiusB, 60);
+  return topology;
+}
+
+/// The axes of the phantom's vessels at rest.
+inline WallTopology PhantomVessels(const PhantomSettings& settings)
+{
+  const PhantomTree tree = CoronaryPhantom(settings).Tree(0.0);
+  WallTopology topology;
+  std::map<int, int> branchOf;
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    branchOf[tree.branches[b].groupId] = static_cast<int>(b);
+  }
+  for (const PhantomBranch& branch : tree.branches)
+  {
+    topology.axis.emplace_back();
+    topology.axisRadius.emplace_back();
+    for (const std::int64_t p : branch.points)
+    {
+      topology.axis.back().push_back(tree.points[p] - tree.displacement[p]);
+      topology.axisRadius.back().push_back(tree.radius[p]);
+    }
+    topology.groupName.push_back(SegmentName(branch.segmentId));
+    const auto parent = branchOf.find(branch.parentGroupId);
+    topology.parent.push_back(parent == branchOf.end() ? -1 : parent->second);
+  }
+  return topology;
+}
+}
+
+#endif
