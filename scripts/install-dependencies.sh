@@ -22,7 +22,7 @@ common=(
 )
 paraview=(
   paraview-dev python3-paraview
-  libopenmpi-dev libdouble-conversion-dev libqt5svg5 qttools5-dev qtxmlpatterns5-dev-tools
+  libopenmpi-dev libdouble-conversion-dev libqt5svg5 libqt5opengl5-dev qttools5-dev qtxmlpatterns5-dev-tools
 )
 # VTK 9.1 itself can not be installed beside python3-paraview: scripts/vtk-prefix.sh unpacks it
 # into a folder of its own, and these are what its libraries load.
