@@ -40,50 +40,60 @@ double Square(double a)
 }
 
 /// Part of the flux of laminar flow through the unit circle that is on the side of x below h.
-double FluxBelow(double h)
+double ExactFluxBelow(double h)
 {
   const double x = std::clamp(h, -1.0, 1.0);
   return 0.5 + (x * (5.0 - 2.0 * x * x) * std::sqrt(1.0 - x * x) + 3.0 * std::asin(x)) / (3.0 * Pi);
 }
 
-/// The inverse of FluxBelow.
-class ChordTable
+/// FluxBelow and its inverse by tables, to 1e-7 and 1e-4: a thousand tracers cross nodes in a step.
+class FluxTable
 {
 public:
-  ChordTable()
+  FluxTable()
   {
     for (int k = 0; k <= Size; ++k)
     {
-      const double wanted = static_cast<double>(k) / Size;
+      this->Flux[k] = ExactFluxBelow(2.0 * k / Size - 1.0);
+      const double root = k * std::sqrt(0.5) / Size;
       double low = -1.0;
-      double high = 1.0;
+      double high = 0.0;
       for (int step = 0; step < 60; ++step)
       {
         const double middle = 0.5 * (low + high);
-        (FluxBelow(middle) < wanted ? low : high) = middle;
+        (ExactFluxBelow(middle) < root * root ? low : high) = middle;
       }
       this->Chord[k] = 0.5 * (low + high);
     }
   }
-  double operator()(double flux) const
+  double FluxBelow(double x) const
   {
-    const double place = std::clamp(flux, 0.0, 1.0) * Size;
-    const int k = std::min(static_cast<int>(place), Size - 1);
-    const double x = this->Chord[k] + (place - k) * (this->Chord[k + 1] - this->Chord[k]);
-    // One step of Newton where the density is not small.
-    const double density = 8.0 / (3.0 * Pi) * (1.0 - x * x) * std::sqrt(1.0 - x * x);
-    return density > 0.02 ? x - (FluxBelow(x) - flux) / density : x;
+    return Interpolate(this->Flux, 0.5 * (std::clamp(x, -1.0, 1.0) + 1.0));
+  }
+  /// By the root of the flux, as the inverse is not smooth at the ends.
+  double ChordOf(double flux) const
+  {
+    const double less = std::max(0.0, std::min(flux, 1.0 - flux));
+    const double x = Interpolate(this->Chord, std::sqrt(2.0 * less));
+    return flux < 0.5 ? x : -x;
   }
 
 private:
-  static constexpr int Size = 4096;
+  static constexpr int Size = 2048;
+  static double Interpolate(const std::array<double, Size + 1>& table, double place)
+  {
+    const double t = place * Size;
+    const int k = std::min(static_cast<int>(t), Size - 1);
+    return table[k] + (t - k) * (table[k + 1] - table[k]);
+  }
+  std::array<double, Size + 1> Flux{};
   std::array<double, Size + 1> Chord{};
 };
 
-double ChordOf(double flux)
+const FluxTable& Tables()
 {
-  static const ChordTable table;
-  return table(flux);
+  static const FluxTable tables;
+  return tables;
 }
 
 /// The same along a chord, as a fraction of its half length: the inverse of (2 + 3 y - y^3) / 4.
@@ -95,6 +105,41 @@ double PlaceOnChord(double flux)
 double FractionalPart(double a)
 {
   return a - std::floor(a);
+}
+
+/// Scrambles 32 bits; loops over it are vectorised, which those over MixBits are not. Source of the constants: C.
+/// Wellons, "Prospecting for hash functions", 2018 (lowbias32).
+inline std::uint32_t MixBits32(std::uint32_t z)
+{
+  z ^= z >> 16;
+  z *= 0x7feb352dU;
+  z ^= z >> 15;
+  z *= 0x846ca68bU;
+  return z ^ (z >> 16);
+}
+
+/// Two numbers in -1 to 1, of mean 0, of 16 bits each.
+inline float LowHalf(std::uint32_t bits)
+{
+  return (static_cast<float>(static_cast<std::int32_t>(bits & 0xffffU)) - 32767.5F) * 0x1p-15F;
+}
+
+inline float HighHalf(std::uint32_t bits)
+{
+  return LowHalf(bits >> 16);
+}
+
+/// Keeps a tracer off the wall itself, where nothing moves.
+void KeepInside(double& x, double& y)
+{
+  constexpr double largest = 0.9999;
+  const double square = x * x + y * y;
+  if (square > largest * largest)
+  {
+    const double scale = largest / std::sqrt(square);
+    x *= scale;
+    y *= scale;
+  }
 }
 
 Vector3 AxisPoint(const FlowNetwork& network, int branch, double abscissa)
@@ -216,6 +261,7 @@ void ContrastTracers::MakeJunctions(const FlowNetwork& network)
     {
       junction.segments.push_back(segment);
     }
+    junction.out.assign(junction.segments.size(), 0.0);
     this->Junctions.push_back(std::move(junction));
   }
 }
@@ -230,8 +276,8 @@ void ContrastTracers::PrepareMotion(double dt, const TracerFlow& flow)
     this->FlowBottom[s] = (*flow.flow)[s];
     this->FlowTop[s] = here ? flow.flowAbove : this->FlowBottom[s];
     Motion& motion = this->Motions[s];
-    motion.above = static_cast<float>(2.0 * dt * this->FlowTop[s]);
-    motion.below = static_cast<float>(2.0 * dt * this->FlowBottom[s]);
+    motion.flow[0] = static_cast<float>(2.0 * dt * this->FlowTop[s]);
+    motion.flow[1] = static_cast<float>(2.0 * dt * this->FlowBottom[s]);
     motion.injector = here ? static_cast<float>(flow.injector.volume) : 0.0F;
     motion.volume = static_cast<float>(segment.volume);
     // Uniform steps of variance 2 D dt.
@@ -239,6 +285,30 @@ void ContrastTracers::PrepareMotion(double dt, const TracerFlow& flow)
       static_cast<float>(std::sqrt(6.0 * this->Settings_.radialDiffusivity * dt) / segment.radius);
     motion.axial = static_cast<float>(
       std::sqrt(6.0 * this->Settings_.axialDiffusivity * dt) * 1e-3 * Pi * Square(segment.radius));
+  }
+}
+
+/// mL/s that leave each node through each of its ways.
+void ContrastTracers::PrepareJunctions()
+{
+  for (std::size_t n = 0; n < this->Junctions.size(); ++n)
+  {
+    Junction& junction = this->Junctions[n];
+    double rest = 0.0;
+    for (std::size_t k = 0; k < junction.segments.size(); ++k)
+    {
+      const int s = junction.segments[k];
+      if (s >= 0)
+      {
+        junction.out[k] =
+          this->Segments[s].above == static_cast<int>(n) ? this->FlowTop[s] : -this->FlowBottom[s];
+        rest -= junction.out[k];
+      }
+    }
+    for (std::size_t k = 0; k < junction.segments.size(); ++k)
+    {
+      junction.out[k] = junction.segments[k] < 0 ? rest : junction.out[k];
+    }
   }
 }
 
@@ -253,46 +323,71 @@ void ContrastTracers::WashOut(double dt)
   }
 }
 
+/// Moves `count` tracers from `first` on as if no segment ended.
+template <bool Axial>
+void ContrastTracers::MoveBlock(std::int64_t first, int count, Block& block)
+{
+  const Motion* const motions = this->Motions.data();
+  const std::int32_t* const segments = this->Segment_.data() + first;
+  std::copy_n(this->Lumen_.data() + first, count, block.lumen.data());
+  std::copy_n(this->X_.data() + first, count, block.x.data());
+  std::copy_n(this->Y_.data() + first, count, block.y.data());
+  for (int i = 0; i < count; ++i)
+  {
+    const Motion& motion = motions[segments[i]];
+    block.rate[i] = motion.flow[block.lumen[i] < motion.injector ? 0 : 1];
+    block.radial[i] = motion.radial;
+    block.volume[i] = motion.volume;
+    if (Axial)
+    {
+      block.axial[i] = motion.axial;
+    }
+  }
+  const std::uint64_t step = MixBits(this->Key + this->Steps);
+  const std::uint32_t base = static_cast<std::uint32_t>(step) + static_cast<std::uint32_t>(first);
+  const auto scramble = static_cast<std::uint32_t>(step >> 32);
+  // All of a block, so that the loop has no rest; what is behind `count` is not used.
+  for (int i = 0; i < Block::Size; ++i)
+  {
+    const std::uint32_t bits = MixBits32((base + static_cast<std::uint32_t>(i)) ^ scramble);
+    const float stepX = block.radial[i] * LowHalf(bits);
+    const float stepY = block.radial[i] * HighHalf(bits);
+    const float farX = block.x[i] + stepX;
+    const float farY = block.y[i] + stepY;
+    const float taken = farX * farX + farY * farY < 1.0F ? 1.0F : 0.0F;
+    const float x = block.x[i] + taken * stepX;
+    const float y = block.y[i] + taken * stepY;
+    float moved = block.lumen[i] + block.rate[i] * (1.0F - x * x - y * y);
+    if (Axial)
+    {
+      moved += block.axial[i] * LowHalf(MixBits32(bits ^ scramble));
+    }
+    block.x[i] = x;
+    block.y[i] = y;
+    block.lumen[i] = moved;
+    block.beyond[i] =
+      static_cast<std::int32_t>(moved < 0.0F) | static_cast<std::int32_t>(moved > block.volume[i]);
+  }
+  std::copy_n(block.lumen.data(), count, this->Lumen_.data() + first);
+  std::copy_n(block.x.data(), count, this->X_.data() + first);
+  std::copy_n(block.y.data(), count, this->Y_.data() + first);
+}
+
+/// Moves all; returns how many of `Leaving` have left their segments.
 template <bool Axial>
 std::size_t ContrastTracers::MoveAll()
 {
-  const std::uint64_t base = MixBits(this->Key + 2 * this->Steps);
-  const std::uint64_t second = MixBits(this->Key + 2 * this->Steps + 1);
-  const Motion* const motions = this->Motions.data();
-  const std::int32_t* const segments = this->Segment_.data();
-  float* const lumens = this->Lumen_.data();
-  float* const xs = this->X_.data();
-  float* const ys = this->Y_.data();
-  std::int32_t* const leaving = this->Leaving.data();
+  Block block{};
   std::size_t leave = 0;
-  const std::int64_t size = this->Size_;
-  for (std::int64_t i = 0; i < size; ++i)
+  for (std::int64_t first = 0; first < this->Size_; first += Block::Size)
   {
-    const Motion motion = motions[segments[i]];
-    const std::uint64_t bits = MixBits(base + static_cast<std::uint64_t>(i));
-    const float stepX = static_cast<float>(static_cast<std::int32_t>(bits)) * 0x1p-31F;
-    const float stepY = static_cast<float>(static_cast<std::int32_t>(bits >> 32)) * 0x1p-31F;
-    const float x = xs[i];
-    const float y = ys[i];
-    const float nextX = x + motion.radial * stepX;
-    const float nextY = y + motion.radial * stepY;
-    const float square = nextX * nextX + nextY * nextY;
-    const bool inside = square < 1.0F;
-    xs[i] = inside ? nextX : x;
-    ys[i] = inside ? nextY : y;
-    const float still = 1.0F - (inside ? square : x * x + y * y);
-    const float lumen = lumens[i];
-    const float rate = lumen < motion.injector ? motion.above : motion.below;
-    float moved = lumen + rate * still;
-    if (Axial)
+    const int count = static_cast<int>(std::min<std::int64_t>(Block::Size, this->Size_ - first));
+    this->MoveBlock<Axial>(first, count, block);
+    for (int i = 0; i < count; ++i)
     {
-      const auto third =
-        static_cast<std::int32_t>(MixBits(second + static_cast<std::uint64_t>(i)) >> 32);
-      moved += motion.axial * static_cast<float>(third) * 0x1p-31F;
+      this->Leaving[leave] = static_cast<std::int32_t>(first + i);
+      leave += static_cast<std::size_t>(block.beyond[i]);
     }
-    lumens[i] = moved;
-    leaving[leave] = static_cast<std::int32_t>(i);
-    leave += static_cast<std::size_t>(moved < 0.0F) | static_cast<std::size_t>(moved > motion.volume);
   }
   return leave;
 }
@@ -336,22 +431,6 @@ void ContrastTracers::Copy(std::int64_t from, std::int64_t to)
   this->X_[to] = this->X_[from];
   this->Y_[to] = this->Y_[from];
   this->Volume_[to] = this->Volume_[from];
-}
-
-/// mL/s that leave a node through one of its ways.
-double ContrastTracers::OutOf(int node, int segment) const
-{
-  if (segment >= 0)
-  {
-    return this->Segments[segment].above == node ? this->FlowTop[segment]
-                                                 : -this->FlowBottom[segment];
-  }
-  double flow = 0.0;
-  for (const int other : this->Junctions[node].segments)
-  {
-    flow -= other >= 0 ? this->OutOf(node, other) : 0.0;
-  }
-  return flow;
 }
 
 /// A tracer whose lumen is beyond an end of its segment goes on for what is left of the step. False: it left the
@@ -401,55 +480,29 @@ bool ContrastTracers::Cross(Tracer& tracer)
 /// The tracer's next segment after a node, and its place in that cross-section.
 ContrastTracers::Way ContrastTracers::Route(Tracer& tracer, int node)
 {
-  const Junction& junction = this->Junctions[node];
+  Junction& junction = this->Junctions[node];
   double total = 0.0;
   int ways = 0;
-  int chosen = -2;
-  for (const int way : junction.segments)
+  std::size_t chosen = 0;
+  for (std::size_t k = 0; k < junction.segments.size(); ++k)
   {
-    const double flow = way == tracer.segment ? 0.0 : this->OutOf(node, way);
-    if (flow > 0.0)
+    if (junction.out[k] > 0.0 && junction.segments[k] != tracer.segment)
     {
-      total += flow;
+      total += junction.out[k];
       ++ways;
-      chosen = way;
+      chosen = k;
     }
   }
-  if (ways > 1)
-  {
-    const double along = tracer.x * junction.partingX + tracer.y * junction.partingY;
-    const double across = tracer.y * junction.partingX - tracer.x * junction.partingY;
-    const double flux = total * FluxBelow(along);
-    double before = 0.0;
-    double taken = 0.0;
-    for (const int way : junction.segments)
-    {
-      const double flow = way == tracer.segment ? 0.0 : this->OutOf(node, way);
-      if (flow > 0.0)
-      {
-        before += taken;
-        taken = flow;
-        chosen = way;
-        if (flux < before + taken)
-        {
-          break;
-        }
-      }
-    }
-    const double x = ChordOf((flux - before) / taken);
-    const double wide = std::sqrt(std::max(1.0 - along * along, 1e-12));
-    const double y = across / wide * std::sqrt(std::max(1.0 - x * x, 0.0));
-    // Not onto the wall itself, where nothing moves.
-    const double scale = std::min(1.0, 0.9999 / std::sqrt(x * x + y * y + 1e-12));
-    tracer.x = scale * (x * junction.partingX - y * junction.partingY);
-    tracer.y = scale * (x * junction.partingY + y * junction.partingX);
-  }
-  if (chosen == -2)
+  if (ways == 0)
   {
     return Way::None; // what comes in does not go out: round-off of a flow that stops
   }
-  tracer.segment = chosen;
-  if (chosen >= 0)
+  if (ways > 1)
+  {
+    chosen = ChooseTube(junction, tracer, total);
+  }
+  tracer.segment = junction.segments[chosen];
+  if (tracer.segment >= 0)
   {
     return Way::Inside;
   }
@@ -465,9 +518,41 @@ ContrastTracers::Way ContrastTracers::Route(Tracer& tracer, int node)
   return Way::Outside;
 }
 
+/// Which of several ways takes a tracer; its stream-tube becomes the whole of that way's circle.
+std::size_t ContrastTracers::ChooseTube(const Junction& junction, Tracer& tracer, double total)
+{
+  const double along = tracer.x * junction.partingX + tracer.y * junction.partingY;
+  const double across = tracer.y * junction.partingX - tracer.x * junction.partingY;
+  const double flux = total * Tables().FluxBelow(along);
+  double before = 0.0;
+  double taken = 0.0;
+  std::size_t chosen = 0;
+  for (std::size_t k = 0; k < junction.segments.size(); ++k)
+  {
+    if (junction.out[k] > 0.0 && junction.segments[k] != tracer.segment)
+    {
+      before += taken;
+      taken = junction.out[k];
+      chosen = k;
+      if (flux < before + taken)
+      {
+        break;
+      }
+    }
+  }
+  const double x = Tables().ChordOf((flux - before) / taken);
+  const double y =
+    across * std::sqrt(std::max(1.0 - x * x, 0.0) / std::max(1.0 - along * along, 1e-12));
+  tracer.x = x * junction.partingX - y * junction.partingY;
+  tracer.y = x * junction.partingY + y * junction.partingX;
+  KeepInside(tracer.x, tracer.y);
+  return chosen;
+}
+
 void ContrastTracers::Step(double dt, const TracerFlow& flow)
 {
   this->PrepareMotion(dt, flow);
+  this->PrepareJunctions();
   std::fill(this->Outflow_.begin(), this->Outflow_.end(), 0.0);
   this->WashOut(dt);
   this->Move();
@@ -518,16 +603,16 @@ void ContrastTracers::Emit(double volume, bool down)
     std::clamp(wanted, 1.0, static_cast<double>(this->Settings_.capacity / 16)));
   this->MakeRoom(count);
   const int segment = this->Flow.injector.segment;
-  const double rate = down ? this->Motions[segment].below : this->Motions[segment].above;
+  const double rate = this->Motions[segment].flow[down ? 1 : 0];
   for (std::int64_t k = 0; k < count; ++k)
   {
     const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
-    const double x = ChordOf(FractionalPart(shiftX + alphaX * number));
+    const double x = Tables().ChordOf(FractionalPart(shiftX + alphaX * number));
     const double y = PlaceOnChord(FractionalPart(shiftY + alphaY * number)) *
       std::sqrt(std::max(1.0 - x * x, 0.0));
     const double time = (static_cast<double>(k) + shiftTime) / static_cast<double>(count);
-    const double scale = std::min(1.0, 0.9999 / std::sqrt(x * x + y * y + 1e-12));
-    Tracer tracer{ segment, 0.0, scale * x, scale * y, volume / static_cast<double>(count) };
+    Tracer tracer{ segment, 0.0, x, y, volume / static_cast<double>(count) };
+    KeepInside(tracer.x, tracer.y);
     tracer.lumen = this->Flow.injector.volume +
       rate * (1.0 - time) * (1.0 - Square(tracer.x) - Square(tracer.y));
     if (this->Cross(tracer))

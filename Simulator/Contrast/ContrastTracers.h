@@ -7,6 +7,7 @@
 
 #include "CoronaryFlow.h"
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -107,6 +108,7 @@ private:
   struct Junction
   {
     std::vector<int> segments;
+    std::vector<double> out; ///< mL/s, as segments
     double partingX = 1.0;
     double partingY = 0.0;
     bool tip = false;
@@ -115,23 +117,38 @@ private:
   /// What the moving loop needs of a segment.
   struct Motion
   {
-    float above;    ///< 2 Q dt above the injector, mL
-    float below;    ///< and below it
+    float flow[2];  ///< 2 Q dt above the injector, and below it, mL
     float injector; ///< mL from the segment's beginning
     float radial;   ///< half width of a step of (x, y)
     float axial;    ///< half width of a step of the lumen, mL
     float volume;
   };
+  /// What the moving loop needs of neighbouring tracers, side by side so that it can be vectorised.
+  struct Block
+  {
+    static constexpr int Size = 512;
+    std::array<float, Size> lumen;
+    std::array<float, Size> x;
+    std::array<float, Size> y;
+    std::array<float, Size> rate;
+    std::array<float, Size> radial;
+    std::array<float, Size> axial;
+    std::array<float, Size> volume;
+    std::array<std::int32_t, Size> beyond; ///< 1 where a tracer is beyond its segment
+  };
 
   void MakeJunctions(const FlowNetwork& network);
   void PrepareMotion(double dt, const TracerFlow& flow);
+  void PrepareJunctions();
   void WashOut(double dt);
   void Move();
+  template <bool Axial>
+  void MoveBlock(std::int64_t first, int count, Block& block);
   template <bool Axial>
   std::size_t MoveAll();
   bool Cross(Tracer& tracer);
   Way Route(Tracer& tracer, int node);
-  double OutOf(int node, int segment) const;
+  static std::size_t ChooseTube(const Junction& junction, Tracer& tracer, double total);
   void Inject(double volume);
   void Emit(double volume, bool down);
   void MakeRoom(std::int64_t count);

@@ -1,25 +1,24 @@
 // A step of 5 ms of contrast medium in the standard phantom: 20,000 tracers in both trees, the network's flow alone, and
 // what drawing asks for. Time is the processor's.
 #include "ContrastModel.h"
-#include "WallMotions.h"
+#include "ContrastTestData.h"
 
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 using namespace coronary;
 
 namespace
 {
-const std::shared_ptr<WallMotion>& Phantom()
+const WallTopology& Phantom()
 {
-  static const std::shared_ptr<WallMotion> wall = MakePhantomWallMotion(PhantomSettings(), 1.0, 4);
-  return wall;
+  static const WallTopology vessels = PhantomVessels({});
+  return vessels;
 }
 
-int LargestRoot(const WallTopology& topology)
+int FirstRoot(const WallTopology& topology)
 {
   for (std::size_t b = 0; b < topology.parent.size(); ++b)
   {
@@ -35,8 +34,8 @@ int LargestRoot(const WallTopology& topology)
 struct Filled
 {
   explicit Filled(std::int64_t tracers)
-    : tip{ LargestRoot(Phantom()->Topology()), 0.0 }
-    , model(Phantom()->Topology(), Settings(tracers), 1)
+    : tip{ FirstRoot(Phantom()), 0.0 }
+    , model(Phantom(), Settings(tracers), 1)
   {
     while (this->model.NumberOfTracers() < tracers * 95 / 100)
     {
@@ -75,7 +74,7 @@ BENCHMARK(Step)->Arg(1000)->Arg(20000)->Unit(benchmark::kMicrosecond);
 
 void FlowAlone(benchmark::State& state)
 {
-  CoronaryFlow flow(Phantom()->Topology(), {});
+  CoronaryFlow flow(Phantom(), {});
   double phase = 0.0;
   for (auto _ : state)
   {
@@ -89,7 +88,7 @@ void Calibrate(benchmark::State& state)
 {
   for (auto _ : state)
   {
-    benchmark::DoNotOptimize(CoronaryFlow(Phantom()->Topology(), {}).TreeFlow(0));
+    benchmark::DoNotOptimize(CoronaryFlow(Phantom(), {}).TreeFlow(0));
   }
 }
 BENCHMARK(Calibrate)->Unit(benchmark::kMicrosecond);
@@ -110,7 +109,10 @@ void TracerPositions(benchmark::State& state)
 {
   const Filled filled(state.range(0));
   std::vector<Vector3> axis;
-  Phantom()->AxisPositions(0.3, axis);
+  for (const std::vector<Vector3>& branch : Phantom().axis)
+  {
+    axis.insert(axis.end(), branch.begin(), branch.end());
+  }
   std::vector<Vector3> positions;
   std::vector<float> volumes;
   for (auto _ : state)
