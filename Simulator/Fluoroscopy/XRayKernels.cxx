@@ -154,6 +154,8 @@ inline Floats MeanChord(Floats radius, Floats distance, Floats pixel)
   return radius * radius * (CircleIntegral(high) - CircleIntegral(low)) / width;
 }
 
+constexpr float GaussPoint = 0.28867513F; // of an interval's length, from its middle
+
 template <bool Hollow>
 inline Floats TubeValue(const TubePart& part, Floats i, float j)
 {
@@ -191,16 +193,22 @@ inline Floats TubeValue(const TubePart& part, Floats i, float j)
     chord -= MeanChord(inner, distance, pixel) * inverseSine;
   }
 
-  // A chord that goes through a cut is on both its sides; so is a pixel.
+  // A chord that goes through a cut is on both its sides; so is a pixel: what is before the cut is a ramp over
+  // the longer of the two, mean over the shorter one by Gauss's two points.
   Floats share = -one;
   const Floats toCut[2] = { place, part.length - place };
+  const Floats ofPixel = pixel * inverseSine;
   for (int end = 0; end < 2; ++end)
   {
     const Floats tilt = distance * inverseCross * At(part.crossCut[end], i, j);
     const Floats from = end == 0 ? toCut[0] + tilt : toCut[1] - tilt;
-    const Floats spread =
-      outerChord * inverseRay * Absolute(At(part.rayCut[end], i, j)) + pixel * inverseSine;
-    share += Clamped(from / spread + 0.5F, zero, one);
+    const Floats ofChord = outerChord * inverseRay * Absolute(At(part.rayCut[end], i, j));
+    const Floats inverse = 1.0F / (ofChord > ofPixel ? ofChord : ofPixel);
+    const Floats shorter = (ofChord > ofPixel ? ofPixel : ofChord) * inverse;
+    const Floats middle = from * inverse + 0.5F;
+    share += 0.5F *
+      (Clamped(middle - GaussPoint * shorter, zero, one) +
+        Clamped(middle + GaussPoint * shorter, zero, one));
   }
   return part.attenuation * chord * share;
 }
