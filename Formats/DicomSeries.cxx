@@ -806,6 +806,7 @@ DicomSeries::DicomSeries(const std::string& folder, const std::string& seriesUid
   info.format = "DICOM";
   this->All = ReadHeaders(ListFiles(folder, poll), poll);
   const Files files = this->Select(folder, seriesUid);
+  info.modality = files.front()->modality;
   const std::map<std::string, Files> series = GroupBySeries(files);
   std::vector<Image> images;
   bool oneFrameOfReference = true;

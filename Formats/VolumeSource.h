@@ -37,8 +37,9 @@ std::size_t VoxelBytes(VoxelType type);
 struct VolumeInfo
 {
   std::string path;
-  std::string format; ///< e.g. "NIfTI-1"
-  ImageGrid grid;     ///< extent begins at 0; LPS millimetres
+  std::string format;   ///< e.g. "NIfTI-1"
+  std::string modality; ///< of DICOM files, "CT", "MR", ...; empty: the format does not say
+  ImageGrid grid;       ///< extent begins at 0; LPS millimetres
   int phases = 1;
   std::vector<double> fractions;       ///< of the R-R interval, one a phase; empty: not in the file
   std::vector<std::string> phaseNames; ///< one a phase, for messages and users

@@ -25,72 +25,6 @@ void Require(bool possible, const char* name, double value, const char* range)
   }
 }
 
-/// Right half of a sampled Gaussian whose both halves sum to 1.
-std::vector<float> GaussianHalf(double sigma)
-{
-  if (!(sigma > 0.0))
-  {
-    return { 1.0F };
-  }
-  const int radius = static_cast<int>(std::ceil(4.0 * sigma));
-  std::vector<double> weights;
-  double sum = 0.0;
-  for (int r = 0; r <= radius; ++r)
-  {
-    weights.push_back(std::exp(-0.5 * r * r / (sigma * sigma)));
-    sum += (r == 0 ? 1.0 : 2.0) * weights.back();
-  }
-  std::vector<float> half;
-  for (const double weight : weights)
-  {
-    half.push_back(static_cast<float>(weight / sum));
-  }
-  return half;
-}
-
-/// Where a sample outside 0 .. count - 1 is taken from: the image is continued as in a mirror at its edge, so that a
-/// symmetric kernel loses nothing there.
-int Mirrored(int i, int count)
-{
-  const int period = 2 * count;
-  const int place = ((i % period) + period) % period;
-  return place < count ? place : period - 1 - place;
-}
-
-/// Pixels a cell of the veil's grid: cells have to be whole, and narrow against the veil.
-int CellSize(int pixels, double sigma)
-{
-  for (const int size : { 8, 4, 2 })
-  {
-    if (pixels % size == 0 && sigma >= 2.0 * size)
-    {
-      return size;
-    }
-  }
-  return 1;
-}
-
-/// Where, relative to the centre of a cell, its first pixel is that is not before the centre.
-double FirstFraction(int cell)
-{
-  return (cell / 2 - 0.5 * (cell - 1)) / cell;
-}
-
-/// The Gaussian between cells that together with averaging over cells and interpolation between them has the
-/// standard deviation sigma.
-std::vector<float> VeilKernelOf(double sigma, int cell)
-{
-  const double averaging = (cell * cell - 1.0) / 12.0;
-  double interpolation = 0.0;
-  for (int j = 0; j < cell; ++j)
-  {
-    // From both sides of the centre.
-    const double fraction = FirstFraction(cell) + static_cast<double>(j) / cell;
-    interpolation += 2.0 * fraction * fraction * (1.0 - fraction) * cell;
-  }
-  return GaussianHalf(std::sqrt(sigma * sigma - averaging - interpolation) / cell);
-}
-
 std::vector<float> OpenShares(int count, double before, double after, double transmission)
 {
   std::vector<float> shares(static_cast<std::size_t>(count));
@@ -392,7 +326,7 @@ void Detector::Resize(int columns, int rows)
   this->Transmission.assign(pixels, 0.0F);
   this->Blurred.assign(pixels, 0.0F);
   this->Signal_.assign(pixels, 0.0F);
-  this->VeilRow.assign(static_cast<std::size_t>(columns), 0.0F);
+  this->Scratch.assign(static_cast<std::size_t>(columns), 0.0F);
   this->Prepare();
 }
 
@@ -403,20 +337,7 @@ void Detector::Prepare()
     OpenShares(this->Columns_, shutters.left, shutters.right, shutters.transmission);
   this->ShutterRows = OpenShares(this->Rows_, shutters.top, shutters.bottom, shutters.transmission);
 
-  const double sigma = this->Settings_.glareSigma;
-  this->CellColumns = CellSize(this->Columns_, sigma);
-  this->CellRows = CellSize(this->Rows_, sigma);
-  this->VeilAlong = VeilKernelOf(sigma, this->CellColumns);
-  this->VeilAcross = VeilKernelOf(sigma, this->CellRows);
-  const auto cells = static_cast<std::size_t>(this->Columns_ / this->CellColumns) *
-    static_cast<std::size_t>(this->Rows_ / this->CellRows);
-  this->Veil.assign(cells, 0.0F);
-  this->VeilScratch.assign(cells, 0.0F);
-  const auto padding = [this](const std::vector<float>& half, int width)
-  { return static_cast<std::size_t>(width) + 2 * half.size(); };
-  this->Padded.assign(std::max(padding(this->BlurKernel, this->Columns_),
-                        padding(this->VeilAlong, this->Columns_ / this->CellColumns)),
-    0.0F);
+  this->Veil.Prepare(this->Columns_, this->Rows_, this->Settings_.glareSigma);
 }
 
 const std::vector<float>& Detector::Expose(const LineIntegrals& first, const LineIntegrals* second,
@@ -432,7 +353,10 @@ const std::vector<float>& Detector::Expose(const LineIntegrals& first, const Lin
     this->Resize(first.columns, first.rows);
   }
   this->Transmit(first, second, third);
-  this->MakeVeil();
+  if (this->Settings_.glareFraction > 0.0)
+  {
+    this->Veil.Blur(this->Transmission.data());
+  }
   // Seeds that are near to each other shall not share frames.
   const std::uint64_t key = MixBits(MixBits(this->Seed) + frame);
   for (int row = 0; row < this->Rows_; ++row)
@@ -458,115 +382,16 @@ void Detector::Transmit(
   }
 }
 
-void Detector::MakeVeil()
-{
-  if (this->Settings_.glareFraction == 0.0)
-  {
-    return;
-  }
-  const int columns = this->Columns_ / this->CellColumns;
-  const int rows = this->Rows_ / this->CellRows;
-  const float share = 1.0F / static_cast<float>(this->CellColumns * this->CellRows);
-  std::fill(this->Veil.begin(), this->Veil.end(), 0.0F);
-  for (int row = 0; row < this->Rows_; ++row)
-  {
-    const float* in = this->Transmission.data() + static_cast<std::size_t>(row) * this->Columns_;
-    float* cells = this->Veil.data() + static_cast<std::size_t>(row / this->CellRows) * columns;
-    for (int cell = 0; cell < columns; ++cell)
-    {
-      float sum = 0.0F;
-      for (int i = 0; i < this->CellColumns; ++i)
-      {
-        sum += in[cell * this->CellColumns + i];
-      }
-      cells[cell] += share * sum;
-    }
-  }
-  for (int row = 0; row < rows; ++row)
-  {
-    const std::size_t begin = static_cast<std::size_t>(row) * columns;
-    this->BlurRow(
-      this->Veil.data() + begin, columns, this->VeilAlong, this->VeilScratch.data() + begin);
-  }
-  this->RowPointers.resize(2 * this->VeilAcross.size() - 1);
-  for (int row = 0; row < rows; ++row)
-  {
-    this->PointToRows(this->VeilScratch, columns, rows, row, this->VeilAcross);
-    DetectorLoops().blurAcross(this->RowPointers.data(), this->VeilAcross.data(),
-      static_cast<int>(this->VeilAcross.size()) - 1, columns,
-      this->Veil.data() + static_cast<std::size_t>(row) * columns);
-  }
-}
-
-/// Blurs along a row that is continued as in mirrors.
-void Detector::BlurRow(const float* in, int width, const std::vector<float>& half, float* result)
-{
-  const int radius = static_cast<int>(half.size()) - 1;
-  float* middle = this->Padded.data() + radius;
-  std::copy(in, in + width, middle);
-  for (int r = 1; r <= radius; ++r)
-  {
-    middle[-r] = in[Mirrored(-r, width)];
-    middle[width - 1 + r] = in[Mirrored(width - 1 + r, width)];
-  }
-  DetectorLoops().blurAlong(middle, half.data(), radius, width, result);
-}
-
-/// RowPointers: the rows from `row` - radius to `row` + radius, continued as in mirrors.
-void Detector::PointToRows(
-  const std::vector<float>& image, int columns, int rows, int row, const std::vector<float>& half)
-{
-  const int radius = static_cast<int>(half.size()) - 1;
-  for (int r = -radius; r <= radius; ++r)
-  {
-    this->RowPointers[static_cast<std::size_t>(r + radius)] =
-      image.data() + static_cast<std::size_t>(Mirrored(row + r, rows)) * columns;
-  }
-}
-
-/// The veil in the pixels of a row: linear between the cells' centres, level outside them.
-void Detector::InterpolateVeil(int row)
-{
-  const int columns = this->Columns_ / this->CellColumns;
-  const int rows = this->Rows_ / this->CellRows;
-  const double place = (row + 0.5) / this->CellRows - 0.5;
-  const int above = std::clamp(static_cast<int>(std::floor(place)), 0, rows - 1);
-  const int below = std::min(above + 1, rows - 1);
-  const auto down = static_cast<float>(std::clamp(place - above, 0.0, 1.0));
-  const float* a = this->Veil.data() + static_cast<std::size_t>(above) * columns;
-  const float* b = this->Veil.data() + static_cast<std::size_t>(below) * columns;
-  const auto value = [=](int cell) { return a[cell] + down * (b[cell] - a[cell]); };
-
-  const int size = this->CellColumns;
-  const int first = size / 2;
-  const auto start = static_cast<float>(FirstFraction(size));
-  const float step = 1.0F / static_cast<float>(size);
-  float* out = this->VeilRow.data();
-  float left = value(0);
-  std::fill(out, out + first, left);
-  for (int cell = 0; cell + 1 < columns; ++cell)
-  {
-    const float right = value(cell + 1);
-    float* pixels = out + cell * size + first;
-    for (int j = 0; j < size; ++j)
-    {
-      pixels[j] = left + (start + step * static_cast<float>(j)) * (right - left);
-    }
-    left = right;
-  }
-  std::fill(out + (columns - 1) * size + first, out + this->Columns_, left);
-}
-
 void Detector::DetectRow(int row, float photons, std::uint64_t key)
 {
   const std::size_t begin = static_cast<std::size_t>(row) * this->Columns_;
   const auto glare = static_cast<float>(this->Settings_.glareFraction);
   if (glare > 0.0F)
   {
-    this->InterpolateVeil(row);
+    this->Veil.Row(row, this->Scratch.data());
   }
   float* detected = this->Transmission.data() + begin;
-  DetectorLoops().mix(detected, this->VeilRow.data(), photons * (1.0F - glare), photons * glare,
+  DetectorLoops().mix(detected, this->Scratch.data(), photons * (1.0F - glare), photons * glare,
     this->Columns_, detected);
   if (this->Settings_.noise)
   {
@@ -577,21 +402,26 @@ void Detector::DetectRow(int row, float photons, std::uint64_t key)
         Photons(tables, detected[i], MixBits(key + begin + static_cast<std::uint64_t>(i)));
     }
   }
-  this->BlurRow(detected, this->Columns_, this->BlurKernel, this->Blurred.data() + begin);
+  BlurMirroredRow(
+    detected, this->Columns_, this->BlurKernel, this->Padded, this->Blurred.data() + begin);
 }
 
 void Detector::BlurAcrossRows(float lag)
 {
   const DetectorKernels& loops = DetectorLoops();
   const int radius = static_cast<int>(this->BlurKernel.size()) - 1;
-  this->RowPointers.resize(2 * this->BlurKernel.size() - 1);
+  std::vector<const float*> around(2 * this->BlurKernel.size() - 1);
   for (int row = 0; row < this->Rows_; ++row)
   {
-    this->PointToRows(this->Blurred, this->Columns_, this->Rows_, row, this->BlurKernel);
+    for (int r = -radius; r <= radius; ++r)
+    {
+      around[static_cast<std::size_t>(r + radius)] = this->Blurred.data() +
+        static_cast<std::size_t>(Mirrored(row + r, this->Rows_)) * this->Columns_;
+    }
     float* held = this->Signal_.data() + static_cast<std::size_t>(row) * this->Columns_;
-    loops.blurAcross(this->RowPointers.data(), this->BlurKernel.data(), radius, this->Columns_,
-      this->VeilRow.data());
-    loops.lag(this->VeilRow.data(), lag, this->Columns_, held);
+    loops.blurAcross(
+      around.data(), this->BlurKernel.data(), radius, this->Columns_, this->Scratch.data());
+    loops.lag(this->Scratch.data(), lag, this->Columns_, held);
   }
 }
 }

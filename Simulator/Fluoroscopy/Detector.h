@@ -10,6 +10,7 @@
 #ifndef DynamicCoronary_Detector_h
 #define DynamicCoronary_Detector_h
 
+#include "BroadBlur.h"
 #include "LineIntegrals.h"
 
 #include <cstdint>
@@ -93,33 +94,22 @@ private:
   void Prepare();
   void Transmit(
     const LineIntegrals& first, const LineIntegrals* second, const LineIntegrals* third);
-  void MakeVeil();
-  void InterpolateVeil(int row);
   void DetectRow(int row, float photons, std::uint64_t key);
   void BlurAcrossRows(float lag);
-  void BlurRow(const float* in, int width, const std::vector<float>& half, float* result);
-  void PointToRows(const std::vector<float>& image, int columns, int rows, int row,
-    const std::vector<float>& half);
 
   DetectorSettings Settings_;
   std::uint64_t Seed;
   int Columns_ = 0;
   int Rows_ = 0;
   bool Filled = false;
-  int CellColumns = 1; ///< pixels a cell of the veil's grid
-  int CellRows = 1;
   std::vector<float> ShutterColumns; ///< open share of each column, and row
   std::vector<float> ShutterRows;
-  std::vector<float> BlurKernel; ///< right halves of symmetric kernels
-  std::vector<float> VeilAlong;
-  std::vector<float> VeilAcross;
+  std::vector<float> BlurKernel; ///< right half
+  BroadBlur Veil;
   std::vector<float> Transmission; ///< exp(-A) between the shutters; then photons
-  std::vector<float> Veil;         ///< one value a cell
-  std::vector<float> VeilScratch;
-  std::vector<float> VeilRow; ///< of one row of pixels
-  std::vector<float> Padded;  ///< a row with what its blur needs beyond its ends
-  std::vector<float> Blurred; ///< along rows
-  std::vector<const float*> RowPointers;
+  std::vector<float> Blurred;      ///< along rows
+  std::vector<float> Scratch;      ///< of one row
+  std::vector<float> Padded;
   std::vector<float> Signal_;
 };
 

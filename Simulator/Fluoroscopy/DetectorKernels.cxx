@@ -98,6 +98,37 @@ void BlurAcross(const float* const* rows, const float* kernel, int radius, int w
   }
 }
 
+template <int Size>
+void AddCellsOf(const float* in, float share, int cells, float* sums)
+{
+  for (int cell = 0; cell < cells; ++cell)
+  {
+    float sum = 0.0F;
+    for (int i = 0; i < Size; ++i)
+    {
+      sum += in[cell * Size + i];
+    }
+    sums[cell] += share * sum;
+  }
+}
+
+void AddCells(const float* in, int size, float share, int cells, float* sums)
+{
+  switch (size)
+  {
+    case 16:
+      return AddCellsOf<16>(in, share, cells, sums);
+    case 8:
+      return AddCellsOf<8>(in, share, cells, sums);
+    case 4:
+      return AddCellsOf<4>(in, share, cells, sums);
+    case 2:
+      return AddCellsOf<2>(in, share, cells, sums);
+    default:
+      return AddCellsOf<1>(in, share, cells, sums);
+  }
+}
+
 void Lag(const float* fresh, float lag, int width, float* held)
 {
   for (int i = 0; i < width; ++i)
@@ -132,5 +163,5 @@ const DetectorKernels DetectorKernelsAvx2
 #else
 const DetectorKernels DetectorKernelsBaseline
 #endif
-  { Transmit, Mix, BlurAlong, BlurAcross, Lag, Logarithm, Grey };
+  { Transmit, Mix, BlurAlong, BlurAcross, AddCells, Lag, Logarithm, Grey };
 }

@@ -19,6 +19,8 @@ struct DetectorKernels
   /// The same across 2 radius + 1 rows.
   void (*blurAcross)(
     const float* const* rows, const float* kernel, int radius, int width, float* result);
+  /// cells[c] += share * (sum of the c-th `size` values)
+  void (*addCells)(const float* in, int size, float share, int cells, float* sums);
   /// held = fresh + lag * (held - fresh)
   void (*lag)(const float* fresh, float lag, int width, float* held);
   /// result = ln(max(signal, least)) - unattenuated

@@ -11,7 +11,9 @@ namespace coronary
 {
 namespace
 {
-constexpr float LeastSignal = 0.25F;     ///< photons: what is shown as the darkest
+constexpr float LeastSignal = 0.25F; ///< photons: what is shown as the darkest
+constexpr double HarmonisedWidths =
+  12.0; ///< standard deviations of what is broad, in an image's width
 constexpr float RoadmapSmoothing = 0.3F; ///< weight of a new frame in the gathered vessels
 
 void Require(bool possible, const char* name, double value, const char* range)
@@ -56,6 +58,8 @@ void ImagerSettings::Validate() const
   this->detector.Validate();
   Require(this->window >= 0.5 && this->window <= 20.0, "window", this->window, "0.5 to 20");
   Require(this->level >= -10.0 && this->level <= 10.0, "level", this->level, "-10 to 10");
+  Require(this->harmonisation >= 0.0 && this->harmonisation <= 0.9, "harmonisation",
+    this->harmonisation, "0 to 0.9");
   Require(this->exposureSeconds >= 0.01 && this->exposureSeconds <= 10.0,
     "time constant of the brightness", this->exposureSeconds, "0.01 to 10 s");
   Require(this->subtractionWindow >= 0.1 && this->subtractionWindow <= 10.0,
@@ -120,6 +124,7 @@ const GreyImage& FluoroscopyImager::Expose(const LineIntegrals& background,
 
   if (this->Mode_ == ImageMode::Plain)
   {
+    this->Harmonise(background);
     this->ShowPlain();
   }
   else
@@ -145,6 +150,8 @@ void FluoroscopyImager::FitTo(int columns, int rows)
   const std::size_t pixels = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   this->Shown_.values.assign(pixels, 0);
   this->LogSignal.assign(pixels, 0.0F);
+  this->Row.assign(static_cast<std::size_t>(columns), 0.0F);
+  this->Broad.Prepare(columns, rows, std::max(4.0, columns / HarmonisedWidths));
   this->SetMode(this->Mode_);
 }
 
@@ -192,6 +199,27 @@ void FluoroscopyImager::Begin(const Exposure& exposure)
     else if (exposure.sequence != this->RoadmapSequence && !this->RoadmapReady)
     {
       this->FinishRoadmap();
+    }
+  }
+}
+
+/// Evens out what is broad in the background, as the exposure follows the background only.
+void FluoroscopyImager::Harmonise(const LineIntegrals& background)
+{
+  if (this->Settings_.harmonisation == 0.0)
+  {
+    return;
+  }
+  this->Broad.Blur(background.values.data());
+  const auto share = static_cast<float>(this->Settings_.harmonisation);
+  const auto middle = static_cast<float>(this->DisplayLevel_ * this->Settings_.harmonisation);
+  for (int row = 0; row < background.rows; ++row)
+  {
+    this->Broad.Row(row, this->Row.data());
+    float* values = this->LogSignal.data() + static_cast<std::size_t>(row) * background.columns;
+    for (std::size_t i = 0; i < this->Row.size(); ++i)
+    {
+      values[i] += share * this->Row[i] + middle;
     }
   }
 }

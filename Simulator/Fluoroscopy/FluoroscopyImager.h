@@ -29,8 +29,11 @@ enum class ImageMode : int
 struct ImagerSettings
 {
   DetectorSettings detector;
-  double window = 3.6;            ///< of ln(photons), that is black to white, 0.5 to 20
-  double level = 0.0;             ///< added to ln(photons) before the window: brighter, -10 to 10
+  double window = 2.6; ///< of ln(photons), that is black to white, 0.5 to 20
+  double level = 0.0;  ///< added to ln(photons) before the window: brighter, -10 to 10
+  double harmonisation =
+    0.5; ///< share of the background's broad brightness that is evened out, 0 to 0.9: lungs less
+         ///< bright, spine less dark
   double exposureSeconds = 0.5;   ///< time constant of the automatic brightness, 0.01 to 10
   double subtractionWindow = 1.2; ///< of the difference of ln(photons), 0.1 to 10
   double roadmapOpacity = 0.6;    ///< how bright the full contrast of a roadmap is, 0 to 1
@@ -101,6 +104,7 @@ private:
   void FitTo(int columns, int rows);
   void FollowBrightness(const LineIntegrals& background, const Exposure& exposure);
   void Begin(const Exposure& exposure);
+  void Harmonise(const LineIntegrals& background);
   void ShowPlain();
   void ShowSubtracted();
   void AddToMask();
@@ -118,7 +122,9 @@ private:
   double DisplayLevel_ = 0.0;
   bool Bright = false;          ///< DisplayLevel_ has been set
   std::vector<float> LogSignal; ///< ln(photons / photons of the unattenuated beam), less the mask
-  std::vector<float> Mask;      ///< the mean of MaskCount frames of LogSignal
+  BroadBlur Broad;              ///< of the background
+  std::vector<float> Row;
+  std::vector<float> Mask; ///< the mean of MaskCount frames of LogSignal
   int MaskCount = 0;
   bool MaskIsOpen = true; ///< the next frame belongs to it
   bool RoadmapReady = false;

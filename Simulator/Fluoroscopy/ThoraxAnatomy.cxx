@@ -386,7 +386,7 @@ double ThoraxAnatomy::DiaphragmHeight(const ThoraxSlice& slice, const Vector3& p
     return top - 26.0 * q - 38.0 * steep * steep;
   };
   return std::max({ dome(-70.0, -8.0, -83.0, 62.0, 82.0), dome(72.0, -8.0, -95.0, 60.0, 82.0),
-    dome(15.0, -35.0, -95.0, 70.0, 62.0) });
+    dome(26.0, -32.0, -77.0, 62.0, 58.0) });
 }
 
 double ThoraxAnatomy::LungTop(double wallLevel)
@@ -529,19 +529,26 @@ void ThoraxAnatomy::AddRib(int number, int side)
   rib.shellValue = RibCortex;
   rib.coreValue = RibMarrow;
   const std::vector<Vector3> line = Curve(points, 4);
+  // Neck thin, angle stout, wider again at the front end; floating ribs are thin and pointed.
+  const auto taper = [&](double t) { return floating ? 1.0 - 0.45 * t : 1.0; };
+  const auto thick = [&](double t)
+  { return taper(t) * (3.3 + 0.9 * std::sin(Pi * std::min(1.0, 1.8 * t))); };
+  const auto tall = [&](double t)
+  {
+    const double stout =
+      5.6 + 1.5 * std::sin(Pi * std::min(1.0, 1.6 * t)) + std::max(0.0, 5.0 * (t - 0.85));
+    return taper(t) * (floating ? 5.0 : stout);
+  };
   for (std::size_t i = 0; i + 1 < line.size(); ++i)
   {
-    const Vector3 outward(line[i].x() - this->MidX(line[i].z()), line[i].y() + 5.0, 0.0);
     const double t = static_cast<double>(i) / static_cast<double>(line.size());
-    // Neck thin, angle stout, wider again at the front end; the first rib is flat and lies.
-    const double tall = (floating ? 5.0 : 5.6 + 1.5 * std::sin(Pi * std::min(1.0, 1.6 * t))) +
-      (t > 0.85 && !floating ? 5.0 * (t - 0.85) : 0.0);
-    const double thick = 3.3 + 0.9 * std::sin(Pi * std::min(1.0, 1.8 * t));
-    const Vector3 across =
-      number == 1 ? Vector3(0.3 * outward.normalized() + Vector3::UnitZ()) : outward.normalized();
-    const double taper = floating ? 1.0 - 0.45 * t : 1.0;
-    rib.parts.emplace_back(Flat(line[i], line[i + 1], across, { thick * taper, thick * taper },
-      { tall * taper, tall * taper }));
+    const double next = static_cast<double>(i + 1) / static_cast<double>(line.size());
+    const Vector3 outward =
+      Vector3(line[i].x() - this->MidX(line[i].z()), line[i].y() + 5.0, 0.0).normalized();
+    // The first rib lies flat.
+    const Vector3 across = number == 1 ? Vector3(0.3 * outward + Vector3::UnitZ()) : outward;
+    rib.parts.emplace_back(
+      Flat(line[i], line[i + 1], across, { thick(t), thick(next) }, { tall(t), tall(next) }));
   }
   this->bones.push_back(std::move(rib));
   if (number <= 10)
