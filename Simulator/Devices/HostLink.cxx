@@ -422,9 +422,10 @@ void HostLink::HandleState(const Message& message)
   this->Shown.pedals = state.pedals;
   this->Shown.buttons = state.buttons;
   ++this->Shown.version;
-  // What was missed in a silence is caught up as fast as it was done.
   const bool silent = this->Shown.state == DeviceState::Stale && !this->Noisy;
-  this->Shown.period = silent ? std::clamp(silence, period, 1e-6 * Lost) : period;
+  this->Shown.period = period;
+  this->Shown.resumptions += silent ? 1 : 0;
+  this->Shown.silence = silent ? std::clamp(silence, period, 1e-6 * Lost) : this->Shown.silence;
   this->Shown.deviceTime = 0;
   if (this->Clocks.Known())
   {

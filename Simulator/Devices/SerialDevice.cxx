@@ -88,19 +88,7 @@ void SerialDevice::Read(std::uint64_t /*tick*/, double secondsPerTick, InputFram
 {
   const bool heard = this->FromDevice.Read(this->Latest);
   this->Silence = heard ? 0.0 : this->Silence + secondsPerTick;
-  this->Since += secondsPerTick;
-  if (this->Latest.version != this->Version)
-  {
-    this->Version = this->Latest.version;
-    this->From = this->Places;
-    this->Since = secondsPerTick;
-  }
-  const double share = std::min(1.0, this->Since / this->Latest.period);
-  for (std::size_t kind = 0; kind < LinkSnapshot::Kinds; ++kind)
-  {
-    const double to = this->Latest.places[kind];
-    this->Places[kind] = share < 1.0 ? this->From[kind] + share * (to - this->From[kind]) : to;
-  }
+  this->Interpolate(secondsPerTick);
   frame = {};
   frame.axes = this->Latest.axes;
   frame.state = this->Silence < Lost ? this->Latest.state : DeviceState::Disconnected;
@@ -119,6 +107,38 @@ void SerialDevice::Read(std::uint64_t /*tick*/, double secondsPerTick, InputFram
   {
     input.pedals = this->Latest.pedals;
     frame.buttons = this->Latest.buttons;
+  }
+}
+
+void SerialDevice::Interpolate(double secondsPerTick)
+{
+  this->Since += secondsPerTick;
+  this->Catching += secondsPerTick;
+  if (this->Latest.version != this->Version)
+  {
+    this->Version = this->Latest.version;
+    this->From = this->Even;
+    this->Since = secondsPerTick;
+  }
+  if (this->Latest.resumptions != this->Resumptions)
+  {
+    // What was missed is caught up as fast as it was done.
+    this->Resumptions = this->Latest.resumptions;
+    this->Catching = secondsPerTick;
+    this->From = this->Latest.places;
+    for (std::size_t kind = 0; kind < LinkSnapshot::Kinds; ++kind)
+    {
+      this->Behind[kind] = this->Places[kind] - this->From[kind];
+    }
+  }
+  const double share = std::min(1.0, this->Since / this->Latest.period);
+  const double left =
+    this->Catching < this->Latest.silence ? 1.0 - this->Catching / this->Latest.silence : 0.0;
+  for (std::size_t kind = 0; kind < LinkSnapshot::Kinds; ++kind)
+  {
+    const double to = this->Latest.places[kind];
+    this->Even[kind] = share < 1.0 ? this->From[kind] + share * (to - this->From[kind]) : to;
+    this->Places[kind] = this->Even[kind] + left * this->Behind[kind];
   }
 }
 

@@ -61,6 +61,7 @@ private:
   void Run();
   void Say();
   void Publish();
+  void Interpolate(double secondsPerTick);
 
   std::unique_ptr<DevicePort> Port;
   ClockFunction Clock;
@@ -69,9 +70,14 @@ private:
   // Of the physics.
   PhysicsWord Word;
   LinkSnapshot Latest;
-  std::array<double, LinkSnapshot::Kinds> From{}; ///< places when Latest came
-  std::array<double, LinkSnapshot::Kinds> Places{};
-  double Since = 0.0;   ///< s of ticks since Latest moved
+  using PlaceArray = std::array<double, LinkSnapshot::Kinds>;
+  PlaceArray From{};     ///< even motion when Latest came
+  PlaceArray Even{};     ///< even motion between the device's states
+  PlaceArray Behind{};   ///< what a silence left to be caught up
+  PlaceArray Places{};   ///< what is said
+  double Since = 0.0;    ///< s of ticks since Latest moved
+  double Catching = 0.0; ///< s of ticks since a silence ended
+  std::uint64_t Resumptions = 0;
   double Silence = 0.0; ///< s of ticks since the thread said anything
   std::uint64_t Version = 0;
 

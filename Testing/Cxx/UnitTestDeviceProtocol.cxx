@@ -377,6 +377,9 @@ TEST(FrameDecoder, UnknownTypesAndTooManyBytes)
   EXPECT_EQ(decoder.Counts().overlong, 1U);
   EXPECT_EQ(Decoded(decoder, Bytes{ 0 } + StateFrame(1)).size(), 1U);
   Message largest = EncodeStop();
+  largest.flags = 1;
+  largest.sequence = 0x0101;
+  largest.microseconds = 0x01010101;
   largest.size = MostPayload;
   largest.payload.fill(0xFF);
   FrameDecoder other;
