@@ -15,10 +15,10 @@ namespace coronary
 {
 enum class DeviceState : std::uint8_t
 {
-  Connecting,   ///< never was there, and may come
+  Connecting,   ///< not known yet
   Running,      ///< its input is good
   Stale,        ///< silent or disturbed for a moment: its pose is held, no forces
-  Disconnected, ///< was there and may come back: pose held, pedals released, no injection
+  Disconnected, ///< not there, and waited for: pose held, pedals released, no injection
   Refused,      ///< not ours, of another version, or not allowed; tried again now and then
   Ended         ///< a recording or a script that is over: its pose is held
 };

@@ -53,6 +53,9 @@ public:
   /// Goes on by `seconds`.
   void Advance(const HandWishes& wishes, double seconds);
 
+  /// At once, without running out.
+  void Stop() { this->Speed = {}; }
+
   const SessionInput& Place() const { return this->Place_; }
 
 private:

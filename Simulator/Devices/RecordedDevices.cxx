@@ -1,0 +1,106 @@
+#include "RecordedDevices.h"
+
+#include "Recording.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace coronary
+{
+namespace
+{
+/// Hz; rates are whole mostly, and times that are made of them are to have the same bits everywhere.
+double RateOf(double secondsPerTick)
+{
+  const double rate = 1.0 / secondsPerTick;
+  const double whole = std::round(rate);
+  return std::abs(rate - whole) < 1e-9 * rate ? whole : rate;
+}
+}
+
+SessionInput ScriptInput(const DriveScript& script, double seconds, std::uint32_t& axes)
+{
+  SessionInput input;
+  input.drive = script.At(seconds);
+  axes = WireAxes | CatheterAxes;
+  return input;
+}
+
+ScriptDevice::ScriptDevice(DriveScript script, std::string name)
+  : Script(std::move(script))
+  , Name(std::move(name))
+{
+}
+
+void ScriptDevice::Read(std::uint64_t tick, double secondsPerTick, InputFrame& frame)
+{
+  const double seconds = static_cast<double>(tick + 1) / RateOf(secondsPerTick);
+  frame = {};
+  frame.input = ScriptInput(this->Script, seconds, frame.axes);
+  const bool over = seconds >= this->Script.Duration() + secondsPerTick;
+  frame.state = over ? DeviceState::Ended : DeviceState::Running;
+  frame.input.pedals = over ? 0 : frame.input.pedals;
+}
+
+DeviceStatus ScriptDevice::Status() const
+{
+  DeviceStatus status;
+  status.state = DeviceState::Running;
+  status.text =
+    "'" + this->Name + "' drives for " + std::to_string(this->Script.Duration()) + " s.";
+  return status;
+}
+
+ReplayDevice::ReplayDevice(const std::string& path)
+  : Name(path)
+{
+  RecordingReader reader(path);
+  this->Rate = reader.Header().tickRate;
+  RecordedItem item;
+  while (reader.Next(item))
+  {
+    this->TickCount = std::max(this->TickCount, item.tick);
+    if (item.type != RecordType::Input)
+    {
+      continue;
+    }
+    this->TickCount = std::max(this->TickCount, item.tick + 1);
+    if (this->Changes.size() == MostChanges)
+    {
+      throw std::runtime_error("'" + path + "' has more than " + std::to_string(MostChanges) +
+        " changes of input, and can not be a device.");
+    }
+    this->Changes.push_back({ item.tick, item.input });
+  }
+  this->Ending =
+    reader.HowEnded() == RecordingReader::Ending::Complete ? "" : " " + reader.EndingText();
+}
+
+void ReplayDevice::Read(std::uint64_t tick, double secondsPerTick, InputFrame& frame)
+{
+  const double rate = RateOf(secondsPerTick);
+  const std::uint64_t recorded = rate == this->Rate
+    ? tick
+    : static_cast<std::uint64_t>(static_cast<double>(tick) / rate * this->Rate);
+  const auto after = std::upper_bound(this->Changes.begin(), this->Changes.end(), recorded,
+    [](std::uint64_t wanted, const Change& change) { return wanted < change.tick; });
+  frame = {};
+  frame.axes = WireAxes | CatheterAxes;
+  if (after != this->Changes.begin())
+  {
+    frame.input.drive = std::prev(after)->input;
+  }
+  frame.state = recorded < this->TickCount ? DeviceState::Running : DeviceState::Ended;
+}
+
+DeviceStatus ReplayDevice::Status() const
+{
+  DeviceStatus status;
+  status.state = DeviceState::Running;
+  status.text = "'" + this->Name + "' drives for " +
+    std::to_string(static_cast<double>(this->TickCount) / this->Rate) + " s." + this->Ending;
+  return status;
+}
+}

@@ -1,0 +1,67 @@
+/**
+ * @file RecordedDevices.h
+ * @brief Hands of another time: recordings and scripts.
+ */
+#ifndef DynamicCoronary_RecordedDevices_h
+#define DynamicCoronary_RecordedDevices_h
+
+#include "Device.h"
+#include "DriveScript.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// What hands that follow the script do at `seconds`. @param axes  bits of DeviceAxes that the script has
+SessionInput ScriptInput(const DriveScript& script, double seconds, std::uint32_t& axes);
+
+/// At the end of a tick the hands are where the script has them then.
+class ScriptDevice : public Device
+{
+public:
+  explicit ScriptDevice(DriveScript script, std::string name = "script");
+
+  void Read(std::uint64_t tick, double secondsPerTick, InputFrame& frame) override;
+  DeviceStatus Status() const override;
+  bool IsScripted() const override { return true; }
+
+private:
+  DriveScript Script;
+  std::string Name;
+};
+
+/// The inputs of a recording, tick by tick; at another tick rate than the recorded one by time.
+class ReplayDevice : public Device
+{
+public:
+  static constexpr std::size_t MostChanges = 10000000;
+
+  /// Reads all of it. A recording that is torn is good up to there.
+  /// @throws std::runtime_error naming the file: not there, no recording, more than MostChanges changes of input
+  explicit ReplayDevice(const std::string& path);
+
+  void Read(std::uint64_t tick, double secondsPerTick, InputFrame& frame) override;
+  DeviceStatus Status() const override;
+  bool IsScripted() const override { return true; }
+
+  std::uint64_t Ticks() const { return this->TickCount; } ///< that were recorded
+  double TickRate() const { return this->Rate; }          ///< Hz, of the recording
+
+private:
+  struct Change
+  {
+    std::uint64_t tick;
+    DriveInput input;
+  };
+
+  std::string Name;
+  std::string Ending; ///< for people
+  std::vector<Change> Changes;
+  std::uint64_t TickCount = 0;
+  double Rate = 0.0;
+};
+}
+
+#endif
