@@ -1134,7 +1134,7 @@ void RequireOpenGL()
 }
 }
 
-int RunWindow(const SessionWorld& world, const WindowOptions& options)
+void RequireDisplay()
 {
   std::string why;
   if (!CanDraw(why))
@@ -1142,6 +1142,11 @@ int RunWindow(const SessionWorld& world, const WindowOptions& options)
     throw std::runtime_error("There is no display for the window (" + why +
       "); sessions without one run with --headless.");
   }
+}
+
+int RunWindow(const SessionWorld& world, const WindowOptions& options)
+{
+  RequireDisplay();
   QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
   int count = 1;
   std::string name = "coronary-simulator";

@@ -20,14 +20,6 @@ double RateOf(double secondsPerTick)
 }
 }
 
-SessionInput ScriptInput(const DriveScript& script, double seconds, std::uint32_t& axes)
-{
-  SessionInput input;
-  input.drive = script.At(seconds);
-  axes = WireAxes | CatheterAxes;
-  return input;
-}
-
 ScriptDevice::ScriptDevice(DriveScript script, std::string name)
   : Script(std::move(script))
   , Name(std::move(name))
@@ -38,7 +30,8 @@ void ScriptDevice::Read(std::uint64_t tick, double secondsPerTick, InputFrame& f
 {
   const double seconds = static_cast<double>(tick + 1) / RateOf(secondsPerTick);
   frame = {};
-  frame.input = ScriptInput(this->Script, seconds, frame.axes);
+  frame.input = this->Script.At(seconds);
+  frame.axes = AllAxes;
   const bool over = seconds >= this->Script.Duration() + secondsPerTick;
   frame.state = over ? DeviceState::Ended : DeviceState::Running;
   frame.input.pedals = over ? 0 : frame.input.pedals;
@@ -87,12 +80,14 @@ void ReplayDevice::Read(std::uint64_t tick, double secondsPerTick, InputFrame& f
   const auto after = std::upper_bound(this->Changes.begin(), this->Changes.end(), recorded,
     [](std::uint64_t wanted, const Change& change) { return wanted < change.tick; });
   frame = {};
-  frame.axes = WireAxes | CatheterAxes;
+  frame.axes = AllAxes;
   if (after != this->Changes.begin())
   {
-    frame.input.drive = std::prev(after)->input;
+    frame.input = std::prev(after)->input;
   }
-  frame.state = recorded < this->TickCount ? DeviceState::Running : DeviceState::Ended;
+  const bool over = recorded >= this->TickCount;
+  frame.state = over ? DeviceState::Ended : DeviceState::Running;
+  frame.input.pedals = over ? 0 : frame.input.pedals;
 }
 
 DeviceStatus ReplayDevice::Status() const

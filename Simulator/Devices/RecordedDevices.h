@@ -14,9 +14,6 @@
 
 namespace coronary
 {
-/// What hands that follow the script do at `seconds`. @param axes  bits of DeviceAxes that the script has
-SessionInput ScriptInput(const DriveScript& script, double seconds, std::uint32_t& axes);
-
 /// At the end of a tick the hands are where the script has them then.
 class ScriptDevice : public Device
 {
@@ -53,7 +50,7 @@ private:
   struct Change
   {
     std::uint64_t tick;
-    DriveInput input;
+    SessionInput input;
   };
 
   std::string Name;
