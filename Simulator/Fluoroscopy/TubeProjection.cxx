@@ -109,6 +109,7 @@ TubePart KernelPart(const Part& part, const Vector3& ray, const Beam& beam, doub
     kernel.inner[end] = static_cast<float>(part.section->inner[end]);
   }
   kernel.length = static_cast<float>(part.length);
+  kernel.inverseLength = static_cast<float>(1.0 / part.length);
   kernel.step = std::max(std::abs(kernel.moment.b), std::abs(kernel.moment.c));
   const double pixel = std::max(beam.nextColumn.norm(), beam.nextRow.norm());
   kernel.greatestPixel =
@@ -178,12 +179,13 @@ Band BandOf(const Part& part, const Vector3& start, const Vector3& end, const Be
   // Bevelled ends and those seen obliquely reach beyond the axis.
   const double bevel = std::max((part.cut[0] - part.axis).norm(), (part.cut[1] - part.axis).norm());
   const double tilt = std::abs(part.axis.dot(ray)) / length;
-  band.halfWidth = shadow + 0.75;
-  band.halfLength = 0.5 * projected + (bevel + tilt) * shadow + 1.5;
+  band.halfWidth = shadow + 0.55;
+  band.halfLength = 0.5 * projected + (bevel + tilt) * shadow + 0.85;
   return band;
 }
 
-void AddPart(const Part& part, const Beam& beam, const XRayKernels& kernels, LineIntegrals& image)
+void AddPart(const Part& part, const Beam& beam, const XRayKernels& kernels, TubePixels& list,
+  LineIntegrals& image)
 {
   const Vector3 start = beam.geometry.Project(part.first);
   const Vector3 end = beam.geometry.Project(part.last);
@@ -206,13 +208,22 @@ void AddPart(const Part& part, const Beam& beam, const XRayKernels& kernels, Lin
     const auto [first, last] = band.ColumnsOf(row);
     const int left = static_cast<int>(std::ceil(std::clamp(first, 0.0, double(image.columns))));
     const int right = static_cast<int>(std::floor(std::clamp(last, -1.0, image.columns - 1.0)));
-    if (left <= right)
+    const int rowStart = row * image.columns;
+    for (int column = left; column <= right; ++column)
     {
-      kernels.addTube(kernel, left - static_cast<int>(originColumn),
-        row - static_cast<int>(originRow), right - left + 1,
-        &image.values[static_cast<std::size_t>(row) * image.columns + left]);
+      if (list.count == TubePixels::Most)
+      {
+        kernels.addTube(kernel, list, image.values.data());
+        list.count = 0;
+      }
+      list.i[list.count] = static_cast<float>(column - originColumn);
+      list.j[list.count] = static_cast<float>(row - originRow);
+      list.index[list.count] = rowStart + column;
+      ++list.count;
     }
   }
+  kernels.addTube(kernel, list, image.values.data());
+  list.count = 0;
 }
 }
 
@@ -221,12 +232,13 @@ void AddTubes(const std::vector<Vector3>& points, const std::vector<TubeSection>
 {
   const Beam beam(geometry);
   const XRayKernels& kernels = BestXRayKernels();
+  TubePixels list;
   for (const Part& part : PartsOf(points, sections))
   {
     const TubeSection& section = *part.section;
     if (section.attenuation > 0.0 && std::max(section.outer[0], section.outer[1]) > LeastRadius)
     {
-      AddPart(part, beam, kernels, image);
+      AddPart(part, beam, kernels, list, image);
     }
   }
 }
