@@ -109,6 +109,7 @@ TubePart KernelPart(const Part& part, const Vector3& ray, const Beam& beam, doub
     kernel.inner[end] = static_cast<float>(part.section->inner[end]);
   }
   kernel.length = static_cast<float>(part.length);
+  kernel.inverseLength = static_cast<float>(1.0 / part.length);
   kernel.step = std::max(std::abs(kernel.moment.b), std::abs(kernel.moment.c));
   const double pixel = std::max(beam.nextColumn.norm(), beam.nextRow.norm());
   kernel.greatestPixel =
@@ -178,12 +179,58 @@ Band BandOf(const Part& part, const Vector3& start, const Vector3& end, const Be
   // Bevelled ends and those seen obliquely reach beyond the axis.
   const double bevel = std::max((part.cut[0] - part.axis).norm(), (part.cut[1] - part.axis).norm());
   const double tilt = std::abs(part.axis.dot(ray)) / length;
-  band.halfWidth = shadow + 0.75;
-  band.halfLength = 0.5 * projected + (bevel + tilt) * shadow + 1.5;
+  band.halfWidth = shadow + 0.55;
+  band.halfLength = 0.5 * projected + (bevel + tilt) * shadow + 0.85;
   return band;
 }
 
-void AddPart(const Part& part, const Beam& beam, const XRayKernels& kernels, LineIntegrals& image)
+/// Gives a tube's pixels to the kernel, many at a time.
+class PixelCollector
+{
+public:
+  PixelCollector(const XRayKernels& kernels, LineIntegrals& image)
+    : Kernels(kernels)
+    , Image(image)
+  {
+  }
+
+  /// Columns [left, right] of a row; offsets count from the origin.
+  void Add(const TubePart& part, int row, int left, int right, int originColumn, int originRow)
+  {
+    while (left <= right)
+    {
+      const int count = std::min(right - left + 1, TubePixels::Most - this->List.count);
+      const int first = this->List.count;
+      const int index = row * this->Image.columns + left;
+      for (int k = 0; k < count; ++k)
+      {
+        this->List.i[first + k] = static_cast<float>(left - originColumn + k);
+        this->List.j[first + k] = static_cast<float>(row - originRow);
+        this->List.index[first + k] = index + k;
+      }
+      this->List.count += count;
+      left += count;
+      if (this->List.count == TubePixels::Most)
+      {
+        this->Finish(part);
+      }
+    }
+  }
+
+  void Finish(const TubePart& part)
+  {
+    this->Kernels.addTube(part, this->List, this->Image.values.data());
+    this->List.count = 0;
+  }
+
+private:
+  const XRayKernels& Kernels;
+  LineIntegrals& Image;
+  TubePixels List;
+};
+
+void AddPart(
+  const Part& part, const Beam& beam, const LineIntegrals& image, PixelCollector& collector)
 {
   const Vector3 start = beam.geometry.Project(part.first);
   const Vector3 end = beam.geometry.Project(part.last);
@@ -193,26 +240,23 @@ void AddPart(const Part& part, const Beam& beam, const XRayKernels& kernels, Lin
   }
   const Band band = BandOf(part, start, end, beam);
   const double halfHeight = band.HalfHeight();
-  const int firstRow =
-    static_cast<int>(std::ceil(std::clamp(band.row - halfHeight, 0.0, double(image.rows))));
-  const int lastRow =
-    static_cast<int>(std::floor(std::clamp(band.row + halfHeight, -1.0, image.rows - 1.0)));
-  const double originColumn = std::round(std::clamp(band.column, 0.0, image.columns - 1.0));
-  const double originRow = std::round(std::clamp(band.row, 0.0, image.rows - 1.0));
+  const auto first = [](double place, int count)
+  { return static_cast<int>(std::ceil(std::clamp(place, 0.0, double(count)))); };
+  const auto last = [](double place, int count)
+  { return static_cast<int>(std::floor(std::clamp(place, -1.0, count - 1.0))); };
+  const int firstRow = first(band.row - halfHeight, image.rows);
+  const int lastRow = last(band.row + halfHeight, image.rows);
+  const int originColumn = std::max(0, last(band.column, image.columns));
+  const int originRow = std::max(0, last(band.row, image.rows));
   const Vector3 ray = beam.geometry.PixelPosition(originColumn, originRow) - beam.geometry.Source();
   const TubePart kernel = KernelPart(part, ray, beam, std::max(start.z(), end.z()));
   for (int row = firstRow; row <= lastRow; ++row)
   {
-    const auto [first, last] = band.ColumnsOf(row);
-    const int left = static_cast<int>(std::ceil(std::clamp(first, 0.0, double(image.columns))));
-    const int right = static_cast<int>(std::floor(std::clamp(last, -1.0, image.columns - 1.0)));
-    if (left <= right)
-    {
-      kernels.addTube(kernel, left - static_cast<int>(originColumn),
-        row - static_cast<int>(originRow), right - left + 1,
-        &image.values[static_cast<std::size_t>(row) * image.columns + left]);
-    }
+    const auto [left, right] = band.ColumnsOf(row);
+    collector.Add(
+      kernel, row, first(left, image.columns), last(right, image.columns), originColumn, originRow);
   }
+  collector.Finish(kernel);
 }
 }
 
@@ -220,13 +264,13 @@ void AddTubes(const std::vector<Vector3>& points, const std::vector<TubeSection>
   const CArmGeometry& geometry, LineIntegrals& image)
 {
   const Beam beam(geometry);
-  const XRayKernels& kernels = BestXRayKernels();
+  PixelCollector collector(BestXRayKernels(), image);
   for (const Part& part : PartsOf(points, sections))
   {
     const TubeSection& section = *part.section;
     if (section.attenuation > 0.0 && std::max(section.outer[0], section.outer[1]) > LeastRadius)
     {
-      AddPart(part, beam, kernels, image);
+      AddPart(part, beam, image, collector);
     }
   }
 }

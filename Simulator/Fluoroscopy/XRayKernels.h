@@ -60,19 +60,29 @@ struct TubePart
   PixelPlane crossCut[2]; ///< (axis x d) . normal, mm
   PixelPlane rayCut[2];   ///< d . normal, mm
   float length;           ///< mm
-  float outer[2];         ///< radius at its ends, mm
-  float inner[2];         ///< 0: solid
+  float inverseLength;
+  float outer[2]; ///< radius at its ends, mm
+  float inner[2]; ///< 0: solid
   float step; ///< of the distance between axis and ray, from pixel to pixel, times |axis x d|; mm^2
   float greatestPixel; ///< a pixel's size where the segment is, mm
   float attenuation;   ///< 1/mm
+};
+
+/// Some pixels, all different; what lies beyond `count` up to a multiple of the lanes is read, and not used.
+struct TubePixels
+{
+  static constexpr int Most = 256;
+  int count = 0;
+  float i[Most] = {};
+  float j[Most] = {};
+  std::int32_t index[Most] = {}; ///< in the image
 };
 
 struct XRayKernels
 {
   void (*sumSlices)(
     const SliceVolume& volume, const SliceRun* runs, int numberOfRuns, SlicePacket& packet);
-  /// Adds to `count` pixels from column offset `i` on, of row offset `j`.
-  void (*addTube)(const TubePart& part, int i, int j, int count, float* pixels);
+  void (*addTube)(const TubePart& part, const TubePixels& list, float* pixels);
 };
 
 extern const XRayKernels XRayKernelsBaseline;
