@@ -91,6 +91,9 @@ public:
   /// The trainee is ready to feel forces: asked for anew with every connection, and after the device has relaxed.
   virtual void ConfirmForces() {}
 
+  /// Whether its places tremble while the hands rest, as those of encoders do.
+  virtual bool IsNoisy() const { return false; }
+
   /// Whether its places are those of a whole session from tick 0 on, and not of hands that may already have moved.
   virtual bool IsScripted() const { return false; }
 };

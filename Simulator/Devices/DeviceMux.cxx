@@ -23,7 +23,7 @@ constexpr std::array<GroupPlaces, DeviceMux::Groups> GroupTable{ { { WireAxes, 0
 
 struct PlaceTraits
 {
-  double noise; ///< what hands at rest, and encoders, may move
+  double noise; ///< what hands at rest move on encoders
   double low;
   double high;
 };
@@ -55,6 +55,7 @@ void DeviceMux::Add(std::shared_ptr<Device> device)
   }
   this->All.push_back(std::move(device));
   this->Sources.resize(this->All.size());
+  this->Sources.back().noisy = this->All.back()->IsNoisy();
 }
 
 void DeviceMux::Start(const ViewPlace& view)
@@ -122,7 +123,8 @@ void DeviceMux::NoteMovement(Source& source, std::size_t group, std::uint64_t ti
   bool moved = false;
   for (std::size_t n = places.first; n < places.end; ++n)
   {
-    moved = moved || std::abs(source.places[n] - hand.reference[n]) > Traits[n].noise;
+    const double noise = source.noisy ? Traits[n].noise : 0.0;
+    moved = moved || std::abs(source.places[n] - hand.reference[n]) > noise;
   }
   if (!hand.seen || moved)
   {
@@ -153,8 +155,10 @@ void DeviceMux::Arbitrate(std::size_t group, std::uint64_t tick)
     {
       continue;
     }
-    const bool mayTake = hand.fresh && (free || static_cast<int>(n) < owner);
-    if (owner < 0 || (hand.moves && mayTake))
+    const bool earlier = static_cast<int>(n) < owner;
+    const bool byMoving = hand.moves && hand.fresh && (free || earlier);
+    const bool byRank = earlier && free && hand.fresh;
+    if (owner < 0 || byMoving || byRank)
     {
       this->TakeOver(group, n);
       return;

@@ -27,9 +27,9 @@ struct ViewPlace
 
 /**
  * Wire, catheter, syringe and view (C-arm with table) each follow one device at a time:
- * - at the start the first one that has it;
- * - a device that was added earlier takes it as soon as it moves it; a later one when the device that has it rests for
- *   RestSeconds;
+ * - while nothing moves, the first one that has it;
+ * - a device that was added earlier takes it as soon as it moves it; a later one by moving it when the device that has it
+ *   has rested for RestSeconds;
  * - when the device that has it is lost (Stale, Disconnected, ...) it is held. Another device gets it only by a new
  *   movement: one that begins after that device has rested for RestSeconds since the loss. So a key that is held down
  *   does not go on with a wire that fell out of the hand.
@@ -84,6 +84,7 @@ private:
   {
     InputFrame frame;
     PlaceArray places{};
+    bool noisy = false;
     std::array<Hand, Groups> hands;
 
     bool Drives(std::size_t group) const;

@@ -177,7 +177,7 @@ enum DeviceStatusBit : std::uint16_t
 {
   ForcesRelaxed = 1U, ///< the motors rest until the next START
   ForceClamped = 2U,  ///< a force was above the axis' maximum
-  DeviceFault = 4U    ///< a fault that ERROR tells of
+  HardwareFault = 4U  ///< a fault that ERROR tells of
 };
 
 struct StateMessage

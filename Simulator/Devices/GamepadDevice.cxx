@@ -370,6 +370,11 @@ int FindGamepad(std::string& path)
 }
 }
 
+bool GamepadDevice::HasEvdev()
+{
+  return true;
+}
+
 void GamepadDevice::WatchController()
 {
   while (!this->Stopping)

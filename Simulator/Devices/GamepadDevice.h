@@ -3,9 +3,9 @@
  * @brief Driving with a game controller, through Linux' evdev.
  *
  * Left stick: wire, forward and turning. Right stick: guide catheter. Right trigger: inject. Left trigger: pedal of
- * fluoroscopy. South button (A, cross): cine. East button (B, circle): mask. Shoulders: left fine, right fast.
- * Directional pad: C-arm, LAO to the right, cranial up; with the north button (Y, triangle): table; with the west button
- * (X, square) up and down: detector. Select: refill the syringe.
+ * fluoroscopy. BTN_SOUTH (A, cross): cine. BTN_EAST (B, circle): mask. Shoulders: left fine, right fast.
+ * Directional pad: C-arm, LAO to the right, cranial up; with BTN_NORTH (triangle; X on Xbox controllers): table, to the
+ * patient's left and head; with BTN_WEST (square; Y): detector. Select: refill the syringe.
  */
 #ifndef DynamicCoronary_GamepadDevice_h
 #define DynamicCoronary_GamepadDevice_h
@@ -100,6 +100,9 @@ public:
 
   /// Recorded events (struct input_event) out of an open file, such as a pipe; it is closed at the end.
   explicit GamepadDevice(int file, const HandSpeeds& speeds = {});
+
+  /// Whether this build can look for controllers.
+  static bool HasEvdev();
 
   ~GamepadDevice() override;
   GamepadDevice(const GamepadDevice&) = delete;

@@ -426,6 +426,7 @@ void HostLink::HandleState(const Message& message)
   this->Shown.period = period;
   this->Shown.resumptions += silent ? 1 : 0;
   this->Shown.silence = silent ? std::clamp(silence, period, 1e-6 * Lost) : this->Shown.silence;
+  this->Shown.arrival = this->Now;
   this->Shown.deviceTime = 0;
   if (this->Clocks.Known())
   {

@@ -48,14 +48,15 @@ struct LinkSnapshot
 {
   static constexpr std::size_t Kinds = static_cast<std::size_t>(AxisKind::Inflation) + 1;
 
-  std::uint64_t version = 0; ///< goes up with every STATE that moves
+  std::uint64_t version = 0; ///< goes up with every STATE
   DeviceState state = DeviceState::Connecting;
   std::uint32_t axes = 0; ///< bits of DeviceAxes
   std::uint16_t pedals = 0;
   std::uint16_t buttons = 0;
   double period = 0.001;         ///< s in which these places are to be reached
   std::uint64_t resumptions = 0; ///< goes up when a silence ends
-  double silence = 0.0; ///< s that the last one was: what was missed is caught up in as much
+  double silence = 0.0;      ///< s that the last one was: what was missed is caught up in as much
+  std::uint64_t arrival = 0; ///< microseconds of the host's clock
   std::uint64_t deviceTime =
     0; ///< microseconds of the host's clock at which the device took them; 0: unknown
   std::array<double, Kinds> places{}; ///< by AxisKind: mm, radians, mL, atm

@@ -76,7 +76,7 @@ void ReplayDevice::Read(std::uint64_t tick, double secondsPerTick, InputFrame& f
   const double rate = RateOf(secondsPerTick);
   const std::uint64_t recorded = rate == this->Rate
     ? tick
-    : static_cast<std::uint64_t>(static_cast<double>(tick) / rate * this->Rate);
+    : static_cast<std::uint64_t>(static_cast<double>(tick) * this->Rate / rate + 1e-6);
   const auto after = std::upper_bound(this->Changes.begin(), this->Changes.end(), recorded,
     [](std::uint64_t wanted, const Change& change) { return wanted < change.tick; });
   frame = {};

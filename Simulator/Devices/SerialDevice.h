@@ -44,6 +44,7 @@ public:
   void Heartbeat(std::uint64_t tick) override;
   DeviceStatus Status() const override;
   void ConfirmForces() override;
+  bool IsNoisy() const override { return true; }
 
   /// Asks the device to count from 0 where it stands; nothing moves. @param kinds  bit n: axes of AxisKind n
   void Zero(std::uint32_t kinds) { this->Zeroing.fetch_or(kinds); }
@@ -53,6 +54,12 @@ public:
 
   /// Microseconds on the host's clock at which the device took what Read() gave last; 0: unknown. The physics' thread.
   std::uint64_t TakenAt() const { return this->Latest.deviceTime; }
+
+  /// Microseconds on the host's clock at which that arrived.
+  std::uint64_t ArrivedAt() const { return this->Latest.arrival; }
+
+  /// States that the device sent so far. The physics' thread.
+  std::uint64_t States() const { return this->Latest.version; }
 
   /// For tests and for people: what the link knows. Only without a thread.
   const HostLink& Link() const { return this->Connection; }

@@ -257,6 +257,34 @@ TEST(DeviceProtocol, MessagesThereAndBack)
   EXPECT_EQ(error.text, "motor too warm");
 }
 
+TEST(DeviceProtocol, ExamplesOfTheDocumentation)
+{
+  std::ifstream stream(DYNAMICCORONARY_SOURCE_DIR "/docs/device-protocol.md");
+  const std::string page{ std::istreambuf_iterator<char>(stream), {} };
+  ASSERT_FALSE(page.empty());
+  HelloMessage hello;
+  hello.nonce = 0x12345678U;
+  hello.host = "DynamicCoronary";
+  StateMessage state;
+  state.tick = 7;
+  state.pedals = 1;
+  state.axes = 2;
+  state.counts[0] = 1000;
+  state.counts[1] = -3;
+  for (const Message& example :
+    { Numbered(Encode(hello), 0), Numbered(Encode(StartMessage{ 1000, 20, 0x12345678U }), 1),
+      Numbered(Encode(state), 9), Numbered(Encode(HeartbeatMessage{ 7 }), 5),
+      Numbered(Encode(ForceMessage{ 8, 20, { -0.5F, 0.0F }, { 0.0F, 0.0F } }), 6) })
+  {
+    const Bytes wire = BytesOf(EncodeFrame(example));
+    Bytes frame(wire.begin(), wire.end() - 1);
+    frame.resize(CobsDecode(frame.data(), frame.size()));
+    EXPECT_NE(page.find("frame: " + Hex(frame) + "\n"), std::string::npos)
+      << "frame: " << Hex(frame);
+    EXPECT_NE(page.find("wire:  " + Hex(wire) + "\n"), std::string::npos) << "wire:  " << Hex(wire);
+  }
+}
+
 TEST(DeviceProtocol, SizesOnTheWire)
 {
   EXPECT_EQ(Encode(TestState()).size, 52U);

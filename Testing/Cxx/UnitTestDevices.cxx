@@ -2,7 +2,11 @@
 #include "ClockOffset.h"
 #include "CounterRandom.h"
 #include "DeviceMux.h"
+#include "DeviceScenario.h"
 #include "KeyboardDevice.h"
+#include "RecordedDevices.h"
+#include "Recording.h"
+#include "ScriptedDevice.h"
 
 #include "Refusals.h"
 #include "VirtualPort.h"
@@ -10,6 +14,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <memory>
 #include <string>
@@ -693,6 +698,239 @@ TEST(DeviceMux, ViewsAreLimitedAndCanBePlaced)
   bench.first->Frame.input.primary += 0.01;
   bench.Run(Tick);
   EXPECT_NEAR(bench.last.primary, -0.29, 1e-12);
+}
+
+TEST(DeviceMux, TheFirstThatIsThereWhileNothingMoves)
+{
+  MuxBench bench;
+  bench.first->Frame.state = DeviceState::Connecting;
+  bench.Run(1.0);
+  EXPECT_EQ(bench.mux.Follows(0), 1);
+  bench.first->Frame.input.drive.wirePosition = 40.0;
+  bench.first->Frame.state = DeviceState::Running;
+  bench.Run(1.0);
+  EXPECT_EQ(bench.mux.Follows(0), 0);
+  EXPECT_EQ(bench.last.drive.wirePosition, 0.0);
+  bench.first->Speed = 1.0; // nothing of it is lost
+  EXPECT_NEAR(bench.Run(0.1), 0.1, 1e-9);
+}
+
+TEST(DeviceMux, TremblingEncodersDoNotKeepOthersOut)
+{
+  MuxBench bench;
+  bench.mux.Add(std::make_shared<KeyboardDevice>());
+  DeviceMux mux;
+  VirtualBench serial;
+  serial.Run(0.1);
+  std::shared_ptr<Device> hardware(&serial.serial, [](Device*) {});
+  mux.Add(hardware);
+  mux.Add(bench.second);
+  const auto run = [&](double seconds)
+  {
+    double at = 0.0;
+    for (auto left = std::llround(seconds / Tick); left > 0; --left)
+    {
+      serial.Place(AxisKind::WireAdvance) = left / 2 % 2 == 0 ? 0.0 : 0.01;
+      serial.Step();
+      at = mux.Next(bench.tick++, Tick).drive.wirePosition;
+    }
+    return at;
+  };
+  run(1.0);
+  EXPECT_EQ(mux.Follows(0), 0);
+  bench.second->Speed = 10.0;
+  EXPECT_GT(run(1.0), 9.9);
+  EXPECT_EQ(mux.Follows(0), 1);
+}
+
+TEST(DeviceUri, Names)
+{
+  EXPECT_EQ(ParseDeviceUri("serial:/dev/ttyACM0").path, "/dev/ttyACM0");
+  EXPECT_EQ(ParseDeviceUri("replay:a:b").path, "a:b");
+  EXPECT_EQ(ParseDeviceUri("gamepad:").scheme, "gamepad");
+  for (const char* wrong : { "serial:", "replay:", "script:" })
+  {
+    ExpectRefusal([&] { ParseDeviceUri(wrong); }, "needs a path");
+  }
+  ExpectRefusal([] { ParseDeviceUri("keyboard:x"); }, "none is wanted");
+  for (const char* wrong : { "", "serial", "mouse:", ":", "SERIAL:/dev/ttyACM0" })
+  {
+    ExpectRefusal([&] { ParseDeviceUri(wrong); }, std::string("'") + wrong + "' is none of");
+  }
+  InputFrame frame;
+  OpenDevice("null:")->Read(0, Tick, frame);
+  EXPECT_EQ(frame.state, DeviceState::Running);
+  EXPECT_EQ(frame.axes, 0U);
+  OpenDevice("keyboard:")->Read(0, Tick, frame);
+  EXPECT_EQ(frame.axes, static_cast<std::uint32_t>(AllAxes));
+  EXPECT_THROW(OpenDevice("replay:/nowhere"), std::runtime_error);
+  EXPECT_THROW(OpenDevice("script:/nowhere"), std::runtime_error);
+}
+
+TEST(ScriptDevice, AsAHeadlessSessionHasIt)
+{
+  const std::string path = testing::TempDir() + "device-script.json";
+  std::ofstream(path) << R"({"format":"dynamiccoronary script","version":1,
+    "pieces":[{"seconds":0.3,"wire_mm":7},{"seconds":0.2,"catheter_deg":30}]})";
+  const DriveScript script = ReadDriveScript(path);
+  const std::shared_ptr<Device> device = OpenDevice("script:" + path);
+  DeviceMux mux;
+  mux.Add(device);
+  InputFrame frame;
+  for (std::uint64_t tick = 0; tick < 1200; ++tick)
+  {
+    const DriveInput expected = script.At(static_cast<double>(tick + 1) / 2000.0);
+    const DriveInput drive = mux.Next(tick, Tick).drive;
+    ASSERT_EQ(drive.wirePosition, expected.wirePosition);
+    ASSERT_EQ(drive.catheterAngle, expected.catheterAngle);
+    device->Read(tick, Tick, frame);
+    ASSERT_EQ(frame.state, tick < 1000 ? DeviceState::Running : DeviceState::Ended) << tick;
+  }
+}
+
+TEST(ReplayDevice, AsItWasRecorded)
+{
+  const std::string path = testing::TempDir() + "device-replay.pcirec";
+  RecordingHeader header;
+  header.tickRate = 2000.0;
+  std::vector<DriveInput> inputs;
+  {
+    RecordingWriter writer(path, header);
+    for (std::uint64_t tick = 0; tick < 3000; ++tick)
+    {
+      DriveInput input;
+      input.wirePosition = tick % 500 < 300 || inputs.empty()
+        ? std::sin(0.01 * static_cast<double>(tick))
+        : inputs.back().wirePosition;
+      inputs.push_back(input);
+      writer.Input(tick, input);
+    }
+    writer.Finish(3000);
+  }
+  ReplayDevice device(path);
+  EXPECT_EQ(device.Ticks(), 3000U);
+  InputFrame frame;
+  for (std::uint64_t tick = 0; tick < 3100; ++tick)
+  {
+    device.Read(tick, Tick, frame);
+    ASSERT_EQ(
+      frame.input.drive.wirePosition, inputs[std::min<std::uint64_t>(tick, 2999)].wirePosition);
+    ASSERT_EQ(frame.state, tick < 3000 ? DeviceState::Running : DeviceState::Ended);
+  }
+  // By time at another rate.
+  for (std::uint64_t tick = 0; tick < 1500; ++tick)
+  {
+    device.Read(tick, 2 * Tick, frame);
+    ASSERT_EQ(frame.input.drive.wirePosition, inputs[2 * tick].wirePosition) << tick;
+  }
+}
+
+namespace
+{
+DeviceScenario ScenarioOf(const std::string& members)
+{
+  return DeviceScenarioFromText(
+    R"({"format":"dynamiccoronary device scenario","version":1)" + members + "}", "'test'");
+}
+
+/// What a host sees of a scenario in its first 2 s.
+struct Seen
+{
+  DecoderCounts counts;
+  std::vector<StateMessage> states;
+  bool wasUnplugged = false;
+};
+
+Seen Watch(const std::string& members, double seconds = 2.0)
+{
+  ScriptedDevice device(ScenarioOf(members));
+  FrameSender host;
+  FrameDecoder decoder;
+  Seen seen;
+  const auto say = [&](const Message& message, std::uint64_t now)
+  {
+    const WireFrame wire = host.Send(message, now);
+    device.Device().Receive(wire.bytes.data(), wire.size, now);
+  };
+  say(Encode(HelloMessage{ 1, 1, 42, "test" }), 0);
+  say(Encode(StartMessage{ 1000, 20, 42 }), 0);
+  for (std::uint64_t now = 0; now < static_cast<std::uint64_t>(1e6 * seconds); now += 500)
+  {
+    device.Step(now);
+    seen.wasUnplugged = seen.wasUnplugged || !device.IsPlugged();
+    for (const std::uint8_t byte : device.TakeBytes())
+    {
+      StateMessage state;
+      if (decoder.Push(byte) && Decode(decoder.Last(), state))
+      {
+        seen.states.push_back(state);
+      }
+    }
+  }
+  seen.counts = decoder.Counts();
+  return seen;
+}
+}
+
+TEST(Emulator, Faults)
+{
+  const Seen good = Watch("");
+  EXPECT_EQ(good.states.size(), 2000U);
+  EXPECT_EQ(good.counts.damaged + good.counts.lost + good.counts.repeated, 0U);
+  const Seen dropped = Watch(R"(,"faults":[{"at":1,"kind":"drop_bytes","count":10}])");
+  EXPECT_EQ(dropped.counts.damaged, 1U);
+  EXPECT_EQ(dropped.counts.lost, 1U);
+  const Seen flipped = Watch(R"(,"faults":[{"at":1,"kind":"flip_bits","count":20}])");
+  EXPECT_EQ(flipped.counts.lost, 20U);
+  EXPECT_GE(flipped.counts.damaged, 20U);
+  const Seen twice = Watch(R"(,"faults":[{"at":1,"kind":"duplicate","count":20}])");
+  EXPECT_EQ(twice.counts.repeated, 20U);
+  EXPECT_EQ(twice.states.size(), 2000U);
+  const Seen disordered = Watch(R"(,"faults":[{"at":1,"kind":"reorder","count":20}])");
+  EXPECT_EQ(disordered.counts.lost, 20U);
+  EXPECT_EQ(disordered.counts.repeated, 20U);
+  const Seen garbage = Watch(R"(,"faults":[{"at":1,"kind":"garbage","count":5000}])");
+  EXPECT_GE(garbage.counts.damaged, 5U);
+  EXPECT_LE(garbage.counts.lost, 1U);
+  const Seen stopped = Watch(R"(,"faults":[{"at":1,"kind":"stop","ms":100}])");
+  EXPECT_EQ(stopped.counts.lost, 100U);
+  const Seen closed = Watch(R"(,"faults":[{"at":1,"kind":"close","ms":100}])");
+  EXPECT_TRUE(closed.wasUnplugged);
+  EXPECT_NEAR(static_cast<double>(closed.states.size()), 1900.0, 1.0);
+  const Seen slow = Watch(R"(,"faults":[{"at":1,"kind":"rate","count":100}])");
+  EXPECT_NEAR(static_cast<double>(slow.states.size()), 1100.0, 2.0);
+  const Seen jumped =
+    Watch(R"(,"first_count":7,"faults":[{"at":1,"kind":"jump_counts","count":-1000}])");
+  EXPECT_EQ(jumped.states.front().counts[0], 7);
+  EXPECT_EQ(jumped.states.back().counts[0], -993);
+}
+
+TEST(Emulator, ScenarioOfHands)
+{
+  const DeviceScenario scenario = ScenarioOf(R"(,"repeat":true,"pieces":[
+    {"seconds":1,"wire_mm":10,"wire_deg":180,"pedals":["fluoroscopy","mask"]},
+    {"seconds":1,"syringe_mL":2},{"seconds":0,"catheter_mm":3}])");
+  HandPlaces hands = scenario.At(0.5);
+  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireAdvance)], 5.0);
+  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireTurn)], M_PI / 2);
+  EXPECT_EQ(hands.pedals, FluoroscopyPedal | MaskPedal);
+  hands = scenario.At(5.5);
+  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireAdvance)], 30.0);
+  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::Syringe)], 5.0);
+  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::CatheterAdvance)], 6.0);
+  EXPECT_EQ(hands.pedals, 0U);
+}
+
+TEST(Emulator, WrongScenarios)
+{
+  ExpectRefusal([] { ScenarioOf(R"(,"pieces":[{"seconds":-1}])"); }, "'test', piece 1");
+  ExpectRefusal([] { ScenarioOf(R"(,"pieces":[{"seconds":1,"wire":1}])"); }, "'wire'");
+  ExpectRefusal([] { ScenarioOf(R"(,"pieces":[{"seconds":1,"pedals":["brake"]}])"); }, "'pedals'");
+  ExpectRefusal(
+    [] { ScenarioOf(R"(,"faults":[{"at":1,"kind":"fire"}])"); }, "no fault that is known");
+  ExpectRefusal([] { ScenarioOf(R"(,"faults":[{"at":1,"kind":"stop"}])"); }, "'ms'");
+  ExpectRefusal([] { ScenarioOf(R"(,"faults":[{"at":1,"kind":"rate","count":0}])"); }, "'count'");
+  ExpectRefusal([] { ScenarioOf(R"(,"rate_hz":5000)"); }, "'rate_hz'");
 }
 
 TEST(KeyboardDevice, SpeedsAndSmoothness)
