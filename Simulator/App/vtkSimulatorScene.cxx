@@ -120,6 +120,9 @@ void vtkSimulatorScene::MakeWall(WallMotion& wall, std::int64_t triangles)
   const double share = static_cast<double>(triangles) /
     static_cast<double>(std::max<vtkIdType>(1, whole->GetNumberOfPolys()));
   fewer->SetTargetReduction(std::clamp(1.0 - share, 0.0, 0.999));
+  // Thin tubes have corners everywhere: what would be an edge elsewhere must not be kept here.
+  fewer->SetFeatureAngle(80.0);
+  fewer->SetDegree(40);
   fewer->PreserveTopologyOn();
   fewer->SplittingOff();
   fewer->BoundaryVertexDeletionOff();

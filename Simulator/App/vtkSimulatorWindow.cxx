@@ -329,7 +329,7 @@ QWidget* Window::MakePanel()
   scroll->setWidget(inside);
   scroll->setWidgetResizable(true);
   scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
-  scroll->setMinimumWidth(300);
+  scroll->setMinimumWidth(inside->minimumSizeHint().width() + 24);
   return scroll;
 }
 

@@ -91,9 +91,6 @@ private:
 class PoissonTable
 {
 public:
-  static constexpr float Largest = 32.0F; ///< mean
-  static constexpr float PerUnit = 4.0F;  ///< tables
-
   PoissonTable()
   {
     for (int row = 0; row < RowCount; ++row)
@@ -102,7 +99,7 @@ public:
     }
   }
 
-  /// Of mean row / PerUnit; uses the upper 31 bits.
+  /// Of mean row / PoissonTablesPerUnit; uses the upper 31 bits.
   int operator()(int row, std::uint64_t bits) const
   {
     const auto slot = static_cast<std::uint32_t>(bits >> 57);
@@ -112,7 +109,7 @@ public:
   }
 
 private:
-  static constexpr int RowCount = static_cast<int>(Largest * PerUnit);
+  static constexpr int RowCount = static_cast<int>(LargestTabledMean * PoissonTablesPerUnit);
   static constexpr int SlotCount = 128; ///< numbers from 0 to 127: 128 photons of 32 never come
 
   /// Probabilities of a mean, times SlotCount.
@@ -130,7 +127,8 @@ private:
 
   void MakeRow(int row)
   {
-    std::array<double, SlotCount> heights = Heights(static_cast<double>(row) / PerUnit);
+    std::array<double, SlotCount> heights =
+      Heights(static_cast<double>(row) / PoissonTablesPerUnit);
     std::vector<std::size_t> low;
     std::vector<std::size_t> high;
     for (std::size_t n = 0; n < SlotCount; ++n)
@@ -184,38 +182,12 @@ const NoiseTables& Tables()
   return *tables;
 }
 
-/// Poisson of a mean below 1/4, by inversion: how many partial sums a uniform number exceeds.
-inline int FewPhotons(float mean, std::uint32_t bits)
+/// The sum of two Poisson numbers is one of the sum of their means. `table` and `fewOrDeviation` as from the kernel.
+inline float PhotonsOf(const NoiseTables& tables, float mean, std::uint64_t bits,
+  std::int32_t table, float fewOrDeviation)
 {
-  const float uniform = static_cast<float>(bits >> 8) * 0x1p-24F;
-  const float none = 1.0F -
-    mean *
-      (1.0F -
-        mean * (0.5F - mean * (1.0F / 6.0F - mean * (1.0F / 24.0F - mean * (1.0F / 120.0F)))));
-  float term = none;
-  float sum = none;
-  int count = 0;
-  for (const float reciprocal : { 1.0F, 1.0F / 2.0F, 1.0F / 3.0F, 1.0F / 4.0F })
-  {
-    count += uniform >= sum ? 1 : 0;
-    term *= mean * reciprocal;
-    sum += term;
-  }
-  return count + (uniform >= sum ? 1 : 0);
-}
-
-/// The sum of two Poisson numbers is one of the sum of their means.
-inline float Photons(const NoiseTables& tables, float mean, std::uint64_t bits)
-{
-  if (mean < PoissonTable::Largest)
-  {
-    const float positive = mean > 0.0F ? mean : 0.0F;
-    const int row = static_cast<int>(positive * PoissonTable::PerUnit);
-    const float rest = positive - static_cast<float>(row) / PoissonTable::PerUnit;
-    return static_cast<float>(
-      tables.poisson(row, bits) + FewPhotons(rest, static_cast<std::uint32_t>(bits)));
-  }
-  return mean + std::sqrt(mean) * tables.normal(bits);
+  return table >= 0 ? static_cast<float>(tables.poisson(table, bits)) + fewOrDeviation
+                    : mean + fewOrDeviation * tables.normal(bits);
 }
 
 std::atomic<bool> OnlyBaseline{ false };
@@ -264,7 +236,10 @@ void UseBaselineDetectorLoops(bool baseline)
 
 float PoissonPhotons(float mean, std::uint64_t bits)
 {
-  return Photons(Tables(), mean, bits);
+  std::int32_t table = 0;
+  float fewOrDeviation = 0.0F;
+  DetectorLoops().photons(&mean, &bits, 1, &table, &fewOrDeviation);
+  return PhotonsOf(Tables(), mean, bits, table, fewOrDeviation);
 }
 
 float FastExp(float x)
@@ -327,6 +302,8 @@ void Detector::Resize(int columns, int rows)
   this->Blurred.assign(pixels, 0.0F);
   this->Signal_.assign(pixels, 0.0F);
   this->Scratch.assign(static_cast<std::size_t>(columns), 0.0F);
+  this->Bits.assign(static_cast<std::size_t>(columns), 0);
+  this->TableOf.assign(static_cast<std::size_t>(columns), 0);
   this->Prepare();
 }
 
@@ -395,15 +372,27 @@ void Detector::DetectRow(int row, float photons, std::uint64_t key)
     this->Columns_, detected);
   if (this->Settings_.noise)
   {
-    const NoiseTables& tables = Tables();
-    for (int i = 0; i < this->Columns_; ++i)
-    {
-      detected[i] =
-        Photons(tables, detected[i], MixBits(key + begin + static_cast<std::uint64_t>(i)));
-    }
+    this->AddNoise(detected, key + begin);
   }
   BlurMirroredRow(
     detected, this->Columns_, this->BlurKernel, this->Padded, this->Blurred.data() + begin);
+}
+
+/// @param first  counter of the row's first pixel
+void Detector::AddNoise(float* row, std::uint64_t first)
+{
+  const NoiseTables& tables = Tables();
+  const auto width = static_cast<std::size_t>(this->Columns_);
+  for (std::size_t i = 0; i < width; ++i)
+  {
+    this->Bits[i] = MixBits(first + i);
+  }
+  DetectorLoops().photons(
+    row, this->Bits.data(), this->Columns_, this->TableOf.data(), this->Scratch.data());
+  for (std::size_t i = 0; i < width; ++i)
+  {
+    row[i] = PhotonsOf(tables, row[i], this->Bits[i], this->TableOf[i], this->Scratch[i]);
+  }
 }
 
 void Detector::BlurAcrossRows(float lag)

@@ -95,6 +95,7 @@ private:
   void Transmit(
     const LineIntegrals& first, const LineIntegrals* second, const LineIntegrals* third);
   void DetectRow(int row, float photons, std::uint64_t key);
+  void AddNoise(float* row, std::uint64_t first);
   void BlurAcrossRows(float lag);
 
   DetectorSettings Settings_;
@@ -106,9 +107,11 @@ private:
   std::vector<float> ShutterRows;
   std::vector<float> BlurKernel; ///< right half
   BroadBlur Veil;
-  std::vector<float> Transmission; ///< exp(-A) between the shutters; then photons
-  std::vector<float> Blurred;      ///< along rows
-  std::vector<float> Scratch;      ///< of one row
+  std::vector<float> Transmission;   ///< exp(-A) between the shutters; then photons
+  std::vector<float> Blurred;        ///< along rows
+  std::vector<float> Scratch;        ///< of one row
+  std::vector<std::uint64_t> Bits;   ///< random, of one row
+  std::vector<std::int32_t> TableOf; ///< each pixel of one row
   std::vector<float> Padded;
   std::vector<float> Signal_;
 };

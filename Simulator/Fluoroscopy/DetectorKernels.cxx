@@ -2,6 +2,8 @@
 
 #include "FastMath.h"
 
+#include <cmath>
+
 namespace coronary
 {
 namespace
@@ -49,6 +51,44 @@ void Mix(const float* transmission, const float* veil, float direct, float veile
   for (int i = 0; i < width; ++i)
   {
     result[i] = direct * transmission[i] + veiled * veil[i];
+  }
+}
+
+/// Of a mean below 1 / PoissonTablesPerUnit, by inversion: how many partial sums a uniform number reaches.
+inline float FewPhotons(float mean, float uniform)
+{
+  const float none = 1.0F -
+    mean *
+      (1.0F -
+        mean * (0.5F - mean * (1.0F / 6.0F - mean * (1.0F / 24.0F - mean * (1.0F / 120.0F)))));
+  const float one = mean * none;
+  const float two = one * mean * (1.0F / 2.0F);
+  const float three = two * mean * (1.0F / 3.0F);
+  const float four = three * mean * (1.0F / 4.0F);
+  const float upTo1 = none + one;
+  const float upTo2 = upTo1 + two;
+  const float upTo3 = upTo2 + three;
+  const float upTo4 = upTo3 + four;
+  return (uniform >= none ? 1.0F : 0.0F) + (uniform >= upTo1 ? 1.0F : 0.0F) +
+    (uniform >= upTo2 ? 1.0F : 0.0F) + (uniform >= upTo3 ? 1.0F : 0.0F) +
+    (uniform >= upTo4 ? 1.0F : 0.0F);
+}
+
+void Photons(const float* mean, const std::uint64_t* bits, int width, std::int32_t* table,
+  float* fewOrDeviation)
+{
+  for (int i = 0; i < width; ++i)
+  {
+    const float positive = mean[i] > 0.0F ? mean[i] : 0.0F;
+    const bool tabled = positive < LargestTabledMean;
+    const float limited = tabled ? positive : 0.0F;
+    const auto row = static_cast<std::int32_t>(limited * PoissonTablesPerUnit);
+    const float rest = limited - static_cast<float>(row) / PoissonTablesPerUnit;
+    const auto low = static_cast<std::int32_t>((bits[i] & 0xffffffffU) >> 8);
+    const float few = FewPhotons(rest, static_cast<float>(low) * 0x1p-24F);
+    const float deviation = std::sqrt(positive);
+    table[i] = tabled ? row : -1;
+    fewOrDeviation[i] = tabled ? few : deviation;
   }
 }
 
@@ -163,5 +203,5 @@ const DetectorKernels DetectorKernelsAvx2
 #else
 const DetectorKernels DetectorKernelsBaseline
 #endif
-  { Transmit, Mix, BlurAlong, BlurAcross, AddCells, Lag, Logarithm, Grey };
+  { Transmit, Mix, Photons, BlurAlong, BlurAcross, AddCells, Lag, Logarithm, Grey };
 }

@@ -6,6 +6,10 @@
 
 namespace coronary
 {
+/// Tables of Poisson's distribution: for means 0, 1 / PoissonTablesPerUnit, ... below LargestTabledMean.
+constexpr float LargestTabledMean = 32.0F;
+constexpr float PoissonTablesPerUnit = 4.0F;
+
 struct DetectorKernels
 {
   /// result = exp(-(first + second + third)) * columnShutter * rowShutter; second and third may be null.
@@ -14,6 +18,10 @@ struct DetectorKernels
   /// result = direct * transmission + veiled * veil
   void (*mix)(const float* transmission, const float* veil, float direct, float veiled, int width,
     float* result);
+  /// What Poisson numbers need beside table look-ups. Below LargestTabledMean: which table, and a Poisson number of
+  /// what the mean is above the table's, from the lower 32 bits. From there on: the standard deviation, table -1.
+  void (*photons)(const float* mean, const std::uint64_t* bits, int width, std::int32_t* table,
+    float* fewOrDeviation);
   /// Symmetric kernel along a row that has `radius` samples before the first and after the last.
   void (*blurAlong)(const float* in, const float* kernel, int radius, int width, float* result);
   /// The same across 2 radius + 1 rows.
