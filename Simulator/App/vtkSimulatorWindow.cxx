@@ -29,6 +29,9 @@
 #include <QFormLayout>
 #include <QGridLayout>
 #include <QGroupBox>
+#include <QJsonArray>
+#include <QJsonDocument>
+#include <QJsonObject>
 #include <QKeyEvent>
 #include <QLabel>
 #include <QMainWindow>
@@ -37,6 +40,7 @@
 #include <QOpenGLContext>
 #include <QPlainTextEdit>
 #include <QPushButton>
+#include <QSaveFile>
 #include <QScrollArea>
 #include <QSlider>
 #include <QSplitter>
@@ -130,6 +134,8 @@ std::string KeyName(const QKeyEvent& event)
       return "Return";
     case Qt::Key_Plus:
       return "plus";
+    case Qt::Key_Backspace:
+      return "BackSpace";
     case Qt::Key_Minus:
       return "minus";
     case Qt::Key_Comma:
@@ -194,6 +200,8 @@ private:
   void End();
   void Problem(const QString& text);
   void SaveScreenshot(const QString& path);
+  void SaveXRay(const QString& name);
+  void PrintRates() const;
   void ToggleVideo(bool on);
 
   SessionWorld World;
@@ -217,6 +225,8 @@ private:
   int DrawnFrames = 0;
   double SceneFrameRate = 0.0;
   QElapsedTimer Second;
+  QElapsedTimer Whole;
+  std::uint64_t AllDrawn = 0;
   QElapsedTimer VideoClock;
   QTimer Timer;
 
@@ -758,6 +768,8 @@ void Window::Begin(const std::string& record, const std::string& replay)
   this->PauseAction->setChecked(false);
   this->Engine->Start();
   this->Second.start();
+  this->Whole.start();
+  this->AllDrawn = 0;
   this->Timer.start(PollInterval);
 }
 
@@ -831,11 +843,12 @@ void Window::Poll()
     this->Options.quitAfter > 0.0 && this->Now.seconds >= this->Options.quitAfter;
   if (this->Engine->IsOver() || timeIsUp)
   {
-    this->End();
     if (this->Options.quitAfter > 0.0)
     {
+      this->PrintRates();
       this->close();
     }
+    this->End();
   }
 }
 
@@ -848,6 +861,7 @@ void Window::ShowScene()
   this->Scene->Update(this->Now);
   this->AnatomyWindow->Render();
   ++this->DrawnFrames;
+  ++this->AllDrawn;
   this->Traces->Add(this->Now);
   this->ShowNumbers(this->Now);
   this->ShowDevices();
@@ -986,6 +1000,23 @@ void Window::ShowRates()
   this->RunSlider->setMaximum(runs > 0 ? static_cast<int>(runs) - 1 : 0);
 }
 
+/// Over the whole session, for whoever runs it unattended.
+void Window::PrintRates() const
+{
+  const double seconds = 1e-3 * static_cast<double>(this->Whole.elapsed());
+  const EngineRates rates = this->Engine->Rates();
+  std::printf(
+    "%.1f s simulated in %.1f s: %.2f times real time, physics at %.0f %% of a core, %.2f s "
+    "behind\n"
+    "X-ray: %llu frames exposed, %llu shown, %.1f ms each; anatomy: %.1f pictures a second "
+    "of %lld triangles\n",
+    this->Now.seconds, seconds, this->Now.seconds / seconds, 100.0 * rates.load, rates.lostSeconds,
+    static_cast<unsigned long long>(this->Now.metrics.frames),
+    static_cast<unsigned long long>(this->Now.metrics.frames) - rates.lateImages,
+    rates.imageMilliseconds, static_cast<double>(this->AllDrawn) / seconds,
+    static_cast<long long>(this->Scene->NumberOfTriangles()));
+}
+
 void Window::ShowCine()
 {
   if (!this->Engine || this->Now.radiating)
@@ -1012,10 +1043,11 @@ void Window::TakeDueScreenshots()
   while (this->NextScreenshot < this->Options.screenshotSeconds.size() &&
     this->Now.seconds >= this->Options.screenshotSeconds[this->NextScreenshot])
   {
-    char name[48];
-    std::snprintf(name, sizeof(name), "window_%06.2fs.png",
-      this->Options.screenshotSeconds[this->NextScreenshot]);
-    this->SaveScreenshot(QDir(QString::fromStdString(this->Options.screenshots)).filePath(name));
+    const QDir folder(QString::fromStdString(this->Options.screenshots));
+    const QString at =
+      QString("%1s").arg(this->Options.screenshotSeconds[this->NextScreenshot], 6, 'f', 2, '0');
+    this->SaveScreenshot(folder.filePath("window_" + at + ".png"));
+    this->SaveXRay(folder.filePath("xray_" + at));
     ++this->NextScreenshot;
   }
 }
@@ -1028,6 +1060,39 @@ void Window::SaveScreenshot(const QString& path)
     return;
   }
   this->Log->appendPlainText("Saved " + path);
+}
+
+/// The last X-ray image, and what was exposed.
+void Window::SaveXRay(const QString& name)
+{
+  const GreyImage& image = this->Shown.image;
+  if (image.values.empty())
+  {
+    return;
+  }
+  const SessionSnapshot& moment = this->Shown.moment;
+  const QJsonObject about{ { "tick", static_cast<double>(moment.tick) },
+    { "seconds", moment.seconds }, { "phase", moment.report.phase },
+    { "primary_deg", moment.pose.primary / Degree },
+    { "secondary_deg", moment.pose.secondary / Degree },
+    { "source_to_detector_mm", moment.pose.sourceToDetector },
+    { "source_to_isocentre_mm", moment.pose.sourceToIsocentre },
+    { "isocentre_mm",
+      QJsonArray{
+        moment.pose.isocentre.x(), moment.pose.isocentre.y(), moment.pose.isocentre.z() } },
+    { "field_of_view_mm", moment.fieldOfView }, { "background", this->Shown.completeness },
+    { "injected_mL", moment.contrast.injected }, { "in_tree_mL", moment.contrast.inTree },
+    { "inserted_mm", moment.report.inserted }, { "branch", moment.report.branch } };
+  const QImage picture(
+    image.values.data(), image.columns, image.rows, image.columns, QImage::Format_Grayscale8);
+  QSaveFile text(name + ".json");
+  const QByteArray bytes = QJsonDocument(about).toJson();
+  const bool written = text.open(QIODevice::WriteOnly) && text.write(bytes) == bytes.size() &&
+    text.commit() && picture.save(name + ".png", "PNG");
+  if (!written)
+  {
+    this->Problem("Cannot write '" + name + ".json' and its picture.");
+  }
 }
 
 void Window::ToggleVideo(bool on)

@@ -93,7 +93,7 @@ struct BackgroundCache::Implementation
   void Finish(std::uint64_t of, const CArmGeometry& geometry, const ImagePointer& image);
   bool Refine(std::uint64_t of, const CArmGeometry& geometry, const PixelRectangle& band,
     LineIntegrals& image) const;
-  std::optional<LineIntegrals> Preview(std::uint64_t of, const CArmGeometry& geometry) const;
+  LineIntegrals Preview(const CArmGeometry& geometry) const;
   bool Make(std::uint64_t of, const CArmGeometry& geometry);
   void Work();
 };
@@ -117,14 +117,18 @@ bool BackgroundCache::Implementation::TakeKept(const CArmGeometry& geometry)
 bool BackgroundCache::Implementation::Publish(std::uint64_t of, ImagePointer image, double fraction)
 {
   const std::lock_guard<std::mutex> lock(this->mutex);
-  if (this->IsStale(of))
+  const bool stale = this->IsStale(of);
+  // Of a geometry that the C-arm has left since it is still nearer than what was there before, unless that is the wanted
+  // one's own.
+  const bool sameSize =
+    image->columns == this->wanted->Format().columns && image->rows == this->wanted->Format().rows;
+  if (!stale || (this->completeness == 0.0 && sameSize))
   {
-    return false;
+    // What was shown is destroyed without the lock, by the argument's end.
+    std::swap(this->current, image);
+    this->completeness = stale ? 0.0 : fraction;
   }
-  // What was shown is destroyed without the lock, by the argument's end.
-  std::swap(this->current, image);
-  this->completeness = fraction;
-  return true;
+  return !stale;
 }
 
 /// Under the lock.
@@ -180,9 +184,9 @@ bool BackgroundCache::Implementation::Refine(std::uint64_t of, const CArmGeometr
   return true;
 }
 
-/// Coarse, with the size of the fine image; nothing when the geometry is not wanted any more.
-std::optional<LineIntegrals> BackgroundCache::Implementation::Preview(
-  std::uint64_t of, const CArmGeometry& geometry) const
+/// Coarse, with the size of the fine image. Always made to its end: while the C-arm moves on with every frame there would
+/// else never be one.
+LineIntegrals BackgroundCache::Implementation::Preview(const CArmGeometry& geometry) const
 {
   const DetectorFormat& format = geometry.Format();
   DetectorFormat coarse = format;
@@ -190,24 +194,14 @@ std::optional<LineIntegrals> BackgroundCache::Implementation::Preview(
   coarse.rows = std::min(format.rows, this->settings.previewSize);
   const CArmGeometry coarseGeometry(geometry.Pose(), coarse);
   LineIntegrals image(coarse.columns, coarse.rows);
-  for (const PixelRectangle& band : BandsOf(coarse, 8))
-  {
-    if (!this->Refine(of, coarseGeometry, band, image))
-    {
-      return std::nullopt;
-    }
-  }
+  this->projector->ProjectRectangle(coarseGeometry, { 0, 0, coarse.columns, coarse.rows }, image);
   return Resampled(image, format.columns, format.rows);
 }
 
 /// @return false when the geometry is not wanted any more
 bool BackgroundCache::Implementation::Make(std::uint64_t of, const CArmGeometry& geometry)
 {
-  std::optional<LineIntegrals> image = this->Preview(of, geometry);
-  if (!image)
-  {
-    return false;
-  }
+  LineIntegrals image = this->Preview(geometry);
   const DetectorFormat& format = geometry.Format();
   const double rowsOfPreview = std::min(format.rows, this->settings.previewSize);
   const double columnsOfPreview = std::min(format.columns, this->settings.previewSize);
@@ -217,14 +211,14 @@ bool BackgroundCache::Implementation::Make(std::uint64_t of, const CArmGeometry&
   for (const PixelRectangle& band : BandsOf(format, this->settings.bandRows))
   {
     const double fraction = std::max(preview, double(rows) / format.rows);
-    if (!this->Publish(of, std::make_shared<const LineIntegrals>(*image), fraction) ||
-      !this->Refine(of, geometry, band, *image))
+    if (!this->Publish(of, std::make_shared<const LineIntegrals>(image), fraction) ||
+      !this->Refine(of, geometry, band, image))
     {
       return false;
     }
     rows += band.rows;
   }
-  this->Finish(of, geometry, std::make_shared<const LineIntegrals>(std::move(*image)));
+  this->Finish(of, geometry, std::make_shared<const LineIntegrals>(std::move(image)));
   return true;
 }
 

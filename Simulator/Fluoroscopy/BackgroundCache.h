@@ -49,14 +49,14 @@ public:
   BackgroundCache(const BackgroundCache&) = delete;
   BackgroundCache& operator=(const BackgroundCache&) = delete;
 
-  /// From now on this geometry; the work on another is given up within one tile.
+  /// From now on this geometry; refining another is given up within one tile, a coarse image that was begun is finished.
   /// @throws what the projector throws when there is no worker
   void SetGeometry(const CArmGeometry& geometry);
 
   /**
    * The best there is, of the last geometry's format. Before its first coarse image: the one of the geometry before,
    * if that had the same format, else null.
-   * @param completeness  0: of a former geometry, or none; between: part of the pixels is at full resolution, the rest
+   * @param completeness  0: coarse, of a geometry that the C-arm came through, or none; between: part of the pixels is at full resolution, the rest
    *   is coarse; 1: finished
    */
   std::shared_ptr<const LineIntegrals> Current(double* completeness = nullptr) const;

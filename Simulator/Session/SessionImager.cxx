@@ -12,8 +12,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double CoilLength = 30.0;    // mm from the tip: a coil of platinum, which shows best
-constexpr double BraidShare = 0.12;     // of a guide catheter's wall that is steel: 16 flat wires of 25 x 75 um or so
+constexpr double CoilLength = 30.0; // mm from the tip: a coil of platinum, which shows best
+constexpr double BraidShare =
+  0.12; // of a guide catheter's wall that is steel: 16 flat wires of 25 x 75 um or so
 constexpr double BlushSigma = 7.0;     // mm of the myocardium behind an outlet
 constexpr double FaintestBlush = 1e-5; // mL
 
@@ -198,8 +199,8 @@ void SessionImager::ProjectInstruments(
     const GuideCatheter& guide = this->Scenario_.catheter;
     InstrumentChain catheter;
     catheter.points = snapshot.catheter;
-    const double wall = (1.0 - BraidShare) * this->Materials.Of(XRayMaterial::BariumPolymer) +
-      BraidShare * steel;
+    const double wall =
+      (1.0 - BraidShare) * this->Materials.Of(XRayMaterial::BariumPolymer) + BraidShare * steel;
     catheter.segments.assign(
       snapshot.catheter.size() - 1, { guide.outerRadius, guide.innerRadius, wall });
     AddInstrument(catheter, geometry, this->InstrumentLayer);
