@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The simulator's physics against closed forms (docs/simulator.md), and random driving in beating phantoms.
+# The simulator's physics against closed forms (docs/simulator.md, docs/contrast.md), and random driving in beating
+# phantoms.
 set -euo pipefail
 
 usage() {
@@ -7,7 +8,7 @@ usage() {
 Usage: scripts/validate-simulator.sh [--quick] [BUILD_FOLDER]
   --quick       without the soak: 20 phantoms of 50,000 ticks take five to ten minutes
   BUILD_FOLDER  default: build/paraview
-Prints the table of the rod, and that of the soak as CSV. Exit code 1 when anything misses its limit.
+Prints the tables of the rod and of contrast medium, and that of the soak as CSV. Exit code 1 when anything misses its limit.
 TEXT
 }
 
@@ -28,9 +29,9 @@ for argument in "$@"; do
   esac
 done
 build="${build:-$(dirname "${BASH_SOURCE[0]}")/../build/paraview}"
-rod="$build/bin/UnitTestCosseratRod"
+tests=(UnitTestCosseratRod UnitTestCoronaryFlow UnitTestContrastTracers UnitTestContrastModel)
 soak="$build/bin/soak-intervention"
-for program in "$rod" "$soak"; do
+for program in "${tests[@]/#/$build/bin/}" "$soak"; do
   if [ ! -x "$program" ]; then
     echo "validate-simulator: $program is not there; build first (README.md)" >&2
     exit 1
@@ -40,13 +41,17 @@ done
 log="$(mktemp)"
 trap 'rm -f "$log"' EXIT
 status=0
-"$rod" >"$log" 2>&1 || status=1
 echo "| test | closed form | measured | off by | tolerance |"
 echo "|---|---|---|---|---|"
-grep '^|' "$log" || status=1
-if [ "$status" -ne 0 ]; then
-  grep -A3 'Failure' "$log" >&2 || true
-fi
+for test in "${tests[@]}"; do
+  failed=no
+  "$build/bin/$test" >"$log" 2>&1 || failed=yes
+  grep '^|' "$log" || failed=yes
+  if [ "$failed" = yes ]; then
+    status=1
+    grep -A3 'Failure' "$log" >&2 || true
+  fi
+done
 if [ "$quick" = no ]; then
   echo
   "$soak" 20 50000 || status=1

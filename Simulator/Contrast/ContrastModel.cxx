@@ -14,7 +14,8 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 // Flow falls to 45 % at 1.9 s.
 constexpr double DepressedFlow = 0.45;
-constexpr double DepressionTime = 1.9; // s, also where t exp(-t / T) is greatest
+constexpr double SmallestVolume = 1e-15; // of a slab without length, mL
+constexpr double DepressionTime = 1.9;   // s, also where t exp(-t / T) is greatest
 
 void Require(bool possible, const char* name, double value, const char* range)
 {
@@ -160,11 +161,12 @@ void ContrastModel::DepressFlow(double dt)
         blood += dt * std::max(this->Flow_.Flow()[s], 0.0);
       }
     }
-    const double part = blood > 0.0 ? std::min(medium / blood, 1.0) : 0.0;
+    const double part = blood > 0.0 ? medium / blood : 0.0; // of few tracers: above 1 at times
     const double share = -std::expm1(-dt / DepressionTime);
     this->Arrived[t] += share * (part - this->Arrived[t]);
     this->Depressed[t] += share * (this->Arrived[t] - this->Depressed[t]);
-    const double fall = this->Settings_.flowDepression * (1.0 - DepressedFlow) * this->Depressed[t];
+    const double fall =
+      this->Settings_.flowDepression * (1.0 - DepressedFlow) * std::min(this->Depressed[t], 1.0);
     this->Flow_.SetOutletFactor(static_cast<int>(t), 1.0 / (1.0 - fall));
   }
 }
@@ -200,7 +202,8 @@ void ContrastModel::SmoothBranch(std::size_t branch) const
   const std::size_t last = this->BranchSlab[branch + 1];
   const double square = this->Settings_.smoothing * this->Settings_.smoothing;
   // Slabs without volume take their neighbours' fraction.
-  const auto volume = [this](std::size_t k) { return std::max(this->Slabs_[k].volume, 1e-12); };
+  const auto volume = [this](std::size_t k)
+  { return std::max(this->Slabs_[k].volume, SmallestVolume); };
   const auto conductance = [&](std::size_t k) // between k and k + 1
   {
     const double apart = std::max(0.5 * (this->SlabLength[k] + this->SlabLength[k + 1]), 1e-6);
@@ -233,7 +236,7 @@ void ContrastModel::LimitBranch(std::size_t branch) const
   double excess = 0.0; // mL
   const auto limit = [&](std::size_t k)
   {
-    const double volume = std::max(this->Slabs_[k].volume, 1e-12);
+    const double volume = std::max(this->Slabs_[k].volume, SmallestVolume);
     const double whole = this->Concentration_[k] + excess / volume;
     this->Concentration_[k] = std::min(whole, 1.0);
     excess = (whole - this->Concentration_[k]) * volume;
@@ -263,7 +266,8 @@ void ContrastModel::TracerPositions(const std::vector<Vector3>& axis,
     const double along = segment.volumeFrom + this->Tracers_.Lumen(tracer);
     const std::size_t slab = this->SlabAt(segment.branch, along);
     const double t = std::clamp(
-      (along - this->SlabBegin[slab]) / std::max(this->Slabs_[slab].volume, 1e-12), 0.0, 1.0);
+      (along - this->SlabBegin[slab]) / std::max(this->Slabs_[slab].volume, SmallestVolume), 0.0,
+      1.0);
     const std::int64_t p = this->Slabs_[slab].point;
     const std::vector<double>& radii = network.Topology().axisRadius[segment.branch];
     const auto k = static_cast<std::size_t>(p - network.Branches()[segment.branch].firstPoint);

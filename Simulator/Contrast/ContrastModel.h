@@ -84,7 +84,7 @@ public:
   const std::vector<ContrastSlab>& Slabs() const { return this->Slabs_; }
 
   /// Fraction of contrast medium, 0 to 1, per slab: the tracers' volume, smoothed along each branch by one implicit
-  /// step of diffusion, which keeps it. Made when asked for, once a step; not for two threads at a time.
+  /// step of diffusion, which keeps it; only where a whole branch would be above 1, it is cut. Made when asked for, once a step; not for two threads at a time.
   const std::vector<double>& Concentration() const;
 
   /**

@@ -46,7 +46,7 @@ double ExactFluxBelow(double h)
   return 0.5 + (x * (5.0 - 2.0 * x * x) * std::sqrt(1.0 - x * x) + 3.0 * std::asin(x)) / (3.0 * Pi);
 }
 
-/// FluxBelow and its inverse by tables, to 1e-7 and 1e-4: a thousand tracers cross nodes in a step.
+/// FluxBelow and its inverse by tables, to 1e-6 and 1e-4: a thousand tracers cross nodes in a step.
 class FluxTable
 {
 public:
@@ -54,7 +54,7 @@ public:
   {
     for (int k = 0; k <= Size; ++k)
     {
-      this->Flux[k] = ExactFluxBelow(2.0 * k / Size - 1.0);
+      this->Flux[k] = static_cast<float>(ExactFluxBelow(2.0 * k / Size - 1.0));
       const double root = k * std::sqrt(0.5) / Size;
       double low = -1.0;
       double high = 0.0;
@@ -63,7 +63,7 @@ public:
         const double middle = 0.5 * (low + high);
         (ExactFluxBelow(middle) < root * root ? low : high) = middle;
       }
-      this->Chord[k] = 0.5 * (low + high);
+      this->Chord[k] = static_cast<float>(0.5 * (low + high));
     }
   }
   double FluxBelow(double x) const
@@ -79,15 +79,15 @@ public:
   }
 
 private:
-  static constexpr int Size = 2048;
-  static double Interpolate(const std::array<double, Size + 1>& table, double place)
+  static constexpr int Size = 1024;
+  static double Interpolate(const std::array<float, Size + 1>& table, double place)
   {
     const double t = place * Size;
     const int k = std::min(static_cast<int>(t), Size - 1);
     return table[k] + (t - k) * (table[k + 1] - table[k]);
   }
-  std::array<double, Size + 1> Flux{};
-  std::array<double, Size + 1> Chord{};
+  std::array<float, Size + 1> Flux{};
+  std::array<float, Size + 1> Chord{};
 };
 
 const FluxTable& Tables()
@@ -176,7 +176,8 @@ ContrastTracers::ContrastTracers(
   settings.Validate();
   for (const FlowSegment& segment : network.Segments())
   {
-    this->Segments.push_back({ segment.above, segment.below, segment.volume, segment.Radius() });
+    this->Segments.push_back({ segment.above, segment.below, segment.volume, segment.Radius(),
+      segment.to - segment.from });
   }
   this->MakeJunctions(network);
   const std::size_t segments = this->Segments.size();
@@ -185,7 +186,7 @@ ContrastTracers::ContrastTracers(
   this->FlowBottom.assign(segments, 0.0);
   const auto capacity = static_cast<std::size_t>(settings.capacity);
   this->Segment_.resize(capacity);
-  this->Lumen_.resize(capacity);
+  this->Part_.resize(capacity);
   this->X_.resize(capacity);
   this->Y_.resize(capacity);
   this->Volume_.resize(capacity);
@@ -269,6 +270,7 @@ void ContrastTracers::MakeJunctions(const FlowNetwork& network)
 void ContrastTracers::PrepareMotion(double dt, const TracerFlow& flow)
 {
   this->Flow = flow;
+  this->Dt = dt;
   for (std::size_t s = 0; s < this->Segments.size(); ++s)
   {
     const Stretch& segment = this->Segments[s];
@@ -276,15 +278,13 @@ void ContrastTracers::PrepareMotion(double dt, const TracerFlow& flow)
     this->FlowBottom[s] = (*flow.flow)[s];
     this->FlowTop[s] = here ? flow.flowAbove : this->FlowBottom[s];
     Motion& motion = this->Motions[s];
-    motion.flow[0] = static_cast<float>(2.0 * dt * this->FlowTop[s]);
-    motion.flow[1] = static_cast<float>(2.0 * dt * this->FlowBottom[s]);
-    motion.injector = here ? static_cast<float>(flow.injector.volume) : 0.0F;
-    motion.volume = static_cast<float>(segment.volume);
+    motion.rate = static_cast<float>(2.0 * dt * this->FlowBottom[s] / segment.volume);
     // Uniform steps of variance 2 D dt.
     motion.radial =
       static_cast<float>(std::sqrt(6.0 * this->Settings_.radialDiffusivity * dt) / segment.radius);
-    motion.axial = static_cast<float>(
-      std::sqrt(6.0 * this->Settings_.axialDiffusivity * dt) * 1e-3 * Pi * Square(segment.radius));
+    // As a fraction of a cylinder with the segment's length and volume: of its length.
+    motion.axial =
+      static_cast<float>(std::sqrt(6.0 * this->Settings_.axialDiffusivity * dt) / segment.length);
   }
 }
 
@@ -329,18 +329,30 @@ void ContrastTracers::MoveBlock(std::int64_t first, int count, Block& block)
 {
   const Motion* const motions = this->Motions.data();
   const std::int32_t* const segments = this->Segment_.data() + first;
-  std::copy_n(this->Lumen_.data() + first, count, block.lumen.data());
+  std::copy_n(this->Part_.data() + first, count, block.part.data());
   std::copy_n(this->X_.data() + first, count, block.x.data());
   std::copy_n(this->Y_.data() + first, count, block.y.data());
   for (int i = 0; i < count; ++i)
   {
     const Motion& motion = motions[segments[i]];
-    block.rate[i] = motion.flow[block.lumen[i] < motion.injector ? 0 : 1];
+    block.rate[i] = motion.rate;
     block.radial[i] = motion.radial;
-    block.volume[i] = motion.volume;
     if (Axial)
     {
       block.axial[i] = motion.axial;
+    }
+  }
+  const int injected = this->Flow.injector.segment;
+  if (injected >= 0)
+  {
+    const Stretch& segment = this->Segments[injected];
+    const auto tip = static_cast<float>(this->Flow.injector.volume / segment.volume);
+    const auto above =
+      static_cast<float>(2.0 * this->Dt * this->FlowTop[injected] / segment.volume);
+    for (int i = 0; i < count; ++i)
+    {
+      const bool before = segments[i] == injected && block.part[i] < tip;
+      block.rate[i] = before ? above : block.rate[i];
     }
   }
   const std::uint64_t step = MixBits(this->Key + this->Steps);
@@ -357,18 +369,18 @@ void ContrastTracers::MoveBlock(std::int64_t first, int count, Block& block)
     const float taken = farX * farX + farY * farY < 1.0F ? 1.0F : 0.0F;
     const float x = block.x[i] + taken * stepX;
     const float y = block.y[i] + taken * stepY;
-    float moved = block.lumen[i] + block.rate[i] * (1.0F - x * x - y * y);
+    float moved = block.part[i] + block.rate[i] * (1.0F - x * x - y * y);
     if (Axial)
     {
       moved += block.axial[i] * LowHalf(MixBits32(bits ^ scramble));
     }
     block.x[i] = x;
     block.y[i] = y;
-    block.lumen[i] = moved;
+    block.part[i] = moved;
     block.beyond[i] =
-      static_cast<std::int32_t>(moved < 0.0F) | static_cast<std::int32_t>(moved > block.volume[i]);
+      static_cast<std::int32_t>(moved < 0.0F) | static_cast<std::int32_t>(moved > 1.0F);
   }
-  std::copy_n(block.lumen.data(), count, this->Lumen_.data() + first);
+  std::copy_n(block.part.data(), count, this->Part_.data() + first);
   std::copy_n(block.x.data(), count, this->X_.data() + first);
   std::copy_n(block.y.data(), count, this->Y_.data() + first);
 }
@@ -383,10 +395,19 @@ std::size_t ContrastTracers::MoveAll()
   {
     const int count = static_cast<int>(std::min<std::int64_t>(Block::Size, this->Size_ - first));
     this->MoveBlock<Axial>(first, count, block);
-    for (int i = 0; i < count; ++i)
+    // Most have not: a few at a time.
+    for (int four = 0; four < count; four += 4)
     {
-      this->Leaving[leave] = static_cast<std::int32_t>(first + i);
-      leave += static_cast<std::size_t>(block.beyond[i]);
+      const std::int32_t* const beyond = block.beyond.data() + four;
+      if ((beyond[0] | beyond[1] | beyond[2] | beyond[3]) == 0)
+      {
+        continue;
+      }
+      for (int i = four; i < std::min(four + 4, count); ++i)
+      {
+        this->Leaving[leave] = static_cast<std::int32_t>(first + i);
+        leave += static_cast<std::size_t>(block.beyond[i]);
+      }
     }
   }
   return leave;
@@ -400,16 +421,16 @@ void ContrastTracers::Move()
   for (std::size_t k = 0; k < leave; ++k)
   {
     const std::int32_t i = this->Leaving[k];
-    Tracer tracer{ this->Segment_[i], this->Lumen_[i], this->X_[i], this->Y_[i], this->Volume_[i] };
-    if (!this->Cross(tracer))
+    Tracer tracer{ this->Segment_[i], this->Lumen(i), this->X_[i], this->Y_[i], this->Volume_[i] };
+    if (this->Cross(tracer))
     {
-      tracer.segment = -1;
+      this->Store(tracer, i);
+    }
+    else
+    {
+      this->Segment_[i] = -1;
       gone = true;
     }
-    this->Segment_[i] = tracer.segment;
-    this->Lumen_[i] = static_cast<float>(tracer.lumen);
-    this->X_[i] = static_cast<float>(tracer.x);
-    this->Y_[i] = static_cast<float>(tracer.y);
   }
   if (gone)
   {
@@ -424,10 +445,19 @@ void ContrastTracers::Move()
   }
 }
 
+void ContrastTracers::Store(const Tracer& tracer, std::int64_t i)
+{
+  this->Segment_[i] = tracer.segment;
+  this->Part_[i] = static_cast<float>(tracer.lumen / this->Segments[tracer.segment].volume);
+  this->X_[i] = static_cast<float>(tracer.x);
+  this->Y_[i] = static_cast<float>(tracer.y);
+  this->Volume_[i] = tracer.volume;
+}
+
 void ContrastTracers::Copy(std::int64_t from, std::int64_t to)
 {
   this->Segment_[to] = this->Segment_[from];
-  this->Lumen_[to] = this->Lumen_[from];
+  this->Part_[to] = this->Part_[from];
   this->X_[to] = this->X_[from];
   this->Y_[to] = this->Y_[from];
   this->Volume_[to] = this->Volume_[from];
@@ -603,7 +633,7 @@ void ContrastTracers::Emit(double volume, bool down)
     std::clamp(wanted, 1.0, static_cast<double>(this->Settings_.capacity / 16)));
   this->MakeRoom(count);
   const int segment = this->Flow.injector.segment;
-  const double rate = this->Motions[segment].flow[down ? 1 : 0];
+  const double rate = 2.0 * this->Dt * (down ? this->FlowBottom : this->FlowTop)[segment];
   for (std::int64_t k = 0; k < count; ++k)
   {
     const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
@@ -617,12 +647,7 @@ void ContrastTracers::Emit(double volume, bool down)
       rate * (1.0 - time) * (1.0 - Square(tracer.x) - Square(tracer.y));
     if (this->Cross(tracer))
     {
-      const std::int64_t i = this->Size_++;
-      this->Segment_[i] = tracer.segment;
-      this->Lumen_[i] = static_cast<float>(tracer.lumen);
-      this->X_[i] = static_cast<float>(tracer.x);
-      this->Y_[i] = static_cast<float>(tracer.y);
-      this->Volume_[i] = tracer.volume;
+      this->Store(tracer, this->Size_++);
     }
   }
 }
@@ -645,10 +670,8 @@ void ContrastTracers::Thin(bool anywhere)
 {
   const auto cellOf = [this](std::int64_t i)
   {
-    const Motion& motion = this->Motions[this->Segment_[i]];
-    const float part = this->Lumen_[i] / motion.volume;
     return this->Segment_[i] * CellsOfSegment +
-      std::clamp(static_cast<int>(part * CellsOfSegment), 0, CellsOfSegment - 1);
+      std::clamp(static_cast<int>(this->Part_[i] * CellsOfSegment), 0, CellsOfSegment - 1);
   };
   std::fill(this->CellBegin.begin(), this->CellBegin.end(), 0);
   for (std::int64_t i = 0; i < this->Size_; ++i)
@@ -710,7 +733,7 @@ std::uint64_t ContrastTracers::StateHash() const
   const auto add = [&hash](const auto& list, std::size_t count)
   { hash = Fnv1a(list.data(), count * sizeof(list[0]), hash); };
   add(this->Segment_, size);
-  add(this->Lumen_, size);
+  add(this->Part_, size);
   add(this->X_, size);
   add(this->Y_, size);
   add(this->Volume_, size);

@@ -18,9 +18,10 @@ struct ContrastTracerSettings
   std::int64_t capacity = 20000; ///< greatest number of tracers, 1000 to 10,000,000
   /// mL of contrast medium a tracer, 1e-7 to 0.1. Doubled while there are too many, halved again when there are few.
   double volume = 2.5e-4;
-  /// Of the radial random walk, mm^2/s, 0 to 100: what secondary flow in bends and the pulse mix. At 0.5 a
-  /// cross-section of 1.5 mm radius is mixed in r^2 / (14.7 D) = 0.3 s.
-  double radialDiffusivity = 0.5;
+  /// Of the radial random walk, mm^2/s, 0 to 100: what secondary flow in bends and the pulse mix. No source has it for
+  /// coronary arteries: 0.2 is 1/1000 to 1/500 of mean speed times radius. A cross-section of 1.5 mm radius is mixed in
+  /// r^2 / (14.7 D) = 0.8 s, where molecular diffusion (0.001) takes minutes.
+  double radialDiffusivity = 0.2;
   /// Along the axis, mm^2/s, 0 to 100. Little against what the velocity profile disperses; above 0 medium also creeps
   /// upstream of the tip, within its segment.
   double axialDiffusivity = 0.0;
@@ -65,10 +66,11 @@ public:
   const ContrastTracerSettings& Settings() const { return this->Settings_; }
   std::int64_t Size() const { return this->Size_; }
   int Segment(std::int64_t i) const { return this->Segment_[i]; }
+  /// mL of the segment's lumen that are before it.
   double Lumen(std::int64_t i) const
   {
-    return this->Lumen_[i];
-  } ///< mL of the segment that are before it
+    return this->Part_[i] * this->Segments[this->Segment_[i]].volume;
+  }
   double X(std::int64_t i) const { return this->X_[i]; }
   double Y(std::int64_t i) const { return this->Y_[i]; }
   double Volume(std::int64_t i) const { return this->Volume_[i]; } ///< mL of contrast medium
@@ -103,6 +105,7 @@ private:
     int below;     ///< node
     double volume; ///< mL
     double radius; ///< mm
+    double length; ///< mm
   };
   /// What a node's blood can go into, in the order in which it leaves along `parting`; -1: out of the tree.
   struct Junction
@@ -117,23 +120,20 @@ private:
   /// What the moving loop needs of a segment.
   struct Motion
   {
-    float flow[2];  ///< 2 Q dt above the injector, and below it, mL
-    float injector; ///< mL from the segment's beginning
-    float radial;   ///< half width of a step of (x, y)
-    float axial;    ///< half width of a step of the lumen, mL
-    float volume;
+    float rate;   ///< 2 Q dt below the injector / the segment's volume
+    float radial; ///< half width of a step of (x, y)
+    float axial;  ///< half width of a step along the segment, of its volume
   };
   /// What the moving loop needs of neighbouring tracers, side by side so that it can be vectorised.
   struct Block
   {
     static constexpr int Size = 512;
-    std::array<float, Size> lumen;
+    std::array<float, Size> part;
     std::array<float, Size> x;
     std::array<float, Size> y;
     std::array<float, Size> rate;
     std::array<float, Size> radial;
     std::array<float, Size> axial;
-    std::array<float, Size> volume;
     std::array<std::int32_t, Size> beyond; ///< 1 where a tracer is beyond its segment
   };
 
@@ -153,6 +153,7 @@ private:
   void Emit(double volume, bool down);
   void MakeRoom(std::int64_t count);
   void Thin(bool anywhere);
+  void Store(const Tracer& tracer, std::int64_t i);
   void Copy(std::int64_t from, std::int64_t to);
 
   ContrastTracerSettings Settings_;
@@ -166,10 +167,11 @@ private:
   std::vector<double> FlowTop;    ///< mL/s per segment, at its beginning
   std::vector<double> FlowBottom; ///< at its end
   TracerFlow Flow;
+  double Dt = 0.0;
 
   std::int64_t Size_ = 0;
   std::vector<std::int32_t> Segment_;
-  std::vector<float> Lumen_;
+  std::vector<float> Part_; ///< of the segment's volume that is before the tracer, 0 to 1
   std::vector<float> X_;
   std::vector<float> Y_;
   std::vector<double> Volume_;

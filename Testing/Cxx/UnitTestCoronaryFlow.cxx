@@ -54,7 +54,7 @@ double LargestImbalance(const CoronaryFlow& flow)
 
 struct Cycle
 {
-  std::vector<double> mean; // per segment, mL/s
+  std::vector<double> mean;  // per segment, mL/s
   std::vector<double> ratio; // per tree
 };
 
@@ -225,8 +225,8 @@ TEST(CoronaryFlow, DiastolicRatioAndSpeedInPhantoms)
           const FlowSegment& segment = flow.Network().Segments()[s];
           const double part = std::min(segment.to - segment.from, 100.0 - length);
           length += part;
-          time += (flow.Network().VolumeAt(segment.branch, segment.from + part) -
-                    segment.volumeFrom) /
+          time +=
+            (flow.Network().VolumeAt(segment.branch, segment.from + part) - segment.volumeFrom) /
             (2.0 * cycle.mean[s]);
         }
         EXPECT_NEAR(0.1 * length / time, 25.0, 0.25) << who;
@@ -334,8 +334,7 @@ TEST(CoronaryFlow, HeartStandsStill)
     const int node = flow.Network().Segments()[s].below;
     if (flow.Network().IsTip(node))
     {
-      EXPECT_NEAR(
-        (flow.Pressure()[node] - 5.0) / flow.OutletResistance(node), steady[s], 1e-9);
+      EXPECT_NEAR((flow.Pressure()[node] - 5.0) / flow.OutletResistance(node), steady[s], 1e-9);
     }
   }
 }
@@ -391,8 +390,8 @@ TEST(CoronaryFlow, KnowsItsSides)
   EXPECT_EQ(FlowNetwork(two).RightSide(), (std::vector<bool>{ false, true }));
   two.groupName = { "pRCA", "LM" };
   EXPECT_EQ(FlowNetwork(two).RightSide(), (std::vector<bool>{ true, false }));
-  EXPECT_EQ(FlowNetwork(two, { CoronarySide::Left }).RightSide(),
-    (std::vector<bool>{ false, false }));
+  EXPECT_EQ(
+    FlowNetwork(two, { CoronarySide::Left }).RightSide(), (std::vector<bool>{ false, false }));
 }
 
 TEST(CoronaryFlow, RefusesBadInput)
