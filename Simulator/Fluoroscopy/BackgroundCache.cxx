@@ -325,8 +325,18 @@ void BackgroundCache::SetGeometry(const CArmGeometry& geometry)
     data.wake.notify_one();
     return;
   }
-  data.Finish(
-    generation, rounded, std::make_shared<const LineIntegrals>(data.projector->Project(rounded)));
+  try
+  {
+    data.Finish(
+      generation, rounded, std::make_shared<const LineIntegrals>(data.projector->Project(rounded)));
+  }
+  catch (...)
+  {
+    // The next call tries again.
+    const std::lock_guard<std::mutex> lock(data.mutex);
+    data.wanted.reset();
+    throw;
+  }
 }
 
 std::shared_ptr<const LineIntegrals> BackgroundCache::Current(double* completeness) const

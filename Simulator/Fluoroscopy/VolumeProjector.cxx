@@ -141,12 +141,18 @@ struct IndexRays
 /// The rays at the corners of a tile: all its others are between them.
 using Corners = std::array<Vector3, 4>;
 
+/// What is common to a rectangle and an image's part.
 PixelRectangle Common(const PixelRectangle& a, const PixelRectangle& b)
 {
-  const int column = std::max(a.column, b.column);
-  const int row = std::max(a.row, b.row);
-  return { column, row, std::max(0, std::min(a.column + a.columns, b.column + b.columns) - column),
-    std::max(0, std::min(a.row + a.rows, b.row + b.rows) - row) };
+  const auto end = [](int first, int count) { return std::int64_t{ first } + std::max(0, count); };
+  PixelRectangle common;
+  common.column = std::max(a.column, b.column);
+  common.row = std::max(a.row, b.row);
+  const std::int64_t right = std::min(end(a.column, a.columns), end(b.column, b.columns));
+  const std::int64_t bottom = std::min(end(a.row, a.rows), end(b.row, b.rows));
+  common.columns = static_cast<int>(std::max<std::int64_t>(0, right - common.column));
+  common.rows = static_cast<int>(std::max<std::int64_t>(0, bottom - common.row));
+  return common;
 }
 
 /// The axis that a ray passes most voxels along.

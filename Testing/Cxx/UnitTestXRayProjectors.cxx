@@ -8,6 +8,7 @@
 #include "SurfaceTestMeshes.h"
 #include "TriangleProjector.h"
 #include "VolumeProjector.h"
+#include "XRayKernels.h"
 #include "XRayTestScenes.h"
 
 #include <gtest/gtest.h>
@@ -16,6 +17,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -510,6 +512,53 @@ TEST(InstrumentProjector, AlongTheViewAChordIsAsLongAsTheSegment)
   }
   Row("instrument: cylinder of 10 mm seen along its axis, mu L", 0.0, worst, "0.2 %");
   EXPECT_LE(worst, 2e-3);
+}
+
+TEST(InstrumentProjector, SameBitsFromAllProcessors)
+{
+  RandomStream random(11);
+  for (int k = 0; k < 50; ++k)
+  {
+    const auto plane = [&]
+    {
+      return PixelPlane{ static_cast<float>(random.Uniform(-500.0, 500.0)),
+        static_cast<float>(random.Uniform(-1.0, 1.0)),
+        static_cast<float>(random.Uniform(-1.0, 1.0)) };
+    };
+    TubePart part{};
+    for (int c = 0; c < 3; ++c)
+    {
+      part.ray[c] = plane();
+      part.cross[c] = plane();
+      part.along[c] = plane();
+    }
+    for (int end = 0; end < 2; ++end)
+    {
+      part.crossCut[end] = plane();
+      part.rayCut[end] = plane();
+      part.outer[end] = static_cast<float>(random.Uniform(0.5, 2.0));
+      part.inner[end] = k % 2 == 0 ? 0.0F : 0.4F;
+    }
+    part.moment = plane();
+    part.length = 2.0F;
+    part.inverseLength = 0.5F;
+    part.step = 1.0F;
+    part.greatestPixel = 0.3F;
+    part.attenuation = 0.7F;
+    TubePixels list;
+    list.count = 203;
+    for (int pixel = 0; pixel < list.count; ++pixel)
+    {
+      list.i[pixel] = static_cast<float>(random.Uniform(-300.0, 300.0));
+      list.j[pixel] = static_cast<float>(random.Uniform(-300.0, 300.0));
+      list.index[pixel] = (pixel * 7) % 203;
+    }
+    std::vector<float> baseline(203, 0.1F);
+    std::vector<float> best(203, 0.1F);
+    XRayKernelsBaseline.addTube(part, list, baseline.data());
+    BestXRayKernels().addTube(part, list, best.data());
+    EXPECT_EQ(baseline, best);
+  }
 }
 
 TEST(InstrumentProjector, RefusesWhatIsNoInstrument)
