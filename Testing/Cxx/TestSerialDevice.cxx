@@ -295,7 +295,7 @@ TEST(SerialDevice, WrongDevice)
 
 TEST(SerialDevice, DrivesByteByByteWithJunk)
 {
-  Hardware hardware(R"({"pieces":[{"seconds":1,"wire_mm":20,"pedals":["cine"]}],
+  Hardware hardware(R"({"pieces":[{"seconds":0.3},{"seconds":1,"wire_mm":20,"pedals":["cine"]}],
     "faults":[{"at":0.2,"kind":"garbage","count":300},{"at":0.4,"kind":"duplicate","count":5},
               {"at":0.6,"kind":"reorder","count":3}]})");
   hardware.byteByByte = true;
@@ -457,8 +457,8 @@ TEST(Emulator, AsAProgram)
   const std::filesystem::path link = folder / "device";
   std::ofstream(folder / "scenario.json")
     << R"({"format":"dynamiccoronary device scenario","version":1,
-    "pieces":[{"seconds":0.5,"wire_mm":10},{"seconds":100}],
-    "faults":[{"at":1.0,"kind":"close","ms":300}]})";
+    "pieces":[{"seconds":0.5},{"seconds":0.5,"wire_mm":10}],
+    "faults":[{"at":3.0,"kind":"close","ms":300}]})";
   EmulatorProcess emulator({ "--quiet", "--scenario", (folder / "scenario.json").string(), "--link",
     link.string(), "--log", (folder / "log").string() });
   {
@@ -466,7 +466,7 @@ TEST(Emulator, AsAProgram)
     ASSERT_TRUE(loop.Reaches(DeviceState::Running));
     loop.Until([&] { return loop.input.drive.wirePosition > 9.99; }, 3.0);
     EXPECT_NEAR(loop.input.drive.wirePosition, 10.0, 0.01);
-    EXPECT_TRUE(loop.Reaches(DeviceState::Disconnected, 3.0));
+    EXPECT_TRUE(loop.Reaches(DeviceState::Disconnected, 5.0));
     EXPECT_TRUE(loop.Reaches(DeviceState::Running, 8.0));
     EXPECT_NEAR(loop.input.drive.wirePosition, 10.0, 0.01);
   }
