@@ -39,7 +39,6 @@ const HounsfieldVolume& MeanThorax()
   {
     ThoraxSettings settings;
     settings.seed = 0;
-    settings.spacing = 2.0;
     return MakeThoraxPhantom(settings);
   }();
   return volume;
