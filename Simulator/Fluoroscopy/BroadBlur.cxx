@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 namespace coronary
 {
@@ -25,7 +26,7 @@ int CellSize(int pixels, double sigma)
 /// Where, from the centre of a cell to that of the next, its first pixel is that is not before the centre.
 double FirstFraction(int cell)
 {
-  return (cell / 2 - 0.5 * (cell - 1)) / cell;
+  return cell % 2 == 0 ? 0.5 / cell : 0.0;
 }
 
 /// The Gaussian between cells: what averaging over cells and interpolation between them leave to do.
@@ -50,6 +51,7 @@ std::vector<float> GaussianHalf(double sigma)
   }
   const int radius = static_cast<int>(std::ceil(4.0 * sigma));
   std::vector<double> weights;
+  weights.reserve(static_cast<std::size_t>(radius) + 1);
   double sum = 0.0;
   for (int r = 0; r <= radius; ++r)
   {
@@ -57,6 +59,7 @@ std::vector<float> GaussianHalf(double sigma)
     sum += (r == 0 ? 1.0 : 2.0) * weights.back();
   }
   std::vector<float> half;
+  half.reserve(weights.size());
   for (const double weight : weights)
   {
     half.push_back(static_cast<float>(weight / sum));
@@ -84,6 +87,16 @@ void BlurMirroredRow(const float* in, int width, const std::vector<float>& half,
     middle[width - 1 + r] = in[Mirrored(width - 1 + r, width)];
   }
   DetectorLoops().blurAlong(middle, half.data(), radius, width, result);
+}
+
+void PointToMirroredRows(
+  const float* image, int columns, int rows, int row, std::vector<const float*>& around)
+{
+  int place = row - static_cast<int>(around.size() / 2);
+  for (const float*& pointer : around)
+  {
+    pointer = image + static_cast<std::ptrdiff_t>(Mirrored(place++, rows)) * columns;
+  }
 }
 
 void BroadBlur::Prepare(int columns, int rows, double sigma)
@@ -122,11 +135,7 @@ void BroadBlur::Blur(const float* image)
   std::vector<const float*> around(2 * this->Across.size() - 1);
   for (int row = 0; row < rows; ++row)
   {
-    for (int r = -radius; r <= radius; ++r)
-    {
-      around[static_cast<std::size_t>(r + radius)] =
-        this->Scratch.data() + static_cast<std::size_t>(Mirrored(row + r, rows)) * columns;
-    }
+    PointToMirroredRows(this->Scratch.data(), columns, rows, row, around);
     DetectorLoops().blurAcross(around.data(), this->Across.data(), radius, columns,
       this->Cells.data() + static_cast<std::size_t>(row) * columns);
   }

@@ -23,6 +23,10 @@ int Mirrored(int i, int count);
 void BlurMirroredRow(const float* in, int width, const std::vector<float>& half,
   std::vector<float>& padded, float* result);
 
+/// An odd number of rows around `row`, of an image that is continued as in mirrors.
+void PointToMirroredRows(
+  const float* image, int columns, int rows, int row, std::vector<const float*>& around);
+
 /**
  * Means over cells of up to 16 x 16 pixels, a Gaussian between the cells, linear interpolation between their centres:
  * together of the wanted standard deviation. A single pixel's blur is centred at its cell, up to half a cell beside.

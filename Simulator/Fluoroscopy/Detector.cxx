@@ -402,11 +402,7 @@ void Detector::BlurAcrossRows(float lag)
   std::vector<const float*> around(2 * this->BlurKernel.size() - 1);
   for (int row = 0; row < this->Rows_; ++row)
   {
-    for (int r = -radius; r <= radius; ++r)
-    {
-      around[static_cast<std::size_t>(r + radius)] = this->Blurred.data() +
-        static_cast<std::size_t>(Mirrored(row + r, this->Rows_)) * this->Columns_;
-    }
+    PointToMirroredRows(this->Blurred.data(), this->Columns_, this->Rows_, row, around);
     float* held = this->Signal_.data() + static_cast<std::size_t>(row) * this->Columns_;
     loops.blurAcross(
       around.data(), this->BlurKernel.data(), radius, this->Columns_, this->Scratch.data());

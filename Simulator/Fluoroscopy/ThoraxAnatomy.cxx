@@ -375,6 +375,12 @@ double ThoraxAnatomy::SkinDistance(const ThoraxSlice& slice, const Vector3& p)
 
 double ThoraxAnatomy::DiaphragmHeight(const ThoraxSlice& slice, const Vector3& p) const
 {
+  constexpr double highest = -60.0;
+  constexpr double rounding = 6.0; ///< mm: domes have no crease between them
+  if (p.z() > highest)
+  {
+    return highest - rounding;
+  }
   const double x = (p.x() - slice.middleX) / this->Lateral;
   const double y = p.y() / this->Sagittal;
   const auto dome = [x, y](double middleX, double middleY, double top, double halfX, double halfY)
@@ -385,8 +391,10 @@ double ThoraxAnatomy::DiaphragmHeight(const ThoraxSlice& slice, const Vector3& p
     const double steep = std::max(0.0, q - 0.5);
     return top - 26.0 * q - 38.0 * steep * steep;
   };
-  return std::max({ dome(-70.0, -8.0, -83.0, 62.0, 82.0), dome(72.0, -8.0, -95.0, 60.0, 82.0),
-    dome(26.0, -32.0, -77.0, 62.0, 58.0) });
+  const double sum = std::exp(dome(-70.0, -8.0, -83.0, 62.0, 82.0) / rounding) +
+    std::exp(dome(72.0, -8.0, -95.0, 60.0, 82.0) / rounding) +
+    std::exp(dome(26.0, -32.0, -80.0, 66.0, 60.0) / rounding);
+  return rounding * std::log(std::max(sum, 1e-300));
 }
 
 double ThoraxAnatomy::LungTop(double wallLevel)

@@ -103,7 +103,7 @@ public:
   double WallLevel(const ThoraxSlice& slice, const Vector3& p, double& radius) const;
   /// Distance from the chest wall, first order, mm; negative inside.
   static double WallDistance(double level, double radius);
-  /// Height of the diaphragm over or below a place, world z.
+  /// Height of the diaphragm over or below a place, world z; some height below it for places far above.
   double DiaphragmHeight(const ThoraxSlice& slice, const Vector3& p) const;
   /// The same of the lungs' upper end.
   static double LungTop(double wallLevel);
