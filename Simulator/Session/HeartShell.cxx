@@ -14,7 +14,7 @@ constexpr int Around = 36;  // points of a ring
 constexpr int Samples = 20; // phases
 constexpr double Inside =
   0.97; // of the way from the middle to the vessels' axes: vessels lie upon it
-constexpr double Below = 0.92; // of the epicardium: the arteries run partly in its fat
+constexpr double Below = 0.87; // of the epicardium: the arteries run partly in its fat
 constexpr double Bell = 0.35;  // radians
 
 /// Of a sphere: the first pole, rings, the last pole.

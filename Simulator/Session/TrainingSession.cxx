@@ -81,7 +81,8 @@ struct TrainingSession::Internals
   SessionReport Report;
   SessionMetrics Metrics;
   SessionInput Last;
-  double Delivered = 0.0; // mL that have left the syringe, follows the plunger
+  double Plunger = 0.0;   // mL
+  double Delivered = 0.0; // mL: where the plunger would be for what has left the syringe
   bool FarTooFast = false;
   std::vector<std::string> Messages;
   std::uint64_t Tick = 0;
@@ -119,11 +120,13 @@ void TrainingSession::Internals::SetView(const SessionInput& input)
 void TrainingSession::Internals::StepContrast(const SessionInput& input)
 {
   const double seconds = static_cast<double>(this->TicksOfContrast) / this->Settings.tickRate;
-  const double plunger = std::isfinite(input.syringe) ? input.syringe : this->Delivered;
+  const double plunger = std::isfinite(input.syringe) ? input.syringe : this->Plunger;
+  // Drawing back stops the flow and fills the syringe: it goes on from there.
+  this->Delivered = plunger < this->Plunger ? plunger : this->Delivered;
+  this->Plunger = plunger;
   const double wanted = plunger - this->Delivered;
   const double pushed = std::clamp(wanted, 0.0, FastestInjection * seconds);
-  // Drawing back fills the syringe: it goes on from there.
-  this->Delivered = wanted < 0.0 ? plunger : this->Delivered + pushed;
+  this->Delivered += pushed;
   if (wanted > 2.0 && !this->FarTooFast)
   {
     this->Messages.emplace_back("The syringe is pushed faster than contrast medium can flow.");
