@@ -630,7 +630,7 @@ void ContrastTracers::Emit(double volume, bool down)
   const double shiftTime = shift.Uniform();
   const double wanted = std::ceil(volume / this->TracerVolume);
   const auto count = static_cast<std::int64_t>(
-    std::clamp(wanted, 1.0, static_cast<double>(this->Settings_.capacity / 16)));
+    std::clamp(wanted, 1.0, std::floor(static_cast<double>(this->Settings_.capacity) / 16.0)));
   this->MakeRoom(count);
   const int segment = this->Flow.injector.segment;
   const double rate = 2.0 * this->Dt * (down ? this->FlowBottom : this->FlowTop)[segment];
