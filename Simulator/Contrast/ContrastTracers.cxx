@@ -343,7 +343,7 @@ void ContrastTracers::MoveBlock(std::int64_t first, int count, Block& block)
     }
   }
   const int injected = this->Flow.injector.segment;
-  if (injected >= 0)
+  if (injected >= 0 && this->Flow.injector.volume > 0.0)
   {
     const Stretch& segment = this->Segments[injected];
     const auto tip = static_cast<float>(this->Flow.injector.volume / segment.volume);
@@ -351,8 +351,10 @@ void ContrastTracers::MoveBlock(std::int64_t first, int count, Block& block)
       static_cast<float>(2.0 * this->Dt * this->FlowTop[injected] / segment.volume);
     for (int i = 0; i < count; ++i)
     {
-      const bool before = segments[i] == injected && block.part[i] < tip;
-      block.rate[i] = before ? above : block.rate[i];
+      // Arithmetic, so that it is vectorised.
+      const float here = segments[i] == injected ? 1.0F : 0.0F;
+      const float early = block.part[i] < tip ? 1.0F : 0.0F;
+      block.rate[i] += here * early * (above - block.rate[i]);
     }
   }
   const std::uint64_t step = MixBits(this->Key + this->Steps);
@@ -630,7 +632,7 @@ void ContrastTracers::Emit(double volume, bool down)
   const double shiftTime = shift.Uniform();
   const double wanted = std::ceil(volume / this->TracerVolume);
   const auto count = static_cast<std::int64_t>(
-    std::clamp(wanted, 1.0, static_cast<double>(this->Settings_.capacity / 16)));
+    std::clamp(wanted, 1.0, std::floor(static_cast<double>(this->Settings_.capacity) / 16.0)));
   this->MakeRoom(count);
   const int segment = this->Flow.injector.segment;
   const double rate = 2.0 * this->Dt * (down ? this->FlowBottom : this->FlowTop)[segment];
