@@ -182,7 +182,6 @@ void HostLink::OpenPort()
       why, false);
     return;
   }
-  this->Outgoing.clear();
   this->Tried = 0;
   this->Greet();
 }
@@ -193,6 +192,7 @@ void HostLink::Greet()
   this->Nonce = static_cast<std::uint32_t>(MixBits(this->Now + MixBits(++this->Connections)));
   this->Decoder.Reset();
   this->Sender.Reset();
+  this->Outgoing.clear();
   this->Outgoing.push_back(0); // ends whatever lies in the device's buffer
   HelloMessage hello;
   hello.nonce = this->Nonce;
@@ -415,7 +415,6 @@ void HostLink::HandleState(const Message& message)
     this->BeginRunning();
   }
   const double since = 1e-6 * (message.microseconds - this->LastDeviceTime);
-  const double silence = 1e-6 * static_cast<double>(this->Now - this->LastState);
   this->Track(state, std::clamp(since, period, 1e-6 * Lost));
   this->LastDeviceTime = message.microseconds;
   this->LastState = this->Now;
@@ -424,8 +423,6 @@ void HostLink::HandleState(const Message& message)
   ++this->Shown.version;
   const bool silent = this->Shown.state == DeviceState::Stale && !this->Noisy;
   this->Shown.period = period;
-  this->Shown.resumptions += silent ? 1 : 0;
-  this->Shown.silence = silent ? std::clamp(silence, period, 1e-6 * Lost) : this->Shown.silence;
   this->Shown.arrival = this->Now;
   this->Shown.deviceTime = 0;
   if (this->Clocks.Known())
@@ -593,6 +590,10 @@ void HostLink::WatchErrors()
 
 void HostLink::Talk(const PhysicsWord& physics)
 {
+  if (this->Outgoing.size() > MostOutgoing) // the device does not read
+  {
+    return;
+  }
   if (this->Now >= this->NextPing)
   {
     this->NextPing = this->Now + Ping;
@@ -606,7 +607,7 @@ void HostLink::Talk(const PhysicsWord& physics)
   }
   // Who does not hear from a sound simulation lets go by itself.
   const std::uint64_t age = this->Now - std::min(this->Now, physics.stamp);
-  if (!physics.alive || age > PhysicsOverrun || this->Outgoing.size() > MostOutgoing)
+  if (!physics.alive || age > PhysicsOverrun)
   {
     return;
   }

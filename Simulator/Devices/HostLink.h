@@ -53,9 +53,7 @@ struct LinkSnapshot
   std::uint32_t axes = 0; ///< bits of DeviceAxes
   std::uint16_t pedals = 0;
   std::uint16_t buttons = 0;
-  double period = 0.001;         ///< s in which these places are to be reached
-  std::uint64_t resumptions = 0; ///< goes up when a silence ends
-  double silence = 0.0;      ///< s that the last one was: what was missed is caught up in as much
+  double period = 0.001;     ///< s in which these places are to be reached
   std::uint64_t arrival = 0; ///< microseconds of the host's clock
   std::uint64_t deviceTime =
     0; ///< microseconds of the host's clock at which the device took them; 0: unknown

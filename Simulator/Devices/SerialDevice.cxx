@@ -18,7 +18,8 @@ std::uint64_t SteadyMicroseconds()
                                       .count());
 }
 
-constexpr double Lost = 1e-6 * static_cast<double>(link_times::Lost); // s
+constexpr double Stale = 1e-6 * static_cast<double>(link_times::Stale); // s
+constexpr double Lost = 1e-6 * static_cast<double>(link_times::Lost);   // s
 
 std::size_t IndexOf(AxisKind kind)
 {
@@ -116,29 +117,40 @@ void SerialDevice::Interpolate(double secondsPerTick)
   this->Catching += secondsPerTick;
   if (this->Latest.version != this->Version)
   {
+    const double gap = 1e-6 * static_cast<double>(this->Latest.arrival - this->LastArrival);
     this->Version = this->Latest.version;
+    this->LastArrival = this->Latest.arrival;
     this->From = this->Even;
     this->Since = secondsPerTick;
-  }
-  if (this->Latest.resumptions != this->Resumptions)
-  {
-    // What was missed is caught up as fast as it was done.
-    this->Resumptions = this->Latest.resumptions;
-    this->Catching = secondsPerTick;
-    this->From = this->Latest.places;
-    for (std::size_t kind = 0; kind < LinkSnapshot::Kinds; ++kind)
+    if (gap >= Stale)
     {
-      this->Behind[kind] = this->Places[kind] - this->From[kind];
+      this->Bridge(gap);
+      this->Catching = secondsPerTick;
     }
   }
   const double share = std::min(1.0, this->Since / this->Latest.period);
-  const double left =
-    this->Catching < this->Latest.silence ? 1.0 - this->Catching / this->Latest.silence : 0.0;
+  const double left = std::max(0.0, 1.0 - this->Catching / this->CatchingTime);
   for (std::size_t kind = 0; kind < LinkSnapshot::Kinds; ++kind)
   {
     const double to = this->Latest.places[kind];
     this->Even[kind] = share < 1.0 ? this->From[kind] + share * (to - this->From[kind]) : to;
-    this->Places[kind] = this->Even[kind] + left * this->Behind[kind];
+    this->Places[kind] = this->Even[kind] + this->Shift[kind] + left * this->Behind[kind];
+  }
+}
+
+/// After a gap between states that were read: a short one is caught up in as long as it was; in a long one the hands
+/// were not on the instrument.
+void SerialDevice::Bridge(double gap)
+{
+  this->From = this->Latest.places;
+  this->CatchingTime = gap;
+  for (std::size_t kind = 0; kind < LinkSnapshot::Kinds; ++kind)
+  {
+    this->Behind[kind] = this->Places[kind] - this->From[kind] - this->Shift[kind];
+    if (gap >= Lost)
+    {
+      this->Shift[kind] += std::exchange(this->Behind[kind], 0.0);
+    }
   }
 }
 

