@@ -353,7 +353,7 @@ double ThoraxAnatomy::WallLevel(const ThoraxSlice& slice, const Vector3& p, doub
   const double x = dx / slice.halfWidth;
   const double y = dy / (0.5 * (slice.back - slice.front));
   radius = std::hypot(dx, dy);
-  const auto i = static_cast<std::size_t>(std::atan2(x, y) / Pi * WallSteps + 0.5);
+  const auto i = static_cast<std::size_t>(std::lrint(std::atan2(x, y) / Pi * WallSteps));
   return std::hypot(x, y) / this->WallRadii[i];
 }
 
