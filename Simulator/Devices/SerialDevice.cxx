@@ -18,8 +18,8 @@ std::uint64_t SteadyMicroseconds()
                                       .count());
 }
 
-constexpr double Stale = 1e-6 * static_cast<double>(link_times::Stale); // s
-constexpr double Lost = 1e-6 * static_cast<double>(link_times::Lost);   // s
+constexpr double MostPeriods = 3.0; // between states that follow each other
+constexpr double Lost = 1e-6 * static_cast<double>(link_times::Lost); // s
 
 std::size_t IndexOf(AxisKind kind)
 {
@@ -122,7 +122,7 @@ void SerialDevice::Interpolate(double secondsPerTick)
     this->LastArrival = this->Latest.arrival;
     this->From = this->Even;
     this->Since = secondsPerTick;
-    if (gap >= Stale)
+    if (gap > MostPeriods * this->Latest.period)
     {
       this->Bridge(gap);
       this->Catching = secondsPerTick;
