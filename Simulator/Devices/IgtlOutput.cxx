@@ -7,6 +7,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
+#include <cstring>
 #include <igtlClientSocket.h>
 #include <igtlImageMessage.h>
 #include <igtlServerSocket.h>
@@ -36,6 +37,7 @@ struct NamedImage
 {
   std::string name;
   GreyImage image;
+  double spacing = 1.0;
   double seconds = 0.0;
   bool fresh = false;
 };
@@ -72,19 +74,13 @@ bool Send(igtl::ClientSocket& client, const NamedPose& named)
 bool Send(igtl::ClientSocket& client, const NamedImage& named)
 {
   const GreyImage& image = named.image;
-  const auto spacing = static_cast<float>(image.spacing);
+  const auto spacing = static_cast<float>(named.spacing);
   const igtl::ImageMessage::Pointer message = igtl::ImageMessage::New();
   message->SetDimensions(image.columns, image.rows, 1);
   message->SetSpacing(spacing, spacing, 1.0F);
-  message->SetScalarTypeToUint16();
-  message->SetEndian(igtl::ImageMessage::ENDIAN_LITTLE);
+  message->SetScalarTypeToUint8();
   message->AllocateScalars();
-  auto* bytes = static_cast<unsigned char*>(message->GetScalarPointer());
-  for (const std::uint16_t pixel : image.pixels)
-  {
-    *bytes++ = static_cast<unsigned char>(pixel & 0xFFU);
-    *bytes++ = static_cast<unsigned char>(pixel >> 8U);
-  }
+  std::memcpy(message->GetScalarPointer(), image.values.data(), image.values.size());
   return Send(client, *message, named.name, named.seconds);
 }
 
@@ -189,21 +185,21 @@ void IgtlOutput::SendPose(const std::string& name, const ToolPose& pose, double 
   this->Data->news.notify_one();
 }
 
-void IgtlOutput::SendImage(const std::string& name, GreyImage image, double seconds)
+void IgtlOutput::SendImage(const std::string& name, GreyImage image, double spacing, double seconds)
 {
   constexpr int Most = 16384;
   if (image.columns < 1 || image.rows < 1 || image.columns > Most || image.rows > Most ||
-    !(image.spacing > 0.0) ||
-    image.pixels.size() !=
+    !(spacing > 0.0) ||
+    image.values.size() !=
       static_cast<std::size_t>(image.columns) * static_cast<std::size_t>(image.rows))
   {
     throw std::invalid_argument("The image '" + name + "' has " +
-      std::to_string(image.pixels.size()) + " pixels, " + std::to_string(image.columns) + " by " +
-      std::to_string(image.rows) + " and a spacing of " + std::to_string(image.spacing) + " mm.");
+      std::to_string(image.values.size()) + " pixels, " + std::to_string(image.columns) + " by " +
+      std::to_string(image.rows) + " and a spacing of " + std::to_string(spacing) + " mm.");
   }
   {
     const std::lock_guard<std::mutex> lock(this->Data->mutex);
-    this->Data->image = { name, std::move(image), seconds, true };
+    this->Data->image = { name, std::move(image), spacing, seconds, true };
   }
   this->Data->news.notify_one();
 }
@@ -233,7 +229,8 @@ void IgtlOutput::SendPose(const std::string& /*name*/, const ToolPose& /*pose*/,
 {
 }
 
-void IgtlOutput::SendImage(const std::string& /*name*/, GreyImage /*image*/, double /*seconds*/)
+void IgtlOutput::SendImage(
+  const std::string& /*name*/, GreyImage /*image*/, double /*spacing*/, double /*seconds*/)
 {
 }
 

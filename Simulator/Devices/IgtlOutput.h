@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_IgtlOutput_h
 #define DynamicCoronary_IgtlOutput_h
 
+#include "Detector.h"
 #include "Geometry.h"
 
 #include <array>
@@ -20,14 +21,6 @@ struct ToolPose
 {
   std::array<Vector3, 3> axes{ Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ() };
   Vector3 origin{ Vector3::Zero() };
-};
-
-struct GreyImage
-{
-  int columns = 0;
-  int rows = 0;
-  double spacing = 1.0;              ///< mm, on the detector
-  std::vector<std::uint16_t> pixels; ///< row by row from the top left
 };
 
 /**
@@ -48,10 +41,11 @@ public:
   IgtlOutput& operator=(const IgtlOutput&) = delete;
 
   ///@{
-  /// From any thread but that of the physics: they lock. @param seconds  of the simulation
+  /// From any thread but that of the physics: they lock.
+  /// @param spacing  of the pixels on the detector, mm  @param seconds  of the simulation
   /// @throws std::invalid_argument: another number of pixels than columns and rows say, a spacing that is not positive
   void SendPose(const std::string& name, const ToolPose& pose, double seconds);
-  void SendImage(const std::string& name, GreyImage image, double seconds);
+  void SendImage(const std::string& name, GreyImage image, double spacing, double seconds);
   ///@}
 
   bool HasClient() const;

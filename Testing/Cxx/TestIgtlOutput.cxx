@@ -107,12 +107,11 @@ TEST(IgtlOutput, PosesAndImages)
   GreyImage image;
   image.columns = 37;
   image.rows = 21;
-  image.spacing = 0.4;
   for (int n = 0; n < 37 * 21; ++n)
   {
-    image.pixels.push_back(static_cast<std::uint16_t>(n * 83));
+    image.values.push_back(static_cast<std::uint8_t>(n * 83));
   }
-  output->SendImage("fluoroscopy", image, 12.6);
+  output->SendImage("fluoroscopy", image, 0.4, 12.6);
   const auto received = Received<igtl::ImageMessage>(*client, "IMAGE");
   int size[3];
   received->GetDimensions(size);
@@ -123,9 +122,9 @@ TEST(IgtlOutput, PosesAndImages)
   received->GetSpacing(spacing);
   EXPECT_FLOAT_EQ(spacing[1], 0.4F);
   const auto* bytes = static_cast<const unsigned char*>(received->GetScalarPointer());
-  for (std::size_t n = 0; n < image.pixels.size(); ++n)
+  for (std::size_t n = 0; n < image.values.size(); ++n)
   {
-    ASSERT_EQ(bytes[2 * n] + 256 * bytes[2 * n + 1], image.pixels[n]) << n;
+    ASSERT_EQ(bytes[n], image.values[n]) << n;
   }
 
   // The client goes, and another one comes.
@@ -152,8 +151,8 @@ TEST(IgtlOutput, WhatIsRefused)
   ASSERT_TRUE(output);
   ExpectRefusal(
     [&] {
-      output->SendImage("x", GreyImage{ 2, 2, 1.0, { 1, 2, 3 } }, 0.0);
+      output->SendImage("x", GreyImage{ 2, 2, { 1, 2, 3 } }, 1.0, 0.0);
     },
     "3 pixels");
-  ExpectRefusal([&] { output->SendImage("x", GreyImage{ 1, 1, 0.0, { 1 } }, 0.0); }, "spacing");
+  ExpectRefusal([&] { output->SendImage("x", GreyImage{ 1, 1, { 1 } }, 0.0, 0.0); }, "spacing");
 }

@@ -799,7 +799,7 @@ TEST(ScriptDevice, AsAHeadlessSessionHasIt)
   InputFrame frame;
   for (std::uint64_t tick = 0; tick < 1200; ++tick)
   {
-    const DriveInput expected = script.At(static_cast<double>(tick + 1) / 2000.0);
+    const DriveInput expected = script.At(static_cast<double>(tick + 1) / 2000.0).drive;
     const DriveInput drive = mux.Next(tick, Tick).drive;
     ASSERT_EQ(drive.wirePosition, expected.wirePosition);
     ASSERT_EQ(drive.catheterAngle, expected.catheterAngle);
@@ -813,15 +813,15 @@ TEST(ReplayDevice, AsItWasRecorded)
   const std::string path = testing::TempDir() + "device-replay.pcirec";
   RecordingHeader header;
   header.tickRate = 2000.0;
-  std::vector<DriveInput> inputs;
+  std::vector<SessionInput> inputs;
   {
     RecordingWriter writer(path, header);
     for (std::uint64_t tick = 0; tick < 3000; ++tick)
     {
-      DriveInput input;
-      input.wirePosition = tick % 500 < 300 || inputs.empty()
+      SessionInput input;
+      input.drive.wirePosition = tick % 500 < 300 || inputs.empty()
         ? std::sin(0.01 * static_cast<double>(tick))
-        : inputs.back().wirePosition;
+        : inputs.back().drive.wirePosition;
       inputs.push_back(input);
       writer.Input(tick, input);
     }
@@ -833,15 +833,15 @@ TEST(ReplayDevice, AsItWasRecorded)
   for (std::uint64_t tick = 0; tick < 3100; ++tick)
   {
     device.Read(tick, Tick, frame);
-    ASSERT_EQ(
-      frame.input.drive.wirePosition, inputs[std::min<std::uint64_t>(tick, 2999)].wirePosition);
+    ASSERT_EQ(frame.input.drive.wirePosition,
+      inputs[std::min<std::uint64_t>(tick, 2999)].drive.wirePosition);
     ASSERT_EQ(frame.state, tick < 3000 ? DeviceState::Running : DeviceState::Ended);
   }
   // By time at another rate.
   for (std::uint64_t tick = 0; tick < 1500; ++tick)
   {
     device.Read(tick, 2 * Tick, frame);
-    ASSERT_EQ(frame.input.drive.wirePosition, inputs[2 * tick].wirePosition) << tick;
+    ASSERT_EQ(frame.input.drive.wirePosition, inputs[2 * tick].drive.wirePosition) << tick;
   }
 }
 
