@@ -18,6 +18,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::uint64_t ForceInterval = 40;  // ticks between recorded forces: 50 Hz at 2 kHz
 constexpr std::uint64_t CommandInterval = 2; // ticks between forces for the hands: 1 kHz at 2 kHz
 constexpr std::size_t MostMessages = 1000;   // that nobody has taken
+constexpr double CatchUp =
+  0.05; // s that a busy machine may hold the physics up without losing time
 
 double SecondsSince(Clock::time_point start)
 {
@@ -330,7 +332,7 @@ void SessionEngine::PublishExposure()
 
 void SessionEngine::RunPhysics()
 {
-  FixedStepClock clock(this->TickRate);
+  FixedStepClock clock(this->TickRate, CatchUp);
   const Clock::time_point start = Clock::now();
   Clock::time_point second = start;
   double worked = 0.0;
