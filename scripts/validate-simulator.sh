@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The simulator's physics against closed forms (docs/simulator.md, docs/contrast.md), and random driving in beating
-# phantoms.
+# The simulator's physics, contrast medium and X-ray images against closed forms (docs/simulator.md, contrast.md,
+# fluoroscopy.md, fluoroscopy-image.md), and random driving in beating phantoms.
 set -euo pipefail
 
 usage() {
@@ -8,7 +8,7 @@ usage() {
 Usage: scripts/validate-simulator.sh [--quick] [BUILD_FOLDER]
   --quick       without the soak: 20 phantoms of 50,000 ticks take five to ten minutes
   BUILD_FOLDER  default: build/paraview
-Prints the tables of the rod and of contrast medium, and that of the soak as CSV. Exit code 1 when anything misses its limit.
+Prints the tables of the rod, of contrast medium and of X-ray images, and that of the soak as CSV. Exit code 1 when anything misses its limit.
 TEXT
 }
 
@@ -29,7 +29,8 @@ for argument in "$@"; do
   esac
 done
 build="${build:-$(dirname "${BASH_SOURCE[0]}")/../build/paraview}"
-tests=(UnitTestCosseratRod UnitTestCoronaryFlow UnitTestContrastTracers UnitTestContrastModel)
+tests=(UnitTestCosseratRod UnitTestCoronaryFlow UnitTestContrastTracers UnitTestContrastModel UnitTestCArm
+  UnitTestAttenuation UnitTestXRayProjectors UnitTestDetector UnitTestAcquisition UnitTestThoraxPhantom)
 soak="$build/bin/soak-intervention"
 for program in "${tests[@]/#/$build/bin/}" "$soak"; do
   if [ ! -x "$program" ]; then

@@ -141,10 +141,10 @@ void FluoroscopyWidget::paintEvent(QPaintEvent*)
   write(Qt::AlignRight | Qt::AlignBottom, 0,
     QString("Contrast %1 mL").arg(metrics.contrast, 0, 'f', 1),
     this->Now.injection > 0.0 ? QColor(255, 200, 60) : plain);
-  if (this->Now.radiating && this->Completeness < 1.0)
+  if (this->Now.radiating && this->Completeness > 0.0 && this->Completeness < 1.0)
   {
     write(Qt::AlignRight | Qt::AlignBottom, 1,
-      QString("Image %1 %").arg(100.0 * this->Completeness, 0, 'f', 0), plain);
+      QString("Refining %1 %").arg(100.0 * this->Completeness, 0, 'f', 0), plain);
   }
   if (!this->Banner.isEmpty())
   {

@@ -47,7 +47,10 @@ void TraceWidget::Add(const SessionSnapshot& snapshot)
   else
   {
     const double from = this->Samples.back().seconds;
-    const double turned = phase - this->LastPhase - std::floor(phase - this->LastPhase);
+    double turned = phase - this->LastPhase - std::floor(phase - this->LastPhase);
+    // Whole beats that nobody has drawn.
+    turned +=
+      std::max(0.0, std::round(this->HeartRate / 60.0 * (snapshot.seconds - from) - turned));
     const int steps = std::clamp(static_cast<int>((snapshot.seconds - from) / Interval), 1, 1000);
     for (int n = 1; n <= steps; ++n)
     {

@@ -219,6 +219,12 @@ void Request::DeclareWindow(CLI::App& app)
     ->type_name("URI")
     ->group(what);
   app
+    .add_option("--igtl", this->window.igtlPort,
+      "Serve the wire's tip and the X-ray images by OpenIGTLink at this port; 3D Slicer: 18944")
+    ->check(WholeWithin(1, 65535))
+    ->type_name("PORT")
+    ->group(what);
+  app
     .add_option("--triangles", this->window.triangles,
       "Of the arteries in the view of the anatomy at most; fewer are drawn faster")
     ->check(WholeWithin(500, 2000000))

@@ -2,6 +2,7 @@
 
 #include "FluoroscopyWidget.h"
 #include "HeartShell.h"
+#include "IgtlOutput.h"
 #include "InstrumentCatalogue.h"
 #include "Interruption.h"
 #include "KeyboardDevice.h"
@@ -66,7 +67,7 @@ constexpr double WheelAdvance = 2.0;        // mm a notch
 constexpr double WheelTurn = 15.0 * Degree; // a notch
 constexpr double DragTurn = 0.3 * Degree;   // of the C-arm, a pixel
 constexpr int PollInterval = 15;            // ms
-constexpr double VideoRate = 15.0;          // Hz
+constexpr double VideoRate = 10.0;          // Hz
 
 struct StandardView
 {
@@ -181,13 +182,14 @@ private:
   QGroupBox* MakeContrastGroup();
   QGroupBox* MakeHeartGroup();
   QGroupBox* MakeAnatomyGroup();
-  QGroupBox* MakeMetricsGroup();
+  QWidget* MakeMetrics();
   void MakeToolBar();
   void ConnectMouse();
 
   void Poll();
   void ShowScene();
   void ShowImage();
+  void SendPose();
   void ShowNumbers(const SessionSnapshot& now);
   void ShowDevices();
   void ShowRates();
@@ -213,6 +215,7 @@ private:
   std::unique_ptr<SessionEngine> Engine;
   std::unique_ptr<vtkSimulatorScene> Scene;
   std::unique_ptr<vtkVideoFile> Video;
+  std::unique_ptr<IgtlOutput> Igtl;
   SessionSnapshot Now;
   ShownImage Shown;
   ImageMode Mode = ImageMode::Plain;
@@ -228,6 +231,7 @@ private:
   QElapsedTimer Whole;
   std::uint64_t AllDrawn = 0;
   QElapsedTimer VideoClock;
+  std::int64_t Filmed = 0; ///< places of the film that have passed
   QTimer Timer;
 
   FluoroscopyWidget* Monitor = nullptr;
@@ -279,6 +283,11 @@ Window::Window(const SessionWorld& world, const WindowOptions& options)
     this->Hardware.push_back(OpenDevice(uri));
   }
 
+  if (options.igtlPort > 0)
+  {
+    this->Igtl = std::make_unique<IgtlOutput>(options.igtlPort);
+  }
+
   this->Monitor = new FluoroscopyWidget;
   this->Anatomy = new QVTKOpenGLNativeWidget;
   this->Anatomy->setRenderWindow(this->AnatomyWindow);
@@ -296,7 +305,11 @@ Window::Window(const SessionWorld& world, const WindowOptions& options)
   column->setContentsMargins(0, 0, 0, 0);
   column->setSpacing(2);
   column->addWidget(views, 1);
-  column->addWidget(this->Traces);
+  auto* below = new QHBoxLayout;
+  below->setSpacing(0);
+  below->addWidget(this->Traces, 1);
+  below->addWidget(this->MakeMetrics());
+  column->addLayout(below);
   this->setCentralWidget(centre);
 
   auto* dock = new QDockWidget("Panel");
@@ -328,12 +341,22 @@ QWidget* Window::MakePanel()
   column->addWidget(this->MakeContrastGroup());
   column->addWidget(this->MakeHeartGroup());
   column->addWidget(this->MakeAnatomyGroup());
-  column->addWidget(this->MakeMetricsGroup());
+  this->ForceButton = Button("Confirm forces", "Hands are on the device and ready to feel forces");
+  this->ForceButton->hide();
+  QObject::connect(this->ForceButton, &QPushButton::clicked,
+    [this]
+    {
+      for (const std::shared_ptr<Device>& device : this->Hardware)
+      {
+        device->ConfirmForces();
+      }
+    });
   this->Log = new QPlainTextEdit;
   this->Log->setReadOnly(true);
   this->Log->setMaximumBlockCount(500);
   this->Log->setMinimumHeight(60);
   this->Log->setFocusPolicy(Qt::ClickFocus);
+  column->addWidget(this->ForceButton);
   column->addWidget(this->Log, 1);
   auto* scroll = new QScrollArea;
   scroll->setWidget(inside);
@@ -587,26 +610,16 @@ QGroupBox* Window::MakeAnatomyGroup()
   return group;
 }
 
-QGroupBox* Window::MakeMetricsGroup()
+QWidget* Window::MakeMetrics()
 {
-  auto* group = new QGroupBox("Procedure");
-  auto* column = new QVBoxLayout(group);
   this->MetricsText = new QLabel;
   this->MetricsText->setTextFormat(Qt::PlainText);
   this->MetricsText->setWordWrap(true);
-  this->ForceButton = Button("Confirm forces", "Hands are on the device and ready to feel forces");
-  this->ForceButton->hide();
-  QObject::connect(this->ForceButton, &QPushButton::clicked,
-    [this]
-    {
-      for (const std::shared_ptr<Device>& device : this->Hardware)
-      {
-        device->ConfirmForces();
-      }
-    });
-  column->addWidget(this->MetricsText);
-  column->addWidget(this->ForceButton);
-  return group;
+  this->MetricsText->setFixedWidth(400);
+  this->MetricsText->setMargin(8);
+  this->MetricsText->setStyleSheet("background: rgb(8, 10, 12); color: rgb(225, 232, 235);");
+  this->MetricsText->setToolTip("What distinguishes trainees");
+  return this->MetricsText;
 }
 
 void Window::MakeToolBar()
@@ -858,6 +871,7 @@ void Window::ShowScene()
   {
     return;
   }
+  this->SendPose();
   this->Scene->Update(this->Now);
   this->AnatomyWindow->Render();
   ++this->DrawnFrames;
@@ -868,6 +882,21 @@ void Window::ShowScene()
   this->Monitor->SetState(this->Now, this->Shown.completeness, this->Mode);
 }
 
+/// The wire's tip for others: its last axis is the way forward.
+void Window::SendPose()
+{
+  if (!this->Igtl || this->Now.wire.size() < 2)
+  {
+    return;
+  }
+  ToolPose pose;
+  pose.origin = this->Now.wire[0];
+  pose.axes[2] = (this->Now.wire[0] - this->Now.wire[1]).normalized();
+  pose.axes[0] = pose.axes[2].unitOrthogonal();
+  pose.axes[1] = pose.axes[2].cross(pose.axes[0]);
+  this->Igtl->SendPose("WireTip", pose, this->Now.seconds);
+}
+
 void Window::ShowImage()
 {
   if (!this->Engine->LatestImage(this->Shown))
@@ -876,6 +905,13 @@ void Window::ShowImage()
   }
   this->Monitor->SetRunText({});
   this->Monitor->SetImage(this->Shown.image);
+  if (this->Igtl)
+  {
+    const GreyImage& image = this->Shown.image;
+    const SessionSnapshot& moment = this->Shown.moment;
+    this->Igtl->SendImage(
+      "Fluoroscopy", image, moment.fieldOfView / image.columns, moment.seconds);
+  }
 }
 
 void Window::ShowNumbers(const SessionSnapshot& now)
@@ -1121,6 +1157,7 @@ void Window::ToggleVideo(bool on)
   {
     this->Video = std::make_unique<vtkVideoFile>(path.toStdString(), VideoRate);
     this->VideoClock.start();
+    this->Filmed = 0;
     this->VideoAction->setChecked(true);
     this->Log->appendPlainText("Filming into " + path);
   }
@@ -1137,14 +1174,15 @@ void Window::RecordVideo()
   {
     this->ToggleVideo(true);
   }
-  if (!this->Video || this->VideoClock.elapsed() < 1000.0 / VideoRate)
+  const double seconds = 1e-3 * static_cast<double>(this->VideoClock.elapsed());
+  if (!this->Video || seconds * VideoRate < static_cast<double>(this->Filmed))
   {
     return;
   }
-  this->VideoClock.restart();
+  this->Filmed = static_cast<std::int64_t>(seconds * VideoRate) + 1;
   const QImage picture = this->grab().toImage().convertToFormat(QImage::Format_RGB888);
   this->Video->Add(picture.constBits(), picture.width(), picture.height(),
-    static_cast<std::size_t>(picture.bytesPerLine()));
+    static_cast<std::size_t>(picture.bytesPerLine()), seconds);
 }
 
 void Window::keyPressEvent(QKeyEvent* event)

@@ -27,6 +27,7 @@ struct Picture
 {
   int width = 0;
   int height = 0;
+  double seconds = 0.0;
   std::vector<std::uint8_t> pixels; // from the bottom, as VTK has them
 };
 }
@@ -49,6 +50,7 @@ struct vtkVideoFile::Internals
   vtkNew<vtkOggTheoraWriter> Writer;
   vtkNew<vtkImageData> Image;
   bool Started = false;
+  std::int64_t Written = 0; ///< pictures of the film
   std::mutex Mutex;
   std::condition_variable Condition;
   std::deque<Picture> Waiting;
@@ -68,9 +70,20 @@ void vtkVideoFile::Internals::Write(const Picture& picture)
     this->Writer->SetInputData(this->Image);
     this->Writer->SetFileName(this->File.TemporaryPath().c_str());
     this->Writer->SetRate(static_cast<int>(std::lround(this->Rate)));
-    this->Writer->SetQuality(2);
+    this->Writer->SetQuality(1);
+    this->Writer->SetSubsampling(1);
     this->Writer->Start();
     this->Started = true;
+  }
+  // The picture before stays until this one's time.
+  const std::int64_t place = std::llround(picture.seconds * this->Rate);
+  for (; this->Written > 0 && this->Written < place; ++this->Written)
+  {
+    this->Writer->Write();
+  }
+  if (this->Written > place)
+  {
+    return; // two for one place
   }
   const int* size = this->Image->GetDimensions();
   auto* to = static_cast<std::uint8_t*>(this->Image->GetScalarPointer());
@@ -89,6 +102,7 @@ void vtkVideoFile::Internals::Write(const Picture& picture)
   }
   this->Image->Modified();
   this->Writer->Write();
+  ++this->Written;
   this->Failed = this->Failed || this->Writer->GetError() != 0;
 }
 
@@ -140,11 +154,13 @@ vtkVideoFile::~vtkVideoFile()
   }
 }
 
-void vtkVideoFile::Add(const std::uint8_t* pixels, int width, int height, std::size_t stride)
+void vtkVideoFile::Add(
+  const std::uint8_t* pixels, int width, int height, std::size_t stride, double seconds)
 {
   Picture picture;
   picture.width = width;
   picture.height = height;
+  picture.seconds = seconds;
   const auto row = static_cast<std::size_t>(width) * 3;
   picture.pixels.resize(row * static_cast<std::size_t>(height));
   for (int y = 0; y < height; ++y)

@@ -24,11 +24,12 @@ public:
   vtkVideoFile& operator=(const vtkVideoFile&) = delete;
 
   /**
-   * A picture, red, green, blue, from the top. The first one's size is the film's: what others have more is cut off, what they have less is
-   * black. When coding is too slow pictures are left out: Dropped().
-   * @param stride  bytes from row to row
+   * A picture, red, green, blue, from the top. The first one's size is the film's: what others have more is cut off, what
+   * they have less is black. It is shown until the next one; when coding is too slow pictures are left out: Dropped().
+   * @param stride   bytes from row to row
+   * @param seconds  since the film began, rising
    */
-  void Add(const std::uint8_t* pixels, int width, int height, std::size_t stride);
+  void Add(const std::uint8_t* pixels, int width, int height, std::size_t stride, double seconds);
 
   std::uint64_t Dropped() const;
 

@@ -8,6 +8,7 @@ namespace coronary
 {
 namespace
 {
+constexpr double Drawn = 250.0; // mm behind the way that can be drawn
 constexpr double TangentLength =
   3.0; // mm over which the direction of the vessel at its ostium is measured
 
@@ -64,8 +65,9 @@ CatheterPath::CatheterPath(const std::vector<Vector3>& axis, const GuideCatheter
   Vector3 side = this->RestSide;
   const double step = 0.01;
   double travelled = 0.0;
+  const int drawn = this->Behind + static_cast<int>(Drawn / this->Spacing);
   this->Local.reserve(this->Behind);
-  for (int i = 1; i <= this->Behind; ++i)
+  for (int i = 1; i <= drawn; ++i)
   {
     const double wanted = i * this->Spacing;
     while (travelled < wanted - 0.5 * step)
@@ -94,7 +96,7 @@ CatheterPath::CatheterPath(const std::vector<Vector3>& axis, const GuideCatheter
       place += 0.5 * step * way;
       travelled += step;
     }
-    this->Local.push_back(place);
+    (i <= this->Behind ? this->Local : this->Further).push_back(place);
   }
   this->Now.resize(this->Behind + 1 + inside);
   this->Tangents.resize(this->Now.size());
@@ -103,6 +105,20 @@ CatheterPath::CatheterPath(const std::vector<Vector3>& axis, const GuideCatheter
   this->Current = this->Now;
   this->Next = this->Now;
   this->Frames();
+  const Matrix3 frame = this->FirstFrame();
+  for (Vector3& point : this->Further)
+  {
+    point = frame.transpose() * (axis.front() + point - this->Now.front());
+  }
+}
+
+/// Axes of the place that is furthest behind, as columns.
+Matrix3 CatheterPath::FirstFrame() const
+{
+  Matrix3 frame;
+  frame << this->Tangents.front(), this->Sides.front(),
+    this->Tangents.front().cross(this->Sides.front());
+  return frame;
 }
 
 void CatheterPath::Shape(const std::vector<Vector3>& axis, std::vector<Vector3>& points) const
@@ -221,6 +237,15 @@ void CatheterPath::Line(double u, double length, std::vector<Vector3>& line) con
   for (int i = from; i >= 0 && static_cast<double>(line.size()) < whole; --i)
   {
     line.push_back(this->Now[i]);
+  }
+  // It is drawn coarsely where it only hangs in the aorta.
+  constexpr std::size_t Step = 8;
+  const Matrix3 frame = this->FirstFrame();
+  std::size_t points = line.size();
+  for (std::size_t i = Step - 1;
+       i < this->Further.size() && static_cast<double>(points += Step) < whole; i += Step)
+  {
+    line.emplace_back(this->Now.front() + frame * this->Further[i]);
   }
 }
 }

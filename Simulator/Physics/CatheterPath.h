@@ -63,12 +63,15 @@ public:
 private:
   void Shape(const std::vector<Vector3>& axis, std::vector<Vector3>& points) const;
   void Frames();
+  Matrix3 FirstFrame() const;
 
   double Spacing = 0.5;
   int Behind = 0; ///< points before the ostium
   Vector3 RestTangent = Vector3::UnitZ();
   Vector3 RestSide = Vector3::UnitX();
   std::vector<Vector3> Local; ///< behind the ostium, in its frame at rest, nearest first
+  std::vector<Vector3>
+    Further; ///< behind the first place of the way, in that place's frame; only drawn
   std::vector<Vector3> Current;
   std::vector<Vector3> Next;
   std::vector<Vector3> Now;

@@ -16,8 +16,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double FloppyTip = 35.0; // mm from the tip in which segments have two samples
-constexpr double ShortTip = 12.0;  // mm from the tip on which segments are half as long
+constexpr double DrawnCatheter = 220.0; // mm
+constexpr double FloppyTip = 35.0;      // mm from the tip in which segments have two samples
+constexpr double ShortTip = 12.0;       // mm from the tip on which segments are half as long
 constexpr double StartInside =
   2.0; // mm of the catheter between its tip and the wire's, at the beginning
 constexpr double SoftTip = 3.0;   // mm of the catheter
@@ -814,7 +815,7 @@ const std::vector<Vector3>& Intervention::Centerline() const
 const std::vector<Vector3>& Intervention::CatheterLine() const
 {
   Internals& data = *this->Data;
-  data.Path->Line(data.CatheterTip, 150.0, data.CatheterPoints);
+  data.Path->Line(data.CatheterTip, DrawnCatheter, data.CatheterPoints);
   return data.CatheterPoints;
 }
 

@@ -54,7 +54,7 @@ HeartShell::HeartShell(const PhantomSettings& phantom)
   for (const Vector3& direction : Directions())
   {
     rest.push_back(
-      frame.ToWorld(HeartFrame::Centre + Inside * HeartFrame::Radii.cwiseProduct(direction)));
+      frame.ToWorld(HeartFrame::Centre + Below * HeartFrame::Radii.cwiseProduct(direction)));
   }
   std::vector<std::vector<Vector3>> samples;
   for (const double phase : EvenPhases())

@@ -171,40 +171,56 @@ void SessionImager::ProjectInstruments(
   const SessionSnapshot& snapshot, const CArmGeometry& geometry)
 {
   std::fill(this->InstrumentLayer.values.begin(), this->InstrumentLayer.values.end(), 0.0F);
+  AddInstrument(this->WireOf(snapshot), geometry, this->InstrumentLayer);
+  const auto addCatheter = [&](const InstrumentSegment& segment)
+  {
+    const std::size_t segments = std::max<std::size_t>(1, snapshot.catheter.size()) - 1;
+    AddInstrument({ snapshot.catheter, std::vector<InstrumentSegment>(segments, segment) },
+      geometry, this->InstrumentLayer);
+  };
+  const GuideCatheter& guide = this->Scenario_.catheter;
+  const double wall = (1.0 - BraidShare) * this->Materials.Of(XRayMaterial::BariumPolymer) +
+    BraidShare * this->Materials.Of(XRayMaterial::StainlessSteel);
+  addCatheter({ guide.outerRadius, guide.innerRadius, wall });
+  if (snapshot.contrast.injected > 0.0)
+  {
+    // Nobody flushes it: what was injected last stays in it.
+    addCatheter({ guide.innerRadius, 0.0, this->NeatContrast });
+  }
+}
+
+InstrumentChain SessionImager::WireOf(const SessionSnapshot& snapshot) const
+{
   const double steel = this->Materials.Of(XRayMaterial::StainlessSteel);
   const double platinum = this->Materials.Of(XRayMaterial::Platinum);
-  if (snapshot.wire.size() > 1)
+  InstrumentChain wire;
+  wire.points = snapshot.wire;
+  // Behind what is simulated it lies in the catheter.
+  double inCatheter = 0.0;
+  for (std::size_t n = 1; n < snapshot.catheter.size() && !wire.points.empty(); ++n)
   {
-    InstrumentChain wire;
-    wire.points = snapshot.wire;
-    double along = 0.0;
-    for (std::size_t n = 0; n + 1 < snapshot.wire.size(); ++n)
+    inCatheter += (snapshot.catheter[n] - snapshot.catheter[n - 1]).norm();
+    if (inCatheter > this->Scenario_.settings.insideCatheter + 1.0)
     {
-      const double length = (snapshot.wire[n + 1] - snapshot.wire[n]).norm();
-      const double middle = along + 0.5 * length;
-      InstrumentSegment segment;
-      segment.outerRadius = AlongWire(
-        this->Scenario_.wire, middle, [](const WireSection& section) { return section.radius; });
-      // The coil of the tip is a tube of platinum wire, about a third of its radius thick.
-      const bool coil = middle < CoilLength;
-      segment.innerRadius = coil ? 0.65 * segment.outerRadius : 0.0;
-      segment.attenuation = coil ? platinum : steel;
-      wire.segments.push_back(segment);
-      along += length;
+      wire.points.push_back(snapshot.catheter[n]);
     }
-    AddInstrument(wire, geometry, this->InstrumentLayer);
   }
-  if (snapshot.catheter.size() > 1)
+  double along = 0.0;
+  for (std::size_t n = 0; n + 1 < wire.points.size(); ++n)
   {
-    const GuideCatheter& guide = this->Scenario_.catheter;
-    InstrumentChain catheter;
-    catheter.points = snapshot.catheter;
-    const double wall =
-      (1.0 - BraidShare) * this->Materials.Of(XRayMaterial::BariumPolymer) + BraidShare * steel;
-    catheter.segments.assign(
-      snapshot.catheter.size() - 1, { guide.outerRadius, guide.innerRadius, wall });
-    AddInstrument(catheter, geometry, this->InstrumentLayer);
+    const double length = (wire.points[n + 1] - wire.points[n]).norm();
+    const double middle = along + 0.5 * length;
+    InstrumentSegment segment;
+    segment.outerRadius = AlongWire(
+      this->Scenario_.wire, middle, [](const WireSection& section) { return section.radius; });
+    // The coil of the tip is a tube of platinum wire, about a third of its radius thick.
+    const bool coil = middle < CoilLength;
+    segment.innerRadius = coil ? 0.65 * segment.outerRadius : 0.0;
+    segment.attenuation = coil ? platinum : steel;
+    wire.segments.push_back(segment);
+    along += length;
   }
+  return wire;
 }
 
 void SessionImager::ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry)

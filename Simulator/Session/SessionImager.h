@@ -80,6 +80,7 @@ public:
 private:
   CArmGeometry GeometryOf(const CArmPose& pose, double fieldOfView) const;
   void ProjectInstruments(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
+  InstrumentChain WireOf(const SessionSnapshot& snapshot) const;
   void ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
 
   Scenario Scenario_;
