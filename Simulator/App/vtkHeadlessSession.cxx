@@ -142,7 +142,12 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
   for (const int branch : metrics.branches)
   {
     const auto n = static_cast<std::size_t>(branch);
-    branches.push_back(n < topology.groupName.size() ? topology.groupName[n] : "");
+    const std::string name = n < topology.groupName.size() ? topology.groupName[n] : "";
+    // Parts of one segment between its side branches are one for people.
+    if (branches.empty() || branches.back() != name)
+    {
+      branches.push_back(name);
+    }
   }
   return { { "procedure_s", metrics.procedureSeconds },
     { "fluoroscopy_s", metrics.fluoroscopySeconds }, { "cine_s", metrics.cineSeconds },

@@ -272,8 +272,11 @@ void vtkSimulatorScene::LookAsCArm(const CArmPose& pose)
   camera->SetFocalPoint(pose.isocentre.data());
   camera->SetPosition(from.data());
   camera->SetViewUp(up.data());
-  this->Renderer_->ResetCamera();
-  camera->Zoom(1.35);
+  // On the arteries and the heart, not on all of the catheter.
+  std::array<double, 6> box{};
+  this->WallMesh->GetPoints()->GetBounds(box.data());
+  this->Renderer_->ResetCamera(box.data());
+  camera->Zoom(1.25);
   this->Renderer_->ResetCameraClippingRange();
 }
 

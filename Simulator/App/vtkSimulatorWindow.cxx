@@ -7,6 +7,7 @@
 #include "Interruption.h"
 #include "KeyboardDevice.h"
 #include "PanelDevice.h"
+#include "RecordedDevices.h"
 #include "TraceWidget.h"
 #include "vtkEvaluationPictures.h"
 #include "vtkSimulatorScene.h"
@@ -759,7 +760,10 @@ void Window::Begin(const std::string& record, const std::string& replay)
   this->Mux = std::make_shared<DeviceMux>();
   if (!this->Options.script.empty())
   {
-    this->Mux->Add(OpenDevice("script:" + this->Options.script));
+    auto script =
+      std::make_shared<ScriptDevice>(ReadDriveScript(this->Options.script), this->Options.script);
+    script->SetStart(StartInputOf(scenario));
+    this->Mux->Add(script);
   }
   for (const std::shared_ptr<Device>& device : this->Hardware)
   {
@@ -909,8 +913,7 @@ void Window::ShowImage()
   {
     const GreyImage& image = this->Shown.image;
     const SessionSnapshot& moment = this->Shown.moment;
-    this->Igtl->SendImage(
-      "Fluoroscopy", image, moment.fieldOfView / image.columns, moment.seconds);
+    this->Igtl->SendImage("Fluoroscopy", image, moment.fieldOfView / image.columns, moment.seconds);
   }
 }
 
@@ -942,9 +945,12 @@ void Window::ShowNumbers(const SessionSnapshot& now)
       .arg(now.contrast.spilled, 0, 'f', 2));
   const SessionMetrics& metrics = now.metrics;
   QString branches;
+  QString last;
   for (const int branch : metrics.branches)
   {
-    branches += (branches.isEmpty() ? "" : ", ") + nameOf(branch);
+    const QString name = nameOf(branch);
+    branches += name == last ? QString() : (branches.isEmpty() ? "" : ", ") + name;
+    last = name;
   }
   this->MetricsText->setText(
     QString("Time  %1 s    Fluoroscopy  %2 s (cine %3 s)\nDose  %4 mGy, %5 Gy cm%6, %7 frames\n"

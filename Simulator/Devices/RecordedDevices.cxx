@@ -30,7 +30,7 @@ void ScriptDevice::Read(std::uint64_t tick, double secondsPerTick, InputFrame& f
 {
   const double seconds = static_cast<double>(tick + 1) / RateOf(secondsPerTick);
   frame = {};
-  frame.input = this->Script.At(seconds);
+  frame.input = this->Script.At(seconds, this->Start);
   frame.axes = AllAxes;
   const bool over = seconds >= this->Script.Duration() + secondsPerTick;
   frame.state = over ? DeviceState::Ended : DeviceState::Running;

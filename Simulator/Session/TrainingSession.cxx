@@ -80,6 +80,7 @@ struct TrainingSession::Internals
   CArmPose Pose;
   SessionReport Report;
   SessionMetrics Metrics;
+  SessionInput Start;
   SessionInput Last;
   double Plunger = 0.0;   // mL
   double Delivered = 0.0; // mL: where the plunger would be for what has left the syringe
@@ -167,22 +168,27 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   }
 }
 
-TrainingSession::TrainingSession(std::shared_ptr<WallMotion> wall, const Scenario& scenario)
-  : Data(std::make_unique<Internals>(std::move(wall), scenario))
+SessionInput StartInputOf(const Scenario& scenario)
 {
-  this->Data->Last = this->StartInput();
-}
-
-TrainingSession::~TrainingSession() = default;
-
-SessionInput TrainingSession::StartInput() const
-{
-  const CArmPose& pose = this->Data->Imaging.pose;
+  const CArmPose& pose = scenario.imaging.pose;
   SessionInput input;
   input.primary = pose.primary;
   input.secondary = pose.secondary;
   input.sourceToDetector = pose.sourceToDetector;
   return input;
+}
+
+TrainingSession::TrainingSession(std::shared_ptr<WallMotion> wall, const Scenario& scenario)
+  : Data(std::make_unique<Internals>(std::move(wall), scenario))
+{
+  this->Data->Last = this->Data->Start = StartInputOf(scenario);
+}
+
+TrainingSession::~TrainingSession() = default;
+
+const SessionInput& TrainingSession::StartInput() const
+{
+  return this->Data->Start;
 }
 
 const SessionReport& TrainingSession::Step(const SessionInput& input)

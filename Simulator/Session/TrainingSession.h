@@ -77,6 +77,9 @@ struct SessionSnapshot
   std::vector<float> tracerVolumes;  ///< mL of contrast medium
 };
 
+/// Hands and feet at rest, the C-arm where the scenario has it.
+SessionInput StartInputOf(const Scenario& scenario);
+
 /**
  * Deterministic: the same binary, vessels, scenario, inputs and events give the same bits. One thread.
  */
@@ -89,8 +92,8 @@ public:
   TrainingSession(const TrainingSession&) = delete;
   TrainingSession& operator=(const TrainingSession&) = delete;
 
-  /// What SessionInput says at the start: the scenario's view.
-  SessionInput StartInput() const;
+  /// StartInputOf its scenario.
+  const SessionInput& StartInput() const;
 
   /// One step of 1 / tickRate.
   const SessionReport& Step(const SessionInput& input);
