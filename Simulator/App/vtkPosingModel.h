@@ -48,12 +48,12 @@ struct PosingSettings
 /// What the deformation has come to.
 struct PosingReport
 {
-  double greatestDisplacement = 0.0;   ///< of a point of the mesh, mm
-  double greatestStrain = 0.0;         ///< of a bone, |posed / rest length - 1|
-  double leastVolumeRatio = 1.0;       ///< signed volume of a tetrahedron / that at rest
-  double greatestVolumeRatio = 1.0;    ///< the same
-  std::int64_t inverted = 0;           ///< tetrahedra that are inverted, after a repair
-  std::int64_t repaired = 0;           ///< tetrahedra that were repaired
+  double greatestDisplacement = 0.0;    ///< of a point of the mesh, mm
+  double greatestStrain = 0.0;          ///< of a bone, |posed / rest length - 1|
+  double leastVolumeRatio = 1.0;        ///< signed volume of a tetrahedron / that at rest
+  double greatestVolumeRatio = 1.0;     ///< the same
+  std::int64_t inverted = 0;            ///< tetrahedra that are inverted, after a repair
+  std::int64_t repaired = 0;            ///< tetrahedra that were repaired
   double deformationMilliseconds = 0.0; ///< wall time of the last pose and deformation
 };
 
@@ -84,7 +84,7 @@ public:
   std::int64_t NumberOfJoints() const { return this->Rig.NumberOfJoints(); }
   std::int64_t Parent(std::int64_t joint) const; ///< -1 at a root
   std::vector<std::int64_t> Daughters(std::int64_t joint) const;
-  Vector3 Joint(std::int64_t joint) const;      ///< where it is now, mm
+  Vector3 Joint(std::int64_t joint) const;        ///< where it is now, mm
   std::string BoneName(std::int64_t joint) const; ///< of the bone that ends in it; empty: none
 
   ///@{
@@ -98,7 +98,7 @@ public:
   void MoveTo(const Vector3& wanted);
   void EndMove();
   void CancelMove();
-  bool Moving() const { return this->MoveStart != nullptr; }
+  bool Moving() const;
   ///@}
 
   ///@{
@@ -106,7 +106,7 @@ public:
   /// @throws std::runtime_error as MoveTo
   void Move(const Vector3& millimetres);
   void Turn(const Vector3& axisTimesRadians); ///< all beyond the joint about it
-  void Twist(double radians); ///< all beyond the joint about the bone that ends in it
+  void Twist(double radians);              ///< all beyond the joint about the bone that ends in it
   void Widen(double factor, double reach); ///< of the radius; reach: mm along the skeleton
   ///@}
 
@@ -128,28 +128,31 @@ public:
   /// @throws std::runtime_error naming the file
   void WriteSurface(const std::string& path) const;
 
-  vtkPolyData* Pose() const { return this->Current; } ///< of vtkSkeletonPose
-  vtkPolyData* BoundaryAtRest() const { return this->Boundary; }
+  vtkPolyData* Pose() const; ///< of vtkSkeletonPose
+  vtkPolyData* BoundaryAtRest() const;
   /// Of vtkSkinDeformation; its first points are those of the boundary.
   vtkUnstructuredGrid* Skin() const;
   const PosingReport& Report() const { return this->Report_; }
 
 private:
-  void MoveFrom(vtkPolyData* start, const Vector3& wanted);
+  /// At least the joint itself, which comes last.
+  std::vector<std::int64_t> Chain(std::int64_t joint) const;
+  vtkSmartPointer<vtkPolyData> Moved(vtkPolyData* start, const Vector3& wanted);
   vtkSmartPointer<vtkPolyData> Placed(
     vtkPolyData* start, std::int64_t joint, const Vector3& wanted, int mode);
-  std::vector<std::int64_t> Chain(std::int64_t joint) const;
-  void Edit(double twist, const Vector3& degrees, double calibre, double reach);
-  vtkSmartPointer<vtkPolyData> PosedBy(vtkPolyData* start);
+  void Edit(double twist, const Vector3& turn, double calibre, double reach);
+  vtkSmartPointer<vtkPolyData> Posed(vtkPolyData* start);
   void Push(const vtkSmartPointer<vtkPolyData>& pose);
   void Show(const vtkSmartPointer<vtkPolyData>& pose, bool repair);
-  void ReportOn(vtkUnstructuredGrid* skin);
+  void Deform(vtkPolyData* pose, bool repair);
+  void MakeReport(vtkPolyData* pose);
 
   vtkMessageTrap& Messages;
   vtkSmartPointer<vtkPolyData> Rest;
   vtkSmartPointer<vtkPolyData> Boundary;
   vtkSmartPointer<vtkUnstructuredGrid> Mesh;
   SkeletonRig Rig;
+  std::vector<std::int64_t> BoneInto; ///< per joint: the bone that ends in it, -1 at a root
   vtkNew<vtkSkeletonPose> Poser;
   vtkNew<vtkSkinDeformation> Deformer;
   PosingSettings Settings_;
@@ -178,7 +181,8 @@ struct PosingOptions
   std::vector<PosingMove> moves; ///< done one after the other at the start
   std::string output;            ///< pose after the moves, .vtp; empty: not written
   std::string surface;           ///< surface after the moves, .vtp; empty: not written
-  std::string screenshots; ///< folder for a picture before the first and after every move; then the window closes
+  std::string
+    screenshots; ///< folder for a picture before the first and after every move; then the window closes
   std::int64_t triangles = 40000; ///< that are drawn at most
   int width = 1500;
   int height = 860;

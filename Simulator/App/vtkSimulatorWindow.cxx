@@ -1115,8 +1115,8 @@ void Window::closeEvent(QCloseEvent* event)
   this->End();
   event->accept();
 }
+}
 
-/// @throws std::runtime_error
 void RequireOpenGL()
 {
   QOffscreenSurface surface;
@@ -1131,7 +1131,6 @@ void RequireOpenGL()
                              "sessions without a window run with --headless.");
   }
   context.doneCurrent();
-}
 }
 
 void RequireDisplay()
