@@ -7,6 +7,7 @@
 #include "vtkSkeletonPose.h"
 #include "vtkSkinDeformation.h"
 
+#include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
@@ -89,9 +90,9 @@ void RequireSamePoints(vtkPolyData* boundary, vtkUnstructuredGrid* mesh, const s
 {
   const std::string path = FileOfRun(folder, "volume_boundary.vtp");
   const std::string other = FileOfRun(folder, "weights.vtu");
-  if (boundary->GetNumberOfPolys() == 0)
+  if (boundary->GetNumberOfPolys() == 0 || boundary->GetPolys()->IsHomogeneous() != 3)
   {
-    Fail(path, "is no surface: it has no polygons");
+    Fail(path, "is no surface of triangles");
   }
   for (vtkIdType n = 0; n < boundary->GetNumberOfPoints(); ++n)
   {
@@ -164,6 +165,13 @@ void BendChain(std::vector<Vector3>& places, const Vector3& wanted)
       places = std::move(bent);
     }
   }
+}
+
+/// Along the axis, as long as the angle.
+Vector3 AngleVector(const Quaternion& rotation)
+{
+  const Eigen::AngleAxisd turn(rotation);
+  return turn.angle() * turn.axis();
 }
 
 /// What is missing is spread evenly over the bones.
@@ -342,50 +350,57 @@ void vtkPosingModel::Move(const Vector3& millimetres)
 vtkSmartPointer<vtkPolyData> vtkPosingModel::Moved(vtkPolyData* start, const Vector3& wanted)
 {
   const std::vector<std::int64_t> chain = this->Chain(this->Chosen_);
+  this->Poser->RemoveAllEdits();
   if (this->Settings_.drag != JointDrag::Turn || chain.size() == 1)
   {
-    return this->Placed(start, this->Chosen_, wanted,
-      this->Settings_.drag == JointDrag::Alone ? vtkSkeletonPose::MoveAlone
-                                               : vtkSkeletonPose::MoveBeyond);
+    this->Poser->MoveJointOn();
+    this->Poser->SetJoint(this->Chosen_);
+    this->Poser->SetMoveMode(this->Settings_.drag == JointDrag::Alone
+        ? vtkSkeletonPose::MoveAlone
+        : vtkSkeletonPose::MoveBeyond);
+    this->Poser->SetJointPosition(wanted.x(), wanted.y(), wanted.z());
+    return this->Posed(start);
   }
+  this->Poser->MoveJointOff();
   std::vector<Vector3> places;
   for (const std::int64_t joint : chain)
   {
     places.push_back(PointOf(start, joint));
   }
-  BendChain(places, wanted);
+  std::vector<Vector3> bent = places;
+  BendChain(bent, wanted);
   if (!this->Settings_.keepLengths)
   {
-    StretchChain(places, wanted);
+    StretchChain(bent, wanted);
   }
-  vtkSmartPointer<vtkPolyData> pose = start;
-  for (std::size_t n = 1; n < chain.size(); ++n)
+  for (std::size_t k = 1; k < chain.size(); ++k)
   {
-    pose = this->Placed(pose, chain[n], places[n],
-      this->Settings_.keepLengths ? vtkSkeletonPose::TurnBoneOnly : vtkSkeletonPose::TurnBone);
+    // A bone turns about its first joint with all beyond it, the rest of the chain too.
+    const Vector3 here = places[k];
+    const Quaternion turn = LeastRotation(here - places[k - 1], bent[k] - places[k - 1]);
+    for (std::size_t n = k; n < chain.size(); ++n)
+    {
+      places[n] = bent[k] + turn * (places[n] - here);
+    }
+    this->AddEdit(chain[k], 0.0, AngleVector(turn), bent[k] - here, 1.0, 0.0);
   }
-  return pose;
+  return this->Posed(start);
 }
 
-vtkSmartPointer<vtkPolyData> vtkPosingModel::Placed(
-  vtkPolyData* start, std::int64_t joint, const Vector3& wanted, int mode)
+void vtkPosingModel::AddEdit(std::int64_t joint, double twist, const Vector3& turn,
+  const Vector3& shift, double calibre, double reach)
 {
-  this->Poser->RemoveAllEdits();
-  this->Poser->MoveJointOn();
-  this->Poser->SetJoint(joint);
-  this->Poser->SetMoveMode(mode);
-  this->Poser->SetJointPosition(wanted.x(), wanted.y(), wanted.z());
-  return this->Posed(start);
+  const Vector3 degrees = turn / Degree;
+  this->Poser->AddEdit(static_cast<double>(joint), twist / Degree, degrees.x(), degrees.y(),
+    degrees.z(), shift.x(), shift.y(), shift.z(), calibre, reach);
 }
 
 void vtkPosingModel::Edit(double twist, const Vector3& turn, double calibre, double reach)
 {
   this->CancelMove();
-  const Vector3 degrees = turn / Degree;
   this->Poser->RemoveAllEdits();
   this->Poser->MoveJointOff();
-  this->Poser->AddEdit(static_cast<double>(this->Chosen_), twist / Degree, degrees.x(), degrees.y(),
-    degrees.z(), 0.0, 0.0, 0.0, calibre, reach);
+  this->AddEdit(this->Chosen_, twist, turn, Vector3::Zero(), calibre, reach);
   this->Push(this->Posed(this->Current));
 }
 

@@ -138,8 +138,8 @@ private:
   /// At least the joint itself, which comes last.
   std::vector<std::int64_t> Chain(std::int64_t joint) const;
   vtkSmartPointer<vtkPolyData> Moved(vtkPolyData* start, const Vector3& wanted);
-  vtkSmartPointer<vtkPolyData> Placed(
-    vtkPolyData* start, std::int64_t joint, const Vector3& wanted, int mode);
+  void AddEdit(std::int64_t joint, double twist, const Vector3& turn, const Vector3& shift,
+    double calibre, double reach);
   void Edit(double twist, const Vector3& turn, double calibre, double reach);
   vtkSmartPointer<vtkPolyData> Posed(vtkPolyData* start);
   void Push(const vtkSmartPointer<vtkPolyData>& pose);

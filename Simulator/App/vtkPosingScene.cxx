@@ -8,7 +8,6 @@
 #include "vtkCellData.h"
 #include "vtkDecimatePro.h"
 #include "vtkFloatArray.h"
-#include "vtkGlyph3DMapper.h"
 #include "vtkIdTypeArray.h"
 #include "vtkPointData.h"
 #include "vtkPoints.h"
@@ -16,7 +15,6 @@
 #include "vtkPolyDataMapper.h"
 #include "vtkProperty.h"
 #include "vtkRenderer.h"
-#include "vtkSphereSource.h"
 #include "vtkUnstructuredGrid.h"
 
 #include <algorithm>
@@ -28,31 +26,29 @@ namespace coronary
 {
 namespace
 {
-constexpr double JointRadius = 0.8; // mm
+constexpr float JointSize = 9.0F; // pixels
+constexpr float ChosenSize = 16.0F;
+constexpr double LargestFeatureAngle = 60.0; // degrees; thin vessels have a few triangles around
 
 /// Means of the triangles around, weighted by their areas.
-void FindNormals(vtkPolyData* surface, vtkFloatArray* normals)
+void FindNormals(
+  const std::vector<Triangle>& triangles, const vtkFloatArray* points, vtkFloatArray* normals)
 {
-  normals->Fill(0.0);
-  auto* points = vtkFloatArray::SafeDownCast(surface->GetPoints()->GetData());
-  const auto at = [](vtkFloatArray* array, vtkIdType n)
-  { return Eigen::Map<Eigen::Vector3f>(array->GetPointer(3 * n)); };
-  for (vtkIdType cell = 0; cell < surface->GetNumberOfPolys(); ++cell)
+  using Places = Eigen::Map<const Eigen::Matrix3Xf>;
+  const vtkIdType count = normals->GetNumberOfTuples();
+  const Places place(const_cast<vtkFloatArray*>(points)->GetPointer(0), 3, count);
+  Eigen::Map<Eigen::Matrix3Xf> normal(normals->GetPointer(0), 3, count);
+  normal.setZero();
+  for (const Triangle& t : triangles)
   {
-    vtkIdType count = 0;
-    const vtkIdType* ids = nullptr;
-    surface->GetPolys()->GetCellAtId(cell, count, ids);
-    const Eigen::Vector3f normal =
-      (at(points, ids[1]) - at(points, ids[0])).cross(at(points, ids[2]) - at(points, ids[0]));
-    for (vtkIdType corner = 0; corner < count; ++corner)
+    const Eigen::Vector3f first = place.col(t[0]);
+    const Eigen::Vector3f area = (place.col(t[1]) - first).cross(place.col(t[2]) - first);
+    for (const std::int64_t corner : t)
     {
-      at(normals, ids[corner]) += normal;
+      normal.col(corner) += area;
     }
   }
-  for (vtkIdType n = 0; n < normals->GetNumberOfTuples(); ++n)
-  {
-    at(normals, n).normalize();
-  }
+  normal.colwise().normalize();
   normals->Modified();
 }
 }
@@ -61,6 +57,10 @@ vtkPosingScene::vtkPosingScene(const vtkPosingModel& model, std::int64_t triangl
   : Model(model)
 {
   this->Renderer_->SetBackground(1.0, 1.0, 1.0);
+  // Joints are seen through the vessels, also where these are opaque, which is drawn faster.
+  this->Front->SetLayer(1);
+  this->Front->InteractiveOff();
+  this->Front->SetActiveCamera(this->Renderer_->GetActiveCamera());
   this->MakeVessels(triangles);
   this->MakeSkeleton();
   this->Update();
@@ -87,12 +87,20 @@ void vtkPosingScene::MakeVessels(std::int64_t triangles)
   fewer->SetTargetReduction(std::clamp(1.0 - share, 0.0, 0.999));
   fewer->PreserveTopologyOn();
   fewer->SplittingOff();
+  fewer->SetFeatureAngle(LargestFeatureAngle);
   fewer->BoundaryVertexDeletionOff();
   fewer->Update();
   vtkPolyData* drawn = fewer->GetOutput();
   auto* kept = vtkIdTypeArray::SafeDownCast(drawn->GetPointData()->GetArray("Origin"));
   this->Drawn.assign(kept->Begin(), kept->End());
   this->Vessels->SetPolys(drawn->GetPolys());
+  for (vtkIdType cell = 0; cell < drawn->GetNumberOfPolys(); ++cell)
+  {
+    vtkIdType count = 0;
+    const vtkIdType* ids = nullptr;
+    drawn->GetPolys()->GetCellAtId(cell, count, ids);
+    this->Triangles.push_back({ ids[0], ids[1], ids[2] });
+  }
   vtkNew<vtkPoints> points;
   points->SetDataTypeToFloat();
   points->SetNumberOfPoints(drawn->GetNumberOfPoints());
@@ -106,10 +114,10 @@ void vtkPosingScene::MakeVessels(std::int64_t triangles)
   this->VesselActor->SetMapper(mapper);
   vtkProperty* look = this->VesselActor->GetProperty();
   look->SetColor(0.86, 0.66, 0.55);
-  look->SetOpacity(0.55);
+  look->SetOpacity(1.0);
   look->SetSpecular(0.2);
   look->SetSpecularPower(30.0);
-  look->BackfaceCullingOn(); // half of what is translucent, and quicker
+  look->BackfaceCullingOn();
   this->Renderer_->AddActor(this->VesselActor);
 }
 
@@ -124,28 +132,32 @@ void vtkPosingScene::MakeSkeleton()
   bones->GetProperty()->SetColor(0.1, 0.1, 0.35);
   bones->GetProperty()->SetLineWidth(2.0F);
   bones->GetProperty()->LightingOff();
-  this->Renderer_->AddActor(bones);
-  vtkNew<vtkSphereSource> sphere;
-  sphere->SetRadius(JointRadius);
-  vtkNew<vtkGlyph3DMapper> balls;
-  balls->SetInputData(this->Skeleton);
-  balls->SetSourceConnection(sphere->GetOutputPort());
-  balls->ScalingOff();
-  balls->OrientOff();
-  balls->ScalarVisibilityOff();
-  vtkNew<vtkActor> joints;
-  joints->SetMapper(balls);
-  joints->GetProperty()->SetColor(0.9, 0.05, 0.05);
-  this->Renderer_->AddActor(joints);
-  vtkNew<vtkSphereSource> large;
-  large->SetRadius(1.7 * JointRadius);
-  large->SetThetaResolution(20);
-  large->SetPhiResolution(20);
-  vtkNew<vtkPolyDataMapper> mapper;
-  mapper->SetInputConnection(large->GetOutputPort());
-  this->ChosenActor->SetMapper(mapper);
-  this->ChosenActor->GetProperty()->SetColor(1.0, 0.85, 0.0);
-  this->Renderer_->AddActor(this->ChosenActor);
+  this->Front->AddActor(bones);
+  const auto showPoints = [this](vtkPolyData* points, double red, double green, float size)
+  {
+    vtkNew<vtkPolyDataMapper> mapper;
+    mapper->SetInputData(points);
+    mapper->ScalarVisibilityOff();
+    vtkNew<vtkActor> actor;
+    actor->SetMapper(mapper);
+    actor->GetProperty()->SetColor(red, green, 0.0);
+    actor->GetProperty()->RenderPointsAsSpheresOn();
+    actor->GetProperty()->SetPointSize(size);
+    this->Front->AddActor(actor);
+  };
+  showPoints(this->Joints, 0.9, 0.0, JointSize);
+  showPoints(this->Chosen, 1.0, 0.85, ChosenSize);
+  vtkNew<vtkCellArray> all;
+  const vtkIdType joints = this->Model.NumberOfJoints();
+  for (vtkIdType n = 0; n < joints; ++n)
+  {
+    all->InsertNextCell(1, &n);
+  }
+  this->Joints->SetVerts(all);
+  vtkNew<vtkCellArray> one;
+  const vtkIdType first = 0;
+  one->InsertNextCell(1, &first);
+  this->Chosen->SetVerts(one);
 }
 
 std::int64_t vtkPosingScene::NumberOfTriangles() const
@@ -155,20 +167,21 @@ std::int64_t vtkPosingScene::NumberOfTriangles() const
 
 void vtkPosingScene::Update()
 {
-  vtkPoints* skin = this->Model.Skin()->GetPoints();
-  vtkPoints* points = this->Vessels->GetPoints();
+  auto* skin = vtkFloatArray::SafeDownCast(this->Model.Skin()->GetPoints()->GetData());
+  auto* points = vtkFloatArray::SafeDownCast(this->Vessels->GetPoints()->GetData());
   for (std::size_t n = 0; n < this->Drawn.size(); ++n)
   {
-    double place[3];
-    skin->GetPoint(this->Drawn[n], place);
-    points->SetPoint(static_cast<vtkIdType>(n), place);
+    std::copy_n(
+      skin->GetPointer(3 * this->Drawn[n]), 3, points->GetPointer(static_cast<vtkIdType>(3 * n)));
   }
-  points->Modified();
-  FindNormals(this->Vessels, this->Normals);
+  this->Vessels->GetPoints()->Modified();
+  FindNormals(this->Triangles, points, this->Normals);
   this->Vessels->Modified();
   this->Skeleton->SetPoints(this->Model.Pose()->GetPoints());
-  const Vector3 chosen = this->Model.Joint(this->Model.Chosen());
-  this->ChosenActor->SetPosition(chosen.x(), chosen.y(), chosen.z());
+  this->Joints->SetPoints(this->Model.Pose()->GetPoints());
+  vtkNew<vtkPoints> chosen;
+  chosen->InsertNextPoint(this->Model.Joint(this->Model.Chosen()).data());
+  this->Chosen->SetPoints(chosen);
   this->Renderer_->ResetCameraClippingRange();
 }
 

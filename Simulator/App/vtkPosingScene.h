@@ -14,7 +14,6 @@
 
 class vtkActor;
 class vtkFloatArray;
-class vtkPoints;
 class vtkPolyData;
 class vtkRenderer;
 
@@ -32,7 +31,8 @@ public:
   vtkPosingScene(const vtkPosingScene&) = delete;
   vtkPosingScene& operator=(const vtkPosingScene&) = delete;
 
-  vtkRenderer* Renderer() const { return this->Renderer_; }
+  vtkRenderer* Renderer() const { return this->Renderer_; }  ///< of the vessels; has the camera
+  vtkRenderer* FrontRenderer() const { return this->Front; } ///< of bones and joints, layer 1
   std::int64_t NumberOfTriangles() const;
 
   /// Takes over the pose, the skin and the choice of the model.
@@ -55,12 +55,15 @@ private:
 
   const vtkPosingModel& Model;
   vtkNew<vtkRenderer> Renderer_;
+  vtkNew<vtkRenderer> Front;
   vtkNew<vtkPolyData> Vessels;
   vtkNew<vtkFloatArray> Normals;
+  std::vector<Triangle> Triangles; ///< of the vessels
   std::vector<std::int64_t> Drawn; ///< per point of the vessels: that of the skin
   vtkNew<vtkPolyData> Skeleton;
+  vtkNew<vtkPolyData> Joints;
+  vtkNew<vtkPolyData> Chosen;
   vtkNew<vtkActor> VesselActor;
-  vtkNew<vtkActor> ChosenActor;
 };
 }
 

@@ -130,6 +130,7 @@ private:
   QCheckBox* LengthsBox = nullptr;
   QDoubleSpinBox* ReachBox = nullptr;
   QLabel* JointText = nullptr;
+  QLabel* PlaceText = nullptr;
   QLabel* StateText = nullptr;
   QAction* UndoAction = nullptr;
   QAction* RedoAction = nullptr;
@@ -150,7 +151,9 @@ Window::Window(const std::string& folder, const PosingOptions& options, vtkMessa
   this->Picture->setMinimumSize(256, 256);
   this->Picture->filter = [this](QEvent& event) { return this->TakeEvent(event); };
   this->RenderWindow->SetMultiSamples(0);
+  this->RenderWindow->SetNumberOfLayers(2);
   this->RenderWindow->AddRenderer(this->Scene.Renderer());
+  this->RenderWindow->AddRenderer(this->Scene.FrontRenderer());
   this->setCentralWidget(this->Picture);
   auto* dock = new QDockWidget("Panel");
   dock->setFeatures(QDockWidget::DockWidgetMovable | QDockWidget::DockWidgetFloatable);
@@ -172,8 +175,9 @@ Window::Window(const std::string& folder, const PosingOptions& options, vtkMessa
 
 Window::~Window()
 {
-  // The scene's renderer goes before the window that draws it.
+  // The scene's renderers go before the window that draws them.
   this->RenderWindow->RemoveRenderer(this->Scene.Renderer());
+  this->RenderWindow->RemoveRenderer(this->Scene.FrontRenderer());
 }
 
 QWidget* Window::MakePanel()
@@ -278,7 +282,9 @@ QGroupBox* Window::MakeJointGroup()
   auto* group = new QGroupBox("Chosen joint");
   auto* form = new QFormLayout(group);
   this->JointText = new QLabel;
-  form->addRow(this->JointText);
+  this->PlaceText = new QLabel;
+  form->addRow("Joint", this->JointText);
+  form->addRow("Place", this->PlaceText);
   const auto pair = [&](const QString& label, const QString& less, const QString& more,
                       const std::function<void(double)>& what)
   {
@@ -602,9 +608,9 @@ void Window::ShowState()
   const PosingReport& report = this->Model.Report();
   const std::int64_t joint = this->Model.Chosen();
   const Vector3 place = this->Model.Joint(joint);
-  this->JointText->setText(QString("Joint %1  %2\n%3  %4  %5 mm")
-                             .arg(joint)
-                             .arg(QString::fromStdString(this->Model.BoneName(joint)))
+  this->JointText->setText(
+    QString("%1  %2").arg(joint).arg(QString::fromStdString(this->Model.BoneName(joint))));
+  this->PlaceText->setText(QString("%1  %2  %3 mm")
                              .arg(place.x(), 0, 'f', 1)
                              .arg(place.y(), 0, 'f', 1)
                              .arg(place.z(), 0, 'f', 1));
@@ -679,18 +685,29 @@ void Window::Begin()
   {
     this->SavePictures(number);
   }
+  std::vector<double> frames;
   for (const PosingMove& move : this->Options.moves)
   {
+    QElapsedTimer clock;
+    clock.start();
     step(
       [&]
       {
         this->Model.Choose(move.joint);
         this->Model.Move(move.millimetres);
       });
+    QApplication::processEvents();
+    frames.push_back(1e-6 * static_cast<double>(clock.nsecsElapsed()));
     if (this->Scripted)
     {
       this->SavePictures(++number);
     }
+  }
+  if (!frames.empty())
+  {
+    const auto middle = frames.begin() + static_cast<std::ptrdiff_t>(frames.size() / 2);
+    std::nth_element(frames.begin(), middle, frames.end());
+    std::printf("%zu moves, %.1f ms a frame (median)\n", frames.size(), *middle);
   }
   if (!this->Options.output.empty())
   {

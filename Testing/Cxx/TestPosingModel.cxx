@@ -389,6 +389,8 @@ TEST_F(TestPosingModel, BadFoldersAreNamed)
   other->GetPoints()->SetPoint(0, 9.0, 9.0, 9.0);
   Save(vtkNew<vtkXMLUnstructuredGridWriter>(), other, folder / "weights.vtu");
   broken("volume_boundary.vtp", "does not belong to");
+  Save(vtkNew<vtkXMLPolyDataWriter>(), ChainTree(Bones), folder / "volume_boundary.vtp");
+  broken("volume_boundary.vtp", "no surface of triangles");
   auto bare = ChainVolume(Bones);
   bare->GetPointData()->Initialize();
   Save(vtkNew<vtkXMLUnstructuredGridWriter>(), bare, folder / "weights.vtu");
