@@ -231,8 +231,22 @@ void Request::DeclarePosing(CLI::App& app)
         "of a session")
       ->type_name("DIR")
       ->group(what);
-  const char* const ofSessions[] = { "--scenario", "--vessels", "--replay", "--script", "--ticks",
-    "--output", "--xray", "--record" };
+  const char* const ofSessions[] = {
+    "--scenario",
+    "--vessels",
+    "--replay",
+    "--script",
+    "--ticks",
+    "--output",
+    "--xray",
+    "--record",
+#ifdef DYNAMICCORONARY_WITH_WINDOW
+    "--device",
+    "--screenshot-at",
+    "--video",
+    "--quit-after",
+#endif
+  };
   for (const char* option : ofSessions)
   {
     folder->excludes(app.get_option(option));
@@ -281,6 +295,14 @@ void Request::RunPosing() const
 #ifdef DYNAMICCORONARY_WITH_WINDOW
   coronary::PosingOptions options = this->posing;
   options.screenshots = this->window.screenshots;
+  if (this->window.triangles != coronary::WindowOptions().triangles)
+  {
+    options.triangles = this->window.triangles;
+  }
+  if (!this->size.empty())
+  {
+    std::sscanf(this->size.c_str(), "%dx%d", &options.width, &options.height);
+  }
   if (coronary::RunPosingWindow(this->pose, options) != 0)
   {
     throw std::runtime_error("posing failed");

@@ -203,7 +203,7 @@ void vtkPosingScene::LookFromFront()
   camera->SetPosition(0.4, -1.0, 0.1);
   camera->SetViewUp(0.0, 0.0, 1.0);
   this->Renderer_->ResetCamera();
-  camera->Zoom(1.4);
+  camera->Zoom(1.25);
   this->Renderer_->ResetCameraClippingRange();
 }
 
