@@ -12,7 +12,9 @@
 #include "ParallelFor.h"
 #include "ProgressDisplay.h"
 #include "SessionWorld.h"
+#include "vtkPosingModel.h"
 #ifdef DYNAMICCORONARY_WITH_WINDOW
+#include "vtkPosingWindow.h"
 #include "vtkSimulatorWindow.h"
 #endif
 
@@ -20,8 +22,11 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <iterator>
 #include <new>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace
 {
@@ -45,6 +50,10 @@ struct Request
   void DeclareWindow(CLI::App& app);
   void RunWindow() const;
 #endif
+  coronary::PosingOptions posing;
+  std::string pose;
+  void DeclarePosing(CLI::App& app);
+  void RunPosing() const;
   std::string dump;
   bool headless = false;
   bool printScenario = false;
@@ -146,6 +155,7 @@ void Request::Declare(CLI::App& app)
 #ifdef DYNAMICCORONARY_WITH_WINDOW
   this->DeclareWindow(app);
 #endif
+  this->DeclarePosing(app);
   const std::string questions = "Instead of a session";
   app.add_flag("--print-scenario", this->printScenario, "Print the scenario in effect as JSON")
     ->group(questions);
@@ -192,6 +202,11 @@ void Request::Run() const
     std::fputs(coronary::ScenarioText(coronary::ScenarioOf(this->session)).c_str(), stdout);
     return;
   }
+  if (!this->pose.empty())
+  {
+    this->RunPosing();
+    return;
+  }
   if (this->headless)
   {
     coronary::RunHeadless(this->session);
@@ -203,6 +218,97 @@ void Request::Run() const
   throw coronary::UsageError(
     "--headless is required: this program was built without its window (Qt5 and VTK's "
     "GUISupportQt were not found)");
+#endif
+}
+
+void Request::DeclarePosing(CLI::App& app)
+{
+  const std::string what = "Posing by hand";
+  auto* folder =
+    app
+      .add_option("--pose", this->pose,
+        "Folder of 'coronary-pipeline run --until weights': pose its skeleton, in place "
+        "of a session")
+      ->type_name("DIR")
+      ->group(what);
+  const char* const ofSessions[] = {
+    "--scenario",
+    "--vessels",
+    "--replay",
+    "--script",
+    "--ticks",
+    "--output",
+    "--xray",
+    "--record",
+#ifdef DYNAMICCORONARY_WITH_WINDOW
+    "--device",
+    "--screenshot-at",
+    "--video",
+    "--quit-after",
+#endif
+  };
+  for (const char* option : ofSessions)
+  {
+    folder->excludes(app.get_option(option));
+  }
+  app
+    .add_option_function<std::vector<std::string>>(
+      "--pose-move",
+      [this](const std::vector<std::string>& texts)
+      {
+        try
+        {
+          std::transform(texts.begin(), texts.end(), std::back_inserter(this->posing.moves),
+            coronary::PosingMoveOf);
+        }
+        catch (const std::invalid_argument& error)
+        {
+          throw CLI::ValidationError("--pose-move", error.what());
+        }
+      },
+      "Move a joint by so many mm; may be repeated")
+    ->type_name("JOINT:DX,DY,DZ")
+    ->needs(folder)
+    ->group(what);
+  app
+    .add_option("--pose-bones", this->posing.settings.bones,
+      "Bones before the moved joint that share the bend")
+    ->check(coronary::WholeWithin(1, 64))
+    ->capture_default_str()
+    ->type_name("N")
+    ->needs(folder)
+    ->group(what);
+  const auto file = [&](const char* name, std::string& path, const char* help)
+  { app.add_option(name, path, help)->type_name("FILE")->needs(folder)->group(what); };
+  file("--pose-start", this->posing.start, "Pose to begin with, .vtp");
+  file("--pose-output", this->posing.output, "Pose after the moves, .vtp");
+  file("--pose-surface", this->posing.surface, "Surface after the moves, .vtp");
+}
+
+void Request::RunPosing() const
+{
+  if (this->headless)
+  {
+    coronary::PoseWithoutWindow(this->pose, this->posing, this->session.quiet);
+    return;
+  }
+#ifdef DYNAMICCORONARY_WITH_WINDOW
+  coronary::PosingOptions options = this->posing;
+  options.screenshots = this->window.screenshots;
+  if (this->window.triangles != coronary::WindowOptions().triangles)
+  {
+    options.triangles = this->window.triangles;
+  }
+  if (!this->size.empty())
+  {
+    std::sscanf(this->size.c_str(), "%dx%d", &options.width, &options.height);
+  }
+  if (coronary::RunPosingWindow(this->pose, options) != 0)
+  {
+    throw std::runtime_error("posing failed");
+  }
+#else
+  throw coronary::UsageError("--pose needs --headless: this program was built without its window");
 #endif
 }
 

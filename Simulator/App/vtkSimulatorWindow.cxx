@@ -1224,8 +1224,8 @@ void Window::closeEvent(QCloseEvent* event)
   this->End();
   event->accept();
 }
+}
 
-/// @throws std::runtime_error
 void RequireOpenGL()
 {
   QOffscreenSurface surface;
@@ -1240,7 +1240,6 @@ void RequireOpenGL()
                              "sessions without a window run with --headless.");
   }
   context.doneCurrent();
-}
 }
 
 void RequireDisplay()

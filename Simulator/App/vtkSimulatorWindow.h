@@ -33,6 +33,9 @@ struct WindowOptions
 /// @throws std::runtime_error: there is no display; quick, so that it can be asked first
 void RequireDisplay();
 
+/// Needs the QApplication. @throws std::runtime_error: the display has no OpenGL 3.2
+void RequireOpenGL();
+
 /**
  * Returns when the window has been closed. Needs a display with OpenGL 3.2.
  * @return 0; 1 when a session failed: the reason was printed
