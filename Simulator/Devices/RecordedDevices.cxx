@@ -20,9 +20,10 @@ double RateOf(double secondsPerTick)
 }
 }
 
-ScriptDevice::ScriptDevice(DriveScript script, std::string name)
+ScriptDevice::ScriptDevice(DriveScript script, std::string name, const SessionInput& start)
   : Script(std::move(script))
   , Name(std::move(name))
+  , Start(start)
 {
 }
 
@@ -30,7 +31,7 @@ void ScriptDevice::Read(std::uint64_t tick, double secondsPerTick, InputFrame& f
 {
   const double seconds = static_cast<double>(tick + 1) / RateOf(secondsPerTick);
   frame = {};
-  frame.input = this->Script.At(seconds);
+  frame.input = this->Script.At(seconds, this->Start);
   frame.axes = AllAxes;
   const bool over = seconds >= this->Script.Duration() + secondsPerTick;
   frame.state = over ? DeviceState::Ended : DeviceState::Running;

@@ -18,7 +18,9 @@ namespace coronary
 class ScriptDevice : public Device
 {
 public:
-  explicit ScriptDevice(DriveScript script, std::string name = "script");
+  /// @param start  where hands and C-arm are before the script moves them
+  explicit ScriptDevice(
+    DriveScript script, std::string name = "script", const SessionInput& start = {});
 
   void Read(std::uint64_t tick, double secondsPerTick, InputFrame& frame) override;
   DeviceStatus Status() const override;
@@ -27,6 +29,7 @@ public:
 private:
   DriveScript Script;
   std::string Name;
+  SessionInput Start;
 };
 
 /// The inputs of a recording, tick by tick; at another tick rate than the recorded one by time.
