@@ -62,16 +62,7 @@ SessionEngine::SessionEngine(
 
 SessionEngine::~SessionEngine()
 {
-  this->Quit = true;
-  this->ExposedCondition.notify_all();
-  if (this->Physics.joinable())
-  {
-    this->Physics.join();
-  }
-  if (this->Images.joinable())
-  {
-    this->Images.join();
-  }
+  this->Join();
 }
 
 void SessionEngine::Start()
@@ -80,30 +71,35 @@ void SessionEngine::Start()
   this->Images = std::thread([this] { this->RunImages(); });
 }
 
-void SessionEngine::Stop()
+void SessionEngine::Join()
 {
   this->Quit = true;
   this->ExposedCondition.notify_all();
-  if (this->Physics.joinable())
+  for (std::thread* thread : { &this->Physics, &this->Images })
   {
-    this->Physics.join();
+    if (thread->joinable())
+    {
+      thread->join();
+    }
   }
-  if (this->Images.joinable())
-  {
-    this->Images.join();
-  }
+}
+
+void SessionEngine::Stop()
+{
+  this->Join();
+  // Whatever happens now, it is over with the recording: without Finish() it leaves no file.
+  const std::unique_ptr<RecordingWriter> recorder = std::move(this->Recorder);
   if (!this->Failure.empty())
   {
     throw std::runtime_error(this->Failure);
   }
-  if (this->Recorder)
+  if (recorder)
   {
     if (this->TickNumber % RecordedHashInterval != 0)
     {
-      this->Recorder->StateHash(this->TickNumber, this->Session.StateHash());
+      recorder->StateHash(this->TickNumber, this->Session.StateHash());
     }
-    this->Recorder->Finish(this->TickNumber);
-    this->Recorder.reset();
+    recorder->Finish(this->TickNumber);
   }
 }
 
@@ -177,8 +173,7 @@ void SessionEngine::Fail(const std::string& why)
 {
   {
     const std::lock_guard<std::mutex> lock(this->MessageMutex);
-    this->Failure = why;
-    this->Messages.push_back(why);
+    this->Failure = this->Failure.empty() ? why : this->Failure; // the first is the cause
   }
   this->Over = true;
 }
@@ -204,8 +199,14 @@ bool SessionEngine::Sound() const
 void SessionEngine::ReadHands(bool ignored)
 {
   const SessionInput before = this->Raw;
+  const double begin = static_cast<double>(this->MuxTick) / this->TickRate;
   this->Raw = this->Mux->Next(this->MuxTick, 1.0 / this->TickRate);
   ++this->MuxTick;
+  const double end = static_cast<double>(this->MuxTick) / this->TickRate;
+  for (const double heartRate : this->Options.script.HeartRates(begin, end))
+  {
+    this->Events.push_back({ RecordedEvent::HeartRate, heartRate });
+  }
   const auto each = [](auto change, SessionInput& to, const SessionInput& a, const SessionInput& b)
   {
     change(to.drive.wirePosition, a.drive.wirePosition, b.drive.wirePosition);
@@ -227,7 +228,6 @@ void SessionEngine::ReadHands(bool ignored)
 
 bool SessionEngine::Tick()
 {
-  this->Events.clear();
   if (this->Replay)
   {
     if (!this->Replay->At(this->TickNumber, this->Input, this->Events))
@@ -248,6 +248,7 @@ bool SessionEngine::Tick()
       this->Recorder->Event(this->TickNumber, event);
     }
   }
+  this->Events.clear();
   if (this->Recorder)
   {
     this->Recorder->Input(this->TickNumber, this->Input);
@@ -299,6 +300,18 @@ bool SessionEngine::Tick()
   return true;
 }
 
+/// The recording has nothing more to say.
+void SessionEngine::EndReplay()
+{
+  const RecordingReader& reader = this->Replay->Reader();
+  if (reader.HowEnded() != RecordingReader::Ending::Complete)
+  {
+    this->Say(this->TickNumber, reader.EndingText() + ".");
+  }
+  this->PublishScene();
+  this->Over = true;
+}
+
 void SessionEngine::PublishScene()
 {
   this->Aim.Write({ this->Session.Pose(), this->Session.FieldOfView() });
@@ -330,6 +343,19 @@ void SessionEngine::PublishExposure()
   this->ExposedCondition.notify_one();
 }
 
+/// Time stands still for a moment. Hands are still read, so that what they do now is not made up for afterwards.
+void SessionEngine::Rest()
+{
+  this->RateOfTicks = 0.0;
+  this->Load = 0.0;
+  const Clock::time_point start = Clock::now();
+  std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  for (auto n = std::lround(SecondsSince(start) * this->TickRate); n > 0 && this->Mux; --n)
+  {
+    this->ReadHands(true);
+  }
+}
+
 void SessionEngine::RunPhysics()
 {
   FixedStepClock clock(this->TickRate, CatchUp);
@@ -345,14 +371,11 @@ void SessionEngine::RunPhysics()
       const double now = SecondsSince(start);
       if (this->Paused)
       {
-        // Hands are still read, so that what they do now is not made up for afterwards.
-        std::this_thread::sleep_for(std::chrono::milliseconds(2));
-        const double passed = SecondsSince(start) - now;
-        for (auto n = std::lround(passed * this->TickRate); n > 0 && this->Mux; --n)
-        {
-          this->ReadHands(true);
-        }
-        pausedFor += passed;
+        this->Rest();
+        pausedFor += SecondsSince(start) - now;
+        ticksBefore = this->TickNumber;
+        worked = 0.0;
+        second = Clock::now();
         continue;
       }
       const std::int64_t due = clock.Due(now - pausedFor);
@@ -361,8 +384,7 @@ void SessionEngine::RunPhysics()
       {
         if (!this->Tick())
         {
-          this->PublishScene();
-          this->Over = true;
+          this->EndReplay();
           return;
         }
       }

@@ -6,6 +6,7 @@
 #define DynamicCoronary_SessionEngine_h
 
 #include "DeviceMux.h"
+#include "DriveScript.h"
 #include "FixedStepClock.h"
 #include "Recording.h"
 #include "SessionImager.h"
@@ -27,6 +28,7 @@ struct EngineOptions
 {
   std::string record; ///< recording to write; empty: none
   std::string replay; ///< recording that takes the place of all hands; empty: none
+  DriveScript script; ///< its heart rates are set; its hands are a ScriptDevice of the mux
   std::vector<std::int64_t> wallPoints; ///< of SessionSnapshot::wall
   double sceneRate = 30.0;              ///< snapshots for the scene a second
 };
@@ -70,7 +72,7 @@ public:
   void Start();
 
   /// Ends the session and finishes its recording.
-  /// @throws std::runtime_error  the recording could not be written, or the session had failed
+  /// @throws std::runtime_error  the recording could not be written, or the session had failed: no recording is left
   void Stop();
 
   /// Simulated time stands still.
@@ -123,9 +125,12 @@ private:
     double fieldOfView = 0.0;
   };
 
+  void Join();
   void RunPhysics();
   void RunImages();
+  void Rest();
   bool Tick();
+  void EndReplay();
   void ReadHands(bool ignored);
   void ApplyEvents();
   void Say(std::uint64_t tick, const std::string& text);
@@ -145,7 +150,7 @@ private:
   SessionInput Raw;     ///< of the mux
   SessionInput Ignored; ///< what hands moved while time stood still
   std::uint64_t MuxTick = 0;
-  std::vector<RecordedEvent> Events;
+  std::vector<RecordedEvent> Events; ///< of the next tick
   std::uint64_t TickNumber = 0;
   std::uint64_t TicksPerScene;
 

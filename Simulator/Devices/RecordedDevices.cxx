@@ -20,9 +20,10 @@ double RateOf(double secondsPerTick)
 }
 }
 
-ScriptDevice::ScriptDevice(DriveScript script, std::string name)
+ScriptDevice::ScriptDevice(DriveScript script, std::string name, const SessionInput& start)
   : Script(std::move(script))
   , Name(std::move(name))
+  , Start(start)
 {
 }
 

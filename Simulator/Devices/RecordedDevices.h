@@ -18,7 +18,9 @@ namespace coronary
 class ScriptDevice : public Device
 {
 public:
-  explicit ScriptDevice(DriveScript script, std::string name = "script");
+  /// @param start  where hands and C-arm are before the script moves them
+  explicit ScriptDevice(
+    DriveScript script, std::string name = "script", const SessionInput& start = {});
 
   /// Where everything is before it begins, above all the C-arm. Before the first Read().
   void SetStart(const SessionInput& start) { this->Start = start; }
@@ -31,6 +33,7 @@ private:
   DriveScript Script;
   SessionInput Start;
   std::string Name;
+  SessionInput Start;
 };
 
 /// The inputs of a recording, tick by tick; at another tick rate than the recorded one by time.

@@ -1,0 +1,337 @@
+// A session in real time on its threads: what hands do reaches it, pauses are not made up for, recordings repeat to the
+// bit, and nothing is left of those that could not be finished.
+#include "RecordedDevices.h"
+#include "SessionEngine.h"
+#include "WallMotions.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <sys/resource.h>
+#include <thread>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+using namespace coronary;
+namespace fs = std::filesystem;
+
+namespace
+{
+/// A small patient: few phases, water around the vessels, 128 x 128 pixels.
+const SessionWorld& World()
+{
+  static const SessionWorld world = []
+  {
+    SessionWorld made;
+    made.scenario = LoadScenario("phantom-lca");
+    ImagingSettings& imaging = made.scenario.imaging;
+    imaging.columns = 128;
+    made.wall = MakePhantomWallMotion(made.scenario.vessels.phantom, 1.0, 8);
+    made.wallHash = WallHash(*made.wall);
+    imaging.pose = StartPose(made.wall->Topology(), imaging);
+    HounsfieldVolume water;
+    water.grid.extent = { 0, 39, 0, 19, 0, 39 };
+    water.grid.spacing = Vector3(10.0, 10.0, 10.0);
+    water.grid.origin = imaging.pose.isocentre - Vector3(195.0, 95.0, 195.0);
+    water.values.assign(40 * 20 * 40, 0);
+    made.background = MakeProjector(water, imaging);
+    return made;
+  }();
+  return world;
+}
+
+DriveScript Script(const std::string& pieces)
+{
+  return DriveScriptFromText(
+    R"({ "format": "dynamiccoronary script", "version": 1, "pieces": )" + pieces + "}", "'script'");
+}
+
+/// Even driving, fluoroscopy with some contrast medium, and another heart rate after a second.
+DriveScript Driving()
+{
+  return Script(R"([ { "seconds": 1, "wire_mm": 10, "pedals": ["fluoroscopy"] },
+    { "seconds": 9, "wire_mm": 45, "wire_deg": 300, "inject_mL": 9, "heart_rate_bpm": 90 } ])");
+}
+
+std::shared_ptr<DeviceMux> Mux(const DriveScript& script)
+{
+  auto mux = std::make_shared<DeviceMux>();
+  const CArmPose& pose = World().scenario.imaging.pose;
+  SessionInput start;
+  start.primary = pose.primary;
+  start.secondary = pose.secondary;
+  start.sourceToDetector = pose.sourceToDetector;
+  mux->Add(std::make_shared<ScriptDevice>(script, "script", start));
+  mux->Start({ pose.primary, pose.secondary, pose.sourceToDetector, Vector3::Zero() });
+  return mux;
+}
+
+/// Waits up to a minute, which machines need that have much else to do.
+void WaitFor(const std::function<bool()>& reached)
+{
+  const auto start = std::chrono::steady_clock::now();
+  while (!reached())
+  {
+    ASSERT_LT(std::chrono::steady_clock::now() - start, std::chrono::minutes(1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+/// As the window does while the session runs, up to a time of the session.
+void RunUntil(SessionEngine& engine, double seconds, SessionSnapshot& now)
+{
+  WaitFor(
+    [&]
+    {
+      engine.LatestScene(now);
+      return now.seconds >= seconds || engine.IsOver();
+    });
+}
+
+std::string StopsWith(SessionEngine& engine)
+{
+  try
+  {
+    engine.Stop();
+  }
+  catch (const std::runtime_error& error)
+  {
+    return error.what();
+  }
+  return {};
+}
+
+std::string AllMessages(SessionEngine& engine)
+{
+  std::string text;
+  for (const std::string& message : engine.TakeMessages())
+  {
+    text += message + "\n";
+  }
+  return text;
+}
+
+/// No file of this program gets longer, as on a disk that is full.
+class FileSizeLimit
+{
+public:
+  explicit FileSizeLimit(rlim_t bytes)
+    : Handler(std::signal(SIGXFSZ, SIG_IGN))
+  {
+    getrlimit(RLIMIT_FSIZE, &this->Before);
+    rlimit limit = this->Before;
+    limit.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit()
+  {
+    setrlimit(RLIMIT_FSIZE, &this->Before);
+    std::signal(SIGXFSZ, this->Handler);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+private:
+  void (*Handler)(int);
+  rlimit Before{};
+};
+
+class TestSessionEngine : public ::testing::Test
+{
+protected:
+  void SetUp() override
+  {
+    this->Folder = fs::temp_directory_path() / ("engine test." + std::to_string(getpid()));
+    fs::create_directories(this->Folder);
+  }
+  void TearDown() override { fs::remove_all(this->Folder); }
+
+  std::string Path(const char* name) const { return (this->Folder / name).string(); }
+
+  fs::path Folder;
+};
+}
+
+TEST_F(TestSessionEngine, RunsAndItsRecordingRepeatsToTheBit)
+{
+  EngineOptions options;
+  options.record = this->Path("a.pcirec");
+  options.script = Driving();
+  options.wallPoints = { 0, 5, 17 };
+  SessionSnapshot now;
+  ShownImage image;
+  std::uint64_t images = 0;
+  {
+    SessionEngine engine(World(), Mux(options.script), options);
+    engine.SetImageMode(ImageMode::Plain);
+    engine.Start();
+    engine.Post({ RecordedEvent::FrameRate, 30.0 });
+    engine.Post({ RecordedEvent::FieldOfView, 150.0 });
+    WaitFor(
+      [&]
+      {
+        engine.LatestScene(now);
+        images += engine.LatestImage(image) ? 1 : 0;
+        GreyImage unused;
+        std::size_t runs = 0;
+        std::size_t frames = 0;
+        EXPECT_FALSE(engine.CineFrame(0, 0, unused, runs, frames));
+        engine.TakeMask();
+        return now.seconds >= 3.0;
+      });
+    EXPECT_FALSE(engine.IsOver());
+    EXPECT_EQ(StopsWith(engine), "");
+    EXPECT_EQ(StopsWith(engine), "") << "once more does nothing";
+    EXPECT_GT(engine.Rates().ticks, 0.0);
+  }
+  EXPECT_EQ(now.wall.size(), 3U);
+  EXPECT_EQ(now.fieldOfView, 150.0);
+  EXPECT_EQ(now.frameRate, 30.0);
+  EXPECT_EQ(now.heartRate, 90.0) << "of the script";
+  EXPECT_NEAR(now.input.drive.wirePosition, 20.0, 2.0);
+  EXPECT_GT(now.report.inserted, 10.0);
+  EXPECT_GT(now.contrast.injected, 1.0);
+  EXPECT_NEAR(static_cast<double>(now.metrics.frames), 90.0, 5.0);
+  EXPECT_EQ(now.pose.primary, World().scenario.imaging.pose.primary) << "the script leaves it";
+  EXPECT_GT(images, 2U);
+  EXPECT_EQ(image.image.columns, 128);
+  EXPECT_EQ(image.moment.fieldOfView, 150.0);
+
+  RecordingReader reader(options.record);
+  RecordedItem item;
+  std::vector<RecordedEvent> events;
+  std::uint64_t hashes = 0;
+  std::uint64_t ticks = 0;
+  while (reader.Next(item))
+  {
+    hashes += item.type == RecordType::StateHash ? 1 : 0;
+    ticks = item.type == RecordType::End ? item.counts[0] : ticks;
+    if (item.type == RecordType::Event)
+    {
+      events.push_back(item.event);
+      EXPECT_TRUE(item.event.kind != RecordedEvent::HeartRate || item.tick == 2000U);
+    }
+  }
+  EXPECT_EQ(reader.HowEnded(), RecordingReader::Ending::Complete);
+  EXPECT_EQ(events.size(), 3U);
+  EXPECT_GE(ticks, 6000U);
+
+  EngineOptions again;
+  again.replay = options.record;
+  again.record = this->Path("b.pcirec");
+  SessionEngine engine(World(), nullptr, again);
+  engine.Start();
+  WaitFor([&] { return engine.IsOver(); });
+  EXPECT_TRUE(engine.LatestScene(now));
+  EXPECT_EQ(StopsWith(engine), "");
+  EXPECT_EQ(now.tick, ticks);
+  EXPECT_GE(hashes, 6U);
+  EXPECT_EQ(engine.ReplayHashes(), std::pair(hashes, hashes));
+  EXPECT_EQ(AllMessages(engine), "");
+  EXPECT_TRUE(fs::exists(again.record));
+}
+
+TEST_F(TestSessionEngine, PausesAreNotMadeUpFor)
+{
+  EngineOptions options;
+  options.script = Script(R"([ { "seconds": 20, "wire_mm": 200 } ])");
+  SessionEngine engine(World(), Mux(options.script), options);
+  engine.Start();
+  SessionSnapshot now;
+  RunUntil(engine, 0.2, now);
+  engine.SetPaused(true);
+  EXPECT_TRUE(engine.IsPaused());
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  engine.LatestScene(now);
+  const double pausedAt = now.seconds;
+  std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+  EXPECT_FALSE(engine.LatestScene(now));
+  EXPECT_EQ(engine.Rates().ticks, 0.0);
+  engine.SetPaused(false);
+  RunUntil(engine, pausedAt + 0.2, now);
+  EXPECT_EQ(StopsWith(engine), "");
+  // Hands go on with 10 mm/s while time stands still; that second is not in their place.
+  EXPECT_NEAR(now.input.drive.wirePosition, 10.0 * now.seconds, 0.01);
+  EXPECT_LT(now.seconds, pausedAt + 0.8);
+}
+
+TEST_F(TestSessionEngine, SaysWhereATornRecordingEnds)
+{
+  EngineOptions options;
+  options.record = this->Path("a.pcirec");
+  {
+    SessionEngine engine(World(), Mux(Driving()), options);
+    engine.Start();
+    SessionSnapshot now;
+    RunUntil(engine, 0.6, now);
+    EXPECT_EQ(StopsWith(engine), "");
+  }
+  fs::resize_file(options.record, fs::file_size(options.record) - 40);
+  EngineOptions again;
+  again.replay = options.record;
+  SessionEngine engine(World(), nullptr, again);
+  engine.Start();
+  WaitFor([&] { return engine.IsOver(); });
+  EXPECT_EQ(StopsWith(engine), "");
+  const std::string text = AllMessages(engine);
+  EXPECT_NE(text.find("is good up to tick"), std::string::npos) << text;
+  EXPECT_NE(text.find(options.record), std::string::npos) << text;
+
+  std::ofstream(this->Folder / "noise.pcirec") << "nothing";
+  again.replay = this->Path("noise.pcirec");
+  EXPECT_THROW(SessionEngine(World(), nullptr, again), std::runtime_error);
+  EXPECT_THROW(SessionEngine(World(), nullptr, {}), std::invalid_argument);
+}
+
+TEST_F(TestSessionEngine, LeavesNoRecordingThatIsNotFinished)
+{
+  EngineOptions options;
+  options.record = this->Path("a.pcirec");
+  {
+    SessionEngine engine(World(), Mux(Driving()), options);
+    engine.Start();
+    SessionSnapshot now;
+    RunUntil(engine, 0.1, now);
+  }
+  EXPECT_TRUE(fs::is_empty(this->Folder));
+
+  // Its folder goes away while it runs.
+  fs::create_directories(this->Folder / "gone");
+  options.record = this->Path("gone/a.pcirec");
+  {
+    SessionEngine engine(World(), Mux(Driving()), options);
+    engine.Start();
+    SessionSnapshot now;
+    RunUntil(engine, 0.1, now);
+    fs::remove_all(this->Folder / "gone");
+    EXPECT_NE(StopsWith(engine).find(options.record), std::string::npos);
+    EXPECT_EQ(AllMessages(engine), "");
+  }
+  EXPECT_TRUE(fs::is_empty(this->Folder));
+
+  options.record = this->Path("nowhere/a.pcirec");
+  EXPECT_THROW(SessionEngine(World(), Mux(Driving()), options), std::runtime_error);
+}
+
+TEST_F(TestSessionEngine, AFullDiskEndsTheSessionWithOneMessage)
+{
+  EngineOptions options;
+  options.record = this->Path("a.pcirec");
+  SessionEngine engine(World(), Mux(Driving()), options);
+  const FileSizeLimit limit(4096); // the recording's header does not fit
+  engine.Start();
+  WaitFor([&] { return engine.IsOver(); });
+  EXPECT_EQ(StopsWith(engine), "Cannot write '" + options.record + "'.");
+  EXPECT_EQ(StopsWith(engine), "Cannot write '" + options.record + "'.");
+  EXPECT_TRUE(fs::is_empty(this->Folder));
+  EXPECT_EQ(AllMessages(engine), "") << "it is said once";
+}
