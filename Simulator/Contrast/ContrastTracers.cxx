@@ -34,11 +34,6 @@ bool Within(double value, double low, double high)
   return value >= low && value <= high; // not for NaN
 }
 
-double Square(double a)
-{
-  return a * a;
-}
-
 /// Part of the flux of laminar flow through the unit circle that is on the side of x below h.
 double ExactFluxBelow(double h)
 {
@@ -56,11 +51,11 @@ constexpr int TableSize = 1024;
 using Table = std::array<float, TableSize + 1>;
 
 /// Between the table's values, place from 0 to 1.
-double Interpolate(const Table& table, double place)
+float Interpolate(const Table& table, float place)
 {
-  const double t = place * TableSize;
+  const float t = place * TableSize;
   const int k = std::min(static_cast<int>(t), TableSize - 1);
-  return table[k] + (t - k) * (table[k + 1] - table[k]);
+  return table[k] + (t - static_cast<float>(k)) * (table[k + 1] - table[k]);
 }
 
 /// Inverse of a part of the flux that grows from 0 at -1 to 1 at 1, the same on both sides. By the root of the flux, as
@@ -83,10 +78,10 @@ public:
       this->Values[k] = static_cast<float>(0.5 * (low + high));
     }
   }
-  double operator()(double flux) const
+  float operator()(float flux) const
   {
-    const double less = std::max(0.0, std::min(flux, 1.0 - flux));
-    return std::copysign(Interpolate(this->Values, std::sqrt(2.0 * less)), flux - 0.5);
+    const float less = std::max(0.0F, std::min(flux, 1.0F - flux));
+    return std::copysign(Interpolate(this->Values, std::sqrt(2.0F * less)), flux - 0.5F);
   }
 
 private:
@@ -103,9 +98,9 @@ struct FluxTables
       this->flux[k] = static_cast<float>(ExactFluxBelow(2.0 * k / TableSize - 1.0));
     }
   }
-  double FluxBelow(double x) const
+  float FluxBelow(float x) const
   {
-    return Interpolate(this->flux, 0.5 * (std::clamp(x, -1.0, 1.0) + 1.0));
+    return Interpolate(this->flux, 0.5F * (std::max(-1.0F, std::min(x, 1.0F)) + 1.0F));
   }
   Table flux{};
   InverseTable chordOf{ ExactFluxBelow };
@@ -123,14 +118,21 @@ double FractionalPart(double a)
   return a - std::floor(a);
 }
 
-/// Keeps a tracer off the wall itself, where nothing moves.
-void KeepInside(double& x, double& y)
+/// Speed as a part of that on the axis.
+template <typename Place>
+double Inside(const Place& place)
 {
-  constexpr double largest = 0.9999;
-  const double square = x * x + y * y;
+  return 1.0 - static_cast<double>(place.x) * place.x - static_cast<double>(place.y) * place.y;
+}
+
+/// Keeps a tracer off the wall itself, where nothing moves.
+void KeepInside(float& x, float& y)
+{
+  constexpr float largest = 0.9999F;
+  const float square = x * x + y * y;
   if (square > largest * largest)
   {
-    const double scale = largest / std::sqrt(square);
+    const float scale = largest / std::sqrt(square);
     x *= scale;
     y *= scale;
   }
@@ -249,8 +251,8 @@ void ContrastTracers::MakeJunctions(const FlowNetwork& network)
     }
     parting = parting.norm() > 1e-6 ? Eigen::Vector2d(parting.normalized())
                                     : Eigen::Vector2d(Eigen::Vector2d::UnitX());
-    junction.partingX = parting.x();
-    junction.partingY = parting.y();
+    junction.partingX = static_cast<float>(parting.x());
+    junction.partingY = static_cast<float>(parting.y());
     std::vector<std::pair<double, int>> order;
     for (std::size_t a = 0; a < ways.size(); ++a)
     {
@@ -312,20 +314,21 @@ void ContrastTracers::PrepareJunctions()
       rest -= s >= 0 ? outOf(s) : 0.0;
     }
     double total = 0.0;
+    for (const int s : junction.segments)
+    {
+      total += std::max(s >= 0 ? outOf(s) : rest, 0.0);
+    }
+    double before = 0.0;
     junction.tubes.clear();
     for (const int s : junction.segments)
     {
       const double out = s >= 0 ? outOf(s) : rest;
       if (out > 0.0)
       {
-        junction.tubes.push_back({ s, total, out });
-        total += out;
+        junction.tubes.push_back(
+          { s, static_cast<float>(before / total), static_cast<float>(total / out) });
+        before += out;
       }
-    }
-    for (Tube& tube : junction.tubes)
-    {
-      tube.begin /= total;
-      tube.scale = total / tube.scale;
     }
   }
 }
@@ -391,8 +394,8 @@ void ContrastTracers::Store(const Tracer& tracer, std::int64_t i)
 {
   this->Segment_[i] = tracer.segment;
   this->Part_[i] = static_cast<float>(tracer.lumen / this->Segments[tracer.segment].volume);
-  this->X_[i] = static_cast<float>(tracer.x);
-  this->Y_[i] = static_cast<float>(tracer.y);
+  this->X_[i] = tracer.x;
+  this->Y_[i] = tracer.y;
   this->Volume_[i] = tracer.volume;
 }
 
@@ -427,7 +430,7 @@ bool ContrastTracers::Cross(Tracer& tracer)
       return true;
     }
     // Twice the time left, mL of lumen for each mL/s.
-    const double left = beyond / (flow * (1.0 - Square(tracer.x) - Square(tracer.y)));
+    const double left = beyond / (flow * Inside(tracer));
     const int node =
       atBeginning ? this->Segments[tracer.segment].above : this->Segments[tracer.segment].below;
     const Way way = this->Route(tracer, node);
@@ -439,7 +442,7 @@ bool ContrastTracers::Cross(Tracer& tracer)
     {
       return false;
     }
-    const double inside = 1.0 - Square(tracer.x) - Square(tracer.y);
+    const double inside = Inside(tracer);
     const Stretch& next = this->Segments[tracer.segment];
     tracer.lumen = next.above == node
       ? left * this->FlowTop[tracer.segment] * inside
@@ -478,9 +481,10 @@ ContrastTracers::Way ContrastTracers::Route(Tracer& tracer, int node)
 /// Which of several segments takes a tracer; its stream-tube becomes the whole of that segment's circle.
 int ContrastTracers::TakeTube(const Junction& junction, Tracer& tracer)
 {
-  const double along = tracer.x * junction.partingX + tracer.y * junction.partingY;
-  const double across = tracer.y * junction.partingX - tracer.x * junction.partingY;
-  const double flux = Tables().FluxBelow(along);
+  const FluxTables& tables = Tables();
+  const float along = tracer.x * junction.partingX + tracer.y * junction.partingY;
+  const float across = tracer.y * junction.partingX - tracer.x * junction.partingY;
+  const float flux = tables.FluxBelow(along);
   // Counted, not searched: which tube it is cannot be predicted.
   std::size_t chosen = 0;
   for (std::size_t k = 1; k < junction.tubes.size(); ++k)
@@ -488,9 +492,9 @@ int ContrastTracers::TakeTube(const Junction& junction, Tracer& tracer)
     chosen += static_cast<std::size_t>(flux >= junction.tubes[k].begin);
   }
   const Tube& tube = junction.tubes[chosen];
-  const double x = Tables().chordOf((flux - tube.begin) * tube.scale);
-  const double y =
-    across * std::sqrt(std::max(1.0 - x * x, 0.0) / std::max(1.0 - along * along, 1e-12));
+  const float x = tables.chordOf((flux - tube.begin) * tube.scale);
+  const float y =
+    across * std::sqrt(std::max(1.0F - x * x, 0.0F) / std::max(1.0F - along * along, 1e-6F));
   tracer.x = x * junction.partingX - y * junction.partingY;
   tracer.y = x * junction.partingY + y * junction.partingX;
   KeepInside(tracer.x, tracer.y);
@@ -555,14 +559,16 @@ void ContrastTracers::Emit(double volume, bool down)
   for (std::int64_t k = 0; k < count; ++k)
   {
     const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
-    const double x = Tables().chordOf(FractionalPart(shiftX + alphaX * number));
-    const double y = Tables().placeOnChord(FractionalPart(shiftY + alphaY * number)) *
-      std::sqrt(std::max(1.0 - x * x, 0.0));
+    const float x =
+      Tables().chordOf(static_cast<float>(FractionalPart(shiftX + alphaX * number)));
+    const float y =
+      Tables().placeOnChord(static_cast<float>(FractionalPart(shiftY + alphaY * number))) *
+      std::sqrt(std::max(1.0F - x * x, 0.0F));
     const double time = (static_cast<double>(k) + shiftTime) / static_cast<double>(count);
     Tracer tracer{ segment, 0.0, x, y, volume / static_cast<double>(count) };
     KeepInside(tracer.x, tracer.y);
     tracer.lumen = this->Flow.injector.volume +
-      rate * (1.0 - time) * (1.0 - Square(tracer.x) - Square(tracer.y));
+      rate * (1.0 - time) * Inside(tracer);
     if (this->Cross(tracer))
     {
       this->Store(tracer, this->Size_++);

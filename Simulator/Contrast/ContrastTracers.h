@@ -95,9 +95,9 @@ private:
   struct Tracer
   {
     int segment;
-    double lumen;
-    double x;
-    double y;
+    double lumen; ///< mL of the segment's lumen that are before it; beyond it: how far its speed takes it
+    float x;
+    float y;
     double volume;
   };
   struct Stretch
@@ -112,16 +112,16 @@ private:
   struct Tube
   {
     int segment;  ///< into which; -1: out of the tree
-    double begin; ///< part of the node's flux that is before it along `parting`
-    double scale; ///< the node's flux / its own
+    float begin; ///< part of the node's flux that is before it along `parting`
+    float scale; ///< the node's flux / its own
   };
   struct Junction
   {
     /// What the node's blood can go into, in the order in which it leaves along `parting`; -1: out of the tree.
     std::vector<int> segments;
     std::vector<Tube> tubes; ///< of those of `segments` that blood goes into now
-    double partingX = 1.0;
-    double partingY = 0.0;
+    float partingX = 1.0F;
+    float partingY = 0.0F;
     bool tip = false;
     bool root = false;
   };
