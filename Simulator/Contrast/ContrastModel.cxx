@@ -12,10 +12,10 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-// Flow falls to 45 % at 1.9 s.
-constexpr double DepressedFlow = 0.45;
+constexpr double DepressedFlow = 0.45;   // of the flow before
+constexpr double DepressionTime = 1.9;   // s, of each of two filters
 constexpr double SmallestVolume = 1e-15; // of a slab without length, mL
-constexpr double DepressionTime = 1.9;   // s, also where t exp(-t / T) is greatest
+constexpr std::size_t CellsOfSlab = 4;   // in the mean; the more, the fewer cells have the end of a slab in them
 
 void Require(bool possible, const char* name, double value, const char* range)
 {
@@ -53,6 +53,7 @@ ContrastModel::ContrastModel(
   , Tracers_(this->Flow_.Network(), settings.tracers, seed)
 {
   this->MakeSlabs();
+  this->MakeSmoothing();
   this->BlushVolume_.assign(this->Flow_.Network().Branches().size(), 0.0);
   this->Arrived.assign(this->Flow_.Network().Roots().size(), 0.0);
   this->Depressed = this->Arrived;
@@ -73,35 +74,69 @@ void ContrastModel::MakeSlabs()
       this->SlabLength.push_back(branch.abscissa[k + 1] - branch.abscissa[k]);
       this->SlabBegin.push_back(branch.volume[k]);
     }
+    const std::size_t cells = CellsOfSlab * count;
     std::size_t slab = 0;
-    for (std::size_t cell = 0; cell < count; ++cell)
+    for (std::size_t cell = 0; cell < cells; ++cell)
     {
       const double from =
-        branch.volume.back() * static_cast<double>(cell) / static_cast<double>(count);
+        branch.volume.back() * static_cast<double>(cell) / static_cast<double>(cells);
       while (slab + 1 < count && branch.volume[slab + 1] <= from)
       {
         ++slab;
       }
-      this->SlabOfCell.push_back(static_cast<std::int32_t>(slab));
+      this->SlabOfCell.push_back(static_cast<std::int32_t>(this->BranchSlab.back() + slab));
     }
+    this->CellsOfVolume.push_back(static_cast<double>(cells) / branch.volume.back());
   }
   this->BranchSlab.push_back(this->Slabs_.size());
   this->Concentration_.assign(this->Slabs_.size(), 0.0);
-  this->Scratch.assign(this->Slabs_.size(), 0.0);
 }
 
 std::size_t ContrastModel::SlabAt(int branch, double volume) const
 {
   const std::size_t first = this->BranchSlab[branch];
-  const auto count = static_cast<int>(this->BranchSlab[branch + 1] - first);
-  const double whole = this->Flow_.Network().Branches()[branch].volume.back();
-  const int cell = std::clamp(static_cast<int>(volume / whole * count), 0, count - 1);
-  std::size_t slab = first + static_cast<std::size_t>(this->SlabOfCell[first + cell]);
-  while (slab + 1 < this->BranchSlab[branch + 1] && this->SlabBegin[slab + 1] <= volume)
+  const std::size_t last = this->BranchSlab[branch + 1] - 1;
+  const auto cells = static_cast<int>(CellsOfSlab * (last + 1 - first));
+  const int cell =
+    std::clamp(static_cast<int>(volume * this->CellsOfVolume[branch]), 0, cells - 1);
+  auto slab = static_cast<std::size_t>(this->SlabOfCell[CellsOfSlab * first + cell]);
+  while (slab < last && this->SlabBegin[slab + 1] <= volume)
   {
     ++slab;
   }
   return slab;
+}
+
+/// The equations of SmoothBranch, eliminated.
+void ContrastModel::MakeSmoothing()
+{
+  const double square = this->Settings_.smoothing * this->Settings_.smoothing;
+  const auto conductance = [&](std::size_t k) // between k and k + 1
+  {
+    const double apart = std::max(0.5 * (this->SlabLength[k] + this->SlabLength[k + 1]), 1e-6);
+    const double area = (this->SlabVolume(k) + this->SlabVolume(k + 1)) / (2.0 * apart);
+    return square * area / apart;
+  };
+  this->Smoothing.resize(this->Slabs_.size());
+  for (std::size_t b = 0; b + 1 < this->BranchSlab.size(); ++b)
+  {
+    double before = 0.0; // conductance to the slab before
+    double ratio = 0.0;  // of the eliminated equation before
+    for (std::size_t k = this->BranchSlab[b]; k < this->BranchSlab[b + 1]; ++k)
+    {
+      const double behind = k + 1 < this->BranchSlab[b + 1] ? conductance(k) : 0.0;
+      const double pivot = this->SlabVolume(k) + before + behind - before * ratio;
+      ratio = behind / pivot;
+      this->Smoothing[k] = { 1.0 / pivot, before / pivot, ratio };
+      before = behind;
+    }
+  }
+}
+
+/// Slabs without volume take their neighbours' fraction.
+double ContrastModel::SlabVolume(std::size_t slab) const
+{
+  return std::max(this->Slabs_[slab].volume, SmallestVolume);
 }
 
 void ContrastModel::Step(
@@ -200,31 +235,16 @@ void ContrastModel::SmoothBranch(std::size_t branch) const
 {
   const std::size_t first = this->BranchSlab[branch];
   const std::size_t last = this->BranchSlab[branch + 1];
-  const double square = this->Settings_.smoothing * this->Settings_.smoothing;
-  // Slabs without volume take their neighbours' fraction.
-  const auto volume = [this](std::size_t k)
-  { return std::max(this->Slabs_[k].volume, SmallestVolume); };
-  const auto conductance = [&](std::size_t k) // between k and k + 1
-  {
-    const double apart = std::max(0.5 * (this->SlabLength[k] + this->SlabLength[k + 1]), 1e-6);
-    const double area = (volume(k) + volume(k + 1)) / (2.0 * apart);
-    return square * area / apart;
-  };
-  double before = 0.0; // conductance to the slab before
-  double ratio = 0.0;  // of the eliminated equation before
+  double before = 0.0; // the slab before, eliminated
   for (std::size_t k = first; k < last; ++k)
   {
-    const double behind = k + 1 < last ? conductance(k) : 0.0;
-    const double pivot = volume(k) + before + behind - before * ratio;
-    const double carried = k > first ? before * this->Concentration_[k - 1] : 0.0;
-    this->Concentration_[k] = (this->Concentration_[k] + carried) / pivot;
-    ratio = behind / pivot;
-    this->Scratch[k] = ratio;
-    before = behind;
+    const SmoothedSlab& row = this->Smoothing[k];
+    before = row.own * this->Concentration_[k] + row.above * before;
+    this->Concentration_[k] = before;
   }
   for (std::size_t k = last - 1; k-- > first;)
   {
-    this->Concentration_[k] += this->Scratch[k] * this->Concentration_[k + 1];
+    this->Concentration_[k] += this->Smoothing[k].below * this->Concentration_[k + 1];
   }
 }
 
@@ -236,7 +256,7 @@ void ContrastModel::LimitBranch(std::size_t branch) const
   double excess = 0.0; // mL
   const auto limit = [&](std::size_t k)
   {
-    const double volume = std::max(this->Slabs_[k].volume, SmallestVolume);
+    const double volume = this->SlabVolume(k);
     const double whole = this->Concentration_[k] + excess / volume;
     this->Concentration_[k] = std::min(whole, 1.0);
     excess = (whole - this->Concentration_[k]) * volume;
@@ -265,9 +285,8 @@ void ContrastModel::TracerPositions(const std::vector<Vector3>& axis,
     const FlowSegment& segment = network.Segments()[this->Tracers_.Segment(tracer)];
     const double along = segment.volumeFrom + this->Tracers_.Lumen(tracer);
     const std::size_t slab = this->SlabAt(segment.branch, along);
-    const double t = std::clamp(
-      (along - this->SlabBegin[slab]) / std::max(this->Slabs_[slab].volume, SmallestVolume), 0.0,
-      1.0);
+    const double t =
+      std::clamp((along - this->SlabBegin[slab]) / this->SlabVolume(slab), 0.0, 1.0);
     const std::int64_t p = this->Slabs_[slab].point;
     const std::vector<double>& radii = network.Topology().axisRadius[segment.branch];
     const auto k = static_cast<std::size_t>(p - network.Branches()[segment.branch].firstPoint);

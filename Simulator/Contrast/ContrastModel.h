@@ -35,8 +35,8 @@ struct ContrastSettings
 struct ContrastSlab
 {
   int branch = 0;
-  std::int64_t point =
-    0; ///< its root-side end in the list of all branches' axis points; the other one is point + 1
+  /// Its root-side end in the list of all branches' axis points; the other one is point + 1.
+  std::int64_t point = 0;
   double volume = 0.0; ///< mL at rest
 };
 
@@ -47,8 +47,7 @@ struct ContrastBalance
   double inTree = 0.0;    ///< in the arteries
   double blush = 0.0;     ///< in the myocardium
   double washedOut = 0.0; ///< left the myocardium
-  double spilled =
-    0.0; ///< in the aorta: injected there, refluxed, or flowed back through an ostium
+  double spilled = 0.0;   ///< in the aorta: injected there, refluxed, or flowed back through an ostium
 };
 
 /**
@@ -84,7 +83,8 @@ public:
   const std::vector<ContrastSlab>& Slabs() const { return this->Slabs_; }
 
   /// Fraction of contrast medium, 0 to 1, per slab: the tracers' volume, smoothed along each branch by one implicit
-  /// step of diffusion, which keeps it; only where a whole branch would be above 1, it is cut. Made when asked for, once a step; not for two threads at a time.
+  /// step of diffusion, which keeps it; only where a whole branch would be above 1, it is cut. Made when asked for,
+  /// once a step; not for two threads at a time.
   const std::vector<double>& Concentration() const;
 
   /**
@@ -101,13 +101,12 @@ public:
   /// mL of contrast medium in the myocardium behind a branch's tip; per branch, 0 where its end is no outlet.
   const std::vector<double>& BlushVolume() const { return this->BlushVolume_; }
 
-  double Flow(int branch) const; ///< mL/s at the branch's beginning, away from the root
-  double Speed(
-    int branch) const; ///< cm/s there, mean over the cross-section; on the axis it is twice that
-  double TreeFlow(int tree) const
-  {
-    return this->Flow_.TreeFlow(tree);
-  } ///< mL/s into a tree from the aorta
+  /// mL/s at the branch's beginning, away from the root.
+  double Flow(int branch) const;
+  /// cm/s there, mean over the cross-section; on the axis it is twice that.
+  double Speed(int branch) const;
+  /// mL/s into a tree from the aorta.
+  double TreeFlow(int tree) const { return this->Flow_.TreeFlow(tree); }
   double AorticPressure() const { return this->Flow_.AorticPressureNow(); } ///< mmHg
 
   ContrastBalance Balance() const;                                ///< exact to round-off
@@ -118,11 +117,21 @@ public:
   const ContrastTracers& Tracers() const { return this->Tracers_; }
 
 private:
+  /// A row of the equations that smooth, eliminated from a branch's beginning on.
+  struct SmoothedSlab
+  {
+    double own;   ///< of its mL of contrast medium
+    double above; ///< of the slab before, eliminated
+    double below; ///< of the slab behind
+  };
+
   void MakeSlabs();
+  void MakeSmoothing();
   void DepressFlow(double dt);
   void UpdateBlush();
   /// The slab of a place along a branch, mL from its beginning.
   std::size_t SlabAt(int branch, double volume) const;
+  double SlabVolume(std::size_t slab) const; ///< mL, above 0
   void SmoothBranch(std::size_t branch) const;
   void LimitBranch(std::size_t branch) const;
 
@@ -133,13 +142,14 @@ private:
   std::vector<double> SlabLength;       ///< mm
   std::vector<double> SlabBegin;        ///< mL along the branch
   std::vector<std::size_t> BranchSlab;  ///< per branch: its first slab; and one more
-  std::vector<std::int32_t> SlabOfCell; ///< cells of equal volume, as many a branch as it has slabs
+  std::vector<std::int32_t> SlabOfCell; ///< where cells of equal volume begin, CellsOfSlab to a slab
+  std::vector<double> CellsOfVolume;    ///< per branch: cells a mL
+  std::vector<SmoothedSlab> Smoothing;  ///< per slab
   std::vector<double> BlushVolume_;
-  std::vector<double>
-    Arrived; ///< per tree: part of contrast medium in what flows into the myocardium, filtered
-  std::vector<double> Depressed; ///< per tree: Arrived, filtered again
+  /// Per tree: part of contrast medium in what flows into the myocardium, filtered.
+  std::vector<double> Arrived;
+  std::vector<double> Depressed; ///< Arrived, filtered again
   mutable std::vector<double> Concentration_;
-  mutable std::vector<double> Scratch;
   mutable std::vector<VesselFrame> Frames;
   mutable bool Current = false;
 };

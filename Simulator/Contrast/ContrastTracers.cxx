@@ -34,11 +34,6 @@ bool Within(double value, double low, double high)
   return value >= low && value <= high; // not for NaN
 }
 
-double Square(double a)
-{
-  return a * a;
-}
-
 /// Part of the flux of laminar flow through the unit circle that is on the side of x below h.
 double ExactFluxBelow(double h)
 {
@@ -46,60 +41,76 @@ double ExactFluxBelow(double h)
   return 0.5 + (x * (5.0 - 2.0 * x * x) * std::sqrt(1.0 - x * x) + 3.0 * std::asin(x)) / (3.0 * Pi);
 }
 
-/// FluxBelow and its inverse by tables, to 1e-6 and 1e-4: a thousand tracers cross nodes in a step.
-class FluxTable
+/// Part of the flux of a chord's points that is below y of its half length.
+double ExactChordFluxBelow(double y)
+{
+  return (2.0 + 3.0 * y - y * y * y) / 4.0;
+}
+
+constexpr int TableSize = 1024;
+using Table = std::array<float, TableSize + 1>;
+
+/// Between the table's values, place from 0 to 1.
+float Interpolate(const Table& table, float place)
+{
+  const float t = place * TableSize;
+  const int k = std::min(static_cast<int>(t), TableSize - 1);
+  return table[k] + (t - static_cast<float>(k)) * (table[k + 1] - table[k]);
+}
+
+/// Inverse of a part of the flux that grows from 0 at -1 to 1 at 1, the same on both sides. By the root of the flux, as
+/// the inverse is not smooth at the ends.
+class InverseTable
 {
 public:
-  FluxTable()
+  explicit InverseTable(double (*fluxBelow)(double))
   {
-    for (int k = 0; k <= Size; ++k)
+    for (int k = 0; k <= TableSize; ++k)
     {
-      this->Flux[k] = static_cast<float>(ExactFluxBelow(2.0 * k / Size - 1.0));
-      const double root = k * std::sqrt(0.5) / Size;
+      const double root = k * std::sqrt(0.5) / TableSize;
       double low = -1.0;
       double high = 0.0;
       for (int step = 0; step < 60; ++step)
       {
         const double middle = 0.5 * (low + high);
-        (ExactFluxBelow(middle) < root * root ? low : high) = middle;
+        (fluxBelow(middle) < root * root ? low : high) = middle;
       }
-      this->Chord[k] = static_cast<float>(0.5 * (low + high));
+      this->Values[k] = static_cast<float>(0.5 * (low + high));
     }
   }
-  double FluxBelow(double x) const
+  float operator()(float flux) const
   {
-    return Interpolate(this->Flux, 0.5 * (std::clamp(x, -1.0, 1.0) + 1.0));
-  }
-  /// By the root of the flux, as the inverse is not smooth at the ends.
-  double ChordOf(double flux) const
-  {
-    const double less = std::max(0.0, std::min(flux, 1.0 - flux));
-    const double x = Interpolate(this->Chord, std::sqrt(2.0 * less));
-    return flux < 0.5 ? x : -x;
+    const float less = std::max(0.0F, std::min(flux, 1.0F - flux));
+    return std::copysign(Interpolate(this->Values, std::sqrt(2.0F * less)), flux - 0.5F);
   }
 
 private:
-  static constexpr int Size = 1024;
-  static double Interpolate(const std::array<float, Size + 1>& table, double place)
-  {
-    const double t = place * Size;
-    const int k = std::min(static_cast<int>(t), Size - 1);
-    return table[k] + (t - k) * (table[k + 1] - table[k]);
-  }
-  std::array<float, Size + 1> Flux{};
-  std::array<float, Size + 1> Chord{};
+  Table Values{};
 };
 
-const FluxTable& Tables()
+/// ExactFluxBelow and its inverse to 1e-6 and 1e-4: hundreds of tracers cross nodes in a step.
+struct FluxTables
 {
-  static const FluxTable tables;
-  return tables;
-}
+  FluxTables()
+  {
+    for (int k = 0; k <= TableSize; ++k)
+    {
+      this->flux[k] = static_cast<float>(ExactFluxBelow(2.0 * k / TableSize - 1.0));
+    }
+  }
+  float FluxBelow(float x) const
+  {
+    return Interpolate(this->flux, 0.5F * (std::max(-1.0F, std::min(x, 1.0F)) + 1.0F));
+  }
+  Table flux{};
+  InverseTable chordOf{ ExactFluxBelow };
+  InverseTable placeOnChord{ ExactChordFluxBelow }; ///< of its half length
+};
 
-/// The same along a chord, as a fraction of its half length: the inverse of (2 + 3 y - y^3) / 4.
-double PlaceOnChord(double flux)
+const FluxTables& Tables()
 {
-  return 2.0 * std::sin(std::asin(2.0 * flux - 1.0) / 3.0);
+  static const FluxTables tables;
+  return tables;
 }
 
 double FractionalPart(double a)
@@ -107,36 +118,21 @@ double FractionalPart(double a)
   return a - std::floor(a);
 }
 
-/// Scrambles 32 bits; loops over it are vectorised, which those over MixBits are not. Source of the constants: C.
-/// Wellons, "Prospecting for hash functions", 2018 (lowbias32).
-inline std::uint32_t MixBits32(std::uint32_t z)
+/// Speed as a part of that on the axis.
+template <typename Place>
+double Inside(const Place& place)
 {
-  z ^= z >> 16;
-  z *= 0x7feb352dU;
-  z ^= z >> 15;
-  z *= 0x846ca68bU;
-  return z ^ (z >> 16);
-}
-
-/// Two numbers in -1 to 1, of mean 0, of 16 bits each.
-inline float LowHalf(std::uint32_t bits)
-{
-  return (static_cast<float>(static_cast<std::int32_t>(bits & 0xffffU)) - 32767.5F) * 0x1p-15F;
-}
-
-inline float HighHalf(std::uint32_t bits)
-{
-  return LowHalf(bits >> 16);
+  return 1.0 - static_cast<double>(place.x) * place.x - static_cast<double>(place.y) * place.y;
 }
 
 /// Keeps a tracer off the wall itself, where nothing moves.
-void KeepInside(double& x, double& y)
+void KeepInside(float& x, float& y)
 {
-  constexpr double largest = 0.9999;
-  const double square = x * x + y * y;
+  constexpr float largest = 0.9999F;
+  const float square = x * x + y * y;
   if (square > largest * largest)
   {
-    const double scale = largest / std::sqrt(square);
+    const float scale = largest / std::sqrt(square);
     x *= scale;
     y *= scale;
   }
@@ -153,6 +149,18 @@ Vector3 AxisPoint(const FlowNetwork& network, int branch, double abscissa)
   const double t = length > 0.0 ? std::clamp((abscissa - s[k - 1]) / length, 0.0, 1.0) : 0.0;
   return axis[k - 1] + t * (axis[k] - axis[k - 1]);
 }
+}
+
+MoveTracersFunction MoveTracersLoop()
+{
+#ifdef DYNAMICCORONARY_WIDE_KERNELS
+  static const bool wide = __builtin_cpu_supports("avx2") != 0;
+  if (wide)
+  {
+    return MoveTracersAvx2;
+  }
+#endif
+  return MoveTracersBaseline;
 }
 
 void ContrastTracerSettings::Validate() const
@@ -182,6 +190,7 @@ ContrastTracers::ContrastTracers(
   this->MakeJunctions(network);
   const std::size_t segments = this->Segments.size();
   this->Motions.resize(segments);
+  this->AxialSteps.resize(segments);
   this->FlowTop.assign(segments, 0.0);
   this->FlowBottom.assign(segments, 0.0);
   const auto capacity = static_cast<std::size_t>(settings.capacity);
@@ -190,7 +199,7 @@ ContrastTracers::ContrastTracers(
   this->X_.resize(capacity);
   this->Y_.resize(capacity);
   this->Volume_.resize(capacity);
-  this->Leaving.resize(capacity);
+  this->Leaving.resize(capacity + 1);
   this->Order.resize(capacity);
   this->CellBegin.resize(segments * CellsOfSegment + 1);
   this->Blush_.assign(network.Nodes().size(), 0.0);
@@ -242,8 +251,8 @@ void ContrastTracers::MakeJunctions(const FlowNetwork& network)
     }
     parting = parting.norm() > 1e-6 ? Eigen::Vector2d(parting.normalized())
                                     : Eigen::Vector2d(Eigen::Vector2d::UnitX());
-    junction.partingX = parting.x();
-    junction.partingY = parting.y();
+    junction.partingX = static_cast<float>(parting.x());
+    junction.partingY = static_cast<float>(parting.y());
     std::vector<std::pair<double, int>> order;
     for (std::size_t a = 0; a < ways.size(); ++a)
     {
@@ -262,7 +271,7 @@ void ContrastTracers::MakeJunctions(const FlowNetwork& network)
     {
       junction.segments.push_back(segment);
     }
-    junction.out.assign(junction.segments.size(), 0.0);
+    junction.tubes.reserve(junction.segments.size());
     this->Junctions.push_back(std::move(junction));
   }
 }
@@ -277,37 +286,49 @@ void ContrastTracers::PrepareMotion(double dt, const TracerFlow& flow)
     const bool here = static_cast<int>(s) == flow.injector.segment;
     this->FlowBottom[s] = (*flow.flow)[s];
     this->FlowTop[s] = here ? flow.flowAbove : this->FlowBottom[s];
-    Motion& motion = this->Motions[s];
+    TracerMotion& motion = this->Motions[s];
     motion.rate = static_cast<float>(2.0 * dt * this->FlowBottom[s] / segment.volume);
     // Uniform steps of variance 2 D dt.
     motion.radial =
       static_cast<float>(std::sqrt(6.0 * this->Settings_.radialDiffusivity * dt) / segment.radius);
     // As a fraction of a cylinder with the segment's length and volume: of its length.
-    motion.axial =
+    this->AxialSteps[s] =
       static_cast<float>(std::sqrt(6.0 * this->Settings_.axialDiffusivity * dt) / segment.length);
   }
 }
 
-/// mL/s that leave each node through each of its ways.
+/// What leaves each node through each of its ways, as stream-tubes.
 void ContrastTracers::PrepareJunctions()
 {
   for (std::size_t n = 0; n < this->Junctions.size(); ++n)
   {
     Junction& junction = this->Junctions[n];
+    const auto outOf = [&](int s) // mL/s
+    {
+      return this->Segments[s].above == static_cast<int>(n) ? this->FlowTop[s]
+                                                            : -this->FlowBottom[s];
+    };
     double rest = 0.0;
-    for (std::size_t k = 0; k < junction.segments.size(); ++k)
+    for (const int s : junction.segments)
     {
-      const int s = junction.segments[k];
-      if (s >= 0)
-      {
-        junction.out[k] =
-          this->Segments[s].above == static_cast<int>(n) ? this->FlowTop[s] : -this->FlowBottom[s];
-        rest -= junction.out[k];
-      }
+      rest -= s >= 0 ? outOf(s) : 0.0;
     }
-    for (std::size_t k = 0; k < junction.segments.size(); ++k)
+    double total = 0.0;
+    for (const int s : junction.segments)
     {
-      junction.out[k] = junction.segments[k] < 0 ? rest : junction.out[k];
+      total += std::max(s >= 0 ? outOf(s) : rest, 0.0);
+    }
+    double before = 0.0;
+    junction.tubes.clear();
+    for (const int s : junction.segments)
+    {
+      const double out = s >= 0 ? outOf(s) : rest;
+      if (out > 0.0)
+      {
+        junction.tubes.push_back(
+          { s, static_cast<float>(before / total), static_cast<float>(total / out) });
+        before += out;
+      }
     }
   }
 }
@@ -323,104 +344,33 @@ void ContrastTracers::WashOut(double dt)
   }
 }
 
-/// Moves `count` tracers from `first` on as if no segment ended.
-template <bool Axial>
-void ContrastTracers::MoveBlock(std::int64_t first, int count, Block& block)
+/// Moves all as if no segment ended; returns how many of `Leaving` are beyond an end of theirs.
+std::int64_t ContrastTracers::MoveWithinSegments()
 {
-  const Motion* const motions = this->Motions.data();
-  const std::int32_t* const segments = this->Segment_.data() + first;
-  std::copy_n(this->Part_.data() + first, count, block.part.data());
-  std::copy_n(this->X_.data() + first, count, block.x.data());
-  std::copy_n(this->Y_.data() + first, count, block.y.data());
-  for (int i = 0; i < count; ++i)
-  {
-    const Motion& motion = motions[segments[i]];
-    block.rate[i] = motion.rate;
-    block.radial[i] = motion.radial;
-    if (Axial)
-    {
-      block.axial[i] = motion.axial;
-    }
-  }
+  TracerRun run;
+  run.segment = this->Segment_.data();
+  run.part = this->Part_.data();
+  run.x = this->X_.data();
+  run.y = this->Y_.data();
+  run.motions = this->Motions.data();
+  run.axial = this->Settings_.axialDiffusivity > 0.0 ? this->AxialSteps.data() : nullptr;
+  run.random = MixBits(this->Key + this->Steps);
   const int injected = this->Flow.injector.segment;
   if (injected >= 0 && this->Flow.injector.volume > 0.0)
   {
-    const Stretch& segment = this->Segments[injected];
-    const auto tip = static_cast<float>(this->Flow.injector.volume / segment.volume);
-    const auto above =
-      static_cast<float>(2.0 * this->Dt * this->FlowTop[injected] / segment.volume);
-    for (int i = 0; i < count; ++i)
-    {
-      // Arithmetic, so that it is vectorised.
-      const float here = segments[i] == injected ? 1.0F : 0.0F;
-      const float early = block.part[i] < tip ? 1.0F : 0.0F;
-      block.rate[i] += here * early * (above - block.rate[i]);
-    }
+    const double volume = this->Segments[injected].volume;
+    run.injected = injected;
+    run.injectedPart = static_cast<float>(this->Flow.injector.volume / volume);
+    run.injectedRate = static_cast<float>(2.0 * this->Dt * this->FlowTop[injected] / volume);
   }
-  const std::uint64_t step = MixBits(this->Key + this->Steps);
-  const std::uint32_t base = static_cast<std::uint32_t>(step) + static_cast<std::uint32_t>(first);
-  const auto scramble = static_cast<std::uint32_t>(step >> 32);
-  // All of a block, so that the loop has no rest; what is behind `count` is not used.
-  for (int i = 0; i < Block::Size; ++i)
-  {
-    const std::uint32_t bits = MixBits32((base + static_cast<std::uint32_t>(i)) ^ scramble);
-    const float stepX = block.radial[i] * LowHalf(bits);
-    const float stepY = block.radial[i] * HighHalf(bits);
-    const float farX = block.x[i] + stepX;
-    const float farY = block.y[i] + stepY;
-    const float taken = farX * farX + farY * farY < 1.0F ? 1.0F : 0.0F;
-    const float x = block.x[i] + taken * stepX;
-    const float y = block.y[i] + taken * stepY;
-    float moved = block.part[i] + block.rate[i] * (1.0F - x * x - y * y);
-    if (Axial)
-    {
-      moved += block.axial[i] * LowHalf(MixBits32(bits ^ scramble));
-    }
-    block.x[i] = x;
-    block.y[i] = y;
-    block.part[i] = moved;
-    block.beyond[i] =
-      static_cast<std::int32_t>(moved < 0.0F) | static_cast<std::int32_t>(moved > 1.0F);
-  }
-  std::copy_n(block.part.data(), count, this->Part_.data() + first);
-  std::copy_n(block.x.data(), count, this->X_.data() + first);
-  std::copy_n(block.y.data(), count, this->Y_.data() + first);
-}
-
-/// Moves all; returns how many of `Leaving` have left their segments.
-template <bool Axial>
-std::size_t ContrastTracers::MoveAll()
-{
-  Block block{};
-  std::size_t leave = 0;
-  for (std::int64_t first = 0; first < this->Size_; first += Block::Size)
-  {
-    const int count = static_cast<int>(std::min<std::int64_t>(Block::Size, this->Size_ - first));
-    this->MoveBlock<Axial>(first, count, block);
-    // Most have not: a few at a time.
-    for (int four = 0; four < count; four += 4)
-    {
-      const std::int32_t* const beyond = block.beyond.data() + four;
-      if ((beyond[0] | beyond[1] | beyond[2] | beyond[3]) == 0)
-      {
-        continue;
-      }
-      for (int i = four; i < std::min(four + 4, count); ++i)
-      {
-        this->Leaving[leave] = static_cast<std::int32_t>(first + i);
-        leave += static_cast<std::size_t>(block.beyond[i]);
-      }
-    }
-  }
-  return leave;
+  return MoveTracersLoop()(run, this->Size_, this->Leaving.data());
 }
 
 void ContrastTracers::Move()
 {
-  const std::size_t leave =
-    this->Settings_.axialDiffusivity > 0.0 ? this->MoveAll<true>() : this->MoveAll<false>();
-  bool gone = false;
-  for (std::size_t k = 0; k < leave; ++k)
+  const std::int64_t leave = this->MoveWithinSegments();
+  std::int64_t gone = 0;
+  for (std::int64_t k = 0; k < leave; ++k)
   {
     const std::int32_t i = this->Leaving[k];
     Tracer tracer{ this->Segment_[i], this->Lumen(i), this->X_[i], this->Y_[i], this->Volume_[i] };
@@ -430,20 +380,13 @@ void ContrastTracers::Move()
     }
     else
     {
-      this->Segment_[i] = -1;
-      gone = true;
+      this->Leaving[gone++] = i;
     }
   }
-  if (gone)
+  // From the last one on, the place of one that left the tree is taken by the last one there is.
+  while (gone > 0)
   {
-    // From the last one on, the place of one that left is taken by the last one there is.
-    for (std::size_t k = leave; k-- > 0;)
-    {
-      if (this->Segment_[this->Leaving[k]] < 0)
-      {
-        this->Copy(--this->Size_, this->Leaving[k]);
-      }
-    }
+    this->Copy(--this->Size_, this->Leaving[--gone]);
   }
 }
 
@@ -451,8 +394,8 @@ void ContrastTracers::Store(const Tracer& tracer, std::int64_t i)
 {
   this->Segment_[i] = tracer.segment;
   this->Part_[i] = static_cast<float>(tracer.lumen / this->Segments[tracer.segment].volume);
-  this->X_[i] = static_cast<float>(tracer.x);
-  this->Y_[i] = static_cast<float>(tracer.y);
+  this->X_[i] = tracer.x;
+  this->Y_[i] = tracer.y;
   this->Volume_[i] = tracer.volume;
 }
 
@@ -487,7 +430,7 @@ bool ContrastTracers::Cross(Tracer& tracer)
       return true;
     }
     // Twice the time left, mL of lumen for each mL/s.
-    const double left = beyond / (flow * (1.0 - Square(tracer.x) - Square(tracer.y)));
+    const double left = beyond / (flow * Inside(tracer));
     const int node =
       atBeginning ? this->Segments[tracer.segment].above : this->Segments[tracer.segment].below;
     const Way way = this->Route(tracer, node);
@@ -499,7 +442,7 @@ bool ContrastTracers::Cross(Tracer& tracer)
     {
       return false;
     }
-    const double inside = 1.0 - Square(tracer.x) - Square(tracer.y);
+    const double inside = Inside(tracer);
     const Stretch& next = this->Segments[tracer.segment];
     tracer.lumen = next.above == node
       ? left * this->FlowTop[tracer.segment] * inside
@@ -512,28 +455,13 @@ bool ContrastTracers::Cross(Tracer& tracer)
 /// The tracer's next segment after a node, and its place in that cross-section.
 ContrastTracers::Way ContrastTracers::Route(Tracer& tracer, int node)
 {
-  Junction& junction = this->Junctions[node];
-  double total = 0.0;
-  int ways = 0;
-  std::size_t chosen = 0;
-  for (std::size_t k = 0; k < junction.segments.size(); ++k)
-  {
-    if (junction.out[k] > 0.0 && junction.segments[k] != tracer.segment)
-    {
-      total += junction.out[k];
-      ++ways;
-      chosen = k;
-    }
-  }
-  if (ways == 0)
+  const Junction& junction = this->Junctions[node];
+  if (junction.tubes.empty())
   {
     return Way::None; // what comes in does not go out: round-off of a flow that stops
   }
-  if (ways > 1)
-  {
-    chosen = ChooseTube(junction, tracer, total);
-  }
-  tracer.segment = junction.segments[chosen];
+  tracer.segment =
+    junction.tubes.size() > 1 ? TakeTube(junction, tracer) : junction.tubes.front().segment;
   if (tracer.segment >= 0)
   {
     return Way::Inside;
@@ -550,35 +478,27 @@ ContrastTracers::Way ContrastTracers::Route(Tracer& tracer, int node)
   return Way::Outside;
 }
 
-/// Which of several ways takes a tracer; its stream-tube becomes the whole of that way's circle.
-std::size_t ContrastTracers::ChooseTube(const Junction& junction, Tracer& tracer, double total)
+/// Which of several segments takes a tracer; its stream-tube becomes the whole of that segment's circle.
+int ContrastTracers::TakeTube(const Junction& junction, Tracer& tracer)
 {
-  const double along = tracer.x * junction.partingX + tracer.y * junction.partingY;
-  const double across = tracer.y * junction.partingX - tracer.x * junction.partingY;
-  const double flux = total * Tables().FluxBelow(along);
-  double before = 0.0;
-  double taken = 0.0;
+  const FluxTables& tables = Tables();
+  const float along = tracer.x * junction.partingX + tracer.y * junction.partingY;
+  const float across = tracer.y * junction.partingX - tracer.x * junction.partingY;
+  const float flux = tables.FluxBelow(along);
+  // Counted, not searched: which tube it is cannot be predicted.
   std::size_t chosen = 0;
-  for (std::size_t k = 0; k < junction.segments.size(); ++k)
+  for (std::size_t k = 1; k < junction.tubes.size(); ++k)
   {
-    if (junction.out[k] > 0.0 && junction.segments[k] != tracer.segment)
-    {
-      before += taken;
-      taken = junction.out[k];
-      chosen = k;
-      if (flux < before + taken)
-      {
-        break;
-      }
-    }
+    chosen += static_cast<std::size_t>(flux >= junction.tubes[k].begin);
   }
-  const double x = Tables().ChordOf((flux - before) / taken);
-  const double y =
-    across * std::sqrt(std::max(1.0 - x * x, 0.0) / std::max(1.0 - along * along, 1e-12));
+  const Tube& tube = junction.tubes[chosen];
+  const float x = tables.chordOf((flux - tube.begin) * tube.scale);
+  const float y =
+    across * std::sqrt(std::max(1.0F - x * x, 0.0F) / std::max(1.0F - along * along, 1e-6F));
   tracer.x = x * junction.partingX - y * junction.partingY;
   tracer.y = x * junction.partingY + y * junction.partingX;
   KeepInside(tracer.x, tracer.y);
-  return chosen;
+  return tube.segment;
 }
 
 void ContrastTracers::Step(double dt, const TracerFlow& flow)
@@ -639,14 +559,16 @@ void ContrastTracers::Emit(double volume, bool down)
   for (std::int64_t k = 0; k < count; ++k)
   {
     const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
-    const double x = Tables().ChordOf(FractionalPart(shiftX + alphaX * number));
-    const double y = PlaceOnChord(FractionalPart(shiftY + alphaY * number)) *
-      std::sqrt(std::max(1.0 - x * x, 0.0));
+    const float x =
+      Tables().chordOf(static_cast<float>(FractionalPart(shiftX + alphaX * number)));
+    const float y =
+      Tables().placeOnChord(static_cast<float>(FractionalPart(shiftY + alphaY * number))) *
+      std::sqrt(std::max(1.0F - x * x, 0.0F));
     const double time = (static_cast<double>(k) + shiftTime) / static_cast<double>(count);
     Tracer tracer{ segment, 0.0, x, y, volume / static_cast<double>(count) };
     KeepInside(tracer.x, tracer.y);
     tracer.lumen = this->Flow.injector.volume +
-      rate * (1.0 - time) * (1.0 - Square(tracer.x) - Square(tracer.y));
+      rate * (1.0 - time) * Inside(tracer);
     if (this->Cross(tracer))
     {
       this->Store(tracer, this->Size_++);

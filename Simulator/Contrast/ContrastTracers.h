@@ -6,6 +6,7 @@
 #define DynamicCoronary_ContrastTracers_h
 
 #include "CoronaryFlow.h"
+#include "TracerKernels.h"
 
 #include <array>
 #include <cstdint>
@@ -94,9 +95,9 @@ private:
   struct Tracer
   {
     int segment;
-    double lumen;
-    double x;
-    double y;
+    double lumen; ///< mL of the segment's lumen that are before it; beyond it: how far its speed takes it
+    float x;
+    float y;
     double volume;
   };
   struct Stretch
@@ -107,48 +108,32 @@ private:
     double radius; ///< mm
     double length; ///< mm
   };
-  /// What a node's blood can go into, in the order in which it leaves along `parting`; -1: out of the tree.
+  /// Part of what comes into a node that leaves together.
+  struct Tube
+  {
+    int segment;  ///< into which; -1: out of the tree
+    float begin; ///< part of the node's flux that is before it along `parting`
+    float scale; ///< the node's flux / its own
+  };
   struct Junction
   {
+    /// What the node's blood can go into, in the order in which it leaves along `parting`; -1: out of the tree.
     std::vector<int> segments;
-    std::vector<double> out; ///< mL/s, as segments
-    double partingX = 1.0;
-    double partingY = 0.0;
+    std::vector<Tube> tubes; ///< of those of `segments` that blood goes into now
+    float partingX = 1.0F;
+    float partingY = 0.0F;
     bool tip = false;
     bool root = false;
   };
-  /// What the moving loop needs of a segment.
-  struct Motion
-  {
-    float rate;   ///< 2 Q dt below the injector / the segment's volume
-    float radial; ///< half width of a step of (x, y)
-    float axial;  ///< half width of a step along the segment, of its volume
-  };
-  /// What the moving loop needs of neighbouring tracers, side by side so that it can be vectorised.
-  struct Block
-  {
-    static constexpr int Size = 512;
-    std::array<float, Size> part;
-    std::array<float, Size> x;
-    std::array<float, Size> y;
-    std::array<float, Size> rate;
-    std::array<float, Size> radial;
-    std::array<float, Size> axial;
-    std::array<std::int32_t, Size> beyond; ///< 1 where a tracer is beyond its segment
-  };
-
   void MakeJunctions(const FlowNetwork& network);
   void PrepareMotion(double dt, const TracerFlow& flow);
   void PrepareJunctions();
   void WashOut(double dt);
   void Move();
-  template <bool Axial>
-  void MoveBlock(std::int64_t first, int count, Block& block);
-  template <bool Axial>
-  std::size_t MoveAll();
+  std::int64_t MoveWithinSegments();
   bool Cross(Tracer& tracer);
   Way Route(Tracer& tracer, int node);
-  static std::size_t ChooseTube(const Junction& junction, Tracer& tracer, double total);
+  static int TakeTube(const Junction& junction, Tracer& tracer);
   void Inject(double volume);
   void Emit(double volume, bool down);
   void MakeRoom(std::int64_t count);
@@ -163,7 +148,8 @@ private:
   double TracerVolume; ///< mL, now
   std::vector<Stretch> Segments;
   std::vector<Junction> Junctions;
-  std::vector<Motion> Motions;
+  std::vector<TracerMotion> Motions;
+  std::vector<float> AxialSteps;  ///< half width of a step along the segment, of its volume
   std::vector<double> FlowTop;    ///< mL/s per segment, at its beginning
   std::vector<double> FlowBottom; ///< at its end
   TracerFlow Flow;
@@ -175,7 +161,7 @@ private:
   std::vector<float> X_;
   std::vector<float> Y_;
   std::vector<double> Volume_;
-  std::vector<std::int32_t> Leaving; ///< tracers that crossed an end of their segment
+  std::vector<std::int32_t> Leaving; ///< tracers beyond an end of their segment
   std::vector<std::int32_t> Order;   ///< for thinning
   std::vector<std::int32_t> CellBegin;
 
