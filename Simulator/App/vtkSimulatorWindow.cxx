@@ -758,12 +758,12 @@ void Window::Begin(const std::string& record, const std::string& replay)
   this->Keys = std::make_shared<KeyboardDevice>();
   this->Panel = std::make_shared<PanelDevice>();
   this->Mux = std::make_shared<DeviceMux>();
+  EngineOptions options;
   if (!this->Options.script.empty())
   {
-    auto script =
-      std::make_shared<ScriptDevice>(ReadDriveScript(this->Options.script), this->Options.script);
-    script->SetStart(StartInputOf(scenario));
-    this->Mux->Add(script);
+    options.script = ReadDriveScript(this->Options.script);
+    this->Mux->Add(std::make_shared<ScriptDevice>(
+      options.script, this->Options.script, StartInputOf(scenario)));
   }
   for (const std::shared_ptr<Device>& device : this->Hardware)
   {
@@ -773,7 +773,6 @@ void Window::Begin(const std::string& record, const std::string& replay)
   this->Mux->Add(this->Keys);
   const CArmPose& pose = scenario.imaging.pose;
   this->Mux->Start({ pose.primary, pose.secondary, pose.sourceToDetector, Vector3::Zero() });
-  EngineOptions options;
   options.record = record;
   options.replay = replay;
   options.wallPoints = this->Scene->WallPoints();

@@ -22,16 +22,12 @@ public:
   explicit ScriptDevice(
     DriveScript script, std::string name = "script", const SessionInput& start = {});
 
-  /// Where everything is before it begins, above all the C-arm. Before the first Read().
-  void SetStart(const SessionInput& start) { this->Start = start; }
-
   void Read(std::uint64_t tick, double secondsPerTick, InputFrame& frame) override;
   DeviceStatus Status() const override;
   bool IsScripted() const override { return true; }
 
 private:
   DriveScript Script;
-  SessionInput Start;
   std::string Name;
   SessionInput Start;
 };
