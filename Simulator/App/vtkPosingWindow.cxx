@@ -1,7 +1,7 @@
-#include "vtkPosingWindow.h"
-
 #include "Interruption.h"
+#include "PosingSession.h"
 #include "vtkMessageTrap.h"
+#include "vtkPosingModel.h"
 #include "vtkPosingScene.h"
 #include "vtkSimulatorWindow.h"
 
