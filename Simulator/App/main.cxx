@@ -10,11 +10,10 @@
 #include "Interruption.h"
 #include "OptionChecks.h"
 #include "ParallelFor.h"
+#include "PosingSession.h"
 #include "ProgressDisplay.h"
 #include "SessionWorld.h"
-#include "vtkPosingModel.h"
 #ifdef DYNAMICCORONARY_WITH_WINDOW
-#include "vtkPosingWindow.h"
 #include "vtkSimulatorWindow.h"
 #endif
 

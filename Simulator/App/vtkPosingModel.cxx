@@ -49,7 +49,7 @@ std::string FileOfRun(const std::string& folder, const char* name)
   {
     Fail(folder, "is no folder: a result of 'coronary-pipeline run' was expected there");
   }
-  const std::string path = (fs::path(folder) / name).string();
+  std::string path = (fs::path(folder) / name).string();
   if (!fs::is_regular_file(path, ignored))
   {
     Fail(path,
@@ -363,6 +363,7 @@ vtkSmartPointer<vtkPolyData> vtkPosingModel::Moved(vtkPolyData* start, const Vec
   }
   this->Poser->MoveJointOff();
   std::vector<Vector3> places;
+  places.reserve(chain.size());
   for (const std::int64_t joint : chain)
   {
     places.push_back(PointOf(start, joint));

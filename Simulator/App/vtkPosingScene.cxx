@@ -1,14 +1,13 @@
 #include "vtkPosingScene.h"
 
+#include "vtkDrawnSurface.h"
 #include "vtkPosingModel.h"
 
 #include "vtkActor.h"
 #include "vtkCamera.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkDecimatePro.h"
 #include "vtkFloatArray.h"
-#include "vtkIdTypeArray.h"
 #include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
@@ -20,7 +19,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace coronary
 {
@@ -28,7 +26,6 @@ namespace
 {
 constexpr float JointSize = 9.0F; // pixels
 constexpr float ChosenSize = 16.0F;
-constexpr double LargestFeatureAngle = 60.0; // degrees; thin vessels have a few triangles around
 
 /// Means of the triangles around, weighted by their areas.
 void FindNormals(
@@ -71,42 +68,23 @@ vtkPosingScene::~vtkPosingScene() = default;
 
 void vtkPosingScene::MakeVessels(std::int64_t triangles)
 {
-  vtkNew<vtkPolyData> whole;
-  whole->SetPoints(this->Model.BoundaryAtRest()->GetPoints());
-  whole->SetPolys(this->Model.BoundaryAtRest()->GetPolys());
-  vtkNew<vtkIdTypeArray> origin;
-  origin->SetName("Origin");
-  origin->SetNumberOfValues(whole->GetNumberOfPoints());
-  std::iota(origin->Begin(), origin->End(), 0);
-  whole->GetPointData()->AddArray(origin);
-  // It takes points away and moves none, so that those that stay are known in every pose.
-  vtkNew<vtkDecimatePro> fewer;
-  fewer->SetInputData(whole);
-  const double share =
-    static_cast<double>(triangles) / static_cast<double>(whole->GetNumberOfPolys());
-  fewer->SetTargetReduction(std::clamp(1.0 - share, 0.0, 0.999));
-  fewer->PreserveTopologyOn();
-  fewer->SplittingOff();
-  fewer->SetFeatureAngle(LargestFeatureAngle);
-  fewer->BoundaryVertexDeletionOff();
-  fewer->Update();
-  vtkPolyData* drawn = fewer->GetOutput();
-  auto* kept = vtkIdTypeArray::SafeDownCast(drawn->GetPointData()->GetArray("Origin"));
-  this->Drawn.assign(kept->Begin(), kept->End());
-  this->Vessels->SetPolys(drawn->GetPolys());
-  for (vtkIdType cell = 0; cell < drawn->GetNumberOfPolys(); ++cell)
+  const DrawnSurface drawn = MakeDrawnSurface(this->Model.BoundaryAtRest(), triangles);
+  this->Drawn = drawn.origin;
+  const auto count = static_cast<vtkIdType>(this->Drawn.size());
+  this->Vessels->SetPolys(drawn.data->GetPolys());
+  for (vtkIdType cell = 0; cell < drawn.data->GetNumberOfPolys(); ++cell)
   {
-    vtkIdType count = 0;
+    vtkIdType corners = 0;
     const vtkIdType* ids = nullptr;
-    drawn->GetPolys()->GetCellAtId(cell, count, ids);
+    drawn.data->GetPolys()->GetCellAtId(cell, corners, ids);
     this->Triangles.push_back({ ids[0], ids[1], ids[2] });
   }
   vtkNew<vtkPoints> points;
   points->SetDataTypeToFloat();
-  points->SetNumberOfPoints(drawn->GetNumberOfPoints());
+  points->SetNumberOfPoints(count);
   this->Vessels->SetPoints(points);
   this->Normals->SetNumberOfComponents(3);
-  this->Normals->SetNumberOfTuples(drawn->GetNumberOfPoints());
+  this->Normals->SetNumberOfTuples(count);
   this->Vessels->GetPointData()->SetNormals(this->Normals);
   vtkNew<vtkPolyDataMapper> mapper;
   mapper->SetInputData(this->Vessels);
@@ -169,10 +147,10 @@ void vtkPosingScene::Update()
 {
   auto* skin = vtkFloatArray::SafeDownCast(this->Model.Skin()->GetPoints()->GetData());
   auto* points = vtkFloatArray::SafeDownCast(this->Vessels->GetPoints()->GetData());
-  for (std::size_t n = 0; n < this->Drawn.size(); ++n)
+  for (vtkIdType n = 0; n < points->GetNumberOfTuples(); ++n)
   {
     std::copy_n(
-      skin->GetPointer(3 * this->Drawn[n]), 3, points->GetPointer(static_cast<vtkIdType>(3 * n)));
+      skin->GetPointer(3 * this->Drawn[static_cast<std::size_t>(n)]), 3, points->GetPointer(3 * n));
   }
   this->Vessels->GetPoints()->Modified();
   FindNormals(this->Triangles, points, this->Normals);

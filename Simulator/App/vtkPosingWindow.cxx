@@ -1,7 +1,7 @@
-#include "vtkPosingWindow.h"
-
 #include "Interruption.h"
+#include "PosingSession.h"
 #include "vtkMessageTrap.h"
+#include "vtkPosingModel.h"
 #include "vtkPosingScene.h"
 #include "vtkSimulatorWindow.h"
 
@@ -44,7 +44,6 @@
 #include <functional>
 #include <memory>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 namespace coronary
@@ -119,10 +118,12 @@ private:
   vtkPosingScene Scene;
   bool HasFailed = false;
   bool Scripted = false;
-  bool Pending = false; ///< a place of the mouse that is not shown yet
+  Vector3 Grabbed = Vector3::Zero();    ///< place of the joint when its move began
+  Vector3 GrabOffset = Vector3::Zero(); ///< of the joint from the mouse
   Vector3 Wanted = Vector3::Zero();
   double FrameMilliseconds = 0.0;
   QTimer Timer;
+  QTimer MouseTimer; ///< runs while a place of the mouse is not shown yet
 
   View* Picture = nullptr;
   vtkNew<vtkGenericOpenGLRenderWindow> RenderWindow;
@@ -171,6 +172,8 @@ Window::Window(const std::string& folder, const PosingOptions& options, vtkMessa
       }
     });
   this->Timer.start(InterruptionInterval);
+  this->MouseTimer.setSingleShot(true);
+  QObject::connect(&this->MouseTimer, &QTimer::timeout, [this] { this->FollowMouse(); });
 }
 
 Window::~Window()
@@ -448,6 +451,8 @@ bool Window::TakeMouse(QMouseEvent& event)
       {
         this->Model.Choose(joint);
         this->Model.BeginMove();
+        this->Grabbed = this->Model.Joint(joint);
+        this->GrabOffset = this->Grabbed - this->Scene.PlaceAt(x, y, this->Grabbed);
       });
     return true;
   }
@@ -457,18 +462,22 @@ bool Window::TakeMouse(QMouseEvent& event)
   }
   if (event.type() == QEvent::MouseButtonRelease && event.button() == Qt::LeftButton)
   {
-    this->FollowMouse();
+    if (this->MouseTimer.isActive())
+    {
+      this->MouseTimer.stop();
+      this->FollowMouse();
+    }
     this->Do([&] { this->Model.EndMove(); });
     return true;
   }
   if (event.type() == QEvent::MouseMove && (event.buttons() & Qt::LeftButton) != 0)
   {
-    this->Wanted = this->Scene.PlaceAt(x, y, this->Model.Joint(this->Model.Chosen()));
+    // In the plane where the joint was grabbed, wherever it has got to.
+    this->Wanted = this->Scene.PlaceAt(x, y, this->Grabbed) + this->GrabOffset;
     // Moves that came in the meantime are one.
-    if (!this->Pending)
+    if (!this->MouseTimer.isActive())
     {
-      this->Pending = true;
-      QTimer::singleShot(0, this, [this] { this->FollowMouse(); });
+      this->MouseTimer.start(0);
     }
   }
   return true;
@@ -476,11 +485,10 @@ bool Window::TakeMouse(QMouseEvent& event)
 
 void Window::FollowMouse()
 {
-  if (!std::exchange(this->Pending, false) || !this->Model.Moving())
+  if (this->Model.Moving())
   {
-    return;
+    this->Do([&] { this->Model.MoveTo(this->Wanted); });
   }
-  this->Do([&] { this->Model.MoveTo(this->Wanted); });
 }
 
 void Window::ChooseBeside(int step)

@@ -1,12 +1,11 @@
 #include "vtkSimulatorScene.h"
 
+#include "vtkDrawnSurface.h"
+
 #include "vtkActor.h"
 #include "vtkCamera.h"
 #include "vtkCellArray.h"
-#include "vtkDecimatePro.h"
-#include "vtkIdTypeArray.h"
 #include "vtkLight.h"
-#include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkPolyDataMapper.h"
@@ -16,7 +15,6 @@
 #include "vtkTubeFilter.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace coronary
 {
@@ -109,35 +107,9 @@ void vtkSimulatorScene::MakeWall(WallMotion& wall, std::int64_t triangles)
   UsePoints(whole);
   SetPoints(whole, rest);
   SetTriangles(whole, wall.Topology().triangles);
-  vtkNew<vtkIdTypeArray> origin;
-  origin->SetName("Origin");
-  origin->SetNumberOfValues(static_cast<vtkIdType>(rest.size()));
-  std::iota(origin->Begin(), origin->End(), 0);
-  whole->GetPointData()->AddArray(origin);
-  // It takes points away and moves none, so that those that stay are known at every moment.
-  vtkNew<vtkDecimatePro> fewer;
-  fewer->SetInputData(whole);
-  const double share = static_cast<double>(triangles) /
-    static_cast<double>(std::max<vtkIdType>(1, whole->GetNumberOfPolys()));
-  fewer->SetTargetReduction(std::clamp(1.0 - share, 0.0, 0.999));
-  // Thin tubes have corners everywhere: what would be an edge elsewhere must not be kept here.
-  fewer->SetFeatureAngle(80.0);
-  fewer->SetDegree(40);
-  fewer->PreserveTopologyOn();
-  fewer->SplittingOff();
-  fewer->BoundaryVertexDeletionOff();
-  fewer->Update();
-  this->WallMesh->ShallowCopy(fewer->GetOutput());
-  auto* kept = vtkIdTypeArray::SafeDownCast(this->WallMesh->GetPointData()->GetArray("Origin"));
-  this->Drawn.clear();
-  for (vtkIdType n = 0; n < this->WallMesh->GetNumberOfPoints(); ++n)
-  {
-    this->Drawn.push_back(kept->GetValue(n));
-  }
-  vtkNew<vtkPoints> points;
-  points->DeepCopy(this->WallMesh->GetPoints());
-  this->WallMesh->SetPoints(points);
-  this->WallMesh->GetPointData()->Initialize();
+  const DrawnSurface drawn = MakeDrawnSurface(whole, triangles);
+  this->WallMesh->ShallowCopy(drawn.data);
+  this->Drawn = drawn.origin;
   vtkNew<vtkPolyDataNormals> normals;
   normals->SetInputData(this->WallMesh);
   normals->SplittingOff();
