@@ -86,12 +86,6 @@ public:
   std::uint64_t StateHash() const;
 
 private:
-  enum class Way
-  {
-    Inside,
-    Outside,
-    None
-  };
   struct Tracer
   {
     int segment;
@@ -99,6 +93,14 @@ private:
     float x;
     float y;
     double volume;
+  };
+  /// A tracer on its way through a node.
+  struct Crossing
+  {
+    Tracer tracer;
+    int node = -1;
+    double left = 0.0;      ///< twice the time left, s
+    std::int64_t place = 0; ///< in the arrays
   };
   struct Stretch
   {
@@ -131,9 +133,11 @@ private:
   void WashOut(double dt);
   void Move();
   std::int64_t MoveWithinSegments();
-  bool Cross(Tracer& tracer);
-  Way Route(Tracer& tracer, int node);
-  static int TakeTube(const Junction& junction, Tracer& tracer);
+  void CrossBatch(const std::int32_t* leaving, std::int64_t count);
+  bool Cross(Crossing& crossing);
+  bool Reach(Crossing& crossing) const;
+  bool Enter(Crossing& crossing);
+  static void TakeTube(const Junction& junction, Tracer& tracer);
   void Inject(double volume);
   void Emit(double volume, bool down);
   void MakeRoom(std::int64_t count);
@@ -162,6 +166,7 @@ private:
   std::vector<float> Y_;
   std::vector<double> Volume_;
   std::vector<std::int32_t> Leaving; ///< tracers beyond an end of their segment
+  std::vector<Crossing> Batch;
   std::vector<std::int32_t> Order;   ///< for thinning
   std::vector<std::int32_t> CellBegin;
 
