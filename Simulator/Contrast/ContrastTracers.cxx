@@ -506,8 +506,7 @@ bool ContrastTracers::Reach(Crossing& crossing) const
   if (flow <= 0.0)
   {
     // Against the flow only diffusion leads, and it is reflected.
-    tracer.lumen =
-      std::clamp(atBeginning ? beyond : segment.volume - beyond, 0.0, segment.volume);
+    tracer.lumen = std::clamp(atBeginning ? beyond : segment.volume - beyond, 0.0, segment.volume);
     return false;
   }
   crossing.node = atBeginning ? segment.above : segment.below;
@@ -621,8 +620,7 @@ void ContrastTracers::Emit(double volume, bool down)
   for (std::int64_t k = 0; k < count; ++k)
   {
     const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
-    const float x =
-      Tables().chordOf(static_cast<float>(FractionalPart(shiftX + alphaX * number)));
+    const float x = Tables().chordOf(static_cast<float>(FractionalPart(shiftX + alphaX * number)));
     const float y =
       Tables().placeOnChord(static_cast<float>(FractionalPart(shiftY + alphaY * number))) *
       std::sqrt(std::max(1.0F - x * x, 0.0F));

@@ -89,7 +89,8 @@ private:
   struct Tracer
   {
     int segment;
-    double lumen; ///< mL of the segment's lumen that are before it; beyond it: how far its speed takes it
+    double
+      lumen; ///< mL of the segment's lumen that are before it; beyond it: how far its speed takes it
     float x;
     float y;
     double volume;
@@ -113,7 +114,7 @@ private:
   /// Part of what comes into a node that leaves together.
   struct Tube
   {
-    int segment;  ///< into which; -1: out of the tree
+    int segment; ///< into which; -1: out of the tree
     float begin; ///< part of the node's flux that is before it along `parting`
     float scale; ///< the node's flux / its own
   };
@@ -167,7 +168,7 @@ private:
   std::vector<double> Volume_;
   std::vector<std::int32_t> Leaving; ///< tracers beyond an end of their segment
   std::vector<Crossing> Batch;
-  std::vector<std::int32_t> Order;   ///< for thinning
+  std::vector<std::int32_t> Order; ///< for thinning
   std::vector<std::int32_t> CellBegin;
 
   double Injected_ = 0.0;
