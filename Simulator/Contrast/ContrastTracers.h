@@ -89,8 +89,7 @@ private:
   struct Tracer
   {
     int segment;
-    double
-      lumen; ///< mL of the segment's lumen that are before it; beyond it: how far its speed takes it
+    double lumen; ///< mL of the segment's lumen that are before it, or as far as its speed takes it
     float x;
     float y;
     double volume;

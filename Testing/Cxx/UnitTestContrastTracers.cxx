@@ -168,6 +168,7 @@ TEST(ContrastTracers, RandomWalkKeepsTheCrossSectionUniform)
     }
     // rho^2 is uniform.
     std::vector<double> square;
+    square.reserve(count);
     for (int i = 0; i < count; ++i)
     {
       square.push_back(
