@@ -15,7 +15,8 @@ constexpr double Pi = 3.14159265358979323846;
 constexpr double DepressedFlow = 0.45;   // of the flow before
 constexpr double DepressionTime = 1.9;   // s, of each of two filters
 constexpr double SmallestVolume = 1e-15; // of a slab without length, mL
-constexpr std::size_t CellsOfSlab = 4;   // in the mean; the more, the fewer cells have the end of a slab in them
+constexpr std::size_t CellsOfSlab =
+  4; // in the mean; the more, the fewer cells have the end of a slab in them
 
 void Require(bool possible, const char* name, double value, const char* range)
 {
@@ -97,8 +98,7 @@ std::size_t ContrastModel::SlabAt(int branch, double volume) const
   const std::size_t first = this->BranchSlab[branch];
   const std::size_t last = this->BranchSlab[branch + 1] - 1;
   const auto cells = static_cast<int>(CellsOfSlab * (last + 1 - first));
-  const int cell =
-    std::clamp(static_cast<int>(volume * this->CellsOfVolume[branch]), 0, cells - 1);
+  const int cell = std::clamp(static_cast<int>(volume * this->CellsOfVolume[branch]), 0, cells - 1);
   auto slab = static_cast<std::size_t>(this->SlabOfCell[CellsOfSlab * first + cell]);
   while (slab < last && this->SlabBegin[slab + 1] <= volume)
   {
@@ -285,8 +285,7 @@ void ContrastModel::TracerPositions(const std::vector<Vector3>& axis,
     const FlowSegment& segment = network.Segments()[this->Tracers_.Segment(tracer)];
     const double along = segment.volumeFrom + this->Tracers_.Lumen(tracer);
     const std::size_t slab = this->SlabAt(segment.branch, along);
-    const double t =
-      std::clamp((along - this->SlabBegin[slab]) / this->SlabVolume(slab), 0.0, 1.0);
+    const double t = std::clamp((along - this->SlabBegin[slab]) / this->SlabVolume(slab), 0.0, 1.0);
     const std::int64_t p = this->Slabs_[slab].point;
     const std::vector<double>& radii = network.Topology().axisRadius[segment.branch];
     const auto k = static_cast<std::size_t>(p - network.Branches()[segment.branch].firstPoint);

@@ -47,7 +47,8 @@ struct ContrastBalance
   double inTree = 0.0;    ///< in the arteries
   double blush = 0.0;     ///< in the myocardium
   double washedOut = 0.0; ///< left the myocardium
-  double spilled = 0.0;   ///< in the aorta: injected there, refluxed, or flowed back through an ostium
+  double spilled =
+    0.0; ///< in the aorta: injected there, refluxed, or flowed back through an ostium
 };
 
 /**
@@ -139,12 +140,13 @@ private:
   CoronaryFlow Flow_;
   ContrastTracers Tracers_;
   std::vector<ContrastSlab> Slabs_;
-  std::vector<double> SlabLength;       ///< mm
-  std::vector<double> SlabBegin;        ///< mL along the branch
-  std::vector<std::size_t> BranchSlab;  ///< per branch: its first slab; and one more
-  std::vector<std::int32_t> SlabOfCell; ///< where cells of equal volume begin, CellsOfSlab to a slab
-  std::vector<double> CellsOfVolume;    ///< per branch: cells a mL
-  std::vector<SmoothedSlab> Smoothing;  ///< per slab
+  std::vector<double> SlabLength;      ///< mm
+  std::vector<double> SlabBegin;       ///< mL along the branch
+  std::vector<std::size_t> BranchSlab; ///< per branch: its first slab; and one more
+  std::vector<std::int32_t>
+    SlabOfCell;                        ///< where cells of equal volume begin, CellsOfSlab to a slab
+  std::vector<double> CellsOfVolume;   ///< per branch: cells a mL
+  std::vector<SmoothedSlab> Smoothing; ///< per slab
   std::vector<double> BlushVolume_;
   /// Per tree: part of contrast medium in what flows into the myocardium, filtered.
   std::vector<double> Arrived;

@@ -17,6 +17,7 @@ namespace
 {
 constexpr double Pi = 3.14159265358979323846;
 constexpr double DirectionLength = 3.0; // mm over which a branch's direction at a node is taken
+constexpr std::size_t BatchSize = 64;   // of crossings
 constexpr int CellsOfSegment = 64;      // for thinning
 constexpr int Crossings = 1000;         // of segments in a step; more are short of a fault
 
@@ -201,6 +202,7 @@ ContrastTracers::ContrastTracers(
   this->Volume_.resize(capacity);
   this->Leaving.resize(capacity + 1);
   this->Order.resize(capacity);
+  this->Batch.resize(BatchSize);
   this->CellBegin.resize(segments * CellsOfSegment + 1);
   this->Blush_.assign(network.Nodes().size(), 0.0);
   this->Outflow_.assign(network.Nodes().size(), 0.0);
@@ -369,24 +371,72 @@ std::int64_t ContrastTracers::MoveWithinSegments()
 void ContrastTracers::Move()
 {
   const std::int64_t leave = this->MoveWithinSegments();
+  const auto batch = static_cast<std::int64_t>(this->Batch.size());
+  for (std::int64_t first = 0; first < leave; first += batch)
+  {
+    this->CrossBatch(this->Leaving.data() + first, std::min(batch, leave - first));
+  }
   std::int64_t gone = 0;
   for (std::int64_t k = 0; k < leave; ++k)
   {
     const std::int32_t i = this->Leaving[k];
-    Tracer tracer{ this->Segment_[i], this->Lumen(i), this->X_[i], this->Y_[i], this->Volume_[i] };
-    if (this->Cross(tracer))
-    {
-      this->Store(tracer, i);
-    }
-    else
-    {
-      this->Leaving[gone++] = i;
-    }
+    this->Leaving[gone] = i;
+    gone += this->Segment_[i] < 0 ? 1 : 0;
   }
   // From the last one on, the place of one that left the tree is taken by the last one there is.
   while (gone > 0)
   {
     this->Copy(--this->Size_, this->Leaving[--gone]);
+  }
+}
+
+/// Those at nodes where flow parts go through short loops, so that the processor can work on several at a time.
+void ContrastTracers::CrossBatch(const std::int32_t* leaving, std::int64_t count)
+{
+  const auto finish = [this](Crossing& crossing)
+  {
+    if (this->Cross(crossing))
+    {
+      this->Store(crossing.tracer, crossing.place);
+    }
+    else
+    {
+      this->Segment_[crossing.place] = -1;
+    }
+  };
+  std::size_t parting = 0;
+  for (std::int64_t k = 0; k < count; ++k)
+  {
+    const std::int32_t i = leaving[k];
+    Crossing& crossing = this->Batch[parting];
+    crossing.place = i;
+    crossing.tracer = { this->Segment_[i], this->Lumen(i), this->X_[i], this->Y_[i],
+      this->Volume_[i] };
+    if (this->Reach(crossing) && this->Junctions[crossing.node].tubes.size() > 1)
+    {
+      ++parting;
+    }
+    else
+    {
+      finish(crossing);
+    }
+  }
+  for (std::size_t k = 0; k < parting; ++k)
+  {
+    Crossing& crossing = this->Batch[k];
+    TakeTube(this->Junctions[crossing.node], crossing.tracer);
+  }
+  for (std::size_t k = 0; k < parting; ++k)
+  {
+    Crossing& crossing = this->Batch[k];
+    if (this->Enter(crossing))
+    {
+      finish(crossing);
+    }
+    else
+    {
+      this->Segment_[crossing.place] = -1;
+    }
   }
 }
 
@@ -408,65 +458,76 @@ void ContrastTracers::Copy(std::int64_t from, std::int64_t to)
   this->Volume_[to] = this->Volume_[from];
 }
 
-/// A tracer whose lumen is beyond an end of its segment goes on for what is left of the step. False: it left the
-/// tree, and has been counted.
-bool ContrastTracers::Cross(Tracer& tracer)
+/// A tracer goes on for what is left of the step. False: it left the tree, and has been counted.
+bool ContrastTracers::Cross(Crossing& crossing)
 {
+  Tracer& tracer = crossing.tracer;
   for (int k = 0; k < Crossings; ++k)
   {
-    const double volume = this->Segments[tracer.segment].volume;
-    const bool atBeginning = tracer.lumen < 0.0;
-    if (!atBeginning && tracer.lumen <= volume)
+    if (!this->Reach(crossing))
     {
       return true;
     }
-    const double beyond = atBeginning ? -tracer.lumen : tracer.lumen - volume;
-    const double flow =
-      atBeginning ? -this->FlowTop[tracer.segment] : this->FlowBottom[tracer.segment];
-    if (flow <= 0.0)
+    const Junction& junction = this->Junctions[crossing.node];
+    if (junction.tubes.empty())
     {
-      // Against the flow only diffusion leads, and it is reflected.
-      tracer.lumen = std::clamp(atBeginning ? beyond : volume - beyond, 0.0, volume);
-      return true;
+      break; // what comes in does not go out: round-off of a flow that stops
     }
-    // Twice the time left, mL of lumen for each mL/s.
-    const double left = beyond / (flow * Inside(tracer));
-    const int node =
-      atBeginning ? this->Segments[tracer.segment].above : this->Segments[tracer.segment].below;
-    const Way way = this->Route(tracer, node);
-    if (way == Way::None)
+    if (junction.tubes.size() > 1)
     {
-      break;
+      TakeTube(junction, tracer);
     }
-    if (way == Way::Outside)
+    else
+    {
+      tracer.segment = junction.tubes.front().segment;
+    }
+    if (!this->Enter(crossing))
     {
       return false;
     }
-    const double inside = Inside(tracer);
-    const Stretch& next = this->Segments[tracer.segment];
-    tracer.lumen = next.above == node
-      ? left * this->FlowTop[tracer.segment] * inside
-      : next.volume + left * this->FlowBottom[tracer.segment] * inside;
   }
   tracer.lumen = std::clamp(tracer.lumen, 0.0, this->Segments[tracer.segment].volume);
   return true;
 }
 
-/// The tracer's next segment after a node, and its place in that cross-section.
-ContrastTracers::Way ContrastTracers::Route(Tracer& tracer, int node)
+/// The node that a tracer reached whose lumen is beyond an end of its segment; false: none, it stays.
+bool ContrastTracers::Reach(Crossing& crossing) const
 {
-  const Junction& junction = this->Junctions[node];
-  if (junction.tubes.empty())
+  Tracer& tracer = crossing.tracer;
+  const Stretch& segment = this->Segments[tracer.segment];
+  const bool atBeginning = tracer.lumen < 0.0;
+  if (!atBeginning && tracer.lumen <= segment.volume)
   {
-    return Way::None; // what comes in does not go out: round-off of a flow that stops
+    return false;
   }
-  tracer.segment =
-    junction.tubes.size() > 1 ? TakeTube(junction, tracer) : junction.tubes.front().segment;
+  const double beyond = atBeginning ? -tracer.lumen : tracer.lumen - segment.volume;
+  const double flow =
+    atBeginning ? -this->FlowTop[tracer.segment] : this->FlowBottom[tracer.segment];
+  if (flow <= 0.0)
+  {
+    // Against the flow only diffusion leads, and it is reflected.
+    tracer.lumen = std::clamp(atBeginning ? beyond : segment.volume - beyond, 0.0, segment.volume);
+    return false;
+  }
+  crossing.node = atBeginning ? segment.above : segment.below;
+  crossing.left = beyond / (flow * Inside(tracer));
+  return true;
+}
+
+/// From a node into the tracer's next segment; false: out of the tree.
+bool ContrastTracers::Enter(Crossing& crossing)
+{
+  Tracer& tracer = crossing.tracer;
+  const int node = crossing.node;
   if (tracer.segment >= 0)
   {
-    return Way::Inside;
+    const Stretch& segment = this->Segments[tracer.segment];
+    const double way = crossing.left * Inside(tracer); // mL of lumen for each mL/s
+    tracer.lumen = segment.above == node ? way * this->FlowTop[tracer.segment]
+                                         : segment.volume + way * this->FlowBottom[tracer.segment];
+    return true;
   }
-  if (junction.tip)
+  if (this->Junctions[node].tip)
   {
     this->Blush_[node] += tracer.volume;
     this->Outflow_[node] += tracer.volume;
@@ -475,11 +536,11 @@ ContrastTracers::Way ContrastTracers::Route(Tracer& tracer, int node)
   {
     this->Spilled_ += tracer.volume;
   }
-  return Way::Outside;
+  return false;
 }
 
 /// Which of several segments takes a tracer; its stream-tube becomes the whole of that segment's circle.
-int ContrastTracers::TakeTube(const Junction& junction, Tracer& tracer)
+void ContrastTracers::TakeTube(const Junction& junction, Tracer& tracer)
 {
   const FluxTables& tables = Tables();
   const float along = tracer.x * junction.partingX + tracer.y * junction.partingY;
@@ -492,13 +553,13 @@ int ContrastTracers::TakeTube(const Junction& junction, Tracer& tracer)
     chosen += static_cast<std::size_t>(flux >= junction.tubes[k].begin);
   }
   const Tube& tube = junction.tubes[chosen];
+  tracer.segment = tube.segment;
   const float x = tables.chordOf((flux - tube.begin) * tube.scale);
   const float y =
     across * std::sqrt(std::max(1.0F - x * x, 0.0F) / std::max(1.0F - along * along, 1e-6F));
   tracer.x = x * junction.partingX - y * junction.partingY;
   tracer.y = x * junction.partingY + y * junction.partingX;
   KeepInside(tracer.x, tracer.y);
-  return tube.segment;
 }
 
 void ContrastTracers::Step(double dt, const TracerFlow& flow)
@@ -559,17 +620,16 @@ void ContrastTracers::Emit(double volume, bool down)
   for (std::int64_t k = 0; k < count; ++k)
   {
     const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
-    const float x =
-      Tables().chordOf(static_cast<float>(FractionalPart(shiftX + alphaX * number)));
+    const float x = Tables().chordOf(static_cast<float>(FractionalPart(shiftX + alphaX * number)));
     const float y =
       Tables().placeOnChord(static_cast<float>(FractionalPart(shiftY + alphaY * number))) *
       std::sqrt(std::max(1.0F - x * x, 0.0F));
     const double time = (static_cast<double>(k) + shiftTime) / static_cast<double>(count);
-    Tracer tracer{ segment, 0.0, x, y, volume / static_cast<double>(count) };
+    Crossing crossing{ { segment, 0.0, x, y, volume / static_cast<double>(count) } };
+    Tracer& tracer = crossing.tracer;
     KeepInside(tracer.x, tracer.y);
-    tracer.lumen = this->Flow.injector.volume +
-      rate * (1.0 - time) * Inside(tracer);
-    if (this->Cross(tracer))
+    tracer.lumen = this->Flow.injector.volume + rate * (1.0 - time) * Inside(tracer);
+    if (this->Cross(crossing))
     {
       this->Store(tracer, this->Size_++);
     }

@@ -86,19 +86,21 @@ public:
   std::uint64_t StateHash() const;
 
 private:
-  enum class Way
-  {
-    Inside,
-    Outside,
-    None
-  };
   struct Tracer
   {
     int segment;
-    double lumen; ///< mL of the segment's lumen that are before it; beyond it: how far its speed takes it
+    double lumen; ///< mL of the segment's lumen that are before it, or as far as its speed takes it
     float x;
     float y;
     double volume;
+  };
+  /// A tracer on its way through a node.
+  struct Crossing
+  {
+    Tracer tracer;
+    int node = -1;
+    double left = 0.0;      ///< twice the time left, s
+    std::int64_t place = 0; ///< in the arrays
   };
   struct Stretch
   {
@@ -111,7 +113,7 @@ private:
   /// Part of what comes into a node that leaves together.
   struct Tube
   {
-    int segment;  ///< into which; -1: out of the tree
+    int segment; ///< into which; -1: out of the tree
     float begin; ///< part of the node's flux that is before it along `parting`
     float scale; ///< the node's flux / its own
   };
@@ -131,9 +133,11 @@ private:
   void WashOut(double dt);
   void Move();
   std::int64_t MoveWithinSegments();
-  bool Cross(Tracer& tracer);
-  Way Route(Tracer& tracer, int node);
-  static int TakeTube(const Junction& junction, Tracer& tracer);
+  void CrossBatch(const std::int32_t* leaving, std::int64_t count);
+  bool Cross(Crossing& crossing);
+  bool Reach(Crossing& crossing) const;
+  bool Enter(Crossing& crossing);
+  static void TakeTube(const Junction& junction, Tracer& tracer);
   void Inject(double volume);
   void Emit(double volume, bool down);
   void MakeRoom(std::int64_t count);
@@ -162,7 +166,8 @@ private:
   std::vector<float> Y_;
   std::vector<double> Volume_;
   std::vector<std::int32_t> Leaving; ///< tracers beyond an end of their segment
-  std::vector<std::int32_t> Order;   ///< for thinning
+  std::vector<Crossing> Batch;
+  std::vector<std::int32_t> Order; ///< for thinning
   std::vector<std::int32_t> CellBegin;
 
   double Injected_ = 0.0;

@@ -33,7 +33,7 @@ struct CoronaryFlowSettings
   double systolicPressure = 120.0; ///< aortic, 20 to 300
   double diastolicPressure = 80.0; ///< aortic, 10 to systolicPressure
   double venousPressure = 5.0;     ///< right atrium, -10 to 30, below diastolicPressure
-  double ejectionBegin = 0.05;     ///< fraction of R-R, 0.01 to 0.2
+  double ejectionBegin = 0.05;     ///< fraction of R-R, 0.01 to 0.15
   double systoleEnd = 0.35;        ///< fraction of R-R, 0.2 to 0.6
 
   /// Mean over the cycle and over the first 100 mm of the LAD (of the tree's main path if nothing is called LAD) of
@@ -50,8 +50,8 @@ struct CoronaryFlowSettings
   /// Mean flow of an outlet is as its diameter to this power, 1 to 4: 3 is Murray's law; 2.27 was measured at
   /// coronary bifurcations (Doriot et al., Coron Artery Dis 2000;11:495).
   double outletExponent = 2.27;
-  double arterialShare =
-    0.6; ///< of an outlet's resistance that is before its compliance, 0.05 to 0.95
+  /// Of an outlet's resistance that is before its compliance, 0.05 to 0.95.
+  double arterialShare = 0.6;
   double outletTime = 0.4;          ///< time constant of an outlet, s, 0.02 to 5
   double referenceHeartRate = 75.0; ///< 1/min, at which the ratios above hold, 30 to 200
 
@@ -130,10 +130,8 @@ public:
   /// Of a tip: R1 + R2.
   double OutletResistance(int node) const { return this->OutletResistance_[node]; }
   double CompliancePressure(int node) const { return this->Compartment[node]; } ///< mmHg
-  double MyocardialFraction(int tree) const
-  {
-    return this->Fraction[tree];
-  } ///< of the ventricle's pressure
+  /// Of the ventricle's pressure.
+  double MyocardialFraction(int tree) const { return this->Fraction[tree]; }
   /// Segments of the path that a tree is calibrated at, and how many mm of it.
   const std::vector<int>& ReferencePath(int tree) const { return this->Path[tree]; }
   std::size_t NumberOfStenoses() const { return this->Stenoses.size(); }

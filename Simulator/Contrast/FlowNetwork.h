@@ -18,7 +18,7 @@ struct CatheterTip
   double abscissa = 0.0; ///< mm along the branch's axis at rest; beyond an end: at that end
 };
 
-/// What one vessel wall's axis says about a branch.
+/// Lengths and volumes along a branch's axis.
 struct FlowBranch
 {
   std::vector<double> abscissa; ///< mm from the branch's beginning, per axis point
@@ -78,9 +78,8 @@ public:
   /// A segment comes after all that are nearer to the root.
   const std::vector<FlowSegment>& Segments() const { return this->Segments_; }
   const std::vector<FlowNode>& Nodes() const { return this->Nodes_; }
-  /// Per tree.
-  const std::vector<int>& Roots() const { return this->Roots_; } ///< node
-  const std::vector<bool>& RightSide() const { return this->RightSide_; }
+  const std::vector<int>& Roots() const { return this->Roots_; }          ///< node, per tree
+  const std::vector<bool>& RightSide() const { return this->RightSide_; } ///< per tree
   const WallTopology& Topology() const { return this->Topology_; }
   /// The point of its parent's axis (in the list of all branches' points) that a branch leaves from; -1 at a root.
   std::int64_t AttachmentPoint(int branch) const { return this->Attachment[branch]; }

@@ -106,8 +106,9 @@ std::int64_t ListBeyond(
 {
   for (int eight = 0; eight < count; eight += 8)
   {
-    const std::int32_t* const b = block.beyond + eight;
-    if ((b[0] | b[1] | b[2] | b[3] | b[4] | b[5] | b[6] | b[7]) != 0)
+    std::uint64_t any[4];
+    std::memcpy(any, block.beyond + eight, sizeof(any));
+    if ((any[0] | any[1] | any[2] | any[3]) != 0)
     {
       for (int i = eight; i < eight + 8; ++i)
       {

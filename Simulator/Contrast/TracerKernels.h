@@ -21,11 +21,12 @@ struct TracerRun
   float* x = nullptr;
   float* y = nullptr;
   const TracerMotion* motions = nullptr; ///< per segment
-  const float* axial = nullptr; ///< per segment: half width of a step of `part`; null: no such steps
-  std::int32_t injected = -1;   ///< segment with a flow of its own above a place; -1: none
-  float injectedPart = 0.0F;    ///< that place, as part
-  float injectedRate = 0.0F;    ///< there
-  std::uint64_t random = 0;     ///< key of this step's random numbers
+  const float* axial =
+    nullptr;                  ///< per segment: half width of a step of `part`; null: no such steps
+  std::int32_t injected = -1; ///< segment with a flow of its own above a place; -1: none
+  float injectedPart = 0.0F;  ///< that place, as part
+  float injectedRate = 0.0F;  ///< there
+  std::uint64_t random = 0;   ///< key of this step's random numbers
 };
 
 /// Moves tracers 0 to `count` - 1 as if no segment ended. Lists those that are beyond an end of theirs and returns how
@@ -33,8 +34,7 @@ struct TracerRun
 using MoveTracersFunction = std::int64_t (*)(
   const TracerRun& run, std::int64_t count, std::int32_t* leaving);
 
-std::int64_t MoveTracersBaseline(
-  const TracerRun& run, std::int64_t count, std::int32_t* leaving);
+std::int64_t MoveTracersBaseline(const TracerRun& run, std::int64_t count, std::int32_t* leaving);
 std::int64_t MoveTracersAvx2(const TracerRun& run, std::int64_t count, std::int32_t* leaving);
 
 /// The widest that this processor runs.

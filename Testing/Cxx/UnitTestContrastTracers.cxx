@@ -1,10 +1,13 @@
 // Tracers in laminar flow against closed forms: residence time, dispersion, what branches take, conservation.
 #include "ContrastTestData.h"
 #include "ContrastTracers.h"
+#include "CounterRandom.h"
+#include "TracerKernels.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -165,6 +168,7 @@ TEST(ContrastTracers, RandomWalkKeepsTheCrossSectionUniform)
     }
     // rho^2 is uniform.
     std::vector<double> square;
+    square.reserve(count);
     for (int i = 0; i < count; ++i)
     {
       square.push_back(
@@ -333,6 +337,104 @@ TEST(ContrastTracers, SameSeedSameBits)
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_NE(hashes[0], hashes[2]);
+}
+
+/// Tracers for the moving loop alone: three segments, some tracers near their ends.
+struct LoopData
+{
+  explicit LoopData(int count)
+    : segment(count)
+    , part(count)
+    , x(count)
+    , y(count)
+    , leaving(count + 1)
+  {
+    RandomStream random(3);
+    for (int i = 0; i < count; ++i)
+    {
+      segment[i] = static_cast<std::int32_t>(random.Bits() % 3);
+      part[i] = static_cast<float>(random.Uniform());
+      x[i] = static_cast<float>(random.Uniform(-0.7, 0.7));
+      y[i] = static_cast<float>(random.Uniform(-0.7, 0.7));
+    }
+  }
+  std::int64_t Move(MoveTracersFunction move, bool axial, bool injected)
+  {
+    TracerRun run;
+    run.segment = segment.data();
+    run.part = part.data();
+    run.x = x.data();
+    run.y = y.data();
+    run.motions = motions.data();
+    run.axial = axial ? steps.data() : nullptr;
+    run.injected = injected ? 1 : -1;
+    run.injectedPart = 0.4F;
+    run.injectedRate = -0.07F;
+    run.random = 0x0123456789abcdefULL;
+    return move(run, static_cast<std::int64_t>(segment.size()), leaving.data());
+  }
+  std::vector<std::int32_t> segment;
+  std::vector<float> part;
+  std::vector<float> x;
+  std::vector<float> y;
+  std::vector<std::int32_t> leaving;
+  std::array<TracerMotion, 3> motions{ { { 0.06F, 0.3F }, { -0.04F, 0.05F }, { 0.01F, 0.6F } } };
+  std::array<float, 3> steps{ 0.01F, 0.03F, 0.02F };
+};
+
+TEST(ContrastTracers, MovingLoopListsThoseBeyondAnEnd)
+{
+  for (const int count : { 1, 7, 8, 511, 512, 513, 5000 })
+  {
+    LoopData data(count);
+    const std::vector<float> before = data.part;
+    const std::int64_t listed = data.Move(MoveTracersBaseline, false, false);
+    std::vector<std::int32_t> beyond;
+    for (int i = 0; i < count; ++i)
+    {
+      const float rho2 = data.x[i] * data.x[i] + data.y[i] * data.y[i];
+      EXPECT_LT(rho2, 1.0F);
+      const TracerMotion& motion = data.motions[data.segment[i]];
+      EXPECT_NEAR(data.part[i], before[i] + motion.rate * (1.0F - rho2), 1e-6F);
+      if (data.part[i] < 0.0F || data.part[i] > 1.0F)
+      {
+        beyond.push_back(i);
+      }
+    }
+    data.leaving.resize(listed);
+    EXPECT_EQ(data.leaving, beyond) << count;
+  }
+}
+
+TEST(ContrastTracers, MovingLoopsGiveTheSameBits)
+{
+  if (MoveTracersLoop() == MoveTracersBaseline)
+  {
+    GTEST_SKIP() << "this processor has one loop only";
+  }
+  for (const int count : { 1, 7, 8, 511, 512, 513, 5000 })
+  {
+    for (const bool axial : { false, true })
+    {
+      for (const bool injected : { false, true })
+      {
+        LoopData a(count);
+        LoopData b(count);
+        std::int64_t listed = 0;
+        for (int k = 0; k < 5; ++k)
+        {
+          listed = a.Move(MoveTracersBaseline, axial, injected);
+          ASSERT_EQ(b.Move(MoveTracersLoop(), axial, injected), listed);
+        }
+        a.leaving.resize(listed);
+        b.leaving.resize(listed);
+        EXPECT_EQ(a.leaving, b.leaving);
+        EXPECT_EQ(a.part, b.part);
+        EXPECT_EQ(a.x, b.x);
+        EXPECT_EQ(a.y, b.y);
+      }
+    }
+  }
 }
 
 TEST(ContrastTracers, BlushWashesOutExponentially)
