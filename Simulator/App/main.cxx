@@ -14,7 +14,7 @@
 #include "ProgressDisplay.h"
 #include "SessionWorld.h"
 #ifdef DYNAMICCORONARY_WITH_WINDOW
-#include "vtkSimulatorWindow.h"
+#include "SimulatorWindow.h"
 #endif
 
 #include <algorithm>

@@ -1,9 +1,9 @@
 #include "Interruption.h"
 #include "PosingSession.h"
+#include "SimulatorWindow.h"
 #include "vtkMessageTrap.h"
 #include "vtkPosingModel.h"
 #include "vtkPosingScene.h"
-#include "vtkSimulatorWindow.h"
 
 #include "QVTKOpenGLNativeWidget.h"
 #include "vtkCamera.h"

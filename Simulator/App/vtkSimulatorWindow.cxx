@@ -1,4 +1,4 @@
-#include "vtkSimulatorWindow.h"
+#include "SimulatorWindow.h"
 
 #include "FluoroscopyWidget.h"
 #include "HeartShell.h"
@@ -762,8 +762,8 @@ void Window::Begin(const std::string& record, const std::string& replay)
   if (!this->Options.script.empty())
   {
     options.script = ReadDriveScript(this->Options.script);
-    this->Mux->Add(std::make_shared<ScriptDevice>(
-      options.script, this->Options.script, StartInputOf(scenario)));
+    this->Mux->Add(
+      std::make_shared<ScriptDevice>(options.script, this->Options.script, StartInputOf(scenario)));
   }
   for (const std::shared_ptr<Device>& device : this->Hardware)
   {

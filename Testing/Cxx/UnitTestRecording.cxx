@@ -359,10 +359,10 @@ TEST(UnitTestRecording, HostileLengthsAndContents)
   EXPECT_EQ(ends(""), Ending::Torn);
   EXPECT_EQ(ends(std::string(4, '\xFF') + std::string(9, '\0')), Ending::Damaged);      // 4 GB
   EXPECT_EQ(ends(std::string("\0\0\x10\0\6", 5) + std::string(8, '\0')), Ending::Torn); // 1 MB
-  EXPECT_EQ(ends(Chunk(1, 0, std::string(20, '\xFF'))), Ending::Damaged);    // endless varint
-  EXPECT_EQ(ends(Chunk(1, 0, std::string("\0\0", 2))), Ending::Damaged);     // no axis
+  EXPECT_EQ(ends(Chunk(1, 0, std::string(20, '\xFF'))), Ending::Damaged);        // endless varint
+  EXPECT_EQ(ends(Chunk(1, 0, std::string("\0\0", 2))), Ending::Damaged);         // no axis
   EXPECT_EQ(ends(Chunk(1, 0, std::string("\0\x80\x20\0", 4))), Ending::Damaged); // unknown axis
-  EXPECT_EQ(ends(Chunk(1, 0, std::string("\0\1", 2))), Ending::Damaged);     // no value
+  EXPECT_EQ(ends(Chunk(1, 0, std::string("\0\1", 2))), Ending::Damaged);         // no value
   EXPECT_EQ(ends(Chunk(4, 0, "short")), Ending::Damaged);
   EXPECT_EQ(ends(Chunk(4, std::uint64_t{ 1 } << 50, "12345678")), Ending::Damaged);
   EXPECT_EQ(ends(Chunk(6, 5, "") + Chunk(6, 4, "")), Ending::Damaged); // back in time

@@ -1,9 +1,9 @@
 /**
- * @file vtkSimulatorWindow.h
+ * @file SimulatorWindow.h
  * @brief The program a trainee sits at: X-ray monitor, anatomy, panel, traces.
  */
-#ifndef vtkSimulatorWindow_h
-#define vtkSimulatorWindow_h
+#ifndef DynamicCoronary_SimulatorWindow_h
+#define DynamicCoronary_SimulatorWindow_h
 
 #include "SessionEngine.h"
 
