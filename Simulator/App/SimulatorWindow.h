@@ -28,20 +28,21 @@ struct WindowOptions
   int height = 860;
   std::int64_t triangles = 9000; ///< of the wall in the anatomy
   bool heart = true;
+  bool quiet = false; ///< no summary on the standard output
 };
 
-/// @throws std::runtime_error: there is no display; quick, so that it can be asked first
-void RequireDisplay();
+/// What can be known before anything is made, which takes long.
+/// @throws UsageError: no such kind of device; std::runtime_error: no display, no place for a file
+void CheckWindow(const WindowOptions& options);
 
 /// Needs the QApplication. @throws std::runtime_error: the display has no OpenGL 3.2
 void RequireOpenGL();
 
 /**
  * Returns when the window has been closed. Needs a display with OpenGL 3.2.
- * @return 0; 1 when a session failed: the reason was printed
- * @throws std::runtime_error: no display or no OpenGL; devices, files as SessionEngine
+ * @throws std::runtime_error: no OpenGL; what went wrong in the sessions, the first; devices, files as SessionEngine
  */
-int RunWindow(const SessionWorld& world, const WindowOptions& options);
+void RunWindow(const SessionWorld& world, const WindowOptions& options);
 }
 
 #endif

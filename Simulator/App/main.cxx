@@ -399,7 +399,8 @@ void Request::RunWindow() const
   {
     std::sscanf(this->size.c_str(), "%dx%d", &options.width, &options.height);
   }
-  coronary::RequireDisplay();
+  options.quiet = chosen.quiet;
+  coronary::CheckWindow(options);
   coronary::SessionWorld world;
   {
     coronary::ProgressDisplay progress("step", 2, chosen.quiet);
@@ -413,10 +414,7 @@ void Request::RunWindow() const
   {
     std::fprintf(stderr, "Warning: %s\n", note.c_str());
   }
-  if (coronary::RunWindow(world, options) != 0)
-  {
-    throw std::runtime_error("the session failed");
-  }
+  coronary::RunWindow(world, options);
 }
 #endif
 

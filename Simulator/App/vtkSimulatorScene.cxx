@@ -239,7 +239,7 @@ void vtkSimulatorScene::LookAsCArm(const CArmPose& pose)
   const CArmGeometry geometry(pose, {});
   vtkCamera* camera = this->Renderer_->GetActiveCamera();
   // The image is as if seen from the detector: towards the source, the patient's left on the right.
-  const Vector3 from = geometry.DetectorCentre();
+  const Vector3& from = geometry.DetectorCentre();
   const Vector3 up = -geometry.RowDirection();
   camera->SetFocalPoint(pose.isocentre.data());
   camera->SetPosition(from.data());

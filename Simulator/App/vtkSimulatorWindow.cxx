@@ -1,6 +1,9 @@
 #include "SimulatorWindow.h"
 
+#include "AtomicFile.h"
+#include "Command.h"
 #include "FluoroscopyWidget.h"
+#include "HeadlessSession.h"
 #include "HeartShell.h"
 #include "IgtlOutput.h"
 #include "InstrumentCatalogue.h"
@@ -44,6 +47,7 @@
 #include <QPushButton>
 #include <QSaveFile>
 #include <QScrollArea>
+#include <QSignalBlocker>
 #include <QSlider>
 #include <QSplitter>
 #include <QStatusBar>
@@ -167,7 +171,8 @@ public:
   /// @throws as SessionEngine, OpenDevice
   void Begin(const std::string& record, const std::string& replay);
 
-  bool Failed() const { return this->HasFailed; }
+  /// What went wrong first; empty: nothing did.
+  const QString& Trouble() const { return this->Trouble_; }
 
 protected:
   void keyPressEvent(QKeyEvent* event) override;
@@ -187,7 +192,9 @@ private:
   void MakeToolBar();
   void ConnectMouse();
 
+  void ShowScenario();
   void Poll();
+  void ShowSession();
   void ShowScene();
   void ShowImage();
   void SendPose();
@@ -199,9 +206,12 @@ private:
   void RecordVideo();
 
   void PlaceView();
+  void TakeScenarioOf(const std::string& recording);
   void Restart(const std::string& record, const std::string& replay);
   void End();
+  void Post(const RecordedEvent& event);
   void Problem(const QString& text);
+  void PressFluoroscopy();
   void SaveScreenshot(const QString& path);
   void SaveXRay(const QString& name);
   void PrintRates() const;
@@ -221,7 +231,7 @@ private:
   ShownImage Shown;
   ImageMode Mode = ImageMode::Plain;
   std::size_t NextScreenshot = 0;
-  bool HasFailed = false;
+  QString Trouble_;
   bool Replaying = false;
   bool ViewIsOurs = false; ///< the panel's values are being set to what devices made of the view
   double Primary = 0.0;    ///< that the panel asked for, radians
@@ -247,6 +257,8 @@ private:
   QDoubleSpinBox* SecondaryBox = nullptr;
   QDoubleSpinBox* DistanceBox = nullptr;
   QDoubleSpinBox* TableBoxes[3] = { nullptr, nullptr, nullptr };
+  QPushButton* FluoroscopyButton = nullptr;
+  QCheckBox* FluoroscopyHold = nullptr;
   QComboBox* FieldChoice = nullptr;
   QComboBox* RateChoice = nullptr;
   QComboBox* ModeChoice = nullptr;
@@ -321,7 +333,9 @@ Window::Window(const SessionWorld& world, const WindowOptions& options)
   this->DeviceText = new QLabel;
   this->statusBar()->addPermanentWidget(this->DeviceText);
   this->ConnectMouse();
+  this->ShowScenario();
   QObject::connect(&this->Timer, &QTimer::timeout, [this] { this->Poll(); });
+  this->Timer.start(PollInterval);
   this->setFocusPolicy(Qt::StrongFocus);
 }
 
@@ -381,19 +395,11 @@ QGroupBox* Window::MakeInstrumentGroup()
   {
     this->CatheterChoice->addItem(QString::fromStdString(one.catheter.name));
   }
-  const auto choose = [](QComboBox* box, const std::string& name)
+  for (QComboBox* box : { this->WireChoice, this->CatheterChoice })
   {
-    const QString text = QString::fromStdString(name);
-    if (box->findText(text) < 0)
-    {
-      box->addItem(text); // the scenario's own
-    }
-    box->setCurrentText(text);
     box->setFocusPolicy(Qt::NoFocus);
     box->setToolTip("Taken at the next new session");
-  };
-  choose(this->WireChoice, this->World.scenario.wire.name);
-  choose(this->CatheterChoice, this->World.scenario.catheter.name);
+  }
   this->InstrumentText = new QLabel;
   this->InstrumentText->setTextFormat(Qt::PlainText);
   form->addRow("Wire", this->WireChoice);
@@ -416,7 +422,7 @@ QGroupBox* Window::MakeViewGroup()
   this->PrimaryBox = Number(-105.0, 105.0, 5.0, 0, QChar(0x00B0), "LAO positive, RAO negative");
   this->SecondaryBox =
     Number(-50.0, 50.0, 5.0, 0, QChar(0x00B0), "Cranial positive, caudal negative");
-  this->DistanceBox = Number(850.0, 1300.0, 10.0, 0, "mm", "Source to detector");
+  this->DistanceBox = Number(900.0, 1300.0, 10.0, 0, "mm", "Source to detector");
   form->addRow(this->ViewChoice);
   form->addRow("LAO / RAO", this->PrimaryBox);
   form->addRow("CRA / CAU", this->SecondaryBox);
@@ -425,7 +431,7 @@ QGroupBox* Window::MakeViewGroup()
   const char* const help[] = { "Towards the patient's left", "Backwards", "Towards the head" };
   for (int axis = 0; axis < 3; ++axis)
   {
-    this->TableBoxes[axis] = Number(-300.0, 300.0, 5.0, 0, "", help[axis]);
+    this->TableBoxes[axis] = Number(-200.0, 200.0, 5.0, 0, "", help[axis]);
     table->addWidget(this->TableBoxes[axis]);
   }
   form->addRow("Table (mm)", table);
@@ -454,16 +460,16 @@ QGroupBox* Window::MakeXRayGroup()
   auto* group = new QGroupBox("X-ray");
   auto* form = new QFormLayout(group);
   auto* row = new QHBoxLayout;
-  auto* fluoroscopy = Button("Fluoroscopy", "Radiation while it is held; key: see Help");
+  this->FluoroscopyButton = Button("Fluoroscopy", "Radiation while it is held; key: see Help");
   auto* cine = Button("Cine", "A run that is stored, while it is held");
   auto* mask = Button("Mask", "The next frame becomes the mask of subtraction and roadmap");
-  row->addWidget(fluoroscopy);
+  row->addWidget(this->FluoroscopyButton);
   row->addWidget(cine);
   row->addWidget(mask);
   form->addRow(row);
-  auto* hold = new QCheckBox("Hold the pedal down");
-  hold->setFocusPolicy(Qt::NoFocus);
-  form->addRow(hold);
+  this->FluoroscopyHold = new QCheckBox("Hold the pedal down");
+  this->FluoroscopyHold->setFocusPolicy(Qt::NoFocus);
+  form->addRow(this->FluoroscopyHold);
   const auto pedal = [this](QPushButton* button, std::uint32_t bit)
   {
     QObject::connect(
@@ -471,17 +477,16 @@ QGroupBox* Window::MakeXRayGroup()
     QObject::connect(
       button, &QPushButton::released, [this, bit] { this->Panel->SetPedal(bit, false); });
   };
-  pedal(fluoroscopy, FluoroscopyPedal);
   pedal(cine, CinePedal);
   pedal(mask, MaskPedal);
-  QObject::connect(
-    hold, &QCheckBox::toggled, [this](bool on) { this->Panel->SetPedal(FluoroscopyPedal, on); });
+  const auto fluoroscopy = [this] { this->PressFluoroscopy(); };
+  QObject::connect(this->FluoroscopyButton, &QPushButton::pressed, fluoroscopy);
+  QObject::connect(this->FluoroscopyButton, &QPushButton::released, fluoroscopy);
+  QObject::connect(this->FluoroscopyHold, &QCheckBox::toggled, fluoroscopy);
   this->RateChoice = new QComboBox;
   this->RateChoice->addItem("7.5 frames/s", 7.5);
   this->RateChoice->addItem("15 frames/s", 15.0);
   this->RateChoice->addItem("30 frames/s", 30.0);
-  this->RateChoice->setCurrentIndex(
-    this->RateChoice->findData(this->World.scenario.imaging.frameRate));
   this->ModeChoice = new QComboBox;
   this->ModeChoice->addItems({ "Plain", "Subtraction (DSA)", "Roadmap" });
   this->FieldChoice = new QComboBox;
@@ -489,8 +494,6 @@ QGroupBox* Window::MakeXRayGroup()
   {
     this->FieldChoice->addItem(QString("%1 mm").arg(field), field);
   }
-  this->FieldChoice->setCurrentIndex(
-    std::max(0, this->FieldChoice->findData(this->World.scenario.imaging.fieldOfView)));
   for (QComboBox* box : { this->RateChoice, this->ModeChoice, this->FieldChoice })
   {
     box->setFocusPolicy(Qt::NoFocus);
@@ -498,21 +501,27 @@ QGroupBox* Window::MakeXRayGroup()
   form->addRow("Rate", this->RateChoice);
   form->addRow("Image", this->ModeChoice);
   form->addRow("Field", this->FieldChoice);
-  QObject::connect(this->RateChoice, QOverload<int>::of(&QComboBox::activated),
-    [this](int) {
-      this->Engine->Post({ RecordedEvent::FrameRate, this->RateChoice->currentData().toDouble() });
-    });
-  QObject::connect(this->FieldChoice, QOverload<int>::of(&QComboBox::activated),
-    [this](int)
-    {
-      this->Engine->Post(
-        { RecordedEvent::FieldOfView, this->FieldChoice->currentData().toDouble() });
-    });
+  // What is chosen is for this session, if there is one, and for the next ones.
+  const auto set = [this](QComboBox* box, RecordedEvent::Kind kind, double ImagingSettings::*value)
+  {
+    QObject::connect(box, QOverload<int>::of(&QComboBox::activated),
+      [this, box, kind, value](int)
+      {
+        const double chosen = box->currentData().toDouble();
+        this->World.scenario.imaging.*value = chosen;
+        this->Post({ kind, chosen });
+      });
+  };
+  set(this->RateChoice, RecordedEvent::FrameRate, &ImagingSettings::frameRate);
+  set(this->FieldChoice, RecordedEvent::FieldOfView, &ImagingSettings::fieldOfView);
   QObject::connect(this->ModeChoice, QOverload<int>::of(&QComboBox::activated),
     [this](int index)
     {
       this->Mode = static_cast<ImageMode>(index);
-      this->Engine->SetImageMode(this->Mode);
+      if (this->Engine)
+      {
+        this->Engine->SetImageMode(this->Mode);
+      }
     });
   this->RunSlider = new QSlider(Qt::Horizontal);
   this->FrameSlider = new QSlider(Qt::Horizontal);
@@ -555,7 +564,6 @@ QGroupBox* Window::MakeHeartGroup()
   this->HeartSlider = new QSlider(Qt::Horizontal);
   this->HeartSlider->setRange(40, 140);
   this->HeartSlider->setFocusPolicy(Qt::NoFocus);
-  this->HeartSlider->setValue(static_cast<int>(this->World.scenario.settings.heartRate));
   this->HeartText = new QLabel;
   this->HeartPause = new QCheckBox("Standing still");
   this->HeartPause->setFocusPolicy(Qt::NoFocus);
@@ -563,14 +571,11 @@ QGroupBox* Window::MakeHeartGroup()
   form->addRow(this->HeartPause);
   const auto set = [this]
   {
-    const int rate = this->HeartPause->isChecked() ? 0 : this->HeartSlider->value();
+    const double rate = this->HeartPause->isChecked() ? 0.0 : this->HeartSlider->value();
     this->HeartText->setText(QString("%1 /min").arg(this->HeartSlider->value()));
-    if (this->Engine)
-    {
-      this->Engine->Post({ RecordedEvent::HeartRate, static_cast<double>(rate) });
-    }
+    this->World.scenario.settings.heartRate = rate;
+    this->Post({ RecordedEvent::HeartRate, rate });
   };
-  set();
   QObject::connect(this->HeartSlider, &QSlider::valueChanged, [set](int) { set(); });
   QObject::connect(this->HeartPause, &QCheckBox::toggled, [set](bool) { set(); });
   return group;
@@ -693,6 +698,41 @@ void Window::MakeToolBar()
     });
 }
 
+/// The panel says what the next session begins with.
+void Window::ShowScenario()
+{
+  const Scenario& scenario = this->World.scenario;
+  const auto choose = [](QComboBox* box, const QString& text, const QVariant& value)
+  {
+    if (box->findText(text) < 0)
+    {
+      box->addItem(text, value); // the scenario's own
+    }
+    box->setCurrentText(text);
+  };
+  choose(this->WireChoice, QString::fromStdString(scenario.wire.name), {});
+  choose(this->CatheterChoice, QString::fromStdString(scenario.catheter.name), {});
+  const ImagingSettings& imaging = scenario.imaging;
+  choose(this->RateChoice, QString("%1 frames/s").arg(imaging.frameRate), imaging.frameRate);
+  choose(this->FieldChoice, QString("%1 mm").arg(imaging.fieldOfView), imaging.fieldOfView);
+  const double heartRate = scenario.settings.heartRate;
+  const QSignalBlocker sliderSilence(this->HeartSlider);
+  const QSignalBlocker pauseSilence(this->HeartPause);
+  this->HeartPause->setChecked(heartRate <= 0.0);
+  if (heartRate > 0.0)
+  {
+    this->HeartSlider->setValue(static_cast<int>(std::lround(heartRate)));
+  }
+  this->HeartText->setText(
+    QString("%1 /min").arg(heartRate > 0.0 ? heartRate : this->HeartSlider->value()));
+}
+
+void Window::PressFluoroscopy()
+{
+  this->Panel->SetPedal(
+    FluoroscopyPedal, this->FluoroscopyButton->isDown() || this->FluoroscopyHold->isChecked());
+}
+
 void Window::ConnectMouse()
 {
   this->Monitor->wheelTurned = [this](double steps, Qt::KeyboardModifiers modifiers)
@@ -758,6 +798,8 @@ void Window::Begin(const std::string& record, const std::string& replay)
   this->Keys = std::make_shared<KeyboardDevice>();
   this->Panel = std::make_shared<PanelDevice>();
   this->Mux = std::make_shared<DeviceMux>();
+  this->PressFluoroscopy();
+  const CArmPose& pose = scenario.imaging.pose;
   EngineOptions options;
   if (!this->Options.script.empty())
   {
@@ -771,7 +813,6 @@ void Window::Begin(const std::string& record, const std::string& replay)
   }
   this->Mux->Add(this->Panel);
   this->Mux->Add(this->Keys);
-  const CArmPose& pose = scenario.imaging.pose;
   this->Mux->Start({ pose.primary, pose.secondary, pose.sourceToDetector, Vector3::Zero() });
   options.record = record;
   options.replay = replay;
@@ -786,7 +827,18 @@ void Window::Begin(const std::string& record, const std::string& replay)
   this->Second.start();
   this->Whole.start();
   this->AllDrawn = 0;
-  this->Timer.start(PollInterval);
+}
+
+/// A recording is of its own instruments and settings; the vessels have to be the same.
+void Window::TakeScenarioOf(const std::string& recording)
+{
+  HeadlessOptions options;
+  options.replay = recording;
+  Scenario scenario = ScenarioOf(options);
+  CheckRecording(recording, scenario, this->World.wallHash, false);
+  scenario.imaging.pose = StartPose(this->World.wall->Topology(), scenario.imaging);
+  this->World.scenario = scenario;
+  this->ShowScenario();
 }
 
 void Window::Restart(const std::string& record, const std::string& replay)
@@ -794,11 +846,24 @@ void Window::Restart(const std::string& record, const std::string& replay)
   this->End();
   try
   {
+    if (!replay.empty())
+    {
+      this->TakeScenarioOf(replay);
+    }
     this->Begin(record, replay);
   }
   catch (const std::exception& error)
   {
+    this->Engine.reset();
     this->Problem(error.what());
+  }
+}
+
+void Window::Post(const RecordedEvent& event)
+{
+  if (this->Engine)
+  {
+    this->Engine->Post(event);
   }
 }
 
@@ -824,13 +889,12 @@ void Window::End()
     this->Problem(error.what());
   }
   this->Engine.reset();
-  this->Timer.stop();
 }
 
+/// The trainee is told now, whoever started the program when it ends.
 void Window::Problem(const QString& text)
 {
-  this->HasFailed = true;
-  std::fprintf(stderr, "coronary-simulator: %s\n", text.toUtf8().constData());
+  this->Trouble_ = this->Trouble_.isEmpty() ? text : this->Trouble_;
   this->Log->appendPlainText(text);
   this->Monitor->SetBanner(text);
 }
@@ -846,6 +910,19 @@ void Window::Poll()
   {
     return;
   }
+  try // Qt does not let exceptions through
+  {
+    this->ShowSession();
+  }
+  catch (const std::exception& error)
+  {
+    this->Problem(error.what());
+    this->End();
+  }
+}
+
+void Window::ShowSession()
+{
   this->ShowImage();
   this->ShowScene();
   for (const std::string& message : this->Engine->TakeMessages())
@@ -861,7 +938,10 @@ void Window::Poll()
   {
     if (this->Options.quitAfter > 0.0)
     {
-      this->PrintRates();
+      if (!this->Options.quiet)
+      {
+        this->PrintRates();
+      }
       this->close();
     }
     this->End();
@@ -997,7 +1077,7 @@ void Window::ShowNumbers(const SessionSnapshot& now)
 
 void Window::ShowDevices()
 {
-  QString banner;
+  QString banner = this->Trouble_;
   bool awaits = false;
   for (const std::shared_ptr<Device>& device : this->Hardware)
   {
@@ -1093,9 +1173,16 @@ void Window::TakeDueScreenshots()
   }
 }
 
+/// Whole or not at all.
+bool SavePicture(const QImage& picture, const QString& path)
+{
+  QSaveFile file(path);
+  return file.open(QIODevice::WriteOnly) && picture.save(&file, "PNG") && file.commit();
+}
+
 void Window::SaveScreenshot(const QString& path)
 {
-  if (!this->grab().save(path, "PNG"))
+  if (!SavePicture(this->grab().toImage(), path))
   {
     this->Problem("Cannot write '" + path + "'.");
     return;
@@ -1129,7 +1216,7 @@ void Window::SaveXRay(const QString& name)
   QSaveFile text(name + ".json");
   const QByteArray bytes = QJsonDocument(about).toJson();
   const bool written = text.open(QIODevice::WriteOnly) && text.write(bytes) == bytes.size() &&
-    text.commit() && picture.save(name + ".png", "PNG");
+    text.commit() && SavePicture(picture, name + ".png");
   if (!written)
   {
     this->Problem("Cannot write '" + name + ".json' and its picture.");
@@ -1241,7 +1328,7 @@ void RequireOpenGL()
   context.doneCurrent();
 }
 
-void RequireDisplay()
+void CheckWindow(const WindowOptions& options)
 {
   std::string why;
   if (!CanDraw(why))
@@ -1249,11 +1336,30 @@ void RequireDisplay()
     throw std::runtime_error("There is no display for the window (" + why +
       "); sessions without one run with --headless.");
   }
+  for (const std::string& uri : options.devices)
+  {
+    try
+    {
+      ParseDeviceUri(uri);
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw UsageError(std::string("--device: ") + error.what());
+    }
+  }
+  const std::string picture =
+    options.screenshots.empty() ? std::string() : options.screenshots + "/window.png";
+  for (const std::string& path : { options.record, options.video, picture })
+  {
+    if (!path.empty())
+    {
+      const AtomicFile place(path); // says when there is none, and leaves nothing
+    }
+  }
 }
 
-int RunWindow(const SessionWorld& world, const WindowOptions& options)
+void RunWindow(const SessionWorld& world, const WindowOptions& options)
 {
-  RequireDisplay();
   QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
   int count = 1;
   std::string name = "coronary-simulator";
@@ -1266,6 +1372,9 @@ int RunWindow(const SessionWorld& world, const WindowOptions& options)
   window.show();
   QApplication::exec();
   ThrowIfInterrupted();
-  return window.Failed() ? 1 : 0;
+  if (!window.Trouble().isEmpty())
+  {
+    throw std::runtime_error(window.Trouble().toStdString());
+  }
 }
 }

@@ -38,8 +38,7 @@ constexpr std::array<SchemeRule, 6> Schemes{ { { "serial", PathRule::Required },
 DeviceUri ParseDeviceUri(const std::string& text)
 {
   const std::size_t colon = text.find(':');
-  const DeviceUri uri{ text.substr(0, colon),
-    colon == std::string::npos ? "" : text.substr(colon + 1) };
+  DeviceUri uri{ text.substr(0, colon), colon == std::string::npos ? "" : text.substr(colon + 1) };
   for (const SchemeRule& rule : Schemes)
   {
     if (colon == std::string::npos || uri.scheme != rule.name)
@@ -60,7 +59,7 @@ DeviceUri ParseDeviceUri(const std::string& text)
     "is none of serial:PATH, gamepad:, gamepad:PATH, keyboard:, replay:FILE, script:FILE, null:");
 }
 
-std::shared_ptr<Device> OpenDevice(const std::string& text)
+std::shared_ptr<Device> OpenDevice(const std::string& text, const SessionInput& start)
 {
   const DeviceUri uri = ParseDeviceUri(text);
   if (uri.scheme == "serial")
@@ -81,7 +80,7 @@ std::shared_ptr<Device> OpenDevice(const std::string& text)
   }
   if (uri.scheme == "script")
   {
-    return std::make_shared<ScriptDevice>(ReadDriveScript(uri.path), uri.path);
+    return std::make_shared<ScriptDevice>(ReadDriveScript(uri.path), uri.path, start);
   }
   return std::make_shared<NullDevice>();
 }

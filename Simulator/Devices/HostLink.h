@@ -132,32 +132,29 @@ private:
 
   DevicePort& Port;
   std::uint64_t Now = 0;
-  Phase At = Phase::Closed;
-  std::uint64_t Due = 0; ///< of the next opening, or the end of waiting for an answer
-  int Tried = 0;
+  std::uint64_t Due = 0;    ///< of the next opening, or the end of waiting for an answer
   std::size_t Failures = 0; ///< in a row, of connecting
-  bool WasRunning = false;
+  Phase At = Phase::Closed;
+  int Tried = 0;
   std::uint32_t Nonce = 0;
   std::uint32_t Connections = 0;
 
   FrameDecoder Decoder;
-  FrameSender Sender;
   std::vector<std::uint8_t> Outgoing;
+  FrameSender Sender;
 
-  std::vector<CapsMessage> Caps;
   std::uint32_t CapsSeen = 0; ///< bit n: axis n
-  std::string Names;          ///< firmware and serial, for people
+  std::vector<CapsMessage> Caps;
+  std::string Names; ///< firmware and serial, for people
   std::array<AxisTrack, MostAxes> Tracks{};
-  std::uint32_t LastDeviceTime = 0;
   std::uint64_t LastState = 0;
   std::uint64_t Glitches = 0;
+  std::uint32_t LastDeviceTime = 0;
 
-  ClockOffset Clocks;
   std::uint32_t PingNumber = 0;
   std::uint64_t NextPing = 0;
+  ClockOffset Clocks;
 
-  bool Confirming = false;
-  bool Confirmed = false;
   std::uint64_t LastStart = 0;
   std::uint64_t LastForce = 0;
   std::uint64_t LastSent = 0; ///< FORCE or HEARTBEAT
@@ -168,10 +165,13 @@ private:
   DecoderCounts WindowStart;
   std::uint64_t WindowBegan = 0;
   double ErrorsPerSecond = 0.0;
-  bool Noisy = false;
 
   LinkSnapshot Shown;
   std::string Text = "Connecting.";
+  bool WasRunning = false;
+  bool Confirming = false;
+  bool Confirmed = false;
+  bool Noisy = false;
   bool Changed = false;
 };
 }

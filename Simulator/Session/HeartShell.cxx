@@ -2,6 +2,7 @@
 
 #include "PhantomAnatomy.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -98,7 +99,7 @@ HeartShell::HeartShell(WallMotion& wall)
         for (const Vector3& point : axis)
         {
           const double cosine = direction.dot((point - middle).normalized());
-          const double angle = std::acos(std::min(1.0, std::max(-1.0, cosine)));
+          const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
           // A little of everything: where no vessel is near, the mean of all.
           row.push_back(std::exp(-0.5 * angle * angle / (Bell * Bell)) + 1e-3);
           sum += row.back();

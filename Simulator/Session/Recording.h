@@ -79,7 +79,7 @@ constexpr std::uint64_t RecordedHashInterval = 1000; ///< ticks between state ha
  * are in a file that can be read; Finish() puts it under its name. Without Finish() it is removed.
  * Ticks must not decrease from call to call.
  * All throw std::runtime_error naming the file when it can not be written, std::invalid_argument for ticks that
- * decrease, numbers that are not finite, texts above MostText bytes.
+ * decrease and texts above MostText bytes. Numbers keep their bits, whatever they say.
  */
 class RecordingWriter
 {

@@ -12,9 +12,9 @@ namespace
 {
 constexpr double ContrastStep = 0.005;    // s
 constexpr double FastestInjection = 12.0; // mL/s: no hand and no injector of a laboratory does more
-constexpr double SteepestPrimary = 1.9;   // radians: what the arm of a laboratory can do
-constexpr double SteepestSecondary = 0.9; // radians
-constexpr double NearestDetector = 50.0;  // mm behind the isocentre
+constexpr double SteepestPrimary = 120.0 * M_PI / 180.0; // what the arm of a laboratory can do
+constexpr double SteepestSecondary = 55.0 * M_PI / 180.0;
+constexpr double NearestDetector = 50.0;    // mm behind the isocentre
 constexpr double FurthestDetector = 1500.0; // mm from the source
 constexpr double FurthestTable = 500.0;     // mm
 constexpr double SmallestField = 80.0;      // mm

@@ -256,8 +256,9 @@ TEST_F(TestCoronarySimulator, SaysWhatIsWrong)
     "wire 'weak', section 1 has a negative 'bending_stiffness_N_mm2'");
   this->ExpectBadScenario(
     [](json& s) { s["settings"]["tick_rate_hz"] = 1e9; }, "settings has 'tick_rate_hz'");
+  // With a window or without, so many ticks are for sessions without one.
   EXPECT_EQ(this->Run("--scenario s.json --ticks 10"), 2);
-  EXPECT_NE(this->Said().find("--headless is required"), std::string::npos);
+  EXPECT_NE(this->Said().find("--headless"), std::string::npos) << this->Said();
   fs::remove(this->Folder / "result/weights.vtu");
   this->ExpectFailure(1, "--scenario s.json --ticks 10", "weights.vtu' is missing");
 }
