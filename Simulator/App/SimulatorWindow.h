@@ -35,6 +35,9 @@ struct WindowOptions
 /// @throws UsageError: no such kind of device; std::runtime_error: no display, no place for a file
 void CheckWindow(const WindowOptions& options);
 
+/// @throws std::runtime_error: there is no display
+void RequireDisplay();
+
 /// Needs the QApplication. @throws std::runtime_error: the display has no OpenGL 3.2
 void RequireOpenGL();
 

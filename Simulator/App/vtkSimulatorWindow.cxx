@@ -1328,7 +1328,7 @@ void RequireOpenGL()
   context.doneCurrent();
 }
 
-void CheckWindow(const WindowOptions& options)
+void RequireDisplay()
 {
   std::string why;
   if (!CanDraw(why))
@@ -1336,6 +1336,11 @@ void CheckWindow(const WindowOptions& options)
     throw std::runtime_error("There is no display for the window (" + why +
       "); sessions without one run with --headless.");
   }
+}
+
+void CheckWindow(const WindowOptions& options)
+{
+  RequireDisplay();
   for (const std::string& uri : options.devices)
   {
     try
