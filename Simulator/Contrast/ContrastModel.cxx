@@ -1,11 +1,10 @@
 #include "ContrastModel.h"
 
 #include "Fnv1a.h"
+#include "RequireRange.h"
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 namespace coronary
 {
@@ -18,19 +17,7 @@ constexpr double SmallestVolume = 1e-15; // of a slab without length, mL
 constexpr std::size_t CellsOfSlab =
   4; // in the mean; the more, the fewer cells have the end of a slab in them
 
-void Require(bool possible, const char* name, double value, const char* range)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(std::string("contrast: ") + name + " is " + std::to_string(value) +
-      "; it has to be " + range);
-  }
-}
-
-bool Within(double value, double low, double high)
-{
-  return value >= low && value <= high; // not for NaN
-}
+constexpr RequireRange Require{ "contrast" };
 
 const ContrastSettings& Checked(const ContrastSettings& settings)
 {

@@ -2,14 +2,12 @@
 
 #include "CounterRandom.h"
 #include "Fnv1a.h"
+#include "RequireRange.h"
 #include "VesselFrames.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <stdexcept>
-#include <string>
 
 namespace coronary
 {
@@ -21,19 +19,7 @@ constexpr std::size_t BatchSize = 64;   // of crossings
 constexpr int CellsOfSegment = 64;      // for thinning
 constexpr int Crossings = 1000;         // of segments in a step; more are short of a fault
 
-void Require(bool possible, const char* name, double value, const char* range)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(std::string("contrast tracers: ") + name + " is " +
-      std::to_string(value) + "; it has to be " + range);
-  }
-}
-
-bool Within(double value, double low, double high)
-{
-  return value >= low && value <= high; // not for NaN
-}
+constexpr RequireRange Require{ "contrast tracers" };
 
 /// Part of the flux of laminar flow through the unit circle that is on the side of x below h.
 double ExactFluxBelow(double h)

@@ -1,11 +1,10 @@
 #include "CoronaryFlow.h"
 
 #include "Fnv1a.h"
+#include "RequireRange.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <stdexcept>
 #include <string>
 
 namespace coronary
@@ -25,19 +24,7 @@ constexpr double FlowReserve = 4.0;       // Gould, Lipscomb, Hamilton, Am J Car
 constexpr double ExpansionLoss = 1.52;    // K_t of Seeley and Young
 constexpr int StepsOfCycle = 160;
 
-void Require(bool possible, const char* name, double value, const char* range)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(std::string("coronary flow: ") + name + " is " +
-      std::to_string(value) + "; it has to be " + range);
-  }
-}
-
-bool Within(double value, double low, double high)
-{
-  return value >= low && value <= high; // not for NaN
-}
+constexpr RequireRange Require{ "coronary flow" };
 
 /// From `a` at t = 0 to `b` at t = 1, level at both.
 double HalfCosine(double a, double b, double t)
