@@ -263,6 +263,50 @@ TEST_F(TestCoronarySimulator, SaysWhatIsWrong)
   this->ExpectFailure(1, "--scenario s.json --ticks 10", "weights.vtu' is missing");
 }
 
+TEST_F(TestCoronarySimulator, RefusesWrongImagesAndContrast)
+{
+  this->ExpectBadScenario([](json& s) { s["imaging"] = { { "zoom", 2 } }; }, "imaging has 'zoom'");
+  this->ExpectBadScenario(
+    [](json& s) {
+      s["imaging"] = { { "frame_rate_hz", 13 } };
+    },
+    "none of 7.5, 15, 30");
+  this->ExpectBadScenario(
+    [](json& s) {
+      s["imaging"] = { { "columns", 100000 } };
+    },
+    "imaging has 'columns'");
+  this->ExpectBadScenario(
+    [](json& s) {
+      s["contrast"] = { { "tracers", "many" } };
+    },
+    "contrast has 'tracers'");
+  this->ExpectBadScenario(
+    [](json& s) {
+      s["contrast"] = { { "viscosity_mPa_s", -1 } };
+    },
+    "'viscosity_mPa_s'");
+  this->Put("changed.json", TestScenario());
+  std::string text = ReadText(this->Folder / "changed.json");
+  text.insert(text.size() - 1, R"(,"imaging":{"energy_keV":NaN})");
+  coronary::WriteFileAtomically((this->Folder / "changed.json").string(), text);
+  this->ExpectFailure(1, "--scenario changed.json --ticks 10", "is no JSON");
+
+  // A patient that is none.
+  fs::create_directories(this->Folder / "empty");
+  std::ofstream(this->Folder / "text.txt") << "hello";
+  std::ofstream(this->Folder / "text.nii") << "hello";
+  for (const auto& [file, part] : { std::pair("text.txt", "can not be a background"),
+         std::pair("text.nii", "is not a NIfTI file"), std::pair("empty", "holds no DICOM images"),
+         std::pair("nowhere.nii", "is not there") })
+  {
+    json scenario = TestScenario();
+    scenario["imaging"] = { { "background", file } };
+    this->Put("changed.json", scenario);
+    this->ExpectFailure(1, "--scenario changed.json --ticks 10 --xray", part);
+  }
+}
+
 TEST_F(TestCoronarySimulator, RefusesInstrumentsThatDoNotFit)
 {
   // A wire as thick as the catheter, and a catheter as thick as the vessel.

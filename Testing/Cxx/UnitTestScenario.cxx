@@ -142,6 +142,88 @@ TEST(UnitTestScenario, EverySettingArrives)
   EXPECT_EQ(s.seed, 77U);
 }
 
+TEST(UnitTestScenario, ImagingAndContrastArriveAndComeBackToTheBit)
+{
+  json text = json::parse(ScenarioText(LoadScenario("phantom-lca")));
+  text["imaging"] = { { "background", "ct/a.nii" }, { "background_offset_mm", { 1, -2.5, 0.1 } },
+    { "thorax_seed", 5 }, { "primary_deg", -31.7 }, { "secondary_deg", 19.3 },
+    { "source_to_isocentre_mm", 712.3 }, { "source_to_detector_mm", 1043.7 },
+    { "isocentre_mm", { 0.1, 0.2, 0.3 } }, { "field_of_view_mm", 171.1 }, { "columns", 321 },
+    { "energy_keV", 61.9 }, { "iodine_mg_mL", 300.3 }, { "frame_rate_hz", 7.5 },
+    { "cine_rate_hz", 30 } };
+  text["contrast"] = { { "viscosity_mPa_s", 3.3 }, { "systolic_pressure_mmHg", 141.7 },
+    { "diastolic_pressure_mmHg", 77.7 }, { "left_axial_speed_cm_s", 17.3 },
+    { "right_axial_speed_cm_s", 13.1 }, { "left_diastolic_ratio", 1.9 },
+    { "right_diastolic_ratio", 1.3 }, { "outlet_exponent", 2.7 }, { "tracer_volume_mL", 0.0013 },
+    { "radial_diffusivity_mm2_s", 0.7 }, { "smoothing_mm", 1.7 }, { "flow_depression", 0.3 },
+    { "tracers", 12345 } };
+  const Scenario s = ScenarioFromText(text.dump(), "'own.json'", "/folder");
+  const coronary::ImagingSettings& imaging = s.imaging;
+  EXPECT_EQ(imaging.background, "/folder/ct/a.nii");
+  EXPECT_EQ(imaging.backgroundOffset, Vector3(1.0, -2.5, 0.1));
+  EXPECT_EQ(imaging.thoraxSeed, 5U);
+  EXPECT_NEAR(imaging.pose.primary, -31.7 * M_PI / 180.0, 1e-15);
+  EXPECT_NEAR(imaging.pose.secondary, 19.3 * M_PI / 180.0, 1e-15);
+  EXPECT_EQ(imaging.pose.sourceToIsocentre, 712.3);
+  EXPECT_EQ(imaging.pose.sourceToDetector, 1043.7);
+  EXPECT_TRUE(imaging.hasIsocentre);
+  EXPECT_EQ(imaging.pose.isocentre, Vector3(0.1, 0.2, 0.3));
+  EXPECT_EQ(imaging.fieldOfView, 171.1);
+  EXPECT_EQ(imaging.columns, 321);
+  EXPECT_EQ(imaging.energy, 61.9);
+  EXPECT_EQ(imaging.iodine, 300.3);
+  EXPECT_EQ(imaging.frameRate, 7.5);
+  EXPECT_EQ(imaging.cineRate, 30.0);
+  EXPECT_EQ(s.contrast.flow.viscosity, 3.3);
+  EXPECT_EQ(s.contrast.flow.systolicPressure, 141.7);
+  EXPECT_EQ(s.contrast.flow.diastolicPressure, 77.7);
+  EXPECT_EQ(s.contrast.flow.leftAxialSpeed, 17.3);
+  EXPECT_EQ(s.contrast.flow.rightAxialSpeed, 13.1);
+  EXPECT_EQ(s.contrast.flow.leftDiastolicRatio, 1.9);
+  EXPECT_EQ(s.contrast.flow.rightDiastolicRatio, 1.3);
+  EXPECT_EQ(s.contrast.flow.outletExponent, 2.7);
+  EXPECT_EQ(s.contrast.tracers.volume, 0.0013);
+  EXPECT_EQ(s.contrast.tracers.radialDiffusivity, 0.7);
+  EXPECT_EQ(s.contrast.tracers.capacity, 12345);
+  EXPECT_EQ(s.contrast.smoothing, 1.7);
+  EXPECT_EQ(s.contrast.flowDepression, 0.3);
+
+  const Scenario again = ScenarioFromText(ScenarioText(s), "'text'", "/elsewhere");
+  EXPECT_EQ(ScenarioText(again), ScenarioText(s));
+  EXPECT_EQ(again.imaging.background, imaging.background);
+  EXPECT_EQ(again.imaging.pose.primary, imaging.pose.primary);
+  EXPECT_EQ(again.imaging.pose.secondary, imaging.pose.secondary);
+  EXPECT_EQ(again.imaging.pose.isocentre, imaging.pose.isocentre);
+  EXPECT_EQ(again.imaging.backgroundOffset, imaging.backgroundOffset);
+  EXPECT_EQ(again.contrast.tracers.volume, s.contrast.tracers.volume);
+  EXPECT_EQ(again.contrast.flow.viscosity, s.contrast.flow.viscosity);
+}
+
+TEST(UnitTestScenario, RefusesWrongImagingAndContrast)
+{
+  Refused([](json& s) { s["imaging"]["zoom"] = 2; }, "imaging has 'zoom', which means nothing");
+  Refused([](json& s) { s["imaging"]["columns"] = "many"; }, "'columns'");
+  Refused([](json& s) { s["imaging"]["columns"] = 5000; }, "'columns'");
+  Refused([](json& s) { s["imaging"]["energy_keV"] = nullptr; }, "'energy_keV'");
+  Refused([](json& s) { s["imaging"]["frame_rate_hz"] = 13; }, "none of 7.5, 15, 30");
+  Refused([](json& s) { s["imaging"]["cine_rate_hz"] = 60; }, "none of 7.5, 15, 30");
+  Refused([](json& s) { s["imaging"]["isocentre_mm"] = { 1, 2 }; }, "three coordinates");
+  Refused([](json& s) { s["imaging"]["primary_rad"] = 2.0; }, "'primary_rad'");
+  Refused(
+    [](json& s)
+    {
+      s["imaging"]["source_to_isocentre_mm"] = 1200;
+      s["imaging"]["source_to_detector_mm"] = 1210;
+    },
+    "'source_to_detector_mm'");
+  Refused([](json& s) { s["imaging"]["background"] = 7; }, "'background'");
+  Refused([](json& s) { s["imaging"] = json::array(); }, "'imaging'");
+  Refused([](json& s) { s["contrast"]["colour"] = "red"; }, "contrast has 'colour'");
+  Refused([](json& s) { s["contrast"]["tracers"] = 5; }, "'tracers'");
+  Refused([](json& s) { s["contrast"]["viscosity_mPa_s"] = -3; }, "'viscosity_mPa_s'");
+  Refused([](json& s) { s["contrast"]["diastolic_pressure_mmHg"] = 200; }, "contrast: ");
+}
+
 TEST(UnitTestScenario, RefusesWithThePlace)
 {
   Refused([](json& s) { s["wire"] = "spaghetti"; }, "no wire 'spaghetti'");
@@ -250,6 +332,63 @@ TEST(UnitTestScenario, ScriptsAreEvenPieces)
   refused(R"([ { "seconds": 1, "heart_rate_bpm": 900 } ])", "'heart_rate_bpm'");
   refused(R"([ { "wire_mm": 1 } ])", "has no 'seconds'");
   refused("3", "is no list");
+}
+
+TEST(UnitTestScenario, ScriptsMoveSyringePedalsAndView)
+{
+  const auto script =
+    coronary::DriveScriptFromText(R"({ "format": "dynamiccoronary script", "version": 1,
+    "pieces": [ { "seconds": 2, "inject_mL": 4, "pedals": ["fluoroscopy", "mask"] },
+      { "seconds": 2, "primary_deg": -30, "secondary_deg": 20, "source_to_detector_mm": -40,
+        "table_x_mm": 10, "table_y_mm": -20, "table_z_mm": 30 },
+      { "seconds": 1, "pedals": ["cine"] }, { "seconds": 1, "pedals": [] } ] })",
+      "'script'");
+  coronary::SessionInput start;
+  start.drive = { 5.0, 0.5, 2.0, 0.25 };
+  start.syringe = 1.0;
+  start.primary = 0.3;
+  start.secondary = -0.1;
+  start.sourceToDetector = 1000.0;
+  start.table = Vector3(1.0, 2.0, 3.0);
+  EXPECT_EQ(script.At(-1.0, start).syringe, 1.0);
+  EXPECT_EQ(script.At(-1.0, start).pedals, 0U) << "not yet begun";
+  const auto injecting = script.At(1.0, start);
+  EXPECT_EQ(injecting.syringe, 3.0);
+  EXPECT_EQ(injecting.pedals, coronary::FluoroscopyPedal | coronary::MaskPedal);
+  EXPECT_EQ(injecting.primary, 0.3);
+  EXPECT_EQ(injecting.drive.wirePosition, 5.0);
+  EXPECT_EQ(injecting.drive.catheterAngle, 0.25);
+  const auto turning = script.At(3.0, start);
+  EXPECT_EQ(turning.syringe, 5.0);
+  EXPECT_EQ(turning.pedals, injecting.pedals) << "until they are set again";
+  EXPECT_NEAR(turning.primary, 0.3 - M_PI / 12.0, 1e-15);
+  EXPECT_NEAR(turning.secondary, -0.1 + M_PI / 18.0, 1e-15);
+  EXPECT_EQ(turning.sourceToDetector, 980.0);
+  EXPECT_EQ(turning.table, Vector3(6.0, -8.0, 18.0));
+  EXPECT_EQ(script.At(4.5, start).pedals, coronary::CinePedal);
+  EXPECT_EQ(script.At(5.5, start).pedals, 0U);
+  const auto after = script.At(100.0, start);
+  EXPECT_EQ(after.table, Vector3(11.0, -18.0, 33.0));
+  EXPECT_EQ(after.pedals, 0U);
+  EXPECT_EQ(script.At(100.0).sourceToDetector, coronary::SessionInput().sourceToDetector - 40.0);
+  const auto refused = [](const std::string& member, const std::string& part)
+  {
+    ExpectRefusal(
+      [&]
+      {
+        coronary::DriveScriptFromText(
+          R"({ "format": "dynamiccoronary script", "version": 1, "pieces": [ { "seconds": 1, )" +
+            member + "} ] }",
+          "'s.json'");
+      },
+      part);
+  };
+  refused(R"("inject_mL": -1)", "piece 1 has a negative 'inject_mL'");
+  refused(R"("pedals": ["brake"])", "'brake', which is none of fluoroscopy, cine, mask");
+  refused(R"("pedals": [7])", "'7', which is none of");
+  refused(R"("pedals": "cine")", "is no list");
+  refused(R"("primary_deg": 1000)", "'primary_deg'");
+  refused(R"("table_x_mm": "far")", "'table_x_mm'");
 }
 
 TEST(UnitTestScenario, TheContractionIsSmoothAndPeriodic)
