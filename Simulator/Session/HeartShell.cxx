@@ -38,10 +38,10 @@ std::vector<Vector3> Directions()
 
 std::vector<double> EvenPhases()
 {
-  std::vector<double> phases;
-  for (int n = 0; n < Samples; ++n)
+  std::vector<double> phases(Samples);
+  for (std::size_t n = 0; n < phases.size(); ++n)
   {
-    phases.push_back(static_cast<double>(n) / Samples);
+    phases[n] = static_cast<double>(n) / Samples;
   }
   return phases;
 }
@@ -60,11 +60,9 @@ HeartShell::HeartShell(const PhantomSettings& phantom)
   std::vector<std::vector<Vector3>> samples;
   for (const double phase : EvenPhases())
   {
-    std::vector<Vector3> moved;
-    for (const Vector3& point : rest)
-    {
-      moved.push_back(heart.Position(point, phase));
-    }
+    std::vector<Vector3> moved(rest.size());
+    std::transform(rest.begin(), rest.end(), moved.begin(),
+      [&](const Vector3& point) { return heart.Position(point, phase); });
     samples.push_back(std::move(moved));
   }
   this->Motion = std::make_unique<PeriodicPositions>(EvenPhases(), samples);
@@ -129,8 +127,7 @@ HeartShell::HeartShell(WallMotion& wall)
 
 void HeartShell::MakeTriangles()
 {
-  const auto at = [](int ring, int k)
-  { return static_cast<std::int64_t>(1 + ring * Around + k % Around); };
+  const auto at = [](int ring, int k) { return std::int64_t{ 1 } + ring * Around + k % Around; };
   const std::int64_t last = 1 + Rings * Around;
   for (int k = 0; k < Around; ++k)
   {
