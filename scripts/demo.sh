@@ -85,6 +85,10 @@ echo "== A guidewire in that model, driven by a script"
 "$root/build/paraview/bin/coronary-simulator" --headless --scenario phantom-lca --vessels "$output/run" \
   --script "$root/Testing/Data/Driving/lad-apex.json" --output "$output/simulator" --output-rate 2 --write-wall
 
+echo "== An angiogram of it"
+"$root/build/paraview/bin/coronary-simulator" --headless --scenario phantom-lca --vessels "$output/run" \
+  --script "$root/Testing/Data/Driving/lca-angiogram.json" --xray --output "$output/simulator/angiogram" --output-rate 10
+
 if [ "$pictures" = yes ]; then
   echo "== Pictures"
   # A home of its own: the pictures must not depend on, nor change, the user's ParaView settings.
@@ -106,6 +110,8 @@ if [ "$pictures" = yes ]; then
   render skinning "$output/run"
   render tracking "$output/run"
   render simulator "$output/simulator"
+  pvpython scripts/render-fluoroscopy.py "$output/simulator/angiogram" --seconds 0.35 0.7 1.0 1.6 3.9 4.6 5.4 6.4 \
+    --shrink 2 --output "$output/pictures/angiogram.png"
 fi
 
 plugin="$(find "$root/build/paraview" -name DynamicCoronaryPlugin.so -print -quit)"
@@ -124,7 +130,8 @@ What lies where
                                       with the skeleton inside and their skin weights;
                                       motion/ has all of it at every phase (.series);
                                       status.csv and report.json say how they came about
-  $output/simulator/                  trajectory.pvd, forces.csv, tip.csv, statistics.json: a session of the simulator
+  $output/simulator/                  trajectory.pvd, forces.csv, tip.csv, statistics.json: a session of the simulator;
+                                      angiogram/: X-ray frames of an injection
   $output/evaluation/                 table1.csv, .json and .tex, report.html (tables, plots, pictures,
                                       the beating tree), branches.csv, pictures/, plots/
   $output/phantom-motion.txt          amplitudes, speeds and rest windows per artery
