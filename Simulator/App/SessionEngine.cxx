@@ -48,14 +48,9 @@ SessionEngine::SessionEngine(
   }
   if (!this->Options.record.empty())
   {
-    RecordingHeader header;
-    header.build = "coronary-simulator " DYNAMICCORONARY_VERSION;
-    header.scenario = ScenarioText(world.scenario);
-    header.meshHash = world.wallHash;
-    header.seed = world.scenario.seed;
-    header.tickRate = this->TickRate;
-    header.started = UtcTime();
-    this->Recorder = std::make_unique<RecordingWriter>(this->Options.record, header);
+    this->Recorder = std::make_unique<RecordingWriter>(this->Options.record,
+      HeaderOf(
+        world.scenario, world.wallHash, "coronary-simulator " DYNAMICCORONARY_VERSION, UtcTime()));
   }
   this->Imager.Aim(this->Session.Pose(), this->Session.FieldOfView());
 }
@@ -276,9 +271,7 @@ bool SessionEngine::Tick()
   const TickReport& forces = report.tick;
   if (this->Recorder && this->TickNumber % ForceInterval == 0)
   {
-    this->Recorder->Force(this->TickNumber,
-      { static_cast<float>(forces.proximalForce), static_cast<float>(forces.proximalTorque),
-        static_cast<float>(forces.tipForce), static_cast<float>(forces.greatestForce) });
+    this->Recorder->Force(this->TickNumber, ForcesOf(report.tick));
   }
   if (this->Mux && this->TickNumber % CommandInterval == 0 && this->Sound())
   {

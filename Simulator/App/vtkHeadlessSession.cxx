@@ -413,14 +413,9 @@ public:
     hands.SetStart(this->Session.StartInput());
     if (!options.record.empty())
     {
-      RecordingHeader header;
-      header.build = "coronary-simulator " DYNAMICCORONARY_VERSION;
-      header.scenario = ScenarioText(world.scenario);
-      header.meshHash = world.wallHash;
-      header.seed = world.scenario.seed;
-      header.tickRate = this->Rate;
-      header.started = UtcTime();
-      this->Recording = std::make_unique<RecordingWriter>(options.record, header);
+      this->Recording = std::make_unique<RecordingWriter>(options.record,
+        HeaderOf(world.scenario, world.wallHash, "coronary-simulator " DYNAMICCORONARY_VERSION,
+          UtcTime()));
     }
   }
 
@@ -525,10 +520,7 @@ private:
     this->KeepHash();
     if (this->Recording && this->Tick % ForceInterval == 0)
     {
-      const TickReport& forces = report.tick;
-      this->Recording->Force(this->Tick,
-        { static_cast<float>(forces.proximalForce), static_cast<float>(forces.proximalTorque),
-          static_cast<float>(forces.tipForce), static_cast<float>(forces.greatestForce) });
+      this->Recording->Force(this->Tick, ForcesOf(report.tick));
     }
     SessionPictures::FolderCallback folder;
     if (this->Files)

@@ -293,7 +293,7 @@ Window::Window(const SessionWorld& world, const WindowOptions& options)
     *world.wall, world.scenario, heart, SceneSettings{ options.triangles });
   for (const std::string& uri : options.devices)
   {
-    this->Hardware.push_back(OpenDevice(uri));
+    this->Hardware.push_back(OpenDevice(uri, StartInputOf(world.scenario)));
   }
 
   if (options.igtlPort > 0)

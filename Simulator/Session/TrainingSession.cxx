@@ -168,6 +168,25 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   }
 }
 
+RecordingHeader HeaderOf(const Scenario& scenario, std::uint64_t wallHash, const std::string& build,
+  const std::string& started)
+{
+  RecordingHeader header;
+  header.build = build;
+  header.scenario = ScenarioText(scenario);
+  header.meshHash = wallHash;
+  header.seed = scenario.seed;
+  header.tickRate = scenario.settings.tickRate;
+  header.started = started;
+  return header;
+}
+
+RecordedForces ForcesOf(const TickReport& report)
+{
+  return { static_cast<float>(report.proximalForce), static_cast<float>(report.proximalTorque),
+    static_cast<float>(report.tipForce), static_cast<float>(report.greatestForce) };
+}
+
 SessionInput StartInputOf(const Scenario& scenario)
 {
   const CArmPose& pose = scenario.imaging.pose;

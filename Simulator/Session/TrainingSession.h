@@ -80,6 +80,13 @@ struct SessionSnapshot
 /// Hands and feet at rest, the C-arm where the scenario has it.
 SessionInput StartInputOf(const Scenario& scenario);
 
+/// In front of a session's recording. @param build  program and version  @param started  UTC, ISO 8601
+RecordingHeader HeaderOf(const Scenario& scenario, std::uint64_t wallHash, const std::string& build,
+  const std::string& started);
+
+/// What of a tick is recorded.
+RecordedForces ForcesOf(const TickReport& report);
+
 /**
  * Deterministic: the same binary, vessels, scenario, inputs and events give the same bits. One thread.
  */

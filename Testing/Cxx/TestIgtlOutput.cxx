@@ -47,7 +47,7 @@ bool WaitFor(const IgtlOutput& output, bool client)
 igtl::ClientSocket::Pointer Connected(int port)
 {
   const igtl::ClientSocket::Pointer client = igtl::ClientSocket::New();
-  EXPECT_EQ(client->ConnectToServer("localhost", port), 0);
+  EXPECT_EQ(client->ConnectToServer("127.0.0.1", port), 0);
   client->SetReceiveTimeout(5000);
   return client;
 }

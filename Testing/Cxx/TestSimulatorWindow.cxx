@@ -266,16 +266,19 @@ TEST_F(TestSimulatorWindow, ADeviceDrivesInjectsAndTheRightBranchesFill)
     washed = injected > 5.5 && inside < 0.03 ? &frame : washed;
   }
   ASSERT_TRUE(empty && full && washed) << this->Said();
+  double faintest = 1e9;
   for (const char* name : { "pLAD", "mLAD", "pLCx" })
   {
     const double filled = Darkness(phantom, *full, name);
+    faintest = std::min(faintest, filled);
     EXPECT_GT(filled, 15.0) << name;
     EXPECT_LT(Darkness(phantom, *empty, name), 0.5 * filled) << name << " before";
     EXPECT_LT(Darkness(phantom, *washed, name), 0.5 * filled) << name << " after";
   }
+  // What is seen there are edges of the patient's bones and of the heart.
   for (const char* name : { "pRCA", "mRCA" })
   {
-    EXPECT_LT(std::abs(Darkness(phantom, *full, name)), 10.0) << name << " gets none";
+    EXPECT_LT(std::abs(Darkness(phantom, *full, name)), 0.6 * faintest) << name << " gets none";
   }
   EXPECT_GE(washed->about["branch"].get<int>(), 0) << "the wire is in a branch";
   EXPECT_GT(washed->about["inserted_mm"].get<double>(), 30.0);
