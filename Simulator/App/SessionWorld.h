@@ -28,7 +28,7 @@ struct SessionWorld
   std::vector<std::string> notes;                    ///< what was assumed, a sentence each
 };
 
-/// @param progress  gets the steps "vessels" and, with the background, "patient"; the numbers from 0 on
+/// @param progress  gets the steps "vessels" and, with the background, "patient", in either order; numbers from 0 on
 /// @throws as LoadVessels, LoadBackground; Cancelled
 SessionWorld LoadWorld(const Scenario& scenario, bool background, ProgressDisplay& progress);
 }

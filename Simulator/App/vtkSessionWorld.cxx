@@ -18,8 +18,21 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, ProgressDispla
   };
   SessionWorld world;
   world.scenario = scenario;
+  int step = 0;
+  const auto loadPatient = [&](const WallTopology& topology)
+  {
+    progress.BeginStep(step++, "patient");
+    world.background = MakeProjector(LoadBackground(scenario, topology, report), scenario.imaging);
+    ThrowIfInterrupted();
+  };
+  // A CT lies where it lies: what is wrong with it is told before the vessels are made, which takes longer.
+  const bool hasImages = !scenario.imaging.background.empty();
+  if (background && hasImages)
+  {
+    loadPatient({});
+  }
   vtkMessageTrap messages;
-  progress.BeginStep(0, "vessels");
+  progress.BeginStep(step++, "vessels");
   VesselModel model = LoadVessels(scenario.vessels, messages, report);
   ThrowIfInterrupted();
   messages.ForgetWarnings();
@@ -29,11 +42,9 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, ProgressDispla
   world.wallHash = WallHash(*world.wall);
   const WallTopology& topology = world.wall->Topology();
   world.scenario.imaging.pose = StartPose(topology, scenario.imaging);
-  if (background)
+  if (background && !hasImages)
   {
-    progress.BeginStep(1, "patient");
-    world.background = MakeProjector(LoadBackground(scenario, topology, report), scenario.imaging);
-    ThrowIfInterrupted();
+    loadPatient(topology);
   }
   return world;
 }
