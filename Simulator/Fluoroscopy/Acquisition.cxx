@@ -1,5 +1,7 @@
 #include "Acquisition.h"
 
+#include "RequireSetting.h"
+
 #include "Fnv1a.h"
 
 #include <algorithm>
@@ -12,15 +14,6 @@ namespace coronary
 {
 namespace
 {
-void Require(bool possible, const char* name, double value, const char* range)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(std::string("acquisition: ") + name + " is " +
-      std::to_string(value) + "; it has to be " + range);
-  }
-}
-
 /// A whole number for all three: frames in two seconds.
 std::int64_t FramesInTwoSeconds(FrameRate rate)
 {
@@ -30,13 +23,14 @@ std::int64_t FramesInTwoSeconds(FrameRate rate)
 void RequireRate(const char* name, FrameRate rate)
 {
   const int value = static_cast<int>(rate);
-  Require(value >= 0 && value <= static_cast<int>(FrameRate::F30), name, value,
-    "one of FrameRate's: 0, 1, 2");
+  RequireSetting("acquisition", value >= 0 && value <= static_cast<int>(FrameRate::F30), name,
+    value, "one of FrameRate's: 0, 1, 2");
 }
 
 void RequireFieldArea(double area)
 {
-  Require(area > 0.0 && area <= 5000.0, "area of the field", area, "above 0, to 5000 cm^2");
+  RequireSetting("acquisition", area > 0.0 && area <= 5000.0, "area of the field", area,
+    "above 0, to 5000 cm^2");
 }
 
 template <typename T>
@@ -67,16 +61,16 @@ FrameRate FrameRateOf(double framesPerSecond)
 
 void AcquisitionSettings::Validate() const
 {
-  Require(this->tickRate >= 100 && this->tickRate <= 100000, "tick rate", this->tickRate,
-    "100 to 100000 Hz");
+  RequireSetting("acquisition", this->tickRate >= 100 && this->tickRate <= 100000, "tick rate",
+    this->tickRate, "100 to 100000 Hz");
   RequireRate("frame rate of fluoroscopy", this->fluoroscopyRate);
   RequireRate("frame rate of cine", this->cineRate);
-  Require(this->fluoroscopyKerma > 0.0 && this->fluoroscopyKerma <= 10.0,
+  RequireSetting("acquisition", this->fluoroscopyKerma > 0.0 && this->fluoroscopyKerma <= 10.0,
     "air kerma of a fluoroscopy frame", this->fluoroscopyKerma, "above 0, to 10 mGy");
-  Require(this->cineKerma > 0.0 && this->cineKerma <= 10.0, "air kerma of a cine frame",
-    this->cineKerma, "above 0, to 10 mGy");
-  Require(this->fluoroscopyPhotons >= 1.0 && this->fluoroscopyPhotons <= 1e6, "photons a pixel",
-    this->fluoroscopyPhotons, "1 to 1e6");
+  RequireSetting("acquisition", this->cineKerma > 0.0 && this->cineKerma <= 10.0,
+    "air kerma of a cine frame", this->cineKerma, "above 0, to 10 mGy");
+  RequireSetting("acquisition", this->fluoroscopyPhotons >= 1.0 && this->fluoroscopyPhotons <= 1e6,
+    "photons a pixel", this->fluoroscopyPhotons, "1 to 1e6");
   RequireFieldArea(this->fieldArea);
 }
 
@@ -107,7 +101,8 @@ void ExposureClock::SetFieldArea(double area)
 
 void ExposureClock::SetDoseFactor(double factor)
 {
-  Require(factor >= 0.1 && factor <= 10.0, "factor of the dose", factor, "0.1 to 10");
+  RequireSetting(
+    "acquisition", factor >= 0.1 && factor <= 10.0, "factor of the dose", factor, "0.1 to 10");
   this->DoseFactor = factor;
 }
 

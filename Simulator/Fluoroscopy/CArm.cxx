@@ -1,5 +1,7 @@
 #include "CArm.h"
 
+#include "RequireSetting.h"
+
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -9,15 +11,6 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-
-void Require(bool possible, const char* name, double value, const char* range)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(
-      std::string("C-arm: ") + name + " is " + std::to_string(value) + "; it has to be " + range);
-  }
-}
 }
 
 bool CArmPose::operator==(const CArmPose& other) const
@@ -38,19 +31,26 @@ CArmGeometry::CArmGeometry(const CArmPose& pose, const DetectorFormat& format)
   , Format_(format)
 {
   // What is not finite fails every comparison.
-  Require(std::abs(pose.primary) <= Pi, "primary angle", pose.primary, "within -pi to pi");
-  Require(
-    std::abs(pose.secondary) <= Pi / 2, "secondary angle", pose.secondary, "within -pi/2 to pi/2");
-  Require(pose.sourceToIsocentre >= 100.0 && pose.sourceToIsocentre <= 5000.0,
+  RequireSetting(
+    "C-arm", std::abs(pose.primary) <= Pi, "primary angle", pose.primary, "within -pi to pi");
+  RequireSetting("C-arm", std::abs(pose.secondary) <= Pi / 2, "secondary angle", pose.secondary,
+    "within -pi/2 to pi/2");
+  RequireSetting("C-arm", pose.sourceToIsocentre >= 100.0 && pose.sourceToIsocentre <= 5000.0,
     "source to isocentre", pose.sourceToIsocentre, "within 100 to 5000 mm");
-  Require(pose.sourceToDetector > pose.sourceToIsocentre && pose.sourceToDetector <= 10000.0,
+  RequireSetting("C-arm",
+    pose.sourceToDetector > pose.sourceToIsocentre && pose.sourceToDetector <= 10000.0,
     "source to detector", pose.sourceToDetector,
     "more than source to isocentre, and at most 10000 mm");
-  Require(pose.isocentre.norm() < 1e6, "isocentre", pose.isocentre.norm(), "near the patient");
-  Require(format.columns >= 1 && format.columns <= 8192, "columns", format.columns, "1 to 8192");
-  Require(format.rows >= 1 && format.rows <= 8192, "rows", format.rows, "1 to 8192");
-  Require(format.width > 0.0 && format.width <= 2000.0, "width", format.width, "up to 2000 mm");
-  Require(format.height > 0.0 && format.height <= 2000.0, "height", format.height, "up to 2000 mm");
+  RequireSetting(
+    "C-arm", pose.isocentre.norm() < 1e6, "isocentre", pose.isocentre.norm(), "near the patient");
+  RequireSetting(
+    "C-arm", format.columns >= 1 && format.columns <= 8192, "columns", format.columns, "1 to 8192");
+  RequireSetting(
+    "C-arm", format.rows >= 1 && format.rows <= 8192, "rows", format.rows, "1 to 8192");
+  RequireSetting(
+    "C-arm", format.width > 0.0 && format.width <= 2000.0, "width", format.width, "up to 2000 mm");
+  RequireSetting("C-arm", format.height > 0.0 && format.height <= 2000.0, "height", format.height,
+    "up to 2000 mm");
 
   const double sinA = std::sin(pose.primary);
   const double cosA = std::cos(pose.primary);

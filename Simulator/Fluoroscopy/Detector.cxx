@@ -1,5 +1,7 @@
 #include "Detector.h"
 
+#include "RequireSetting.h"
+
 #include "CounterRandom.h"
 #include "DetectorKernels.h"
 #include "FastMath.h"
@@ -16,15 +18,6 @@ namespace coronary
 {
 namespace
 {
-void Require(bool possible, const char* name, double value, const char* range)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(std::string("detector: ") + name + " is " + std::to_string(value) +
-      "; it has to be " + range);
-  }
-}
-
 std::vector<float> OpenShares(int count, double before, double after, double transmission)
 {
   std::vector<float> shares(static_cast<std::size_t>(count));
@@ -255,22 +248,27 @@ float FastLog(float x)
 void DetectorSettings::Validate() const
 {
   // What is not finite fails every comparison.
-  Require(this->glareFraction >= 0.0 && this->glareFraction <= 0.5, "share of glare",
-    this->glareFraction, "0 to 0.5");
-  Require(this->glareSigma >= 4.0 && this->glareSigma <= 200.0, "width of glare", this->glareSigma,
-    "4 to 200 pixels");
-  Require(
-    this->blurSigma >= 0.0 && this->blurSigma <= 3.0, "blur", this->blurSigma, "0 to 3 pixels");
-  Require(this->fluoroscopyLag >= 0.0 && this->fluoroscopyLag <= 0.95, "lag in fluoroscopy",
-    this->fluoroscopyLag, "0 to 0.95");
-  Require(this->cineLag >= 0.0 && this->cineLag <= 0.95, "lag in cine", this->cineLag, "0 to 0.95");
+  RequireSetting("detector", this->glareFraction >= 0.0 && this->glareFraction <= 0.5,
+    "share of glare", this->glareFraction, "0 to 0.5");
+  RequireSetting("detector", this->glareSigma >= 4.0 && this->glareSigma <= 200.0, "width of glare",
+    this->glareSigma, "4 to 200 pixels");
+  RequireSetting("detector", this->blurSigma >= 0.0 && this->blurSigma <= 3.0, "blur",
+    this->blurSigma, "0 to 3 pixels");
+  RequireSetting("detector", this->fluoroscopyLag >= 0.0 && this->fluoroscopyLag <= 0.95,
+    "lag in fluoroscopy", this->fluoroscopyLag, "0 to 0.95");
+  RequireSetting("detector", this->cineLag >= 0.0 && this->cineLag <= 0.95, "lag in cine",
+    this->cineLag, "0 to 0.95");
   const auto shutter = [](const char* name, double value)
-  { Require(value >= 0.0 && value <= 0.45, name, value, "0 to 0.45 of the image"); };
+  {
+    RequireSetting(
+      "detector", value >= 0.0 && value <= 0.45, name, value, "0 to 0.45 of the image");
+  };
   shutter("left shutter", this->shutters.left);
   shutter("right shutter", this->shutters.right);
   shutter("top shutter", this->shutters.top);
   shutter("bottom shutter", this->shutters.bottom);
-  Require(this->shutters.transmission >= 0.0 && this->shutters.transmission <= 1.0,
+  RequireSetting("detector",
+    this->shutters.transmission >= 0.0 && this->shutters.transmission <= 1.0,
     "transmission of the shutters", this->shutters.transmission, "0 to 1");
 }
 
@@ -323,8 +321,9 @@ const std::vector<float>& Detector::Expose(const LineIntegrals& first, const Lin
   RequireImage(first);
   RequireSameSize(first, second);
   RequireSameSize(first, third);
-  Require(photons > 0.0 && photons <= 1e7, "photons a pixel", photons, "above 0, to 1e7");
-  Require(lag >= 0.0 && lag < 1.0, "lag", lag, "0 to below 1");
+  RequireSetting(
+    "detector", photons > 0.0 && photons <= 1e7, "photons a pixel", photons, "above 0, to 1e7");
+  RequireSetting("detector", lag >= 0.0 && lag < 1.0, "lag", lag, "0 to below 1");
   if (first.columns != this->Columns_ || first.rows != this->Rows_)
   {
     this->Resize(first.columns, first.rows);

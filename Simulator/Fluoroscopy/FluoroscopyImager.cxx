@@ -1,5 +1,7 @@
 #include "FluoroscopyImager.h"
 
+#include "RequireSetting.h"
+
 #include "DetectorKernels.h"
 
 #include <algorithm>
@@ -15,15 +17,6 @@ constexpr float LeastSignal = 0.25F; ///< photons: what is shown as the darkest
 constexpr double HarmonisedWidths =
   12.0; ///< standard deviations of what is broad, in an image's width
 constexpr float RoadmapSmoothing = 0.3F; ///< weight of a new frame in the gathered vessels
-
-void Require(bool possible, const char* name, double value, const char* range)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(
-      std::string("images: ") + name + " is " + std::to_string(value) + "; it has to be " + range);
-  }
-}
 
 /// Mean over the 3 x 3 neighbours, nearer at the image's edges.
 void SmoothInPlace(std::vector<float>& image, int columns, int rows)
@@ -56,20 +49,22 @@ std::size_t Bytes(const GreyImage& image)
 void ImagerSettings::Validate() const
 {
   this->detector.Validate();
-  Require(this->window >= 0.5 && this->window <= 20.0, "window", this->window, "0.5 to 20");
-  Require(this->level >= -10.0 && this->level <= 10.0, "level", this->level, "-10 to 10");
-  Require(this->harmonisation >= 0.0 && this->harmonisation <= 0.9, "harmonisation",
-    this->harmonisation, "0 to 0.9");
-  Require(this->exposureSeconds >= 0.01 && this->exposureSeconds <= 10.0,
+  RequireSetting(
+    "images", this->window >= 0.5 && this->window <= 20.0, "window", this->window, "0.5 to 20");
+  RequireSetting(
+    "images", this->level >= -10.0 && this->level <= 10.0, "level", this->level, "-10 to 10");
+  RequireSetting("images", this->harmonisation >= 0.0 && this->harmonisation <= 0.9,
+    "harmonisation", this->harmonisation, "0 to 0.9");
+  RequireSetting("images", this->exposureSeconds >= 0.01 && this->exposureSeconds <= 10.0,
     "time constant of the brightness", this->exposureSeconds, "0.01 to 10 s");
-  Require(this->subtractionWindow >= 0.1 && this->subtractionWindow <= 10.0,
+  RequireSetting("images", this->subtractionWindow >= 0.1 && this->subtractionWindow <= 10.0,
     "window of subtraction", this->subtractionWindow, "0.1 to 10");
-  Require(this->roadmapOpacity >= 0.0 && this->roadmapOpacity <= 1.0, "opacity of the roadmap",
-    this->roadmapOpacity, "0 to 1");
-  Require(this->roadmapThreshold >= 0.0 && this->roadmapThreshold <= 5.0,
+  RequireSetting("images", this->roadmapOpacity >= 0.0 && this->roadmapOpacity <= 1.0,
+    "opacity of the roadmap", this->roadmapOpacity, "0 to 1");
+  RequireSetting("images", this->roadmapThreshold >= 0.0 && this->roadmapThreshold <= 5.0,
     "threshold of the roadmap", this->roadmapThreshold, "0 to 5");
-  Require(this->maskFrames >= 1 && this->maskFrames <= 64, "number of frames of a mask",
-    this->maskFrames, "1 to 64");
+  RequireSetting("images", this->maskFrames >= 1 && this->maskFrames <= 64,
+    "number of frames of a mask", this->maskFrames, "1 to 64");
 }
 
 FluoroscopyImager::FluoroscopyImager(const ImagerSettings& settings, std::uint64_t seed)

@@ -1,5 +1,7 @@
 #include "ThoraxPhantom.h"
 
+#include "RequireSetting.h"
+
 #include "CounterRandom.h"
 #include "ThoraxAnatomy.h"
 
@@ -27,15 +29,6 @@ constexpr float Heart = 48.0F;
 constexpr float Abdomen = 38.0F;
 constexpr float Liver = 60.0F;
 constexpr float Gas = -980.0F;
-
-void Require(bool possible, const char* name, double value, const char* range)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(
-      std::string("thorax: ") + name + " is " + std::to_string(value) + "; it has to be " + range);
-  }
-}
 
 /// Smooth noise of mean 0 and amplitude about 1: random values on a lattice, linear between them, periodic.
 class LatticeNoise
@@ -366,9 +359,11 @@ private:
 
 void ThoraxSettings::Validate() const
 {
-  Require(this->spacing >= 0.8 && this->spacing <= 6.0, "spacing", this->spacing, "0.8 to 6 mm");
-  Require(this->width >= 260.0 && this->width <= 420.0, "width", this->width, "260 to 420 mm");
-  Require(this->fat >= 4.0 && this->fat <= 40.0, "fat", this->fat, "4 to 40 mm");
+  RequireSetting("thorax", this->spacing >= 0.8 && this->spacing <= 6.0, "spacing", this->spacing,
+    "0.8 to 6 mm");
+  RequireSetting(
+    "thorax", this->width >= 260.0 && this->width <= 420.0, "width", this->width, "260 to 420 mm");
+  RequireSetting("thorax", this->fat >= 4.0 && this->fat <= 40.0, "fat", this->fat, "4 to 40 mm");
 }
 
 HounsfieldVolume MakeThoraxPhantom(const ThoraxSettings& settings, const ProgressCallback& progress)

@@ -412,6 +412,41 @@ std::shared_ptr<WallMotion> SampleWallMotion(WallMotion& motion, int phases)
   return std::make_shared<SampledWallMotion>(motion.Topology(), times, positions, axis);
 }
 
+namespace
+{
+/// Place of each branch in its tree, by its GroupId.
+std::map<int, int> BranchesByGroup(const PhantomTree& tree)
+{
+  std::map<int, int> branchOf;
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    branchOf[tree.branches[b].groupId] = static_cast<int>(b);
+  }
+  return branchOf;
+}
+}
+
+WallTopology PhantomAxes(const CoronaryPhantom& phantom)
+{
+  WallTopology topology;
+  const PhantomTree tree = phantom.Tree(0.0);
+  const std::map<int, int> branchOf = BranchesByGroup(tree);
+  for (const PhantomBranch& branch : tree.branches)
+  {
+    topology.axis.emplace_back();
+    topology.axisRadius.emplace_back();
+    for (const std::int64_t p : branch.points)
+    {
+      topology.axis.back().push_back(tree.points[p] - tree.displacement[p]);
+      topology.axisRadius.back().push_back(tree.radius[p]);
+    }
+    topology.groupName.push_back(SegmentName(branch.segmentId));
+    const auto parent = branchOf.find(branch.parentGroupId);
+    topology.parent.push_back(parent == branchOf.end() ? -1 : parent->second);
+  }
+  return topology;
+}
+
 std::shared_ptr<WallMotion> MakePhantomWallMotion(
   const PhantomSettings& settings, double edgeLength, int phases, const ProgressCallback& progress)
 {
@@ -428,26 +463,8 @@ std::shared_ptr<WallMotion> MakePhantomWallMotion(
   PhantomSettings used = settings;
   used.surfaceSpacing = edgeLength;
   const CoronaryPhantom phantom(used);
-  WallTopology topology;
-  const PhantomTree tree = phantom.Tree(0.0);
-  std::map<int, int> branchOf;
-  for (std::size_t b = 0; b < tree.branches.size(); ++b)
-  {
-    branchOf[tree.branches[b].groupId] = static_cast<int>(b);
-  }
-  for (const PhantomBranch& branch : tree.branches)
-  {
-    topology.axis.emplace_back();
-    topology.axisRadius.emplace_back();
-    for (const std::int64_t p : branch.points)
-    {
-      topology.axis.back().push_back(tree.points[p] - tree.displacement[p]);
-      topology.axisRadius.back().push_back(tree.radius[p]);
-    }
-    topology.groupName.push_back(SegmentName(branch.segmentId));
-    const auto parent = branchOf.find(branch.parentGroupId);
-    topology.parent.push_back(parent == branchOf.end() ? -1 : parent->second);
-  }
+  WallTopology topology = PhantomAxes(phantom);
+  const std::map<int, int> branchOf = BranchesByGroup(phantom.Tree(0.0));
   std::vector<double> times;
   std::vector<std::vector<Vector3>> positions;
   std::vector<std::vector<Vector3>> axis;
@@ -472,7 +489,7 @@ std::shared_ptr<WallMotion> MakePhantomWallMotion(
     positions.push_back(std::move(surface.points));
     const PhantomTree moved = phantom.Tree(time);
     axis.emplace_back();
-    for (const PhantomBranch& branch : tree.branches)
+    for (const PhantomBranch& branch : moved.branches)
     {
       for (const std::int64_t p : branch.points)
       {

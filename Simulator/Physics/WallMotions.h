@@ -133,6 +133,9 @@ private:
  */
 std::shared_ptr<WallMotion> SampleWallMotion(WallMotion& motion, int phases);
 
+/// Axes at rest with their radii, names and parents of the phantom's vessels; without a surface.
+WallTopology PhantomAxes(const CoronaryPhantom& phantom);
+
 /**
  * The phantom's true lumen: both coronary trees, as components of one surface. Entities 2 and 3 are the left and
  * right ostium, 4.. the ends of the branches; a point's group is the place of its branch in Topology().axis.

@@ -3,10 +3,9 @@
 #define ContrastTestData_h
 
 #include "CoronaryPhantom.h"
-#include "WallMotion.h"
+#include "WallMotions.h"
 
 #include <cstdio>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -59,27 +58,7 @@ inline WallTopology Fork(double radiusA, double radiusB)
 /// The axes of the phantom's vessels at rest.
 inline WallTopology PhantomVessels(const PhantomSettings& settings)
 {
-  const PhantomTree tree = CoronaryPhantom(settings).Tree(0.0);
-  WallTopology topology;
-  std::map<int, int> branchOf;
-  for (std::size_t b = 0; b < tree.branches.size(); ++b)
-  {
-    branchOf[tree.branches[b].groupId] = static_cast<int>(b);
-  }
-  for (const PhantomBranch& branch : tree.branches)
-  {
-    topology.axis.emplace_back();
-    topology.axisRadius.emplace_back();
-    for (const std::int64_t p : branch.points)
-    {
-      topology.axis.back().push_back(tree.points[p] - tree.displacement[p]);
-      topology.axisRadius.back().push_back(tree.radius[p]);
-    }
-    topology.groupName.push_back(SegmentName(branch.segmentId));
-    const auto parent = branchOf.find(branch.parentGroupId);
-    topology.parent.push_back(parent == branchOf.end() ? -1 : parent->second);
-  }
-  return topology;
+  return PhantomAxes(CoronaryPhantom(settings));
 }
 }
 
