@@ -22,7 +22,7 @@ configure_package_config_file(
   INSTALL_DESTINATION "${package_destination}")
 write_basic_package_version_file(
   "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config-version.cmake"
-  COMPATIBILITY SameMinorVersion)
+  COMPATIBILITY SameMajorVersion)
 install(FILES
   "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config.cmake"
   "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config-version.cmake"

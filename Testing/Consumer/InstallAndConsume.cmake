@@ -3,7 +3,8 @@
 # shell and, in the ParaView tree, from pvpython.
 #
 # cmake -D BUILD_DIR=... -D SOURCE_DIR=... -D WORK_DIR=... -D GENERATOR=... -D BUILD_TYPE=...
-#       -D CXX_COMPILER=... -D C_COMPILER=... [-D PVPYTHON=...] -P InstallAndConsume.cmake
+#       -D CXX_COMPILER=... -D C_COMPILER=... [-D PVPYTHON=...] [-D CPACK=...] -P InstallAndConsume.cmake
+# With CPACK the installation is what lies in the Debian package.
 cmake_minimum_required(VERSION 3.18)
 
 # run(<what> <command> [args ...]): stops with the whole output when the command fails.
@@ -23,9 +24,23 @@ endforeach()
 
 file(REMOVE_RECURSE "${WORK_DIR}")
 file(MAKE_DIRECTORY "${WORK_DIR}")
-run("installation" "${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${WORK_DIR}/staging")
 set(prefix "${WORK_DIR}/prefix with space")
-file(RENAME "${WORK_DIR}/staging" "${prefix}")
+if(CPACK)
+  run("packaging" "${CPACK}" --config "${BUILD_DIR}/CPackConfig.cmake" -B "${WORK_DIR}/package"
+    -D CPACK_DEBIAN_COMPRESSION_TYPE=gzip)
+  file(GLOB package "${WORK_DIR}/package/dynamiccoronary_*.deb")
+  run("unpacking" dpkg-deb --extract "${package}" "${WORK_DIR}/staging")
+  file(RENAME "${WORK_DIR}/staging/usr" "${prefix}")
+  run("reading the package" dpkg-deb --field "${package}" Depends)
+  foreach(needed paraview libxrl libstdc)
+    if(NOT run_output MATCHES "(^|[ ,])${needed}")
+      message(FATAL_ERROR "The package does not depend on ${needed}*: ${run_output}")
+    endif()
+  endforeach()
+else()
+  run("installation" "${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${WORK_DIR}/staging")
+  file(RENAME "${WORK_DIR}/staging" "${prefix}")
+endif()
 
 run("configuring the consumer" "${CMAKE_COMMAND}" -S "${SOURCE_DIR}" -B "${WORK_DIR}/consumer"
   -G "${GENERATOR}"

@@ -1,0 +1,76 @@
+#!/usr/bin/env bash
+# Installs the package in a Debian 12 that was just made and has nothing else, and uses it: ParaView must load the
+# plugin by itself, the programs must run; removed, it must leave nothing behind. Needs root and debootstrap.
+set -euo pipefail
+
+if [ $# -lt 1 ] || [ $# -gt 2 ] || [ ! -f "$1" ]; then
+  echo "Usage: scripts/test-package.sh PACKAGE.deb [FOLDER]   (FOLDER, where the system is made: default mktemp -d)" >&2
+  exit 2
+fi
+if [ "$(id -u)" -ne 0 ] || ! command -v debootstrap >/dev/null; then
+  echo "test-package: run me as root, with debootstrap installed" >&2
+  exit 1
+fi
+package="$(realpath "$1")"
+system="$(realpath "${2:-$(mktemp -d)}")"
+mirror="${DEBIAN_MIRROR:-http://deb.debian.org/debian}"
+
+# Its mounts are seen by this process and its children only.
+if [ -z "${DYNAMICCORONARY_OWN_MOUNTS:-}" ]; then
+  DYNAMICCORONARY_OWN_MOUNTS=yes exec unshare --mount -- "$0" "$package" "$system"
+fi
+if [ ! -e "$system/usr/bin/dpkg" ]; then
+  echo "== A new Debian 12 in $system"
+  debootstrap --variant=minbase --include=ca-certificates bookworm "$system" "$mirror" >"$system.log" 2>&1
+fi
+cp /etc/resolv.conf "$system/etc/resolv.conf"
+cp "$package" "$system/root/package.deb"
+mount -t proc proc "$system/proc"
+mount --rbind /dev "$system/dev"
+
+cat >"$system/root/use.sh" <<'EOF'
+set -eu
+export DEBIAN_FRONTEND=noninteractive HOME=/root
+apt-get -qq update
+apt-get -qq -y --no-install-recommends install /root/package.deb python3-paraview libqt5svg5 xvfb xauth >/root/apt.log 2>&1 ||
+  { tail -n 20 /root/apt.log; exit 1; }
+echo "== Installed: $(dpkg-query -W -f '${Package} ${Version}' dynamiccoronary)"
+cat /usr/bin/paraview.conf
+display() { xvfb-run -a -s "-screen 0 1280x900x24 -noreset" "$@"; }
+
+cd /root
+coronary-pipeline --version
+coronary-pipeline phantom --seed 1 --phases 3 --spacing 0.8 --output phantom --quiet
+coronary-pipeline run phantom/series.json --output run --quiet
+coronary-pipeline evaluate --result run --truth phantom --no-pictures --output evaluation | tail -n 3
+coronary-simulator --headless --scenario phantom-lca --output session --duration 0.2 >/dev/null
+coronary-device-emulator --help >/dev/null
+
+cat >autoload.py <<'PYTHON'
+from paraview import simple
+if not hasattr(simple, "CoronaryPhantom"):
+    raise SystemExit("ParaView's Python did not load the plugin by itself")
+tree = simple.Calculator(Input=simple.OutputPort(simple.CoronaryPhantom(), 1))
+tree.UpdatePipeline(0.35)
+print("pvpython: %d points of the centerlines" % tree.GetDataInformation().GetNumberOfPoints())
+PYTHON
+pvpython autoload.py
+cat >window.py <<'PYTHON'
+from paraview import simple
+open("/root/window.txt", "w").write("loaded" if hasattr(simple, "CoronaryPhantom") else "not loaded")
+PYTHON
+display timeout 120 paraview --script=/root/window.py >/root/paraview.log 2>&1 &
+window=$!
+for _ in $(seq 100); do [ -e /root/window.txt ] && break; sleep 1; done
+kill "$window" 2>/dev/null || true
+echo "paraview: plugin $(cat /root/window.txt)"
+[ "$(cat /root/window.txt)" = loaded ]
+
+apt-get -qq -y remove dynamiccoronary >/root/apt.log 2>&1 || { tail -n 20 /root/apt.log; exit 1; }
+if [ -e /usr/bin/paraview.conf ] || find / -xdev -path /proc -prune -o -iname '*coronary*' -not -path '/root/*' -not -path '/var/*' -print | grep .; then
+  echo "test-package: the files above stayed behind" >&2
+  exit 1
+fi
+echo "== Removed without a trace"
+EOF
+chroot "$system" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 bash /root/use.sh
