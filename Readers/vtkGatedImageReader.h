@@ -8,25 +8,29 @@
  * - one 4-D NIfTI, NRRD or MetaImage file;
  * - a JSON file that lists images, R-R fractions, cycle length and seed points.
  *
- * Pipeline time is the fraction of the R-R interval. TIME_STEPS are the fractions of the phases,
- * strictly increasing; a requested time is answered with the nearest phase (the earlier one of two at
- * the same distance), also outside the range. Without a requested time the first phase is read.
- *
  * World coordinates are LPS millimetres; the orientation is the image's direction matrix.
- *
- * Output port 0, vtkImageData:
- * - point scalars `HU`, one component: short when the stored values are integers of at most 16 bits
- *   with an integral rescale (DICOM slope and intercept, NIfTI scl_slope, ...) and lie within short;
- *   float otherwise. The type announced before reading assumes that 16-bit values fit.
- * - field data `CycleLength` (double, seconds) and `PhaseTime` (double, R-R fraction of the phase).
- *
- * Output port 1, vtkPolyData: the seed points of a JSON file as vertices in LPS millimetres, with the
- * point array `Name` (string). Empty without seeds.
  *
  * Headers are read once, in RequestInformation, and again only when a file or a property changed.
  * One volume is in memory at a time: the one that is the output.
  *
+ * @par Output ports:
+ * - 0, vtkImageData: the phase. Point data `HU` (short or float, Hounsfield units; the scalars): short
+ *   when the stored values are integers of at most 16 bits with an integral rescale (DICOM slope and
+ *   intercept, NIfTI scl_slope, ...) and lie within short; float otherwise. The type announced before
+ *   reading assumes that 16-bit values fit. Field data `CycleLength` (double, s) and `PhaseTime`
+ *   (double, fraction of the R-R interval).
+ * - 1, vtkPolyData: the seed points of a JSON file as vertices. Point data `Name` (string). Empty
+ *   without seeds.
+ *
+ * @par Time:
+ * Pipeline time is the fraction of the R-R interval. TIME_STEPS are the fractions of the phases,
+ * strictly increasing; a requested time is answered with the nearest phase (the earlier one of two at
+ * the same distance), also outside the range. Without a requested time the first phase is read.
+ *
+ * @par Failure:
  * Wrong or damaged input gives one error that names the file or property, and no output.
+ *
+ * @sa docs/readers.md
  */
 #ifndef vtkGatedImageReader_h
 #define vtkGatedImageReader_h

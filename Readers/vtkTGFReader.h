@@ -2,7 +2,8 @@
  * @class vtkTGFReader
  * @brief Reads a skeleton in Trivial Graph Format (.tgf, libigl and Blender) as centerlines or bones.
  *
- * Output, vtkPolyData: a point for each joint, in the order of the file (joints without bones are
+ * @par Output:
+ * vtkPolyData: a point for each joint, in the order of the file (joints without bones are
  * points without a line). A root is a joint at which bones only begin; where bones go both ways, the
  * first joint that is an end. Point data `MaximumInscribedSphereRadius` (double, mm): `Radius`
  * everywhere, as the format has none; `Abscissas` (double, mm from the root).
@@ -13,6 +14,9 @@
  *   the place in the file, from 0), `GroupIds`, `TreeIds` (int, those of TreeForm), `Length` (double, mm)
  *
  * The output is whole in piece 0 and empty in every other piece.
+ *
+ * @par Time:
+ * The file has no time, nor has the output.
  *
  * @par Failure:
  * A file that can not be opened, a line that can not be read, a bone without its joints, a loop: one

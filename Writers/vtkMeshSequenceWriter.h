@@ -33,6 +33,9 @@
  * All files appear together when the last one is whole; older ones stay until then. Then those that an older
  * NAME.json stands for are gone: nothing of a longer sequence stays among the new one.
  *
+ * @par Time:
+ * Writes the phases that `Phases` says, one after the other, and asks its input for each.
+ *
  * @par Failure:
  * Other points or cells at one phase, cells of other kinds, a position that is not finite, a boundary that is not
  * the mesh's, times that do not increase, an input that does not answer for a time, a setting out of

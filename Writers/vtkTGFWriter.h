@@ -2,7 +2,8 @@
  * @class vtkTGFWriter
  * @brief Writes a skeleton in Trivial Graph Format (.tgf), as libigl and Blender read it.
  *
- * Input, vtkPolyData, one of
+ * @par Input:
+ * vtkPolyData, one of
  * - a skeleton, at rest or posed, as of vtkCenterlineSkeleton: lines of two points, with the point array
  *   `ParentJoint` or without any ids of centerlines. Joint n of the file is point n; bones stand in the
  *   order of the cell array `BoneId`, so that the place in the file is the id.
@@ -10,10 +11,14 @@
  *   (`CenterlineIds`, `TractIds`, `GroupIds`). Every point becomes a joint, every step from point to
  *   point a bone.
  *
+ * @par Files:
  * Parents stand first in their bones. Positions are written with all their digits and come back bit by
  * bit; radii, other ids and names have no place in the format.
  *
  * The file appears under its name when it is whole; an older one stays until then.
+ *
+ * @par Time:
+ * The time that the pipeline is at is written.
  *
  * @par Failure:
  * Without a file name, without lines, for lines that are no tree (a loop), or when the file can not be

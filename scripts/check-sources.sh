@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks that need no build: layers, formatting, XML, scripts. Exit 1 when one of them fails.
+# Checks that need no build: layers, formatting, XML, scripts, reference pages, links. Exit 1 when one of them fails.
 set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -118,6 +118,13 @@ if [ "$bad_scripts" -ne 0 ]; then
   fail "scripts"
 else
   echo "ok: ${#scripts[@]} shell scripts"
+fi
+
+if [ -z "$python3" ]; then
+  echo "skipped: reference pages and links (python3 is not installed)"
+else
+  "$python3" scripts/make-filter-reference.py --check || fail "reference of the filters"
+  "$python3" scripts/check-links.py || fail "links of the documentation"
 fi
 
 if [ "$failures" -gt 0 ]; then

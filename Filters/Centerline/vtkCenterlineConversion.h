@@ -10,11 +10,13 @@
  * The form of the input is found by its arrays (both kinds: a tree). An input that has the wanted
  * form already passes through.
  *
- * Input, vtkPolyData: polylines, and a point array with the radius, `RadiusArrayName`. Blanked tracts
+ * @par Input:
+ * vtkPolyData: polylines, and a point array with the radius, `RadiusArrayName`. Blanked tracts
  * are branches like the others. A tree whose branches leave others in their middle is split for
  * VMTK's lines.
  *
- * Output, vtkPolyData: the other form; positions in double. All point arrays go along with their
+ * @par Output:
+ * vtkPolyData: the other form; positions in double. All point arrays go along with their
  * points, all cell arrays with their branches: what VMTK's form does not need (`SegmentLabel`,
  * `TreeIds`, ...) is kept there, and comes back. New or replaced are
  * - tree: point data `Abscissas` (double, mm); cell data `GroupIds`, `ParentGroupIds`, `TreeIds` (int,
@@ -22,7 +24,10 @@
  * - VMTK's lines: cell data `CenterlineIds`, `TractIds`, `GroupIds`, `Blanking` (int)
  *
  * Field data pass. The output is whole in piece 0 and empty in every other piece. Blocks of a
- * composite input are treated one by one, time passes.
+ * composite input are treated one by one.
+ *
+ * @par Time:
+ * Passes through: every time step is converted by itself.
  *
  * @par Failure:
  * An array that is missing, not of one component or does not fit: one error that names it, and no

@@ -25,22 +25,24 @@
  * @par Output ports:
  * - 0, vtkPolyData: one polyline a branch, from root to tip; the first point of a branch is the
  *   last of its parent, whose data it has. Depth first, a vessel's continuation before its side
- *   branches. Point data: that of the input, and `MaximumInscribedSphereRadius`, `Abscissas` (mm
- *   along the tree from its root), `FrenetTangent`, `FrenetNormal`, `FrenetBinormal` (double[3],
- *   unit), `Curvature`, `Torsion` (1/mm), `SectionArea` (mm^2), `SegmentIds` (int,
- *   coronary::SegmentId, 0 unnamed). Cell data: `GroupIds`, `ParentGroupIds` (-1 at a root),
- *   `TreeIds` (0 left, 1 right, -1 neither; numbered 0, 1, ... when not labelled),
- *   `BranchGeneration`, `StrahlerOrder`, `SegmentIds` (int), `SegmentLabel` (string, empty
- *   unnamed), `Length` (mm), `Tortuosity` (length / chord - 1).
- * - 1, vtkPolyData: bifurcations as vertices. Point data `ParentGroupIds`, `DaughterGroupIds`
- *   (int[n], n at least 3, widest first, -1 none), `TreeIds`, `SegmentIds` (of the parent),
- *   `BifurcationAngle` (between the two widest daughters, radians), `DaughterAngles` (double[n],
- *   between the parent's course and each daughter), `ParentRadius`, `DaughterRadii` (mm),
- *   `AreaRatio` (sum of daughters over parent), `DaughterAreaRatio` (second over widest),
- *   `MurrayExponent` x, `MurrayResidual` (r_p^x - sum r_d^x) / r_p^x (Eq. 3 of the paper: x = 3),
- *   `HuoKassabResidual` (x = 7/3), `FinetRatio` r_p / (r_1 + r_2), `FittedExponent` (the x without
- *   residual, NaN where there is none). In doubles[n] a missing daughter is -1.
- * - 2, vtkPolyData: the loops that were found, as closed polylines with cell data `Length`.
+ *   branches. Point data: that of the input, and `MaximumInscribedSphereRadius` (double, mm),
+ *   `Abscissas` (double, mm along the tree from its root), `FrenetTangent`, `FrenetNormal`,
+ *   `FrenetBinormal` (double[3], unit), `Curvature`, `Torsion` (double, 1/mm), `SectionArea`
+ *   (double, mm^2), `SegmentIds` (int, coronary::SegmentId, 0 unnamed). Cell data: `GroupIds`
+ *   (int), `ParentGroupIds` (int, -1 at a root), `TreeIds` (int: 0 left, 1 right, -1 neither;
+ *   numbered 0, 1, ... when not labelled), `BranchGeneration`, `StrahlerOrder`, `SegmentIds`
+ *   (int), `SegmentLabel` (string, empty unnamed), `Length` (double, mm), `Tortuosity` (double,
+ *   length / chord - 1).
+ * - 1, vtkPolyData: bifurcations as vertices. Point data `ParentGroupIds` (int), `DaughterGroupIds`
+ *   (int[n], n at least 3, widest first, -1 none), `TreeIds`, `SegmentIds` (int, of the parent),
+ *   `BifurcationAngle` (double, radians, between the two widest daughters), `DaughterAngles`
+ *   (double[n], radians, between the parent's course and each daughter), `ParentRadius` (double, mm),
+ *   `DaughterRadii` (double[n], mm), `AreaRatio` (double, sum of daughters over parent),
+ *   `DaughterAreaRatio` (double, second over widest), `MurrayExponent` (double, x), `MurrayResidual`
+ *   (double, (r_p^x - sum r_d^x) / r_p^x; Eq. 3 of the paper: x = 3), `HuoKassabResidual` (double, the
+ *   same with x = 7/3), `FinetRatio` (double, r_p / (r_1 + r_2)), `FittedExponent` (double, the x
+ *   without residual, NaN where there is none). In doubles[n] a missing daughter is -1.
+ * - 2, vtkPolyData: the loops that were found, as closed polylines. Cell data `Length` (double, mm).
  *
  * Field data of outputs 0 and 1: that of the input, `PrunedTwigs`, `ClosedGaps` (int),
  * `LoopLengths` (double, mm), `FittedExponent` (double, over all bifurcations; no value where none
@@ -51,11 +53,19 @@
  * The output is whole in piece 0 and empty, with all arrays, in every other piece. Blocks of a
  * composite input are treated one by one.
  *
+ * @par Time:
+ * Passes through from input 0: every time step is computed by itself. Put vtkReferencePhase
+ * before it for what is made once for a heart.
+ *
  * @par Failure:
  * A setting out of range, a missing radius array, a radius that is not a positive number, a
  * coordinate that is not finite: one error that names it, and no output. An input without lines
  * gives an empty output. Loops are a warning. An aborted execution leaves an empty output and is
  * started anew by the next request.
+ *
+ * @par Sources:
+ * Names: Raff et al., J Cardiovasc Comput Tomogr 2009;3:122 (SCCT). Exponents of the bifurcations: Murray 1926,
+ * Huo and Kassab, Finet et al.; see docs/topology.md.
  *
  * @sa coronary::BuildTopology, coronary::LabelSegments, docs/topology.md
  */

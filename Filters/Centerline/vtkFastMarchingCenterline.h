@@ -42,6 +42,10 @@
  *
  * The output is whole in piece 0 and empty, with all arrays, in every other piece.
  *
+ * @par Time:
+ * Passes through from input 0: every time step is computed by itself. Put vtkReferencePhase
+ * before it for what is made once for a heart.
+ *
  * @par Failure:
  * A missing array, seeds that are not there or a setting out of range is one error and no output. An
  * empty image, surface or seed list is a normal piece of a pipeline: empty outputs, no error.

@@ -20,6 +20,9 @@
  * input, among it `CycleLength`; `PhaseTime` (double, fraction of the R-R interval) is added where
  * the input has none.
  *
+ * @par Time:
+ * Ends here: the output has neither TIME_STEPS nor TIME_RANGE.
+ *
  * @par Failure:
  * A Time that is not finite, or not available in the exact mode; an automatic choice among data
  * that do not compare from phase to phase: one error that says so, and no output.

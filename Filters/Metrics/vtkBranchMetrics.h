@@ -24,7 +24,7 @@
  *   of either side, -1: none), `ReferenceGroup`, `ResultGroup` (vtkIdType, -1: none),
  *   `ReferenceLength`, `ResultLength` (double, mm, NaN: none), `LengthRatio`, `Overlap`, `Covered`,
  *   `Continuity` (double, 0 to 1 but for the ratio), `LongestGap` (double, mm), `Detected` (int).
- *   Field data, double, one value each: `BCR`, `BCS`, `BCR_bounded`, `BCS_bounded`, `BCS_matched`,
+ *   Field data (double, one value each): `BCR`, `BCS`, `BCR_bounded`, `BCS_bounded`, `BCS_matched`,
  *   `LengthDetected`, `ReferenceBranches`, `ResultBranches`, `MatchedBranches`, `DetectedBranches`,
  *   `FalseBranches`, `FalseLength` (mm), `OV`, `OF`, `OT`, `AD`, `AI`, `AT`.
  * - 1, vtkPolyData: the branches of both sides as lines, those of the reference first. Cell data
@@ -39,6 +39,9 @@
  * A setting out of range, a bare surface, a coordinate or radius that is not finite, times that do not
  * match: one error that names it, and no output. Without lines the table has no rows, and measures are
  * NaN. An aborted execution leaves empty outputs and is started anew by the next request.
+ *
+ * @par Sources:
+ * Eq. 17 of Wang et al., arXiv 2503.02218; Schaap et al., Med Image Anal 2009;13:701, for OV to AT.
  *
  * @sa coronary::CompareBranches, vtkCenterlineMetrics, vtkMeshDistanceMetrics, docs/metrics.md
  */

@@ -27,16 +27,22 @@
  * - 1, vtkPolyData: the lines of both sides. Point data `CenterlineMatch` (int: 1 true positive, 2
  *   false negative, 3 false positive, 0 not compared), `CenterlineDistance` (double, mm, of the
  *   shortest connection; NaN without one), `FromReference` (int, 0 or 1), and
- *   `MaximumInscribedSphereRadius` (double, mm, NaN unknown). Cell data `FromReference`.
+ *   `MaximumInscribedSphereRadius` (double, mm, NaN unknown). Cell data `FromReference` (int).
  *
  * The output is whole in piece 0, and empty in every other piece. Blocks of a composite result are
  * treated one by one.
+ *
+ * @par Time:
+ * The output has the time steps of the result (input 0); both inputs are asked for the same time.
  *
  * @par Failure:
  * A setting out of range, a reference without radii, a radius that is negative or not finite, a
  * coordinate that is not finite: one error that names it, and no output. Without lines the output
  * has no row but the total. An aborted execution leaves an empty output and is started anew by the
  * next request.
+ *
+ * @par Sources:
+ * Schaap et al., Med Image Anal 2009;13:701 (CAT08).
  *
  * @sa coronary::CompareCenterlines, coronary::CompareCenterlineTrees, docs/metrics.md
  */

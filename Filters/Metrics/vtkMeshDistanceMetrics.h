@@ -21,7 +21,7 @@
  * - 1, vtkPolyData: the reference with its distance from the result.
  * - 2, vtkTable: a row for each branch of the result, a row for each branch of the reference, and
  *   the last one for all together. Columns: `Name` (string), `Side` (int: 0 result, 1 reference, -1
- *   both), `GroupId` (vtkIdType, -1 for all), then double, mm, NaN where it does not apply: `HD`,
+ *   both), `GroupId` (vtkIdType, -1 for all), then (double, mm, NaN where it does not apply): `HD`,
  *   `HD_AB`, `HD_BA`, `HD95`, `HD95_AB`, `HD95_BA`, `HD95_pooled`, `MSD`, `MSD_BA`, `MSD_area`,
  *   `MSD_area_AB`, `MSD_area_BA`, `RMS`, `RMS_AB`, `RMS_BA`, `error_bound` (what HD can be too
  *   small by), `quadrature_error` (estimate, of MSD_area), `Area_A`, `Area_B` (mm^2). A branch is
@@ -45,6 +45,9 @@
  * not match: one error that names it, and no output. A warning when one surface is about 10, 100 or
  * 1000 times as large as the other one: other units. An aborted execution leaves empty outputs and
  * is started anew by the next request.
+ *
+ * @par Sources:
+ * Eq. 15 and 16 of Wang et al., arXiv 2503.02218.
  *
  * @sa coronary::CompareSurfaces, vtkBranchMetrics, docs/metrics.md
  */

@@ -16,7 +16,7 @@
  * - 0: vtkPointSet (a tree, a skeleton, any mesh) with the same points and cells at every time step. Optional point
  *   arrays: `TrackingConfidence` (0 to 1), `TrackingStatus`, `CalibreFactor` (factor of the radius), the
  *   radius (mm), `EllipseMajor` and `EllipseMinor` (semi-axes, mm). Optional cell array: `BoneRotation`
- *   (double[4], w x y z). Field data: `CycleLength` (s).
+ *   (double[4], w x y z). Field data: `CycleLength` (double, s).
  *
  * @par Output port:
  * - 0: the input's type, cells and arrays, with the points of the moment. Point data: `Velocity`
@@ -34,10 +34,17 @@
  *
  * The output is whole in piece 0, and empty in every other piece. An empty input gives an empty output.
  *
+ * @par Time:
+ * Any time is answered, modulo Period. TIME_STEPS are offered for players only: by default the paper's 20 phases (`Steps`).
+ * TIME_RANGE is TimeRange, stretched to hold all steps. The first request reads all steps of the input.
+ *
  * @par Failure:
  * Less than two time steps, steps that do not increase strictly or are not finite, other points, cells or lines at
  * another step, a position that is not finite, an array of wrong form, a setting out of range, composite data: one
  * error and no output.
+ *
+ * @par Sources:
+ * Eq. 8, 10 and 11 of Wang et al., arXiv 2503.02218.
  *
  * @sa coronary::PhaseInterpolation, vtkMotionRegularizer
  */

@@ -28,11 +28,15 @@
  *   reference). Cell data `AxialStrain` (double: length / length at the reference - 1).
  * - 1: vtkPolyData, the skeleton with the same arrays, as vtkSkinDeformation takes it.
  * Both have TIME_STEPS and TIME_RANGE of the tracked phases; another time gives the nearest one. Field data:
- * that of the lines, `CycleLength` (s), `ReferenceTime`, `TrackedShare` (double, one value a tracked phase: share of
- * places that were tracked), `TrackingRepeatability` (double, mm: phases that show the same moment against each
+ * that of the lines, `CycleLength` (double, s), `ReferenceTime` (double, fraction of R-R), `TrackedShare` (double, one value
+ * a tracked phase: share of places that were tracked), `TrackingRepeatability` (double, mm: phases that show the same moment against each
  * other; NaN when there are none).
  *
  * The output is whole in piece 0, and empty in every other piece. Lines without points give an empty output.
+ *
+ * @par Time:
+ * TIME_STEPS and TIME_RANGE are the tracked phases; another time gives the nearest one. The first request reads all
+ * tracked phases, later ones read no image.
  *
  * @par Failure:
  * An input without time steps or with one only, times that do not increase, lines outside the image, a

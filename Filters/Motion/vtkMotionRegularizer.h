@@ -27,10 +27,17 @@
  *
  * The output is whole in piece 0, and empty in every other piece. An empty input gives an empty output.
  *
+ * @par Time:
+ * TIME_STEPS and TIME_RANGE are those of the input; another time gives the nearest step. The first request reads all
+ * steps of the input.
+ *
  * @par Failure:
  * Less than two time steps, steps that do not increase strictly or are not finite, other points or lines at another
  * step, a position that is not finite, cells that are no lines, a segment without length at rest, an array of
  * wrong form, a setting out of range: one error and no output.
+ *
+ * @par Sources:
+ * Eq. 13 and 14 of Wang et al., arXiv 2503.02218.
  *
  * @sa coronary::RegularizeMotion, vtkCardiacPhaseInterpolator
  */

@@ -42,11 +42,17 @@
  * @par Input port:
  * 0, optional, one vtkPointSet: points to be carried by the motion to output 5.
  *
+ * @par Time:
+ * TIME_STEPS are the phases, TIME_RANGE is from the first to the last; any time is answered exactly, also between and
+ * outside of them. Without a request the first phase is given.
+ *
  * @par Failure:
  * A setting out of its range or not finite is one error that names the property, and no output.
  * An aborted execution leaves an empty output and is started anew by the next request.
  *
- * Sources of anatomy, motion and image model: see CoronaryPhantom.h and docs/phantom.md.
+ * @par Sources:
+ * Anatomy: Dodge et al., Circulation 1988;78:1167 and 1992;86:232. Motion: Shechter et al. 2005 (PMC2396325),
+ * Mao et al., J Comput Assist Tomogr 2000;24:253. More in docs/phantom.md.
  *
  * @sa coronary::CoronaryPhantom
  */

@@ -28,12 +28,20 @@
  * The output is whole in piece 0, and empty in every other piece. Blocks of a composite mesh are
  * treated one by one. An empty mesh gives an empty output. The same bits on any number of threads.
  *
+ * @par Time:
+ * Passes through from input 0. Weights belong to the mesh and skeleton at rest: put vtkReferencePhase before
+ * both, or every time step solves for its own.
+ *
  * @par Failure:
  * A setting out of range, cells that are no tetrahedra or have no volume, points without tetrahedra, a
  * skeleton without bones, a bone without length or outside of the mesh, two bones at one point, a part
  * of the mesh without bone: one error that names it, and no output. What did not converge within the
  * iterations, and bones that leave the mesh, are a warning. An aborted execution leaves an empty output
  * and is started anew by the next request.
+ *
+ * @par Sources:
+ * Jacobson et al., Bounded biharmonic weights for real-time deformation, ACM Trans Graph (SIGGRAPH) 2011;30:78. Eq. 5 to 7
+ * of Wang et al., arXiv 2503.02218.
  *
  * @sa coronary::ComputeSkinWeights, vtkCenterlineSkeleton
  */

@@ -24,6 +24,10 @@
  * every other piece. Blocks of a composite input are treated one by one. An empty input gives an
  * empty output.
  *
+ * @par Time:
+ * Passes through from input 0: every time step is computed by itself. Put vtkReferencePhase
+ * before it for what is made once for a heart.
+ *
  * @par Failure:
  * A setting out of range, lines that are no tree, a radius array that is missing or unfit, a
  * coordinate that is not finite, a branch without length: one error that names it, and no output.

@@ -20,6 +20,9 @@
  *
  * The output is whole in piece 0, and empty in every other piece. An empty input gives an empty output.
  *
+ * @par Time:
+ * With input 1 TIME_STEPS and TIME_RANGE are those of input 1, else time passes through from input 0.
+ *
  * @par Failure:
  * A joint that does not exist, a number that is not finite, a calibre that is not positive, a bone that
  * would lose its length, lines that are no bones, a posed skeleton with other bones: one error and no output.

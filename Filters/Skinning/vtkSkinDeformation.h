@@ -13,13 +13,13 @@
  * - 1: vtkPolyData, the skeleton at rest that the weights were made with: points are joints, lines of two
  *   points bones, in the order of the indices.
  * - 2: vtkPolyData, the skeleton posed: the same cells, other points. Cell data `BoneRotation`
- *   (4 components w x y z) and `BoneTwist` (radians), point data `CalibreFactor`: all optional. Without
+ *   (double[4], w x y z) and `BoneTwist` (double, radians), point data `CalibreFactor` (double): all optional. Without
  *   rotations bones turn with the least twist. May have time; the output has the same.
  *
  * @par Output port:
  * - 0: the mesh with moved points. Cells and all other arrays are the input's own, but for its active
- *   normals, which would be wrong. Point data `Displacement` (mm, from rest), `Velocity` (optional, mm/s),
- *   `Normals` (optional, unit, of the moved triangles). Cell data `VolumeRatio` (double,
+ *   normals, which would be wrong. Point data `Displacement` (float[3], double[3] with DoublePrecision; mm, from rest), `Velocity`
+ *   (the same, mm/s, optional), `Normals` (the same, unit, of the moved triangles, optional). Cell data `VolumeRatio` (double,
  *   tetrahedra: signed volume / that at rest; NaN for other cells) when tetrahedra are checked. Field
  *   data: `InvertedTetrahedra` (vtkIdType, cells that are left, with a warning), `RepairedTetrahedra`
  *   (vtkIdType, how many were repaired), that of the mesh and of the pose.
@@ -27,6 +27,10 @@
  * Points move by themselves: pieces of a mesh may be on different ranks, each has the whole skeleton
  * (normals at the seams of pieces are those of the piece). Blocks of a composite mesh are moved one by
  * one; blocks that are no point sets are passed on as they are.
+ *
+ * @par Time:
+ * TIME_STEPS and TIME_RANGE are those of the pose (input 2). A request goes to the pose; mesh and skeleton at rest are
+ * read once.
  *
  * @par Failure:
  * A missing or wrong array, a point without weights, an index of a bone that does not exist, a pose

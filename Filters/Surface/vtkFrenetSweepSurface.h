@@ -27,23 +27,30 @@
  * their size (coronary::MeasureContours); it takes the place of ContourArrayName.
  *
  * @par Output ports:
- * - 0, vtkPolyData: the surface, triangles. Point data `GroupIds` (int), `Abscissas` (mm from the
- *   root along the axes), `MaximumInscribedSphereRadius` (of the vessel, mm), `WallCurvature`
- *   (kappa, 1/mm), `EdgeLength` (h, mm), `Normals` (the active normals, unit, outwards). Cell data
- *   `CellEntityIds` (1 wall, 2.. caps: inlets first), `GroupIds`, and what the input has of
+ * - 0, vtkPolyData: the surface, triangles. Point data `GroupIds` (int), `Abscissas` (double, mm
+ *   from the root along the axes), `MaximumInscribedSphereRadius` (double, mm, of the vessel),
+ *   `WallCurvature` (double, kappa, 1/mm), `EdgeLength` (double, h, mm), `Normals` (double[3], the
+ *   active normals, unit, outwards). Cell data `CellEntityIds` (int: 1 wall, 2.. caps, inlets first),
+ *   `GroupIds` (int), and what the input has of
  *   `SegmentIds` (int) and `SegmentLabel` (string). Field data: that of the input.
  * - 1, vtkMultiBlockDataSet: a vtkStructuredGrid for each branch, the tube alone, whatever joins
  *   it: PatchSamples + 1 points around (the first once more as the last), patches along it in the
  *   second direction. Block names: `SegmentLabel`, or "Group n". Point data `Abscissas`,
- *   `MaximumInscribedSphereRadius`, `PatchCentre`, `FrenetTangent`, `FrenetNormal`,
- *   `FrenetBinormal` (double[3]), `Curvature`, `Torsion`, `FrameTwist` (of the frame against least
- *   twist; 1/mm), the same for all points of a patch. Field data `GroupIds`.
+ *   `MaximumInscribedSphereRadius` (double, mm), `PatchCentre` (double[3], mm), `FrenetTangent`,
+ *   `FrenetNormal`, `FrenetBinormal` (double[3], unit), `Curvature`, `Torsion` (double, 1/mm),
+ *   `FrameTwist` (double, 1/mm, of the frame against least twist), the same for all points of a
+ *   patch. Field data `GroupIds` (int).
  * - 2, vtkPolyData: the inlets and outlets as vertices, in the order of their ids, also when they
- *   are open. Point data `CellEntityIds`, `GroupIds`, `CapNormal` (double[3], unit, outwards),
- *   `MaximumInscribedSphereRadius`, `IsInlet` (0 or 1), `SegmentLabel`.
+ *   are open. Point data `CellEntityIds`, `GroupIds` (int), `CapNormal` (double[3], unit,
+ *   outwards), `MaximumInscribedSphereRadius` (double, mm), `IsInlet` (int, 0 or 1), `SegmentLabel`
+ *   (string).
  *
  * The output is whole in piece 0 and empty, with all arrays, in every other piece. Blocks of a
  * composite input are treated one by one.
+ *
+ * @par Time:
+ * Passes through from input 0: every time step is computed by itself. Two steps have
+ * different triangles; for one topology move one surface with vtkSkinDeformation.
  *
  * @par Failure:
  * A setting out of range, a missing array, a radius that is not positive, a branch without length,
@@ -51,6 +58,9 @@
  * no output. Input without lines gives an empty output. A branch too short to leave its parent is
  * lengthened or left out, with a warning that says where. An aborted execution leaves an empty
  * output and is started anew by the next request.
+ *
+ * @par Sources:
+ * Eq. 4 of Wang et al., arXiv 2503.02218, for the size of the triangles.
  *
  * @sa coronary::SweepVesselTree, vtkCoronaryTreeTopology, docs/surface.md
  */

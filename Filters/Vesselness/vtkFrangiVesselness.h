@@ -38,11 +38,18 @@
  * `VesselnessC` (double, HU, method Frangi) or `VesselnessLambda3` (double, HU, one value a scale,
  * method Jerman).
  *
+ * @par Time:
+ * Passes through from input 0. The automatic C is measured at one time and serves all.
+ *
  * @par Failure:
  * A setting out of its range, a missing, non-numeric or multi-component array, an image of fewer
  * than three dimensions, a mask on another grid: one error that names it, and no output. A SigmaMin
  * below half the largest voxel spacing is a warning. An aborted execution leaves an empty output
  * and is started anew by the next request.
+ *
+ * @par Sources:
+ * Frangi et al., MICCAI 1998, LNCS 1496:130. Sato et al., Med Image Anal 1998;2:143. Jerman et al., IEEE
+ * Trans Med Imaging 2016;35:2107.
  *
  * @sa coronary::MultiscaleVesselness, docs/vesselness.md
  */

@@ -35,6 +35,10 @@
  * The whole image is needed at once, so every MPI rank works on all of it and gives its piece;
  * outputs 1 and 2 are in piece 0 only. Time passes through. Same bits on any number of threads.
  *
+ * @par Time:
+ * Passes through from input 0: every time step is computed by itself. Put vtkReferencePhase
+ * before it for what is made once for a heart.
+ *
  * @par Failure:
  * A setting out of its range, a missing or multi-component array, an image of fewer than three
  * dimensions, a vesselness on another grid, a seed outside the image, no seed and no ostium found:

@@ -29,6 +29,9 @@
  * The output is whole in piece 0, and empty in every other piece. An empty input gives an empty
  * output.
  *
+ * @par Time:
+ * Passes through from input 0: every time step is computed by itself.
+ *
  * @par Failure:
  * A setting out of range, a coordinate that is not finite: one error, and no output. What can not be
  * put right is a warning. An aborted execution leaves an empty output and is started anew by the next

@@ -29,6 +29,10 @@
  * The output is whole in piece 0, and empty in every other piece. An empty input gives an empty
  * output.
  *
+ * @par Time:
+ * Passes through from input 0: every time step is computed by itself. Two steps have
+ * different tetrahedra; for one topology move one mesh with vtkSkinDeformation.
+ *
  * @par Failure:
  * A surface that is open, not a manifold, doubled, without volume or cuts itself, cells that are no
  * triangles, a skeleton point outside, a setting out of range, a backend that is not there or fails

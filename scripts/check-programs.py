@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""Whether the documentation and the programs' own --help say the same.
+
+Usage: check-programs.py BIN_DIRECTORY
+
+- every option of every command has its place in the page that documents it, with its default, and every option in a
+  table there exists;
+- every command line in any page, in a code block or in backticks, names a program, command and options that exist.
+Exit code 1 when one does not.
+"""
+import glob
+import os
+import re
+import shlex
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+# Where the options of a program are documented; of the commands of coronary-pipeline in a section each.
+PAGES = {"coronary-simulator": "docs/simulator-files.md", "coronary-device-emulator": "docs/device-protocol.md"}
+COMMANDS_PAGE = "docs/programs.md"
+OPTION = re.compile(r"(?<![\w/-])--[a-z][\w-]*")
+# Not in every build tree: they need Google's benchmark library or Qt.
+OPTIONAL = {"skin-deformation-benchmark", "motion-benchmark", "vessel-wall-benchmark"}
+
+
+class Programs:
+    """The programs of a build tree, by their --help."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.texts = {}
+
+    def exists(self, program):
+        return os.access(os.path.join(self.folder, program), os.X_OK)
+
+    def help(self, program, command=""):
+        """What --help prints; empty when there is no such command."""
+        if (program, command) not in self.texts:
+            line = [os.path.join(self.folder, program)] + ([command] if command else []) + ["--help"]
+            done = subprocess.run(line, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60, check=False)
+            self.texts[program, command] = done.stdout if done.returncode == 0 else ""
+        return self.texts[program, command]
+
+    def commands(self, program):
+        """Names of the subcommands."""
+        part = self.help(program).partition("Subcommands:")[2]
+        return re.findall(r"^  ([a-z][\w-]*)", part, re.M)
+
+    def options(self, program, command=""):
+        """{option: default or None} without --help and --version."""
+        found = re.findall(r"^\s+(?:-\w,)?(--[a-z][\w-]*)([^\n]*)", self.help(program, command), re.M)
+        result = {}
+        for name, rest in found:
+            default = re.search(r"^[^\n]*?\S=(\[[^\]]*\]|[^\s,]+)", rest.split("  ")[0])
+            if name not in ("--help", "--help-all", "--version"):
+                result[name] = default.group(1) if default else None
+        return result
+
+
+def read(path):
+    with open(os.path.join(ROOT, path), encoding="utf-8") as file:
+        return file.read()
+
+
+def sections(text):
+    """{title: text} of the ### sections of a page."""
+    parts = re.split(r"^###? (.*)$", text, flags=re.M)
+    return dict(zip(parts[1::2], parts[2::2]))
+
+
+def rows_with(option, text):
+    """Rows of tables whose first cell names the option."""
+    return [line for line in text.splitlines()
+            if line.startswith("|") and re.search(r"%s(?![\w-])" % option, line.split("|")[1])]
+
+
+def check_command(programs, program, command, text, inherited, page, complaints):
+    """The options of a command against its text."""
+    where = "%s: %s" % (page, " ".join(filter(None, [program, command])))
+    options = programs.options(program, command)
+    for option, default in options.items():
+        if not re.search(r"%s(?![\w-])" % option, text):
+            if not inherited or not re.search(r"%s(?![\w-])" % option, inherited):
+                complaints.append("%s: %s is not there" % (where, option))
+            continue
+        rows = rows_with(option, text)
+        cells = rows[0].split("|") if rows else []
+        alone = rows and len(OPTION.findall(cells[1])) == 1
+        if default and alone and re.fullmatch(r"[-+.\de\[\],]+", default):
+            for value in default.strip("[]").split(","):
+                written = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", rows[0])]
+                if float(value) not in written:
+                    complaints.append("%s: the default %s of %s is not there" % (where, value, option))
+    for line in text.splitlines():
+        if line.startswith("| `--"):
+            for option in OPTION.findall(line.split("|")[1]):
+                if option not in options:
+                    complaints.append("%s: %s does not exist" % (where, option))
+
+
+def command_lines(text):
+    """Command lines in code blocks and in backticks."""
+    for block in re.findall(r"^```(?:sh|bash|console)?\n(.*?)^```", text, re.M | re.S):
+        yield from re.sub(r"\\\n\s*", " ", block).splitlines()
+    yield from (line.strip() for line in re.findall(r"^    (?:\S.*)$", text, re.M))
+    for span in re.findall(r"(?<!`)`([^`]+)`(?!`)", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)):
+        yield " ".join(span.split())
+
+
+def check_line(programs, line, page, complaints):
+    """Programs, commands and options of a command line."""
+    try:
+        words = shlex.split(line, comments=True)
+    except ValueError:
+        return
+    names = [(index, os.path.basename(word)) for index, word in enumerate(words)]
+    for index, name in names:
+        if not re.fullmatch(r"coronary-(pipeline|simulator|device-emulator)|validate-[\w-]+|[\w-]+-benchmark", name):
+            continue
+        if words[index].startswith("scripts/") or not programs.exists(name):
+            if words[index] == name and name not in OPTIONAL and index == 0:
+                complaints.append("%s: there is no program %s" % (page, name))
+            return
+        rest = words[index + 1:]
+        command = ""
+        if programs.commands(name) and rest and re.fullmatch(r"[a-z-]+", rest[0]) and not rest[0].startswith("-"):
+            command = rest[0]
+            if command not in programs.commands(name):
+                complaints.append("%s: %s has no command %s" % (page, name, command))
+                return
+        for option in [word.split("=")[0] for word in rest if OPTION.fullmatch(word.split("=")[0])]:
+            if not re.search(r"%s(?![\w-])" % option, programs.help(name, command)) and "benchmark_" not in option:
+                complaints.append("%s: %s has no option %s: %s" % (page, name, option, line))
+        return
+
+
+def main(arguments):
+    if len(arguments) != 1 or not os.path.isdir(arguments[0]):
+        sys.stderr.write(__doc__)
+        return 2
+    programs = Programs(arguments[0])
+    complaints = []
+    parts = sections(read(COMMANDS_PAGE))
+    for command in programs.commands("coronary-pipeline"):
+        text = parts.get(command, "")
+        inherited = parts.get("phantom", "") if "Takes the options of" in text else ""
+        check_command(programs, "coronary-pipeline", command, text, inherited, COMMANDS_PAGE, complaints)
+        if "`coronary-pipeline %s`" % command not in read(COMMANDS_PAGE):
+            complaints.append("%s: %s is not in the table of commands" % (COMMANDS_PAGE, command))
+    for program, page in PAGES.items():
+        if programs.exists(program):
+            check_command(programs, program, "", read(page), "", page, complaints)
+    pages = ["README.md"] + sorted(os.path.relpath(path, ROOT) for path in glob.glob(os.path.join(ROOT, "docs", "*.md")))
+    lines = 0
+    for page in pages:
+        for line in command_lines(read(page)):
+            check_line(programs, line, page, complaints)
+            lines += 1
+    print("\n".join(complaints) if complaints
+          else "ok: options of the programs; %d lines of code on %d pages" % (lines, len(pages)))
+    return 1 if complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
