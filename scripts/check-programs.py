@@ -89,7 +89,9 @@ def check_command(programs, program, command, text, inherited, page, complaints)
         alone = rows and len(OPTION.findall(cells[1])) == 1
         if default and alone and re.fullmatch(r"[-+.\de\[\],]+", default):
             for value in default.strip("[]").split(","):
-                written = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", rows[0])]
+                # In the column of defaults, where the table has one.
+                text_of_default = cells[3] if len(cells) >= 6 else rows[0]
+                written = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", text_of_default)]
                 if float(value) not in written:
                     complaints.append("%s: the default %s of %s is not there" % (where, value, option))
     for line in text.splitlines():

@@ -22,6 +22,7 @@ STAGES = [("Filters/Phantom", "Phantom"), ("Readers", "Readers"), ("Filters/Comm
           ("Filters/Vesselness", "Vesselness and segmentation"), ("Filters/Centerline", "Centerlines"),
           ("Filters/Surface", "Surface"), ("Filters/Volume", "Volume"), ("Filters/Skinning", "Skeleton and weights"),
           ("Filters/Motion", "Motion"), ("Filters/Metrics", "Metrics"), ("Writers", "Writers")]
+INHERITED = ("SetInputArrayToProcess",)
 TIMES = ("TimestepValues", "TimeRange")
 UNIT = re.compile(
     r"(?<![\w`'])(mm\^3|mm\^2|mm/s|1/mm|mm|HU per cm|HU|ms|[Ss]econds|s|degrees|radians|MPa|percent|voxels"
@@ -40,6 +41,12 @@ Proxy = namedtuple("Proxy", "group label python menu inputs outputs properties f
 def words(text):
     """The text on one line."""
     return " ".join((text or "").split())
+
+
+def spaced(text):
+    """With an empty line between a list and the paragraphs around it, as Markdown wants it."""
+    text = re.sub(r"(?m)^([-\d ] .*)\n(?=[A-Z])", r"\1\n\n", text)
+    return re.sub(r"(?m)^([^-\s|].*)\n(?=- )", r"\1\n\n", text)
 
 
 def python_name(label):
@@ -255,11 +262,13 @@ def parse_arrays(title, text):
     port, place, before = single.group(1) if single else "0", "", ""
     rows, waiting = [], []
     pattern = re.compile(
-        r"^- (?:port )?(?P<port>\d)\b|(?P<place>[Pp]oint\s+(?:data|array)|[Cc]ell\s+(?:data|array)|[Ff]ield\s+data|Columns)"
+        r"^- (?:port )?(?P<port>\d)\b|(?P<paragraph>\n\n(?=[A-Z]))|(?P<place>[Pp]oint\s+(?:data|array)|[Cc]ell\s+(?:data|array)|[Ff]ield\s+data|Columns)"
         r"|`(?P<name>\w+)`|\((?P<type>[^()]*(?:\([^()]*\)[^()]*)*)\)(?P<colon>:?)|(?P<end>[.;](?=\s|$))", re.M)
-    for match in pattern.finditer(text):
+    for match in pattern.finditer(spaced(text)):
         if match.group("port"):
             port, place, waiting, before = match.group("port"), "", [], ""
+        elif match.group("paragraph"):
+            port, place, waiting, before = "all" if re.search(r"^- \d", text, re.M) else port, "", [], ""
         elif match.group("place"):
             word = match.group("place").split()[0].lower()
             place, waiting, before = {"columns": "column"}.get(word, word), [], ""
@@ -280,7 +289,7 @@ def parse_arrays(title, text):
             else:
                 for row in waiting if TYPE.match(kind) else waiting[-1:]:
                     row[3] = kind if TYPE.match(kind) or not row[3] else row[3] + ", " + kind
-            waiting = waiting if not TYPE.match(kind) and not everything else []
+            waiting = waiting if not (TYPE.match(kind) or everything or before) else []
         elif match.group("end"):
             waiting = []
             before = "" if match.group("end") == "." else before
@@ -327,10 +336,8 @@ class Pages:
             if word in self.headers and word != own:
                 return "[%s](%s.md)" % (word, word)
             return "`%s`" % word
-        text = re.sub(r"(?m)^([-\d ] .*)\n(?=[A-Z])", r"\1\n\n", text)
-        text = re.sub(r"(?m)^([^-\s|].*)\n(?=- )", r"\1\n\n", text)
         text = re.sub(r"`[^`]*`|docs/[\w-]+\.md|coronary::\w+|\bvtk[A-Z]\w+", link, text)
-        return re.sub(r"<(?=[A-Za-z/])", "&lt;", text)
+        return re.sub(r"<(?=[A-Za-z/])", "&lt;", spaced(text))
 
     def cell(self, text, own=""):
         return words(self.prose(text, own)).replace("|", "\\|")
@@ -376,7 +383,7 @@ class Pages:
     @staticmethod
     def where(header, proxies):
         """How the class is reached."""
-        rows = ["| | |", "|---|---|", "| C++ | `#include <%s.h>`, module `%s` |" % (
+        rows = ["| in | as |", "|---|---|", "| C++ | `#include <%s.h>`, module `%s` |" % (
             header.name, "DynamicCoronary::Coronary" + header.folder.split("/")[-1])]
         for proxy in proxies:
             if proxy.group == "writers":
@@ -423,11 +430,17 @@ class Pages:
                 continue
             direction = "in" if title.startswith("Input") else "out"
             for port, place, array, kind in parse_arrays(title, text):
-                rows.append("| %s %s | %s | `%s` | %s |" % (direction, port, place, array, self.cell(kind, header.name)))
+                start = "| %s&nbsp;%s | %s |" % (direction, port, place)
+                end = "| %s |" % self.cell(kind, header.name)
+                if rows and rows[-1][0] == start and rows[-1][2] == end:
+                    rows[-1][1] += ", `%s`" % array
+                else:
+                    rows.append([start, "`%s`" % array, end])
                 self.arrays.setdefault(array, []).append((header.name, direction, place, kind))
         if not rows:
             return []
-        return ["### Arrays", "", "| port | on | array | type, unit, meaning |", "|---|---|---|---|"] + rows + [""]
+        return ["### Arrays", "", "| port | on | arrays | type, unit, meaning |", "|---|---|---|---|"] \
+            + [" ".join(row) for row in rows] + [""]
 
     def unit(self, header, prop):
         """The unit that the proxy's or the header's sentence names; pipeline time is in fractions of R-R."""
@@ -468,6 +481,8 @@ class Pages:
             if prop.element.get("information_only") == "1":
                 continue
             self.compare_default(header, prop)
+            if prop.command not in INHERITED and not self.setter_text(header, prop.command):
+                self.complain(header, "no documented %s, which ServerManagerXML/%s calls" % (prop.command, proxy.file))
             label = prop.label + {"advanced": " *(advanced)*", "never": " *(hidden)*"}.get(prop.visibility, "")
             start = "| %s | `%s` | `%s` | %s |" % (label, prop.python, prop.command, self.cell(prop.default))
             meaning = self.cell(prop.meaning, header.name)

@@ -1,42 +1,49 @@
 #!/usr/bin/env bash
-# Runs the programs that measure and validate, and leaves their tables in a folder: what
-# docs/validation.md reports.
+# Runs the programs that measure and validate, and leaves their tables in a folder: what docs/validation.md and
+# the pages that it names report.
 set -euo pipefail
 
 usage() {
   cat <<'EOF'
-Usage: scripts/validate.sh [--build DIR] [--output DIR] [--list] [TABLE ...]
+Usage: scripts/validate.sh [--build DIR] [--output DIR] [--quick] [--list] [TABLE ...]
   --build DIR   build tree with the programs (default: build/paraview)
   --output DIR  where the tables go, one Markdown file each (default: validation-output)
+  --quick       a small form of each table, a quarter of an hour in all: whether everything runs and agrees. Its numbers
+                are not those of the documentation, and its times are worth nothing
   --list        name the tables with their commands, run nothing
-Without TABLE all of them, which takes an hour or so. Times are worth something on a quiet machine only.
-Table 1 of the paper on ten phantoms: scripts/validate-evaluation.sh.
+Without TABLE all of them, which takes hours. Times are worth something on a quiet machine only.
 Exit code 1 when a program fails or a target is missed.
 EOF
 }
 
-# name: program and its arguments
+# name | command | command of the quick form, empty: the same, -: none. What begins with scripts/ is one of ours.
 tables=(
-  "vesselness-itk: vesselness-benchmark itk --repeats 3 --strict"
-  "vesselness-clinical: vesselness-benchmark clinical --strict"
-  "vesselness-methods: vesselness-benchmark methods"
-  "vesselness-scales: vesselness-benchmark scales"
-  "vesselness-instructions: vesselness-benchmark instructions"
-  "vesselness-agreement: vesselness-benchmark agreement"
-  "segmentation: validate-segmentation"
-  "centerline-speed: centerline-benchmark --strict"
-  "centerline: validate-centerline --details --invariance"
-  "centerline-coarse: validate-centerline --seeds 205..214 --spacing 0.6"
-  "surface: validate-surface"
-  "volume: validate-volume"
-  "skin-weights: skin-weight-benchmark --sizes 0 1 2 5 3 4"
-  "skin-deformation: skin-deformation-benchmark --benchmark_repetitions=5 --benchmark_report_aggregates_only=true"
-  "mesh-distance: mesh-distance-benchmark --strict"
-  "volume-cgal: validate-volume --backend CGAL --seeds 3 --variants plain"
-  "motion: validate-motion --seeds 101..110 --details"
-  "motion-ideal: validate-motion --seeds 101..110 --window 0"
-  "motion-140ms: validate-motion --seeds 101..110 --window 140"
-  "motion-lost: validate-motion --seeds 101..110 --lost"
+  "vesselness-itk | vesselness-benchmark itk --repeats 3 --strict | vesselness-benchmark itk --size 96 --repeats 1"
+  "vesselness-clinical | vesselness-benchmark clinical --strict | vesselness-benchmark clinical --clinical-size 128 128 64 --repeats 1"
+  "vesselness-methods | vesselness-benchmark methods | vesselness-benchmark methods --size 96 --repeats 1"
+  "vesselness-scales | vesselness-benchmark scales | vesselness-benchmark scales --size 96 --repeats 1"
+  "vesselness-instructions | vesselness-benchmark instructions | vesselness-benchmark instructions --size 96 --repeats 1"
+  "vesselness-agreement | vesselness-benchmark agreement | vesselness-benchmark agreement --agreement-size 64"
+  "segmentation | validate-segmentation | validate-segmentation --quick"
+  "centerline-speed | centerline-benchmark --strict | centerline-benchmark --size 96 --repeats 1"
+  "centerline | validate-centerline --details --invariance | validate-centerline --quick"
+  "centerline-coarse | validate-centerline --seeds 205..214 --spacing 0.6 | -"
+  "centerline-noisy | validate-centerline --window 140 --noise 40 --spacing 0.5 | -"
+  "surface | validate-surface | validate-surface --quick"
+  "surface-unseen | validate-surface --seeds 21..50 --variants varied | -"
+  "volume | validate-volume | validate-volume --quick"
+  "volume-wall | validate-volume --surface truth --seeds 7..7 --variants plain --phantoms-only | -"
+  "volume-cgal | validate-volume --backend CGAL --seeds 3 --variants plain | -"
+  "skin-weights | skin-weight-benchmark --sizes 0 1 2 5 6 3 4 | skin-weight-benchmark --sizes 0 --libigl-up-to 0"
+  "skin-deformation | skin-deformation-benchmark --benchmark_repetitions=5 --benchmark_report_aggregates_only=true | skin-deformation-benchmark --benchmark_min_time=0.01"
+  "mesh-distance | mesh-distance-benchmark --strict | mesh-distance-benchmark --size 10000 --repeats 1"
+  "motion | validate-motion --seeds 101..110 --details | validate-motion --quick"
+  "motion-ideal | validate-motion --seeds 101..110 --window 0 | -"
+  "motion-140ms | validate-motion --seeds 101..110 --window 140 | -"
+  "motion-lost | validate-motion --seeds 101..110 --lost | -"
+  "motion-measured-heart | validate-real-motion | validate-real-motion --quick"
+  "evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation --seeds 101 --lost none --spacing 0.6"
+  "simulator | scripts/validate-simulator.sh BUILD | scripts/validate-simulator.sh --quick BUILD"
 )
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
@@ -44,6 +51,7 @@ build="$root/build/paraview"
 output="$root/validation-output"
 wanted=()
 list=no
+quick=no
 while [ $# -gt 0 ]; do
   case "$1" in
     --build | --output)
@@ -56,6 +64,7 @@ while [ $# -gt 0 ]; do
       ;;
     --build=?*) build="${1#*=}" ;;
     --output=?*) output="${1#*=}" ;;
+    --quick) quick=yes ;;
     --list) list=yes ;;
     -h | --help)
       usage
@@ -70,59 +79,73 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-if [ "$list" = yes ]; then
-  printf '%s\n' "${tables[@]}"
-  exit 0
-fi
 
-chosen=()
-if [ ${#wanted[@]} -eq 0 ]; then
-  chosen=("${tables[@]}")
-fi
+# The line of a table -> its name, its command in the form that is wanted.
+name_of() { echo "${1%% | *}"; }
+command_of() {
+  local rest="${1#* | }"
+  local full="${rest%% | *}" small="${rest#* | }"
+  if [ "$quick" = yes ]; then echo "$small"; else echo "$full"; fi
+}
+
 for name in ${wanted[@]+"${wanted[@]}"}; do
   found=no
   for table in "${tables[@]}"; do
-    if [ "${table%%:*}" = "$name" ]; then
-      chosen+=("$table")
-      found=yes
-    fi
+    [ "$(name_of "$table")" != "$name" ] || found=yes
   done
   if [ "$found" = no ]; then
     echo "validate: there is no table '$name'; --list names them" >&2
     exit 2
   fi
 done
-# Needs Google's benchmark library, which only developers have.
-if [ ${#wanted[@]} -eq 0 ] && [ ! -x "$build/bin/skin-deformation-benchmark" ]; then
-  echo "validate: without skin-deformation, its program was not built" >&2
-  kept=()
-  for table in "${chosen[@]}"; do
-    [ "${table%%:*}" = skin-deformation ] || kept+=("$table")
-  done
-  chosen=("${kept[@]}")
-fi
-# All of them first: nobody wants to hear of it after an hour.
-for table in "${chosen[@]}"; do
-  read -r program _ <<<"${table#*: }"
-  if [ ! -x "$build/bin/$program" ]; then
+
+chosen=()
+for table in "${tables[@]}"; do
+  name="$(name_of "$table")"
+  command="$(command_of "$table")"
+  if [ "$command" = - ]; then
+    continue
+  fi
+  if [ ${#wanted[@]} -gt 0 ] && [[ " ${wanted[*]} " != *" $name "* ]]; then
+    continue
+  fi
+  if [ "$list" = yes ]; then
+    echo "$name: $command"
+    continue
+  fi
+  program="${command%% *}"
+  if [[ "$program" != scripts/* && ! -x "$build/bin/$program" ]]; then
+    # Needs Google's benchmark library, which only developers have.
+    if [ "$program" = skin-deformation-benchmark ] && [ ${#wanted[@]} -eq 0 ]; then
+      echo "validate: without skin-deformation, its program was not built" >&2
+      continue
+    fi
+    # All of them are looked for first: nobody wants to hear of it after an hour.
     echo "validate: no $build/bin/$program: build the tree first (cmake --build --preset paraview)" >&2
     exit 1
   fi
+  chosen+=("$table")
 done
+if [ "$list" = yes ]; then
+  exit 0
+fi
 
 exec </dev/null
 mkdir -p "$output"
 failed=()
-for table in "${chosen[@]}"; do
-  name="${table%%:*}"
-  command="${table#*: }"
+for table in ${chosen[@]+"${chosen[@]}"}; do
+  name="$(name_of "$table")"
+  command="$(command_of "$table")"
   read -ra words <<<"$command"
+  words=("${words[@]/#BUILD/$build}")
+  words=("${words[@]/#OUTPUT/$output}")
+  if [[ "${words[0]}" == scripts/* ]]; then words[0]="$root/${words[0]}"; else words[0]="$build/bin/${words[0]}"; fi
   echo "== $name: $command"
   # Under another name until it is complete.
   partial="$output/$name.md.partial"
   # shellcheck disable=SC2016 # The backticks are Markdown.
   printf '`%s`\n\n' "$command" >"$partial"
-  if ! "$build/bin/${words[0]}" "${words[@]:1}" >>"$partial"; then
+  if ! "${words[@]}" >>"$partial"; then
     failed+=("$name")
     printf '\n**Failed, or a target is missed.**\n' >>"$partial"
   fi

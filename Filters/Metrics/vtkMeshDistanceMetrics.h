@@ -24,7 +24,7 @@
  *   both), `GroupId` (vtkIdType, -1 for all), then (double, mm, NaN where it does not apply): `HD`,
  *   `HD_AB`, `HD_BA`, `HD95`, `HD95_AB`, `HD95_BA`, `HD95_pooled`, `MSD`, `MSD_BA`, `MSD_area`,
  *   `MSD_area_AB`, `MSD_area_BA`, `RMS`, `RMS_AB`, `RMS_BA`, `error_bound` (what HD can be too
- *   small by), `quadrature_error` (estimate, of MSD_area), `Area_A`, `Area_B` (mm^2). A branch is
+ *   small by), `quadrature_error` (estimate, of MSD_area), `Area_A`, `Area_B` (double, mm^2). A branch is
  *   compared with the whole of the other surface; `HD`, `HD95`, `MSD`, `MSD_area`, `RMS` of its row
  *   are its own side's.
  *
