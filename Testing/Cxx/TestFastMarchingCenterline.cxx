@@ -249,7 +249,7 @@ TEST(FastMarchingCenterline, PointsThatAreSetAreAsGoodAsConnectedOnes)
   {
     Messages messages(set);
     set->Update();
-    EXPECT_TRUE(messages.HasError("there is no seed"));
+    EXPECT_TRUE(messages.HasError("no seed: connect"));
     set->SetSeedPoint(0, seed.x(), seed.y(), seed.z());
     EXPECT_TRUE(messages.HasError("no seed or target point 0"));
   }
