@@ -77,7 +77,9 @@ const T* ValuesAs(vtkDataArray* array, std::vector<T>& copy)
   return copy.data();
 }
 
-std::vector<Vector3> PointsOf(vtkInformationVector* input)
+/// The points of an input, if there is one, and others.
+std::vector<Vector3> PointsOf(
+  vtkInformationVector* input, const std::vector<std::array<double, 3>>& others)
 {
   std::vector<Vector3> points;
   vtkPointSet* set = input->GetNumberOfInformationObjects() > 0
@@ -86,6 +88,10 @@ std::vector<Vector3> PointsOf(vtkInformationVector* input)
   for (vtkIdType n = 0; set && n < set->GetNumberOfPoints(); ++n)
   {
     points.emplace_back(set->GetPoint(n));
+  }
+  for (const std::array<double, 3>& point : others)
+  {
+    points.emplace_back(point.data());
   }
   return points;
 }
@@ -193,6 +199,50 @@ vtkFastMarchingCenterline::vtkFastMarchingCenterline()
 
 vtkFastMarchingCenterline::~vtkFastMarchingCenterline() = default;
 
+void vtkFastMarchingCenterline::SetSeedPoint(int index, double x, double y, double z)
+{
+  this->SetPoint(this->SeedPoints, index, { x, y, z });
+}
+
+void vtkFastMarchingCenterline::SetNumberOfSeedPoints(int count)
+{
+  this->SetNumberOfPoints(this->SeedPoints, count);
+}
+
+void vtkFastMarchingCenterline::SetTargetPoint(int index, double x, double y, double z)
+{
+  this->SetPoint(this->TargetPoints, index, { x, y, z });
+}
+
+void vtkFastMarchingCenterline::SetNumberOfTargetPoints(int count)
+{
+  this->SetNumberOfPoints(this->TargetPoints, count);
+}
+
+void vtkFastMarchingCenterline::SetPoint(
+  Points& points, int index, const std::array<double, 3>& point)
+{
+  if (index < 0 || index >= static_cast<int>(points.size()))
+  {
+    vtkErrorMacro("There is no seed or target point " << index << " of " << points.size());
+    return;
+  }
+  if (points[index] != point)
+  {
+    points[index] = point;
+    this->Modified();
+  }
+}
+
+void vtkFastMarchingCenterline::SetNumberOfPoints(Points& points, int count)
+{
+  if (count >= 0 && count != static_cast<int>(points.size()))
+  {
+    points.resize(static_cast<std::size_t>(count), { 0.0, 0.0, 0.0 });
+    this->Modified();
+  }
+}
+
 int vtkFastMarchingCenterline::FillInputPortInformation(int port, vtkInformation* info)
 {
   info->Remove(INPUT_REQUIRED_DATA_TYPE());
@@ -205,7 +255,7 @@ int vtkFastMarchingCenterline::FillInputPortInformation(int port, vtkInformation
   {
     info->Set(INPUT_REQUIRED_DATA_TYPE(), port < 3 ? "vtkPointSet" : "vtkImageData");
   }
-  if (port > 1)
+  if (port > 0)
   {
     info->Set(INPUT_IS_OPTIONAL(), 1);
   }
@@ -310,8 +360,10 @@ void vtkFastMarchingCenterline::Execute(
     "SurfaceSpacing must not be negative");
 
   coronary::CenterlineInput input;
-  input.seeds = PointsOf(inputs[1]);
-  input.targets = PointsOf(inputs[2]);
+  vtkCoronary::Require(inputs[1]->GetNumberOfInformationObjects() > 0 || !this->SeedPoints.empty(),
+    "there is no seed: connect the Seeds input or set SeedPoints");
+  input.seeds = PointsOf(inputs[1], this->SeedPoints);
+  input.targets = PointsOf(inputs[2], this->TargetPoints);
   settings.findTips = this->FindTips || input.targets.empty();
   settings.thinBranches = this->FollowThinBranches;
   vtkDataObject* data = vtkDataObject::GetData(inputs[0]->GetInformationObject(0));
@@ -586,6 +638,8 @@ void vtkFastMarchingCenterline::Execute(
 void vtkFastMarchingCenterline::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
+  os << indent << "SeedPoints: " << this->SeedPoints.size() << '\n';
+  os << indent << "TargetPoints: " << this->TargetPoints.size() << '\n';
   os << indent << "ImageKind: " << this->ImageKind << '\n';
   os << indent << "AutomaticSpeedThreshold: " << this->AutomaticSpeedThreshold << '\n';
   os << indent << "SpeedThreshold: " << this->SpeedThreshold << '\n';

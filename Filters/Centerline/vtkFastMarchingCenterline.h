@@ -16,8 +16,8 @@
  * @par Input ports:
  * - 0: vtkImageData with a speed (any measure that is greatest on the axes: vesselness) or a mask, or a
  *   vtkPolyData that is a closed surface.
- * - 1: seeds, any vtkPointSet: one point for each tree, its root.
- * - 2, optional: targets, any vtkPointSet.
+ * - 1: seeds, any vtkPointSet: one point for each tree, its root. Optional where SetSeedPoint gives some.
+ * - 2, optional: targets, any vtkPointSet; SetTargetPoint gives more.
  * - 3, optional: the vtkImageData in which lumens are measured (HU), on any grid. Without it the radius is
  *   that of the mask or surface, and on a speed alone a rough one.
  * - 4, optional: a vtkImageData on the voxels of input 0 whose first point array limits a speed image to
@@ -58,7 +58,9 @@
 #include "vtkCoronaryCenterlineModule.h" // for the export macro
 #include "vtkPolyDataAlgorithm.h"
 
+#include <array>  // for std::array
 #include <string> // for std::string
+#include <vector> // for std::vector
 
 class VTKCORONARYCENTERLINE_EXPORT vtkFastMarchingCenterline : public vtkPolyDataAlgorithm
 {
@@ -88,6 +90,18 @@ public:
   void SetTargetConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(2, output); }
   void SetIntensityConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(3, output); }
   void SetMaskConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(4, output); }
+  ///@}
+
+  ///@{
+  /**
+   * Seeds and targets beside those of the inputs 1 and 2, mm. Default none. An index that is not there is an error.
+   */
+  void SetSeedPoint(int index, double x, double y, double z);
+  void SetNumberOfSeedPoints(int count);
+  int GetNumberOfSeedPoints() { return static_cast<int>(this->SeedPoints.size()); }
+  void SetTargetPoint(int index, double x, double y, double z);
+  void SetNumberOfTargetPoints(int count);
+  int GetNumberOfTargetPoints() { return static_cast<int>(this->TargetPoints.size()); }
   ///@}
 
   ///@{
@@ -277,9 +291,15 @@ private:
   vtkFastMarchingCenterline(const vtkFastMarchingCenterline&) = delete;
   void operator=(const vtkFastMarchingCenterline&) = delete;
 
+  using Points = std::vector<std::array<double, 3>>;
+  void SetPoint(Points& points, int index, const std::array<double, 3>& point);
+  void SetNumberOfPoints(Points& points, int count);
+
   /// @param wanted  false: only what an output without branches has
   void Execute(bool wanted, vtkInformationVector** inputs, vtkInformationVector* outputs);
 
+  Points SeedPoints;
+  Points TargetPoints;
   int ImageKind = SpeedImage;
   bool AutomaticSpeedThreshold = true;
   double SpeedThreshold = 0.01;

@@ -233,6 +233,46 @@ TEST(FastMarchingCenterline, MaskWithTargetsAndTheirStatus)
   }
 }
 
+TEST(FastMarchingCenterline, PointsThatAreSetAreAsGoodAsConnectedOnes)
+{
+  const Vector3 seed(2.5, 5.75, 5.75);
+  const Vector3 target(27.0, 5.75, 5.75);
+  vtkNew<vtkFastMarchingCenterline> connected;
+  connected->SetInputDataObject(0, Vessel());
+  connected->SetInputDataObject(1, PointSet({ seed }));
+  connected->SetInputDataObject(2, PointSet({ target }));
+  connected->SetImageKind(vtkFastMarchingCenterline::MaskImage);
+  connected->Update();
+  vtkNew<vtkFastMarchingCenterline> set;
+  set->SetInputDataObject(0, Vessel());
+  set->SetImageKind(vtkFastMarchingCenterline::MaskImage);
+  {
+    Messages messages(set);
+    set->Update();
+    EXPECT_TRUE(messages.HasError("no seed: connect"));
+    set->SetSeedPoint(0, seed.x(), seed.y(), seed.z());
+    EXPECT_TRUE(messages.HasError("no seed or target point 0"));
+  }
+  set->SetNumberOfSeedPoints(1);
+  set->SetSeedPoint(0, seed.x(), seed.y(), seed.z());
+  set->SetNumberOfTargetPoints(1);
+  set->SetTargetPoint(0, target.x(), target.y(), target.z());
+  Messages messages(set);
+  set->Update();
+  EXPECT_TRUE(messages.Errors.empty());
+  ASSERT_GT(set->GetOutput()->GetNumberOfPoints(), 10);
+  ASSERT_EQ(set->GetOutput()->GetNumberOfPoints(), connected->GetOutput()->GetNumberOfPoints());
+  for (vtkIdType n = 0; n < set->GetOutput()->GetNumberOfPoints(); ++n)
+  {
+    EXPECT_EQ(Vector3(set->GetOutput()->GetPoint(n)), Vector3(connected->GetOutput()->GetPoint(n)));
+  }
+  // The same values again are no change.
+  const vtkMTimeType before = set->GetMTime();
+  set->SetNumberOfSeedPoints(1);
+  set->SetSeedPoint(0, seed.x(), seed.y(), seed.z());
+  EXPECT_EQ(set->GetMTime(), before);
+}
+
 TEST(FastMarchingCenterline, RefusalsAndEmptyInput)
 {
   vtkNew<vtkFastMarchingCenterline> filter;

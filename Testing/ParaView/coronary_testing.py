@@ -166,8 +166,10 @@ def digest(data):
         lines.append("%s %s" % (name, hashlib.sha256(values).hexdigest()))
 
     add("points", data.GetPoints().GetData())
-    cells = data.GetLines() if data.IsA("vtkPolyData") else data.GetCells()
-    add("cells", cells.GetConnectivityArray())
+    # A structured grid has no list of its cells.
+    if data.IsA("vtkPolyData") or data.IsA("vtkUnstructuredGrid"):
+        cells = data.GetLines() if data.IsA("vtkPolyData") else data.GetCells()
+        add("cells", cells.GetConnectivityArray())
     for where, attributes in (("point", data.GetPointData()), ("cell", data.GetCellData())):
         for index in range(attributes.GetNumberOfArrays()):
             array = attributes.GetAbstractArray(index)

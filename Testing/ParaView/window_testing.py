@@ -1,4 +1,5 @@
 """What the tests that run inside the ParaView window share."""
+import ctypes
 import os
 import subprocess
 import traceback
@@ -21,3 +22,45 @@ def photograph_desktop(folder, step):
                         os.path.join(folder, "desktop_%s.png" % step)], check=False)
     except FileNotFoundError:
         pass
+
+
+class KeyEvent(ctypes.Structure):
+    """XKeyEvent of Xlib."""
+    _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("send_event", ctypes.c_int),
+                ("display", ctypes.c_void_p), ("window", ctypes.c_ulong), ("root", ctypes.c_ulong),
+                ("subwindow", ctypes.c_ulong), ("time", ctypes.c_ulong), ("x", ctypes.c_int),
+                ("y", ctypes.c_int), ("x_root", ctypes.c_int), ("y_root", ctypes.c_int),
+                ("state", ctypes.c_uint), ("keycode", ctypes.c_uint), ("same_screen", ctypes.c_int),
+                ("room", ctypes.c_long * 24)]
+
+
+class Desktop:
+    """The test's own X server. The play-back's own keys start no shortcuts, and its mouse moves no pointer."""
+
+    def __init__(self):
+        self.x = ctypes.CDLL("libX11.so.6")
+        self.x.XOpenDisplay.restype = ctypes.c_void_p
+        self.x.XDefaultRootWindow.restype = ctypes.c_ulong
+        self.display = ctypes.c_void_p(self.x.XOpenDisplay(None))
+        self.root = self.x.XDefaultRootWindow(self.display)
+
+    def point(self, x, y):
+        """The pointer to a place of the screen."""
+        self.x.XWarpPointer(self.display, 0, ctypes.c_ulong(self.root), 0, 0, 0, 0, int(x), int(y))
+        self.x.XSync(self.display, 0)
+
+    def press(self, name):
+        """A key, pressed and released, for the window under the pointer, which gets the focus."""
+        root, window = ctypes.c_ulong(), ctypes.c_ulong()
+        numbers = [ctypes.byref(ctypes.c_int()) for _ in range(5)]
+        self.x.XQueryPointer(self.display, ctypes.c_ulong(self.root), ctypes.byref(root),
+                             ctypes.byref(window), *numbers)
+        self.x.XSetInputFocus(self.display, window, 2, ctypes.c_ulong(0))
+        self.x.XStringToKeysym.restype = ctypes.c_ulong
+        symbol = ctypes.c_ulong(self.x.XStringToKeysym(name.encode()))
+        code = self.x.XKeysymToKeycode(self.display, symbol)
+        for kind in (2, 3):
+            event = KeyEvent(type=kind, display=self.display, window=window.value, root=self.root,
+                             keycode=code, same_screen=1)
+            self.x.XSendEvent(self.display, window, 1, ctypes.c_long(3), ctypes.byref(event))
+        self.x.XSync(self.display, 0)

@@ -1,0 +1,142 @@
+"""Runs inside the ParaView window, called by the play-back: seeds are picked on a slice, dragged, undone."""
+import os
+import sys
+
+from paraview import simple
+
+folder = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
+sys.path.insert(0, os.environ["DYNAMICCORONARY_TEST_SCRIPTS"])
+# Half the height of what the view shows, mm; the share of the view's width by which the handle is dragged.
+SCALE = 25.0
+DRAG = 0.1
+TIME = 0.75
+# A place of the screen that is in the view, pixels.
+INSIDE = (1000, 500)
+
+seen = {}
+
+
+def make():
+    """A slice of the phantom's image through the left ostium, which is in the middle of the view."""
+    from coronary_testing import IMAGE, OSTIA, fetch
+    phantom = simple.CoronaryPhantom(registrationName="Phantom", Spacing=[1.6, 1.6, 1.6])
+    phase = simple.ReferencePhase(simple.OutputPort(phantom, IMAGE), registrationName="Phase",
+                                  Automatic=0, Time=TIME)
+    seen["ostium"] = list(fetch(phantom, OSTIA, TIME).GetPoint(0))
+    phase.UpdatePipeline(TIME)
+    image = phase.GetDataInformation()
+    bounds, extent = image.GetBounds(), image.GetExtent()
+    share = (seen["ostium"][2] - bounds[4]) / (bounds[5] - bounds[4])
+    view = simple.GetActiveViewOrCreate("RenderView")
+    shown = simple.Show(phase, view)
+    shown.SetRepresentationType("Slice")
+    shown.SliceMode = "XY Plane"
+    shown.Slice = round(extent[4] + share * (extent[5] - extent[4]))
+    seen["height"] = bounds[4] + shown.Slice / (extent[5] - extent[4]) * (bounds[5] - bounds[4])
+    simple.ColorBy(shown, ("POINTS", "HU"))
+    simple.GetColorTransferFunction("HU").RescaleTransferFunction(-200.0, 500.0)
+    simple.SetActiveSource(phase)
+    simple.Render(view)
+
+
+def aim(x=0.0, y=0.0):
+    """The left ostium in the middle of the view, or as far from it as said, in mm."""
+    view = simple.GetActiveView()
+    centre = [seen["ostium"][0] + x, seen["ostium"][1] + y, seen["ostium"][2]]
+    view.CameraParallelProjection = 1
+    view.CameraParallelScale = SCALE
+    view.CameraFocalPoint = centre
+    # From the feet, as radiologists look: the patient's left is on the right.
+    view.CameraPosition = [centre[0], centre[1], centre[2] - 100.0]
+    view.CameraViewUp = [0.0, -1.0, 0.0]
+    simple.Render(view)
+
+
+def point():
+    """The pointer into the view, where a pick wants it; the play-back says where in it the mouse is."""
+    from window_testing import Desktop
+    seen["desktop"] = Desktop()
+    seen["desktop"].point(*INSIDE)
+
+
+def press(key):
+    seen["desktop"].press(key)
+
+
+def unapplied():
+    """The seeds as the panel has them."""
+    seeds = simple.GetActiveSource().SMProxy.GetProperty("SeedPoints")
+    return [seeds.GetUncheckedElement(n) for n in range(seeds.GetNumberOfUncheckedElements())]
+
+
+def near(a, b, tolerance):
+    return len(a) == len(b) and all(abs(x - y) < tolerance for x, y in zip(a, b))
+
+
+def mask_voxels():
+    from coronary_testing import fetch
+    mask = fetch(simple.GetActiveSource(), 0, TIME).GetPointData().GetArray("VesselMask")
+    return sum(bytes(memoryview(mask)))
+
+
+def require_help():
+    """The window of the help has the plugin's pages: it keeps the compiled help of plugins in temporary files."""
+    from coronary_testing import require
+    files = [os.readlink("/proc/self/fd/" + name) for name in os.listdir("/proc/self/fd")
+             if os.path.islink("/proc/self/fd/" + name)]
+    os.write(1, ("open: %s\n" % [f for f in files if ".q" in f]).encode())
+
+
+def look(step):
+    from coronary_testing import require, require_different_pictures, require_picture
+    view = simple.GetActiveView()
+    source = simple.GetActiveSource()
+    ostium = seen["ostium"]
+    state = "%s, ostium %s" % (source.GetXMLName(), ostium)
+    if hasattr(source, "SeedPoints"):
+        state += ", seeds %s, of the panel %s" % (list(source.SeedPoints), unapplied())
+    os.write(1, (step + ": " + state + "\n").encode())
+    width, height = view.ViewSize
+    dragged = [ostium[0] + DRAG * 2.0 * SCALE * width / height, ostium[1]]
+    if step == "created":
+        require(source.GetXMLName() == "VesselSegmentation", state)
+        require(source.AutomaticOstia == 1 and not unapplied(), state)
+    elif step == "added":
+        require(near(unapplied(), view.CameraFocalPoint, 1e-6), state)
+        require(not list(source.SeedPoints), "nothing was applied: " + state)
+    elif step == "picked":
+        # Where the mouse points, on the slice that is seen there.
+        require(near(unapplied()[:2], ostium[:2], 0.3), state)
+        require(abs(unapplied()[2] - seen["height"]) < 0.1, state)
+    elif step == "dragged":
+        require(near(unapplied()[:2], dragged, 0.3), state)
+    elif step == "applied":
+        require(near(list(source.SeedPoints), unapplied(), 1e-9), state)
+        require(near(list(source.SeedPoints)[:2], ostium[:2], 0.3), state)
+        require(mask_voxels() > 100, "%d voxels" % mask_voxels())
+    elif step in ("removed", "undone"):
+        require(bool(list(source.SeedPoints)) == (step == "undone"), state)
+        require(unapplied() == list(source.SeedPoints), "the panel shows others: " + state)
+    elif step == "setting":
+        require(source.GenerateProbability == 1 and list(source.SeedPoints), state)
+    elif step == "gone":
+        require(source is None or source.GetXMLName() != "FrangiVesselness", state)
+    elif step == "again":
+        require(simple.FindSource("FrangiVesselness1") is not None, state)
+    elif step == "help":
+        require_help()
+    picture = os.path.join(folder, "seeds_%s.png" % step)
+    simple.SaveScreenshot(picture, view)
+    require_picture(picture, 0.005)
+    if step == "dragged":
+        require_different_pictures(os.path.join(folder, "seeds_picked.png"), picture, 0.0005)
+
+
+def check(step):
+    from window_testing import check_step
+    check_step(step, look)
+
+
+def photograph(step):
+    from window_testing import photograph_desktop
+    photograph_desktop(folder, step)

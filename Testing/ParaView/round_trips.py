@@ -1,0 +1,261 @@
+"""Every proxy with other settings than its own, through a state file, a Python state and a trace; outputs too."""
+import glob
+import os
+import struct
+import sys
+import xml.etree.ElementTree as ElementTree
+
+from paraview import make_name_valid, simple
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
+
+from coronary_testing import (digest, fetch, find, load_plugin, require, require_states_restore,
+                              require_trace_repeats)
+
+plugin, folder, xml_folder = sys.argv[1:4]
+# What a value by rule would make senseless: axes that are no rotation, times that do not increase.
+SENSIBLE = {("CoronaryPhantomSource", "Direction"): [0, 1, 0, 1, 0, 0, 0, 0, -1],
+            ("CoronaryPhantomSource", "Phases"): [0.1, 0.3, 0.75],
+            ("CoronaryCardiacPhaseInterpolator", "OfferedRange"): [0.1, 1.1],
+            ("CoronaryGatedImageReader", "FileNames"):
+                [os.path.join(folder, "phase_%d.mha" % n) for n in range(2)],
+            ("CoronaryGatedImageReader", "PhaseFractions"): [0.1, 0.6],
+            ("CoronaryGatedDICOMFolder", "DirectoryName"): os.path.join(folder, "dicom"),
+            ("CoronaryGatedDICOMFolder", "SeriesInstanceUID"): "1.2.3",
+            ("CoronaryTGFReader", "FileName"): os.path.join(folder, "tree.tgf")}
+# A file, a folder or an array of the input each has to be there.
+LEFT = ("FileListDomain", "ArrayListDomain", "ExtentDomain")
+
+
+def write_tree(name, way):
+    """A fork of three vessels, a point each millimetre, as a .tgf file."""
+    joints = [(0.0, z) for z in range(13)]
+    bones = [(n, n + 1) for n in range(1, 13)]
+    for side in (way, -way):
+        first = len(joints) + 1
+        joints += [(side * n / 12.0, 12 + n) for n in range(1, 13)]
+        bones += [(13, first)] + [(n, n + 1) for n in range(first, first + 11)]
+    with open(os.path.join(folder, name), "w") as file:
+        file.writelines("%d %r 0 %r\n" % (n, *joint) for n, joint in enumerate(joints, 1))
+        file.write("#\n")
+        file.writelines("%d %d\n" % bone for bone in bones)
+
+
+def write_images():
+    """Two phases of a small image."""
+    paths = [os.path.join(folder, "phase_%d.mha" % n) for n in range(2)]
+    for phase, path in enumerate(paths):
+        with open(path, "wb") as file:
+            file.write(b"ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nElementSpacing = 1 2 3\n"
+                       b"ElementType = MET_UCHAR\nBinaryData = True\nElementDataFile = LOCAL\n")
+            file.write(bytes(range(phase, 24 + phase)))
+    return paths
+
+
+def write_dicom():
+    """Two slices of one phase, with no more than a reader needs."""
+    def element(group, number, kind, value):
+        value = value if isinstance(value, bytes) else value.encode()
+        value += (b"\0" if kind == "UI" else b" ") * (len(value) % 2)
+        length = struct.pack("<HI", 0, len(value)) if kind == "OW" else struct.pack("<H", len(value))
+        return struct.pack("<HH", group, number) + kind.encode() + length + value
+
+    os.makedirs(os.path.join(folder, "dicom"), exist_ok=True)
+    for z in range(2):
+        meta = element(2, 0x10, "UI", "1.2.840.10008.1.2.1")
+        data = element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") + \
+            element(8, 0x18, "UI", "1.2.3.%d" % z) + element(8, 0x60, "CS", "CT") + \
+            element(0x20, 0x0d, "UI", "1.2") + element(0x20, 0x0e, "UI", "1.2.3") + \
+            element(0x20, 0x32, "DS", "0\\0\\%d" % z) + element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + \
+            element(0x28, 0x02, "US", struct.pack("<H", 1)) + element(0x28, 0x04, "CS", "MONOCHROME2") + \
+            element(0x28, 0x10, "US", struct.pack("<H", 2)) + \
+            element(0x28, 0x11, "US", struct.pack("<H", 2)) + element(0x28, 0x30, "DS", "1\\1")
+        for number, value in ((0x100, 16), (0x101, 16), (0x102, 15), (0x103, 0)):
+            data += element(0x28, number, "US", struct.pack("<H", value))
+        data += element(0x28, 0x1052, "DS", "-1024") + element(0x28, 0x1053, "DS", "1") + \
+            element(0x7fe0, 0x10, "OW", bytes(8))
+        with open(os.path.join(folder, "dicom", "%d.dcm" % z), "wb") as file:
+            file.write(bytes(128) + b"DICM" + element(2, 0, "UL", struct.pack("<I", len(meta))) + meta + data)
+
+
+def other_number(value, low, high, step):
+    """Another number than the default one, within the domain."""
+    if high is not None:
+        return value + step * (high - value) if value + step * (high - value) != value else low
+    return value + step * (abs(value) + 1.0)
+
+
+def other_value(proxy, element):
+    """Another value than the default one, as Python takes it; None where there is none by rule."""
+    domains = {child.tag: child for child in element if child.tag.endswith("Domain")}
+    key = (proxy, element.get("name"))
+    if key in SENSIBLE:
+        return SENSIBLE[key]
+    if any(tag in domains for tag in LEFT):
+        return None
+    defaults = [] if element.get("default_values") in (None, "none") else element.get("default_values").split()
+    if element.tag == "StringVectorProperty":
+        return "Other" + "".join(defaults)
+    if "EnumerationDomain" in domains:
+        entries = [entry.attrib for entry in domains["EnumerationDomain"]]
+        return next(entry["text"] for entry in entries if entry["value"] != defaults[0])
+    if "BooleanDomain" in domains:
+        return 1 - int(defaults[0])
+    numbers = [float(value) for value in defaults] or \
+        [0.25 * (n + 1) for n in range(int(element.get("number_of_elements_per_command", "1")))]
+    if defaults:
+        limits = next(iter(domains.values()))
+        low, high = (float(limits.get(end)) if limits.get(end) else None for end in ("min", "max"))
+        numbers = [other_number(number, low, high, 0.02) for number in numbers]
+    if element.tag in ("IntVectorProperty", "IdTypeVectorProperty"):
+        numbers = [int(number) + (int(number) == float(default)) for number, default
+                   in zip(numbers, defaults)]
+    return numbers if len(numbers) > 1 or not defaults else numbers[0]
+
+
+def settings(element):
+    """Names in Python and values, other than the default ones, of all that the panel shows."""
+    values = {}
+    for child in element:
+        if child.tag.endswith("VectorProperty") and not child.get("information_only"):
+            value = other_value(element.get("name"), child)
+            if value is not None:
+                values[make_name_valid(child.get("label"))] = value
+    return values
+
+
+def all_proxies():
+    for path in sorted(glob.glob(os.path.join(xml_folder, "*.xml"))):
+        for group in ElementTree.parse(path).getroot().findall("ProxyGroup"):
+            for element in group.findall("SourceProxy"):
+                yield element
+
+
+def stand_ins():
+    """A source for each type of input."""
+    image = simple.Wavelet(registrationName="Image", WholeExtent=[0, 2, 0, 2, 0, 2])
+    lines = simple.Line(registrationName="Lines", Resolution=4)
+    mesh = simple.Tetrahedralize(image, registrationName="Tetrahedra")
+    return {"vtkImageData": image, "vtkDataObject": image, "vtkPolyData": lines, "vtkPointSet": lines,
+            "vtkUnstructuredGrid": mesh}
+
+
+def make_all():
+    """One of each proxy, with all inputs; nothing of it is executed."""
+    sources = stand_ins()
+    for element in all_proxies():
+        label = make_name_valid(element.get("label"))
+        inputs = {make_name_valid(port.get("label")): sources[port.find("DataTypeDomain/DataType").get("value")]
+                  for port in element.findall("InputProperty")}
+        getattr(simple, label)(registrationName=element.get("name"), **inputs, **settings(element))
+
+
+def read_all():
+    """All settings and inputs of the proxies of make_all."""
+    found = {}
+    for element in all_proxies():
+        proxy = find(element.get("name"))
+        for name in settings(element):
+            value = getattr(proxy, name)
+            found[element.get("name"), name] = list(value) if hasattr(value, "__len__") and \
+                not isinstance(value, str) else value
+        for port in element.findall("InputProperty"):
+            source = getattr(proxy, make_name_valid(port.get("label")))
+            found[element.get("name"), port.get("name")] = [
+                name for (name, _), one in simple.GetSources().items() if one.SMProxy == source.SMProxy]
+    return found
+
+
+def require_settings():
+    """That the values are those which were given, and not the default ones."""
+    count = 0
+    found = read_all()
+    for element in all_proxies():
+        for name, value in settings(element).items():
+            there = found[element.get("name"), name]
+            require(there == value or there == [value] or
+                    all(abs(a - b) < 1e-12 for a, b in zip(there, value)),
+                    "%s.%s is %s, not %s" % (element.get("name"), name, there, value))
+            count += 1
+    print("%d settings of %d proxies" % (count, len(list(all_proxies()))), flush=True)
+
+
+def make_wall():
+    """What the other tests have no round trip of: readers, conversion, sweep, cleaner, mesher, metrics."""
+    # Settings with the creation: a trace of a script records no others.
+    tree = simple.TGFSkeletonReader(registrationName="Tree", FileName=os.path.join(folder, "tree.tgf"),
+                                    Radius=1.5)
+    truth = simple.TGFSkeletonReader(registrationName="Truth", Radius=1.4,
+                                     FileName=os.path.join(folder, "truth.tgf"))
+    simple.CenterlineConversion(tree, registrationName="Conversion", Tolerance=1e-5)
+    wall = simple.FrenetSweepSurface(tree, registrationName="Wall", MinimumEdgeLength=0.6,
+                                     MaximumEdgeLength=1.0, Blending=0.4, PatchSamples=12)
+    simple.SurfaceCleaner(wall, registrationName="Clean", MinimumAngle=5.0, JoinDistance=0.5)
+    bones = simple.CenterlineSkeleton(tree, registrationName="Bones", LengthPerRadius=2.5,
+                                      MinimumLength=2.0)
+    simple.TetrahedralMesher(wall, Skeleton=bones, registrationName="Mesh", RadiusEdgeRatio=1.6,
+                             MinimumDihedralAngle=12.0)
+    simple.CenterlineMetrics(Result=tree, Reference=truth, registrationName="Agreement",
+                             RelevantRadius=0.5, Spacing=0.1)
+    simple.GatedImageReader(registrationName="Images", CycleLength=0.9, PhaseFractions=[0.1, 0.6],
+                            FileNames=[os.path.join(folder, "phase_%d.mha" % n) for n in range(2)])
+
+
+def leaves(data):
+    """The data sets of composite data, or the one that it is."""
+    if not data.IsA("vtkMultiBlockDataSet"):
+        return [data]
+    blocks = [data.GetBlock(n) for n in range(data.GetNumberOfBlocks())]
+    return [leaf for block in blocks if block for leaf in leaves(block)]
+
+
+def outputs():
+    """A digest of each output of make_wall."""
+    found = []
+    for name, ports in (("Conversion", (0,)), ("Wall", (0, 1, 2)), ("Clean", (0,)), ("Bones", (0,)),
+                        ("Mesh", (0, 1, 2)), ("Agreement", (1,))):
+        for port in ports:
+            data = fetch(find(name), port, 0.0)
+            require(data.GetNumberOfPoints() > 2, "%s, port %d is empty" % (name, port))
+            found.append((name, port, [digest(leaf) for leaf in leaves(data)]))
+    images = find("Images")
+    images.UpdatePipelineInformation()
+    require(list(images.TimestepValues) == [0.1, 0.6], "times of the images")
+    for time in images.TimestepValues:
+        scalars = fetch(images, 0, time).GetPointData().GetScalars()
+        found.append(("Images", time, bytes(memoryview(scalars))))
+    require(found[-1][2] != found[-2][2], "the phases are the same")
+    return found
+
+
+def require_times():
+    """Who has times that its input has not says them."""
+    for (name, _), source in simple.GetSources().items():
+        algorithm = source.GetClientSideObject()
+        if not algorithm or "coronary" not in algorithm.GetClassName().lower() + source.GetXMLName().lower():
+            continue
+        source.UpdatePipelineInformation()
+        said = hasattr(source, "TimestepValues")
+        before = any(
+            algorithm.GetInputInformation(port, n).Has(Pipeline.TIME_STEPS())
+            for port in range(algorithm.GetNumberOfInputPorts())
+            for n in range(algorithm.GetNumberOfInputConnections(port)))
+        for port in range(algorithm.GetNumberOfOutputPorts()):
+            has = algorithm.GetOutputInformation(port).Has(Pipeline.TIME_STEPS())
+            require(said or before or not has, "%s has times and no TimestepValues" % name)
+
+
+load_plugin(plugin)
+write_tree("tree.tgf", 8.0)
+write_tree("truth.tgf", 8.5)
+write_images()
+write_dicom()
+require_trace_repeats(make_wall, outputs)
+simple.ResetSession()
+make_wall()
+require_times()
+require_states_restore(outputs, os.path.join(folder, "wall.pvsm"))
+require_trace_repeats(make_all, read_all)
+simple.ResetSession()
+make_all()
+require_settings()
+require_states_restore(read_all, os.path.join(folder, "all.pvsm"))
