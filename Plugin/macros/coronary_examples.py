@@ -1,0 +1,173 @@
+"""The examples of the menu Dynamic Coronary, of sources of the plugin only: they need no files.
+
+From Python: `import coronary_examples; coronary_examples.posing()`. As a state: `paraview --state Plugin/states/posing.py`.
+Each function makes a layout of its own and returns its sources by name, with "layout" and "views"; `size` is that of
+all views together in pixels, None: as large as the window. RuntimeError without the DynamicCoronary plugin.
+"""
+from paraview import simple
+
+import coronary_views as views
+
+IMAGE, LINES, SURFACE = 0, 1, 2
+REST = 0.75  # the phase in which the model is made, R-R fraction
+HOUNSFIELD = (-150.0, 650.0)
+# A tree of short bones that are the same at every phase, and a mesh that is quick to make.
+COARSE = {"Seed": 1, "CenterlineSpacing": 4.0}
+
+
+def start(first_source_time=None):
+    scene = simple.GetAnimationScene()
+    scene.UpdateAnimationUsingDataTimeSteps()
+    if first_source_time is not None:
+        scene.AnimationTime = first_source_time
+
+
+def finish(made, layout, shown, active):
+    simple.SetActiveView(shown[0])
+    simple.SetActiveSource(active)
+    for view in shown:
+        simple.Render(view)
+    made.update(layout=layout, views=shown)
+    return made
+
+
+def phantom(size=None):
+    """The phantom's true lumen in front of its beating CT, and an axial slice with the lumen's rim."""
+    views.require_plugin()
+    layout, front = views.new_layout("Phantom", size)
+    axial, _ = views.split(layout, 0, 0.55)
+    source = simple.CoronaryPhantom(registrationName="Coronary Phantom", Seed=1, Spacing=[0.6, 0.6, 0.6])
+    source.UpdatePipeline(REST)
+    start(REST)
+    box = list(source.GetDataInformation(SURFACE).GetBounds())
+    centre = [0.5 * (low + high) for low, high in zip(box[::2], box[1::2])]
+
+    lumen = simple.OutputPort(source, SURFACE)
+    views.plain(simple.Show(lumen, front, "GeometryRepresentation"), views.WALL)
+    cut = simple.Slice(simple.OutputPort(source, IMAGE), registrationName="Axial slice", SliceType="Plane")
+    rim = simple.Slice(lumen, registrationName="Lumen in the slice", SliceType="Plane")
+    for one in (cut, rim):
+        one.SliceType.Origin = centre
+        one.SliceType.Normal = [0.0, 0.0, 1.0]
+        one.Triangulatetheslice = 0
+    for view in (front, axial):
+        image = simple.Show(cut, view, "GeometryRepresentation")
+        views.grey_slice(image, "HU", *HOUNSFIELD)
+        image.SetScalarBarVisibility(view, False)
+    simple.Show(cut, axial).SetScalarBarVisibility(axial, True)
+    views.legend(axial, "HU", "CT (HU)", "%-#.0f")
+    ring = simple.Show(rim, axial, "GeometryRepresentation")
+    views.plain(ring, views.WALL)
+    ring.LineWidth = 2.5
+    views.look_along(front, [0.2516, 0.8555, -0.4529], [0.0, 0.0, 1.0], box, 1.3)
+    views.look_from_the_feet(axial, box)
+    views.note_phase((front, axial), source)
+    views.note(front, "Phantom 1: the true lumen, and its CT", "What is shown")
+    return finish({"phantom": source, "slice": cut, "rim": rim}, layout, (front, axial), source)
+
+
+def overlay_review(size=None):
+    """A model over the truth, and its distance: two phantoms, one of which has less lateral waves."""
+    views.require_plugin()
+    import compare_series
+    truth = simple.CoronaryPhantom(registrationName="Truth", Seed=1)
+    model = simple.CoronaryPhantom(registrationName="Model (less tortuous)", Seed=1, Tortuosity=0.7)
+    start(REST)
+    made = compare_series.compare(simple.OutputPort(model, SURFACE), simple.OutputPort(truth, SURFACE),
+                                  greatest=1.0, size=size)
+    views.note(made["views"][0], "model red, truth green", "What is shown")
+    made.update(model=model, truth=truth)
+    return finish(made, made["layout"], made["views"], made["distance"])
+
+
+def bound_mesh():
+    """Phantom, its skeleton over time and at rest, and tetrahedra that hang on it."""
+    source = simple.CoronaryPhantom(registrationName="Coronary Phantom", **COARSE)
+    lines = simple.OutputPort(source, LINES)
+    moving = simple.CenterlineSkeleton(lines, registrationName="Skeleton in time", EveryStepIsABone=1)
+    rest = simple.ReferencePhase(moving, registrationName="Skeleton", Automatic=0, Time=REST)
+    still = simple.ReferencePhase(lines, registrationName="Centerlines", Automatic=0, Time=REST)
+    surface = simple.FrenetSweepSurface(still, registrationName="Surface", MinimumEdgeLength=0.4,
+                                        MaximumEdgeLength=1.5, EdgeLengthPerRadius=0.7)
+    mesh = simple.TetrahedralMesher(simple.OutputPort(surface, 0), registrationName="Tetrahedra",
+                                    Skeleton=rest, LeaveOutPointsOutside=1)
+    weights = simple.BiharmonicSkinWeights(simple.OutputPort(mesh, 0), registrationName="Skin weights",
+                                           Skeleton=rest)
+    return {"phantom": source, "moving": moving, "rest": rest, "surface": surface, "mesh": mesh,
+            "weights": weights}
+
+
+def posing(size=None):
+    """A tree that is bent by a joint; the handle of the joint is in the left view, its numbers in the panel."""
+    views.require_plugin()
+    made = bound_mesh()
+    made["rest"].UpdatePipeline(REST)
+    joint, place = middle_of_the_longest_vessel(views.fetched(made["rest"], REST))
+    pose = simple.SkeletonPose(
+        made["rest"], registrationName="Skeleton Pose", MoveTheChosenJoint=1, ChosenJoint=joint,
+        JointPosition=[place[0] + 9.0, place[1] - 5.0, place[2] + 3.0])
+    moved = simple.SkinDeformation(made["weights"], registrationName="Posed mesh",
+                                   SkeletonAtRest=made["rest"], PosedSkeleton=pose)
+    made.update(pose=pose, moved=moved)
+    layout, front = views.new_layout("Posing", size)
+    moved.UpdatePipeline(REST)
+    box = list(moved.GetDataInformation(0).GetBounds())
+    before = simple.Show(made["surface"], front, "GeometryRepresentation")
+    views.plain(before, [0.6, 0.6, 0.6], 0.25)
+    wall = simple.Show(moved, front, "UnstructuredGridRepresentation")
+    views.colour_by(wall, front, "Displacement", "displacement by the pose (mm)", 0.0, 12.0)
+    joints = simple.Show(pose, front, "GeometryRepresentation")
+    views.plain(joints, views.BLACK)
+    joints.LineWidth = 2.0
+    joints.RenderLinesAsTubes = 1
+    views.look_from_the_front(front, box, 1.3)
+    views.note(front, "Drag the handle of the joint, Apply; grey: before", "What is shown")
+    return finish(made, layout, (front,), pose)
+
+
+def middle_of_the_longest_vessel(skeleton):
+    """Number and place of a joint half way from an ostium to the farthest tip."""
+    parents = skeleton.GetPointData().GetArray("ParentJoint")
+    paths = []
+    for joint in range(skeleton.GetNumberOfPoints()):
+        path = [joint]
+        while parents.GetTuple1(path[-1]) >= 0:
+            path.append(int(parents.GetTuple1(path[-1])))
+        paths.append(path)
+    longest = max(paths, key=len)
+    joint = longest[len(longest) // 2]
+    return joint, skeleton.GetPoint(joint)
+
+
+def cfd_export(size=None):
+    """A moving mesh of tetrahedra with named faces, cut open to show its quality."""
+    views.require_plugin()
+    made = bound_mesh()
+    moved = simple.SkinDeformation(made["weights"], registrationName="Moving mesh",
+                                   SkeletonAtRest=made["rest"], PosedSkeleton=made["moving"])
+    made["moved"] = moved
+    start(0.35)
+    moved.UpdatePipeline(0.35)
+    box = list(moved.GetDataInformation(0).GetBounds())
+    layout, front = views.new_layout("CFD export", size)
+    inside, _ = views.split(layout, 0, 0.5)
+    wall = simple.Show(moved, front, "UnstructuredGridRepresentation")
+    views.colour_by(wall, front, "Displacement", "displacement from rest (mm)", 0.0, 20.0)
+    ends = simple.Show(simple.OutputPort(made["surface"], 2), front, "GeometryRepresentation")
+    views.plain(ends, views.BLACK)
+    ends.PointSize = 6.0
+    views.look_from_the_front(front, box, 1.3)
+    centre = [0.5 * (low + high) for low, high in zip(box[::2], box[1::2])]
+    cut = simple.Clip(moved, registrationName="Cut open", ClipType="Plane", Crinkleclip=1)
+    cut.ClipType.Origin = centre
+    cut.ClipType.Normal = [0.0, 1.0, 0.0]
+    cut.Invert = 0
+    made["cut"] = cut
+    shown = simple.Show(cut, inside, "UnstructuredGridRepresentation")
+    shown.SetRepresentationType("Surface With Edges")
+    views.colour_by(shown, inside, "MinimumDihedralAngle", "least dihedral angle at rest (rad)", 0.0, 1.23,
+                    "Viridis (matplotlib)", "CELLS")
+    views.look_from_the_front(inside, box, 4.0)
+    views.note_phase((front, inside), made["phantom"])
+    views.note(front, "File > Save Data > Mesh sequence for simulations of flow", "What to do")
+    return finish(made, layout, (front, inside), moved)
