@@ -85,12 +85,15 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
     if len(times) < (3 if tracked == "even" else 2):
         print("Dynamic Coronary: too few phases to track, so this is a model at rest.")
         made["lines"] = made["tree"]
-        add("wall", simple.ExtractSurface(weights, registrationName="10 Wall"))
+        wall = weights
     else:
-        tracker = add("tracker", simple.CenterlineTracker(
+        tracker = simple.CenterlineTracker(
             source, registrationName="10 Tracker", Centerlines=tree, Skeleton=skeleton,
-            TemporalWindow=temporal_window_ms / 1000.0, TrackedPhases=tracked.capitalize()))
-        poses = simple.OutputPort(tracker.Proxy, 1)
+            TrackedPhases=tracked.capitalize())
+        # The unit in its label is a part of its name in Python.
+        tracker.SetPropertyWithName("TemporalWindow", temporal_window_ms / 1000.0)
+        tracker = add("tracker", tracker)
+        poses = simple.OutputPort(made["tracker"], 1)
         if regularized:
             tracker = add("regularizer", simple.MotionRegularizer(
                 tracker, registrationName="10 Motion of the lines, regularised"))
@@ -104,7 +107,9 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
         moved = add("moved", simple.SkinDeformation(
             weights, registrationName="12 Deformation", SkeletonAtRest=skeleton,
             PosedSkeleton=poses, DoublePrecision=1))
-        add("wall", simple.ExtractSurface(moved, registrationName="13 Beating wall"))
+        wall = moved
+    boundary = add("boundary", simple.ExtractSurface(wall, registrationName="13 Boundary"))
+    add("wall", simple.GenerateSurfaceNormals(boundary, registrationName="14 Wall", FeatureAngle=60.0))
     if show:
         made["layout"], made["views"] = show_model(made, times, size)
     return made

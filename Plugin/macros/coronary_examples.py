@@ -10,6 +10,7 @@ import coronary_views as views
 
 IMAGE, LINES, SURFACE = 0, 1, 2
 REST = 0.75  # the phase in which the model is made, R-R fraction
+SYSTOLE = 0.35
 HOUNSFIELD = (-150.0, 650.0)
 # A tree of short bones that are the same at every phase, and a mesh that is quick to make.
 COARSE = {"Seed": 1, "CenterlineSpacing": 4.0}
@@ -81,46 +82,50 @@ def overlay_review(size=None):
 
 
 def bound_mesh():
-    """Phantom, its skeleton over time and at rest, and tetrahedra that hang on it."""
-    source = simple.CoronaryPhantom(registrationName="Coronary Phantom", **COARSE)
-    lines = simple.OutputPort(source, LINES)
-    moving = simple.CenterlineSkeleton(lines, registrationName="Skeleton in time", EveryStepIsABone=1)
-    rest = simple.ReferencePhase(moving, registrationName="Skeleton", Automatic=0, Time=REST)
-    still = simple.ReferencePhase(lines, registrationName="Centerlines", Automatic=0, Time=REST)
-    surface = simple.FrenetSweepSurface(still, registrationName="Surface", MinimumEdgeLength=0.4,
+    """Tetrahedra that hang on a skeleton, of the phantom at rest."""
+    # A source of its own: what moves asks the other one for other times.
+    still = simple.CoronaryPhantom(registrationName="Phantom at rest", **COARSE)
+    lines = simple.ReferencePhase(simple.OutputPort(still, LINES), registrationName="Centerlines at rest",
+                                  Automatic=0, Time=REST)
+    rest = simple.CenterlineSkeleton(lines, registrationName="Skeleton at rest", EveryStepIsABone=1)
+    surface = simple.FrenetSweepSurface(lines, registrationName="Surface", MinimumEdgeLength=0.4,
                                         MaximumEdgeLength=1.5, EdgeLengthPerRadius=0.7)
     mesh = simple.TetrahedralMesher(simple.OutputPort(surface, 0), registrationName="Tetrahedra",
                                     Skeleton=rest, LeaveOutPointsOutside=1)
     weights = simple.BiharmonicSkinWeights(simple.OutputPort(mesh, 0), registrationName="Skin weights",
                                            Skeleton=rest)
-    return {"phantom": source, "moving": moving, "rest": rest, "surface": surface, "mesh": mesh,
-            "weights": weights}
+    weights.UpdatePipeline(REST)
+    return {"rest": rest, "surface": surface, "mesh": mesh, "weights": weights}
+
+
+def wall_of(mesh):
+    """The boundary of tetrahedra with smooth shading."""
+    boundary = simple.ExtractSurface(mesh, registrationName="Boundary")
+    return simple.GenerateSurfaceNormals(boundary, registrationName="Wall", FeatureAngle=60.0)
 
 
 def posing(size=None):
     """A tree that is bent by a joint; the handle of the joint is in the left view, its numbers in the panel."""
     views.require_plugin()
     made = bound_mesh()
-    made["rest"].UpdatePipeline(REST)
     joint, place = middle_of_the_longest_vessel(views.fetched(made["rest"], REST))
     pose = simple.SkeletonPose(
         made["rest"], registrationName="Skeleton Pose", MoveTheChosenJoint=1, ChosenJoint=joint,
         JointPosition=[place[0] + 9.0, place[1] - 5.0, place[2] + 3.0])
     moved = simple.SkinDeformation(made["weights"], registrationName="Posed mesh",
                                    SkeletonAtRest=made["rest"], PosedSkeleton=pose)
-    made.update(pose=pose, moved=moved)
+    made.update(pose=pose, moved=moved, wall=wall_of(moved))
     layout, front = views.new_layout("Posing", size)
     moved.UpdatePipeline(REST)
     box = list(moved.GetDataInformation(0).GetBounds())
-    before = simple.Show(made["surface"], front, "GeometryRepresentation")
-    views.plain(before, [0.6, 0.6, 0.6], 0.25)
-    wall = simple.Show(moved, front, "UnstructuredGridRepresentation")
-    views.colour_by(wall, front, "Displacement", "displacement by the pose (mm)", 0.0, 12.0)
-    joints = simple.Show(pose, front, "GeometryRepresentation")
-    views.plain(joints, views.BLACK)
-    joints.LineWidth = 2.0
-    joints.RenderLinesAsTubes = 1
-    views.look_from_the_front(front, box, 1.3)
+    # Inside the wall where that has not moved.
+    before = simple.Show(made["rest"], front, "GeometryRepresentation")
+    views.plain(before, [0.6, 0.6, 0.6])
+    before.LineWidth = 4.0
+    before.RenderLinesAsTubes = 1
+    wall = simple.Show(made["wall"], front, "GeometryRepresentation")
+    views.colour_by(wall, front, "Displacement", "displacement by the pose (mm)", 0.0, 11.0)
+    views.look_from_the_front(front, box, 1.7)
     views.note(front, "Drag the handle of the joint, Apply; grey: before", "What is shown")
     return finish(made, layout, (front,), pose)
 
@@ -139,27 +144,36 @@ def middle_of_the_longest_vessel(skeleton):
     return joint, skeleton.GetPoint(joint)
 
 
+def widest_fork(skeleton):
+    """The place of the widest joint with more than one daughter."""
+    parents = skeleton.GetPointData().GetArray("ParentJoint")
+    radii = skeleton.GetPointData().GetArray(views.RADIUS)
+    mothers = [int(parents.GetTuple1(joint)) for joint in range(skeleton.GetNumberOfPoints())]
+    forks = [joint for joint in set(mothers) if joint >= 0 and mothers.count(joint) > 1]
+    return skeleton.GetPoint(max(forks, key=radii.GetTuple1))
+
+
 def cfd_export(size=None):
     """A moving mesh of tetrahedra with named faces, cut open to show its quality."""
     views.require_plugin()
     made = bound_mesh()
+    source = simple.CoronaryPhantom(registrationName="Coronary Phantom", **COARSE)
+    poses = simple.CenterlineSkeleton(simple.OutputPort(source, LINES), registrationName="Skeleton in time",
+                                      EveryStepIsABone=1)
     moved = simple.SkinDeformation(made["weights"], registrationName="Moving mesh",
-                                   SkeletonAtRest=made["rest"], PosedSkeleton=made["moving"])
-    made["moved"] = moved
-    start(0.35)
-    moved.UpdatePipeline(0.35)
+                                   SkeletonAtRest=made["rest"], PosedSkeleton=poses)
+    made.update(phantom=source, poses=poses, moved=moved, wall=wall_of(moved))
+    start(SYSTOLE)
+    moved.UpdatePipeline(SYSTOLE)
     box = list(moved.GetDataInformation(0).GetBounds())
     layout, front = views.new_layout("CFD export", size)
     inside, _ = views.split(layout, 0, 0.5)
-    wall = simple.Show(moved, front, "UnstructuredGridRepresentation")
+    wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     views.colour_by(wall, front, "Displacement", "displacement from rest (mm)", 0.0, 20.0)
-    ends = simple.Show(simple.OutputPort(made["surface"], 2), front, "GeometryRepresentation")
-    views.plain(ends, views.BLACK)
-    ends.PointSize = 6.0
     views.look_from_the_front(front, box, 1.3)
-    centre = [0.5 * (low + high) for low, high in zip(box[::2], box[1::2])]
+    fork = widest_fork(views.fetched(poses, SYSTOLE))
     cut = simple.Clip(moved, registrationName="Cut open", ClipType="Plane", Crinkleclip=1)
-    cut.ClipType.Origin = centre
+    cut.ClipType.Origin = fork
     cut.ClipType.Normal = [0.0, 1.0, 0.0]
     cut.Invert = 0
     made["cut"] = cut
@@ -167,7 +181,7 @@ def cfd_export(size=None):
     shown.SetRepresentationType("Surface With Edges")
     views.colour_by(shown, inside, "MinimumDihedralAngle", "least dihedral angle at rest (rad)", 0.0, 1.23,
                     "Viridis (matplotlib)", "CELLS")
-    views.look_from_the_front(inside, box, 4.0)
-    views.note_phase((front, inside), made["phantom"])
+    views.look_from_the_front(inside, [side for place in fork for side in (place - 8.0, place + 8.0)])
+    views.note_phase((front, inside), source)
     views.note(front, "File > Save Data > Mesh sequence for simulations of flow", "What to do")
     return finish(made, layout, (front, inside), moved)

@@ -70,7 +70,7 @@ def plain(shown, colour, opacity=1.0):
     shown.Opacity = opacity
 
 
-def colour_by(shown, view, array, title, low, high, preset="Viridis (matplotlib)", where="POINTS"):
+def colour_by(shown, view, array, title, low, high, preset="Plasma (matplotlib)", where="POINTS"):
     """Colours of a point array from `low` to `high`, with a legend below."""
     simple.ColorBy(shown, (where, array))
     transfer = simple.GetColorTransferFunction(array)
@@ -104,7 +104,7 @@ def grey_slice(shown, array, low, high):
     transfer.AutomaticRescaleRangeMode = "Never"
 
 
-def note(view, words, name, place="Upper Center", colour=None, size=16):
+def note(view, words, name, place="Upper Right Corner", colour=None, size=16):
     """A line of text in a view."""
     text = simple.Text(registrationName=name, Text=words)
     shown = simple.Show(text, view)
@@ -210,5 +210,5 @@ def name_segments(shown, view, tree):
     bar.Title = "Segment"
     bar.ComponentTitle = ""
     bar.TitleColor = bar.LabelColor = BLACK
-    bar.WindowLocation = "Right Center"
+    bar.WindowLocation = "Upper Right Corner"
     return segments
