@@ -15,8 +15,8 @@ coronaryMenuActions::coronaryMenuActions(QObject* parent)
   this->Add("coronaryCompare", "Compare Series",
     "The selected model over the selected truth, and its distance from it", "compare");
   this->AddSeparator();
-  this->Add("coronaryPhantom", "Example: Phantom", "A beating phantom: surface and gated CT",
-    "phantom");
+  this->Add(
+    "coronaryPhantom", "Example: Phantom", "A beating phantom: surface and gated CT", "phantom");
   this->Add("coronaryReview", "Example: Overlay Review",
     "A model over the truth, and its distance from it, phase by phase", "overlay_review");
   this->Add("coronaryPosing", "Example: Posing",
@@ -34,7 +34,9 @@ void coronaryMenuActions::Add(
   action->setObjectName(name);
   action->setToolTip(help);
   action->setStatusTip(help);
-  const QByteArray code = QByteArray("import coronary_menu\ncoronary_menu.") + function + "()\n";
+  // With paraview.simple Python finds the modules of plugins.
+  const QByteArray code =
+    QByteArray("import paraview.simple\nimport coronary_menu\ncoronary_menu.") + function + "()\n";
   QObject::connect(action, &QAction::triggered, this,
     [code] { pqPVApplicationCore::instance()->pythonManager()->executeCode(code); });
 }

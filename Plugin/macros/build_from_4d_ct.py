@@ -125,14 +125,12 @@ def require_vessels(tree, largest_radius):
             % (views.name_of(tree), widest, largest_radius))
 
 
-def greatest_displacement(made, times):
-    """Of the lines, over the times, mm."""
-    greatest = 0.0
-    for time in times:
-        made["lines"].UpdatePipeline(time)
-        array = made["lines"].PointData["Displacement"]
-        greatest = max(greatest, array.GetRange(-1)[1] if array else 0.0)
-    return greatest
+def greatest_displacement(lines, times):
+    """Of moving lines: how far, mm, and when."""
+    def at(time):
+        lines.UpdatePipeline(time)
+        return lines.PointData["Displacement"].GetRange(-1)[1]
+    return max((at(time), -time) for time in times)
 
 
 def show_model(made, times, size=None):
@@ -143,14 +141,14 @@ def show_model(made, times, size=None):
     moving = "moved" in made
     scene = simple.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
-    if times:
-        scene.AnimationTime = times[0]
     box = list(made["tree"].GetDataInformation(0).GetBounds())
 
     wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     if moving:
+        far, when = greatest_displacement(made["lines"], times)
+        scene.AnimationTime = -when
         views.colour_by(wall, front, "Displacement", "displacement from the reference phase (mm)",
-                        0.0, greatest_displacement(made, times) or 1.0)
+                        0.0, far or 1.0)
     else:
         views.plain(wall, views.WALL)
     views.look_from_the_front(front, box)
@@ -174,7 +172,7 @@ def show_model(made, times, size=None):
 
     tree = simple.Show(made["lines"], named, "GeometryRepresentation")
     tree.LineWidth = 4.0
-    views.name_segments(tree, named, simple.OutputPort(made["tree"], 0))
+    views.name_segments(made["lines"], tree, named)
     views.look_from_the_front(named, box)
 
     if times:

@@ -37,7 +37,8 @@ def phantom(size=None):
     views.require_plugin()
     layout, front = views.new_layout("Phantom", size)
     axial, _ = views.split(layout, 0, 0.55)
-    source = simple.CoronaryPhantom(registrationName="Coronary Phantom", Seed=1, Spacing=[0.6, 0.6, 0.6])
+    source = simple.CoronaryPhantom(registrationName="Coronary Phantom", Seed=1, Spacing=[0.8, 0.8, 0.8],
+                                    SurfaceSpacing=0.6)
     source.UpdatePipeline(REST)
     start(REST)
     box = list(source.GetDataInformation(SURFACE).GetBounds())
@@ -51,6 +52,8 @@ def phantom(size=None):
         one.SliceType.Origin = centre
         one.SliceType.Normal = [0.0, 0.0, 1.0]
         one.Triangulatetheslice = 0
+    views.look_along(front, [0.2516, 0.8555, -0.4529], [0.0, 0.0, 1.0], box, 1.3)
+    views.look_from_the_feet(axial, box)
     for view in (front, axial):
         image = simple.Show(cut, view, "GeometryRepresentation")
         views.grey_slice(image, "HU", *HOUNSFIELD)
@@ -60,8 +63,6 @@ def phantom(size=None):
     ring = simple.Show(rim, axial, "GeometryRepresentation")
     views.plain(ring, views.WALL)
     ring.LineWidth = 2.5
-    views.look_along(front, [0.2516, 0.8555, -0.4529], [0.0, 0.0, 1.0], box, 1.3)
-    views.look_from_the_feet(axial, box)
     views.note_phase((front, axial), source)
     views.note(front, "Phantom 1: the true lumen, and its CT", "What is shown")
     return finish({"phantom": source, "slice": cut, "rim": rim}, layout, (front, axial), source)
@@ -71,8 +72,9 @@ def overlay_review(size=None):
     """A model over the truth, and its distance: two phantoms, one of which has less lateral waves."""
     views.require_plugin()
     import compare_series
-    truth = simple.CoronaryPhantom(registrationName="Truth", Seed=1)
-    model = simple.CoronaryPhantom(registrationName="Model (less tortuous)", Seed=1, Tortuosity=0.7)
+    truth = simple.CoronaryPhantom(registrationName="Truth", Seed=1, SurfaceSpacing=0.6)
+    model = simple.CoronaryPhantom(registrationName="Model (less tortuous)", Seed=1, SurfaceSpacing=0.6,
+                                   Tortuosity=0.7)
     start(REST)
     made = compare_series.compare(simple.OutputPort(model, SURFACE), simple.OutputPort(truth, SURFACE),
                                   greatest=1.0, size=size)
@@ -88,8 +90,8 @@ def bound_mesh():
     lines = simple.ReferencePhase(simple.OutputPort(still, LINES), registrationName="Centerlines at rest",
                                   Automatic=0, Time=REST)
     rest = simple.CenterlineSkeleton(lines, registrationName="Skeleton at rest", EveryStepIsABone=1)
-    surface = simple.FrenetSweepSurface(lines, registrationName="Surface", MinimumEdgeLength=0.4,
-                                        MaximumEdgeLength=1.5, EdgeLengthPerRadius=0.7)
+    surface = simple.FrenetSweepSurface(lines, registrationName="Surface", MinimumEdgeLength=0.5,
+                                        MaximumEdgeLength=2.0, EdgeLengthPerRadius=0.7)
     mesh = simple.TetrahedralMesher(simple.OutputPort(surface, 0), registrationName="Tetrahedra",
                                     Skeleton=rest, LeaveOutPointsOutside=1)
     weights = simple.BiharmonicSkinWeights(simple.OutputPort(mesh, 0), registrationName="Skin weights",
@@ -121,8 +123,7 @@ def posing(size=None):
     # Inside the wall where that has not moved.
     before = simple.Show(made["rest"], front, "GeometryRepresentation")
     views.plain(before, [0.6, 0.6, 0.6])
-    before.LineWidth = 4.0
-    before.RenderLinesAsTubes = 1
+    before.LineWidth = 2.0
     wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     views.colour_by(wall, front, "Displacement", "displacement by the pose (mm)", 0.0, 11.0)
     views.look_from_the_front(front, box, 1.7)
@@ -181,7 +182,7 @@ def cfd_export(size=None):
     shown.SetRepresentationType("Surface With Edges")
     views.colour_by(shown, inside, "MinimumDihedralAngle", "least dihedral angle at rest (rad)", 0.0, 1.23,
                     "Viridis (matplotlib)", "CELLS")
-    views.look_from_the_front(inside, [side for place in fork for side in (place - 8.0, place + 8.0)])
+    views.look_from_the_front(inside, [side for place in fork for side in (place - 11.0, place + 11.0)])
     views.note_phase((front, inside), source)
     views.note(front, "File > Save Data > Mesh sequence for simulations of flow", "What to do")
     return finish(made, layout, (front, inside), moved)

@@ -5,6 +5,9 @@ WALL = [0.80, 0.16, 0.16]
 LINE = [1.0, 0.85, 0.2]
 BLACK = [0.0, 0.0, 0.0]
 WHITE = [1.0, 1.0, 1.0]
+# One after the other, for neighbours that can be told apart.
+SEGMENTS = [[0.84, 0.15, 0.16], [0.12, 0.47, 0.71], [0.17, 0.63, 0.17], [1.00, 0.50, 0.05], [0.58, 0.40, 0.74],
+            [0.55, 0.34, 0.29], [0.89, 0.47, 0.76], [0.50, 0.50, 0.50], [0.74, 0.74, 0.13], [0.09, 0.75, 0.81]]
 PHASE = "{time:.0f} % of the R-R interval"
 RADIUS = "MaximumInscribedSphereRadius"
 
@@ -58,8 +61,9 @@ def look_from_the_front(view, box, zoom=1.25):
 
 
 def look_from_the_feet(view, box, zoom=1.25):
-    """An axial slice as radiologists have it: from the feet, the patient's right is at the left."""
+    """An axial slice as radiologists have it: on black, from the feet, the patient's right is at the left."""
     look_along(view, [0.0, 0.0, 1.0], [0.0, -1.0, 0.0], box, zoom)
+    view.Background = BLACK
     view.OrientationAxesVisibility = 0
 
 
@@ -81,12 +85,17 @@ def colour_by(shown, view, array, title, low, high, preset="Plasma (matplotlib)"
     return legend(view, array, title, "%-#.2f" if high < 5.0 else "%-#.1f")
 
 
+def ink(view):
+    """Black on white, white on black."""
+    return WHITE if list(view.Background) == BLACK else BLACK
+
+
 def legend(view, array, title, form):
     """The bar of an array's colours, below in a view; `form` as of printf."""
     bar = simple.GetScalarBar(simple.GetColorTransferFunction(array), view)
     bar.Title = title
     bar.ComponentTitle = ""
-    bar.TitleColor = bar.LabelColor = BLACK
+    bar.TitleColor = bar.LabelColor = ink(view)
     bar.AutomaticLabelFormat = 0
     bar.LabelFormat = bar.RangeLabelFormat = form
     bar.Orientation = "Horizontal"
@@ -104,22 +113,22 @@ def grey_slice(shown, array, low, high):
     transfer.AutomaticRescaleRangeMode = "Never"
 
 
-def note(view, words, name, place="Upper Right Corner", colour=None, size=16):
+def note(view, words, name, place="Upper Right Corner", size=16):
     """A line of text in a view."""
     text = simple.Text(registrationName=name, Text=words)
     shown = simple.Show(text, view)
-    shown.Color = colour or BLACK
+    shown.Color = ink(view)
     shown.FontSize = size
     shown.WindowLocation = place
     return text
 
 
-def note_phase(views, source, name="Phase", colours=None):
+def note_phase(views, source, name="Phase"):
     """The phase that is shown, in per cent of the R-R interval, in each view."""
     phase = simple.AnnotateTimeFilter(source, registrationName=name, Format=PHASE, Scale=100.0)
-    for number, view in enumerate(views):
+    for view in views:
         label = simple.Show(phase, view)
-        label.Color = colours[number] if colours else BLACK
+        label.Color = ink(view)
         label.FontSize = 18
         label.WindowLocation = "Upper Left Corner"
     return phase
@@ -187,28 +196,28 @@ def grey_window(source, array, usual):
     return usual if low < -100.0 and high > usual[1] / 2.0 else (low, high)
 
 
-def name_segments(shown, view, tree):
-    """Colours of a tree's lines by their SCCT segments, with a legend of names.
+def name_segments(source, shown, view):
+    """Colours of a named tree's lines by their SCCT segments, and the names beside them.
 
-    `tree` is the output port of a named tree, of which `shown` shows the lines.
+    `shown` is the representation of `source` in `view`. The names are labels of a selection: another selection takes
+    their place.
     """
-    data = fetched(tree).GetCellData()
-    ids, names = data.GetArray("SegmentIds"), data.GetAbstractArray("SegmentLabel")
-    segments = {int(ids.GetTuple1(n)): names.GetValue(n) for n in range(ids.GetNumberOfTuples())}
+    ids = fetched(source).GetCellData().GetArray("SegmentIds")
+    segments = sorted({int(ids.GetTuple1(n)) for n in range(ids.GetNumberOfTuples())})
     simple.ColorBy(shown, ("CELLS", "SegmentIds"))
     transfer = simple.GetColorTransferFunction("SegmentIds")
     transfer.InterpretValuesAsCategories = 1
     transfer.AnnotationsInitialized = 1
-    words = []
-    for number, name in sorted(segments.items()):
-        words += [str(number), name or "no name"]
-    transfer.Annotations = words
-    transfer.ApplyPreset("KAAMS", True)
-    transfer.Annotations = words
-    shown.SetScalarBarVisibility(view, True)
-    bar = simple.GetScalarBar(transfer, view)
-    bar.Title = "Segment"
-    bar.ComponentTitle = ""
-    bar.TitleColor = bar.LabelColor = BLACK
-    bar.WindowLocation = "Upper Right Corner"
-    return segments
+    transfer.Annotations = [word for number in segments for word in (str(number), str(number))]
+    transfer.IndexedColors = [part for n in range(len(segments)) for part in SEGMENTS[n % len(SEGMENTS)]]
+    transfer.IndexedOpacities = [1.0] * len(segments)
+    shown.SetScalarBarVisibility(view, False)
+    active = simple.GetActiveSource()
+    simple.SetActiveSource(source)
+    simple.QuerySelect(QueryString="(id >= 0)", FieldType="CELL")
+    simple.SetActiveSource(active)
+    shown.SelectionOpacity = 0.0
+    shown.SelectionCellLabelVisibility = 1
+    shown.SelectionCellFieldDataArrayName = "SegmentLabel"
+    shown.SelectionCellLabelColor = BLACK
+    shown.SelectionCellLabelFontSize = 15
