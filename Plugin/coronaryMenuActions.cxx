@@ -5,6 +5,9 @@
 
 #include <QAction>
 #include <QByteArray>
+#include <QMenu>
+#include <QTimer>
+#include <QWidget>
 
 coronaryMenuActions::coronaryMenuActions(QObject* parent)
   : QActionGroup(parent)
@@ -23,6 +26,7 @@ coronaryMenuActions::coronaryMenuActions(QObject* parent)
     "A coronary tree that is bent by the joints of its skeleton", "posing");
   this->Add("coronaryExport", "Example: CFD Export",
     "A moving mesh of tetrahedra for simulations of flow", "cfd_export");
+  this->NameMenu();
 }
 
 coronaryMenuActions::~coronaryMenuActions() = default;
@@ -39,6 +43,21 @@ void coronaryMenuActions::Add(
     QByteArray("import paraview.simple\nimport coronary_menu\ncoronary_menu.") + function + "()\n";
   QObject::connect(action, &QAction::triggered, this,
     [code] { pqPVApplicationCore::instance()->pythonManager()->executeCode(code); });
+}
+
+void coronaryMenuActions::NameMenu()
+{
+  // ParaView makes the menu, once there is a window, and gives it no name: recorded tests need one.
+  for (QWidget* widget : this->actions().first()->associatedWidgets())
+  {
+    if (qobject_cast<QMenu*>(widget))
+    {
+      widget->setObjectName("menuDynamicCoronary");
+      return;
+    }
+  }
+  constexpr int Milliseconds = 100;
+  QTimer::singleShot(Milliseconds, this, [this] { this->NameMenu(); });
 }
 
 void coronaryMenuActions::AddSeparator()

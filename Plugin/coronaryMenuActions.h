@@ -23,6 +23,7 @@ private:
   /// `name` is what the entry is called in recorded tests, `function` one of the module coronary_menu.
   void Add(const char* name, const char* text, const char* help, const char* function);
   void AddSeparator();
+  void NameMenu();
 };
 
 #endif

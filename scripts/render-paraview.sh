@@ -34,12 +34,12 @@ python() {
   echo "<pqevent object=\"$shell\" command=\"executeCommand\" arguments=\"$1&#xA;\" />"
 }
 click() {
-  echo "<pqevent object=\"$menu/Dynamic Coronary\" command=\"activate\" arguments=\"$1\" />"
+  echo "<pqevent object=\"$menu/menuDynamicCoronary\" command=\"activate\" arguments=\"$1\" />"
 }
 {
   echo '<?xml version="1.0" ?><pqevents>'
   python "exec(open('$root/scripts/render-paraview.py').read())"
-  echo "<pqevent object=\"$menu\" command=\"activate\" arguments=\"Dynamic Coronary\" />"
+  echo "<pqevent object=\"$menu\" command=\"activate\" arguments=\"menuDynamicCoronary\" />"
   python "grab('menu')"
   for example in Phantom Review Posing Export; do
     click "coronary$example"
@@ -59,6 +59,6 @@ read -r number <"$work/display"
 DISPLAY=":$number"
 export DISPLAY
 unset XAUTHORITY
-paraview --dr "--plugin-search-paths=$plugin" --plugins=DynamicCoronaryPlugin \
+paraview -qwindowgeometry 1400x860+0+0 --dr "--plugin-search-paths=$plugin" --plugins=DynamicCoronaryPlugin \
   "--test-directory=$work" "--test-script=$work/play.xml" --exit
 ls "$PICTURES"/paraview-*.png
