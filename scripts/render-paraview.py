@@ -8,6 +8,9 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkIOImage import vtkPNGWriter
 
+# Steps of grey values, a divisor of 255: the noise of a CT makes large files.
+LEVEL = 15
+
 
 def grab(name):
     """The screen as the X server has it in its file, of which Xvfb's -fbdir says where it is, as paraview-NAME.png."""
@@ -19,6 +22,7 @@ def grab(name):
     begin = header[0] + 12 * colours
     rows = numpy.frombuffer(data, numpy.uint8, height * stride, begin).reshape(height, stride)
     pixels = rows[::-1, : 4 * width].reshape(-1, 4)[:, 2::-1]
+    pixels = pixels // LEVEL * LEVEL
     image = vtkImageData()
     image.SetDimensions(width, height, 1)
     image.GetPointData().SetScalars(numpy_to_vtk(numpy.ascontiguousarray(pixels), deep=True))

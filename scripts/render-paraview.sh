@@ -34,7 +34,7 @@ python() {
   echo "<pqevent object=\"$shell\" command=\"executeCommand\" arguments=\"$1&#xA;\" />"
 }
 click() {
-  echo "<pqevent object=\"$menu/menuDynamicCoronary\" command=\"activate\" arguments=\"$1\" />"
+  echo "<pqevent object=\"pqClientMainWindow/menuDynamicCoronary\" command=\"activate\" arguments=\"$1\" />"
 }
 {
   echo '<?xml version="1.0" ?><pqevents>'

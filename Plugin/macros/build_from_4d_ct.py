@@ -7,6 +7,8 @@ build_from_4d_ct.build(source)`.
 The stages and their settings are those of `coronary-pipeline run`, and give the same points. Needs the
 DynamicCoronary plugin.
 """
+import os
+
 from paraview import print_error, simple
 
 import coronary_views as views
@@ -182,6 +184,29 @@ def show_model(made, times, size=None):
     for view in (front, axial, named):
         simple.Render(view)
     return layout, (front, axial, named)
+
+
+def open_result(folder, series, size=None):
+    """Shows the folder of a `coronary-pipeline run` beside its images, as build() shows what it made.
+
+    RuntimeError when one of the files is missing.
+    """
+    views.require_plugin()
+    paths = [os.path.join(folder, "centerline.vtp"), os.path.join(folder, "motion", "centerline.pvd"),
+             os.path.join(folder, "motion.pvd"), series]
+    for path in paths:
+        if not os.path.isfile(path):
+            raise RuntimeError("'%s' is missing: a finished run and its images are needed." % path)
+    tree = simple.XMLPolyDataReader(registrationName="Named trees", FileName=[paths[0]])
+    lines = simple.PVDReader(registrationName="Centerlines in time", FileName=paths[1])
+    moved = simple.PVDReader(registrationName="Beating surface", FileName=paths[2])
+    source = simple.GatedImageReader(registrationName="Images", FileNames=[series])
+    wall = simple.GenerateSurfaceNormals(moved, registrationName="Wall", FeatureAngle=60.0)
+    made = {"source": source, "reference": source, "tree": tree, "lines": lines, "moved": moved, "wall": wall}
+    for proxy in (source, tree, lines, wall):
+        proxy.UpdatePipeline()
+    made["layout"], made["views"] = show_model(made, views.times_of(source), size)
+    return made
 
 
 def example():

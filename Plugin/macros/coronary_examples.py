@@ -16,11 +16,12 @@ HOUNSFIELD = (-150.0, 650.0)
 COARSE = {"Seed": 1, "CenterlineSpacing": 4.0}
 
 
-def start(first_source_time=None):
+def start(source, time):
+    """The animation with the time steps there are, at the one of a source next to `time`, which is returned."""
     scene = simple.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
-    if first_source_time is not None:
-        scene.AnimationTime = first_source_time
+    scene.AnimationTime = min(views.times_of(source), key=lambda step: abs(step - time))
+    return scene.AnimationTime
 
 
 def finish(made, layout, shown, active):
@@ -40,7 +41,7 @@ def phantom(size=None):
     source = simple.CoronaryPhantom(registrationName="Coronary Phantom", Seed=1, Spacing=[0.8, 0.8, 0.8],
                                     SurfaceSpacing=0.6)
     source.UpdatePipeline(REST)
-    start(REST)
+    start(source, REST)
     box = list(source.GetDataInformation(SURFACE).GetBounds())
     centre = [0.5 * (low + high) for low, high in zip(box[::2], box[1::2])]
 
@@ -75,7 +76,7 @@ def overlay_review(size=None):
     truth = simple.CoronaryPhantom(registrationName="Truth", Seed=1, SurfaceSpacing=0.6)
     model = simple.CoronaryPhantom(registrationName="Model (less tortuous)", Seed=1, SurfaceSpacing=0.6,
                                    Tortuosity=0.7)
-    start(REST)
+    start(truth, REST)
     made = compare_series.compare(simple.OutputPort(model, SURFACE), simple.OutputPort(truth, SURFACE),
                                   greatest=1.0, size=size)
     views.note(made["views"][0], "model red, truth green", "What is shown")
@@ -164,15 +165,15 @@ def cfd_export(size=None):
     moved = simple.SkinDeformation(made["weights"], registrationName="Moving mesh",
                                    SkeletonAtRest=made["rest"], PosedSkeleton=poses)
     made.update(phantom=source, poses=poses, moved=moved, wall=wall_of(moved))
-    start(SYSTOLE)
-    moved.UpdatePipeline(SYSTOLE)
+    moment = start(source, SYSTOLE)
+    moved.UpdatePipeline(moment)
     box = list(moved.GetDataInformation(0).GetBounds())
     layout, front = views.new_layout("CFD export", size)
     inside, _ = views.split(layout, 0, 0.5)
     wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     views.colour_by(wall, front, "Displacement", "displacement from rest (mm)", 0.0, 20.0)
     views.look_from_the_front(front, box, 1.3)
-    fork = widest_fork(views.fetched(poses, SYSTOLE))
+    fork = widest_fork(views.fetched(poses, moment))
     cut = simple.Clip(moved, registrationName="Cut open", ClipType="Plane", Crinkleclip=1)
     cut.ClipType.Origin = fork
     cut.ClipType.Normal = [0.0, 1.0, 0.0]

@@ -19,10 +19,16 @@ def require_plugin():
 
 
 def new_layout(name, size=None):
-    """A layout, and its first view; `size` in pixels of all views together, None: as large as the window."""
-    layout = simple.CreateLayout(name)
-    view = simple.CreateView("RenderView")
-    simple.AssignViewToLayout(view, layout, 0)
+    """A layout, and its first view; an empty one that is there is taken. `size` in pixels of all views together,
+    None: as large as the window."""
+    view = simple.GetActiveView()
+    layout = simple.GetLayout(view) if view and view.GetXMLName() == "RenderView" else None
+    if layout and not layout.GetSplitDirection(0) and not list(view.Representations):
+        simple.RenameLayout(name, layout)
+    else:
+        layout = simple.CreateLayout(name)
+        view = simple.CreateView("RenderView")
+        simple.AssignViewToLayout(view, layout, 0)
     if size:
         layout.SetSize(*size)
     return layout, view

@@ -47,12 +47,15 @@ def require_the_run(made, result):
         require_same(made["moved"], os.path.join(result, "motion", "volume_%02d.vtu" % number), time)
 
 
-def require_shown(made):
-    times = list(simple.GetAnimationScene().TimeKeeper.TimestepValues)
-    require(times == list(made["source"].TimestepValues), "the animation has the times %s" % times)
+def require_named():
     names = [name for name, _ in simple.GetSources()]
     for name in ("1 Reference phase", "5 Named trees", "9 Skin weights", "14 Wall"):
         require(name in names, "there is no %s in %s" % (name, names))
+
+
+def require_shown(made):
+    times = list(simple.GetAnimationScene().TimeKeeper.TimestepValues)
+    require(times == list(made["source"].TimestepValues), "the animation has the times %s" % times)
     for number, view in enumerate(made["views"]):
         picture = os.path.join(folder, "view_%d.png" % number)
         simple.SaveScreenshot(picture, view)
@@ -82,6 +85,10 @@ require(macro.selected_series() == source, "the only series is not taken")
 made = macro.build(source, seed=SEED, least_branch=LEAST_BRANCH, edges=EDGES, size=(1000, 600))
 require_the_run(made, result)
 require_shown(made)
-fails(lambda: macro.build(source, seed=[-70.0, -70.0, 0.0], show=False), '"')
+require_named()
+fails(lambda: macro.require_vessels(made["tree"], 0.1), "more than twice the largest one")
 simple.ResetSession()
+opened = macro.open_result(result, series, size=(1000, 600))
+require_shown(opened)
+fails(lambda: macro.open_result(folder, series), "centerline.vtp' is missing")
 print("done")
