@@ -78,7 +78,7 @@ def overlay_review(size=None):
                                    Tortuosity=0.7)
     start(truth, REST)
     made = compare_series.compare(simple.OutputPort(model, SURFACE), simple.OutputPort(truth, SURFACE),
-                                  greatest=1.0, size=size)
+                                  greatest=0.5, size=size)
     views.note(made["views"][0], "model red, truth green", "What is shown")
     made.update(model=model, truth=truth)
     return finish(made, made["layout"], made["views"], made["distance"])
@@ -127,7 +127,8 @@ def posing(size=None):
     before.LineWidth = 2.0
     wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     views.colour_by(wall, front, "Displacement", "displacement by the pose (mm)", 0.0, 11.0)
-    views.look_from_the_front(front, box, 1.7)
+    wall.Opacity = 0.7  # the handle is inside
+    views.look_from_the_front(front, box, 1.5)
     views.note(front, "Drag the handle of the joint, Apply; grey: before", "What is shown")
     return finish(made, layout, (front,), pose)
 
