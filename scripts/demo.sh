@@ -142,5 +142,6 @@ fi
 cat <<EOF
   ${plugin#"$root/"}
                                       the ParaView plugin
-Look at it: paraview --plugin-search-paths=${plugin%/*} $root/$output/phantom/truth/surface.pvd
+Look at it, and press play:
+  paraview --plugin-search-paths=${plugin%/*} --plugins=DynamicCoronaryPlugin --state=Plugin/states/result.py
 EOF

@@ -9,6 +9,8 @@ plugin.
 """
 from paraview import servermanager, simple
 
+import coronary_views as views
+
 RED = [0.84, 0.15, 0.16]
 GREEN = [0.24, 0.70, 0.31]
 DISTANCE = "SurfaceDistance"
@@ -24,17 +26,11 @@ def compare(model, truth, greatest=0.5, size=None):
     Returns a dictionary with `distance` (the MeshDistanceMetrics filter), `views` (overlay, distance)
     and `layout`. Raises RuntimeError without the plugin, ValueError for a distance that is not positive.
     """
-    if not hasattr(simple, "MeshDistanceMetrics"):
-        raise RuntimeError("The DynamicCoronary plugin is not loaded (Tools, Manage Plugins).")
+    views.require_plugin()
     if not greatest > 0.0:
         raise ValueError("greatest must be above 0")
-    layout = simple.CreateLayout("Model and truth")
-    overlay = simple.CreateView("RenderView")
-    simple.AssignViewToLayout(overlay, layout, 0)
-    coloured = simple.CreateView("RenderView")
-    simple.AssignViewToLayout(coloured, layout, layout.SplitHorizontal(0, 0.5) + 1)
-    if size:
-        layout.SetSize(*size)
+    layout, overlay = views.new_layout("Model and truth", size)
+    coloured, _ = views.split(layout, 0, 0.5)
 
     # Times of both series are those of the animation, whatever was opened first.
     scene = simple.GetAnimationScene()
@@ -42,56 +38,23 @@ def compare(model, truth, greatest=0.5, size=None):
     time = scene.AnimationTime
 
     for source, colour in ((model, RED), (truth, GREEN)):
-        shown = simple.Show(source, overlay, "GeometryRepresentation")
-        shown.ColorArrayName = [None, ""]
-        shown.AmbientColor = shown.DiffuseColor = colour
+        views.plain(simple.Show(source, overlay, "GeometryRepresentation"), colour)
 
     distance = simple.MeshDistanceMetrics(registrationName="Distance", Result=model,
                                           Reference=truth)
     distance.UpdatePipeline(time)
     shown = simple.Show(simple.OutputPort(distance, 0), coloured, "GeometryRepresentation")
-    simple.ColorBy(shown, ("POINTS", DISTANCE))
-    transfer = simple.GetColorTransferFunction(DISTANCE)
-    transfer.ApplyPreset("Cool to Warm", True)
-    transfer.RescaleTransferFunction(-greatest, greatest)
-    transfer.AutomaticRescaleRangeMode = "Never"
-    shown.SetScalarBarVisibility(coloured, True)
-    bar = simple.GetScalarBar(transfer, coloured)
-    bar.Title = "distance (mm), negative: inside"
-    bar.ComponentTitle = ""
-    bar.TitleColor = bar.LabelColor = [0.0, 0.0, 0.0]
-    bar.AutomaticLabelFormat = 0
-    bar.LabelFormat = bar.RangeLabelFormat = "%-#.2f"
-    bar.Orientation = "Horizontal"
-    bar.WindowLocation = "Lower Center"
-    bar.ScalarBarLength = 0.5
-
+    views.colour_by(shown, coloured, DISTANCE, "distance (mm), negative: inside", -greatest, greatest,
+                    "Cool to Warm")
+    box = distance.GetDataInformation(0).GetBounds()
     for view in (overlay, coloured):
-        phase = simple.AnnotateTimeFilter(model, registrationName="Phase",
-                                          Format="{time:.3f} of the R-R interval")
-        label = simple.Show(phase, view)
-        label.Color = [0.0, 0.0, 0.0]
-        label.WindowLocation = "Upper Left Corner"
-        look_from_the_front(view)
+        views.look_from_the_front(view, box)
+    views.note_phase((overlay, coloured), model)
     simple.AddCameraLink(overlay, coloured, "Model and truth")
     simple.SetActiveView(overlay)
     simple.Render(overlay)
     simple.Render(coloured)
     return {"distance": distance, "views": (overlay, coloured), "layout": layout}
-
-
-def look_from_the_front(view):
-    """LPS: the viewer stands before the patient, who stands upright."""
-    view.UseColorPaletteForBackground = 0
-    view.Background = [1.0, 1.0, 1.0]
-    view.OrientationAxesLabelColor = [0.0, 0.0, 0.0]
-    view.CameraParallelProjection = 1
-    view.CameraPosition = [0.0, -1.0, 0.0]
-    view.CameraFocalPoint = [0.0, 0.0, 0.0]
-    view.CameraViewUp = [0.0, 0.0, 1.0]
-    simple.ResetCamera(view)
-    # The sphere around the tree fits; the tree is flatter.
-    view.CameraParallelScale *= 0.8
 
 
 def selected_series():

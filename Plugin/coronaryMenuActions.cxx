@@ -1,0 +1,67 @@
+#include "coronaryMenuActions.h"
+
+#include <pqPVApplicationCore.h>
+#include <pqPythonManager.h>
+
+#include <QAction>
+#include <QByteArray>
+#include <QMenu>
+#include <QTimer>
+#include <QWidget>
+
+coronaryMenuActions::coronaryMenuActions(QObject* parent)
+  : QActionGroup(parent)
+{
+  this->Add("coronaryBuild", "Build from 4D CT",
+    "The whole pipeline on the selected image series; on a small phantom when there is nothing yet",
+    "build");
+  this->Add("coronaryCompare", "Compare Series",
+    "The selected model over the selected truth, and its distance from it", "compare");
+  this->AddSeparator();
+  this->Add(
+    "coronaryPhantom", "Example: Phantom", "A beating phantom: surface and gated CT", "phantom");
+  this->Add("coronaryReview", "Example: Overlay Review",
+    "A model over the truth, and its distance from it, phase by phase", "overlay_review");
+  this->Add("coronaryPosing", "Example: Posing",
+    "A coronary tree that is bent by the joints of its skeleton", "posing");
+  this->Add("coronaryExport", "Example: CFD Export",
+    "A moving mesh of tetrahedra for simulations of flow", "cfd_export");
+  this->NameMenu();
+}
+
+coronaryMenuActions::~coronaryMenuActions() = default;
+
+void coronaryMenuActions::Add(
+  const char* name, const char* text, const char* help, const char* function)
+{
+  auto* action = new QAction(text, this);
+  action->setObjectName(name);
+  action->setToolTip(help);
+  action->setStatusTip(help);
+  // With paraview.simple Python finds the modules of plugins.
+  const QByteArray code =
+    QByteArray("import paraview.simple\nimport coronary_menu\ncoronary_menu.") + function + "()\n";
+  QObject::connect(action, &QAction::triggered, this,
+    [code] { pqPVApplicationCore::instance()->pythonManager()->executeCode(code); });
+}
+
+void coronaryMenuActions::NameMenu()
+{
+  // ParaView makes the menu, once there is a window, and gives it no name: recorded tests need one.
+  for (QWidget* widget : this->actions().first()->associatedWidgets())
+  {
+    if (qobject_cast<QMenu*>(widget))
+    {
+      widget->setObjectName("menuDynamicCoronary");
+      return;
+    }
+  }
+  constexpr int Milliseconds = 100;
+  QTimer::singleShot(Milliseconds, this, [this] { this->NameMenu(); });
+}
+
+void coronaryMenuActions::AddSeparator()
+{
+  auto* action = new QAction(this);
+  action->setSeparator(true);
+}

@@ -1,0 +1,229 @@
+"""What the scripts of the menu Dynamic Coronary share: views, colours, legends, notes."""
+from paraview import servermanager, simple
+
+WALL = [0.80, 0.16, 0.16]
+LINE = [1.0, 0.85, 0.2]
+BLACK = [0.0, 0.0, 0.0]
+WHITE = [1.0, 1.0, 1.0]
+# One after the other, for neighbours that can be told apart.
+SEGMENTS = [[0.84, 0.15, 0.16], [0.12, 0.47, 0.71], [0.17, 0.63, 0.17], [1.00, 0.50, 0.05], [0.58, 0.40, 0.74],
+            [0.55, 0.34, 0.29], [0.89, 0.47, 0.76], [0.50, 0.50, 0.50], [0.74, 0.74, 0.13], [0.09, 0.75, 0.81]]
+PHASE = "{time:.0f} % of the R-R interval"
+RADIUS = "MaximumInscribedSphereRadius"
+
+
+def require_plugin():
+    """Raises RuntimeError without the plugin."""
+    if not hasattr(simple, "CoronaryPhantom"):
+        raise RuntimeError("The DynamicCoronary plugin is not loaded (Tools, Manage Plugins).")
+
+
+def new_layout(name, size=None):
+    """A layout, and its first view; an empty one that is there is taken. `size` in pixels of all views together,
+    None: as large as the window."""
+    view = simple.GetActiveView()
+    layout = simple.GetLayout(view) if view and view.GetXMLName() == "RenderView" else None
+    if layout and not layout.GetSplitDirection(0) and not list(view.Representations):
+        simple.RenameLayout(name, layout)
+    else:
+        layout = simple.CreateLayout(name)
+        view = simple.CreateView("RenderView")
+        simple.AssignViewToLayout(view, layout, 0)
+    if size:
+        layout.SetSize(*size)
+    return layout, view
+
+
+def split(layout, cell, share, downwards=False):
+    """Another view at the right of the cell of a layout, or below; gives the view and the number of its cell.
+
+    The cell becomes the one of number 2 * cell + 1.
+    """
+    cut = layout.SplitVertical if downwards else layout.SplitHorizontal
+    second = cut(cell, share) + 1
+    view = simple.CreateView("RenderView")
+    simple.AssignViewToLayout(view, layout, second)
+    return view, second
+
+
+def look_along(view, direction, up, box, zoom=1.25):
+    """White, parallel rays along `direction` (LPS, length 1); the sphere around `box` (bounds) fills the view, or
+    `zoom` times more."""
+    centre = [0.5 * (low + high) for low, high in zip(box[::2], box[1::2])]
+    radius = 0.5 * sum((high - low) ** 2 for low, high in zip(box[::2], box[1::2])) ** 0.5
+    view.UseColorPaletteForBackground = 0
+    view.Background = WHITE
+    view.OrientationAxesLabelColor = BLACK
+    view.CameraParallelProjection = 1
+    view.CameraFocalPoint = centre
+    view.CameraPosition = [middle - 4.0 * radius * part for middle, part in zip(centre, direction)]
+    view.CameraViewUp = up
+    view.CameraParallelScale = radius / zoom
+
+
+def look_from_the_front(view, box, zoom=1.25):
+    """LPS: the viewer stands before the patient, who stands upright."""
+    look_along(view, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], box, zoom)
+
+
+def look_from_the_feet(view, box, zoom=1.25):
+    """An axial slice as radiologists have it: on black, from the feet, the patient's right is at the left."""
+    look_along(view, [0.0, 0.0, 1.0], [0.0, -1.0, 0.0], box, zoom)
+    view.Background = BLACK
+    view.OrientationAxesVisibility = 0
+
+
+def plain(shown, colour, opacity=1.0):
+    """One colour instead of an array's."""
+    shown.ColorArrayName = ["POINTS", ""]
+    shown.AmbientColor = shown.DiffuseColor = colour
+    shown.Opacity = opacity
+
+
+def colour_by(shown, view, array, title, low, high, preset="Plasma (matplotlib)", where="POINTS"):
+    """Colours of a point array from `low` to `high`, with a legend below."""
+    simple.ColorBy(shown, (where, array))
+    transfer = simple.GetColorTransferFunction(array)
+    transfer.ApplyPreset(preset, True)
+    transfer.RescaleTransferFunction(low, high)
+    transfer.AutomaticRescaleRangeMode = "Never"
+    shown.SetScalarBarVisibility(view, True)
+    return legend(view, array, title, "%-#.2f" if high < 5.0 else "%-#.1f")
+
+
+def ink(view):
+    """Black on white, white on black."""
+    return WHITE if list(view.Background) == BLACK else BLACK
+
+
+def legend(view, array, title, form):
+    """The bar of an array's colours, below in a view; `form` as of printf."""
+    bar = simple.GetScalarBar(simple.GetColorTransferFunction(array), view)
+    bar.Title = title
+    bar.ComponentTitle = ""
+    bar.TitleColor = bar.LabelColor = ink(view)
+    bar.AutomaticLabelFormat = 0
+    bar.LabelFormat = bar.RangeLabelFormat = form
+    bar.Orientation = "Horizontal"
+    bar.WindowLocation = "Lower Center"
+    bar.ScalarBarLength = 0.5
+    return bar
+
+
+def grey_slice(shown, array, low, high):
+    """Grey values of an image between `low` and `high`, and no legend."""
+    simple.ColorBy(shown, ("POINTS", array))
+    transfer = simple.GetColorTransferFunction(array)
+    transfer.ApplyPreset("Grayscale", True)
+    transfer.RescaleTransferFunction(low, high)
+    transfer.AutomaticRescaleRangeMode = "Never"
+
+
+def note(view, words, name, place="Upper Right Corner", size=16):
+    """A line of text in a view."""
+    text = simple.Text(registrationName=name, Text=words)
+    shown = simple.Show(text, view)
+    shown.Color = ink(view)
+    shown.FontSize = size
+    shown.WindowLocation = place
+    return text
+
+
+def note_phase(views, source, name="Phase"):
+    """The phase that is shown, in per cent of the R-R interval, in each view."""
+    phase = simple.AnnotateTimeFilter(source, registrationName=name, Format=PHASE, Scale=100.0)
+    for view in views:
+        label = simple.Show(phase, view)
+        label.Color = ink(view)
+        label.FontSize = 18
+        label.WindowLocation = "Upper Left Corner"
+    return phase
+
+
+def fetched(port, time=None):
+    """The data of an output port, on the client."""
+    tap = servermanager.filters.ReductionFilter(Input=port)
+    tap.UpdatePipeline(*([] if time is None else [time]))
+    data = tap.GetClientSideObject().GetOutputDataObject(0)
+    copy = data.NewInstance()
+    copy.ShallowCopy(data)
+    return copy
+
+
+def is_port(source):
+    """Whether this is one output port of a source."""
+    return source.__class__.__name__ == "OutputPort"
+
+
+def proxy_of(source):
+    """The source itself, of a source or one of its output ports."""
+    return source.Proxy if is_port(source) else source
+
+
+def name_of(source):
+    """What the pipeline browser calls a source."""
+    for (name, _), known in simple.GetSources().items():
+        if known == proxy_of(source):
+            return name
+    return proxy_of(source).GetXMLLabel()
+
+
+def times_of(source):
+    """The time steps of a source, increasing; none of a still one."""
+    proxy = proxy_of(source)
+    proxy.UpdatePipelineInformation()
+    steps = getattr(proxy, "TimestepValues", None)
+    if steps is None:
+        return []
+    return sorted(steps) if hasattr(steps, "__len__") else [float(steps)]
+
+
+def is_image(source):
+    """Whether the first output of a source, or an output port, is an image."""
+    output = proxy_of(source).SMProxy.GetOutputPort(source.Port if is_port(source) else 0)
+    if not output.GetDataInformation().GetDataSetTypeAsString().startswith("vtk"):
+        proxy_of(source).UpdatePipeline()
+    return output.GetDataInformation().GetDataSetTypeAsString() == "vtkImageData"
+
+
+def is_series(source):
+    """Whether a source is an image that changes with time, and not made of another one."""
+    return not hasattr(source, "Input") and is_image(source) and len(times_of(source)) > 1
+
+
+def image_array(source):
+    """The scalars of an image."""
+    return source.PointData.GetArray(0).GetName()
+
+
+def grey_window(source, array, usual):
+    """`usual`, unless the image can not be CT in Hounsfield units: then its range."""
+    low, high = source.PointData[array].GetRange()
+    return usual if low < -100.0 and high > usual[1] / 2.0 else (low, high)
+
+
+def name_segments(source, shown, view):
+    """Colours of a named tree's lines by their SCCT segments, and the names beside them.
+
+    `shown` is the representation of `source` in `view`. The names are labels of a selection: another selection takes
+    their place.
+    """
+    ids = fetched(source).GetCellData().GetArray("SegmentIds")
+    segments = sorted({int(ids.GetTuple1(n)) for n in range(ids.GetNumberOfTuples())})
+    simple.ColorBy(shown, ("CELLS", "SegmentIds"))
+    transfer = simple.GetColorTransferFunction("SegmentIds")
+    transfer.InterpretValuesAsCategories = 1
+    transfer.AnnotationsInitialized = 1
+    transfer.Annotations = [word for number in segments for word in (str(number), str(number))]
+    transfer.IndexedColors = [part for n in range(len(segments)) for part in SEGMENTS[n % len(SEGMENTS)]]
+    transfer.IndexedOpacities = [1.0] * len(segments)
+    shown.SetScalarBarVisibility(view, False)
+    active = simple.GetActiveSource()
+    simple.SetActiveSource(source)
+    simple.QuerySelect(QueryString="(id >= 0)", FieldType="CELL")
+    simple.SetActiveSource(active)
+    shown.SelectionOpacity = 0.0
+    shown.SelectionCellLabelVisibility = 1
+    shown.SelectionCellFieldDataArrayName = "SegmentLabel"
+    shown.SelectionCellLabelColor = BLACK
+    shown.SelectionCellLabelFontSize = 15
