@@ -407,11 +407,18 @@ void CheckKeys(const GltfModel& model)
   }
 }
 
-/// Whether the first key has to come again at the end of the period.
-bool Closes(const GltfModel& model)
+constexpr double SamePhase = 1e-9; ///< of a period
+
+/// Those of one period where the animation loops, else all.
+std::vector<GltfKey> KeysOf(const GltfModel& model)
 {
-  return model.loop && model.keys.size() > 1 &&
-    model.keys.back().phase < model.keys.front().phase + model.period * (1.0 - 1e-9);
+  std::vector<GltfKey> keys = model.keys;
+  while (model.loop && keys.size() > 1 &&
+    keys.back().phase > keys.front().phase + model.period * (1.0 + SamePhase))
+  {
+    keys.pop_back();
+  }
+  return keys;
 }
 
 /// Unit normals of the points, weighted by the areas around.
@@ -467,6 +474,7 @@ public:
   Document(const GltfModel& model, const GltfSkin& skin)
     : Model(model)
     , Skin(skin)
+    , Keys(KeysOf(model))
     , Nodes(model, HasCalibre(model))
   {
     CheckKeys(model);
@@ -717,16 +725,23 @@ private:
     return attributes;
   }
 
+  /// Whether the first key has to come again at the end of the period.
+  bool Closes() const
+  {
+    return this->Model.loop && this->Keys.size() > 1 &&
+      this->Keys.back().phase < this->Keys.front().phase + this->Model.period * (1.0 - SamePhase);
+  }
+
   /// Seconds of the keys, the last one that of the return to the first.
   std::vector<float> Times() const
   {
     std::vector<float> times;
-    for (const GltfKey& key : this->Model.keys)
+    for (const GltfKey& key : this->Keys)
     {
       times.push_back(
-        static_cast<float>((key.phase - this->Model.keys[0].phase) * this->Model.cycleLength));
+        static_cast<float>((key.phase - this->Keys[0].phase) * this->Model.cycleLength));
     }
-    if (Closes(this->Model))
+    if (this->Closes())
     {
       times.push_back(static_cast<float>(this->Model.period * this->Model.cycleLength));
     }
@@ -735,16 +750,16 @@ private:
 
   void AddAnimation()
   {
-    if (this->Model.keys.empty())
+    if (this->Keys.empty())
     {
       return;
     }
     std::vector<std::vector<LocalPose>> keys;
-    for (const GltfKey& key : this->Model.keys)
+    for (const GltfKey& key : this->Keys)
     {
       keys.push_back(this->Nodes.Local(key.motion));
     }
-    if (Closes(this->Model))
+    if (this->Closes())
     {
       keys.push_back(keys.front());
     }
@@ -812,7 +827,7 @@ private:
   {
     Json phases = Json::array();
     Json deviations = Json::array();
-    for (const GltfKey& key : this->Model.keys)
+    for (const GltfKey& key : this->Keys)
     {
       phases.push_back(key.phase);
       deviations.push_back(std::round(key.largestDeviation * 1e6) / 1e6);
@@ -820,13 +835,14 @@ private:
     return { { "unit", "m" }, { "axes", "+X left, +Y superior, +Z anterior" },
       { "source_axes", "LPS" }, { "source_unit", "mm" }, { "from_source", "(x, z, -y) / 1000" },
       { "phases", std::move(phases) }, { "cycle_s", this->Model.cycleLength },
-      { "cycle_known", this->Model.cycleLengthKnown }, { "closed", Closes(this->Model) },
+      { "cycle_known", this->Model.cycleLengthKnown }, { "closed", this->Closes() },
       { "influences", this->Skin.Influences() },
       { "largest_deviation_mm", std::move(deviations) } };
   }
 
   const GltfModel& Model;
   const GltfSkin& Skin;
+  std::vector<GltfKey> Keys;
   BoneNodes Nodes;
   Json Json_;
   Buffer Data;
