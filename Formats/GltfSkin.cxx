@@ -562,8 +562,6 @@ private:
     constexpr const char* Ends[] = { "", " end", " calibre", " end calibre" };
     for (std::size_t b = 0; b < names.size(); ++b)
     {
-      const std::int64_t parent = this->Model.bones[b].parent;
-      const std::size_t ends = this->NodeOf(b, TailNode);
       for (std::size_t kind = 0; kind < kinds; ++kind)
       {
         const LocalPose& pose = local[kinds * b + kind];
@@ -578,15 +576,6 @@ private:
           { "end", kind == HeadNode || kind == HeadCalibre ? "first" : "second" } };
         nodes[this->NodeOf(b, kind)] = std::move(node);
       }
-      nodes[this->NodeOf(b, HeadNode)]["children"].push_back(ends);
-      if (kinds > 2)
-      {
-        nodes[this->NodeOf(b, HeadNode)]["children"].push_back(this->NodeOf(b, HeadCalibre));
-        nodes[ends]["children"].push_back(this->NodeOf(b, TailCalibre));
-      }
-      const std::size_t above =
-        parent < 0 ? 0 : this->NodeOf(static_cast<std::size_t>(parent), TailNode);
-      nodes[above]["children"].push_back(this->NodeOf(b, HeadNode));
       for (const Pose& pose : { this->Nodes.Head(rest[b], b), this->Nodes.Tail(rest[b], b) })
       {
         joints.push_back(this->NodeOf(b, joints.size() % 2 + (kinds > 2 ? 2 : 0)));
@@ -597,6 +586,7 @@ private:
         }
       }
     }
+    this->Connect(nodes);
     for (Json& node : nodes)
     {
       this->Json_["nodes"].push_back(std::move(node));
@@ -604,6 +594,25 @@ private:
     this->Data.BeginView(0);
     this->Json_["skins"] = { { { "name", this->Model.name }, { "skeleton", 0 },
       { "inverseBindMatrices", this->Data.Floats(inverse, 16, false) }, { "joints", joints } } };
+  }
+
+  /// Gives the nodes their children: a bone hangs on the end of the one before it.
+  void Connect(std::vector<Json>& nodes) const
+  {
+    for (std::size_t b = 0; b < this->Model.bones.size(); ++b)
+    {
+      const std::int64_t parent = this->Model.bones[b].parent;
+      const std::size_t ends = this->NodeOf(b, TailNode);
+      nodes[this->NodeOf(b, HeadNode)]["children"].push_back(ends);
+      if (this->Nodes.KindsPerBone() > 2)
+      {
+        nodes[this->NodeOf(b, HeadNode)]["children"].push_back(this->NodeOf(b, HeadCalibre));
+        nodes[ends]["children"].push_back(this->NodeOf(b, TailCalibre));
+      }
+      const std::size_t above =
+        parent < 0 ? 0 : this->NodeOf(static_cast<std::size_t>(parent), TailNode);
+      nodes[above]["children"].push_back(this->NodeOf(b, HeadNode));
+    }
   }
 
   /// "pLAD" of "pLAD-2".

@@ -156,7 +156,7 @@ TEST(GltfSkin, ViewersSeeTheDeformedPointsAtEveryKey)
   {
     GltfModel model = ModelOf(rig, 3);
     const GltfSkin skin(model, 8);
-    EXPECT_EQ(skin.LargestDropped(), 0.0F);
+    EXPECT_LT(skin.LargestDropped(), 1e-7F);
     const auto truth = AddKeys(rig, model, skin, Phases, calibre);
     const GltfEvaluator file(coronary::GltfBinary(model, skin));
     ASSERT_EQ(file.Times().size(), Phases.size() + 1);
@@ -165,7 +165,7 @@ TEST(GltfSkin, ViewersSeeTheDeformedPointsAtEveryKey)
       EXPECT_GT(LargestDistance(truth[k], model.points), 0.5) << "does not move";
       EXPECT_LT(LargestDistance(file.Vertices("wall", static_cast<int>(k)), truth[k]), FloatError)
         << "calibre " << calibre << ", key " << k;
-      EXPECT_LT(model.keys[k].largestDeviation, 1e-5);
+      EXPECT_LT(model.keys[k].largestDeviation, 5e-5);
     }
     // The last key is the first one again.
     EXPECT_EQ(LargestDistance(
@@ -194,8 +194,8 @@ TEST(GltfSkin, FewerInfluencesDeviateByWhatIsReported)
   GltfModel more = ModelOf(rig, 6);
   const GltfSkin whole(more, 12);
   AddKeys(rig, more, whole, Phases, true);
-  EXPECT_EQ(whole.LargestDropped(), 0.0F);
-  EXPECT_LT(more.keys[1].largestDeviation, 1e-5);
+  EXPECT_LT(whole.LargestDropped(), 1e-7F);
+  EXPECT_LT(more.keys[1].largestDeviation, 5e-5);
 }
 
 TEST(GltfSkin, TwistIsBlendedLinearly)
