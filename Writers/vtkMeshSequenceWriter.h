@@ -103,7 +103,7 @@ public:
   ///@}
 
   ///@{
-  /// One cycle in the unit of the input's time, positive. Default 1.
+  /// One cycle in the unit of the input's time, positive: of even phases, and of glTF's loop. Default 1.
   vtkSetMacro(Period, double);
   vtkGetMacro(Period, double);
   ///@}
@@ -165,7 +165,7 @@ public:
   ///@}
 
   ///@{
-  /// Whether the glTF animation comes back to its first phase after a Period. Default on.
+  /// Whether the glTF animation comes back to its first phase after a Period; phases beyond it are left out. Default on.
   vtkSetMacro(GltfLoop, bool);
   vtkGetMacro(GltfLoop, bool);
   vtkBooleanMacro(GltfLoop, bool);
