@@ -636,24 +636,35 @@ private:
       material("caps", { 0.8, 0.68, 0.45, 1.0 }) };
   }
 
-  /// Faces of one kind, with vertices of their own: normals break where they meet the others.
+  /// Faces of one kind.
   void AddMesh(bool caps, std::vector<std::size_t>& roots)
   {
-    constexpr auto None = std::numeric_limits<std::uint32_t>::max();
-    std::vector<Triangle> triangles;
+    Json mesh = { { "name", caps ? "caps" : "wall" }, { "primitives", Json::array() } };
     for (const GltfFace& face : this->Model.faces)
     {
-      if (face.cap == caps)
+      if (face.cap == caps && !face.triangles.empty())
       {
-        triangles.insert(triangles.end(), face.triangles.begin(), face.triangles.end());
+        mesh["primitives"].push_back(this->Primitive(face));
       }
     }
-    if (triangles.empty())
+    if (mesh["primitives"].empty())
     {
       return;
     }
+    Json& meshes = this->Json_["meshes"];
+    roots.push_back(this->Json_["nodes"].size());
+    this->Json_["nodes"].push_back(
+      { { "name", caps ? "caps" : "wall" }, { "mesh", meshes.size() }, { "skin", 0 } });
+    meshes.push_back(std::move(mesh));
+  }
+
+  /// A face with vertices of its own: normals break where it meets the others, and VTK's reader moves only
+  /// one of several primitives that share them.
+  Json Primitive(const GltfFace& face)
+  {
+    constexpr auto None = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::uint32_t> local(this->Model.points.size(), None);
-    for (const Triangle& t : triangles)
+    for (const Triangle& t : face.triangles)
     {
       for (const std::int64_t corner : t)
       {
@@ -671,32 +682,18 @@ private:
         points.push_back(n);
       }
     }
-    const Json attributes = this->Attributes(points, NormalsOf(this->Model.points, triangles));
-    Json mesh = { { "name", caps ? "caps" : "wall" }, { "primitives", Json::array() } };
-    this->Data.BeginView(IndexBuffer);
-    for (const GltfFace& face : this->Model.faces)
+    Json attributes = this->Attributes(points, NormalsOf(this->Model.points, face.triangles));
+    std::vector<std::uint32_t> indices;
+    for (const Triangle& t : face.triangles)
     {
-      if (face.cap != caps || face.triangles.empty())
+      for (const std::int64_t corner : t)
       {
-        continue;
+        indices.push_back(local[static_cast<std::size_t>(corner)]);
       }
-      std::vector<std::uint32_t> indices;
-      for (const Triangle& t : face.triangles)
-      {
-        for (const std::int64_t corner : t)
-        {
-          indices.push_back(local[static_cast<std::size_t>(corner)]);
-        }
-      }
-      mesh["primitives"].push_back(
-        { { "attributes", attributes }, { "indices", this->Data.Indices(indices) },
-          { "material", caps ? 1 : 0 }, { "mode", 4 }, { "extras", { { "face", face.name } } } });
     }
-    Json& meshes = this->Json_["meshes"];
-    roots.push_back(this->Json_["nodes"].size());
-    this->Json_["nodes"].push_back(
-      { { "name", caps ? "caps" : "wall" }, { "mesh", meshes.size() }, { "skin", 0 } });
-    meshes.push_back(std::move(mesh));
+    this->Data.BeginView(IndexBuffer);
+    return { { "attributes", std::move(attributes) }, { "indices", this->Data.Indices(indices) },
+      { "material", face.cap ? 1 : 0 }, { "mode", 4 }, { "extras", { { "face", face.name } } } };
   }
 
   Json Attributes(const std::vector<std::size_t>& points, const std::vector<Vector3>& normals)

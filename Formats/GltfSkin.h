@@ -26,7 +26,8 @@
 
 namespace coronary
 {
-/// Triangles that have a name. All that have the same `cap` become one mesh, each a primitive of it.
+/// Triangles that have a name. All that have the same `cap` become one mesh, each a primitive of it with its own vertices,
+/// which are the points in their order as far as the face has them.
 struct GltfFace
 {
   std::string name;

@@ -20,6 +20,7 @@ common=(
   libfreetype-dev libgif-dev libglew-dev libx11-dev
   libgtest-dev clang-format-14 xvfb xauth
   pkg-config libevdev-dev libopenigtlink-dev
+  nodejs curl ca-certificates
 )
 paraview=(
   paraview-dev python3-paraview

@@ -70,22 +70,23 @@ public:
     return this->Values(this->Document["animations"][0]["samplers"][0]["input"]);
   }
 
-  const nlohmann::json& Attributes(const std::string& mesh) const
+  const nlohmann::json& Attributes(const std::string& mesh, std::size_t primitive = 0) const
   {
     for (const auto& each : this->Document["meshes"])
     {
       if (each["name"] == mesh)
       {
-        return each["primitives"][0]["attributes"];
+        return each["primitives"][primitive]["attributes"];
       }
     }
     throw std::runtime_error("no mesh " + mesh);
   }
 
-  /// Vertices of a mesh at a key, moved by its skin, in LPS and mm; -1: at rest, without the skin.
-  std::vector<Eigen::Vector3d> Vertices(const std::string& mesh, int key) const
+  /// Vertices of a primitive at a key, moved by its skin, in LPS and mm; -1: at rest, without the skin.
+  std::vector<Eigen::Vector3d> Vertices(
+    const std::string& mesh, int key, std::size_t primitive = 0) const
   {
-    const auto& attributes = this->Attributes(mesh);
+    const auto& attributes = this->Attributes(mesh, primitive);
     const std::vector<double> positions = this->Values(attributes["POSITION"]);
     std::vector<Eigen::Vector3d> result;
     std::vector<Eigen::Affine3d> joints;

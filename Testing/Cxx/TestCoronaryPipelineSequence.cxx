@@ -163,13 +163,14 @@ TEST_F(TestCoronaryPipelineSequence, TheKhronosValidatorFindsNothing)
   Save(vtkNew<vtkXMLUnstructuredGridWriter>(), volume, this->Folder / "result/weights.vtu");
   Save(vtkNew<vtkXMLPolyDataWriter>(), ChainBoundary(volume, 1),
     this->Folder / "result/volume_boundary.vtp");
-  for (const char* name : { "skeleton.vtp", "motion/skeleton_000.vtp" })
+  for (const char* name : { "skeleton.vtp", "motion/skeleton_000.vtp", "motion/skeleton_001.vtp" })
   {
     Save(vtkNew<vtkXMLPolyDataWriter>(), ChainSkeleton(1), this->Folder / "result" / name);
   }
   ASSERT_EQ(
-    this->Run("result --poses result/motion/skeleton_000.vtp --pose-times 0.4 --mode linear "
-              "--times 0.4 --formats gltf --gltf-influences 8 --quiet --output one"),
+    this->Run("result --poses result/motion/skeleton_000.vtp result/motion/skeleton_001.vtp "
+              "--pose-times 0,0.4 --times 0.4 --formats gltf --gltf-influences 8 --quiet "
+              "--output one"),
     0)
     << ReadText(this->Folder / "stderr");
   const std::string command = "cd '" + this->Folder.string() +
