@@ -69,7 +69,7 @@ bool IsBareName(const std::string& name)
   const std::string kind = name.substr(0, end);
   return end != std::string::npos && name.find("..") == std::string::npos &&
     (kind == "volume" || kind == "surface" || kind == "vmtk" || kind == "simvascular" ||
-      kind == "quality");
+      kind == "skin" || kind == "quality");
 }
 
 std::string Joined(const std::vector<std::int64_t>& ids)

@@ -5,10 +5,13 @@
 #include "MeshSequenceReport.h"
 #include "PartialProgress.h"
 #include "StagedFolder.h"
+#include "SurfaceFile.h"
 #include "TetrahedralBoundary.h"
+#include "vtkBoneMotion.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkGltfModel.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -577,6 +580,22 @@ vtkSmartPointer<vtkPoints> PointsOf(
   return points;
 }
 
+/// A vector array of the mesh, if it has it, as three numbers a point: `letter` and x, y or z.
+void AddVectors(vtkPointSet* mesh, const char* name, const std::string& letter,
+  const std::vector<vtkIdType>& points, coronary::FileSurface& surface)
+{
+  vtkDataArray* array = mesh->GetPointData()->GetArray(name);
+  for (int c = 0; array != nullptr && array->GetNumberOfComponents() == 3 && c < 3; ++c)
+  {
+    std::vector<float> values;
+    for (const vtkIdType point : points)
+    {
+      values.push_back(static_cast<float>(array->GetComponent(point, c)));
+    }
+    surface.vertexValues.emplace_back(letter + "xyz"[c], std::move(values));
+  }
+}
+
 /// One phase, measured.
 struct PhaseMesh
 {
@@ -627,9 +646,16 @@ public:
     coronary::WriteFileAtomically(this->Folder.Add(name), text);
   }
 
+  /// A file of one phase, of any kind but SimVascular's.
+  std::string BytesOf(const std::string& kind, const PhaseMesh& phase,
+    const std::vector<coronary::MeshSequenceReport::Face>& faces, bool keepWeights) const;
   vtkSmartPointer<vtkUnstructuredGrid> Volume(const PhaseMesh& phase, bool keepWeights) const;
   vtkSmartPointer<vtkPolyData> SurfaceOf(const PhaseMesh& phase, bool keepWeights) const;
   vtkSmartPointer<vtkUnstructuredGrid> Vmtk(const PhaseMesh& phase, bool keepWeights) const;
+  coronary::FileSurface PlainSurface(const PhaseMesh& phase,
+    const std::vector<coronary::MeshSequenceReport::Face>& faces, bool values) const;
+  std::unique_ptr<vtkGltfModel> NewGltf(vtkPointSet* mesh,
+    const std::vector<coronary::MeshSequenceReport::Face>& faces, int influences) const;
   void WriteSimVascular(const std::string& folder, const PhaseMesh& phase,
     const std::vector<coronary::MeshSequenceReport::Face>& faces, double unit);
 
@@ -637,7 +663,8 @@ public:
   const std::string Prefix;
 
 private:
-  void AddFields(const PhaseMesh& phase, vtkDataSet* data) const;
+  void AddFields(const PhaseMesh& phase, bool keepWeights, vtkDataSet* data) const;
+  std::vector<Triangle> LocalTriangles() const;
   vtkSmartPointer<vtkPolyData> Face(const PhaseMesh& phase, const Patch& patch, double unit) const;
 
   coronary::StagedFolder Folder;
@@ -649,10 +676,14 @@ private:
 };
 
 /// Field data of the phase instead of those at rest.
-void SequenceFiles::AddFields(const PhaseMesh& phase, vtkDataSet* data) const
+void SequenceFiles::AddFields(const PhaseMesh& phase, bool keepWeights, vtkDataSet* data) const
 {
   vtkNew<vtkFieldData> fields;
   fields->ShallowCopy(phase.mesh->GetFieldData());
+  if (!keepWeights)
+  {
+    vtkBoneMotion::Remove(fields);
+  }
   AddNumber(fields, names::PhaseTime, phase.time);
   AddNumber(fields, names::SurfaceArea, phase.surface.area);
   if (!this->Topo.tetrahedra.empty())
@@ -693,7 +724,7 @@ vtkSmartPointer<vtkUnstructuredGrid> SequenceFiles::Volume(
     cells, names::MinimumDihedralAngle, phase.tetrahedra.minimumDihedral);
   vtkCoronary::AddArray<vtkDoubleArray>(
     cells, names::RadiusEdgeRatio, phase.tetrahedra.radiusEdgeRatio);
-  this->AddFields(phase, grid);
+  this->AddFields(phase, keepWeights, grid);
   return grid;
 }
 
@@ -728,7 +759,7 @@ vtkSmartPointer<vtkPolyData> SequenceFiles::SurfaceOf(
   }
   vtkCoronary::AddArray<vtkIntArray>(
     surface->GetCellData(), this->Topo.entityIdsName, this->Topo.entity);
-  this->AddFields(phase, surface);
+  this->AddFields(phase, keepWeights, surface);
   return surface;
 }
 
@@ -775,6 +806,60 @@ vtkSmartPointer<vtkPolyData> SequenceFiles::Face(
   return face;
 }
 
+/// The surface's triangles on its own points.
+std::vector<Triangle> SequenceFiles::LocalTriangles() const
+{
+  return ReadCells<3>(this->Surface.cells);
+}
+
+/// @param values  whether normals, displacements and velocities are wanted, as far as the mesh has them
+coronary::FileSurface SequenceFiles::PlainSurface(const PhaseMesh& phase,
+  const std::vector<coronary::MeshSequenceReport::Face>& faces, bool values) const
+{
+  coronary::FileSurface surface;
+  std::ostringstream comment;
+  comment << "DynamicCoronary, mm, LPS, time " << phase.time;
+  surface.comment = comment.str();
+  surface.points.resize(this->Surface.points.size());
+  for (std::size_t n = 0; n < surface.points.size(); ++n)
+  {
+    phase.mesh->GetPoint(this->Surface.points[n], surface.points[n].data());
+  }
+  surface.triangles = this->LocalTriangles();
+  surface.face = this->Topo.entity;
+  for (const auto& face : faces)
+  {
+    surface.faces.emplace_back(face.id, face.name);
+  }
+  if (values)
+  {
+    AddVectors(phase.mesh, names::Displacement, "d", this->Surface.points, surface);
+    AddVectors(phase.mesh, names::Velocity, "v", this->Surface.points, surface);
+  }
+  return surface;
+}
+
+std::unique_ptr<vtkGltfModel> SequenceFiles::NewGltf(vtkPointSet* mesh,
+  const std::vector<coronary::MeshSequenceReport::Face>& faces, int influences) const
+{
+  auto gltf = std::make_unique<vtkGltfModel>(mesh, this->Surface.points, influences);
+  const std::vector<Triangle> triangles = this->LocalTriangles();
+  for (const auto& face : faces)
+  {
+    coronary::GltfFace part{ face.name, face.id != WallId, {} };
+    for (std::size_t n = 0; n < triangles.size(); ++n)
+    {
+      if (this->Topo.entity[n] == face.id)
+      {
+        part.triangles.push_back(triangles[n]);
+      }
+    }
+    gltf->Model.faces.push_back(std::move(part));
+  }
+  gltf->Model.name = this->Name;
+  return gltf;
+}
+
 void SequenceFiles::WriteSimVascular(const std::string& folder, const PhaseMesh& phase,
   const std::vector<coronary::MeshSequenceReport::Face>& faces, double unit)
 {
@@ -805,10 +890,32 @@ void SequenceFiles::WriteSimVascular(const std::string& folder, const PhaseMesh&
   }
 }
 
+std::string SequenceFiles::BytesOf(const std::string& kind, const PhaseMesh& phase,
+  const std::vector<coronary::MeshSequenceReport::Face>& faces, bool keepWeights) const
+{
+  if (kind == "volume")
+  {
+    return XmlOf(this->Volume(phase, keepWeights));
+  }
+  if (kind == "surface")
+  {
+    return XmlOf(this->SurfaceOf(phase, keepWeights));
+  }
+  if (kind == "vmtk")
+  {
+    return XmlOf(this->Vmtk(phase, keepWeights));
+  }
+  const coronary::FileSurface surface = this->PlainSurface(phase, faces, kind == "ply");
+  return kind == "obj" ? coronary::ObjText(surface)
+    : kind == "ply"    ? coronary::PlyBytes(surface)
+                       : coronary::StlBytes(surface);
+}
+
 /// Files of one kind over the phases.
 struct Series
 {
-  std::string kind;
+  std::string kind; ///< in the report
+  std::string stem; ///< of the files' names
   std::string extension;
   std::vector<coronary::TimedFile> files;
 };
@@ -928,8 +1035,13 @@ void vtkMeshSequenceWriter::Validate() const
   Require(!path.empty(), "FileName is not set");
   Require(fs::path(path).extension() == ".json" && !fs::path(path).stem().empty(),
     "FileName must be the report's, NAME.json; '" + path + "' is not");
-  Require(this->WriteSeries || this->WriteSimVascular || this->WriteVmtk,
-    "There is nothing to write: WriteSeries, WriteSimVascular and WriteVmtk are off");
+  Require(this->WriteSeries || this->WriteSimVascular || this->WriteVmtk || this->WriteObj ||
+      this->WritePly || this->WriteStl || this->WriteGltf || this->WriteGltfJson,
+    "There is nothing to write: WriteSeries, WriteSimVascular, WriteVmtk, WriteObj, WritePly, "
+    "WriteStl, "
+    "WriteGltf and WriteGltfJson are off");
+  Require(this->GltfInfluences >= 4 && this->GltfInfluences <= 16 && this->GltfInfluences % 4 == 0,
+    "GltfInfluences must be 4, 8, 12 or 16");
   Require(this->Phases >= InputSteps && this->Phases <= ListedTimes, "Phases must be 0, 1 or 2");
   Require(this->NumberOfPhases >= 1 && this->NumberOfPhases <= 100000,
     "NumberOfPhases must be 1 to 100000");
@@ -1032,6 +1144,7 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
   result.poorAngle = this->PoorDihedralAngle * Degree;
   std::unique_ptr<SequenceFiles> files;
   std::vector<Series> series;
+  std::unique_ptr<vtkGltfModel> gltf;
   vtkCoronary::UpstreamRequest request(info, info);
   try
   {
@@ -1070,15 +1183,27 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
         result.surfacePoints = files->SurfacePoints();
         if (this->WriteSeries && result.tetrahedra > 0)
         {
-          series.push_back({ "volume", "vtu", {} });
+          series.push_back({ "volume", "volume", "vtu", {} });
         }
         if (this->WriteSeries)
         {
-          series.push_back({ "surface", "vtp", {} });
+          series.push_back({ "surface", "surface", "vtp", {} });
         }
         if (this->WriteVmtk)
         {
-          series.push_back({ "vmtk", "vtu", {} });
+          series.push_back({ "vmtk", "vmtk", "vtu", {} });
+        }
+        for (const auto& [wanted, kind] : { std::pair(this->WriteObj, "obj"),
+               std::pair(this->WritePly, "ply"), std::pair(this->WriteStl, "stl") })
+        {
+          if (wanted)
+          {
+            series.push_back({ kind, "surface", kind, {} });
+          }
+        }
+        if (this->WriteGltf || this->WriteGltfJson)
+        {
+          gltf = files->NewGltf(mesh, result.faces, this->GltfInfluences);
         }
       }
       const Topology& topology = files->GetTopology();
@@ -1104,23 +1229,14 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
         coronary::Report(
           report, (static_cast<double>(k) + 0.5) / static_cast<double>(times.size()));
         const std::string file =
-          files->Prefix + one.kind + "_" + files->Number(k) + "." + one.extension;
-        vtkSmartPointer<vtkDataSet> data;
-        if (one.kind == "volume")
-        {
-          data = files->Volume(phase, this->KeepWeights);
-        }
-        else if (one.kind == "surface")
-        {
-          data = files->SurfaceOf(phase, this->KeepWeights);
-        }
-        else
-        {
-          data = files->Vmtk(phase, this->KeepWeights);
-        }
-        files->Write(file, XmlOf(data));
+          files->Prefix + one.stem + "_" + files->Number(k) + "." + one.extension;
+        files->Write(file, files->BytesOf(one.kind, phase, result.faces, this->KeepWeights));
         one.files.push_back({ file, times[k] });
         entry.files.emplace_back(one.kind, file);
+      }
+      if (gltf)
+      {
+        gltf->AddPhase(mesh, times[k]);
       }
       if (this->WriteSimVascular)
       {
@@ -1138,10 +1254,34 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
     }
     for (const Series& one : series)
     {
-      const std::string stem = files->Prefix + one.kind;
-      files->Write(stem + ".pvd", coronary::PvdText(one.files));
-      files->Write(stem + "." + one.extension + ".series", coronary::FileSeriesText(one.files));
-      result.files.emplace_back(one.kind, stem + ".pvd");
+      const std::string stem = files->Prefix + one.stem;
+      const std::string list = stem + "." + one.extension + ".series";
+      files->Write(list, coronary::FileSeriesText(one.files));
+      const bool xml = one.kind != one.extension; // a .pvd list is for VTK's own
+      if (xml)
+      {
+        files->Write(stem + ".pvd", coronary::PvdText(one.files));
+      }
+      result.files.emplace_back(one.kind, xml ? stem + ".pvd" : list);
+    }
+    if (gltf)
+    {
+      gltf->Model.period = this->Period;
+      gltf->Model.loop = this->GltfLoop;
+      const auto write = [&](const char* kind, const char* extension, const std::string& bytes)
+      {
+        const std::string name = files->Prefix + "skin." + extension;
+        files->Write(name, bytes);
+        result.files.emplace_back(kind, name);
+      };
+      if (this->WriteGltf)
+      {
+        write("gltf", "glb", coronary::GltfBinary(gltf->Model, *gltf->Skin));
+      }
+      if (this->WriteGltfJson)
+      {
+        write("gltf-json", "gltf", coronary::GltfText(gltf->Model, *gltf->Skin));
+      }
     }
     files->Write(files->Prefix + "quality.csv", coronary::MeshSequenceCsv(result));
     result.files.emplace_back("quality", files->Prefix + "quality.csv");
@@ -1192,6 +1332,13 @@ void vtkMeshSequenceWriter::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "WriteSeries: " << this->WriteSeries << '\n';
   os << indent << "WriteSimVascular: " << this->WriteSimVascular << '\n';
   os << indent << "WriteVmtk: " << this->WriteVmtk << '\n';
+  os << indent << "WriteObj: " << this->WriteObj << '\n';
+  os << indent << "WritePly: " << this->WritePly << '\n';
+  os << indent << "WriteStl: " << this->WriteStl << '\n';
+  os << indent << "WriteGltf: " << this->WriteGltf << '\n';
+  os << indent << "WriteGltfJson: " << this->WriteGltfJson << '\n';
+  os << indent << "GltfInfluences: " << this->GltfInfluences << '\n';
+  os << indent << "GltfLoop: " << this->GltfLoop << '\n';
   os << indent << "SimVascularUnit: " << this->SimVascularUnit << '\n';
   os << indent << "KeepWeights: " << this->KeepWeights << '\n';
   os << indent << "PrefixFiles: " << this->PrefixFiles << '\n';

@@ -21,6 +21,9 @@
  *   mesh-complete.exterior.vtp, walls_combined.vtp, mesh-surfaces/FACE.vtp: `GlobalNodeID`, `GlobalElementID`,
  *   `ModelFaceID`, `ModelRegionID` (int, from 1)
  * - VMTK: NAME_vmtk_000.vtu ..: the tetrahedra with `CellEntityIds` 0, then the boundary triangles with theirs
+ * - OBJ, PLY, STL: the surface, NAME_surface_000.obj .., and a .series list
+ * - glTF: NAME_skin.glb, or NAME_skin.gltf: the surface at rest, its bones as a skin, and their motion. Needs the arrays
+ *   of vtkSkinDeformation: `Displacement`, `BoneIndices`, `BoneWeightsCompact`, field data of vtkBoneMotion.h
  * - NAME_quality.csv, and NAME.json: quality, faces and files
  *
  * Tetrahedra come out with `TetrahedronVolume`, `MinimumDihedralAngle`, `RadiusEdgeRatio` of the phase, and field
@@ -103,7 +106,7 @@ public:
   ///@}
 
   ///@{
-  /// One cycle in the unit of the input's time, positive. Default 1.
+  /// One cycle in the unit of the input's time, positive: of even phases, and of glTF's loop. Default 1.
   vtkSetMacro(Period, double);
   vtkGetMacro(Period, double);
   ///@}
@@ -133,6 +136,42 @@ public:
   vtkSetMacro(WriteVmtk, bool);
   vtkGetMacro(WriteVmtk, bool);
   vtkBooleanMacro(WriteVmtk, bool);
+  ///@}
+
+  ///@{
+  /// The surface as numbered files of other programs, and their .series lists. Default off.
+  vtkSetMacro(WriteObj, bool);
+  vtkGetMacro(WriteObj, bool);
+  vtkBooleanMacro(WriteObj, bool);
+  vtkSetMacro(WritePly, bool);
+  vtkGetMacro(WritePly, bool);
+  vtkBooleanMacro(WritePly, bool);
+  vtkSetMacro(WriteStl, bool);
+  vtkGetMacro(WriteStl, bool);
+  vtkBooleanMacro(WriteStl, bool);
+  ///@}
+
+  ///@{
+  /// The surface on its bones as one animated glTF file, binary (.glb) or text (.gltf). Default off.
+  vtkSetMacro(WriteGltf, bool);
+  vtkGetMacro(WriteGltf, bool);
+  vtkBooleanMacro(WriteGltf, bool);
+  vtkSetMacro(WriteGltfJson, bool);
+  vtkGetMacro(WriteGltfJson, bool);
+  vtkBooleanMacro(WriteGltfJson, bool);
+  ///@}
+
+  ///@{
+  /// Nodes that a point of the glTF file may hang on: 4 (default; what every viewer reads), 8, 12 or 16.
+  vtkSetMacro(GltfInfluences, int);
+  vtkGetMacro(GltfInfluences, int);
+  ///@}
+
+  ///@{
+  /// Whether the glTF animation comes back to its first phase after a Period; phases beyond it are left out. Default on.
+  vtkSetMacro(GltfLoop, bool);
+  vtkGetMacro(GltfLoop, bool);
+  vtkBooleanMacro(GltfLoop, bool);
   ///@}
 
   ///@{
@@ -219,6 +258,13 @@ private:
   bool WriteSeries = true;
   bool WriteSimVascular = false;
   bool WriteVmtk = false;
+  bool WriteObj = false;
+  bool WritePly = false;
+  bool WriteStl = false;
+  bool WriteGltf = false;
+  bool WriteGltfJson = false;
+  int GltfInfluences = 4;
+  bool GltfLoop = true;
   double SimVascularUnit = 1.0;
   bool KeepWeights = false;
   bool PrefixFiles = true;

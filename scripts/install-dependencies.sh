@@ -21,6 +21,7 @@ common=(
   libgtest-dev clang-format-14 xvfb xauth
   dpkg-dev file
   pkg-config libevdev-dev libopenigtlink-dev
+  nodejs curl ca-certificates
 )
 paraview=(
   paraview-dev python3-paraview

@@ -56,6 +56,8 @@ struct SequenceJob
   double cycleMs = 0.0; ///< 0: that of the poses
   std::vector<std::string> formats = { "series" };
   std::string unit = "mm";
+  int influences = 4;
+  bool loop = true;
   double poor = 15.0;
   int threads = 0;
   bool quiet = false;
@@ -149,10 +151,10 @@ void SequenceJob::Declare(CLI::App& app)
   const std::string files = "Files";
   app
     .add_option("--formats", this->formats,
-      "series (ParaView: .pvd and .series), simvascular (mesh-complete folders), vmtk; several "
-      "with "
-      "commas")
-    ->check(CLI::IsMember({ "series", "simvascular", "vmtk" }))
+      "series (ParaView: .pvd and .series), simvascular (mesh-complete folders), vmtk; of the "
+      "surface obj, ply, stl, and gltf (one animated .glb) or gltf-json; several with commas")
+    ->check(
+      CLI::IsMember({ "series", "simvascular", "vmtk", "obj", "ply", "stl", "gltf", "gltf-json" }))
     ->delimiter(',')
     ->allow_extra_args(false)
     ->type_name("LIST")
@@ -164,6 +166,17 @@ void SequenceJob::Declare(CLI::App& app)
     ->check(CLI::IsMember({ "mm", "cm" }))
     ->type_name("UNIT")
     ->capture_default_str()
+    ->group(files);
+  app
+    .add_option("--gltf-influences", this->influences,
+      "Nodes that a point may hang on in glTF: 4 (all viewers), 8, 12 or 16")
+    ->check(CLI::IsMember({ 4, 8, 12, 16 }))
+    ->type_name("N")
+    ->capture_default_str()
+    ->group(files);
+  app
+    .add_flag("!--no-gltf-loop", this->loop,
+      "The animation ends with the last phase, and does not come back to the first one")
     ->group(files);
   app
     .add_option("--poor", this->poor,
@@ -222,6 +235,13 @@ void SequenceJob::Choose(vtkMeshSequenceWriter* writer) const
   writer->SetWriteSeries(wanted("series"));
   writer->SetWriteSimVascular(wanted("simvascular"));
   writer->SetWriteVmtk(wanted("vmtk"));
+  writer->SetWriteObj(wanted("obj"));
+  writer->SetWritePly(wanted("ply"));
+  writer->SetWriteStl(wanted("stl"));
+  writer->SetWriteGltf(wanted("gltf"));
+  writer->SetWriteGltfJson(wanted("gltf-json"));
+  writer->SetGltfInfluences(this->influences);
+  writer->SetGltfLoop(this->loop);
   writer->SetSimVascularUnit(this->unit == "cm" ? 10.0 : 1.0);
   writer->SetPoorDihedralAngle(this->poor);
 }
@@ -322,11 +342,14 @@ void SequenceJob::Run() const
 
 Command MakeSequenceCommand(CLI::App& program)
 {
-  CLI::App* app = program.add_subcommand(
-    "sequence", "One mesh over the heart cycle, for simulations: series, SimVascular, VMTK");
-  app->footer("Writes DIR/mesh.json and mesh_quality.csv; series: mesh_volume_000.vtu .., "
-              "mesh_surface_000.vtp .., their .pvd and .series; simvascular: "
-              "mesh_simvascular/phase_000/mesh-complete ..; vmtk: mesh_vmtk_000.vtu ...");
+  CLI::App* app = program.add_subcommand("sequence",
+    "One mesh over the heart cycle, for simulations and viewers: series, SimVascular, VMTK, "
+    "OBJ, PLY, STL, glTF");
+  app->footer(
+    "Writes DIR/mesh.json and mesh_quality.csv; series: mesh_volume_000.vtu .., "
+    "mesh_surface_000.vtp .., their .pvd and .series; simvascular: "
+    "mesh_simvascular/phase_000/mesh-complete ..; vmtk: mesh_vmtk_000.vtu ..; obj, ply, stl: "
+    "mesh_surface_000.obj ..; gltf: mesh_skin.glb.");
   auto job = std::make_shared<SequenceJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

@@ -2,6 +2,7 @@
 
 #include "PartialProgress.h"
 #include "SkinDeformation.h"
+#include "vtkBoneMotion.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
@@ -566,6 +567,14 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
     }
   }
   output->GetFieldData()->PassData(pose->GetFieldData());
+  if (!this->Stretch)
+  {
+    for (coronary::BoneTransform& bone : setup.bones)
+    {
+      bone.stretch = 1.0;
+    }
+  }
+  vtkBoneMotion::Set(output->GetFieldData(), skin.Rig(), setup.bones);
 
   if (withTetrahedra)
   {

@@ -22,7 +22,8 @@
  *   (the same, mm/s, optional), `Normals` (the same, unit, of the moved triangles, optional). Cell data `VolumeRatio` (double,
  *   tetrahedra: signed volume / that at rest; NaN for other cells) when tetrahedra are checked. Field
  *   data: `InvertedTetrahedra` (vtkIdType, cells that are left, with a warning), `RepairedTetrahedra`
- *   (vtkIdType, how many were repaired), that of the mesh and of the pose.
+ *   (vtkIdType, how many were repaired), `BoneEndsAtRest`, `BoneParent`, `BoneMotion` (see vtkBoneMotion.h), that
+ *   of the mesh and of the pose.
  *
  * Points move by themselves: pieces of a mesh may be on different ranks, each has the whole skeleton
  * (normals at the seams of pieces are those of the piece). Blocks of a composite mesh are moved one by

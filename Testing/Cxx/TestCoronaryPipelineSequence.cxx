@@ -109,8 +109,10 @@ protected:
 
 TEST_F(TestCoronaryPipelineSequence, PhasesOfOneTopologyInAllFormats)
 {
-  ASSERT_EQ(this->Run("result --phases 20 --formats series,simvascular,vmtk --simvascular-unit cm "
-                      "--velocity --cycle-ms 800 --threads 1 --output out"),
+  ASSERT_EQ(
+    this->Run("result --phases 20 --formats series,simvascular,vmtk,obj,ply,stl,gltf,gltf-json "
+              "--gltf-influences 8 --simvascular-unit cm "
+              "--velocity --cycle-ms 800 --threads 1 --output out"),
     0)
     << ReadText(this->Folder / "stderr");
   EXPECT_NE(ReadText(this->Folder / "stdout").find("out: 20 phases, 0 inverted tetrahedra"),
@@ -137,8 +139,10 @@ TEST_F(TestCoronaryPipelineSequence, PhasesOfOneTopologyInAllFormats)
   reader->Update();
   EXPECT_EQ(reader->GetOutput()->GetPoints()->GetDataType(), VTK_DOUBLE);
 
-  ASSERT_EQ(this->Run("result --phases 20 --formats series,simvascular,vmtk --simvascular-unit cm "
-                      "--velocity --cycle-ms 800 --threads 3 --quiet --output out3"),
+  ASSERT_EQ(
+    this->Run("result --phases 20 --formats series,simvascular,vmtk,obj,ply,stl,gltf,gltf-json "
+              "--gltf-influences 8 --simvascular-unit cm "
+              "--velocity --cycle-ms 800 --threads 3 --quiet --output out3"),
     0);
   EXPECT_EQ(ReadText(this->Folder / "stdout") + ReadText(this->Folder / "stderr"), "");
   EXPECT_EQ(std::system(("diff -r '" + (this->Folder / "out").string() + "' '" +
@@ -146,6 +150,42 @@ TEST_F(TestCoronaryPipelineSequence, PhasesOfOneTopologyInAllFormats)
                           .c_str()),
     0)
     << "another number of threads gave other files";
+}
+
+TEST_F(TestCoronaryPipelineSequence, TheKhronosValidatorFindsNothing)
+{
+  ASSERT_EQ(this->Run("result --phases 20 --volume-conservation 1 --formats gltf,gltf-json "
+                      "--quiet --output many"),
+    0)
+    << ReadText(this->Folder / "stderr");
+  // One bone, one phase, four more influences than there are nodes.
+  const auto volume = ChainVolume(1);
+  Save(vtkNew<vtkXMLUnstructuredGridWriter>(), volume, this->Folder / "result/weights.vtu");
+  Save(vtkNew<vtkXMLPolyDataWriter>(), ChainBoundary(volume, 1),
+    this->Folder / "result/volume_boundary.vtp");
+  for (const char* name : { "skeleton.vtp", "motion/skeleton_000.vtp", "motion/skeleton_001.vtp" })
+  {
+    Save(vtkNew<vtkXMLPolyDataWriter>(), ChainSkeleton(1), this->Folder / "result" / name);
+  }
+  ASSERT_EQ(
+    this->Run("result --poses result/motion/skeleton_000.vtp result/motion/skeleton_001.vtp "
+              "--pose-times 0,0.4 --times 0.4 --formats gltf --gltf-influences 8 --quiet "
+              "--output one"),
+    0)
+    << ReadText(this->Folder / "stderr");
+  const std::string command = "cd '" + this->Folder.string() +
+    "' && '" DYNAMICCORONARY_SCRIPTS
+    "/gltf-validator.sh' many/mesh_skin.glb many/mesh_skin.gltf one/mesh_skin.glb >stdout 2>stderr";
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 125)
+  {
+    GTEST_SKIP() << ReadText(this->Folder / "stderr");
+  }
+  EXPECT_EQ(WEXITSTATUS(status), 0)
+    << ReadText(this->Folder / "stdout") << ReadText(this->Folder / "stderr");
+  const std::string found = ReadText(this->Folder / "stdout");
+  EXPECT_NE(found.find("one/mesh_skin.glb: 0 errors, 0 warnings"), std::string::npos) << found;
 }
 
 TEST_F(TestCoronaryPipelineSequence, VelocityIsThatOfThePoints)

@@ -3,6 +3,7 @@
 
 #include "FileSeries.h"
 #include "FilterMessages.h"
+#include "GltfEvaluator.h"
 #include "MeshQuality.h"
 #include "MeshSequenceReport.h"
 #include "SequenceTestData.h"
@@ -10,6 +11,12 @@
 #include "vtkCardiacPhaseInterpolator.h"
 #include "vtkSkinDeformation.h"
 
+#include "vtkCompositeDataIterator.h"
+#include "vtkCompositeDataSet.h"
+#include "vtkGLTFReader.h"
+#include "vtkOBJReader.h"
+#include "vtkPLYReader.h"
+#include "vtkSTLReader.h"
 #include "vtkTable.h"
 #include "vtkXMLPolyDataReader.h"
 #include "vtkXMLUnstructuredGridReader.h"
@@ -20,7 +27,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <set>
 #include <unistd.h>
 
@@ -237,6 +246,18 @@ protected:
       data->GetPoint(static_cast<vtkIdType>(n), points[n].data());
     }
     return points;
+  }
+
+  static std::vector<vtkDataObject*> Leaves(vtkDataObject* tree)
+  {
+    std::vector<vtkDataObject*> leaves;
+    vtkSmartPointer<vtkCompositeDataIterator> each;
+    each.TakeReference(vtkCompositeDataSet::SafeDownCast(tree)->NewIterator());
+    for (each->InitTraversal(); !each->IsDoneWithTraversal(); each->GoToNextItem())
+    {
+      leaves.push_back(each->GetCurrentDataObject());
+    }
+    return leaves;
   }
 
   static double Enclosed(vtkPolyData* surface)
@@ -615,6 +636,182 @@ TEST_F(TestMeshSequenceWriter, ASurfaceAlone)
   this->Writer->WriteSimVascularOff();
   this->Writer->SetInputData(1, this->Boundary);
   this->ExpectRefusal("is for tetrahedra");
+}
+
+TEST_F(TestMeshSequenceWriter, SurfacesForOtherPrograms)
+{
+  this->Connect();
+  this->Writer->WriteObjOn();
+  this->Writer->WritePlyOn();
+  this->Writer->WriteStlOn();
+  this->Write();
+  const auto files = this->Report()["files"];
+  EXPECT_EQ(files["obj"], "bar_surface.obj.series");
+  const auto list = coronary::ReadFileSeries((this->Folder / "bar_surface.ply.series").string());
+  ASSERT_EQ(list.size(), 5U);
+  std::vector<std::int64_t> ofObj;
+  for (std::size_t k = 0; k < 5; ++k)
+  {
+    const auto phase = this->Report()["phases"][k]["files"];
+    const auto truth = this->ReadSurface(phase["surface"].get<std::string>());
+    const auto pathOf = [&](const char* kind)
+    { return (this->Folder / phase[kind].get<std::string>()).string(); };
+    const auto read = [&](auto reader, const char* kind)
+    {
+      reader->SetFileName(pathOf(kind).c_str());
+      reader->Update();
+      return vtkSmartPointer<vtkPolyData>(reader->GetOutput());
+    };
+    const auto obj = read(vtkSmartPointer<vtkOBJReader>::New(), "obj");
+    const auto ply = read(vtkSmartPointer<vtkPLYReader>::New(), "ply");
+    const auto stl = read(vtkSmartPointer<vtkSTLReader>::New(), "stl");
+    // The same points in the same order; .stl knows corners only, which the reader merges.
+    for (const auto& surface : { obj, ply })
+    {
+      ASSERT_EQ(surface->GetNumberOfPoints(), truth->GetNumberOfPoints());
+      for (vtkIdType n = 0; n < truth->GetNumberOfPoints(); ++n)
+      {
+        for (int c = 0; c < 3; ++c)
+        {
+          ASSERT_FLOAT_EQ(
+            static_cast<float>(surface->GetPoint(n)[c]), static_cast<float>(truth->GetPoint(n)[c]));
+        }
+      }
+    }
+    EXPECT_EQ(Connectivity(ply->GetPolys()), Connectivity(truth->GetPolys()));
+    EXPECT_EQ(stl->GetNumberOfPoints(), truth->GetNumberOfPoints());
+    ASSERT_EQ(stl->GetNumberOfPolys(), truth->GetNumberOfPolys());
+    EXPECT_NEAR(Enclosed(stl), Enclosed(truth), 1e-5 * Enclosed(truth)) << "looks outwards";
+    EXPECT_NEAR(Enclosed(obj), Enclosed(truth), 1e-5 * Enclosed(truth));
+    if (k == 0)
+    {
+      ofObj = Connectivity(obj->GetPolys());
+    }
+    EXPECT_EQ(Connectivity(obj->GetPolys()), ofObj) << "another topology";
+    // One group a face, as large as the report says.
+    std::ifstream text(pathOf("obj"));
+    std::map<std::string, std::int64_t> groups;
+    std::string group;
+    for (std::string line; std::getline(text, line);)
+    {
+      if (line.rfind("g ", 0) == 0)
+      {
+        group = line.substr(2);
+        EXPECT_EQ(groups.count(group), 0U) << "two groups " << group;
+      }
+      groups[group] += line.rfind("f ", 0) == 0 ? 1 : 0;
+    }
+    for (const auto& face : this->Report()["faces"])
+    {
+      EXPECT_EQ(groups[face["name"].get<std::string>()], face["triangles"].get<std::int64_t>());
+    }
+  }
+  // A shorter sequence takes all of it away.
+  this->Bar->Steps = { 0.0 };
+  this->Bar->Modified();
+  this->Writer->WriteStlOff();
+  this->Write();
+  EXPECT_TRUE(fs::exists(this->Folder / "bar_surface_000.obj"));
+  EXPECT_FALSE(fs::exists(this->Folder / "bar_surface_001.obj"));
+  EXPECT_FALSE(fs::exists(this->Folder / "bar_surface_000.stl"));
+  EXPECT_FALSE(fs::exists(this->Folder / "bar_surface.stl.series"));
+}
+
+TEST_F(TestMeshSequenceWriter, GltfShowsTheMovedSurface)
+{
+  vtkNew<BendingChain> chain;
+  chain->Bones = Bones;
+  vtkNew<vtkSkinDeformation> deformation;
+  deformation->SetInputData(0, this->Bar->Rest);
+  deformation->SetInputData(1, ChainSkeleton(Bones));
+  deformation->SetPoseConnection(chain->GetOutputPort());
+  deformation->DoublePrecisionOn();
+  deformation->SetVolumeConservation(1.0);
+  this->Writer->SetInputConnection(deformation->GetOutputPort());
+  this->Writer->SetInputData(1, this->Boundary);
+  this->Writer->SetInputData(2, this->Caps);
+  this->Writer->WriteGltfOn();
+  this->Write();
+  EXPECT_EQ(this->Report()["files"]["gltf"], "bar_skin.glb");
+  EXPECT_EQ(
+    this->ReadSurface("bar_surface_000.vtp")->GetFieldData()->GetArray("BoneMotion"), nullptr)
+    << "what is for glTF goes into no other file";
+  std::ifstream stream(this->Folder / "bar_skin.glb", std::ios::binary);
+  const GltfEvaluator file(std::string(std::istreambuf_iterator<char>(stream), {}));
+  ASSERT_EQ(file.Times().size(), 11U);
+  double largestMove = 0.0;
+  for (int k = 0; k < 11; ++k)
+  {
+    const auto surface =
+      this->ReadSurface(this->Report()["phases"][static_cast<std::size_t>(k)]["files"]["surface"]);
+    const std::vector<double> entity = Values(surface->GetCellData(), "CellEntityIds");
+    for (int face = 1; face <= 3; ++face)
+    {
+      std::set<vtkIdType> used;
+      for (vtkIdType n = 0; n < surface->GetNumberOfPolys(); ++n)
+      {
+        vtkIdType count = 0;
+        const vtkIdType* ids = nullptr;
+        surface->GetPolys()->GetCellAtId(n, count, ids);
+        if (entity[static_cast<std::size_t>(n)] == face)
+        {
+          used.insert(ids, ids + count);
+        }
+      }
+      const char* mesh = face == 1 ? "wall" : "caps";
+      const std::size_t primitive = face == 3 ? 1 : 0;
+      const auto vertices = file.Vertices(mesh, k, primitive);
+      const auto rest = file.Vertices(mesh, -1, primitive);
+      ASSERT_EQ(vertices.size(), used.size());
+      std::size_t n = 0;
+      for (const vtkIdType point : used)
+      {
+        const coronary::Vector3 truth(surface->GetPoint(point));
+        ASSERT_LT((vertices[n] - truth).norm(), 1e-4) << "key " << k;
+        largestMove = std::max(largestMove, (rest[n] - truth).norm());
+        ++n;
+      }
+    }
+  }
+  EXPECT_GT(largestMove, 2.0);
+
+  // VTK's own reader, with the animation at the fourth key and at a later one.
+  vtkNew<vtkGLTFReader> reader;
+  reader->SetFileName((this->Folder / "bar_skin.glb").c_str());
+  reader->UpdateInformation();
+  ASSERT_EQ(reader->GetNumberOfAnimations(), 1);
+  reader->EnableAnimation(0);
+  reader->SetApplyDeformationsToGeometry(true);
+  for (const int key : { 3, 8 })
+  {
+    const double time = file.Times()[static_cast<std::size_t>(key)];
+    reader->UpdateInformation();
+    reader->UpdateTimeStep(time);
+    // Not GetBounds(): the reader moves points without telling that they are others.
+    Eigen::AlignedBox3d bounds;
+    for (vtkDataObject* block : Leaves(reader->GetOutputDataObject(0)))
+    {
+      for (const coronary::Vector3& point : PointsOf(vtkPointSet::SafeDownCast(block)))
+      {
+        bounds.extend(point);
+      }
+    }
+    double truth[6];
+    this->ReadSurface(this->Report()["phases"][static_cast<std::size_t>(key)]["files"]["surface"])
+      ->GetBounds(truth);
+    EXPECT_NEAR(bounds.max()[0], truth[1] / 1000.0, 1e-5) << "left";
+    EXPECT_NEAR(bounds.max()[1], truth[5] / 1000.0, 1e-5) << "superior is up";
+    EXPECT_NEAR(bounds.max()[2], -truth[2] / 1000.0, 1e-5) << "anterior is towards the viewer";
+  }
+}
+
+TEST_F(TestMeshSequenceWriter, GltfNeedsBones)
+{
+  this->Connect();
+  this->Writer->WriteGltfOn();
+  this->ExpectRefusal("Displacement");
+  this->Writer->SetGltfInfluences(7);
+  this->ExpectRefusal("GltfInfluences");
 }
 
 TEST_F(TestMeshSequenceWriter, WithoutTimeThereIsOnePhase)

@@ -6,7 +6,8 @@ import sys
 
 from paraview import servermanager, simple
 
-from coronary_testing import SURFACE, fetch, load_plugin, quick_phantom, require
+from coronary_testing import (SURFACE, fetch, load_plugin, quick_phantom, require,
+                              skinning_pipeline, write_skeleton)
 
 plugin, folder = sys.argv[1:3]
 PHASES = [0.0, 0.25, 0.35, 0.75]
@@ -66,8 +67,29 @@ def tetrahedra():
     require(min(values(data.GetPointData().GetArray("GlobalNodeID"))) == 1.0, "ids begin with 1")
 
 
+def skinned_surface():
+    """A surface on bones as a user of File > Save Data has it, in the formats of viewers."""
+    moved = skinning_pipeline(write_skeleton(folder), Edits=[1, 0, 0, 20, 0, 0, 0, 0, 1, 0])[2]
+    moved.Blend = "Linear"
+    path = os.path.join(folder, "skin.json")
+    simple.SaveData(path, proxy=moved, Series=0, OBJ=1, PLY=1, STL=1, GLTF=1, GLTFInfluences=8)
+    with open(path) as file:
+        report = json.load(file)
+    for kind in ("obj", "ply", "stl"):
+        data = fetch(simple.OpenDataFile(os.path.join(folder, "skin_surface_000." + kind)), 0, 0.0)
+        require(data.GetNumberOfPolys() == report["triangles"], kind + " is not whole")
+    with open(os.path.join(folder, report["files"]["gltf"]), "rb") as file:
+        content = file.read()
+    require(content[:4] == b"glTF", "no glTF file")
+    size = int.from_bytes(content[12:16], "little")
+    document = json.loads(content[20:20 + size])
+    require(max(document["scenes"][0]["extras"]["largest_deviation_mm"]) < 1e-3,
+            "glTF shows another shape: %s" % document["scenes"][0]["extras"])
+
+
 load_plugin(plugin)
 require(hasattr(servermanager.writers, "MeshSequenceWriter"), "there is no writer")
 moving_surface()
 tetrahedra()
+skinned_surface()
 print("done")
