@@ -130,9 +130,8 @@ void EvaluateJob::Declare(CLI::App& app)
     "turned and compared");
   app
     .add_option("--web-triangles", this->webTriangles,
-      "Triangles of a surface in review.html, at most about so many; 0: up to 60000, fewer for "
-      "more than 50 phases in "
-      "all")
+      "Triangles of a surface in review.html, at most about so many; 0: up to 150000, fewer for "
+      "more than 20 phases in all")
     ->check(WholeWithin(0, 10000000))
     ->type_name("N")
     ->capture_default_str();

@@ -353,11 +353,11 @@ PackedShapes PackShapes(const ReviewCase& shapes)
 
 std::int64_t DefaultReviewTriangles(std::int64_t phases)
 {
-  // Of a surface that turns smoothly without a graphics card; over all phases, of a page of about 25 MB.
-  constexpr std::int64_t Smooth = 60000;
+  // A surface of the pipeline as it is; twenty phases of two make a page of about 15 MB, and so do more phases.
+  constexpr std::int64_t Most = 150000;
   constexpr std::int64_t OfAllPhases = 3000000;
   constexpr std::int64_t Least = 4000;
-  return std::clamp(OfAllPhases / std::max<std::int64_t>(1, phases), Least, Smooth);
+  return std::clamp(OfAllPhases / std::max<std::int64_t>(1, phases), Least, Most);
 }
 
 void WebReview::Add(const CaseEvaluation& evaluation, const ReviewCase& shapes)

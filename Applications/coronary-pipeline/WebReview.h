@@ -89,7 +89,7 @@ struct PackedShapes
  */
 PackedShapes PackShapes(const ReviewCase& shapes);
 
-/// As many triangles a surface as keep a page of these many phases, over all cases, small and quick.
+/// As many triangles a surface as keep a page of so many phases, over all cases, small and quick.
 std::int64_t DefaultReviewTriangles(std::int64_t phases);
 
 /// Collects cases and writes the page.
