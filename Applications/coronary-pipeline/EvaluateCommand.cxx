@@ -3,6 +3,7 @@
 #include "AtomicFile.h"
 #include "DistanceOptions.h"
 #include "Evaluation.h"
+#include "EvaluationJson.h"
 #include "EvaluationReport.h"
 #include "Interruption.h"
 #include "MovingModel.h"
@@ -16,14 +17,13 @@
 #include "vtkMessageTrap.h"
 #include "vtkSurfaceFile.h"
 #include "vtkSurfaceInput.h"
+#include "vtkWebReview.h"
 
 #include "vtkCellData.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkStringArray.h"
-
-#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -52,6 +52,8 @@ struct EvaluateJob
   MeshDistanceSettings distance;
   double timeTolerance = 1e-3;
   bool noPictures = false;
+  bool web = false;
+  std::int64_t webTriangles = 0; ///< 0: as many as suit the number of phases
   int threads = 0;
   bool quiet = false;
 
@@ -77,8 +79,11 @@ private:
   void Evaluate(CaseFiles& files, vtkMessageTrap& messages,
     const std::function<void(const PhaseFiles&)>& begin,
     const std::function<void(double)>& progress) const;
-  ReportCase Draw(const CaseFiles& files, const std::string& subfolder, StagedFolder& folder,
-    vtkMessageTrap& messages, const std::function<void(double)>& progress) const;
+  static EvaluationScene SceneOf(const CaseFiles& files, vtkMessageTrap& messages);
+  static ReportCase Draw(const EvaluationScene& scene, const std::string& subfolder,
+    StagedFolder& folder, const std::function<void(double)>& progress);
+  /// The options that its tables come from, for the reader of a page.
+  std::string CommandLine() const;
   void WriteReport(const std::vector<CaseEvaluation>& evaluations,
     std::vector<ReportCase> illustrations, std::vector<std::string> plots,
     const std::string& withoutPictures, const std::string& path) const;
@@ -120,6 +125,16 @@ void EvaluateJob::Declare(CLI::App& app)
     ->type_name("FRACTION")
     ->capture_default_str();
   app.add_flag("--no-pictures", this->noPictures, "Tables and report only");
+  app.add_flag("--web", this->web,
+    "Also review.html: one file for a web browser, without network, in which the beating model is "
+    "turned and compared");
+  app
+    .add_option("--web-triangles", this->webTriangles,
+      "Triangles of a surface in review.html, at most about so many; 0: up to 150000, fewer for "
+      "more than 20 phases in all")
+    ->check(WholeWithin(0, 10000000))
+    ->type_name("N")
+    ->capture_default_str();
   app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
     ->check(WholeWithin(0, 1024))
     ->type_name("N")
@@ -243,48 +258,6 @@ BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* s
   return vtkCoronary::TreeOf(lines, names, side);
 }
 
-nlohmann::ordered_json JsonOf(const EvaluationMeasures& measures)
-{
-  nlohmann::ordered_json all;
-  for (const EvaluationColumn& column : EvaluationColumns())
-  {
-    const double value = measures.*column.value;
-    all[column.key] = std::isfinite(value) ? nlohmann::ordered_json(value) : nullptr;
-  }
-  return all;
-}
-
-nlohmann::ordered_json JsonOf(const std::vector<CaseEvaluation>& cases)
-{
-  nlohmann::ordered_json all;
-  all["cases"] = nlohmann::ordered_json::array();
-  for (const CaseEvaluation& one : cases)
-  {
-    nlohmann::ordered_json entry = { { "name", one.name } };
-    entry["phases"] = nlohmann::ordered_json::array();
-    for (const PhaseEvaluation& phase : one.phases)
-    {
-      nlohmann::ordered_json row = { { "phase", phase.phase }, { "fraction", phase.fraction },
-        { "interpolated", phase.interpolated }, { "lost", phase.lost } };
-      row.update(JsonOf(phase.measures));
-      entry["phases"].push_back(row);
-    }
-    for (const bool interpolated : { true, false })
-    {
-      const std::string kind = interpolated ? "interpolated" : "tracked";
-      const MeasureSummary summary = SummarizePhases(one, interpolated);
-      entry[kind + "_mean"] = JsonOf(summary.mean);
-      entry[kind + "_deviation"] = JsonOf(summary.deviation);
-    }
-    entry["warnings"] = one.warnings;
-    all["cases"].push_back(entry);
-  }
-  const MeasureSummary over = SummarizeCases(cases);
-  all["mean"] = JsonOf(over.mean);
-  all["deviation"] = JsonOf(over.deviation);
-  return all;
-}
-
 void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
   const std::function<void(const PhaseFiles&)>& begin,
   const std::function<void(double)>& progress) const
@@ -325,20 +298,28 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
   }
 }
 
-ReportCase EvaluateJob::Draw(const CaseFiles& files, const std::string& subfolder,
-  StagedFolder& folder, vtkMessageTrap& messages, const std::function<void(double)>& progress) const
+EvaluationScene EvaluateJob::SceneOf(const CaseFiles& files, vtkMessageTrap& messages)
 {
-  const auto read = [&](const std::string& path)
-  { return path.empty() ? vtkSmartPointer<vtkPolyData>() : ReadPolyData(path, messages); };
+  const auto reader = [&files, &messages](const std::string PhaseFiles::*path)
+  {
+    return [&files, &messages, path](int index)
+    {
+      const std::string& file = files.phases[static_cast<std::size_t>(index)].*path;
+      return file.empty() ? vtkSmartPointer<vtkPolyData>() : ReadPolyData(file, messages);
+    };
+  };
   EvaluationScene scene;
   scene.evaluation = &files.evaluation;
-  scene.model = [&](int index)
-  { return read(files.phases[static_cast<std::size_t>(index)].model); };
-  scene.truth = [&](int index)
-  { return read(files.phases[static_cast<std::size_t>(index)].truth); };
-  scene.centerline = [&](int index)
-  { return read(files.phases[static_cast<std::size_t>(index)].modelLines); };
+  scene.model = reader(&PhaseFiles::model);
+  scene.truth = reader(&PhaseFiles::truth);
+  scene.centerline = reader(&PhaseFiles::modelLines);
+  scene.truthCenterline = reader(&PhaseFiles::truthLines);
+  return scene;
+}
 
+ReportCase EvaluateJob::Draw(const EvaluationScene& scene, const std::string& subfolder,
+  StagedFolder& folder, const std::function<void(double)>& progress)
+{
   ReportCase pictures;
   const auto add =
     [&](auto draw, const char* name, const char* title, const char* caption, double done)
@@ -369,6 +350,37 @@ ReportCase EvaluateJob::Draw(const CaseFiles& files, const std::string& subfolde
   }
   progress(1.0);
   return pictures;
+}
+
+std::string EvaluateJob::CommandLine() const
+{
+  // As a shell takes it.
+  const auto quoted = [](const std::string& text)
+  {
+    if (!text.empty() &&
+      text.find_first_not_of(
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._/-") == std::string::npos)
+    {
+      return text;
+    }
+    std::string safe = "'";
+    for (const char c : text)
+    {
+      safe += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    }
+    return safe + "'";
+  };
+  std::string line = "coronary-pipeline evaluate";
+  for (std::size_t n = 0; n < this->results.size(); ++n)
+  {
+    line += " --result " + quoted(this->results[n]) + " --truth " + quoted(this->truths[n]);
+    line += this->names.empty() ? "" : " --name " + quoted(this->names[n]);
+  }
+  line += this->untracked == "auto" ? "" : " --interpolated " + this->untracked;
+  line += this->distance.clipEnds ? " --clip-ends" : "";
+  line += " --web";
+  line += this->webTriangles == 0 ? "" : " --web-triangles " + std::to_string(this->webTriangles);
+  return line + " --output " + quoted(this->output);
 }
 
 void EvaluateJob::WriteReport(const std::vector<CaseEvaluation>& evaluations,
@@ -432,7 +444,7 @@ void EvaluateJob::Run() const
   try
   {
     ProgressDisplay progress(
-      "step", static_cast<int>(steps + (draw ? cases.size() : 0)), this->quiet);
+      "step", static_cast<int>(steps + (draw || this->web ? cases.size() : 0)), this->quiet);
     const auto update = [&](double fraction) { progress.Update(fraction); };
     int step = 0;
     for (CaseFiles& files : cases)
@@ -451,12 +463,36 @@ void EvaluateJob::Run() const
     WriteFileAtomically(table, EvaluationCsv(evaluations));
     WriteFileAtomically(folder.Add("table1.tex"), EvaluationLatex(evaluations));
     WriteFileAtomically(folder.Add("branches.csv"), BranchCsv(evaluations));
-    for (std::size_t n = 0; draw && n < cases.size(); ++n)
+    WebReview review;
+    const std::int64_t triangles = this->webTriangles > 0
+      ? this->webTriangles
+      : DefaultReviewTriangles(static_cast<std::int64_t>(steps));
+    for (std::size_t n = 0; (draw || this->web) && n < cases.size(); ++n)
     {
       progress.BeginStep(step++, cases[n].evaluation.name + ", pictures");
-      const std::string subfolder =
-        cases.size() == 1 ? "pictures/" : "pictures/" + std::to_string(n + 1) + "/";
-      illustrations.push_back(this->Draw(cases[n], subfolder, folder, messages, update));
+      // What it has read goes with it.
+      const EvaluationScene scene = SceneOf(cases[n], messages);
+      if (draw)
+      {
+        const std::string subfolder =
+          cases.size() == 1 ? "pictures/" : "pictures/" + std::to_string(n + 1) + "/";
+        illustrations.push_back(Draw(scene, subfolder, folder, update));
+      }
+      if (this->web)
+      {
+        review.Add(evaluations[n],
+          MakeReviewCase(scene, triangles,
+            [&](double fraction)
+            {
+              update(fraction);
+              return Interruption() == 0;
+            }));
+      }
+    }
+    if (this->web)
+    {
+      WriteFileAtomically(folder.Add("review.html"),
+        review.Html("coronary-pipeline " DYNAMICCORONARY_VERSION, this->CommandLine()));
     }
     if (draw)
     {
@@ -472,7 +508,7 @@ void EvaluateJob::Run() const
     }
     this->WriteReport(evaluations, std::move(illustrations), std::move(plots), withoutPictures,
       folder.Add("report.html"));
-    WriteFileAtomically(folder.Add("table1.json"), JsonOf(evaluations).dump(2) + "\n");
+    WriteFileAtomically(folder.Add("table1.json"), EvaluationJson(evaluations).dump(2) + "\n");
     messages.ThrowIfError();
     ThrowIfInterrupted();
   }
@@ -508,7 +544,7 @@ Command MakeEvaluateCommand(CLI::App& program)
   app->footer(
     "Writes DIR/table1.csv, table1.tex, branches.csv, report.html, table1.json; and with a display "
     "pictures/ (of several cases pictures/1/, ...) and plots/. On a machine without one: "
-    "xvfb-run -a coronary-pipeline evaluate ...");
+    "xvfb-run -a coronary-pipeline evaluate ... With --web also DIR/review.html.");
   auto job = std::make_shared<EvaluateJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

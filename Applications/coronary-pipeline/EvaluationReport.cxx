@@ -1,5 +1,7 @@
 #include "EvaluationReport.h"
 
+#include "HtmlParts.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -73,36 +75,6 @@ for (const player of document.querySelectorAll('.player')) {
 }
 )";
 
-std::string Escaped(const std::string& text)
-{
-  std::string escaped;
-  for (const char c : text)
-  {
-    switch (c)
-    {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        // Other control characters are not allowed in HTML.
-        escaped += static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t' ? ' ' : c;
-    }
-  }
-  return escaped;
-}
-
 std::string Number(double value, int digits = 3)
 {
   if (!std::isfinite(value))
@@ -125,32 +97,10 @@ std::string ReadFile(const std::string& path)
   return bytes;
 }
 
-std::string Base64(const std::string& bytes)
-{
-  constexpr const char* Letters =
-    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t k = 0; k < bytes.size(); k += 3)
-  {
-    const std::size_t left = std::min<std::size_t>(3, bytes.size() - k);
-    std::uint32_t group = 0;
-    for (std::size_t i = 0; i < 3; ++i)
-    {
-      group = (group << 8) | (i < left ? static_cast<unsigned char>(bytes[k + i]) : 0U);
-    }
-    for (std::size_t i = 0; i < 4; ++i)
-    {
-      text += i <= left ? Letters[(group >> (18 - 6 * i)) & 63U] : '=';
-    }
-  }
-  return text;
-}
-
 std::string Image(const std::string& path, const std::string& alternative, const char* more = "")
 {
   const bool gif = path.size() > 4 && path.compare(path.size() - 4, 4, ".gif") == 0;
-  return "<img alt=\"" + Escaped(alternative) + "\" src=\"data:image/" + (gif ? "gif" : "png") +
+  return "<img alt=\"" + EscapedHtml(alternative) + "\" src=\"data:image/" + (gif ? "gif" : "png") +
     ";base64," + Base64(ReadFile(path)) + "\"" + more + ">\n";
 }
 
@@ -262,7 +212,7 @@ std::string PartB(const std::vector<CaseEvaluation>& cases)
   html += "</tr></thead>\n<tbody>\n";
   for (const CaseEvaluation& one : cases)
   {
-    html += "<tr><td>" + Escaped(one.name) + "</td>" +
+    html += "<tr><td>" + EscapedHtml(one.name) + "</td>" +
       MeanAndDeviation(SummarizePhases(one, true), columns) + "</tr>\n";
   }
   if (cases.size() > 1)
@@ -281,8 +231,8 @@ std::string PartB(const std::vector<CaseEvaluation>& cases)
   html += "</tr></thead>\n<tbody>\n";
   for (const PaperCase& one : PaperPartB())
   {
-    html +=
-      "<tr><td>" + Escaped(one.name) + "</td>" + Cells(one.mean, paperColumns, "", 2) + "</tr>\n";
+    html += "<tr><td>" + EscapedHtml(one.name) + "</td>" + Cells(one.mean, paperColumns, "", 2) +
+      "</tr>\n";
   }
   const MeasureSummary& all = PaperSummaryB();
   html += "<tr class=\"sum\"><td>Mean</td>" + Cells(all.mean, paperColumns, "", 2) + "</tr>\n" +
@@ -406,7 +356,7 @@ std::string BranchTable(const CaseEvaluation& one)
     "</tr></thead>\n<tbody>\n";
   for (const auto& [group, row] : rows)
   {
-    html += "<tr><td>" + (row.label.empty() ? "&ndash;" : Escaped(row.label)) + "</td><td>" +
+    html += "<tr><td>" + (row.label.empty() ? "&ndash;" : EscapedHtml(row.label)) + "</td><td>" +
       std::to_string(group) + "</td><td>" + std::to_string(row.phases) + "</td>";
     html += "<td>" + Number(row.length.Mean(), 1) + "</td>";
     for (const double value : { row.covered.Mean(), row.covered.Least, row.continuity.Mean(),
@@ -424,7 +374,7 @@ std::string Warnings(const std::vector<std::string>& warnings)
   std::string html;
   for (const std::string& warning : warnings)
   {
-    html += "<li>" + Escaped(warning) + "</li>\n";
+    html += "<li>" + EscapedHtml(warning) + "</li>\n";
   }
   return html.empty() ? html : "<ul class=\"warnings\">\n" + html + "</ul>\n";
 }
@@ -459,15 +409,15 @@ std::string EvaluationHtml(const EvaluationReport& report)
   std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
                      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
                      "<title>" +
-    Escaped(report.title) + "</title>\n<style>" + Style +
-    "</style>\n</head>\n<body>\n<header><h1>" + Escaped(report.title) +
+    EscapedHtml(report.title) + "</title>\n<style>" + Style +
+    "</style>\n</head>\n<body>\n<header><h1>" + EscapedHtml(report.title) +
     "</h1></header>\n<nav aria-label=\"Contents\"><ul>\n";
   const bool warned = !report.warnings.empty();
   html += warned ? "<li><a href=\"#warnings\">Warnings</a></li>\n" : "";
   html += report.cases.empty() ? "" : "<li><a href=\"#part-b\">All cases</a></li>\n";
   for (std::size_t k = 0; k < report.cases.size(); ++k)
   {
-    html += "<li><a href=\"#case" + std::to_string(k) + "\">" + Escaped(report.cases[k].name) +
+    html += "<li><a href=\"#case" + std::to_string(k) + "\">" + EscapedHtml(report.cases[k].name) +
       "</a></li>\n";
   }
   html += report.plots.empty() ? "" : "<li><a href=\"#plots\">Measures over the phases</a></li>\n";
@@ -484,18 +434,18 @@ std::string EvaluationHtml(const EvaluationReport& report)
   for (std::size_t k = 0; k < report.cases.size(); ++k)
   {
     const CaseEvaluation& one = report.cases[k];
-    html += "<section>\n<h2 id=\"case" + std::to_string(k) + "\">" + Escaped(one.name) + "</h2>\n" +
-      Warnings(one.warnings) + PartA(one);
+    html += "<section>\n<h2 id=\"case" + std::to_string(k) + "\">" + EscapedHtml(one.name) +
+      "</h2>\n" + Warnings(one.warnings) + PartA(one);
     if (!report.illustrations.empty())
     {
       html += Player(report.illustrations[k].beating, one.name);
       for (const ReportPicture& picture : report.illustrations[k].pictures)
       {
-        html += "<h3>" + Escaped(picture.title) + "</h3>\n<figure>" +
+        html += "<h3>" + EscapedHtml(picture.title) + "</h3>\n<figure>" +
           Image(picture.path, one.name + ": " + picture.title);
         html += picture.caption.empty()
           ? ""
-          : "<figcaption>" + Escaped(picture.caption) + "</figcaption>";
+          : "<figcaption>" + EscapedHtml(picture.caption) + "</figcaption>";
         html += "</figure>\n";
       }
     }
@@ -516,8 +466,8 @@ std::string EvaluationHtml(const EvaluationReport& report)
       "<h2 id=\"settings\">Inputs and settings</h2>\n<div class=\"scroll\"><table>\n<tbody>\n";
     for (const auto& [name, value] : report.settings)
     {
-      html +=
-        "<tr><td>" + Escaped(name) + "</td><td class=\"text\">" + Escaped(value) + "</td></tr>\n";
+      html += "<tr><td>" + EscapedHtml(name) + "</td><td class=\"text\">" + EscapedHtml(value) +
+        "</td></tr>\n";
     }
     html += "</tbody></table></div>\n";
   }

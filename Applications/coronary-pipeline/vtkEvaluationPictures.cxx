@@ -55,6 +55,8 @@ constexpr Colour Grey = { 110, 110, 110 };
 constexpr Colour Orange = { 230, 120, 0 };
 constexpr int PageWidth = 2400;
 constexpr int Margin = 40;
+constexpr double OverlayAspect = 10.0 / 9.0;
+constexpr double OverlayMargin = 0.09;
 using Anchor = PictureCanvas::Anchor;
 
 /// Points and normals in single precision, triangles with 32 bits an index, nothing else.
@@ -446,7 +448,7 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
 
   PictureCanvas page(pageWidth, pageHeight);
   const double aspect = double(width) / height;
-  const PictureView view = stage.View(aspect, 0.09);
+  const PictureView view = stage.View(aspect, OverlayMargin);
   page.Write(Margin, Margin + 16, stage.Name(), 40, Black, Anchor::Left, true);
   page.Write(pageWidth - Margin, Margin + 16, "view " + view.Name(), 28, Grey, Anchor::Right);
   int x = Margin;
@@ -602,6 +604,47 @@ std::vector<int> FourPhases(const Stage& stage)
 }
 }
 
+vtkPolyData* ShownModel(const EvaluationScene& scene, int index)
+{
+  return Stage(scene).Model(index);
+}
+
+vtkPolyData* ShownTruth(const EvaluationScene& scene, int index)
+{
+  return Stage(scene).Truth(index);
+}
+
+PictureView OverlayView(const EvaluationScene& scene, double& aspect)
+{
+  aspect = OverlayAspect;
+  return Stage(scene).View(OverlayAspect, OverlayMargin);
+}
+
+std::vector<int> DistancePhases(const EvaluationScene& scene)
+{
+  return FourPhases(Stage(scene));
+}
+
+double DistanceRange(const std::vector<double>& distances)
+{
+  std::vector<double> all;
+  for (const double distance : distances)
+  {
+    if (std::isfinite(distance))
+    {
+      all.push_back(std::abs(distance));
+    }
+  }
+  if (all.empty())
+  {
+    return 1.0;
+  }
+  // A few points far away must not take the colours from all others.
+  const auto place = all.begin() + static_cast<std::ptrdiff_t>(0.995 * (all.size() - 1));
+  std::nth_element(all.begin(), place, all.end());
+  return RoundUp(std::max(*place, 1e-3));
+}
+
 void DrawDistances(const EvaluationScene& scene, const std::string& path)
 {
   const Stage stage(scene);
@@ -611,22 +654,10 @@ void DrawDistances(const EvaluationScene& scene, const std::string& path)
   for (const int k : phases)
   {
     distances.push_back(stage.Distance(k));
-    for (const double distance : distances.back().pointDistancesA)
-    {
-      if (std::isfinite(distance))
-      {
-        all.push_back(std::abs(distance));
-      }
-    }
+    const std::vector<double>& one = distances.back().pointDistancesA;
+    all.insert(all.end(), one.begin(), one.end());
   }
-  // A few points far away must not take the colours from all others.
-  double greatest = 1.0;
-  if (!all.empty())
-  {
-    const auto place = all.begin() + static_cast<std::ptrdiff_t>(0.995 * (all.size() - 1));
-    std::nth_element(all.begin(), place, all.end());
-    greatest = RoundUp(std::max(*place, 1e-3));
-  }
+  const double greatest = DistanceRange(all);
   const vtkSmartPointer<vtkColorTransferFunction> map = DistanceColours(greatest);
 
   constexpr int Gap = 14;

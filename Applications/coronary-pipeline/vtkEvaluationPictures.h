@@ -21,6 +21,7 @@ class vtkPolyData;
 namespace coronary
 {
 struct PictureStore;
+struct PictureView;
 
 /// What is drawn. Indices are those of evaluation->phases.
 struct EvaluationScene
@@ -32,6 +33,7 @@ struct EvaluationScene
   Source truth; ///< closed surface, triangles, mm
   Source
     centerline; ///< the model's tree: lines with the cell array GroupIds; empty, or returns null: there is none
+  Source truthCenterline; ///< the same of the truth; pictures do without it
 
   /// Points, triangles and lines that were asked for already, in single precision: 4 MB a surface of
   /// 120000 triangles. Made with the first picture; pictures of one scene read each file once.
@@ -67,6 +69,19 @@ void DrawSequence(const EvaluationScene& scene, const std::string& path);
  * @return the PNG files' paths, in order
  */
 std::vector<std::string> DrawBeating(const EvaluationScene& scene, const std::string& folder);
+
+///@{
+/// What the pictures show, for others that show the same; none of it needs a display. Surfaces have points in single
+/// precision, normals and triangles only. @throws as the pictures do.
+vtkPolyData* ShownModel(const EvaluationScene& scene, int index);
+vtkPolyData* ShownTruth(const EvaluationScene& scene, int index);
+/// Of a tile of DrawOverlayGrid.
+PictureView OverlayView(const EvaluationScene& scene, double& aspect);
+/// Those of DrawDistances.
+std::vector<int> DistancePhases(const EvaluationScene& scene);
+/// Where the colours of DrawDistances end, mm. Distances may have a sign; what is not finite does not count.
+double DistanceRange(const std::vector<double>& distances);
+///@}
 }
 
 #endif

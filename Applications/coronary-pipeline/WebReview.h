@@ -1,0 +1,115 @@
+/**
+ * @file WebReview.h
+ * @brief An evaluation as one HTML file in which the beating model is turned and compared with the truth.
+ *
+ * The page needs no other file and no network. Its shapes are numbers: positions of 16 bits in the box around all
+ * phases, distances of 16 bits, both as differences that deflate well. docs/evaluation.md has the form.
+ */
+#ifndef DynamicCoronary_WebReview_h
+#define DynamicCoronary_WebReview_h
+
+#include "Evaluation.h"
+
+#include <nlohmann/json.hpp>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// A name that is written beside a point.
+struct ReviewLabel
+{
+  std::string text;
+  std::uint32_t point = 0;
+};
+
+/// What is connected with what. Phases of a moving mesh share one.
+struct ReviewTopology
+{
+  static constexpr std::uint8_t NoBranch = 255;
+
+  std::uint32_t points = 0;
+  std::vector<std::uint32_t> cells; ///< point indices: three a triangle, two a piece of a line
+  std::vector<std::uint8_t>
+    branches; ///< of each point: index of ReviewSeries::branches, or NoBranch
+  std::vector<ReviewLabel> labels;
+};
+
+struct ReviewFrame
+{
+  std::size_t topology = 0;
+  std::vector<float> positions; ///< x, y, z of each point; mm, LPS
+  std::vector<float>
+    distances; ///< of each point, mm, negative: inside; NaN: not known; empty: none
+};
+
+/// A surface, or a tree of lines, over the phases.
+struct ReviewSeries
+{
+  int corners = 3; ///< of a cell: 3 triangles, 2 pieces of lines
+  std::vector<std::string> branches;
+  std::vector<ReviewTopology> topologies;
+  std::vector<ReviewFrame> frames; ///< one a phase; empty: there is none
+
+  std::int64_t originalCells = 0; ///< in the phase with the most, before the surface was reduced
+  double deviation = 0.0;         ///< greatest Hausdorff distance from the original, mm
+};
+
+/// A case to look at.
+struct ReviewCase
+{
+  ReviewSeries model;
+  ReviewSeries truth;
+  ReviewSeries modelLines;
+  ReviewSeries truthLines;
+
+  // Where the page looks from at first: PictureView of the case's pictures.
+  double leftAnterior = 0.0; ///< degrees
+  double cranial = 0.0;      ///< degrees
+  std::array<double, 3> centre = { 0.0, 0.0, 0.0 };
+  double height = 100.0; ///< mm
+  double aspect = 1.0;   ///< width over height that the height is right for
+  double range = 1.0;    ///< of the colours of distances, mm
+};
+
+/// Shapes as bytes, and where in them what is.
+struct PackedShapes
+{
+  nlohmann::ordered_json layout;
+  std::string bytes;
+};
+
+/**
+ * Positions become whole numbers of 0 to 65535 between `low` and `low + 65535 * step`, so they are at most half a step
+ * off along each axis; distances whole multiples of `distance_step`, -32768: not known.
+ * @throws std::invalid_argument for numbers that do not fit together or positions that are not finite
+ */
+PackedShapes PackShapes(const ReviewCase& shapes);
+
+/// As many triangles a surface as keep a page of so many phases, over all cases, small and quick.
+std::int64_t DefaultReviewTriangles(std::int64_t phases);
+
+/// Collects cases and writes the page.
+class WebReview
+{
+public:
+  /// @throws as PackShapes; std::invalid_argument for a series with neither no frame nor one a phase
+  void Add(const CaseEvaluation& evaluation, const ReviewCase& shapes);
+
+  /**
+   * The page, the same bytes of the same input. Every text in it is escaped.
+   * @param command  how it was made, for the reader
+   */
+  std::string Html(const std::string& version, const std::string& command) const;
+
+private:
+  std::vector<CaseEvaluation> Evaluations;
+  std::vector<nlohmann::ordered_json> Cases;
+  std::vector<std::string> Blocks; ///< deflated, in base 64
+};
+}
+
+#endif

@@ -1,0 +1,263 @@
+"""The review page in Chromium: check_review.py PIPELINE FOLDER
+
+Makes a small evaluation of two cases, opens its page, uses it as a reviewer does and looks at the pixels. Screenshots stay
+in the folder. Exit 125, which CTest takes as skipped, where there is no Chromium.
+"""
+import json
+import os
+import subprocess
+import sys
+import time
+
+import chromium
+
+HOSTILE = "</script><script>alert(1)</script> & \"one\""
+COARSE = ("--truth-only", "--phases", "3", "--quiet", "--surface-spacing", "1.5", "--centerline-spacing", "3")
+STATE = "document.getElementById('stage').dataset"
+
+
+def check(condition, what):
+    """Ends the test with a sentence."""
+    if not condition:
+        sys.exit("FAILED: " + what)
+
+
+def make_page(pipeline):
+    """Two hearts that differ, and one that is its own truth."""
+    def run(*arguments):
+        subprocess.run([pipeline, *arguments], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=120)
+
+    for seed in ("5", "6"):
+        run("phantom", "--seed", seed, *COARSE, "--output", "truth" + seed)
+    run("evaluate", "--result", "truth6", "--truth", "truth5", "--name", HOSTILE, "--result", "truth5", "--truth", "truth5",
+        "--name", "itself", "--no-pictures", "--quiet", "--web", "--web-triangles", "6000", "--output", "evaluation")
+
+
+def red(pixel):
+    return pixel[0] > 90 and pixel[0] > 1.8 * pixel[1] and pixel[0] > 1.8 * pixel[2]
+
+
+def green(pixel):
+    return pixel[1] > 60 and pixel[1] > 1.3 * pixel[0] and pixel[1] > 1.2 * pixel[2]
+
+
+def orange(pixel):
+    return pixel[0] > 130 and pixel[0] > 1.25 * pixel[1] > 1.25 * pixel[2]
+
+
+def blue(pixel):
+    return pixel[2] > 90 and pixel[2] > 1.3 * pixel[0]
+
+
+class Reviewer:
+    """Looks at the page and uses it."""
+
+    def __init__(self, page):
+        self.page = page
+
+    def state(self, name):
+        return self.page.evaluate("%s.%s" % (STATE, name))
+
+    def ready(self):
+        self.page.wait("document.getElementById('stage') && %s.state && %s.state !== 'reading'" % (STATE, STATE))
+        check(self.state("state") == "ready", "the shapes are not there: " + self.text("#trouble"))
+        self.page.wait("Number(%s.drawn) > 0" % STATE)
+
+    def text(self, selector):
+        return self.page.evaluate("document.querySelector(%s).textContent" % json.dumps(selector))
+
+    def after(self, act):
+        """Waits until something was drawn after an act and the fine picture is there."""
+        before = int(self.state("drawn"))
+        act()
+        self.page.wait("Number(%s.drawn) > %d" % (STATE, before))
+        drawn = None
+        while drawn != self.state("drawn"):
+            drawn = self.state("drawn")
+            time.sleep(0.25)
+
+    def press(self, key):
+        self.after(lambda: self.page.press(key))
+
+    def picture(self):
+        """The canvas at a third of its size, without what stands before it, as rows."""
+        self.page.evaluate("document.head.append(Object.assign(document.createElement('style'),"
+                           " { id: 'bare', textContent: '.stage > :not(canvas) { visibility: hidden }' }))")
+        png = self.page.screenshot(selector="#canvas", scale=0.34)
+        self.page.evaluate("document.getElementById('bare').remove()")
+        return chromium.pixels(png)
+
+    def count(self, *kinds):
+        pixels = [pixel for row in self.picture() for pixel in row]
+        return [sum(map(kind, pixels)) for kind in kinds]
+
+
+def check_tables(page, table):
+    """Numbers as they are in table1.json, to the digits shown."""
+    def rows(selector):
+        return page.evaluate("[...document.querySelectorAll(%s)].map((row) => [...row.children].map((cell) => cell.textContent))"
+                             % json.dumps(selector))
+
+    def number(value):
+        return "–" if value is None else "%.3f" % value
+
+    keys = [key for key in table["mean"] if any(phase[key] is not None for case in table["cases"] for phase in case["phases"])]
+    headings = page.evaluate("[...document.querySelectorAll('#part-a thead tr:last-child th:not(.paper)')]"
+                             ".map((one) => one.firstChild.textContent)")
+    check(headings[3:] == keys, "the columns of Part A are %s, not %s" % (headings[3:], keys))
+    shown, case = rows("#part-a tbody tr"), table["cases"][0]
+    check(len(shown) == len(case["phases"]), "Part A has not a row a phase")
+    for row, phase in zip(shown, case["phases"]):
+        check(row[:2] == [str(phase["phase"]), "%.1f" % (100 * phase["fraction"])], "a wrong phase: %s" % row)
+        check(row[3:3 + len(keys)] == [number(phase[key]) for key in keys], "wrong numbers: %s" % row)
+    check(rows("#part-a tfoot tr")[0][1:1 + len(keys)] == [number(case["interpolated_mean"][key]) for key in keys],
+          "wrong means of Part A")
+    for row, case in zip(rows("#part-b tbody:not(.paper) tr"), table["cases"]):
+        check(row[0] == case["name"], "Part B calls a case '%s'" % row[0])
+        check([cell.split(" ")[0] for cell in row[1:]] == [number(case["interpolated_mean"][key]) for key in keys],
+              "wrong numbers in Part B: %s" % row)
+    paper = rows("#part-b tbody.paper tr")
+    check(len(paper) == 6 and "4.96 ± 1.78" in paper[-1], "the paper's Part B is not there")
+
+
+def review(page, url, table):
+    user = Reviewer(page)
+    began = time.monotonic()
+    page.open(url)
+    user.ready()
+    print("ready after %.2f s" % (time.monotonic() - began))
+    check(user.text("#part-a-case") == HOSTILE, "the hostile name is not a text")
+    check(page.evaluate("document.scripts.length") == 4, "the hostile name made an element")
+    check(page.evaluate("typeof Review + typeof Painter + typeof RED") == "undefined" * 3, "there are globals")
+    page.screenshot("overlay.png")
+
+    reds, greens = user.count(red, green)
+    check(reds > 150 and greens > 150, "the overlay has %d red and %d green pixels" % (reds, greens))
+    user.press("1")
+    reds, greens = user.count(red, green)
+    check(reds > 300 and greens == 0, "the model has %d red and %d green pixels" % (reds, greens))
+    user.press("2")
+    reds, greens = user.count(red, green)
+    check(greens > 300 and reds == 0, "the truth has %d red and %d green pixels" % (reds, greens))
+    user.press("5")
+    user.press("4")
+    far = user.count(orange, blue)
+    check(sum(far) > 100, "distances have no colours")
+    page.screenshot("distance.png")
+    user.after(lambda: page.evaluate(
+        "(() => { const one = document.getElementById('range'); one.value = 1000; one.dispatchEvent(new Event('change')); })()"))
+    check(sum(user.count(orange, blue)) < 0.1 * sum(far), "another range of the colours changes nothing")
+    user.after(lambda: page.click("#range-reset"))
+    check(abs(sum(user.count(orange, blue)) - sum(far)) < 5, "the range does not come back")
+
+    # Reading a point: one that the picture shows.
+    box = page.evaluate("(() => { const box = document.getElementById('canvas').getBoundingClientRect();"
+                        " return [box.x, box.y, box.width, box.height]; })()")
+    rows = user.picture()
+    y, x = next((y, x) for y, row in enumerate(rows) if y > 0.2 * len(rows) for x, pixel in enumerate(row)
+                if orange(pixel) or blue(pixel) and x < 0.8 * len(row))
+    user.after(lambda: page.click_at(box[0] + (x + 1) / 0.34, box[1] + (y + 0.5) / 0.34))
+    if "mm" not in user.text("#readout").split("surface")[0]:
+        user.after(lambda: page.click("#farthest"))
+    readout = user.text("#readout")
+    check("side the truth" in readout and "phase 0" in readout and "%R-R" in readout, "what is read: " + readout)
+    user.after(lambda: page.click("#farthest"))
+    greatest = float(user.text("#readout strong").split(" ")[0])
+    check(0 < greatest <= table["cases"][0]["phases"][0]["HD"] + 0.01, "the largest distance is %g" % greatest)
+    check(page.evaluate("!document.getElementById('mark').hidden"), "the point is not marked")
+
+    # Turning, and back.
+    user.press("3")
+    at_first, view = user.picture(), user.state("view")
+    middle = box[0] + box[2] / 2, box[1] + box[3] / 2
+    user.after(lambda: page.drag(middle, (middle[0] + 120, middle[1] + 60)))
+    check(user.state("view") != view, "dragging does not turn")
+    turned = user.picture()
+    different = sum(a != b for one, other in zip(at_first, turned) for a, b in zip(one, other))
+    check(different > 500, "turning changes %d pixels" % different)
+    user.after(lambda: page.click(".views button:nth-child(4)"))
+    check(user.state("view").startswith("LAO 45"), "LAO 45 looks from " + user.state("view"))
+    user.press("r")
+    check(user.state("view") == view, "reset looks from " + user.state("view"))
+
+    # Phases.
+    user.press("ArrowRight")
+    check(user.state("phase") == "1", "the arrow key does not go to the next phase")
+    user.after(lambda: page.click("#part-a tbody tr:nth-child(3) td:nth-child(4)"))
+    check(user.state("phase") == "2" and page.evaluate("document.querySelector('#part-a tr[aria-current]').dataset.phase") == "2",
+          "a row of the table does not go to its phase")
+    check("Phase 2" in user.text("#caption") and page.evaluate("document.getElementById('phase').value") == "2",
+          "the slider is not at the phase")
+    check(user.text(".plot .value") == "%.3f" % table["cases"][0]["phases"][2]["HD"], "the plot's cursor is elsewhere")
+    user.after(lambda: page.evaluate("(() => { const one = document.getElementById('phase'); one.value = 0;"
+                                     " one.dispatchEvent(new Event('input')); })()"))
+    check(user.state("phase") == "0", "the slider does not go to a phase")
+    page.click("#play")
+    page.wait("%s.phase === '1'" % STATE)
+    page.wait("%s.phase === '2'" % STATE)
+    page.click("#play")
+    check(user.state("playing") == "no", "it does not pause")
+
+    # Lines and names.
+    user.press("1")
+    without = user.picture()
+    user.after(lambda: (page.click("#lines"), page.click("#labels")))
+    check(user.picture() != without, "there are no centerlines")
+    names = page.evaluate("[...document.querySelectorAll('#names span')].map((one) => one.textContent)")
+    check(len(names) > 5 and any(name.endswith("LAD") for name in names), "names: %s" % names)
+    page.dark(True)
+    page.wait("matchMedia('(prefers-color-scheme: dark)').matches")
+    user.press("3")
+    page.screenshot("dark.png")
+    check(sum(user.picture()[0][0]) < 150, "the background is not dark")
+    page.dark(False)
+
+    page.click("#all-measures")
+    check_tables(page, table)
+
+    # The other case: its own truth.
+    page.click("#part-b tbody tr:nth-child(2) th")
+    user.ready()
+    page.wait("%s.case === '1'" % STATE)
+    user.press("4")
+    check(sum(user.count(orange, blue)) == 0, "a surface is not its own truth")
+
+    page.resize(390, 844, mobile=True)
+    page.wait("innerWidth < 500")
+    time.sleep(0.3)
+    page.screenshot("narrow.png")
+    check(page.evaluate("document.documentElement.scrollWidth") <= 390, "the page is wider than a telephone")
+
+    check(page.requests == [url], "the network was asked for %s" % page.requests)
+    check(not page.complaints, "the browser complains: %s" % page.complaints)
+
+
+def review_in_old_browser(page, url):
+    """Without DecompressionStream: a sentence, and the tables."""
+    page.call("Page.addScriptToEvaluateOnNewDocument", source="delete window.DecompressionStream;")
+    page.open(url)
+    page.wait("document.getElementById('stage') && %s.state === 'trouble'" % STATE)
+    check("DecompressionStream" in page.evaluate("document.getElementById('trouble').textContent"), "no sentence")
+    check(page.evaluate("document.querySelectorAll('#part-a tbody tr').length") == 3, "no table")
+
+
+def main():
+    pipeline, folder = sys.argv[1:3]
+    program = chromium.find()
+    if program is None:
+        print("skipped: Chromium is missing")
+        sys.exit(125)
+    os.makedirs(folder, exist_ok=True)
+    os.chdir(folder)
+    make_page(pipeline)
+    with open("evaluation/table1.json", encoding="utf-8") as file:
+        table = json.load(file)
+    url = "file://" + os.path.abspath("evaluation/review.html")
+    with chromium.Browser(program, 1400, 900) as page:
+        review(page, url, table)
+        review_in_old_browser(page, url)
+    print("the review page is as it should be")
+
+
+if __name__ == "__main__":
+    main()
