@@ -16,7 +16,7 @@ Exit code 1 when a program fails or a target is missed.
 EOF
 }
 
-# name | command | command of the quick form, empty: the same, -: none. What begins with scripts/ is one of ours.
+# name | command | command of the quick form, -: none. What begins with scripts/ is one of ours.
 tables=(
   "vesselness-itk | vesselness-benchmark itk --repeats 3 --strict | vesselness-benchmark itk --size 96 --repeats 1"
   "vesselness-clinical | vesselness-benchmark clinical --strict | vesselness-benchmark clinical --clinical-size 128 128 64 --repeats 1"
