@@ -8,7 +8,7 @@ usage() {
 Usage: scripts/validate.sh [--build DIR] [--output DIR] [--quick] [--list] [TABLE ...]
   --build DIR   build tree with the programs (default: build/paraview)
   --output DIR  where the tables go, one Markdown file each (default: validation-output)
-  --quick       a small form of each table, a quarter of an hour in all: whether everything runs and agrees. Its numbers
+  --quick       a small form of each table: whether everything runs and agrees. Its numbers
                 are not those of the documentation, and its times are worth nothing
   --list        name the tables with their commands, run nothing
 Without TABLE all of them, which takes hours. Times are worth something on a quiet machine only.
@@ -16,7 +16,7 @@ Exit code 1 when a program fails or a target is missed.
 EOF
 }
 
-# name | command | command of the quick form, empty: the same, -: none. What begins with scripts/ is one of ours.
+# name | command | command of the quick form, -: none. What begins with scripts/ is one of ours.
 tables=(
   "vesselness-itk | vesselness-benchmark itk --repeats 3 --strict | vesselness-benchmark itk --size 96 --repeats 1"
   "vesselness-clinical | vesselness-benchmark clinical --strict | vesselness-benchmark clinical --clinical-size 128 128 64 --repeats 1"
