@@ -396,7 +396,11 @@ void vtkFastMarchingCenterline::Execute(
     {
       input.grid = vtkCoronary::GridOf(image);
       int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-      vtkAbstractArray* any = this->GetInputAbstractArrayToProcess(0, inputs, association);
+      const char* name = this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
+      // ParaView gives an empty name while it does not know the input's arrays.
+      vtkAbstractArray* any = name && *name == '\0'
+        ? image->GetPointData()->GetScalars()
+        : this->GetInputAbstractArrayToProcess(0, inputs, association);
       vtkCoronary::Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
         "the image's array belongs to the cells: point data are needed");
       vtkDataArray* array = CheckedArray(any, image, "the image");

@@ -271,7 +271,9 @@ vtkDataArray* vtkVesselSegmentation::InputArray(vtkInformationVector** inputs, i
     vtkInformation* chosen = this->GetInputArrayInformation(0);
     const char* name = chosen->Get(vtkDataObject::FIELD_NAME());
     wanted = name ? name : "";
-    any = this->GetInputAbstractArrayToProcess(0, inputs, association);
+    // ParaView gives an empty name while it does not know the input's arrays.
+    any = name && wanted.empty() ? data->GetPointData()->GetScalars()
+                                 : this->GetInputAbstractArrayToProcess(0, inputs, association);
   }
   else
   {

@@ -1,5 +1,6 @@
 """Runs inside the ParaView window, called by the play-back: seeds are picked on a slice, dragged, undone."""
 import os
+import sqlite3
 import sys
 
 from paraview import simple
@@ -57,6 +58,7 @@ def point():
     from window_testing import Desktop
     seen["desktop"] = Desktop()
     seen["desktop"].point(*INSIDE)
+    seen["desktop"].focus()
 
 
 def press(key):
@@ -80,11 +82,14 @@ def mask_voxels():
 
 
 def require_help():
-    """The window of the help has the plugin's pages: it keeps the compiled help of plugins in temporary files."""
+    """The help's window has the plugin's pages: its collection, a data base in a temporary file, names them."""
     from coronary_testing import require
-    files = [os.readlink("/proc/self/fd/" + name) for name in os.listdir("/proc/self/fd")
-             if os.path.islink("/proc/self/fd/" + name)]
-    os.write(1, ("open: %s\n" % [f for f in files if ".q" in f]).encode())
+    files = {os.readlink("/proc/self/fd/" + name) for name in os.listdir("/proc/self/fd")
+             if os.path.islink("/proc/self/fd/" + name)}
+    collections = [path for path in files if path.endswith(".qhc")]
+    require(collections, "the help did not open")
+    names = [row[0] for row in sqlite3.connect(collections[0]).execute("SELECT Name FROM NamespaceTable")]
+    require("dynamiccoronaryplugin.org" in [name.lower() for name in names], "the help has %s" % names)
 
 
 def look(step):

@@ -49,13 +49,19 @@ class Desktop:
         self.x.XWarpPointer(self.display, 0, ctypes.c_ulong(self.root), 0, 0, 0, 0, int(x), int(y))
         self.x.XSync(self.display, 0)
 
-    def press(self, name):
-        """A key, pressed and released, for the window under the pointer, which gets the focus."""
+    def focus(self):
+        """Gives the window under the pointer the focus, and returns it."""
         root, window = ctypes.c_ulong(), ctypes.c_ulong()
         numbers = [ctypes.byref(ctypes.c_int()) for _ in range(5)]
         self.x.XQueryPointer(self.display, ctypes.c_ulong(self.root), ctypes.byref(root),
                              ctypes.byref(window), *numbers)
         self.x.XSetInputFocus(self.display, window, 2, ctypes.c_ulong(0))
+        self.x.XSync(self.display, 0)
+        return window
+
+    def press(self, name):
+        """A key, pressed and released, for the window under the pointer."""
+        window = self.focus()
         self.x.XStringToKeysym.restype = ctypes.c_ulong
         symbol = ctypes.c_ulong(self.x.XStringToKeysym(name.encode()))
         code = self.x.XKeysymToKeycode(self.display, symbol)
