@@ -186,5 +186,5 @@ def cfd_export(size=None):
                     "Viridis (matplotlib)", "CELLS")
     views.look_from_the_front(inside, [side for place in fork for side in (place - 11.0, place + 11.0)])
     views.note_phase((front, inside), source)
-    views.note(front, "File > Save Data > Mesh sequence for simulations of flow", "What to do")
+    views.note(front, "File > Save Data: mesh sequence", "What to do")
     return finish(made, layout, (front, inside), moved)
