@@ -111,7 +111,7 @@ def posing(size=None):
     """A tree that is bent by a joint; the handle of the joint is in the left view, its numbers in the panel."""
     views.require_plugin()
     made = bound_mesh()
-    joint, place = middle_of_the_longest_vessel(views.fetched(made["rest"], REST))
+    joint, place = middle_of_the_longest_vessel(views.fetched(made["rest"]))
     pose = simple.SkeletonPose(
         made["rest"], registrationName="Skeleton Pose", MoveTheChosenJoint=1, ChosenJoint=joint,
         JointPosition=[place[0] + 9.0, place[1] - 5.0, place[2] + 3.0])
@@ -174,7 +174,9 @@ def cfd_export(size=None):
     wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     views.colour_by(wall, front, "Displacement", "displacement from rest (mm)", 0.0, 20.0)
     views.look_from_the_front(front, box, 1.3)
-    fork = widest_fork(views.fetched(poses, moment))
+    posed = simple.ReferencePhase(poses, Automatic=0, Time=moment)
+    fork = widest_fork(views.fetched(posed))
+    simple.Delete(posed)
     cut = simple.Clip(moved, registrationName="Cut open", ClipType="Plane", Crinkleclip=1)
     cut.ClipType.Origin = fork
     cut.ClipType.Normal = [0.0, 1.0, 0.0]
@@ -186,5 +188,5 @@ def cfd_export(size=None):
                     "Viridis (matplotlib)", "CELLS")
     views.look_from_the_front(inside, [side for place in fork for side in (place - 11.0, place + 11.0)])
     views.note_phase((front, inside), source)
-    views.note(front, "File > Save Data > Mesh sequence for simulations of flow", "What to do")
+    views.note(front, "File > Save Data: mesh sequence", "What to do")
     return finish(made, layout, (front, inside), moved)

@@ -140,14 +140,10 @@ def note_phase(views, source, name="Phase"):
     return phase
 
 
-def fetched(port, time=None):
-    """The data of an output port, on the client."""
-    tap = servermanager.filters.ReductionFilter(Input=port)
-    tap.UpdatePipeline(*([] if time is None else [time]))
-    data = tap.GetClientSideObject().GetOutputDataObject(0)
-    copy = data.NewInstance()
-    copy.ShallowCopy(data)
-    return copy
+def fetched(source):
+    """The data of a source's first output, on the client, also of another server's. Not at a certain time."""
+    source.UpdatePipeline()
+    return servermanager.Fetch(source)
 
 
 def is_port(source):
