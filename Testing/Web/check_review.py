@@ -224,6 +224,7 @@ def review(page, url, table):
 
     page.resize(390, 844, mobile=True)
     page.wait("innerWidth < 500")
+    page.evaluate("scrollTo(0, 0)")
     time.sleep(0.3)
     page.screenshot("narrow.png")
     check(page.evaluate("document.documentElement.scrollWidth") <= 390, "the page is wider than a telephone")
