@@ -25,12 +25,12 @@ def check(condition, what):
 def make_page(pipeline):
     """Two hearts that differ, and one that is its own truth."""
     def run(*arguments):
-        subprocess.run([pipeline, *arguments], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=120)
+        subprocess.run([pipeline, *arguments], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=240)
 
     for seed in ("5", "6"):
         run("phantom", "--seed", seed, *COARSE, "--output", "truth" + seed)
     run("evaluate", "--result", "truth6", "--truth", "truth5", "--name", HOSTILE, "--result", "truth5", "--truth", "truth5",
-        "--name", "itself", "--no-pictures", "--quiet", "--web", "--web-triangles", "6000", "--output", "evaluation")
+        "--name", "itself", "--no-pictures", "--quiet", "--web", "--error-bound", "0.1", "--output", "evaluation")
 
 
 def red(pixel):
