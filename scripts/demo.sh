@@ -74,7 +74,7 @@ echo "== From the images to the coronary arteries"
 
 echo "== The model against the truth: Table 1, ours beside the paper's"
 evaluate=("$pipeline" evaluate --result "$output/run" --truth "$output/phantom" --name "phantom 1"
-  --output "$output/evaluation")
+  --web --output "$output/evaluation")
 if [ "$pictures" = yes ]; then
   xvfb-run -a -s "-screen 0 1600x1000x24 -noreset" "${evaluate[@]}"
 else

@@ -18,7 +18,7 @@ common=(
   libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev
   libcgal-dev libxrl-dev
   libfreetype-dev libgif-dev libglew-dev libx11-dev
-  libgtest-dev clang-format-14 xvfb xauth
+  libgtest-dev clang-format-14 xvfb xauth chromium
   dpkg-dev file
   pkg-config libevdev-dev libopenigtlink-dev
   nodejs curl ca-certificates

@@ -21,7 +21,7 @@ namespace coronary
 namespace
 {
 /// What a reduced surface may differ from its original by more than is said, mm.
-constexpr double DeviationError = 5e-3;
+constexpr double DeviationError = 1e-2;
 
 /// Branches by their group's name, in the order in which they are met.
 class BranchList

@@ -25,12 +25,12 @@ def check(condition, what):
 def make_page(pipeline):
     """Two hearts that differ, and one that is its own truth."""
     def run(*arguments):
-        subprocess.run([pipeline, *arguments], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=120)
+        subprocess.run([pipeline, *arguments], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=240)
 
     for seed in ("5", "6"):
         run("phantom", "--seed", seed, *COARSE, "--output", "truth" + seed)
     run("evaluate", "--result", "truth6", "--truth", "truth5", "--name", HOSTILE, "--result", "truth5", "--truth", "truth5",
-        "--name", "itself", "--no-pictures", "--quiet", "--web", "--web-triangles", "6000", "--output", "evaluation")
+        "--name", "itself", "--no-pictures", "--quiet", "--web", "--error-bound", "0.1", "--output", "evaluation")
 
 
 def red(pixel):
@@ -224,6 +224,7 @@ def review(page, url, table):
 
     page.resize(390, 844, mobile=True)
     page.wait("innerWidth < 500")
+    page.evaluate("scrollTo(0, 0)")
     time.sleep(0.3)
     page.screenshot("narrow.png")
     check(page.evaluate("document.documentElement.scrollWidth") <= 390, "the page is wider than a telephone")

@@ -42,9 +42,12 @@ function markOf(kind, x, y, size) {
   return drawing('path', { d: path, class: `mark ${kind}` });
 }
 
-/** Round values, at most six of them, that span both. */
+/** Round values, at most six of them, that span both; values that are nearly one lie in the middle. */
 function ticksOf(least, greatest) {
-  const rough = (greatest - least) / 4 || 1;
+  const missing = Math.max(0, 0.01 - (greatest - least), 0.02 * Math.abs(greatest) - (greatest - least));
+  least -= least >= 0 ? Math.min(least, missing / 2) : missing / 2;
+  greatest += missing / 2;
+  const rough = (greatest - least) / 4;
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
   const ticks = [];

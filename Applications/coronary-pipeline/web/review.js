@@ -380,21 +380,24 @@ class Review {
     this.update();
   }
 
-  /** To the point that is furthest from the other surface. */
+  /** To the point of what is shown that is furthest from the other surface. */
   pickFarthest() {
     if (!this.shapes) {
       return;
     }
-    const side = this.sides[0];
-    const series = this.shapes[side];
-    const frame = series.frames[this.phase];
-    let point = -1;
-    for (let k = 0; k < frame.topology.points; ++k) {
-      if (Math.abs(series.distance(frame, k)) > (point < 0 ? -1 : Math.abs(series.distance(frame, point)))) {
-        point = k;
+    let farthest = null;
+    for (const side of this.sides) {
+      const series = this.shapes[side];
+      const frame = series.frames[this.phase];
+      for (let point = 0; point < frame.topology.points; ++point) {
+        const distance = Math.abs(series.distance(frame, point));
+        if (distance > (farthest ? farthest.distance : -1)) {
+          farthest = { distance, series, frame, point };
+        }
       }
     }
-    if (point >= 0) {
+    if (farthest) {
+      const { series, frame, point } = farthest;
       this.picked = { series, topology: frame.topology, corners: [point, point, point], weights: [1, 0, 0], point };
       this.readOut();
       this.update();

@@ -1,0 +1,37 @@
+#!/usr/bin/env python3
+"""A picture of an evaluation's review page, as Chromium shows it: the phase with the greatest Hausdorff distance.
+
+  python3 scripts/render-review.py EVALUATION/review.html OUTPUT.png
+"""
+import os
+import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "Testing", "Web"))
+sys.dont_write_bytecode = True
+import chromium  # noqa: E402
+
+SIZE = (1360, 880)
+STATE = "document.getElementById('stage').dataset"
+WORST = """(() => {
+  const rows = JSON.parse(document.getElementById('data').textContent).table1.cases[0].phases;
+  return rows.reduce((worst, row, k) => (row.HD > rows[worst].HD ? k : worst), 0);
+})()"""
+
+page_file, output = sys.argv[1:3]
+program = chromium.find()
+if program is None:
+    sys.exit("render-review: Chromium is missing")
+with chromium.Browser(program, *SIZE) as page:
+    page.open("file://" + os.path.abspath(page_file))
+    page.wait("document.getElementById('stage') && Number(%s.drawn) > 0" % STATE)
+    worst = page.evaluate(WORST)
+    page.click("#part-a tbody tr:nth-child(%d)" % (worst + 1))
+    page.click("#labels")
+    page.click("#farthest")
+    drawn = -1
+    while drawn != page.evaluate(STATE + ".drawn"):
+        drawn = page.evaluate(STATE + ".drawn")
+        page.evaluate("new Promise((done) => setTimeout(done, 1000))")
+    page.evaluate("scrollTo(0, 0)")
+    page.screenshot(output)
+print(output)
