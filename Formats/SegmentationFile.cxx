@@ -19,6 +19,15 @@ bool EndsWith(const std::string& text, const std::string& end)
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
+// In one line, whatever it is.
+std::string Quoted(const std::string& text)
+{
+  std::string line = text.substr(0, 64);
+  std::replace_if(
+    line.begin(), line.end(), [](char c) { return c >= 0 && c < ' '; }, ' ');
+  return "'" + line + "'";
+}
+
 std::vector<Segment> SegmentsOf(
   const std::map<std::string, std::string>& notes, const std::string& path)
 {
@@ -42,7 +51,7 @@ std::vector<Segment> SegmentsOf(
     segment.id = *id;
     if (!ids.insert(segment.id).second)
     {
-      FormatError(path, "two segments have the ID '" + segment.id.substr(0, 64) + "'");
+      FormatError(path, "two segments have the ID " + Quoted(segment.id));
     }
     const std::string* name = note("Name");
     segment.name = name != nullptr ? *name : segment.id;
@@ -66,11 +75,6 @@ std::vector<Segment> SegmentsOf(
     }
     segments.push_back(segment);
   }
-}
-
-std::string Quoted(const std::string& text)
-{
-  return "'" + text.substr(0, 64) + "'";
 }
 
 // As Slicer has it: of a layer the box around the extents of its segments counts.

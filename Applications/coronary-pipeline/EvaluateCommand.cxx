@@ -48,7 +48,8 @@ struct EvaluateJob
   std::vector<std::string> truths;
   std::vector<std::string> names;
   std::string output;
-  std::string untracked = "auto"; ///< "auto", "odd" or "none"
+  std::vector<std::string> segments; ///< of masks that are the truth
+  std::string untracked = "auto";    ///< "auto", "odd" or "none"
   MeshDistanceSettings distance;
   double timeTolerance = 1e-3;
   bool noPictures = false;
@@ -96,8 +97,9 @@ void EvaluateJob::Declare(CLI::App& app)
     ->required();
   app
     .add_option("--truth", this->truths,
-      "Folder of the true surfaces (surface.pvd, truth/surface.pvd), or such a file; once for each "
-      "case")
+      "Folder of the true surfaces (surface.pvd, truth/surface.pvd), or such a file, which may "
+      "list "
+      "masks (.seg.nrrd), or a series.json with a mask for its phases; once for each case")
     ->allow_extra_args(false)
     ->type_name("DIR")
     ->required();
@@ -107,6 +109,12 @@ void EvaluateJob::Declare(CLI::App& app)
   app.add_option("--output", this->output, "Folder to write to; made when it does not exist")
     ->type_name("DIR")
     ->required();
+  app
+    .add_option("--mask-segment", this->segments,
+      "Name or ID of a segment, where the truth is a mask; may be repeated. Without any, all of "
+      "them")
+    ->allow_extra_args(false)
+    ->type_name("NAME");
   app
     .add_option("--interpolated", this->untracked,
       "Phases that were not tracked: auto (as the result's report says, else odd), odd or none")
@@ -301,8 +309,8 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
     EvaluationInput input;
     const auto read = [&](const std::string& path)
     {
-      return ReadTriangles(
-        path, vtkCoronaryArrayNames::GroupIds, vtkCoronaryArrayNames::CellEntityIds, messages);
+      return ReadTriangles(path, vtkCoronaryArrayNames::GroupIds,
+        vtkCoronaryArrayNames::CellEntityIds, messages, this->segments);
     };
     SurfaceTriangles model = read(one.model);
     SurfaceTriangles truth = read(one.truth);
@@ -335,7 +343,10 @@ ReportCase EvaluateJob::Draw(const CaseFiles& files, const std::string& subfolde
   scene.model = [&](int index)
   { return read(files.phases[static_cast<std::size_t>(index)].model); };
   scene.truth = [&](int index)
-  { return read(files.phases[static_cast<std::size_t>(index)].truth); };
+  {
+    return ReadSurface(
+      files.phases[static_cast<std::size_t>(index)].truth, messages, this->segments);
+  };
   scene.centerline = [&](int index)
   { return read(files.phases[static_cast<std::size_t>(index)].modelLines); };
 
