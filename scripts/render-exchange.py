@@ -63,10 +63,8 @@ def tube(places):
 
 
 def main(plugin, mask, markups, output):
-    simple.LoadPlugin(plugin, ns=globals())
-    reader = simple.OpenDataFile(mask)
-    if reader.GetXMLName() != "CoronarySegmentationReader":
-        reader = simple.SegmentationReader(FileNames=[mask])
+    simple.LoadPlugin(plugin, ns=vars(simple))
+    reader = simple.SegmentationReader(FileNames=[mask])
     contour = simple.Contour(Input=reader, ContourBy=["POINTS", "VesselMask"], Isosurfaces=[0.5])
     renderer = vtkRenderer()
     renderer.SetBackground(0.06, 0.07, 0.09)

@@ -73,7 +73,9 @@ private:
   vtkSmartPointer<vtkPolyData> AsTree(vtkPolyData* lines, vtkMessageTrap& messages) const;
   vtkSmartPointer<vtkPolyData> OneTree(vtkPolyData* tree) const;
   void WriteVessels(vtkPolyData* tree) const;
-  void Write(vtkPolyData* lines, bool wasTree, vtkMessageTrap& messages) const;
+  /// @return what was written
+  vtkSmartPointer<vtkPolyData> Write(
+    vtkPolyData* lines, bool wasTree, vtkMessageTrap& messages) const;
 };
 
 constexpr const char* Forms[] = { "tree", "vmtk", "skeleton", "simvascular", "svpath", "slicer" };
@@ -279,12 +281,22 @@ vtkSmartPointer<vtkPolyData> ConvertJob::AsTree(vtkPolyData* lines, vtkMessageTr
   {
     return this->Joined(lines, messages);
   }
-  if (vtkCoronary::FormOf(lines) == vtkCoronary::CenterlineForm::Unknown &&
-    !EndsWith(this->input, ".vtp"))
+  if (vtkCoronary::FormOf(lines) != vtkCoronary::CenterlineForm::Unknown)
   {
-    return TreeOfLines(lines, this->tolerance);
+    return lines;
   }
-  return lines;
+  const bool skeleton = EndsWith(this->input, ".tgf") || EndsWith(this->output, ".tgf");
+  const bool asItIs =
+    skeleton || (EndsWith(this->input, ".vtp") && IsMarkupsFileName(this->output));
+  if (EndsWith(this->input, ".vtp") && !asItIs)
+  {
+    throw std::runtime_error("'" + this->input +
+      "' is neither a tree (cell arrays GroupIds and ParentGroupIds), nor VMTK's branches "
+      "(CenterlineIds, TractIds and GroupIds), nor SimVascular's centerlines (point arrays "
+      "BranchId "
+      "and BifurcationId): --join makes a tree of its lines.");
+  }
+  return asItIs ? vtkSmartPointer<vtkPolyData>(lines) : TreeOfLines(lines, this->tolerance);
 }
 
 vtkSmartPointer<vtkPolyData> ConvertJob::OneTree(vtkPolyData* tree) const
@@ -338,7 +350,8 @@ void ConvertJob::WriteVessels(vtkPolyData* tree) const
   std::printf("%s: %zu paths, %zu contours\n", this->output.c_str(), vessels.size(), contours);
 }
 
-void ConvertJob::Write(vtkPolyData* lines, bool wasTree, vtkMessageTrap& messages) const
+vtkSmartPointer<vtkPolyData> ConvertJob::Write(
+  vtkPolyData* lines, bool wasTree, vtkMessageTrap& messages) const
 {
   if (IsMarkupsFileName(this->output))
   {
@@ -346,7 +359,7 @@ void ConvertJob::Write(vtkPolyData* lines, bool wasTree, vtkMessageTrap& message
     const std::string name = std::filesystem::path(this->output).stem().stem().string();
     WriteFileAtomically(
       this->output, MarkupsText(points ? FiducialsOf(lines, name) : CurvesOf(lines)));
-    return;
+    return lines;
   }
   if (EndsWith(this->output, ".tgf"))
   {
@@ -356,12 +369,12 @@ void ConvertJob::Write(vtkPolyData* lines, bool wasTree, vtkMessageTrap& message
     writer->SetTolerance(this->tolerance);
     writer->Write();
     messages.ThrowIfError();
-    return;
+    return lines;
   }
   if (this->form == "skeleton" || lines->GetNumberOfLines() == 0)
   {
     WritePolyData(this->output, lines, messages);
-    return;
+    return lines;
   }
   vtkNew<vtkCenterlineConversion> conversion;
   conversion->SetInputData(lines);
@@ -371,11 +384,11 @@ void ConvertJob::Write(vtkPolyData* lines, bool wasTree, vtkMessageTrap& message
     tree ? vtkCenterlineConversion::TreeForm : vtkCenterlineConversion::VmtkForm);
   conversion->Update();
   messages.ThrowIfError();
-  WritePolyData(this->output,
-    this->form == "simvascular"
-      ? ToSimVascular(this->OneTree(conversion->GetOutput()), this->Unit())
-      : vtkSmartPointer<vtkPolyData>(conversion->GetOutput()),
-    messages);
+  const vtkSmartPointer<vtkPolyData> written = this->form == "simvascular"
+    ? ToSimVascular(this->OneTree(conversion->GetOutput()), this->Unit())
+    : vtkSmartPointer<vtkPolyData>(conversion->GetOutput());
+  WritePolyData(this->output, written, messages);
+  return written;
 }
 
 void ConvertJob::Run() const
@@ -423,7 +436,7 @@ void ConvertJob::Run() const
     this->WriteVessels(this->OneTree(lines));
     return;
   }
-  this->Write(lines, wasTree, messages);
+  lines = this->Write(lines, wasTree, messages);
   std::printf("%s: %lld lines, %lld points\n", this->output.c_str(),
     static_cast<long long>(lines->GetNumberOfLines()),
     static_cast<long long>(lines->GetNumberOfPoints()));

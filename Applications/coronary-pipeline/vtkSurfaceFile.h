@@ -29,8 +29,8 @@ bool IsSurfaceFile(const std::string& path);
  * @param segments  of a mask, by name or ID; empty: all
  * @throws std::runtime_error naming the file, also if it has no polygons
  */
-vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& path, vtkMessageTrap& messages,
-  const std::vector<std::string>& segments = {});
+vtkSmartPointer<vtkPolyData> ReadSurface(
+  const std::string& path, vtkMessageTrap& messages, const std::vector<std::string>& segments = {});
 
 /// A surface to be compared, and where its arrays are.
 struct SurfaceTriangles
@@ -46,8 +46,7 @@ struct SurfaceTriangles
  * @throws as ReadSurface; std::invalid_argument naming an array that does not fit
  */
 SurfaceTriangles ReadTriangles(const std::string& path, const std::string& groups,
-  const std::string& caps, vtkMessageTrap& messages,
-  const std::vector<std::string>& segments = {});
+  const std::string& caps, vtkMessageTrap& messages, const std::vector<std::string>& segments = {});
 }
 
 #endif

@@ -229,6 +229,24 @@ def fork():
     return {"markups": [curve("LM", trunk, 2.0), curve("LAD", left, 1.5), curve("LCx", right, 1.25)]}
 
 
+def write_lines(path):
+    """The Y as vmtkcenterlines has it: a whole line to each tip, with radii and without ids."""
+    trunk, left, right = ([p["position"] for p in m["controlPoints"]] for m in fork()["markups"])
+    lines = [trunk + left[1:], trunk + right[1:]]
+    points = " ".join(str(v) for line in lines for p in line for v in p)
+    radii = " ".join("2" if n < len(trunk) else "1.4" for line in lines for n in range(len(line)))
+    count = len(lines[0])
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(
+            f'<VTKFile type="PolyData" version="0.1" byte_order="LittleEndian"><PolyData>'
+            f'<Piece NumberOfPoints="{2 * count}" NumberOfLines="2" NumberOfVerts="0" NumberOfStrips="0" NumberOfPolys="0">'
+            f'<PointData><DataArray type="Float64" Name="MaximumInscribedSphereRadius" format="ascii">{radii}</DataArray>'
+            f'</PointData><Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">{points}</DataArray>'
+            f'</Points><Lines><DataArray type="Int64" Name="connectivity" format="ascii">'
+            f'{" ".join(map(str, range(2 * count)))}</DataArray><DataArray type="Int64" Name="offsets" format="ascii">'
+            f'{count} {2 * count}</DataArray></Lines></Piece></PolyData></VTKFile>\n')
+
+
 def centerlines():
     """Markups, VMTK's and SimVascular's forms, there and back."""
     with open("fork.mrk.json", "w", encoding="utf-8") as file:
@@ -265,6 +283,10 @@ def centerlines():
     run("convert", "tree.vtp", "lines.vtp", "--form", "vmtk")
     vmtk, tracts = read_vtp("lines.vtp")
     check(len(tracts) == 4 and list(vmtk["CenterlineIds"]) == [0, 0, 1, 1], "VMTK's tracts")
+    write_lines("whole.vtp")
+    run("convert", "whole.vtp", "x.vtp", code=1, says="--join")
+    run("convert", "whole.vtp", "joined.vtp", "--join")
+    check(len(read_vtp("joined.vtp")[1]) == 3, "whole lines of VMTK were not joined to a tree")
     with open("bad.pth", "w", encoding="utf-8") as file:
         file.write('<path id="1"><timestep><path_element><path_points><path_point><pos x="1" y="nan" z="0"/>')
     run("convert", "bad.pth", "x.vtp", code=1, says="y is 'nan'")
