@@ -34,7 +34,7 @@ struct SeriesDescription
     std::string image;      ///< a volume file, or a folder of DICOM files
     std::string surface;    ///< true lumen surface; empty if there is none
     std::string centerline; ///< true centerline tree; empty if there is none
-    std::string mask;       ///< segmentation of the vessels; empty if there is none
+    std::string mask = {};  ///< segmentation of the vessels; empty if there is none
   };
 
   struct Seed
