@@ -15,14 +15,28 @@ namespace
 struct Fields
 {
   std::map<std::string, std::string> values; ///< keys in lower case
+  std::map<std::string, std::string> notes;  ///< "key:=value", as the writer spelled the key
   std::vector<std::string> list;             ///< file names after "data file: LIST"
   std::size_t end = 0;                       ///< where the header ends
   bool closed = false;                       ///< by an empty line, so that data may follow
 };
 
-Fields ReadFields(const std::string& path)
+// The value of a note: "\\n" and "\\\\" stand for the end of a line and a backslash.
+std::string NoteValue(const std::string& text)
 {
-  const std::string text = ReadHeaderText(path);
+  std::string value;
+  for (std::size_t i = 0; i < text.size(); ++i)
+  {
+    const char next = text[i] == '\\' && i + 1 < text.size() ? text[i + 1] : '\0';
+    const bool escaped = next == 'n' || next == '\\';
+    value += !escaped ? text[i] : next == 'n' ? '\n' : '\\';
+    i += escaped ? 1 : 0;
+  }
+  return value;
+}
+
+Fields ParseFields(const std::string& text, const std::string& path)
+{
   if (text.compare(0, 7, "NRRD000") != 0)
   {
     FormatError(path, "is not a NRRD file: it does not begin with 'NRRD000'");
@@ -57,6 +71,7 @@ Fields ReadFields(const std::string& path)
     // "key:=value" is a note of the writer, not a field.
     if (colon + 1 < line.size() && line[colon + 1] == '=')
     {
+      fields.notes[line.substr(0, colon)] = NoteValue(line.substr(colon + 2));
       continue;
     }
     std::string key = LowerCase(Trimmed(line.substr(0, colon)));
@@ -418,13 +433,19 @@ void SetData(VolumeHeader& header, const Fields& fields)
 }
 }
 
+std::map<std::string, std::string> ParseNrrdNotes(const std::string& text, const std::string& path)
+{
+  return ParseFields(text, path).notes;
+}
+
 VolumeHeader ReadNrrdHeader(const std::string& path)
 {
   VolumeHeader header;
   VolumeInfo& info = header.info;
   info.path = path;
   info.format = "NRRD";
-  const Fields fields = ReadFields(path);
+  const Fields fields = ParseFields(ReadHeaderText(path), path);
+  header.notes = fields.notes;
   const int dimension =
     ParseIntegers(Required(fields, "dimension", path), 1, 1, path, "dimension").front();
   if (dimension != 3 && dimension != 4)

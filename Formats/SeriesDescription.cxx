@@ -185,6 +185,7 @@ SeriesDescription::Phase ParsePhase(
   }
   phase.fraction = FiniteNumber(entry["fraction"], path, name + ".fraction");
   phase.image = Text(entry, "image", path, name, true);
+  phase.mask = Text(entry, "mask", path, name, false);
   const auto truth = entry.find("truth");
   if (truth != entry.end() && truth->is_object())
   {
@@ -293,6 +294,10 @@ void WriteSeriesDescription(const std::string& path, const SeriesDescription& de
   for (const SeriesDescription::Phase& phase : description.phases)
   {
     Json entry = { { "fraction", phase.fraction }, { "image", phase.image } };
+    if (!phase.mask.empty())
+    {
+      entry["mask"] = phase.mask;
+    }
     if (!phase.surface.empty())
     {
       entry["truth"]["surface"] = phase.surface;

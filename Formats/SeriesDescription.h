@@ -6,7 +6,7 @@
  * {
  *   "cycle_ms": 1000,
  *   "phases": [
- *     { "fraction": -0.05, "image": "phase_00.mha",
+ *     { "fraction": -0.05, "image": "phase_00.mha", "mask": "phase_00.seg.nrrd",
  *       "truth": { "surface": "truth/surface_00.vtp", "centerline": "truth/centerline_00.vtp" } }
  *   ],
  *   "seeds": [ { "name": "LCA", "position": [12.5, -30.0, 41.0] } ]
@@ -34,6 +34,7 @@ struct SeriesDescription
     std::string image;      ///< a volume file, or a folder of DICOM files
     std::string surface;    ///< true lumen surface; empty if there is none
     std::string centerline; ///< true centerline tree; empty if there is none
+    std::string mask = {};  ///< segmentation of the vessels; empty if there is none
   };
 
   struct Seed

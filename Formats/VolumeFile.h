@@ -8,6 +8,7 @@
 #include "VolumeSource.h"
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,6 +28,7 @@ struct VolumeHeader
   bool wholeFile = false;             ///< the compressed stream holds the header too (.nii.gz)
   std::vector<std::string> dataFiles; ///< of equal shares, in the order of the voxels
   std::uint64_t dataOffset = 0;       ///< bytes before the voxels, in each data file
+  std::map<std::string, std::string> notes; ///< "key:=value" lines of a NRRD header
 };
 
 /// True when the name ends as one of the formats that ReadVolumeHeader() knows.

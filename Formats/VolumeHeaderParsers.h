@@ -8,6 +8,7 @@
 #include "VolumeFile.h"
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,9 @@ namespace coronary
 VolumeHeader ReadMetaImageHeader(const std::string& path);
 VolumeHeader ReadNrrdHeader(const std::string& path);
 VolumeHeader ReadNiftiHeader(const std::string& path);
+
+/// The "key:=value" lines of a NRRD header. @param path for messages @throws std::runtime_error
+std::map<std::string, std::string> ParseNrrdNotes(const std::string& text, const std::string& path);
 
 /// The first bytes of a text header that may be followed by voxels; at most 1 MiB.
 std::string ReadHeaderText(const std::string& path);

@@ -43,6 +43,7 @@ MakeCommand MakeInspectCommand;
 MakeCommand MakeRunCommand;
 MakeCommand MakeConvertCommand;
 MakeCommand MakeSequenceCommand;
+MakeCommand MakeSlicerCommand;
 MakeCommand MakeMetricsCommand;
 MakeCommand MakeEvaluateCommand;
 }

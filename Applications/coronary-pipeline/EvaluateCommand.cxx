@@ -48,7 +48,8 @@ struct EvaluateJob
   std::vector<std::string> truths;
   std::vector<std::string> names;
   std::string output;
-  std::string untracked = "auto"; ///< "auto", "odd" or "none"
+  std::vector<std::string> segments; ///< of masks that are the truth
+  std::string untracked = "auto";    ///< "auto", "odd" or "none"
   MeshDistanceSettings distance;
   double timeTolerance = 1e-3;
   bool noPictures = false;
@@ -79,7 +80,7 @@ private:
   void Evaluate(CaseFiles& files, vtkMessageTrap& messages,
     const std::function<void(const PhaseFiles&)>& begin,
     const std::function<void(double)>& progress) const;
-  static EvaluationScene SceneOf(const CaseFiles& files, vtkMessageTrap& messages);
+  EvaluationScene SceneOf(const CaseFiles& files, vtkMessageTrap& messages) const;
   static ReportCase Draw(const EvaluationScene& scene, const std::string& subfolder,
     StagedFolder& folder, const std::function<void(double)>& progress);
   /// The options that its tables come from, for the reader of a page.
@@ -101,8 +102,9 @@ void EvaluateJob::Declare(CLI::App& app)
     ->required();
   app
     .add_option("--truth", this->truths,
-      "Folder of the true surfaces (surface.pvd, truth/surface.pvd), or such a file; once for each "
-      "case")
+      "Folder of the true surfaces (surface.pvd, truth/surface.pvd), or such a file, which may "
+      "list "
+      "masks (.seg.nrrd), or a series.json with a mask for its phases; once for each case")
     ->allow_extra_args(false)
     ->type_name("DIR")
     ->required();
@@ -112,6 +114,12 @@ void EvaluateJob::Declare(CLI::App& app)
   app.add_option("--output", this->output, "Folder to write to; made when it does not exist")
     ->type_name("DIR")
     ->required();
+  app
+    .add_option("--mask-segment", this->segments,
+      "Name or ID of a segment, where the truth is a mask; may be repeated. Without any, all of "
+      "them")
+    ->allow_extra_args(false)
+    ->type_name("NAME");
   app
     .add_option("--interpolated", this->untracked,
       "Phases that were not tracked: auto (as the result's report says, else odd), odd or none")
@@ -274,8 +282,8 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
     EvaluationInput input;
     const auto read = [&](const std::string& path)
     {
-      return ReadTriangles(
-        path, vtkCoronaryArrayNames::GroupIds, vtkCoronaryArrayNames::CellEntityIds, messages);
+      return ReadTriangles(path, vtkCoronaryArrayNames::GroupIds,
+        vtkCoronaryArrayNames::CellEntityIds, messages, this->segments);
     };
     SurfaceTriangles model = read(one.model);
     SurfaceTriangles truth = read(one.truth);
@@ -298,7 +306,7 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
   }
 }
 
-EvaluationScene EvaluateJob::SceneOf(const CaseFiles& files, vtkMessageTrap& messages)
+EvaluationScene EvaluateJob::SceneOf(const CaseFiles& files, vtkMessageTrap& messages) const
 {
   const auto reader = [&files, &messages](const std::string PhaseFiles::*path)
   {
@@ -311,7 +319,11 @@ EvaluationScene EvaluateJob::SceneOf(const CaseFiles& files, vtkMessageTrap& mes
   EvaluationScene scene;
   scene.evaluation = &files.evaluation;
   scene.model = reader(&PhaseFiles::model);
-  scene.truth = reader(&PhaseFiles::truth);
+  scene.truth = [this, &files, &messages](int index)
+  {
+    const std::string& file = files.phases[static_cast<std::size_t>(index)].truth;
+    return ReadSurface(file, messages, this->segments);
+  };
   scene.centerline = reader(&PhaseFiles::modelLines);
   scene.truthCenterline = reader(&PhaseFiles::truthLines);
   return scene;

@@ -1,5 +1,7 @@
 #include "MovingModel.h"
 
+#include "SeriesDescription.h"
+
 #include <nlohmann/json.hpp>
 
 #include <cmath>
@@ -110,6 +112,32 @@ const TimedFile* MovingModel::At(const std::vector<TimedFile>& files, double tim
   return best;
 }
 
+namespace
+{
+/// The phases of a series.json that have a mask, or the true surface.
+void ReadSeries(const std::string& path, MovingModel& model)
+{
+  const SeriesDescription series = ReadSeriesDescription(path);
+  for (const SeriesDescription::Phase& phase : series.phases)
+  {
+    const std::string& surface = phase.mask.empty() ? phase.surface : phase.mask;
+    if (!surface.empty())
+    {
+      model.surfaces.push_back({ ResolveSeriesPath(path, surface), phase.fraction });
+    }
+    if (!phase.centerline.empty())
+    {
+      model.centerlines.push_back({ ResolveSeriesPath(path, phase.centerline), phase.fraction });
+    }
+  }
+  if (model.surfaces.empty())
+  {
+    throw std::runtime_error(
+      "'" + path + "' has no phase with a 'mask' or a true surface: there is nothing to compare.");
+  }
+}
+}
+
 MovingModel FindMovingModel(const std::string& path)
 {
   MovingModel model;
@@ -117,6 +145,11 @@ MovingModel FindMovingModel(const std::string& path)
   std::error_code ignored;
   if (fs::is_regular_file(path, ignored))
   {
+    if (fs::path(path).extension() == ".json")
+    {
+      ReadSeries(path, model);
+      return model;
+    }
     model.surfaces = ReadList(path);
     return model;
   }

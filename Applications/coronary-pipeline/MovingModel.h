@@ -29,7 +29,8 @@ struct MovingModel
 
 /**
  * Looks for surfaces and centerlines in what `run` or `phantom` wrote (motion.pvd, surface.pvd, their .series, in
- * the folder itself, in motion/ or in truth/), or takes one .pvd or .series file of surfaces.
+ * the folder itself, in motion/ or in truth/), or takes one .pvd or .series file of surfaces or masks, or a series.json: the
+ * masks of its phases, or their true surfaces.
  * @throws std::runtime_error naming the folder or file and what is missing
  */
 MovingModel FindMovingModel(const std::string& path);

@@ -186,6 +186,17 @@ RunOptions::RunOptions(CLI::App& app, RunSettings& settings)
   seed.option->type_size(3)->expected(1, 100000)->allow_extra_args(false);
   seed.optional = true;
   seed.points = true;
+  add(group, "--seed-file", "seed_file", settings.seedFile, "FILE",
+    "Points in vessels or on ostia as markups of 3D Slicer (.mrk.json), beside those of --seed",
+    segmentation);
+  add(group, "--mask", "mask", settings.mask, "FILE",
+    "Mask of the vessels in the reference phase, instead of segmenting it: a .seg.nrrd of 3D "
+    "Slicer, or "
+    "another volume. With it of several phases --time. Without it, that of a series.json",
+    segmentation);
+  add(group, "--mask-segment", "mask_segments", settings.maskSegments, "NAME",
+    "Name or ID of a segment of the mask; may be repeated. Without any, all of them", segmentation)
+    .option->allow_extra_args(false);
   between(add(group, "--largest-radius", "largest_radius", settings.largestRadius, "MM",
             "Blood that a ball of this radius fits into is aorta or chamber, mm", segmentation),
     1.0, 50.0)

@@ -44,6 +44,9 @@ struct RunSettings
   std::vector<double> scales = { 0.5, 2.5 };
   double c = 100.0; // the largest norm in a clinical CT belongs to bone and metal
   std::vector<double> seeds;
+  std::string seedFile; ///< markups
+  std::string mask;
+  std::vector<std::string> maskSegments;
   double largestRadius = 4.5;
   std::vector<double> window;
 

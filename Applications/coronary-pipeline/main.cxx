@@ -27,6 +27,7 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakeInspectCommand,
   coronary::MakeRunCommand,
   coronary::MakeSequenceCommand,
+  coronary::MakeSlicerCommand,
   coronary::MakeMetricsCommand,
   coronary::MakeEvaluateCommand,
   coronary::MakeConvertCommand,

@@ -1,12 +1,17 @@
 #include "vtkRunStages.h"
 
 #include "AtomicFile.h"
+#include "Command.h"
 #include "FileSeries.h"
 #include "Interruption.h"
+#include "MarkupsFile.h"
+#include "MaskResampling.h"
 #include "MatrixFile.h"
 #include "MeshSequenceReport.h"
 #include "MetaImageWriter.h"
 #include "OptionChecks.h"
+#include "SegmentationFile.h"
+#include "SeriesDescription.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
@@ -303,16 +308,18 @@ Json MakeVesselness(RunStep& step)
     { "c", vesselness->GetUsedC() } };
 }
 
-Json MakeSegmentation(RunStep& step)
+/// The segmentation with its seeds and the aorta; a mask that is there already stays.
+void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
+  vtkSmartPointer<vtkPolyData>& seeds, vtkSmartPointer<vtkPolyData>& aorta)
 {
   const RunSettings& settings = step.input.Settings;
-  NeedVesselness(step);
   vtkNew<vtkVesselSegmentation> segmentation;
   segmentation->SetInputData(step.input.Reference);
   segmentation->SetVesselnessData(step.input.Vesselness);
-  for (std::size_t n = 0; n + 2 < settings.seeds.size(); n += 3)
+  const std::vector<double>& given = step.input.Seeds;
+  for (std::size_t n = 0; n + 2 < given.size(); n += 3)
   {
-    segmentation->AddSeed(settings.seeds[n], settings.seeds[n + 1], settings.seeds[n + 2]);
+    segmentation->AddSeed(given[n], given[n + 1], given[n + 2]);
   }
   segmentation->SetLargestRadius(settings.largestRadius);
   if (!settings.window.empty())
@@ -322,12 +329,74 @@ Json MakeSegmentation(RunStep& step)
     segmentation->SetBloodValue(settings.window[1]);
   }
   Update(segmentation, step);
-  step.input.Mask = Detached(segmentation->GetOutput());
-  vtkImageData* mask = step.input.Mask;
-  auto* seeds =
+  seeds =
     vtkPolyData::SafeDownCast(segmentation->GetOutputDataObject(vtkVesselSegmentation::SeedsPort));
-  auto* aorta =
+  aorta =
     vtkPolyData::SafeDownCast(segmentation->GetOutputDataObject(vtkVesselSegmentation::AortaPort));
+  if (!mask)
+  {
+    mask = Detached(segmentation->GetOutput());
+    return;
+  }
+  // How much of the other segmentation hangs on a seed is of no interest.
+  seeds->GetPointData()->RemoveArray(vtkCoronaryArrayNames::SeedVolume);
+}
+
+/// A given mask at the voxels of the reference phase.
+vtkSmartPointer<vtkImageData> FittedMask(
+  const RunStep& step, const std::string& path, Json& numbers)
+{
+  vtkImageData* reference = step.input.Reference;
+  const SegmentationFile file(path);
+  const SegmentationMask given = file.Mask(step.input.Settings.maskSegments, KeepGoing);
+  ResampledMask fitted;
+  try
+  {
+    fitted = ResampleMask(given.grid, given.voxels, vtkCoronary::GridOf(reference));
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::runtime_error("'" + path + "': " + error.what() + ".");
+  }
+  auto mask = vtkSmartPointer<vtkImageData>::New();
+  mask->CopyStructure(reference);
+  mask->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
+  std::copy(fitted.voxels.begin(), fitted.voxels.end(),
+    static_cast<unsigned char*>(mask->GetScalarPointer()));
+  mask->GetPointData()->GetScalars()->SetName(vtkCoronaryArrayNames::VesselMask);
+  mask->GetFieldData()->PassData(reference->GetFieldData());
+  numbers["given_mask"] = path;
+  numbers["given_voxels"] = given.count;
+  numbers["voxels"] = fitted.count;
+  numbers["resampled"] = !fitted.sameVoxels;
+  numbers["share_inside_image"] = fitted.insideShare;
+  return mask;
+}
+
+Json MakeSegmentation(RunStep& step)
+{
+  const RunSettings& settings = step.input.Settings;
+  const std::string givenMask = step.input.MaskOf(step.report.Of("phase").get<int>());
+  const std::vector<double>& given = step.input.Seeds;
+  Json numbers = { { "file", "mask.mha" } };
+  NeedVesselness(step);
+  vtkSmartPointer<vtkImageData> mask;
+  if (!givenMask.empty())
+  {
+    mask = FittedMask(step, givenMask, numbers);
+  }
+  vtkSmartPointer<vtkPolyData> seeds;
+  auto aorta = vtkSmartPointer<vtkPolyData>::New();
+  if (mask && !given.empty())
+  {
+    seeds = SeedsOfSurface(nullptr, given);
+  }
+  else
+  {
+    Segment(step, mask, seeds, aorta);
+    numbers["window"] = Numbers(mask, vtkCoronaryArrayNames::BloodWindow);
+  }
+  step.input.Mask = mask;
   WriteMetaImage(step.Add("mask.mha"), vtkCoronary::GridOf(mask),
     static_cast<const unsigned char*>(mask->GetScalarPointer()), settings.compress, KeepGoing);
   WritePolyData(step.Add("ostia.vtp"), seeds, step.input.Messages);
@@ -343,8 +412,17 @@ Json MakeSegmentation(RunStep& step)
       seed["volume"].get<double>());
     step.summary += text;
   }
-  return { { "file", "mask.mha" }, { "window", Numbers(mask, vtkCoronaryArrayNames::BloodWindow) },
-    { "seeds", described }, { "seeds_file", "ostia.vtp" }, { "aorta_file", "aorta.vtp" } };
+  if (!givenMask.empty())
+  {
+    char text[80];
+    std::snprintf(text, sizeof(text), "; given mask, %.1f %% of it in the image",
+      100.0 * numbers["share_inside_image"].get<double>());
+    step.summary += text;
+  }
+  numbers["seeds"] = described;
+  numbers["seeds_file"] = "ostia.vtp";
+  numbers["aorta_file"] = "aorta.vtp";
+  return numbers;
 }
 
 /// A closed surface in place of images; gives the seeds.
@@ -362,10 +440,10 @@ vtkSmartPointer<vtkPolyData> PrepareSurface(
     throw std::runtime_error(
       "'" + settings.input.front() + "' has no surface that could be closed.");
   }
-  auto seeds = SeedsOfSurface(surface, settings.seeds);
+  auto seeds = SeedsOfSurface(surface, step.input.Seeds);
   centerline->SetInputDataObject(0, surface);
   centerline->SetSnapDistance(SurfaceSnapDistance);
-  if (settings.seeds.empty())
+  if (step.input.Seeds.empty())
   {
     // Which end of its vessels a tree begins at is known when they are.
     centerline->SetInputDataObject(1, seeds);
@@ -751,10 +829,71 @@ Json MakeMotion(RunStep& step)
 }
 }
 
+namespace
+{
+/// The masks of a series.json, one a phase; empty when none of them has one.
+std::vector<std::string> MasksOfSeries(const std::string& path)
+{
+  std::vector<std::string> masks;
+  bool any = false;
+  for (const SeriesDescription::Phase& phase : ReadSeriesDescription(path).phases)
+  {
+    masks.push_back(ResolveSeriesPath(path, phase.mask));
+    any = any || !phase.mask.empty();
+  }
+  return any ? masks : std::vector<std::string>();
+}
+
+/// Of the phases with a mask the one nearest to a time; -1: none has one.
+int NearestWithMask(const RunInput& input, double time)
+{
+  int best = -1;
+  for (int phase = 0; phase < input.Reader->GetNumberOfPhases(); ++phase)
+  {
+    const auto away = [&](int other) { return std::abs(input.Reader->GetPhaseTime(other) - time); };
+    if (!input.MaskOf(phase).empty() && (best < 0 || away(phase) < away(best)))
+    {
+      best = phase;
+    }
+  }
+  return best;
+}
+}
+
+std::string RunInput::MaskOf(int phase) const
+{
+  if (!this->Settings.mask.empty())
+  {
+    return this->Settings.mask;
+  }
+  const auto number = static_cast<std::size_t>(phase);
+  return phase >= 0 && number < this->Masks.size() ? this->Masks[number] : std::string();
+}
+
+bool RunInput::HasMasks() const
+{
+  return !this->Settings.mask.empty() || !this->Masks.empty();
+}
+
 RunInput::RunInput(const RunSettings& settings, vtkMessageTrap& messages)
   : Settings(settings)
   , Messages(messages)
+  , Seeds(settings.seeds)
 {
+  if (!settings.seedFile.empty())
+  {
+    for (const Markup& markup : ReadMarkupsFile(settings.seedFile))
+    {
+      for (const Markup::Point& point : markup.points)
+      {
+        this->Seeds.insert(this->Seeds.end(), point.position.data(), point.position.data() + 3);
+      }
+    }
+    if (this->Seeds.size() == settings.seeds.size())
+    {
+      throw std::runtime_error("'" + settings.seedFile + "' has no points.");
+    }
+  }
   const auto surfaces = std::count_if(settings.input.begin(), settings.input.end(), IsSurfaceFile);
   if (surfaces > 0)
   {
@@ -785,6 +924,16 @@ RunInput::RunInput(const RunSettings& settings, vtkMessageTrap& messages)
   }
   this->Reader->UpdateInformation();
   messages.ThrowIfError();
+  const std::string& first = settings.input.front();
+  if (settings.input.size() == 1 && fs::path(first).extension() == ".json")
+  {
+    this->Masks = MasksOfSeries(first);
+  }
+  if (!settings.mask.empty() && std::isnan(settings.time) && this->Reader->GetNumberOfPhases() > 1)
+  {
+    throw UsageError("--mask: --time has to say which of the " +
+      std::to_string(this->Reader->GetNumberOfPhases()) + " phases the mask is of");
+  }
 }
 
 RunInput::~RunInput() = default;
@@ -793,6 +942,20 @@ std::vector<std::string> RunInput::Files() const
 {
   std::vector<std::string> files = this->Settings.input;
   const fs::path folder = fs::path(files.front()).parent_path();
+  for (const std::string& file : this->Masks)
+  {
+    if (!file.empty())
+    {
+      files.push_back(file);
+    }
+  }
+  for (const std::string& file : { this->Settings.mask, this->Settings.seedFile })
+  {
+    if (!file.empty())
+    {
+      files.push_back(file);
+    }
+  }
   for (int n = 0; this->Reader && n < this->Reader->GetNumberOfPhases(); ++n)
   {
     // Those of a series.json are named as in it.
@@ -837,7 +1000,14 @@ void FindReference(RunStep& step)
   {
     time = found->GetTuple1(0);
   }
-  const int phase = PhaseAt(reader, time);
+  int phase = PhaseAt(reader, time);
+  // Of several masks that of the quietest phase; where there is none, the nearest.
+  if (automatic && input.HasMasks() && NearestWithMask(input, time) != phase)
+  {
+    phase = NearestWithMask(input, time);
+    input.Reference = nullptr;
+    LoadReference(step, false, reader->GetPhaseTime(phase));
+  }
   step.report.Set("phase", phase);
   step.report.Set("time", reader->GetPhaseTime(phase));
   step.report.Set("image", reader->GetPhaseFileName(phase));

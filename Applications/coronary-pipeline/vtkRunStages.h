@@ -41,12 +41,20 @@ public:
   /// All files of which the input is, for DescribeInput().
   std::vector<std::string> Files() const;
 
+  /// The segmentation that was given for a phase; empty: none.
+  std::string MaskOf(int phase) const;
+
+  /// Whether one was given for some phase.
+  bool HasMasks() const;
+
   /// Why there is no motion in it; empty when there is.
   std::string WhyStill() const;
 
   const RunSettings& Settings;
   vtkMessageTrap& Messages;
   vtkSmartPointer<vtkGatedImageReader> Reader;
+  std::vector<double> Seeds;      ///< given points, three numbers each
+  std::vector<std::string> Masks; ///< of a series.json, one a phase; empty: there are none
 
   ///@{
   /// Of the reference phase; null: not in memory.

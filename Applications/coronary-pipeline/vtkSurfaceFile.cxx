@@ -1,7 +1,9 @@
 #include "vtkSurfaceFile.h"
 
 #include "MeshFile.h"
+#include "VolumeFile.h"
 #include "vtkDataFiles.h"
+#include "vtkMaskSurface.h"
 #include "vtkMessageTrap.h"
 #include "vtkSurfaceInput.h"
 
@@ -68,10 +70,15 @@ bool IsSurfaceFile(const std::string& path)
   return IsMeshFile(path) || ends(".vtp") || ends(".vtu") || ends(".stl") || ends(".ply");
 }
 
-vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& path, vtkMessageTrap& messages)
+vtkSmartPointer<vtkPolyData> ReadSurface(
+  const std::string& path, vtkMessageTrap& messages, const std::vector<std::string>& segments)
 {
   vtkSmartPointer<vtkPolyData> surface;
-  if (EndsWith(path, ".vtp"))
+  if (IsVolumeFileName(path))
+  {
+    surface = ReadMaskSurface(path, segments);
+  }
+  else if (EndsWith(path, ".vtp"))
   {
     surface = ReadPolyData(path, messages);
   }
@@ -103,10 +110,10 @@ vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& path, vtkMessageTrap
 }
 
 SurfaceTriangles ReadTriangles(const std::string& path, const std::string& groups,
-  const std::string& caps, vtkMessageTrap& messages)
+  const std::string& caps, vtkMessageTrap& messages, const std::vector<std::string>& segments)
 {
   SurfaceTriangles surface;
-  surface.data = vtkCoronary::TrianglesOf(ReadSurface(path, messages));
+  surface.data = vtkCoronary::TrianglesOf(ReadSurface(path, messages, segments));
   surface.mesh = vtkCoronary::SurfaceOf(surface.data, groups, caps);
   if (surface.mesh.triangles.empty())
   {

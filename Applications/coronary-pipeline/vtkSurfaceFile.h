@@ -11,6 +11,7 @@
 #include "vtkSmartPointer.h"
 
 #include <string>
+#include <vector>
 
 class vtkMessageTrap;
 
@@ -23,10 +24,13 @@ constexpr const char* SurfaceFileKinds = ".vtp, .vtu, .obj, .off, .mesh, .stl or
 bool IsSurfaceFile(const std::string& path);
 
 /**
- * Polygons of a file; of a .vtu file the boundary. Arrays come along where the kind has any.
+ * Polygons of a file; of a .vtu file the boundary, of a mask (.seg.nrrd and other volumes) its surface. Arrays come
+ * along where the kind has any.
+ * @param segments  of a mask, by name or ID; empty: all
  * @throws std::runtime_error naming the file, also if it has no polygons
  */
-vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& path, vtkMessageTrap& messages);
+vtkSmartPointer<vtkPolyData> ReadSurface(
+  const std::string& path, vtkMessageTrap& messages, const std::vector<std::string>& segments = {});
 
 /// A surface to be compared, and where its arrays are.
 struct SurfaceTriangles
@@ -42,7 +46,7 @@ struct SurfaceTriangles
  * @throws as ReadSurface; std::invalid_argument naming an array that does not fit
  */
 SurfaceTriangles ReadTriangles(const std::string& path, const std::string& groups,
-  const std::string& caps, vtkMessageTrap& messages);
+  const std::string& caps, vtkMessageTrap& messages, const std::vector<std::string>& segments = {});
 }
 
 #endif
