@@ -658,8 +658,7 @@ private:
     meshes.push_back(std::move(mesh));
   }
 
-  /// A face with vertices of its own: normals break where it meets the others, and VTK's reader moves only
-  /// one of several primitives that share them.
+  /// A face with vertices of its own: normals break where it meets the others.
   Json Primitive(const GltfFace& face)
   {
     constexpr auto None = std::numeric_limits<std::uint32_t>::max();
