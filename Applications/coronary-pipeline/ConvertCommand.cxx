@@ -76,6 +76,19 @@ void ConvertJob::Declare(CLI::App& app)
     ->capture_default_str();
 }
 
+/// With the name of the file that it is about.
+void ThrowIfError(vtkMessageTrap& messages, const std::string& path)
+{
+  try
+  {
+    messages.ThrowIfError();
+  }
+  catch (const std::runtime_error& error)
+  {
+    throw std::runtime_error("'" + path + "': " + error.what());
+  }
+}
+
 void ConvertJob::Run() const
 {
   if (IsMeshConversion(this->input, this->output))
@@ -132,7 +145,7 @@ void ConvertJob::Run() const
     writer->SetFileName(this->output.c_str());
     writer->SetTolerance(this->tolerance);
     writer->Write();
-    messages.ThrowIfError();
+    ThrowIfError(messages, this->input);
   }
   else if (bones)
   {
@@ -148,7 +161,7 @@ void ConvertJob::Run() const
     conversion->SetOutputForm(
       tree ? vtkCenterlineConversion::TreeForm : vtkCenterlineConversion::VmtkForm);
     conversion->Update();
-    messages.ThrowIfError();
+    ThrowIfError(messages, this->input);
     lines = conversion->GetOutput();
     WritePolyData(this->output, lines, messages);
   }
