@@ -3,8 +3,6 @@
 #include "vtkCenterlineSkeleton.h"
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkFrangiVesselness.h"
-#include "vtkFrenetSweepSurface.h"
-#include "vtkMeshDistanceMetrics.h"
 
 #include "vtkNew.h"
 #include "vtkPolyData.h"
@@ -43,7 +41,7 @@ double Resident()
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-/// From the phantom to its vesselness, surface, skeleton and distances, for a beat.
+/// From the phantom to its vesselness and skeleton, for a beat.
 void Beat()
 {
   vtkNew<vtkCoronaryPhantomSource> phantom;
@@ -58,23 +56,14 @@ void Beat()
   vesselness->SetSigmaMin(2.0);
   vesselness->SetSigmaMax(3.0);
   vesselness->SetNumberOfScales(1);
-  vtkNew<vtkFrenetSweepSurface> surface;
-  surface->SetInputConnection(phantom->GetOutputPort(vtkCoronaryPhantomSource::TreePort));
-  surface->SetMinimumEdgeLength(0.8);
-  surface->SetMaximumEdgeLength(2.0);
   vtkNew<vtkCenterlineSkeleton> skeleton;
   skeleton->SetInputConnection(phantom->GetOutputPort(vtkCoronaryPhantomSource::TreePort));
-  vtkNew<vtkMeshDistanceMetrics> metrics;
-  metrics->SetInputConnection(0, surface->GetOutputPort());
-  metrics->SetInputConnection(1, phantom->GetOutputPort(vtkCoronaryPhantomSource::SurfacePort));
-  metrics->SetErrorBound(0.1);
   for (int phase = 0; phase < Phases; ++phase)
   {
     const double time = static_cast<double>(phase) / Phases;
     vesselness->UpdateTimeStep(time);
     skeleton->UpdateTimeStep(time);
-    metrics->UpdateTimeStep(time);
-    ASSERT_GT(vtkPolyData::SafeDownCast(surface->GetOutputDataObject(0))->GetNumberOfPolys(), 0);
+    ASSERT_GT(skeleton->GetOutput()->GetNumberOfLines(), 0);
   }
 }
 }
