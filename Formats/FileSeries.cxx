@@ -1,6 +1,6 @@
 #include "FileSeries.h"
 
-#include <nlohmann/json.hpp>
+#include "BoundedJson.h"
 
 #include <array>
 #include <cmath>
@@ -58,11 +58,15 @@ std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text
   nlohmann::json list;
   try
   {
-    list = nlohmann::json::parse(text);
+    list = ParseBoundedJson(text);
   }
   catch (const nlohmann::json::exception& error)
   {
-    Fail(path, std::string("is not JSON: ") + error.what());
+    Fail(path, "is not JSON: " + JsonReason(error));
+  }
+  catch (const TooDeepJson& error)
+  {
+    Fail(path, error.what());
   }
   const auto entries = list.find("files");
   if (entries == list.end() || !entries->is_array())

@@ -1,11 +1,12 @@
 #include "MeshSequenceReport.h"
 
-#include <nlohmann/json.hpp>
+#include "BoundedJson.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 namespace coronary
@@ -146,13 +147,31 @@ std::string MeshSequenceCsv(const MeshSequenceReport& report)
   return text.str();
 }
 
+namespace
+{
+/// Null when it is not there, or no JSON.
+Json ReadReport(const std::string& path)
+{
+  std::ifstream stream(path, std::ios::binary);
+  const std::string text{ std::istreambuf_iterator<char>(stream),
+    std::istreambuf_iterator<char>() };
+  try
+  {
+    return ParseBoundedJson<Json>(text);
+  }
+  catch (const std::exception&)
+  {
+    return {};
+  }
+}
+}
+
 std::vector<std::string> MeshSequenceFiles(const std::string& path)
 {
   const std::filesystem::path file(path);
   const std::string stem = file.stem().string();
   std::vector<std::string> names;
-  std::ifstream stream(path, std::ios::binary);
-  const Json json = Json::parse(stream, nullptr, false);
+  const Json json = ReadReport(path);
   const auto object = [](const Json& parent, const char* name) -> Json
   {
     const auto found = parent.is_object() ? parent.find(name) : parent.end();

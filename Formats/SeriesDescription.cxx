@@ -1,8 +1,7 @@
 #include "SeriesDescription.h"
 
 #include "AtomicFile.h"
-
-#include <nlohmann/json.hpp>
+#include "BoundedJson.h"
 
 #include <cmath>
 #include <cstdint>
@@ -218,17 +217,6 @@ SeriesDescription::Seed ParseSeed(
   return seed;
 }
 
-// The exceptions of the JSON library begin with a code in brackets that says nothing to a user.
-std::string Reason(const std::exception& error)
-{
-  std::string text = error.what();
-  const std::size_t bracket = text.find("] ");
-  if (bracket != std::string::npos)
-  {
-    text.erase(0, bracket + 2);
-  }
-  return text;
-}
 }
 
 SeriesDescription ReadSeriesDescription(const std::string& path)
@@ -237,11 +225,15 @@ SeriesDescription ReadSeriesDescription(const std::string& path)
   Json root;
   try
   {
-    root = Json::parse(text);
+    root = ParseBoundedJson<Json>(text);
   }
   catch (const Json::exception& error)
   {
-    Fail(path, "is not valid JSON: " + Reason(error));
+    Fail(path, "is not valid JSON: " + JsonReason(error));
+  }
+  catch (const TooDeepJson& error)
+  {
+    Fail(path, error.what());
   }
   if (!root.is_object())
   {
@@ -321,7 +313,7 @@ void WriteSeriesDescription(const std::string& path, const SeriesDescription& de
   }
   catch (const Json::exception& error)
   {
-    Fail(path, Reason(error));
+    Fail(path, JsonReason(error));
   }
   WriteFileAtomically(path, text + "\n");
 }

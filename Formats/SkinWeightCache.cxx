@@ -276,6 +276,17 @@ bool ReadSkinWeights(const std::string& path, const SkinWeightInput& input, Skin
   return true;
 }
 
+std::string WithSkinWeightChecksum(std::string bytes)
+{
+  if (bytes.size() >= sizeof(std::uint64_t))
+  {
+    const std::size_t size = bytes.size() - sizeof(std::uint64_t);
+    const std::uint64_t sum = Checksum(bytes.data(), size);
+    std::memcpy(&bytes[size], &sum, sizeof(sum));
+  }
+  return bytes;
+}
+
 void WriteSkinWeights(const std::string& path, const SkinWeights& weights)
 {
   std::string bytes(Magic.begin(), Magic.end());

@@ -28,6 +28,9 @@ bool ReadSkinWeights(const std::string& path, const SkinWeightInput& input, Skin
 /// The file appears when it is whole. @throws std::runtime_error naming `path`
 void WriteSkinWeights(const std::string& path, const SkinWeights& weights);
 
+/// The bytes of such a file with the right checksum in place of their last eight; for tests of what is behind it.
+std::string WithSkinWeightChecksum(std::string bytes);
+
 /**
  * ComputeSkinWeights, by way of the cache in `folder`, which is made when it is missing; without a
  * cache when `folder` is empty. Only weights that converged are kept.

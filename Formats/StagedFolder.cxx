@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
 #include <system_error>
 
 #include <cstdlib> // for mkdtemp
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 namespace coronary
 {
@@ -15,6 +19,8 @@ namespace fs = std::filesystem;
 
 namespace
 {
+constexpr const char* StagingName = ".unfinished-";
+
 [[noreturn]] void Fail(const fs::path& path, const std::string& reason)
 {
   throw std::runtime_error("Cannot write '" + path.string() + "': " + reason + ".");
@@ -59,13 +65,51 @@ void RemoveEmptyFolders(const std::vector<std::string>& folders)
     fs::remove(*folder, ignored);
   }
 }
+
+/// -1 when another process has it, it is gone, or the file system knows no locks.
+int LockFolder(const std::string& folder)
+{
+  const int file = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file >= 0 && flock(file, LOCK_EX | LOCK_NB) != 0)
+  {
+    close(file);
+    return -1;
+  }
+  return file;
+}
+
+/// Removes what killed processes left: whoever works on a folder of ours holds its lock.
+void RemoveAbandoned(const std::string& folder, const std::string& except)
+{
+  constexpr auto Settled = std::chrono::minutes(1); // a folder is locked a moment after it is made
+  std::vector<fs::path> abandoned;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+  {
+    const std::string name = entry.path().filename().string();
+    if (name.rfind(StagingName, 0) == 0 && entry.path() != except &&
+      entry.last_write_time(error) + Settled < fs::file_time_type::clock::now())
+    {
+      abandoned.push_back(entry.path());
+    }
+  }
+  for (const fs::path& path : abandoned)
+  {
+    const int lock = LockFolder(path.string());
+    if (lock >= 0)
+    {
+      fs::remove_all(path, error);
+      close(lock);
+    }
+  }
+}
 }
 
 StagedFolder::StagedFolder(const std::string& folder)
   : Folder(Normalized(folder))
   , Created(MakeFolders(this->Folder))
 {
-  std::string name = (fs::path(this->Folder) / ".unfinished-XXXXXX").string();
+  std::string name = (fs::path(this->Folder) / (std::string(StagingName) + "XXXXXX")).string();
   if (!mkdtemp(name.data()))
   {
     const std::string reason = std::strerror(errno);
@@ -73,6 +117,8 @@ StagedFolder::StagedFolder(const std::string& folder)
     Fail(this->Folder, reason);
   }
   this->Staging = name;
+  this->Lock = LockFolder(name);
+  RemoveAbandoned(this->Folder, name);
 }
 
 StagedFolder::~StagedFolder()
@@ -82,6 +128,16 @@ StagedFolder::~StagedFolder()
     std::error_code ignored;
     fs::remove_all(this->Staging, ignored);
     RemoveEmptyFolders(this->Created);
+  }
+  this->Unlock();
+}
+
+void StagedFolder::Unlock()
+{
+  if (this->Lock >= 0)
+  {
+    close(this->Lock);
+    this->Lock = -1;
   }
 }
 
@@ -134,6 +190,7 @@ void StagedFolder::Commit()
   }
   fs::remove_all(staging, error);
   this->Staging.clear();
+  this->Unlock();
   for (const std::string& name : this->Older)
   {
     if (std::find(this->Names.begin(), this->Names.end(), name) != this->Names.end())

@@ -14,7 +14,8 @@ namespace coronary
  * Files that belong together are written to a hidden folder inside the wanted one and moved out of
  * it by Commit(): an older set of the same names is never mixed with half of a new one.
  * Without Commit() (an exception, an interruption) the destructor removes what was written, and
- * the folders that were made for it.
+ * the folders that were made for it. What a process left that was killed, the next one in this folder removes; a lock
+ * tells it from what is in the making.
  */
 class StagedFolder
 {
@@ -53,8 +54,11 @@ public:
   std::string Translate(const std::string& message) const;
 
 private:
+  void Unlock();
+
   std::string Folder;
   std::string Staging; ///< empty once committed
+  int Lock = -1;       ///< file that holds the lock of Staging; -1: none
   std::vector<std::string> Names;
   std::vector<std::string> Older;
   std::vector<std::string> Created; ///< folders to remove again, outermost first

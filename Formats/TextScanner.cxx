@@ -107,6 +107,12 @@ void TextScanner::SkipLine()
   this->At = end == std::string::npos ? this->Contents.size() : end;
 }
 
+void TextScanner::SkipCharacter()
+{
+  this->Line += this->Contents[this->At] == '\n' ? 1 : 0;
+  ++this->At;
+}
+
 std::string_view TextScanner::Word()
 {
   if (this->AtEnd())

@@ -26,6 +26,7 @@ public:
   std::string_view Word(); ///< the next one, on whatever line; throws at the end
   bool AtLineEnd();        ///< no word is left on this line
   void SkipLine();         ///< the rest of this line
+  void SkipCharacter();    ///< one of them, whichever it is; not at the end of the file
   double Number();         ///< the next word as a number, which may be nan or inf
   double Coordinate();     ///< the next word as a finite number
   std::int64_t Integer();  ///< the next word as an integer

@@ -13,8 +13,23 @@ if(DYNAMICCORONARY_SANITIZE)
     -fno-omit-frame-pointer -g)
   add_link_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}")
   # GCC follows values less well through instrumented code, and warns inside <regex> and Eigen.
-  target_compile_options(dynamiccoronary_options INTERFACE -Wno-maybe-uninitialized)
+  target_compile_options(dynamiccoronary_options INTERFACE
+    "$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
 endif()
+
+# What the fuzzing tree watches: where the program goes (libFuzzer), and what it must not do there.
+set(dynamiccoronary_fuzz_options -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow
+  -fno-sanitize-recover=all -fno-omit-frame-pointer)
+
+# dynamiccoronary_fuzzed_folder()
+#   In the fuzzing tree, instruments the targets that this folder makes from here on. The code that computes goes without:
+#   it reads no bytes of others, and takes long to build.
+function(dynamiccoronary_fuzzed_folder)
+  if(DYNAMICCORONARY_FUZZ)
+    add_compile_options(${dynamiccoronary_fuzz_options})
+    add_link_options(-fsanitize=address,undefined)
+  endif()
+endfunction()
 
 # dynamiccoronary_module_options(<module> [link ...])
 #   Our warnings and run path on a VTK module, and private links to the plain C++ libraries.

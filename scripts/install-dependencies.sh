@@ -8,7 +8,7 @@ usage() {
 Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--developer]
   --check      change nothing; name what is missing and exit 1, exit 0 when all is there
   --tree TREE  packages of one tree only (both without this option)
-  --developer  clang-tidy, shellcheck and ITK (the benchmarks compare with it) as well
+  --developer  clang, valgrind, clang-tidy, shellcheck and ITK (the benchmarks compare with it) as well
 Runs as root, or through sudo. Run again, it changes nothing.
 EOF
 }
@@ -33,7 +33,7 @@ vtk=(
   libtbb-dev libjsoncpp-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libopenmpi3
   libpng16-16 libtiff6 patchelf
 )
-developer=(clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev plastimatch)
+developer=(clang libclang-rt-14-dev valgrind clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev plastimatch)
 
 check_only=no
 tree=all

@@ -144,6 +144,19 @@ void ConvertJob::Declare(CLI::App& app)
     ->type_name("N");
 }
 
+/// With the name of the file that it is about.
+void ThrowIfError(vtkMessageTrap& messages, const std::string& path)
+{
+  try
+  {
+    messages.ThrowIfError();
+  }
+  catch (const std::runtime_error& error)
+  {
+    throw std::runtime_error("'" + path + "': " + error.what());
+  }
+}
+
 bool IsSimVascularFile(const std::string& path)
 {
   return EndsWith(path, ".pth") || EndsWith(path, ".ctgr");
@@ -238,7 +251,7 @@ vtkSmartPointer<vtkPolyData> ConvertJob::Joined(vtkPolyData* lines, vtkMessageTr
   vtkNew<vtkCoronaryTreeTopology> topology;
   topology->SetInputData(lines);
   topology->Update();
-  messages.ThrowIfError();
+  ThrowIfError(messages, this->input);
   return topology->GetOutput();
 }
 
@@ -253,7 +266,7 @@ vtkSmartPointer<vtkPolyData> ConvertJob::Read(vtkMessageTrap& messages, bool& is
     reader->SetOutputForm(
       this->form == "skeleton" ? vtkTGFReader::SkeletonForm : vtkTGFReader::TreeForm);
     reader->Update();
-    messages.ThrowIfError();
+    ThrowIfError(messages, this->input);
     return reader->GetOutput();
   }
   if (IsMarkupsFileName(this->input))
@@ -368,7 +381,7 @@ vtkSmartPointer<vtkPolyData> ConvertJob::Write(
     writer->SetFileName(this->output.c_str());
     writer->SetTolerance(this->tolerance);
     writer->Write();
-    messages.ThrowIfError();
+    ThrowIfError(messages, this->input);
     return lines;
   }
   if (this->form == "skeleton" || lines->GetNumberOfLines() == 0)
@@ -383,7 +396,7 @@ vtkSmartPointer<vtkPolyData> ConvertJob::Write(
   conversion->SetOutputForm(
     tree ? vtkCenterlineConversion::TreeForm : vtkCenterlineConversion::VmtkForm);
   conversion->Update();
-  messages.ThrowIfError();
+  ThrowIfError(messages, this->input);
   const vtkSmartPointer<vtkPolyData> written = this->form == "simvascular"
     ? ToSimVascular(this->OneTree(conversion->GetOutput()), this->Unit())
     : vtkSmartPointer<vtkPolyData>(conversion->GetOutput());

@@ -1,12 +1,12 @@
 #include "MovingModel.h"
 
+#include "BoundedJson.h"
 #include "SeriesDescription.h"
-
-#include <nlohmann/json.hpp>
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 namespace fs = std::filesystem;
@@ -73,15 +73,20 @@ std::vector<double> NumbersOf(const nlohmann::json& parent, const char* name)
 /// What the report of `run` says of the motion.
 void ReadReport(const std::string& path, MovingModel& model)
 {
-  std::ifstream file(path);
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
   nlohmann::json report;
   try
   {
-    report = nlohmann::json::parse(file);
+    report = ParseBoundedJson(text);
   }
   catch (const nlohmann::json::exception&)
   {
     throw std::runtime_error("'" + path + "' is not the report of a run: it is no JSON.");
+  }
+  catch (const TooDeepJson& error)
+  {
+    throw std::runtime_error("'" + path + "' is not the report of a run: it " + error.what() + ".");
   }
   const auto motion = report.is_object() ? report.find("motion") : report.end();
   if (!report.is_object() || motion == report.end() || !motion->is_object())

@@ -1,5 +1,6 @@
 #include "RunReport.h"
 
+#include "BoundedJson.h"
 #include "Fnv1a.h"
 #include "UtcTime.h"
 
@@ -10,6 +11,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <system_error>
 
 #include <sys/resource.h>
@@ -190,7 +192,15 @@ RunReport::RunReport(std::string folder, Json settings, Json input)
     this->WhyNoOlder = "there is no '" + path.string() + "'";
     return;
   }
-  this->Older = Json::parse(file, nullptr, false);
+  const std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
+  try
+  {
+    this->Older = ParseBoundedJson<Json>(text);
+  }
+  catch (const std::exception&)
+  {
+    this->Older = Json();
+  }
   if (!this->Older.is_object() || !Member(this->Older, "stages").is_array())
   {
     this->Older = Json();

@@ -1,5 +1,6 @@
 #include "RunSettings.h"
 
+#include "BoundedJson.h"
 #include "Command.h"
 #include "OptionChecks.h"
 #include "vtkMovingMesh.h"
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 namespace coronary
@@ -376,14 +378,19 @@ void RunOptions::Read(const std::string& path)
   {
     throw std::runtime_error("Cannot open the settings '" + path + "'.");
   }
+  const std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
   Json json;
   try
   {
-    json = Json::parse(file);
+    json = ParseBoundedJson<Json>(text);
   }
   catch (const Json::exception& error)
   {
-    throw std::runtime_error("'" + path + "' is not JSON: " + error.what());
+    throw std::runtime_error("'" + path + "' is not JSON: " + JsonReason(error));
+  }
+  catch (const TooDeepJson& error)
+  {
+    throw std::runtime_error("'" + path + "' " + error.what() + ".");
   }
   if (!json.is_object())
   {

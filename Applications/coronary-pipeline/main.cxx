@@ -5,6 +5,7 @@
  * 128 + n ended by signal n (130: Ctrl-C).
  */
 #include "Command.h"
+#include "ErrorLine.h"
 #include "Interruption.h"
 #include "ParallelFor.h"
 
@@ -33,11 +34,11 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakeConvertCommand,
 };
 
-int Complain(const CLI::App* command, std::string message, int exitCode)
+int Complain(const CLI::App* command, const std::string& message, int exitCode)
 {
-  std::replace(message.begin(), message.end(), '\n', ' ');
   const std::string name = command ? " " + command->get_name() : "";
-  std::fprintf(stderr, "coronary-pipeline%s: %s\n", name.c_str(), message.c_str());
+  std::fprintf(
+    stderr, "coronary-pipeline%s: %s\n", name.c_str(), coronary::ErrorLine(message).c_str());
   return exitCode;
 }
 

@@ -2,8 +2,12 @@
 
 #include "AppendedXmlData.h"
 #include "AtomicFile.h"
+#include "XmlDataCheck.h"
 #include "vtkMessageTrap.h"
 
+#include "vtkCell.h"
+#include "vtkCellArray.h"
+#include "vtkGenericCell.h"
 #include "vtkNew.h"
 #include "vtkPolyData.h"
 #include "vtkUnstructuredGrid.h"
@@ -14,6 +18,7 @@
 #include "vtkXMLUnstructuredGridReader.h"
 #include "vtkXMLUnstructuredGridWriter.h"
 
+#include <array>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -30,21 +35,81 @@ void ReadXml(
   {
     throw std::runtime_error("Cannot open '" + path + "'.");
   }
+  const std::string text(std::istreambuf_iterator<char>(file), {});
   if (!reader->CanReadFile(path.c_str()))
   {
     throw std::runtime_error("'" + path + "' is not a VTK XML " + what + " file.");
   }
-  const std::string text(std::istreambuf_iterator<char>(file), {});
-  reader->ReadFromInputStringOn();
-  reader->SetInputString(WithInlineXmlData(text));
-  reader->Update();
   try
   {
+    CheckXmlData(text);
+  }
+  catch (const std::runtime_error& error)
+  {
+    throw std::runtime_error("'" + path + "' " + error.what() + ".");
+  }
+  try
+  {
+    reader->ReadFromInputStringOn();
+    reader->SetInputString(WithInlineXmlData(text));
+    reader->Update();
     messages.ThrowIfError();
   }
   catch (const std::exception& error)
   {
     throw std::runtime_error("Cannot read '" + path + "': " + error.what());
+  }
+}
+}
+
+namespace
+{
+/// That all corners are points: not all of VTK's filters look.
+void CheckCorners(const std::string& path, vtkCellArray* cells, vtkIdType points)
+{
+  const vtkIdType count = cells ? cells->GetNumberOfCells() : 0;
+  for (vtkIdType c = 0; c < count; ++c)
+  {
+    vtkIdType size = 0;
+    const vtkIdType* corners = nullptr;
+    cells->GetCellAtId(c, size, corners);
+    for (vtkIdType n = 0; n < size; ++n)
+    {
+      if (corners[n] < 0 || corners[n] >= points)
+      {
+        throw std::runtime_error("'" + path + "' has a cell at point " +
+          std::to_string(corners[n]) + ", and " + std::to_string(points) + " points.");
+      }
+    }
+  }
+}
+
+/// That cells are of kinds that VTK knows, with as many corners as these have.
+void CheckCellTypes(const std::string& path, vtkUnstructuredGrid* grid)
+{
+  const auto refuse = [&](vtkIdType cell, const char* what)
+  {
+    throw std::runtime_error("'" + path + "' has a cell of type " +
+      std::to_string(grid->GetCellType(cell)) + ", which " + what + ".");
+  };
+  std::array<int, 256> sizes{}; // 0: not known yet, -1: any
+  for (vtkIdType cell = 0; cell < grid->GetNumberOfCells(); ++cell)
+  {
+    const int type = grid->GetCellType(cell);
+    int& size = sizes[static_cast<unsigned char>(type)];
+    if (size == 0)
+    {
+      const auto made = vtkSmartPointer<vtkCell>::Take(vtkGenericCell::InstantiateCell(type));
+      if (!made || type == VTK_POLYHEDRON)
+      {
+        refuse(cell, "is not read here");
+      }
+      size = made->GetNumberOfPoints() > 0 ? static_cast<int>(made->GetNumberOfPoints()) : -1;
+    }
+    if (size > 0 && grid->GetCells()->GetCellSize(cell) != size)
+    {
+      refuse(cell, "has another number of corners");
+    }
   }
 }
 }
@@ -59,7 +124,13 @@ vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTra
 {
   vtkNew<vtkXMLPolyDataReader> reader;
   ReadXml(path, reader, "poly data", messages);
-  return reader->GetOutput();
+  vtkPolyData* data = reader->GetOutput();
+  for (vtkCellArray* cells :
+    { data->GetVerts(), data->GetLines(), data->GetPolys(), data->GetStrips() })
+  {
+    CheckCorners(path, cells, data->GetNumberOfPoints());
+  }
+  return data;
 }
 
 vtkSmartPointer<vtkUnstructuredGrid> ReadUnstructuredGrid(
@@ -67,7 +138,10 @@ vtkSmartPointer<vtkUnstructuredGrid> ReadUnstructuredGrid(
 {
   vtkNew<vtkXMLUnstructuredGridReader> reader;
   ReadXml(path, reader, "unstructured grid", messages);
-  return reader->GetOutput();
+  vtkUnstructuredGrid* data = reader->GetOutput();
+  CheckCorners(path, data->GetCells(), data->GetNumberOfPoints());
+  CheckCellTypes(path, data);
+  return data;
 }
 
 namespace

@@ -1,6 +1,7 @@
 #include "vtkSurfaceFile.h"
 
 #include "MeshFile.h"
+#include "StlPlyFile.h"
 #include "VolumeFile.h"
 #include "vtkDataFiles.h"
 #include "vtkMaskSurface.h"
@@ -10,9 +11,7 @@
 #include "vtkCellArray.h"
 #include "vtkGeometryFilter.h"
 #include "vtkNew.h"
-#include "vtkPLYReader.h"
 #include "vtkPoints.h"
-#include "vtkSTLReader.h"
 #include "vtkUnstructuredGrid.h"
 
 #include <fstream>
@@ -40,27 +39,6 @@ vtkSmartPointer<vtkPolyData> Triangles(const FileMesh& mesh)
   surface->SetPoints(points);
   surface->SetPolys(polys);
   return surface;
-}
-
-template <typename Reader>
-vtkSmartPointer<vtkPolyData> ReadWith(const std::string& path, vtkMessageTrap& messages)
-{
-  if (!std::ifstream(path))
-  {
-    throw std::runtime_error("Cannot open '" + path + "'.");
-  }
-  vtkNew<Reader> reader;
-  reader->SetFileName(path.c_str());
-  reader->Update();
-  try
-  {
-    messages.ThrowIfError();
-  }
-  catch (const std::exception& error)
-  {
-    throw std::runtime_error("Cannot read '" + path + "': " + error.what());
-  }
-  return reader->GetOutput();
 }
 }
 
@@ -92,11 +70,11 @@ vtkSmartPointer<vtkPolyData> ReadSurface(
   }
   else if (EndsWith(path, ".stl"))
   {
-    surface = ReadWith<vtkSTLReader>(path, messages);
+    surface = Triangles(ReadStlFile(path));
   }
   else if (EndsWith(path, ".ply"))
   {
-    surface = ReadWith<vtkPLYReader>(path, messages);
+    surface = Triangles(ReadPlyFile(path));
   }
   else
   {

@@ -89,10 +89,15 @@ private:
 };
 
 /// Where the joints of a branch stand, from 0 to its length.
+constexpr double MostBonesOfBranch = 1e5; // a vessel has some dozens
+
 std::vector<double> PlaceJoints(const Course& course, const CenterlineSkeletonSettings& settings)
 {
   const double length = course.Length();
   // The number of wanted bones up to s; even steps of it are the bones.
+  Require(length <= MostBonesOfBranch * settings.minimumLength,
+    "a branch of " + std::to_string(length) + " mm is too long for bones of minimumLength " +
+      std::to_string(settings.minimumLength) + " mm");
   const int samples = 1 + static_cast<int>(std::ceil(length / (0.05 * settings.minimumLength)));
   std::vector<double> count(samples + 1, 0.0);
   const double step = length / samples;

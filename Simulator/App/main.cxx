@@ -6,6 +6,7 @@
  * 128 + n ended by signal n (130: Ctrl-C).
  */
 #include "Command.h"
+#include "ErrorLine.h"
 #include "HeadlessSession.h"
 #include "Interruption.h"
 #include "OptionChecks.h"
@@ -32,10 +33,9 @@ namespace
 constexpr int Failed = 1;
 constexpr int WrongUsage = 2;
 
-int Complain(std::string message, int exitCode)
+int Complain(const std::string& message, int exitCode)
 {
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::fprintf(stderr, "coronary-simulator: %s\n", message.c_str());
+  std::fprintf(stderr, "coronary-simulator: %s\n", coronary::ErrorLine(message).c_str());
   return exitCode;
 }
 

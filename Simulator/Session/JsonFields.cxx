@@ -1,5 +1,7 @@
 #include "JsonFields.h"
 
+#include "BoundedJson.h"
+
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -11,8 +13,6 @@ namespace coronary
 {
 namespace
 {
-constexpr int DeepestNesting = 64;
-
 std::string Shortened(const nlohmann::json& value)
 {
   std::string text = value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -57,39 +57,17 @@ std::string ReadTextFile(const std::string& path, std::size_t most)
 
 nlohmann::json ParseJson(const std::string& text, const std::string& where)
 {
-  bool deep = false;
-  const auto limit = [&](int depth, nlohmann::json::parse_event_t, nlohmann::json&)
-  {
-    if (depth > DeepestNesting)
-    {
-      deep = true;
-      throw std::runtime_error("deep");
-    }
-    return true;
-  };
   try
   {
-    return nlohmann::json::parse(text, limit);
+    return ParseBoundedJson(text);
   }
   catch (const nlohmann::json::exception& error)
   {
-    std::string reason = error.what();
-    const std::size_t bracket = reason.find("] ");
-    reason = bracket == std::string::npos ? reason : reason.substr(bracket + 2);
-    if (reason.size() > 160)
-    {
-      reason = reason.substr(0, 157) + "...";
-    }
-    throw std::runtime_error(where + " is no JSON: " + reason);
+    throw std::runtime_error(where + " is no JSON: " + JsonReason(error));
   }
-  catch (const std::runtime_error&)
+  catch (const TooDeepJson& error)
   {
-    if (!deep)
-    {
-      throw;
-    }
-    throw std::runtime_error(
-      where + " is nested more than " + std::to_string(DeepestNesting) + " times.");
+    throw std::runtime_error(where + " " + error.what() + ".");
   }
 }
 

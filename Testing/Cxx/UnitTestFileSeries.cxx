@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -208,4 +209,23 @@ TEST(UnitTestMeshSequenceReport, NumbersAndNames)
 
   report.tetrahedra = 0;
   EXPECT_NE(coronary::MeshSequenceCsv(report).find("enclosed_volume_mm3"), std::string::npos);
+}
+
+TEST(StagedFolder, RemovesWhatKilledProcessesLeft)
+{
+  const std::filesystem::path folder =
+    std::filesystem::path(testing::TempDir()) / "staged-abandoned";
+  std::filesystem::remove_all(folder);
+  const auto old = std::filesystem::file_time_type::clock::now() - std::chrono::hours(1);
+  std::filesystem::create_directories(folder / ".unfinished-killed" / "motion");
+  std::filesystem::last_write_time(folder / ".unfinished-killed", old);
+  coronary::StagedFolder working(folder.string());
+  const std::filesystem::path inTheMaking =
+    std::filesystem::path(working.Add("a.txt")).parent_path();
+  std::filesystem::last_write_time(inTheMaking, old);
+  {
+    coronary::StagedFolder other(folder.string());
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / ".unfinished-killed"));
+  EXPECT_TRUE(std::filesystem::exists(inTheMaking)) << "someone works there";
 }
