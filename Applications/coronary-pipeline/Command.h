@@ -32,6 +32,8 @@ struct Command
    * @throws UsageError: exit code 2; Cancelled: interrupted; any other exception: exit code 1.
    */
   std::function<void()> run;
+
+  bool onRanks = false; ///< whether several processes of MPI can do it together
 };
 
 /// Declares a command and its options.
@@ -45,6 +47,7 @@ MakeCommand MakeConvertCommand;
 MakeCommand MakeSequenceCommand;
 MakeCommand MakeMetricsCommand;
 MakeCommand MakeEvaluateCommand;
+MakeCommand MakeCohortCommand;
 }
 
 #endif
