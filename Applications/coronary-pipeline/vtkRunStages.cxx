@@ -795,6 +795,10 @@ Json MakeMotion(RunStep& step)
   const std::string path = step.Add(name);
   moving.Write(
     path, times, messages, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); });
+  if (!step.ranks.IsFirst())
+  {
+    return {};
+  }
   for (const std::string& file : MeshSequenceFiles(path))
   {
     if ("motion/" + file != name)
