@@ -1,5 +1,7 @@
 #include "StagedFolder.h"
 
+#include "RankGroup.h"
+
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
@@ -106,24 +108,47 @@ void RemoveAbandoned(const std::string& folder, const std::string& except)
 }
 
 StagedFolder::StagedFolder(const std::string& folder)
-  : Folder(Normalized(folder))
-  , Created(MakeFolders(this->Folder))
+  : StagedFolder(folder, RankGroup::Alone())
 {
-  std::string name = (fs::path(this->Folder) / (std::string(StagingName) + "XXXXXX")).string();
-  if (!mkdtemp(name.data()))
+}
+
+StagedFolder::StagedFolder(const std::string& folder, RankGroup& ranks)
+  : Folder(Normalized(folder))
+  , Owner(ranks.IsFirst())
+{
+  if (this->Owner)
   {
-    const std::string reason = std::strerror(errno);
-    RemoveEmptyFolders(this->Created);
-    Fail(this->Folder, reason);
+    this->Created = MakeFolders(this->Folder);
+    std::string name = (fs::path(this->Folder) / (std::string(StagingName) + "XXXXXX")).string();
+    if (!mkdtemp(name.data()))
+    {
+      const std::string reason = std::strerror(errno);
+      RemoveEmptyFolders(this->Created);
+      Fail(this->Folder, reason);
+    }
+    this->Staging = name;
+    this->Lock = LockFolder(name);
+    RemoveAbandoned(this->Folder, name);
   }
-  this->Staging = name;
-  this->Lock = LockFolder(name);
-  RemoveAbandoned(this->Folder, name);
+  try
+  {
+    this->Staging = ranks.FromFirst(this->Staging);
+  }
+  catch (...)
+  {
+    this->Discard();
+    throw;
+  }
 }
 
 StagedFolder::~StagedFolder()
 {
-  if (!this->Staging.empty())
+  this->Discard();
+}
+
+void StagedFolder::Discard()
+{
+  if (this->Owner && !this->Staging.empty())
   {
     std::error_code ignored;
     fs::remove_all(this->Staging, ignored);

@@ -10,6 +10,8 @@
 
 namespace coronary
 {
+class RankGroup;
+
 /**
  * Files that belong together are written to a hidden folder inside the wanted one and moved out of
  * it by Commit(): an older set of the same names is never mixed with half of a new one.
@@ -23,6 +25,13 @@ public:
   /// Makes the folder, and its parents.
   /// @throws std::runtime_error naming `folder` when it can not be made or written to.
   explicit StagedFolder(const std::string& folder);
+
+  /**
+   * One for several ranks, who all have to make it: each may Add() files and write them, and the first one alone
+   * commits, after it has added the others' names too.
+   * @throws as above; as RankGroup::Gather
+   */
+  StagedFolder(const std::string& folder, RankGroup& ranks);
   ~StagedFolder();
   StagedFolder(const StagedFolder&) = delete;
   StagedFolder& operator=(const StagedFolder&) = delete;
@@ -32,6 +41,9 @@ public:
    * @throws std::runtime_error naming folder/name when that can not be a file.
    */
   std::string Add(const std::string& name);
+
+  /// What was added, in its order.
+  const std::vector<std::string>& Added() const { return this->Names; }
 
   /// Where a file is now that was added.
   std::string PathOf(const std::string& name) const;
@@ -54,6 +66,8 @@ public:
   std::string Translate(const std::string& message) const;
 
 private:
+  /// Removes what is not committed.
+  void Discard();
   void Unlock();
 
   std::string Folder;
@@ -62,6 +76,7 @@ private:
   std::vector<std::string> Names;
   std::vector<std::string> Older;
   std::vector<std::string> Created; ///< folders to remove again, outermost first
+  bool Owner = true;                ///< of the folder; false: another rank removes it
 };
 }
 

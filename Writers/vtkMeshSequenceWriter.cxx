@@ -4,6 +4,7 @@
 #include "FileSeries.h"
 #include "MeshSequenceReport.h"
 #include "PartialProgress.h"
+#include "RankGroup.h"
 #include "StagedFolder.h"
 #include "SurfaceFile.h"
 #include "TetrahedralBoundary.h"
@@ -610,11 +611,12 @@ class SequenceFiles
 {
 public:
   /// @param prefix  what the names of files other than the report begin with
-  SequenceFiles(
-    const std::string& path, std::string prefix, int digits, std::size_t phases, Topology topology)
+  SequenceFiles(const std::string& path, std::string prefix, int digits, std::size_t phases,
+    Topology topology, coronary::RankGroup& ranks)
     : Name(fs::path(path).stem().string())
     , Prefix(std::move(prefix))
-    , Folder(fs::path(path).parent_path().empty() ? "." : fs::path(path).parent_path().string())
+    , Folder(
+        fs::path(path).parent_path().empty() ? "." : fs::path(path).parent_path().string(), ranks)
     , Topo(std::move(topology))
     , Surface(this->Topo.PatchOf(0))
     , Width(
@@ -920,6 +922,103 @@ struct Series
   std::vector<coronary::TimedFile> files;
 };
 
+/// A phase in the report with the names of its files, which the series get too.
+coronary::MeshSequenceReport::Phase EntryOf(double time, std::size_t phase,
+  const SequenceFiles& files, bool simVascular, std::vector<Series>& series)
+{
+  coronary::MeshSequenceReport::Phase entry;
+  entry.time = time;
+  for (Series& one : series)
+  {
+    const std::string file =
+      files.Prefix + one.stem + "_" + files.Number(phase) + "." + one.extension;
+    one.files.push_back({ file, time });
+    entry.files.emplace_back(one.kind, file);
+  }
+  if (simVascular)
+  {
+    entry.files.emplace_back(
+      "simvascular", files.Prefix + "simvascular/phase_" + files.Number(phase) + "/mesh-complete");
+  }
+  return entry;
+}
+
+/// What the report has of a phase as plain numbers, and back.
+std::vector<double> NumbersOf(const coronary::MeshSequenceReport::Phase& phase)
+{
+  const coronary::TetrahedraQuality& t = phase.tetrahedra;
+  const coronary::TrianglesQuality& s = phase.surface;
+  std::vector<double> numbers = { phase.time, static_cast<double>(t.poor), t.leastVolume,
+    static_cast<double>(t.leastVolumeAt), t.totalVolume, t.leastDihedralAngle,
+    static_cast<double>(t.leastDihedralAngleAt), t.greatestRadiusEdgeRatio,
+    static_cast<double>(t.greatestRadiusEdgeRatioAt), s.area, s.enclosedVolume, s.leastAngle,
+    static_cast<double>(s.leastAngleAt), static_cast<double>(t.inverted.size()) };
+  numbers.insert(numbers.end(), t.inverted.begin(), t.inverted.end());
+  numbers.insert(numbers.end(), s.degenerate.begin(), s.degenerate.end());
+  return numbers;
+}
+
+void TakeNumbers(const std::vector<double>& numbers, coronary::MeshSequenceReport::Phase& phase)
+{
+  auto next = numbers.begin();
+  const auto whole = [&] { return static_cast<std::int64_t>(*next++); };
+  coronary::TetrahedraQuality& t = phase.tetrahedra;
+  coronary::TrianglesQuality& s = phase.surface;
+  phase.time = *next++;
+  t.poor = whole();
+  t.leastVolume = *next++;
+  t.leastVolumeAt = whole();
+  t.totalVolume = *next++;
+  t.leastDihedralAngle = *next++;
+  t.leastDihedralAngleAt = whole();
+  t.greatestRadiusEdgeRatio = *next++;
+  t.greatestRadiusEdgeRatioAt = whole();
+  s.area = *next++;
+  s.enclosedVolume = *next++;
+  s.leastAngle = *next++;
+  s.leastAngleAt = whole();
+  const auto middle = next + 1 + static_cast<std::ptrdiff_t>(*next);
+  t.inverted.assign(next + 1, middle);
+  s.degenerate.assign(middle, numbers.end());
+}
+
+/// What every rank measured and wrote becomes known to all.
+void SharePhases(
+  coronary::RankGroup& ranks, coronary::MeshSequenceReport& report, coronary::StagedFolder& folder)
+{
+  if (ranks.Size() == 1)
+  {
+    return;
+  }
+  std::vector<std::vector<double>> numbers(report.phases.size());
+  for (std::size_t k = 0; k < numbers.size(); ++k)
+  {
+    if (ranks.Owns(k))
+    {
+      numbers[k] = NumbersOf(report.phases[k]);
+    }
+  }
+  coronary::ShareLists(ranks, numbers);
+  for (std::size_t k = 0; k < numbers.size(); ++k)
+  {
+    TakeNumbers(numbers[k], report.phases[k]);
+  }
+  std::string names;
+  for (const std::string& name : folder.Added())
+  {
+    names += name + '\n';
+  }
+  const std::vector<std::string> all = ranks.Gather(names);
+  for (std::size_t rank = 1; ranks.IsFirst() && rank < all.size(); ++rank)
+  {
+    std::istringstream lines(all[rank]);
+    for (std::string name; std::getline(lines, name);)
+    {
+      folder.Add(name);
+    }
+  }
+}
+
 /// One sentence about the phases that have inverted tetrahedra; empty when there are none.
 std::string InversionWarning(const std::vector<coronary::MeshSequenceReport::Phase>& phases)
 {
@@ -1137,6 +1236,7 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
     this->UpdateProgress(fraction);
     return !this->GetAbortExecute();
   };
+  coronary::RankGroup& ranks = this->Ranks != nullptr ? *this->Ranks : coronary::RankGroup::Alone();
   auto* boundary = vtkPolyData::SafeDownCast(this->GetInput(1));
   auto* caps = vtkPolyData::SafeDownCast(this->GetInput(2));
 
@@ -1150,6 +1250,12 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
   {
     for (std::size_t k = 0; k < times.size(); ++k)
     {
+      // The first phase says what all have to be like.
+      if (k > 0 && !ranks.Owns(k) && !gltf)
+      {
+        result.phases.push_back(EntryOf(times[k], k, *files, this->WriteSimVascular, series));
+        continue;
+      }
       coronary::Report(report, static_cast<double>(k) / static_cast<double>(times.size()));
       moment.time = times[k];
       request.Ask(nullptr, moment);
@@ -1178,7 +1284,7 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
         const std::string stem = fs::path(this->FileName).stem().string();
         files = std::make_unique<SequenceFiles>(this->FileName,
           this->PrefixFiles ? stem + "_" : std::string(), this->Digits, times.size(),
-          std::move(topology));
+          std::move(topology), ranks);
         result.prefix = files->Prefix;
         result.surfacePoints = files->SurfacePoints();
         if (this->WriteSeries && result.tetrahedra > 0)
@@ -1201,10 +1307,22 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
             series.push_back({ kind, "surface", kind, {} });
           }
         }
-        if (this->WriteGltf || this->WriteGltfJson)
+        // One file of all phases: the first rank goes through them all.
+        if ((this->WriteGltf || this->WriteGltfJson) && ranks.IsFirst())
         {
           gltf = files->NewGltf(mesh, result.faces, this->GltfInfluences);
         }
+      }
+      coronary::MeshSequenceReport::Phase entry =
+        EntryOf(times[k], k, *files, this->WriteSimVascular, series);
+      if (gltf)
+      {
+        gltf->AddPhase(mesh, times[k]);
+      }
+      if (!ranks.Owns(k))
+      {
+        result.phases.push_back(std::move(entry));
+        continue;
       }
       const Topology& topology = files->GetTopology();
       PhaseMesh phase;
@@ -1222,28 +1340,17 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
       {
         throw std::invalid_argument("At " + name + ": " + error.what());
       }
-      coronary::MeshSequenceReport::Phase entry;
-      entry.time = times[k];
-      for (Series& one : series)
+      for (const Series& one : series)
       {
         coronary::Report(
           report, (static_cast<double>(k) + 0.5) / static_cast<double>(times.size()));
-        const std::string file =
-          files->Prefix + one.stem + "_" + files->Number(k) + "." + one.extension;
-        files->Write(file, files->BytesOf(one.kind, phase, result.faces, this->KeepWeights));
-        one.files.push_back({ file, times[k] });
-        entry.files.emplace_back(one.kind, file);
-      }
-      if (gltf)
-      {
-        gltf->AddPhase(mesh, times[k]);
+        files->Write(
+          one.files.back().path, files->BytesOf(one.kind, phase, result.faces, this->KeepWeights));
       }
       if (this->WriteSimVascular)
       {
-        const std::string folder =
-          files->Prefix + "simvascular/phase_" + files->Number(k) + "/mesh-complete";
-        files->WriteSimVascular(folder, phase, result.faces, this->SimVascularUnit);
-        entry.files.emplace_back("simvascular", folder);
+        files->WriteSimVascular(
+          entry.files.back().second, phase, result.faces, this->SimVascularUnit);
       }
       entry.tetrahedra = std::move(phase.tetrahedra);
       entry.tetrahedra.volume = {};
@@ -1252,15 +1359,19 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
       entry.surface = std::move(phase.surface);
       result.phases.push_back(std::move(entry));
     }
+    SharePhases(ranks, result, files->GetFolder());
     for (const Series& one : series)
     {
       const std::string stem = files->Prefix + one.stem;
       const std::string list = stem + "." + one.extension + ".series";
-      files->Write(list, coronary::FileSeriesText(one.files));
       const bool xml = one.kind != one.extension; // a .pvd list is for VTK's own
-      if (xml)
+      if (ranks.IsFirst())
       {
-        files->Write(stem + ".pvd", coronary::PvdText(one.files));
+        files->Write(list, coronary::FileSeriesText(one.files));
+        if (xml)
+        {
+          files->Write(stem + ".pvd", coronary::PvdText(one.files));
+        }
       }
       result.files.emplace_back(one.kind, xml ? stem + ".pvd" : list);
     }
@@ -1283,13 +1394,19 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
         write("gltf-json", "gltf", coronary::GltfText(gltf->Model, *gltf->Skin));
       }
     }
-    files->Write(files->Prefix + "quality.csv", coronary::MeshSequenceCsv(result));
     result.files.emplace_back("quality", files->Prefix + "quality.csv");
-    files->Write(files->Name + ".json", coronary::MeshSequenceJson(result));
-    files->GetFolder().TakePlaceOf(coronary::MeshSequenceFiles(this->FileName));
+    if (ranks.IsFirst())
+    {
+      files->Write(files->Prefix + "quality.csv", coronary::MeshSequenceCsv(result));
+      files->Write(files->Name + ".json", coronary::MeshSequenceJson(result));
+      files->GetFolder().TakePlaceOf(coronary::MeshSequenceFiles(this->FileName));
+    }
     request.Restore();
     coronary::Report(report, 1.0);
-    files->GetFolder().Commit();
+    if (ranks.IsFirst())
+    {
+      files->GetFolder().Commit();
+    }
   }
   catch (const std::exception& error)
   {
@@ -1309,7 +1426,7 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
   }
   FillTable(result, this->Quality);
   const std::string warning = InversionWarning(result.phases);
-  if (!warning.empty())
+  if (!warning.empty() && ranks.IsFirst())
   {
     vtkWarningMacro(<< warning);
   }

@@ -61,6 +61,11 @@
 class vtkInformation;
 class vtkTable;
 
+namespace coronary
+{
+class RankGroup;
+}
+
 class VTKCORONARYWRITERS_EXPORT vtkMeshSequenceWriter : public vtkWriter
 {
 public:
@@ -79,6 +84,17 @@ public:
   vtkSetFilePathMacro(FileName);
   vtkGetFilePathMacro(FileName);
   ///@}
+
+#ifndef __VTK_WRAP__
+  /**
+   * Processes that write together, each its share of the phases; the first one writes the report and the lists.
+   * All have to write, to a folder that all see. Not owned; null (default): this process alone.
+   */
+  void SetRanks(coronary::RankGroup* ranks)
+  {
+    this->Ranks = ranks;
+  }
+#endif
 
   enum PhaseKinds
   {
@@ -274,6 +290,7 @@ private:
   std::string EntityIdsArrayName;
   vtkNew<vtkTable> Quality;
   bool Written = false;
+  coronary::RankGroup* Ranks = nullptr;
 };
 
 #endif

@@ -32,6 +32,8 @@ struct Command
    * @throws UsageError: exit code 2; Cancelled: interrupted; any other exception: exit code 1.
    */
   std::function<void()> run;
+
+  bool onRanks = false; ///< whether several processes of MPI can do it together
 };
 
 /// Declares a command and its options.
@@ -46,6 +48,7 @@ MakeCommand MakeSequenceCommand;
 MakeCommand MakeSlicerCommand;
 MakeCommand MakeMetricsCommand;
 MakeCommand MakeEvaluateCommand;
+MakeCommand MakeCohortCommand;
 }
 
 #endif

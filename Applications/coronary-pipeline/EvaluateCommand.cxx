@@ -4,12 +4,13 @@
 #include "DistanceOptions.h"
 #include "Evaluation.h"
 #include "EvaluationJson.h"
+#include "EvaluationRecord.h"
 #include "EvaluationReport.h"
 #include "Interruption.h"
 #include "MovingModel.h"
 #include "OptionChecks.h"
-#include "ParallelFor.h"
 #include "ProgressDisplay.h"
+#include "Ranks.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
 #include "vtkEvaluationPictures.h"
@@ -31,6 +32,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -55,6 +57,7 @@ struct EvaluateJob
   bool noPictures = false;
   bool web = false;
   std::int64_t webTriangles = 0; ///< 0: as many as suit the number of phases
+  std::string measureCache;
   int threads = 0;
   bool quiet = false;
 
@@ -77,6 +80,8 @@ private:
     std::vector<PhaseFiles> phases;
   };
   CaseFiles FindCase(std::size_t number) const;
+  EvaluationRecord Measure(const PhaseFiles& one, const EvaluationSettings& settings,
+    vtkMessageTrap& messages, const std::function<void(double)>& progress) const;
   void Evaluate(CaseFiles& files, vtkMessageTrap& messages,
     const std::function<void(const PhaseFiles&)>& begin,
     const std::function<void(double)>& progress) const;
@@ -143,6 +148,11 @@ void EvaluateJob::Declare(CLI::App& app)
     ->check(WholeWithin(0, 10000000))
     ->type_name("N")
     ->capture_default_str();
+  app
+    .add_option("--measure-cache", this->measureCache,
+      "Folder in which the measures of phases are kept; the same files and settings are taken from "
+      "there")
+    ->type_name("DIR");
   app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
     ->check(WholeWithin(0, 1024))
     ->type_name("N")
@@ -266,6 +276,34 @@ BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* s
   return vtkCoronary::TreeOf(lines, names, side);
 }
 
+EvaluationRecord EvaluateJob::Measure(const PhaseFiles& one, const EvaluationSettings& settings,
+  vtkMessageTrap& messages, const std::function<void(double)>& progress) const
+{
+  EvaluationInput input;
+  const auto read = [&](const std::string& path)
+  {
+    return ReadTriangles(path, vtkCoronaryArrayNames::GroupIds,
+      vtkCoronaryArrayNames::CellEntityIds, messages, this->segments);
+  };
+  SurfaceTriangles model = read(one.model);
+  SurfaceTriangles truth = read(one.truth);
+  input.model = std::move(model.mesh);
+  input.truth = std::move(truth.mesh);
+  input.modelTree = ReadTree(one.modelLines, model.data, "result", messages, nullptr);
+  input.truthTree = ReadTree(one.truthLines, truth.data, "reference", messages, &input.labels);
+  PhaseEvaluation phase = one.phase;
+  EvaluationRecord record;
+  EvaluatePhase(input, settings, phase, record.warnings,
+    [&](double fraction)
+    {
+      progress(fraction);
+      return Interruption() == 0;
+    });
+  record.measures = phase.measures;
+  record.branches = std::move(phase.branches);
+  return record;
+}
+
 void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
   const std::function<void(const PhaseFiles&)>& begin,
   const std::function<void(double)>& progress) const
@@ -274,30 +312,43 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
   settings.distance = this->distance;
   settings.distance.signedDistances = false;
   std::vector<std::string>& warnings = files.evaluation.warnings;
-  for (PhaseFiles& one : files.phases)
+  const EvaluationCache cache(this->measureCache);
+  std::string own; // what this rank measured, a line a phase
+  for (std::size_t n = 0; n < files.phases.size(); ++n)
   {
+    const PhaseFiles& one = files.phases[n];
     ThrowIfInterrupted();
     begin(one);
-    settings.distance.names = { "'" + one.model + "'", "'" + one.truth + "'" };
-    EvaluationInput input;
-    const auto read = [&](const std::string& path)
+    if (!Ranks().Owns(n))
     {
-      return ReadTriangles(path, vtkCoronaryArrayNames::GroupIds,
-        vtkCoronaryArrayNames::CellEntityIds, messages, this->segments);
-    };
-    SurfaceTriangles model = read(one.model);
-    SurfaceTriangles truth = read(one.truth);
-    input.model = std::move(model.mesh);
-    input.truth = std::move(truth.mesh);
-    input.modelTree = ReadTree(one.modelLines, model.data, "result", messages, nullptr);
-    input.truthTree = ReadTree(one.truthLines, truth.data, "reference", messages, &input.labels);
-    EvaluatePhase(input, settings, one.phase, warnings,
-      [&](double fraction)
-      {
-        progress(fraction);
-        return Interruption() == 0;
-      });
-    files.evaluation.phases.push_back(one.phase);
+      continue;
+    }
+    const std::string name = cache.NameOf(
+      { one.model, one.truth, one.modelLines, one.truthLines }, this->segments, settings);
+    EvaluationRecord record;
+    if (!cache.Read(name, record))
+    {
+      settings.distance.names = { "'" + one.model + "'", "'" + one.truth + "'" };
+      record = Measure(one, settings, messages, progress);
+      cache.Write(name, record);
+    }
+    own += record.Text() + '\n';
+  }
+  std::vector<std::istringstream> lines;
+  for (const std::string& text : Ranks().Gather(own))
+  {
+    lines.emplace_back(text);
+  }
+  for (std::size_t n = 0; n < files.phases.size(); ++n)
+  {
+    std::string line;
+    std::getline(lines[n % lines.size()], line);
+    EvaluationRecord record = EvaluationRecord::Of(line);
+    PhaseEvaluation& phase = files.phases[n].phase;
+    phase.measures = record.measures;
+    phase.branches = std::move(record.branches);
+    warnings.insert(warnings.end(), record.warnings.begin(), record.warnings.end());
+    files.evaluation.phases.push_back(phase);
   }
   if (std::isnan(files.evaluation.phases.front().measures.completenessRatio))
   {
@@ -435,7 +486,7 @@ void EvaluateJob::Run() const
   {
     throw UsageError("--name: one for every case, or none");
   }
-  SetNumberOfThreads(this->threads);
+  UseThreads(this->threads);
   std::vector<CaseFiles> cases;
   std::size_t steps = 0;
   for (std::size_t n = 0; n < this->results.size(); ++n)
@@ -444,19 +495,21 @@ void EvaluateJob::Run() const
     steps += cases.back().phases.size();
   }
   std::string why;
-  const bool draw = !this->noPictures && CanDraw(why);
+  const bool first = Ranks().IsFirst();
+  const bool draw = first && !this->noPictures && CanDraw(why);
   const std::string withoutPictures =
-    draw || this->noPictures ? "" : "there are no pictures and plots: " + why;
+    draw || this->noPictures || !first ? "" : "there are no pictures and plots: " + why;
 
-  StagedFolder folder(this->output);
+  StagedFolder folder(this->output, Ranks());
   vtkMessageTrap messages;
+  std::vector<std::string> complaints;
   std::vector<CaseEvaluation> evaluations;
   std::vector<ReportCase> illustrations;
   std::vector<std::string> plots;
   try
   {
-    ProgressDisplay progress(
-      "step", static_cast<int>(steps + (draw || this->web ? cases.size() : 0)), this->quiet);
+    ProgressDisplay progress("step",
+      static_cast<int>(steps + (draw || this->web ? cases.size() : 0)), this->quiet || !first);
     const auto update = [&](double fraction) { progress.Update(fraction); };
     int step = 0;
     for (CaseFiles& files : cases)
@@ -471,6 +524,13 @@ void EvaluateJob::Run() const
         update);
       evaluations.push_back(files.evaluation);
     }
+    messages.ThrowIfError();
+    complaints = LinesOfAll(messages.TakeWarnings());
+    if (!first)
+    {
+      return;
+    }
+    const OthersWait alone(this->threads);
     const std::string table = folder.Add("table1.csv");
     WriteFileAtomically(table, EvaluationCsv(evaluations));
     WriteFileAtomically(folder.Add("table1.tex"), EvaluationLatex(evaluations));
@@ -530,6 +590,10 @@ void EvaluateJob::Run() const
     throw std::runtime_error(folder.Translate(error.what()));
   }
   folder.Commit();
+  for (const std::string& complaint : complaints)
+  {
+    std::fprintf(stderr, "Warning: %s\n", complaint.c_str());
+  }
   messages.PrintWarnings();
   for (const CaseEvaluation& one : evaluations)
   {
@@ -559,6 +623,6 @@ Command MakeEvaluateCommand(CLI::App& program)
     "xvfb-run -a coronary-pipeline evaluate ... With --web also DIR/review.html.");
   auto job = std::make_shared<EvaluateJob>();
   job->Declare(*app);
-  return { app, [job] { job->Run(); } };
+  return { app, [job] { job->Run(); }, true };
 }
 }

@@ -31,6 +31,11 @@ int Interruption()
   return ArrivedSignal;
 }
 
+void RememberInterruption(int signal)
+{
+  ArrivedSignal = signal;
+}
+
 void ThrowIfInterrupted()
 {
   if (Interruption() != 0)

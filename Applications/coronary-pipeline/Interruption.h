@@ -13,6 +13,9 @@ void CatchInterruptions();
 /// The signal that arrived, or 0.
 int Interruption();
 
+/// As if the signal had arrived here: it arrived at another process of the same work.
+void RememberInterruption(int signal);
+
 /// @throws Cancelled when a signal arrived.
 void ThrowIfInterrupted();
 }

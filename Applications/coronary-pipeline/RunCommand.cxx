@@ -4,12 +4,14 @@
 #include "Interruption.h"
 #include "ParallelFor.h"
 #include "ProgressDisplay.h"
+#include "Ranks.h"
 #include "RunReport.h"
 #include "RunSettings.h"
 #include "StagedFolder.h"
 #include "vtkMessageTrap.h"
 #include "vtkRunStages.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -48,6 +50,10 @@ private:
   std::vector<RunStage> Plan(const RunInput& input, RunReport& report) const;
   void Make(
     RunStage stage, RunInput& input, RunReport& report, ProgressDisplay& progress, int& number);
+  /// A stage on another rank than the first: its share of it, or nothing but to wait.
+  void Help(RunStage stage, RunInput& input, RunReport& report);
+  /// A stage ends on all ranks together. @return warnings of all
+  static std::vector<std::string> End(RunInput& input);
   void LeaveOut(RunStage stage, const std::string& reason, RunReport& report);
   void Commit(StagedFolder& folder, RunStage stage, const RunReport& report) const;
   void Stop(RunStage stage, const std::string& reason, RunReport& report) const;
@@ -78,7 +84,7 @@ std::vector<RunStage> RunJob::Plan(const RunInput& input, RunReport& report) con
   if (this->Resume)
   {
     const std::string reason = report.Keep(this->Options, first, last);
-    if (!reason.empty() && !this->Settings.quiet)
+    if (!reason.empty() && !this->Settings.quiet && Ranks().IsFirst())
     {
       auto next = first;
       while (report.Has(next))
@@ -96,6 +102,17 @@ std::vector<RunStage> RunJob::Plan(const RunInput& input, RunReport& report) con
     {
       stages.push_back(static_cast<RunStage>(n));
     }
+  }
+  // All ranks have looked into the folder before the first one changes it, and what it found counts.
+  std::string numbers;
+  for (const RunStage stage : stages)
+  {
+    numbers += static_cast<char>(stage);
+  }
+  stages.clear();
+  for (const char number : Ranks().FromFirst(numbers))
+  {
+    stages.push_back(static_cast<RunStage>(number));
   }
   return stages;
 }
@@ -124,17 +141,21 @@ void RunJob::Make(
   RunStage stage, RunInput& input, RunReport& report, ProgressDisplay& progress, int& number)
 {
   const RunClock clock;
-  StagedFolder folder(this->Settings.output);
+  StagedFolder folder(this->Settings.output, Ranks());
   try
   {
     std::vector<std::string> files;
-    RunStep step{ input, report, folder, files, [&](double fraction) { progress.Update(fraction); },
-      {} };
+    RunStep step{ input, report, folder, Ranks(), files,
+      [&](double fraction) { progress.Update(fraction); }, {} };
     if (stage == RunStage::Vesselness)
     {
+      const OthersWait alone(this->Settings.threads);
       progress.BeginStep(number++, "reference phase");
       FindReference(step);
+      Ranks().FromFirst(report.Of("time").dump());
     }
+    const auto alone =
+      IsShared(stage) ? nullptr : std::make_unique<OthersWait>(this->Settings.threads);
     progress.BeginStep(number++, RunStageNames()[static_cast<std::size_t>(stage)]);
     const nlohmann::ordered_json numbers = MakeStage(stage, step);
     ThrowIfInterrupted();
@@ -144,11 +165,12 @@ void RunJob::Make(
     {
       sizes.emplace_back(file, folder.PathOf(file));
     }
-    const std::vector<std::string> warnings = input.Messages.TakeWarnings();
+    const std::vector<std::string> warnings = End(input);
     this->Warnings.insert(this->Warnings.end(), warnings.begin(), warnings.end());
     report.Finish(stage, numbers, clock, warnings, sizes);
     this->Commit(folder, stage, report);
     this->Changed = true;
+    Ranks().Gather("");
     this->Say(step.summary);
   }
   catch (const std::runtime_error& error)
@@ -158,8 +180,44 @@ void RunJob::Make(
   }
 }
 
+std::vector<std::string> RunJob::End(RunInput& input)
+{
+  return LinesOfAll(input.Messages.TakeWarnings());
+}
+
+void RunJob::Help(RunStage stage, RunInput& input, RunReport& report)
+{
+  StagedFolder folder(this->Settings.output, Ranks());
+  try
+  {
+    std::vector<std::string> files;
+    RunStep step{ input, report, folder, Ranks(), files, [](double) {}, {} };
+    if (stage == RunStage::Vesselness)
+    {
+      report.Set("time", nlohmann::ordered_json::parse(Ranks().FromFirst("")));
+    }
+    if (IsShared(stage))
+    {
+      MakeStage(stage, step);
+    }
+    ThrowIfInterrupted();
+    End(input);
+  }
+  catch (const std::runtime_error& error)
+  {
+    ThrowIfInterrupted();
+    throw std::runtime_error(folder.Translate(error.what()));
+  }
+  // The files are in their place when the first rank has committed them.
+  Ranks().Gather("");
+}
+
 void RunJob::Stop(RunStage stage, const std::string& reason, RunReport& report) const
 {
+  if (!Ranks().IsFirst())
+  {
+    return;
+  }
   // What was there stays as it is when this run has made nothing that takes its place.
   std::error_code error;
   const bool there =
@@ -181,7 +239,10 @@ void RunJob::Run()
   this->Options.Check();
   if (this->PrintSettings)
   {
-    std::printf("%s\n", this->Options.All().dump(2).c_str());
+    if (Ranks().IsFirst())
+    {
+      std::printf("%s\n", this->Options.All().dump(2).c_str());
+    }
     return;
   }
   if (this->Settings.input.empty())
@@ -192,7 +253,7 @@ void RunJob::Run()
   {
     throw UsageError("--output is required");
   }
-  SetNumberOfThreads(this->Settings.threads);
+  UseThreads(this->Settings.threads);
   vtkMessageTrap messages;
   RunInput input(this->Settings, messages);
   if (this->Settings.surface == "given" && !input.IsSurface())
@@ -219,7 +280,7 @@ void RunJob::Run()
   }
   int number = 0;
   {
-    ProgressDisplay progress("stage", steps, this->Settings.quiet);
+    ProgressDisplay progress("stage", steps, this->Settings.quiet || !Ranks().IsFirst());
     for (const RunStage stage : stages)
     {
       ReleaseImages(input, stage);
@@ -227,7 +288,14 @@ void RunJob::Run()
       {
         if (stage == RunStage::Motion && !still.empty())
         {
-          this->LeaveOut(stage, still, report);
+          if (Ranks().IsFirst())
+          {
+            this->LeaveOut(stage, still, report);
+          }
+        }
+        else if (!Ranks().IsFirst())
+        {
+          this->Help(stage, input, report);
         }
         else
         {
@@ -246,10 +314,14 @@ void RunJob::Run()
       }
       catch (const std::exception& error)
       {
-        this->Stop(stage, error.what(), report);
+        this->Stop(stage, Ranks().Reason(error.what()), report);
         throw;
       }
     }
+  }
+  if (!Ranks().IsFirst())
+  {
+    return;
   }
   for (const std::string& warning : this->Warnings)
   {
@@ -284,6 +356,6 @@ Command MakeRunCommand(CLI::App& program)
               "weights.vtu, weights.dmat, motion.pvd, motion/ with series of centerlines, "
               "skeletons, tetrahedra and surfaces; and, after every stage, report.json.");
   auto job = std::make_shared<RunJob>(*app);
-  return { app, [job] { job->Run(); } };
+  return { app, [job] { job->Run(); }, true };
 }
 }

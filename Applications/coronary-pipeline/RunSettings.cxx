@@ -396,10 +396,14 @@ void RunOptions::Read(const std::string& path)
   {
     throw std::runtime_error("'" + path + "' is not a JSON object of settings.");
   }
+  this->Take(json, "'" + path + "'");
+}
+
+void RunOptions::Take(const Json& json, const std::string& place)
+{
   for (const auto& item : json.items())
   {
-    const std::string where =
-      std::string("'").append(path).append("': '").append(item.key()).append("'");
+    const std::string where = std::string(place).append(": '").append(item.key()).append("'");
     const Json& value = item.value();
     const auto found = std::find_if(this->List.begin(), this->List.end(),
       [&](const Setting& setting) { return setting.name == item.key(); });

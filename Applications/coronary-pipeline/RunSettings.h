@@ -89,6 +89,9 @@ public:
    */
   void Read(const std::string& path);
 
+  /// The same of a JSON object. @param place  what messages call it @throws std::runtime_error as Read()
+  void Take(const nlohmann::ordered_json& json, const std::string& place);
+
   /// @throws UsageError naming the option that does not go with another one
   void Check() const;
 

@@ -1,8 +1,8 @@
 #include "Command.h"
 
 #include "OptionChecks.h"
-#include "ParallelFor.h"
 #include "ProgressDisplay.h"
+#include "Ranks.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
@@ -282,10 +282,10 @@ vtkSmartPointer<vtkPolyData> ReadOptional(
 
 void SequenceJob::Run() const
 {
-  SetNumberOfThreads(this->threads);
+  UseThreads(this->threads);
   const std::vector<std::string> poseFiles = this->PoseFiles();
   vtkMessageTrap messages;
-  ProgressDisplay progress("step", 2, this->quiet);
+  ProgressDisplay progress("step", 2, this->quiet || !Ranks().IsFirst());
   progress.BeginStep(0, "reading");
   const auto mesh =
     ReadUnstructuredGrid((fs::path(this->result) / "weights.vtu").string(), messages);
@@ -327,12 +327,16 @@ void SequenceJob::Run() const
     moving.Writer->SetInputData(2, caps);
   }
   this->Choose(moving.Writer);
+  moving.Writer->SetRanks(&Ranks());
   progress.BeginStep(1, "phases");
   moving.Write((fs::path(this->output) / "mesh.json").string(),
     this->PhaseTimes(source->GetTimes()), messages,
     [&](double fraction) { progress.Update(fraction); });
-  messages.PrintWarnings();
-  if (!this->quiet)
+  for (const std::string& warning : LinesOfAll(messages.TakeWarnings()))
+  {
+    std::fprintf(stderr, "Warning: %s\n", warning.c_str());
+  }
+  if (!this->quiet && Ranks().IsFirst())
   {
     std::printf(
       "%s: %s\n", this->output.c_str(), this->Summary(moving.Writer->GetQuality()).c_str());
@@ -352,6 +356,6 @@ Command MakeSequenceCommand(CLI::App& program)
     "mesh_surface_000.obj ..; gltf: mesh_skin.glb.");
   auto job = std::make_shared<SequenceJob>();
   job->Declare(*app);
-  return { app, [job] { job->Run(); } };
+  return { app, [job] { job->Run(); }, true };
 }
 }

@@ -2,12 +2,13 @@
  * coronary-pipeline: the project's batch program.
  *
  * Exit codes: 0 done; 1 failed, with one line that says why; 2 the command line is wrong;
- * 128 + n ended by signal n (130: Ctrl-C).
+ * 128 + n ended by signal n (130: Ctrl-C). Of several ranks (mpirun) the first one has it, the others 0.
  */
 #include "Command.h"
 #include "ErrorLine.h"
 #include "Interruption.h"
 #include "ParallelFor.h"
+#include "Ranks.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -31,14 +32,18 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakeSlicerCommand,
   coronary::MakeMetricsCommand,
   coronary::MakeEvaluateCommand,
+  coronary::MakeCohortCommand,
   coronary::MakeConvertCommand,
 };
 
 int Complain(const CLI::App* command, const std::string& message, int exitCode)
 {
-  const std::string name = command ? " " + command->get_name() : "";
-  std::fprintf(
-    stderr, "coronary-pipeline%s: %s\n", name.c_str(), coronary::ErrorLine(message).c_str());
+  if (coronary::IsFirstProcess())
+  {
+    const std::string name = command ? " " + command->get_name() : "";
+    std::fprintf(
+      stderr, "coronary-pipeline%s: %s\n", name.c_str(), coronary::ErrorLine(message).c_str());
+  }
   return exitCode;
 }
 
@@ -46,8 +51,13 @@ int RunCommand(const coronary::Command& command)
 {
   try
   {
+    coronary::StartRanks();
     coronary::CatchInterruptions();
-    command.run();
+    if (coronary::Ranks().Size() > 1 && !command.onRanks)
+    {
+      throw coronary::UsageError("this command works in one process: start it without mpirun");
+    }
+    coronary::Ranks().Agree(command.run);
     return 0;
   }
   catch (const coronary::UsageError& error)
@@ -94,7 +104,7 @@ int Run(int argc, char** argv)
   }
   catch (const CLI::Success& wanted) // --help, --version
   {
-    return program.exit(wanted);
+    return coronary::IsFirstProcess() ? program.exit(wanted) : 0;
   }
   catch (const CLI::ParseError& error)
   {
@@ -126,11 +136,13 @@ int main(int argc, char** argv)
   {
     return Complain(nullptr, error.what(), Failed);
   }
+  coronary::FinishRanks();
   // What was printed must have arrived: the reader may be a full disk.
   std::cout.flush();
   if (exitCode == 0 && (!std::cout || std::fflush(stdout) != 0))
   {
     return Complain(nullptr, "cannot write to the standard output", Failed);
   }
-  return exitCode;
+  // The starter ends all others as soon as one fails: the first one is to say it.
+  return coronary::IsFirstProcess() ? exitCode : 0;
 }

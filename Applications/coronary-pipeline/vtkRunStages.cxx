@@ -10,6 +10,7 @@
 #include "MeshSequenceReport.h"
 #include "MetaImageWriter.h"
 #include "OptionChecks.h"
+#include "RankGroup.h"
 #include "SegmentationFile.h"
 #include "SeriesDescription.h"
 #include "StagedFolder.h"
@@ -31,6 +32,7 @@
 #include "vtkDoubleArray.h"
 #include "vtkFastMarchingCenterline.h"
 #include "vtkFieldData.h"
+#include "vtkFloatArray.h"
 #include "vtkFrangiVesselness.h"
 #include "vtkFrenetSweepSurface.h"
 #include "vtkGatedImageReader.h"
@@ -55,6 +57,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -287,18 +290,84 @@ void Update(vtkAlgorithm* algorithm, const RunStep& step)
   UpdateAtTime(algorithm, 0, 0.0, step.input.Messages, step.progress);
 }
 
+/// The slices that a rank works on; none: the last is before the first.
+std::array<int, 6> SlabOf(const RankGroup& ranks, int rank, const int whole[6])
+{
+  std::array<int, 6> slab;
+  std::copy_n(whole, 6, slab.begin());
+  const std::int64_t slices = whole[5] - whole[4] + 1;
+  slab[4] = whole[4] + static_cast<int>(slices * rank / ranks.Size());
+  slab[5] = whole[4] + static_cast<int>(slices * (rank + 1) / ranks.Size()) - 1;
+  return slab;
+}
+
+/// Each rank computes a slab, and the first one gets all of them.
+vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, const RunStep& step)
+{
+  vtkNew<vtkReferencePhase> phase; // lives as long as it is asked
+  if (!step.ranks.IsFirst())
+  {
+    // Of the reference no more is read than the slab and its surroundings.
+    phase->SetInputConnection(step.input.Reader->GetOutputPort());
+    phase->SetAutomatic(false);
+    phase->SetTime(step.report.Of("time").get<double>());
+    vesselness->SetInputConnection(phase->GetOutputPort());
+  }
+  vesselness->UpdateInformation();
+  int whole[6];
+  vesselness->GetOutputInformation(0)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
+  const std::array<int, 6> slab = SlabOf(step.ranks, step.ranks.Rank(), whole);
+  const float* own = nullptr;
+  std::size_t size = 0;
+  if (slab[4] <= slab[5])
+  {
+    WithProgress(vesselness, step.progress, [&] { vesselness->UpdateExtent(slab.data()); });
+    step.input.Messages.ThrowIfError();
+    own = static_cast<const float*>(vesselness->GetOutput()->GetScalarPointer());
+    size = static_cast<std::size_t>(vesselness->GetOutput()->GetNumberOfPoints()) * sizeof(float);
+  }
+  vtkSmartPointer<vtkImageData> all;
+  if (step.ranks.IsFirst())
+  {
+    all = vtkSmartPointer<vtkImageData>::New();
+    all->CopyStructure(vesselness->GetOutput());
+    all->SetExtent(whole);
+    vtkNew<vtkFloatArray> values;
+    values->SetName(vesselness->GetOutput()->GetPointData()->GetScalars()->GetName());
+    values->SetNumberOfTuples(all->GetNumberOfPoints());
+    all->GetPointData()->SetScalars(values);
+    all->GetFieldData()->PassData(vesselness->GetOutput()->GetFieldData());
+  }
+  step.ranks.Collect(own, size, all ? all->GetScalarPointer() : nullptr);
+  return all;
+}
+
 Json MakeVesselness(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
-  NeedReference(step);
   vtkNew<vtkFrangiVesselness> vesselness;
-  vesselness->SetInputData(step.input.Reference);
   vesselness->SetSigmaMin(settings.scales[0]);
   vesselness->SetSigmaMax(settings.scales[1]);
   vesselness->SetAutomaticC(!(settings.c > 0.0));
   vesselness->SetC(settings.c > 0.0 ? settings.c : 1.0);
-  Update(vesselness, step);
-  step.input.Vesselness = Detached(vesselness->GetOutput());
+  if (step.ranks.IsFirst())
+  {
+    NeedReference(step);
+    vesselness->SetInputData(step.input.Reference);
+  }
+  if (step.ranks.Size() > 1)
+  {
+    step.input.Vesselness = ComputeInSlabs(vesselness, step);
+  }
+  else
+  {
+    Update(vesselness, step);
+    step.input.Vesselness = Detached(vesselness->GetOutput());
+  }
+  if (!step.ranks.IsFirst())
+  {
+    return {};
+  }
   vtkImageData* response = step.input.Vesselness;
   WriteMetaImage(step.Add("vesselness.mha"), vtkCoronary::GridOf(response),
     static_cast<const float*>(response->GetScalarPointer()), settings.compress, KeepGoing);
@@ -725,13 +794,20 @@ std::string WriteMovingLines(
     std::string name = stem + "_";
     name.append(width - digits.size(), '0').append(digits).append(".vtp");
     files.push_back({ name, times[n] });
-    UpdateAtTime(lines, 0, times[n], step.input.Messages, [](double) {});
-    WritePolyData(step.Add("motion/" + files.back().path),
-      vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), step.input.Messages);
+    const std::string path = step.Add("motion/" + files.back().path);
+    if (step.ranks.Owns(n))
+    {
+      UpdateAtTime(lines, 0, times[n], step.input.Messages, [](double) {});
+      WritePolyData(
+        path, vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), step.input.Messages);
+    }
   }
   std::string list = "motion/" + stem + ".vtp.series";
-  WriteFileAtomically(step.Add(list), FileSeriesText(files));
-  WriteFileAtomically(step.Add("motion/" + stem + ".pvd"), PvdText(files));
+  if (step.ranks.IsFirst())
+  {
+    WriteFileAtomically(step.Add(list), FileSeriesText(files));
+    WriteFileAtomically(step.Add("motion/" + stem + ".pvd"), PvdText(files));
+  }
   return list;
 }
 
@@ -770,6 +846,7 @@ Json MakeMotion(RunStep& step)
   tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
   tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
                                                        : vtkCenterlineTracker::AllPhases);
+  tracker->SetRanks(&step.ranks);
   const std::vector<double> times = Moments(step.input);
   const int mode = InterpolationMode(settings.interpolation);
   vtkNew<vtkCardiacPhaseInterpolator> lines;
@@ -784,6 +861,7 @@ Json MakeMotion(RunStep& step)
   moving.Writer->SetInputData(2, ReadLines(step, "caps.vtp"));
   moving.Writer->PrefixFilesOff();
   moving.Writer->SetDigits(PhaseDigits);
+  moving.Writer->SetRanks(&step.ranks);
 
   // The images are read now.
   UpdateAtTime(
@@ -795,6 +873,10 @@ Json MakeMotion(RunStep& step)
   const std::string path = step.Add(name);
   moving.Write(
     path, times, messages, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); });
+  if (!step.ranks.IsFirst())
+  {
+    return {};
+  }
   for (const std::string& file : MeshSequenceFiles(path))
   {
     if ("motion/" + file != name)
@@ -1011,6 +1093,11 @@ void FindReference(RunStep& step)
   step.report.Set("phase", phase);
   step.report.Set("time", reader->GetPhaseTime(phase));
   step.report.Set("image", reader->GetPhaseFileName(phase));
+}
+
+bool IsShared(RunStage stage)
+{
+  return stage == RunStage::Vesselness || stage == RunStage::Motion;
 }
 
 Json MakeStage(RunStage stage, RunStep& step)

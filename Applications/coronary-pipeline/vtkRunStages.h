@@ -26,6 +26,7 @@ class vtkPolyData;
 
 namespace coronary
 {
+class RankGroup;
 class StagedFolder;
 
 /// What the stages work on.
@@ -70,6 +71,7 @@ struct RunStep
   RunInput& input;
   RunReport& report;               ///< of the stages before
   StagedFolder& folder;            ///< for the stage's files
+  RankGroup& ranks;                ///< that work on the stage together
   std::vector<std::string>& files; ///< names of those
   std::function<void(double)> progress;
   std::string summary; ///< a few words for the user
@@ -78,10 +80,14 @@ struct RunStep
   std::string Add(const std::string& name);
 };
 
+/// Whether all ranks work on a stage; else the first one alone.
+bool IsShared(RunStage stage);
+
 /// The reference phase: number, time and file into the report, the image into the input.
 void FindReference(RunStep& step);
 
-/// Makes the files of a stage. @return what the report tells of it @throws std::runtime_error, Cancelled
+/// Makes the files of a stage, those that are shared with all ranks. @return what the report tells of it, on the first
+/// rank @throws std::runtime_error, Cancelled
 nlohmann::ordered_json MakeStage(RunStage stage, RunStep& step);
 
 /// Lets images go that the stages from `next` on do not need.

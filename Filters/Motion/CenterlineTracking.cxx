@@ -375,7 +375,7 @@ public:
   Tracker(const MovingLines& lines, double referenceTime, const std::vector<double>& times,
     const std::function<ScalarImage(double time)>& imageAt,
     const CenterlineTrackingSettings& settings, CenterlineTrackingReport& report,
-    const ProgressCallback& progress)
+    const ProgressCallback& progress, RankGroup& ranks)
     : Lines(lines)
     , ReferenceTime(referenceTime)
     , Times(times)
@@ -383,6 +383,7 @@ public:
     , Settings(settings)
     , Result(report)
     , Progress(progress)
+    , Ranks(ranks)
     , Nodes(PlaceNodes(lines, settings.nodeSpacing))
     , Coarse(settings.coarseRadius, settings.coarseSpacing)
     , Fine(settings.fineRadius, 1.0)
@@ -408,6 +409,8 @@ private:
   ScalarImage Read(double time);
   void MeasureContrast();
   void SearchCoarsely();
+  /// Positions in `order`, each of the phase whose place is the guess of the one at this position; none: -1.
+  std::vector<std::ptrdiff_t> Guesses(const std::vector<std::size_t>& order) const;
   /// Looks for the surroundings of the nodes without the vessels, which may be invisible, or with
   /// them.
   Seen SearchFinely(bool vessels, double progressFrom);
@@ -447,6 +450,7 @@ private:
   const CenterlineTrackingSettings& Settings;
   CenterlineTrackingReport& Result;
   const ProgressCallback& Progress;
+  RankGroup& Ranks;
 
   LineNodes Nodes;
   Patch Coarse;
@@ -458,7 +462,8 @@ private:
   double Contrast = 1.0; ///< of the vessels in the reference
   double Voxel = 0.4;    ///< largest edge of the reference's voxels, mm
   SparseVolume Reference;
-  std::vector<SparseVolume> Volumes; ///< per phase
+  std::vector<bool> Own;             ///< per phase: of this rank's share
+  std::vector<SparseVolume> Volumes; ///< per phase; empty where it is another rank's
   PerPhase Displacement;             ///< per phase and node: the present trajectories
   Trajectories Motion;
   Seen Surroundings; ///< where the tissue around the nodes was found; empty: not looked for
@@ -632,26 +637,17 @@ void Tracker::SearchCoarsely()
       return CyclicDistance(this->Times[a], this->ReferenceTime) <
         CyclicDistance(this->Times[b], this->ReferenceTime);
     });
+  const std::vector<std::ptrdiff_t> guesses = this->Guesses(order);
   this->Displacement.assign(phases, {});
   this->Volumes.resize(phases);
-  std::vector<std::size_t> done;
-  for (std::size_t step = 0; step < phases; ++step)
+  this->Own.assign(phases, false);
+  const auto search = [&](
+                        std::size_t position, const ScalarImage& image, const AveragedVolume& moved)
   {
-    const std::size_t phase = order[step];
-    std::vector<Vector3> guess(nodes, Vector3::Zero());
-    double nearest = CyclicDistance(this->Times[phase], this->ReferenceTime);
-    for (const std::size_t other : done)
-    {
-      const double apart = CyclicDistance(this->Times[phase], this->Times[other]);
-      if (apart < nearest)
-      {
-        nearest = apart;
-        guess = this->Displacement[other];
-      }
-    }
-    const ScalarImage image = this->Read(this->Times[phase]);
-    const AveragedVolume moved =
-      AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
+    const std::size_t phase = order[position];
+    std::vector<Vector3> places = guesses[position] < 0
+      ? std::vector<Vector3>(nodes, Vector3::Zero())
+      : this->Displacement[order[static_cast<std::size_t>(guesses[position])]];
     std::vector<std::vector<float>> costs(nodes);
     ParallelFor(
       nodes, 4,
@@ -660,7 +656,7 @@ void Tracker::SearchCoarsely()
         std::vector<float> block(static_cast<std::size_t>(blockSide) * blockSide * blockSide);
         for (std::int64_t n = first; n < last; ++n)
         {
-          const Vector3 centre = this->Nodes.position[n] + guess[n];
+          const Vector3 centre = this->Nodes.position[n] + places[n];
           std::size_t at = 0;
           for (int k = -blockReach; k <= blockReach; ++k)
           {
@@ -676,24 +672,84 @@ void Tracker::SearchCoarsely()
             block, blockSide, this->Coarse, weights[n], wanted[n], lattice.reach, costs[n]);
         }
       },
-      this->Part(0.6 * (static_cast<double>(step) + 0.3) / static_cast<double>(phases),
-        0.6 * static_cast<double>(step + 1) / static_cast<double>(phases)));
+      this->Part(0.6 * (static_cast<double>(position) + 0.3) / static_cast<double>(phases),
+        0.6 * static_cast<double>(position + 1) / static_cast<double>(phases)));
     ToLikelihoods(costs, 30.0, 20.0, 0.1 * this->NoiseFloor());
     const std::vector<Vector3> best = BestDisplacements(this->Nodes, lattice, costs, 0.5);
     for (std::int64_t n = 0; n < nodes; ++n)
     {
-      guess[n] += best[n];
+      places[n] += best[n];
     }
-    this->Displacement[phase] = std::move(guess);
-    done.push_back(phase);
-    this->Volumes[phase] =
-      SparseVolume(image, this->PlacesAt(this->Displacement[phase]), this->Keep());
+    this->Volumes[phase] = SparseVolume(image, this->PlacesAt(places), this->Keep());
+    return places;
+  };
+  // A phase for each rank at a time: all read theirs at once, and search when the guess is known.
+  const auto ranks = static_cast<std::size_t>(this->Ranks.Size());
+  for (std::size_t first = 0; first < phases; first += ranks)
+  {
+    const std::size_t end = std::min(phases, first + ranks);
+    const std::size_t own = first + static_cast<std::size_t>(this->Ranks.Rank());
+    ScalarImage image;
+    AveragedVolume moved;
+    if (own < end)
+    {
+      this->Own[order[own]] = true;
+      image = this->Read(this->Times[order[own]]);
+      moved = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
+    }
+    std::vector<bool> ready;
+    const auto isOpen = [&](std::size_t position)
+    { return this->Displacement[order[position]].empty(); };
+    for (std::size_t open = end - first; open > 0;)
+    {
+      ready.assign(end - first, false);
+      for (std::size_t position = first; position < end; ++position)
+      {
+        const std::ptrdiff_t guess = guesses[position];
+        ready[position - first] =
+          isOpen(position) && (guess < 0 || !isOpen(static_cast<std::size_t>(guess)));
+      }
+      std::vector<std::vector<Vector3>> found(phases);
+      if (own < end && ready[own - first])
+      {
+        found[order[own]] = search(own, image, moved);
+      }
+      ShareLists(this->Ranks, found);
+      for (std::size_t position = first; position < end; ++position)
+      {
+        if (ready[position - first])
+        {
+          this->Displacement[order[position]] = std::move(found[order[position]]);
+          --open;
+        }
+      }
+    }
   }
   const Seen seen{ this->Displacement,
     std::vector<std::vector<Matrix3>>(
       phases, std::vector<Matrix3>(nodes, Matrix3::Identity() / (1.5 * 1.5))),
     2.5 };
   this->Fit({ &seen });
+}
+
+std::vector<std::ptrdiff_t> Tracker::Guesses(const std::vector<std::size_t>& order) const
+{
+  std::vector<std::ptrdiff_t> guesses(order.size(), -1);
+  for (std::size_t position = 0; position < order.size(); ++position)
+  {
+    const double time = this->Times[order[position]];
+    double nearest = CyclicDistance(time, this->ReferenceTime);
+    for (std::size_t before = 0; before < position; ++before)
+    {
+      const double apart = CyclicDistance(time, this->Times[order[before]]);
+      if (apart < nearest)
+      {
+        nearest = apart;
+        guesses[position] = static_cast<std::ptrdiff_t>(before);
+      }
+    }
+  }
+  return guesses;
 }
 
 void Tracker::Fit(const std::vector<const Seen*>& seen)
@@ -789,10 +845,14 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
   const std::vector<std::vector<float>> weights = vessels
     ? std::vector<std::vector<float>>(nodes, this->Fine.weights)
     : this->WithoutVessels(this->Fine, 0.8);
-  Seen seen{ PerPhase(phases),
-    std::vector<std::vector<Matrix3>>(phases, std::vector<Matrix3>(nodes, Matrix3::Zero())), 1.5 };
+  Seen seen{ PerPhase(phases), std::vector<std::vector<Matrix3>>(phases), 1.5 };
   for (std::size_t k = 0; k < phases; ++k)
   {
+    if (!this->Own[k])
+    {
+      continue;
+    }
+    seen.information[k].assign(nodes, Matrix3::Zero());
     const std::vector<Vector3> places = this->PlacesAt(this->Displacement[k]);
     if (!std::all_of(places.begin(), places.end(),
           [&](const Vector3& place)
@@ -912,6 +972,8 @@ Tracker::Seen Tracker::SearchFinely(bool vessels, double progressFrom)
       seen.displacement[k][n] += this->Displacement[k][n];
     }
   }
+  ShareLists(this->Ranks, seen.displacement);
+  ShareLists(this->Ranks, seen.information);
   return seen;
 }
 
@@ -920,10 +982,9 @@ void Tracker::Align(double robustScale, double progressFrom)
   const std::size_t phases = this->Times.size();
   const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
   const double h = 0.25;
-  PerPhase measured(phases, std::vector<Vector3>(nodes, Vector3::Zero()));
-  std::vector<std::vector<Matrix3>> information(
-    phases, std::vector<Matrix3>(nodes, Matrix3::Zero()));
-  this->Likeness.assign(phases, std::vector<double>(nodes, 0.0));
+  PerPhase measured(phases);
+  std::vector<std::vector<Matrix3>> information(phases);
+  this->Likeness.assign(phases, {});
   const std::size_t samples = this->Core.places.size();
   // What is expected to be seen of a node.
   struct Sight
@@ -935,6 +996,13 @@ void Tracker::Align(double robustScale, double progressFrom)
   std::vector<Sight> sights(nodes);
   for (std::size_t k = 0; k < phases; ++k)
   {
+    if (!this->Own[k])
+    {
+      continue;
+    }
+    measured[k].assign(nodes, Vector3::Zero());
+    information[k].assign(nodes, Matrix3::Zero());
+    this->Likeness[k].assign(nodes, 0.0);
     std::vector<Matrix3> expectedCurvature(nodes, Matrix3::Zero());
     std::vector<int> averaged(nodes, 1);
     const auto part = [&](double from, double to)
@@ -1099,6 +1167,9 @@ void Tracker::Align(double robustScale, double progressFrom)
       },
       part(0.5, 1.0));
   }
+  ShareLists(this->Ranks, measured);
+  ShareLists(this->Ranks, information);
+  ShareLists(this->Ranks, this->Likeness);
   Seen seen{ std::move(measured), std::move(information), robustScale };
   this->Fit(this->WithSurroundings(seen));
   this->Vessels = std::move(seen);
@@ -1118,7 +1189,11 @@ std::vector<double> Tracker::MeasureCalibre() const
     double widening = 0.0;
     double information = 0.0;
   };
-  std::vector<std::vector<Estimate>> estimates(phases, std::vector<Estimate>(nodes));
+  std::vector<std::vector<Estimate>> estimates(phases);
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    estimates[k].resize(this->Own[k] ? nodes : 0);
+  }
   const std::vector<std::vector<int>> daughters = Daughters(this->Nodes);
   ParallelFor(static_cast<std::int64_t>(nodes), 4,
     [&](std::int64_t first, std::int64_t last)
@@ -1130,6 +1205,10 @@ std::vector<double> Tracker::MeasureCalibre() const
         const double radius = NodeRadius(this->Nodes, n);
         for (std::size_t k = 0; k < phases; ++k)
         {
+          if (!this->Own[k])
+          {
+            continue;
+          }
           // Where a vessel is smeared over several of its diameters nothing is left to be measured.
           const std::vector<Vector3> smear = this->Smear(n, this->Times[k]);
           const double smeared = (smear.back() - smear.front()).norm() / std::max(radius, 0.3);
@@ -1206,6 +1285,7 @@ std::vector<double> Tracker::MeasureCalibre() const
         }
       }
     });
+  ShareLists(this->Ranks, estimates);
   // A node alone is too noisy: the weighted median of all.
   std::vector<double> widening(phases, 0.0);
   std::vector<double> trust(phases, 0.0);
@@ -1391,7 +1471,7 @@ void CenterlineTrackingSettings::Validate() const
 PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
   const std::vector<double>& times, const std::function<ScalarImage(double time)>& imageAt,
   const CenterlineTrackingSettings& settings, CenterlineTrackingReport* report,
-  const ProgressCallback& progress)
+  const ProgressCallback& progress, RankGroup& ranks)
 {
   settings.Validate();
   CenterlineTrackingReport own;
@@ -1417,7 +1497,7 @@ PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
         "The times of the phases do not increase: number " + std::to_string(k));
     }
   }
-  Tracker tracker(lines, referenceTime, times, imageAt, settings, result, progress);
+  Tracker tracker(lines, referenceTime, times, imageAt, settings, result, progress, ranks);
   return tracker.Run();
 }
 }

@@ -10,6 +10,7 @@
 
 #include "ParallelFor.h"
 #include "PoseSequence.h"
+#include "RankGroup.h"
 #include "ScalarImage.h"
 #include "TrajectoryModel.h"
 
@@ -52,8 +53,8 @@ struct CenterlineTrackingReport
   int repeatedPhases = 0;            ///< how many such pairs
   std::vector<double> trackedShare;  ///< per phase: nodes that were tracked
   std::vector<std::string> warnings; ///< one sentence each
-  std::int64_t keptBytes = 0;        ///< of images
-  int imagesRead = 0;
+  std::int64_t keptBytes = 0;        ///< of images, by this rank
+  int imagesRead = 0;                ///< by this rank
 };
 
 /**
@@ -61,14 +62,18 @@ struct CenterlineTrackingReport
  * @param referenceTime  of the lines, fraction of R-R
  * @param times          of the phases to track, strictly increasing
  * @param imageAt        gives the image of a time; one that was given before need not stay
+ * @param ranks          the phases are dealt out to them: each reads, keeps and measures its own, and the reference.
+ *   All get the whole result, bit by bit that of one. The wide search of a phase begins where a phase before it
+ *   ended, so that two phases at a time are searched, whatever the number of ranks.
  * @return positions at `times`, with confidence, status and calibre
  * @throws std::invalid_argument naming a setting or what is wrong with the lines, times or images;
- * std::runtime_error: the lines were found in none of the phases; Cancelled; what imageAt throws
+ * std::runtime_error: the lines were found in none of the phases; Cancelled; what imageAt throws, and
+ * RankGroup::Gather
  */
 PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
   const std::vector<double>& times, const std::function<ScalarImage(double time)>& imageAt,
   const CenterlineTrackingSettings& settings = {}, CenterlineTrackingReport* report = nullptr,
-  const ProgressCallback& progress = {});
+  const ProgressCallback& progress = {}, RankGroup& ranks = RankGroup::Alone());
 }
 
 #endif

@@ -432,7 +432,8 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
     "The reference time " + std::to_string(data.Reference) +
       " is none of the time steps of the series");
   data.Poses = coronary::TrackCenterlines(data.Lines, data.Reference, times, imageAt, settings,
-    &data.Report, vtkCoronary::ProgressOf(this));
+    &data.Report, vtkCoronary::ProgressOf(this),
+    this->Ranks != nullptr ? *this->Ranks : coronary::RankGroup::Alone());
   ++data.Trackings;
   data.Known = true;
   data.KnownOf = this->GetMTime();

@@ -56,6 +56,11 @@
 #include <string> // for std::string
 #include <vector> // for std::vector
 
+namespace coronary
+{
+class RankGroup;
+}
+
 class VTKCORONARYMOTION_EXPORT vtkCenterlineTracker : public vtkPolyDataAlgorithm
 {
 public:
@@ -189,6 +194,17 @@ public:
   vtkGetMacro(StrainArrayName, std::string);
   ///@}
 
+#ifndef __VTK_WRAP__
+  /**
+   * Processes that track together: each reads and measures its share of the phases, and all have the same output.
+   * All have to be asked for it. Not owned; null (default): this process alone.
+   */
+  void SetRanks(coronary::RankGroup* ranks)
+  {
+    this->Ranks = ranks;
+  }
+#endif
+
   /// For tests: how often the series was read.
   int GetNumberOfTrackings() const;
 
@@ -227,6 +243,7 @@ private:
   std::string CalibreArrayName;
   std::string DisplacementArrayName;
   std::string StrainArrayName;
+  coronary::RankGroup* Ranks = nullptr;
   struct Internals;
   std::unique_ptr<Internals> Data;
 };

@@ -718,6 +718,193 @@ check_libraries() {
     && fail "the program needs libraries that it should not"
 }
 
+# Several processes, as mpirun starts them: as root, and more than there are cores.
+on_ranks() {
+  ranks=$1
+  expected=$2
+  shift 2
+  OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1 \
+    OMPI_MCA_btl_vader_single_copy_mechanism=none OMPI_MCA_orte_execute_quiet=1 OMPI_MCA_hwloc_base_binding_policy=none \
+    timeout 120 mpirun -q -np "$ranks" "$program" "$@" >stdout 2>stderr
+  code=$?
+  if [ "$code" -ne "$expected" ]; then
+    fail "'$*' on $ranks ranks: exit code $code instead of $expected"
+    cat stdout stderr
+  fi
+}
+
+# The report of a run without what is different every time, and other folders' names.
+plain_report() {
+  sed -E 's/"(seconds|cpu_seconds|peak_memory_mb)": [0-9.e+-]*/"\1": 0/; s/"(run|started)": "[^"]*"/"\1": ""/;
+    s/"output": "[^"]*"/"output": ""/' "$1/report.json"
+}
+
+check_ranks() {
+  command -v mpirun >/dev/null || exit 125
+  # shellcheck disable=SC2086
+  run 0 phantom --quiet --seed 2 --phases 5 --spacing 1.2 $coarse --output series
+  for ranks in 1 2 4; do
+    on_ranks "$ranks" 0 run series/series.json --quiet --scales 0.7 2.5 --edges 0.4 0.8 --threads 1 --output "run$ranks"
+    on_ranks "$ranks" 0 sequence run1 --phases 5 --formats series,simvascular,vmtk --velocity --quiet --output "sequence$ranks"
+    on_ranks "$ranks" 0 evaluate --result run1 --truth series --no-pictures --quiet --output "table$ranks"
+    plain_report "run$ranks" >"report$ranks"
+  done
+  for ranks in 2 4; do
+    expect_same_results run1 "run$ranks" "run on $ranks ranks gives other files"
+    diff report1 "report$ranks" || fail "run on $ranks ranks gives another report"
+    diff -rq sequence1 "sequence$ranks" || fail "sequence on $ranks ranks gives other files"
+    diff -rq table1 "table$ranks" || fail "evaluate on $ranks ranks gives other files"
+  done
+  [ "$(find run1/motion -name 'surface_0*.vtp' | wc -l)" = 5 ] || fail "not all phases: $(ls run1/motion)"
+  [ "$(grep -c '"interpolated"' table1/table1.json)" = 5 ] || fail "not all phases in the table"
+
+  # The first rank alone speaks.
+  on_ranks 2 0 run --print-settings x
+  [ "$(grep -c '"until"' stdout)" = 1 ] || fail "not one rank printed: $(cat stdout)"
+  on_ranks 2 2 run --no-such-option
+  expect_one_line "coronary-pipeline run" "no-such-option"
+  on_ranks 2 2 phantom --output other
+  expect_one_line "coronary-pipeline phantom" "without mpirun"
+}
+
+check_ranks_failures() {
+  command -v mpirun >/dev/null || exit 125
+  # shellcheck disable=SC2086
+  run 0 phantom --quiet --seed 2 --phases 5 --spacing 1.2 $coarse --output series
+  on_ranks 2 0 run series/series.json --quiet --scales 0.7 2.5 --edges 0.4 0.8 --until weights --time 0 --output result
+  before=$(cat result/*.vtp result/*.vtu | cksum)
+  # A phase that only one of the ranks reads, whichever it is.
+  for phase in 1 2 3; do
+    cp -r series damaged
+    head -c 3000 series/phase_0$phase.mha >damaged/phase_0$phase.mha
+    on_ranks 2 1 run damaged/series.json --quiet --scales 0.7 2.5 --edges 0.4 0.8 --time 0 --output broken
+    expect_one_line "coronary-pipeline run" "phase_0$phase.mha"
+    rm -r damaged
+    [ -z "$(find broken -name '.*' -mindepth 1)" ] || fail "hidden files are left: $(find broken)"
+  done
+  cp -r series/truth truth
+  head -c 500 truth/surface_01.vtp >cut.vtp
+  mv cut.vtp truth/surface_01.vtp
+  on_ranks 3 1 evaluate --result series --truth truth --no-pictures --quiet --output tables
+  expect_one_line "coronary-pipeline evaluate" "surface_01.vtp"
+  expect_nothing_in tables
+  [ "$before" = "$(cat result/*.vtp result/*.vtu | cksum)" ] || fail "the other result changed"
+
+  # One rank is asked to end: all do.
+  on_ranks 2 143 run series/series.json --quiet --scales 0.7 2.5 --edges 0.2 0.8 --output stopped &
+  waiting=$!
+  sleep 3
+  ranks=$(pgrep -f "^$program run series/series.json --quiet --scales 0.7 2.5 --edges 0.2 0.8 --output stopped" | tail -n 1)
+  kill -TERM "$ranks"
+  wait "$waiting"
+  grep -q "interrupted" stderr || fail "not interrupted: $(cat stderr)"
+}
+
+check_cohort() {
+  mkdir own
+  # shellcheck disable=SC2086
+  run 0 phantom --quiet --seed 3 --phases 3 --spacing 1.2 $coarse --output own/p3
+  head -c 3000 own/p3/phase_01.mha >own/cut.mha
+  mkdir own/bad
+  cp -r own/p3/* own/bad
+  mv own/cut.mha own/bad/phase_01.mha
+  cat >cases.json <<'JSON'
+{ "run": { "scales": [0.7, 2.5], "edges": [0.4, 0.8] },
+  "cases": [
+    { "name": "given", "input": "own/p3/series.json", "truth": "own/p3" },
+    { "name": "bad", "input": "own/bad/series.json", "truth": "own/p3", "run": { "tracked": "even" } },
+    { "name": "made", "phantom": { "seed": 2, "phases": 3, "spacing": 1.2, "surface_spacing": 1.5 } },
+    { "name": "slow", "phantom": { "seed": 4, "phases": 3, "spacing": 0.5 }, "time_limit": 0.3 } ] }
+JSON
+  run 0 cohort cases.json --output never --dry-run
+  [ "$(grep -c 'is to be done' stdout)" = 4 ] || fail "--dry-run: $(cat stdout)"
+  [ ! -e never ] || fail "--dry-run wrote"
+
+  run 1 cohort cases.json --output one --no-pictures
+  expect_text stderr "2 of 4 cases failed: bad, slow"
+  grep -q '"message": ".*phase_01.mha' one/cohort.json || fail "cohort.json: $(cat one/cohort.json)"
+  expect_text one/cohort.json "after the time limit of 0.3 s"
+  [ "$(grep -c '"state": "done"' one/cohort.json)" = 2 ] || fail "$(cat one/cohort.json)"
+  for file in table1.csv table1.tex table1.json report.html; do
+    grep -q made one/evaluation/$file || fail "no made in $file"
+    grep -q given one/evaluation/$file || fail "no given in $file"
+    grep -q slow one/evaluation/$file && fail "slow in $file"
+  done
+
+  # Nothing is done twice; what failed only when it is asked for.
+  cp -r one/evaluation first
+  run 1 cohort cases.json --output one --no-pictures
+  [ "$(wc -l <stderr)" = 1 ] || fail "something was done again: $(cat stderr)"
+  cmp first/table1.json one/evaluation/table1.json || fail "other tables"
+  run 1 cohort cases.json --output one --no-pictures --retry-failed
+  grep -q '^\[2/2\]' stderr || fail "not both failed ones again: $(cat stderr)"
+
+  # Killed in the midst, and gone on with: the same tables.
+  "$program" cohort cases.json --output killed --no-pictures --quiet &
+  cohort=$!
+  for _ in $(seq 600); do
+    [ -e killed/given/run/report.json ] && break
+    sleep 0.1
+  done
+  kill -KILL "$cohort"
+  wait "$cohort" 2>/dev/null
+  run 1 cohort cases.json --output killed --no-pictures
+  for file in table1.csv table1.tex table1.json branches.csv; do
+    cmp one/evaluation/$file killed/evaluation/$file || fail "$file is not what it is without the kill"
+  done
+
+  # In parts, two at a time, and on ranks.
+  run 0 cohort cases.json --output parts --part 1 2 --no-pictures --quiet
+  [ ! -e parts/cohort.json ] || fail "a part wrote the list"
+  run 1 cohort cases.json --output parts --no-pictures --jobs 2
+  cmp one/evaluation/table1.csv parts/evaluation/table1.csv || fail "other tables in parts"
+  if command -v mpirun >/dev/null; then
+    on_ranks 2 1 cohort cases.json --output ranks --no-pictures
+    cmp one/evaluation/table1.csv ranks/evaluation/table1.csv || fail "other tables on ranks"
+    expect_text stderr "on rank 1"
+  fi
+
+  # Another setting is another case.
+  sed 's/"seed": 2/"seed": 5/' cases.json >other.json
+  run 0 cohort other.json --output one --dry-run
+  expect_text stdout "made: is to be done: its settings or files have changed"
+  expect_text stdout "given: is done"
+}
+
+check_cohort_input() {
+  mkdir there
+  echo x >there/image.mha
+  for wrong in '{}/cases' '{ "cases": [] }/cases' '{ "case": [] }/case' \
+    '{ "cases": [ { "name": "a" } ] }/cases[0]' \
+    '{ "cases": [ { "input": "there" } ] }/cases[0].name' \
+    '{ "cases": [ { "name": "a|b", "input": "there" } ] }/cases[0].name' \
+    '{ "cases": [ { "name": "..", "input": "there" } ] }/cases[0].name' \
+    '{ "cases": [ { "name": "evaluation", "input": "there" } ] }/cases[0].name' \
+    '{ "cases": [ { "name": "a", "input": "there" }, { "name": "a", "input": "there" } ] }/cases[1].name' \
+    '{ "cases": [ { "name": "a", "input": "nowhere" } ] }/cases[0].input' \
+    '{ "cases": [ { "name": "a", "input": ["there", 1] } ] }/cases[0].input[1]' \
+    '{ "cases": [ { "name": "a", "input": "there", "thruth": "there" } ] }/cases[0].thruth' \
+    '{ "cases": [ { "name": "a", "input": "there", "truth": "nowhere" } ] }/cases[0].truth' \
+    '{ "cases": [ { "name": "a", "input": "there", "run": { "scals": 1 } } ] }/cases[0].run' \
+    '{ "cases": [ { "name": "a", "input": "there", "run": { "threads": 1 } } ] }/cases[0].run.threads' \
+    '{ "cases": [ { "name": "a", "phantom": { "sed": 1 } } ] }/cases[0].phantom' \
+    '{ "cases": [ { "name": "a", "phantom": { "spacing": 1000 } } ] }/cases[0].phantom' \
+    '{ "cases": [ { "name": "a", "phantom": {}, "time_limit": 0 } ] }/cases[0].time_limit' \
+    '{ "cases": [ { "name": "a", "phantom": {} } ], "evaluate": { "clip": true } }/evaluate'; do
+    echo "${wrong%/*}" >wrong.json
+    run 1 cohort wrong.json --output result
+    expect_one_line "coronary-pipeline cohort" "cohort.$(echo "${wrong##*/}" | sed 's/[][]/./g')"
+  done
+  echo '{' >wrong.json
+  run 1 cohort wrong.json --output result
+  expect_one_line "coronary-pipeline cohort" "'wrong.json' is not JSON"
+  run 1 cohort nowhere.json --output result
+  expect_one_line "coronary-pipeline cohort" "nowhere.json"
+  run 2 cohort wrong.json --output result --part 3 2
+  expect_one_line "coronary-pipeline cohort" "--part"
+  [ ! -e result ] || fail "a folder was made for nothing"
+}
+
 "check_$case"
 if [ "$failures" -gt 0 ]; then
   echo "$failures check(s) failed"

@@ -7,6 +7,7 @@
 #include "LineNodes.h"
 #include "Refusals.h"
 #include "SparseVolume.h"
+#include "ThreadRanks.h"
 #include "TrajectoryModel.h"
 #include "VesselImage.h"
 
@@ -622,6 +623,60 @@ TEST(CenterlineTracking, FollowsImagesOfVesselsAlone)
     EXPECT_LT(mean, 0.3) << "phase " << k;
     EXPECT_GT(report.trackedShare[k], 0.8);
   }
+}
+
+TEST(CenterlineTracking, IsTheSameOnRanks)
+{
+  const MovingLines lines = Fork();
+  const std::vector<double> times = { 0.0, 0.15, 0.3, 0.5, 0.7, 0.9 };
+  CenterlineTrackingSettings settings;
+  settings.tissue = false;
+  settings.cycleLength = 1.0;
+  const auto track = [&](RankGroup& ranks, double damaged, CenterlineTrackingReport& report)
+  {
+    VesselImage image;
+    return TrackCenterlines(
+      lines, 0.0, times,
+      [&](double t)
+      {
+        if (t == damaged)
+        {
+          throw std::runtime_error("damaged");
+        }
+        image = Moved(Way(t));
+        return image.View();
+      },
+      settings, &report, {}, ranks);
+  };
+  CenterlineTrackingReport report;
+  const PoseSequence alone = track(RankGroup::Alone(), -1.0, report);
+  for (const int size : { 2, 8 })
+  {
+    std::vector<PoseSequence> poses(static_cast<std::size_t>(size));
+    std::vector<CenterlineTrackingReport> reports(poses.size());
+    const std::vector<std::string> failures = ThreadRanks::Run(size,
+      [&](RankGroup& ranks) { poses[ranks.Rank()] = track(ranks, -1.0, reports[ranks.Rank()]); });
+    for (int rank = 0; rank < size; ++rank)
+    {
+      ASSERT_EQ(failures[rank], "");
+      EXPECT_EQ(poses[rank].points, alone.points);
+      EXPECT_EQ(poses[rank].confidence, alone.confidence);
+      EXPECT_EQ(poses[rank].status, alone.status);
+      EXPECT_EQ(poses[rank].calibre, alone.calibre);
+      EXPECT_EQ(reports[rank].trackedShare, report.trackedShare);
+      // The reference and its share, whatever it needed again.
+      EXPECT_LT(reports[rank].imagesRead, report.imagesRead);
+    }
+  }
+  // One that fails does not leave the others waiting.
+  const std::vector<std::string> failures = ThreadRanks::Run(2,
+    [&](RankGroup& ranks)
+    {
+      CenterlineTrackingReport own;
+      track(ranks, 0.3, own);
+    });
+  EXPECT_TRUE((failures == std::vector<std::string>{ "damaged", "another rank failed" }) ||
+    (failures == std::vector<std::string>{ "another rank failed", "damaged" }));
 }
 
 namespace
