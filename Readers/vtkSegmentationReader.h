@@ -2,13 +2,16 @@
  * @class vtkSegmentationReader
  * @brief Reads segmentations of 3D Slicer (.seg.nrrd), or label maps, as masks: one file a cardiac phase.
  *
- * Output, vtkImageData: point scalars `VesselMask` (unsigned char, 0 or 1), the union of the wanted segments; field data
+ * @par Output:
+ * vtkImageData. Point data `VesselMask` (unsigned char, 0 or 1, the scalars, the union of the wanted segments). Field data
  * `PhaseTime` (double, R-R fraction of the phase). All phases have the voxels of the first file: masks on other voxels
  * are brought onto these (see coronary::ResampleMask), with a warning when a part of them lies outside.
  *
+ * @par Time:
  * Pipeline time is the fraction of the R-R interval; a requested time is answered with the nearest phase, the earlier one of
  * two at the same distance. Without a requested time the first phase is read. World coordinates are LPS millimetres.
  *
+ * @par Failure:
  * Wrong or damaged input gives one error that names the file, and no output.
  *
  * @sa coronary::SegmentationFile, vtkGatedImageReader

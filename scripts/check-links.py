@@ -8,8 +8,6 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-# Pages that other branches bring; without them the links to them are left alone.
-COMING = {"docs/paraview.md", "docs/cluster.md", "docs/exchange.md", "docs/hardening.md"}
 SKIPPED = {"build", "demo-output", "validation-output", ".git"}
 
 
@@ -58,8 +56,6 @@ def check_links(pages, complaints):
                 continue
             path, _, anchor = target.partition("#")
             path = os.path.normpath(os.path.join(os.path.dirname(page), path)) if path else page
-            if path in COMING and not os.path.exists(os.path.join(ROOT, path)):
-                continue
             if not os.path.exists(os.path.join(ROOT, path)):
                 complaints.append("%s: %s is not there" % (page, target))
                 continue
