@@ -43,7 +43,7 @@ coronary-pipeline --version
 coronary-pipeline phantom --seed 1 --phases 3 --spacing 0.8 --output phantom --quiet
 coronary-pipeline run phantom/series.json --output run --quiet
 coronary-pipeline evaluate --result run --truth phantom --no-pictures --output evaluation | tail -n 3
-coronary-simulator --headless --scenario phantom-lca --output session --duration 0.2 >/dev/null
+coronary-simulator --headless --scenario phantom-lca --output session --ticks 400 >/dev/null
 coronary-device-emulator --help >/dev/null
 
 cat >autoload.py <<'PYTHON'
