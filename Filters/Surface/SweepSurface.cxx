@@ -28,6 +28,10 @@ constexpr double GreatestSmoothing = 4.0; ///< of the axes, radii
 constexpr double LeastBlending = 0.1;
 constexpr int FaultReliefs = 2;    ///< times that faults of the finished mesh are relieved
 constexpr double FaultReach = 4.0; ///< of such a relief, in radii
+constexpr int Sweeps = 64;         ///< at most, with what each one could not mesh relieved
+/// Below, the areas of triangles vanish in what the angles are made of; mm.
+constexpr double LeastRadius = 1e-6;
+constexpr double MostTriangles = 2e7;
 
 double EdgeLength(const SweepSettings& settings, double curvature, double radius)
 {
@@ -37,6 +41,42 @@ double EdgeLength(const SweepSettings& settings, double curvature, double radius
   // Where the wall is more bent than the vessel is thin, its own radius counts.
   const double bend = std::max(1.0 / curvature, 0.12 * radius);
   return std::min(h, settings.edgeLengthPerRadius * std::min(radius, bend));
+}
+
+/// A wall too fine or too large for any mesh: wrong units, mostly. The branches are checked already.
+void CheckSize(const SweepTree& tree, const SweepSettings& settings)
+{
+  double triangles = 0.0;
+  for (const SweepBranch& branch : tree.branches)
+  {
+    for (std::size_t i = 0; i < branch.points.size(); ++i)
+    {
+      const std::int64_t p = branch.points[i];
+      const double radius = tree.radius[p];
+      if (radius < LeastRadius)
+      {
+        std::ostringstream text;
+        text << "SweepVesselTree: radius " << radius << " mm at point " << p << ", it must be "
+             << LeastRadius << " mm or more";
+        throw std::invalid_argument(text.str());
+      }
+      if (i > 0)
+      {
+        const double edge = EdgeLength(settings, 1.0 / radius, radius);
+        const double length = (tree.points[p] - tree.points[branch.points[i - 1]]).norm();
+        triangles += 2.0 * Pi * radius * length / (std::sqrt(3.0) / 4.0 * edge * edge);
+      }
+    }
+  }
+  if (!(triangles <= MostTriangles))
+  {
+    std::ostringstream text;
+    text.precision(3);
+    text << "SweepVesselTree: the wall needs about " << triangles << " triangles, at most "
+         << MostTriangles << " are possible; lengths are in mm, maximumEdgeLength is "
+         << settings.maximumEdgeLength << " mm";
+    throw std::invalid_argument(text.str());
+  }
 }
 
 /// The swept wall as the remesher sees it.
@@ -666,7 +706,8 @@ SweptSurface SweepVesselTree(
   Reliefs reliefs;
   SweptSurface best;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (int faulty = 0;;)
+  int faulty = 0;
+  for (int sweep = 1;; ++sweep)
   {
     std::vector<Fault> faults;
     try
@@ -709,7 +750,7 @@ SweptSurface SweepVesselTree(
     {
       for (const JunctionFailure& place : unresolved.places)
       {
-        if (reliefs.Add(place.centre, place.reach, settings, place.what()))
+        if (sweep < Sweeps && reliefs.Add(place.centre, place.reach, settings, place.what()))
         {
           continue;
         }
@@ -717,7 +758,7 @@ SweptSurface SweepVesselTree(
         {
           return best; // with few faults, which is better than without a branch
         }
-        if (place.thinnestEnd < 0 ||
+        if (sweep >= Sweeps || place.thinnestEnd < 0 ||
           std::any_of(reliefs.leftOut.begin(), reliefs.leftOut.end(),
             [&](const SweepOmission& omission) { return omission.end == place.thinnestEnd; }))
         {
@@ -748,6 +789,7 @@ SweptSurface SweepOnce(const SweepTree& tree, const SweepSettings& settings, con
     return [&progress, from, to](double f) { return progress(from + (to - from) * f); };
   };
   SweptLumen lumen(tree, settings, reliefs.places, reliefs.leftOut);
+  CheckSize(tree, settings);
   lumen.SetEdgeRetreat(BluntRetreat);
   Report(progress, 0.05);
   result.remarks = lumen.Remarks();

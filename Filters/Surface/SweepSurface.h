@@ -105,7 +105,8 @@ struct SweptSurface
 };
 
 /**
- * @throws std::invalid_argument  naming the setting, or the branch and point that is wrong
+ * @throws std::invalid_argument  naming the setting, or the branch and point that is wrong; when a
+ *                                radius is below 1e-6 mm or the wall needs over 2e7 triangles
  *         std::runtime_error     when some junction cannot be resolved nor left out, naming it
  *         Cancelled
  */

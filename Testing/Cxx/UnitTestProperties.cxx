@@ -396,6 +396,17 @@ TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
     change(tree);
     return tree;
   };
+  // Of a branched tree, whose junction has to be meshed too.
+  const auto scaled = [](double factor)
+  {
+    SweepTree tree = SweepInput(BuildTopology(RandomTree(1)));
+    for (std::size_t p = 0; p < tree.points.size(); ++p)
+    {
+      tree.points[p] *= factor;
+      tree.radius[p] *= factor;
+    }
+    return tree;
+  };
   const std::map<std::string, SweepTree> trees = {
     { "good", good },
     { "nothing", {} },
@@ -409,6 +420,44 @@ TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
     { "all the same",
       changed([](SweepTree& t) { t.points.assign(t.points.size(), Vector3(1, 2, 3)); }) },
     { "a point twice", changed([](SweepTree& t) { t.points[2] = t.points[1]; }) },
+    { "tiny", scaled(1e-9) },
+    { "small", scaled(1e-6) },
+    { "huge", scaled(1e9) },
+    { "beyond", scaled(1e300) },
+    { "doubled",
+      changed(
+        [](SweepTree& t)
+        {
+          t.points.insert(t.points.end(), t.points.begin(), t.points.end());
+          t.radius.assign(8, 1.0);
+          t.branches.push_back({ { 4, 5, 6, 7 }, 1 });
+        }) },
+    { "a side branch within the trunk",
+      changed(
+        [](SweepTree& t)
+        {
+          t.points.insert(t.points.end(), { { 0.1, 0, 4 }, { 0.2, 0, 6 }, { 0.3, 0, 9 } });
+          t.radius.assign(7, 1.0);
+          t.branches.push_back({ { 1, 4, 5, 6 }, 1 });
+        }) },
+    { "two branches one on the other",
+      changed(
+        [](SweepTree& t)
+        {
+          t.points.insert(
+            t.points.end(), { { 0, 0, 8 }, { 0, 0, 10 }, { 0, 0, 7.5 }, { 0, 0, 11 } });
+          t.radius.assign(8, 1.0);
+          t.branches.push_back({ { 3, 4, 5 }, 1 });
+          t.branches.push_back({ { 3, 6, 7 }, 2 });
+        }) },
+    { "back into the trunk",
+      changed(
+        [](SweepTree& t)
+        {
+          t.points.insert(t.points.end(), { { 0, 0, 3 }, { 0, 0, 1 } });
+          t.radius.assign(6, 1.0);
+          t.branches.push_back({ { 3, 4, 5 }, 1 });
+        }) },
   };
   for (const auto& [name, tree] : trees)
   {
