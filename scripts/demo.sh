@@ -51,7 +51,7 @@ mkdir -p build/logs "$output"
 
 if [ "$install" = yes ]; then
   echo "== Packages"
-  scripts/install-dependencies.sh --tree paraview
+  scripts/install-dependencies.sh --tree paraview --no-tests
 fi
 
 echo "== Building (log: build/logs/demo-build.log)"

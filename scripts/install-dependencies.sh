@@ -5,9 +5,10 @@ set -euo pipefail
 
 usage() {
   cat <<'EOF'
-Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--developer]
+Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--no-tests] [--developer]
   --check      change nothing; name what is missing and exit 1, exit 0 when all is there
   --tree TREE  packages of one tree only (both without this option)
+  --no-tests   without the browser and what else only tests use
   --developer  clang, valgrind, clang-tidy, shellcheck and ITK (the benchmarks compare with it) as well
 Runs as root, or through sudo. Run again, it changes nothing.
 EOF
@@ -18,10 +19,9 @@ common=(
   libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev
   libcgal-dev libxrl-dev
   libfreetype-dev libgif-dev libglew-dev libx11-dev
-  libgtest-dev clang-format-14 xvfb xauth chromium
+  libgtest-dev clang-format-14 xvfb xauth
   dpkg-dev file
   pkg-config libevdev-dev libopenigtlink-dev
-  nodejs curl ca-certificates
 )
 paraview=(
   paraview-dev python3-paraview
@@ -33,11 +33,14 @@ vtk=(
   libtbb-dev libjsoncpp-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libopenmpi3
   libpng16-16 libtiff6 patchelf
 )
+# For tests that skip without them.
+tests=(chromium nodejs curl ca-certificates)
 developer=(clang libclang-rt-14-dev valgrind clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev plastimatch)
 
 check_only=no
 tree=all
 with_developer=no
+with_tests=yes
 while [ $# -gt 0 ]; do
   case "$1" in
     --check) check_only=yes ;;
@@ -46,6 +49,7 @@ while [ $# -gt 0 ]; do
       shift || true
       ;;
     --tree=*) tree="${1#*=}" ;;
+    --no-tests) with_tests=no ;;
     --developer) with_developer=yes ;;
     -h | --help)
       usage
@@ -69,6 +73,9 @@ case "$tree" in
     exit 2
     ;;
 esac
+if [ "$with_tests" = yes ]; then
+  wanted+=("${tests[@]}")
+fi
 if [ "$with_developer" = yes ]; then
   wanted+=("${developer[@]}")
 fi

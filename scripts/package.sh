@@ -42,7 +42,7 @@ fi
 exec </dev/null
 cd "$root"
 if [ "$install" = yes ]; then
-  scripts/install-dependencies.sh --tree paraview
+  scripts/install-dependencies.sh --tree paraview --no-tests
 fi
 mkdir -p build/logs
 log="$root/build/logs/package.log"

@@ -44,7 +44,7 @@ cd "$root"
 mkdir -p build/logs
 if [ "$install" = yes ]; then
   echo "== Packages"
-  scripts/install-dependencies.sh --tree paraview </dev/null
+  scripts/install-dependencies.sh --tree paraview --no-tests </dev/null
 fi
 echo "== Building (log: build/logs/simulate-build.log)"
 if ! { cmake --preset paraview && cmake --build --preset paraview -j "$jobs" --target coronary-simulator; } \
