@@ -20,7 +20,7 @@ common=(
   libcgal-dev libxrl-dev
   libfreetype-dev libgif-dev libglew-dev libx11-dev
   libgtest-dev clang-format-14 xvfb xauth
-  dpkg-dev file
+  dpkg-dev file python3
   pkg-config libevdev-dev libopenigtlink-dev
 )
 paraview=(
