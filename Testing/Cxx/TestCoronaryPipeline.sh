@@ -774,11 +774,11 @@ check_ranks() {
 check_ranks_failures() {
   command -v mpirun >/dev/null || exit 125
   # shellcheck disable=SC2086
-  run 0 phantom --seed 2 $moving --output series
+  run 0 phantom --seed 2 $moving --compress --output series
   # A phase that only one of the ranks reads, whichever it is; the reference is the last one.
   for phase in 0 1; do
     cp -r series damaged
-    head -c 3000 series/phase_0$phase.mha >damaged/phase_0$phase.mha
+    printf damaged | dd of="damaged/phase_0$phase.mha" bs=1 seek=30000 conv=notrunc 2>dd.txt
     # shellcheck disable=SC2086
     on_ranks 2 1 run damaged/series.json $quick --time 1.06 --output broken
     expect_one_line "coronary-pipeline run" "phase_0$phase.mha"
@@ -796,9 +796,9 @@ check_ranks_failures() {
 
   # One rank is asked to end: all do.
   # shellcheck disable=SC2086
-  on_ranks 2 143 run series/series.json $quick --edges 0.15 0.3 --output stopped &
+  on_ranks 2 143 run series/series.json $quick --contours --output stopped &
   waiting=$!
-  until_there stopped/surface.vtp
+  until_there stopped/weights.vtu
   kill -TERM "$(pgrep -f "^$program run series/series.json .*--output stopped" | tail -n 1)"
   wait "$waiting"
   grep -q "interrupted" stderr || fail "not interrupted: $(cat stderr)"
@@ -837,9 +837,10 @@ JSON
   "$program" cohort cases.json --output one --no-pictures >stdout 2>stderr &
   cohort=$!
   for _ in $(seq 2400); do
-    pkill -KILL -f "^coronary-pipeline run .*--output $work/one/made/run" && break
+    process=$(pgrep -f "^coronary-pipeline run .*--output $work/one/made/run") && break
     sleep 0.05
   done
+  kill -KILL "$process"
   wait "$cohort"
   [ $? = 1 ] || fail "cohort with failed cases: not exit code 1"
   expect_text stderr "3 of 4 cases failed: bad, made, slow"
