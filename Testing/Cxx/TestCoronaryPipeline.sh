@@ -809,7 +809,7 @@ check_ranks_failures() {
 until_there() {
   for _ in $(seq 1200); do
     [ ! -e "$1" ] || return
-    sleep 0.05
+    sleep 0.1
   done
   fail "no $1"
 }
@@ -836,9 +836,9 @@ JSON
   # One has a damaged image, one is too slow, the process of one is killed: the fourth has its table.
   "$program" cohort cases.json --output one --no-pictures >stdout 2>stderr &
   cohort=$!
-  for _ in $(seq 2400); do
+  for _ in $(seq 1000); do
     process=$(pgrep -f "^coronary-pipeline run .*--output $work/one/made/run") && break
-    sleep 0.05
+    sleep 0.2
   done
   kill -KILL "$process"
   wait "$cohort"
