@@ -1,5 +1,6 @@
 #include "MarkupsFile.h"
 
+#include "BoundedJson.h"
 #include "VolumeHeaderParsers.h"
 
 #include <nlohmann/json.hpp>
@@ -295,14 +296,15 @@ std::vector<Markup> ParseMarkups(const std::string& text, const std::string& nam
   Json root;
   try
   {
-    root = Json::parse(text);
+    root = ParseBoundedJson<Json>(text);
+  }
+  catch (const TooDeepJson& error)
+  {
+    FormatError(name, error.what());
   }
   catch (const Json::exception& error)
   {
-    const std::string reason = error.what();
-    const std::size_t bracket = reason.find("] ");
-    FormatError(name,
-      "is not valid JSON: " + (bracket == std::string::npos ? reason : reason.substr(bracket + 2)));
+    FormatError(name, "is not valid JSON: " + JsonReason(error));
   }
   if (!root.is_object() || !root.contains("markups") || !root["markups"].is_array())
   {

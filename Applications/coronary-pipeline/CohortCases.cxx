@@ -1,5 +1,6 @@
 #include "CohortCases.h"
 
+#include "BoundedJson.h"
 #include "Command.h"
 #include "Fnv1a.h"
 #include "RunReport.h"
@@ -11,6 +12,7 @@
 #include <fstream>
 #include <initializer_list>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 
 namespace coronary
@@ -273,11 +275,17 @@ Cohort ReadCohort(const std::string& path)
   Json json;
   try
   {
-    json = Json::parse(file);
+    std::ostringstream text;
+    text << file.rdbuf();
+    json = ParseBoundedJson<Json>(text.str());
+  }
+  catch (const TooDeepJson& error)
+  {
+    throw std::runtime_error("'" + path + "' " + error.what());
   }
   catch (const Json::exception& error)
   {
-    throw std::runtime_error("'" + path + "' is not JSON: " + error.what());
+    throw std::runtime_error("'" + path + "' is not JSON: " + JsonReason(error));
   }
   const std::string where = "'" + path + "': cohort";
   RequireKnown(json, { "cases", "run", "evaluate" }, where);

@@ -1,6 +1,7 @@
 #include "EvaluationRecord.h"
 
 #include "AtomicFile.h"
+#include "BoundedJson.h"
 #include "Fnv1a.h"
 
 #include <nlohmann/json.hpp>
@@ -62,7 +63,7 @@ EvaluationRecord EvaluationRecord::Of(const std::string& text)
 {
   try
   {
-    const Json json = Json::parse(text);
+    const Json json = ParseBoundedJson<Json>(text);
     EvaluationRecord record;
     std::size_t at = 0;
     for (const EvaluationColumn& column : EvaluationColumns())
@@ -86,7 +87,7 @@ EvaluationRecord EvaluationRecord::Of(const std::string& text)
   }
   catch (const std::exception& error)
   {
-    throw std::runtime_error(std::string("These are no measures of a phase: ") + error.what());
+    throw std::runtime_error("These are no measures of a phase: " + JsonReason(error));
   }
 }
 

@@ -285,7 +285,9 @@ public:
     std::vector<std::pair<int, int>> open{ { node, -1 } };
     while (!open.empty())
     {
-      const auto [at, from] = open.back();
+      // No structured binding: clang 14 lets no lambda capture one.
+      const int at = open.back().first;
+      const int from = open.back().second;
       open.pop_back();
       const auto go = [&](int next, int upper, int lower)
       {

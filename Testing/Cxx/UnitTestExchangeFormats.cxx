@@ -284,7 +284,8 @@ TEST(Markups, Hostile)
   refuse(MarkupsWith(", \"coordinateSystem\": \"XYZ\"", OnePoint), "coordinateSystem is \"XYZ\"");
   refuse(MarkupsWith(", \"coordinateSystem\": 2", OnePoint), "coordinateSystem is 2");
   refuse(MarkupsWith(", \"coordinateUnits\": \"inch\"", OnePoint), "coordinateUnits");
-  refuse(std::string(100000, '['), "not valid JSON");
+  refuse(std::string(100000, '['), "is nested more than 64 times");
+  refuse(std::string(100000, '[') + std::string(100000, ']'), "is nested more than 64 times");
   const std::string whole = MarkupsWith("", OnePoint);
   for (std::size_t size = 0; size < whole.size(); size += 3)
   {

@@ -6,16 +6,20 @@
 #include "CenterlineConversion.h"
 #include "DicomFile.h"
 #include "DicomStructure.h"
+#include "EvaluationRecord.h"
 #include "FileSeries.h"
 #include "FormatTestFiles.h"
 #include "GatedSeries.h"
+#include "MarkupsFile.h"
 #include "MatrixFile.h"
 #include "MeshFile.h"
 #include "MeshSequenceReport.h"
 #include "MesherMessage.h"
 #include "MetaImageWriter.h"
 #include "MovingModel.h"
+#include "SegmentationFile.h"
 #include "SeriesDescription.h"
+#include "SimVascularFile.h"
 #include "SkinWeightCache.h"
 #include "StlPlyFile.h"
 #include "VolumeFile.h"
@@ -560,6 +564,150 @@ std::vector<std::string> AppendedXmlSeeds()
     head.substr(0, 69) + R"( compressor="vtkZLibDataCompressor")" + head.substr(69) +
       "<AppendedData encoding=\"raw\">_" + packed + tail };
 }
+
+void CheckFinite(const std::vector<Vector3>& points)
+{
+  for (const Vector3& point : points)
+  {
+    Require(point.allFinite(), "a position that is no number");
+  }
+}
+
+void ReadMarkups(const std::string& bytes)
+{
+  const std::vector<Markup> markups = ParseMarkups(bytes, "curves.mrk.json");
+  for (const Markup& markup : markups)
+  {
+    for (const Markup::Point& point : markup.points)
+    {
+      Require(point.position.allFinite(), "a position that is no number");
+    }
+    for (const Markup::Measurement& measurement : markup.measurements)
+    {
+      Require(measurement.values.size() == markup.points.size(), "values that are no point's");
+    }
+  }
+}
+
+std::vector<std::string> MarkupsSeeds()
+{
+  Markup curve;
+  curve.name = "LAD";
+  curve.points.resize(2);
+  curve.points[1].label = "second";
+  curve.points[1].position = Vector3(1.0, 2.0, 3.0);
+  curve.measurements = { { "Radius", "mm", { 1.5, 1.25 } } };
+  return { MarkupsText({ curve }),
+    R"({"markups":[{"type":"Fiducial","coordinateSystem":"RAS","coordinateUnits":"um",)"
+    R"("controlPoints":[{"label":"a","position":[1,2,3]},{"positionStatus":"undefined"}]}]})" };
+}
+
+const std::string SegmentationHeader =
+  "NRRD0004\ntype: unsigned char\ndimension: 4\nspace: left-posterior-superior\n"
+  "sizes: 2 4 3 2\nspace directions: none (0.5,0,0) (0,0.5,0) (0,0,1)\n"
+  "kinds: list domain domain domain\nencoding: raw\nspace origin: (10,-20,5)\n"
+  "Segment0_ID:=Segment_1\nSegment0_Name:=Vessel\nSegment0_LabelValue:=1\n"
+  "Segment0_Layer:=0\nSegment0_Extent:=0 3 0 2 0 1\n"
+  "Segment1_ID:=Segment_2\nSegment1_Name:=Plaque\nSegment1_LabelValue:=2\n"
+  "Segment1_Layer:=1\nSegment1_Extent:=1 1 1 1 0 0\n\n";
+
+void ReadSegments(const std::string& bytes)
+{
+  for (const Segment& segment : ParseSegments(bytes, "mask.seg.nrrd"))
+  {
+    Require(segment.layer >= 0 && segment.value >= 0, "a segment without a layer or value");
+  }
+}
+
+std::vector<std::string> SegmentsSeeds()
+{
+  return { SegmentationHeader };
+}
+
+/// The mask of all segments.
+void ReadSegmentation(const std::string& bytes)
+{
+  const SegmentationFile file(FileWith("mask.seg.nrrd", bytes));
+  double count = 1.0;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    count *= file.Grid().extent[2 * axis + 1] + 1.0;
+  }
+  if (count * file.NumberOfLayers() > static_cast<double>(MostVoxels))
+  {
+    return;
+  }
+  const SegmentationMask mask = file.Mask({});
+  Require(static_cast<double>(mask.voxels.size()) == count, "a mask of another size");
+  Require(mask.count > 0, "a mask without voxels");
+}
+
+std::vector<std::string> SegmentationSeeds()
+{
+  std::string voxels(48, '\0');
+  voxels[0] = 1;
+  voxels[11] = 2;
+  return { SegmentationHeader + voxels };
+}
+
+void ReadSimVascularPath(const std::string& bytes)
+{
+  const SimVascularPath path = ParseSimVascularPath(bytes, "path.pth");
+  Require(!path.points.empty(), "a path without points");
+  CheckFinite(path.controlPoints);
+  for (const PathFrame& frame : path.points)
+  {
+    CheckFinite({ frame.position, frame.tangent, frame.rotation });
+  }
+}
+
+std::vector<std::string> SimVascularPathSeeds()
+{
+  SimVascularPath path;
+  path.controlPoints = { Vector3(0, 0, 0), Vector3(1, 0.5, 2) };
+  path.points = { { 0, Vector3(0, 0, 0), Vector3::UnitZ(), Vector3::UnitX() },
+    { 1, Vector3(1, 0.5, 2), Vector3::UnitZ(), Vector3::UnitX() } };
+  return { SimVascularPathText(path) };
+}
+
+void ReadSimVascularContours(const std::string& bytes)
+{
+  const SimVascularContourGroup group = ParseSimVascularContours(bytes, "group.ctgr");
+  for (const SimVascularContour& contour : group.contours)
+  {
+    CheckFinite(contour.controlPoints);
+    CheckFinite(contour.contourPoints);
+    Require(contour.Radius() >= 0.0, "a radius that is none");
+  }
+}
+
+std::vector<std::string> SimVascularContourSeeds()
+{
+  SimVascularContour contour;
+  contour.type = "Circle";
+  contour.contourPoints = { Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(-1, -1, 0) };
+  contour.controlPoints = { Vector3(0, 0, 0), Vector3(1, 0, 0) };
+  SimVascularContourGroup group;
+  group.pathName = "a <&> b";
+  group.contours = { contour };
+  return { SimVascularContourText(group) };
+}
+
+/// What is taken is written as it was read.
+void ReadEvaluationRecord(const std::string& bytes)
+{
+  const std::string text = EvaluationRecord::Of(bytes).Text();
+  Require(EvaluationRecord::Of(text).Text() == text, "a record that changes when it is written");
+}
+
+std::vector<std::string> EvaluationRecordSeeds()
+{
+  EvaluationRecord record;
+  record.branches.resize(1);
+  record.branches[0].label = "LAD";
+  record.warnings = { "a mask without voxels" };
+  return { EvaluationRecord().Text(), record.Text() };
+}
 }
 
 std::vector<Harness> FormatHarnesses()
@@ -588,6 +736,12 @@ std::vector<Harness> FormatHarnesses()
     { "mesher-message", ReadMesherMessages, MesherSeeds },
     { "appended-xml", ReadAppendedXml, AppendedXmlSeeds },
     { "xml-check", CheckXml, AppendedXmlSeeds },
+    { "markups", ReadMarkups, MarkupsSeeds },
+    { "segments", ReadSegments, SegmentsSeeds },
+    { "segmentation", ReadSegmentation, SegmentationSeeds },
+    { "simvascular-path", ReadSimVascularPath, SimVascularPathSeeds },
+    { "simvascular-contours", ReadSimVascularContours, SimVascularContourSeeds },
+    { "evaluation-record", ReadEvaluationRecord, EvaluationRecordSeeds },
   };
 }
 }
