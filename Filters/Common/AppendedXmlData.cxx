@@ -159,6 +159,9 @@ private:
   Layout How;
 };
 
+/// Base64 needs 4 characters for 3 bytes, and the names of an array's element stand twice.
+constexpr std::size_t MostGrowth = 4;
+
 struct Element
 {
   std::size_t begin; ///< of the start tag
@@ -195,19 +198,21 @@ std::string WithInlineXmlData(std::string text)
   const View data = all.substr(underscore + 1, close - underscore - 1);
 
   std::vector<Element> elements;
-  for (std::size_t at = all.find('<', file); at < appended; at = all.find('<', at + 1))
+  std::size_t behind = 0;
+  for (std::size_t at = all.find('<', file); at < appended; at = all.find('<', behind))
   {
     const View tag = tagAt(at);
+    behind = at + tag.size();
     if (FindAttribute(tag, "format").value != "appended")
     {
       continue;
     }
     const std::optional<std::size_t> offset = Number(FindAttribute(tag, "offset").value);
-    if (!offset || *offset > data.size())
+    if (!offset || *offset > data.size() || behind > appended)
     {
       return text;
     }
-    elements.push_back({ at, at + tag.size(), *offset, tag[tag.size() - 2] == '/' });
+    elements.push_back({ at, behind, *offset, tag[tag.size() - 2] == '/' });
   }
 
   std::string result;
@@ -246,6 +251,11 @@ std::string WithInlineXmlData(std::string text)
         end = other.offset > element.offset ? std::min(end, other.offset) : end;
       }
       result += data.substr(element.offset, end - element.offset);
+    }
+    // Arrays that lie in each other: no writer makes those, and many of a large one would fill the memory.
+    if (result.size() > MostGrowth * text.size())
+    {
+      return text;
     }
     if (element.empty)
     {

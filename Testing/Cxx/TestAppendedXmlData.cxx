@@ -140,6 +140,15 @@ TEST(AppendedXmlData, OtherTextsStayAsTheyAre)
   {
     EXPECT_EQ(WithInlineXmlData(text), text);
   }
+  // Arrays that all lie in the same bytes: a file of a megabyte would become gigabytes.
+  std::string many = "<VTKFile>";
+  for (int n = 0; n < 100; ++n)
+  {
+    many += "<DataArray format=\"appended\" offset=\"0\"/>";
+  }
+  many +=
+    "<AppendedData encoding=\"base64\">_" + std::string(20000, 'A') + "</AppendedData></VTKFile>";
+  EXPECT_EQ(WithInlineXmlData(many), many);
 }
 
 TEST(AppendedXmlData, DamagedTextsDoNoHarm)
