@@ -1,5 +1,6 @@
 #include "GltfSkin.h"
 
+#include "Base64.h"
 #include "LittleEndian.h"
 
 #include <nlohmann/json.hpp>
@@ -442,29 +443,6 @@ std::vector<Vector3> NormalsOf(
     normal = length > 0.0 ? Vector3(normal / length) : Vector3(Vector3::UnitZ());
   }
   return normals;
-}
-
-constexpr char Base64Digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-
-/// @param bytes  as many as a multiple of four; the rest is padded
-std::string Base64(const std::string& bytes)
-{
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t n = 0; n < bytes.size(); n += 3)
-  {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - n);
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-    {
-      bits = (bits << 8) | (k < count ? static_cast<unsigned char>(bytes[n + k]) : 0U);
-    }
-    for (std::size_t k = 0; k < 4; ++k)
-    {
-      text += k <= count ? Base64Digits[(bits >> (18 - 6 * k)) & 63U] : '=';
-    }
-  }
-  return text;
 }
 
 /// Puts the document together.

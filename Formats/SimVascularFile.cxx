@@ -2,6 +2,7 @@
 
 #include "TextScanner.h"
 #include "VolumeHeaderParsers.h"
+#include "XmlText.h"
 
 #include <algorithm>
 #include <cmath>
@@ -245,20 +246,6 @@ private:
   bool Empty = false;
 };
 
-std::string Encoded(const std::string& text)
-{
-  std::string result;
-  for (const char c : text)
-  {
-    result += c == '&' ? "&amp;"
-      : c == '<'       ? "&lt;"
-      : c == '>'       ? "&gt;"
-      : c == '"'       ? "&quot;"
-                       : std::string(1, c);
-  }
-  return result;
-}
-
 std::string Element(const std::string& name, const Vector3& vector)
 {
   std::string text = "<" + name;
@@ -462,7 +449,7 @@ std::string SimVascularPathText(const SimVascularPath& path)
 std::string SimVascularContourText(const SimVascularContourGroup& group)
 {
   std::string text = std::string(Declaration) + "<contourgroup path_name=\"" +
-    Encoded(group.pathName) + "\" path_id=\"" + std::to_string(group.pathId) +
+    EscapedXml(group.pathName) + "\" path_id=\"" + std::to_string(group.pathId) +
     "\" reslice_size=\"5\" point_2D_display_size=\"\" point_size=\"\" version=\"1.0\">\n" +
     "<timestep id=\"0\">\n" +
     "<lofting_parameters method=\"nurbs\" sampling=\"60\" sample_per_seg=\"12\" "
@@ -472,7 +459,8 @@ std::string SimVascularContourText(const SimVascularContourGroup& group)
     "u_parametric_type=\"centripetal\" v_parametric_type=\"chord\" />\n";
   for (const SimVascularContour& contour : group.contours)
   {
-    text += "<contour id=\"" + std::to_string(contour.id) + "\" type=\"" + Encoded(contour.type) +
+    text += "<contour id=\"" + std::to_string(contour.id) + "\" type=\"" +
+      EscapedXml(contour.type) +
       "\" method=\"Manual\" closed=\"true\" min_control_number=\"2\" max_control_number=\"" +
       std::to_string(std::max<std::size_t>(2, contour.controlPoints.size())) +
       "\" subdivision_type=\"0\" subdivision_number=\"" +

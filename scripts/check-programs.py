@@ -20,8 +20,9 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PAGES = {"coronary-simulator": "docs/simulator-files.md", "coronary-device-emulator": "docs/device-protocol.md"}
 COMMANDS_PAGE = "docs/programs.md"
 OPTION = re.compile(r"(?<![\w/-])--[a-z][\w-]*")
-# Not in every build tree: they need Google's benchmark library or Qt.
-OPTIONAL = {"skin-deformation-benchmark", "motion-benchmark", "vessel-wall-benchmark"}
+# Not in every build tree: they need Google's benchmark library.
+OPTIONAL = {"skin-deformation-benchmark", "motion-benchmark", "vessel-wall-benchmark", "intervention-benchmark",
+            "contrast-benchmark", "fluoroscopy-benchmark", "detector-benchmark"}
 
 
 class Programs:

@@ -1,5 +1,6 @@
 #include "EvaluationReport.h"
 
+#include "Base64.h"
 #include "HtmlParts.h"
 
 #include <algorithm>

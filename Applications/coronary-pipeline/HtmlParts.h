@@ -11,9 +11,6 @@ namespace coronary
 {
 /// A text as a part of HTML, of its attributes too: no character of it is markup.
 std::string EscapedHtml(const std::string& text);
-
-/// RFC 4648, with its padding, in one line.
-std::string Base64(const std::string& bytes);
 }
 
 #endif

@@ -1,6 +1,7 @@
 #include "SlicerScene.h"
 
 #include "TextScanner.h"
+#include "XmlText.h"
 
 #include <algorithm>
 #include <stdexcept>
@@ -11,20 +12,6 @@ namespace
 {
 constexpr const char* Begin = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
                               "<MRML version=\"Slicer5.6.0\" userTags=\"\">\n";
-
-std::string Escaped(const std::string& text)
-{
-  std::string result;
-  for (const char c : text)
-  {
-    result += c == '&' ? "&amp;"
-      : c == '<'       ? "&lt;"
-      : c == '>'       ? "&gt;"
-      : c == '"'       ? "&quot;"
-                       : std::string(1, c);
-  }
-  return result;
-}
 
 /// File names of Slicer's scenes have percent signs for what is not allowed in an address.
 std::string AsAddress(const std::string& path)
@@ -51,7 +38,7 @@ std::string Number(double value)
 
 std::string Attribute(const std::string& name, const std::string& value)
 {
-  return " " + name + "=\"" + Escaped(value) + "\"";
+  return " " + name + "=\"" + EscapedXml(value) + "\"";
 }
 
 /// An element without contents.

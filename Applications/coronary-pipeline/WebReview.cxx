@@ -1,5 +1,6 @@
 #include "WebReview.h"
 
+#include "Base64.h"
 #include "EvaluationJson.h"
 #include "HtmlParts.h"
 #include "WebFiles.h"
