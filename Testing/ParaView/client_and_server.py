@@ -29,7 +29,7 @@ class Server:
 
     def __init__(self, ranks):
         with socket.socket() as free:
-            free.bind(("localhost", 0))
+            free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
         self.path = os.path.join(folder, "server-%d.txt" % ranks)
         launcher = mpirun + ["-np", str(ranks)] if ranks > 1 else []
@@ -48,7 +48,7 @@ class Server:
                 self.process.kill()
                 require(False, "the server does not start: " + self.said())
             time.sleep(0.1)
-        simple.Connect("localhost", self.port)
+        simple.Connect("127.0.0.1", self.port)
         require(servermanager.ActiveConnection.IsRemote(), "the session is not that of a server")
         # On the server; the client has it already.
         simple.LoadPlugin(plugin, remote=True, ns=vars(simple))

@@ -13,12 +13,14 @@ from coronary_testing import (digest, fetch, find, load_plugin, require, require
 
 plugin, folder, xml_folder = sys.argv[1:4]
 # What a value by rule would make senseless: axes that are no rotation, times that do not increase.
+IMAGES = [os.path.join(folder, "phase_%d.mha" % n) for n in range(2)]
 SENSIBLE = {("CoronaryPhantomSource", "Direction"): [0, 1, 0, 1, 0, 0, 0, 0, -1],
             ("CoronaryPhantomSource", "Phases"): [0.1, 0.3, 0.75],
             ("CoronaryCardiacPhaseInterpolator", "OfferedRange"): [0.1, 1.1],
-            ("CoronaryGatedImageReader", "FileNames"):
-                [os.path.join(folder, "phase_%d.mha" % n) for n in range(2)],
+            ("CoronaryGatedImageReader", "FileNames"): IMAGES,
             ("CoronaryGatedImageReader", "PhaseFractions"): [0.1, 0.6],
+            ("CoronarySegmentationReader", "FileNames"): IMAGES,
+            ("CoronarySegmentationReader", "PhaseFractions"): [0.1, 0.6],
             ("CoronaryGatedDICOMFolder", "DirectoryName"): os.path.join(folder, "dicom"),
             ("CoronaryGatedDICOMFolder", "SeriesInstanceUID"): "1.2.3",
             ("CoronaryTGFReader", "FileName"): os.path.join(folder, "tree.tgf")}
@@ -42,13 +44,11 @@ def write_tree(name, way):
 
 def write_images():
     """Two phases of a small image."""
-    paths = [os.path.join(folder, "phase_%d.mha" % n) for n in range(2)]
-    for phase, path in enumerate(paths):
+    for phase, path in enumerate(IMAGES):
         with open(path, "wb") as file:
             file.write(b"ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nElementSpacing = 1 2 3\n"
                        b"ElementType = MET_UCHAR\nBinaryData = True\nElementDataFile = LOCAL\n")
             file.write(bytes(range(phase, 24 + phase)))
-    return paths
 
 
 def write_dicom():
@@ -197,7 +197,7 @@ def make_wall():
     simple.CenterlineMetrics(Result=tree, Reference=truth, registrationName="Agreement",
                              RelevantRadius=0.5, Spacing=0.1)
     simple.GatedImageReader(registrationName="Images", CycleLength=0.9, PhaseFractions=[0.1, 0.6],
-                            FileNames=[os.path.join(folder, "phase_%d.mha" % n) for n in range(2)])
+                            FileNames=IMAGES)
 
 
 def leaves(data):
