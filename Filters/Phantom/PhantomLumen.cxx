@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace coronary
 {
@@ -9,6 +10,8 @@ namespace
 {
 constexpr int MaximumVessels = 32;
 constexpr double CellSize = 4.0; ///< of the bins, mm
+/// A bin has all that a ball of this radius (mm) around a point of it needs: that much is looked at for each point of a surface.
+constexpr double PointBall = 1.5;
 
 /// Calls visit(key) for each bin that a box touches.
 template <typename Visit>
@@ -93,7 +96,8 @@ PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vect
   for (std::size_t i = 0; i < this->Pieces.size(); ++i)
   {
     const Piece& piece = this->Pieces[i];
-    const double margin = this->Limit + std::max(piece.radius, piece.radius + piece.widening);
+    const double margin =
+      PointBall + this->Limit + std::max(piece.radius, piece.radius + piece.widening);
     const Vector3 end = piece.start + piece.axis;
     const Vector3 low = piece.start.cwiseMin(end).array() - margin;
     const Vector3 high = piece.start.cwiseMax(end).array() + margin;
@@ -107,30 +111,35 @@ void PhantomLumen::Collect(const Vector3& centre, double ballRadius, Candidates&
   candidates.pieces.clear();
   candidates.junctions.clear();
   candidates.ends.clear();
-  ForEachCell(centre.array() - ballRadius, centre.array() + ballRadius,
+  const auto near = [&](std::int32_t i)
+  {
+    const Piece& piece = this->Pieces[i];
+    const double u =
+      std::clamp((centre - piece.start).dot(piece.axis) * piece.inverseSquaredLength, 0.0, 1.0);
+    const double margin =
+      ballRadius + this->Limit + std::max(piece.radius, piece.radius + piece.widening);
+    return (centre - piece.start - u * piece.axis).squaredNorm() <= margin * margin;
+  };
+  int bins = 0;
+  const double beyond = std::max(0.0, ballRadius - PointBall);
+  ForEachCell(centre.array() - beyond, centre.array() + beyond,
     [&](std::int64_t cell)
     {
       const auto bin = this->Bins.find(cell);
       if (bin != this->Bins.end())
       {
-        candidates.pieces.insert(candidates.pieces.end(), bin->second.begin(), bin->second.end());
+        std::copy_if(
+          bin->second.begin(), bin->second.end(), std::back_inserter(candidates.pieces), near);
+        ++bins;
       }
     });
-  std::sort(candidates.pieces.begin(), candidates.pieces.end());
-  candidates.pieces.erase(
-    std::unique(candidates.pieces.begin(), candidates.pieces.end()), candidates.pieces.end());
-  candidates.pieces.erase(
-    std::remove_if(candidates.pieces.begin(), candidates.pieces.end(),
-      [&](std::int32_t i)
-      {
-        const Piece& piece = this->Pieces[i];
-        const double u =
-          std::clamp((centre - piece.start).dot(piece.axis) * piece.inverseSquaredLength, 0.0, 1.0);
-        const double margin =
-          ballRadius + this->Limit + std::max(piece.radius, piece.radius + piece.widening);
-        return (centre - piece.start - u * piece.axis).squaredNorm() > margin * margin;
-      }),
-    candidates.pieces.end());
+  // One bin is in order, and has nothing twice.
+  if (bins > 1)
+  {
+    std::sort(candidates.pieces.begin(), candidates.pieces.end());
+    candidates.pieces.erase(
+      std::unique(candidates.pieces.begin(), candidates.pieces.end()), candidates.pieces.end());
+  }
   if (candidates.pieces.empty())
   {
     return;
@@ -225,8 +234,8 @@ PhantomLumen::Sample PhantomLumen::Evaluate(
 double PhantomLumen::Project(Vector3& position, double tolerance) const
 {
   constexpr double h = 1e-3;
-  Candidates candidates;
-  this->Collect(position, 1.5, candidates);
+  thread_local Candidates candidates;
+  this->Collect(position, PointBall, candidates);
   const Vector3 start = position;
   const auto distanceAt = [&](const Vector3& p) { return this->Evaluate(p, candidates).distance; };
   double distance = distanceAt(position);
@@ -253,7 +262,7 @@ double PhantomLumen::Project(Vector3& position, double tolerance) const
     position += move;
     if ((position - start).squaredNorm() > 1.4 * 1.4)
     {
-      this->Collect(position, 1.5, candidates);
+      this->Collect(position, PointBall, candidates);
     }
     distance = distanceAt(position);
   }

