@@ -225,6 +225,9 @@ private:
 
   static std::string Decoded(std::string text)
   {
+    // XML 1.0, 3.3.3: an end of line within a value is a space.
+    std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\t' || c == '\r' || c == '\n'; }, ' ');
     static const std::pair<const char*, const char*> entities[] = { { "&quot;", "\"" },
       { "&apos;", "'" }, { "&lt;", "<" }, { "&gt;", ">" }, { "&amp;", "&" } };
     for (const auto& [entity, character] : entities)
