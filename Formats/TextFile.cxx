@@ -14,13 +14,13 @@ std::string ReadTextFile(const std::string& path, const std::string& what, std::
   }
   std::string text;
   char block[65536];
-  while (file.read(block, sizeof(block)) || file.gcount() > 0)
+  while (text.size() <= largest && (file.read(block, sizeof(block)) || file.gcount() > 0))
   {
     text.append(block, static_cast<std::size_t>(file.gcount()));
-    if (text.size() > largest)
-    {
-      throw std::runtime_error("'" + path + "': is too large for " + what + ".");
-    }
+  }
+  if (text.size() > largest)
+  {
+    throw std::runtime_error("'" + path + "': is too large for " + what + ".");
   }
   if (file.bad() || !file.eof())
   {
