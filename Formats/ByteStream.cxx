@@ -174,7 +174,7 @@ void ByteStream::Read(std::uint64_t position, void* destination, std::size_t siz
   }
 }
 
-std::uint64_t CheckedFileSize(const std::string& path)
+void RequireFile(const std::string& path)
 {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
@@ -186,6 +186,12 @@ std::uint64_t CheckedFileSize(const std::string& path)
   {
     throw std::runtime_error("'" + path + "' is not a file.");
   }
+}
+
+std::uint64_t CheckedFileSize(const std::string& path)
+{
+  RequireFile(path);
+  std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
   if (error)
   {

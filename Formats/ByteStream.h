@@ -55,6 +55,9 @@ private:
   std::unique_ptr<Internals> Impl;
 };
 
+/// @throws std::runtime_error naming `path` when it is missing, or no regular file (a folder, a pipe)
+void RequireFile(const std::string& path);
+
 /**
  * Size of an existing regular file in bytes.
  * @throws std::runtime_error naming `path` when it is missing, a folder, empty or not readable

@@ -1,16 +1,15 @@
 #include "FileSeries.h"
 
 #include "BoundedJson.h"
+#include "ByteStream.h"
+#include "TextFile.h"
 
 #include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 namespace coronary
@@ -19,38 +18,9 @@ namespace fs = std::filesystem;
 
 namespace
 {
-// A list of a hundred thousand files has some megabytes.
-constexpr std::uintmax_t LargestList = 64u << 20;
-
 [[noreturn]] void Fail(const std::string& path, const std::string& what)
 {
   throw std::runtime_error("'" + path + "': " + what + ".");
-}
-
-std::string ReadText(const std::string& path)
-{
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status))
-  {
-    throw std::runtime_error("File '" + path + "' does not exist.");
-  }
-  if (!fs::is_regular_file(status))
-  {
-    Fail(path, "is not a file");
-  }
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (error || size > LargestList)
-  {
-    Fail(path, "is too large for a list of files");
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
-  if (file.bad() || text.size() != size)
-  {
-    Fail(path, "cannot be read");
-  }
-  return text;
 }
 
 std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text)
@@ -231,7 +201,8 @@ std::vector<TimedFile> ReadPvd(const std::string& path, std::string text)
 
 std::vector<TimedFile> ReadFileSeries(const std::string& path)
 {
-  const std::string text = ReadText(path);
+  RequireFile(path);
+  const std::string text = ReadTextFile(path, "a list of files");
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   const char kind = first == std::string::npos ? '\0' : text[first];
   if (kind != '{' && kind != '<')

@@ -1,28 +1,21 @@
 #include "MarkupsFile.h"
 
 #include "BoundedJson.h"
+#include "ByteStream.h"
+#include "TextFile.h"
 #include "VolumeHeaderParsers.h"
 
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
-#include <system_error>
 
 namespace coronary
 {
 namespace
 {
-namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-// A hundred thousand points are about 30 MB.
-constexpr std::uintmax_t LargestFile = 64u << 20;
 
 // The name of the schema, which Slicer compares; nothing is fetched from there.
 constexpr const char* Schema = "https://raw.githubusercontent.com/slicer/slicer/master/Modules/"
@@ -321,23 +314,8 @@ std::vector<Markup> ParseMarkups(const std::string& text, const std::string& nam
 
 std::vector<Markup> ReadMarkupsFile(const std::string& path)
 {
-  std::error_code error;
-  if (!fs::is_regular_file(path, error))
-  {
-    throw std::runtime_error("Cannot open '" + path + "'.");
-  }
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (error || size > LargestFile)
-  {
-    FormatError(path, "is too large for markups");
-  }
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
-  if (!file)
-  {
-    FormatError(path, "cannot be read");
-  }
-  return ParseMarkups(text, path);
+  RequireFile(path);
+  return ParseMarkups(ReadTextFile(path, "markups"), path);
 }
 
 std::string MarkupsText(const std::vector<Markup>& markups)

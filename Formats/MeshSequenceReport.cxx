@@ -1,12 +1,11 @@
 #include "MeshSequenceReport.h"
 
 #include "BoundedJson.h"
+#include "TextFile.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 
 namespace coronary
@@ -152,12 +151,9 @@ namespace
 /// Null when it is not there, or no JSON.
 Json ReadReport(const std::string& path)
 {
-  std::ifstream stream(path, std::ios::binary);
-  const std::string text{ std::istreambuf_iterator<char>(stream),
-    std::istreambuf_iterator<char>() };
   try
   {
-    return ParseBoundedJson<Json>(text);
+    return ParseBoundedJson<Json>(ReadTextFile(path, "a report"));
   }
   catch (const std::exception&)
   {

@@ -2,12 +2,12 @@
 
 #include "AtomicFile.h"
 #include "BoundedJson.h"
+#include "ByteStream.h"
+#include "TextFile.h"
 
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <system_error>
 
@@ -19,9 +19,6 @@ namespace
 {
 using Json = nlohmann::ordered_json;
 
-// A description of a thousand phases is a few hundred kilobytes.
-constexpr std::uintmax_t LargestDescription = 64u << 20;
-
 [[noreturn]] void Fail(const std::string& path, const std::string& what)
 {
   throw std::runtime_error("'" + path + "': " + what + ".");
@@ -29,30 +26,11 @@ constexpr std::uintmax_t LargestDescription = 64u << 20;
 
 std::string ReadText(const std::string& path)
 {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status))
-  {
-    throw std::runtime_error("File '" + path + "' does not exist.");
-  }
-  if (!fs::is_regular_file(status))
-  {
-    Fail(path, "is not a file");
-  }
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (error || size > LargestDescription)
-  {
-    Fail(path, "is too large for a description of a series");
-  }
-  if (size == 0)
+  RequireFile(path);
+  std::string text = ReadTextFile(path, "a description of a series");
+  if (text.empty())
   {
     Fail(path, "is empty");
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
-  if (!file)
-  {
-    Fail(path, "cannot be read");
   }
   return text;
 }

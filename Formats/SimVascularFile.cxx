@@ -1,5 +1,7 @@
 #include "SimVascularFile.h"
 
+#include "ByteStream.h"
+#include "TextFile.h"
 #include "TextScanner.h"
 #include "VolumeHeaderParsers.h"
 #include "XmlText.h"
@@ -7,20 +9,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <stdexcept>
-#include <system_error>
 
 namespace coronary
 {
 namespace
 {
-namespace fs = std::filesystem;
-
-constexpr std::uintmax_t LargestFile = 256u << 20;
+constexpr std::uint64_t LargestFile = 256u << 20;
 constexpr std::size_t DeepestElement = 32;
 
 /// The elements of an XML text one after the other. Text between tags means nothing in these files.
@@ -476,22 +472,7 @@ std::string SimVascularContourText(const SimVascularContourGroup& group)
 
 std::string ReadSimVascularFile(const std::string& path)
 {
-  std::error_code error;
-  if (!fs::is_regular_file(path, error))
-  {
-    throw std::runtime_error("Cannot open '" + path + "'.");
-  }
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (error || size > LargestFile)
-  {
-    FormatError(path, "is too large for a path or contours");
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
-  if (!file)
-  {
-    FormatError(path, "cannot be read");
-  }
-  return text;
+  RequireFile(path);
+  return ReadTextFile(path, "a path or contours", LargestFile);
 }
 }

@@ -43,7 +43,7 @@ for file in "${files[@]}"; do
       esac
       ;;
     ServerManagerXML/*.xml) xmls+=("$file") ;;
-    *.sh | .ci/run) scripts+=("$file") ;;
+    *.sh | *.bash | .ci/run) scripts+=("$file") ;;
   esac
 done
 
@@ -105,7 +105,7 @@ fi
 
 bad_scripts=0
 for script in "${scripts[@]}"; do
-  if [ ! -x "$script" ]; then
+  if [[ $script != *.bash && ! -x $script ]]; then
     echo "$script is not executable"
     bad_scripts=1
   fi

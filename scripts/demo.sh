@@ -15,51 +15,24 @@ EOF
 }
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
-install=yes
+# shellcheck source=scripts/build-first.bash
+source "$root/scripts/build-first.bash"
 pictures=yes
-jobs="$(nproc)"
 while [ $# -gt 0 ]; do
+  taken=1
   case "$1" in
-    --no-install) install=no ;;
     --no-pictures) pictures=no ;;
-    -j)
-      jobs="${2:-}"
-      shift || true
-      ;;
-    -j*) jobs="${1#-j}" ;;
-    -h | --help)
-      usage
-      exit 0
-      ;;
-    *)
-      echo "demo: unknown option '$1'" >&2
-      usage >&2
-      exit 2
-      ;;
+    *) build_option "$@" || refuse_option "$1" ;;
   esac
-  shift || true
+  shift "$taken"
 done
-if ! [[ $jobs =~ ^[1-9][0-9]*$ ]]; then
-  echo "demo: -j takes a number of jobs, not '$jobs'" >&2
-  exit 2
-fi
 
 exec </dev/null
 cd "$root"
 output=demo-output
-mkdir -p build/logs "$output"
+mkdir -p "$output"
 
-if [ "$install" = yes ]; then
-  echo "== Packages"
-  scripts/install-dependencies.sh --tree paraview --no-tests
-fi
-
-echo "== Building (log: build/logs/demo-build.log)"
-if ! { cmake --preset paraview && cmake --build --preset paraview -j "$jobs"; } \
-  >build/logs/demo-build.log 2>&1; then
-  tail -n 40 build/logs/demo-build.log >&2
-  exit 1
-fi
+install_and_build build/logs/demo-build.log
 pipeline="$root/build/paraview/bin/coronary-pipeline"
 
 echo "== The beating phantom: 20 phases of gated CT, and the truth"

@@ -9,34 +9,17 @@ centerline.png  the branches, coloured by radius, with their bifurcations, from 
                 the surface and beside the other centerlines (white) when they are given
 """
 import argparse
-import importlib.util
 import os
 
 from vtkmodules.vtkCommonCore import vtkLookupTable
-from vtkmodules.vtkFiltersCore import vtkTubeFilter
-from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-here = os.path.dirname(os.path.abspath(__file__))
-spec = importlib.util.spec_from_file_location(
-    "render_segmentation", os.path.join(here, "render-segmentation.py"))
-views = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(views)
-common = views.common
+import pictures
 
 RADIUS = "MaximumInscribedSphereRadius"
 SURFACE = (0.62, 0.70, 0.82)
 REFERENCE = (1.0, 1.0, 1.0)
 FORK = (1.0, 0.88, 0.35)
-
-
-def tubes(lines, radius):
-    tube = vtkTubeFilter()
-    tube.SetInputData(lines)
-    tube.SetRadius(radius)
-    tube.SetNumberOfSides(12)
-    tube.Update()
-    return tube.GetOutput()
 
 
 def radius_colors(low, high):
@@ -67,10 +50,10 @@ def main():
     path = arguments.input
     if os.path.isdir(path):
         path = os.path.join(path, "centerline.vtp")
-    lines = common.read_poly(path)
+    lines = pictures.read_poly(path)
     radii = lines.GetPointData().GetArray(RADIUS)
     if lines.GetNumberOfCells() == 0 or radii is None:
-        common.fail("%s has no centerlines with radii (%s)" % (path, RADIUS))
+        pictures.fail("%s has no centerlines with radii (%s)" % (path, RADIUS))
     lines.GetPointData().SetActiveScalars(RADIUS)
     low, high = radii.GetRange()
     bounds = lines.GetBounds()
@@ -78,13 +61,13 @@ def main():
     size = max(bounds[2 * a + 1] - bounds[2 * a] for a in range(3))
     width = 0.005 * size
     forks = bifurcations(lines)
-    window, made = views.panels("Centerlines: %d branches, %d bifurcations; radius %.2f (blue) to %.2f mm (red)"
-                                % (lines.GetNumberOfCells(), len(forks), low, high))
-    surface = common.read_poly(arguments.truth) if arguments.truth else None
-    reference = common.read_poly(arguments.reference) if arguments.reference else None
-    for panel, (_, eye, up) in zip(made, views.VIEWS):
+    window, made = pictures.panels("Centerlines: %d branches, %d bifurcations; radius %.2f (blue) to %.2f mm (red)"
+                                   % (lines.GetNumberOfCells(), len(forks), low, high))
+    surface = pictures.read_poly(arguments.truth) if arguments.truth else None
+    reference = pictures.read_poly(arguments.reference) if arguments.reference else None
+    for panel, (_, eye, up) in zip(made, pictures.VIEWS):
         mapper = vtkPolyDataMapper()
-        mapper.SetInputData(tubes(lines, width))
+        mapper.SetInputData(pictures.tube(lines, width, 12))
         mapper.SetScalarModeToUsePointFieldData()
         mapper.SelectColorArray(RADIUS)
         mapper.SetLookupTable(radius_colors(low, high))
@@ -93,20 +76,14 @@ def main():
         actor.SetMapper(mapper)
         panel.AddActor(actor)
         for fork in forks:
-            ball = vtkSphereSource()
-            ball.SetCenter(fork)
-            ball.SetRadius(2.0 * width)
-            ball.SetThetaResolution(24)
-            ball.SetPhiResolution(24)
-            ball.Update()
-            common.add_surface(panel, ball.GetOutput(), color=FORK)
+            pictures.add_surface(panel, pictures.ball(fork, 2.0 * width), color=FORK)
         if reference:
-            common.add_surface(panel, tubes(reference, 0.5 * width), color=REFERENCE)
+            pictures.add_surface(panel, pictures.tube(reference, 0.5 * width, 12), color=REFERENCE)
         if surface:
-            common.add_surface(panel, surface, color=SURFACE, opacity=0.25)
-        common.look_at(panel, center, eye, up, 0.95 * size)
+            pictures.add_surface(panel, surface, color=SURFACE, opacity=0.25)
+        pictures.look_at(panel, center, eye, up, 0.95 * size)
     os.makedirs(arguments.output, exist_ok=True)
-    common.save(window, arguments.output, "centerline.png")
+    pictures.save(window, arguments.output, "centerline.png")
 
 
 if __name__ == "__main__":

@@ -19,6 +19,8 @@ from vtkmodules.util import numpy_support
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 
+import pictures
+
 BONE = 5.0
 
 
@@ -94,21 +96,10 @@ def producer(simple, data):
     return source
 
 
-def fetched(proxy, port=0):
-    """The data of an output port, in this process."""
-    from paraview import servermanager, simple
-    tap = servermanager.filters.ReductionFilter(Input=simple.OutputPort(proxy, port))
-    tap.UpdatePipeline()
-    data = tap.GetClientSideObject().GetOutputDataObject(0)
-    copy = data.NewInstance()
-    copy.ShallowCopy(data)
-    return copy
-
-
 def deformed(simple, mesh, rest, pose, **settings):
     skin = simple.SkinDeformation(Mesh=producer(simple, mesh), SkeletonAtRest=producer(simple, rest),
                                   PosedSkeleton=producer(simple, pose), ComputeNormals=1, **settings)
-    return fetched(skin)
+    return pictures.fetch(skin)
 
 
 def chain_poses(rest):
@@ -239,7 +230,7 @@ def posable(simple, name):
         tree = simple.OutputPort(simple.CoronaryPhantom(), 1)
         surface = simple.FrenetSweepSurface(tree)
     else:
-        opened = fetched(simple.OpenDataFile(name))
+        opened = pictures.fetch(simple.OpenDataFile(name))
         surface = simple.SurfaceCleaner(Surface=producer(simple, opened))
         lines = simple.FastMarchingCenterline(Input=surface,
                                               Seeds=producer(simple, highest_points(opened)))
@@ -248,7 +239,7 @@ def posable(simple, name):
     tetrahedra = simple.TetrahedralMesher(Surface=surface, Skeleton=skeleton,
                                           LeaveOutPointsOutside=1, Repair=1)
     weights = simple.BiharmonicSkinWeights(Mesh=tetrahedra, Skeleton=skeleton)
-    return fetched(skeleton), fetched(weights)
+    return pictures.fetch(skeleton), pictures.fetch(weights)
 
 
 def subtree(skeleton, joint):
@@ -272,7 +263,7 @@ def draw_tree(simple, folder, surface):
     for number in range(3):
         pose = simple.SkeletonPose(Skeleton=producer(simple, rest))
         pose.Edits = [value for edit in edits[:number] for value in edit]
-        skeleton = fetched(pose)
+        skeleton = pictures.fetch(pose)
         moved = deformed(simple, mesh, rest, skeleton, Blend="Dual Quaternion")
         where = view(simple, [660, 700])
         panel(simple, where, ("at rest", f"joint {first} turned by 50 degrees",

@@ -17,23 +17,11 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkCommonTransforms import vtkTransform
 from vtkmodules.vtkFiltersCore import vtkAppendPolyData, vtkPolyDataNormals
 from vtkmodules.vtkFiltersGeneral import vtkTransformPolyDataFilter
-from vtkmodules.vtkFiltersGeometry import vtkGeometryFilter
 from vtkmodules.vtkIOGeometry import vtkGLTFReader
-from vtkmodules.vtkIOImage import vtkPNGWriter
-from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
-from vtkmodules.vtkRenderingCore import (vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow,
-                                         vtkTextActor, vtkWindowToImageFilter)
-import vtkmodules.vtkRenderingFreeType
-import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 (registers the factories)
+
+import pictures
 
 OURS, THEIRS, OTHER = (0.80, 0.16, 0.16), (0.16, 0.45, 0.70), (0.75, 0.75, 0.75)
-
-
-def written(folder, name):
-    reader = vtkXMLPolyDataReader()
-    reader.SetFileName(os.path.join(folder, name))
-    reader.Update()
-    return reader.GetOutput()
 
 
 def from_gltf(path, seconds):
@@ -72,27 +60,12 @@ def largest_distance(ours, theirs):
     return numpy.linalg.norm(points - found, axis=1).max()
 
 
-def show(renderer, data, colour, opacity):
+def show(renderer, data, colour):
     normals = vtkPolyDataNormals()
     normals.SplittingOff()
     normals.SetInputData(data)
-    mapper = vtkPolyDataMapper()
-    mapper.SetInputConnection(normals.GetOutputPort())
-    mapper.ScalarVisibilityOff()
-    actor = vtkActor()
-    actor.SetMapper(mapper)
-    actor.GetProperty().SetColor(colour)
-    actor.GetProperty().SetOpacity(opacity)
-    renderer.AddActor(actor)
-
-
-def label(renderer, text):
-    actor = vtkTextActor()
-    actor.SetInput(text)
-    actor.GetTextProperty().SetFontSize(22)
-    actor.GetTextProperty().SetColor(0.1, 0.1, 0.1)
-    actor.SetPosition(14, 12)
-    renderer.AddActor(actor)
+    normals.Update()
+    pictures.add_plain(renderer, normals.GetOutput(), colour)
 
 
 def main():
@@ -108,13 +81,10 @@ def main():
         head = file.read(20)
         extras = json.loads(file.read(int.from_bytes(head[12:16], "little")))["scenes"][0]["extras"]
     phases = [report["phases"][number] for number in arguments.phases]
-    ours = [written(arguments.sequence, phase["files"]["surface"]) for phase in phases]
+    ours = [pictures.read_poly(os.path.join(arguments.sequence, phase["files"]["surface"])) for phase in phases]
     theirs = [from_gltf(path, (phase["time"] - extras["phases"][0]) * extras["cycle_s"]) for phase in phases]
 
-    window = vtkRenderWindow()
-    window.SetOffScreenRendering(1)
-    window.SetSize(1400, 1200)
-    window.SetMultiSamples(8)
+    window = pictures.off_screen((1400, 1200), [])
     camera = None
     for row, phase in enumerate(phases):
         distance = largest_distance(ours[row], theirs[row])
@@ -122,12 +92,11 @@ def main():
         for column, (data, colour, name) in enumerate((
                 (ours, OURS, "written surface, %.2f R-R" % phase["time"]),
                 (theirs, THEIRS, "mesh_skin.glb, within %.2g mm" % distance))):
-            renderer = vtkRenderer()
+            renderer = pictures.new_renderer((1, 1, 1))
             renderer.SetViewport(0.5 * column, 0.5 - 0.5 * row, 0.5 * column + 0.5, 1.0 - 0.5 * row)
-            renderer.SetBackground(1, 1, 1)
-            show(renderer, data[row], colour, 1.0)
-            show(renderer, data[1 - row], OTHER, 1.0)
-            label(renderer, name)
+            show(renderer, data[row], colour)
+            show(renderer, data[1 - row], OTHER)
+            pictures.add_text(renderer, name, 14, 12, color=(0.1, 0.1, 0.1))
             window.AddRenderer(renderer)
             if camera is None:
                 # LPS: the viewer stands before the patient.
@@ -140,15 +109,8 @@ def main():
                 camera.Zoom(1.5)
             renderer.SetActiveCamera(camera)
             renderer.ResetCameraClippingRange()
-    window.Render()
-    grab = vtkWindowToImageFilter()
-    grab.SetInput(window)
-    grab.ReadFrontBufferOff()
-    writer = vtkPNGWriter()
     os.makedirs(arguments.output, exist_ok=True)
-    writer.SetFileName(os.path.join(arguments.output, "gltf.png"))
-    writer.SetInputConnection(grab.GetOutputPort())
-    writer.Write()
+    pictures.save(window, arguments.output, "gltf.png")
 
 
 main()

@@ -9,36 +9,24 @@ segmentation.png  the segmented lumen (red) with aorta and ostia from three side
                   surface (green) when it is given
 """
 import argparse
-import importlib.util
 import json
 import os
 import sys
 
 from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 from vtkmodules.vtkCommonTransforms import vtkMatrixToLinearTransform
-from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D, vtkTubeFilter, vtkWindowedSincPolyDataFilter
+from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D, vtkWindowedSincPolyDataFilter
 from vtkmodules.vtkFiltersGeneral import vtkTransformPolyDataFilter
-from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkImagingCore import vtkImageConstantPad
 from vtkmodules.vtkRenderingCore import vtkColorTransferFunction, vtkVolume, vtkVolumeProperty
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkSmartVolumeMapper
 
-here = os.path.dirname(os.path.abspath(__file__))
-spec = importlib.util.spec_from_file_location(
-    "render_phantom", os.path.join(here, "render-phantom.py"))
-common = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(common)
+import pictures
 
 FOUND = (0.90, 0.28, 0.24)
 TRUE = (0.35, 0.80, 0.40)
 AORTA = (0.55, 0.60, 0.70)
 OSTIUM = (1.0, 0.88, 0.35)
-VIEWS = (  # name, where the eye is, up
-    ("from the front", (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
-    ("from the left", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    ("from the feet", (0.0, 0.0, -1.0), (0.0, -1.0, 0.0)),
-)
-TITLE = 60  # pixels
 
 
 def mask_surface(volume):
@@ -64,64 +52,40 @@ def mask_surface(volume):
     return place.GetOutput()
 
 
-def panels(text):
-    """A window with a title and a panel for each view."""
-    window, base = common.new_window()
-    width, height = common.SIZE
-    common.add_text(base, text, 20, height - 42, 26, bold=True)
-    made = []
-    for n, (name, _, _) in enumerate(VIEWS):
-        panel = common.add_panel(window, n * width / 3.0 + 2, 0, (n + 1) * width / 3.0 - 2,
-                                 height - TITLE)
-        common.add_text(panel, name, 16, 16)
-        made.append(panel)
-    return window, made
-
-
 def picture_segmentation(report, folder, truth, output):
     part = report["segmentation"]
-    mask = common.Volume(os.path.join(folder, part["file"]))
+    mask = pictures.Volume(os.path.join(folder, part["file"]))
     surface = mask_surface(mask)
     if surface.GetNumberOfPoints() == 0:
-        common.fail("the mask is empty")
-    seeds = common.read_poly(os.path.join(folder, part["seeds_file"]))
-    aorta = common.read_poly(os.path.join(folder, part["aorta_file"]))
+        pictures.fail("the mask is empty")
+    seeds = pictures.read_poly(os.path.join(folder, part["seeds_file"]))
+    aorta = pictures.read_poly(os.path.join(folder, part["aorta_file"]))
     bounds = surface.GetBounds()
     center = [0.5 * (bounds[2 * a] + bounds[2 * a + 1]) for a in range(3)]
     size = max(bounds[2 * a + 1] - bounds[2 * a] for a in range(3))
     names = ["%s %.2f" % (s["name"], s["confidence"]) for s in part["seeds"]]
-    window, made = panels("Segmentation at %.0f %% of R-R; seeds and their confidence: %s"
+    window, made = pictures.panels("Segmentation at %.0f %% of R-R; seeds and their confidence: %s"
                           % (100.0 * report["time"], ", ".join(names)))
-    for panel, (_, eye, up) in zip(made, VIEWS):
-        common.add_surface(panel, surface, color=FOUND)
+    for panel, (_, eye, up) in zip(made, pictures.VIEWS):
+        pictures.add_surface(panel, surface, color=FOUND)
         if truth:
-            common.add_surface(panel, truth, color=TRUE, opacity=0.35)
+            pictures.add_surface(panel, truth, color=TRUE, opacity=0.35)
         if aorta.GetNumberOfPoints() > 1:
-            tube = vtkTubeFilter()
-            tube.SetInputData(aorta)
-            tube.SetRadius(1.0)
-            tube.Update()
-            common.add_surface(panel, tube.GetOutput(), color=AORTA)
+            pictures.add_surface(panel, pictures.tube(aorta, 1.0), color=AORTA)
         for p in range(seeds.GetNumberOfPoints()):
-            ball = vtkSphereSource()
-            ball.SetCenter(seeds.GetPoint(p))
-            ball.SetRadius(2.0)
-            ball.SetThetaResolution(24)
-            ball.SetPhiResolution(24)
-            ball.Update()
-            common.add_surface(panel, ball.GetOutput(), color=OSTIUM)
-        common.look_at(panel, center, eye, up, 0.95 * size)
-    common.save(window, output, "segmentation.png")
+            pictures.add_surface(panel, pictures.ball(seeds.GetPoint(p), 2.0), color=OSTIUM)
+        pictures.look_at(panel, center, eye, up, 0.95 * size)
+    pictures.save(window, output, "segmentation.png")
 
 
 def picture_vesselness(report, folder, output):
-    volume = common.Volume(os.path.join(folder, report["vesselness"]["file"]))
+    volume = pictures.Volume(os.path.join(folder, report["vesselness"]["file"]))
     bounds = volume.world_bounds()
     center = [0.5 * (low + high) for low, high in bounds]
     size = max(high - low for low, high in bounds)
-    window, made = panels("Vesselness, maximum along the line of sight (c = %.0f HU)"
+    window, made = pictures.panels("Vesselness, maximum along the line of sight (c = %.0f HU)"
                           % report["vesselness"]["c"])
-    for panel, (_, eye, up) in zip(made, VIEWS):
+    for panel, (_, eye, up) in zip(made, pictures.VIEWS):
         mapper = vtkSmartVolumeMapper()
         mapper.SetInputData(volume.image)
         mapper.SetBlendModeToMaximumIntensity()
@@ -141,8 +105,8 @@ def picture_vesselness(report, folder, output):
         actor.SetProperty(properties)
         actor.SetUserMatrix(volume.matrix())
         panel.AddVolume(actor)
-        common.look_at(panel, center, eye, up, 0.95 * size)
-    common.save(window, output, "vesselness.png")
+        pictures.look_at(panel, center, eye, up, 0.95 * size)
+    pictures.save(window, output, "vesselness.png")
 
 
 def main():
@@ -159,7 +123,7 @@ def main():
     os.makedirs(arguments.output, exist_ok=True)
     picture_vesselness(report, arguments.folder, arguments.output)
     if "segmentation" in report:
-        truth = common.read_poly(arguments.truth) if arguments.truth else None
+        truth = pictures.read_poly(arguments.truth) if arguments.truth else None
         picture_segmentation(report, arguments.folder, truth, arguments.output)
 
 

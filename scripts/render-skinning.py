@@ -6,7 +6,6 @@
 skinning.png  bones in the surface; the weights of two neighbouring bones beside a bifurcation
 """
 import argparse
-import importlib.util
 import os
 
 from vtkmodules.vtkCommonCore import vtkIntArray, vtkLookupTable
@@ -17,11 +16,7 @@ from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-here = os.path.dirname(os.path.abspath(__file__))
-spec = importlib.util.spec_from_file_location(
-    "render_phantom", os.path.join(here, "render-phantom.py"))
-common = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(common)
+import pictures
 
 BONES = ((0.85, 0.15, 0.15), (0.15, 0.35, 0.85))
 JOINT = (0.1, 0.1, 0.1)
@@ -111,7 +106,7 @@ def neighbours(skeleton):
             if best is None or size > best[0]:
                 best = (size, i, next_ones[0], second)
     if best is None:
-        common.fail("no bifurcation in the skeleton")
+        pictures.fail("no bifurcation in the skeleton")
     return best[1:]
 
 
@@ -121,11 +116,11 @@ def main():
     parser.add_argument("--output", required=True, help="folder for the picture")
     arguments = parser.parse_args()
     os.makedirs(arguments.output, exist_ok=True)
-    skeleton = common.read_poly(os.path.join(arguments.input, "skeleton.vtp"))
-    surface = common.read_poly(os.path.join(arguments.input, "surface.vtp"))
+    skeleton = pictures.read_poly(os.path.join(arguments.input, "skeleton.vtp"))
+    surface = pictures.read_poly(os.path.join(arguments.input, "surface.vtp"))
     path = os.path.join(arguments.input, "weights.vtu")
     if not os.path.isfile(path):
-        common.fail("missing file: " + path)
+        pictures.fail("missing file: " + path)
     reader = vtkXMLUnstructuredGridReader()
     reader.SetFileName(path)
     shell = vtkDataSetSurfaceFilter()
@@ -133,30 +128,30 @@ def main():
     shell.Update()
     wall = shell.GetOutput()
 
-    window, base = common.new_window()
-    width, height = common.SIZE
+    window, base = pictures.new_window()
+    width, height = pictures.SIZE
     tall = height - 60
-    common.add_text(base, "%d bones, %d points" % (
+    pictures.add_text(base, "%d bones, %d points" % (
         skeleton.GetNumberOfCells(), reader.GetOutput().GetNumberOfPoints()),
         20, height - 42, 26, bold=True)
-    panel = common.add_panel(window, 2, 2, width / 2 - 2, tall)
-    common.add_surface(panel, surface, color=WALL, opacity=0.3)
+    panel = pictures.add_panel(window, 2, 2, width / 2 - 2, tall)
+    pictures.add_surface(panel, surface, color=WALL, opacity=0.3)
     add_bones(panel, skeleton, 0.25)
     bounds = surface.GetBounds()
     center = [(bounds[2 * i] + bounds[2 * i + 1]) / 2.0 for i in range(3)]
-    common.look_at(panel, center, (0.5, -0.8, 0.35), (0.0, 0.0, 1.0),
-                   0.36 * surface.GetLength())
+    pictures.look_at(panel, center, (0.5, -0.8, 0.35), (0.0, 0.0, 1.0),
+                     0.36 * surface.GetLength())
     first, second, joint = neighbours(skeleton)
     names = skeleton.GetFieldData().GetAbstractArray("BoneName")
     where = skeleton.GetPoint(joint)
     size = skeleton.GetPointData().GetArray("MaximumInscribedSphereRadius").GetTuple1(joint)
     for i, bone in enumerate((first, second)):
-        panel = common.add_panel(window, width / 2 + 2, (1 - i) * tall / 2 + 2, width - 2,
-                                 (2 - i) * tall / 2 - 2)
-        common.add_text(panel, "weight of " + names.GetValue(bone), 16, 16)
+        panel = pictures.add_panel(window, width / 2 + 2, (1 - i) * tall / 2 + 2, width - 2,
+                                   (2 - i) * tall / 2 - 2)
+        pictures.add_text(panel, "weight of " + names.GetValue(bone), 16, 16)
         add_weight(panel, wall, bone)
-        common.look_at(panel, where, (0.5, -0.8, 0.35), (0.0, 0.0, 1.0), 7.0 * size)
-    common.save(window, arguments.output, "skinning.png")
+        pictures.look_at(panel, where, (0.5, -0.8, 0.35), (0.0, 0.0, 1.0), 7.0 * size)
+    pictures.save(window, arguments.output, "skinning.png")
 
 
 if __name__ == "__main__":

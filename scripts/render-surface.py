@@ -11,20 +11,14 @@ surface_mesh.png   the triangles near: a bifurcation, a cap, a stenosis, two ves
 """
 import argparse
 import glob
-import importlib.util
 import math
 import os
 
-from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkPoints
+from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkLookupTable, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-here = os.path.dirname(os.path.abspath(__file__))
-spec = importlib.util.spec_from_file_location(
-    "render_segmentation", os.path.join(here, "render-segmentation.py"))
-views = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(views)
-common = views.common
+import pictures
 
 RADIUS = "MaximumInscribedSphereRadius"
 TRUE = (1.0, 1.0, 1.0)
@@ -39,7 +33,7 @@ def add_triangles(panel, mesh):
     mapper.SetInputData(mesh)
     mapper.SetScalarModeToUseCellFieldData()
     mapper.SelectColorArray("CellEntityIds")
-    table = common.vtkLookupTable()
+    table = vtkLookupTable()
     table.SetNumberOfTableValues(2)
     table.SetTableRange(0.5, 2.5)
     table.SetTableValue(0, *WALL, 1.0)
@@ -61,7 +55,7 @@ def bifurcation(surface, forks):
     radii = forks.GetPointData().GetArray("ParentRadius")
     order = sorted(range(forks.GetNumberOfPoints()), key=lambda n: -radii.GetTuple1(n))
     if not order:
-        common.fail("the trees have no bifurcation")
+        pictures.fail("the trees have no bifurcation")
     chosen = order[min(1, len(order) - 1)]
     return forks.GetPoint(chosen), radii.GetTuple1(chosen)
 
@@ -106,26 +100,26 @@ def passing():
 
 
 def built_plugin():
-    found = glob.glob(os.path.join(here, "..", "build", "paraview", "**",
+    found = glob.glob(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "build", "paraview", "**",
                                    "DynamicCoronaryPlugin.so"), recursive=True)
     if not found:
-        common.fail("no plugin in build/paraview; name it with --plugin")
+        pictures.fail("no plugin in build/paraview; name it with --plugin")
     return found[0]
 
 
 def close_ups(title, shots, add):
     """A window of four panels; a shot: name, what `add` puts into it, place, eye, scale."""
-    window, base = common.new_window()
-    across, height = common.SIZE
-    common.add_text(base, title, 20, height - 42, 26, bold=True)
+    window, base = pictures.new_window()
+    across, height = pictures.SIZE
+    pictures.add_text(base, title, 20, height - 42, 26, bold=True)
     for n, (name, mesh, where, eye, scale) in enumerate(shots):
         left, low = n % 2, 1 - n // 2
-        tall = 0.5 * (height - views.TITLE)
-        panel = common.add_panel(window, left * across / 2.0 + 2, low * tall + 2,
-                                 (left + 1) * across / 2.0 - 2, (low + 1) * tall - 2)
+        tall = 0.5 * (height - pictures.TITLE)
+        panel = pictures.add_panel(window, left * across / 2.0 + 2, low * tall + 2,
+                                   (left + 1) * across / 2.0 - 2, (low + 1) * tall - 2)
         add(panel, mesh)
-        common.add_text(panel, name, 16, 16)
-        common.look_at(panel, where, eye, (0.0, 0.1, 1.0) if abs(eye[2]) < 0.8 else (0, 1, 0), scale)
+        pictures.add_text(panel, name, 16, 16)
+        pictures.look_at(panel, where, eye, (0.0, 0.1, 1.0) if abs(eye[2]) < 0.8 else (0, 1, 0), scale)
     return window
 
 
@@ -136,26 +130,26 @@ def main():
     parser.add_argument("--truth", help="true surface, .vtp")
     parser.add_argument("--plugin", help="DynamicCoronaryPlugin.so; default: that of build/paraview")
     arguments = parser.parse_args()
-    surface = common.read_poly(os.path.join(arguments.input, "surface.vtp"))
-    caps = common.read_poly(os.path.join(arguments.input, "caps.vtp"))
-    forks = common.read_poly(os.path.join(arguments.input, "bifurcations.vtp"))
+    surface = pictures.read_poly(os.path.join(arguments.input, "surface.vtp"))
+    caps = pictures.read_poly(os.path.join(arguments.input, "caps.vtp"))
+    forks = pictures.read_poly(os.path.join(arguments.input, "bifurcations.vtp"))
     if surface.GetNumberOfPolys() == 0 or caps.GetNumberOfPoints() == 0:
-        common.fail("%s has no surface" % arguments.input)
+        pictures.fail("%s has no surface" % arguments.input)
     plugin = arguments.plugin or built_plugin()
     os.makedirs(arguments.output, exist_ok=True)
 
     bounds = surface.GetBounds()
     center = [0.5 * (bounds[2 * a] + bounds[2 * a + 1]) for a in range(3)]
     size = max(bounds[2 * a + 1] - bounds[2 * a] for a in range(3))
-    window, made = views.panels("Surface: %d triangles, %d inlets and outlets"
-                                % (surface.GetNumberOfPolys(), caps.GetNumberOfPoints()))
-    truth = common.read_poly(arguments.truth) if arguments.truth else None
-    for panel, (_, eye, up) in zip(made, views.VIEWS):
-        common.add_surface(panel, surface, color=WALL)
+    window, made = pictures.panels("Surface: %d triangles, %d inlets and outlets"
+                                   % (surface.GetNumberOfPolys(), caps.GetNumberOfPoints()))
+    truth = pictures.read_poly(arguments.truth) if arguments.truth else None
+    for panel, (_, eye, up) in zip(made, pictures.VIEWS):
+        pictures.add_surface(panel, surface, color=WALL)
         if truth:
-            common.add_surface(panel, truth, color=TRUE, opacity=0.3)
-        common.look_at(panel, center, eye, up, 0.95 * size)
-    common.save(window, arguments.output, "surface.png")
+            pictures.add_surface(panel, truth, color=TRUE, opacity=0.3)
+        pictures.look_at(panel, center, eye, up, 0.95 * size)
+    pictures.save(window, arguments.output, "surface.png")
 
     place, radius = bifurcation(surface, forks)
     inlet = caps.GetPoint(0)
@@ -169,7 +163,7 @@ def main():
         ("two vessels at 0.5 mm", swept(plugin, passing()), (0.0, 0.0, 1.3), (-0.3, -0.95, 0.05), 3.0),
     ]
     window = close_ups("Triangles: wall red, caps yellow", shots, add_triangles)
-    common.save(window, arguments.output, "surface_mesh.png")
+    pictures.save(window, arguments.output, "surface_mesh.png")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ tracking.png  centerlines at all moments, coloured by branch; where some points 
 import argparse
 import json
 import os
-import importlib.util
 
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
@@ -17,11 +16,7 @@ from vtkmodules.vtkFiltersCore import vtkGlyph3D
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-here = os.path.dirname(os.path.abspath(__file__))
-spec = importlib.util.spec_from_file_location(
-    "render_phantom", os.path.join(here, "render-phantom.py"))
-common = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(common)
+import pictures
 
 START = (0.85, 0.12, 0.12)
 WAY = (0.35, 0.6, 0.95)
@@ -33,10 +28,10 @@ def series(run, name):
     folder = os.path.join(run, "motion")
     path = os.path.join(folder, name)
     if not os.path.isfile(path):
-        common.fail("missing file: " + path)
+        pictures.fail("missing file: " + path)
     with open(path, encoding="utf-8") as file:
         files = json.load(file)["files"]
-    return [(one["time"], common.read_poly(os.path.join(folder, one["name"]))) for one in files]
+    return [(one["time"], pictures.read_poly(os.path.join(folder, one["name"]))) for one in files]
 
 
 def add_cells(panel, mesh, table):
@@ -81,7 +76,7 @@ def add_balls(panel, data, chosen, radius):
     glyphs.SetSourceConnection(ball.GetOutputPort())
     glyphs.ScalingOff()
     glyphs.Update()
-    common.add_surface(panel, glyphs.GetOutput(), color=START)
+    pictures.add_surface(panel, glyphs.GetOutput(), color=START)
 
 
 def main():
@@ -93,37 +88,37 @@ def main():
     lines = series(arguments.input, "centerline.vtp.series")
     surfaces = series(arguments.input, "surface.vtp.series")
     if len(lines) < 3:
-        common.fail("three moments or more are needed")
+        pictures.fail("three moments or more are needed")
 
-    window, base = common.new_window()
-    width, height = common.SIZE
+    window, base = pictures.new_window()
+    width, height = pictures.SIZE
     tall = height - 60
-    common.add_text(base, "Tracked through %d moments of the cycle" % len(lines), 20, height - 42,
-                    26, bold=True)
+    pictures.add_text(base, "Tracked through %d moments of the cycle" % len(lines), 20, height - 42,
+                      26, bold=True)
     bounds = surfaces[0][1].GetBounds()
     center = [(bounds[2 * i] + bounds[2 * i + 1]) / 2.0 for i in range(3)]
 
     def panel(number, title):
-        result = common.add_panel(window, number * width / 3 + 2, 2,
-                                  (number + 1) * width / 3 - 2, tall)
-        common.add_text(result, title, 16, 16, 18)
+        result = pictures.add_panel(window, number * width / 3 + 2, 2,
+                                    (number + 1) * width / 3 - 2, tall)
+        pictures.add_text(result, title, 16, 16, 18)
         return result
 
     def look(target):
-        common.look_at(target, center, (0.5, -0.8, 0.35), (0.0, 0.0, 1.0),
-                       0.62 * surfaces[0][1].GetLength())
+        pictures.look_at(target, center, (0.5, -0.8, 0.35), (0.0, 0.0, 1.0),
+                         0.62 * surfaces[0][1].GetLength())
 
     start = lines[0][1]
     target = panel(0, "centerlines over time, by branch")
-    table = common.branch_colors(start)
+    table = pictures.branch_colors(start)
     for _, data in lines:
-        add_cells(target, common.tube(data, 0.3), table)
+        add_cells(target, pictures.tube(data, 0.3), table)
     look(target)
 
     chosen = range(0, start.GetNumberOfPoints(), max(1, start.GetNumberOfPoints() // 150))
     target = panel(1, "first positions, and their ways")
-    common.add_surface(target, common.tube(start, 0.25), color=(0.7, 0.7, 0.7), opacity=0.6)
-    common.add_surface(target, common.tube(ways(lines, chosen), 0.3), color=WAY, opacity=0.55)
+    pictures.add_surface(target, pictures.tube(start, 0.25), color=(0.7, 0.7, 0.7), opacity=0.6)
+    pictures.add_surface(target, pictures.tube(ways(lines, chosen), 0.3), color=WAY, opacity=0.55)
     add_balls(target, start, chosen, 0.9)
     look(target)
 
@@ -131,9 +126,9 @@ def main():
     picks = [surfaces[0], surfaces[step], surfaces[2 * step]]
     target = panel(2, "wall at " + ", ".join("%.0f" % (100.0 * time) for time, _ in picks) + " %")
     for (_, data), color in zip(picks, WALLS):
-        common.add_surface(target, data, color=color, opacity=0.8)
+        pictures.add_surface(target, data, color=color, opacity=0.8)
     look(target)
-    common.save(window, arguments.output, "tracking.png")
+    pictures.save(window, arguments.output, "tracking.png")
 
 
 if __name__ == "__main__":

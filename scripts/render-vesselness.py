@@ -6,32 +6,21 @@
 import argparse
 import os
 
-from paraview import servermanager, simple
+from paraview import simple
 from vtkmodules.vtkCommonCore import vtkLookupTable
-from vtkmodules.vtkIOImage import vtkPNGWriter
 from vtkmodules.vtkImagingCore import vtkImageMapToColors, vtkImageReslice
 from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
-from vtkmodules.vtkRenderingCore import (
-    vtkImageActor,
-    vtkRenderer,
-    vtkRenderWindow,
-    vtkTextActor,
-    vtkWindowToImageFilter,
-)
-import vtkmodules.vtkRenderingFreeType  # noqa: F401
-import vtkmodules.vtkRenderingOpenGL2  # noqa: F401
+from vtkmodules.vtkRenderingCore import vtkImageActor, vtkRenderer, vtkTextActor
+
+import pictures
 
 SLAB = 20.0  # mm
 PANEL = (620, 560)
 
 
-def fetch(proxy, name):
+def image_of(proxy, name):
     """The image of a proxy, with one of its arrays as the scalars."""
-    tap = servermanager.filters.ReductionFilter(Input=proxy)
-    tap.UpdatePipeline()
-    data = tap.GetClientSideObject().GetOutputDataObject(0)
-    image = data.NewInstance()
-    image.ShallowCopy(data)
+    image = pictures.fetch(proxy)
     image.GetPointData().SetActiveScalars(name)
     return image
 
@@ -121,18 +110,15 @@ def main():
     frangi = simple.FrangiVesselness(phase, GenerateScale=1, AutomaticC=0, C=100.0)
     jerman = simple.FrangiVesselness(phase, Method="Jerman")
 
-    window = vtkRenderWindow()
-    window.SetOffScreenRendering(1)
-    window.SetSize(2 * PANEL[0], 2 * PANEL[1])
-    window.SetMultiSamples(0)
+    window = pictures.off_screen((2 * PANEL[0], 2 * PANEL[1]), [], 0)
     gray = table(-150.0, 650.0, (0, 0), (0, 0), (0, 1))
     warm = table(0.0, 1.0, (0.0, 0.15), (0.9, 0.35), (0.0, 1.0))
-    add_panel(window, 0, 0, slab(fetch(phase, "HU")), gray,
+    add_panel(window, 0, 0, slab(image_of(phase, "HU")), gray,
               "CT, maximum of a slab of %.0f mm" % SLAB, "HU")
-    add_panel(window, 1, 0, slab(fetch(frangi, "Vesselness")), warm, "Frangi, C = 100 HU", "")
-    add_panel(window, 0, 1, slab(fetch(jerman, "Vesselness")), warm, "Jerman, Tau = 0.75", "")
+    add_panel(window, 1, 0, slab(image_of(frangi, "Vesselness")), warm, "Frangi, C = 100 HU", "")
+    add_panel(window, 0, 1, slab(image_of(jerman, "Vesselness")), warm, "Jerman, Tau = 0.75", "")
     # Where there is a vessel; elsewhere the scale means nothing.
-    image = fetch(frangi, "VesselScale")
+    image = image_of(frangi, "VesselScale")
     scales, values = (image.GetPointData().GetArray(n) for n in ("VesselScale", "Vesselness"))
     for n in range(scales.GetNumberOfValues()):
         if values.GetValue(n) < 0.15:
@@ -141,15 +127,7 @@ def main():
     rainbow.SetBelowRangeColor(0.04, 0.05, 0.07, 1.0)
     rainbow.UseBelowRangeColorOn()
     add_panel(window, 1, 1, slab(image), rainbow, "Scale of the maximum (Frangi above 0.15)", "mm")
-    window.Render()
-    grabber = vtkWindowToImageFilter()
-    grabber.SetInput(window)
-    grabber.ReadFrontBufferOff()
-    writer = vtkPNGWriter()
-    writer.SetFileName(arguments.output)
-    writer.SetInputConnection(grabber.GetOutputPort())
-    writer.Write()
-    print(arguments.output)
+    pictures.save(window, arguments.output)
 
 
 main()

@@ -8,7 +8,7 @@ volume.png  tetrahedra behind a cut, and the skeleton among them: at a bifurcati
             two vessels that pass each other at 0.5 mm. The last two are made for the picture
 """
 import argparse
-import importlib.util
+import importlib
 import os
 
 from vtkmodules.vtkCommonDataModel import vtkBox, vtkImplicitBoolean, vtkPlane
@@ -18,12 +18,9 @@ from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-here = os.path.dirname(os.path.abspath(__file__))
-spec = importlib.util.spec_from_file_location(
-    "render_surface", os.path.join(here, "render-surface.py"))
-surfaces = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(surfaces)
-common = surfaces.common
+import pictures
+
+surfaces = importlib.import_module("render-surface")
 
 CELLS = (0.93, 0.88, 0.70)
 EDGE = (0.12, 0.10, 0.12)
@@ -32,21 +29,13 @@ SKELETON = (0.85, 0.10, 0.10)
 
 def filled(plugin, tree):
     """Tetrahedra of a tree's swept surface, and their edges along the tree."""
-    from paraview import servermanager, simple
+    from paraview import simple
     simple.LoadPlugin(plugin, ns=simple.__dict__)
     source = simple.TrivialProducer()
     source.GetClientSideObject().SetOutput(tree)
     mesher = simple.TetrahedralMesher(Surface=simple.FrenetSweepSurface(Input=source),
                                       Skeleton=source)
-    mesher.UpdatePipeline()
-    parts = []
-    for port in (0, 2):
-        tap = servermanager.filters.ReductionFilter(Input=simple.OutputPort(mesher, port))
-        tap.UpdatePipeline()
-        part = tap.GetClientSideObject().GetOutputDataObject(0)
-        parts.append(part.NewInstance())
-        parts[-1].ShallowCopy(part)
-    return parts
+    return [pictures.fetch(mesher, port) for port in (0, 2)]
 
 
 def add_cut(panel, cut):
@@ -99,7 +88,7 @@ def across_fork(lines, place):
         if max(abs(a - b) for a, b in zip(points.GetPoint(0), place)) < 1e-6:
             later = points.GetPoint(min(6, points.GetNumberOfPoints() - 1))
             ways.append([a - b for a, b in zip(later, place)])
-    return common.cross(*ways[:2]) if len(ways) > 1 else (0.2, -1.0, 0.25)
+    return pictures.cross(*ways[:2]) if len(ways) > 1 else (0.2, -1.0, 0.25)
 
 
 def main():
@@ -110,17 +99,17 @@ def main():
     arguments = parser.parse_args()
     path = os.path.join(arguments.input, "volume.vtu")
     if not os.path.isfile(path):
-        common.fail("missing file: " + path)
+        pictures.fail("missing file: " + path)
     reader = vtkXMLUnstructuredGridReader()
     reader.SetFileName(path)
     reader.Update()
     tree = (reader.GetOutput(),
-            common.read_poly(os.path.join(arguments.input, "volume_skeleton.vtp")))
-    caps = common.read_poly(os.path.join(arguments.input, "caps.vtp"))
-    lines = common.read_poly(os.path.join(arguments.input, "centerline.vtp"))
-    forks = common.read_poly(os.path.join(arguments.input, "bifurcations.vtp"))
+            pictures.read_poly(os.path.join(arguments.input, "volume_skeleton.vtp")))
+    caps = pictures.read_poly(os.path.join(arguments.input, "caps.vtp"))
+    lines = pictures.read_poly(os.path.join(arguments.input, "centerline.vtp"))
+    forks = pictures.read_poly(os.path.join(arguments.input, "bifurcations.vtp"))
     if tree[0].GetNumberOfCells() == 0 or caps.GetNumberOfPoints() == 0:
-        common.fail("%s has no tetrahedra" % arguments.input)
+        pictures.fail("%s has no tetrahedra" % arguments.input)
     plugin = arguments.plugin or surfaces.built_plugin()
 
     place, radius = surfaces.bifurcation(tree[0], forks)
@@ -128,7 +117,7 @@ def main():
     normal = caps.GetPointData().GetArray("CapNormal").GetTuple(0)
     width = caps.GetPointData().GetArray(surfaces.RADIUS).GetTuple1(0)
     # In the plane of the cap, so that the cut goes through it.
-    across = common.unit(common.cross(normal, (0.3, 0.5, 0.8)))
+    across = pictures.unit(pictures.cross(normal, (0.3, 0.5, 0.8)))
     inside = [p - 1.2 * width * n for p, n in zip(inlet, normal)]
     shots = []
     for name, mesh, where, eye, scale in (
@@ -138,12 +127,12 @@ def main():
             ("two vessels at 0.5 mm", filled(plugin, surfaces.passing()), (0.0, 0.0, 1.2),
              (0.87, -0.5, 0.0), 3.0)):
         # Cells with positive function values are left out: the plane's normal looks at the eye.
-        shots.append((name, (mesh, where, common.unit(eye), scale), where, eye, scale))
+        shots.append((name, (mesh, where, pictures.unit(eye), scale), where, eye, scale))
     os.makedirs(arguments.output, exist_ok=True)
     window = surfaces.close_ups("Tetrahedra behind a cut: %d in %d points; the skeleton red"
                                 % (tree[0].GetNumberOfCells(), tree[0].GetNumberOfPoints()),
                                 shots, add_cut)
-    common.save(window, arguments.output, "volume.png")
+    pictures.save(window, arguments.output, "volume.png")
 
 
 if __name__ == "__main__":

@@ -16,41 +16,14 @@ EOF
 }
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
-install=yes
-jobs="$(nproc)"
-while [ $# -gt 0 ]; do
-  case "$1" in
-    --no-install) install=no ;;
-    -j)
-      jobs="${2:-}"
-      shift || true
-      ;;
-    -j*) jobs="${1#-j}" ;;
-    -h | --help)
-      usage
-      exit 0
-      ;;
-    *) break ;;
-  esac
-  shift || true
+# shellcheck source=scripts/build-first.bash
+source "$root/scripts/build-first.bash"
+while [ $# -gt 0 ] && build_option "$@"; do
+  shift "$taken"
 done
-if ! [[ $jobs =~ ^[1-9][0-9]*$ ]]; then
-  echo "simulate: -j takes a number of jobs, not '$jobs'" >&2
-  exit 2
-fi
 
 folder="$PWD"
 cd "$root"
-mkdir -p build/logs
-if [ "$install" = yes ]; then
-  echo "== Packages"
-  scripts/install-dependencies.sh --tree paraview --no-tests </dev/null
-fi
-echo "== Building (log: build/logs/simulate-build.log)"
-if ! { cmake --preset paraview && cmake --build --preset paraview -j "$jobs" --target coronary-simulator; } \
-  >build/logs/simulate-build.log 2>&1 </dev/null; then
-  tail -n 40 build/logs/simulate-build.log >&2
-  exit 1
-fi
+install_and_build build/logs/simulate-build.log --target coronary-simulator </dev/null
 cd "$folder"
 exec "$root/build/paraview/bin/coronary-simulator" "$@"

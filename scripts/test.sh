@@ -14,35 +14,22 @@ EOF
 }
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+# shellcheck source=scripts/build-first.bash
+source "$root/scripts/build-first.bash"
 trees=(paraview vtk)
 sanitizers=no
-install=yes
-jobs="$(nproc)"
 while [ $# -gt 0 ]; do
+  taken=1
   case "$1" in
     --tree)
       trees=("${2:-}")
-      shift || true
+      taken=$(($# > 1 ? 2 : 1))
       ;;
     --tree=*) trees=("${1#*=}") ;;
     --sanitizers) sanitizers=yes ;;
-    --no-install) install=no ;;
-    -j)
-      jobs="${2:-}"
-      shift || true
-      ;;
-    -j*) jobs="${1#-j}" ;;
-    -h | --help)
-      usage
-      exit 0
-      ;;
-    *)
-      echo "test: unknown option '$1'" >&2
-      usage >&2
-      exit 2
-      ;;
+    *) build_option "$@" || refuse_option "$1" ;;
   esac
-  shift || true
+  shift "$taken"
 done
 for tree in "${trees[@]}"; do
   if [ "$tree" != paraview ] && [ "$tree" != vtk ]; then
@@ -50,10 +37,6 @@ for tree in "${trees[@]}"; do
     exit 2
   fi
 done
-if ! [[ $jobs =~ ^[1-9][0-9]*$ ]]; then
-  echo "test: -j takes a number of jobs, not '$jobs'" >&2
-  exit 2
-fi
 
 exec </dev/null
 cd "$root"

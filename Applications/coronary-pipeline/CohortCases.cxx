@@ -5,14 +5,13 @@
 #include "Fnv1a.h"
 #include "RunReport.h"
 #include "RunSettings.h"
+#include "TextFile.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <initializer_list>
 #include <set>
-#include <sstream>
 #include <stdexcept>
 
 namespace coronary
@@ -267,17 +266,11 @@ CohortCase CaseOf(
 
 Cohort ReadCohort(const std::string& path)
 {
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-  {
-    throw std::runtime_error("Cannot open the cases '" + path + "'.");
-  }
+  const std::string text = ReadTextFile(path, "cases");
   Json json;
   try
   {
-    std::ostringstream text;
-    text << file.rdbuf();
-    json = ParseBoundedJson<Json>(text.str());
+    json = ParseBoundedJson<Json>(text);
   }
   catch (const TooDeepJson& error)
   {

@@ -397,7 +397,7 @@ vtkSmartPointer<vtkPolyData> ConvertJob::Write(
     tree ? vtkCenterlineConversion::TreeForm : vtkCenterlineConversion::VmtkForm);
   conversion->Update();
   ThrowIfError(messages, this->input);
-  const vtkSmartPointer<vtkPolyData> written = this->form == "simvascular"
+  vtkSmartPointer<vtkPolyData> written = this->form == "simvascular"
     ? ToSimVascular(this->OneTree(conversion->GetOutput()), this->Unit())
     : vtkSmartPointer<vtkPolyData>(conversion->GetOutput());
   WritePolyData(this->output, written, messages);

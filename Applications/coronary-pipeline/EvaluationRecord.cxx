@@ -3,6 +3,7 @@
 #include "AtomicFile.h"
 #include "BoundedJson.h"
 #include "Fnv1a.h"
+#include "TextFile.h"
 
 #include <nlohmann/json.hpp>
 
@@ -133,16 +134,14 @@ std::string EvaluationCache::NameOf(const std::vector<std::string>& files,
 
 bool EvaluationCache::Read(const std::string& name, EvaluationRecord& record) const
 {
-  std::ifstream file(fs::path(this->Folder) / name);
-  if (name.empty() || !file)
+  if (name.empty())
   {
     return false;
   }
-  std::stringstream text;
-  text << file.rdbuf();
   try
   {
-    record = EvaluationRecord::Of(text.str());
+    const std::string path = (fs::path(this->Folder) / name).string();
+    record = EvaluationRecord::Of(ReadTextFile(path, "measures"));
     return true;
   }
   catch (const std::runtime_error&)

@@ -2,11 +2,10 @@
 
 #include "BoundedJson.h"
 #include "SeriesDescription.h"
+#include "TextFile.h"
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 namespace fs = std::filesystem;
@@ -73,8 +72,7 @@ std::vector<double> NumbersOf(const nlohmann::json& parent, const char* name)
 /// What the report of `run` says of the motion.
 void ReadReport(const std::string& path, MovingModel& model)
 {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
+  const std::string text = ReadTextFile(path, "the report of a run");
   nlohmann::json report;
   try
   {

@@ -2,6 +2,7 @@
 
 #include "BoundedJson.h"
 #include "Fnv1a.h"
+#include "TextFile.h"
 #include "UtcTime.h"
 
 #include <algorithm>
@@ -11,7 +12,6 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <system_error>
 
 #include <sys/resource.h>
@@ -186,16 +186,14 @@ RunReport::RunReport(std::string folder, Json settings, Json input)
   , Started(UtcTime())
 {
   const fs::path path = fs::path(this->Folder) / "report.json";
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
+  if (!std::ifstream(path))
   {
     this->WhyNoOlder = "there is no '" + path.string() + "'";
     return;
   }
-  const std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
   try
   {
-    this->Older = ParseBoundedJson<Json>(text);
+    this->Older = ParseBoundedJson<Json>(ReadTextFile(path.string(), "a report"));
   }
   catch (const std::exception&)
   {

@@ -3,12 +3,11 @@
 #include "BoundedJson.h"
 #include "Command.h"
 #include "OptionChecks.h"
+#include "TextFile.h"
 #include "vtkMovingMesh.h"
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 namespace coronary
@@ -373,12 +372,7 @@ void RunOptions::Assign(Setting& setting, const Json& value, const std::string& 
 
 void RunOptions::Read(const std::string& path)
 {
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-  {
-    throw std::runtime_error("Cannot open the settings '" + path + "'.");
-  }
-  const std::string text{ std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
+  const std::string text = ReadTextFile(path, "settings");
   Json json;
   try
   {

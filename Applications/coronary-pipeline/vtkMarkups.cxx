@@ -3,6 +3,7 @@
 #include "CenterlineConversion.h"
 #include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkSeeds.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -144,29 +145,17 @@ bool AreFiducials(const std::vector<Markup>& markups)
 
 vtkSmartPointer<vtkPolyData> SeedsOf(const std::vector<Markup>& markups)
 {
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  vtkNew<vtkCellArray> vertices;
-  vtkNew<vtkStringArray> labels;
-  labels->SetName(names::Name);
-  vtkNew<vtkDoubleArray> confidence;
-  confidence->SetName(names::Confidence);
+  std::vector<Vector3> positions;
+  std::vector<std::string> labels;
   for (const Markup& markup : markups)
   {
     for (const Markup::Point& point : markup.points)
     {
-      const vtkIdType id = points->InsertNextPoint(point.position.data());
-      vertices->InsertNextCell(1, &id);
-      labels->InsertNextValue(point.label.empty() ? std::to_string(id) : point.label);
-      confidence->InsertNextValue(1.0);
+      positions.push_back(point.position);
+      labels.push_back(point.label);
     }
   }
-  auto seeds = vtkSmartPointer<vtkPolyData>::New();
-  seeds->SetPoints(points);
-  seeds->SetVerts(vertices);
-  seeds->GetPointData()->AddArray(labels);
-  seeds->GetPointData()->AddArray(confidence);
-  return seeds;
+  return MakeSeeds(positions, 1.0, labels);
 }
 
 vtkSmartPointer<vtkPolyData> LinesOf(

@@ -1,20 +1,16 @@
 #include "vtkRunSurface.h"
 
-#include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkDataArray.h"
-#include "vtkDoubleArray.h"
 #include "vtkIdList.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
-#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkPolyDataConnectivityFilter.h"
-#include "vtkStringArray.h"
+#include "vtkSeeds.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -31,32 +27,7 @@ constexpr double GuessedConfidence = 0.5;
 /// How much of a vessel an end is, mm: at its very tip it is rounded off.
 constexpr double EndLength = 5.0;
 
-vtkSmartPointer<vtkPolyData> MakeSeeds(
-  const std::vector<std::array<double, 3>>& positions, double confidenceOfAll)
-{
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  vtkNew<vtkCellArray> vertices;
-  vtkNew<vtkStringArray> names;
-  names->SetName(vtkCoronaryArrayNames::Name);
-  vtkNew<vtkDoubleArray> confidence;
-  confidence->SetName(vtkCoronaryArrayNames::Confidence);
-  for (const auto& position : positions)
-  {
-    const vtkIdType id = points->InsertNextPoint(position.data());
-    vertices->InsertNextCell(1, &id);
-    names->InsertNextValue(std::to_string(id));
-    confidence->InsertNextValue(confidenceOfAll);
-  }
-  auto seeds = vtkSmartPointer<vtkPolyData>::New();
-  seeds->SetPoints(points);
-  seeds->SetVerts(vertices);
-  seeds->GetPointData()->AddArray(names);
-  seeds->GetPointData()->AddArray(confidence);
-  return seeds;
-}
-
-std::vector<std::array<double, 3>> HighestPoints(vtkPolyData* surface)
+std::vector<Vector3> HighestPoints(vtkPolyData* surface)
 {
   vtkNew<vtkPolyDataConnectivityFilter> components;
   components->SetInputData(surface);
@@ -65,15 +36,15 @@ std::vector<std::array<double, 3>> HighestPoints(vtkPolyData* surface)
   components->Update();
   vtkPolyData* colored = components->GetOutput();
   vtkDataArray* region = colored->GetPointData()->GetArray("RegionId");
-  std::map<int, std::array<double, 3>> highest;
+  std::map<int, Vector3> highest;
   for (vtkIdType n = 0; n < colored->GetNumberOfPoints(); ++n)
   {
-    std::array<double, 3> point;
+    Vector3 point;
     colored->GetPoint(n, point.data());
     auto& top = highest.emplace(static_cast<int>(region->GetTuple1(n)), point).first->second;
     top = point[2] > top[2] ? point : top;
   }
-  std::vector<std::array<double, 3>> points;
+  std::vector<Vector3> points;
   points.reserve(highest.size());
   for (const auto& [id, point] : highest)
   {
@@ -85,10 +56,10 @@ std::vector<std::array<double, 3>> HighestPoints(vtkPolyData* surface)
 
 vtkSmartPointer<vtkPolyData> SeedsOfSurface(vtkPolyData* surface, const std::vector<double>& given)
 {
-  std::vector<std::array<double, 3>> positions;
+  std::vector<Vector3> positions;
   for (std::size_t n = 0; n + 2 < given.size(); n += 3)
   {
-    positions.push_back({ given[n], given[n + 1], given[n + 2] });
+    positions.emplace_back(given[n], given[n + 1], given[n + 2]);
   }
   if (given.empty())
   {
@@ -137,7 +108,7 @@ vtkSmartPointer<vtkPolyData> WidestEnds(vtkPolyData* trees)
       offer(cell, false);
     }
   }
-  std::vector<std::array<double, 3>> positions;
+  std::vector<Vector3> positions;
   for (const auto& [tree, best] : widest)
   {
     positions.emplace_back();

@@ -1,6 +1,7 @@
 #include "DriveScript.h"
 
 #include "JsonFields.h"
+#include "TextFile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -187,6 +188,6 @@ DriveScript DriveScriptFromText(const std::string& text, const std::string& orig
 
 DriveScript ReadDriveScript(const std::string& path)
 {
-  return DriveScriptFromText(ReadTextFile(path), "'" + path + "'");
+  return DriveScriptFromText(ReadTextFile(path, "a script"), "'" + path + "'");
 }
 }

@@ -3,6 +3,7 @@
 #include "EmbeddedFiles.h"
 #include "InstrumentJson.h"
 #include "JsonFields.h"
+#include "TextFile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -278,7 +279,7 @@ InstrumentCatalogue CatalogueFromText(const std::string& text, const std::string
 
 InstrumentCatalogue ReadCatalogue(const std::string& path)
 {
-  return CatalogueFromText(ReadTextFile(path), "'" + path + "'");
+  return CatalogueFromText(ReadTextFile(path, "a catalogue"), "'" + path + "'");
 }
 
 const InstrumentCatalogue& BuiltInCatalogue()

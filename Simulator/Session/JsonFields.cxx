@@ -4,8 +4,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -29,30 +27,6 @@ std::string RangeText(double low, double high)
   std::snprintf(text, sizeof(text), "a number from %g to %g", low, high);
   return text;
 }
-}
-
-std::string ReadTextFile(const std::string& path, std::size_t most)
-{
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-  {
-    throw std::runtime_error("Cannot open '" + path + "'.");
-  }
-  std::string text;
-  char block[65536];
-  while (file.read(block, sizeof(block)) || file.gcount() > 0)
-  {
-    text.append(block, static_cast<std::size_t>(file.gcount()));
-    if (text.size() > most)
-    {
-      throw std::runtime_error("'" + path + "' has more than " + std::to_string(most) + " bytes.");
-    }
-  }
-  if (file.bad() || !file.eof())
-  {
-    throw std::runtime_error("Cannot read '" + path + "'.");
-  }
-  return text;
 }
 
 nlohmann::json ParseJson(const std::string& text, const std::string& where)

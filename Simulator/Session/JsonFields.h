@@ -13,10 +13,6 @@
 
 namespace coronary
 {
-/// Contents of a file.
-/// @throws std::runtime_error naming the file: it can not be read, or has more than `most` bytes
-std::string ReadTextFile(const std::string& path, std::size_t most = std::size_t{ 16 } << 20);
-
 /// @param where  for messages: the file's name in quotes
 /// @throws std::runtime_error: no JSON, or nested more than 64 times
 nlohmann::json ParseJson(const std::string& text, const std::string& where);

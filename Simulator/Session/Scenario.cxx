@@ -3,6 +3,7 @@
 #include "EmbeddedFiles.h"
 #include "InstrumentJson.h"
 #include "JsonFields.h"
+#include "TextFile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -504,7 +505,8 @@ Scenario LoadScenario(const std::string& name)
       "' is neither a scenario file nor a built-in scenario; built in are " + names + ".");
   }
   const std::string folder = fs::path(name).parent_path().string();
-  return ScenarioFromText(ReadTextFile(name), "'" + name + "'", folder.empty() ? "." : folder);
+  return ScenarioFromText(
+    ReadTextFile(name, "a scenario"), "'" + name + "'", folder.empty() ? "." : folder);
 }
 
 int RootBranch(const WallTopology& topology, const std::string& artery)

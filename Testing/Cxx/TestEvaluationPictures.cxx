@@ -1,4 +1,5 @@
 // The pictures of a small made-up case: a forked tree that moves, its truth beside it. Pixels are counted.
+#include "Refusals.h"
 #include "vtkAnimatedGif.h"
 #include "vtkEvaluationPictures.h"
 #include "vtkEvaluationPlots.h"
@@ -454,15 +455,8 @@ TEST_F(EvaluationPictures, WithoutNumbersThereIsStillAPicture)
 
 TEST_F(EvaluationPictures, ErrorsNameWhatIsWrong)
 {
-  try
-  {
-    DrawOverlayGrid(this->Scene, this->Path("no/overlay.png"));
-    FAIL() << "a folder that is not there";
-  }
-  catch (const std::runtime_error& error)
-  {
-    EXPECT_NE(std::string(error.what()).find("no/overlay.png"), std::string::npos);
-  }
+  ExpectError(
+    [&] { DrawOverlayGrid(this->Scene, this->Path("no/overlay.png")); }, "no/overlay.png");
   EXPECT_THROW(DrawPlots({ this->Case }, this->Path("no")), std::runtime_error);
   EXPECT_THROW(DrawBeating(this->Scene, this->Path("no")), std::runtime_error);
   EXPECT_THROW(DrawPlots({}, this->Folder), std::invalid_argument);

@@ -1,6 +1,7 @@
 // Posing by hand without a window: edits, what can be undone, files, and what is refused.
 #include "vtkPosingModel.h"
 
+#include "Refusals.h"
 #include "VesselTestData.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
@@ -67,17 +68,7 @@ protected:
   template <typename Function>
   void ExpectFailure(const Function& function, const std::string& file, const std::string& part)
   {
-    try
-    {
-      function();
-      ADD_FAILURE() << "nothing was thrown, wanted: " << part;
-    }
-    catch (const std::runtime_error& error)
-    {
-      const std::string text = error.what();
-      EXPECT_NE(text.find(file), std::string::npos) << text;
-      EXPECT_NE(text.find(part), std::string::npos) << text;
-    }
+    ExpectError(function, file, part);
     this->Messages.ForgetWarnings();
   }
 

@@ -1,5 +1,6 @@
 // The report's HTML: all parts, every text escaped, tags balanced, nothing from the network.
 #include "EvaluationReport.h"
+#include "Refusals.h"
 
 #include <gtest/gtest.h>
 
@@ -215,15 +216,7 @@ TEST_F(EvaluationReportTest, NamesFilesThatAreMissing)
 {
   EvaluationReport report = this->Full();
   report.plots = { this->Folder + "/none.svg" };
-  try
-  {
-    EvaluationHtml(report);
-    FAIL() << "a missing plot";
-  }
-  catch (const std::runtime_error& error)
-  {
-    EXPECT_NE(std::string(error.what()).find("none.svg"), std::string::npos);
-  }
+  ExpectError([&] { EvaluationHtml(report); }, "none.svg");
   report.plots = { this->Folder + "/picture.png" };
   EXPECT_THROW(EvaluationHtml(report), std::runtime_error) << "no SVG";
   report = this->Full();

@@ -21,24 +21,6 @@ using namespace formattest;
 
 namespace
 {
-/// Calls what is to throw std::runtime_error with `part` in its one line.
-template <typename Function>
-void ExpectError(const Function& function, const std::string& part)
-{
-  try
-  {
-    function();
-    ADD_FAILURE() << "nothing was thrown, wanted: " << part;
-  }
-  catch (const std::runtime_error& error)
-  {
-    const std::string what = error.what();
-    EXPECT_NE(what.find(part), std::string::npos) << what;
-    EXPECT_EQ(what.find('\n'), std::string::npos) << what;
-    EXPECT_LT(what.size(), 600u) << what;
-  }
-}
-
 /// Two layers of 4 x 3 x 2 voxels: vessel (1) and plaque (2) share the first, the aorta has the second.
 const std::string Notes =
   "Segment0_ID:=Segment_1\nSegment0_Name:=Vessel\nSegment0_LabelValue:=1\n"

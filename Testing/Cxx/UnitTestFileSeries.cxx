@@ -2,6 +2,7 @@
 #include "AtomicFile.h"
 #include "FileSeries.h"
 #include "MeshSequenceReport.h"
+#include "Refusals.h"
 #include "StagedFolder.h"
 
 #include <gtest/gtest.h>
@@ -40,16 +41,7 @@ protected:
   void ExpectFailure(const std::string& text, const std::string& part)
   {
     const std::string path = this->Put("list", text);
-    try
-    {
-      coronary::ReadFileSeries(path);
-      ADD_FAILURE() << "nothing was thrown, wanted: " << part;
-    }
-    catch (const std::runtime_error& error)
-    {
-      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
-      EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
-    }
+    ExpectError([&] { coronary::ReadFileSeries(path); }, path, part);
   }
 
   fs::path Folder;

@@ -1,10 +1,14 @@
 // The file formats in plain C++: geometry, values, times, and the message for every kind of bad
 // input. The files are written by FormatTestFiles, not by the code under test.
 #include "AtomicFile.h"
+#include "FileSeries.h"
 #include "FormatTestFiles.h"
 #include "GatedSeries.h"
+#include "MarkupsFile.h"
 #include "MetaImageWriter.h"
 #include "SeriesDescription.h"
+#include "SimVascularFile.h"
+#include "TextFile.h"
 #include "VolumeFile.h"
 
 #include <gtest/gtest.h>
@@ -17,6 +21,7 @@
 #include <limits>
 #include <sstream>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 using namespace coronary;
 using namespace formattest;
@@ -221,6 +226,35 @@ TEST(SeriesDescription, BadInputGivesOneClearMessage)
   ExpectMessage(
     MessageOf([&] { WriteSeriesDescription(folder / "w.json", d); }), { "seeds[0]", "not finite" });
   EXPECT_FALSE(std::filesystem::exists(folder / "w.json"));
+}
+
+TEST(TextFile, IsReadWholeUpToItsBound)
+{
+  const TemporaryFolder folder;
+  std::string text(200000, 'x');
+  text += std::string("\0\n\r\n", 4);
+  WriteText(folder / "a.txt", text);
+  EXPECT_EQ(ReadTextFile(folder / "a.txt", "a test", text.size()), text);
+  ExpectMessage(MessageOf([&] { ReadTextFile(folder / "a.txt", "a test", text.size() - 1); }),
+    { "a.txt': is too large for a test" });
+  WriteText(folder / "empty", "");
+  EXPECT_EQ(ReadTextFile(folder / "empty", "a test", 0), "");
+  ExpectMessage(
+    MessageOf([&] { ReadTextFile(folder / "none", "a test"); }), { "Cannot open", "none'" });
+  ExpectMessage(MessageOf([&] { ReadTextFile(folder / "", "a test"); }), { "cannot be read" });
+  ExpectMessage(MessageOf([] { ReadTextFile("/dev/zero", "a test", 100000); }), { "too large" });
+
+  // The formats that a window reads do not wait for who writes into a pipe.
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  for (void (*const read)(const std::string&) :
+    { +[](const std::string& path) { ReadSeriesDescription(path); },
+      +[](const std::string& path) { ReadFileSeries(path); },
+      +[](const std::string& path) { ReadMarkupsFile(path); },
+      +[](const std::string& path) { ReadSimVascularFile(path); } })
+  {
+    ExpectMessage(MessageOf([&] { read(folder / "pipe"); }), { "pipe' is not a file" });
+    ExpectMessage(MessageOf([&] { read(folder / "none"); }), { "none' does not exist" });
+  }
 }
 
 TEST(MetaImage, WrittenImagesComeBackWithTheirGeometry)

@@ -3,6 +3,7 @@
 #include "FormatTestFiles.h"
 #include "MatrixFile.h"
 #include "MeshFile.h"
+#include "Refusals.h"
 
 #include <gtest/gtest.h>
 
@@ -16,22 +17,6 @@ using namespace formattest;
 
 namespace
 {
-template <typename Function>
-void ExpectRefusal(const Function& function, const std::string& file, const std::string& part)
-{
-  try
-  {
-    function();
-    ADD_FAILURE() << "nothing was thrown, wanted: " << part;
-  }
-  catch (const std::runtime_error& error)
-  {
-    const std::string message = error.what();
-    EXPECT_NE(message.find(part), std::string::npos) << message;
-    EXPECT_NE(message.find(file), std::string::npos) << message;
-  }
-}
-
 FileMesh Tetrahedron()
 {
   FileMesh mesh;
@@ -103,7 +88,7 @@ TEST(MatrixFile, RefusesWithTheFileAndTheReason)
   const auto refuse = [&](const std::string& text, const std::string& part)
   {
     WriteText(folder / "bad.dmat", text);
-    ExpectRefusal([&] { ReadMatrixFile(folder / "bad.dmat"); }, "bad.dmat", part);
+    ExpectError([&] { ReadMatrixFile(folder / "bad.dmat"); }, "bad.dmat", part);
   };
   refuse("", "ends too early");
   refuse("2 x\n", "line 1: 'x' is no integer");
@@ -117,8 +102,8 @@ TEST(MatrixFile, RefusesWithTheFileAndTheReason)
   refuse("0 0\n2 2\n1234567", "too short");
   refuse("0 0\n1 1\n123456789", "9 bytes");
   refuse("0 0\n1 1 12345678", "do not end with the line");
-  ExpectRefusal([&] { ReadMatrixFile(folder / "none.dmat"); }, "none.dmat", "No such file");
-  ExpectRefusal([&]
+  ExpectError([&] { ReadMatrixFile(folder / "none.dmat"); }, "none.dmat", "No such file");
+  ExpectError([&]
     { WriteMatrixFile((folder / "bad.dmat") + "/w.dmat", Eigen::MatrixXd::Zero(1, 1)); },
     "w.dmat", "Cannot write");
 }
@@ -188,7 +173,7 @@ TEST(MeshFile, RefusesWithTheFileAndTheLine)
   const auto refuse = [&](const std::string& name, const std::string& text, const std::string& part)
   {
     WriteText(folder / name, text);
-    ExpectRefusal([&] { ReadMeshFile(folder / name); }, name, part);
+    ExpectError([&] { ReadMeshFile(folder / name); }, name, part);
   };
   refuse("a.obj", "v 0 0 0\nv 1 nan 0\n", "line 2: a coordinate is not finite");
   refuse("a.obj", "v 0 0 0\nf 1 2 3\n", "line 2: a corner is point 1");
@@ -207,15 +192,15 @@ TEST(MeshFile, RefusesWithTheFileAndTheLine)
   refuse("a.mesh", "MeshVersionFormatted 2\nVertices 1\n0 0 0 0\nTriangles 1\n1 0 1 0\n",
     "line 5: a corner is point -1");
   refuse("a.mesh", "MeshVersionFormatted 2\nBlobs 3\n", "line 2: a part of the mesh is not known");
-  ExpectRefusal([&] { ReadMeshFile(folder / "none.off"); }, "none.off", "No such file");
-  ExpectRefusal([&] { ReadMeshFile(folder / "a.stl"); }, "a.stl", "is no .obj");
+  ExpectError([&] { ReadMeshFile(folder / "none.off"); }, "none.off", "No such file");
+  ExpectError([&] { ReadMeshFile(folder / "a.stl"); }, "a.stl", "is no .obj");
   FileMesh mesh = Tetrahedron();
   mesh.tetrahedra = { { 0, 1, 2, 3 } };
-  ExpectRefusal([&] { WriteMeshFile(folder / "t.obj", mesh); }, "t.obj", "only .mesh");
+  ExpectError([&] { WriteMeshFile(folder / "t.obj", mesh); }, "t.obj", "only .mesh");
   mesh.tetrahedra[0][2] = 4;
-  ExpectRefusal([&] { WriteMeshFile(folder / "t.mesh", mesh); }, "t.mesh", "tetrahedron 0");
+  ExpectError([&] { WriteMeshFile(folder / "t.mesh", mesh); }, "t.mesh", "tetrahedron 0");
   mesh.points[1].x() = std::numeric_limits<double>::infinity();
-  ExpectRefusal([&] { WriteMeshFile(folder / "t.off", mesh); }, "t.off", "point 1");
+  ExpectError([&] { WriteMeshFile(folder / "t.off", mesh); }, "t.off", "point 1");
   EXPECT_FALSE(std::filesystem::exists(folder / "t.off"));
 }
 

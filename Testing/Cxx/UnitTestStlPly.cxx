@@ -1,5 +1,6 @@
 // .stl and .ply files, and what damaged ones may not do.
 #include "FormatTestFiles.h"
+#include "Refusals.h"
 #include "StlPlyFile.h"
 
 #include <gtest/gtest.h>
@@ -53,17 +54,7 @@ protected:
 
   void Refuse(const std::string& name, const std::string& bytes, const std::string& part)
   {
-    try
-    {
-      this->Read(name, bytes);
-      ADD_FAILURE() << "taken, wanted: " << part;
-    }
-    catch (const std::runtime_error& error)
-    {
-      const std::string message = error.what();
-      EXPECT_NE(message.find(part), std::string::npos) << message;
-      EXPECT_NE(message.find(name), std::string::npos) << message;
-    }
+    ExpectError([&] { this->Read(name, bytes); }, name, part);
   }
 
   const TemporaryFolder Folder;

@@ -4,8 +4,10 @@ import sys
 
 from paraview import simple
 
-folder = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
 sys.path.insert(0, os.environ["DYNAMICCORONARY_TEST_SCRIPTS"])
+from coronary_testing import require
+from window_testing import checker, photograph, picture
+
 # Views with something in it, and what moves or was moved: source, array.
 EXPECTED = {
     "phantom": (2, None),
@@ -16,26 +18,21 @@ EXPECTED = {
 
 
 def look(step):
-    from coronary_testing import require, require_picture
     count, moved = EXPECTED[step]
     views = [view for view in simple.GetRenderViews() if any(
         getattr(shown, "Visibility", 0) for shown in view.Representations)]
     require(len(views) == count, "%d views show something, not %d" % (len(views), count))
     for number, view in enumerate(views):
-        picture = os.path.join(folder, "menu_%s_%d.png" % (step, number))
-        simple.SaveScreenshot(picture, view)
-        require_picture(picture, 0.02)
+        picture("menu_%s_%d" % (step, number), view, 0.02)
     if moved:
         array = simple.FindSource(moved[0]).PointData[moved[1]]
         require(array.GetRange(-1)[1] > 0.5 if array.GetNumberOfComponents() > 1
                 else array.GetRange()[1] > 0.1, "%s of %s is %s" % (*moved[::-1], array.GetRange()))
-
-
-def check(step):
-    from window_testing import check_step, photograph_desktop
-    check_step(step, look)
-    photograph_desktop(folder, step)
+    photograph(step)
 
 
 def clear():
     simple.ResetSession()
+
+
+check = checker(look)

@@ -4,8 +4,10 @@ import sys
 
 from paraview import simple
 
-folder = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
 sys.path.insert(0, os.environ["DYNAMICCORONARY_TEST_SCRIPTS"])
+from coronary_testing import content, fetch, require, require_different_pictures, skinning_pipeline, write_skeleton
+from window_testing import FOLDER, checker, near, photograph, picture
+
 # The chosen joint at rest, in the middle of the view; half the height of what the view shows, mm; the
 # share of the view's width by which the handle is dragged.
 JOINT = (0.0, 0.0, 10.0)
@@ -14,8 +16,7 @@ DRAG = 0.08
 
 
 def make():
-    from coronary_testing import skinning_pipeline, write_skeleton
-    pose, moved = skinning_pipeline(write_skeleton(folder), ChosenJoint=0)[1:]
+    pose, moved = skinning_pipeline(write_skeleton(FOLDER), ChosenJoint=0)[1:]
     moved.InvertedTetrahedra = "Repair"
     view = simple.GetActiveViewOrCreate("RenderView")
     shown = simple.Show(moved, view)
@@ -38,7 +39,6 @@ def aim(joint=4):
 
 
 def joints_and_mesh():
-    from coronary_testing import content, fetch
     pose = fetch(simple.FindSource("Pose"), 0, 0.0)
     moved = fetch(simple.FindSource("Moved"), 0, 0.0)
     largest = moved.GetPointData().GetArray("Displacement").GetMaxNorm()
@@ -54,12 +54,7 @@ def dragged(view):
     return DRAG * 2.0 * SCALE * width / height
 
 
-def near(a, b, tolerance):
-    return all(abs(x - y) < tolerance for x, y in zip(a, b))
-
-
 def look(step):
-    from coronary_testing import require, require_different_pictures, require_picture
     pose = simple.FindSource("Pose")
     view = simple.GetActiveView()
     joints, largest, points = joints_and_mesh()
@@ -100,18 +95,9 @@ def look(step):
         require(all(near(a, b, 1e-9) for a, b in zip(joints, seen[other][0])),
                 "the joints are not those when " + other + ": " + state)
     seen[step] = (joints, largest, points)
-    picture = os.path.join(folder, "pose_%s.png" % step)
-    simple.SaveScreenshot(picture, view)
-    require_picture(picture, 0.005)
+    shown = picture("pose_" + step, view, 0.005)
     if step == "dragged":
-        require_different_pictures(os.path.join(folder, "pose_chosen.png"), picture, 0.002)
+        require_different_pictures(os.path.join(FOLDER, "pose_chosen.png"), shown, 0.002)
 
 
-def check(step):
-    from window_testing import check_step
-    check_step(step, look)
-
-
-def photograph(step):
-    from window_testing import photograph_desktop
-    photograph_desktop(folder, step)
+check = checker(look)

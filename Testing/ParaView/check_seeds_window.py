@@ -5,8 +5,10 @@ import sys
 
 from paraview import simple
 
-folder = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
 sys.path.insert(0, os.environ["DYNAMICCORONARY_TEST_SCRIPTS"])
+from coronary_testing import IMAGE, OSTIA, fetch, require, require_different_pictures
+from window_testing import Desktop, FOLDER, checker, near, photograph, picture
+
 # Half the height of what the view shows, mm; the share of the view's width by which the handle is dragged.
 SCALE = 25.0
 DRAG = 0.1
@@ -19,7 +21,6 @@ seen = {}
 
 def make():
     """A slice of the phantom's image through the left ostium, which is in the middle of the view."""
-    from coronary_testing import IMAGE, OSTIA, fetch
     phantom = simple.CoronaryPhantom(registrationName="Phantom", Spacing=[1.6, 1.6, 1.6])
     phase = simple.ReferencePhase(simple.OutputPort(phantom, IMAGE), registrationName="Phase",
                                   Automatic=0, Time=TIME)
@@ -55,7 +56,6 @@ def aim(x=0.0, y=0.0):
 
 def point():
     """The pointer into the view, where a pick wants it; the play-back says where in it the mouse is."""
-    from window_testing import Desktop
     seen["desktop"] = Desktop()
     seen["desktop"].point(*INSIDE)
     seen["desktop"].focus()
@@ -71,19 +71,13 @@ def unapplied():
     return [seeds.GetUncheckedElement(n) for n in range(seeds.GetNumberOfUncheckedElements())]
 
 
-def near(a, b, tolerance):
-    return len(a) == len(b) and all(abs(x - y) < tolerance for x, y in zip(a, b))
-
-
 def mask_voxels():
-    from coronary_testing import fetch
     mask = fetch(simple.GetActiveSource(), 0, TIME).GetPointData().GetArray("VesselMask")
     return sum(bytes(memoryview(mask)))
 
 
 def require_help():
     """The help's window has the plugin's pages: its collection, a data base in a temporary file, names them."""
-    from coronary_testing import require
     files = {os.readlink("/proc/self/fd/" + name) for name in os.listdir("/proc/self/fd")
              if os.path.islink("/proc/self/fd/" + name)}
     collections = [path for path in files if path.endswith(".qhc")]
@@ -93,7 +87,6 @@ def require_help():
 
 
 def look(step):
-    from coronary_testing import require, require_different_pictures, require_picture
     view = simple.GetActiveView()
     source = simple.GetActiveSource()
     ostium = seen["ostium"]
@@ -130,18 +123,9 @@ def look(step):
         require(simple.FindSource("FrangiVesselness1") is not None, state)
     elif step == "help":
         require_help()
-    picture = os.path.join(folder, "seeds_%s.png" % step)
-    simple.SaveScreenshot(picture, view)
-    require_picture(picture, 0.005)
+    shown = picture("seeds_" + step, view, 0.005)
     if step == "dragged":
-        require_different_pictures(os.path.join(folder, "seeds_picked.png"), picture, 0.0005)
+        require_different_pictures(os.path.join(FOLDER, "seeds_picked.png"), shown, 0.0005)
 
 
-def check(step):
-    from window_testing import check_step
-    check_step(step, look)
-
-
-def photograph(step):
-    from window_testing import photograph_desktop
-    photograph_desktop(folder, step)
+check = checker(look)

@@ -4,8 +4,9 @@ import sys
 
 from paraview import simple
 
-folder = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
 sys.path.insert(0, os.environ["DYNAMICCORONARY_TEST_SCRIPTS"])
+from coronary_testing import IMAGE, SURFACE, require, require_different_pictures, show_phantom
+from window_testing import FOLDER, checker, photograph, picture
 
 
 def shown_ports(phantom, view):
@@ -15,8 +16,6 @@ def shown_ports(phantom, view):
 
 
 def look(step):
-    from coronary_testing import (IMAGE, SURFACE, require, require_different_pictures,
-                                  require_picture, show_phantom)
     phantom = simple.GetActiveSource()
     view = simple.GetActiveView()
     scene = simple.GetAnimationScene()
@@ -33,19 +32,10 @@ def look(step):
     else:
         require(view.ViewTime == scene.TimeKeeper.TimestepValues[int(step)],
                 "the time is %g" % view.ViewTime)
-    picture = os.path.join(folder, "window_%s.png" % step)
-    simple.SaveScreenshot(picture, view)
-    require_picture(picture, 0.005)
+    picture("window_" + step, view, 0.005)
     if step == "19":
-        require_different_pictures(os.path.join(folder, "window_all.png"),
-                                   os.path.join(folder, "window_7.png"))
+        require_different_pictures(os.path.join(FOLDER, "window_all.png"),
+                                   os.path.join(FOLDER, "window_7.png"))
 
 
-def check(step):
-    from window_testing import check_step
-    check_step(step, look)
-
-
-def photograph(step):
-    from window_testing import photograph_desktop
-    photograph_desktop(folder, step)
+check = checker(look)

@@ -4,24 +4,45 @@ import os
 import subprocess
 import traceback
 
+from paraview import simple
 
-def check_step(step, look):
-    """Calls look(step). The window's Python shell would print an exception and go on."""
-    try:
-        look(step)
-        os.write(1, ("window: %s is right\n" % step).encode())
-    except BaseException:
-        os.write(2, traceback.format_exc().encode())
-        os._exit(1)
+from coronary_testing import require_picture
+
+FOLDER = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
 
 
-def photograph_desktop(folder, step):
+def checker(look):
+    """The play-back's check(step): calls look(step), and lets play-back.sh know that it was right."""
+    def check(step):
+        try:
+            look(step)
+            with open(os.path.join(FOLDER, "checked"), "a", encoding="utf-8") as file:
+                file.write(step + "\n")
+        except BaseException:
+            os.write(2, traceback.format_exc().encode())
+            os._exit(1)
+    return check
+
+
+def photograph(step):
     """The whole window, for people to look at, where the tool for it is installed."""
     try:
         subprocess.run(["import", "-silent", "-window", "root",
-                        os.path.join(folder, "desktop_%s.png" % step)], check=False)
+                        os.path.join(FOLDER, "desktop_%s.png" % step)], check=False)
     except FileNotFoundError:
         pass
+
+
+def picture(name, view, share):
+    """A view in a file, which is to show something in that share of it; its path."""
+    path = os.path.join(FOLDER, name + ".png")
+    simple.SaveScreenshot(path, view)
+    require_picture(path, share)
+    return path
+
+
+def near(a, b, tolerance):
+    return len(a) == len(b) and all(abs(x - y) < tolerance for x, y in zip(a, b))
 
 
 class KeyEvent(ctypes.Structure):

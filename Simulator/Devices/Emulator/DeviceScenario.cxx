@@ -2,6 +2,7 @@
 
 #include "JsonFields.h"
 #include "SessionInput.h"
+#include "TextFile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -201,6 +202,6 @@ DeviceScenario DeviceScenarioFromText(const std::string& text, const std::string
 
 DeviceScenario ReadDeviceScenario(const std::string& path)
 {
-  return DeviceScenarioFromText(ReadTextFile(path), "'" + path + "'");
+  return DeviceScenarioFromText(ReadTextFile(path, "a scenario of a device"), "'" + path + "'");
 }
 }

@@ -1,0 +1,31 @@
+#include "TextFile.h"
+
+#include <fstream>
+#include <stdexcept>
+
+namespace coronary
+{
+std::string ReadTextFile(const std::string& path, const std::string& what, std::uint64_t largest)
+{
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+  {
+    throw std::runtime_error("Cannot open '" + path + "'.");
+  }
+  std::string text;
+  char block[65536];
+  while (text.size() <= largest && (file.read(block, sizeof(block)) || file.gcount() > 0))
+  {
+    text.append(block, static_cast<std::size_t>(file.gcount()));
+  }
+  if (text.size() > largest)
+  {
+    throw std::runtime_error("'" + path + "': is too large for " + what + ".");
+  }
+  if (file.bad() || !file.eof())
+  {
+    throw std::runtime_error("'" + path + "': cannot be read.");
+  }
+  return text;
+}
+}
