@@ -689,7 +689,8 @@ PoseSequence Beating(const MovingLines& lines, const std::vector<double>& times,
     const double angle = 2.0 * EIGEN_PI * times[k];
     for (Vector3& point : sequence.points[k])
     {
-      point += (1.0 + 0.01 * point.x()) * (std::cos(angle) * first + std::sin(2.0 * angle) * second);
+      point +=
+        (1.0 + 0.01 * point.x()) * (std::cos(angle) * first + std::sin(2.0 * angle) * second);
     }
   }
   return sequence;
@@ -938,8 +939,8 @@ TEST(RandomMotion, InterpolationMovesWithTheWorld)
         for (std::size_t p = 0; p < lines.rest.size(); ++p)
         {
           ASSERT_LT((map * pose.points[p] - other.points[p]).norm(), anyMap ? 1e-9 : 0.01) << seed;
-          ASSERT_LT((map.linear() * pose.velocity[p] - other.velocity[p]).norm(),
-            anyMap ? 1e-7 : 0.1)
+          ASSERT_LT(
+            (map.linear() * pose.velocity[p] - other.velocity[p]).norm(), anyMap ? 1e-7 : 0.1)
             << seed;
         }
       }
@@ -961,8 +962,8 @@ TEST(RandomMotion, WhatStandsStillKeepsStanding)
       const PhaseInterpolation motion(sequence, SettingsOf(mode));
       motion.Evaluate(random.Uniform(-2.0, 2.0), pose);
       EXPECT_LT(Farthest(pose.points, lines.rest), 1e-6) << seed;
-      EXPECT_LT(Farthest(pose.velocity, std::vector<Vector3>(lines.rest.size(), Vector3::Zero())),
-        1e-6)
+      EXPECT_LT(
+        Farthest(pose.velocity, std::vector<Vector3>(lines.rest.size(), Vector3::Zero())), 1e-6)
         << seed;
     }
     const RegularizedMotion regular = RegularizeMotion(sequence, lines);
@@ -1114,8 +1115,7 @@ TEST(RandomMotion, RegularisationMovesWithTheWorldAndKnowsNoFirstPhase)
       const RegularizedMotion moved = RegularizeMotion(Mapped(sequence, motion), there, settings);
       // Eq. 14 does not turn displacements: rest and poses move together.
       EXPECT_LT(Farthest(Mapped(regular.poses, motion), moved.poses), 1e-8) << seed;
-      const RegularizedMotion turned =
-        RegularizeMotion(FromTheSecondOn(sequence), lines, settings);
+      const RegularizedMotion turned = RegularizeMotion(FromTheSecondOn(sequence), lines, settings);
       EXPECT_LT(Farthest(FromTheSecondOn(regular.poses), turned.poses), 1e-8) << seed;
 
       // It is the minimum: less than before, and more wherever one goes from there.
