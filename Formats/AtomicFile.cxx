@@ -1,7 +1,9 @@
 #include "AtomicFile.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -9,10 +11,16 @@
 #include <random>
 #include <stdexcept>
 #include <system_error>
+#include <vector>
 
 namespace coronary
 {
 namespace fs = std::filesystem;
+
+namespace
+{
+constexpr auto Abandoned = std::chrono::hours(1);
+}
 
 AtomicFile::AtomicFile(const std::string& path)
   : Final(path)
@@ -63,6 +71,32 @@ void AtomicFile::Commit()
     throw std::runtime_error("Cannot write '" + this->Final + "': " + error.message() + ".");
   }
   this->Temporary.clear();
+}
+
+void RemoveAbandonedFiles(const std::string& path)
+{
+  const fs::path wanted(path);
+  const std::string begin = "." + wanted.stem().string() + ".";
+  const std::string end = wanted.extension().string();
+  std::vector<fs::path> abandoned;
+  std::error_code error;
+  const fs::path folder = wanted.has_parent_path() ? wanted.parent_path() : fs::path(".");
+  for (const auto& entry : fs::directory_iterator(folder, error))
+  {
+    const std::string name = entry.path().filename().string();
+    if (name.size() > begin.size() + end.size() && name.rfind(begin, 0) == 0 &&
+      name.compare(name.size() - end.size(), end.size(), end) == 0 &&
+      std::min(name.find_first_not_of("0123456789-", begin.size()), name.size()) ==
+        name.size() - end.size() &&
+      entry.last_write_time(error) + Abandoned < fs::file_time_type::clock::now())
+    {
+      abandoned.push_back(entry.path());
+    }
+  }
+  for (const fs::path& left : abandoned)
+  {
+    fs::remove(left, error);
+  }
 }
 
 void WriteFileAtomically(const std::string& path, const std::string& contents)

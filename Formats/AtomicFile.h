@@ -43,6 +43,12 @@ private:
 };
 
 /**
+ * Removes what killed processes left of AtomicFiles of this path: those that nobody has written to for an hour. For
+ * folders that many runs write to, as caches; what can not be removed stays.
+ */
+void RemoveAbandonedFiles(const std::string& path);
+
+/**
  * Writes `contents` to `path` atomically.
  * @throws std::runtime_error naming `path` and the reason (no such folder, disk full, ...).
  */

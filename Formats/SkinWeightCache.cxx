@@ -294,6 +294,7 @@ void WriteSkinWeights(const std::string& path, const SkinWeights& weights)
   writer(ByteOrder);
   ForMembers(weights, writer);
   writer(Checksum(bytes.data(), bytes.size()));
+  RemoveAbandonedFiles(path);
   WriteFileAtomically(path, bytes);
 }
 

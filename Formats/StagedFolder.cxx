@@ -200,7 +200,7 @@ void StagedFolder::Commit()
   const fs::path folder(this->Folder);
   const fs::path staging(this->Staging);
   std::error_code error;
-  if (!this->Names.empty())
+  if (!this->Names.empty() && !this->LastStays)
   {
     fs::remove(folder / this->Names.back(), error);
   }

@@ -56,6 +56,9 @@ public:
    */
   void Commit();
 
+  /// The older file of the last one's name describes none of the others: it stays until it is replaced.
+  void KeepLast() { this->LastStays = true; }
+
   /**
    * Files of an older set that this one takes the place of: Commit() removes those that it does not replace, and the
    * folders that are empty then. Only plain files below the folder are removed, whatever the names say.
@@ -76,7 +79,8 @@ private:
   std::vector<std::string> Names;
   std::vector<std::string> Older;
   std::vector<std::string> Created; ///< folders to remove again, outermost first
-  bool Owner = true;                ///< of the folder; false: another rank removes it
+  bool LastStays = false;
+  bool Owner = true; ///< of the folder; false: another rank removes it
 };
 }
 

@@ -159,7 +159,9 @@ void EvaluationCache::Write(const std::string& name, const EvaluationRecord& rec
   try
   {
     fs::create_directories(this->Folder);
-    WriteFileAtomically((fs::path(this->Folder) / name).string(), record.Text() + "\n");
+    const std::string path = (fs::path(this->Folder) / name).string();
+    RemoveAbandonedFiles(path);
+    WriteFileAtomically(path, record.Text() + "\n");
   }
   catch (const std::exception&)
   {

@@ -123,6 +123,11 @@ void RunJob::Commit(StagedFolder& folder, RunStage stage, const RunReport& repor
   folder.TakePlaceOf(report.OlderFiles(stage));
   WriteFileAtomically(folder.Add(ReportName), report.Text());
   ThrowIfInterrupted();
+  if (this->Changed)
+  {
+    // The report that is there is of this run's earlier stages: who is killed now, resumes from them.
+    folder.KeepLast();
+  }
   folder.Commit();
 }
 

@@ -345,28 +345,31 @@ void PhaseInterpolation::Merge(const PoseSequence& sequence)
     return Eigen::Map<const Eigen::RowVectorXd>(
       points > 0 ? sequence.points[phase].front().data() : nullptr, 3 * points);
   };
-  // Means first; then repetitions are moved to their common time along the velocity between the
-  // neighbours, so that a steady motion is not changed by the merging.
-  this->Points.resize(knots, 3 * points);
-  for (Index k = 0; k < knots; ++k)
-  {
-    this->Points.row(k).setZero();
-    for (const std::size_t phase : this->Members[k])
-    {
-      this->Points.row(k) += position(phase);
-    }
-    this->Points.row(k) /= static_cast<double>(this->Members[k].size());
-  }
+  // What a member counts for in the mean at a point.
   const auto share = [&](Index k, Index point, std::size_t phase)
   {
     double sum = 0.0;
     for (const std::size_t member : this->Members[k])
     {
-      sum += sequence.confidence[member][point];
+      sum += sequence.confidence.empty() ? 0.0 : sequence.confidence[member][point];
     }
     return sum > 0.0 ? sequence.confidence[phase][point] / sum
                      : 1.0 / static_cast<double>(this->Members[k].size());
   };
+  // Means first; then repetitions are moved to their common time along the velocity between the
+  // neighbours, so that a steady motion is not changed by the merging.
+  this->Points = Rows::Zero(knots, 3 * points);
+  for (Index k = 0; k < knots; ++k)
+  {
+    for (const std::size_t phase : this->Members[k])
+    {
+      const auto at = position(phase);
+      for (Index n = 0; n < points; ++n)
+      {
+        this->Points.row(k).segment<3>(3 * n) += share(k, n, phase) * at.segment<3>(3 * n);
+      }
+    }
+  }
   const Rows means = this->Points;
   double squares = 0.0;
   double repeated = 0.0;
@@ -397,10 +400,7 @@ void PhaseInterpolation::Merge(const PoseSequence& sequence)
       Vector3 mean = Vector3::Zero();
       for (std::size_t m = 0; m < members.size(); ++m)
       {
-        const double weight = sequence.confidence.empty()
-          ? 1.0 / static_cast<double>(members.size())
-          : share(k, n, members[m]);
-        mean += weight * moved[m].segment<3>(3 * n).transpose();
+        mean += share(k, n, members[m]) * moved[m].segment<3>(3 * n).transpose();
       }
       this->Points.row(k).segment<3>(3 * n) = mean.transpose();
       for (const Eigen::RowVectorXd& other : moved)
@@ -432,13 +432,11 @@ void PhaseInterpolation::Merge(const PoseSequence& sequence)
     {
       for (const std::size_t phase : this->Members[k])
       {
-        this->LogCalibre.row(k) +=
-          Eigen::Map<const Eigen::ArrayXd>(sequence.calibre[phase].data(), points)
-            .log()
-            .matrix()
-            .transpose();
+        for (Index n = 0; n < points; ++n)
+        {
+          this->LogCalibre(k, n) += share(k, n, phase) * std::log(sequence.calibre[phase][n]);
+        }
       }
-      this->LogCalibre.row(k) /= static_cast<double>(this->Members[k].size());
     }
   }
   if (!sequence.status.empty())
@@ -514,6 +512,7 @@ void PhaseInterpolation::FitLowNoise(const Rows& weights, const ProgressCallback
   // A point's samples that count for less than the others of the same point are replaced, before modes
   // are sought: by its own periodic line through those that count.
   const bool even = (weights.array() == weights(0, 0)).all() && weights(0, 0) > 0.0;
+  const bool any = (weights.array() > 0.0).any();
   Rows filled = this->Points;
   if (!even)
   {
@@ -531,6 +530,12 @@ void PhaseInterpolation::FitLowNoise(const Rows& weights, const ProgressCallback
               known.push_back(k);
             }
           }
+          if (known.empty() && any)
+          {
+            // Where nothing is known there is no motion that the modes could be of.
+            filled.middleCols(3 * n, 3).rowwise() =
+              this->Points.middleCols(3 * n, 3).colwise().mean();
+          }
           for (Index k = 0; k < knots && !known.empty(); ++k)
           {
             const auto after = std::lower_bound(known.begin(), known.end(), k) - known.begin();
@@ -543,7 +548,7 @@ void PhaseInterpolation::FitLowNoise(const Rows& weights, const ProgressCallback
               at * this->Points.row(b).segment<3>(3 * n))
                                    .transpose();
             const double share = weights(k, n) / best;
-            if (share < 1.0 && a != b)
+            if (share < 1.0)
             {
               filled.row(k).segment<3>(3 * n) =
                 (share * this->Points.row(k).segment<3>(3 * n) + (1.0 - share) * line.transpose())

@@ -51,7 +51,10 @@ void RequireSteps(const std::vector<double>& steps)
   for (std::size_t k = 0; k < steps.size(); ++k)
   {
     Require(std::isfinite(steps[k]), "The input's " + At(steps, k) + " is not finite");
-    Require(k == 0 || steps[k] > steps[k - 1],
+  }
+  for (std::size_t k = 1; k < steps.size(); ++k)
+  {
+    Require(steps[k] > steps[k - 1],
       "The input's time steps do not increase strictly: " + At(steps, k) + " follows " +
         At(steps, k - 1));
   }

@@ -16,8 +16,10 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <limits>
 #include <sstream>
 #include <sys/resource.h>
@@ -147,6 +149,34 @@ TEST(AtomicFile, KeepsTheOldFileUntilTheNewOneIsWhole)
   WriteFileAtomically(path, "new");
   EXPECT_EQ(ReadBytes(path), Bytes({ 'n', 'e', 'w' }));
   EXPECT_EQ(folder.NumberOfEntries(), 1);
+}
+
+TEST(AtomicFile, WhatKilledProcessesLeftIsRemoved)
+{
+  const TemporaryFolder folder;
+  const std::string path = folder / "weights.bin";
+  const AtomicFile young(path);
+  const std::string left[] = { folder / ".weights.123-4.bin", folder / ".weights.12a-4.bin",
+    folder / ".weights.123-4.txt", folder / ".other.123-4.bin", folder / "weights.1-2.bin" };
+  for (const std::string& name : left)
+  {
+    WriteText(name, "half");
+    std::filesystem::last_write_time(
+      name, std::filesystem::file_time_type::clock::now() - std::chrono::hours(2));
+  }
+  RemoveAbandonedFiles(path);
+  EXPECT_FALSE(std::filesystem::exists(left[0]));
+  EXPECT_TRUE(std::filesystem::exists(young.TemporaryPath()));
+  for (int n = 1; n < 5; ++n)
+  {
+    EXPECT_TRUE(std::filesystem::exists(left[n])) << left[n];
+  }
+  RemoveAbandonedFiles(folder / "other");
+  EXPECT_TRUE(std::filesystem::exists(left[3]));
+  std::filesystem::rename(left[3], folder / ".other.123-4");
+  RemoveAbandonedFiles(folder / "other");
+  EXPECT_FALSE(std::filesystem::exists(folder / ".other.123-4"));
+  RemoveAbandonedFiles(folder / "nowhere/weights.bin");
 }
 
 TEST(AtomicFile, SaysWhyItCannotWrite)

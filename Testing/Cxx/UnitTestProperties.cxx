@@ -5,6 +5,8 @@
 #include "CenterlineTopology.h"
 #include "CounterRandom.h"
 #include "MeshDistance.h"
+#include "MotionRegularization.h"
+#include "PhaseInterpolation.h"
 #include "SkeletonPose.h"
 #include "SkinDeformation.h"
 #include "SurfaceCleaning.h"
@@ -14,11 +16,14 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 using namespace coronary;
@@ -621,4 +626,582 @@ TEST(DegenerateSkins, WeightsAreAPartitionOfUnityOrRefused)
       : 0;
   }
   EXPECT_GE(solved, 1);
+}
+
+// Motion: phases and poses at random.
+namespace
+{
+constexpr PhaseInterpolationMode Modes[] = { PhaseInterpolationMode::Linear,
+  PhaseInterpolationMode::PeriodicCubic, PhaseInterpolationMode::LowNoise };
+
+PhaseInterpolationSettings SettingsOf(PhaseInterpolationMode mode)
+{
+  PhaseInterpolationSettings settings;
+  settings.mode = mode;
+  settings.greatestRank = 2; // fewer to try: quicker
+  settings.greatestOrder = 3;
+  return settings;
+}
+
+MovingLines LinesOf(const CenterlineSet& set)
+{
+  return { set.points, set.radius, set.lines };
+}
+
+/// In one cycle that begins anywhere, none nearer to another than 0.03.
+std::vector<double> RandomPhases(RandomStream& random, std::size_t count)
+{
+  constexpr double least = 0.03;
+  std::vector<double> gaps(count);
+  double sum = 0.0;
+  for (double& gap : gaps)
+  {
+    gap = random.Uniform();
+    sum += gap;
+  }
+  std::vector<double> times{ random.Uniform(-1.5, 1.5) };
+  for (std::size_t k = 1; k < count; ++k)
+  {
+    times.push_back(
+      times.back() + least + (1.0 - least * static_cast<double>(count)) * gaps[k] / sum);
+  }
+  return times;
+}
+
+/// Rest as it is at every phase.
+PoseSequence Standing(const MovingLines& lines, std::vector<double> times)
+{
+  PoseSequence sequence;
+  sequence.points.assign(times.size(), lines.rest);
+  sequence.times = std::move(times);
+  return sequence;
+}
+
+/// Two harmonics, which every point follows in its own measure.
+PoseSequence Beating(const MovingLines& lines, const std::vector<double>& times, std::uint64_t seed)
+{
+  RandomStream random(seed, 1);
+  PoseSequence sequence = Standing(lines, times);
+  const Vector3 first = 4.0 * RandomDirection(random);
+  const Vector3 second = RandomDirection(random);
+  for (std::size_t k = 0; k < times.size(); ++k)
+  {
+    const double angle = 2.0 * EIGEN_PI * times[k];
+    for (Vector3& point : sequence.points[k])
+    {
+      point +=
+        (1.0 + 0.01 * point.x()) * (std::cos(angle) * first + std::sin(2.0 * angle) * second);
+    }
+  }
+  return sequence;
+}
+
+void Jitter(PoseSequence& sequence, RandomStream& random, double size)
+{
+  for (std::vector<Vector3>& points : sequence.points)
+  {
+    for (Vector3& point : points)
+    {
+      point += size * RandomDirection(random);
+    }
+  }
+}
+
+void DrawConfidence(PoseSequence& sequence, RandomStream& random)
+{
+  sequence.confidence.clear();
+  for (const std::vector<Vector3>& points : sequence.points)
+  {
+    sequence.confidence.emplace_back();
+    for (std::size_t p = 0; p < points.size(); ++p)
+    {
+      sequence.confidence.back().push_back(random.Uniform(0.1, 1.0));
+    }
+  }
+}
+
+/// All that a sequence can have.
+PoseSequence RandomSequence(const MovingLines& lines, std::uint64_t seed)
+{
+  RandomStream random(seed, 2);
+  PoseSequence sequence = Standing(lines, RandomPhases(random, 4 + random.Bits() % 9));
+  Jitter(sequence, random, 3.0);
+  DrawConfidence(sequence, random);
+  for (std::size_t k = 0; k < sequence.times.size(); ++k)
+  {
+    sequence.status.emplace_back();
+    sequence.calibre.emplace_back();
+    for (std::size_t p = 0; p < lines.rest.size(); ++p)
+    {
+      sequence.status.back().push_back(static_cast<TrackingStatus>(random.Bits() % 4));
+      sequence.calibre.back().push_back(random.Uniform(0.8, 1.25));
+    }
+    sequence.rotation.emplace_back();
+    for (int bone = 0; bone < 3; ++bone)
+    {
+      sequence.rotation.back().emplace_back(
+        Eigen::AngleAxisd(random.Uniform(0.0, 1.0), RandomDirection(random)));
+    }
+  }
+  return sequence;
+}
+
+/// The same, told from the second phase on: the first one comes last, a cycle later.
+PoseSequence FromTheSecondOn(PoseSequence sequence)
+{
+  const auto turn = [](auto& list)
+  {
+    if (!list.empty())
+    {
+      std::rotate(list.begin(), list.begin() + 1, list.end());
+    }
+  };
+  turn(sequence.times);
+  turn(sequence.points);
+  turn(sequence.confidence);
+  turn(sequence.status);
+  turn(sequence.calibre);
+  turn(sequence.rotation);
+  sequence.times.back() += 1.0;
+  return sequence;
+}
+
+template <typename Map>
+PoseSequence Mapped(PoseSequence sequence, const Map& map)
+{
+  for (std::vector<Vector3>& points : sequence.points)
+  {
+    for (Vector3& point : points)
+    {
+      point = map * point;
+    }
+  }
+  return sequence;
+}
+
+double Farthest(const std::vector<Vector3>& a, const std::vector<Vector3>& b)
+{
+  double farthest = a.size() == b.size() ? 0.0 : Infinity;
+  for (std::size_t p = 0; p < std::min(a.size(), b.size()); ++p)
+  {
+    farthest = std::max(farthest, (a[p] - b[p]).norm());
+  }
+  return farthest;
+}
+
+double Farthest(const PoseSequence& a, const PoseSequence& b)
+{
+  double farthest = 0.0;
+  for (std::size_t k = 0; k < a.points.size(); ++k)
+  {
+    farthest = std::max(farthest, Farthest(a.points[k], b.points[k]));
+  }
+  return farthest;
+}
+
+/// Some samples of no confidence, the others of some.
+std::vector<std::pair<std::size_t, std::size_t>> Lose(PoseSequence& sequence, RandomStream& random)
+{
+  DrawConfidence(sequence, random);
+  std::vector<std::pair<std::size_t, std::size_t>> lost;
+  for (std::size_t p = 0; p < sequence.points.front().size(); ++p)
+  {
+    // A point is lost wholly, or but for one phase, or now and then.
+    const std::uint64_t kind = random.Bits() % 10;
+    const std::size_t kept = random.Bits() % sequence.points.size();
+    for (std::size_t k = 0; k < sequence.points.size(); ++k)
+    {
+      if (kind == 0 || (kind == 1 && k != kept) || random.Uniform() < 0.2)
+      {
+        sequence.confidence[k][p] = 0.0;
+        lost.emplace_back(k, p);
+      }
+    }
+  }
+  return lost;
+}
+
+MotionRegularizationSettings WithoutLimits()
+{
+  MotionRegularizationSettings settings;
+  settings.greatestBending = EIGEN_PI;
+  settings.leastCurvatureRadius = 0.0;
+  settings.greatestStrain = Infinity;
+  settings.greatestStep = Infinity;
+  return settings;
+}
+}
+
+TEST(RandomMotion, InterpolationGoesThroughItsPhases)
+{
+  for (std::uint64_t seed = 1; seed <= 8; ++seed)
+  {
+    const MovingLines lines = LinesOf(RandomTree(seed));
+    const PoseSequence sequence = RandomSequence(lines, seed);
+    for (const PhaseInterpolationMode mode :
+      { PhaseInterpolationMode::Linear, PhaseInterpolationMode::PeriodicCubic })
+    {
+      const PhaseInterpolation motion(sequence, SettingsOf(mode));
+      ASSERT_EQ(motion.Knots().size(), sequence.times.size()) << seed;
+      EXPECT_EQ(motion.Repeatability(), 0.0);
+      InterpolatedPose pose;
+      for (std::size_t k = 0; k < sequence.times.size(); ++k)
+      {
+        for (const double cycle : { -3.0, 0.0, 1.0, 100.0 })
+        {
+          motion.Evaluate(sequence.times[k] + cycle, pose);
+          EXPECT_LT(Farthest(pose.points, sequence.points[k]), 1e-9) << seed << " phase " << k;
+          EXPECT_EQ(pose.status, sequence.status[k]) << seed << " phase " << k;
+          for (std::size_t p = 0; p < lines.rest.size(); ++p)
+          {
+            ASSERT_NEAR(pose.confidence[p], sequence.confidence[k][p], 1e-9) << seed;
+            ASSERT_NEAR(pose.calibre[p], sequence.calibre[k][p], 1e-9) << seed;
+          }
+          for (std::size_t b = 0; b < sequence.rotation[k].size(); ++b)
+          {
+            ASSERT_LT(pose.rotation[b].angularDistance(sequence.rotation[k][b]), 1e-6) << seed;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(RandomMotion, InterpolationKnowsNoFirstPhaseAndItsVelocityIsTheDerivative)
+{
+  constexpr double step = 1e-5;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+  {
+    RandomStream random(seed, 3);
+    const MovingLines lines = LinesOf(RandomTree(seed));
+    const PoseSequence sequence = RandomSequence(lines, seed);
+    for (const PhaseInterpolationMode mode : Modes)
+    {
+      const PhaseInterpolation motion(sequence, SettingsOf(mode));
+      const PhaseInterpolation turned(FromTheSecondOn(sequence), SettingsOf(mode));
+      InterpolatedPose pose;
+      InterpolatedPose other;
+      for (int n = 0; n < 5; ++n)
+      {
+        // Not at a phase, where the velocity of the linear one jumps.
+        std::size_t before = 0;
+        std::size_t after = 0;
+        double share = 0.0;
+        double time = 0.0;
+        do
+        {
+          time = random.Uniform(-2.0, 2.0);
+          motion.Bracket(time, before, after, share);
+        } while (share < 0.01 || share > 0.99);
+        motion.Evaluate(time, pose);
+        turned.Evaluate(time + 1.0, other);
+        EXPECT_LT(Farthest(pose.points, other.points), 1e-6) << seed << " at " << time;
+        EXPECT_LT(Farthest(pose.velocity, other.velocity), 1e-4) << seed << " at " << time;
+        InterpolatedPose sooner;
+        motion.Evaluate(time - step, sooner);
+        motion.Evaluate(time + step, other);
+        for (std::size_t p = 0; p < lines.rest.size(); ++p)
+        {
+          const Vector3 rate = (other.points[p] - sooner.points[p]) / (2.0 * step);
+          ASSERT_LT((rate - pose.velocity[p]).norm(), 1e-3 * (1.0 + rate.norm())) << seed;
+        }
+      }
+    }
+  }
+}
+
+TEST(RandomMotion, InterpolationMovesWithTheWorld)
+{
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+  {
+    RandomStream random(seed, 4);
+    const MovingLines lines = LinesOf(RandomTree(seed));
+    PoseSequence sequence = RandomSequence(lines, seed);
+    Eigen::Affine3d shear(RandomMotion(seed));
+    for (int n = 0; n < 9; ++n)
+    {
+      shear.linear()(n / 3, n % 3) += random.Uniform(-0.5, 0.5);
+    }
+    for (const PhaseInterpolationMode mode : Modes)
+    {
+      // The modes of low noise depend on lengths, and their fit ends when it moves by less than 0.001 mm.
+      const bool anyMap = mode != PhaseInterpolationMode::LowNoise;
+      const Eigen::Affine3d map = anyMap ? shear : Eigen::Affine3d(RandomMotion(seed));
+      const PhaseInterpolation motion(sequence, SettingsOf(mode));
+      const PhaseInterpolation mapped(Mapped(sequence, map), SettingsOf(mode));
+      InterpolatedPose pose;
+      InterpolatedPose other;
+      for (int n = 0; n < 5; ++n)
+      {
+        const double time = random.Uniform(-2.0, 2.0);
+        motion.Evaluate(time, pose);
+        mapped.Evaluate(time, other);
+        for (std::size_t p = 0; p < lines.rest.size(); ++p)
+        {
+          ASSERT_LT((map * pose.points[p] - other.points[p]).norm(), anyMap ? 1e-9 : 0.01) << seed;
+          ASSERT_LT(
+            (map.linear() * pose.velocity[p] - other.velocity[p]).norm(), anyMap ? 1e-7 : 0.1)
+            << seed;
+        }
+      }
+    }
+  }
+}
+
+TEST(RandomMotion, WhatStandsStillKeepsStanding)
+{
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+  {
+    RandomStream random(seed, 5);
+    const MovingLines lines = LinesOf(RandomTree(seed));
+    PoseSequence sequence = Standing(lines, RandomPhases(random, 7));
+    DrawConfidence(sequence, random);
+    InterpolatedPose pose;
+    for (const PhaseInterpolationMode mode : Modes)
+    {
+      const PhaseInterpolation motion(sequence, SettingsOf(mode));
+      motion.Evaluate(random.Uniform(-2.0, 2.0), pose);
+      EXPECT_LT(Farthest(pose.points, lines.rest), 1e-6) << seed;
+      EXPECT_LT(
+        Farthest(pose.velocity, std::vector<Vector3>(lines.rest.size(), Vector3::Zero())), 1e-6)
+        << seed;
+    }
+    const RegularizedMotion regular = RegularizeMotion(sequence, lines);
+    EXPECT_LT(Farthest(regular.poses, sequence), 1e-9) << seed;
+    EXPECT_EQ(regular.iterations, 0) << seed;
+    EXPECT_EQ(regular.violations, 0) << seed;
+  }
+}
+
+TEST(RandomMotion, InterpolationDoesNotCountWhatHasNoConfidence)
+{
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+  {
+    RandomStream random(seed, 6);
+    const MovingLines lines = LinesOf(RandomTree(seed));
+    // Low noise: single samples.
+    PoseSequence sequence = Beating(lines, RandomPhases(random, 12), seed);
+    const auto lost = Lose(sequence, random);
+    PoseSequence wrong = sequence;
+    for (const auto& [k, p] : lost)
+    {
+      wrong.points[k][p] += 50.0 * RandomDirection(random);
+    }
+    const PhaseInterpolationSettings settings = SettingsOf(PhaseInterpolationMode::LowNoise);
+    const PhaseInterpolation right(sequence, settings);
+    const PhaseInterpolation other(wrong, settings);
+    InterpolatedPose a;
+    InterpolatedPose b;
+    const auto seen = [&](std::size_t p)
+    {
+      return std::any_of(sequence.confidence.begin(), sequence.confidence.end(),
+        [p](const std::vector<double>& ofPhase) { return ofPhase[p] > 0.0; });
+    };
+    for (int n = 0; n < 5; ++n)
+    {
+      const double time = random.Uniform();
+      right.Evaluate(time, a);
+      other.Evaluate(time, b);
+      double farthest = 0.0;
+      for (std::size_t p = 0; p < lines.rest.size(); ++p)
+      {
+        // A point that nobody has ever seen is somewhere.
+        farthest = std::max(farthest, seen(p) ? (a.points[p] - b.points[p]).norm() : 0.0);
+      }
+      EXPECT_LT(farthest, 1e-9) << seed;
+    }
+
+    // Through the phases: one of two repetitions.
+    PoseSequence twice = Beating(lines, { 0.0, 0.004, 0.3, 0.304, 0.55, 0.8, 0.805 }, seed);
+    DrawConfidence(twice, random);
+    twice.calibre.assign(7, std::vector<double>(lines.rest.size(), 1.0));
+    for (const std::size_t k : { 1, 2, 6 })
+    {
+      twice.confidence[k].assign(lines.rest.size(), 0.0);
+    }
+    wrong = twice;
+    for (const std::size_t k : { 1, 2, 6 })
+    {
+      for (std::size_t p = 0; p < lines.rest.size(); ++p)
+      {
+        wrong.points[k][p] += 50.0 * RandomDirection(random);
+        wrong.calibre[k][p] = random.Uniform(0.5, 2.0);
+      }
+    }
+    for (const PhaseInterpolationMode mode : Modes)
+    {
+      const PhaseInterpolation good(twice, SettingsOf(mode));
+      const PhaseInterpolation bad(wrong, SettingsOf(mode));
+      ASSERT_EQ(good.Knots().size(), 4U);
+      const double time = random.Uniform();
+      good.Evaluate(time, a);
+      bad.Evaluate(time, b);
+      EXPECT_LT(Farthest(a.points, b.points), 1e-9) << seed;
+      EXPECT_EQ(a.calibre, b.calibre) << seed;
+    }
+  }
+}
+
+TEST(RandomMotion, RegularisationKeepsWhatHasNoEnergy)
+{
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+  {
+    RandomStream random(seed, 7);
+    // Every phase has its own translation, of the whole tree: nothing bends, nothing stretches.
+    const MovingLines tree = LinesOf(RandomTree(seed));
+    PoseSequence sequence = Standing(tree, RandomPhases(random, 8));
+    DrawConfidence(sequence, random);
+    for (std::vector<Vector3>& points : sequence.points)
+    {
+      const Vector3 translation = 6.0 * RandomDirection(random);
+      for (Vector3& point : points)
+      {
+        point += translation;
+      }
+    }
+    MotionRegularizationSettings settings;
+    settings.temporalWeight = 0.0;
+    const RegularizedMotion moved = RegularizeMotion(sequence, tree, settings);
+    EXPECT_LT(Farthest(moved.poses, sequence), 1e-9) << seed;
+    EXPECT_EQ(moved.violations, 0) << seed;
+
+    // A straight vessel of uneven segments that is turned, stretched and sheared stays straight.
+    MovingLines straight;
+    straight.rest = { Vector3::Zero() };
+    straight.lines = { { 0 } };
+    const Vector3 direction = RandomDirection(random);
+    for (int n = 1; n < 30; ++n)
+    {
+      straight.rest.emplace_back(straight.rest.back() + random.Uniform(0.3, 2.0) * direction);
+      straight.lines[0].push_back(n);
+    }
+    PoseSequence affine = Standing(straight, RandomPhases(random, 8));
+    for (std::size_t k = 0; k < affine.times.size(); ++k)
+    {
+      Eigen::Affine3d map(RandomMotion(100 * seed + k));
+      map.linear() += 0.1 * Eigen::Matrix3d::Random();
+      for (Vector3& point : affine.points[k])
+      {
+        point = map * point;
+      }
+    }
+    MotionRegularizationSettings still = WithoutLimits();
+    still.temporalWeight = still.velocityWeight = 0.0;
+    EXPECT_LT(Farthest(RegularizeMotion(affine, straight, still).poses, affine), 1e-8) << seed;
+  }
+}
+
+TEST(RandomMotion, RegularisationMovesWithTheWorldAndKnowsNoFirstPhase)
+{
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+  {
+    RandomStream random(seed, 8);
+    const MovingLines lines = LinesOf(RandomTree(seed));
+    PoseSequence sequence = Beating(lines, RandomPhases(random, 8), seed);
+    Jitter(sequence, random, 0.3);
+    DrawConfidence(sequence, random);
+    for (const MotionEnergy energy : { MotionEnergy::Displacement, MotionEnergy::Position })
+    {
+      MotionRegularizationSettings settings = WithoutLimits();
+      settings.wellTracked = 1.0; // whose tolerance is a limit too
+      settings.energy = energy;
+      const RegularizedMotion regular = RegularizeMotion(sequence, lines, settings);
+      const Eigen::Isometry3d motion = RandomMotion(seed);
+      MovingLines there = lines;
+      for (Vector3& point : there.rest)
+      {
+        point = motion * point;
+      }
+      const RegularizedMotion moved = RegularizeMotion(Mapped(sequence, motion), there, settings);
+      // Eq. 14 does not turn displacements: rest and poses move together.
+      EXPECT_LT(Farthest(Mapped(regular.poses, motion), moved.poses), 1e-8) << seed;
+      const RegularizedMotion turned = RegularizeMotion(FromTheSecondOn(sequence), lines, settings);
+      EXPECT_LT(Farthest(FromTheSecondOn(regular.poses), turned.poses), 1e-8) << seed;
+
+      // It is the minimum: less than before, and more wherever one goes from there.
+      EXPECT_LE(regular.after.objective, regular.before.objective) << seed;
+      for (int n = 0; n < 5; ++n)
+      {
+        PoseSequence near = regular.poses;
+        Jitter(near, random, 0.01);
+        EXPECT_GT(EnergiesOf(near, sequence, lines, settings).objective, regular.after.objective)
+          << seed;
+      }
+    }
+  }
+}
+
+TEST(RandomMotion, RegularisationDoesNotCountWhatHasNoConfidence)
+{
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+  {
+    RandomStream random(seed, 9);
+    const MovingLines lines = LinesOf(RandomTree(seed));
+    PoseSequence sequence = Beating(lines, RandomPhases(random, 10), seed);
+    const auto lost = Lose(sequence, random);
+    PoseSequence wrong = sequence;
+    for (const auto& [k, p] : lost)
+    {
+      wrong.points[k][p] += 20.0 * RandomDirection(random);
+    }
+    const MotionRegularizationSettings settings = WithoutLimits();
+    const RegularizedMotion right = RegularizeMotion(sequence, lines, settings);
+    const RegularizedMotion other = RegularizeMotion(wrong, lines, settings);
+    // 20 mm that weigh 1e-6.
+    EXPECT_LT(Farthest(right.poses, other.poses), 0.02) << seed;
+  }
+}
+
+TEST(RandomMotion, RegularisationKeepsItsLimitsOrSaysWhereNot)
+{
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+  {
+    RandomStream random(seed, 10);
+    const MovingLines lines = LinesOf(RandomTree(seed));
+    PoseSequence sequence = Beating(lines, RandomPhases(random, 8), seed);
+    const PoseSequence smooth = sequence;
+    Jitter(sequence, random, 0.8);
+    DrawConfidence(sequence, random);
+    MotionRegularizationSettings settings;
+    settings.greatestStrain = 0.15;
+    settings.greatestStep = 6.0;
+    const RegularizedMotion regular = RegularizeMotion(sequence, lines, settings);
+    EXPECT_GT(regular.iterations, 0) << seed;
+    const double slack = 3.0 * settings.precision;
+    std::int64_t beyond = 0;
+    for (std::size_t k = 0; k < regular.poses.points.size(); ++k)
+    {
+      const std::vector<Vector3>& points = regular.poses.points[k];
+      const std::vector<Vector3>& next =
+        regular.poses.points[(k + 1) % regular.poses.points.size()];
+      EXPECT_TRUE(AllFinite(points)) << seed;
+      for (std::size_t p = 0; p < points.size(); ++p)
+      {
+        beyond += (next[p] - points[p]).norm() > settings.greatestStep + slack ? 1 : 0;
+        if (sequence.confidence[k][p] >= settings.wellTracked)
+        {
+          EXPECT_LE((points[p] - sequence.points[k][p]).norm(), settings.tolerance + slack) << seed;
+        }
+      }
+      for (std::size_t n = 0; n < lines.lines.size(); ++n)
+      {
+        const std::vector<std::int64_t>& line = lines.lines[n];
+        double length = 0.0;
+        double rest = 0.0;
+        for (std::size_t p = 1; p < line.size(); ++p)
+        {
+          const auto a = static_cast<std::size_t>(line[p - 1]);
+          const auto b = static_cast<std::size_t>(line[p]);
+          const double now = (points[b] - points[a]).norm();
+          const double then = (lines.rest[b] - lines.rest[a]).norm();
+          beyond += std::abs(now - then) > settings.greatestStrain * then + slack ? 1 : 0;
+          length += now;
+          rest += then;
+        }
+        EXPECT_NEAR(regular.strain[k][n], length / rest - 1.0, 1e-9) << seed;
+        EXPECT_NEAR(regular.stress[k][n], settings.youngsModulus * regular.strain[k][n], 1e-9);
+      }
+    }
+    EXPECT_LE(beyond, regular.violations) << seed;
+  }
 }
