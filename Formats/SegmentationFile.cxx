@@ -211,9 +211,9 @@ SegmentationMask SegmentationFile::Mask(
   SegmentationMask mask;
   mask.grid = this->VoxelGrid;
   const std::array<int, 6>& extent = mask.grid.extent;
-  const auto nx = static_cast<std::size_t>(extent[1] + 1);
-  const auto ny = static_cast<std::size_t>(extent[3] + 1);
-  mask.voxels.assign(nx * ny * static_cast<std::size_t>(extent[5] + 1), 0);
+  const auto nx = static_cast<std::size_t>(extent[1]) + 1;
+  const auto ny = static_cast<std::size_t>(extent[3]) + 1;
+  mask.voxels.assign(nx * ny * (static_cast<std::size_t>(extent[5]) + 1), 0);
   std::vector<float> labels(mask.voxels.size());
   std::set<int> layers;
   for (const Segment& segment : chosen)
