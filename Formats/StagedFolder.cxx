@@ -200,11 +200,7 @@ void StagedFolder::Commit()
   const fs::path folder(this->Folder);
   const fs::path staging(this->Staging);
   std::error_code error;
-  if (!this->Names.empty() && !this->LastStays)
-  {
-    fs::remove(folder / this->Names.back(), error);
-  }
-  for (const std::string& name : this->Names)
+  const auto move = [&](const std::string& name)
   {
     fs::create_directories((folder / name).parent_path(), error);
     fs::rename(staging / name, folder / name, error);
@@ -212,10 +208,29 @@ void StagedFolder::Commit()
     {
       Fail(folder / name, error.message());
     }
+  };
+  if (!this->Names.empty() && !this->LastStays)
+  {
+    fs::remove(folder / this->Names.back(), error);
+  }
+  for (std::size_t n = 0; n + 1 < this->Names.size(); ++n)
+  {
+    move(this->Names[n]);
+  }
+  this->RemoveOlder();
+  if (!this->Names.empty())
+  {
+    move(this->Names.back());
   }
   fs::remove_all(staging, error);
   this->Staging.clear();
   this->Unlock();
+}
+
+void StagedFolder::RemoveOlder()
+{
+  const fs::path folder(this->Folder);
+  std::error_code error;
   for (const std::string& name : this->Older)
   {
     if (std::find(this->Names.begin(), this->Names.end(), name) != this->Names.end())

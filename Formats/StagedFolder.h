@@ -71,6 +71,7 @@ public:
 private:
   /// Removes what is not committed.
   void Discard();
+  void RemoveOlder();
   void Unlock();
 
   std::string Folder;

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Shows that memory does not grow: 20 times the whole road in one process, from the phantom to the meshes of the model.
+# Shows that memory does not grow: 20 times the whole road in one process, from the phantom to a session in the model.
 set -euo pipefail
 
 usage() {
@@ -7,7 +7,7 @@ usage() {
 Usage: scripts/check-leaks.sh [--tree DIR] [--cycles N] [--quick] [--valgrind] [--heaptrack]
   --tree DIR   build tree with the tests (default: build/paraview)
   --cycles N   cycles in one process, 3 at least (default: 20)
-  --quick      measure the model against itself instead of the truth: a third of the time
+  --quick      measure the model against itself instead of the truth, and without a session of the simulator
   --valgrind   also one cycle, and 3 beats of three filters, under valgrind's memcheck (slow: many minutes)
   --heaptrack  also 2 and 6 cycles under heaptrack: the longer run may leave no byte more than the shorter one
 Exit code 1 when memory grows, or valgrind finds memory of ours that is lost.

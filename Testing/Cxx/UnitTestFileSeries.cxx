@@ -157,6 +157,37 @@ TEST_F(UnitTestFileSeries, AShorterSetTakesThePlaceOfALongerOne)
   EXPECT_TRUE(fs::exists(this->Folder / "outside"));
 }
 
+TEST_F(UnitTestFileSeries, AnOlderDescriptionStaysOnlyWhereItDescribesNoneOfTheFiles)
+{
+  const fs::path folder = this->Folder / "set";
+  for (const bool keep : { false, true })
+  {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    coronary::WriteFileAtomically((folder / "list").string(), "old");
+    coronary::WriteFileAtomically((folder / "more").string(), "old");
+    coronary::StagedFolder staged(folder.string());
+    for (const char* name : { "file", "list" })
+    {
+      coronary::WriteFileAtomically(staged.Add(name), "new one");
+    }
+    staged.TakePlaceOf({ "more" });
+    if (keep)
+    {
+      staged.KeepLast();
+    }
+    // It breaks off at the first file.
+    fs::create_directories(folder / "file/in the way");
+    EXPECT_THROW(staged.Commit(), std::runtime_error);
+    EXPECT_EQ(fs::exists(folder / "list"), keep);
+    EXPECT_TRUE(fs::exists(folder / "more"));
+    fs::remove_all(folder / "file");
+    staged.Commit();
+    EXPECT_EQ(fs::file_size(folder / "list"), 7u);
+    EXPECT_FALSE(fs::exists(folder / "more"));
+  }
+}
+
 TEST(UnitTestMeshSequenceReport, NumbersAndNames)
 {
   coronary::MeshSequenceReport report;
