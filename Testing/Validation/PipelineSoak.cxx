@@ -195,17 +195,17 @@ int Soak(const Settings& settings)
 
 int main(int argc, char** argv)
 {
-  Settings settings;
-  CLI::App app("The whole road of coronary-pipeline many times in one process.", "soak-pipeline");
-  app.add_option("CYCLES", settings.cycles, "How many times; less than 3 show no growth")
-    ->check(CLI::Range(1, 100000))
-    ->capture_default_str();
-  app.add_flag(
-    "--quick", settings.quick, "Without the truth, measured against itself, and without a session");
-  app.add_flag("--pictures", settings.pictures, "Also the pictures of evaluate, with a display");
-  CLI11_PARSE(app, argc, argv);
   try
   {
+    Settings settings;
+    CLI::App app("The whole road many times in one process.", "soak-pipeline");
+    app.add_option("CYCLES", settings.cycles, "How many times; less than 3 show no growth")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+    app.add_flag("--quick", settings.quick,
+      "Without the truth, measured against itself, and without a session");
+    app.add_flag("--pictures", settings.pictures, "Also the pictures of evaluate, with a display");
+    CLI11_PARSE(app, argc, argv);
     CatchInterruptions();
     return Soak(settings);
   }
