@@ -4,6 +4,7 @@
 #include "ByteStream.h"
 #include "TextFile.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -252,5 +253,12 @@ std::string PvdText(const std::vector<TimedFile>& files)
       "\" group=\"\" part=\"0\" file=\"" + Encoded(file.path) + "\"/>\n";
   }
   return text + "  </Collection>\n</VTKFile>\n";
+}
+
+std::string SeriesNumber(std::size_t number, std::size_t count, std::size_t digits)
+{
+  const std::string text = std::to_string(number);
+  const std::size_t width = std::max(digits, std::to_string(count - 1).size());
+  return std::string(width - text.size(), '0') + text;
 }
 }

@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_FileSeries_h
 #define DynamicCoronary_FileSeries_h
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,13 @@ std::string FileSeriesText(const std::vector<TimedFile>& files);
 
 /// The text of a .pvd file; paths are written as they are.
 std::string PvdText(const std::vector<TimedFile>& files);
+
+/**
+ * The number of a file, for its name: all files of a series have as many digits as the last one, so that they sort.
+ * @param count   files, of which this is one
+ * @param digits  at least
+ */
+std::string SeriesNumber(std::size_t number, std::size_t count, std::size_t digits = 2);
 }
 
 #endif

@@ -49,7 +49,6 @@ struct Reader
   /// What a position is multiplied with, to be LPS.
   Vector3 Signs(const Json& markup, const std::string& owner) const
   {
-    const Vector3 ras(-1.0, -1.0, 1.0);
     const auto found = markup.find("coordinateSystem");
     if (found == markup.end() || found->is_null())
     {
@@ -64,7 +63,7 @@ struct Reader
     }
     if (system == "RAS" || system == "0")
     {
-      return ras;
+      return { -1.0, -1.0, 1.0 };
     }
     this->Fail(owner + ".coordinateSystem is " + found->dump().substr(0, 32) +
       "; LPS, RAS, 0 (RAS) and 1 (LPS) are known");

@@ -619,8 +619,8 @@ public:
         fs::path(path).parent_path().empty() ? "." : fs::path(path).parent_path().string(), ranks)
     , Topo(std::move(topology))
     , Surface(this->Topo.PatchOf(0))
-    , Width(
-        std::max<std::size_t>(static_cast<std::size_t>(digits), std::to_string(phases - 1).size()))
+    , Phases(phases)
+    , Digits(static_cast<std::size_t>(digits))
   {
     if (!this->Topo.tetrahedra.empty())
     {
@@ -638,8 +638,7 @@ public:
 
   std::string Number(std::size_t phase) const
   {
-    const std::string digits = std::to_string(phase);
-    return std::string(this->Width - digits.size(), '0') + digits;
+    return coronary::SeriesNumber(phase, this->Phases, this->Digits);
   }
 
   /// Writes a file, and tells the report.
@@ -673,7 +672,8 @@ private:
   Topology Topo;
   Patch Surface;
   std::map<int, Patch> Faces; ///< made when they are first written
-  std::size_t Width;
+  std::size_t Phases;
+  std::size_t Digits;
   vtkSmartPointer<vtkCellArray> Tetrahedra;
 };
 

@@ -2,6 +2,7 @@
 
 #include "AtomicFile.h"
 #include "CoronaryPhantom.h"
+#include "FileSeries.h"
 #include "Interruption.h"
 #include "MetaImageWriter.h"
 #include "OptionChecks.h"
@@ -256,13 +257,6 @@ std::string Collection(const std::string& stem, const std::vector<std::string>& 
   return text.str();
 }
 
-std::string Number(std::size_t index, std::size_t count)
-{
-  const std::string text = std::to_string(index);
-  const std::size_t width = std::max<std::size_t>(2, std::to_string(count - 1).size());
-  return std::string(width - text.size(), '0') + text;
-}
-
 std::string Percent(double fraction)
 {
   char text[32];
@@ -283,7 +277,7 @@ public:
   {
     for (std::size_t i = 0; i < times.size(); ++i)
     {
-      this->Numbers.push_back(Number(i, times.size()));
+      this->Numbers.push_back(SeriesNumber(i, times.size()));
     }
     this->Series.cycleMs = 1000.0 * job.settings.cycleLength;
   }

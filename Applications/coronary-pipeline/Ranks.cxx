@@ -197,16 +197,15 @@ void MpiRanks::Wait(MPI_Request& request)
 {
   using namespace std::chrono_literals;
   auto pause = 20us;
-  for (int done = 0;;)
+  int done = 0;
+  MPI_Request_get_status(request, &done, MPI_STATUS_IGNORE);
+  while (!done)
   {
-    MPI_Test(&request, &done, MPI_STATUS_IGNORE);
-    if (done)
-    {
-      return;
-    }
     std::this_thread::sleep_for(pause);
     pause = std::min<std::chrono::microseconds>(2 * pause, 2ms);
+    MPI_Request_get_status(request, &done, MPI_STATUS_IGNORE);
   }
+  MPI_Wait(&request, MPI_STATUS_IGNORE);
 }
 
 std::vector<long long> MpiRanks::Announce(long long own, const std::string& failure)

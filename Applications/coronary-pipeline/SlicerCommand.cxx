@@ -1,6 +1,7 @@
 #include "Command.h"
 
 #include "AtomicFile.h"
+#include "FileSeries.h"
 #include "Interruption.h"
 #include "MarkupsFile.h"
 #include "MovingModel.h"
@@ -150,9 +151,9 @@ SlicerSequence SlicerJob::WriteModels(const std::vector<TimedFile>& files, const
   {
     ThrowIfInterrupted();
     step.progress.BeginStep(step.number++, name + " " + std::to_string(n));
-    const std::string digits = std::to_string(n);
-    const std::string item = folder + "/" + folder + "_" +
-      std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits + "." + ending;
+    std::string item = folder;
+    item.append("/").append(folder).append("_").append(SeriesNumber(n, files.size(), 3));
+    item.append(".").append(ending);
     const auto data = lines ? ReadPolyData(files[n].path, step.messages)
                             : ReadSurface(files[n].path, step.messages);
     WriteSlicerModel(step.folder.Add(item), data, step.messages);

@@ -172,8 +172,9 @@ std::string SlicerSceneText(const std::vector<SlicerSequence>& sequences,
     synchronization += Attribute("SynchronizationPropertiesMap" + postfix,
       "playback true recording false overwriteProxyName false saveChanges false missingItemMode "
       "createFromPrevious ");
-    references += "sequenceNodeRef" + postfix + ":" + IdOf("Sequence", number) + ";dataNodeRef" +
-      postfix + ":" + IdOf(sequence.IsVolume() ? "ScalarVolume" : "Model", number) + ";";
+    references.append("sequenceNodeRef").append(postfix).append(":");
+    references.append(IdOf("Sequence", number)).append(";dataNodeRef").append(postfix).append(":");
+    references.append(IdOf(sequence.IsVolume() ? "ScalarVolume" : "Model", number)).append(";");
   }
   const double rate = std::max(1.0, static_cast<double>(index.values.size()) / perCycle);
   text += Node("SequenceBrowser", IdOf("SequenceBrowser", 1), "Heart cycle",

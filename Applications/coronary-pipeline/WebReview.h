@@ -76,7 +76,7 @@ struct ReviewCase
 };
 
 /// Shapes as bytes, and where in them what is.
-struct PackedShapes
+struct PackedShapes // NOLINT(bugprone-exception-escape): as CohortCase
 {
   nlohmann::ordered_json layout;
   std::string bytes;

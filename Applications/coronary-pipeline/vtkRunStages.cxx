@@ -786,13 +786,10 @@ std::string WriteMovingLines(
   vtkAlgorithm* lines, const std::string& stem, const std::vector<double>& times, RunStep& step)
 {
   std::vector<TimedFile> files;
-  const std::size_t width =
-    std::max<std::size_t>(PhaseDigits, std::to_string(times.size() - 1).size());
   for (std::size_t n = 0; n < times.size(); ++n)
   {
-    const std::string digits = std::to_string(n);
     std::string name = stem + "_";
-    name.append(width - digits.size(), '0').append(digits).append(".vtp");
+    name.append(SeriesNumber(n, times.size(), PhaseDigits)).append(".vtp");
     files.push_back({ name, times[n] });
     const std::string path = step.Add("motion/" + files.back().path);
     if (step.ranks.Owns(n))

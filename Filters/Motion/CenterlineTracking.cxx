@@ -1010,6 +1010,7 @@ void Tracker::Align(double robustScale, double progressFrom)
     const auto part = [&](double from, double to)
     {
       const double share = 0.05 / static_cast<double>(phases);
+      // NOLINTNEXTLINE(clang-analyzer-cplusplus.NewDeleteLeaks): std::function frees what it holds
       return this->Part(progressFrom + share * (static_cast<double>(k) + from),
         progressFrom + share * (static_cast<double>(k) + to));
     };
@@ -1320,7 +1321,7 @@ std::vector<double> Tracker::MeasureCalibre() const
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
   for (int row = 0; row < size; ++row)
   {
-    const double harmonic = 1.0 + row / 2;
+    const int harmonic = 1 + row / 2;
     matrix(row, row) = 0.01 * std::pow(harmonic, 4);
   }
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);

@@ -82,6 +82,16 @@ TEST_F(UnitTestFileSeries, ReadsWhatParaViewWrites)
   EXPECT_EQ(series[1].path, (this->Folder / "b.vtp").string());
 }
 
+TEST_F(UnitTestFileSeries, NumbersSort)
+{
+  EXPECT_EQ(coronary::SeriesNumber(0, 1), "00");
+  EXPECT_EQ(coronary::SeriesNumber(9, 100), "09");
+  EXPECT_EQ(coronary::SeriesNumber(9, 101), "009");
+  EXPECT_EQ(coronary::SeriesNumber(100, 101), "100");
+  EXPECT_EQ(coronary::SeriesNumber(7, 10, 1), "7");
+  EXPECT_EQ(coronary::SeriesNumber(7, 20, 3), "007");
+}
+
 TEST_F(UnitTestFileSeries, SaysWhatIsWrong)
 {
   this->ExpectFailure("", "neither a .series nor a .pvd");
