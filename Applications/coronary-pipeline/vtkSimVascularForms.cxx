@@ -335,6 +335,7 @@ SimVascularVessel VesselAlong(
   constexpr double controlSpacing = 5.0;
   SimVascularVessel vessel;
   std::vector<Vector3> scaled;
+  scaled.reserve(points.size());
   for (const Vector3& point : points)
   {
     scaled.emplace_back(point / unit);
