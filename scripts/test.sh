@@ -63,25 +63,47 @@ if ! scripts/check-sources.sh; then
   failed+=(sources)
 fi
 
-for tree in "${trees[@]}"; do
-  rm -f "$logs/$tree-tests.log"
-  if [ "$tree" != paraview ] && [ -z "${DYNAMICCORONARY_VTK_DIR:-}" ]; then
+# build TREE
+build() {
+  if [ "$1" != paraview ] && [ -z "${DYNAMICCORONARY_VTK_DIR:-}" ]; then
     DYNAMICCORONARY_VTK_DIR="$(scripts/vtk-prefix.sh)"
     export DYNAMICCORONARY_VTK_DIR
   fi
-  echo "== $tree: configuring (log: build/logs/$tree-configure.log)"
-  if ! cmake --preset "$tree" >"$logs/$tree-configure.log" 2>&1; then
-    tail -n 40 "$logs/$tree-configure.log"
-    failed+=("$tree-configure")
-    continue
+  cmake --preset "$1" && cmake --build --preset "$1" -j "$jobs"
+}
+
+# The process group that builds the next tree with what the tests leave of the cores: some of them want to be alone.
+beside=""
+trap '[ -z "$beside" ] || kill -- "-$beside" 2>/dev/null || true' EXIT
+
+for index in "${!trees[@]}"; do
+  tree="${trees[index]}"
+  next="${trees[index + 1]:-}"
+  log="$logs/$tree-build.log"
+  rm -f "$logs/$tree-tests.log"
+  built=yes
+  if [ -n "$beside" ]; then
+    echo "== $tree: building, begun beside the tests (log: build/logs/$tree-build.log)"
+    wait "$beside" || built=no
+    beside=""
+    tail -n 40 "$log"
+  else
+    echo "== $tree: building"
+    build "$tree" 2>&1 | tee "$log" || built=no
   fi
-  echo "== $tree: building"
-  if ! cmake --build --preset "$tree" -j "$jobs"; then
+  if [ "$built" = no ]; then
     failed+=("$tree-build")
     continue
   fi
+  if [ -n "$next" ]; then
+    set -m
+    (renice -n 19 -p "$BASHPID" && build "$next") >"$logs/$next-build.log" 2>&1 &
+    beside=$!
+    set +m
+  fi
   echo "== $tree: testing"
-  if ! ctest --preset "$tree" -j "$jobs" --no-tests=error 2>&1 | tee "$logs/$tree-tests.log"; then
+  # The sources have been checked.
+  if ! ctest --preset "$tree" -j "$jobs" --no-tests=error -E '^CheckSources$' 2>&1 | tee "$logs/$tree-tests.log"; then
     failed+=("$tree-tests")
   fi
 done
