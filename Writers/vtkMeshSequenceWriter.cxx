@@ -589,6 +589,7 @@ void AddVectors(vtkPointSet* mesh, const char* name, const std::string& letter,
   for (int c = 0; array != nullptr && array->GetNumberOfComponents() == 3 && c < 3; ++c)
   {
     std::vector<float> values;
+    values.reserve(points.size());
     for (const vtkIdType point : points)
     {
       values.push_back(static_cast<float>(array->GetComponent(point, c)));

@@ -350,8 +350,7 @@ def panels(text):
     add_text(base, text, 20, height - 42, 26, bold=True)
     made = []
     for n, (name, _, _) in enumerate(VIEWS):
-        panel = add_panel(window, n * width / 3.0 + 2, 0, (n + 1) * width / 3.0 - 2,
-                                 height - TITLE)
+        panel = add_panel(window, n * width / 3.0 + 2, 0, (n + 1) * width / 3.0 - 2, height - TITLE)
         add_text(panel, name, 16, 16)
         made.append(panel)
     return window, made
@@ -368,5 +367,3 @@ def dot(a, b):
 def unit(a):
     length = math.sqrt(dot(a, a))
     return tuple(x / length for x in a)
-
-

@@ -10,7 +10,8 @@ namespace
 {
 constexpr int MaximumVessels = 32;
 constexpr double CellSize = 4.0; ///< of the bins, mm
-/// A bin has all that a ball of this radius (mm) around a point of it needs: that much is looked at for each point of a surface.
+/// A bin has all that a ball of this radius (mm) around any place in it needs: so much is asked for
+/// around each point of a surface.
 constexpr double PointBall = 1.5;
 
 /// Calls visit(key) for each bin that a box touches.

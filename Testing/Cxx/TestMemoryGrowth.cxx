@@ -1,5 +1,6 @@
 // Memory over many cycles of one process: what a cycle takes, it gives back. DYNAMICCORONARY_CYCLES says how many cycles;
 // scripts/check-leaks.sh shows the table.
+#include "ProcessMemory.h"
 #include "vtkCenterlineSkeleton.h"
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkFrangiVesselness.h"
@@ -9,13 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include <malloc.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <vector>
 
 namespace
@@ -23,23 +20,6 @@ namespace
 constexpr int Phases = 2;
 constexpr double MostGrowth =
   65536; // bytes that 20 cycles may leave behind, caches of the libraries included
-
-/// Bytes that are allocated.
-double Allocated()
-{
-  const auto info = mallinfo2();
-  return static_cast<double>(info.uordblks + info.hblkhd);
-}
-
-/// Bytes of this process in memory.
-double Resident()
-{
-  std::ifstream file("/proc/self/statm");
-  double total = 0.0;
-  double resident = 0.0;
-  file >> total >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
 
 /// From the phantom to its vesselness and skeleton, for a beat.
 void Beat()
@@ -81,10 +61,10 @@ TEST(MemoryGrowth, ABeatGivesBackWhatItTook)
   {
     Beat();
     malloc_trim(0);
-    allocated.push_back(Allocated());
+    allocated.push_back(AllocatedBytes());
     const double grown = cycle < 3 ? 0.0 : allocated.back() - allocated[1];
     std::printf("%5d  %13.3f  %12.1f  %20.0f\n", cycle, allocated.back() / 1048576.0,
-      Resident() / 1048576.0, grown);
+      ResidentBytes() / 1048576.0, grown);
     std::fflush(stdout);
   }
   EXPECT_LT(allocated.back() - allocated[1], MostGrowth);

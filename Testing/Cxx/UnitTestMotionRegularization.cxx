@@ -2,6 +2,7 @@
 #include "MotionRegularization.h"
 
 #include "CoronaryPhantom.h"
+#include "MotionTestData.h"
 #include "Refusals.h"
 
 #include <gtest/gtest.h>
@@ -136,15 +137,6 @@ MotionRegularizationSettings NoWeights()
   return settings;
 }
 
-MotionRegularizationSettings NoLimits()
-{
-  MotionRegularizationSettings settings;
-  settings.greatestBending = Pi;
-  settings.leastCurvatureRadius = 0.0;
-  settings.greatestStrain = Infinity;
-  settings.greatestStep = Infinity;
-  return settings;
-}
 }
 
 TEST(MotionRegularization, SmoothMotionStays)

@@ -6,6 +6,7 @@
 #include "CounterRandom.h"
 #include "MeshDistance.h"
 #include "MotionRegularization.h"
+#include "MotionTestData.h"
 #include "PhaseInterpolation.h"
 #include "SkeletonPose.h"
 #include "SkinDeformation.h"
@@ -821,14 +822,16 @@ std::vector<std::pair<std::size_t, std::size_t>> Lose(PoseSequence& sequence, Ra
   return lost;
 }
 
-MotionRegularizationSettings WithoutLimits()
+/// The sequence with those samples moved by a distance in mm, each in a direction of its own.
+PoseSequence Misplaced(PoseSequence sequence,
+  const std::vector<std::pair<std::size_t, std::size_t>>& samples, double distance,
+  RandomStream& random)
 {
-  MotionRegularizationSettings settings;
-  settings.greatestBending = EIGEN_PI;
-  settings.leastCurvatureRadius = 0.0;
-  settings.greatestStrain = Infinity;
-  settings.greatestStep = Infinity;
-  return settings;
+  for (const auto& [k, p] : samples)
+  {
+    sequence.points[k][p] += distance * RandomDirection(random);
+  }
+  return sequence;
 }
 }
 
@@ -982,11 +985,7 @@ TEST(RandomMotion, InterpolationDoesNotCountWhatHasNoConfidence)
     // Low noise: single samples.
     PoseSequence sequence = Beating(lines, RandomPhases(random, 12), seed);
     const auto lost = Lose(sequence, random);
-    PoseSequence wrong = sequence;
-    for (const auto& [k, p] : lost)
-    {
-      wrong.points[k][p] += 50.0 * RandomDirection(random);
-    }
+    PoseSequence wrong = Misplaced(sequence, lost, 50.0, random);
     const PhaseInterpolationSettings settings = SettingsOf(PhaseInterpolationMode::LowNoise);
     const PhaseInterpolation right(sequence, settings);
     const PhaseInterpolation other(wrong, settings);
@@ -1085,7 +1084,7 @@ TEST(RandomMotion, RegularisationKeepsWhatHasNoEnergy)
         point = map * point;
       }
     }
-    MotionRegularizationSettings still = WithoutLimits();
+    MotionRegularizationSettings still = NoLimits();
     still.temporalWeight = still.velocityWeight = 0.0;
     EXPECT_LT(Farthest(RegularizeMotion(affine, straight, still).poses, affine), 1e-8) << seed;
   }
@@ -1102,7 +1101,7 @@ TEST(RandomMotion, RegularisationMovesWithTheWorldAndKnowsNoFirstPhase)
     DrawConfidence(sequence, random);
     for (const MotionEnergy energy : { MotionEnergy::Displacement, MotionEnergy::Position })
     {
-      MotionRegularizationSettings settings = WithoutLimits();
+      MotionRegularizationSettings settings = NoLimits();
       settings.wellTracked = 1.0; // whose tolerance is a limit too
       settings.energy = energy;
       const RegularizedMotion regular = RegularizeMotion(sequence, lines, settings);
@@ -1139,12 +1138,8 @@ TEST(RandomMotion, RegularisationDoesNotCountWhatHasNoConfidence)
     const MovingLines lines = LinesOf(RandomTree(seed));
     PoseSequence sequence = Beating(lines, RandomPhases(random, 10), seed);
     const auto lost = Lose(sequence, random);
-    PoseSequence wrong = sequence;
-    for (const auto& [k, p] : lost)
-    {
-      wrong.points[k][p] += 20.0 * RandomDirection(random);
-    }
-    const MotionRegularizationSettings settings = WithoutLimits();
+    const PoseSequence wrong = Misplaced(sequence, lost, 20.0, random);
+    const MotionRegularizationSettings settings = NoLimits();
     const RegularizedMotion right = RegularizeMotion(sequence, lines, settings);
     const RegularizedMotion other = RegularizeMotion(wrong, lines, settings);
     // 20 mm that weigh 1e-6.

@@ -2,6 +2,7 @@
 // Writes a line for each phantom and a last one for all; exit code 1 when a wire left a lumen or had to be set back.
 #include "CounterRandom.h"
 #include "Intervention.h"
+#include "ProcessMemory.h"
 #include "WallMotions.h"
 
 #include <algorithm>
@@ -9,11 +10,8 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <string>
 #include <vector>
-
-#include <unistd.h>
 
 using namespace coronary;
 
@@ -46,16 +44,6 @@ Guidewire RandomWire(RandomStream& random)
   add(80.0, 0.5 * shaft, 0.0);
   add(100.0, shaft, 0.0);
   return wire;
-}
-
-/// MB of memory that the process has.
-double Resident()
-{
-  std::ifstream file("/proc/self/statm");
-  double pages = 0.0;
-  double resident = 0.0;
-  file >> pages >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
 GuideCatheter Catheter()
@@ -127,7 +115,7 @@ int main(int argc, char** argv)
     {
       if (k == std::min(ticks / 10, 120000L))
       {
-        early = Resident();
+        early = ResidentBytes() / 1e6;
       }
       if (k % 800 == 0)
       {
@@ -172,7 +160,7 @@ int main(int argc, char** argv)
       static_cast<int>(settings.seed),
       topology.groupName.empty() ? "" : topology.groupName[options.rootBranch].c_str(), ticks,
       passed, 1e6 * passed / static_cast<double>(ticks), deep, sum / static_cast<double>(ticks),
-      gap, force, inserted, lost, reset, early, Resident());
+      gap, force, inserted, lost, reset, early, ResidentBytes() / 1e6);
     std::fflush(stdout);
     outside += lost;
     resets += reset;

@@ -5,13 +5,13 @@
 #include "HeadlessSession.h"
 #include "Interruption.h"
 #include "ParallelFor.h"
+#include "ProcessMemory.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -148,24 +148,6 @@ void Cycle(const WorkFolder& work, const Settings& settings)
   DoInVain(broken);
 }
 
-/// Bytes that are allocated.
-double Allocated()
-{
-  malloc_trim(0);
-  const auto info = mallinfo2();
-  return static_cast<double>(info.uordblks + info.hblkhd);
-}
-
-/// Bytes of this process in memory.
-double Resident()
-{
-  std::ifstream file("/proc/self/statm");
-  double total = 0.0;
-  double resident = 0.0;
-  file >> total >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
-
 int Soak(const Settings& settings)
 {
   const WorkFolder work;
@@ -175,11 +157,12 @@ int Soak(const Settings& settings)
   for (int cycle = 1; cycle <= settings.cycles; ++cycle)
   {
     Cycle(work, settings);
-    const double allocated = Allocated();
+    malloc_trim(0);
+    const double allocated = AllocatedBytes();
     steady = cycle == FirstSteadyCycle ? allocated : steady;
     grown = cycle > FirstSteadyCycle ? allocated - steady : 0.0;
-    std::printf(
-      "%5d  %13.3f  %12.1f  %20.0f\n", cycle, allocated / 1048576.0, Resident() / 1048576.0, grown);
+    std::printf("%5d  %13.3f  %12.1f  %20.0f\n", cycle, allocated / 1048576.0,
+      ResidentBytes() / 1048576.0, grown);
     std::fflush(stdout);
     ThrowIfInterrupted();
   }
