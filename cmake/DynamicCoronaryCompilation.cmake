@@ -10,7 +10,7 @@ if(DYNAMICCORONARY_SANITIZE)
   # On the whole build: a sanitizer must see every allocation of the process.
   # What the undefined behaviour sanitizer finds must fail the test, not only be printed.
   add_compile_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}" -fno-sanitize-recover=all
-    -fno-omit-frame-pointer -g)
+    -fno-omit-frame-pointer -g1)
   add_link_options("-fsanitize=${DYNAMICCORONARY_SANITIZE}")
   # GCC follows values less well through instrumented code, and warns inside <regex> and Eigen.
   target_compile_options(dynamiccoronary_options INTERFACE

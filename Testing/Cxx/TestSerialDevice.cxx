@@ -492,17 +492,16 @@ TEST(Emulator, AsAProgram)
   const std::filesystem::path link = folder / "device";
   std::ofstream(folder / "scenario.json")
     << R"({"format":"dynamiccoronary device scenario","version":1,
-    "pieces":[{"seconds":0.5},{"seconds":0.5,"wire_mm":10}],
-    "faults":[{"at":3.0,"kind":"close","ms":300}]})";
+    "pieces":[{"seconds":2.0},{"seconds":0.5,"wire_mm":10}],
+    "faults":[{"at":4.0,"kind":"close","ms":300}]})";
   EmulatorProcess emulator({ "--quiet", "--scenario", (folder / "scenario.json").string(), "--link",
     link.string(), "--log", (folder / "log").string() });
   {
     Loop loop(std::make_shared<SerialDevice>(link.string()));
     ASSERT_TRUE(loop.Reaches(DeviceState::Running));
-    loop.Until([&] { return loop.input.drive.wirePosition > 9.99; }, 1.5);
+    loop.Until([&] { return loop.input.drive.wirePosition > 9.99; }, 3.0);
     const double reached = loop.input.drive.wirePosition;
-    EXPECT_GT(reached, 5.0);
-    EXPECT_LT(reached, 10.01);
+    EXPECT_NEAR(reached, 10.0, 0.01);
     EXPECT_TRUE(loop.Reaches(DeviceState::Disconnected, 5.0));
     EXPECT_TRUE(loop.Reaches(DeviceState::Running, 8.0));
     EXPECT_NEAR(loop.input.drive.wirePosition, reached, 0.01);
