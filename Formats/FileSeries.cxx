@@ -3,9 +3,9 @@
 #include "BoundedJson.h"
 #include "ByteStream.h"
 #include "TextFile.h"
+#include "XmlText.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -61,57 +61,14 @@ std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text
   return files;
 }
 
-constexpr std::array<std::pair<const char*, char>, 5> Entities{ { { "&lt;", '<' }, { "&gt;", '>' },
-  { "&quot;", '"' }, { "&apos;", '\'' }, { "&amp;", '&' } } };
-
-std::string Decoded(const std::string& path, const std::string& text)
-{
-  std::string result;
-  for (std::size_t i = 0; i < text.size();)
-  {
-    if (text[i] != '&')
-    {
-      result += text[i++];
-      continue;
-    }
-    bool known = false;
-    for (const auto& [entity, character] : Entities)
-    {
-      const std::string name(entity);
-      if (text.compare(i, name.size(), name) == 0)
-      {
-        result += character;
-        i += name.size();
-        known = true;
-        break;
-      }
-    }
-    if (!known)
-    {
-      Fail(path, "has an entity that is not known in '" + text + "'");
-    }
-  }
-  return result;
-}
-
-std::string Encoded(const std::string& text)
-{
-  std::string result;
-  for (const char c : text)
-  {
-    std::string written(1, c);
-    for (const auto& [entity, character] : Entities)
-    {
-      written = c == character ? entity : written;
-    }
-    result += written;
-  }
-  return result;
-}
-
 bool IsSpace(char c)
 {
   return c == ' ' || c == '\t' || c == '\n' || c == '\r';
+}
+
+bool IsControl(char c)
+{
+  return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
 }
 
 /// The attributes of the element whose name ends at `at`; leaves `at` behind it.
@@ -143,7 +100,14 @@ std::map<std::string, std::string> Attributes(
     {
       name.pop_back();
     }
-    attributes[name] = Decoded(path, text.substr(open + 1, close - open - 1));
+    try
+    {
+      attributes[name] = UnescapedXml(text.substr(open + 1, close - open - 1));
+    }
+    catch (const std::runtime_error& error)
+    {
+      Fail(path, error.what());
+    }
     at = close + 1;
   }
 }
@@ -218,9 +182,12 @@ std::vector<TimedFile> ReadFileSeries(const std::string& path)
   const fs::path folder = fs::path(path).parent_path();
   for (std::size_t n = 0; n < files.size(); ++n)
   {
-    if (files[n].path.empty())
+    const std::string& name = files[n].path;
+    if (name.empty() || std::any_of(name.begin(), name.end(), IsControl))
     {
-      Fail(path, "file " + std::to_string(n) + " has no name");
+      Fail(path,
+        "file " + std::to_string(n) +
+          (name.empty() ? " has no name" : " has a control character in its name"));
     }
     if (!std::isfinite(files[n].time) || (n > 0 && !(files[n].time > files[n - 1].time)))
     {
@@ -250,7 +217,7 @@ std::string PvdText(const std::vector<TimedFile>& files)
   for (const TimedFile& file : files)
   {
     text += "    <DataSet timestep=\"" + nlohmann::json(file.time).dump() +
-      "\" group=\"\" part=\"0\" file=\"" + Encoded(file.path) + "\"/>\n";
+      "\" group=\"\" part=\"0\" file=\"" + EscapedXml(file.path) + "\"/>\n";
   }
   return text + "  </Collection>\n</VTKFile>\n";
 }

@@ -201,8 +201,15 @@ private:
       {
         this->Fail("is no XML: the value of '" + name + "' is not quoted, or truncated");
       }
-      this->Attributes[name] =
-        Decoded(this->Text.substr(this->Position + 1, end - this->Position - 1));
+      try
+      {
+        this->Attributes[name] =
+          UnescapedXml(this->Text.substr(this->Position + 1, end - this->Position - 1));
+      }
+      catch (const std::runtime_error& error)
+      {
+        this->Fail("is no XML: " + std::string(error.what()));
+      }
       this->Position = end + 1;
     }
   }
@@ -217,24 +224,6 @@ private:
     }
     ++this->Position;
     this->Open.pop_back();
-  }
-
-  static std::string Decoded(std::string text)
-  {
-    // XML 1.0, 3.3.3: an end of line within a value is a space.
-    std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '\t' || c == '\r' || c == '\n'; }, ' ');
-    static const std::pair<const char*, const char*> entities[] = { { "&quot;", "\"" },
-      { "&apos;", "'" }, { "&lt;", "<" }, { "&gt;", ">" }, { "&amp;", "&" } };
-    for (const auto& [entity, character] : entities)
-    {
-      for (std::size_t at = text.find(entity); at != std::string::npos;
-           at = text.find(entity, at + 1))
-      {
-        text.replace(at, std::string(entity).size(), character);
-      }
-    }
-    return text;
   }
 
   const std::string& Text;

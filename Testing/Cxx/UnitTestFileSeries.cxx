@@ -4,6 +4,7 @@
 #include "MeshSequenceReport.h"
 #include "Refusals.h"
 #include "StagedFolder.h"
+#include "XmlText.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -92,6 +93,20 @@ TEST_F(UnitTestFileSeries, NumbersSort)
   EXPECT_EQ(coronary::SeriesNumber(7, 20, 3), "007");
 }
 
+TEST(XmlText, ValuesThereAndBack)
+{
+  const std::string text = "a < b > \"c\" & 'd' \xC3\xA9";
+  EXPECT_EQ(coronary::UnescapedXml(coronary::EscapedXml(text)), text);
+  EXPECT_EQ(coronary::UnescapedXml("&#65;&#x41;&#xe9;&#x20AC;&#x1F600;&apos;&amp;lt;"),
+    "AA\xC3\xA9\xE2\x82\xAC\xF0\x9F\x98\x80'&lt;");
+  EXPECT_EQ(coronary::UnescapedXml("a\r\nb\tc&#10;d"), "a  b c d");
+  for (const char* wrong : { "&", "&;", "&lt", "&LT;", "&nbsp;", "&#;", "&#x;", "&#0;", "&#7;",
+         "&#xD800;", "&#x110000;", "&#99999999999;", "&#-1;", "&#6 5;", "&amp &lt;" })
+  {
+    EXPECT_THROW(coronary::UnescapedXml(wrong), std::runtime_error) << wrong;
+  }
+}
+
 TEST_F(UnitTestFileSeries, SaysWhatIsWrong)
 {
   this->ExpectFailure("", "neither a .series nor a .pvd");
@@ -116,7 +131,10 @@ TEST_F(UnitTestFileSeries, SaysWhatIsWrong)
   this->ExpectFailure(open + "<DataSet file='a'/>" + close, "DataSet 0 has no timestep");
   this->ExpectFailure(open + "<DataSet file='a' timestep='x'/>" + close, "is a number");
   this->ExpectFailure(open + "<DataSet file='a' timestep='nan'/>" + close, "not finite");
-  this->ExpectFailure(open + "<DataSet file='&bad;' timestep='0'/>" + close, "entity");
+  this->ExpectFailure(open + "<DataSet file='&bad;' timestep='0'/>" + close,
+    "a reference ('&') that is not one of XML");
+  this->ExpectFailure(
+    "{\"files\": [{\"name\": \"a\\nb\", \"time\": 1}]}", "file 0 has a control character");
   this->ExpectFailure(open + close + "<DataSet file='a", "middle of an element");
   this->ExpectFailure(open + "<DataSet file='a' timestep='0' part='0'/>" +
       "<DataSet file='b' timestep='0' part='1'/>" + close,
