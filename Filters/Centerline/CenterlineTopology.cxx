@@ -173,6 +173,11 @@ void Check(const CenterlineSet& lines)
     {
       throw std::invalid_argument("Point " + std::to_string(i) + " is not finite");
     }
+    if (!std::isfinite(lines.points[i].squaredNorm()))
+    {
+      throw std::invalid_argument(
+        "Point " + std::to_string(i) + " is too far away to measure lengths");
+    }
   }
   for (std::size_t l = 0; l < lines.lines.size(); ++l)
   {
@@ -686,7 +691,9 @@ void CutLoops(
     for (const int next : graph.neighbours[v])
     {
       const double r = 0.5 * (graph.radius[v] + graph.radius[next]);
-      const double there = at + (graph.points[next] - graph.points[v]).norm() / (r * r);
+      // Where this overflows, the vertex is still reached.
+      const double there = std::min(std::numeric_limits<double>::max(),
+        at + (graph.points[next] - graph.points[v]).norm() / (r * r));
       if (there < cost[next])
       {
         cost[next] = there;

@@ -116,7 +116,8 @@ struct CenterlineTopology : CenterlineTree
  * Lines with fewer than two distinct points are left out.
  *
  * @throws std::invalid_argument for settings out of range, a radius or coordinate that is not
- *         finite, a radius that is not positive, or an index out of range; Cancelled
+ *         finite, a point whose squared distance from the origin overflows, a radius that is not
+ *         positive, or an index out of range; Cancelled
  */
 CenterlineTopology BuildTopology(const CenterlineSet& lines, const TopologySettings& settings = {},
   const ProgressCallback& progress = {});

@@ -177,8 +177,7 @@ private:
     const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), count);
     if (error != std::errc() || end != value.data() + value.size() || count < 0)
     {
-      Refuse("has a " + std::string(name) + " that is no number of things: '" +
-        std::string(value.substr(0, 40)) + "'");
+      Refuse("has a " + std::string(name) + " that is no number of things");
     }
     const auto number = static_cast<double>(count);
     if (name == "NumberOfComponents")

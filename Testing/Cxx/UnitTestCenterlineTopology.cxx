@@ -409,6 +409,10 @@ TEST(CenterlineTopology, FindsAndCutsLoops)
   alone.Add(
     { Vector3(0, 0, 0), Vector3(10, 0, 0), Vector3(10, 10, 0), Vector3(0, 0, 0) }, Constant(1.0));
   EXPECT_EQ(BuildTopology(alone.set).loops.size(), 1U);
+
+  // Of vessels so thin that their resistance overflows, too.
+  alone.set.radius.assign(alone.set.points.size(), 1e-170);
+  EXPECT_EQ(BuildTopology(alone.set).loops.size(), 1U);
 }
 
 TEST(CenterlineTopology, StrahlerOrders)
@@ -614,7 +618,9 @@ TEST(CenterlineTopology, NothingAndNonsense)
   EXPECT_NE(message(bad).find("radius of point 5"), std::string::npos);
   bad = good;
   bad.points[7][1] = std::numeric_limits<double>::infinity();
-  EXPECT_NE(message(bad).find("Point 7"), std::string::npos);
+  EXPECT_NE(message(bad).find("Point 7 is not finite"), std::string::npos);
+  bad.points[7][1] = -1e200;
+  EXPECT_NE(message(bad).find("Point 7 is too far away"), std::string::npos);
   bad = good;
   bad.lines[1][2] = 100000;
   EXPECT_NE(message(bad).find("Line 1"), std::string::npos);
