@@ -701,7 +701,8 @@ TEST_F(TestMeshSequenceWriter, SurfacesForOtherPrograms)
       }
       groups[group] += line.rfind("f ", 0) == 0 ? 1 : 0;
     }
-    for (const auto& face : this->Report()["faces"])
+    const nlohmann::json report = this->Report();
+    for (const auto& face : report["faces"])
     {
       EXPECT_EQ(groups[face["name"].get<std::string>()], face["triangles"].get<std::int64_t>());
     }

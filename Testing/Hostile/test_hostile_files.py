@@ -288,12 +288,13 @@ def json_cases(kind, command, program, start):
 
 
 # The runs -----------------------------------------------------------------------------------------------------------------
-def limited():
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+def limited(memory):
+    if memory:
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def run(case, programs, work):
+def run(case, programs, work, memory):
     """None when the case is as it should be, else what is wrong."""
     folder = work / case.name.replace(".", "-")
     folder.mkdir()
@@ -305,7 +306,7 @@ def run(case, programs, work):
     command += [names.get(word, word.replace("WORK", str(folder))) for word in case.command]
     with open(folder / "stderr", "w+b") as errors:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors,
-                                   preexec_fn=limited, cwd=folder)
+                                   preexec_fn=lambda: limited(memory), cwd=folder)
         timer = concurrent.futures.ThreadPoolExecutor(1)
         ended = timer.submit(os.wait4, process.pid, 0)
         try:
@@ -335,7 +336,7 @@ def run(case, programs, work):
         return f"prints control characters: {shown!r}"
     if left:
         return f"leaves {left}"
-    if usage.ru_maxrss > RESIDENT:
+    if memory and usage.ru_maxrss > RESIDENT:
         return f"took {usage.ru_maxrss >> 10} MB"
     return None
 
@@ -345,12 +346,13 @@ def main():
     parser.add_argument("--pipeline", required=True)
     parser.add_argument("--simulator", required=True)
     parser.add_argument("--only", default="", help="cases whose name has this text")
+    parser.add_argument("--any-memory", action="store_true", help="no limits of memory: sanitizers need a lot themselves")
     options = parser.parse_args()
     programs = {"pipeline": options.pipeline, "simulator": options.simulator}
     cases = [c for group in (volumes, surfaces, others) for c in group() if options.only in c.name]
     failed = 0
     with tempfile.TemporaryDirectory() as name, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for case, wrong in zip(cases, pool.map(lambda c: run(c, programs, Path(name)), cases)):
+        for case, wrong in zip(cases, pool.map(lambda c: run(c, programs, Path(name), not options.any_memory), cases)):
             if wrong:
                 failed += 1
                 print(f"FAILED: {case.name}: {wrong}")
