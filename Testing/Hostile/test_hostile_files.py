@@ -288,13 +288,13 @@ def json_cases(kind, command, program, start):
 
 
 # The runs -----------------------------------------------------------------------------------------------------------------
-def limited(memory):
-    if memory:
+def limited(limit_memory):
+    if limit_memory:
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def run(case, programs, work, memory):
+def run(case, programs, work, limit_memory):
     """None when the case is as it should be, else what is wrong."""
     folder = work / case.name.replace(".", "-")
     folder.mkdir()
@@ -306,7 +306,7 @@ def run(case, programs, work, memory):
     command += [names.get(word, word.replace("WORK", str(folder))) for word in case.command]
     with open(folder / "stderr", "w+b") as errors:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors,
-                                   preexec_fn=lambda: limited(memory), cwd=folder)
+                                   preexec_fn=lambda: limited(limit_memory), cwd=folder)
         timer = concurrent.futures.ThreadPoolExecutor(1)
         ended = timer.submit(os.wait4, process.pid, 0)
         try:
@@ -336,7 +336,7 @@ def run(case, programs, work, memory):
         return f"prints control characters: {shown!r}"
     if left:
         return f"leaves {left}"
-    if memory and usage.ru_maxrss > RESIDENT:
+    if limit_memory and usage.ru_maxrss > RESIDENT:
         return f"took {usage.ru_maxrss >> 10} MB"
     return None
 
