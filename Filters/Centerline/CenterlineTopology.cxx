@@ -17,6 +17,7 @@ namespace
 {
 constexpr double Pi = 3.14159265358979323846;
 constexpr double Infinity = std::numeric_limits<double>::infinity();
+constexpr double LongestLine = 1e6; ///< in median radii: edges lie in cells of two radii
 
 /// A stretch alongside another vessel is the same vessel when it is longer than this many radii;
 /// a daughter leaves its parent's neighbourhood sooner.
@@ -39,9 +40,11 @@ struct CellHash
 
 Cell CellOf(const Vector3& p, double size)
 {
-  return { static_cast<std::int64_t>(std::floor(p[0] / size)),
-    static_cast<std::int64_t>(std::floor(p[1] / size)),
-    static_cast<std::int64_t>(std::floor(p[2] / size)) };
+  // What is farther away than that shares a cell.
+  static constexpr double Last = 4e18;
+  const auto index = [size](double x)
+  { return static_cast<std::int64_t>(std::clamp(std::floor(x / size), -Last, Last)); };
+  return { index(p[0]), index(p[1]), index(p[2]) };
 }
 
 struct Nearest
@@ -1212,13 +1215,18 @@ CenterlineTopology BuildTopology(
     tree.fittedExponent = std::numeric_limits<double>::quiet_NaN();
     return tree;
   }
+  const double radius = Median(radii);
+  if (extent > LongestLine * radius)
+  {
+    throw std::invalid_argument("A line is more than a million times as long as the median radius");
+  }
   Graph graph;
-  graph.cellSize = 2.0 * Median(radii);
+  graph.cellSize = 2.0 * radius;
   std::vector<std::size_t> order(lines.lines.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),
     [&](std::size_t a, std::size_t b) { return lengths[a] > lengths[b]; });
-  LineInserter inserter(graph, settings.mergeRatio, 1e-3 * Median(radii));
+  LineInserter inserter(graph, settings.mergeRatio, 1e-3 * radius);
   for (std::size_t i = 0; i < order.size(); ++i)
   {
     Report(progress, 0.4 * static_cast<double>(i) / static_cast<double>(order.size()));

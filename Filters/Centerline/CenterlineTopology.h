@@ -117,7 +117,7 @@ struct CenterlineTopology : CenterlineTree
  *
  * @throws std::invalid_argument for settings out of range, a radius or coordinate that is not
  *         finite, a point whose squared distance from the origin overflows, a radius that is not
- *         positive, or an index out of range; Cancelled
+ *         positive, an index out of range, or a line longer than a million median radii; Cancelled
  */
 CenterlineTopology BuildTopology(const CenterlineSet& lines, const TopologySettings& settings = {},
   const ProgressCallback& progress = {});

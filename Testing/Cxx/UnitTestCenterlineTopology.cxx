@@ -410,8 +410,9 @@ TEST(CenterlineTopology, FindsAndCutsLoops)
     { Vector3(0, 0, 0), Vector3(10, 0, 0), Vector3(10, 10, 0), Vector3(0, 0, 0) }, Constant(1.0));
   EXPECT_EQ(BuildTopology(alone.set).loops.size(), 1U);
 
-  // Of vessels so thin that their resistance overflows, too.
-  alone.set.radius.assign(alone.set.points.size(), 1e-170);
+  // Where a vessel is so thin that its resistance overflows, too.
+  const auto third = static_cast<std::ptrdiff_t>(alone.set.radius.size() / 3);
+  std::fill(alone.set.radius.begin() + third, alone.set.radius.end() - third, 1e-170);
   EXPECT_EQ(BuildTopology(alone.set).loops.size(), 1U);
 }
 
@@ -621,6 +622,9 @@ TEST(CenterlineTopology, NothingAndNonsense)
   EXPECT_NE(message(bad).find("Point 7 is not finite"), std::string::npos);
   bad.points[7][1] = -1e200;
   EXPECT_NE(message(bad).find("Point 7 is too far away"), std::string::npos);
+  bad = good;
+  bad.points[7][1] = 1e7;
+  EXPECT_NE(message(bad).find("a million times as long"), std::string::npos);
   bad = good;
   bad.lines[1][2] = 100000;
   EXPECT_NE(message(bad).find("Line 1"), std::string::npos);
