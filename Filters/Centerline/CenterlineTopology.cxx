@@ -126,6 +126,44 @@ struct Graph
     const double margin = reach + 0.5 * this->cellSize;
     const Cell low = CellOf(p - Vector3::Constant(margin), this->cellSize);
     const Cell high = CellOf(p + Vector3::Constant(margin), this->cellSize);
+    const auto look = [&](const std::vector<std::pair<int, int>>& cell)
+    {
+      for (const auto& [a, b] : cell)
+      {
+        const Vector3 way = this->points[b] - this->points[a];
+        const double t = std::clamp(
+          (p - this->points[a]).dot(way) / std::max(1e-300, way.squaredNorm()), 0.0, 1.0);
+        const double distance = (this->points[a] + t * way - p).norm();
+        if (distance <= reach && distance < nearest.distance && accept(a, b))
+        {
+          nearest = { distance, a, b, t };
+        }
+      }
+    };
+    double count = 1.0;
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      count *= static_cast<double>(high[axis] - low[axis]) + 1.0;
+    }
+    if (count > static_cast<double>(this->edges.size()))
+    {
+      // More cells than have edges. Sorted, as the first of two edges at one distance wins.
+      std::vector<std::pair<Cell, const std::vector<std::pair<int, int>>*>> within;
+      for (const auto& [cell, list] : this->edges)
+      {
+        if (std::equal(low.begin(), low.end(), cell.begin(), std::less_equal<>()) &&
+          std::equal(cell.begin(), cell.end(), high.begin(), std::less_equal<>()))
+        {
+          within.emplace_back(cell, &list);
+        }
+      }
+      std::sort(within.begin(), within.end());
+      for (const auto& found : within)
+      {
+        look(*found.second);
+      }
+      return nearest;
+    }
     for (std::int64_t i = low[0]; i <= high[0]; ++i)
     {
       for (std::int64_t j = low[1]; j <= high[1]; ++j)
@@ -133,20 +171,9 @@ struct Graph
         for (std::int64_t k = low[2]; k <= high[2]; ++k)
         {
           const auto found = this->edges.find({ i, j, k });
-          if (found == this->edges.end())
+          if (found != this->edges.end())
           {
-            continue;
-          }
-          for (const auto& [a, b] : found->second)
-          {
-            const Vector3 way = this->points[b] - this->points[a];
-            const double t = std::clamp(
-              (p - this->points[a]).dot(way) / std::max(1e-300, way.squaredNorm()), 0.0, 1.0);
-            const double distance = (this->points[a] + t * way - p).norm();
-            if (distance <= reach && distance < nearest.distance && accept(a, b))
-            {
-              nearest = { distance, a, b, t };
-            }
+            look(found->second);
           }
         }
       }

@@ -416,6 +416,19 @@ TEST(CenterlineTopology, FindsAndCutsLoops)
   EXPECT_EQ(BuildTopology(alone.set).loops.size(), 1U);
 }
 
+TEST(CenterlineTopology, RadiusOfAMillionMedians)
+{
+  // All that is nearer than its radius is one vessel, and the search for it ends.
+  LineMaker lines;
+  lines.Add({ Vector3(0, 0, 0), Vector3(80, 0, 0) }, Constant(1.0));
+  lines.Add({ Vector3(40, 0, 0), Vector3(40, 30, 0) }, Constant(0.5));
+  lines.Add({ Vector3(200, 0, 0), Vector3(240, 0, 0) }, Constant(1.0));
+  lines.set.radius.back() = 1e6;
+  const CenterlineTopology tree = BuildTopology(lines.set);
+  CheckTree(tree);
+  EXPECT_EQ(tree.closedGaps, 1U);
+}
+
 TEST(CenterlineTopology, StrahlerOrders)
 {
   // A comb has order 2 all along, a full binary tree one more at each level.
