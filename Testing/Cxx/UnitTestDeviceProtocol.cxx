@@ -44,22 +44,23 @@ void* operator new[](std::size_t size)
   return Allocate(size);
 }
 
-void operator delete(void* memory) noexcept
+// Where one of a pair is inlined and the other is not, GCC warns that they do not match.
+[[gnu::noinline]] void operator delete(void* memory) noexcept
 {
   std::free(memory);
 }
 
-void operator delete[](void* memory) noexcept
+[[gnu::noinline]] void operator delete[](void* memory) noexcept
 {
   std::free(memory);
 }
 
-void operator delete(void* memory, std::size_t) noexcept
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept
 {
   std::free(memory);
 }
 
-void operator delete[](void* memory, std::size_t) noexcept
+[[gnu::noinline]] void operator delete[](void* memory, std::size_t) noexcept
 {
   std::free(memory);
 }
