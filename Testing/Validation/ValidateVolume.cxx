@@ -3,6 +3,7 @@
 // Markdown on stdout; the exit code is 1 when a limit is missed.
 
 #include "CoronaryPhantom.h"
+#include "Instrumented.h"
 #include "PhantomCases.h"
 #include "SharedSurface.h"
 #include "SurfaceCleaning.h"
@@ -289,7 +290,7 @@ int Run(int argc, char** argv)
     std::fprintf(stderr, "validate-volume: built without %s\n", backend.c_str());
     return quick ? 0 : 1;
   }
-  const bool timed = settings.backend == TetrahedralBackend::TetGen;
+  const bool timed = !Instrumented && settings.backend == TetrahedralBackend::TetGen;
   std::printf("# Tetrahedra by %s\n\n", backend.c_str());
   std::printf(
     "Wanted: dihedral angles of at least %.0f degrees, at most %.0f %% of the tetrahedra below "
