@@ -1034,13 +1034,19 @@ void ComputeGeometry(
       heads.push_back(branch.groupId);
     }
   }
+  struct Course
+  {
+    std::vector<std::int64_t> points;
+    CurveGeometry curve;
+  };
+  std::vector<Course> courses(heads.size());
   ParallelFor(
     static_cast<std::int64_t>(heads.size()), 1,
     [&](std::int64_t first, std::int64_t last)
     {
       for (std::int64_t h = first; h < last; ++h)
       {
-        std::vector<std::int64_t> way;
+        std::vector<std::int64_t>& way = courses[h].points;
         for (int b = heads[h]; b >= 0; b = tree.continuation[b])
         {
           const auto& points = tree.branches[b].points;
@@ -1056,20 +1062,25 @@ void ComputeGeometry(
         CurveSmoothing used = smoothing;
         // Bends shorter than two diameters are the detector's, not the vessel's.
         used.leastWavelength = std::max(used.leastWavelength, 4.0 * Median(radii));
-        const CurveGeometry curve = ComputeCurveGeometry(positions, used);
-        // A daughter's first point is its parent's.
-        const bool root = tree.branches[heads[h]].parentGroupId < 0;
-        for (std::size_t i = root ? 0 : 1; i < way.size(); ++i)
-        {
-          tree.tangent[way[i]] = curve.tangent[i];
-          tree.normal[way[i]] = curve.normal[i];
-          tree.binormal[way[i]] = curve.binormal[i];
-          tree.curvature[way[i]] = curve.curvature[i];
-          tree.torsion[way[i]] = curve.torsion[i];
-        }
+        courses[h].curve = ComputeCurveGeometry(positions, used);
       }
     },
     progress);
+  // One after another: two vessels that begin at one root share its point.
+  for (std::size_t h = 0; h < heads.size(); ++h)
+  {
+    const auto& [way, curve] = courses[h];
+    // A daughter's first point is its parent's.
+    const bool root = tree.branches[heads[h]].parentGroupId < 0;
+    for (std::size_t i = root ? 0 : 1; i < way.size(); ++i)
+    {
+      tree.tangent[way[i]] = curve.tangent[i];
+      tree.normal[way[i]] = curve.normal[i];
+      tree.binormal[way[i]] = curve.binormal[i];
+      tree.curvature[way[i]] = curve.curvature[i];
+      tree.torsion[way[i]] = curve.torsion[i];
+    }
+  }
 }
 
 double MurrayResidual(double parent, const std::vector<double>& daughters, double exponent)
