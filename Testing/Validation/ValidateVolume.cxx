@@ -297,8 +297,11 @@ int Run(int argc, char** argv)
     "%.0f degrees, volumes above %.0e mm^3,\nno inverted one, all points and segments of "
     "the centerlines in the mesh, at most %d tries",
     LeastAngle, 100.0 * LargestPoorShare, PoorAngle, LeastVolume, MostTries);
-  std::printf(
-    timed ? ", %.0f s of processor time for 100,000 triangles.\n\n" : ".\n\n", LargestSeconds);
+  if (timed)
+  {
+    std::printf(", %.0f s of processor time for 100,000 triangles", LargestSeconds);
+  }
+  std::printf(".\n\n");
   std::printf(
     "| surface | triangles | tetrahedra | tries | least angle (degrees) | below 15 degrees "
     "(%%) | least volume (mm^3) | processor time (s) | reached |\n"
