@@ -47,8 +47,8 @@ struct CoronaryFlowSettings
   double leftDiastolicRatio = 1.95;
   double rightDiastolicRatio = 1.0;
 
-  /// Mean flow of an outlet is as its diameter to this power, 1 to 4: 3 is Murray's law; 2.27 was measured at
-  /// coronary bifurcations (Doriot et al., Coron Artery Dis 2000;11:495).
+  /// Mean flow of an outlet is as its diameter to this power, 1 to 4: 3 is Murray's law; 2.27 fits what Doriot et al.
+  /// (Coron Artery Dis 2000;11:495) measured at coronary bifurcations (van der Giessen et al., J Biomech 2011;44:1089).
   double outletExponent = 2.27;
   /// Of an outlet's resistance that is before its compliance, 0.05 to 0.95.
   double arterialShare = 0.6;
