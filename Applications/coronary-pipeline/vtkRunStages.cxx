@@ -614,7 +614,8 @@ vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
   if (tree->GetNumberOfLines() == 0)
   {
     std::string reasons;
-    for (const auto& one : step.report.Of("centerline")["trees"])
+    const Json centerline = step.report.Of("centerline");
+    for (const auto& one : centerline["trees"])
     {
       reasons += (reasons.empty() ? ": " : "; ") + one["name"].get<std::string>() + " " +
         one["message"].get<std::string>();

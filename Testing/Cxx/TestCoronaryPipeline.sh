@@ -676,7 +676,8 @@ check_run() {
   if [ ! -s mask/mask.mha ] || [ -e mask/centerline.vtp ]; then
     fail "--until segmentation wrote $(ls mask)"
   fi
-  run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --until centerline --output beyond
+  run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --until centerline \
+    --centerline-seconds 3600 --output beyond
   [ "$(branches_of beyond)" -gt "$(branches_of result)" ] || fail "beyond the mask are no more branches"
 
   run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced

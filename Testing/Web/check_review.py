@@ -79,6 +79,11 @@ class Reviewer:
     def press(self, key):
         self.after(lambda: self.page.press(key))
 
+    def canvas(self):
+        """Left, top, width and height of the canvas in the window."""
+        return self.page.evaluate("(() => { const box = document.getElementById('canvas').getBoundingClientRect();"
+                                  " return [box.x, box.y, box.width, box.height]; })()")
+
     def picture(self):
         """The canvas at a third of its size, without what stands before it, as rows."""
         self.page.evaluate("document.head.append(Object.assign(document.createElement('style'),"
@@ -120,6 +125,66 @@ def check_tables(page, table):
     check(len(paper) == 6 and "4.96 ± 1.78" in paper[-1], "the paper's Part B is not there")
 
 
+def check_fingers(user):
+    """On a telephone: one finger turns, two come nearer, a tap reads, and the page stays where it is."""
+    page = user.page
+    user.press("1")
+    box = user.canvas()
+    x, y = box[0] + box[2] / 2, box[1] + box[3] / 2
+    page_place = "[scrollY, visualViewport.scale].join()"
+    before, view = page.evaluate(page_place), user.state("view")
+    user.after(lambda: page.touch(*([(x + 10 * k, y + 5 * k)] for k in range(7))))
+    check(user.state("view") != view, "a finger does not turn")
+    view, coloured = user.state("view"), sum(user.count(red))
+    user.after(lambda: page.touch(*([(x - 40 - 5 * k, y), (x + 40 + 5 * k, y)] for k in range(9))))
+    check(user.state("view") == view, "two fingers turn")
+    check(sum(user.count(red)) > 1.3 * coloured, "two fingers do not come nearer")
+    check(page.evaluate(page_place) == before, "the page moves with the fingers")
+    rows = user.picture()
+    places = [(column, row) for row, pixels in enumerate(rows) for column, pixel in enumerate(pixels)
+              if row > 0.3 * len(rows) and red(pixel)]
+    column, row = places[len(places) // 2]
+    scale = len(rows[0]) / box[2]
+    user.after(lambda: page.touch([(box[0] + (column + 0.5) / scale, box[1] + (row + 0.5) / scale)]))
+    check("on the model, phase 0" in user.text("#readout"), "a tap reads: " + user.text("#readout"))
+
+
+def check_lost_context(user):
+    """The graphics driver may take its memory at any time, and give it back."""
+    page, picture = user.page, user.picture()
+    page.evaluate("window.loss = document.getElementById('canvas').getContext('webgl2').getExtension('WEBGL_lose_context');"
+                  " loss.loseContext()")
+    page.wait("document.getElementById('canvas').getContext('webgl2').isContextLost()")
+    page.press("ArrowRight")
+    page.press("ArrowLeft")
+    user.after(lambda: page.evaluate("loss.restoreContext()"))
+    check(user.picture() == picture, "the picture does not come back with the graphics context")
+
+
+def check_print(user):
+    """The paper has the picture, which is the only image in it, names where they are on the screen, and whole tables."""
+    page = user.page
+    places = ("(() => { const stage = document.getElementById('stage').getBoundingClientRect();"
+              " return [...document.querySelectorAll('#names span, #scale')].map((one) => one.getBoundingClientRect())"
+              ".flatMap((one) => [(one.x - stage.x) / stage.width, (one.y - stage.y) / stage.height]); })()")
+    on_screen = page.evaluate(places)
+    page.dark(True)
+    pdf = page.print("review.pdf")
+    page.dark(False)
+    check(pdf.startswith(b"%PDF") and pdf.count(b"/Subtype /Image") == 1, "the picture is not on the paper")
+    check(page.evaluate("document.getElementById('print').naturalWidth === document.getElementById('canvas').width"),
+          "the paper has another picture")
+    corner = ("(() => { const one = document.createElement('canvas').getContext('2d');"
+              " one.drawImage(document.getElementById('print'), 0, 0); return [...one.getImageData(0, 0, 1, 1).data]; })()")
+    check(page.evaluate(corner) == [255, 255, 255, 255], "the paper is not white")
+    page.media("print")
+    on_paper = page.evaluate(places)
+    check(len(on_paper) > 10 and max(abs(a - b) for a, b in zip(on_screen, on_paper)) < 0.01, "names stand elsewhere on paper")
+    page.resize(718, 1000)
+    check(page.evaluate("document.documentElement.scrollWidth") <= 718, "a table is wider than the paper")
+    page.media("")
+
+
 def review(page, url, table):
     user = Reviewer(page)
     began = time.monotonic()
@@ -151,8 +216,7 @@ def review(page, url, table):
     check(abs(sum(user.count(orange, blue)) - sum(far)) < 5, "the range does not come back")
 
     # Reading a point: one that the picture shows.
-    box = page.evaluate("(() => { const box = document.getElementById('canvas').getBoundingClientRect();"
-                        " return [box.x, box.y, box.width, box.height]; })()")
+    box = user.canvas()
     rows = user.picture()
     y, x = next((y, x) for y, row in enumerate(rows) if y > 0.2 * len(rows) for x, pixel in enumerate(row)
                 if orange(pixel) or blue(pixel) and x < 0.8 * len(row))
@@ -221,6 +285,8 @@ def review(page, url, table):
     page.wait("%s.case === '1'" % STATE)
     user.press("4")
     check(sum(user.count(orange, blue)) == 0, "a surface is not its own truth")
+    check_lost_context(user)
+    check_print(user)
 
     page.resize(390, 844, mobile=True)
     page.wait("innerWidth < 500")
@@ -228,8 +294,10 @@ def review(page, url, table):
     time.sleep(0.3)
     page.screenshot("narrow.png")
     check(page.evaluate("document.documentElement.scrollWidth") <= 390, "the page is wider than a telephone")
+    check_fingers(user)
 
-    check(page.requests == [url], "the network was asked for %s" % page.requests)
+    requests = [one for one in page.requests if not one.startswith("data:")]  # the printed picture is one
+    check(requests == [url], "the network was asked for %s" % requests)
     check(not page.complaints, "the browser complains: %s" % page.complaints)
 
 

@@ -126,10 +126,15 @@ class Browser:
 
     def resize(self, width, height, scale=1, mobile=False):
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=mobile)
+        self.call("Emulation.setTouchEmulationEnabled", enabled=mobile, maxTouchPoints=2 if mobile else 1)
 
     def dark(self, on):
         value = "dark" if on else "light"
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": value}])
+
+    def media(self, kind):
+        """What styles are for: "print", or "" for the screen."""
+        self.call("Emulation.setEmulatedMedia", media=kind)
 
     def open(self, url):
         self.requests.clear()
@@ -176,6 +181,15 @@ class Browser:
                        button="left", buttons=1)
         self.mouse("mouseReleased", *end, button="left", clickCount=1)
 
+    def touch(self, *steps):
+        """Fingers that come down at the places of the first step, move through the others and go."""
+        kind = "touchStart"
+        for places in steps:
+            points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(places)]
+            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+            kind = "touchMove"
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
     def press(self, key):
         text = {"text": key} if len(key) == 1 else {}
         self.call("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
@@ -193,6 +207,13 @@ class Browser:
             with open(path, "wb") as file:
                 file.write(png)
         return png
+
+    def print(self, path):
+        """The bytes of the printed page, which go to a PDF file too."""
+        pdf = base64.b64decode(self.call("Page.printToPDF", printBackground=True)["data"])
+        with open(path, "wb") as file:
+            file.write(pdf)
+        return pdf
 
 
 def pixels(png):

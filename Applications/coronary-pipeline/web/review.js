@@ -4,6 +4,8 @@ const RED = [214, 39, 40];
 const GREEN = [60, 179, 80];
 const LINE_COLOURS = { model: [122, 12, 20], truth: [10, 92, 40] };
 const DARK_LINE_COLOURS = { model: [255, 176, 170], truth: [170, 240, 180] };
+const PAPER_WIDTH = 680;  // of the printed picture at most, CSS pixels: 18 cm
+const PAPER_HEIGHT = 530;
 const MODES = ['model', 'truth', 'overlay', 'model-distance', 'truth-distance'];
 const PLAY = 'M5 3l12 7-12 7z';
 const PAUSE = 'M5 3h4v14H5zM11 3h4v14h-4z';
@@ -289,15 +291,16 @@ class Review {
     return getComputedStyle(this.stage).backgroundColor.match(/[\d.]+/g).slice(0, 3).map((part) => part / 255);
   }
 
-  draw(moving = false) {
+  /** @param moving coarser while it moves @param paper in the colours of a light page */
+  draw(moving = false, paper = false) {
     if (!this.shapes || !this.painter || this.painter.gl.isContextLost()) {
       return;
     }
-    const colours = this.dark.matches ? DARK_LINE_COLOURS : LINE_COLOURS;
+    const colours = this.dark.matches && !paper ? DARK_LINE_COLOURS : LINE_COLOURS;
     const lines = byId('lines').checked
       ? this.trees.map(({ side, series }) => ({ series, frame: series.frames[this.phase], colour: colours[side] }))
       : [];
-    this.painter.draw(this.camera, this.shown, lines, this.background, moving ? this.quality : 0);
+    this.painter.draw(this.camera, this.shown, lines, paper ? [1, 1, 1] : this.background, moving ? this.quality : 0);
     this.placeNames();
     this.placeMark();
     this.showView();
@@ -555,9 +558,15 @@ class Review {
       this.update();
     });
     addEventListener('beforeprint', () => {
-      this.draw(false);
+      // The stage keeps its shape on paper: names, the mark and the scale stay where they are on the picture.
+      const { offsetWidth: width, offsetHeight: height, style } = this.stage;
+      style.setProperty('--width', `${width}px`);
+      style.setProperty('--height', `${height}px`);
+      style.setProperty('--shrink', Math.min(1, PAPER_WIDTH / width, PAPER_HEIGHT / height));
+      this.draw(false, true);
       byId('print').src = this.canvas.toDataURL('image/png');
     });
+    addEventListener('afterprint', () => this.draw());
   }
 
   key(event) {

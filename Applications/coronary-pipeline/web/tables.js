@@ -8,9 +8,12 @@ function meanAndDeviation(mean, deviation, digits = 3) {
   return known(deviation) ? `${written(mean, digits)} ± ${written(deviation, digits)}` : written(mean, digits);
 }
 
+/** A measure's name, which may break after an underscore, and its unit. */
 function heading(column, kind = null) {
+  const [first, ...rest] = column.key.split('_');
+  const name = element('span', {}, [first, ...rest.flatMap((part) => ['_', element('wbr'), part])]);
   return element('th', { scope: 'col', class: kind },
-    column.unit ? [column.key, element('small', {}, [` ${column.unit}`])] : [column.key]);
+    column.unit ? [name, element('small', {}, [` ${column.unit}`])] : [name]);
 }
 
 function cell(text, kind = null) {
