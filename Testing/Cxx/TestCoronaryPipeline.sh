@@ -731,7 +731,7 @@ on_ranks() {
   shift 2
   OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1 \
     OMPI_MCA_btl_vader_single_copy_mechanism=none OMPI_MCA_orte_execute_quiet=1 OMPI_MCA_hwloc_base_binding_policy=none \
-    timeout 120 mpirun -q -np "$ranks" "$program" "$@" >stdout 2>stderr
+    timeout "${RANKS_TIMEOUT:-120}" mpirun -q -np "$ranks" "$program" "$@" >stdout 2>stderr
   code=$?
   sed -i '/^\[hwloc/d' stderr # where there is no /sys, Open MPI says so
   if [ "$code" -ne "$expected" ]; then
