@@ -55,6 +55,7 @@ struct Course
   std::vector<double> confidence;
   std::vector<double> lumen;  ///< image value
   std::vector<double> behind; ///< image value behind the wall
+  std::vector<char> crossing; ///< on a bridge
 
   std::size_t size() const { return points.size(); }
   void resize(std::size_t count)
@@ -64,6 +65,7 @@ struct Course
     confidence.resize(count);
     lumen.resize(count);
     behind.resize(count);
+    crossing.resize(count);
   }
 };
 
@@ -259,6 +261,8 @@ private:
   void SmoothRadii(Course& course) const;
   void Calibrate(const Course& course);
   void CorrectRadii();
+  void MarkCrossings(Course& course) const;
+  void MarkBridged();
   std::size_t SeenUpTo(const Course& course, double parentRadius) const;
   std::int64_t Append(const Way& way, int treeId, bool wanted);
   std::vector<Vector3> FollowOuterWall(const Course& course, std::size_t good,
@@ -1065,6 +1069,68 @@ void Extractor::CorrectRadii()
   }
 }
 
+/// Which samples lie on a way across a lesion.
+void Extractor::MarkCrossings(Course& course) const
+{
+  course.crossing.assign(course.size(), 0);
+  const double reach = 2.0 * this->Voxel + 0.5 * this->Step;
+  for (const CenterlineBridge& bridge : this->Input.bridges)
+  {
+    for (std::size_t i = 0; i < course.size(); ++i)
+    {
+      course.crossing[i] = course.crossing[i] != 0 ||
+        std::any_of(bridge.points.begin(), bridge.points.end(),
+          [&](const Vector3& p) { return (p - course.points[i]).squaredNorm() <= reach * reach; });
+    }
+  }
+}
+
+/// What was guessed on the ways across lesions, and how certain it is that what lies behind them belongs to the tree.
+void Extractor::MarkBridged()
+{
+  CenterlineTree& tree = this->Tree;
+  tree.bridged.assign(tree.points.size(), 0);
+  tree.bridgeConfidence.assign(tree.points.size(), 1.0);
+  if (this->Input.bridges.empty())
+  {
+    return;
+  }
+  const double reach = 2.0 * this->Voxel + 0.5 * this->Step;
+  for (const CenterlineTree::Branch& branch : tree.branches)
+  {
+    double certain = branch.parentGroupId < 0
+      ? 1.0
+      : tree.bridgeConfidence[static_cast<std::size_t>(branch.points[0])];
+    std::vector<char> passed(this->Input.bridges.size(), 0);
+    for (std::size_t i = branch.parentGroupId < 0 ? 0 : 1; i < branch.points.size(); ++i)
+    {
+      const auto p = static_cast<std::size_t>(branch.points[i]);
+      for (std::size_t b = 0; b < this->Input.bridges.size(); ++b)
+      {
+        const CenterlineBridge& bridge = this->Input.bridges[b];
+        const bool here = std::any_of(bridge.points.begin(), bridge.points.end(),
+          [&](const Vector3& q) { return (q - tree.points[p]).squaredNorm() <= reach * reach; });
+        if (!here)
+        {
+          continue;
+        }
+        if (tree.confidence[p] < this->Settings.minimumConfidence)
+        {
+          tree.bridged[p] = 1;
+        }
+        // The middle of the way is what a branch that only begins at one of its ends does not pass.
+        const Vector3& middle = bridge.points[bridge.points.size() / 2];
+        if (passed[b] == 0 && (middle - tree.points[p]).squaredNorm() <= reach * reach)
+        {
+          passed[b] = 1;
+          certain *= bridge.confidence;
+        }
+      }
+      tree.bridgeConfidence[p] = certain;
+    }
+  }
+}
+
 /// @returns the number of samples up to where a vessel is seen, 0 if there is none
 std::size_t Extractor::SeenUpTo(const Course& course, double parentRadius) const
 {
@@ -1079,7 +1145,10 @@ std::size_t Extractor::SeenUpTo(const Course& course, double parentRadius) const
   double unseen = 0.0;
   for (std::size_t i = first; i < course.size(); ++i)
   {
-    const double evidence = course.confidence[i] - this->Settings.minimumConfidence;
+    // On a way across a lesion nothing need be seen, if something is behind it.
+    const double evidence = course.crossing[i] != 0
+      ? std::max(0.0, course.confidence[i] - this->Settings.minimumConfidence)
+      : course.confidence[i] - this->Settings.minimumConfidence;
     sum += evidence;
     unseen = evidence < 0.0 ? unseen + this->Step : 0.0;
     if (unseen > gap)
@@ -1327,6 +1396,7 @@ std::int64_t Extractor::Append(const Way& way, int treeId, bool wanted)
   }
   if (!wanted)
   {
+    this->MarkCrossings(course);
     const std::size_t end = this->SeenUpTo(course, root ? this->Lumen.maximumRadius : parentRadius);
     course.resize(end);
     if ((static_cast<double>(end) - 1.0) * this->Step < least)
@@ -1974,6 +2044,7 @@ void Extractor::Finish()
         Text(this->Given.seeds[s]) + " has no branch that is long and clear enough";
     }
   }
+  this->MarkBridged();
   this->CorrectRadii();
   this->Result.tree = SplitAtBifurcations(this->Tree);
   if (this->Settings.snap)
@@ -2141,6 +2212,10 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   framed.grid.direction = Matrix3::Identity();
   std::transform(framed.seeds.begin(), framed.seeds.end(), framed.seeds.begin(), toFrame);
   std::transform(framed.targets.begin(), framed.targets.end(), framed.targets.begin(), toFrame);
+  for (CenterlineBridge& bridge : framed.bridges)
+  {
+    std::transform(bridge.points.begin(), bridge.points.end(), bridge.points.begin(), toFrame);
+  }
   ScalarImage intensity;
   if (input.intensity)
   {

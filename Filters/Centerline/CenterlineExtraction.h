@@ -19,6 +19,13 @@
 
 namespace coronary
 {
+/// A way across a lesion that belongs to the region: no vessel need be seen there.
+struct CenterlineBridge
+{
+  std::vector<Vector3> points; ///< mm
+  double confidence = 1.0;     ///< 0 to 1
+};
+
 /**
  * What to march in: a speed, a mask, or both (then the mask limits the region). All on one grid,
  * i fastest, not owned.
@@ -34,6 +41,7 @@ struct CenterlineInput
   const ScalarImage* intensity = nullptr;
   std::vector<Vector3> seeds;   ///< mm, one for each tree; its root
   std::vector<Vector3> targets; ///< mm; may be empty
+  std::vector<CenterlineBridge> bridges;
 };
 
 /// Zero means automatic for all lengths; the automatic ones follow voxels and radii, not millimetres.

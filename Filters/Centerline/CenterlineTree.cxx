@@ -49,6 +49,8 @@ void CheckTree(const CenterlineTree& tree)
   const std::size_t count = tree.points.size();
   CheckSize(tree.radius, count, "radius", true);
   CheckSize(tree.confidence, count, "confidence", false);
+  CheckSize(tree.bridged, count, "bridged", false);
+  CheckSize(tree.bridgeConfidence, count, "bridgeConfidence", false);
   CheckSize(tree.abscissa, count, "abscissa", false);
   CheckSize(tree.segmentId, count, "segmentId", false);
   for (std::size_t i = 0; i < count; ++i)
@@ -64,6 +66,7 @@ void CheckTree(const CenterlineTree& tree)
   }
   CheckFinite(tree.radius, "radius");
   CheckFinite(tree.confidence, "confidence");
+  CheckFinite(tree.bridgeConfidence, "bridgeConfidence");
   CheckFinite(tree.abscissa, "abscissa");
 
   std::map<int, const Branch*> known;

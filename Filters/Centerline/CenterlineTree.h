@@ -42,7 +42,12 @@ struct CenterlineTree
   std::vector<Vector3> points;    ///< mm
   std::vector<double> radius;     ///< lumen radius, mm
   std::vector<double> confidence; ///< of position and radius: 0 a guess .. 1 clearly seen
-  std::vector<double> abscissa;   ///< mm from the root along the tree
+  /// 1: not seen, guessed on a way across a lesion; 0 seen.
+  std::vector<unsigned char> bridged;
+  /// That the way here, from the last place that is seen for certain, is the artery's: 0 to 1. Of everything behind
+  /// a link across a lesion it is the product of the links before it.
+  std::vector<double> bridgeConfidence;
+  std::vector<double> abscissa; ///< mm from the root along the tree
   std::vector<int> segmentId;
   std::vector<Branch> branches; ///< a parent stands before its daughters
 };

@@ -1,12 +1,15 @@
 #include "VesselSegmentation.h"
 
 #include "DistanceTransform.h"
+#include "VesselLinking.h"
+#include "VoxelLattice.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <queue>
 #include <stdexcept>
+#include <unordered_map>
 
 namespace coronary
 {
@@ -18,7 +21,9 @@ enum State : unsigned char
   Unknown = 0,
   Body = 1,   ///< aorta, chamber, great vessel
   Vessel = 2, ///< collected
-  Band = 4    ///< near the wall of what was collected
+  Band = 4,   ///< near the wall of what was collected
+  Leak = 16,  ///< larger than any vessel: not collected again
+  Bridge = 32 ///< on the way across a lesion: collected whatever it looks like
 };
 
 ProgressCallback Part(const ProgressCallback& progress, double from, double to)
@@ -30,93 +35,18 @@ ProgressCallback Part(const ProgressCallback& progress, double from, double to)
   return [progress, from, to](double f) { return progress(from + (to - from) * f); };
 }
 
-/// Neighbours of a voxel: index differences and offsets.
-struct Neighbour
-{
-  int di;
-  int dj;
-  int dk;
-  std::int64_t offset;
-  float length; ///< mm
-};
-
-/// The voxel grid, and blocks of about 0.7 mm on it for what needs no more detail.
-class Lattice
-{
-public:
-  Lattice(const std::array<int, 3>& size, const Vector3& spacing)
-    : Size(size)
-    , Spacing(spacing)
-  {
-    constexpr double blockSize = 0.75; // mm
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      this->Factor[axis] =
-        std::max(1, static_cast<int>(std::floor(blockSize / spacing[axis] + 0.25)));
-      this->Blocks[axis] = (size[axis] + this->Factor[axis] - 1) / this->Factor[axis];
-      this->BlockSpacing[axis] = spacing[axis] * this->Factor[axis];
-    }
-    for (int dk = -1; dk <= 1; ++dk)
-    {
-      for (int dj = -1; dj <= 1; ++dj)
-      {
-        for (int di = -1; di <= 1; ++di)
-        {
-          if (di != 0 || dj != 0 || dk != 0)
-          {
-            this->Around.push_back({ di, dj, dk, this->Index(di, dj, dk),
-              static_cast<float>(spacing.cwiseProduct(Vector3(di, dj, dk)).norm()) });
-          }
-        }
-      }
-    }
-  }
-
-  std::int64_t Index(int i, int j, int k) const
-  {
-    return (static_cast<std::int64_t>(k) * this->Size[1] + j) * this->Size[0] + i;
-  }
-  std::array<int, 3> Place(std::int64_t p) const
-  {
-    const std::int64_t row = p / this->Size[0];
-    return { static_cast<int>(p % this->Size[0]), static_cast<int>(row % this->Size[1]),
-      static_cast<int>(row / this->Size[1]) };
-  }
-  std::int64_t Block(int a, int b, int c) const
-  {
-    return (static_cast<std::int64_t>(c) * this->Blocks[1] + b) * this->Blocks[0] + a;
-  }
-  std::int64_t BlockOf(const std::array<int, 3>& p) const
-  {
-    return this->Block(p[0] / this->Factor[0], p[1] / this->Factor[1], p[2] / this->Factor[2]);
-  }
-  bool Contains(int i, int j, int k) const
-  {
-    return i >= 0 && j >= 0 && k >= 0 && i < this->Size[0] && j < this->Size[1] &&
-      k < this->Size[2];
-  }
-  double VoxelVolume() const { return this->Spacing.prod(); }
-
-  std::array<int, 3> Size;
-  Vector3 Spacing;
-  std::array<int, 3> Factor;
-  std::array<int, 3> Blocks;
-  Vector3 BlockSpacing;
-  std::vector<Neighbour> Around; ///< the 26 neighbours
-};
-
 /// Steps 1 to 4 of the header for one type of voxel.
 template <typename T>
 class Segmentation
 {
 public:
-  Segmentation(const T* image, const ImageGrid& grid, const std::array<int, 3>& size,
-    const float* vesselness, const VesselSegmentationSettings& settings)
+  Segmentation(const T* image, const ScalarImage& whole, const float* vesselness,
+    const VesselSegmentationSettings& settings)
     : Image(image)
+    , Whole(whole)
     , Vesselness(vesselness)
-    , Grid(grid)
     , Settings(settings)
-    , L(size, grid.spacing)
+    , L(whole.grid)
   {
   }
 
@@ -129,6 +59,7 @@ private:
     std::int64_t voxel;
     float path; ///< mm from the seed
     int seed;
+    std::int64_t before; ///< the voxel that it was reached from, -1 at the seed
   };
 
   float Share(std::int64_t p) const
@@ -146,72 +77,24 @@ private:
       std::min(thin > 0.0f ? thin : 0.0f, 1.0f) * std::min(tube > 0.0f ? tube : 0.0f, 1.0f);
     return std::max(dim, std::min(blood > 0.0f ? blood : 0.0f, 1.0f));
   }
-  /// The voxel of a place; nothing outside the image, and for what is no number.
-  std::optional<std::array<int, 3>> Nearest(const Vector3& world) const
-  {
-    const Vector3 index = this->Grid.spacing.cwiseInverse().cwiseProduct(
-      this->Grid.direction.transpose() * (world - this->Grid.origin));
-    std::array<int, 3> place;
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      const double inside = index[axis] - this->Grid.extent[2 * axis];
-      if (!(inside >= -0.5 && inside <= this->L.Size[axis] - 0.5))
-      {
-        return std::nullopt;
-      }
-      place[axis] = std::clamp(static_cast<int>(std::lround(inside)), 0, this->L.Size[axis] - 1);
-    }
-    return place;
-  }
-  Vector3 World(const std::array<int, 3>& p) const
-  {
-    return this->Grid.IndexToWorld(
-      p[0] + this->Grid.extent[0], p[1] + this->Grid.extent[2], p[2] + this->Grid.extent[4]);
-  }
-  /// Calls f(voxel, place) for the voxels within `radius` mm of a place.
-  template <typename F>
-  void Ball(const std::array<int, 3>& centre, double radius, const F& f) const
-  {
-    std::array<int, 3> low;
-    std::array<int, 3> high;
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      const int reach = static_cast<int>(radius / this->L.Spacing[axis]);
-      low[axis] = std::max(0, centre[axis] - reach);
-      high[axis] = std::min(this->L.Size[axis] - 1, centre[axis] + reach);
-    }
-    for (int k = low[2]; k <= high[2]; ++k)
-    {
-      for (int j = low[1]; j <= high[1]; ++j)
-      {
-        for (int i = low[0]; i <= high[0]; ++i)
-        {
-          const Vector3 d =
-            this->L.Spacing.cwiseProduct(Vector3(i - centre[0], j - centre[1], k - centre[2]));
-          if (d.squaredNorm() <= radius * radius)
-          {
-            f(this->L.Index(i, j, k), std::array<int, 3>{ i, j, k });
-          }
-        }
-      }
-    }
-  }
-
   BloodWindow MeasureWindow(const std::vector<std::array<int, 3>>& places) const;
   double MeasureTubular(const std::vector<std::array<int, 3>>& places) const;
   void FindBodies(const ProgressCallback& progress);
   void Collect(const std::vector<VesselSeed>& seeds, const std::vector<std::array<int, 3>>& places,
     const ProgressCallback& progress);
   void CutLeakage();
+  void CrossLesions(const std::vector<VesselSeed>& seeds,
+    const std::vector<std::array<int, 3>>& places, const ProgressCallback& progress);
+  void KeepConnected();
   void RefineWall(std::vector<float>* probability, const ProgressCallback& progress);
   void DropIslands();
   void FillHoles();
 
   const T* Image;
+  const ScalarImage& Whole;
   const float* Vesselness;
-  const ImageGrid& Grid;
   const VesselSegmentationSettings& Settings;
-  Lattice L;
+  VoxelLattice L;
   float Tissue = 0.0f;
   float InverseContrast = 1.0f;
   float Tubular = 1.0f; ///< vesselness of a clear tube
@@ -219,6 +102,7 @@ private:
   std::vector<unsigned char> States;
   std::vector<Member> Members; ///< in order of their path length
   double Leakage = 0.0;        ///< mm^3
+  std::vector<VesselLink> Links;
 };
 
 template <typename T>
@@ -234,7 +118,7 @@ BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>
   for (const std::array<int, 3>& place : places)
   {
     double best = -std::numeric_limits<double>::infinity();
-    this->Ball(place, near,
+    this->L.Ball(place, near,
       [&](std::int64_t, const std::array<int, 3>& at)
       {
         double sum = 0.0;
@@ -257,7 +141,7 @@ BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>
         best = std::max(best, sum / count);
       });
     bloods.push_back(best);
-    this->Ball(place, far,
+    this->L.Ball(place, far,
       [&](std::int64_t p, const std::array<int, 3>&)
       {
         const auto value = static_cast<float>(this->Image[p]);
@@ -292,7 +176,7 @@ double Segmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>>& pl
   std::vector<float> values;
   for (const std::array<int, 3>& place : places)
   {
-    this->Ball(place, radius,
+    this->L.Ball(place, radius,
       [&](std::int64_t p, const std::array<int, 3>&)
       {
         if (this->Share(p) > 0.4f && std::isfinite(this->Vesselness[p]))
@@ -404,10 +288,10 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
     {
       const Vector3 axis = seeds[s].axis.normalized();
       // A cylinder along the axis, open; what lies before the ostium is aorta.
-      this->Ball(places[s], mouth,
+      this->L.Ball(places[s], mouth,
         [&](std::int64_t p, const std::array<int, 3>& at)
         {
-          const Vector3 d = this->World(at) - seeds[s].position;
+          const Vector3 d = this->L.World(at) - seeds[s].position;
           const double along = d.dot(axis);
           const double across = (d - along * axis).norm();
           if (along < 0.0)
@@ -422,7 +306,7 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
     }
     else
     {
-      this->Ball(places[s], ballRadius,
+      this->L.Ball(places[s], ballRadius,
         [&](std::int64_t p, const std::array<int, 3>&)
         {
           if (this->States[p] == Body)
@@ -438,6 +322,7 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
     float path;
     std::int64_t voxel;
     int seed;
+    std::int64_t before;
     bool operator<(const Entry& other) const
     {
       return this->path != other.path ? this->path > other.path : this->voxel > other.voxel;
@@ -447,12 +332,12 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
   const auto weak = static_cast<float>(this->Settings.weak);
   for (std::size_t s = 0; s < seeds.size(); ++s)
   {
-    this->Ball(places[s], ballRadius,
+    this->L.Ball(places[s], ballRadius,
       [&](std::int64_t p, const std::array<int, 3>&)
       {
         if (this->States[p] == Unknown && this->Likelihood(p) >= weak)
         {
-          queue.push({ 0.0f, p, static_cast<int>(s) });
+          queue.push({ 0.0f, p, static_cast<int>(s), -1 });
         }
       });
   }
@@ -462,18 +347,18 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
   {
     const Entry top = queue.top();
     queue.pop();
-    if (this->States[top.voxel] != Unknown)
+    if (this->States[top.voxel] != Unknown && this->States[top.voxel] != Bridge)
     {
       continue;
     }
     this->States[top.voxel] = Vessel;
-    this->Members.push_back({ top.voxel, top.path, top.seed });
+    this->Members.push_back({ top.voxel, top.path, top.seed, top.before });
     if (++popped % 65536 == 0)
     {
       Report(progress, std::min(1.0f, top.path / longest));
     }
     const std::array<int, 3> at = this->L.Place(top.voxel);
-    for (const Neighbour& n : this->L.Around)
+    for (const VoxelLattice::Neighbour& n : this->L.Around)
     {
       if (!this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk))
       {
@@ -481,9 +366,11 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
       }
       const std::int64_t q = top.voxel + n.offset;
       const float path = top.path + n.length;
-      if (this->States[q] == Unknown && path <= longest && this->Likelihood(q) >= weak)
+      const bool free =
+        (this->States[q] == Unknown && this->Likelihood(q) >= weak) || this->States[q] == Bridge;
+      if (free && path <= longest)
       {
-        queue.push({ path, q, top.seed });
+        queue.push({ path, q, top.seed, top.voxel });
       }
     }
   }
@@ -525,7 +412,7 @@ void Segmentation<T>::CutLeakage()
   {
     const std::int64_t voxel = this->Members[m].voxel;
     const std::array<int, 3> at = this->L.Place(voxel);
-    for (const Neighbour& n : this->L.Around)
+    for (const VoxelLattice::Neighbour& n : this->L.Around)
     {
       if (this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk) &&
         this->States[voxel + n.offset] == Vessel)
@@ -656,11 +543,139 @@ void Segmentation<T>::CutLeakage()
     }
     else
     {
-      this->States[this->Members[m].voxel] = Unknown;
-      this->Leakage += pieces[pieceOf[m]].twig ? 0.0 : this->L.VoxelVolume();
+      const Piece& piece = pieces[pieceOf[m]];
+      this->States[this->Members[m].voxel] = piece.dropped && !piece.twig ? Leak : Unknown;
+      this->Leakage += piece.twig ? 0.0 : this->L.VoxelVolume();
     }
   }
   this->Members = std::move(kept);
+}
+
+/// Round by round what hangs on nothing is linked to what is there, and collected from there on.
+template <typename T>
+void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
+  const std::vector<std::array<int, 3>>& places, const ProgressCallback& progress)
+{
+  const ImageInterpolator interpolator(this->Whole);
+  const auto weak = static_cast<float>(this->Settings.weak);
+  const LinkingImage image{ this->L, interpolator,
+    static_cast<double>(this->Tissue + 1.0f / this->InverseContrast),
+    static_cast<double>(this->Tissue), this->Settings.largestRadius,
+    [this](std::int64_t p) { return this->Share(p); },
+    [this](std::int64_t p) { return this->Vesselness[p] * this->InverseTubular; },
+    [this, weak](std::int64_t p)
+    { return this->States[p] == Unknown && this->Likelihood(p) >= weak; },
+    [this](std::int64_t p) { return this->States[p] == Vessel; },
+    [this](std::int64_t p) { return this->States[p] == Body || this->States[p] == Leak; } };
+  LinkingSettings settings;
+  settings.leastConfidence = this->Settings.leastLinkConfidence;
+  settings.longestGap = this->Settings.longestGap;
+  // Each round can only add; more than a handful of lesions in a row does not happen.
+  constexpr int rounds = 8;
+  for (int round = 0; round < rounds && !this->Members.empty(); ++round)
+  {
+    std::vector<std::pair<std::int64_t, float>> tree;
+    tree.reserve(this->Members.size());
+    for (const Member& m : this->Members)
+    {
+      tree.emplace_back(m.voxel, m.path);
+    }
+    std::vector<VesselLink> links = FindVesselLinks(image, tree, settings,
+      Part(progress, static_cast<double>(round) / rounds, (round + 1.0) / rounds));
+    if (links.empty())
+    {
+      break;
+    }
+    for (VesselLink& link : links)
+    {
+      this->Links.push_back(std::move(link));
+    }
+    for (const Member& m : this->Members)
+    {
+      this->States[m.voxel] = Unknown;
+    }
+    for (const VesselLink& link : this->Links)
+    {
+      for (const std::int64_t voxel : link.voxels)
+      {
+        if (this->States[voxel] == Unknown)
+        {
+          this->States[voxel] = Bridge;
+        }
+      }
+    }
+    this->Members.clear();
+    this->Leakage = 0.0;
+    this->Collect(seeds, places, {});
+    this->CutLeakage();
+  }
+  for (unsigned char& state : this->States)
+  {
+    state = state == Leak || state == Bridge ? static_cast<unsigned char>(Unknown) : state;
+  }
+}
+
+/// A narrow place may lie within a wall that was put half way between wide places: what is behind it keeps the
+/// way that it was collected by.
+template <typename T>
+void Segmentation<T>::KeepConnected()
+{
+  std::unordered_map<std::int64_t, std::size_t> memberOf;
+  memberOf.reserve(this->Members.size() * 2);
+  for (std::size_t m = 0; m < this->Members.size(); ++m)
+  {
+    memberOf[this->Members[m].voxel] = m;
+  }
+  constexpr unsigned char connected = 8;
+  std::vector<std::int64_t> stack;
+  const auto flood = [&](std::int64_t from)
+  {
+    stack.assign(1, from);
+    this->States[from] = connected;
+    while (!stack.empty())
+    {
+      const std::int64_t at = stack.back();
+      stack.pop_back();
+      this->L.Neighbours(at,
+        [&](std::int64_t next, float)
+        {
+          if (this->States[next] == Vessel)
+          {
+            this->States[next] = connected;
+            stack.push_back(next);
+          }
+        });
+    }
+  };
+  // In the order of their paths: what is before a member is decided when it comes.
+  for (const Member& m : this->Members)
+  {
+    if (m.before < 0 && this->States[m.voxel] == Vessel)
+    {
+      flood(m.voxel);
+    }
+    if (this->States[m.voxel] != Vessel)
+    {
+      continue;
+    }
+    std::vector<std::int64_t> way;
+    std::int64_t at = m.before;
+    while (at >= 0 && this->States[at] != connected)
+    {
+      way.push_back(at);
+      const auto before = memberOf.find(at);
+      at = before == memberOf.end() ? -1 : this->Members[before->second].before;
+    }
+    for (const std::int64_t voxel : way)
+    {
+      this->States[voxel] = Vessel;
+    }
+    flood(m.voxel);
+  }
+  for (unsigned char& state : this->States)
+  {
+    state = state == connected ? static_cast<unsigned char>(Vessel) : state;
+  }
 }
 
 template <typename T>
@@ -683,14 +698,14 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
   {
     const std::array<int, 3> at = this->L.Place(this->Members[m].voxel);
     const bool rim = std::any_of(this->L.Around.begin(), this->L.Around.end(),
-      [&](const Neighbour& n)
+      [&](const VoxelLattice::Neighbour& n)
       {
         return this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk) &&
           this->States[this->Members[m].voxel + n.offset] == Unknown;
       });
     if (rim)
     {
-      this->Ball(at, band.maxCoeff(),
+      this->L.Ball(at, band.maxCoeff(),
         [&](std::int64_t p, const std::array<int, 3>& place)
         {
           const Vector3 d = this->L.Spacing.cwiseProduct(
@@ -720,7 +735,7 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
     const std::array<int, 3> at = this->L.Place(m.voxel);
     float sum = static_cast<float>(this->Image[m.voxel]);
     int count = 1;
-    for (const Neighbour& n : this->L.Around)
+    for (const VoxelLattice::Neighbour& n : this->L.Around)
     {
       if (std::abs(n.di) + std::abs(n.dj) + std::abs(n.dk) == 1 &&
         this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk))
@@ -876,7 +891,7 @@ void Segmentation<T>::DropIslands()
     for (std::size_t n = 0; n < piece.size(); ++n)
     {
       const std::array<int, 3> at = this->L.Place(piece[n]);
-      for (const Neighbour& next : this->L.Around)
+      for (const VoxelLattice::Neighbour& next : this->L.Around)
       {
         const std::int64_t q = piece[n] + next.offset;
         if (this->L.Contains(at[0] + next.di, at[1] + next.dj, at[2] + next.dk) &&
@@ -975,7 +990,7 @@ VesselSegmentationResult Segmentation<T>::Run(
   std::vector<std::array<int, 3>> places;
   for (std::size_t s = 0; s < seeds.size(); ++s)
   {
-    const std::optional<std::array<int, 3>> place = this->Nearest(seeds[s].position);
+    const std::optional<std::array<int, 3>> place = this->L.Nearest(seeds[s].position);
     if (!place)
     {
       throw std::invalid_argument("seed " + std::to_string(s) + " is outside the image");
@@ -1006,6 +1021,10 @@ VesselSegmentationResult Segmentation<T>::Run(
   this->Collect(seeds, places, Part(progress, 0.3, 0.5));
   result.seedVolume.assign(seeds.size(), 0.0);
   this->CutLeakage();
+  if (this->Settings.crossLesions)
+  {
+    this->CrossLesions(seeds, places, Part(progress, 0.5, 0.6));
+  }
   for (const Member& m : this->Members)
   {
     result.seedVolume[m.seed] += this->L.VoxelVolume();
@@ -1021,6 +1040,10 @@ VesselSegmentationResult Segmentation<T>::Run(
     {
       this->States = collected;
     }
+    else if (this->Settings.crossLesions)
+    {
+      this->KeepConnected();
+    }
   }
   this->DropIslands();
   if (this->Settings.fillHoles)
@@ -1032,6 +1055,7 @@ VesselSegmentationResult Segmentation<T>::Run(
     state = state == Vessel ? 1 : 0;
   }
   result.mask = std::move(this->States);
+  result.links = std::move(this->Links);
   if (probability)
   {
     // A filled hole is vessel; a dropped island is none.
@@ -1068,6 +1092,9 @@ void VesselSegmentationSettings::Validate() const
     this->largestRadius >= 1.0 && this->largestRadius <= 50.0, "largestRadius must be 1 to 50 mm");
   check(
     this->longestPath > 0.0 && std::isfinite(this->longestPath), "longestPath must be positive");
+  check(this->longestGap >= 0.0 && this->longestGap <= 40.0, "longestGap must be 0 to 40 mm");
+  check(this->leastLinkConfidence >= 0.0 && this->leastLinkConfidence <= 1.0,
+    "leastLinkConfidence must be 0 to 1");
   check(this->smallestIsland >= 0.0 && std::isfinite(this->smallestIsland),
     "smallestIsland must not be negative");
 }
@@ -1089,7 +1116,7 @@ VesselSegmentationResult SegmentVessels(const ScalarImage& image, const float* v
   return std::visit(
     [&](const auto* values)
     {
-      Segmentation segmentation(values, image.grid, size, vesselness, settings);
+      Segmentation segmentation(values, image, vesselness, settings);
       return segmentation.Run(seeds, probability, progress);
     },
     image.values);

@@ -17,6 +17,7 @@
 
 #include "ParallelFor.h"
 #include "ScalarImage.h"
+#include "VesselLinking.h"
 
 #include <optional>
 #include <string>
@@ -49,6 +50,9 @@ struct VesselSegmentationSettings
   double smallestIsland = 2.0;   ///< mm^3: smaller pieces are dropped, >= 0
   bool fillHoles = true;         ///< fill what is enclosed by vessel
   bool refineWall = true;        ///< step 4; else the collected voxels are the result
+  bool crossLesions = true;      ///< link pieces behind lesions to what hangs on the seeds
+  double longestGap = 25.0;      ///< mm that such a link may have, 0 to 40
+  double leastLinkConfidence = 0.5; ///< that a link must have, 0 to 1
 
   /// @throws std::invalid_argument that names the first setting that is out of range
   void Validate() const;
@@ -63,6 +67,7 @@ struct VesselSegmentationResult
   double tubular = 0.0;            ///< the same
   std::vector<double> seedVolume;  ///< mm^3 that hang on each seed; 0: the seed reached nothing
   double leakageVolume = 0.0;      ///< mm^3 that step 3 dropped
+  std::vector<VesselLink> links;   ///< ways across lesions that are part of the mask
 };
 
 /**

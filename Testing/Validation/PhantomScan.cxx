@@ -79,7 +79,10 @@ PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, d
   start = ProcessorSeconds();
   VesselSegmentationSettings settings;
   settings.window = BloodWindow{ CoronaryOstiaSettings().softTissue, ostia.aorta.mean };
-  result.mask = SegmentVessels(image, result.vesselness.data(), seeds, settings).mask;
+  VesselSegmentationResult segmentation =
+    SegmentVessels(image, result.vesselness.data(), seeds, settings);
+  result.mask = std::move(segmentation.mask);
+  result.links = std::move(segmentation.links);
   AddSeconds(seconds, 1, ProcessorSeconds() - start);
   return result;
 }
@@ -96,6 +99,10 @@ CenterlineTopology TreeOf(const PhantomScan& image, double* seconds)
   input.mask = image.mask.data();
   input.intensity = &intensity;
   input.seeds = image.seeds;
+  for (const VesselLink& link : image.links)
+  {
+    input.bridges.push_back({ link.points, link.confidence });
+  }
   CenterlineSettings settings;
   settings.timeLimit = 3600.0; // A slow machine is no other result.
   const CenterlineResult extracted = ExtractCenterlines(input, settings);

@@ -7,6 +7,7 @@
 
 #include "CenterlineTopology.h"
 #include "CoronaryPhantom.h"
+#include "VesselLinking.h"
 
 #include <cstdint>
 #include <vector>
@@ -21,6 +22,7 @@ struct PhantomScan
   std::vector<float> vesselness;
   std::vector<unsigned char> mask;
   std::vector<Vector3> seeds;
+  std::vector<VesselLink> links;
 };
 
 /**

@@ -1,0 +1,709 @@
+#include "VesselLinking.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <unordered_map>
+
+namespace coronary
+{
+namespace
+{
+constexpr float Unreached = std::numeric_limits<float>::infinity();
+/// Vesselness, in that of a clear tube, that a piece's voxels have at least: bones and chambers have less.
+constexpr float LeastTube = 0.3F;
+/// Vesselness, in the same unit, that tells a thin lumen or a wall's tube from noise.
+constexpr float VisibleTube = 0.2F;
+/// Brighter than blood by this factor is bone or calcium, darker than tissue by it is lung.
+constexpr float TooBright = 1.6F;
+constexpr float Lung = -1.5F;
+constexpr double ShellNear = 2.0; ///< mm from an end: where its direction and calibre are measured
+constexpr double ShellFar = 5.0;
+constexpr double WallGap = 8.0;  ///< mm: longest link to a wall
+constexpr double FreeGap = 12.0; ///< mm: longer ones need more than ends that point at each other
+
+double Angle(const Vector3& a, const Vector3& b)
+{
+  return std::acos(std::clamp(a.dot(b), -1.0, 1.0));
+}
+
+/// Voxels that hang together, with distances within them.
+class VoxelPiece
+{
+public:
+  VoxelPiece(const VoxelLattice& lattice, std::vector<std::int64_t> voxels)
+    : L(lattice)
+    , Voxels(std::move(voxels))
+  {
+    this->Number.reserve(this->Voxels.size() * 2);
+    for (std::size_t n = 0; n < this->Voxels.size(); ++n)
+    {
+      this->Number[this->Voxels[n]] = static_cast<std::int32_t>(n);
+    }
+  }
+
+  std::size_t Size() const { return this->Voxels.size(); }
+  std::int64_t Voxel(std::int32_t n) const { return this->Voxels[static_cast<std::size_t>(n)]; }
+  Vector3 Position(std::int32_t n) const { return this->L.World(this->L.Place(this->Voxel(n))); }
+  bool Contains(std::int64_t voxel) const { return this->Number.count(voxel) != 0; }
+
+  /// Calls f(number, mm) for the neighbours that belong to the piece.
+  template <typename F>
+  void Neighbours(std::int32_t n, const F& f) const
+  {
+    this->L.Neighbours(this->Voxel(n),
+      [&](std::int64_t voxel, float length)
+      {
+        const auto found = this->Number.find(voxel);
+        if (found != this->Number.end())
+        {
+          f(found->second, length);
+        }
+      });
+  }
+
+  /// What is within `reach` mm of a start, nearest first: numbers and mm, and where the way came from.
+  struct Reached
+  {
+    std::int32_t number;
+    float distance;
+    std::int32_t before; ///< place in the list, -1 at the start
+  };
+  std::vector<Reached> Around(std::int32_t start, float reach) const
+  {
+    struct Entry
+    {
+      float distance;
+      std::int32_t number;
+      std::int32_t before;
+      bool operator<(const Entry& other) const
+      {
+        return this->distance != other.distance ? this->distance > other.distance
+                                                : this->number > other.number;
+      }
+    };
+    std::vector<Reached> reached;
+    std::unordered_map<std::int32_t, char> done;
+    std::priority_queue<Entry> queue;
+    queue.push({ 0.0F, start, -1 });
+    while (!queue.empty())
+    {
+      const Entry top = queue.top();
+      queue.pop();
+      if (!done.emplace(top.number, 1).second)
+      {
+        continue;
+      }
+      const auto place = static_cast<std::int32_t>(reached.size());
+      reached.push_back({ top.number, top.distance, top.before });
+      this->Neighbours(top.number,
+        [&](std::int32_t next, float length)
+        {
+          if (top.distance + length <= reach && done.count(next) == 0)
+          {
+            queue.push({ top.distance + length, next, place });
+          }
+        });
+    }
+    return reached;
+  }
+
+private:
+  const VoxelLattice& L;
+  std::vector<std::int64_t> Voxels;
+  std::unordered_map<std::int64_t, std::int32_t> Number;
+};
+
+/// Where a piece or the tree ends.
+struct VesselEnd
+{
+  std::int32_t number = -1;
+  Vector3 position = Vector3::Zero();
+  Vector3 outwards = Vector3::Zero(); ///< unit
+  double radius = 0.0;                ///< mm, 0: not measured
+  double lumen = 0.0;                 ///< share of the contrast
+};
+
+class Linker
+{
+public:
+  Linker(const LinkingImage& image, const LinkingSettings& settings)
+    : I(image)
+    , L(image.lattice)
+    , Settings(settings)
+  {
+    this->Lumen.reference.lumen = image.blood;
+    this->Lumen.reference.background = image.tissue;
+    this->Lumen.maximumRadius = image.largestRadius;
+  }
+
+  std::vector<VesselLink> Run(
+    const std::vector<std::pair<std::int64_t, float>>& tree, const ProgressCallback& progress);
+
+private:
+  struct Orphan
+  {
+    VoxelPiece piece;
+    double length = 0.0; ///< mm between its farthest ends
+    std::vector<VesselEnd> ends;
+    std::vector<double>
+      growth; ///< of an end: how much wider the vessel becomes behind it, a factor
+  };
+
+  std::vector<std::vector<std::int64_t>> Pieces(
+    const std::vector<std::pair<std::int64_t, float>>& tree) const;
+  bool InLung(const std::vector<std::int64_t>& piece) const;
+  std::optional<VesselEnd> EndAt(const VoxelPiece& piece, std::int32_t number) const;
+  std::vector<VesselEnd> EndsOf(
+    const VoxelPiece& piece, const std::vector<VoxelPiece::Reached>& distances) const;
+  double Growth(const VoxelPiece& piece, const VesselEnd& end) const;
+  std::optional<Orphan> Describe(std::vector<std::int64_t> voxels) const;
+  float Evidence(std::int64_t voxel) const;
+  bool Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target, double within,
+    VesselLink& link) const;
+  double Judge(const Orphan& orphan, std::size_t end, const VesselEnd* tip, VesselLink& link) const;
+
+  const LinkingImage& I;
+  const VoxelLattice& L;
+  const LinkingSettings& Settings;
+  LumenSettings Lumen;
+};
+
+/// Connected voxels that look like vessel around the tree, and are none of it.
+std::vector<std::vector<std::int64_t>> Linker::Pieces(
+  const std::vector<std::pair<std::int64_t, float>>& tree) const
+{
+  // As far as the heart reaches around the tree.
+  constexpr double margin = 60.0; // mm
+  std::array<int, 3> low = this->L.Size;
+  std::array<int, 3> high{ 0, 0, 0 };
+  for (const auto& [voxel, path] : tree)
+  {
+    const std::array<int, 3> at = this->L.Place(voxel);
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      low[axis] = std::min(low[axis], at[axis]);
+      high[axis] = std::max(high[axis], at[axis]);
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const int reach = static_cast<int>(margin / this->L.Spacing[axis]);
+    low[axis] = std::max(0, low[axis] - reach);
+    high[axis] = std::min(this->L.Size[axis] - 1, high[axis] + reach);
+  }
+  const int slices = high[2] - low[2] + 1;
+  std::vector<std::vector<std::int64_t>> found(static_cast<std::size_t>(std::max(0, slices)));
+  ParallelFor(slices, 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t slice = first; slice < last; ++slice)
+      {
+        for (int j = low[1]; j <= high[1]; ++j)
+        {
+          for (int i = low[0]; i <= high[0]; ++i)
+          {
+            const std::int64_t p = this->L.Index(i, j, low[2] + static_cast<int>(slice));
+            if (this->I.tube(p) >= LeastTube && this->I.share(p) <= TooBright &&
+              this->I.couldBelong(p))
+            {
+              found[static_cast<std::size_t>(slice)].push_back(p);
+            }
+          }
+        }
+      }
+    });
+  std::vector<std::int64_t> all;
+  for (const std::vector<std::int64_t>& slice : found)
+  {
+    all.insert(all.end(), slice.begin(), slice.end());
+  }
+  const auto place = [&](std::int64_t voxel) -> std::ptrdiff_t
+  {
+    const auto at = std::lower_bound(all.begin(), all.end(), voxel);
+    return at != all.end() && *at == voxel ? at - all.begin() : -1;
+  };
+  std::vector<char> seen(all.size(), 0);
+  std::vector<std::vector<std::int64_t>> pieces;
+  // A tube of two voxels' area and the least length has this many.
+  const auto least =
+    static_cast<std::size_t>(this->Settings.leastPiece / std::cbrt(this->L.VoxelVolume()) * 1.5);
+  for (std::size_t n = 0; n < all.size(); ++n)
+  {
+    if (seen[n] != 0)
+    {
+      continue;
+    }
+    std::vector<std::int64_t> piece{ all[n] };
+    seen[n] = 1;
+    for (std::size_t m = 0; m < piece.size(); ++m)
+    {
+      this->L.Neighbours(piece[m],
+        [&](std::int64_t next, float)
+        {
+          const std::ptrdiff_t at = place(next);
+          if (at >= 0 && seen[static_cast<std::size_t>(at)] == 0)
+          {
+            seen[static_cast<std::size_t>(at)] = 1;
+            piece.push_back(next);
+          }
+        });
+    }
+    if (piece.size() >= least)
+    {
+      std::sort(piece.begin(), piece.end());
+      pieces.push_back(std::move(piece));
+    }
+  }
+  return pieces;
+}
+
+/// Vessels of the lung are as bright, and lie in air.
+bool Linker::InLung(const std::vector<std::int64_t>& piece) const
+{
+  const std::size_t stride = std::max<std::size_t>(1, piece.size() / 200);
+  int lung = 0;
+  int all = 0;
+  constexpr double away = 4.0; // mm
+  for (std::size_t n = 0; n < piece.size(); n += stride)
+  {
+    const std::array<int, 3> at = this->L.Place(piece[n]);
+    for (int face = 0; face < 6; ++face)
+    {
+      std::array<int, 3> to = at;
+      const int step = std::max(1, static_cast<int>(std::lround(away / this->L.Spacing[face / 2])));
+      to[face / 2] += face % 2 != 0 ? step : -step;
+      if (this->L.Contains(to[0], to[1], to[2]))
+      {
+        ++all;
+        lung += this->I.share(this->L.Index(to[0], to[1], to[2])) < Lung ? 1 : 0;
+      }
+    }
+  }
+  return 3 * lung > all;
+}
+
+/// The end at a voxel, if it is one: all of the piece that is near lies on one side.
+std::optional<VesselEnd> Linker::EndAt(const VoxelPiece& piece, std::int32_t number) const
+{
+  VesselEnd end;
+  end.number = number;
+  end.position = piece.Position(number);
+  Vector3 inwards = Vector3::Zero();
+  Vector3 middle = Vector3::Zero();
+  int count = 0;
+  for (const VoxelPiece::Reached& r : piece.Around(number, static_cast<float>(ShellFar)))
+  {
+    if (r.distance >= ShellNear)
+    {
+      const Vector3 offset = piece.Position(r.number) - end.position;
+      inwards += offset.normalized();
+      middle += offset;
+      ++count;
+    }
+  }
+  if (count < 3)
+  {
+    return std::nullopt;
+  }
+  inwards /= count;
+  middle /= count;
+  // In a tube that goes on to both sides the directions cancel out.
+  constexpr double oneSided = 0.8;
+  if (inwards.norm() < oneSided)
+  {
+    return std::nullopt;
+  }
+  inwards.normalize();
+  end.outwards = -inwards;
+  const LumenSection section = MeasureLumen(this->I.image, end.position + middle, inwards,
+    2.0 * std::cbrt(this->L.VoxelVolume()), this->Lumen);
+  if (section.confidence > 0.3)
+  {
+    end.radius = section.radius;
+  }
+  end.lumen = (section.lumen - this->I.tissue) / (this->I.blood - this->I.tissue);
+  return end;
+}
+
+/// Ends are where the distance from the farthest place is greatest around.
+std::vector<VesselEnd> Linker::EndsOf(
+  const VoxelPiece& piece, const std::vector<VoxelPiece::Reached>& distances) const
+{
+  std::vector<float> away(piece.Size(), 0.0F);
+  for (const VoxelPiece::Reached& r : distances)
+  {
+    away[static_cast<std::size_t>(r.number)] = r.distance;
+  }
+  std::vector<std::int32_t> tips;
+  for (std::size_t n = 0; n < piece.Size(); ++n)
+  {
+    bool greatest = true;
+    const auto here = static_cast<std::int32_t>(n);
+    piece.Neighbours(here,
+      [&](std::int32_t next, float)
+      {
+        const float other = away[static_cast<std::size_t>(next)];
+        greatest = greatest && (other < away[n] || (other == away[n] && next > here));
+      });
+    if (greatest)
+    {
+      tips.push_back(here);
+    }
+  }
+  tips.push_back(distances.front().number);
+  std::sort(tips.begin(), tips.end(),
+    [&](std::int32_t a, std::int32_t b)
+    {
+      const float da = away[static_cast<std::size_t>(a)];
+      const float db = away[static_cast<std::size_t>(b)];
+      return da != db ? da > db : a < b;
+    });
+  std::vector<VesselEnd> ends;
+  for (const std::int32_t tip : tips)
+  {
+    const Vector3 position = piece.Position(tip);
+    constexpr double apart = 4.0; // mm
+    if (std::any_of(ends.begin(), ends.end(),
+          [&](const VesselEnd& e) { return (e.position - position).norm() < apart; }))
+    {
+      continue;
+    }
+    const std::optional<VesselEnd> end = this->EndAt(piece, tip);
+    if (end)
+    {
+      ends.push_back(*end);
+    }
+  }
+  return ends;
+}
+
+/// How much wider the vessel is 10 to 40 mm behind an end: veins widen towards the heart, arteries do not
+/// widen away from it.
+double Linker::Growth(const VoxelPiece& piece, const VesselEnd& end) const
+{
+  const std::vector<VoxelPiece::Reached> reached = piece.Around(end.number, 45.0F);
+  std::vector<std::int32_t> way;
+  for (auto at = static_cast<std::int32_t>(reached.size()) - 1; at >= 0;
+       at = reached[static_cast<std::size_t>(at)].before)
+  {
+    way.push_back(reached[static_cast<std::size_t>(at)].number);
+  }
+  std::reverse(way.begin(), way.end());
+  std::vector<double> near;
+  std::vector<double> far;
+  const std::size_t chord = 4;
+  double along = 0.0;
+  for (std::size_t n = 1; n < way.size(); ++n)
+  {
+    along += (piece.Position(way[n]) - piece.Position(way[n - 1])).norm();
+    if (n % 2 != 0 || n < chord || n + chord >= way.size())
+    {
+      continue;
+    }
+    const Vector3 tangent =
+      (piece.Position(way[n + chord]) - piece.Position(way[n - chord])).normalized();
+    const LumenSection section = MeasureLumen(this->I.image, piece.Position(way[n]), tangent,
+      2.0 * std::cbrt(this->L.VoxelVolume()), this->Lumen);
+    if (section.confidence > 0.6)
+    {
+      (along < 8.0 ? near : far).push_back(section.radius);
+    }
+  }
+  if (near.size() < 3 || far.size() < 5)
+  {
+    return 1.0;
+  }
+  const auto upper = [](std::vector<double>& values, double quantile)
+  {
+    const auto place =
+      values.begin() + static_cast<std::ptrdiff_t>(quantile * static_cast<double>(values.size()));
+    std::nth_element(values.begin(), place, values.end());
+    return *place;
+  };
+  return upper(far, 0.8) / std::max(0.1, upper(near, 0.8));
+}
+
+std::optional<Linker::Orphan> Linker::Describe(std::vector<std::int64_t> voxels) const
+{
+  if (this->InLung(voxels))
+  {
+    return std::nullopt;
+  }
+  const double volume = static_cast<double>(voxels.size()) * this->L.VoxelVolume();
+  Orphan orphan{ VoxelPiece(this->L, std::move(voxels)), 0.0, {}, {} };
+  const std::int32_t first = orphan.piece.Around(0, Unreached).back().number;
+  const std::vector<VoxelPiece::Reached> distances = orphan.piece.Around(first, Unreached);
+  orphan.length = distances.back().distance;
+  // A tube, not a lump.
+  if (orphan.length < this->Settings.leastPiece ||
+    volume > M_PI * std::pow(0.6 * this->I.largestRadius, 2) * orphan.length)
+  {
+    return std::nullopt;
+  }
+  orphan.ends = this->EndsOf(orphan.piece, distances);
+  return orphan;
+}
+
+/// 0 nothing .. 1 a tube.
+float Linker::Evidence(std::int64_t voxel) const
+{
+  const float tube = std::min(1.0F, this->I.tube(voxel) / VisibleTube);
+  return std::isfinite(tube) ? std::max(0.0F, tube) : 0.0F;
+}
+
+/// The cheapest way from an end of a piece to the tree, near a target.
+/// @param within  mm from the target that count as there
+bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target,
+  double within, VesselLink& link) const
+{
+  const double gap = (target - end.position).norm();
+  const double reach = 0.75 * gap + 3.0;
+  const Vector3 middle = 0.5 * (target + end.position);
+  struct Entry
+  {
+    float cost;
+    std::int64_t voxel;
+    bool operator<(const Entry& other) const
+    {
+      return this->cost != other.cost ? this->cost > other.cost : this->voxel > other.voxel;
+    }
+  };
+  struct Known
+  {
+    float cost;
+    std::int64_t before;
+    bool done;
+  };
+  std::unordered_map<std::int64_t, Known> known;
+  std::priority_queue<Entry> queue;
+  const std::int64_t start = piece.Voxel(end.number);
+  known[start] = { 0.0F, -1, false };
+  queue.push({ 0.0F, start });
+  std::int64_t arrived = -1;
+  while (!queue.empty())
+  {
+    const Entry top = queue.top();
+    queue.pop();
+    Known& here = known[top.voxel];
+    if (here.done)
+    {
+      continue;
+    }
+    here.done = true;
+    if (this->I.inTree(top.voxel))
+    {
+      if ((this->L.World(this->L.Place(top.voxel)) - target).norm() <= within)
+      {
+        arrived = top.voxel;
+        break;
+      }
+      continue;
+    }
+    this->L.Neighbours(top.voxel,
+      [&](std::int64_t next, float length)
+      {
+        if (this->I.forbidden(next) || (this->L.World(this->L.Place(next)) - middle).norm() > reach)
+        {
+          return;
+        }
+        float perMillimetre = 1.0F - 0.85F * this->Evidence(next);
+        // Bright and no tube: the rim of a chamber.
+        if (this->I.share(next) > 0.5F && this->I.tube(next) < LeastTube)
+        {
+          perMillimetre += 1.0F;
+        }
+        const float cost = top.cost + length * perMillimetre;
+        const auto [place, isNew] = known.try_emplace(next, Known{ cost, top.voxel, false });
+        if (isNew || (!place->second.done && cost < place->second.cost))
+        {
+          place->second = { cost, top.voxel, false };
+          queue.push({ cost, next });
+        }
+      });
+  }
+  if (arrived < 0)
+  {
+    return false;
+  }
+  link.voxels.clear();
+  link.points.clear();
+  link.length = 0.0;
+  link.unseen = 0.0;
+  for (std::int64_t at = arrived; at >= 0; at = known[at].before)
+  {
+    const Vector3 p = this->L.World(this->L.Place(at));
+    if (!link.points.empty())
+    {
+      const double step = (p - link.points.back()).norm();
+      link.length += step;
+      link.unseen += step * (1.0 - static_cast<double>(this->Evidence(at)));
+    }
+    link.points.push_back(p);
+    link.voxels.push_back(at);
+  }
+  return link.length <= 1.5 * gap + 3.0;
+}
+
+/// The odds for a link, as a logarithm.
+/// @param tip  of the tree; null for its wall
+double Linker::Judge(
+  const Orphan& orphan, std::size_t number, const VesselEnd* tip, VesselLink& link) const
+{
+  const VesselEnd& end = orphan.ends[number];
+  const Vector3 from = link.points.front();
+  const double gap = (from - end.position).norm();
+  // Over a short gap the chord says nothing.
+  const double chordWeight = std::min(1.0, gap / 4.0);
+  const Vector3 chord = gap > 0.0 ? Vector3((from - end.position) / gap) : end.outwards;
+  double odds = 2.2;
+  const auto turn = [&](double angle, double scale) { return (angle / scale) * (angle / scale); };
+  odds -= chordWeight * turn(Angle(end.outwards, chord), 0.7);
+  if (tip != nullptr)
+  {
+    odds -= chordWeight * turn(Angle(tip->outwards, -chord), 0.7);
+    odds -= turn(Angle(tip->outwards, -end.outwards), 1.0);
+  }
+  else
+  {
+    odds -= 0.5;
+  }
+  odds -= link.unseen / 6.0;
+  odds -= std::max(0.0, link.unseen - FreeGap) / 4.0;
+  if (tip != nullptr && tip->radius > 0.0 && end.radius > 0.0)
+  {
+    link.radiusBefore = tip->radius;
+    const double ratio = std::log(end.radius / tip->radius);
+    odds -= 2.0 * std::max(0.0, ratio - 0.25) + 1.0 * std::max(0.0, -ratio - 0.7);
+  }
+  if (tip != nullptr)
+  {
+    const double brighter = end.lumen - tip->lumen;
+    odds -= 3.0 * std::max(0.0, brighter - 0.3) + 2.0 * std::max(0.0, -brighter - 0.5);
+  }
+  link.radiusBehind = end.radius;
+  link.pieceLength = orphan.length;
+  odds += std::min(1.0, (orphan.length - 15.0) / 15.0);
+  odds -= 4.0 * std::max(0.0, orphan.growth[number] - 1.15);
+  return odds;
+}
+
+std::vector<VesselLink> Linker::Run(
+  const std::vector<std::pair<std::int64_t, float>>& tree, const ProgressCallback& progress)
+{
+  std::vector<Orphan> orphans;
+  for (std::vector<std::int64_t>& voxels : this->Pieces(tree))
+  {
+    std::optional<Orphan> orphan = this->Describe(std::move(voxels));
+    if (orphan && !orphan->ends.empty())
+    {
+      orphans.push_back(std::move(*orphan));
+    }
+  }
+  Report(progress, 0.5);
+  std::vector<std::int64_t> treeVoxels;
+  treeVoxels.reserve(tree.size());
+  std::vector<VoxelPiece::Reached> paths;
+  for (const auto& [voxel, path] : tree)
+  {
+    paths.push_back({ static_cast<std::int32_t>(treeVoxels.size()), path, -1 });
+    treeVoxels.push_back(voxel);
+  }
+  const VoxelPiece trunk(this->L, std::move(treeVoxels));
+  const std::vector<VesselEnd> tips =
+    paths.empty() ? std::vector<VesselEnd>() : this->EndsOf(trunk, paths);
+
+  std::vector<VesselLink> links;
+  for (Orphan& orphan : orphans)
+  {
+    VesselLink best;
+    double bestOdds = -std::numeric_limits<double>::infinity();
+    orphan.growth.assign(orphan.ends.size(), -1.0);
+    for (std::size_t e = 0; e < orphan.ends.size(); ++e)
+    {
+      const VesselEnd& end = orphan.ends[e];
+      const auto consider = [&](const Vector3& target, double within, const VesselEnd* tip)
+      {
+        VesselLink link;
+        if (!this->Way(orphan.piece, end, target, within, link))
+        {
+          return;
+        }
+        if (orphan.growth[e] < 0.0)
+        {
+          orphan.growth[e] = this->Growth(orphan.piece, end);
+        }
+        const double odds = this->Judge(orphan, e, tip, link);
+        if (odds > bestOdds)
+        {
+          bestOdds = odds;
+          best = std::move(link);
+        }
+      };
+      for (const VesselEnd& tip : tips)
+      {
+        const Vector3 chord = tip.position - end.position;
+        const double gap = chord.norm();
+        if (gap > this->Settings.longestGap ||
+          (gap > 4.0 &&
+            (Angle(end.outwards, chord / gap) > 1.2 || Angle(tip.outwards, -chord / gap) > 1.2)))
+        {
+          continue;
+        }
+        consider(tip.position, 2.0, &tip);
+      }
+      // The wall of the tree ahead.
+      double least = std::numeric_limits<double>::infinity();
+      Vector3 wall = Vector3::Zero();
+      const std::optional<std::array<int, 3>> at = this->L.Nearest(end.position);
+      if (at)
+      {
+        this->L.Ball(*at, WallGap,
+          [&](std::int64_t voxel, const std::array<int, 3>& place)
+          {
+            if (!this->I.inTree(voxel))
+            {
+              return;
+            }
+            const Vector3 chord = this->L.World(place) - end.position;
+            const double gap = std::max(1e-6, chord.norm());
+            const double angle = Angle(end.outwards, chord / gap);
+            const double cost = gap * (1.0 + angle * angle);
+            if ((angle < 0.9 || gap < 2.5) && cost < least)
+            {
+              least = cost;
+              wall = this->L.World(place);
+            }
+          });
+      }
+      if (std::isfinite(least))
+      {
+        consider(wall, 1.5, nullptr);
+      }
+    }
+    best.confidence = 1.0 / (1.0 + std::exp(-bestOdds));
+    if (getenv("LINKDEBUG")) // DEBUG
+    { // DEBUG
+      const Vector3 c = orphan.piece.Position(0); // DEBUG
+      fprintf(stderr, "orphan n=%zu len=%.1f ends=%zu at %.0f %.0f %.0f odds=%.2f gap=%.1f unseen=%.1f r %.2f>%.2f growth %.2f from %.0f %.0f %.0f\n", // DEBUG
+        orphan.piece.Size(), orphan.length, orphan.ends.size(), c[0], c[1], c[2], bestOdds, best.length, best.unseen, best.radiusBefore, best.radiusBehind, // DEBUG
+        *std::max_element(orphan.growth.begin(), orphan.growth.end()), best.points.empty() ? 0.0 : best.points[0][0], best.points.empty() ? 0.0 : best.points[0][1], best.points.empty() ? 0.0 : best.points[0][2]); // DEBUG
+    } // DEBUG
+    if (best.confidence >= this->Settings.leastConfidence)
+    {
+      links.push_back(std::move(best));
+    }
+  }
+  Report(progress, 1.0);
+  return links;
+}
+}
+
+std::vector<VesselLink> FindVesselLinks(const LinkingImage& image,
+  const std::vector<std::pair<std::int64_t, float>>& tree, const LinkingSettings& settings,
+  const ProgressCallback& progress)
+{
+  return Linker(image, settings).Run(tree, progress);
+}
+}

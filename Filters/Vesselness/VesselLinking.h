@@ -1,0 +1,69 @@
+/**
+ * @file VesselLinking.h
+ * @brief Pieces of vessel that hang on nothing, and the ways across lesions that lead to them.
+ *
+ * A stenosis, a calcification or an occlusion interrupts what is connected, not the artery. Pieces of
+ * tube that no seed reaches are described by their ends: where, in which direction, how wide, how
+ * bright. An end is linked to an end of the tree, or to its wall, when both point at each other, calibre
+ * and brightness fit, and the cheapest way between them does not lead through a chamber. Every link has a
+ * confidence; docs/segmentation.md has what it is made of and how it was calibrated.
+ */
+#ifndef DynamicCoronary_VesselLinking_h
+#define DynamicCoronary_VesselLinking_h
+
+#include "LumenMeasurement.h"
+#include "ParallelFor.h"
+#include "VoxelLattice.h"
+
+#include <functional>
+#include <vector>
+
+namespace coronary
+{
+/// A way across a place where no vessel is seen, or too little of it.
+struct VesselLink
+{
+  std::vector<Vector3> points;      ///< mm, from the tree to the piece
+  double length = 0.0;              ///< mm
+  double unseen = 0.0;              ///< mm of it that show no tube
+  double confidence = 0.0;          ///< 0 to 1, that this is the artery's way
+  double radiusBefore = 0.0;        ///< mm, lumen on the tree's side; 0 not known
+  double radiusBehind = 0.0;        ///< mm, on the piece's side; 0 not known
+  double pieceLength = 0.0;         ///< mm of vessel that hang on it, at least
+  std::vector<std::int64_t> voxels; ///< numbers in the lattice, along the points
+};
+
+/// Values of single voxels that linking looks at; numbers are the lattice's.
+struct LinkingImage
+{
+  const VoxelLattice& lattice;
+  const ImageInterpolator& image;
+  double blood = 0.0;                            ///< image value of undiluted contrast medium
+  double tissue = 0.0;                           ///< of muscle
+  double largestRadius = 4.5;                    ///< mm
+  std::function<float(std::int64_t)> share;      ///< of the contrast between tissue and blood
+  std::function<float(std::int64_t)> tube;       ///< vesselness over that of a clear tube
+  std::function<bool(std::int64_t)> couldBelong; ///< vessel-like, and free
+  std::function<bool(std::int64_t)> inTree;
+  std::function<bool(std::int64_t)> forbidden; ///< chamber, great vessel, leakage: no way through
+};
+
+struct LinkingSettings
+{
+  double leastPiece = 8.0;      ///< mm, length of a piece worth a link, > 0
+  double longestGap = 25.0;     ///< mm between ends that point at each other, >= 0
+  double leastConfidence = 0.5; ///< of a link, 0 to 1
+};
+
+/**
+ * The links that may be made now: at most one a piece, none that contradict each other. What they lead to is
+ * not part of the tree yet, and may have more pieces behind it.
+ * @param tree  numbers of the tree's voxels, with the path length from the root, mm
+ * @throws Cancelled
+ */
+std::vector<VesselLink> FindVesselLinks(const LinkingImage& image,
+  const std::vector<std::pair<std::int64_t, float>>& tree, const LinkingSettings& settings,
+  const ProgressCallback& progress = {});
+}
+
+#endif
