@@ -162,6 +162,7 @@ private:
   float Evidence(std::int64_t voxel) const;
   bool Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target, double within,
     VesselLink& link) const;
+  bool Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const;
   double Judge(const Orphan& orphan, std::size_t end, const VesselEnd* tip, VesselLink& link) const;
 
   const LinkingImage& I;
@@ -523,6 +524,9 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
         }
       });
   }
+  if (getenv("LINKDEBUG2"))
+    fprintf(stderr, "   way arrived %d known %zu tube at end %.2f share %.2f\n", arrived >= 0,
+      known.size(), this->I.tube(start), this->I.share(start)); // DEBUG
   if (arrived < 0)
   {
     return false;
@@ -543,7 +547,52 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
     link.points.push_back(p);
     link.voxels.push_back(at);
   }
-  return link.length <= 1.5 * gap + 3.0;
+  return link.length <= 1.35 * gap + 1.5;
+}
+
+/// The smooth curve between two ends that point at each other, where nothing shows the way.
+bool Linker::Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const
+{
+  const Vector3 chord = end.position - tip.position;
+  const double gap = chord.norm();
+  const double handle = gap / 3.0;
+  const Vector3 a = tip.position + handle * tip.outwards;
+  const Vector3 b = end.position + handle * end.outwards;
+  const int steps =
+    std::max(2, static_cast<int>(std::ceil(2.0 * gap / this->L.Spacing.minCoeff())));
+  link.voxels.clear();
+  link.points.clear();
+  link.length = 0.0;
+  link.unseen = 0.0;
+  for (int step = 0; step <= steps; ++step)
+  {
+    const double t = static_cast<double>(step) / steps;
+    const double u = 1.0 - t;
+    const Vector3 p = u * u * u * tip.position + 3.0 * u * u * t * a + 3.0 * u * t * t * b +
+      t * t * t * end.position;
+    const std::optional<std::array<int, 3>> place = this->L.Nearest(p);
+    if (!place)
+    {
+      return false;
+    }
+    const std::int64_t voxel = this->L.Index((*place)[0], (*place)[1], (*place)[2]);
+    if (this->I.forbidden(voxel))
+    {
+      return false;
+    }
+    if (!link.points.empty())
+    {
+      const double length = (p - link.points.back()).norm();
+      link.length += length;
+      link.unseen += length * (1.0 - static_cast<double>(this->Evidence(voxel)));
+    }
+    link.points.push_back(p);
+    if (link.voxels.empty() || link.voxels.back() != voxel)
+    {
+      link.voxels.push_back(voxel);
+    }
+  }
+  return true;
 }
 
 /// The odds for a link, as a logarithm.
@@ -570,12 +619,15 @@ double Linker::Judge(
     odds -= 0.5;
   }
   odds -= link.unseen / 6.0;
-  odds -= std::max(0.0, link.unseen - FreeGap) / 4.0;
+  odds -= std::max(0.0, link.unseen - FreeGap) / 8.0;
   if (tip != nullptr && tip->radius > 0.0 && end.radius > 0.0)
   {
     link.radiusBefore = tip->radius;
     const double ratio = std::log(end.radius / tip->radius);
     odds -= 2.0 * std::max(0.0, ratio - 0.25) + 1.0 * std::max(0.0, -ratio - 0.7);
+    // Vessels taper: one that ends at full width goes on, and one that begins so comes from somewhere.
+    const double abrupt = std::min(end.radius, tip->radius);
+    odds += 2.0 * std::clamp((abrupt - 0.6) / 0.6, 0.0, 1.0);
   }
   if (tip != nullptr)
   {
@@ -626,7 +678,8 @@ std::vector<VesselLink> Linker::Run(
       const auto consider = [&](const Vector3& target, double within, const VesselEnd* tip)
       {
         VesselLink link;
-        if (!this->Way(orphan.piece, end, target, within, link))
+        if (!this->Way(orphan.piece, end, target, within, link) &&
+          (tip == nullptr || !this->Curve(end, *tip, link)))
         {
           return;
         }
@@ -635,6 +688,9 @@ std::vector<VesselLink> Linker::Run(
           orphan.growth[e] = this->Growth(orphan.piece, end);
         }
         const double odds = this->Judge(orphan, e, tip, link);
+        if (getenv("LINKDEBUG2"))
+          fprintf(stderr, "   odds %.2f length %.1f unseen %.1f growth %.2f lumen %.2f\n", odds,
+            link.length, link.unseen, orphan.growth[e], orphan.ends[e].lumen); // DEBUG
         if (odds > bestOdds)
         {
           bestOdds = odds;
@@ -645,6 +701,14 @@ std::vector<VesselLink> Linker::Run(
       {
         const Vector3 chord = tip.position - end.position;
         const double gap = chord.norm();
+        if (getenv("LINKDEBUG2") && gap < 25)
+          fprintf(stderr,
+            "  cand orphan %zu end %zu (%.0f %.0f %.0f) tip (%.0f %.0f %.0f) gap %.1f angles %.2f "
+            "%.2f r %.2f %.2f\n",
+            orphan.piece.Size(), e, end.position[0], end.position[1], end.position[2],
+            tip.position[0], tip.position[1], tip.position[2], gap,
+            Angle(end.outwards, chord / gap), Angle(tip.outwards, -chord / gap), end.radius,
+            tip.radius); // DEBUG
         if (gap > this->Settings.longestGap ||
           (gap > 4.0 &&
             (Angle(end.outwards, chord / gap) > 1.2 || Angle(tip.outwards, -chord / gap) > 1.2)))
@@ -683,13 +747,19 @@ std::vector<VesselLink> Linker::Run(
       }
     }
     best.confidence = 1.0 / (1.0 + std::exp(-bestOdds));
-    if (getenv("LINKDEBUG")) // DEBUG
-    { // DEBUG
+    if (getenv("LINKDEBUG"))                      // DEBUG
+    {                                             // DEBUG
       const Vector3 c = orphan.piece.Position(0); // DEBUG
-      fprintf(stderr, "orphan n=%zu len=%.1f ends=%zu at %.0f %.0f %.0f odds=%.2f gap=%.1f unseen=%.1f r %.2f>%.2f growth %.2f from %.0f %.0f %.0f\n", // DEBUG
-        orphan.piece.Size(), orphan.length, orphan.ends.size(), c[0], c[1], c[2], bestOdds, best.length, best.unseen, best.radiusBefore, best.radiusBehind, // DEBUG
-        *std::max_element(orphan.growth.begin(), orphan.growth.end()), best.points.empty() ? 0.0 : best.points[0][0], best.points.empty() ? 0.0 : best.points[0][1], best.points.empty() ? 0.0 : best.points[0][2]); // DEBUG
-    } // DEBUG
+      fprintf(stderr,
+        "orphan n=%zu len=%.1f ends=%zu at %.0f %.0f %.0f odds=%.2f gap=%.1f unseen=%.1f r "
+        "%.2f>%.2f growth %.2f from %.0f %.0f %.0f\n", // DEBUG
+        orphan.piece.Size(), orphan.length, orphan.ends.size(), c[0], c[1], c[2], bestOdds,
+        best.length, best.unseen, best.radiusBefore, best.radiusBehind, // DEBUG
+        *std::max_element(orphan.growth.begin(), orphan.growth.end()),
+        best.points.empty() ? 0.0 : best.points[0][0],
+        best.points.empty() ? 0.0 : best.points[0][1],
+        best.points.empty() ? 0.0 : best.points[0][2]); // DEBUG
+    }                                                   // DEBUG
     if (best.confidence >= this->Settings.leastConfidence)
     {
       links.push_back(std::move(best));

@@ -196,6 +196,12 @@ void WriteLines(const std::string& path, const CenterlineSet& set)
     }
     file << '\n';
   }
+  file << "POINT_DATA " << set.points.size()
+       << "\nSCALARS MaximumInscribedSphereRadius double 1\nLOOKUP_TABLE default\n";
+  for (const double radius : set.radius)
+  {
+    file << radius << '\n';
+  }
 }
 
 Outcome Run(
