@@ -14,6 +14,7 @@
 #include "SegmentationFile.h"
 #include "SeriesDescription.h"
 #include "StagedFolder.h"
+#include "vtkBridgeReport.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
@@ -277,6 +278,9 @@ void NeedMask(const RunStep& step)
   if (!step.input.Mask)
   {
     step.input.Mask = ReadVolume(step, "mask.mha", vtkCoronaryArrayNames::VesselMask);
+    // The image's file has no room for them.
+    vtkCoronary::SetBridges(
+      step.input.Mask->GetFieldData(), BridgesOfLines(ReadLines(step, "bridges.vtp")));
   }
 }
 
@@ -377,9 +381,10 @@ Json MakeVesselness(RunStep& step)
     { "c", vesselness->GetUsedC() } };
 }
 
-/// The segmentation with its seeds and the aorta; a mask that is there already stays.
+/// The segmentation with its seeds, the aorta and the ways across lesions; a mask that is there already stays.
 void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
-  vtkSmartPointer<vtkPolyData>& seeds, vtkSmartPointer<vtkPolyData>& aorta)
+  vtkSmartPointer<vtkPolyData>& seeds, vtkSmartPointer<vtkPolyData>& aorta,
+  vtkSmartPointer<vtkPolyData>& bridges)
 {
   const RunSettings& settings = step.input.Settings;
   vtkNew<vtkVesselSegmentation> segmentation;
@@ -405,6 +410,8 @@ void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
   if (!mask)
   {
     mask = Detached(segmentation->GetOutput());
+    bridges = vtkPolyData::SafeDownCast(
+      segmentation->GetOutputDataObject(vtkVesselSegmentation::BridgesPort));
     return;
   }
   // How much of the other segmentation hangs on a seed is of no interest.
@@ -456,13 +463,14 @@ Json MakeSegmentation(RunStep& step)
   }
   vtkSmartPointer<vtkPolyData> seeds;
   auto aorta = vtkSmartPointer<vtkPolyData>::New();
+  auto bridges = vtkSmartPointer<vtkPolyData>::New();
   if (mask && !given.empty())
   {
     seeds = SeedsOfSurface(nullptr, given);
   }
   else
   {
-    Segment(step, mask, seeds, aorta);
+    Segment(step, mask, seeds, aorta, bridges);
     numbers["window"] = Numbers(mask, vtkCoronaryArrayNames::BloodWindow);
   }
   step.input.Mask = mask;
@@ -470,6 +478,7 @@ Json MakeSegmentation(RunStep& step)
     static_cast<const unsigned char*>(mask->GetScalarPointer()), settings.compress, KeepGoing);
   WritePolyData(step.Add("ostia.vtp"), seeds, step.input.Messages);
   WritePolyData(step.Add("aorta.vtp"), aorta, step.input.Messages);
+  WritePolyData(step.Add("bridges.vtp"), bridges, step.input.Messages);
   Json described = DescribeSeeds(seeds);
   for (const auto& seed : described)
   {
@@ -491,6 +500,7 @@ Json MakeSegmentation(RunStep& step)
   numbers["seeds"] = described;
   numbers["seeds_file"] = "ostia.vtp";
   numbers["aorta_file"] = "aorta.vtp";
+  numbers["bridges_file"] = "bridges.vtp";
   return numbers;
 }
 
@@ -595,6 +605,17 @@ Json MakeCenterline(RunStep& step)
     length += one["length"].get<double>();
   }
   numbers["trees"] = trees;
+  numbers["bridges"] = Json::array();
+  const Json segmentation = step.report.Of("segmentation");
+  if (!step.input.IsSurface() && segmentation.contains("window"))
+  {
+    numbers["bridges"] = DescribeBridges(ReadLines(step, "bridges.vtp"), tree, step.input.Reference,
+      segmentation["window"][1].get<double>());
+    for (const std::string& warning : BridgeWarnings(numbers["bridges"]))
+    {
+      vtkGenericWarningMacro(<< warning);
+    }
+  }
   numbers["complete"] = complete && complete->GetTuple1(0) != 0.0;
   numbers["branches"] = tree->GetNumberOfLines();
   numbers["bifurcations"] = forks->GetNumberOfPoints();
@@ -1141,7 +1162,7 @@ std::vector<std::string> UsualFiles(const std::string& folder, RunStage from)
 {
   const std::vector<std::vector<std::string>> byStage = {
     { "vesselness.mha" },
-    { "mask.mha", "ostia.vtp", "aorta.vtp" },
+    { "mask.mha", "ostia.vtp", "aorta.vtp", "bridges.vtp" },
     { "given_surface.vtp", "centerline.vtp", "bifurcations.vtp", "centerline_lines.vtp",
       "status.csv" },
     { "surface.vtp", "caps.vtp" },

@@ -6,6 +6,7 @@
 #include "FastMarching.h"
 #include "LumenMeasurement.h"
 #include "ThinBranches.h"
+#include "VeinRejection.h"
 #include "VoxelRegion.h"
 
 #include <algorithm>
@@ -1074,7 +1075,7 @@ void Extractor::MarkCrossings(Course& course) const
 {
   course.crossing.assign(course.size(), 0);
   const double reach = 2.0 * this->Voxel + 0.5 * this->Step;
-  for (const CenterlineBridge& bridge : this->Input.bridges)
+  for (const VesselBridge& bridge : this->Input.bridges)
   {
     for (std::size_t i = 0; i < course.size(); ++i)
     {
@@ -1107,7 +1108,7 @@ void Extractor::MarkBridged()
       const auto p = static_cast<std::size_t>(branch.points[i]);
       for (std::size_t b = 0; b < this->Input.bridges.size(); ++b)
       {
-        const CenterlineBridge& bridge = this->Input.bridges[b];
+        const VesselBridge& bridge = this->Input.bridges[b];
         const bool here = std::any_of(bridge.points.begin(), bridge.points.end(),
           [&](const Vector3& q) { return (q - tree.points[p]).squaredNorm() <= reach * reach; });
         if (!here)
@@ -2056,6 +2057,10 @@ void Extractor::Finish()
     }
     MeasureTree(this->Result.tree);
   }
+  if (getenv("VEINDEBUG") && this->Input.intensity)
+  {
+    FindVeins(this->Result.tree, *this->Image, this->Lumen.reference, this->Blur);
+  } // DEBUG
   std::map<std::int64_t, CenterlineBifurcation> joints;
   for (const CenterlineTree::Branch& branch : this->Result.tree.branches)
   {
@@ -2212,7 +2217,7 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   framed.grid.direction = Matrix3::Identity();
   std::transform(framed.seeds.begin(), framed.seeds.end(), framed.seeds.begin(), toFrame);
   std::transform(framed.targets.begin(), framed.targets.end(), framed.targets.begin(), toFrame);
-  for (CenterlineBridge& bridge : framed.bridges)
+  for (VesselBridge& bridge : framed.bridges)
   {
     std::transform(bridge.points.begin(), bridge.points.end(), bridge.points.begin(), toFrame);
   }

@@ -13,19 +13,13 @@
 #include "Geometry.h"
 #include "ParallelFor.h"
 #include "ScalarImage.h"
+#include "VesselBridge.h"
 
 #include <limits>
 #include <string>
 
 namespace coronary
 {
-/// A way across a lesion that belongs to the region: no vessel need be seen there.
-struct CenterlineBridge
-{
-  std::vector<Vector3> points; ///< mm
-  double confidence = 1.0;     ///< 0 to 1
-};
-
 /**
  * What to march in: a speed, a mask, or both (then the mask limits the region). All on one grid,
  * i fastest, not owned.
@@ -41,7 +35,8 @@ struct CenterlineInput
   const ScalarImage* intensity = nullptr;
   std::vector<Vector3> seeds;   ///< mm, one for each tree; its root
   std::vector<Vector3> targets; ///< mm; may be empty
-  std::vector<CenterlineBridge> bridges;
+  /// Ways across lesions that belong to the region: no vessel need be seen there.
+  std::vector<VesselBridge> bridges;
 };
 
 /// Zero means automatic for all lengths; the automatic ones follow voxels and radii, not millimetres.

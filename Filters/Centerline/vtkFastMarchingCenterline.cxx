@@ -407,12 +407,14 @@ void vtkFastMarchingCenterline::Execute(
       if (this->ImageKind == MaskImage)
       {
         input.mask = ValuesAs<vtkUnsignedCharArray>(array, maskCopy);
+        input.bridges = vtkCoronary::BridgesOf(image->GetFieldData());
       }
       else
       {
         input.speed = ValuesAs<vtkFloatArray>(array, speedCopy);
         if (vtkImageData* mask = ImageOf(inputs[4]))
         {
+          input.bridges = vtkCoronary::BridgesOf(mask->GetFieldData());
           const coronary::ImageGrid grid = vtkCoronary::GridOf(mask);
           vtkCoronary::Require(grid.extent == input.grid.extent &&
               grid.origin.isApprox(input.grid.origin, 1e-5) &&
@@ -480,6 +482,10 @@ void vtkFastMarchingCenterline::Execute(
     treeOutput->GetPointData(), names::Abscissas, tree.abscissa);
   vtkCoronary::AddArray<vtkDoubleArray>(
     treeOutput->GetPointData(), this->ConfidenceArrayName, tree.confidence);
+  vtkCoronary::AddArray<vtkUnsignedCharArray>(
+    treeOutput->GetPointData(), names::Bridged, tree.bridged);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    treeOutput->GetPointData(), names::BridgeConfidence, tree.bridgeConfidence);
   vtkCellData* cells = treeOutput->GetCellData();
   AddBranchValues<vtkIntArray>(
     cells, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });

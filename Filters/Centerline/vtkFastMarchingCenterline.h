@@ -27,7 +27,9 @@
  * - 0, vtkPolyData: the trees, one polyline a branch from root to tip; the first point of a branch is the
  *   last of its parent. Point data `MaximumInscribedSphereRadius` (double, mm: of the circle with the
  *   section's mean wall distance; on masks and surfaces to their wall), `Abscissas` (double, mm from the
- *   root), `Confidence` (double, 0 a guess to 1 clearly seen). Cell data `GroupIds`,
+ *   root), `Confidence` (double, 0 a guess to 1 clearly seen), `Bridged` (unsigned char, 1: guessed on a
+ *   way across a lesion that the mask's field data describe), `BridgeConfidence` (double, 0 to 1: that what
+ *   is behind such ways belongs to the tree; 1 before the first). Cell data `GroupIds`,
  *   `ParentGroupIds` (-1 at a root), `TreeIds` (index of the seed; all int), `Length` (double, mm),
  *   `Tortuosity` (double, length / chord - 1).
  * - 1, vtkPolyData: VMTK's form: for each tip or target one line from its root for each piece between bifurcations,

@@ -32,7 +32,13 @@ constexpr const char* VesselProbability = "VesselProbability"; ///< float, 0 to 
 // Segmentation, field data.
 constexpr const char* BloodWindow = "BloodWindow"; ///< double, 2 values: tissue, blood
 
+constexpr const char* BridgePoints = "BridgePoints"; ///< double[4], mm and number of the bridge
+constexpr const char* BridgeConfidences = "BridgeConfidences"; ///< double, 0 to 1, one a bridge
+constexpr const char* BridgeUnseen = "BridgeUnseen"; ///< double, mm without a tube, one a bridge
+
 // Centerline tree, point data.
+constexpr const char* Bridged = "Bridged"; ///< unsigned char, 1: not seen, guessed across a lesion
+constexpr const char* BridgeConfidence = "BridgeConfidence"; ///< double, 0 to 1, 1 before any bridge
 constexpr const char* Radius = "MaximumInscribedSphereRadius"; ///< double, mm
 constexpr const char* Abscissas = "Abscissas";       ///< double, mm from the root along the tree
 constexpr const char* SegmentIds = "SegmentIds";     ///< int, coronary::SegmentId

@@ -1,12 +1,14 @@
 #include "vtkCoronaryFilterParts.h"
 
 #include "ParallelFor.h"
+#include "vtkCoronaryArrayNames.h"
 
 #include "vtkAlgorithm.h"
 #include "vtkDataArray.h"
 #include "vtkDataArrayRange.h"
 #include "vtkDataObject.h"
 #include "vtkDemandDrivenPipeline.h"
+#include "vtkDoubleArray.h"
 #include "vtkFloatArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -56,6 +58,67 @@ coronary::ScalarImage ScalarImageOf(
     result.values = static_cast<const float*>(copy.data());
   }
   return result;
+}
+
+void SetBridges(vtkFieldData* data, const std::vector<coronary::VesselBridge>& bridges)
+{
+  vtkNew<vtkDoubleArray> points;
+  points->SetName(vtkCoronaryArrayNames::BridgePoints);
+  points->SetNumberOfComponents(4);
+  std::vector<double> confidences;
+  std::vector<double> unseen;
+  for (const coronary::VesselBridge& bridge : bridges)
+  {
+    for (const coronary::Vector3& p : bridge.points)
+    {
+      points->InsertNextTuple4(p[0], p[1], p[2], static_cast<double>(confidences.size()));
+    }
+    confidences.push_back(bridge.confidence);
+    unseen.push_back(bridge.unseen);
+  }
+  data->AddArray(points);
+  AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::BridgeConfidences, confidences);
+  AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::BridgeUnseen, unseen);
+}
+
+std::vector<coronary::VesselBridge> BridgesOf(vtkFieldData* data)
+{
+  vtkDataArray* points = data->GetArray(vtkCoronaryArrayNames::BridgePoints);
+  vtkDataArray* confidences = data->GetArray(vtkCoronaryArrayNames::BridgeConfidences);
+  if (!points || !confidences || confidences->GetNumberOfTuples() == 0)
+  {
+    return {};
+  }
+  const auto require = [](bool fits, const char* name)
+  { Require(fits, "the field data array '" + std::string(name) + "' does not describe bridges"); };
+  require(points->GetNumberOfComponents() == 4, vtkCoronaryArrayNames::BridgePoints);
+  require(confidences->GetNumberOfComponents() == 1, vtkCoronaryArrayNames::BridgeConfidences);
+  std::vector<coronary::VesselBridge> bridges(
+    static_cast<std::size_t>(confidences->GetNumberOfTuples()));
+  vtkDataArray* unseen = data->GetArray(vtkCoronaryArrayNames::BridgeUnseen);
+  for (std::size_t b = 0; b < bridges.size(); ++b)
+  {
+    const auto n = static_cast<vtkIdType>(b);
+    bridges[b].confidence = confidences->GetTuple1(n);
+    bridges[b].unseen =
+      unseen && n < unseen->GetNumberOfTuples() ? unseen->GetComponent(n, 0) : 0.0;
+    require(bridges[b].confidence >= 0.0 && bridges[b].confidence <= 1.0,
+      vtkCoronaryArrayNames::BridgeConfidences);
+  }
+  for (vtkIdType n = 0; n < points->GetNumberOfTuples(); ++n)
+  {
+    double tuple[4];
+    points->GetTuple(n, tuple);
+    const coronary::Vector3 place(tuple);
+    require(place.allFinite() && tuple[3] >= 0.0 && tuple[3] < static_cast<double>(bridges.size()),
+      vtkCoronaryArrayNames::BridgePoints);
+    bridges[static_cast<std::size_t>(tuple[3])].points.push_back(place);
+  }
+  for (const coronary::VesselBridge& bridge : bridges)
+  {
+    require(!bridge.points.empty(), vtkCoronaryArrayNames::BridgePoints);
+  }
+  return bridges;
 }
 
 void Require(bool condition, const std::string& requirement)

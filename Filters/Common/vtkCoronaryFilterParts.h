@@ -7,6 +7,7 @@
 
 #include "Geometry.h"
 #include "ScalarImage.h"
+#include "VesselBridge.h"
 #include "vtkCoronaryCommonModule.h" // for the export macro
 
 #include "vtkFieldData.h"
@@ -30,6 +31,14 @@ VTKCORONARYCOMMON_EXPORT coronary::ImageGrid GridOf(vtkImageData* image);
 /// are copied into `copy`; the result is valid as long as the image and the copy are.
 VTKCORONARYCOMMON_EXPORT coronary::ScalarImage ScalarImageOf(
   vtkImageData* image, vtkDataArray* array, std::vector<float>& copy);
+
+/// Ways across lesions as field data: BridgePoints, BridgeConfidences, BridgeUnseen.
+VTKCORONARYCOMMON_EXPORT void SetBridges(
+  vtkFieldData* data, const std::vector<coronary::VesselBridge>& bridges);
+
+/// What SetBridges wrote; nothing where it did not.
+/// @throws std::invalid_argument that names the array that does not fit
+VTKCORONARYCOMMON_EXPORT std::vector<coronary::VesselBridge> BridgesOf(vtkFieldData* data);
 
 /// @throws std::invalid_argument(requirement) when `condition` does not hold
 VTKCORONARYCOMMON_EXPORT void Require(bool condition, const std::string& requirement);

@@ -13,6 +13,7 @@
 
 #include "LumenMeasurement.h"
 #include "ParallelFor.h"
+#include "VesselBridge.h"
 #include "VoxelLattice.h"
 
 #include <functional>
@@ -20,13 +21,10 @@
 
 namespace coronary
 {
-/// A way across a place where no vessel is seen, or too little of it.
-struct VesselLink
+/// A way across a place where no vessel is seen, or too little of it: from the tree to a piece.
+struct VesselLink : VesselBridge
 {
-  std::vector<Vector3> points;      ///< mm, from the tree to the piece
   double length = 0.0;              ///< mm
-  double unseen = 0.0;              ///< mm of it that show no tube
-  double confidence = 0.0;          ///< 0 to 1, that this is the artery's way
   double radiusBefore = 0.0;        ///< mm, lumen on the tree's side; 0 not known
   double radiusBehind = 0.0;        ///< mm, on the piece's side; 0 not known
   double pieceLength = 0.0;         ///< mm of vessel that hang on it, at least

@@ -8,6 +8,7 @@
 #include "vtkCoronaryFilterParts.h"
 
 #include "vtkCellArray.h"
+#include "vtkCellData.h"
 #include "vtkDataArrayRange.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
@@ -146,7 +147,32 @@ void Insert(
   output->GetPointData()->AddArray(array);
 }
 
-/// Takes the message's first word as the name of a property.
+/// Ways across lesions as polylines.
+void AddBridges(vtkPolyData* output, const std::vector<coronary::VesselLink>& links)
+{
+  vtkNew<vtkCellArray> lines;
+  std::vector<double> confidence;
+  std::vector<double> length;
+  std::vector<double> unseen;
+  for (const coronary::VesselLink& link : links)
+  {
+    lines->InsertNextCell(static_cast<int>(link.points.size()));
+    for (const Vector3& point : link.points)
+    {
+      lines->InsertCellPoint(output->GetPoints()->InsertNextPoint(point.data()));
+    }
+    confidence.push_back(link.confidence);
+    length.push_back(link.length);
+    unseen.push_back(link.unseen);
+  }
+  output->SetLines(lines);
+  namespace names = vtkCoronaryArrayNames;
+  vtkCellData* cells = output->GetCellData();
+  vtkCoronary::AddArray<vtkDoubleArray>(cells, names::BridgeConfidence, confidence);
+  vtkCoronary::AddArray<vtkDoubleArray>(cells, names::Length, length);
+  vtkCoronary::AddArray<vtkDoubleArray>(cells, names::BridgeUnseen, unseen);
+}
+
 /// Smallest and largest scale of the vesselness that is computed here, mm.
 std::vector<double> DefaultScales(const Vector3& spacing)
 {
@@ -166,7 +192,7 @@ vtkVesselSegmentation::vtkVesselSegmentation()
   , ProbabilityArrayName(vtkCoronaryArrayNames::VesselProbability)
 {
   this->SetNumberOfInputPorts(3);
-  this->SetNumberOfOutputPorts(3);
+  this->SetNumberOfOutputPorts(4);
   this->SetInputArrayToProcess(
     0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
 }
@@ -231,7 +257,7 @@ int vtkVesselSegmentation::RequestInformation(
   vtkInformation* outInfo = outputs->GetInformationObject(MaskPort);
   vtkDataObject::SetPointDataActiveScalarInfo(outInfo, VTK_UNSIGNED_CHAR, 1);
   outInfo->Set(CAN_PRODUCE_SUB_EXTENT(), 1);
-  for (const int port : { SeedsPort, AortaPort })
+  for (const int port : { SeedsPort, AortaPort, BridgesPort })
   {
     outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
   }
@@ -320,6 +346,9 @@ void vtkVesselSegmentation::Execute(
   settings.smallestIsland = this->SmallestIsland;
   settings.fillHoles = this->FillHoles;
   settings.refineWall = this->RefineWall;
+  settings.crossLesions = this->CrossLesions;
+  settings.longestGap = this->LongestGap;
+  settings.leastLinkConfidence = this->LeastLinkConfidence;
   if (!this->AutomaticWindow)
   {
     settings.window = coronary::BloodWindow{ this->TissueValue, this->BloodValue };
@@ -334,6 +363,7 @@ void vtkVesselSegmentation::Execute(
   vtkImageData* output = vtkImageData::GetData(outputs->GetInformationObject(MaskPort));
   vtkPolyData* seedsOutput = vtkPolyData::GetData(outputs->GetInformationObject(SeedsPort));
   vtkPolyData* aortaOutput = vtkPolyData::GetData(outputs->GetInformationObject(AortaPort));
+  vtkPolyData* bridgesOutput = vtkPolyData::GetData(outputs->GetInformationObject(BridgesPort));
   const coronary::ImageGrid grid = vtkCoronary::GridOf(input);
   const Extent& whole = grid.extent;
 
@@ -491,6 +521,8 @@ void vtkVesselSegmentation::Execute(
   window->InsertNextValue(result.window.tissue);
   window->InsertNextValue(result.window.blood);
   output->GetFieldData()->AddArray(window);
+  const std::vector<coronary::VesselBridge> bridges(result.links.begin(), result.links.end());
+  vtkCoronary::SetBridges(output->GetFieldData(), bridges);
   for (std::size_t s = 0; s < seeds.size(); ++s)
   {
     if (!(result.seedVolume[s] > 0.0))
@@ -510,7 +542,7 @@ void vtkVesselSegmentation::Execute(
     data->GetPointData()->AddArray(array);
     return array;
   };
-  for (vtkPolyData* data : { seedsOutput, aortaOutput })
+  for (vtkPolyData* data : { seedsOutput, aortaOutput, bridgesOutput })
   {
     data->Initialize();
     vtkNew<vtkPoints> points;
@@ -553,6 +585,7 @@ void vtkVesselSegmentation::Execute(
     }
   }
   aortaOutput->SetLines(lines);
+  AddBridges(bridgesOutput, result.links);
 }
 
 int vtkVesselSegmentation::RequestData(
@@ -593,6 +626,9 @@ void vtkVesselSegmentation::PrintSelf(ostream& os, vtkIndent indent)
   print("SmallestIsland", this->SmallestIsland);
   print("FillHoles", this->FillHoles);
   print("RefineWall", this->RefineWall);
+  print("CrossLesions", this->CrossLesions);
+  print("LongestGap", this->LongestGap);
+  print("LeastLinkConfidence", this->LeastLinkConfidence);
   print("GenerateProbability", this->GenerateProbability);
   print("MaskArrayName", this->MaskArrayName);
   print("ProbabilityArrayName", this->ProbabilityArrayName);

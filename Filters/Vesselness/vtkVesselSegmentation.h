@@ -31,9 +31,13 @@
  *   vessel that hang on it).
  * - 2, vtkPolyData: the ascending aorta as a polyline, upwards; point data
  *   `MaximumInscribedSphereRadius` (double, mm). Empty when the seeds were given.
+ * - 3, vtkPolyData: the ways across lesions as polylines, from what hangs on a seed to a piece of
+ *   vessel behind it. Cell data `BridgeConfidence` (double, 0 to 1), `Length` and `BridgeUnseen`
+ *   (double, mm: all of it, and what shows no tube). The mask's field data have them too
+ *   (`BridgePoints`, `BridgeConfidences`, `BridgeUnseen`), for the centerlines that are made in it.
  *
  * The whole image is needed at once, so every MPI rank works on all of it and gives its piece;
- * outputs 1 and 2 are in piece 0 only. Time passes through. Same bits on any number of threads.
+ * outputs 1 to 3 are in piece 0 only. Time passes through. Same bits on any number of threads.
  *
  * @par Time:
  * Passes through from input 0: every time step is computed by itself. Put vtkReferencePhase
@@ -68,7 +72,8 @@ public:
   {
     MaskPort = 0,
     SeedsPort = 1,
-    AortaPort = 2
+    AortaPort = 2,
+    BridgesPort = 3
   };
 
   ///@{
@@ -176,6 +181,20 @@ public:
 
   ///@{
   /**
+   * Go on behind lesions: pieces of vessel that no seed reaches are linked by their ends (default on), across at most
+   * LongestGap mm (default 25, 0 to 40), when the link has at least LeastLinkConfidence (default 0.5, 0 to 1).
+   */
+  vtkSetMacro(CrossLesions, bool);
+  vtkGetMacro(CrossLesions, bool);
+  vtkBooleanMacro(CrossLesions, bool);
+  vtkSetMacro(LongestGap, double);
+  vtkGetMacro(LongestGap, double);
+  vtkSetMacro(LeastLinkConfidence, double);
+  vtkGetMacro(LeastLinkConfidence, double);
+  ///@}
+
+  ///@{
+  /**
    * Also give the probability array. Default off.
    */
   vtkSetMacro(GenerateProbability, bool);
@@ -226,6 +245,9 @@ private:
 
   std::vector<std::array<double, 3>> Seeds;
   bool AutomaticOstia = true;
+  bool CrossLesions = true;
+  double LongestGap = 25.0;
+  double LeastLinkConfidence = 0.5;
   bool AutomaticWindow = true;
   double TissueValue = 50.0;
   double BloodValue = 400.0;

@@ -99,10 +99,7 @@ CenterlineTopology TreeOf(const PhantomScan& image, double* seconds)
   input.mask = image.mask.data();
   input.intensity = &intensity;
   input.seeds = image.seeds;
-  for (const VesselLink& link : image.links)
-  {
-    input.bridges.push_back({ link.points, link.confidence });
-  }
+  input.bridges.assign(image.links.begin(), image.links.end());
   CenterlineSettings settings;
   settings.timeLimit = 3600.0; // A slow machine is no other result.
   const CenterlineResult extracted = ExtractCenterlines(input, settings);
