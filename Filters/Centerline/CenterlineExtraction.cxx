@@ -6,7 +6,6 @@
 #include "FastMarching.h"
 #include "LumenMeasurement.h"
 #include "ThinBranches.h"
-#include "VeinRejection.h"
 #include "VoxelRegion.h"
 
 #include <algorithm>
@@ -2057,10 +2056,6 @@ void Extractor::Finish()
     }
     MeasureTree(this->Result.tree);
   }
-  if (getenv("VEINDEBUG") && this->Input.intensity)
-  {
-    FindVeins(this->Result.tree, *this->Image, this->Lumen.reference, this->Blur);
-  } // DEBUG
   std::map<std::int64_t, CenterlineBifurcation> joints;
   for (const CenterlineTree::Branch& branch : this->Result.tree.branches)
   {

@@ -20,6 +20,7 @@ constexpr float TooBright = 1.6F;
 constexpr float Lung = -1.5F;
 constexpr double ShellNear = 2.0; ///< mm from an end: where its direction and calibre are measured
 constexpr double ShellFar = 5.0;
+constexpr double ShellEnd = 8.0;
 constexpr double WallGap = 8.0;  ///< mm: longest link to a wall
 constexpr double FreeGap = 12.0; ///< mm: longer ones need more than ends that point at each other
 
@@ -163,6 +164,7 @@ private:
   bool Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target, double within,
     VesselLink& link) const;
   bool Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const;
+  double RadiusByVolume(const Vector3& place) const;
   double Judge(const Orphan& orphan, std::size_t end, const VesselEnd* tip, VesselLink& link) const;
 
   const LinkingImage& I;
@@ -292,34 +294,48 @@ std::optional<VesselEnd> Linker::EndAt(const VoxelPiece& piece, std::int32_t num
   end.number = number;
   end.position = piece.Position(number);
   Vector3 inwards = Vector3::Zero();
-  Vector3 middle = Vector3::Zero();
-  int count = 0;
-  for (const VoxelPiece::Reached& r : piece.Around(number, static_cast<float>(ShellFar)))
+  Vector3 near = Vector3::Zero();
+  Vector3 far = Vector3::Zero();
+  int nearCount = 0;
+  int farCount = 0;
+  for (const VoxelPiece::Reached& r : piece.Around(number, static_cast<float>(ShellEnd)))
   {
-    if (r.distance >= ShellNear)
+    const Vector3 offset = piece.Position(r.number) - end.position;
+    if (r.distance >= ShellNear && r.distance < ShellFar)
     {
-      const Vector3 offset = piece.Position(r.number) - end.position;
       inwards += offset.normalized();
-      middle += offset;
-      ++count;
+      near += offset;
+      ++nearCount;
+    }
+    else if (r.distance >= ShellFar)
+    {
+      far += offset;
+      ++farCount;
     }
   }
-  if (count < 3)
+  if (nearCount < 3 || farCount < 1)
   {
     return std::nullopt;
   }
-  inwards /= count;
-  middle /= count;
   // In a tube that goes on to both sides the directions cancel out.
   constexpr double oneSided = 0.8;
-  if (inwards.norm() < oneSided)
+  if (inwards.norm() < oneSided * nearCount)
   {
     return std::nullopt;
   }
-  inwards.normalize();
-  end.outwards = -inwards;
-  const LumenSection section = MeasureLumen(this->I.image, end.position + middle, inwards,
-    2.0 * std::cbrt(this->L.VoxelVolume()), this->Lumen);
+  near /= nearCount;
+  far /= farCount;
+  end.outwards = (near - far).normalized();
+  if (!end.outwards.allFinite())
+  {
+    return std::nullopt;
+  }
+  // A blunt end's outermost voxel lies beside its axis.
+  const Vector3 middle = near;
+  const Vector3 tip = end.position;
+  end.position = tip + near + (-near).dot(end.outwards) * end.outwards;
+  const LumenSection section = MeasureLumen(
+    this->I.image, tip + middle, end.outwards, 2.0 * std::cbrt(this->L.VoxelVolume()), this->Lumen);
   if (section.confidence > 0.3)
   {
     end.radius = section.radius;
@@ -524,9 +540,6 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
         }
       });
   }
-  if (getenv("LINKDEBUG2"))
-    fprintf(stderr, "   way arrived %d known %zu tube at end %.2f share %.2f\n", arrived >= 0,
-      known.size(), this->I.tube(start), this->I.share(start)); // DEBUG
   if (arrived < 0)
   {
     return false;
@@ -595,6 +608,21 @@ bool Linker::Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link)
   return true;
 }
 
+/// Of the tree around one of its voxels: that of a tube with so much in it. 0 without any.
+double Linker::RadiusByVolume(const Vector3& place) const
+{
+  const std::optional<std::array<int, 3>> at = this->L.Nearest(place);
+  if (!at)
+  {
+    return 0.0;
+  }
+  constexpr double reach = 3.0; // mm
+  int count = 0;
+  this->L.Ball(*at, reach,
+    [&](std::int64_t voxel, const std::array<int, 3>&) { count += this->I.inTree(voxel) ? 1 : 0; });
+  return std::sqrt(count * this->L.VoxelVolume() / (2.0 * reach * M_PI));
+}
+
 /// The odds for a link, as a logarithm.
 /// @param tip  of the tree; null for its wall
 double Linker::Judge(
@@ -620,19 +648,31 @@ double Linker::Judge(
   }
   odds -= link.unseen / 6.0;
   odds -= std::max(0.0, link.unseen - FreeGap) / 8.0;
-  if (tip != nullptr && tip->radius > 0.0 && end.radius > 0.0)
+  link.radiusBefore =
+    tip != nullptr && tip->radius > 0.0 ? tip->radius : this->RadiusByVolume(from);
+  if (link.radiusBefore > 0.0 && end.radius > 0.0)
   {
-    link.radiusBefore = tip->radius;
-    const double ratio = std::log(end.radius / tip->radius);
-    odds -= 2.0 * std::max(0.0, ratio - 0.25) + 1.0 * std::max(0.0, -ratio - 0.7);
-    // Vessels taper: one that ends at full width goes on, and one that begins so comes from somewhere.
-    const double abrupt = std::min(end.radius, tip->radius);
-    odds += 2.0 * std::clamp((abrupt - 0.6) / 0.6, 0.0, 1.0);
+    const double ratio = std::log(end.radius / link.radiusBefore);
+    odds -= std::max(0.0, -ratio - 0.7);
+    if (tip != nullptr)
+    {
+      odds -= 2.0 * std::max(0.0, ratio - 0.25);
+      // Vessels taper: one that ends at full width goes on, and one that begins so comes from somewhere.
+      const double abrupt = std::min(end.radius, link.radiusBefore);
+      odds += 2.0 * std::clamp((abrupt - 0.6) / 0.6, 0.0, 1.0);
+    }
+    else
+    {
+      // A side branch is no wider than what it leaves.
+      odds -= 5.0 * std::max(0.0, ratio - 0.1);
+    }
   }
   if (tip != nullptr)
   {
     const double brighter = end.lumen - tip->lumen;
     odds -= 3.0 * std::max(0.0, brighter - 0.3) + 2.0 * std::max(0.0, -brighter - 0.5);
+    // What is wide enough to show its blood, and shows much less of it, is a vein.
+    odds -= end.radius > 0.8 ? 5.0 * std::max(0.0, -brighter - 0.3) : 0.0;
   }
   link.radiusBehind = end.radius;
   link.pieceLength = orphan.length;
@@ -678,8 +718,15 @@ std::vector<VesselLink> Linker::Run(
       const auto consider = [&](const Vector3& target, double within, const VesselEnd* tip)
       {
         VesselLink link;
-        if (!this->Way(orphan.piece, end, target, within, link) &&
-          (tip == nullptr || !this->Curve(end, *tip, link)))
+        const bool way = this->Way(orphan.piece, end, target, within, link);
+        // Where hardly anything is seen, the cheapest way follows what is no vessel.
+        VesselLink curve;
+        if (tip != nullptr && (!way || link.unseen > 0.5 * link.length) &&
+          this->Curve(end, *tip, curve))
+        {
+          link = std::move(curve);
+        }
+        else if (!way)
         {
           return;
         }
@@ -688,9 +735,6 @@ std::vector<VesselLink> Linker::Run(
           orphan.growth[e] = this->Growth(orphan.piece, end);
         }
         const double odds = this->Judge(orphan, e, tip, link);
-        if (getenv("LINKDEBUG2"))
-          fprintf(stderr, "   odds %.2f length %.1f unseen %.1f growth %.2f lumen %.2f\n", odds,
-            link.length, link.unseen, orphan.growth[e], orphan.ends[e].lumen); // DEBUG
         if (odds > bestOdds)
         {
           bestOdds = odds;
@@ -701,14 +745,6 @@ std::vector<VesselLink> Linker::Run(
       {
         const Vector3 chord = tip.position - end.position;
         const double gap = chord.norm();
-        if (getenv("LINKDEBUG2") && gap < 25)
-          fprintf(stderr,
-            "  cand orphan %zu end %zu (%.0f %.0f %.0f) tip (%.0f %.0f %.0f) gap %.1f angles %.2f "
-            "%.2f r %.2f %.2f\n",
-            orphan.piece.Size(), e, end.position[0], end.position[1], end.position[2],
-            tip.position[0], tip.position[1], tip.position[2], gap,
-            Angle(end.outwards, chord / gap), Angle(tip.outwards, -chord / gap), end.radius,
-            tip.radius); // DEBUG
         if (gap > this->Settings.longestGap ||
           (gap > 4.0 &&
             (Angle(end.outwards, chord / gap) > 1.2 || Angle(tip.outwards, -chord / gap) > 1.2)))
@@ -747,19 +783,6 @@ std::vector<VesselLink> Linker::Run(
       }
     }
     best.confidence = 1.0 / (1.0 + std::exp(-bestOdds));
-    if (getenv("LINKDEBUG"))                      // DEBUG
-    {                                             // DEBUG
-      const Vector3 c = orphan.piece.Position(0); // DEBUG
-      fprintf(stderr,
-        "orphan n=%zu len=%.1f ends=%zu at %.0f %.0f %.0f odds=%.2f gap=%.1f unseen=%.1f r "
-        "%.2f>%.2f growth %.2f from %.0f %.0f %.0f\n", // DEBUG
-        orphan.piece.Size(), orphan.length, orphan.ends.size(), c[0], c[1], c[2], bestOdds,
-        best.length, best.unseen, best.radiusBefore, best.radiusBehind, // DEBUG
-        *std::max_element(orphan.growth.begin(), orphan.growth.end()),
-        best.points.empty() ? 0.0 : best.points[0][0],
-        best.points.empty() ? 0.0 : best.points[0][1],
-        best.points.empty() ? 0.0 : best.points[0][2]); // DEBUG
-    }                                                   // DEBUG
     if (best.confidence >= this->Settings.leastConfidence)
     {
       links.push_back(std::move(best));

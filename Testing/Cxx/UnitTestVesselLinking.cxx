@@ -1,0 +1,261 @@
+// Pieces of tube behind gaps: what belongs to the tree is linked where it runs, what does not is not.
+
+#include "CenterlineExtraction.h"
+#include "MultiscaleVesselness.h"
+#include "VesselSegmentation.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+using namespace coronary;
+
+namespace
+{
+constexpr double Fat = -80.0;
+constexpr double Tissue = 50.0;
+constexpr double Blood = 400.0;
+constexpr double Blur = 0.35; // mm
+
+/// Signed distance to a wall in mm, negative inside.
+using Distance = std::function<double(const Vector3&)>;
+
+/// A straight tube with round ends; its radius changes evenly.
+Distance Tube(const Vector3& from, const Vector3& to, double radius, double endRadius)
+{
+  return [=](const Vector3& p)
+  {
+    const Vector3 axis = to - from;
+    const double t = std::clamp((p - from).dot(axis) / axis.squaredNorm(), 0.0, 1.0);
+    return (p - from - t * axis).norm() - (radius + t * (endRadius - radius));
+  };
+}
+
+Distance Tube(const Vector3& from, const Vector3& to, double radius)
+{
+  return Tube(from, to, radius, radius);
+}
+
+/// An image of blood in fat, and what the stages make of it. The tree begins at (2, 0, 0) and runs along x.
+struct Scene
+{
+  ImageGrid grid;
+  std::vector<float> values;
+  std::vector<float> vesselness;
+  VesselSegmentationSettings settings;
+
+  explicit Scene(const std::vector<Distance>& bodies)
+  {
+    grid.spacing = Vector3(0.5, 0.5, 0.5);
+    grid.origin = Vector3(-6.0, -14.0, -12.0);
+    grid.extent = { 0, 179, 0, 91, 0, 47 };
+    const int nx = 180;
+    const int ny = 92;
+    values.resize(static_cast<std::size_t>(nx) * ny * 48);
+    ParallelFor(static_cast<std::int64_t>(values.size()), 4096,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t p = first; p < last; ++p)
+        {
+          const Vector3 place = grid.IndexToWorld(
+            static_cast<int>(p % nx), static_cast<int>(p / nx % ny), static_cast<int>(p / nx / ny));
+          double empty = 1.0;
+          for (const Distance& body : bodies)
+          {
+            empty *= 1.0 - 0.5 * std::erfc(body(place) / (std::sqrt(2.0) * Blur));
+          }
+          values[static_cast<std::size_t>(p)] =
+            static_cast<float>(Fat + (Blood - Fat) * (1.0 - empty));
+        }
+      });
+    VesselnessSettings frangi;
+    frangi.sigmas = VesselnessScales(0.5, 2.5, 5, true);
+    frangi.c = 100.0;
+    vesselness.resize(values.size());
+    MultiscaleVesselness(frangi, grid.spacing, grid.extent)
+      .Compute({ values.data(), grid.extent }, grid.extent, nullptr,
+        { vesselness.data(), nullptr, nullptr });
+    settings.window = BloodWindow{ Tissue, Blood };
+  }
+
+  VesselSegmentationResult Run() const
+  {
+    return SegmentVessels(
+      { values.data(), grid }, vesselness.data(), { { Vector3(2.0, 0.0, 0.0) } }, settings);
+  }
+  /// Voxels of the mask that a condition holds for.
+  int Count(const VesselSegmentationResult& result,
+    const std::function<bool(const Vector3&)>& condition) const
+  {
+    int count = 0;
+    for (std::size_t p = 0; p < result.mask.size(); ++p)
+    {
+      const auto v = static_cast<int>(p);
+      count +=
+        result.mask[p] != 0 && condition(grid.IndexToWorld(v % 180, v / 180 % 92, v / 180 / 92))
+        ? 1
+        : 0;
+    }
+    return count;
+  }
+};
+
+bool Behind(const Vector3& p)
+{
+  return p[0] > 48.0;
+}
+
+TEST(VesselLinking, GoesOnBehindAnOcclusion)
+{
+  Scene scene({ Tube({ 0, 0, 0 }, { 30, 0, 0 }, 1.4), Tube({ 42, 0, 0 }, { 78, 0, 0 }, 1.4) });
+  const VesselSegmentationResult result = scene.Run();
+  ASSERT_EQ(result.links.size(), 1U);
+  const VesselLink& link = result.links.front();
+  EXPECT_GE(link.confidence, 0.7);
+  EXPECT_GT(link.unseen, 6.0);
+  EXPECT_NEAR(link.length, 12.0, 4.0);
+  for (const Vector3& p : link.points)
+  {
+    EXPECT_LT(std::hypot(p[1], p[2]), 1.0);
+  }
+  EXPECT_NEAR(link.radiusBefore, 1.4, 0.3);
+  EXPECT_NEAR(link.radiusBehind, 1.4, 0.3);
+  EXPECT_GT(scene.Count(result, Behind), 1000);
+
+  scene.settings.crossLesions = false;
+  const VesselSegmentationResult without = scene.Run();
+  EXPECT_TRUE(without.links.empty());
+  EXPECT_EQ(scene.Count(without, Behind), 0);
+}
+
+TEST(VesselLinking, FollowsTheVesselsBend)
+{
+  // A circle of 40 mm radius; 14 mm of it are closed.
+  const auto at = [](double angle)
+  { return Vector3(40.0 * std::sin(angle), 40.0 * (1.0 - std::cos(angle)), 0.0); };
+  std::vector<Distance> bodies;
+  for (double angle = 0.0; angle < 1.3; angle += 0.02)
+  {
+    if (angle < 0.5 || angle > 0.85)
+    {
+      bodies.push_back(Tube(at(angle), at(angle + 0.02), 1.5));
+    }
+  }
+  const VesselSegmentationResult result = Scene(bodies).Run();
+  ASSERT_EQ(result.links.size(), 1U);
+  for (const Vector3& p : result.links.front().points)
+  {
+    EXPECT_LT(std::abs((p - Vector3(0.0, 40.0, 0.0)).norm() - 40.0), 1.0);
+    EXPECT_LT(std::abs(p[2]), 1.0);
+  }
+}
+
+TEST(VesselLinking, AThinLumenIsSeen)
+{
+  // Blurred so much that a fifth of its contrast is left on its axis.
+  const Distance channel = Tube({ 30, 0, 0 }, { 40, 0, 0 }, -0.3);
+  const VesselSegmentationResult result =
+    Scene({ Tube({ 0, 0, 0 }, { 30, 0, 0 }, 1.4), channel, Tube({ 40, 0, 0 }, { 78, 0, 0 }, 1.4) })
+      .Run();
+  ASSERT_EQ(result.links.size(), 1U);
+  EXPECT_LT(result.links.front().unseen, 2.0);
+  EXPECT_GE(result.links.front().confidence, 0.8);
+}
+
+TEST(VesselLinking, WhatRunsBesideIsAnother)
+{
+  const Scene scene(
+    { Tube({ 0, 0, 0 }, { 40, 0, 0 }, 1.4), Tube({ 15, 7, 0 }, { 78, 7, 0 }, 1.4) });
+  const VesselSegmentationResult result = scene.Run();
+  EXPECT_TRUE(result.links.empty());
+  EXPECT_EQ(scene.Count(result, [](const Vector3& p) { return p[1] > 4.0; }), 0);
+}
+
+TEST(VesselLinking, WhatPointsElsewhereIsAnother)
+{
+  const Scene scene(
+    { Tube({ 0, 0, 0 }, { 30, 0, 0 }, 1.4), Tube({ 44, -10, 0 }, { 44, 28, 0 }, 1.4) });
+  const VesselSegmentationResult result = scene.Run();
+  EXPECT_TRUE(result.links.empty());
+  EXPECT_EQ(scene.Count(result, [](const Vector3& p) { return p[0] > 40.0; }), 0);
+}
+
+TEST(VesselLinking, NotThroughAChamber)
+{
+  const Scene scene({ Tube({ 0, 0, 0 }, { 26, 0, 0 }, 1.4), Tube({ 48, 0, 0 }, { 78, 0, 0 }, 1.4),
+    [](const Vector3& p) { return (p - Vector3(37.0, 0.0, 0.0)).norm() - 8.0; } });
+  const VesselSegmentationResult result = scene.Run();
+  EXPECT_TRUE(result.links.empty());
+  EXPECT_EQ(scene.Count(result, Behind), 0);
+}
+
+TEST(VesselLinking, VesselsDoNotWidenAwayFromTheHeart)
+{
+  const auto scene = [](double begin, double end)
+  {
+    return Scene(
+      { Tube({ 0, 0, 0 }, { 30, 0, 0 }, 1.0), Tube({ 38, 0, 0 }, { 80, 0, 0 }, begin, end) })
+      .Run()
+      .links.size();
+  };
+  EXPECT_EQ(scene(1.0, 0.7), 1U);
+  EXPECT_EQ(scene(0.8, 2.6), 0U);
+}
+
+TEST(VesselLinking, NotAcrossMoreThanTheLongestGap)
+{
+  Scene scene({ Tube({ 0, 0, 0 }, { 30, 0, 0 }, 1.4), Tube({ 42, 0, 0 }, { 78, 0, 0 }, 1.4) });
+  scene.settings.longestGap = 8.0;
+  EXPECT_TRUE(scene.Run().links.empty());
+  scene.settings.longestGap = 50.0;
+  EXPECT_THROW(scene.Run(), std::invalid_argument);
+}
+
+TEST(VesselLinking, CenterlinesSayWhatTheyDidNotSee)
+{
+  const Scene scene(
+    { Tube({ 0, 0, 0 }, { 30, 0, 0 }, 1.4), Tube({ 42, 0, 0 }, { 78, 0, 0 }, 1.4) });
+  const VesselSegmentationResult segmentation = scene.Run();
+  ASSERT_EQ(segmentation.links.size(), 1U);
+  const ScalarImage image{ scene.values.data(), scene.grid };
+  CenterlineInput input;
+  input.grid = scene.grid;
+  input.speed = scene.vesselness.data();
+  input.mask = segmentation.mask.data();
+  input.intensity = &image;
+  input.seeds = { Vector3(2.0, 0.0, 0.0) };
+  input.bridges.assign(segmentation.links.begin(), segmentation.links.end());
+  const CenterlineTree tree = ExtractCenterlines(input, {}).tree;
+  ASSERT_EQ(tree.bridged.size(), tree.points.size());
+  ASSERT_EQ(tree.bridgeConfidence.size(), tree.points.size());
+  double farthest = 0.0;
+  int guessed = 0;
+  for (std::size_t p = 0; p < tree.points.size(); ++p)
+  {
+    const double x = tree.points[p][0];
+    farthest = std::max(farthest, x);
+    EXPECT_LT(std::hypot(tree.points[p][1], tree.points[p][2]), 0.6);
+    if (x > 33.0 && x < 39.0)
+    {
+      EXPECT_EQ(tree.bridged[p], 1) << x;
+      ++guessed;
+    }
+    if (x < 28.0 || x > 44.0)
+    {
+      EXPECT_EQ(tree.bridged[p], 0) << x;
+    }
+    if (x < 28.0)
+    {
+      EXPECT_EQ(tree.bridgeConfidence[p], 1.0);
+    }
+    if (x > 44.0)
+    {
+      EXPECT_EQ(tree.bridgeConfidence[p], segmentation.links.front().confidence);
+    }
+  }
+  EXPECT_GT(farthest, 75.0);
+  EXPECT_GT(guessed, 10);
+}
+}
