@@ -6,6 +6,7 @@
 #include "FastMarching.h"
 #include "LumenMeasurement.h"
 #include "ThinBranches.h"
+#include "VeinRejection.h"
 #include "VoxelRegion.h"
 
 #include <algorithm>
@@ -191,11 +192,14 @@ constexpr double LeastTurn = 0.35;
 class Extractor
 {
 public:
-  /// @param given  the same input in world coordinates, for messages
+  /// @param given     the same input in world coordinates, for messages
+  /// @param excluded  voxels that are no artery; empty: none are known
   Extractor(const CenterlineInput& input, const CenterlineInput& given,
-    const CenterlineSettings& settings, const ProgressCallback& progress)
+    const std::vector<unsigned char>& excluded, const CenterlineSettings& settings,
+    const ProgressCallback& progress)
     : Input(input)
     , Given(given)
+    , Excluded(excluded)
     , Settings(settings)
     , Progress(progress)
     , Start(std::chrono::steady_clock::now())
@@ -209,6 +213,10 @@ public:
   }
 
   CenterlineResult Run();
+
+  /// After Run: branches of its tree that are veins are added to the excluded voxels, and to what was rejected.
+  /// @returns whether there is one
+  bool ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins) const;
 
 private:
   // Places.
@@ -261,6 +269,7 @@ private:
   void SmoothRadii(Course& course) const;
   void Calibrate(const Course& course);
   void CorrectRadii();
+  bool IsExcluded(const std::vector<Vector3>& points) const;
   void MarkCrossings(Course& course) const;
   void MarkBridged();
   std::size_t SeenUpTo(const Course& course, double parentRadius) const;
@@ -293,6 +302,7 @@ private:
 
   const CenterlineInput& Input;
   const CenterlineInput& Given;
+  const std::vector<unsigned char>& Excluded;
   const CenterlineSettings& Settings;
   const ProgressCallback& Progress;
   std::chrono::steady_clock::time_point Start;
@@ -488,6 +498,7 @@ void Extractor::MakeRegion()
       {
         const std::size_t v = row + static_cast<std::size_t>(i);
         flags[i] = (mask == nullptr || mask[v] != 0) && speed[v] > threshold &&
+          (this->Excluded.empty() || this->Excluded[v] == 0) &&
           (!gate ||
             this->Image->At(this->Input.grid.IndexToWorld(i + e[0], j, k)) >
               this->IntensityThreshold);
@@ -1620,6 +1631,99 @@ bool Extractor::ThinBranchesFor(ThinBranchSettings& settings) const
   return true;
 }
 
+/// Whether a way leads into what is known to be no artery: for a quarter of it.
+bool Extractor::IsExcluded(const std::vector<Vector3>& points) const
+{
+  if (this->Excluded.empty())
+  {
+    return false;
+  }
+  const auto inside = std::count_if(points.begin(), points.end(),
+    [&](const Vector3& point)
+    {
+      const Vector3 index = this->ToIndex(point);
+      return this->InImage(index) &&
+        this->Excluded[this->Offset(static_cast<int>(std::lround(index[0])),
+          static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])))] != 0;
+    });
+  return 4 * static_cast<std::size_t>(inside) > points.size();
+}
+
+bool Extractor::ExcludeVeins(
+  std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins) const
+{
+  if (!this->Input.intensity || !this->Calibrated)
+  {
+    return false;
+  }
+  const CenterlineTree& tree = this->Result.tree;
+  const std::vector<VeinBranch> found =
+    FindVeins(tree, *this->Image, this->Lumen.reference, this->Blur);
+  if (found.empty())
+  {
+    return false;
+  }
+  excluded.resize(static_cast<std::size_t>(this->Size[0]) * this->Size[1] * this->Size[2], 0);
+  // In units of the radius the nearest lumen has a voxel.
+  const auto mark = [&](std::size_t p, unsigned char value)
+  {
+    const Vector3 centre = this->ToIndex(tree.points[p]);
+    const double reach = value != 0 ? 1.4 * tree.radius[p] + this->Voxel : tree.radius[p];
+    const std::array<int, 6>& e = this->Input.grid.extent;
+    int range[6];
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const double steps = reach / this->Spacing[axis];
+      range[2 * axis] = std::max(e[2 * axis], static_cast<int>(std::ceil(centre[axis] - steps)));
+      range[2 * axis + 1] =
+        std::min(e[2 * axis + 1], static_cast<int>(std::floor(centre[axis] + steps)));
+    }
+    for (int k = range[4]; k <= range[5]; ++k)
+    {
+      for (int j = range[2]; j <= range[3]; ++j)
+      {
+        for (int i = range[0]; i <= range[1]; ++i)
+        {
+          if ((Vector3(i, j, k) - centre).cwiseProduct(this->Spacing).norm() <= reach)
+          {
+            excluded[this->Offset(i, j, k)] = value;
+          }
+        }
+      }
+    }
+  };
+  std::vector<char> isVein(tree.branches.size(), 0);
+  for (const VeinBranch& vein : found)
+  {
+    for (std::size_t b = 0; b < tree.branches.size(); ++b)
+    {
+      const CenterlineTree::Branch& branch = tree.branches[b];
+      if (branch.groupId == vein.groupId)
+      {
+        isVein[b] = 1;
+        veins.push_back({ tree.points[static_cast<std::size_t>(branch.points.front())],
+          branch.length, vein.probability });
+        for (const std::int64_t p : branch.points)
+        {
+          mark(static_cast<std::size_t>(p), 1);
+        }
+      }
+    }
+  }
+  // What the arteries' own lumens cover stays theirs.
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    for (const std::int64_t p : tree.branches[b].points)
+    {
+      if (isVein[b] == 0)
+      {
+        mark(static_cast<std::size_t>(p), 0);
+      }
+    }
+  }
+  return true;
+}
+
 /// What is too thin for the region, by the image alone.
 void Extractor::FollowThinBranches()
 {
@@ -1639,7 +1743,7 @@ void Extractor::FollowThinBranches()
         [&](const Vector3& other)
         { return (other - point).squaredNorm() < 4.0 * this->Voxel * this->Voxel; });
     }
-    if (2 * known > branch.points.size())
+    if (2 * known > branch.points.size() || this->IsExcluded(branch.points))
     {
       continue;
     }
@@ -1664,7 +1768,7 @@ void Extractor::LengthenTips()
   const std::vector<TipPath> paths = FollowTips(*this->Image, this->Tree, settings);
   for (std::size_t b = 0; b < paths.size(); ++b)
   {
-    if (paths[b].points.empty())
+    if (paths[b].points.empty() || this->IsExcluded(paths[b].points))
     {
       continue;
     }
@@ -2224,7 +2328,28 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
     intensity.grid.direction = turn * intensity.grid.direction;
     framed.intensity = &intensity;
   }
-  CenterlineResult result = Extractor(framed, input, settings, progress).Run();
+  // A vein that was followed is closed, and the trees are made anew: what was entered through it is entered where it
+  // leaves its artery.
+  std::vector<unsigned char> excluded;
+  std::vector<RejectedVein> veins;
+  CenterlineResult result;
+  constexpr int rounds = 3;
+  for (int round = 0; round <= rounds; ++round)
+  {
+    std::vector<unsigned char> more = excluded;
+    Extractor extractor(framed, input, excluded, settings, progress);
+    result = extractor.Run();
+    if (round == rounds || !extractor.ExcludeVeins(more, veins))
+    {
+      break;
+    }
+    excluded = std::move(more);
+  }
+  for (RejectedVein& vein : veins)
+  {
+    vein.position = origin + input.grid.direction * vein.position;
+  }
+  result.veins = std::move(veins);
   for (Vector3& point : result.tree.points)
   {
     point = origin + input.grid.direction * point;

@@ -95,12 +95,21 @@ struct CenterlineBifurcation
   std::vector<int> daughterGroupIds;
 };
 
+/// What touched a tree and was taken for a vein: it was left out.
+struct RejectedVein
+{
+  Vector3 position = Vector3::Zero(); ///< mm, where it touched
+  double length = 0.0;                ///< mm
+  double probability = 0.0;           ///< 0.5 to 1
+};
+
 struct CenterlineResult
 {
   CenterlineTree tree;                ///< split; treeId is the seed's index
   std::vector<CenterlineEnd> seeds;   ///< one for each seed
   std::vector<CenterlineEnd> targets; ///< one for each target
   std::vector<CenterlineBifurcation> bifurcations;
+  std::vector<RejectedVein> veins;
   std::vector<std::string> messages; ///< what a user should know
   bool complete = true;              ///< false: stopped by a limit
   std::int64_t regionVoxels = 0;

@@ -486,6 +486,22 @@ void vtkFastMarchingCenterline::Execute(
     treeOutput->GetPointData(), names::Bridged, tree.bridged);
   vtkCoronary::AddArray<vtkDoubleArray>(
     treeOutput->GetPointData(), names::BridgeConfidence, tree.bridgeConfidence);
+  vtkNew<vtkDoubleArray> veinPositions;
+  veinPositions->SetName(names::VeinPositions);
+  veinPositions->SetNumberOfComponents(3);
+  std::vector<double> veinLengths;
+  std::vector<double> veinProbabilities;
+  for (const coronary::RejectedVein& vein : result.veins)
+  {
+    veinPositions->InsertNextTuple(vein.position.data());
+    veinLengths.push_back(vein.length);
+    veinProbabilities.push_back(vein.probability);
+  }
+  treeOutput->GetFieldData()->AddArray(veinPositions);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    treeOutput->GetFieldData(), names::VeinLengths, veinLengths);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    treeOutput->GetFieldData(), names::VeinProbabilities, veinProbabilities);
   vtkCellData* cells = treeOutput->GetCellData();
   AddBranchValues<vtkIntArray>(
     cells, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });

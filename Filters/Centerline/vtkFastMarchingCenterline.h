@@ -31,7 +31,8 @@
  *   way across a lesion that the mask's field data describe), `BridgeConfidence` (double, 0 to 1: that what
  *   is behind such ways belongs to the tree; 1 before the first). Cell data `GroupIds`,
  *   `ParentGroupIds` (-1 at a root), `TreeIds` (index of the seed; all int), `Length` (double, mm),
- *   `Tortuosity` (double, length / chord - 1).
+ *   `Tortuosity` (double, length / chord - 1). Field data `VeinPositions` (double[3], mm), `VeinLengths`
+ *   (double, mm), `VeinProbabilities` (double): what touched the trees, was taken for a vein, and left out.
  * - 1, vtkPolyData: VMTK's form: for each tip or target one line from its root for each piece between bifurcations,
  *   proximal pieces repeated. Point data as output 0; cell data `CenterlineIds`, `TractIds`,
  *   `GroupIds`, `Blanking` (all int; Blanking is 0: bifurcations are points here).

@@ -31,10 +31,14 @@ constexpr const char* VesselMask = "VesselMask";               ///< unsigned cha
 constexpr const char* VesselProbability = "VesselProbability"; ///< float, 0 to 1
 // Segmentation, field data.
 constexpr const char* BloodWindow = "BloodWindow"; ///< double, 2 values: tissue, blood
-
 constexpr const char* BridgePoints = "BridgePoints"; ///< double[4], mm and number of the bridge
 constexpr const char* BridgeConfidences = "BridgeConfidences"; ///< double, 0 to 1, one a bridge
 constexpr const char* BridgeUnseen = "BridgeUnseen"; ///< double, mm without a tube, one a bridge
+
+// Centerline tree, field data: what touched it and was left out.
+constexpr const char* VeinPositions = "VeinPositions";         ///< double[3], mm
+constexpr const char* VeinLengths = "VeinLengths";             ///< double, mm
+constexpr const char* VeinProbabilities = "VeinProbabilities"; ///< double, 0.5 to 1
 
 // Centerline tree, point data.
 constexpr const char* Bridged = "Bridged"; ///< unsigned char, 1: not seen, guessed across a lesion
