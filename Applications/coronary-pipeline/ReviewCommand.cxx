@@ -1,0 +1,459 @@
+#include "Command.h"
+
+#include "AtomicFile.h"
+#include "Evaluation.h"
+#include "Interruption.h"
+#include "MovingModel.h"
+#include "OptionChecks.h"
+#include "ProgressDisplay.h"
+#include "Ranks.h"
+#include "StagedFolder.h"
+#include "WebReview.h"
+#include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
+#include "vtkRunResult.h"
+#include "vtkVesselPictures.h"
+#include "vtkWebReview.h"
+
+#include "vtkImageData.h"
+#include "vtkPolyData.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+namespace
+{
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// A phase that more of the tree was lost in was not tracked really.
+constexpr double LeastTrackedShare = 0.5;
+constexpr double SameTime = 1e-3;
+
+bool IsFile(const fs::path& path)
+{
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+struct ReviewJob
+{
+  std::string result;
+  std::string output;
+  std::vector<std::string> images;
+  std::string name;
+  ViewSettings views;
+  bool noPictures = false;
+  std::int64_t webTriangles = 0; ///< 0: as many as suit the number of phases
+  int threads = 0;
+  bool quiet = false;
+
+  void Declare(CLI::App& app);
+  void Run() const;
+
+private:
+  /// A run as it is looked at.
+  struct Look
+  {
+    RunResult result;
+    std::vector<VesselView> vessels;
+    CaseEvaluation phases; ///< without measures
+    int reference = 0;     ///< index of the phase that the images are of
+    MovingModel model;     ///< empty without motion
+    ResultImage image;
+    ResultImage calcium;
+    std::string withoutPictures;
+  };
+  Look Read(vtkMessageTrap& messages) const;
+  void FindPhases(Look& look) const;
+  ResultScene SceneOf(const Look& look, vtkMessageTrap& messages) const;
+  Json Draw(
+    const Look& look, WebReview& review, StagedFolder& folder, ProgressDisplay& progress) const;
+  Json Describe(const Look& look) const;
+  std::string Folder() const;
+};
+
+void ReviewJob::Declare(CLI::App& app)
+{
+  app.add_option("RUN,--run", this->result, "Folder that run wrote, with a centerline at least")
+    ->type_name("DIR")
+    ->required();
+  app
+    .add_option("--output", this->output,
+      "Folder to write to; made when it does not exist; by default RUN/review")
+    ->type_name("DIR");
+  app
+    .add_option("--image", this->images,
+      "The gated images, as of run, where they are no longer at the place that the run read them "
+      "from")
+    ->type_name("PATH");
+  app.add_option("--name", this->name, "Name of the case; by default that of the folder")
+    ->type_name("TEXT");
+  app
+    .add_option("--half-width", this->views.halfWidth,
+      "Width of the straightened views to each side of the vessel's axis, mm")
+    ->check(Within(2.0, 40.0))
+    ->type_name("MM")
+    ->capture_default_str();
+  app.add_option("--thickness", this->views.thickness, "Thickness of the slabs, mm")
+    ->check(Within(0.5, 50.0))
+    ->type_name("MM")
+    ->capture_default_str();
+  app
+    .add_option("--window", this->views.window,
+      "Image values that are black and white; by default -150 and twice the lumen's, at least 500")
+    ->expected(2)
+    ->check(Within(-1e6, 1e6))
+    ->type_name("VALUE");
+  app.add_flag("--no-pictures", this->noPictures, "Without views of the image");
+  app
+    .add_option("--web-triangles", this->webTriangles,
+      "Triangles of a surface, at most about so many; 0: up to 150000, fewer for more than 20 "
+      "phases")
+    ->check(WholeWithin(0, 10000000))
+    ->type_name("N")
+    ->capture_default_str();
+  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
+    ->check(WholeWithin(0, 1024))
+    ->type_name("N")
+    ->capture_default_str();
+  app.add_flag("--quiet", this->quiet, "No progress and no summary");
+}
+
+std::string ReviewJob::Folder() const
+{
+  return this->output.empty() ? (fs::path(this->result) / "review").string() : this->output;
+}
+
+void ReviewJob::FindPhases(Look& look) const
+{
+  const fs::path folder = this->result;
+  if (IsFile(folder / "motion.pvd") || IsFile(folder / "motion" / "surface.pvd"))
+  {
+    look.model = FindMovingModel(this->result);
+  }
+  const MovingModel& model = look.model;
+  for (std::size_t n = 0; n < model.surfaces.size(); ++n)
+  {
+    PhaseEvaluation phase;
+    phase.phase = static_cast<int>(n);
+    phase.fraction = model.surfaces[n].time;
+    phase.interpolated = model.tracksKnown;
+    for (std::size_t k = 0; k < model.trackedTimes.size(); ++k)
+    {
+      if (std::abs(model.trackedTimes[k] - phase.fraction) <= SameTime)
+      {
+        phase.interpolated = false;
+        phase.lost = k < model.trackedShare.size() && model.trackedShare[k] < LeastTrackedShare;
+      }
+    }
+    const auto away = [&](int index)
+    {
+      return std::abs(
+        look.phases.phases[static_cast<std::size_t>(index)].fraction - look.result.time);
+    };
+    look.phases.phases.push_back(phase);
+    look.reference =
+      away(static_cast<int>(n)) < away(look.reference) ? static_cast<int>(n) : look.reference;
+  }
+  if (look.phases.phases.empty())
+  {
+    PhaseEvaluation phase;
+    phase.fraction = look.result.time;
+    look.phases.phases.push_back(phase);
+  }
+}
+
+ReviewJob::Look ReviewJob::Read(vtkMessageTrap& messages) const
+{
+  Look look;
+  look.result = ReadRunResult(this->result, messages);
+  look.vessels = ViewsOf(look.result);
+  std::error_code error;
+  const fs::path folder = fs::absolute(this->result, error).lexically_normal();
+  look.phases.name = !this->name.empty()
+    ? this->name
+    : (folder.filename().empty() ? folder.parent_path() : folder).filename().string();
+  this->FindPhases(look);
+  if (this->noPictures)
+  {
+    return look;
+  }
+  try
+  {
+    look.image =
+      ReadRunImage(look.result, this->images, messages, [](double) { return Interruption() == 0; });
+    look.calcium = ReadRunCalcium(look.result, messages);
+  }
+  catch (const std::runtime_error& reason)
+  {
+    ThrowIfInterrupted();
+    // What was asked for by name has to be there.
+    if (!this->images.empty())
+    {
+      throw;
+    }
+    look.withoutPictures = std::string("there are no views of the image: ") + reason.what();
+  }
+  return look;
+}
+
+ResultScene ReviewJob::SceneOf(const Look& look, vtkMessageTrap& messages) const
+{
+  ResultScene scene;
+  scene.count = static_cast<int>(look.phases.phases.size());
+  const MovingModel& model = look.model;
+  const std::string surface = (fs::path(this->result) / "surface.vtp").string();
+  if (!model.surfaces.empty())
+  {
+    scene.model = [&](int index)
+    { return ReadPolyData(model.surfaces[static_cast<std::size_t>(index)].path, messages); };
+    scene.centerline = [&](int index)
+    {
+      const TimedFile* file = MovingModel::At(
+        model.centerlines, model.surfaces[static_cast<std::size_t>(index)].time, SameTime);
+      return file ? ReadPolyData(file->path, messages) : vtkSmartPointer<vtkPolyData>();
+    };
+  }
+  else
+  {
+    scene.model = [surface, &messages](int) { return ReadPolyData(surface, messages); };
+    if (!IsFile(surface))
+    {
+      scene.model = nullptr;
+    }
+    scene.centerline = [&look](int) { return look.result.lines; };
+  }
+  // Moved lines have the points of those at rest.
+  const vtkSmartPointer<vtkPolyData> first = scene.centerline(0);
+  if (first && static_cast<std::size_t>(first->GetNumberOfPoints()) == look.result.bridged.size())
+  {
+    scene.guessed = look.result.bridged;
+  }
+  return scene;
+}
+
+Json NamedPicture(
+  const ViewPicture& view, const std::string& name, WebReview& review, StagedFolder& folder)
+{
+  const std::string file = "pictures/" + name + ".png";
+  WriteFileAtomically(folder.Add(file), view.picture.WholePng());
+  Json entry = view.layout;
+  entry["file"] = file;
+  entry["picture"] = review.AddPicture(view.picture.PlainPng());
+  entry["marks"] = review.AddPicture(view.picture.LayerPng());
+  entry["columns"] = view.picture.plain.Width();
+  entry["rows"] = view.picture.plain.Height();
+  return entry;
+}
+
+/// Of a name what file systems take, with a number before it that keeps the order.
+std::string FileStem(std::size_t number, const std::string& name)
+{
+  std::string stem = (number < 9 ? "0" : "") + std::to_string(number + 1) + "-";
+  for (const char c : name)
+  {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
+    const bool capital = c >= 'A' && c <= 'Z';
+    if (plain || capital)
+    {
+      stem += capital ? static_cast<char>(c - 'A' + 'a') : c;
+    }
+    else if (stem.back() != '-')
+    {
+      stem += '-';
+    }
+  }
+  constexpr std::size_t Longest = 60;
+  stem = stem.substr(0, Longest);
+  return stem.back() == '-' ? stem.substr(0, stem.size() - 1) : stem;
+}
+
+double Rounded(double value)
+{
+  return std::round(100.0 * value) / 100.0;
+}
+
+Json DescribeVessel(const VesselView& view)
+{
+  Json entry = { { "name", view.name }, { "group", view.chain.groupId },
+    { "tree", view.chain.treeId }, { "length", Rounded(view.chain.Length()) },
+    { "bridged", Rounded(view.bridged) }, { "interpolated", Rounded(view.interpolated) },
+    { "stenosis", Rounded(view.narrowest) } };
+  entry["pieces"] = Json::array();
+  for (const VesselPiece& piece : view.chain.pieces)
+  {
+    entry["pieces"].push_back(
+      { { "name", piece.name }, { "begin", Rounded(piece.begin) }, { "end", Rounded(piece.end) } });
+  }
+  entry["path"] = Json::array();
+  for (const Vector3& place : view.path)
+  {
+    entry["path"].push_back({ Rounded(place[0]), Rounded(place[1]), Rounded(place[2]) });
+  }
+  return entry;
+}
+
+Json ReviewJob::Describe(const Look& look) const
+{
+  Json run = { { "reference", look.reference }, { "warnings", look.result.Warnings() } };
+  if (!look.withoutPictures.empty())
+  {
+    run["warnings"].push_back(look.withoutPictures);
+  }
+  for (const char* kind : { "trees", "bridges", "lesions", "calcium" })
+  {
+    Json list = look.result.Findings(kind);
+    // A stage may have more to say of a kind than its list.
+    for (const char* inner : { "list", "objects", kind })
+    {
+      if (list.is_object() && list.contains(inner) && list[inner].is_array())
+      {
+        list = Json(list[inner]);
+      }
+    }
+    run[kind] = list.is_array() ? list : Json();
+  }
+  run["stages"] = Json::array();
+  const Json stages = look.result.report.contains("stages") ? look.result.report["stages"] : Json();
+  for (const Json& stage : stages)
+  {
+    if (stage.is_object() && stage.contains("name") && stage.contains("state"))
+    {
+      run["stages"].push_back({ { "name", stage["name"] }, { "state", stage["state"] },
+        { "seconds", stage.contains("seconds") ? stage["seconds"] : Json() } });
+    }
+  }
+  return run;
+}
+
+Json ReviewJob::Draw(
+  const Look& look, WebReview& review, StagedFolder& folder, ProgressDisplay& progress) const
+{
+  Json run = this->Describe(look);
+  const bool draw = look.image.values != nullptr;
+  const auto update = [&](double fraction)
+  {
+    progress.Update(fraction);
+    return Interruption() == 0;
+  };
+  const auto goOn = [](double) { return Interruption() == 0; };
+  std::unique_ptr<VesselPainter> painter;
+  if (draw)
+  {
+    painter = std::make_unique<VesselPainter>(
+      look.result, *look.image.values, look.calcium.values.get(), this->views);
+    run["window"] = { painter->Window().low, painter->Window().high };
+    run["thickness"] = this->views.thickness;
+    run["half_width"] = this->views.halfWidth;
+  }
+  int step = 1;
+  run["vessels"] = Json::array();
+  for (std::size_t n = 0; n < look.vessels.size(); ++n)
+  {
+    const VesselView& view = look.vessels[n];
+    Json entry = DescribeVessel(view);
+    if (draw)
+    {
+      progress.BeginStep(step++, view.name);
+      const std::string stem = FileStem(n, view.name);
+      entry["straightened"] = NamedPicture(painter->Straightened(view, goOn), stem, review, folder);
+      progress.Update(0.5);
+      entry["slab"] = NamedPicture(painter->Slab(view, goOn), stem + "-slab", review, folder);
+    }
+    run["vessels"].push_back(entry);
+  }
+  run["sheets"] = Json::array();
+  for (int direction = 0; draw && direction < 3; ++direction)
+  {
+    const char* sheet = VesselPainter::SheetName(direction);
+    progress.BeginStep(step++, std::string(sheet) + " slabs");
+    Json entry = NamedPicture(
+      painter->Sheet(direction, update), std::string("slabs-") + sheet, review, folder);
+    entry["name"] = sheet;
+    run["sheets"].push_back(entry);
+  }
+  return run;
+}
+
+void ReviewJob::Run() const
+{
+  if (this->views.window.size() == 2 && !(this->views.window[0] < this->views.window[1]))
+  {
+    throw UsageError("--window: the first value must be below the second");
+  }
+  UseThreads(this->threads);
+  vtkMessageTrap messages;
+  StagedFolder folder(this->Folder());
+  std::size_t vessels = 0;
+  std::size_t pictures = 0;
+  std::string without;
+  try
+  {
+    Look look = this->Read(messages);
+    messages.ThrowIfError();
+    const bool draw = look.image.values != nullptr;
+    vessels = look.vessels.size();
+    pictures = draw ? 2 * vessels + 3 : 0;
+    without = look.withoutPictures;
+    ProgressDisplay progress("step", static_cast<int>(1 + (draw ? vessels + 3 : 0)), this->quiet);
+    progress.BeginStep(0, "shapes");
+    WebReview review;
+    const std::int64_t triangles = this->webTriangles > 0
+      ? this->webTriangles
+      : DefaultReviewTriangles(static_cast<std::int64_t>(look.phases.phases.size()));
+    review.Add(look.phases,
+      MakeResultCase(this->SceneOf(look, messages), triangles,
+        [&](double fraction)
+        {
+          progress.Update(fraction);
+          return Interruption() == 0;
+        }));
+    review.SetRun(this->Draw(look, review, folder, progress));
+    messages.ThrowIfError();
+    ThrowIfInterrupted();
+    WriteFileAtomically(folder.Add("review.html"),
+      review.Html(
+        "coronary-pipeline " DYNAMICCORONARY_VERSION, "coronary-pipeline review " + this->result));
+  }
+  catch (const std::runtime_error& error)
+  {
+    ThrowIfInterrupted();
+    throw std::runtime_error(folder.Translate(error.what()));
+  }
+  folder.Commit();
+  messages.PrintWarnings();
+  if (!without.empty())
+  {
+    std::fprintf(stderr, "Warning: %s\n", without.c_str());
+  }
+  if (!this->quiet)
+  {
+    std::printf(
+      "%s: %zu vessels, %zu pictures, review.html\n", this->Folder().c_str(), vessels, pictures);
+  }
+}
+}
+
+Command MakeReviewCommand(CLI::App& program)
+{
+  CLI::App* app = program.add_subcommand(
+    "review", "A run to look at: straightened views and slabs of its vessels, and a page of all");
+  app->footer("Writes DIR/review.html, one file for a web browser, without network; and "
+              "DIR/pictures/ with, for each vessel, NN-NAME.png (straightened) and "
+              "NN-NAME-slab.png, and slabs-axial.png, slabs-coronal.png, slabs-sagittal.png. Needs "
+              "no display.");
+  auto job = std::make_shared<ReviewJob>();
+  job->Declare(*app);
+  return { app, [job] { job->Run(); } };
+}
+}
