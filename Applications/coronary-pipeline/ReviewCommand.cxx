@@ -310,7 +310,7 @@ Json ReviewJob::Describe(const Look& look) const
   {
     run["warnings"].push_back(look.withoutPictures);
   }
-  for (const char* kind : { "trees", "bridges", "lesions", "calcium" })
+  for (const char* kind : { "checks", "bridges", "lesions", "calcium" })
   {
     Json list = look.result.Findings(kind);
     // A stage may have more to say of a kind than its list.

@@ -152,11 +152,12 @@ Sight SightOf(const RunResult& result, std::int64_t point)
                                 : (marked(result.interpolated) ? Sight::Interpolated : Sight::Seen);
 }
 
-double Median(std::vector<double> values)
+/// Of the wide vessels' axes, which the many thin ones must not outnumber.
+double UpperQuartile(std::vector<double> values)
 {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(3 * (values.size() - 1) / 4);
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
 }
 }
 
@@ -190,7 +191,8 @@ std::vector<VesselView> ViewsOf(const RunResult& result)
       if (HasValues(result.stenosis, result))
       {
         const double degree = result.stenosis[static_cast<std::size_t>(chain.points[k])];
-        view.narrowest = std::isfinite(degree) ? std::max(view.narrowest, degree) : view.narrowest;
+        view.narrowest =
+          degree >= ToldNarrowing ? std::max(view.narrowest, degree) : view.narrowest;
       }
     }
     std::vector<Vector3> own;
@@ -224,7 +226,7 @@ GreyWindow WindowOf(const RunResult& result, const ImageInterpolator& image)
   {
     return { -150.0, 850.0 };
   }
-  const double lumen = Median(values);
+  const double lumen = UpperQuartile(values);
   if (lumen > LeastLumen && lumen < GreatestLumen)
   {
     return { -150.0, std::max(500.0, 2.0 * lumen) };
@@ -663,6 +665,21 @@ ViewPicture VesselPainter::Slab(const VesselView& view, const ProgressCallback& 
   return { std::move(picture), PlaneJson(plane) };
 }
 
+bool VesselPainter::Meets(const SlabPlane& plane) const
+{
+  constexpr int Places = 8; // across the picture
+  for (int k = 0; k < (Places + 1) * (Places + 1); ++k)
+  {
+    const double x = double(k % (Places + 1)) / Places * (plane.width - 1);
+    const double y = double(k / (Places + 1)) / Places * (plane.height - 1);
+    if (this->Image.Contains(plane.corner + plane.spacing * (x * plane.right + y * plane.down)))
+    {
+      return true;
+    }
+  }
+  return false;
+}
+
 const char* VesselPainter::SheetName(int direction)
 {
   static const char* const Names[3] = { "axial", "coronal", "sagittal" };
@@ -681,22 +698,32 @@ ViewPicture VesselPainter::Sheet(int direction, const ProgressCallback& progress
     reach = std::max(reach, std::abs(whole.ToPicture(point)[2]));
   }
   const double thickness = this->Settings.thickness;
-  // One more than the trees need, on both sides together.
-  const int wanted = 1 + static_cast<int>(std::ceil(2.0 * reach / thickness));
-  const int count = std::min(wanted, MostSlabs);
+  // As far before and behind the trees as beside them, where the image goes so far.
+  const int all =
+    std::min(MostSlabs, static_cast<int>(std::ceil(2.0 * (reach + SheetMargin) / thickness)));
+  std::vector<SlabPlane> planes;
+  for (int n = 0; n < all; ++n)
+  {
+    // From the viewer away, but axial ones from the head down, as they are read.
+    const double depth = (0.5 * (all - 1) - n) * thickness * (direction == 0 ? -1.0 : 1.0);
+    SlabPlane plane = whole;
+    plane.corner += depth * plane.towards;
+    if (this->Meets(plane))
+    {
+      planes.push_back(plane);
+    }
+  }
+  const int count = std::max(1, static_cast<int>(planes.size()));
   const int rows = (count + SheetColumns - 1) / SheetColumns;
   const int columns = std::min(count, SheetColumns);
   const int gap = 4;
   MarkedPicture picture(columns * (whole.width + gap) - gap, rows * (whole.height + gap) - gap);
   Json tiles = Json::array();
-  for (int n = 0; n < count; ++n)
+  for (int n = 0; n < static_cast<int>(planes.size()); ++n)
   {
-    Report(progress, double(n) / count);
-    // From the viewer away, but axial ones from the head down, as they are read.
-    const double depth = (0.5 * (count - 1) - n) * thickness * (direction == 0 ? -1.0 : 1.0);
-    SlabPlane plane = whole;
-    plane.corner += depth * plane.towards;
-    const GreyPicture slab = ProjectSlab(this->Image, plane, {}, thickness, progress);
+    const SlabPlane& plane = planes[static_cast<std::size_t>(n)];
+    const GreyPicture slab = ProjectSlab(this->Image, plane, {}, thickness,
+      [&](double) { return !progress || progress(double(n) / count); });
     const int x = n % SheetColumns * (plane.width + gap);
     const int y = n / SheetColumns * (plane.height + gap);
     this->DrawCut(picture, slab, x, y);
@@ -710,6 +737,6 @@ ViewPicture VesselPainter::Sheet(int direction, const ProgressCallback& progress
     tile["top"] = y;
     tiles.push_back(tile);
   }
-  return { std::move(picture), { { "tiles", tiles }, { "left_out", wanted - count } } };
+  return { std::move(picture), { { "tiles", tiles } } };
 }
 }

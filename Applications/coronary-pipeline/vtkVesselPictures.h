@@ -49,14 +49,14 @@ struct VesselView
   std::string name;          ///< unique among the vessels
   double bridged = 0.0;      ///< mm of it that were guessed across gaps
   double interpolated = 0.0; ///< mm of it whose radius was interpolated
-  double narrowest = 0.0;    ///< greatest degree of a narrowing, 0 to 1
+  double narrowest = 0.0;    ///< greatest degree of a narrowing of 0.25 or more, to 1; 0: none
   std::vector<Vector3> path; ///< places of it, 1 mm apart from its beginning, without the lead-in
 };
 
 /// The vessels of a run, from the largest tree's beginning on.
 std::vector<VesselView> ViewsOf(const RunResult& result);
 
-/// From well below soft tissue to twice the lumen's median on the axes, where those are Hounsfield units; else from the
+/// From well below soft tissue to twice what the lumen has on the axes (the upper quartile), where those are Hounsfield units; else from the
 /// image's least values.
 GreyWindow WindowOf(const RunResult& result, const ImageInterpolator& image);
 
@@ -93,6 +93,7 @@ private:
   void DrawAttenuation(MarkedPicture& picture, const GreyPicture& cut, int x, int y) const;
   void DrawTree(MarkedPicture& picture, const SlabPlane& plane, const std::vector<float>& depths,
     int x, int y, bool thin) const;
+  bool Meets(const SlabPlane& plane) const;
   unsigned char Grey(float value) const;
 
   const RunResult& Result;

@@ -201,7 +201,8 @@ class Review {
     }
     const distances = known(phase.HD) ? [element('span', {}, [`HD ${written(phase.HD, 2)}  MSD ${written(phase.MSD, 2)} mm`])] : [];
     byId('caption').replaceChildren(element('strong', {}, [`Phase ${phase.phase}`]), ` ${percentOf(phase)} `,
-      element('em', { class: kindOf(phase) }, [kindOf(phase)]), ...distances);
+      // Of a result at rest nothing was tracked.
+      this.compared || this.order.length > 1 ? element('em', { class: kindOf(phase) }, [kindOf(phase)]) : '', ...distances);
     this.plots.forEach((plot) => plot.show(this.phase));
   }
 

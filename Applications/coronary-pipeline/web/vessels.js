@@ -1,6 +1,7 @@
 // What a run says of itself: warnings, what was guessed, findings, and its vessels in the image.
 
 const FINDINGS = [
+  ['checks', 'Checks of the whole tree', 'Nothing was noticed.'],
   ['bridges', 'Guessed across gaps', 'No gap was bridged.'],
   ['lesions', 'Narrowings', 'No narrowing was found.'],
   ['calcium', 'Calcium', 'No calcium was found.'],
@@ -101,7 +102,7 @@ class RunPanel {
     byId('sheets').replaceChildren(...run.sheets.map((one) => this.sheet(one)));
     if (pictured) {
       byId('views-note').textContent = `Two cuts at right angles, ±${run.half_width} mm about the axis, then diameter (mm) and the ` +
-        `image’s values on the axis; beside them a slab of ${run.thickness} mm that follows the vessel. Black ${run.window[0].toFixed(0)}, ` +
+        `image’s values on the axis; below them a slab of ${run.thickness} mm that follows the vessel. Black ${run.window[0].toFixed(0)}, ` +
         `white ${run.window[1].toFixed(0)} (HU). A click shows the place in the model.`;
     }
   }
@@ -121,7 +122,7 @@ class RunPanel {
 
   fillVessels() {
     const head = element('thead', {}, [element('tr', {}, [element('th', { scope: 'col', class: 'text' }, ['Vessel']),
-      ...[['length', 'mm'], ['bridged', 'mm'], ['radius guessed', 'mm'], ['narrowest', '']].map(([name, unit]) =>
+      ...[['length', 'mm'], ['bridged', 'mm'], ['radius guessed', 'mm'], ['narrowing', '']].map(([name, unit]) =>
         element('th', { scope: 'col' }, [name, element('small', {}, [` ${unit}`])]))])]);
     const length = (value) => (value > 0 ? value.toFixed(1) : '–');
     const body = element('tbody');
@@ -216,9 +217,8 @@ class RunPanel {
       }
     });
     this.sheets.push(view);
-    const left = sheet.left_out > 0 ? ` (${sheet.left_out} more are left out)` : '';
     return element('article', {}, [element('h3', {}, [`${sheet.name[0].toUpperCase()}${sheet.name.slice(1)}`,
-      element('small', {}, [` ${sheet.tiles.length} slabs${left}`])]), element('div', { class: 'scroll' }, [view.made])]);
+      element('small', {}, [` ${sheet.tiles.length} slabs`])]), element('div', { class: 'scroll' }, [view.made])]);
   }
 
   /** Pixels of a slab's picture, and mm from its plane. */
