@@ -7,22 +7,19 @@
 #include "OptionChecks.h"
 #include "ProgressDisplay.h"
 #include "Ranks.h"
+#include "RunReview.h"
 #include "StagedFolder.h"
 #include "WebReview.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
-#include "vtkRunResult.h"
-#include "vtkVesselPictures.h"
 #include "vtkWebReview.h"
 
-#include "vtkImageData.h"
 #include "vtkPolyData.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -33,7 +30,6 @@ namespace coronary
 namespace
 {
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 /// A phase that more of the tree was lost in was not tracked really.
 constexpr double LeastTrackedShare = 0.5;
@@ -64,21 +60,14 @@ private:
   /// A run as it is looked at.
   struct Look
   {
-    RunResult result;
-    std::vector<VesselView> vessels;
+    ReviewedRun run;
     CaseEvaluation phases; ///< without measures
     int reference = 0;     ///< index of the phase that the images are of
     MovingModel model;     ///< empty without motion
-    ResultImage image;
-    ResultImage calcium;
-    std::string withoutPictures;
   };
   Look Read(vtkMessageTrap& messages) const;
   void FindPhases(Look& look) const;
   ResultScene SceneOf(const Look& look, vtkMessageTrap& messages) const;
-  Json Draw(
-    const Look& look, WebReview& review, StagedFolder& folder, ProgressDisplay& progress) const;
-  Json Describe(const Look& look) const;
   std::string Folder() const;
 };
 
@@ -159,7 +148,7 @@ void ReviewJob::FindPhases(Look& look) const
     const auto away = [&](int index)
     {
       return std::abs(
-        look.phases.phases[static_cast<std::size_t>(index)].fraction - look.result.time);
+        look.phases.phases[static_cast<std::size_t>(index)].fraction - look.run.result.time);
     };
     look.phases.phases.push_back(phase);
     look.reference =
@@ -168,7 +157,7 @@ void ReviewJob::FindPhases(Look& look) const
   if (look.phases.phases.empty())
   {
     PhaseEvaluation phase;
-    phase.fraction = look.result.time;
+    phase.fraction = look.run.result.time;
     look.phases.phases.push_back(phase);
   }
 }
@@ -176,34 +165,13 @@ void ReviewJob::FindPhases(Look& look) const
 ReviewJob::Look ReviewJob::Read(vtkMessageTrap& messages) const
 {
   Look look;
-  look.result = ReadRunResult(this->result, messages);
-  look.vessels = ViewsOf(look.result);
+  look.run = OpenRun(this->result, this->images, !this->noPictures, messages);
   std::error_code error;
   const fs::path folder = fs::absolute(this->result, error).lexically_normal();
   look.phases.name = !this->name.empty()
     ? this->name
     : (folder.filename().empty() ? folder.parent_path() : folder).filename().string();
   this->FindPhases(look);
-  if (this->noPictures)
-  {
-    return look;
-  }
-  try
-  {
-    look.image =
-      ReadRunImage(look.result, this->images, messages, [](double) { return Interruption() == 0; });
-    look.calcium = ReadRunCalcium(look.result, messages);
-  }
-  catch (const std::runtime_error& reason)
-  {
-    ThrowIfInterrupted();
-    // What was asked for by name has to be there.
-    if (!this->images.empty())
-    {
-      throw;
-    }
-    look.withoutPictures = std::string("there are no views of the image: ") + reason.what();
-  }
   return look;
 }
 
@@ -231,158 +199,16 @@ ResultScene ReviewJob::SceneOf(const Look& look, vtkMessageTrap& messages) const
     {
       scene.model = nullptr;
     }
-    scene.centerline = [&look](int) { return look.result.lines; };
+    scene.centerline = [&look](int) { return look.run.result.lines; };
   }
   // Moved lines have the points of those at rest.
   const vtkSmartPointer<vtkPolyData> first = scene.centerline(0);
-  if (first && static_cast<std::size_t>(first->GetNumberOfPoints()) == look.result.bridged.size())
+  if (first &&
+    static_cast<std::size_t>(first->GetNumberOfPoints()) == look.run.result.bridged.size())
   {
-    scene.guessed = look.result.bridged;
+    scene.guessed = look.run.result.bridged;
   }
   return scene;
-}
-
-Json NamedPicture(
-  const ViewPicture& view, const std::string& name, WebReview& review, StagedFolder& folder)
-{
-  const std::string file = "pictures/" + name + ".png";
-  WriteFileAtomically(folder.Add(file), view.picture.WholePng());
-  Json entry = view.layout;
-  entry["file"] = file;
-  entry["picture"] = review.AddPicture(view.picture.PlainPng());
-  entry["marks"] = review.AddPicture(view.picture.LayerPng());
-  entry["columns"] = view.picture.plain.Width();
-  entry["rows"] = view.picture.plain.Height();
-  return entry;
-}
-
-/// Of a name what file systems take, with a number before it that keeps the order.
-std::string FileStem(std::size_t number, const std::string& name)
-{
-  std::string stem = (number < 9 ? "0" : "") + std::to_string(number + 1) + "-";
-  for (const char c : name)
-  {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
-    const bool capital = c >= 'A' && c <= 'Z';
-    if (plain || capital)
-    {
-      stem += capital ? static_cast<char>(c - 'A' + 'a') : c;
-    }
-    else if (stem.back() != '-')
-    {
-      stem += '-';
-    }
-  }
-  constexpr std::size_t Longest = 60;
-  stem = stem.substr(0, Longest);
-  return stem.back() == '-' ? stem.substr(0, stem.size() - 1) : stem;
-}
-
-double Rounded(double value)
-{
-  return std::round(100.0 * value) / 100.0;
-}
-
-Json DescribeVessel(const VesselView& view)
-{
-  Json entry = { { "name", view.name }, { "group", view.chain.groupId },
-    { "tree", view.chain.treeId }, { "length", Rounded(view.chain.Length()) },
-    { "bridged", Rounded(view.bridged) }, { "interpolated", Rounded(view.interpolated) },
-    { "stenosis", Rounded(view.narrowest) } };
-  entry["pieces"] = Json::array();
-  for (const VesselPiece& piece : view.chain.pieces)
-  {
-    entry["pieces"].push_back(
-      { { "name", piece.name }, { "begin", Rounded(piece.begin) }, { "end", Rounded(piece.end) } });
-  }
-  entry["path"] = Json::array();
-  for (const Vector3& place : view.path)
-  {
-    entry["path"].push_back({ Rounded(place[0]), Rounded(place[1]), Rounded(place[2]) });
-  }
-  return entry;
-}
-
-Json ReviewJob::Describe(const Look& look) const
-{
-  Json run = { { "reference", look.reference }, { "warnings", look.result.Warnings() } };
-  if (!look.withoutPictures.empty())
-  {
-    run["warnings"].push_back(look.withoutPictures);
-  }
-  for (const char* kind : { "checks", "bridges", "lesions", "calcium" })
-  {
-    Json list = look.result.Findings(kind);
-    // A stage may have more to say of a kind than its list.
-    for (const char* inner : { "list", "objects", kind })
-    {
-      if (list.is_object() && list.contains(inner) && list[inner].is_array())
-      {
-        list = Json(list[inner]);
-      }
-    }
-    run[kind] = list.is_array() ? list : Json();
-  }
-  run["stages"] = Json::array();
-  const Json stages = look.result.report.contains("stages") ? look.result.report["stages"] : Json();
-  for (const Json& stage : stages)
-  {
-    if (stage.is_object() && stage.contains("name") && stage.contains("state"))
-    {
-      run["stages"].push_back({ { "name", stage["name"] }, { "state", stage["state"] },
-        { "seconds", stage.contains("seconds") ? stage["seconds"] : Json() } });
-    }
-  }
-  return run;
-}
-
-Json ReviewJob::Draw(
-  const Look& look, WebReview& review, StagedFolder& folder, ProgressDisplay& progress) const
-{
-  Json run = this->Describe(look);
-  const bool draw = look.image.values != nullptr;
-  const auto update = [&](double fraction)
-  {
-    progress.Update(fraction);
-    return Interruption() == 0;
-  };
-  const auto goOn = [](double) { return Interruption() == 0; };
-  std::unique_ptr<VesselPainter> painter;
-  if (draw)
-  {
-    painter = std::make_unique<VesselPainter>(
-      look.result, *look.image.values, look.calcium.values.get(), this->views);
-    run["window"] = { painter->Window().low, painter->Window().high };
-    run["thickness"] = this->views.thickness;
-    run["half_width"] = this->views.halfWidth;
-  }
-  int step = 1;
-  run["vessels"] = Json::array();
-  for (std::size_t n = 0; n < look.vessels.size(); ++n)
-  {
-    const VesselView& view = look.vessels[n];
-    Json entry = DescribeVessel(view);
-    if (draw)
-    {
-      progress.BeginStep(step++, view.name);
-      const std::string stem = FileStem(n, view.name);
-      entry["straightened"] = NamedPicture(painter->Straightened(view, goOn), stem, review, folder);
-      progress.Update(0.5);
-      entry["slab"] = NamedPicture(painter->Slab(view, goOn), stem + "-slab", review, folder);
-    }
-    run["vessels"].push_back(entry);
-  }
-  run["sheets"] = Json::array();
-  for (int direction = 0; draw && direction < 3; ++direction)
-  {
-    const char* sheet = VesselPainter::SheetName(direction);
-    progress.BeginStep(step++, std::string(sheet) + " slabs");
-    Json entry = NamedPicture(
-      painter->Sheet(direction, update), std::string("slabs-") + sheet, review, folder);
-    entry["name"] = sheet;
-    run["sheets"].push_back(entry);
-  }
-  return run;
 }
 
 void ReviewJob::Run() const
@@ -401,24 +227,24 @@ void ReviewJob::Run() const
   {
     Look look = this->Read(messages);
     messages.ThrowIfError();
-    const bool draw = look.image.values != nullptr;
-    vessels = look.vessels.size();
-    pictures = draw ? 2 * vessels + 3 : 0;
-    without = look.withoutPictures;
-    ProgressDisplay progress("step", static_cast<int>(1 + (draw ? vessels + 3 : 0)), this->quiet);
-    progress.BeginStep(0, "shapes");
+    vessels = look.run.vessels.size();
+    without = look.run.withoutPictures;
+    ProgressDisplay progress("step", 1 + RunReviewSteps(look.run), this->quiet);
+    const auto update = [&](double fraction)
+    {
+      progress.Update(fraction);
+      return Interruption() == 0;
+    };
+    int step = 0;
+    progress.BeginStep(step++, "shapes");
     WebReview review;
     const std::int64_t triangles = this->webTriangles > 0
       ? this->webTriangles
       : DefaultReviewTriangles(static_cast<std::int64_t>(look.phases.phases.size()));
-    review.Add(look.phases,
-      MakeResultCase(this->SceneOf(look, messages), triangles,
-        [&](double fraction)
-        {
-          progress.Update(fraction);
-          return Interruption() == 0;
-        }));
-    review.SetRun(this->Draw(look, review, folder, progress));
+    review.Add(look.phases, MakeResultCase(this->SceneOf(look, messages), triangles, update));
+    pictures = AddRunReview(
+      look.run, this->views, look.reference, review, &folder,
+      [&](const std::string& what) { progress.BeginStep(step++, what); }, update);
     messages.ThrowIfError();
     ThrowIfInterrupted();
     WriteFileAtomically(folder.Add("review.html"),

@@ -11,10 +11,8 @@
 
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
-#include "vtkImageData.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
-#include "vtkPolyData.h"
 #include "vtkStringArray.h"
 
 #include <cmath>

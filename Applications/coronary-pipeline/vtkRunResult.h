@@ -9,6 +9,8 @@
 #include "LumenMeasurement.h"
 #include "ParallelFor.h"
 
+#include "vtkImageData.h"
+#include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
 
 #include <nlohmann/json.hpp>
@@ -17,9 +19,7 @@
 #include <string>
 #include <vector>
 
-class vtkImageData;
 class vtkMessageTrap;
-class vtkPolyData;
 
 namespace coronary
 {

@@ -35,7 +35,7 @@ struct GreyWindow
   double high = 1.0;
 };
 
-/// A picture, and where in it what is: docs/user-guide.md, "Looking at a result".
+/// A picture, and where in it what is: docs/evaluation.md, "A run without a truth".
 struct ViewPicture
 {
   MarkedPicture picture;

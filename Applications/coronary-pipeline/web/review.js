@@ -91,7 +91,7 @@ class Review {
     if (phases.every((phase) => phase.fraction !== null)) {
       this.order.sort((a, b) => phases[a].fraction - phases[b].fraction || a - b);
     }
-    this.phase = this.order[0];
+    this.phase = this.data.cases[index].run ? this.data.cases[index].run.reference : this.order[0];
     this.setRange(this.data.cases[index].range);
     this.run.fill(this.data.cases[index].run || null);
     this.run.mark(null);
