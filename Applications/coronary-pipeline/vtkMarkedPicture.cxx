@@ -97,7 +97,7 @@ void MarkedPicture::Line(
     const Place& a = points[k - 1];
     const Place& b = points[k];
     const double length = std::hypot(b[0] - a[0], b[1] - a[1]);
-    if (!(length < 1e6))
+    if (!(length < 1e4))
     {
       continue; // not a place in any picture
     }

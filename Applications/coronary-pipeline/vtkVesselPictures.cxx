@@ -18,6 +18,9 @@ constexpr double PixelsPerMillimetre = 6.0; // of straightened views
 constexpr double SlabPixel = 0.25;          // mm
 constexpr double SheetPixel = 0.5;          // mm
 constexpr double SlabMargin = 10.0;         // mm around a vessel
+constexpr double MostColumns = 6000.0;      // of a straightened view: longer vessels are coarser
+constexpr double MostSlabPixels = 2000.0;   // across; the same
+constexpr double MostSheetPixels = 600.0;   // across a slab of a sheet; the same
 constexpr double SheetMargin = 20.0; // mm around the trees: missed vessels are looked for there
 constexpr int SheetColumns = 5;
 constexpr int MostSlabs = 40;
@@ -27,7 +30,7 @@ constexpr double ToldNarrowing = 0.25;
 constexpr int LeftMargin = 52;
 constexpr int RightMargin = 14;
 constexpr int NameBand = 24;
-constexpr int RulerBand = 40;
+constexpr int RulerBand = 53; // two rows of names
 constexpr int DiameterBand = 84;
 constexpr int AttenuationBand = 60;
 constexpr int LeastWidth = 300;
@@ -150,6 +153,19 @@ Sight SightOf(const RunResult& result, std::int64_t point)
   { return HasValues(values, result) && values[static_cast<std::size_t>(point)] > 0.5; };
   return marked(result.bridged) ? Sight::Bridged
                                 : (marked(result.interpolated) ? Sight::Interpolated : Sight::Seen);
+}
+
+/// Of the box around points, mm.
+double SizeOf(const std::vector<Vector3>& points)
+{
+  Vector3 low = points.front();
+  Vector3 high = points.front();
+  for (const Vector3& point : points)
+  {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  return (high - low).norm();
 }
 
 /// Of the wide vessels' axes, which the many thin ones must not outnumber.
@@ -328,14 +344,15 @@ VesselPainter::Profile VesselPainter::ProfileOf(
   return profile;
 }
 
-void VesselPainter::DrawWalls(MarkedPicture& picture, const Profile& profile, int x, int y) const
+void VesselPainter::DrawWalls(
+  MarkedPicture& picture, const Profile& profile, double step, int x, int y) const
 {
   for (const double side : { 1.0, -1.0 })
   {
     DrawBySight(
       picture, profile.sight,
       [&](std::size_t k) -> MarkedPicture::Place {
-        return { double(x) + double(k), y - side * profile.radius[k] * PixelsPerMillimetre };
+        return { double(x) + double(k), y - side * profile.radius[k] / step };
       },
       1.0, 0.9);
   }
@@ -398,7 +415,7 @@ void VesselPainter::DrawRuler(MarkedPicture& picture, const VesselView& view,
     }
   }
   canvas.Write(x - 6, y + 14, "mm", 11, Soft, Anchor::Right);
-  int free = 0;
+  int free[2] = { 0, 0 };
   for (const VesselFork& fork : view.chain.forks)
   {
     const int place = at(fork.arc);
@@ -406,9 +423,10 @@ void VesselPainter::DrawRuler(MarkedPicture& picture, const VesselView& view,
     {
       canvas.Fill(place - k, y + 22 + k, 2 * k + 1, 1, White);
     }
-    if (place + 7 > free)
+    const int row = place + 7 > free[0] ? 0 : 1;
+    if (place + 7 > free[row])
     {
-      free = place + 15 + canvas.Write(place + 8, y + 28, fork.name, 11, White);
+      free[row] = place + 15 + canvas.Write(place + 8, y + 28 + 13 * row, fork.name, 11, White);
     }
   }
 }
@@ -519,8 +537,9 @@ void VesselPainter::DrawAttenuation(
 ViewPicture VesselPainter::Straightened(
   const VesselView& view, const ProgressCallback& progress) const
 {
-  const VesselCourse course =
-    FollowAxis(AxisOf(this->Result, view.chain), 1.0 / PixelsPerMillimetre);
+  const double whole = view.chain.arc.back() - view.chain.arc.front();
+  const VesselCourse course = FollowAxis(
+    AxisOf(this->Result, view.chain), std::max(1.0 / PixelsPerMillimetre, whole / MostColumns));
   const auto cuts = StraightenVessel(this->Image, course, this->Settings.halfWidth, progress);
   const Profile profile = this->ProfileOf(view, course);
   const int columns = cuts[0].width;
@@ -560,7 +579,7 @@ ViewPicture VesselPainter::Straightened(
       x - 6, row + rows / 2, number == 0 ? "0\xC2\xB0" : "90\xC2\xB0", 11, Soft, Anchor::Right);
     this->DrawCalcium(
       picture, course, number == 0 ? course.normal : course.binormal, x, row + rows / 2);
-    this->DrawWalls(picture, profile, x, row + rows / 2);
+    this->DrawWalls(picture, profile, course.step, x, row + rows / 2);
     if (lead > 0.0)
     {
       picture.Line(
@@ -571,12 +590,12 @@ ViewPicture VesselPainter::Straightened(
   }
   // 5 mm, upright.
   picture.plain.Fill(
-    x - 24, firstRow + rows / 2 + 14, 2, static_cast<int>(5.0 * PixelsPerMillimetre), Soft);
+    x - 24, firstRow + rows / 2 + 14, 2, static_cast<int>(5.0 / course.step), Soft);
   this->DrawRuler(picture, view, course, lead, x, ruler + 2);
   this->DrawDiameter(picture, profile, x, ruler + RulerBand);
   this->DrawAttenuation(picture, cuts[0], x, ruler + RulerBand + DiameterBand);
   return { std::move(picture),
-    { { "left", at(0.0) }, { "per_mm", PixelsPerMillimetre }, { "top", firstRow },
+    { { "left", at(0.0) }, { "per_mm", 1.0 / course.step }, { "top", firstRow },
       { "bottom", ruler } } };
 }
 
@@ -645,8 +664,9 @@ void DrawFrame(MarkedPicture& picture, const SlabPlane& plane, int x, int y, boo
 
 ViewPicture VesselPainter::Slab(const VesselView& view, const ProgressCallback& progress) const
 {
-  std::vector<Vector3> axis = AxisOf(this->Result, view.chain);
-  const SlabPlane plane = PlaneOfVessel(axis, SlabMargin, SlabPixel);
+  const std::vector<Vector3> axis = AxisOf(this->Result, view.chain);
+  const SlabPlane plane =
+    PlaneOfVessel(axis, SlabMargin, std::max(SlabPixel, SizeOf(axis) / MostSlabPixels));
   const std::vector<float> depths = DepthsAlong(plane, view.path, 3.0, progress);
   const GreyPicture slab =
     ProjectSlab(this->Image, plane, depths, this->Settings.thickness, progress);
@@ -690,8 +710,8 @@ ViewPicture VesselPainter::Sheet(int direction, const ProgressCallback& progress
 {
   const Vector3 directions[3] = { -Vector3::UnitZ(), -Vector3::UnitY(), Vector3::UnitX() };
   const std::vector<Vector3>& points = this->Result.tree.points;
-  const SlabPlane whole =
-    Framed(PlaneTowards(directions[direction]), points, SheetMargin, SheetPixel);
+  const SlabPlane whole = Framed(PlaneTowards(directions[direction]), points, SheetMargin,
+    std::max(SheetPixel, SizeOf(points) / MostSheetPixels));
   double reach = 0.0;
   for (const Vector3& point : points)
   {

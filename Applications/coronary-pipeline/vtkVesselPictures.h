@@ -84,7 +84,7 @@ private:
   struct Profile;
   Profile ProfileOf(const VesselView& view, const VesselCourse& course) const;
   void DrawCut(MarkedPicture& picture, const GreyPicture& cut, int x, int y) const;
-  void DrawWalls(MarkedPicture& picture, const Profile& profile, int x, int y) const;
+  void DrawWalls(MarkedPicture& picture, const Profile& profile, double step, int x, int y) const;
   void DrawCalcium(MarkedPicture& picture, const VesselCourse& course,
     const std::vector<Vector3>& across, int x, int y) const;
   void DrawRuler(MarkedPicture& picture, const VesselView& view, const VesselCourse& course,

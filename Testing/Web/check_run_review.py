@@ -139,7 +139,7 @@ def check_straightened(folder):
     elsewhere = sum(like(rows[row][column], ORANGE, 30) for row in range(FIRST, FIRST + 2 * ROWS)
                     for column in range(column_of(12), column_of(40)))
     check(elsewhere == 0, "%d orange pixels where all was seen" % elsewhere)
-    profile = range(FIRST + 2 * ROWS + 4 + 40, len(rows))
+    profile = range(FIRST + 2 * ROWS + 4 + 53, len(rows))
     reds = [column for row in profile for column in range(len(rows[0])) if like(rows[row][column], RED, 40)]
     check(reds and abs(sum(reds) / len(reds) - column_of(34)) < 12, "the narrowing is not written at 34 mm")
     chalk = [column for row in profile for column in range(len(rows[0])) if like(rows[row][column], YELLOW, 40)]

@@ -85,6 +85,7 @@ class RunPanel {
     this.figures = [];
     this.sheets = [];
     document.querySelectorAll('.of-run').forEach((one) => { one.hidden = !run; });
+    document.body.classList.toggle('pictured', Boolean(run && run.vessels.some((one) => one.straightened)));
     if (!run) {
       return;
     }
