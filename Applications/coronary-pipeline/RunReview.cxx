@@ -92,16 +92,7 @@ Json Describe(const ReviewedRun& look, int reference)
   }
   for (const char* kind : { "checks", "bridges", "lesions", "calcium" })
   {
-    Json list = look.result.Findings(kind);
-    // A stage may have more to say of a kind than its list.
-    for (const char* inner : { "list", "objects", kind })
-    {
-      if (list.is_object() && list.contains(inner) && list[inner].is_array())
-      {
-        list = Json(list[inner]);
-      }
-    }
-    run[kind] = list.is_array() ? list : Json();
+    run[kind] = look.result.Findings(kind);
   }
   run["stages"] = Json::array();
   const Json stages = look.result.report.contains("stages") ? look.result.report["stages"] : Json();
@@ -168,8 +159,7 @@ std::size_t AddRunReview(const ReviewedRun& run, const ViewSettings& views, int 
   std::unique_ptr<VesselPainter> painter;
   if (run.image.values)
   {
-    painter = std::make_unique<VesselPainter>(
-      run.result, *run.image.values, run.calcium.values.get(), views);
+    painter = std::make_unique<VesselPainter>(run.result, *run.image.values, run.calcium, views);
     said["window"] = { painter->Window().low, painter->Window().high };
     said["thickness"] = views.thickness;
     said["half_width"] = views.halfWidth;

@@ -25,7 +25,7 @@ struct ReviewedRun
   RunResult result;
   std::vector<VesselView> vessels;
   ResultImage image;           ///< without values: there are no pictures
-  ResultImage calcium;         ///< without values: it was not looked for, or there is none
+  ResultLabels calcium;        ///< empty: it was not looked for, or there is none
   std::string withoutPictures; ///< why, a sentence; empty: they are there, or not wanted
 };
 

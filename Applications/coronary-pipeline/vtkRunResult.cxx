@@ -15,6 +15,8 @@
 #include "vtkPointData.h"
 #include "vtkStringArray.h"
 
+#include <Eigen/LU>
+
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -99,6 +101,34 @@ std::vector<std::string> InputFiles(const RunResult& result)
   }
   return files;
 }
+}
+
+ResultLabels::ResultLabels(vtkImageData* image)
+  : Data(image)
+  , Grid(vtkCoronary::GridOf(image))
+  , Inverse((this->Grid.direction * this->Grid.spacing.asDiagonal()).inverse())
+{
+}
+
+int ResultLabels::At(const Vector3& world) const
+{
+  if (this->Empty())
+  {
+    return 0;
+  }
+  const Vector3 index = this->Inverse * (world - this->Grid.origin);
+  vtkIdType voxel = 0;
+  for (int axis = 2; axis >= 0; --axis)
+  {
+    const int first = this->Grid.extent[2 * axis];
+    const int last = this->Grid.extent[2 * axis + 1];
+    if (!(index[axis] > first - 0.5 && index[axis] < last + 0.5))
+    {
+      return 0;
+    }
+    voxel = voxel * (last - first + 1) + (std::lround(index[axis]) - first);
+  }
+  return static_cast<int>(this->Data->GetPointData()->GetScalars()->GetComponent(voxel, 0));
 }
 
 Json RunResult::Findings(const std::string& name) const
@@ -254,18 +284,17 @@ ResultImage ReadRunImage(const RunResult& result, const std::vector<std::string>
   return image;
 }
 
-ResultImage ReadRunCalcium(const RunResult& result, vtkMessageTrap& messages)
+ResultLabels ReadRunCalcium(const RunResult& result, vtkMessageTrap& messages)
 {
-  ResultImage image;
   const fs::path path = fs::path(result.folder) / "calcium.mha";
-  if (IsFile(path))
+  if (!IsFile(path))
   {
-    vtkNew<vtkGatedImageReader> reader;
-    reader->SetFileName(path.string().c_str());
-    reader->Update();
-    messages.ThrowIfError();
-    Prepare(image, reader->GetOutput());
+    return {};
   }
-  return image;
+  vtkNew<vtkGatedImageReader> reader;
+  reader->SetFileName(path.string().c_str());
+  reader->Update();
+  messages.ThrowIfError();
+  return ResultLabels(reader->GetOutput());
 }
 }

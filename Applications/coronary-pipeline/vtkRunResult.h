@@ -31,6 +31,24 @@ struct ResultImage
   std::unique_ptr<ImageInterpolator> values;
 };
 
+/// Objects by number on the voxels of an image, 0: none.
+class ResultLabels
+{
+public:
+  ResultLabels() = default;
+  explicit ResultLabels(vtkImageData* image);
+
+  bool Empty() const { return this->Data == nullptr; }
+
+  /// That of the voxel in which a place lies; outside of the image 0.
+  int At(const Vector3& world) const;
+
+private:
+  vtkSmartPointer<vtkImageData> Data;
+  ImageGrid Grid;
+  Matrix3 Inverse = Matrix3::Identity();
+};
+
 struct RunResult
 {
   std::string folder;
@@ -71,8 +89,8 @@ RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages);
 ResultImage ReadRunImage(const RunResult& result, const std::vector<std::string>& files,
   vtkMessageTrap& messages, const ProgressCallback& progress = {});
 
-/// Labels of calcifications, calcium.mha of the folder; without values: there is none.
-ResultImage ReadRunCalcium(const RunResult& result, vtkMessageTrap& messages);
+/// Calcifications, calcium.mha of the folder; empty: there is none.
+ResultLabels ReadRunCalcium(const RunResult& result, vtkMessageTrap& messages);
 }
 
 #endif

@@ -56,6 +56,22 @@ std::string Text(const char* format, double value)
   return text;
 }
 
+/// A name that has room beside a vessel; never a part of a letter.
+std::string Brief(const std::string& name)
+{
+  constexpr std::size_t Longest = 40;
+  if (name.size() <= Longest)
+  {
+    return name;
+  }
+  std::size_t end = Longest - 3;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0U) == 0x80U)
+  {
+    --end;
+  }
+  return name.substr(0, end) + "...";
+}
+
 Json Triple(const Vector3& v)
 {
   const auto rounded = [](double value) { return std::round(1e4 * value) / 1e4; };
@@ -277,7 +293,7 @@ struct VesselPainter::Profile
 };
 
 VesselPainter::VesselPainter(const RunResult& result, const ImageInterpolator& image,
-  const ImageInterpolator* calcium, const ViewSettings& settings)
+  const ResultLabels& calcium, const ViewSettings& settings)
   : Result(result)
   , Image(image)
   , Calcium(calcium)
@@ -369,7 +385,7 @@ void VesselPainter::DrawWalls(
 void VesselPainter::DrawCalcium(MarkedPicture& picture, const VesselCourse& course,
   const std::vector<Vector3>& across, int x, int y) const
 {
-  if (!this->Calcium)
+  if (this->Calcium.Empty())
   {
     return;
   }
@@ -381,9 +397,7 @@ void VesselPainter::DrawCalcium(MarkedPicture& picture, const VesselCourse& cour
       return false;
     }
     const auto k = static_cast<std::size_t>(column);
-    const Vector3 place = course.position[k] + row * course.step * across[k];
-    // Labels are whole numbers of objects: half way to the background is their border.
-    return this->Calcium->Contains(place) && this->Calcium->At(place) >= 0.5;
+    return this->Calcium.At(course.position[k] + row * course.step * across[k]) != 0;
   };
   for (int row = -half; row <= half; ++row)
   {
@@ -426,7 +440,8 @@ void VesselPainter::DrawRuler(MarkedPicture& picture, const VesselView& view,
     const int row = place + 7 > free[0] ? 0 : 1;
     if (place + 7 > free[row])
     {
-      free[row] = place + 15 + canvas.Write(place + 8, y + 28 + 13 * row, fork.name, 11, White);
+      free[row] =
+        place + 15 + canvas.Write(place + 8, y + 28 + 13 * row, Brief(fork.name), 11, White);
     }
   }
 }
@@ -567,7 +582,8 @@ ViewPicture VesselPainter::Straightened(
     if (begin + 4 > free)
     {
       free = begin + 8 +
-        picture.plain.Write(begin + 4, NameBand / 2, piece.name, 13, White, Anchor::Left, true);
+        picture.plain.Write(
+          begin + 4, NameBand / 2, Brief(piece.name), 13, White, Anchor::Left, true);
     }
   }
   int number = 0;
@@ -679,7 +695,7 @@ ViewPicture VesselPainter::Slab(const VesselView& view, const ProgressCallback& 
     const auto at = std::min(view.path.size() - 1, static_cast<std::size_t>(std::max(0.0, middle)));
     const Vector3 place = plane.ToPicture(view.path[at]);
     picture.Write(
-      static_cast<int>(place[0]) + 8, static_cast<int>(place[1]) - 8, piece.name, 12, White);
+      static_cast<int>(place[0]) + 8, static_cast<int>(place[1]) - 8, Brief(piece.name), 12, White);
   }
   DrawFrame(picture, plane, 0, 0, true);
   return { std::move(picture), PlaneJson(plane) };

@@ -63,9 +63,9 @@ GreyWindow WindowOf(const RunResult& result, const ImageInterpolator& image);
 class VesselPainter
 {
 public:
-  /// All have to outlive this. @param calcium  labels; null: there are none
+  /// All have to outlive this.
   VesselPainter(const RunResult& result, const ImageInterpolator& image,
-    const ImageInterpolator* calcium, const ViewSettings& settings);
+    const ResultLabels& calcium, const ViewSettings& settings);
 
   const GreyWindow& Window() const { return this->Greys; }
 
@@ -98,7 +98,7 @@ private:
 
   const RunResult& Result;
   const ImageInterpolator& Image;
-  const ImageInterpolator* Calcium;
+  const ResultLabels& Calcium;
   const ViewSettings Settings;
   const GreyWindow Greys;
 };

@@ -1,11 +1,16 @@
 // What a run says of itself: warnings, what was guessed, findings, and its vessels in the image.
 
+// What is found where in what the run says, its title, and what is said of an empty list.
 const FINDINGS = [
-  ['checks', 'Checks of the whole tree', 'Nothing was noticed.'],
-  ['bridges', 'Guessed across gaps', 'No gap was bridged.'],
-  ['lesions', 'Narrowings', 'No narrowing was found.'],
-  ['calcium', 'Calcium', 'No calcium was found.'],
+  ['checks', ['checks'], 'Checks of the whole tree', 'Nothing was noticed.'],
+  ['bridges', ['bridges'], 'Guessed across gaps', 'No gap was bridged.'],
+  ['lesions', ['lesions'], 'Narrowings', 'No narrowing was found.'],
+  ['calcium', ['calcium', 'objects'], 'Calcium', 'No calcium was found.'],
+  ['hidden', ['calcium', 'radius_interpolated'], 'Radius guessed, behind calcium', 'None was.'],
 ];
+// Columns that come first; the others follow as they are.
+const FIRST_COLUMNS = ['what', 'vessel', 'kind', 'degree', 'diameter_stenosis_percent', 'range_percent', 'confidence', 'length_mm',
+  'least_diameter_mm', 'reference_diameter_mm'];
 const PLACES = ['position', 'place', 'at', 'minimum', 'centre', 'center', 'from', 'begin'];
 const NEAR_VESSEL = 4; // mm from its axis: a click there belongs to it
 
@@ -26,36 +31,48 @@ function placeOf(finding) {
   return name ? finding[name] : null;
 }
 
+const UNITS = { mm: 'mm', mm2: 'mm²', mm3: 'mm³', hu: 'HU', percent: '%', deg: '°' };
+
 /** "length_mm" becomes "length" and "mm". */
 function wordsOf(key) {
-  const [, name, unit] = key.match(/^(.*?)(?:_(mm3|mm2|mm|hu|HU|ml))?$/);
-  return { name: name.replace(/_/g, ' '), unit: unit ? unit.replace('3', '³').replace('2', '²').replace('hu', 'HU') : '' };
+  const [, name, unit] = key.match(/^(.*?)(?:_(mm|mm2|mm3|hu|percent|deg))?$/);
+  return { name: name.replace(/_/g, ' '), unit: unit ? UNITS[unit] : '' };
+}
+
+/** A range of two numbers. */
+function isRange(value) {
+  return Array.isArray(value) && value.length === 2 && value.every(known);
 }
 
 function shownValue(key, value) {
   if (known(value)) {
-    const share = /degree|stenosis/.test(key) && !/_mm/.test(key) && Math.abs(value) <= 1;
-    return share ? `${(100 * value).toFixed(0)} %` : Number.isInteger(value) ? `${value}` : value.toFixed(2);
+    const digits = /_percent$|_hu$|_deg$/.test(key) ? 0 : /_mm$/.test(key) ? 1 : 2;
+    return key === 'degree' ? `${(100 * value).toFixed(0)} %` : Number.isInteger(value) ? `${value}` : value.toFixed(digits);
+  }
+  if (isRange(value)) {
+    return `${shownValue(key, value[0])} to ${shownValue(key, value[1])}`;
   }
   return typeof value === 'string' ? value : typeof value === 'boolean' ? (value ? 'yes' : 'no') : '–';
 }
 
 /** A row a finding with all that it says in words and numbers. */
 function fillFindings(table, findings, onPlace) {
-  const plain = (value) => value !== null && typeof value !== 'object';
-  const keys = [...new Set(findings.flatMap((one) => Object.keys(one).filter((key) => plain(one[key]))))];
-  const texts = new Set(keys.filter((key) => findings.every((one) => typeof one[key] !== 'number')));
+  const plain = (value) => value !== null && (typeof value !== 'object' || isRange(value));
+  const order = (key) => (FIRST_COLUMNS.includes(key) ? FIRST_COLUMNS.indexOf(key) : FIRST_COLUMNS.length);
+  const keys = [...new Set(findings.flatMap((one) => Object.keys(one).filter((key) => plain(one[key]))))]
+    .sort((a, b) => order(a) - order(b));
+  const texts = new Set(keys.filter((key) => findings.every((one) => typeof one[key] === 'string' || typeof one[key] === 'boolean')));
   const head = element('thead', {}, [element('tr', {}, [
-    ...keys.map((key) => {
+    element('th', { scope: 'col', class: 'text' }, ['place']), ...keys.map((key) => {
       const { name, unit } = wordsOf(key);
       return element('th', { scope: 'col', class: texts.has(key) ? 'text' : null }, unit ? [name, element('small', {}, [` ${unit}`])] : [name]);
-    }), element('th', { scope: 'col' }, ['place'])])]);
+    })])]);
   const body = element('tbody');
   findings.forEach((one) => {
     const place = placeOf(one);
     const cells = keys.map((key) => cell(shownValue(key, one[key]), texts.has(key) ? 'text' : null));
     const button = place ? element('button', { type: 'button' }, ['show']) : '–';
-    const row = element('tr', { class: place ? 'goes' : null }, [...cells, element('td', {}, [button])]);
+    const row = element('tr', { class: place ? 'goes' : null }, [element('td', { class: 'text' }, [button]), ...cells]);
     if (place) {
       row.addEventListener('click', () => onPlace(place));
     }
@@ -95,7 +112,7 @@ class RunPanel {
     byId('run-stages').textContent = run.stages.map((one) =>
       `${one.name} ${one.state === 'finished' && known(one.seconds) ? `${one.seconds.toFixed(1)} s` : one.state}`).join(', ');
     this.fillVessels();
-    byId('findings').replaceChildren(...FINDINGS.map(([kind, title, none]) => this.findings(kind, title, none)));
+    byId('findings').replaceChildren(...FINDINGS.map((one) => this.findings(...one)));
     const pictured = run.vessels.some((one) => one.straightened);
     byId('vessel-views').hidden = !pictured;
     byId('heart-sheets').hidden = run.sheets.length === 0;
@@ -108,9 +125,19 @@ class RunPanel {
     }
   }
 
-  findings(kind, title, none) {
-    const found = this.run[kind];
+  findings(kind, path, title, none) {
+    let found = path.reduce((inner, name) => (inner && !Array.isArray(inner) ? inner[name] : inner), this.run);
+    found = Array.isArray(found) ? found.filter((one) => one !== null && typeof one === 'object') : null;
+    const around = path.length > 1 && kind === path[0] ? this.run[kind] : null;
     const parts = [element('h3', {}, [title])];
+    if (around && !Array.isArray(around)) {
+      // What is said of all of them together.
+      const all = Object.keys(around).filter((key) => ['number', 'string'].includes(typeof around[key]) && key !== 'file');
+      parts.push(element('p', { class: 'none' }, [all.map((key) => {
+        const { name, unit } = wordsOf(key);
+        return `${name} ${shownValue(key, around[key])}${unit ? ` ${unit}` : ''}`;
+      }).join('; ')]));
+    }
     if (found && found.length > 0) {
       const table = element('table', { id: `run-${kind}` });
       fillFindings(table, found, (place) => this.onPlace(place, true));
