@@ -229,8 +229,8 @@ RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages)
     throw std::runtime_error("'" + lines.string() + "': " + error.what());
   }
   result.names = BranchNames(data, result.tree);
-  result.bridged = PointValues(data, "Bridged");
-  result.bridgeConfidence = PointValues(data, "BridgeConfidence");
+  result.bridged = PointValues(data, vtkCoronaryArrayNames::Bridged);
+  result.bridgeConfidence = PointValues(data, vtkCoronaryArrayNames::BridgeConfidence);
   result.interpolated = PointValues(data, "RadiusInterpolated");
   result.stenosis = PointValues(data, "StenosisDegree");
   result.reference = PointValues(data, "ReferenceRadius");
