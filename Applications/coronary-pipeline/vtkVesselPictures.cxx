@@ -289,6 +289,7 @@ struct VesselPainter::Profile
   std::vector<double> reference; ///< mm; empty: not known
   std::vector<double> stenosis;  ///< 0 to 1; empty: not known
   std::vector<double> calcium;   ///< label; empty: not known
+  std::vector<double> sureness;  ///< of bridges, 0 to 1; empty: not known
   std::vector<Sight> sight;
 };
 
@@ -348,6 +349,7 @@ VesselPainter::Profile VesselPainter::ProfileOf(
   profile.reference = sampled(this->Result.reference, false);
   profile.stenosis = sampled(this->Result.stenosis, false);
   profile.calcium = sampled(this->Result.calcium, true);
+  profile.sureness = sampled(this->Result.bridgeConfidence, true);
   std::vector<double> sights;
   for (const std::int64_t point : points)
   {
@@ -497,6 +499,22 @@ void VesselPainter::DrawDiameter(MarkedPicture& picture, const Profile& profile,
     picture.Line(places, 1.0, Healthy, 5.0);
   }
   DrawBySight(picture, profile.sight, curve(profile.radius), 1.4);
+  // How sure the run is of each bridge, where it is least so.
+  for (std::size_t begin = 0; begin < profile.sureness.size(); ++begin)
+  {
+    std::size_t end = begin;
+    double least = 1.0;
+    while (end < profile.sureness.size() && profile.sight[end] == Sight::Bridged)
+    {
+      least = std::min(least, profile.sureness[end++]);
+    }
+    if (end > begin)
+    {
+      picture.Write(x + static_cast<int>((begin + end) / 2), y + height - 9, Text("%.2f", least),
+        11, Bridge, Anchor::Centre);
+      begin = end;
+    }
+  }
   // Each narrowing at its narrowest place.
   for (std::size_t begin = 0; begin < profile.stenosis.size(); ++begin)
   {
