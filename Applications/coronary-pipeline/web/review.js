@@ -514,7 +514,7 @@ class Review {
     }
     const phase = this.table.phases[this.phase];
     const place = `L ${now.position[0].toFixed(1)}, P ${now.position[1].toFixed(1)}, H ${now.position[2].toFixed(1)} mm`;
-    if (!this.compared) {
+    if (!this.compared || this.picked.place) {
       const near = this.phase === run.reference ? this.run.nearest(now.position) : null;
       readout.replaceChildren(element('strong', {}, [near ? near.vessel.name : now.branch || 'no vessel within 4 mm']),
         element('span', {}, [near ? `${near.arc} mm along it` : '']), element('span', {}, [place]));
