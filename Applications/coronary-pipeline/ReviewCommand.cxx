@@ -20,6 +20,8 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -175,6 +177,26 @@ ReviewJob::Look ReviewJob::Read(vtkMessageTrap& messages) const
   return look;
 }
 
+/// Files that an older review in the folder names: vessels may have had other names.
+std::vector<std::string> OlderPictures(const std::string& folder)
+{
+  std::ifstream page(fs::path(folder) / "review.html", std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(page), {});
+  const std::string begin = "\"file\":\"";
+  std::vector<std::string> names;
+  for (std::size_t at = text.find(begin); at != std::string::npos; at = text.find(begin, at))
+  {
+    at += begin.size();
+    const std::string name = text.substr(at, text.find('"', at) - at);
+    if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-./") == std::string::npos &&
+      name.rfind("pictures/", 0) == 0)
+    {
+      names.push_back(name);
+    }
+  }
+  return names;
+}
+
 ResultScene ReviewJob::SceneOf(const Look& look, vtkMessageTrap& messages) const
 {
   ResultScene scene;
@@ -247,6 +269,7 @@ void ReviewJob::Run() const
       [&](const std::string& what) { progress.BeginStep(step++, what); }, update);
     messages.ThrowIfError();
     ThrowIfInterrupted();
+    folder.TakePlaceOf(OlderPictures(this->Folder()));
     WriteFileAtomically(folder.Add("review.html"),
       review.Html(
         "coronary-pipeline " DYNAMICCORONARY_VERSION, "coronary-pipeline review " + this->result));

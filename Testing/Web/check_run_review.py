@@ -190,6 +190,11 @@ def check_pictures(pipeline):
             check(one.read() == other.read(), name + " depends on the number of threads")
     run("review", "bare", "--output", "bare-review", "--window", "-100", "700", "--quiet")
     check(not any(like(one, ORANGE, 30) for row in pixels("bare-review/pictures/01-prca-mrca.png") for one in row), "marks of nothing")
+    # Pictures of an older review go with it; what is not its own stays.
+    with open("bare-review/pictures/09-mine.png", "w", encoding="utf-8"):
+        pass
+    run("review", "bare", "--no-pictures", "--output", "bare-review", "--quiet")
+    check(os.listdir("bare-review/pictures") == ["09-mine.png"], "left of an older review: %s" % os.listdir("bare-review/pictures"))
     said = run("review", "run", "--no-pictures", "--output", "tables").stdout
     check(said == "tables: 2 vessels, 0 pictures, review.html\n", "it says: " + said)
 
