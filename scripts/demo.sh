@@ -54,6 +54,9 @@ else
   "${evaluate[@]}" --no-pictures
 fi
 
+echo "== The run to look at: its vessels in the image"
+"$pipeline" review "$output/run"
+
 echo "== A guidewire in that model, driven by a script"
 "$root/build/paraview/bin/coronary-simulator" --headless --scenario phantom-lca --vessels "$output/run" \
   --script "$root/Testing/Data/Driving/lad-apex.json" --output "$output/simulator" --output-rate 2 --write-wall
@@ -102,7 +105,8 @@ What lies where
                                       closed surface with its caps, skeleton, tetrahedra
                                       with the skeleton inside and their skin weights;
                                       motion/ has all of it at every phase (.series);
-                                      status.csv and report.json say how they came about
+                                      status.csv and report.json say how they came about;
+                                      review/review.html: its vessels in the image, straightened and in slabs
   $output/simulator/                  trajectory.pvd, forces.csv, tip.csv, statistics.json: a session of the simulator;
                                       angiogram/: X-ray frames of an injection
   $output/evaluation/                 table1.csv, .json and .tex, report.html (tables, plots, pictures,

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""A picture of an evaluation's review page, as Chromium shows it: the phase with the greatest Hausdorff distance.
+"""A picture of a review page, as Chromium shows it: of an evaluation the phase with the greatest Hausdorff distance, of a run its first vessel.
 
   python3 scripts/render-review.py EVALUATION/review.html OUTPUT.png
+  python3 scripts/render-review.py RUN/review/review.html OUTPUT.png
 """
 import os
 import sys
@@ -12,10 +13,11 @@ import chromium  # noqa: E402
 
 SIZE = (1360, 880)
 STATE = "document.getElementById('stage').dataset"
+DATA = "JSON.parse(document.getElementById('data').textContent)"
 WORST = """(() => {
-  const rows = JSON.parse(document.getElementById('data').textContent).table1.cases[0].phases;
+  const rows = %s.table1.cases[0].phases;
   return rows.reduce((worst, row, k) => (row.HD > rows[worst].HD ? k : worst), 0);
-})()"""
+})()""" % DATA
 
 page_file, output = sys.argv[1:3]
 program = chromium.find()
@@ -24,14 +26,23 @@ if program is None:
 with chromium.Browser(program, *SIZE) as page:
     page.open("file://" + os.path.abspath(page_file))
     page.wait("document.getElementById('stage') && Number(%s.drawn) > 0" % STATE)
-    worst = page.evaluate(WORST)
-    page.click("#part-a tbody tr:nth-child(%d)" % (worst + 1))
+    compared = page.evaluate(DATA + ".cases[0].shapes.truth !== null")
+    if compared:
+        worst = page.evaluate(WORST)
+        page.click("#part-a tbody tr:nth-child(%d)" % (worst + 1))
     page.click("#labels")
-    page.click("#farthest")
+    if compared:
+        page.click("#farthest")
+    else:
+        page.click("#vessels tbody tr")
     drawn = -1
     while drawn != page.evaluate(STATE + ".drawn"):
         drawn = page.evaluate(STATE + ".drawn")
         page.evaluate("new Promise((done) => setTimeout(done, 1000))")
-    page.evaluate("scrollTo(0, 0)")
+    if compared:
+        page.evaluate("scrollTo(0, 0)")
+    else:
+        page.evaluate("document.getElementById('vessel-views').scrollIntoView()")
+        page.wait("[...document.querySelectorAll('#views article:first-child img')].every((one) => one.naturalWidth > 0)")
     page.screenshot(output)
 print(output)

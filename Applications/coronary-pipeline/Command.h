@@ -48,6 +48,7 @@ MakeCommand MakeSequenceCommand;
 MakeCommand MakeSlicerCommand;
 MakeCommand MakeMetricsCommand;
 MakeCommand MakeEvaluateCommand;
+MakeCommand MakeReviewCommand;
 MakeCommand MakeCohortCommand;
 }
 

@@ -11,6 +11,7 @@
 #include "OptionChecks.h"
 #include "ProgressDisplay.h"
 #include "Ranks.h"
+#include "RunReview.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
 #include "vtkEvaluationPictures.h"
@@ -56,6 +57,7 @@ struct EvaluateJob
   double timeTolerance = 1e-3;
   bool noPictures = false;
   bool web = false;
+  bool views = false;
   std::int64_t webTriangles = 0; ///< 0: as many as suit the number of phases
   std::string measureCache;
   int threads = 0;
@@ -90,6 +92,9 @@ private:
     StagedFolder& folder, const std::function<void(double)>& progress);
   /// The options that its tables come from, for the reader of a page.
   std::string CommandLine() const;
+  /// To the page what a result that run made says of itself.
+  void AddRun(const std::string& result, const CaseEvaluation& evaluation, WebReview& review,
+    std::vector<std::string>& complaints, vtkMessageTrap& messages) const;
   void WriteReport(const std::vector<CaseEvaluation>& evaluations,
     std::vector<ReportCase> illustrations, std::vector<std::string> plots,
     const std::string& withoutPictures, const std::string& path) const;
@@ -141,6 +146,10 @@ void EvaluateJob::Declare(CLI::App& app)
   app.add_flag("--web", this->web,
     "Also review.html: one file for a web browser, without network, in which the beating model is "
     "turned and compared");
+  app.add_flag("--views", this->views,
+    "In review.html also straightened views and slabs of the vessels of a result that run made, in "
+    "the image that "
+    "it was found in");
   app
     .add_option("--web-triangles", this->webTriangles,
       "Triangles of a surface in review.html, at most about so many; 0: up to 150000, fewer for "
@@ -442,6 +451,7 @@ std::string EvaluateJob::CommandLine() const
   line += this->untracked == "auto" ? "" : " --interpolated " + this->untracked;
   line += this->distance.clipEnds ? " --clip-ends" : "";
   line += " --web";
+  line += this->views ? " --views" : "";
   line += this->webTriangles == 0 ? "" : " --web-triangles " + std::to_string(this->webTriangles);
   return line + " --output " + quoted(this->output);
 }
@@ -475,8 +485,37 @@ void EvaluateJob::WriteReport(const std::vector<CaseEvaluation>& evaluations,
   WriteEvaluationReport(report, path);
 }
 
+void EvaluateJob::AddRun(const std::string& result, const CaseEvaluation& evaluation,
+  WebReview& review, std::vector<std::string>& complaints, vtkMessageTrap& messages) const
+{
+  if (!IsRunFolder(result))
+  {
+    return;
+  }
+  const ReviewedRun run = OpenRun(result, {}, this->views, messages);
+  int reference = 0;
+  const auto away = [&](int index) {
+    return std::abs(evaluation.phases[static_cast<std::size_t>(index)].fraction - run.result.time);
+  };
+  for (int n = 1; n < static_cast<int>(evaluation.phases.size()); ++n)
+  {
+    reference = away(n) < away(reference) ? n : reference;
+  }
+  if (!run.withoutPictures.empty())
+  {
+    complaints.push_back(run.withoutPictures);
+  }
+  AddRunReview(
+    run, ViewSettings(), reference, review, nullptr, [](const std::string&) {},
+    [](double) { return Interruption() == 0; });
+}
+
 void EvaluateJob::Run() const
 {
+  if (this->views && !this->web)
+  {
+    throw UsageError("--views: only with --web");
+  }
   if (this->results.size() != this->truths.size())
   {
     throw UsageError("--result and --truth: one of each for every case, not " +
@@ -559,6 +598,7 @@ void EvaluateJob::Run() const
               update(fraction);
               return Interruption() == 0;
             }));
+        this->AddRun(this->results[n], evaluations[n], review, complaints, messages);
       }
     }
     if (this->web)

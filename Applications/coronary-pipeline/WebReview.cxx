@@ -348,6 +348,7 @@ PackedShapes PackShapes(const ReviewCase& shapes)
   packed.layout["truth"] = WriteSeries(writer, shapes.truth);
   packed.layout["model_lines"] = WriteSeries(writer, shapes.modelLines);
   packed.layout["truth_lines"] = WriteSeries(writer, shapes.truthLines);
+  packed.layout["guessed_lines"] = WriteSeries(writer, shapes.guessedLines);
   packed.bytes = std::move(writer.Bytes);
   return packed;
 }
@@ -364,7 +365,7 @@ std::int64_t DefaultReviewTriangles(std::int64_t phases)
 void WebReview::Add(const CaseEvaluation& evaluation, const ReviewCase& shapes)
 {
   for (const ReviewSeries* series :
-    { &shapes.model, &shapes.truth, &shapes.modelLines, &shapes.truthLines })
+    { &shapes.model, &shapes.truth, &shapes.modelLines, &shapes.truthLines, &shapes.guessedLines })
   {
     if (!series->frames.empty() && series->frames.size() != evaluation.phases.size())
     {
@@ -389,6 +390,21 @@ void WebReview::Add(const CaseEvaluation& evaluation, const ReviewCase& shapes)
   this->Blocks.push_back(Base64(Deflated(packed.bytes)));
 }
 
+std::size_t WebReview::AddPicture(const std::string& png)
+{
+  this->Pictures.push_back(Base64(png));
+  return this->Pictures.size() - 1;
+}
+
+void WebReview::SetRun(Json run)
+{
+  if (this->Cases.empty())
+  {
+    throw std::invalid_argument("There is no case that a run could be of.");
+  }
+  this->Cases.back()["run"] = std::move(run);
+}
+
 std::string WebReview::Html(const std::string& version, const std::string& command) const
 {
   Json data;
@@ -403,6 +419,11 @@ std::string WebReview::Html(const std::string& version, const std::string& comma
   {
     blocks += "<script type=\"text/plain\" id=\"shapes-" + std::to_string(k) + "\">" +
       this->Blocks[k] + "</script>\n";
+  }
+  for (std::size_t k = 0; k < this->Pictures.size(); ++k)
+  {
+    blocks += "<script type=\"text/plain\" id=\"picture-" + std::to_string(k) + "\">" +
+      this->Pictures[k] + "</script>\n";
   }
   return Filled(web::Page,
     { { "style", web::Style }, { "script", web::Script }, { "data", JsonForHtml(data) },

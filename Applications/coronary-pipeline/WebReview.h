@@ -1,6 +1,6 @@
 /**
  * @file WebReview.h
- * @brief An evaluation as one HTML file in which the beating model is turned and compared with the truth.
+ * @brief An evaluation, or a run, as one HTML file in which the beating model is turned and compared with the truth.
  *
  * The page needs no other file and no network. Its shapes are numbers: positions of 16 bits in the box around all
  * phases, distances of 16 bits, both as differences that deflate well. docs/evaluation.md has the form.
@@ -65,6 +65,7 @@ struct ReviewCase
   ReviewSeries truth;
   ReviewSeries modelLines;
   ReviewSeries truthLines;
+  ReviewSeries guessedLines; ///< dashes where the model's lines were guessed across gaps
 
   // Where the page looks from at first: PictureView of the case's pictures.
   double leftAnterior = 0.0; ///< degrees
@@ -96,8 +97,18 @@ std::int64_t DefaultReviewTriangles(std::int64_t phases);
 class WebReview
 {
 public:
+  /// A case without truth and lines without a surface are taken too.
   /// @throws as PackShapes; std::invalid_argument for a series with neither no frame nor one a phase
   void Add(const CaseEvaluation& evaluation, const ReviewCase& shapes);
+
+  /// A PNG file that the page has in it. @return its number, for `run`
+  std::size_t AddPicture(const std::string& png);
+
+  /**
+   * What a run says of its last case that was added: its vessels with their pictures, warnings, findings.
+   * docs/evaluation.md has the form.
+   */
+  void SetRun(nlohmann::ordered_json run);
 
   /**
    * The page, the same bytes of the same input. Every text in it is escaped.
@@ -108,7 +119,8 @@ public:
 private:
   std::vector<CaseEvaluation> Evaluations;
   std::vector<nlohmann::ordered_json> Cases;
-  std::vector<std::string> Blocks; ///< deflated, in base 64
+  std::vector<std::string> Blocks;   ///< deflated, in base 64
+  std::vector<std::string> Pictures; ///< in base 64
 };
 }
 

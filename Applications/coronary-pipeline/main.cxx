@@ -32,6 +32,7 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakeSlicerCommand,
   coronary::MakeMetricsCommand,
   coronary::MakeEvaluateCommand,
+  coronary::MakeReviewCommand,
   coronary::MakeCohortCommand,
   coronary::MakeConvertCommand,
 };

@@ -9,10 +9,12 @@
 #include "vtkCellArray.h"
 #include "vtkCellArrayIterator.h"
 #include "vtkCellData.h"
+#include "vtkMath.h"
 #include "vtkPolyData.h"
 #include "vtkStringArray.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 
@@ -22,6 +24,11 @@ namespace
 {
 /// What a reduced surface may differ from its original by more than is said, mm.
 constexpr double DeviationError = 1e-2;
+/// Of a guessed piece of a line that is drawn, and of one that is not, mm.
+constexpr double DashLength = 1.5;
+/// Free at each side of the picture of a result, share of its size.
+constexpr double ResultMargin = 0.09;
+constexpr double ResultAspect = 10.0 / 9.0;
 
 /// Branches by their group's name, in the order in which they are met.
 class BranchList
@@ -123,9 +130,22 @@ struct Lines
   std::map<std::int64_t, std::string> labels;
 };
 
+/// Which pieces of lines are taken.
+enum class Pieces
+{
+  Seen,  ///< both ends were
+  Dashes ///< every other of the rest, about DashLength long
+};
+
+bool IsGuessed(const std::vector<double>& guessed, vtkIdType point)
+{
+  return point < static_cast<vtkIdType>(guessed.size()) &&
+    guessed[static_cast<std::size_t>(point)] > 0.5;
+}
+
 /// Pieces of the lines, and each name at the middle of the longest line that bears it.
-ReviewTopology TopologyOfLines(
-  vtkPolyData* tree, const std::map<std::int64_t, std::string>& names, BranchList& branches)
+ReviewTopology TopologyOfLines(vtkPolyData* tree, const std::map<std::int64_t, std::string>& names,
+  BranchList& branches, const std::vector<double>& guessed, Pieces pieces)
 {
   ReviewTopology topology;
   topology.points = static_cast<std::uint32_t>(tree->GetNumberOfPoints());
@@ -140,10 +160,27 @@ ReviewTopology TopologyOfLines(
     vtkIdType count = 0;
     const vtkIdType* ids = nullptr;
     cells->GetCurrentCell(count, ids);
+    double arc = 0.0; // of the guessed stretch
     for (vtkIdType k = 1; k < count; ++k)
     {
-      topology.cells.push_back(static_cast<std::uint32_t>(ids[k - 1]));
-      topology.cells.push_back(static_cast<std::uint32_t>(ids[k]));
+      const bool isGuessed = IsGuessed(guessed, ids[k - 1]) || IsGuessed(guessed, ids[k]);
+      const bool isDash = std::fmod(arc, 2.0 * DashLength) < DashLength;
+      if (isGuessed)
+      {
+        double ends[2][3];
+        tree->GetPoint(ids[k - 1], ends[0]);
+        tree->GetPoint(ids[k], ends[1]);
+        arc += std::sqrt(vtkMath::Distance2BetweenPoints(ends[0], ends[1]));
+      }
+      else
+      {
+        arc = 0.0;
+      }
+      if (pieces == Pieces::Dashes ? isGuessed && isDash : !isGuessed)
+      {
+        topology.cells.push_back(static_cast<std::uint32_t>(ids[k - 1]));
+        topology.cells.push_back(static_cast<std::uint32_t>(ids[k]));
+      }
     }
     if (!groups || count == 0)
     {
@@ -173,7 +210,8 @@ ReviewTopology TopologyOfLines(
   return topology;
 }
 
-Lines ReadLines(const EvaluationScene::Source& source, int count)
+Lines ReadLines(const EvaluationScene::Source& source, int count,
+  const std::vector<double>& guessed = {}, Pieces pieces = Pieces::Seen)
 {
   Lines lines;
   lines.series.corners = 2;
@@ -188,7 +226,8 @@ Lines ReadLines(const EvaluationScene::Source& source, int count)
       if (!last || !SameCells(last, tree, last->GetLines(), tree->GetLines()))
       {
         AddLabels(tree, lines.labels);
-        lines.series.topologies.push_back(TopologyOfLines(tree, lines.labels, branches));
+        lines.series.topologies.push_back(
+          TopologyOfLines(tree, lines.labels, branches, guessed, pieces));
       }
       last = tree;
       for (vtkIdType point = 0; point < tree->GetNumberOfPoints(); ++point)
@@ -223,7 +262,7 @@ public:
   {
   }
 
-  /// @param distances  one a point of the surface
+  /// @param distances  one a point of the surface; empty: there are none
   void Add(
     int index, vtkPolyData* surface, const SurfaceMesh& mesh, const std::vector<double>& distances)
   {
@@ -239,7 +278,10 @@ public:
     for (const vtkIdType point : this->Reduced.points)
     {
       AppendPosition(surface, point, frame.positions);
-      frame.distances.push_back(static_cast<float>(distances[static_cast<std::size_t>(point)]));
+      if (!distances.empty())
+      {
+        frame.distances.push_back(static_cast<float>(distances[static_cast<std::size_t>(point)]));
+      }
       left.points.push_back(mesh.points[static_cast<std::size_t>(point)]);
     }
     this->Series.frames.push_back(std::move(frame));
@@ -294,7 +336,7 @@ private:
   const vtkIdType Wanted;
   BranchList Branches;
   ReducedSurface Reduced;
-  vtkPolyData* Last = nullptr; ///< the scene's store has it
+  vtkSmartPointer<vtkPolyData> Last;
   ReviewSeries Series;
 };
 }
@@ -341,6 +383,63 @@ ReviewCase MakeReviewCase(
   review.range = DistanceRange(distances);
   review.model = models.Take();
   review.truth = truths.Take();
+  return review;
+}
+
+ReviewCase MakeResultCase(
+  const ResultScene& scene, std::int64_t triangles, const ProgressCallback& progress)
+{
+  ReviewCase review;
+  Lines lines = ReadLines(scene.centerline, scene.count, scene.guessed);
+  review.modelLines = std::move(lines.series);
+  if (std::any_of(
+        scene.guessed.begin(), scene.guessed.end(), [](double value) { return value > 0.5; }))
+  {
+    review.guessedLines =
+      ReadLines(scene.centerline, scene.count, scene.guessed, Pieces::Dashes).series;
+    for (ReviewTopology& topology : review.guessedLines.topologies)
+    {
+      topology.labels.clear(); // the other lines have them
+    }
+  }
+  std::vector<Vector3> points;
+  const auto append = [&](const std::vector<float>& positions, std::size_t wanted)
+  {
+    const std::size_t step = std::max<std::size_t>(1, positions.size() / 3 / wanted);
+    for (std::size_t k = 0; 3 * k + 2 < positions.size(); k += step)
+    {
+      points.emplace_back(positions[3 * k], positions[3 * k + 1], positions[3 * k + 2]);
+    }
+  };
+  for (const ReviewFrame& frame : review.modelLines.frames)
+  {
+    append(frame.positions, 4000);
+  }
+  if (scene.model)
+  {
+    SurfaceSeries models(scene.model, std::move(lines.labels), triangles);
+    for (int k = 0; k < scene.count; ++k)
+    {
+      Report(progress, double(k) / scene.count);
+      const vtkSmartPointer<vtkPolyData> surface = vtkCoronary::TrianglesOf(scene.model(k));
+      models.Add(k, surface, vtkCoronary::SurfaceOf(surface, "", ""), {});
+    }
+    review.model = models.Take();
+    for (const ReviewFrame& frame : review.model.frames)
+    {
+      append(frame.positions, 4000);
+    }
+  }
+  if (points.empty())
+  {
+    throw std::invalid_argument("The result to review has no points.");
+  }
+  const PictureView view = FindView(points, points, ResultAspect, ResultMargin);
+  review.aspect = ResultAspect;
+  review.leftAnterior = view.leftAnterior;
+  review.cranial = view.cranial;
+  review.height = view.height;
+  review.centre = { view.centre[0], view.centre[1], view.centre[2] };
   return review;
 }
 }

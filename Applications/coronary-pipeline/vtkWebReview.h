@@ -1,6 +1,6 @@
 /**
  * @file vtkWebReview.h
- * @brief From the surfaces and centerlines of an evaluation to what its review page shows.
+ * @brief From the surfaces and centerlines of an evaluation, or of a run, to what its review page shows.
  */
 #ifndef vtkWebReview_h
 #define vtkWebReview_h
@@ -10,6 +10,7 @@
 #include "vtkEvaluationPictures.h"
 
 #include <cstdint>
+#include <vector>
 
 namespace coronary
 {
@@ -23,6 +24,22 @@ namespace coronary
  */
 ReviewCase MakeReviewCase(
   const EvaluationScene& scene, std::int64_t triangles, const ProgressCallback& progress = {});
+
+/// A result without a truth.
+struct ResultScene
+{
+  int count = 1;                      ///< phases
+  EvaluationScene::Source model;      ///< of each phase; empty: there are no surfaces
+  EvaluationScene::Source centerline; ///< of each phase
+  std::vector<double> guessed;        ///< of the lines' points: 1 across a gap; empty: none
+};
+
+/**
+ * The same of a result. Lines are drawn as dashes where both ends of a piece, or one of them, are guessed.
+ * @throws std::invalid_argument for a scene without points; what the scene's functions throw; Cancelled
+ */
+ReviewCase MakeResultCase(
+  const ResultScene& scene, std::int64_t triangles, const ProgressCallback& progress = {});
 }
 
 #endif

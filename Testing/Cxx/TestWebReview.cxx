@@ -307,6 +307,68 @@ TEST_F(WebReviewPage, AllTrianglesComeBackWithinTheStatedError)
   EXPECT_GT(*greatest, 1.0);
 }
 
+TEST_F(WebReviewPage, AResultWithoutATruthHasDashesWhereItWasGuessed)
+{
+  ResultScene scene;
+  scene.count = 4;
+  scene.centerline = this->Scene.centerline;
+  scene.guessed.assign(static_cast<std::size_t>(Tree(0.0, 1.0)->GetNumberOfPoints()), 0.0);
+  std::fill(scene.guessed.begin() + 5, scene.guessed.begin() + 16, 1.0); // of the first line
+  for (const bool surface : { false, true })
+  {
+    scene.model = surface ? this->Scene.model : EvaluationScene::Source();
+    WebReview review;
+    EXPECT_THROW(review.SetRun({}), std::invalid_argument);
+    review.Add(this->Evaluation, MakeResultCase(scene, 1000000));
+    EXPECT_EQ(review.AddPicture("one"), 0U);
+    EXPECT_EQ(review.AddPicture("two"), 1U);
+    review.SetRun({ { "warnings", { Hostile } } });
+    const Page page(review.Html("coronary-pipeline 0", "review"));
+    EXPECT_EQ(page.Element("<script type=\"text/plain\" id=\"picture-1\">"), "dHdv");
+    const Json& one = page.Data["cases"][0];
+    EXPECT_EQ(one["run"]["warnings"].size(), 1U);
+    const Json& shapes = one["shapes"];
+    EXPECT_TRUE(shapes["truth"].is_null());
+    EXPECT_TRUE(shapes["truth_lines"].is_null());
+    EXPECT_EQ(shapes["model"].is_null(), !surface);
+    const std::string bytes = page.Bytes(0);
+    if (surface)
+    {
+      const Decoded model(shapes["model"], bytes);
+      ASSERT_EQ(model.positions.size(), 4U);
+      EXPECT_TRUE(model.distances[0].empty());
+    }
+    // Pieces by the point that they end at; those from 4 to 5 .. 15 to 16 touch a guessed point.
+    const auto ends = [&](const char* name)
+    {
+      const std::vector<unsigned int> cells = Decoded(shapes[name], bytes).cells[0];
+      std::set<unsigned int> points;
+      for (std::size_t k = 0; k < cells.size(); k += 2)
+      {
+        EXPECT_EQ(cells[k + 1], cells[k] + 1);
+        points.insert(cells[k + 1]);
+      }
+      return points;
+    };
+    const std::set<unsigned int> seen = ends("model_lines");
+    const std::set<unsigned int> dashes = ends("guessed_lines");
+    EXPECT_EQ(seen.size(), 3U * 30U - 12U);
+    for (const unsigned int point : seen)
+    {
+      EXPECT_TRUE(point < 5 || point > 16) << point;
+    }
+    // Dashes of 1.5 mm and gaps as long between, in pieces of 0.7 mm.
+    EXPECT_EQ(dashes.count(5), 1U);
+    EXPECT_GE(dashes.size(), 5U);
+    EXPECT_LE(dashes.size(), 8U);
+    EXPECT_GE(*dashes.begin(), 5U);
+    EXPECT_LE(*dashes.rbegin(), 16U);
+  }
+  scene.centerline = [](int) { return vtkSmartPointer<vtkPolyData>(); };
+  scene.model = nullptr;
+  EXPECT_THROW(MakeResultCase(scene, 1000), std::invalid_argument);
+}
+
 TEST_F(WebReviewPage, ReducedSurfacesKeepPointsAndSayHowFarOffTheyAre)
 {
   const Page page = this->Make(1500);

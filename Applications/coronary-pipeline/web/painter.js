@@ -314,7 +314,7 @@ class Painter {
 
   /**
    * @param surfaces  at most two of { series, frame, colour, opacity, range }; with a range, in mm, coloured by distance
-   * @param lines     { series, frame, colour } each, over everything
+   * @param lines     { series, frame, colour, width } each, over everything; width in the page's pixels, 2 where it is missing
    */
   draw(camera, surfaces, lines, background, quality) {
     const gl = this.gl;
@@ -391,12 +391,12 @@ class Painter {
     }
   }
 
-  drawLines(view, { series, frame, colour }) {
+  drawLines(view, { series, frame, colour, width = 2 }) {
     const gl = this.gl;
     const made = this.linesOf(frame);
     const ratio = this.canvas.width / Math.max(1, this.canvas.clientWidth);
     this.use(this.line, { centre: view.centre, right: view.right, up: view.up, scale: view.scale,
-      low: series.low, size: series.size, colour: colour.map((part) => part / 255), width: 2 * ratio,
+      low: series.low, size: series.size, colour: colour.map((part) => part / 255), width: width * ratio,
       pixel: [2 / this.canvas.width, 2 / this.canvas.height] });
     gl.bindVertexArray(made.array);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, made.count);

@@ -4,6 +4,8 @@ const RED = [214, 39, 40];
 const GREEN = [60, 179, 80];
 const LINE_COLOURS = { model: [122, 12, 20], truth: [10, 92, 40] };
 const DARK_LINE_COLOURS = { model: [255, 176, 170], truth: [170, 240, 180] };
+const GUESSED = [232, 128, 0];
+const NEAR_VIEW = 60; // mm that the picture is high when one goes to a place
 const PAPER_WIDTH = 680;  // of the printed picture at most, CSS pixels: 18 cm
 const PAPER_HEIGHT = 530;
 const MODES = ['model', 'truth', 'overlay', 'model-distance', 'truth-distance'];
@@ -43,6 +45,7 @@ class Review {
     } catch (error) {
       this.complain(error.message);
     }
+    this.run = new RunPanel((place, near) => this.goToPlace(place, near));
     this.fillColourBar();
     new ResizeObserver(() => this.resize()).observe(this.stage);
     this.resize();
@@ -59,6 +62,11 @@ class Review {
 
   get table() {
     return this.data.table1.cases[this.index];
+  }
+
+  /** Whether the case has a truth; one of a run alone has not. */
+  get compared() {
+    return this.data.cases[this.index].shapes.truth !== null;
   }
 
   // --- cases and phases
@@ -83,8 +91,19 @@ class Review {
     if (phases.every((phase) => phase.fraction !== null)) {
       this.order.sort((a, b) => phases[a].fraction - phases[b].fraction || a - b);
     }
-    this.phase = this.order[0];
+    this.phase = this.data.cases[index].run ? this.data.cases[index].run.reference : this.order[0];
     this.setRange(this.data.cases[index].range);
+    this.run.fill(this.data.cases[index].run || null);
+    this.run.mark(null);
+    byId('modes').hidden = !this.compared;
+    byId('against').textContent = this.compared ? 'against the truth' : 'and the image it was found in';
+    byId('transport').hidden = phases.length < 2;
+    document.querySelectorAll('.of-truth').forEach((one) => { one.hidden = !this.compared; });
+    document.querySelectorAll('.of-measures').forEach((one) => { one.hidden = !this.compared; });
+    if (!this.compared) {
+      this.setMode('model');
+      byId('lines').checked = true;
+    }
     this.fillTables();
     this.fillTicks();
     this.showPhase(this.phase);
@@ -111,6 +130,12 @@ class Review {
   }
 
   fillTables() {
+    if (!this.compared) {
+      this.plots = [];
+      this.fillAbout();
+      this.markPhase();
+      return;
+    }
     const all = byId('all-measures').checked;
     byId('part-a-case').textContent = this.data.cases.length > 1 || this.table.name ? this.table.name : '';
     fillPartA(byId('part-a'), this.data, this.index, all, (k) => this.goTo(k));
@@ -176,7 +201,8 @@ class Review {
     }
     const distances = known(phase.HD) ? [element('span', {}, [`HD ${written(phase.HD, 2)}  MSD ${written(phase.MSD, 2)} mm`])] : [];
     byId('caption').replaceChildren(element('strong', {}, [`Phase ${phase.phase}`]), ` ${percentOf(phase)} `,
-      element('em', { class: kindOf(phase) }, [kindOf(phase)]), ...distances);
+      // Of a result at rest nothing was tracked.
+      this.compared || this.order.length > 1 ? element('em', { class: kindOf(phase) }, [kindOf(phase)]) : '', ...distances);
     this.plots.forEach((plot) => plot.show(this.phase));
   }
 
@@ -268,6 +294,9 @@ class Review {
     const surface = (series, colour, opacity, range) =>
       ({ series, frame: series.frames[this.phase], colour, opacity, range });
     const opacity = (id) => Number(byId(id).value);
+    if (!model) {
+      return []; // a run without a surface: lines only
+    }
     switch (this.mode) {
       case 'model': return [surface(model, RED, 1, 0)];
       case 'truth': return [surface(truth, GREEN, 1, 0)];
@@ -300,6 +329,10 @@ class Review {
     const lines = byId('lines').checked
       ? this.trees.map(({ side, series }) => ({ series, frame: series.frames[this.phase], colour: colours[side] }))
       : [];
+    const guessed = this.shapes.guessed_lines;
+    if (guessed) {
+      lines.push({ series: guessed, frame: guessed.frames[this.phase], colour: GUESSED, width: 4 });
+    }
     this.painter.draw(this.camera, this.shown, lines, paper ? [1, 1, 1] : this.background, moving ? this.quality : 0);
     this.placeNames();
     this.placeMark();
@@ -370,6 +403,10 @@ class Review {
       return;
     }
     const opaque = this.shown.filter(({ opacity }) => opacity > 0.02);
+    if (!this.shapes.model) {
+      this.pickLine(x, y);
+      return;
+    }
     let best = null;
     for (const { series, frame } of opaque) {
       const hit = this.camera.pick(series, frame, x, y);
@@ -381,6 +418,40 @@ class Review {
       corners: best.hit.corners, weights: best.hit.weights, point: best.hit.point };
     this.readOut();
     this.update();
+  }
+
+  /** Without a surface: the point of the tree that is nearest on the picture. */
+  pickLine(x, y) {
+    const series = this.shapes.model_lines;
+    const frame = series.frames[this.phase];
+    let best = null;
+    for (let point = 0; point < frame.topology.points; ++point) {
+      const at = this.camera.project(series.position(frame, point));
+      const distance = Math.hypot(at.x - x, at.y - y);
+      if (distance < (best ? best.distance : 15)) {
+        best = { distance, point };
+      }
+    }
+    this.picked = best && { series, topology: frame.topology, corners: [best.point, best.point, best.point],
+      weights: [1, 0, 0], point: best.point };
+    this.readOut();
+    this.update();
+  }
+
+  /** A place of the reference phase, from a table or a picture. */
+  goToPlace(place, near) {
+    this.goTo(this.data.cases[this.index].run.reference);
+    this.picked = { place };
+    if (near) {
+      this.camera.centre = place.slice();
+      this.camera.height = Math.min(this.camera.height, NEAR_VIEW);
+      const figure = this.run.nearest(place) && this.run.figures.find(({ vessel }) => vessel === this.run.nearest(place).vessel);
+      if (figure) {
+        figure.article.scrollIntoView({ block: 'nearest' });
+      }
+    }
+    this.readOut();
+    this.moved();
   }
 
   /** To the point of what is shown that is furthest from the other surface. */
@@ -410,14 +481,19 @@ class Review {
   /** Follows the point through the phases, as long as these share their points. */
   get pickedNow() {
     const picked = this.picked;
+    if (picked && picked.place) {
+      const here = this.phase === this.data.cases[this.index].run.reference;
+      return here ? { side: 'model', position: picked.place, distance: NaN, branch: '' } : null;
+    }
     const frame = picked && this.shapes && picked.series.frames[this.phase];
-    const visible = picked && this.shapes && this.sides.some((side) => this.shapes[side] === picked.series);
+    const visible = picked && this.shapes && this.sides.some((side) =>
+      this.shapes[side] === picked.series || this.shapes[`${side}_lines`] === picked.series);
     if (!visible || frame.topology !== picked.topology) {
       return null;
     }
     const mix = (value) => picked.corners.reduce((sum, corner, k) => sum + picked.weights[k] * value(corner), 0);
     return {
-      side: picked.series === this.shapes.model ? 'model' : 'truth',
+      side: picked.series === this.shapes.truth ? 'truth' : 'model',
       position: [0, 1, 2].map((axis) => mix((corner) => picked.series.position(frame, corner)[axis])),
       distance: mix((corner) => picked.series.distance(frame, corner)),
       branch: picked.series.branch(frame, picked.point),
@@ -428,18 +504,29 @@ class Review {
     const now = this.pickedNow;
     const readout = byId('readout');
     readout.classList.toggle('read', Boolean(now));
+    // Pictures are of the reference phase.
+    const run = this.data.cases[this.index].run;
+    this.run.mark(now && run && this.phase === run.reference ? now.position : null);
     if (!now) {
-      readout.textContent = 'Click the surface to read the distance, the branch and the phase there.';
+      readout.textContent = this.compared ? 'Click the surface to read the distance, the branch and the phase there.'
+        : 'Click the model, a picture or a row of a table to see the same place in the others.';
       return;
     }
     const phase = this.table.phases[this.phase];
+    const place = `L ${now.position[0].toFixed(1)}, P ${now.position[1].toFixed(1)}, H ${now.position[2].toFixed(1)} mm`;
+    if (!this.compared || this.picked.place) {
+      const near = this.phase === run.reference ? this.run.nearest(now.position) : null;
+      readout.replaceChildren(element('strong', {}, [near ? near.vessel.name : now.branch || 'no vessel within 4 mm']),
+        element('span', {}, [near ? `${near.arc} mm along it` : '']), element('span', {}, [place]));
+      return;
+    }
     const other = now.side === 'model' ? 'truth' : 'model';
     const distance = Number.isFinite(now.distance)
       ? `${Math.abs(now.distance).toFixed(2)} mm ${now.distance < 0 ? 'inside' : 'outside'} the ${other}` : 'distance not known';
     readout.replaceChildren(element('strong', {}, [distance]),
       element('span', {}, [now.branch || 'branch not known']),
       element('span', {}, [`on the ${now.side}, phase ${phase.phase}, ${percentOf(phase)}, ${kindOf(phase)}`]),
-      element('span', {}, [`L ${now.position[0].toFixed(1)}, P ${now.position[1].toFixed(1)}, H ${now.position[2].toFixed(1)} mm`]));
+      element('span', {}, [place]));
   }
 
   placeMark() {
@@ -455,13 +542,17 @@ class Review {
   // --- what is shown
 
   setMode(mode) {
+    if (mode !== 'model' && !this.compared) {
+      return;
+    }
     this.mode = mode;
     this.stage.dataset.mode = mode;
     document.querySelector(`input[name="mode"][value="${mode}"]`).checked = true;
     byId('colours').hidden = !mode.endsWith('distance');
     document.querySelectorAll('.of-distance').forEach((one) => { one.hidden = !mode.endsWith('distance'); });
     document.querySelectorAll('.of-overlay').forEach((one) => { one.hidden = mode !== 'overlay'; });
-    byId('key').replaceChildren(...(mode.endsWith('distance') ? [] : this.sides).map((side) => element('span', { class: side }, [side])));
+    byId('key').replaceChildren(...(mode.endsWith('distance') ? [] : this.sides).map((side) => element('span', { class: side }, [side])),
+      ...(this.data.cases[this.index].shapes.guessed_lines ? [element('span', { class: 'guessed' }, ['guessed'])] : []));
     this.readOut();
     this.update();
   }
@@ -486,19 +577,29 @@ class Review {
 
   fillAbout() {
     const one = this.data.cases[this.index];
-    const rows = [['Made by', this.data.version], ['Command', this.data.command],
-      ['Distances', 'of the surfaces as they were, to the nearest point of the other one’s triangles; negative: inside. The colours ' +
-        `end at ±${one.range} mm as in the pictures: 99.5 % of the points are nearer there`]];
+    const rows = [['Made by', this.data.version], ['Command', this.data.command]];
+    if (this.compared) {
+      rows.push(['Distances', 'of the surfaces as they were, to the nearest point of the other one’s triangles; negative: inside. The colours ' +
+        `end at ±${one.range} mm as in the pictures: 99.5 % of the points are nearer there`]);
+    }
     for (const [side, title] of [['model', 'Model'], ['truth', 'Truth']]) {
       const layout = one.shapes[side];
+      if (!layout) {
+        continue;
+      }
       const shown = Math.max(...layout.topologies.map((topology) => topology.indices / layout.corners));
-      const exact = `positions to ${(0.5 * Math.hypot(...layout.step)).toFixed(4)} mm, distances to ${(0.5 * layout.distance_step).toFixed(4)} mm`;
+      const exact = `positions to ${(0.5 * Math.hypot(...layout.step)).toFixed(4)} mm${this.compared ? `, distances to ${(0.5 * layout.distance_step).toFixed(4)} mm` : ''}`;
       rows.push([title, shown < layout.original_cells
         ? `shown reduced: ${shown.toLocaleString('en')} of ${layout.original_cells.toLocaleString('en')} triangles, at most ` +
           `${layout.deviation.toFixed(3)} mm off (Hausdorff distance, all phases); ${exact}`
         : `all ${shown.toLocaleString('en')} triangles; ${exact}`]);
     }
-    rows.push(['Table 1', 'of the surfaces as they were, with all their triangles']);
+    if (this.compared) {
+      rows.push(['Table 1', 'of the surfaces as they were, with all their triangles']);
+    }
+    if (one.run) {
+      rows.push(['Pictures', 'of the reference phase, in which the tree was found; places are LPS in mm']);
+    }
     byId('about').replaceChildren(...rows.flatMap(([name, text]) => [element('dt', {}, [name]), element('dd', {}, [text])]));
   }
 

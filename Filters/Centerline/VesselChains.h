@@ -1,0 +1,56 @@
+/**
+ * @file VesselChains.h
+ * @brief The branches of a tree joined into vessels that are looked at from their beginning to their end.
+ */
+#ifndef DynamicCoronary_VesselChains_h
+#define DynamicCoronary_VesselChains_h
+
+#include "CenterlineTree.h"
+
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// A piece of a vessel with one name.
+struct VesselPiece
+{
+  std::string name;
+  double begin = 0.0; ///< mm from the vessel's beginning
+  double end = 0.0;
+};
+
+/// A branch that leaves a vessel.
+struct VesselFork
+{
+  std::string name;
+  double arc = 0.0; ///< mm from the vessel's beginning
+};
+
+struct VesselChain
+{
+  std::string name;                 ///< of its pieces: "LM, pLAD, mLAD, dLAD"
+  std::vector<std::int64_t> points; ///< of the tree, in order; those of the lead-in first
+  std::vector<double> arc; ///< of each point, mm from the beginning; negative in the lead-in
+  std::vector<VesselPiece> pieces;
+  std::vector<VesselFork> forks;
+  int groupId = 0; ///< of its first branch
+  int treeId = 0;
+
+  double Length() const { return this->arc.empty() ? 0.0 : this->arc.back(); }
+};
+
+/**
+ * Every branch becomes part of one vessel. Where a branch ends, the vessel goes on into the daughter of the same
+ * artery (pLAD, mLAD, dLAD; the left main's is the LAD); where names do not tell, into the one whose tip is furthest
+ * away along the tree. A vessel that leaves another begins with a piece of that one, so that its origin is seen.
+ * In the order of the trees; a vessel before those that leave it.
+ * @param names   of the branches; empty ones become "branch N", N the group
+ * @param leadIn  mm of the parent before the origin
+ * @throws std::invalid_argument for another number of names than branches; as CheckTree
+ */
+std::vector<VesselChain> JoinVessels(
+  const CenterlineTree& tree, const std::vector<std::string>& names, double leadIn = 8.0);
+}
+
+#endif
