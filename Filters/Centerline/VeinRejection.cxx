@@ -203,7 +203,8 @@ std::optional<VeinBranch> VeinFinder::Describe(std::size_t branch, double& error
   if (!early.empty() && !last.empty())
   {
     result.calibre = Median(early) / std::max(1e-9, widest);
-    result.growth = Median(last) / std::max(1e-9, Median(early));
+    // Behind a narrow begin any artery is wider again: only what becomes wider than the artery before counts.
+    result.growth = Median(last) / std::max({ 1e-9, Median(early), 0.9 * widest });
   }
   // Beside another vessel: within 6 mm of one, and not of the fork.
   std::size_t beside = 0;
@@ -273,7 +274,8 @@ std::vector<VeinBranch> VeinFinder::Run()
     odds += std::min(4.0, 8.0 * std::max(0.0, one.growth - 1.15));
     odds += 1.5 * std::max(0.0, one.beside - 0.3);
     one.probability = 1.0 / (1.0 + std::exp(-odds));
-    if (odds >= 0.0)
+    // No sign but the brightness can tell a vein from an artery behind a lesion.
+    if (odds >= 0.0 && darker > 1.0)
     {
       veins.push_back(one);
     }
