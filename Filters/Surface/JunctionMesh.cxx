@@ -508,6 +508,10 @@ JunctionMesh MeshJunction(const SweptLumen& lumen, int junction)
   }
   JunctionFailure failure(text.str());
   failure.centre = j.centre;
+  for (const SweptLumen::Arm& arm : j.arms)
+  {
+    failure.groups.push_back(lumen.GroupAt(lumen.Spans()[arm.span].vessel, arm.cut));
+  }
   for (const SweptLumen::Range& range : j.ranges)
   {
     const VesselAxis& axis = *lumen.Vessels()[range.vessel].axis;
