@@ -18,6 +18,7 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
+#include "vtkRunMeshes.h"
 #include "vtkRunSurface.h"
 #include "vtkSurfaceFile.h"
 
@@ -705,27 +706,35 @@ Json MakeSurface(RunStep& step)
   WritePolyData(step.Add("surface.vtp"), surface, step.input.Messages);
   WritePolyData(step.Add("caps.vtp"), caps, step.input.Messages);
   step.summary = std::to_string(surface->GetNumberOfPolys()) + " triangles";
-  return { { "file", "surface.vtp" }, { "caps_file", "caps.vtp" },
+  Json numbers = { { "file", "surface.vtp" }, { "caps_file", "caps.vtp" },
     { "kind", given ? "given" : "swept" }, { "triangles", surface->GetNumberOfPolys() },
     { "points", surface->GetNumberOfPoints() }, { "caps", caps->GetNumberOfPoints() } };
+  DescribeChanges(surface, numbers);
+  if (!numbers["left_out"].empty())
+  {
+    step.summary += ", " + std::to_string(numbers["left_out"].size()) + " branches left out";
+  }
+  return numbers;
 }
 
 Json MakeVolume(RunStep& step)
 {
   vtkMessageTrap& messages = step.input.Messages;
+  const auto surface = ReadLines(step, "surface.vtp");
+  // Branches that have no wall have no bones.
+  const auto tree = SweptPart(ReadTree(step), surface);
   vtkNew<vtkCenterlineSkeleton> skeleton;
-  skeleton->SetInputData(ReadTree(step));
+  skeleton->SetInputData(tree);
   UpdateAtTime(skeleton, 0, 0.0, messages, [](double) {});
   vtkPolyData* bones = skeleton->GetOutput();
   vtkNew<vtkTetrahedralMesher> mesher;
-  mesher->SetInputData(ReadLines(step, "surface.vtp"));
   mesher->SetSkeletonData(bones);
   // Where the wall was smoothed, the line may leave it.
   mesher->LeaveOutsideOn();
   // The smallest vessels of a coarse image may need smaller ones than the filter's default allows; the report
   // has the least.
   mesher->SetMinimumVolume(0.0);
-  Update(mesher, step);
+  const std::string helped = FillSurface(mesher, surface, tree, [&] { Update(mesher, step); });
   vtkUnstructuredGrid* volume = mesher->GetOutput();
   WritePolyData(step.Add("skeleton.vtp"), bones, messages);
   vtkNew<vtkTGFWriter> graph;
@@ -748,7 +757,7 @@ Json MakeVolume(RunStep& step)
     { "least_dihedral_angle_rad", Numbers(volume, vtkCoronaryArrayNames::LeastDihedralAngle) },
     { "least_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::LeastVolume) },
     { "total_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::TotalVolume) },
-    { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) } };
+    { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) }, { "helped_by", helped } };
 }
 
 /// A row a point, a column a bone, out of the compact form that moves the mesh.

@@ -63,8 +63,8 @@ double LengthOf(const SweepTree& tree, const std::vector<std::int64_t>& list)
 }
 
 /// Distance of a place from the polyline of a branch.
-double DistanceTo(
-  const SweepTree& tree, const std::vector<std::int64_t>& list, const Vector3& place, std::size_t& at)
+double DistanceTo(const SweepTree& tree, const std::vector<std::int64_t>& list,
+  const Vector3& place, std::size_t& at)
 {
   double best = std::numeric_limits<double>::max();
   for (std::size_t i = 0; i < list.size(); ++i)
@@ -196,8 +196,7 @@ SweepCut CutTree(SweepTree& tree, int groupId, const Vector3& place, double reac
   }
   const double all = LengthOf(tree, list);
   const Vector3 from = tree.points[list[first]];
-  cut.parts.push_back(
-    { groupId, VesselName(tree, groupId), "", from, all - LengthOf(tree, kept) });
+  cut.parts.push_back({ groupId, VesselName(tree, groupId), "", from, all - LengthOf(tree, kept) });
   std::vector<char> removed(tree.branches.size(), 0);
   removed[branch] = kept.size() < 2 ? 1 : 0;
   list = kept;

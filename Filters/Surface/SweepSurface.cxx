@@ -36,6 +36,7 @@ constexpr double FairAngle = 5.0;
 constexpr double NeedAngle = 0.5;
 /// Around a fault so many radii of a branch are left out.
 constexpr double CutReach = 2.0;
+constexpr double CutGrowth = 3.0;
 /// Below, the areas of triangles vanish in what the angles are made of; mm.
 constexpr double LeastRadius = 1e-6;
 constexpr double MostTriangles = 2e7;
@@ -621,8 +622,8 @@ struct Reliefs
   std::vector<SweepOmission> leftOut;
 
   /// More at this place. @return false when no more is to be had
-  bool Add(
-    const Vector3& centre, double reach, const SweepSettings& settings, const std::string& reason, int group)
+  bool Add(const Vector3& centre, double reach, const SweepSettings& settings,
+    const std::string& reason, int group)
   {
     std::size_t i = 0;
     while (i < this->places.size() &&
@@ -748,7 +749,7 @@ public:
       {
         this->CutLeast({ { collision.groups[0], collision.places[0] },
                          { collision.groups[1], collision.places[1] } },
-          collision.reach, "it runs through " + this->OtherOf(collision) + " without joining it");
+          collision.reach, "it runs through another vessel without joining it");
       }
       if (this->Tree.branches.empty())
       {
@@ -760,12 +761,6 @@ public:
 
 private:
   using Choice = std::pair<int, Vector3>; ///< group and place
-
-  std::string OtherOf(const SweepCollision& collision) const
-  {
-    return VesselName(this->Input, collision.groups[0]) + " or " +
-      VesselName(this->Input, collision.groups[1]);
-  }
 
   SweptSurface Finished(SweptSurface surface) const
   {
@@ -779,6 +774,19 @@ private:
     surface.remarks.insert(surface.remarks.end(), reliefs.begin(), reliefs.end());
     surface.remarks.insert(surface.remarks.end(), this->Remarks.begin(), this->Remarks.end());
     surface.leftOut.insert(surface.leftOut.end(), this->LeftOut.begin(), this->LeftOut.end());
+    std::set<std::int64_t> missing;
+    if (!surface.leftOut.empty())
+    {
+      for (const SweepBranch& branch : this->Input.branches)
+      {
+        missing.insert(branch.points.begin(), branch.points.end());
+      }
+      for (const std::int64_t p : surface.leftOutPoints)
+      {
+        missing.erase(p);
+      }
+    }
+    surface.leftOutPoints.assign(missing.begin(), missing.end());
     return surface;
   }
 
@@ -794,7 +802,8 @@ private:
     for (const Fault& fault : this->Apart(faults, FaultReach))
     {
       more = this->Relief.Add(fault.position, FaultReach * fault.radius, this->Settings,
-               "the triangles at " + SweepPlace(fault.position) + " were too thin or cut each other",
+               VesselName(this->Input, fault.group) + " at " + SweepPlace(fault.position) +
+                 ": triangles were too thin or cut each other",
                fault.group) ||
         more;
     }
@@ -835,13 +844,20 @@ private:
     least.length = std::numeric_limits<double>::max();
     for (const Choice& choice : choices)
     {
+      // Who fails again loses more.
+      const auto before = this->Cuts.find(choice.first);
+      const double more = before == this->Cuts.end() ? 1.0 : std::pow(CutGrowth, before->second);
       SweepTree tree = this->Tree;
-      SweepCut cut = CutTree(tree, choice.first, choice.second, reach);
+      SweepCut cut = CutTree(tree, choice.first, choice.second, more * reach);
       if (!cut.parts.empty() && cut.length < least.length)
       {
         least = std::move(cut);
         best = std::move(tree);
       }
+    }
+    for (const Choice& choice : choices)
+    {
+      ++this->Cuts[choice.first];
     }
     if (least.parts.empty())
     {
@@ -855,6 +871,10 @@ private:
     for (std::size_t i = 0; i < least.parts.size(); ++i)
     {
       const SweepLeftOut& part = least.parts[i];
+      if (part.length <= 0.0)
+      {
+        continue; // a point that was added to its end
+      }
       AddLeftOut(this->LeftOut, this->Remarks, this->Input, part.groupId,
         i == 0 ? reason : "it comes from " + least.parts[0].vessel + ", which is left out",
         part.place, part.length);
@@ -869,8 +889,14 @@ private:
     for (const JunctionFailure& place : unresolved.places)
     {
       const int group = place.groups.empty() ? 0 : place.groups.front();
+      std::string vessels;
+      for (const int g : std::set<int>(place.groups.begin(), place.groups.end()))
+      {
+        vessels += (vessels.empty() ? "" : ", ") + VesselName(this->Input, g);
+      }
       if (!this->Last &&
-        this->Relief.Add(place.centre, place.reach, this->Settings, place.what(), group))
+        this->Relief.Add(place.centre, place.reach, this->Settings,
+          vessels + " at " + SweepPlace(place.centre) + ": the wall could not be resolved", group))
       {
         continue;
       }
@@ -898,6 +924,7 @@ private:
   Reliefs Relief;
   std::vector<SweepLeftOut> LeftOut;
   std::vector<std::string> Remarks;
+  std::map<int, int> Cuts; ///< of each group
   int FaultSweeps = 0;
   bool Last = false;
 };
@@ -1120,6 +1147,7 @@ Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reli
   result.repairs = lumen.Repairs();
   result.leftOut = lumen.LeftOut();
   result.trees = lumen.Trees();
+  result.leftOutPoints = lumen.SweptPoints(); // all others, in the end
 
   // Caps: roots first, then tips, both in the order of the input's branches.
   const auto& tips = lumen.Tips();

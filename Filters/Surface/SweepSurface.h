@@ -120,11 +120,12 @@ struct SweptSurface
   std::vector<int> entityId; ///< per triangle: 1 wall, 2.. caps
   std::vector<SweepCap> caps;
   std::vector<SweepPatches> patches;
-  int trees = 0;                      ///< connected components
-  std::vector<std::string> remarks;   ///< what was changed or left out, where, and what helps
-  std::vector<SweepRepair> repairs;   ///< the same, in parts
-  std::vector<SweepLeftOut> leftOut;  ///< and what is missing
+  int trees = 0;                       ///< connected components
+  std::vector<std::string> remarks;    ///< what was changed or left out, where, and what helps
+  std::vector<SweepRepair> repairs;    ///< the same, in parts
+  std::vector<SweepLeftOut> leftOut;   ///< and what is missing
   std::vector<unsigned char> repaired; ///< per point: 1 where triangles were replaced; may be empty
+  std::vector<std::int64_t> leftOutPoints; ///< of the tree: on no branch that was swept
 };
 
 /**

@@ -38,7 +38,8 @@ std::string Millimetres(double length)
 }
 }
 
-std::string MendEnd(VesselCourse& course, const VesselAxis& axis, bool atStart, Vector3& place)
+std::string MendEnd(
+  VesselCourse& course, const VesselAxis& axis, bool atStart, bool mayTrim, Vector3& place)
 {
   const std::vector<VesselAxis::Station>& stations = axis.AllStations();
   const double length = axis.Length();
@@ -97,8 +98,8 @@ std::string MendEnd(VesselCourse& course, const VesselAxis& axis, bool atStart, 
     {
       double& radius = course.radius[index(i)];
       const double room = FitSlope * std::max(0.0, zone - along[i]);
-      radius = std::clamp(radius, std::max(0.5 * anchor.radius, anchor.radius - room),
-        anchor.radius + room);
+      radius = std::clamp(
+        radius, std::max(0.5 * anchor.radius, anchor.radius - room), anchor.radius + room);
     }
   };
   if (bend <= FitBend)
@@ -107,7 +108,7 @@ std::string MendEnd(VesselCourse& course, const VesselAxis& axis, bool atStart, 
     return "its radius changes too fast towards its end; limited over the last " +
       Millimetres(zone);
   }
-  if (zone <= LongestTrim * anchor.radius && length - zone > 4.0 * anchor.radius)
+  if (mayTrim && zone <= LongestTrim * anchor.radius && length - zone > 4.0 * anchor.radius)
   {
     const auto erase = [&](auto& list)
     {

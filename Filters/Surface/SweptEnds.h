@@ -27,10 +27,12 @@ struct VesselCourse
  *
  * @param axis     of the course as it is
  * @param atStart  which end
+ * @param mayTrim  else it is laid straight at once
  * @param[out] place  of the end before
  * @return what was done, "" when the end is fit as it is
  */
-std::string MendEnd(VesselCourse& course, const VesselAxis& axis, bool atStart, Vector3& place);
+std::string MendEnd(
+  VesselCourse& course, const VesselAxis& axis, bool atStart, bool mayTrim, Vector3& place);
 }
 
 #endif

@@ -102,7 +102,7 @@ struct SweptLumen::Build
   std::vector<Link> links;
   std::map<std::int64_t, std::vector<Incidence>> incidences;
   std::map<std::int64_t, int> treeOfNode;
-  std::vector<std::int64_t> extended; ///< end points that were moved outwards
+  std::vector<std::int64_t> extended;          ///< end points that were moved outwards
   std::set<std::tuple<int, bool, int>> mended; ///< group, at its start, round
   /// Where vessels meet: numbers and arc lengths of the vessels, one for each first junction.
   struct Node
@@ -613,7 +613,7 @@ struct SweptLumen::Build
       for (int round = 0; round < EndRounds && (atStart ? startOpen : endOpen); ++round)
       {
         Vector3 place = Vector3::Zero();
-        const std::string done = MendEnd(course, *axis, atStart, place);
+        const std::string done = MendEnd(course, *axis, atStart, round == 0, place);
         if (done.empty())
         {
           break;
@@ -1612,6 +1612,15 @@ SweptLumen::SweptLumen(const SweepTree& tree, const SweepSettings& settings,
     build.Connect();
     build.MakeVessels();
   } while (!build.CutJunctions());
+  for (const Link& link : build.links)
+  {
+    if (link.alive)
+    {
+      this->SweptPointList.insert(
+        this->SweptPointList.end(), link.points.begin(), link.points.end());
+    }
+  }
+  std::sort(this->SweptPointList.begin(), this->SweptPointList.end());
   build.SplitFolds();
   build.FinishJunctions();
   build.LimitEnds();

@@ -152,6 +152,8 @@ public:
   const std::vector<SweepRepair>& Repairs() const { return this->RepairList; }
   const std::vector<SweepLeftOut>& LeftOut() const { return this->LeftOutList; }
   int Trees() const { return this->TreeCount; }
+  /// Points of the input through which a vessel was swept, ascending.
+  const std::vector<std::int64_t>& SweptPoints() const { return this->SweptPointList; }
 
   /// The wall seen from a position; the site moves on to the neighbouring part where it must.
   void Evaluate(const Vector3& position, Site& site, Sample& sample) const;
@@ -184,6 +186,7 @@ private:
   std::vector<std::string> RemarkList;
   std::vector<SweepRepair> RepairList;
   std::vector<SweepLeftOut> LeftOutList;
+  std::vector<std::int64_t> SweptPointList;
   /// For each part (spans first, then junctions): tubes of other parts that come close.
   std::vector<std::vector<Range>> Neighbours;
   double Clearance = 0.0;
