@@ -152,44 +152,26 @@ public:
   std::vector<Triangle> triangles;
   std::vector<int> entity;
 
-  void Make(const ProgressCallback& progress)
+  /// @param reliefs  where the tree is not as it was given
+  void Make(const std::vector<SweepRelief>& reliefs, const ProgressCallback& progress)
   {
     const auto& junctions = this->Lumen.Junctions();
     std::vector<JunctionMesh> meshes(junctions.size());
-    std::vector<std::unique_ptr<JunctionFailure>> failed(junctions.size());
-    ParallelFor(
-      static_cast<std::int64_t>(junctions.size()), 1,
-      [&](std::int64_t first, std::int64_t last)
-      {
-        for (std::int64_t j = first; j < last; ++j)
-        {
-          if (junctions[j].arms.empty())
-          {
-            continue;
-          }
-          try
-          {
-            meshes[j] = MeshJunction(this->Lumen, static_cast<int>(j));
-          }
-          catch (const JunctionFailure& failure)
-          {
-            failed[j] = std::make_unique<JunctionFailure>(failure);
-          }
-        }
-      },
-      progress);
-    Unresolved unresolved;
-    for (const auto& failure : failed)
+    // What was relieved may fail again: first of all, so that nothing else is done in vain.
+    std::vector<std::int64_t> doubtful;
+    std::vector<std::int64_t> others;
+    for (std::size_t j = 0; j < junctions.size(); ++j)
     {
-      if (failure)
+      const bool relieved = std::any_of(reliefs.begin(), reliefs.end(),
+        [&](const SweepRelief& relief)
+        { return (relief.centre - junctions[j].centre).norm() < relief.reach; });
+      if (!junctions[j].arms.empty())
       {
-        unresolved.places.push_back(*failure);
+        (relieved ? doubtful : others).push_back(static_cast<std::int64_t>(j));
       }
     }
-    if (!unresolved.places.empty())
-    {
-      throw unresolved;
-    }
+    this->MeshJunctions(doubtful, meshes, {});
+    this->MeshJunctions(others, meshes, progress);
     std::vector<std::int64_t> offset(junctions.size(), 0);
     for (std::size_t j = 0; j < junctions.size(); ++j)
     {
@@ -246,6 +228,42 @@ public:
   }
 
 private:
+  /// @throws Unresolved with all that fail; Cancelled
+  void MeshJunctions(const std::vector<std::int64_t>& which, std::vector<JunctionMesh>& meshes,
+    const ProgressCallback& progress) const
+  {
+    std::vector<std::unique_ptr<JunctionFailure>> failed(which.size());
+    ParallelFor(
+      static_cast<std::int64_t>(which.size()), 1,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t i = first; i < last; ++i)
+        {
+          try
+          {
+            meshes[which[i]] = MeshJunction(this->Lumen, static_cast<int>(which[i]));
+          }
+          catch (const JunctionFailure& failure)
+          {
+            failed[i] = std::make_unique<JunctionFailure>(failure);
+          }
+        }
+      },
+      progress);
+    Unresolved unresolved;
+    for (const auto& failure : failed)
+    {
+      if (failure)
+      {
+        unresolved.places.push_back(*failure);
+      }
+    }
+    if (!unresolved.places.empty())
+    {
+      throw unresolved;
+    }
+  }
+
   void Add(std::int64_t a, std::int64_t b, std::int64_t c, int e)
   {
     this->triangles.push_back({ a, b, c });
@@ -1180,7 +1198,7 @@ Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reli
   }
 
   FirstMesh first(lumen, settings, capEntity);
-  first.Make(part(0.05, 0.25));
+  first.Make(reliefs.places, part(0.05, 0.25));
   const std::vector<std::int64_t> torn = CellsOfBadEdges(first.triangles);
   if (!torn.empty())
   {

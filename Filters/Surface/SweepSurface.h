@@ -24,7 +24,7 @@ struct SweepBranch
 {
   std::vector<std::int64_t> points; ///< indices; branches are joined where they share a point
   int groupId = 0;
-  std::string name; ///< of the vessel, for messages; may be empty
+  std::string name{}; ///< of the vessel, for messages; may be empty
 };
 
 /// What is swept: a forest of branches.
