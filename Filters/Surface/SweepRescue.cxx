@@ -177,6 +177,7 @@ SweepCut CutTree(SweepTree& tree, int groupId, const Vector3& place, double reac
   std::vector<std::int64_t> kept;
   std::set<std::int64_t> gone(list.begin(), list.end());
   std::size_t first = 0;
+  cut.atRoot = keepTail;
   if (keepTail)
   {
     kept.assign(begin + signedOf(after), list.end());

@@ -38,6 +38,7 @@ struct SweepCut
 {
   std::vector<SweepLeftOut> parts; ///< one a branch, without reasons
   double length = 0.0;             ///< of all, mm
+  bool atRoot = false;             ///< the part before the place, with the inlet
 };
 
 /**

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
 #include <set>
@@ -859,7 +858,6 @@ private:
   {
     SweepTree best;
     SweepCut least;
-    least.length = std::numeric_limits<double>::max();
     for (const Choice& choice : choices)
     {
       // Who fails again loses more.
@@ -867,7 +865,10 @@ private:
       const double more = before == this->Cuts.end() ? 1.0 : std::pow(CutGrowth, before->second);
       SweepTree tree = this->Tree;
       SweepCut cut = CutTree(tree, choice.first, choice.second, more * reach);
-      if (!cut.parts.empty() && cut.length < least.length)
+      // A tree without its inlet is worth less than any branch.
+      if (!cut.parts.empty() &&
+        (least.parts.empty() ||
+          std::make_pair(cut.atRoot, cut.length) < std::make_pair(least.atRoot, least.length)))
       {
         least = std::move(cut);
         best = std::move(tree);

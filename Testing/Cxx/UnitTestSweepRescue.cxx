@@ -126,11 +126,11 @@ SweepTree Random(unsigned seed)
     return Add(tree, group, from, std::max(3, static_cast<int>(2.0 * length)),
       [&](double t)
       {
-        direction += Vector3(uniform(-0.2, 0.2), uniform(-0.2, 0.2), uniform(-0.2, 0.2));
+        direction += Vector3(uniform(-0.12, 0.12), uniform(-0.12, 0.12), uniform(-0.12, 0.12));
         direction.normalize();
         place += 0.5 * direction;
         return std::make_pair(
-          place, std::max(0.2, radius * (1.0 - 0.5 * t) * std::exp(uniform(-0.3, 0.3))));
+          place, std::max(0.2, radius * (1.0 - 0.5 * t) * std::exp(uniform(-0.2, 0.2))));
       });
   };
   auto trunk = walk(0, -1, 35.0, 1.8);
