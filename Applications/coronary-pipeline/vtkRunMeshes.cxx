@@ -29,6 +29,9 @@ namespace
 using Json = nlohmann::ordered_json;
 namespace names = vtkCoronaryArrayNames;
 
+/// What is wider than so many times the largest radius of a vessel is none; aneurysms are narrower.
+constexpr double WidestVessel = 2.0;
+
 vtkStringArray* Texts(vtkPolyData* data, const char* name)
 {
   return vtkStringArray::SafeDownCast(data->GetFieldData()->GetAbstractArray(name));
@@ -68,6 +71,29 @@ bool PlaceIn(const std::string& message, double place[3])
   }
   return false;
 }
+}
+
+void RequireVessels(vtkPolyData* tree, const std::string& path, double largestRadius)
+{
+  vtkDataArray* radii = tree->GetPointData()->GetArray(names::Radius);
+  vtkIdType widest = 0;
+  for (vtkIdType n = 1; n < radii->GetNumberOfTuples(); ++n)
+  {
+    widest = radii->GetTuple1(n) > radii->GetTuple1(widest) ? n : widest;
+  }
+  const double limit = WidestVessel * largestRadius;
+  if (radii->GetTuple1(widest) > limit)
+  {
+    double p[3];
+    tree->GetPoint(widest, p);
+    char text[200];
+    std::snprintf(text, sizeof(text),
+      "' has a radius of %.1f mm at (%.1f, %.1f, %.1f), more than twice --largest-radius (%g mm): "
+      "the tree runs into a chamber or a great vessel",
+      radii->GetTuple1(widest), p[0], p[1], p[2], largestRadius);
+    throw std::runtime_error(
+      "'" + path + text + "; give seeds, a window, larger scales or another --largest-radius.");
+  }
 }
 
 void DescribeChanges(vtkPolyData* surface, Json& numbers)

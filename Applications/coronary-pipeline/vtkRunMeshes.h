@@ -18,6 +18,14 @@ class vtkTetrahedralMesher;
 
 namespace coronary
 {
+/**
+ * A tree in images that runs into a chamber has no wall that could be swept in finite time.
+ * @param path           of the tree, for the message
+ * @param largestRadius  of a vessel, mm
+ * @throws std::runtime_error naming the widest place
+ */
+void RequireVessels(vtkPolyData* tree, const std::string& path, double largestRadius);
+
 /// `repairs`: {vessel, what, place} and `left_out`: {vessel, reason, place, length_mm} of a swept surface.
 void DescribeChanges(vtkPolyData* surface, nlohmann::ordered_json& numbers);
 

@@ -75,9 +75,6 @@ using Json = nlohmann::ordered_json;
 /// How far a place on the wall may be from the axis, mm.
 constexpr double SurfaceSnapDistance = 3.0;
 
-/// What is wider than so many times the largest radius of a vessel is none; aneurysms are narrower.
-constexpr double WidestVessel = 2.0;
-
 /// The number of the phase at a time.
 int PhaseAt(vtkGatedImageReader* reader, double time)
 {
@@ -648,30 +645,6 @@ vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
   return tree;
 }
 
-/// A tree in images that runs into a chamber has no wall that could be swept in finite time.
-void RequireVessels(const RunStep& step, vtkPolyData* tree)
-{
-  vtkDataArray* radii = tree->GetPointData()->GetArray(vtkCoronaryArrayNames::Radius);
-  vtkIdType widest = 0;
-  for (vtkIdType n = 1; n < radii->GetNumberOfTuples(); ++n)
-  {
-    widest = radii->GetTuple1(n) > radii->GetTuple1(widest) ? n : widest;
-  }
-  const double limit = WidestVessel * step.input.Settings.largestRadius;
-  if (radii->GetTuple1(widest) > limit)
-  {
-    double p[3];
-    tree->GetPoint(widest, p);
-    char text[200];
-    std::snprintf(text, sizeof(text),
-      "' has a radius of %.1f mm at (%.1f, %.1f, %.1f), more than twice --largest-radius (%g mm): "
-      "the tree runs into a chamber or a great vessel",
-      radii->GetTuple1(widest), p[0], p[1], p[2], step.input.Settings.largestRadius);
-    throw std::runtime_error("'" + PathOf(step, "centerline.vtp") + text +
-      "; give seeds, a window, larger scales or another --largest-radius.");
-  }
-}
-
 Json MakeSurface(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
@@ -681,7 +654,7 @@ Json MakeSurface(RunStep& step)
   const auto tree = ReadTree(step);
   if (!step.input.IsSurface())
   {
-    RequireVessels(step, tree);
+    RequireVessels(tree, PathOf(step, "centerline.vtp"), settings.largestRadius);
   }
   if (given)
   {
