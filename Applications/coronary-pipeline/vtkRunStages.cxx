@@ -18,6 +18,7 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
+#include "vtkRunMeshes.h"
 #include "vtkRunSurface.h"
 #include "vtkSurfaceFile.h"
 
@@ -73,9 +74,6 @@ using Json = nlohmann::ordered_json;
 
 /// How far a place on the wall may be from the axis, mm.
 constexpr double SurfaceSnapDistance = 3.0;
-
-/// What is wider than so many times the largest radius of a vessel is none; aneurysms are narrower.
-constexpr double WidestVessel = 2.0;
 
 /// The number of the phase at a time.
 int PhaseAt(vtkGatedImageReader* reader, double time)
@@ -647,30 +645,6 @@ vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
   return tree;
 }
 
-/// A tree in images that runs into a chamber has no wall that could be swept in finite time.
-void RequireVessels(const RunStep& step, vtkPolyData* tree)
-{
-  vtkDataArray* radii = tree->GetPointData()->GetArray(vtkCoronaryArrayNames::Radius);
-  vtkIdType widest = 0;
-  for (vtkIdType n = 1; n < radii->GetNumberOfTuples(); ++n)
-  {
-    widest = radii->GetTuple1(n) > radii->GetTuple1(widest) ? n : widest;
-  }
-  const double limit = WidestVessel * step.input.Settings.largestRadius;
-  if (radii->GetTuple1(widest) > limit)
-  {
-    double p[3];
-    tree->GetPoint(widest, p);
-    char text[200];
-    std::snprintf(text, sizeof(text),
-      "' has a radius of %.1f mm at (%.1f, %.1f, %.1f), more than twice --largest-radius (%g mm): "
-      "the tree runs into a chamber or a great vessel",
-      radii->GetTuple1(widest), p[0], p[1], p[2], step.input.Settings.largestRadius);
-    throw std::runtime_error("'" + PathOf(step, "centerline.vtp") + text +
-      "; give seeds, a window, larger scales or another --largest-radius.");
-  }
-}
-
 Json MakeSurface(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
@@ -680,7 +654,7 @@ Json MakeSurface(RunStep& step)
   const auto tree = ReadTree(step);
   if (!step.input.IsSurface())
   {
-    RequireVessels(step, tree);
+    RequireVessels(tree, PathOf(step, "centerline.vtp"), settings.largestRadius);
   }
   if (given)
   {
@@ -705,27 +679,35 @@ Json MakeSurface(RunStep& step)
   WritePolyData(step.Add("surface.vtp"), surface, step.input.Messages);
   WritePolyData(step.Add("caps.vtp"), caps, step.input.Messages);
   step.summary = std::to_string(surface->GetNumberOfPolys()) + " triangles";
-  return { { "file", "surface.vtp" }, { "caps_file", "caps.vtp" },
+  Json numbers = { { "file", "surface.vtp" }, { "caps_file", "caps.vtp" },
     { "kind", given ? "given" : "swept" }, { "triangles", surface->GetNumberOfPolys() },
     { "points", surface->GetNumberOfPoints() }, { "caps", caps->GetNumberOfPoints() } };
+  DescribeChanges(surface, numbers);
+  if (!numbers["left_out"].empty())
+  {
+    step.summary += ", " + std::to_string(numbers["left_out"].size()) + " branches left out";
+  }
+  return numbers;
 }
 
 Json MakeVolume(RunStep& step)
 {
   vtkMessageTrap& messages = step.input.Messages;
+  const auto surface = ReadLines(step, "surface.vtp");
+  // Branches that have no wall have no bones.
+  const auto tree = SweptPart(ReadTree(step), surface);
   vtkNew<vtkCenterlineSkeleton> skeleton;
-  skeleton->SetInputData(ReadTree(step));
+  skeleton->SetInputData(tree);
   UpdateAtTime(skeleton, 0, 0.0, messages, [](double) {});
   vtkPolyData* bones = skeleton->GetOutput();
   vtkNew<vtkTetrahedralMesher> mesher;
-  mesher->SetInputData(ReadLines(step, "surface.vtp"));
   mesher->SetSkeletonData(bones);
   // Where the wall was smoothed, the line may leave it.
   mesher->LeaveOutsideOn();
   // The smallest vessels of a coarse image may need smaller ones than the filter's default allows; the report
   // has the least.
   mesher->SetMinimumVolume(0.0);
-  Update(mesher, step);
+  const std::string helped = FillSurface(mesher, surface, tree, [&] { Update(mesher, step); });
   vtkUnstructuredGrid* volume = mesher->GetOutput();
   WritePolyData(step.Add("skeleton.vtp"), bones, messages);
   vtkNew<vtkTGFWriter> graph;
@@ -748,7 +730,7 @@ Json MakeVolume(RunStep& step)
     { "least_dihedral_angle_rad", Numbers(volume, vtkCoronaryArrayNames::LeastDihedralAngle) },
     { "least_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::LeastVolume) },
     { "total_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::TotalVolume) },
-    { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) } };
+    { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) }, { "helped_by", helped } };
 }
 
 /// A row a point, a column a bone, out of the compact form that moves the mesh.

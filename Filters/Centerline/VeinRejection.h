@@ -23,8 +23,8 @@ struct VeinBranch
   double probability = 0.0; ///< 0 to 1
   double brightness = 0.0;  ///< step from the artery, share of the contrast, negative: darker
   double calibre = 1.0;     ///< radius over the greatest of the artery before it
-  double growth = 1.0;      ///< radius at its end over that at its begin
-  double beside = 0.0;      ///< share of its length beside an artery
+  double growth = 1.0; ///< radius at its end over the larger of that at its begin and the artery's
+  double beside = 0.0; ///< share of its length beside an artery
 };
 
 /**

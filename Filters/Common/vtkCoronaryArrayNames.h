@@ -233,7 +233,15 @@ constexpr const char* MeshPointId = "MeshPointId"; ///< vtkIdType, point of the 
 constexpr const char* SurfaceArea = "SurfaceArea"; ///< double, mm^2
 
 // Cleaned surface, field data.
-constexpr const char* Repairs = "Repairs";                           ///< string, a sentence each
+constexpr const char* Repairs = "Repairs";               ///< string, a sentence each
+constexpr const char* RepairVessels = "RepairVessels";   ///< string, of the swept surface
+constexpr const char* RepairPlaces = "RepairPlaces";     ///< double[3], mm
+constexpr const char* LeftOut = "LeftOut";               ///< string, reasons of branches
+constexpr const char* LeftOutVessels = "LeftOutVessels"; ///< string
+constexpr const char* LeftOutPlaces = "LeftOutPlaces";   ///< double[3], mm
+constexpr const char* LeftOutLengths = "LeftOutLengths"; ///< double, mm
+constexpr const char* LeftOutPoints = "LeftOutPoints";   ///< idtype, of the tree
+constexpr const char* Repaired = "Repaired";             ///< uchar, 1: triangles were replaced
 constexpr const char* GreatestDisplacement = "GreatestDisplacement"; ///< double, mm
 }
 

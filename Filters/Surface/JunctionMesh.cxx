@@ -15,17 +15,22 @@ using Key = std::uint64_t;
 
 /// Grids of more nodes are not tried.
 constexpr std::int64_t MostNodes = 100'000'000;
+/// Nor, when so many coarser grids gave nothing, of more than these: what three do not resolve is
+/// rarely resolved by the others, and they cost most of the time.
+constexpr int CheapAttempts = 3;
+constexpr std::int64_t MostNodesLater = 600'000;
 
 /// One attempt with one grid.
 class Attempt
 {
 public:
-  Attempt(const SweptLumen& lumen, int junction, double cell, double shift)
+  Attempt(const SweptLumen& lumen, int junction, double cell, double shift, std::int64_t mostNodes)
     : Lumen(lumen)
     , J(lumen.Junctions()[junction])
     , Number(junction)
     , Cell(cell)
     , Shift(shift)
+    , Most(mostNodes)
   {
   }
 
@@ -117,7 +122,7 @@ private:
     }
     const std::int64_t nodes =
       static_cast<std::int64_t>(this->Size[0]) * this->Size[1] * this->Size[2];
-    if (nodes > MostNodes)
+    if (nodes > this->Most)
     {
       return false;
     }
@@ -474,6 +479,7 @@ private:
   int Number;
   double Cell;
   double Shift;
+  std::int64_t Most; ///< nodes of the grid
   Vector3 Low = Vector3::Zero();
   std::array<int, 3> Size{ 0, 0, 0 };
   std::vector<float> Values;
@@ -491,7 +497,8 @@ JunctionMesh MeshJunction(const SweptLumen& lumen, int junction)
   double cell = 0.2 * j.smallestRadius;
   for (int attempt = 0; attempt < 6; ++attempt)
   {
-    Attempt run(lumen, junction, cell, 0.31 * attempt);
+    Attempt run(
+      lumen, junction, cell, 0.31 * attempt, attempt < CheapAttempts ? MostNodes : MostNodesLater);
     if (run.Run())
     {
       return std::move(run.mesh);
@@ -508,6 +515,10 @@ JunctionMesh MeshJunction(const SweptLumen& lumen, int junction)
   }
   JunctionFailure failure(text.str());
   failure.centre = j.centre;
+  for (const SweptLumen::Arm& arm : j.arms)
+  {
+    failure.groups.push_back(lumen.GroupAt(lumen.Spans()[arm.span].vessel, arm.cut));
+  }
   for (const SweptLumen::Range& range : j.ranges)
   {
     const VesselAxis& axis = *lumen.Vessels()[range.vessel].axis;

@@ -18,6 +18,7 @@ public:
   using std::runtime_error::runtime_error;
   Vector3 centre = Vector3::Zero();
   double reach = 0.0;            ///< all of the junction is so near, mm
+  std::vector<int> groups;       ///< of its arms
   std::int64_t thinnestEnd = -1; ///< of the branches that end after it, as a point of the input
 };
 

@@ -1,15 +1,16 @@
 #include "SweepSurface.h"
 
 #include "AdaptiveRemesher.h"
-#include "JunctionMesh.h"
+#include "SweepRescue.h"
+#include "SweptFirstMesh.h"
 #include "SweptLumen.h"
 #include "TriangleIntersections.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -26,22 +27,18 @@ constexpr int Repairs = 3;
 constexpr int RemeshingAttempts = 3;
 constexpr double GreatestSmoothing = 4.0; ///< of the axes, radii
 constexpr double LeastBlending = 0.1;
-constexpr int FaultReliefs = 2;    ///< times that faults of the finished mesh are relieved
+constexpr int FaultReliefs = 1;    ///< times that faults of the finished mesh are relieved
 constexpr double FaultReach = 4.0; ///< of such a relief, in radii
 constexpr int Sweeps = 64;         ///< at most, with what each one could not mesh relieved
+/// Angles of triangles that were replaced, degrees: such a mesh is taken at once; or in need.
+constexpr double FairAngle = 5.0;
+constexpr double NeedAngle = 0.5;
+/// Around a fault so many radii of a branch are left out.
+constexpr double CutReach = 2.0;
+constexpr double CutGrowth = 3.0;
 /// Below, the areas of triangles vanish in what the angles are made of; mm.
 constexpr double LeastRadius = 1e-6;
 constexpr double MostTriangles = 2e7;
-
-double EdgeLength(const SweepSettings& settings, double curvature, double radius)
-{
-  const double h = settings.minimumEdgeLength +
-    (settings.maximumEdgeLength - settings.minimumEdgeLength) *
-      std::exp(-settings.curvatureWeight * curvature);
-  // Where the wall is more bent than the vessel is thin, its own radius counts.
-  const double bend = std::max(1.0 / curvature, 0.12 * radius);
-  return std::min(h, settings.edgeLengthPerRadius * std::min(radius, bend));
-}
 
 /// A wall too fine or too large for any mesh: wrong units, mostly. The branches are checked already.
 void CheckSize(const SweepTree& tree, const SweepSettings& settings)
@@ -62,7 +59,7 @@ void CheckSize(const SweepTree& tree, const SweepSettings& settings)
       }
       if (i > 0)
       {
-        const double edge = EdgeLength(settings, 1.0 / radius, radius);
+        const double edge = SweptEdgeLength(settings, 1.0 / radius, radius);
         const double length = (tree.points[p] - tree.points[branch.points[i - 1]]).norm();
         triangles += 2.0 * Pi * radius * length / (std::sqrt(3.0) / 4.0 * edge * edge);
       }
@@ -106,7 +103,7 @@ public:
     }
     vertex.part = site.part;
     vertex.piece = site.piece;
-    vertex.size = EdgeLength(this->Settings, sample.curvature, sample.radius);
+    vertex.size = SweptEdgeLength(this->Settings, sample.curvature, sample.radius);
   }
 
   void Begin(double done) override
@@ -120,385 +117,6 @@ public:
 private:
   SweptLumen& Lumen;
   const SweepSettings& Settings;
-};
-
-/// Junctions that no grid resolves.
-struct Unresolved
-{
-  std::vector<JunctionFailure> places;
-};
-
-/// The first mesh: rings along the spans, junctions between, caps at the ends.
-class FirstMesh
-{
-public:
-  FirstMesh(
-    const SweptLumen& lumen, const SweepSettings& settings, const std::vector<int>& capEntity)
-    : Lumen(lumen)
-    , Settings(settings)
-    , CapEntity(capEntity)
-  {
-  }
-
-  std::vector<RemeshVertex> vertices;
-  std::vector<Triangle> triangles;
-  std::vector<int> entity;
-
-  void Make(const ProgressCallback& progress)
-  {
-    const auto& junctions = this->Lumen.Junctions();
-    std::vector<JunctionMesh> meshes(junctions.size());
-    std::vector<std::unique_ptr<JunctionFailure>> failed(junctions.size());
-    ParallelFor(
-      static_cast<std::int64_t>(junctions.size()), 1,
-      [&](std::int64_t first, std::int64_t last)
-      {
-        for (std::int64_t j = first; j < last; ++j)
-        {
-          if (junctions[j].arms.empty())
-          {
-            continue;
-          }
-          try
-          {
-            meshes[j] = MeshJunction(this->Lumen, static_cast<int>(j));
-          }
-          catch (const JunctionFailure& failure)
-          {
-            failed[j] = std::make_unique<JunctionFailure>(failure);
-          }
-        }
-      },
-      progress);
-    Unresolved unresolved;
-    for (const auto& failure : failed)
-    {
-      if (failure)
-      {
-        unresolved.places.push_back(*failure);
-      }
-    }
-    if (!unresolved.places.empty())
-    {
-      throw unresolved;
-    }
-    std::vector<std::int64_t> offset(junctions.size(), 0);
-    for (std::size_t j = 0; j < junctions.size(); ++j)
-    {
-      offset[j] = static_cast<std::int64_t>(this->vertices.size());
-      for (const Vector3& p : meshes[j].points)
-      {
-        RemeshVertex vertex;
-        vertex.position = p;
-        vertex.part = -1 - static_cast<std::int32_t>(j);
-        this->vertices.push_back(vertex);
-      }
-      for (const Triangle& t : meshes[j].triangles)
-      {
-        this->Add(t[0] + offset[j], t[1] + offset[j], t[2] + offset[j], 1);
-      }
-    }
-    const auto loopOf = [&](int junction, int span, bool atStart)
-    {
-      std::vector<std::int64_t> loop;
-      const auto& arms = junctions[junction].arms;
-      for (std::size_t a = 0; a < arms.size(); ++a)
-      {
-        if (arms[a].span == span && arms[a].atStart == atStart)
-        {
-          loop = meshes[junction].loops[a];
-        }
-      }
-      for (std::int64_t& p : loop)
-      {
-        p += offset[junction];
-      }
-      return loop;
-    };
-    for (std::size_t i = 0; i < this->Lumen.Spans().size(); ++i)
-    {
-      const SweptLumen::Span& span = this->Lumen.Spans()[i];
-      if (span.inner)
-      {
-        continue;
-      }
-      const int index = static_cast<int>(i);
-      std::vector<std::int64_t> start;
-      std::vector<std::int64_t> end;
-      if (span.startJunction >= 0)
-      {
-        start = loopOf(span.startJunction, index, true);
-      }
-      if (span.endJunction >= 0)
-      {
-        end = loopOf(span.endJunction, index, false);
-      }
-      this->Tube(index, start, end);
-    }
-  }
-
-private:
-  void Add(std::int64_t a, std::int64_t b, std::int64_t c, int e)
-  {
-    this->triangles.push_back({ a, b, c });
-    this->entity.push_back(e);
-  }
-
-  double SizeAt(const VesselAxis& axis, double s) const
-  {
-    const VesselAxis::Station station = axis.At(s);
-    const double bend = station.curvature.norm();
-    const double curvature =
-      std::max(1.0 / station.radius, bend / std::max(0.05, 1.0 - bend * station.radius));
-    return EdgeLength(this->Settings, curvature, station.radius);
-  }
-
-  /// A ring's point moved along the vessel: rings lean like the plane of an end that is near.
-  Vector3 Leaning(int index, double s, Vector3 position) const
-  {
-    const SweptLumen::Span& span = this->Lumen.Spans()[index];
-    const VesselAxis& axis = *this->Lumen.Vessels()[span.vessel].axis;
-    const VesselAxis::Station station = axis.At(s);
-    const Vector3 offset = position - station.point;
-    for (const bool atStart : { true, false })
-    {
-      const int tip = atStart ? span.startTip : span.endTip;
-      if (tip < 0)
-      {
-        continue;
-      }
-      const SweptLumen::Tip& end = this->Lumen.Tips()[tip];
-      const VesselAxis::Station last = axis.At(atStart ? span.from : span.to);
-      const Vector3 outward = atStart ? Vector3(-last.tangent) : last.tangent;
-      const double cosine = end.normal.dot(outward);
-      const double most = end.radius * std::sqrt(std::max(0.0, 1.0 / (cosine * cosine) - 1.0));
-      const double reach = std::min(2.0 * most, 0.9 * (span.cutTo - span.cutFrom));
-      const double share = 1.0 - std::abs(s - last.s) / std::max(1e-12, reach);
-      if (most > 1e-9 * end.radius && share > 0.0)
-      {
-        const Vector3 across = offset - offset.dot(outward) * outward;
-        position -= share * end.normal.dot(across) / cosine * outward;
-      }
-    }
-    return position;
-  }
-
-  std::vector<std::int64_t> Ring(int span, double s, int count, double phase, int tip)
-  {
-    const VesselAxis& axis = *this->Lumen.Vessels()[this->Lumen.Spans()[span].vessel].axis;
-    std::vector<std::int64_t> ring;
-    for (int i = 0; i < count; ++i)
-    {
-      RemeshVertex vertex;
-      vertex.position = this->Leaning(span, s, axis.WallPoint(s, 2.0 * Pi * (i + phase) / count));
-      vertex.part = span;
-      vertex.piece = axis.PieceAt(s);
-      vertex.patch = tip;
-      vertex.rim = tip >= 0;
-      ring.push_back(static_cast<std::int64_t>(this->vertices.size()));
-      this->vertices.push_back(vertex);
-    }
-    return ring;
-  }
-
-  /// Angles around a station, rising from the first point's on.
-  std::vector<double> Angles(
-    const VesselAxis::Station& station, const std::vector<std::int64_t>& ring) const
-  {
-    std::vector<double> angle;
-    for (const std::int64_t p : ring)
-    {
-      const Vector3 offset = this->vertices[p].position - station.point;
-      const double a = std::atan2(offset.dot(station.binormal), offset.dot(station.normal));
-      angle.push_back(
-        angle.empty() ? a : angle.back() + std::remainder(a - angle.back(), 2.0 * Pi));
-    }
-    return angle;
-  }
-
-  /// Triangles between two closed rings, by angle.
-  void Zip(const std::vector<std::int64_t>& low, const std::vector<double>& lowAngle,
-    const std::vector<std::int64_t>& high, const std::vector<double>& highAngle, int e)
-  {
-    const std::size_t n = low.size();
-    const std::size_t m = high.size();
-    // Start where the first point of `low` has its nearest partner.
-    std::size_t shift = 0;
-    double best = 10.0;
-    for (std::size_t k = 0; k < m; ++k)
-    {
-      const double off = std::abs(std::remainder(highAngle[k] - lowAngle[0], 2.0 * Pi));
-      if (off < best)
-      {
-        best = off;
-        shift = k;
-      }
-    }
-    if (n == 0 || m == 0)
-    {
-      return;
-    }
-    const double base =
-      highAngle[shift] - (lowAngle[0] + std::remainder(highAngle[shift] - lowAngle[0], 2.0 * Pi));
-    const auto at = [&](const std::vector<double>& angle, std::size_t i, std::size_t count)
-    {
-      const std::size_t turns = i / count;
-      return angle[i % count] + 2.0 * Pi * static_cast<double>(turns);
-    };
-    std::size_t i = 0;
-    std::size_t j = 0;
-    while (i < n || j < m)
-    {
-      const double nextLow = at(lowAngle, i + 1, n) + at(lowAngle, i, n);
-      const double nextHigh =
-        at(highAngle, shift + j + 1, m) + at(highAngle, shift + j, m) - 2.0 * base;
-      const bool advanceLow = j >= m || (i < n && nextLow <= nextHigh);
-      const std::int64_t a = low[i % n];
-      const std::int64_t b = high[(shift + j) % m];
-      if (advanceLow)
-      {
-        this->Add(a, low[(i + 1) % n], b, e);
-        ++i;
-      }
-      else
-      {
-        this->Add(a, high[(shift + j + 1) % m], b, e);
-        ++j;
-      }
-    }
-  }
-
-  void Tube(int index, const std::vector<std::int64_t>& start, const std::vector<std::int64_t>& end)
-  {
-    const SweptLumen::Span& span = this->Lumen.Spans()[index];
-    const VesselAxis& axis = *this->Lumen.Vessels()[span.vessel].axis;
-    const double from = span.cutFrom;
-    const double to = span.cutTo;
-    // Ring distances in units of the height of an even triangle.
-    constexpr int samples = 400;
-    std::vector<double> rows(1, 0.0);
-    for (int i = 0; i < samples; ++i)
-    {
-      const double s = from + (to - from) * (i + 0.5) / samples;
-      rows.push_back(rows.back() + (to - from) / samples / (0.866 * this->SizeAt(axis, s)));
-    }
-    const int count = std::max(1, static_cast<int>(std::lround(rows.back())));
-    std::vector<std::int64_t> previous = start;
-    VesselAxis::Station previousStation = axis.At(from);
-    int around = 0;
-    std::size_t row = 0;
-    for (int k = 0; k <= count; ++k)
-    {
-      double s = to;
-      if (k < count)
-      {
-        const double wanted = rows.back() * k / count;
-        while (row + 2 < rows.size() && rows[row + 1] < wanted)
-        {
-          ++row;
-        }
-        const double part = (wanted - rows[row]) / std::max(1e-12, rows[row + 1] - rows[row]);
-        s = from + (to - from) * (static_cast<double>(row) + part) / samples;
-      }
-      const VesselAxis::Station station = axis.At(s);
-      double circumference = 0.0;
-      for (int a = 0; a < 32; ++a)
-      {
-        circumference += 2.0 * Pi / 32.0 * axis.WallRadius(s, 2.0 * Pi * a / 32.0);
-      }
-      const int ideal =
-        std::max(7, static_cast<int>(std::lround(circumference / this->SizeAt(axis, s))));
-      if (around == 0 || std::abs(ideal - around) > std::max(1.0, 0.08 * around))
-      {
-        around = ideal;
-      }
-      std::vector<std::int64_t> ring;
-      if (k == 0)
-      {
-        ring = span.startTip >= 0 ? this->Ring(index, s, around, 0.0, span.startTip) : start;
-      }
-      else if (k == count)
-      {
-        ring = span.endTip >= 0 ? this->Ring(index, s, around, 0.5 * (k % 2), span.endTip) : end;
-      }
-      else
-      {
-        ring = this->Ring(index, s, around, 0.5 * (k % 2), -1);
-      }
-      if (k > 0)
-      {
-        this->Zip(
-          previous, this->Angles(previousStation, previous), ring, this->Angles(station, ring), 1);
-      }
-      if (k == 0 && span.startTip >= 0)
-      {
-        this->Cap(ring, station, span.startTip, index, true);
-      }
-      if (k == count && span.endTip >= 0)
-      {
-        this->Cap(ring, station, span.endTip, index, false);
-      }
-      previous = ring;
-      previousStation = station;
-    }
-  }
-
-  /// A flat disc of shrinking rings.
-  void Cap(const std::vector<std::int64_t>& rim, const VesselAxis::Station& station, int tip,
-    int span, bool atStart)
-  {
-    const int e = this->CapEntity[tip];
-    const std::size_t firstTriangle = this->triangles.size();
-    std::vector<std::int64_t> outer = rim;
-    const double size = EdgeLength(this->Settings, 1.0 / station.radius, station.radius);
-    const double step = 0.866 * size / station.radius;
-    const VesselAxis& axis = *this->Lumen.Vessels()[this->Lumen.Spans()[span].vessel].axis;
-    int row = 0;
-    while (1.0 - (row + 1) * step > 0.7 * step)
-    {
-      ++row;
-      const double share = 1.0 - row * step;
-      const int count =
-        std::max(5, static_cast<int>(std::lround(static_cast<double>(rim.size()) * share)));
-      std::vector<std::int64_t> inner;
-      for (int i = 0; i < count; ++i)
-      {
-        RemeshVertex vertex;
-        const Vector3 wall = axis.WallPoint(station.s, 2.0 * Pi * (i + 0.5 * (row % 2)) / count);
-        vertex.position = station.point + share * (wall - station.point);
-        vertex.part = span;
-        vertex.piece = axis.PieceAt(station.s);
-        vertex.patch = tip;
-        inner.push_back(static_cast<std::int64_t>(this->vertices.size()));
-        this->vertices.push_back(vertex);
-      }
-      this->Zip(outer, this->Angles(station, outer), inner, this->Angles(station, inner), e);
-      outer = inner;
-    }
-    RemeshVertex centre;
-    centre.position = station.point;
-    centre.part = span;
-    centre.piece = axis.PieceAt(station.s);
-    centre.patch = tip;
-    const std::int64_t c = static_cast<std::int64_t>(this->vertices.size());
-    this->vertices.push_back(centre);
-    for (std::size_t i = 0; i < outer.size(); ++i)
-    {
-      this->Add(outer[i], outer[(i + 1) % outer.size()], c, e);
-    }
-    // Rings that shrink towards the inside turn counter-clockwise about the tangent.
-    if (atStart)
-    {
-      for (std::size_t t = firstTriangle; t < this->triangles.size(); ++t)
-      {
-        std::swap(this->triangles[t][1], this->triangles[t][2]);
-      }
-    }
-  }
-
-  const SweptLumen& Lumen;
-  const SweepSettings& Settings;
-  const std::vector<int>& CapEntity;
 };
 
 std::vector<SweepPatches> MakePatches(const SweptLumen& lumen, const SweepSettings& settings)
@@ -552,15 +170,21 @@ std::vector<SweepPatches> MakePatches(const SweptLumen& lumen, const SweepSettin
   return result;
 }
 
-/// Triangles that cut others or have too small an angle.
-std::vector<std::int64_t> FindFaults(const AdaptiveRemesher& mesh)
+std::vector<Vector3> PointsOf(const std::vector<RemeshVertex>& vertices)
 {
   std::vector<Vector3> points;
-  points.reserve(mesh.Vertices().size());
-  for (const RemeshVertex& vertex : mesh.Vertices())
+  points.reserve(vertices.size());
+  for (const RemeshVertex& vertex : vertices)
   {
     points.push_back(vertex.position);
   }
+  return points;
+}
+
+/// Triangles that cut others or have too small an angle.
+std::vector<std::int64_t> FindFaults(const AdaptiveRemesher& mesh)
+{
+  const std::vector<Vector3> points = PointsOf(mesh.Vertices());
   const std::vector<Triangle> triangles = mesh.Triangles();
   std::vector<std::int64_t> faults;
   for (const auto& pair : FindSelfIntersections(points, triangles))
@@ -604,11 +228,12 @@ struct Reliefs
 {
   std::vector<SweepRelief> places;
   std::vector<std::string> reasons; ///< one a place
+  std::vector<int> groups;          ///< one a place
   std::vector<SweepOmission> leftOut;
 
   /// More at this place. @return false when no more is to be had
-  bool Add(
-    const Vector3& centre, double reach, const SweepSettings& settings, const std::string& reason)
+  bool Add(const Vector3& centre, double reach, const SweepSettings& settings,
+    const std::string& reason, int group)
   {
     std::size_t i = 0;
     while (i < this->places.size() &&
@@ -620,6 +245,7 @@ struct Reliefs
     {
       this->places.push_back({ centre, reach, settings.smoothing, settings.blending });
       this->reasons.push_back(reason);
+      this->groups.push_back(group);
     }
     SweepRelief& place = this->places[i];
     if (place.smoothing >= GreatestSmoothing)
@@ -632,39 +258,45 @@ struct Reliefs
     return true;
   }
 
+  /// What was done at a place.
+  std::string Words(std::size_t i) const
+  {
+    std::ostringstream text;
+    text.precision(3);
+    text << "axes less than " << this->places[i].reach << " mm away are smoothed over "
+         << this->places[i].smoothing << " radii and fillets have " << this->places[i].blending
+         << " radii";
+    return text.str();
+  }
+
   std::vector<std::string> Remarks() const
   {
     std::vector<std::string> remarks;
     for (std::size_t i = 0; i < this->places.size(); ++i)
     {
-      std::ostringstream text;
-      text.precision(3);
-      text << this->reasons[i] << "; for that reason axes less than " << this->places[i].reach
-           << " mm away are smoothed over " << this->places[i].smoothing
-           << " radii and fillets have " << this->places[i].blending << " radii";
-      remarks.push_back(text.str());
+      remarks.push_back(this->reasons[i] + "; for that reason " + this->Words(i));
     }
     return remarks;
   }
 };
 
-/// A part of the finished mesh that has faults.
+/// A part of the mesh that has faults.
 struct Fault
 {
   Vector3 position;
   double radius; ///< of the vessel
+  int group;
 };
 
-SweptSurface SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
-  std::vector<Fault>& faults, const ProgressCallback& progress);
-
-std::string Place(const Vector3& p)
+/// What one sweep gives.
+struct Sweep
 {
-  std::ostringstream text;
-  text.precision(6);
-  text << "(" << p[0] << ", " << p[1] << ", " << p[2] << ")";
-  return text.str();
-}
+  SweptSurface surface;
+  std::vector<Fault> faults; ///< left; none: the surface may be handed out
+};
+
+Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
+  bool last, const ProgressCallback& progress);
 }
 
 void SweepSettings::Validate() const
@@ -687,10 +319,237 @@ void SweepSettings::Validate() const
   Require(between(this->patchSpacing, 0.1, 4.0), "patchSpacing", "0.1 to 4");
 }
 
+namespace
+{
+/// Sweeps until nothing fails, changing and leaving out ever more where something does.
+class Sweeper
+{
+public:
+  Sweeper(const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
+    : Input(tree)
+    , Tree(tree)
+    , Settings(settings)
+    , Progress(progress)
+  {
+  }
+
+  SweptSurface Run()
+  {
+    for (int sweep = 1;; ++sweep)
+    {
+      this->Last = sweep >= Sweeps;
+      try
+      {
+        Sweep result = SweepOnce(
+          this->Tree, this->Settings, this->Relief, this->FaultSweeps >= FaultReliefs, Progress);
+        if (result.faults.empty())
+        {
+          return this->Finished(std::move(result.surface));
+        }
+        if (!this->RelieveFaults(result.faults))
+        {
+          this->CutFaults(result.faults);
+        }
+      }
+      catch (const Unresolved& unresolved)
+      {
+        this->Resolve(unresolved);
+      }
+      catch (const SweepCollision& collision)
+      {
+        this->CutLeast({ { collision.groups[0], collision.places[0] },
+                         { collision.groups[1], collision.places[1] } },
+          collision.reach, "it runs through another vessel without joining it");
+      }
+      if (this->Tree.branches.empty())
+      {
+        throw std::runtime_error("SweepVesselTree: no vessel of the tree can be swept; " +
+          (this->Remarks.empty() ? std::string("nothing is left") : this->Remarks.front()));
+      }
+    }
+  }
+
+private:
+  using Choice = std::pair<int, Vector3>; ///< group and place
+
+  SweptSurface Finished(SweptSurface surface) const
+  {
+    for (std::size_t i = 0; i < this->Relief.places.size(); ++i)
+    {
+      const SweepRelief& place = this->Relief.places[i];
+      surface.repairs.push_back({ this->Relief.groups[i],
+        VesselName(this->Input, this->Relief.groups[i]), this->Relief.Words(i), place.centre });
+    }
+    const std::vector<std::string> reliefs = this->Relief.Remarks();
+    surface.remarks.insert(surface.remarks.end(), reliefs.begin(), reliefs.end());
+    surface.remarks.insert(surface.remarks.end(), this->Remarks.begin(), this->Remarks.end());
+    surface.leftOut.insert(surface.leftOut.end(), this->LeftOut.begin(), this->LeftOut.end());
+    std::set<std::int64_t> missing;
+    if (!surface.leftOut.empty())
+    {
+      for (const SweepBranch& branch : this->Input.branches)
+      {
+        missing.insert(branch.points.begin(), branch.points.end());
+      }
+      for (const std::int64_t p : surface.leftOutPoints)
+      {
+        missing.erase(p);
+      }
+    }
+    surface.leftOutPoints.assign(missing.begin(), missing.end());
+    return surface;
+  }
+
+  /// Smoother axes and smaller fillets where triangles are bad. @return false when nothing changed
+  bool RelieveFaults(const std::vector<Fault>& faults)
+  {
+    if (this->FaultSweeps >= FaultReliefs)
+    {
+      return false;
+    }
+    ++this->FaultSweeps;
+    bool more = false;
+    for (const Fault& fault : this->Apart(faults, FaultReach))
+    {
+      more = this->Relief.Add(fault.position, FaultReach * fault.radius, this->Settings,
+               VesselName(this->Input, fault.group) + " at " + SweepPlace(fault.position) +
+                 ": triangles were too thin or cut each other",
+               fault.group) ||
+        more;
+    }
+    return more;
+  }
+
+  /// One fault for each place.
+  static std::vector<Fault> Apart(const std::vector<Fault>& faults, double reach)
+  {
+    std::vector<Fault> apart;
+    for (const Fault& fault : faults)
+    {
+      if (std::none_of(apart.begin(), apart.end(),
+            [&](const Fault& f)
+            { return (f.position - fault.position).norm() < reach * fault.radius; }))
+      {
+        apart.push_back(fault);
+      }
+    }
+    return apart;
+  }
+
+  void CutFaults(const std::vector<Fault>& faults)
+  {
+    for (const Fault& fault : this->Apart(faults, CutReach))
+    {
+      this->CutLeast({ { fault.group, fault.position } }, CutReach * fault.radius,
+        "no sound triangles could be made of its wall");
+    }
+    this->FaultSweeps = 0;
+  }
+
+  /// Cuts, of several branches, that with which the least is lost.
+  void CutLeast(const std::vector<Choice>& choices, double reach, const std::string& reason)
+  {
+    SweepTree best;
+    SweepCut least;
+    for (const Choice& choice : choices)
+    {
+      // Who fails again loses more.
+      const auto before = this->Cuts.find(choice.first);
+      const double more = before == this->Cuts.end() ? 1.0 : std::pow(CutGrowth, before->second);
+      SweepTree tree = this->Tree;
+      SweepCut cut = CutTree(tree, choice.first, choice.second, more * reach);
+      // A tree without its inlet is worth less than any branch.
+      if (!cut.parts.empty() &&
+        (least.parts.empty() ||
+          std::make_pair(cut.atRoot, cut.length) < std::make_pair(least.atRoot, least.length)))
+      {
+        least = std::move(cut);
+        best = std::move(tree);
+      }
+    }
+    for (const Choice& choice : choices)
+    {
+      ++this->Cuts[choice.first];
+    }
+    if (least.parts.empty())
+    {
+      // The group is gone already, with one that was cut before.
+      if (this->Last)
+      {
+        this->Tree.branches.clear();
+      }
+      return;
+    }
+    for (std::size_t i = 0; i < least.parts.size(); ++i)
+    {
+      const SweepLeftOut& part = least.parts[i];
+      if (part.length <= 0.0)
+      {
+        continue; // a point that was added to its end
+      }
+      AddLeftOut(this->LeftOut, this->Remarks, this->Input, part.groupId,
+        i == 0 ? reason : "it comes from " + least.parts[0].vessel + ", which is left out",
+        part.place, part.length);
+    }
+    this->Tree = std::move(best);
+  }
+
+  /// Kinks that no tube of that width can follow are smoothed away, the more the worse they are, and
+  /// fillets that run into each other made smaller. Where that does not help a branch has to go.
+  void Resolve(const Unresolved& unresolved)
+  {
+    for (const JunctionFailure& place : unresolved.places)
+    {
+      const int group = place.groups.empty() ? 0 : place.groups.front();
+      std::string vessels;
+      for (const int g : std::set<int>(place.groups.begin(), place.groups.end()))
+      {
+        vessels += (vessels.empty() ? "" : ", ") + VesselName(this->Input, g);
+      }
+      if (!this->Last &&
+        this->Relief.Add(place.centre, place.reach, this->Settings,
+          vessels + " at " + SweepPlace(place.centre) + ": the wall could not be resolved", group))
+      {
+        continue;
+      }
+      if (!this->Last && place.thinnestEnd >= 0 &&
+        std::none_of(this->Relief.leftOut.begin(), this->Relief.leftOut.end(),
+          [&](const SweepOmission& omission) { return omission.end == place.thinnestEnd; }))
+      {
+        this->Relief.leftOut.push_back({ place.thinnestEnd, place.centre, place.reach });
+        continue;
+      }
+      std::vector<Choice> choices;
+      for (const int g : place.groups)
+      {
+        choices.emplace_back(g, place.centre);
+      }
+      this->CutLeast(choices, this->Last ? 2.0 * place.reach : 0.5 * place.reach,
+        "no wall can be resolved there");
+    }
+  }
+
+  const SweepTree& Input;
+  SweepTree Tree;
+  const SweepSettings& Settings;
+  const ProgressCallback& Progress;
+  Reliefs Relief;
+  std::vector<SweepLeftOut> LeftOut;
+  std::vector<std::string> Remarks;
+  std::map<int, int> Cuts; ///< of each group
+  int FaultSweeps = 0;
+  bool Last = false;
+};
+}
+
 SweptSurface SweepVesselTree(
   const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
+  if (tree.branches.empty())
+  {
+    return {};
+  }
   double reported = 0.0;
   ProgressCallback rising;
   if (progress)
@@ -701,85 +560,189 @@ SweptSurface SweepVesselTree(
       return progress(reported);
     };
   }
-  // Kinks that no tube of that width can follow are smoothed away, the more the worse they are, and
-  // fillets that run into each other made smaller. Where that does not help a branch has to go.
-  Reliefs reliefs;
-  SweptSurface best;
-  std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  int faulty = 0;
-  for (int sweep = 1;; ++sweep)
-  {
-    std::vector<Fault> faults;
-    try
-    {
-      SweptSurface result = SweepOnce(tree, settings, reliefs, faults, rising);
-      if (faults.size() < fewest)
-      {
-        fewest = faults.size();
-        best = std::move(result);
-        for (const std::string& remark : reliefs.Remarks())
-        {
-          best.remarks.push_back(remark);
-        }
-      }
-      bool more = false;
-      if (faulty < FaultReliefs)
-      {
-        std::vector<Vector3> seen;
-        for (const Fault& fault : faults)
-        {
-          const double reach = FaultReach * fault.radius;
-          if (std::none_of(seen.begin(), seen.end(),
-                [&](const Vector3& p) { return (p - fault.position).norm() < reach; }))
-          {
-            seen.push_back(fault.position);
-            more =
-              reliefs.Add(fault.position, reach, settings,
-                "the triangles at " + Place(fault.position) + " were too thin or cut each other") ||
-              more;
-          }
-        }
-      }
-      if (!more)
-      {
-        return best;
-      }
-      ++faulty;
-    }
-    catch (const Unresolved& unresolved)
-    {
-      for (const JunctionFailure& place : unresolved.places)
-      {
-        if (sweep < Sweeps && reliefs.Add(place.centre, place.reach, settings, place.what()))
-        {
-          continue;
-        }
-        if (fewest < std::numeric_limits<std::size_t>::max())
-        {
-          return best; // with few faults, which is better than without a branch
-        }
-        if (sweep >= Sweeps || place.thinnestEnd < 0 ||
-          std::any_of(reliefs.leftOut.begin(), reliefs.leftOut.end(),
-            [&](const SweepOmission& omission) { return omission.end == place.thinnestEnd; }))
-        {
-          throw std::runtime_error(place.what());
-        }
-        reliefs.leftOut.push_back({ place.thinnestEnd, place.centre, place.reach });
-      }
-    }
-  }
+  return Sweeper(tree, settings, rising).Run();
 }
 
 namespace
 {
-SweptSurface SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
-  std::vector<Fault>& faultsLeft, const ProgressCallback& progress)
+/// The surface's points and what belongs to each, where the wall is known.
+void FillPoints(
+  const SweptLumen& lumen, const std::vector<RemeshVertex>& vertices, SweptSurface& result)
 {
-  SweptSurface result;
-  if (tree.branches.empty())
+  const std::size_t n = vertices.size();
+  result.points.resize(n);
+  result.normals.resize(n);
+  result.edgeLength.resize(n);
+  result.curvature.resize(n);
+  result.radius.resize(n);
+  result.abscissa.resize(n);
+  result.groupId.resize(n);
+  ParallelFor(static_cast<std::int64_t>(n), 1024,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t v = begin; v < end; ++v)
+      {
+        const RemeshVertex& vertex = vertices[v];
+        SweptLumen::Site site{ vertex.part, vertex.piece };
+        SweptLumen::Sample sample;
+        lumen.Evaluate(vertex.position, site, sample);
+        const SweptLumen::Vessel& vessel = lumen.Vessels()[sample.vessel];
+        const double s = std::clamp(sample.s, 0.0, vessel.axis->Length());
+        result.points[v] = vertex.position;
+        result.normals[v] = vertex.normal;
+        result.edgeLength[v] = vertex.size;
+        result.curvature[v] = sample.curvature;
+        result.radius[v] = sample.radius;
+        result.abscissa[v] = vessel.abscissa + s;
+        result.groupId[v] = lumen.GroupAt(sample.vessel, s);
+      }
+    });
+}
+
+/// Takes the caps away, with their inner points.
+void OpenEnds(SweptSurface& result)
+{
+  const std::size_t n = result.points.size();
+  std::vector<std::int64_t> number(n, -1);
+  std::vector<Triangle> triangles;
+  for (std::size_t t = 0; t < result.triangles.size(); ++t)
   {
-    return result;
+    if (result.entityId[t] == 1)
+    {
+      triangles.push_back(result.triangles[t]);
+      for (const std::int64_t p : triangles.back())
+      {
+        number[p] = 0;
+      }
+    }
   }
+  std::int64_t count = 0;
+  for (std::int64_t& p : number)
+  {
+    p = p < 0 ? p : count++;
+  }
+  const auto keep = [&](auto& list)
+  {
+    for (std::size_t v = 0; v < list.size(); ++v)
+    {
+      if (number[v] >= 0)
+      {
+        list[number[v]] = list[v];
+      }
+    }
+    list.resize(std::min<std::size_t>(list.size(), count));
+  };
+  keep(result.points);
+  keep(result.normals);
+  keep(result.edgeLength);
+  keep(result.curvature);
+  keep(result.radius);
+  keep(result.abscissa);
+  keep(result.groupId);
+  keep(result.repaired);
+  for (Triangle& t : triangles)
+  {
+    for (std::int64_t& p : t)
+    {
+      p = number[p];
+    }
+  }
+  result.triangles = std::move(triangles);
+  result.entityId.assign(result.triangles.size(), 1);
+}
+
+/// The vessels' places where triangles are bad.
+std::vector<Fault> PlacesOf(const SweptLumen& lumen, const std::vector<RemeshVertex>& vertices,
+  const std::vector<Triangle>& triangles, const std::vector<std::int64_t>& cells)
+{
+  std::vector<Fault> places;
+  for (const std::int64_t t : cells)
+  {
+    const RemeshVertex& vertex = vertices[triangles[t][0]];
+    SweptLumen::Site site{ vertex.part, vertex.piece };
+    SweptLumen::Sample sample;
+    lumen.Evaluate(vertex.position, site, sample);
+    places.push_back(
+      { vertex.position, sample.radius, lumen.GroupAt(sample.vessel, std::max(0.0, sample.s)) });
+  }
+  return places;
+}
+
+/// Whether vessels meet at some of these triangles: only there blunter edges help.
+bool AnyInJunction(const AdaptiveRemesher& mesh, const std::vector<std::int64_t>& cells)
+{
+  const std::vector<Triangle> triangles = mesh.Triangles();
+  return std::any_of(cells.begin(), cells.end(),
+    [&](std::int64_t t) { return mesh.Vertices()[triangles[t][0]].part < 0; });
+}
+
+/// Triangles at edges that have not two of them, one each way: such a mesh can not be remeshed.
+std::vector<std::int64_t> CellsOfBadEdges(const std::vector<Triangle>& triangles)
+{
+  std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> sides;
+  std::set<std::int64_t> bad;
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+  {
+    for (int c = 0; c < 3; ++c)
+    {
+      const auto side = sides.emplace(
+        std::make_pair(triangles[t][c], triangles[t][(c + 1) % 3]), static_cast<std::int64_t>(t));
+      if (!side.second || triangles[t][c] == triangles[t][(c + 1) % 3])
+      {
+        bad.insert({ side.first->second, static_cast<std::int64_t>(t) });
+      }
+    }
+  }
+  for (const auto& side : sides)
+  {
+    if (sides.count({ side.first.second, side.first.first }) == 0)
+    {
+      bad.insert(side.second);
+    }
+  }
+  return { bad.begin(), bad.end() };
+}
+
+/// Replaces bad triangles where they are. @return whether that gave a sound mesh
+bool MendTriangles(const SweptLumen& lumen, const SweepTree& tree, const std::vector<Fault>& faults,
+  double leastAngle, RescueMesh& mesh, SweptSurface& result)
+{
+  if (!CleanSweptMesh(mesh, lumen.Trees(), leastAngle))
+  {
+    return false;
+  }
+  std::set<int> said;
+  for (const Fault& fault : faults)
+  {
+    if (said.insert(fault.group).second)
+    {
+      AddRepair(result.repairs, result.remarks, tree, fault.group,
+        "triangles that were too thin or cut each other were replaced; the wall is not exact there",
+        fault.position);
+    }
+  }
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i)
+  {
+    RemeshVertex& vertex = mesh.vertices[i];
+    if (mesh.replaced[i] != 0 && vertex.patch < 0)
+    {
+      SweptLumen::Site site{ vertex.part, vertex.piece };
+      SweptLumen::Sample sample;
+      lumen.Evaluate(vertex.position, site, sample);
+      vertex.normal = sample.gradient.normalized();
+    }
+  }
+  return true;
+}
+
+/**
+ * @param last  what stays bad is not relieved any more: triangles are replaced even by poor ones
+ */
+Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
+  bool lastSweep, const ProgressCallback& progress)
+{
+  Sweep sweep;
+  SweptSurface& result = sweep.surface;
   const auto part = [&](double from, double to) -> ProgressCallback
   {
     if (!progress)
@@ -793,7 +756,10 @@ SweptSurface SweepOnce(const SweepTree& tree, const SweepSettings& settings, con
   lumen.SetEdgeRetreat(BluntRetreat);
   Report(progress, 0.05);
   result.remarks = lumen.Remarks();
+  result.repairs = lumen.Repairs();
+  result.leftOut = lumen.LeftOut();
   result.trees = lumen.Trees();
+  result.leftOutPoints = lumen.SweptPoints(); // all others, in the end
 
   // Caps: roots first, then tips, both in the order of the input's branches.
   const auto& tips = lumen.Tips();
@@ -825,140 +791,67 @@ SweptSurface SweepOnce(const SweepTree& tree, const SweepSettings& settings, con
       tip.normal, tip.radius });
   }
 
-  FirstMesh first(lumen, settings, capEntity);
-  first.Make(part(0.05, 0.25));
+  const SweptFirstMesh first =
+    MakeFirstMesh(lumen, settings, capEntity, reliefs.places, part(0.05, 0.25));
+  const std::vector<std::int64_t> torn = CellsOfBadEdges(first.triangles);
+  if (!torn.empty())
+  {
+    sweep.faults = PlacesOf(lumen, first.vertices, first.triangles, torn);
+    return sweep;
+  }
   // Edges between vessels that are too sharp for the mesh to follow are made blunter, all of them:
   // the same everywhere is easier to understand than some that differ.
   SweepSettings blunted = settings;
-  std::unique_ptr<AdaptiveRemesher> mesh;
+  RescueMesh mesh;
   for (int attempt = 0;; ++attempt)
   {
     Wall wall(lumen, blunted);
-    const bool last = attempt + 1 == RemeshingAttempts;
-    mesh =
-      std::make_unique<AdaptiveRemesher>(wall, last ? std::move(first.vertices) : first.vertices,
-        first.triangles, last ? std::move(first.entity) : first.entity, settings.gradation);
-    mesh->Run(part(attempt == 0 ? 0.25 : 0.9, 0.95));
-    std::vector<std::int64_t> faults = FindFaults(*mesh);
+    AdaptiveRemesher remesher(
+      wall, first.vertices, first.triangles, first.entity, settings.gradation);
+    remesher.Run(part(attempt == 0 ? 0.25 : 0.9, 0.95));
+    std::vector<std::int64_t> faults = FindFaults(remesher);
     for (int repair = 0; repair < Repairs && !faults.empty(); ++repair)
     {
-      mesh->Repair(faults);
-      faults = FindFaults(*mesh);
+      remesher.Repair(faults);
+      faults = FindFaults(remesher);
     }
+    mesh = { remesher.Vertices(), remesher.Triangles(), remesher.Entities(), {} };
     if (faults.empty())
     {
-      break;
+      // What the mesher would refuse all the same.
+      faults = CellsThatFail(PointsOf(mesh.vertices), mesh.triangles);
+      if (faults.empty())
+      {
+        break;
+      }
     }
+    const bool last = attempt + 1 == RemeshingAttempts || !AnyInJunction(remesher, faults);
     if (last)
     {
-      const Vector3& p = mesh->Vertices()[mesh->Triangles()[faults.front()][0]].position;
-      std::ostringstream text;
-      text.precision(6);
-      text << faults.size() << " triangles with angles below " << LeastAngle
-           << " degrees or that cut others are left, the first at (" << p[0] << ", " << p[1] << ", "
-           << p[2] << ")";
-      result.remarks.push_back(text.str());
-      const std::vector<Triangle> all = mesh->Triangles();
-      for (const std::int64_t t : faults)
+      const std::vector<Fault> places = PlacesOf(lumen, mesh.vertices, mesh.triangles, faults);
+      if (!MendTriangles(lumen, tree, places, FairAngle, mesh, result) &&
+        !(lastSweep && MendTriangles(lumen, tree, places, NeedAngle, mesh, result)))
       {
-        const RemeshVertex& vertex = mesh->Vertices()[all[t][0]];
-        SweptLumen::Site site{ vertex.part, vertex.piece };
-        SweptLumen::Sample sample;
-        lumen.Evaluate(vertex.position, site, sample);
-        faultsLeft.push_back({ vertex.position, sample.radius });
+        sweep.faults = places;
+        return sweep;
       }
       break;
     }
     blunted.edgeRetreat = 2.0 * std::max(blunted.edgeRetreat, BluntRetreat);
     lumen.SetEdgeRetreat(blunted.edgeRetreat);
   }
-  const AdaptiveRemesher& remesher = *mesh;
   Report(progress, 0.95);
-
-  const auto& vertices = remesher.Vertices();
-  const std::size_t n = vertices.size();
-  result.points.resize(n);
-  result.normals.resize(n);
-  result.edgeLength.resize(n);
-  result.curvature.resize(n);
-  result.radius.resize(n);
-  result.abscissa.resize(n);
-  result.groupId.resize(n);
-  ParallelFor(static_cast<std::int64_t>(n), 1024,
-    [&](std::int64_t begin, std::int64_t end)
-    {
-      for (std::int64_t v = begin; v < end; ++v)
-      {
-        const RemeshVertex& vertex = vertices[v];
-        SweptLumen::Site site{ vertex.part, vertex.piece };
-        SweptLumen::Sample sample;
-        lumen.Evaluate(vertex.position, site, sample);
-        const SweptLumen::Vessel& vessel = lumen.Vessels()[sample.vessel];
-        const double s = std::clamp(sample.s, 0.0, vessel.axis->Length());
-        result.points[v] = vertex.position;
-        result.normals[v] = vertex.normal;
-        result.edgeLength[v] = vertex.size;
-        result.curvature[v] = sample.curvature;
-        result.radius[v] = sample.radius;
-        result.abscissa[v] = vessel.abscissa + s;
-        result.groupId[v] = lumen.GroupAt(sample.vessel, s);
-      }
-    });
-  result.triangles = remesher.Triangles();
-  result.entityId = remesher.Entities();
+  FillPoints(lumen, mesh.vertices, result);
+  result.triangles = std::move(mesh.triangles);
+  result.entityId = std::move(mesh.entity);
+  result.repaired = std::move(mesh.replaced);
   if (!settings.capped)
   {
-    // The caps' inner points go with their triangles.
-    std::vector<std::int64_t> number(n, -1);
-    std::vector<Triangle> triangles;
-    std::int64_t count = 0;
-    for (std::size_t t = 0; t < result.triangles.size(); ++t)
-    {
-      if (result.entityId[t] == 1)
-      {
-        triangles.push_back(result.triangles[t]);
-        for (const std::int64_t p : triangles.back())
-        {
-          number[p] = 0;
-        }
-      }
-    }
-    for (std::size_t v = 0; v < n; ++v)
-    {
-      if (number[v] < 0)
-      {
-        continue;
-      }
-      number[v] = count;
-      result.points[count] = result.points[v];
-      result.normals[count] = result.normals[v];
-      result.edgeLength[count] = result.edgeLength[v];
-      result.curvature[count] = result.curvature[v];
-      result.radius[count] = result.radius[v];
-      result.abscissa[count] = result.abscissa[v];
-      result.groupId[count] = result.groupId[v];
-      ++count;
-    }
-    result.points.resize(count);
-    result.normals.resize(count);
-    result.edgeLength.resize(count);
-    result.curvature.resize(count);
-    result.radius.resize(count);
-    result.abscissa.resize(count);
-    result.groupId.resize(count);
-    for (Triangle& t : triangles)
-    {
-      for (std::int64_t& p : t)
-      {
-        p = number[p];
-      }
-    }
-    result.triangles = std::move(triangles);
-    result.entityId.assign(result.triangles.size(), 1);
+    OpenEnds(result);
   }
   result.patches = MakePatches(lumen, settings);
   Report(progress, 1.0);
-  return result;
+  return sweep;
 }
 }
 }

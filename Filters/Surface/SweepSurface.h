@@ -24,6 +24,7 @@ struct SweepBranch
 {
   std::vector<std::int64_t> points; ///< indices; branches are joined where they share a point
   int groupId = 0;
+  std::string name{}; ///< of the vessel, for messages; may be empty
 };
 
 /// What is swept: a forest of branches.
@@ -77,6 +78,25 @@ struct SweepCap
   double radius = 0.0;
 };
 
+/// Something that was changed so that the vessels could be meshed.
+struct SweepRepair
+{
+  int groupId = 0;
+  std::string vessel; ///< "R-PDA (group 4)", or "group 4" where it has no name
+  std::string what;
+  Vector3 place = Vector3::Zero(); ///< mm
+};
+
+/// A part of the tree that is not in the surface.
+struct SweepLeftOut
+{
+  int groupId = 0;
+  std::string vessel;
+  std::string reason;
+  Vector3 place = Vector3::Zero(); ///< mm; it is missing from there on
+  double length = 0.0;             ///< mm
+};
+
 /// One branch as a structured surface: patches (centre and outer contour) joined by B-splines.
 struct SweepPatches
 {
@@ -100,14 +120,24 @@ struct SweptSurface
   std::vector<int> entityId; ///< per triangle: 1 wall, 2.. caps
   std::vector<SweepCap> caps;
   std::vector<SweepPatches> patches;
-  int trees = 0;                    ///< connected components
-  std::vector<std::string> remarks; ///< what was changed or left out, and where
+  int trees = 0;                       ///< connected components
+  std::vector<std::string> remarks;    ///< what was changed or left out, where, and what helps
+  std::vector<SweepRepair> repairs;    ///< the same, in parts
+  std::vector<SweepLeftOut> leftOut;   ///< and what is missing
+  std::vector<unsigned char> repaired; ///< per point: 1 where triangles were replaced; may be empty
+  std::vector<std::int64_t> leftOutPoints; ///< of the tree: on no branch that was swept
 };
 
 /**
+ * A surface that comes out has passed the check of the tetrahedral mesher (CheckSurface,
+ * CheckSelfIntersections; open ends apart). What can not be meshed is mended where it is: ends that
+ * fold over their caps are trimmed, straightened or limited in slope; axes smoothed and fillets made
+ * smaller; triangles replaced. A branch for which nothing helps is left out from there on, and the
+ * rest is made.
+ *
  * @throws std::invalid_argument  naming the setting, or the branch and point that is wrong; when a
  *                                radius is below 1e-6 mm or the wall needs over 2e7 triangles
- *         std::runtime_error     when some junction cannot be resolved nor left out, naming it
+ *         std::runtime_error     when nothing of the tree can be meshed, naming the first reason
  *         Cancelled
  */
 SweptSurface SweepVesselTree(

@@ -1,12 +1,17 @@
 #include "SweptLumen.h"
 
+#include "SweepRescue.h"
+#include "SweptEnds.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>
+#include <set>
 #include <sstream>
 #include <stdexcept>
+#include <tuple>
 
 namespace coronary
 {
@@ -26,6 +31,8 @@ constexpr double FirstPreference = 0.1;
 /// hairpin.
 constexpr double HairpinRatio = 0.5;
 constexpr double HairpinReach = 6.0;
+/// Times that a free end is mended at most.
+constexpr int EndRounds = 3;
 /// A junction's arms are cut where other walls are a fillet's radius and this many radii away.
 constexpr double CutMargin = 0.45;
 /// Fillets end this many radii of the greater and of the smaller vessel away from the node, and
@@ -95,7 +102,8 @@ struct SweptLumen::Build
   std::vector<Link> links;
   std::map<std::int64_t, std::vector<Incidence>> incidences;
   std::map<std::int64_t, int> treeOfNode;
-  std::vector<std::int64_t> extended; ///< end points that were moved outwards
+  std::vector<std::int64_t> extended;          ///< end points that were moved outwards
+  std::set<std::tuple<int, bool, int>> mended; ///< group, at its start, round
   /// Where vessels meet: numbers and arc lengths of the vessels, one for each first junction.
   struct Node
   {
@@ -275,9 +283,10 @@ struct SweptLumen::Build
         ++kept;
       }
       link.alive = kept > 1 && kept < list.size() && length > 3.0 * this->radius[list[kept - 1]];
-      self.RemarkList.push_back("group " + std::to_string(link.group) + " is left out from " +
-        Where(link.alive ? this->points[list[kept - 1]] : this->points[list.front()]) +
-        " to its end at " + Where(this->points[omission.end]));
+      const std::size_t from = link.alive ? kept - 1 : 0;
+      AddLeftOut(self.LeftOutList, self.RemarkList, this->input, link.group,
+        "where it begins no wall can be resolved", this->points[list[from]],
+        this->LinkLength(link, from));
       if (link.alive)
       {
         list.resize(kept);
@@ -355,8 +364,8 @@ struct SweptLumen::Build
         turn = i;
       }
     }
-    self.RemarkList.push_back("group " + std::to_string(group) + " turns back inside itself at " +
-      Where(this->points[list[turn]]) + "; its end up to there is left out");
+    this->Repaired(
+      group, "turns back inside itself; its end up to there is left out", this->points[list[turn]]);
     list.erase(list.begin(), list.begin() + static_cast<std::ptrdiff_t>(turn));
   }
 
@@ -381,12 +390,15 @@ struct SweptLumen::Build
         continue;
       }
       const std::int64_t a = root(link.points.front());
-      const std::int64_t b = root(link.points.back());
+      std::int64_t b = root(link.points.back());
       if (a == b)
       {
-        throw std::invalid_argument("SweepVesselTree: the branches form a loop at point " +
-          std::to_string(link.points.back()) + " " + Where(this->points[link.points.back()]) +
-          ", group " + std::to_string(link.group));
+        this->OpenLoop(this->links[i]);
+        if (!link.alive)
+        {
+          continue;
+        }
+        b = link.points.back(); // an end of its own now
       }
       parent.emplace(a, a);
       parent[b] = a;
@@ -421,14 +433,43 @@ struct SweptLumen::Build
     }
   }
 
-  double LinkLength(const Link& link) const
+  double LinkLength(const Link& link, std::size_t from = 0) const
   {
     double length = 0.0;
-    for (std::size_t i = 1; i < link.points.size(); ++i)
+    for (std::size_t i = from + 1; i < link.points.size(); ++i)
     {
       length += (this->points[link.points[i]] - this->points[link.points[i - 1]]).norm();
     }
     return length;
+  }
+
+  /// A link that closes a loop ends before the place where it would; or is left out.
+  void OpenLoop(Link& link)
+  {
+    std::vector<std::int64_t>& list = link.points;
+    const std::int64_t closing = list.back();
+    const double reach =
+      2.0 * (this->radius[closing] + (list.size() > 1 ? this->radius[list[list.size() - 2]] : 0.0));
+    std::size_t kept = list.size() - 1;
+    while (kept > 0 && (this->points[list[kept - 1]] - this->points[closing]).norm() < reach)
+    {
+      --kept;
+    }
+    Link head = link;
+    head.points.resize(kept);
+    link.alive = kept > 1 && this->LinkLength(head) > 3.0 * this->radius[list[kept - 1]];
+    const std::size_t from = link.alive ? kept - 1 : 0;
+    AddLeftOut(self.LeftOutList, self.RemarkList, this->input, link.group,
+      "it would close a loop of branches", this->points[list[from]], this->LinkLength(link, from));
+    if (link.alive)
+    {
+      list.resize(kept);
+    }
+  }
+
+  void Repaired(int group, const std::string& what, const Vector3& place)
+  {
+    AddRepair(self.RepairList, self.RemarkList, this->input, group, what, place);
   }
 
   /// Direction and radius of a link as seen from one of its ends, `reach` away from it.
@@ -557,6 +598,38 @@ struct SweptLumen::Build
     }
   }
 
+  /// The axis of a course, whose free ends are mended where no tube can follow them.
+  std::unique_ptr<VesselAxis> MakeAxis(
+    VesselCourse course, bool startOpen, bool endOpen, int firstGroup, int lastGroup)
+  {
+    const auto make = [&]()
+    {
+      return std::make_unique<VesselAxis>(
+        course.points, course.radius, course.smoothing, startOpen, endOpen);
+    };
+    std::unique_ptr<VesselAxis> axis = make();
+    for (const bool atStart : { true, false })
+    {
+      for (int round = 0; round < EndRounds && (atStart ? startOpen : endOpen); ++round)
+      {
+        Vector3 place = Vector3::Zero();
+        const std::string done = MendEnd(course, *axis, atStart, round == 0, place);
+        if (done.empty())
+        {
+          break;
+        }
+        // The vessels are made anew when a stub was mended; what is said of an end is said once.
+        const int group = atStart ? firstGroup : lastGroup;
+        if (this->mended.insert({ group, atStart, round }).second)
+        {
+          this->Repaired(group, done, place);
+        }
+        axis = make();
+      }
+    }
+    return axis;
+  }
+
   void MakeVessel(Incidence arm, int tree, const std::vector<std::array<int, 2>>& partner,
     std::vector<char>& used, std::map<std::int64_t, double>& abscissa,
     std::map<std::int64_t, int>& junctionOfNode, std::map<std::int64_t, Vector3>& normalOfNode,
@@ -609,8 +682,8 @@ struct SweptLumen::Build
     Vessel vessel;
     vessel.tree = tree;
     vessel.abscissa = abscissa[course.front()];
-    vessel.axis = std::make_unique<VesselAxis>(
-      path, r, smoothing, degree(course.front()) == 1, degree(course.back()) == 1);
+    vessel.axis = this->MakeAxis({ path, r, smoothing }, degree(course.front()) == 1,
+      degree(course.back()) == 1, groups.front(), groups.back());
     VesselAxis& axis = *vessel.axis;
     const auto seed = normalOfNode.find(course.front());
     axis.SetFrames(this->settings.frame,
@@ -1107,14 +1180,14 @@ struct SweptLumen::Build
     if (hidden || count >= 8)
     {
       this->links[at.link].alive = false;
-      self.RemarkList.push_back("group " + std::to_string(tip.group) + " at " + Where(tip.centre) +
-        " ends inside the vessel it comes from, or runs along it to its end; left out");
+      AddLeftOut(self.LeftOutList, self.RemarkList, this->input, tip.group,
+        "it ends inside the vessel it comes from, or runs along it to its end",
+        arm.atStart ? axis.At(span.from).point : axis.At(span.to).point, span.to - span.from);
       return;
     }
     if (count == 0)
     {
-      self.RemarkList.push_back("group " + std::to_string(tip.group) + " at " + Where(tip.centre) +
-        " ends before it has left its parent; lengthened");
+      this->Repaired(tip.group, "ends before it has left its parent; lengthened", tip.centre);
     }
     this->extended.push_back(tip.point);
     const Vector3 outward = arm.atStart ? axis.At(axis.Length()).tangent : -axis.At(0.0).tangent;
@@ -1158,8 +1231,9 @@ struct SweptLumen::Build
       {
         const Vector3 side = (tip.normal - cosine * outward).normalized();
         tip.normal = std::cos(allowed) * outward + std::sin(allowed) * side;
-        self.RemarkList.push_back("the plane of the end of group " + std::to_string(tip.group) +
-          " at " + Where(tip.centre) + " would cut a junction; turned towards the cross-section");
+        this->Repaired(tip.group,
+          "the plane of its end would cut a junction; turned towards the cross-section",
+          tip.centre);
       }
     }
   }
@@ -1482,10 +1556,8 @@ struct SweptLumen::Build
         const double smaller = std::min(a.radius, b.radius);
         if (distance < std::abs(a.radius - b.radius) + (self.Clearance + 0.1) * smaller)
         {
-          throw std::invalid_argument("SweepVesselTree: groups " +
-            std::to_string(self.GroupAt(a.vessel, a.s)) + " and " +
-            std::to_string(self.GroupAt(b.vessel, b.s)) + " run through each other at " +
-            Where(a.centre) + " without joining");
+          throw SweepCollision{ { self.GroupAt(a.vessel, a.s), self.GroupAt(b.vessel, b.s) },
+            { a.centre, b.centre }, a.radius + b.radius };
         }
         found[slot(a.part)][b.vessel].push_back(b.piece);
         found[slot(b.part)][a.vessel].push_back(a.piece);
@@ -1540,6 +1612,15 @@ SweptLumen::SweptLumen(const SweepTree& tree, const SweepSettings& settings,
     build.Connect();
     build.MakeVessels();
   } while (!build.CutJunctions());
+  for (const Link& link : build.links)
+  {
+    if (link.alive)
+    {
+      this->SweptPointList.insert(
+        this->SweptPointList.end(), link.points.begin(), link.points.end());
+    }
+  }
+  std::sort(this->SweptPointList.begin(), this->SweptPointList.end());
   build.SplitFolds();
   build.FinishJunctions();
   build.LimitEnds();

@@ -140,6 +140,7 @@ public:
     int tree;
   };
 
+  /// @throws std::invalid_argument as SweepVesselTree; SweepCollision (SweepRescue.h)
   SweptLumen(const SweepTree& tree, const SweepSettings& settings,
     const std::vector<SweepRelief>& reliefs = {}, const std::vector<SweepOmission>& leftOut = {});
 
@@ -148,7 +149,11 @@ public:
   const std::vector<Junction>& Junctions() const { return this->JunctionList; }
   const std::vector<Tip>& Tips() const { return this->TipList; }
   const std::vector<std::string>& Remarks() const { return this->RemarkList; }
+  const std::vector<SweepRepair>& Repairs() const { return this->RepairList; }
+  const std::vector<SweepLeftOut>& LeftOut() const { return this->LeftOutList; }
   int Trees() const { return this->TreeCount; }
+  /// Points of the input through which a vessel was swept, ascending.
+  const std::vector<std::int64_t>& SweptPoints() const { return this->SweptPointList; }
 
   /// The wall seen from a position; the site moves on to the neighbouring part where it must.
   void Evaluate(const Vector3& position, Site& site, Sample& sample) const;
@@ -179,6 +184,9 @@ private:
   std::vector<Junction> JunctionList;
   std::vector<Tip> TipList;
   std::vector<std::string> RemarkList;
+  std::vector<SweepRepair> RepairList;
+  std::vector<SweepLeftOut> LeftOutList;
+  std::vector<std::int64_t> SweptPointList;
   /// For each part (spans first, then junctions): tubes of other parts that come close.
   std::vector<std::vector<Range>> Neighbours;
   double Clearance = 0.0;

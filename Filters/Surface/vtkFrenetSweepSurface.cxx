@@ -14,6 +14,7 @@
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkIdList.h"
+#include "vtkIdTypeArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -27,6 +28,7 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkStructuredGrid.h"
+#include "vtkUnsignedCharArray.h"
 
 #include <algorithm>
 #include <array>
@@ -144,10 +146,15 @@ public:
       if (fits(labels))
       {
         this->segmentLabels.emplace(branch.groupId, labels->GetValue(cell));
+        branch.name = labels->GetValue(cell);
       }
       this->tree.branches.push_back(std::move(branch));
     }
+    this->firstAtPlace = same;
   }
+
+  /// The first of the points at the same place, for each point.
+  std::vector<std::int64_t> firstAtPlace;
 
 private:
   static vtkDataArray* Find(vtkPolyData* input, const std::string& name)
@@ -296,6 +303,51 @@ public:
     cells->AddArray(MakeArray<vtkIntArray>(this->Self.CellEntityIdsArrayName, s.entityId));
     cells->AddArray(MakeArray<vtkIntArray>(this->Self.GroupIdsArrayName, group));
     this->AddSegments(cells, group);
+  }
+
+  /// What was changed and what is missing, into field data; nothing where all is as it should be.
+  void WriteChanges(vtkPolyData* output) const
+  {
+    namespace names = vtkCoronaryArrayNames;
+    using coronary::SweepLeftOut;
+    using coronary::SweepRepair;
+    const SweptSurface& s = this->Surface;
+    vtkFieldData* field = output->GetFieldData();
+    if (!s.repaired.empty())
+    {
+      output->GetPointData()->AddArray(
+        MakeArray<vtkUnsignedCharArray>(names::Repaired, s.repaired));
+    }
+    if (!s.repairs.empty())
+    {
+      field->AddArray(MakeArray<vtkStringArray>(
+        names::Repairs, Collect(s.repairs, [](const SweepRepair& r) { return r.what; })));
+      field->AddArray(MakeArray<vtkStringArray>(
+        names::RepairVessels, Collect(s.repairs, [](const SweepRepair& r) { return r.vessel; })));
+      field->AddArray(MakeVectors(
+        names::RepairPlaces, Collect(s.repairs, [](const SweepRepair& r) { return r.place; })));
+    }
+    if (!s.leftOut.empty())
+    {
+      field->AddArray(MakeArray<vtkStringArray>(
+        names::LeftOut, Collect(s.leftOut, [](const SweepLeftOut& l) { return l.reason; })));
+      field->AddArray(MakeArray<vtkStringArray>(
+        names::LeftOutVessels, Collect(s.leftOut, [](const SweepLeftOut& l) { return l.vessel; })));
+      field->AddArray(MakeVectors(
+        names::LeftOutPlaces, Collect(s.leftOut, [](const SweepLeftOut& l) { return l.place; })));
+      field->AddArray(MakeArray<vtkDoubleArray>(
+        names::LeftOutLengths, Collect(s.leftOut, [](const SweepLeftOut& l) { return l.length; })));
+      std::vector<std::int64_t> points;
+      for (std::size_t i = 0; i < this->From.firstAtPlace.size(); ++i)
+      {
+        if (std::binary_search(
+              s.leftOutPoints.begin(), s.leftOutPoints.end(), this->From.firstAtPlace[i]))
+        {
+          points.push_back(static_cast<std::int64_t>(i));
+        }
+      }
+      field->AddArray(MakeArray<vtkIdTypeArray>(names::LeftOutPoints, points));
+    }
   }
 
   void WritePatches(vtkMultiBlockDataSet* output) const
@@ -575,6 +627,7 @@ int vtkFrenetSweepSurface::RequestData(
     {
       surfaceOutput->GetFieldData()->PassData(input->GetFieldData());
     }
+    writer.WriteChanges(surfaceOutput);
     for (const std::string& remark : surface.remarks)
     {
       vtkWarningMacro(<< remark);

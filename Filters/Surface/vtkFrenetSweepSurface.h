@@ -32,7 +32,13 @@
  *   `WallCurvature` (double, kappa, 1/mm), `EdgeLength` (double, h, mm), `Normals` (double[3], the
  *   active normals, unit, outwards). Cell data `CellEntityIds` (int: 1 wall, 2.. caps, inlets first),
  *   `GroupIds` (int), and what the input has of
- *   `SegmentIds` (int) and `SegmentLabel` (string). Field data: that of the input.
+ *   `SegmentIds` (int) and `SegmentLabel` (string). Field data: that of the input. Only where the
+ *   tree could not be swept as it is, point data `Repaired` (uchar, 1 where triangles were
+ *   replaced) and field data, one value a change: `Repairs` (string), `RepairVessels` (string),
+ *   `RepairPlaces` (double[3], mm); one a branch that is missing: `LeftOut` (string, why),
+ *   `LeftOutVessels` (string), `LeftOutPlaces` (double[3], mm, where it begins to be missing),
+ *   `LeftOutLengths` (double, mm); and `LeftOutPoints` (idtype, the input's points that are on no
+ *   branch of the surface).
  * - 1, vtkMultiBlockDataSet: a vtkStructuredGrid for each branch, the tube alone, whatever joins
  *   it: PatchSamples + 1 points around (the first once more as the last), patches along it in the
  *   second direction. Block names: `SegmentLabel`, or "Group n". Point data `Abscissas`,
@@ -53,11 +59,14 @@
  * different triangles; for one topology move one surface with vtkSkinDeformation.
  *
  * @par Failure:
- * A setting out of range, a missing array, a radius that is not positive, a branch without length,
- * branches that form a loop or run through each other without joining: one error that names it, and
- * no output. Input without lines gives an empty output. A branch too short to leave its parent is
- * lengthened or left out, with a warning that says where. An aborted execution leaves an empty
- * output and is started anew by the next request.
+ * A setting out of range, a missing array, a radius that is not positive, a branch without length:
+ * one error that names it, and no output. Input without lines gives an empty output. What can not
+ * be swept as it is stays local: a branch too short to leave its parent is lengthened or left out;
+ * an end that folds over its cap is trimmed, laid straight or limited in slope; where triangles stay
+ * bad they are replaced; a branch that forms a loop, runs through another one without joining, or can
+ * not be meshed at all is left out from there on. A warning names vessel, place and remedy, and what
+ * comes out has always passed the tetrahedral mesher's check. Only when nothing is left there is an
+ * error. An aborted execution leaves an empty output and is started anew by the next request.
  *
  * @par Sources:
  * Eq. 4 of Wang et al., arXiv 2503.02218, for the size of the triangles.

@@ -15,6 +15,7 @@
 #include "vtkFieldData.h"
 #include "vtkFloatArray.h"
 #include "vtkIdList.h"
+#include "vtkIdTypeArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
 #include "vtkIntArray.h"
@@ -306,6 +307,44 @@ TEST(FrenetSweepSurface, PlacesThatAreTheSameJoin)
   const Mesh mesh(filter->GetOutput());
   EXPECT_EQ(coronary::MeasureSurface(mesh.points, mesh.triangles).components, 1);
   EXPECT_EQ(filter->GetCaps()->GetNumberOfPoints(), 3);
+}
+
+TEST(FrenetSweepSurface, BranchesThatAreLeftOutAreNamed)
+{
+  // A vessel that crosses the trunk without a common point.
+  const auto fork = MakeFork();
+  vtkNew<vtkIdList> ids;
+  for (int i = 0; i <= 60; ++i)
+  {
+    const double p[3] = { -10.0 + i / 3.0, 0.1, 7.0 };
+    ids->InsertNextId(fork->GetPoints()->InsertNextPoint(p));
+    fork->GetPointData()->GetArray("MaximumInscribedSphereRadius")->InsertNextTuple1(1.0);
+  }
+  fork->GetLines()->InsertNextCell(ids);
+  Get<vtkIntArray>(fork->GetCellData(), "GroupIds")->InsertNextValue(99);
+  Get<vtkStringArray>(fork->GetCellData(), "SegmentLabel")->InsertNextValue("D9");
+  Get<vtkIntArray>(fork->GetCellData(), "SegmentIds")->InsertNextValue(9);
+  vtkNew<vtkFrenetSweepSurface> filter;
+  filter->SetInputData(fork);
+  Messages messages(filter);
+  filter->Update();
+  EXPECT_TRUE(messages.Errors.empty());
+  ASSERT_EQ(messages.Warnings.size(), 1U);
+  EXPECT_NE(messages.Warnings[0].find("D9 (group 99) is left out"), std::string::npos);
+  const Mesh mesh(filter->GetOutput());
+  EXPECT_EQ(coronary::MeasureSurface(mesh.points, mesh.triangles).components, 2);
+  vtkFieldData* field = filter->GetOutput()->GetFieldData();
+  ASSERT_EQ(Get<vtkStringArray>(field, "LeftOut")->GetNumberOfValues(), 1);
+  EXPECT_EQ(Get<vtkStringArray>(field, "LeftOutVessels")->GetValue(0), "D9 (group 99)");
+  EXPECT_NEAR(Get<vtkDoubleArray>(field, "LeftOutPlaces")->GetComponent(0, 0), -3.5, 1.0);
+  EXPECT_NEAR(Get<vtkDoubleArray>(field, "LeftOutLengths")->GetValue(0), 13.5, 1.0);
+  auto* missing = Get<vtkIdTypeArray>(field, "LeftOutPoints");
+  EXPECT_NEAR(static_cast<double>(missing->GetNumberOfValues()), 41.0, 3.0);
+  EXPECT_EQ(missing->GetValue(missing->GetNumberOfValues() - 1), ids->GetId(60));
+  filter->SetInputData(MakeFork());
+  filter->Update();
+  EXPECT_EQ(filter->GetOutput()->GetFieldData()->GetAbstractArray("LeftOut"), nullptr);
+  EXPECT_EQ(filter->GetOutput()->GetFieldData()->GetAbstractArray("Repairs"), nullptr);
 }
 
 TEST(FrenetSweepSurface, OpenEndsAndOtherNames)

@@ -1,0 +1,38 @@
+/**
+ * @file SweptEnds.h
+ * @brief Free ends of vessels that no tube of their width can follow.
+ */
+#ifndef DynamicCoronary_SweptEnds_h
+#define DynamicCoronary_SweptEnds_h
+
+#include "VesselAxis.h"
+
+#include <string>
+#include <vector>
+
+namespace coronary
+{
+/// A vessel's course: points, radii in mm, and the smoothing at each.
+struct VesselCourse
+{
+  std::vector<Vector3> points;
+  std::vector<double> radius;
+  std::vector<double> smoothing;
+};
+
+/**
+ * Mends a free end whose tube would fold over its cap: where curvature times radius is too great,
+ * or the radius changes so fast that wall and cap meet in a blade. The radius is limited in slope;
+ * where that is not enough, a short end is left out, and a longer one laid straight.
+ *
+ * @param axis     of the course as it is
+ * @param atStart  which end
+ * @param mayTrim  else it is laid straight at once
+ * @param[out] place  of the end before
+ * @return what was done, "" when the end is fit as it is
+ */
+std::string MendEnd(
+  VesselCourse& course, const VesselAxis& axis, bool atStart, bool mayTrim, Vector3& place);
+}
+
+#endif
