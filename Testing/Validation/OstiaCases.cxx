@@ -158,6 +158,21 @@ std::vector<Vector3> Beginning(const PhantomTree& tree, int treeId, double from,
   return line;
 }
 
+/// mm outside of the arteries' wall, as if they were made of balls; 20 mm and more are as good as any
+double OutsideVessels(const Work& work, const Vector3& p)
+{
+  double least = 20.0;
+  for (std::size_t n = 0; n < work.tree.points.size(); n += 2)
+  {
+    const double square = (work.tree.points[n] - p).squaredNorm();
+    if (square < 625.0)
+    {
+      least = std::min(least, std::sqrt(square) - work.tree.radius[n]);
+    }
+  }
+  return least;
+}
+
 /// mm outside of the wall of the root and the ascending aorta
 double OutsideRoot(const AorticRoot& root, const Vector3& p)
 {
@@ -311,10 +326,7 @@ void BrightNeighbours(Work& work, Painter& painter)
   const std::vector<Vector3> trunk{ a.pulmonaryBase - 14.0 * a.pulmonaryAxis,
     a.pulmonaryBase + 120.0 * a.pulmonaryAxis };
   const auto clear = [&](const Vector3& p)
-  {
-    return std::min(
-      OutsideRoot(a.root, p) - 1.6, work.phantom->LumenDistance(p, work.recipe.moment) - 1.0);
-  };
+  { return std::min(OutsideRoot(a.root, p) - 1.6, OutsideVessels(work, p) - 1.0); };
   painter.Paint(blood,
     [&](const Vector3& p)
     {
@@ -484,11 +496,7 @@ void Change(const std::string& group, RandomStream& random, Work& work)
     {
       const Vector3 c = root.centre - 6.0 * root.axis + sign * offset * side;
       const auto clear = [&](const Vector3& p, double depth)
-      {
-        return depth < -2.0
-          ? depth
-          : std::min(depth, work.phantom->LumenDistance(p, work.recipe.moment) - 1.0);
-      };
+      { return depth < -2.0 ? depth : std::min(depth, OutsideVessels(work, p) - 1.0); };
       painter.Paint(Wall,
         [&](const Vector3& p)
         { return OutsideRoot(root, p) < 0.0 ? -1e3 : clear(p, size + 1.6 - (p - c).norm()); });
