@@ -95,6 +95,9 @@ public:
     {
       return result;
     }
+    // A little farther out the line is free of the bend before it.
+    constexpr double farther = 1.5; // mm
+    clear = this->At(std::min(this->Lengths[clear] + farther, this->Lengths.back() - 2.0));
     std::vector<Vector3> course;
     std::size_t last = 0;
     if (!this->FollowBack(clear, course, last))
@@ -105,7 +108,13 @@ public:
     this->Spread(course, last);
     result.moved = (this->Point(0) - result.position).norm();
     result.position = this->Point(0);
-    result.normal = (this->Point(1) - this->Point(0)).normalized();
+    constexpr double chord = 1.5; // mm
+    std::size_t to = 1;
+    while (to < last && (this->Point(to) - this->Point(0)).norm() < chord)
+    {
+      ++to;
+    }
+    result.normal = (this->Point(to) - this->Point(0)).normalized();
     result.radius = this->Radius(0);
     return result;
   }
@@ -178,9 +187,9 @@ private:
   {
     constexpr double leastClosed = 0.5;
     constexpr double funnel = 1.25; // of the radius at the clear section
-    constexpr double beyond = 5.0; // mm before the tree's first point
-    constexpr double joint = 4.0;  // mm behind the clear section that may move a little
-    constexpr double chord = 2.5;  // mm that give the direction
+    constexpr double beyond = 5.0;  // mm before the tree's first point
+    constexpr double joint = 4.0;   // mm behind the clear section that may move a little
+    constexpr double chord = 2.5;   // mm that give the direction
     last = this->At(this->Lengths[clear] + joint);
     const Vector3 start = this->Point(clear);
     Vector3 back = (start - this->Point(this->At(this->Lengths[clear] + chord))).normalized();
@@ -196,14 +205,26 @@ private:
     {
       return false;
     }
-    const double radius = ring.radius;
+    double radius = ring.radius;
+    const Vector3 ahead = this->Point(last) - this->Point(this->At(this->Lengths[last] - 1.0));
+    const Ring farther = MeasureRing(this->Image, this->Point(last), ahead.normalized(),
+      1.2 * this->Radius(last) + 0.2, lumen, this->Settings);
+    if (farther.closed >= leastClosed && farther.radius > 0.0)
+    {
+      radius = std::min(radius, 1.1 * farther.radius);
+    }
     std::vector<Vector3> before{ start };
+    const double dark =
+      0.5 * (lumen + this->Settings.reference.background); // there is nothing before it
     const double most = this->Lengths[clear] + beyond;
-    while (Step * static_cast<double>(before.size()) < most)
+    bool opened = false;
+    while (!opened && Step * static_cast<double>(before.size()) < most)
     {
       Vector3 next = before.back() + Step * back;
       ring = MeasureRing(this->Image, next, back, radius, lumen, this->Settings);
-      if (ring.closed < leastClosed || ring.radius > funnel * radius)
+      opened =
+        ring.closed < leastClosed || ring.radius > funnel * radius || this->Image.At(next) < dark;
+      if (opened)
       {
         break;
       }
@@ -212,6 +233,12 @@ private:
       next += shift * ring.shift;
       back = (0.85 * back + 0.15 * (next - before.back()).normalized()).normalized();
       before.push_back(next);
+    }
+    if (!opened)
+    {
+      // It goes on as a vessel: the seed is where the tree is meant to begin.
+      const auto keep = static_cast<std::size_t>(this->Lengths[clear] / Step) + 1;
+      before.resize(std::min(before.size(), keep));
     }
     std::vector<Vector3> line(before.rbegin(), before.rend());
     for (std::size_t i = clear + 1; i <= last; ++i)
@@ -274,7 +301,7 @@ private:
         course[std::min(i + 2, course.size() - 1)] - course[i < 2 ? 0 : i - 2];
       const Ring ring = MeasureRing(
         this->Image, course[i], tangent.normalized(), 1.2 * known + 0.2, lumen, this->Settings);
-      if (ring.closed >= 0.6 && ring.radius > 0.0)
+      if (ring.closed >= 0.8 && ring.radius > 0.0)
       {
         radii[i] = ring.radius;
         weights[i] = ring.closed * ring.closed;
@@ -284,9 +311,15 @@ private:
     std::vector<double> smooth = SmoothSequence(radii, weights, wavelength / Step);
     // What is measured here is a half maximum: its difference to the vessel's own radius is that at the end.
     const double offset = known - smooth.back();
+    // Where it opens the ring looks narrower than it is; a narrowing that is one shows in the tree as well.
+    double narrowest = known;
+    for (std::size_t i = 0; i <= last; ++i)
+    {
+      narrowest = std::min(narrowest, this->Radius(i));
+    }
     for (double& radius : smooth)
     {
-      radius = std::clamp(radius + offset, 0.7 * known, 1.4 * known);
+      radius = std::clamp(radius + offset, 0.95 * narrowest, 1.3 * known);
     }
     return smooth;
   }

@@ -73,30 +73,49 @@ struct Candidate
 {
   AorticTube tube;
   AorticOutlets around;
-  double confidence; ///< of the circles
+  double confidence;  ///< of the circles
+  double prior = 0.0; ///< evidence: an aorta that lies across the body is rare
 };
 
-/// @param brightest  HU of the brightest tube
-double TubeEvidence(const Candidate& candidate, double brightest)
+double LengthOf(const AorticTube& tube)
+{
+  double length = 0.0;
+  for (std::size_t n = 1; n < tube.sections.size(); ++n)
+  {
+    length += (tube.sections[n].centre - tube.sections[n - 1].centre).norm();
+  }
+  return length;
+}
+
+/// What speaks for a tube as the aorta, from its circles alone.
+double ShapeEvidence(const Candidate& candidate)
 {
   std::vector<double> radii;
-  double length = 0.0;
-  const std::vector<AorticSection>& sections = candidate.tube.sections;
-  for (std::size_t n = 0; n < sections.size(); ++n)
+  for (const AorticSection& section : candidate.tube.sections)
   {
-    radii.push_back(sections[n].radius);
-    length += n > 0 ? (sections[n].centre - sections[n - 1].centre).norm() : 0.0;
+    radii.push_back(section.radius);
   }
   const double radius = MedianOf(radii);
   double sum = 2.0 * std::log(std::max(0.05, candidate.confidence));
   sum += Evidence(std::max({ 0.0, 11.0 - radius, 0.3 * (radius - 22.0) }), 1.5, 0.0, -3.0);
-  sum -= 2.0 * (1.0 - std::min(1.0, length / 30.0));
+  sum -= 2.0 * (1.0 - std::min(1.0, LengthOf(candidate.tube) / 30.0));
+  return sum;
+}
+
+/// The same with what is around it.
+/// @param brightest  HU of the brightest tube
+double TubeEvidence(const Candidate& candidate, double brightest)
+{
+  double sum = candidate.prior + ShapeEvidence(candidate);
+  // A heart's chambers are beside its aorta; the aorta of the abdomen has none.
+  constexpr double heart = 2000.0; // mm^3
+  sum -= 3.5 * (1.0 - std::min(1.0, candidate.around.chambers / heart));
   // Arterial blood is about as bright everywhere; only unmixed medium in veins is brighter.
   sum -= candidate.around.mean < 0.65 * brightest ? 1.5 : 0.0;
   return sum;
 }
 
-constexpr double Missing = -3.5; ///< evidence for one ostium without the other
+constexpr double Missing = -0.3; ///< evidence for one ostium without the other
 
 std::vector<Hypothesis> Explain(
   const std::vector<Candidate>& candidates, const CoronaryOstiaSettings& settings)
@@ -143,8 +162,8 @@ std::vector<Hypothesis> Explain(
 double Agreement(const std::vector<Hypothesis>& explanations,
   const std::vector<Candidate>& candidates, const Vector3& place, bool left)
 {
-  constexpr double none = 4.0;  // evidence that a pair has by chance
-  constexpr double same = 4.0;  // mm
+  constexpr double none = 5.0; // evidence that a pair has by chance
+  constexpr double same = 4.0; // mm
   const double reference = std::max(none, explanations.front().evidence);
   double agree = 0.0;
   double all = std::exp(none - reference);
@@ -160,49 +179,173 @@ double Agreement(const std::vector<Hypothesis>& explanations,
   return agree / all;
 }
 
-/// What is looked at: tubes of one direction of slices, sliced square to their axes, and what hangs on them.
-std::vector<Candidate> FindCandidates(const ScalarImage& image, const Matrix3& axes,
-  const CoronaryOstiaSettings& settings, const ProgressCallback& progress)
+/// Whether a tube is one that has been looked at.
+bool IsKnown(const AorticTube& tube, const std::vector<Candidate>& candidates)
 {
-  const auto part = [&](double from, double to)
+  constexpr double near = 4.0;  // mm
+  constexpr double share = 0.7; // of its sections
+  for (const Candidate& candidate : candidates)
   {
-    return [&progress, from, to](double f)
-    { return !progress || progress(from + (to - from) * f); };
-  };
-  constexpr double spacing = 1.5; // mm
-  const auto [low, high] = BoundsAlong(image.grid, axes);
-  const WorldVolume volume = ResampleToWorld(image, low, high, spacing, axes, part(0.0, 0.15));
-  const std::vector<AorticTube> tubes = FindAorticTubes(volume, settings, part(0.15, 0.3));
-  std::vector<Candidate> result;
-  for (std::size_t t = 0; t < tubes.size(); ++t)
-  {
-    const double share = 0.7 / static_cast<double>(tubes.size());
-    const double from = 0.3 + share * static_cast<double>(t);
-    Candidate candidate;
-    candidate.tube = SliceSquare(volume, tubes[t], settings);
-    if (candidate.tube.sections.size() < 4)
+    const TubeAxis axis(candidate.tube.sections);
+    std::size_t same = 0;
+    for (const AorticSection& section : tube.sections)
     {
-      candidate.tube = tubes[t];
+      same += axis.At(section.centre).distance < near ? 1 : 0;
     }
-    double length = spacing;
-    double score = 0.0;
-    for (std::size_t n = 0; n < candidate.tube.sections.size(); ++n)
+    if (static_cast<double>(same) >= share * static_cast<double>(tube.sections.size()))
     {
-      score += candidate.tube.scores[n];
-      length += n > 0
-        ? (candidate.tube.sections[n].centre - candidate.tube.sections[n - 1].centre).norm()
-        : 0.0;
-    }
-    // A tube of few or poor circles may be anything.
-    const double roundness = score / static_cast<double>(candidate.tube.sections.size());
-    candidate.confidence = std::min(1.0, length / 15.0) * std::clamp(roundness / 0.7, 0.0, 1.0);
-    candidate.around = FindOutlets(image, candidate.tube, settings, part(from, from + share));
-    if (candidate.around.mean > settings.softTissue)
-    {
-      result.push_back(std::move(candidate));
+      return true;
     }
   }
+  return false;
+}
+
+/// The tubes along one direction of slices, sliced square to their axes, the likeliest first.
+std::vector<Candidate> FindTubes(const ScalarImage& image, const Matrix3& axes,
+  const CoronaryOstiaSettings& settings, const ProgressCallback& progress)
+{
+  constexpr double spacing = 1.5; // mm
+  const auto [low, high] = BoundsAlong(image.grid, axes);
+  const WorldVolume volume = ResampleToWorld(
+    image, low, high, spacing, axes, [&](double f) { return !progress || progress(0.5 * f); });
+  const std::vector<AorticTube> tubes = FindAorticTubes(
+    volume, settings, [&](double f) { return !progress || progress(0.5 + 0.5 * f); });
+  std::vector<Candidate> result;
+  for (const AorticTube& tube : tubes)
+  {
+    Candidate candidate;
+    candidate.tube = SliceSquare(volume, tube, settings);
+    if (candidate.tube.sections.size() < 4)
+    {
+      candidate.tube = tube;
+    }
+    double score = 0.0;
+    for (const double one : candidate.tube.scores)
+    {
+      score += one;
+    }
+    // A tube of few or poor circles may be anything.
+    const double length = spacing + LengthOf(candidate.tube);
+    const double roundness = score / static_cast<double>(candidate.tube.sections.size());
+    candidate.confidence = std::min(1.0, length / 15.0) * std::clamp(roundness / 0.7, 0.0, 1.0);
+    result.push_back(std::move(candidate));
+  }
+  std::stable_sort(result.begin(), result.end(),
+    [](const Candidate& a, const Candidate& b) { return ShapeEvidence(a) > ShapeEvidence(b); });
   return result;
+}
+
+/// Slices along the body, and four oblique ones for an aorta that lies more across.
+std::array<Matrix3, 5> SliceAxes()
+{
+  std::array<Matrix3, 5> axes;
+  axes[0] = Matrix3::Identity();
+  for (int n = 0; n < 4; ++n)
+  {
+    const double turn = 0.5 * Pi * n;
+    axes[n + 1] =
+      Eigen::AngleAxisd(0.25 * Pi, Vector3(std::cos(turn), std::sin(turn), 0.0)).toRotationMatrix();
+  }
+  return axes;
+}
+
+/// What explains an image best, and from what.
+struct Search
+{
+  std::vector<Candidate> candidates;
+  std::vector<Hypothesis> explanations;
+};
+
+/**
+ * Looks at one tube after the other, the likeliest first, until one explains the image so well that no other could
+ * do better.
+ */
+Search FindExplanations(
+  const ScalarImage& image, const CoronaryOstiaSettings& settings, const ProgressCallback& progress)
+{
+  constexpr double clear = 8.5;     // evidence of a pair that no other reaches by chance
+  constexpr double doubtful = 5.0;  // evidence below which oblique slices are tried as well
+  constexpr std::size_t others = 2; // tubes of each oblique direction
+  Search search;
+  const auto best = [&]()
+  { return search.explanations.empty() ? -1e9 : search.explanations.front().evidence; };
+  const std::array<Matrix3, 5> directions = SliceAxes();
+  for (std::size_t d = 0; d < directions.size(); ++d)
+  {
+    // The first direction is usually the only one.
+    const double begin = d == 0 ? 0.0 : 0.8 + 0.05 * static_cast<double>(d - 1);
+    const double span = d == 0 ? 0.8 : 0.05;
+    const auto part = [&, begin, span](double from, double to)
+    {
+      return [&progress, begin, span, from, to](double f)
+      { return !progress || progress(begin + span * (from + (to - from) * f)); };
+    };
+    std::vector<Candidate> tubes = FindTubes(image, directions[d], settings, part(0.0, 0.3));
+    std::size_t looked = 0;
+    for (std::size_t t = 0; t < tubes.size() && (d == 0 || looked < others); ++t)
+    {
+      if (d > 0 && IsKnown(tubes[t].tube, search.candidates))
+      {
+        continue;
+      }
+      ++looked;
+      tubes[t].prior = d > 0 ? -1.0 : 0.0;
+      const double share = 0.7 / static_cast<double>(tubes.size());
+      const double from = 0.3 + share * static_cast<double>(t);
+      tubes[t].around = FindOutlets(image, tubes[t].tube, settings, part(from, from + share));
+      if (!(tubes[t].around.mean > settings.softTissue))
+      {
+        continue;
+      }
+      search.candidates.push_back(std::move(tubes[t]));
+      search.explanations = Explain(search.candidates, settings);
+      if (best() >= clear)
+      {
+        return search;
+      }
+    }
+    if (best() >= doubtful || (d == 0 && tubes.empty()))
+    {
+      break;
+    }
+  }
+  return search;
+}
+
+/// The part of a tube that is aorta, and its blood where the ostia are.
+AscendingAorta AortaOf(const Candidate& candidate, const std::vector<double>& levels)
+{
+  constexpr double below = 20.0;  // mm from an ostium to the valve, at most
+  constexpr double around = 15.0; // mm
+  AscendingAorta aorta;
+  aorta.mean = candidate.around.mean;
+  aorta.deviation = candidate.around.deviation;
+  aorta.confidence = candidate.confidence;
+  const std::vector<AorticSection>& sections = candidate.tube.sections;
+  const TubeAxis axis(sections);
+  double lowest = -1e9;
+  double level = 0.0;
+  for (const double one : levels)
+  {
+    lowest = std::max(lowest, one - below);
+    level += one / static_cast<double>(levels.size());
+  }
+  std::vector<double> means;
+  for (std::size_t n = 0; n < sections.size(); ++n)
+  {
+    const double length = axis.At(sections[n].centre).length;
+    if (length >= lowest || n + 4 >= sections.size())
+    {
+      aorta.sections.push_back(sections[n]);
+    }
+    const double mean = candidate.around.sectionMeans[n];
+    if (!levels.empty() && std::abs(length - level) < around && std::isfinite(mean))
+    {
+      means.push_back(mean);
+    }
+  }
+  aorta.mean = means.size() < 3 ? aorta.mean : MedianOf(means);
+  return aorta;
 }
 }
 
@@ -242,9 +385,9 @@ CoronaryOstia FindCoronaryOstia(
   {
     throw std::invalid_argument("the image needs positive spacing and a finite position");
   }
-  const std::vector<Candidate> candidates =
-    FindCandidates(image, Matrix3::Identity(), settings, progress);
-  const std::vector<Hypothesis> explanations = Explain(candidates, settings);
+  const Search search = FindExplanations(image, settings, progress);
+  const std::vector<Candidate>& candidates = search.candidates;
+  const std::vector<Hypothesis>& explanations = search.explanations;
 #ifdef OSTIA_DUMP
   if (getenv("OSTIA_DUMP"))
   {
@@ -256,7 +399,8 @@ CoronaryOstia FindCoronaryOstia(
         len += (c.tube.sections[n].centre - c.tube.sections[n - 1].centre).norm();
       const auto& f = c.tube.sections.front();
       const auto& g = c.tube.sections.back();
-      printf("T %zu conf %.2f n %zu len %.0f mean %.0f sd %.0f low %.1f %.1f %.1f r %.1f high %.1f "
+      printf("T %zu cham %.0f conf %.2f n %zu len %.0f mean %.0f sd %.0f low %.1f %.1f %.1f r %.1f "
+             "high %.1f "
              "%.1f %.1f r %.1f\n",
         t, c.confidence, c.tube.sections.size(), len, c.around.mean, c.around.deviation,
         f.centre[0], f.centre[1], f.centre[2], f.radius, g.centre[0], g.centre[1], g.centre[2],
@@ -281,10 +425,7 @@ CoronaryOstia FindCoronaryOstia(
   {
     const Hypothesis& best = explanations.front();
     const Candidate& chosen = candidates[best.tube];
-    result.aorta.sections = chosen.tube.sections;
-    result.aorta.mean = chosen.around.mean;
-    result.aorta.deviation = chosen.around.deviation;
-    result.aorta.confidence = chosen.confidence;
+    std::vector<double> levels;
     const auto add = [&](int outlet, bool left)
     {
       if (outlet >= 0)
@@ -293,17 +434,16 @@ CoronaryOstia FindCoronaryOstia(
         ostium.name = left ? "LCA" : "RCA";
         ostium.confidence = Agreement(explanations, candidates, ostium.position, left);
         result.ostia.push_back(ostium);
+        levels.push_back(chosen.around.outlets[outlet].level);
       }
     };
     add(best.left, true);
     add(best.right, false);
+    result.aorta = AortaOf(chosen, levels);
   }
   else if (!candidates.empty())
   {
-    result.aorta.sections = candidates.front().tube.sections;
-    result.aorta.mean = candidates.front().around.mean;
-    result.aorta.deviation = candidates.front().around.deviation;
-    result.aorta.confidence = candidates.front().confidence;
+    result.aorta = AortaOf(candidates.front(), {});
   }
 
   constexpr double sure = 0.5;

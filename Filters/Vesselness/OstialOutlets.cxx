@@ -46,6 +46,20 @@ struct WallPatch
   }
 };
 
+std::vector<AorticSection> EveryThird(const std::vector<AorticSection>& sections)
+{
+  std::vector<AorticSection> result;
+  for (std::size_t n = 0; n < sections.size(); n += 3)
+  {
+    result.push_back(sections[n]);
+  }
+  if ((sections.size() - 1) % 3 != 0)
+  {
+    result.push_back(sections.back());
+  }
+  return result;
+}
+
 class OutletSearch
 {
 public:
@@ -56,17 +70,20 @@ public:
 
   double BloodMean = 0.0;
   double BloodDeviation = 0.0;
+  std::vector<double> SectionMeans; ///< NaN: unknown
+  double Chambers = 0.0;            ///< mm^3
 
 private:
   static constexpr double Below = 25.0; ///< mm below the lowest circle: the root is no circle
 
   void Blood(const AorticTube& tube);
   void Bodies(const ProgressCallback& progress);
+  void MeasureChambers();
   void Vessels(const ProgressCallback& progress);
   void March();
   bool OnTube(const Vector3& p) const
   {
-    const TubeAxis::Place place = this->Axis.At(p);
+    const TubeAxis::Place place = this->CoarseAxis.At(p);
     return place.length > -Below && place.distance < 1.25 * place.radius + 1.5;
   }
   bool Contains(const std::array<int, 3>& p) const
@@ -84,7 +101,8 @@ private:
 
   const CoronaryOstiaSettings& Settings;
   TubeAxis Axis;
-  Matrix3 Upright; ///< turns the aorta's axis upwards, the shortest way
+  TubeAxis CoarseAxis; ///< of every third section: what is asked for each voxel
+  Matrix3 Upright;     ///< turns the aorta's axis upwards, the shortest way
   WorldVolume Volume;
   float Half = 0.0f;                ///< HU at a wall
   std::vector<unsigned char> Body;  ///< 1 large body, 2 large body on the aorta
@@ -100,6 +118,7 @@ OutletSearch::OutletSearch(const ScalarImage& image, const AorticTube& tube,
   const CoronaryOstiaSettings& settings, const ProgressCallback& progress)
   : Settings(settings)
   , Axis(tube.sections)
+  , CoarseAxis(EveryThird(tube.sections))
   , Upright(Eigen::Quaterniond::FromTwoVectors(this->Axis.Direction(), Vector3::UnitZ())
               .toRotationMatrix())
 {
@@ -175,11 +194,13 @@ void OutletSearch::Blood(const AorticTube& tube)
         }
       }
     }
+    this->SectionMeans.push_back(std::numeric_limits<double>::quiet_NaN());
     if (inside.size() < 20)
     {
       continue;
     }
     const double median = MedianOf(inside);
+    this->SectionMeans.back() = median;
     means.push_back(median);
     for (double& value : inside)
     {
@@ -215,6 +236,38 @@ void OutletSearch::Bodies(const ProgressCallback& progress)
         }
       }
     });
+  this->MeasureChambers();
+}
+
+/// Arterial blood in bodies of 9 mm radius at least that are not the tube.
+void OutletSearch::MeasureChambers()
+{
+  const std::array<int, 3>& n = this->Volume.size;
+  const int deep = static_cast<int>(9.0 / this->Volume.spacing);
+  const double contrast = this->BloodMean - this->Settings.softTissue;
+  const auto darkest = static_cast<float>(this->BloodMean - 0.2 * contrast);
+  const auto brightest = static_cast<float>(this->BloodMean + 0.3 * contrast);
+  const std::array<std::int64_t, 3> steps{ deep, this->Volume.Index(0, deep, 0),
+    this->Volume.Index(0, 0, deep) };
+  std::int64_t count = 0;
+  for (int k = deep; k + deep < n[2]; ++k)
+  {
+    for (int j = deep; j + deep < n[1]; ++j)
+    {
+      for (int i = deep; i + deep < n[0]; ++i)
+      {
+        const std::int64_t p = this->Volume.Index(i, j, k);
+        bool inside = this->Body[p] == 1 && this->Volume.values[p] > darkest &&
+          this->Volume.values[p] < brightest;
+        for (const std::int64_t step : steps)
+        {
+          inside = inside && this->Body[p - step] && this->Body[p + step];
+        }
+        count += inside ? 1 : 0;
+      }
+    }
+  }
+  this->Chambers = std::pow(this->Volume.spacing, 3) * static_cast<double>(count);
 }
 
 /// What is as bright as blood; or less bright, as thin vessels in coarse voxels are, but tubular.
@@ -578,10 +631,10 @@ WallPatch OutletSearch::FitWall(
         continue;
       }
       const double f = (inside - this->Half) / (inside - outside);
-      const Vector3 place = (1.0 - f) * this->Volume.World(at) + f * this->Volume.World(next);
+      const Vector3 edge = (1.0 - f) * this->Volume.World(at) + f * this->Volume.World(next);
       const bool mouth = std::any_of(vessel.begin(), vessel.end(),
-        [&](const Vector3& v) { return (place - v).norm() < 1.3 * radius + 0.5; });
-      const Vector3 local = patch.Local(place);
+        [&](const Vector3& v) { return (edge - v).norm() < 1.3 * radius + 0.5; });
+      const Vector3 local = patch.Local(edge);
       if (!mouth && local.norm() < extent && local[2] > -0.5 * extent)
       {
         points.push_back(local);
@@ -651,7 +704,9 @@ double OutletSearch::Recentre(
     const double cosine = std::cos(2.0 * Pi * ray / rays);
     const double sine = std::sin(2.0 * Pi * ray / rays);
     float before = this->At(centre);
-    const int steps = static_cast<int>(std::ceil((1.6 * radius + 0.5) / step));
+    // In the vessel's funnel the wall is there, but it is not that of the vessel any more.
+    const double reach = adapt ? 1.6 * radius + 0.5 : 1.35 * radius + 0.4;
+    const int steps = static_cast<int>(std::ceil(reach / step));
     for (int i = 1; i < steps; ++i)
     {
       const double rho = i * step;
@@ -798,6 +853,8 @@ AorticOutlets FindOutlets(const ScalarImage& image, const AorticTube& tube,
   AorticOutlets result;
   result.mean = search.BloodMean;
   result.deviation = search.BloodDeviation;
+  result.sectionMeans = search.SectionMeans;
+  result.chambers = search.Chambers;
   if (search.BloodMean > settings.softTissue)
   {
     result.outlets = search.Find();

@@ -28,8 +28,11 @@ struct Outlet
 
 struct AorticOutlets
 {
-  double mean = 0.0;           ///< HU of the blood
-  double deviation = 0.0;      ///< HU, its standard deviation
+  double mean = 0.0;      ///< HU of the blood
+  double deviation = 0.0; ///< HU, its standard deviation
+  /// HU of the blood in each of the tube's sections; NaN: outside of what was looked at.
+  std::vector<double> sectionMeans;
+  double chambers = 0.0;       ///< mm^3 well inside large bodies of arterial blood beside the tube
   std::vector<Outlet> outlets; ///< at most twelve, most vessel first
 };
 
