@@ -4,7 +4,9 @@
 #include "OstialOutlets.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <stdexcept>
 
 namespace coronary
@@ -388,39 +390,6 @@ CoronaryOstia FindCoronaryOstia(
   const Search search = FindExplanations(image, settings, progress);
   const std::vector<Candidate>& candidates = search.candidates;
   const std::vector<Hypothesis>& explanations = search.explanations;
-#ifdef OSTIA_DUMP
-  if (getenv("OSTIA_DUMP"))
-  {
-    for (size_t t = 0; t < candidates.size(); ++t)
-    {
-      const auto& c = candidates[t];
-      double len = 0;
-      for (size_t n = 1; n < c.tube.sections.size(); ++n)
-        len += (c.tube.sections[n].centre - c.tube.sections[n - 1].centre).norm();
-      const auto& f = c.tube.sections.front();
-      const auto& g = c.tube.sections.back();
-      printf("T %zu cham %.0f conf %.2f n %zu len %.0f mean %.0f sd %.0f low %.1f %.1f %.1f r %.1f "
-             "high %.1f "
-             "%.1f %.1f r %.1f\n",
-        t, c.confidence, c.tube.sections.size(), len, c.around.mean, c.around.deviation,
-        f.centre[0], f.centre[1], f.centre[2], f.radius, g.centre[0], g.centre[1], g.centre[2],
-        g.radius);
-      for (size_t i = 0; i < c.around.outlets.size(); ++i)
-      {
-        const auto& o = c.around.outlets[i];
-        printf("O %zu %zu pos %.1f %.1f %.1f az %.0f lev %.1f r %.2f len %.0f tub %.2f shade %.2f "
-               "dep %.2f vol %.0f course %.0f %.0f %.0f L %.1f R %.1f\n",
-          t, i, o.ostium.position[0], o.ostium.position[1], o.ostium.position[2],
-          o.azimuth * 180 / Pi, o.level, o.ostium.radius, o.ostium.length, o.tubular, o.shade,
-          o.departure, o.volume, o.course[0], o.course[1], o.course[2],
-          RoleEvidence(o, true, settings), RoleEvidence(o, false, settings));
-      }
-    }
-    for (size_t i = 0; i < std::min<size_t>(6, explanations.size()); ++i)
-      printf("H %.2f t %d l %d r %d\n", explanations[i].evidence, explanations[i].tube,
-        explanations[i].left, explanations[i].right);
-  }
-#endif
   if (!explanations.empty())
   {
     const Hypothesis& best = explanations.front();
@@ -462,7 +431,10 @@ CoronaryOstia FindCoronaryOstia(
     {
       if (ostium.confidence < sure)
       {
-        result.doubt += (result.doubt.empty() ? "not sure of the " : " and the ") + ostium.name;
+        std::array<char, 16> share;
+        std::snprintf(share.data(), share.size(), " (%.2f)", ostium.confidence);
+        result.doubt +=
+          (result.doubt.empty() ? "not sure of the " : " and the ") + ostium.name + share.data();
       }
     }
   }
