@@ -11,7 +11,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Step = 0.3; ///< mm between sections
 
 /// The section of a vessel as far as its wall is seen.
 struct Ring
@@ -73,11 +72,21 @@ public:
     , Image(image)
     , Settings(settings)
   {
+    // Lengths follow the vessel's width: in that of a coronary artery a unit is a millimetre.
+    std::vector<double> radii;
+    for (std::size_t i = 0; i < std::min(free + 1, branch.points.size()); ++i)
+    {
+      radii.push_back(this->Radius(i));
+    }
+    std::sort(radii.begin(), radii.end());
+    constexpr double usual = 1.8; // mm
+    this->Unit = std::max(radii[radii.size() / 3] / usual, 1.5 * image.SmallestSpacing());
+    this->Step = 0.3 * this->Unit;
     double length = 0.0;
     for (std::size_t i = 0; i < std::min(free + 1, branch.points.size()); ++i)
     {
       length += i > 0 ? (this->Point(i) - this->Point(i - 1)).norm() : 0.0;
-      if (length > Longest)
+      if (length > Longest * this->Unit)
       {
         break;
       }
@@ -96,8 +105,9 @@ public:
       return result;
     }
     // A little farther out the line is free of the bend before it.
-    constexpr double farther = 1.5; // mm
-    clear = this->At(std::min(this->Lengths[clear] + farther, this->Lengths.back() - 2.0));
+    const double farther = 1.5 * this->Unit;
+    clear =
+      this->At(std::min(this->Lengths[clear] + farther, this->Lengths.back() - 2.0 * this->Unit));
     std::vector<Vector3> course;
     std::size_t last = 0;
     if (!this->FollowBack(clear, course, last))
@@ -108,7 +118,7 @@ public:
     this->Spread(course, last);
     result.moved = (this->Point(0) - result.position).norm();
     result.position = this->Point(0);
-    constexpr double chord = 1.5; // mm
+    const double chord = 1.5 * this->Unit;
     std::size_t to = 1;
     while (to < last && (this->Point(to) - this->Point(0)).norm() < chord)
     {
@@ -120,7 +130,7 @@ public:
   }
 
 private:
-  static constexpr double Longest = 20.0; ///< mm of vessel that are looked at
+  static constexpr double Longest = 20.0; ///< units of vessel that are looked at
 
   const Vector3& Point(std::size_t i) const
   {
@@ -146,17 +156,17 @@ private:
   /// The first point from which on the vessel is seen, and as wide as it stays.
   bool FindClear(std::size_t& clear) const
   {
-    constexpr double stays = 2.0;     // mm
-    constexpr double wider = 1.2;     // of the settled radius
-    constexpr double seen = 0.7;      // confidence
-    constexpr double farthest = 12.0; // mm: what settles later is no funnel
+    const double stays = 2.0 * this->Unit;
+    constexpr double wider = 1.2;              // of the settled radius
+    constexpr double seen = 0.7;               // confidence
+    const double farthest = 12.0 * this->Unit; // what settles later is no funnel
     if (this->Lengths.size() < 6 || this->Lengths.back() < 2.0 * stays)
     {
       return false;
     }
     // The settled radius: of the narrower half, away from the wall.
     std::vector<double> radii;
-    const std::size_t from = this->At(std::min(3.0, 0.4 * this->Lengths.back()));
+    const std::size_t from = this->At(std::min(3.0 * this->Unit, 0.4 * this->Lengths.back()));
     for (std::size_t i = from; i < this->Lengths.size(); ++i)
     {
       radii.push_back(this->Radius(i));
@@ -186,10 +196,11 @@ private:
   bool FollowBack(std::size_t clear, std::vector<Vector3>& course, std::size_t& last) const
   {
     constexpr double leastClosed = 0.5;
-    constexpr double funnel = 1.25; // of the radius at the clear section
-    constexpr double beyond = 5.0;  // mm before the tree's first point
-    constexpr double joint = 4.0;   // mm behind the clear section that may move a little
-    constexpr double chord = 2.5;   // mm that give the direction
+    constexpr double whole = 0.85;          // share of the wall that shows where the middle is
+    constexpr double funnel = 1.25;         // of the radius at the clear section
+    const double beyond = 5.0 * this->Unit; // before the tree's first point
+    const double joint = 4.0 * this->Unit;  // behind the clear section that may move a little
+    const double chord = 2.5 * this->Unit;  // that give the direction
     last = this->At(this->Lengths[clear] + joint);
     const Vector3 start = this->Point(clear);
     Vector3 back = (start - this->Point(this->At(this->Lengths[clear] + chord))).normalized();
@@ -199,16 +210,17 @@ private:
       values.push_back(this->Image.At(this->Point(i)));
     }
     const double lumen = MedianOf(values);
-    Ring ring =
-      MeasureRing(this->Image, start, back, 1.2 * this->Radius(clear) + 0.2, lumen, this->Settings);
+    Ring ring = MeasureRing(this->Image, start, back, 1.2 * this->Radius(clear) + 0.2 * this->Unit,
+      lumen, this->Settings);
     if (ring.closed < leastClosed || !(ring.radius > 0.0))
     {
       return false;
     }
     double radius = ring.radius;
-    const Vector3 ahead = this->Point(last) - this->Point(this->At(this->Lengths[last] - 1.0));
+    const Vector3 ahead =
+      this->Point(last) - this->Point(this->At(this->Lengths[last] - this->Unit));
     const Ring farther = MeasureRing(this->Image, this->Point(last), ahead.normalized(),
-      1.2 * this->Radius(last) + 0.2, lumen, this->Settings);
+      1.2 * this->Radius(last) + 0.2 * this->Unit, lumen, this->Settings);
     if (farther.closed >= leastClosed && farther.radius > 0.0)
     {
       radius = std::min(radius, 1.1 * farther.radius);
@@ -218,26 +230,32 @@ private:
       0.5 * (lumen + this->Settings.reference.background); // there is nothing before it
     const double most = this->Lengths[clear] + beyond;
     bool opened = false;
-    while (!opened && Step * static_cast<double>(before.size()) < most)
+    while (!opened && this->Step * static_cast<double>(before.size()) < most)
     {
-      Vector3 next = before.back() + Step * back;
+      Vector3 next = before.back() + this->Step * back;
       ring = MeasureRing(this->Image, next, back, radius, lumen, this->Settings);
-      opened =
-        ring.closed < leastClosed || ring.radius > funnel * radius || this->Image.At(next) < dark;
+      if (this->Image.At(next) < dark)
+      {
+        break; // the vessel's own end
+      }
+      opened = ring.closed < leastClosed || ring.radius > funnel * radius;
       if (opened)
       {
         break;
       }
-      // Slowly: noise must not turn it, and one side may open before the other.
-      const double shift = std::min(1.0, 0.3 * Step / std::max(1e-9, ring.shift.norm()));
-      next += shift * ring.shift;
-      back = (0.85 * back + 0.15 * (next - before.back()).normalized()).normalized();
+      // Slowly, as noise must not turn it; and straight on where one side is open before the other.
+      const double shift = std::min(1.0, 0.3 * this->Step / std::max(1e-12, ring.shift.norm()));
+      if (ring.closed >= whole)
+      {
+        next += shift * ring.shift;
+        back = (0.85 * back + 0.15 * (next - before.back()).normalized()).normalized();
+      }
       before.push_back(next);
     }
     if (!opened)
     {
       // It goes on as a vessel: the seed is where the tree is meant to begin.
-      const auto keep = static_cast<std::size_t>(this->Lengths[clear] / Step) + 1;
+      const auto keep = static_cast<std::size_t>(this->Lengths[clear] / this->Step) + 1;
       before.resize(std::min(before.size(), keep));
     }
     std::vector<Vector3> line(before.rbegin(), before.rend());
@@ -245,7 +263,7 @@ private:
     {
       line.push_back(this->Point(i));
     }
-    line = ResampleCurve(line, Step);
+    line = ResampleCurve(line, this->Step);
     if (line.size() < 5)
     {
       return false;
@@ -256,8 +274,8 @@ private:
     {
       weights[weights.size() - 1 - i] = 1e4;
     }
-    constexpr double wavelength = 6.0; // mm
-    course = SmoothCurve(line, weights, wavelength / Step);
+    const double wavelength = 6.0 * this->Unit;
+    course = SmoothCurve(line, weights, wavelength / this->Step);
     return true;
   }
 
@@ -299,16 +317,16 @@ private:
     {
       const Vector3 tangent =
         course[std::min(i + 2, course.size() - 1)] - course[i < 2 ? 0 : i - 2];
-      const Ring ring = MeasureRing(
-        this->Image, course[i], tangent.normalized(), 1.2 * known + 0.2, lumen, this->Settings);
+      const Ring ring = MeasureRing(this->Image, course[i], tangent.normalized(),
+        1.2 * known + 0.2 * this->Unit, lumen, this->Settings);
       if (ring.closed >= 0.8 && ring.radius > 0.0)
       {
         radii[i] = ring.radius;
         weights[i] = ring.closed * ring.closed;
       }
     }
-    constexpr double wavelength = 6.0; // mm
-    std::vector<double> smooth = SmoothSequence(radii, weights, wavelength / Step);
+    const double wavelength = 6.0 * this->Unit;
+    std::vector<double> smooth = SmoothSequence(radii, weights, wavelength / this->Step);
     // What is measured here is a half maximum: its difference to the vessel's own radius is that at the end.
     const double offset = known - smooth.back();
     // Where it opens the ring looks narrower than it is; a narrowing that is one shows in the tree as well.
@@ -328,6 +346,8 @@ private:
   const CenterlineTree::Branch& Branch;
   const ImageInterpolator& Image;
   const LumenSettings& Settings;
+  double Unit = 1.0;           ///< mm
+  double Step = 0.3;           ///< mm between sections
   std::vector<double> Lengths; ///< mm from the first point
 };
 }

@@ -394,6 +394,7 @@ CoronaryOstia FindCoronaryOstia(
   {
     const Hypothesis& best = explanations.front();
     const Candidate& chosen = candidates[best.tube];
+    constexpr double least = 0.05; // confidence
     std::vector<double> levels;
     const auto add = [&](int outlet, bool left)
     {
@@ -402,13 +403,17 @@ CoronaryOstia FindCoronaryOstia(
         CoronaryOstium ostium = chosen.around.outlets[outlet].ostium;
         ostium.name = left ? "LCA" : "RCA";
         ostium.confidence = Agreement(explanations, candidates, ostium.position, left);
+        if (ostium.confidence < least)
+        {
+          return; // the best of nothing
+        }
         result.ostia.push_back(ostium);
         levels.push_back(chosen.around.outlets[outlet].level);
       }
     };
     add(best.left, true);
     add(best.right, false);
-    result.aorta = AortaOf(chosen, levels);
+    result.aorta = AortaOf(levels.empty() ? candidates.front() : chosen, levels);
   }
   else if (!candidates.empty())
   {
