@@ -291,7 +291,7 @@ Search FindExplanations(
         continue;
       }
       ++looked;
-      tubes[t].prior = d > 0 ? -1.0 : 0.0;
+      tubes[t].prior = d > 0 ? -2.0 : 0.0;
       const double share = 0.7 / static_cast<double>(tubes.size());
       const double from = 0.3 + share * static_cast<double>(t);
       tubes[t].around = FindOutlets(image, tubes[t].tube, settings, part(from, from + share));
@@ -394,7 +394,8 @@ CoronaryOstia FindCoronaryOstia(
   {
     const Hypothesis& best = explanations.front();
     const Candidate& chosen = candidates[best.tube];
-    constexpr double least = 0.05; // confidence
+    // Across the body there is always something: not worth a name without likelihood.
+    const double least = chosen.prior < 0.0 ? 0.1 : 0.0;
     std::vector<double> levels;
     const auto add = [&](int outlet, bool left)
     {
@@ -405,7 +406,7 @@ CoronaryOstia FindCoronaryOstia(
         ostium.confidence = Agreement(explanations, candidates, ostium.position, left);
         if (ostium.confidence < least)
         {
-          return; // the best of nothing
+          return;
         }
         result.ostia.push_back(ostium);
         levels.push_back(chosen.around.outlets[outlet].level);
