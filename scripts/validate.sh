@@ -24,6 +24,7 @@ tables=(
   "vesselness-scales | vesselness-benchmark scales | vesselness-benchmark scales --size 96 --repeats 1"
   "vesselness-instructions | vesselness-benchmark instructions | vesselness-benchmark instructions --size 96 --repeats 1"
   "vesselness-agreement | vesselness-benchmark agreement | vesselness-benchmark agreement --agreement-size 64"
+  "ostia | validate-ostia | validate-ostia --quick"
   "segmentation | validate-segmentation | validate-segmentation --quick"
   "centerline-speed | centerline-benchmark --strict | centerline-benchmark --size 96 --repeats 1"
   "centerline | validate-centerline --details --invariance | validate-centerline --quick"

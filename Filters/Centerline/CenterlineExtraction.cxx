@@ -5,6 +5,7 @@
 #include "DistanceTransform.h"
 #include "FastMarching.h"
 #include "LumenMeasurement.h"
+#include "OstialRoot.h"
 #include "ThinBranches.h"
 #include "VeinRejection.h"
 #include "VoxelRegion.h"
@@ -270,6 +271,7 @@ private:
   void Calibrate(const Course& course);
   void CorrectRadii();
   bool IsExcluded(const std::vector<Vector3>& points) const;
+  void SettleOstia();
   void MarkCrossings(Course& course) const;
   void MarkBridged();
   std::size_t SeenUpTo(const Course& course, double parentRadius) const;
@@ -2129,6 +2131,25 @@ void Extractor::FitForks(CenterlineTree& tree) const
   }
 }
 
+/// Trees that come out of a wide body begin where their vessel leaves it.
+void Extractor::SettleOstia()
+{
+  if (!this->Settings.snap || !this->Image || !std::isnan(this->Lumen.level))
+  {
+    return;
+  }
+  for (const OstialRoot& root : SettleRoots(this->Tree, *this->Image, this->Lumen))
+  {
+    if (!root.found)
+    {
+      const Vector3 world = this->Given.grid.origin + this->Given.grid.direction * root.position;
+      this->Result.messages.push_back("the tree of seed " + std::to_string(root.treeId) +
+        " begins at " + Text(world) +
+        ", which may be inside the aorta: no clear section of its first vessel before it parts");
+    }
+  }
+}
+
 void Extractor::Finish()
 {
   for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
@@ -2150,6 +2171,7 @@ void Extractor::Finish()
   }
   this->MarkBridged();
   this->CorrectRadii();
+  this->SettleOstia();
   this->Result.tree = SplitAtBifurcations(this->Tree);
   if (this->Settings.snap)
   {

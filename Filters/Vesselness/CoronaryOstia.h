@@ -31,11 +31,12 @@ struct CoronaryOstiaSettings
   void Validate() const;
 };
 
-/// One axial cross-section of the aorta.
+/// One cross-section of the aorta.
 struct AorticSection
 {
-  Vector3 centre; ///< mm
-  double radius;  ///< mm
+  Vector3 centre;                    ///< mm
+  double radius;                     ///< mm
+  Vector3 normal = Vector3::UnitZ(); ///< unit vector upwards, square to the section
 };
 
 struct AscendingAorta

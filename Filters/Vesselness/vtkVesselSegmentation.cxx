@@ -450,8 +450,9 @@ void vtkVesselSegmentation::Execute(
     }
     if (!found.doubt.empty())
     {
-      vtkWarningMacro(
-        "AutomaticOstia: " << found.doubt << ". Look at output 1 before you trust it.");
+      vtkWarningMacro("AutomaticOstia: " << found.doubt
+                                         << ". Look at output 1 before you trust it, and give "
+                                         << "seeds (Seeds input, AddSeed) where it is wrong.");
     }
     aorta = found.aorta;
     ostia = found.ostia;
