@@ -217,9 +217,11 @@ RunOptions::RunOptions(CLI::App& app, RunSettings& settings)
             "Shorter branches are none, mm; 0: ten voxels", centerline),
     0.0, 1000.0)
     .option->capture_default_str();
-  between(add(group, "--centerline-seconds", "centerline_seconds", settings.centerlineSeconds, "S",
-            "After this time the trees are written as far as they are found", centerline),
-    0.1, 1e6)
+  between(add(group, "--centerline-steps", "centerline_steps", settings.centerlineSteps, "N",
+            "After so many points on the ways back from possible tips the trees are written as far "
+            "as they are found: a limit of work, the same on any machine",
+            centerline),
+    1, 2e9)
     .option->capture_default_str();
   add(group, "!--no-labels", "labels", settings.labels, "",
     "Give the segments no names: for trees that are not coronary", centerline);

@@ -52,7 +52,7 @@ struct RunSettings
 
   bool beyondMask = false;
   double leastBranch = 0.0;
-  double centerlineSeconds = 120.0;
+  int centerlineSteps = 5000000;
   bool labels = true;
 
   std::string surface = "swept"; ///< or "given"

@@ -558,7 +558,7 @@ Json MakeCenterline(RunStep& step)
     { "lines_file", "centerline_lines.vtp" }, { "status_file", "status.csv" } };
   vtkNew<vtkFastMarchingCenterline> centerline;
   centerline->SetMinimumBranchLength(settings.leastBranch);
-  centerline->SetTimeLimit(settings.centerlineSeconds);
+  centerline->SetStepLimit(settings.centerlineSteps);
   vtkSmartPointer<vtkPolyData> seeds;
   if (step.input.IsSurface())
   {

@@ -677,7 +677,7 @@ check_run() {
     fail "--until segmentation wrote $(ls mask)"
   fi
   run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --until centerline \
-    --centerline-seconds 3600 --output beyond
+    --output beyond
   [ "$(branches_of beyond)" -gt "$(branches_of result)" ] || fail "beyond the mask are no more branches"
 
   run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced
