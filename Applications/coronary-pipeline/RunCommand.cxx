@@ -55,9 +55,13 @@ private:
   /// A stage ends on all ranks together. @return warnings of all
   static std::vector<std::string> End(RunInput& input);
   void LeaveOut(RunStage stage, const std::string& reason, RunReport& report);
+  /// Trees that a finished stage has lost are an error, or with --partial a warning.
+  void TellLost(RunStage stage, const RunReport& report);
   void Commit(StagedFolder& folder, RunStage stage, const RunReport& report) const;
   void Stop(RunStage stage, const std::string& reason, RunReport& report) const;
   void Say(const std::string& words);
+  /// What the stages so far have warned of, also of a run that fails.
+  void TellWarnings();
 
   RunSettings Settings;
   RunOptions Options;
@@ -68,6 +72,18 @@ private:
   std::vector<std::string> Warnings;
   std::string Summary;
 };
+
+void RunJob::TellWarnings()
+{
+  if (Ranks().IsFirst())
+  {
+    for (const std::string& warning : this->Warnings)
+    {
+      std::fprintf(stderr, "Warning: %s\n", warning.c_str());
+    }
+  }
+  this->Warnings.clear();
+}
 
 void RunJob::Say(const std::string& words)
 {
@@ -131,6 +147,28 @@ void RunJob::Commit(StagedFolder& folder, RunStage stage, const RunReport& repor
   folder.Commit();
 }
 
+void RunJob::TellLost(RunStage stage, const RunReport& report)
+{
+  const nlohmann::ordered_json numbers =
+    report.Of(RunStageNames()[static_cast<std::size_t>(stage)]);
+  if (!numbers.is_object() || !numbers.contains("lost") || numbers["lost"].empty())
+  {
+    return;
+  }
+  std::vector<std::string> lost;
+  for (const auto& tree : numbers["lost"])
+  {
+    lost.push_back(tree["message"].get<std::string>());
+  }
+  const bool all = numbers.contains("trees") && numbers["trees"].size() == lost.size();
+  if (!this->Settings.partial || all)
+  {
+    throw std::runtime_error(
+      lost.front() + (all ? "." : "; or go on with the other one with --partial."));
+  }
+  this->Warnings.insert(this->Warnings.end(), lost.begin(), lost.end());
+}
+
 void RunJob::LeaveOut(RunStage stage, const std::string& reason, RunReport& report)
 {
   const std::string& name = RunStageNames()[static_cast<std::size_t>(stage)];
@@ -170,13 +208,15 @@ void RunJob::Make(
     {
       sizes.emplace_back(file, folder.PathOf(file));
     }
-    const std::vector<std::string> warnings = End(input);
+    std::vector<std::string> warnings = End(input);
+    warnings.insert(warnings.end(), step.warnings.begin(), step.warnings.end());
     this->Warnings.insert(this->Warnings.end(), warnings.begin(), warnings.end());
     report.Finish(stage, numbers, clock, warnings, sizes);
     this->Commit(folder, stage, report);
     this->Changed = true;
     Ranks().Gather("");
     this->Say(step.summary);
+    this->TellLost(stage, report);
   }
   catch (const std::runtime_error& error)
   {
@@ -276,6 +316,14 @@ void RunJob::Run()
   {
     report.Set("surface_input", this->Settings.input.front());
   }
+  if (Ranks().IsFirst())
+  {
+    // Also of what was made before, where this run goes on.
+    for (const RunStage stage : { RunStage::Segmentation, RunStage::Centerline })
+    {
+      this->TellLost(stage, report);
+    }
+  }
   const std::string still = input.WhyStill();
   int steps = 0;
   for (const RunStage stage : stages)
@@ -315,11 +363,13 @@ void RunJob::Run()
       catch (const std::bad_alloc&)
       {
         this->Stop(stage, "not enough memory", report);
+        this->TellWarnings();
         throw;
       }
       catch (const std::exception& error)
       {
         this->Stop(stage, Ranks().Reason(error.what()), report);
+        this->TellWarnings();
         throw;
       }
     }
@@ -328,10 +378,7 @@ void RunJob::Run()
   {
     return;
   }
-  for (const std::string& warning : this->Warnings)
-  {
-    std::fprintf(stderr, "Warning: %s\n", warning.c_str());
-  }
+  this->TellWarnings();
   if (this->Settings.quiet)
   {
     return;

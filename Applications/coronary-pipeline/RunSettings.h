@@ -54,6 +54,7 @@ struct RunSettings
   double leastBranch = 0.0;
   int centerlineSteps = 5000000;
   bool labels = true;
+  bool partial = false;
 
   std::string surface = "swept"; ///< or "given"
   std::vector<double> edges = { 0.15, 0.7 };

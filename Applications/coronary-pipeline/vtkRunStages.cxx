@@ -170,6 +170,81 @@ Json DescribeTrees(vtkPolyData* lines, vtkPolyData* seeds)
   return list;
 }
 
+std::string AtPlace(const Json& position)
+{
+  char text[100];
+  std::snprintf(text, sizeof(text), "(%.1f, %.1f, %.1f)", position[0].get<double>(),
+    position[1].get<double>(), position[2].get<double>());
+  return text;
+}
+
+/// What a tree is called by the name of its seed.
+std::string TreeName(const std::string& seed)
+{
+  return seed == "LCA" ? "the left coronary tree"
+    : seed == "RCA"    ? "the right coronary tree"
+                       : "the tree of seed " + seed;
+}
+
+/// Trees of which no ostium was found. @param seeds  as of DescribeSeeds()
+Json OstiaNotFound(const Json& seeds)
+{
+  Json lost = Json::array();
+  for (const char* name : { "LCA", "RCA" })
+  {
+    const auto is = [&](const Json& seed) { return seed["name"] == name; };
+    if (std::none_of(seeds.begin(), seeds.end(), is))
+    {
+      lost.push_back({ { "tree", name },
+        { "message",
+          TreeName(name) +
+            " is lost: its ostium was not found on the aorta. Give the ostia of "
+            "all trees with --seed X Y Z" } });
+    }
+  }
+  return lost;
+}
+
+/// Trees that have no branch. @param trees  as of DescribeTrees()
+Json TreesNotFound(const Json& trees)
+{
+  Json lost = Json::array();
+  for (const auto& tree : trees)
+  {
+    if (tree["status"] != 0 || tree["branches"] == 0)
+    {
+      const std::string why = tree["message"].get<std::string>();
+      const std::string name = tree["name"].get<std::string>();
+      lost.push_back({ { "tree", name },
+        { "message",
+          TreeName(name) + " is lost: no vessel was followed from " + AtPlace(tree["position"]) +
+            (why.empty() ? "" : " (" + why + ")") +
+            ". Give a point in its lumen with --seed X Y Z, or leave that seed out" } });
+    }
+  }
+  return lost;
+}
+
+/// What the check of the named trees found.
+Json DescribeChecks(vtkPolyData* tree)
+{
+  namespace names = vtkCoronaryArrayNames;
+  vtkFieldData* fields = tree->GetFieldData();
+  auto* texts = vtkStringArray::SafeDownCast(fields->GetAbstractArray(names::Warnings));
+  auto* vessels = vtkStringArray::SafeDownCast(fields->GetAbstractArray(names::WarningVessels));
+  vtkDataArray* places = fields->GetArray(names::WarningPlaces);
+  vtkDataArray* confidences = fields->GetArray(names::WarningConfidences);
+  Json list = Json::array();
+  for (vtkIdType n = 0; texts && vessels && places && confidences && n < texts->GetNumberOfValues();
+       ++n)
+  {
+    const double* place = places->GetTuple3(n);
+    list.push_back({ { "what", texts->GetValue(n) }, { "vessel", vessels->GetValue(n) },
+      { "place", { place[0], place[1], place[2] } }, { "confidence", confidences->GetTuple1(n) } });
+  }
+  return list;
+}
+
 std::string StatusTable(const Json& trees)
 {
   std::string table = "name,x_mm,y_mm,z_mm,status,message,branches,length_mm\n";
@@ -498,6 +573,7 @@ Json MakeSegmentation(RunStep& step)
     step.summary += text;
   }
   numbers["seeds"] = described;
+  numbers["lost"] = given.empty() ? OstiaNotFound(described) : Json::array();
   numbers["seeds_file"] = "ostia.vtp";
   numbers["aorta_file"] = "aorta.vtp";
   numbers["bridges_file"] = "bridges.vtp";
@@ -613,8 +689,18 @@ Json MakeCenterline(RunStep& step)
       segmentation["window"][1].get<double>());
     for (const std::string& warning : BridgeWarnings(numbers["bridges"]))
     {
-      vtkGenericWarningMacro(<< warning);
+      step.warnings.push_back(warning);
     }
+  }
+  // Of a surface without seeds every piece is a tree, also crumbs without a vessel.
+  numbers["lost"] =
+    step.input.IsSurface() && step.input.Seeds.empty() ? Json::array() : TreesNotFound(trees);
+  numbers["checks"] = DescribeChecks(tree);
+  for (const auto& check : numbers["checks"])
+  {
+    char sure[40];
+    std::snprintf(sure, sizeof(sure), " (confidence %.2f)", check["confidence"].get<double>());
+    step.warnings.push_back(check["what"].get<std::string>() + sure);
   }
   numbers["complete"] = complete && complete->GetTuple1(0) != 0.0;
   numbers["branches"] = tree->GetNumberOfLines();

@@ -74,7 +74,8 @@ struct RunStep
   RankGroup& ranks;                ///< that work on the stage together
   std::vector<std::string>& files; ///< names of those
   std::function<void(double)> progress;
-  std::string summary; ///< a few words for the user
+  std::string summary;                    ///< a few words for the user
+  std::vector<std::string> warnings = {}; ///< of the stage itself, beside those of filters
 
   /// Where to write a file of the stage.
   std::string Add(const std::string& name);

@@ -1359,6 +1359,8 @@ LabelingResult Labeler::Run(const ProgressCallback& progress)
   result.heart.size = this->Unit / size;
   result.heart.origin =
     this->Centre + this->Unit * (pose.matrix.inverse() * (this->Atlas.origin - pose.shift));
+  result.fit.matrix = pose.matrix / this->Unit;
+  result.fit.shift = pose.shift - result.fit.matrix * this->Centre;
   this->NameSegments(pose, assignment);
   return result;
 }
