@@ -28,8 +28,9 @@ constexpr double NearestOstia = 6.0;     ///< of two ostia
 constexpr double FarthestOstia = 70.0;   ///< of two ostia
 constexpr double TipLength = 3.0;        ///< over which a tip's radius is taken
 constexpr double BeforeTip = 15.0;       ///< a lesion at the tip narrows less than this
-constexpr double WideTip = 0.85;         ///< radius with which no whole vessel ends
-constexpr double WideBeforeTip = 1.05;   ///< the same before the tip
+constexpr double UsualTip = 0.48;        ///< median radius of healthy tips
+constexpr double WideTip = 0.72;         ///< radius with which no whole vessel ends, for usual tips
+constexpr double WideBeforeTip = 0.9;    ///< the same before the tip
 constexpr double SmallVesselsTip = 1.3;  ///< of a right coronary artery that is not dominant
 constexpr double Widening = 1.4;         ///< arteries taper
 constexpr double UncertainFit = 8.0;     ///< mean distance from the mean heart's vessels
@@ -59,14 +60,14 @@ constexpr std::array<Wall, 12> Walls = { {
   { "basal anterolateral wall", Feeder::Circumflex, 15.0, 0.375, 20.0 },
   { "basal inferolateral wall", Feeder::Circumflex, 15.0, 0.625, 22.0 },
   { "basal inferior wall", Feeder::PosteriorDescending, 15.0, 0.875, 23.0 },
-  { "mid anterior wall", Feeder::AnteriorDescending, 40.0, 0.125, 17.0 },
+  { "mid anterior wall", Feeder::AnteriorDescending, 40.0, 0.125, 15.0 },
   { "mid anterolateral wall", Feeder::Circumflex, 40.0, 0.375, 18.0 },
   { "mid inferolateral wall", Feeder::Circumflex, 40.0, 0.625, 27.0 },
   { "mid inferior wall", Feeder::PosteriorDescending, 40.0, 0.875, 25.0 },
-  { "apical anterior wall", Feeder::DistalAnteriorDescending, 65.0, 0.125, 17.0 },
+  { "apical anterior wall", Feeder::DistalAnteriorDescending, 65.0, 0.125, 14.0 },
   { "apical lateral wall", Feeder::AnteriorDescending, 65.0, 0.375, 21.0 },
   { "apical inferior wall", Feeder::PosteriorDescending, 65.0, 0.875, 25.0 },
-  { "apex", Feeder::DistalAnteriorDescending, 86.0, 0.0, 27.0 },
+  { "apex", Feeder::DistalAnteriorDescending, 86.0, 0.0, 25.0 },
 } };
 
 std::string At(const Vector3& place)
@@ -391,6 +392,18 @@ std::vector<std::int64_t> Checker::PathBack(std::size_t branch, double length) c
 /// Vessels end thin; they do not widen, and do not go on for ever.
 void Checker::Tips()
 {
+  // Large hearts have wide vessels; but when most ends are cut, they are no measure.
+  std::vector<double> radii;
+  for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
+  {
+    if (this->IsTip[b] != 0 && this->Tree.branches[b].treeId >= 0)
+    {
+      radii.push_back(this->MedianRadius(this->PathBack(b, BeforeTip), 0.0, TipLength));
+    }
+  }
+  std::sort(radii.begin(), radii.end());
+  const double calibre =
+    radii.empty() ? 1.0 : std::clamp(radii[radii.size() / 2] / UsualTip, 0.9, 1.3);
   for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
   {
     const CenterlineTree::Branch& branch = this->Tree.branches[b];
@@ -411,8 +424,9 @@ void Checker::Tips()
     const double end = this->MedianRadius(path, 0.0, TipLength);
     const double before = this->MedianRadius(path, TipLength, BeforeTip);
     const bool small = branch.treeId == 1 && this->Labels.dominance == Dominance::Left;
-    const double excess = small ? std::max(end, before) - SmallVesselsTip
-                                : std::max(end - WideTip, before - WideBeforeTip);
+    const double excess = small
+      ? std::max(end, before) - SmallVesselsTip
+      : std::max(end - calibre * WideTip, before - calibre * WideBeforeTip);
     if (excess > 0.0)
     {
       this->Warn(name + " ends at " + At(place) + " in full calibre (radius " +
