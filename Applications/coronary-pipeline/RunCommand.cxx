@@ -54,7 +54,6 @@ private:
   void Help(RunStage stage, RunInput& input, RunReport& report);
   /// A stage ends on all ranks together. @return warnings of all
   static std::vector<std::string> End(RunInput& input);
-  void LeaveOut(RunStage stage, const std::string& reason, RunReport& report);
   /// Trees that a finished stage has lost are an error, or with --partial a warning.
   void TellLost(RunStage stage, const RunReport& report);
   void Commit(StagedFolder& folder, RunStage stage, const RunReport& report) const;
@@ -95,7 +94,9 @@ void RunJob::Say(const std::string& words)
 
 std::vector<RunStage> RunJob::Plan(const RunInput& input, RunReport& report) const
 {
-  const RunStage first = input.IsSurface() ? RunStage::Centerline : RunStage::Vesselness;
+  const RunStage first = input.IsSurface() ? RunStage::Centerline
+    : input.IsMask()                       ? RunStage::Segmentation
+                                           : RunStage::Vesselness;
   const RunStage last = this->Settings.Until();
   if (this->Resume)
   {
@@ -167,17 +168,6 @@ void RunJob::TellLost(RunStage stage, const RunReport& report)
       lost.front() + (all ? "." : "; or go on with the other one with --partial."));
   }
   this->Warnings.insert(this->Warnings.end(), lost.begin(), lost.end());
-}
-
-void RunJob::LeaveOut(RunStage stage, const std::string& reason, RunReport& report)
-{
-  const std::string& name = RunStageNames()[static_cast<std::size_t>(stage)];
-  this->Warnings.push_back(name + " is not possible: " + reason);
-  report.LeaveOut(stage, "not possible", reason, { { "possible", false }, { "reason", reason } });
-  StagedFolder folder(this->Settings.output);
-  this->Commit(folder, stage, report);
-  this->Changed = true;
-  this->Say("no " + name + ": " + reason);
 }
 
 void RunJob::Make(
@@ -290,9 +280,9 @@ void RunJob::Run()
     }
     return;
   }
-  if (this->Settings.input.empty())
+  if (this->Settings.input.empty() && this->Settings.mask.empty())
   {
-    throw UsageError("--input is required");
+    throw UsageError("--input is required, or a mask with --mask");
   }
   if (this->Settings.output.empty())
   {
@@ -309,12 +299,24 @@ void RunJob::Run()
   {
     throw UsageError("--until " + this->Settings.until + ": a surface has no images");
   }
+  if (input.IsMask() && this->Settings.Until() < RunStage::Segmentation)
+  {
+    throw UsageError("--until " + this->Settings.until + ": a mask has no images");
+  }
+  if (input.IsMask() && this->Settings.contours)
+  {
+    throw UsageError("--contours: a mask has no images that show them");
+  }
   RunReport report(this->Settings.output, this->Options.All(),
     DescribeInput(input.Files(), this->Settings.output));
   const std::vector<RunStage> stages = this->Plan(input, report);
   if (input.IsSurface())
   {
     report.Set("surface_input", this->Settings.input.front());
+  }
+  else if (input.IsMask())
+  {
+    report.Set("mask_input", this->Settings.mask);
   }
   if (Ranks().IsFirst())
   {
@@ -324,12 +326,10 @@ void RunJob::Run()
       this->TellLost(stage, report);
     }
   }
-  const std::string still = input.WhyStill();
   int steps = 0;
   for (const RunStage stage : stages)
   {
     steps += stage == RunStage::Vesselness ? 2 : 1;
-    steps -= stage == RunStage::Motion && !still.empty() ? 1 : 0;
   }
   int number = 0;
   {
@@ -339,14 +339,7 @@ void RunJob::Run()
       ReleaseImages(input, stage);
       try
       {
-        if (stage == RunStage::Motion && !still.empty())
-        {
-          if (Ranks().IsFirst())
-          {
-            this->LeaveOut(stage, still, report);
-          }
-        }
-        else if (!Ranks().IsFirst())
+        if (!Ranks().IsFirst())
         {
           this->Help(stage, input, report);
         }
@@ -387,7 +380,7 @@ void RunJob::Run()
   {
     this->Say("nothing to do");
   }
-  if (input.IsSurface())
+  if (input.IsSurface() || input.IsMask())
   {
     std::printf("%s: %s\n", this->Settings.output.c_str(), this->Summary.c_str());
     return;

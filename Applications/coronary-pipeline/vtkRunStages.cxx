@@ -17,15 +17,15 @@
 #include "vtkBridgeReport.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
-#include "vtkMovingMesh.h"
+#include "vtkRunMask.h"
+#include "vtkRunMotion.h"
 #include "vtkRunSurface.h"
+#include "vtkRunTrees.h"
 #include "vtkSurfaceFile.h"
 
 #include "vtkBiharmonicSkinWeights.h"
-#include "vtkCardiacPhaseInterpolator.h"
 #include "vtkCellData.h"
 #include "vtkCenterlineSkeleton.h"
-#include "vtkCenterlineTracker.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryTreeTopology.h"
@@ -41,16 +41,13 @@
 #include "vtkInformation.h"
 #include "vtkInformationDoubleVectorKey.h"
 #include "vtkMatrix3x3.h"
-#include "vtkMeshSequenceWriter.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkReferencePhase.h"
-#include "vtkSkinDeformation.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkSurfaceCleaner.h"
 #include "vtkTGFWriter.h"
-#include "vtkTable.h"
 #include "vtkTetrahedralMesher.h"
 #include "vtkUnstructuredGrid.h"
 #include "vtkVesselSegmentation.h"
@@ -66,10 +63,39 @@
 
 namespace coronary
 {
-namespace
-{
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+std::string PathOf(const RunStep& step, const std::string& name)
+{
+  return (fs::path(step.input.Settings.output) / name).string();
+}
+
+vtkSmartPointer<vtkPolyData> ReadLines(const RunStep& step, const std::string& name)
+{
+  return ReadPolyData(PathOf(step, name), step.input.Messages);
+}
+
+vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
+{
+  auto tree = ReadLines(step, "centerline.vtp");
+  if (tree->GetNumberOfLines() == 0)
+  {
+    std::string reasons;
+    const Json centerline = step.report.Of("centerline");
+    for (const auto& one : centerline["trees"])
+    {
+      reasons += (reasons.empty() ? ": " : "; ") + one["name"].get<std::string>() + " " +
+        one["message"].get<std::string>();
+    }
+    throw std::runtime_error("'" + PathOf(step, "centerline.vtp") +
+      "' has no branches to make a surface of" + reasons + ".");
+  }
+  return tree;
+}
+
+namespace
+{
 
 /// How far a place on the wall may be from the axis, mm.
 constexpr double SurfaceSnapDistance = 3.0;
@@ -91,176 +117,6 @@ int PhaseAt(vtkGatedImageReader* reader, double time)
   return best;
 }
 
-Json Numbers(vtkDataSet* data, const char* name)
-{
-  Json list = Json::array();
-  if (vtkDataArray* array = data->GetFieldData()->GetArray(name))
-  {
-    for (vtkIdType n = 0; n < array->GetNumberOfValues(); ++n)
-    {
-      list.push_back(array->GetTuple1(n));
-    }
-  }
-  return list;
-}
-
-Json DescribeSeeds(vtkPolyData* seeds)
-{
-  vtkPointData* data = seeds->GetPointData();
-  auto* names = vtkStringArray::SafeDownCast(data->GetAbstractArray(vtkCoronaryArrayNames::Name));
-  Json list = Json::array();
-  for (vtkIdType n = 0; n < seeds->GetNumberOfPoints(); ++n)
-  {
-    // Seeds of a surface have neither radius nor volume.
-    const auto value = [&](const char* name)
-    { return data->HasArray(name) ? data->GetArray(name)->GetTuple1(n) : 0.0; };
-    double position[3];
-    seeds->GetPoint(n, position);
-    list.push_back(
-      { { "name", names->GetValue(n) }, { "position", { position[0], position[1], position[2] } },
-        { "confidence", value(vtkCoronaryArrayNames::Confidence) },
-        { "radius", value(vtkCoronaryArrayNames::Radius) },
-        { "volume", value(vtkCoronaryArrayNames::SeedVolume) } });
-  }
-  return list;
-}
-
-/// Text for one field of a CSV file.
-std::string Quoted(const std::string& text)
-{
-  std::string quoted = "\"";
-  for (const char c : text)
-  {
-    quoted += c == '"' ? "\"\"" : std::string(1, c);
-  }
-  return quoted + "\"";
-}
-
-/// What became of each seed: reached, or why not, with the tree that hangs on it.
-Json DescribeTrees(vtkPolyData* lines, vtkPolyData* seeds)
-{
-  vtkFieldData* fields = lines->GetFieldData();
-  vtkDataArray* status = fields->GetArray(vtkCoronaryArrayNames::SeedStatus);
-  auto* messages =
-    vtkStringArray::SafeDownCast(fields->GetAbstractArray(vtkCoronaryArrayNames::SeedMessage));
-  auto* names = vtkStringArray::SafeDownCast(
-    seeds->GetPointData()->GetAbstractArray(vtkCoronaryArrayNames::Name));
-  vtkDataArray* treeIds = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::TreeIds);
-  vtkDataArray* lengths = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::Length);
-  Json list = Json::array();
-  for (vtkIdType n = 0; n < seeds->GetNumberOfPoints(); ++n)
-  {
-    vtkIdType branches = 0;
-    double length = 0.0;
-    for (vtkIdType cell = 0; cell < lines->GetNumberOfCells(); ++cell)
-    {
-      if (treeIds->GetTuple1(cell) == static_cast<double>(n))
-      {
-        ++branches;
-        length += lengths->GetTuple1(cell);
-      }
-    }
-    double position[3];
-    seeds->GetPoint(n, position);
-    list.push_back(
-      { { "name", names->GetValue(n) }, { "position", { position[0], position[1], position[2] } },
-        { "status", static_cast<int>(status->GetTuple1(n)) }, { "message", messages->GetValue(n) },
-        { "branches", branches }, { "length", length } });
-  }
-  return list;
-}
-
-std::string AtPlace(const Json& position)
-{
-  char text[100];
-  std::snprintf(text, sizeof(text), "(%.1f, %.1f, %.1f)", position[0].get<double>(),
-    position[1].get<double>(), position[2].get<double>());
-  return text;
-}
-
-/// What a tree is called by the name of its seed.
-std::string TreeName(const std::string& seed)
-{
-  return seed == "LCA" ? "the left coronary tree"
-    : seed == "RCA"    ? "the right coronary tree"
-                       : "the tree of seed " + seed;
-}
-
-/// Trees of which no ostium was found. @param seeds  as of DescribeSeeds()
-Json OstiaNotFound(const Json& seeds)
-{
-  Json lost = Json::array();
-  for (const char* name : { "LCA", "RCA" })
-  {
-    const auto is = [&](const Json& seed) { return seed["name"] == name; };
-    if (std::none_of(seeds.begin(), seeds.end(), is))
-    {
-      lost.push_back({ { "tree", name },
-        { "message",
-          TreeName(name) +
-            " is lost: its ostium was not found on the aorta. Give the ostia of "
-            "all trees with --seed X Y Z" } });
-    }
-  }
-  return lost;
-}
-
-/// Trees that have no branch. @param trees  as of DescribeTrees()
-Json TreesNotFound(const Json& trees)
-{
-  Json lost = Json::array();
-  for (const auto& tree : trees)
-  {
-    if (tree["status"] != 0 || tree["branches"] == 0)
-    {
-      const std::string why = tree["message"].get<std::string>();
-      const std::string name = tree["name"].get<std::string>();
-      lost.push_back({ { "tree", name },
-        { "message",
-          TreeName(name) + " is lost: no vessel was followed from " + AtPlace(tree["position"]) +
-            (why.empty() ? "" : " (" + why + ")") +
-            ". Give a point in its lumen with --seed X Y Z, or leave that seed out" } });
-    }
-  }
-  return lost;
-}
-
-/// What the check of the named trees found.
-Json DescribeChecks(vtkPolyData* tree)
-{
-  namespace names = vtkCoronaryArrayNames;
-  vtkFieldData* fields = tree->GetFieldData();
-  auto* texts = vtkStringArray::SafeDownCast(fields->GetAbstractArray(names::Warnings));
-  auto* vessels = vtkStringArray::SafeDownCast(fields->GetAbstractArray(names::WarningVessels));
-  vtkDataArray* places = fields->GetArray(names::WarningPlaces);
-  vtkDataArray* confidences = fields->GetArray(names::WarningConfidences);
-  Json list = Json::array();
-  for (vtkIdType n = 0; texts && vessels && places && confidences && n < texts->GetNumberOfValues();
-       ++n)
-  {
-    const double* place = places->GetTuple3(n);
-    list.push_back({ { "what", texts->GetValue(n) }, { "vessel", vessels->GetValue(n) },
-      { "place", { place[0], place[1], place[2] } }, { "confidence", confidences->GetTuple1(n) } });
-  }
-  return list;
-}
-
-std::string StatusTable(const Json& trees)
-{
-  std::string table = "name,x_mm,y_mm,z_mm,status,message,branches,length_mm\n";
-  for (const auto& tree : trees)
-  {
-    table += Quoted(tree["name"].get<std::string>());
-    for (const auto& value : tree["position"])
-    {
-      table += "," + value.dump();
-    }
-    table += "," + tree["status"].dump() + "," + Quoted(tree["message"].get<std::string>()) + "," +
-      tree["branches"].dump() + "," + tree["length"].dump() + "\n";
-  }
-  return table;
-}
-
 template <typename Data>
 vtkSmartPointer<Data> Detached(Data* data)
 {
@@ -269,16 +125,6 @@ vtkSmartPointer<Data> Detached(Data* data)
   // What follows is static, whether it comes from memory or from a file.
   copy->GetInformation()->Remove(vtkDataObject::DATA_TIME_STEP());
   return copy;
-}
-
-std::string PathOf(const RunStep& step, const std::string& name)
-{
-  return (fs::path(step.input.Settings.output) / name).string();
-}
-
-vtkSmartPointer<vtkPolyData> ReadLines(const RunStep& step, const std::string& name)
-{
-  return ReadPolyData(PathOf(step, name), step.input.Messages);
 }
 
 /// A volume that an earlier stage wrote, on the grid of the reference phase.
@@ -526,6 +372,10 @@ vtkSmartPointer<vtkImageData> FittedMask(
 
 Json MakeSegmentation(RunStep& step)
 {
+  if (step.input.IsMask())
+  {
+    return MakeGivenMask(step);
+  }
   const RunSettings& settings = step.input.Settings;
   const std::string givenMask = step.input.MaskOf(step.report.Of("phase").get<int>());
   const std::vector<double>& given = step.input.Seeds;
@@ -640,6 +490,13 @@ Json MakeCenterline(RunStep& step)
   {
     seeds = PrepareSurface(step, centerline, numbers);
   }
+  else if (step.input.IsMask())
+  {
+    NeedGivenMask(step);
+    seeds = ReadLines(step, "ostia.vtp");
+    centerline->SetImageKind(vtkFastMarchingCenterline::MaskImage);
+    centerline->SetInputDataObject(0, step.input.Mask);
+  }
   else
   {
     NeedVesselness(step);
@@ -712,25 +569,6 @@ Json MakeCenterline(RunStep& step)
   step.summary =
     std::to_string(tree->GetNumberOfLines()) + " branches, " + Format(std::round(length)) + " mm";
   return numbers;
-}
-
-/// The tree, which must not be empty.
-vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
-{
-  auto tree = ReadLines(step, "centerline.vtp");
-  if (tree->GetNumberOfLines() == 0)
-  {
-    std::string reasons;
-    const Json centerline = step.report.Of("centerline");
-    for (const auto& one : centerline["trees"])
-    {
-      reasons += (reasons.empty() ? ": " : "; ") + one["name"].get<std::string>() + " " +
-        one["message"].get<std::string>();
-    }
-    throw std::runtime_error("'" + PathOf(step, "centerline.vtp") +
-      "' has no branches to make a surface of" + reasons + ".");
-  }
-  return tree;
 }
 
 /// A tree in images that runs into a chamber has no wall that could be swept in finite time.
@@ -889,131 +727,6 @@ Json MakeWeights(RunStep& step)
 
 constexpr int PhaseDigits = 2;
 
-/// The lines or the skeleton at every moment, and their lists; gives the name of one of these.
-std::string WriteMovingLines(
-  vtkAlgorithm* lines, const std::string& stem, const std::vector<double>& times, RunStep& step)
-{
-  std::vector<TimedFile> files;
-  for (std::size_t n = 0; n < times.size(); ++n)
-  {
-    std::string name = stem + "_";
-    name.append(SeriesNumber(n, times.size(), PhaseDigits)).append(".vtp");
-    files.push_back({ name, times[n] });
-    const std::string path = step.Add("motion/" + files.back().path);
-    if (step.ranks.Owns(n))
-    {
-      UpdateAtTime(lines, 0, times[n], step.input.Messages, [](double) {});
-      WritePolyData(
-        path, vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), step.input.Messages);
-    }
-  }
-  std::string list = "motion/" + stem + ".vtp.series";
-  if (step.ranks.IsFirst())
-  {
-    WriteFileAtomically(step.Add(list), FileSeriesText(files));
-    WriteFileAtomically(step.Add("motion/" + stem + ".pvd"), PvdText(files));
-  }
-  return list;
-}
-
-std::vector<double> Moments(const RunInput& input)
-{
-  std::vector<double> times = input.Settings.moments;
-  if (times.empty())
-  {
-    for (int n = 0; n < input.Reader->GetNumberOfPhases(); ++n)
-    {
-      times.push_back(input.Reader->GetPhaseTime(n));
-    }
-  }
-  std::sort(times.begin(), times.end());
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  return times;
-}
-
-std::vector<double> TimeSteps(vtkAlgorithm* algorithm)
-{
-  vtkInformation* info = algorithm->GetOutputInformation(0);
-  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
-  const double* steps = info->Get(key);
-  return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
-}
-
-Json MakeMotion(RunStep& step)
-{
-  const RunSettings& settings = step.input.Settings;
-  vtkMessageTrap& messages = step.input.Messages;
-  const auto skeleton = ReadLines(step, "skeleton.vtp");
-  vtkNew<vtkCenterlineTracker> tracker;
-  tracker->SetInputConnection(step.input.Reader->GetOutputPort());
-  tracker->SetInputDataObject(1, ReadTree(step));
-  tracker->SetInputDataObject(2, skeleton);
-  tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
-  tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
-                                                       : vtkCenterlineTracker::AllPhases);
-  tracker->SetRanks(&step.ranks);
-  const std::vector<double> times = Moments(step.input);
-  const int mode = InterpolationMode(settings.interpolation);
-  vtkNew<vtkCardiacPhaseInterpolator> lines;
-  lines->SetInputConnection(tracker->GetOutputPort(0));
-  lines->SetMode(mode);
-  MovingMesh moving;
-  moving.Interpolator->SetInputConnection(tracker->GetOutputPort(1));
-  moving.Interpolator->SetMode(mode);
-  moving.Deformation->SetInputData(0, ReadUnstructuredGrid(PathOf(step, "weights.vtu"), messages));
-  moving.Deformation->SetInputData(1, skeleton);
-  moving.Writer->SetInputData(1, ReadLines(step, "volume_boundary.vtp"));
-  moving.Writer->SetInputData(2, ReadLines(step, "caps.vtp"));
-  moving.Writer->PrefixFilesOff();
-  moving.Writer->SetDigits(PhaseDigits);
-  moving.Writer->SetRanks(&step.ranks);
-
-  // The images are read now.
-  UpdateAtTime(
-    tracker, 0, times.front(), messages, [&](double fraction) { step.progress(0.8 * fraction); });
-  Json lists;
-  lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
-  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
-  const std::string name = "motion/mesh.json";
-  const std::string path = step.Add(name);
-  moving.Write(
-    path, times, messages, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); });
-  if (!step.ranks.IsFirst())
-  {
-    return {};
-  }
-  for (const std::string& file : MeshSequenceFiles(path))
-  {
-    if ("motion/" + file != name)
-    {
-      step.Add("motion/" + file);
-    }
-  }
-  lists["volume"] = "motion/volume.vtu.series";
-  lists["surface"] = "motion/surface.vtp.series";
-  std::vector<TimedFile> surfaces =
-    ReadFileSeries((fs::path(path).parent_path() / "surface.pvd").string());
-  for (TimedFile& file : surfaces)
-  {
-    file.path = "motion/" + fs::path(file.path).filename().string();
-  }
-  WriteFileAtomically(step.Add("motion.pvd"), PvdText(surfaces));
-
-  vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
-  Json inverted = Json::array();
-  vtkTable* quality = moving.Writer->GetQuality();
-  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
-  {
-    inverted.push_back(
-      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
-  }
-  step.summary = std::to_string(times.size()) + " moments";
-  return { { "possible", true }, { "file", "motion.pvd" }, { "series", lists }, { "quality", name },
-    { "times", times }, { "tracked_times", TimeSteps(tracker) },
-    { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
-    { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
-    { "inverted_tetrahedra", inverted } };
-}
 }
 
 namespace
@@ -1081,6 +794,10 @@ RunInput::RunInput(const RunSettings& settings, vtkMessageTrap& messages)
       throw std::runtime_error("'" + settings.seedFile + "' has no points.");
     }
   }
+  if (this->IsMask())
+  {
+    return;
+  }
   const auto surfaces = std::count_if(settings.input.begin(), settings.input.end(), IsSurfaceFile);
   if (surfaces > 0)
   {
@@ -1128,7 +845,7 @@ RunInput::~RunInput() = default;
 std::vector<std::string> RunInput::Files() const
 {
   std::vector<std::string> files = this->Settings.input;
-  const fs::path folder = fs::path(files.front()).parent_path();
+  const fs::path folder = files.empty() ? fs::path() : fs::path(files.front()).parent_path();
   for (const std::string& file : this->Masks)
   {
     if (!file.empty())
@@ -1155,9 +872,9 @@ std::vector<std::string> RunInput::Files() const
 
 std::string RunInput::WhyStill() const
 {
-  if (this->IsSurface())
+  if (this->IsSurface() || this->IsMask())
   {
-    return "a surface has no images to track";
+    return this->IsMask() ? "a mask has no images to track" : "a surface has no images to track";
   }
   const int phases = this->Reader->GetNumberOfPhases();
   if (phases < 2)
