@@ -327,11 +327,11 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
   for (const Piece& piece : this->Pieces())
   {
     const double volume = static_cast<double>(piece.voxels.size()) * this->Voxel;
-    const bool tree =
-      piece.diagonal >= LeastTree && (!this->Result.hasAorta || !piece.contact.empty());
+    const bool tree = piece.diagonal >= LeastTree &&
+      (!this->Result.hasAorta || (!piece.contact.empty() && piece.reach >= LeastReach));
     if (!tree)
     {
-      if (volume >= LeastNamed && (piece.diagonal >= LeastTree || piece.contact.empty()))
+      if (volume >= LeastNamed && piece.contact.empty())
       {
         char text[100];
         std::snprintf(text, sizeof(text), "a piece of %.0f mm^3 around ", volume);
