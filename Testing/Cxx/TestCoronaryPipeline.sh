@@ -569,7 +569,38 @@ check_weights() {
   expect_text stderr "Warning: motion is not possible: one phase only"
   expect_text still/report.json '"reason": "one phase only"'
   [ -s still/weights.vtu ] || fail "no static model: $(ls still)"
-  [ ! -e still/motion.pvd ] || fail "motion of one phase"
+  expect_text still/report.json '"at_rest": true'
+  [ -s still/motion.pvd ] || fail "no model at rest: $(ls still)"
+  for kind in centerline.vtp skeleton.vtp surface.vtp volume.vtu; do
+    [ -s "still/motion/$kind.series" ] || fail "no $kind.series: $(ls still/motion)"
+  done
+  for kind in skeleton surface; do
+    cmp "still/motion/${kind}_00.vtp" "still/motion/${kind}_01.vtp" || fail "$kind does not rest"
+  done
+
+  # A mask alone: the same trees, without an image.
+  run 2 run --mask still/mask.mha --until vesselness --output masked
+  expect_one_line "coronary-pipeline run" "a mask has no images"
+  run 0 run --mask still/mask.mha --quiet --edges 0.8 1.6 --output masked
+  expect_text stderr "has no aorta: trees begin at their widest ends"
+  expect_text stderr "motion is not possible: a mask has no images to track"
+  [ -s masked/motion.pvd ] || fail "no model of a mask: $(ls masked)"
+  [ "$(grep -c . masked/status.csv)" -ge 3 ] || fail "trees of a mask: $(cat masked/status.csv)"
+
+  # A tree that is lost ends the run, or is left out by name.
+  ostium=$(sed -n 2p still/status.csv | cut -d, -f2-4 | tr , ' ')
+  options="--quiet --scales 0.7 2.5 --until centerline --seed $ostium --seed 0 0 900 --output lost"
+  # shellcheck disable=SC2086
+  run 1 run series/phase_01.mha $options
+  expect_text stderr "the tree of seed 1 is lost"
+  expect_text stderr "--partial"
+  [ -s lost/centerline.vtp ] || fail "nothing to look at: $(ls lost)"
+  # shellcheck disable=SC2086
+  run 1 run series/phase_01.mha $options --resume
+  expect_text stderr "the tree of seed 1 is lost"
+  # shellcheck disable=SC2086
+  run 0 run series/phase_01.mha $options --resume --partial
+  expect_text stderr "Warning: the tree of seed 1 is lost"
 }
 
 check_settings() {
