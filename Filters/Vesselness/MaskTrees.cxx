@@ -20,6 +20,8 @@ constexpr double LeastAorta = 3.0;     ///< volumes of the ball
 constexpr double SmallestHeart = 60.0; ///< mm, diagonal of the box around the trees of one heart
 constexpr double LargestHeart = 260.0; ///< mm
 
+constexpr int MostNamed = 5; ///< pieces that are left out, one by one
+
 /// The part of the grid that is worked on: around all that is in the mask, with a voxel of air.
 struct Part
 {
@@ -324,6 +326,8 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
   }
   Vector3 low = Vector3::Constant(1e300);
   Vector3 high = -low;
+  int pieces = 0;
+  double leftOut = 0.0; // beside those that were named, the largest
   for (const Piece& piece : this->Pieces())
   {
     const double volume = static_cast<double>(piece.voxels.size()) * this->Voxel;
@@ -333,10 +337,16 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
     {
       if (volume >= LeastNamed && piece.contact.empty())
       {
-        char text[100];
-        std::snprintf(text, sizeof(text), "a piece of %.0f mm^3 around ", volume);
-        this->Result.remarks.push_back(
-          text + At(place(piece.voxels)) + " is left out: it hangs on no tree of the mask");
+        ++pieces;
+        leftOut += volume;
+        if (pieces <= MostNamed)
+        {
+          char text[100];
+          std::snprintf(text, sizeof(text), "a piece of %.0f mm^3 around ", volume);
+          this->Result.remarks.push_back(
+            text + At(place(piece.voxels)) + " is left out: it hangs on no tree of the mask");
+          leftOut = 0.0;
+        }
       }
       continue;
     }
@@ -353,6 +363,13 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
       low = low.cwiseMin(this->Place(voxel));
       high = high.cwiseMax(this->Place(voxel));
     }
+  }
+  if (pieces > MostNamed)
+  {
+    char text[100];
+    std::snprintf(text, sizeof(text), "%d more pieces of %.0f mm^3 together are left out",
+      pieces - MostNamed, leftOut);
+    this->Result.remarks.emplace_back(text);
   }
   if (this->Result.trees.empty())
   {
