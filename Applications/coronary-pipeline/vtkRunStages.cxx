@@ -100,6 +100,12 @@ namespace
 /// How far a place on the wall may be from the axis, mm.
 constexpr double SurfaceSnapDistance = 3.0;
 
+/// Voxels, mm, in which coronary arteries can still be followed.
+constexpr double LargestVoxel = 1.0;
+
+/// Images with fewer values between the least and the greatest are in another unit than HU.
+constexpr double LeastRangeOfHU = 400.0;
+
 /// What is wider than so many times the largest radius of a vessel is none; aneurysms are narrower.
 constexpr double WidestVessel = 2.0;
 
@@ -267,6 +273,35 @@ vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, co
   return all;
 }
 
+/// What is known of an image before anything is looked for in it: voxels too large for coronary arteries, values that are
+/// no HU. @return whether the contrast has to be measured because its scale is unknown
+bool DoubtImage(RunStep& step)
+{
+  vtkImageData* image = step.input.Reference;
+  const std::string name = "'" + step.report.Of("image").get<std::string>() + "'";
+  double spacing[3];
+  image->GetSpacing(spacing);
+  const double largest = *std::max_element(spacing, spacing + 3);
+  if (largest > LargestVoxel)
+  {
+    step.warnings.push_back(name + " has voxels of " + Format(largest) +
+      " mm: arteries narrower than " + Format(2.0 * largest) +
+      " mm are not resolved, and will be missing or end early; take a reconstruction of at most " +
+      Format(0.7) + " mm");
+  }
+  double range[2];
+  image->GetScalarRange(range);
+  const bool unknown =
+    range[1] - range[0] < LeastRangeOfHU && step.input.Settings.c == RunSettings().c;
+  if (unknown)
+  {
+    step.warnings.push_back(name + " has values from " + Format(range[0]) + " to " +
+      Format(range[1]) +
+      ", which are no HU: --c 0 is taken, and --window may have to say what is tissue and blood");
+  }
+  return unknown;
+}
+
 Json MakeVesselness(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
@@ -275,10 +310,16 @@ Json MakeVesselness(RunStep& step)
   vesselness->SetSigmaMax(settings.scales[1]);
   vesselness->SetAutomaticC(!(settings.c > 0.0));
   vesselness->SetC(settings.c > 0.0 ? settings.c : 1.0);
+  std::string doubt;
   if (step.ranks.IsFirst())
   {
     NeedReference(step);
+    doubt = DoubtImage(step) ? "no HU" : "";
     vesselness->SetInputData(step.input.Reference);
+  }
+  if (!step.ranks.FromFirst(doubt).empty())
+  {
+    vesselness->SetAutomaticC(true);
   }
   if (step.ranks.Size() > 1)
   {
@@ -323,7 +364,25 @@ void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
     segmentation->SetTissueValue(settings.window[0]);
     segmentation->SetBloodValue(settings.window[1]);
   }
-  Update(segmentation, step);
+  try
+  {
+    Update(segmentation, step);
+  }
+  catch (const std::runtime_error& error)
+  {
+    const std::string text = error.what();
+    const std::size_t begin = text.find("AutomaticOstia found no ostium (");
+    const std::size_t end = text.rfind("): give points");
+    if (begin == std::string::npos || end == std::string::npos)
+    {
+      throw;
+    }
+    throw std::runtime_error("'" + step.report.Of("image").get<std::string>() +
+      "': no coronary ostium was found: " +
+      text.substr(text.find('(', begin) + 1, end - text.find('(', begin) - 1) +
+      ". Give the ostia with --seed X Y Z (LPS, mm); of values that are no HU, --window TISSUE "
+      "BLOOD too.");
+  }
   seeds =
     vtkPolyData::SafeDownCast(segmentation->GetOutputDataObject(vtkVesselSegmentation::SeedsPort));
   aorta =
