@@ -132,8 +132,16 @@ Json WriteMovingMesh(MovingMesh& moving, const std::vector<double>& times, RunSt
 /// The model at rest in the files of a moving one, so that all that reads these takes it: every pose is the same.
 Json MakeRest(RunStep& step, const std::string& reason)
 {
-  const std::vector<double>& wanted = step.input.Settings.moments;
-  const std::vector<double> times = wanted.size() > 1 ? wanted : std::vector<double>{ 0.0, 0.5 };
+  // The phase that it is, so that it can be compared with what is known of that, and one half a cycle away.
+  const Json phase = step.report.Of("time");
+  const double own = phase.is_number() ? phase.get<double>() : 0.0;
+  std::vector<double> times = step.input.Settings.moments;
+  if (times.size() < 2)
+  {
+    times = { own, own < 0.5 ? own + 0.5 : own - 0.5 };
+  }
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
   const auto skeleton = ReadLines(step, "skeleton.vtp");
   const auto tree = ReadTree(step);
   vtkNew<vtkTimedPolyData> axes;
