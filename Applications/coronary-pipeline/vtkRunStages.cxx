@@ -101,7 +101,7 @@ namespace
 constexpr double SurfaceSnapDistance = 3.0;
 
 /// Voxels, mm, in which coronary arteries can still be followed.
-constexpr double LargestVoxel = 1.0;
+constexpr double LargestVoxel = 1.25;
 
 /// Images with fewer values between the least and the greatest are in another unit than HU.
 constexpr double LeastRangeOfHU = 400.0;
