@@ -54,10 +54,13 @@ private:
   void Help(RunStage stage, RunInput& input, RunReport& report);
   /// A stage ends on all ranks together. @return warnings of all
   static std::vector<std::string> End(RunInput& input);
-  void LeaveOut(RunStage stage, const std::string& reason, RunReport& report);
+  /// Trees that a finished stage has lost are an error, or with --partial a warning.
+  void TellLost(RunStage stage, const RunReport& report);
   void Commit(StagedFolder& folder, RunStage stage, const RunReport& report) const;
   void Stop(RunStage stage, const std::string& reason, RunReport& report) const;
   void Say(const std::string& words);
+  /// What the stages so far have warned of, also of a run that fails.
+  void TellWarnings();
 
   RunSettings Settings;
   RunOptions Options;
@@ -69,6 +72,18 @@ private:
   std::string Summary;
 };
 
+void RunJob::TellWarnings()
+{
+  if (Ranks().IsFirst())
+  {
+    for (const std::string& warning : this->Warnings)
+    {
+      std::fprintf(stderr, "Warning: %s\n", warning.c_str());
+    }
+  }
+  this->Warnings.clear();
+}
+
 void RunJob::Say(const std::string& words)
 {
   if (!words.empty())
@@ -79,7 +94,9 @@ void RunJob::Say(const std::string& words)
 
 std::vector<RunStage> RunJob::Plan(const RunInput& input, RunReport& report) const
 {
-  const RunStage first = input.IsSurface() ? RunStage::Centerline : RunStage::Vesselness;
+  const RunStage first = input.IsSurface() ? RunStage::Centerline
+    : input.IsMask()                       ? RunStage::Segmentation
+                                           : RunStage::Vesselness;
   const RunStage last = this->Settings.Until();
   if (this->Resume)
   {
@@ -131,15 +148,26 @@ void RunJob::Commit(StagedFolder& folder, RunStage stage, const RunReport& repor
   folder.Commit();
 }
 
-void RunJob::LeaveOut(RunStage stage, const std::string& reason, RunReport& report)
+void RunJob::TellLost(RunStage stage, const RunReport& report)
 {
-  const std::string& name = RunStageNames()[static_cast<std::size_t>(stage)];
-  this->Warnings.push_back(name + " is not possible: " + reason);
-  report.LeaveOut(stage, "not possible", reason, { { "possible", false }, { "reason", reason } });
-  StagedFolder folder(this->Settings.output);
-  this->Commit(folder, stage, report);
-  this->Changed = true;
-  this->Say("no " + name + ": " + reason);
+  const nlohmann::ordered_json numbers =
+    report.Of(RunStageNames()[static_cast<std::size_t>(stage)]);
+  if (!numbers.is_object() || !numbers.contains("lost") || numbers["lost"].empty())
+  {
+    return;
+  }
+  std::vector<std::string> lost;
+  for (const auto& tree : numbers["lost"])
+  {
+    lost.push_back(tree["message"].get<std::string>());
+  }
+  const bool all = numbers.contains("trees") && numbers["trees"].size() == lost.size();
+  if (!this->Settings.partial || all)
+  {
+    throw std::runtime_error(
+      lost.front() + (all ? "." : "; or go on with the other one with --partial."));
+  }
+  this->Warnings.insert(this->Warnings.end(), lost.begin(), lost.end());
 }
 
 void RunJob::Make(
@@ -170,13 +198,15 @@ void RunJob::Make(
     {
       sizes.emplace_back(file, folder.PathOf(file));
     }
-    const std::vector<std::string> warnings = End(input);
+    std::vector<std::string> warnings = End(input);
+    warnings.insert(warnings.end(), step.warnings.begin(), step.warnings.end());
     this->Warnings.insert(this->Warnings.end(), warnings.begin(), warnings.end());
     report.Finish(stage, numbers, clock, warnings, sizes);
     this->Commit(folder, stage, report);
     this->Changed = true;
     Ranks().Gather("");
     this->Say(step.summary);
+    this->TellLost(stage, report);
   }
   catch (const std::runtime_error& error)
   {
@@ -250,9 +280,9 @@ void RunJob::Run()
     }
     return;
   }
-  if (this->Settings.input.empty())
+  if (this->Settings.input.empty() && this->Settings.mask.empty())
   {
-    throw UsageError("--input is required");
+    throw UsageError("--input is required, or a mask with --mask");
   }
   if (this->Settings.output.empty())
   {
@@ -269,6 +299,14 @@ void RunJob::Run()
   {
     throw UsageError("--until " + this->Settings.until + ": a surface has no images");
   }
+  if (input.IsMask() && this->Settings.Until() < RunStage::Segmentation)
+  {
+    throw UsageError("--until " + this->Settings.until + ": a mask has no images");
+  }
+  if (input.IsMask() && this->Settings.contours)
+  {
+    throw UsageError("--contours: a mask has no images that show them");
+  }
   RunReport report(this->Settings.output, this->Options.All(),
     DescribeInput(input.Files(), this->Settings.output));
   const std::vector<RunStage> stages = this->Plan(input, report);
@@ -276,12 +314,22 @@ void RunJob::Run()
   {
     report.Set("surface_input", this->Settings.input.front());
   }
-  const std::string still = input.WhyStill();
+  else if (input.IsMask())
+  {
+    report.Set("mask_input", this->Settings.mask);
+  }
+  if (Ranks().IsFirst())
+  {
+    // Also of what was made before, where this run goes on.
+    for (const RunStage stage : { RunStage::Segmentation, RunStage::Centerline })
+    {
+      this->TellLost(stage, report);
+    }
+  }
   int steps = 0;
   for (const RunStage stage : stages)
   {
     steps += stage == RunStage::Vesselness ? 2 : 1;
-    steps -= stage == RunStage::Motion && !still.empty() ? 1 : 0;
   }
   int number = 0;
   {
@@ -291,14 +339,7 @@ void RunJob::Run()
       ReleaseImages(input, stage);
       try
       {
-        if (stage == RunStage::Motion && !still.empty())
-        {
-          if (Ranks().IsFirst())
-          {
-            this->LeaveOut(stage, still, report);
-          }
-        }
-        else if (!Ranks().IsFirst())
+        if (!Ranks().IsFirst())
         {
           this->Help(stage, input, report);
         }
@@ -315,11 +356,13 @@ void RunJob::Run()
       catch (const std::bad_alloc&)
       {
         this->Stop(stage, "not enough memory", report);
+        this->TellWarnings();
         throw;
       }
       catch (const std::exception& error)
       {
         this->Stop(stage, Ranks().Reason(error.what()), report);
+        this->TellWarnings();
         throw;
       }
     }
@@ -328,10 +371,7 @@ void RunJob::Run()
   {
     return;
   }
-  for (const std::string& warning : this->Warnings)
-  {
-    std::fprintf(stderr, "Warning: %s\n", warning.c_str());
-  }
+  this->TellWarnings();
   if (this->Settings.quiet)
   {
     return;
@@ -340,7 +380,7 @@ void RunJob::Run()
   {
     this->Say("nothing to do");
   }
-  if (input.IsSurface())
+  if (input.IsSurface() || input.IsMask())
   {
     std::printf("%s: %s\n", this->Settings.output.c_str(), this->Summary.c_str());
     return;
@@ -355,11 +395,12 @@ Command MakeRunCommand(CLI::App& program)
 {
   CLI::App* app = program.add_subcommand(
     "run", "From a gated image series, or a surface, to the beating coronary arteries");
-  app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, bridges.vtp, centerline.vtp, "
-              "bifurcations.vtp, centerline_lines.vtp, status.csv, surface.vtp, caps.vtp, "
-              "skeleton.vtp, skeleton.tgf, volume.vtu, volume_boundary.vtp, volume_skeleton.vtp, "
-              "weights.vtu, weights.dmat, motion.pvd, motion/ with series of centerlines, "
-              "skeletons, tetrahedra and surfaces; and, after every stage, report.json.");
+  app->footer(
+    "Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, bridges.vtp, centerline.vtp, "
+    "bifurcations.vtp, centerline_lines.vtp, status.csv, surface.vtp, caps.vtp, "
+    "skeleton.vtp, skeleton.tgf, volume.vtu, volume_boundary.vtp, volume_skeleton.vtp, "
+    "weights.vtu, weights.dmat, motion.pvd, motion/ with series of centerlines, "
+    "skeletons, tetrahedra and surfaces; and, after every stage, report.json.");
   auto job = std::make_shared<RunJob>(*app);
   return { app, [job] { job->Run(); }, true };
 }

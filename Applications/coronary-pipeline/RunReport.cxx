@@ -310,16 +310,6 @@ void RunReport::Finish(RunStage stage, const Json& numbers, const RunClock& cloc
   this->Numbers[Name(stage)] = numbers;
 }
 
-void RunReport::LeaveOut(
-  RunStage stage, const std::string& state, const std::string& reason, const Json& numbers)
-{
-  this->Stages.push_back({ { "name", Name(stage) }, { "state", state }, { "reason", reason } });
-  if (!numbers.is_null())
-  {
-    this->Numbers[Name(stage)] = numbers;
-  }
-}
-
 void RunReport::Stop(RunStage stage, const std::string& reason)
 {
   this->Stopped = { { "stage", Name(stage) }, { "reason", reason } };

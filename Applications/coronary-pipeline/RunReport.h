@@ -70,10 +70,6 @@ public:
     const std::vector<std::string>& warnings,
     const std::vector<std::pair<std::string, std::string>>& files);
 
-  /// A stage is left out; numbers may be null.
-  void LeaveOut(RunStage stage, const std::string& state, const std::string& reason,
-    const nlohmann::ordered_json& numbers);
-
   /// The run ended within a stage.
   void Stop(RunStage stage, const std::string& reason);
 

@@ -217,12 +217,18 @@ RunOptions::RunOptions(CLI::App& app, RunSettings& settings)
             "Shorter branches are none, mm; 0: ten voxels", centerline),
     0.0, 1000.0)
     .option->capture_default_str();
-  between(add(group, "--centerline-seconds", "centerline_seconds", settings.centerlineSeconds, "S",
-            "After this time the trees are written as far as they are found", centerline),
-    0.1, 1e6)
-    .option->capture_default_str();
+  check(add(group, "--centerline-steps", "centerline_steps", settings.centerlineSteps, "N",
+          "After so many points on the ways back from possible tips the trees are written as far "
+          "as they are found: a limit of work, the same on any machine",
+          centerline),
+    WholeWithin(1, 2000000000));
+  this->List.back().option->capture_default_str();
   add(group, "!--no-labels", "labels", settings.labels, "",
     "Give the segments no names: for trees that are not coronary", centerline);
+  add(group, "--partial", "partial", settings.partial, "",
+    "Go on when a tree is lost: an ostium that was not found, a seed from which no vessel was "
+    "followed. Without it the run ends there",
+    none);
 
   group = "Surface";
   check(add(group, "--surface", "surface", settings.surface, "KIND",

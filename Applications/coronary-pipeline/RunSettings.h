@@ -52,8 +52,9 @@ struct RunSettings
 
   bool beyondMask = false;
   double leastBranch = 0.0;
-  double centerlineSeconds = 120.0;
+  int centerlineSteps = 5000000;
   bool labels = true;
+  bool partial = false;
 
   std::string surface = "swept"; ///< or "given"
   std::vector<double> edges = { 0.15, 0.7 };

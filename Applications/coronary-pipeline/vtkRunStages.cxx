@@ -18,15 +18,16 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
+#include "vtkRunMask.h"
 #include "vtkRunMeshes.h"
+#include "vtkRunMotion.h"
 #include "vtkRunSurface.h"
+#include "vtkRunTrees.h"
 #include "vtkSurfaceFile.h"
 
 #include "vtkBiharmonicSkinWeights.h"
-#include "vtkCardiacPhaseInterpolator.h"
 #include "vtkCellData.h"
 #include "vtkCenterlineSkeleton.h"
-#include "vtkCenterlineTracker.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryTreeTopology.h"
@@ -42,16 +43,13 @@
 #include "vtkInformation.h"
 #include "vtkInformationDoubleVectorKey.h"
 #include "vtkMatrix3x3.h"
-#include "vtkMeshSequenceWriter.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkReferencePhase.h"
-#include "vtkSkinDeformation.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkSurfaceCleaner.h"
 #include "vtkTGFWriter.h"
-#include "vtkTable.h"
 #include "vtkTetrahedralMesher.h"
 #include "vtkUnstructuredGrid.h"
 #include "vtkVesselSegmentation.h"
@@ -67,13 +65,48 @@
 
 namespace coronary
 {
-namespace
-{
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+std::string PathOf(const RunStep& step, const std::string& name)
+{
+  return (fs::path(step.input.Settings.output) / name).string();
+}
+
+vtkSmartPointer<vtkPolyData> ReadLines(const RunStep& step, const std::string& name)
+{
+  return ReadPolyData(PathOf(step, name), step.input.Messages);
+}
+
+vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
+{
+  auto tree = ReadLines(step, "centerline.vtp");
+  if (tree->GetNumberOfLines() == 0)
+  {
+    std::string reasons;
+    const Json centerline = step.report.Of("centerline");
+    for (const auto& one : centerline["trees"])
+    {
+      reasons += (reasons.empty() ? ": " : "; ") + one["name"].get<std::string>() + " " +
+        one["message"].get<std::string>();
+    }
+    throw std::runtime_error("'" + PathOf(step, "centerline.vtp") +
+      "' has no branches to make a surface of" + reasons + ".");
+  }
+  return tree;
+}
+
+namespace
+{
+
 /// How far a place on the wall may be from the axis, mm.
 constexpr double SurfaceSnapDistance = 3.0;
+
+/// Voxels, mm, in which coronary arteries can still be followed.
+constexpr double LargestVoxel = 1.25;
+
+/// Images with fewer values between the least and the greatest are in another unit than HU.
+constexpr double LeastRangeOfHU = 400.0;
 
 /// The number of the phase at a time.
 int PhaseAt(vtkGatedImageReader* reader, double time)
@@ -89,101 +122,6 @@ int PhaseAt(vtkGatedImageReader* reader, double time)
   return best;
 }
 
-Json Numbers(vtkDataSet* data, const char* name)
-{
-  Json list = Json::array();
-  if (vtkDataArray* array = data->GetFieldData()->GetArray(name))
-  {
-    for (vtkIdType n = 0; n < array->GetNumberOfValues(); ++n)
-    {
-      list.push_back(array->GetTuple1(n));
-    }
-  }
-  return list;
-}
-
-Json DescribeSeeds(vtkPolyData* seeds)
-{
-  vtkPointData* data = seeds->GetPointData();
-  auto* names = vtkStringArray::SafeDownCast(data->GetAbstractArray(vtkCoronaryArrayNames::Name));
-  Json list = Json::array();
-  for (vtkIdType n = 0; n < seeds->GetNumberOfPoints(); ++n)
-  {
-    // Seeds of a surface have neither radius nor volume.
-    const auto value = [&](const char* name)
-    { return data->HasArray(name) ? data->GetArray(name)->GetTuple1(n) : 0.0; };
-    double position[3];
-    seeds->GetPoint(n, position);
-    list.push_back(
-      { { "name", names->GetValue(n) }, { "position", { position[0], position[1], position[2] } },
-        { "confidence", value(vtkCoronaryArrayNames::Confidence) },
-        { "radius", value(vtkCoronaryArrayNames::Radius) },
-        { "volume", value(vtkCoronaryArrayNames::SeedVolume) } });
-  }
-  return list;
-}
-
-/// Text for one field of a CSV file.
-std::string Quoted(const std::string& text)
-{
-  std::string quoted = "\"";
-  for (const char c : text)
-  {
-    quoted += c == '"' ? "\"\"" : std::string(1, c);
-  }
-  return quoted + "\"";
-}
-
-/// What became of each seed: reached, or why not, with the tree that hangs on it.
-Json DescribeTrees(vtkPolyData* lines, vtkPolyData* seeds)
-{
-  vtkFieldData* fields = lines->GetFieldData();
-  vtkDataArray* status = fields->GetArray(vtkCoronaryArrayNames::SeedStatus);
-  auto* messages =
-    vtkStringArray::SafeDownCast(fields->GetAbstractArray(vtkCoronaryArrayNames::SeedMessage));
-  auto* names = vtkStringArray::SafeDownCast(
-    seeds->GetPointData()->GetAbstractArray(vtkCoronaryArrayNames::Name));
-  vtkDataArray* treeIds = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::TreeIds);
-  vtkDataArray* lengths = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::Length);
-  Json list = Json::array();
-  for (vtkIdType n = 0; n < seeds->GetNumberOfPoints(); ++n)
-  {
-    vtkIdType branches = 0;
-    double length = 0.0;
-    for (vtkIdType cell = 0; cell < lines->GetNumberOfCells(); ++cell)
-    {
-      if (treeIds->GetTuple1(cell) == static_cast<double>(n))
-      {
-        ++branches;
-        length += lengths->GetTuple1(cell);
-      }
-    }
-    double position[3];
-    seeds->GetPoint(n, position);
-    list.push_back(
-      { { "name", names->GetValue(n) }, { "position", { position[0], position[1], position[2] } },
-        { "status", static_cast<int>(status->GetTuple1(n)) }, { "message", messages->GetValue(n) },
-        { "branches", branches }, { "length", length } });
-  }
-  return list;
-}
-
-std::string StatusTable(const Json& trees)
-{
-  std::string table = "name,x_mm,y_mm,z_mm,status,message,branches,length_mm\n";
-  for (const auto& tree : trees)
-  {
-    table += Quoted(tree["name"].get<std::string>());
-    for (const auto& value : tree["position"])
-    {
-      table += "," + value.dump();
-    }
-    table += "," + tree["status"].dump() + "," + Quoted(tree["message"].get<std::string>()) + "," +
-      tree["branches"].dump() + "," + tree["length"].dump() + "\n";
-  }
-  return table;
-}
-
 template <typename Data>
 vtkSmartPointer<Data> Detached(Data* data)
 {
@@ -192,16 +130,6 @@ vtkSmartPointer<Data> Detached(Data* data)
   // What follows is static, whether it comes from memory or from a file.
   copy->GetInformation()->Remove(vtkDataObject::DATA_TIME_STEP());
   return copy;
-}
-
-std::string PathOf(const RunStep& step, const std::string& name)
-{
-  return (fs::path(step.input.Settings.output) / name).string();
-}
-
-vtkSmartPointer<vtkPolyData> ReadLines(const RunStep& step, const std::string& name)
-{
-  return ReadPolyData(PathOf(step, name), step.input.Messages);
 }
 
 /// A volume that an earlier stage wrote, on the grid of the reference phase.
@@ -344,6 +272,35 @@ vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, co
   return all;
 }
 
+/// What is known of an image before anything is looked for in it: voxels too large for coronary arteries, values that are
+/// no HU. @return whether the contrast has to be measured because its scale is unknown
+bool DoubtImage(RunStep& step)
+{
+  vtkImageData* image = step.input.Reference;
+  const std::string name = "'" + step.report.Of("image").get<std::string>() + "'";
+  double spacing[3];
+  image->GetSpacing(spacing);
+  const double largest = *std::max_element(spacing, spacing + 3);
+  if (largest > LargestVoxel)
+  {
+    step.warnings.push_back(name + " has voxels of " + Format(largest) +
+      " mm: arteries narrower than " + Format(2.0 * largest) +
+      " mm are not resolved, and will be missing or end early; take a reconstruction of at most " +
+      Format(0.7) + " mm");
+  }
+  double range[2];
+  image->GetScalarRange(range);
+  const bool unknown =
+    range[1] - range[0] < LeastRangeOfHU && step.input.Settings.c == RunSettings().c;
+  if (unknown)
+  {
+    step.warnings.push_back(name + " has values from " + Format(range[0]) + " to " +
+      Format(range[1]) +
+      ", which are no HU: --c 0 is taken, and --window may have to say what is tissue and blood");
+  }
+  return unknown;
+}
+
 Json MakeVesselness(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
@@ -352,10 +309,16 @@ Json MakeVesselness(RunStep& step)
   vesselness->SetSigmaMax(settings.scales[1]);
   vesselness->SetAutomaticC(!(settings.c > 0.0));
   vesselness->SetC(settings.c > 0.0 ? settings.c : 1.0);
+  std::string doubt;
   if (step.ranks.IsFirst())
   {
     NeedReference(step);
+    doubt = DoubtImage(step) ? "no HU" : "";
     vesselness->SetInputData(step.input.Reference);
+  }
+  if (!step.ranks.FromFirst(doubt).empty())
+  {
+    vesselness->SetAutomaticC(true);
   }
   if (step.ranks.Size() > 1)
   {
@@ -400,7 +363,25 @@ void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
     segmentation->SetTissueValue(settings.window[0]);
     segmentation->SetBloodValue(settings.window[1]);
   }
-  Update(segmentation, step);
+  try
+  {
+    Update(segmentation, step);
+  }
+  catch (const std::runtime_error& error)
+  {
+    const std::string text = error.what();
+    const std::size_t begin = text.find("AutomaticOstia found no ostium (");
+    const std::size_t end = text.rfind("): give points");
+    if (begin == std::string::npos || end == std::string::npos)
+    {
+      throw;
+    }
+    throw std::runtime_error("'" + step.report.Of("image").get<std::string>() +
+      "': no coronary ostium was found: " +
+      text.substr(text.find('(', begin) + 1, end - text.find('(', begin) - 1) +
+      ". Give the ostia with --seed X Y Z (LPS, mm); of values that are no HU, --window TISSUE "
+      "BLOOD too.");
+  }
   seeds =
     vtkPolyData::SafeDownCast(segmentation->GetOutputDataObject(vtkVesselSegmentation::SeedsPort));
   aorta =
@@ -449,6 +430,10 @@ vtkSmartPointer<vtkImageData> FittedMask(
 
 Json MakeSegmentation(RunStep& step)
 {
+  if (step.input.IsMask())
+  {
+    return MakeGivenMask(step);
+  }
   const RunSettings& settings = step.input.Settings;
   const std::string givenMask = step.input.MaskOf(step.report.Of("phase").get<int>());
   const std::vector<double>& given = step.input.Seeds;
@@ -496,6 +481,7 @@ Json MakeSegmentation(RunStep& step)
     step.summary += text;
   }
   numbers["seeds"] = described;
+  numbers["lost"] = given.empty() ? OstiaNotFound(described) : Json::array();
   numbers["seeds_file"] = "ostia.vtp";
   numbers["aorta_file"] = "aorta.vtp";
   numbers["bridges_file"] = "bridges.vtp";
@@ -556,11 +542,18 @@ Json MakeCenterline(RunStep& step)
     { "lines_file", "centerline_lines.vtp" }, { "status_file", "status.csv" } };
   vtkNew<vtkFastMarchingCenterline> centerline;
   centerline->SetMinimumBranchLength(settings.leastBranch);
-  centerline->SetTimeLimit(settings.centerlineSeconds);
+  centerline->SetStepLimit(settings.centerlineSteps);
   vtkSmartPointer<vtkPolyData> seeds;
   if (step.input.IsSurface())
   {
     seeds = PrepareSurface(step, centerline, numbers);
+  }
+  else if (step.input.IsMask())
+  {
+    NeedGivenMask(step);
+    seeds = ReadLines(step, "ostia.vtp");
+    centerline->SetImageKind(vtkFastMarchingCenterline::MaskImage);
+    centerline->SetInputDataObject(0, step.input.Mask);
   }
   else
   {
@@ -611,8 +604,18 @@ Json MakeCenterline(RunStep& step)
       segmentation["window"][1].get<double>());
     for (const std::string& warning : BridgeWarnings(numbers["bridges"]))
     {
-      vtkGenericWarningMacro(<< warning);
+      step.warnings.push_back(warning);
     }
+  }
+  // Of a surface without seeds every piece is a tree, also crumbs without a vessel.
+  numbers["lost"] =
+    step.input.IsSurface() && step.input.Seeds.empty() ? Json::array() : TreesNotFound(trees);
+  numbers["checks"] = DescribeChecks(tree);
+  for (const auto& check : numbers["checks"])
+  {
+    char sure[40];
+    std::snprintf(sure, sizeof(sure), " (confidence %.2f)", check["confidence"].get<double>());
+    step.warnings.push_back(check["what"].get<std::string>() + sure);
   }
   numbers["complete"] = complete && complete->GetTuple1(0) != 0.0;
   numbers["branches"] = tree->GetNumberOfLines();
@@ -624,25 +627,6 @@ Json MakeCenterline(RunStep& step)
   step.summary =
     std::to_string(tree->GetNumberOfLines()) + " branches, " + Format(std::round(length)) + " mm";
   return numbers;
-}
-
-/// The tree, which must not be empty.
-vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step)
-{
-  auto tree = ReadLines(step, "centerline.vtp");
-  if (tree->GetNumberOfLines() == 0)
-  {
-    std::string reasons;
-    const Json centerline = step.report.Of("centerline");
-    for (const auto& one : centerline["trees"])
-    {
-      reasons += (reasons.empty() ? ": " : "; ") + one["name"].get<std::string>() + " " +
-        one["message"].get<std::string>();
-    }
-    throw std::runtime_error("'" + PathOf(step, "centerline.vtp") +
-      "' has no branches to make a surface of" + reasons + ".");
-  }
-  return tree;
 }
 
 Json MakeSurface(RunStep& step)
@@ -785,131 +769,6 @@ Json MakeWeights(RunStep& step)
 
 constexpr int PhaseDigits = 2;
 
-/// The lines or the skeleton at every moment, and their lists; gives the name of one of these.
-std::string WriteMovingLines(
-  vtkAlgorithm* lines, const std::string& stem, const std::vector<double>& times, RunStep& step)
-{
-  std::vector<TimedFile> files;
-  for (std::size_t n = 0; n < times.size(); ++n)
-  {
-    std::string name = stem + "_";
-    name.append(SeriesNumber(n, times.size(), PhaseDigits)).append(".vtp");
-    files.push_back({ name, times[n] });
-    const std::string path = step.Add("motion/" + files.back().path);
-    if (step.ranks.Owns(n))
-    {
-      UpdateAtTime(lines, 0, times[n], step.input.Messages, [](double) {});
-      WritePolyData(
-        path, vtkPolyData::SafeDownCast(lines->GetOutputDataObject(0)), step.input.Messages);
-    }
-  }
-  std::string list = "motion/" + stem + ".vtp.series";
-  if (step.ranks.IsFirst())
-  {
-    WriteFileAtomically(step.Add(list), FileSeriesText(files));
-    WriteFileAtomically(step.Add("motion/" + stem + ".pvd"), PvdText(files));
-  }
-  return list;
-}
-
-std::vector<double> Moments(const RunInput& input)
-{
-  std::vector<double> times = input.Settings.moments;
-  if (times.empty())
-  {
-    for (int n = 0; n < input.Reader->GetNumberOfPhases(); ++n)
-    {
-      times.push_back(input.Reader->GetPhaseTime(n));
-    }
-  }
-  std::sort(times.begin(), times.end());
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  return times;
-}
-
-std::vector<double> TimeSteps(vtkAlgorithm* algorithm)
-{
-  vtkInformation* info = algorithm->GetOutputInformation(0);
-  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
-  const double* steps = info->Get(key);
-  return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
-}
-
-Json MakeMotion(RunStep& step)
-{
-  const RunSettings& settings = step.input.Settings;
-  vtkMessageTrap& messages = step.input.Messages;
-  const auto skeleton = ReadLines(step, "skeleton.vtp");
-  vtkNew<vtkCenterlineTracker> tracker;
-  tracker->SetInputConnection(step.input.Reader->GetOutputPort());
-  tracker->SetInputDataObject(1, ReadTree(step));
-  tracker->SetInputDataObject(2, skeleton);
-  tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
-  tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
-                                                       : vtkCenterlineTracker::AllPhases);
-  tracker->SetRanks(&step.ranks);
-  const std::vector<double> times = Moments(step.input);
-  const int mode = InterpolationMode(settings.interpolation);
-  vtkNew<vtkCardiacPhaseInterpolator> lines;
-  lines->SetInputConnection(tracker->GetOutputPort(0));
-  lines->SetMode(mode);
-  MovingMesh moving;
-  moving.Interpolator->SetInputConnection(tracker->GetOutputPort(1));
-  moving.Interpolator->SetMode(mode);
-  moving.Deformation->SetInputData(0, ReadUnstructuredGrid(PathOf(step, "weights.vtu"), messages));
-  moving.Deformation->SetInputData(1, skeleton);
-  moving.Writer->SetInputData(1, ReadLines(step, "volume_boundary.vtp"));
-  moving.Writer->SetInputData(2, ReadLines(step, "caps.vtp"));
-  moving.Writer->PrefixFilesOff();
-  moving.Writer->SetDigits(PhaseDigits);
-  moving.Writer->SetRanks(&step.ranks);
-
-  // The images are read now.
-  UpdateAtTime(
-    tracker, 0, times.front(), messages, [&](double fraction) { step.progress(0.8 * fraction); });
-  Json lists;
-  lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
-  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
-  const std::string name = "motion/mesh.json";
-  const std::string path = step.Add(name);
-  moving.Write(
-    path, times, messages, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); });
-  if (!step.ranks.IsFirst())
-  {
-    return {};
-  }
-  for (const std::string& file : MeshSequenceFiles(path))
-  {
-    if ("motion/" + file != name)
-    {
-      step.Add("motion/" + file);
-    }
-  }
-  lists["volume"] = "motion/volume.vtu.series";
-  lists["surface"] = "motion/surface.vtp.series";
-  std::vector<TimedFile> surfaces =
-    ReadFileSeries((fs::path(path).parent_path() / "surface.pvd").string());
-  for (TimedFile& file : surfaces)
-  {
-    file.path = "motion/" + fs::path(file.path).filename().string();
-  }
-  WriteFileAtomically(step.Add("motion.pvd"), PvdText(surfaces));
-
-  vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
-  Json inverted = Json::array();
-  vtkTable* quality = moving.Writer->GetQuality();
-  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
-  {
-    inverted.push_back(
-      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
-  }
-  step.summary = std::to_string(times.size()) + " moments";
-  return { { "possible", true }, { "file", "motion.pvd" }, { "series", lists }, { "quality", name },
-    { "times", times }, { "tracked_times", TimeSteps(tracker) },
-    { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
-    { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
-    { "inverted_tetrahedra", inverted } };
-}
 }
 
 namespace
@@ -977,6 +836,10 @@ RunInput::RunInput(const RunSettings& settings, vtkMessageTrap& messages)
       throw std::runtime_error("'" + settings.seedFile + "' has no points.");
     }
   }
+  if (this->IsMask())
+  {
+    return;
+  }
   const auto surfaces = std::count_if(settings.input.begin(), settings.input.end(), IsSurfaceFile);
   if (surfaces > 0)
   {
@@ -1024,7 +887,7 @@ RunInput::~RunInput() = default;
 std::vector<std::string> RunInput::Files() const
 {
   std::vector<std::string> files = this->Settings.input;
-  const fs::path folder = fs::path(files.front()).parent_path();
+  const fs::path folder = files.empty() ? fs::path() : fs::path(files.front()).parent_path();
   for (const std::string& file : this->Masks)
   {
     if (!file.empty())
@@ -1051,9 +914,9 @@ std::vector<std::string> RunInput::Files() const
 
 std::string RunInput::WhyStill() const
 {
-  if (this->IsSurface())
+  if (this->IsSurface() || this->IsMask())
   {
-    return "a surface has no images to track";
+    return this->IsMask() ? "a mask has no images to track" : "a surface has no images to track";
   }
   const int phases = this->Reader->GetNumberOfPhases();
   if (phases < 2)

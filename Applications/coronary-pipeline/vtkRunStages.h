@@ -37,7 +37,10 @@ public:
   RunInput(const RunSettings& settings, vtkMessageTrap& messages);
   ~RunInput();
 
-  bool IsSurface() const { return this->Reader == nullptr; }
+  /// A mask without images.
+  bool IsMask() const { return this->Settings.input.empty(); }
+
+  bool IsSurface() const { return this->Reader == nullptr && !this->IsMask(); }
 
   /// All files of which the input is, for DescribeInput().
   std::vector<std::string> Files() const;
@@ -74,11 +77,21 @@ struct RunStep
   RankGroup& ranks;                ///< that work on the stage together
   std::vector<std::string>& files; ///< names of those
   std::function<void(double)> progress;
-  std::string summary; ///< a few words for the user
+  std::string summary;                    ///< a few words for the user
+  std::vector<std::string> warnings = {}; ///< of the stage itself, beside those of filters
 
   /// Where to write a file of the stage.
   std::string Add(const std::string& name);
 };
+
+/// Where a file of the result is, made now or before.
+std::string PathOf(const RunStep& step, const std::string& name);
+
+///@{
+/// Poly data of an earlier stage; the tree must not be empty. @throws std::runtime_error
+vtkSmartPointer<vtkPolyData> ReadLines(const RunStep& step, const std::string& name);
+vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step);
+///@}
 
 /// Whether all ranks work on a stage; else the first one alone.
 bool IsShared(RunStage stage);

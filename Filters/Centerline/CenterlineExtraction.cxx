@@ -11,7 +11,6 @@
 #include "VoxelRegion.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -203,7 +202,6 @@ public:
     , Excluded(excluded)
     , Settings(settings)
     , Progress(progress)
-    , Start(std::chrono::steady_clock::now())
     , Spacing(input.grid.spacing)
     , Finest(input.grid.spacing.minCoeff())
     , Voxel(std::cbrt(input.grid.spacing.prod()))
@@ -249,11 +247,6 @@ private:
       }
     }
     return true;
-  }
-  bool OutOfTime() const
-  {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - this->Start).count() >
-      this->Settings.timeLimit;
   }
 
   void PrepareMeasurement();
@@ -307,7 +300,6 @@ private:
   const std::vector<unsigned char>& Excluded;
   const CenterlineSettings& Settings;
   const ProgressCallback& Progress;
-  std::chrono::steady_clock::time_point Start;
   Vector3 Spacing;
   double Finest;
   double Voxel;
@@ -634,12 +626,6 @@ void Extractor::MarchFrom()
 
   FastMarchingSettings settings;
   settings.spacing = this->Spacing;
-  bool timedOut = false;
-  settings.goOn = [&](std::uint32_t)
-  {
-    timedOut = this->OutOfTime();
-    return !timedOut;
-  };
   std::vector<FastMarchingSource> sources;
   for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
   {
@@ -671,14 +657,6 @@ void Extractor::MarchFrom()
   this->Marching =
     std::make_unique<FastMarching>(this->Region, std::move(speed), settings, progress);
   this->Marching->March(sources);
-  if (timedOut)
-  {
-    this->Result.complete = false;
-    std::ostringstream text;
-    text << "stopped by the time limit of " << this->Settings.timeLimit
-         << " s while marching: parts of the trees may be missing";
-    this->Result.messages.push_back(text.str());
-  }
   this->Result.memory = this->Marching->MemorySize() +
     this->Region.Size() * (sizeof(float) + sizeof(std::int32_t)) +
     this->MaskImage.size() * sizeof(std::int16_t) + this->MaskDistance.size() * sizeof(float);
@@ -1573,6 +1551,7 @@ void Extractor::FindTips()
     { return a.length != b.length ? a.length > b.length : a.number < b.number; });
 
   std::size_t done = 0;
+  std::int64_t steps = 0;
   for (const Tip& tip : tips)
   {
     Report(
@@ -1581,18 +1560,19 @@ void Extractor::FindTips()
     {
       continue;
     }
-    if (this->OutOfTime())
+    if (steps >= this->Settings.stepLimit)
     {
       this->Result.complete = false;
       std::ostringstream text;
-      text << "stopped by the time limit of " << this->Settings.timeLimit
-           << " s while following branches: " << tips.size() - done
+      text << "stopped by the limit of " << this->Settings.stepLimit
+           << " steps while following branches: " << tips.size() - done + 1
            << " possible tips were not looked at";
       this->Result.messages.push_back(text.str());
       return;
     }
     const std::array<int, 3> index = this->Region.IndexOf(tip.address);
     const Way way = this->WayBack(Vector3(index[0], index[1], index[2]), tip.number);
+    steps += static_cast<std::int64_t>(way.points.size());
     if (this->Append(way, this->Marching->Source()[tip.number], false) >= 0)
     {
       continue;
@@ -2273,7 +2253,7 @@ void CenterlineSettings::Validate() const
   length(this->smoothing, "smoothing");
   length(this->blur, "blur");
   length(this->snapDistance, "snapDistance");
-  Require(this->timeLimit > 0.0, "timeLimit must be positive");
+  Require(this->stepLimit > 0, "stepLimit must be positive");
   Require(this->voxelLimit > 0, "voxelLimit must be positive");
 }
 

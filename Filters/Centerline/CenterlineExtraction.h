@@ -59,7 +59,8 @@ struct CenterlineSettings
   bool snap = true;                 ///< put points on the measured centre
   double snapDistance = 0.0;        ///< mm between a given seed or target and the region
   bool thinBranches = true; ///< on images also branches that are too thin for the speed or mask
-  double timeLimit = 120.0; ///< seconds
+  /// Points on the ways back from tips, of all together: a limit of work, the same on any machine.
+  std::int64_t stepLimit = 5000000;
   std::int64_t voxelLimit = 100000000; ///< voxels in the region
 
   /// @throws std::invalid_argument that names the first setting out of range
@@ -73,7 +74,7 @@ enum class EndStatus : int
   OutsideRegion = 2, ///< no vessel there
   NotConnected = 3,  ///< no way through vessels from any seed
   InOtherTree = 4,   ///< a seed in the vessel of an earlier seed
-  LimitReached = 5,  ///< time or size limit
+  LimitReached = 5,  ///< of work or size
   TooShort = 6       ///< the point is in the lumen of its seed
 };
 
@@ -118,7 +119,7 @@ struct CenterlineResult
 };
 
 /**
- * Deterministic, the same on any number of threads, unless a time limit ends it.
+ * Deterministic, the same on any number of threads and under any load.
  * @throws std::invalid_argument for settings or an input that can not be used (no seed, nothing to
  * march in, spacing not positive); Cancelled. Seeds and targets that can not be used are
  * reported, not thrown.

@@ -208,6 +208,11 @@ SegmentAtlas Build()
 }
 }
 
+Vector3 SegmentAtlas::OnEpicardium(double azimuth, double height) const
+{
+  return Frame().On(azimuth, height);
+}
+
 const SegmentAtlas& SegmentAtlas::Get()
 {
   static const SegmentAtlas atlas = Build();

@@ -75,6 +75,10 @@ struct SegmentAtlas
   Matrix3 axes;
   Vector3 origin;
 
+  /// The point of the epicardial ellipsoid at an azimuth about c (degrees, from a towards b) and a
+  /// height below the groove (mm).
+  Vector3 OnEpicardium(double azimuth, double height) const;
+
   static const SegmentAtlas& Get();
 };
 }

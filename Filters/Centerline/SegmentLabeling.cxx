@@ -28,10 +28,14 @@ constexpr double Correlation = 10.0;    ///< length of vessel that counts as one
 constexpr double Misfit = 4.5;          ///< greatest cost of an observation
 constexpr double CourseWeight = 1.0;    ///< of 1 - cos(angle between courses)
 constexpr double Unnamed = 2.2;         ///< cost of an observation on a vessel without a name
+constexpr double LongestUnnamed = 25.0; ///< conus, sinus node and atrial branches are short
+constexpr double UnnamedLength = 0.12;  ///< cost of a longer one with what hangs on it, for each mm
 constexpr double LeastNumbered = 8.0;   ///< shorter side branches are not counted
 constexpr double OriginDeviation = 8.0; ///< of a side branch's origin along its vessel
 constexpr double NumberedCourse = 1.0;  ///< weight of a side branch's course beside its origin
 constexpr double SkippedNumber = 2.0;   ///< cost of a first, second, ... branch that is not there
+constexpr double StemLength = 5.0;      ///< three arteries that leave the left main nearly together
+constexpr double StemCost = 1.0;        ///< of a ramus that leaves such a stem
 
 using Costs = std::array<double, NumberOfVessels>;
 
@@ -247,6 +251,7 @@ private:
   std::vector<double> CourseCosts(
     const Pose& pose, const Assignment& assignment, int start, std::size_t numbers) const;
   Pose Refine(const Pose& pose, const Assignment& assignment) const;
+  void ApplyDefinitions(Assignment& assignment) const;
   void NameSegments(const Pose& pose, const Assignment& assignment);
 
   CenterlineTopology& Tree;
@@ -259,6 +264,7 @@ private:
   std::vector<std::vector<int>> Roots; ///< first pieces of every tree
   std::vector<double> TreeLength;
   std::vector<Vector3> RootPosition;
+  std::vector<double> Below;                     ///< length of a piece and of all that hangs on it
   std::vector<const Bifurcation*> BifurcationOf; ///< of a branch's end
 };
 
@@ -383,6 +389,15 @@ void Labeler::Cut()
       parent = index;
     }
     lastChunk[b] = parent;
+  }
+  this->Below.assign(this->Chunks.size(), 0.0);
+  for (std::size_t c = this->Chunks.size(); c-- > 0;)
+  {
+    this->Below[c] += this->Chunks[c].length;
+    if (this->Chunks[c].parent >= 0)
+    {
+      this->Below[this->Chunks[c].parent] += this->Below[c];
+    }
   }
 }
 
@@ -637,6 +652,12 @@ double Labeler::AssignTree(int tree, Side side, Dominance dominance, const std::
   const double inferior = dominance == Dominance::Balanced ? 0.0 : 2.5;
   const auto extra = [&](V from, V to)
   { return from == V::RightCoronary && to == V::InferiorRight ? inferior : 0.0; };
+  // Three arteries that leave the left main together come as two divisions with a stem between them.
+  const auto isStem = [&](const Chunk& chunk)
+  {
+    return chunk.startsBranch && chunk.children.size() > 1 && chunk.length < StemLength &&
+      this->Tree.branches[chunk.branch].generation <= 1;
+  };
   std::vector<Costs> cost(count);
   std::vector<std::array<std::vector<V>, NumberOfVessels>> choice(count);
   const auto bit = [](V vessel) -> unsigned { return IsTrunk(vessel) ? 1U << I(vessel) : 0U; };
@@ -697,6 +718,16 @@ double Labeler::AssignTree(int tree, Side side, Dominance dominance, const std::
       }
       else if (divides)
       {
+        // What leaves together with a child.
+        const auto beside = [&](std::size_t child)
+        {
+          double longest = 0.0;
+          for (std::size_t i = 0; i < chunk.children.size(); ++i)
+          {
+            longest = i == child ? longest : std::max(longest, this->Below[chunk.children[i]]);
+          }
+          return longest;
+        };
         // Each trunk goes on in one child at most.
         std::map<unsigned, std::pair<double, std::vector<V>>> states;
         states[0] = { 0.0, {} };
@@ -710,7 +741,20 @@ double Labeler::AssignTree(int tree, Side side, Dominance dominance, const std::
               const V vessel = static_cast<V>(v);
               const double child = cost[chunk.children[i]][v];
               double step = branching[p][v] + extra(parent, vessel);
-              if (!(child + step < Infinity) || (mask & bit(vessel)) != 0U)
+              if (vessel == V::Other && parent != V::Other)
+              {
+                step +=
+                  UnnamedLength * std::max(0.0, this->Below[chunk.children[i]] - LongestUnnamed);
+              }
+              if (vessel == V::Ramus && isStem(chunk) &&
+                (parent == V::AnteriorDescending || parent == V::Circumflex))
+              {
+                step = StemCost;
+              }
+              // The left main ends at its first division that is more than a twig.
+              const bool goesOn = parent == V::LeftMain && vessel == V::LeftMain;
+              if (!(child + step < Infinity) || (mask & bit(vessel)) != 0U ||
+                (goesOn && beside(i) > LongestUnnamed))
               {
                 continue;
               }
@@ -1004,6 +1048,34 @@ std::vector<double> Labeler::CourseCosts(
   return sum;
 }
 
+/// What position and course can not decide, but the words say: the right coronary's last segment goes as far as the
+/// posterior descending artery leaves, and who descends alone behind is that artery.
+void Labeler::ApplyDefinitions(Assignment& assignment) const
+{
+  using V = Vessel;
+  std::vector<V>& vessels = assignment.vessels;
+  const auto has = [&](V vessel)
+  { return std::find(vessels.begin(), vessels.end(), vessel) != vessels.end(); };
+  if (has(V::InferiorRight) && !has(V::RightPosteriorDescending))
+  {
+    std::replace(vessels.begin(), vessels.end(), V::InferiorRight, V::RightPosteriorDescending);
+  }
+  // Children have higher indices than their parents.
+  std::vector<char> leads(vessels.size(), 0);
+  for (std::size_t c = vessels.size(); c-- > 0;)
+  {
+    if (leads[c] != 0 && vessels[c] == V::RightPosterolateral)
+    {
+      vessels[c] = V::RightCoronary;
+    }
+    const int parent = this->Chunks[c].parent;
+    if (parent >= 0 && (leads[c] != 0 || vessels[c] == V::RightPosteriorDescending))
+    {
+      leads[static_cast<std::size_t>(parent)] = 1;
+    }
+  }
+}
+
 void Labeler::NameSegments(const Pose& pose, const Assignment& assignment)
 {
   using V = Vessel;
@@ -1025,15 +1097,6 @@ void Labeler::NameSegments(const Pose& pose, const Assignment& assignment)
     }
     return arc;
   };
-  std::vector<double> below(count, 0.0); // length of a piece and what hangs on it
-  for (std::size_t c = count; c-- > 0;)
-  {
-    below[c] += this->Chunks[c].length;
-    if (this->Chunks[c].parent >= 0)
-    {
-      below[this->Chunks[c].parent] += below[c];
-    }
-  }
   struct SideBranch
   {
     int chunk;
@@ -1049,7 +1112,7 @@ void Labeler::NameSegments(const Pose& pose, const Assignment& assignment)
     {
       const Chunk& chunk = this->Chunks[c];
       if (assignment.vessels[c] == kind && chunk.startsBranch && chunk.parent >= 0 &&
-        assignment.vessels[chunk.parent] == trunk && below[c] >= LeastNumbered)
+        assignment.vessels[chunk.parent] == trunk && this->Below[c] >= LeastNumbered)
       {
         const std::int64_t origin = this->Tree.branches[chunk.branch].points[0];
         found.push_back(
@@ -1315,6 +1378,7 @@ LabelingResult Labeler::Run(const ProgressCallback& progress)
     chosen = results[i].first.cost < results[chosen].first.cost ? i : chosen;
   }
   LabelingResult result;
+  this->ApplyDefinitions(results[chosen].first);
   const auto& [assignment, pose] = results[chosen];
   result.cost = assignment.cost;
   result.dominance = assignment.dominance;
@@ -1359,6 +1423,8 @@ LabelingResult Labeler::Run(const ProgressCallback& progress)
   result.heart.size = this->Unit / size;
   result.heart.origin =
     this->Centre + this->Unit * (pose.matrix.inverse() * (this->Atlas.origin - pose.shift));
+  result.fit.matrix = pose.matrix / this->Unit;
+  result.fit.shift = pose.shift - result.fit.matrix * this->Centre;
   this->NameSegments(pose, assignment);
   return result;
 }

@@ -47,10 +47,24 @@ struct HeartPose
   }
 };
 
+/// The affine fit behind the names: nearer to the individual's proportions than HeartPose.
+struct MeanHeartFit
+{
+  Matrix3 matrix = Matrix3::Identity();
+  Vector3 shift = Vector3::Zero();
+
+  /// Position on the mean heart (SegmentAtlas.h), mm, LPS.
+  Vector3 ToMeanHeart(const Vector3& position) const
+  {
+    return this->matrix * position + this->shift;
+  }
+};
+
 struct LabelingResult
 {
   Dominance dominance = Dominance::Right;
   HeartPose heart;
+  MeanHeartFit fit;
   double meanDistance = 0.0; ///< of the named vessels from the mean heart's, mm of the mean heart
   double cost = 0.0;         ///< of the chosen assignment; less is better
   double margin = 0.0;       ///< cost of the best assignment with another dominance, minus cost

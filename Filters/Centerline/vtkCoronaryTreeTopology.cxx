@@ -2,6 +2,7 @@
 
 #include "CenterlineTopology.h"
 #include "SegmentLabeling.h"
+#include "TreeCheck.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
@@ -264,6 +265,31 @@ public:
       output->GetCellData(), this->Self->LengthArrayName, lengths);
   }
 
+  void WriteWarnings(vtkPolyData* output, const std::vector<coronary::TreeWarning>& warnings) const
+  {
+    namespace names = vtkCoronaryArrayNames;
+    if (warnings.empty())
+    {
+      return;
+    }
+    std::vector<vtkStdString> texts;
+    std::vector<vtkStdString> vessels;
+    std::vector<std::vector<double>> places;
+    std::vector<double> confidences;
+    for (const coronary::TreeWarning& warning : warnings)
+    {
+      texts.emplace_back(warning.what);
+      vessels.emplace_back(warning.vessel);
+      places.push_back({ warning.place[0], warning.place[1], warning.place[2] });
+      confidences.push_back(warning.confidence);
+    }
+    vtkFieldData* data = output->GetFieldData();
+    vtkCoronary::AddArray<vtkStringArray>(data, names::Warnings, texts);
+    vtkCoronary::AddArray<vtkStringArray>(data, names::WarningVessels, vessels);
+    AddRows<vtkDoubleArray>(data, names::WarningPlaces, places, 3, 0.0);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, names::WarningConfidences, confidences);
+  }
+
   void WriteFieldData(vtkPolyData* output, const coronary::LabelingResult* labels) const
   {
     namespace names = vtkCoronaryArrayNames;
@@ -479,6 +505,13 @@ int vtkCoronaryTreeTopology::RequestData(
       this->LabelSegments && !tree.branches.empty() ? &labels : nullptr;
     writer.WriteFieldData(output[TreePort], named);
     writer.WriteFieldData(output[BifurcationPort], named);
+    if (named != nullptr)
+    {
+      const std::vector<coronary::TreeWarning> warnings =
+        coronary::CheckCoronaryTrees(tree, labels);
+      writer.WriteWarnings(output[TreePort], warnings);
+      writer.WriteWarnings(output[BifurcationPort], warnings);
+    }
     if (!tree.loops.empty())
     {
       vtkWarningMacro(<< tree.loops.size() << (tree.loops.size() == 1 ? " loop was" : " loops were")

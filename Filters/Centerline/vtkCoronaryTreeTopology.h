@@ -48,7 +48,11 @@
  * `LoopLengths` (double, mm), `FittedExponent` (double, over all bifurcations; no value where none
  * fits), and when labelled `Dominance` (string) and `HeartFrame` (double[16], 4x4 matrix row by row:
  * from world to heart coordinates in mm of the mean heart; first axis from the right coronary's to
- * the circumflex' side, third from base to apex, origin in the atrioventricular groove).
+ * the circumflex' side, third from base to apex, origin in the atrioventricular groove). Where the
+ * check of labelled trees finds what healthy hearts do not have (an artery that ends in full
+ * calibre, a wall without any), one value each of `Warnings` (string, a sentence with vessel and
+ * place), `WarningVessels` (string, SCCT name), `WarningPlaces` (double[3]) and
+ * `WarningConfidences` (double, 0 to 1); nothing where all is well.
  *
  * The output is whole in piece 0 and empty, with all arrays, in every other piece. Blocks of a
  * composite input are treated one by one.

@@ -353,7 +353,7 @@ void vtkFastMarchingCenterline::Execute(
   settings.snap = this->Snap;
   settings.blur = this->Blur;
   settings.snapDistance = this->SnapDistance;
-  settings.timeLimit = this->TimeLimit;
+  settings.stepLimit = this->StepLimit;
   settings.voxelLimit = this->VoxelLimit;
   settings.Validate();
   vtkCoronary::Require(std::isfinite(this->SurfaceSpacing) && this->SurfaceSpacing >= 0.0,
@@ -684,7 +684,7 @@ void vtkFastMarchingCenterline::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Blur: " << this->Blur << '\n';
   os << indent << "SnapDistance: " << this->SnapDistance << '\n';
   os << indent << "SurfaceSpacing: " << this->SurfaceSpacing << '\n';
-  os << indent << "TimeLimit: " << this->TimeLimit << '\n';
+  os << indent << "StepLimit: " << this->StepLimit << '\n';
   os << indent << "VoxelLimit: " << this->VoxelLimit << '\n';
   os << indent << "IntensityArrayName: " << this->IntensityArrayName << '\n';
   os << indent << "RadiusArrayName: " << this->RadiusArrayName << '\n';

@@ -250,11 +250,13 @@ public:
 
   ///@{
   /**
-   * The work ends, with a warning and what was found, after so many seconds (default 120), and does
-   * not begin with more voxels in the region (default 100 million).
+   * The work ends, with a warning and what was found, after so many points on the ways back from
+   * possible tips (default 5 million; the largest trees take some hundred thousand), and does not
+   * begin with more voxels in the region (default 100 million). Both count work, not time: the
+   * result is the same on a slow or busy machine.
    */
-  vtkSetMacro(TimeLimit, double);
-  vtkGetMacro(TimeLimit, double);
+  vtkSetMacro(StepLimit, vtkIdType);
+  vtkGetMacro(StepLimit, vtkIdType);
   vtkSetMacro(VoxelLimit, vtkIdType);
   vtkGetMacro(VoxelLimit, vtkIdType);
   ///@}
@@ -321,7 +323,7 @@ private:
   double Blur = 0.0;
   double SnapDistance = 0.0;
   double SurfaceSpacing = 0.0;
-  double TimeLimit = 120.0;
+  vtkIdType StepLimit = 5000000;
   vtkIdType VoxelLimit = 100000000;
   std::string IntensityArrayName;
   std::string RadiusArrayName;

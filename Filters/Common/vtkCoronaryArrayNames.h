@@ -94,6 +94,10 @@ constexpr const char* HeartFrame = "HeartFrame";   ///< double[16], world to hea
 constexpr const char* PrunedTwigs = "PrunedTwigs"; ///< int, number
 constexpr const char* ClosedGaps = "ClosedGaps";   ///< int, number
 constexpr const char* LoopLengths = "LoopLengths"; ///< double, mm, one value a loop
+// What the check of whole trees found; one value a warning, absent without any; the sentences are `Warnings`.
+constexpr const char* WarningVessels = "WarningVessels";         ///< string, SCCT name
+constexpr const char* WarningPlaces = "WarningPlaces";           ///< double[3]
+constexpr const char* WarningConfidences = "WarningConfidences"; ///< double, 0 to 1
 
 // Bifurcations, point data (with ParentGroupIds, TreeIds, SegmentIds of the parent).
 constexpr const char* DaughterGroupIds = "DaughterGroupIds"; ///< int[n], widest first, -1: none

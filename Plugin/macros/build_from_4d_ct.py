@@ -22,7 +22,7 @@ HOUNSFIELD = (-150.0, 650.0)
 
 
 def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_radius=4.5, window=(),
-          beyond_mask=False, least_branch=0.0, centerline_seconds=120.0, labels=True,
+          beyond_mask=False, least_branch=0.0, centerline_steps=5000000, labels=True,
           edges=(0.15, 0.7), open_ends=False, leave_bones_outside=False, temporal_window_ms=66.0,
           tracked="all", interpolation="cubic", regularized=False, show=True, size=None):
     """Assembles the pipeline and computes it.
@@ -67,7 +67,7 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
     ostia = add("segmentation", segmentation, "found no ostium: give seeds", 1)
     centerline = simple.FastMarchingCenterline(
         vesselness, registrationName="4 Centerlines", Seeds=ostia, CTImage=reference,
-        MinimumBranchLength=least_branch, TimeLimit=centerline_seconds)
+        MinimumBranchLength=least_branch, StepLimit=centerline_steps)
     if not beyond_mask:
         centerline.Mask = simple.OutputPort(segmentation, 0)
     lines = add("centerline", centerline, "found no vessel at the seeds: look at the vesselness there")

@@ -419,6 +419,29 @@ void MakeStillOrContracting(
   model.motion = "contraction by formula";
 }
 
+/// Whether a list of poses has different ones: that of a run of one phase has the pose at rest, several times.
+bool Moves(const std::string& list, vtkMessageTrap& messages)
+{
+  vtkSmartPointer<vtkPolyData> first;
+  for (const TimedFile& file : ReadFileSeries(list))
+  {
+    const auto data = ReadPolyData(file.path, messages);
+    first = first ? first : data;
+    if (data->GetNumberOfPoints() != first->GetNumberOfPoints())
+    {
+      return true; // told when the poses are read
+    }
+    for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
+    {
+      if ((Vector3(data->GetPoint(n)) - Vector3(first->GetPoint(n))).norm() > 1e-6)
+      {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 VesselModel LoadRun(
   const VesselSource& source, vtkMessageTrap& messages, const ProgressCallback& progress)
 {
@@ -430,7 +453,7 @@ VesselModel LoadRun(
   VesselModel model;
   const std::string list = (fs::path(source.path) / "motion/skeleton.vtp.series").string();
   const bool tracked = source.motion == VesselMotion::Tracked ||
-    (source.motion == VesselMotion::Automatic && IsFile(list));
+    (source.motion == VesselMotion::Automatic && IsFile(list) && Moves(list, messages));
   const std::string boundary = (fs::path(source.path) / "volume_boundary.vtp").string();
   const std::string surface = tracked ? FileOfRun(source.path, "volume_boundary.vtp", "volume")
     : IsFile(boundary)                ? boundary

@@ -569,7 +569,39 @@ check_weights() {
   expect_text stderr "Warning: motion is not possible: one phase only"
   expect_text still/report.json '"reason": "one phase only"'
   [ -s still/weights.vtu ] || fail "no static model: $(ls still)"
-  [ ! -e still/motion.pvd ] || fail "motion of one phase"
+  expect_text still/report.json '"at_rest": true'
+  [ -s still/motion.pvd ] || fail "no model at rest: $(ls still)"
+  for kind in centerline.vtp skeleton.vtp surface.vtp volume.vtu; do
+    [ -s "still/motion/$kind.series" ] || fail "no $kind.series: $(ls still/motion)"
+  done
+  for kind in skeleton surface; do
+    cmp "still/motion/${kind}_00.vtp" "still/motion/${kind}_01.vtp" || fail "$kind does not rest"
+  done
+
+  # A mask alone: the same trees, without an image.
+  run 2 run --mask still/mask.mha --until vesselness --output masked
+  expect_one_line "coronary-pipeline run" "a mask has no images"
+  run 0 run --mask still/mask.mha --quiet --edges 0.8 1.6 --output masked
+  expect_text stderr "has no aorta: trees begin at their widest ends"
+  expect_text stderr "motion is not possible: a mask has no images to track"
+  [ -s masked/motion.pvd ] || fail "no model of a mask: $(ls masked)"
+  [ "$(grep -c . masked/status.csv)" -ge 3 ] || fail "trees of a mask: $(cat masked/status.csv)"
+
+  # A tree that is lost ends the run, or is left out by name.
+  ostium=$(sed -n 2p still/status.csv | cut -d, -f2-4 | tr , ' ')
+  corner=$(grep -a '^Offset = ' still/mask.mha | cut -d' ' -f3-5) # of the image, where no vessel is
+  options="--quiet --scales 0.7 2.5 --until centerline --seed $ostium --seed $corner --output lost"
+  # shellcheck disable=SC2086
+  run 1 run series/phase_01.mha $options
+  expect_text stderr "the tree of seed 1 is lost"
+  expect_text stderr "--partial"
+  [ -s lost/centerline.vtp ] || fail "nothing to look at: $(ls lost)"
+  # shellcheck disable=SC2086
+  run 1 run series/phase_01.mha $options --resume
+  expect_text stderr "the tree of seed 1 is lost"
+  # shellcheck disable=SC2086
+  run 0 run series/phase_01.mha $options --resume --partial
+  expect_text stderr "Warning: the tree of seed 1 is lost"
 }
 
 check_settings() {
@@ -610,7 +642,7 @@ check_surface() {
   run 0 phantom --quiet --seed 2 --fractions 0.74 --truth-only --surface-spacing 0.8 --output made
   cp made/truth/surface_00.vtp given.vtp
   run 0 run given.vtp --edges 0.8 1.6 --output swept
-  expect_text stderr "stage 1 of 4 (centerline)"
+  expect_text stderr "stage 1 of 5 (centerline)"
   expect_text stderr "Warning: motion is not possible: a surface has no images to track"
   for file in given_surface.vtp centerline.vtp surface.vtp volume.vtu skeleton.tgf weights.dmat report.json; do
     [ -s "swept/$file" ] || fail "no $file: $(ls swept)"
@@ -677,7 +709,7 @@ check_run() {
     fail "--until segmentation wrote $(ls mask)"
   fi
   run 0 run series/series.json --quiet --beyond-mask --scales 0.7 2.5 --until centerline \
-    --centerline-seconds 3600 --output beyond
+    --output beyond
   [ "$(branches_of beyond)" -gt "$(branches_of result)" ] || fail "beyond the mask are no more branches"
 
   run 0 run series/series.json --quiet --until vesselness --scales 0.7 2.5 --time 0.1 --output enhanced

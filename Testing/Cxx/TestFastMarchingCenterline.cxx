@@ -5,7 +5,6 @@
 #include "CenterlineExtraction.h"
 #include "FilterMessages.h"
 #include "Geometry.h"
-#include "Instrumented.h"
 #include "SharedSurface.h"
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkFrangiVesselness.h"
@@ -98,10 +97,6 @@ TEST(FastMarchingCenterline, ThePhantomsTreeFromItsImage)
   filter->SetInputConnection(vesselness->GetOutputPort());
   filter->SetSeedConnection(phantom->GetOutputPort(vtkCoronaryPhantomSource::OstiaPort));
   filter->SetIntensityConnection(phantom->GetOutputPort(vtkCoronaryPhantomSource::ImagePort));
-  if (coronary::Instrumented)
-  {
-    filter->SetTimeLimit(3600.0);
-  }
   Messages messages(filter);
   filter->UpdateTimeStep(0.75);
   EXPECT_TRUE(messages.Errors.empty()) << messages.Errors.front();

@@ -718,6 +718,23 @@ TEST(CenterlineExtraction, WhatCanNotBeReachedIsNamed)
   ASSERT_EQ(large.messages.size(), 1u);
   EXPECT_NE(large.messages[0].find("limit of 10"), std::string::npos);
   EXPECT_EQ(large.targets[0].status, EndStatus::LimitReached);
+
+  // The limit of work counts what is done, longest way first: one step lets one way through.
+  const Tube side{ Line(Vector3(0, -6, 0.5), Vector3(2, 5, 1)), 1.2 };
+  const Scene fork(
+    { near, side }, Vector3::Constant(0.5), Matrix3::Identity(), Vector3::Zero(), 15.0);
+  input = fork.Input({ Vector3(-12, -6, 0) });
+  settings = CenterlineSettings();
+  settings.thinBranches = false;
+  EXPECT_EQ(ExtractCenterlines(input, settings).tree.branches.size(), 3u);
+  settings.stepLimit = 1;
+  const CenterlineResult stopped = ExtractCenterlines(input, settings);
+  EXPECT_FALSE(stopped.complete);
+  EXPECT_EQ(stopped.tree.branches.size(), 1u);
+  ASSERT_EQ(stopped.messages.size(), 1u);
+  EXPECT_NE(stopped.messages[0].find("limit of 1 steps"), std::string::npos) << stopped.messages[0];
+  settings.stepLimit = 0;
+  EXPECT_THROW(ExtractCenterlines(input, settings), std::invalid_argument);
 }
 
 TEST(CenterlineExtraction, DegenerateImages)

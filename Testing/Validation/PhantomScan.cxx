@@ -100,9 +100,7 @@ CenterlineTopology TreeOf(const PhantomScan& image, double* seconds)
   input.intensity = &intensity;
   input.seeds = image.seeds;
   input.bridges.assign(image.links.begin(), image.links.end());
-  CenterlineSettings settings;
-  settings.timeLimit = 3600.0; // A slow machine is no other result.
-  const CenterlineResult extracted = ExtractCenterlines(input, settings);
+  const CenterlineResult extracted = ExtractCenterlines(input, CenterlineSettings());
   AddSeconds(seconds, 0, ProcessorSeconds() - start);
   start = ProcessorSeconds();
   CenterlineSet set;
