@@ -87,7 +87,7 @@ PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, d
   return result;
 }
 
-CenterlineTopology TreeOf(const PhantomScan& image, double* seconds)
+CenterlineTopology TreeOf(const PhantomScan& image, double* seconds, double* blur)
 {
   double start = ProcessorSeconds();
   ScalarImage intensity;
@@ -105,6 +105,10 @@ CenterlineTopology TreeOf(const PhantomScan& image, double* seconds)
   const CenterlineResult extracted = ExtractCenterlines(input, settings);
   AddSeconds(seconds, 0, ProcessorSeconds() - start);
   start = ProcessorSeconds();
+  if (blur != nullptr)
+  {
+    *blur = extracted.blur;
+  }
   CenterlineSet set;
   set.points = extracted.tree.points;
   set.radius = extracted.tree.radius;
