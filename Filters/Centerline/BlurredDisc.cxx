@@ -107,4 +107,30 @@ double BlurredBallCentre(double radius)
   return std::erf(radius / std::sqrt(2.0)) -
     std::sqrt(2.0 / M_PI) * radius * std::exp(-0.5 * radius * radius);
 }
+
+double BallHalfMaximum(double radius)
+{
+  // A point's, from where on the closed form loses its digits.
+  if (radius < 0.05)
+  {
+    return std::sqrt(2.0 * std::log(2.0));
+  }
+  const auto profile = [&](double d)
+  {
+    const double root = std::sqrt(2.0);
+    return 0.5 * (std::erf((radius + d) / root) + std::erf((radius - d) / root)) -
+      (std::exp(-0.5 * (radius - d) * (radius - d)) -
+        std::exp(-0.5 * (radius + d) * (radius + d))) /
+      (d * std::sqrt(2.0 * M_PI));
+  };
+  const double half = 0.5 * BlurredBallCentre(radius);
+  double low = 0.1;
+  double high = radius + 3.0;
+  for (int round = 0; round < 50; ++round)
+  {
+    const double d = 0.5 * (low + high);
+    (profile(d) > half ? low : high) = d;
+  }
+  return 0.5 * (low + high);
+}
 }

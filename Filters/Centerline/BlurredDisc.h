@@ -17,6 +17,9 @@ double BlurredDisc(double distance, double radius);
 
 /// Share of a ball's contrast at its centre, radius in standard deviations of the blur.
 double BlurredBallCentre(double radius);
+
+/// Distance at which a blurred ball has half of what it has at its centre; both in standard deviations of the blur.
+double BallHalfMaximum(double radius);
 }
 
 #endif

@@ -13,6 +13,7 @@ namespace coronary
 {
 namespace
 {
+constexpr double DimmestLevel = 0.9;      ///< of the tree's usual one, that thresholds start from
 constexpr double SliceThickness = 3.0;    ///< mm, of Agatston's rule
 constexpr double LeastSliceArea = 1.0;    ///< mm^2, of Agatston's rule
 constexpr double HighestDensity = 3000.0; ///< HU, of what is taken for a deposit's own value
@@ -85,9 +86,15 @@ void ForNeighbours(const Lattice& lattice, std::int64_t offset, const Visit& vis
   }
 }
 
+/// What a voxel has to be brighter than: where the lumen seems dim it may only be blurred.
+double LevelAt(const LumenLevels& levels, std::int64_t point)
+{
+  return std::max(levels.level[point], DimmestLevel * levels.usual);
+}
+
 double ContrastAt(const LumenLevels& levels, std::int64_t point)
 {
-  return std::max(1.0, levels.level[point] - levels.background);
+  return std::max(1.0, LevelAt(levels, point) - levels.background);
 }
 
 /// Voxels above the lower threshold beside the tree, by offset, without labels.
@@ -97,7 +104,7 @@ std::vector<CalciumVoxel> BrightVoxels(const CenterlineTree& tree, const ScalarI
   const Lattice lattice(image);
   const auto threshold = [&](std::size_t p)
   {
-    return levels.level[p] +
+    return LevelAt(levels, static_cast<std::int64_t>(p)) +
       std::max(settings.growShare * ContrastAt(levels, static_cast<std::int64_t>(p)),
         settings.growDeviations * levels.noise);
   };
@@ -251,6 +258,7 @@ public:
     : Tree(tree)
     , Levels(levels)
     , Blur(blur)
+    , Background(levels.background)
   {
     for (std::size_t p = 0; p < tree.points.size(); ++p)
     {
@@ -263,7 +271,7 @@ public:
 
   double At(const Vector3& position) const
   {
-    double value = this->Levels.background;
+    double value = this->Background;
     double nearest = 1e30;
     for (const std::size_t p : this->Near)
     {
@@ -273,23 +281,40 @@ public:
         nearest = distance;
         const double share =
           BlurredDisc(std::sqrt(distance) / this->Blur, this->Tree.radius[p] / this->Blur);
-        value = this->Levels.background + share * (this->Levels.level[p] - this->Levels.background);
+        value = this->Background + share * (this->Levels.level[p] - this->Background);
       }
     }
     return value;
+  }
+
+  /// What lies around vessels here.
+  void SetBackground(double value) { this->Background = value; }
+
+  /// Share of the lumen in what is seen at a position, 0 to 1.
+  double LumenShare(const Vector3& position) const
+  {
+    double share = 0.0;
+    for (const std::size_t p : this->Near)
+    {
+      share = std::max(share,
+        BlurredDisc((this->Tree.points[p] - position).norm() / this->Blur,
+          this->Tree.radius[p] / this->Blur));
+    }
+    return share;
   }
 
 private:
   const CenterlineTree& Tree;
   const LumenLevels& Levels;
   double Blur;
+  double Background;
   std::vector<std::size_t> Near;
 };
 
 /// Density and volume up to half of the object's own contrast.
 void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
   const std::vector<std::int64_t>& own, const Lattice& lattice, const ImageInterpolator& image,
-  const Surroundings& surroundings, double blur)
+  Surroundings& surroundings, double blur)
 {
   // The two brightest voxels together: one alone is the noise's.
   std::vector<std::int64_t> order = own;
@@ -301,17 +326,9 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
         : calcium.voxels[a].offset < calcium.voxels[b].offset;
     });
   const std::size_t top = std::min<std::size_t>(2, order.size());
-  double bright = 0.0;
-  double around = 0.0;
-  for (std::size_t n = 0; n < top; ++n)
-  {
-    const CalciumVoxel& voxel = calcium.voxels[order[n]];
-    bright += voxel.value / static_cast<double>(top);
-    around +=
-      surroundings.At(lattice.PositionOf(lattice.IndexOf(voxel.offset))) / static_cast<double>(top);
-  }
   // The object with all that blur may have made of it, in eighths of voxels.
   std::vector<std::int64_t> region;
+  std::size_t outermost = 0; // of the region, from here on
   {
     std::unordered_map<std::int64_t, bool> member;
     for (const std::int64_t n : own)
@@ -338,14 +355,35 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
           });
       }
       begin = end;
+      outermost = end;
     }
   }
-  struct Part
+  std::vector<double> outside;
+  for (std::size_t n = outermost; n < region.size(); ++n)
   {
-    double value;
-    double without; ///< calcium
-  };
-  std::vector<Part> parts;
+    const Vector3 place = lattice.PositionOf(lattice.IndexOf(region[n]));
+    if (surroundings.LumenShare(place) < 0.05)
+    {
+      outside.push_back(image.At(place));
+    }
+  }
+  if (outside.size() >= 8)
+  {
+    std::nth_element(outside.begin(), outside.begin() + outside.size() / 2, outside.end());
+    surroundings.SetBackground(outside[outside.size() / 2]);
+  }
+  double bright = 0.0;
+  double around = 0.0;
+  for (std::size_t n = 0; n < top; ++n)
+  {
+    const CalciumVoxel& voxel = calcium.voxels[order[n]];
+    bright += voxel.value / static_cast<double>(top);
+    around +=
+      surroundings.At(lattice.PositionOf(lattice.IndexOf(voxel.offset))) / static_cast<double>(top);
+  }
+  // What is brighter than half of the peak, over what would be there, in eighths of voxels.
+  const double excess = std::max(1.0, bright - around);
+  double volume = 0.0;
   for (const std::int64_t offset : region)
   {
     const Vector3 centre = lattice.PositionOf(lattice.IndexOf(offset));
@@ -354,23 +392,22 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
       const Vector3 shift((corner & 1) - 0.5, (corner >> 1 & 1) - 0.5, (corner >> 2) - 0.5);
       const Vector3 place =
         centre + lattice.grid.direction * (0.5 * lattice.grid.spacing.cwiseProduct(shift));
-      parts.push_back({ image.At(place), surroundings.At(place) });
+      volume +=
+        image.At(place) - surroundings.At(place) > 0.5 * excess ? lattice.volume / 8.0 : 0.0;
     }
   }
-  object.density = bright;
-  for (int round = 0; round < 4; ++round)
+  // The ball that shows so much above half of its own peak.
+  const auto volumeOf = [](double radius) { return 4.0 / 3.0 * M_PI * radius * radius * radius; };
+  double low = 0.0;
+  double high = std::cbrt(0.75 / M_PI * volume) / blur + 2.0;
+  for (int round = 0; round < 40; ++round)
   {
-    std::size_t count = 0;
-    for (const Part& part : parts)
-    {
-      // Where the lumen is as bright as the object there is nothing to be told apart.
-      count += part.value > 0.5 * (object.density + part.without) ? 1 : 0;
-    }
-    object.correctedVolume = static_cast<double>(count) * lattice.volume / 8.0;
-    const double radius = std::cbrt(0.75 / M_PI * object.correctedVolume);
-    const double share = std::max(0.4, BlurredBallCentre(radius / blur));
-    object.density = std::min(std::max(HighestDensity, bright), around + (bright - around) / share);
+    const double radius = 0.5 * (low + high);
+    (volumeOf(blur * BallHalfMaximum(radius)) < volume ? low : high) = radius;
   }
+  const double share = std::max(BlurredBallCentre(high), 0.15);
+  object.density = std::min(std::max(HighestDensity, bright), around + excess / share);
+  object.correctedVolume = volumeOf(blur * high);
 }
 }
 
@@ -429,7 +466,7 @@ CalciumMap FindCalcium(const CenterlineTree& tree, const ScalarImage& image,
       const CalciumVoxel& voxel = map.voxels[component.voxels[n]];
       component.firstPoint = std::min(component.firstPoint, voxel.point);
       dense = dense ||
-        static_cast<double>(voxel.value) > levels.level[voxel.point] +
+        static_cast<double>(voxel.value) > LevelAt(levels, voxel.point) +
             std::max(settings.seedShare * ContrastAt(levels, voxel.point),
               settings.seedDeviations * levels.noise);
       ForNeighbours(lattice, voxel.offset,
@@ -537,7 +574,7 @@ void MeasureCalcium(CalciumMap& calcium, const CenterlineTree& tree,
         }
         object.segmentId = tree.segmentId.empty() ? 0 : tree.segmentId[object.point];
         object.score = Score(calcium, own[n], lattice);
-        const Surroundings surroundings(
+        Surroundings surroundings(
           tree, levels, blur, 0.5 * (low + high), 0.5 * (high - low).norm() + 8.0);
         MeasureVolume(object, calcium, own[n], lattice, values, surroundings, blur);
       }

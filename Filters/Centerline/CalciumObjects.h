@@ -50,7 +50,7 @@ struct CalciumObject
   double abscissaStart = 0.0;       ///< mm from the root, along the vessels that it touches
   double abscissaEnd = 0.0;
   double volume = 0.0;          ///< mm^3, of all voxels above the threshold: too large, it blooms
-  double correctedVolume = 0.0; ///< mm^3, up to half its own contrast on each side
+  double correctedVolume = 0.0; ///< mm^3, without blooming
   double peak = 0.0;            ///< image value
   double density = 0.0; ///< image value without blur; above `peak` in small objects, an estimate
   double arc = 0.0;     ///< degrees around the lumen, at its widest section
@@ -81,10 +81,10 @@ CalciumMap FindCalcium(const CenterlineTree& tree, const ScalarImage& image,
 /**
  * Fills the measures of all objects, with the lumen that was found beside them.
  *
- * An object's own value is its peak, lifted by what blur takes from a ball of its size. Its volume goes up to half of
- * what separates it from the lumen on the inside, and from the surroundings outside: there also voxels below the
- * threshold of FindCalcium count. The score takes slices of 3 mm along the patient's z axis and all voxels of the
- * objects, per lesion; with contrast in the vessels it is another measure than Agatston's.
+ * Density and volume without blur are those of a ball with the same peak that shows as much above half of it, over the
+ * lumen on one side and the surroundings on the other. What can not be seen beside the lumen does not
+ * count. The score takes slices of 3 mm along the patient's z axis and all voxels of the object; with contrast in the
+ * vessels it is another measure than Agatston's.
  * @param tree  with the radii and positions of the lumen that is left, and abscissas
  */
 void MeasureCalcium(CalciumMap& calcium, const CenterlineTree& tree,

@@ -17,6 +17,9 @@ constexpr double WideEnough =
 constexpr double Spread = 0.07; ///< of levels, relative; what is farther off counts less
 constexpr double BrightestShare = 1.25; ///< of the tree's median: what is above is calcium
 
+constexpr double LeastShare = 0.75;     ///< of the level upstream: what is below is the blur's
+constexpr double LeastWideLength = 8.0; ///< mm: fewer wide places tell nothing
+
 double Quantile(std::vector<double> values, double share)
 {
   if (values.empty())
@@ -88,6 +91,7 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
   result.background = Quantile(around, 0.1);
   // A tree of thin vessels only: the brightest of them say most.
   const double usual = wide.size() >= 10 ? Quantile(wide, 0.5) : Quantile(thin, 0.9);
+  result.usual = usual;
   for (const VesselPath& path : paths)
   {
     const std::size_t points = path.points.size();
@@ -109,7 +113,7 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
       }
     }
     const double before = path.parent < 0 ? usual : result.level[path.points.front()];
-    if (first >= points || path.arc[last] - path.arc[first] < 3.0)
+    if (first >= points || path.arc[last] - path.arc[first] < LeastWideLength)
     {
       for (std::size_t i = path.parent < 0 ? 0 : 1; i < points; ++i)
       {
@@ -140,7 +144,9 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
     }
     for (std::size_t i = path.parent < 0 ? 0 : 1; i < points; ++i)
     {
-      result.level[path.points[i]] = smooth[std::clamp(i, first, last)];
+      // Blood loses some of its contrast on its way, and gains none.
+      result.level[path.points[i]] = std::clamp(
+        smooth[std::clamp(i, first, last)], LeastShare * before, BrightestShare * before);
     }
   }
   // Noise: single voxels on the axes of wide vessels. Calcium and narrowings are outliers.

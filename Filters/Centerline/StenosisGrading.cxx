@@ -19,9 +19,13 @@ constexpr double ProfileWavelength = 3.0; ///< mm, that the graded profile halve
 constexpr double HealthySpread = 0.06;    ///< relative, of radii around the healthy calibre
 constexpr double MethodError = 0.04;      ///< mm, of a radius, beside the image's noise
 constexpr double BlurError = 0.10;        ///< relative, of small radii: the blur is known no better
-constexpr double TipLength = 6.0;         ///< mm before a vessel's end that are not graded
-constexpr double NormalQuantile = 1.645;  ///< 5 % to either side
-constexpr double OccludedRadius = 0.2;    ///< mm: less is no lumen that can be seen
+constexpr double LongestLesion = 45.0; ///< mm with its shoulders; beyond it is the vessel's calibre
+constexpr double ClosedMargin =
+  1.12;                             ///< that the healthy radius may exceed the wider shoulder's end
+constexpr double TipLength = 6.0;   ///< mm before a vessel's end that are not graded
+constexpr double MouthLength = 2.0; ///< mm behind an ostium that are not graded
+constexpr double NormalQuantile = 1.645; ///< 5 % to either side
+constexpr double OccludedRadius = 0.2;   ///< mm: less is no lumen that can be seen
 
 void Require(bool condition, const char* requirement)
 {
@@ -263,6 +267,31 @@ Reference Regress(const Profile& profile, const std::vector<double>& steps, doub
   return reference;
 }
 
+/// Valleys shorter than `length` samples filled up to their lower shoulder: a vessel that gets narrower and stays so is
+/// a vessel that gets narrower.
+std::vector<double> Closed(const std::vector<double>& values, double length)
+{
+  const auto count = static_cast<std::ptrdiff_t>(values.size());
+  const auto reach = static_cast<std::ptrdiff_t>(std::lround(0.5 * length));
+  std::vector<double> dilated(values.size());
+  std::vector<double> closed(values.size());
+  const auto extreme = [&](const std::vector<double>& from, std::ptrdiff_t i, bool greatest)
+  {
+    const auto first = from.begin() + std::max<std::ptrdiff_t>(0, i - reach);
+    const auto last = from.begin() + std::min(count, i + reach + 1);
+    return greatest ? *std::max_element(first, last) : *std::min_element(first, last);
+  };
+  for (std::ptrdiff_t i = 0; i < count; ++i)
+  {
+    dilated[static_cast<std::size_t>(i)] = extreme(values, i, true);
+  }
+  for (std::ptrdiff_t i = 0; i < count; ++i)
+  {
+    closed[static_cast<std::size_t>(i)] = extreme(dilated, i, false);
+  }
+  return closed;
+}
+
 /// What grading one vessel needs.
 struct GradedPath
 {
@@ -330,6 +359,9 @@ void GradedPath::Describe(
   double deviation = std::hypot(
     MethodError, this->profile.weight[least] > 0.0 ? this->profile.deviation[least] : 0.3 * radius);
   deviation = std::hypot(deviation, BlurError * radius * std::exp(-radius / 0.5));
+  // A part of the wall is behind calcium.
+  deviation =
+    std::hypot(deviation, 0.5 * healthy * this->lumen.calciumArc[this->PointAt(least)] / 360.0);
   const double referenceError = std::hypot(0.03 * healthy, 0.5 * this->spread);
   const double significance = (healthy - radius) / std::hypot(deviation, referenceError);
   if (significance < this->settings.leastSignificance)
@@ -374,13 +406,16 @@ void GradedPath::FindLesions(std::vector<Stenosis>& lesions) const
   const std::size_t count = this->profile.size();
   const auto tip =
     static_cast<std::size_t>(std::min<double>(static_cast<double>(count), TipLength / Fine));
+  // In the mouth of the aorta no section is the vessel's alone.
+  const std::size_t start =
+    this->path.parent < 0 ? static_cast<std::size_t>(std::lround(MouthLength / Fine)) : 0;
   std::vector<char> taken(count, 0);
   for (;;)
   {
     // The worst place that is left, then down to half of it on either side.
     std::size_t least = count;
     double worst = this->settings.leastDegree;
-    for (std::size_t i = 0; i + tip < count; ++i)
+    for (std::size_t i = start; i + tip < count; ++i)
     {
       if (taken[i] == 0 && this->degree[i] >= worst &&
         this->reference[i] >= this->settings.leastReferenceRadius)
@@ -540,10 +575,15 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
     };
     graded.smooth =
       SmoothSequence(graded.profile.radius, graded.profile.weight, ProfileWavelength / Fine);
+    for (double& radius : graded.smooth)
+    {
+      radius = std::max(0.0, radius);
+    }
+    const std::vector<double> open = Closed(graded.smooth, LongestLesion / Fine);
     for (std::size_t i = 0; i < graded.profile.size(); ++i)
     {
-      graded.smooth[i] = std::max(0.0, graded.smooth[i]);
-      graded.reference.push_back(referenceAt(static_cast<double>(i) * Fine));
+      graded.reference.push_back(
+        std::min(referenceAt(static_cast<double>(i) * Fine), ClosedMargin * open[i]));
       graded.degree.push_back(std::clamp(1.0 - graded.smooth[i] / graded.reference[i], 0.0, 1.0));
     }
     for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
@@ -551,12 +591,18 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
       const std::int64_t p = path.points[i];
       const auto sample = std::min(
         graded.profile.size() - 1, static_cast<std::size_t>(std::lround(path.arc[i] / Fine)));
-      result.referenceRadius[p] = referenceAt(path.arc[i]);
+      result.referenceRadius[p] = graded.reference[sample];
       result.degree[p] = lumen.measured[p] > 0.0 || lumen.interpolated[p] != 0 ||
           (!bridged.empty() && bridged[p] != 0)
         ? graded.degree[sample]
         : 0.0;
     }
+    if (getenv("LESDUMP"))
+      for (std::size_t i = 0; i < graded.profile.size(); i += 2)
+        fprintf(stderr, "P%zu seg %d s %.1f raw %.2f dev %.3f smooth %.2f ref %.2f tree %.2f\n", n,
+          tree.segmentId.empty() ? 0 : tree.segmentId[graded.PointAt(i)], i * Fine,
+          graded.profile.radius[i], graded.profile.deviation[i], graded.smooth[i],
+          graded.reference[i], tree.radius[graded.PointAt(i)]); // DUMP
     const std::size_t before = result.lesions.size();
     graded.FindLesions(result.lesions);
     int treeId = 0;
