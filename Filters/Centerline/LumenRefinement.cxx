@@ -17,8 +17,9 @@ namespace coronary
 namespace
 {
 constexpr int Rays = 24;
-constexpr double LeastRadius = 0.05; ///< mm
-constexpr double RingStart = 1.8;    ///< blurs outside of the wall the surroundings begin
+constexpr double LeastRadius = 0.05;        ///< mm
+constexpr double LeastBridgedRadius = 0.25; ///< mm
+constexpr double RingStart = 1.8;           ///< blurs outside of the wall the surroundings begin
 constexpr double RingEnd = 3.0;
 constexpr double CalciumHalo = 2.0; ///< blurs around an object that its blooming changes
 constexpr double LeastRays = 0.4;   ///< share of rays that have to count
@@ -586,9 +587,8 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
     const std::int64_t p = path.points[i];
     const Fit& fit = work.fits[i];
     const bool own = i > 0 || path.parent < 0;
-    const bool bridged = !this->tree.confidence.empty() && this->tree.confidence[p] <= 0.0;
     radii[i] = this->tree.radius[p];
-    if (work.skipped[i] != 0 || bridged)
+    if (work.skipped[i] != 0)
     {
       weights[i] = 1.0 / (0.04 + 0.01 * radii[i] * radii[i]);
       shiftWeights[i] = 1e3;
@@ -659,7 +659,9 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
     const std::int64_t p = path.points[i];
     if (work.skipped[i] == 0)
     {
-      result.radius[p] = std::max(LeastRadius, smooth[i]);
+      const bool bridged = !this->tree.bridged.empty() && this->tree.bridged[p] != 0;
+      // A way across an occlusion stays a vessel.
+      result.radius[p] = std::max(bridged ? LeastBridgedRadius : LeastRadius, smooth[i]);
     }
     if (moved && work.skipped[i] == 0)
     {

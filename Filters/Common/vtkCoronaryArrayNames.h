@@ -51,6 +51,14 @@ constexpr const char* Velocity = "Velocity";         ///< double[3], mm/s
 
 constexpr const char* Visibility = "Visibility"; ///< double, 0 lost .. 1 full contrast
 
+// Centerline tree in an image, point data.
+constexpr const char* StenosisDegree = "StenosisDegree";   ///< double, 0 to 1, by diameter
+constexpr const char* ReferenceRadius = "ReferenceRadius"; ///< double, mm, of the healthy vessel
+constexpr const char* RadiusInterpolated = "RadiusInterpolated"; ///< uchar, 1: hidden by calcium
+constexpr const char* CalciumLabel = "CalciumLabel"; ///< int, object beside the point, 0: none
+constexpr const char* Bridged = "Bridged"; ///< uchar, 1: not seen, guessed across a lesion
+constexpr const char* BridgeConfidence = "BridgeConfidence"; ///< double, 0 to 1
+
 // Points with a meaning of their own (ostia, seeds), point data.
 constexpr const char* Name = "Name";             ///< string
 constexpr const char* Axis = "Axis";             ///< double[3], unit vector

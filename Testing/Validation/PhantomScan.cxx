@@ -119,6 +119,15 @@ CenterlineTopology TreeOf(const PhantomScan& image, double* seconds, double* blu
   }
   CenterlineTopology tree = BuildTopology(set);
   LabelSegments(tree);
+  for (const std::int64_t source : tree.source)
+  {
+    tree.confidence.push_back(extracted.tree.confidence[source]);
+    if (!extracted.tree.bridged.empty())
+    {
+      tree.bridged.push_back(extracted.tree.bridged[source]);
+      tree.bridgeConfidence.push_back(extracted.tree.bridgeConfidence[source]);
+    }
+  }
   AddSeconds(seconds, 1, ProcessorSeconds() - start);
   return tree;
 }

@@ -368,7 +368,8 @@ void Run(const Case& test, const Options& options, Outcome& outcome)
   refined.radius = lumen.radius;
   MeasureTree(refined);
   MeasureCalcium(calcium, refined, paths, image, levels, blur);
-  const StenosisGrading grading = GradeStenoses(refined, paths, lumen);
+  const StenosisGrading grading =
+    GradeStenoses(refined, paths, lumen, refined.bridged, refined.bridgeConfidence);
   CompareLesions(phantom, refined, grading, outcome);
   CompareCalcium(phantom, calcium, outcome);
   CompareRadii(truth, tree, refined, lumen, outcome);
