@@ -17,6 +17,8 @@ constexpr double WideEnough =
 constexpr double Spread = 0.07; ///< of levels, relative; what is farther off counts less
 constexpr double BrightestShare = 1.25; ///< of the tree's median: what is above is calcium
 
+constexpr double UsualShare = 0.7; ///< of the wide places are dimmer: some were only taken for wide
+constexpr double DimmestShare = 0.6;    ///< of the usual contrast: what shows less is no wide lumen
 constexpr double LeastShare = 0.75;     ///< of the level upstream: what is below is the blur's
 constexpr double LeastWideLength = 8.0; ///< mm: fewer wide places tell nothing
 
@@ -90,8 +92,9 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
   }
   result.background = Quantile(around, 0.1);
   // A tree of thin vessels only: the brightest of them say most.
-  const double usual = wide.size() >= 10 ? Quantile(wide, 0.5) : Quantile(thin, 0.9);
+  const double usual = wide.size() >= 10 ? Quantile(wide, UsualShare) : Quantile(thin, 0.9);
   result.usual = usual;
+  std::vector<char> counts(count, 0); // wide, and bright as contrast is
   for (const VesselPath& path : paths)
   {
     const std::size_t points = path.points.size();
@@ -105,9 +108,12 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
       const double r = tree.radius[p] / blur;
       const double share = -std::expm1(-0.5 * r * r);
       own[i] = result.background + (seen[p].lumen - result.background) / std::max(share, 0.5);
-      if (r > WideEnough && own[i] < BrightestShare * usual)
+      const bool bridged = !tree.bridged.empty() && tree.bridged[p] != 0;
+      if (r > WideEnough && own[i] < BrightestShare * usual && !bridged &&
+        own[i] - result.background > DimmestShare * (usual - result.background))
       {
         weights[i] = share * (tree.confidence.empty() ? 1.0 : std::max(0.1, tree.confidence[p]));
+        counts[p] = 1;
         first = std::min(first, i);
         last = i;
       }
@@ -154,7 +160,7 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
   const std::array<int, 3> size = image.Dimensions();
   for (std::size_t p = 0; p < count; ++p)
   {
-    if (tree.radius[p] > 2.5 * blur + 0.5 * values.SmallestSpacing())
+    if (counts[p] != 0 && tree.radius[p] > 2.5 * blur + 0.5 * values.SmallestSpacing())
     {
       const Vector3 index = values.ToIndex(tree.points[p]);
       Vector3 nearest;

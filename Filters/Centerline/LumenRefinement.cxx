@@ -18,6 +18,7 @@ namespace
 {
 constexpr int Rays = 24;
 constexpr double LeastRadius = 0.05;        ///< mm
+constexpr double LeastChange = 0.05;        ///< mm, of a radius: less counts little
 constexpr double LeastBridgedRadius = 0.25; ///< mm
 constexpr double RingStart = 1.8;           ///< blurs outside of the wall the surroundings begin
 constexpr double RingEnd = 3.0;
@@ -531,6 +532,20 @@ Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected)
   Fit best = this->fitter.Measure(position, tangent, prior, reach, beside);
   if (!beside)
   {
+    // A line that was led across a lesion may be much wider than what it runs through.
+    for (const double start : { 0.5 * expected, this->blur })
+    {
+      if (this->IsMeasured(best) && best.misfit < 2.5 * prior.noise)
+      {
+        break;
+      }
+      prior.radius = std::min(start, expected);
+      const Fit fit = this->fitter.Measure(position, tangent, prior, reach, false);
+      if (this->IsMeasured(fit) && (!this->IsMeasured(best) || fit.misfit < 0.8 * best.misfit))
+      {
+        best = fit;
+      }
+    }
     return best;
   }
   // The line may have been drawn onto the calcium: the lumen is looked for beside it.
@@ -660,8 +675,13 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
     if (work.skipped[i] == 0)
     {
       const bool bridged = !this->tree.bridged.empty() && this->tree.bridged[p] != 0;
+      // What is no more than the measurements' error changes nothing.
+      const double change = smooth[i] - this->tree.radius[p];
+      const double error = LeastChange + 0.02 * this->tree.radius[p];
+      const double radius =
+        this->tree.radius[p] + change * change * change / (change * change + error * error);
       // A way across an occlusion stays a vessel.
-      result.radius[p] = std::max(bridged ? LeastBridgedRadius : LeastRadius, smooth[i]);
+      result.radius[p] = std::max(bridged ? LeastBridgedRadius : LeastRadius, radius);
     }
     if (moved && work.skipped[i] == 0)
     {

@@ -597,12 +597,6 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
         ? graded.degree[sample]
         : 0.0;
     }
-    if (getenv("LESDUMP"))
-      for (std::size_t i = 0; i < graded.profile.size(); i += 2)
-        fprintf(stderr, "P%zu seg %d s %.1f raw %.2f dev %.3f smooth %.2f ref %.2f tree %.2f\n", n,
-          tree.segmentId.empty() ? 0 : tree.segmentId[graded.PointAt(i)], i * Fine,
-          graded.profile.radius[i], graded.profile.deviation[i], graded.smooth[i],
-          graded.reference[i], tree.radius[graded.PointAt(i)]); // DUMP
     const std::size_t before = result.lesions.size();
     graded.FindLesions(result.lesions);
     int treeId = 0;

@@ -375,12 +375,6 @@ void Run(const Case& test, const Options& options, Outcome& outcome)
   CompareRadii(truth, tree, refined, lumen, outcome);
   if (options.details)
   {
-    for (const CalciumObject& c : calcium.objects) // DUMP
-      std::fprintf(stderr,
-        "object %d seg %d at %.0f..%.0f mm volume %.2f corrected %.2f peak %.0f density %.0f arc "
-        "%.0f score %.1f\n",
-        c.label, c.segmentId, c.abscissaStart, c.abscissaEnd, c.volume, c.correctedVolume, c.peak,
-        c.density, c.arc, c.score);
     std::fprintf(stderr, "seed %llu: level %.0f background %.0f noise %.1f blur %.3f, %zu voxels\n",
       static_cast<unsigned long long>(test.settings.seed), levels.level.front(), levels.background,
       levels.noise, blur, calcium.voxels.size());
