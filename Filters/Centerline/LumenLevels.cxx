@@ -1,5 +1,6 @@
 #include "LumenLevels.h"
 
+#include "BlurredDisc.h"
 #include "CurveSmoothing.h"
 #include "LumenMeasurement.h"
 
@@ -11,10 +12,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double Wavelength = 50.0; ///< mm, of changes along a vessel that are followed
-constexpr double WideEnough =
-  2.0;                          ///< blurs: of such a radius the centre shows 86 % of the contrast
-constexpr double Spread = 0.07; ///< of levels, relative; what is farther off counts less
+constexpr double Wavelength = 50.0;     ///< mm, of changes along a vessel that are followed
+constexpr double WideEnough = 2.5;      ///< blurs: such a radius shows its contrast at its centre
+constexpr double Spread = 0.07;         ///< of levels, relative; what is farther off counts less
 constexpr double BrightestShare = 1.25; ///< of the tree's median: what is above is calcium
 
 constexpr double UsualShare = 0.7; ///< of the wide places are dimmer: some were only taken for wide
@@ -37,6 +37,7 @@ double Quantile(std::vector<double> values, double share)
 struct PointValues
 {
   double lumen = 0.0;  ///< mean over a small disc
+  double share = 1.0;  ///< of the contrast that blur leaves there
   double around = 0.0; ///< lower quartile of a ring outside of the wall
 };
 
@@ -58,6 +59,9 @@ PointValues ValuesAt(const ImageInterpolator& image, const Vector3& position,
     ring.push_back(image.At(position + (radius + 2.5 * blur) * direction));
   }
   values.lumen /= directions + 1;
+  values.share =
+    (BlurredDisc(0.0, radius / blur) + directions * BlurredDisc(disc / blur, radius / blur)) /
+    (directions + 1);
   values.around = Quantile(ring, 0.25);
   return values;
 }
@@ -106,7 +110,7 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
     {
       const std::int64_t p = path.points[i];
       const double r = tree.radius[p] / blur;
-      const double share = -std::expm1(-0.5 * r * r);
+      const double share = seen[p].share;
       own[i] = result.background + (seen[p].lumen - result.background) / std::max(share, 0.5);
       const bool bridged = !tree.bridged.empty() && tree.bridged[p] != 0;
       if (r > WideEnough && own[i] < BrightestShare * usual && !bridged &&

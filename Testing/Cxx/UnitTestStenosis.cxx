@@ -208,6 +208,7 @@ TEST(LumenRefinement, MeasuresLumensAboveAndBelowTheBlur)
     Tube tube;
     tube.radius = [=](double z) { return z < 25.0 ? 2.0 : radius; };
     tube.Render();
+    SCOPED_TRACE(radius);
     // Widths that were measured in the usual way do not get below the blur.
     CenterlineTree tree = LineWith(2.0, Vector3(0.1, -0.1, 0.0));
     for (std::size_t p = 0; p < tree.points.size(); ++p)
