@@ -56,8 +56,6 @@ constexpr const char* StenosisDegree = "StenosisDegree";   ///< double, 0 to 1, 
 constexpr const char* ReferenceRadius = "ReferenceRadius"; ///< double, mm, of the healthy vessel
 constexpr const char* RadiusInterpolated = "RadiusInterpolated"; ///< uchar, 1: hidden by calcium
 constexpr const char* CalciumLabel = "CalciumLabel"; ///< int, object beside the point, 0: none
-constexpr const char* Bridged = "Bridged"; ///< uchar, 1: not seen, guessed across a lesion
-constexpr const char* BridgeConfidence = "BridgeConfidence"; ///< double, 0 to 1
 
 // Points with a meaning of their own (ostia, seeds), point data.
 constexpr const char* Name = "Name";             ///< string
