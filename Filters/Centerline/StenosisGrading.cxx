@@ -361,7 +361,7 @@ void GradedPath::Describe(
   deviation = std::hypot(deviation, BlurError * radius * std::exp(-radius / 0.5));
   // A part of the wall is behind calcium.
   deviation =
-    std::hypot(deviation, 0.5 * healthy * this->lumen.calciumArc[this->PointAt(least)] / 360.0);
+    std::hypot(deviation, 0.35 * healthy * this->lumen.calciumArc[this->PointAt(least)] / 360.0);
   const double referenceError = std::hypot(0.03 * healthy, 0.5 * this->spread);
   const double significance = (healthy - radius) / std::hypot(deviation, referenceError);
   if (significance < this->settings.leastSignificance)
