@@ -18,6 +18,7 @@ namespace
 {
 constexpr int Rays = 24;
 constexpr double LeastRadius = 0.05;        ///< mm
+constexpr double GreatestGrowth = 1.4;      ///< of a radius by its measurement anew
 constexpr double LeastChange = 0.05;        ///< mm, of a radius: less counts little
 constexpr double LeastBridgedRadius = 0.25; ///< mm
 constexpr double RingStart = 1.8;           ///< blurs outside of the wall the surroundings begin
@@ -608,7 +609,8 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
       weights[i] = 1.0 / (0.04 + 0.01 * radii[i] * radii[i]);
       shiftWeights[i] = 1e3;
     }
-    else if (this->IsMeasured(fit))
+    // Much wider than rays found it: a neighbour without a wall between, no lumen of its own.
+    else if (this->IsMeasured(fit) && fit.radius <= GreatestGrowth * radii[i] + 0.2)
     {
       radii[i] = fit.radius;
       weights[i] = 1.0 / (fit.deviation * fit.deviation + 0.0025);

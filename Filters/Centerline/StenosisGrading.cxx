@@ -22,6 +22,7 @@ constexpr double BlurError = 0.10;        ///< relative, of small radii: the blu
 constexpr double LongestLesion = 45.0; ///< mm with its shoulders; beyond it is the vessel's calibre
 constexpr double ClosedMargin =
   1.12;                             ///< that the healthy radius may exceed the wider shoulder's end
+constexpr double WidestShare = 1.7; ///< of the population's diameter: beyond it little is certain
 constexpr double TipLength = 6.0;   ///< mm before a vessel's end that are not graded
 constexpr double MouthLength = 2.0; ///< mm behind an ostium that are not graded
 constexpr double NormalQuantile = 1.645; ///< 5 % to either side
@@ -392,6 +393,12 @@ void GradedPath::Describe(
   }
   lesion.confidence =
     std::max(0.05, 1.0 - (lesion.degreeHigh - lesion.degreeLow) / 0.8) * bridgeTrust;
+  // An artery is hardly ever so wide: the line may run in something else.
+  if (lesion.populationDiameter > 0.0 &&
+    lesion.referenceDiameter > WidestShare * lesion.populationDiameter)
+  {
+    lesion.confidence *= 0.3;
+  }
   const bool seen = radius > OccludedRadius;
   lesion.kind = !seen && lesion.degree > 0.85 ? LesionKind::Occluded
     : lesion.bridged                          ? LesionKind::Bridged
