@@ -30,6 +30,8 @@ tables=(
   "centerline | validate-centerline --details --invariance | validate-centerline --quick"
   "centerline-coarse | validate-centerline --seeds 205..214 --spacing 0.6 | -"
   "centerline-noisy | validate-centerline --window 140 --noise 40 --spacing 0.5 | -"
+  "stenosis | validate-stenosis --details | validate-stenosis --quick"
+  "stenosis-axes | validate-stenosis --true-axes --seeds 301..310 | -"
   "surface | validate-surface | validate-surface --quick"
   "surface-unseen | validate-surface --seeds 21..50 --variants varied | -"
   "volume | validate-volume | validate-volume --quick"

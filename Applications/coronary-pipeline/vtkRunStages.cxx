@@ -21,6 +21,7 @@
 #include "vtkRunMask.h"
 #include "vtkRunMeshes.h"
 #include "vtkRunMotion.h"
+#include "vtkRunLesions.h"
 #include "vtkRunSurface.h"
 #include "vtkRunTrees.h"
 #include "vtkSurfaceFile.h"
@@ -569,17 +570,34 @@ Json MakeCenterline(RunStep& step)
   }
   centerline->SetInputDataObject(1, seeds);
   vtkNew<vtkCoronaryTreeTopology> topology;
-  topology->SetInputConnection(centerline->GetOutputPort());
   topology->SetRootData(seeds);
   topology->SetLabelSegments(settings.labels);
   UpdateAtTime(centerline, 0, 0.0, step.input.Messages,
-    [&](double fraction) { step.progress(0.5 + 0.4 * fraction); });
+    [&](double fraction) { step.progress(0.5 + 0.3 * fraction); });
+  const auto raw = Detached(centerline->GetOutput());
+  const auto lines = Detached(vtkPolyData::SafeDownCast(
+    centerline->GetOutputDataObject(vtkFastMarchingCenterline::LinesPort)));
+  vtkDataArray* blurs = raw->GetFieldData()->GetArray(vtkCoronaryArrayNames::ImageBlur);
+  const double blur = blurs && blurs->GetNumberOfValues() > 0 ? blurs->GetTuple1(0) : 0.0;
+  if (!step.input.IsSurface())
+  {
+    RefineTreeLumen(raw, lines, step.input.Reference, blur,
+      [&](double fraction) { step.progress(0.8 + 0.05 * fraction); });
+  }
+  topology->SetInputData(raw);
   UpdateAtTime(topology, 0, 0.0, step.input.Messages,
-    [&](double fraction) { step.progress(0.9 + 0.1 * fraction); });
-  vtkPolyData* raw = centerline->GetOutput();
+    [&](double fraction) { step.progress(0.85 + 0.1 * fraction); });
   vtkPolyData* tree = topology->GetOutput();
-  auto* lines = vtkPolyData::SafeDownCast(
-    centerline->GetOutputDataObject(vtkFastMarchingCenterline::LinesPort));
+  if (!step.input.IsSurface())
+  {
+    const TreeLesions lesions = GradeTreeLesions(
+      tree, step.input.Reference, blur, [&] { return step.Add("calcium.mha"); },
+      [&](double fraction) { step.progress(0.95 + 0.05 * fraction); });
+    WriteFileAtomically(step.Add("lesions.csv"), lesions.table);
+    numbers["lesions_file"] = "lesions.csv";
+    numbers["lesions"] = lesions.lesions;
+    numbers["calcium"] = lesions.calcium;
+  }
   auto* forks = vtkPolyData::SafeDownCast(
     topology->GetOutputDataObject(vtkCoronaryTreeTopology::BifurcationPort));
   WritePolyData(step.Add("centerline.vtp"), tree, step.input.Messages);
@@ -1009,7 +1027,7 @@ std::vector<std::string> UsualFiles(const std::string& folder, RunStage from)
     { "vesselness.mha" },
     { "mask.mha", "ostia.vtp", "aorta.vtp", "bridges.vtp" },
     { "given_surface.vtp", "centerline.vtp", "bifurcations.vtp", "centerline_lines.vtp",
-      "status.csv" },
+      "status.csv", "lesions.csv", "calcium.mha" },
     { "surface.vtp", "caps.vtp" },
     { "skeleton.vtp", "skeleton.tgf", "volume.vtu", "volume_boundary.vtp", "volume_skeleton.vtp" },
     { "weights.vtu", "weights.dmat" },

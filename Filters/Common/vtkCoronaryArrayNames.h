@@ -30,7 +30,7 @@ constexpr const char* PhaseTime = "PhaseTime"; ///< double, 1 value, fraction of
 constexpr const char* VesselMask = "VesselMask";               ///< unsigned char, 0 or 1
 constexpr const char* VesselProbability = "VesselProbability"; ///< float, 0 to 1
 // Segmentation, field data.
-constexpr const char* BloodWindow = "BloodWindow"; ///< double, 2 values: tissue, blood
+constexpr const char* BloodWindow = "BloodWindow";   ///< double, 2 values: tissue, blood
 constexpr const char* BridgePoints = "BridgePoints"; ///< double[4], mm and number of the bridge
 constexpr const char* BridgeConfidences = "BridgeConfidences"; ///< double, 0 to 1, one a bridge
 constexpr const char* BridgeUnseen = "BridgeUnseen"; ///< double, mm without a tube, one a bridge
@@ -42,7 +42,8 @@ constexpr const char* VeinProbabilities = "VeinProbabilities"; ///< double, 0.5 
 
 // Centerline tree, point data.
 constexpr const char* Bridged = "Bridged"; ///< unsigned char, 1: not seen, guessed across a lesion
-constexpr const char* BridgeConfidence = "BridgeConfidence"; ///< double, 0 to 1, 1 before any bridge
+constexpr const char* BridgeConfidence =
+  "BridgeConfidence"; ///< double, 0 to 1, 1 before any bridge
 constexpr const char* Radius = "MaximumInscribedSphereRadius"; ///< double, mm
 constexpr const char* Abscissas = "Abscissas";       ///< double, mm from the root along the tree
 constexpr const char* SegmentIds = "SegmentIds";     ///< int, coronary::SegmentId
@@ -50,6 +51,12 @@ constexpr const char* Displacement = "Displacement"; ///< double[3], mm from the
 constexpr const char* Velocity = "Velocity";         ///< double[3], mm/s
 
 constexpr const char* Visibility = "Visibility"; ///< double, 0 lost .. 1 full contrast
+
+// Centerline tree in an image, point data.
+constexpr const char* StenosisDegree = "StenosisDegree";   ///< double, 0 to 1, by diameter
+constexpr const char* ReferenceRadius = "ReferenceRadius"; ///< double, mm, of the healthy vessel
+constexpr const char* RadiusInterpolated = "RadiusInterpolated"; ///< uchar, 1: hidden by calcium
+constexpr const char* CalciumLabel = "CalciumLabel"; ///< int, object beside the point, 0: none
 
 // Points with a meaning of their own (ostia, seeds), point data.
 constexpr const char* Name = "Name";             ///< string

@@ -301,6 +301,45 @@ PhantomTree CoronaryPhantom::Tree(double t) const
   return tree;
 }
 
+std::vector<PhantomStenosis> CoronaryPhantom::Stenoses(double t) const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  std::vector<PhantomStenosis> result;
+  if (anatomy.narrowings.empty())
+  {
+    return result;
+  }
+  const PhantomTree tree = this->Tree(t);
+  for (const Narrowing& narrowing : anatomy.narrowings)
+  {
+    PhantomStenosis stenosis;
+    stenosis.vessel = anatomy.vesselNames[narrowing.vessel];
+    stenosis.point = narrowing.point;
+    stenosis.segmentId = tree.segmentId[narrowing.point];
+    stenosis.position = tree.points[narrowing.point];
+    stenosis.abscissa = tree.abscissa[narrowing.point];
+    stenosis.length = narrowing.width;
+    stenosis.degree = narrowing.degree;
+    stenosis.leastRadius = tree.radius[narrowing.point];
+    stenosis.referenceRadius = stenosis.leastRadius / (1.0 - narrowing.degree);
+    result.push_back(stenosis);
+  }
+  return result;
+}
+
+std::vector<PhantomPlaque> CoronaryPhantom::Plaques(double t) const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  std::vector<PhantomPlaque> result;
+  for (const Plaque& plaque : anatomy.plaques)
+  {
+    result.push_back({ anatomy.vesselNames[plaque.vessel], anatomy.tree.segmentId[plaque.point],
+      plaque.point, anatomy.tree.abscissa[plaque.point], this->Position(plaque.centre, t),
+      plaque.radius, Plaque::Value });
+  }
+  return result;
+}
+
 PhantomTree CoronaryPhantom::Vein(double t) const
 {
   return this->Data->Move(this->Data->Anatomy.vein, t, 1.0);

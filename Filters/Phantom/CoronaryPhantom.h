@@ -169,6 +169,32 @@ struct PhantomOstium
   double radius;    ///< mm
 };
 
+/// A narrowing of a vessel: what a stenosis that was measured is compared with.
+struct PhantomStenosis
+{
+  std::string vessel;           ///< "LAD", "LCx", "RCA", "D1", ...
+  int segmentId = 0;            ///< of the narrowest place
+  std::int64_t point = -1;      ///< of PhantomTree, the narrowest place
+  Vector3 position;             ///< mm, of that point
+  double abscissa = 0.0;        ///< mm from the ostium along the reference tree
+  double length = 0.0;          ///< mm along the vessel, at half the depth of the narrowing
+  double degree = 0.0;          ///< share of the diameter that is gone, 0 to 1
+  double leastRadius = 0.0;     ///< mm, that is left
+  double referenceRadius = 0.0; ///< mm, without the lesion
+};
+
+/// A calcification: a ball whose part inside the lumen is not rendered.
+struct PhantomPlaque
+{
+  std::string vessel;
+  int segmentId = 0;
+  std::int64_t point = -1; ///< of PhantomTree, beside the plaque
+  double abscissa = 0.0;   ///< mm from the ostium along the reference tree
+  Vector3 centre;          ///< mm
+  double radius = 0.0;     ///< mm
+  double value = 0.0;      ///< HU before blurring
+};
+
 /// How a vessel moves over one cycle.
 struct PhantomMotionSummary
 {
@@ -208,6 +234,12 @@ public:
   PhantomTree Vein(double t) const;
 
   std::vector<PhantomOstium> Ostia(double t) const;
+
+  ///@{
+  /// The lesions that PhantomSettings asks for, in the order in which they were placed.
+  std::vector<PhantomStenosis> Stenoses(double t) const;
+  std::vector<PhantomPlaque> Plaques(double t) const;
+  ///@}
 
   /**
    * The lumen's wall. The mesh is made once, at the first call; at time t its points are carried

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <stdexcept>
@@ -856,11 +857,26 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     }
     return std::make_pair(host, s);
   };
+  // Where on which vessel; points of the tree are not known yet.
+  struct Lesion
+  {
+    std::size_t host;
+    double arc;
+    double width;
+  };
+  std::vector<Lesion> narrowed;
+  std::vector<Lesion> calcified;
+  std::vector<std::vector<double>> healthy;
+  for (const DenseVessel& vessel : dense)
+  {
+    healthy.push_back(vessel.radius);
+  }
   RandomStream stenosisRandom(settings.seed, Stenoses);
   for (int n = 0; n < settings.stenoses; ++n)
   {
     const auto [host, position] = pickPlace(stenosisRandom, n, 5.0);
     const double width = stenosisRandom.Uniform(6.0, 12.0) / 2.3548;
+    narrowed.push_back({ host, position, 2.3548 * width });
     DenseVessel& vessel = dense[host];
     for (std::size_t i = 0; i < vessel.points.size(); ++i)
     {
@@ -883,7 +899,9 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     const Vector3 out = std::cos(angle) * side + std::sin(angle) * tangent.cross(side);
     const double radius = plaqueRandom.Uniform(0.5, 1.2);
     this->plaques.push_back(
-      { centre + out * (AtArc(vessel, vessel.radius, position) + 0.5 * radius), radius });
+      { centre + out * (AtArc(vessel, vessel.radius, position) + 0.5 * radius), radius,
+        static_cast<int>(host), -1 });
+    calcified.push_back({ host, position, 2.0 * radius });
   }
   double occlusionStart = 0.0;
   double occlusionEnd = 0.0;
@@ -1000,6 +1018,33 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     {
       cut(v, -1, -1);
     }
+  }
+  const auto nearestPoint = [&](const Lesion& lesion)
+  {
+    const Vector3 place = AtArc(dense[lesion.host], dense[lesion.host].points, lesion.arc);
+    std::int64_t nearest = 0;
+    double least = std::numeric_limits<double>::max();
+    for (std::size_t p = 0; p < this->tree.points.size(); ++p)
+    {
+      const double distance = (this->tree.points[p] - place).squaredNorm();
+      if (this->pointVessel[p] == static_cast<int>(lesion.host) && distance < least)
+      {
+        least = distance;
+        nearest = static_cast<std::int64_t>(p);
+      }
+    }
+    return nearest;
+  };
+  for (const Lesion& lesion : narrowed)
+  {
+    const double left = AtArc(dense[lesion.host], dense[lesion.host].radius, lesion.arc);
+    const double whole = AtArc(dense[lesion.host], healthy[lesion.host], lesion.arc);
+    this->narrowings.push_back(
+      { static_cast<int>(lesion.host), nearestPoint(lesion), lesion.width, 1.0 - left / whole });
+  }
+  for (std::size_t p = 0; p < calcified.size(); ++p)
+  {
+    this->plaques[p].point = nearestPoint(calcified[p]);
   }
   this->tree.displacement.assign(this->tree.points.size(), Vector3::Zero());
   this->tree.velocity.assign(this->tree.points.size(), Vector3::Zero());

@@ -12,8 +12,21 @@ namespace coronary
 /// A calcification on a vessel's wall.
 struct Plaque
 {
-  Vector3 centre; ///< mm, at rest
-  double radius;  ///< mm
+  static constexpr float Value = 850.0f; ///< HU
+
+  Vector3 centre;     ///< mm, at rest
+  double radius;      ///< mm
+  int vessel;         ///< that it lies on
+  std::int64_t point; ///< of the tree, nearest along the vessel
+};
+
+/// A place where a vessel is narrowed on purpose.
+struct Narrowing
+{
+  int vessel;
+  std::int64_t point; ///< of the tree, where it is narrowest
+  double width;       ///< mm along the vessel, at half its depth
+  double degree;      ///< share of the diameter that is gone there, lesions that overlap together
 };
 
 /// A place where a side vessel leaves its parent.
@@ -68,6 +81,7 @@ struct PhantomAnatomy
   std::vector<Junction> junctions;
   std::vector<VesselEnd> ends;
   std::vector<Plaque> plaques;
+  std::vector<Narrowing> narrowings;
   std::vector<std::string> vesselNames;
 
   PhantomTree vein;

@@ -952,7 +952,8 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
                   // Dense calcium blooms.
                   const double blur = std::sqrt(meanBlur * meanBlur + 0.3 * 0.3);
                   const double d = (world - plaque.start).norm() - plaque.radius;
-                  value += NormalIntegral::Of(static_cast<float>(-d / blur)) * (850.0f - value);
+                  value +=
+                    NormalIntegral::Of(static_cast<float>(-d / blur)) * (Plaque::Value - value);
                 }
                 if (step)
                 {

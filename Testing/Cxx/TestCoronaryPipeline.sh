@@ -684,7 +684,7 @@ check_run() {
   sed 's/phase_00/cut/' series/series.json >series/broken.json
   run 0 run series/series.json --scales 0.7 2.5 --until centerline --output result
   for file in vesselness.mha mask.mha ostia.vtp aorta.vtp centerline.vtp bifurcations.vtp \
-    centerline_lines.vtp status.csv report.json; do
+    centerline_lines.vtp status.csv lesions.csv report.json; do
     [ -s "result/$file" ] || fail "no $file"
   done
   expect_text stdout "LCA at"
@@ -695,7 +695,9 @@ check_run() {
   grep -q '"complete": true' result/report.json || fail "the trees are not complete"
   [ "$(grep -cE '^"(LCA|RCA)",.*,0,"reached",[0-9]+,[0-9.]+$' result/status.csv)" = 2 ] \
     || fail "status.csv: $(cat result/status.csv)"
-  for name in SegmentLabel MaximumInscribedSphereRadius Confidence SeedStatus Dominance; do
+  [ "$(head -c 12 result/lesions.csv)" = "vessel,x_mm," ] || fail "lesions.csv: $(cat result/lesions.csv)"
+  for name in SegmentLabel MaximumInscribedSphereRadius Confidence SeedStatus Dominance \
+    StenosisDegree ReferenceRadius RadiusInterpolated CalciumLabel; do
     grep -q "Name=\"$name\"" result/centerline.vtp || fail "no $name in centerline.vtp"
   done
   for name in CenterlineIds TractIds GroupIds Blanking; do

@@ -87,7 +87,7 @@ PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, d
   return result;
 }
 
-CenterlineTopology TreeOf(const PhantomScan& image, double* seconds)
+CenterlineTopology TreeOf(const PhantomScan& image, double* seconds, double* blur)
 {
   double start = ProcessorSeconds();
   ScalarImage intensity;
@@ -103,6 +103,10 @@ CenterlineTopology TreeOf(const PhantomScan& image, double* seconds)
   const CenterlineResult extracted = ExtractCenterlines(input, CenterlineSettings());
   AddSeconds(seconds, 0, ProcessorSeconds() - start);
   start = ProcessorSeconds();
+  if (blur != nullptr)
+  {
+    *blur = extracted.blur;
+  }
   CenterlineSet set;
   set.points = extracted.tree.points;
   set.radius = extracted.tree.radius;
@@ -113,6 +117,15 @@ CenterlineTopology TreeOf(const PhantomScan& image, double* seconds)
   }
   CenterlineTopology tree = BuildTopology(set);
   LabelSegments(tree);
+  for (const std::int64_t source : tree.source)
+  {
+    tree.confidence.push_back(extracted.tree.confidence[source]);
+    if (!extracted.tree.bridged.empty())
+    {
+      tree.bridged.push_back(extracted.tree.bridged[source]);
+      tree.bridgeConfidence.push_back(extracted.tree.bridgeConfidence[source]);
+    }
+  }
   AddSeconds(seconds, 1, ProcessorSeconds() - start);
   return tree;
 }

@@ -35,7 +35,9 @@ PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, d
   bool trueOstia, double* seconds = nullptr);
 
 /// @param seconds  null, or room for 2 processor times: extraction, topology and names
-CenterlineTopology TreeOf(const PhantomScan& image, double* seconds = nullptr);
+/// @param blur     null, or room for the standard deviation of the image's blur as the extraction found it, mm
+CenterlineTopology TreeOf(
+  const PhantomScan& image, double* seconds = nullptr, double* blur = nullptr);
 }
 
 #endif

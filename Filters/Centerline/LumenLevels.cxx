@@ -1,0 +1,189 @@
+#include "LumenLevels.h"
+
+#include "BlurredDisc.h"
+#include "CurveSmoothing.h"
+#include "LumenMeasurement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Wavelength = 50.0;     ///< mm, of changes along a vessel that are followed
+constexpr double WideEnough = 2.5;      ///< blurs: such a radius shows its contrast at its centre
+constexpr double Spread = 0.07;         ///< of levels, relative; what is farther off counts less
+constexpr double BrightestShare = 1.25; ///< of the tree's median: what is above is calcium
+
+constexpr double UsualShare = 0.7; ///< of the wide places are dimmer: some were only taken for wide
+constexpr double DimmestShare = 0.6;    ///< of the usual contrast: what shows less is no wide lumen
+constexpr double LeastShare = 0.75;     ///< of the level upstream: what is below is the blur's
+constexpr double LeastWideLength = 8.0; ///< mm: fewer wide places tell nothing
+
+double Quantile(std::vector<double> values, double share)
+{
+  if (values.empty())
+  {
+    return 0.0;
+  }
+  const auto at =
+    values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+struct PointValues
+{
+  double lumen = 0.0;  ///< mean over a small disc
+  double share = 1.0;  ///< of the contrast that blur leaves there
+  double around = 0.0; ///< lower quartile of a ring outside of the wall
+};
+
+PointValues ValuesAt(const ImageInterpolator& image, const Vector3& position,
+  const Vector3& tangent, double radius, double blur)
+{
+  constexpr int directions = 12;
+  const Vector3 u = tangent.unitOrthogonal();
+  const Vector3 v = tangent.cross(u);
+  PointValues values;
+  values.lumen = image.At(position);
+  std::vector<double> ring;
+  const double disc = std::min(0.4 * radius, image.SmallestSpacing());
+  for (int i = 0; i < directions; ++i)
+  {
+    const double angle = 2.0 * M_PI * i / directions;
+    const Vector3 direction = std::cos(angle) * u + std::sin(angle) * v;
+    values.lumen += image.At(position + disc * direction);
+    ring.push_back(image.At(position + (radius + 2.5 * blur) * direction));
+  }
+  values.lumen /= directions + 1;
+  values.share =
+    (BlurredDisc(0.0, radius / blur) + directions * BlurredDisc(disc / blur, radius / blur)) /
+    (directions + 1);
+  values.around = Quantile(ring, 0.25);
+  return values;
+}
+}
+
+LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+  const ScalarImage& image, double blur)
+{
+  CheckTree(tree);
+  if (!(blur > 0.0) || !std::isfinite(blur))
+  {
+    throw std::invalid_argument("MeasureLumenLevels: the image's blur must be positive");
+  }
+  const ImageInterpolator values(image);
+  LumenLevels result;
+  const std::size_t count = tree.points.size();
+  result.level.assign(count, 0.0);
+  std::vector<PointValues> seen(count);
+  std::vector<double> wide;
+  std::vector<double> around;
+  std::vector<double> thin;
+  for (const VesselPath& path : paths)
+  {
+    const std::vector<Vector3> tangents = PathTangents(tree, path, 1.0);
+    for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
+    {
+      const std::int64_t p = path.points[i];
+      seen[p] = ValuesAt(values, tree.points[p], tangents[i], tree.radius[p], blur);
+      around.push_back(seen[p].around);
+      (tree.radius[p] > WideEnough * blur ? wide : thin).push_back(seen[p].lumen);
+    }
+  }
+  result.background = Quantile(around, 0.1);
+  // A tree of thin vessels only: the brightest of them say most.
+  const double usual = wide.size() >= 10 ? Quantile(wide, UsualShare) : Quantile(thin, 0.9);
+  result.usual = usual;
+  std::vector<char> counts(count, 0); // wide, and bright as contrast is
+  for (const VesselPath& path : paths)
+  {
+    const std::size_t points = path.points.size();
+    std::vector<double> own(points, 0.0);
+    std::vector<double> weights(points, 0.0);
+    std::size_t first = points;
+    std::size_t last = 0;
+    for (std::size_t i = 0; i < points; ++i)
+    {
+      const std::int64_t p = path.points[i];
+      const double r = tree.radius[p] / blur;
+      const double share = seen[p].share;
+      own[i] = result.background + (seen[p].lumen - result.background) / std::max(share, 0.5);
+      const bool bridged = !tree.bridged.empty() && tree.bridged[p] != 0;
+      if (r > WideEnough && own[i] < BrightestShare * usual && !bridged &&
+        own[i] - result.background > DimmestShare * (usual - result.background))
+      {
+        weights[i] = share * (tree.confidence.empty() ? 1.0 : std::max(0.1, tree.confidence[p]));
+        counts[p] = 1;
+        first = std::min(first, i);
+        last = i;
+      }
+    }
+    const double before = path.parent < 0 ? usual : result.level[path.points.front()];
+    if (first >= points || path.arc[last] - path.arc[first] < LeastWideLength)
+    {
+      for (std::size_t i = path.parent < 0 ? 0 : 1; i < points; ++i)
+      {
+        result.level[path.points[i]] = before;
+      }
+      continue;
+    }
+    const double step = std::max(1e-6, path.arc.back() / static_cast<double>(points - 1));
+    // At its origin a vessel has its parent's blood.
+    if (path.parent >= 0)
+    {
+      own[0] = before;
+      weights[0] = 4.0 / step;
+      first = 0;
+    }
+    std::vector<double> smooth;
+    std::vector<double> robust = weights;
+    double scale = 0.3;
+    for (int pass = 0; pass < 6; ++pass)
+    {
+      smooth = SmoothSequence(own, robust, Wavelength / step);
+      scale = std::max(Spread, 0.5 * scale);
+      for (std::size_t i = 0; i < points; ++i)
+      {
+        const double residual = (own[i] - smooth[i]) / (scale * std::max(std::abs(usual), 1.0));
+        robust[i] = weights[i] / ((1.0 + residual * residual) * (1.0 + residual * residual));
+      }
+    }
+    for (std::size_t i = path.parent < 0 ? 0 : 1; i < points; ++i)
+    {
+      // Blood loses some of its contrast on its way, and gains none.
+      result.level[path.points[i]] = std::clamp(
+        smooth[std::clamp(i, first, last)], LeastShare * before, BrightestShare * before);
+    }
+  }
+  // Noise: single voxels on the axes of wide vessels. Calcium and narrowings are outliers.
+  std::vector<double> deviations;
+  const std::array<int, 3> size = image.Dimensions();
+  for (std::size_t p = 0; p < count; ++p)
+  {
+    if (counts[p] != 0 && tree.radius[p] > 2.5 * blur + 0.5 * values.SmallestSpacing())
+    {
+      const Vector3 index = values.ToIndex(tree.points[p]);
+      Vector3 nearest;
+      bool inside = true;
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        nearest[axis] = std::round(index[axis]);
+        inside = inside && nearest[axis] >= image.grid.extent[2 * axis] &&
+          nearest[axis] < image.grid.extent[2 * axis] + size[axis];
+      }
+      if (inside)
+      {
+        deviations.push_back(
+          std::abs(values.At(image.grid.IndexToWorld(nearest[0], nearest[1], nearest[2])) -
+            result.level[p]));
+      }
+    }
+  }
+  result.noise = deviations.size() >= 10 ? 1.4826 * Quantile(deviations, 0.5) : 0.05 * usual;
+  return result;
+}
+}

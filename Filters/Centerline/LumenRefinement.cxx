@@ -1,0 +1,793 @@
+#include "LumenRefinement.h"
+
+#include "BlurredDisc.h"
+#include "CurveSmoothing.h"
+#include "LumenMeasurement.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <unordered_set>
+
+namespace coronary
+{
+namespace
+{
+constexpr int Rays = 24;
+constexpr double LeastRadius = 0.05;        ///< mm
+constexpr double GreatestGrowth = 1.4;      ///< of a radius by its measurement anew
+constexpr double LeastChange = 0.05;        ///< mm, of a radius: less counts little
+constexpr double LeastBridgedRadius = 0.25; ///< mm
+constexpr double RingStart = 1.8;           ///< blurs outside of the wall the surroundings begin
+constexpr double RingEnd = 3.0;
+constexpr double CalciumHalo = 2.0; ///< blurs around an object that its blooming changes
+constexpr double LeastRays = 0.4;   ///< share of rays that have to count
+
+void Require(bool condition, const char* requirement)
+{
+  if (!condition)
+  {
+    throw std::invalid_argument(std::string("RefinementSettings: ") + requirement);
+  }
+}
+
+/// Values of a section in polar coordinates around a place.
+struct PolarSection
+{
+  Vector3 centre;
+  Vector3 u;
+  Vector3 v;
+  double step = 0.0; ///< mm between samples of a ray
+  int count = 0;     ///< samples a ray; the first lies half a step from the centre
+  std::vector<float> values;
+  std::vector<char> hidden; ///< by calcium
+
+  double Distance(int sample) const { return (sample + 0.5) * this->step; }
+  std::size_t At(int ray, int sample) const
+  {
+    return static_cast<std::size_t>(ray) * this->count + sample;
+  }
+};
+
+struct Fit
+{
+  bool found = false;
+  double x = 0.0; ///< mm from the section's centre
+  double y = 0.0;
+  double radius = 0.0;    ///< mm
+  double deviation = 0.0; ///< mm
+  double level = 0.0;
+  double misfit = 1e30;   ///< root mean square, image values
+  double hiddenArc = 0.0; ///< degrees of the wall behind calcium
+};
+
+struct Prior
+{
+  double radius = 1.0; ///< mm, where the search begins
+  double level = 0.0;
+  double levelDeviation = 0.0;
+  double shift = 0.3; ///< mm, standard deviation of the centre
+  double noise = 10.0;
+};
+
+class SectionFitter
+{
+public:
+  SectionFitter(const ScalarImage& image, double blur, double background,
+    const std::unordered_set<std::int64_t>& hidden)
+    : Image(image)
+    , Grid(image.grid)
+    , Size(image.Dimensions())
+    , Blur(blur)
+    , Background(background)
+    , Hidden(hidden)
+  {
+  }
+
+  Fit Measure(const Vector3& position, const Vector3& tangent, const Prior& prior, double reach,
+    bool calcium) const
+  {
+    const PolarSection section = this->Sample(position, tangent, reach, calcium);
+    Fit fit;
+    fit.radius = prior.radius;
+    fit.level = prior.level;
+    for (int round = 0; round < 5; ++round)
+    {
+      std::array<double, Rays> around;
+      std::array<char, Rays> counts;
+      if (!this->MeasureAround(section, fit, around, counts) ||
+        !this->Solve(section, prior, around, counts, fit))
+      {
+        fit.found = false;
+        break;
+      }
+    }
+    fit.hiddenArc = this->HiddenArc(section, fit);
+    return fit;
+  }
+
+private:
+  PolarSection Sample(
+    const Vector3& position, const Vector3& tangent, double reach, bool calcium) const
+  {
+    PolarSection section;
+    section.centre = position;
+    section.u = tangent.unitOrthogonal();
+    section.v = tangent.cross(section.u);
+    section.step = 0.4 * this->Image.SmallestSpacing();
+    section.count = std::max(4, static_cast<int>(std::ceil(reach / section.step)));
+    section.values.resize(static_cast<std::size_t>(Rays) * section.count);
+    section.hidden.assign(section.values.size(), 0);
+    for (int ray = 0; ray < Rays; ++ray)
+    {
+      const double angle = 2.0 * M_PI * ray / Rays;
+      const Vector3 direction = std::cos(angle) * section.u + std::sin(angle) * section.v;
+      for (int s = 0; s < section.count; ++s)
+      {
+        const Vector3 place = position + section.Distance(s) * direction;
+        section.values[section.At(ray, s)] = static_cast<float>(this->Image.At(place));
+        section.hidden[section.At(ray, s)] = calcium && this->IsHidden(place) ? 1 : 0;
+      }
+    }
+    return section;
+  }
+
+  bool IsHidden(const Vector3& place) const
+  {
+    const Vector3 index = this->Image.ToIndex(place);
+    std::int64_t offset = 0;
+    for (int axis = 2; axis >= 0; --axis)
+    {
+      const std::int64_t n = std::llround(index[axis]) - this->Grid.extent[2 * axis];
+      if (n < 0 || n >= this->Size[axis])
+      {
+        return false;
+      }
+      offset = offset * this->Size[axis] + n;
+    }
+    return this->Hidden.count(offset) > 0;
+  }
+
+  /// From the fitted centre along a ray of the section to the same angle: the distance from the centre.
+  static double DistanceFrom(const Fit& fit, double x, double y)
+  {
+    return std::hypot(x - fit.x, y - fit.y);
+  }
+
+  /// What lies behind the wall, without what the lumen's blur adds there, for each ray.
+  bool MeasureAround(const PolarSection& section, const Fit& fit, std::array<double, Rays>& around,
+    std::array<char, Rays>& counts) const
+  {
+    const double contrast = std::max(1.0, fit.level - this->Background);
+    // Air behind fat is no part of the wall.
+    const double floor = this->Background - 0.1 * contrast;
+    std::array<double, Rays> own;
+    std::vector<double> known;
+    for (int ray = 0; ray < Rays; ++ray)
+    {
+      const double angle = 2.0 * M_PI * ray / Rays;
+      double sum = 0.0;
+      double weight = 0.0;
+      int all = 0;
+      for (int s = 0; s < section.count; ++s)
+      {
+        const double rho = section.Distance(s);
+        const double d =
+          DistanceFrom(fit, rho * std::cos(angle), rho * std::sin(angle)) - fit.radius;
+        if (d < RingStart * this->Blur || d > RingEnd * this->Blur)
+        {
+          continue;
+        }
+        ++all;
+        if (section.hidden[section.At(ray, s)] != 0)
+        {
+          continue;
+        }
+        const double share = BlurredDisc((d + fit.radius) / this->Blur, fit.radius / this->Blur);
+        const double value =
+          (section.values[section.At(ray, s)] - share * fit.level) / (1.0 - share);
+        sum += std::max(floor, value);
+        weight += 1.0;
+      }
+      counts[ray] = weight > 0.5 * all && all > 0 ? 1 : 0;
+      own[ray] = counts[ray] != 0 ? sum / weight : 0.0;
+      if (counts[ray] != 0)
+      {
+        known.push_back(own[ray]);
+      }
+    }
+    if (static_cast<double>(known.size()) < LeastRays * Rays)
+    {
+      return false;
+    }
+    std::nth_element(known.begin(), known.begin() + known.size() / 2, known.end());
+    const double usual = known[known.size() / 2];
+    // A branch or a neighbour: no wall to be seen there.
+    for (int ray = 0; ray < Rays; ++ray)
+    {
+      if (counts[ray] != 0 && own[ray] > usual + 0.4 * (fit.level - usual))
+      {
+        counts[ray] = 0;
+      }
+    }
+    int left = 0;
+    for (int ray = 0; ray < Rays; ++ray)
+    {
+      double sum = 0.0;
+      int neighbours = 0;
+      for (const int side : { -1, 0, 1 })
+      {
+        const int other = (ray + side + Rays) % Rays;
+        if (counts[other] != 0)
+        {
+          sum += own[other];
+          ++neighbours;
+        }
+      }
+      around[ray] = neighbours > 0 ? sum / neighbours : usual;
+      left += counts[ray];
+    }
+    return left >= LeastRays * Rays;
+  }
+
+  /// Gauss-Newton for centre, radius and level, with surroundings that are given.
+  bool Solve(const PolarSection& section, const Prior& prior,
+    const std::array<double, Rays>& around, const std::array<char, Rays>& counts, Fit& fit) const
+  {
+    using Matrix4 = Eigen::Matrix4d;
+    using Vector4 = Eigen::Vector4d;
+    // Noise is the same over about a voxel: so many independent values there are.
+    const double correlated = std::max(0.9 * this->Image.SmallestSpacing(), this->Blur);
+    const double patch = 4.0 * M_PI * correlated * correlated;
+    const double most = section.count * section.step - RingStart * this->Blur;
+    double noise = std::max(prior.noise, 1e-6);
+    for (int iteration = 0; iteration < 4; ++iteration)
+    {
+      Matrix4 normal = Matrix4::Zero();
+      Vector4 right = Vector4::Zero();
+      double squares = 0.0;
+      double area = 0.0;
+      for (int ray = 0; ray < Rays; ++ray)
+      {
+        if (counts[ray] == 0)
+        {
+          continue;
+        }
+        const double angle = 2.0 * M_PI * ray / Rays;
+        const double c = std::cos(angle);
+        const double s = std::sin(angle);
+        for (int n = 0; n < section.count; ++n)
+        {
+          const double rho = section.Distance(n);
+          const double dx = rho * c - fit.x;
+          const double dy = rho * s - fit.y;
+          const double distance = std::hypot(dx, dy);
+          if (distance > fit.radius + RingStart * this->Blur)
+          {
+            if (rho > fit.radius + std::hypot(fit.x, fit.y) + RingStart * this->Blur)
+            {
+              break;
+            }
+            continue;
+          }
+          const std::size_t at = section.At(ray, n);
+          if (section.hidden[at] != 0)
+          {
+            continue;
+          }
+          const double contrast = fit.level - around[ray];
+          const double e = 0.02;
+          const double d = distance / this->Blur;
+          const double r = fit.radius / this->Blur;
+          const double share = BlurredDisc(d, r);
+          const double byDistance = (BlurredDisc(d + e, r) - BlurredDisc(std::max(0.0, d - e), r)) /
+            (d + e - std::max(0.0, d - e)) / this->Blur;
+          const double byRadius = (BlurredDisc(d, r + e) - BlurredDisc(d, std::max(0.0, r - e))) /
+            (r + e - std::max(0.0, r - e)) / this->Blur;
+          const double residual = section.values[at] - (around[ray] + share * contrast);
+          const double inverse = distance > 1e-9 ? 1.0 / distance : 0.0;
+          const Vector4 row(-contrast * byDistance * dx * inverse,
+            -contrast * byDistance * dy * inverse, contrast * byRadius, share);
+          // What fits badly is something else.
+          const double far = residual / (4.0 * noise);
+          const double weight =
+            rho * section.step * (2.0 * M_PI / Rays) / patch / (1.0 + far * far);
+          normal += weight * row * row.transpose();
+          right += weight * residual * row;
+          squares += weight * residual * residual;
+          area += weight;
+        }
+      }
+      if (!(area > 0.0))
+      {
+        return false;
+      }
+      fit.misfit = std::sqrt(squares / area);
+      noise = std::max(prior.noise, fit.misfit);
+      const double precision = 1.0 / (noise * noise);
+      Matrix4 information = precision * normal;
+      Vector4 gradient = precision * right;
+      const double held = 1.0 / (prior.shift * prior.shift);
+      information(0, 0) += held;
+      information(1, 1) += held;
+      gradient[0] -= held * fit.x;
+      gradient[1] -= held * fit.y;
+      const double known = 1.0 / (prior.levelDeviation * prior.levelDeviation);
+      information(3, 3) += known;
+      gradient[3] += known * (prior.level - fit.level);
+      // A radius of which nothing is seen is not determined.
+      information(2, 2) += 1e-2;
+      const Matrix4 covariance = information.inverse();
+      Vector4 change = covariance * gradient;
+      const double step = 0.5 * std::max(fit.radius, this->Blur);
+      for (int n = 0; n < 3; ++n)
+      {
+        change[n] = std::clamp(change[n], -step, step);
+      }
+      fit.x += change[0];
+      fit.y += change[1];
+      fit.radius = std::clamp(fit.radius + change[2], LeastRadius, std::max(LeastRadius, most));
+      fit.level += change[3];
+      fit.deviation = std::sqrt(std::max(0.0, covariance(2, 2)));
+      fit.found = std::isfinite(fit.radius) && std::isfinite(fit.x) && std::isfinite(fit.y);
+      if (!fit.found)
+      {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  double HiddenArc(const PolarSection& section, const Fit& fit) const
+  {
+    int rays = 0;
+    for (int ray = 0; ray < Rays; ++ray)
+    {
+      const double angle = 2.0 * M_PI * ray / Rays;
+      for (int n = 0; n < section.count; ++n)
+      {
+        const double rho = section.Distance(n);
+        const double d =
+          DistanceFrom(fit, rho * std::cos(angle), rho * std::sin(angle)) - fit.radius;
+        if (std::abs(d) < this->Blur && section.hidden[section.At(ray, n)] != 0)
+        {
+          ++rays;
+          break;
+        }
+      }
+    }
+    return 360.0 * rays / Rays;
+  }
+
+  ImageInterpolator Image;
+  ImageGrid Grid;
+  std::array<int, 3> Size;
+  double Blur;
+  double Background;
+  const std::unordered_set<std::int64_t>& Hidden;
+};
+
+/// The objects' voxels with those that their blooming reaches.
+std::unordered_set<std::int64_t> HiddenVoxels(
+  const CalciumMap& calcium, const ScalarImage& image, double blur)
+{
+  const std::array<int, 3> size = image.Dimensions();
+  const double reach = CalciumHalo * blur;
+  std::array<std::int64_t, 3> extent;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    extent[axis] = static_cast<std::int64_t>(reach / image.grid.spacing[axis]);
+  }
+  std::unordered_set<std::int64_t> hidden;
+  for (const CalciumVoxel& voxel : calcium.voxels)
+  {
+    const std::array<std::int64_t, 3> n{ voxel.offset % size[0], voxel.offset / size[0] % size[1],
+      voxel.offset / size[0] / size[1] };
+    for (std::int64_t k = -extent[2]; k <= extent[2]; ++k)
+    {
+      for (std::int64_t j = -extent[1]; j <= extent[1]; ++j)
+      {
+        for (std::int64_t i = -extent[0]; i <= extent[0]; ++i)
+        {
+          const Vector3 offset = image.grid.spacing.cwiseProduct(
+            Vector3(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)));
+          const std::array<std::int64_t, 3> m{ n[0] + i, n[1] + j, n[2] + k };
+          if (offset.norm() <= reach && m[0] >= 0 && m[1] >= 0 && m[2] >= 0 && m[0] < size[0] &&
+            m[1] < size[1] && m[2] < size[2])
+          {
+            hidden.insert((m[2] * size[1] + m[1]) * size[0] + m[0]);
+          }
+        }
+      }
+    }
+  }
+  return hidden;
+}
+
+/// Whether a section lies in the lumen of the vessel that this one leaves.
+bool InParent(
+  const CenterlineTree& tree, const VesselPath& parent, const Vector3& position, double margin)
+{
+  for (const std::int64_t p : parent.points)
+  {
+    const double reach = tree.radius[p] + margin;
+    if ((tree.points[p] - position).squaredNorm() < reach * reach)
+    {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// What a path was measured to be, before anything is smoothed.
+struct PathWork
+{
+  const VesselPath* path = nullptr;
+  std::vector<Vector3> tangents;
+  std::vector<char> skipped; ///< in a mouth, or bridged
+  std::vector<char> besideCalcium;
+  std::vector<Fit> fits;
+};
+}
+
+void RefinementSettings::Validate() const
+{
+  Require(this->levelUncertainty >= 0.005 && this->levelUncertainty <= 0.5,
+    "levelUncertainty must be from 0.005 to 0.5");
+  Require(
+    this->wavelength >= 0.5 && this->wavelength <= 50.0, "wavelength must be from 0.5 to 50 mm");
+  Require(this->greatestArc >= 30.0 && this->greatestArc <= 300.0,
+    "greatestArc must be from 30 to 300 degrees");
+}
+
+namespace
+{
+/// The parts of a refinement that all sections share.
+struct Refiner
+{
+  const CenterlineTree& tree;
+  const LumenLevels& levels;
+  const CalciumMap& calcium;
+  const ScalarImage& image;
+  double blur;
+  const RefinementSettings& settings;
+  SectionFitter fitter;
+
+  void Prepare(PathWork& work, const std::vector<VesselPath>& paths, RefinedLumen& result) const;
+  std::vector<double> ExpectedRadii(const PathWork& work) const;
+  Fit MeasureAt(const PathWork& work, std::size_t place, double expected) const;
+  void Finish(const PathWork& work, RefinedLumen& result) const;
+  bool IsMeasured(const Fit& fit) const
+  {
+    return fit.found && fit.hiddenArc <= this->settings.greatestArc &&
+      fit.deviation < std::max(fit.radius, this->blur);
+  }
+};
+
+void Refiner::Prepare(
+  PathWork& work, const std::vector<VesselPath>& paths, RefinedLumen& result) const
+{
+  const VesselPath& path = *work.path;
+  const std::size_t count = path.points.size();
+  work.tangents = PathTangents(this->tree, path, 1.25);
+  work.skipped.assign(count, 0);
+  work.besideCalcium.assign(count, 0);
+  work.fits.assign(count, {});
+  bool inMouth = path.parent >= 0;
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    const std::int64_t p = path.points[i];
+    inMouth = inMouth &&
+      InParent(this->tree, paths[path.parent], this->tree.points[p], 0.5 * this->tree.radius[p]);
+    work.skipped[i] = inMouth ? 1 : 0;
+    work.besideCalcium[i] = result.calcium[p] != 0 ? 1 : 0;
+  }
+}
+
+/// Where calcium may have been taken for lumen the radius follows from the vessel before and behind it.
+std::vector<double> Refiner::ExpectedRadii(const PathWork& work) const
+{
+  const VesselPath& path = *work.path;
+  const std::size_t count = path.points.size();
+  std::vector<double> radii(count);
+  std::vector<double> weights(count, 1.0);
+  bool any = false;
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    radii[i] = this->tree.radius[path.points[i]];
+    weights[i] = work.besideCalcium[i] != 0 ? 1e-3 : 1.0;
+    any = any || work.besideCalcium[i] != 0;
+  }
+  if (!any)
+  {
+    return radii;
+  }
+  const double step = std::max(1e-6, path.arc.back() / static_cast<double>(count - 1));
+  std::vector<double> smooth = SmoothSequence(radii, weights, 10.0 / step);
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    radii[i] = work.besideCalcium[i] != 0
+      ? std::clamp(smooth[i], 0.5 * radii[i], std::max(radii[i], 0.5 * radii[i]))
+      : radii[i];
+  }
+  return radii;
+}
+
+Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected) const
+{
+  const std::int64_t p = work.path->points[place];
+  const Vector3& tangent = work.tangents[place];
+  const double contrast = std::max(1.0, this->levels.level[p] - this->levels.background);
+  const bool beside = work.besideCalcium[place] != 0;
+  Prior prior;
+  prior.radius = expected;
+  prior.level = this->levels.level[p];
+  prior.levelDeviation = this->settings.levelUncertainty * contrast;
+  prior.shift = std::max(0.25, 0.25 * expected);
+  prior.noise = std::max(this->levels.noise, 0.01 * contrast);
+  const double reach = 1.25 * expected + (RingEnd + 1.0) * this->blur + 0.5;
+  const Vector3& position = this->tree.points[p];
+  Fit best = this->fitter.Measure(position, tangent, prior, reach, beside);
+  if (!beside)
+  {
+    // A line that was led across a lesion may be much wider than what it runs through.
+    for (const double start : { 0.5 * expected, this->blur })
+    {
+      if (this->IsMeasured(best) && best.misfit < 2.5 * prior.noise)
+      {
+        break;
+      }
+      prior.radius = std::min(start, expected);
+      const Fit fit = this->fitter.Measure(position, tangent, prior, reach, false);
+      if (this->IsMeasured(fit) && (!this->IsMeasured(best) || fit.misfit < 0.8 * best.misfit))
+      {
+        best = fit;
+      }
+    }
+    return best;
+  }
+  // The line may have been drawn onto the calcium: the lumen is looked for beside it.
+  const Vector3 u = tangent.unitOrthogonal();
+  const Vector3 v = tangent.cross(u);
+  const auto cost = [&](const Fit& fit)
+  {
+    return !this->IsMeasured(fit)
+      ? 1e30
+      : std::pow(fit.misfit / prior.noise, 2) + std::pow(std::log(fit.radius / expected) / 0.3, 2) +
+        std::pow((fit.level - prior.level) / prior.levelDeviation, 2) +
+        std::pow(std::hypot(fit.x, fit.y) / std::max(0.8, expected), 2);
+  };
+  double least = cost(best);
+  for (const double away : { 0.5, 1.0 })
+  {
+    for (int side = 0; side < 8; ++side)
+    {
+      const double distance = away * std::max(0.8, expected);
+      const double x = distance * std::cos(0.25 * M_PI * side);
+      const double y = distance * std::sin(0.25 * M_PI * side);
+      Fit fit = this->fitter.Measure(position + x * u + y * v, tangent, prior, reach, true);
+      fit.x += x;
+      fit.y += y;
+      // Another lumen than this one is none of its.
+      if (cost(fit) < 0.8 * least && std::hypot(fit.x, fit.y) < expected + fit.radius)
+      {
+        least = cost(fit);
+        best = fit;
+      }
+    }
+  }
+  return best;
+}
+
+/// Radii and positions of a path from its sections.
+void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
+{
+  const VesselPath& path = *work.path;
+  const std::size_t count = path.points.size();
+  const double step = std::max(1e-6, path.arc.back() / static_cast<double>(count - 1));
+  std::vector<double> radii(count);
+  std::vector<double> weights(count);
+  std::array<std::vector<double>, 3> shifts;
+  std::vector<double> shiftWeights(count, 0.0);
+  for (std::vector<double>& shift : shifts)
+  {
+    shift.assign(count, 0.0);
+  }
+  bool moved = false;
+  double total = 0.0;
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    const std::int64_t p = path.points[i];
+    const Fit& fit = work.fits[i];
+    const bool own = i > 0 || path.parent < 0;
+    radii[i] = this->tree.radius[p];
+    if (work.skipped[i] != 0)
+    {
+      weights[i] = 1.0 / (0.04 + 0.01 * radii[i] * radii[i]);
+      shiftWeights[i] = 1e3;
+    }
+    // Much wider than rays found it: a neighbour without a wall between, no lumen of its own.
+    else if (this->IsMeasured(fit) && fit.radius <= GreatestGrowth * radii[i] + 0.2)
+    {
+      radii[i] = fit.radius;
+      weights[i] = 1.0 / (fit.deviation * fit.deviation + 0.0025);
+      shiftWeights[i] = 1.0;
+      if (work.besideCalcium[i] != 0)
+      {
+        const Vector3 u = work.tangents[i].unitOrthogonal();
+        const Vector3 shift = fit.x * u + fit.y * work.tangents[i].cross(u);
+        for (int axis = 0; axis < 3; ++axis)
+        {
+          shifts[axis][i] = shift[axis];
+        }
+        moved = true;
+      }
+      if (own)
+      {
+        result.measured[p] = fit.radius;
+        result.deviation[p] = fit.deviation;
+      }
+    }
+    else if (work.besideCalcium[i] != 0)
+    {
+      weights[i] = 1e-6;
+      shiftWeights[i] = 1e-3;
+      if (own)
+      {
+        result.interpolated[p] = 1;
+      }
+    }
+    else
+    {
+      // Not round, or not alone: as it was found.
+      weights[i] = 1.0 / (0.04 + 0.01 * radii[i] * radii[i]);
+      shiftWeights[i] = 1e3;
+    }
+    if (own)
+    {
+      result.calciumArc[p] = work.besideCalcium[i] != 0 ? fit.hiddenArc : 0.0;
+    }
+    total += weights[i];
+  }
+  if (total < 1e-3)
+  {
+    return; // Nothing but calcium.
+  }
+  std::vector<double> smooth = SmoothSequence(radii, weights, this->settings.wavelength / step);
+  std::vector<double> robust = weights;
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    const double far = (radii[i] - smooth[i]) / (0.1 * std::max(smooth[i], this->blur));
+    robust[i] /= 1.0 + far * far;
+  }
+  smooth = SmoothSequence(radii, robust, this->settings.wavelength / step);
+  if (moved)
+  {
+    for (std::vector<double>& shift : shifts)
+    {
+      shift = SmoothSequence(shift, shiftWeights, this->settings.wavelength / step);
+    }
+  }
+  for (std::size_t i = path.parent < 0 ? 0 : 1; i < count; ++i)
+  {
+    const std::int64_t p = path.points[i];
+    if (work.skipped[i] == 0)
+    {
+      const bool bridged = !this->tree.bridged.empty() && this->tree.bridged[p] != 0;
+      // What is no more than the measurements' error changes nothing.
+      const double change = smooth[i] - this->tree.radius[p];
+      const double error = LeastChange + 0.02 * this->tree.radius[p];
+      const double radius =
+        this->tree.radius[p] + change * change * change / (change * change + error * error);
+      // A way across an occlusion stays a vessel.
+      result.radius[p] = std::max(bridged ? LeastBridgedRadius : LeastRadius, radius);
+    }
+    if (moved && work.skipped[i] == 0)
+    {
+      result.points[p] += Vector3(shifts[0][i], shifts[1][i], shifts[2][i]);
+    }
+  }
+}
+
+/// The object beside each point: within the blooming around its lumen.
+std::vector<int> LabelsBeside(
+  const CenterlineTree& tree, const CalciumMap& calcium, const ScalarImage& image, double blur)
+{
+  std::vector<Vector3> positions;
+  positions.reserve(calcium.voxels.size());
+  const std::array<int, 3> size = image.Dimensions();
+  for (const CalciumVoxel& voxel : calcium.voxels)
+  {
+    positions.push_back(
+      image.grid.IndexToWorld(static_cast<double>(voxel.offset % size[0] + image.grid.extent[0]),
+        static_cast<double>(voxel.offset / size[0] % size[1] + image.grid.extent[2]),
+        static_cast<double>(voxel.offset / size[0] / size[1] + image.grid.extent[4])));
+  }
+  const double margin = (CalciumHalo + 1.0) * blur + 0.5 * image.grid.spacing.maxCoeff();
+  std::vector<int> labels(tree.points.size(), 0);
+  ParallelFor(static_cast<std::int64_t>(tree.points.size()), 64,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t p = first; p < last; ++p)
+      {
+        double nearest = std::pow(tree.radius[p] + margin, 2);
+        for (std::size_t v = 0; v < positions.size(); ++v)
+        {
+          const double distance = (positions[v] - tree.points[p]).squaredNorm();
+          if (distance < nearest)
+          {
+            nearest = distance;
+            labels[p] = calcium.voxels[v].label;
+          }
+        }
+      }
+    });
+  return labels;
+}
+}
+
+RefinedLumen RefineLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+  const ScalarImage& image, const LumenLevels& levels, const CalciumMap& calcium, double blur,
+  const RefinementSettings& settings, const ProgressCallback& progress)
+{
+  settings.Validate();
+  CheckTree(tree);
+  if (!(blur > 0.0) || !std::isfinite(blur))
+  {
+    throw std::invalid_argument("RefineLumen: the image's blur must be positive");
+  }
+  const std::size_t count = tree.points.size();
+  RefinedLumen result;
+  result.points = tree.points;
+  result.radius = tree.radius;
+  result.measured.assign(count, 0.0);
+  result.deviation.assign(count, 0.0);
+  result.calciumArc.assign(count, 0.0);
+  result.interpolated.assign(count, 0);
+  result.calcium = LabelsBeside(tree, calcium, image, blur);
+  const std::unordered_set<std::int64_t> hidden = HiddenVoxels(calcium, image, blur);
+  const Refiner refiner{ tree, levels, calcium, image, blur, settings,
+    SectionFitter(image, blur, levels.background, hidden) };
+  struct Place
+  {
+    std::size_t path;
+    std::size_t point;
+  };
+  std::vector<PathWork> works(paths.size());
+  std::vector<std::vector<double>> expected;
+  std::vector<Place> places;
+  for (std::size_t n = 0; n < paths.size(); ++n)
+  {
+    works[n].path = &paths[n];
+    refiner.Prepare(works[n], paths, result);
+    expected.push_back(refiner.ExpectedRadii(works[n]));
+    for (std::size_t i = 0; i < paths[n].points.size(); ++i)
+    {
+      if (works[n].skipped[i] == 0)
+      {
+        places.push_back({ n, i });
+      }
+    }
+  }
+  ParallelFor(
+    static_cast<std::int64_t>(places.size()), 16,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const Place& place = places[n];
+        works[place.path].fits[place.point] =
+          refiner.MeasureAt(works[place.path], place.point, expected[place.path][place.point]);
+      }
+    },
+    progress);
+  for (const PathWork& work : works)
+  {
+    refiner.Finish(work, result);
+  }
+  return result;
+}
+}

@@ -1,0 +1,57 @@
+/**
+ * @file LumenRefinement.h
+ * @brief Centre and radius of the lumen that is left, beside calcium and in narrowings.
+ *
+ * Half-maximum widths can not get smaller than the blur, and the calcium's edge is not the lumen's. So in each section
+ * a blurred disc is fitted whose brightness is known from the wide parts of the vessel (LumenLevels): a lumen that is
+ * smaller than the blur is measured by how much of that brightness is left, a larger one by its width, and one method
+ * goes over into the other. What calcium and its blooming cover does not count.
+ */
+#ifndef DynamicCoronary_LumenRefinement_h
+#define DynamicCoronary_LumenRefinement_h
+
+#include "CalciumObjects.h"
+
+namespace coronary
+{
+struct RefinementSettings
+{
+  double levelUncertainty =
+    0.06; ///< of the contrast's brightness at a place, relative, 0.005 to 0.5
+  double wavelength =
+    3.0; ///< mm along a vessel that smoothing halves in the refined radii, 0.5 to 50
+  double greatestArc =
+    180.0; ///< degrees of the wall behind calcium beyond which nothing is measured
+
+  /// @throws std::invalid_argument that names the first setting out of range
+  void Validate() const;
+};
+
+/// One value a point of the tree.
+struct RefinedLumen
+{
+  std::vector<Vector3> points; ///< mm; as given except beside calcium
+  std::vector<double>
+    radius; ///< mm, the measured ones lightly smoothed, across what was not measured interpolated
+  std::vector<double> measured;   ///< mm, in the point's own section; 0: not measured
+  std::vector<double> deviation;  ///< mm, standard deviation of `measured`; 0 where there is none
+  std::vector<double> calciumArc; ///< degrees of the wall that calcium hides
+  std::vector<unsigned char>
+    interpolated;           ///< 1: the lumen can not be seen, the radius is its neighbours'
+  std::vector<int> calcium; ///< label of the object beside the point, 0: none
+};
+
+/**
+ * Measures all sections of a tree anew.
+ *
+ * Sections in the mouth of a branch keep their radius; they are neither measured nor interpolated. Where the tree is
+ * marked as bridged the radius does not get smaller than 0.25 mm, so that a vessel stays.
+ * @param blur  standard deviation of the image's blur, mm, positive
+ * @throws std::invalid_argument as CheckTree, or for settings out of range; Cancelled
+ */
+RefinedLumen RefineLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+  const ScalarImage& image, const LumenLevels& levels, const CalciumMap& calcium, double blur,
+  const RefinementSettings& settings = {}, const ProgressCallback& progress = {});
+}
+
+#endif

@@ -1,0 +1,458 @@
+// Lumen, calcium and stenoses in images of straight blurred tubes, whose values are known in closed form.
+
+#include "BlurredDisc.h"
+#include "CalciumObjects.h"
+#include "CoronaryPhantom.h"
+#include "LumenLevels.h"
+#include "LumenRefinement.h"
+#include "Refusals.h"
+#include "StenosisGrading.h"
+#include "VesselPaths.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+using namespace coronary;
+
+namespace
+{
+constexpr double Blur = 0.4;        // mm
+constexpr double Lumen = 400.0;     // HU
+constexpr double Fat = -80.0;       // HU
+constexpr double Calcium = 1100.0;  // HU
+constexpr double TubeLength = 60.0; // mm
+constexpr double Spacing = 0.4;     // mm
+
+struct Ball
+{
+  Vector3 centre;
+  double radius;
+};
+
+/// A tube along z through (0, 0), 60 mm long, in fat; balls of calcium painted over what is outside of its lumen.
+struct Tube
+{
+  std::function<double(double)> radius;
+  std::vector<Ball> balls;
+  double brightness = Lumen;
+
+  std::vector<float> values;
+  ScalarImage image;
+
+  void Render()
+  {
+    ImageGrid& grid = this->image.grid;
+    const int half = 18;
+    const auto slices = static_cast<int>(TubeLength / Spacing) + 21;
+    grid.extent = { 0, 2 * half, 0, 2 * half, 0, slices - 1 };
+    grid.spacing = Vector3::Constant(Spacing);
+    grid.origin = Vector3(-half * Spacing, -half * Spacing, -10 * Spacing);
+    this->values.resize(static_cast<std::size_t>(this->image.NumberOfVoxels()));
+    std::size_t at = 0;
+    for (int k = 0; k < slices; ++k)
+    {
+      for (int j = 0; j <= 2 * half; ++j)
+      {
+        for (int i = 0; i <= 2 * half; ++i, ++at)
+        {
+          const Vector3 p = grid.IndexToWorld(i, j, k);
+          double value = Fat;
+          for (const Ball& ball : this->balls)
+          {
+            const double distance = (p - ball.centre).norm() - ball.radius;
+            value += 0.5 * std::erfc(distance / (std::sqrt(2.0) * Blur)) * (Calcium - value);
+          }
+          const double share = BlurredDisc(
+            std::hypot(p[0], p[1]) / Blur, this->radius(std::clamp(p[2], 0.0, TubeLength)) / Blur);
+          this->values[at] = static_cast<float>(value + share * (this->brightness - value));
+        }
+      }
+    }
+    this->image.values = static_cast<const float*>(this->values.data());
+  }
+};
+
+/// One branch along the tube, with the given radius everywhere.
+CenterlineTree LineWith(double radius, const Vector3& off = Vector3::Zero())
+{
+  CenterlineTree tree;
+  CenterlineTree::Branch branch;
+  branch.segmentId = MidLAD;
+  for (double z = 0.0; z <= TubeLength; z += 0.25)
+  {
+    branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
+    tree.points.push_back(off + Vector3(0.0, 0.0, z));
+    tree.radius.push_back(radius);
+    tree.segmentId.push_back(MidLAD);
+  }
+  tree.branches.push_back(branch);
+  MeasureTree(tree);
+  return tree;
+}
+
+struct Measured
+{
+  LumenLevels levels;
+  CalciumMap calcium;
+  RefinedLumen lumen;
+  StenosisGrading grading;
+};
+
+Measured MeasureAll(const Tube& tube, const CenterlineTree& tree)
+{
+  Measured result;
+  const std::vector<VesselPath> paths = VesselPaths(tree);
+  result.levels = MeasureLumenLevels(tree, paths, tube.image, Blur);
+  result.calcium = FindCalcium(tree, tube.image, result.levels);
+  result.lumen = RefineLumen(tree, paths, tube.image, result.levels, result.calcium, Blur);
+  CenterlineTree refined = tree;
+  refined.points = result.lumen.points;
+  refined.radius = result.lumen.radius;
+  MeasureTree(refined);
+  MeasureCalcium(result.calcium, refined, paths, tube.image, result.levels, Blur);
+  result.grading = GradeStenoses(refined, paths, result.lumen);
+  return result;
+}
+
+Tube Narrowed(double healthy, double degree)
+{
+  Tube tube;
+  tube.radius = [=](double z)
+  { return healthy * (1.0 - degree * std::exp(-0.5 * std::pow((z - 30.0) / 3.4, 2))); };
+  tube.Render();
+  return tube;
+}
+}
+
+TEST(BlurredDisc, HasTheDiscsAreaAndItsCentre)
+{
+  for (const double radius : { 0.1, 0.5, 1.0, 3.0, 7.0 })
+  {
+    double sum = 0.0;
+    const double step = 0.01;
+    for (double d = 0.5 * step; d < radius + 4.9; d += step)
+    {
+      sum += 2.0 * M_PI * d * step * BlurredDisc(d, radius);
+    }
+    EXPECT_NEAR(sum, M_PI * radius * radius, 0.01 * M_PI * radius * radius) << radius;
+    EXPECT_NEAR(BlurredDisc(0.0, radius), 1.0 - std::exp(-0.5 * radius * radius), 2e-3) << radius;
+  }
+  EXPECT_EQ(BlurredDisc(1.0, 0.0), 0.0);
+  // Where the table ends and a nearly straight edge begins.
+  for (const double off : { -1.5, 0.0, 1.5 })
+  {
+    EXPECT_NEAR(BlurredDisc(7.85 + off, 7.85), BlurredDisc(7.95 + off, 7.95), 5e-3) << off;
+  }
+}
+
+TEST(BlurredDisc, BallsHaveTheirLimits)
+{
+  EXPECT_NEAR(BlurredBallCentre(6.0), 1.0, 1e-6);
+  // A small one: its volume times the density of the normal distribution in the middle.
+  EXPECT_NEAR(BlurredBallCentre(0.1), 4.0 / 3.0 * M_PI * 1e-3 * std::pow(2.0 * M_PI, -1.5), 1e-6);
+  EXPECT_NEAR(BallHalfMaximum(0.01), std::sqrt(2.0 * std::log(2.0)), 1e-3);
+  EXPECT_NEAR(BallHalfMaximum(0.06), std::sqrt(2.0 * std::log(2.0)), 1e-2);
+  EXPECT_NEAR(BallHalfMaximum(10.0), 10.0, 0.2);
+}
+
+TEST(VesselPaths, TheNameCarriesAVesselOn)
+{
+  // A trunk, a wide straight daughter and a thin one that turns off.
+  CenterlineTree tree;
+  const auto line = [&](int id, int parent, int segment, const Vector3& to, double radius)
+  {
+    CenterlineTree::Branch branch;
+    branch.groupId = id;
+    branch.parentGroupId = parent;
+    branch.segmentId = segment;
+    Vector3 from = Vector3::Zero();
+    if (parent >= 0)
+    {
+      branch.points.push_back(tree.branches[0].points.back());
+      from = tree.points[tree.branches[0].points.back()];
+    }
+    for (int i = parent >= 0 ? 1 : 0; i <= 20; ++i)
+    {
+      branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
+      tree.points.emplace_back(from + to * i / 20.0);
+      tree.radius.push_back(radius);
+    }
+    tree.branches.push_back(branch);
+  };
+  line(0, -1, 0, Vector3(0.0, 0.0, 20.0), 2.0);
+  line(1, 0, 0, Vector3(0.0, 0.0, 20.0), 1.8);
+  line(2, 0, 0, Vector3(20.0, 0.0, 0.0), 1.2);
+  std::vector<VesselPath> paths = VesselPaths(tree);
+  ASSERT_EQ(paths.size(), 2U);
+  EXPECT_EQ(paths[0].points.back(), tree.branches[1].points.back());
+  EXPECT_NEAR(paths[0].arc.back(), 40.0, 1e-9);
+  EXPECT_EQ(paths[0].forks, std::vector<std::size_t>{ 20 });
+  EXPECT_EQ(paths[1].parent, 0);
+  EXPECT_EQ(paths[1].points.front(), tree.branches[0].points.back());
+  tree.branches[0].segmentId = LeftMain;
+  tree.branches[1].segmentId = ProximalLCx;
+  tree.branches[2].segmentId = ProximalLAD;
+  paths = VesselPaths(tree);
+  EXPECT_EQ(paths[0].points.back(), tree.branches[2].points.back());
+}
+
+TEST(LumenRefinement, MeasuresLumensAboveAndBelowTheBlur)
+{
+  for (const double radius : { 0.3, 0.5, 0.8, 1.5, 2.5 })
+  {
+    // A wide vessel that ends thin: the wide part tells how bright contrast is.
+    Tube tube;
+    tube.radius = [=](double z) { return z < 25.0 ? 2.0 : radius; };
+    tube.Render();
+    SCOPED_TRACE(radius);
+    // Widths that were measured in the usual way do not get below the blur.
+    CenterlineTree tree = LineWith(2.0, Vector3(0.1, -0.1, 0.0));
+    for (std::size_t p = 0; p < tree.points.size(); ++p)
+    {
+      tree.radius[p] = tree.points[p][2] < 25.0 ? 2.0 : std::max(0.7, 1.2 * radius);
+    }
+    const Measured measured = MeasureAll(tube, tree);
+    for (std::size_t p = 0; p < tree.points.size(); ++p)
+    {
+      const double z = tree.points[p][2];
+      if (z > 32.0 && z < 55.0)
+      {
+        EXPECT_NEAR(measured.lumen.measured[p], radius, 0.05 + 0.02 * radius) << z;
+        EXPECT_NEAR(measured.levels.level[p], Lumen, 12.0);
+      }
+    }
+  }
+}
+
+TEST(StenosisGrading, DegreesAreThoseOfTheTube)
+{
+  for (const double degree : { 0.4, 0.6, 0.75, 0.85 })
+  {
+    const Tube tube = Narrowed(1.6, degree);
+    const Measured measured = MeasureAll(tube, LineWith(1.5));
+    ASSERT_EQ(measured.grading.lesions.size(), 1U) << degree;
+    const Stenosis& lesion = measured.grading.lesions.front();
+    EXPECT_NEAR(lesion.degree, degree, 0.05);
+    EXPECT_NEAR(lesion.areaDegree, 1.0 - std::pow(1.0 - lesion.degree, 2), 1e-12);
+    EXPECT_NEAR(lesion.position[2], 30.0, 1.0);
+    EXPECT_NEAR(lesion.referenceDiameter, 3.2, 0.15);
+    EXPECT_NEAR(lesion.length, 8.0, 2.0);
+    EXPECT_LE(lesion.degreeLow, degree);
+    EXPECT_GE(lesion.degreeHigh, degree);
+    EXPECT_EQ(lesion.kind, LesionKind::Soft);
+    EXPECT_EQ(lesion.segmentId, MidLAD);
+    EXPECT_FALSE(lesion.bridged);
+    // The tree's own radius follows.
+    const double least =
+      *std::min_element(measured.lumen.radius.begin() + 40, measured.lumen.radius.end() - 40);
+    EXPECT_NEAR(least, 1.6 * (1.0 - degree), 0.1);
+  }
+}
+
+TEST(StenosisGrading, TaperingVesselsHaveNoLesion)
+{
+  Tube tube;
+  tube.radius = [](double z) { return 2.0 - 0.018 * z; };
+  tube.Render();
+  const Measured measured = MeasureAll(tube, LineWith(1.5));
+  EXPECT_TRUE(measured.grading.lesions.empty());
+  // Nor one that gets narrower within a few millimetres and stays so.
+  tube.radius = [](double z) { return z < 25.0 ? 2.0 : std::max(1.0, 2.0 - 0.1 * (z - 25.0)); };
+  tube.Render();
+  EXPECT_TRUE(MeasureAll(tube, LineWith(1.5)).grading.lesions.empty());
+}
+
+TEST(StenosisGrading, BridgedLesionsSaySo)
+{
+  const Tube tube = Narrowed(1.6, 0.9);
+  CenterlineTree tree = LineWith(1.5);
+  const std::vector<VesselPath> paths = VesselPaths(tree);
+  const Measured measured = MeasureAll(tube, tree);
+  std::vector<unsigned char> bridged(tree.points.size(), 0);
+  std::vector<double> confidence(tree.points.size(), 1.0);
+  for (std::size_t p = 110; p < 130; ++p)
+  {
+    bridged[p] = 1;
+    confidence[p] = 0.6;
+  }
+  const StenosisGrading plain = GradeStenoses(tree, paths, measured.lumen);
+  const StenosisGrading grading = GradeStenoses(tree, paths, measured.lumen, bridged, confidence);
+  ASSERT_EQ(grading.lesions.size(), 1U);
+  ASSERT_EQ(plain.lesions.size(), 1U);
+  EXPECT_TRUE(grading.lesions.front().bridged);
+  EXPECT_NEAR(grading.lesions.front().confidence, 0.6 * plain.lesions.front().confidence, 1e-9);
+  EXPECT_TRUE(grading.lesions.front().kind == LesionKind::Bridged ||
+    grading.lesions.front().kind == LesionKind::Occluded);
+}
+
+TEST(CalciumObjects, BallsBesideTheLumenAreMeasuredAndTheLumenStays)
+{
+  Tube tube;
+  tube.radius = [](double) { return 1.5; };
+  tube.balls = { { Vector3(2.4, 0.0, 20.0), 1.0 }, { Vector3(0.0, -2.5, 42.0), 0.8 } };
+  tube.Render();
+  // The line was drawn towards the first one.
+  CenterlineTree tree = LineWith(1.5);
+  for (Vector3& point : tree.points)
+  {
+    point[0] += 0.8 * std::exp(-0.5 * std::pow((point[2] - 20.0) / 2.0, 2));
+  }
+  MeasureTree(tree);
+  const Measured measured = MeasureAll(tube, tree);
+  ASSERT_EQ(measured.calcium.objects.size(), 2U);
+  for (std::size_t n = 0; n < 2; ++n)
+  {
+    const CalciumObject& object = measured.calcium.objects[n];
+    const Ball& ball = tube.balls[n];
+    EXPECT_LT((object.centre - ball.centre).norm(), 0.4);
+    const double volume = 4.0 / 3.0 * M_PI * std::pow(ball.radius, 3);
+    EXPECT_NEAR(object.correctedVolume, volume, 0.45 * volume);
+    EXPECT_NEAR(object.density, Calcium, 150.0);
+    EXPECT_EQ(object.segmentId, MidLAD);
+    EXPECT_NEAR(0.5 * (object.abscissaStart + object.abscissaEnd), ball.centre[2], 1.0);
+    EXPECT_GT(object.arc, 30.0);
+    EXPECT_LT(object.arc, 150.0);
+  }
+  EXPECT_GT(measured.calcium.objects[0].volume, measured.calcium.objects[1].volume);
+  for (std::size_t p = 20; p + 20 < tree.points.size(); ++p)
+  {
+    EXPECT_NEAR(measured.lumen.radius[p], 1.5, 0.15) << tree.points[p][2];
+  }
+  // The point that was farthest off.
+  const auto at = static_cast<std::size_t>(20.0 / 0.25);
+  EXPECT_LT(std::hypot(measured.lumen.points[at][0], measured.lumen.points[at][1]), 0.25);
+  EXPECT_EQ(measured.lumen.calcium[at], 1);
+  EXPECT_TRUE(measured.grading.lesions.empty());
+  // Voxels find themselves.
+  const CalciumVoxel& voxel = measured.calcium.voxels.front();
+  EXPECT_EQ(measured.calcium.Find(voxel.offset), 0);
+  EXPECT_EQ(measured.calcium.Find(voxel.offset + 1000000), -1);
+}
+
+TEST(CalciumObjects, WhatCalciumEnclosesIsInterpolatedAndSaid)
+{
+  Tube tube;
+  tube.radius = [](double) { return 1.2; };
+  for (int side = 0; side < 8; ++side)
+  {
+    const double angle = 0.25 * M_PI * side;
+    tube.balls.push_back({ Vector3(2.0 * std::cos(angle), 2.0 * std::sin(angle), 30.0), 1.0 });
+  }
+  tube.Render();
+  const Measured measured = MeasureAll(tube, LineWith(1.2));
+  ASSERT_EQ(measured.calcium.objects.size(), 1U);
+  EXPECT_GT(measured.calcium.objects.front().arc, 300.0);
+  const auto at = static_cast<std::size_t>(30.0 / 0.25);
+  EXPECT_EQ(measured.lumen.interpolated[at], 1);
+  EXPECT_EQ(measured.lumen.measured[at], 0.0);
+  EXPECT_NEAR(measured.lumen.radius[at], 1.2, 0.2);
+  EXPECT_EQ(measured.lumen.interpolated[40], 0);
+}
+
+TEST(CalciumObjects, NoiseAndContrastAreNoCalcium)
+{
+  Tube tube;
+  tube.radius = [](double) { return 1.5; };
+  tube.Render();
+  // A checkerboard of 30 HU: noise that is the same everywhere.
+  for (std::size_t n = 0; n < tube.values.size(); ++n)
+  {
+    tube.values[n] += n % 2 == 0 ? 30.0F : -30.0F;
+  }
+  const Measured measured = MeasureAll(tube, LineWith(1.5));
+  EXPECT_TRUE(measured.calcium.objects.empty());
+  // As if it were normal: the median of its size times 1.48.
+  EXPECT_NEAR(measured.levels.noise, 44.0, 8.0);
+}
+
+TEST(CalciumObjects, AgatstonsWeights)
+{
+  EXPECT_EQ(AgatstonWeight(129.0), 0);
+  EXPECT_EQ(AgatstonWeight(130.0), 1);
+  EXPECT_EQ(AgatstonWeight(199.0), 1);
+  EXPECT_EQ(AgatstonWeight(200.0), 2);
+  EXPECT_EQ(AgatstonWeight(399.0), 3);
+  EXPECT_EQ(AgatstonWeight(1500.0), 4);
+}
+
+TEST(StenosisGrading, TheSameOnAnyNumberOfThreads)
+{
+  Tube tube = Narrowed(1.6, 0.7);
+  tube.balls = { { Vector3(2.4, 0.0, 20.0), 1.0 } };
+  tube.Render();
+  const CenterlineTree tree = LineWith(1.5);
+  SetNumberOfThreads(1);
+  const Measured one = MeasureAll(tube, tree);
+  SetNumberOfThreads(4);
+  const Measured four = MeasureAll(tube, tree);
+  SetNumberOfThreads(0);
+  EXPECT_EQ(one.lumen.radius, four.lumen.radius);
+  EXPECT_EQ(one.lumen.calcium, four.lumen.calcium);
+  EXPECT_EQ(one.grading.degree, four.grading.degree);
+  EXPECT_EQ(
+    one.calcium.objects.front().correctedVolume, four.calcium.objects.front().correctedVolume);
+}
+
+TEST(StenosisGrading, RefusesWhatItCanNotUse)
+{
+  const Tube tube = Narrowed(1.6, 0.5);
+  const CenterlineTree tree = LineWith(1.5);
+  const std::vector<VesselPath> paths = VesselPaths(tree);
+  ExpectRefusal([&] { MeasureLumenLevels(tree, paths, tube.image, 0.0); }, "blur");
+  const LumenLevels levels = MeasureLumenLevels(tree, paths, tube.image, Blur);
+  CalciumSettings calcium;
+  calcium.wallDistance = 0.0;
+  ExpectRefusal([&] { FindCalcium(tree, tube.image, levels, calcium); }, "wallDistance");
+  RefinementSettings refinement;
+  refinement.wavelength = 0.0;
+  ExpectRefusal(
+    [&] { RefineLumen(tree, paths, tube.image, levels, {}, Blur, refinement); }, "wavelength");
+  GradingSettings grading;
+  grading.leastDegree = 0.0;
+  ExpectRefusal([&] { GradeStenoses(tree, paths, {}, {}, {}, grading); }, "leastDegree");
+  ExpectRefusal([&] { GradeStenoses(tree, paths, {}); }, "one value a point");
+  ExpectThrown<Cancelled>([&]
+    { RefineLumen(tree, paths, tube.image, levels, {}, Blur, {}, [](double) { return false; }); },
+    "cancelled");
+}
+
+TEST(PhantomLesions, AreWhatTheTreeShows)
+{
+  PhantomSettings settings;
+  settings.seed = 7;
+  settings.stenoses = 3;
+  settings.stenosisDegree = 0.6;
+  settings.calcifiedPlaques = 5;
+  const CoronaryPhantom phantom(settings);
+  settings.stenoses = 0;
+  const CoronaryPhantom healthy(settings);
+  const PhantomTree tree = phantom.Tree(0.3);
+  const PhantomTree without = healthy.Tree(0.3);
+  ASSERT_EQ(phantom.Stenoses(0.3).size(), 3U);
+  for (const PhantomStenosis& stenosis : phantom.Stenoses(0.3))
+  {
+    EXPECT_EQ(stenosis.leastRadius, tree.radius[stenosis.point]);
+    EXPECT_EQ(stenosis.position, tree.points[stenosis.point]);
+    EXPECT_NEAR(
+      stenosis.degree, 1.0 - tree.radius[stenosis.point] / without.radius[stenosis.point], 0.01);
+    EXPECT_NEAR(stenosis.degree, 0.6, 0.05);
+    EXPECT_FALSE(stenosis.vessel.empty());
+    // It is the narrowest place around.
+    for (std::int64_t p = stenosis.point - 3; p <= stenosis.point + 3; ++p)
+    {
+      EXPECT_GE(tree.radius[p], 0.99 * stenosis.leastRadius);
+    }
+  }
+  ASSERT_EQ(phantom.Plaques(0.3).size(), 5U);
+  for (const PhantomPlaque& plaque : phantom.Plaques(0.3))
+  {
+    const double distance = (plaque.centre - tree.points[plaque.point]).norm();
+    EXPECT_NEAR(distance, tree.radius[plaque.point] + 0.5 * plaque.radius, 0.5);
+    EXPECT_GT(plaque.value, 500.0);
+  }
+  EXPECT_TRUE(healthy.Stenoses(0.3).empty());
+}
