@@ -116,6 +116,21 @@ nlohmann::ordered_json DescribeBridges(
   return list;
 }
 
+nlohmann::ordered_json DescribeVeins(vtkPolyData* tree)
+{
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  vtkFieldData* data = tree->GetFieldData();
+  vtkDataArray* positions = data->GetArray(vtkCoronaryArrayNames::VeinPositions);
+  vtkDataArray* lengths = data->GetArray(vtkCoronaryArrayNames::VeinLengths);
+  vtkDataArray* probabilities = data->GetArray(vtkCoronaryArrayNames::VeinProbabilities);
+  for (vtkIdType n = 0; positions && n < positions->GetNumberOfTuples(); ++n)
+  {
+    list.push_back({ { "position", Place(Vector3(positions->GetTuple3(n))) },
+      { "length_mm", lengths->GetTuple1(n) }, { "probability", probabilities->GetTuple1(n) } });
+  }
+  return list;
+}
+
 std::vector<std::string> BridgeWarnings(const nlohmann::ordered_json& bridges)
 {
   std::vector<std::string> warnings;

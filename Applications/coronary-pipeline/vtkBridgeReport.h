@@ -31,6 +31,10 @@ std::vector<VesselBridge> BridgesOfLines(vtkPolyData* lines);
 nlohmann::ordered_json DescribeBridges(
   vtkPolyData* lines, vtkPolyData* tree, vtkImageData* reference, double blood);
 
+/// What touched the trees and was left out as a vein: "position" (mm), "length_mm", "probability".
+/// @param tree  with the centerline filter's field data
+nlohmann::ordered_json DescribeVeins(vtkPolyData* tree);
+
 /// A sentence for each bridge of a report that a user should look at: what is not seen for 3 mm or more.
 std::vector<std::string> BridgeWarnings(const nlohmann::ordered_json& bridges);
 }

@@ -17,7 +17,6 @@
 #include "vtkImageData.h"
 #include "vtkIntArray.h"
 #include "vtkPointData.h"
-#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkUnsignedCharArray.h"
 
@@ -207,46 +206,6 @@ void WriteLabels(const std::string& path, const Measurement& measurement, const 
     write(static_cast<short>(0));
   }
 }
-}
-
-void RefineTreeLumen(vtkPolyData* tree, vtkPolyData* lines, vtkImageData* image, double blur,
-  const std::function<void(double)>& progress)
-{
-  if (tree->GetNumberOfLines() == 0 || !(blur > 0.0))
-  {
-    return;
-  }
-  Measurement measurement;
-  Measure(measurement, tree, image, blur, progress);
-  const RefinedLumen& lumen = measurement.lumen;
-  // The lines repeat the tree's points.
-  std::map<std::array<double, 3>, std::size_t> places;
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (std::size_t p = 0; p < lumen.points.size(); ++p)
-  {
-    std::array<double, 3> position;
-    tree->GetPoint(static_cast<vtkIdType>(p), position.data());
-    places[position] = p;
-    points->InsertNextPoint(lumen.points[p].data());
-  }
-  vtkNew<vtkPoints> linePoints;
-  linePoints->SetDataTypeToDouble();
-  std::vector<double> lineRadii;
-  vtkDataArray* given = lines->GetPointData()->GetArray(names::Radius);
-  for (vtkIdType n = 0; n < lines->GetNumberOfPoints(); ++n)
-  {
-    std::array<double, 3> position;
-    lines->GetPoint(n, position.data());
-    const auto place = places.find(position);
-    const bool known = place != places.end();
-    linePoints->InsertNextPoint(known ? lumen.points[place->second].data() : position.data());
-    lineRadii.push_back(known ? lumen.radius[place->second] : given->GetTuple1(n));
-  }
-  tree->SetPoints(points);
-  lines->SetPoints(linePoints);
-  vtkCoronary::AddArray<vtkDoubleArray>(tree->GetPointData(), names::Radius, lumen.radius);
-  vtkCoronary::AddArray<vtkDoubleArray>(lines->GetPointData(), names::Radius, lineRadii);
 }
 
 TreeLesions GradeTreeLesions(vtkPolyData* tree, vtkImageData* image, double blur,

@@ -15,17 +15,6 @@ class vtkPolyData;
 
 namespace coronary
 {
-/**
- * Puts the lumen that is left beside calcium and in narrowings into the radii and points of extracted trees, and of the
- * same trees in VMTK's form.
- * @param tree   as of vtkFastMarchingCenterline; without branches nothing is done
- * @param lines  its output of lines
- * @param blur   of the image, mm
- * @throws Cancelled
- */
-void RefineTreeLumen(vtkPolyData* tree, vtkPolyData* lines, vtkImageData* image, double blur,
-  const std::function<void(double)>& progress);
-
 /// What GradeTreeLesions() found.
 struct TreeLesions
 {

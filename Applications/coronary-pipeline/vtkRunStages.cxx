@@ -570,25 +570,21 @@ Json MakeCenterline(RunStep& step)
   }
   centerline->SetInputDataObject(1, seeds);
   vtkNew<vtkCoronaryTreeTopology> topology;
+  topology->SetInputConnection(centerline->GetOutputPort());
   topology->SetRootData(seeds);
   topology->SetLabelSegments(settings.labels);
   UpdateAtTime(centerline, 0, 0.0, step.input.Messages,
-    [&](double fraction) { step.progress(0.5 + 0.3 * fraction); });
-  const auto raw = Detached(centerline->GetOutput());
-  const auto lines = Detached(vtkPolyData::SafeDownCast(
-    centerline->GetOutputDataObject(vtkFastMarchingCenterline::LinesPort)));
+    [&](double fraction) { step.progress(0.5 + 0.35 * fraction); });
+  vtkPolyData* raw = centerline->GetOutput();
+  auto* lines = vtkPolyData::SafeDownCast(
+    centerline->GetOutputDataObject(vtkFastMarchingCenterline::LinesPort));
   vtkDataArray* blurs = raw->GetFieldData()->GetArray(vtkCoronaryArrayNames::ImageBlur);
   const double blur = blurs && blurs->GetNumberOfValues() > 0 ? blurs->GetTuple1(0) : 0.0;
-  if (!step.input.IsSurface())
-  {
-    RefineTreeLumen(raw, lines, step.input.Reference, blur,
-      [&](double fraction) { step.progress(0.8 + 0.05 * fraction); });
-  }
-  topology->SetInputData(raw);
   UpdateAtTime(topology, 0, 0.0, step.input.Messages,
     [&](double fraction) { step.progress(0.85 + 0.1 * fraction); });
   vtkPolyData* tree = topology->GetOutput();
-  if (!step.input.IsSurface())
+  const bool measured = !step.input.IsSurface() && !step.input.IsMask();
+  if (measured)
   {
     const TreeLesions lesions = GradeTreeLesions(
       tree, step.input.Reference, blur, [&] { return step.Add("calcium.mha"); },
@@ -614,9 +610,10 @@ Json MakeCenterline(RunStep& step)
     length += one["length"].get<double>();
   }
   numbers["trees"] = trees;
+  numbers["veins"] = DescribeVeins(raw);
   numbers["bridges"] = Json::array();
   const Json segmentation = step.report.Of("segmentation");
-  if (!step.input.IsSurface() && segmentation.contains("window"))
+  if (measured && segmentation.contains("window"))
   {
     numbers["bridges"] = DescribeBridges(ReadLines(step, "bridges.vtp"), tree, step.input.Reference,
       segmentation["window"][1].get<double>());

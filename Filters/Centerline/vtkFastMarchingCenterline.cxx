@@ -1,7 +1,11 @@
 #include "vtkFastMarchingCenterline.h"
 
+#include "CalciumObjects.h"
 #include "CenterlineExtraction.h"
+#include "LumenLevels.h"
+#include "LumenRefinement.h"
 #include "SurfaceDistance.h"
+#include "VesselPaths.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
@@ -170,6 +174,20 @@ void AddCell(vtkCellArray* cells, const std::vector<std::int64_t>& ids)
   {
     cells->InsertCellPoint(static_cast<vtkIdType>(id));
   }
+}
+
+/// Centres and radii as what calcium and narrowings leave.
+void MeasureAnew(CenterlineTree& tree, const coronary::ScalarImage& image, double blur,
+  const coronary::ProgressCallback& progress)
+{
+  const std::vector<coronary::VesselPath> paths = coronary::VesselPaths(tree);
+  const coronary::LumenLevels levels = coronary::MeasureLumenLevels(tree, paths, image, blur);
+  const coronary::CalciumMap calcium = coronary::FindCalcium(tree, image, levels, {}, progress);
+  coronary::RefinedLumen lumen =
+    coronary::RefineLumen(tree, paths, image, levels, calcium, blur, {}, progress);
+  tree.points = std::move(lumen.points);
+  tree.radius = std::move(lumen.radius);
+  coronary::MeasureTree(tree);
 }
 
 /// Takes the message's first word as the name of a property.
@@ -446,8 +464,15 @@ void vtkFastMarchingCenterline::Execute(
       intensity = vtkCoronary::ScalarImageOf(measured, array, intensityCopy);
       input.intensity = &intensity;
     }
+    const bool refine = this->RefineLumen && input.intensity;
+    const double end = refine ? 0.9 : 1.0;
     result =
-      coronary::ExtractCenterlines(input, settings, vtkCoronary::ProgressOf(this, begin, 1.0));
+      coronary::ExtractCenterlines(input, settings, vtkCoronary::ProgressOf(this, begin, end));
+    if (refine && !result.tree.branches.empty() && result.blur > 0.0)
+    {
+      MeasureAnew(
+        result.tree, *input.intensity, result.blur, vtkCoronary::ProgressOf(this, end, 1.0));
+    }
   }
   for (const std::string& message : result.messages)
   {
@@ -674,6 +699,7 @@ void vtkFastMarchingCenterline::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "SpeedExponent: " << this->SpeedExponent << '\n';
   os << indent << "FindTips: " << this->FindTips << '\n';
   os << indent << "FollowThinBranches: " << this->FollowThinBranches << '\n';
+  os << indent << "RefineLumen: " << this->RefineLumen << '\n';
   os << indent << "MinimumBranchLength: " << this->MinimumBranchLength << '\n';
   os << indent << "MinimumConfidence: " << this->MinimumConfidence << '\n';
   os << indent << "MaximumGap: " << this->MaximumGap << '\n';

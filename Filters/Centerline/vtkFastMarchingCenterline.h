@@ -168,6 +168,16 @@ public:
 
   ///@{
   /**
+   * Whether on images (input 3) centres and radii are measured once more as the lumen that calcium and narrowings leave:
+   * half-maximum widths can not get smaller than the blur. Default on.
+   */
+  vtkSetMacro(RefineLumen, bool);
+  vtkGetMacro(RefineLumen, bool);
+  vtkBooleanMacro(RefineLumen, bool);
+  ///@}
+
+  ///@{
+  /**
    * Shorter branches are no branches, mm. Default 0: ten voxels, and one and a half radii of the parent.
    */
   vtkSetMacro(MinimumBranchLength, double);
@@ -313,6 +323,7 @@ private:
   double SpeedExponent = 2.0;
   bool FindTips = false;
   bool FollowThinBranches = true;
+  bool RefineLumen = true;
   double MinimumBranchLength = 0.0;
   double MinimumConfidence = 0.5;
   double MaximumGap = 0.0;
