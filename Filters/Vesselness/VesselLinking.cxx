@@ -656,7 +656,8 @@ double Linker::Judge(
     odds -= std::max(0.0, -ratio - 0.7);
     if (tip != nullptr)
     {
-      odds -= 2.0 * std::max(0.0, ratio - 0.25);
+      // The tip may lie in the lesion: then what follows is wider, but not twice as wide.
+      odds -= 2.0 * std::max(0.0, ratio - 0.25) + 5.0 * std::max(0.0, ratio - 0.45);
       // Vessels taper: one that ends at full width goes on, and one that begins so comes from somewhere.
       const double abrupt = std::min(end.radius, link.radiusBefore);
       odds += 2.0 * std::clamp((abrupt - 0.6) / 0.6, 0.0, 1.0);
