@@ -32,6 +32,7 @@ tables=(
   "centerline-noisy | validate-centerline --window 140 --noise 40 --spacing 0.5 | -"
   "stenosis | validate-stenosis --details | validate-stenosis --quick"
   "stenosis-axes | validate-stenosis --true-axes --seeds 301..310 | -"
+  "disease | validate-disease | validate-disease --quick"
   "surface | validate-surface | validate-surface --quick"
   "surface-unseen | validate-surface --seeds 21..50 --variants varied | -"
   "volume | validate-volume | validate-volume --quick"
