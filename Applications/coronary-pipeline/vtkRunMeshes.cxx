@@ -2,6 +2,7 @@
 
 #include "ParallelFor.h"
 #include "TetrahedralMesh.h"
+#include "TriangleBvh.h"
 #include "vtkCoronaryArrayNames.h"
 
 #include "vtkCellArray.h"
@@ -21,6 +22,7 @@
 #include <limits>
 #include <set>
 #include <stdexcept>
+#include <vector>
 
 namespace coronary
 {
@@ -104,17 +106,71 @@ void DescribeChanges(vtkPolyData* surface, Json& numbers)
     names::LeftOutPlaces, names::LeftOutLengths);
 }
 
+/// Points at free ends of a tree's lines that a mended surface no longer covers.
+void AddUncovered(vtkPolyData* tree, vtkPolyData* surface, std::set<vtkIdType>& gone)
+{
+  std::vector<Vector3> points;
+  std::vector<Triangle> triangles;
+  for (vtkIdType n = 0; n < surface->GetNumberOfPoints(); ++n)
+  {
+    points.emplace_back(surface->GetPoint(n));
+  }
+  vtkNew<vtkIdList> ids;
+  for (vtkIdType cell = 0; cell < surface->GetNumberOfCells(); ++cell)
+  {
+    surface->GetCellPoints(cell, ids);
+    if (ids->GetNumberOfIds() == 3)
+    {
+      triangles.push_back({ ids->GetId(0), ids->GetId(1), ids->GetId(2) });
+    }
+  }
+  const TriangleBvh wall(points, triangles);
+  std::vector<int> uses(static_cast<std::size_t>(tree->GetNumberOfPoints()), 0);
+  for (vtkIdType cell = 0; cell < tree->GetNumberOfCells(); ++cell)
+  {
+    tree->GetCellPoints(cell, ids);
+    for (vtkIdType i = 0; i < ids->GetNumberOfIds(); ++i)
+    {
+      ++uses[static_cast<std::size_t>(ids->GetId(i))];
+    }
+  }
+  for (vtkIdType cell = 0; cell < tree->GetNumberOfCells(); ++cell)
+  {
+    tree->GetCellPoints(cell, ids);
+    const vtkIdType count = ids->GetNumberOfIds();
+    for (const bool fromStart : { true, false })
+    {
+      for (vtkIdType i = 0; i < count; ++i)
+      {
+        const vtkIdType p = ids->GetId(fromStart ? i : count - 1 - i);
+        if (uses[static_cast<std::size_t>(p)] > 1 || wall.Winding(Vector3(tree->GetPoint(p))) != 0)
+        {
+          break;
+        }
+        gone.insert(p);
+      }
+    }
+  }
+}
+
 vtkSmartPointer<vtkPolyData> SweptPart(vtkPolyData* tree, vtkPolyData* surface)
 {
-  vtkDataArray* missing = surface->GetFieldData()->GetArray(names::LeftOutPoints);
-  if (!missing || missing->GetNumberOfTuples() == 0)
+  std::set<vtkIdType> gone;
+  if (vtkDataArray* missing = surface->GetFieldData()->GetArray(names::LeftOutPoints))
+  {
+    for (vtkIdType n = 0; n < missing->GetNumberOfTuples(); ++n)
+    {
+      gone.insert(static_cast<vtkIdType>(missing->GetTuple1(n)));
+    }
+  }
+  // Ends that were trimmed are told by the repairs, not by their points.
+  if (surface->GetFieldData()->GetAbstractArray(names::RepairVessels) != nullptr || !gone.empty())
+  {
+    AddUncovered(tree, surface, gone);
+  }
+  if (gone.empty())
   {
     return tree;
-  }
-  std::set<vtkIdType> gone;
-  for (vtkIdType n = 0; n < missing->GetNumberOfTuples(); ++n)
-  {
-    gone.insert(static_cast<vtkIdType>(missing->GetTuple1(n)));
   }
   auto part = vtkSmartPointer<vtkPolyData>::New();
   part->SetPoints(tree->GetPoints());

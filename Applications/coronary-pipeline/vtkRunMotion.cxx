@@ -110,7 +110,7 @@ Json WriteMovingMesh(MovingMesh& moving, const std::vector<double>& times, RunSt
   moving.Write(path, times, step.input.Messages, progress);
   if (!step.ranks.IsFirst())
   {
-    return {};
+    return Json::object();
   }
   for (const std::string& file : MeshSequenceFiles(path))
   {

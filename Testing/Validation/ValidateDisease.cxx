@@ -259,7 +259,7 @@ std::string List(const std::map<std::string, double>& lengths)
 }
 
 // In the coarse voxels of the quick run:
-constexpr double LeastQuickFound = 0.90;
+constexpr double LeastQuickFound = 0.85;
 constexpr double LargestQuickFalse = 10.0; // mm a tree
 
 /// What a condition's phantoms came to.
