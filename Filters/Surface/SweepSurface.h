@@ -131,7 +131,7 @@ struct SweptSurface
 /**
  * A surface that comes out has passed the check of the tetrahedral mesher (CheckSurface,
  * CheckSelfIntersections; open ends apart). What can not be meshed is mended where it is: ends that
- * fold over their caps are trimmed, straightened or limited in slope; axes smoothed and fillets made
+ * fold over their caps are laid straight or limited in slope; axes smoothed and fillets made
  * smaller; triangles replaced. A branch for which nothing helps is left out from there on, and the
  * rest is made.
  *

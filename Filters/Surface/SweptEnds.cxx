@@ -16,8 +16,6 @@ constexpr double FoldingSlope = 2.0;
 constexpr double FitSlope = 0.5;
 /// What lies so many radii from the end can not be cut off as a fold of its own.
 constexpr double EndReach = 1.6;
-/// So many radii of a sound place may be left out.
-constexpr double LongestTrim = 3.0;
 
 double BendOf(const VesselAxis::Station& station, double radius)
 {
@@ -38,8 +36,7 @@ std::string Millimetres(double length)
 }
 }
 
-std::string MendEnd(
-  VesselCourse& course, const VesselAxis& axis, bool atStart, bool mayTrim, Vector3& place)
+std::string MendEnd(VesselCourse& course, const VesselAxis& axis, bool atStart, Vector3& place)
 {
   const std::vector<VesselAxis::Station>& stations = axis.AllStations();
   const double length = axis.Length();
@@ -107,25 +104,6 @@ std::string MendEnd(
     limitRadius();
     return "its radius changes too fast towards its end; limited over the last " +
       Millimetres(zone);
-  }
-  if (mayTrim && zone <= LongestTrim * anchor.radius && length - zone > 4.0 * anchor.radius)
-  {
-    const auto erase = [&](auto& list)
-    {
-      if (atStart)
-      {
-        list.erase(list.begin(), list.begin() + inside);
-      }
-      else
-      {
-        list.erase(list.end() - inside, list.end());
-      }
-    };
-    erase(course.points);
-    erase(course.radius);
-    erase(course.smoothing);
-    return "its end bends more sharply than the vessel is wide; the last " + Millimetres(zone) +
-      " are left out";
   }
   limitRadius();
   for (int i = 0; i < inside; ++i)

@@ -23,16 +23,14 @@ struct VesselCourse
 /**
  * Mends a free end whose tube would fold over its cap: where curvature times radius is too great,
  * or the radius changes so fast that wall and cap meet in a blade. The radius is limited in slope;
- * where that is not enough, a short end is left out, and a longer one laid straight.
+ * where that is not enough, the end is laid straight: a shorter one would leave bones outside of the wall.
  *
  * @param axis     of the course as it is
  * @param atStart  which end
- * @param mayTrim  else it is laid straight at once
  * @param[out] place  of the end before
  * @return what was done, "" when the end is fit as it is
  */
-std::string MendEnd(
-  VesselCourse& course, const VesselAxis& axis, bool atStart, bool mayTrim, Vector3& place);
+std::string MendEnd(VesselCourse& course, const VesselAxis& axis, bool atStart, Vector3& place);
 }
 
 #endif

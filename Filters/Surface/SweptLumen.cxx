@@ -613,7 +613,7 @@ struct SweptLumen::Build
       for (int round = 0; round < EndRounds && (atStart ? startOpen : endOpen); ++round)
       {
         Vector3 place = Vector3::Zero();
-        const std::string done = MendEnd(course, *axis, atStart, round == 0, place);
+        const std::string done = MendEnd(course, *axis, atStart, place);
         if (done.empty())
         {
           break;

@@ -62,7 +62,7 @@
  * A setting out of range, a missing array, a radius that is not positive, a branch without length:
  * one error that names it, and no output. Input without lines gives an empty output. What can not
  * be swept as it is stays local: a branch too short to leave its parent is lengthened or left out;
- * an end that folds over its cap is trimmed, laid straight or limited in slope; where triangles stay
+ * an end that folds over its cap is laid straight or limited in slope; where triangles stay
  * bad they are replaced; a branch that forms a loop, runs through another one without joining, or can
  * not be meshed at all is left out from there on. A warning names vessel, place and remedy, and what
  * comes out has always passed the tetrahedral mesher's check. Only when nothing is left there is an
