@@ -254,20 +254,22 @@ std::vector<VeinBranch> VeinFinder::Run()
   {
     return {};
   }
-  const double usual = Median(steps);
+  // Veins are only ever darker: how arteries differ shows in the steps that are brighter than usual.
+  const double usual = std::clamp(Median(steps), -0.1, 0.0);
   std::vector<double> off;
-  off.reserve(steps.size());
   for (const double step : steps)
   {
-    off.push_back(std::abs(step - usual));
+    if (step >= usual)
+    {
+      off.push_back(step - usual);
+    }
   }
-  const double natural = std::max(0.01, 1.4826 * Median(off));
+  const double natural = std::max(0.01, off.empty() ? 0.0 : 1.4826 * Median(off));
   std::vector<VeinBranch> veins;
   for (std::size_t n = 0; n < all.size(); ++n)
   {
     VeinBranch& one = all[n];
-    const double darker =
-      -(one.brightness - std::clamp(usual, -0.1, 0.0)) / std::hypot(errors[n], natural);
+    const double darker = (usual - one.brightness) / std::hypot(errors[n], natural);
     double odds = -3.5;
     odds += std::min(4.0, std::max(0.0, darker - 1.5));
     odds += std::min(4.0, 8.0 * std::max(0.0, one.calibre - 1.15));

@@ -560,29 +560,42 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
     link.points.push_back(p);
     link.voxels.push_back(at);
   }
-  return link.length <= 1.35 * gap + 1.5;
+  // What is seen may bend more than what is not.
+  return link.length <= (link.unseen < 0.1 * link.length ? 1.5 : 1.35) * gap + 1.5;
 }
 
 /// The smooth curve between two ends that point at each other, where nothing shows the way.
 bool Linker::Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const
 {
-  const Vector3 chord = end.position - tip.position;
-  const double gap = chord.norm();
-  const double handle = gap / 3.0;
-  const Vector3 a = tip.position + handle * tip.outwards;
-  const Vector3 b = end.position + handle * end.outwards;
-  const int steps =
-    std::max(2, static_cast<int>(std::ceil(2.0 * gap / this->L.Spacing.minCoeff())));
+  const double gap = (end.position - tip.position).norm();
+  const Vector3 a = tip.position + gap / 3.0 * tip.outwards;
+  const Vector3 b = end.position + gap / 3.0 * end.outwards;
+  // An end's axis may begin outside of its voxels: the way begins within both.
+  constexpr double inside = 1.5; // mm
+  const double more = gap > 0.0 ? inside / gap : 0.0;
+  const int steps = std::max(
+    2, static_cast<int>(std::ceil(2.0 * (gap + 2.0 * inside) / this->L.Spacing.minCoeff())));
   link.voxels.clear();
   link.points.clear();
   link.length = 0.0;
   link.unseen = 0.0;
+  const auto at = [&](double t) -> Vector3
+  {
+    if (t < 0.0)
+    {
+      return tip.position + gap * t * tip.outwards;
+    }
+    if (t > 1.0)
+    {
+      return end.position - gap * (t - 1.0) * end.outwards;
+    }
+    const double u = 1.0 - t;
+    return u * u * u * tip.position + 3.0 * u * u * t * a + 3.0 * u * t * t * b +
+      t * t * t * end.position;
+  };
   for (int step = 0; step <= steps; ++step)
   {
-    const double t = static_cast<double>(step) / steps;
-    const double u = 1.0 - t;
-    const Vector3 p = u * u * u * tip.position + 3.0 * u * u * t * a + 3.0 * u * t * t * b +
-      t * t * t * end.position;
+    const Vector3 p = at(-more + (1.0 + 2.0 * more) * step / steps);
     const std::optional<std::array<int, 3>> place = this->L.Nearest(p);
     if (!place)
     {
@@ -650,9 +663,14 @@ double Linker::Judge(
   odds -= std::max(0.0, link.unseen - FreeGap) / 8.0;
   link.radiusBefore =
     tip != nullptr && tip->radius > 0.0 ? tip->radius : this->RadiusByVolume(from);
-  if (link.radiusBefore > 0.0 && end.radius > 0.0)
+  // A piece that is thick on the whole is no vessel that begins thin; side branches add to its volume.
+  const double thick = 0.6 *
+    std::sqrt(
+      static_cast<double>(orphan.piece.Size()) * this->L.VoxelVolume() / (M_PI * orphan.length));
+  const double behind = std::max(end.radius, thick);
+  if (link.radiusBefore > 0.0)
   {
-    const double ratio = std::log(end.radius / link.radiusBefore);
+    const double ratio = std::log(behind / link.radiusBefore);
     odds -= std::max(0.0, -ratio - 0.7);
     if (tip != nullptr)
     {
