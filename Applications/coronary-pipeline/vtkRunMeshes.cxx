@@ -125,6 +125,7 @@ void AddUncovered(vtkPolyData* tree, vtkPolyData* surface, std::set<vtkIdType>& 
     }
   }
   const TriangleBvh wall(points, triangles);
+  constexpr double onCap = 0.3; // mm
   std::vector<int> uses(static_cast<std::size_t>(tree->GetNumberOfPoints()), 0);
   for (vtkIdType cell = 0; cell < tree->GetNumberOfCells(); ++cell)
   {
@@ -143,7 +144,10 @@ void AddUncovered(vtkPolyData* tree, vtkPolyData* surface, std::set<vtkIdType>& 
       for (vtkIdType i = 0; i < count; ++i)
       {
         const vtkIdType p = ids->GetId(fromStart ? i : count - 1 - i);
-        if (uses[static_cast<std::size_t>(p)] > 1 || wall.Winding(Vector3(tree->GetPoint(p))) != 0)
+        const Vector3 place(tree->GetPoint(p));
+        // A tree begins and ends on its caps.
+        if (uses[static_cast<std::size_t>(p)] > 1 || wall.Winding(place) != 0 ||
+          wall.Closest(place, onCap).triangle >= 0)
         {
           break;
         }
