@@ -254,17 +254,15 @@ std::vector<VeinBranch> VeinFinder::Run()
   {
     return {};
   }
-  // Veins are only ever darker: how arteries differ shows in the steps that are brighter than usual.
+  // Most branches are arteries: how these differ is the measure.
   const double usual = std::clamp(Median(steps), -0.1, 0.0);
   std::vector<double> off;
+  off.reserve(steps.size());
   for (const double step : steps)
   {
-    if (step >= usual)
-    {
-      off.push_back(step - usual);
-    }
+    off.push_back(std::abs(step - usual));
   }
-  const double natural = std::max(0.01, off.empty() ? 0.0 : 1.4826 * Median(off));
+  const double natural = std::max(0.01, 1.4826 * Median(off));
   std::vector<VeinBranch> veins;
   for (std::size_t n = 0; n < all.size(); ++n)
   {
