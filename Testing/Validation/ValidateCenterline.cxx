@@ -83,19 +83,6 @@ struct Outcome
 // Against the truth
 // ---------------------------------------------------------------------------------------------
 
-template <typename Tree>
-CenterlineSet SetOf(const Tree& tree)
-{
-  CenterlineSet set;
-  set.points = tree.points;
-  set.radius = tree.radius;
-  for (const auto& branch : tree.branches)
-  {
-    set.lines.push_back(branch.points);
-  }
-  return set;
-}
-
 struct Fork
 {
   Vector3 point;

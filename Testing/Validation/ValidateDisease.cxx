@@ -93,23 +93,9 @@ struct Outcome
   double toFirstError = 0.0;              ///< OF
   double relevant = 0.0;                  ///< OT
   double distance = 0.0;                  ///< AI, mm
-  double bridged = 0.0;                   ///< mm
   std::map<std::string, double> missedOf; ///< segment: mm
   double seconds = 0.0;                   ///< of processor time
 };
-
-template <typename Tree>
-CenterlineSet SetOf(const Tree& tree)
-{
-  CenterlineSet set;
-  set.points = tree.points;
-  set.radius = tree.radius;
-  for (const auto& branch : tree.branches)
-  {
-    set.lines.push_back(branch.points);
-  }
-  return set;
-}
 
 /// The truth's and the result's lengths within a distance of each other.
 void CompareLengths(const PhantomTree& truth, const CenterlineTopology& tree, Outcome& outcome)
