@@ -75,6 +75,23 @@ std::vector<std::string> BranchNames(vtkPolyData* lines, const CenterlineTree& t
   return names;
 }
 
+/// As the file has them, also by group.
+void TakeSegments(vtkPolyData* lines, CenterlineTree& tree)
+{
+  vtkDataArray* segments = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::SegmentIds);
+  vtkDataArray* groups = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
+  std::map<int, int> byGroup;
+  for (vtkIdType k = 0; segments && groups && k < segments->GetNumberOfTuples(); ++k)
+  {
+    byGroup.emplace(
+      static_cast<int>(groups->GetTuple1(k)), static_cast<int>(segments->GetTuple1(k)));
+  }
+  for (CenterlineTree::Branch& branch : tree.branches)
+  {
+    branch.segmentId = byGroup[branch.groupId];
+  }
+}
+
 void Prepare(ResultImage& image, vtkImageData* data)
 {
   image.data = data;
@@ -229,12 +246,13 @@ RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages)
     throw std::runtime_error("'" + lines.string() + "': " + error.what());
   }
   result.names = BranchNames(data, result.tree);
+  TakeSegments(data, result.tree);
   result.bridged = PointValues(data, vtkCoronaryArrayNames::Bridged);
   result.bridgeConfidence = PointValues(data, vtkCoronaryArrayNames::BridgeConfidence);
-  result.interpolated = PointValues(data, "RadiusInterpolated");
-  result.stenosis = PointValues(data, "StenosisDegree");
-  result.reference = PointValues(data, "ReferenceRadius");
-  result.calcium = PointValues(data, "CalciumLabel");
+  result.interpolated = PointValues(data, vtkCoronaryArrayNames::RadiusInterpolated);
+  result.stenosis = PointValues(data, vtkCoronaryArrayNames::StenosisDegree);
+  result.reference = PointValues(data, vtkCoronaryArrayNames::ReferenceRadius);
+  result.calcium = PointValues(data, vtkCoronaryArrayNames::CalciumLabel);
   return result;
 }
 

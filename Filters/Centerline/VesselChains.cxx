@@ -1,7 +1,8 @@
 #include "VesselChains.h"
 
+#include "VesselPaths.h"
+
 #include <algorithm>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -9,209 +10,132 @@ namespace coronary
 {
 namespace
 {
-/// "LAD" of "pLAD": what the pieces of one artery share; empty: none.
-std::string ArteryOf(const std::string& name)
-{
-  for (const char* artery : { "LAD", "LCx", "RCA" })
-  {
-    if (name.size() == 4 && name.compare(1, 3, artery) == 0)
-    {
-      return artery;
-    }
-  }
-  return name == "LM" ? "LAD" : name;
-}
-
 class Joiner
 {
 public:
   Joiner(const CenterlineTree& tree, const std::vector<std::string>& names, double leadIn)
     : Tree(tree)
+    , Names(names)
     , LeadIn(leadIn)
+    , Paths(VesselPaths(tree))
+    , Owner(tree.points.size(), 0)
+    , Leaving(this->Paths.size())
   {
-    for (std::size_t n = 0; n < tree.branches.size(); ++n)
+    for (std::size_t b = 0; b < tree.branches.size(); ++b)
     {
-      const CenterlineTree::Branch& branch = tree.branches[n];
-      this->Index[branch.groupId] = n;
-      this->Names.push_back(
-        names[n].empty() ? "branch " + std::to_string(branch.groupId) : names[n]);
-      this->Lengths.push_back(this->LengthOf(branch.points));
-    }
-    this->Daughters.resize(tree.branches.size());
-    this->Reach = this->Lengths;
-    // A parent stands before its daughters.
-    for (std::size_t n = tree.branches.size(); n-- > 0;)
-    {
-      const int parent = tree.branches[n].parentGroupId;
-      if (parent >= 0)
+      const CenterlineTree::Branch& branch = tree.branches[b];
+      for (std::size_t i = branch.parentGroupId < 0 ? 0 : 1; i < branch.points.size(); ++i)
       {
-        const std::size_t above = this->Index.at(parent);
-        this->Daughters[above].insert(this->Daughters[above].begin(), n);
-        this->Reach[above] =
-          std::max(this->Reach[above], this->AttachedAt(n, above) + this->Reach[n]);
+        this->Owner[static_cast<std::size_t>(branch.points[i])] = b;
       }
+    }
+    for (std::size_t p = 0; p < this->Paths.size(); ++p)
+    {
+      if (this->Paths[p].parent >= 0)
+      {
+        this->Leaving[static_cast<std::size_t>(this->Paths[p].parent)].push_back(p);
+      }
+    }
+    for (std::size_t p = 0; p < this->Paths.size(); ++p)
+    {
+      std::stable_sort(this->Leaving[p].begin(), this->Leaving[p].end(),
+        [&](std::size_t a, std::size_t b) { return this->OriginOf(a) < this->OriginOf(b); });
     }
   }
 
-  std::vector<VesselChain> Join()
+  std::vector<VesselChain> Join() const
   {
     std::vector<VesselChain> chains;
-    for (std::size_t n = 0; n < this->Tree.branches.size(); ++n)
+    for (std::size_t root = 0; root < this->Paths.size(); ++root)
     {
-      if (this->Tree.branches[n].parentGroupId >= 0)
+      if (this->Paths[root].parent >= 0)
       {
         continue;
       }
       // What leaves a vessel follows it, nearest its beginning first.
-      std::vector<std::pair<std::size_t, VesselChain>> waiting = { { n, VesselChain() } };
+      std::vector<std::size_t> waiting{ root };
       while (!waiting.empty())
       {
-        auto [branch, lead] = std::move(waiting.back());
+        const std::size_t path = waiting.back();
         waiting.pop_back();
-        std::vector<std::size_t> leaving;
-        chains.push_back(this->Follow(branch, std::move(lead), leaving));
-        for (auto next = leaving.rbegin(); next != leaving.rend(); ++next)
-        {
-          waiting.emplace_back(
-            *next, this->LeadInto(chains.back(), this->Tree.branches[*next].points.front()));
-        }
+        chains.push_back(this->Describe(path));
+        waiting.insert(waiting.end(), this->Leaving[path].rbegin(), this->Leaving[path].rend());
       }
     }
     return chains;
   }
 
 private:
-  double LengthOf(const std::vector<std::int64_t>& points) const
+  /// The place on its parent's path where a path begins.
+  std::size_t OriginOf(std::size_t path) const
   {
-    double length = 0.0;
-    for (std::size_t k = 1; k < points.size(); ++k)
-    {
-      length += this->Step(points[k - 1], points[k]);
-    }
-    return length;
+    const std::vector<std::int64_t>& parent =
+      this->Paths[static_cast<std::size_t>(this->Paths[path].parent)].points;
+    return static_cast<std::size_t>(
+      std::find(parent.begin(), parent.end(), this->Paths[path].points.front()) - parent.begin());
   }
 
-  double Step(std::int64_t from, std::int64_t to) const
+  std::size_t BranchAt(const VesselPath& path, std::size_t place) const
   {
-    return (this->Tree.points[static_cast<std::size_t>(to)] -
-      this->Tree.points[static_cast<std::size_t>(from)])
-      .norm();
+    return this->Owner[static_cast<std::size_t>(path.points[place])];
   }
 
-  /// Where on its parent a branch begins, mm from the parent's first point.
-  double AttachedAt(std::size_t branch, std::size_t parent) const
+  std::string NameAt(const VesselPath& path, std::size_t place) const
   {
-    const std::vector<std::int64_t>& points = this->Tree.branches[parent].points;
-    const std::int64_t first = this->Tree.branches[branch].points.front();
-    double arc = 0.0;
-    for (std::size_t k = 0; k < points.size() && points[k] != first; ++k)
-    {
-      arc += k + 1 < points.size() ? this->Step(points[k], points[k + 1]) : 0.0;
-    }
-    return arc;
+    const std::size_t branch = this->BranchAt(path, place);
+    return this->Names[branch].empty()
+      ? "branch " + std::to_string(this->Tree.branches[branch].groupId)
+      : this->Names[branch];
   }
 
-  /// The daughter at the branch's end that is the same vessel; the number of branches: none.
-  std::size_t Continuation(std::size_t branch) const
+  VesselChain Describe(std::size_t number) const
   {
-    const std::size_t none = this->Tree.branches.size();
-    std::size_t best = none;
-    const std::string artery = ArteryOf(this->Names[branch]);
-    const auto same = [&](std::size_t n) { return ArteryOf(this->Names[n]) == artery; };
-    for (const std::size_t n : this->Daughters[branch])
+    const VesselPath& path = this->Paths[number];
+    VesselChain chain;
+    if (path.parent >= 0)
     {
-      if (this->Tree.branches[n].points.front() != this->Tree.branches[branch].points.back())
+      const VesselPath& parent = this->Paths[static_cast<std::size_t>(path.parent)];
+      const std::size_t last = this->OriginOf(number);
+      std::size_t first = last;
+      while (first > 0 && parent.arc[last] - parent.arc[first] < this->LeadIn)
       {
-        continue;
+        --first;
       }
-      if (best == none || (same(n) && !same(best)) ||
-        (same(n) == same(best) && this->Reach[n] > this->Reach[best]))
+      for (std::size_t k = first; k < last; ++k)
       {
-        best = n;
+        chain.points.push_back(parent.points[k]);
+        chain.arc.push_back(parent.arc[k] - parent.arc[last]);
       }
     }
-    return best;
-  }
-
-  void Append(VesselChain& chain, std::size_t branch) const
-  {
-    const std::vector<std::int64_t>& points = this->Tree.branches[branch].points;
-    double arc = chain.arc.empty() ? 0.0 : chain.arc.back();
-    const double begin = arc;
-    for (std::size_t k = 0; k < points.size(); ++k)
+    chain.points.insert(chain.points.end(), path.points.begin(), path.points.end());
+    chain.arc.insert(chain.arc.end(), path.arc.begin(), path.arc.end());
+    const CenterlineTree::Branch& begin = this->Tree.branches[this->BranchAt(path, 1)];
+    chain.groupId = begin.groupId;
+    chain.treeId = begin.treeId;
+    for (std::size_t k = 1; k < path.points.size(); ++k)
     {
-      if (k == 0 && !chain.points.empty())
+      const std::string name = this->NameAt(path, k);
+      if (chain.pieces.empty() || chain.pieces.back().name != name)
       {
-        continue; // the point of its parent
+        chain.pieces.push_back({ name, path.arc[k - 1], path.arc[k] });
+        chain.name += (chain.name.empty() ? "" : ", ") + name;
       }
-      arc += k > 0 ? this->Step(points[k - 1], points[k]) : 0.0;
-      chain.points.push_back(points[k]);
-      chain.arc.push_back(arc);
+      chain.pieces.back().end = path.arc[k];
     }
-    const std::string& name = this->Names[branch];
-    if (!chain.pieces.empty() && chain.pieces.back().name == name)
+    for (const std::size_t side : this->Leaving[number])
     {
-      chain.pieces.back().end = arc;
-      return;
-    }
-    chain.pieces.push_back({ name, begin, arc });
-    chain.name += (chain.name.empty() ? "" : ", ") + name;
-  }
-
-  /// The last of a vessel before a point, up to it, with arcs up to 0.
-  VesselChain LeadInto(const VesselChain& parent, std::int64_t point) const
-  {
-    VesselChain lead;
-    const auto at = std::find(parent.points.begin(), parent.points.end(), point);
-    if (at == parent.points.end())
-    {
-      return lead;
-    }
-    const auto last = static_cast<std::size_t>(at - parent.points.begin());
-    std::size_t first = last;
-    while (first > 0 && parent.arc[last] - parent.arc[first] < this->LeadIn)
-    {
-      --first;
-    }
-    for (std::size_t k = first; k <= last; ++k)
-    {
-      lead.points.push_back(parent.points[k]);
-      lead.arc.push_back(parent.arc[k] - parent.arc[last]);
-    }
-    return lead;
-  }
-
-  /// @param leaving  branches that begin on it
-  VesselChain Follow(std::size_t branch, VesselChain chain, std::vector<std::size_t>& leaving) const
-  {
-    const std::size_t none = this->Tree.branches.size();
-    chain.groupId = this->Tree.branches[branch].groupId;
-    chain.treeId = this->Tree.branches[branch].treeId;
-    for (std::size_t next = branch; next != none;)
-    {
-      const double begin = chain.arc.empty() ? 0.0 : chain.arc.back();
-      this->Append(chain, next);
-      const std::size_t following = this->Continuation(next);
-      for (const std::size_t n : this->Daughters[next])
-      {
-        if (n != following)
-        {
-          leaving.push_back(n);
-          chain.forks.push_back({ this->Names[n], begin + this->AttachedAt(n, next) });
-        }
-      }
-      next = following;
+      chain.forks.push_back({ this->NameAt(this->Paths[side], 1), path.arc[this->OriginOf(side)] });
     }
     return chain;
   }
 
   const CenterlineTree& Tree;
+  const std::vector<std::string>& Names;
   const double LeadIn;
-  std::map<int, std::size_t> Index;
-  std::vector<std::string> Names;
-  std::vector<double> Lengths;
-  std::vector<double> Reach; ///< mm from a branch's beginning to its furthest tip
-  std::vector<std::vector<std::size_t>> Daughters;
+  std::vector<VesselPath> Paths;
+  std::vector<std::size_t> Owner; ///< of a point: its branch; a shared one is the parent's
+  std::vector<std::vector<std::size_t>>
+    Leaving; ///< of a path: those that leave it, by their origin
 };
 }
 

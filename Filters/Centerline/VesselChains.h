@@ -41,10 +41,8 @@ struct VesselChain
 };
 
 /**
- * Every branch becomes part of one vessel. Where a branch ends, the vessel goes on into the daughter of the same
- * artery (pLAD, mLAD, dLAD; the left main's is the LAD); where names do not tell, into the one whose tip is furthest
- * away along the tree. A vessel that leaves another begins with a piece of that one, so that its origin is seen.
- * In the order of the trees; a vessel before those that leave it.
+ * The vessels are those of VesselPaths. One that leaves another begins with a piece of that one, so that its origin
+ * is seen. In the order of the trees; a vessel before those that leave it.
  * @param names   of the branches; empty ones become "branch N", N the group
  * @param leadIn  mm of the parent before the origin
  * @throws std::invalid_argument for another number of names than branches; as CheckTree

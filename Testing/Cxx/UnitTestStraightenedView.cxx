@@ -1,5 +1,6 @@
 // Straightened views and slabs of tubes whose grey values and places are known; vessels joined from branches.
 
+#include "CoronaryPhantom.h" // for SegmentId
 #include "StraightenedView.h"
 #include "VesselChains.h"
 
@@ -359,8 +360,7 @@ namespace
 CenterlineTree LeftTree(std::vector<std::string>& names)
 {
   CenterlineTree tree;
-  const auto add = [&](
-                     int parent, std::int64_t from, const Vector3& way, int count, const char* name)
+  const auto add = [&](int parent, std::int64_t from, const Vector3& way, int count, int segment)
   {
     CenterlineTree::Branch branch;
     branch.groupId = static_cast<int>(tree.branches.size());
@@ -376,15 +376,16 @@ CenterlineTree LeftTree(std::vector<std::string>& names)
       tree.points.emplace_back(tree.points[static_cast<std::size_t>(branch.points.back())] + way);
       branch.points.push_back(static_cast<std::int64_t>(tree.points.size()) - 1);
     }
+    branch.segmentId = segment;
     tree.branches.push_back(branch);
-    names.emplace_back(name);
+    names.push_back(SegmentName(segment));
     return branch.points.back();
   };
-  const std::int64_t main = add(-1, -1, Vector3::UnitX(), 10, "LM");
-  const std::int64_t first = add(0, main, Vector3::UnitZ(), 20, "pLAD");
-  add(0, main, Vector3::UnitY(), 60, "pLCx"); // longer than the LAD
-  add(1, first, Vector3::UnitX(), 40, "D1");  // longer than the rest of the LAD
-  add(1, first, Vector3::UnitZ(), 15, "mLAD");
+  const std::int64_t main = add(-1, -1, Vector3::UnitX(), 10, LeftMain);
+  const std::int64_t first = add(0, main, Vector3::UnitZ(), 20, ProximalLAD);
+  add(0, main, Vector3::UnitY(), 60, ProximalLCx);    // longer than the LAD
+  add(1, first, Vector3::UnitX(), 40, FirstDiagonal); // longer than the rest of the LAD
+  add(1, first, Vector3::UnitZ(), 15, MidLAD);
   tree.radius.assign(tree.points.size(), 1.5);
   return tree;
 }
@@ -402,13 +403,13 @@ TEST(JoinVessels, ArteriesGoOnByName)
   EXPECT_DOUBLE_EQ(chains[0].pieces[1].begin, 10.0);
   EXPECT_DOUBLE_EQ(chains[0].pieces[1].end, 30.0);
   ASSERT_EQ(chains[0].forks.size(), 2U);
-  EXPECT_EQ(chains[0].forks[0].name, "pLCx");
+  EXPECT_EQ(chains[0].forks[0].name, ProximalLCx);
   EXPECT_DOUBLE_EQ(chains[0].forks[0].arc, 10.0);
-  EXPECT_EQ(chains[0].forks[1].name, "D1");
+  EXPECT_EQ(chains[0].forks[1].name, FirstDiagonal);
   EXPECT_DOUBLE_EQ(chains[0].forks[1].arc, 30.0);
-  EXPECT_EQ(chains[1].name, "pLCx");
+  EXPECT_EQ(chains[1].name, ProximalLCx);
   EXPECT_DOUBLE_EQ(chains[1].Length(), 60.0);
-  EXPECT_EQ(chains[2].name, "D1");
+  EXPECT_EQ(chains[2].name, FirstDiagonal);
   // The lead-in: 4 mm of the parent, ending at the origin.
   ASSERT_EQ(chains[2].points.size(), 4U + 41U);
   EXPECT_DOUBLE_EQ(chains[2].arc.front(), -4.0);
@@ -416,15 +417,18 @@ TEST(JoinVessels, ArteriesGoOnByName)
   EXPECT_EQ(tree.points[static_cast<std::size_t>(chains[2].points[4])], Vector3(10, 0, 20));
 }
 
-TEST(JoinVessels, WithoutNamesTheFurthestTip)
+TEST(JoinVessels, WithoutNamesTheStraightOne)
 {
   std::vector<std::string> names;
-  const CenterlineTree tree = LeftTree(names);
+  CenterlineTree tree = LeftTree(names);
   names.assign(names.size(), "");
+  for (CenterlineTree::Branch& branch : tree.branches)
+  {
+    branch.segmentId = 0;
+  }
   const std::vector<VesselChain> chains = JoinVessels(tree, names);
   ASSERT_EQ(chains.size(), 3U);
-  // 10 + 60 along the circumflex are as long as 10 + 20 + 40: the first counts.
-  EXPECT_EQ(chains[0].name, "branch 0, branch 1, branch 3");
+  EXPECT_EQ(chains[0].name, "branch 0, branch 1, branch 4");
   double length = 0.0;
   for (const VesselChain& chain : chains)
   {
