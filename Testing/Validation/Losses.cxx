@@ -1,6 +1,7 @@
 #include "Losses.h"
 
 #include "BridgeCheck.h"
+#include "LooseVessels.h"
 #include "TreeCheck.h"
 
 #include <algorithm>
@@ -222,6 +223,15 @@ std::vector<Said> WarningsOf(const PhantomScan& scan, const FoundTree& found)
   for (const TreeWarning& warning : CheckCoronaryTrees(found.tree, found.labels))
   {
     list.push_back({ "check", warning.what, warning.vessel, { warning.place } });
+  }
+  const LooseVesselInput input{ image, scan.vesselness.data(), found.tree, found.labels.heart,
+    scan.window.tissue, scan.window.blood };
+  for (const LooseVessel& vessel : FindLooseVessels(input))
+  {
+    for (const TreeWarning& warning : LooseVesselWarnings({ vessel }))
+    {
+      list.push_back({ "loose", warning.what, warning.vessel, vessel.points });
+    }
   }
   return list;
 }

@@ -45,7 +45,7 @@ LengthComparison CompareLengths(const PhantomTree& truth, const CenterlineTree& 
 /// Something that a run says is wrong.
 struct Said
 {
-  std::string source; ///< "ostia", "seeds", "bridge", "check", "surface"
+  std::string source; ///< "ostia", "seeds", "bridge", "check", "loose", "surface"
   std::string what;
   std::string vessel; ///< SCCT name, "LAD", "LCx", "LCA" or "RCA", or none
   std::vector<Vector3> places;
