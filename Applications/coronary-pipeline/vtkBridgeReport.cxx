@@ -1,6 +1,6 @@
 #include "vtkBridgeReport.h"
 
-#include "LumenMeasurement.h"
+#include "BridgeCheck.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 
@@ -14,7 +14,6 @@
 #include "vtkStringArray.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <limits>
 #include <stdexcept>
 
@@ -83,8 +82,6 @@ nlohmann::ordered_json DescribeBridges(
   vtkPolyData* lines, vtkPolyData* tree, vtkImageData* reference, double blood)
 {
   constexpr double runsAcross = 2.0; // mm
-  constexpr double nothingSeen = 3.0;
-  constexpr double calcium = 1.3; // of the blood
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::vector<float> copy;
   const ScalarImage image =
@@ -98,20 +95,14 @@ nlohmann::ordered_json DescribeBridges(
       continue;
     }
     double length = 0.0;
-    double brightest = -std::numeric_limits<double>::infinity();
-    for (std::size_t n = 0; n < bridge.points.size(); ++n)
+    for (std::size_t n = 1; n < bridge.points.size(); ++n)
     {
-      length += n > 0 ? (bridge.points[n] - bridge.points[n - 1]).norm() : 0.0;
-      brightest = std::max(brightest, interpolator.At(bridge.points[n]));
+      length += (bridge.points[n] - bridge.points[n - 1]).norm();
     }
-    const bool bright = brightest > calcium * blood;
     list.push_back({ { "vessel", vessel }, { "from", Place(bridge.points.front()) },
       { "to", Place(bridge.points.back()) }, { "length_mm", length },
       { "unseen_mm", bridge.unseen }, { "confidence", bridge.confidence },
-      { "kind",
-        bright                           ? "calcium"
-          : bridge.unseen >= nothingSeen ? "occlusion"
-                                         : "stenosis" } });
+      { "kind", BridgeKindName(KindOfBridge(bridge, interpolator, blood)) } });
   }
   return list;
 }
@@ -140,16 +131,14 @@ std::vector<std::string> BridgeWarnings(const nlohmann::ordered_json& bridges)
     {
       continue;
     }
-    char text[240];
-    std::snprintf(text, sizeof(text),
-      "%s: no lumen is seen for %.0f mm between (%.0f, %.0f, %.0f) and (%.0f, %.0f, %.0f): "
-      "occluded, or lost in "
-      "the image; what lies behind was linked with a confidence of %.2f.",
-      bridge["vessel"].get<std::string>().c_str(), bridge["unseen_mm"].get<double>(),
-      bridge["from"][0].get<double>(), bridge["from"][1].get<double>(),
-      bridge["from"][2].get<double>(), bridge["to"][0].get<double>(), bridge["to"][1].get<double>(),
-      bridge["to"][2].get<double>(), bridge["confidence"].get<double>());
-    warnings.emplace_back(text);
+    const auto place = [&](const char* end)
+    {
+      return Vector3(
+        bridge[end][0].get<double>(), bridge[end][1].get<double>(), bridge[end][2].get<double>());
+    };
+    const VesselBridge crossed{ { place("from"), place("to") }, bridge["confidence"].get<double>(),
+      bridge["unseen_mm"].get<double>() };
+    warnings.push_back(OcclusionWarning(crossed, bridge["vessel"].get<std::string>()).what + ".");
   }
   return warnings;
 }

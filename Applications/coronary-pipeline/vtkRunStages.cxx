@@ -594,6 +594,13 @@ Json MakeCenterline(RunStep& step)
     numbers["lesions"] = lesions.lesions;
     numbers["calcium"] = lesions.calcium;
   }
+  const Json segmentation = step.report.Of("segmentation");
+  const bool windowed = measured && segmentation.contains("window");
+  if (windowed)
+  {
+    AddLooseVessels(tree, step.input.Reference, step.input.Vesselness,
+      segmentation["window"][0].get<double>(), segmentation["window"][1].get<double>());
+  }
   auto* forks = vtkPolyData::SafeDownCast(
     topology->GetOutputDataObject(vtkCoronaryTreeTopology::BifurcationPort));
   WritePolyData(step.Add("centerline.vtp"), tree, step.input.Messages);
@@ -612,8 +619,7 @@ Json MakeCenterline(RunStep& step)
   numbers["trees"] = trees;
   numbers["veins"] = DescribeVeins(raw);
   numbers["bridges"] = Json::array();
-  const Json segmentation = step.report.Of("segmentation");
-  if (measured && segmentation.contains("window"))
+  if (windowed)
   {
     numbers["bridges"] = DescribeBridges(ReadLines(step, "bridges.vtp"), tree, step.input.Reference,
       segmentation["window"][1].get<double>());

@@ -1,16 +1,25 @@
 #include "vtkRunTrees.h"
 
-#include "vtkCellData.h"
+#include "LooseVessels.h"
+#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
+
+#include "vtkCellData.h"
 #include "vtkDataArray.h"
 #include "vtkDataSet.h"
+#include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
+#include "vtkImageData.h"
+#include "vtkNew.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkStringArray.h"
 
 #include <algorithm>
 #include <cstdio>
+#include <variant>
+#include <vector>
 
 namespace coronary
 {
@@ -148,6 +157,71 @@ Json TreesNotFound(const Json& trees)
     }
   }
   return lost;
+}
+
+void AddLooseVessels(
+  vtkPolyData* tree, vtkImageData* image, vtkImageData* vesselness, double tissue, double blood)
+{
+  namespace names = vtkCoronaryArrayNames;
+  vtkFieldData* fields = tree->GetFieldData();
+  vtkDataArray* frame = fields->GetArray(names::HeartFrame);
+  if (!frame || frame->GetNumberOfComponents() != 16 || tree->GetNumberOfLines() == 0)
+  {
+    return;
+  }
+  HeartPose heart;
+  Vector3 shift;
+  for (int row = 0; row < 3; ++row)
+  {
+    for (int column = 0; column < 3; ++column)
+    {
+      heart.axes(row, column) = frame->GetComponent(0, 4 * row + column);
+    }
+    shift[row] = frame->GetComponent(0, 4 * row + 3);
+  }
+  heart.size = 1.0 / heart.axes.row(0).norm();
+  heart.axes *= heart.size;
+  heart.origin = -heart.size * (heart.axes.transpose() * shift);
+  const CenterlineTree lines = vtkCoronary::TreeOf(tree, names::Radius);
+  std::vector<float> imageCopy;
+  std::vector<float> copy;
+  const ScalarImage tubes =
+    vtkCoronary::ScalarImageOf(vesselness, vesselness->GetPointData()->GetScalars(), copy);
+  const LooseVesselInput input{ vtkCoronary::ScalarImageOf(
+                                  image, image->GetPointData()->GetScalars(), imageCopy),
+    std::get<const float*>(tubes.values), lines, heart, tissue, blood };
+  const auto texts = [&](const char* name)
+  {
+    auto* array = vtkStringArray::SafeDownCast(fields->GetAbstractArray(name));
+    if (!array)
+    {
+      vtkNew<vtkStringArray> made;
+      made->SetName(name);
+      fields->AddArray(made);
+      array = made;
+    }
+    return array;
+  };
+  const auto numbers = [&](const char* name, int components)
+  {
+    vtkDataArray* array = fields->GetArray(name);
+    if (!array)
+    {
+      vtkNew<vtkDoubleArray> made;
+      made->SetName(name);
+      made->SetNumberOfComponents(components);
+      fields->AddArray(made);
+      array = made;
+    }
+    return array;
+  };
+  for (const TreeWarning& warning : LooseVesselWarnings(FindLooseVessels(input)))
+  {
+    texts(names::Warnings)->InsertNextValue(warning.what);
+    texts(names::WarningVessels)->InsertNextValue(warning.vessel);
+    numbers(names::WarningPlaces, 3)->InsertNextTuple(warning.place.data());
+    numbers(names::WarningConfidences, 1)->InsertNextTuple1(warning.confidence);
+  }
 }
 
 Json DescribeChecks(vtkPolyData* tree)

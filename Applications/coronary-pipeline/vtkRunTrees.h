@@ -10,6 +10,7 @@
 #include <string>
 
 class vtkDataSet;
+class vtkImageData;
 class vtkPolyData;
 
 namespace coronary
@@ -29,7 +30,16 @@ nlohmann::ordered_json OstiaNotFound(const nlohmann::ordered_json& seeds);
 /// Trees that have no branch. @param trees  as of DescribeTrees()
 nlohmann::ordered_json TreesNotFound(const nlohmann::ordered_json& trees);
 
-/// What the check of the named trees found: what, vessel, place, confidence.
+/**
+ * What the image shows and the trees do not hold: added to the warnings in the tree's field data. Of trees without names, of
+ * which the heart's place is not known, nothing is said.
+ * @param image, vesselness  on one grid
+ * @param tissue, blood      the image's values of muscle and of undiluted contrast medium
+ */
+void AddLooseVessels(
+  vtkPolyData* tree, vtkImageData* image, vtkImageData* vesselness, double tissue, double blood);
+
+/// What the checks of the named trees found: what, vessel, place, confidence.
 nlohmann::ordered_json DescribeChecks(vtkPolyData* tree);
 
 /// status.csv. @param trees  as of DescribeTrees()

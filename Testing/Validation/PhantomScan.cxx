@@ -1,10 +1,8 @@
 #include "PhantomScan.h"
 
-#include "CenterlineExtraction.h"
 #include "CoronaryOstia.h"
+#include "MeasuredLesions.h"
 #include "MultiscaleVesselness.h"
-#include "SegmentLabeling.h"
-#include "VesselSegmentation.h"
 
 #include <ctime>
 #include <stdexcept>
@@ -23,6 +21,40 @@ void AddSeconds(double* seconds, int index, double value)
   if (seconds != nullptr)
   {
     seconds[index] = value;
+  }
+}
+
+CenterlineResult Extract(const PhantomScan& image)
+{
+  const ScalarImage intensity = image.Image();
+  CenterlineInput input;
+  input.grid = image.grid;
+  input.speed = image.vesselness.data();
+  input.mask = image.mask.data();
+  input.intensity = &intensity;
+  input.seeds = image.seeds;
+  input.bridges.assign(image.links.begin(), image.links.end());
+  return ExtractCenterlines(input, CenterlineSettings());
+}
+
+CenterlineSet LinesOf(const CenterlineTree& tree, const std::vector<Vector3>& roots)
+{
+  CenterlineSet set = SetOf(tree);
+  set.roots = roots;
+  return set;
+}
+
+/// What the topology does not know of, of the points that it was made of.
+void PassOn(const CenterlineTree& from, CenterlineTopology& tree)
+{
+  for (const std::int64_t source : tree.source)
+  {
+    tree.confidence.push_back(from.confidence[source]);
+    if (!from.bridged.empty())
+    {
+      tree.bridged.push_back(from.bridged[source]);
+      tree.bridgeConfidence.push_back(from.bridgeConfidence[source]);
+    }
   }
 }
 }
@@ -47,6 +79,7 @@ PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, d
     for (const PhantomOstium& ostium : phantom.Ostia(moment))
     {
       seeds.push_back({ ostium.position, ostium.axis });
+      result.seedNames.push_back(ostium.name);
     }
   }
   else
@@ -54,7 +87,9 @@ PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, d
     for (const CoronaryOstium& ostium : ostia.ostia)
     {
       seeds.push_back({ ostium.position, ostium.axis });
+      result.seedNames.push_back(ostium.name);
     }
+    result.doubt = ostia.doubt;
   }
   if (seeds.empty())
   {
@@ -82,50 +117,52 @@ PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, d
   VesselSegmentationResult segmentation =
     SegmentVessels(image, result.vesselness.data(), seeds, settings);
   result.mask = std::move(segmentation.mask);
+  result.window = segmentation.window;
   result.links = std::move(segmentation.links);
   AddSeconds(seconds, 1, ProcessorSeconds() - start);
   return result;
 }
 
+ScalarImage PhantomScan::Image() const
+{
+  ScalarImage image;
+  image.grid = this->grid;
+  image.values = static_cast<const std::int16_t*>(this->values.data());
+  return image;
+}
+
+FoundTree FindTree(const PhantomScan& image)
+{
+  FoundTree found;
+  found.extraction = Extract(image);
+  CenterlineTree& raw = found.extraction.tree;
+  if (!raw.branches.empty() && found.extraction.blur > 0.0)
+  {
+    MeasuredLesions measured = MeasureLumen(raw, image.Image(), found.extraction.blur);
+    raw.points = std::move(measured.lumen.points);
+    raw.radius = std::move(measured.lumen.radius);
+    MeasureTree(raw);
+  }
+  found.tree = BuildTopology(LinesOf(raw, image.seeds));
+  found.labels = LabelSegments(found.tree);
+  SplitAtSegmentBorders(found.tree);
+  PassOn(raw, found.tree);
+  return found;
+}
+
 CenterlineTopology TreeOf(const PhantomScan& image, double* seconds, double* blur)
 {
   double start = ProcessorSeconds();
-  ScalarImage intensity;
-  intensity.grid = image.grid;
-  intensity.values = static_cast<const std::int16_t*>(image.values.data());
-  CenterlineInput input;
-  input.grid = image.grid;
-  input.speed = image.vesselness.data();
-  input.mask = image.mask.data();
-  input.intensity = &intensity;
-  input.seeds = image.seeds;
-  input.bridges.assign(image.links.begin(), image.links.end());
-  const CenterlineResult extracted = ExtractCenterlines(input, CenterlineSettings());
+  const CenterlineResult extracted = Extract(image);
   AddSeconds(seconds, 0, ProcessorSeconds() - start);
   start = ProcessorSeconds();
   if (blur != nullptr)
   {
     *blur = extracted.blur;
   }
-  CenterlineSet set;
-  set.points = extracted.tree.points;
-  set.radius = extracted.tree.radius;
-  set.roots = image.seeds;
-  for (const CenterlineTree::Branch& branch : extracted.tree.branches)
-  {
-    set.lines.push_back(branch.points);
-  }
-  CenterlineTopology tree = BuildTopology(set);
+  CenterlineTopology tree = BuildTopology(LinesOf(extracted.tree, image.seeds));
   LabelSegments(tree);
-  for (const std::int64_t source : tree.source)
-  {
-    tree.confidence.push_back(extracted.tree.confidence[source]);
-    if (!extracted.tree.bridged.empty())
-    {
-      tree.bridged.push_back(extracted.tree.bridged[source]);
-      tree.bridgeConfidence.push_back(extracted.tree.bridgeConfidence[source]);
-    }
-  }
+  PassOn(extracted.tree, tree);
   AddSeconds(seconds, 1, ProcessorSeconds() - start);
   return tree;
 }

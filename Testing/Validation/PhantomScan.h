@@ -5,11 +5,15 @@
 #ifndef DynamicCoronary_PhantomScan_h
 #define DynamicCoronary_PhantomScan_h
 
+#include "CenterlineExtraction.h"
 #include "CenterlineTopology.h"
 #include "CoronaryPhantom.h"
+#include "SegmentLabeling.h"
 #include "VesselLinking.h"
+#include "VesselSegmentation.h"
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace coronary
@@ -22,7 +26,13 @@ struct PhantomScan
   std::vector<float> vesselness;
   std::vector<unsigned char> mask;
   std::vector<Vector3> seeds;
+  std::vector<std::string> seedNames; ///< "LCA", "RCA"
+  std::string doubt;                  ///< of the search for the ostia; empty when it is sure
+  BloodWindow window;
   std::vector<VesselLink> links;
+
+  /// The image as the algorithms take it, of `values`.
+  ScalarImage Image() const;
 };
 
 /**
@@ -34,6 +44,18 @@ struct PhantomScan
 PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, double moment,
   bool trueOstia, double* seconds = nullptr);
 
+/// A tree as `run` has it before its surface: the lumen measured anew, named, cut where names change.
+struct FoundTree
+{
+  CenterlineTopology tree;
+  LabelingResult labels;
+  CenterlineResult extraction; ///< before that
+};
+
+/// @throws as ExtractCenterlines
+FoundTree FindTree(const PhantomScan& image);
+
+/// The tree as the extraction alone gives it, named.
 /// @param seconds  null, or room for 2 processor times: extraction, topology and names
 /// @param blur     null, or room for the standard deviation of the image's blur as the extraction found it, mm
 CenterlineTopology TreeOf(

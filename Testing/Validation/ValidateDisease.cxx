@@ -1,12 +1,16 @@
-// Trees of centerlines from images of diseased phantoms, against their exact truth: how much of the tree is found
-// behind lesions, how much of what is found is no artery, and whether a loss is told. Nothing is given by hand.
-// Tables in Markdown on stdout; the exit code is 1 when a limit is missed.
+// Trees and surfaces from images of diseased phantoms, against their exact truth: how much of the tree is found behind
+// lesions, how much of what is found is no artery, how far the surface is from the wall, how well degrees of stenoses are
+// measured, and whether a loss is told. Nothing is given by hand. Tables in Markdown on stdout; the exit code is 1 when a
+// limit is missed.
 
 #include "CenterlineOverlap.h"
-#include "CenterlineTopology.h"
 #include "CoronaryPhantom.h"
+#include "Losses.h"
+#include "MeasuredLesions.h"
+#include "MeshDistance.h"
 #include "PhantomCases.h"
 #include "PhantomScan.h"
+#include "SweepSurface.h"
 
 #include <CLI/CLI.hpp>
 
@@ -14,10 +18,13 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <exception>
 #include <fstream>
 #include <functional>
-#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,10 +33,16 @@ namespace
 using namespace coronary;
 
 constexpr double ReferencePhase = 0.75;
-constexpr double LeastRadius = 0.5;  // mm: thinner vessels need not be found
-constexpr double FoundWithin = 1.5;  // mm from an axis
-constexpr double LargestFalse = 5.0; // mm a tree
-constexpr double LeastMeanOF = 0.90; // overlap until the first error, mean of all cases
+constexpr double LargestFalse = 5.0;            // mm a tree
+constexpr double LeastMeanOF = 0.90;            // overlap until the first error, mean of all cases
+constexpr double LargestSurfaceDistance = 0.25; // mm, two-sided mean, mean of a condition
+constexpr double GradedDegree = 0.5;  // lesions of this diameter stenosis and more are judged
+constexpr double LeastWithin = 0.90;  // of them with a lumen of 1 mm or more, within 10 points
+constexpr double LeastInRange = 0.90; // of the narrower ones, in the stated range of 90 %
+// In the coarse voxels of the quick run:
+constexpr double LeastQuickFound = 0.85;
+constexpr double LargestQuickFalse = 10.0;  // mm a tree
+constexpr double LargestQuickSurface = 0.7; // mm
 
 /// A kind of case, what it changes, and the share of the tree that must be found.
 struct Condition
@@ -38,6 +51,7 @@ struct Condition
   double leastFound;
   std::function<void(PhantomSettings&)> change;
   double spacing = 0.5; ///< mm
+  bool healthy = false;
 };
 
 std::vector<Condition> Conditions()
@@ -51,7 +65,7 @@ std::vector<Condition> Conditions()
     };
   };
   return {
-    { "healthy", 0.99, [](PhantomSettings&) {} },
+    { "healthy", 0.99, [](PhantomSettings&) {}, 0.5, true },
     { "stenoses-50", 0.98, narrow(4, 0.5) },
     { "stenoses-70", 0.98, narrow(4, 0.7) },
     { "stenoses-90", 0.95, narrow(4, 0.9) },
@@ -83,76 +97,53 @@ std::vector<Condition> Conditions()
   };
 }
 
+struct Options
+{
+  bool trueOstia = false;
+  bool surface = true;
+  bool details = false;
+  bool quick = false;
+  std::string lines; ///< folder
+};
+
+struct Warned
+{
+  Said said;
+  std::string names; ///< of what it names; empty: nothing is wrong there
+};
+
 struct Outcome
 {
   std::string failure;
-  double found = 0.0;                     ///< share of the true length
-  double missed = 0.0;                    ///< mm
-  double wrong = 0.0;                     ///< mm of the result that is no artery
-  double overlap = 0.0;                   ///< OV
-  double toFirstError = 0.0;              ///< OF
-  double relevant = 0.0;                  ///< OT
-  double distance = 0.0;                  ///< AI, mm
-  std::map<std::string, double> missedOf; ///< segment: mm
-  double seconds = 0.0;                   ///< of processor time
+  LengthComparison lengths;
+  double overlap = 0.0;       ///< OV
+  double toFirstError = 0.0;  ///< OF
+  double relevant = 0.0;      ///< OT
+  double distance = 0.0;      ///< AI, mm
+  std::string surfaceFailure; ///< why there is none
+  double surface = 0.0;       ///< two-sided mean distance from the wall, mm
+  double leftOut = 0.0;       ///< mm of the tree that the surface has not
+  DegreeTally wide;           ///< lesions where 1 mm or more is left
+  DegreeTally narrow;         ///< where less is left
+  std::vector<std::string> lesions;
+  std::vector<Warned> warnings;
+  std::vector<Stretch> untold;
+  double seconds = 0.0; ///< of processor time, with the picture and the truth
+
+  bool HasToTell() const { return this->lengths.missed > LargestUntold; }
+  int Alarms() const
+  {
+    return static_cast<int>(std::count_if(this->warnings.begin(), this->warnings.end(),
+      [](const Warned& warned) { return warned.names.empty(); }));
+  }
 };
 
-/// The truth's and the result's lengths within a distance of each other.
-void CompareLengths(const PhantomTree& truth, const CenterlineTopology& tree, Outcome& outcome)
+/// Every case runs on one thread, its own.
+double ThreadSeconds()
 {
-  const auto near = [](const Vector3& p, const std::vector<Vector3>& points, double reach)
-  {
-    return std::any_of(points.begin(), points.end(),
-      [&](const Vector3& q) { return (q - p).squaredNorm() <= reach * reach; });
-  };
-  double all = 0.0;
-  for (const PhantomBranch& branch : truth.branches)
-  {
-    for (std::size_t i = 1; i < branch.points.size(); ++i)
-    {
-      const auto p = static_cast<std::size_t>(branch.points[i]);
-      if (truth.radius[p] < LeastRadius && truth.visibility[p] > 0.0 &&
-        truth.radius[static_cast<std::size_t>(branch.points.back())] < LeastRadius)
-      {
-        // Thin to its end: what is thin in a lesion only counts.
-        const bool lesion = std::any_of(branch.points.begin() + static_cast<std::ptrdiff_t>(i),
-          branch.points.end(),
-          [&](std::int64_t q) { return truth.radius[static_cast<std::size_t>(q)] >= LeastRadius; });
-        if (!lesion)
-        {
-          continue;
-        }
-      }
-      const double length =
-        (truth.points[p] - truth.points[static_cast<std::size_t>(branch.points[i - 1])]).norm();
-      all += length;
-      if (!near(truth.points[p], tree.points, FoundWithin))
-      {
-        outcome.missed += length;
-        outcome.missedOf[truth.segmentId[p] == 0 ? "none" : SegmentName(truth.segmentId[p])] +=
-          length;
-      }
-    }
-  }
-  outcome.found = all > 0.0 ? 1.0 - outcome.missed / all : 0.0;
-  for (const CenterlineTree::Branch& branch : tree.branches)
-  {
-    for (std::size_t i = 1; i < branch.points.size(); ++i)
-    {
-      const auto p = static_cast<std::size_t>(branch.points[i]);
-      bool right = false;
-      for (std::size_t q = 0; q < truth.points.size() && !right; ++q)
-      {
-        const double reach = std::max(FoundWithin, truth.radius[q]);
-        right = (truth.points[q] - tree.points[p]).squaredNorm() <= reach * reach;
-      }
-      if (!right)
-      {
-        outcome.wrong +=
-          (tree.points[p] - tree.points[static_cast<std::size_t>(branch.points[i - 1])]).norm();
-      }
-    }
-  }
+  std::timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 /// Lines of the truth and the result as a legacy VTK file, to be looked at.
@@ -188,81 +179,229 @@ void WriteLines(const std::string& path, const CenterlineSet& set)
   }
 }
 
-Outcome Run(
-  const Condition& condition, std::uint64_t seed, bool trueOstia, const std::string& lines)
+/// The surface as `run` makes it of the tree, failures included.
+void CompareSurface(const CoronaryPhantom& phantom, const CenterlineTree& tree, Outcome& outcome)
+{
+  SweepTree swept;
+  swept.points = tree.points;
+  swept.radius = tree.radius;
+  for (const CenterlineTree::Branch& branch : tree.branches)
+  {
+    swept.branches.push_back({ branch.points, branch.groupId, SegmentName(branch.segmentId) });
+  }
+  SweptSurface surface;
+  try
+  {
+    surface = SweepVesselTree(swept, SweepSettings());
+  }
+  catch (const std::exception& error)
+  {
+    outcome.surfaceFailure = error.what();
+    return;
+  }
+  for (const SweepLeftOut& part : surface.leftOut)
+  {
+    outcome.leftOut += part.length;
+  }
+  for (Said& said : WarningsOf(surface))
+  {
+    outcome.warnings.push_back({ std::move(said), "" });
+  }
+  const PhantomSurface wall = phantom.Surface(ReferencePhase);
+  SurfaceMesh result;
+  result.points = std::move(surface.points);
+  result.triangles = std::move(surface.triangles);
+  SurfaceMesh truth;
+  truth.points = wall.points;
+  truth.triangles = wall.triangles;
+  MeshDistanceSettings settings;
+  settings.hausdorff = false;
+  settings.pointMeasures = false;
+  settings.signedDistances = false;
+  outcome.surface = CompareSurfaces(result, truth, settings).mean;
+}
+
+void CompareLesions(
+  const CoronaryPhantom& phantom, const PhantomScan& scan, const FoundTree& found, Outcome& outcome)
+{
+  const std::vector<PhantomStenosis> truth = phantom.Stenoses(ReferencePhase);
+  if (truth.empty())
+  {
+    return;
+  }
+  std::vector<Stenosis> lesions;
+  if (!found.tree.branches.empty() && found.extraction.blur > 0.0)
+  {
+    lesions = MeasureLesions(found.tree, scan.Image(), found.extraction.blur).grading.lesions;
+  }
+  for (const LesionMatch& match : MatchLesions(truth, found.tree.points, lesions))
+  {
+    if (match.truth.degree < GradedDegree - 1e-6)
+    {
+      continue;
+    }
+    (match.Wide() ? outcome.wide : outcome.narrow).Add(match);
+    std::array<char, 200> row;
+    std::snprintf(row.data(), row.size(),
+      "%s of %.0f %% (%.2f mm left): ", SegmentName(match.truth.segmentId).c_str(),
+      100.0 * match.truth.degree, 2.0 * match.truth.leastRadius);
+    std::string text = row.data();
+    if (match.lesion < 0)
+    {
+      text += match.reached ? "not listed" : "not reached";
+    }
+    else
+    {
+      const Stenosis& lesion = lesions[static_cast<std::size_t>(match.lesion)];
+      std::snprintf(row.data(), row.size(), "%.0f %%, range %.0f to %.0f, %s",
+        100.0 * lesion.degree, 100.0 * lesion.degreeLow, 100.0 * lesion.degreeHigh,
+        LesionKindName(lesion.kind));
+      text += row.data();
+    }
+    outcome.lesions.push_back(text);
+  }
+}
+
+/// What there is a reason to warn of, apart from losses and extras.
+std::vector<Vector3> Troubles(const CoronaryPhantom& phantom, const PhantomScan& scan)
+{
+  constexpr double wrongOstium = 5.0; // mm
+  std::vector<Vector3> places;
+  const PhantomTree tree = phantom.Tree(ReferencePhase);
+  for (std::size_t p = 0; p < tree.points.size(); ++p)
+  {
+    if (tree.visibility[p] <= 0.0)
+    {
+      places.push_back(tree.points[p]);
+    }
+  }
+  for (const PhantomStenosis& stenosis : phantom.Stenoses(ReferencePhase))
+  {
+    places.push_back(stenosis.position);
+  }
+  for (const PhantomPlaque& plaque : phantom.Plaques(ReferencePhase))
+  {
+    places.push_back(plaque.centre);
+  }
+  for (const Vector3& seed : scan.seeds)
+  {
+    double least = wrongOstium + 1.0;
+    for (const PhantomOstium& ostium : phantom.Ostia(ReferencePhase))
+    {
+      least = std::min(least, (ostium.position - seed).norm());
+    }
+    if (least > wrongOstium)
+    {
+      places.push_back(seed);
+    }
+  }
+  return places;
+}
+
+/// Which warnings have a reason. On a healthy heart none has, whatever it says.
+void JudgeWarnings(bool healthy, const std::vector<Vector3>& troubles, Outcome& outcome)
+{
+  std::vector<Said> all;
+  for (Warned& warned : outcome.warnings)
+  {
+    all.push_back(warned.said);
+    if (healthy)
+    {
+      continue;
+    }
+    for (const Stretch& loss : outcome.lengths.losses)
+    {
+      if (loss.length >= 3.0 && Names(warned.said, loss))
+      {
+        warned.names += (warned.names.empty() ? "" : "; ") + loss.Text();
+      }
+    }
+    // What a surface leaves out it does lack.
+    if (warned.names.empty() &&
+      (warned.said.source == "surface" || IsJustified(warned.said, outcome.lengths, troubles)))
+    {
+      warned.names = warned.said.source == "surface" ? "the surface" : "a lesion or a false branch";
+    }
+  }
+  outcome.untold = Untold(outcome.lengths, all);
+}
+
+Outcome Run(const Condition& condition, std::uint64_t seed, const Options& options)
 {
   Outcome outcome;
+  const double start = ThreadSeconds();
   PhantomSettings settings;
   settings.seed = seed;
   condition.change(settings);
   const CoronaryPhantom phantom(settings);
   try
   {
-    std::array<double, 4> seconds{};
     const PhantomScan scan = ScanPhantom(
-      phantom, phantom.DefaultGrid(condition.spacing), ReferencePhase, trueOstia, seconds.data());
-    const CenterlineTopology tree = TreeOf(scan, seconds.data() + 2);
-    for (const double s : seconds)
-    {
-      outcome.seconds += s;
-    }
+      phantom, phantom.DefaultGrid(condition.spacing), ReferencePhase, options.trueOstia);
+    const FoundTree found = FindTree(scan);
     const PhantomTree truth = phantom.Tree(ReferencePhase);
-    CompareLengths(truth, tree, outcome);
+    outcome.lengths = CompareLengths(truth, found.tree);
     CenterlineOverlapSettings relevant;
     relevant.leastRadius = LeastRadius;
     relevant.spacing = 0.1;
     const CenterlineOverlapMeasures total =
-      CompareCenterlineTrees(SetOf(truth), SetOf(tree), relevant).total;
+      CompareCenterlineTrees(SetOf(truth), SetOf(found.tree), relevant).total;
     outcome.overlap = total.overlap;
     outcome.toFirstError = total.overlapToFirstError;
     outcome.relevant = total.overlapRelevant;
     outcome.distance = total.distanceInside;
-    if (!lines.empty())
+    for (Said& said : WarningsOf(scan, found))
     {
-      const std::string base = lines + "/" + condition.name + "-" + std::to_string(seed);
+      outcome.warnings.push_back({ std::move(said), "" });
+    }
+    CompareLesions(phantom, scan, found, outcome);
+    if (options.surface)
+    {
+      CompareSurface(phantom, found.tree, outcome);
+    }
+    JudgeWarnings(condition.healthy, Troubles(phantom, scan), outcome);
+    if (!options.lines.empty())
+    {
+      const std::string base = options.lines + "/" + condition.name + "-" + std::to_string(seed);
       WriteLines(base + "-truth.vtk", SetOf(truth));
-      WriteLines(base + "-found.vtk", SetOf(tree));
+      WriteLines(base + "-found.vtk", SetOf(found.tree));
     }
   }
   catch (const std::exception& error)
   {
     outcome.failure = error.what();
   }
+  outcome.seconds = ThreadSeconds() - start;
   return outcome;
 }
-
-std::string List(const std::map<std::string, double>& lengths)
-{
-  std::string text;
-  for (const auto& [name, length] : lengths)
-  {
-    if (length >= 3.0)
-    {
-      text += (text.empty() ? "" : ", ") + name + " " + std::to_string(std::lround(length));
-    }
-  }
-  return text;
-}
-
-// In the coarse voxels of the quick run:
-constexpr double LeastQuickFound = 0.85;
-constexpr double LargestQuickFalse = 10.0; // mm a tree
 
 /// What a condition's phantoms came to.
 struct Summary
 {
   int phantoms = 0;
   int failed = 0;
-  double found = 0.0; ///< mean
+  double found = 0.0; ///< sums, unless said otherwise
   double least = 1.0;
-  double wrong = 0.0; ///< mm a tree, mean
+  double wrong = 0.0; ///< mm a tree
   double most = 0.0;
   double toFirstError = 0.0;
   double overlap = 0.0;
+  double relevant = 0.0;
+  int surfaces = 0;
+  double surface = 0.0; ///< mm
+  double farthest = 0.0;
+  double leftOut = 0.0;
+  int toTell = 0; ///< cases
+  int untold = 0; ///< cases
+  int alarms = 0; ///< warnings
+  DegreeTally wide;
+  DegreeTally narrow;
+  double seconds = 0.0;
 
   void Add(const Outcome& o)
   {
     ++this->phantoms;
+    this->seconds += o.seconds;
     if (!o.failure.empty())
     {
       ++this->failed;
@@ -270,59 +409,291 @@ struct Summary
       return;
     }
     constexpr double trees = 2.0;
-    this->found += o.found;
-    this->least = std::min(this->least, o.found);
-    this->wrong += o.wrong / trees;
-    this->most = std::max(this->most, o.wrong / trees);
+    this->found += o.lengths.found;
+    this->least = std::min(this->least, o.lengths.found);
+    this->wrong += o.lengths.wrong / trees;
+    this->most = std::max(this->most, o.lengths.wrong / trees);
     this->toFirstError += o.toFirstError;
     this->overlap += o.overlap;
+    this->relevant += o.relevant;
+    this->surfaces += o.surfaceFailure.empty() ? 1 : 0;
+    this->surface += o.surface;
+    this->farthest = std::max(this->farthest, o.surface);
+    this->leftOut += o.leftOut;
+    this->toTell += o.HasToTell() ? 1 : 0;
+    this->untold += o.untold.empty() ? 0 : 1;
+    this->alarms += o.Alarms();
+    this->wide.Add(o.wide);
+    this->narrow.Add(o.narrow);
   }
   double Mean(double sum) const { return this->phantoms > 0 ? sum / this->phantoms : 0.0; }
+  double MeanSurface() const { return this->surfaces > 0 ? this->surface / this->surfaces : 0.0; }
 };
 
-void PrintRow(const Condition& condition, std::uint64_t seed, const Outcome& o)
+struct Row
+{
+  Condition condition;
+  Summary summary;
+};
+
+std::string Joined(const std::vector<Stretch>& stretches, double least)
+{
+  std::string text;
+  for (const Stretch& stretch : stretches)
+  {
+    if (stretch.length >= least)
+    {
+      text += (text.empty() ? "" : "; ") + stretch.Text();
+    }
+  }
+  return text;
+}
+
+void PrintHead(const Options& options)
+{
+  std::printf("Phantoms at t = %.2f, seeds at the %s ostia. Found: share of the true axis with a "
+              "radius of %.1f mm or "
+              "more (and of what is\nnarrowed within it) within %.1f mm of the result. False: "
+              "farther than that, and than "
+              "the lumen's radius, from any axis.\nSurface: two-sided mean distance (by area) of "
+              "the swept surface and the phantom's whole wall. Lesions: those of %.0f %% or "
+              "more\nwhere 1 mm or more is left, within %.0f points, of all. Told: of more than "
+              "%.0f mm missed, the longest loss and every one above %.0f mm.\n\n",
+    ReferencePhase, options.trueOstia ? "true" : "automatic", LeastRadius, FoundWithin,
+    100.0 * GradedDegree, 100.0 * DegreeTally::LargestError, LargestUntold, LargestUntold);
+  std::printf(
+    "| condition | seed | found | missed, mm | false, mm | OV | OF | OT | AI, mm | surface, mm | "
+    "left out, mm | lesions | told | warnings without reason | CPU, s | missed of "
+    "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+}
+
+void PrintCase(
+  const Condition& condition, std::uint64_t seed, const Outcome& o, const Options& options)
 {
   const auto number = static_cast<unsigned long long>(seed);
   if (!o.failure.empty())
   {
     std::printf("| %s | %llu | **%s** |\n", condition.name, number, o.failure.c_str());
+    return;
   }
-  else
+  std::array<char, 60> surface{ "-" };
+  if (options.surface)
   {
-    std::printf("| %s | %llu | %.3f | %.1f | %.1f | %.3f | %.3f | %.3f | %.3f | %.1f | %s |\n",
-      condition.name, number, o.found, o.missed, o.wrong, o.overlap, o.toFirstError, o.relevant,
-      o.distance, o.seconds, List(o.missedOf).c_str());
+    std::snprintf(
+      surface.data(), surface.size(), o.surfaceFailure.empty() ? "%.3f" : "**none**", o.surface);
   }
-  std::fflush(stdout);
+  const std::string lesions = o.wide.Lesions() > 0
+    ? std::to_string(o.wide.within) + " of " + std::to_string(o.wide.Lesions())
+    : std::string("-");
+  std::printf("| %s | %llu | %.3f | %.1f | %.1f | %.3f | %.3f | %.3f | %.3f | %s | %.0f | %s | %s "
+              "| %d | %.0f | %s |\n",
+    condition.name, number, o.lengths.found, o.lengths.missed, o.lengths.wrong, o.overlap,
+    o.toFirstError, o.relevant, o.distance, surface.data(), o.leftOut, lesions.c_str(),
+    !o.HasToTell()       ? "-"
+      : o.untold.empty() ? "yes"
+                         : "**no**",
+    o.Alarms(), o.seconds, Joined(o.lengths.losses, 3.0).c_str());
 }
 
-/// @return whether all limits are met: in the mean of a condition's phantoms
-bool PrintSummaries(const std::vector<std::pair<Condition, Summary>>& summaries, bool quick)
+/// Warnings, lesions, failures: what stands behind a case's row.
+std::string Details(const Condition& condition, std::uint64_t seed, const Outcome& o, bool all)
+{
+  std::string text;
+  const std::string begin = "* " + std::string(condition.name) + " " + std::to_string(seed) + ": ";
+  if (!o.surfaceFailure.empty())
+  {
+    text += begin + "no surface: " + o.surfaceFailure + "\n";
+  }
+  for (const Stretch& loss : o.untold)
+  {
+    std::array<char, 120> place;
+    const Vector3& p = loss.points.front();
+    std::snprintf(place.data(), place.size(), " from (%.1f, %.1f, %.1f) on", p[0], p[1], p[2]);
+    text += begin + "**untold**: " + loss.Text() + place.data() + "\n";
+  }
+  for (const Warned& warned : o.warnings)
+  {
+    if (warned.names.empty() || all)
+    {
+      text += begin + warned.said.source + " (" +
+        (warned.names.empty() ? "**no reason**" : warned.names) + "): " + warned.said.what + "\n";
+    }
+  }
+  for (const std::string& lesion : o.lesions)
+  {
+    text += all ? begin + lesion + "\n" : "";
+  }
+  return text;
+}
+
+/// @return whether all limits on trees and surfaces are met: in the mean of a condition's phantoms
+bool PrintSummaries(const std::vector<Row>& rows, const Options& options)
 {
   std::printf(
-    "\n| condition | phantoms | found, mean | wanted | least | false a tree, mm, mean | most "
-    "| OV, mean | OF, mean | |\n|---|---|---|---|---|---|---|---|---|---|\n");
+    "\n| condition | phantoms | failed | found, mean | wanted | least | false a tree, mm, "
+    "mean | most | OV, mean | OF, mean | OT, mean | surface, mm, mean | most | no surface "
+    "| left out, mm, mean | CPU, s, mean | "
+    "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   bool all = true;
   double firstErrors = 0.0;
   int phantoms = 0;
-  for (const auto& [condition, s] : summaries)
+  for (const auto& [condition, s] : rows)
   {
-    const double wanted = quick ? LeastQuickFound : condition.leastFound;
+    const double wanted = options.quick ? LeastQuickFound : condition.leastFound;
+    const int without = options.surface ? s.phantoms - s.failed - s.surfaces : 0;
     const bool met = s.failed == 0 && s.Mean(s.found) >= wanted &&
-      s.Mean(s.wrong) <= (quick ? LargestQuickFalse : LargestFalse);
+      s.Mean(s.wrong) <= (options.quick ? LargestQuickFalse : LargestFalse) && without == 0 &&
+      (!options.surface ||
+        s.MeanSurface() <= (options.quick ? LargestQuickSurface : LargestSurfaceDistance));
     all = all && met;
     firstErrors += s.toFirstError;
     phantoms += s.phantoms;
-    std::printf("| %s | %d | %.3f | %.2f | %.3f | %.1f | %.1f | %.3f | %.3f | %s |\n",
-      condition.name, s.phantoms, s.Mean(s.found), wanted, s.least, s.Mean(s.wrong), s.most,
-      s.Mean(s.overlap), s.Mean(s.toFirstError), met ? "met" : "**MISSED**");
+    std::printf("| %s | %d | %d | %.3f | %.2f | %.3f | %.1f | %.1f | %.3f | %.3f | %.3f | ",
+      condition.name, s.phantoms, s.failed, s.Mean(s.found), wanted, s.least, s.Mean(s.wrong),
+      s.most, s.Mean(s.overlap), s.Mean(s.toFirstError), s.Mean(s.relevant));
+    if (options.surface)
+    {
+      std::printf(
+        "%.3f | %.3f | %d | %.1f | ", s.MeanSurface(), s.farthest, without, s.Mean(s.leftOut));
+    }
+    else
+    {
+      std::printf("- | - | - | - | ");
+    }
+    std::printf("%.0f | %s |\n", s.Mean(s.seconds), met ? "met" : "**MISSED**");
   }
   const double mean = phantoms > 0 ? firstErrors / phantoms : 0.0;
-  const bool ordered = quick || mean >= LeastMeanOF;
-  std::printf("\nOF over all: %.3f, wanted %.2f: %s. False: at most %.0f mm a tree in the mean.\n",
-    mean, quick ? 0.0 : LeastMeanOF, ordered ? "met" : "**MISSED**",
-    quick ? LargestQuickFalse : LargestFalse);
+  const bool ordered = options.quick || mean >= LeastMeanOF;
+  std::printf(
+    "\nOF over all: %.3f, wanted %.2f: %s. In the mean of a condition false at most %.0f mm "
+    "a tree, surface at most %.2f mm.\n",
+    mean, options.quick ? 0.0 : LeastMeanOF, ordered ? "met" : "**MISSED**",
+    options.quick ? LargestQuickFalse : LargestFalse,
+    options.quick ? LargestQuickSurface : LargestSurfaceDistance);
   return all && ordered && phantoms > 0;
+}
+
+/// @return whether the limits on degrees of stenoses are met, over all conditions
+bool PrintLesions(const std::vector<Row>& rows, const Options& options)
+{
+  DegreeTally wide;
+  DegreeTally narrow;
+  std::printf("\nLesions of %.0f %% or more; wide: 1 mm or more is left.\n\n| condition | wide | "
+              "within %.0f points | mean error | in range | not listed | not reached | narrow | in "
+              "range | mean error | not listed | not reached "
+              "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    100.0 * GradedDegree, 100.0 * DegreeTally::LargestError);
+  const auto print = [](const char* name, const DegreeTally& w, const DegreeTally& n)
+  {
+    std::printf("| %s | %d | %s | %+.3f | %s | %d | %d | %d | %s | %+.3f | %d | %d |\n", name,
+      w.Lesions(), ShareText(w.within, w.Lesions()).c_str(), w.sum / std::max(1, w.listed),
+      ShareText(w.inRange, w.Lesions()).c_str(), w.unlisted, w.unreached, n.Lesions(),
+      ShareText(n.inRange, n.Lesions()).c_str(), n.sum / std::max(1, n.listed), n.unlisted,
+      n.unreached);
+  };
+  for (const auto& [condition, s] : rows)
+  {
+    wide.Add(s.wide);
+    narrow.Add(s.narrow);
+    if (s.wide.Lesions() + s.narrow.Lesions() > 0)
+    {
+      print(condition.name, s.wide, s.narrow);
+    }
+  }
+  print("all", wide, narrow);
+  const auto judge = [&](const char* what, int part, const DegreeTally& tally, double least)
+  {
+    const bool met = options.quick || part >= least * tally.Lesions();
+    std::printf("%s: %s of %d, wanted %.0f %%: %s.\n", what,
+      ShareText(part, tally.Lesions()).c_str(), tally.Lesions(),
+      options.quick ? 0.0 : 100.0 * least, met ? "met" : "**MISSED**");
+    return met;
+  };
+  std::printf("\n");
+  const bool within = judge("Wide lesions within 10 points", wide.within, wide, LeastWithin);
+  return judge("Narrow ones in the stated range", narrow.inRange, narrow, LeastInRange) && within;
+}
+
+/// @return whether all losses are told, and no healthy heart is warned of
+bool PrintWarnings(const std::vector<Row>& rows, const Options& options)
+{
+  std::printf("\n| condition | phantoms | miss more than %.0f mm | of them told | warnings without "
+              "reason | |\n|---|---|---|---|---|---|\n",
+    LargestUntold);
+  bool all = true;
+  int toTell = 0;
+  int untold = 0;
+  for (const auto& [condition, s] : rows)
+  {
+    const bool met = (options.quick || s.untold == 0) && !(condition.healthy && s.alarms > 0);
+    all = all && met;
+    toTell += s.toTell;
+    untold += s.untold;
+    std::printf("| %s | %d | %d | %d | %d | %s |\n", condition.name, s.phantoms, s.toTell,
+      s.toTell - s.untold, s.alarms, met ? "met" : "**MISSED**");
+  }
+  std::printf("\nTold: %d of %d cases that miss more than %.0f mm. Wanted: all, and no warning of "
+              "healthy hearts.\n",
+    toTell - untold, toTell, LargestUntold);
+  return all;
+}
+
+/// Cases beside each other: as many as there are cores, and a gigabyte of free memory for each.
+int DefaultJobs()
+{
+  long free = 0;
+  std::ifstream file("/proc/meminfo");
+  for (std::string line; std::getline(file, line);)
+  {
+    if (std::sscanf(line.c_str(), "MemAvailable: %ld kB", &free) == 1)
+    {
+      break;
+    }
+  }
+  constexpr long gigabyte = 1 << 20; // kB
+  return static_cast<int>(std::clamp<long>(free / gigabyte, 1, NumberOfThreads()));
+}
+
+/// Runs the cases, prints their rows in order as they come.
+std::vector<Row> RunAll(const std::vector<Condition>& conditions,
+  const std::vector<std::uint64_t>& seeds, int jobs, const Options& options)
+{
+  std::vector<Row> rows;
+  for (const Condition& condition : conditions)
+  {
+    rows.push_back({ condition, {} });
+  }
+  const auto count = static_cast<std::int64_t>(conditions.size() * seeds.size());
+  std::vector<std::optional<Outcome>> outcomes(static_cast<std::size_t>(count));
+  std::size_t printed = 0;
+  std::string details;
+  std::mutex mutex;
+  SetNumberOfThreads(jobs);
+  PrintHead(options);
+  std::fflush(stdout);
+  ParallelFor(count, 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const auto at = static_cast<std::size_t>(n);
+        Outcome outcome = Run(conditions[at / seeds.size()], seeds[at % seeds.size()], options);
+        const std::lock_guard<std::mutex> lock(mutex);
+        outcomes[at] = std::move(outcome);
+        for (; printed < outcomes.size() && outcomes[printed]; ++printed)
+        {
+          Row& row = rows[printed / seeds.size()];
+          const std::uint64_t seed = seeds[printed % seeds.size()];
+          row.summary.Add(*outcomes[printed]);
+          PrintCase(row.condition, seed, *outcomes[printed], options);
+          details += Details(row.condition, seed, *outcomes[printed], options.details);
+          outcomes[printed] = Outcome(); // its stretches and texts are of no more use
+        }
+        std::fflush(stdout);
+      }
+    });
+  std::printf("\n%s", details.c_str());
+  return rows;
 }
 }
 
@@ -330,70 +701,69 @@ int main(int argc, char** argv)
 {
   try
   {
-    CLI::App program("Trees of centerlines from images of diseased phantoms, against their truth");
+    CLI::App program("Trees and surfaces from images of diseased phantoms, against their truth");
+    Options options;
     std::string seedText = "401..420";
     std::vector<std::string> wanted;
-    bool trueOstia = false;
-    bool quick = false;
-    std::string lines;
+    bool noSurface = false;
+    int jobs = 0;
     program.add_option("--seeds", seedText, "phantoms: one seed, or first..last")
       ->capture_default_str();
     program.add_option("--conditions", wanted, "only these");
-    program.add_option("--lines", lines, "folder for the lines of truth and result, *.vtk");
-    program.add_flag("--true-ostia", trueOstia, "start at the true ostia, not at those found");
+    program
+      .add_option("--jobs", jobs,
+        "cases at a time, about 0.6 GB each; 0: as many as cores and free memory allow")
+      ->check(CLI::Range(0, 64))
+      ->capture_default_str();
+    program.add_option("--lines", options.lines, "folder for the lines of truth and result, *.vtk");
     program.add_flag(
-      "--quick", quick, "one phantom of three conditions in coarse voxels, with limits of its own");
+      "--true-ostia", options.trueOstia, "start at the true ostia, not at those found");
+    program.add_flag("--no-surface", noSurface, "leave out the surfaces");
+    program.add_flag("--details", options.details,
+      "also all warnings and lesions, not only what is untold or without reason");
+    program.add_flag("--quick", options.quick,
+      "one phantom of three conditions in coarse voxels, with limits of its own");
     std::vector<std::uint64_t> seeds;
-    std::vector<Condition> conditions = Conditions();
+    std::vector<Condition> conditions;
     try
     {
       program.parse(argc, argv);
-      seeds = ParseSeeds(quick ? "3" : seedText, LoneNumber::Seed);
-      if (quick && wanted.empty())
+      seeds = ParseSeeds(options.quick ? "3" : seedText, LoneNumber::Seed);
+      if (options.quick && wanted.empty())
       {
         wanted = { "stenoses-70", "occlusion", "dim-contrast" };
       }
-      for (const std::string& name : wanted)
+      for (const Condition& condition : Conditions())
       {
-        if (std::none_of(conditions.begin(), conditions.end(),
-              [&](const Condition& condition) { return condition.name == name; }))
+        if (wanted.empty() ||
+          std::find(wanted.begin(), wanted.end(), condition.name) != wanted.end())
         {
-          throw CLI::ValidationError("conditions", "there is no condition '" + name + "'");
+          conditions.push_back(condition);
+          conditions.back().spacing = options.quick ? 0.8 : condition.spacing;
         }
+      }
+      if (!wanted.empty() &&
+        conditions.size() != std::set<std::string>(wanted.begin(), wanted.end()).size())
+      {
+        std::string names;
+        for (const Condition& condition : Conditions())
+        {
+          names += (names.empty() ? "" : ", ") + std::string(condition.name);
+        }
+        throw CLI::ValidationError("conditions", "there are only " + names);
       }
     }
     catch (const CLI::ParseError& error)
     {
       return program.exit(error);
     }
-    std::printf("Phantoms at t = %.2f, seeds at the %s ostia. Found: share of the true axis with a "
-                "radius of %.1f mm or "
-                "more (and of what is\nnarrowed within it) within %.1f mm of the result. False: "
-                "farther than that, and than "
-                "the lumen's radius, from any axis.\n\n",
-      ReferencePhase, trueOstia ? "true" : "automatic", LeastRadius, FoundWithin);
-    std::printf(
-      "| condition | seed | found | missed, mm | false, mm | OV | OF | OT | AI, mm | CPU, s "
-      "| missed of |\n|---|---|---|---|---|---|---|---|---|---|---|\n");
-    std::vector<std::pair<Condition, Summary>> summaries;
-    for (Condition& condition : conditions)
-    {
-      if (!wanted.empty() &&
-        std::find(wanted.begin(), wanted.end(), condition.name) == wanted.end())
-      {
-        continue;
-      }
-      condition.spacing = quick ? 0.8 : condition.spacing;
-      Summary summary;
-      for (const std::uint64_t seed : seeds)
-      {
-        const Outcome outcome = Run(condition, seed, trueOstia, lines);
-        PrintRow(condition, seed, outcome);
-        summary.Add(outcome);
-      }
-      summaries.emplace_back(condition, summary);
-    }
-    return PrintSummaries(summaries, quick) ? 0 : 1;
+    options.surface = !noSurface;
+    const std::vector<Row> rows =
+      RunAll(conditions, seeds, jobs > 0 ? jobs : DefaultJobs(), options);
+    const bool trees = PrintSummaries(rows, options);
+    const bool lesions = PrintLesions(rows, options);
+    const bool warnings = PrintWarnings(rows, options);
+    return trees && lesions && warnings ? 0 : 1;
   }
   catch (const std::exception& error)
   {

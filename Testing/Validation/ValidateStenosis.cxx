@@ -2,15 +2,11 @@
 // lesions that do not exist, volumes of calcium, radii beside it. Tables in Markdown on stdout; the exit code is 1 when a
 // limit is missed.
 
-#include "CalciumObjects.h"
 #include "CenterlineTopology.h"
 #include "CoronaryPhantom.h"
-#include "LumenLevels.h"
-#include "LumenRefinement.h"
+#include "MeasuredLesions.h"
 #include "PhantomCases.h"
 #include "PhantomScan.h"
-#include "StenosisGrading.h"
-#include "VesselPaths.h"
 
 #include <CLI/CLI.hpp>
 
@@ -29,10 +25,8 @@ namespace
 using namespace coronary;
 
 constexpr double ReferencePhase = 0.75;
-constexpr double DegreeError = 0.10;        // of what is left of the diameter, absolute
 constexpr double LeastShare = 0.90;         // of lesions above 50 % with a lumen of 1 mm or more
 constexpr double TrueBlur = 0.40;           // mm, of the phantoms' images between voxels of 0.5 mm
-constexpr double MatchDistance = 6.0;       // mm from a true lesion to the measured one
 constexpr double LargestRadiusError = 0.20; // mean, mm, beside calcium
 constexpr double LargestFalse = 0.1;        // lesions a healthy phantom
 constexpr double LeastRadius = 0.75;        // mm, of what radii are compared at
@@ -54,12 +48,8 @@ struct Options
 /// What came of all phantoms of one kind.
 struct Outcome
 {
-  std::vector<double> wide;   ///< degree errors where 1 mm or more is left
-  std::vector<double> narrow; ///< where less is left
-  int wideInRange = 0;        ///< the true degree lies in the stated range
-  int narrowInRange = 0;
-  int unreached = 0; ///< lesions without a tree
-  int missed = 0;    ///< reached, but not listed
+  DegreeTally wide;   ///< where 1 mm or more is left
+  DegreeTally narrow; ///< where less is left
   int falseLesions = 0;
   int falseCalcium = 0;
   int plaques = 0; ///< of which something is outside of the lumen
@@ -195,56 +185,30 @@ double VisibleVolume(const CoronaryPhantom& phantom, const PhantomPlaque& plaque
 void CompareLesions(const CoronaryPhantom& phantom, const CenterlineTree& tree,
   const StenosisGrading& grading, Outcome& outcome)
 {
+  const auto seed = static_cast<unsigned long long>(phantom.Settings().seed);
   std::vector<char> used(grading.lesions.size(), 0);
-  for (const PhantomStenosis& truth : phantom.Stenoses(ReferencePhase))
+  for (const LesionMatch& match :
+    MatchLesions(phantom.Stenoses(ReferencePhase), tree.points, grading.lesions))
   {
-    double reached = std::numeric_limits<double>::infinity();
-    for (const Vector3& point : tree.points)
-    {
-      reached = std::min(reached, (point - truth.position).norm());
-    }
-    std::size_t best = used.size();
-    double least = MatchDistance;
-    for (std::size_t l = 0; l < used.size(); ++l)
-    {
-      const double distance = (grading.lesions[l].position - truth.position).norm();
-      if (used[l] == 0 && distance < least)
-      {
-        least = distance;
-        best = l;
-      }
-    }
+    (match.Wide() ? outcome.wide : outcome.narrow).Add(match);
+    const PhantomStenosis& truth = match.truth;
     std::array<char, 300> row;
-    if (best == used.size())
+    if (match.lesion < 0)
     {
-      ++(reached > 1.5 ? outcome.unreached : outcome.missed);
-      std::snprintf(row.data(), row.size(), "| %llu | %s | %.0f | %.2f | %.2f | %s | | | | |",
-        static_cast<unsigned long long>(phantom.Settings().seed), truth.vessel.c_str(),
-        100.0 * truth.degree, 2.0 * truth.leastRadius, 2.0 * truth.referenceRadius,
-        reached > 1.5 ? "not reached" : "not listed");
+      std::snprintf(row.data(), row.size(), "| %llu | %s | %.0f | %.2f | %.2f | %s | | | | |", seed,
+        truth.vessel.c_str(), 100.0 * truth.degree, 2.0 * truth.leastRadius,
+        2.0 * truth.referenceRadius, match.reached ? "not listed" : "not reached");
       outcome.rows.emplace_back(row.data());
       continue;
     }
-    used[best] = 1;
-    const Stenosis& lesion = grading.lesions[best];
-    const double error = lesion.degree - truth.degree;
-    const bool inRange = truth.degree >= lesion.degreeLow && truth.degree <= lesion.degreeHigh;
-    if (truth.leastRadius >= 0.5)
-    {
-      outcome.wide.push_back(error);
-      outcome.wideInRange += inRange ? 1 : 0;
-    }
-    else
-    {
-      outcome.narrow.push_back(error);
-      outcome.narrowInRange += inRange ? 1 : 0;
-    }
+    used[static_cast<std::size_t>(match.lesion)] = 1;
+    const Stenosis& lesion = grading.lesions[static_cast<std::size_t>(match.lesion)];
     std::snprintf(row.data(), row.size(),
-      "| %llu | %s | %.0f | %.2f | %.2f | %.0f | %.0f..%.0f | %.2f | %.2f | %s %.1f |",
-      static_cast<unsigned long long>(phantom.Settings().seed), truth.vessel.c_str(),
-      100.0 * truth.degree, 2.0 * truth.leastRadius, 2.0 * truth.referenceRadius,
-      100.0 * lesion.degree, 100.0 * lesion.degreeLow, 100.0 * lesion.degreeHigh,
-      lesion.leastDiameter, lesion.referenceDiameter, LesionKindName(lesion.kind), least);
+      "| %llu | %s | %.0f | %.2f | %.2f | %.0f | %.0f..%.0f | %.2f | %.2f | %s %.1f |", seed,
+      truth.vessel.c_str(), 100.0 * truth.degree, 2.0 * truth.leastRadius,
+      2.0 * truth.referenceRadius, 100.0 * lesion.degree, 100.0 * lesion.degreeLow,
+      100.0 * lesion.degreeHigh, lesion.leastDiameter, lesion.referenceDiameter,
+      LesionKindName(lesion.kind), match.distance);
     outcome.rows.emplace_back(row.data());
   }
   for (std::size_t l = 0; l < used.size(); ++l)
@@ -255,8 +219,7 @@ void CompareLesions(const CoronaryPhantom& phantom, const CenterlineTree& tree,
       ++outcome.falseLesions;
       std::array<char, 300> row;
       std::snprintf(row.data(), row.size(),
-        "| %llu | %s at %.0f mm | none | | | %.0f | %.0f..%.0f | %.2f | %.2f | %s |",
-        static_cast<unsigned long long>(phantom.Settings().seed),
+        "| %llu | %s at %.0f mm | none | | | %.0f | %.0f..%.0f | %.2f | %.2f | %s |", seed,
         SegmentName(lesion.segmentId).c_str(), lesion.abscissaLeast, 100.0 * lesion.degree,
         100.0 * lesion.degreeLow, 100.0 * lesion.degreeHigh, lesion.leastDiameter,
         lesion.referenceDiameter, LesionKindName(lesion.kind));
@@ -359,59 +322,27 @@ void Run(const Case& test, const Options& options, Outcome& outcome)
     image.values = static_cast<const std::int16_t*>(scan.values.data());
     tree = TreeOf(scan, nullptr, &blur);
   }
-  const std::vector<VesselPath> paths = VesselPaths(tree);
-  const LumenLevels levels = MeasureLumenLevels(tree, paths, image, blur);
-  CalciumMap calcium = FindCalcium(tree, image, levels);
-  const RefinedLumen lumen = RefineLumen(tree, paths, image, levels, calcium, blur);
-  CenterlineTree refined = tree;
-  refined.points = lumen.points;
-  refined.radius = lumen.radius;
-  MeasureTree(refined);
-  MeasureCalcium(calcium, refined, paths, image, levels, blur);
-  const StenosisGrading grading =
-    GradeStenoses(refined, paths, lumen, refined.bridged, refined.bridgeConfidence);
-  CompareLesions(phantom, refined, grading, outcome);
-  CompareCalcium(phantom, calcium, outcome);
-  CompareRadii(truth, tree, refined, lumen, outcome);
+  const MeasuredLesions measured = MeasureLesions(tree, image, blur);
+  CompareLesions(phantom, measured.refined, measured.grading, outcome);
+  CompareCalcium(phantom, measured.calcium, outcome);
+  CompareRadii(truth, tree, measured.refined, measured.lumen, outcome);
   if (options.details)
   {
     std::fprintf(stderr, "seed %llu: level %.0f background %.0f noise %.1f blur %.3f, %zu voxels\n",
-      static_cast<unsigned long long>(test.settings.seed), levels.level.front(), levels.background,
-      levels.noise, blur, calcium.voxels.size());
+      static_cast<unsigned long long>(test.settings.seed), measured.levels.level.front(),
+      measured.levels.background, measured.levels.noise, blur, measured.calcium.voxels.size());
   }
 }
 
-/// Share of errors of at most the limit.
-double ShareWithin(const std::vector<double>& errors, double limit)
-{
-  const auto good = std::count_if(
-    errors.begin(), errors.end(), [&](double error) { return std::abs(error) <= limit; });
-  return static_cast<double>(good) / static_cast<double>(errors.size());
-}
-}
-
-namespace
-{
 void PrintRow(const Case& test, const Outcome& o)
 {
-  const auto within = [](const std::vector<double>& errors)
-  {
-    return errors.empty() ? std::string("-")
-                          : std::to_string(std::lround(100.0 * ShareWithin(errors, DegreeError)));
-  };
-  const auto inRange = [](int count, const std::vector<double>& errors)
-  {
-    return errors.empty()
-      ? std::string("-")
-      : std::to_string(std::lround(100.0 * count / static_cast<double>(errors.size())));
-  };
-  std::array<char, 600> row;
-  std::snprintf(row.data(), row.size(),
-    "| %s | %zu | %s | %+.3f | %s | %zu | %s | %+.3f | %s | %d | %d | %d |", test.name.c_str(),
-    o.wide.size(), within(o.wide).c_str(), Mean(o.wide), inRange(o.wideInRange, o.wide).c_str(),
-    o.narrow.size(), within(o.narrow).c_str(), Mean(o.narrow),
-    inRange(o.narrowInRange, o.narrow).c_str(), o.missed, o.unreached, o.falseLesions);
-  std::printf("%s\n", row.data());
+  const auto mean = [](const DegreeTally& tally) { return tally.sum / std::max(1, tally.listed); };
+  std::printf("| %s | %d | %s | %+.3f | %s | %d | %s | %+.3f | %s | %d | %d | %d |\n",
+    test.name.c_str(), o.wide.listed, ShareText(o.wide.within, o.wide.listed).c_str(), mean(o.wide),
+    ShareText(o.wide.inRange, o.wide.listed).c_str(), o.narrow.listed,
+    ShareText(o.narrow.within, o.narrow.listed).c_str(), mean(o.narrow),
+    ShareText(o.narrow.inRange, o.narrow.listed).c_str(), o.wide.unlisted + o.narrow.unlisted,
+    o.wide.unreached + o.narrow.unreached, o.falseLesions);
 }
 
 void PrintCalciumRow(const Case& test, const Outcome& o)
@@ -505,7 +436,7 @@ int main(int argc, char** argv)
       }
     }
     std::vector<Outcome> outcomes(cases.size());
-    std::vector<double> wide;
+    DegreeTally wide;
     int healthy = 0;
     int falseOnHealthy = 0;
     for (std::size_t c = 0; c < cases.size(); ++c)
@@ -523,13 +454,12 @@ int main(int argc, char** argv)
         healthy += static_cast<int>(seeds.size());
         falseOnHealthy += outcomes[c].falseLesions;
       }
-      wide.insert(wide.end(), outcomes[c].wide.begin(), outcomes[c].wide.end());
+      wide.Add(outcomes[c].wide);
     }
-    std::printf(
-      "Degrees by diameter; a lumen is wide where 1 mm or more is left.\n\n"
-      "| phantoms | wide lesions | within 10 points, %% | mean error | in range, %% | narrow "
-      "ones | within 10 points, %% | mean error | in range, %% | not listed | not reached | "
-      "false |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+    std::printf("Degrees by diameter; a lumen is wide where 1 mm or more is left.\n\n"
+                "| phantoms | wide lesions | within 10 points | mean error | in range | narrow "
+                "ones | within 10 points | mean error | in range | not listed | not reached | "
+                "false |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (std::size_t c = 0; c < cases.size(); ++c)
     {
       PrintRow(cases[c], outcomes[c]);
@@ -559,12 +489,12 @@ int main(int argc, char** argv)
       }
     }
     bool met = true;
-    if (!wide.empty())
+    if (wide.listed > 0)
     {
-      const double share = ShareWithin(wide, DegreeError);
+      const double share = static_cast<double>(wide.within) / wide.listed;
       met = met && share >= LeastShare;
       std::printf("\nWide lesions within %.0f points: %.0f %%, at least %.0f %% wanted: %s\n",
-        100.0 * DegreeError, 100.0 * share, 100.0 * LeastShare,
+        100.0 * DegreeTally::LargestError, 100.0 * share, 100.0 * LeastShare,
         share >= LeastShare ? "met" : "**MISSED**");
     }
     if (healthy > 0)

@@ -1,0 +1,529 @@
+#include "LooseVessels.h"
+
+#include "LumenMeasurement.h"
+#include "ParallelFor.h"
+#include "SegmentAtlas.h"
+#include "VoxelLattice.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <limits>
+#include <map>
+#include <queue>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr double LeastLength = 8.0; ///< mm
+constexpr double Margin = 20.0;     ///< mm around the tree: half the way between its branches
+/// Vesselness of a piece's voxels, in that on the axes of thin arteries: it falls so far towards their walls.
+constexpr double LeastTube = 0.35;
+constexpr double LeastShare = 0.15;    ///< of the contrast between muscle and blood
+constexpr double TooBright = 1.6;      ///< the same: bone
+constexpr double Thin = 1.2;           ///< mm, radius
+constexpr double Step = 1.0;           ///< mm between sections
+constexpr double Outside = 1.5;        ///< mm beyond the wall of the tree's vessels
+constexpr double SeenConfidence = 0.5; ///< of a section with a lumen all around
+/// Great cardiac, middle and marginal veins run in the grooves and beside branches, some millimetres off the artery.
+constexpr double BesideReach = 10.0; ///< mm
+constexpr double BesideCosine = 0.7; ///< of the angle between both
+/// Contrast of arteries that were missed and of veins, over that of arteries of their calibre: mean and spread. Behind lesions
+/// it is less; veins fill after the arteries, some hearts' nearly as much.
+constexpr double ArteryContrast[] = { 1.0, 0.2 };
+constexpr double VeinContrast[] = { 0.55, 0.25 };
+constexpr double ThinEnd =
+  0.65; ///< mm, half-maximum radius: arteries end thinner, veins go on into wider ones
+constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
+/// Mean distance of true arteries from those of the mean heart is less; beyond it grows doubt.
+constexpr double UsualAway = 10.0; ///< mm of the mean heart
+
+double Median(std::vector<double> values)
+{
+  if (values.empty())
+  {
+    return 0.0;
+  }
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Whether a segment is of the artery that a course of the mean heart is called by: "LAD" has three.
+bool IsOf(int segment, const std::string& course)
+{
+  return SegmentName(segment) == course ||
+    (course == "LAD" && segment >= ProximalLAD && segment <= DistalLAD) ||
+    (course == "LCx" && (segment == ProximalLCx || segment == DistalLCx)) ||
+    (course == "RCA" && segment >= ProximalRCA && segment <= DistalRCA);
+}
+
+/// Logarithm of a normal distribution's density, but for a constant.
+double LogDensity(double value, const double (&usual)[2])
+{
+  const double off = (value - usual[0]) / usual[1];
+  return -0.5 * off * off - std::log(usual[1]);
+}
+
+/// What a vessel of the mean heart is called.
+std::string NameOf(const SegmentAtlas::Point& point)
+{
+  const std::string number = point.number > 0 ? std::to_string(point.number) : "";
+  switch (point.vessel)
+  {
+    case Vessel::LeftMain:
+      return SegmentName(LeftMain);
+    case Vessel::AnteriorDescending:
+      return "LAD";
+    case Vessel::Circumflex:
+      return "LCx";
+    case Vessel::Ramus:
+      return SegmentName(RamusIntermedius);
+    case Vessel::Diagonal:
+      return "D" + number;
+    case Vessel::Septal:
+      return "S" + number;
+    case Vessel::ObtuseMarginal:
+      return "OM" + number;
+    case Vessel::LeftPosterolateral:
+      return SegmentName(LeftPLB);
+    case Vessel::LeftPosteriorDescending:
+      return SegmentName(LeftPDA);
+    case Vessel::RightCoronary:
+      return "RCA";
+    case Vessel::RightVentricular:
+      return SegmentName(RightVentricularBranch);
+    case Vessel::AcuteMarginal:
+      return SegmentName(AcuteMarginal);
+    case Vessel::RightPosteriorDescending:
+      return SegmentName(RightPDA);
+    case Vessel::RightPosterolateral:
+      return SegmentName(RightPLB);
+    case Vessel::InferiorRight:
+      return SegmentName(InferiorRightBranch);
+    case Vessel::Other:
+      break;
+  }
+  return "";
+}
+
+/// A point of the tree with its course, and what the image shows there.
+struct Sample
+{
+  Vector3 position;
+  Vector3 tangent;
+  int segment = 0;
+  double radius = 0.0;     ///< mm, half-maximum
+  double contrast = 0.0;   ///< of its lumen
+  double vesselness = 0.0; ///< greatest around
+};
+
+class Search
+{
+public:
+  explicit Search(const LooseVesselInput& input)
+    : I(input)
+    , L(input.image.grid)
+    , Interpolator(input.image)
+  {
+    this->Lumen.reference.lumen = input.blood;
+    this->Lumen.reference.background = input.tissue;
+  }
+  std::vector<LooseVessel> Run();
+
+private:
+  double Share(std::int64_t voxel) const
+  {
+    const double value = std::visit(
+      [&](const auto* values) { return static_cast<double>(values[voxel]); }, this->I.image.values);
+    return (value - this->I.tissue) / (this->I.blood - this->I.tissue);
+  }
+  Sample Measure(const Vector3& position, const Vector3& tangent, double guess, double* seen) const;
+  void MeasureTree();
+  std::vector<std::vector<std::int64_t>> Pieces() const;
+  bool IsOnHeart(const std::vector<std::int64_t>& piece) const;
+  double Away(const Vector3& position, std::string* name) const;
+  std::vector<Vector3> Axis(const std::vector<std::int64_t>& piece) const;
+  bool Describe(const std::vector<std::int64_t>& piece, LooseVessel& vessel) const;
+
+  const LooseVesselInput& I;
+  VoxelLattice L;
+  ImageInterpolator Interpolator;
+  LumenSettings Lumen;
+  std::vector<Sample> Samples; ///< of the tree, where it is seen
+  double Tube = 0.0;           ///< vesselness of thin arteries
+};
+
+Sample Search::Measure(
+  const Vector3& position, const Vector3& tangent, double guess, double* seen) const
+{
+  const LumenSection section =
+    MeasureLumen(this->Interpolator, position, tangent, guess, this->Lumen);
+  Sample sample;
+  sample.position = position;
+  sample.tangent = tangent;
+  sample.radius = section.radius;
+  sample.contrast = section.lumen - this->I.tissue;
+  if (const auto at = this->L.Nearest(section.centre))
+  {
+    this->L.Ball(*at, 1.0,
+      [&](std::int64_t voxel, const std::array<int, 3>&)
+      {
+        const double value = this->I.vesselness[voxel];
+        sample.vesselness = std::max(sample.vesselness, value);
+      });
+  }
+  *seen = section.confidence;
+  return sample;
+}
+
+void Search::MeasureTree()
+{
+  const CenterlineTree& tree = this->I.tree;
+  std::vector<double> thin;
+  for (const CenterlineTree::Branch& branch : tree.branches)
+  {
+    for (std::size_t i = 2; i + 2 < branch.points.size(); i += 2)
+    {
+      const std::int64_t p = branch.points[i];
+      const Vector3 tangent =
+        (tree.points[branch.points[i + 2]] - tree.points[branch.points[i - 2]]).normalized();
+      double seen = 0.0;
+      Sample sample = this->Measure(tree.points[p], tangent, tree.radius[p], &seen);
+      sample.segment = tree.segmentId.empty() ? 0 : tree.segmentId[p];
+      if (tangent.allFinite() && seen > SeenConfidence)
+      {
+        this->Samples.push_back(sample);
+        if (sample.radius < Thin)
+        {
+          thin.push_back(sample.vesselness);
+        }
+      }
+    }
+  }
+  this->Tube = Median(thin);
+}
+
+/// Connected voxels of tubes that are not near the tree.
+std::vector<std::vector<std::int64_t>> Search::Pieces() const
+{
+  const std::array<int, 3>& size = this->L.Size;
+  std::array<int, 3> low = size;
+  std::array<int, 3> high{ -1, -1, -1 };
+  std::vector<char> taken(static_cast<std::size_t>(this->I.image.NumberOfVoxels()), 0);
+  for (std::size_t p = 0; p < this->I.tree.points.size(); ++p)
+  {
+    const auto at = this->L.Nearest(this->I.tree.points[p]);
+    if (!at)
+    {
+      continue;
+    }
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const int reach = static_cast<int>(Margin / this->L.Spacing[axis]);
+      low[axis] = std::min(low[axis], std::max(0, (*at)[axis] - reach));
+      high[axis] = std::max(high[axis], std::min(size[axis] - 1, (*at)[axis] + reach));
+    }
+    this->L.Ball(*at, this->I.tree.radius[p] + Outside,
+      [&](std::int64_t voxel, const std::array<int, 3>&)
+      { taken[static_cast<std::size_t>(voxel)] = 1; });
+  }
+  const double least = LeastTube * this->Tube;
+  std::vector<std::vector<std::int64_t>> pieces;
+  for (int k = low[2]; k <= high[2]; ++k)
+  {
+    for (int j = low[1]; j <= high[1]; ++j)
+    {
+      for (int i = low[0]; i <= high[0]; ++i)
+      {
+        const auto free = [&](std::int64_t voxel)
+        {
+          if (taken[static_cast<std::size_t>(voxel)] != 0 || !(this->I.vesselness[voxel] >= least))
+          {
+            return false;
+          }
+          const double share = this->Share(voxel);
+          return share >= LeastShare && share <= TooBright;
+        };
+        const std::int64_t first = this->L.Index(i, j, k);
+        if (!free(first))
+        {
+          continue;
+        }
+        taken[static_cast<std::size_t>(first)] = 1;
+        std::vector<std::int64_t> piece{ first };
+        for (std::size_t n = 0; n < piece.size(); ++n)
+        {
+          this->L.Neighbours(piece[n],
+            [&](std::int64_t next, float)
+            {
+              if (free(next))
+              {
+                taken[static_cast<std::size_t>(next)] = 1;
+                piece.push_back(next);
+              }
+            });
+        }
+        if (static_cast<double>(piece.size()) * std::cbrt(this->L.VoxelVolume()) >= LeastLength)
+        {
+          std::sort(piece.begin(), piece.end());
+          pieces.push_back(std::move(piece));
+        }
+      }
+    }
+  }
+  return pieces;
+}
+
+/// mm of the mean heart from its nearest artery, and what that is called.
+double Search::Away(const Vector3& position, std::string* name) const
+{
+  const SegmentAtlas& atlas = SegmentAtlas::Get();
+  const Vector3 place = atlas.axes.transpose() * this->I.heart.ToHeart(position) + atlas.origin;
+  double least = std::numeric_limits<double>::infinity();
+  const SegmentAtlas::Point* nearest = nullptr;
+  for (const SegmentAtlas::Point& point : atlas.points)
+  {
+    const double away = (point.position - place).squaredNorm();
+    if (away < least)
+    {
+      least = away;
+      nearest = &point;
+    }
+  }
+  if (name != nullptr && nearest != nullptr)
+  {
+    *name = NameOf(*nearest);
+  }
+  return std::sqrt(least);
+}
+
+/// Whether most of a piece is where arteries run: vessels of the lung and ribs are many.
+bool Search::IsOnHeart(const std::vector<std::int64_t>& piece) const
+{
+  const std::size_t stride = std::max<std::size_t>(1, piece.size() / 100);
+  int all = 0;
+  int near = 0;
+  for (std::size_t n = 0; n < piece.size(); n += stride)
+  {
+    ++all;
+    near += this->Away(this->L.World(this->L.Place(piece[n])), nullptr) < 2.0 * UsualAway ? 1 : 0;
+  }
+  return 2 * near > all;
+}
+
+/// The longest shortest way through a piece, smoothed, a step apart.
+std::vector<Vector3> Search::Axis(const std::vector<std::int64_t>& piece) const
+{
+  std::vector<std::ptrdiff_t> before(piece.size());
+  const auto farthest = [&](std::size_t from)
+  {
+    std::vector<float> distance(piece.size(), std::numeric_limits<float>::infinity());
+    using Entry = std::pair<float, std::size_t>;
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+    distance[from] = 0.0F;
+    before[from] = -1;
+    queue.push({ 0.0F, from });
+    std::size_t last = from;
+    while (!queue.empty())
+    {
+      const auto [length, at] = queue.top();
+      queue.pop();
+      if (length > distance[at])
+      {
+        continue;
+      }
+      last = at;
+      this->L.Neighbours(piece[at],
+        [&](std::int64_t voxel, float step)
+        {
+          const auto found = std::lower_bound(piece.begin(), piece.end(), voxel);
+          if (found == piece.end() || *found != voxel)
+          {
+            return;
+          }
+          const auto next = static_cast<std::size_t>(found - piece.begin());
+          // Through the middle of the tube.
+          const double tube = this->I.vesselness[voxel] / this->Tube;
+          const auto cost = static_cast<float>(step / std::clamp(tube, 0.3, 1.5));
+          if (length + cost < distance[next])
+          {
+            distance[next] = length + cost;
+            before[next] = static_cast<std::ptrdiff_t>(at);
+            queue.push({ distance[next], next });
+          }
+        });
+    }
+    return last;
+  };
+  const std::size_t end = farthest(farthest(0));
+  std::vector<Vector3> way;
+  for (auto at = static_cast<std::ptrdiff_t>(end); at >= 0;
+       at = before[static_cast<std::size_t>(at)])
+  {
+    way.push_back(this->L.World(this->L.Place(piece[static_cast<std::size_t>(at)])));
+  }
+  const auto reach = static_cast<std::size_t>(1.5 / this->L.Spacing.minCoeff()) + 1;
+  std::vector<Vector3> axis;
+  for (std::size_t n = 0; n < way.size(); ++n)
+  {
+    const std::size_t around = std::min({ reach, n, way.size() - 1 - n });
+    Vector3 mean = Vector3::Zero();
+    for (std::size_t m = n - around; m <= n + around; ++m)
+    {
+      mean += way[m] / static_cast<double>(2 * around + 1);
+    }
+    if (axis.empty() || (mean - axis.back()).norm() >= Step)
+    {
+      axis.push_back(mean);
+    }
+  }
+  return axis;
+}
+
+bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vessel) const
+{
+  vessel.points = this->Axis(piece);
+  const std::vector<Vector3>& axis = vessel.points;
+  for (std::size_t n = 1; n < axis.size(); ++n)
+  {
+    vessel.length += (axis[n] - axis[n - 1]).norm();
+  }
+  if (vessel.length < LeastLength || axis.size() < 5)
+  {
+    return false;
+  }
+  std::vector<double> radii;
+  std::vector<double> contrasts;
+  std::map<std::string, int> names;
+  std::array<std::vector<double>, 2> ends;
+  const auto endSections = static_cast<std::size_t>(EndLength / Step);
+  int count = 0;
+  for (std::size_t n = 1; n + 1 < axis.size(); ++n)
+  {
+    const Vector3 tangent =
+      (axis[std::min(n + 2, axis.size() - 1)] - axis[n < 2 ? 0 : n - 2]).normalized();
+    double seen = 0.0;
+    const Sample sample = this->Measure(axis[n], tangent, 0.8, &seen);
+    ++count;
+    if (seen > SeenConfidence)
+    {
+      radii.push_back(sample.radius);
+      for (const std::size_t end : { 0, 1 })
+      {
+        if ((end == 0 ? n : axis.size() - 1 - n) <= endSections)
+        {
+          ends[end].push_back(sample.radius);
+        }
+      }
+      contrasts.push_back(sample.contrast);
+    }
+    const Sample* companion = &this->Samples.front();
+    for (const Sample& other : this->Samples)
+    {
+      companion =
+        (other.position - axis[n]).squaredNorm() < (companion->position - axis[n]).squaredNorm()
+        ? &other
+        : companion;
+    }
+    std::string name;
+    vessel.away += this->Away(axis[n], &name);
+    if ((companion->position - axis[n]).norm() < BesideReach &&
+      std::abs(companion->tangent.dot(tangent)) > BesideCosine)
+    {
+      (IsOf(companion->segment, name) ? vessel.besideItsOwn : vessel.besideOther) += 1.0;
+    }
+    ++names[name];
+  }
+  vessel.besideItsOwn /= count;
+  vessel.besideOther /= count;
+  vessel.away /= count;
+  vessel.seen = static_cast<double>(radii.size()) / count;
+  vessel.radius = Median(radii);
+  std::vector<double> usual;
+  for (const Sample& sample : this->Samples)
+  {
+    if (std::abs(sample.radius - vessel.radius) < 0.2 * vessel.radius)
+    {
+      usual.push_back(sample.contrast);
+    }
+  }
+  const double level = Median(usual);
+  vessel.brightness = level > 0.0 ? Median(contrasts) / level : 0.0;
+  vessel.nearest = std::max_element(names.begin(), names.end(),
+    [](const auto& one, const auto& other) {
+      return one.second < other.second;
+    })->first;
+  vessel.thinEnd = vessel.radius;
+  for (const std::vector<double>& end : ends)
+  {
+    vessel.thinEnd = end.empty() ? vessel.thinEnd : std::min(vessel.thinEnd, Median(end));
+  }
+  // Where an artery usually runs and does, another one is its vein; where it does not, it is the artery.
+  const double odds = LogDensity(vessel.brightness, ArteryContrast) -
+    LogDensity(vessel.brightness, VeinContrast) + 1.0 - 5.0 * vessel.besideItsOwn -
+    1.5 * vessel.besideOther + (vessel.thinEnd <= ThinEnd ? 1.0 : -2.0);
+  vessel.confidence = vessel.seen / (1.0 + std::exp(-odds)) *
+    std::exp(-std::max(0.0, vessel.away - UsualAway) / UsualAway);
+  return true;
+}
+
+std::vector<LooseVessel> Search::Run()
+{
+  this->MeasureTree();
+  std::vector<LooseVessel> vessels;
+  if (this->Samples.empty() || !(this->Tube > 0.0))
+  {
+    return vessels;
+  }
+  for (const std::vector<std::int64_t>& piece : this->Pieces())
+  {
+    LooseVessel vessel;
+    if (this->IsOnHeart(piece) && this->Describe(piece, vessel))
+    {
+      vessels.push_back(std::move(vessel));
+    }
+  }
+  std::stable_sort(vessels.begin(), vessels.end(),
+    [](const LooseVessel& a, const LooseVessel& b) { return a.length > b.length; });
+  return vessels;
+}
+}
+
+std::vector<LooseVessel> FindLooseVessels(const LooseVesselInput& input)
+{
+  if (!(input.blood > input.tissue) || input.vesselness == nullptr)
+  {
+    throw std::invalid_argument("loose vessels: blood must be above tissue, and vesselness given");
+  }
+  return Search(input).Run();
+}
+
+std::vector<TreeWarning> LooseVesselWarnings(const std::vector<LooseVessel>& vessels)
+{
+  constexpr double rather = 0.5;
+  std::vector<TreeWarning> warnings;
+  for (const LooseVessel& vessel : vessels)
+  {
+    if (vessel.confidence < rather)
+    {
+      continue;
+    }
+    const Vector3& from = vessel.points.front();
+    const Vector3& to = vessel.points.back();
+    const Vector3& middle = vessel.points[vessel.points.size() / 2];
+    std::array<char, 300> text;
+    std::snprintf(text.data(), text.size(),
+      "a vessel of %.0f mm between (%.1f, %.1f, %.1f) and (%.1f, %.1f, %.1f), by (%.1f, %.1f, "
+      "%.1f), looks like an artery and is in no tree; nearest to it usually runs the %s",
+      vessel.length, from[0], from[1], from[2], to[0], to[1], to[2], middle[0], middle[1],
+      middle[2], vessel.nearest.c_str());
+    warnings.push_back({ text.data(), vessel.nearest, middle, std::min(0.99, vessel.confidence) });
+  }
+  return warnings;
+}
+}

@@ -1,0 +1,171 @@
+// Tubes that no tree holds: an artery that is cut off is told with its place, veins and healthy trees are not.
+
+#include "CoronaryPhantom.h"
+#include "LooseVessels.h"
+#include "MultiscaleVesselness.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+using namespace coronary;
+
+namespace
+{
+constexpr double Phase = 0.75;
+
+/// An image of a phantom with its vesselness, and the true tree as far as it is wide enough to be seen.
+class LooseVessels : public ::testing::Test
+{
+protected:
+  static void SetUpTestSuite()
+  {
+    PhantomSettings settings;
+    settings.seed = 311;
+    const CoronaryPhantom phantom(settings);
+    Truth = phantom.Tree(Phase);
+    Vein = phantom.Vein(Phase);
+    Grid = phantom.DefaultGrid(0.6);
+    ScalarImage image;
+    image.grid = Grid;
+    const auto voxels = static_cast<std::size_t>(image.NumberOfVoxels());
+    Values.resize(voxels);
+    phantom.Render(Grid, Grid.extent, Phase, Values.data());
+    const std::vector<float> input(Values.begin(), Values.end());
+    Vesselness.resize(voxels);
+    VesselnessSettings frangi;
+    frangi.sigmas = VesselnessScales(0.5, 2.5, 5, true);
+    frangi.c = 100.0;
+    MultiscaleVesselness::Output output;
+    output.vesselness = Vesselness.data();
+    MultiscaleVesselness(frangi, Grid.spacing, Grid.extent)
+      .Compute({ input.data(), Grid.extent }, Grid.extent, nullptr, output);
+  }
+  static void TearDownTestSuite()
+  {
+    Values = {};
+    Vesselness = {};
+  }
+
+  /// What is found with the tree without a segment's branches and all that hangs on them.
+  static std::vector<LooseVessel> Find(int without, std::vector<Vector3>* gone = nullptr)
+  {
+    CenterlineSet set;
+    set.points = Truth.points;
+    set.radius = Truth.radius;
+    std::set<int> cut;
+    for (const PhantomBranch& branch : Truth.branches)
+    {
+      if (branch.segmentId == without || cut.count(branch.parentGroupId) != 0)
+      {
+        cut.insert(branch.groupId);
+        for (const std::int64_t point : branch.points)
+        {
+          if (gone != nullptr)
+          {
+            gone->push_back(Truth.points[static_cast<std::size_t>(point)]);
+          }
+        }
+        continue;
+      }
+      std::vector<std::int64_t> line = branch.points;
+      while (line.size() > 1 && Truth.radius[static_cast<std::size_t>(line.back())] < 0.45)
+      {
+        line.pop_back();
+      }
+      if (line.size() > 1)
+      {
+        set.lines.push_back(line);
+      }
+    }
+    CenterlineTopology tree = BuildTopology(set);
+    const LabelingResult labels = LabelSegments(tree);
+    ScalarImage image;
+    image.grid = Grid;
+    image.values = static_cast<const std::int16_t*>(Values.data());
+    return FindLooseVessels({ image, Vesselness.data(), tree, labels.heart, 50.0, 420.0 });
+  }
+  static double Distance(const Vector3& place, const std::vector<Vector3>& points)
+  {
+    double least = 1e9;
+    for (const Vector3& point : points)
+    {
+      least = std::min(least, (point - place).norm());
+    }
+    return least;
+  }
+
+  static PhantomTree Truth;
+  static PhantomTree Vein;
+  static ImageGrid Grid;
+  static std::vector<std::int16_t> Values;
+  static std::vector<float> Vesselness;
+};
+PhantomTree LooseVessels::Truth;
+PhantomTree LooseVessels::Vein;
+ImageGrid LooseVessels::Grid;
+std::vector<std::int16_t> LooseVessels::Values;
+std::vector<float> LooseVessels::Vesselness;
+}
+
+TEST_F(LooseVessels, NothingIsSaidOfAHealthyTree)
+{
+  for (const TreeWarning& warning : LooseVesselWarnings(Find(-1)))
+  {
+    ADD_FAILURE() << warning.what;
+  }
+}
+
+TEST_F(LooseVessels, ASideBranchThatIsMissingIsTold)
+{
+  for (const int segment : { SecondDiagonal, FirstObtuseMarginal, AcuteMarginal })
+  {
+    std::vector<Vector3> gone;
+    const std::vector<LooseVessel> vessels = Find(segment, &gone);
+    const std::vector<TreeWarning> warnings = LooseVesselWarnings(vessels);
+    ASSERT_FALSE(warnings.empty()) << SegmentName(segment);
+    for (const TreeWarning& warning : warnings)
+    {
+      EXPECT_LT(Distance(warning.place, gone), 2.0) << warning.what;
+      EXPECT_GE(warning.confidence, 0.5);
+      EXPECT_LE(warning.confidence, 0.99);
+    }
+    // All along it.
+    const auto longest = std::find_if(vessels.begin(), vessels.end(),
+      [&](const LooseVessel& vessel) { return vessel.confidence >= 0.5; });
+    for (const Vector3& point : longest->points)
+    {
+      EXPECT_LT(Distance(point, gone), 2.0);
+    }
+  }
+}
+
+TEST_F(LooseVessels, AVeinIsNoArtery)
+{
+  int veins = 0;
+  for (const LooseVessel& vessel : Find(-1))
+  {
+    const Vector3& middle = vessel.points[vessel.points.size() / 2];
+    if (Distance(middle, Vein.points) < 3.0)
+    {
+      ++veins;
+      EXPECT_LT(vessel.confidence, 0.2);
+    }
+  }
+  EXPECT_GT(veins, 0);
+}
+
+TEST_F(LooseVessels, WithoutContrastOrTreeThereIsNoMeasure)
+{
+  ScalarImage image;
+  image.grid = Grid;
+  image.values = static_cast<const std::int16_t*>(Values.data());
+  const CenterlineTree none;
+  EXPECT_TRUE(
+    FindLooseVessels({ image, Vesselness.data(), none, HeartPose(), 50.0, 420.0 }).empty());
+  EXPECT_THROW(FindLooseVessels({ image, Vesselness.data(), none, HeartPose(), 50.0, 50.0 }),
+    std::invalid_argument);
+  EXPECT_THROW(
+    FindLooseVessels({ image, nullptr, none, HeartPose(), 50.0, 420.0 }), std::invalid_argument);
+}
