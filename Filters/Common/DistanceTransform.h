@@ -29,6 +29,15 @@ std::vector<float> SquaredDistanceTransform(const unsigned char* mask,
   const ProgressCallback& progress = {});
 
 /**
+ * Where a voxel whose mask value is 0 is near: 1 where the squared distance transform is at most `square` mm^2, else 0.
+ * Needs a byte a voxel, where the transform needs four; distances of up to 24 voxels are looked at in windows, which is quicker.
+ * @throws Cancelled
+ */
+std::vector<unsigned char> NearZeros(const unsigned char* mask,
+  const std::array<int, 3>& dimensions, const Vector3& spacing, double square,
+  const ProgressCallback& progress = {});
+
+/**
  * What a ball of `radius` mm covers while it stays inside the mask: 1 there, else 0. Keeps bodies
  * and drops tubes and sheets thinner than the ball.
  * @throws Cancelled

@@ -136,6 +136,49 @@ const VesselnessKernels& Kernels()
   return *Selected();
 }
 
+/// Of a row of voxels from i0 to i1.
+struct RowPiece
+{
+  int i0;
+  int i1;
+  int j;
+  int k;
+};
+
+/// What a mask has of some rows; nothing: i1 is below i0.
+struct Bounds
+{
+  int i0;
+  int i1;
+  int j0;
+  int j1;
+};
+
+Bounds MaskBounds(const unsigned char* rows, int width, int count)
+{
+  const auto isIn = [](unsigned char value) { return value != 0; };
+  Bounds bounds{ width, -1, count, -1 };
+  for (int j = 0; j < count; ++j)
+  {
+    const unsigned char* row = rows + static_cast<std::int64_t>(j) * width;
+    const unsigned char* first = std::find_if(row, row + width, isIn);
+    if (first == row + width)
+    {
+      continue;
+    }
+    int last = width - 1;
+    while (row[last] == 0)
+    {
+      --last;
+    }
+    bounds.i0 = std::min(bounds.i0, static_cast<int>(first - row));
+    bounds.i1 = std::max(bounds.i1, last);
+    bounds.j0 = std::min(bounds.j0, j);
+    bounds.j1 = j;
+  }
+  return bounds;
+}
+
 /// Axis of the vessel: eigenvector of the eigenvalue that is the greatest after the sign.
 Eigen::Vector3f VesselAxis(const HessianRow& h, int i, float sign)
 {
@@ -244,11 +287,12 @@ std::array<int, 3> MultiscaleVesselness::Halo() const
   return halo;
 }
 
-/// consume(j, k, scale, row, buffer) gets the Hessian of one row of the part at one scale; for a
-/// given row all scales come in order, from one thread.
+/// consume(row, scale, width, hessian) gets the Hessian of one row of the part at one scale, or of that piece of it that
+/// holds what the mask has of the rows around; for a given row all scales come in order, from one thread. Rows
+/// without mask may not come.
 template <typename Consumer>
 void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<int, 6>& part,
-  const Consumer& consume, const ProgressCallback& progress) const
+  const unsigned char* mask, const Consumer& consume, const ProgressCallback& progress) const
 {
   const std::array<int, 6>& e = input.extent;
   const std::array<int, 3> halo = this->Halo();
@@ -286,8 +330,24 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
       for (std::int64_t unit = first; unit < last; ++unit)
       {
         const int k = part[4] + static_cast<int>(unit / bands);
-        const int j0 = part[2] + static_cast<int>(unit % bands) * BandRows;
-        const int j1 = std::min(part[3], j0 + BandRows - 1);
+        int j0 = part[2] + static_cast<int>(unit % bands) * BandRows;
+        int j1 = std::min(part[3], j0 + BandRows - 1);
+        int i0 = part[0];
+        int i1 = part[1];
+        if (mask)
+        {
+          const Bounds wanted =
+            MaskBounds(mask + ((k - part[4]) * static_cast<std::int64_t>(ny) + (j0 - part[2])) * nx,
+              nx, j1 - j0 + 1);
+          if (wanted.i1 < wanted.i0)
+          {
+            continue;
+          }
+          i0 = part[0] + wanted.i0;
+          i1 = part[0] + wanted.i1;
+          j1 = j0 + wanted.j1;
+          j0 += wanted.j0;
+        }
         for (std::size_t scale = 0; scale < this->Taps.size(); ++scale)
         {
           const auto& taps = this->Taps[scale];
@@ -297,8 +357,8 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
           const int ry = static_cast<int>(taps[3].size()) - 1;
           const int rz = static_cast<int>(taps[6].size()) - 1;
           // What exists of the halo; the rest repeats the border.
-          const int x0 = std::max(part[0] - rx, this->Whole[0]);
-          const int x1 = std::min(part[1] + rx, this->Whole[1]);
+          const int x0 = std::max(i0 - rx, this->Whole[0]);
+          const int x1 = std::min(i1 + rx, this->Whole[1]);
           const int y0 = std::max(j0 - ry, this->Whole[2]);
           const int y1 = std::min(j1 + ry, this->Whole[3]);
           const int width = x1 - x0 + 1;
@@ -334,7 +394,7 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
           }
 
           // Across the rows, then along them.
-          const int packed = Padded(nx);
+          const int packed = Padded(i1 - i0 + 1);
           for (std::vector<float>& row : crossed)
           {
             row.resize(stride);
@@ -357,7 +417,7 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
           const auto along = [&](int from, int order, int to)
           {
             // The row with its halo, border voxels repeated.
-            const int left = part[0] - rx;
+            const int left = i0 - rx;
             for (int x = left; x < x0; ++x)
             {
               scratch[x - left] = crossed[from][0];
@@ -382,7 +442,7 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
             along(4, 0, 5); // yz
             const HessianRow hessian{ results[0].data(), results[1].data(), results[2].data(),
               results[3].data(), results[4].data(), results[5].data() };
-            consume(y, k, scale, packed, hessian);
+            consume(RowPiece{ i0, i1, y, k }, scale, packed, hessian);
           }
         }
       }
@@ -401,9 +461,24 @@ void MultiscaleVesselness::Compute(const VoxelBlock& input, const std::array<int
     static_cast<float>(0.5 / (this->Settings.c * this->Settings.c)) };
   const int nx = part[1] - part[0] + 1;
   const int ny = part[3] - part[2] + 1;
+  const std::int64_t slice = static_cast<std::int64_t>(nx) * ny;
+  ParallelFor(mask ? part[5] - part[4] + 1 : 0, 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      // What the mask leaves out is not computed at all.
+      std::fill(output.vesselness + first * slice, output.vesselness + last * slice, 0.0f);
+      if (output.scale)
+      {
+        std::fill(output.scale + first * slice, output.scale + last * slice, 0.0f);
+      }
+      if (output.direction)
+      {
+        std::fill(output.direction + 3 * first * slice, output.direction + 3 * last * slice, 0.0f);
+      }
+    });
   this->ForEachRow(
-    input, part,
-    [&](int j, int k, std::size_t scale, int width, const HessianRow& hessian)
+    input, part, mask,
+    [&](const RowPiece& piece, std::size_t scale, int width, const HessianRow& hessian)
     {
       thread_local std::vector<float> response;
       response.resize(width);
@@ -421,10 +496,11 @@ void MultiscaleVesselness::Compute(const VoxelBlock& input, const std::array<int
             response.data());
           break;
       }
-      const std::int64_t row = ((k - part[4]) * static_cast<std::int64_t>(ny) + (j - part[2])) * nx;
+      const std::int64_t row = (piece.k - part[4]) * slice +
+        static_cast<std::int64_t>(piece.j - part[2]) * nx + (piece.i0 - part[0]);
       float* best = output.vesselness + row;
       const auto sigma = static_cast<float>(this->Settings.sigmas[scale]);
-      for (int i = 0; i < nx; ++i)
+      for (int i = 0; i <= piece.i1 - piece.i0; ++i)
       {
         if (scale == 0)
         {
@@ -477,19 +553,20 @@ MultiscaleVesselness::Extremes MultiscaleVesselness::Measure(const VoxelBlock& i
   Extremes extremes;
   extremes.jermanMaxima.assign(jerman ? this->Taps.size() : 0, 0.0);
   this->ForEachRow(
-    input, part,
-    [&](int j, int k, std::size_t scale, int width, const HessianRow& hessian)
+    input, part, mask,
+    [&](const RowPiece& piece, std::size_t scale, int width, const HessianRow& hessian)
     {
       thread_local std::vector<float> measure;
       measure.resize(width);
       const unsigned char* inside = mask
-        ? mask + ((k - part[4]) * static_cast<std::int64_t>(ny) + (j - part[2])) * nx
+        ? mask + ((piece.k - part[4]) * static_cast<std::int64_t>(ny) + (piece.j - part[2])) * nx +
+          (piece.i0 - part[0])
         : nullptr;
       const auto largest = [&]
       {
         // Not max_element: a NaN in front would hide the rest of the row.
         float result = 0.0f;
-        for (int i = 0; i < nx; ++i)
+        for (int i = 0; i <= piece.i1 - piece.i0; ++i)
         {
           const float value = inside && !inside[i] ? 0.0f : measure[i];
           const bool greater = value > result && value <= std::numeric_limits<float>::max();

@@ -76,7 +76,8 @@ public:
    * Frangi's values below 1e-6 are rounding, and become 0.
    *
    * @param input   must hold `part` grown by Halo(), as far as that lies in the whole image
-   * @param mask    one value for each voxel of `part`, 0: leave out (result 0); may be null
+   * @param mask    one value for each voxel of `part`, 0: leave out (result 0); may be null. Pieces of rows outside
+   *                of it are not computed
    * @throws Cancelled, and std::invalid_argument if the input lacks part of the halo
    */
   void Compute(const VoxelBlock& input, const std::array<int, 6>& part, const unsigned char* mask,
@@ -101,8 +102,8 @@ public:
 
 private:
   template <typename Consumer>
-  void ForEachRow(const VoxelBlock& input, const std::array<int, 6>& part, const Consumer& consume,
-    const ProgressCallback& progress) const;
+  void ForEachRow(const VoxelBlock& input, const std::array<int, 6>& part,
+    const unsigned char* mask, const Consumer& consume, const ProgressCallback& progress) const;
 
   VesselnessSettings Settings;
   Vector3 Spacing;

@@ -1,10 +1,14 @@
 #include "VesselLinking.h"
 
+#include "SparseVoxels.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <memory>
+#include <optional>
 #include <queue>
-#include <unordered_map>
 
 namespace coronary
 {
@@ -36,32 +40,29 @@ public:
   VoxelPiece(const VoxelLattice& lattice, std::vector<std::int64_t> voxels)
     : L(lattice)
     , Voxels(std::move(voxels))
+    , Number(MakeNumbers(lattice, this->Voxels))
   {
-    this->Number.reserve(this->Voxels.size() * 2);
-    for (std::size_t n = 0; n < this->Voxels.size(); ++n)
-    {
-      this->Number[this->Voxels[n]] = static_cast<std::int32_t>(n);
-    }
   }
 
   std::size_t Size() const { return this->Voxels.size(); }
+  const std::vector<std::int64_t>& All() const { return this->Voxels; }
   std::int64_t Voxel(std::int32_t n) const { return this->Voxels[static_cast<std::size_t>(n)]; }
   Vector3 Position(std::int32_t n) const { return this->L.World(this->L.Place(this->Voxel(n))); }
-  bool Contains(std::int64_t voxel) const { return this->Number.count(voxel) != 0; }
 
   /// Calls f(number, mm) for the neighbours that belong to the piece.
   template <typename F>
   void Neighbours(std::int32_t n, const F& f) const
   {
-    this->L.Neighbours(this->Voxel(n),
-      [&](std::int64_t voxel, float length)
+    const std::array<int, 3> at = this->L.Place(this->Voxel(n));
+    for (const VoxelLattice::Neighbour& next : this->L.Around)
+    {
+      const std::int32_t number =
+        this->Number.Get(at[0] + next.di, at[1] + next.dj, at[2] + next.dk);
+      if (number >= 0)
       {
-        const auto found = this->Number.find(voxel);
-        if (found != this->Number.end())
-        {
-          f(found->second, length);
-        }
-      });
+        f(number, next.length);
+      }
+    }
   }
 
   /// What is within `reach` mm of a start, nearest first: numbers and mm, and where the way came from.
@@ -85,35 +86,63 @@ public:
       }
     };
     std::vector<Reached> reached;
-    std::unordered_map<std::int32_t, char> done;
+    thread_local std::vector<char> done; // 0 between calls
+    done.resize(std::max(done.size(), this->Size()), 0);
     std::priority_queue<Entry> queue;
     queue.push({ 0.0F, start, -1 });
     while (!queue.empty())
     {
       const Entry top = queue.top();
       queue.pop();
-      if (!done.emplace(top.number, 1).second)
+      if (done[static_cast<std::size_t>(top.number)] != 0)
       {
         continue;
       }
+      done[static_cast<std::size_t>(top.number)] = 1;
       const auto place = static_cast<std::int32_t>(reached.size());
       reached.push_back({ top.number, top.distance, top.before });
       this->Neighbours(top.number,
         [&](std::int32_t next, float length)
         {
-          if (top.distance + length <= reach && done.count(next) == 0)
+          if (top.distance + length <= reach && done[static_cast<std::size_t>(next)] == 0)
           {
             queue.push({ top.distance + length, next, place });
           }
         });
     }
+    for (const Reached& r : reached)
+    {
+      done[static_cast<std::size_t>(r.number)] = 0;
+    }
     return reached;
   }
 
 private:
+  static SparseVoxels<std::int32_t> MakeNumbers(
+    const VoxelLattice& lattice, const std::vector<std::int64_t>& voxels)
+  {
+    std::array<int, 3> low = lattice.Size;
+    std::array<int, 3> high{ -1, -1, -1 };
+    for (const std::int64_t voxel : voxels)
+    {
+      const std::array<int, 3> at = lattice.Place(voxel);
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        low[axis] = std::min(low[axis], at[axis]);
+        high[axis] = std::max(high[axis], at[axis]);
+      }
+    }
+    SparseVoxels<std::int32_t> numbers(low, high, -1);
+    for (std::size_t n = 0; n < voxels.size(); ++n)
+    {
+      numbers.At(lattice.Place(voxels[n])) = static_cast<std::int32_t>(n);
+    }
+    return numbers;
+  }
+
   const VoxelLattice& L;
   std::vector<std::int64_t> Voxels;
-  std::unordered_map<std::int64_t, std::int32_t> Number;
+  SparseVoxels<std::int32_t> Number;
 };
 
 /// Where a piece or the tree ends.
@@ -149,7 +178,18 @@ private:
     double length = 0.0; ///< mm between its farthest ends
     std::vector<VesselEnd> ends;
     std::vector<double>
-      growth; ///< of an end: how much wider the vessel becomes behind it, a factor
+      growth; ///< of an end: how much wider the vessel becomes behind it, a factor; -1: not measured
+  };
+  /// What a piece was found to be: a round later most pieces are the same.
+  struct Description
+  {
+    std::vector<std::int64_t> voxels; ///< of a piece that is no orphan
+    std::unique_ptr<Orphan> orphan;
+
+    const std::vector<std::int64_t>& Voxels() const
+    {
+      return this->orphan ? this->orphan->piece.All() : this->voxels;
+    }
   };
 
   std::vector<std::vector<std::int64_t>> Pieces(
@@ -160,7 +200,10 @@ private:
     const VoxelPiece& piece, const std::vector<VoxelPiece::Reached>& distances) const;
   double Growth(const VoxelPiece& piece, const VesselEnd& end) const;
   std::optional<Orphan> Describe(std::vector<std::int64_t> voxels) const;
+  void DescribeAll(std::vector<std::vector<std::int64_t>> pieces, const ProgressCallback& progress);
+  VesselLink BestLink(Orphan& orphan, const std::vector<VesselEnd>& tips) const;
   float Evidence(std::int64_t voxel) const;
+  float Price(std::int64_t voxel) const;
   bool Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target, double within,
     VesselLink& link) const;
   bool Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const;
@@ -171,6 +214,7 @@ private:
   const VoxelLattice& L;
   const LinkingSettings& Settings;
   LumenSettings Lumen;
+  std::map<std::int64_t, Description> Described; ///< by the pieces' first voxels
 };
 
 /// Connected voxels that look like vessel around the tree, and are none of it.
@@ -470,6 +514,14 @@ float Linker::Evidence(std::int64_t voxel) const
   return std::isfinite(tube) ? std::max(0.0F, tube) : 0.0F;
 }
 
+/// Of a millimetre on a way.
+float Linker::Price(std::int64_t voxel) const
+{
+  const float price = 1.0F - 0.85F * this->Evidence(voxel);
+  // Bright and no tube: the rim of a chamber.
+  return this->I.share(voxel) > 0.5F && this->I.tube(voxel) < LeastTube ? price + 1.0F : price;
+}
+
 /// The cheapest way from an end of a piece to the tree, near a target.
 /// @param within  mm from the target that count as there
 bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target,
@@ -487,23 +539,35 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
       return this->cost != other.cost ? this->cost > other.cost : this->voxel > other.voxel;
     }
   };
+  // A voxel is looked at once, however many neighbours lead to it.
   struct Known
   {
-    float cost;
     std::int64_t before;
+    float cost;
+    float perMillimetre; ///< negative: not looked at yet; infinite: no way
     bool done;
   };
-  std::unordered_map<std::int64_t, Known> known;
-  std::priority_queue<Entry> queue;
+  std::array<int, 3> low;
+  std::array<int, 3> high;
+  this->L.BoxAround(middle, reach, low, high);
   const std::int64_t start = piece.Voxel(end.number);
-  known[start] = { 0.0F, -1, false };
+  const std::array<int, 3> startAt = this->L.Place(start);
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    low[axis] = std::min(low[axis], startAt[axis]);
+    high[axis] = std::max(high[axis], startAt[axis]);
+  }
+  SparseVoxels<Known> known(low, high, { -1, Unreached, -1.0F, false });
+  std::priority_queue<Entry> queue;
+  known.At(startAt) = { -1, 0.0F, 1.0F, false };
   queue.push({ 0.0F, start });
   std::int64_t arrived = -1;
   while (!queue.empty())
   {
     const Entry top = queue.top();
     queue.pop();
-    Known& here = known[top.voxel];
+    const std::array<int, 3> at = this->L.Place(top.voxel);
+    Known& here = known.At(at);
     if (here.done)
     {
       continue;
@@ -511,34 +575,36 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
     here.done = true;
     if (this->I.inTree(top.voxel))
     {
-      if ((this->L.World(this->L.Place(top.voxel)) - target).norm() <= within)
+      if ((this->L.World(at) - target).norm() <= within)
       {
         arrived = top.voxel;
         break;
       }
       continue;
     }
-    this->L.Neighbours(top.voxel,
-      [&](std::int64_t next, float length)
+    for (const VoxelLattice::Neighbour& step : this->L.Around)
+    {
+      const std::array<int, 3> to{ at[0] + step.di, at[1] + step.dj, at[2] + step.dk };
+      if (!known.Contains(to))
       {
-        if (this->I.forbidden(next) || (this->L.World(this->L.Place(next)) - middle).norm() > reach)
-        {
-          return;
-        }
-        float perMillimetre = 1.0F - 0.85F * this->Evidence(next);
-        // Bright and no tube: the rim of a chamber.
-        if (this->I.share(next) > 0.5F && this->I.tube(next) < LeastTube)
-        {
-          perMillimetre += 1.0F;
-        }
-        const float cost = top.cost + length * perMillimetre;
-        const auto [place, isNew] = known.try_emplace(next, Known{ cost, top.voxel, false });
-        if (isNew || (!place->second.done && cost < place->second.cost))
-        {
-          place->second = { cost, top.voxel, false };
-          queue.push({ cost, next });
-        }
-      });
+        continue;
+      }
+      const std::int64_t next = top.voxel + step.offset;
+      Known& there = known.At(to);
+      if (there.perMillimetre < 0.0F)
+      {
+        there.perMillimetre = this->I.forbidden(next) || (this->L.World(to) - middle).norm() > reach
+          ? Unreached
+          : this->Price(next);
+      }
+      const float cost = top.cost + step.length * there.perMillimetre;
+      if (!there.done && cost < there.cost)
+      {
+        there.cost = cost;
+        there.before = top.voxel;
+        queue.push({ cost, next });
+      }
+    }
   }
   if (arrived < 0)
   {
@@ -548,7 +614,7 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
   link.points.clear();
   link.length = 0.0;
   link.unseen = 0.0;
-  for (std::int64_t at = arrived; at >= 0; at = known[at].before)
+  for (std::int64_t at = arrived; at >= 0; at = known.Get(this->L.Place(at)).before)
   {
     const Vector3 p = this->L.World(this->L.Place(at));
     if (!link.points.empty())
@@ -700,16 +766,141 @@ double Linker::Judge(
   return odds;
 }
 
+/// Descriptions of all pieces, in the order of their first voxels. What was known of others is forgotten.
+void Linker::DescribeAll(
+  std::vector<std::vector<std::int64_t>> pieces, const ProgressCallback& progress)
+{
+  std::map<std::int64_t, Description> known = std::move(this->Described);
+  this->Described.clear();
+  std::vector<std::pair<std::vector<std::int64_t>*, Description*>> unknown;
+  for (std::vector<std::int64_t>& voxels : pieces)
+  {
+    Description& description = this->Described[voxels.front()];
+    const auto before = known.find(voxels.front());
+    if (before != known.end() && before->second.Voxels() == voxels)
+    {
+      description = std::move(before->second);
+    }
+    else
+    {
+      unknown.emplace_back(&voxels, &description);
+    }
+  }
+  // The largest first, so that no thread begins with it when the others have ended.
+  std::stable_sort(unknown.begin(), unknown.end(),
+    [](const auto& a, const auto& b) { return a.first->size() > b.first->size(); });
+  ParallelFor(
+    static_cast<std::int64_t>(unknown.size()), 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const auto& [voxels, description] = unknown[static_cast<std::size_t>(n)];
+        std::optional<Orphan> orphan = this->Describe(*voxels);
+        if (orphan)
+        {
+          description->orphan = std::make_unique<Orphan>(std::move(*orphan));
+          description->orphan->growth.assign(description->orphan->ends.size(), -1.0);
+        }
+        else
+        {
+          description->voxels = std::move(*voxels);
+        }
+      }
+    },
+    progress);
+}
+
+/// The likeliest of the links from an orphan's ends to the tree; without any its confidence is 0.
+VesselLink Linker::BestLink(Orphan& orphan, const std::vector<VesselEnd>& tips) const
+{
+  VesselLink best;
+  double bestOdds = -std::numeric_limits<double>::infinity();
+  for (std::size_t e = 0; e < orphan.ends.size(); ++e)
+  {
+    const VesselEnd& end = orphan.ends[e];
+    const auto consider = [&](const Vector3& target, double within, const VesselEnd* tip)
+    {
+      VesselLink link;
+      const bool way = this->Way(orphan.piece, end, target, within, link);
+      // Where hardly anything is seen, the cheapest way follows what is no vessel.
+      VesselLink curve;
+      if (tip != nullptr && (!way || link.unseen > 0.5 * link.length) &&
+        this->Curve(end, *tip, curve))
+      {
+        link = std::move(curve);
+      }
+      else if (!way)
+      {
+        return;
+      }
+      if (orphan.growth[e] < 0.0)
+      {
+        orphan.growth[e] = this->Growth(orphan.piece, end);
+      }
+      const double odds = this->Judge(orphan, e, tip, link);
+      if (odds > bestOdds)
+      {
+        bestOdds = odds;
+        best = std::move(link);
+      }
+    };
+    for (const VesselEnd& tip : tips)
+    {
+      const Vector3 chord = tip.position - end.position;
+      const double gap = chord.norm();
+      if (gap > this->Settings.longestGap ||
+        (gap > 4.0 &&
+          (Angle(end.outwards, chord / gap) > 1.2 || Angle(tip.outwards, -chord / gap) > 1.2)))
+      {
+        continue;
+      }
+      consider(tip.position, 2.0, &tip);
+    }
+    // The wall of the tree ahead.
+    double least = std::numeric_limits<double>::infinity();
+    Vector3 wall = Vector3::Zero();
+    const std::optional<std::array<int, 3>> at = this->L.Nearest(end.position);
+    if (at)
+    {
+      this->L.Ball(*at, WallGap,
+        [&](std::int64_t voxel, const std::array<int, 3>& place)
+        {
+          if (!this->I.inTree(voxel))
+          {
+            return;
+          }
+          const Vector3 chord = this->L.World(place) - end.position;
+          const double gap = std::max(1e-6, chord.norm());
+          const double angle = Angle(end.outwards, chord / gap);
+          const double cost = gap * (1.0 + angle * angle);
+          if ((angle < 0.9 || gap < 2.5) && cost < least)
+          {
+            least = cost;
+            wall = this->L.World(place);
+          }
+        });
+    }
+    if (std::isfinite(least))
+    {
+      consider(wall, 1.5, nullptr);
+    }
+  }
+  best.confidence = 1.0 / (1.0 + std::exp(-bestOdds));
+  return best;
+}
+
 std::vector<VesselLink> Linker::Run(
   const std::vector<std::pair<std::int64_t, float>>& tree, const ProgressCallback& progress)
 {
-  std::vector<Orphan> orphans;
-  for (std::vector<std::int64_t>& voxels : this->Pieces(tree))
+  this->DescribeAll(
+    this->Pieces(tree), [&](double fraction) { return !progress || progress(0.5 * fraction); });
+  std::vector<Orphan*> orphans;
+  for (auto& [first, description] : this->Described)
   {
-    std::optional<Orphan> orphan = this->Describe(std::move(voxels));
-    if (orphan && !orphan->ends.empty())
+    if (description.orphan && !description.orphan->ends.empty())
     {
-      orphans.push_back(std::move(*orphan));
+      orphans.push_back(&*description.orphan);
     }
   }
   Report(progress, 0.5);
@@ -725,97 +916,47 @@ std::vector<VesselLink> Linker::Run(
   const std::vector<VesselEnd> tips =
     paths.empty() ? std::vector<VesselEnd>() : this->EndsOf(trunk, paths);
 
+  std::vector<VesselLink> best(orphans.size());
+  ParallelFor(
+    static_cast<std::int64_t>(orphans.size()), 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        best[static_cast<std::size_t>(n)] =
+          this->BestLink(*orphans[static_cast<std::size_t>(n)], tips);
+      }
+    },
+    [&](double fraction) { return !progress || progress(0.5 + 0.5 * fraction); });
   std::vector<VesselLink> links;
-  for (Orphan& orphan : orphans)
+  for (VesselLink& link : best)
   {
-    VesselLink best;
-    double bestOdds = -std::numeric_limits<double>::infinity();
-    orphan.growth.assign(orphan.ends.size(), -1.0);
-    for (std::size_t e = 0; e < orphan.ends.size(); ++e)
+    if (link.confidence >= this->Settings.leastConfidence)
     {
-      const VesselEnd& end = orphan.ends[e];
-      const auto consider = [&](const Vector3& target, double within, const VesselEnd* tip)
-      {
-        VesselLink link;
-        const bool way = this->Way(orphan.piece, end, target, within, link);
-        // Where hardly anything is seen, the cheapest way follows what is no vessel.
-        VesselLink curve;
-        if (tip != nullptr && (!way || link.unseen > 0.5 * link.length) &&
-          this->Curve(end, *tip, curve))
-        {
-          link = std::move(curve);
-        }
-        else if (!way)
-        {
-          return;
-        }
-        if (orphan.growth[e] < 0.0)
-        {
-          orphan.growth[e] = this->Growth(orphan.piece, end);
-        }
-        const double odds = this->Judge(orphan, e, tip, link);
-        if (odds > bestOdds)
-        {
-          bestOdds = odds;
-          best = std::move(link);
-        }
-      };
-      for (const VesselEnd& tip : tips)
-      {
-        const Vector3 chord = tip.position - end.position;
-        const double gap = chord.norm();
-        if (gap > this->Settings.longestGap ||
-          (gap > 4.0 &&
-            (Angle(end.outwards, chord / gap) > 1.2 || Angle(tip.outwards, -chord / gap) > 1.2)))
-        {
-          continue;
-        }
-        consider(tip.position, 2.0, &tip);
-      }
-      // The wall of the tree ahead.
-      double least = std::numeric_limits<double>::infinity();
-      Vector3 wall = Vector3::Zero();
-      const std::optional<std::array<int, 3>> at = this->L.Nearest(end.position);
-      if (at)
-      {
-        this->L.Ball(*at, WallGap,
-          [&](std::int64_t voxel, const std::array<int, 3>& place)
-          {
-            if (!this->I.inTree(voxel))
-            {
-              return;
-            }
-            const Vector3 chord = this->L.World(place) - end.position;
-            const double gap = std::max(1e-6, chord.norm());
-            const double angle = Angle(end.outwards, chord / gap);
-            const double cost = gap * (1.0 + angle * angle);
-            if ((angle < 0.9 || gap < 2.5) && cost < least)
-            {
-              least = cost;
-              wall = this->L.World(place);
-            }
-          });
-      }
-      if (std::isfinite(least))
-      {
-        consider(wall, 1.5, nullptr);
-      }
-    }
-    best.confidence = 1.0 / (1.0 + std::exp(-bestOdds));
-    if (best.confidence >= this->Settings.leastConfidence)
-    {
-      links.push_back(std::move(best));
+      links.push_back(std::move(link));
     }
   }
-  Report(progress, 1.0);
   return links;
 }
 }
 
-std::vector<VesselLink> FindVesselLinks(const LinkingImage& image,
-  const std::vector<std::pair<std::int64_t, float>>& tree, const LinkingSettings& settings,
-  const ProgressCallback& progress)
+struct VesselLinker::Work
 {
-  return Linker(image, settings).Run(tree, progress);
+  LinkingImage image;
+  LinkingSettings settings;
+  Linker linker{ image, settings };
+};
+
+VesselLinker::VesselLinker(const LinkingImage& image, const LinkingSettings& settings)
+  : Data(new Work{ image, settings })
+{
+}
+
+VesselLinker::~VesselLinker() = default;
+
+std::vector<VesselLink> VesselLinker::Find(
+  const std::vector<std::pair<std::int64_t, float>>& tree, const ProgressCallback& progress)
+{
+  return this->Data->linker.Run(tree, progress);
 }
 }

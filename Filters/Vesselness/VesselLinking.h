@@ -17,6 +17,7 @@
 #include "VoxelLattice.h"
 
 #include <functional>
+#include <memory>
 #include <vector>
 
 namespace coronary
@@ -53,15 +54,29 @@ struct LinkingSettings
   double leastConfidence = 0.5; ///< of a link, 0 to 1
 };
 
-/**
- * The links that may be made now: at most one a piece, none that contradict each other. What they lead to is
- * not part of the tree yet, and may have more pieces behind it.
- * @param tree  numbers of the tree's voxels, with the path length from the root, mm
- * @throws Cancelled
- */
-std::vector<VesselLink> FindVesselLinks(const LinkingImage& image,
-  const std::vector<std::pair<std::int64_t, float>>& tree, const LinkingSettings& settings,
-  const ProgressCallback& progress = {});
+/// Finds links, round by round: what was found out of pieces that are the same a round later is kept.
+class VesselLinker
+{
+public:
+  /// @param image  its functions are called from several threads, and its references must outlive this
+  VesselLinker(const LinkingImage& image, const LinkingSettings& settings);
+  ~VesselLinker();
+  VesselLinker(const VesselLinker&) = delete;
+  VesselLinker& operator=(const VesselLinker&) = delete;
+
+  /**
+   * The links that may be made now: at most one a piece, none that contradict each other. What they lead to is
+   * not part of the tree yet, and may have more pieces behind it.
+   * @param tree  numbers of the tree's voxels, with the path length from the root, mm
+   * @throws Cancelled
+   */
+  std::vector<VesselLink> Find(
+    const std::vector<std::pair<std::int64_t, float>>& tree, const ProgressCallback& progress = {});
+
+private:
+  struct Work;
+  std::unique_ptr<Work> Data;
+};
 }
 
 #endif

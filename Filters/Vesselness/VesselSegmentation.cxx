@@ -1,6 +1,7 @@
 #include "VesselSegmentation.h"
 
 #include "DistanceTransform.h"
+#include "SparseVoxels.h"
 #include "VesselLinking.h"
 #include "VoxelLattice.h"
 
@@ -9,7 +10,6 @@
 #include <limits>
 #include <queue>
 #include <stdexcept>
-#include <unordered_map>
 
 namespace coronary
 {
@@ -34,6 +34,68 @@ ProgressCallback Part(const ProgressCallback& progress, double from, double to)
   }
   return [progress, from, to](double f) { return progress(from + (to - from) * f); };
 }
+
+/// What is known of a block near the vessels.
+struct BlockValue
+{
+  std::array<int, 3> place;
+  float lumen = -std::numeric_limits<float>::infinity(); ///< brightest smoothed member
+  float outsideSum = 0.0f;
+  float outsideCount = 0.0f;
+};
+
+/// Blocks near the vessels: there are few of them in an image.
+class BlockValues
+{
+public:
+  explicit BlockValues(const std::array<int, 3>& blocks)
+    : Blocks(blocks)
+    , Numbers({ 0, 0, 0 }, { blocks[0] - 1, blocks[1] - 1, blocks[2] - 1 }, -1)
+  {
+  }
+
+  /// Place in `values` of a block, which is new there if need be.
+  std::size_t Number(const std::array<int, 3>& place)
+  {
+    std::int32_t& number = this->Numbers.At(place);
+    if (number < 0)
+    {
+      number = static_cast<std::int32_t>(this->values.size());
+      this->values.push_back({ place });
+    }
+    return static_cast<std::size_t>(number);
+  }
+  const BlockValue* Find(const std::array<int, 3>& place) const
+  {
+    const std::int32_t number = this->Numbers.Get(place);
+    return number < 0 ? nullptr : &this->values[static_cast<std::size_t>(number)];
+  }
+  /// Adds all blocks that are up to `times` the reach away from one, axis by axis.
+  void Grow(const std::array<int, 3>& reach, int times)
+  {
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const std::size_t count = this->values.size();
+      for (std::size_t n = 0; n < count; ++n)
+      {
+        std::array<int, 3> place = this->values[n].place;
+        const int middle = place[axis];
+        const int last = std::min(this->Blocks[axis] - 1, middle + times * reach[axis]);
+        for (place[axis] = std::max(0, middle - times * reach[axis]); place[axis] <= last;
+             ++place[axis])
+        {
+          this->Number(place);
+        }
+      }
+    }
+  }
+
+  std::vector<BlockValue> values;
+
+private:
+  std::array<int, 3> Blocks;
+  SparseVoxels<std::int32_t> Numbers;
+};
 
 /// Steps 1 to 4 of the header for one type of voxel.
 template <typename T>
@@ -85,6 +147,22 @@ private:
   void CutLeakage();
   void CrossLesions(const std::vector<VesselSeed>& seeds,
     const std::vector<std::array<int, 3>>& places, const ProgressCallback& progress);
+  template <typename V>
+  SparseVoxels<V> Sparse(V nothing) const
+  {
+    return SparseVoxels<V>(
+      { 0, 0, 0 }, { this->L.Size[0] - 1, this->L.Size[1] - 1, this->L.Size[2] - 1 }, nothing);
+  }
+  /// Places in Members, -1: none.
+  SparseVoxels<std::int32_t> MemberNumbers() const
+  {
+    auto numbers = this->Sparse<std::int32_t>(-1);
+    for (std::size_t m = 0; m < this->Members.size(); ++m)
+    {
+      numbers.At(this->L.Place(this->Members[m].voxel)) = static_cast<std::int32_t>(m);
+    }
+    return numbers;
+  }
   void KeepConnected();
   void RefineWall(std::vector<float>* probability, const ProgressCallback& progress);
   void DropIslands();
@@ -241,14 +319,15 @@ void Segmentation<T>::FindBodies(const ProgressCallback& progress)
     Part(progress, 0.0, 0.3));
   std::vector<unsigned char> body = OpenWithBall(blood.data(), blocks, this->L.BlockSpacing,
     this->Settings.largestRadius, Part(progress, 0.3, 0.7));
+  blood = std::vector<unsigned char>();
   // The rim of a body is bright as well, and no vessel unless it is tubular.
   for (unsigned char& b : body)
   {
     b = b ? 0 : 1;
   }
-  const std::vector<float> away =
-    SquaredDistanceTransform(body.data(), blocks, this->L.BlockSpacing, Part(progress, 0.7, 0.9));
   const double rim = 1.1 * this->L.BlockSpacing.maxCoeff();
+  const std::vector<unsigned char> near =
+    NearZeros(body.data(), blocks, this->L.BlockSpacing, rim * rim, Part(progress, 0.7, 0.9));
   this->States.assign(
     static_cast<std::size_t>(this->L.Size[0]) * this->L.Size[1] * this->L.Size[2], Unknown);
   ParallelFor(
@@ -262,9 +341,8 @@ void Segmentation<T>::FindBodies(const ProgressCallback& progress)
           for (int i = 0; i < this->L.Size[0]; ++i)
           {
             const std::int64_t p = this->L.Index(i, j, k);
-            const float distance = away[this->L.BlockOf({ i, j, k })];
-            if (distance <= 0.0f ||
-              (distance <= rim * rim && !(this->Vesselness[p] >= this->Tubular)))
+            const std::int64_t block = this->L.BlockOf({ i, j, k });
+            if (body[block] == 0 || (near[block] != 0 && !(this->Vesselness[p] >= this->Tubular)))
             {
               this->States[p] = Body;
             }
@@ -320,24 +398,29 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
   struct Entry
   {
     float path;
+    std::int32_t
+      origin; ///< number of the seed, times Ways, and of the neighbour that it was reached from
     std::int64_t voxel;
-    int seed;
-    std::int64_t before;
     bool operator<(const Entry& other) const
     {
       return this->path != other.path ? this->path > other.path : this->voxel > other.voxel;
     }
   };
+  constexpr std::int32_t ways = 32;
+  constexpr std::int32_t none = ways - 1;
   std::priority_queue<Entry> queue;
+  // The shortest path that waits for a voxel: a longer one need not wait as well.
+  SparseVoxels<float> shortest = this->Sparse(std::numeric_limits<float>::infinity());
   const auto weak = static_cast<float>(this->Settings.weak);
   for (std::size_t s = 0; s < seeds.size(); ++s)
   {
     this->L.Ball(places[s], ballRadius,
-      [&](std::int64_t p, const std::array<int, 3>&)
+      [&](std::int64_t p, const std::array<int, 3>& at)
       {
-        if (this->States[p] == Unknown && this->Likelihood(p) >= weak)
+        if (this->States[p] == Unknown && this->Likelihood(p) >= weak && shortest.Get(at) > 0.0f)
         {
-          queue.push({ 0.0f, p, static_cast<int>(s), -1 });
+          shortest.At(at) = 0.0f;
+          queue.push({ 0.0f, static_cast<std::int32_t>(s) * ways + none, p });
         }
       });
   }
@@ -352,14 +435,17 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
       continue;
     }
     this->States[top.voxel] = Vessel;
-    this->Members.push_back({ top.voxel, top.path, top.seed, top.before });
+    const std::int32_t way = top.origin % ways;
+    this->Members.push_back({ top.voxel, top.path, top.origin / ways,
+      way == none ? -1 : top.voxel - this->L.Around[static_cast<std::size_t>(way)].offset });
     if (++popped % 65536 == 0)
     {
       Report(progress, std::min(1.0f, top.path / longest));
     }
     const std::array<int, 3> at = this->L.Place(top.voxel);
-    for (const VoxelLattice::Neighbour& n : this->L.Around)
+    for (std::size_t w = 0; w < this->L.Around.size(); ++w)
     {
+      const VoxelLattice::Neighbour& n = this->L.Around[w];
       if (!this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk))
       {
         continue;
@@ -368,9 +454,15 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
       const float path = top.path + n.length;
       const bool free =
         (this->States[q] == Unknown && this->Likelihood(q) >= weak) || this->States[q] == Bridge;
-      if (free && path <= longest)
+      if (!free || path > longest)
       {
-        queue.push({ path, q, top.seed, top.voxel });
+        continue;
+      }
+      float& least = shortest.At(at[0] + n.di, at[1] + n.dj, at[2] + n.dk);
+      if (path < least)
+      {
+        least = path;
+        queue.push({ path, top.origin / ways * ways + static_cast<std::int32_t>(w), q });
       }
     }
   }
@@ -393,31 +485,18 @@ void Segmentation<T>::CutLeakage()
     bool dropped = false;
     bool twig = false; ///< dropped for lack of a strong voxel, which is no leakage
   };
-  // Piece of each member, found through a map from voxels to members.
-  std::vector<std::pair<std::int64_t, std::int32_t>> order(this->Members.size());
-  for (std::size_t m = 0; m < this->Members.size(); ++m)
-  {
-    order[m] = { this->Members[m].voxel, static_cast<std::int32_t>(m) };
-  }
-  std::sort(order.begin(), order.end());
-  const auto find = [&](std::int64_t voxel) -> std::int32_t
-  {
-    const auto place = std::lower_bound(
-      order.begin(), order.end(), std::make_pair(voxel, std::numeric_limits<std::int32_t>::min()));
-    return place != order.end() && place->first == voxel ? place->second : -1;
-  };
+  const SparseVoxels<std::int32_t> numbers = this->MemberNumbers();
   const auto sliceOf = [&](std::int32_t m)
   { return static_cast<int>(this->Members[m].path / thickness); };
   const auto visit = [&](std::int32_t m, const auto& f)
   {
-    const std::int64_t voxel = this->Members[m].voxel;
-    const std::array<int, 3> at = this->L.Place(voxel);
+    const std::array<int, 3> at = this->L.Place(this->Members[m].voxel);
     for (const VoxelLattice::Neighbour& n : this->L.Around)
     {
-      if (this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk) &&
-        this->States[voxel + n.offset] == Vessel)
+      const std::int32_t other = numbers.Get(at[0] + n.di, at[1] + n.dj, at[2] + n.dk);
+      if (other >= 0)
       {
-        f(find(voxel + n.offset));
+        f(other);
       }
     }
   };
@@ -470,9 +549,10 @@ void Segmentation<T>::CutLeakage()
     visit(static_cast<std::int32_t>(m),
       [&](std::int32_t o)
       {
-        if (pieceOf[m] < pieceOf[o])
+        const std::pair<std::int32_t, std::int32_t> contact(pieceOf[m], pieceOf[o]);
+        if (contact.first < contact.second && (contacts.empty() || contacts.back() != contact))
         {
-          contacts.emplace_back(pieceOf[m], pieceOf[o]);
+          contacts.push_back(contact);
         }
       });
   }
@@ -572,6 +652,7 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
   settings.longestGap = this->Settings.longestGap;
   // Each round can only add; more than a handful of lesions in a row does not happen.
   constexpr int rounds = 8;
+  VesselLinker linker(image, settings);
   for (int round = 0; round < rounds && !this->Members.empty(); ++round)
   {
     std::vector<std::pair<std::int64_t, float>> tree;
@@ -580,8 +661,8 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
     {
       tree.emplace_back(m.voxel, m.path);
     }
-    std::vector<VesselLink> links = FindVesselLinks(image, tree, settings,
-      Part(progress, static_cast<double>(round) / rounds, (round + 1.0) / rounds));
+    std::vector<VesselLink> links = linker.Find(
+      tree, Part(progress, static_cast<double>(round) / rounds, (round + 1.0) / rounds));
     if (links.empty())
     {
       break;
@@ -620,12 +701,7 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
 template <typename T>
 void Segmentation<T>::KeepConnected()
 {
-  std::unordered_map<std::int64_t, std::size_t> memberOf;
-  memberOf.reserve(this->Members.size() * 2);
-  for (std::size_t m = 0; m < this->Members.size(); ++m)
-  {
-    memberOf[this->Members[m].voxel] = m;
-  }
+  const SparseVoxels<std::int32_t> numbers = this->MemberNumbers();
   constexpr unsigned char connected = 8;
   std::vector<std::int64_t> stack;
   const auto flood = [&](std::int64_t from)
@@ -663,8 +739,8 @@ void Segmentation<T>::KeepConnected()
     while (at >= 0 && this->States[at] != connected)
     {
       way.push_back(at);
-      const auto before = memberOf.find(at);
-      at = before == memberOf.end() ? -1 : this->Members[before->second].before;
+      const std::int32_t before = numbers.Get(this->L.Place(at));
+      at = before < 0 ? -1 : this->Members[static_cast<std::size_t>(before)].before;
     }
     for (const std::int64_t voxel : way)
     {
@@ -720,16 +796,14 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
   }
 
   // Lumen and surroundings by blocks: the brightest smoothed member, and the mean outside the band.
-  const std::size_t blockCount = static_cast<std::size_t>(blocks[0]) * blocks[1] * blocks[2];
-  constexpr float none = -std::numeric_limits<float>::infinity();
-  std::vector<float> lumen(blockCount, none);
   std::array<int, 3> reach;
   for (int axis = 0; axis < 3; ++axis)
   {
     reach[axis] =
       std::max(1, static_cast<int>(std::lround(surroundings / this->L.BlockSpacing[axis])));
   }
-  std::vector<char> wanted(blockCount, 0);
+  constexpr float none = -std::numeric_limits<float>::infinity();
+  BlockValues near(blocks);
   for (const Member& m : this->Members)
   {
     const std::array<int, 3> at = this->L.Place(m.voxel);
@@ -744,67 +818,19 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
         ++count;
       }
     }
-    const std::int64_t block = this->L.BlockOf(at);
-    lumen[block] = std::max(lumen[block], sum / static_cast<float>(count));
-    if (wanted[block] == 0)
-    {
-      wanted[block] = 1;
-    }
+    float& lumen = near.values[near.Number(this->L.PlaceOfBlock(at))].lumen;
+    lumen = std::max(lumen, sum / static_cast<float>(count));
   }
-  const auto around = [&](std::int64_t block, int factor, const auto& f)
-  {
-    const int a = static_cast<int>(block % blocks[0]);
-    const int b = static_cast<int>(block / blocks[0] % blocks[1]);
-    const int c = static_cast<int>(block / blocks[0] / blocks[1]);
-    for (int z = std::max(0, c - factor * reach[2]);
-         z <= std::min(blocks[2] - 1, c + factor * reach[2]); ++z)
-    {
-      for (int y = std::max(0, b - factor * reach[1]);
-           y <= std::min(blocks[1] - 1, b + factor * reach[1]); ++y)
-      {
-        for (int x = std::max(0, a - factor * reach[0]);
-             x <= std::min(blocks[0] - 1, a + factor * reach[0]); ++x)
-        {
-          const Vector3 d = this->L.BlockSpacing.cwiseProduct(Vector3(x - a, y - b, z - c));
-          f(this->L.Block(x, y, z), d);
-        }
-      }
-    }
-  };
-  std::vector<std::int64_t> near;
-  for (std::size_t b = 0; b < blockCount; ++b)
-  {
-    if (wanted[b] == 1)
-    {
-      around(static_cast<std::int64_t>(b), 2,
-        [&](std::int64_t other, const Vector3&)
-        {
-          if (wanted[other] == 0)
-          {
-            wanted[other] = 2;
-          }
-        });
-    }
-  }
-  for (std::size_t b = 0; b < blockCount; ++b)
-  {
-    if (wanted[b] != 0)
-    {
-      near.push_back(static_cast<std::int64_t>(b));
-    }
-  }
-  std::vector<float> outsideSum(blockCount, 0.0f);
-  std::vector<float> outsideCount(blockCount, 0.0f);
+  near.Grow(reach, 2);
   ParallelFor(
-    static_cast<std::int64_t>(near.size()), 4096,
+    static_cast<std::int64_t>(near.values.size()), 4096,
     [&](std::int64_t first, std::int64_t last)
     {
       for (std::int64_t n = first; n < last; ++n)
       {
-        const std::int64_t block = near[n];
-        const std::array<int, 3> corner{ static_cast<int>(block % blocks[0]) * this->L.Factor[0],
-          static_cast<int>(block / blocks[0] % blocks[1]) * this->L.Factor[1],
-          static_cast<int>(block / blocks[0] / blocks[1]) * this->L.Factor[2] };
+        BlockValue& block = near.values[static_cast<std::size_t>(n)];
+        const std::array<int, 3> corner{ block.place[0] * this->L.Factor[0],
+          block.place[1] * this->L.Factor[1], block.place[2] * this->L.Factor[2] };
         for (int k = corner[2]; k < std::min(this->L.Size[2], corner[2] + this->L.Factor[2]); ++k)
         {
           for (int j = corner[1]; j < std::min(this->L.Size[1], corner[1] + this->L.Factor[1]); ++j)
@@ -816,8 +842,8 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
               const auto value = static_cast<float>(this->Image[p]);
               if (this->States[p] == Unknown && std::isfinite(value) && this->Likelihood(p) < 0.5f)
               {
-                outsideSum[block] += value;
-                outsideCount[block] += 1.0f;
+                block.outsideSum += value;
+                block.outsideCount += 1.0f;
               }
             }
           }
@@ -825,6 +851,26 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
       }
     },
     Part(progress, 0.2, 0.4));
+  // What the blocks around one count.
+  struct Neighbour
+  {
+    std::array<int, 3> step;
+    float weight;
+    bool lumen; ///< whether its lumen is looked at
+  };
+  std::vector<Neighbour> around;
+  for (int z = -reach[2]; z <= reach[2]; ++z)
+  {
+    for (int y = -reach[1]; y <= reach[1]; ++y)
+    {
+      for (int x = -reach[0]; x <= reach[0]; ++x)
+      {
+        const Vector3 d = this->L.BlockSpacing.cwiseProduct(Vector3(x, y, z));
+        around.push_back({ { x, y, z }, static_cast<float>(std::exp(-0.5 * d.squaredNorm())),
+          d.cwiseQuotient(lumenReach).squaredNorm() <= 1.0 });
+      }
+    }
+  }
 
   // Half way between the two, per candidate.
   if (probability != nullptr)
@@ -844,17 +890,22 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
         float brightest = none;
         float sum = 0.0f;
         float weights = 0.0f;
-        around(this->L.BlockOf(this->L.Place(p)), 1,
-          [&](std::int64_t block, const Vector3& d)
+        const std::array<int, 3> at = this->L.PlaceOfBlock(this->L.Place(p));
+        for (const Neighbour& neighbour : around)
+        {
+          const BlockValue* block = near.Find(
+            { at[0] + neighbour.step[0], at[1] + neighbour.step[1], at[2] + neighbour.step[2] });
+          if (block == nullptr)
           {
-            const auto weight = static_cast<float>(std::exp(-0.5 * d.squaredNorm()));
-            sum += weight * outsideSum[block];
-            weights += weight * outsideCount[block];
-            if (d.cwiseQuotient(lumenReach).squaredNorm() <= 1.0)
-            {
-              brightest = std::max(brightest, lumen[block]);
-            }
-          });
+            continue;
+          }
+          sum += neighbour.weight * block->outsideSum;
+          weights += neighbour.weight * block->outsideCount;
+          if (neighbour.lumen)
+          {
+            brightest = std::max(brightest, block->lumen);
+          }
+        }
         brightest = std::min(brightest, blood);
         const float outside = weights > 0.0f ? std::min(sum / weights, brightest) : this->Tissue;
         const float value = static_cast<float>(this->Image[p]);

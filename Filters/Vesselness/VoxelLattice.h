@@ -74,6 +74,10 @@ public:
   {
     return (static_cast<std::int64_t>(c) * this->Blocks[1] + b) * this->Blocks[0] + a;
   }
+  std::array<int, 3> PlaceOfBlock(const std::array<int, 3>& p) const
+  {
+    return { p[0] / this->Factor[0], p[1] / this->Factor[1], p[2] / this->Factor[2] };
+  }
   std::int64_t BlockOf(const std::array<int, 3>& p) const
   {
     return this->Block(p[0] / this->Factor[0], p[1] / this->Factor[1], p[2] / this->Factor[2]);
@@ -106,6 +110,21 @@ public:
   {
     return this->Grid.IndexToWorld(
       p[0] + this->Grid.extent[0], p[1] + this->Grid.extent[2], p[2] + this->Grid.extent[4]);
+  }
+  /// Corners of a box that holds all voxels within `radius` mm of a place; a voxel of the image at least.
+  void BoxAround(
+    const Vector3& world, double radius, std::array<int, 3>& low, std::array<int, 3>& high) const
+  {
+    const Vector3 index = this->Spacing.cwiseInverse().cwiseProduct(
+      this->Grid.direction.transpose() * (world - this->Grid.origin));
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const double middle = index[axis] - this->Grid.extent[2 * axis];
+      const double reach = radius / this->Spacing[axis] + 1.0;
+      const double last = this->Size[axis] - 1;
+      low[axis] = static_cast<int>(std::clamp(std::floor(middle - reach), 0.0, last));
+      high[axis] = static_cast<int>(std::clamp(std::ceil(middle + reach), 0.0, last));
+    }
   }
   /// Calls f(voxel, place) for the voxels within `radius` mm of a place.
   template <typename F>

@@ -745,21 +745,33 @@ void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkI
     vtkDataArray* array = this->InputArray(inputs, 0, input);
     vtkCoronary::Require(
       Contains(ExtentOf(input), block), "the image lacks part of the requested extent");
-    std::vector<unsigned char> inside;
-    if (maskInfo)
-    {
-      vtkImageData* mask = vtkImageData::GetData(maskInfo);
-      vtkDataArray* maskArray = this->InputArray(inputs, 1, mask);
-      vtkCoronary::Require(
-        Contains(ExtentOf(mask), part), "the mask lacks part of the requested extent");
-      inside.resize(Size(part));
-      Convert<ToMask>(maskArray, ExtentOf(mask), part, inside.data());
-    }
+    vtkImageData* mask = maskInfo ? vtkImageData::GetData(maskInfo) : nullptr;
+    vtkDataArray* maskArray = mask ? this->InputArray(inputs, 1, mask) : nullptr;
+    vtkCoronary::Require(
+      !mask || Contains(ExtentOf(mask), part), "the mask lacks part of the requested extent");
     if (structured)
     {
-      const FloatBlock floats(input, array, block);
-      vesselness.Compute(floats.Block, part, maskInfo ? inside.data() : nullptr, to,
-        vtkCoronary::ProgressOf(&self, 0.4, 1.0));
+      // In slabs: of other voxels than floats there need be a copy only of what is looked at.
+      constexpr int depth = 32;
+      for (int k = part[4]; k <= part[5]; k += depth)
+      {
+        Extent slab = part;
+        slab[4] = k;
+        slab[5] = std::min(part[5], k + depth - 1);
+        std::vector<unsigned char> inside(mask ? Size(slab) : 0);
+        if (mask)
+        {
+          Convert<ToMask>(maskArray, ExtentOf(mask), slab, inside.data());
+        }
+        const FloatBlock floats(input, array, Grown(slab, vesselness.Halo(), whole));
+        const std::int64_t before = Size(part) / (part[5] - part[4] + 1) * (k - part[4]);
+        const auto share = [&](int slice)
+        { return 0.4 + 0.6 * (slice - part[4]) / (part[5] - part[4] + 1); };
+        vesselness.Compute(floats.Block, slab, mask ? inside.data() : nullptr,
+          { to.vesselness + before, to.scale ? to.scale + before : nullptr,
+            to.direction ? to.direction + 3 * before : nullptr },
+          vtkCoronary::ProgressOf(&self, share(k), share(slab[5] + 1)));
+      }
     }
     else
     {

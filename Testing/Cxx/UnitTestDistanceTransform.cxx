@@ -210,6 +210,28 @@ TEST(DistanceTransform, OpeningKeepsTheBodyAndDropsTheVessel)
   EXPECT_GT(Count(mask.Open(0.75)), 0.97 * static_cast<double>(Count(mask.values)));
 }
 
+TEST(DistanceTransform, WindowsAndTransformAgreeToTheBit)
+{
+  // Few zeros and few others; balls within a window, beyond it, and with voxels on the rim itself.
+  for (const double zeros : { 0.0, 0.001, 0.05, 0.9, 1.0 })
+  {
+    for (const Vector3& spacing : { Vector3(0.5, 0.5, 0.5), Vector3(0.3, 0.47, 1.1) })
+    {
+      const Mask mask = Random({ 70, 41, 53 }, spacing, zeros, 17);
+      const std::vector<float> squared = mask.Distances();
+      for (const double radius : { 0.0, 0.3, 1.5, 4.5, 20.0, 1000.0 })
+      {
+        const double square = radius * radius;
+        std::vector<unsigned char> expected(squared.size());
+        std::transform(squared.begin(), squared.end(), expected.begin(),
+          [&](float distance) { return distance <= square ? 1 : 0; });
+        EXPECT_EQ(NearZeros(mask.values.data(), mask.size, mask.spacing, square), expected)
+          << zeros << " " << radius;
+      }
+    }
+  }
+}
+
 TEST(DistanceTransform, SameBitsOnAnyNumberOfThreads)
 {
   const Mask mask = Random({ 61, 47, 33 }, Vector3(0.35, 0.4, 0.9), 0.001, 5);

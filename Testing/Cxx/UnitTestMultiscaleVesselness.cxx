@@ -533,6 +533,41 @@ TEST(MultiscaleVesselness, MaskMeasureAndConstantImage)
   }
 }
 
+TEST(MultiscaleVesselness, AMaskChangesNothingInsideOfIt)
+{
+  RandomStream random(5, 9);
+  const Volume volume(
+    61, 120, 9, Vector3(0.4, 0.5, 0.7), [&](const Vector3&) { return 100.0 * random.Normal(); });
+  VesselnessSettings settings = Standard();
+  const MultiscaleVesselness filter(settings, volume.spacing, volume.extent);
+  const Result whole = Filter(volume, settings);
+  // A slanted slab: pieces of rows of all lengths, rows, slices and whole bands without any.
+  std::vector<unsigned char> mask(volume.values.size(), 0);
+  for (int k = 2; k < 8; ++k)
+  {
+    for (int j = 0; j < 70; ++j)
+    {
+      for (int i = std::max(0, j - 20); i < std::min(61, j + 5 - 2 * k); ++i)
+      {
+        mask[volume.Index(i, j, k)] = 1;
+      }
+    }
+  }
+  std::vector<float> vesselness(mask.size(), -1.0F);
+  std::vector<float> scale(mask.size(), -1.0F);
+  std::vector<float> direction(3 * mask.size(), -2.0F);
+  filter.Compute(volume.Block(), volume.extent, mask.data(),
+    { vesselness.data(), scale.data(), direction.data() });
+  std::size_t different = 0;
+  for (std::size_t p = 0; p < mask.size(); ++p)
+  {
+    different += vesselness[p] != (mask[p] != 0 ? whole.vesselness[p] : 0.0F);
+    different += mask[p] == 0 && (scale[p] != 0.0F || direction[3 * p] != 0.0F);
+    different += vesselness[p] > 0.0F && !(scale[p] > 0.0F);
+  }
+  EXPECT_EQ(different, 0U);
+}
+
 TEST(MultiscaleVesselness, NaNVoxelsDoNotSpread)
 {
   const Vector3 spacing(0.4, 0.4, 0.4);

@@ -157,6 +157,29 @@ TEST(VesselLinking, FollowsTheVesselsBend)
   }
 }
 
+TEST(VesselLinking, OneLesionBehindAnother)
+{
+  // Each round finds the next piece, and what it knows of the one behind holds until it is its turn.
+  const Scene scene({ Tube({ 0, 0, 0 }, { 20, 0, 0 }, 1.4), Tube({ 26, 0, 0 }, { 46, 0, 0 }, 1.4),
+    Tube({ 52, 0, 0 }, { 78, 0, 0 }, 1.3) });
+  SetNumberOfThreads(1);
+  const VesselSegmentationResult result = scene.Run();
+  SetNumberOfThreads(3);
+  const VesselSegmentationResult several = scene.Run();
+  SetNumberOfThreads(0);
+  ASSERT_EQ(result.links.size(), 2U);
+  EXPECT_NEAR(result.links[0].points.front()[0], 20.0, 4.0);
+  EXPECT_NEAR(result.links[1].points.front()[0], 46.0, 4.0);
+  EXPECT_GT(scene.Count(result, [](const Vector3& p) { return p[0] > 60.0; }), 300);
+  EXPECT_EQ(several.mask, result.mask);
+  ASSERT_EQ(several.links.size(), 2U);
+  for (std::size_t n = 0; n < 2; ++n)
+  {
+    EXPECT_EQ(several.links[n].voxels, result.links[n].voxels);
+    EXPECT_EQ(several.links[n].confidence, result.links[n].confidence);
+  }
+}
+
 TEST(VesselLinking, AThinLumenIsSeen)
 {
   // Blurred so much that a quarter of its contrast is left on its axis.
