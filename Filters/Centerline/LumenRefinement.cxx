@@ -582,6 +582,39 @@ Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected)
   return best;
 }
 
+/// Where nothing is known the radius goes evenly from what is seen before to what is seen behind: a smooth curve would
+/// carry a slope on to a narrowing or a widening that nobody saw.
+void BridgeUnknown(
+  const VesselPath& path, const std::vector<char>& unknown, std::vector<double>& radii)
+{
+  const std::size_t count = radii.size();
+  for (std::size_t first = 0; first < count; ++first)
+  {
+    if (unknown[first] == 0)
+    {
+      continue;
+    }
+    std::size_t after = first;
+    while (after < count && unknown[after] != 0)
+    {
+      ++after;
+    }
+    if (first == 0 && after == count)
+    {
+      return;
+    }
+    const double from = first > 0 ? radii[first - 1] : radii[after];
+    const double to = after < count ? radii[after] : from;
+    const double begin = path.arc[first > 0 ? first - 1 : 0];
+    const double end = path.arc[std::min(after, count - 1)];
+    for (std::size_t i = first; i < after; ++i)
+    {
+      radii[i] = from + (to - from) * (path.arc[i] - begin) / std::max(1e-9, end - begin);
+    }
+    first = after;
+  }
+}
+
 /// Radii and positions of a path from its sections.
 void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
 {
@@ -592,6 +625,7 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
   std::vector<double> weights(count);
   std::array<std::vector<double>, 3> shifts;
   std::vector<double> shiftWeights(count, 0.0);
+  std::vector<char> unknown(count, 0);
   for (std::vector<double>& shift : shifts)
   {
     shift.assign(count, 0.0);
@@ -635,6 +669,7 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
     {
       weights[i] = 1e-6;
       shiftWeights[i] = 1e-3;
+      unknown[i] = 1;
       if (own)
       {
         result.interpolated[p] = 1;
@@ -664,6 +699,7 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
     robust[i] /= 1.0 + far * far;
   }
   smooth = SmoothSequence(radii, robust, this->settings.wavelength / step);
+  BridgeUnknown(path, unknown, smooth);
   if (moved)
   {
     for (std::vector<double>& shift : shifts)

@@ -365,7 +365,8 @@ void GradedPath::Describe(
     std::hypot(deviation, 0.35 * healthy * this->lumen.calciumArc[this->PointAt(least)] / 360.0);
   const double referenceError = std::hypot(0.03 * healthy, 0.5 * this->spread);
   const double significance = (healthy - radius) / std::hypot(deviation, referenceError);
-  if (significance < this->settings.leastSignificance)
+  // Behind calcium a narrowing can not be told from none: it is listed, with the range of all that it may be.
+  if (!lesion.interpolated && significance < this->settings.leastSignificance)
   {
     return;
   }

@@ -353,6 +353,38 @@ TEST(CalciumObjects, WhatCalciumEnclosesIsInterpolatedAndSaid)
   EXPECT_EQ(measured.lumen.interpolated[40], 0);
 }
 
+TEST(CalciumObjects, BehindItTheRadiusGoesFromWhatIsBeforeToWhatIsBehind)
+{
+  // Steep towards the calcium, as blooming makes a lumen: what follows behind it is not steeper still.
+  Tube tube;
+  const double middle = 0.5 * TubeLength;
+  tube.radius = [&](double z)
+  { return z < middle ? std::max(0.7, 1.6 - 0.25 * std::max(0.0, z - middle + 6.0)) : 1.5; };
+  for (const double along : { -1.5, 0.0, 1.5 })
+  {
+    tube.balls.push_back({ Vector3(0.0, 0.0, middle + along), 2.2 });
+  }
+  tube.Render();
+  const Measured measured = MeasureAll(tube, LineWith(1.5));
+  const std::vector<unsigned char>& hidden = measured.lumen.interpolated;
+  const auto first = std::find(hidden.begin(), hidden.end(), 1) - hidden.begin();
+  auto last = first;
+  while (last + 1 < static_cast<std::ptrdiff_t>(hidden.size()) && hidden[last + 1] == 1)
+  {
+    ++last;
+  }
+  ASSERT_GT(first, 10);
+  ASSERT_GT(last, first + 4);
+  const std::vector<double>& radius = measured.lumen.radius;
+  const double least = std::min(radius[first - 1], radius[last + 1]);
+  const double most = std::max(radius[first - 1], radius[last + 1]);
+  for (auto i = first; i <= last; ++i)
+  {
+    EXPECT_GT(radius[i], least - 0.1) << i;
+    EXPECT_LT(radius[i], most + 0.1) << i;
+  }
+}
+
 TEST(CalciumObjects, NoiseAndContrastAreNoCalcium)
 {
   Tube tube;
