@@ -65,6 +65,60 @@ PointValues ValuesAt(const ImageInterpolator& image, const Vector3& position,
   values.around = Quantile(ring, 0.25);
   return values;
 }
+
+/// Of single voxels on the axes of wide vessels, against what is around them along the axis: calcium and narrowings are
+/// outliers, and blood that changes from place to place is no noise.
+double NoiseOnAxes(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+  const ImageInterpolator& values, const ScalarImage& image, double blur,
+  const std::vector<char>& counts, double usual)
+{
+  constexpr double around = 4.0; // mm, of the axis to either side
+  constexpr std::size_t least = 5;
+  const std::array<int, 3> size = image.Dimensions();
+  std::vector<double> deviations;
+  for (const VesselPath& path : paths)
+  {
+    std::vector<std::pair<double, double>> voxels; // mm along, value; each voxel once
+    Vector3 before = Vector3::Constant(-1e9);
+    for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
+    {
+      const std::int64_t p = path.points[i];
+      if (counts[p] == 0 || !(tree.radius[p] > 2.5 * blur + 0.5 * values.SmallestSpacing()))
+      {
+        continue;
+      }
+      const Vector3 index = values.ToIndex(tree.points[p]).array().round();
+      bool inside = index != before;
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        inside = inside && index[axis] >= image.grid.extent[2 * axis] &&
+          index[axis] < image.grid.extent[2 * axis] + size[axis];
+      }
+      if (inside)
+      {
+        before = index;
+        voxels.emplace_back(
+          path.arc[i], values.At(image.grid.IndexToWorld(index[0], index[1], index[2])));
+      }
+    }
+    for (const auto& [arc, value] : voxels)
+    {
+      std::vector<double> near;
+      for (const auto& [otherArc, other] : voxels)
+      {
+        if (std::abs(otherArc - arc) <= around)
+        {
+          near.push_back(other);
+        }
+      }
+      if (near.size() >= least)
+      {
+        deviations.push_back(std::abs(value - Quantile(std::move(near), 0.5)));
+      }
+    }
+  }
+  return deviations.size() >= 10 ? 1.4826 * Quantile(std::move(deviations), 0.5) : usual;
+}
 }
 
 LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
@@ -159,31 +213,7 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
         smooth[std::clamp(i, first, last)], LeastShare * before, BrightestShare * before);
     }
   }
-  // Noise: single voxels on the axes of wide vessels. Calcium and narrowings are outliers.
-  std::vector<double> deviations;
-  const std::array<int, 3> size = image.Dimensions();
-  for (std::size_t p = 0; p < count; ++p)
-  {
-    if (counts[p] != 0 && tree.radius[p] > 2.5 * blur + 0.5 * values.SmallestSpacing())
-    {
-      const Vector3 index = values.ToIndex(tree.points[p]);
-      Vector3 nearest;
-      bool inside = true;
-      for (int axis = 0; axis < 3; ++axis)
-      {
-        nearest[axis] = std::round(index[axis]);
-        inside = inside && nearest[axis] >= image.grid.extent[2 * axis] &&
-          nearest[axis] < image.grid.extent[2 * axis] + size[axis];
-      }
-      if (inside)
-      {
-        deviations.push_back(
-          std::abs(values.At(image.grid.IndexToWorld(nearest[0], nearest[1], nearest[2])) -
-            result.level[p]));
-      }
-    }
-  }
-  result.noise = deviations.size() >= 10 ? 1.4826 * Quantile(deviations, 0.5) : 0.05 * usual;
+  result.noise = NoiseOnAxes(tree, paths, values, image, blur, counts, 0.05 * usual);
   return result;
 }
 }
