@@ -37,8 +37,8 @@ constexpr double BesideCosine = 0.7; ///< of the angle between both
 /// it is less; veins fill after the arteries, some hearts' nearly as much.
 constexpr double ArteryContrast[] = { 1.0, 0.2 };
 constexpr double VeinContrast[] = { 0.55, 0.25 };
-constexpr double ThinEnd =
-  0.65; ///< mm, half-maximum radius: arteries end thinner, veins go on into wider ones
+/// mm, half-maximum radii: arteries end thinner than the one, veins go on into wider ones than the other.
+constexpr double ThinEnd[] = { 0.55, 0.75 };
 constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
 /// Mean distance of true arteries from those of the mean heart is less; beyond it grows doubt.
 constexpr double UsualAway = 10.0; ///< mm of the mean heart
@@ -535,9 +535,11 @@ bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vesse
     vessel.thinEnd = end.empty() ? vessel.thinEnd : std::min(vessel.thinEnd, Median(end));
   }
   // Where an artery usually runs and does, another one is its vein; where it does not, it is the artery.
+  const double thick =
+    std::clamp((vessel.thinEnd - ThinEnd[0]) / (ThinEnd[1] - ThinEnd[0]), 0.0, 1.0);
   const double odds = LogDensity(vessel.brightness, ArteryContrast) -
     LogDensity(vessel.brightness, VeinContrast) + 1.0 - 5.0 * vessel.besideItsOwn -
-    1.5 * vessel.besideOther + (vessel.thinEnd <= ThinEnd ? 1.0 : -2.0);
+    1.5 * vessel.besideOther + 1.0 - 3.0 * thick;
   vessel.confidence = vessel.seen / (1.0 + std::exp(-odds)) *
     std::exp(-std::max(0.0, vessel.away - UsualAway) / UsualAway);
   return true;
