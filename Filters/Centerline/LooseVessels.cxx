@@ -14,6 +14,7 @@
 #include <map>
 #include <queue>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -22,7 +23,7 @@ namespace
 constexpr double LeastLength = 8.0; ///< mm
 constexpr double Margin = 20.0;     ///< mm around the tree: half the way between its branches
 /// Vesselness of a piece's voxels, in that on the axes of thin arteries: it falls so far towards their walls.
-constexpr double LeastTube = 0.35;
+constexpr double LeastTube = 0.2;
 constexpr double LeastShare = 0.15;    ///< of the contrast between muscle and blood
 constexpr double TooBright = 1.6;      ///< the same: bone
 constexpr double Thin = 1.2;           ///< mm, radius
@@ -36,8 +37,8 @@ constexpr double BesideCosine = 0.7; ///< of the angle between both
 /// it is less; veins fill after the arteries, some hearts' nearly as much.
 constexpr double ArteryContrast[] = { 1.0, 0.2 };
 constexpr double VeinContrast[] = { 0.55, 0.25 };
-constexpr double ThinEnd =
-  0.65; ///< mm, half-maximum radius: arteries end thinner, veins go on into wider ones
+/// mm, half-maximum radii: arteries end thinner than the one, veins go on into wider ones than the other.
+constexpr double ThinEnd[] = { 0.55, 0.75 };
 constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
 /// Mean distance of true arteries from those of the mean heart is less; beyond it grows doubt.
 constexpr double UsualAway = 10.0; ///< mm of the mean heart
@@ -148,6 +149,15 @@ private:
   bool IsOnHeart(const std::vector<std::int64_t>& piece) const;
   double Away(const Vector3& position, std::string* name) const;
   std::vector<Vector3> Axis(const std::vector<std::int64_t>& piece) const;
+  struct Section
+  {
+    Sample sample;
+    bool seen;   ///< a lumen all around
+    bool bright; ///< as an artery
+  };
+  double UsualContrast(double radius) const;
+  std::vector<Section> Sections(const std::vector<Vector3>& axis) const;
+  static std::pair<std::size_t, std::size_t> BestStretch(const std::vector<Section>& sections);
   bool Describe(const std::vector<std::int64_t>& piece, LooseVessel& vessel) const;
 
   const LooseVesselInput& I;
@@ -385,15 +395,86 @@ std::vector<Vector3> Search::Axis(const std::vector<std::int64_t>& piece) const
   return axis;
 }
 
+/// What arteries of a radius usually show above muscle; 0 where the tree has none of about that radius.
+double Search::UsualContrast(double radius) const
+{
+  std::vector<double> usual;
+  for (const Sample& sample : this->Samples)
+  {
+    if (std::abs(sample.radius - radius) < 0.2 * radius)
+    {
+      usual.push_back(sample.contrast);
+    }
+  }
+  return Median(usual);
+}
+
+/// Sections along an axis.
+std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) const
+{
+  // Brighter than here a section is an artery's rather than a vein's.
+  constexpr double even = 0.5 * (ArteryContrast[0] + VeinContrast[0]);
+  std::map<int, double> known; // by radius in tenths of mm
+  std::vector<Section> sections;
+  for (std::size_t n = 0; n < axis.size(); ++n)
+  {
+    const Vector3 tangent =
+      (axis[std::min(n + 2, axis.size() - 1)] - axis[n < 2 ? 0 : n - 2]).normalized();
+    double seen = 0.0;
+    Section section{ this->Measure(axis[n], tangent, 0.8, &seen), false, false };
+    section.seen = seen > SeenConfidence;
+    if (section.seen)
+    {
+      const auto [usual, isNew] = known.emplace(std::lround(10.0 * section.sample.radius), 0.0);
+      if (isNew)
+      {
+        usual->second = this->UsualContrast(section.sample.radius);
+      }
+      section.bright = section.sample.contrast >= even * usual->second;
+    }
+    sections.push_back(section);
+  }
+  return sections;
+}
+
+/// The stretch that looks most like an artery: an artery and a vein that touch are one piece of voxels.
+std::pair<std::size_t, std::size_t> Search::BestStretch(const std::vector<Section>& sections)
+{
+  std::pair<std::size_t, std::size_t> best{ 0, 0 };
+  int most = 0;
+  int sum = 0;
+  std::size_t begin = 0;
+  for (std::size_t n = 0; n < sections.size(); ++n)
+  {
+    if (sum <= 0)
+    {
+      sum = 0;
+      begin = n;
+    }
+    sum += sections[n].seen && sections[n].bright ? 1 : -1;
+    if (sum > most)
+    {
+      most = sum;
+      best = { begin, n + 1 };
+    }
+  }
+  return best;
+}
+
 bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vessel) const
 {
-  vessel.points = this->Axis(piece);
-  const std::vector<Vector3>& axis = vessel.points;
-  for (std::size_t n = 1; n < axis.size(); ++n)
+  const std::vector<Vector3> whole = this->Axis(piece);
+  std::vector<Section> sections = this->Sections(whole);
+  const auto [first, last] = BestStretch(sections);
+  sections.assign(sections.begin() + static_cast<std::ptrdiff_t>(first),
+    sections.begin() + static_cast<std::ptrdiff_t>(last));
+  vessel.points.assign(whole.begin() + static_cast<std::ptrdiff_t>(first),
+    whole.begin() + static_cast<std::ptrdiff_t>(last));
+  for (std::size_t n = 1; n < vessel.points.size(); ++n)
   {
-    vessel.length += (axis[n] - axis[n - 1]).norm();
+    vessel.length += (vessel.points[n] - vessel.points[n - 1]).norm();
   }
-  if (vessel.length < LeastLength || axis.size() < 5)
+  if (vessel.length < LeastLength)
   {
     return false;
   }
@@ -401,59 +482,49 @@ bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vesse
   std::vector<double> contrasts;
   std::map<std::string, int> names;
   std::array<std::vector<double>, 2> ends;
-  const auto endSections = static_cast<std::size_t>(EndLength / Step);
-  int count = 0;
-  for (std::size_t n = 1; n + 1 < axis.size(); ++n)
+  for (std::size_t n = 0; n < sections.size(); ++n)
   {
-    const Vector3 tangent =
-      (axis[std::min(n + 2, axis.size() - 1)] - axis[n < 2 ? 0 : n - 2]).normalized();
-    double seen = 0.0;
-    const Sample sample = this->Measure(axis[n], tangent, 0.8, &seen);
-    ++count;
-    if (seen > SeenConfidence)
+    const Sample& sample = sections[n].sample;
+    if (sections[n].seen)
     {
       radii.push_back(sample.radius);
+      contrasts.push_back(sample.contrast);
       for (const std::size_t end : { 0, 1 })
       {
-        if ((end == 0 ? n : axis.size() - 1 - n) <= endSections)
+        if (static_cast<double>(end == 0 ? n : sections.size() - 1 - n) * Step < EndLength)
         {
           ends[end].push_back(sample.radius);
         }
       }
-      contrasts.push_back(sample.contrast);
     }
     const Sample* companion = &this->Samples.front();
     for (const Sample& other : this->Samples)
     {
-      companion =
-        (other.position - axis[n]).squaredNorm() < (companion->position - axis[n]).squaredNorm()
+      companion = (other.position - sample.position).squaredNorm() <
+          (companion->position - sample.position).squaredNorm()
         ? &other
         : companion;
     }
     std::string name;
-    vessel.away += this->Away(axis[n], &name);
-    if ((companion->position - axis[n]).norm() < BesideReach &&
-      std::abs(companion->tangent.dot(tangent)) > BesideCosine)
+    vessel.away += this->Away(sample.position, &name);
+    // Beside, not ahead of a tip.
+    const Vector3 across = companion->position - sample.position;
+    if (across.norm() < BesideReach &&
+      std::abs(across.dot(sample.tangent)) < BesideCosine * across.norm() &&
+      std::abs(companion->tangent.dot(sample.tangent)) > BesideCosine)
     {
       (IsOf(companion->segment, name) ? vessel.besideItsOwn : vessel.besideOther) += 1.0;
     }
     ++names[name];
   }
+  const auto count = static_cast<double>(sections.size());
   vessel.besideItsOwn /= count;
   vessel.besideOther /= count;
   vessel.away /= count;
   vessel.seen = static_cast<double>(radii.size()) / count;
   vessel.radius = Median(radii);
-  std::vector<double> usual;
-  for (const Sample& sample : this->Samples)
-  {
-    if (std::abs(sample.radius - vessel.radius) < 0.2 * vessel.radius)
-    {
-      usual.push_back(sample.contrast);
-    }
-  }
-  const double level = Median(usual);
-  vessel.brightness = level > 0.0 ? Median(contrasts) / level : 0.0;
+  const double usual = this->UsualContrast(vessel.radius);
+  vessel.brightness = usual > 0.0 ? Median(contrasts) / usual : 0.0;
   vessel.nearest = std::max_element(names.begin(), names.end(),
     [](const auto& one, const auto& other) {
       return one.second < other.second;
@@ -464,9 +535,11 @@ bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vesse
     vessel.thinEnd = end.empty() ? vessel.thinEnd : std::min(vessel.thinEnd, Median(end));
   }
   // Where an artery usually runs and does, another one is its vein; where it does not, it is the artery.
+  const double thick =
+    std::clamp((vessel.thinEnd - ThinEnd[0]) / (ThinEnd[1] - ThinEnd[0]), 0.0, 1.0);
   const double odds = LogDensity(vessel.brightness, ArteryContrast) -
     LogDensity(vessel.brightness, VeinContrast) + 1.0 - 5.0 * vessel.besideItsOwn -
-    1.5 * vessel.besideOther + (vessel.thinEnd <= ThinEnd ? 1.0 : -2.0);
+    1.5 * vessel.besideOther + 1.0 - 3.0 * thick;
   vessel.confidence = vessel.seen / (1.0 + std::exp(-odds)) *
     std::exp(-std::max(0.0, vessel.away - UsualAway) / UsualAway);
   return true;

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 using namespace coronary;
@@ -23,6 +24,7 @@ protected:
   {
     PhantomSettings settings;
     settings.seed = 311;
+    settings.veinHU = 260.0; // arteries: 420
     const CoronaryPhantom phantom(settings);
     Truth = phantom.Tree(Phase);
     Vein = phantom.Vein(Phase);
@@ -109,8 +111,20 @@ std::vector<std::int16_t> LooseVessels::Values;
 std::vector<float> LooseVessels::Vesselness;
 }
 
-TEST_F(LooseVessels, NothingIsSaidOfAHealthyTree)
+TEST_F(LooseVessels, NothingIsSaidOfAHealthyTreeBesideItsVein)
 {
+  // Which is there to be seen, and in no tree.
+  int bright = 0;
+  for (const Vector3& point : Vein.points)
+  {
+    const Vector3 index = (point - Grid.origin) / Grid.spacing[0];
+    const int nx = Grid.extent[1] + 1;
+    const int ny = Grid.extent[3] + 1;
+    const auto at =
+      (std::lround(index[2]) * ny + std::lround(index[1])) * nx + std::lround(index[0]);
+    bright += Values[static_cast<std::size_t>(at)] > 200 ? 1 : 0;
+  }
+  EXPECT_GT(2 * bright, static_cast<int>(Vein.points.size()));
   for (const TreeWarning& warning : LooseVesselWarnings(Find(-1)))
   {
     ADD_FAILURE() << warning.what;
@@ -139,21 +153,6 @@ TEST_F(LooseVessels, ASideBranchThatIsMissingIsTold)
       EXPECT_LT(Distance(point, gone), 2.0);
     }
   }
-}
-
-TEST_F(LooseVessels, AVeinIsNoArtery)
-{
-  int veins = 0;
-  for (const LooseVessel& vessel : Find(-1))
-  {
-    const Vector3& middle = vessel.points[vessel.points.size() / 2];
-    if (Distance(middle, Vein.points) < 3.0)
-    {
-      ++veins;
-      EXPECT_LT(vessel.confidence, 0.2);
-    }
-  }
-  EXPECT_GT(veins, 0);
 }
 
 TEST_F(LooseVessels, WithoutContrastOrTreeThereIsNoMeasure)
