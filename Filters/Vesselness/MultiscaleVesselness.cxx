@@ -16,7 +16,9 @@ namespace coronary
 {
 namespace
 {
-constexpr int BandRows = 48;
+/// Rows and slices that are filtered at once: what they share is read and computed once.
+constexpr int BandRows = 96;
+constexpr int BandSlices = 4;
 
 /// Of the kernels, in standard deviations. At 4 the second derivative still has half a per cent of
 /// its height, which costs 1e-3 of vesselness and more; here it is 1e-4.
@@ -145,38 +147,211 @@ struct RowPiece
   int k;
 };
 
-/// What a mask has of some rows; nothing: i1 is below i0.
-struct Bounds
+/// A box of voxels that one thread filters at once.
+struct Band
 {
   int i0;
   int i1;
   int j0;
   int j1;
+  int k0;
+  int k1;
 };
 
-Bounds MaskBounds(const unsigned char* rows, int width, int count)
+/// Keeps of a band what holds all that the mask has of it. @return whether that is anything
+bool Shrink(Band& band, const unsigned char* mask, const std::array<int, 6>& part)
 {
+  const std::int64_t nx = part[1] - part[0] + 1;
+  const std::int64_t ny = part[3] - part[2] + 1;
   const auto isIn = [](unsigned char value) { return value != 0; };
-  Bounds bounds{ width, -1, count, -1 };
-  for (int j = 0; j < count; ++j)
+  Band kept{ part[1] + 1, part[0] - 1, part[3] + 1, part[2] - 1, part[5] + 1, part[4] - 1 };
+  for (int k = band.k0; k <= band.k1; ++k)
   {
-    const unsigned char* row = rows + static_cast<std::int64_t>(j) * width;
-    const unsigned char* first = std::find_if(row, row + width, isIn);
-    if (first == row + width)
+    for (int j = band.j0; j <= band.j1; ++j)
     {
-      continue;
+      const unsigned char* row = mask + ((k - part[4]) * ny + (j - part[2])) * nx;
+      const unsigned char* first = std::find_if(row, row + nx, isIn);
+      if (first == row + nx)
+      {
+        continue;
+      }
+      auto last = static_cast<int>(nx) - 1;
+      while (row[last] == 0)
+      {
+        --last;
+      }
+      kept.i0 = std::min(kept.i0, part[0] + static_cast<int>(first - row));
+      kept.i1 = std::max(kept.i1, part[0] + last);
+      kept.j0 = std::min(kept.j0, j);
+      kept.j1 = std::max(kept.j1, j);
+      kept.k0 = std::min(kept.k0, k);
+      kept.k1 = std::max(kept.k1, k);
     }
-    int last = width - 1;
-    while (row[last] == 0)
-    {
-      --last;
-    }
-    bounds.i0 = std::min(bounds.i0, static_cast<int>(first - row));
-    bounds.i1 = std::max(bounds.i1, last);
-    bounds.j0 = std::min(bounds.j0, j);
-    bounds.j1 = j;
   }
-  return bounds;
+  band = kept;
+  return kept.i0 <= kept.i1;
+}
+
+/// Hessians of the rows of a band at one scale after the other.
+class BandFilter
+{
+public:
+  using ScaleTaps = std::array<std::vector<float>, 9>;
+
+  BandFilter(const VoxelBlock& input, const std::array<int, 6>& whole)
+    : Input(input)
+    , Whole(whole)
+    , RowStride(input.extent[1] - input.extent[0] + 1)
+    , SliceStride(this->RowStride * (input.extent[3] - input.extent[2] + 1))
+    , End(input.values + this->SliceStride * (input.extent[5] - input.extent[4] + 1))
+  {
+  }
+
+  /// Derivatives across the slices, of all rows that the band's rows need.
+  void Begin(const Band& band, const ScaleTaps& taps);
+  /// Of a row of the band; valid until the next call.
+  HessianRow Row(int y, int k);
+  /// Values in a row, with those that fill its last pack.
+  int Width() const { return Padded(this->Part.i1 - this->Part.i0 + 1); }
+
+private:
+  void Along(int from, int order, int to);
+  const float* const* Gather(int derivative, int y, int k);
+  float* Across(int derivative, int y, int k)
+  {
+    return &this->Slabs[derivative]
+                       [(static_cast<std::size_t>(k - this->Part.k0) * (this->Y1 - this->Y0 + 1) +
+                          (y - this->Y0)) *
+                         this->Stride];
+  }
+
+  const VoxelBlock& Input;
+  const std::array<int, 6>& Whole;
+  std::int64_t RowStride;
+  std::int64_t SliceStride;
+  const float* End;
+  const ScaleTaps* Taps = nullptr;
+  Band Part{};
+  std::array<int, 3> Reach{}; ///< of the taps
+  // What exists of the halo; the rest repeats the border.
+  int X0 = 0;
+  int X1 = 0;
+  int Y0 = 0;
+  int Y1 = 0;
+  int Stride = 0; ///< of the rows with their halo
+  std::vector<float> LastRows;
+  std::array<std::vector<float>, 3> Slabs; ///< derivatives across the slices
+  std::array<std::vector<float>, 6> Crossed;
+  std::array<std::vector<float>, 6> Results;
+  std::vector<float> Scratch;
+  std::vector<const float*> Rows;
+};
+
+void BandFilter::Begin(const Band& band, const ScaleTaps& taps)
+{
+  this->Part = band;
+  this->Taps = &taps;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    this->Reach[axis] = static_cast<int>(taps[3 * axis].size()) - 1;
+  }
+  this->X0 = std::max(band.i0 - this->Reach[0], this->Whole[0]);
+  this->X1 = std::min(band.i1 + this->Reach[0], this->Whole[1]);
+  this->Y0 = std::max(band.j0 - this->Reach[1], this->Whole[2]);
+  this->Y1 = std::min(band.j1 + this->Reach[1], this->Whole[3]);
+  const int width = this->X1 - this->X0 + 1;
+  this->Stride = Padded(width);
+  for (std::vector<float>& slab : this->Slabs)
+  {
+    slab.resize(
+      static_cast<std::size_t>(this->Stride) * (this->Y1 - this->Y0 + 1) * (band.k1 - band.k0 + 1));
+  }
+  for (std::vector<float>& row : this->Crossed)
+  {
+    row.resize(this->Stride);
+  }
+  for (std::vector<float>& row : this->Results)
+  {
+    row.resize(this->Width());
+  }
+  this->Scratch.resize(this->Width() + 2 * this->Reach[0]);
+  const int rz = this->Reach[2];
+  this->LastRows.resize(static_cast<std::size_t>(this->Stride) * (2 * rz + 1));
+  const float* const kernels[] = { taps[6].data(), taps[7].data(), taps[8].data() };
+  const std::array<int, 6>& e = this->Input.extent;
+  this->Rows.resize(2 * rz + 1);
+  // The slices of a band share nearly all rows, which stay in the cache for the next slice.
+  for (int y = this->Y0; y <= this->Y1; ++y)
+  {
+    for (int k = band.k0; k <= band.k1; ++k)
+    {
+      for (int t = -rz; t <= rz; ++t)
+      {
+        const int z = std::clamp(k + t, this->Whole[4], this->Whole[5]);
+        const float* source = this->Input.values + (z - e[4]) * this->SliceStride +
+          (y - e[2]) * this->RowStride + (this->X0 - e[0]);
+        // A whole pack may reach beyond a row's end, into the next row, whose values come to nothing; the block's
+        // last rows are copied.
+        if (source + this->Stride > this->End)
+        {
+          float* copy = &this->LastRows[static_cast<std::size_t>(t + rz) * this->Stride];
+          std::copy_n(source, width, copy);
+          std::fill(copy + width, copy + this->Stride, 0.0f);
+          source = copy;
+        }
+        this->Rows[t + rz] = source;
+      }
+      float* const out[] = { this->Across(0, y, k), this->Across(1, y, k), this->Across(2, y, k) };
+      Kernels().filterAcross(this->Rows.data(), rz, kernels, 3, this->Stride, out);
+    }
+  }
+}
+
+const float* const* BandFilter::Gather(int derivative, int y, int k)
+{
+  const int ry = this->Reach[1];
+  this->Rows.resize(2 * ry + 1);
+  for (int t = -ry; t <= ry; ++t)
+  {
+    this->Rows[t + ry] =
+      this->Across(derivative, std::clamp(y + t, this->Whole[2], this->Whole[3]), k);
+  }
+  return this->Rows.data();
+}
+
+/// A derivative along the row.
+void BandFilter::Along(int from, int order, int to)
+{
+  // The row with its halo, border voxels repeated.
+  const int rx = this->Reach[0];
+  const int left = this->Part.i0 - rx;
+  const int width = this->X1 - this->X0 + 1;
+  const std::vector<float>& row = this->Crossed[from];
+  std::fill(this->Scratch.begin(), this->Scratch.begin() + (this->X0 - left), row.front());
+  std::copy_n(row.data(), width, this->Scratch.data() + (this->X0 - left));
+  std::fill(this->Scratch.begin() + (this->X1 + 1 - left), this->Scratch.end(), row[width - 1]);
+  Kernels().filterAlong(this->Scratch.data(), rx, (*this->Taps)[order].data(), order, this->Width(),
+    this->Results[to].data());
+}
+
+HessianRow BandFilter::Row(int y, int k)
+{
+  const ScaleTaps& taps = *this->Taps;
+  const float* const kernels[] = { taps[3].data(), taps[4].data(), taps[5].data() };
+  float* const out[] = { this->Crossed[0].data(), this->Crossed[1].data(), this->Crossed[2].data(),
+    this->Crossed[3].data(), this->Crossed[4].data(), this->Crossed[5].data() };
+  const int ry = this->Reach[1];
+  Kernels().filterAcross(this->Gather(0, y, k), ry, kernels, 3, this->Stride, out);
+  Kernels().filterAcross(this->Gather(1, y, k), ry, kernels, 2, this->Stride, out + 3);
+  Kernels().filterAcross(this->Gather(2, y, k), ry, kernels, 1, this->Stride, out + 5);
+  this->Along(0, 2, 0); // xx
+  this->Along(2, 0, 1); // yy
+  this->Along(5, 0, 2); // zz
+  this->Along(1, 1, 3); // xy
+  this->Along(3, 1, 4); // xz
+  this->Along(4, 0, 5); // yz
+  return { this->Results[0].data(), this->Results[1].data(), this->Results[2].data(),
+    this->Results[3].data(), this->Results[4].data(), this->Results[5].data() };
 }
 
 /// Axis of the vessel: eigenvector of the eigenvalue that is the greatest after the sign.
@@ -305,8 +480,6 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
       throw std::invalid_argument("MultiscaleVesselness: the input lacks part of the halo");
     }
   }
-  const std::int64_t rowStride = e[1] - e[0] + 1;
-  const std::int64_t sliceStride = rowStride * (e[3] - e[2] + 1);
   const int nx = part[1] - part[0] + 1;
   const int ny = part[3] - part[2] + 1;
   const int nz = part[5] - part[4] + 1;
@@ -314,135 +487,33 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
   {
     return;
   }
-  const VesselnessKernels& kernels = Kernels();
   const int bands = (ny + BandRows - 1) / BandRows;
-
+  const int bandRows = (ny + bands - 1) / bands;
+  const int groups = (nz + BandSlices - 1) / BandSlices;
   ParallelFor(
-    static_cast<std::int64_t>(bands) * nz, 1,
+    static_cast<std::int64_t>(bands) * groups, 1,
     [&](std::int64_t first, std::int64_t last)
     {
-      std::vector<float> inputRows;
-      std::vector<float> slabs[3];
-      std::vector<float> crossed[6];
-      std::vector<float> results[6];
-      std::vector<float> scratch;
-      std::vector<const float*> rows;
+      BandFilter filter(input, this->Whole);
       for (std::int64_t unit = first; unit < last; ++unit)
       {
-        const int k = part[4] + static_cast<int>(unit / bands);
-        int j0 = part[2] + static_cast<int>(unit % bands) * BandRows;
-        int j1 = std::min(part[3], j0 + BandRows - 1);
-        int i0 = part[0];
-        int i1 = part[1];
-        if (mask)
+        Band band{ part[0], part[1], part[2] + static_cast<int>(unit % bands) * bandRows, 0,
+          part[4] + static_cast<int>(unit / bands) * BandSlices, 0 };
+        band.j1 = std::min(part[3], band.j0 + bandRows - 1);
+        band.k1 = std::min(part[5], band.k0 + BandSlices - 1);
+        if (band.j0 > band.j1 || (mask && !Shrink(band, mask, part)))
         {
-          const Bounds wanted =
-            MaskBounds(mask + ((k - part[4]) * static_cast<std::int64_t>(ny) + (j0 - part[2])) * nx,
-              nx, j1 - j0 + 1);
-          if (wanted.i1 < wanted.i0)
-          {
-            continue;
-          }
-          i0 = part[0] + wanted.i0;
-          i1 = part[0] + wanted.i1;
-          j1 = j0 + wanted.j1;
-          j0 += wanted.j0;
+          continue;
         }
         for (std::size_t scale = 0; scale < this->Taps.size(); ++scale)
         {
-          const auto& taps = this->Taps[scale];
-          const float* const kernelsY[] = { taps[3].data(), taps[4].data(), taps[5].data() };
-          const float* const kernelsZ[] = { taps[6].data(), taps[7].data(), taps[8].data() };
-          const int rx = static_cast<int>(taps[0].size()) - 1;
-          const int ry = static_cast<int>(taps[3].size()) - 1;
-          const int rz = static_cast<int>(taps[6].size()) - 1;
-          // What exists of the halo; the rest repeats the border.
-          const int x0 = std::max(i0 - rx, this->Whole[0]);
-          const int x1 = std::min(i1 + rx, this->Whole[1]);
-          const int y0 = std::max(j0 - ry, this->Whole[2]);
-          const int y1 = std::min(j1 + ry, this->Whole[3]);
-          const int width = x1 - x0 + 1;
-          const int stride = Padded(width);
-
-          // Across the slices. Rows of the input may end before a whole pack: copied if so.
-          for (std::vector<float>& slab : slabs)
+          filter.Begin(band, this->Taps[scale]);
+          for (int k = band.k0; k <= band.k1; ++k)
           {
-            slab.resize(static_cast<std::size_t>(stride) * (y1 - y0 + 1));
-          }
-          rows.resize(2 * rz + 1);
-          const bool roomy = x0 + stride - 1 <= e[1];
-          inputRows.resize(roomy ? 0 : static_cast<std::size_t>(stride) * (2 * rz + 1));
-          for (int y = y0; y <= y1; ++y)
-          {
-            for (int t = -rz; t <= rz; ++t)
+            for (int y = band.j0; y <= band.j1; ++y)
             {
-              const int z = std::clamp(k + t, this->Whole[4], this->Whole[5]);
-              const float* source =
-                input.values + (z - e[4]) * sliceStride + (y - e[2]) * rowStride + (x0 - e[0]);
-              if (!roomy)
-              {
-                float* copy = &inputRows[static_cast<std::size_t>(t + rz) * stride];
-                std::copy_n(source, width, copy);
-                std::fill(copy + width, copy + stride, 0.0f);
-                source = copy;
-              }
-              rows[t + rz] = source;
+              consume(RowPiece{ band.i0, band.i1, y, k }, scale, filter.Width(), filter.Row(y, k));
             }
-            const std::size_t at = static_cast<std::size_t>(y - y0) * stride;
-            float* const out[] = { &slabs[0][at], &slabs[1][at], &slabs[2][at] };
-            kernels.filterAcross(rows.data(), rz, kernelsZ, 3, stride, out);
-          }
-
-          // Across the rows, then along them.
-          const int packed = Padded(i1 - i0 + 1);
-          for (std::vector<float>& row : crossed)
-          {
-            row.resize(stride);
-          }
-          for (std::vector<float>& row : results)
-          {
-            row.resize(packed);
-          }
-          scratch.resize(packed + 2 * rx);
-          rows.resize(2 * ry + 1);
-          const auto gather = [&](int slab, int y)
-          {
-            for (int t = -ry; t <= ry; ++t)
-            {
-              const int from = std::clamp(y + t, this->Whole[2], this->Whole[3]);
-              rows[t + ry] = &slabs[slab][static_cast<std::size_t>(from - y0) * stride];
-            }
-            return rows.data();
-          };
-          const auto along = [&](int from, int order, int to)
-          {
-            // The row with its halo, border voxels repeated.
-            const int left = i0 - rx;
-            for (int x = left; x < x0; ++x)
-            {
-              scratch[x - left] = crossed[from][0];
-            }
-            std::copy_n(crossed[from].data(), width, scratch.data() + (x0 - left));
-            std::fill(scratch.begin() + (x1 + 1 - left), scratch.end(), crossed[from][width - 1]);
-            kernels.filterAlong(
-              scratch.data(), rx, taps[order].data(), order, packed, results[to].data());
-          };
-          for (int y = j0; y <= j1; ++y)
-          {
-            float* const out[] = { crossed[0].data(), crossed[1].data(), crossed[2].data(),
-              crossed[3].data(), crossed[4].data(), crossed[5].data() };
-            kernels.filterAcross(gather(0, y), ry, kernelsY, 3, stride, out);
-            kernels.filterAcross(gather(1, y), ry, kernelsY, 2, stride, out + 3);
-            kernels.filterAcross(gather(2, y), ry, kernelsY, 1, stride, out + 5);
-            along(0, 2, 0); // xx
-            along(2, 0, 1); // yy
-            along(5, 0, 2); // zz
-            along(1, 1, 3); // xy
-            along(3, 1, 4); // xz
-            along(4, 0, 5); // yz
-            const HessianRow hessian{ results[0].data(), results[1].data(), results[2].data(),
-              results[3].data(), results[4].data(), results[5].data() };
-            consume(RowPiece{ i0, i1, y, k }, scale, packed, hessian);
           }
         }
       }
