@@ -37,8 +37,13 @@ double RoleEvidence(const Outlet& outlet, bool left, const CoronaryOstiaSettings
   const double r = outlet.ostium.radius;
   const double usual = 0.7 * settings.largestVessel;
   sum += Evidence(std::max({ 0.0, 2.0 * (0.9 - r), r - usual }), 0.5, 0.5, -4.0);
-  // The rims of chambers are bright and long as well, but no tubes.
-  sum += 4.0 * std::clamp((outlet.tubular - 0.05) / 0.2, 0.0, 1.0) - 3.0;
+  // The rims of chambers are bright and long as well, but no tubes. That a rim points at the aorta is no rare chance:
+  // what does not hang on it must be a clear tube.
+  const double tube =
+    outlet.ostium.hidden > 0.0 ? (outlet.tubular - 0.3) / 0.3 : (outlet.tubular - 0.05) / 0.2;
+  sum += 4.0 * std::clamp(tube, 0.0, 1.0) - 3.0;
+  // As for links across lesions: a nat for 6 mm that are not seen.
+  sum -= outlet.ostium.hidden / 6.0;
   // A narrow or hidden beginning may be a wall between two vessels.
   sum -= 1.5 * std::clamp((outlet.shade - 1.0) / 3.0, 0.0, 1.0);
   // The right one goes to the right and round the heart, the left one forward or round the left side; both down.
@@ -442,6 +447,16 @@ CoronaryOstia FindCoronaryOstia(
         result.doubt +=
           (result.doubt.empty() ? "not sure of the " : " and the ") + ostium.name + share.data();
       }
+    }
+  }
+  for (const CoronaryOstium& ostium : result.ostia)
+  {
+    if (ostium.hidden > 0.0)
+    {
+      std::array<char, 64> length;
+      std::snprintf(
+        length.data(), length.size(), " begins behind %.0f mm that show no vessel", ostium.hidden);
+      result.doubt += (result.doubt.empty() ? "the " : "; the ") + ostium.name + length.data();
     }
   }
   Report(progress, 1.0);

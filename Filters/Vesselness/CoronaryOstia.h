@@ -5,7 +5,7 @@
  * The aorta is a stack of bright circles in world-axial slices (Hough transform, then a chain over
  * the slices). From its wall a minimal-path search runs outwards through what is bright but not a
  * large body (chambers, great vessels). An ostium is where many millimetres of such vessel
- * hang on one place of the wall. docs/segmentation.md explains the steps and their limits.
+ * hang on one place of the wall, or where such a vessel points at it from behind a lesion. docs/segmentation.md explains the steps and their limits.
  */
 #ifndef DynamicCoronary_CoronaryOstia_h
 #define DynamicCoronary_CoronaryOstia_h
@@ -55,6 +55,8 @@ struct CoronaryOstium
   double radius = 0.0;     ///< mm, of the vessel a few millimetres from the wall
   double length = 0.0;     ///< mm of vessel followed from here, at most 80
   double confidence = 0.0; ///< 0 to 1; below 0.5 it needs a look
+  /// mm behind the wall that show no vessel, at most 10: the place is the one that a vessel farther on points at.
+  double hidden = 0.0;
 };
 
 struct CoronaryOstia

@@ -1,6 +1,7 @@
 #include "OstialOutlets.h"
 
 #include "DistanceTransform.h"
+#include "HiddenMouths.h"
 #include "MultiscaleVesselness.h"
 
 #include <Eigen/Cholesky>
@@ -94,10 +95,14 @@ private:
   /// 0 to 1: how much a voxel looks like vessel
   float Brightness(std::int64_t p) const { return this->Likeness[p]; }
   bool Describe(Outlet& outlet, const std::vector<std::int64_t>& members) const;
+  Outlet Describe(const HiddenMouth& mouth) const;
+  float TubenessAt(std::int64_t p) const;
+  void Orient(Outlet& outlet, const Vector3& farther) const;
   void FollowToWall(CoronaryOstium& ostium) const;
   double Recentre(Vector3& centre, double& radius, const Vector3& axis, bool adapt) const;
   WallPatch FitWall(const Vector3& around, const std::vector<Vector3>& vessel, double radius) const;
   float At(const Vector3& p) const { return this->Volume.At(p); }
+  Vector3 World(std::int64_t p) const { return this->Volume.World(this->Volume.Place(p)); }
 
   const CoronaryOstiaSettings& Settings;
   TubeAxis Axis;
@@ -452,7 +457,36 @@ std::vector<Outlet> OutletSearch::Find() const
       result.push_back(outlet);
     }
   }
+  // Directions of vessels are known to some 20 degrees, a place 10 mm ahead to about the 3 mm that make it useful.
+  constexpr double farthest = 10.0; // mm
+  constexpr double tree = 15.0;     // mm: what is shorter may be a blot
+  MouthImage image{ this->Volume, this->Body, this->Likeness, this->Tubeness, this->Length };
+  image.lung = static_cast<float>(
+    this->Settings.softTissue - 1.5 * (this->BloodMean - this->Settings.softTissue));
+  image.largestVessel = this->Settings.largestVessel;
+  for (const HiddenMouth& mouth : FindHiddenMouths(image, farthest, tree))
+  {
+    result.push_back(this->Describe(mouth));
+  }
   return result;
+}
+
+/// The largest around a voxel: a path need not run in the middle.
+float OutletSearch::TubenessAt(std::int64_t p) const
+{
+  const std::array<int, 3> at = this->Volume.Place(p);
+  float best = 0.0f;
+  for (int k = std::max(0, at[2] - 1); k <= std::min(this->Volume.size[2] - 1, at[2] + 1); ++k)
+  {
+    for (int j = std::max(0, at[1] - 1); j <= std::min(this->Volume.size[1] - 1, at[1] + 1); ++j)
+    {
+      for (int i = std::max(0, at[0] - 1); i <= std::min(this->Volume.size[0] - 1, at[0] + 1); ++i)
+      {
+        best = std::max(best, this->Tubeness[this->Volume.Index(i, j, k)]);
+      }
+    }
+  }
+  return best;
 }
 
 bool OutletSearch::Describe(Outlet& outlet, const std::vector<std::int64_t>& members) const
@@ -489,21 +523,7 @@ bool OutletSearch::Describe(Outlet& outlet, const std::vector<std::int64_t>& mem
     {
       continue;
     }
-    // The path need not run in the middle.
-    const std::array<int, 3> at = this->Volume.Place(p);
-    float best = 0.0f;
-    for (int k = std::max(0, at[2] - 1); k <= std::min(this->Volume.size[2] - 1, at[2] + 1); ++k)
-    {
-      for (int j = std::max(0, at[1] - 1); j <= std::min(this->Volume.size[1] - 1, at[1] + 1); ++j)
-      {
-        for (int i = std::max(0, at[0] - 1); i <= std::min(this->Volume.size[0] - 1, at[0] + 1);
-             ++i)
-        {
-          best = std::max(best, this->Tubeness[this->Volume.Index(i, j, k)]);
-        }
-      }
-    }
-    outlet.tubular += best;
+    outlet.tubular += this->TubenessAt(p);
     ++count;
   }
   outlet.tubular /= std::max(1, count);
@@ -572,21 +592,75 @@ bool OutletSearch::Describe(Outlet& outlet, const std::vector<std::int64_t>& mem
 
   outlet.ostium.position = middles.front();
   this->FollowToWall(outlet.ostium);
-  const Vector3& position = outlet.ostium.position;
-  const TubeAxis::Place place = this->Axis.At(position);
-  outlet.level = place.length;
-  const Vector3 outward = this->Upright * (position - place.centre);
-  outlet.azimuth = std::atan2(-outward[1], outward[0]);
-  outlet.departure = axis.dot((position - place.centre).normalized());
+  Vector3 farther = outlet.ostium.position;
   constexpr double along = 40.0; // mm
   for (const std::int64_t p : path)
   {
     if (this->Length[p] <= along)
     {
-      outlet.course = this->Upright * (this->Volume.World(this->Volume.Place(p)) - position);
+      farther = this->World(p);
     }
   }
+  this->Orient(outlet, farther);
   return true;
+}
+
+/// Where an outlet lies about the aorta.
+/// @param farther  a place 40 mm along the vessel, or its end
+void OutletSearch::Orient(Outlet& outlet, const Vector3& farther) const
+{
+  const Vector3& position = outlet.ostium.position;
+  const TubeAxis::Place place = this->Axis.At(position);
+  outlet.level = place.length;
+  const Vector3 outward = this->Upright * (position - place.centre);
+  outlet.azimuth = std::atan2(-outward[1], outward[0]);
+  outlet.departure = outlet.ostium.axis.dot((position - place.centre).normalized());
+  outlet.course = this->Upright * (farther - position);
+}
+
+/// An outlet whose vessel is not seen at the wall.
+Outlet OutletSearch::Describe(const HiddenMouth& mouth) const
+{
+  constexpr double opening = 5.0; // mm that give the direction at the wall
+  constexpr double shaded = 10.0; // mm, and the others below, as for what is seen
+  constexpr double along = 40.0;
+  constexpr double most = 45.0;
+  constexpr double longest = 80.0;
+  Outlet outlet;
+  outlet.volume = mouth.volume;
+  outlet.ostium.hidden = mouth.hidden;
+  outlet.ostium.length = std::min(longest, mouth.length);
+  outlet.ostium.radius = mouth.radius;
+  std::vector<std::int64_t> path = mouth.way;
+  path.insert(path.end(), mouth.along.begin() + 1, mouth.along.end());
+  const Vector3 first = this->World(path.front());
+  Vector3 ahead = first;
+  Vector3 farther = first;
+  double length = 0.0;
+  int count = 0;
+  for (std::size_t n = 1; n < path.size(); ++n)
+  {
+    const Vector3 here = this->World(path[n]);
+    const double step = (here - this->World(path[n - 1])).norm();
+    length += step;
+    outlet.shade += length <= shaded ? step * (1.0 - this->Brightness(path[n])) : 0.0;
+    if (n >= mouth.way.size() && length <= most)
+    {
+      outlet.tubular += this->TubenessAt(path[n]);
+      ++count;
+    }
+    ahead = length <= opening ? here : ahead;
+    farther = length <= along ? here : farther;
+  }
+  outlet.tubular /= std::max(1, count);
+  outlet.ostium.axis = (ahead - first).normalized();
+  outlet.ostium.position = this->World(mouth.way[std::min<std::size_t>(2, mouth.way.size() - 1)]);
+  this->FollowToWall(outlet.ostium);
+  outlet.ostium.radius = mouth.radius;
+  const Vector3 axis = ahead - outlet.ostium.position;
+  outlet.ostium.axis = axis.norm() > 0.0 ? Vector3(axis.normalized()) : outlet.ostium.axis;
+  this->Orient(outlet, farther);
+  return outlet;
 }
 
 /// The wall around a place on it, without the vessel's mouth, continued over that.

@@ -33,7 +33,7 @@ struct AorticOutlets
   /// HU of the blood in each of the tube's sections; NaN: outside of what was looked at.
   std::vector<double> sectionMeans;
   double chambers = 0.0;       ///< mm^3 well inside large bodies of arterial blood beside the tube
-  std::vector<Outlet> outlets; ///< at most twelve, most vessel first
+  std::vector<Outlet> outlets; ///< at most twelve, most vessel first; then mouths that are hidden
 };
 
 /// What hangs on a tube that may be the aorta.

@@ -153,6 +153,7 @@ struct VesselEnd
   Vector3 outwards = Vector3::Zero(); ///< unit
   double radius = 0.0;                ///< mm, 0: not measured
   double lumen = 0.0;                 ///< share of the contrast
+  double root = 0.0;                  ///< mm from where the tree begins; 0: an end like others
 };
 
 class Linker
@@ -727,8 +728,9 @@ double Linker::Judge(
   }
   odds -= link.unseen / 6.0;
   odds -= std::max(0.0, link.unseen - FreeGap) / 8.0;
+  const bool root = tip != nullptr && tip->root > 0.0;
   link.radiusBefore =
-    tip != nullptr && tip->radius > 0.0 ? tip->radius : this->RadiusByVolume(from);
+    tip != nullptr && (tip->radius > 0.0 || root) ? tip->radius : this->RadiusByVolume(from);
   // A piece that is thick on the whole is no vessel that begins thin; side branches add to its volume.
   const double thick = 0.6 *
     std::sqrt(
@@ -751,6 +753,11 @@ double Linker::Judge(
       // A side branch is no wider than what it leaves.
       odds -= 5.0 * std::max(0.0, ratio - 0.1);
     }
+  }
+  if (root)
+  {
+    // What begins at full width right before the aorta comes from there.
+    odds += 2.0 * std::clamp((end.radius - 0.6) / 0.6, 0.0, 1.0);
   }
   if (tip != nullptr)
   {
@@ -855,7 +862,7 @@ VesselLink Linker::BestLink(Orphan& orphan, const std::vector<VesselEnd>& tips) 
       {
         continue;
       }
-      consider(tip.position, 2.0, &tip);
+      consider(tip.position, 2.0 + tip.root, &tip);
     }
     // The wall of the tree ahead.
     double least = std::numeric_limits<double>::infinity();
@@ -913,8 +920,17 @@ std::vector<VesselLink> Linker::Run(
     treeVoxels.push_back(voxel);
   }
   const VoxelPiece trunk(this->L, std::move(treeVoxels));
-  const std::vector<VesselEnd> tips =
+  std::vector<VesselEnd> tips =
     paths.empty() ? std::vector<VesselEnd>() : this->EndsOf(trunk, paths);
+  for (const VesselRoot& root : this->I.roots)
+  {
+    VesselEnd tip;
+    tip.position = root.position;
+    tip.outwards = root.outwards;
+    tip.lumen = 1.0; // the aorta's
+    tip.root = std::max(root.reach, this->L.Spacing.minCoeff());
+    tips.push_back(tip);
+  }
 
   std::vector<VesselLink> best(orphans.size());
   ParallelFor(
@@ -942,7 +958,7 @@ std::vector<VesselLink> Linker::Run(
 
 struct VesselLinker::Work
 {
-  LinkingImage image;
+  const LinkingImage& image;
   LinkingSettings settings;
   Linker linker{ image, settings };
 };

@@ -32,6 +32,14 @@ struct VesselLink : VesselBridge
   std::vector<std::int64_t> voxels; ///< numbers in the lattice, along the points
 };
 
+/// Where a tree is known to begin, and hardly anything is seen of it.
+struct VesselRoot
+{
+  Vector3 position = Vector3::Zero(); ///< mm, the last that is seen
+  Vector3 outwards = Vector3::Zero(); ///< unit, into the vessel
+  double reach = 0.0;                 ///< mm from the beginning to `position`
+};
+
 /// Values of single voxels that linking looks at; numbers are the lattice's.
 struct LinkingImage
 {
@@ -45,6 +53,7 @@ struct LinkingImage
   std::function<bool(std::int64_t)> couldBelong; ///< vessel-like, and free
   std::function<bool(std::int64_t)> inTree;
   std::function<bool(std::int64_t)> forbidden; ///< chamber, great vessel, leakage: no way through
+  std::vector<VesselRoot> roots;               ///< ends of the tree beside those that it shows
 };
 
 struct LinkingSettings
@@ -58,7 +67,7 @@ struct LinkingSettings
 class VesselLinker
 {
 public:
-  /// @param image  its functions are called from several threads, and its references must outlive this
+  /// @param image  must outlive this; its functions are called from several threads, its roots may change between calls
   VesselLinker(const LinkingImage& image, const LinkingSettings& settings);
   ~VesselLinker();
   VesselLinker(const VesselLinker&) = delete;

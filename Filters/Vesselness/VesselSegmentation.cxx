@@ -163,6 +163,7 @@ private:
     }
     return numbers;
   }
+  std::vector<VesselRoot> HiddenRoots(const std::vector<VesselSeed>& seeds, double seen) const;
   void KeepConnected();
   void RefineWall(std::vector<float>* probability, const ProgressCallback& progress);
   void DropIslands();
@@ -417,7 +418,9 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
     this->L.Ball(places[s], ballRadius,
       [&](std::int64_t p, const std::array<int, 3>& at)
       {
-        if (this->States[p] == Unknown && this->Likelihood(p) >= weak && shortest.Get(at) > 0.0f)
+        if (((this->States[p] == Unknown && this->Likelihood(p) >= weak) ||
+              this->States[p] == Bridge) &&
+          shortest.Get(at) > 0.0f)
         {
           shortest.At(at) = 0.0f;
           queue.push({ 0.0f, static_cast<std::int32_t>(s) * ways + none, p });
@@ -631,6 +634,57 @@ void Segmentation<T>::CutLeakage()
   this->Members = std::move(kept);
 }
 
+/**
+ * Seeds that hardly anything hangs on: what begins there may be hidden by a lesion.
+ * @param seen  mm of vessel that are enough to go on from
+ */
+template <typename T>
+std::vector<VesselRoot> Segmentation<T>::HiddenRoots(
+  const std::vector<VesselSeed>& seeds, double seen) const
+{
+  constexpr double least = 2.0; // mm: less has no direction, and may be the aorta's blurred wall
+  std::vector<const Member*> farthest(seeds.size(), nullptr);
+  for (const Member& m : this->Members)
+  {
+    const auto s = static_cast<std::size_t>(m.seed);
+    if (farthest[s] == nullptr || m.path > farthest[s]->path)
+    {
+      farthest[s] = &m;
+    }
+  }
+  std::vector<VesselRoot> roots;
+  for (std::size_t s = 0; s < seeds.size(); ++s)
+  {
+    const double path = farthest[s] != nullptr ? static_cast<double>(farthest[s]->path) : 0.0;
+    if (path >= seen || !(seeds[s].axis.squaredNorm() > 0.0))
+    {
+      continue;
+    }
+    const Vector3 axis = seeds[s].axis.normalized();
+    VesselRoot root{ seeds[s].position + least * axis, axis, least };
+    if (path > least)
+    {
+      // The middle of its blunt end.
+      Vector3 sum = Vector3::Zero();
+      int count = 0;
+      for (const Member& m : this->Members)
+      {
+        if (static_cast<std::size_t>(m.seed) == s && static_cast<double>(m.path) > path - 1.0)
+        {
+          sum += this->L.World(this->L.Place(m.voxel));
+          ++count;
+        }
+      }
+      root.position = sum / count;
+      const Vector3 way = root.position - seeds[s].position;
+      root.reach = way.norm();
+      root.outwards = (axis + way.normalized()).normalized();
+    }
+    roots.push_back(root);
+  }
+  return roots;
+}
+
 /// Round by round what hangs on nothing is linked to what is there, and collected from there on.
 template <typename T>
 void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
@@ -638,28 +692,51 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
 {
   const ImageInterpolator interpolator(this->Whole);
   const auto weak = static_cast<float>(this->Settings.weak);
-  const LinkingImage image{ this->L, interpolator,
+  // Where nothing is collected at a seed, links arrive at its first voxels.
+  std::vector<std::int64_t> bare;
+  LinkingImage image{ this->L, interpolator,
     static_cast<double>(this->Tissue + 1.0f / this->InverseContrast),
     static_cast<double>(this->Tissue), this->Settings.largestRadius,
     [this](std::int64_t p) { return this->Share(p); },
     [this](std::int64_t p) { return this->Vesselness[p] * this->InverseTubular; },
     [this, weak](std::int64_t p)
     { return this->States[p] == Unknown && this->Likelihood(p) >= weak; },
-    [this](std::int64_t p) { return this->States[p] == Vessel; },
-    [this](std::int64_t p) { return this->States[p] == Body || this->States[p] == Leak; } };
+    [this, &bare](std::int64_t p)
+    { return this->States[p] == Vessel || std::find(bare.begin(), bare.end(), p) != bare.end(); },
+    [this](std::int64_t p) { return this->States[p] == Body || this->States[p] == Leak; }, {} };
   LinkingSettings settings;
   settings.leastConfidence = this->Settings.leastLinkConfidence;
   settings.longestGap = this->Settings.longestGap;
   // Each round can only add; more than a handful of lesions in a row does not happen.
   constexpr int rounds = 8;
   VesselLinker linker(image, settings);
-  for (int round = 0; round < rounds && !this->Members.empty(); ++round)
+  for (int round = 0; round < rounds; ++round)
   {
     std::vector<std::pair<std::int64_t, float>> tree;
     tree.reserve(this->Members.size());
     for (const Member& m : this->Members)
     {
       tree.emplace_back(m.voxel, m.path);
+    }
+    image.roots = this->HiddenRoots(seeds, settings.leastPiece);
+    bare.clear();
+    for (const VesselRoot& root : image.roots)
+    {
+      const std::optional<std::array<int, 3>> first =
+        this->L.Nearest(root.position - 0.5 * root.reach * root.outwards);
+      if (first)
+      {
+        const std::int64_t voxel = this->L.Index((*first)[0], (*first)[1], (*first)[2]);
+        if (this->States[voxel] == Unknown)
+        {
+          bare.push_back(voxel);
+          tree.emplace_back(voxel, 0.0f);
+        }
+      }
+    }
+    if (tree.empty())
+    {
+      break;
     }
     std::vector<VesselLink> links = linker.Find(
       tree, Part(progress, static_cast<double>(round) / rounds, (round + 1.0) / rounds));

@@ -25,6 +25,7 @@ struct Root
   ImageGrid grid;
   std::vector<std::int16_t> values;
   std::vector<PhantomOstium> truth;
+  std::vector<Vector3> left; ///< axes of the left tree, from the ostium on
 
   CoronaryOstia Find(const CoronaryOstiaSettings& settings = {}) const
   {
@@ -42,6 +43,17 @@ Root MakeRoot(std::uint64_t seed, Dominance dominance, double spacing, double an
   const CoronaryPhantom phantom(settings);
   Root root;
   root.truth = phantom.Ostia(Phase);
+  const PhantomTree tree = phantom.Tree(Phase);
+  for (const PhantomBranch& branch : tree.branches)
+  {
+    if (branch.treeId == 0)
+    {
+      for (const std::int64_t p : branch.points)
+      {
+        root.left.push_back(tree.points[static_cast<std::size_t>(p)]);
+      }
+    }
+  }
   root.grid.spacing = spacing * Vector3(1.0, 1.0, 1.1);
   root.grid.direction = Eigen::AngleAxisd(angle, Vector3(1.0, 2.0, -2.0).normalized()).matrix();
   const Vector3 centre = 0.5 * (root.truth[0].position + root.truth[1].position);
@@ -98,6 +110,36 @@ void ExpectFound(const CoronaryOstia& found, const Root& root, const std::string
   EXPECT_NEAR(found.aorta.mean, 420.0, 30.0);
   EXPECT_NEAR(found.aorta.deviation, 20.0, 15.0);
   EXPECT_GT(found.aorta.confidence, 0.5);
+}
+
+/// Plaque in place of the first millimetres of the left tree.
+Root WithoutLeftMouth(double length)
+{
+  Root root = Standard();
+  constexpr double plaque = 60.0; // HU
+  std::vector<Vector3> hidden;
+  for (const Vector3& p : root.left)
+  {
+    if ((p - root.left.front()).norm() < length)
+    {
+      hidden.push_back(p);
+    }
+  }
+  Vector3 outward = root.truth[0].position - root.truth[1].position;
+  outward.normalize();
+  const std::array<int, 3> n = ScalarImage{ root.values.data(), root.grid }.Dimensions();
+  for (std::size_t v = 0; v < root.values.size(); ++v)
+  {
+    const auto i = static_cast<int>(v);
+    const Vector3 p = root.grid.IndexToWorld(i % n[0], i / n[0] % n[1], i / (n[0] * n[1]));
+    if ((p - root.truth[0].position).dot(outward) > 0.3 &&
+      std::any_of(
+        hidden.begin(), hidden.end(), [&](const Vector3& q) { return (p - q).norm() < 3.2; }))
+    {
+      root.values[v] = std::min(root.values[v], static_cast<std::int16_t>(plaque));
+    }
+  }
+  return root;
 }
 
 std::string MessageOf(const std::function<void()>& action)
@@ -294,6 +336,29 @@ TEST(CoronaryOstia, ASingleVesselIsNamedAndDoubted)
   ASSERT_EQ(found.ostia.size(), 1u) << found.doubt;
   EXPECT_EQ(found.ostia[0].name, "RCA");
   EXPECT_LT((found.ostia[0].position - root.truth[1].position).norm(), 2.0);
+  EXPECT_EQ(found.doubt, "only the RCA was found");
+}
+
+TEST(CoronaryOstia, AMouthThatIsHiddenIsWhereItsVesselPoints)
+{
+  const Root root = WithoutLeftMouth(8.0);
+  const CoronaryOstia seen = Standard().Find();
+  const CoronaryOstia found = root.Find();
+  ASSERT_EQ(found.ostia.size(), 2u) << found.doubt;
+  EXPECT_EQ(found.ostia[0].name, "LCA");
+  EXPECT_LT((found.ostia[0].position - root.truth[0].position).norm(), 3.0);
+  EXPECT_GT(found.ostia[0].axis.dot(root.truth[0].axis), 0.5);
+  EXPECT_GT(found.ostia[0].confidence, 0.2);
+  EXPECT_LT(found.ostia[0].confidence, seen.ostia[0].confidence - 0.03);
+  EXPECT_LT((found.ostia[1].position - root.truth[1].position).norm(), 2.0);
+}
+
+TEST(CoronaryOstia, AVesselFarFromTheAortaHasNoMouthThere)
+{
+  const Root root = WithoutLeftMouth(25.0);
+  const CoronaryOstia found = root.Find();
+  ASSERT_EQ(found.ostia.size(), 1u);
+  EXPECT_EQ(found.ostia[0].name, "RCA");
   EXPECT_EQ(found.doubt, "only the RCA was found");
 }
 

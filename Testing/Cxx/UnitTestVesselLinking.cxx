@@ -85,10 +85,9 @@ struct Scene
         { vesselness.data(), nullptr, nullptr });
   }
 
-  VesselSegmentationResult Run() const
+  VesselSegmentationResult Run(const VesselSeed& seed = { Vector3(2.0, 0.0, 0.0) }) const
   {
-    return SegmentVessels(
-      { values.data(), grid }, vesselness.data(), { { Vector3(2.0, 0.0, 0.0) } }, settings);
+    return SegmentVessels({ values.data(), grid }, vesselness.data(), { seed }, settings);
   }
   /// Voxels of the mask that a condition holds for.
   int Count(const VesselSegmentationResult& result,
@@ -239,6 +238,60 @@ TEST(VesselLinking, NotAcrossMoreThanTheLongestGap)
   EXPECT_TRUE(scene.Run().links.empty());
   scene.settings.longestGap = 50.0;
   EXPECT_THROW(scene.Run(), std::invalid_argument);
+}
+
+/// A part of the aorta with its wall at (4, 0, 0).
+double Aorta(const Vector3& p)
+{
+  return (p - Vector3(-6.0, 0.0, 0.0)).norm() - 10.0;
+}
+
+TEST(VesselLinking, AVesselWhoseMouthIsHidden)
+{
+  const VesselSeed ostium{ Vector3(4.0, 0.0, 0.0), Vector3::UnitX() };
+  for (const double stump : { 0.0, 3.0 })
+  {
+    SCOPED_TRACE(stump);
+    std::vector<Distance> bodies{ Aorta, Tube({ 13.6, 0, 0 }, { 78, 0, 0 }, 1.6) };
+    if (stump > 0.0)
+    {
+      bodies.push_back(Tube({ 0, 0, 0 }, { 4.0 + stump, 0, 0 }, 1.6));
+    }
+    Scene scene(bodies);
+    const VesselSegmentationResult result = scene.Run(ostium);
+    ASSERT_EQ(result.links.size(), 1U);
+    const VesselLink& link = result.links.front();
+    EXPECT_GE(link.confidence, 0.5);
+    EXPECT_LE(link.confidence, 0.99);
+    EXPECT_GT(link.unseen, 3.0);
+    for (const Vector3& p : link.points)
+    {
+      EXPECT_LT(std::hypot(p[1], p[2]), 1.0);
+      EXPECT_GT(p[0], 3.0);
+    }
+    EXPECT_LT(link.points.front()[0], 9.0);
+    EXPECT_GT(scene.Count(result, Behind), 1000);
+    EXPECT_GT(result.seedVolume.front(), 300.0);
+    EXPECT_EQ(scene.Count(result, [](const Vector3& p) { return p[0] < 3.0; }), 0);
+
+    scene.settings.crossLesions = false;
+    EXPECT_EQ(scene.Count(scene.Run(ostium), Behind), 0);
+  }
+}
+
+TEST(VesselLinking, AnOstiumWithoutVesselStaysAlone)
+{
+  const VesselSeed ostium{ Vector3(4.0, 0.0, 0.0), Vector3::UnitX() };
+  const VesselSegmentationResult nothing = Scene({ Aorta }).Run(ostium);
+  EXPECT_TRUE(nothing.links.empty());
+  EXPECT_EQ(nothing.seedVolume.front(), 0.0);
+  // One that runs past it, and one farther away than lesions are long.
+  const VesselSegmentationResult past =
+    Scene({ Aorta, Tube({ 14, -13, 0 }, { 14, 31, 0 }, 1.6) }).Run(ostium);
+  EXPECT_TRUE(past.links.empty());
+  const VesselSegmentationResult far =
+    Scene({ Aorta, Tube({ 36, 0, 0 }, { 78, 0, 0 }, 1.6) }).Run(ostium);
+  EXPECT_TRUE(far.links.empty());
 }
 
 TEST(VeinRejection, ADarkWideTubeThatTouchesIsLeftOut)

@@ -291,6 +291,16 @@ void Erase(Work& work, Painter& painter, int treeId, double length)
     truth.end());
 }
 
+/// Plaque in place of a vessel's lumen from some millimetres behind its ostium on; it still begins there.
+void Hide(Work& work, Painter& painter, int treeId, double from, double to, double value)
+{
+  const std::vector<Vector3> line = Beginning(work.tree, treeId, from, to);
+  const AorticRoot& root = work.anatomy->root;
+  painter.Paint(value,
+    [&](const Vector3& p)
+    { return std::min(2.8 - Painter::DistanceTo(line, p), OutsideRoot(root, p)); });
+}
+
 /// A vessel that begins `rise` mm above its usual place.
 void RaiseOstium(Work& work, Painter& painter, int treeId, double rise)
 {
@@ -523,6 +533,12 @@ void Change(const std::string& group, RandomStream& random, Work& work)
   {
     RaiseOstium(work, painter, random.Uniform() < 0.5 ? 0 : 1, random.Uniform(9.0, 18.0));
   }
+  else if (is("hidden mouth"))
+  {
+    const int treeId = random.Uniform() < 0.5 ? 0 : 1;
+    const double from = random.Uniform(0.0, 4.0);
+    Hide(work, painter, treeId, from, from + random.Uniform(4.0, 8.0), random.Uniform(30.0, 90.0));
+  }
   else if (is("no right ostium"))
   {
     Erase(work, painter, 1, 25.0);
@@ -600,6 +616,7 @@ const std::vector<OstiaGroup>& OstiaGroups()
     { "native", "no contrast medium", true },
     { "lungs' phase", "only the pulmonary arteries are bright", true },
     { "abdomen", "a bright aorta with renal and mesenteric arteries", true },
+    { "hidden mouth", "plaque closes 4 to 8 mm of one artery, 0 to 4 mm behind its ostium", false },
   };
   return groups;
 }
