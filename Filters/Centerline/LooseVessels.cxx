@@ -1,7 +1,6 @@
 #include "LooseVessels.h"
 
 #include "LumenMeasurement.h"
-#include "ParallelFor.h"
 #include "SegmentAtlas.h"
 #include "VoxelLattice.h"
 

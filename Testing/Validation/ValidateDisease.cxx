@@ -298,17 +298,13 @@ std::vector<Vector3> Troubles(const CoronaryPhantom& phantom, const PhantomScan&
   return places;
 }
 
-/// Which warnings have a reason. On a healthy heart none has, whatever it says.
+/// Which warnings have a reason.
 void JudgeWarnings(bool healthy, const std::vector<Vector3>& troubles, Outcome& outcome)
 {
   std::vector<Said> all;
   for (Warned& warned : outcome.warnings)
   {
     all.push_back(warned.said);
-    if (healthy)
-    {
-      continue;
-    }
     for (const Stretch& loss : outcome.lengths.losses)
     {
       if (loss.length >= 3.0 && Names(warned.said, loss))
@@ -316,11 +312,18 @@ void JudgeWarnings(bool healthy, const std::vector<Vector3>& troubles, Outcome& 
         warned.names += (warned.names.empty() ? "" : "; ") + loss.Text();
       }
     }
-    // What a surface leaves out it does lack.
-    if (warned.names.empty() &&
-      (warned.said.source == "surface" || IsJustified(warned.said, outcome.lengths, troubles)))
+    if (!warned.names.empty())
     {
-      warned.names = warned.said.source == "surface" ? "the surface" : "a lesion or a false branch";
+      continue;
+    }
+    if (warned.said.source == "surface")
+    {
+      // What a surface leaves out it does lack; of a healthy heart it should not.
+      warned.names = healthy ? "" : "the surface";
+    }
+    else if (IsJustified(warned.said, outcome.lengths, troubles))
+    {
+      warned.names = "a lesion or a false branch";
     }
   }
   outcome.untold = Untold(outcome.lengths, all);
