@@ -22,6 +22,7 @@
 #include "vtkRunMask.h"
 #include "vtkRunMeshes.h"
 #include "vtkRunMotion.h"
+#include "vtkRunRegion.h"
 #include "vtkRunSurface.h"
 #include "vtkRunTrees.h"
 #include "vtkSurfaceFile.h"
@@ -105,9 +106,6 @@ constexpr double SurfaceSnapDistance = 3.0;
 
 /// Voxels, mm, in which coronary arteries can still be followed.
 constexpr double LargestVoxel = 1.25;
-
-/// Images with fewer values between the least and the greatest are in another unit than HU.
-constexpr double LeastRangeOfHU = 400.0;
 
 /// The number of the phase at a time.
 int PhaseAt(vtkGatedImageReader* reader, double time)
@@ -321,6 +319,11 @@ Json MakeVesselness(RunStep& step)
   {
     vesselness->SetAutomaticC(true);
   }
+  vtkSmartPointer<vtkImageData> heart = HeartMask(step);
+  if (heart)
+  {
+    vesselness->SetInputData(1, heart);
+  }
   if (step.ranks.Size() > 1)
   {
     step.input.Vesselness = ComputeInSlabs(vesselness, step);
@@ -340,7 +343,7 @@ Json MakeVesselness(RunStep& step)
   step.summary = "vesselness with c = " + Format(vesselness->GetUsedC());
   return { { "file", "vesselness.mha" },
     { "sigmas", Numbers(response, vtkCoronaryArrayNames::VesselnessSigmas) },
-    { "c", vesselness->GetUsedC() } };
+    { "c", vesselness->GetUsedC() }, { "region", DescribeRegion(step) } };
 }
 
 /// The segmentation with its seeds, the aorta and the ways across lesions; a mask that is there already stays.
@@ -357,6 +360,7 @@ void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
   {
     segmentation->AddSeed(given[n], given[n + 1], given[n + 2]);
   }
+  segmentation->SetKnownOstia(step.input.Ostia);
   segmentation->SetLargestRadius(settings.largestRadius);
   if (!settings.window.empty())
   {
@@ -978,6 +982,7 @@ void FindReference(RunStep& step)
   step.report.Set("phase", phase);
   step.report.Set("time", reader->GetPhaseTime(phase));
   step.report.Set("image", reader->GetPhaseFileName(phase));
+  FindHeart(step);
 }
 
 bool IsShared(RunStage stage)

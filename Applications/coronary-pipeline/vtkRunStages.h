@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,8 @@ namespace coronary
 {
 class RankGroup;
 class StagedFolder;
+class HeartRegion;
+struct CoronaryOstia;
 
 /// What the stages work on.
 class RunInput
@@ -59,6 +62,12 @@ public:
   vtkSmartPointer<vtkGatedImageReader> Reader;
   std::vector<double> Seeds;      ///< given points, three numbers each
   std::vector<std::string> Masks; ///< of a series.json, one a phase; empty: there are none
+
+  ///@{
+  /// What was found in the reference phase before anything else; null: not looked for, or not sure.
+  std::shared_ptr<const CoronaryOstia> Ostia;
+  std::shared_ptr<const HeartRegion> Region;
+  ///@}
 
   ///@{
   /// Of the reference phase; null: not in memory.

@@ -1,5 +1,7 @@
 #include "JunctionMesh.h"
 
+#include "ParallelFor.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -127,50 +129,70 @@ private:
       return false;
     }
     constexpr float unknown = 1e30F;
+    constexpr float wanted = 2e30F;
     this->Values.assign(nodes, unknown);
     // Blocks of cells; those that the wall cannot reach are not looked into.
     constexpr int block = 4;
-    for (int k = 0; k + 1 < this->Size[2]; k += block)
+    const std::array<int, 3> blocks{ (this->Size[0] + block - 2) / block,
+      (this->Size[1] + block - 2) / block, (this->Size[2] + block - 2) / block };
+    std::vector<char> reached(static_cast<std::size_t>(blocks[0]) * blocks[1] * blocks[2]);
+    const auto cornerOf = [&](std::int64_t n)
     {
-      for (int j = 0; j + 1 < this->Size[1]; j += block)
+      return std::array<int, 3>{ static_cast<int>(n % blocks[0]) * block,
+        static_cast<int>(n / blocks[0] % blocks[1]) * block,
+        static_cast<int>(n / blocks[0] / blocks[1]) * block };
+    };
+    ParallelFor(static_cast<std::int64_t>(reached.size()), 256,
+      [&](std::int64_t first, std::int64_t last)
       {
-        for (int i = 0; i + 1 < this->Size[0]; i += block)
+        for (std::int64_t n = first; n < last; ++n)
         {
-          const Vector3 centre = this->At(i, j, k) + Vector3::Constant(0.5 * block * this->Cell);
+          const std::array<int, 3> at = cornerOf(n);
+          const Vector3 centre =
+            this->At(at[0], at[1], at[2]) + Vector3::Constant(0.5 * block * this->Cell);
           const double reach = 1.35 * 0.5 * block * this->Cell * std::sqrt(3.0);
-          if (std::abs(this->Value(centre)) > reach)
+          reached[n] = std::abs(this->Value(centre)) > reach ? 0 : 1;
+        }
+      });
+    std::vector<std::array<int, 3>> known; // nodes of these, each once
+    for (std::size_t n = 0; n < reached.size(); ++n)
+    {
+      if (reached[n] == 0)
+      {
+        continue;
+      }
+      const auto [i, j, k] = cornerOf(static_cast<std::int64_t>(n));
+      const int top[3] = { std::min(i + block, this->Size[0] - 1),
+        std::min(j + block, this->Size[1] - 1), std::min(k + block, this->Size[2] - 1) };
+      for (int c = k; c <= top[2]; ++c)
+      {
+        for (int b = j; b <= top[1]; ++b)
+        {
+          for (int a = i; a <= top[0]; ++a)
           {
-            continue;
-          }
-          const int top[3] = { std::min(i + block, this->Size[0] - 1),
-            std::min(j + block, this->Size[1] - 1), std::min(k + block, this->Size[2] - 1) };
-          for (int c = k; c <= top[2]; ++c)
-          {
-            for (int b = j; b <= top[1]; ++b)
+            float& value = this->Values[this->Node(a, b, c)];
+            if (value == unknown)
             {
-              for (int a = i; a <= top[0]; ++a)
-              {
-                float& value = this->Values[this->Node(a, b, c)];
-                if (value == unknown)
-                {
-                  value = static_cast<float>(this->Value(this->At(a, b, c)));
-                }
-              }
+              value = wanted;
+              known.push_back({ a, b, c });
             }
-          }
-          for (int c = k; c < top[2]; ++c)
-          {
-            for (int b = j; b < top[1]; ++b)
+            if (a < top[0] && b < top[1] && c < top[2])
             {
-              for (int a = i; a < top[0]; ++a)
-              {
-                this->Cells.push_back({ a, b, c });
-              }
+              this->Cells.push_back({ a, b, c });
             }
           }
         }
       }
     }
+    ParallelFor(static_cast<std::int64_t>(known.size()), 1024,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          const auto [a, b, c] = known[n];
+          this->Values[this->Node(a, b, c)] = static_cast<float>(this->Value(this->At(a, b, c)));
+        }
+      });
     return true;
   }
 
@@ -277,35 +299,39 @@ private:
     const std::size_t n = this->mesh.points.size();
     this->Past.resize(n);
     this->Arm.assign(n, -1);
-    for (std::size_t p = 0; p < n; ++p)
-    {
-      Vector3 x = this->mesh.points[p];
-      SweptLumen::Sample sample;
-      for (int iteration = 0; iteration < 4; ++iteration)
+    ParallelFor(static_cast<std::int64_t>(n), 512,
+      [&](std::int64_t first, std::int64_t last)
       {
-        this->Lumen.EvaluateJunctionAt(x, this->Number, sample);
-        const double square = sample.gradient.squaredNorm();
-        if (iteration == 3 || square < 1e-2 || std::abs(sample.distance) > 1.5 * this->Cell)
+        for (std::int64_t p = first; p < last; ++p)
         {
-          break;
+          Vector3 x = this->mesh.points[p];
+          SweptLumen::Sample sample;
+          for (int iteration = 0; iteration < 4; ++iteration)
+          {
+            this->Lumen.EvaluateJunctionAt(x, this->Number, sample);
+            const double square = sample.gradient.squaredNorm();
+            if (iteration == 3 || square < 1e-2 || std::abs(sample.distance) > 1.5 * this->Cell)
+            {
+              break;
+            }
+            const Vector3 move = -sample.distance / square * sample.gradient;
+            x += move * std::min(1.0, 0.5 * this->Cell / std::max(1e-12, move.norm()));
+          }
+          int arm = -1;
+          const double past = this->Beyond(sample, arm);
+          // What closes the grid behind the cut is dropped anyway, and stays where it is.
+          if (past < 2.0 * this->Cell)
+          {
+            this->mesh.points[p] = x;
+          }
+          this->Past[p] = past;
+          this->Arm[p] = arm;
+          if (std::abs(past) < 0.2 * this->Cell)
+          {
+            this->Past[p] = 0.0;
+          }
         }
-        const Vector3 move = -sample.distance / square * sample.gradient;
-        x += move * std::min(1.0, 0.5 * this->Cell / std::max(1e-12, move.norm()));
-      }
-      int arm = -1;
-      const double past = this->Beyond(sample, arm);
-      // What closes the grid behind the cut is dropped anyway, and stays where it is.
-      if (past < 2.0 * this->Cell)
-      {
-        this->mesh.points[p] = x;
-      }
-      this->Past[p] = past;
-      this->Arm[p] = arm;
-      if (std::abs(past) < 0.2 * this->Cell)
-      {
-        this->Past[p] = 0.0;
-      }
-    }
+      });
   }
 
   std::int64_t CutPoint(std::int64_t a, std::int64_t b)

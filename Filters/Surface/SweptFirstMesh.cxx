@@ -107,23 +107,31 @@ private:
     const ProgressCallback& progress) const
   {
     std::vector<std::unique_ptr<JunctionFailure>> failed(which.size());
-    ParallelFor(
-      static_cast<std::int64_t>(which.size()), 1,
-      [&](std::int64_t first, std::int64_t last)
+    const auto mesh = [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
       {
-        for (std::int64_t i = first; i < last; ++i)
+        try
         {
-          try
-          {
-            meshes[which[i]] = MeshJunction(this->Lumen, static_cast<int>(which[i]));
-          }
-          catch (const JunctionFailure& failure)
-          {
-            failed[i] = std::make_unique<JunctionFailure>(failure);
-          }
+          meshes[which[i]] = MeshJunction(this->Lumen, static_cast<int>(which[i]));
         }
-      },
-      progress);
+        catch (const JunctionFailure& failure)
+        {
+          failed[i] = std::make_unique<JunctionFailure>(failure);
+        }
+      }
+    };
+    const auto count = static_cast<std::int64_t>(which.size());
+    if (count < 2 * NumberOfThreads())
+    {
+      // Too few for all threads to have some: these share the work on each.
+      mesh(0, count);
+      Report(progress, 1.0);
+    }
+    else
+    {
+      ParallelFor(count, 1, mesh, progress);
+    }
     Unresolved unresolved;
     for (const auto& failure : failed)
     {

@@ -235,6 +235,15 @@ void vtkVesselSegmentation::SetNumberOfSeeds(int count)
   }
 }
 
+void vtkVesselSegmentation::SetKnownOstia(std::shared_ptr<const coronary::CoronaryOstia> ostia)
+{
+  if (this->KnownOstia != ostia)
+  {
+    this->KnownOstia = std::move(ostia);
+    this->Modified();
+  }
+}
+
 int vtkVesselSegmentation::FillInputPortInformation(int port, vtkInformation* info)
 {
   info->Set(INPUT_REQUIRED_DATA_TYPE(), port == 2 ? "vtkPolyData" : "vtkImageData");
@@ -441,8 +450,10 @@ void vtkVesselSegmentation::Execute(
     vtkCoronary::Require(this->AutomaticOstia,
       "there is no seed: give points on the Seeds input or with AddSeed, or switch AutomaticOstia "
       "on");
-    const coronary::CoronaryOstia found =
-      coronary::FindCoronaryOstia(image.Image, {}, vtkCoronary::ProgressOf(this, 0.0, OstiaShare));
+    const coronary::CoronaryOstia found = this->KnownOstia
+      ? *this->KnownOstia
+      : coronary::FindCoronaryOstia(
+          image.Image, {}, vtkCoronary::ProgressOf(this, 0.0, OstiaShare));
     if (found.ostia.empty())
     {
       throw std::runtime_error("AutomaticOstia found no ostium (" + found.doubt +
@@ -615,6 +626,7 @@ void vtkVesselSegmentation::PrintSelf(ostream& os, vtkIndent indent)
        << this->Seeds[s][2] << "\n";
   }
   print("AutomaticOstia", this->AutomaticOstia);
+  print("KnownOstia", this->KnownOstia != nullptr);
   print("AutomaticWindow", this->AutomaticWindow);
   print("TissueValue", this->TissueValue);
   print("BloodValue", this->BloodValue);

@@ -58,8 +58,14 @@
 #include "vtkImageAlgorithm.h"
 
 #include <array>  // for std::array
+#include <memory> // for std::shared_ptr
 #include <string> // for std::string
 #include <vector> // for std::vector
+
+namespace coronary
+{
+struct CoronaryOstia;
+}
 
 class VTKCORONARYVESSELNESS_EXPORT vtkVesselSegmentation : public vtkImageAlgorithm
 {
@@ -105,6 +111,12 @@ public:
   vtkGetMacro(AutomaticOstia, bool);
   vtkBooleanMacro(AutomaticOstia, bool);
   ///@}
+
+#ifndef __VTK_WRAP__
+  /// What coronary::FindCoronaryOstia found in the image, for who has it already: it is not looked for again. Null
+  /// (default): it is not known.
+  void SetKnownOstia(std::shared_ptr<const coronary::CoronaryOstia> ostia);
+#endif
 
   ///@{
   /**
@@ -244,6 +256,7 @@ private:
     vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs);
 
   std::vector<std::array<double, 3>> Seeds;
+  std::shared_ptr<const coronary::CoronaryOstia> KnownOstia;
   bool AutomaticOstia = true;
   bool CrossLesions = true;
   double LongestGap = 25.0;

@@ -1,0 +1,35 @@
+/**
+ * @file vtkRunRegion.h
+ * @brief The heart's part of the reference phase: the rest of a chest is not looked at.
+ */
+#ifndef DynamicCoronary_vtkRunRegion_h
+#define DynamicCoronary_vtkRunRegion_h
+
+#include "vtkRunStages.h"
+
+#include "vtkSmartPointer.h"
+
+#include <nlohmann/json.hpp>
+
+class vtkImageData;
+
+namespace coronary
+{
+/// Images with fewer values between the least and the greatest are in another unit than HU.
+constexpr double LeastRangeOfHU = 400.0;
+
+/**
+ * The ostia of the reference phase and the region around them, into the input; no region where the ostia are not sure, where
+ * seeds or a mask are given, or where the image is not HU.
+ * @throws Cancelled
+ */
+void FindHeart(RunStep& step);
+
+/// The region as a mask on the reference phase, the same on all ranks; null: the whole image counts.
+vtkSmartPointer<vtkImageData> HeartMask(RunStep& step);
+
+/// What the report says of it.
+nlohmann::ordered_json DescribeRegion(const RunStep& step);
+}
+
+#endif
