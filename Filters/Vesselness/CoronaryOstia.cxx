@@ -42,8 +42,9 @@ double RoleEvidence(const Outlet& outlet, bool left, const CoronaryOstiaSettings
   const double tube =
     outlet.ostium.hidden > 0.0 ? (outlet.tubular - 0.3) / 0.3 : (outlet.tubular - 0.05) / 0.2;
   sum += 4.0 * std::clamp(tube, 0.0, 1.0) - 3.0;
-  // As for links across lesions: a nat for 6 mm that are not seen.
-  sum -= outlet.ostium.hidden / 6.0;
+  // The place is the less certain the farther it is extrapolated, as for links across lesions. What a lesion leaves of
+  // an artery is a thin lumen and a wall: bare fat between aorta and vessel speaks against a mouth.
+  sum -= outlet.ostium.hidden / 6.0 + outlet.unseen / 2.0;
   // A narrow or hidden beginning may be a wall between two vessels.
   sum -= 1.5 * std::clamp((outlet.shade - 1.0) / 3.0, 0.0, 1.0);
   // The right one goes to the right and round the heart, the left one forward or round the left side; both down.

@@ -64,6 +64,7 @@ private:
       this->Tube(p) >= LeastTube;
   }
   float Tube(std::int64_t p) const { return this->I.tubeness[p] / this->I.clearTube; }
+  float Seen(std::int64_t p) const { return std::clamp(this->Tube(p) / VisibleTube, 0.0F, 1.0F); }
   Vector3 World(std::int64_t p) const { return this->I.volume.World(this->I.volume.Place(p)); }
 
   template <typename F>
@@ -367,7 +368,7 @@ std::optional<HiddenMouth> MouthSearch::MouthOf(const PieceEnd& end)
     {
       return Infinite;
     }
-    const float seen = std::clamp(this->Tube(q) / VisibleTube, 0.0F, 1.0F);
+    const float seen = this->Seen(q);
     // Bright and no tube: the rim of a chamber.
     const bool rim =
       this->I.body[q] == 0 && this->I.likeness[q] > 0.5F && this->Tube(q) < LeastTube;
@@ -411,7 +412,9 @@ std::optional<HiddenMouth> MouthSearch::MouthOf(const PieceEnd& end)
     {
       const double step = (this->World(voxel) - this->World(mouth.way.back())).norm();
       mouth.length += step;
-      mouth.hidden += step * (1.0 - static_cast<double>(this->I.likeness[voxel]));
+      const double dark = step * (1.0 - static_cast<double>(this->I.likeness[voxel]));
+      mouth.hidden += dark;
+      mouth.unseen += dark * (1.0 - static_cast<double>(this->Seen(voxel)));
     }
     mouth.way.push_back(voxel);
   }

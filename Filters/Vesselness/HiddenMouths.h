@@ -31,6 +31,7 @@ struct HiddenMouth
   std::vector<std::int64_t> along; ///< voxels from there to the piece's other end
   double volume = 0.0;             ///< mm^3 of the piece
   double hidden = 0.0;             ///< mm of the way that look like no vessel
+  double unseen = 0.0;             ///< mm of these that show no tube of any brightness
   double turn = 0.0;   ///< radians between the piece's direction at its end and the way's chord
   double length = 0.0; ///< mm from the aorta to the other end
   double radius = 0.0; ///< mm, of the piece near the aorta

@@ -629,6 +629,7 @@ Outlet OutletSearch::Describe(const HiddenMouth& mouth) const
   Outlet outlet;
   outlet.volume = mouth.volume;
   outlet.ostium.hidden = mouth.hidden;
+  outlet.unseen = mouth.unseen;
   outlet.ostium.length = std::min(longest, mouth.length);
   outlet.ostium.radius = mouth.radius;
   std::vector<std::int64_t> path = mouth.way;

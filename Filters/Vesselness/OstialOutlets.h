@@ -22,7 +22,8 @@ struct Outlet
   double tubular = 0.0;  ///< mean vesselness along the vessel, 0 to 1
   double shade = 0.0;    ///< mm of dark path within the first 10 mm
   double departure =
-    0.0; ///< cosine of the angle between the vessel and the wall's outward direction
+    0.0;               ///< cosine of the angle between the vessel and the wall's outward direction
+  double unseen = 0.0; ///< mm of a hidden mouth that show no tube, not even a thin or dark one
   Vector3 course = Vector3::Zero(); ///< from the ostium to 40 mm along the vessel or its end, mm
 };
 

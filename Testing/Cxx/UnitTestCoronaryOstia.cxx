@@ -112,19 +112,12 @@ void ExpectFound(const CoronaryOstia& found, const Root& root, const std::string
   EXPECT_GT(found.aorta.confidence, 0.5);
 }
 
-/// Plaque in place of the first millimetres of the left tree.
+/// A rod of plaque in fat in place of the first millimetres of the left tree.
 Root WithoutLeftMouth(double length)
 {
   Root root = Standard();
-  constexpr double plaque = 60.0; // HU
-  std::vector<Vector3> hidden;
-  for (const Vector3& p : root.left)
-  {
-    if ((p - root.left.front()).norm() < length)
-    {
-      hidden.push_back(p);
-    }
-  }
+  constexpr std::int16_t plaque = 60; // HU
+  constexpr std::int16_t fat = -90;
   Vector3 outward = root.truth[0].position - root.truth[1].position;
   outward.normalize();
   const std::array<int, 3> n = ScalarImage{ root.values.data(), root.grid }.Dimensions();
@@ -132,11 +125,23 @@ Root WithoutLeftMouth(double length)
   {
     const auto i = static_cast<int>(v);
     const Vector3 p = root.grid.IndexToWorld(i % n[0], i / n[0] % n[1], i / (n[0] * n[1]));
-    if ((p - root.truth[0].position).dot(outward) > 0.3 &&
-      std::any_of(
-        hidden.begin(), hidden.end(), [&](const Vector3& q) { return (p - q).norm() < 3.2; }))
+    if ((p - root.truth[0].position).dot(outward) <= 0.3)
     {
-      root.values[v] = std::min(root.values[v], static_cast<std::int16_t>(plaque));
+      continue;
+    }
+    double away = 1e9;
+    bool hidden = false;
+    for (const Vector3& q : root.left)
+    {
+      if ((p - q).norm() < away)
+      {
+        away = (p - q).norm();
+        hidden = (q - root.left.front()).norm() < length;
+      }
+    }
+    if (hidden && away < 4.5)
+    {
+      root.values[v] = away < 2.2 ? plaque : fat;
     }
   }
   return root;
