@@ -182,7 +182,9 @@ std::vector<Fork> ForksOfTwo(const CenterlineTree& tree)
   return forks;
 }
 
-constexpr double GreatBranch = 0.6; ///< radius in radii of its parent
+constexpr double SamePlace = 3.0;       ///< mm: where a vein was rejected before
+constexpr double LongestCrossing = 6.0; ///< mm within a vein, at most, of what crosses it
+constexpr double GreatBranch = 0.6;     ///< radius in radii of its parent
 /// Between where a great branch's axis can be seen and the parent's axis; mean of phantoms. Radians.
 constexpr double GreatBranchBend = 0.2;
 /// A vessel goes straight on if it bends by no more, and the other one by so much more. Radians.
@@ -1620,15 +1622,21 @@ bool Extractor::IsExcluded(const std::vector<Vector3>& points) const
   {
     return false;
   }
-  const auto inside = std::count_if(points.begin(), points.end(),
-    [&](const Vector3& point)
+  std::size_t inside = 0;
+  double length = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i)
+  {
+    const Vector3 index = this->ToIndex(points[i]);
+    if (this->InImage(index) &&
+      this->Excluded[this->Offset(static_cast<int>(std::lround(index[0])),
+        static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])))] != 0)
     {
-      const Vector3 index = this->ToIndex(point);
-      return this->InImage(index) &&
-        this->Excluded[this->Offset(static_cast<int>(std::lround(index[0])),
-          static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])))] != 0;
-    });
-  return 4 * static_cast<std::size_t>(inside) > points.size();
+      ++inside;
+      length += i > 0 ? (points[i] - points[i - 1]).norm() : 0.0;
+    }
+  }
+  // Along a vein, not across it.
+  return length > LongestCrossing || 4 * inside > points.size();
 }
 
 bool Extractor::ExcludeVeins(
@@ -1647,10 +1655,9 @@ bool Extractor::ExcludeVeins(
   }
   excluded.resize(static_cast<std::size_t>(this->Size[0]) * this->Size[1] * this->Size[2], 0);
   // In units of the radius the nearest lumen has a voxel.
-  const auto mark = [&](std::size_t p, unsigned char value)
+  const auto mark = [&](std::size_t p, double reach, unsigned char value)
   {
     const Vector3 centre = this->ToIndex(tree.points[p]);
-    const double reach = value != 0 ? 1.4 * tree.radius[p] + this->Voxel : tree.radius[p];
     const std::array<int, 6>& e = this->Input.grid.extent;
     int range[6];
     for (int axis = 0; axis < 3; ++axis)
@@ -1674,33 +1681,51 @@ bool Extractor::ExcludeVeins(
       }
     }
   };
-  std::vector<char> isVein(tree.branches.size(), 0);
+  std::vector<char> closed(tree.points.size(), 0);
+  const std::size_t rejectedBefore = veins.size();
   for (const VeinBranch& vein : found)
   {
-    for (std::size_t b = 0; b < tree.branches.size(); ++b)
+    double length = 0.0;
+    for (std::size_t i = 0; i < vein.closed.size(); ++i)
     {
-      const CenterlineTree::Branch& branch = tree.branches[b];
-      if (branch.groupId == vein.groupId)
-      {
-        isVein[b] = 1;
-        veins.push_back({ tree.points[static_cast<std::size_t>(branch.points.front())],
-          branch.length, vein.probability });
-        for (const std::int64_t p : branch.points)
-        {
-          mark(static_cast<std::size_t>(p), 1);
-        }
-      }
+      const auto p = static_cast<std::size_t>(vein.closed[i]);
+      closed[p] = 1;
+      mark(p, tree.radius[p] + 0.5 * this->Voxel, 1);
+      length += i == 0
+        ? 0.0
+        : (tree.points[p] - tree.points[static_cast<std::size_t>(vein.closed[i - 1])]).norm();
+    }
+    const Vector3& place = tree.points[static_cast<std::size_t>(vein.closed.front())];
+    const auto before = veins.begin() + static_cast<std::ptrdiff_t>(rejectedBefore);
+    const auto known = std::find_if(veins.begin(), before,
+      [&](const RejectedVein& other) { return (other.position - place).norm() < SamePlace; });
+    if (known != before)
+    {
+      known->length = std::max(known->length, length);
+      known->probability = std::max(known->probability, vein.probability);
+    }
+    else
+    {
+      veins.push_back({ place, length, vein.probability });
     }
   }
   // What the arteries' own lumens cover stays theirs.
-  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  for (std::size_t p = 0; p < tree.points.size(); ++p)
   {
-    for (const std::int64_t p : tree.branches[b].points)
+    if (closed[p] == 0)
     {
-      if (isVein[b] == 0)
-      {
-        mark(static_cast<std::size_t>(p), 0);
-      }
+      mark(p, tree.radius[p], 0);
+    }
+  }
+  // What leaves a vein may be an artery that it crosses: the way across stays open.
+  for (const CenterlineTree::Branch& branch : tree.branches)
+  {
+    const auto first = static_cast<std::size_t>(branch.points.front());
+    const auto second = static_cast<std::size_t>(branch.points[1]);
+    if (closed[first] != 0 && closed[second] == 0)
+    {
+      const auto middle = static_cast<std::size_t>(branch.points[branch.points.size() / 2]);
+      mark(first, tree.radius[first] + tree.radius[middle] + 2.0 * this->Voxel, 0);
     }
   }
   return true;
@@ -2331,11 +2356,12 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
     framed.intensity = &intensity;
   }
   // A vein that was followed is closed, and the trees are made anew: what was entered through it is entered where it
-  // leaves its artery.
+  // leaves its artery. A vein may cross every great branch of both coronary arteries, and what hangs on one crossing is
+  // seen only when another one is closed.
   std::vector<unsigned char> excluded;
   std::vector<RejectedVein> veins;
   CenterlineResult result;
-  constexpr int rounds = 3;
+  constexpr int rounds = 6;
   for (int round = 0; round <= rounds; ++round)
   {
     std::vector<unsigned char> more = excluded;

@@ -5,14 +5,31 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 namespace coronary
 {
 namespace
 {
-constexpr double Near = 20.0;       ///< mm from a fork that are compared
+constexpr double Near = 20.0; ///< mm from a fork that are compared
+constexpr double Far = 40.0;  ///< mm of a branch that are looked at
+constexpr double Unlimited = std::numeric_limits<double>::infinity();
 constexpr double LeastLength = 8.0; ///< mm: what is shorter shows too little
 constexpr double LeastRadius = 2.0; ///< blurs: thinner lumens are darker for the blur alone
+constexpr double Straight = 6.0;    ///< mm along which a direction is measured
+/// Few branches touch by chance: 3 in 100.
+constexpr double Prior = -3.5;
+/// Bend of a vessel over the breadth of another one, and of the measured directions, rad; against directions at random
+/// this tells a tube that goes through from two branches that face each other.
+constexpr double ThroughBend = 0.15;
+/// A vessel's radius at both sides of a place: error, logarithm.
+constexpr double SameRadius = 0.15;
+/// mm along the tree between the begins of two branches that can be one tube: two great lumens side by side.
+constexpr double TouchLength = 15.0;
+/// mm of what leaves an artery before it is another vessel's: the wall between two lumens that touch.
+constexpr double LongestStem = 4.0;
+/// mm of a vein that are closed, at least: more than what is looked for beyond a tip.
+constexpr double CloseLength = 12.0;
 
 double Median(std::vector<double> values)
 {
@@ -21,49 +38,148 @@ double Median(std::vector<double> values)
   return *middle;
 }
 
+/// Standard deviation of a median by noise: samples within about 1 mm are not independent.
+double SpreadOfMedian(const std::vector<double>& values)
+{
+  std::vector<double> off;
+  const double middle = Median(values);
+  off.reserve(values.size());
+  for (const double value : values)
+  {
+    off.push_back(std::abs(value - middle));
+  }
+  return 1.4826 * Median(off) / std::sqrt(std::max(1.0, static_cast<double>(values.size()) / 4.0));
+}
+
+/// Lesions narrow a vessel, nothing widens it: its radius is what most of it has at least.
+double UpperRadius(std::vector<double> values)
+{
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(4 * values.size() / 5);
+  std::nth_element(values.begin(), place, values.end());
+  return std::max(1e-9, *place);
+}
+
+double Angle(const Vector3& a, const Vector3& b)
+{
+  return std::acos(std::clamp(a.dot(b), -1.0, 1.0));
+}
+
 class VeinFinder
 {
 public:
   VeinFinder(const CenterlineTree& tree, const ImageInterpolator& image,
     const LumenReference& reference, double blur)
     : Tree(tree)
+    , Image(image)
     , Blur(blur)
     , Contrast(reference.lumen - reference.background)
   {
     CheckTree(tree);
     this->Value.resize(tree.points.size());
+    this->GivenBack.resize(tree.points.size());
     for (std::size_t p = 0; p < tree.points.size(); ++p)
     {
       // What the blur took from a thin lumen is given back.
       const double r = tree.radius[p] / std::max(1e-9, blur);
       const double kept = std::max(0.3, 1.0 - std::exp(-0.5 * r * r));
-      this->Value[p] =
-        (image.At(tree.points[p]) - reference.background) / std::max(1e-9, this->Contrast) / kept;
+      const double seen =
+        (image.At(tree.points[p]) - reference.background) / std::max(1e-9, this->Contrast);
+      this->Value[p] = seen / kept;
+      this->GivenBack[p] = seen / kept - seen;
     }
+    this->Daughters.resize(tree.branches.size());
     for (std::size_t b = 0; b < tree.branches.size(); ++b)
     {
       this->Index[tree.branches[b].groupId] = b;
+      if (tree.branches[b].parentGroupId >= 0)
+      {
+        this->Daughters[this->Index.at(tree.branches[b].parentGroupId)].push_back(b);
+      }
     }
+    std::vector<double> tips;
+    for (std::size_t b = 0; b < tree.branches.size(); ++b)
+    {
+      if (this->Daughters[b].empty())
+      {
+        tips.push_back(std::log(this->TipRadius(this->Down(b, Unlimited))));
+      }
+    }
+    this->UsualTip = tips.empty() ? 0.0 : Median(tips);
   }
 
   std::vector<VeinBranch> Run();
 
 private:
   /// Points along the tree from a fork on, with mm from it.
-  using Course = std::vector<std::pair<std::size_t, double>>;
+  struct Step
+  {
+    std::size_t point;
+    double passed;
+  };
+  using Course = std::vector<Step>;
+  /// A branch that may be a vein's.
+  struct Arm
+  {
+    VeinBranch signs;
+    Course course;
+    double error = 0.0; ///< of the brightness, by noise, share of the contrast
+    double stepBeside =
+      0.0; ///< brightness, over that of what it runs beside, share of the contrast
+    double errorBeside = 0.0; ///< of it; 0: not known
+    double evidence = 0.0;    ///< its own: odds without the prior, as a logarithm
+    double prior = Prior;
+    double odds = 0.0;
+    bool darker = false;
+    bool goesOn = false; ///< there is as much blood ahead of its tip
+  };
+  /// What leaves the place where two arms begin, seen from there.
+  struct Place
+  {
+    std::vector<std::size_t> through; ///< points of the artery there
+    double radiusBefore = 0.0;        ///< of the artery
+    Vector3 flow = Vector3::Zero();
+    std::vector<std::size_t> others; ///< branches that go on
+  };
+  struct Side
+  {
+    Vector3 position = Vector3::Zero();
+    Vector3 outwards = Vector3::Zero();
+    double radius = 0.0;
+  };
+
+  const Vector3& At(std::int64_t point) const
+  {
+    return this->Tree.points[static_cast<std::size_t>(point)];
+  }
   Course Down(std::size_t branch, double reach) const;
   Course Up(std::size_t branch, double reach) const;
-  std::vector<double> Values(const Course& run, double from) const;
-  std::optional<VeinBranch> Describe(std::size_t branch, double& error) const;
+  std::vector<double> Values(const std::vector<double>& of, const Course& run, double from) const;
+  std::vector<double> Radii(const Course& run, double from, double to) const;
+  double TipRadius(const Course& course) const;
+  bool GoesOn(const Course& course) const;
+  void Beside(Arm& arm) const;
+  std::optional<Arm> Describe(std::size_t branch) const;
+  void Weigh(Arm& arm) const;
+  std::optional<Place> Between(std::size_t a, std::size_t b) const;
+  std::optional<Side> SideOf(const Course& course, const Place& place) const;
+  std::optional<double> Through(const Arm& a, const Arm& b, double& bend) const;
+  void FindOpposites(std::vector<Arm>& arms) const;
 
   const CenterlineTree& Tree;
+  const ImageInterpolator& Image;
   double Blur;
   double Contrast;
-  std::vector<double> Value; ///< share of the contrast at a point
+  double UsualTip = 0.0; ///< logarithm of the radius
+  double Usual =
+    0.0; ///< brightness of most branches against what they leave, share of the contrast
+  double Natural = 0.01;         ///< how they differ
+  std::vector<double> Value;     ///< share of the contrast at a point
+  std::vector<double> GivenBack; ///< of it, for the blur
   std::map<int, std::size_t> Index;
+  std::vector<std::vector<std::size_t>> Daughters;
 };
 
-/// A branch and the widest that follow.
+/// A branch and those that go straight on.
 VeinFinder::Course VeinFinder::Down(std::size_t branch, double reach) const
 {
   Course run;
@@ -73,33 +189,33 @@ VeinFinder::Course VeinFinder::Down(std::size_t branch, double reach) const
     const std::vector<std::int64_t>& points = this->Tree.branches[branch].points;
     for (std::size_t i = 1; i < points.size(); ++i)
     {
-      passed += (this->Tree.points[static_cast<std::size_t>(points[i])] -
-        this->Tree.points[static_cast<std::size_t>(points[i - 1])])
-                  .norm();
-      run.emplace_back(static_cast<std::size_t>(points[i]), passed);
+      passed += (this->At(points[i]) - this->At(points[i - 1])).norm();
+      run.push_back({ static_cast<std::size_t>(points[i]), passed });
       if (passed > reach)
       {
         return run;
       }
     }
-    double widest = 0.0;
-    std::size_t next = branch;
-    for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
-    {
-      const std::vector<std::int64_t>& own = this->Tree.branches[b].points;
-      const double radius = this->Tree.radius[static_cast<std::size_t>(own[own.size() / 2])];
-      if (this->Tree.branches[b].parentGroupId == this->Tree.branches[branch].groupId &&
-        radius > widest)
-      {
-        widest = radius;
-        next = b;
-      }
-    }
-    if (next == branch)
+    if (this->Daughters[branch].empty())
     {
       return run;
     }
-    branch = next;
+    constexpr std::size_t chord = 8;
+    const Vector3 ahead = (this->At(points.back()) -
+      this->At(points[points.size() > chord ? points.size() - 1 - chord : 0]))
+                            .normalized();
+    double straightest = -2.0;
+    for (const std::size_t daughter : this->Daughters[branch])
+    {
+      const std::vector<std::int64_t>& own = this->Tree.branches[daughter].points;
+      const double straight =
+        (this->At(own[std::min(own.size() - 1, chord)]) - this->At(own[0])).normalized().dot(ahead);
+      if (straight > straightest)
+      {
+        straightest = straight;
+        branch = daughter;
+      }
+    }
   }
 }
 
@@ -114,10 +230,8 @@ VeinFinder::Course VeinFinder::Up(std::size_t branch, double reach) const
     const CenterlineTree::Branch& up = this->Tree.branches[this->Index.at(parent)];
     for (std::size_t i = up.points.size() - 1; i > 0; --i)
     {
-      passed += (this->Tree.points[static_cast<std::size_t>(up.points[i])] -
-        this->Tree.points[static_cast<std::size_t>(up.points[i - 1])])
-                  .norm();
-      run.emplace_back(static_cast<std::size_t>(up.points[i - 1]), passed);
+      passed += (this->At(up.points[i]) - this->At(up.points[i - 1])).norm();
+      run.push_back({ static_cast<std::size_t>(up.points[i - 1]), passed });
       if (passed > reach)
       {
         return run;
@@ -128,7 +242,8 @@ VeinFinder::Course VeinFinder::Up(std::size_t branch, double reach) const
   return run;
 }
 
-std::vector<double> VeinFinder::Values(const Course& run, double from) const
+std::vector<double> VeinFinder::Values(
+  const std::vector<double>& of, const Course& run, double from) const
 {
   std::vector<double> values;
   for (const auto& [point, passed] : run)
@@ -136,27 +251,144 @@ std::vector<double> VeinFinder::Values(const Course& run, double from) const
     if (passed >= from && this->Tree.radius[point] >= LeastRadius * this->Blur &&
       (this->Tree.bridged.empty() || this->Tree.bridged[point] == 0))
     {
-      values.push_back(this->Value[point]);
+      values.push_back(of[point]);
     }
   }
   return values;
 }
 
-/// @param error  of the brightness, by noise, share of the contrast
-std::optional<VeinBranch> VeinFinder::Describe(std::size_t branch, double& error) const
+std::vector<double> VeinFinder::Radii(const Course& run, double from, double to) const
 {
-  const Course down = this->Down(branch, 40.0);
+  std::vector<double> radii;
+  for (const auto& [point, passed] : run)
+  {
+    if (passed >= from && passed < to &&
+      (this->Tree.bridged.empty() || this->Tree.bridged[point] == 0) &&
+      (this->Tree.confidence.empty() || this->Tree.confidence[point] >= 0.5))
+    {
+      radii.push_back(this->Tree.radius[point]);
+    }
+  }
+  return radii;
+}
+
+/// Of its last 3 mm.
+double VeinFinder::TipRadius(const Course& course) const
+{
+  const double length = course.empty() ? 0.0 : course.back().passed;
+  std::vector<double> radii = this->Radii(course, length - 3.0, length + 1.0);
+  return radii.empty() ? this->Blur : std::max(1e-9, Median(std::move(radii)));
+}
+
+/// Whether there is blood, and no calcium, ahead of a tip.
+bool VeinFinder::GoesOn(const Course& course) const
+{
+  const double length = course.back().passed;
+  std::vector<double> own;
+  Vector3 before = this->Tree.points[course.front().point];
+  for (const auto& [point, passed] : course)
+  {
+    if (passed >= length - Straight)
+    {
+      own.push_back(this->Image.At(this->Tree.points[point]));
+    }
+    else
+    {
+      before = this->Tree.points[point];
+    }
+  }
+  const Vector3& tip = this->Tree.points[course.back().point];
+  const Vector3 ahead = (tip - before).normalized();
+  const double radius = this->TipRadius(course);
+  std::vector<double> values;
+  for (double s = 1.5 * radius; s <= 1.5 * radius + 2.0; s += 0.25)
+  {
+    values.push_back(this->Image.At(tip + s * ahead));
+  }
+  const double step = (Median(values) - Median(own)) / std::max(1e-9, this->Contrast);
+  return std::abs(step) < 0.2;
+}
+
+/// Millimetres of a course within 3 mm of the wall of a vessel that it does not come from or give off there, and how much
+/// brighter it is than that, side by side.
+void VeinFinder::Beside(Arm& arm) const
+{
+  const Course& course = arm.course;
+  // Of the course itself, and what leaves it.
+  std::set<std::size_t> own;
+  std::set<std::int64_t> points;
+  for (const Step& step : course)
+  {
+    points.insert(static_cast<std::int64_t>(step.point));
+  }
+  for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
+  {
+    const std::vector<std::int64_t>& of = this->Tree.branches[b].points;
+    if (points.count(of.front()) != 0 || points.count(of[1]) != 0)
+    {
+      own.insert(b);
+    }
+  }
+  std::vector<double> steps;
+  double before = 0.0;
+  for (const auto& [point, passed] : course)
+  {
+    const double length = passed - before;
+    before = passed;
+    if (passed < 10.0)
+    {
+      continue;
+    }
+    double gap = 3.0;
+    std::optional<std::size_t> nearest;
+    for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
+    {
+      const std::vector<std::int64_t>& other = this->Tree.branches[b].points;
+      for (std::size_t i = 0; own.count(b) == 0 && i < other.size(); i += 3)
+      {
+        const auto q = static_cast<std::size_t>(other[i]);
+        const double away = (this->Tree.points[q] - this->Tree.points[point]).norm() -
+          this->Tree.radius[q] - this->Tree.radius[point];
+        if (away < gap)
+        {
+          gap = away;
+          nearest = q;
+        }
+      }
+    }
+    if (nearest)
+    {
+      arm.signs.beside += length;
+      const auto clear = [&](std::size_t p)
+      {
+        return this->Tree.radius[p] >= LeastRadius * this->Blur &&
+          (this->Tree.bridged.empty() || this->Tree.bridged[p] == 0);
+      };
+      if (clear(point) && clear(*nearest))
+      {
+        steps.push_back(this->Value[point] - this->Value[*nearest]);
+      }
+    }
+  }
+  if (steps.size() >= 16)
+  {
+    arm.stepBeside = Median(steps);
+    arm.errorBeside = SpreadOfMedian(steps);
+  }
+}
+
+std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
+{
+  Arm arm;
+  arm.course = this->Down(branch, Far);
+  const Course& down = arm.course;
   const Course up = this->Up(branch, Near);
-  if (down.empty() || up.empty() || down.back().second < LeastLength)
+  if (down.empty() || up.empty() || down.back().passed < LeastLength)
   {
     return std::nullopt;
   }
-  // Behind a lesion blood may be thinner, and the vessel wider.
-  const std::size_t first = down.front().first;
-  if (!this->Tree.bridgeConfidence.empty() && this->Tree.bridgeConfidence[first] < 1.0)
-  {
-    return std::nullopt;
-  }
+  VeinBranch& signs = arm.signs;
+  signs.groupId = this->Tree.branches[branch].groupId;
   double widest = 0.0;
   for (const auto& [point, passed] : up)
   {
@@ -164,121 +396,442 @@ std::optional<VeinBranch> VeinFinder::Describe(std::size_t branch, double& error
   }
   // The fork itself belongs to both.
   const double mouth = std::min(widest, 3.0) + 1.0;
-  const std::vector<double> own = this->Values(down, mouth);
-  const std::vector<double> before = this->Values(up, mouth);
-  if (own.size() < 8 || before.size() < 8)
+  const double length = down.back().passed;
+  // Behind a lesion blood may be thinner, and the vessel wider.
+  const double sure =
+    this->Tree.bridgeConfidence.empty() ? 1.0 : this->Tree.bridgeConfidence[down.front().point];
+  if (sure < 1.0)
+  {
+    arm.prior = std::max(Prior, std::log((1.0 - sure) / std::max(1e-9, sure)));
+  }
+  else
+  {
+    const std::vector<double> own = this->Values(this->Value, down, mouth);
+    const std::vector<double> before = this->Values(this->Value, up, mouth);
+    arm.error = std::numeric_limits<double>::infinity();
+    if (own.size() >= 8 && before.size() >= 8)
+    {
+      signs.brightness = Median(own) - Median(before);
+      // What the blur took is known by half.
+      const double given = Median(this->Values(this->GivenBack, down, mouth)) -
+        Median(this->Values(this->GivenBack, up, mouth));
+      arm.error = std::hypot(SpreadOfMedian(own), SpreadOfMedian(before), 0.5 * given);
+    }
+    const std::vector<double> early = this->Radii(down, mouth, mouth + LeastLength);
+    const std::vector<double> late =
+      this->Radii(down, std::max(mouth, length - LeastLength), length + 1.0);
+    if (!early.empty() && !late.empty())
+    {
+      const std::vector<double> near = this->Radii(up, 1.5, 1.5 + LeastLength);
+      signs.calibre = Median(early) / (near.empty() ? std::max(1e-9, widest) : UpperRadius(near));
+      // Behind a narrow begin any artery is wider again: only what becomes wider than the artery before counts.
+      signs.growth = Median(late) / std::max({ 1e-9, Median(early), 0.9 * widest });
+    }
+  }
+  // A vein widens throughout, not only where its end runs into something else.
+  signs.taper = std::numeric_limits<double>::quiet_NaN();
+  const double third = (length - mouth) / 3.0;
+  const std::vector<double> first = this->Radii(down, mouth, mouth + third);
+  const std::vector<double> second = this->Radii(down, mouth + third, length - third);
+  const std::vector<double> last = this->Radii(down, length - third, length + 1.0);
+  if (length - mouth >= LeastLength && std::min({ first.size(), second.size(), last.size() }) >= 3)
+  {
+    const double middle = UpperRadius(second);
+    // As between its halves.
+    signs.taper = 1.5 * std::log(std::min(middle / UpperRadius(first), UpperRadius(last) / middle));
+  }
+  const Vector3& tip = this->Tree.points[down.back().point];
+  const Vector3& before = this->Tree.points[down[down.size() > 8 ? down.size() - 9 : 0].point];
+  if (length <= Far && this->Image.Contains(tip + 2.0 * (tip - before)))
+  {
+    signs.blunt = std::log(this->TipRadius(down)) - this->UsualTip;
+    arm.goesOn = this->GoesOn(down);
+  }
+  // Directions of the flow before, and of what leaves.
+  const auto within = [](const Course& run, double passed)
+  {
+    const auto at =
+      std::find_if(run.begin(), run.end(), [&](const Step& step) { return step.passed >= passed; });
+    return (at == run.end() ? run.back() : *at).point;
+  };
+  const Vector3 flow =
+    this->At(this->Tree.branches[branch].points.front()) - this->Tree.points[within(up, Straight)];
+  const Vector3 leaving =
+    this->Tree.points[within(down, mouth + Straight)] - this->Tree.points[within(down, mouth)];
+  if (flow.norm() > 0.0 && leaving.norm() > 0.0)
+  {
+    signs.takeOff = Angle(flow.normalized(), leaving.normalized());
+  }
+  this->Beside(arm);
+  return arm;
+}
+
+void VeinFinder::Weigh(Arm& arm) const
+{
+  const VeinBranch& signs = arm.signs;
+  double darker = arm.error > 0.0 && std::isfinite(arm.error)
+    ? (this->Usual - signs.brightness) / std::hypot(arm.error, this->Natural)
+    : 0.0;
+  // Of two that run side by side the darker one is the vein.
+  double beside = std::min(3.0, signs.beside / 7.0);
+  if (arm.errorBeside > 0.0)
+  {
+    const double less = -arm.stepBeside / std::hypot(arm.errorBeside, this->Natural);
+    darker = std::max(darker, less);
+    beside /= 1.0 + std::exp(-less);
+  }
+  else
+  {
+    beside *= 0.5;
+  }
+  arm.darker = darker > 1.0;
+  arm.evidence = std::min(4.0, std::max(0.0, darker - 1.5));
+  // Vessels are wider behind a lesion as well, but not darker.
+  const double most = arm.darker ? 4.0 : 1.5;
+  arm.evidence += std::min(most, 8.0 * std::max(0.0, signs.calibre - 1.15));
+  arm.evidence += std::min(most, 8.0 * std::max(0.0, signs.growth - 1.15));
+  // Arteries taper by a tenth or more between their halves; trunks by less.
+  if (!std::isnan(signs.taper))
+  {
+    arm.evidence += std::clamp(10.0 * (signs.taper + 0.1), -2.0, 3.0);
+  }
+  // A lesion may end an artery that is wide. Where blood goes on ahead, the vessel was entered from its other end as
+  // well: a loop, which arteries do not make.
+  arm.evidence += (arm.goesOn ? 1.75 : 0.5) * std::clamp(3.0 * (signs.blunt - 0.35), 0.0, 2.0);
+  // Against the flow.
+  arm.evidence += std::clamp(2.0 * (signs.takeOff - 1.8), 0.0, 2.0);
+  arm.evidence += beside;
+  arm.odds = arm.prior + arm.evidence;
+}
+
+/// The artery between the begins of two branches, which goes on there.
+std::optional<VeinFinder::Place> VeinFinder::Between(std::size_t a, std::size_t b) const
+{
+  const auto parents = [&](std::size_t branch)
+  {
+    std::vector<std::size_t> up;
+    for (int parent = this->Tree.branches[branch].parentGroupId; parent >= 0;
+         parent = this->Tree.branches[up.back()].parentGroupId)
+    {
+      up.push_back(this->Index.at(parent));
+    }
+    return up;
+  };
+  const std::vector<std::size_t> aboveA = parents(a);
+  const std::vector<std::size_t> aboveB = parents(b);
+  const auto has = [](const std::vector<std::size_t>& list, std::size_t branch)
+  { return std::find(list.begin(), list.end(), branch) != list.end(); };
+  if (has(aboveA, b) || has(aboveB, a))
   {
     return std::nullopt;
   }
-  VeinBranch result;
-  result.groupId = this->Tree.branches[branch].groupId;
-  result.brightness = Median(own) - Median(before);
-  // Noise by the differences of neighbours; samples within about 1 mm are not independent.
-  const auto spread = [](const std::vector<double>& values)
+  const auto common = std::find_if(
+    aboveA.begin(), aboveA.end(), [&](std::size_t branch) { return has(aboveB, branch); });
+  if (common == aboveA.end())
   {
-    std::vector<double> off;
-    const double middle = Median(values);
-    off.reserve(values.size());
-    for (const double value : values)
+    return std::nullopt;
+  }
+  std::size_t top = *common;
+  std::set<std::size_t> on;
+  double length = 0.0;
+  const auto add = [&](std::size_t branch)
+  {
+    on.insert(branch);
+    const std::vector<std::int64_t>& points = this->Tree.branches[branch].points;
+    for (std::size_t i = 1; i < points.size(); ++i)
     {
-      off.push_back(std::abs(value - middle));
+      length += (this->At(points[i]) - this->At(points[i - 1])).norm();
     }
-    return 1.4826 * Median(off) /
-      std::sqrt(std::max(1.0, static_cast<double>(values.size()) / 4.0));
   };
-  error = std::hypot(spread(own), spread(before));
-  std::vector<double> early;
-  std::vector<double> last;
-  for (const auto& [point, passed] : down)
+  for (const std::vector<std::size_t>* above : { &aboveA, &aboveB })
   {
-    if (passed >= mouth && passed < mouth + 8.0)
+    for (auto at = above->begin(); *at != top; ++at)
     {
-      early.push_back(this->Tree.radius[point]);
-    }
-    if (passed >= down.back().second - 8.0 && passed >= mouth)
-    {
-      last.push_back(this->Tree.radius[point]);
+      add(*at);
     }
   }
-  if (!early.empty() && !last.empty())
+  const auto others = [&]
   {
-    result.calibre = Median(early) / std::max(1e-9, widest);
-    // Behind a narrow begin any artery is wider again: only what becomes wider than the artery before counts.
-    result.growth = Median(last) / std::max({ 1e-9, Median(early), 0.9 * widest });
+    std::vector<std::size_t> result;
+    for (const std::size_t daughter : this->Daughters[top])
+    {
+      if (daughter != a && daughter != b && on.count(daughter) == 0)
+      {
+        result.push_back(daughter);
+      }
+    }
+    for (const std::size_t branch : on)
+    {
+      for (const std::size_t daughter : this->Daughters[branch])
+      {
+        if (daughter != a && daughter != b && on.count(daughter) == 0)
+        {
+          result.push_back(daughter);
+        }
+      }
+    }
+    return result;
+  };
+  Place place;
+  place.others = others();
+  // Where two vessels touch, the way into the other one may look like a short branch.
+  double stem = length;
+  while (place.others.empty() && this->Tree.branches[top].parentGroupId >= 0)
+  {
+    add(top);
+    if (length - stem > LongestStem)
+    {
+      return std::nullopt;
+    }
+    top = this->Index.at(this->Tree.branches[top].parentGroupId);
+    place.others = others();
   }
-  // Beside another vessel: within 6 mm of one, and not of the fork.
-  std::size_t beside = 0;
-  std::size_t counted = 0;
-  const std::vector<std::int64_t>& points = this->Tree.branches[branch].points;
-  for (const auto& [point, passed] : down)
+  if (place.others.empty() || length > TouchLength)
   {
-    if (passed < 10.0)
+    return std::nullopt;
+  }
+  for (const std::size_t branch : on)
+  {
+    for (const std::int64_t point : this->Tree.branches[branch].points)
+    {
+      place.through.push_back(static_cast<std::size_t>(point));
+    }
+  }
+  const Course up = this->Up(this->Daughters[top].front(), Near);
+  for (const Step& step : up)
+  {
+    place.through.push_back(step.point);
+  }
+  for (const std::size_t branch : place.others)
+  {
+    for (const Step& step : this->Down(branch, Near))
+    {
+      place.through.push_back(step.point);
+    }
+  }
+  const std::vector<double> before = this->Radii(up, 2.0, 2.0 + LeastLength);
+  const auto back =
+    std::find_if(up.begin(), up.end(), [](const Step& step) { return step.passed >= Straight; });
+  if (before.empty() || back == up.end())
+  {
+    return std::nullopt;
+  }
+  place.radiusBefore = Median(before);
+  place.flow = (this->At(this->Tree.branches[top].points.back()) - this->Tree.points[back->point])
+                 .normalized();
+  return place;
+}
+
+/// Where an arm is by itself: outside of the artery's wall.
+std::optional<VeinFinder::Side> VeinFinder::SideOf(const Course& course, const Place& place) const
+{
+  std::size_t first = 0;
+  for (; first < course.size() && course[first].passed < LeastLength; ++first)
+  {
+    const std::size_t own = course[first].point;
+    const bool inside = std::any_of(place.through.begin(), place.through.end(),
+      [&](std::size_t q)
+      {
+        return (this->Tree.points[q] - this->Tree.points[own]).norm() <
+          this->Tree.radius[q] + this->Tree.radius[own];
+      });
+    if (!inside)
+    {
+      break;
+    }
+  }
+  std::size_t last = first;
+  while (last + 1 < course.size() && course[last].passed < course[first].passed + Straight)
+  {
+    ++last;
+  }
+  if (first >= course.size() || course[last].passed - course[first].passed < 0.4 * Straight)
+  {
+    return std::nullopt;
+  }
+  Side side;
+  Vector3 middle = Vector3::Zero();
+  double passed = 0.0;
+  std::vector<double> radii;
+  const auto count = static_cast<double>(last - first + 1);
+  for (std::size_t i = first; i <= last; ++i)
+  {
+    middle += this->Tree.points[course[i].point] / count;
+    passed += course[i].passed / count;
+    radii.push_back(this->Tree.radius[course[i].point]);
+  }
+  for (std::size_t i = first; i <= last; ++i)
+  {
+    side.outwards += (course[i].passed - passed) * (this->Tree.points[course[i].point] - middle);
+  }
+  side.outwards.normalize();
+  side.position = middle - (passed - course[first].passed) * side.outwards;
+  side.radius = std::max(1e-9, Median(radii));
+  return side.outwards.allFinite() ? std::optional<Side>(side) : std::nullopt;
+}
+
+/// The odds, as a logarithm, that two branches are one tube which goes through an artery, against two of its branches
+/// with directions at random.
+/// @param bend  of the tube, rad
+std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b, double& bend) const
+{
+  const std::size_t branchA = this->Index.at(a.signs.groupId);
+  const std::size_t branchB = this->Index.at(b.signs.groupId);
+  const std::optional<Place> place = this->Between(branchA, branchB);
+  if (!place)
+  {
+    return std::nullopt;
+  }
+  const std::optional<Side> sideA = this->SideOf(a.course, *place);
+  const std::optional<Side> sideB = this->SideOf(b.course, *place);
+  if (!sideA || !sideB)
+  {
+    return std::nullopt;
+  }
+  // The artery goes on in another branch, which ought to be more like it than both.
+  const auto unlike = [&](const Side& side)
+  {
+    return std::abs(std::log(side.radius / place->radiusBefore)) / (2.0 * SameRadius) +
+      Angle(side.outwards, place->flow) / 0.5;
+  };
+  double goesOn = std::numeric_limits<double>::infinity();
+  for (const std::size_t branch : place->others)
+  {
+    Place alone = *place;
+    alone.through.clear();
+    if (const std::optional<Side> side = this->SideOf(this->Down(branch, Near), alone))
+    {
+      goesOn = std::min(goesOn, unlike(*side));
+    }
+  }
+  const Vector3 chord = sideB->position - sideA->position;
+  bend = Angle(-sideA->outwards, sideB->outwards);
+  if (chord.norm() > 1.0)
+  {
+    bend = std::max({ bend, Angle(-sideA->outwards, chord.normalized()),
+      Angle(sideB->outwards, chord.normalized()) });
+  }
+  const double step = std::log(sideA->radius / sideB->radius) / SameRadius;
+  const double turn = bend / ThroughBend;
+  // Both ends hold the same blood.
+  double blood = 0.0;
+  if (a.error > 0.0 && std::isfinite(a.error) && b.error > 0.0 && std::isfinite(b.error))
+  {
+    blood = (a.signs.brightness - b.signs.brightness) /
+      std::hypot(std::hypot(a.error, b.error), this->Natural);
+  }
+  const double instead = std::max(0.0, goesOn - std::min(unlike(*sideA), unlike(*sideB)));
+  return std::log(2.0 / (ThroughBend * ThroughBend)) - 0.5 * turn * turn - 0.5 * step * step -
+    0.5 * blood * blood - instead;
+}
+
+/// Two arms that are each other's best continuation are judged together.
+void VeinFinder::FindOpposites(std::vector<Arm>& arms) const
+{
+  struct Best
+  {
+    double odds = 0.0;
+    double bend = 0.0;
+    std::size_t other = 0;
+  };
+  std::vector<Best> best(arms.size());
+  for (std::size_t a = 0; a < arms.size(); ++a)
+  {
+    for (std::size_t b = a + 1; b < arms.size(); ++b)
+    {
+      double bend = 0.0;
+      const std::optional<double> through = this->Through(arms[a], arms[b], bend);
+      if (!through)
+      {
+        continue;
+      }
+      if (*through > best[a].odds)
+      {
+        best[a] = { *through, bend, b };
+      }
+      if (*through > best[b].odds)
+      {
+        best[b] = { *through, bend, a };
+      }
+    }
+  }
+  std::vector<double> own;
+  own.reserve(arms.size());
+  for (const Arm& arm : arms)
+  {
+    own.push_back(arm.odds);
+  }
+  for (std::size_t a = 0; a < arms.size(); ++a)
+  {
+    const std::size_t b = best[a].other;
+    if (!(best[a].odds > 0.0) || best[b].other != a)
     {
       continue;
     }
-    ++counted;
-    bool near = false;
-    for (const CenterlineTree::Branch& other : this->Tree.branches)
+    Arm& arm = arms[a];
+    // However certain the other one is: that this is its continuation is another question.
+    const double together = best[a].odds + arm.evidence + std::min(0.0, own[b]);
+    if (together > arm.odds)
     {
-      const bool same = other.groupId == result.groupId || other.points.front() == points.back() ||
-        other.points.back() == points.back();
-      for (std::size_t i = 0; !near && !same && i < other.points.size(); i += 3)
-      {
-        const auto q = static_cast<std::size_t>(other.points[i]);
-        const double reach = 3.0 + this->Tree.radius[q] + this->Tree.radius[point];
-        near = (this->Tree.points[q] - this->Tree.points[point]).squaredNorm() < reach * reach;
-      }
+      arm.odds = together;
+      arm.signs.oppositeGroupId = arms[b].signs.groupId;
+      arm.signs.bend = best[a].bend;
     }
-    beside += near ? 1 : 0;
   }
-  result.beside = counted > 0 ? static_cast<double>(beside) / static_cast<double>(counted) : 0.0;
-  return result;
 }
 
 std::vector<VeinBranch> VeinFinder::Run()
 {
-  std::vector<VeinBranch> all;
-  std::vector<double> errors;
+  std::vector<Arm> arms;
   std::vector<double> steps;
   for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
   {
-    double error = 0.0;
-    if (std::optional<VeinBranch> one = this->Describe(b, error))
+    if (std::optional<Arm> one = this->Describe(b))
     {
-      all.push_back(*one);
-      errors.push_back(error);
-      steps.push_back(one->brightness);
+      if (std::isfinite(one->error) && one->error > 0.0)
+      {
+        steps.push_back(one->signs.brightness);
+      }
+      arms.push_back(std::move(*one));
     }
-  }
-  if (all.empty())
-  {
-    return {};
   }
   // Most branches are arteries: how these differ is the measure.
-  const double usual = std::clamp(Median(steps), -0.1, 0.0);
-  std::vector<double> off;
-  off.reserve(steps.size());
-  for (const double step : steps)
+  if (!steps.empty())
   {
-    off.push_back(std::abs(step - usual));
-  }
-  const double natural = std::max(0.01, 1.4826 * Median(off));
-  std::vector<VeinBranch> veins;
-  for (std::size_t n = 0; n < all.size(); ++n)
-  {
-    VeinBranch& one = all[n];
-    const double darker = (usual - one.brightness) / std::hypot(errors[n], natural);
-    double odds = -3.5;
-    odds += std::min(4.0, std::max(0.0, darker - 1.5));
-    odds += std::min(4.0, 8.0 * std::max(0.0, one.calibre - 1.15));
-    odds += std::min(4.0, 8.0 * std::max(0.0, one.growth - 1.15));
-    odds += 1.5 * std::max(0.0, one.beside - 0.3);
-    one.probability = 1.0 / (1.0 + std::exp(-odds));
-    // No sign but the brightness can tell a vein from an artery behind a lesion.
-    if (odds >= 0.0 && darker > 1.0)
+    this->Usual = std::clamp(Median(steps), -0.1, 0.0);
+    std::vector<double> off;
+    off.reserve(steps.size());
+    for (const double step : steps)
     {
-      veins.push_back(one);
+      off.push_back(std::abs(step - this->Usual));
     }
+    this->Natural = std::max(this->Natural, 1.4826 * Median(off));
+  }
+  for (Arm& arm : arms)
+  {
+    this->Weigh(arm);
+  }
+  this->FindOpposites(arms);
+  std::vector<VeinBranch> veins;
+  for (Arm& arm : arms)
+  {
+    if (arm.odds < 0.0)
+    {
+      continue;
+    }
+    VeinBranch& vein = arm.signs;
+    vein.probability = 1.0 / (1.0 + std::exp(-arm.odds));
+    // What ends as wide as a vein is one to its end; else an artery may have been entered through it.
+    const double close = vein.blunt > 0.35 ? arm.course.back().passed
+                                           : std::min(arm.course.back().passed, CloseLength);
+    for (const Step& step : arm.course)
+    {
+      if (vein.closed.empty() || step.passed <= close)
+      {
+        vein.closed.push_back(static_cast<std::int64_t>(step.point));
+      }
+    }
+    veins.push_back(std::move(vein));
   }
   return veins;
 }

@@ -2,9 +2,10 @@
  * @file VeinRejection.h
  * @brief Branches of a tree of arteries that are veins which touch it.
  *
- * Veins hold less contrast medium than the arteries beside them, widen towards the heart while arteries taper away
- * from it, cross arteries instead of leaving them, and run beside one. No single sign decides: each adds to the odds,
- * measured against how the tree's own branches vary.
+ * Veins cross arteries instead of leaving them: where one touches, a tube goes through. They widen towards the heart
+ * while arteries taper away from it, end as wide as they are (where another way into them was shorter) while arteries end
+ * thin, leave in any direction while arteries leave with the flow, run beside an artery, and mostly hold less
+ * contrast medium. No single sign decides: each adds to the odds, measured against how the tree's own branches vary.
  */
 #ifndef DynamicCoronary_VeinRejection_h
 #define DynamicCoronary_VeinRejection_h
@@ -12,6 +13,7 @@
 #include "CenterlineTree.h"
 #include "LumenMeasurement.h"
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -19,12 +21,21 @@ namespace coronary
 {
 struct VeinBranch
 {
-  int groupId = -1;         ///< of the branch where the vein begins; what follows belongs to it
+  int groupId = -1; ///< of the branch where the vein begins
+  int oppositeGroupId =
+    -1; ///< of the branch in which it goes on at the artery's other side, -1 none
   double probability = 0.0; ///< 0 to 1
   double brightness = 0.0;  ///< step from the artery, share of the contrast, negative: darker
   double calibre = 1.0;     ///< radius over the greatest of the artery before it
   double growth = 1.0; ///< radius at its end over the larger of that at its begin and the artery's
-  double beside = 0.0; ///< share of its length beside an artery
+  double taper =
+    0.0; ///< logarithm of its radius over that half of its length before, where that grows least; NaN not known
+  double blunt = 0.0;   ///< logarithm of the radius at its tip over what tips of the tree have
+  double takeOff = 0.0; ///< angle to the flow in the artery before, rad
+  double bend =
+    0.0; ///< of the tube through the artery to the opposite branch, rad; if there is one
+  double beside = 0.0;              ///< share of its length beside an artery
+  std::vector<std::int64_t> closed; ///< points from its begin on that are the vein's for certain
 };
 
 /**

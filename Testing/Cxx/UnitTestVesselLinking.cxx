@@ -294,56 +294,92 @@ TEST(VesselLinking, AnOstiumWithoutVesselStaysAlone)
   EXPECT_TRUE(far.links.empty());
 }
 
-TEST(VeinRejection, ADarkWideTubeThatTouchesIsLeftOut)
+/// A tube of another value, which may touch the others.
+void Draw(Scene& scene, const Distance& tube, double value)
 {
-  // A vein of 60 % of the contrast crosses the artery and touches it; an artery's branch leaves at the same angle.
-  const auto scene = [](double value)
+  for (std::size_t p = 0; p < scene.values.size(); ++p)
   {
-    Scene one(
-      { Tube({ 0, 0, 0 }, { 78, 0, 0 }, 1.6, 1.2), Tube({ 25, 0, 0 }, { 35, 26, 0 }, 1.0) });
-    const Distance vein = Tube({ 50, -11, 2.6 }, { 56, 28, 2.6 }, 1.4);
-    for (std::size_t p = 0; p < one.values.size(); ++p)
-    {
-      const auto v = static_cast<int>(p);
-      const Vector3 place = one.grid.IndexToWorld(v % 180, v / 180 % 92, v / 180 / 92);
-      const double inside = 0.5 * std::erfc(vein(place) / (std::sqrt(2.0) * Blur));
-      one.values[p] += static_cast<float>(inside * std::max(0.0, value - one.values[p]));
-    }
-    one.Filter();
-    return one;
-  };
-  const auto extract = [](const Scene& one)
-  {
-    const VesselSegmentationResult segmentation = one.Run();
-    const ScalarImage image{ one.values.data(), one.grid };
-    CenterlineInput input;
-    input.grid = one.grid;
-    input.speed = one.vesselness.data();
-    input.mask = segmentation.mask.data();
-    input.intensity = &image;
-    input.seeds = { Vector3(2.0, 0.0, 0.0) };
-    return ExtractCenterlines(input, {});
-  };
-  const auto reaches = [](const CenterlineResult& result, const Vector3& place)
-  {
-    return std::any_of(result.tree.points.begin(), result.tree.points.end(),
-      [&](const Vector3& p) { return (p - place).norm() < 2.0; });
-  };
-  const CenterlineResult dark = extract(scene(Fat + 0.6 * (Blood - Fat)));
-  EXPECT_FALSE(dark.veins.empty());
-  EXPECT_FALSE(reaches(dark, { 55.0, 21.5, 2.6 }));
-  EXPECT_TRUE(reaches(dark, { 34.0, 23.4, 0.0 }));
-  EXPECT_TRUE(reaches(dark, { 76.0, 0.0, 0.0 }));
-  for (const RejectedVein& vein : dark.veins)
-  {
-    EXPECT_GE(vein.probability, 0.5);
-    EXPECT_NEAR(vein.position[0], 51.8, 5.0);
-    EXPECT_GT(vein.length, 5.0);
+    const auto v = static_cast<int>(p);
+    const Vector3 place = scene.grid.IndexToWorld(v % 180, v / 180 % 92, v / 180 / 92);
+    const double inside = 0.5 * std::erfc(tube(place) / (std::sqrt(2.0) * Blur));
+    scene.values[p] += static_cast<float>(inside * std::max(0.0, value - scene.values[p]));
   }
-  // As bright as blood it is one of the artery's branches.
-  const CenterlineResult bright = extract(scene(Blood));
-  EXPECT_TRUE(bright.veins.empty());
-  EXPECT_TRUE(reaches(bright, { 55.0, 21.5, 2.6 }));
+  scene.Filter();
+}
+
+CenterlineResult Extract(const Scene& scene)
+{
+  const VesselSegmentationResult segmentation = scene.Run();
+  const ScalarImage image{ scene.values.data(), scene.grid };
+  CenterlineInput input;
+  input.grid = scene.grid;
+  input.speed = scene.vesselness.data();
+  input.mask = segmentation.mask.data();
+  input.intensity = &image;
+  input.seeds = { Vector3(2.0, 0.0, 0.0) };
+  return ExtractCenterlines(input, {});
+}
+
+bool Reaches(const CenterlineResult& result, const Vector3& place)
+{
+  return std::any_of(result.tree.points.begin(), result.tree.points.end(),
+    [&](const Vector3& p) { return (p - place).norm() < 2.0; });
+}
+
+TEST(VeinRejection, WhatCrossesIsLeftOut)
+{
+  // A vein crosses the artery and touches it; an artery's branch leaves at the same angle.
+  for (const double share : { 0.6, 1.0 })
+  {
+    Scene scene(
+      { Tube({ 0, 0, 0 }, { 78, 0, 0 }, 1.6, 1.2), Tube({ 25, 0, 0 }, { 35, 26, 0 }, 1.1, 0.5) });
+    Draw(scene, Tube({ 50, -13, 2.6 }, { 56, 30, 2.6 }, 1.3, 1.6), Fat + share * (Blood - Fat));
+    const CenterlineResult result = Extract(scene);
+    EXPECT_FALSE(result.veins.empty()) << share;
+    EXPECT_FALSE(Reaches(result, { 55.0, 21.5, 2.6 })) << share;
+    EXPECT_FALSE(Reaches(result, { 50.6, -8.0, 2.6 })) << share;
+    EXPECT_TRUE(Reaches(result, { 34.0, 23.4, 0.0 })) << share;
+    EXPECT_TRUE(Reaches(result, { 75.0, 0.0, 0.0 })) << share;
+    for (const RejectedVein& vein : result.veins)
+    {
+      EXPECT_GE(vein.probability, 0.5);
+      EXPECT_NEAR(vein.position[0], 51.8, 5.0);
+      EXPECT_GT(vein.length, 5.0);
+    }
+  }
+}
+
+TEST(VeinRejection, BranchesThatFaceEachOtherStay)
+{
+  // Both taper to nothing that can be seen, and the artery is thinner behind them.
+  const CenterlineResult result = Extract(
+    Scene({ Tube({ 0, 0, 0 }, { 38, 0, 0 }, 1.9, 1.7), Tube({ 38, 0, 0 }, { 78, 0, 0 }, 1.3, 0.8),
+      Tube({ 38, 0, 0 }, { 38, 28, 0 }, 1.2, 0.5), Tube({ 38, 0, 0 }, { 38, -13, 0 }, 1.2, 0.6) }));
+  EXPECT_TRUE(result.veins.empty());
+  EXPECT_TRUE(Reaches(result, { 38.0, 25.0, 0.0 }));
+  EXPECT_TRUE(Reaches(result, { 38.0, -11.0, 0.0 }));
+  EXPECT_TRUE(Reaches(result, { 75.0, 0.0, 0.0 }));
+}
+
+TEST(VeinRejection, ARamusStays)
+{
+  // A main stem parts in three; the outer two leave to opposite sides.
+  const CenterlineResult result = Extract(
+    Scene({ Tube({ 0, 0, 0 }, { 14, 0, 0 }, 2.2), Tube({ 14, 0, 0 }, { 70, 0, 0 }, 1.2, 0.6),
+      Tube({ 14, 0, 0 }, { 22, 28, 0 }, 1.8, 1.2), Tube({ 14, 0, 0 }, { 17, -13, 0 }, 1.6, 1.4) }));
+  EXPECT_TRUE(result.veins.empty());
+  EXPECT_TRUE(Reaches(result, { 66.0, 0.0, 0.0 }));
+  EXPECT_TRUE(Reaches(result, { 21.0, 25.0, 0.0 }));
+  EXPECT_TRUE(Reaches(result, { 16.5, -11.0, 0.0 }));
+}
+
+TEST(VeinRejection, ABranchThatRunsBesideStays)
+{
+  const CenterlineResult result = Extract(
+    Scene({ Tube({ 0, 0, 0 }, { 80, 0, 0 }, 1.8, 1.2), Tube({ 12, 0, 0 }, { 22, 4.6, 0 }, 1.1, 1.0),
+      Tube({ 22, 4.6, 0 }, { 72, 5.6, 0 }, 1.0, 0.5) }));
+  EXPECT_TRUE(result.veins.empty());
+  EXPECT_TRUE(Reaches(result, { 66.0, 5.5, 0.0 }));
 }
 
 TEST(VesselLinking, CenterlinesSayWhatTheyDidNotSee)
