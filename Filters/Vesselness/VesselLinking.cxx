@@ -947,7 +947,8 @@ std::vector<VesselLink> Linker::Run(
   std::vector<VesselLink> links;
   for (VesselLink& link : best)
   {
-    if (link.confidence >= this->Settings.leastConfidence)
+    // A piece may have no way at all.
+    if (!link.voxels.empty() && link.confidence >= this->Settings.leastConfidence)
     {
       links.push_back(std::move(link));
     }

@@ -11,6 +11,7 @@
 #include <limits>
 #include <queue>
 #include <stdexcept>
+#include <unordered_set>
 
 namespace coronary
 {
@@ -649,6 +650,7 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
   // Each round can only add; more than a handful of lesions in a row does not happen.
   constexpr int rounds = 8;
   VesselLinker linker(image, settings);
+  std::unordered_set<std::int64_t> refused;
   for (int round = 0; round < rounds; ++round)
   {
     std::vector<std::pair<std::int64_t, float>> tree;
@@ -679,6 +681,10 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
     }
     std::vector<VesselLink> links = linker.Find(
       tree, Part(progress, static_cast<double>(round) / rounds, (round + 1.0) / rounds));
+    // What was linked once and dropped again would be so in every round.
+    links.erase(std::remove_if(links.begin(), links.end(),
+                  [&](const VesselLink& link) { return refused.count(link.voxels.back()) != 0; }),
+      links.end());
     if (links.empty())
     {
       break;
@@ -705,6 +711,21 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
     this->Leakage = 0.0;
     this->Collect(seeds, places, {});
     this->CutLeakage();
+    // A link leads to something, or it is none.
+    const auto dead = std::stable_partition(this->Links.begin(), this->Links.end(),
+      [&](const VesselLink& link) { return this->States[link.voxels.back()] == Vessel; });
+    for (auto link = dead; link != this->Links.end(); ++link)
+    {
+      refused.insert(link->voxels.back());
+      for (const std::int64_t voxel : link->voxels)
+      {
+        if (this->States[voxel] == Bridge)
+        {
+          this->States[voxel] = Unknown;
+        }
+      }
+    }
+    this->Links.erase(dead, this->Links.end());
   }
   for (unsigned char& state : this->States)
   {
