@@ -72,7 +72,8 @@ double NoiseOnAxes(const CenterlineTree& tree, const std::vector<VesselPath>& pa
   const ImageInterpolator& values, const ScalarImage& image, double blur,
   const std::vector<char>& counts, double usual)
 {
-  constexpr double around = 4.0; // mm, of the axis to either side
+  constexpr double around =
+    10.0; // mm, of the axis to either side: farther than noise hangs together
   constexpr std::size_t least = 5;
   const std::array<int, 3> size = image.Dimensions();
   std::vector<double> deviations;
@@ -148,10 +149,15 @@ LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<Ves
       (tree.radius[p] > WideEnough * blur ? wide : thin).push_back(seen[p].lumen);
     }
   }
-  result.background = Quantile(around, 0.1);
   // A tree of thin vessels only: the brightest of them say most.
   const double usual = wide.size() >= 10 ? Quantile(wide, UsualShare) : Quantile(thin, 0.9);
   result.usual = usual;
+  // Fat: the darkest that is common around vessels. What is darker than that by half of the contrast is the lung beside it.
+  const double middle = Quantile(around, 0.5);
+  around.erase(std::remove_if(around.begin(), around.end(),
+                 [&](double value) { return value < middle - 0.5 * (usual - middle); }),
+    around.end());
+  result.background = Quantile(around, 0.1);
   std::vector<char> counts(count, 0); // wide, and bright as contrast is
   for (const VesselPath& path : paths)
   {

@@ -16,7 +16,7 @@ struct LumenLevels
 {
   std::vector<double> level; ///< one value a point of the tree: image value of a wide lumen there
   double noise = 0.0;        ///< standard deviation of single voxels in wide lumens
-  double background = 0.0;   ///< what is darkest around vessels
+  double background = 0.0;   ///< what is darkest around vessels, but for air
   double usual = 0.0;        ///< level of most of the wide places
 };
 

@@ -405,6 +405,30 @@ TEST(CalciumObjects, NoiseAndContrastAreNoCalcium)
   EXPECT_NEAR(measured.levels.noise, 30.0, 6.0);
 }
 
+TEST(LumenLevels, TheLungBesideAVesselIsNotItsBackground)
+{
+  Tube tube;
+  tube.radius = [](double) { return 1.5; };
+  tube.Render();
+  const CenterlineTree tree = LineWith(1.5);
+  const std::vector<VesselPath> paths = VesselPaths(tree);
+  const double fat = MeasureLumenLevels(tree, paths, tube.image, Blur).background;
+  EXPECT_NEAR(fat, Fat, 10.0);
+  // On a part of the way air lies on one side.
+  for (std::size_t n = 0; n < tube.values.size(); ++n)
+  {
+    const std::array<int, 3> size = tube.image.Dimensions();
+    const auto at = static_cast<int>(n);
+    const Vector3 p =
+      tube.image.grid.IndexToWorld(at % size[0], at / size[0] % size[1], at / size[0] / size[1]);
+    if (p[0] > 0.0 && std::hypot(p[0], p[1]) > 2.0 && p[2] < 0.4 * TubeLength)
+    {
+      tube.values[n] = -800.0F;
+    }
+  }
+  EXPECT_NEAR(MeasureLumenLevels(tree, paths, tube.image, Blur).background, fat, 15.0);
+}
+
 TEST(CalciumObjects, AgatstonsWeights)
 {
   EXPECT_EQ(AgatstonWeight(129.0), 0);
