@@ -403,13 +403,13 @@ TEST(JoinVessels, ArteriesGoOnByName)
   EXPECT_DOUBLE_EQ(chains[0].pieces[1].begin, 10.0);
   EXPECT_DOUBLE_EQ(chains[0].pieces[1].end, 30.0);
   ASSERT_EQ(chains[0].forks.size(), 2U);
-  EXPECT_EQ(chains[0].forks[0].name, ProximalLCx);
+  EXPECT_EQ(chains[0].forks[0].name, "pLCx");
   EXPECT_DOUBLE_EQ(chains[0].forks[0].arc, 10.0);
-  EXPECT_EQ(chains[0].forks[1].name, FirstDiagonal);
+  EXPECT_EQ(chains[0].forks[1].name, "D1");
   EXPECT_DOUBLE_EQ(chains[0].forks[1].arc, 30.0);
-  EXPECT_EQ(chains[1].name, ProximalLCx);
+  EXPECT_EQ(chains[1].name, "pLCx");
   EXPECT_DOUBLE_EQ(chains[1].Length(), 60.0);
-  EXPECT_EQ(chains[2].name, FirstDiagonal);
+  EXPECT_EQ(chains[2].name, "D1");
   // The lead-in: 4 mm of the parent, ending at the origin.
   ASSERT_EQ(chains[2].points.size(), 4U + 41U);
   EXPECT_DOUBLE_EQ(chains[2].arc.front(), -4.0);
