@@ -2,6 +2,7 @@
 
 #include "BlockValues.h"
 #include "DistanceTransform.h"
+#include "SlicePieces.h"
 #include "SparseVoxels.h"
 #include "VesselLinking.h"
 #include "VoxelLattice.h"
@@ -105,6 +106,8 @@ private:
   }
   std::vector<VesselRoot> HiddenRoots(const std::vector<VesselSeed>& seeds, double seen) const;
   void KeepConnected();
+  BlockValues MeasureBlocks(
+    const std::array<int, 3>& reach, const ProgressCallback& progress) const;
   void RefineWall(std::vector<float>* probability, const ProgressCallback& progress);
   void DropIslands();
   void FillHoles();
@@ -419,15 +422,6 @@ void Segmentation<T>::CutLeakage()
   const double thickness = std::max(1.5, 1.5 * this->L.Spacing.maxCoeff());
   const double largestArea =
     1.6 * 3.14159265358979 * this->Settings.largestRadius * this->Settings.largestRadius;
-  struct Piece
-  {
-    int slice = 0;
-    std::int64_t voxels = 0;
-    bool strong = false;
-    float tube = 0.0f; ///< largest vesselness
-    bool dropped = false;
-    bool twig = false; ///< dropped for lack of a strong voxel, which is no leakage
-  };
   const SparseVoxels<std::int32_t> numbers = this->MemberNumbers();
   const auto sliceOf = [&](std::int32_t m)
   { return static_cast<int>(this->Members[m].path / thickness); };
@@ -444,7 +438,7 @@ void Segmentation<T>::CutLeakage()
     }
   };
   std::vector<std::int32_t> pieceOf(this->Members.size(), -1);
-  std::vector<Piece> pieces;
+  std::vector<SlicePiece> pieces;
   std::vector<std::int32_t> stack;
   const auto strong = static_cast<float>(this->Settings.strong);
   for (std::size_t m = 0; m < this->Members.size(); ++m)
@@ -478,14 +472,13 @@ void Segmentation<T>::CutLeakage()
     }
   }
   // Larger than a vessel; or large, and nowhere like a tube, as the rims of chambers are.
-  for (Piece& piece : pieces)
+  for (SlicePiece& piece : pieces)
   {
     const double area = static_cast<double>(piece.voxels) * this->L.VoxelVolume() / thickness;
     const bool rim = area > 0.15 * largestArea && piece.tube < 0.5f * this->Tubular;
     piece.dropped = (area > largestArea && piece.slice > 0) ||
       (rim && thickness * piece.slice > 2.0 * this->Settings.largestRadius);
   }
-  // Twigs without a single strong voxel.
   std::vector<std::pair<std::int32_t, std::int32_t>> contacts;
   for (std::size_t m = 0; m < this->Members.size(); ++m)
   {
@@ -499,42 +492,7 @@ void Segmentation<T>::CutLeakage()
         }
       });
   }
-  std::sort(contacts.begin(), contacts.end());
-  contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
-  std::vector<std::vector<std::int32_t>> touching(pieces.size());
-  for (const auto& [a, b] : contacts)
-  {
-    touching[a].push_back(b);
-    touching[b].push_back(a);
-  }
-  std::vector<std::int32_t> tips;
-  std::vector<int> degree(pieces.size());
-  for (std::size_t p = 0; p < pieces.size(); ++p)
-  {
-    degree[p] = static_cast<int>(touching[p].size());
-    if (degree[p] <= 1)
-    {
-      tips.push_back(static_cast<std::int32_t>(p));
-    }
-  }
-  while (!tips.empty())
-  {
-    const std::int32_t tip = tips.back();
-    tips.pop_back();
-    if (pieces[tip].strong || pieces[tip].dropped || pieces[tip].slice == 0)
-    {
-      continue;
-    }
-    pieces[tip].dropped = true;
-    pieces[tip].twig = true;
-    for (const std::int32_t next : touching[tip])
-    {
-      if (--degree[next] == 1)
-      {
-        tips.push_back(next);
-      }
-    }
-  }
+  DropTwigs(pieces, std::move(contacts));
   // What can still be reached from the seeds without the dropped pieces.
   std::vector<char> reached(this->Members.size(), 0);
   stack.clear();
@@ -566,7 +524,7 @@ void Segmentation<T>::CutLeakage()
     }
     else
     {
-      const Piece& piece = pieces[pieceOf[m]];
+      const SlicePiece& piece = pieces[pieceOf[m]];
       this->States[this->Members[m].voxel] = piece.dropped && !piece.twig ? Leak : Unknown;
       this->Leakage += piece.twig ? 0.0 : this->L.VoxelVolume();
     }
@@ -791,56 +749,15 @@ void Segmentation<T>::KeepConnected()
   }
 }
 
+/**
+ * Lumen and surroundings by blocks: the brightest smoothed member, and the mean outside the band.
+ * @param reach  blocks around one that its values are taken from, for each axis
+ */
 template <typename T>
-void Segmentation<T>::RefineWall(std::vector<float>* probability, const ProgressCallback& progress)
+BlockValues Segmentation<T>::MeasureBlocks(
+  const std::array<int, 3>& reach, const ProgressCallback& progress) const
 {
-  // Wide enough for the next voxel along each axis, mm.
-  const Vector3 band = (1.2 * this->L.Spacing).cwiseMax(0.8);
-  // How far from a voxel its lumen is looked for, mm: a place in the band must find it.
-  const Vector3 lumenReach = (1.2 * this->L.BlockSpacing).cwiseMax(1.5);
-  constexpr double surroundings = 1.8; // mm: how far the local values are taken from
-  const std::array<int, 3>& blocks = this->L.Blocks;
-
-  // The band, from the members that have a neighbour outside.
-  std::vector<std::int64_t> candidates;
-  for (const Member& m : this->Members)
-  {
-    candidates.push_back(m.voxel);
-  }
-  for (std::size_t m = 0; m < this->Members.size(); ++m)
-  {
-    const std::array<int, 3> at = this->L.Place(this->Members[m].voxel);
-    const bool rim = std::any_of(this->L.Around.begin(), this->L.Around.end(),
-      [&](const VoxelLattice::Neighbour& n)
-      {
-        return this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk) &&
-          this->States[this->Members[m].voxel + n.offset] == Unknown;
-      });
-    if (rim)
-    {
-      this->L.Ball(at, band.maxCoeff(),
-        [&](std::int64_t p, const std::array<int, 3>& place)
-        {
-          const Vector3 d = this->L.Spacing.cwiseProduct(
-            Vector3(place[0] - at[0], place[1] - at[1], place[2] - at[2]));
-          if (this->States[p] == Unknown && d.cwiseQuotient(band).squaredNorm() <= 1.0)
-          {
-            this->States[p] = Band;
-            candidates.push_back(p);
-          }
-        });
-    }
-  }
-
-  // Lumen and surroundings by blocks: the brightest smoothed member, and the mean outside the band.
-  std::array<int, 3> reach;
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    reach[axis] =
-      std::max(1, static_cast<int>(std::lround(surroundings / this->L.BlockSpacing[axis])));
-  }
-  constexpr float none = -std::numeric_limits<float>::infinity();
-  BlockValues near(blocks);
+  BlockValues near(this->L.Blocks);
   for (const Member& m : this->Members)
   {
     const std::array<int, 3> at = this->L.Place(m.voxel);
@@ -887,7 +804,57 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
         }
       }
     },
-    Part(progress, 0.2, 0.4));
+    progress);
+  return near;
+}
+
+template <typename T>
+void Segmentation<T>::RefineWall(std::vector<float>* probability, const ProgressCallback& progress)
+{
+  // Wide enough for the next voxel along each axis, mm.
+  const Vector3 band = (1.2 * this->L.Spacing).cwiseMax(0.8);
+  // How far from a voxel its lumen is looked for, mm: a place in the band must find it.
+  const Vector3 lumenReach = (1.2 * this->L.BlockSpacing).cwiseMax(1.5);
+  constexpr double surroundings = 1.8; // mm: how far the local values are taken from
+
+  // The band, from the members that have a neighbour outside.
+  std::vector<std::int64_t> candidates;
+  for (const Member& m : this->Members)
+  {
+    candidates.push_back(m.voxel);
+  }
+  for (std::size_t m = 0; m < this->Members.size(); ++m)
+  {
+    const std::array<int, 3> at = this->L.Place(this->Members[m].voxel);
+    const bool rim = std::any_of(this->L.Around.begin(), this->L.Around.end(),
+      [&](const VoxelLattice::Neighbour& n)
+      {
+        return this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk) &&
+          this->States[this->Members[m].voxel + n.offset] == Unknown;
+      });
+    if (rim)
+    {
+      this->L.Ball(at, band.maxCoeff(),
+        [&](std::int64_t p, const std::array<int, 3>& place)
+        {
+          const Vector3 d = this->L.Spacing.cwiseProduct(
+            Vector3(place[0] - at[0], place[1] - at[1], place[2] - at[2]));
+          if (this->States[p] == Unknown && d.cwiseQuotient(band).squaredNorm() <= 1.0)
+          {
+            this->States[p] = Band;
+            candidates.push_back(p);
+          }
+        });
+    }
+  }
+
+  std::array<int, 3> reach;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    reach[axis] =
+      std::max(1, static_cast<int>(std::lround(surroundings / this->L.BlockSpacing[axis])));
+  }
+  const BlockValues near = this->MeasureBlocks(reach, Part(progress, 0.2, 0.4));
   // What the blocks around one count.
   struct Neighbour
   {
@@ -924,7 +891,7 @@ void Segmentation<T>::RefineWall(std::vector<float>* probability, const Progress
       for (std::int64_t n = first; n < last; ++n)
       {
         const std::int64_t p = candidates[n];
-        float brightest = none;
+        float brightest = -std::numeric_limits<float>::infinity();
         float sum = 0.0f;
         float weights = 0.0f;
         const std::array<int, 3> at = this->L.PlaceOfBlock(this->L.Place(p));

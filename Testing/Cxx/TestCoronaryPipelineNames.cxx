@@ -18,6 +18,7 @@
 #include <map>
 #include <string>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 namespace
@@ -144,7 +145,9 @@ TEST_P(TestCoronaryPipelineNames, AreThoseOfAnotherSetting)
   this->Call("run coarse/series.json " + options + "voxels");
   const std::vector<NamedPiece> usual = this->Names("default");
   ASSERT_GT(usual.size(), 300U);
-  for (const char* other : { "narrow", "seeds", "voxels" })
+  // In coarse voxels the dominance may be in doubt, and with it one name behind.
+  for (const auto& [other, least] :
+    { std::pair("narrow", 0.97), std::pair("seeds", 0.97), std::pair("voxels", 0.95) })
   {
     const Agreement agreement = Compare(usual, this->Names(other));
     std::string changed;
@@ -154,7 +157,7 @@ TEST_P(TestCoronaryPipelineNames, AreThoseOfAnotherSetting)
     }
     // Coarser voxels show less of the thin ends.
     EXPECT_GT(agreement.both, 0.8 * agreement.all) << other;
-    EXPECT_GT(agreement.same, 0.97 * agreement.both) << other << ":" << changed;
+    EXPECT_GT(agreement.same, least * agreement.both) << other << ":" << changed;
   }
 }
 
