@@ -66,34 +66,13 @@ ProgressCallback ProgressOf(const std::function<void(double)>& progress)
 }
 
 /// An image, a tree in it, and what was measured of both.
-struct Measurement
+struct Measurement : TreeLumen
 {
   CenterlineTree tree;
   std::vector<VesselPath> paths;
   std::vector<float> copy;
   ScalarImage image;
-  LumenLevels levels;
-  CalciumMap calcium;
-  RefinedLumen lumen;
 };
-
-void Measure(Measurement& measurement, vtkPolyData* data, vtkImageData* image, double blur,
-  const std::function<void(double)>& progress)
-{
-  measurement.tree = TreeWithArrays(data);
-  measurement.paths = VesselPaths(measurement.tree);
-  measurement.image =
-    vtkCoronary::ScalarImageOf(image, image->GetPointData()->GetScalars(), measurement.copy);
-  measurement.levels =
-    MeasureLumenLevels(measurement.tree, measurement.paths, measurement.image, blur);
-  const std::function<void(double)> first = [&](double fraction) { progress(0.2 * fraction); };
-  const std::function<void(double)> second = [&](double fraction)
-  { progress(0.2 + 0.8 * fraction); };
-  measurement.calcium =
-    FindCalcium(measurement.tree, measurement.image, measurement.levels, {}, ProgressOf(first));
-  measurement.lumen = RefineLumen(measurement.tree, measurement.paths, measurement.image,
-    measurement.levels, measurement.calcium, blur, {}, ProgressOf(second));
-}
 
 Json Position(const Vector3& position)
 {
@@ -222,7 +201,13 @@ TreeLesions GradeTreeLesions(vtkPolyData* tree, vtkImageData* image, double blur
   StenosisGrading grading;
   if (tree->GetNumberOfLines() > 0 && blur > 0.0)
   {
-    Measure(measurement, tree, image, blur, progress);
+    measurement.tree = TreeWithArrays(tree);
+    measurement.paths = VesselPaths(measurement.tree);
+    measurement.image =
+      vtkCoronary::ScalarImageOf(image, image->GetPointData()->GetScalars(), measurement.copy);
+    const ProgressCallback report = ProgressOf(progress);
+    static_cast<TreeLumen&>(measurement) =
+      MeasureTreeLumen(measurement.tree, measurement.paths, measurement.image, blur, report);
     MeasureCalcium(measurement.calcium, measurement.tree, measurement.paths, measurement.image,
       measurement.levels, blur);
     grading = GradeStenoses(measurement.tree, measurement.paths, measurement.lumen,

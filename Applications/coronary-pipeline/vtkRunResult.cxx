@@ -56,39 +56,25 @@ std::vector<double> PointValues(vtkPolyData* lines, const char* name)
   return values;
 }
 
-/// By group: branches of the tree may stand in another order than lines of the file.
-std::vector<std::string> BranchNames(vtkPolyData* lines, const CenterlineTree& tree)
+/// Each branch's label and segment, which the file has by group.
+void TakeNames(vtkPolyData* lines, RunResult& result)
 {
-  auto* labels = vtkStringArray::SafeDownCast(
-    lines->GetCellData()->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
-  vtkDataArray* groups = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
-  std::map<int, std::string> byGroup;
-  for (vtkIdType k = 0; labels && groups && k < labels->GetNumberOfValues(); ++k)
+  vtkCellData* cells = lines->GetCellData();
+  auto* labels =
+    vtkStringArray::SafeDownCast(cells->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
+  vtkDataArray* segments = cells->GetArray(vtkCoronaryArrayNames::SegmentIds);
+  vtkDataArray* groups = cells->GetArray(vtkCoronaryArrayNames::GroupIds);
+  std::map<int, vtkIdType> cellOf;
+  for (vtkIdType k = 0; groups && k < groups->GetNumberOfTuples(); ++k)
   {
-    byGroup.emplace(static_cast<int>(groups->GetTuple1(k)), labels->GetValue(k));
+    cellOf.emplace(static_cast<int>(groups->GetTuple1(k)), k);
   }
-  std::vector<std::string> names;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (CenterlineTree::Branch& branch : result.tree.branches)
   {
-    names.push_back(byGroup[branch.groupId]);
-  }
-  return names;
-}
-
-/// As the file has them, also by group.
-void TakeSegments(vtkPolyData* lines, CenterlineTree& tree)
-{
-  vtkDataArray* segments = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::SegmentIds);
-  vtkDataArray* groups = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
-  std::map<int, int> byGroup;
-  for (vtkIdType k = 0; segments && groups && k < segments->GetNumberOfTuples(); ++k)
-  {
-    byGroup.emplace(
-      static_cast<int>(groups->GetTuple1(k)), static_cast<int>(segments->GetTuple1(k)));
-  }
-  for (CenterlineTree::Branch& branch : tree.branches)
-  {
-    branch.segmentId = byGroup[branch.groupId];
+    const auto cell = cellOf.find(branch.groupId);
+    const bool known = cell != cellOf.end();
+    result.names.push_back(labels && known ? labels->GetValue(cell->second) : vtkStdString());
+    branch.segmentId = segments && known ? static_cast<int>(segments->GetTuple1(cell->second)) : 0;
   }
 }
 
@@ -245,8 +231,7 @@ RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages)
   {
     throw std::runtime_error("'" + lines.string() + "': " + error.what());
   }
-  result.names = BranchNames(data, result.tree);
-  TakeSegments(data, result.tree);
+  TakeNames(data, result);
   result.bridged = PointValues(data, vtkCoronaryArrayNames::Bridged);
   result.bridgeConfidence = PointValues(data, vtkCoronaryArrayNames::BridgeConfidence);
   result.interpolated = PointValues(data, vtkCoronaryArrayNames::RadiusInterpolated);

@@ -1,5 +1,6 @@
 #include "BifurcationFit.h"
 
+#include "Median.h"
 #include "ParallelFor.h"
 
 #include <Eigen/Dense>
@@ -58,13 +59,6 @@ double ValueAt(const std::vector<double>& values, double place)
   const auto i = std::min(static_cast<std::size_t>(place), values.size() - 2);
   const double t = place - static_cast<double>(i);
   return (1.0 - t) * values[i] + t * values[i + 1];
-}
-
-double Median(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Index that is `length` further along a polyline, or nearest to it; backwards if negative.
@@ -171,7 +165,7 @@ bool Fit::FindExtent()
   const std::size_t known =
     Along(side, this->Alone, std::max(1.5 * this->Axes.sideRadius[this->Alone], 4.0 * this->Voxel));
   this->SideRadius =
-    Median({ this->Axes.sideRadius.begin() + static_cast<std::ptrdiff_t>(this->Alone),
+    MedianOf({ this->Axes.sideRadius.begin() + static_cast<std::ptrdiff_t>(this->Alone),
       this->Axes.sideRadius.begin() + static_cast<std::ptrdiff_t>(known) + 1 });
 
   // Behind the carina the vessels have their own walls again.
@@ -196,9 +190,9 @@ bool Fit::FindExtent()
     return false;
   }
   const std::vector<double>& radius = this->Axes.throughRadius;
-  this->FirstRadius = Median({ radius.begin() + static_cast<std::ptrdiff_t>(before),
+  this->FirstRadius = MedianOf({ radius.begin() + static_cast<std::ptrdiff_t>(before),
     radius.begin() + static_cast<std::ptrdiff_t>(this->First) + 1 });
-  this->LastRadius = Median({ radius.begin() + static_cast<std::ptrdiff_t>(this->Last),
+  this->LastRadius = MedianOf({ radius.begin() + static_cast<std::ptrdiff_t>(this->Last),
     radius.begin() + static_cast<std::ptrdiff_t>(after) + 1 });
   this->Inwards = (through[this->First] - through[before]).normalized();
   this->Outwards = (through[after] - through[this->Last]).normalized();
@@ -220,7 +214,7 @@ void Fit::CollectWalls()
   {
     values.push_back(this->Image.At(this->Axes.side[i]));
   }
-  const double lumen = Median(values);
+  const double lumen = MedianOf(values);
   std::vector<Vector3> walls;
   const auto collect = [&](const std::vector<Vector3>& line, const std::vector<double>& radius)
   {

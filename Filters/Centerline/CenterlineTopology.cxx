@@ -1,5 +1,7 @@
 #include "CenterlineTopology.h"
 
+#include "Median.h"
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -181,13 +183,6 @@ struct Graph
     return nearest;
   }
 };
-
-double Median(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 void Check(const CenterlineSet& lines)
 {
@@ -960,7 +955,7 @@ double EndCalibre(const CenterlineTopology& tree, const CenterlineTree::Branch& 
   {
     return tree.radius[branch.points[fromStart ? std::min(1, n - 1) : n - 1]];
   }
-  return Median(values);
+  return MedianOf(values);
 }
 
 double AngleBetween(const Vector3& a, const Vector3& b)
@@ -1061,7 +1056,7 @@ void ComputeGeometry(
         }
         CurveSmoothing used = smoothing;
         // Bends shorter than two diameters are the detector's, not the vessel's.
-        used.leastWavelength = std::max(used.leastWavelength, 4.0 * Median(radii));
+        used.leastWavelength = std::max(used.leastWavelength, 4.0 * MedianOf(radii));
         courses[h].curve = ComputeCurveGeometry(positions, used);
       }
     },
@@ -1253,7 +1248,7 @@ CenterlineTopology BuildTopology(
     tree.fittedExponent = std::numeric_limits<double>::quiet_NaN();
     return tree;
   }
-  const double radius = Median(radii);
+  const double radius = MedianOf(radii);
   if (extent > LongestLine * radius)
   {
     throw std::invalid_argument("A line is more than a million times as long as the median radius");

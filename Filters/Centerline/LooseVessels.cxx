@@ -1,6 +1,7 @@
 #include "LooseVessels.h"
 
 #include "LumenMeasurement.h"
+#include "Median.h"
 #include "SegmentAtlas.h"
 #include "VoxelLattice.h"
 
@@ -41,17 +42,6 @@ constexpr double ThinEnd[] = { 0.55, 0.75 };
 constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
 /// Mean distance of true arteries from those of the mean heart is less; beyond it grows doubt.
 constexpr double UsualAway = 10.0; ///< mm of the mean heart
-
-double Median(std::vector<double> values)
-{
-  if (values.empty())
-  {
-    return 0.0;
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Whether a segment is of the artery that a course of the mean heart is called by: "LAD" has three.
 bool IsOf(int segment, const std::string& course)
@@ -214,7 +204,7 @@ void Search::MeasureTree()
       }
     }
   }
-  this->Tube = Median(thin);
+  this->Tube = MedianOf(thin);
 }
 
 /// Connected voxels of tubes that are not near the tree.
@@ -405,7 +395,7 @@ double Search::UsualContrast(double radius) const
       usual.push_back(sample.contrast);
     }
   }
-  return Median(usual);
+  return MedianOf(usual);
 }
 
 /// Sections along an axis.
@@ -521,9 +511,9 @@ bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vesse
   vessel.besideOther /= count;
   vessel.away /= count;
   vessel.seen = static_cast<double>(radii.size()) / count;
-  vessel.radius = Median(radii);
+  vessel.radius = MedianOf(radii);
   const double usual = this->UsualContrast(vessel.radius);
-  vessel.brightness = usual > 0.0 ? Median(contrasts) / usual : 0.0;
+  vessel.brightness = usual > 0.0 ? MedianOf(contrasts) / usual : 0.0;
   vessel.nearest = std::max_element(names.begin(), names.end(),
     [](const auto& one, const auto& other) {
       return one.second < other.second;
@@ -531,7 +521,7 @@ bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vesse
   vessel.thinEnd = vessel.radius;
   for (const std::vector<double>& end : ends)
   {
-    vessel.thinEnd = end.empty() ? vessel.thinEnd : std::min(vessel.thinEnd, Median(end));
+    vessel.thinEnd = end.empty() ? vessel.thinEnd : std::min(vessel.thinEnd, MedianOf(end));
   }
   // Where an artery usually runs and does, another one is its vein; where it does not, it is the artery.
   const double thick =

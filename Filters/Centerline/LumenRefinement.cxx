@@ -3,6 +3,7 @@
 #include "BlurredDisc.h"
 #include "CurveSmoothing.h"
 #include "LumenMeasurement.h"
+#include "PartialProgress.h"
 
 #include <Eigen/Dense>
 
@@ -825,5 +826,26 @@ RefinedLumen RefineLumen(const CenterlineTree& tree, const std::vector<VesselPat
     refiner.Finish(work, result);
   }
   return result;
+}
+
+TreeLumen MeasureTreeLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+  const ScalarImage& image, double blur, const ProgressCallback& progress)
+{
+  constexpr double calciumShare = 0.2; // of the time
+  TreeLumen measured;
+  measured.levels = MeasureLumenLevels(tree, paths, image, blur);
+  measured.calcium =
+    FindCalcium(tree, image, measured.levels, {}, PartOf(progress, 0.0, calciumShare));
+  measured.lumen = RefineLumen(tree, paths, image, measured.levels, measured.calcium, blur, {},
+    PartOf(progress, calciumShare, 1.0));
+  return measured;
+}
+
+CenterlineTree WithLumen(CenterlineTree tree, const RefinedLumen& lumen)
+{
+  tree.points = lumen.points;
+  tree.radius = lumen.radius;
+  MeasureTree(tree);
+  return tree;
 }
 }

@@ -52,6 +52,26 @@ struct RefinedLumen
 RefinedLumen RefineLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, const LumenLevels& levels, const CalciumMap& calcium, double blur,
   const RefinementSettings& settings = {}, const ProgressCallback& progress = {});
+
+/// All that is measured of the lumen along a tree.
+struct TreeLumen
+{
+  LumenLevels levels;
+  CalciumMap calcium;
+  RefinedLumen lumen;
+};
+
+/**
+ * Levels, calcium and the lumen beside it, one after the other.
+ * @param paths  of the tree
+ * @param blur   standard deviation of the image's blur, mm, positive
+ * @throws std::invalid_argument as CheckTree; Cancelled
+ */
+TreeLumen MeasureTreeLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+  const ScalarImage& image, double blur, const ProgressCallback& progress = {});
+
+/// A tree with the lumen that was measured of it.
+CenterlineTree WithLumen(CenterlineTree tree, const RefinedLumen& lumen);
 }
 
 #endif

@@ -1,6 +1,7 @@
 #include "OstialRoot.h"
 
 #include "CurveSmoothing.h"
+#include "Median.h"
 
 #include <Eigen/Cholesky>
 
@@ -19,13 +20,6 @@ struct Ring
   double radius = 0.0;             ///< mm, at half of the contrast
   double closed = 0.0;             ///< share of the circle with a wall, 0 to 1
 };
-
-double MedianOf(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// @param expected  mm: walls farther than 1.5 times of it are those of the aorta
 Ring MeasureRing(const ImageInterpolator& image, const Vector3& position, const Vector3& tangent,

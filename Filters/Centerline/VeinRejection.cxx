@@ -1,5 +1,7 @@
 #include "VeinRejection.h"
 
+#include "Median.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -31,24 +33,18 @@ constexpr double LongestStem = 4.0;
 /// mm of a vein that are closed, at least: more than what is looked for beyond a tip.
 constexpr double CloseLength = 12.0;
 
-double Median(std::vector<double> values)
-{
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Standard deviation of a median by noise: samples within about 1 mm are not independent.
 double SpreadOfMedian(const std::vector<double>& values)
 {
   std::vector<double> off;
-  const double middle = Median(values);
+  const double middle = MedianOf(values);
   off.reserve(values.size());
   for (const double value : values)
   {
     off.push_back(std::abs(value - middle));
   }
-  return 1.4826 * Median(off) / std::sqrt(std::max(1.0, static_cast<double>(values.size()) / 4.0));
+  return 1.4826 * MedianOf(off) /
+    std::sqrt(std::max(1.0, static_cast<double>(values.size()) / 4.0));
 }
 
 /// Lesions narrow a vessel, nothing widens it: its radius is what most of it has at least.
@@ -104,7 +100,7 @@ public:
         tips.push_back(std::log(this->TipRadius(this->Down(b, Unlimited))));
       }
     }
-    this->UsualTip = tips.empty() ? 0.0 : Median(tips);
+    this->UsualTip = tips.empty() ? 0.0 : MedianOf(tips);
   }
 
   std::vector<VeinBranch> Run();
@@ -277,7 +273,7 @@ double VeinFinder::TipRadius(const Course& course) const
 {
   const double length = course.empty() ? 0.0 : course.back().passed;
   std::vector<double> radii = this->Radii(course, length - 3.0, length + 1.0);
-  return radii.empty() ? this->Blur : std::max(1e-9, Median(std::move(radii)));
+  return radii.empty() ? this->Blur : std::max(1e-9, MedianOf(std::move(radii)));
 }
 
 /// Whether there is blood, and no calcium, ahead of a tip.
@@ -305,7 +301,7 @@ bool VeinFinder::GoesOn(const Course& course) const
   {
     values.push_back(this->Image.At(tip + s * ahead));
   }
-  const double step = (Median(values) - Median(own)) / std::max(1e-9, this->Contrast);
+  const double step = (MedianOf(values) - MedianOf(own)) / std::max(1e-9, this->Contrast);
   return std::abs(step) < 0.2;
 }
 
@@ -372,7 +368,7 @@ void VeinFinder::Beside(Arm& arm) const
   }
   if (steps.size() >= 16)
   {
-    arm.stepBeside = Median(steps);
+    arm.stepBeside = MedianOf(steps);
     arm.errorBeside = SpreadOfMedian(steps);
   }
 }
@@ -411,10 +407,10 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
     arm.error = std::numeric_limits<double>::infinity();
     if (own.size() >= 8 && before.size() >= 8)
     {
-      signs.brightness = Median(own) - Median(before);
+      signs.brightness = MedianOf(own) - MedianOf(before);
       // What the blur took is known by half.
-      const double given = Median(this->Values(this->GivenBack, down, mouth)) -
-        Median(this->Values(this->GivenBack, up, mouth));
+      const double given = MedianOf(this->Values(this->GivenBack, down, mouth)) -
+        MedianOf(this->Values(this->GivenBack, up, mouth));
       arm.error = std::hypot(SpreadOfMedian(own), SpreadOfMedian(before), 0.5 * given);
     }
     const std::vector<double> early = this->Radii(down, mouth, mouth + LeastLength);
@@ -423,9 +419,9 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
     if (!early.empty() && !late.empty())
     {
       const std::vector<double> near = this->Radii(up, 1.5, 1.5 + LeastLength);
-      signs.calibre = Median(early) / (near.empty() ? std::max(1e-9, widest) : UpperRadius(near));
+      signs.calibre = MedianOf(early) / (near.empty() ? std::max(1e-9, widest) : UpperRadius(near));
       // Behind a narrow begin any artery is wider again: only what becomes wider than the artery before counts.
-      signs.growth = Median(late) / std::max({ 1e-9, Median(early), 0.9 * widest });
+      signs.growth = MedianOf(late) / std::max({ 1e-9, MedianOf(early), 0.9 * widest });
     }
   }
   // A vein widens throughout, not only where its end runs into something else.
@@ -616,7 +612,7 @@ std::optional<VeinFinder::Place> VeinFinder::Between(std::size_t a, std::size_t 
   {
     return std::nullopt;
   }
-  place.radiusBefore = Median(before);
+  place.radiusBefore = MedianOf(before);
   place.flow = (this->At(this->Tree.branches[top].points.back()) - this->Tree.points[back->point])
                  .normalized();
   return place;
@@ -666,7 +662,7 @@ std::optional<VeinFinder::Side> VeinFinder::SideOf(const Course& course, const P
   }
   side.outwards.normalize();
   side.position = middle - (passed - course[first].passed) * side.outwards;
-  side.radius = std::max(1e-9, Median(radii));
+  side.radius = std::max(1e-9, MedianOf(radii));
   return side.outwards.allFinite() ? std::optional<Side>(side) : std::nullopt;
 }
 
@@ -798,14 +794,14 @@ std::vector<VeinBranch> VeinFinder::Run()
   // Most branches are arteries: how these differ is the measure.
   if (!steps.empty())
   {
-    this->Usual = std::clamp(Median(steps), -0.1, 0.0);
+    this->Usual = std::clamp(MedianOf(steps), -0.1, 0.0);
     std::vector<double> off;
     off.reserve(steps.size());
     for (const double step : steps)
     {
       off.push_back(std::abs(step - this->Usual));
     }
-    this->Natural = std::max(this->Natural, 1.4826 * Median(off));
+    this->Natural = std::max(this->Natural, 1.4826 * MedianOf(off));
   }
   for (Arm& arm : arms)
   {

@@ -176,20 +176,6 @@ void AddCell(vtkCellArray* cells, const std::vector<std::int64_t>& ids)
   }
 }
 
-/// Centres and radii as what calcium and narrowings leave.
-void MeasureAnew(CenterlineTree& tree, const coronary::ScalarImage& image, double blur,
-  const coronary::ProgressCallback& progress)
-{
-  const std::vector<coronary::VesselPath> paths = coronary::VesselPaths(tree);
-  const coronary::LumenLevels levels = coronary::MeasureLumenLevels(tree, paths, image, blur);
-  const coronary::CalciumMap calcium = coronary::FindCalcium(tree, image, levels, {}, progress);
-  coronary::RefinedLumen lumen =
-    coronary::RefineLumen(tree, paths, image, levels, calcium, blur, {}, progress);
-  tree.points = std::move(lumen.points);
-  tree.radius = std::move(lumen.radius);
-  coronary::MeasureTree(tree);
-}
-
 /// Takes the message's first word as the name of a property.
 std::string PropertyMessage(std::string message)
 {
@@ -470,8 +456,10 @@ void vtkFastMarchingCenterline::Execute(
       coronary::ExtractCenterlines(input, settings, vtkCoronary::ProgressOf(this, begin, end));
     if (refine && !result.tree.branches.empty() && result.blur > 0.0)
     {
-      MeasureAnew(
-        result.tree, *input.intensity, result.blur, vtkCoronary::ProgressOf(this, end, 1.0));
+      const coronary::TreeLumen lumen =
+        coronary::MeasureTreeLumen(result.tree, coronary::VesselPaths(result.tree),
+          *input.intensity, result.blur, vtkCoronary::ProgressOf(this, end, 1.0));
+      result.tree = coronary::WithLumen(std::move(result.tree), lumen.lumen);
     }
   }
   for (const std::string& message : result.messages)

@@ -1,5 +1,7 @@
 #include "AorticTubes.h"
 
+#include "Median.h"
+
 #include <Eigen/Cholesky>
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 #include "CoronaryOstia.h"
 
 #include "AorticTubes.h"
+#include "Median.h"
 #include "OstialOutlets.h"
 
 #include <algorithm>

@@ -2,6 +2,7 @@
 
 #include "DistanceTransform.h"
 #include "HiddenMouths.h"
+#include "Median.h"
 #include "MultiscaleVesselness.h"
 
 #include <Eigen/Cholesky>

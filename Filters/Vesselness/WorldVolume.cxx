@@ -80,15 +80,4 @@ std::pair<Vector3, Vector3> BoundsAlong(const ImageGrid& grid, const Matrix3& ax
   }
   return { low, high };
 }
-
-double MedianOf(std::vector<double>& values)
-{
-  if (values.empty())
-  {
-    return 0.0;
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 }

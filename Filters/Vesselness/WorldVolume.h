@@ -109,9 +109,6 @@ WorldVolume ResampleToWorld(const ScalarImage& image, const Vector3& low, const 
 
 /// Box around the centres of an image's voxels, in coordinates along `axes`, mm.
 std::pair<Vector3, Vector3> BoundsAlong(const ImageGrid& grid, const Matrix3& axes);
-
-/// Of a list that it reorders; 0 of an empty one. The upper one of two.
-double MedianOf(std::vector<double>& values);
 }
 
 #endif

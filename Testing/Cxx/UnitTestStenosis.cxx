@@ -95,25 +95,16 @@ CenterlineTree LineWith(double radius, const Vector3& off = Vector3::Zero())
   return tree;
 }
 
-struct Measured
+struct Measured : TreeLumen
 {
-  LumenLevels levels;
-  CalciumMap calcium;
-  RefinedLumen lumen;
   StenosisGrading grading;
 };
 
 Measured MeasureAll(const Tube& tube, const CenterlineTree& tree)
 {
-  Measured result;
   const std::vector<VesselPath> paths = VesselPaths(tree);
-  result.levels = MeasureLumenLevels(tree, paths, tube.image, Blur);
-  result.calcium = FindCalcium(tree, tube.image, result.levels);
-  result.lumen = RefineLumen(tree, paths, tube.image, result.levels, result.calcium, Blur);
-  CenterlineTree refined = tree;
-  refined.points = result.lumen.points;
-  refined.radius = result.lumen.radius;
-  MeasureTree(refined);
+  Measured result{ MeasureTreeLumen(tree, paths, tube.image, Blur), {} };
+  const CenterlineTree refined = WithLumen(tree, result.lumen);
   MeasureCalcium(result.calcium, refined, paths, tube.image, result.levels, Blur);
   result.grading = GradeStenoses(refined, paths, result.lumen);
   return result;

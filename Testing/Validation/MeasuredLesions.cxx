@@ -7,25 +7,11 @@
 
 namespace coronary
 {
-MeasuredLesions MeasureLumen(const CenterlineTree& tree, const ScalarImage& image, double blur)
-{
-  MeasuredLesions measured;
-  const std::vector<VesselPath> paths = VesselPaths(tree);
-  measured.levels = MeasureLumenLevels(tree, paths, image, blur);
-  measured.calcium = FindCalcium(tree, image, measured.levels);
-  measured.lumen = RefineLumen(tree, paths, image, measured.levels, measured.calcium, blur);
-  return measured;
-}
-
 MeasuredLesions MeasureLesions(const CenterlineTree& tree, const ScalarImage& image, double blur)
 {
-  MeasuredLesions measured = MeasureLumen(tree, image, blur);
   const std::vector<VesselPath> paths = VesselPaths(tree);
-  CenterlineTree& refined = measured.refined;
-  refined = tree;
-  refined.points = measured.lumen.points;
-  refined.radius = measured.lumen.radius;
-  MeasureTree(refined);
+  MeasuredLesions measured{ MeasureTreeLumen(tree, paths, image, blur), {}, {} };
+  const CenterlineTree& refined = measured.refined = WithLumen(tree, measured.lumen);
   MeasureCalcium(measured.calcium, refined, paths, image, measured.levels, blur);
   measured.grading =
     GradeStenoses(refined, paths, measured.lumen, refined.bridged, refined.bridgeConfidence);

@@ -5,9 +5,7 @@
 #ifndef DynamicCoronary_MeasuredLesions_h
 #define DynamicCoronary_MeasuredLesions_h
 
-#include "CalciumObjects.h"
 #include "CoronaryPhantom.h"
-#include "LumenLevels.h"
 #include "LumenRefinement.h"
 #include "StenosisGrading.h"
 
@@ -16,20 +14,14 @@
 
 namespace coronary
 {
-struct MeasuredLesions
+struct MeasuredLesions : TreeLumen
 {
-  LumenLevels levels;
-  CalciumMap calcium;
-  RefinedLumen lumen;      ///< of the given tree
-  CenterlineTree refined;  ///< that tree with this lumen; empty after MeasureLumen() alone
-  StenosisGrading grading; ///< of the refined tree; empty after MeasureLumen() alone
+  CenterlineTree refined;  ///< the given tree with this lumen
+  StenosisGrading grading; ///< of the refined tree
 };
 
 /// @param blur  standard deviation of the image's blur, mm, positive
 /// @throws std::invalid_argument as CheckTree
-MeasuredLesions MeasureLumen(const CenterlineTree& tree, const ScalarImage& image, double blur);
-
-/// The same, with the narrowings graded.
 MeasuredLesions MeasureLesions(const CenterlineTree& tree, const ScalarImage& image, double blur);
 
 /// What became of a true lesion.

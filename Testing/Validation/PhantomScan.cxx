@@ -138,10 +138,9 @@ FoundTree FindTree(const PhantomScan& image)
   CenterlineTree& raw = found.extraction.tree;
   if (!raw.branches.empty() && found.extraction.blur > 0.0)
   {
-    MeasuredLesions measured = MeasureLumen(raw, image.Image(), found.extraction.blur);
-    raw.points = std::move(measured.lumen.points);
-    raw.radius = std::move(measured.lumen.radius);
-    MeasureTree(raw);
+    const TreeLumen measured =
+      MeasureTreeLumen(raw, VesselPaths(raw), image.Image(), found.extraction.blur);
+    raw = WithLumen(std::move(raw), measured.lumen);
   }
   found.tree = BuildTopology(LinesOf(raw, image.seeds));
   found.labels = LabelSegments(found.tree);
