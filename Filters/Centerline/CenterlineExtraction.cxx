@@ -182,6 +182,7 @@ std::vector<Fork> ForksOfTwo(const CenterlineTree& tree)
   return forks;
 }
 
+constexpr double LeastUnseen = 1.5;     ///< mm of a way across a lesion that are a passage
 constexpr double SamePlace = 3.0;       ///< mm: where a vein was rejected before
 constexpr double LongestCrossing = 6.0; ///< mm within a vein, at most, of what crosses it
 constexpr double GreatBranch = 0.6;     ///< radius in radii of its parent
@@ -217,7 +218,8 @@ public:
 
   /// After Run: branches of its tree that are veins are added to the excluded voxels, and to what was rejected.
   /// @returns whether there is one
-  bool ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins) const;
+  bool ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins,
+    std::vector<JudgedBranch>& judged) const;
 
 private:
   // Places.
@@ -1095,6 +1097,7 @@ void Extractor::MarkBridged()
       ? 1.0
       : tree.bridgeConfidence[static_cast<std::size_t>(branch.points[0])];
     std::vector<char> passed(this->Input.bridges.size(), 0);
+    std::vector<double> unseen(this->Input.bridges.size(), 0.0); // mm along each
     for (std::size_t i = branch.parentGroupId < 0 ? 0 : 1; i < branch.points.size(); ++i)
     {
       const auto p = static_cast<std::size_t>(branch.points[i]);
@@ -1110,10 +1113,13 @@ void Extractor::MarkBridged()
         if (tree.confidence[p] < this->Settings.minimumConfidence)
         {
           tree.bridged[p] = 1;
+          unseen[b] += this->Step;
         }
-        // The middle of the way is what a branch that only begins at one of its ends does not pass.
+        // The middle of the way, and more than a moment of it unseen, are what a branch that only begins at one of its
+        // ends does not pass.
         const Vector3& middle = bridge.points[bridge.points.size() / 2];
-        if (passed[b] == 0 && (middle - tree.points[p]).squaredNorm() <= reach * reach)
+        if (passed[b] == 0 &&
+          (unseen[b] >= LeastUnseen || (middle - tree.points[p]).squaredNorm() <= reach * reach))
         {
           passed[b] = 1;
           certain *= bridge.confidence;
@@ -1639,16 +1645,27 @@ bool Extractor::IsExcluded(const std::vector<Vector3>& points) const
   return length > LongestCrossing || 4 * inside > points.size();
 }
 
-bool Extractor::ExcludeVeins(
-  std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins) const
+bool Extractor::ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins,
+  std::vector<JudgedBranch>& judged) const
 {
   if (!this->Input.intensity || !this->Calibrated)
   {
     return false;
   }
   const CenterlineTree& tree = this->Result.tree;
-  const std::vector<VeinBranch> found =
-    FindVeins(tree, *this->Image, this->Lumen.reference, this->Blur);
+  std::vector<VeinBranch> found;
+  for (VeinBranch& branch : JudgeBranches(tree, *this->Image, this->Lumen.reference, this->Blur))
+  {
+    judged.push_back({ {}, branch });
+    for (const std::int64_t point : branch.course)
+    {
+      judged.back().course.push_back(tree.points[static_cast<std::size_t>(point)]);
+    }
+    if (branch.probability >= 0.5)
+    {
+      found.push_back(std::move(branch));
+    }
+  }
   if (found.empty())
   {
     return false;
@@ -2360,6 +2377,7 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   // seen only when another one is closed.
   std::vector<unsigned char> excluded;
   std::vector<RejectedVein> veins;
+  std::vector<JudgedBranch> judged;
   CenterlineResult result;
   constexpr int rounds = 6;
   for (int round = 0; round <= rounds; ++round)
@@ -2367,21 +2385,25 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
     std::vector<unsigned char> more = excluded;
     Extractor extractor(framed, input, excluded, settings, progress);
     result = extractor.Run();
-    if (round == rounds || !extractor.ExcludeVeins(more, veins))
+    if (round == rounds || !extractor.ExcludeVeins(more, veins, judged))
     {
       break;
     }
     excluded = std::move(more);
   }
+  const auto toWorld = [&](Vector3& point)
+  { point = origin + input.grid.direction * Vector3(point); };
   for (RejectedVein& vein : veins)
   {
-    vein.position = origin + input.grid.direction * vein.position;
+    toWorld(vein.position);
   }
   result.veins = std::move(veins);
-  for (Vector3& point : result.tree.points)
+  for (JudgedBranch& branch : judged)
   {
-    point = origin + input.grid.direction * point;
+    std::for_each(branch.course.begin(), branch.course.end(), toWorld);
   }
+  result.judged = std::move(judged);
+  std::for_each(result.tree.points.begin(), result.tree.points.end(), toWorld);
   return result;
 }
 }

@@ -3,6 +3,7 @@
 #include "Median.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -19,8 +20,9 @@ constexpr double Unlimited = std::numeric_limits<double>::infinity();
 constexpr double LeastLength = 8.0; ///< mm: what is shorter shows too little
 constexpr double LeastRadius = 2.0; ///< blurs: thinner lumens are darker for the blur alone
 constexpr double Straight = 6.0;    ///< mm along which a direction is measured
-/// Few branches touch by chance: 3 in 100.
+/// Few branches touch by chance: 3 in 100. Behind a lesion it is the chance that what was linked is none of the tree.
 constexpr double Prior = -3.5;
+constexpr double Accompanied = 20.0; ///< mm beside an artery: as much as more
 /// Bend of a vessel over the breadth of another one, and of the measured directions, rad; against directions at random
 /// this tells a tube that goes through from two branches that face each other.
 constexpr double ThroughBend = 0.15;
@@ -32,6 +34,32 @@ constexpr double TouchLength = 15.0;
 constexpr double LongestStem = 4.0;
 /// mm of a vein that are closed, at least: more than what is looked for beyond a tip.
 constexpr double CloseLength = 12.0;
+
+/// Logarithmic odds a unit of each sign adds. Fitted by scripts/fit-veins.py to the branches of PHANTOMS.
+struct Sign
+{
+  const char* name;
+  double weight;
+};
+constexpr double Intercept = -5.01;
+constexpr std::array<Sign, NumberOfVeinSigns> Signs{ {
+  { "darker", 0.43 },
+  { "brighter", 1.04 },
+  { "darker_beside", 2.34 },
+  { "brighter_beside", 1.58 },
+  { "beside", 3.43 },
+  { "beside_unclear", 0.37 },
+  { "thinner", 1.47 },
+  { "taper", 2.75 },
+  { "strong_taper", 0.96 },
+  { "no_taper", 0.99 },
+  { "blunt_goes_on", 5.25 },
+  { "blunt", 5.46 },
+  { "backwards", 1.30 },
+  { "through", 1.30 },
+  { "short", 2.39 },
+  { "no_brightness", -0.20 },
+} };
 
 /// Standard deviation of a median by noise: samples within about 1 mm are not independent.
 double SpreadOfMedian(const std::vector<double>& values)
@@ -116,17 +144,21 @@ private:
   /// A branch that may be a vein's.
   struct Arm
   {
-    VeinBranch signs;
+    VeinBranch branch;
     Course course;
-    double error = 0.0; ///< of the brightness, by noise, share of the contrast
-    double stepBeside =
-      0.0; ///< brightness, over that of what it runs beside, share of the contrast
+    double brightness = 0.0; ///< step from the artery, share of the contrast, negative: darker
+    double error = 0.0;      ///< of it, by noise; 0: not known
+    double beside = 0.0;     ///< mm beside another artery
+    double stepBeside = 0.0; ///< brightness over that of what it runs beside, share of the contrast
     double errorBeside = 0.0; ///< of it; 0: not known
-    double evidence = 0.0;    ///< its own: odds without the prior, as a logarithm
-    double prior = Prior;
-    double odds = 0.0;
-    bool darker = false;
-    bool goesOn = false; ///< there is as much blood ahead of its tip
+    double calibre = 1.0;     ///< radius over the greatest of the artery before it
+    /// Logarithm of its radius over that half of its length before, where that grows least; NaN: not known.
+    double taper = std::numeric_limits<double>::quiet_NaN();
+    double blunt = 0.0;   ///< logarithm of the radius at its tip over what tips of the tree have
+    double takeOff = 0.0; ///< angle to the flow in the artery before, rad
+    double through = 0.0; ///< odds that it goes on at the artery's other side, as a logarithm
+    double doubt = 0.0;   ///< odds of a vein that a link before it adds, as a logarithm
+    bool goesOn = false;  ///< there is as much blood ahead of its tip
   };
   /// What leaves the place where two arms begin, seen from there.
   struct Place
@@ -158,7 +190,7 @@ private:
   void Weigh(Arm& arm) const;
   std::optional<Place> Between(std::size_t a, std::size_t b) const;
   std::optional<Side> SideOf(const Course& course, const Place& place) const;
-  std::optional<double> Through(const Arm& a, const Arm& b, double& bend) const;
+  std::optional<double> Through(const Arm& a, const Arm& b) const;
   void FindOpposites(std::vector<Arm>& arms) const;
 
   const CenterlineTree& Tree;
@@ -354,7 +386,7 @@ void VeinFinder::Beside(Arm& arm) const
     }
     if (nearest)
     {
-      arm.signs.beside += length;
+      arm.beside += length;
       const auto clear = [&](std::size_t p)
       {
         return this->Tree.radius[p] >= LeastRadius * this->Blur &&
@@ -383,8 +415,7 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
   {
     return std::nullopt;
   }
-  VeinBranch& signs = arm.signs;
-  signs.groupId = this->Tree.branches[branch].groupId;
+  arm.branch.groupId = this->Tree.branches[branch].groupId;
   double widest = 0.0;
   for (const auto& [point, passed] : up)
   {
@@ -398,34 +429,29 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
     this->Tree.bridgeConfidence.empty() ? 1.0 : this->Tree.bridgeConfidence[down.front().point];
   if (sure < 1.0)
   {
-    arm.prior = std::max(Prior, std::log((1.0 - sure) / std::max(1e-9, sure)));
+    arm.doubt = std::max(0.0, std::log((1.0 - sure) / std::max(1e-9, sure)) - Prior);
   }
   else
   {
+    arm.branch.known = true;
     const std::vector<double> own = this->Values(this->Value, down, mouth);
     const std::vector<double> before = this->Values(this->Value, up, mouth);
-    arm.error = std::numeric_limits<double>::infinity();
     if (own.size() >= 8 && before.size() >= 8)
     {
-      signs.brightness = MedianOf(own) - MedianOf(before);
+      arm.brightness = MedianOf(own) - MedianOf(before);
       // What the blur took is known by half.
       const double given = MedianOf(this->Values(this->GivenBack, down, mouth)) -
         MedianOf(this->Values(this->GivenBack, up, mouth));
       arm.error = std::hypot(SpreadOfMedian(own), SpreadOfMedian(before), 0.5 * given);
     }
     const std::vector<double> early = this->Radii(down, mouth, mouth + LeastLength);
-    const std::vector<double> late =
-      this->Radii(down, std::max(mouth, length - LeastLength), length + 1.0);
-    if (!early.empty() && !late.empty())
+    if (!early.empty())
     {
       const std::vector<double> near = this->Radii(up, 1.5, 1.5 + LeastLength);
-      signs.calibre = MedianOf(early) / (near.empty() ? std::max(1e-9, widest) : UpperRadius(near));
-      // Behind a narrow begin any artery is wider again: only what becomes wider than the artery before counts.
-      signs.growth = MedianOf(late) / std::max({ 1e-9, MedianOf(early), 0.9 * widest });
+      arm.calibre = MedianOf(early) / (near.empty() ? std::max(1e-9, widest) : UpperRadius(near));
     }
   }
   // A vein widens throughout, not only where its end runs into something else.
-  signs.taper = std::numeric_limits<double>::quiet_NaN();
   const double third = (length - mouth) / 3.0;
   const std::vector<double> first = this->Radii(down, mouth, mouth + third);
   const std::vector<double> second = this->Radii(down, mouth + third, length - third);
@@ -434,13 +460,13 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
   {
     const double middle = UpperRadius(second);
     // As between its halves.
-    signs.taper = 1.5 * std::log(std::min(middle / UpperRadius(first), UpperRadius(last) / middle));
+    arm.taper = 1.5 * std::log(std::min(middle / UpperRadius(first), UpperRadius(last) / middle));
   }
   const Vector3& tip = this->Tree.points[down.back().point];
   const Vector3& before = this->Tree.points[down[down.size() > 8 ? down.size() - 9 : 0].point];
   if (length <= Far && this->Image.Contains(tip + 2.0 * (tip - before)))
   {
-    signs.blunt = std::log(this->TipRadius(down)) - this->UsualTip;
+    arm.blunt = std::log(this->TipRadius(down)) - this->UsualTip;
     arm.goesOn = this->GoesOn(down);
   }
   // Directions of the flow before, and of what leaves.
@@ -456,7 +482,7 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
     this->Tree.points[within(down, mouth + Straight)] - this->Tree.points[within(down, mouth)];
   if (flow.norm() > 0.0 && leaving.norm() > 0.0)
   {
-    signs.takeOff = Angle(flow.normalized(), leaving.normalized());
+    arm.takeOff = Angle(flow.normalized(), leaving.normalized());
   }
   this->Beside(arm);
   return arm;
@@ -464,40 +490,40 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
 
 void VeinFinder::Weigh(Arm& arm) const
 {
-  const VeinBranch& signs = arm.signs;
-  double darker = arm.error > 0.0 && std::isfinite(arm.error)
-    ? (this->Usual - signs.brightness) / std::hypot(arm.error, this->Natural)
-    : 0.0;
-  // Of two that run side by side the darker one is the vein.
-  double beside = std::min(3.0, signs.beside / 7.0);
-  if (arm.errorBeside > 0.0)
+  // In standard deviations, against most branches and against what it runs beside.
+  const bool known = arm.error > 0.0;
+  const double darker =
+    known ? (this->Usual - arm.brightness) / std::hypot(arm.error, this->Natural) : 0.0;
+  const bool knownBeside = arm.errorBeside > 0.0;
+  const double darkerBeside =
+    knownBeside ? -arm.stepBeside / std::hypot(arm.errorBeside, this->Natural) : 0.0;
+  const double beside = std::min(1.0, arm.beside / Accompanied);
+  const bool tapers = !std::isnan(arm.taper);
+  const double blunt = std::clamp(arm.blunt, 0.0, 1.3);
+  arm.branch.signs = {
+    std::clamp(darker, 0.0, 5.0),
+    std::clamp(darker, -3.0, 0.0),
+    beside * std::clamp(darkerBeside, 0.0, 5.0),
+    beside * std::clamp(darkerBeside, -5.0, 0.0),
+    beside,
+    knownBeside ? 0.0 : beside,
+    std::clamp(std::log(std::max(1e-9, arm.calibre)), -1.0, 0.0),
+    tapers ? std::clamp(arm.taper, -0.5, 0.2) : 0.0,
+    tapers ? std::clamp(arm.taper + 0.5, -1.0, 0.0) : 0.0,
+    tapers ? 0.0 : 1.0,
+    arm.goesOn ? blunt : 0.0,
+    arm.goesOn ? 0.0 : blunt,
+    std::clamp(arm.takeOff - 1.8, 0.0, 1.0),
+    std::clamp(arm.through, 0.0, 6.0),
+    std::max(0.0, 20.0 - arm.course.back().passed) / 20.0,
+    known ? 0.0 : 1.0,
+  };
+  double odds = Intercept + arm.doubt;
+  for (std::size_t n = 0; n < NumberOfVeinSigns; ++n)
   {
-    const double less = -arm.stepBeside / std::hypot(arm.errorBeside, this->Natural);
-    darker = std::max(darker, less);
-    beside /= 1.0 + std::exp(-less);
+    odds += Signs[n].weight * arm.branch.signs[n];
   }
-  else
-  {
-    beside *= 0.5;
-  }
-  arm.darker = darker > 1.0;
-  arm.evidence = std::min(4.0, std::max(0.0, darker - 1.5));
-  // Vessels are wider behind a lesion as well, but not darker.
-  const double most = arm.darker ? 4.0 : 1.5;
-  arm.evidence += std::min(most, 8.0 * std::max(0.0, signs.calibre - 1.15));
-  arm.evidence += std::min(most, 8.0 * std::max(0.0, signs.growth - 1.15));
-  // Arteries taper by a tenth or more between their halves; trunks by less.
-  if (!std::isnan(signs.taper))
-  {
-    arm.evidence += std::clamp(10.0 * (signs.taper + 0.1), -2.0, 3.0);
-  }
-  // A lesion may end an artery that is wide. Where blood goes on ahead, the vessel was entered from its other end as
-  // well: a loop, which arteries do not make.
-  arm.evidence += (arm.goesOn ? 1.75 : 0.5) * std::clamp(3.0 * (signs.blunt - 0.35), 0.0, 2.0);
-  // Against the flow.
-  arm.evidence += std::clamp(2.0 * (signs.takeOff - 1.8), 0.0, 2.0);
-  arm.evidence += beside;
-  arm.odds = arm.prior + arm.evidence;
+  arm.branch.probability = 1.0 / (1.0 + std::exp(-odds));
 }
 
 /// The artery between the begins of two branches, which goes on there.
@@ -668,11 +694,10 @@ std::optional<VeinFinder::Side> VeinFinder::SideOf(const Course& course, const P
 
 /// The odds, as a logarithm, that two branches are one tube which goes through an artery, against two of its branches
 /// with directions at random.
-/// @param bend  of the tube, rad
-std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b, double& bend) const
+std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b) const
 {
-  const std::size_t branchA = this->Index.at(a.signs.groupId);
-  const std::size_t branchB = this->Index.at(b.signs.groupId);
+  const std::size_t branchA = this->Index.at(a.branch.groupId);
+  const std::size_t branchB = this->Index.at(b.branch.groupId);
   const std::optional<Place> place = this->Between(branchA, branchB);
   if (!place)
   {
@@ -701,7 +726,7 @@ std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b, double& be
     }
   }
   const Vector3 chord = sideB->position - sideA->position;
-  bend = Angle(-sideA->outwards, sideB->outwards);
+  double bend = Angle(-sideA->outwards, sideB->outwards);
   if (chord.norm() > 1.0)
   {
     bend = std::max({ bend, Angle(-sideA->outwards, chord.normalized()),
@@ -711,23 +736,21 @@ std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b, double& be
   const double turn = bend / ThroughBend;
   // Both ends hold the same blood.
   double blood = 0.0;
-  if (a.error > 0.0 && std::isfinite(a.error) && b.error > 0.0 && std::isfinite(b.error))
+  if (a.error > 0.0 && b.error > 0.0)
   {
-    blood = (a.signs.brightness - b.signs.brightness) /
-      std::hypot(std::hypot(a.error, b.error), this->Natural);
+    blood = (a.brightness - b.brightness) / std::hypot(std::hypot(a.error, b.error), this->Natural);
   }
   const double instead = std::max(0.0, goesOn - std::min(unlike(*sideA), unlike(*sideB)));
   return std::log(2.0 / (ThroughBend * ThroughBend)) - 0.5 * turn * turn - 0.5 * step * step -
     0.5 * blood * blood - instead;
 }
 
-/// Two arms that are each other's best continuation are judged together.
+/// Two arms that are each other's best continuation may be one tube.
 void VeinFinder::FindOpposites(std::vector<Arm>& arms) const
 {
   struct Best
   {
     double odds = 0.0;
-    double bend = 0.0;
     std::size_t other = 0;
   };
   std::vector<Best> best(arms.size());
@@ -735,43 +758,28 @@ void VeinFinder::FindOpposites(std::vector<Arm>& arms) const
   {
     for (std::size_t b = a + 1; b < arms.size(); ++b)
     {
-      double bend = 0.0;
-      const std::optional<double> through = this->Through(arms[a], arms[b], bend);
+      const std::optional<double> through = this->Through(arms[a], arms[b]);
       if (!through)
       {
         continue;
       }
       if (*through > best[a].odds)
       {
-        best[a] = { *through, bend, b };
+        best[a] = { *through, b };
       }
       if (*through > best[b].odds)
       {
-        best[b] = { *through, bend, a };
+        best[b] = { *through, a };
       }
     }
-  }
-  std::vector<double> own;
-  own.reserve(arms.size());
-  for (const Arm& arm : arms)
-  {
-    own.push_back(arm.odds);
   }
   for (std::size_t a = 0; a < arms.size(); ++a)
   {
     const std::size_t b = best[a].other;
-    if (!(best[a].odds > 0.0) || best[b].other != a)
+    if (best[a].odds > 0.0 && best[b].other == a)
     {
-      continue;
-    }
-    Arm& arm = arms[a];
-    // However certain the other one is: that this is its continuation is another question.
-    const double together = best[a].odds + arm.evidence + std::min(0.0, own[b]);
-    if (together > arm.odds)
-    {
-      arm.odds = together;
-      arm.signs.oppositeGroupId = arms[b].signs.groupId;
-      arm.signs.bend = best[a].bend;
+      arms[a].through = best[a].odds;
+      arms[a].branch.oppositeGroupId = arms[b].branch.groupId;
     }
   }
 }
@@ -784,9 +792,9 @@ std::vector<VeinBranch> VeinFinder::Run()
   {
     if (std::optional<Arm> one = this->Describe(b))
     {
-      if (std::isfinite(one->error) && one->error > 0.0)
+      if (one->error > 0.0)
       {
-        steps.push_back(one->signs.brightness);
+        steps.push_back(one->brightness);
       }
       arms.push_back(std::move(*one));
     }
@@ -803,37 +811,41 @@ std::vector<VeinBranch> VeinFinder::Run()
     }
     this->Natural = std::max(this->Natural, 1.4826 * MedianOf(off));
   }
+  this->FindOpposites(arms);
+  std::vector<VeinBranch> branches;
   for (Arm& arm : arms)
   {
     this->Weigh(arm);
-  }
-  this->FindOpposites(arms);
-  std::vector<VeinBranch> veins;
-  for (Arm& arm : arms)
-  {
-    if (arm.odds < 0.0)
-    {
-      continue;
-    }
-    VeinBranch& vein = arm.signs;
-    vein.probability = 1.0 / (1.0 + std::exp(-arm.odds));
+    VeinBranch& branch = arm.branch;
     // What ends as wide as a vein is one to its end; else an artery may have been entered through it.
-    const double close = vein.blunt > 0.35 ? arm.course.back().passed
-                                           : std::min(arm.course.back().passed, CloseLength);
+    const double close = arm.blunt > 0.35 ? Far : std::min(arm.course.back().passed, CloseLength);
     for (const Step& step : arm.course)
     {
-      if (vein.closed.empty() || step.passed <= close)
+      branch.course.push_back(static_cast<std::int64_t>(step.point));
+      if (branch.closed.empty() || step.passed <= close)
       {
-        vein.closed.push_back(static_cast<std::int64_t>(step.point));
+        branch.closed.push_back(static_cast<std::int64_t>(step.point));
       }
     }
-    veins.push_back(std::move(vein));
+    branches.push_back(std::move(branch));
   }
-  return veins;
+  return branches;
 }
 }
 
-std::vector<VeinBranch> FindVeins(const CenterlineTree& tree, const ImageInterpolator& image,
+const std::array<const char*, NumberOfVeinSigns>& VeinSignNames()
+{
+  static const std::array<const char*, NumberOfVeinSigns> names = []
+  {
+    std::array<const char*, NumberOfVeinSigns> all{};
+    std::transform(
+      Signs.begin(), Signs.end(), all.begin(), [](const Sign& sign) { return sign.name; });
+    return all;
+  }();
+  return names;
+}
+
+std::vector<VeinBranch> JudgeBranches(const CenterlineTree& tree, const ImageInterpolator& image,
   const LumenReference& reference, double blur)
 {
   return VeinFinder(tree, image, reference, blur).Run();

@@ -5,7 +5,8 @@
  * Veins cross arteries instead of leaving them: where one touches, a tube goes through. They widen towards the heart
  * while arteries taper away from it, end as wide as they are (where another way into them was shorter) while arteries end
  * thin, leave in any direction while arteries leave with the flow, run beside an artery, and mostly hold less
- * contrast medium. No single sign decides: each adds to the odds, measured against how the tree's own branches vary.
+ * contrast medium. No single sign decides: each adds to the odds, measured against how the tree's own branches vary, with
+ * a weight fitted to phantoms (scripts/fit-veins.py).
  */
 #ifndef DynamicCoronary_VeinRejection_h
 #define DynamicCoronary_VeinRejection_h
@@ -13,39 +14,37 @@
 #include "CenterlineTree.h"
 #include "LumenMeasurement.h"
 
-#include <limits>
-#include <string>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace coronary
 {
+/// What the odds that a branch is a vein are made of, each in a range where its logarithmic odds are about linear.
+constexpr std::size_t NumberOfVeinSigns = 16;
+const std::array<const char*, NumberOfVeinSigns>& VeinSignNames();
+
 struct VeinBranch
 {
-  int groupId = -1; ///< of the branch where the vein begins
+  int groupId = -1; ///< of the branch where it begins
   int oppositeGroupId =
-    -1; ///< of the branch in which it goes on at the artery's other side, -1 none
-  double probability = 0.0; ///< 0 to 1
-  double brightness = 0.0;  ///< step from the artery, share of the contrast, negative: darker
-  double calibre = 1.0;     ///< radius over the greatest of the artery before it
-  double growth = 1.0; ///< radius at its end over the larger of that at its begin and the artery's
-  double taper =
-    0.0; ///< logarithm of its radius over that half of its length before, where that grows least; NaN not known
-  double blunt = 0.0;   ///< logarithm of the radius at its tip over what tips of the tree have
-  double takeOff = 0.0; ///< angle to the flow in the artery before, rad
-  double bend =
-    0.0; ///< of the tube through the artery to the opposite branch, rad; if there is one
-  double beside = 0.0;              ///< share of its length beside an artery
-  std::vector<std::int64_t> closed; ///< points from its begin on that are the vein's for certain
+    -1; ///< of the branch in which it seems to go on at the artery's other side, -1 none
+  double probability = 0.0; ///< of a vein, 0 to 1
+  bool known = false;       ///< nothing before it was bridged: all signs could be measured
+  std::array<double, NumberOfVeinSigns> signs{};
+  std::vector<std::int64_t> course; ///< points from its begin on, 40 mm straight on
+  std::vector<std::int64_t> closed; ///< of these, what is the vein's for certain, if it is one
 };
 
 /**
  * @param tree       split; radii in mm
  * @param reference  what a lumen and its surroundings look like
  * @param blur       of the image, standard deviation in mm
- * @returns the branches with a probability of a half or more, a parent before its daughters
+ * @returns the branches of 8 mm and more that leave another one, a parent before its daughters
  * @throws std::invalid_argument as CheckTree
  */
-std::vector<VeinBranch> FindVeins(const CenterlineTree& tree, const ImageInterpolator& image,
+std::vector<VeinBranch> JudgeBranches(const CenterlineTree& tree, const ImageInterpolator& image,
   const LumenReference& reference, double blur);
 }
 

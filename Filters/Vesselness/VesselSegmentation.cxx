@@ -2,6 +2,7 @@
 
 #include "BlockValues.h"
 #include "DistanceTransform.h"
+#include "Median.h"
 #include "SlicePieces.h"
 #include "SparseVoxels.h"
 #include "VesselLinking.h"
@@ -83,6 +84,7 @@ private:
   BloodWindow MeasureWindow(const std::vector<std::array<int, 3>>& places) const;
   double MeasureTubular(const std::vector<std::array<int, 3>>& places) const;
   void FindBodies(const ProgressCallback& progress);
+  void FindNoisyBodies(const ProgressCallback& progress);
   void Collect(const std::vector<VesselSeed>& seeds, const std::vector<std::array<int, 3>>& places,
     const ProgressCallback& progress);
   void CutLeakage();
@@ -295,6 +297,100 @@ void Segmentation<T>::FindBodies(const ProgressCallback& progress)
       }
     },
     Part(progress, 0.9, 1.0));
+}
+
+/// A chamber that is dimmer than the arteries, in much noise: so many of its voxels look like vessel that they hang
+/// together, though no ball is full of them. Means tell it.
+template <typename T>
+void Segmentation<T>::FindNoisyBodies(const ProgressCallback& progress)
+{
+  constexpr double cellSize = 2.0; // mm
+  // A tenth of all voxels exceeds the mean by so many standard deviations; as many hang together in a lattice of 26
+  // neighbours (site percolation: 0.098, Kurzawski and Malarz, Rep. Math. Phys. 70, 2012).
+  constexpr double exceeded = 1.28;
+  constexpr double surelyBlood = 0.7;
+  std::array<int, 3> factor{};
+  std::array<int, 3> cells{};
+  Vector3 spacing;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    factor[axis] = std::max(1, static_cast<int>(std::lround(cellSize / this->L.Spacing[axis])));
+    cells[axis] = (this->L.Size[axis] + factor[axis] - 1) / factor[axis];
+    spacing[axis] = this->L.Spacing[axis] * factor[axis];
+  }
+  const auto cellOf = [&](int i, int j, int k)
+  {
+    return (static_cast<std::size_t>(k / factor[2]) * cells[1] + j / factor[1]) * cells[0] +
+      i / factor[0];
+  };
+  const std::size_t count = static_cast<std::size_t>(cells[0]) * cells[1] * cells[2];
+  std::vector<float> means(count, 0.0f);
+  std::vector<float> deviations(count, 0.0f);
+  std::vector<int> counts(count, 0);
+  ParallelFor(
+    cells[2], 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      const int end = std::min(this->L.Size[2], static_cast<int>(last) * factor[2]);
+      for (int k = static_cast<int>(first) * factor[2]; k < end; ++k)
+      {
+        for (int j = 0; j < this->L.Size[1]; ++j)
+        {
+          for (int i = 0; i < this->L.Size[0]; ++i)
+          {
+            const float share = this->Share(this->L.Index(i, j, k));
+            if (std::isfinite(share))
+            {
+              const std::size_t cell = cellOf(i, j, k);
+              means[cell] += share;
+              deviations[cell] += share * share;
+              ++counts[cell];
+            }
+          }
+        }
+      }
+    },
+    Part(progress, 0.0, 0.5));
+  std::vector<double> noises;
+  for (std::size_t c = 0; c < count; ++c)
+  {
+    const auto n = static_cast<float>(std::max(1, counts[c]));
+    means[c] /= n;
+    deviations[c] = std::sqrt(std::max(0.0f, deviations[c] / n - means[c] * means[c]));
+    if (counts[c] > 1 && means[c] > surelyBlood)
+    {
+      noises.push_back(deviations[c]);
+    }
+  }
+  const double weakShare = 0.3 + 0.45 * this->Settings.weak;
+  const double least = weakShare - exceeded * MedianOf(std::move(noises));
+  if (least >= 0.5)
+  {
+    return; // FindBodies() has them
+  }
+  std::vector<unsigned char> bright(count);
+  for (std::size_t c = 0; c < count; ++c)
+  {
+    bright[c] = means[c] > least ? 1 : 0;
+  }
+  // Vessels fill cells only in part: half a cell more is surely none.
+  std::vector<unsigned char> body = OpenWithBall(bright.data(), cells, spacing,
+    this->Settings.largestRadius + 0.5 * spacing.maxCoeff(), Part(progress, 0.5, 1.0));
+  for (int k = 0; k < this->L.Size[2]; ++k)
+  {
+    for (int j = 0; j < this->L.Size[1]; ++j)
+    {
+      for (int i = 0; i < this->L.Size[0]; ++i)
+      {
+        // A vessel on its surface may share a cell with it.
+        const std::int64_t p = this->L.Index(i, j, k);
+        if (body[cellOf(i, j, k)] != 0 && !(this->Vesselness[p] >= this->Tubular))
+        {
+          this->States[p] = Body;
+        }
+      }
+    }
+  }
 }
 
 template <typename T>
@@ -1072,7 +1168,8 @@ VesselSegmentationResult Segmentation<T>::Run(
   this->InverseTubular = 1.0f / this->Tubular;
   result.tubular = this->Tubular;
 
-  this->FindBodies(Part(progress, 0.0, 0.3));
+  this->FindBodies(Part(progress, 0.0, 0.2));
+  this->FindNoisyBodies(Part(progress, 0.2, 0.3));
   this->Collect(seeds, places, Part(progress, 0.3, 0.5));
   result.seedVolume.assign(seeds.size(), 0.0);
   this->CutLeakage();
