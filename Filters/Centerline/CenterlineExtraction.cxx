@@ -267,6 +267,7 @@ private:
   void SmoothRadii(Course& course) const;
   void Calibrate(const Course& course);
   void CorrectRadii();
+  bool IsExcludedAt(const Vector3& point) const;
   bool IsExcluded(const std::vector<Vector3>& points) const;
   void SettleOstia();
   void MarkCrossings(Course& course) const;
@@ -1621,6 +1622,14 @@ bool Extractor::ThinBranchesFor(ThinBranchSettings& settings) const
   return true;
 }
 
+bool Extractor::IsExcludedAt(const Vector3& point) const
+{
+  const Vector3 index = this->ToIndex(point);
+  return !this->Excluded.empty() && this->InImage(index) &&
+    this->Excluded[this->Offset(static_cast<int>(std::lround(index[0])),
+      static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])))] != 0;
+}
+
 /// Whether a way leads into what is known to be no artery: for a quarter of it.
 bool Extractor::IsExcluded(const std::vector<Vector3>& points) const
 {
@@ -1632,10 +1641,7 @@ bool Extractor::IsExcluded(const std::vector<Vector3>& points) const
   double length = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i)
   {
-    const Vector3 index = this->ToIndex(points[i]);
-    if (this->InImage(index) &&
-      this->Excluded[this->Offset(static_cast<int>(std::lround(index[0])),
-        static_cast<int>(std::lround(index[1])), static_cast<int>(std::lround(index[2])))] != 0)
+    if (this->IsExcludedAt(points[i]))
     {
       ++inside;
       length += i > 0 ? (points[i] - points[i - 1]).norm() : 0.0;
@@ -1654,7 +1660,9 @@ bool Extractor::ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<R
   }
   const CenterlineTree& tree = this->Result.tree;
   std::vector<VeinBranch> found;
-  for (VeinBranch& branch : JudgeBranches(tree, *this->Image, this->Lumen.reference, this->Blur))
+  const auto closedBefore = [&](const Vector3& point) { return this->IsExcludedAt(point); };
+  for (VeinBranch& branch :
+    JudgeBranches(tree, *this->Image, this->Lumen.reference, this->Blur, closedBefore))
   {
     judged.push_back({ {}, branch });
     for (const std::int64_t point : branch.course)

@@ -1,5 +1,6 @@
 #include "VeinRejection.h"
 
+#include "FittedOdds.h"
 #include "Median.h"
 
 #include <algorithm>
@@ -22,6 +23,7 @@ constexpr double LeastRadius = 2.0; ///< blurs: thinner lumens are darker for th
 constexpr double Straight = 6.0;    ///< mm along which a direction is measured
 /// Few branches touch by chance: 3 in 100. Behind a lesion it is the chance that what was linked is none of the tree.
 constexpr double Prior = -3.5;
+constexpr double CutReach = 1.0;     ///< mm beyond a tip's wall
 constexpr double Accompanied = 20.0; ///< mm beside an artery: as much as more
 /// Bend of a vessel over the breadth of another one, and of the measured directions, rad; against directions at random
 /// this tells a tube that goes through from two branches that face each other.
@@ -35,30 +37,26 @@ constexpr double LongestStem = 4.0;
 /// mm of a vein that are closed, at least: more than what is looked for beyond a tip.
 constexpr double CloseLength = 12.0;
 
-/// Logarithmic odds a unit of each sign adds. Fitted by scripts/fit-veins.py to the branches of PHANTOMS.
-struct Sign
-{
-  const char* name;
-  double weight;
-};
-constexpr double Intercept = -5.01;
-constexpr std::array<Sign, NumberOfVeinSigns> Signs{ {
-  { "darker", 0.43 },
-  { "brighter", 1.04 },
-  { "darker_beside", 2.34 },
-  { "brighter_beside", 1.58 },
-  { "beside", 3.43 },
-  { "beside_unclear", 0.37 },
-  { "thinner", 1.47 },
+/// Fitted to the branches of phantoms (scripts/fit-odds.sh).
+constexpr double Intercept = -4.59;
+constexpr std::array<FittedSign, NumberOfVeinSigns> Signs{ {
+  { "darker", 0.67 },
+  { "brighter", 0.74 },
+  { "darker_beside", 2.22 },
+  { "brighter_beside", 1.21 },
+  { "beside", 2.37 },
+  { "beside_unclear", 0.68 },
+  { "thinner", 0.76 },
   { "taper", 2.75 },
-  { "strong_taper", 0.96 },
-  { "no_taper", 0.99 },
-  { "blunt_goes_on", 5.25 },
-  { "blunt", 5.46 },
-  { "backwards", 1.30 },
-  { "through", 1.30 },
-  { "short", 2.39 },
-  { "no_brightness", -0.20 },
+  { "strong_taper", 1.07 },
+  { "no_taper", 1.03 },
+  { "blunt_goes_on", 2.88 },
+  { "blunt_cut", 3.40 },
+  { "blunt", 3.78 },
+  { "backwards", 1.42 },
+  { "through", 0.81 },
+  { "short", 2.38 },
+  { "no_brightness", -0.84 },
 } };
 
 /// Standard deviation of a median by noise: samples within about 1 mm are not independent.
@@ -92,9 +90,10 @@ class VeinFinder
 {
 public:
   VeinFinder(const CenterlineTree& tree, const ImageInterpolator& image,
-    const LumenReference& reference, double blur)
+    const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
     : Tree(tree)
     , Image(image)
+    , Closed(closed)
     , Blur(blur)
     , Contrast(reference.lumen - reference.background)
   {
@@ -158,6 +157,7 @@ private:
     double takeOff = 0.0; ///< angle to the flow in the artery before, rad
     double through = 0.0; ///< odds that it goes on at the artery's other side, as a logarithm
     double doubt = 0.0;   ///< odds of a vein that a link before it adds, as a logarithm
+    bool cut = false;     ///< it ends where a vein was closed, in an earlier round
     bool goesOn = false;  ///< there is as much blood ahead of its tip
   };
   /// What leaves the place where two arms begin, seen from there.
@@ -179,14 +179,16 @@ private:
   {
     return this->Tree.points[static_cast<std::size_t>(point)];
   }
-  Course Down(std::size_t branch, double reach) const;
+  Course Down(std::size_t branch, double reach, std::vector<double>* forks = nullptr) const;
   Course Up(std::size_t branch, double reach) const;
   std::vector<double> Values(const std::vector<double>& of, const Course& run, double from) const;
   std::vector<double> Radii(const Course& run, double from, double to) const;
   double TipRadius(const Course& course) const;
   bool GoesOn(const Course& course) const;
+  bool IsCut(const Course& course) const;
   void Beside(Arm& arm) const;
-  std::optional<Arm> Describe(std::size_t branch) const;
+  std::optional<Arm> Describe(std::size_t branch, double reach) const;
+  double VeinBegin(const Arm& arm) const;
   void Weigh(Arm& arm) const;
   std::optional<Place> Between(std::size_t a, std::size_t b) const;
   std::optional<Side> SideOf(const Course& course, const Place& place) const;
@@ -195,6 +197,7 @@ private:
 
   const CenterlineTree& Tree;
   const ImageInterpolator& Image;
+  const std::function<bool(const Vector3&)>& Closed;
   double Blur;
   double Contrast;
   double UsualTip = 0.0; ///< logarithm of the radius
@@ -208,7 +211,9 @@ private:
 };
 
 /// A branch and those that go straight on.
-VeinFinder::Course VeinFinder::Down(std::size_t branch, double reach) const
+/// @param forks  gets the mm at which it parts, if wanted
+VeinFinder::Course VeinFinder::Down(
+  std::size_t branch, double reach, std::vector<double>* forks) const
 {
   Course run;
   double passed = 0.0;
@@ -227,6 +232,10 @@ VeinFinder::Course VeinFinder::Down(std::size_t branch, double reach) const
     if (this->Daughters[branch].empty())
     {
       return run;
+    }
+    if (forks != nullptr)
+    {
+      forks->push_back(passed);
     }
     constexpr std::size_t chord = 8;
     const Vector3 ahead = (this->At(points.back()) -
@@ -337,6 +346,30 @@ bool VeinFinder::GoesOn(const Course& course) const
   return std::abs(step) < 0.2;
 }
 
+/// Whether a course ends where something was closed.
+bool VeinFinder::IsCut(const Course& course) const
+{
+  if (!this->Closed)
+  {
+    return false;
+  }
+  const double reach = this->TipRadius(course) + CutReach;
+  const Vector3& tip = this->Tree.points[course.back().point];
+  for (int direction = 0; direction < 27; ++direction)
+  {
+    const Vector3 way =
+      Vector3(direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1).normalized();
+    for (double s = 0.0; direction != 13 && s <= reach; s += 0.5)
+    {
+      if (this->Closed(tip + s * way))
+      {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 /// Millimetres of a course within 3 mm of the wall of a vessel that it does not come from or give off there, and how much
 /// brighter it is than that, side by side.
 void VeinFinder::Beside(Arm& arm) const
@@ -405,10 +438,11 @@ void VeinFinder::Beside(Arm& arm) const
   }
 }
 
-std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
+/// @param reach  mm of its course; where that is less than Far it goes on, and has no tip
+std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch, double reach) const
 {
   Arm arm;
-  arm.course = this->Down(branch, Far);
+  arm.course = this->Down(branch, reach);
   const Course& down = arm.course;
   const Course up = this->Up(branch, Near);
   if (down.empty() || up.empty() || down.back().passed < LeastLength)
@@ -464,10 +498,11 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch) const
   }
   const Vector3& tip = this->Tree.points[down.back().point];
   const Vector3& before = this->Tree.points[down[down.size() > 8 ? down.size() - 9 : 0].point];
-  if (length <= Far && this->Image.Contains(tip + 2.0 * (tip - before)))
+  if (reach >= Far && length <= Far && this->Image.Contains(tip + 2.0 * (tip - before)))
   {
     arm.blunt = std::log(this->TipRadius(down)) - this->UsualTip;
-    arm.goesOn = this->GoesOn(down);
+    arm.cut = this->IsCut(down);
+    arm.goesOn = !arm.cut && this->GoesOn(down);
   }
   // Directions of the flow before, and of what leaves.
   const auto within = [](const Course& run, double passed)
@@ -512,18 +547,15 @@ void VeinFinder::Weigh(Arm& arm) const
     tapers ? std::clamp(arm.taper + 0.5, -1.0, 0.0) : 0.0,
     tapers ? 0.0 : 1.0,
     arm.goesOn ? blunt : 0.0,
-    arm.goesOn ? 0.0 : blunt,
+    arm.cut ? blunt : 0.0,
+    arm.goesOn || arm.cut ? 0.0 : blunt,
     std::clamp(arm.takeOff - 1.8, 0.0, 1.0),
     std::clamp(arm.through, 0.0, 6.0),
     std::max(0.0, 20.0 - arm.course.back().passed) / 20.0,
     known ? 0.0 : 1.0,
   };
-  double odds = Intercept + arm.doubt;
-  for (std::size_t n = 0; n < NumberOfVeinSigns; ++n)
-  {
-    odds += Signs[n].weight * arm.branch.signs[n];
-  }
-  arm.branch.probability = 1.0 / (1.0 + std::exp(-odds));
+  arm.branch.probability =
+    ProbabilityOf(arm.doubt + FittedOdds(Intercept, Signs, arm.branch.signs));
 }
 
 /// The artery between the begins of two branches, which goes on there.
@@ -784,13 +816,37 @@ void VeinFinder::FindOpposites(std::vector<Arm>& arms) const
   }
 }
 
+/// mm at which an arm becomes a vein: what is judged as one may be an artery up to where the vein touches it.
+double VeinFinder::VeinBegin(const Arm& arm) const
+{
+  const std::size_t branch = this->Index.at(arm.branch.groupId);
+  std::vector<double> forks;
+  this->Down(branch, Far, &forks);
+  double begin = 0.0;
+  for (const double fork : forks)
+  {
+    std::optional<Arm> stem = this->Describe(branch, fork);
+    if (!stem || fork >= Far)
+    {
+      continue;
+    }
+    this->Weigh(*stem);
+    if (stem->branch.probability >= 0.5)
+    {
+      break;
+    }
+    begin = fork;
+  }
+  return begin;
+}
+
 std::vector<VeinBranch> VeinFinder::Run()
 {
   std::vector<Arm> arms;
   std::vector<double> steps;
   for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
   {
-    if (std::optional<Arm> one = this->Describe(b))
+    if (std::optional<Arm> one = this->Describe(b, Far))
     {
       if (one->error > 0.0)
       {
@@ -818,11 +874,12 @@ std::vector<VeinBranch> VeinFinder::Run()
     this->Weigh(arm);
     VeinBranch& branch = arm.branch;
     // What ends as wide as a vein is one to its end; else an artery may have been entered through it.
-    const double close = arm.blunt > 0.35 ? Far : std::min(arm.course.back().passed, CloseLength);
+    const double begin = branch.probability >= 0.5 ? this->VeinBegin(arm) : 0.0;
+    const double end = arm.blunt > 0.35 ? 2.0 * Far : begin + CloseLength;
     for (const Step& step : arm.course)
     {
       branch.course.push_back(static_cast<std::int64_t>(step.point));
-      if (branch.closed.empty() || step.passed <= close)
+      if (step.passed > begin && (branch.closed.empty() || step.passed <= end))
       {
         branch.closed.push_back(static_cast<std::int64_t>(step.point));
       }
@@ -835,19 +892,13 @@ std::vector<VeinBranch> VeinFinder::Run()
 
 const std::array<const char*, NumberOfVeinSigns>& VeinSignNames()
 {
-  static const std::array<const char*, NumberOfVeinSigns> names = []
-  {
-    std::array<const char*, NumberOfVeinSigns> all{};
-    std::transform(
-      Signs.begin(), Signs.end(), all.begin(), [](const Sign& sign) { return sign.name; });
-    return all;
-  }();
+  static const std::array<const char*, NumberOfVeinSigns> names = NamesOf(Signs);
   return names;
 }
 
 std::vector<VeinBranch> JudgeBranches(const CenterlineTree& tree, const ImageInterpolator& image,
-  const LumenReference& reference, double blur)
+  const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
 {
-  return VeinFinder(tree, image, reference, blur).Run();
+  return VeinFinder(tree, image, reference, blur, closed).Run();
 }
 }

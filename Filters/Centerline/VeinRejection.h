@@ -6,7 +6,7 @@
  * while arteries taper away from it, end as wide as they are (where another way into them was shorter) while arteries end
  * thin, leave in any direction while arteries leave with the flow, run beside an artery, and mostly hold less
  * contrast medium. No single sign decides: each adds to the odds, measured against how the tree's own branches vary, with
- * a weight fitted to phantoms (scripts/fit-veins.py).
+ * a weight fitted to phantoms (scripts/fit-odds.sh).
  */
 #ifndef DynamicCoronary_VeinRejection_h
 #define DynamicCoronary_VeinRejection_h
@@ -17,12 +17,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace coronary
 {
 /// What the odds that a branch is a vein are made of, each in a range where its logarithmic odds are about linear.
-constexpr std::size_t NumberOfVeinSigns = 16;
+constexpr std::size_t NumberOfVeinSigns = 17;
 const std::array<const char*, NumberOfVeinSigns>& VeinSignNames();
 
 struct VeinBranch
@@ -41,11 +42,13 @@ struct VeinBranch
  * @param tree       split; radii in mm
  * @param reference  what a lumen and its surroundings look like
  * @param blur       of the image, standard deviation in mm
+ * @param closed     whether a place was closed before: a branch that ends there was cut; may be empty
  * @returns the branches of 8 mm and more that leave another one, a parent before its daughters
  * @throws std::invalid_argument as CheckTree
  */
 std::vector<VeinBranch> JudgeBranches(const CenterlineTree& tree, const ImageInterpolator& image,
-  const LumenReference& reference, double blur);
+  const LumenReference& reference, double blur,
+  const std::function<bool(const Vector3&)>& closed = {});
 }
 
 #endif

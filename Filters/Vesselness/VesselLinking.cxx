@@ -1,5 +1,7 @@
 #include "VesselLinking.h"
 
+#include "FittedOdds.h"
+#include "Median.h"
 #include "SparseVoxels.h"
 
 #include <algorithm>
@@ -28,6 +30,24 @@ constexpr double ShellEnd = 8.0;
 constexpr double WallGap = 8.0;  ///< mm: longest link to a wall
 constexpr double FreeGap = 12.0; ///< mm: longer ones need more than ends that point at each other
 
+/// Fitted to the links that came to mind in phantoms (scripts/fit-odds.sh).
+constexpr double Intercept = 1.35;
+constexpr std::array<FittedSign, NumberOfLinkSigns> Signs{ {
+  { "to_wall", -0.83 },
+  { "unseen", -1.27 },
+  { "long_unseen", -0.34 },
+  { "turn_of_piece", -0.54 },
+  { "turn_of_tree", -0.93 },
+  { "thinner", -1.28 },
+  { "wider", -0.77 },
+  { "length", 0.97 },
+  { "great_length", 0.44 },
+  { "darker", -0.80 },
+  { "darker_than_wall", -1.17 },
+  { "brighter", -1.02 },
+  { "clear", 0.93 },
+} };
+
 double Angle(const Vector3& a, const Vector3& b)
 {
   return std::acos(std::clamp(a.dot(b), -1.0, 1.0));
@@ -46,6 +66,7 @@ public:
 
   std::size_t Size() const { return this->Voxels.size(); }
   const std::vector<std::int64_t>& All() const { return this->Voxels; }
+  bool Has(std::int64_t voxel) const { return this->Number.Get(this->L.Place(voxel)) >= 0; }
   std::int64_t Voxel(std::int32_t n) const { return this->Voxels[static_cast<std::size_t>(n)]; }
   Vector3 Position(std::int32_t n) const { return this->L.World(this->L.Place(this->Voxel(n))); }
 
@@ -178,8 +199,6 @@ private:
     VoxelPiece piece;
     double length = 0.0; ///< mm between its farthest ends
     std::vector<VesselEnd> ends;
-    std::vector<double>
-      growth; ///< of an end: how much wider the vessel becomes behind it, a factor; -1: not measured
   };
   /// What a piece was found to be: a round later most pieces are the same.
   struct Description
@@ -199,23 +218,31 @@ private:
   std::optional<VesselEnd> EndAt(const VoxelPiece& piece, std::int32_t number) const;
   std::vector<VesselEnd> EndsOf(
     const VoxelPiece& piece, const std::vector<VoxelPiece::Reached>& distances) const;
-  double Growth(const VoxelPiece& piece, const VesselEnd& end) const;
   std::optional<Orphan> Describe(std::vector<std::int64_t> voxels) const;
   void DescribeAll(std::vector<std::vector<std::int64_t>> pieces, const ProgressCallback& progress);
-  VesselLink BestLink(Orphan& orphan, const std::vector<VesselEnd>& tips) const;
+  std::vector<Vector3> Behind(const VoxelPiece& piece, const VesselEnd& end) const;
+  VesselLink BestLink(const Orphan& orphan, const std::vector<VesselEnd>& tips,
+    std::vector<ConsideredLink>& considered) const;
   float Evidence(std::int64_t voxel) const;
   float Price(std::int64_t voxel) const;
   bool Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target, double within,
     VesselLink& link) const;
   bool Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const;
   double RadiusByVolume(const Vector3& place) const;
-  double Judge(const Orphan& orphan, std::size_t end, const VesselEnd* tip, VesselLink& link) const;
+  template <typename Use>
+  double BrightShare(const Vector3& place, double reach, const Use& use) const;
+  void Describe(
+    const Orphan& orphan, std::size_t number, const VesselEnd* tip, VesselLink& link) const;
+  static double Judge(const VesselLink& link, const VesselEnd* tip);
 
   const LinkingImage& I;
   const VoxelLattice& L;
   const LinkingSettings& Settings;
   LumenSettings Lumen;
   std::map<std::int64_t, Description> Described; ///< by the pieces' first voxels
+
+public:
+  std::vector<ConsideredLink> Considered; ///< by the last run
 };
 
 /// Connected voxels that look like vessel around the tree, and are none of it.
@@ -441,52 +468,6 @@ std::vector<VesselEnd> Linker::EndsOf(
   return ends;
 }
 
-/// How much wider the vessel is 10 to 40 mm behind an end: veins widen towards the heart, arteries do not
-/// widen away from it.
-double Linker::Growth(const VoxelPiece& piece, const VesselEnd& end) const
-{
-  const std::vector<VoxelPiece::Reached> reached = piece.Around(end.number, 45.0F);
-  std::vector<std::int32_t> way;
-  for (auto at = static_cast<std::int32_t>(reached.size()) - 1; at >= 0;
-       at = reached[static_cast<std::size_t>(at)].before)
-  {
-    way.push_back(reached[static_cast<std::size_t>(at)].number);
-  }
-  std::reverse(way.begin(), way.end());
-  std::vector<double> near;
-  std::vector<double> far;
-  const std::size_t chord = 4;
-  double along = 0.0;
-  for (std::size_t n = 1; n < way.size(); ++n)
-  {
-    along += (piece.Position(way[n]) - piece.Position(way[n - 1])).norm();
-    if (n % 2 != 0 || n < chord || n + chord >= way.size())
-    {
-      continue;
-    }
-    const Vector3 tangent =
-      (piece.Position(way[n + chord]) - piece.Position(way[n - chord])).normalized();
-    const LumenSection section = MeasureLumen(this->I.image, piece.Position(way[n]), tangent,
-      2.0 * std::cbrt(this->L.VoxelVolume()), this->Lumen);
-    if (section.confidence > 0.6)
-    {
-      (along < 8.0 ? near : far).push_back(section.radius);
-    }
-  }
-  if (near.size() < 3 || far.size() < 5)
-  {
-    return 1.0;
-  }
-  const auto upper = [](std::vector<double>& values, double quantile)
-  {
-    const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(quantile * static_cast<double>(values.size()));
-    std::nth_element(values.begin(), place, values.end());
-    return *place;
-  };
-  return upper(far, 0.8) / std::max(0.1, upper(near, 0.8));
-}
-
 std::optional<Linker::Orphan> Linker::Describe(std::vector<std::int64_t> voxels) const
 {
   if (this->InLung(voxels))
@@ -494,7 +475,7 @@ std::optional<Linker::Orphan> Linker::Describe(std::vector<std::int64_t> voxels)
     return std::nullopt;
   }
   const double volume = static_cast<double>(voxels.size()) * this->L.VoxelVolume();
-  Orphan orphan{ VoxelPiece(this->L, std::move(voxels)), 0.0, {}, {} };
+  Orphan orphan{ VoxelPiece(this->L, std::move(voxels)), 0.0, {} };
   const std::int32_t first = orphan.piece.Around(0, Unreached).back().number;
   const std::vector<VoxelPiece::Reached> distances = orphan.piece.Around(first, Unreached);
   orphan.length = distances.back().distance;
@@ -703,9 +684,30 @@ double Linker::RadiusByVolume(const Vector3& place) const
   return std::sqrt(count * this->L.VoxelVolume() / (2.0 * reach * M_PI));
 }
 
-/// The odds for a link, as a logarithm.
+/// Share of the contrast that the brightest quarter of some voxels near a place has; 0 without any.
+template <typename Use>
+double Linker::BrightShare(const Vector3& place, double reach, const Use& use) const
+{
+  const std::optional<std::array<int, 3>> at = this->L.Nearest(place);
+  if (!at)
+  {
+    return 0.0;
+  }
+  std::vector<double> shares;
+  this->L.Ball(*at, reach,
+    [&](std::int64_t voxel, const std::array<int, 3>&)
+    {
+      if (use(voxel))
+      {
+        shares.push_back(this->I.share(voxel));
+      }
+    });
+  return QuantileOf(std::move(shares), 0.75);
+}
+
+/// Fills the link's signs and what they are made of.
 /// @param tip  of the tree; null for its wall
-double Linker::Judge(
+void Linker::Describe(
   const Orphan& orphan, std::size_t number, const VesselEnd* tip, VesselLink& link) const
 {
   const VesselEnd& end = orphan.ends[number];
@@ -714,62 +716,63 @@ double Linker::Judge(
   // Over a short gap the chord says nothing.
   const double chordWeight = std::min(1.0, gap / 4.0);
   const Vector3 chord = gap > 0.0 ? Vector3((from - end.position) / gap) : end.outwards;
-  double odds = 2.2;
-  const auto turn = [&](double angle, double scale) { return (angle / scale) * (angle / scale); };
-  odds -= chordWeight * turn(Angle(end.outwards, chord), 0.7);
-  if (tip != nullptr)
-  {
-    odds -= chordWeight * turn(Angle(tip->outwards, -chord), 0.7);
-    odds -= turn(Angle(tip->outwards, -end.outwards), 1.0);
-  }
-  else
-  {
-    odds -= 0.5;
-  }
-  odds -= link.unseen / 6.0;
-  odds -= std::max(0.0, link.unseen - FreeGap) / 8.0;
+  constexpr double greatestTurn = 6.0;
+  const auto turn = [&](double angle, double scale)
+  { return std::min(greatestTurn, (angle / scale) * (angle / scale)); };
   const bool root = tip != nullptr && tip->root > 0.0;
   link.radiusBefore =
     tip != nullptr && (tip->radius > 0.0 || root) ? tip->radius : this->RadiusByVolume(from);
+  link.radiusBehind = end.radius;
+  link.pieceLength = orphan.length;
   // A piece that is thick on the whole is no vessel that begins thin; side branches add to its volume.
   const double thick = 0.6 *
     std::sqrt(
       static_cast<double>(orphan.piece.Size()) * this->L.VoxelVolume() / (M_PI * orphan.length));
-  const double behind = std::max(end.radius, thick);
-  if (link.radiusBefore > 0.0)
+  const double wider = link.radiusBefore > 0.0
+    ? std::log(std::max(1e-9, std::max(end.radius, thick)) / link.radiusBefore)
+    : 0.0;
+  // What is darker than the tree's vessel there is a vein; a root has no vessel to compare with.
+  const double brighter = root
+    ? 0.0
+    : this->BrightShare(end.position, 6.0, [&](std::int64_t v) { return orphan.piece.Has(v); }) -
+      this->BrightShare(from, 3.0, [&](std::int64_t v) { return this->I.inTree(v); });
+  double clearest = 1.0;
+  for (const Vector3& point : link.points)
   {
-    const double ratio = std::log(behind / link.radiusBefore);
-    odds -= std::max(0.0, -ratio - 0.7);
-    if (tip != nullptr)
+    if (const std::optional<std::array<int, 3>> at = this->L.Nearest(point))
     {
-      // The tip may lie in the lesion: then what follows is wider, but not twice as wide.
-      odds -= 2.0 * std::max(0.0, ratio - 0.25) + 5.0 * std::max(0.0, ratio - 0.45);
-      // Vessels taper: one that ends at full width goes on, and one that begins so comes from somewhere.
-      const double abrupt = std::min(end.radius, link.radiusBefore);
-      odds += 2.0 * std::clamp((abrupt - 0.6) / 0.6, 0.0, 1.0);
-    }
-    else
-    {
-      // A side branch is no wider than what it leaves.
-      odds -= 5.0 * std::max(0.0, ratio - 0.1);
+      clearest = std::min(
+        clearest, static_cast<double>(this->I.tube(this->L.Index((*at)[0], (*at)[1], (*at)[2]))));
     }
   }
-  if (root)
+  const bool wall = tip == nullptr;
+  link.signs = {
+    wall ? 1.0 : 0.0,
+    link.unseen / 6.0,
+    std::max(0.0, link.unseen - FreeGap) / 8.0,
+    chordWeight * turn(Angle(end.outwards, chord), 0.7),
+    wall ? 0.0 : chordWeight * turn(Angle(tip->outwards, -chord), 0.7),
+    std::max(0.0, -wider - 0.7),
+    // The tip may lie in the lesion: then what follows is wider, but not twice as wide.
+    wall ? 0.0 : std::max(0.0, wider - 0.25),
+    std::min(1.0, (orphan.length - 15.0) / 15.0),
+    std::clamp((orphan.length - 30.0) / 30.0, 0.0, 3.0),
+    wall ? 0.0 : std::max(0.0, -brighter - 0.1),
+    wall ? std::max(0.0, -brighter - 0.1) : 0.0,
+    std::max(0.0, brighter - 0.1),
+    clearest,
+  };
+}
+
+/// The odds for a link, as a logarithm.
+double Linker::Judge(const VesselLink& link, const VesselEnd* tip)
+{
+  double odds = FittedOdds(Intercept, Signs, link.signs);
+  if (tip != nullptr && tip->root > 0.0)
   {
     // What begins at full width right before the aorta comes from there.
-    odds += 2.0 * std::clamp((end.radius - 0.6) / 0.6, 0.0, 1.0);
+    odds += 2.0 * std::clamp((link.radiusBehind - 0.6) / 0.6, 0.0, 1.0);
   }
-  if (tip != nullptr)
-  {
-    const double brighter = end.lumen - tip->lumen;
-    odds -= 3.0 * std::max(0.0, brighter - 0.3) + 2.0 * std::max(0.0, -brighter - 0.5);
-    // What is wide enough to show its blood, and shows much less of it, is a vein.
-    odds -= end.radius > 0.8 ? 5.0 * std::max(0.0, -brighter - 0.3) : 0.0;
-  }
-  link.radiusBehind = end.radius;
-  link.pieceLength = orphan.length;
-  odds += std::min(1.0, (orphan.length - 15.0) / 15.0);
-  odds -= 4.0 * std::max(0.0, orphan.growth[number] - 1.15);
   return odds;
 }
 
@@ -807,7 +810,6 @@ void Linker::DescribeAll(
         if (orphan)
         {
           description->orphan = std::make_unique<Orphan>(std::move(*orphan));
-          description->orphan->growth.assign(description->orphan->ends.size(), -1.0);
         }
         else
         {
@@ -818,10 +820,27 @@ void Linker::DescribeAll(
     progress);
 }
 
+/// Places in the first 15 mm of a piece behind its end.
+std::vector<Vector3> Linker::Behind(const VoxelPiece& piece, const VesselEnd& end) const
+{
+  constexpr float reach = 15.0F; // mm
+  constexpr std::size_t stride = 7;
+  std::vector<Vector3> places;
+  const std::vector<VoxelPiece::Reached> reached = piece.Around(end.number, reach);
+  for (std::size_t n = 0; n < reached.size(); n += stride)
+  {
+    const std::int64_t voxel = piece.All()[static_cast<std::size_t>(reached[n].number)];
+    places.push_back(this->L.World(this->L.Place(voxel)));
+  }
+  return places;
+}
+
 /// The likeliest of the links from an orphan's ends to the tree; without any its confidence is 0.
-VesselLink Linker::BestLink(Orphan& orphan, const std::vector<VesselEnd>& tips) const
+VesselLink Linker::BestLink(const Orphan& orphan, const std::vector<VesselEnd>& tips,
+  std::vector<ConsideredLink>& considered) const
 {
   VesselLink best;
+  best.confidence = 0.0;
   double bestOdds = -std::numeric_limits<double>::infinity();
   for (std::size_t e = 0; e < orphan.ends.size(); ++e)
   {
@@ -841,11 +860,10 @@ VesselLink Linker::BestLink(Orphan& orphan, const std::vector<VesselEnd>& tips) 
       {
         return;
       }
-      if (orphan.growth[e] < 0.0)
-      {
-        orphan.growth[e] = this->Growth(orphan.piece, end);
-      }
-      const double odds = this->Judge(orphan, e, tip, link);
+      this->Describe(orphan, e, tip, link);
+      const double odds = Judge(link, tip);
+      link.confidence = ProbabilityOf(odds);
+      considered.push_back({ link, this->Behind(orphan.piece, end) });
       if (odds > bestOdds)
       {
         bestOdds = odds;
@@ -893,7 +911,6 @@ VesselLink Linker::BestLink(Orphan& orphan, const std::vector<VesselEnd>& tips) 
       consider(wall, 1.5, nullptr);
     }
   }
-  best.confidence = 1.0 / (1.0 + std::exp(-bestOdds));
   return best;
 }
 
@@ -933,17 +950,23 @@ std::vector<VesselLink> Linker::Run(
   }
 
   std::vector<VesselLink> best(orphans.size());
+  std::vector<std::vector<ConsideredLink>> considered(orphans.size());
   ParallelFor(
     static_cast<std::int64_t>(orphans.size()), 1,
     [&](std::int64_t first, std::int64_t last)
     {
       for (std::int64_t n = first; n < last; ++n)
       {
-        best[static_cast<std::size_t>(n)] =
-          this->BestLink(*orphans[static_cast<std::size_t>(n)], tips);
+        best[static_cast<std::size_t>(n)] = this->BestLink(
+          *orphans[static_cast<std::size_t>(n)], tips, considered[static_cast<std::size_t>(n)]);
       }
     },
     [&](double fraction) { return !progress || progress(0.5 + 0.5 * fraction); });
+  this->Considered.clear();
+  for (std::vector<ConsideredLink>& some : considered)
+  {
+    std::move(some.begin(), some.end(), std::back_inserter(this->Considered));
+  }
   std::vector<VesselLink> links;
   for (VesselLink& link : best)
   {
@@ -970,6 +993,17 @@ VesselLinker::VesselLinker(const LinkingImage& image, const LinkingSettings& set
 }
 
 VesselLinker::~VesselLinker() = default;
+
+std::vector<ConsideredLink> VesselLinker::TakeConsidered()
+{
+  return std::move(this->Data->linker.Considered);
+}
+
+const std::array<const char*, NumberOfLinkSigns>& LinkSignNames()
+{
+  static const std::array<const char*, NumberOfLinkSigns> names = NamesOf(Signs);
+  return names;
+}
 
 std::vector<VesselLink> VesselLinker::Find(
   const std::vector<std::pair<std::int64_t, float>>& tree, const ProgressCallback& progress)

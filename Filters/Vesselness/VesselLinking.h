@@ -6,7 +6,7 @@
  * tube that no seed reaches are described by their ends: where, in which direction, how wide, how
  * bright. An end is linked to an end of the tree, or to its wall, when both point at each other, calibre
  * and brightness fit, and the cheapest way between them does not lead through a chamber. Every link has a
- * confidence; docs/segmentation.md has what it is made of and how it was calibrated.
+ * confidence: the odds of its signs, with weights fitted to phantoms (scripts/fit-odds.sh).
  */
 #ifndef DynamicCoronary_VesselLinking_h
 #define DynamicCoronary_VesselLinking_h
@@ -16,12 +16,19 @@
 #include "VesselBridge.h"
 #include "VoxelLattice.h"
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <vector>
 
 namespace coronary
 {
+/// What the odds of a link are made of, each in a range where its logarithmic odds are about linear.
+constexpr std::size_t NumberOfLinkSigns = 13;
+const std::array<const char*, NumberOfLinkSigns>& LinkSignNames();
+
 /// A way across a place where no vessel is seen, or too little of it: from the tree to a piece.
 struct VesselLink : VesselBridge
 {
@@ -30,6 +37,14 @@ struct VesselLink : VesselBridge
   double radiusBehind = 0.0;        ///< mm, on the piece's side; 0 not known
   double pieceLength = 0.0;         ///< mm of vessel that hang on it, at least
   std::vector<std::int64_t> voxels; ///< numbers in the lattice, along the points
+  std::array<double, NumberOfLinkSigns> signs{};
+};
+
+/// A link that was thought of, made or not: what the weights of the signs are fitted to.
+struct ConsideredLink
+{
+  VesselLink link;
+  std::vector<Vector3> behind; ///< mm, places in the first 15 mm of the piece that it leads to
 };
 
 /// Where a tree is known to begin, and hardly anything is seen of it.
@@ -81,6 +96,9 @@ public:
    */
   std::vector<VesselLink> Find(
     const std::vector<std::pair<std::int64_t, float>>& tree, const ProgressCallback& progress = {});
+
+  /// All that the last Find() thought of.
+  std::vector<ConsideredLink> TakeConsidered();
 
 private:
   struct Work;

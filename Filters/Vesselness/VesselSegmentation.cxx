@@ -127,6 +127,7 @@ private:
   std::vector<Member> Members; ///< in order of their path length
   double Leakage = 0.0;        ///< mm^3
   std::vector<VesselLink> Links;
+  std::vector<ConsideredLink> Considered;
 };
 
 template <typename T>
@@ -735,6 +736,10 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
     }
     std::vector<VesselLink> links = linker.Find(
       tree, Part(progress, static_cast<double>(round) / rounds, (round + 1.0) / rounds));
+    for (ConsideredLink& link : linker.TakeConsidered())
+    {
+      this->Considered.push_back(std::move(link));
+    }
     // What was linked once and dropped again would be so in every round.
     links.erase(std::remove_if(links.begin(), links.end(),
                   [&](const VesselLink& link) { return refused.count(link.voxels.back()) != 0; }),
@@ -1208,6 +1213,7 @@ VesselSegmentationResult Segmentation<T>::Run(
   }
   result.mask = std::move(this->States);
   result.links = std::move(this->Links);
+  result.considered = std::move(this->Considered);
   if (probability)
   {
     // A filled hole is vessel; a dropped island is none.

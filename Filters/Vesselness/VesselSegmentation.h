@@ -68,6 +68,7 @@ struct VesselSegmentationResult
   std::vector<double> seedVolume;  ///< mm^3 that hang on each seed; 0: the seed reached nothing
   double leakageVolume = 0.0;      ///< mm^3 that step 3 dropped
   std::vector<VesselLink> links;   ///< ways across lesions that are part of the mask
+  std::vector<ConsideredLink> considered; ///< links that came to mind, made or not, round by round
 };
 
 /**

@@ -91,6 +91,19 @@ bool Counts(const PhantomTree& truth, const PhantomBranch& branch, std::size_t s
       branch.points.begin() + static_cast<std::ptrdiff_t>(step), branch.points.end(), wide);
 }
 
+bool IsOnArtery(const PhantomTree& truth, const Vector3& point)
+{
+  for (std::size_t q = 0; q < truth.points.size(); ++q)
+  {
+    const double reach = std::max(FoundWithin, truth.radius[q]);
+    if ((truth.points[q] - point).squaredNorm() <= reach * reach)
+    {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// Whether a segment belongs to a whole artery.
 bool Holds(const std::string& artery, int segment, int treeId)
 {
@@ -122,6 +135,26 @@ std::string Stretch::Text() const
     }
   }
   return text;
+}
+
+double ShareOnArteries(const PhantomTree& truth, const std::vector<Vector3>& line)
+{
+  double all = 0.0;
+  double on = 0.0;
+  for (std::size_t i = 1; i < line.size(); ++i)
+  {
+    const double length = (line[i] - line[i - 1]).norm();
+    all += length;
+    on += IsOnArtery(truth, line[i]) ? length : 0.0;
+  }
+  return all > 0.0 ? on / all : 0.0;
+}
+
+double ShareNearArteries(const PhantomTree& truth, const std::vector<Vector3>& places)
+{
+  const auto on = std::count_if(
+    places.begin(), places.end(), [&](const Vector3& place) { return IsOnArtery(truth, place); });
+  return places.empty() ? 0.0 : static_cast<double>(on) / static_cast<double>(places.size());
 }
 
 LengthComparison CompareLengths(const PhantomTree& truth, const CenterlineTree& tree)
@@ -162,13 +195,7 @@ LengthComparison CompareLengths(const PhantomTree& truth, const CenterlineTree& 
     for (std::size_t i = 1; i < branch.points.size(); ++i)
     {
       const std::int64_t p = branch.points[i];
-      bool right = false;
-      for (std::size_t q = 0; q < truth.points.size() && !right; ++q)
-      {
-        const double reach = std::max(FoundWithin, truth.radius[q]);
-        right = (truth.points[q] - tree.points[p]).squaredNorm() <= reach * reach;
-      }
-      if (!right)
+      if (!IsOnArtery(truth, tree.points[p]))
       {
         wrong.Add(branch.points[i - 1], p);
       }

@@ -42,6 +42,12 @@ struct LengthComparison
 /// The truth's and the result's lengths within a distance of each other.
 LengthComparison CompareLengths(const PhantomTree& truth, const CenterlineTree& tree);
 
+/// The share of a line, by length, that is artery.
+double ShareOnArteries(const PhantomTree& truth, const std::vector<Vector3>& line);
+
+/// The share of some places.
+double ShareNearArteries(const PhantomTree& truth, const std::vector<Vector3>& places);
+
 /// Something that a run says is wrong.
 struct Said
 {

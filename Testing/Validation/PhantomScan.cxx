@@ -119,6 +119,7 @@ PhantomScan ScanPhantom(const CoronaryPhantom& phantom, const ImageGrid& grid, d
   result.mask = std::move(segmentation.mask);
   result.window = segmentation.window;
   result.links = std::move(segmentation.links);
+  result.considered = std::move(segmentation.considered);
   AddSeconds(seconds, 1, ProcessorSeconds() - start);
   return result;
 }

@@ -30,6 +30,7 @@ struct PhantomScan
   std::string doubt;                  ///< of the search for the ostia; empty when it is sure
   BloodWindow window;
   std::vector<VesselLink> links;
+  std::vector<ConsideredLink> considered;
 
   /// The image as the algorithms take it, of `values`.
   ScalarImage Image() const;

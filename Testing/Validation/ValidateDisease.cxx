@@ -25,6 +25,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -103,7 +104,9 @@ struct Options
   bool surface = true;
   bool details = false;
   bool quick = false;
-  std::string lines; ///< folder
+  std::string lines;    ///< folder
+  std::string branches; ///< file
+  std::string links;    ///< file
 };
 
 struct Warned
@@ -128,6 +131,8 @@ struct Outcome
   std::vector<std::string> lesions;
   std::vector<Warned> warnings;
   std::vector<Stretch> untold;
+  std::string branches; ///< rows of the table of branches
+  std::string links;    ///< rows of the table of links
   double seconds = 0.0; ///< of processor time, with the picture and the truth
 
   bool HasToTell() const { return this->lengths.missed > LargestUntold; }
@@ -262,6 +267,48 @@ void CompareLesions(
   }
 }
 
+/// A row of what the weights of odds are fitted to: share that is artery, whether it is to be used, probability, place, signs.
+template <std::size_t N>
+std::string OddsRow(double artery, bool used, double probability, const Vector3& place,
+  const std::array<double, N>& signs)
+{
+  std::array<char, 80> text;
+  std::snprintf(text.data(), text.size(), "%.3f,%d,%.4f,%.1f,%.1f,%.1f", artery, used ? 1 : 0,
+    probability, place[0], place[1], place[2]);
+  std::string row = text.data();
+  for (const double sign : signs)
+  {
+    std::snprintf(text.data(), text.size(), ",%.4f", sign);
+    row += text.data();
+  }
+  return row + '\n';
+}
+
+/// What each branch was judged by, in every round.
+std::string BranchRows(const PhantomTree& truth, const std::vector<JudgedBranch>& judged)
+{
+  std::string rows;
+  for (const auto& [course, judgement] : judged)
+  {
+    rows += OddsRow(ShareOnArteries(truth, course), judgement.known, judgement.probability,
+      course.back(), judgement.signs);
+  }
+  return rows;
+}
+
+/// What each link was judged by, in every round: it is right when the way and what it leads to are artery.
+std::string LinkRows(const PhantomTree& truth, const std::vector<ConsideredLink>& considered)
+{
+  std::string rows;
+  for (const auto& [link, behind] : considered)
+  {
+    const double artery =
+      std::min(ShareOnArteries(truth, link.points), ShareNearArteries(truth, behind));
+    rows += OddsRow(artery, true, link.confidence, link.points.back(), link.signs);
+  }
+  return rows;
+}
+
 /// What there is a reason to warn of, apart from losses and extras.
 std::vector<Vector3> Troubles(const CoronaryPhantom& phantom, const PhantomScan& scan)
 {
@@ -363,6 +410,14 @@ Outcome Run(const Condition& condition, std::uint64_t seed, const Options& optio
       CompareSurface(phantom, found.tree, outcome);
     }
     JudgeWarnings(condition.healthy, Troubles(phantom, scan), outcome);
+    if (!options.branches.empty())
+    {
+      outcome.branches = BranchRows(truth, found.extraction.judged);
+    }
+    if (!options.links.empty())
+    {
+      outcome.links = LinkRows(truth, scan.considered);
+    }
     if (!options.lines.empty())
     {
       const std::string base = options.lines + "/" + condition.name + "-" + std::to_string(seed);
@@ -657,6 +712,40 @@ int DefaultJobs()
   return static_cast<int>(std::clamp<long>(free / gigabyte, 1, NumberOfThreads()));
 }
 
+/// A table of what odds are fitted to; nothing when it has no path.
+class OddsTable
+{
+public:
+  template <std::size_t N>
+  OddsTable(const std::string& path, const std::array<const char*, N>& names)
+  {
+    if (path.empty())
+    {
+      return;
+    }
+    this->File.exceptions(std::ios::failbit | std::ios::badbit);
+    this->File.open(path);
+    this->File << "condition,seed,artery,used,probability,x,y,z";
+    for (const char* name : names)
+    {
+      this->File << ',' << name;
+    }
+    this->File << '\n';
+  }
+
+  void Add(const Condition& condition, std::uint64_t seed, const std::string& rows)
+  {
+    std::istringstream lines(rows);
+    for (std::string line; std::getline(lines, line);)
+    {
+      this->File << condition.name << ',' << seed << ',' << line << '\n';
+    }
+  }
+
+private:
+  std::ofstream File;
+};
+
 /// Runs the cases, prints their rows in order as they come.
 std::vector<Row> RunAll(const std::vector<Condition>& conditions,
   const std::vector<std::uint64_t>& seeds, int jobs, const Options& options)
@@ -671,6 +760,8 @@ std::vector<Row> RunAll(const std::vector<Condition>& conditions,
   std::size_t printed = 0;
   std::string details;
   std::mutex mutex;
+  OddsTable branches(options.branches, VeinSignNames());
+  OddsTable links(options.links, LinkSignNames());
   SetNumberOfThreads(jobs);
   PrintHead(options);
   std::fflush(stdout);
@@ -689,6 +780,8 @@ std::vector<Row> RunAll(const std::vector<Condition>& conditions,
           const std::uint64_t seed = seeds[printed % seeds.size()];
           row.summary.Add(*outcomes[printed]);
           PrintCase(row.condition, seed, *outcomes[printed], options);
+          branches.Add(row.condition, seed, outcomes[printed]->branches);
+          links.Add(row.condition, seed, outcomes[printed]->links);
           details += Details(row.condition, seed, *outcomes[printed], options.details);
           outcomes[printed] = Outcome(); // its stretches and texts are of no more use
         }
@@ -719,6 +812,10 @@ int main(int argc, char** argv)
       ->check(CLI::Range(0, 64))
       ->capture_default_str();
     program.add_option("--lines", options.lines, "folder for the lines of truth and result, *.vtk");
+    program.add_option("--branches", options.branches,
+      "table of all branches that were judged to be artery or vein, *.csv");
+    program.add_option(
+      "--links", options.links, "table of all links across lesions that came to mind, *.csv");
     program.add_flag(
       "--true-ostia", options.trueOstia, "start at the true ostia, not at those found");
     program.add_flag("--no-surface", noSurface, "leave out the surfaces");

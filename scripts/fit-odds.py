@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+"""Weights of odds: logistic regression of artery or not on the signs of branches or links.
+
+Reads tables of `validate-disease --branches FILE` (the odds of a vein, VeinRejection.cxx) or `--links FILE` (the odds that
+a link is right, VesselLinking.cxx). Prints the weights, and how well weights tell that were fitted without the heart that
+they judge (eight folds). What is artery only in part, and what lies behind a link, is left out. The penalty is half the
+squared weights.
+"""
+import argparse
+import csv
+import sys
+
+import numpy as np
+
+FIRST_SIGN = 8  # condition, seed, artery, used, probability, x, y, z
+FOLDS = 8
+
+
+def fit(signs, truth):
+    """Weights and, last, the intercept, which is not penalised."""
+    data = np.column_stack([signs, np.ones(len(signs))])
+    penalty = np.r_[np.ones(signs.shape[1]), 0.0]
+    weights = np.zeros(data.shape[1])
+    for _ in range(100):
+        chance = 1.0 / (1.0 + np.exp(-data @ weights))
+        gradient = data.T @ (chance - truth) + penalty * weights
+        hessian = (data * (chance * (1.0 - chance))[:, None]).T @ data + np.diag(penalty)
+        step = np.linalg.solve(hessian + 1e-9 * np.eye(len(weights)), gradient)
+        weights -= step
+        if np.abs(step).max() < 1e-8:
+            break
+    return weights
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kind", choices=["branches", "links"])
+    parser.add_argument("tables", nargs="+", metavar="table")
+    parser.add_argument("--wrong", action="store_true", help="list what is told wrongly")
+    arguments = parser.parse_args()
+    rows = []
+    for name in arguments.tables:
+        with open(name, newline="", encoding="utf-8") as file:
+            head, *body = csv.reader(file)
+            rows += body
+    rows = [row for row in rows if row[3] == "1" and not 0.25 <= float(row[2]) <= 0.75]
+    if not rows:
+        sys.exit("nothing to fit in " + ", ".join(arguments.tables))
+    signs = np.array([row[FIRST_SIGN:] for row in rows], float)
+    artery = np.array([float(row[2]) > 0.5 for row in rows])
+    what = "links" if arguments.kind == "links" else "veins"
+    truth = (artery if arguments.kind == "links" else ~artery).astype(float)
+    hearts = [row[0] + row[1] for row in rows]
+    fold = {heart: n % FOLDS for n, heart in enumerate(dict.fromkeys(hearts))}
+    folds = np.array([fold[heart] for heart in hearts])
+    data = np.column_stack([signs, np.ones(len(rows))])
+    odds = np.zeros(len(rows))
+    for n in range(min(FOLDS, len(fold))):
+        odds[folds == n] = data[folds == n] @ fit(signs[folds != n], truth[folds != n])
+    print(f"{len(rows)} rows of {len(fold)} hearts, {int(truth.sum())} of them {what}")
+    for name, weight in zip(head[FIRST_SIGN:] + ["(intercept)"], fit(signs, truth)):
+        print(f"{name:20s} {weight:6.2f}")
+    used = np.array([float(row[4]) for row in rows])
+    chance = 1.0 / (1.0 + np.exp(-odds))
+    for how, said in (("as it was", used), ("fitted without their heart", chance)):
+        missed = int((truth * (said < 0.5)).sum())
+        print(f"{how}: {missed} {what} missed, {int(((1 - truth) * (said >= 0.5)).sum())} that are none")
+    error = 0.0
+    for low in np.arange(0.0, 1.0, 0.1):
+        inside = (chance >= low) & (chance < low + 0.1)
+        if inside.any():
+            error += abs(chance[inside].sum() - truth[inside].sum()) / len(rows)
+            print(f"said {low:.1f} to {low + 0.1:.1f}: {inside.sum()}, mean {chance[inside].mean():.2f}, "
+                  f"true {truth[inside].mean():.2f}")
+    print(f"expected calibration error {error:.3f}")
+    if arguments.wrong:
+        for row, odd, right in zip(rows, odds, truth):
+            if (odd >= 0.0) != bool(right):
+                print(f"{odd:5.1f}", *row[:FIRST_SIGN])
+
+
+if __name__ == "__main__":
+    main()
