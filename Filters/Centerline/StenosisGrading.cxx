@@ -27,6 +27,7 @@ constexpr double TipLength = 6.0;   ///< mm before a vessel's end that are not g
 constexpr double MouthLength = 2.0; ///< mm behind an ostium that are not graded
 constexpr double NormalQuantile = 1.645; ///< 5 % to either side
 constexpr double OccludedRadius = 0.2;   ///< mm: less is no lumen that can be seen
+constexpr double LostRadius = 0.35;      ///< mm: a lumen that is thinner may be lost in the noise
 
 void Require(bool condition, const char* requirement)
 {
@@ -387,6 +388,11 @@ void GradedPath::Describe(
     std::hypot(deviation / std::max(radius, 0.02), referenceError / healthy) * NormalQuantile;
   lesion.degreeLow = std::clamp(lesion.degree - error, 0.0, 1.0);
   lesion.degreeHigh = std::clamp(lesion.degree + error, 0.0, 1.0);
+  const bool occluded = radius <= OccludedRadius && lesion.degree > 0.85;
+  if (occluded)
+  {
+    lesion.degreeLow = std::min(lesion.degreeLow, std::max(0.0, 1.0 - LostRadius / healthy));
+  }
   if (lesion.interpolated)
   {
     lesion.degreeLow = 0.0;
@@ -400,12 +406,11 @@ void GradedPath::Describe(
   {
     lesion.confidence *= 0.3;
   }
-  const bool seen = radius > OccludedRadius;
-  lesion.kind = !seen && lesion.degree > 0.85 ? LesionKind::Occluded
-    : lesion.bridged                          ? LesionKind::Bridged
-    : calcium > 0.5 * samples                 ? LesionKind::Calcified
-    : calcium > 0.0                           ? LesionKind::Mixed
-                                              : LesionKind::Soft;
+  lesion.kind = occluded      ? LesionKind::Occluded
+    : lesion.bridged          ? LesionKind::Bridged
+    : calcium > 0.5 * samples ? LesionKind::Calcified
+    : calcium > 0.0           ? LesionKind::Mixed
+                              : LesionKind::Soft;
   lesions.push_back(lesion);
 }
 

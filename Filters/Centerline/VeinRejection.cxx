@@ -38,25 +38,25 @@ constexpr double LongestStem = 4.0;
 constexpr double CloseLength = 12.0;
 
 /// Fitted to the branches of phantoms (scripts/fit-odds.sh).
-constexpr double Intercept = -4.59;
+constexpr double Intercept = -4.74;
 constexpr std::array<FittedSign, NumberOfVeinSigns> Signs{ {
-  { "darker", 0.67 },
-  { "brighter", 0.74 },
-  { "darker_beside", 2.22 },
-  { "brighter_beside", 1.21 },
-  { "beside", 2.37 },
-  { "beside_unclear", 0.68 },
-  { "thinner", 0.76 },
-  { "taper", 2.75 },
-  { "strong_taper", 1.07 },
-  { "no_taper", 1.03 },
-  { "blunt_goes_on", 2.88 },
-  { "blunt_cut", 3.40 },
-  { "blunt", 3.78 },
-  { "backwards", 1.42 },
-  { "through", 0.81 },
-  { "short", 2.38 },
-  { "no_brightness", -0.84 },
+  { "darker", 0.78 },
+  { "brighter", 0.79 },
+  { "darker_beside", 2.23 },
+  { "brighter_beside", 1.19 },
+  { "beside", 2.48 },
+  { "beside_unclear", 0.76 },
+  { "thinner", 0.50 },
+  { "taper", 2.84 },
+  { "strong_taper", 1.39 },
+  { "no_taper", 0.91 },
+  { "blunt_goes_on", 2.98 },
+  { "blunt_cut", 3.01 },
+  { "blunt", 4.14 },
+  { "backwards", 1.18 },
+  { "through", 1.20 },
+  { "short", 2.25 },
+  { "no_brightness", -0.92 },
 } };
 
 /// Standard deviation of a median by noise: samples within about 1 mm are not independent.
@@ -536,7 +536,7 @@ void VeinFinder::Weigh(Arm& arm) const
   const bool tapers = !std::isnan(arm.taper);
   const double blunt = std::clamp(arm.blunt, 0.0, 1.3);
   arm.branch.signs = {
-    std::clamp(darker, 0.0, 5.0),
+    std::clamp(darker, 0.0, 6.0),
     std::clamp(darker, -3.0, 0.0),
     beside * std::clamp(darkerBeside, 0.0, 5.0),
     beside * std::clamp(darkerBeside, -5.0, 0.0),

@@ -31,21 +31,23 @@ constexpr double WallGap = 8.0;  ///< mm: longest link to a wall
 constexpr double FreeGap = 12.0; ///< mm: longer ones need more than ends that point at each other
 
 /// Fitted to the links that came to mind in phantoms (scripts/fit-odds.sh).
-constexpr double Intercept = 1.35;
+constexpr double Intercept = 1.27;
 constexpr std::array<FittedSign, NumberOfLinkSigns> Signs{ {
-  { "to_wall", -0.83 },
-  { "unseen", -1.27 },
-  { "long_unseen", -0.34 },
-  { "turn_of_piece", -0.54 },
-  { "turn_of_tree", -0.93 },
+  { "to_wall", -0.67 },
+  { "unseen", -1.58 },
+  { "long_unseen", -0.24 },
+  { "turn_of_piece", -0.57 },
+  { "turn_of_tree", -0.75 },
   { "thinner", -1.28 },
-  { "wider", -0.77 },
-  { "length", 0.97 },
-  { "great_length", 0.44 },
-  { "darker", -0.80 },
-  { "darker_than_wall", -1.17 },
-  { "brighter", -1.02 },
-  { "clear", 0.93 },
+  { "wider", -0.65 },
+  { "outgrows", -7.15 },
+  { "abrupt", 1.87 },
+  { "length", 1.03 },
+  { "great_length", 0.41 },
+  { "darker_than_end", -0.77 },
+  { "darker_than_wall", -1.27 },
+  { "brighter", -0.92 },
+  { "clear", 0.88 },
 } };
 
 double Angle(const Vector3& a, const Vector3& b)
@@ -199,6 +201,8 @@ private:
     VoxelPiece piece;
     double length = 0.0; ///< mm between its farthest ends
     std::vector<VesselEnd> ends;
+    std::vector<double>
+      growth; ///< of an end: how much wider the vessel becomes behind it, a factor; -1: not measured
   };
   /// What a piece was found to be: a round later most pieces are the same.
   struct Description
@@ -218,10 +222,11 @@ private:
   std::optional<VesselEnd> EndAt(const VoxelPiece& piece, std::int32_t number) const;
   std::vector<VesselEnd> EndsOf(
     const VoxelPiece& piece, const std::vector<VoxelPiece::Reached>& distances) const;
+  double Growth(const VoxelPiece& piece, const VesselEnd& end) const;
   std::optional<Orphan> Describe(std::vector<std::int64_t> voxels) const;
   void DescribeAll(std::vector<std::vector<std::int64_t>> pieces, const ProgressCallback& progress);
   std::vector<Vector3> Behind(const VoxelPiece& piece, const VesselEnd& end) const;
-  VesselLink BestLink(const Orphan& orphan, const std::vector<VesselEnd>& tips,
+  VesselLink BestLink(Orphan& orphan, const std::vector<VesselEnd>& tips,
     std::vector<ConsideredLink>& considered) const;
   float Evidence(std::int64_t voxel) const;
   float Price(std::int64_t voxel) const;
@@ -468,6 +473,45 @@ std::vector<VesselEnd> Linker::EndsOf(
   return ends;
 }
 
+/// How much wider the vessel is 10 to 40 mm behind an end: veins widen towards the heart, arteries do not
+/// widen away from it.
+double Linker::Growth(const VoxelPiece& piece, const VesselEnd& end) const
+{
+  const std::vector<VoxelPiece::Reached> reached = piece.Around(end.number, 45.0F);
+  std::vector<std::int32_t> way;
+  for (auto at = static_cast<std::int32_t>(reached.size()) - 1; at >= 0;
+       at = reached[static_cast<std::size_t>(at)].before)
+  {
+    way.push_back(reached[static_cast<std::size_t>(at)].number);
+  }
+  std::reverse(way.begin(), way.end());
+  std::vector<double> near;
+  std::vector<double> far;
+  const std::size_t chord = 4;
+  double along = 0.0;
+  for (std::size_t n = 1; n < way.size(); ++n)
+  {
+    along += (piece.Position(way[n]) - piece.Position(way[n - 1])).norm();
+    if (n % 2 != 0 || n < chord || n + chord >= way.size())
+    {
+      continue;
+    }
+    const Vector3 tangent =
+      (piece.Position(way[n + chord]) - piece.Position(way[n - chord])).normalized();
+    const LumenSection section = MeasureLumen(this->I.image, piece.Position(way[n]), tangent,
+      2.0 * std::cbrt(this->L.VoxelVolume()), this->Lumen);
+    if (section.confidence > 0.6)
+    {
+      (along < 8.0 ? near : far).push_back(section.radius);
+    }
+  }
+  if (near.size() < 3 || far.size() < 5)
+  {
+    return 1.0;
+  }
+  return QuantileOf(std::move(far), 0.8) / std::max(0.1, QuantileOf(std::move(near), 0.8));
+}
+
 std::optional<Linker::Orphan> Linker::Describe(std::vector<std::int64_t> voxels) const
 {
   if (this->InLung(voxels))
@@ -475,7 +519,7 @@ std::optional<Linker::Orphan> Linker::Describe(std::vector<std::int64_t> voxels)
     return std::nullopt;
   }
   const double volume = static_cast<double>(voxels.size()) * this->L.VoxelVolume();
-  Orphan orphan{ VoxelPiece(this->L, std::move(voxels)), 0.0, {} };
+  Orphan orphan{ VoxelPiece(this->L, std::move(voxels)), 0.0, {}, {} };
   const std::int32_t first = orphan.piece.Around(0, Unreached).back().number;
   const std::vector<VoxelPiece::Reached> distances = orphan.piece.Around(first, Unreached);
   orphan.length = distances.back().distance;
@@ -731,6 +775,10 @@ void Linker::Describe(
   const double wider = link.radiusBefore > 0.0
     ? std::log(std::max(1e-9, std::max(end.radius, thick)) / link.radiusBefore)
     : 0.0;
+  const double least = 0.3; // mm: what is thinner is not measured
+  const double grown = std::log(orphan.growth[number] * std::max(end.radius, least) /
+    std::max({ link.radiusBefore, end.radius, least }));
+  const double abrupt = std::min(end.radius, link.radiusBefore);
   // What is darker than the tree's vessel there is a vein; a root has no vessel to compare with.
   const double brighter = root
     ? 0.0
@@ -755,6 +803,10 @@ void Linker::Describe(
     std::max(0.0, -wider - 0.7),
     // The tip may lie in the lesion: then what follows is wider, but not twice as wide.
     wall ? 0.0 : std::max(0.0, wider - 0.25),
+    // Veins widen away from where they are linked; behind lesions arteries are a little wider at most.
+    std::clamp(grown - 0.3, 0.0, 1.0),
+    // Vessels taper: one that ends at full width goes on, and one that begins so comes from somewhere.
+    wall ? 0.0 : std::min(1.0, link.unseen / 6.0) * std::clamp((abrupt - 0.6) / 0.6, 0.0, 1.0),
     std::min(1.0, (orphan.length - 15.0) / 15.0),
     std::clamp((orphan.length - 30.0) / 30.0, 0.0, 3.0),
     wall ? 0.0 : std::max(0.0, -brighter - 0.1),
@@ -810,6 +862,7 @@ void Linker::DescribeAll(
         if (orphan)
         {
           description->orphan = std::make_unique<Orphan>(std::move(*orphan));
+          description->orphan->growth.assign(description->orphan->ends.size(), -1.0);
         }
         else
         {
@@ -836,8 +889,8 @@ std::vector<Vector3> Linker::Behind(const VoxelPiece& piece, const VesselEnd& en
 }
 
 /// The likeliest of the links from an orphan's ends to the tree; without any its confidence is 0.
-VesselLink Linker::BestLink(const Orphan& orphan, const std::vector<VesselEnd>& tips,
-  std::vector<ConsideredLink>& considered) const
+VesselLink Linker::BestLink(
+  Orphan& orphan, const std::vector<VesselEnd>& tips, std::vector<ConsideredLink>& considered) const
 {
   VesselLink best;
   best.confidence = 0.0;
@@ -859,6 +912,10 @@ VesselLink Linker::BestLink(const Orphan& orphan, const std::vector<VesselEnd>& 
       else if (!way)
       {
         return;
+      }
+      if (orphan.growth[e] < 0.0)
+      {
+        orphan.growth[e] = this->Growth(orphan.piece, end);
       }
       this->Describe(orphan, e, tip, link);
       const double odds = Judge(link, tip);

@@ -26,7 +26,7 @@
 namespace coronary
 {
 /// What the odds of a link are made of, each in a range where its logarithmic odds are about linear.
-constexpr std::size_t NumberOfLinkSigns = 13;
+constexpr std::size_t NumberOfLinkSigns = 15;
 const std::array<const char*, NumberOfLinkSigns>& LinkSignNames();
 
 /// A way across a place where no vessel is seen, or too little of it: from the tree to a piece.
