@@ -1707,7 +1707,6 @@ bool Extractor::ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<R
     }
   };
   std::vector<char> closed(tree.points.size(), 0);
-  const std::size_t rejectedBefore = veins.size();
   for (const VeinBranch& vein : found)
   {
     double length = 0.0;
@@ -1721,10 +1720,9 @@ bool Extractor::ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<R
         : (tree.points[p] - tree.points[static_cast<std::size_t>(vein.closed[i - 1])]).norm();
     }
     const Vector3& place = tree.points[static_cast<std::size_t>(vein.closed.front())];
-    const auto before = veins.begin() + static_cast<std::ptrdiff_t>(rejectedBefore);
-    const auto known = std::find_if(veins.begin(), before,
+    const auto known = std::find_if(veins.begin(), veins.end(),
       [&](const RejectedVein& other) { return (other.position - place).norm() < SamePlace; });
-    if (known != before)
+    if (known != veins.end())
     {
       known->length = std::max(known->length, length);
       known->probability = std::max(known->probability, vein.probability);

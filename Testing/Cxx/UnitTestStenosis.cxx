@@ -281,6 +281,24 @@ TEST(StenosisGrading, BridgedLesionsSaySo)
     grading.lesions.front().kind == LesionKind::Occluded);
 }
 
+TEST(StenosisGrading, NoLumenIsARangeAsWell)
+{
+  // A lumen of 0.3 mm radius and none look the same in noise.
+  const Tube tube = Narrowed(1.6, 1.0);
+  CenterlineTree tree = LineWith(1.5);
+  tree.bridged.assign(tree.points.size(), 0);
+  std::fill(tree.bridged.begin() + 100, tree.bridged.begin() + 140, 1);
+  const Measured measured = MeasureAll(tube, tree);
+  const StenosisGrading grading =
+    GradeStenoses(tree, VesselPaths(tree), measured.lumen, tree.bridged);
+  ASSERT_EQ(grading.lesions.size(), 1U);
+  const Stenosis& lesion = grading.lesions.front();
+  EXPECT_EQ(lesion.kind, LesionKind::Occluded);
+  EXPECT_EQ(lesion.degreeHigh, 1.0);
+  EXPECT_LT(lesion.degreeLow, 1.0 - 0.3 / 1.6);
+  EXPECT_GT(lesion.degreeLow, 0.6);
+}
+
 TEST(CalciumObjects, BallsBesideTheLumenAreMeasuredAndTheLumenStays)
 {
   Tube tube;

@@ -426,5 +426,22 @@ TEST(VesselLinking, CenterlinesSayWhatTheyDidNotSee)
   }
   EXPECT_GT(farthest, 75.0);
   EXPECT_GT(guessed, 10);
+
+  // Who crosses beside the middle of the way does not know more about what lies behind.
+  VesselBridge& bridge = input.bridges.front();
+  const std::size_t middle = bridge.points.size() / 2;
+  for (std::size_t n = middle - 2; n <= middle + 2; ++n)
+  {
+    bridge.points[n][1] += 5.0;
+  }
+  const CenterlineTree beside = ExtractCenterlines(input, {}).tree;
+  ASSERT_FALSE(beside.points.empty());
+  for (std::size_t p = 0; p < beside.points.size(); ++p)
+  {
+    if (beside.points[p][0] > 44.0)
+    {
+      EXPECT_EQ(beside.bridgeConfidence[p], bridge.confidence);
+    }
+  }
 }
 }

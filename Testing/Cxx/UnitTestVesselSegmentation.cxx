@@ -11,6 +11,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
 #include <string>
 
 using namespace coronary;
@@ -311,6 +312,40 @@ TEST(VesselSegmentation, AChamberAtTheFarEndIsCutOff)
       EXPECT_GT(result.leakageVolume, 500.0);
     }
   }
+}
+
+TEST(VesselSegmentation, ADimChamberInMuchNoiseIsNoVessel)
+{
+  // As dim as a right ventricle, so noisy that a quarter of its voxels look like vessel and hang together. At its rim, where
+  // means are less, some do.
+  const BentTube tube{ 1.8 };
+  const Distance chamber = [](const Vector3& p)
+  { return (p - Vector3(20.6, 0.0, 0.0)).norm() - 7.5; };
+  ASSERT_LT(chamber(BentTube::Axis(0.8)), 1.8);
+  const Distance wall = [=](const Vector3& p) { return tube.Tube(p); };
+  Case image;
+  image.grid = Oblique();
+  image.Fill(
+    [&](const Vector3& p)
+    {
+      return std::max(
+        Union({ wall, BentTube::Ball })(p), Tissue + 0.4 * (Blood - Tissue) * Profile(chamber(p)));
+    });
+  std::mt19937 random(7);
+  std::normal_distribution<float> noise(0.0F, 0.17F * static_cast<float>(Blood - Tissue));
+  for (float& value : image.values)
+  {
+    value += noise(random);
+  }
+  image.Filter();
+  image.seeds = { { Vector3::Zero(), Vector3::UnitX() } };
+  image.settings.window = BloodWindow{ Tissue, Blood };
+  const VesselSegmentationResult result = image.Run();
+  const double inside =
+    image.Volume(result, [&](const Vector3& p) { return chamber(p) < -2.5 && wall(p) > 1.0; });
+  EXPECT_LT(inside, 0.03 * 4.0 / 3.0 * M_PI * std::pow(5.0, 3));
+  EXPECT_NEAR(image.Volume(result, [&](const Vector3& p) { return InTube(p) && wall(p) < 0.5; }),
+    tube.Volume(), 0.15 * tube.Volume());
 }
 
 TEST(VesselSegmentation, HolesAreFilledOrNot)
