@@ -219,7 +219,7 @@ public:
   /// After Run: branches of its tree that are veins are added to the excluded voxels, and to what was rejected.
   /// @returns whether there is one
   bool ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins,
-    std::vector<JudgedBranch>& judged) const;
+    std::vector<VeinBranch>& judged) const;
 
 private:
   // Places.
@@ -1652,7 +1652,7 @@ bool Extractor::IsExcluded(const std::vector<Vector3>& points) const
 }
 
 bool Extractor::ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins,
-  std::vector<JudgedBranch>& judged) const
+  std::vector<VeinBranch>& judged) const
 {
   if (!this->Input.intensity || !this->Calibrated)
   {
@@ -1664,15 +1664,11 @@ bool Extractor::ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<R
   for (VeinBranch& branch :
     JudgeBranches(tree, *this->Image, this->Lumen.reference, this->Blur, closedBefore))
   {
-    judged.push_back({ {}, branch });
-    for (const std::int64_t point : branch.course)
-    {
-      judged.back().course.push_back(tree.points[static_cast<std::size_t>(point)]);
-    }
     if (branch.probability >= 0.5)
     {
-      found.push_back(std::move(branch));
+      found.push_back(branch);
     }
+    judged.push_back(std::move(branch));
   }
   if (found.empty())
   {
@@ -2383,7 +2379,7 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   // seen only when another one is closed.
   std::vector<unsigned char> excluded;
   std::vector<RejectedVein> veins;
-  std::vector<JudgedBranch> judged;
+  std::vector<VeinBranch> judged;
   CenterlineResult result;
   constexpr int rounds = 6;
   for (int round = 0; round <= rounds; ++round)
@@ -2404,7 +2400,7 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
     toWorld(vein.position);
   }
   result.veins = std::move(veins);
-  for (JudgedBranch& branch : judged)
+  for (VeinBranch& branch : judged)
   {
     std::for_each(branch.course.begin(), branch.course.end(), toWorld);
   }

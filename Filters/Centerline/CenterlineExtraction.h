@@ -105,13 +105,6 @@ struct RejectedVein
   double probability = 0.0;           ///< 0.5 to 1
 };
 
-/// A branch that was judged, in any round.
-struct JudgedBranch
-{
-  std::vector<Vector3> course; ///< mm
-  VeinBranch judgement;
-};
-
 struct CenterlineResult
 {
   CenterlineTree tree;                ///< split; treeId is the seed's index
@@ -119,7 +112,8 @@ struct CenterlineResult
   std::vector<CenterlineEnd> targets; ///< one for each target
   std::vector<CenterlineBifurcation> bifurcations;
   std::vector<RejectedVein> veins;
-  std::vector<JudgedBranch> judged;  ///< what the weights of VeinRejection.h are fitted to
+  std::vector<VeinBranch>
+    judged; ///< in all rounds: what the weights of VeinRejection.h are fitted to
   std::vector<std::string> messages; ///< what a user should know
   bool complete = true;              ///< false: stopped by a limit
   std::int64_t regionVoxels = 0;

@@ -811,7 +811,6 @@ void VeinFinder::FindOpposites(std::vector<Arm>& arms) const
     if (best[a].odds > 0.0 && best[b].other == a)
     {
       arms[a].through = best[a].odds;
-      arms[a].branch.oppositeGroupId = arms[b].branch.groupId;
     }
   }
 }
@@ -878,7 +877,7 @@ std::vector<VeinBranch> VeinFinder::Run()
     const double end = arm.blunt > 0.35 ? 2.0 * Far : begin + CloseLength;
     for (const Step& step : arm.course)
     {
-      branch.course.push_back(static_cast<std::int64_t>(step.point));
+      branch.course.push_back(this->Tree.points[step.point]);
       if (step.passed > begin && (branch.closed.empty() || step.passed <= end))
       {
         branch.closed.push_back(static_cast<std::int64_t>(step.point));

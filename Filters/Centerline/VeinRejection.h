@@ -28,14 +28,12 @@ const std::array<const char*, NumberOfVeinSigns>& VeinSignNames();
 
 struct VeinBranch
 {
-  int groupId = -1; ///< of the branch where it begins
-  int oppositeGroupId =
-    -1; ///< of the branch in which it seems to go on at the artery's other side, -1 none
+  int groupId = -1;         ///< of the branch where it begins
   double probability = 0.0; ///< of a vein, 0 to 1
   bool known = false;       ///< nothing before it was bridged: all signs could be measured
   std::array<double, NumberOfVeinSigns> signs{};
-  std::vector<std::int64_t> course; ///< points from its begin on, 40 mm straight on
-  std::vector<std::int64_t> closed; ///< of these, what is the vein's for certain, if it is one
+  std::vector<Vector3> course;      ///< mm, from its begin on, 40 mm straight on
+  std::vector<std::int64_t> closed; ///< points of it that are the vein's for certain, if it is one
 };
 
 /**

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
+#include <limits>
 #include <mutex>
 
 namespace coronary
@@ -268,20 +268,18 @@ std::vector<std::pair<std::int64_t, std::int64_t>> FindSelfIntersections(
   }
   starts.push_back(entries.size());
   std::mutex mutex;
-  std::atomic<std::size_t> found{ 0 };
   ParallelFor(static_cast<std::int64_t>(starts.size()) - 1, 256,
     [&](std::int64_t first, std::int64_t last)
     {
       std::vector<std::pair<std::int64_t, std::int64_t>> own;
       for (std::int64_t c = first; c < last; ++c)
       {
-        if (limit > 0 && found >= limit)
-        {
-          break;
-        }
+        // By cells, so that it does not depend on threads what is found.
+        const std::size_t most =
+          limit > 0 ? own.size() + limit : std::numeric_limits<std::size_t>::max();
         for (std::size_t i = starts[c]; i < starts[c + 1]; ++i)
         {
-          for (std::size_t j = i + 1; j < starts[c + 1]; ++j)
+          for (std::size_t j = i + 1; j < starts[c + 1] && own.size() < most; ++j)
           {
             const std::int64_t s = entries[i].second;
             const std::int64_t t = entries[j].second;
@@ -295,7 +293,6 @@ std::vector<std::pair<std::int64_t, std::int64_t>> FindSelfIntersections(
               Intersect(points, triangles[s], triangles[t]))
             {
               own.emplace_back(s, t);
-              ++found;
             }
           }
         }

@@ -15,7 +15,8 @@ namespace coronary
  * Exact for finite coordinates whose products of three neither overflow nor underflow. In one plane,
  * edges that only lie on each other do not count.
  *
- * @param limit  stop looking after about so many; 0: find all
+ * @param limit  pairs after which a place of about two triangles' size is left: a heap of many triangles there takes the
+ *               square of their number; 0: find all
  * @return pairs of triangle numbers, each with the lower number first, in ascending order
  */
 std::vector<std::pair<std::int64_t, std::int64_t>> FindSelfIntersections(

@@ -24,6 +24,7 @@ constexpr double BluntRetreat = 0.6;
 /// Smaller angles are repaired, degrees: a little more than what is promised.
 constexpr double LeastAngle = 12.0;
 constexpr int Repairs = 3;
+constexpr std::size_t Heap = 2000; ///< faulty triangles
 constexpr int RemeshingAttempts = 3;
 constexpr double GreatestSmoothing = 4.0; ///< of the axes, radii
 constexpr double LeastBlending = 0.1;
@@ -187,7 +188,9 @@ std::vector<std::int64_t> FindFaults(const AdaptiveRemesher& mesh)
   const std::vector<Vector3> points = PointsOf(mesh.Vertices());
   const std::vector<Triangle> triangles = mesh.Triangles();
   std::vector<std::int64_t> faults;
-  for (const auto& pair : FindSelfIntersections(points, triangles))
+  // More at one place are a heap that repairs do not untie.
+  constexpr std::size_t most = 1000;
+  for (const auto& pair : FindSelfIntersections(points, triangles, most))
   {
     faults.push_back(pair.first);
     faults.push_back(pair.second);
@@ -810,7 +813,8 @@ Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reli
       wall, first.vertices, first.triangles, first.entity, settings.gradation);
     remesher.Run(part(attempt == 0 ? 0.25 : 0.9, 0.95));
     std::vector<std::int64_t> faults = FindFaults(remesher);
-    for (int repair = 0; repair < Repairs && !faults.empty(); ++repair)
+    // What is a heap of triangles only grows.
+    for (int repair = 0; repair < Repairs && !faults.empty() && faults.size() < Heap; ++repair)
     {
       remesher.Repair(faults);
       faults = FindFaults(remesher);
@@ -825,7 +829,8 @@ Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reli
         break;
       }
     }
-    const bool last = attempt + 1 == RemeshingAttempts || !AnyInJunction(remesher, faults);
+    const bool last =
+      attempt + 1 == RemeshingAttempts || faults.size() >= Heap || !AnyInJunction(remesher, faults);
     if (last)
     {
       const std::vector<Fault> places = PlacesOf(lumen, mesh.vertices, mesh.triangles, faults);

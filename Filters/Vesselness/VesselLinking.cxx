@@ -31,23 +31,23 @@ constexpr double WallGap = 8.0;  ///< mm: longest link to a wall
 constexpr double FreeGap = 12.0; ///< mm: longer ones need more than ends that point at each other
 
 /// Fitted to the links that came to mind in phantoms (scripts/fit-odds.sh).
-constexpr double Intercept = 1.27;
+constexpr double Intercept = 1.33;
 constexpr std::array<FittedSign, NumberOfLinkSigns> Signs{ {
-  { "to_wall", -0.67 },
-  { "unseen", -1.58 },
-  { "long_unseen", -0.24 },
+  { "to_wall", -0.65 },
+  { "unseen", -1.45 },
+  { "long_unseen", -0.27 },
   { "turn_of_piece", -0.57 },
-  { "turn_of_tree", -0.75 },
-  { "thinner", -1.28 },
-  { "wider", -0.65 },
-  { "outgrows", -7.15 },
-  { "abrupt", 1.87 },
-  { "length", 1.03 },
-  { "great_length", 0.41 },
-  { "darker_than_end", -0.77 },
-  { "darker_than_wall", -1.27 },
-  { "brighter", -0.92 },
-  { "clear", 0.88 },
+  { "turn_of_tree", -0.86 },
+  { "thinner", -1.29 },
+  { "wider", -0.54 },
+  { "outgrows", -7.17 },
+  { "abrupt", 1.75 },
+  { "length", 1.07 },
+  { "great_length", 0.42 },
+  { "darker_than_end", -0.80 },
+  { "darker_than_wall", -1.37 },
+  { "brighter", -5.92 },
+  { "clear", 0.81 },
 } };
 
 double Angle(const Vector3& a, const Vector3& b)

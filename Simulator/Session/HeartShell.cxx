@@ -17,6 +17,8 @@ constexpr double Inside =
   0.97; // of the way from the middle to the vessels' axes: vessels lie upon it
 constexpr double Below = 0.87; // of the epicardium: the arteries run partly in its fat
 constexpr double Bell = 0.35;  // radians
+constexpr double Nearest =
+  10.0; // exponent of the mean: the nearer vessels count, or they would run inside
 
 /// Of a sphere: the first pole, rings, the last pole.
 std::vector<Vector3> Directions()
@@ -115,9 +117,9 @@ HeartShell::HeartShell(WallMotion& wall)
       double distance = 0.0;
       for (std::size_t k = 0; k < axis.size(); ++k)
       {
-        distance += weights[n][k] * (axis[k] - middle).norm();
+        distance += weights[n][k] * std::pow((axis[k] - middle).norm(), -Nearest);
       }
-      moved.emplace_back(middle + Inside * distance * directions[n]);
+      moved.emplace_back(middle + Inside * std::pow(distance, -1.0 / Nearest) * directions[n]);
     }
     samples.push_back(std::move(moved));
   }

@@ -23,8 +23,9 @@ public:
   explicit HeartShell(const PhantomSettings& phantom);
 
   /**
-   * A smooth star-shaped surface that the axes of the vessels lie on: its distance from the middle of the vessels is, in
-   * every direction, the mean of the vessels' distances weighted by a bell of the angle between.
+   * A smooth star-shaped surface that the vessels lie on: its distance from the middle of the vessels is, in
+   * every direction, a mean of the vessels' distances, weighted by a bell of the angle between, in which the nearer ones
+   * count most.
    * @throws std::invalid_argument  the vessels have no axis
    */
   explicit HeartShell(WallMotion& wall);

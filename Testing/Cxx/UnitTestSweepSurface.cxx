@@ -12,6 +12,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -597,4 +598,30 @@ TEST(TriangleIntersections, FoldsAndFlatFans)
   const auto pairs = FindSelfIntersections(flat, { { 0, 1, 2 }, { 1, 0, 3 } });
   ASSERT_EQ(pairs.size(), 1U);
   EXPECT_EQ(pairs[0], (std::pair<std::int64_t, std::int64_t>(0, 1)));
+}
+
+TEST(TriangleIntersections, AHeapIsLeftAfterItsLimit)
+{
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(0.0, 1.0);
+  std::vector<Vector3> points;
+  std::vector<Triangle> triangles;
+  for (std::int64_t t = 0; t < 400; ++t)
+  {
+    for (int corner = 0; corner < 3; ++corner)
+    {
+      points.emplace_back(place(random), place(random), place(random));
+    }
+    triangles.push_back({ 3 * t, 3 * t + 1, 3 * t + 2 });
+  }
+  const auto all = FindSelfIntersections(points, triangles);
+  SetNumberOfThreads(1);
+  const auto some = FindSelfIntersections(points, triangles, 100);
+  SetNumberOfThreads(3);
+  EXPECT_EQ(FindSelfIntersections(points, triangles, 100), some);
+  SetNumberOfThreads(0);
+  EXPECT_GE(some.size(), 100U);
+  EXPECT_LT(some.size(), all.size());
+  EXPECT_TRUE(std::includes(all.begin(), all.end(), some.begin(), some.end()));
+  EXPECT_EQ(FindSelfIntersections(points, triangles, all.size() + 1), all);
 }

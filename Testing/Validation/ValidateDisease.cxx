@@ -285,13 +285,13 @@ std::string OddsRow(double artery, bool used, double probability, const Vector3&
 }
 
 /// What each branch was judged by, in every round.
-std::string BranchRows(const PhantomTree& truth, const std::vector<JudgedBranch>& judged)
+std::string BranchRows(const PhantomTree& truth, const std::vector<VeinBranch>& judged)
 {
   std::string rows;
-  for (const auto& [course, judgement] : judged)
+  for (const VeinBranch& branch : judged)
   {
-    rows += OddsRow(ShareOnArteries(truth, course), judgement.known, judgement.probability,
-      course.back(), judgement.signs);
+    rows += OddsRow(ShareOnArteries(truth, branch.course), branch.known, branch.probability,
+      branch.course.back(), branch.signs);
   }
   return rows;
 }
