@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <deque>
 #include <memory>
 #include <utility>
@@ -79,7 +80,7 @@ public:
   Process(const std::string& executable, const MesherRequest& request)
     : Name(executable.substr(executable.rfind('/') + 1))
     , Request(Encode(request))
-    , Start(Clock::now())
+    , LastWork(Clock::now())
   {
     // A socket, not a pipe: writing to a worker that is gone is an error here and no signal to the
     // host.
@@ -184,9 +185,24 @@ public:
     return Read(this->Data, this->Answer);
   }
 
-  double Seconds() const
+  /// Of processor time, all that it has used; of the clock since it last did something, while it does nothing. A busy
+  /// machine makes neither longer.
+  double Seconds()
   {
-    return std::chrono::duration<double>(Clock::now() - this->Start).count();
+    const Clock::time_point now = Clock::now();
+    clockid_t clock;
+    timespec time{};
+    if (::clock_getcpuclockid(this->Id, &clock) != 0 || ::clock_gettime(clock, &time) != 0)
+    {
+      return 0.0; // it has ended
+    }
+    const double used = static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+    if (used > this->Used + LeastWork)
+    {
+      this->Used = used;
+      this->LastWork = now;
+    }
+    return std::max(used, std::chrono::duration<double>(now - this->LastWork).count());
   }
 
   void Refuse(const std::string& what)
@@ -240,6 +256,7 @@ public:
   }
 
 private:
+  static constexpr double LeastWork = 0.01; ///< s
   static constexpr std::size_t maximumPrinted = 65536;
   static constexpr std::size_t maximumQuoted = 400;
 
@@ -283,7 +300,8 @@ private:
   Descriptor Data;
   Descriptor Output;
   pid_t Id = -1;
-  Clock::time_point Start;
+  double Used = 0.0; ///< s of processor time
+  Clock::time_point LastWork;
 };
 
 bool IsExecutable(const std::string& file)

@@ -32,7 +32,7 @@ std::string FindMesher(const std::string& name, const std::string& folder = "");
  * the answers. What the workers print is kept, and its end is part of the message when one fails.
  *
  * @param executable  full name, as FindMesher gives it
- * @param timeLimit   seconds for each process, positive
+ * @param timeLimit   seconds of processor time for each process, or of doing nothing, positive: the machine's load does not count
  * @param progress    called at least ten times a second
  * @return one answer for each request; a status other than Done is an answer as well
  * @throws MesherFailure; Cancelled

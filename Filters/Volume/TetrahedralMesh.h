@@ -41,7 +41,7 @@ struct TetrahedralMeshSettings
   bool repair = true; ///< one try to repair what can not be meshed, or only with flat tetrahedra
   double repairLimit = 0.01; ///< largest displacement by it, in local radii
   OutsidePolicy outside = OutsidePolicy::Refuse;
-  double timeLimit = 300.0; ///< seconds for each component and try, positive
+  double timeLimit = 300.0; ///< seconds of processor time for each component and try, positive
   std::string workerFolder; ///< where the workers are; empty: where they were installed
 
   /// @throws std::invalid_argument naming the setting.

@@ -170,7 +170,8 @@ public:
 
   ///@{
   /**
-   * Seconds after which a mesher's process is stopped, positive. Default 300.
+   * Seconds of processor time, or of doing nothing, after which a mesher's process is stopped, positive.
+   * Default 300.
    */
   vtkSetMacro(TimeLimit, double);
   vtkGetMacro(TimeLimit, double);
