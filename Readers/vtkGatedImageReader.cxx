@@ -1,6 +1,7 @@
 #include "vtkGatedImageReader.h"
 
 #include "GatedSeries.h"
+#include "LargePages.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 
@@ -681,6 +682,8 @@ void vtkGatedImageReader::ReadImage(int phase, const int extent[6], vtkImageData
     {
       vtkNew<vtkShortArray> shorts;
       shorts->SetNumberOfValues(voxels);
+      coronary::PreferLargePages(
+        shorts->GetPointer(0), sizeof(short) * static_cast<std::size_t>(voxels));
       if (source.Read(index, wanted, shorts->GetPointer(0), progress))
       {
         values = shorts.GetPointer();
@@ -690,6 +693,8 @@ void vtkGatedImageReader::ReadImage(int phase, const int extent[6], vtkImageData
     {
       vtkNew<vtkFloatArray> floats;
       floats->SetNumberOfValues(voxels);
+      coronary::PreferLargePages(
+        floats->GetPointer(0), sizeof(float) * static_cast<std::size_t>(voxels));
       source.Read(index, wanted, floats->GetPointer(0), progress);
       values = floats.GetPointer();
     }

@@ -74,32 +74,48 @@ const std::vector<float>& Shapes()
 }
 }
 
-double BlurredDisc(double distance, double radius)
+BlurredProfile::BlurredProfile(double radius)
+  : Radius(radius)
 {
-  if (radius <= 0.0)
+  if (radius > 0.0 && radius < LargestRadius - Step)
+  {
+    const double r = radius / Step;
+    const int i = static_cast<int>(r);
+    this->Share = r - i;
+    this->Shape = Shapes().data() + static_cast<std::size_t>(i) * DistanceCount;
+    this->Centre = CentreOf(radius);
+  }
+}
+
+double BlurredProfile::At(double distance) const
+{
+  if (this->Radius <= 0.0)
   {
     return 0.0;
   }
-  if (radius >= LargestRadius - Step)
+  if (!this->Shape)
   {
     // Nearly straight: blurring moves the edge inwards by half the curvature.
-    const double inwards = 0.5 / std::max(distance, 0.5 * radius);
-    return 0.5 * std::erfc((distance + inwards - radius) / std::sqrt(2.0));
+    const double inwards = 0.5 / std::max(distance, 0.5 * this->Radius);
+    return 0.5 * std::erfc((distance + inwards - this->Radius) / std::sqrt(2.0));
   }
-  const double d = distance / Step;
   if (distance >= LargestDistance - Step)
   {
     return 0.0;
   }
-  const double r = radius / Step;
-  const int i = static_cast<int>(r);
+  const double d = distance / Step;
   const int j = static_cast<int>(d);
-  const double f = r - i;
+  const double f = this->Share;
   const double g = d - j;
-  const float* table = Shapes().data() + static_cast<std::size_t>(i) * DistanceCount + j;
+  const float* table = this->Shape + j;
   const double shape = (1.0 - f) * ((1.0 - g) * table[0] + g * table[1]) +
     f * ((1.0 - g) * table[DistanceCount] + g * table[DistanceCount + 1]);
-  return CentreOf(radius) * shape;
+  return this->Centre * shape;
+}
+
+double BlurredDisc(double distance, double radius)
+{
+  return BlurredProfile(radius).At(distance);
 }
 
 double BlurredBallCentre(double radius)

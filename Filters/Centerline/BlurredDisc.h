@@ -15,6 +15,20 @@ namespace coronary
  */
 double BlurredDisc(double distance, double radius);
 
+/// The same for many distances of one disc: what follows from its radius is made once.
+class BlurredProfile
+{
+public:
+  explicit BlurredProfile(double radius);
+  double At(double distance) const;
+
+private:
+  double Radius;
+  const float* Shape = nullptr; ///< none: nothing, or nearly straight
+  double Share = 0.0;           ///< between the shapes of two radii
+  double Centre = 0.0;
+};
+
 /// Share of a ball's contrast at its centre, radius in standard deviations of the blur.
 double BlurredBallCentre(double radius);
 

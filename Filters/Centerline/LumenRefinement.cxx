@@ -165,31 +165,33 @@ private:
     const double contrast = std::max(1.0, fit.level - this->Background);
     // Air behind fat is no part of the wall.
     const double floor = this->Background - 0.1 * contrast;
+    const BlurredProfile lumen(fit.radius / this->Blur);
     std::array<double, Rays> own;
     std::vector<double> known;
     for (int ray = 0; ray < Rays; ++ray)
     {
       const double angle = 2.0 * M_PI * ray / Rays;
+      const double c = std::cos(angle);
+      const double s = std::sin(angle);
       double sum = 0.0;
       double weight = 0.0;
       int all = 0;
-      for (int s = 0; s < section.count; ++s)
+      for (int n = 0; n < section.count; ++n)
       {
-        const double rho = section.Distance(s);
-        const double d =
-          DistanceFrom(fit, rho * std::cos(angle), rho * std::sin(angle)) - fit.radius;
+        const double rho = section.Distance(n);
+        const double d = DistanceFrom(fit, rho * c, rho * s) - fit.radius;
         if (d < RingStart * this->Blur || d > RingEnd * this->Blur)
         {
           continue;
         }
         ++all;
-        if (section.hidden[section.At(ray, s)] != 0)
+        if (section.hidden[section.At(ray, n)] != 0)
         {
           continue;
         }
-        const double share = BlurredDisc((d + fit.radius) / this->Blur, fit.radius / this->Blur);
+        const double share = lumen.At((d + fit.radius) / this->Blur);
         const double value =
-          (section.values[section.At(ray, s)] - share * fit.level) / (1.0 - share);
+          (section.values[section.At(ray, n)] - share * fit.level) / (1.0 - share);
         sum += std::max(floor, value);
         weight += 1.0;
       }
@@ -251,6 +253,11 @@ private:
       Vector4 right = Vector4::Zero();
       double squares = 0.0;
       double area = 0.0;
+      const double e = 0.02;
+      const double r = fit.radius / this->Blur;
+      const BlurredProfile lumen(r);
+      const BlurredProfile wider(r + e);
+      const BlurredProfile thinner(std::max(0.0, r - e));
       for (int ray = 0; ray < Rays; ++ray)
       {
         if (counts[ray] == 0)
@@ -280,14 +287,12 @@ private:
             continue;
           }
           const double contrast = fit.level - around[ray];
-          const double e = 0.02;
           const double d = distance / this->Blur;
-          const double r = fit.radius / this->Blur;
-          const double share = BlurredDisc(d, r);
-          const double byDistance = (BlurredDisc(d + e, r) - BlurredDisc(std::max(0.0, d - e), r)) /
+          const double share = lumen.At(d);
+          const double byDistance = (lumen.At(d + e) - lumen.At(std::max(0.0, d - e))) /
             (d + e - std::max(0.0, d - e)) / this->Blur;
-          const double byRadius = (BlurredDisc(d, r + e) - BlurredDisc(d, std::max(0.0, r - e))) /
-            (r + e - std::max(0.0, r - e)) / this->Blur;
+          const double byRadius =
+            (wider.At(d) - thinner.At(d)) / (r + e - std::max(0.0, r - e)) / this->Blur;
           const double residual = section.values[at] - (around[ray] + share * contrast);
           const double inverse = distance > 1e-9 ? 1.0 / distance : 0.0;
           const Vector4 row(-contrast * byDistance * dx * inverse,
@@ -348,11 +353,12 @@ private:
     for (int ray = 0; ray < Rays; ++ray)
     {
       const double angle = 2.0 * M_PI * ray / Rays;
+      const double c = std::cos(angle);
+      const double s = std::sin(angle);
       for (int n = 0; n < section.count; ++n)
       {
         const double rho = section.Distance(n);
-        const double d =
-          DistanceFrom(fit, rho * std::cos(angle), rho * std::sin(angle)) - fit.radius;
+        const double d = DistanceFrom(fit, rho * c, rho * s) - fit.radius;
         if (std::abs(d) < this->Blur && section.hidden[section.At(ray, n)] != 0)
         {
           ++rays;

@@ -1,5 +1,6 @@
 #include "vtkFrangiVesselness.h"
 
+#include "LargePages.h"
 #include "MultiscaleVesselness.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
@@ -255,6 +256,8 @@ vtkSmartPointer<vtkFloatArray> NewArray(
     throw std::bad_alloc();
   }
   array->SetNumberOfTuples(output->GetNumberOfPoints());
+  coronary::PreferLargePages(
+    array->GetPointer(0), sizeof(float) * static_cast<std::size_t>(array->GetNumberOfValues()));
   output->GetPointData()->AddArray(array);
   return array;
 }

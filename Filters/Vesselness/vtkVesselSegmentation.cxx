@@ -1,6 +1,7 @@
 #include "vtkVesselSegmentation.h"
 
 #include "CoronaryOstia.h"
+#include "LargePages.h"
 #include "MultiscaleVesselness.h"
 #include "VesselSegmentation.h"
 #include "vtkCoronaryArrayNames.h"
@@ -132,6 +133,8 @@ void Insert(
   if (!IsEmpty(part))
   {
     T* target = array->GetPointer(0);
+    coronary::PreferLargePages(
+      target, sizeof(T) * static_cast<std::size_t>(output->GetNumberOfPoints()));
     const std::int64_t nx = whole[1] - whole[0] + 1;
     const std::int64_t ny = whole[3] - whole[2] + 1;
     for (std::int64_t k = part[4]; k <= part[5]; ++k)
