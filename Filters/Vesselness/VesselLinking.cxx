@@ -29,6 +29,11 @@ constexpr double ShellFar = 5.0;
 constexpr double ShellEnd = 8.0;
 constexpr double WallGap = 8.0;  ///< mm: longest link to a wall
 constexpr double FreeGap = 12.0; ///< mm: longer ones need more than ends that point at each other
+/// Ends that face each other are one vessel's, and it runs between them as a smooth curve does: a way that strays from it by
+/// this share of the gap is another thing's, unless it is as clear as a vessel.
+constexpr double Facing = 0.6;    ///< rad of each end to the other
+constexpr double Straying = 0.2;  ///< of the gap
+constexpr double ClearTube = 0.5; ///< vesselness, in that of a clear tube, throughout
 
 /// Fitted to the links that came to mind in phantoms (scripts/fit-odds.sh).
 constexpr double Intercept = 1.33;
@@ -233,6 +238,9 @@ private:
   bool Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target, double within,
     VesselLink& link) const;
   bool Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const;
+  double Clearest(const VesselLink& link) const;
+  bool Strays(const VesselLink& way, const VesselLink& curve, const VesselEnd& end,
+    const VesselEnd& tip) const;
   double RadiusByVolume(const Vector3& place) const;
   template <typename Use>
   double BrightShare(const Vector3& place, double reach, const Use& use) const;
@@ -713,6 +721,45 @@ bool Linker::Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link)
   return true;
 }
 
+/// Vesselness, in that of a clear tube, that a way has throughout, at most 1.
+double Linker::Clearest(const VesselLink& link) const
+{
+  double clearest = 1.0;
+  for (const Vector3& point : link.points)
+  {
+    if (const std::optional<std::array<int, 3>> at = this->L.Nearest(point))
+    {
+      clearest = std::min(
+        clearest, static_cast<double>(this->I.tube(this->L.Index((*at)[0], (*at)[1], (*at)[2]))));
+    }
+  }
+  return clearest;
+}
+
+/// Whether a way between ends that face each other goes elsewhere than they point, along what is no clear vessel.
+bool Linker::Strays(
+  const VesselLink& way, const VesselLink& curve, const VesselEnd& end, const VesselEnd& tip) const
+{
+  const Vector3 chord = tip.position - end.position;
+  const double gap = chord.norm();
+  if (tip.root > 0.0 || gap < WallGap || Angle(end.outwards, chord / gap) > Facing ||
+    Angle(tip.outwards, -chord / gap) > Facing)
+  {
+    return false;
+  }
+  double farthest = 0.0;
+  for (const Vector3& point : way.points)
+  {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Vector3& other : curve.points)
+    {
+      least = std::min(least, (other - point).norm());
+    }
+    farthest = std::max(farthest, least);
+  }
+  return farthest > Straying * gap && this->Clearest(way) < ClearTube;
+}
+
 /// Of the tree around one of its voxels: that of a tube with so much in it. 0 without any.
 double Linker::RadiusByVolume(const Vector3& place) const
 {
@@ -784,15 +831,6 @@ void Linker::Describe(
     ? 0.0
     : this->BrightShare(end.position, 6.0, [&](std::int64_t v) { return orphan.piece.Has(v); }) -
       this->BrightShare(from, 3.0, [&](std::int64_t v) { return this->I.inTree(v); });
-  double clearest = 1.0;
-  for (const Vector3& point : link.points)
-  {
-    if (const std::optional<std::array<int, 3>> at = this->L.Nearest(point))
-    {
-      clearest = std::min(
-        clearest, static_cast<double>(this->I.tube(this->L.Index((*at)[0], (*at)[1], (*at)[2]))));
-    }
-  }
   const bool wall = tip == nullptr;
   link.signs = {
     wall ? 1.0 : 0.0,
@@ -812,7 +850,7 @@ void Linker::Describe(
     wall ? 0.0 : std::max(0.0, -brighter - 0.1),
     wall ? std::max(0.0, -brighter - 0.1) : 0.0,
     std::max(0.0, brighter - 0.1),
-    clearest,
+    this->Clearest(link),
   };
 }
 
@@ -904,8 +942,8 @@ VesselLink Linker::BestLink(
       const bool way = this->Way(orphan.piece, end, target, within, link);
       // Where hardly anything is seen, the cheapest way follows what is no vessel.
       VesselLink curve;
-      if (tip != nullptr && (!way || link.unseen > 0.5 * link.length) &&
-        this->Curve(end, *tip, curve))
+      if (tip != nullptr && this->Curve(end, *tip, curve) &&
+        (!way || link.unseen > 0.5 * link.length || this->Strays(link, curve, end, *tip)))
       {
         link = std::move(curve);
       }
