@@ -2,6 +2,7 @@
 
 #include "LumenMeasurement.h"
 #include "Median.h"
+#include "ParallelFor.h"
 #include "SegmentAtlas.h"
 #include "VoxelLattice.h"
 
@@ -12,6 +13,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <optional>
 #include <queue>
 #include <stdexcept>
 #include <utility>
@@ -39,7 +41,13 @@ constexpr double ArteryContrast[] = { 1.0, 0.2 };
 constexpr double VeinContrast[] = { 0.55, 0.25 };
 /// mm, half-maximum radii: arteries end thinner than the one, veins go on into wider ones than the other.
 constexpr double ThinEnd[] = { 0.55, 0.75 };
+/// The same: a stretch between two lesions of a trunk may end as wide as the one; ribs and great vessels as the other.
+constexpr double WideEnd[] = { 1.2, 1.8 };
 constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
+/// What begins ahead of a tip of the tree and goes on in its direction is the rest of that artery: a lesion parts them.
+constexpr double OnwardGap = 12.0;    ///< mm from the tip
+constexpr double OnwardCosine = 0.75; ///< of the angles between the tip, the gap and what goes on
+constexpr double OnwardOdds = 2.0;
 /// Mean distance of true arteries from those of the mean heart is less; beyond it grows doubt.
 constexpr double UsualAway = 10.0; ///< mm of the mean heart
 
@@ -112,6 +120,40 @@ struct Sample
   double vesselness = 0.0; ///< greatest around
 };
 
+/// Where a branch of the tree ends.
+struct Tip
+{
+  Vector3 position;
+  Vector3 ahead; ///< unit
+};
+
+/// Ends of branches without daughters, with the direction of their last millimetres.
+std::vector<Tip> TipsOf(const CenterlineTree& tree)
+{
+  std::vector<Tip> tips;
+  for (const CenterlineTree::Branch& branch : tree.branches)
+  {
+    if (std::any_of(tree.branches.begin(), tree.branches.end(),
+          [&](const CenterlineTree::Branch& other)
+          { return other.parentGroupId == branch.groupId; }))
+    {
+      continue;
+    }
+    const Vector3& tip = tree.points[branch.points.back()];
+    std::size_t back = branch.points.size() - 1;
+    while (back > 0 && (tree.points[branch.points[back]] - tip).norm() < 2.0 * EndLength)
+    {
+      --back;
+    }
+    const Vector3 ahead = (tip - tree.points[branch.points[back]]).normalized();
+    if (ahead.norm() > 0.5)
+    {
+      tips.push_back({ tip, ahead });
+    }
+  }
+  return tips;
+}
+
 class Search
 {
 public:
@@ -119,6 +161,7 @@ public:
     : I(input)
     , L(input.image.grid)
     , Interpolator(input.image)
+    , Tips(TipsOf(input.tree))
   {
     this->Lumen.reference.lumen = input.blood;
     this->Lumen.reference.background = input.tissue;
@@ -145,6 +188,7 @@ private:
     bool bright; ///< as an artery
   };
   double UsualContrast(double radius) const;
+  bool GoesOn(const std::vector<Vector3>& axis) const;
   std::vector<Section> Sections(const std::vector<Vector3>& axis) const;
   static std::pair<std::size_t, std::size_t> BestStretch(const std::vector<Section>& sections);
   bool Describe(const std::vector<std::int64_t>& piece, LooseVessel& vessel) const;
@@ -153,6 +197,7 @@ private:
   VoxelLattice L;
   ImageInterpolator Interpolator;
   LumenSettings Lumen;
+  std::vector<Tip> Tips;
   std::vector<Sample> Samples; ///< of the tree, where it is seen
   double Tube = 0.0;           ///< vesselness of thin arteries
 };
@@ -232,46 +277,63 @@ std::vector<std::vector<std::int64_t>> Search::Pieces() const
       { taken[static_cast<std::size_t>(voxel)] = 1; });
   }
   const double least = LeastTube * this->Tube;
-  std::vector<std::vector<std::int64_t>> pieces;
-  for (int k = low[2]; k <= high[2]; ++k)
+  const auto free = [&](std::int64_t voxel)
   {
-    for (int j = low[1]; j <= high[1]; ++j)
+    if (taken[static_cast<std::size_t>(voxel)] != 0 || !(this->I.vesselness[voxel] >= least))
     {
-      for (int i = low[0]; i <= high[0]; ++i)
+      return false;
+    }
+    const double share = this->Share(voxel);
+    return share >= LeastShare && share <= TooBright;
+  };
+  // All that are free, slice by slice; pieces are then taken in this order.
+  std::vector<std::vector<std::int64_t>> slices(
+    static_cast<std::size_t>(std::max(0, high[2] - low[2] + 1)));
+  ParallelFor(static_cast<std::int64_t>(slices.size()), 4,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      for (std::int64_t slice = begin; slice < end; ++slice)
       {
-        const auto free = [&](std::int64_t voxel)
+        for (int j = low[1]; j <= high[1]; ++j)
         {
-          if (taken[static_cast<std::size_t>(voxel)] != 0 || !(this->I.vesselness[voxel] >= least))
+          for (int i = low[0]; i <= high[0]; ++i)
           {
-            return false;
-          }
-          const double share = this->Share(voxel);
-          return share >= LeastShare && share <= TooBright;
-        };
-        const std::int64_t first = this->L.Index(i, j, k);
-        if (!free(first))
-        {
-          continue;
-        }
-        taken[static_cast<std::size_t>(first)] = 1;
-        std::vector<std::int64_t> piece{ first };
-        for (std::size_t n = 0; n < piece.size(); ++n)
-        {
-          this->L.Neighbours(piece[n],
-            [&](std::int64_t next, float)
+            const std::int64_t voxel = this->L.Index(i, j, low[2] + static_cast<int>(slice));
+            if (free(voxel))
             {
-              if (free(next))
-              {
-                taken[static_cast<std::size_t>(next)] = 1;
-                piece.push_back(next);
-              }
-            });
+              slices[static_cast<std::size_t>(slice)].push_back(voxel);
+            }
+          }
         }
-        if (static_cast<double>(piece.size()) * std::cbrt(this->L.VoxelVolume()) >= LeastLength)
-        {
-          std::sort(piece.begin(), piece.end());
-          pieces.push_back(std::move(piece));
-        }
+      }
+    });
+  std::vector<std::vector<std::int64_t>> pieces;
+  for (const std::vector<std::int64_t>& slice : slices)
+  {
+    for (const std::int64_t first : slice)
+    {
+      if (!free(first))
+      {
+        continue;
+      }
+      taken[static_cast<std::size_t>(first)] = 1;
+      std::vector<std::int64_t> piece{ first };
+      for (std::size_t n = 0; n < piece.size(); ++n)
+      {
+        this->L.Neighbours(piece[n],
+          [&](std::int64_t next, float)
+          {
+            if (free(next))
+            {
+              taken[static_cast<std::size_t>(next)] = 1;
+              piece.push_back(next);
+            }
+          });
+      }
+      if (static_cast<double>(piece.size()) * std::cbrt(this->L.VoxelVolume()) >= LeastLength)
+      {
+        std::sort(piece.begin(), piece.end());
+        pieces.push_back(std::move(piece));
       }
     }
   }
@@ -396,6 +458,25 @@ double Search::UsualContrast(double radius) const
     }
   }
   return MedianOf(usual);
+}
+
+/// Whether an axis, from one of its ends, goes on where the tree ends.
+bool Search::GoesOn(const std::vector<Vector3>& axis) const
+{
+  const auto from = [&](const Vector3& begin, const Vector3& inwards)
+  {
+    const Vector3 along = (inwards - begin).normalized();
+    return std::any_of(this->Tips.begin(), this->Tips.end(),
+      [&](const Tip& tip)
+      {
+        const Vector3 gap = begin - tip.position;
+        // Over a short gap its direction says nothing.
+        const bool ahead = gap.norm() < Outside || gap.dot(tip.ahead) > OnwardCosine * gap.norm();
+        return gap.norm() < OnwardGap && ahead && along.dot(tip.ahead) > OnwardCosine;
+      });
+  };
+  const auto inside = std::min(axis.size() - 1, static_cast<std::size_t>(2.0 * EndLength / Step));
+  return from(axis.front(), axis[inside]) || from(axis.back(), axis[axis.size() - 1 - inside]);
 }
 
 /// Sections along an axis.
@@ -523,12 +604,14 @@ bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vesse
   {
     vessel.thinEnd = end.empty() ? vessel.thinEnd : std::min(vessel.thinEnd, MedianOf(end));
   }
+  vessel.goesOn = this->GoesOn(vessel.points);
   // Where an artery usually runs and does, another one is its vein; where it does not, it is the artery.
-  const double thick =
-    std::clamp((vessel.thinEnd - ThinEnd[0]) / (ThinEnd[1] - ThinEnd[0]), 0.0, 1.0);
+  const auto beyond = [&](const double(&from)[2])
+  { return std::clamp((vessel.thinEnd - from[0]) / (from[1] - from[0]), 0.0, 1.0); };
+  const double thick = beyond(ThinEnd) + beyond(WideEnd);
   const double odds = LogDensity(vessel.brightness, ArteryContrast) -
     LogDensity(vessel.brightness, VeinContrast) + 1.0 - 5.0 * vessel.besideItsOwn -
-    1.5 * vessel.besideOther + 1.0 - 3.0 * thick;
+    1.5 * vessel.besideOther + 1.0 - 3.0 * thick + (vessel.goesOn ? OnwardOdds : 0.0);
   vessel.confidence = vessel.seen / (1.0 + std::exp(-odds)) *
     std::exp(-std::max(0.0, vessel.away - UsualAway) / UsualAway);
   return true;
@@ -542,12 +625,25 @@ std::vector<LooseVessel> Search::Run()
   {
     return vessels;
   }
-  for (const std::vector<std::int64_t>& piece : this->Pieces())
-  {
-    LooseVessel vessel;
-    if (this->IsOnHeart(piece) && this->Describe(piece, vessel))
+  const std::vector<std::vector<std::int64_t>> pieces = this->Pieces();
+  std::vector<std::optional<LooseVessel>> found(pieces.size());
+  ParallelFor(static_cast<std::int64_t>(pieces.size()), 1,
+    [&](std::int64_t first, std::int64_t last)
     {
-      vessels.push_back(std::move(vessel));
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        LooseVessel vessel;
+        if (this->IsOnHeart(pieces[n]) && this->Describe(pieces[n], vessel))
+        {
+          found[n] = std::move(vessel);
+        }
+      }
+    });
+  for (std::optional<LooseVessel>& vessel : found)
+  {
+    if (vessel)
+    {
+      vessels.push_back(std::move(*vessel));
     }
   }
   std::stable_sort(vessels.begin(), vessels.end(),

@@ -31,6 +31,7 @@ struct LooseVessel
     0.0; ///< share of its length along with that artery of the tree which usually runs there
   double besideOther = 0.0; ///< the same with another artery
   double away = 0.0;        ///< mm of the mean heart from its courses of arteries, mean
+  bool goesOn = false;      ///< it begins ahead of a tip of the tree, and runs in its direction
   double confidence = 0.0;  ///< 0 to 1, that it is an artery
   std::string
     nearest; ///< artery of the mean heart whose course is nearest: "D2", "LAD", "RCA", ...
