@@ -5,8 +5,10 @@
 #include "DistanceTransform.h"
 #include "FastMarching.h"
 #include "LumenMeasurement.h"
+#include "Median.h"
 #include "OstialRoot.h"
 #include "ThinBranches.h"
+#include "TurnedBranches.h"
 #include "VeinRejection.h"
 #include "VoxelRegion.h"
 
@@ -232,6 +234,11 @@ private:
   {
     return this->Input.grid.origin + this->Input.grid.direction * frame;
   }
+  /// In the coordinates that the input was given in.
+  Vector3 ToGiven(const Vector3& frame) const
+  {
+    return this->Given.grid.origin + this->Given.grid.direction * frame;
+  }
   std::size_t Offset(int i, int j, int k) const
   {
     const std::array<int, 6>& e = this->Input.grid.extent;
@@ -272,7 +279,9 @@ private:
   void SettleOstia();
   void MarkCrossings(Course& course) const;
   void MarkBridged();
-  std::size_t SeenUpTo(const Course& course, double parentRadius) const;
+  std::vector<double> Outgrowth(const Course& course, std::vector<double> before) const;
+  std::size_t SeenUpTo(
+    const Course& course, double parentRadius, const std::vector<double>& before) const;
   std::int64_t Append(const Way& way, int treeId, bool wanted);
   std::vector<Vector3> FollowOuterWall(const Course& course, std::size_t good,
     const std::function<double(const Vector3&)>& outside) const;
@@ -282,6 +291,8 @@ private:
   bool ThinBranchesFor(ThinBranchSettings& settings) const;
   void FollowThinBranches();
   void LengthenTips();
+  void TurnBranches();
+  void Remove(std::size_t index);
   void FollowTargets();
   void StraightenFork(
     CenterlineTree& tree, std::size_t parent, std::size_t turning, std::size_t straight) const;
@@ -439,6 +450,10 @@ void Extractor::MakeRegion()
                                                    : this->MaskDistance.data();
   const float* speed = distance ? distance : this->Input.speed;
   const unsigned char* mask = this->Input.wallDistance ? nullptr : this->Input.mask;
+  // A mask is somebody's decision of what is vessel: automatic thresholds, which cut thin branches off
+  // where the measure is low, at their roots, do not overrule it.
+  const bool decided = mask != nullptr && !distance;
+  const bool anySpeed = decided && std::isnan(this->Settings.speedThreshold);
   if (distance)
   {
     // Thin vessels hold together where the wall is within half a voxel.
@@ -448,7 +463,7 @@ void Extractor::MakeRegion()
   else
   {
     this->SpeedThreshold = this->Settings.speedThreshold;
-    if (std::isnan(this->SpeedThreshold))
+    if (std::isnan(this->SpeedThreshold) && !anySpeed)
     {
       // A histogram of logarithms: any speed, any unit.
       float greatest = 0.0F;
@@ -480,10 +495,6 @@ void Extractor::MakeRegion()
     }
   }
 
-  // A mask is somebody's decision of what is vessel: automatic thresholds, which cut thin branches off
-  // where the measure is low, at their roots, do not overrule it.
-  const bool decided = mask != nullptr && !distance;
-  const bool anySpeed = decided && std::isnan(this->Settings.speedThreshold);
   const float threshold =
     anySpeed ? -std::numeric_limits<float>::infinity() : static_cast<float>(this->SpeedThreshold);
   const bool gate = this->Input.intensity && std::isfinite(this->IntensityThreshold) &&
@@ -1131,8 +1142,41 @@ void Extractor::MarkBridged()
   }
 }
 
+/// What speaks against a vessel because it is wider than what it comes from: no section of a chamber is quite
+/// clear, and an aneurysm's are.
+/// @param before  radii upstream, the nearest last
+std::vector<double> Extractor::Outgrowth(const Course& course, std::vector<double> before) const
+{
+  constexpr double far = 25.0; // mm upstream that are compared
+  constexpr double near = 4.0; // mm that may have begun to widen
+  constexpr double wide = 1.5; // as much as an ectatic artery
+  constexpr double most = 0.5;
+  const std::size_t known = before.size();
+  before.insert(before.end(), course.radius.begin(), course.radius.end());
+  std::vector<double> against(course.size(), 0.0);
+  const auto steps = [&](double length) { return static_cast<std::size_t>(length / this->Step); };
+  for (std::size_t i = 0; i < course.size(); ++i)
+  {
+    const std::size_t end = known + i > steps(near) ? known + i - steps(near) : 0;
+    const std::size_t begin = end > steps(far) ? end - steps(far) : 0;
+    if (end - begin < steps(2.0 * near))
+    {
+      continue;
+    }
+    // Lesions narrow what is upstream.
+    const double usual = QuantileOf({ before.begin() + static_cast<std::ptrdiff_t>(begin),
+                                      before.begin() + static_cast<std::ptrdiff_t>(end) },
+      0.8);
+    against[i] =
+      std::clamp(std::log(course.radius[i] / (wide * usual + 0.5 * this->Voxel)), 0.0, most);
+  }
+  return against;
+}
+
+/// @param before  radii upstream
 /// @returns the number of samples up to where a vessel is seen, 0 if there is none
-std::size_t Extractor::SeenUpTo(const Course& course, double parentRadius) const
+std::size_t Extractor::SeenUpTo(
+  const Course& course, double parentRadius, const std::vector<double>& before) const
 {
   const double gap =
     this->Settings.maximumGap > 0.0 ? this->Settings.maximumGap : 10.0 * this->Voxel;
@@ -1143,12 +1187,12 @@ std::size_t Extractor::SeenUpTo(const Course& course, double parentRadius) const
   double greatest = 0.0;
   double sum = 0.0;
   double unseen = 0.0;
+  const std::vector<double> outgrowth = this->Outgrowth(course, before);
   for (std::size_t i = first; i < course.size(); ++i)
   {
     // On a way across a lesion nothing need be seen, if something is behind it.
-    const double evidence = course.crossing[i] != 0
-      ? std::max(0.0, course.confidence[i] - this->Settings.minimumConfidence)
-      : course.confidence[i] - this->Settings.minimumConfidence;
+    const double seen = course.confidence[i] - this->Settings.minimumConfidence - outgrowth[i];
+    const double evidence = course.crossing[i] != 0 ? std::max(0.0, seen) : seen;
     sum += evidence;
     unseen = evidence < 0.0 ? unseen + this->Step : 0.0;
     if (unseen > gap)
@@ -1397,7 +1441,22 @@ std::int64_t Extractor::Append(const Way& way, int treeId, bool wanted)
   if (!wanted)
   {
     this->MarkCrossings(course);
-    const std::size_t end = this->SeenUpTo(course, root ? this->Lumen.maximumRadius : parentRadius);
+    std::vector<double> before;
+    if (!root)
+    {
+      const auto parent =
+        static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(way.owner)]);
+      for (const std::int64_t p : this->Tree.branches[parent].points)
+      {
+        before.push_back(this->Tree.radius[static_cast<std::size_t>(p)]);
+        if (p == way.owner)
+        {
+          break;
+        }
+      }
+    }
+    const std::size_t end =
+      this->SeenUpTo(course, root ? this->Lumen.maximumRadius : parentRadius, before);
     course.resize(end);
     if ((static_cast<double>(end) - 1.0) * this->Step < least)
     {
@@ -1651,6 +1710,7 @@ bool Extractor::IsExcluded(const std::vector<Vector3>& points) const
   return length > LongestCrossing || 4 * inside > points.size();
 }
 
+/// @param excluded  may be what this one was made with: it is read before it is changed
 bool Extractor::ExcludeVeins(std::vector<unsigned char>& excluded, std::vector<RejectedVein>& veins,
   std::vector<VeinBranch>& judged) const
 {
@@ -1833,6 +1893,62 @@ void Extractor::LengthenTips()
     }
     chain.resize(at);
     this->Own(b);
+  }
+}
+
+/// Branches that were entered from their ends begin where they leave their own vessel.
+void Extractor::TurnBranches()
+{
+  if (!this->Image || !std::isnan(this->Lumen.level) || this->Tree.branches.empty())
+  {
+    return;
+  }
+  const auto at = [&](std::int64_t point)
+  { return Text(this->ToGiven(this->Tree.points[static_cast<std::size_t>(point)])); };
+  std::vector<TurnedBranch> turned = FindTurnedBranches(*this->Image, this->Tree, this->Voxel);
+  for (const TurnedBranch& one : turned)
+  {
+    const CenterlineTree::Branch branch = this->Tree.branches[one.branch];
+    const std::string text = "a vessel of " + std::to_string(std::lround(one.length)) +
+      " mm from " + at(branch.points.back()) + " to " + at(branch.points.front()) +
+      " touches another one at its end";
+    bool joined = false;
+    if (one.root >= 0)
+    {
+      Way way;
+      way.owner = static_cast<std::int32_t>(one.root);
+      for (std::size_t i = one.contact; i < branch.points.size(); ++i)
+      {
+        way.points.push_back(this->Tree.points[static_cast<std::size_t>(branch.points[i])]);
+      }
+      way.points.insert(way.points.end(), one.way.rbegin(), one.way.rend());
+      joined = !this->IsExcluded(one.way) && this->Append(way, branch.treeId, true) >= 0;
+    }
+    this->Result.messages.push_back(text +
+      (joined ? "; it is taken for a branch that leaves at " + at(one.root)
+              : "; where it begins is not seen, and it is left out"));
+  }
+  for (auto one = turned.rbegin(); one != turned.rend(); ++one)
+  {
+    this->Remove(one->branch);
+  }
+}
+
+/// A branch without daughters.
+void Extractor::Remove(std::size_t index)
+{
+  const auto removed = static_cast<int>(index);
+  const int parent = this->Tree.branches[index].parentGroupId;
+  this->Tree.branches.erase(this->Tree.branches.begin() + removed);
+  for (CenterlineTree::Branch& branch : this->Tree.branches)
+  {
+    branch.groupId -= branch.groupId > removed ? 1 : 0;
+    branch.parentGroupId -= branch.parentGroupId > removed ? 1 : 0;
+  }
+  for (std::int32_t& branch : this->BranchOf)
+  {
+    branch = branch == removed ? parent : branch;
+    branch -= branch > removed ? 1 : 0;
   }
 }
 
@@ -2166,9 +2282,8 @@ void Extractor::SettleOstia()
   {
     if (!root.found)
     {
-      const Vector3 world = this->Given.grid.origin + this->Given.grid.direction * root.position;
       this->Result.messages.push_back("the tree of seed " + std::to_string(root.treeId) +
-        " begins at " + Text(world) +
+        " begins at " + Text(this->ToGiven(root.position)) +
         ", which may be inside the aorta: no clear section of its first vessel before it parts");
     }
   }
@@ -2262,6 +2377,7 @@ CenterlineResult Extractor::Run()
     {
       this->FindTips();
       this->FollowThinBranches();
+      this->TurnBranches();
       this->LengthenTips();
     }
     this->FollowTargets();
@@ -2384,14 +2500,12 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   constexpr int rounds = 6;
   for (int round = 0; round <= rounds; ++round)
   {
-    std::vector<unsigned char> more = excluded;
     Extractor extractor(framed, input, excluded, settings, progress);
     result = extractor.Run();
-    if (round == rounds || !extractor.ExcludeVeins(more, veins, judged))
+    if (round == rounds || !extractor.ExcludeVeins(excluded, veins, judged))
     {
       break;
     }
-    excluded = std::move(more);
   }
   const auto toWorld = [&](Vector3& point)
   { point = origin + input.grid.direction * Vector3(point); };

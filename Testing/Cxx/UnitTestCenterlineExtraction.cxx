@@ -549,6 +549,23 @@ TEST(CenterlineExtraction, OneSharedPointAtABifurcation)
   EXPECT_NO_THROW(CheckTree(result.tree));
 }
 
+TEST(CenterlineExtraction, AnAneurysmWithAClearWallIsVessel)
+{
+  const Tube parent{ Line(Vector3(-14, 0, -12), Vector3(14, 0, -12)), 1.5 };
+  const Tube daughter{ Line(Vector3(0, 0, -12), Vector3(0, 0, 14)), 0.9 };
+  const Tube aneurysm{ Line(Vector3(0, 0, -1), Vector3(0, 0, 4)), 2.2 };
+  const Scene scene({ parent, daughter, aneurysm }, Vector3::Constant(0.4), Matrix3::Identity(),
+    Vector3::Zero(), 16.0);
+  const CenterlineResult result =
+    ExtractCenterlines(scene.Input({ parent.axis.front() }), CenterlineSettings{});
+  double highest = -100.0;
+  for (const Vector3& point : result.tree.points)
+  {
+    highest = std::max(highest, point[2]);
+  }
+  EXPECT_GT(highest, 12.0);
+}
+
 // The longer way turns off by more than a right angle: its path is rounded there, and the vessel that
 // goes straight on is set on to that curve.
 TEST(CenterlineExtraction, TheForkOfALongBranchThatTurnsOffIsWhereTheAxesMeet)

@@ -1,0 +1,424 @@
+#include "TurnedBranches.h"
+
+#include "Median.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <stdexcept>
+
+namespace coronary
+{
+namespace
+{
+constexpr double AgainstFlow = 2.0; ///< rad between the flow and what leaves against it
+constexpr double Straight = 6.0;    ///< mm along which a direction is measured
+constexpr double Beside = 8.0;      ///< mm between walls of vessels that run side by side
+constexpr double Parallel = 0.65;   ///< cosine between their courses
+constexpr double LongestWay = 30.0; ///< mm to the true root
+/// Contrast along a way, as a share of the branch's own: mean, and least over 2 mm.
+constexpr double MeanShare = 0.5;
+constexpr double LeastShare = 0.3;
+constexpr double Window = 2.0;
+constexpr double MostDetour = 1.6; ///< length of a way over the distance of its ends
+/// The way leaves the end in the branch's own direction, not across to what is beside it.
+constexpr double Cone = 0.65; ///< cosine
+constexpr double ConeReach = 5.0;
+
+/// Length along a branch's points, mm.
+std::vector<double> Lengths(const CenterlineTree& tree, const std::vector<std::int64_t>& points)
+{
+  std::vector<double> along(points.size(), 0.0);
+  for (std::size_t i = 1; i < points.size(); ++i)
+  {
+    along[i] = along[i - 1] + (tree.points[points[i]] - tree.points[points[i - 1]]).norm();
+  }
+  return along;
+}
+
+class TurnedFinder
+{
+public:
+  TurnedFinder(const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+    : Image(image)
+    , Tree(tree)
+    , Voxel(voxel)
+  {
+    CheckTree(tree);
+    if (!(voxel > 0.0))
+    {
+      throw std::invalid_argument("turned branches: a voxel must be longer than 0");
+    }
+  }
+
+  std::vector<TurnedBranch> Run() const;
+
+private:
+  /// Points upstream of a branch, from its begin to the root, and the flow at each.
+  struct Upstream
+  {
+    std::vector<std::int64_t> points;
+    std::vector<Vector3> flow;
+  };
+
+  Upstream Above(std::size_t branch) const;
+  bool RunsBack(std::size_t branch, const Upstream& above, TurnedBranch& turned) const;
+  void FindRoot(const Upstream& above, TurnedBranch& turned) const;
+  bool IsSeen(const std::vector<Vector3>& way, double own, double around) const;
+  bool IsWay(const std::vector<Vector3>& way, const Vector3& flow, double own, double around) const;
+  /// Of the vessel and of what is around it, without what other vessels cover.
+  std::pair<double, double> Values(const TurnedBranch& turned) const;
+
+  const ImageInterpolator& Image;
+  const CenterlineTree& Tree;
+  double Voxel;
+};
+
+TurnedFinder::Upstream TurnedFinder::Above(std::size_t branch) const
+{
+  Upstream above;
+  std::int64_t from = this->Tree.branches[branch].points.front();
+  for (int parent = this->Tree.branches[branch].parentGroupId; parent >= 0;)
+  {
+    const auto at = std::find_if(this->Tree.branches.begin(), this->Tree.branches.end(),
+      [&](const CenterlineTree::Branch& one) { return one.groupId == parent; });
+    const std::vector<std::int64_t>& points = at->points;
+    const auto end = std::find(points.begin(), points.end(), from);
+    for (auto i = std::distance(points.begin(), end); i >= 0; --i)
+    {
+      above.points.push_back(points[static_cast<std::size_t>(i)]);
+    }
+    from = points.front();
+    parent = at->parentGroupId;
+    if (parent >= 0)
+    {
+      above.points.pop_back(); // the next one has it as well
+    }
+  }
+  const std::size_t count = above.points.size();
+  const auto at = [&](std::size_t i) -> const Vector3&
+  { return this->Tree.points[static_cast<std::size_t>(above.points[i])]; };
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    std::size_t up = i;
+    for (double passed = 0.0; up + 1 < count && passed < Straight; ++up)
+    {
+      passed += (at(up + 1) - at(up)).norm();
+    }
+    std::size_t down = up > i ? i : i - std::min<std::size_t>(i, 8);
+    above.flow.push_back((at(down) - at(up)).normalized());
+  }
+  return above;
+}
+
+/// Whether a branch leaves against the flow and stays beside what it comes from.
+bool TurnedFinder::RunsBack(std::size_t branch, const Upstream& above, TurnedBranch& turned) const
+{
+  const std::vector<std::int64_t>& points = this->Tree.branches[branch].points;
+  const std::vector<double> along = Lengths(this->Tree, points);
+  const auto begin = static_cast<std::size_t>(points.front());
+  const double mouth = this->Tree.radius[begin] + 1.0;
+  const auto within = [&](double passed)
+  {
+    return std::min(points.size() - 1,
+      static_cast<std::size_t>(
+        std::lower_bound(along.begin(), along.end(), passed) - along.begin()));
+  };
+  turned.branch = branch;
+  turned.contact = within(mouth);
+  turned.length = along.back();
+  if (along.back() < mouth + 0.5 * Straight || above.points.size() < 4)
+  {
+    return false;
+  }
+  const Vector3 leaving =
+    this->Tree.points[points[within(mouth + Straight)]] - this->Tree.points[points[turned.contact]];
+  const double angle =
+    std::acos(std::clamp(leaving.normalized().dot(above.flow.front()), -1.0, 1.0));
+  if (!(angle > AgainstFlow))
+  {
+    return false;
+  }
+  double all = 0.0;
+  double beside = 0.0;
+  for (std::size_t i = turned.contact; i + 1 < points.size(); ++i)
+  {
+    const Vector3& here = this->Tree.points[points[i]];
+    const Vector3 course = (this->Tree.points[points[i + 1]] - here).normalized();
+    double gap = Beside;
+    bool against = false;
+    for (std::size_t n = 0; n < above.points.size(); ++n)
+    {
+      const auto p = static_cast<std::size_t>(above.points[n]);
+      const double away = (this->Tree.points[p] - here).norm() - this->Tree.radius[p] -
+        this->Tree.radius[static_cast<std::size_t>(points[i])];
+      if (away < gap)
+      {
+        gap = away;
+        against = course.dot(above.flow[n]) < -Parallel;
+      }
+    }
+    all += along[i + 1] - along[i];
+    beside += gap < Beside && against ? along[i + 1] - along[i] : 0.0;
+  }
+  return beside > 0.5 * all;
+}
+
+std::pair<double, double> TurnedFinder::Values(const TurnedBranch& turned) const
+{
+  const std::vector<std::int64_t>& points = this->Tree.branches[turned.branch].points;
+  std::vector<double> own;
+  std::vector<double> around;
+  for (std::size_t i = turned.contact; i + 1 < points.size(); ++i)
+  {
+    const auto p = static_cast<std::size_t>(points[i]);
+    const Vector3 tangent = (this->Tree.points[points[i + 1]] - this->Tree.points[p]).normalized();
+    if (!tangent.allFinite())
+    {
+      continue;
+    }
+    own.push_back(this->Image.At(this->Tree.points[p]));
+    const Vector3 u = tangent.unitOrthogonal();
+    const Vector3 v = tangent.cross(u);
+    for (int side = 0; side < 8; ++side)
+    {
+      const double turn = M_PI * side / 4.0;
+      around.push_back(this->Image.At(this->Tree.points[p] +
+        (this->Tree.radius[p] + 2.0 * this->Voxel) * (std::cos(turn) * u + std::sin(turn) * v)));
+    }
+  }
+  // Half of it may be another vessel or a chamber.
+  return { MedianOf(own), QuantileOf(around, 0.25) };
+}
+
+bool TurnedFinder::IsSeen(const std::vector<Vector3>& way, double own, double around) const
+{
+  std::vector<double> shares;
+  for (std::size_t i = 1; i < way.size(); ++i)
+  {
+    const double length = (way[i] - way[i - 1]).norm();
+    const int pieces = std::max(1, static_cast<int>(std::lround(length / (0.5 * this->Voxel))));
+    for (int piece = 1; piece <= pieces; ++piece)
+    {
+      const Vector3 at = way[i - 1] + static_cast<double>(piece) / pieces * (way[i] - way[i - 1]);
+      shares.push_back((this->Image.At(at) - around) / (own - around));
+    }
+  }
+  const auto window = std::max<std::size_t>(
+    1, std::min(shares.size(), static_cast<std::size_t>(Window / (0.5 * this->Voxel))));
+  double sum = 0.0;
+  double all = 0.0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < shares.size(); ++i)
+  {
+    const double share = std::min(1.0, shares[i]);
+    all += share;
+    sum += share - (i >= window ? std::min(1.0, shares[i - window]) : 0.0);
+    if (i + 1 >= window)
+    {
+      least = std::min(least, sum / static_cast<double>(window));
+    }
+  }
+  return !shares.empty() && all >= MeanShare * static_cast<double>(shares.size()) &&
+    least >= LeastShare;
+}
+
+/// Whether a way, from its root on, is one that a branch takes.
+bool TurnedFinder::IsWay(
+  const std::vector<Vector3>& way, const Vector3& flow, double own, double around) const
+{
+  double length = 0.0;
+  for (std::size_t i = 1; i < way.size(); ++i)
+  {
+    length += (way[i] - way[i - 1]).norm();
+  }
+  const Vector3 leaving = way[std::min<std::size_t>(way.size() - 1, 6)] - way.front();
+  // A root against the flow again is none.
+  return length <= LongestWay && length <= MostDetour * (way.back() - way.front()).norm() + 1.5 &&
+    leaving.normalized().dot(flow) >= std::cos(AgainstFlow) && this->IsSeen(way, own, around);
+}
+
+/// The cheapest way from a branch's end to a vessel upstream, over a lattice of voxels.
+void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
+{
+  const std::vector<std::int64_t>& points = this->Tree.branches[turned.branch].points;
+  const Vector3& end = this->Tree.points[points.back()];
+  const std::vector<double> along = Lengths(this->Tree, points);
+  std::size_t back = points.size() - 1;
+  while (back > turned.contact && along.back() - along[back] < 0.5 * Straight)
+  {
+    --back;
+  }
+  const Vector3 ahead = (end - this->Tree.points[points[back]]).normalized();
+  const auto [own, around] = this->Values(turned);
+  if (!ahead.allFinite() || !(own > around))
+  {
+    return;
+  }
+  const int reach = static_cast<int>(std::ceil(LongestWay / this->Voxel));
+  const int size = 2 * reach + 1;
+  const auto number = [&](int i, int j, int k)
+  { return (static_cast<std::size_t>(k) * size + j) * size + i; };
+  const auto place = [&](std::size_t n) -> Vector3
+  {
+    const int i = static_cast<int>(n % size);
+    const int j = static_cast<int>(n / size % size);
+    const int k = static_cast<int>(n / size / size);
+    return end + this->Voxel * Vector3(i - reach, j - reach, k - reach);
+  };
+  // Lumens: of what is upstream, where the way may end, and of all else, where it may not pass.
+  constexpr std::int32_t open = -1;
+  constexpr std::int32_t closed = -2;
+  std::vector<std::int32_t> lumen(static_cast<std::size_t>(size) * size * size, open);
+  const auto mark = [&](std::size_t p, std::int32_t value)
+  {
+    const Vector3 at = (this->Tree.points[p] - end) / this->Voxel + Vector3::Constant(reach);
+    const double radius = this->Tree.radius[p] / this->Voxel;
+    std::array<int, 6> box;
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      box[2 * axis] = std::max(0, static_cast<int>(std::ceil(at[axis] - radius)));
+      box[2 * axis + 1] = std::min(size - 1, static_cast<int>(std::floor(at[axis] + radius)));
+    }
+    for (int k = box[4]; k <= box[5]; ++k)
+    {
+      for (int j = box[2]; j <= box[3]; ++j)
+      {
+        for (int i = box[0]; i <= box[1]; ++i)
+        {
+          if ((Vector3(i, j, k) - at).norm() <= radius)
+          {
+            lumen[number(i, j, k)] = value;
+          }
+        }
+      }
+    }
+  };
+  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  {
+    if (&branch != &this->Tree.branches[turned.branch])
+    {
+      for (const std::int64_t p : branch.points)
+      {
+        mark(static_cast<std::size_t>(p), closed);
+      }
+    }
+  }
+  for (std::size_t n = 0; n < above.points.size(); ++n)
+  {
+    mark(static_cast<std::size_t>(above.points[n]), static_cast<std::int32_t>(n));
+  }
+  struct Entry
+  {
+    float cost;
+    std::size_t voxel;
+    bool operator<(const Entry& other) const
+    {
+      return this->cost != other.cost ? this->cost > other.cost : this->voxel > other.voxel;
+    }
+  };
+  std::vector<float> cost(lumen.size(), std::numeric_limits<float>::infinity());
+  std::vector<std::int64_t> before(lumen.size(), -1);
+  std::priority_queue<Entry> queue;
+  const std::size_t start = number(reach, reach, reach);
+  cost[start] = 0.0F;
+  queue.push({ 0.0F, start });
+  std::int64_t arrived = -1;
+  while (!queue.empty() && arrived < 0)
+  {
+    const Entry top = queue.top();
+    queue.pop();
+    if (top.cost > cost[top.voxel])
+    {
+      continue;
+    }
+    if (top.voxel != start && lumen[top.voxel] >= 0)
+    {
+      arrived = static_cast<std::int64_t>(top.voxel);
+      break;
+    }
+    const int i = static_cast<int>(top.voxel % size);
+    const int j = static_cast<int>(top.voxel / size % size);
+    const int k = static_cast<int>(top.voxel / size / size);
+    for (int near = 0; near < 27; ++near)
+    {
+      const int ni = i + near % 3 - 1;
+      const int nj = j + near / 3 % 3 - 1;
+      const int nk = k + near / 9 - 1;
+      if (near == 13 || std::min({ ni, nj, nk }) < 0 || std::max({ ni, nj, nk }) >= size)
+      {
+        continue;
+      }
+      const std::size_t next = number(ni, nj, nk);
+      const Vector3 at = place(next);
+      const Vector3 offset = at - end;
+      if (lumen[next] == closed || !this->Image.Contains(at) ||
+        (offset.norm() < ConeReach && offset.dot(ahead) < Cone * offset.norm()))
+      {
+        continue;
+      }
+      const double share = std::clamp((this->Image.At(at) - around) / (own - around), 0.0, 1.0);
+      const double step = this->Voxel * Vector3(ni - i, nj - j, nk - k).norm();
+      const auto more = static_cast<float>(step / (0.03 + share * share));
+      if (top.cost + more < cost[next])
+      {
+        cost[next] = top.cost + more;
+        before[next] = static_cast<std::int64_t>(top.voxel);
+        queue.push({ cost[next], next });
+      }
+    }
+  }
+  if (arrived < 0)
+  {
+    return;
+  }
+  std::vector<Vector3> way;
+  for (std::int64_t at = arrived; at >= 0; at = before[static_cast<std::size_t>(at)])
+  {
+    way.push_back(place(static_cast<std::size_t>(at)));
+  }
+  const auto meeting = static_cast<std::size_t>(lumen[static_cast<std::size_t>(arrived)]);
+  if (this->IsWay(way, above.flow[meeting], own, around))
+  {
+    turned.root = above.points[meeting];
+    turned.way = std::move(way);
+  }
+}
+
+std::vector<TurnedBranch> TurnedFinder::Run() const
+{
+  std::vector<char> parts(this->Tree.branches.size(), 0);
+  for (std::size_t b = 0; b < parts.size(); ++b)
+  {
+    for (const CenterlineTree::Branch& other : this->Tree.branches)
+    {
+      parts[b] |= other.parentGroupId == this->Tree.branches[b].groupId ? 1 : 0;
+    }
+  }
+  std::vector<TurnedBranch> found;
+  for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
+  {
+    if (parts[b] != 0 || this->Tree.branches[b].parentGroupId < 0)
+    {
+      continue;
+    }
+    const Upstream above = this->Above(b);
+    TurnedBranch turned;
+    if (this->RunsBack(b, above, turned))
+    {
+      this->FindRoot(above, turned);
+      found.push_back(std::move(turned));
+    }
+  }
+  return found;
+}
+}
+
+std::vector<TurnedBranch> FindTurnedBranches(
+  const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+{
+  return TurnedFinder(image, tree, voxel).Run();
+}
+}
