@@ -3,6 +3,8 @@
 #include "CoronaryOstia.h"
 #include "HeartRegion.h"
 #include "Interruption.h"
+#include "LargePages.h"
+#include "ParallelFor.h"
 #include "RankGroup.h"
 #include "RunSettings.h"
 #include "vtkGatedImageReader.h"
@@ -16,12 +18,73 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <limits>
 #include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 namespace coronary
 {
 using Json = nlohmann::ordered_json;
+
+void RangeOf(vtkImageData* image, double range[2])
+{
+  std::vector<float> copy;
+  const ScalarImage voxels =
+    vtkCoronary::ScalarImageOf(image, image->GetPointData()->GetScalars(), copy);
+  const std::int64_t slices = voxels.Dimensions()[2];
+  const std::int64_t slice = voxels.NumberOfVoxels() / std::max<std::int64_t>(1, slices);
+  std::vector<double> least(static_cast<std::size_t>(slices), VTK_DOUBLE_MAX);
+  std::vector<double> greatest(static_cast<std::size_t>(slices), VTK_DOUBLE_MIN);
+  std::visit(
+    [&](const auto* values)
+    {
+      ParallelFor(slices, 4,
+        [&](std::int64_t first, std::int64_t last)
+        {
+          for (std::int64_t k = first; k < last; ++k)
+          {
+            // What is no number compares with nothing.
+            auto low = std::numeric_limits<std::decay_t<decltype(*values)>>::max();
+            auto high = std::numeric_limits<std::decay_t<decltype(*values)>>::lowest();
+            for (std::int64_t v = k * slice; v < (k + 1) * slice; ++v)
+            {
+              low = values[v] < low ? values[v] : low;
+              high = values[v] > high ? values[v] : high;
+            }
+            least[k] = low;
+            greatest[k] = high;
+          }
+        });
+    },
+    voxels.values);
+  range[0] = slices > 0 ? *std::min_element(least.begin(), least.end()) : VTK_DOUBLE_MAX;
+  range[1] = slices > 0 ? *std::max_element(greatest.begin(), greatest.end()) : VTK_DOUBLE_MIN;
+}
+
+void RequireOstia(const RunStep& step, const std::vector<double>& confidences)
+{
+  const auto best = std::max_element(confidences.begin(), confidences.end());
+  if (best == confidences.end() || *best >= LeastOstialConfidence)
+  {
+    return;
+  }
+  double range[2];
+  RangeOf(step.input.Reference, range);
+  char text[300];
+  std::snprintf(text, sizeof(text),
+    "no coronary ostium was found: the likeliest place has a confidence of %.2f. %s. Give the "
+    "ostia with --seed X Y Z (LPS, mm) when the vessels are to be seen",
+    *best,
+    range[0] >= 0.0
+      ? "No value is below 0, where HU have fat and air: take off what was added to them (1024, "
+        "mostly)"
+      : "It may have no contrast medium in the aorta, or not show the ascending aorta");
+  throw std::runtime_error("'" + step.report.Of("image").get<std::string>() + "': " + text + ".");
+}
 
 void FindHeart(RunStep& step)
 {
@@ -29,7 +92,7 @@ void FindHeart(RunStep& step)
   const RunSettings& settings = input.Settings;
   vtkImageData* image = input.Reference;
   double range[2];
-  image->GetScalarRange(range);
+  RangeOf(image, range);
   // With c measured the region would have a say in it.
   if (!input.Seeds.empty() || input.HasMasks() || settings.beyondMask || !(settings.c > 0.0) ||
     range[1] - range[0] < LeastRangeOfHU)
@@ -53,6 +116,12 @@ void FindHeart(RunStep& step)
     // Who needs the image says what is wrong with it.
     return;
   }
+  std::vector<double> confidences;
+  for (const CoronaryOstium& ostium : input.Ostia->ostia)
+  {
+    confidences.push_back(ostium.confidence);
+  }
+  RequireOstia(step, confidences);
   if (input.Ostia->ostia.size() < 2 || !input.Ostia->doubt.empty())
   {
     return;
@@ -91,8 +160,9 @@ vtkSmartPointer<vtkImageData> HeartMask(RunStep& step)
     mask->SetDirectionMatrix(info->Get(vtkDataObject::DIRECTION()));
   }
   mask->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
-  HeartRegion(vtkCoronary::GridOf(mask), blocks)
-    .Fill(static_cast<unsigned char*>(mask->GetScalarPointer()));
+  auto* voxels = static_cast<unsigned char*>(mask->GetScalarPointer());
+  PreferLargePages(voxels, static_cast<std::size_t>(mask->GetNumberOfPoints()));
+  HeartRegion(vtkCoronary::GridOf(mask), blocks).Fill(voxels);
   return mask;
 }
 

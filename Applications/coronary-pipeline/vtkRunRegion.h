@@ -18,6 +18,19 @@ namespace coronary
 /// Images with fewer values between the least and the greatest are in another unit than HU.
 constexpr double LeastRangeOfHU = 400.0;
 
+/// The least and the greatest value; VTK's own way to them took more than a second of a run.
+void RangeOf(vtkImageData* image, double range[2]);
+
+/// Ostia that are all less sure than this are none: nine such runs of ten go through something else.
+constexpr double LeastOstialConfidence = 0.1;
+
+/**
+ * Ends a run whose ostia were looked for and can not be believed.
+ * @param confidences  of the ostia that were found
+ * @throws std::runtime_error naming the image, what may be wrong with it and what helps
+ */
+void RequireOstia(const RunStep& step, const std::vector<double>& confidences);
+
 /**
  * The ostia of the reference phase and the region around them, into the input; no region where the ostia are not sure, where
  * seeds or a mask are given, or where the image is not HU.

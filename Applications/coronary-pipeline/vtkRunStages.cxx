@@ -288,7 +288,7 @@ bool DoubtImage(RunStep& step)
       Format(0.7) + " mm");
   }
   double range[2];
-  image->GetScalarRange(range);
+  RangeOf(image, range);
   const bool unknown =
     range[1] - range[0] < LeastRangeOfHU && step.input.Settings.c == RunSettings().c;
   if (unknown)
@@ -391,6 +391,15 @@ void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
     vtkPolyData::SafeDownCast(segmentation->GetOutputDataObject(vtkVesselSegmentation::SeedsPort));
   aorta =
     vtkPolyData::SafeDownCast(segmentation->GetOutputDataObject(vtkVesselSegmentation::AortaPort));
+  if (given.empty())
+  {
+    std::vector<double> confidences;
+    for (const auto& seed : DescribeSeeds(seeds))
+    {
+      confidences.push_back(seed["confidence"].get<double>());
+    }
+    RequireOstia(step, confidences);
+  }
   if (!mask)
   {
     mask = Detached(segmentation->GetOutput());
