@@ -11,9 +11,9 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
-#include <optional>
 #include <queue>
 #include <stdexcept>
 #include <utility>
@@ -191,7 +191,11 @@ private:
   bool GoesOn(const std::vector<Vector3>& axis) const;
   std::vector<Section> Sections(const std::vector<Vector3>& axis) const;
   static std::pair<std::size_t, std::size_t> BestStretch(const std::vector<Section>& sections);
-  bool Describe(const std::vector<std::int64_t>& piece, LooseVessel& vessel) const;
+  bool Describe(
+    const std::vector<Vector3>& whole, std::vector<Section> sections, LooseVessel& vessel) const;
+  std::vector<std::vector<std::int64_t>> Rest(const std::vector<std::int64_t>& piece,
+    const std::vector<Vector3>& axis, const std::vector<Section>& sections) const;
+  std::vector<LooseVessel> VesselsOf(std::vector<std::int64_t> piece) const;
 
   const LooseVesselInput& I;
   VoxelLattice L;
@@ -531,10 +535,9 @@ std::pair<std::size_t, std::size_t> Search::BestStretch(const std::vector<Sectio
   return best;
 }
 
-bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vessel) const
+bool Search::Describe(
+  const std::vector<Vector3>& whole, std::vector<Section> sections, LooseVessel& vessel) const
 {
-  const std::vector<Vector3> whole = this->Axis(piece);
-  std::vector<Section> sections = this->Sections(whole);
   const auto [first, last] = BestStretch(sections);
   sections.assign(sections.begin() + static_cast<std::ptrdiff_t>(first),
     sections.begin() + static_cast<std::ptrdiff_t>(last));
@@ -617,6 +620,84 @@ bool Search::Describe(const std::vector<std::int64_t>& piece, LooseVessel& vesse
   return true;
 }
 
+/// What is left of a piece without the vessel along an axis: parts that may be a vessel.
+std::vector<std::vector<std::int64_t>> Search::Rest(const std::vector<std::int64_t>& piece,
+  const std::vector<Vector3>& axis, const std::vector<Section>& sections) const
+{
+  const double edge = std::cbrt(this->L.VoxelVolume());
+  std::vector<char> taken(piece.size(), 0);
+  for (std::size_t n = 0; n < axis.size(); ++n)
+  {
+    const double reach = std::clamp(sections[n].sample.radius, Step, WideEnd[1]) + edge;
+    for (std::size_t v = 0; v < piece.size(); ++v)
+    {
+      const Vector3 place = this->L.World(this->L.Place(piece[v]));
+      taken[v] |= (place - axis[n]).squaredNorm() < reach * reach ? 1 : 0;
+    }
+  }
+  std::vector<std::vector<std::int64_t>> parts;
+  for (std::size_t first = 0; first < piece.size(); ++first)
+  {
+    if (taken[first] != 0)
+    {
+      continue;
+    }
+    taken[first] = 1;
+    std::vector<std::int64_t> part{ piece[first] };
+    for (std::size_t n = 0; n < part.size(); ++n)
+    {
+      this->L.Neighbours(part[n],
+        [&](std::int64_t voxel, float)
+        {
+          const auto found = std::lower_bound(piece.begin(), piece.end(), voxel);
+          const auto at = static_cast<std::size_t>(found - piece.begin());
+          if (found != piece.end() && *found == voxel && taken[at] == 0)
+          {
+            taken[at] = 1;
+            part.push_back(voxel);
+          }
+        });
+    }
+    if (static_cast<double>(part.size()) * edge >= LeastLength)
+    {
+      std::sort(part.begin(), part.end());
+      parts.push_back(std::move(part));
+    }
+  }
+  return parts;
+}
+
+/// Vessels that touch are one piece: the longest of it, then those of what is left.
+std::vector<LooseVessel> Search::VesselsOf(std::vector<std::int64_t> piece) const
+{
+  constexpr int most = 8; // ways that are looked at
+  std::vector<LooseVessel> vessels;
+  std::vector<std::vector<std::int64_t>> parts{ std::move(piece) };
+  for (int n = 0; n < most && !parts.empty(); ++n)
+  {
+    const auto largest = std::max_element(
+      parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
+    const std::vector<std::int64_t> part = std::move(*largest);
+    parts.erase(largest);
+    if (!this->IsOnHeart(part))
+    {
+      continue;
+    }
+    const std::vector<Vector3> axis = this->Axis(part);
+    const std::vector<Section> sections = this->Sections(axis);
+    LooseVessel vessel;
+    if (this->Describe(axis, sections, vessel))
+    {
+      vessels.push_back(std::move(vessel));
+    }
+    for (std::vector<std::int64_t>& rest : this->Rest(part, axis, sections))
+    {
+      parts.push_back(std::move(rest));
+    }
+  }
+  return vessels;
+}
+
 std::vector<LooseVessel> Search::Run()
 {
   this->MeasureTree();
@@ -625,26 +706,19 @@ std::vector<LooseVessel> Search::Run()
   {
     return vessels;
   }
-  const std::vector<std::vector<std::int64_t>> pieces = this->Pieces();
-  std::vector<std::optional<LooseVessel>> found(pieces.size());
+  std::vector<std::vector<std::int64_t>> pieces = this->Pieces();
+  std::vector<std::vector<LooseVessel>> found(pieces.size());
   ParallelFor(static_cast<std::int64_t>(pieces.size()), 1,
     [&](std::int64_t first, std::int64_t last)
     {
       for (std::int64_t n = first; n < last; ++n)
       {
-        LooseVessel vessel;
-        if (this->IsOnHeart(pieces[n]) && this->Describe(pieces[n], vessel))
-        {
-          found[n] = std::move(vessel);
-        }
+        found[n] = this->VesselsOf(std::move(pieces[n]));
       }
     });
-  for (std::optional<LooseVessel>& vessel : found)
+  for (std::vector<LooseVessel>& some : found)
   {
-    if (vessel)
-    {
-      vessels.push_back(std::move(*vessel));
-    }
+    std::move(some.begin(), some.end(), std::back_inserter(vessels));
   }
   std::stable_sort(vessels.begin(), vessels.end(),
     [](const LooseVessel& a, const LooseVessel& b) { return a.length > b.length; });

@@ -25,6 +25,8 @@ constexpr double Straight = 6.0;    ///< mm along which a direction is measured
 constexpr double Prior = -3.5;
 constexpr double CutReach = 1.0;     ///< mm beyond a tip's wall
 constexpr double Accompanied = 20.0; ///< mm beside an artery: as much as more
+/// Share of the contrast by which the lumens of two arteries side by side differ: they hold the same blood.
+constexpr double SameBlood = 0.04;
 /// Bend of a vessel over the breadth of another one, and of the measured directions, rad; against directions at random
 /// this tells a tube that goes through from two branches that face each other.
 constexpr double ThroughBend = 0.15;
@@ -38,25 +40,25 @@ constexpr double LongestStem = 4.0;
 constexpr double CloseLength = 12.0;
 
 /// Fitted to the branches of phantoms (scripts/fit-odds.sh).
-constexpr double Intercept = -4.74;
+constexpr double Intercept = -5.04;
 constexpr std::array<FittedSign, NumberOfVeinSigns> Signs{ {
-  { "darker", 0.78 },
-  { "brighter", 0.79 },
-  { "darker_beside", 2.23 },
-  { "brighter_beside", 1.19 },
-  { "beside", 2.48 },
-  { "beside_unclear", 0.76 },
-  { "thinner", 0.50 },
-  { "taper", 2.84 },
-  { "strong_taper", 1.39 },
-  { "no_taper", 0.91 },
-  { "blunt_goes_on", 2.98 },
-  { "blunt_cut", 3.01 },
-  { "blunt", 4.14 },
-  { "backwards", 1.18 },
+  { "darker", 0.93 },
+  { "brighter", 1.70 },
+  { "darker_beside", 2.92 },
+  { "brighter_beside", 1.33 },
+  { "beside", 3.04 },
+  { "beside_unclear", 0.67 },
+  { "thinner", 1.47 },
+  { "taper", 3.45 },
+  { "strong_taper", 1.42 },
+  { "no_taper", 0.59 },
+  { "blunt_goes_on", 2.37 },
+  { "blunt_cut", 3.00 },
+  { "blunt", 4.41 },
+  { "backwards", 1.84 },
   { "through", 1.20 },
-  { "short", 2.25 },
-  { "no_brightness", -0.92 },
+  { "short", 2.43 },
+  { "no_brightness", -0.04 },
 } };
 
 /// Standard deviation of a median by noise: samples within about 1 mm are not independent.
@@ -531,7 +533,7 @@ void VeinFinder::Weigh(Arm& arm) const
     known ? (this->Usual - arm.brightness) / std::hypot(arm.error, this->Natural) : 0.0;
   const bool knownBeside = arm.errorBeside > 0.0;
   const double darkerBeside =
-    knownBeside ? -arm.stepBeside / std::hypot(arm.errorBeside, this->Natural) : 0.0;
+    knownBeside ? -arm.stepBeside / std::hypot(arm.errorBeside, SameBlood) : 0.0;
   const double beside = std::min(1.0, arm.beside / Accompanied);
   const bool tapers = !std::isnan(arm.taper);
   const double blunt = std::clamp(arm.blunt, 0.0, 1.3);

@@ -650,10 +650,69 @@ void Separate(std::vector<DenseVessel>& vessels)
   }
 }
 
+double VeinRadius(double along)
+{
+  return 0.8 + 0.9 * along;
+}
+
+/// Veins cross arteries on the side away from the heart, and do not share their lumens: both walls are between them.
+void LiftOverArteries(
+  const HeartFrame& frame, const std::vector<DenseVessel>& arteries, DenseVessel& course)
+{
+  constexpr double walls = 0.7;  // mm: half a millimetre is the artery's
+  constexpr double slope = 10.0; // mm along the vein to each side of what it crosses
+  constexpr int rounds = 20;
+  const std::size_t count = course.points.size();
+  for (int round = 0; round < rounds; ++round)
+  {
+    std::vector<double> lift(count, 0.0);
+    std::vector<Vector3> outwards(count);
+    for (std::size_t i = 0; i < count; ++i)
+    {
+      const Vector3& p = course.points[i];
+      const Vector3 tangent =
+        course.points[std::min(i + 1, count - 1)] - course.points[i > 0 ? i - 1 : 0];
+      outwards[i] = EpicardialNormal(frame, p, tangent.normalized());
+      for (const DenseVessel& artery : arteries)
+      {
+        for (std::size_t n = 0; n < artery.points.size(); ++n)
+        {
+          const Vector3 away = p - artery.points[n];
+          const double least =
+            artery.radius[n] + VeinRadius(course.arc[i] / course.arc.back()) + walls;
+          const double missing = least * least - away.squaredNorm();
+          if (missing > 0.0)
+          {
+            const double up = away.dot(outwards[i]);
+            lift[i] = std::max(lift[i], std::sqrt(up * up + missing) - up);
+          }
+        }
+      }
+    }
+    if (*std::max_element(lift.begin(), lift.end()) < 0.01)
+    {
+      break;
+    }
+    // As little as needed there, and gently up to it.
+    for (std::size_t i = 0; i < count; ++i)
+    {
+      double most = 0.0;
+      for (std::size_t n = 0; n < count; ++n)
+      {
+        const double off = std::abs(course.arc[n] - course.arc[i]) / slope;
+        most = std::max(most, off < 1.0 ? lift[n] * (1.0 - SmoothStep(off)) : 0.0);
+      }
+      course.points[i] += most * outwards[i];
+    }
+    ComputeArc(course);
+  }
+}
+
 /// The great cardiac vein: beside the LAD from the apex up to its first diagonal, then in the groove
 /// beside the circumflex from its first marginal on.
-PhantomTree MakeVein(const HeartFrame& frame, const DenseVessel& anterior, double firstDiagonal,
-  const DenseVessel& circumflex, double firstMarginal, double spacing)
+PhantomTree MakeVein(const HeartFrame& frame, const std::vector<DenseVessel>& arteries,
+  const DenseVessel& anterior, double firstDiagonal, const DenseVessel& circumflex,
+  double firstMarginal, double spacing)
 {
   const auto beside = [&](const DenseVessel& vessel, double arc, double away, double out)
   {
@@ -686,6 +745,7 @@ PhantomTree MakeVein(const HeartFrame& frame, const DenseVessel& anterior, doubl
     course.points.push_back(curve(curve.End() * i / fine));
   }
   ComputeArc(course);
+  LiftOverArteries(frame, arteries, course);
 
   PhantomTree vein;
   PhantomBranch branch;
@@ -697,7 +757,7 @@ PhantomTree MakeVein(const HeartFrame& frame, const DenseVessel& anterior, doubl
     const double s = length * i / count;
     branch.points.push_back(i);
     vein.points.push_back(AtArc(course, course.points, s));
-    vein.radius.push_back(0.8 + 0.9 * s / length);
+    vein.radius.push_back(VeinRadius(s / length));
     vein.abscissa.push_back(s);
     vein.segmentId.push_back(0);
   }
@@ -1057,8 +1117,14 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     }
   }
 
-  this->vein = MakeVein(this->frame, dense[byName.at("LAD")], dense[byName.at("D1")].parentArc,
-    dense[byName.at("LCx")], dense[byName.at("OM1")].parentArc, settings.centerlineSpacing);
+  std::vector<DenseVessel> whole = dense;
+  for (std::size_t v = 0; v < whole.size(); ++v)
+  {
+    whole[v].radius = healthy[v];
+  }
+  this->vein =
+    MakeVein(this->frame, whole, dense[byName.at("LAD")], dense[byName.at("D1")].parentArc,
+      dense[byName.at("LCx")], dense[byName.at("OM1")].parentArc, settings.centerlineSpacing);
 
   const Vector3 trunk(14.0, -38.0, 8.0);
   this->pulmonaryBase = (trunk + variation(trunk) * 0.4) * this->frame.size;

@@ -31,9 +31,10 @@ constexpr double WallGap = 8.0;  ///< mm: longest link to a wall
 constexpr double FreeGap = 12.0; ///< mm: longer ones need more than ends that point at each other
 /// Ends that face each other are one vessel's, and it runs between them as a smooth curve does: a way that strays from it by
 /// this share of the gap is another thing's, unless it is as clear as a vessel.
-constexpr double Facing = 0.6;    ///< rad of each end to the other
-constexpr double Straying = 0.2;  ///< of the gap
-constexpr double ClearTube = 0.5; ///< vesselness, in that of a clear tube, throughout
+constexpr double Facing = 0.6;      ///< rad of each end to the other
+constexpr double LeastFacing = 5.0; ///< mm: nearer ends may face anywhere
+constexpr double Straying = 0.2;    ///< of the gap
+constexpr double ClearTube = 0.5;   ///< vesselness, in that of a clear tube, throughout
 
 /// Fitted to the links that came to mind in phantoms (scripts/fit-odds.sh).
 constexpr double Intercept = 1.33;
@@ -742,7 +743,7 @@ bool Linker::Strays(
 {
   const Vector3 chord = tip.position - end.position;
   const double gap = chord.norm();
-  if (tip.root > 0.0 || gap < WallGap || Angle(end.outwards, chord / gap) > Facing ||
+  if (tip.root > 0.0 || gap < LeastFacing || Angle(end.outwards, chord / gap) > Facing ||
     Angle(tip.outwards, -chord / gap) > Facing)
   {
     return false;
@@ -942,8 +943,17 @@ VesselLink Linker::BestLink(
       const bool way = this->Way(orphan.piece, end, target, within, link);
       // Where hardly anything is seen, the cheapest way follows what is no vessel.
       VesselLink curve;
-      if (tip != nullptr && this->Curve(end, *tip, curve) &&
-        (!way || link.unseen > 0.5 * link.length || this->Strays(link, curve, end, *tip)))
+      VesselEnd facing;
+      if (tip == nullptr)
+      {
+        // A wall faces whatever is before it.
+        facing.position = target;
+        facing.outwards = (end.position - target).normalized();
+      }
+      const VesselEnd& other = tip != nullptr ? *tip : facing;
+      const bool unseen = tip != nullptr && (!way || link.unseen > 0.5 * link.length);
+      if ((unseen || way) && this->Curve(end, other, curve) &&
+        (unseen || this->Strays(link, curve, end, other)))
       {
         link = std::move(curve);
       }

@@ -570,6 +570,33 @@ TEST(PhantomImage, TissuesHaveTheirValues)
   EXPECT_NEAR(ValueAt(phantom, vein.points[middle], t), settings.veinHU, 12.0);
 }
 
+TEST(CoronaryPhantom, TheVeinSharesNoLumenWithAnArtery)
+{
+  for (const std::uint64_t seed : { 1, 2, 3, 585, 944 })
+  {
+    PhantomSettings settings;
+    settings.seed = seed;
+    const CoronaryPhantom phantom(settings);
+    for (const double t : { 0.35, 0.75 })
+    {
+      const PhantomTree tree = phantom.Tree(t);
+      const PhantomTree vein = phantom.Vein(t);
+      double gap = 10.0;
+      for (std::size_t v = 0; v < vein.points.size(); ++v)
+      {
+        for (std::size_t p = 0; p < tree.points.size(); ++p)
+        {
+          gap = std::min(
+            gap, (vein.points[v] - tree.points[p]).norm() - vein.radius[v] - tree.radius[p]);
+        }
+      }
+      // The heart's wall thickens and thins around both.
+      EXPECT_GT(gap, t == 0.75 ? 0.5 : 0.1) << "seed " << seed << ", t " << t;
+      EXPECT_LT(gap, 1.5) << "seed " << seed << ", t " << t;
+    }
+  }
+}
+
 TEST(PhantomImage, DirectionAndOriginOnlyMoveTheSamples)
 {
   const CoronaryPhantom phantom(Quiet());
