@@ -307,6 +307,21 @@ void Draw(Scene& scene, const Distance& tube, double value)
   scene.Filter();
 }
 
+TEST(VesselLinking, ADimVesselBesideALesionIsNotTheWay)
+{
+  // A branch leaves right before the lesion: the way begins at a wall, not at a tip.
+  Scene scene({ Tube({ 0, 0, 0 }, { 30, 0, 0 }, 1.4, 1.2), Tube({ 38.5, 0, 0 }, { 78, 0, 0 }, 1.2),
+    Tube({ 27, 0, 0 }, { 40, -20, 0 }, 0.9) });
+  Draw(scene, Tube({ 14, 2.5, 0 }, { 64, 2.5, 0 }, 0.9), Fat + 0.45 * (Blood - Fat));
+  const VesselSegmentationResult result = scene.Run();
+  ASSERT_EQ(result.links.size(), 1U);
+  for (const Vector3& p : result.links.front().points)
+  {
+    EXPECT_LT(std::hypot(p[1], p[2]), 1.0) << p.transpose();
+  }
+  EXPECT_GT(scene.Count(result, Behind), 1000);
+}
+
 CenterlineResult Extract(const Scene& scene)
 {
   const VesselSegmentationResult segmentation = scene.Run();
