@@ -48,6 +48,7 @@ constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
 constexpr double OnwardGap = 12.0;    ///< mm from the tip
 constexpr double OnwardCosine = 0.75; ///< of the angles between the tip, the gap and what goes on
 constexpr double OnwardOdds = 2.0;
+constexpr double LeastOnward = 5.0; ///< mm of it
 /// Mean distance of true arteries from those of the mean heart is less; beyond it grows doubt.
 constexpr double UsualAway = 10.0; ///< mm of the mean heart
 
@@ -184,8 +185,9 @@ private:
   struct Section
   {
     Sample sample;
-    bool seen;   ///< a lumen all around
-    bool bright; ///< as an artery
+    bool seen; ///< a lumen all around
+    double
+      odds; ///< of an artery's rather than a vein's, as a logarithm, -1 to 1; -1 where nothing is seen
   };
   double UsualContrast(double radius) const;
   bool GoesOn(const std::vector<Vector3>& axis) const;
@@ -486,8 +488,6 @@ bool Search::GoesOn(const std::vector<Vector3>& axis) const
 /// Sections along an axis.
 std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) const
 {
-  // Brighter than here a section is an artery's rather than a vein's.
-  constexpr double even = 0.5 * (ArteryContrast[0] + VeinContrast[0]);
   std::map<int, double> known; // by radius in tenths of mm
   std::vector<Section> sections;
   for (std::size_t n = 0; n < axis.size(); ++n)
@@ -495,7 +495,7 @@ std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) 
     const Vector3 tangent =
       (axis[std::min(n + 2, axis.size() - 1)] - axis[n < 2 ? 0 : n - 2]).normalized();
     double seen = 0.0;
-    Section section{ this->Measure(axis[n], tangent, 0.8, &seen), false, false };
+    Section section{ this->Measure(axis[n], tangent, 0.8, &seen), false, -1.0 };
     section.seen = seen > SeenConfidence;
     if (section.seen)
     {
@@ -504,7 +504,9 @@ std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) 
       {
         usual->second = this->UsualContrast(section.sample.radius);
       }
-      section.bright = section.sample.contrast >= even * usual->second;
+      const double brightness = section.sample.contrast / std::max(1e-9, usual->second);
+      section.odds = std::clamp(
+        LogDensity(brightness, ArteryContrast) - LogDensity(brightness, VeinContrast), -1.0, 1.0);
     }
     sections.push_back(section);
   }
@@ -515,17 +517,17 @@ std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) 
 std::pair<std::size_t, std::size_t> Search::BestStretch(const std::vector<Section>& sections)
 {
   std::pair<std::size_t, std::size_t> best{ 0, 0 };
-  int most = 0;
-  int sum = 0;
+  double most = 0.0;
+  double sum = 0.0;
   std::size_t begin = 0;
   for (std::size_t n = 0; n < sections.size(); ++n)
   {
-    if (sum <= 0)
+    if (sum <= 0.0)
     {
-      sum = 0;
+      sum = 0.0;
       begin = n;
     }
-    sum += sections[n].seen && sections[n].bright ? 1 : -1;
+    sum += sections[n].odds;
     if (sum > most)
     {
       most = sum;
@@ -547,7 +549,8 @@ bool Search::Describe(
   {
     vessel.length += (vessel.points[n] - vessel.points[n - 1]).norm();
   }
-  if (vessel.length < LeastLength)
+  vessel.goesOn = vessel.length >= LeastOnward && this->GoesOn(vessel.points);
+  if (vessel.length < LeastLength && !vessel.goesOn)
   {
     return false;
   }
@@ -607,7 +610,6 @@ bool Search::Describe(
   {
     vessel.thinEnd = end.empty() ? vessel.thinEnd : std::min(vessel.thinEnd, MedianOf(end));
   }
-  vessel.goesOn = this->GoesOn(vessel.points);
   // Where an artery usually runs and does, another one is its vein; where it does not, it is the artery.
   const auto beyond = [&](const double(&from)[2])
   { return std::clamp((vessel.thinEnd - from[0]) / (from[1] - from[0]), 0.0, 1.0); };
