@@ -29,7 +29,7 @@ BEFORE = {
 
 
 def fit(before, names, signs, truth):
-    """Weights and, last, the intercept, which is not penalised."""
+    """Weights and, last, the intercept, which is penalised only where it is known before."""
     data = np.column_stack([signs, np.ones(len(signs))])
     known = np.array([before.get(name, (0.0, 1.0)) for name in names] + [before.get("(intercept)", (0.0, 0.0))])
     weights, penalty = known.T.copy()

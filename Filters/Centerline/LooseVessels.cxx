@@ -68,6 +68,13 @@ double LogDensity(double value, const double (&usual)[2])
   return -0.5 * off * off - std::log(usual[1]);
 }
 
+/// Of an artery rather than a vein, as a logarithm.
+/// @param brightness  over that of arteries of the same calibre
+double ArteryOdds(double brightness)
+{
+  return LogDensity(brightness, ArteryContrast) - LogDensity(brightness, VeinContrast);
+}
+
 /// What a vessel of the mean heart is called.
 std::string NameOf(const SegmentAtlas::Point& point)
 {
@@ -189,6 +196,9 @@ private:
     double
       odds; ///< of an artery's rather than a vein's, as a logarithm, -1 to 1; -1 where nothing is seen
   };
+  template <typename Take>
+  void AddPiece(
+    std::int64_t first, const Take& take, std::vector<std::vector<std::int64_t>>& pieces) const;
   double UsualContrast(double radius) const;
   bool GoesOn(const std::vector<Vector3>& axis) const;
   std::vector<Section> Sections(const std::vector<Vector3>& axis) const;
@@ -258,6 +268,35 @@ void Search::MeasureTree()
   this->Tube = MedianOf(thin);
 }
 
+/// What hangs together with a voxel, sorted, when it is long enough for a vessel.
+/// @param take  whether a voxel was free; it is not any more
+template <typename Take>
+void Search::AddPiece(
+  std::int64_t first, const Take& take, std::vector<std::vector<std::int64_t>>& pieces) const
+{
+  if (!take(first))
+  {
+    return;
+  }
+  std::vector<std::int64_t> piece{ first };
+  for (std::size_t n = 0; n < piece.size(); ++n)
+  {
+    this->L.Neighbours(piece[n],
+      [&](std::int64_t next, float)
+      {
+        if (take(next))
+        {
+          piece.push_back(next);
+        }
+      });
+  }
+  if (static_cast<double>(piece.size()) * std::cbrt(this->L.VoxelVolume()) >= LeastLength)
+  {
+    std::sort(piece.begin(), piece.end());
+    pieces.push_back(std::move(piece));
+  }
+}
+
 /// Connected voxels of tubes that are not near the tree.
 std::vector<std::vector<std::int64_t>> Search::Pieces() const
 {
@@ -292,6 +331,12 @@ std::vector<std::vector<std::int64_t>> Search::Pieces() const
     const double share = this->Share(voxel);
     return share >= LeastShare && share <= TooBright;
   };
+  const auto take = [&](std::int64_t voxel)
+  {
+    const bool was = free(voxel);
+    taken[static_cast<std::size_t>(voxel)] |= was ? 1 : 0;
+    return was;
+  };
   // All that are free, slice by slice; pieces are then taken in this order.
   std::vector<std::vector<std::int64_t>> slices(
     static_cast<std::size_t>(std::max(0, high[2] - low[2] + 1)));
@@ -318,29 +363,7 @@ std::vector<std::vector<std::int64_t>> Search::Pieces() const
   {
     for (const std::int64_t first : slice)
     {
-      if (!free(first))
-      {
-        continue;
-      }
-      taken[static_cast<std::size_t>(first)] = 1;
-      std::vector<std::int64_t> piece{ first };
-      for (std::size_t n = 0; n < piece.size(); ++n)
-      {
-        this->L.Neighbours(piece[n],
-          [&](std::int64_t next, float)
-          {
-            if (free(next))
-            {
-              taken[static_cast<std::size_t>(next)] = 1;
-              piece.push_back(next);
-            }
-          });
-      }
-      if (static_cast<double>(piece.size()) * std::cbrt(this->L.VoxelVolume()) >= LeastLength)
-      {
-        std::sort(piece.begin(), piece.end());
-        pieces.push_back(std::move(piece));
-      }
+      this->AddPiece(first, take, pieces);
     }
   }
   return pieces;
@@ -505,8 +528,7 @@ std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) 
         usual->second = this->UsualContrast(section.sample.radius);
       }
       const double brightness = section.sample.contrast / std::max(1e-9, usual->second);
-      section.odds = std::clamp(
-        LogDensity(brightness, ArteryContrast) - LogDensity(brightness, VeinContrast), -1.0, 1.0);
+      section.odds = std::clamp(ArteryOdds(brightness), -1.0, 1.0);
     }
     sections.push_back(section);
   }
@@ -614,8 +636,7 @@ bool Search::Describe(
   const auto beyond = [&](const double(&from)[2])
   { return std::clamp((vessel.thinEnd - from[0]) / (from[1] - from[0]), 0.0, 1.0); };
   const double thick = beyond(ThinEnd) + beyond(WideEnd);
-  const double odds = LogDensity(vessel.brightness, ArteryContrast) -
-    LogDensity(vessel.brightness, VeinContrast) + 1.0 - 5.0 * vessel.besideItsOwn -
+  const double odds = ArteryOdds(vessel.brightness) + 1.0 - 5.0 * vessel.besideItsOwn -
     1.5 * vessel.besideOther + 1.0 - 3.0 * thick + (vessel.goesOn ? OnwardOdds : 0.0);
   vessel.confidence = vessel.seen / (1.0 + std::exp(-odds)) *
     std::exp(-std::max(0.0, vessel.away - UsualAway) / UsualAway);
@@ -637,34 +658,22 @@ std::vector<std::vector<std::int64_t>> Search::Rest(const std::vector<std::int64
       taken[v] |= (place - axis[n]).squaredNorm() < reach * reach ? 1 : 0;
     }
   }
-  std::vector<std::vector<std::int64_t>> parts;
-  for (std::size_t first = 0; first < piece.size(); ++first)
+  const auto take = [&](std::int64_t voxel)
   {
-    if (taken[first] != 0)
+    const auto found = std::lower_bound(piece.begin(), piece.end(), voxel);
+    if (found == piece.end() || *found != voxel)
     {
-      continue;
+      return false;
     }
-    taken[first] = 1;
-    std::vector<std::int64_t> part{ piece[first] };
-    for (std::size_t n = 0; n < part.size(); ++n)
-    {
-      this->L.Neighbours(part[n],
-        [&](std::int64_t voxel, float)
-        {
-          const auto found = std::lower_bound(piece.begin(), piece.end(), voxel);
-          const auto at = static_cast<std::size_t>(found - piece.begin());
-          if (found != piece.end() && *found == voxel && taken[at] == 0)
-          {
-            taken[at] = 1;
-            part.push_back(voxel);
-          }
-        });
-    }
-    if (static_cast<double>(part.size()) * edge >= LeastLength)
-    {
-      std::sort(part.begin(), part.end());
-      parts.push_back(std::move(part));
-    }
+    char& known = taken[static_cast<std::size_t>(found - piece.begin())];
+    const bool was = known == 0;
+    known = 1;
+    return was;
+  };
+  std::vector<std::vector<std::int64_t>> parts;
+  for (const std::int64_t first : piece)
+  {
+    this->AddPiece(first, take, parts);
   }
   return parts;
 }
