@@ -421,7 +421,9 @@ std::vector<Vector3> Search::Axis(const std::vector<std::int64_t>& piece) const
     std::size_t last = from;
     while (!queue.empty())
     {
-      const auto [length, at] = queue.top();
+      // No structured binding: lambdas can not hold those everywhere.
+      const float length = queue.top().first;
+      const std::size_t at = queue.top().second;
       queue.pop();
       if (length > distance[at])
       {

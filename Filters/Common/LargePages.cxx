@@ -22,7 +22,9 @@ void PreferLargePages(void* memory, std::size_t bytes) noexcept
   const auto end = (reinterpret_cast<std::uintptr_t>(memory) + bytes) / page * page;
   // What is refused stays as it is.
   const int before = errno;
-  ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+  auto* const first =
+    static_cast<char*>(memory) + (begin - reinterpret_cast<std::uintptr_t>(memory));
+  ::madvise(first, end - begin, MADV_HUGEPAGE);
   errno = before;
 #else
   (void)memory;
