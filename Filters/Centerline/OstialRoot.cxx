@@ -74,7 +74,7 @@ public:
     }
     std::sort(radii.begin(), radii.end());
     constexpr double usual = 1.8; // mm
-    this->Unit = std::max(radii[radii.size() / 3] / usual, 1.5 * image.SmallestSpacing());
+    this->Unit = std::max(radii[radii.size() / 2] / usual, 1.5 * image.SmallestSpacing());
     this->Step = 0.3 * this->Unit;
     double length = 0.0;
     for (std::size_t i = 0; i < std::min(free + 1, branch.points.size()); ++i)
@@ -86,6 +86,7 @@ public:
       }
       this->Lengths.push_back(length);
     }
+    this->Healthy = this->HealthyRadius();
   }
 
   OstialRoot Settle()
@@ -147,18 +148,9 @@ private:
     return std::min<std::size_t>(place - this->Lengths.begin(), this->Lengths.size() - 1);
   }
 
-  /// The first point from which on the vessel is seen, and as wide as it stays.
-  bool FindClear(std::size_t& clear) const
+  /// The radius that most of the way is not wider than: a lesion takes the smaller part of it, a funnel its beginning.
+  double HealthyRadius() const
   {
-    const double stays = 2.0 * this->Unit;
-    constexpr double wider = 1.2;              // of the settled radius
-    constexpr double seen = 0.7;               // confidence
-    const double farthest = 12.0 * this->Unit; // what settles later is no funnel
-    if (this->Lengths.size() < 6 || this->Lengths.back() < 2.0 * stays)
-    {
-      return false;
-    }
-    // The settled radius: of the narrower half, away from the wall.
     std::vector<double> radii;
     const std::size_t from = this->At(std::min(3.0 * this->Unit, 0.4 * this->Lengths.back()));
     for (std::size_t i = from; i < this->Lengths.size(); ++i)
@@ -166,13 +158,26 @@ private:
       radii.push_back(this->Radius(i));
     }
     std::sort(radii.begin(), radii.end());
-    const double settled = radii[radii.size() / 3];
+    return radii[radii.size() * 3 / 4];
+  }
+
+  /// The first point from which on the vessel is seen, and no wider than it is farther on.
+  bool FindClear(std::size_t& clear) const
+  {
+    const double stays = 2.0 * this->Unit;
+    constexpr double wider = 1.2;              // of the healthy radius
+    constexpr double seen = 0.7;               // confidence
+    const double farthest = 12.0 * this->Unit; // what settles later is no funnel
+    if (this->Lengths.size() < 6 || this->Lengths.back() < 2.0 * stays)
+    {
+      return false;
+    }
     for (std::size_t i = 0; i < this->Lengths.size() && this->Lengths[i] <= farthest; ++i)
     {
       bool good = this->Lengths[i] + stays <= this->Lengths.back();
       for (std::size_t j = i; good && j <= this->At(this->Lengths[i] + stays); ++j)
       {
-        good = this->Radius(j) <= wider * settled && this->Confidence(j) >= seen;
+        good = this->Radius(j) <= wider * this->Healthy && this->Confidence(j) >= seen;
       }
       if (good)
       {
@@ -191,7 +196,7 @@ private:
   {
     constexpr double leastClosed = 0.5;
     constexpr double whole = 0.85;          // share of the wall that shows where the middle is
-    constexpr double funnel = 1.25;         // of the radius at the clear section
+    constexpr double funnel = 1.25;         // of the healthy radius
     const double beyond = 5.0 * this->Unit; // before the tree's first point
     const double joint = 4.0 * this->Unit;  // behind the clear section that may move a little
     const double chord = 2.5 * this->Unit;  // that give the direction
@@ -210,15 +215,8 @@ private:
     {
       return false;
     }
-    double radius = ring.radius;
-    const Vector3 ahead =
-      this->Point(last) - this->Point(this->At(this->Lengths[last] - this->Unit));
-    const Ring farther = MeasureRing(this->Image, this->Point(last), ahead.normalized(),
-      1.2 * this->Radius(last) + 0.2 * this->Unit, lumen, this->Settings);
-    if (farther.closed >= leastClosed && farther.radius > 0.0)
-    {
-      radius = std::min(radius, 1.1 * farther.radius);
-    }
+    // From within a lesion it may widen to the healthy vessel, and from within the funnel it may not.
+    const double radius = std::clamp(ring.radius, this->Healthy, 1.1 * this->Healthy);
     std::vector<Vector3> before{ start };
     const double dark =
       0.5 * (lumen + this->Settings.reference.background); // there is nothing before it
@@ -304,6 +302,7 @@ private:
   std::vector<double> Measure(const std::vector<Vector3>& course, std::size_t last) const
   {
     const double known = this->Radius(last);
+    const double widest = std::max(known, this->Healthy);
     const double lumen = this->Image.At(course[course.size() * 2 / 3]);
     std::vector<double> radii(course.size(), 0.0);
     std::vector<double> weights(course.size(), 1e-6);
@@ -312,7 +311,7 @@ private:
       const Vector3 tangent =
         course[std::min(i + 2, course.size() - 1)] - course[i < 2 ? 0 : i - 2];
       const Ring ring = MeasureRing(this->Image, course[i], tangent.normalized(),
-        1.2 * known + 0.2 * this->Unit, lumen, this->Settings);
+        1.2 * widest + 0.2 * this->Unit, lumen, this->Settings);
       if (ring.closed >= 0.8 && ring.radius > 0.0)
       {
         radii[i] = ring.radius;
@@ -331,7 +330,7 @@ private:
     }
     for (double& radius : smooth)
     {
-      radius = std::clamp(radius + offset, 0.95 * narrowest, 1.3 * known);
+      radius = std::clamp(radius + offset, 0.95 * narrowest, 1.3 * widest);
     }
     return smooth;
   }
@@ -343,6 +342,7 @@ private:
   double Unit = 1.0;           ///< mm
   double Step = 0.3;           ///< mm between sections
   std::vector<double> Lengths; ///< mm from the first point
+  double Healthy = 0.0;        ///< mm, radius of the vessel without lesion and funnel
 };
 }
 

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -127,6 +128,38 @@ TEST(OstialRoot, FunnelsBelongToTheAorta)
   EXPECT_GT(roots[0].position[0], 0.5);
   EXPECT_LT(roots[0].position[0], 3.0);
   EXPECT_LT(roots[0].radius, 2.7);
+}
+
+TEST(OstialRoot, AFullWidthBeforeALesionIsTheVessel)
+{
+  // A lesion of 9 mm that leaves 30 %: right behind the ostium, and some millimetres on. The line begins in the aorta.
+  const Vector3 axis = Vector3::UnitX();
+  constexpr double healthy = 1.8;
+  for (const double start : { 0.0, 2.0, 5.0 })
+  {
+    SCOPED_TRACE(testing::Message() << "lesion from " << start << " mm on");
+    const auto radius = [&](double along)
+    {
+      const double share = std::clamp((along - start) / 9.0, 0.0, 1.0);
+      return healthy * (1.0 - 0.35 * (1.0 - std::cos(2.0 * M_PI * share)));
+    };
+    const Picture picture([&](const Vector3& p)
+      { return std::min(p[0], Tube(p, Vector3::Zero(), axis, radius(p[0]), 0.0)); });
+    CenterlineTree tree = BentTree(axis, healthy);
+    for (std::size_t i = 0; i < tree.points.size(); ++i)
+    {
+      const double along = tree.points[i][0];
+      tree.radius[i] += along > 0.0 ? radius(along) - healthy : 0.0;
+    }
+    const std::vector<OstialRoot> roots = picture.Settle(tree);
+    ASSERT_TRUE(roots.at(0).found);
+    EXPECT_NEAR(roots[0].position[0], 0.0, 1.0);
+    EXPECT_NEAR(roots[0].radius, healthy, 0.25 * healthy);
+    for (std::size_t i = 0; i < tree.points.size(); ++i)
+    {
+      EXPECT_NEAR(tree.radius[i], radius(tree.points[i][0]), 0.3) << tree.points[i][0];
+    }
+  }
 }
 
 TEST(OstialRoot, SeedsInsideOfVesselsStayWhereTheyAre)
