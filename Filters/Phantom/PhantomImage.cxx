@@ -331,8 +331,8 @@ Tissues::Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy)
   this->Paint(hu(0.48 * left), 0.7f, Content::Chamber,
     { rightVentricle, no(leftVentricleWall), rightInlet, rightApex });
   this->Paint(hu(left), 0.7f, Content::Chamber, { leftVentricle });
-  this->Paint(hu(0.6 * left), 0.1f, Content::GreatVessel, { pulmonary });
-  this->Paint(hu(left), 0.3f, Content::GreatVessel, { outflow });
+  this->Paint(hu(0.6 * left), 0.1f, Content::Chamber, { pulmonary });
+  this->Paint(hu(left), 0.3f, Content::Chamber, { outflow }); // the first septal branch passes it
   this->Paint(hu(left + 10.0), 0.1f, Content::GreatVessel, { sinus });
   this->Paint(hu(left + 10.0), 0.1f, Content::GreatVessel, { tubular });
   this->Paint(hu(left + 10.0), 0.1f, Content::GreatVessel, { ascending });

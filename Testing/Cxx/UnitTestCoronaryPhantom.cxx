@@ -597,6 +597,37 @@ TEST(CoronaryPhantom, TheVeinSharesNoLumenWithAnArtery)
   }
 }
 
+TEST(PhantomImage, SeptalBranchesRunThroughMuscleNotBlood)
+{
+  // That of 547 passes the outflow tract of the left ventricle.
+  for (const std::uint64_t seed : { 2, 547 })
+  {
+    PhantomSettings settings = Quiet();
+    settings.seed = seed;
+    const CoronaryPhantom phantom(settings);
+    const PhantomTree tree = phantom.Tree(0.75);
+    int sections = 0;
+    for (const PhantomBranch& branch : tree.branches)
+    {
+      if (branch.segmentId < FirstSeptal || branch.segmentId > ThirdSeptal)
+      {
+        continue;
+      }
+      for (std::size_t i = 16; i + 2 < branch.points.size(); i += 8)
+      {
+        const Vector3& centre = tree.points[branch.points[i]];
+        const Vector3 u =
+          (tree.points[branch.points[i + 2]] - tree.points[branch.points[i - 2]]).unitOrthogonal();
+        const double beside = tree.radius[branch.points[i]] + 1.0;
+        EXPECT_LT(ValueAt(phantom, centre + beside * u, 0.75), 200) << seed << ", point " << i;
+        EXPECT_LT(ValueAt(phantom, centre - beside * u, 0.75), 200) << seed << ", point " << i;
+        ++sections;
+      }
+    }
+    EXPECT_GT(sections, 10);
+  }
+}
+
 TEST(PhantomImage, DirectionAndOriginOnlyMoveTheSamples)
 {
   const CoronaryPhantom phantom(Quiet());
