@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Weights of odds: logistic regression of artery or not on the signs of branches or links.
+"""Weights of odds: logistic regression of artery or not on the signs of branches, links or tips.
 
-Reads tables of `validate-disease --branches FILE` (the odds of a vein, VeinRejection.cxx) or `--links FILE` (the odds that
-a link is right, VesselLinking.cxx). Prints the weights, and how well weights tell that were fitted without the heart that
+Reads tables of `validate-disease --branches FILE` (the odds of a vein, VeinRejection.cxx), `--links FILE` (the odds that
+a link is right, VesselLinking.cxx) or `--tips FILE` (the odds that a vessel goes on, VesselTips.cxx). Prints the weights, and how well weights tell that were fitted without the heart that
 they judge (eight folds). What is artery only in part, and what lies behind a link, is left out. The penalty is half the
 squared weights, or half the squared difference from what is known before.
 """
@@ -25,6 +25,7 @@ BEFORE = {
                  "blunt": (4.1, 1.0), "backwards": (1.2, 1.0), "short": (2.2, 1.0), "thinner": (0.5, 1.0),
                  "beside_unclear": (0.8, 1.0), "(intercept)": (-4.7, 4.0)},
     "links": {"outgrows": (-8.0, 1.0), "abrupt": (1.5, 1.0), "brighter": (-6.0, 1.0)},
+    "tips": {},
 }
 
 
@@ -46,7 +47,7 @@ def fit(before, names, signs, truth):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kind", choices=["branches", "links"])
+    parser.add_argument("kind", choices=["branches", "links", "tips"])
     parser.add_argument("tables", nargs="+", metavar="table")
     parser.add_argument("--wrong", action="store_true", help="list what is told wrongly")
     arguments = parser.parse_args()
@@ -62,8 +63,8 @@ def main():
     before = BEFORE[arguments.kind]
     names = head[FIRST_SIGN:]
     artery = np.array([float(row[2]) > 0.5 for row in rows])
-    what = "links" if arguments.kind == "links" else "veins"
-    truth = (artery if arguments.kind == "links" else ~artery).astype(float)
+    what = {"links": "links", "tips": "vessels that go on", "branches": "veins"}[arguments.kind]
+    truth = (~artery if arguments.kind == "branches" else artery).astype(float)
     hearts = [row[0] + row[1] for row in rows]
     fold = {heart: n % FOLDS for n, heart in enumerate(dict.fromkeys(hearts))}
     folds = np.array([fold[heart] for heart in hearts])

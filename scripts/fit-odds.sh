@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Fits the weights of VeinRejection.cxx and VesselLinking.cxx to phantoms that nothing else is measured with, and prints them.
+# Fits the weights of VeinRejection.cxx, VesselLinking.cxx and VesselTips.cxx to phantoms that nothing else is measured with, and prints them.
 set -euo pipefail
 
 usage() {
   cat <<'EOF'
 Usage: scripts/fit-odds.sh [--build DIR] [--output DIR] [--wrong]
   --build DIR   build tree with validate-disease (default: build/paraview)
-  --output DIR  where the tables of branches and links go (default: odds-output)
-  --wrong       also list the branches and links that are told wrongly
+  --output DIR  where the tables of branches, links and tips go (default: odds-output)
+  --wrong       also list what is told wrongly
 Needs python3-numpy. What was judged depends on the weights that the programs have: fit, build, fit again.
 EOF
 }
@@ -31,15 +31,15 @@ hearts=("bright-vein 310..323" "dim-contrast 324..331" "stenoses-70 338..345" "s
   "left-ramus-60-calcified-20 356..359" "noise-60 362..364" "healthy 368..369" "occlusion 374..379" "calcified-25 382..383")
 
 mkdir -p "$output"
-rm -f "$output"/{branches,links}-*.csv
+rm -f "$output"/{branches,links,tips}-*.csv
 for heart in "${hearts[@]}"; do
   read -r condition seeds <<<"$heart"
   echo "$condition $seeds" >&2
   # Its limits are another matter; anything but a missed limit is a fault.
   "$build/bin/validate-disease" --no-surface --conditions "$condition" --seeds "$seeds" \
-    --branches "$output/branches-$condition.csv" --links "$output/links-$condition.csv" >"$output/$condition.md" || (($? == 1))
+    --branches "$output/branches-$condition.csv" --links "$output/links-$condition.csv" --tips "$output/tips-$condition.csv" >"$output/$condition.md" || (($? == 1))
 done
-for kind in branches links; do
+for kind in branches links tips; do
   echo "$kind"
   python3 "$root/scripts/fit-odds.py" "$kind" "$output/$kind"-*.csv "${wrong[@]}"
 done

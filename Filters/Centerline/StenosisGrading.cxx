@@ -2,6 +2,7 @@
 
 #include "CoronaryPhantom.h" // for SegmentId
 #include "CurveSmoothing.h"
+#include "VesselTips.h"
 
 #include <Eigen/Dense>
 
@@ -23,9 +24,11 @@ constexpr double LongestLesion = 45.0; ///< mm with its shoulders; beyond it is 
 constexpr double ClosedMargin =
   1.12;                             ///< that the healthy radius may exceed the wider shoulder's end
 constexpr double WidestShare = 1.7; ///< of the population's diameter: beyond it little is certain
-constexpr double TipLength = 6.0;   ///< mm before a vessel's end that are not graded
-constexpr double MouthLength = 2.0; ///< mm behind an ostium that are not graded
+constexpr double TipLength =
+  6.0; ///< mm before a vessel's end that are not graded, but for one that it is lost in
+constexpr double MouthLength = 2.0;      ///< mm behind an ostium that are not graded
 constexpr double NormalQuantile = 1.645; ///< 5 % to either side
+constexpr double UncertainRange = 0.8;   ///< of degrees: one that wide tells nothing
 constexpr double OccludedRadius = 0.2;   ///< mm: less is no lumen that can be seen
 constexpr double LostRadius = 0.35;      ///< mm: a lumen that is thinner may be lost in the noise
 
@@ -324,7 +327,71 @@ struct GradedPath
   void Describe(
     std::size_t first, std::size_t least, std::size_t last, std::vector<Stenosis>& lesions) const;
   void FindLesions(std::vector<Stenosis>& lesions) const;
+  void DescribeEnd(const VesselTip& tip, std::vector<Stenosis>& lesions) const;
+
+private:
+  void Place(std::size_t first, std::size_t least, std::size_t last, Stenosis& lesion) const;
+  void Grade(
+    double radius, double healthy, double radiusError, double healthyError, Stenosis& lesion) const;
 };
+
+/// Where a lesion is, by samples of the profile.
+void GradedPath::Place(
+  std::size_t first, std::size_t least, std::size_t last, Stenosis& lesion) const
+{
+  lesion.point = this->PointAt(least);
+  lesion.position = this->tree.points[lesion.point];
+  lesion.segmentId = this->tree.segmentId.empty() ? 0 : this->tree.segmentId[lesion.point];
+  const auto abscissa = [&](std::size_t sample)
+  { return this->tree.abscissa.empty() ? 0.0 : this->tree.abscissa[this->PointAt(sample)]; };
+  lesion.abscissaStart = abscissa(first);
+  lesion.abscissaLeast = abscissa(least);
+  lesion.abscissaEnd = abscissa(last);
+  lesion.length = static_cast<double>(last - first) * this->profile.step;
+  lesion.populationDiameter = PopulationDiameter(lesion.segmentId);
+}
+
+/// How much is gone of the healthy radius, with its range. Errors are standard deviations, mm.
+void GradedPath::Grade(
+  double radius, double healthy, double radiusError, double healthyError, Stenosis& lesion) const
+{
+  lesion.leastDiameter = 2.0 * radius;
+  lesion.referenceDiameter = 2.0 * healthy;
+  lesion.degree = std::clamp(1.0 - radius / healthy, 0.0, 1.0);
+  lesion.areaDegree = 1.0 - std::pow(1.0 - lesion.degree, 2);
+  const double error = (1.0 - lesion.degree) *
+    std::hypot(radiusError / std::max(radius, 0.02), healthyError / healthy) * NormalQuantile;
+  lesion.degreeLow = std::clamp(lesion.degree - error, 0.0, 1.0);
+  lesion.degreeHigh = std::clamp(lesion.degree + error, 0.0, 1.0);
+}
+
+/// A vessel whose line ends in a lesion: what is seen of it, or more.
+void GradedPath::DescribeEnd(const VesselTip& tip, std::vector<Stenosis>& lesions) const
+{
+  constexpr double farther[] = { 5.0, 9.0 }; // mm before the tip: not yet narrowed
+  const double healthy =
+    std::max(tip.before, RadiusBeforeTip(this->tree, this->path, farther[0], farther[1]));
+  // What ends in full calibre shows no lesion.
+  constexpr double narrowed = 0.85; // of the radius before
+  if (healthy < this->settings.leastReferenceRadius || tip.end > narrowed * tip.before)
+  {
+    return;
+  }
+  const std::size_t last = this->profile.size() - 1;
+  std::size_t first = last;
+  while (first > 0 && this->smooth[first - 1] < 0.5 * (healthy + tip.end))
+  {
+    --first;
+  }
+  Stenosis lesion;
+  this->Place(first, last, last, lesion);
+  this->Grade(
+    tip.end, healthy, std::hypot(MethodError, BlurError * tip.end), 0.03 * healthy, lesion);
+  lesion.degreeHigh = 1.0;
+  lesion.confidence = tip.goesOn * std::max(0.05, 1.0 - (1.0 - lesion.degreeLow) / UncertainRange);
+  lesion.kind = LesionKind::Lost;
+  lesions.push_back(lesion);
+}
 
 void GradedPath::Describe(
   std::size_t first, std::size_t least, std::size_t last, std::vector<Stenosis>& lesions) const
@@ -351,7 +418,6 @@ void GradedPath::Describe(
     }
   }
   const auto samples = static_cast<double>(last - first + 1);
-  lesion.length = (samples - 1.0) * this->profile.step;
   lesion.interpolated = this->IsHidden(least);
   // In a mouth nothing is measured; a lesion that is mostly unseen must be bridged or behind calcium.
   if (measured + hidden < 0.5 * samples && !lesion.bridged)
@@ -371,23 +437,8 @@ void GradedPath::Describe(
   {
     return;
   }
-  lesion.point = this->PointAt(least);
-  lesion.position = this->tree.points[lesion.point];
-  lesion.segmentId = this->tree.segmentId.empty() ? 0 : this->tree.segmentId[lesion.point];
-  const auto abscissa = [&](std::size_t sample)
-  { return this->tree.abscissa.empty() ? 0.0 : this->tree.abscissa[this->PointAt(sample)]; };
-  lesion.abscissaStart = abscissa(first);
-  lesion.abscissaLeast = abscissa(least);
-  lesion.abscissaEnd = abscissa(last);
-  lesion.leastDiameter = 2.0 * radius;
-  lesion.referenceDiameter = 2.0 * healthy;
-  lesion.populationDiameter = PopulationDiameter(lesion.segmentId);
-  lesion.degree = std::clamp(1.0 - radius / healthy, 0.0, 1.0);
-  lesion.areaDegree = 1.0 - std::pow(1.0 - lesion.degree, 2);
-  const double error = (1.0 - lesion.degree) *
-    std::hypot(deviation / std::max(radius, 0.02), referenceError / healthy) * NormalQuantile;
-  lesion.degreeLow = std::clamp(lesion.degree - error, 0.0, 1.0);
-  lesion.degreeHigh = std::clamp(lesion.degree + error, 0.0, 1.0);
+  this->Place(first, least, last, lesion);
+  this->Grade(radius, healthy, deviation, referenceError, lesion);
   const bool occluded = radius <= OccludedRadius && lesion.degree > 0.85;
   if (occluded)
   {
@@ -399,7 +450,7 @@ void GradedPath::Describe(
     lesion.degreeHigh = 1.0;
   }
   lesion.confidence =
-    std::max(0.05, 1.0 - (lesion.degreeHigh - lesion.degreeLow) / 0.8) * bridgeTrust;
+    std::max(0.05, 1.0 - (lesion.degreeHigh - lesion.degreeLow) / UncertainRange) * bridgeTrust;
   // An artery is hardly ever so wide: the line may run in something else.
   if (lesion.populationDiameter > 0.0 &&
     lesion.referenceDiameter > WidestShare * lesion.populationDiameter)
@@ -503,6 +554,8 @@ const char* LesionKindName(LesionKind kind)
       return "mixed";
     case LesionKind::Occluded:
       return "occluded";
+    case LesionKind::Lost:
+      return "lost";
     case LesionKind::Bridged:
     default:
       return "bridged";
@@ -565,6 +618,7 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
   StenosisGrading result;
   result.degree.assign(points, 0.0);
   result.referenceRadius = tree.radius;
+  const std::vector<VesselTip> tips = JudgeTips(tree, paths);
   for (std::size_t n = 0; n < paths.size(); ++n)
   {
     const VesselPath& path = paths[n];
@@ -612,6 +666,10 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
     }
     const std::size_t before = result.lesions.size();
     graded.FindLesions(result.lesions);
+    if (tips[n].goesOn >= LeastGoingOn)
+    {
+      graded.DescribeEnd(tips[n], result.lesions);
+    }
     int treeId = 0;
     for (const CenterlineTree::Branch& branch : tree.branches)
     {

@@ -22,10 +22,11 @@ enum class LesionKind : int
   Calcified = 1, ///< calcium along more than half of it
   Mixed = 2,     ///< calcium along a part
   Occluded = 3,  ///< no lumen is seen
-  Bridged = 4    ///< the line was guessed across it; not an occlusion by what is seen
+  Bridged = 4,   ///< the line was guessed across it; not an occlusion by what is seen
+  Lost = 5       ///< the line ends in it: its degree is what is seen of it or more
 };
 
-/// "soft", "calcified", "mixed", "occluded", "bridged".
+/// "soft", "calcified", "mixed", "occluded", "bridged", "lost".
 const char* LesionKindName(LesionKind kind);
 
 /// One narrowing. Degrees are shares of the healthy diameter or area that are gone, 0 to 1.

@@ -1,6 +1,7 @@
 #include "TreeCheck.h"
 
 #include "SegmentAtlas.h"
+#include "VesselTips.h"
 
 #include <algorithm>
 #include <array>
@@ -28,7 +29,6 @@ constexpr double NearestOstia = 6.0;     ///< of two ostia
 constexpr double FarthestOstia = 70.0;   ///< of two ostia
 constexpr double TipLength = 3.0;        ///< over which a tip's radius is taken
 constexpr double BeforeTip = 15.0;       ///< a lesion at the tip narrows less than this
-constexpr double UsualTip = 0.48;        ///< median radius of healthy tips
 constexpr double WideTip = 0.78;         ///< radius with which no whole vessel ends, for usual tips
 constexpr double WideBeforeTip = 0.95;   ///< the same before the tip
 constexpr double SmallVesselsTip = 1.3;  ///< of a right coronary artery that is not dominant
@@ -114,8 +114,6 @@ private:
   void BackOfTheHeart();
   void Tips();
   void Territories();
-  double MedianRadius(const std::vector<std::int64_t>& path, double from, double to) const;
-  std::vector<std::int64_t> PathBack(std::size_t branch, double length) const;
   std::string NameOf(std::size_t branch) const;
 
   const CenterlineTopology& Tree;
@@ -124,7 +122,6 @@ private:
   Matrix3 Inverse;
   double Trust = 1.0; ///< in the fit
   std::array<std::int64_t, 2> Roots = { -1, -1 };
-  std::vector<char> IsTip;
   std::vector<TreeWarning> Warnings;
 };
 
@@ -133,16 +130,11 @@ Checker::Checker(const CenterlineTopology& tree, const LabelingResult& labels)
   , Labels(labels)
   , Atlas(SegmentAtlas::Get())
   , Inverse(labels.fit.matrix.inverse())
-  , IsTip(tree.branches.size(), 1)
 {
   this->Trust = std::exp(-std::max(0.0, labels.meanDistance - UncertainFit) / UncertainFit);
   for (const CenterlineTree::Branch& branch : tree.branches)
   {
-    if (branch.parentGroupId >= 0)
-    {
-      this->IsTip[static_cast<std::size_t>(branch.parentGroupId)] = 0;
-    }
-    else if (branch.treeId >= 0 && branch.treeId < 2 &&
+    if (branch.parentGroupId < 0 && branch.treeId >= 0 && branch.treeId < 2 &&
       this->Roots[static_cast<std::size_t>(branch.treeId)] < 0)
     {
       this->Roots[static_cast<std::size_t>(branch.treeId)] = branch.points.front();
@@ -342,87 +334,34 @@ void Checker::BackOfTheHeart()
   }
 }
 
-double Checker::MedianRadius(const std::vector<std::int64_t>& path, double from, double to) const
-{
-  std::vector<double> radii;
-  const double end = this->Tree.abscissa[path.front()];
-  for (const std::int64_t point : path)
-  {
-    const double back = end - this->Tree.abscissa[point];
-    if (back >= from && back <= to)
-    {
-      radii.push_back(this->Tree.radius[point]);
-    }
-  }
-  if (radii.empty())
-  {
-    return 0.0;
-  }
-  const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
-  std::nth_element(radii.begin(), middle, radii.end());
-  return *middle;
-}
-
-/// Points from the tip of a branch towards the root, as far as the vessel is the same one.
-std::vector<std::int64_t> Checker::PathBack(std::size_t branch, double length) const
-{
-  std::vector<std::int64_t> path;
-  auto b = static_cast<int>(branch);
-  const double end = this->Tree.abscissa[this->Tree.branches[branch].points.back()];
-  for (;;)
-  {
-    const CenterlineTree::Branch& one = this->Tree.branches[b];
-    for (std::size_t i = one.points.size(); i-- > (one.parentGroupId >= 0 ? 1U : 0U);)
-    {
-      if (end - this->Tree.abscissa[one.points[i]] > length)
-      {
-        return path;
-      }
-      path.push_back(one.points[i]);
-    }
-    const int parent = one.parentGroupId;
-    if (parent < 0 || this->Tree.continuation[parent] != b)
-    {
-      return path;
-    }
-    b = parent;
-  }
-}
-
 /// Vessels end thin; they do not widen, and do not go on for ever.
 void Checker::Tips()
 {
-  // Large hearts have wide vessels; but when most ends are cut, they are no measure.
-  std::vector<double> radii;
-  for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
+  const std::vector<VesselPath> paths = VesselPaths(this->Tree);
+  const double calibre = TipCalibre(this->Tree, paths);
+  const std::vector<VesselTip> tips = JudgeTips(this->Tree, paths);
+  for (std::size_t n = 0; n < paths.size(); ++n)
   {
-    if (this->IsTip[b] != 0 && this->Tree.branches[b].treeId >= 0)
-    {
-      radii.push_back(this->MedianRadius(this->PathBack(b, BeforeTip), 0.0, TipLength));
-    }
-  }
-  std::sort(radii.begin(), radii.end());
-  const double calibre =
-    radii.empty() ? 1.0 : std::clamp(radii[radii.size() / 2] / UsualTip, 0.9, 1.3);
-  for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
-  {
-    const CenterlineTree::Branch& branch = this->Tree.branches[b];
-    if (this->IsTip[b] == 0 || branch.treeId < 0)
+    const VesselPath& path = paths[n];
+    const std::int64_t tip = path.points.back();
+    const auto last = std::find_if(this->Tree.branches.begin(), this->Tree.branches.end(),
+      [tip](const CenterlineTree::Branch& one) { return one.points.back() == tip; });
+    const CenterlineTree::Branch& branch = *last;
+    if (branch.treeId < 0)
     {
       continue;
     }
-    const std::int64_t tip = branch.points.back();
     const Vector3& place = this->Tree.points[tip];
-    const std::string name = this->NameOf(b);
-    const std::vector<std::int64_t> path = this->PathBack(b, 2.0 * BeforeTip);
+    const std::string name =
+      this->NameOf(static_cast<std::size_t>(last - this->Tree.branches.begin()));
     if (this->Tree.abscissa[tip] > LongestPath)
     {
       this->Warn(name + " ends at " + At(place) + ", " + Rounded(this->Tree.abscissa[tip]) +
           " mm from the ostium, farther than coronary arteries go: it may go on in a vein",
         name, place, Sure(this->Tree.abscissa[tip] - LongestPath, 40.0));
     }
-    const double end = this->MedianRadius(path, 0.0, TipLength);
-    const double before = this->MedianRadius(path, TipLength, BeforeTip);
+    const double end = RadiusBeforeTip(this->Tree, path, 0.0, TipLength);
+    const double before = RadiusBeforeTip(this->Tree, path, TipLength, BeforeTip);
     const bool small = branch.treeId == 1 && this->Labels.dominance == Dominance::Left;
     const double excess = small
       ? std::max(end, before) - SmallVesselsTip
@@ -435,8 +374,16 @@ void Checker::Tips()
         name, place, Sure(excess, 0.4));
       continue;
     }
-    const double begin =
-      this->MedianRadius(path, 0.6 * branch.length, std::min(branch.length, 2.0 * BeforeTip));
+    if (tips[n].goesOn >= LeastGoingOn)
+    {
+      this->Warn(name + " ends at " + At(place) + " where it narrows, from " +
+          Rounded(tips[n].before, 1) + " to " + Rounded(tips[n].end, 1) +
+          " mm of radius: a lesion may hide its rest",
+        name, place, tips[n].goesOn);
+      continue;
+    }
+    const double begin = RadiusBeforeTip(
+      this->Tree, path, 0.6 * branch.length, std::min(branch.length, 2.0 * BeforeTip));
     if (branch.length > 8.0 && end > 0.7 && begin > 0.0 && end > Widening * begin)
     {
       this->Warn(name + " widens towards its end at " + At(place) + ", from " + Rounded(begin, 1) +

@@ -258,6 +258,40 @@ TEST(StenosisGrading, TaperingVesselsHaveNoLesion)
   EXPECT_TRUE(MeasureAll(tube, LineWith(1.5)).grading.lesions.empty());
 }
 
+TEST(StenosisGrading, AVesselThatIsLostInALesionSaysSo)
+{
+  // The line ends half way into a lesion of 80 %; the same vessel without the lesion just ends there.
+  for (const double degree : { 0.8, 0.0 })
+  {
+    SCOPED_TRACE(degree);
+    const auto healthy = [](double z) { return 1.9 - 0.018 * z; };
+    Tube tube;
+    tube.radius = [=](double z)
+    { return healthy(z) * (1.0 - degree * std::exp(-0.5 * std::pow((z - 58.0) / 2.5, 2))); };
+    tube.Render();
+    CenterlineTree tree = LineWith(1.2);
+    const std::size_t last = 222; // z = 55.5
+    tree.points.resize(last + 1);
+    tree.radius.resize(last + 1);
+    tree.segmentId.resize(last + 1);
+    tree.abscissa.resize(last + 1);
+    tree.branches[0].points.resize(last + 1);
+    MeasureTree(tree);
+    const Measured measured = MeasureAll(tube, tree);
+    ASSERT_EQ(measured.grading.lesions.size(), degree > 0.0 ? 1U : 0U);
+    for (const Stenosis& lesion : measured.grading.lesions)
+    {
+      EXPECT_EQ(lesion.kind, LesionKind::Lost);
+      EXPECT_EQ(lesion.position, tree.points.back());
+      EXPECT_NEAR(lesion.referenceDiameter, 2.0 * healthy(52.0), 0.25);
+      EXPECT_LT(lesion.degreeLow, degree);
+      EXPECT_EQ(lesion.degreeHigh, 1.0);
+      EXPECT_LT(lesion.confidence, 0.5); // of the degree
+      EXPECT_LT(lesion.abscissaStart, lesion.abscissaEnd);
+    }
+  }
+}
+
 TEST(StenosisGrading, BridgedLesionsSaySo)
 {
   const Tube tube = Narrowed(1.6, 0.9);

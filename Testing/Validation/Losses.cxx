@@ -18,16 +18,6 @@ constexpr double NamesWithin = 15.0; ///< mm
 constexpr double LeastShare = 0.25;  ///< of a loss that a named vessel holds
 constexpr double LeastStretch = 3.0; ///< mm: shorter ones are no reason for a warning
 
-double Distance(const Vector3& place, const std::vector<Vector3>& points)
-{
-  double least = std::numeric_limits<double>::infinity();
-  for (const Vector3& point : points)
-  {
-    least = std::min(least, (point - place).squaredNorm());
-  }
-  return std::sqrt(least);
-}
-
 /// Steps of a tree's branches that are marked, joined where they touch.
 class Joiner
 {
@@ -115,6 +105,16 @@ bool Holds(const std::string& artery, int segment, int treeId)
     (artery == "LAD" && descending.count(segment) != 0) ||
     (artery == "LCx" && circumflex.count(segment) != 0);
 }
+}
+
+double Distance(const Vector3& place, const std::vector<Vector3>& points)
+{
+  double least = std::numeric_limits<double>::infinity();
+  for (const Vector3& point : points)
+  {
+    least = std::min(least, (point - place).squaredNorm());
+  }
+  return std::sqrt(least);
 }
 
 std::string Stretch::Text() const

@@ -48,6 +48,9 @@ double ShareOnArteries(const PhantomTree& truth, const std::vector<Vector3>& lin
 /// The share of some places.
 double ShareNearArteries(const PhantomTree& truth, const std::vector<Vector3>& places);
 
+/// From a place to the nearest of some points, mm; infinite without points.
+double Distance(const Vector3& place, const std::vector<Vector3>& points);
+
 /// Something that a run says is wrong.
 struct Said
 {

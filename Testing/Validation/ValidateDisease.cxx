@@ -11,6 +11,7 @@
 #include "PhantomCases.h"
 #include "PhantomScan.h"
 #include "SweepSurface.h"
+#include "VesselTips.h"
 
 #include <CLI/CLI.hpp>
 
@@ -107,6 +108,7 @@ struct Options
   std::string lines;    ///< folder
   std::string branches; ///< file
   std::string links;    ///< file
+  std::string tips;     ///< file
 };
 
 struct Warned
@@ -128,11 +130,13 @@ struct Outcome
   double leftOut = 0.0;       ///< mm of the tree that the surface has not
   DegreeTally wide;           ///< lesions where 1 mm or more is left
   DegreeTally narrow;         ///< where less is left
+  DegreeTally thin;           ///< the same, in vessels that are too thin to be graded
   std::vector<std::string> lesions;
   std::vector<Warned> warnings;
   std::vector<Stretch> untold;
   std::string branches; ///< rows of the table of branches
   std::string links;    ///< rows of the table of links
+  std::string tips;     ///< rows of the table of tips
   double seconds = 0.0; ///< of processor time, with the picture and the truth
 
   bool HasToTell() const { return this->lengths.missed > LargestUntold; }
@@ -245,7 +249,7 @@ void CompareLesions(
     {
       continue;
     }
-    (match.Wide() ? outcome.wide : outcome.narrow).Add(match);
+    (match.Wide() ? outcome.wide : match.Graded() ? outcome.narrow : outcome.thin).Add(match);
     std::array<char, 200> row;
     std::snprintf(row.data(), row.size(),
       "%s of %.0f %% (%.2f mm left): ", SegmentName(match.truth.segmentId).c_str(),
@@ -267,7 +271,7 @@ void CompareLesions(
   }
 }
 
-/// A row of what the weights of odds are fitted to: share that is artery, whether it is to be used, probability, place, signs.
+/// A row of what the weights of odds are fitted to: share that is artery (of a tip: whether the vessel goes on), whether it is to be used, probability, place, signs.
 template <std::size_t N>
 std::string OddsRow(double artery, bool used, double probability, const Vector3& place,
   const std::array<double, N>& signs)
@@ -305,6 +309,34 @@ std::string LinkRows(const PhantomTree& truth, const std::vector<ConsideredLink>
     const double artery =
       std::min(ShareOnArteries(truth, link.points), ShareNearArteries(truth, behind));
     rows += OddsRow(artery, true, link.confidence, link.points.back(), link.signs);
+  }
+  return rows;
+}
+
+/// What each tip was judged by: the vessel goes on where a loss begins within some millimetres.
+std::string TipRows(const LengthComparison& lengths, const CenterlineTree& tree)
+{
+  constexpr double ahead = 4.0; // mm
+  constexpr double rest =
+    5.0; // mm that are worth telling; of a few millimetres it is hard to say whether they should
+  constexpr double little = 2.0;
+  std::string rows;
+  const std::vector<VesselPath> paths = VesselPaths(tree);
+  const std::vector<VesselTip> tips = JudgeTips(tree, paths);
+  for (std::size_t n = 0; n < paths.size(); ++n)
+  {
+    const VesselTip& tip = tips[n];
+    const Vector3& place = tree.points[paths[n].points.back()];
+    double lost = 0.0;
+    for (const Stretch& loss : lengths.losses)
+    {
+      if (Distance(place, loss.points) < ahead)
+      {
+        lost = std::max(lost, loss.length);
+      }
+    }
+    const double goesOn = lost >= rest ? 1.0 : lost > little ? 0.5 : 0.0;
+    rows += OddsRow(goesOn, tip.goesOn > 0.0, tip.goesOn, place, tip.signs);
   }
   return rows;
 }
@@ -418,6 +450,10 @@ Outcome Run(const Condition& condition, std::uint64_t seed, const Options& optio
     {
       outcome.links = LinkRows(truth, scan.considered);
     }
+    if (!options.tips.empty())
+    {
+      outcome.tips = TipRows(outcome.lengths, found.tree);
+    }
     if (!options.lines.empty())
     {
       const std::string base = options.lines + "/" + condition.name + "-" + std::to_string(seed);
@@ -454,6 +490,7 @@ struct Summary
   int alarms = 0; ///< warnings
   DegreeTally wide;
   DegreeTally narrow;
+  DegreeTally thin;
   double seconds = 0.0;
 
   void Add(const Outcome& o)
@@ -483,6 +520,7 @@ struct Summary
     this->alarms += o.Alarms();
     this->wide.Add(o.wide);
     this->narrow.Add(o.narrow);
+    this->thin.Add(o.thin);
   }
   double Mean(double sum) const { return this->phantoms > 0 ? sum / this->phantoms : 0.0; }
   double MeanSurface() const { return this->surfaces > 0 ? this->surface / this->surfaces : 0.0; }
@@ -636,29 +674,35 @@ bool PrintLesions(const std::vector<Row>& rows, const Options& options)
 {
   DegreeTally wide;
   DegreeTally narrow;
-  std::printf("\nLesions of %.0f %% or more; wide: 1 mm or more is left.\n\n| condition | wide | "
+  DegreeTally thin;
+  std::printf("\nLesions of %.0f %% or more; wide: 1 mm or more is left; thin: less is left, in a "
+              "vessel of less than %.1f mm, which is not graded.\n\n| condition | wide | "
               "within %.0f points | mean error | in range | not listed | not reached | narrow | in "
-              "range | mean error | not listed | not reached "
-              "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-    100.0 * GradedDegree, 100.0 * DegreeTally::LargestError);
-  const auto print = [](const char* name, const DegreeTally& w, const DegreeTally& n)
+              "range | mean error | not listed | not reached | thin | in range | not reached "
+              "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    100.0 * GradedDegree, 2.0 * GradingSettings().leastReferenceRadius,
+    100.0 * DegreeTally::LargestError);
+  const auto print =
+    [](const char* name, const DegreeTally& w, const DegreeTally& n, const DegreeTally& t)
   {
-    std::printf("| %s | %d | %s | %+.3f | %s | %d | %d | %d | %s | %+.3f | %d | %d |\n", name,
-      w.Lesions(), ShareText(w.within, w.Lesions()).c_str(), w.sum / std::max(1, w.listed),
+    std::printf("| %s | %d | %s | %+.3f | %s | %d | %d | %d | %s | %+.3f | %d | %d | %d | %s | %d "
+                "|\n",
+      name, w.Lesions(), ShareText(w.within, w.Lesions()).c_str(), w.sum / std::max(1, w.listed),
       ShareText(w.inRange, w.Lesions()).c_str(), w.unlisted, w.unreached, n.Lesions(),
       ShareText(n.inRange, n.Lesions()).c_str(), n.sum / std::max(1, n.listed), n.unlisted,
-      n.unreached);
+      n.unreached, t.Lesions(), ShareText(t.inRange, t.Lesions()).c_str(), t.unreached);
   };
   for (const auto& [condition, s] : rows)
   {
     wide.Add(s.wide);
     narrow.Add(s.narrow);
-    if (s.wide.Lesions() + s.narrow.Lesions() > 0)
+    thin.Add(s.thin);
+    if (s.wide.Lesions() + s.narrow.Lesions() + s.thin.Lesions() > 0)
     {
-      print(condition.name, s.wide, s.narrow);
+      print(condition.name, s.wide, s.narrow, s.thin);
     }
   }
-  print("all", wide, narrow);
+  print("all", wide, narrow, thin);
   const auto judge = [&](const char* what, int part, const DegreeTally& tally, double least)
   {
     const bool met = options.quick || part >= least * tally.Lesions();
@@ -762,6 +806,7 @@ std::vector<Row> RunAll(const std::vector<Condition>& conditions,
   std::mutex mutex;
   OddsTable branches(options.branches, VeinSignNames());
   OddsTable links(options.links, LinkSignNames());
+  OddsTable tips(options.tips, TipSignNames());
   SetNumberOfThreads(jobs);
   PrintHead(options);
   std::fflush(stdout);
@@ -782,6 +827,7 @@ std::vector<Row> RunAll(const std::vector<Condition>& conditions,
           PrintCase(row.condition, seed, *outcomes[printed], options);
           branches.Add(row.condition, seed, outcomes[printed]->branches);
           links.Add(row.condition, seed, outcomes[printed]->links);
+          tips.Add(row.condition, seed, outcomes[printed]->tips);
           details += Details(row.condition, seed, *outcomes[printed], options.details);
           outcomes[printed] = Outcome(); // its stretches and texts are of no more use
         }
@@ -816,6 +862,8 @@ int main(int argc, char** argv)
       "table of all branches that were judged to be artery or vein, *.csv");
     program.add_option(
       "--links", options.links, "table of all links across lesions that came to mind, *.csv");
+    program.add_option("--tips", options.tips,
+      "table of all tips that were judged to end a vessel or to be a lesion of it, *.csv");
     program.add_flag(
       "--true-ostia", options.trueOstia, "start at the true ostia, not at those found");
     program.add_flag("--no-surface", noSurface, "leave out the surfaces");
