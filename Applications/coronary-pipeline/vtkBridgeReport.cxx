@@ -1,6 +1,7 @@
 #include "vtkBridgeReport.h"
 
 #include "BridgeCheck.h"
+#include "TreeCheck.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 
@@ -48,6 +49,11 @@ std::pair<std::string, double> NearestVessel(vtkPolyData* tree, const Vector3& p
 nlohmann::ordered_json Place(const Vector3& p)
 {
   return { p[0], p[1], p[2] };
+}
+
+Vector3 PlaceOf(const nlohmann::ordered_json& place)
+{
+  return { place[0].get<double>(), place[1].get<double>(), place[2].get<double>() };
 }
 }
 
@@ -131,14 +137,23 @@ std::vector<std::string> BridgeWarnings(const nlohmann::ordered_json& bridges)
     {
       continue;
     }
-    const auto place = [&](const char* end)
-    {
-      return Vector3(
-        bridge[end][0].get<double>(), bridge[end][1].get<double>(), bridge[end][2].get<double>());
-    };
-    const VesselBridge crossed{ { place("from"), place("to") }, bridge["confidence"].get<double>(),
-      bridge["unseen_mm"].get<double>() };
+    const VesselBridge crossed{ { PlaceOf(bridge["from"]), PlaceOf(bridge["to"]) },
+      bridge["confidence"].get<double>(), bridge["unseen_mm"].get<double>() };
     warnings.push_back(OcclusionWarning(crossed, bridge["vessel"].get<std::string>()).what + ".");
+  }
+  return warnings;
+}
+
+std::vector<std::string> VeinWarnings(const nlohmann::ordered_json& veins)
+{
+  std::vector<std::string> warnings;
+  for (const auto& vein : veins)
+  {
+    if (const auto warning = DoubtfulVeinWarning(PlaceOf(vein["position"]),
+          vein["length_mm"].get<double>(), vein["probability"].get<double>()))
+    {
+      warnings.push_back(warning->what + ".");
+    }
   }
   return warnings;
 }

@@ -37,6 +37,9 @@ nlohmann::ordered_json DescribeVeins(vtkPolyData* tree);
 
 /// A sentence for each bridge of a report that a user should look at: what is not seen for 3 mm or more.
 std::vector<std::string> BridgeWarnings(const nlohmann::ordered_json& bridges);
+
+/// A sentence for each vein of a report that may be an artery.
+std::vector<std::string> VeinWarnings(const nlohmann::ordered_json& veins);
 }
 
 #endif

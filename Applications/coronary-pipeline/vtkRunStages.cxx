@@ -631,6 +631,10 @@ Json MakeCenterline(RunStep& step)
   }
   numbers["trees"] = trees;
   numbers["veins"] = DescribeVeins(raw);
+  for (const std::string& warning : VeinWarnings(numbers["veins"]))
+  {
+    step.warnings.push_back(warning);
+  }
   numbers["bridges"] = Json::array();
   if (windowed)
   {

@@ -494,6 +494,19 @@ std::vector<TreeWarning> Checker::Run()
 }
 }
 
+std::optional<TreeWarning> DoubtfulVeinWarning(const Vector3& place, double length, double vein)
+{
+  constexpr double certain = 0.95;
+  if (vein >= certain)
+  {
+    return std::nullopt;
+  }
+  return TreeWarning{ "a vessel of " + Rounded(length) + " mm that touches a tree at " + At(place) +
+      " was left out as a vein, with a probability of " + Rounded(vein, 2) +
+      ": it may be an artery",
+    "", place, 1.0 - vein };
+}
+
 std::vector<TreeWarning> CheckCoronaryTrees(
   const CenterlineTopology& tree, const LabelingResult& labels)
 {

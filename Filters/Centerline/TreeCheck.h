@@ -13,6 +13,7 @@
 #include "CenterlineTopology.h"
 #include "SegmentLabeling.h"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,14 @@ struct TreeWarning
  */
 std::vector<TreeWarning> CheckCoronaryTrees(
   const CenterlineTopology& tree, const LabelingResult& labels);
+
+/**
+ * To be said of what was left out as a vein unless that is certain; none when it is.
+ * @param place   mm, where it touches a tree
+ * @param length  mm
+ * @param vein    probability of one, 0 to 1
+ */
+std::optional<TreeWarning> DoubtfulVeinWarning(const Vector3& place, double length, double vein);
 }
 
 #endif

@@ -191,6 +191,7 @@ private:
   void Beside(Arm& arm) const;
   std::optional<Arm> Describe(std::size_t branch, double reach) const;
   double VeinBegin(const Arm& arm) const;
+  std::optional<double> Narrowest(const Course& course) const;
   void Weigh(Arm& arm) const;
   std::optional<Place> Between(std::size_t a, std::size_t b) const;
   std::optional<Side> SideOf(const Course& course, const Place& place) const;
@@ -821,13 +822,17 @@ void VeinFinder::FindOpposites(std::vector<Arm>& arms) const
 double VeinFinder::VeinBegin(const Arm& arm) const
 {
   const std::size_t branch = this->Index.at(arm.branch.groupId);
-  std::vector<double> forks;
-  this->Down(branch, Far, &forks);
-  double begin = 0.0;
-  for (const double fork : forks)
+  std::vector<double> places;
+  this->Down(branch, Far, &places);
+  if (const std::optional<double> narrow = this->Narrowest(arm.course))
   {
-    std::optional<Arm> stem = this->Describe(branch, fork);
-    if (!stem || fork >= Far)
+    places.insert(std::upper_bound(places.begin(), places.end(), *narrow), *narrow);
+  }
+  double begin = 0.0;
+  for (const double place : places)
+  {
+    std::optional<Arm> stem = this->Describe(branch, place);
+    if (!stem || place >= Far)
     {
       continue;
     }
@@ -836,9 +841,42 @@ double VeinFinder::VeinBegin(const Arm& arm) const
     {
       break;
     }
-    begin = fork;
+    begin = place;
   }
   return begin;
+}
+
+/// mm at which a course is narrowest, where it widens on both sides of it: an artery's thin end may touch a vein.
+std::optional<double> VeinFinder::Narrowest(const Course& course) const
+{
+  constexpr double around = 1.5;  // mm
+  constexpr double widens = 1.15; // of the radius
+  const double length = course.empty() ? 0.0 : course.back().passed;
+  double least = std::numeric_limits<double>::infinity();
+  double place = 0.0;
+  for (const Step& step : course)
+  {
+    if (step.passed < LeastLength || step.passed > length - LeastLength)
+    {
+      continue;
+    }
+    const std::vector<double> radii =
+      this->Radii(course, step.passed - around, step.passed + around);
+    const double radius = radii.empty() ? least : MedianOf(radii);
+    if (radius < least)
+    {
+      least = radius;
+      place = step.passed;
+    }
+  }
+  const std::vector<double> before = this->Radii(course, 0.0, place);
+  const std::vector<double> behind = this->Radii(course, place, length + 1.0);
+  if (before.empty() || behind.empty() || UpperRadius(before) < widens * least ||
+    UpperRadius(behind) < widens * least)
+  {
+    return std::nullopt;
+  }
+  return place;
 }
 
 std::vector<VeinBranch> VeinFinder::Run()

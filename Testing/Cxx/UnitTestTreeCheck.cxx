@@ -125,6 +125,19 @@ TEST(TreeCheck, WhatIsCutOffIsNamedWithItsPlace)
   }
 }
 
+TEST(TreeCheck, AVeinThatMayBeAnArteryIsSaid)
+{
+  EXPECT_FALSE(DoubtfulVeinWarning(Vector3(1.0, 2.0, 3.0), 20.0, 0.97));
+  const auto warning = DoubtfulVeinWarning(Vector3(1.0, 2.0, 3.0), 20.0, 0.7);
+  ASSERT_TRUE(warning);
+  EXPECT_EQ(warning->place, Vector3(1.0, 2.0, 3.0));
+  EXPECT_NEAR(warning->confidence, 0.3, 1e-12);
+  EXPECT_EQ(warning->what,
+    "a vessel of 20 mm that touches a tree at (1.0, 2.0, 3.0) was left out as a vein, with a "
+    "probability of 0.70: "
+    "it may be an artery");
+}
+
 TEST(TreeCheck, AVesselThatWidensIsDoubted)
 {
   const PhantomTree tree = TreeOf(321, 0);

@@ -364,6 +364,23 @@ TEST(VeinRejection, WhatCrossesIsLeftOut)
   }
 }
 
+TEST(VeinRejection, AnArteryStaysWhoseThinEndTouchesAVein)
+{
+  // The line goes on in the vein, which widens from there on beside the artery: there is no fork between the two.
+  Scene scene(
+    { Tube({ 0, 0, 0 }, { 80, 0, 0 }, 1.6, 1.4), Tube({ 10, 0, 0 }, { 32, 9, 0 }, 1.2, 0.6),
+      Tube({ 20, 0, 0 }, { 32, -12, 0 }, 1.0, 0.6), Tube({ 50, 0, 0 }, { 62, -12, 0 }, 1.0, 0.6) });
+  constexpr double dim = Fat + 0.6 * (Blood - Fat);
+  Draw(scene, Tube({ 31.5, 8.8, 0 }, { 42, 4.6, 0 }, 0.8, 1.2), dim);
+  Draw(scene, Tube({ 42, 4.6, 0 }, { 76, 4.6, 0 }, 1.2, 1.6), dim);
+  const CenterlineResult result = Extract(scene);
+  ASSERT_EQ(result.veins.size(), 1U);
+  EXPECT_LT((result.veins[0].position - Vector3(32, 9, 0)).norm(), 5.0);
+  EXPECT_TRUE(Reaches(result, { 28.0, 7.4, 0.0 }));
+  EXPECT_FALSE(Reaches(result, { 45.0, 4.6, 0.0 }));
+  EXPECT_FALSE(Reaches(result, { 60.0, 4.6, 0.0 }));
+}
+
 TEST(VeinRejection, BranchesThatFaceEachOtherStay)
 {
   // Both taper to nothing that can be seen, and the artery is thinner behind them.

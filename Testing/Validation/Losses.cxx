@@ -231,6 +231,13 @@ std::vector<Said> WarningsOf(const PhantomScan& scan, const FoundTree& found)
       list.push_back({ "seeds", end.message, scan.seedNames[s], { scan.seeds[s] } });
     }
   }
+  for (const RejectedVein& vein : found.extraction.veins)
+  {
+    if (const auto warning = DoubtfulVeinWarning(vein.position, vein.length, vein.probability))
+    {
+      list.push_back({ "vein", warning->what, "", { vein.position } });
+    }
+  }
   for (const std::string& message : found.extraction.messages)
   {
     list.push_back({ "centerline", message, "", {} });

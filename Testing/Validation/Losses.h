@@ -54,7 +54,7 @@ double Distance(const Vector3& place, const std::vector<Vector3>& points);
 /// Something that a run says is wrong.
 struct Said
 {
-  std::string source; ///< "ostia", "seeds", "bridge", "check", "loose", "surface"
+  std::string source; ///< "ostia", "seeds", "bridge", "check", "loose", "vein", "surface"
   std::string what;
   std::string vessel; ///< SCCT name, "LAD", "LCx", "LCA" or "RCA", or none
   std::vector<Vector3> places;
