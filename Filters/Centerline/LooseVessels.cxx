@@ -45,7 +45,7 @@ constexpr double ThinEnd[] = { 0.55, 0.75 };
 constexpr double WideEnd[] = { 1.2, 1.8 };
 constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
 /// What begins ahead of a tip of the tree and goes on in its direction is the rest of that artery: a lesion parts them.
-constexpr double OnwardGap = 12.0;    ///< mm from the tip
+constexpr double OnwardGap = 15.0;    ///< mm from the tip
 constexpr double OnwardCosine = 0.75; ///< of the angles between the tip, the gap and what goes on
 constexpr double OnwardOdds = 2.0;
 constexpr double LeastOnward = 5.0; ///< mm of it
