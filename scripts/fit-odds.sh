@@ -28,16 +28,19 @@ done
 
 # Conditions of validate-disease, each with hearts of its own; most where veins and lesions are hard to tell.
 hearts=("bright-vein 310..323" "dim-contrast 324..331" "stenoses-70 338..345" "stenoses-90 350..357"
-  "left-ramus-60-calcified-20 356..359" "noise-60 362..364" "healthy 368..369" "occlusion 374..379" "calcified-25 382..383")
+  "left-ramus-60-calcified-20 356..359" "noise-60 362..364" "healthy 368..369" "occlusion 374..379" "calcified-25 382..383"
+  "stenoses-70 523..540" "stenoses-90 521..536" "stenoses-70-calcified-25 541..552" "stenoses-70-coarse 553..564"
+  "healthy 521..532" "noise-60 521..528")
 
 mkdir -p "$output"
 rm -f "$output"/{branches,links,tips}-*.csv
 for heart in "${hearts[@]}"; do
   read -r condition seeds <<<"$heart"
   echo "$condition $seeds" >&2
+  name="$condition-$seeds"
   # Its limits are another matter; anything but a missed limit is a fault.
   "$build/bin/validate-disease" --no-surface --conditions "$condition" --seeds "$seeds" \
-    --branches "$output/branches-$condition.csv" --links "$output/links-$condition.csv" --tips "$output/tips-$condition.csv" >"$output/$condition.md" || (($? == 1))
+    --branches "$output/branches-$name.csv" --links "$output/links-$name.csv" --tips "$output/tips-$name.csv" >"$output/$name.md" || (($? == 1))
 done
 for kind in branches links tips; do
   echo "$kind"

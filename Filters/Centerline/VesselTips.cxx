@@ -19,11 +19,11 @@ constexpr double UsualBefore = 0.51; ///< mm, the same in the second section
 
 /// Fitted to the tips of phantoms (scripts/fit-odds.sh). A unit is 0.1 mm of radius, in hearts of usual calibre.
 constexpr double Unit = 0.1;
-constexpr double Intercept = -5.57;
+constexpr double Intercept = -5.56;
 constexpr std::array<FittedSign, NumberOfTipSigns> Signs{ {
-  { "wide_before", 1.49 },
-  { "tapers_before", 0.64 },
-  { "wide_narrows", 0.96 },
+  { "wide_before", 1.11 },
+  { "tapers_before", 0.43 },
+  { "wide_narrows", 1.35 },
 } };
 
 /// A right coronary artery that is not dominant ends in full calibre.

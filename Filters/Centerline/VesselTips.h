@@ -25,7 +25,7 @@ struct VesselTip
   std::array<double, NumberOfTipSigns> signs{};
 };
 
-/// Of a vessel that goes on: it is told. Whole vessels of healthy phantoms have 0.25 at most.
+/// Of a vessel that goes on: it is told. Whole vessels of healthy phantoms have 0.26 at most.
 constexpr double LeastGoingOn = 0.3;
 
 /**

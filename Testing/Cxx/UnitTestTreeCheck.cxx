@@ -115,7 +115,7 @@ TEST(TreeCheck, WhatIsCutOffIsNamedWithItsPlace)
     for (const TreeWarning& warning : ofLeft)
     {
       EXPECT_FALSE(warning.vessel.empty());
-      EXPECT_GE(warning.confidence, 0.3);
+      EXPECT_GE(warning.confidence, 0.3) << warning.what;
       EXPECT_LE(warning.confidence, 0.99);
       // Not of the other tree.
       EXPECT_EQ(warning.what.find("RCA"), std::string::npos) << warning.what;
