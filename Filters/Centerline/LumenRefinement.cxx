@@ -489,7 +489,9 @@ void Refiner::Prepare(
     const std::int64_t p = path.points[i];
     inMouth = inMouth &&
       InParent(this->tree, paths[path.parent], this->tree.points[p], 0.5 * this->tree.radius[p]);
-    work.skipped[i] = inMouth ? 1 : 0;
+    // At an ostium a part of the section is the aorta's.
+    const bool atOstium = path.parent < 0 && path.arc[i] < 0.5 * this->tree.radius[p];
+    work.skipped[i] = inMouth || atOstium ? 1 : 0;
     work.besideCalcium[i] = result.calcium[p] != 0 ? 1 : 0;
   }
 }

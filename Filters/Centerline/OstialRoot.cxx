@@ -87,6 +87,9 @@ public:
       this->Lengths.push_back(length);
     }
     this->Healthy = this->HealthyRadius();
+    constexpr double whole = 0.75; // less of what its daughters need is a lesion, not a narrow stem
+    const double needed = this->RadiusOfDaughters(free);
+    this->Healthy = this->Healthy < whole * needed ? needed : this->Healthy;
   }
 
   OstialRoot Settle()
@@ -127,10 +130,11 @@ public:
 private:
   static constexpr double Longest = 20.0; ///< units of vessel that are looked at
 
-  const Vector3& Point(std::size_t i) const
+  const Vector3& PointOf(std::int64_t p) const
   {
-    return this->Tree.points[static_cast<std::size_t>(this->Branch.points[i])];
+    return this->Tree.points[static_cast<std::size_t>(p)];
   }
+  const Vector3& Point(std::size_t i) const { return this->PointOf(this->Branch.points[i]); }
   double Radius(std::size_t i) const
   {
     return this->Tree.radius[static_cast<std::size_t>(this->Branch.points[i])];
@@ -148,17 +152,76 @@ private:
     return std::min<std::size_t>(place - this->Lengths.begin(), this->Lengths.size() - 1);
   }
 
-  /// The radius that most of the way is not wider than: a lesion takes the smaller part of it, a funnel its beginning.
+  /// The greatest radius that is seen and stays for 2 units: a funnel's does not, and a lesion is narrower.
+  /// Where none stays, the narrower third away from the wall.
   double HealthyRadius() const
   {
-    std::vector<double> radii;
+    const double stays = 2.0 * this->Unit;
+    constexpr double steady = 0.12; // of the mean
+    constexpr double seen = 0.7;    // confidence
+    double healthy = 0.0;
+    for (std::size_t i = 0; i < this->Lengths.size(); ++i)
+    {
+      if (this->Lengths[i] + stays > this->Lengths.back())
+      {
+        break;
+      }
+      std::vector<double> radii;
+      bool clear = true;
+      for (std::size_t j = i; j <= this->At(this->Lengths[i] + stays); ++j)
+      {
+        radii.push_back(this->Radius(j));
+        clear = clear && this->Confidence(j) >= seen;
+      }
+      const auto [least, most] = std::minmax_element(radii.begin(), radii.end());
+      if (clear && *most - *least <= steady * 0.5 * (*most + *least))
+      {
+        healthy = std::max(healthy, MedianOf(radii));
+      }
+    }
+    if (healthy > 0.0)
+    {
+      return healthy;
+    }
     const std::size_t from = this->At(std::min(3.0 * this->Unit, 0.4 * this->Lengths.back()));
+    std::vector<double> radii;
     for (std::size_t i = from; i < this->Lengths.size(); ++i)
     {
       radii.push_back(this->Radius(i));
     }
-    std::sort(radii.begin(), radii.end());
-    return radii[radii.size() * 3 / 4];
+    return QuantileOf(radii, 1.0 / 3.0);
+  }
+
+  /// The radius of a vessel that parts in those behind the last point that may move (Huo and Kassab 2007): a lesion may take
+  /// all of a short main stem. 0 where none begins within the length that is looked at.
+  double RadiusOfDaughters(std::size_t free) const
+  {
+    constexpr double exponent = 7.0 / 3.0;
+    const double reach = 10.0 * this->Unit;
+    double sum = 0.0;
+    const std::int64_t fork = this->Branch.points[std::min(free, this->Branch.points.size() - 1)];
+    for (const CenterlineTree::Branch& other : this->Tree.branches)
+    {
+      const auto at = std::find(other.points.begin(), other.points.end(), fork);
+      std::vector<double> radii;
+      double length = 0.0;
+      for (auto p = at; p != other.points.end() && p + 1 != other.points.end(); ++p)
+      {
+        length += (this->PointOf(*(p + 1)) - this->PointOf(*p)).norm();
+        const double own = this->Tree.radius[static_cast<std::size_t>(*(p + 1))];
+        if (length > reach)
+        {
+          break;
+        }
+        if (length > own) // behind the mouth
+        {
+          radii.push_back(own);
+        }
+      }
+      sum += radii.empty() ? 0.0 : std::pow(MedianOf(radii), exponent);
+    }
+    const bool parts = this->Lengths.size() == std::min(free + 1, this->Branch.points.size());
+    return parts ? std::pow(sum, 1.0 / exponent) : 0.0;
   }
 
   /// The first point from which on the vessel is seen, and no wider than it is farther on.

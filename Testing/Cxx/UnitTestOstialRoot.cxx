@@ -130,6 +130,35 @@ TEST(OstialRoot, FunnelsBelongToTheAorta)
   EXPECT_LT(roots[0].radius, 2.7);
 }
 
+TEST(OstialRoot, TheFunnelOfAShortMainStemIsNotItsWidth)
+{
+  // The first branch leaves 9 mm outside of the wall: half of what may move is funnel, and measured as such.
+  const Vector3 axis = Vector3::UnitX();
+  constexpr double radius = 1.9;
+  constexpr double depth = 5.0;
+  const Picture picture([&](const Vector3& p)
+    { return std::min(p[0], Tube(p, Vector3::Zero(), axis, radius, depth)); });
+  CenterlineTree tree = BentTree(axis, radius);
+  for (std::size_t i = 0; i < tree.points.size(); ++i)
+  {
+    const double open = std::clamp(depth - tree.points[i][0], 0.0, depth);
+    tree.radius[i] = radius + 0.5 * open * open / depth;
+  }
+  CenterlineTree::Branch side;
+  side.groupId = 1;
+  side.parentGroupId = 0;
+  side.points = { 44, static_cast<std::int64_t>(tree.points.size()) };
+  tree.points.emplace_back(tree.points[44] + Vector3(3, 6, 0));
+  tree.radius.push_back(1.0);
+  tree.confidence.push_back(1.0);
+  tree.branches.push_back(side);
+  const std::vector<OstialRoot> roots = picture.Settle(tree);
+  ASSERT_TRUE(roots.at(0).found);
+  EXPECT_GT(roots[0].position[0], 0.8);
+  EXPECT_LT(roots[0].position[0], 3.5);
+  EXPECT_LT(roots[0].radius, 1.35 * radius);
+}
+
 TEST(OstialRoot, AFullWidthBeforeALesionIsTheVessel)
 {
   // A lesion of 9 mm that leaves 30 %: right behind the ostium, and some millimetres on. The line begins in the aorta.

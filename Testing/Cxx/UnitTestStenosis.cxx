@@ -220,6 +220,38 @@ TEST(LumenRefinement, MeasuresLumensAboveAndBelowTheBlur)
   }
 }
 
+TEST(LumenRefinement, AnOstiumKeepsItsRadius)
+{
+  // The first sections lie partly in the aorta, which the vessel leaves obliquely: what is fitted there is no lumen's.
+  const Vector3 outwards = Vector3(0.2, 0.06, 1.0).normalized();
+  for (const double inside : { 0.0, 0.5 })
+  {
+    Tube tube;
+    tube.radius = [](double) { return 1.9; };
+    tube.Render();
+    const ImageGrid& grid = tube.image.grid;
+    for (std::size_t v = 0; v < tube.values.size(); ++v)
+    {
+      const auto n = static_cast<int>(v);
+      const int nx = grid.extent[1] + 1;
+      const int ny = grid.extent[3] + 1;
+      const Vector3 p = grid.IndexToWorld(n % nx, n / nx % ny, n / nx / ny);
+      const double share = 0.5 * std::erfc((p.dot(outwards) - inside) / (std::sqrt(2.0) * Blur));
+      tube.values[v] =
+        std::max(tube.values[v], static_cast<float>(Fat + share * (Lumen + 10.0 - Fat)));
+    }
+    const Measured measured = MeasureAll(tube, LineWith(2.0));
+    for (std::size_t p = 0; p < 4; ++p)
+    {
+      EXPECT_NEAR(measured.lumen.radius[p], 2.0, 0.1) << inside << ", point " << p;
+    }
+    for (std::size_t p = 20; p < 40; ++p)
+    {
+      EXPECT_NEAR(measured.lumen.radius[p], 1.9, 0.05) << inside << ", point " << p;
+    }
+  }
+}
+
 TEST(StenosisGrading, DegreesAreThoseOfTheTube)
 {
   for (const double degree : { 0.4, 0.6, 0.75, 0.85 })
