@@ -37,8 +37,8 @@ constexpr double BesideReach = 10.0; ///< mm
 constexpr double BesideCosine = 0.7; ///< of the angle between both
 /// Contrast of arteries that were missed and of veins, over that of arteries of their calibre: mean and spread. Behind lesions
 /// it is less; veins fill after the arteries, some hearts' nearly as much.
-constexpr double ArteryContrast[] = { 1.0, 0.2 };
-constexpr double VeinContrast[] = { 0.55, 0.25 };
+constexpr double ArteryContrast[] = { 0.95, 0.2 };
+constexpr double VeinContrast[] = { 0.55, 0.15 };
 /// mm, half-maximum radii: arteries end thinner than the one, veins go on into wider ones than the other.
 constexpr double ThinEnd[] = { 0.55, 0.75 };
 /// The same: a stretch between two lesions of a trunk may end as wide as the one; ribs and great vessels as the other.
@@ -48,7 +48,8 @@ constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
 constexpr double OnwardGap = 15.0;    ///< mm from the tip
 constexpr double OnwardCosine = 0.75; ///< of the angles between the tip, the gap and what goes on
 constexpr double OnwardOdds = 2.0;
-constexpr double LeastOnward = 5.0; ///< mm of it
+constexpr double SideCosine = 0.5;  ///< the same, of what comes from the side of a vessel
+constexpr double LeastOnward = 5.0; ///< mm of either
 /// Mean distance of true arteries from those of the mean heart is less; beyond it grows doubt.
 constexpr double UsualAway = 10.0; ///< mm of the mean heart
 
@@ -124,7 +125,7 @@ struct Sample
   Vector3 tangent;
   int segment = 0;
   double radius = 0.0;     ///< mm, half-maximum
-  double contrast = 0.0;   ///< of its lumen
+  double contrast = 0.0;   ///< of its lumen, share of that of blood
   double vesselness = 0.0; ///< greatest around
 };
 
@@ -201,6 +202,7 @@ private:
     std::int64_t first, const Take& take, std::vector<std::vector<std::int64_t>>& pieces) const;
   double UsualContrast(double radius) const;
   bool GoesOn(const std::vector<Vector3>& axis) const;
+  bool ComesFromASide(const std::vector<Vector3>& axis) const;
   std::vector<Section> Sections(const std::vector<Vector3>& axis) const;
   static std::pair<std::size_t, std::size_t> BestStretch(const std::vector<Section>& sections);
   bool Describe(
@@ -227,7 +229,9 @@ Sample Search::Measure(
   sample.position = position;
   sample.tangent = tangent;
   sample.radius = section.radius;
-  sample.contrast = section.lumen - this->I.tissue;
+  // Thin vessels show less in fat than in muscle: what is around them decides what blood would show.
+  const double behind = std::min(section.behind, this->I.tissue);
+  sample.contrast = (section.lumen - behind) / (this->I.blood - behind);
   if (const auto at = this->L.Nearest(section.centre))
   {
     this->L.Ball(*at, 1.0,
@@ -510,11 +514,30 @@ bool Search::GoesOn(const std::vector<Vector3>& axis) const
   return from(axis.front(), axis[inside]) || from(axis.back(), axis[axis.size() - 1 - inside]);
 }
 
+/// Whether an axis, straight back from one of its ends, comes from the side of a vessel that flows its way.
+bool Search::ComesFromASide(const std::vector<Vector3>& axis) const
+{
+  const auto from = [&](const Vector3& begin, const Vector3& inwards)
+  {
+    const Vector3 along = (inwards - begin).normalized();
+    return std::any_of(this->Samples.begin(), this->Samples.end(),
+      [&](const Sample& sample)
+      {
+        const Vector3 gap = begin - sample.position;
+        return gap.norm() < OnwardGap && gap.dot(along) > SideCosine * gap.norm() &&
+          along.dot(sample.tangent) > 0.0;
+      });
+  };
+  const auto inside = std::min(axis.size() - 1, static_cast<std::size_t>(2.0 * EndLength / Step));
+  return from(axis.front(), axis[inside]) || from(axis.back(), axis[axis.size() - 1 - inside]);
+}
+
 /// Sections along an axis.
 std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) const
 {
   std::map<int, double> known; // by radius in tenths of mm
   std::vector<Section> sections;
+  std::vector<double> brightness(axis.size(), 0.0);
   for (std::size_t n = 0; n < axis.size(); ++n)
   {
     const Vector3 tangent =
@@ -529,10 +552,24 @@ std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) 
       {
         usual->second = this->UsualContrast(section.sample.radius);
       }
-      const double brightness = section.sample.contrast / std::max(1e-9, usual->second);
-      section.odds = std::clamp(ArteryOdds(brightness), -1.0, 1.0);
+      brightness[n] = section.sample.contrast / std::max(1e-9, usual->second);
     }
     sections.push_back(section);
+  }
+  // With its neighbours: noise is as large as the difference.
+  for (std::size_t n = 0; n < sections.size(); ++n)
+  {
+    double sum = 0.0;
+    int seen = 0;
+    for (std::size_t m = n == 0 ? 0 : n - 1; m < std::min(n + 2, sections.size()); ++m)
+    {
+      sum += brightness[m];
+      seen += sections[m].seen ? 1 : 0;
+    }
+    if (sections[n].seen)
+    {
+      sections[n].odds = std::clamp(ArteryOdds(sum / seen), -1.0, 1.0);
+    }
   }
   return sections;
 }
@@ -574,7 +611,9 @@ bool Search::Describe(
     vessel.length += (vessel.points[n] - vessel.points[n - 1]).norm();
   }
   vessel.goesOn = vessel.length >= LeastOnward && this->GoesOn(vessel.points);
-  if (vessel.length < LeastLength && !vessel.goesOn)
+  const bool hangs =
+    vessel.goesOn || (vessel.length >= LeastOnward && this->ComesFromASide(vessel.points));
+  if (vessel.length < LeastLength && !hangs)
   {
     return false;
   }
@@ -634,13 +673,18 @@ bool Search::Describe(
   {
     vessel.thinEnd = end.empty() ? vessel.thinEnd : std::min(vessel.thinEnd, MedianOf(end));
   }
-  // Where an artery usually runs and does, another one is its vein; where it does not, it is the artery.
+  // Where an artery usually runs and does, another one is its vein, the surer the longer it runs beside; where it does
+  // not, it is the artery.
   const auto beyond = [&](const double(&from)[2])
   { return std::clamp((vessel.thinEnd - from[0]) / (from[1] - from[0]), 0.0, 1.0); };
   const double thick = beyond(ThinEnd) + beyond(WideEnd);
-  const double odds = ArteryOdds(vessel.brightness) + 1.0 - 5.0 * vessel.besideItsOwn -
-    1.5 * vessel.besideOther + 1.0 - 3.0 * thick + (vessel.goesOn ? OnwardOdds : 0.0);
+  const double companion = std::min(8.0, vessel.besideItsOwn * (2.0 + 0.1 * vessel.length));
+  const double odds = ArteryOdds(vessel.brightness) + 1.0 - companion - 1.5 * vessel.besideOther +
+    1.0 - 3.0 * thick + (vessel.goesOn ? OnwardOdds : 0.0);
+  // What is short may be anything: two of three that are as long as this.
+  constexpr double convincing = 5.0; // mm
   vessel.confidence = vessel.seen / (1.0 + std::exp(-odds)) *
+    (1.0 - std::exp(-vessel.length / convincing)) *
     std::exp(-std::max(0.0, vessel.away - UsualAway) / UsualAway);
   return true;
 }

@@ -88,6 +88,33 @@ protected:
     image.values = static_cast<const std::int16_t*>(Values.data());
     return FindLooseVessels({ image, Vesselness.data(), tree, labels.heart, 50.0, 420.0 });
   }
+  /// Fat in a ball of the image.
+  static void Hide(const Vector3& centre, double radius)
+  {
+    for (int k = Grid.extent[4]; k <= Grid.extent[5]; ++k)
+    {
+      for (int j = Grid.extent[2]; j <= Grid.extent[3]; ++j)
+      {
+        const Vector3 row = Grid.IndexToWorld(Grid.extent[0], j, k);
+        if (std::hypot(row[1] - centre[1], row[2] - centre[2]) > radius)
+        {
+          continue;
+        }
+        for (int i = Grid.extent[0]; i <= Grid.extent[1]; ++i)
+        {
+          if ((Grid.IndexToWorld(i, j, k) - centre).norm() < radius)
+          {
+            const auto nx = static_cast<std::size_t>(Grid.extent[1] + 1);
+            const auto ny = static_cast<std::size_t>(Grid.extent[3] + 1);
+            const auto at = (static_cast<std::size_t>(k) * ny + static_cast<std::size_t>(j)) * nx +
+              static_cast<std::size_t>(i);
+            Values[at] = -95;
+            Vesselness[at] = 0.0F;
+          }
+        }
+      }
+    }
+  }
   static double Distance(const Vector3& place, const std::vector<Vector3>& points)
   {
     double least = 1e9;
@@ -153,6 +180,41 @@ TEST_F(LooseVessels, ASideBranchThatIsMissingIsTold)
       EXPECT_LT(Distance(point, gone), 2.0);
     }
   }
+}
+
+TEST_F(LooseVessels, AShortRestBehindALesionIsTold)
+{
+  // Of a marginal less than 8 mm are left to be seen, 10 mm from where it leaves its parent; and no tip of the tree leads there.
+  const std::vector<std::int16_t> values = Values;
+  const std::vector<float> vesselness = Vesselness;
+  std::vector<Vector3> rest;
+  for (const PhantomBranch& branch : Truth.branches)
+  {
+    if (branch.segmentId != SecondObtuseMarginal)
+    {
+      continue;
+    }
+    const double begin = Truth.abscissa[static_cast<std::size_t>(branch.points.front())];
+    for (const std::int64_t p : branch.points)
+    {
+      const auto point = static_cast<std::size_t>(p);
+      const double passed = Truth.abscissa[point] - begin;
+      if (passed > 8.0 && passed < 22.0)
+      {
+        rest.push_back(Truth.points[point]);
+      }
+      else if (passed > 2.0)
+      {
+        Hide(Truth.points[point], 2.5);
+      }
+    }
+  }
+  const std::vector<TreeWarning> warnings = LooseVesselWarnings(Find(SecondObtuseMarginal));
+  Values = values;
+  Vesselness = vesselness;
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_LT(Distance(warnings[0].place, rest), 1.5);
+  EXPECT_LT(warnings[0].confidence, 0.85); // it is short
 }
 
 TEST_F(LooseVessels, WithoutContrastOrTreeThereIsNoMeasure)
