@@ -1,7 +1,7 @@
 #include "vtkRunLesions.h"
 
 #include "CalciumObjects.h"
-#include "CoronaryPhantom.h"
+#include "CoronaryAnatomy.h"
 #include "Interruption.h"
 #include "LumenLevels.h"
 #include "LumenRefinement.h"

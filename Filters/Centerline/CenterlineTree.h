@@ -34,7 +34,7 @@ struct CenterlineTree
     // From here on filled by the topology stage.
     int generation = 0; ///< 0 at a root
     int strahlerOrder = 1;
-    int segmentId = 0;       ///< SegmentId of CoronaryPhantom.h, 0 unknown
+    int segmentId = 0;       ///< SegmentId of CoronaryAnatomy.h, 0 unknown
     double length = 0.0;     ///< mm
     double tortuosity = 0.0; ///< length / chord - 1
   };

@@ -14,7 +14,7 @@
 #define DynamicCoronary_SegmentLabeling_h
 
 #include "CenterlineTopology.h"
-#include "CoronaryPhantom.h" // for SegmentId and Dominance
+#include "CoronaryAnatomy.h"
 
 namespace coronary
 {

@@ -1,6 +1,6 @@
 #include "StenosisGrading.h"
 
-#include "CoronaryPhantom.h" // for SegmentId
+#include "CoronaryAnatomy.h"
 #include "CurveSmoothing.h"
 #include "VesselTips.h"
 

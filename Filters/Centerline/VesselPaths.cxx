@@ -1,6 +1,6 @@
 #include "VesselPaths.h"
 
-#include "CoronaryPhantom.h" // for SegmentId
+#include "CoronaryAnatomy.h"
 
 #include <algorithm>
 #include <map>

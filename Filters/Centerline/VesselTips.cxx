@@ -1,6 +1,6 @@
 #include "VesselTips.h"
 
-#include "CoronaryPhantom.h" // for SegmentId
+#include "CoronaryAnatomy.h"
 #include "FittedOdds.h"
 #include "Median.h"
 

@@ -1,6 +1,6 @@
 #include "vtkCardiacPhaseInterpolator.h"
 
-#include "CoronaryPhantom.h"
+#include "CoronaryAnatomy.h"
 #include "PhaseInterpolation.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"

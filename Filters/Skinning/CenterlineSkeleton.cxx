@@ -1,6 +1,6 @@
 #include "CenterlineSkeleton.h"
 
-#include "CoronaryPhantom.h"
+#include "CoronaryAnatomy.h"
 
 #include <algorithm>
 #include <cmath>

@@ -39,7 +39,7 @@ struct Skeleton
     int id = 0;               ///< number of the bone, from 0
     int groupId = 0;          ///< branch of the tree that was given
     int treeId = 0;           ///< tree of the forest that was given
-    int segmentId = 0;        ///< SegmentId of CoronaryPhantom.h, 0 unknown
+    int segmentId = 0;        ///< SegmentId of CoronaryAnatomy.h, 0 unknown
     std::string name;    ///< unique: segment, number along it: "pLAD-2"; "branch5-2" if unnamed
     double length = 0.0; ///< mm along the vessel; not less than the distance of the joints
   };

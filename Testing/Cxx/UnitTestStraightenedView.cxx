@@ -1,6 +1,6 @@
 // Straightened views and slabs of tubes whose grey values and places are known; vessels joined from branches.
 
-#include "CoronaryPhantom.h" // for SegmentId
+#include "CoronaryAnatomy.h"
 #include "StraightenedView.h"
 #include "VesselChains.h"
 
