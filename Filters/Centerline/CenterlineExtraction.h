@@ -53,7 +53,7 @@ struct CenterlineSettings
   double minimumBranchLength = 0.0; ///< mm outside of the parent's lumen
   double minimumConfidence = 0.5;   ///< 0 to 1: sections below are not seen as vessel
   double maximumGap = 0.0;          ///< mm without a visible vessel that a branch may bridge
-  double maximumRadius = 0.0;       ///< mm
+  double maximumRadius = 0.0;       ///< mm; automatic: twice the seeds', at least 3 mm and 6 voxels
   double resampling = 0.0;          ///< distance of points, mm
   double smoothing = 0.0;           ///< wavelength that smoothing halves, mm
   double blur = 0.0;                ///< standard deviation of the image's blur, mm; 0: measured
