@@ -112,7 +112,7 @@ int vtkTGFReader::RequestData(
     }
     vtkPolyData* output = vtkPolyData::GetData(outputs, 0);
     const coronary::CenterlineTree tree = coronary::FromSkeleton(skeleton, this->Radius);
-    vtkCoronary::SetTree(output, tree, names::Radius);
+    vtkCoronary::SetTree(output, tree);
     if (this->OutputForm == SkeletonForm)
     {
       SetBones(output, skeleton, tree);

@@ -1077,7 +1077,6 @@ void FillTable(const coronary::MeshSequenceReport& report, vtkTable* table)
 }
 
 vtkMeshSequenceWriter::vtkMeshSequenceWriter()
-  : EntityIdsArrayName(names::CellEntityIds)
 {
   this->SetNumberOfInputPorts(3);
 }
@@ -1152,7 +1151,6 @@ void vtkMeshSequenceWriter::Validate() const
   Require(this->PoorDihedralAngle >= 0.0 && this->PoorDihedralAngle <= 70.0,
     "PoorDihedralAngle must be 0 to 70 degrees");
   Require(this->Digits >= 1 && this->Digits <= 9, "Digits must be 1 to 9");
-  Require(!this->EntityIdsArrayName.empty(), "EntityIdsArrayName is empty");
   for (const auto& [id, name] : this->FaceNames)
   {
     Require(id >= 1, "FaceName: ids begin with 1");
@@ -1274,14 +1272,13 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
       }
       if (!files)
       {
-        Topology topology = TopologyOf(mesh, boundary, this->EntityIdsArrayName);
+        Topology topology = TopologyOf(mesh, boundary, names::CellEntityIds);
         Require(!topology.tetrahedra.empty() || (!this->WriteSimVascular && !this->WriteVmtk),
           "WriteSimVascular and WriteVmtk need tetrahedra, and the mesh is a surface");
         result.points = topology.points;
         result.tetrahedra = static_cast<std::int64_t>(topology.tetrahedra.size());
         result.triangles = static_cast<std::int64_t>(topology.triangles.size());
-        result.faces =
-          FacesOf(topology, this->FaceNames, NamesOfCaps(caps, this->EntityIdsArrayName));
+        result.faces = FacesOf(topology, this->FaceNames, NamesOfCaps(caps, names::CellEntityIds));
         const std::string stem = fs::path(this->FileName).stem().string();
         files = std::make_unique<SequenceFiles>(this->FileName,
           this->PrefixFiles ? stem + "_" : std::string(), this->Digits, times.size(),
@@ -1466,5 +1463,4 @@ void vtkMeshSequenceWriter::PrintSelf(ostream& os, vtkIndent indent)
   {
     os << indent << "FaceName " << id << ": " << name << '\n';
   }
-  os << indent << "EntityIdsArrayName: " << this->EntityIdsArrayName << '\n';
 }

@@ -236,8 +236,6 @@ public:
 
   ///@{
   /// Name of the cell array with the ids of the faces. Default `CellEntityIds`.
-  vtkSetMacro(EntityIdsArrayName, std::string);
-  vtkGetMacro(EntityIdsArrayName, std::string);
   ///@}
 
   /**
@@ -287,7 +285,6 @@ private:
   int Digits = 3;
   double PoorDihedralAngle = 15.0;
   std::map<int, std::string> FaceNames;
-  std::string EntityIdsArrayName;
   vtkNew<vtkTable> Quality;
   bool Written = false;
   coronary::RankGroup* Ranks = nullptr;

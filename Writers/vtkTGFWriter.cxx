@@ -107,11 +107,11 @@ void vtkTGFWriter::WriteData()
       switch (vtkCoronary::FormOf(input))
       {
         case vtkCoronary::CenterlineForm::Tree:
-          skeleton = coronary::ToSkeleton(vtkCoronary::TreeOf(input, ""));
+          skeleton = coronary::ToSkeleton(vtkCoronary::TreeOf(input, vtkCoronary::Radii::Ignored));
           break;
         case vtkCoronary::CenterlineForm::Vmtk:
-          skeleton = coronary::ToSkeleton(
-            coronary::FromVmtkTracts(vtkCoronary::TractsOf(input, ""), this->Tolerance));
+          skeleton = coronary::ToSkeleton(coronary::FromVmtkTracts(
+            vtkCoronary::TractsOf(input, vtkCoronary::Radii::Ignored), this->Tolerance));
           break;
         case vtkCoronary::CenterlineForm::Unknown:
           throw std::invalid_argument("The lines are neither a skeleton (two points each) nor a "

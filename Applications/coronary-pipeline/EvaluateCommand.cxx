@@ -262,14 +262,12 @@ EvaluateJob::CaseFiles EvaluateJob::FindCase(std::size_t number) const
 BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* side,
   vtkMessageTrap& messages, std::map<std::int64_t, std::string>* labels)
 {
-  const vtkCoronary::TreeArrayNames names = { "Automatic", vtkCoronaryArrayNames::GroupIds,
-    vtkCoronaryArrayNames::Abscissas };
   if (path.empty())
   {
     vtkPointData* arrays = surface->GetPointData();
-    const bool known =
-      arrays->HasArray(names.group.c_str()) != 0 && arrays->HasArray(names.abscissa.c_str()) != 0;
-    return known ? vtkCoronary::TreeOf(surface, names, side) : BranchTree();
+    const bool known = arrays->HasArray(vtkCoronaryArrayNames::GroupIds) != 0 &&
+      arrays->HasArray(vtkCoronaryArrayNames::Abscissas) != 0;
+    return known ? vtkCoronary::TreeOf(surface, side) : BranchTree();
   }
   vtkSmartPointer<vtkPolyData> lines = ReadPolyData(path, messages);
   auto* texts = vtkStringArray::SafeDownCast(
@@ -282,7 +280,7 @@ BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* s
       labels->emplace(static_cast<std::int64_t>(groups->GetTuple1(n)), texts->GetValue(n));
     }
   }
-  return vtkCoronary::TreeOf(lines, names, side);
+  return vtkCoronary::TreeOf(lines, side);
 }
 
 EvaluationRecord EvaluateJob::Measure(const PhaseFiles& one, const EvaluationSettings& settings,

@@ -285,7 +285,7 @@ vtkSmartPointer<vtkPolyData> TreeOfLines(vtkPolyData* lines, double tolerance)
   CenterlineTree tree = FromSkeleton(skeleton);
   tree.radius = radii;
   auto data = vtkSmartPointer<vtkPolyData>::New();
-  vtkCoronary::SetTree(data, tree, names::Radius);
+  vtkCoronary::SetTree(data, tree);
   if (labels != nullptr)
   {
     vtkNew<vtkStringArray> texts;

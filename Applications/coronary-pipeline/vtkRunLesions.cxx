@@ -36,7 +36,7 @@ using Json = nlohmann::ordered_json;
 /// The tree with all that its arrays tell.
 CenterlineTree TreeWithArrays(vtkPolyData* data)
 {
-  CenterlineTree tree = vtkCoronary::TreeOf(data, names::Radius);
+  CenterlineTree tree = vtkCoronary::TreeOf(data);
   vtkPointData* arrays = data->GetPointData();
   const auto each = [&](const char* name, const auto& take)
   {

@@ -222,10 +222,7 @@ RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages)
   }
   try
   {
-    result.tree = vtkCoronary::TreeOf(data,
-      data->GetPointData()->HasArray(vtkCoronaryArrayNames::Radius) != 0
-        ? vtkCoronaryArrayNames::Radius
-        : "");
+    result.tree = vtkCoronary::TreeOf(data, vtkCoronary::Radii::IfThere);
   }
   catch (const std::invalid_argument& error)
   {

@@ -182,7 +182,7 @@ void AddLooseVessels(
   heart.size = 1.0 / heart.axes.row(0).norm();
   heart.axes *= heart.size;
   heart.origin = -heart.size * (heart.axes.transpose() * shift);
-  const CenterlineTree lines = vtkCoronary::TreeOf(tree, names::Radius);
+  const CenterlineTree lines = vtkCoronary::TreeOf(tree);
   std::vector<float> imageCopy;
   std::vector<float> copy;
   const ScalarImage tubes =

@@ -50,7 +50,7 @@ struct Stretch
 /// Branches with one daughter joined to it; the root comes first, parents before daughters.
 std::vector<Stretch> StretchesOf(vtkPolyData* data)
 {
-  const CenterlineTree whole = vtkCoronary::TreeOf(data, names::Radius);
+  const CenterlineTree whole = vtkCoronary::TreeOf(data);
   const CenterlineTree tree = SplitAtBifurcations(whole);
   const auto roots = std::count_if(tree.branches.begin(), tree.branches.end(),
     [](const CenterlineTree::Branch& branch) { return branch.parentGroupId == -1; });
@@ -544,7 +544,7 @@ vtkSmartPointer<vtkPolyData> FromSimVascular(vtkPolyData* lines, double unit)
   CenterlineTree tree = FromSkeleton(skeleton);
   tree.radius = used;
   auto data = vtkSmartPointer<vtkPolyData>::New();
-  vtkCoronary::SetTree(data, tree, names::Radius);
+  vtkCoronary::SetTree(data, tree);
   return data;
 }
 

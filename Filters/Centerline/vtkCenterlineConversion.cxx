@@ -80,7 +80,6 @@ void AddCellValues(
 }
 
 vtkCenterlineConversion::vtkCenterlineConversion()
-  : RadiusArrayName(names::Radius)
 {
 }
 
@@ -101,7 +100,7 @@ int vtkCenterlineConversion::RequestUpdateExtent(
 
 void vtkCenterlineConversion::ToVmtk(vtkPolyData* input, vtkPolyData* output) const
 {
-  const CenterlineTree tree = vtkCoronary::TreeOf(input, this->RadiusArrayName);
+  const CenterlineTree tree = vtkCoronary::TreeOf(input);
   const std::vector<VmtkTract> tracts = coronary::ToVmtkTracts(tree);
   const std::map<vtkIdType, vtkIdType> cellOf = CellsByPoint(input);
   vtkNew<vtkPoints> points;
@@ -134,7 +133,7 @@ void vtkCenterlineConversion::ToVmtk(vtkPolyData* input, vtkPolyData* output) co
 
 void vtkCenterlineConversion::ToTree(vtkPolyData* input, vtkPolyData* output) const
 {
-  const std::vector<VmtkTract> tracts = vtkCoronary::TractsOf(input, this->RadiusArrayName);
+  const std::vector<VmtkTract> tracts = vtkCoronary::TractsOf(input);
   std::vector<coronary::TractPoint> origins;
   CenterlineTree tree = coronary::FromVmtkTracts(tracts, this->Tolerance, &origins);
   std::vector<vtkIdType> pointRows;
@@ -160,7 +159,7 @@ void vtkCenterlineConversion::ToTree(vtkPolyData* input, vtkPolyData* output) co
   {
     output->GetCellData()->RemoveArray(name);
   }
-  vtkCoronary::SetTree(output, tree, this->RadiusArrayName);
+  vtkCoronary::SetTree(output, tree);
 }
 
 int vtkCenterlineConversion::RequestData(
@@ -220,5 +219,4 @@ void vtkCenterlineConversion::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "OutputForm: " << this->OutputForm << '\n';
   os << indent << "Tolerance: " << this->Tolerance << '\n';
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << '\n';
 }

@@ -11,7 +11,7 @@
  * form already passes through.
  *
  * @par Input:
- * vtkPolyData: polylines, and a point array with the radius, `RadiusArrayName`. Blanked tracts
+ * vtkPolyData: polylines, and a point array with the radius (`MaximumInscribedSphereRadius` or `Radius`). Blanked tracts
  * are branches like the others. A tree whose branches leave others in their middle is split for
  * VMTK's lines.
  *
@@ -73,14 +73,6 @@ public:
   vtkGetMacro(Tolerance, double);
   ///@}
 
-  ///@{
-  /**
-   * Point array of the radii, mm. Default `MaximumInscribedSphereRadius`.
-   */
-  vtkSetMacro(RadiusArrayName, std::string);
-  vtkGetMacro(RadiusArrayName, std::string);
-  ///@}
-
 protected:
   vtkCenterlineConversion();
   ~vtkCenterlineConversion() override = default;
@@ -101,7 +93,6 @@ private:
 
   int OutputForm = VmtkForm;
   double Tolerance = 1e-6;
-  std::string RadiusArrayName;
 };
 
 #endif

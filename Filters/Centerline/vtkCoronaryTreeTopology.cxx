@@ -123,7 +123,6 @@ public:
 
   void WriteTree(vtkPolyData* output) const
   {
-    const auto& self = *this->Self;
     const CenterlineTopology& tree = this->Tree;
     const auto count = static_cast<vtkIdType>(tree.points.size());
     vtkNew<vtkPoints> points;
@@ -154,15 +153,15 @@ public:
     {
       data->CopyData(given, tree.source[i], i);
     }
-    vtkCoronary::AddArray<vtkDoubleArray>(data, self.RadiusArrayName, tree.radius);
-    vtkCoronary::AddArray<vtkDoubleArray>(data, self.AbscissasArrayName, tree.abscissa);
-    AddVectors(data, self.FrenetTangentArrayName, tree.tangent);
-    AddVectors(data, self.FrenetNormalArrayName, tree.normal);
-    AddVectors(data, self.FrenetBinormalArrayName, tree.binormal);
-    vtkCoronary::AddArray<vtkDoubleArray>(data, self.CurvatureArrayName, tree.curvature);
-    vtkCoronary::AddArray<vtkDoubleArray>(data, self.TorsionArrayName, tree.torsion);
-    vtkCoronary::AddArray<vtkDoubleArray>(data, self.SectionAreaArrayName, tree.area);
-    vtkCoronary::AddArray<vtkIntArray>(data, self.SegmentIdsArrayName, tree.segmentId);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Radius, tree.radius);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Abscissas, tree.abscissa);
+    AddVectors(data, vtkCoronaryArrayNames::FrenetTangent, tree.tangent);
+    AddVectors(data, vtkCoronaryArrayNames::FrenetNormal, tree.normal);
+    AddVectors(data, vtkCoronaryArrayNames::FrenetBinormal, tree.binormal);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Curvature, tree.curvature);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Torsion, tree.torsion);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::SectionArea, tree.area);
+    vtkCoronary::AddArray<vtkIntArray>(data, vtkCoronaryArrayNames::SegmentIds, tree.segmentId);
 
     using Branch = coronary::CenterlineTree::Branch;
     vtkCellData* cells = output->GetCellData();
@@ -171,19 +170,19 @@ public:
       vtkCoronary::AddArray<vtkIntArray>(
         cells, name, OfBranches(tree, [=](const Branch& branch) { return branch.*member; }));
     };
-    ints(self.GroupIdsArrayName, &Branch::groupId);
-    ints(self.ParentGroupIdsArrayName, &Branch::parentGroupId);
-    ints(self.TreeIdsArrayName, &Branch::treeId);
-    ints(self.BranchGenerationArrayName, &Branch::generation);
-    ints(self.StrahlerOrderArrayName, &Branch::strahlerOrder);
-    ints(self.SegmentIdsArrayName, &Branch::segmentId);
-    vtkCoronary::AddArray<vtkStringArray>(cells, self.SegmentLabelArrayName,
+    ints(vtkCoronaryArrayNames::GroupIds, &Branch::groupId);
+    ints(vtkCoronaryArrayNames::ParentGroupIds, &Branch::parentGroupId);
+    ints(vtkCoronaryArrayNames::TreeIds, &Branch::treeId);
+    ints(vtkCoronaryArrayNames::BranchGeneration, &Branch::generation);
+    ints(vtkCoronaryArrayNames::StrahlerOrder, &Branch::strahlerOrder);
+    ints(vtkCoronaryArrayNames::SegmentIds, &Branch::segmentId);
+    vtkCoronary::AddArray<vtkStringArray>(cells, vtkCoronaryArrayNames::SegmentLabel,
       OfBranches(tree,
         [](const Branch& branch)
         { return vtkStdString(coronary::SegmentName(branch.segmentId)); }));
-    vtkCoronary::AddArray<vtkDoubleArray>(cells, self.LengthArrayName,
+    vtkCoronary::AddArray<vtkDoubleArray>(cells, vtkCoronaryArrayNames::Length,
       OfBranches(tree, [](const Branch& branch) { return branch.length; }));
-    vtkCoronary::AddArray<vtkDoubleArray>(cells, self.TortuosityArrayName,
+    vtkCoronary::AddArray<vtkDoubleArray>(cells, vtkCoronaryArrayNames::Tortuosity,
       OfBranches(tree, [](const Branch& branch) { return branch.tortuosity; }));
   }
 
@@ -206,13 +205,13 @@ public:
     output->SetPoints(points);
     output->SetVerts(vertices);
     vtkPointData* data = output->GetPointData();
-    vtkCoronary::AddArray<vtkIntArray>(data, self.ParentGroupIdsArrayName,
+    vtkCoronary::AddArray<vtkIntArray>(data, vtkCoronaryArrayNames::ParentGroupIds,
       OfBifurcations(tree, [](const Bifurcation& b) { return b.parent; }));
     AddRows<vtkIntArray>(data, names::DaughterGroupIds,
       OfBifurcations(tree, [](const Bifurcation& b) { return b.daughters; }), width, -1);
-    vtkCoronary::AddArray<vtkIntArray>(data, self.TreeIdsArrayName,
+    vtkCoronary::AddArray<vtkIntArray>(data, vtkCoronaryArrayNames::TreeIds,
       OfBifurcations(tree, [&](const Bifurcation& b) { return tree.branches[b.parent].treeId; }));
-    vtkCoronary::AddArray<vtkIntArray>(data, self.SegmentIdsArrayName,
+    vtkCoronary::AddArray<vtkIntArray>(data, vtkCoronaryArrayNames::SegmentIds,
       OfBifurcations(
         tree, [&](const Bifurcation& b) { return tree.branches[b.parent].segmentId; }));
     AddRows<vtkDoubleArray>(data, names::DaughterAngles,
@@ -262,7 +261,7 @@ public:
     output->SetPoints(points);
     output->SetLines(lines);
     vtkCoronary::AddArray<vtkDoubleArray>(
-      output->GetCellData(), this->Self->LengthArrayName, lengths);
+      output->GetCellData(), vtkCoronaryArrayNames::Length, lengths);
   }
 
   void WriteWarnings(vtkPolyData* output, const std::vector<coronary::TreeWarning>& warnings) const
@@ -340,23 +339,6 @@ private:
 };
 
 vtkCoronaryTreeTopology::vtkCoronaryTreeTopology()
-  : RadiusArrayName(vtkCoronaryArrayNames::Radius)
-  , AbscissasArrayName(vtkCoronaryArrayNames::Abscissas)
-  , FrenetTangentArrayName(vtkCoronaryArrayNames::FrenetTangent)
-  , FrenetNormalArrayName(vtkCoronaryArrayNames::FrenetNormal)
-  , FrenetBinormalArrayName(vtkCoronaryArrayNames::FrenetBinormal)
-  , CurvatureArrayName(vtkCoronaryArrayNames::Curvature)
-  , TorsionArrayName(vtkCoronaryArrayNames::Torsion)
-  , SectionAreaArrayName(vtkCoronaryArrayNames::SectionArea)
-  , SegmentIdsArrayName(vtkCoronaryArrayNames::SegmentIds)
-  , GroupIdsArrayName(vtkCoronaryArrayNames::GroupIds)
-  , ParentGroupIdsArrayName(vtkCoronaryArrayNames::ParentGroupIds)
-  , TreeIdsArrayName(vtkCoronaryArrayNames::TreeIds)
-  , BranchGenerationArrayName(vtkCoronaryArrayNames::BranchGeneration)
-  , StrahlerOrderArrayName(vtkCoronaryArrayNames::StrahlerOrder)
-  , SegmentLabelArrayName(vtkCoronaryArrayNames::SegmentLabel)
-  , LengthArrayName(vtkCoronaryArrayNames::Length)
-  , TortuosityArrayName(vtkCoronaryArrayNames::Tortuosity)
 {
   this->SetNumberOfInputPorts(2);
   this->SetNumberOfOutputPorts(3);
@@ -425,46 +407,12 @@ int vtkCoronaryTreeTopology::RequestData(
     labeling.dominance = this->Dominance;
     labeling.orientationWeight = this->OrientationWeight;
     labeling.Validate();
-    for (const std::string* name :
-      { &this->RadiusArrayName, &this->AbscissasArrayName, &this->FrenetTangentArrayName,
-        &this->FrenetNormalArrayName, &this->FrenetBinormalArrayName, &this->CurvatureArrayName,
-        &this->TorsionArrayName, &this->SectionAreaArrayName, &this->SegmentIdsArrayName,
-        &this->GroupIdsArrayName, &this->ParentGroupIdsArrayName, &this->TreeIdsArrayName,
-        &this->BranchGenerationArrayName, &this->StrahlerOrderArrayName,
-        &this->SegmentLabelArrayName, &this->LengthArrayName, &this->TortuosityArrayName })
-    {
-      if (name->empty())
-      {
-        throw std::invalid_argument("An output array needs a name");
-      }
-    }
-
     coronary::CenterlineSet set;
     const vtkIdType lineCount = wanted ? input->GetNumberOfLines() : 0;
     if (lineCount > 0)
     {
-      vtkPointData* data = input->GetPointData();
-      const bool automatic =
-        this->InputRadiusArrayName.empty() || this->InputRadiusArrayName == "Automatic";
-      vtkDataArray* radius = data->GetArray(
-        automatic ? vtkCoronaryArrayNames::Radius : this->InputRadiusArrayName.c_str());
-      if (radius == nullptr && automatic)
-      {
-        radius = data->GetArray("Radius");
-      }
-      if (radius == nullptr)
-      {
-        throw std::invalid_argument(automatic
-            ? "The input has no point array MaximumInscribedSphereRadius or Radius"
-            : "The input has no point array " + this->InputRadiusArrayName);
-      }
-      if (radius->GetNumberOfComponents() != 1 ||
-        radius->GetNumberOfTuples() != input->GetNumberOfPoints())
-      {
-        throw std::invalid_argument("The radius array " +
-          std::string(radius->GetName() != nullptr ? radius->GetName() : "") +
-          " must have one value for each point");
-      }
+      vtkDataArray* radius =
+        vtkCoronary::RadiusOf(input, "The input has", this->InputRadiusArrayName);
       const vtkIdType points = input->GetNumberOfPoints();
       set.points.resize(points);
       set.radius.resize(points);
@@ -539,21 +487,4 @@ void vtkCoronaryTreeTopology::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Dominance: " << this->Dominance << "\n";
   os << indent << "OrientationWeight: " << this->OrientationWeight << "\n";
   os << indent << "InputRadiusArrayName: " << this->InputRadiusArrayName << "\n";
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n";
-  os << indent << "AbscissasArrayName: " << this->AbscissasArrayName << "\n";
-  os << indent << "FrenetTangentArrayName: " << this->FrenetTangentArrayName << "\n";
-  os << indent << "FrenetNormalArrayName: " << this->FrenetNormalArrayName << "\n";
-  os << indent << "FrenetBinormalArrayName: " << this->FrenetBinormalArrayName << "\n";
-  os << indent << "CurvatureArrayName: " << this->CurvatureArrayName << "\n";
-  os << indent << "TorsionArrayName: " << this->TorsionArrayName << "\n";
-  os << indent << "SectionAreaArrayName: " << this->SectionAreaArrayName << "\n";
-  os << indent << "SegmentIdsArrayName: " << this->SegmentIdsArrayName << "\n";
-  os << indent << "GroupIdsArrayName: " << this->GroupIdsArrayName << "\n";
-  os << indent << "ParentGroupIdsArrayName: " << this->ParentGroupIdsArrayName << "\n";
-  os << indent << "TreeIdsArrayName: " << this->TreeIdsArrayName << "\n";
-  os << indent << "BranchGenerationArrayName: " << this->BranchGenerationArrayName << "\n";
-  os << indent << "StrahlerOrderArrayName: " << this->StrahlerOrderArrayName << "\n";
-  os << indent << "SegmentLabelArrayName: " << this->SegmentLabelArrayName << "\n";
-  os << indent << "LengthArrayName: " << this->LengthArrayName << "\n";
-  os << indent << "TortuosityArrayName: " << this->TortuosityArrayName << "\n";
 }

@@ -209,52 +209,6 @@ public:
   vtkGetMacro(OrientationWeight, double);
   ///@}
 
-  ///@{
-  /**
-   * Names of the point arrays of the tree. Defaults as listed above.
-   */
-  vtkSetStdStringFromCharMacro(RadiusArrayName);
-  vtkGetCharFromStdStringMacro(RadiusArrayName);
-  vtkSetStdStringFromCharMacro(AbscissasArrayName);
-  vtkGetCharFromStdStringMacro(AbscissasArrayName);
-  vtkSetStdStringFromCharMacro(FrenetTangentArrayName);
-  vtkGetCharFromStdStringMacro(FrenetTangentArrayName);
-  vtkSetStdStringFromCharMacro(FrenetNormalArrayName);
-  vtkGetCharFromStdStringMacro(FrenetNormalArrayName);
-  vtkSetStdStringFromCharMacro(FrenetBinormalArrayName);
-  vtkGetCharFromStdStringMacro(FrenetBinormalArrayName);
-  vtkSetStdStringFromCharMacro(CurvatureArrayName);
-  vtkGetCharFromStdStringMacro(CurvatureArrayName);
-  vtkSetStdStringFromCharMacro(TorsionArrayName);
-  vtkGetCharFromStdStringMacro(TorsionArrayName);
-  vtkSetStdStringFromCharMacro(SectionAreaArrayName);
-  vtkGetCharFromStdStringMacro(SectionAreaArrayName);
-  vtkSetStdStringFromCharMacro(SegmentIdsArrayName);
-  vtkGetCharFromStdStringMacro(SegmentIdsArrayName);
-  ///@}
-
-  ///@{
-  /**
-   * Names of the cell arrays of the tree. Defaults as listed above.
-   */
-  vtkSetStdStringFromCharMacro(GroupIdsArrayName);
-  vtkGetCharFromStdStringMacro(GroupIdsArrayName);
-  vtkSetStdStringFromCharMacro(ParentGroupIdsArrayName);
-  vtkGetCharFromStdStringMacro(ParentGroupIdsArrayName);
-  vtkSetStdStringFromCharMacro(TreeIdsArrayName);
-  vtkGetCharFromStdStringMacro(TreeIdsArrayName);
-  vtkSetStdStringFromCharMacro(BranchGenerationArrayName);
-  vtkGetCharFromStdStringMacro(BranchGenerationArrayName);
-  vtkSetStdStringFromCharMacro(StrahlerOrderArrayName);
-  vtkGetCharFromStdStringMacro(StrahlerOrderArrayName);
-  vtkSetStdStringFromCharMacro(SegmentLabelArrayName);
-  vtkGetCharFromStdStringMacro(SegmentLabelArrayName);
-  vtkSetStdStringFromCharMacro(LengthArrayName);
-  vtkGetCharFromStdStringMacro(LengthArrayName);
-  vtkSetStdStringFromCharMacro(TortuosityArrayName);
-  vtkGetCharFromStdStringMacro(TortuosityArrayName);
-  ///@}
-
   vtkPolyData* GetBifurcations() { return this->GetOutput(BifurcationPort); }
   vtkPolyData* GetLoops() { return this->GetOutput(LoopPort); }
 
@@ -286,23 +240,6 @@ private:
   double OrientationWeight = 1.0;
 
   std::string InputRadiusArrayName = "Automatic";
-  std::string RadiusArrayName;
-  std::string AbscissasArrayName;
-  std::string FrenetTangentArrayName;
-  std::string FrenetNormalArrayName;
-  std::string FrenetBinormalArrayName;
-  std::string CurvatureArrayName;
-  std::string TorsionArrayName;
-  std::string SectionAreaArrayName;
-  std::string SegmentIdsArrayName;
-  std::string GroupIdsArrayName;
-  std::string ParentGroupIdsArrayName;
-  std::string TreeIdsArrayName;
-  std::string BranchGenerationArrayName;
-  std::string StrahlerOrderArrayName;
-  std::string SegmentLabelArrayName;
-  std::string LengthArrayName;
-  std::string TortuosityArrayName;
 
   class Writer;
 };

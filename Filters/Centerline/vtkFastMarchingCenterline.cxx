@@ -192,8 +192,6 @@ std::string PropertyMessage(std::string message)
 }
 
 vtkFastMarchingCenterline::vtkFastMarchingCenterline()
-  : RadiusArrayName(vtkCoronaryArrayNames::Radius)
-  , ConfidenceArrayName(vtkCoronaryArrayNames::Confidence)
 {
   this->SetNumberOfInputPorts(5);
   this->SetNumberOfOutputPorts(3);
@@ -336,8 +334,6 @@ int vtkFastMarchingCenterline::RequestData(
 void vtkFastMarchingCenterline::Execute(
   bool wanted, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  vtkCoronary::Require(!this->RadiusArrayName.empty() && !this->ConfidenceArrayName.empty(),
-    "RadiusArrayName and ConfidenceArrayName need a name");
   coronary::CenterlineSettings settings;
   if (!this->AutomaticSpeedThreshold)
   {
@@ -490,11 +486,11 @@ void vtkFastMarchingCenterline::Execute(
   }
   treeOutput->SetLines(lines);
   vtkCoronary::AddArray<vtkDoubleArray>(
-    treeOutput->GetPointData(), this->RadiusArrayName, tree.radius);
+    treeOutput->GetPointData(), vtkCoronaryArrayNames::Radius, tree.radius);
   vtkCoronary::AddArray<vtkDoubleArray>(
     treeOutput->GetPointData(), names::Abscissas, tree.abscissa);
   vtkCoronary::AddArray<vtkDoubleArray>(
-    treeOutput->GetPointData(), this->ConfidenceArrayName, tree.confidence);
+    treeOutput->GetPointData(), vtkCoronaryArrayNames::Confidence, tree.confidence);
   vtkCoronary::AddArray<vtkUnsignedCharArray>(
     treeOutput->GetPointData(), names::Bridged, tree.bridged);
   vtkCoronary::AddArray<vtkDoubleArray>(
@@ -603,10 +599,11 @@ void vtkFastMarchingCenterline::Execute(
   }
   AddPoints(linesOutput, positions);
   linesOutput->SetLines(tracts);
-  vtkCoronary::AddArray<vtkDoubleArray>(linesOutput->GetPointData(), this->RadiusArrayName, radius);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    linesOutput->GetPointData(), vtkCoronaryArrayNames::Radius, radius);
   vtkCoronary::AddArray<vtkDoubleArray>(linesOutput->GetPointData(), names::Abscissas, abscissa);
   vtkCoronary::AddArray<vtkDoubleArray>(
-    linesOutput->GetPointData(), this->ConfidenceArrayName, confidence);
+    linesOutput->GetPointData(), vtkCoronaryArrayNames::Confidence, confidence);
   vtkCoronary::AddArray<vtkIntArray>(
     linesOutput->GetCellData(), names::CenterlineIds, centerlineIds);
   vtkCoronary::AddArray<vtkIntArray>(linesOutput->GetCellData(), names::TractIds, tractIds);
@@ -643,7 +640,7 @@ void vtkFastMarchingCenterline::Execute(
   AddPoints(forksOutput, forks);
   forksOutput->SetVerts(vertices);
   vtkCoronary::AddArray<vtkDoubleArray>(
-    forksOutput->GetPointData(), this->RadiusArrayName, forkRadius);
+    forksOutput->GetPointData(), vtkCoronaryArrayNames::Radius, forkRadius);
   vtkCoronary::AddArray<vtkIntArray>(forksOutput->GetPointData(), names::ParentGroupIds, parents);
   vtkCoronary::AddArray<vtkIntArray>(forksOutput->GetPointData(), names::TreeIds, trees);
   forksOutput->GetPointData()->AddArray(daughters);
@@ -701,6 +698,4 @@ void vtkFastMarchingCenterline::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "StepLimit: " << this->StepLimit << '\n';
   os << indent << "VoxelLimit: " << this->VoxelLimit << '\n';
   os << indent << "IntensityArrayName: " << this->IntensityArrayName << '\n';
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << '\n';
-  os << indent << "ConfidenceArrayName: " << this->ConfidenceArrayName << '\n';
 }

@@ -202,7 +202,7 @@ public:
 
   ///@{
   /**
-   * Greatest radius that is measured, mm. Default 0: twice the radius at the seeds.
+   * Greatest radius that is measured, mm. Default 0: twice the radius at the seeds, at least 3 mm and 6 voxels.
    */
   vtkSetMacro(MaximumRadius, double);
   vtkGetMacro(MaximumRadius, double);
@@ -280,16 +280,6 @@ public:
   vtkGetMacro(IntensityArrayName, std::string);
   ///@}
 
-  ///@{
-  /**
-   * Names of the radius and confidence arrays. Defaults `MaximumInscribedSphereRadius`, `Confidence`.
-   */
-  vtkSetMacro(RadiusArrayName, std::string);
-  vtkGetMacro(RadiusArrayName, std::string);
-  vtkSetMacro(ConfidenceArrayName, std::string);
-  vtkGetMacro(ConfidenceArrayName, std::string);
-  ///@}
-
 protected:
   vtkFastMarchingCenterline();
   ~vtkFastMarchingCenterline() override;
@@ -337,8 +327,6 @@ private:
   vtkIdType StepLimit = 5000000;
   vtkIdType VoxelLimit = 100000000;
   std::string IntensityArrayName;
-  std::string RadiusArrayName;
-  std::string ConfidenceArrayName;
 };
 
 #endif

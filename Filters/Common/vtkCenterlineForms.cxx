@@ -1,6 +1,7 @@
 #include "vtkCenterlineForms.h"
 
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -36,6 +37,13 @@ vtkDataArray* Column(vtkDataSetAttributes* data, const char* name, const char* k
       " components: one is needed");
   }
   return array;
+}
+
+vtkDataArray* RadiusFor(vtkPolyData* data, vtkCoronary::Radii radii)
+{
+  return radii == vtkCoronary::Radii::Ignored ? nullptr
+    : radii == vtkCoronary::Radii::IfThere    ? vtkCoronary::FindRadius(data)
+                                              : vtkCoronary::RadiusOf(data, "The centerlines have");
 }
 
 /// Calls visit(cell id, point ids) for all lines.
@@ -130,10 +138,9 @@ vtkCoronary::CenterlineForm vtkCoronary::FormOf(vtkPolyData* data)
                                                         : CenterlineForm::Unknown;
 }
 
-coronary::CenterlineTree vtkCoronary::TreeOf(vtkPolyData* data, const std::string& radiusName)
+coronary::CenterlineTree vtkCoronary::TreeOf(vtkPolyData* data, Radii radii)
 {
-  vtkDataArray* radius =
-    radiusName.empty() ? nullptr : Column(data->GetPointData(), radiusName.c_str(), "point");
+  vtkDataArray* radius = RadiusFor(data, radii);
   vtkDataArray* groups = Column(data->GetCellData(), names::GroupIds, "cell");
   vtkDataArray* parents = Column(data->GetCellData(), names::ParentGroupIds, "cell");
   vtkDataArray* trees = data->GetCellData()->GetArray(names::TreeIds);
@@ -162,11 +169,9 @@ coronary::CenterlineTree vtkCoronary::TreeOf(vtkPolyData* data, const std::strin
   return tree;
 }
 
-std::vector<coronary::VmtkTract> vtkCoronary::TractsOf(
-  vtkPolyData* data, const std::string& radiusName)
+std::vector<coronary::VmtkTract> vtkCoronary::TractsOf(vtkPolyData* data, Radii radii)
 {
-  vtkDataArray* radius =
-    radiusName.empty() ? nullptr : Column(data->GetPointData(), radiusName.c_str(), "point");
+  vtkDataArray* radius = RadiusFor(data, radii);
   vtkDataArray* lines = Column(data->GetCellData(), names::CenterlineIds, "cell");
   vtkDataArray* numbers = Column(data->GetCellData(), names::TractIds, "cell");
   vtkDataArray* groups = Column(data->GetCellData(), names::GroupIds, "cell");
@@ -191,8 +196,7 @@ std::vector<coronary::VmtkTract> vtkCoronary::TractsOf(
   return tracts;
 }
 
-void vtkCoronary::SetTree(
-  vtkPolyData* data, const coronary::CenterlineTree& tree, const std::string& radiusName)
+void vtkCoronary::SetTree(vtkPolyData* data, const coronary::CenterlineTree& tree)
 {
   using Branch = coronary::CenterlineTree::Branch;
   vtkNew<vtkPoints> points;
@@ -212,10 +216,7 @@ void vtkCoronary::SetTree(
   }
   data->SetPoints(points);
   data->SetLines(lines);
-  if (!radiusName.empty())
-  {
-    AddPointValues(data, radiusName, tree.radius);
-  }
+  AddPointValues(data, names::Radius, tree.radius);
   AddPointValues(data, names::Abscissas, tree.abscissa);
   AddCellValues<vtkIntArray>(
     data, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });

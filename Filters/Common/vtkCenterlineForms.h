@@ -9,7 +9,6 @@
 #include "CenterlineTree.h"
 #include "vtkCoronaryCommonModule.h" // for the export macro
 
-#include <string>
 #include <vector>
 
 class vtkPolyData;
@@ -26,26 +25,31 @@ enum class CenterlineForm
 /// As the cell arrays tell. What has both kinds of arrays is a tree.
 VTKCORONARYCOMMON_EXPORT CenterlineForm FormOf(vtkPolyData* data);
 
+/// What is done about radii (vtkCoronary::FindRadius).
+enum class Radii
+{
+  Needed,
+  IfThere, ///< else 0
+  Ignored  ///< 0
+};
+
 /**
- * Polylines as the branches of a tree; points keep their indices. Radii are 0 when `radiusName` is
- * empty.
+ * Polylines as the branches of a tree; points keep their indices.
  * @throws std::invalid_argument naming the array that is missing or unfit, or as coronary::CheckTree
  */
 VTKCORONARYCOMMON_EXPORT coronary::CenterlineTree TreeOf(
-  vtkPolyData* data, const std::string& radiusName);
+  vtkPolyData* data, Radii radii = Radii::Needed);
 
 /**
- * Polylines as VMTK's tracts; `source` holds the indices of the points. Radii are 0 when
- * `radiusName` is empty; `Blanking` may be missing.
+ * Polylines as VMTK's tracts; `source` holds the indices of the points. `Blanking` may be missing.
  * @throws std::invalid_argument naming the array that is missing or unfit
  */
 VTKCORONARYCOMMON_EXPORT std::vector<coronary::VmtkTract> TractsOf(
-  vtkPolyData* data, const std::string& radiusName);
+  vtkPolyData* data, Radii radii = Radii::Needed);
 
-/// Points, lines, and the arrays of a tree: radii (not when `radiusName` is empty), `Abscissas`;
+/// Points, lines, and the arrays of a tree: `MaximumInscribedSphereRadius`, `Abscissas`;
 /// `GroupIds`, `ParentGroupIds`, `TreeIds`, `Length`, `Tortuosity`. Arrays of these names are replaced.
-VTKCORONARYCOMMON_EXPORT void SetTree(
-  vtkPolyData* data, const coronary::CenterlineTree& tree, const std::string& radiusName);
+VTKCORONARYCOMMON_EXPORT void SetTree(vtkPolyData* data, const coronary::CenterlineTree& tree);
 }
 
 #endif

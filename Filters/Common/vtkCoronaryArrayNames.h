@@ -1,8 +1,8 @@
 /**
  * @file vtkCoronaryArrayNames.h
- * @brief Default names of the arrays that travel between the stages.
+ * @brief Names of the arrays that travel between the stages.
  *
- * Every filter offers its array names as properties; these are their defaults.
+ * They are fixed: a filter has a property for an array only where users bring data of their own.
  * Names follow VMTK where VMTK has one. See docs/design.md, "What travels between the stages".
  */
 #ifndef vtkCoronaryArrayNames_h

@@ -14,6 +14,8 @@
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkMatrix3x3.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
 #include "vtkShortArray.h"
 #include "vtkUnsignedShortArray.h"
 
@@ -58,6 +60,31 @@ coronary::ScalarImage ScalarImageOf(
     result.values = static_cast<const float*>(copy.data());
   }
   return result;
+}
+
+vtkDataArray* FindRadius(vtkPolyData* lines, const std::string& chosen)
+{
+  vtkPointData* data = lines->GetPointData();
+  const bool automatic = chosen.empty() || chosen == "Automatic";
+  vtkDataArray* radius = data->GetArray(automatic ? vtkCoronaryArrayNames::Radius : chosen.c_str());
+  if (radius == nullptr && automatic)
+  {
+    radius = data->GetArray("Radius");
+  }
+  Require(radius != nullptr || automatic, "There is no point array " + chosen + " of radii");
+  Require(radius == nullptr ||
+      (radius->GetNumberOfComponents() == 1 &&
+        radius->GetNumberOfTuples() == lines->GetNumberOfPoints()),
+    "The radius array " + std::string(radius == nullptr ? "" : radius->GetName()) +
+      " must have one value for each point");
+  return radius;
+}
+
+vtkDataArray* RadiusOf(vtkPolyData* lines, const std::string& whose, const std::string& chosen)
+{
+  vtkDataArray* radius = FindRadius(lines, chosen);
+  Require(radius != nullptr, whose + " no point array MaximumInscribedSphereRadius or Radius");
+  return radius;
 }
 
 void SetBridges(vtkFieldData* data, const std::vector<coronary::VesselBridge>& bridges)

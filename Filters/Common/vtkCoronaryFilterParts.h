@@ -21,6 +21,7 @@ class vtkAlgorithm;
 class vtkDataArray;
 class vtkImageData;
 class vtkInformationVector;
+class vtkPolyData;
 
 namespace vtkCoronary
 {
@@ -31,6 +32,20 @@ VTKCORONARYCOMMON_EXPORT coronary::ImageGrid GridOf(vtkImageData* image);
 /// are copied into `copy`; the result is valid as long as the image and the copy are.
 VTKCORONARYCOMMON_EXPORT coronary::ScalarImage ScalarImageOf(
   vtkImageData* image, vtkDataArray* array, std::vector<float>& copy);
+
+/**
+ * Radii of lines, mm, one value a point: the array `chosen`; when that is empty or "Automatic",
+ * `MaximumInscribedSphereRadius`, or `Radius` as some programs call it. Null when neither is there.
+ * @throws std::invalid_argument naming `chosen` when it is missing, or the array that has other than one value a point
+ */
+VTKCORONARYCOMMON_EXPORT vtkDataArray* FindRadius(
+  vtkPolyData* lines, const std::string& chosen = {});
+
+/// The same where it is needed.
+/// @param whose  for messages: "The input has"
+/// @throws std::invalid_argument also when there is none
+VTKCORONARYCOMMON_EXPORT vtkDataArray* RadiusOf(
+  vtkPolyData* lines, const std::string& whose, const std::string& chosen = {});
 
 /// Ways across lesions as field data: BridgePoints, BridgeConfidences, BridgeUnseen.
 VTKCORONARYCOMMON_EXPORT void SetBridges(

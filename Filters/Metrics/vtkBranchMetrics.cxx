@@ -194,8 +194,6 @@ void WriteBranches(vtkPolyData* output, const BranchMetrics& metrics)
 }
 
 vtkBranchMetrics::vtkBranchMetrics()
-  : GroupArrayName(vtkCoronaryArrayNames::GroupIds)
-  , AbscissaArrayName(vtkCoronaryArrayNames::Abscissas)
 {
   this->SetNumberOfInputPorts(2);
   this->SetNumberOfOutputPorts(2);
@@ -267,13 +265,10 @@ int vtkBranchMetrics::RequestData(
     vtkCoronary::Require(this->TimeTolerance >= 0.0, "TimeTolerance must be 0 or more");
     const std::string mismatch = vtkCoronary::TimeMismatch(inputs, this->TimeTolerance);
     vtkCoronary::Require(mismatch.empty(), mismatch);
-    const vtkCoronary::TreeArrayNames names = { this->RadiusArrayName, this->GroupArrayName,
-      this->AbscissaArrayName };
     const BranchTree result = vtkCoronary::TreeOf(
-      vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ResultPort], 0)), names, "result");
-    const BranchTree reference =
-      vtkCoronary::TreeOf(vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ReferencePort], 0)),
-        names, "reference");
+      vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ResultPort], 0)), "result");
+    const BranchTree reference = vtkCoronary::TreeOf(
+      vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ReferencePort], 0)), "reference");
     const BranchMetrics metrics =
       coronary::CompareBranches(result, reference, settings, vtkCoronary::ProgressOf(this));
     WriteTable(table, metrics);
@@ -298,7 +293,4 @@ void vtkBranchMetrics::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "LeastLength: " << this->LeastLength << "\n";
   os << indent << "LinesAreBranches: " << this->LinesAreBranches << "\n";
   os << indent << "TimeTolerance: " << this->TimeTolerance << "\n";
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n";
-  os << indent << "GroupArrayName: " << this->GroupArrayName << "\n";
-  os << indent << "AbscissaArrayName: " << this->AbscissaArrayName << "\n";
 }

@@ -144,20 +144,6 @@ public:
   vtkGetMacro(TimeTolerance, double);
   ///@}
 
-  ///@{
-  /**
-   * Names of the inputs' arrays: radius (point data; `Automatic`, the default:
-   * `MaximumInscribedSphereRadius`, or `Radius` where there is no such array), `GroupIds` and
-   * `Abscissas`.
-   */
-  vtkSetStdStringFromCharMacro(RadiusArrayName);
-  vtkGetCharFromStdStringMacro(RadiusArrayName);
-  vtkSetStdStringFromCharMacro(GroupArrayName);
-  vtkGetCharFromStdStringMacro(GroupArrayName);
-  vtkSetStdStringFromCharMacro(AbscissaArrayName);
-  vtkGetCharFromStdStringMacro(AbscissaArrayName);
-  ///@}
-
   vtkPolyData* GetBranches();
 
 protected:
@@ -184,9 +170,6 @@ private:
   double LeastLength = 3.0;
   bool LinesAreBranches = false;
   double TimeTolerance = 1e-3;
-  std::string RadiusArrayName = "Automatic";
-  std::string GroupArrayName;
-  std::string AbscissaArrayName;
 };
 
 #endif

@@ -44,35 +44,6 @@ namespace
 {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
-vtkDataArray* FindRadius(vtkPolyData* data, const std::string& name, bool needed)
-{
-  const bool automatic = name.empty() || name == "Automatic";
-  vtkDataArray* radius =
-    data->GetPointData()->GetArray(automatic ? vtkCoronaryArrayNames::Radius : name.c_str());
-  if (radius == nullptr && automatic)
-  {
-    radius = data->GetPointData()->GetArray("Radius");
-  }
-  if (radius == nullptr)
-  {
-    if (needed)
-    {
-      throw std::invalid_argument(automatic
-          ? "The reference has no point array MaximumInscribedSphereRadius or Radius"
-          : "The reference has no point array " + name);
-    }
-    return nullptr;
-  }
-  if (radius->GetNumberOfComponents() != 1 ||
-    radius->GetNumberOfTuples() != data->GetNumberOfPoints())
-  {
-    throw std::invalid_argument("The radius array " +
-      std::string(radius->GetName() != nullptr ? radius->GetName() : "") +
-      " must have one value for each point");
-  }
-  return radius;
-}
-
 CenterlineSet Read(vtkPolyData* data, vtkDataArray* radius)
 {
   CenterlineSet set;
@@ -181,9 +152,6 @@ void WriteTable(vtkTable* table, const TreeOverlap& overlap, bool paths, vtkStri
 }
 
 vtkCenterlineMetrics::vtkCenterlineMetrics()
-  : MatchArrayName(vtkCoronaryArrayNames::CenterlineMatch)
-  , DistanceArrayName(vtkCoronaryArrayNames::CenterlineDistance)
-  , FromReferenceArrayName(vtkCoronaryArrayNames::FromReference)
 {
   this->SetNumberOfInputPorts(2);
   this->SetNumberOfOutputPorts(2);
@@ -251,20 +219,13 @@ int vtkCenterlineMetrics::RequestData(
     {
       throw std::invalid_argument("There is no method " + std::to_string(this->Method));
     }
-    for (const std::string* name :
-      { &this->MatchArrayName, &this->DistanceArrayName, &this->FromReferenceArrayName })
-    {
-      if (name->empty())
-      {
-        throw std::invalid_argument("An output array needs a name");
-      }
-    }
     CenterlineSet sets[2]; // reference, result
     if (wanted)
     {
-      sets[0] = Read(
-        reference, FindRadius(reference, this->RadiusArrayName, reference->GetNumberOfLines() > 0));
-      sets[1] = Read(result, FindRadius(result, this->RadiusArrayName, false));
+      sets[0] = Read(reference,
+        reference->GetNumberOfLines() > 0 ? vtkCoronary::RadiusOf(reference, "The reference has")
+                                          : nullptr);
+      sets[1] = Read(result, vtkCoronary::FindRadius(result));
     }
     if (sets[0].lines.empty())
     {
@@ -312,16 +273,16 @@ int vtkCenterlineMetrics::RequestData(
     points->SetDataTypeToDouble();
     vtkNew<vtkCellArray> lines;
     vtkNew<vtkIntArray> match;
-    match->SetName(this->MatchArrayName.c_str());
+    match->SetName(vtkCoronaryArrayNames::CenterlineMatch);
     vtkNew<vtkDoubleArray> distance;
-    distance->SetName(this->DistanceArrayName.c_str());
+    distance->SetName(vtkCoronaryArrayNames::CenterlineDistance);
     vtkNew<vtkDoubleArray> radius;
     radius->SetName(vtkCoronaryArrayNames::Radius);
     vtkNew<vtkIntArray> pointSide;
     vtkNew<vtkIntArray> cellSide;
     for (vtkIntArray* array : { pointSide.Get(), cellSide.Get() })
     {
-      array->SetName(this->FromReferenceArrayName.c_str());
+      array->SetName(vtkCoronaryArrayNames::FromReference);
     }
     for (int side = 0; side < 2; ++side)
     {
@@ -371,8 +332,4 @@ void vtkCenterlineMetrics::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "LeastRadius: " << this->LeastRadius << "\n";
   os << indent << "StartLength: " << this->StartLength << "\n";
   os << indent << "ClipStart: " << this->ClipStart << "\n";
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n";
-  os << indent << "MatchArrayName: " << this->MatchArrayName << "\n";
-  os << indent << "DistanceArrayName: " << this->DistanceArrayName << "\n";
-  os << indent << "FromReferenceArrayName: " << this->FromReferenceArrayName << "\n";
 }

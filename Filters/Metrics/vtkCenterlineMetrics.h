@@ -9,7 +9,7 @@
  *
  * @par Input ports:
  * - 0: vtkPolyData, the result; lines, other cells are ignored. A radius array is optional.
- * - 1: vtkPolyData, the reference; lines with a point array of radii: `RadiusArrayName`, by default
+ * - 1: vtkPolyData, the reference; lines with a point array of radii:
  *   `MaximumInscribedSphereRadius`, or `Radius` where there is no such array.
  *
  * Lines run from the root to the tips, and hang together where the first point of one is a point of
@@ -144,27 +144,6 @@ public:
   vtkBooleanMacro(ClipStart, bool);
   ///@}
 
-  ///@{
-  /**
-   * Name of the inputs' point array with the radius. `Automatic`, the default:
-   * `MaximumInscribedSphereRadius`, or `Radius` where there is no such array.
-   */
-  vtkSetStdStringFromCharMacro(RadiusArrayName);
-  vtkGetCharFromStdStringMacro(RadiusArrayName);
-  ///@}
-
-  ///@{
-  /**
-   * Names of the arrays of the lines. Defaults as listed above.
-   */
-  vtkSetStdStringFromCharMacro(MatchArrayName);
-  vtkGetCharFromStdStringMacro(MatchArrayName);
-  vtkSetStdStringFromCharMacro(DistanceArrayName);
-  vtkGetCharFromStdStringMacro(DistanceArrayName);
-  vtkSetStdStringFromCharMacro(FromReferenceArrayName);
-  vtkGetCharFromStdStringMacro(FromReferenceArrayName);
-  ///@}
-
   vtkPolyData* GetLines();
 
 protected:
@@ -190,10 +169,6 @@ private:
   double LeastRadius = 0.0;
   double StartLength = 5.0;
   bool ClipStart = true;
-  std::string RadiusArrayName = "Automatic";
-  std::string MatchArrayName;
-  std::string DistanceArrayName;
-  std::string FromReferenceArrayName;
 };
 
 #endif

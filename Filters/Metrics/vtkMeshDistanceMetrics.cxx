@@ -123,9 +123,6 @@ void WriteFieldData(vtkFieldData* field, const MeshDistance& distances)
 }
 
 vtkMeshDistanceMetrics::vtkMeshDistanceMetrics()
-  : GroupArrayName(vtkCoronaryArrayNames::GroupIds)
-  , CapArrayName(vtkCoronaryArrayNames::CellEntityIds)
-  , DistanceArrayName(vtkCoronaryArrayNames::SurfaceDistance)
 {
   this->SetNumberOfInputPorts(2);
   this->SetNumberOfOutputPorts(3);
@@ -202,8 +199,6 @@ int vtkMeshDistanceMetrics::RequestData(
     settings.names = { "the result", "the reference" };
     settings.Validate();
     vtkCoronary::Require(this->TimeTolerance >= 0.0, "TimeTolerance must be 0 or more");
-    vtkCoronary::Require(
-      !this->DistanceArrayName.empty(), "DistanceArrayName: an output array needs a name");
     const std::string mismatch = vtkCoronary::TimeMismatch(inputs, this->TimeTolerance);
     vtkCoronary::Require(mismatch.empty(), mismatch);
     coronary::SurfaceMesh meshes[2];
@@ -211,8 +206,8 @@ int vtkMeshDistanceMetrics::RequestData(
     {
       surfaces[side]->ShallowCopy(
         vtkCoronary::TrianglesOf(vtkDataObject::GetData(inputs[side], 0)));
-      meshes[side] = vtkCoronary::SurfaceOf(
-        surfaces[side], this->GroupArrayName, this->ClipEnds ? this->CapArrayName : std::string());
+      meshes[side] = vtkCoronary::SurfaceOf(surfaces[side], vtkCoronaryArrayNames::GroupIds,
+        this->ClipEnds ? vtkCoronaryArrayNames::CellEntityIds : std::string());
     }
     const MeshDistance distances =
       coronary::CompareSurfaces(meshes[0], meshes[1], settings, vtkCoronary::ProgressOf(this));
@@ -222,9 +217,10 @@ int vtkMeshDistanceMetrics::RequestData(
     }
     for (int side = 0; side < 2; ++side)
     {
-      vtkCoronary::AddArray<vtkDoubleArray>(surfaces[side]->GetPointData(), this->DistanceArrayName,
+      vtkCoronary::AddArray<vtkDoubleArray>(surfaces[side]->GetPointData(),
+        vtkCoronaryArrayNames::SurfaceDistance,
         side == 0 ? distances.pointDistancesA : distances.pointDistancesB);
-      surfaces[side]->GetPointData()->SetActiveScalars(this->DistanceArrayName.c_str());
+      surfaces[side]->GetPointData()->SetActiveScalars(vtkCoronaryArrayNames::SurfaceDistance);
       // Not the input's own field data.
       vtkNew<vtkFieldData> field;
       field->ShallowCopy(surfaces[side]->GetFieldData());
@@ -257,7 +253,4 @@ void vtkMeshDistanceMetrics::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ClipEnds: " << this->ClipEnds << "\n";
   os << indent << "EndLength: " << this->EndLength << "\n";
   os << indent << "TimeTolerance: " << this->TimeTolerance << "\n";
-  os << indent << "GroupArrayName: " << this->GroupArrayName << "\n";
-  os << indent << "CapArrayName: " << this->CapArrayName << "\n";
-  os << indent << "DistanceArrayName: " << this->DistanceArrayName << "\n";
 }

@@ -115,7 +115,7 @@ public:
 
   ///@{
   /**
-   * Whether ends of vessels are left out: caps (by `CapArrayName`), and on both surfaces what lies
+   * Whether ends of vessels are left out: caps (by `CellEntityIds`), and on both surfaces what lies
    * beyond an end of either one. Default off.
    */
   vtkSetMacro(ClipEnds, bool);
@@ -137,24 +137,6 @@ public:
    */
   vtkSetMacro(TimeTolerance, double);
   vtkGetMacro(TimeTolerance, double);
-  ///@}
-
-  ///@{
-  /**
-   * Names of the inputs' arrays. Defaults `GroupIds`, `CellEntityIds`; empty: not looked for.
-   */
-  vtkSetStdStringFromCharMacro(GroupArrayName);
-  vtkGetCharFromStdStringMacro(GroupArrayName);
-  vtkSetStdStringFromCharMacro(CapArrayName);
-  vtkGetCharFromStdStringMacro(CapArrayName);
-  ///@}
-
-  ///@{
-  /**
-   * Name of the outputs' array. Default `SurfaceDistance`.
-   */
-  vtkSetStdStringFromCharMacro(DistanceArrayName);
-  vtkGetCharFromStdStringMacro(DistanceArrayName);
   ///@}
 
   vtkPolyData* GetReferenceOutput();
@@ -183,9 +165,6 @@ private:
   bool ClipEnds = false;
   double EndLength = 3.0;
   double TimeTolerance = 1e-3;
-  std::string GroupArrayName;
-  std::string CapArrayName;
-  std::string DistanceArrayName;
 };
 
 #endif

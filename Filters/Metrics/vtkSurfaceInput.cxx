@@ -1,6 +1,7 @@
 #include "vtkSurfaceInput.h"
 
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
 
 #include "vtkAppendPolyData.h"
@@ -272,27 +273,11 @@ void SetCommonTime(vtkInformationVector** inputs, vtkInformationVector* outputs)
 
 namespace
 {
-vtkDataArray* RadiusOf(vtkPolyData* data, const std::string& name)
-{
-  const bool automatic = name.empty() || name == "Automatic";
-  vtkDataArray* radius =
-    data->GetPointData()->GetArray(automatic ? vtkCoronaryArrayNames::Radius : name.c_str());
-  return radius == nullptr && automatic ? data->GetPointData()->GetArray("Radius") : radius;
-}
-
 /// Cells of the groups' array count in VTK's order: vertices come before lines.
-coronary::BranchTree TreeOfLines(
-  vtkPolyData* data, const TreeArrayNames& names, const std::string& side)
+coronary::BranchTree TreeOfLines(vtkPolyData* data)
 {
   coronary::BranchTree tree;
-  vtkDataArray* radius = RadiusOf(data, names.radius);
-  if (radius != nullptr &&
-    (radius->GetNumberOfComponents() != 1 ||
-      radius->GetNumberOfTuples() != data->GetNumberOfPoints()))
-  {
-    throw std::invalid_argument("The radius array " + std::string(radius->GetName()) + " of " +
-      side + " must have one value for each point");
-  }
+  vtkDataArray* radius = vtkCoronary::FindRadius(data);
   tree.lines.points.resize(data->GetNumberOfPoints());
   for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i)
   {
@@ -303,7 +288,8 @@ coronary::BranchTree TreeOfLines(
     }
   }
   const std::vector<std::int64_t> groups =
-    IdsOf(data->GetCellData()->GetArray(names.group.c_str()), data->GetNumberOfCells(), "cell");
+    IdsOf(data->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds), data->GetNumberOfCells(),
+      "cell");
   vtkNew<vtkIdList> cell;
   vtkCellArray* lines = data->GetLines();
   vtkIdType number = data->GetNumberOfVerts();
@@ -319,7 +305,7 @@ coronary::BranchTree TreeOfLines(
 }
 }
 
-coronary::BranchTree TreeOf(vtkPolyData* data, const TreeArrayNames& names, const std::string& side)
+coronary::BranchTree TreeOf(vtkPolyData* data, const std::string& side)
 {
   if (data == nullptr || data->GetNumberOfCells() == 0)
   {
@@ -327,17 +313,18 @@ coronary::BranchTree TreeOf(vtkPolyData* data, const TreeArrayNames& names, cons
   }
   if (data->GetNumberOfLines() > 0)
   {
-    return TreeOfLines(data, names, side);
+    return TreeOfLines(data);
   }
   if (data->GetNumberOfPolys() + data->GetNumberOfStrips() == 0)
   {
     return {};
   }
-  vtkDataArray* group = data->GetPointData()->GetArray(names.group.c_str());
-  vtkDataArray* abscissa = data->GetPointData()->GetArray(names.abscissa.c_str());
+  vtkDataArray* group = data->GetPointData()->GetArray(vtkCoronaryArrayNames::GroupIds);
+  vtkDataArray* abscissa = data->GetPointData()->GetArray(vtkCoronaryArrayNames::Abscissas);
   if (group == nullptr || abscissa == nullptr)
   {
-    const std::string& missing = group == nullptr ? names.group : names.abscissa;
+    const std::string missing =
+      group == nullptr ? vtkCoronaryArrayNames::GroupIds : vtkCoronaryArrayNames::Abscissas;
     throw std::invalid_argument("The " + side + " is a surface without the point array " + missing +
       ": its branches are not known; give its centerline instead");
   }
@@ -345,7 +332,7 @@ coronary::BranchTree TreeOf(vtkPolyData* data, const TreeArrayNames& names, cons
   const std::vector<std::int64_t> groups = IdsOf(group, count, "point");
   if (abscissa->GetNumberOfComponents() != 1 || abscissa->GetNumberOfTuples() != count)
   {
-    throw std::invalid_argument("The point array " + names.abscissa + " must have one value each");
+    throw std::invalid_argument("The point array Abscissas must have one value each");
   }
   std::vector<coronary::Vector3> points(count);
   std::vector<double> along(count);

@@ -64,22 +64,13 @@ VTKCORONARYMETRICS_EXPORT std::string TimeMismatch(vtkInformationVector** inputs
 VTKCORONARYMETRICS_EXPORT void SetCommonTime(
   vtkInformationVector** inputs, vtkInformationVector* outputs);
 
-/// Arrays of a tree. A radius that is empty or "Automatic" is that of an inscribed sphere, or "Radius".
-struct TreeArrayNames
-{
-  std::string radius;
-  std::string group;
-  std::string abscissa;
-};
-
 /**
  * The lines of poly data as a tree; of a surface whose points have a group and an abscissa, the middles of
  * its slices; nothing of null or empty data.
  * @param side  "result" or "reference", for messages
  * @throws std::invalid_argument naming an array that is missing or does not fit
  */
-VTKCORONARYMETRICS_EXPORT coronary::BranchTree TreeOf(
-  vtkPolyData* data, const TreeArrayNames& names, const std::string& side);
+VTKCORONARYMETRICS_EXPORT coronary::BranchTree TreeOf(vtkPolyData* data, const std::string& side);
 }
 
 #endif

@@ -133,26 +133,22 @@ void vtkCardiacPhaseInterpolator::Internals::Build(vtkCardiacPhaseInterpolator* 
   vtkPointData* pointData = data.first->GetPointData();
   bool radiusVaries = false;
   std::vector<std::vector<double>> radius;
-  if (pointData->HasArray(self->RadiusArrayName.c_str()))
+  for (const char* name : { "Radius", names::Radius })
   {
-    this->RadiusName = self->RadiusArrayName;
-  }
-  else if (self->RadiusArrayName == names::Radius && pointData->HasArray("Radius"))
-  {
-    this->RadiusName = "Radius";
+    this->RadiusName = pointData->HasArray(name) != 0 ? name : this->RadiusName;
   }
   if (!this->RadiusName.empty())
   {
     radius = ValuesOf(data, this->RadiusName, radiusVaries);
   }
   bool varies = false;
-  std::vector<std::vector<double>> major = ValuesOf(data, self->MajorArrayName, varies);
-  std::vector<std::vector<double>> minor = ValuesOf(data, self->MinorArrayName, varies);
+  std::vector<std::vector<double>> major = ValuesOf(data, names::EllipseMajor, varies);
+  std::vector<std::vector<double>> minor = ValuesOf(data, names::EllipseMinor, varies);
   Require(major.empty() == minor.empty(),
-    "Arrays " + self->MajorArrayName + " and " + self->MinorArrayName +
+    std::string("Arrays ") + names::EllipseMajor + " and " + names::EllipseMinor +
       " of the input: one is there without the other");
-  RequirePositive(major, self->MajorArrayName);
-  RequirePositive(minor, self->MinorArrayName);
+  RequirePositive(major, names::EllipseMajor);
+  RequirePositive(minor, names::EllipseMinor);
   if (!major.empty())
   {
     coronary::PoseSequence axes;
@@ -287,8 +283,8 @@ void vtkCardiacPhaseInterpolator::Internals::WriteSections(
   }
   if (this->HasCalibre)
   {
-    vtkCoronary::AddArray<vtkDoubleArray>(pointData, self->CalibreArrayName, this->Pose.calibre);
-    vtkCoronary::AddArray<vtkDoubleArray>(pointData, self->AreaStrainArrayName, strain);
+    vtkCoronary::AddArray<vtkDoubleArray>(pointData, names::CalibreFactor, this->Pose.calibre);
+    vtkCoronary::AddArray<vtkDoubleArray>(pointData, names::AreaStrain, strain);
   }
   if (radius)
   {
@@ -296,8 +292,8 @@ void vtkCardiacPhaseInterpolator::Internals::WriteSections(
   }
   if (ellipses)
   {
-    vtkCoronary::AddArray<vtkDoubleArray>(pointData, self->MajorArrayName, major);
-    vtkCoronary::AddArray<vtkDoubleArray>(pointData, self->MinorArrayName, minor);
+    vtkCoronary::AddArray<vtkDoubleArray>(pointData, names::EllipseMajor, major);
+    vtkCoronary::AddArray<vtkDoubleArray>(pointData, names::EllipseMinor, minor);
   }
   vtkCoronary::AddArray<vtkIdTypeArray>(
     output->GetFieldData(), names::ClampedSections, std::vector<vtkIdType>{ clamped });
@@ -329,9 +325,9 @@ void vtkCardiacPhaseInterpolator::Internals::WriteOthers(
     }
     const std::string name = array.steps.front()->GetName();
     const bool written = !array.cell &&
-      (name == self->VelocityArrayName || name == self->AreaStrainArrayName ||
-        (name == this->RadiusName && this->HasCalibre) || name == self->MajorArrayName ||
-        name == self->MinorArrayName);
+      (name == names::Velocity || name == names::AreaStrain ||
+        (name == this->RadiusName && this->HasCalibre) || name == names::EllipseMajor ||
+        name == names::EllipseMinor);
     if (written)
     {
       continue;
@@ -362,16 +358,7 @@ void vtkCardiacPhaseInterpolator::Internals::WriteOthers(
 }
 
 vtkCardiacPhaseInterpolator::vtkCardiacPhaseInterpolator()
-  : ConfidenceArrayName(names::TrackingConfidence)
-  , StatusArrayName(names::TrackingStatus)
-  , CalibreArrayName(names::CalibreFactor)
-  , RotationArrayName(names::BoneRotation)
-  , RadiusArrayName(names::Radius)
-  , VelocityArrayName(names::Velocity)
-  , AreaStrainArrayName(names::AreaStrain)
-  , MajorArrayName(names::EllipseMajor)
-  , MinorArrayName(names::EllipseMinor)
-  , Data(new Internals)
+  : Data(new Internals)
 {
 }
 
@@ -504,20 +491,11 @@ int vtkCardiacPhaseInterpolator::RequestData(
     {
       Require(std::isfinite(step), "A step of the list is not finite");
     }
-    for (const std::string* name :
-      { &this->ConfidenceArrayName, &this->StatusArrayName, &this->CalibreArrayName,
-        &this->RotationArrayName, &this->RadiusArrayName, &this->VelocityArrayName,
-        &this->AreaStrainArrayName, &this->MajorArrayName, &this->MinorArrayName })
-    {
-      Require(!name->empty(), "An array needs a name");
-    }
-    const vtkPoseSequences::PoseArrays arrays{ this->ConfidenceArrayName, this->StatusArrayName,
-      this->CalibreArrayName, this->RotationArrayName };
     vtkPoseSequences::Reader& reader = this->Data->Reader;
-    if (!reader.Knows(inInfo, arrays))
+    if (!reader.Knows(inInfo))
     {
       this->Data->Motion.reset();
-      reader.Read(inInfo, outInfo, arrays, vtkCoronary::ProgressOf(this, 0.0, 0.8));
+      reader.Read(inInfo, outInfo, vtkCoronary::ProgressOf(this, 0.0, 0.8));
     }
     const vtkPoseSequences::Sequence& data = reader.Current();
     if (data.Empty())
@@ -542,13 +520,13 @@ int vtkCardiacPhaseInterpolator::RequestData(
     moment.confidence = pose.confidence.empty() ? nullptr : &pose.confidence;
     moment.status = pose.status.empty() ? nullptr : &pose.status;
     moment.rotation = pose.rotation.empty() ? nullptr : &pose.rotation;
-    vtkPoseSequences::Write(data.first, moment, arrays, output);
+    vtkPoseSequences::Write(data.first, moment, output);
     this->Data->WriteOthers(this, phase, output);
     this->Data->WriteSections(this, phase, output);
 
     const double cycle = data.cycleLength > 0.0 ? data.cycleLength : this->CycleLength;
     vtkNew<vtkDoubleArray> velocity;
-    velocity->SetName(this->VelocityArrayName.c_str());
+    velocity->SetName(names::Velocity);
     velocity->SetNumberOfComponents(3);
     velocity->SetNumberOfTuples(static_cast<vtkIdType>(pose.velocity.size()));
     double* value = velocity->GetPointer(0);
@@ -606,13 +584,4 @@ void vtkCardiacPhaseInterpolator::PrintSelf(ostream& os, vtkIndent indent)
   }
   os << '\n';
   os << indent << "TimeRange: " << this->TimeRange[0] << ' ' << this->TimeRange[1] << '\n';
-  os << indent << "ConfidenceArrayName: " << this->ConfidenceArrayName << '\n';
-  os << indent << "StatusArrayName: " << this->StatusArrayName << '\n';
-  os << indent << "CalibreArrayName: " << this->CalibreArrayName << '\n';
-  os << indent << "RotationArrayName: " << this->RotationArrayName << '\n';
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << '\n';
-  os << indent << "VelocityArrayName: " << this->VelocityArrayName << '\n';
-  os << indent << "AreaStrainArrayName: " << this->AreaStrainArrayName << '\n';
-  os << indent << "MajorArrayName: " << this->MajorArrayName << '\n';
-  os << indent << "MinorArrayName: " << this->MinorArrayName << '\n';
 }

@@ -196,32 +196,6 @@ public:
   vtkGetVector2Macro(TimeRange, double);
   ///@}
 
-  ///@{
-  /**
-   * Names of the arrays. Defaults `TrackingConfidence`, `TrackingStatus`, `CalibreFactor`, `BoneRotation`,
-   * `MaximumInscribedSphereRadius` (or `Radius` where the input has only that), `Velocity`, `AreaStrain`, `EllipseMajor`,
-   * `EllipseMinor`. None may be empty.
-   */
-  vtkSetMacro(ConfidenceArrayName, std::string);
-  vtkGetMacro(ConfidenceArrayName, std::string);
-  vtkSetMacro(StatusArrayName, std::string);
-  vtkGetMacro(StatusArrayName, std::string);
-  vtkSetMacro(CalibreArrayName, std::string);
-  vtkGetMacro(CalibreArrayName, std::string);
-  vtkSetMacro(RotationArrayName, std::string);
-  vtkGetMacro(RotationArrayName, std::string);
-  vtkSetMacro(RadiusArrayName, std::string);
-  vtkGetMacro(RadiusArrayName, std::string);
-  vtkSetMacro(VelocityArrayName, std::string);
-  vtkGetMacro(VelocityArrayName, std::string);
-  vtkSetMacro(AreaStrainArrayName, std::string);
-  vtkGetMacro(AreaStrainArrayName, std::string);
-  vtkSetMacro(MajorArrayName, std::string);
-  vtkGetMacro(MajorArrayName, std::string);
-  vtkSetMacro(MinorArrayName, std::string);
-  vtkGetMacro(MinorArrayName, std::string);
-  ///@}
-
   /// Times that the input's steps have been read; once, as long as the input does not change.
   int GetNumberOfReads() const;
 
@@ -256,15 +230,6 @@ private:
   int NumberOfSteps = 21;
   std::vector<double> ListedTimes;
   double TimeRange[2] = { 0.0, 1.0 };
-  std::string ConfidenceArrayName;
-  std::string StatusArrayName;
-  std::string CalibreArrayName;
-  std::string RotationArrayName;
-  std::string RadiusArrayName;
-  std::string VelocityArrayName;
-  std::string AreaStrainArrayName;
-  std::string MajorArrayName;
-  std::string MinorArrayName;
 
   struct Internals;
   std::unique_ptr<Internals> Data;

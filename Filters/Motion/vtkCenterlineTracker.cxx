@@ -153,10 +153,8 @@ coronary::VesselImage Drawn(vtkPolyData* shapes)
   }
   vtkCoronary::Require(shapes != nullptr && shapes->GetNumberOfLines() > 0,
     "The series has neither lines nor surfaces");
-  const char* radius =
-    shapes->GetPointData()->GetArray(names::Radius) != nullptr ? names::Radius : "Radius";
   return coronary::RenderLines(
-    vtkPoseSequences::LinesOf(shapes, radius), DrawnSpacing, DrawnMargin);
+    vtkPoseSequences::LinesOf(shapes, vtkCoronary::FindRadius(shapes)), DrawnSpacing, DrawnMargin);
 }
 
 double LengthOf(vtkIdType count, const vtkIdType* points, const std::vector<Vector3>& positions)
@@ -195,12 +193,7 @@ struct vtkCenterlineTracker::Internals
 };
 
 vtkCenterlineTracker::vtkCenterlineTracker()
-  : ConfidenceArrayName(names::TrackingConfidence)
-  , StatusArrayName(names::TrackingStatus)
-  , CalibreArrayName(names::CalibreFactor)
-  , DisplacementArrayName(names::Displacement)
-  , StrainArrayName(names::AxialStrain)
-  , Data(new Internals)
+  : Data(new Internals)
 {
   this->SetNumberOfInputPorts(3);
   this->SetNumberOfOutputPorts(2);
@@ -358,12 +351,7 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
       "AutomaticReference off and give ReferenceTime");
   }
   Require(std::isfinite(data.Reference), "ReferenceTime must be finite");
-  std::string radius = this->RadiusArrayName;
-  if (radius.empty())
-  {
-    radius = input->GetPointData()->GetArray(names::Radius) != nullptr ? names::Radius : "Radius";
-  }
-  data.Lines = vtkPoseSequences::LinesOf(input, radius);
+  data.Lines = vtkPoseSequences::LinesOf(input, vtkCoronary::FindRadius(input));
 
   coronary::CenterlineTrackingSettings settings;
   settings.temporalWindow = this->TemporalWindow;
@@ -458,11 +446,6 @@ int vtkCenterlineTracker::RequestData(
   Internals& data = *this->Data;
   try
   {
-    for (const std::string* name : { &this->ConfidenceArrayName, &this->StatusArrayName,
-           &this->CalibreArrayName, &this->DisplacementArrayName, &this->StrainArrayName })
-    {
-      vtkCoronary::Require(!name->empty(), "An output array needs a name");
-    }
     if (!data.Knows(this, inputs))
     {
       this->Track(inputs);
@@ -474,17 +457,13 @@ int vtkCenterlineTracker::RequestData(
     const double wanted =
       asked->Has(SDDP::UPDATE_TIME_STEP()) ? asked->Get(SDDP::UPDATE_TIME_STEP()) : times.front();
     const std::size_t phase = NearestIndex(times, wanted);
-    vtkPoseSequences::PoseArrays arrays;
-    arrays.confidence = this->ConfidenceArrayName;
-    arrays.status = this->StatusArrayName;
-    arrays.calibre = this->CalibreArrayName;
     const auto write =
       [&](vtkPolyData* like, const vtkPoseSequences::Moment& moment, vtkPolyData* out)
     {
-      vtkPoseSequences::Write(like, moment, arrays, out);
+      vtkPoseSequences::Write(like, moment, out);
       std::vector<Vector3> rest;
       vtkNew<vtkDoubleArray> displacement;
-      displacement->SetName(this->DisplacementArrayName.c_str());
+      displacement->SetName(names::Displacement);
       displacement->SetNumberOfComponents(3);
       displacement->SetNumberOfTuples(like->GetNumberOfPoints());
       for (vtkIdType n = 0; n < like->GetNumberOfPoints(); ++n)
@@ -496,7 +475,7 @@ int vtkCenterlineTracker::RequestData(
       out->GetPointData()->AddArray(displacement);
       // Cells of poly data: vertices, lines, polygons, strips.
       vtkNew<vtkDoubleArray> strain;
-      strain->SetName(this->StrainArrayName.c_str());
+      strain->SetName(names::AxialStrain);
       strain->SetNumberOfValues(like->GetNumberOfCells());
       strain->FillValue(0.0);
       vtkIdType cell = like->GetNumberOfVerts();
@@ -584,11 +563,5 @@ void vtkCenterlineTracker::PrintSelf(ostream& os, vtkIndent indent)
      << indent << "TemporalWindow: " << this->TemporalWindow << "\n"
      << indent << "CycleLength: " << this->CycleLength << "\n"
      << indent << "NodeSpacing: " << this->NodeSpacing << "\n"
-     << indent << "CaptureRange: " << this->CaptureRange << "\n"
-     << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n"
-     << indent << "ConfidenceArrayName: " << this->ConfidenceArrayName << "\n"
-     << indent << "StatusArrayName: " << this->StatusArrayName << "\n"
-     << indent << "CalibreArrayName: " << this->CalibreArrayName << "\n"
-     << indent << "DisplacementArrayName: " << this->DisplacementArrayName << "\n"
-     << indent << "StrainArrayName: " << this->StrainArrayName << "\n";
+     << indent << "CaptureRange: " << this->CaptureRange << "\n";
 }

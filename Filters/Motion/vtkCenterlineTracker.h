@@ -169,31 +169,6 @@ public:
   vtkGetMacro(CaptureRange, double);
   ///@}
 
-  ///@{
-  /**
-   * Name of the radius array of lines; empty (default): `MaximumInscribedSphereRadius`, or `Radius`.
-   */
-  vtkSetMacro(RadiusArrayName, std::string);
-  vtkGetMacro(RadiusArrayName, std::string);
-  ///@}
-
-  ///@{
-  /**
-   * Names of the arrays made. Defaults `TrackingConfidence`, `TrackingStatus`, `CalibreFactor`,
-   * `Displacement`, `AxialStrain`.
-   */
-  vtkSetMacro(ConfidenceArrayName, std::string);
-  vtkGetMacro(ConfidenceArrayName, std::string);
-  vtkSetMacro(StatusArrayName, std::string);
-  vtkGetMacro(StatusArrayName, std::string);
-  vtkSetMacro(CalibreArrayName, std::string);
-  vtkGetMacro(CalibreArrayName, std::string);
-  vtkSetMacro(DisplacementArrayName, std::string);
-  vtkGetMacro(DisplacementArrayName, std::string);
-  vtkSetMacro(StrainArrayName, std::string);
-  vtkGetMacro(StrainArrayName, std::string);
-  ///@}
-
 #ifndef __VTK_WRAP__
   /**
    * Processes that track together: each reads and measures its share of the phases, and all have the same output.
@@ -237,12 +212,6 @@ private:
   double CycleLength = 0.8;
   double NodeSpacing = 2.0;
   double CaptureRange = 16.0;
-  std::string RadiusArrayName;
-  std::string ConfidenceArrayName;
-  std::string StatusArrayName;
-  std::string CalibreArrayName;
-  std::string DisplacementArrayName;
-  std::string StrainArrayName;
   coronary::RankGroup* Ranks = nullptr;
   struct Internals;
   std::unique_ptr<Internals> Data;

@@ -71,15 +71,7 @@ void RequireLines(vtkPolyData* data, const std::string& whose)
 }
 
 vtkMotionRegularizer::vtkMotionRegularizer()
-  : ConfidenceArrayName(names::TrackingConfidence)
-  , StatusArrayName(names::TrackingStatus)
-  , CalibreArrayName(names::CalibreFactor)
-  , RotationArrayName(names::BoneRotation)
-  , StrainArrayName(names::AxialStrain)
-  , StressArrayName(names::AxialStress)
-  , ClampArrayName(names::MotionClamps)
-  , MoveArrayName(names::RegularizationMove)
-  , Data(new Internals)
+  : Data(new Internals)
 {
   this->SetNumberOfInputPorts(2);
 }
@@ -172,19 +164,11 @@ int vtkMotionRegularizer::RequestData(
     Require(this->GreatestBending >= 1.0 && this->GreatestBending <= 180.0,
       "GreatestBending must be 1 to 180 degrees");
     Require(this->GreatestStep >= 0.0, "GreatestStep must be 0 or more");
-    for (const std::string* name : { &this->ConfidenceArrayName, &this->StatusArrayName,
-           &this->CalibreArrayName, &this->RotationArrayName, &this->StrainArrayName,
-           &this->StressArrayName, &this->ClampArrayName, &this->MoveArrayName })
-    {
-      Require(!name->empty(), "An array needs a name");
-    }
-    const vtkPoseSequences::PoseArrays arrays{ this->ConfidenceArrayName, this->StatusArrayName,
-      this->CalibreArrayName, this->RotationArrayName };
     Internals& data = *this->Data;
-    if (!data.Reader.Knows(inInfo, arrays))
+    if (!data.Reader.Knows(inInfo))
     {
       data.Solved = false;
-      data.Reader.Read(inInfo, outInfo, arrays, vtkCoronary::ProgressOf(this, 0.0, 0.4));
+      data.Reader.Read(inInfo, outInfo, vtkCoronary::ProgressOf(this, 0.0, 0.4));
     }
     const vtkPoseSequences::Sequence& sequence = data.Reader.Current();
     if (sequence.Empty())
@@ -200,13 +184,13 @@ int vtkMotionRegularizer::RequestData(
       data.Solved = false;
       auto* first = vtkPolyData::SafeDownCast(sequence.first);
       RequireLines(first, "The input");
-      coronary::MovingLines lines = vtkPoseSequences::LinesOf(first, "");
+      coronary::MovingLines lines = vtkPoseSequences::LinesOf(first, nullptr);
       if (Connected(inputs[1]))
       {
         vtkPolyData* rest = vtkPolyData::GetData(inputs[1]->GetInformationObject(0));
         Require(
           rest != nullptr, "The lines at rest are composite data: a single poly data is needed");
-        const coronary::MovingLines still = vtkPoseSequences::LinesOf(rest, "");
+        const coronary::MovingLines still = vtkPoseSequences::LinesOf(rest, nullptr);
         Require(still.rest.size() == lines.rest.size() && still.lines == lines.lines,
           "The lines at rest are not those of the input");
         lines.rest = still.rest;
@@ -257,13 +241,13 @@ int vtkMotionRegularizer::RequestData(
     const coronary::RegularizedMotion& motion = data.Motion;
     vtkPoseSequences::Moment moment = vtkPoseSequences::MomentOf(motion.poses, k);
     moment.time = times[k];
-    vtkPoseSequences::Write(sequence.first, moment, arrays, output);
+    vtkPoseSequences::Write(sequence.first, moment, output);
     vtkPoseSequences::WriteVarying(sequence, k, output);
 
     vtkPointData* pointData = output->GetPointData();
-    vtkCoronary::AddArray<vtkIntArray>(pointData, this->ClampArrayName, motion.clamps[k]);
+    vtkCoronary::AddArray<vtkIntArray>(pointData, names::MotionClamps, motion.clamps[k]);
     vtkNew<vtkDoubleArray> moves;
-    moves->SetName(this->MoveArrayName.c_str());
+    moves->SetName(names::RegularizationMove);
     moves->SetNumberOfComponents(3);
     moves->SetNumberOfTuples(output->GetNumberOfPoints());
     for (std::size_t n = 0; n < motion.poses.points[k].size(); ++n)
@@ -273,9 +257,9 @@ int vtkMotionRegularizer::RequestData(
     }
     pointData->AddArray(moves);
     vtkCoronary::AddArray<vtkDoubleArray>(
-      output->GetCellData(), this->StrainArrayName, motion.strain[k]);
+      output->GetCellData(), names::AxialStrain, motion.strain[k]);
     vtkCoronary::AddArray<vtkDoubleArray>(
-      output->GetCellData(), this->StressArrayName, motion.stress[k]);
+      output->GetCellData(), names::AxialStress, motion.stress[k]);
 
     vtkFieldData* fields = output->GetFieldData();
     const auto add = [fields](const char* name, const std::vector<double>& values)
@@ -319,12 +303,4 @@ void vtkMotionRegularizer::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Iterations: " << this->Iterations << '\n';
   os << indent << "ReferenceTime: " << this->ReferenceTime << '\n';
   os << indent << "Period: " << this->Period << '\n';
-  os << indent << "ConfidenceArrayName: " << this->ConfidenceArrayName << '\n';
-  os << indent << "StatusArrayName: " << this->StatusArrayName << '\n';
-  os << indent << "CalibreArrayName: " << this->CalibreArrayName << '\n';
-  os << indent << "RotationArrayName: " << this->RotationArrayName << '\n';
-  os << indent << "StrainArrayName: " << this->StrainArrayName << '\n';
-  os << indent << "StressArrayName: " << this->StressArrayName << '\n';
-  os << indent << "ClampArrayName: " << this->ClampArrayName << '\n';
-  os << indent << "MoveArrayName: " << this->MoveArrayName << '\n';
 }

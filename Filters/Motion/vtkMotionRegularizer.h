@@ -170,29 +170,6 @@ public:
   vtkGetMacro(Period, double);
   ///@}
 
-  ///@{
-  /**
-   * Names of the arrays. Defaults `TrackingConfidence`, `TrackingStatus`, `CalibreFactor`, `BoneRotation`,
-   * `AxialStrain`, `AxialStress`, `MotionClamps`, `RegularizationMove`. None may be empty.
-   */
-  vtkSetMacro(ConfidenceArrayName, std::string);
-  vtkGetMacro(ConfidenceArrayName, std::string);
-  vtkSetMacro(StatusArrayName, std::string);
-  vtkGetMacro(StatusArrayName, std::string);
-  vtkSetMacro(CalibreArrayName, std::string);
-  vtkGetMacro(CalibreArrayName, std::string);
-  vtkSetMacro(RotationArrayName, std::string);
-  vtkGetMacro(RotationArrayName, std::string);
-  vtkSetMacro(StrainArrayName, std::string);
-  vtkGetMacro(StrainArrayName, std::string);
-  vtkSetMacro(StressArrayName, std::string);
-  vtkGetMacro(StressArrayName, std::string);
-  vtkSetMacro(ClampArrayName, std::string);
-  vtkGetMacro(ClampArrayName, std::string);
-  vtkSetMacro(MoveArrayName, std::string);
-  vtkGetMacro(MoveArrayName, std::string);
-  ///@}
-
   /// Times that the motion has been computed; moving the time does not add to it.
   int GetNumberOfSolutions() const;
 
@@ -228,14 +205,6 @@ private:
   int Iterations = 400;
   double ReferenceTime = 0.75;
   double Period = 1.0;
-  std::string ConfidenceArrayName;
-  std::string StatusArrayName;
-  std::string CalibreArrayName;
-  std::string RotationArrayName;
-  std::string StrainArrayName;
-  std::string StressArrayName;
-  std::string ClampArrayName;
-  std::string MoveArrayName;
 
   struct Internals;
   std::unique_ptr<Internals> Data;

@@ -31,6 +31,8 @@ using coronary::Vector3;
 using vtkCoronary::Require;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
+namespace names = vtkCoronaryArrayNames;
+
 namespace vtkPoseSequences
 {
 namespace
@@ -129,7 +131,7 @@ bool SameNumbers(vtkDataArray* a, vtkDataArray* b)
 
 /// Those of the first step that are there later with the same form, and are not the same in all.
 void FindVarying(const std::vector<vtkSmartPointer<vtkPointSet>>& steps, bool cell,
-  const PoseArrays& names, std::vector<VaryingArray>& varying)
+  std::vector<VaryingArray>& varying)
 {
   const auto attributes = [&](std::size_t k) -> vtkFieldData*
   {
@@ -143,9 +145,9 @@ void FindVarying(const std::vector<vtkSmartPointer<vtkPointSet>>& steps, bool ce
   {
     vtkAbstractArray* first = attributes(0)->GetAbstractArray(n);
     const std::string name = first->GetName() ? first->GetName() : "";
-    const bool ofPose = cell
-      ? name == names.rotation
-      : name == names.confidence || name == names.status || name == names.calibre;
+    const bool ofPose = cell ? name == names::BoneRotation
+                             : name == names::TrackingConfidence || name == names::TrackingStatus ||
+        name == names::CalibreFactor;
     if (name.empty() || ofPose)
     {
       continue;
@@ -213,12 +215,6 @@ void RequireSameCells(
 }
 }
 
-PoseArrays PoseArrays::Defaults()
-{
-  return { vtkCoronaryArrayNames::TrackingConfidence, vtkCoronaryArrayNames::TrackingStatus,
-    vtkCoronaryArrayNames::CalibreFactor, vtkCoronaryArrayNames::BoneRotation };
-}
-
 bool Sequence::Empty() const
 {
   return !this->first || this->first->GetNumberOfPoints() == 0;
@@ -247,18 +243,17 @@ void Reader::RequestTime(vtkInformation* inInfo) const
   inInfo->Set(SDDP::UPDATE_TIME_STEP(), same ? this->LastStep : steps.front());
 }
 
-bool Reader::Knows(vtkInformation* inInfo, const PoseArrays& names) const
+bool Reader::Knows(vtkInformation* inInfo) const
 {
-  return this->Known && this->KnownNames == names &&
-    this->KnownProducer == vtkExecutive::PRODUCER()->GetExecutive(inInfo) &&
+  return this->Known && this->KnownProducer == vtkExecutive::PRODUCER()->GetExecutive(inInfo) &&
     this->KnownPort == vtkExecutive::PRODUCER()->GetPort(inInfo) &&
     this->KnownOf == vtkCoronary::UpstreamTime(inInfo) && this->KnownSteps == StepsOf(inInfo);
 }
 
-const Sequence& Reader::Read(vtkInformation* inInfo, vtkInformation* outInfo,
-  const PoseArrays& names, const coronary::ProgressCallback& progress)
+const Sequence& Reader::Read(
+  vtkInformation* inInfo, vtkInformation* outInfo, const coronary::ProgressCallback& progress)
 {
-  if (this->Knows(inInfo, names))
+  if (this->Knows(inInfo))
   {
     return this->Data;
   }
@@ -303,17 +298,19 @@ const Sequence& Reader::Read(vtkInformation* inInfo, vtkInformation* outInfo,
       const auto number = [](vtkDataArray* array, vtkIdType n)
       { return array->GetComponent(n, 0); };
       vtkPointData* pointData = now->GetPointData();
-      Append(pointData, names.confidence, 1, points, k, data.poses.confidence, number);
-      Append(pointData, names.calibre, 1, points, k, data.poses.calibre, number);
-      Append(pointData, names.status, 1, points, k, data.poses.status,
+      Append(pointData, names::TrackingConfidence, 1, points, k, data.poses.confidence, number);
+      Append(pointData, names::CalibreFactor, 1, points, k, data.poses.calibre, number);
+      Append(pointData, names::TrackingStatus, 1, points, k, data.poses.status,
         [&](vtkDataArray* array, vtkIdType n)
         {
           const double value = array->GetComponent(n, 0);
           Require(value == 0.0 || value == 1.0 || value == 2.0 || value == 3.0,
-            "Array " + names.status + " of the input has a value that is not 0 to 3");
+            std::string("Array ") + names::TrackingStatus +
+              " of the input has a value that is not 0 to 3");
           return static_cast<coronary::TrackingStatus>(static_cast<int>(value));
         });
-      Append(now->GetCellData(), names.rotation, 4, now->GetNumberOfCells(), k, data.poses.rotation,
+      Append(now->GetCellData(), names::BoneRotation, 4, now->GetNumberOfCells(), k,
+        data.poses.rotation,
         [](vtkDataArray* array, vtkIdType n)
         {
           double wxyz[4];
@@ -336,15 +333,14 @@ const Sequence& Reader::Read(vtkInformation* inInfo, vtkInformation* outInfo,
       throw std::invalid_argument(std::string("The input's motion: ") + error.what());
     }
     data.first = kept.front();
-    FindVarying(kept, false, names, data.varying);
-    FindVarying(kept, true, names, data.varying);
-    vtkDataArray* cycle = data.first->GetFieldData()->GetArray(vtkCoronaryArrayNames::CycleLength);
+    FindVarying(kept, false, data.varying);
+    FindVarying(kept, true, data.varying);
+    vtkDataArray* cycle = data.first->GetFieldData()->GetArray(names::CycleLength);
     if (cycle && cycle->GetNumberOfValues() == 1)
     {
       data.cycleLength = cycle->GetComponent(0, 0);
       Require(std::isfinite(data.cycleLength) && data.cycleLength > 0.0,
-        std::string("Array ") + vtkCoronaryArrayNames::CycleLength +
-          " of the input must be positive");
+        std::string("Array ") + names::CycleLength + " of the input must be positive");
     }
   }
   this->Data = std::move(data);
@@ -353,7 +349,6 @@ const Sequence& Reader::Read(vtkInformation* inInfo, vtkInformation* outInfo,
   this->KnownProducer = vtkExecutive::PRODUCER()->GetExecutive(inInfo);
   this->KnownPort = vtkExecutive::PRODUCER()->GetPort(inInfo);
   this->KnownSteps = steps;
-  this->KnownNames = names;
   this->LastStep = steps.empty() ? 0.0 : this->Data.Empty() ? steps.front() : steps.back();
   return this->Data;
 }
@@ -370,7 +365,7 @@ Moment MomentOf(const coronary::PoseSequence& sequence, std::size_t k)
   return moment;
 }
 
-void Write(vtkPointSet* like, const Moment& moment, const PoseArrays& names, vtkPointSet* output)
+void Write(vtkPointSet* like, const Moment& moment, vtkPointSet* output)
 {
   output->ShallowCopy(like);
   vtkNew<vtkFieldData> fields;
@@ -387,26 +382,27 @@ void Write(vtkPointSet* like, const Moment& moment, const PoseArrays& names, vtk
     }
     output->SetPoints(points);
   }
-  if (moment.confidence && !names.confidence.empty())
+  if (moment.confidence)
   {
     vtkCoronary::AddArray<vtkDoubleArray>(
-      output->GetPointData(), names.confidence, *moment.confidence);
+      output->GetPointData(), names::TrackingConfidence, *moment.confidence);
   }
-  if (moment.status && !names.status.empty())
+  if (moment.status)
   {
     std::vector<int> values(moment.status->size());
     std::transform(moment.status->begin(), moment.status->end(), values.begin(),
       [](coronary::TrackingStatus status) { return static_cast<int>(status); });
-    vtkCoronary::AddArray<vtkIntArray>(output->GetPointData(), names.status, values);
+    vtkCoronary::AddArray<vtkIntArray>(output->GetPointData(), names::TrackingStatus, values);
   }
-  if (moment.calibre && !names.calibre.empty())
+  if (moment.calibre)
   {
-    vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names.calibre, *moment.calibre);
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      output->GetPointData(), names::CalibreFactor, *moment.calibre);
   }
-  if (moment.rotation && !names.rotation.empty())
+  if (moment.rotation)
   {
     vtkNew<vtkDoubleArray> array;
-    array->SetName(names.rotation.c_str());
+    array->SetName(names::BoneRotation);
     array->SetNumberOfComponents(4);
     array->SetNumberOfTuples(static_cast<vtkIdType>(moment.rotation->size()));
     for (std::size_t n = 0; n < moment.rotation->size(); ++n)
@@ -434,7 +430,7 @@ void WriteVarying(const Sequence& sequence, std::size_t k, vtkPointSet* output)
   }
 }
 
-coronary::MovingLines LinesOf(vtkPolyData* data, const std::string& radiusName)
+coronary::MovingLines LinesOf(vtkPolyData* data, vtkDataArray* radius)
 {
   coronary::MovingLines lines;
   const vtkIdType points = data->GetNumberOfPoints();
@@ -443,7 +439,7 @@ coronary::MovingLines LinesOf(vtkPolyData* data, const std::string& radiusName)
   {
     data->GetPoint(n, lines.rest[static_cast<std::size_t>(n)].data());
   }
-  if (vtkDataArray* radius = Find(data->GetPointData(), radiusName, 1, points))
+  if (radius != nullptr)
   {
     lines.radius.resize(lines.rest.size());
     for (vtkIdType n = 0; n < points; ++n)

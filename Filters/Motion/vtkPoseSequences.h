@@ -15,30 +15,13 @@
 #include <vector>
 
 class vtkAbstractArray;
+class vtkDataArray;
 class vtkInformation;
 class vtkPointSet;
 class vtkPolyData;
 
 namespace vtkPoseSequences
 {
-/// Names of the arrays of a pose that are read and written; an empty name: not.
-struct PoseArrays
-{
-  std::string confidence; ///< point data
-  std::string status;     ///< point data
-  std::string calibre;    ///< point data
-  std::string rotation;   ///< cell data, w x y z
-
-  /// The names of vtkCoronaryArrayNames.
-  static PoseArrays Defaults();
-
-  bool operator==(const PoseArrays& other) const
-  {
-    return this->confidence == other.confidence && this->status == other.status &&
-      this->calibre == other.calibre && this->rotation == other.rotation;
-  }
-};
-
 /// An array that is not the same at all time steps, beside those of the pose.
 struct VaryingArray
 {
@@ -69,7 +52,7 @@ public:
   void RequestTime(vtkInformation* inInfo) const;
 
   /// True when Read would read nothing: for filters that keep what they make of a sequence.
-  bool Knows(vtkInformation* inInfo, const PoseArrays& names) const;
+  bool Knows(vtkInformation* inInfo) const;
 
   /**
    * Inside RequestData. An input without points gives an empty sequence.
@@ -78,7 +61,7 @@ public:
    * finite, other numbers of points or cells or other lines than at the first step, an array of wrong
    * form, as coronary::CheckPoseSequence; std::runtime_error when the input fails; coronary::Cancelled
    */
-  const Sequence& Read(vtkInformation* inInfo, vtkInformation* outInfo, const PoseArrays& names,
+  const Sequence& Read(vtkInformation* inInfo, vtkInformation* outInfo,
     const coronary::ProgressCallback& progress = {});
 
   /// Of the last Read.
@@ -93,7 +76,6 @@ private:
   const void* KnownProducer = nullptr;
   int KnownPort = 0;
   std::vector<double> KnownSteps;
-  PoseArrays KnownNames;
   double LastStep = 0.0;
   int Reads = 0;
   Sequence Data;
@@ -120,17 +102,17 @@ Moment MomentOf(const coronary::PoseSequence& sequence, std::size_t k);
  * Makes `output` the data `like` with other points: cells and other arrays are shared, field data are the
  * output's own, DATA_TIME_STEP is the moment's time. Points keep their precision.
  */
-void Write(vtkPointSet* like, const Moment& moment, const PoseArrays& names, vtkPointSet* output);
+void Write(vtkPointSet* like, const Moment& moment, vtkPointSet* output);
 
 /// Gives `output` the arrays of step `k` that are not the same at all steps.
 void WriteVarying(const Sequence& sequence, std::size_t k, vtkPointSet* output);
 
 /**
  * Lines, vertices at rest and radii of poly data.
- * @param radiusName  point array with radii, mm; empty or not there: no radii
+ * @param radius  mm, one value a point; null: no radii
  * @throws std::invalid_argument as coronary::CheckMovingLines
  */
-coronary::MovingLines LinesOf(vtkPolyData* data, const std::string& radiusName);
+coronary::MovingLines LinesOf(vtkPolyData* data, vtkDataArray* radius);
 }
 
 #endif

@@ -101,11 +101,6 @@ std::vector<vtkStdString> BoneNames(
 }
 
 vtkBiharmonicSkinWeights::vtkBiharmonicSkinWeights()
-  : BoneWeightsArrayName(names::BoneWeights)
-  , BoneIndicesArrayName(names::BoneIndices)
-  , BoneWeightsCompactArrayName(names::BoneWeightsCompact)
-  , DroppedWeightArrayName(names::DroppedWeight)
-  , BoneNameArrayName(names::BoneName)
 {
   this->SetNumberOfInputPorts(2);
 }
@@ -158,12 +153,6 @@ int vtkBiharmonicSkinWeights::RequestData(
     settings.Validate();
     vtkCoronary::Require(
       this->Influences >= 1 && this->Influences <= 64, "Influences must be within 1 to 64");
-    for (const std::string* name : { &this->BoneWeightsArrayName, &this->BoneIndicesArrayName,
-           &this->BoneWeightsCompactArrayName, &this->DroppedWeightArrayName,
-           &this->BoneNameArrayName })
-    {
-      vtkCoronary::Require(!name->empty(), "An output array needs a name");
-    }
     if (mesh->GetNumberOfPoints() == 0)
     {
       return 1;
@@ -184,7 +173,7 @@ int vtkBiharmonicSkinWeights::RequestData(
                       << " iterations: violation " << weights.residual);
     }
     const std::vector<vtkStdString> boneNames =
-      BoneNames(skeleton, this->BoneNameArrayName, input.bones.size());
+      BoneNames(skeleton, names::BoneName, input.bones.size());
     std::vector<vtkStdString> leftOutNames;
     std::string listed;
     std::vector<double> partlyOutside = weights.lengthOutside;
@@ -214,11 +203,11 @@ int vtkBiharmonicSkinWeights::RequestData(
     const coronary::CompactSkinWeights compact =
       coronary::CompactWeights(weights, this->Influences);
     vtkNew<vtkIntArray> bone;
-    bone->SetName(this->BoneIndicesArrayName.c_str());
+    bone->SetName(names::BoneIndices);
     bone->SetNumberOfComponents(this->Influences);
     bone->SetNumberOfTuples(points);
     vtkNew<vtkFloatArray> weight;
-    weight->SetName(this->BoneWeightsCompactArrayName.c_str());
+    weight->SetName(names::BoneWeightsCompact);
     weight->SetNumberOfComponents(this->Influences);
     weight->SetNumberOfTuples(points);
     for (std::size_t e = 0; e < compact.bone.size(); ++e)
@@ -229,11 +218,11 @@ int vtkBiharmonicSkinWeights::RequestData(
     }
     data->AddArray(bone);
     data->AddArray(weight);
-    vtkCoronary::AddArray<vtkFloatArray>(data, this->DroppedWeightArrayName, compact.dropped);
+    vtkCoronary::AddArray<vtkFloatArray>(data, names::DroppedWeight, compact.dropped);
     if (this->Dense)
     {
       vtkNew<vtkDoubleArray> dense;
-      dense->SetName(this->BoneWeightsArrayName.c_str());
+      dense->SetName(names::BoneWeights);
       dense->SetNumberOfComponents(static_cast<int>(weights.bones));
       dense->SetNumberOfTuples(points);
       dense->Fill(0.0);
@@ -252,7 +241,7 @@ int vtkBiharmonicSkinWeights::RequestData(
     }
 
     vtkFieldData* field = output->GetFieldData();
-    vtkCoronary::AddArray<vtkStringArray>(field, this->BoneNameArrayName, boneNames);
+    vtkCoronary::AddArray<vtkStringArray>(field, names::BoneName, boneNames);
     vtkCoronary::AddArray<vtkIntArray>(
       field, names::WeightsConverged, std::vector<int>{ weights.converged ? 1 : 0 });
     vtkCoronary::AddArray<vtkIntArray>(
@@ -291,9 +280,4 @@ void vtkBiharmonicSkinWeights::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Influences: " << this->Influences << "\n";
   os << indent << "Dense: " << this->Dense << "\n";
   os << indent << "CacheFolder: " << this->CacheFolder << "\n";
-  os << indent << "BoneWeightsArrayName: " << this->BoneWeightsArrayName << "\n";
-  os << indent << "BoneIndicesArrayName: " << this->BoneIndicesArrayName << "\n";
-  os << indent << "BoneWeightsCompactArrayName: " << this->BoneWeightsCompactArrayName << "\n";
-  os << indent << "DroppedWeightArrayName: " << this->DroppedWeightArrayName << "\n";
-  os << indent << "BoneNameArrayName: " << this->BoneNameArrayName << "\n";
 }

@@ -165,22 +165,6 @@ public:
   vtkGetCharFromStdStringMacro(CacheFolder);
   ///@}
 
-  ///@{
-  /**
-   * Names of the arrays. Defaults as listed above.
-   */
-  vtkSetStdStringFromCharMacro(BoneWeightsArrayName);
-  vtkGetCharFromStdStringMacro(BoneWeightsArrayName);
-  vtkSetStdStringFromCharMacro(BoneIndicesArrayName);
-  vtkGetCharFromStdStringMacro(BoneIndicesArrayName);
-  vtkSetStdStringFromCharMacro(BoneWeightsCompactArrayName);
-  vtkGetCharFromStdStringMacro(BoneWeightsCompactArrayName);
-  vtkSetStdStringFromCharMacro(DroppedWeightArrayName);
-  vtkGetCharFromStdStringMacro(DroppedWeightArrayName);
-  vtkSetStdStringFromCharMacro(BoneNameArrayName);
-  vtkGetCharFromStdStringMacro(BoneNameArrayName);
-  ///@}
-
 protected:
   vtkBiharmonicSkinWeights();
   ~vtkBiharmonicSkinWeights() override = default;
@@ -206,11 +190,6 @@ private:
   int Influences = 8;
   bool Dense = false;
   std::string CacheFolder;
-  std::string BoneWeightsArrayName;
-  std::string BoneIndicesArrayName;
-  std::string BoneWeightsCompactArrayName;
-  std::string DroppedWeightArrayName;
-  std::string BoneNameArrayName;
 };
 
 #endif

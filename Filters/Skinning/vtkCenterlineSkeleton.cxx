@@ -47,11 +47,6 @@ auto OfBones(const Skeleton& skeleton, const Get& get)
 }
 
 vtkCenterlineSkeleton::vtkCenterlineSkeleton()
-  : ParentJointArrayName(names::ParentJoint)
-  , RadiusArrayName(names::Radius)
-  , AbscissasArrayName(names::Abscissas)
-  , BoneIdArrayName(names::BoneId)
-  , BoneNameArrayName(names::BoneName)
 {
 }
 
@@ -67,23 +62,6 @@ int vtkCenterlineSkeleton::RequestUpdateExtent(
 {
   vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
   return 1;
-}
-
-std::string vtkCenterlineSkeleton::FindRadius(vtkPolyData* input) const
-{
-  if (!this->InputRadiusArrayName.empty() && this->InputRadiusArrayName != "Automatic")
-  {
-    return this->InputRadiusArrayName;
-  }
-  for (const char* name : { names::Radius, "Radius" })
-  {
-    if (input->GetPointData()->GetArray(name) != nullptr)
-    {
-      return name;
-    }
-  }
-  throw std::invalid_argument(
-    "The centerlines have no point array MaximumInscribedSphereRadius or Radius");
 }
 
 int vtkCenterlineSkeleton::RequestData(
@@ -104,11 +82,6 @@ int vtkCenterlineSkeleton::RequestData(
     settings.sagittaRatio = this->SagittaRatio;
     settings.everyStep = this->EveryStep;
     settings.Validate();
-    for (const std::string* name : { &this->ParentJointArrayName, &this->RadiusArrayName,
-           &this->AbscissasArrayName, &this->BoneIdArrayName, &this->BoneNameArrayName })
-    {
-      vtkCoronary::Require(!name->empty(), "An output array needs a name");
-    }
     if (input->GetNumberOfLines() == 0)
     {
       return 1;
@@ -116,7 +89,7 @@ int vtkCenterlineSkeleton::RequestData(
     vtkCoronary::Require(vtkCoronary::FormOf(input) == vtkCoronary::CenterlineForm::Tree,
       "The lines are no tree (cell arrays GroupIds and ParentGroupIds): make one of them with "
       "vtkCoronaryTreeTopology");
-    coronary::CenterlineTree tree = vtkCoronary::TreeOf(input, this->FindRadius(input));
+    coronary::CenterlineTree tree = vtkCoronary::TreeOf(input);
     vtkDataArray* segments = input->GetPointData()->GetArray(names::SegmentIds);
     for (vtkIdType i = 0; segments != nullptr && i < segments->GetNumberOfTuples(); ++i)
     {
@@ -140,13 +113,13 @@ int vtkCenterlineSkeleton::RequestData(
     output->SetPoints(points);
     output->SetLines(lines);
     vtkPointData* data = output->GetPointData();
-    vtkCoronary::AddArray<vtkIdTypeArray>(data, this->ParentJointArrayName, skeleton.parent);
-    vtkCoronary::AddArray<vtkDoubleArray>(data, this->RadiusArrayName, skeleton.radius);
-    vtkCoronary::AddArray<vtkDoubleArray>(data, this->AbscissasArrayName, skeleton.abscissa);
+    vtkCoronary::AddArray<vtkIdTypeArray>(data, names::ParentJoint, skeleton.parent);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, names::Radius, skeleton.radius);
+    vtkCoronary::AddArray<vtkDoubleArray>(data, names::Abscissas, skeleton.abscissa);
     using Bone = Skeleton::Bone;
     vtkCellData* cells = output->GetCellData();
     vtkCoronary::AddArray<vtkIntArray>(
-      cells, this->BoneIdArrayName, OfBones(skeleton, [](const Bone& b) { return b.id; }));
+      cells, names::BoneId, OfBones(skeleton, [](const Bone& b) { return b.id; }));
     vtkCoronary::AddArray<vtkIntArray>(
       cells, names::GroupIds, OfBones(skeleton, [](const Bone& b) { return b.groupId; }));
     vtkCoronary::AddArray<vtkIntArray>(
@@ -156,7 +129,7 @@ int vtkCenterlineSkeleton::RequestData(
     vtkCoronary::AddArray<vtkDoubleArray>(
       cells, names::Length, OfBones(skeleton, [](const Bone& b) { return b.length; }));
     output->GetFieldData()->PassData(input->GetFieldData());
-    vtkCoronary::AddArray<vtkStringArray>(output->GetFieldData(), this->BoneNameArrayName,
+    vtkCoronary::AddArray<vtkStringArray>(output->GetFieldData(), names::BoneName,
       OfBones(skeleton, [](const Bone& b) { return vtkStdString(b.name); }));
     this->UpdateProgress(1.0);
     return 1;
@@ -175,10 +148,4 @@ void vtkCenterlineSkeleton::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "RadiusFactor: " << this->RadiusFactor << "\n";
   os << indent << "SagittaRatio: " << this->SagittaRatio << "\n";
   os << indent << "EveryStep: " << this->EveryStep << "\n";
-  os << indent << "InputRadiusArrayName: " << this->InputRadiusArrayName << "\n";
-  os << indent << "ParentJointArrayName: " << this->ParentJointArrayName << "\n";
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n";
-  os << indent << "AbscissasArrayName: " << this->AbscissasArrayName << "\n";
-  os << indent << "BoneIdArrayName: " << this->BoneIdArrayName << "\n";
-  os << indent << "BoneNameArrayName: " << this->BoneNameArrayName << "\n";
 }

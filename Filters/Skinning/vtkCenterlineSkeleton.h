@@ -92,31 +92,6 @@ public:
   vtkBooleanMacro(EveryStep, bool);
   ///@}
 
-  ///@{
-  /**
-   * Name of the input's point array with the radius. `Automatic`, the default:
-   * `MaximumInscribedSphereRadius`, or `Radius` where there is no such array.
-   */
-  vtkSetStdStringFromCharMacro(InputRadiusArrayName);
-  vtkGetCharFromStdStringMacro(InputRadiusArrayName);
-  ///@}
-
-  ///@{
-  /**
-   * Names of the output's arrays. Defaults as listed above.
-   */
-  vtkSetStdStringFromCharMacro(ParentJointArrayName);
-  vtkGetCharFromStdStringMacro(ParentJointArrayName);
-  vtkSetStdStringFromCharMacro(RadiusArrayName);
-  vtkGetCharFromStdStringMacro(RadiusArrayName);
-  vtkSetStdStringFromCharMacro(AbscissasArrayName);
-  vtkGetCharFromStdStringMacro(AbscissasArrayName);
-  vtkSetStdStringFromCharMacro(BoneIdArrayName);
-  vtkGetCharFromStdStringMacro(BoneIdArrayName);
-  vtkSetStdStringFromCharMacro(BoneNameArrayName);
-  vtkGetCharFromStdStringMacro(BoneNameArrayName);
-  ///@}
-
 protected:
   vtkCenterlineSkeleton();
   ~vtkCenterlineSkeleton() override = default;
@@ -132,19 +107,11 @@ private:
   vtkCenterlineSkeleton(const vtkCenterlineSkeleton&) = delete;
   void operator=(const vtkCenterlineSkeleton&) = delete;
 
-  std::string FindRadius(vtkPolyData* input) const;
-
   double MinimumLength = 3.0;
   double MaximumLength = 8.0;
   double RadiusFactor = 3.0;
   double SagittaRatio = 0.25;
   bool EveryStep = false;
-  std::string InputRadiusArrayName = "Automatic";
-  std::string ParentJointArrayName;
-  std::string RadiusArrayName;
-  std::string AbscissasArrayName;
-  std::string BoneIdArrayName;
-  std::string BoneNameArrayName;
 };
 
 #endif

@@ -56,16 +56,10 @@ vtkIdType FirstLine(vtkPolyData* data)
 }
 }
 
+namespace names = vtkCoronaryArrayNames;
+
 namespace vtkSkeletonForms
 {
-void PoseArrays::Validate() const
-{
-  for (const std::string* name : { &this->rotation, &this->twist, &this->strain, &this->calibre })
-  {
-    Require(!name->empty(), "An array needs a name");
-  }
-}
-
 Skeleton SkeletonOf(
   vtkPolyData* data, const std::string& whose, const coronary::ProgressCallback& progress)
 {
@@ -109,8 +103,8 @@ Skeleton SkeletonOf(
   return skeleton;
 }
 
-SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const PoseArrays& names,
-  const coronary::ProgressCallback& progress)
+SkeletonPose PoseOf(
+  vtkPolyData* data, const coronary::SkeletonRig& rig, const coronary::ProgressCallback& progress)
 {
   const Skeleton& rest = rig.Rest();
   Require(data->GetNumberOfPoints() == rig.NumberOfJoints() &&
@@ -139,7 +133,8 @@ SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const P
   }
   const vtkIdType first = FirstLine(data);
   const vtkIdType bones = rig.NumberOfBones();
-  if (vtkDataArray* rotations = FindArray(data->GetCellData(), names.rotation, 4, first + bones))
+  if (vtkDataArray* rotations =
+        FindArray(data->GetCellData(), names::BoneRotation, 4, first + bones))
   {
     for (vtkIdType n = first; n < first + bones; ++n)
     {
@@ -148,14 +143,15 @@ SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig, const P
     }
   }
   pose.twist =
-    ValuesOf(FindArray(data->GetCellData(), names.twist, 1, first + bones), first, bones);
-  pose.calibre = ValuesOf(FindArray(data->GetPointData(), names.calibre, 1, rig.NumberOfJoints()),
-    0, rig.NumberOfJoints());
+    ValuesOf(FindArray(data->GetCellData(), names::BoneTwist, 1, first + bones), first, bones);
+  pose.calibre =
+    ValuesOf(FindArray(data->GetPointData(), names::CalibreFactor, 1, rig.NumberOfJoints()), 0,
+      rig.NumberOfJoints());
   return pose;
 }
 
 void SetPose(vtkPolyData* rest, const SkeletonPose& pose,
-  const std::vector<coronary::BoneTransform>& bones, const PoseArrays& names, vtkPolyData* output,
+  const std::vector<coronary::BoneTransform>& bones, vtkPolyData* output,
   const coronary::ProgressCallback& progress)
 {
   const auto joints = static_cast<vtkIdType>(pose.joints.size());
@@ -181,9 +177,9 @@ void SetPose(vtkPolyData* rest, const SkeletonPose& pose,
     output->GetCellData()->AddArray(array);
     return array.Get();
   };
-  vtkDoubleArray* rotation = makeArray(names.rotation, 4);
-  vtkDoubleArray* twist = makeArray(names.twist, 1);
-  vtkDoubleArray* strain = makeArray(names.strain, 1);
+  vtkDoubleArray* rotation = makeArray(names::BoneRotation, 4);
+  vtkDoubleArray* twist = makeArray(names::BoneTwist, 1);
+  vtkDoubleArray* strain = makeArray(names::AxialStrain, 1);
   for (std::size_t n = 0; n < bones.size(); ++n)
   {
     const vtkIdType cell = first + static_cast<vtkIdType>(n);
@@ -195,6 +191,6 @@ void SetPose(vtkPolyData* rest, const SkeletonPose& pose,
   }
   std::vector<double> calibre = pose.calibre;
   calibre.resize(pose.joints.size(), 1.0);
-  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names.calibre, calibre);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::CalibreFactor, calibre);
 }
 }

@@ -15,18 +15,6 @@ class vtkPolyData;
 
 namespace vtkSkeletonForms
 {
-/// Names of the arrays of a pose.
-struct PoseArrays
-{
-  std::string rotation;
-  std::string twist;
-  std::string strain;
-  std::string calibre;
-
-  /// @throws std::invalid_argument when one of them is empty
-  void Validate() const;
-};
-
 /**
  * Bones are the lines in their order. `ParentJoint`, where it is there, says which end is on the root's side;
  * else it is the first one.
@@ -37,15 +25,15 @@ coronary::Skeleton SkeletonOf(
   vtkPolyData* data, const std::string& whose, const coronary::ProgressCallback& progress = {});
 
 /**
- * The points, and of the arrays of `names` what is there.
+ * The points, and of the arrays of a pose what is there.
  * @throws std::invalid_argument: other bones than the rest skeleton's, an array of wrong form
  */
 coronary::SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig,
-  const PoseArrays& names, const coronary::ProgressCallback& progress = {});
+  const coronary::ProgressCallback& progress = {});
 
 /// Makes `output` the skeleton `rest`, posed: its cells and arrays, other points, arrays of the pose.
 void SetPose(vtkPolyData* rest, const coronary::SkeletonPose& pose,
-  const std::vector<coronary::BoneTransform>& bones, const PoseArrays& names, vtkPolyData* output,
+  const std::vector<coronary::BoneTransform>& bones, vtkPolyData* output,
   const coronary::ProgressCallback& progress = {});
 }
 

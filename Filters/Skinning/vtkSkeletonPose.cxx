@@ -77,10 +77,6 @@ vtkDoubleArray* vtkSkeletonPose::GetMoveAsEdit()
 }
 
 vtkSkeletonPose::vtkSkeletonPose()
-  : RotationArrayName(names::BoneRotation)
-  , TwistArrayName(names::BoneTwist)
-  , StrainArrayName(names::AxialStrain)
-  , CalibreArrayName(names::CalibreFactor)
 {
   this->SetNumberOfInputPorts(2);
 }
@@ -195,9 +191,6 @@ int vtkSkeletonPose::RequestData(
   this->MoveAsEdit->SetNumberOfValues(0);
   try
   {
-    const vtkSkeletonForms::PoseArrays arrays{ this->RotationArrayName, this->TwistArrayName,
-      this->StrainArrayName, this->CalibreArrayName };
-    arrays.Validate();
     if (input->GetNumberOfPoints() == 0)
     {
       return 1;
@@ -207,7 +200,7 @@ int vtkSkeletonPose::RequestData(
       progress, { 4.0, start ? 2.0 : 0.0, static_cast<double>(this->Edits.size()), 4.0 });
     const coronary::SkeletonRig rig(vtkSkeletonForms::SkeletonOf(input, "the skeleton", parts(0)));
     coronary::SkeletonPose pose =
-      start ? vtkSkeletonForms::PoseOf(start, rig, arrays, parts(1)) : rig.RestPose();
+      start ? vtkSkeletonForms::PoseOf(start, rig, parts(1)) : rig.RestPose();
     const coronary::ProgressCallback editProgress = parts(2);
     coronary::LoopReport report(editProgress, static_cast<std::int64_t>(this->Edits.size()));
     for (std::size_t n = 0; n < this->Edits.size(); ++n)
@@ -229,7 +222,7 @@ int vtkSkeletonPose::RequestData(
     }
     std::vector<coronary::BoneTransform> bones;
     rig.Transform(pose, bones);
-    vtkSkeletonForms::SetPose(input, pose, bones, arrays, output, parts(3));
+    vtkSkeletonForms::SetPose(input, pose, bones, output, parts(3));
     if (start)
     {
       output->GetFieldData()->PassData(start->GetFieldData());
@@ -277,8 +270,4 @@ void vtkSkeletonPose::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MoveMode: " << this->MoveMode << '\n';
   os << indent << "JointRotation: " << this->JointRotation[0] << ' ' << this->JointRotation[1]
      << ' ' << this->JointRotation[2] << '\n';
-  os << indent << "RotationArrayName: " << this->RotationArrayName << '\n';
-  os << indent << "TwistArrayName: " << this->TwistArrayName << '\n';
-  os << indent << "StrainArrayName: " << this->StrainArrayName << '\n';
-  os << indent << "CalibreArrayName: " << this->CalibreArrayName << '\n';
 }

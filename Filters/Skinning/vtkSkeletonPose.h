@@ -136,20 +136,6 @@ public:
    */
   vtkDoubleArray* GetMoveAsEdit();
 
-  ///@{
-  /**
-   * Names of the arrays. Defaults `BoneRotation`, `BoneTwist`, `AxialStrain`, `CalibreFactor`.
-   */
-  vtkSetMacro(RotationArrayName, std::string);
-  vtkGetMacro(RotationArrayName, std::string);
-  vtkSetMacro(TwistArrayName, std::string);
-  vtkGetMacro(TwistArrayName, std::string);
-  vtkSetMacro(StrainArrayName, std::string);
-  vtkGetMacro(StrainArrayName, std::string);
-  vtkSetMacro(CalibreArrayName, std::string);
-  vtkGetMacro(CalibreArrayName, std::string);
-  ///@}
-
 protected:
   vtkSkeletonPose();
   ~vtkSkeletonPose() override;
@@ -176,10 +162,6 @@ private:
   double JointRotation[3] = { 0.0, 0.0, 0.0 };
   vtkNew<vtkDoubleArray> JointPlaces;
   vtkNew<vtkDoubleArray> MoveAsEdit;
-  std::string RotationArrayName;
-  std::string TwistArrayName;
-  std::string StrainArrayName;
-  std::string CalibreArrayName;
 };
 
 #endif

@@ -307,7 +307,7 @@ Setup& vtkSkinDeformation::Internals::Make(const Origin& origin, vtkSkinDeformat
   settings.blend = static_cast<coronary::SkinBlend>(self->Blend);
   settings.stretch = self->Stretch;
   setup.skin = std::make_unique<coronary::SkinDeformation>(points,
-    WeightsOf(mesh, self->IndicesArrayName, self->WeightsArrayName, parts(1)),
+    WeightsOf(mesh, names::BoneIndices, names::BoneWeightsCompact, parts(1)),
     vtkSkeletonForms::SkeletonOf(rest, "the skeleton at rest"), settings, parts(2));
   this->Setups.push_front(std::move(setup));
   ++this->NumberOfSetups;
@@ -321,14 +321,7 @@ Setup& vtkSkinDeformation::Internals::Make(const Origin& origin, vtkSkinDeformat
 vtkStandardNewMacro(vtkSkinDeformation);
 
 vtkSkinDeformation::vtkSkinDeformation()
-  : IndicesArrayName(names::BoneIndices)
-  , WeightsArrayName(names::BoneWeightsCompact)
-  , RotationArrayName(names::BoneRotation)
-  , TwistArrayName(names::BoneTwist)
-  , CalibreArrayName(names::CalibreFactor)
-  , DisplacementArrayName(names::Displacement)
-  , VelocityArrayName(names::Velocity)
-  , Data(new Internals)
+  : Data(new Internals)
 {
   this->SetNumberOfInputPorts(3);
 }
@@ -447,8 +440,8 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
   Origin origin;
   origin.settings = { this->Blend, this->Stretch ? 1 : 0 };
   origin.Add(mesh->GetPoints());
-  origin.Add(WeightArray(mesh, this->IndicesArrayName));
-  origin.Add(WeightArray(mesh, this->WeightsArrayName));
+  origin.Add(WeightArray(mesh, names::BoneIndices));
+  origin.Add(WeightArray(mesh, names::BoneWeightsCompact));
   origin.Add(rest->GetPoints());
   origin.Add(rest->GetLines());
   origin.Add(rest->GetPointData()->GetAbstractArray(names::ParentJoint));
@@ -495,9 +488,6 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
       coronary::PartOf(part, 0.3, 1.0));
     setup.hasTetrahedra = true;
   }
-  const vtkSkeletonForms::PoseArrays arrays{ this->RotationArrayName, this->TwistArrayName,
-    names::AxialStrain, this->CalibreArrayName };
-  arrays.Validate();
 
   const auto makeArray = [&](const char* name)
   {
@@ -509,7 +499,7 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
   };
   const auto deform = [&](vtkPolyData* pose, Array* positions, Part part)
   {
-    skin.Rig().Transform(vtkSkeletonForms::PoseOf(pose, skin.Rig(), arrays), setup.bones);
+    skin.Rig().Transform(vtkSkeletonForms::PoseOf(pose, skin.Rig()), setup.bones);
     skin.Rig().ConserveVolume(this->VolumeConservation, setup.bones);
     skin.Deform(setup.bones, positions->GetPointer(0), parts(part));
   };
@@ -520,7 +510,7 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
   if (stencil.Exists())
   {
     const auto other = makeArray(nullptr);
-    velocity = makeArray(this->VelocityArrayName.c_str());
+    velocity = makeArray(names::Velocity);
     deform(stencil.first.pose, other, Earlier);
     deform(stencil.second.pose, velocity, Later);
     deform(pose, positions, Deforming);
@@ -617,7 +607,7 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
                       << ": see the field array InvertedTetrahedra");
     }
   }
-  const auto displacement = makeArray(this->DisplacementArrayName.c_str());
+  const auto displacement = makeArray(names::Displacement);
   skin.Displacements(positions->GetPointer(0), displacement->GetPointer(0), parts(Displacing));
   output->GetPointData()->AddArray(displacement);
   if (velocity)
@@ -663,10 +653,6 @@ int vtkSkinDeformation::RequestData(
       "VolumeConservation must be 0 to 1");
     Require(this->LeastVolumeRatio >= 0.0 && this->LeastVolumeRatio <= 0.5,
       "LeastVolumeRatio must be 0 to 0.5");
-    for (const std::string* name : { &this->DisplacementArrayName, &this->VelocityArrayName })
-    {
-      Require(!name->empty(), "An output array needs a name");
-    }
     Stencil stencil;
     if (this->ComputeVelocity && mesh->GetNumberOfElements(vtkDataObject::POINT) > 0)
     {
@@ -726,11 +712,4 @@ void vtkSkinDeformation::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ComputeNormals: " << this->ComputeNormals << '\n';
   os << indent << "Tetrahedra: " << this->Tetrahedra << '\n';
   os << indent << "LeastVolumeRatio: " << this->LeastVolumeRatio << '\n';
-  os << indent << "IndicesArrayName: " << this->IndicesArrayName << '\n';
-  os << indent << "WeightsArrayName: " << this->WeightsArrayName << '\n';
-  os << indent << "RotationArrayName: " << this->RotationArrayName << '\n';
-  os << indent << "TwistArrayName: " << this->TwistArrayName << '\n';
-  os << indent << "CalibreArrayName: " << this->CalibreArrayName << '\n';
-  os << indent << "DisplacementArrayName: " << this->DisplacementArrayName << '\n';
-  os << indent << "VelocityArrayName: " << this->VelocityArrayName << '\n';
 }

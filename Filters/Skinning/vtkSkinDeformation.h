@@ -156,33 +156,6 @@ public:
   vtkGetMacro(LeastVolumeRatio, double);
   ///@}
 
-  ///@{
-  /**
-   * Names of the arrays read. Defaults `BoneIndices`, `BoneWeightsCompact`, `BoneRotation`,
-   * `BoneTwist`, `CalibreFactor`.
-   */
-  vtkSetMacro(IndicesArrayName, std::string);
-  vtkGetMacro(IndicesArrayName, std::string);
-  vtkSetMacro(WeightsArrayName, std::string);
-  vtkGetMacro(WeightsArrayName, std::string);
-  vtkSetMacro(RotationArrayName, std::string);
-  vtkGetMacro(RotationArrayName, std::string);
-  vtkSetMacro(TwistArrayName, std::string);
-  vtkGetMacro(TwistArrayName, std::string);
-  vtkSetMacro(CalibreArrayName, std::string);
-  vtkGetMacro(CalibreArrayName, std::string);
-  ///@}
-
-  ///@{
-  /**
-   * Names of the arrays made. Defaults `Displacement`, `Velocity`.
-   */
-  vtkSetMacro(DisplacementArrayName, std::string);
-  vtkGetMacro(DisplacementArrayName, std::string);
-  vtkSetMacro(VelocityArrayName, std::string);
-  vtkGetMacro(VelocityArrayName, std::string);
-  ///@}
-
   /// For tests: how often a mesh and its weights were read.
   int GetNumberOfSetups() const;
 
@@ -220,13 +193,6 @@ private:
   bool ComputeNormals = false;
   int Tetrahedra = RepairTetrahedra;
   double LeastVolumeRatio = 0.0;
-  std::string IndicesArrayName;
-  std::string WeightsArrayName;
-  std::string RotationArrayName;
-  std::string TwistArrayName;
-  std::string CalibreArrayName;
-  std::string DisplacementArrayName;
-  std::string VelocityArrayName;
   std::unique_ptr<Internals> Data;
 };
 

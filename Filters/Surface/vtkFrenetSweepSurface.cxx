@@ -111,10 +111,10 @@ public:
       return;
     }
     vtkCellData* cells = input->GetCellData();
-    vtkDataArray* groups = cells->GetArray(self.GroupIdsArrayName.c_str());
-    vtkDataArray* ids = cells->GetArray(self.SegmentIdsArrayName.c_str());
+    vtkDataArray* groups = cells->GetArray(vtkCoronaryArrayNames::GroupIds);
+    vtkDataArray* ids = cells->GetArray(vtkCoronaryArrayNames::SegmentIds);
     auto* labels =
-      vtkStringArray::SafeDownCast(cells->GetAbstractArray(self.SegmentLabelArrayName.c_str()));
+      vtkStringArray::SafeDownCast(cells->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
     this->hasSegmentIds = ids != nullptr;
     this->hasLabels = labels != nullptr;
     if (!wanted || input->GetNumberOfLines() == 0)
@@ -169,27 +169,8 @@ private:
 
   void ReadPoints(const vtkFrenetSweepSurface& self, vtkPolyData* input, bool hasImage)
   {
-    vtkPointData* data = input->GetPointData();
-    const bool automatic =
-      self.InputRadiusArrayName.empty() || self.InputRadiusArrayName == "Automatic";
-    vtkDataArray* radius =
-      data->GetArray(automatic ? vtkCoronaryArrayNames::Radius : self.InputRadiusArrayName.c_str());
-    if (radius == nullptr && automatic)
-    {
-      radius = data->GetArray("Radius");
-    }
-    if (radius == nullptr)
-    {
-      throw std::invalid_argument(automatic
-          ? "The input has no point array MaximumInscribedSphereRadius or Radius"
-          : "The input has no point array " + self.InputRadiusArrayName);
-    }
+    vtkDataArray* radius = vtkCoronary::RadiusOf(input, "The input has", self.InputRadiusArrayName);
     const vtkIdType count = input->GetNumberOfPoints();
-    if (radius->GetNumberOfComponents() != 1)
-    {
-      throw std::invalid_argument("The radius array " + std::string(radius->GetName()) +
-        " must have one value for each point");
-    }
     this->tree.points.resize(count);
     this->tree.radius.resize(count);
     for (vtkIdType i = 0; i < count; ++i)
@@ -216,7 +197,7 @@ private:
       return;
     }
     vtkDataArray* contours = Find(input, self.ContourArrayName);
-    vtkDataArray* normals = Find(input, self.ContourNormalArrayName);
+    vtkDataArray* normals = Find(input, vtkCoronaryArrayNames::FrenetNormal);
     const int samples = contours->GetNumberOfComponents();
     if (samples < 6)
     {
@@ -225,8 +206,8 @@ private:
     }
     if (normals->GetNumberOfComponents() != 3)
     {
-      throw std::invalid_argument(
-        "The contour normals " + self.ContourNormalArrayName + " must have 3 components");
+      throw std::invalid_argument(std::string("The contour normals ") +
+        vtkCoronaryArrayNames::FrenetNormal + " must have 3 components");
     }
     this->tree.contourSamples = samples;
     this->tree.contours.resize(static_cast<std::size_t>(count) * samples);
@@ -293,15 +274,15 @@ public:
     }
     output->SetPolys(triangles);
     vtkPointData* points = output->GetPointData();
-    points->AddArray(MakeArray<vtkIntArray>(this->Self.GroupIdsArrayName, s.groupId));
-    points->AddArray(MakeArray<vtkDoubleArray>(this->Self.AbscissasArrayName, s.abscissa));
-    points->AddArray(MakeArray<vtkDoubleArray>(this->Self.RadiusArrayName, s.radius));
-    points->AddArray(MakeArray<vtkDoubleArray>(this->Self.WallCurvatureArrayName, s.curvature));
-    points->AddArray(MakeArray<vtkDoubleArray>(this->Self.EdgeLengthArrayName, s.edgeLength));
+    points->AddArray(MakeArray<vtkIntArray>(vtkCoronaryArrayNames::GroupIds, s.groupId));
+    points->AddArray(MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::Abscissas, s.abscissa));
+    points->AddArray(MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::Radius, s.radius));
+    points->AddArray(MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::WallCurvature, s.curvature));
+    points->AddArray(MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::EdgeLength, s.edgeLength));
     points->SetNormals(MakeVectors("Normals", s.normals));
     vtkCellData* cells = output->GetCellData();
-    cells->AddArray(MakeArray<vtkIntArray>(this->Self.CellEntityIdsArrayName, s.entityId));
-    cells->AddArray(MakeArray<vtkIntArray>(this->Self.GroupIdsArrayName, group));
+    cells->AddArray(MakeArray<vtkIntArray>(vtkCoronaryArrayNames::CellEntityIds, s.entityId));
+    cells->AddArray(MakeArray<vtkIntArray>(vtkCoronaryArrayNames::GroupIds, group));
     this->AddSegments(cells, group);
   }
 
@@ -392,8 +373,8 @@ public:
           name, spread(Collect(patches.centres, [=](const Station& s) { return s.*member; }))));
       };
       data->AddArray(
-        MakeArray<vtkDoubleArray>(this->Self.AbscissasArrayName, spread(patches.abscissa)));
-      numbers(this->Self.RadiusArrayName, &Station::radius);
+        MakeArray<vtkDoubleArray>(vtkCoronaryArrayNames::Abscissas, spread(patches.abscissa)));
+      numbers(vtkCoronaryArrayNames::Radius, &Station::radius);
       vectors(names::PatchCentre, &Station::point);
       vectors(names::FrenetTangent, &Station::tangent);
       vectors(names::FrenetNormal, &Station::normal);
@@ -402,8 +383,8 @@ public:
         spread(Collect(patches.centres, [](const Station& s) { return s.curvature.norm(); }))));
       numbers(names::Torsion, &Station::torsion);
       numbers(names::FrameTwist, &Station::twist);
-      grid->GetFieldData()->AddArray(
-        MakeArray<vtkIntArray>(this->Self.GroupIdsArrayName, std::vector<int>{ patches.groupId }));
+      grid->GetFieldData()->AddArray(MakeArray<vtkIntArray>(
+        vtkCoronaryArrayNames::GroupIds, std::vector<int>{ patches.groupId }));
       output->SetBlock(block, grid);
       const auto label = this->From.segmentLabels.find(patches.groupId);
       const std::string name = label != this->From.segmentLabels.end() && !label->second.empty()
@@ -427,14 +408,14 @@ public:
     }
     output->SetVerts(vertices);
     vtkPointData* data = output->GetPointData();
-    data->AddArray(MakeArray<vtkIntArray>(this->Self.CellEntityIdsArrayName,
+    data->AddArray(MakeArray<vtkIntArray>(vtkCoronaryArrayNames::CellEntityIds,
       Collect(caps, [](const SweepCap& c) { return c.entityId; })));
     const std::vector<int> groups = Collect(caps, [](const SweepCap& c) { return c.groupId; });
-    data->AddArray(MakeArray<vtkIntArray>(this->Self.GroupIdsArrayName, groups));
+    data->AddArray(MakeArray<vtkIntArray>(vtkCoronaryArrayNames::GroupIds, groups));
     data->AddArray(
       MakeVectors(names::CapNormal, Collect(caps, [](const SweepCap& c) { return c.normal; })));
     data->AddArray(MakeArray<vtkDoubleArray>(
-      this->Self.RadiusArrayName, Collect(caps, [](const SweepCap& c) { return c.radius; })));
+      vtkCoronaryArrayNames::Radius, Collect(caps, [](const SweepCap& c) { return c.radius; })));
     data->AddArray(MakeArray<vtkIntArray>(
       names::IsInlet, Collect(caps, [](const SweepCap& c) { return c.inlet ? 1 : 0; })));
     this->AddSegments(data, groups);
@@ -450,12 +431,12 @@ private:
     };
     if (this->From.hasSegmentIds)
     {
-      data->AddArray(MakeArray<vtkIntArray>(this->Self.SegmentIdsArrayName,
+      data->AddArray(MakeArray<vtkIntArray>(vtkCoronaryArrayNames::SegmentIds,
         Collect(groups, [&](int group) { return of(this->From.segmentIds, group, 0); })));
     }
     if (this->From.hasLabels)
     {
-      data->AddArray(MakeArray<vtkStringArray>(this->Self.SegmentLabelArrayName,
+      data->AddArray(MakeArray<vtkStringArray>(vtkCoronaryArrayNames::SegmentLabel,
         Collect(
           groups, [&](int group) { return of(this->From.segmentLabels, group, vtkStdString()); })));
     }
@@ -467,15 +448,6 @@ private:
 };
 
 vtkFrenetSweepSurface::vtkFrenetSweepSurface()
-  : ContourNormalArrayName(vtkCoronaryArrayNames::FrenetNormal)
-  , GroupIdsArrayName(vtkCoronaryArrayNames::GroupIds)
-  , SegmentIdsArrayName(vtkCoronaryArrayNames::SegmentIds)
-  , SegmentLabelArrayName(vtkCoronaryArrayNames::SegmentLabel)
-  , RadiusArrayName(vtkCoronaryArrayNames::Radius)
-  , AbscissasArrayName(vtkCoronaryArrayNames::Abscissas)
-  , CellEntityIdsArrayName(vtkCoronaryArrayNames::CellEntityIds)
-  , WallCurvatureArrayName(vtkCoronaryArrayNames::WallCurvature)
-  , EdgeLengthArrayName(vtkCoronaryArrayNames::EdgeLength)
 {
   this->SetNumberOfInputPorts(2);
   this->SetNumberOfOutputPorts(3);
@@ -601,16 +573,6 @@ int vtkFrenetSweepSurface::RequestData(
     }
     settings.frame = static_cast<coronary::SweepFrame>(this->Frame);
     settings.Validate();
-    for (const std::string* name :
-      { &this->GroupIdsArrayName, &this->SegmentIdsArrayName, &this->SegmentLabelArrayName,
-        &this->RadiusArrayName, &this->AbscissasArrayName, &this->CellEntityIdsArrayName,
-        &this->WallCurvatureArrayName, &this->EdgeLengthArrayName })
-    {
-      if (name->empty())
-      {
-        throw std::invalid_argument("An output array needs a name");
-      }
-    }
     const bool hasImage = inputs[1]->GetNumberOfInformationObjects() > 0;
     Reader reader(*this, input, wanted, hasImage);
     if (hasImage && !reader.tree.branches.empty())
@@ -649,7 +611,6 @@ void vtkFrenetSweepSurface::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ContourArrayName: " << this->ContourArrayName << "\n";
   os << indent << "EndNormalArrayName: " << this->EndNormalArrayName << "\n";
   os << indent << "InputImageArrayName: " << this->InputImageArrayName << "\n";
-  os << indent << "ContourNormalArrayName: " << this->ContourNormalArrayName << "\n";
   os << indent << "MinimumEdgeLength: " << this->MinimumEdgeLength << "\n";
   os << indent << "MaximumEdgeLength: " << this->MaximumEdgeLength << "\n";
   os << indent << "CurvatureWeight: " << this->CurvatureWeight << "\n";
@@ -663,12 +624,4 @@ void vtkFrenetSweepSurface::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Frame: " << this->Frame << "\n";
   os << indent << "PatchSamples: " << this->PatchSamples << "\n";
   os << indent << "PatchSpacing: " << this->PatchSpacing << "\n";
-  os << indent << "GroupIdsArrayName: " << this->GroupIdsArrayName << "\n";
-  os << indent << "SegmentIdsArrayName: " << this->SegmentIdsArrayName << "\n";
-  os << indent << "SegmentLabelArrayName: " << this->SegmentLabelArrayName << "\n";
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n";
-  os << indent << "AbscissasArrayName: " << this->AbscissasArrayName << "\n";
-  os << indent << "CellEntityIdsArrayName: " << this->CellEntityIdsArrayName << "\n";
-  os << indent << "WallCurvatureArrayName: " << this->WallCurvatureArrayName << "\n";
-  os << indent << "EdgeLengthArrayName: " << this->EdgeLengthArrayName << "\n";
 }

@@ -16,7 +16,7 @@
  * ignored. Point data: a positive radius in mm, by default `MaximumInscribedSphereRadius`, or
  * `Radius` where there is no such array. Optional: contours of cross-sections that are not round,
  * ContourArrayName, with as many components as directions (at least 6): radii in mm in equal steps
- * of the angle from ContourNormalArrayName (double[3]) towards tangent x normal;
+ * of the angle from `FrenetNormal` (double[3]) towards tangent x normal;
  * EndNormalArrayName (3 components), normals of the planes that cut the free ends, at most 60
  * degrees off the axis, zero for across the axis. Cell data, optional: `GroupIds` (else the number
  * of the line), `SegmentIds`, `SegmentLabel`.
@@ -118,15 +118,6 @@ public:
    */
   vtkSetStdStringFromCharMacro(ContourArrayName);
   vtkGetCharFromStdStringMacro(ContourArrayName);
-  ///@}
-
-  ///@{
-  /**
-   * Name of the input's point array with the direction of the contours' first radius. Default
-   * `FrenetNormal`.
-   */
-  vtkSetStdStringFromCharMacro(ContourNormalArrayName);
-  vtkGetCharFromStdStringMacro(ContourNormalArrayName);
   ///@}
 
   ///@{
@@ -263,34 +254,6 @@ public:
   vtkGetMacro(PatchSpacing, double);
   ///@}
 
-  ///@{
-  /**
-   * Names of arrays of input and output. Defaults as listed above.
-   */
-  vtkSetStdStringFromCharMacro(GroupIdsArrayName);
-  vtkGetCharFromStdStringMacro(GroupIdsArrayName);
-  vtkSetStdStringFromCharMacro(SegmentIdsArrayName);
-  vtkGetCharFromStdStringMacro(SegmentIdsArrayName);
-  vtkSetStdStringFromCharMacro(SegmentLabelArrayName);
-  vtkGetCharFromStdStringMacro(SegmentLabelArrayName);
-  ///@}
-
-  ///@{
-  /**
-   * Names of arrays of the outputs. Defaults as listed above.
-   */
-  vtkSetStdStringFromCharMacro(RadiusArrayName);
-  vtkGetCharFromStdStringMacro(RadiusArrayName);
-  vtkSetStdStringFromCharMacro(AbscissasArrayName);
-  vtkGetCharFromStdStringMacro(AbscissasArrayName);
-  vtkSetStdStringFromCharMacro(CellEntityIdsArrayName);
-  vtkGetCharFromStdStringMacro(CellEntityIdsArrayName);
-  vtkSetStdStringFromCharMacro(WallCurvatureArrayName);
-  vtkGetCharFromStdStringMacro(WallCurvatureArrayName);
-  vtkSetStdStringFromCharMacro(EdgeLengthArrayName);
-  vtkGetCharFromStdStringMacro(EdgeLengthArrayName);
-  ///@}
-
   vtkMultiBlockDataSet* GetPatches();
   vtkPolyData* GetCaps() { return this->GetOutput(CapPort); }
 
@@ -329,15 +292,6 @@ private:
   std::string ContourArrayName = "None";
   std::string EndNormalArrayName = "None";
   std::string InputImageArrayName = "Automatic";
-  std::string ContourNormalArrayName;
-  std::string GroupIdsArrayName;
-  std::string SegmentIdsArrayName;
-  std::string SegmentLabelArrayName;
-  std::string RadiusArrayName;
-  std::string AbscissasArrayName;
-  std::string CellEntityIdsArrayName;
-  std::string WallCurvatureArrayName;
-  std::string EdgeLengthArrayName;
 
   class Reader;
   class Writer;

@@ -363,10 +363,7 @@ struct vtkFrangiVesselness::Internals
 vtkStandardNewMacro(vtkFrangiVesselness);
 
 vtkFrangiVesselness::vtkFrangiVesselness()
-  : VesselnessArrayName(vtkCoronaryArrayNames::Vesselness)
-  , ScaleArrayName(vtkCoronaryArrayNames::VesselScale)
-  , DirectionArrayName(vtkCoronaryArrayNames::VesselDirection)
-  , Data(new Internals)
+  : Data(new Internals)
 {
   this->Data->Self = this;
   this->SetNumberOfInputPorts(2);
@@ -403,12 +400,6 @@ coronary::VesselnessSettings vtkFrangiVesselness::Internals::Settings() const
   vtkCoronary::Require(
     self.NumberOfScales >= 1 && self.NumberOfScales <= 100, "NumberOfScales must be 1 to 100");
   vtkCoronary::Require(self.MeasurementBlockSize > 0, "MeasurementBlockSize must be positive");
-  for (const std::string* name :
-    { &self.VesselnessArrayName, &self.ScaleArrayName, &self.DirectionArrayName })
-  {
-    vtkCoronary::Require(
-      !name->empty(), "VesselnessArrayName, ScaleArrayName and DirectionArrayName need a name");
-  }
 
   coronary::VesselnessSettings settings;
   settings.method = static_cast<coronary::VesselnessMethod>(self.Method);
@@ -714,17 +705,18 @@ void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkI
     AddField(output, vtkCoronaryArrayNames::VesselnessLambda3, settings.jermanMaxima);
   }
 
-  const vtkSmartPointer<vtkFloatArray> values = NewArray(output, self.VesselnessArrayName, 1);
-  output->GetPointData()->SetActiveScalars(self.VesselnessArrayName.c_str());
+  const vtkSmartPointer<vtkFloatArray> values =
+    NewArray(output, vtkCoronaryArrayNames::Vesselness, 1);
+  output->GetPointData()->SetActiveScalars(vtkCoronaryArrayNames::Vesselness);
   vtkSmartPointer<vtkFloatArray> scales;
   vtkSmartPointer<vtkFloatArray> directions;
   if (self.GenerateScale)
   {
-    scales = NewArray(output, self.ScaleArrayName, 1);
+    scales = NewArray(output, vtkCoronaryArrayNames::VesselScale, 1);
   }
   if (self.GenerateDirection)
   {
-    directions = NewArray(output, self.DirectionArrayName, 3);
+    directions = NewArray(output, vtkCoronaryArrayNames::VesselDirection, 3);
   }
   // In the place of the result if it is all of it.
   std::vector<float> parts[3];
@@ -843,7 +835,4 @@ void vtkFrangiVesselness::PrintSelf(ostream& os, vtkIndent indent)
   std::for_each(this->Region, this->Region + 6, [&](int value) { os << ' ' << value; });
   os << "\n";
   print("MaskArrayName", this->MaskArrayName);
-  print("VesselnessArrayName", this->VesselnessArrayName);
-  print("ScaleArrayName", this->ScaleArrayName);
-  print("DirectionArrayName", this->DirectionArrayName);
 }

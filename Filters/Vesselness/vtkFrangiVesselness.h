@@ -231,18 +231,6 @@ public:
   vtkGetVector6Macro(Region, int);
   ///@}
 
-  ///@{
-  /**
-   * Names of the output arrays. Defaults Vesselness, VesselScale, VesselDirection.
-   */
-  vtkSetStdStringFromCharMacro(VesselnessArrayName);
-  vtkGetCharFromStdStringMacro(VesselnessArrayName);
-  vtkSetStdStringFromCharMacro(ScaleArrayName);
-  vtkGetCharFromStdStringMacro(ScaleArrayName);
-  vtkSetStdStringFromCharMacro(DirectionArrayName);
-  vtkGetCharFromStdStringMacro(DirectionArrayName);
-  ///@}
-
 protected:
   vtkFrangiVesselness();
   ~vtkFrangiVesselness() override;
@@ -281,9 +269,6 @@ private:
   bool UseRegion = false;
   int Region[6] = { 0, 0, 0, 0, 0, 0 };
   std::string MaskArrayName;
-  std::string VesselnessArrayName;
-  std::string ScaleArrayName;
-  std::string DirectionArrayName;
   double UsedC = 0.0;
 
   struct Internals;

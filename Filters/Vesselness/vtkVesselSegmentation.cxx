@@ -191,8 +191,6 @@ std::vector<double> DefaultScales(const Vector3& spacing)
 vtkStandardNewMacro(vtkVesselSegmentation);
 
 vtkVesselSegmentation::vtkVesselSegmentation()
-  : MaskArrayName(vtkCoronaryArrayNames::VesselMask)
-  , ProbabilityArrayName(vtkCoronaryArrayNames::VesselProbability)
 {
   this->SetNumberOfInputPorts(3);
   this->SetNumberOfOutputPorts(4);
@@ -349,8 +347,6 @@ void vtkVesselSegmentation::Execute(
   vtkCoronary::Require(this->AutomaticTubular ||
       (this->TubularVesselness > 0.0 && std::isfinite(this->TubularVesselness)),
     "TubularVesselness must be positive");
-  vtkCoronary::Require(!this->MaskArrayName.empty() && !this->ProbabilityArrayName.empty(),
-    "MaskArrayName and ProbabilityArrayName need a name");
   settings.weak = this->WeakThreshold;
   settings.strong = this->StrongThreshold;
   settings.largestRadius = this->LargestRadius;
@@ -395,8 +391,9 @@ void vtkVesselSegmentation::Execute(
   output->GetFieldData()->PassData(input->GetFieldData());
   if (IsEmpty(whole))
   {
-    Insert<vtkUnsignedCharArray>(output, this->MaskArrayName, std::vector<unsigned char>(), whole);
-    output->GetPointData()->SetActiveScalars(this->MaskArrayName.c_str());
+    Insert<vtkUnsignedCharArray>(
+      output, vtkCoronaryArrayNames::VesselMask, std::vector<unsigned char>(), whole);
+    output->GetPointData()->SetActiveScalars(vtkCoronaryArrayNames::VesselMask);
     return;
   }
   vtkCoronary::Require(whole[0] < whole[1] && whole[2] < whole[3] && whole[4] < whole[5],
@@ -525,11 +522,12 @@ void vtkVesselSegmentation::Execute(
   const coronary::VesselSegmentationResult result =
     coronary::SegmentVessels(image.Image, vesselness, seeds, settings, this->GenerateProbability,
       vtkCoronary::ProgressOf(this, OstiaShare + VesselnessShare, 0.98));
-  Insert<vtkUnsignedCharArray>(output, this->MaskArrayName, result.mask, whole);
-  output->GetPointData()->SetActiveScalars(this->MaskArrayName.c_str());
+  Insert<vtkUnsignedCharArray>(output, vtkCoronaryArrayNames::VesselMask, result.mask, whole);
+  output->GetPointData()->SetActiveScalars(vtkCoronaryArrayNames::VesselMask);
   if (this->GenerateProbability)
   {
-    Insert<vtkFloatArray>(output, this->ProbabilityArrayName, result.probability, whole);
+    Insert<vtkFloatArray>(
+      output, vtkCoronaryArrayNames::VesselProbability, result.probability, whole);
   }
   vtkNew<vtkDoubleArray> window;
   window->SetName(vtkCoronaryArrayNames::BloodWindow);
@@ -646,6 +644,4 @@ void vtkVesselSegmentation::PrintSelf(ostream& os, vtkIndent indent)
   print("LongestGap", this->LongestGap);
   print("LeastLinkConfidence", this->LeastLinkConfidence);
   print("GenerateProbability", this->GenerateProbability);
-  print("MaskArrayName", this->MaskArrayName);
-  print("ProbabilityArrayName", this->ProbabilityArrayName);
 }

@@ -223,16 +223,6 @@ public:
   vtkGetCharFromStdStringMacro(InputVesselnessArrayName);
   ///@}
 
-  ///@{
-  /**
-   * Names of the output arrays. Defaults VesselMask and VesselProbability.
-   */
-  vtkSetStdStringFromCharMacro(MaskArrayName);
-  vtkGetCharFromStdStringMacro(MaskArrayName);
-  vtkSetStdStringFromCharMacro(ProbabilityArrayName);
-  vtkGetCharFromStdStringMacro(ProbabilityArrayName);
-  ///@}
-
 protected:
   vtkVesselSegmentation();
   ~vtkVesselSegmentation() override;
@@ -275,8 +265,6 @@ private:
   bool RefineWall = true;
   bool GenerateProbability = false;
   std::string InputVesselnessArrayName;
-  std::string MaskArrayName;
-  std::string ProbabilityArrayName;
 };
 
 #endif

@@ -41,29 +41,11 @@ vtkStandardNewMacro(vtkTetrahedralMesher);
 
 namespace
 {
-void ReadSkeleton(vtkPolyData* skeleton, const std::string& name, TetrahedralMeshInput& input)
+void ReadSkeleton(vtkPolyData* skeleton, TetrahedralMeshInput& input)
 {
   input.skeletonPoints = vtkCoronary::ReadPoints(skeleton);
-  const bool automatic = name.empty() || name == "Automatic";
-  vtkDataArray* radius =
-    skeleton->GetPointData()->GetArray(automatic ? vtkCoronaryArrayNames::Radius : name.c_str());
-  if (radius == nullptr && automatic)
+  if (vtkDataArray* radius = vtkCoronary::FindRadius(skeleton))
   {
-    radius = skeleton->GetPointData()->GetArray("Radius");
-  }
-  if (radius == nullptr && !automatic)
-  {
-    throw std::invalid_argument("The skeleton has no point array " + name);
-  }
-  if (radius != nullptr)
-  {
-    if (radius->GetNumberOfComponents() != 1 ||
-      radius->GetNumberOfTuples() != skeleton->GetNumberOfPoints())
-    {
-      throw std::invalid_argument("The radius array " +
-        std::string(radius->GetName() != nullptr ? radius->GetName() : "") +
-        " must have one value for each point");
-    }
     for (vtkIdType i = 0; i < skeleton->GetNumberOfPoints(); ++i)
     {
       input.skeletonRadius.push_back(radius->GetComponent(i, 0));
@@ -212,7 +194,7 @@ int vtkTetrahedralMesher::RequestData(
     input.triangles = vtkCoronary::ReadTriangles(surface);
     if (skeleton != nullptr)
     {
-      ReadSkeleton(skeleton, this->RadiusArrayName, input);
+      ReadSkeleton(skeleton, input);
     }
     const TetrahedralMesh mesh =
       coronary::MakeTetrahedralMesh(input, settings, vtkCoronary::ProgressOf(this));
@@ -319,6 +301,5 @@ void vtkTetrahedralMesher::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "LeaveOutside: " << this->LeaveOutside << "\n";
   os << indent << "TimeLimit: " << this->TimeLimit << "\n";
   os << indent << "WorkerFolder: " << this->WorkerFolder << "\n";
-  os << indent << "RadiusArrayName: " << this->RadiusArrayName << "\n";
   os << indent << "EntityArrayName: " << this->EntityArrayName << "\n";
 }

@@ -187,15 +187,6 @@ public:
 
   ///@{
   /**
-   * Name of the skeleton's point array with the radius. `Automatic`, the default:
-   * `MaximumInscribedSphereRadius`, or `Radius`, or none.
-   */
-  vtkSetStdStringFromCharMacro(RadiusArrayName);
-  vtkGetCharFromStdStringMacro(RadiusArrayName);
-  ///@}
-
-  ///@{
-  /**
    * Name of the arrays with the ids of wall and caps, in the surface and in the outputs.
    * Default `CellEntityIds`.
    */
@@ -234,7 +225,6 @@ private:
   bool LeaveOutside = false;
   double TimeLimit = 300.0;
   std::string WorkerFolder;
-  std::string RadiusArrayName = "Automatic";
   std::string EntityArrayName;
 };
 

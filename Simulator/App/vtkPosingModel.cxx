@@ -80,11 +80,6 @@ SkeletonRig RigOf(vtkPolyData* rest, const std::string& folder)
     [&] { return SkeletonRig(vtkSkeletonForms::SkeletonOf(rest, "the skeleton")); });
 }
 
-vtkSkeletonForms::PoseArrays PoseArrayNames()
-{
-  return { names::BoneRotation, names::BoneTwist, names::AxialStrain, names::CalibreFactor };
-}
-
 /// The boundary's points are the first ones of the tetrahedra.
 void RequireSamePoints(vtkPolyData* boundary, vtkUnstructuredGrid* mesh, const std::string& folder)
 {
@@ -485,7 +480,7 @@ void vtkPosingModel::ReadPose(const std::string& path)
     [&]
     {
       std::vector<BoneTransform> bones;
-      this->Rig.Transform(vtkSkeletonForms::PoseOf(pose, this->Rig, PoseArrayNames()), bones);
+      this->Rig.Transform(vtkSkeletonForms::PoseOf(pose, this->Rig), bones);
       return bones.size();
     });
   this->Push(pose);

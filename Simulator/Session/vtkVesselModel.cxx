@@ -309,14 +309,11 @@ CompactSkinWeights WeightsOf(vtkUnstructuredGrid* mesh, const std::string& path)
 PoseSequence PosesOf(const std::string& list, const Skeleton& skeleton, vtkMessageTrap& messages)
 {
   const SkeletonRig rig(skeleton);
-  const vtkSkeletonForms::PoseArrays arrays{ names::BoneRotation, names::BoneTwist,
-    names::AxialStrain, names::CalibreFactor };
   PoseSequence poses;
   for (const TimedFile& file : ReadFileSeries(list))
   {
     const auto data = ReadPolyData(file.path, messages);
-    const SkeletonPose pose =
-      About(file.path, [&] { return vtkSkeletonForms::PoseOf(data, rig, arrays); });
+    const SkeletonPose pose = About(file.path, [&] { return vtkSkeletonForms::PoseOf(data, rig); });
     poses.times.push_back(file.time);
     poses.points.push_back(pose.joints);
     poses.calibre.push_back(pose.calibre);

@@ -634,27 +634,14 @@ TEST(BiharmonicSkinWeightsFilter, ReportsProgressWithoutGoingBack)
   EXPECT_LE(reports.back(), 1.0);
 }
 
-TEST(BiharmonicSkinWeightsFilter, NamesOfArraysAreProperties)
+TEST(BiharmonicSkinWeightsFilter, PrintsItsSettings)
 {
   vtkNew<vtkBiharmonicSkinWeights> filter;
-  SetComb(filter);
   filter->DenseOn();
-  filter->SetBoneWeightsArrayName("W");
-  filter->SetBoneIndicesArrayName("I");
-  filter->SetBoneWeightsCompactArrayName("C");
-  filter->SetDroppedWeightArrayName("D");
-  filter->SetBoneNameArrayName("N");
-  filter->Update();
-  for (const char* name : { "W", "I", "C", "D" })
-  {
-    EXPECT_NE(PointArray(filter->GetOutput(), name), nullptr);
-  }
-  EXPECT_NE(filter->GetOutput()->GetFieldData()->GetAbstractArray("N"), nullptr);
   std::ostringstream text;
   filter->Print(text);
   for (const char* name : { "Mode: 0", "Tolerance: 1e-06", "Iterations: 2000",
-         "Neighbourhood: 1.75", "Widen: 1", "Influences: 8", "Dense: 1",
-         "CacheFolder: ", "BoneWeightsArrayName: W", "BoneNameArrayName: N" })
+         "Neighbourhood: 1.75", "Widen: 1", "Influences: 8", "Dense: 1", "CacheFolder: " })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
@@ -728,7 +715,6 @@ TEST(BiharmonicSkinWeightsFilterRefuses, OtherCellsAndSettings)
   refuse("Iterations", [](auto* f) { f->SetIterations(0); });
   refuse("Neighbourhood", [](auto* f) { f->SetNeighbourhood(-1.0); });
   refuse("Influences", [](auto* f) { f->SetInfluences(65); });
-  refuse("array needs a name", [](auto* f) { f->SetBoneIndicesArrayName(""); });
 }
 
 TEST(BiharmonicSkinWeightsFilter, TooFewIterationsAreAWarning)

@@ -211,8 +211,7 @@ TEST(BranchMetricsFilter, PrintsItsSettings)
   std::ostringstream text;
   filter->Print(text);
   for (const char* name : { "Spacing: 0.25", "Tolerance: 1.5", "DetectedShare: 0.8",
-         "OverlapGate: 0.25", "LeastLength: 3", "LinesAreBranches: 0", "TimeTolerance: 0.001",
-         "RadiusArrayName: Automatic", "GroupArrayName: GroupIds", "AbscissaArrayName: Abscissas" })
+         "OverlapGate: 0.25", "LeastLength: 3", "LinesAreBranches: 0", "TimeTolerance: 0.001" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }

@@ -365,7 +365,7 @@ TEST(CenterlineConversion, PrintsAllSettings)
   reader->Print(text);
   vtkNew<vtkTGFWriter> writer;
   writer->Print(text);
-  for (const char* name : { "OutputForm", "Tolerance", "RadiusArrayName", "FileName", "Radius" })
+  for (const char* name : { "OutputForm", "Tolerance", "FileName", "Radius" })
   {
     EXPECT_NE(text.str().find(std::string(name) + ":"), std::string::npos) << name;
   }

@@ -334,21 +334,13 @@ TEST(CenterlineSkeleton, BlocksOneByOne)
   }
 }
 
-TEST(CenterlineSkeleton, NamesOfArraysAreProperties)
+TEST(CenterlineSkeleton, PrintsItsSettings)
 {
   vtkNew<vtkCenterlineSkeleton> filter;
-  filter->SetInputData(Fork("Calibre"));
-  filter->SetInputRadiusArrayName("Calibre");
-  filter->SetRadiusArrayName("Width");
-  filter->SetBoneIdArrayName("Number");
-  filter->Update();
-  EXPECT_NE(filter->GetOutput()->GetPointData()->GetArray("Width"), nullptr);
-  EXPECT_NE(filter->GetOutput()->GetCellData()->GetArray("Number"), nullptr);
   std::ostringstream text;
   filter->Print(text);
   for (const char* name : { "MinimumLength: 3", "MaximumLength: 8", "RadiusFactor: 3",
-         "SagittaRatio: 0.25", "EveryStep: 0", "InputRadiusArrayName: Calibre",
-         "RadiusArrayName: Width", "BoneIdArrayName: Number", "BoneNameArrayName: BoneName" })
+         "SagittaRatio: 0.25", "EveryStep: 0" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
@@ -359,9 +351,6 @@ TEST(CenterlineSkeletonRefuses, WhatIsNoTree)
   vtkNew<vtkCenterlineSkeleton> filter;
   filter->SetInputData(Fork("Calibre"));
   ExpectRefusal(filter, "no point array MaximumInscribedSphereRadius or Radius");
-  filter->SetInputRadiusArrayName("Width");
-  ExpectRefusal(filter, "'Width'");
-  filter->SetInputRadiusArrayName("Automatic");
 
   auto fork = Fork();
   fork->GetCellData()->RemoveArray("ParentGroupIds");
@@ -393,5 +382,4 @@ TEST(CenterlineSkeletonRefuses, SettingsOutOfRange)
   refuse("MaximumLength", [](auto* f) { f->SetMaximumLength(5.0); });
   refuse("RadiusFactor", [=](auto* f) { f->SetRadiusFactor(nan); });
   refuse("SagittaRatio", [](auto* f) { f->SetSagittaRatio(2.0); });
-  refuse("array needs a name", [](auto* f) { f->SetBoneIdArrayName(""); });
 }

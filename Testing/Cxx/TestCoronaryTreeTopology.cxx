@@ -333,20 +333,14 @@ TEST(CoronaryTreeTopology, LoopsAreShownAndWarnedOf)
     expected, 1e-4);
 }
 
-TEST(CoronaryTreeTopology, ArrayNamesAreProperties)
+TEST(CoronaryTreeTopology, TheRadiusArrayIsChosen)
 {
   vtkNew<vtkCoronaryTreeTopology> filter;
   filter->SetInputData(MakeFork("Calibre"));
   filter->SetInputRadiusArrayName("Calibre");
   filter->LabelSegmentsOff();
-  filter->SetCurvatureArrayName("Bend");
-  filter->SetGroupIdsArrayName("Branch");
   filter->Update();
-  EXPECT_NE(filter->GetOutput()->GetPointData()->GetArray("Bend"), nullptr);
-  EXPECT_EQ(filter->GetOutput()->GetPointData()->GetArray("Curvature"), nullptr);
-  EXPECT_NE(filter->GetOutput()->GetCellData()->GetArray("Branch"), nullptr);
-  filter->SetTorsionArrayName("");
-  ExpectRefusal(filter, "needs a name");
+  EXPECT_NE(filter->GetOutput()->GetPointData()->GetArray("MaximumInscribedSphereRadius"), nullptr);
 }
 
 TEST(CoronaryTreeTopology, EmptyInputGivesEmptyOutputWithArrays)

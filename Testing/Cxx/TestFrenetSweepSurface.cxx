@@ -347,19 +347,18 @@ TEST(FrenetSweepSurface, BranchesThatAreLeftOutAreNamed)
   EXPECT_EQ(filter->GetOutput()->GetFieldData()->GetAbstractArray("Repairs"), nullptr);
 }
 
-TEST(FrenetSweepSurface, OpenEndsAndOtherNames)
+TEST(FrenetSweepSurface, OpenEndsAndARadiusThatIsChosen)
 {
   vtkNew<vtkFrenetSweepSurface> filter;
   filter->SetInputData(MakeFork("Width"));
   filter->SetInputRadiusArrayName("Width");
-  filter->SetCellEntityIdsArrayName("ModelFaceID");
   filter->CappingOff();
   filter->Update();
   const Mesh mesh(filter->GetOutput());
   const auto measures = coronary::MeasureSurface(mesh.points, mesh.triangles);
   EXPECT_GT(measures.openEdges, 0U);
   EXPECT_EQ(measures.eulerCharacteristic, 2 - 3);
-  auto* ids = Get<vtkIntArray>(filter->GetOutput()->GetCellData(), "ModelFaceID");
+  auto* ids = Get<vtkIntArray>(filter->GetOutput()->GetCellData(), "CellEntityIds");
   double range[2];
   ids->GetRange(range);
   EXPECT_EQ(range[1], 1.0);
@@ -491,9 +490,6 @@ TEST(FrenetSweepSurface, Refusals)
   filter->SetContourArrayName("MaximumInscribedSphereRadius");
   ExpectRefusal(filter, "FrenetNormal");
   filter->SetContourArrayName("None");
-  filter->SetGroupIdsArrayName("");
-  ExpectRefusal(filter, "needs a name");
-  filter->SetGroupIdsArrayName("GroupIds");
   Messages messages(filter);
   filter->Update();
   EXPECT_TRUE(messages.Errors.empty());

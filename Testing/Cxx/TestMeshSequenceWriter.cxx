@@ -924,8 +924,6 @@ TEST_F(TestMeshSequenceWriter, RefusesSettingsOutOfRange)
   refuses("Digits must", [&] { w->SetDigits(3); });
   w->WriteSeriesOff();
   refuses("nothing to write", [&] { w->WriteSeriesOn(); });
-  w->SetEntityIdsArrayName("");
-  refuses("EntityIdsArrayName", [&] { w->SetEntityIdsArrayName("CellEntityIds"); });
   w->SetFaceName(1, "../wall");
   refuses("FaceName '../wall'", [&] { w->RemoveAllFaceNames(); });
   w->SetFaceName(7, "seven");

@@ -345,8 +345,6 @@ TEST(MotionRegularizer, RefusesWithOneMessage)
   setting(
     "ReferenceTime must", [&] { filter->SetReferenceTime(nan); },
     [&] { filter->SetReferenceTime(0.75); });
-  setting(
-    "name", [&] { filter->SetMoveArrayName(""); }, [&] { filter->SetMoveArrayName("Move"); });
   ExpectError(filter, "time must be finite", [&] { filter->UpdateTimeStep(nan); });
   vtkNew<vtkMultiBlockDataSet> blocks;
   vtkNew<vtkPolyData> block;

@@ -262,9 +262,6 @@ TEST(SkeletonPose, RefusesWithOneMessage)
   filter->SetJointPosition(nan, 0, 0);
   ExpectError(filter, "JointPosition");
   filter->MoveJointOff();
-  filter->SetTwistArrayName("");
-  ExpectError(filter, "name");
-  filter->SetTwistArrayName("BoneTwist");
   const auto line = ChainSkeleton(3);
   vtkNew<vtkCellArray> lines;
   const vtkIdType ids[3] = { 0, 1, 2 };

@@ -303,7 +303,6 @@ TEST(VesselSegmentation, SaysWhatIsWrong)
       f->SetBloodValue(0.0);
     },
     "BloodValue");
-  refuse([](auto* f) { f->SetMaskArrayName(""); }, "MaskArrayName");
   refuse([](auto* f) { f->AddSeed(1000.0, 0.0, 0.0); }, "Seed 1 is outside the image");
   refuse(
     [](auto* f)

@@ -33,7 +33,6 @@ def make_pipeline():
     vesselness.GenerateDirection = 1
     vesselness.UseRegion = 1
     vesselness.Region = [2, 35, 3, 36, 4, 38]
-    vesselness.VesselnessArrayName = "Response"
     return phantom, phase, vesselness
 
 
@@ -49,9 +48,9 @@ def arrays_and_time():
     data = fetch(vesselness, 0, 0.35)
     points = data.GetPointData()
     names = sorted(points.GetArrayName(n) for n in range(points.GetNumberOfArrays()))
-    require(names == ["Response", "VesselDirection", "VesselScale"], "arrays %s" % names)
-    require(points.GetScalars().GetName() == "Response", "the active scalars")
-    response = points.GetArray("Response").GetRange()
+    require(names == ["VesselDirection", "VesselScale", "Vesselness"], "arrays %s" % names)
+    require(points.GetScalars().GetName() == "Vesselness", "the active scalars")
+    response = points.GetArray("Vesselness").GetRange()
     require(response[0] == 0.0 and 0.2 < response[1] <= 1.0, "range %s" % (response,))
     vesselness.UpdatePropertyInformation()
     used = vesselness.GetProperty("UsedC").GetElement(0)
@@ -72,12 +71,12 @@ def arrays_and_time():
     require(content(fetch(vesselness, 0, 0.35)) == content(data), "C given and measured differ")
 
     mask = simple.FrangiVesselness(phase, Mask=vesselness)
-    mask.MaskArrayName = "Response"
+    mask.MaskArrayName = "Vesselness"
     mask.SigmaMin = 0.8
     require(mask.Mask is not None, "the mask is not connected")
     inside = fetch(mask, 0, 0.35).GetPointData().GetScalars()
     outside = [n for n in range(0, inside.GetNumberOfTuples(), 5)
-               if points.GetArray("Response").GetValue(n) == 0.0]
+               if points.GetArray("Vesselness").GetValue(n) == 0.0]
     require(outside and all(inside.GetValue(n) == 0.0 for n in outside), "the mask has no effect")
     require(inside.GetRange()[1] > 0.0, "the mask removes all")
     unmasked = simple.FrangiVesselness(phase)
@@ -129,7 +128,7 @@ def picture():
     view.ViewSize = [600, 600]
     shown = simple.Show(vesselness, view)
     require(shown.Representation == "Slice", "it is shown as %s" % shown.Representation)
-    simple.ColorBy(shown, ("POINTS", "Response"))
+    simple.ColorBy(shown, ("POINTS", "Vesselness"))
     view.ResetCamera()
     path = os.path.join(folder, "vesselness.png")
     simple.SaveScreenshot(path, view)
