@@ -1,55 +1,32 @@
 #include "vtkMeshSequenceWriter.h"
 
-#include "AtomicFile.h"
-#include "FileSeries.h"
 #include "MeshSequenceReport.h"
 #include "PartialProgress.h"
 #include "RankGroup.h"
-#include "StagedFolder.h"
-#include "SurfaceFile.h"
-#include "TetrahedralBoundary.h"
-#include "vtkBoneMotion.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
-#include "vtkGltfModel.h"
+#include "vtkSequenceFormats.h"
 
-#include "vtkCellArray.h"
-#include "vtkCellData.h"
-#include "vtkDataArray.h"
+#include "vtkDataSetAttributes.h"
 #include "vtkDoubleArray.h"
 #include "vtkExecutive.h"
-#include "vtkFieldData.h"
-#include "vtkIdList.h"
-#include "vtkIdTypeArray.h"
 #include "vtkInformation.h"
-#include "vtkIntArray.h"
-#include "vtkNew.h"
 #include "vtkObjectFactory.h"
-#include "vtkPointData.h"
-#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
-#include "vtkStringArray.h"
 #include "vtkTable.h"
-#include "vtkUnstructuredGrid.h"
-#include "vtkXMLPolyDataWriter.h"
-#include "vtkXMLUnstructuredGridWriter.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
 
 namespace fs = std::filesystem;
 namespace names = vtkCoronaryArrayNames;
-using coronary::Tetrahedron;
-using coronary::Triangle;
 using vtkCoronary::Require;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -57,14 +34,7 @@ vtkStandardNewMacro(vtkMeshSequenceWriter);
 
 namespace
 {
-constexpr int WallId = 1;
 constexpr double Degree = 0.017453292519943295769;
-
-// Of SimVascular and svFSIplus, which take 32-bit integers only.
-constexpr const char* GlobalNodeID = "GlobalNodeID";
-constexpr const char* GlobalElementID = "GlobalElementID";
-constexpr const char* ModelFaceID = "ModelFaceID";
-constexpr const char* ModelRegionID = "ModelRegionID";
 
 /// As the report counts them.
 std::string PhaseName(std::size_t phase, double time)
@@ -72,876 +42,6 @@ std::string PhaseName(std::size_t phase, double time)
   std::ostringstream text;
   text << "phase " << phase << " (time " << time << ')';
   return text.str();
-}
-
-/// Triangles of poly data that has nothing else.
-vtkCellArray* OnlyTriangles(vtkPolyData* data, const std::string& what)
-{
-  Require(data->GetNumberOfVerts() == 0 && data->GetNumberOfLines() == 0 &&
-      data->GetNumberOfStrips() == 0,
-    what + " has vertices, lines or strips: only triangles can be written");
-  vtkCellArray* polys = data->GetPolys();
-  for (vtkIdType n = 0; n < polys->GetNumberOfCells(); ++n)
-  {
-    Require(
-      polys->GetCellSize(n) == 3, what + ": cell " + std::to_string(n) + " is not a triangle");
-  }
-  return polys;
-}
-
-template <std::size_t Corners>
-std::vector<std::array<std::int64_t, Corners>> ReadCells(vtkCellArray* cells)
-{
-  std::vector<std::array<std::int64_t, Corners>> result(
-    static_cast<std::size_t>(cells->GetNumberOfCells()));
-  vtkNew<vtkIdList> ids;
-  for (std::size_t n = 0; n < result.size(); ++n)
-  {
-    cells->GetCellAtId(static_cast<vtkIdType>(n), ids);
-    for (std::size_t k = 0; k < Corners; ++k)
-    {
-      result[n][k] = ids->GetId(static_cast<vtkIdType>(k));
-    }
-  }
-  return result;
-}
-
-template <std::size_t Corners>
-vtkSmartPointer<vtkCellArray> MakeCells(
-  const std::vector<std::array<std::int64_t, Corners>>& elements)
-{
-  auto cells = vtkSmartPointer<vtkCellArray>::New();
-  const auto count = static_cast<vtkIdType>(elements.size());
-  cells->AllocateExact(count, static_cast<vtkIdType>(Corners) * count);
-  for (const auto& element : elements)
-  {
-    std::array<vtkIdType, Corners> ids{};
-    std::copy(element.begin(), element.end(), ids.begin());
-    cells->InsertNextCell(static_cast<vtkIdType>(Corners), ids.data());
-  }
-  return cells;
-}
-
-std::vector<coronary::Vector3> ReadPoints(vtkPointSet* data)
-{
-  std::vector<coronary::Vector3> points(static_cast<std::size_t>(data->GetNumberOfPoints()));
-  for (std::size_t n = 0; n < points.size(); ++n)
-  {
-    data->GetPoint(static_cast<vtkIdType>(n), points[n].data());
-  }
-  return points;
-}
-
-/// @throws std::invalid_argument(complaint) when there is no such array
-vtkDataArray* NeededArray(vtkFieldData* data, const std::string& name, const std::string& complaint)
-{
-  vtkDataArray* array = data->GetArray(name.c_str());
-  if (!array)
-  {
-    throw std::invalid_argument(complaint);
-  }
-  return array;
-}
-
-/// Ids of faces out of an array of any numbers.
-std::vector<int> ReadFaceIds(vtkDataArray* array, const std::string& where)
-{
-  Require(array->GetNumberOfComponents() == 1, where + " must have one component");
-  std::vector<int> ids(static_cast<std::size_t>(array->GetNumberOfTuples()));
-  for (std::size_t n = 0; n < ids.size(); ++n)
-  {
-    const double value = array->GetComponent(static_cast<vtkIdType>(n), 0);
-    Require(value >= 1.0 && value <= std::numeric_limits<int>::max() && value == std::floor(value),
-      where + " must hold whole numbers from 1; that of cell " + std::to_string(n) + " is not");
-    ids[n] = static_cast<int>(value);
-  }
-  return ids;
-}
-
-bool IsWeight(const char* name)
-{
-  const std::string text = name ? name : "";
-  return text == names::BoneIndices || text == names::BoneWeightsCompact ||
-    text == names::BoneWeights || text == names::DroppedWeight;
-}
-
-void RemoveWeights(vtkPointData* data)
-{
-  for (const char* name :
-    { names::BoneIndices, names::BoneWeightsCompact, names::BoneWeights, names::DroppedWeight })
-  {
-    data->RemoveArray(name);
-  }
-}
-
-/// The part of a mesh's boundary that has its own file, with points of its own.
-struct Patch
-{
-  std::vector<std::int64_t> triangles; ///< of the boundary
-  std::vector<vtkIdType> points;       ///< of the mesh, ascending
-  vtkSmartPointer<vtkCellArray> cells;
-};
-
-/// What is the same at every phase.
-struct Topology
-{
-  std::string entityIdsName;
-  vtkIdType points = 0;
-  vtkSmartPointer<vtkCellArray> inputCells; ///< at the first phase
-  std::vector<Tetrahedron> tetrahedra;      ///< none: a surface alone
-  bool turned = false;                      ///< corners stand in another order in the input
-  std::vector<Triangle> triangles;          ///< looking outwards, on the mesh's points
-  std::vector<std::int64_t> behind;         ///< per triangle: its tetrahedron
-  std::vector<int> entity;                  ///< per triangle
-  vtkSmartPointer<vtkCellData> data;        ///< of the triangles, where a boundary was given
-
-  Patch PatchOf(int face) const;
-};
-
-/// All triangles, or those of one face.
-Patch Topology::PatchOf(int face) const
-{
-  Patch patch;
-  std::vector<vtkIdType> local(static_cast<std::size_t>(this->points), -1);
-  for (std::size_t n = 0; n < this->triangles.size(); ++n)
-  {
-    if (face == 0 || this->entity[n] == face)
-    {
-      patch.triangles.push_back(static_cast<std::int64_t>(n));
-      for (const std::int64_t corner : this->triangles[n])
-      {
-        local[static_cast<std::size_t>(corner)] = 0;
-      }
-    }
-  }
-  for (std::size_t n = 0; n < local.size(); ++n)
-  {
-    if (local[n] == 0)
-    {
-      local[n] = static_cast<vtkIdType>(patch.points.size());
-      patch.points.push_back(static_cast<vtkIdType>(n));
-    }
-  }
-  patch.cells = vtkSmartPointer<vtkCellArray>::New();
-  for (const std::int64_t n : patch.triangles)
-  {
-    vtkIdType ids[3];
-    for (int k = 0; k < 3; ++k)
-    {
-      ids[k] = local[static_cast<std::size_t>(this->triangles[static_cast<std::size_t>(n)][k])];
-    }
-    patch.cells->InsertNextCell(3, ids);
-  }
-  return patch;
-}
-
-/// Where the boundary's points are in the mesh.
-std::vector<std::int64_t> PointsInMesh(vtkPolyData* boundary, vtkIdType points)
-{
-  std::vector<std::int64_t> map(static_cast<std::size_t>(boundary->GetNumberOfPoints()));
-  vtkDataArray* ids = boundary->GetPointData()->GetArray(names::MeshPointId);
-  Require(ids != nullptr || boundary->GetNumberOfPoints() == points,
-    "The boundary has " + std::to_string(boundary->GetNumberOfPoints()) + " points, the mesh " +
-      std::to_string(points) + ": it must be on the same points, or have the point array " +
-      names::MeshPointId);
-  for (std::size_t n = 0; n < map.size(); ++n)
-  {
-    map[n] = static_cast<std::int64_t>(n);
-    if (ids)
-    {
-      const double value = ids->GetComponent(static_cast<vtkIdType>(n), 0);
-      Require(value >= 0.0 && value < static_cast<double>(points),
-        std::string("Array ") + names::MeshPointId +
-          " of the boundary names a point that the mesh does not have");
-      map[n] = static_cast<std::int64_t>(value);
-    }
-  }
-  return map;
-}
-
-/// Brings the mesh's boundary into the order of the one that was given, with its data.
-void TakeBoundary(vtkPolyData* boundary, Topology& topology)
-{
-  std::vector<Triangle> given = ReadCells<3>(OnlyTriangles(boundary, "The boundary"));
-  vtkDataArray* ids = NeededArray(boundary->GetCellData(), topology.entityIdsName,
-    "The boundary has no cell array " + topology.entityIdsName);
-  const std::vector<int> entity =
-    ReadFaceIds(ids, "Array " + topology.entityIdsName + " of the boundary");
-  const std::vector<std::int64_t> map = PointsInMesh(boundary, topology.points);
-  std::map<Triangle, std::size_t> known;
-  for (std::size_t n = 0; n < topology.triangles.size(); ++n)
-  {
-    Triangle sorted = topology.triangles[n];
-    std::sort(sorted.begin(), sorted.end());
-    known[sorted] = n;
-  }
-  std::vector<Triangle> triangles;
-  std::vector<std::int64_t> behind;
-  for (std::size_t n = 0; n < given.size(); ++n)
-  {
-    Triangle sorted = given[n];
-    for (std::int64_t& corner : sorted)
-    {
-      corner = map[static_cast<std::size_t>(corner)];
-    }
-    std::sort(sorted.begin(), sorted.end());
-    const auto found = known.find(sorted);
-    Require(found != known.end(),
-      "Triangle " + std::to_string(n) +
-        " of the boundary is no face on the boundary of the tetrahedra, or comes twice");
-    triangles.push_back(topology.triangles[found->second]);
-    behind.push_back(topology.behind[found->second]);
-    known.erase(found);
-  }
-  Require(known.empty(),
-    std::to_string(known.size()) + " faces of the tetrahedra are missing in the boundary");
-  topology.triangles = std::move(triangles);
-  topology.behind = std::move(behind);
-  topology.entity = entity;
-  topology.data = boundary->GetCellData();
-}
-
-/// Tetrahedra whose corners stand in the other order all have negative volumes.
-bool IsTurned(const std::vector<coronary::Vector3>& points, const std::vector<Tetrahedron>& cells)
-{
-  std::size_t negative = 0;
-  for (const Tetrahedron& t : cells)
-  {
-    negative += coronary::TetrahedronVolume(points[static_cast<std::size_t>(t[0])],
-                  points[static_cast<std::size_t>(t[1])], points[static_cast<std::size_t>(t[2])],
-                  points[static_cast<std::size_t>(t[3])]) < 0.0
-      ? 1
-      : 0;
-  }
-  return 10 * negative > 9 * cells.size();
-}
-
-void RequireTetrahedra(vtkUnstructuredGrid* grid)
-{
-  for (vtkIdType n = 0; n < grid->GetNumberOfCells(); ++n)
-  {
-    Require(grid->GetCellType(n) == VTK_TETRA,
-      "Cell " + std::to_string(n) + " of the mesh is not a tetrahedron");
-  }
-}
-
-Topology TopologyOf(vtkPointSet* mesh, vtkPolyData* boundary, const std::string& entityIdsName)
-{
-  Topology topology;
-  topology.entityIdsName = entityIdsName;
-  topology.points = mesh->GetNumberOfPoints();
-  // SimVascular's ids have 32 bits.
-  Require(std::max(topology.points, mesh->GetNumberOfCells()) < std::numeric_limits<int>::max(),
-    "The mesh is too large: ids of points and cells must fit into 32 bits");
-  if (auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh))
-  {
-    RequireTetrahedra(grid);
-    topology.inputCells = grid->GetCells();
-    topology.tetrahedra = ReadCells<4>(grid->GetCells());
-    topology.turned = IsTurned(ReadPoints(mesh), topology.tetrahedra);
-    if (topology.turned)
-    {
-      for (Tetrahedron& t : topology.tetrahedra)
-      {
-        std::swap(t[0], t[1]);
-      }
-    }
-    for (const auto& [triangle, tetrahedron] : coronary::BoundaryFaces(topology.tetrahedra))
-    {
-      topology.triangles.push_back(triangle);
-      topology.behind.push_back(tetrahedron);
-    }
-    topology.entity.assign(topology.triangles.size(), WallId);
-    if (boundary)
-    {
-      TakeBoundary(boundary, topology);
-    }
-    return topology;
-  }
-  Require(boundary == nullptr,
-    "A boundary (port 1) is for tetrahedra; triangles have cell data " + entityIdsName +
-      " of their own");
-  auto* surface = vtkPolyData::SafeDownCast(mesh);
-  topology.inputCells = OnlyTriangles(surface, "The mesh");
-  topology.triangles = ReadCells<3>(topology.inputCells);
-  vtkDataArray* ids = surface->GetCellData()->GetArray(entityIdsName.c_str());
-  topology.entity = ids ? ReadFaceIds(ids, "Array " + entityIdsName + " of the mesh")
-                        : std::vector<int>(topology.triangles.size(), WallId);
-  return topology;
-}
-
-/// @throws std::invalid_argument that says what differs
-void RequireSame(const Topology& topology, vtkPointSet* mesh)
-{
-  const bool volume = !topology.tetrahedra.empty();
-  auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh);
-  auto* surface = vtkPolyData::SafeDownCast(mesh);
-  Require(volume ? grid != nullptr : surface != nullptr, "the mesh is of another type");
-  Require(mesh->GetNumberOfPoints() == topology.points,
-    "the mesh has " + std::to_string(mesh->GetNumberOfPoints()) + " points instead of " +
-      std::to_string(topology.points));
-  vtkCellArray* cells = volume ? grid->GetCells() : surface->GetPolys();
-  const vtkIdType wanted = topology.inputCells->GetNumberOfCells();
-  Require(mesh->GetNumberOfCells() == wanted && cells->GetNumberOfCells() == wanted,
-    "the mesh has " + std::to_string(mesh->GetNumberOfCells()) + " cells instead of " +
-      std::to_string(wanted));
-  if (grid)
-  {
-    RequireTetrahedra(grid);
-  }
-  if (cells == topology.inputCells)
-  {
-    return;
-  }
-  vtkNew<vtkIdList> ids;
-  vtkNew<vtkIdList> firstIds;
-  for (vtkIdType n = 0; n < wanted; ++n)
-  {
-    cells->GetCellAtId(n, ids);
-    topology.inputCells->GetCellAtId(n, firstIds);
-    Require(ids->GetNumberOfIds() == firstIds->GetNumberOfIds() &&
-        std::equal(ids->begin(), ids->end(), firstIds->begin()),
-      "cell " + std::to_string(n) + " of the mesh has other points than at the first phase");
-  }
-}
-
-bool IsNameCharacter(char c)
-{
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-    c == '_' || c == '.';
-}
-
-std::string FileNameOf(std::string text)
-{
-  std::replace_if(
-    text.begin(), text.end(), [](char c) { return !IsNameCharacter(c); }, '_');
-  return text;
-}
-
-/// Names of the caps, as far as the caps' vertices tell.
-std::map<int, std::string> NamesOfCaps(vtkPolyData* caps, const std::string& entityIdsName)
-{
-  std::map<int, std::string> result;
-  if (!caps || caps->GetNumberOfPoints() == 0)
-  {
-    return result;
-  }
-  vtkDataArray* array = NeededArray(
-    caps->GetPointData(), entityIdsName, "The caps have no point array " + entityIdsName);
-  const std::vector<int> ids = ReadFaceIds(array, "Array " + entityIdsName + " of the caps");
-  vtkDataArray* inlet = caps->GetPointData()->GetArray(names::IsInlet);
-  auto* label =
-    vtkStringArray::SafeDownCast(caps->GetPointData()->GetAbstractArray(names::SegmentLabel));
-  for (std::size_t n = 0; n < ids.size(); ++n)
-  {
-    const auto at = static_cast<vtkIdType>(n);
-    std::string name = "cap";
-    if (inlet)
-    {
-      name = inlet->GetComponent(at, 0) != 0.0 ? "inlet" : "outlet";
-    }
-    const std::string vessel = label ? std::string(label->GetValue(at)) : std::string();
-    result[ids[n]] = FileNameOf(name + "_" + (vessel.empty() ? std::to_string(ids[n]) : vessel));
-  }
-  return result;
-}
-
-/// Faces by ascending ids, each with a name of its own.
-std::vector<coronary::MeshSequenceReport::Face> FacesOf(const Topology& topology,
-  const std::map<int, std::string>& wanted, const std::map<int, std::string>& ofCaps)
-{
-  std::map<int, std::int64_t> counts;
-  for (const int id : topology.entity)
-  {
-    ++counts[id];
-  }
-  for (const auto& [id, name] : wanted)
-  {
-    Require(counts.count(id) > 0,
-      "FaceName '" + name + "' is for face " + std::to_string(id) + ", which the mesh has not");
-  }
-  std::map<std::string, int> uses;
-  std::vector<coronary::MeshSequenceReport::Face> faces;
-  for (const auto& [id, count] : counts)
-  {
-    std::string name = id == WallId ? "wall" : "cap_" + std::to_string(id);
-    if (const auto cap = ofCaps.find(id); cap != ofCaps.end() && id != WallId)
-    {
-      name = cap->second;
-    }
-    if (const auto own = wanted.find(id); own != wanted.end())
-    {
-      name = own->second;
-    }
-    ++uses[name];
-    faces.push_back({ id, name, count });
-  }
-  for (auto& face : faces)
-  {
-    if (uses[face.name] > 1)
-    {
-      Require(wanted.count(face.id) == 0, "FaceName '" + face.name + "' is given to two faces");
-      face.name += "_" + std::to_string(face.id);
-    }
-  }
-  return faces;
-}
-
-std::string XmlOf(vtkDataSet* data)
-{
-  vtkSmartPointer<vtkXMLUnstructuredDataWriter> writer;
-  if (vtkPolyData::SafeDownCast(data))
-  {
-    writer = vtkSmartPointer<vtkXMLPolyDataWriter>::New();
-  }
-  else
-  {
-    writer = vtkSmartPointer<vtkXMLUnstructuredGridWriter>::New();
-  }
-  // Into memory: VTK's writer does not notice when the last bytes find no room on the disk. And not
-  // appended, which Debian's expat makes unreadable for VTK.
-  writer->SetInputData(data);
-  writer->WriteToOutputStringOn();
-  writer->SetDataModeToBinary();
-  if (!writer->Write())
-  {
-    throw std::runtime_error("VTK's XML writer failed");
-  }
-  return writer->GetOutputString();
-}
-
-void AddNumber(vtkFieldData* data, const char* name, double value)
-{
-  vtkCoronary::AddArray<vtkDoubleArray>(data, name, std::vector<double>{ value });
-}
-
-/// Ids that begin with 1.
-void AddIds(vtkFieldData* data, const char* name, const std::vector<std::int64_t>& fromZero)
-{
-  vtkNew<vtkIntArray> ids;
-  ids->SetName(name);
-  ids->SetNumberOfValues(static_cast<vtkIdType>(fromZero.size()));
-  for (std::size_t n = 0; n < fromZero.size(); ++n)
-  {
-    ids->SetValue(static_cast<vtkIdType>(n), static_cast<int>(fromZero[n] + 1));
-  }
-  data->AddArray(ids);
-}
-
-std::vector<std::int64_t> Numbered(std::size_t count)
-{
-  std::vector<std::int64_t> numbers(count);
-  for (std::size_t n = 0; n < count; ++n)
-  {
-    numbers[n] = static_cast<std::int64_t>(n);
-  }
-  return numbers;
-}
-
-/// Values of the chosen tuples, of arrays of numbers.
-void CopyTuples(vtkDataSetAttributes* from, const std::vector<vtkIdType>& tuples, bool keepWeights,
-  vtkDataSetAttributes* to)
-{
-  vtkNew<vtkIdList> ids;
-  ids->SetNumberOfIds(static_cast<vtkIdType>(tuples.size()));
-  std::copy(tuples.begin(), tuples.end(), ids->begin());
-  for (int n = 0; n < from->GetNumberOfArrays(); ++n)
-  {
-    vtkDataArray* array = from->GetArray(n);
-    if (!array || (!keepWeights && IsWeight(array->GetName())))
-    {
-      continue;
-    }
-    vtkSmartPointer<vtkDataArray> part;
-    part.TakeReference(array->NewInstance());
-    part->SetName(array->GetName());
-    part->SetNumberOfComponents(array->GetNumberOfComponents());
-    part->SetNumberOfTuples(ids->GetNumberOfIds());
-    for (int c = 0; c < array->GetNumberOfComponents(); ++c)
-    {
-      part->SetComponentName(c, array->GetComponentName(c));
-    }
-    array->GetTuples(ids, part);
-    to->AddArray(part);
-  }
-}
-
-vtkSmartPointer<vtkPoints> PointsOf(
-  vtkPointSet* mesh, const std::vector<vtkIdType>& chosen, double unit)
-{
-  auto points = vtkSmartPointer<vtkPoints>::New();
-  points->SetDataType(mesh->GetPoints()->GetDataType());
-  points->SetNumberOfPoints(static_cast<vtkIdType>(chosen.size()));
-  for (std::size_t n = 0; n < chosen.size(); ++n)
-  {
-    double x[3];
-    mesh->GetPoint(chosen[n], x);
-    points->SetPoint(static_cast<vtkIdType>(n), x[0] / unit, x[1] / unit, x[2] / unit);
-  }
-  return points;
-}
-
-/// A vector array of the mesh, if it has it, as three numbers a point: `letter` and x, y or z.
-void AddVectors(vtkPointSet* mesh, const char* name, const std::string& letter,
-  const std::vector<vtkIdType>& points, coronary::FileSurface& surface)
-{
-  vtkDataArray* array = mesh->GetPointData()->GetArray(name);
-  for (int c = 0; array != nullptr && array->GetNumberOfComponents() == 3 && c < 3; ++c)
-  {
-    std::vector<float> values;
-    values.reserve(points.size());
-    for (const vtkIdType point : points)
-    {
-      values.push_back(static_cast<float>(array->GetComponent(point, c)));
-    }
-    surface.vertexValues.emplace_back(letter + "xyz"[c], std::move(values));
-  }
-}
-
-/// One phase, measured.
-struct PhaseMesh
-{
-  vtkPointSet* mesh = nullptr;
-  double time = 0.0;
-  coronary::TetrahedraQuality tetrahedra;
-  coronary::TrianglesQuality surface;
-};
-
-/// Makes the files of all phases.
-class SequenceFiles
-{
-public:
-  /// @param prefix  what the names of files other than the report begin with
-  SequenceFiles(const std::string& path, std::string prefix, int digits, std::size_t phases,
-    Topology topology, coronary::RankGroup& ranks)
-    : Name(fs::path(path).stem().string())
-    , Prefix(std::move(prefix))
-    , Folder(
-        fs::path(path).parent_path().empty() ? "." : fs::path(path).parent_path().string(), ranks)
-    , Topo(std::move(topology))
-    , Surface(this->Topo.PatchOf(0))
-    , Phases(phases)
-    , Digits(static_cast<std::size_t>(digits))
-  {
-    if (!this->Topo.tetrahedra.empty())
-    {
-      this->Tetrahedra =
-        this->Topo.turned ? MakeCells(this->Topo.tetrahedra) : this->Topo.inputCells;
-    }
-  }
-
-  const Topology& GetTopology() const { return this->Topo; }
-  std::int64_t SurfacePoints() const
-  {
-    return static_cast<std::int64_t>(this->Surface.points.size());
-  }
-  coronary::StagedFolder& GetFolder() { return this->Folder; }
-
-  std::string Number(std::size_t phase) const
-  {
-    return coronary::SeriesNumber(phase, this->Phases, this->Digits);
-  }
-
-  /// Writes a file, and tells the report.
-  void Write(const std::string& name, const std::string& text)
-  {
-    coronary::WriteFileAtomically(this->Folder.Add(name), text);
-  }
-
-  /// A file of one phase, of any kind but SimVascular's.
-  std::string BytesOf(const std::string& kind, const PhaseMesh& phase,
-    const std::vector<coronary::MeshSequenceReport::Face>& faces, bool keepWeights) const;
-  vtkSmartPointer<vtkUnstructuredGrid> Volume(const PhaseMesh& phase, bool keepWeights) const;
-  vtkSmartPointer<vtkPolyData> SurfaceOf(const PhaseMesh& phase, bool keepWeights) const;
-  vtkSmartPointer<vtkUnstructuredGrid> Vmtk(const PhaseMesh& phase, bool keepWeights) const;
-  coronary::FileSurface PlainSurface(const PhaseMesh& phase,
-    const std::vector<coronary::MeshSequenceReport::Face>& faces, bool values) const;
-  std::unique_ptr<vtkGltfModel> NewGltf(vtkPointSet* mesh,
-    const std::vector<coronary::MeshSequenceReport::Face>& faces, int influences) const;
-  void WriteSimVascular(const std::string& folder, const PhaseMesh& phase,
-    const std::vector<coronary::MeshSequenceReport::Face>& faces, double unit);
-
-  const std::string Name;
-  const std::string Prefix;
-
-private:
-  void AddFields(const PhaseMesh& phase, bool keepWeights, vtkDataSet* data) const;
-  std::vector<Triangle> LocalTriangles() const;
-  vtkSmartPointer<vtkPolyData> Face(const PhaseMesh& phase, const Patch& patch, double unit) const;
-
-  coronary::StagedFolder Folder;
-  Topology Topo;
-  Patch Surface;
-  std::map<int, Patch> Faces; ///< made when they are first written
-  std::size_t Phases;
-  std::size_t Digits;
-  vtkSmartPointer<vtkCellArray> Tetrahedra;
-};
-
-/// Field data of the phase instead of those at rest.
-void SequenceFiles::AddFields(const PhaseMesh& phase, bool keepWeights, vtkDataSet* data) const
-{
-  vtkNew<vtkFieldData> fields;
-  fields->ShallowCopy(phase.mesh->GetFieldData());
-  if (!keepWeights)
-  {
-    vtkBoneMotion::Remove(fields);
-  }
-  AddNumber(fields, names::PhaseTime, phase.time);
-  AddNumber(fields, names::SurfaceArea, phase.surface.area);
-  if (!this->Topo.tetrahedra.empty())
-  {
-    const coronary::TetrahedraQuality& quality = phase.tetrahedra;
-    vtkNew<vtkIdTypeArray> inverted;
-    inverted->SetName(names::InvertedTetrahedra);
-    for (const std::int64_t id : quality.inverted)
-    {
-      inverted->InsertNextValue(id);
-    }
-    fields->AddArray(inverted);
-    AddNumber(fields, names::PoorFraction,
-      static_cast<double>(quality.poor) / static_cast<double>(this->Topo.tetrahedra.size()));
-    AddNumber(fields, names::LeastVolume, quality.leastVolume);
-    AddNumber(fields, names::TotalVolume, quality.totalVolume);
-    AddNumber(fields, names::LeastDihedralAngle, quality.leastDihedralAngle);
-    AddNumber(fields, names::GreatestRadiusEdgeRatio, quality.greatestRadiusEdgeRatio);
-  }
-  data->SetFieldData(fields);
-}
-
-vtkSmartPointer<vtkUnstructuredGrid> SequenceFiles::Volume(
-  const PhaseMesh& phase, bool keepWeights) const
-{
-  auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
-  grid->ShallowCopy(phase.mesh);
-  grid->SetCells(VTK_TETRA, this->Tetrahedra);
-  if (!keepWeights)
-  {
-    RemoveWeights(grid->GetPointData());
-  }
-  vtkCellData* cells = grid->GetCellData();
-  vtkCoronary::AddArray<vtkIntArray>(
-    cells, this->Topo.entityIdsName, std::vector<int>(this->Topo.tetrahedra.size(), 0));
-  vtkCoronary::AddArray<vtkDoubleArray>(cells, names::TetrahedronVolume, phase.tetrahedra.volume);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    cells, names::MinimumDihedralAngle, phase.tetrahedra.minimumDihedral);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    cells, names::RadiusEdgeRatio, phase.tetrahedra.radiusEdgeRatio);
-  this->AddFields(phase, keepWeights, grid);
-  return grid;
-}
-
-vtkSmartPointer<vtkPolyData> SequenceFiles::SurfaceOf(
-  const PhaseMesh& phase, bool keepWeights) const
-{
-  auto surface = vtkSmartPointer<vtkPolyData>::New();
-  if (this->Topo.tetrahedra.empty())
-  {
-    surface->ShallowCopy(phase.mesh);
-    if (!keepWeights)
-    {
-      RemoveWeights(surface->GetPointData());
-    }
-  }
-  else
-  {
-    surface->SetPoints(PointsOf(phase.mesh, this->Surface.points, 1.0));
-    surface->SetPolys(this->Surface.cells);
-    CopyTuples(
-      phase.mesh->GetPointData(), this->Surface.points, keepWeights, surface->GetPointData());
-    vtkCoronary::AddArray<vtkIdTypeArray>(
-      surface->GetPointData(), names::MeshPointId, this->Surface.points);
-    if (this->Topo.data)
-    {
-      const std::vector<std::int64_t> all = Numbered(this->Topo.triangles.size());
-      CopyTuples(this->Topo.data, std::vector<vtkIdType>(all.begin(), all.end()), keepWeights,
-        surface->GetCellData());
-    }
-    vtkCoronary::AddArray<vtkIdTypeArray>(
-      surface->GetCellData(), names::TetrahedronId, this->Topo.behind);
-  }
-  vtkCoronary::AddArray<vtkIntArray>(
-    surface->GetCellData(), this->Topo.entityIdsName, this->Topo.entity);
-  this->AddFields(phase, keepWeights, surface);
-  return surface;
-}
-
-vtkSmartPointer<vtkUnstructuredGrid> SequenceFiles::Vmtk(
-  const PhaseMesh& phase, bool keepWeights) const
-{
-  auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
-  grid->SetPoints(phase.mesh->GetPoints());
-  grid->GetPointData()->ShallowCopy(phase.mesh->GetPointData());
-  if (!keepWeights)
-  {
-    RemoveWeights(grid->GetPointData());
-  }
-  const std::size_t tetrahedra = this->Topo.tetrahedra.size();
-  std::vector<int> ids(tetrahedra, 0);
-  ids.insert(ids.end(), this->Topo.entity.begin(), this->Topo.entity.end());
-  std::vector<int> types(tetrahedra, VTK_TETRA);
-  types.resize(ids.size(), VTK_TRIANGLE);
-  vtkNew<vtkCellArray> cells;
-  cells->DeepCopy(this->Tetrahedra);
-  cells->Append(MakeCells(this->Topo.triangles));
-  grid->SetCells(types.data(), cells);
-  vtkCoronary::AddArray<vtkIntArray>(grid->GetCellData(), this->Topo.entityIdsName, ids);
-  return grid;
-}
-
-vtkSmartPointer<vtkPolyData> SequenceFiles::Face(
-  const PhaseMesh& phase, const Patch& patch, double unit) const
-{
-  auto face = vtkSmartPointer<vtkPolyData>::New();
-  face->SetPoints(PointsOf(phase.mesh, patch.points, unit));
-  face->SetPolys(patch.cells);
-  AddIds(face->GetPointData(), GlobalNodeID,
-    std::vector<std::int64_t>(patch.points.begin(), patch.points.end()));
-  std::vector<std::int64_t> elements;
-  std::vector<int> ids;
-  for (const std::int64_t n : patch.triangles)
-  {
-    elements.push_back(this->Topo.behind[static_cast<std::size_t>(n)]);
-    ids.push_back(this->Topo.entity[static_cast<std::size_t>(n)]);
-  }
-  AddIds(face->GetCellData(), GlobalElementID, elements);
-  vtkCoronary::AddArray<vtkIntArray>(face->GetCellData(), ModelFaceID, ids);
-  return face;
-}
-
-/// The surface's triangles on its own points.
-std::vector<Triangle> SequenceFiles::LocalTriangles() const
-{
-  return ReadCells<3>(this->Surface.cells);
-}
-
-/// @param values  whether normals, displacements and velocities are wanted, as far as the mesh has them
-coronary::FileSurface SequenceFiles::PlainSurface(const PhaseMesh& phase,
-  const std::vector<coronary::MeshSequenceReport::Face>& faces, bool values) const
-{
-  coronary::FileSurface surface;
-  std::ostringstream comment;
-  comment << "DynamicCoronary, mm, LPS, time " << phase.time;
-  surface.comment = comment.str();
-  surface.points.resize(this->Surface.points.size());
-  for (std::size_t n = 0; n < surface.points.size(); ++n)
-  {
-    phase.mesh->GetPoint(this->Surface.points[n], surface.points[n].data());
-  }
-  surface.triangles = this->LocalTriangles();
-  surface.face = this->Topo.entity;
-  for (const auto& face : faces)
-  {
-    surface.faces.emplace_back(face.id, face.name);
-  }
-  if (values)
-  {
-    AddVectors(phase.mesh, names::Displacement, "d", this->Surface.points, surface);
-    AddVectors(phase.mesh, names::Velocity, "v", this->Surface.points, surface);
-  }
-  return surface;
-}
-
-std::unique_ptr<vtkGltfModel> SequenceFiles::NewGltf(vtkPointSet* mesh,
-  const std::vector<coronary::MeshSequenceReport::Face>& faces, int influences) const
-{
-  auto gltf = std::make_unique<vtkGltfModel>(mesh, this->Surface.points, influences);
-  const std::vector<Triangle> triangles = this->LocalTriangles();
-  for (const auto& face : faces)
-  {
-    coronary::GltfFace part{ face.name, face.id != WallId, {} };
-    for (std::size_t n = 0; n < triangles.size(); ++n)
-    {
-      if (this->Topo.entity[n] == face.id)
-      {
-        part.triangles.push_back(triangles[n]);
-      }
-    }
-    gltf->Model.faces.push_back(std::move(part));
-  }
-  gltf->Model.name = this->Name;
-  return gltf;
-}
-
-void SequenceFiles::WriteSimVascular(const std::string& folder, const PhaseMesh& phase,
-  const std::vector<coronary::MeshSequenceReport::Face>& faces, double unit)
-{
-  vtkNew<vtkUnstructuredGrid> grid;
-  const std::vector<std::int64_t> all = Numbered(static_cast<std::size_t>(this->Topo.points));
-  grid->SetPoints(PointsOf(phase.mesh, std::vector<vtkIdType>(all.begin(), all.end()), unit));
-  grid->SetCells(VTK_TETRA, this->Tetrahedra);
-  AddIds(grid->GetPointData(), GlobalNodeID, all);
-  AddIds(grid->GetCellData(), GlobalElementID, Numbered(this->Topo.tetrahedra.size()));
-  vtkCoronary::AddArray<vtkIntArray>(
-    grid->GetCellData(), ModelRegionID, std::vector<int>(this->Topo.tetrahedra.size(), 1));
-  this->Write(folder + "/mesh-complete.mesh.vtu", XmlOf(grid));
-  this->Write(
-    folder + "/mesh-complete.exterior.vtp", XmlOf(this->Face(phase, this->Surface, unit)));
-  for (const auto& face : faces)
-  {
-    auto patch = this->Faces.find(face.id);
-    if (patch == this->Faces.end())
-    {
-      patch = this->Faces.emplace(face.id, this->Topo.PatchOf(face.id)).first;
-    }
-    const std::string text = XmlOf(this->Face(phase, patch->second, unit));
-    this->Write(folder + "/mesh-surfaces/" + face.name + ".vtp", text);
-    if (face.id == WallId)
-    {
-      this->Write(folder + "/walls_combined.vtp", text);
-    }
-  }
-}
-
-std::string SequenceFiles::BytesOf(const std::string& kind, const PhaseMesh& phase,
-  const std::vector<coronary::MeshSequenceReport::Face>& faces, bool keepWeights) const
-{
-  if (kind == "volume")
-  {
-    return XmlOf(this->Volume(phase, keepWeights));
-  }
-  if (kind == "surface")
-  {
-    return XmlOf(this->SurfaceOf(phase, keepWeights));
-  }
-  if (kind == "vmtk")
-  {
-    return XmlOf(this->Vmtk(phase, keepWeights));
-  }
-  const coronary::FileSurface surface = this->PlainSurface(phase, faces, kind == "ply");
-  return kind == "obj" ? coronary::ObjText(surface)
-    : kind == "ply"    ? coronary::PlyBytes(surface)
-                       : coronary::StlBytes(surface);
-}
-
-/// Files of one kind over the phases.
-struct Series
-{
-  std::string kind; ///< in the report
-  std::string stem; ///< of the files' names
-  std::string extension;
-  std::vector<coronary::TimedFile> files;
-};
-
-/// A phase in the report with the names of its files, which the series get too.
-coronary::MeshSequenceReport::Phase EntryOf(double time, std::size_t phase,
-  const SequenceFiles& files, bool simVascular, std::vector<Series>& series)
-{
-  coronary::MeshSequenceReport::Phase entry;
-  entry.time = time;
-  for (Series& one : series)
-  {
-    const std::string file =
-      files.Prefix + one.stem + "_" + files.Number(phase) + "." + one.extension;
-    one.files.push_back({ file, time });
-    entry.files.emplace_back(one.kind, file);
-  }
-  if (simVascular)
-  {
-    entry.files.emplace_back(
-      "simvascular", files.Prefix + "simvascular/phase_" + files.Number(phase) + "/mesh-complete");
-  }
-  return entry;
 }
 
 /// What the report has of a phase as plain numbers, and back.
@@ -1155,7 +255,7 @@ void vtkMeshSequenceWriter::Validate() const
   {
     Require(id >= 1, "FaceName: ids begin with 1");
     Require(!name.empty() && name.front() != '.' &&
-        std::all_of(name.begin(), name.end(), IsNameCharacter),
+        std::all_of(name.begin(), name.end(), vtkMeshSequence::IsNameCharacter),
       "FaceName '" + name + "' must be of letters, digits, '-', '_' and '.'");
   }
 }
@@ -1221,210 +321,252 @@ void vtkMeshSequenceWriter::WriteData()
   }
 }
 
-void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
+/// One Write().
+class vtkMeshSequenceWriter::Run
 {
-  std::vector<double> times = this->WantedTimes(info);
-  vtkCoronary::Moment moment;
-  moment.exists = !times.empty();
-  if (times.empty())
-  {
-    times.push_back(0.0);
-  }
-  const coronary::ProgressCallback report = [this](double fraction)
-  {
-    this->UpdateProgress(fraction);
-    return !this->GetAbortExecute();
-  };
-  coronary::RankGroup& ranks = this->Ranks != nullptr ? *this->Ranks : coronary::RankGroup::Alone();
-  auto* boundary = vtkPolyData::SafeDownCast(this->GetInput(1));
-  auto* caps = vtkPolyData::SafeDownCast(this->GetInput(2));
+public:
+  Run(vtkMeshSequenceWriter* self, vtkInformation* info);
 
-  coronary::MeshSequenceReport result;
-  result.poorAngle = this->PoorDihedralAngle * Degree;
-  std::unique_ptr<SequenceFiles> files;
-  std::vector<Series> series;
-  std::unique_ptr<vtkGltfModel> gltf;
-  vtkCoronary::UpstreamRequest request(info, info);
+  void WriteAll();
+
+  coronary::MeshSequenceReport Result;
+
+private:
+  vtkPointSet* MeshAt(std::size_t k);
+  void Begin(vtkPointSet* mesh);
+  bool NeedsMeshAt(std::size_t k) const;
+  coronary::MeshSequenceReport::Phase Name(std::size_t k);
+  vtkMeshSequence::PhaseMesh Measure(std::size_t k, vtkPointSet* mesh) const;
+  void WritePhase(std::size_t k);
+  void Finish();
+
+  vtkMeshSequenceWriter* Self;
+  vtkInformation* Info;
+  coronary::RankGroup& Ranks;
+  coronary::ProgressCallback Progress;
+  std::vector<double> Times;
+  vtkCoronary::Moment Moment;
+  vtkCoronary::UpstreamRequest Request;
+  std::unique_ptr<vtkMeshSequence::Files> Files; ///< when the first phase is known
+  std::vector<std::unique_ptr<vtkMeshSequence::Format>> Formats;
+};
+
+vtkMeshSequenceWriter::Run::Run(vtkMeshSequenceWriter* self, vtkInformation* info)
+  : Self(self)
+  , Info(info)
+  , Ranks(self->Ranks != nullptr ? *self->Ranks : coronary::RankGroup::Alone())
+  , Progress(
+      [self](double fraction)
+      {
+        self->UpdateProgress(fraction);
+        return !self->GetAbortExecute();
+      })
+  , Times(self->WantedTimes(info))
+  , Request(info, info)
+{
+  this->Moment.exists = !this->Times.empty();
+  if (this->Times.empty())
+  {
+    this->Times.push_back(0.0);
+  }
+  this->Result.poorAngle = self->PoorDihedralAngle * Degree;
+}
+
+/// @throws std::invalid_argument when it is empty or of another time
+vtkPointSet* vtkMeshSequenceWriter::Run::MeshAt(std::size_t k)
+{
+  const double time = this->Times[k];
+  this->Moment.time = time;
+  this->Request.Ask(nullptr, this->Moment);
+  auto* mesh = vtkPointSet::SafeDownCast(vtkDataObject::GetData(this->Info));
+  const std::string name = PhaseName(k, time);
+  Require(mesh != nullptr && mesh->GetNumberOfPoints() > 0 && mesh->GetNumberOfCells() > 0,
+    "The mesh is empty at " + name);
+  if (this->Moment.exists && mesh->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
+  {
+    const double given = mesh->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
+    std::ostringstream text;
+    text << "The input answers for " << name << " with its mesh of time " << given
+         << ": take its time steps, or put a vtkCardiacPhaseInterpolator before it";
+    Require(std::abs(given - time) <= 1e-9 * std::max(1.0, std::abs(time)), text.str());
+  }
+  return mesh;
+}
+
+/// The first phase says what all have to be like.
+void vtkMeshSequenceWriter::Run::Begin(vtkPointSet* mesh)
+{
+  vtkMeshSequenceWriter* self = this->Self;
+  vtkMeshSequence::Topology topology = vtkMeshSequence::TopologyOf(
+    mesh, vtkPolyData::SafeDownCast(self->GetInput(1)), names::CellEntityIds);
+  Require(!topology.tetrahedra.empty() || (!self->WriteSimVascular && !self->WriteVmtk),
+    "WriteSimVascular and WriteVmtk need tetrahedra, and the mesh is a surface");
+  this->Result.points = topology.points;
+  this->Result.tetrahedra = static_cast<std::int64_t>(topology.tetrahedra.size());
+  this->Result.triangles = static_cast<std::int64_t>(topology.triangles.size());
+  this->Result.faces = vtkMeshSequence::FacesOf(topology, self->FaceNames,
+    vtkMeshSequence::NamesOfCaps(
+      vtkPolyData::SafeDownCast(self->GetInput(2)), names::CellEntityIds));
+  const std::string stem = fs::path(self->FileName).stem().string();
+  this->Files = std::make_unique<vtkMeshSequence::Files>(self->FileName,
+    self->PrefixFiles ? stem + "_" : std::string(), self->Digits, this->Times.size(),
+    std::move(topology), this->Result.faces, self->KeepWeights, this->Ranks);
+  this->Result.prefix = this->Files->prefix;
+  this->Result.surfacePoints = static_cast<std::int64_t>(this->Files->surface.points.size());
+
+  vtkMeshSequence::FormatSettings formats;
+  formats.series = self->WriteSeries;
+  formats.simVascular = self->WriteSimVascular;
+  formats.vmtk = self->WriteVmtk;
+  formats.obj = self->WriteObj;
+  formats.ply = self->WritePly;
+  formats.stl = self->WriteStl;
+  formats.gltf = self->WriteGltf;
+  formats.gltfJson = self->WriteGltfJson;
+  formats.simVascularUnit = self->SimVascularUnit;
+  formats.gltfInfluences = self->GltfInfluences;
+  formats.period = self->Period;
+  formats.gltfLoop = self->GltfLoop;
+  this->Formats = vtkMeshSequence::MakeFormats(formats, *this->Files, mesh, this->Ranks.IsFirst());
+}
+
+bool vtkMeshSequenceWriter::Run::NeedsMeshAt(std::size_t k) const
+{
+  return k == 0 || this->Ranks.Owns(k) ||
+    std::any_of(this->Formats.begin(), this->Formats.end(),
+      [](const auto& format) { return format->NeedsAll(); });
+}
+
+coronary::MeshSequenceReport::Phase vtkMeshSequenceWriter::Run::Name(std::size_t k)
+{
+  coronary::MeshSequenceReport::Phase entry;
+  entry.time = this->Times[k];
+  for (const auto& format : this->Formats)
+  {
+    format->Name(k, entry.time, entry);
+  }
+  return entry;
+}
+
+vtkMeshSequence::PhaseMesh vtkMeshSequenceWriter::Run::Measure(
+  std::size_t k, vtkPointSet* mesh) const
+{
+  const vtkMeshSequence::Topology& topology = this->Files->topology;
+  vtkMeshSequence::PhaseMesh phase;
+  phase.mesh = mesh;
+  phase.time = this->Times[k];
   try
   {
-    for (std::size_t k = 0; k < times.size(); ++k)
+    vtkMeshSequence::RequireSame(topology, mesh);
+    const std::vector<coronary::Vector3> points = vtkMeshSequence::ReadPoints(mesh);
+    phase.tetrahedra =
+      coronary::MeasureTetrahedra(points, topology.tetrahedra, this->Result.poorAngle);
+    phase.surface = coronary::MeasureTriangles(points, topology.triangles);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::invalid_argument("At " + PhaseName(k, phase.time) + ": " + error.what());
+  }
+  return phase;
+}
+
+void vtkMeshSequenceWriter::Run::WritePhase(std::size_t k)
+{
+  if (!this->NeedsMeshAt(k))
+  {
+    this->Result.phases.push_back(this->Name(k));
+    return;
+  }
+  const auto count = static_cast<double>(this->Times.size());
+  coronary::Report(this->Progress, static_cast<double>(k) / count);
+  vtkPointSet* mesh = this->MeshAt(k);
+  if (!this->Files)
+  {
+    this->Begin(mesh);
+  }
+  coronary::MeshSequenceReport::Phase entry = this->Name(k);
+  for (const auto& format : this->Formats)
+  {
+    format->Collect(mesh, entry.time);
+  }
+  if (this->Ranks.Owns(k))
+  {
+    vtkMeshSequence::PhaseMesh phase = this->Measure(k, mesh);
+    for (const auto& format : this->Formats)
     {
-      // The first phase says what all have to be like.
-      if (k > 0 && !ranks.Owns(k) && !gltf)
-      {
-        result.phases.push_back(EntryOf(times[k], k, *files, this->WriteSimVascular, series));
-        continue;
-      }
-      coronary::Report(report, static_cast<double>(k) / static_cast<double>(times.size()));
-      moment.time = times[k];
-      request.Ask(nullptr, moment);
-      auto* mesh = vtkPointSet::SafeDownCast(vtkDataObject::GetData(info));
-      const std::string name = PhaseName(k, times[k]);
-      Require(mesh != nullptr && mesh->GetNumberOfPoints() > 0 && mesh->GetNumberOfCells() > 0,
-        "The mesh is empty at " + name);
-      if (moment.exists && mesh->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
-      {
-        const double given = mesh->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
-        std::ostringstream text;
-        text << "The input answers for " << name << " with its mesh of time " << given
-             << ": take its time steps, or put a vtkCardiacPhaseInterpolator before it";
-        Require(std::abs(given - times[k]) <= 1e-9 * std::max(1.0, std::abs(times[k])), text.str());
-      }
-      if (!files)
-      {
-        Topology topology = TopologyOf(mesh, boundary, names::CellEntityIds);
-        Require(!topology.tetrahedra.empty() || (!this->WriteSimVascular && !this->WriteVmtk),
-          "WriteSimVascular and WriteVmtk need tetrahedra, and the mesh is a surface");
-        result.points = topology.points;
-        result.tetrahedra = static_cast<std::int64_t>(topology.tetrahedra.size());
-        result.triangles = static_cast<std::int64_t>(topology.triangles.size());
-        result.faces = FacesOf(topology, this->FaceNames, NamesOfCaps(caps, names::CellEntityIds));
-        const std::string stem = fs::path(this->FileName).stem().string();
-        files = std::make_unique<SequenceFiles>(this->FileName,
-          this->PrefixFiles ? stem + "_" : std::string(), this->Digits, times.size(),
-          std::move(topology), ranks);
-        result.prefix = files->Prefix;
-        result.surfacePoints = files->SurfacePoints();
-        if (this->WriteSeries && result.tetrahedra > 0)
-        {
-          series.push_back({ "volume", "volume", "vtu", {} });
-        }
-        if (this->WriteSeries)
-        {
-          series.push_back({ "surface", "surface", "vtp", {} });
-        }
-        if (this->WriteVmtk)
-        {
-          series.push_back({ "vmtk", "vmtk", "vtu", {} });
-        }
-        for (const auto& [wanted, kind] : { std::pair(this->WriteObj, "obj"),
-               std::pair(this->WritePly, "ply"), std::pair(this->WriteStl, "stl") })
-        {
-          if (wanted)
-          {
-            series.push_back({ kind, "surface", kind, {} });
-          }
-        }
-        // One file of all phases: the first rank goes through them all.
-        if ((this->WriteGltf || this->WriteGltfJson) && ranks.IsFirst())
-        {
-          gltf = files->NewGltf(mesh, result.faces, this->GltfInfluences);
-        }
-      }
-      coronary::MeshSequenceReport::Phase entry =
-        EntryOf(times[k], k, *files, this->WriteSimVascular, series);
-      if (gltf)
-      {
-        gltf->AddPhase(mesh, times[k]);
-      }
-      if (!ranks.Owns(k))
-      {
-        result.phases.push_back(std::move(entry));
-        continue;
-      }
-      const Topology& topology = files->GetTopology();
-      PhaseMesh phase;
-      phase.mesh = mesh;
-      phase.time = times[k];
-      try
-      {
-        RequireSame(topology, mesh);
-        const std::vector<coronary::Vector3> points = ReadPoints(mesh);
-        phase.tetrahedra =
-          coronary::MeasureTetrahedra(points, topology.tetrahedra, result.poorAngle);
-        phase.surface = coronary::MeasureTriangles(points, topology.triangles);
-      }
-      catch (const std::invalid_argument& error)
-      {
-        throw std::invalid_argument("At " + name + ": " + error.what());
-      }
-      for (const Series& one : series)
-      {
-        coronary::Report(
-          report, (static_cast<double>(k) + 0.5) / static_cast<double>(times.size()));
-        files->Write(
-          one.files.back().path, files->BytesOf(one.kind, phase, result.faces, this->KeepWeights));
-      }
-      if (this->WriteSimVascular)
-      {
-        files->WriteSimVascular(
-          entry.files.back().second, phase, result.faces, this->SimVascularUnit);
-      }
-      entry.tetrahedra = std::move(phase.tetrahedra);
-      entry.tetrahedra.volume = {};
-      entry.tetrahedra.minimumDihedral = {};
-      entry.tetrahedra.radiusEdgeRatio = {};
-      entry.surface = std::move(phase.surface);
-      result.phases.push_back(std::move(entry));
+      coronary::Report(this->Progress, (static_cast<double>(k) + 0.5) / count);
+      format->Write(phase);
     }
-    SharePhases(ranks, result, files->GetFolder());
-    for (const Series& one : series)
+    entry.tetrahedra = std::move(phase.tetrahedra);
+    entry.tetrahedra.volume = {};
+    entry.tetrahedra.minimumDihedral = {};
+    entry.tetrahedra.radiusEdgeRatio = {};
+    entry.surface = std::move(phase.surface);
+  }
+  this->Result.phases.push_back(std::move(entry));
+}
+
+/// Lists, the animation, the report; then the new files take the place of the old ones.
+void vtkMeshSequenceWriter::Run::Finish()
+{
+  vtkMeshSequence::Files& files = *this->Files;
+  const bool first = this->Ranks.IsFirst();
+  SharePhases(this->Ranks, this->Result, files.folder);
+  for (const auto& format : this->Formats)
+  {
+    format->Finish(first, this->Result);
+  }
+  const std::string quality = files.prefix + "quality.csv";
+  this->Result.files.emplace_back("quality", quality);
+  if (first)
+  {
+    files.Write(quality, coronary::MeshSequenceCsv(this->Result));
+    files.Write(files.name + ".json", coronary::MeshSequenceJson(this->Result));
+    files.folder.TakePlaceOf(coronary::MeshSequenceFiles(this->Self->FileName));
+  }
+  this->Request.Restore();
+  coronary::Report(this->Progress, 1.0);
+  if (first)
+  {
+    files.folder.Commit();
+  }
+}
+
+void vtkMeshSequenceWriter::Run::WriteAll()
+{
+  try
+  {
+    for (std::size_t k = 0; k < this->Times.size(); ++k)
     {
-      const std::string stem = files->Prefix + one.stem;
-      const std::string list = stem + "." + one.extension + ".series";
-      const bool xml = one.kind != one.extension; // a .pvd list is for VTK's own
-      if (ranks.IsFirst())
-      {
-        files->Write(list, coronary::FileSeriesText(one.files));
-        if (xml)
-        {
-          files->Write(stem + ".pvd", coronary::PvdText(one.files));
-        }
-      }
-      result.files.emplace_back(one.kind, xml ? stem + ".pvd" : list);
+      this->WritePhase(k);
     }
-    if (gltf)
-    {
-      gltf->Model.period = this->Period;
-      gltf->Model.loop = this->GltfLoop;
-      const auto write = [&](const char* kind, const char* extension, const std::string& bytes)
-      {
-        const std::string name = files->Prefix + "skin." + extension;
-        files->Write(name, bytes);
-        result.files.emplace_back(kind, name);
-      };
-      if (this->WriteGltf)
-      {
-        write("gltf", "glb", coronary::GltfBinary(gltf->Model, *gltf->Skin));
-      }
-      if (this->WriteGltfJson)
-      {
-        write("gltf-json", "gltf", coronary::GltfText(gltf->Model, *gltf->Skin));
-      }
-    }
-    result.files.emplace_back("quality", files->Prefix + "quality.csv");
-    if (ranks.IsFirst())
-    {
-      files->Write(files->Prefix + "quality.csv", coronary::MeshSequenceCsv(result));
-      files->Write(files->Name + ".json", coronary::MeshSequenceJson(result));
-      files->GetFolder().TakePlaceOf(coronary::MeshSequenceFiles(this->FileName));
-    }
-    request.Restore();
-    coronary::Report(report, 1.0);
-    if (ranks.IsFirst())
-    {
-      files->GetFolder().Commit();
-    }
+    this->Finish();
   }
   catch (const std::exception& error)
   {
     try
     {
-      request.Restore(); // else the next update would begin with the time that failed
+      this->Request.Restore(); // else the next update would begin with the time that failed
     }
     catch (const std::exception&)
     {
       // The input has said why; what came first counts.
     }
-    if (files && dynamic_cast<const coronary::Cancelled*>(&error) == nullptr)
+    if (this->Files && dynamic_cast<const coronary::Cancelled*>(&error) == nullptr)
     {
-      throw std::runtime_error(files->GetFolder().Translate(error.what()));
+      throw std::runtime_error(this->Files->folder.Translate(error.what()));
     }
     throw;
   }
-  FillTable(result, this->Quality);
-  const std::string warning = InversionWarning(result.phases);
-  if (!warning.empty() && ranks.IsFirst())
+}
+
+void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
+{
+  Run run(this, info);
+  run.WriteAll();
+  FillTable(run.Result, this->Quality);
+  const std::string warning = InversionWarning(run.Result.phases);
+  if (!warning.empty() && (this->Ranks == nullptr || this->Ranks->IsFirst()))
   {
     vtkWarningMacro(<< warning);
   }

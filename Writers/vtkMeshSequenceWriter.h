@@ -262,6 +262,7 @@ private:
   void Validate() const;
   std::vector<double> WantedTimes(vtkInformation* info) const;
   void WritePhases(vtkInformation* info);
+  class Run;
 
   char* FileName = nullptr;
   int Phases = InputSteps;

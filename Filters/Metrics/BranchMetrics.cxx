@@ -455,6 +455,37 @@ CenterlineSet LinesOf(const std::vector<TreeBranch>& branches, double tolerance,
   }
   return set;
 }
+
+/// Nearest places of another tree's branches.
+std::vector<BranchLocator::Found> Locate(const Samples& samples, const BranchLocator& locator)
+{
+  std::vector<BranchLocator::Found> found(samples.points.size());
+  ParallelFor(static_cast<std::int64_t>(found.size()), 512,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        found[i] = locator.Nearest(samples.points[i]);
+      }
+    });
+  return found;
+}
+
+/// Common length by that of both branches; 0 below the gate, which is no match, and must not keep a branch from another
+/// one.
+Eigen::MatrixXd OverlapOf(const Eigen::MatrixXd& common, const BranchMetrics& metrics, double gate)
+{
+  Eigen::MatrixXd overlap(common.rows(), common.cols());
+  for (Eigen::Index r = 0; r < common.rows(); ++r)
+  {
+    for (Eigen::Index i = 0; i < common.cols(); ++i)
+    {
+      const double share = common(r, i) / (metrics.reference[r].length + metrics.result[i].length);
+      overlap(r, i) = share >= gate && share > 0.0 ? share : 0.0;
+    }
+  }
+  return overlap;
+}
 }
 
 void BranchMetricsSettings::Validate() const
@@ -611,21 +642,8 @@ BranchMetrics CompareBranches(const BranchTree& result, const BranchTree& refere
   const Samples samplesR = SampleBranches(metrics.reference, settings);
   const BranchLocator locatorI(metrics.result);
   const BranchLocator locatorR(metrics.reference);
-  const auto locate = [&](const Samples& samples, const BranchLocator& locator)
-  {
-    std::vector<BranchLocator::Found> found(samples.points.size());
-    ParallelFor(static_cast<std::int64_t>(found.size()), 512,
-      [&](std::int64_t first, std::int64_t last)
-      {
-        for (std::int64_t i = first; i < last; ++i)
-        {
-          found[i] = locator.Nearest(samples.points[i]);
-        }
-      });
-    return found;
-  };
-  const std::vector<BranchLocator::Found> foundR = locate(samplesR, locatorI);
-  const std::vector<BranchLocator::Found> foundI = locate(samplesI, locatorR);
+  const std::vector<BranchLocator::Found> foundR = Locate(samplesR, locatorI);
+  const std::vector<BranchLocator::Found> foundI = Locate(samplesI, locatorR);
 
   Eigen::MatrixXd common = Eigen::MatrixXd::Zero(countR, countI);
   const auto nearR = [&](std::size_t i) { return foundR[i].distance <= samplesR.tolerance[i]; };
@@ -650,16 +668,7 @@ BranchMetrics CompareBranches(const BranchTree& result, const BranchTree& refere
       metrics.falseLength += samplesI.length[i];
     }
   }
-  Eigen::MatrixXd overlap(countR, countI);
-  for (Eigen::Index r = 0; r < countR; ++r)
-  {
-    for (Eigen::Index i = 0; i < countI; ++i)
-    {
-      const double share = common(r, i) / (metrics.reference[r].length + metrics.result[i].length);
-      // What is below the gate is no match, and must not keep a branch from another one.
-      overlap(r, i) = share >= settings.overlapGate && share > 0.0 ? share : 0.0;
-    }
-  }
+  const Eigen::MatrixXd overlap = OverlapOf(common, metrics, settings.overlapGate);
   const std::vector<std::int64_t> matchOf =
     countR > 0 && countI > 0 ? Assign(overlap) : std::vector<std::int64_t>(countR, -1);
   Report(work(0), 1.0);

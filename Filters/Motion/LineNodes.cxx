@@ -13,6 +13,69 @@ struct Link
   int node;
   double length;
 };
+
+/// Parents, steps and an order in which parents come first.
+void ConnectNodes(const std::vector<std::vector<Link>>& links, LineNodes& nodes)
+{
+  const std::size_t size = nodes.size();
+  nodes.parent.assign(size, -2);
+  nodes.step.assign(size, 0.0);
+  for (std::size_t root = 0; root < size; ++root)
+  {
+    if (nodes.parent[root] != -2)
+    {
+      continue;
+    }
+    nodes.parent[root] = -1;
+    nodes.order.push_back(static_cast<int>(root));
+    for (std::size_t next = nodes.order.size() - 1; next < nodes.order.size(); ++next)
+    {
+      const int node = nodes.order[next];
+      for (const Link& link : links[node])
+      {
+        if (nodes.parent[link.node] == -2)
+        {
+          nodes.parent[link.node] = node;
+          nodes.step[link.node] = std::max(link.length, 1e-3);
+          nodes.order.push_back(link.node);
+        }
+      }
+    }
+  }
+}
+
+/// From one neighbour to another one; where lines meet, along the vessel that goes straight on.
+void FindTangents(const std::vector<std::vector<Link>>& links, LineNodes& nodes)
+{
+  const std::size_t size = nodes.size();
+  nodes.tangent.assign(size, Vector3::UnitX());
+  for (std::size_t node = 0; node < size; ++node)
+  {
+    const std::vector<Link>& around = links[node];
+    double straightest = 2.0;
+    for (std::size_t a = 0; a < around.size(); ++a)
+    {
+      const Vector3 back = (nodes.position[around[a].node] - nodes.position[node]).normalized();
+      if (around.size() == 1)
+      {
+        nodes.tangent[node] = back;
+      }
+      for (std::size_t b = a + 1; b < around.size(); ++b)
+      {
+        const Vector3 on = (nodes.position[around[b].node] - nodes.position[node]).normalized();
+        if (back.dot(on) < straightest && (on - back).norm() > 1e-9)
+        {
+          straightest = back.dot(on);
+          nodes.tangent[node] = (on - back).normalized();
+        }
+      }
+    }
+    if (!(std::abs(nodes.tangent[node].norm() - 1.0) < 1e-6))
+    {
+      nodes.tangent[node] = Vector3::UnitX();
+    }
+  }
+}
 }
 
 LineNodes PlaceNodes(const MovingLines& lines, double spacing)
@@ -117,60 +180,8 @@ LineNodes PlaceNodes(const MovingLines& lines, double spacing)
   }
 
   // The forest, from the first node of each tree on.
-  const std::size_t size = nodes.size();
-  nodes.parent.assign(size, -2);
-  nodes.step.assign(size, 0.0);
-  for (std::size_t root = 0; root < size; ++root)
-  {
-    if (nodes.parent[root] != -2)
-    {
-      continue;
-    }
-    nodes.parent[root] = -1;
-    nodes.order.push_back(static_cast<int>(root));
-    for (std::size_t next = nodes.order.size() - 1; next < nodes.order.size(); ++next)
-    {
-      const int node = nodes.order[next];
-      for (const Link& link : links[node])
-      {
-        if (nodes.parent[link.node] == -2)
-        {
-          nodes.parent[link.node] = node;
-          nodes.step[link.node] = std::max(link.length, 1e-3);
-          nodes.order.push_back(link.node);
-        }
-      }
-    }
-  }
-
-  nodes.tangent.assign(size, Vector3::UnitX());
-  for (std::size_t node = 0; node < size; ++node)
-  {
-    // From one neighbour to another one; where lines meet, along the vessel that goes straight on.
-    const std::vector<Link>& around = links[node];
-    double straightest = 2.0;
-    for (std::size_t a = 0; a < around.size(); ++a)
-    {
-      const Vector3 back = (nodes.position[around[a].node] - nodes.position[node]).normalized();
-      if (around.size() == 1)
-      {
-        nodes.tangent[node] = back;
-      }
-      for (std::size_t b = a + 1; b < around.size(); ++b)
-      {
-        const Vector3 on = (nodes.position[around[b].node] - nodes.position[node]).normalized();
-        if (back.dot(on) < straightest && (on - back).norm() > 1e-9)
-        {
-          straightest = back.dot(on);
-          nodes.tangent[node] = (on - back).normalized();
-        }
-      }
-    }
-    if (!(std::abs(nodes.tangent[node].norm() - 1.0) < 1e-6))
-    {
-      nodes.tangent[node] = Vector3::UnitX();
-    }
-  }
+  ConnectNodes(links, nodes);
+  FindTangents(links, nodes);
   return nodes;
 }
 }

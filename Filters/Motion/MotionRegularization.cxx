@@ -615,6 +615,299 @@ Positions OriginOf(const Problem& problem, const MovingLines& lines)
   return origin;
 }
 
+/// What the data add to the right side of the energies' equations.
+Positions PullOf(const Problem& problem, const PoseSequence& sequence, const Positions& input,
+  const Positions& origin)
+{
+  Positions pull(input.rows(), 3);
+  for (std::int64_t point = 0; point < problem.points; ++point)
+  {
+    for (std::int64_t k = 0; k < problem.phases; ++k)
+    {
+      const Index unknown = problem.Unknown(point, k);
+      pull.row(unknown) =
+        problem.WeightOf(sequence, point, k) * (input.row(unknown) - origin.row(unknown));
+    }
+  }
+  return pull;
+}
+
+/// Keeps the limits by the method of multipliers, with over-relaxation.
+class Multipliers
+{
+public:
+  /// @param pull     towards the data, of the energies' equations
+  /// @param energies  matrix of these equations
+  Multipliers(const Limits& limits, const Positions& input, const Positions& origin,
+    const Positions& pull, std::vector<Eigen::Triplet<double>> energies)
+    : Bounds(limits)
+    , Input(input)
+    , Origin(origin)
+    , Pull(pull)
+    , Triplets(std::move(energies))
+    , OfEnergies(this->Triplets.size())
+    , Wanted(limits.List.size())
+    , Force(limits.List.size(), { Vector3::Zero(), Vector3::Zero() })
+    , Apart(limits.List.size(), 0.0)
+  {
+    this->SetPenalty(FirstPenalty);
+  }
+
+  /// @return iterations
+  int Run(const MotionRegularizationSettings& settings, Positions& positions,
+    const ProgressCallback& progress);
+
+private:
+  void SetPenalty(double penalty);
+  void ProjectAll(const Positions& positions, bool begin);
+  Positions RightSide() const;
+
+  const Limits& Bounds;
+  const Positions& Input;
+  const Positions& Origin;
+  const Positions& Pull;
+  std::vector<Eigen::Triplet<double>> Triplets;
+  std::size_t OfEnergies;
+  double Penalty = 0.0;
+  std::unique_ptr<Solver> Equations;
+  std::vector<std::array<Vector3, 2>> Wanted; ///< allowed values, by limit
+  std::vector<std::array<Vector3, 2>> Force;
+  std::vector<double> Apart; ///< mm, of the values from the wanted ones
+};
+
+void Multipliers::SetPenalty(double penalty)
+{
+  this->Penalty = penalty;
+  this->Triplets.erase(
+    this->Triplets.begin() + static_cast<std::ptrdiff_t>(this->OfEnergies), this->Triplets.end());
+  this->Bounds.AddTriplets(penalty, this->Triplets);
+  this->Equations = std::make_unique<Solver>(this->Pull.rows(), this->Triplets);
+}
+
+/// Brings each limit's values to the nearest allowed ones.
+void Multipliers::ProjectAll(const Positions& positions, bool begin)
+{
+  ParallelFor(static_cast<std::int64_t>(this->Bounds.List.size()), Grain,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        const auto n = static_cast<std::size_t>(i);
+        Vector3 values[2] = { Vector3::Zero(), Vector3::Zero() };
+        this->Bounds.Values(n, positions, values);
+        this->Apart[n] = 0.0;
+        Vector3 relaxed[2];
+        for (std::size_t row = 0; row < this->Bounds.Rows(n); ++row)
+        {
+          if (!begin)
+          {
+            this->Apart[n] = std::max(this->Apart[n], (values[row] - this->Wanted[n][row]).norm());
+            values[row] = Relaxation * values[row] + (1.0 - Relaxation) * this->Wanted[n][row];
+          }
+          values[row] += this->Force[n][row];
+          relaxed[row] = values[row];
+        }
+        this->Bounds.Project(n, values);
+        for (std::size_t row = 0; row < this->Bounds.Rows(n); ++row)
+        {
+          this->Wanted[n][row] = values[row];
+          this->Force[n][row] = relaxed[row] - values[row];
+        }
+      }
+    });
+}
+
+Positions Multipliers::RightSide() const
+{
+  Positions right = this->Pull;
+  Positions sums = Positions::Zero(this->Pull.rows(), 3);
+  for (std::size_t n = 0; n < this->Bounds.List.size(); ++n)
+  {
+    Vector3 values[2] = { this->Wanted[n][0] - this->Force[n][0], Vector3::Zero() };
+    if (this->Bounds.Rows(n) == 2)
+    {
+      values[1] = this->Wanted[n][1] - this->Force[n][1];
+    }
+    if (this->Bounds.List[n].kind == Limit::Tolerance)
+    {
+      values[0] += (this->Input.row(this->Bounds.List[n].unknowns[0]) -
+        this->Origin.row(this->Bounds.List[n].unknowns[0]))
+                     .transpose();
+    }
+    else
+    {
+      // The unknowns are what is left without the this->Origin.
+      Vector3 rest[2] = { Vector3::Zero(), Vector3::Zero() };
+      this->Bounds.Values(n, this->Origin, rest);
+      values[0] -= rest[0];
+      values[1] -= rest[1];
+    }
+    this->Bounds.Scatter(n, values, sums);
+  }
+  right += this->Penalty * sums;
+  return right;
+}
+
+int Multipliers::Run(const MotionRegularizationSettings& settings, Positions& positions,
+  const ProgressCallback& progress)
+{
+  this->ProjectAll(positions, true);
+  int stale = 0;
+  double best = std::numeric_limits<double>::infinity();
+  for (int iteration = 1; iteration <= settings.iterations; ++iteration)
+  {
+    const Positions next = this->Equations->Solve(this->RightSide()) + this->Origin;
+    const double change = (next - positions).rowwise().norm().maxCoeff();
+    positions = next;
+    this->ProjectAll(positions, false);
+    const double violation = *std::max_element(this->Apart.begin(), this->Apart.end());
+    Report(progress, 0.3 + 0.65 * iteration / settings.iterations);
+    if (violation < settings.precision && change < settings.precision)
+    {
+      return iteration;
+    }
+    stale = violation < 0.98 * best ? 0 : stale + 1;
+    best = std::min(best, violation);
+    const bool raised = this->Penalty > FirstPenalty;
+    if (stale >= StaleIterations && raised)
+    {
+      return iteration;
+    }
+    if (!raised && (stale >= StaleIterations || iteration == PatientIterations))
+    {
+      stale = 0;
+      best = std::numeric_limits<double>::infinity();
+      for (std::array<Vector3, 2>& forces : this->Force)
+      {
+        forces[0] /= 10.0;
+        forces[1] /= 10.0;
+      }
+      this->SetPenalty(10.0 * this->Penalty);
+    }
+  }
+  return settings.iterations;
+}
+
+/// Adds the bits of the limits that positions exceed.
+void FindClamps(const Limits& limits, const Positions& at, std::vector<int>& bits)
+{
+  ParallelFor(static_cast<std::int64_t>(bits.size()), Grain,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        Vector3 values[2];
+        limits.Values(static_cast<std::size_t>(n), at, values);
+        const Vector3 original[2] = { values[0], values[1] };
+        const int bit = limits.Project(static_cast<std::size_t>(n), values);
+        // Rounding alone is no clamp.
+        if (bit != 0 &&
+          ((values[0] - original[0]).norm() > 1e-9 ||
+            (limits.Rows(static_cast<std::size_t>(n)) == 2 &&
+              (values[1] - original[1]).norm() > 1e-9)))
+        {
+          bits[static_cast<std::size_t>(n)] |= bit;
+        }
+      }
+    });
+}
+
+/// What a well-tracked point may move is kept whatever else is not.
+void KeepTolerance(
+  const Limits& limits, const Positions& input, double tolerance, Positions& positions)
+{
+  for (const Limit& limit : limits.List)
+  {
+    if (limit.kind != Limit::Tolerance)
+    {
+      continue;
+    }
+    const Index unknown = limit.unknowns[0];
+    const Eigen::RowVector3d move = positions.row(unknown) - input.row(unknown);
+    const double length = move.norm();
+    if (length > tolerance)
+    {
+      positions.row(unknown) = input.row(unknown) + move * (tolerance / length);
+    }
+  }
+}
+
+/// Counts the limits that are exceeded, and marks the points of those that are clamped.
+void MarkClamps(const Problem& problem, const Limits& limits, const Positions& positions,
+  const std::vector<int>& bits, RegularizedMotion& result)
+{
+  for (std::size_t n = 0; n < limits.List.size(); ++n)
+  {
+    const Limit& limit = limits.List[n];
+    result.violations += limits.Excess(n, positions) > 0.0 ? 1 : 0;
+    if (bits[n] == 0)
+    {
+      continue;
+    }
+    // The corner's own point; both ends of a segment; the later phase of a step.
+    const auto mark = [&](Index unknown)
+    {
+      result.clamps[problem.order[static_cast<std::size_t>(unknown % problem.phases)]]
+                   [static_cast<std::size_t>(unknown / problem.phases)] |= bits[n];
+    };
+    if (limit.kind == Limit::Strain)
+    {
+      mark(limit.unknowns[0]);
+    }
+    mark(limit.kind == Limit::Tolerance ? limit.unknowns[0] : limit.unknowns[1]);
+  }
+  for (const std::vector<int>& phase : result.clamps)
+  {
+    for (const int clamp : phase)
+    {
+      for (std::size_t bit = 0; bit < result.clamped.size(); ++bit)
+      {
+        result.clamped[bit] += (clamp >> bit) & 1;
+      }
+    }
+  }
+}
+
+/// Strain and stress of all lines at one phase.
+void MeasureStrain(const MovingLines& lines, const std::vector<Vector3>& now, double youngsModulus,
+  RegularizedMotion& result)
+{
+  result.strain.emplace_back();
+  result.stress.emplace_back();
+  for (const std::vector<std::int64_t>& line : lines.lines)
+  {
+    double rest = 0.0;
+    double length = 0.0;
+    for (std::size_t p = 1; p < line.size(); ++p)
+    {
+      rest += (lines.rest[line[p]] - lines.rest[line[p - 1]]).norm();
+      length += (now[line[p]] - now[line[p - 1]]).norm();
+    }
+    result.strain.back().push_back(length / rest - 1.0);
+    result.stress.back().push_back(youngsModulus * result.strain.back().back());
+  }
+}
+
+/// Bones turn with their joints.
+void TurnBones(
+  const PoseSequence& sequence, const MovingLines& lines, std::size_t k, PoseSequence& poses)
+{
+  const std::vector<Vector3>& now = poses.points[k];
+  for (std::size_t n = 0; !sequence.rotation.empty() &&
+       sequence.rotation[k].size() == lines.lines.size() && n < lines.lines.size();
+       ++n)
+  {
+    const std::int64_t head = lines.lines[n].front();
+    const std::int64_t tail = lines.lines[n].back();
+    const Vector3 old = sequence.points[k][tail] - sequence.points[k][head];
+    const Vector3 turned = now[tail] - now[head];
+    if (old.norm() > 0.0 && turned.norm() > 0.0)
+    {
+      poses.rotation[k][n] = (LeastRotation(old, turned) * sequence.rotation[k][n]).normalized();
+    }
+  }
+}
+
 MotionEnergies EnergiesOfPositions(const Problem& problem, const Positions& positions,
   const Positions& origin, const Positions& data, const PoseSequence& sequence)
 {
@@ -718,16 +1011,7 @@ RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const MovingLin
     result.before = EnergiesOfPositions(problem, input, origin, input, sequence);
     std::vector<Eigen::Triplet<double>> triplets;
     AddEnergyTriplets(problem, sequence, triplets);
-    Positions pull(size, 3); // towards the data
-    for (std::int64_t point = 0; point < problem.points; ++point)
-    {
-      for (std::int64_t k = 0; k < problem.phases; ++k)
-      {
-        const Index unknown = problem.Unknown(point, k);
-        pull.row(unknown) =
-          problem.WeightOf(sequence, point, k) * (input.row(unknown) - origin.row(unknown));
-      }
-    }
+    const Positions pull = PullOf(problem, sequence, input, origin);
     if (settings.temporalWeight > 0.0 || settings.spatialWeight > 0.0 ||
       settings.velocityWeight > 0.0)
     {
@@ -736,177 +1020,19 @@ RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const MovingLin
     Report(progress, 0.2);
 
     const Limits limits(problem, sequence, input);
-    const auto count = static_cast<std::int64_t>(limits.List.size());
     std::vector<int> bits(limits.List.size(), 0);
-    const auto findBits = [&](const Positions& at)
-    {
-      ParallelFor(count, Grain,
-        [&](std::int64_t first, std::int64_t last)
-        {
-          for (std::int64_t n = first; n < last; ++n)
-          {
-            Vector3 values[2];
-            limits.Values(static_cast<std::size_t>(n), at, values);
-            const Vector3 original[2] = { values[0], values[1] };
-            const int bit = limits.Project(static_cast<std::size_t>(n), values);
-            // Rounding alone is no clamp.
-            if (bit != 0 &&
-              ((values[0] - original[0]).norm() > 1e-9 ||
-                (limits.Rows(static_cast<std::size_t>(n)) == 2 &&
-                  (values[1] - original[1]).norm() > 1e-9)))
-            {
-              bits[static_cast<std::size_t>(n)] |= bit;
-            }
-          }
-        });
-    };
     // What the input or its smooth form exceeds is what is clamped.
-    findBits(positions);
+    FindClamps(limits, positions, bits);
     const bool touched = std::any_of(bits.begin(), bits.end(), [](int bit) { return bit != 0; });
-    findBits(input);
+    FindClamps(limits, input, bits);
     if (touched)
     {
-      double penalty = FirstPenalty;
-      const std::size_t ofEnergies = triplets.size();
-      limits.AddTriplets(penalty, triplets);
-      auto solver = std::make_unique<Solver>(size, triplets);
+      Multipliers multipliers(limits, input, origin, pull, std::move(triplets));
       Report(progress, 0.3);
-      std::vector<std::array<Vector3, 2>> wanted(limits.List.size());
-      std::vector<std::array<Vector3, 2>> force(
-        limits.List.size(), { Vector3::Zero(), Vector3::Zero() });
-      std::vector<double> apart(limits.List.size(), 0.0);
-      const auto local = [&](bool begin)
-      {
-        ParallelFor(count, Grain,
-          [&](std::int64_t first, std::int64_t last)
-          {
-            for (std::int64_t i = first; i < last; ++i)
-            {
-              const auto n = static_cast<std::size_t>(i);
-              Vector3 values[2] = { Vector3::Zero(), Vector3::Zero() };
-              limits.Values(n, positions, values);
-              apart[n] = 0.0;
-              Vector3 relaxed[2];
-              for (std::size_t row = 0; row < limits.Rows(n); ++row)
-              {
-                if (!begin)
-                {
-                  apart[n] = std::max(apart[n], (values[row] - wanted[n][row]).norm());
-                  values[row] = Relaxation * values[row] + (1.0 - Relaxation) * wanted[n][row];
-                }
-                values[row] += force[n][row];
-                relaxed[row] = values[row];
-              }
-              limits.Project(n, values);
-              for (std::size_t row = 0; row < limits.Rows(n); ++row)
-              {
-                wanted[n][row] = values[row];
-                force[n][row] = relaxed[row] - values[row];
-              }
-            }
-          });
-      };
-      local(true);
-      int stale = 0;
-      double best = std::numeric_limits<double>::infinity();
-      for (int iteration = 1; iteration <= settings.iterations; ++iteration)
-      {
-        Positions right = pull;
-        Positions sums = Positions::Zero(size, 3);
-        for (std::size_t n = 0; n < limits.List.size(); ++n)
-        {
-          Vector3 values[2] = { wanted[n][0] - force[n][0], Vector3::Zero() };
-          if (limits.Rows(n) == 2)
-          {
-            values[1] = wanted[n][1] - force[n][1];
-          }
-          if (limits.List[n].kind == Limit::Tolerance)
-          {
-            values[0] +=
-              (input.row(limits.List[n].unknowns[0]) - origin.row(limits.List[n].unknowns[0]))
-                .transpose();
-          }
-          else
-          {
-            // The unknowns are what is left without the origin.
-            Vector3 rest[2] = { Vector3::Zero(), Vector3::Zero() };
-            limits.Values(n, origin, rest);
-            values[0] -= rest[0];
-            values[1] -= rest[1];
-          }
-          limits.Scatter(n, values, sums);
-        }
-        right += penalty * sums;
-        const Positions next = solver->Solve(right) + origin;
-        const double change = (next - positions).rowwise().norm().maxCoeff();
-        positions = next;
-        local(false);
-        result.iterations = iteration;
-        const double violation = *std::max_element(apart.begin(), apart.end());
-        Report(progress, 0.3 + 0.65 * iteration / settings.iterations);
-        if (violation < settings.precision && change < settings.precision)
-        {
-          break;
-        }
-        stale = violation < 0.98 * best ? 0 : stale + 1;
-        best = std::min(best, violation);
-        const bool raised = penalty > FirstPenalty;
-        if (stale >= StaleIterations && raised)
-        {
-          break;
-        }
-        if (!raised && (stale >= StaleIterations || iteration == PatientIterations))
-        {
-          stale = 0;
-          best = std::numeric_limits<double>::infinity();
-          penalty *= 10.0;
-          for (std::array<Vector3, 2>& forces : force)
-          {
-            forces[0] /= 10.0;
-            forces[1] /= 10.0;
-          }
-          triplets.erase(
-            triplets.begin() + static_cast<std::ptrdiff_t>(ofEnergies), triplets.end());
-          limits.AddTriplets(penalty, triplets);
-          solver = std::make_unique<Solver>(size, triplets);
-        }
-      }
-      // What a well-tracked point may move is kept whatever else is not.
-      for (const Limit& limit : limits.List)
-      {
-        if (limit.kind != Limit::Tolerance)
-        {
-          continue;
-        }
-        const Index unknown = limit.unknowns[0];
-        const Eigen::RowVector3d move = positions.row(unknown) - input.row(unknown);
-        const double length = move.norm();
-        if (length > settings.tolerance)
-        {
-          positions.row(unknown) = input.row(unknown) + move * (settings.tolerance / length);
-        }
-      }
+      result.iterations = multipliers.Run(settings, positions, progress);
+      KeepTolerance(limits, input, settings.tolerance, positions);
     }
-    for (std::size_t n = 0; n < limits.List.size(); ++n)
-    {
-      const Limit& limit = limits.List[n];
-      result.violations += limits.Excess(n, positions) > 0.0 ? 1 : 0;
-      if (bits[n] == 0)
-      {
-        continue;
-      }
-      // The corner's own point; both ends of a segment; the later phase of a step.
-      const auto mark = [&](Index unknown)
-      {
-        result.clamps[problem.order[static_cast<std::size_t>(unknown % problem.phases)]]
-                     [static_cast<std::size_t>(unknown / problem.phases)] |= bits[n];
-      };
-      if (limit.kind == Limit::Strain)
-      {
-        mark(limit.unknowns[0]);
-      }
-      mark(limit.kind == Limit::Tolerance ? limit.unknowns[0] : limit.unknowns[1]);
-    }
+    MarkClamps(problem, limits, positions, bits, result);
     result.after = EnergiesOfPositions(problem, positions, origin, input, sequence);
     result.greatestMove = (positions - input).rowwise().norm().maxCoeff();
   }
@@ -918,48 +1044,10 @@ RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const MovingLin
       phase[point] = positions.row(problem.Unknown(point, k)).transpose();
     }
   }
-  for (const std::vector<int>& phase : result.clamps)
-  {
-    for (const int clamp : phase)
-    {
-      for (std::size_t bit = 0; bit < result.clamped.size(); ++bit)
-      {
-        result.clamped[bit] += (clamp >> bit) & 1;
-      }
-    }
-  }
   for (std::size_t k = 0; k < sequence.NumberOfPhases(); ++k)
   {
-    const std::vector<Vector3>& now = result.poses.points[k];
-    result.strain.emplace_back();
-    result.stress.emplace_back();
-    for (const std::vector<std::int64_t>& line : lines.lines)
-    {
-      double rest = 0.0;
-      double length = 0.0;
-      for (std::size_t p = 1; p < line.size(); ++p)
-      {
-        rest += (lines.rest[line[p]] - lines.rest[line[p - 1]]).norm();
-        length += (now[line[p]] - now[line[p - 1]]).norm();
-      }
-      result.strain.back().push_back(length / rest - 1.0);
-      result.stress.back().push_back(settings.youngsModulus * result.strain.back().back());
-    }
-    // Bones turn with their joints.
-    for (std::size_t n = 0; !sequence.rotation.empty() &&
-         sequence.rotation[k].size() == lines.lines.size() && n < lines.lines.size();
-         ++n)
-    {
-      const std::int64_t head = lines.lines[n].front();
-      const std::int64_t tail = lines.lines[n].back();
-      const Vector3 old = sequence.points[k][tail] - sequence.points[k][head];
-      const Vector3 turned = now[tail] - now[head];
-      if (old.norm() > 0.0 && turned.norm() > 0.0)
-      {
-        result.poses.rotation[k][n] =
-          (LeastRotation(old, turned) * sequence.rotation[k][n]).normalized();
-      }
-    }
+    MeasureStrain(lines, result.poses.points[k], settings.youngsModulus, result);
+    TurnBones(sequence, lines, k, result.poses);
   }
   Report(progress, 1.0);
   return result;

@@ -1,6 +1,7 @@
 #include "PhaseInterpolation.h"
 
-#include <Eigen/Cholesky>
+#include "HarmonicFit.h"
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
@@ -15,23 +16,14 @@ namespace coronary
 {
 namespace
 {
-using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Rows = HarmonicRows;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Quaternion = Eigen::Quaterniond;
 
-constexpr double Pi = 3.14159265358979323846;
 /// Columns that one task works on.
 constexpr std::int64_t Grain = 8192;
-/// Of the Fourier fit, relative to its diagonal: enough to be solvable at any set of phases.
-constexpr double LeastRidge = 1e-9;
-constexpr double Ridges[] = { 0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3 };
-/// End of the weighted fit: the greatest change of a fitted position in one iteration, mm.
-constexpr double FitTolerance = 1e-3;
-constexpr int FitIterations = 200;
-/// Errors of predictions that make no difference, mm.
-constexpr double PredictionTolerance = 1e-4;
 
 void Require(bool condition, const char* message)
 {
@@ -39,12 +31,6 @@ void Require(bool condition, const char* message)
   {
     throw std::invalid_argument(message);
   }
-}
-
-double Modulo(double time)
-{
-  const double rest = time - std::floor(time);
-  return rest < 1.0 ? rest : 0.0;
 }
 
 double Apart(double a, double b)
@@ -77,112 +63,6 @@ MatrixXd SecondDerivatives(const std::vector<double>& knots)
     right(k, after) += 6.0 / h1;
   }
   return left.partialPivLu().solve(right);
-}
-
-VectorXd Harmonics(double time, int order)
-{
-  VectorXd row(2 * order + 1);
-  row[0] = 1.0;
-  for (int m = 1; m <= order; ++m)
-  {
-    row[2 * m - 1] = std::cos(2.0 * Pi * m * time);
-    row[2 * m] = std::sin(2.0 * Pi * m * time);
-  }
-  return row;
-}
-
-VectorXd HarmonicRates(double time, int order)
-{
-  VectorXd row(2 * order + 1);
-  row[0] = 0.0;
-  for (int m = 1; m <= order; ++m)
-  {
-    row[2 * m - 1] = -2.0 * Pi * m * std::sin(2.0 * Pi * m * time);
-    row[2 * m] = 2.0 * Pi * m * std::cos(2.0 * Pi * m * time);
-  }
-  return row;
-}
-
-VectorXd Penalty(int order, double ridge, double samples)
-{
-  VectorXd penalty = VectorXd::Zero(2 * order + 1);
-  for (int m = 1; m <= order; ++m)
-  {
-    const double strength = 0.5 * samples * (ridge * (std::pow(m, 4) - 1.0) + LeastRidge);
-    penalty[2 * m - 1] = strength;
-    penalty[2 * m] = strength;
-  }
-  return penalty;
-}
-
-/// The ridge fit as a matrix that is applied to values at the times: coefficients of the harmonics.
-MatrixXd FourierFit(const std::vector<double>& times, int order, double ridge)
-{
-  const auto count = static_cast<Index>(times.size());
-  MatrixXd design(count, 2 * order + 1);
-  for (Index k = 0; k < count; ++k)
-  {
-    design.row(k) = Harmonics(times[k], order).transpose();
-  }
-  MatrixXd normal = design.transpose() * design;
-  normal.diagonal() += Penalty(order, ridge, static_cast<double>(count));
-  return normal.ldlt().solve(design.transpose());
-}
-
-/// Principal directions of the rows' deviations from their mean, in terms of the rows: the columns of
-/// `modes` times the centred rows are orthonormal modes, strongest first.
-struct Modes
-{
-  VectorXd strength;   ///< singular values
-  MatrixXd directions; ///< eigenvectors of the Gram matrix
-};
-
-Modes ModesOf(MatrixXd gram)
-{
-  const Index count = gram.rows();
-  const MatrixXd centre =
-    MatrixXd::Identity(count, count) - MatrixXd::Constant(count, count, 1.0 / count);
-  gram = centre * gram * centre;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(0.5 * (gram + gram.transpose()));
-  Modes modes;
-  modes.strength = solver.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
-  modes.directions = solver.eigenvectors().rowwise().reverse();
-  return modes;
-}
-
-/// Product of all rows with all rows. Blocks of columns are summed in their order.
-MatrixXd GramOf(const Rows& rows)
-{
-  const Index blocks = (rows.cols() + Grain - 1) / Grain;
-  std::vector<MatrixXd> parts(static_cast<std::size_t>(blocks));
-  ParallelFor(blocks, 1,
-    [&](std::int64_t first, std::int64_t last)
-    {
-      for (std::int64_t b = first; b < last; ++b)
-      {
-        const Index start = b * Grain;
-        const auto part = rows.middleCols(start, std::min<Index>(Grain, rows.cols() - start));
-        parts[static_cast<std::size_t>(b)] = part * part.transpose();
-      }
-    });
-  MatrixXd gram = MatrixXd::Zero(rows.rows(), rows.rows());
-  for (const MatrixXd& part : parts)
-  {
-    gram += part;
-  }
-  return gram;
-}
-
-/// result = matrix * rows, over blocks of columns.
-void Multiply(const MatrixXd& matrix, const Rows& rows, Rows& result)
-{
-  result.resize(matrix.rows(), rows.cols());
-  ParallelFor(rows.cols(), Grain,
-    [&](std::int64_t first, std::int64_t last)
-    {
-      result.middleCols(first, last - first).noalias() =
-        matrix * rows.middleCols(first, last - first);
-    });
 }
 
 Vector3 Logarithm(Quaternion rotation)
@@ -265,7 +145,8 @@ PhaseInterpolation::PhaseInterpolation(const PoseSequence& sequence,
     {
       weights = (this->Confidence.array() < settings.leastConfidence).select(0.0, this->Confidence);
     }
-    this->FitLowNoise(weights, progress);
+    this->Fit_ =
+      LowNoiseFitter(this->Knots_, this->Points, weights, settings, progress).Run(this->PointsMore);
     const MatrixXd fit = FourierFit(this->Knots_, this->Fit_.order, this->Fit_.ridge);
     Multiply(fit, this->LogCalibre, this->LogCalibreMore);
     Multiply(fit, this->Tangents, this->TangentsMore);
@@ -274,6 +155,48 @@ PhaseInterpolation::PhaseInterpolation(const PoseSequence& sequence,
 }
 
 void PhaseInterpolation::Merge(const PoseSequence& sequence)
+{
+  this->GroupPhases(sequence);
+  this->MergePositions(sequence);
+  const auto knots = static_cast<Index>(this->Members.size());
+  const auto points = static_cast<Index>(sequence.points.front().size());
+  if (!sequence.confidence.empty())
+  {
+    this->Confidence = Rows::Zero(knots, points);
+    for (Index k = 0; k < knots; ++k)
+    {
+      for (const std::size_t phase : this->Members[k])
+      {
+        this->Confidence.row(k) +=
+          Eigen::Map<const Eigen::RowVectorXd>(sequence.confidence[phase].data(), points);
+      }
+      this->Confidence.row(k) /= static_cast<double>(this->Members[k].size());
+    }
+  }
+  if (!sequence.calibre.empty())
+  {
+    this->LogCalibre = Rows::Zero(knots, points);
+    for (Index k = 0; k < knots; ++k)
+    {
+      for (const std::size_t phase : this->Members[k])
+      {
+        for (Index n = 0; n < points; ++n)
+        {
+          this->LogCalibre(k, n) +=
+            this->Share(sequence, k, n, phase) * std::log(sequence.calibre[phase][n]);
+        }
+      }
+    }
+  }
+  this->MergeStatus(sequence);
+  if (!sequence.rotation.empty())
+  {
+    this->MergeRotations(sequence);
+  }
+}
+
+/// Repetitions are what is near in time around the cycle.
+void PhaseInterpolation::GroupPhases(const PoseSequence& sequence)
 {
   const std::size_t phases = sequence.NumberOfPhases();
   for (const double time : sequence.times)
@@ -332,32 +255,37 @@ void PhaseInterpolation::Merge(const PoseSequence& sequence)
     "The sequence has fewer than two different phases: times that are nearer to each other than "
     "the "
     "tolerance, modulo one cycle, are one");
-
-  const auto knots = static_cast<Index>(groups.size());
-  const auto points = static_cast<Index>(sequence.points.front().size());
   for (const Group& group : groups)
   {
     this->Knots_.push_back(group.time);
     this->Members.push_back(group.phases);
   }
+}
+
+/// What a member counts for in the mean at a point.
+double PhaseInterpolation::Share(
+  const PoseSequence& sequence, Index k, Index point, std::size_t phase) const
+{
+  double sum = 0.0;
+  for (const std::size_t member : this->Members[k])
+  {
+    sum += sequence.confidence.empty() ? 0.0 : sequence.confidence[member][point];
+  }
+  return sum > 0.0 ? sequence.confidence[phase][point] / sum
+                   : 1.0 / static_cast<double>(this->Members[k].size());
+}
+
+/// Means first; then repetitions are moved to their common time along the velocity between the
+/// neighbours, so that a steady motion is not changed by the merging.
+void PhaseInterpolation::MergePositions(const PoseSequence& sequence)
+{
+  const auto knots = static_cast<Index>(this->Members.size());
+  const auto points = static_cast<Index>(sequence.points.front().size());
   const auto position = [&](std::size_t phase)
   {
     return Eigen::Map<const Eigen::RowVectorXd>(
       points > 0 ? sequence.points[phase].front().data() : nullptr, 3 * points);
   };
-  // What a member counts for in the mean at a point.
-  const auto share = [&](Index k, Index point, std::size_t phase)
-  {
-    double sum = 0.0;
-    for (const std::size_t member : this->Members[k])
-    {
-      sum += sequence.confidence.empty() ? 0.0 : sequence.confidence[member][point];
-    }
-    return sum > 0.0 ? sequence.confidence[phase][point] / sum
-                     : 1.0 / static_cast<double>(this->Members[k].size());
-  };
-  // Means first; then repetitions are moved to their common time along the velocity between the
-  // neighbours, so that a steady motion is not changed by the merging.
   this->Points = Rows::Zero(knots, 3 * points);
   for (Index k = 0; k < knots; ++k)
   {
@@ -366,7 +294,8 @@ void PhaseInterpolation::Merge(const PoseSequence& sequence)
       const auto at = position(phase);
       for (Index n = 0; n < points; ++n)
       {
-        this->Points.row(k).segment<3>(3 * n) += share(k, n, phase) * at.segment<3>(3 * n);
+        this->Points.row(k).segment<3>(3 * n) +=
+          this->Share(sequence, k, n, phase) * at.segment<3>(3 * n);
       }
     }
   }
@@ -400,7 +329,7 @@ void PhaseInterpolation::Merge(const PoseSequence& sequence)
       Vector3 mean = Vector3::Zero();
       for (std::size_t m = 0; m < members.size(); ++m)
       {
-        mean += share(k, n, members[m]) * moved[m].segment<3>(3 * n).transpose();
+        mean += this->Share(sequence, k, n, members[m]) * moved[m].segment<3>(3 * n).transpose();
       }
       this->Points.row(k).segment<3>(3 * n) = mean.transpose();
       for (const Eigen::RowVectorXd& other : moved)
@@ -411,432 +340,73 @@ void PhaseInterpolation::Merge(const PoseSequence& sequence)
     }
   }
   this->Repeatability_ = repeated > 0.0 ? std::sqrt(squares / repeated) : 0.0;
+}
 
-  if (!sequence.confidence.empty())
+/// Of the repetition that is known best.
+void PhaseInterpolation::MergeStatus(const PoseSequence& sequence)
+{
+  if (sequence.status.empty())
   {
-    this->Confidence = Rows::Zero(knots, points);
-    for (Index k = 0; k < knots; ++k)
+    return;
+  }
+  const auto knots = static_cast<Index>(this->Members.size());
+  const auto points = static_cast<Index>(sequence.points.front().size());
+  for (Index k = 0; k < knots; ++k)
+  {
+    std::vector<TrackingStatus> status = sequence.status[this->Members[k].front()];
+    for (Index n = 0; !sequence.confidence.empty() && n < points; ++n)
     {
+      double best = -1.0;
       for (const std::size_t phase : this->Members[k])
       {
-        this->Confidence.row(k) +=
-          Eigen::Map<const Eigen::RowVectorXd>(sequence.confidence[phase].data(), points);
-      }
-      this->Confidence.row(k) /= static_cast<double>(this->Members[k].size());
-    }
-  }
-  if (!sequence.calibre.empty())
-  {
-    this->LogCalibre = Rows::Zero(knots, points);
-    for (Index k = 0; k < knots; ++k)
-    {
-      for (const std::size_t phase : this->Members[k])
-      {
-        for (Index n = 0; n < points; ++n)
+        if (sequence.confidence[phase][n] > best)
         {
-          this->LogCalibre(k, n) += share(k, n, phase) * std::log(sequence.calibre[phase][n]);
+          best = sequence.confidence[phase][n];
+          status[n] = sequence.status[phase][n];
         }
       }
     }
-  }
-  if (!sequence.status.empty())
-  {
-    for (Index k = 0; k < knots; ++k)
-    {
-      // Of the repetition that is known best.
-      std::vector<TrackingStatus> status = sequence.status[this->Members[k].front()];
-      for (Index n = 0; !sequence.confidence.empty() && n < points; ++n)
-      {
-        double best = -1.0;
-        for (const std::size_t phase : this->Members[k])
-        {
-          if (sequence.confidence[phase][n] > best)
-          {
-            best = sequence.confidence[phase][n];
-            status[n] = sequence.status[phase][n];
-          }
-        }
-      }
-      this->Status.push_back(std::move(status));
-    }
-  }
-  if (!sequence.rotation.empty())
-  {
-    const auto bones = static_cast<Index>(sequence.rotation.front().size());
-    this->Tangents = Rows::Zero(knots, 3 * bones);
-    for (Index bone = 0; bone < bones; ++bone)
-    {
-      // The rotation of the least sum of squared sines, sign of quaternions aside (Markley 2007).
-      Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
-      for (std::size_t phase = 0; phase < phases; ++phase)
-      {
-        const Eigen::Vector4d q = sequence.rotation[phase][bone].normalized().coeffs();
-        sum += q * q.transpose();
-      }
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
-      Quaternion mean;
-      mean.coeffs() = solver.eigenvectors().col(3);
-      Index strongest = 0;
-      mean.coeffs().cwiseAbs().maxCoeff(&strongest);
-      if (mean.coeffs()[3] < 0.0 || (mean.coeffs()[3] == 0.0 && mean.coeffs()[strongest] < 0.0))
-      {
-        mean.coeffs() = -mean.coeffs();
-      }
-      mean.normalize();
-      this->MeanRotation.push_back(mean);
-      for (Index k = 0; k < knots; ++k)
-      {
-        Vector3 tangent = Vector3::Zero();
-        for (const std::size_t phase : this->Members[k])
-        {
-          tangent += Logarithm(mean.conjugate() * sequence.rotation[phase][bone].normalized());
-        }
-        this->Tangents.row(k).segment<3>(3 * bone) =
-          (tangent / static_cast<double>(this->Members[k].size())).transpose();
-      }
-    }
+    this->Status.push_back(std::move(status));
   }
 }
 
-void PhaseInterpolation::FitLowNoise(const Rows& weights, const ProgressCallback& progress)
+void PhaseInterpolation::MergeRotations(const PoseSequence& sequence)
 {
-  const Index knots = this->Points.rows();
-  const Index columns = this->Points.cols();
-  const Index points = columns / 3;
-  if (points == 0)
+  const std::size_t phases = sequence.NumberOfPhases();
+  const auto knots = static_cast<Index>(this->Members.size());
+  const auto bones = static_cast<Index>(sequence.rotation.front().size());
+  this->Tangents = Rows::Zero(knots, 3 * bones);
+  for (Index bone = 0; bone < bones; ++bone)
   {
-    this->Fit_.order = 1;
-    this->PointsMore = Rows::Zero(3, 0);
-    return;
-  }
-  // A point's samples that count for less than the others of the same point are replaced, before modes
-  // are sought: by its own periodic line through those that count.
-  const bool even = (weights.array() == weights(0, 0)).all() && weights(0, 0) > 0.0;
-  const bool any = (weights.array() > 0.0).any();
-  Rows filled = this->Points;
-  if (!even)
-  {
-    ParallelFor(points, 256,
-      [&](std::int64_t first, std::int64_t last)
-      {
-        for (std::int64_t n = first; n < last; ++n)
-        {
-          const double best = weights.col(n).maxCoeff();
-          std::vector<Index> known;
-          for (Index k = 0; k < knots; ++k)
-          {
-            if (best > 0.0 && weights(k, n) > 0.0)
-            {
-              known.push_back(k);
-            }
-          }
-          if (known.empty() && any)
-          {
-            // Where nothing is known there is no motion that the modes could be of.
-            filled.middleCols(3 * n, 3).rowwise() =
-              this->Points.middleCols(3 * n, 3).colwise().mean();
-          }
-          for (Index k = 0; k < knots && !known.empty(); ++k)
-          {
-            const auto after = std::lower_bound(known.begin(), known.end(), k) - known.begin();
-            const Index b = known[static_cast<std::size_t>(after) % known.size()];
-            const Index a =
-              known[(static_cast<std::size_t>(after) + known.size() - 1) % known.size()];
-            const double gap = Modulo(this->Knots_[b] - this->Knots_[a]);
-            const double at = gap > 0.0 ? Modulo(this->Knots_[k] - this->Knots_[a]) / gap : 0.0;
-            const Vector3 line = ((1.0 - at) * this->Points.row(a).segment<3>(3 * n) +
-              at * this->Points.row(b).segment<3>(3 * n))
-                                   .transpose();
-            const double share = weights(k, n) / best;
-            if (share < 1.0)
-            {
-              filled.row(k).segment<3>(3 * n) =
-                (share * this->Points.row(k).segment<3>(3 * n) + (1.0 - share) * line.transpose())
-                  .eval();
-            }
-          }
-        }
-      });
-  }
-  Report(progress, 0.2);
-
-  // Rank, order and ridge by which phases that are left out are predicted best.
-  const MatrixXd gram = GramOf(filled);
-  const int ranks = std::min<int>(this->Settings.greatestRank, static_cast<int>(knots) - 2);
-  const int orders = this->Settings.greatestOrder;
-  std::vector<double> errors;
-  struct Choice
-  {
-    int rank;
-    int order;
-    double ridge;
-  };
-  std::vector<Choice> choices;
-  for (int rank = 1; rank <= std::max(1, ranks); ++rank)
-  {
-    for (int order = 1; order <= orders; ++order)
+    // The rotation of the least sum of squared sines, sign of quaternions aside (Markley 2007).
+    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+    for (std::size_t phase = 0; phase < phases; ++phase)
     {
-      for (const double ridge : Ridges)
-      {
-        // More coefficients than phases: the smoothest of the series that pass near to them.
-        if (2 * order + 1 > static_cast<int>(knots) - 1 && ridge == 0.0)
-        {
-          continue;
-        }
-        choices.push_back({ rank, order, ridge });
-      }
+      const Eigen::Vector4d q = sequence.rotation[phase][bone].normalized().coeffs();
+      sum += q * q.transpose();
     }
-  }
-  errors.assign(choices.size(), 0.0);
-  double total = 0.0;
-  for (Index out = 0; out < knots; ++out)
-  {
-    total += weights.row(out).sum();
-  }
-  for (Index out = 0; knots > 2 && out < knots; ++out)
-  {
-    std::vector<double> times;
-    std::vector<Index> rows;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
+    Quaternion mean;
+    mean.coeffs() = solver.eigenvectors().col(3);
+    Index strongest = 0;
+    mean.coeffs().cwiseAbs().maxCoeff(&strongest);
+    if (mean.coeffs()[3] < 0.0 || (mean.coeffs()[3] == 0.0 && mean.coeffs()[strongest] < 0.0))
+    {
+      mean.coeffs() = -mean.coeffs();
+    }
+    mean.normalize();
+    this->MeanRotation.push_back(mean);
     for (Index k = 0; k < knots; ++k)
     {
-      if (k != out)
+      Vector3 tangent = Vector3::Zero();
+      for (const std::size_t phase : this->Members[k])
       {
-        rows.push_back(k);
-        times.push_back(this->Knots_[k]);
+        tangent += Logarithm(mean.conjugate() * sequence.rotation[phase][bone].normalized());
       }
-    }
-    const Index count = knots - 1;
-    MatrixXd part(count, count);
-    for (Index a = 0; a < count; ++a)
-    {
-      for (Index b = 0; b < count; ++b)
-      {
-        part(a, b) = gram(rows[a], rows[b]);
-      }
-    }
-    const Modes modes = ModesOf(part);
-    // A prediction is a sum of the rows with these weights, a column a choice.
-    MatrixXd blend = MatrixXd::Zero(knots, static_cast<Index>(choices.size()));
-    for (std::size_t c = 0; c < choices.size(); ++c)
-    {
-      const Choice& choice = choices[c];
-      const MatrixXd fit = FourierFit(times, choice.order, choice.ridge);
-      const VectorXd smooth =
-        (Harmonics(this->Knots_[out], choice.order).transpose() * fit).transpose();
-      const Index rank = std::min<Index>(choice.rank, count - 1);
-      const auto kept = modes.directions.leftCols(rank);
-      // Mean and projected deviations, carried to the moment that was left out.
-      const double sum = smooth.sum();
-      VectorXd row = VectorXd::Constant(count, sum / static_cast<double>(count));
-      VectorXd centred = kept * (kept.transpose() * smooth);
-      centred.array() -= centred.mean();
-      row += centred;
-      for (Index k = 0; k < count; ++k)
-      {
-        blend(rows[k], static_cast<Index>(c)) = row[k];
-      }
-    }
-    const Index blocks = (points + Grain - 1) / Grain;
-    std::vector<VectorXd> parts(static_cast<std::size_t>(blocks));
-    ParallelFor(blocks, 1,
-      [&](std::int64_t first, std::int64_t last)
-      {
-        for (std::int64_t b = first; b < last; ++b)
-        {
-          const Index start = b * Grain;
-          const Index size = std::min<Index>(Grain, points - start);
-          VectorXd sums = VectorXd::Zero(blend.cols());
-          constexpr Index Few = 64;
-          for (Index at = start; at < start + size; at += Few)
-          {
-            const Index few = std::min(Few, start + size - at);
-            MatrixXd wrong = blend.transpose() * filled.middleCols(3 * at, 3 * few);
-            wrong.rowwise() -= this->Points.row(out).segment(3 * at, 3 * few);
-            for (Index n = 0; n < few; ++n)
-            {
-              sums += weights(out, at + n) * wrong.middleCols(3 * n, 3).rowwise().squaredNorm();
-            }
-          }
-          parts[static_cast<std::size_t>(b)] = sums;
-        }
-      });
-    for (const VectorXd& sums : parts)
-    {
-      for (std::size_t c = 0; c < choices.size(); ++c)
-      {
-        errors[c] += sums[static_cast<Index>(c)];
-      }
-    }
-    Report(progress, 0.2 + 0.5 * static_cast<double>(out + 1) / static_cast<double>(knots));
-  }
-  // The smallest of those that are as good as the best.
-  const double enough = *std::min_element(errors.begin(), errors.end()) * 1.001 +
-    total * PredictionTolerance * PredictionTolerance;
-  const auto best = static_cast<std::size_t>(
-    std::find_if(errors.begin(), errors.end(), [=](double e) { return e <= enough; }) -
-    errors.begin());
-  const int rank = choices[best].rank;
-  const int order = choices[best].order;
-  this->Fit_.rank = rank;
-  this->Fit_.order = order;
-  this->Fit_.ridge = choices[best].ridge;
-  this->Fit_.predicted = total > 0.0 ? std::sqrt(errors[best] / total) : 0.0;
-
-  // The fit to all phases: the strongest modes of the filled data, and their time courses.
-  const Modes modes = ModesOf(gram);
-  const MatrixXd fit = FourierFit(this->Knots_, order, this->Fit_.ridge);
-  const auto kept = modes.directions.leftCols(rank);
-  MatrixXd project = kept * kept.transpose();
-  project.colwise() -= project.rowwise().mean().eval();
-  project.array() += 1.0 / static_cast<double>(knots);
-  Multiply(fit * project, filled, this->PointsMore);
-
-  MatrixXd design(knots, 2 * order + 1);
-  for (Index k = 0; k < knots; ++k)
-  {
-    design.row(k) = Harmonics(this->Knots_[k], order).transpose();
-  }
-  if (!even && total > 0.0)
-  {
-    // Weighted low rank by alternating least squares: modes and mean of a point, given the courses;
-    // courses, given the modes.
-    MatrixXd courses; // a row a harmonic without the constant, a column a mode
-    {
-      const MatrixXd time = design.rightCols(2 * order) * fit.bottomRows(2 * order);
-      courses = fit.bottomRows(2 * order) * kept;
-      for (Index r = 0; r < rank; ++r)
-      {
-        courses.col(r) *= std::max(modes.strength[r], 1e-9);
-      }
-    }
-    const VectorXd penalty =
-      Penalty(order, this->Fit_.ridge, static_cast<double>(knots)).tail(2 * order);
-    Rows shape(rank + 1, columns); // mean, modes
-    Rows fitted(knots, columns);
-    Rows before = design * this->PointsMore;
-    const Index blocks = (points + 255) / 256;
-    struct Sums
-    {
-      std::vector<MatrixXd> gram;
-      MatrixXd moment;
-      double change = 0.0;
-    };
-    for (int iteration = 1; iteration <= FitIterations; ++iteration)
-    {
-      // Modes of like size, so that one ridge suits all of them.
-      MatrixXd values = design.rightCols(2 * order) * courses;
-      for (Index r = 0; r < rank; ++r)
-      {
-        const double size = std::sqrt(values.col(r).squaredNorm() / static_cast<double>(knots));
-        if (size > 0.0)
-        {
-          courses.col(r) /= size;
-          values.col(r) /= size;
-        }
-      }
-      MatrixXd basis(knots, rank + 1);
-      basis.col(0).setOnes();
-      basis.rightCols(rank) = values;
-      std::vector<Sums> parts(static_cast<std::size_t>(blocks));
-      ParallelFor(blocks, 1,
-        [&](std::int64_t first, std::int64_t last)
-        {
-          for (std::int64_t b = first; b < last; ++b)
-          {
-            Sums& sums = parts[static_cast<std::size_t>(b)];
-            sums.gram.assign(static_cast<std::size_t>(knots), MatrixXd::Zero(rank, rank));
-            sums.moment = MatrixXd::Zero(knots, rank);
-            for (Index n = b * 256; n < std::min<Index>(points, (b + 1) * 256); ++n)
-            {
-              const VectorXd w = weights.col(n);
-              MatrixXd normal = basis.transpose() * w.asDiagonal() * basis;
-              const double size = std::max(normal.trace(), 1e-12);
-              normal.diagonal().array() += 1e-9 * size;
-              // A point that is known at few phases moves little on its own account.
-              normal.diagonal().tail(rank).array() += 0.005 * w.maxCoeff();
-              const MatrixXd right =
-                basis.transpose() * w.asDiagonal() * this->Points.middleCols(3 * n, 3);
-              shape.middleCols(3 * n, 3) = w.sum() > 0.0 ? MatrixXd(normal.ldlt().solve(right))
-                                                         : MatrixXd(MatrixXd::Zero(rank + 1, 3));
-              if (!(w.sum() > 0.0))
-              {
-                shape.row(0).segment<3>(3 * n) = this->Points.middleCols(3 * n, 3).colwise().mean();
-              }
-              const auto u = shape.block(1, 3 * n, rank, 3);
-              const MatrixXd square = u * u.transpose();
-              for (Index k = 0; k < knots; ++k)
-              {
-                sums.gram[static_cast<std::size_t>(k)] += w[k] * square;
-                sums.moment.row(k) += w[k] *
-                  (this->Points.row(k).segment<3>(3 * n) - shape.row(0).segment<3>(3 * n)) *
-                  u.transpose();
-              }
-            }
-          }
-        });
-      MatrixXd normal = MatrixXd::Zero(2 * order * rank, 2 * order * rank);
-      MatrixXd right = MatrixXd::Zero(2 * order, rank);
-      for (Index k = 0; k < knots; ++k)
-      {
-        MatrixXd square = MatrixXd::Zero(rank, rank);
-        Eigen::RowVectorXd moment = Eigen::RowVectorXd::Zero(rank);
-        for (const Sums& sums : parts)
-        {
-          square += sums.gram[static_cast<std::size_t>(k)];
-          moment += sums.moment.row(k);
-        }
-        const VectorXd f = design.row(k).tail(2 * order).transpose();
-        right += f * moment;
-        for (Index r = 0; r < rank; ++r)
-        {
-          for (Index s = 0; s < rank; ++s)
-          {
-            normal.block(2 * order * r, 2 * order * s, 2 * order, 2 * order) +=
-              square(r, s) * f * f.transpose();
-          }
-        }
-      }
-      for (Index r = 0; r < rank; ++r)
-      {
-        const double size =
-          normal.block(2 * order * r, 2 * order * r, 2 * order, 2 * order).trace() /
-          (static_cast<double>(knots) * order);
-        normal.block(2 * order * r, 2 * order * r, 2 * order, 2 * order).diagonal() +=
-          2.0 * std::max(size, 1e-12) * penalty;
-      }
-      const VectorXd solved =
-        normal.ldlt().solve(Eigen::Map<const VectorXd>(right.data(), right.size()));
-      courses = Eigen::Map<const MatrixXd>(solved.data(), 2 * order, rank);
-      // Coefficients: mean, and courses times modes.
-      this->PointsMore.resize(2 * order + 1, columns);
-      this->PointsMore.row(0) = shape.row(0);
-      Rows modesOnly = shape.bottomRows(rank);
-      Rows moving;
-      Multiply(courses, modesOnly, moving);
-      this->PointsMore.bottomRows(2 * order) = moving;
-      Multiply(design, this->PointsMore, fitted);
-      const double change = (fitted - before).cwiseAbs().maxCoeff();
-      before.swap(fitted);
-      this->Fit_.iterations = iteration;
-      Report(progress, 0.7 + 0.3 * iteration / FitIterations);
-      if (change < FitTolerance)
-      {
-        break;
-      }
+      this->Tangents.row(k).segment<3>(3 * bone) =
+        (tangent / static_cast<double>(this->Members[k].size())).transpose();
     }
   }
-  Rows fitted;
-  Multiply(design, this->PointsMore, fitted);
-  double squares = 0.0;
-  for (Index n = 0; n < points; ++n)
-  {
-    for (Index k = 0; k < knots; ++k)
-    {
-      squares += weights(k, n) *
-        (fitted.row(k).segment<3>(3 * n) - this->Points.row(k).segment<3>(3 * n)).squaredNorm();
-    }
-  }
-  this->Fit_.residual = total > 0.0 ? std::sqrt(squares / total) : 0.0;
 }
 
 void PhaseInterpolation::Bracket(

@@ -100,7 +100,12 @@ private:
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   void Merge(const PoseSequence& sequence);
-  void FitLowNoise(const Rows& weights, const ProgressCallback& progress);
+  void GroupPhases(const PoseSequence& sequence);
+  double Share(
+    const PoseSequence& sequence, Eigen::Index k, Eigen::Index point, std::size_t phase) const;
+  void MergePositions(const PoseSequence& sequence);
+  void MergeStatus(const PoseSequence& sequence);
+  void MergeRotations(const PoseSequence& sequence);
 
   PhaseInterpolationSettings Settings;
   std::vector<double> Times; ///< of the sequence, modulo 1

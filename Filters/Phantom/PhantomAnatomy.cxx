@@ -1,10 +1,10 @@
 #include "PhantomAnatomy.h"
 
 #include "CounterRandom.h"
+#include "PhantomCourses.h"
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -31,212 +31,6 @@ enum Purpose : std::uint64_t
   Stenoses = 107,
   Plaques = 108
 };
-
-/// A control point of a vessel's course and the lumen diameter there.
-struct Control
-{
-  Vector3 position; ///< world, mm, in the mean heart of size 1
-  double diameter;  ///< mm
-};
-
-/// How much a vessel is drawn to the epicardial surface.
-enum class Course
-{
-  Epicardial,
-  Intramural
-};
-
-struct VesselPlan
-{
-  std::string name;
-  int tree;
-  std::string parent; ///< empty: starts at an ostium
-  Course course;
-  std::vector<Control> controls;
-  /// Segment from the start, then from the origin of the named child vessel on.
-  int segment;
-  std::vector<std::pair<std::string, int>> changes;
-};
-
-Control At(double l, double p, double s, double diameter)
-{
-  return { Vector3(l, p, s), diameter };
-}
-
-/// A control point by azimuth (degrees) and height (mm) on the epicardium of the mean heart.
-Control On(double azimuth, double height, double diameter)
-{
-  static const HeartFrame mean;
-  return { mean.ToWorld(HeartFrame::OnEpicardium(azimuth, height)), diameter };
-}
-
-/// Control points: Dodge 1988 (positions) and 1992 (diameters of right-dominant men), in the order
-/// of the vessel; points that Dodge does not give are placed by azimuth and height.
-std::vector<VesselPlan> PlanVessels(const PhantomSettings& settings)
-{
-  const bool rightDominant = settings.dominance == Dominance::Right;
-  const bool leftDominant = settings.dominance == Dominance::Left;
-  std::vector<VesselPlan> plans;
-
-  plans.push_back({ "LAD", 0, "", Course::Epicardial,
-    { At(0.0, 0.0, 0.0, 4.5), At(6.9, -1.2, 0.5, 4.5), At(10.8, -2.1, 0.0, 4.4),
-      At(15.0, -5.5, -0.8, 3.7), At(20.4, -10.4, -2.0, 3.6), At(25.6, -15.4, -2.6, 3.5),
-      At(30.7, -24.9, -6.3, 2.9), At(36.0, -37.3, -11.0, 2.5), At(39.1, -48.3, -19.0, 2.3),
-      At(40.1, -61.8, -31.3, 2.0), At(42.8, -74.2, -53.5, 1.7), At(46.6, -77.5, -75.8, 1.4),
-      At(44.9, -71.9, -87.8, 1.3), At(42.2, -64.9, -89.1, 1.1), At(39.2, -58.2, -89.8, 0.9) },
-    LeftMain, { { "LCx", ProximalLAD }, { "D1", MidLAD }, { "D3", DistalLAD } } });
-
-  VesselPlan circumflex{ "LCx", 0, "LAD", Course::Epicardial,
-    { At(10.8, -2.1, 0.0, 3.4), At(13.7, -1.0, -2.9, 3.4), At(16.4, 1.1, -7.3, 3.4),
-      At(18.4, 3.9, -11.3, 3.3), At(20.9, 6.4, -14.2, 2.8), At(22.3, 10.9, -18.7, 2.8),
-      At(23.5, 13.6, -23.6, 2.7), At(23.5, 17.0, -29.0, 1.7), At(20.9, 20.9, -36.5, 1.6),
-      At(19.0, 23.5, -44.8, 1.3) },
-    ProximalLCx, { { "OM1", DistalLCx } } };
-  if (rightDominant)
-  {
-    circumflex.controls.push_back(At(18.2, 18.6, -51.8, 1.1));
-  }
-  else
-  {
-    // The circumflex goes on around the groove, and is larger for it.
-    const double larger = leftDominant ? 4.2 / 3.4 : 3.8 / 3.4;
-    for (Control& control : circumflex.controls)
-    {
-      control.diameter = std::max(control.diameter * larger, leftDominant ? 2.6 : 2.3);
-    }
-    circumflex.controls.push_back(On(-50.0, 1.0, leftDominant ? 2.5 : 2.2));
-    circumflex.controls.push_back(On(-68.0, 1.0, leftDominant ? 2.4 : 2.1));
-    if (leftDominant)
-    {
-      for (const Control& control :
-        { On(-88.0, 1.0, 2.3), On(-108.0, 2.0, 2.2), On(-124.0, 7.0, 2.1), On(-126.0, 20.0, 2.0),
-          On(-120.0, 38.0, 1.7), On(-112.0, 59.0, 1.3), On(-106.0, 69.0, 1.0) })
-      {
-        circumflex.controls.push_back(control);
-      }
-      circumflex.changes.emplace_back("L-PLB", LeftPDA);
-    }
-    else
-    {
-      for (const Control& control :
-        { On(-76.0, 8.0, 2.0), On(-78.0, 20.0, 1.7), On(-77.0, 34.0, 1.4), On(-76.0, 46.0, 1.0) })
-      {
-        circumflex.controls.push_back(control);
-      }
-      circumflex.changes.emplace_back("OM3", LeftPLB);
-    }
-  }
-  plans.push_back(circumflex);
-  if (leftDominant)
-  {
-    plans.push_back({ "L-PLB", 0, "LCx", Course::Epicardial,
-      { On(-68.0, 1.0, 1.9), On(-72.0, 10.0, 1.8), On(-74.0, 22.0, 1.6), On(-75.0, 35.0, 1.3),
-        On(-76.0, 46.0, 1.0) },
-      LeftPLB, {} });
-  }
-
-  plans.push_back({ "D1", 0, "LAD", Course::Epicardial,
-    { At(27.7, -15.4, -4.5, 2.1), At(35.8, -19.8, -9.4, 1.9), At(49.9, -27.7, -24.2, 1.5),
-      At(60.4, -33.8, -34.2, 1.2), At(64.8, -39.2, -45.0, 0.9) },
-    FirstDiagonal, {} });
-  plans.push_back({ "D2", 0, "LAD", Course::Epicardial,
-    { At(35.1, -32.7, -10.2, 1.9), At(41.5, -38.7, -16.3, 1.7), At(53.1, -46.1, -31.3, 1.4),
-      At(60.6, -52.2, -42.1, 1.1), At(63.0, -56.1, -53.2, 0.9) },
-    SecondDiagonal, {} });
-  plans.push_back({ "D3", 0, "LAD", Course::Epicardial,
-    { At(41.2, -47.4, -20.4, 1.7), At(45.3, -52.1, -26.5, 1.6), At(55.2, -59.2, -39.5, 1.3),
-      At(60.0, -63.5, -50.5, 0.9) },
-    ThirdDiagonal, {} });
-  plans.push_back({ "S1", 0, "LAD", Course::Intramural,
-    { At(28.5, -20.5, -4.8, 1.4), At(25.3, -24.6, -13.0, 1.2), At(21.1, -30.2, -22.1, 1.0),
-      At(18.5, -35.0, -30.0, 0.9) },
-    FirstSeptal, {} });
-  plans.push_back({ "S2", 0, "LAD", Course::Intramural,
-    { At(36.3, -40.0, -12.5, 1.1), At(31.5, -42.6, -20.5, 1.0), At(27.5, -46.0, -28.0, 0.9) },
-    SecondSeptal, {} });
-  plans.push_back({ "S3", 0, "LAD", Course::Intramural,
-    { At(39.6, -54.5, -24.5, 1.1), At(35.0, -55.5, -32.0, 1.0), At(31.5, -58.0, -39.0, 0.9) },
-    ThirdSeptal, {} });
-  plans.push_back({ "OM1", 0, "LCx", Course::Epicardial,
-    { At(18.4, 3.9, -11.3, 2.1), At(30.3, 5.9, -16.4, 2.0), At(44.1, 0.8, -34.5, 1.5),
-      At(53.6, -3.0, -46.4, 1.2), At(57.4, -10.3, -58.3, 0.9) },
-    FirstObtuseMarginal, {} });
-  plans.push_back({ "OM2", 0, "LCx", Course::Epicardial,
-    { At(22.7, 12.0, -22.3, 2.0), At(28.4, 15.1, -30.0, 1.9), At(35.7, 12.3, -46.6, 1.4),
-      At(38.9, 7.9, -57.8, 1.1), At(40.4, 0.7, -68.9, 0.9) },
-    SecondObtuseMarginal, {} });
-  plans.push_back({ "OM3", 0, "LCx", Course::Epicardial,
-    { At(23.6, 19.8, -35.5, 1.5), At(25.4, 20.5, -41.8, 1.5), At(30.4, 16.2, -55.1, 1.3),
-      At(32.0, 11.0, -64.5, 0.9) },
-    ThirdObtuseMarginal, {} });
-  if (settings.ramus)
-  {
-    plans.push_back({ "RI", 0, "LAD", Course::Epicardial,
-      { At(10.8, -2.1, 0.0, 2.0), At(17.0, -4.0, -3.5, 1.9), On(34.0, 16.0, 1.8),
-        On(26.0, 27.0, 1.6), On(18.0, 40.0, 1.3), On(11.0, 52.0, 1.0) },
-      RamusIntermedius, {} });
-  }
-
-  VesselPlan right{ "RCA", 1, "", Course::Epicardial,
-    { At(-14.4, -30.9, -14.5, 4.0), At(-18.8, -32.4, -16.3, 4.0), At(-28.8, -36.7, -21.4, 3.9),
-      At(-35.0, -40.0, -27.5, 3.8), At(-39.1, -40.3, -35.9, 3.5), At(-43.7, -40.4, -48.6, 3.4),
-      At(-45.7, -38.1, -60.3, 3.2), At(-43.3, -33.9, -69.2, 3.2), At(-37.3, -30.5, -74.2, 3.1) },
-    ProximalRCA, { { "RV1", MidRCA }, { "AM1", DistalRCA } } };
-  if (leftDominant)
-  {
-    for (Control& control : right.controls)
-    {
-      control.diameter *= 2.8 / 4.0;
-    }
-    right.controls.back().diameter = 1.3;
-    right.controls[right.controls.size() - 2].diameter = 1.7;
-  }
-  else
-  {
-    right.controls.push_back(At(-28.9, -16.9, -74.6, 2.9));
-    right.changes.emplace_back("R-PDA", RightPLB);
-    if (rightDominant)
-    {
-      for (const Control& control : { At(-14.8, -5.7, -71.1, 2.3), At(-9.6, 1.8, -67.5, 2.0),
-             At(-5.0, 8.0, -67.6, 1.8), At(1.0, 10.0, -73.5, 1.7), At(11.3, 5.8, -80.8, 1.4),
-             At(21.1, 1.7, -77.5, 1.1), At(36.0, -1.6, -75.0, 0.9) })
-      {
-        right.controls.push_back(control);
-      }
-    }
-    else
-    {
-      right.changes.back().second = InferiorRightBranch;
-      right.controls.push_back(At(-17.0, -6.5, -74.0, 1.7));
-      right.controls.push_back(At(-8.0, -5.5, -79.5, 1.3));
-      right.controls.push_back(At(2.7, -8.1, -84.9, 1.0));
-    }
-  }
-  plans.push_back(right);
-  plans.push_back({ "RV1", 1, "RCA", Course::Epicardial,
-    { At(-35.0, -40.0, -27.5, 1.6), On(141.0, 9.0, 1.5), On(134.0, 21.0, 1.3),
-      On(127.0, 34.0, 1.0) },
-    RightVentricularBranch, {} });
-  plans.push_back({ "AM1", 1, "RCA", Course::Epicardial,
-    { At(-45.7, -38.1, -60.3, 1.9), On(183.0, 9.0, 1.8), On(177.0, 23.0, 1.6), On(169.0, 39.0, 1.2),
-      On(163.0, 53.0, 0.9) },
-    AcuteMarginal, {} });
-  if (!leftDominant)
-  {
-    plans.push_back({ "R-PDA", 1, "RCA", Course::Epicardial,
-      { At(-28.9, -16.9, -74.6, 2.2), On(-131.0, 9.0, 2.1), On(-126.0, 22.0, 2.0),
-        On(-120.0, 38.0, 1.7), On(-112.0, 59.0, 1.3), On(-106.0, 69.0, 1.0) },
-      RightPDA, {} });
-  }
-  if (rightDominant)
-  {
-    plans.push_back({ "RI-inferior", 1, "RCA", Course::Epicardial,
-      { At(-13.6, -4.0, -70.8, 1.5), At(-6.5, -4.5, -77.0, 1.5), At(2.7, -8.1, -84.9, 1.4),
-        At(14.0, -14.0, -90.5, 0.9) },
-      InferiorRightBranch, {} });
-  }
-  return plans;
-}
 
 /// A C2 cubic through points, with natural ends, parametrised by chord length.
 class CubicCurve
@@ -787,169 +581,234 @@ int Strahler(PhantomTree& tree, std::size_t branch)
   tree.branches[branch].strahlerOrder = order;
   return order;
 }
-}
 
-PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
-  : frame(HeartSize(settings))
+/// The anatomy in the making: vessels in fine steps first, then the tree that is cut from them.
+class AnatomyBuilder
 {
-  const HeartFrame mean;
-  const Variation variation(settings);
-  const std::vector<VesselPlan> plans = PlanVessels(settings);
-  std::map<std::string, std::size_t> byName;
-  for (std::size_t v = 0; v < plans.size(); ++v)
-  {
-    byName[plans[v].name] = v;
-    this->vesselNames.push_back(plans[v].name);
-    this->intramural.push_back(plans[v].course == Course::Intramural);
-  }
+public:
+  AnatomyBuilder(PhantomAnatomy& anatomy, const PhantomSettings& settings);
 
-  // Courses and calibres.
-  RandomStream calibre(settings.seed, Calibre);
-  std::vector<DenseVessel> dense(plans.size());
-  for (std::size_t v = 0; v < plans.size(); ++v)
-  {
-    const VesselPlan& plan = plans[v];
-    DenseVessel& vessel = dense[v];
-    std::vector<Vector3> controls;
-    for (const Control& control : plan.controls)
-    {
-      controls.push_back(Place(control, plan.course, mean, variation, this->frame.size));
-    }
-    double parentRadius = 0.0;
-    if (!plan.parent.empty())
-    {
-      vessel.parent = byName.at(plan.parent);
-      const DenseVessel& parent = dense[vessel.parent];
-      std::size_t nearest = 0;
-      for (std::size_t i = 1; i < parent.points.size(); ++i)
-      {
-        if ((parent.points[i] - controls[0]).squaredNorm() <
-          (parent.points[nearest] - controls[0]).squaredNorm())
-        {
-          nearest = i;
-        }
-      }
-      vessel.parentArc = parent.arc[nearest];
-      parentRadius = parent.radius[nearest];
-      // The parent's waves carry the origin along, and the first part of the side vessel with it.
-      const Vector3 shift = parent.points[nearest] - controls[0];
-      const Vector3 origin = controls[0];
-      for (Vector3& control : controls)
-      {
-        control += shift * std::exp(-(control - origin).norm() / 15.0);
-      }
-      controls[0] = parent.points[nearest];
-    }
-    const CubicCurve curve(controls);
-    const int fine = static_cast<int>(std::ceil(40.0 * static_cast<double>(controls.size())));
-    for (int i = 0; i <= fine; ++i)
-    {
-      vessel.points.push_back(curve(curve.End() * i / fine));
-    }
-    ComputeArc(vessel);
-    if (settings.seed != 0 && settings.tortuosity > 0.0)
-    {
-      RandomStream waves(settings.seed, Waves + 1000 * (v + 1));
-      AddWaves(vessel, this->frame, settings.tortuosity, waves);
-      ComputeArc(vessel);
-    }
+  void GrowVessels();
+  void PlaceRoot();
+  void PlaceLesions();
+  void CutIntoBranches();
+  void LocateLesions();
+  void AddVein();
+  void PlacePulmonaryTrunk();
 
-    std::vector<double> at;
-    std::vector<double> diameters;
-    const double vesselFactor = settings.calibre *
-      (settings.seed == 0 ? 1.0 : 1.0 + settings.calibreVariation * calibre.Normal(2.0));
-    for (std::size_t c = 0; c < controls.size(); ++c)
-    {
-      const double position = curve.Knot(c) / curve.End() * fine;
-      const auto index = std::min(static_cast<std::size_t>(position), vessel.arc.size() - 2);
-      at.push_back(vessel.arc[index] +
-        (position - static_cast<double>(index)) * (vessel.arc[index + 1] - vessel.arc[index]));
-      diameters.push_back(plan.controls[c].diameter * vesselFactor);
-    }
-    for (double s : vessel.arc)
-    {
-      // Three averaged samples take the corners out of the taper.
-      double diameter = 0.0;
-      for (const double offset : { -2.0, 0.0, 2.0 })
-      {
-        diameter += InterpolateDiameter(at, diameters, s + offset) / 3.0;
-      }
-      // A side vessel is never as wide as the vessel that it leaves.
-      const double widest = parentRadius > 0.0 ? 0.9 * parentRadius : diameter;
-      vessel.radius.push_back(std::max(SmallestRadius, std::min(0.5 * diameter, widest)));
-    }
-  }
-
-  // The aortic root goes through both ostia.
-  this->leftOstium = dense[byName.at("LAD")].points.front();
-  this->rightOstium = dense[byName.at("RCA")].points.front();
-  this->root.centre = 0.5 * (this->leftOstium + this->rightOstium);
-  this->root.radius = 0.5 * (this->leftOstium - this->rightOstium).norm();
-  const Vector3 across = (this->leftOstium - this->rightOstium).normalized();
-  const Vector3 up(-0.30, -0.20, 0.93);
-  this->root.axis = (up - up.dot(across) * across).normalized();
-  KeepOutOfAorta(dense, this->root, this->leftOstium, this->rightOstium);
-  Separate(dense);
-
-  // Lesions, away from the bifurcations so that a narrowing is where it is said to be.
-  const std::vector<std::string> hosts = settings.dominance == Dominance::Left
-    ? std::vector<std::string>{ "LAD", "LCx", "D1", "OM1" }
-    : std::vector<std::string>{ "LAD", "RCA", "LCx", "D1" };
-  const auto clearOfJunctions = [&](std::size_t host, double s, double distance)
-  {
-    for (const DenseVessel& child : dense)
-    {
-      if (child.parent == host && std::abs(child.parentArc - s) < distance)
-      {
-        return false;
-      }
-    }
-    return true;
-  };
-  const auto pickPlace = [&](RandomStream& random, int number, double distance)
-  {
-    const std::size_t host = byName.at(hosts[number % hosts.size()]);
-    const double last = std::min(80.0, dense[host].arc.back() - 10.0);
-    double s = random.Uniform(8.0, last);
-    for (int attempt = 0; attempt < 200 && !clearOfJunctions(host, s, distance); ++attempt)
-    {
-      s = random.Uniform(8.0, last);
-    }
-    return std::make_pair(host, s);
-  };
-  // Where on which vessel; points of the tree are not known yet.
+private:
+  /// Where on which vessel; points of the tree are not known yet.
   struct Lesion
   {
     std::size_t host;
     double arc;
     double width;
   };
-  std::vector<Lesion> narrowed;
-  std::vector<Lesion> calcified;
-  std::vector<std::vector<double>> healthy;
-  for (const DenseVessel& vessel : dense)
+
+  double LeaveParent(
+    const VesselPlan& plan, DenseVessel& vessel, std::vector<Vector3>& controls) const;
+  void GrowVessel(std::size_t v, RandomStream& calibre);
+  bool ClearOfJunctions(std::size_t host, double s, double distance) const;
+  std::pair<std::size_t, double> PickPlace(RandomStream& random, int number, double distance) const;
+  std::int64_t AddPoint(std::size_t v, double arc, double abscissa, int segment);
+  void Cut(std::size_t v, std::int64_t origin, int parentGroup);
+  std::int64_t NearestPoint(const Lesion& lesion) const;
+
+  PhantomAnatomy& Anatomy;
+  const PhantomSettings& Settings;
+  const Variation Varied;
+  const std::vector<VesselPlan> Plans;
+  std::map<std::string, std::size_t> ByName;
+  std::vector<DenseVessel> Dense;
+  std::vector<std::vector<double>> Healthy; ///< radii before the lesions
+  std::vector<Lesion> Narrowed;
+  std::vector<Lesion> Calcified;
+  double OcclusionStart = 0.0;
+  double OcclusionEnd = 0.0;
+  std::size_t OccludedVessel;
+  std::vector<std::vector<std::pair<double, std::size_t>>> Children; ///< arc of the origin, vessel
+};
+
+AnatomyBuilder::AnatomyBuilder(PhantomAnatomy& anatomy, const PhantomSettings& settings)
+  : Anatomy(anatomy)
+  , Settings(settings)
+  , Varied(settings)
+  , Plans(PlanVessels(settings))
+  , Dense(this->Plans.size())
+  , Children(this->Plans.size())
+{
+  for (std::size_t v = 0; v < this->Plans.size(); ++v)
   {
-    healthy.push_back(vessel.radius);
+    this->ByName[this->Plans[v].name] = v;
+    this->Anatomy.vesselNames.push_back(this->Plans[v].name);
+    this->Anatomy.intramural.push_back(this->Plans[v].course == Course::Intramural);
   }
-  RandomStream stenosisRandom(settings.seed, Stenoses);
-  for (int n = 0; n < settings.stenoses; ++n)
+  this->OccludedVessel = this->ByName.at("RCA");
+}
+
+/// Starts a side vessel on its parent.
+/// @return the parent's radius there, mm; 0 without a parent
+double AnatomyBuilder::LeaveParent(
+  const VesselPlan& plan, DenseVessel& vessel, std::vector<Vector3>& controls) const
+{
+  if (plan.parent.empty())
   {
-    const auto [host, position] = pickPlace(stenosisRandom, n, 5.0);
+    return 0.0;
+  }
+  vessel.parent = this->ByName.at(plan.parent);
+  const DenseVessel& parent = this->Dense[vessel.parent];
+  std::size_t nearest = 0;
+  for (std::size_t i = 1; i < parent.points.size(); ++i)
+  {
+    if ((parent.points[i] - controls[0]).squaredNorm() <
+      (parent.points[nearest] - controls[0]).squaredNorm())
+    {
+      nearest = i;
+    }
+  }
+  vessel.parentArc = parent.arc[nearest];
+  const double parentRadius = parent.radius[nearest];
+  // The parent's waves carry the origin along, and the first part of the side vessel with it.
+  const Vector3 shift = parent.points[nearest] - controls[0];
+  const Vector3 origin = controls[0];
+  for (Vector3& control : controls)
+  {
+    control += shift * std::exp(-(control - origin).norm() / 15.0);
+  }
+  controls[0] = parent.points[nearest];
+  return parentRadius;
+}
+
+void AnatomyBuilder::GrowVessels()
+{
+  RandomStream calibre(this->Settings.seed, Calibre);
+  for (std::size_t v = 0; v < this->Plans.size(); ++v)
+  {
+    this->GrowVessel(v, calibre);
+  }
+}
+
+/// Course and calibre.
+void AnatomyBuilder::GrowVessel(std::size_t v, RandomStream& calibre)
+{
+  static const HeartFrame mean;
+  const VesselPlan& plan = this->Plans[v];
+  DenseVessel& vessel = this->Dense[v];
+  std::vector<Vector3> controls;
+  for (const Control& control : plan.controls)
+  {
+    controls.push_back(Place(control, plan.course, mean, this->Varied, this->Anatomy.frame.size));
+  }
+  const double parentRadius = this->LeaveParent(plan, vessel, controls);
+  const CubicCurve curve(controls);
+  const int fine = static_cast<int>(std::ceil(40.0 * static_cast<double>(controls.size())));
+  for (int i = 0; i <= fine; ++i)
+  {
+    vessel.points.push_back(curve(curve.End() * i / fine));
+  }
+  ComputeArc(vessel);
+  if (this->Settings.seed != 0 && this->Settings.tortuosity > 0.0)
+  {
+    RandomStream waves(this->Settings.seed, Waves + 1000 * (v + 1));
+    AddWaves(vessel, this->Anatomy.frame, this->Settings.tortuosity, waves);
+    ComputeArc(vessel);
+  }
+
+  std::vector<double> at;
+  std::vector<double> diameters;
+  const double vesselFactor = this->Settings.calibre *
+    (this->Settings.seed == 0 ? 1.0 : 1.0 + this->Settings.calibreVariation * calibre.Normal(2.0));
+  for (std::size_t c = 0; c < controls.size(); ++c)
+  {
+    const double position = curve.Knot(c) / curve.End() * fine;
+    const auto index = std::min(static_cast<std::size_t>(position), vessel.arc.size() - 2);
+    at.push_back(vessel.arc[index] +
+      (position - static_cast<double>(index)) * (vessel.arc[index + 1] - vessel.arc[index]));
+    diameters.push_back(plan.controls[c].diameter * vesselFactor);
+  }
+  for (double s : vessel.arc)
+  {
+    // Three averaged samples take the corners out of the taper.
+    double diameter = 0.0;
+    for (const double offset : { -2.0, 0.0, 2.0 })
+    {
+      diameter += InterpolateDiameter(at, diameters, s + offset) / 3.0;
+    }
+    // A side vessel is never as wide as the vessel that it leaves.
+    const double widest = parentRadius > 0.0 ? 0.9 * parentRadius : diameter;
+    vessel.radius.push_back(std::max(SmallestRadius, std::min(0.5 * diameter, widest)));
+  }
+}
+
+/// The aortic root goes through both ostia.
+void AnatomyBuilder::PlaceRoot()
+{
+  this->Anatomy.leftOstium = this->Dense[this->ByName.at("LAD")].points.front();
+  this->Anatomy.rightOstium = this->Dense[this->ByName.at("RCA")].points.front();
+  this->Anatomy.root.centre = 0.5 * (this->Anatomy.leftOstium + this->Anatomy.rightOstium);
+  this->Anatomy.root.radius = 0.5 * (this->Anatomy.leftOstium - this->Anatomy.rightOstium).norm();
+  const Vector3 across = (this->Anatomy.leftOstium - this->Anatomy.rightOstium).normalized();
+  const Vector3 up(-0.30, -0.20, 0.93);
+  this->Anatomy.root.axis = (up - up.dot(across) * across).normalized();
+  KeepOutOfAorta(
+    this->Dense, this->Anatomy.root, this->Anatomy.leftOstium, this->Anatomy.rightOstium);
+  Separate(this->Dense);
+}
+
+bool AnatomyBuilder::ClearOfJunctions(std::size_t host, double s, double distance) const
+{
+  for (const DenseVessel& child : this->Dense)
+  {
+    if (child.parent == host && std::abs(child.parentArc - s) < distance)
+    {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Away from the bifurcations, so that a narrowing is where it is said to be.
+std::pair<std::size_t, double> AnatomyBuilder::PickPlace(
+  RandomStream& random, int number, double distance) const
+{
+  const std::vector<std::string> hosts = this->Settings.dominance == Dominance::Left
+    ? std::vector<std::string>{ "LAD", "LCx", "D1", "OM1" }
+    : std::vector<std::string>{ "LAD", "RCA", "LCx", "D1" };
+  const std::size_t host = this->ByName.at(hosts[number % hosts.size()]);
+  const double last = std::min(80.0, this->Dense[host].arc.back() - 10.0);
+  double s = random.Uniform(8.0, last);
+  for (int attempt = 0; attempt < 200 && !this->ClearOfJunctions(host, s, distance); ++attempt)
+  {
+    s = random.Uniform(8.0, last);
+  }
+  return { host, s };
+}
+
+void AnatomyBuilder::PlaceLesions()
+{
+  for (const DenseVessel& vessel : this->Dense)
+  {
+    this->Healthy.push_back(vessel.radius);
+  }
+  RandomStream stenosisRandom(this->Settings.seed, Stenoses);
+  for (int n = 0; n < this->Settings.stenoses; ++n)
+  {
+    const auto [host, position] = this->PickPlace(stenosisRandom, n, 5.0);
     const double width = stenosisRandom.Uniform(6.0, 12.0) / 2.3548;
-    narrowed.push_back({ host, position, 2.3548 * width });
-    DenseVessel& vessel = dense[host];
+    this->Narrowed.push_back({ host, position, 2.3548 * width });
+    DenseVessel& vessel = this->Dense[host];
     for (std::size_t i = 0; i < vessel.points.size(); ++i)
     {
       const double u = (vessel.arc[i] - position) / width;
       vessel.radius[i] = std::max(SmallestRadius,
-        vessel.radius[i] * (1.0 - settings.stenosisDegree * std::exp(-0.5 * u * u)));
+        vessel.radius[i] * (1.0 - this->Settings.stenosisDegree * std::exp(-0.5 * u * u)));
     }
   }
-  RandomStream plaqueRandom(settings.seed, Plaques);
-  for (int n = 0; n < settings.calcifiedPlaques; ++n)
+  RandomStream plaqueRandom(this->Settings.seed, Plaques);
+  for (int n = 0; n < this->Settings.calcifiedPlaques; ++n)
   {
-    const auto [host, position] = pickPlace(plaqueRandom, n, 3.0);
-    const DenseVessel& vessel = dense[host];
+    const auto [host, position] = this->PickPlace(plaqueRandom, n, 3.0);
+    const DenseVessel& vessel = this->Dense[host];
     const Vector3 centre = AtArc(vessel, vessel.points, position);
     const Vector3 tangent =
       (AtArc(vessel, vessel.points, position + 0.5) - AtArc(vessel, vessel.points, position - 0.5))
@@ -958,176 +817,205 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
     const double angle = plaqueRandom.Uniform(0.0, 2.0 * Pi);
     const Vector3 out = std::cos(angle) * side + std::sin(angle) * tangent.cross(side);
     const double radius = plaqueRandom.Uniform(0.5, 1.2);
-    this->plaques.push_back(
+    this->Anatomy.plaques.push_back(
       { centre + out * (AtArc(vessel, vessel.radius, position) + 0.5 * radius), radius,
         static_cast<int>(host), -1 });
-    calcified.push_back({ host, position, 2.0 * radius });
+    this->Calcified.push_back({ host, position, 2.0 * radius });
   }
-  double occlusionStart = 0.0;
-  double occlusionEnd = 0.0;
-  const std::size_t occludedVessel = byName.at("RCA");
-  if (settings.chronicOcclusion)
+  if (this->Settings.chronicOcclusion)
   {
-    const double origin = dense[byName.at("RV1")].parentArc;
-    const double next = dense[byName.at("AM1")].parentArc;
+    const double origin = this->Dense[this->ByName.at("RV1")].parentArc;
+    const double next = this->Dense[this->ByName.at("AM1")].parentArc;
     const double length = std::min(15.0, next - origin - 8.0);
-    occlusionStart = 0.5 * (origin + next - length);
-    occlusionEnd = occlusionStart + length;
+    this->OcclusionStart = 0.5 * (origin + next - length);
+    this->OcclusionEnd = this->OcclusionStart + length;
   }
+}
 
-  // Cut into branches at the origins of the side vessels, and resample evenly in between.
-  std::vector<std::vector<std::pair<double, std::size_t>>> children(plans.size());
-  for (std::size_t v = 0; v < plans.size(); ++v)
+std::int64_t AnatomyBuilder::AddPoint(std::size_t v, double arc, double abscissa, int segment)
+{
+  const DenseVessel& vessel = this->Dense[v];
+  this->Anatomy.tree.points.push_back(AtArc(vessel, vessel.points, arc));
+  this->Anatomy.tree.radius.push_back(AtArc(vessel, vessel.radius, arc));
+  this->Anatomy.tree.abscissa.push_back(abscissa);
+  this->Anatomy.tree.segmentId.push_back(segment);
+  this->Anatomy.pointVessel.push_back(static_cast<int>(v));
+  this->Anatomy.occluded.push_back(this->Settings.chronicOcclusion && v == this->OccludedVessel &&
+    arc >= this->OcclusionStart && arc <= this->OcclusionEnd);
+  return static_cast<std::int64_t>(this->Anatomy.tree.points.size()) - 1;
+}
+
+/// Depth first, so that a parent has a lower id than its daughters.
+void AnatomyBuilder::Cut(std::size_t v, std::int64_t origin, int parentGroup)
+{
+  const DenseVessel& vessel = this->Dense[v];
+  const VesselPlan& plan = this->Plans[v];
+  std::sort(this->Children[v].begin(), this->Children[v].end());
+  int segment = plan.segment;
+  double from = 0.0;
+  const double base = origin < 0 ? 0.0 : this->Anatomy.tree.abscissa[origin];
+  std::int64_t last = origin;
+  if (last < 0)
   {
-    if (dense[v].parent < plans.size())
-    {
-      children[dense[v].parent].emplace_back(dense[v].parentArc, v);
-    }
+    last = this->AddPoint(v, 0.0, 0.0, segment);
+    this->Anatomy.ends.push_back({ static_cast<int>(v), last, last + 1, plan.tree == 0 ? 2 : 3 });
   }
-  const auto addPoint = [&](std::size_t v, double arc, double abscissa, int segment)
+  struct Waiting
   {
-    const DenseVessel& vessel = dense[v];
-    this->tree.points.push_back(AtArc(vessel, vessel.points, arc));
-    this->tree.radius.push_back(AtArc(vessel, vessel.radius, arc));
-    this->tree.abscissa.push_back(abscissa);
-    this->tree.segmentId.push_back(segment);
-    this->pointVessel.push_back(static_cast<int>(v));
-    this->occluded.push_back(settings.chronicOcclusion && v == occludedVessel &&
-      arc >= occlusionStart && arc <= occlusionEnd);
-    return static_cast<std::int64_t>(this->tree.points.size()) - 1;
+    std::size_t vessel;
+    std::int64_t point;
+    int group;
   };
-  // Depth first, so that a parent has a lower id than its daughters.
-  const std::function<void(std::size_t, std::int64_t, int)> cut =
-    [&](std::size_t v, std::int64_t origin, int parentGroup)
+  std::vector<Waiting> waiting;
+  std::size_t next = 0;
+  int group = parentGroup;
+  while (from < vessel.arc.back())
   {
-    const DenseVessel& vessel = dense[v];
-    const VesselPlan& plan = plans[v];
-    std::sort(children[v].begin(), children[v].end());
-    int segment = plan.segment;
-    double from = 0.0;
-    const double base = origin < 0 ? 0.0 : this->tree.abscissa[origin];
-    std::int64_t last = origin;
-    if (last < 0)
+    const bool toEnd = next == this->Children[v].size();
+    const double to = toEnd ? vessel.arc.back() : this->Children[v][next].first;
+    PhantomBranch branch;
+    branch.groupId = static_cast<int>(this->Anatomy.tree.branches.size());
+    branch.parentGroupId = group;
+    branch.treeId = plan.tree;
+    branch.generation = group < 0 ? 0 : this->Anatomy.tree.branches[group].generation + 1;
+    branch.segmentId = segment;
+    branch.points.push_back(last);
+    const int count =
+      std::max(2, static_cast<int>(std::lround((to - from) / this->Settings.centerlineSpacing)));
+    for (int i = 1; i <= count; ++i)
     {
-      last = addPoint(v, 0.0, 0.0, segment);
-      this->ends.push_back({ static_cast<int>(v), last, last + 1, plan.tree == 0 ? 2 : 3 });
+      const double arc = from + (to - from) * i / count;
+      const std::int64_t point = this->AddPoint(v, arc, base + arc, segment);
+      this->Anatomy.steps.push_back({ last, point, static_cast<int>(v), branch.groupId });
+      branch.points.push_back(point);
+      last = point;
     }
-    struct Waiting
+    branch.length = to - from;
+    branch.tortuosity = branch.length /
+        (this->Anatomy.tree.points[branch.points.back()] -
+          this->Anatomy.tree.points[branch.points.front()])
+          .norm() -
+      1.0;
+    group = branch.groupId;
+    this->Anatomy.tree.branches.push_back(branch);
+    from = to;
+    while (next < this->Children[v].size() && this->Children[v][next].first <= to)
     {
-      std::size_t vessel;
-      std::int64_t point;
-      int group;
-    };
-    std::vector<Waiting> waiting;
-    std::size_t next = 0;
-    int group = parentGroup;
-    while (from < vessel.arc.back())
-    {
-      const bool toEnd = next == children[v].size();
-      const double to = toEnd ? vessel.arc.back() : children[v][next].first;
-      PhantomBranch branch;
-      branch.groupId = static_cast<int>(this->tree.branches.size());
-      branch.parentGroupId = group;
-      branch.treeId = plan.tree;
-      branch.generation = group < 0 ? 0 : this->tree.branches[group].generation + 1;
-      branch.segmentId = segment;
-      branch.points.push_back(last);
-      const int count =
-        std::max(2, static_cast<int>(std::lround((to - from) / settings.centerlineSpacing)));
-      for (int i = 1; i <= count; ++i)
+      const std::size_t child = this->Children[v][next].second;
+      waiting.push_back({ child, last, group });
+      this->Anatomy.junctions.push_back({ static_cast<int>(v), static_cast<int>(child), last });
+      for (const auto& change : plan.changes)
       {
-        const double arc = from + (to - from) * i / count;
-        const std::int64_t point = addPoint(v, arc, base + arc, segment);
-        this->steps.push_back({ last, point, static_cast<int>(v), branch.groupId });
-        branch.points.push_back(point);
-        last = point;
-      }
-      branch.length = to - from;
-      branch.tortuosity = branch.length /
-          (this->tree.points[branch.points.back()] - this->tree.points[branch.points.front()])
-            .norm() -
-        1.0;
-      group = branch.groupId;
-      this->tree.branches.push_back(branch);
-      from = to;
-      while (next < children[v].size() && children[v][next].first <= to)
-      {
-        const std::size_t child = children[v][next].second;
-        waiting.push_back({ child, last, group });
-        this->junctions.push_back({ static_cast<int>(v), static_cast<int>(child), last });
-        for (const auto& change : plan.changes)
+        if (change.first == this->Plans[child].name)
         {
-          if (change.first == plans[child].name)
-          {
-            segment = change.second;
-          }
+          segment = change.second;
         }
-        ++next;
       }
-    }
-    this->ends.push_back(
-      { static_cast<int>(v), last, last - 1, 4 + static_cast<int>(this->ends.size()) });
-    for (const Waiting& child : waiting)
-    {
-      cut(child.vessel, child.point, child.group);
-    }
-  };
-  for (std::size_t v = 0; v < plans.size(); ++v)
-  {
-    if (dense[v].parent >= plans.size())
-    {
-      cut(v, -1, -1);
+      ++next;
     }
   }
-  const auto nearestPoint = [&](const Lesion& lesion)
+  this->Anatomy.ends.push_back(
+    { static_cast<int>(v), last, last - 1, 4 + static_cast<int>(this->Anatomy.ends.size()) });
+  for (const Waiting& child : waiting)
   {
-    const Vector3 place = AtArc(dense[lesion.host], dense[lesion.host].points, lesion.arc);
-    std::int64_t nearest = 0;
-    double least = std::numeric_limits<double>::max();
-    for (std::size_t p = 0; p < this->tree.points.size(); ++p)
-    {
-      const double distance = (this->tree.points[p] - place).squaredNorm();
-      if (this->pointVessel[p] == static_cast<int>(lesion.host) && distance < least)
-      {
-        least = distance;
-        nearest = static_cast<std::int64_t>(p);
-      }
-    }
-    return nearest;
-  };
-  for (const Lesion& lesion : narrowed)
-  {
-    const double left = AtArc(dense[lesion.host], dense[lesion.host].radius, lesion.arc);
-    const double whole = AtArc(dense[lesion.host], healthy[lesion.host], lesion.arc);
-    this->narrowings.push_back(
-      { static_cast<int>(lesion.host), nearestPoint(lesion), lesion.width, 1.0 - left / whole });
+    this->Cut(child.vessel, child.point, child.group);
   }
-  for (std::size_t p = 0; p < calcified.size(); ++p)
-  {
-    this->plaques[p].point = nearestPoint(calcified[p]);
-  }
-  this->tree.displacement.assign(this->tree.points.size(), Vector3::Zero());
-  this->tree.velocity.assign(this->tree.points.size(), Vector3::Zero());
-  this->tree.visibility.assign(this->tree.points.size(), 1.0);
-  for (std::size_t b = 0; b < this->tree.branches.size(); ++b)
-  {
-    if (this->tree.branches[b].parentGroupId < 0)
-    {
-      Strahler(this->tree, b);
-    }
-  }
+}
 
-  std::vector<DenseVessel> whole = dense;
+/// Branches end at the origins of the side vessels; points are even in between.
+void AnatomyBuilder::CutIntoBranches()
+{
+  for (std::size_t v = 0; v < this->Plans.size(); ++v)
+  {
+    if (this->Dense[v].parent < this->Plans.size())
+    {
+      this->Children[this->Dense[v].parent].emplace_back(this->Dense[v].parentArc, v);
+    }
+  }
+  for (std::size_t v = 0; v < this->Plans.size(); ++v)
+  {
+    if (this->Dense[v].parent >= this->Plans.size())
+    {
+      this->Cut(v, -1, -1);
+    }
+  }
+  this->Anatomy.tree.displacement.assign(this->Anatomy.tree.points.size(), Vector3::Zero());
+  this->Anatomy.tree.velocity.assign(this->Anatomy.tree.points.size(), Vector3::Zero());
+  this->Anatomy.tree.visibility.assign(this->Anatomy.tree.points.size(), 1.0);
+  for (std::size_t b = 0; b < this->Anatomy.tree.branches.size(); ++b)
+  {
+    if (this->Anatomy.tree.branches[b].parentGroupId < 0)
+    {
+      Strahler(this->Anatomy.tree, b);
+    }
+  }
+}
+
+std::int64_t AnatomyBuilder::NearestPoint(const Lesion& lesion) const
+{
+  const Vector3 place =
+    AtArc(this->Dense[lesion.host], this->Dense[lesion.host].points, lesion.arc);
+  std::int64_t nearest = 0;
+  double least = std::numeric_limits<double>::max();
+  for (std::size_t p = 0; p < this->Anatomy.tree.points.size(); ++p)
+  {
+    const double distance = (this->Anatomy.tree.points[p] - place).squaredNorm();
+    if (this->Anatomy.pointVessel[p] == static_cast<int>(lesion.host) && distance < least)
+    {
+      least = distance;
+      nearest = static_cast<std::int64_t>(p);
+    }
+  }
+  return nearest;
+}
+
+/// Names the points of the tree that the lesions lie at.
+void AnatomyBuilder::LocateLesions()
+{
+  for (const Lesion& lesion : this->Narrowed)
+  {
+    const double left =
+      AtArc(this->Dense[lesion.host], this->Dense[lesion.host].radius, lesion.arc);
+    const double whole = AtArc(this->Dense[lesion.host], this->Healthy[lesion.host], lesion.arc);
+    this->Anatomy.narrowings.push_back({ static_cast<int>(lesion.host), this->NearestPoint(lesion),
+      lesion.width, 1.0 - left / whole });
+  }
+  for (std::size_t p = 0; p < this->Calcified.size(); ++p)
+  {
+    this->Anatomy.plaques[p].point = this->NearestPoint(this->Calcified[p]);
+  }
+}
+
+void AnatomyBuilder::AddVein()
+{
+  std::vector<DenseVessel> whole = this->Dense;
   for (std::size_t v = 0; v < whole.size(); ++v)
   {
-    whole[v].radius = healthy[v];
+    whole[v].radius = this->Healthy[v];
   }
-  this->vein =
-    MakeVein(this->frame, whole, dense[byName.at("LAD")], dense[byName.at("D1")].parentArc,
-      dense[byName.at("LCx")], dense[byName.at("OM1")].parentArc, settings.centerlineSpacing);
+  this->Anatomy.vein = MakeVein(this->Anatomy.frame, whole, this->Dense[this->ByName.at("LAD")],
+    this->Dense[this->ByName.at("D1")].parentArc, this->Dense[this->ByName.at("LCx")],
+    this->Dense[this->ByName.at("OM1")].parentArc, this->Settings.centerlineSpacing);
+}
 
+void AnatomyBuilder::PlacePulmonaryTrunk()
+{
   const Vector3 trunk(14.0, -38.0, 8.0);
-  this->pulmonaryBase = (trunk + variation(trunk) * 0.4) * this->frame.size;
-  this->pulmonaryAxis = Vector3(0.15, 0.5, 0.85).normalized();
+  this->Anatomy.pulmonaryBase = (trunk + this->Varied(trunk) * 0.4) * this->Anatomy.frame.size;
+  this->Anatomy.pulmonaryAxis = Vector3(0.15, 0.5, 0.85).normalized();
+}
+}
+
+PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
+  : frame(HeartSize(settings))
+{
+  AnatomyBuilder builder(*this, settings);
+  builder.GrowVessels();
+  builder.PlaceRoot();
+  builder.PlaceLesions();
+  builder.CutIntoBranches();
+  builder.LocateLesions();
+  builder.AddVein();
+  builder.PlacePulmonaryTrunk();
 }
 }

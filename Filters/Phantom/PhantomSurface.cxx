@@ -196,10 +196,10 @@ std::vector<GridBlock> FindBlocks(const PhantomAnatomy& anatomy, const Vector3& 
   return blocks;
 }
 
-Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vector3& shift,
-  double h, const ProgressCallback& progress)
+/// Signed distances to the wall at the corners of the blocks' cells.
+void SampleDistances(std::vector<GridBlock>& blocks, const PhantomLumen& lumen,
+  const Vector3& shift, double h, const ProgressCallback& progress)
 {
-  std::vector<GridBlock> blocks = FindBlocks(anatomy, shift, h);
   ParallelFor(
     static_cast<std::int64_t>(blocks.size()), 8,
     [&](std::int64_t first, std::int64_t last)
@@ -230,6 +230,13 @@ Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vec
       }
     },
     progress);
+}
+
+Mesh Extract(const PhantomAnatomy& anatomy, const PhantomLumen& lumen, const Vector3& shift,
+  double h, const ProgressCallback& progress)
+{
+  std::vector<GridBlock> blocks = FindBlocks(anatomy, shift, h);
+  SampleDistances(blocks, lumen, shift, h, progress);
 
   Mesh mesh;
   const CellSheets& sheets = CellSheets::Instance();

@@ -107,11 +107,33 @@ private:
   /// x = (Q + R)^-1 (R (2 z - s) - c), by adding what the change of the right-hand side changes; or,
   /// when `exact`, what the true residual of x does.
   void Solve(const Values& s, const Values& z, Values& right, Values& x, bool exact) const;
+  /// What a bone would feel in a row where it is not allowed.
+  struct Outside
+  {
+    std::int32_t row;
+    double gradient;
+  };
+  /// Qz + c for all pairs, and by bone what is outside of its domain.
+  /// @return energy
+  double Gradients(const Values& z, Values& gradient, bool everywhere,
+    std::vector<std::vector<Outside>>& outside) const;
+  /// @param multiplier  by row, of the sum, Joint
+  /// @param lowest      by row, gradient of any bone
+  void JudgeRows(const Values& z, const Values& gradient, Values& multiplier, Values& lowest,
+    Violation& violation) const;
+  /// Bones that are not allowed somewhere. Where a bone's weight is far away, its gradient is 0.
+  void JudgeOutside(const std::vector<std::vector<Outside>>& outside, const Values& multiplier,
+    Values& lowest, Violation& violation, std::vector<Violator>* violators) const;
   /// Qz + c for all pairs; `everywhere` judges the other bones too, and lists where they violate.
   Violation Judge(const Values& z, Values& gradient, bool everywhere,
     std::vector<Violator>* violators = nullptr) const;
   /// Another penalty when one of the residuals lags behind, as OSQP does.
   void Balance(const Values& x, const Values& z, const Values& previous, Values& s);
+  /// Change of the pairs that are free, with all others held; by rows.
+  /// @param pivot  by row the pair that follows from the others, Joint; else -1
+  Values NewtonStep(const std::vector<std::int64_t>& unknowns,
+    const std::vector<std::int64_t>& offset, const std::vector<std::int64_t>& pivot,
+    const Values& gradient) const;
   /// Exact solves with the bounds that hold as equations, until these are the right ones.
   void Polish(const ProgressCallback& progress);
   static double Dot(const Values& a, const Values& b);

@@ -389,29 +389,38 @@ struct OnBone
   std::int64_t point;
 };
 
-/// Fixes the points on bones, and puts samples where bones run between points.
-void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const SparseMatrix& k,
-  bool leaveOutside, SkinWeightSystem& system)
+using PointsOnBones = std::vector<std::vector<OnBone>>; ///< by bone, along it
+
+/// Bones that meet at each joint.
+std::vector<std::vector<std::int32_t>> BonesOfJoints(
+  const SkinWeightInput& input, std::size_t joints)
 {
-  const auto count = static_cast<std::int64_t>(mesh.points.size());
+  std::vector<std::vector<std::int32_t>> bonesOfJoint(joints);
   const auto bones = static_cast<std::int64_t>(input.bones.size());
-  const double reach = 1e-5 * mesh.diagonal;
-  std::vector<std::vector<std::int32_t>> bonesOfJoint(mesh.joints.size());
   for (std::int64_t b = 0; b < bones; ++b)
   {
     bonesOfJoint[input.bones[b].first].push_back(static_cast<std::int32_t>(b));
     bonesOfJoint[input.bones[b].second].push_back(static_cast<std::int32_t>(b));
   }
-  const auto shared = [&](std::int64_t joint)
-  {
-    std::vector<SkinWeightSystem::Target> targets;
-    for (const std::int32_t b : bonesOfJoint[joint])
-    {
-      targets.push_back({ b, 1.0 / static_cast<double>(bonesOfJoint[joint].size()) });
-    }
-    return targets;
-  };
+  return bonesOfJoint;
+}
 
+/// Weights at a joint: even ones of the bones that meet there.
+std::vector<SkinWeightSystem::Target> SharedTargets(const std::vector<std::int32_t>& meeting)
+{
+  std::vector<SkinWeightSystem::Target> targets;
+  for (const std::int32_t b : meeting)
+  {
+    targets.push_back({ b, 1.0 / static_cast<double>(meeting.size()) });
+  }
+  return targets;
+}
+
+/// @param reach  mm of the scaled mesh, within which a point is on a bone
+PointsOnBones FindPointsOnBones(const SkinWeightInput& input, const ScaledMesh& mesh, double reach)
+{
+  const auto count = static_cast<std::int64_t>(mesh.points.size());
+  const auto bones = static_cast<std::int64_t>(input.bones.size());
   std::vector<std::vector<OnBone>> pointsOf(bones);
   ParallelFor(bones, 1,
     [&](std::int64_t first, std::int64_t last)
@@ -433,7 +442,16 @@ void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const Spars
           [](const OnBone& a, const OnBone& c) { return a.along < c.along; });
       }
     });
+  return pointsOf;
+}
 
+/// Fixes the points on bones.
+void FixPoints(const SkinWeightInput& input, const ScaledMesh& mesh, double reach,
+  const std::vector<std::vector<std::int32_t>>& bonesOfJoint, const PointsOnBones& pointsOf,
+  SkinWeightSystem& system)
+{
+  const auto count = static_cast<std::int64_t>(mesh.points.size());
+  const auto bones = static_cast<std::int64_t>(input.bones.size());
   system.fixed.assign(count, {});
   // Points on joints first: there bones meet rightly.
   std::vector<std::int64_t> jointAt(count, -1);
@@ -449,7 +467,7 @@ void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const Spars
             "joints " + std::to_string(jointAt[on.point]) + " and " + std::to_string(joint) +
               " lie on the same point " + std::to_string(on.point) + " of the mesh");
           jointAt[on.point] = joint;
-          system.fixed[on.point] = shared(joint);
+          system.fixed[on.point] = SharedTargets(bonesOfJoint[joint]);
         }
       }
     }
@@ -474,8 +492,14 @@ void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const Spars
       system.fixed[on.point] = { { static_cast<std::int32_t>(b), 1.0 } };
     }
   }
+}
 
-  // Where the bone is no edge of the mesh, it is sampled.
+/// Puts samples where bones run between points: where the bone is no edge of the mesh.
+void SampleBones(const SkinWeightInput& input, const ScaledMesh& mesh, const SparseMatrix& k,
+  double reach, const std::vector<std::vector<std::int32_t>>& bonesOfJoint,
+  const PointsOnBones& pointsOf, bool leaveOutside, SkinWeightSystem& system)
+{
+  const auto bones = static_cast<std::int64_t>(input.bones.size());
   system.lengthOutside.assign(bones, 0.0);
   std::unique_ptr<TetrahedronLocator> locator;
   std::vector<char> jointSampled(mesh.joints.size(), 0);
@@ -519,7 +543,7 @@ void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const Spars
       if (!jointSampled[joint])
       {
         jointSampled[joint] = 1;
-        sample(along, 0.5, shared(joint));
+        sample(along, 0.5, SharedTargets(bonesOfJoint[joint]));
       }
     };
     const auto isEdge = [&](std::int64_t i, std::int64_t j)
@@ -574,6 +598,17 @@ void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const Spars
       "bone " + std::to_string(b) + " at " + At(input.joints[input.bones[b].first]) +
         " lies outside of the mesh");
   }
+}
+
+void Constrain(const SkinWeightInput& input, const ScaledMesh& mesh, const SparseMatrix& k,
+  bool leaveOutside, SkinWeightSystem& system)
+{
+  const double reach = 1e-5 * mesh.diagonal;
+  const std::vector<std::vector<std::int32_t>> bonesOfJoint =
+    BonesOfJoints(input, mesh.joints.size());
+  const PointsOnBones pointsOf = FindPointsOnBones(input, mesh, reach);
+  FixPoints(input, mesh, reach, bonesOfJoint, pointsOf, system);
+  SampleBones(input, mesh, k, reach, bonesOfJoint, pointsOf, leaveOutside, system);
 }
 
 /// The parts of the mesh that do not hang together must have a bone each.
@@ -764,34 +799,13 @@ SparseMatrix Permute(const SparseMatrix& matrix, const std::vector<std::int64_t>
   SparseMatrix permuted = JoinRows(parts);
   return permuted;
 }
-}
 
-SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
-  const SkinWeightSettings& settings, const ProgressCallback& progress)
+/// By bone, of the energy's linear part; rows are points yet.
+using LinearTerms = std::vector<std::vector<SkinWeightSystem::Entry>>;
+
+/// Penalties of the samples. They couple points of one tetrahedron only: no new entries.
+void AddSamples(double penalty, SparseMatrix& q, LinearTerms& linear, SkinWeightSystem& system)
 {
-  Report(progress, 0.0);
-  const ScaledMesh mesh = CheckAndScale(input);
-  SkinWeightSystem system;
-  system.unit = mesh.unit;
-  system.bones = static_cast<std::int64_t>(input.bones.size());
-  std::vector<double> mass;
-  const SparseMatrix k = Stiffness(mesh, mass);
-  Report(progress, 0.2);
-  Constrain(input, mesh, k, settings.leaveOutside, system);
-  if (!system.outside.empty())
-  {
-    return system;
-  }
-  CheckComponents(input, k, system);
-  Report(progress, 0.3);
-  std::vector<double> distance;
-  const std::vector<std::int32_t> nearest = NearestBones(mesh, k, system, distance);
-  MeasureBones(input, mesh, nearest, distance, system);
-  Report(progress, 0.4);
-
-  SparseMatrix q = settings.mode == SkinWeightMode::Harmonic ? k : Bilaplacian(k, mass);
-  Report(progress, 0.6);
-  // Penalties of the samples. They couple points of one tetrahedron only: no new entries.
   std::vector<double> original;
   if (!system.samples.empty())
   {
@@ -801,14 +815,12 @@ SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
       original[i] = *Find(q, i, i);
     }
   }
-  std::vector<std::vector<SkinWeightSystem::Entry>> linear(system.bones); // rows are points yet
-  system.constant.assign(system.bones, 0.0);
   for (const SkinWeightSystem::Sample& sample : system.samples)
   {
     double strength = 0.0;
     for (int a = 0; a < 4; ++a)
     {
-      strength += 0.25 * settings.penalty * sample.size * original[sample.points[a]];
+      strength += 0.25 * penalty * sample.size * original[sample.points[a]];
     }
     for (int a = 0; a < 4; ++a)
     {
@@ -828,8 +840,11 @@ SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
       system.constant[target.bone] += 0.5 * strength * target.value * target.value;
     }
   }
+}
 
-  // What the fixed points add.
+/// What the fixed points add.
+void AddFixedPoints(const SparseMatrix& q, LinearTerms& linear, SkinWeightSystem& system)
+{
   for (std::int64_t i = 0; i < q.rows; ++i)
   {
     for (const SkinWeightSystem::Target& target : system.fixed[i])
@@ -868,6 +883,102 @@ SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
       }
     }
   }
+}
+
+/// The linear part by rows, ascending, each once.
+void SetLinear(
+  const LinearTerms& linear, const std::vector<std::int32_t>& rowOfPoint, SkinWeightSystem& system)
+{
+  system.linear.resize(system.bones);
+  for (std::int64_t b = 0; b < system.bones; ++b)
+  {
+    std::vector<SkinWeightSystem::Entry>& entries = system.linear[b];
+    for (const SkinWeightSystem::Entry& entry : linear[b])
+    {
+      if (rowOfPoint[entry.row] >= 0)
+      {
+        entries.push_back({ rowOfPoint[entry.row], entry.value });
+      }
+    }
+    std::stable_sort(
+      entries.begin(), entries.end(), [](const auto& x, const auto& y) { return x.row < y.row; });
+    std::size_t kept = 0;
+    for (std::size_t e = 0; e < entries.size(); ++e)
+    {
+      if (kept > 0 && entries[kept - 1].row == entries[e].row)
+      {
+        entries[kept - 1].value += entries[e].value;
+      }
+      else
+      {
+        entries[kept++] = entries[e];
+      }
+    }
+    entries.resize(kept);
+  }
+}
+
+/// Bones whose points are beside each other.
+void FindNeighbours(
+  const SparseMatrix& k, const std::vector<std::int32_t>& nearest, SkinWeightSystem& system)
+{
+  system.neighbours.resize(system.bones);
+  const auto touch = [&](std::int32_t a, std::int32_t b)
+  {
+    if (a != b)
+    {
+      system.neighbours[a].push_back(b);
+      system.neighbours[b].push_back(a);
+    }
+  };
+  for (std::int64_t i = 0; i < k.rows; ++i)
+  {
+    for (std::int64_t a = k.offset[i]; a < k.offset[i + 1]; ++a)
+    {
+      touch(nearest[i], nearest[k.column[a]]);
+    }
+    for (const SkinWeightSystem::Target& target : system.fixed[i])
+    {
+      touch(nearest[i], target.bone);
+    }
+  }
+  for (std::vector<std::int32_t>& list : system.neighbours)
+  {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  }
+}
+}
+
+SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
+  const SkinWeightSettings& settings, const ProgressCallback& progress)
+{
+  Report(progress, 0.0);
+  const ScaledMesh mesh = CheckAndScale(input);
+  SkinWeightSystem system;
+  system.unit = mesh.unit;
+  system.bones = static_cast<std::int64_t>(input.bones.size());
+  std::vector<double> mass;
+  const SparseMatrix k = Stiffness(mesh, mass);
+  Report(progress, 0.2);
+  Constrain(input, mesh, k, settings.leaveOutside, system);
+  if (!system.outside.empty())
+  {
+    return system;
+  }
+  CheckComponents(input, k, system);
+  Report(progress, 0.3);
+  std::vector<double> distance;
+  const std::vector<std::int32_t> nearest = NearestBones(mesh, k, system, distance);
+  MeasureBones(input, mesh, nearest, distance, system);
+  Report(progress, 0.4);
+
+  SparseMatrix q = settings.mode == SkinWeightMode::Harmonic ? k : Bilaplacian(k, mass);
+  Report(progress, 0.6);
+  LinearTerms linear(system.bones);
+  system.constant.assign(system.bones, 0.0);
+  AddSamples(settings.penalty, q, linear, system);
+  AddFixedPoints(q, linear, system);
 
   // Free points in a fill-reducing order.
   std::vector<std::int64_t> freePoints;
@@ -896,59 +1007,8 @@ SkinWeightSystem MakeSkinWeightSystem(const SkinWeightInput& input,
     system.diagonal[r] = *Find(system.energy, row, row);
     system.nearest[r] = nearest[system.pointOfRow[r]];
   }
-  system.linear.resize(system.bones);
-  for (std::int64_t b = 0; b < system.bones; ++b)
-  {
-    std::vector<SkinWeightSystem::Entry>& entries = system.linear[b];
-    for (const SkinWeightSystem::Entry& entry : linear[b])
-    {
-      if (rowOfPoint[entry.row] >= 0)
-      {
-        entries.push_back({ rowOfPoint[entry.row], entry.value });
-      }
-    }
-    std::stable_sort(
-      entries.begin(), entries.end(), [](const auto& x, const auto& y) { return x.row < y.row; });
-    std::size_t kept = 0;
-    for (std::size_t e = 0; e < entries.size(); ++e)
-    {
-      if (kept > 0 && entries[kept - 1].row == entries[e].row)
-      {
-        entries[kept - 1].value += entries[e].value;
-      }
-      else
-      {
-        entries[kept++] = entries[e];
-      }
-    }
-    entries.resize(kept);
-  }
-
-  system.neighbours.resize(system.bones);
-  const auto touch = [&](std::int32_t a, std::int32_t b)
-  {
-    if (a != b)
-    {
-      system.neighbours[a].push_back(b);
-      system.neighbours[b].push_back(a);
-    }
-  };
-  for (std::int64_t i = 0; i < k.rows; ++i)
-  {
-    for (std::int64_t a = k.offset[i]; a < k.offset[i + 1]; ++a)
-    {
-      touch(nearest[i], nearest[k.column[a]]);
-    }
-    for (const SkinWeightSystem::Target& target : system.fixed[i])
-    {
-      touch(nearest[i], target.bone);
-    }
-  }
-  for (std::vector<std::int32_t>& list : system.neighbours)
-  {
-    std::sort(list.begin(), list.end());
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-  }
+  SetLinear(linear, rowOfPoint, system);
+  FindNeighbours(k, nearest, system);
   Report(progress, 1.0);
   return system;
 }

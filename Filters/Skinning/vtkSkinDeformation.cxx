@@ -429,6 +429,91 @@ void vtkSkinDeformation::FindStencil(vtkInformation* poseInfo, Stencil& stencil)
   request.Restore();
 }
 
+namespace
+{
+Origin OriginOf(vtkPointSet* mesh, vtkObject* indices, vtkObject* weights, vtkPolyData* rest,
+  const std::array<int, 2>& settings)
+{
+  auto* surface = vtkPolyData::SafeDownCast(mesh);
+  auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh);
+  Origin origin;
+  origin.settings = settings;
+  origin.Add(mesh->GetPoints());
+  origin.Add(indices);
+  origin.Add(weights);
+  origin.Add(rest->GetPoints());
+  origin.Add(rest->GetLines());
+  origin.Add(rest->GetPointData()->GetAbstractArray(names::ParentJoint));
+  origin.Add(grid ? grid->GetCells() : nullptr);
+  origin.Add(surface ? surface->GetPolys() : nullptr);
+  origin.Add(surface ? surface->GetStrips() : nullptr);
+  return origin;
+}
+
+/// The parabola through three poses.
+/// @param nearer    first pose after now; its values are lost
+/// @param velocity  second pose after now, twice as far; then the velocity
+/// @param seconds   to the first one
+template <typename Array>
+void OneSidedVelocity(
+  Array* nearer, Array* now, Array* velocity, double seconds, const ProgressCallback& progress)
+{
+  const vtkIdType count = now->GetNumberOfValues();
+  const coronary::WorkParts differences(progress, { 1.0, 1.0 });
+  coronary::SkinVelocities(nearer->GetPointer(0), now->GetPointer(0), 0.5 * seconds, count,
+    nearer->GetPointer(0), differences(0));
+  coronary::SkinVelocities(velocity->GetPointer(0), now->GetPointer(0), 2.0 * seconds, count,
+    velocity->GetPointer(0), differences(1));
+  for (vtkIdType n = 0; n < count; ++n)
+  {
+    velocity->SetValue(n, nearer->GetValue(n) - velocity->GetValue(n));
+  }
+}
+
+/// Those of the mesh at rest.
+void RemoveNormals(vtkPointSet* output)
+{
+  for (vtkDataSetAttributes* attributes :
+    { static_cast<vtkDataSetAttributes*>(output->GetPointData()),
+      static_cast<vtkDataSetAttributes*>(output->GetCellData()) })
+  {
+    if (attributes->GetNormals() != nullptr)
+    {
+      const std::string name =
+        attributes->GetNormals()->GetName() ? attributes->GetNormals()->GetName() : "";
+      attributes->SetNormals(nullptr);
+      attributes->RemoveArray(name.c_str());
+    }
+  }
+}
+
+/// Ratios of volumes, and which tetrahedra are inverted.
+/// @return cells that still are
+std::vector<vtkIdType> ReportTetrahedra(const Setup& setup, vtkPointSet* output)
+{
+  const coronary::InversionReport& report = setup.report;
+  vtkNew<vtkDoubleArray> ratios;
+  ratios->SetName(names::VolumeRatio);
+  ratios->SetNumberOfValues(output->GetNumberOfCells());
+  ratios->Fill(std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t n = 0; n < setup.cells.size(); ++n)
+  {
+    ratios->SetValue(setup.cells[n], setup.skin->VolumeRatios()[n]);
+  }
+  output->GetCellData()->AddArray(ratios);
+  std::vector<vtkIdType> left;
+  for (const std::int64_t n : report.tetrahedra)
+  {
+    left.push_back(setup.cells[n]);
+  }
+  vtkCoronary::AddArray<vtkIdTypeArray>(output->GetFieldData(), names::InvertedTetrahedra, left);
+  const auto gone = static_cast<vtkIdType>(report.found) - static_cast<vtkIdType>(left.size());
+  vtkCoronary::AddArray<vtkIdTypeArray>(output->GetFieldData(), names::RepairedTetrahedra,
+    std::vector<vtkIdType>{ std::max<vtkIdType>(0, gone) });
+  return left;
+}
+}
+
 template <typename Array>
 void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** inputs,
   const Stencil& stencil, vtkPointSet* output, const ProgressCallback& progress)
@@ -437,17 +522,8 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
   const vtkIdType count = mesh->GetNumberOfPoints();
   auto* surface = vtkPolyData::SafeDownCast(mesh);
   auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh);
-  Origin origin;
-  origin.settings = { this->Blend, this->Stretch ? 1 : 0 };
-  origin.Add(mesh->GetPoints());
-  origin.Add(WeightArray(mesh, names::BoneIndices));
-  origin.Add(WeightArray(mesh, names::BoneWeightsCompact));
-  origin.Add(rest->GetPoints());
-  origin.Add(rest->GetLines());
-  origin.Add(rest->GetPointData()->GetAbstractArray(names::ParentJoint));
-  origin.Add(grid ? grid->GetCells() : nullptr);
-  origin.Add(surface ? surface->GetPolys() : nullptr);
-  origin.Add(surface ? surface->GetStrips() : nullptr);
+  const Origin origin = OriginOf(mesh, WeightArray(mesh, names::BoneIndices),
+    WeightArray(mesh, names::BoneWeightsCompact), rest, { this->Blend, this->Stretch ? 1 : 0 });
   Setup* known = this->Data->Find(origin);
 
   const bool withTriangles = surface && this->ComputeNormals;
@@ -514,20 +590,10 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
     deform(stencil.first.pose, other, Earlier);
     deform(stencil.second.pose, velocity, Later);
     deform(pose, positions, Deforming);
-    const ProgressCallback whole = parts(Difference);
-    const coronary::WorkParts differences(whole, { 1.0, 1.0 });
     if (stencil.oneSided)
     {
-      // The parabola through three poses.
-      const double seconds = (stencil.first.time - stencil.now) * stencil.cycle;
-      coronary::SkinVelocities(other->GetPointer(0), positions->GetPointer(0), 0.5 * seconds,
-        3 * count, other->GetPointer(0), differences(0));
-      coronary::SkinVelocities(velocity->GetPointer(0), positions->GetPointer(0), 2.0 * seconds,
-        3 * count, velocity->GetPointer(0), differences(1));
-      for (vtkIdType n = 0; n < 3 * count; ++n)
-      {
-        velocity->SetValue(n, other->GetValue(n) - velocity->GetValue(n));
-      }
+      OneSidedVelocity(other.Get(), positions.Get(), velocity.Get(),
+        (stencil.first.time - stencil.now) * stencil.cycle, parts(Difference));
     }
     else
     {
@@ -544,18 +610,7 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
   vtkNew<vtkPoints> points;
   points->SetData(positions);
   output->SetPoints(points);
-  for (vtkDataSetAttributes* attributes :
-    { static_cast<vtkDataSetAttributes*>(output->GetPointData()),
-      static_cast<vtkDataSetAttributes*>(output->GetCellData()) })
-  {
-    if (attributes->GetNormals() != nullptr)
-    {
-      const std::string name =
-        attributes->GetNormals()->GetName() ? attributes->GetNormals()->GetName() : "";
-      attributes->SetNormals(nullptr);
-      attributes->RemoveArray(name.c_str());
-    }
-  }
+  RemoveNormals(output);
   output->GetFieldData()->PassData(pose->GetFieldData());
   if (!this->Stretch)
   {
@@ -578,30 +633,12 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
       skin.CheckTetrahedra(
         positions->GetPointer(0), setup.report, this->LeastVolumeRatio, parts(Checking));
     }
-    const coronary::InversionReport& report = setup.report;
-    vtkNew<vtkDoubleArray> ratios;
-    ratios->SetName(names::VolumeRatio);
-    ratios->SetNumberOfValues(mesh->GetNumberOfCells());
-    ratios->Fill(std::numeric_limits<double>::quiet_NaN());
-    for (std::size_t n = 0; n < setup.cells.size(); ++n)
-    {
-      ratios->SetValue(setup.cells[n], skin.VolumeRatios()[n]);
-    }
-    output->GetCellData()->AddArray(ratios);
-    std::vector<vtkIdType> left;
-    for (const std::int64_t n : report.tetrahedra)
-    {
-      left.push_back(setup.cells[n]);
-    }
-    vtkCoronary::AddArray<vtkIdTypeArray>(output->GetFieldData(), names::InvertedTetrahedra, left);
-    const auto gone = static_cast<vtkIdType>(report.found) - static_cast<vtkIdType>(left.size());
-    vtkCoronary::AddArray<vtkIdTypeArray>(output->GetFieldData(), names::RepairedTetrahedra,
-      std::vector<vtkIdType>{ std::max<vtkIdType>(0, gone) });
+    const std::vector<vtkIdType> left = ReportTetrahedra(setup, output);
     if (!left.empty())
     {
       vtkWarningMacro(<< left.size() << " tetrahedra are inverted"
                       << (this->Tetrahedra == RepairTetrahedra ? " after the repair, " +
-                               std::to_string(report.found) + " were before it"
+                               std::to_string(setup.report.found) + " were before it"
                                                                : std::string())
                       << "; the first one is cell " << left[0]
                       << ": see the field array InvertedTetrahedra");

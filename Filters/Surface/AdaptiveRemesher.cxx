@@ -273,20 +273,10 @@ AdaptiveRemesher::Index AdaptiveRemesher::Split(Index h)
   return m;
 }
 
-bool AdaptiveRemesher::Collapse(Index h, bool forQuality, bool unfold)
+/// The link condition: exactly the apices `c` and `d` may be next to both ends; none may keep too few
+/// edges.
+bool AdaptiveRemesher::KeepsManifold(Index a, Index b, Index c, Index d) const
 {
-  const Index g = this->Twin[h];
-  Index a = this->From(h); // stays
-  Index b = this->To(h);   // goes
-  const Index c = this->Apex(h);
-  const Index d = this->Apex(g);
-  RemeshVertex& va = this->V[a];
-  RemeshVertex& vb = this->V[b];
-  if (va.rim && vb.rim && !this->IsFeature(h))
-  {
-    return false;
-  }
-  // Exactly c and d may be next to both ends.
   Index common = 0;
   Index degreeA = 0;
   Index degreeB = 0;
@@ -324,20 +314,13 @@ bool AdaptiveRemesher::Collapse(Index h, bool forQuality, bool unfold)
       return false;
     }
   }
-  RemeshVertex vertex = va;
-  if (va.rim == vb.rim && va.patch == vb.patch)
-  {
-    vertex.position = 0.5 * (va.position + vb.position);
-    vertex.normal = (va.normal + vb.normal).normalized();
-    vertex.size = 0.5 * (va.size + vb.size);
-    const double size = vertex.size;
-    this->Surface.Project(vertex);
-    vertex.size = std::min(vertex.size, 1.1 * size);
-  }
-  else if (vb.rim)
-  {
-    vertex = vb;
-  }
+  return true;
+}
+
+/// Whether the triangles around `a` and `b` are good enough with both at one vertex.
+bool AdaptiveRemesher::GainsByMerging(
+  Index a, Index b, const RemeshVertex& vertex, bool forQuality, bool unfold) const
+{
   double before = 1.0;
   double after = 1.0;
   double facedBefore = 1.0;
@@ -391,9 +374,43 @@ bool AdaptiveRemesher::Collapse(Index h, bool forQuality, bool unfold)
   {
     return false;
   }
-  if (unfold       ? facesAfter <= facedBefore
+  return !(unfold  ? facesAfter <= facedBefore
       : forQuality ? after <= before
-                   : after < std::min(before, -std::cos(18.0 * Degree)))
+                   : after < std::min(before, -std::cos(18.0 * Degree)));
+}
+
+bool AdaptiveRemesher::Collapse(Index h, bool forQuality, bool unfold)
+{
+  const Index g = this->Twin[h];
+  Index a = this->From(h); // stays
+  Index b = this->To(h);   // goes
+  const Index c = this->Apex(h);
+  const Index d = this->Apex(g);
+  RemeshVertex& va = this->V[a];
+  RemeshVertex& vb = this->V[b];
+  if (va.rim && vb.rim && !this->IsFeature(h))
+  {
+    return false;
+  }
+  if (!this->KeepsManifold(a, b, c, d))
+  {
+    return false;
+  }
+  RemeshVertex vertex = va;
+  if (va.rim == vb.rim && va.patch == vb.patch)
+  {
+    vertex.position = 0.5 * (va.position + vb.position);
+    vertex.normal = (va.normal + vb.normal).normalized();
+    vertex.size = 0.5 * (va.size + vb.size);
+    const double size = vertex.size;
+    this->Surface.Project(vertex);
+    vertex.size = std::min(vertex.size, 1.1 * size);
+  }
+  else if (vb.rim)
+  {
+    vertex = vb;
+  }
+  if (!this->GainsByMerging(a, b, vertex, forQuality, unfold))
   {
     return false;
   }
@@ -405,7 +422,7 @@ bool AdaptiveRemesher::Collapse(Index h, bool forQuality, bool unfold)
   const Index gp = Previous(g);
   // All of b's triangles become a's.
   std::vector<Index> moved;
-  moved.reserve(degreeB);
+  moved.reserve(16);
   this->AroundVertex(b, [&](Index e) { moved.push_back(e); });
   for (const Index e : moved)
   {

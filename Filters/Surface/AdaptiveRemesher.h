@@ -94,6 +94,9 @@ private:
   void ProjectAll();
   void Grade();
   Index Split(Index h);
+  bool KeepsManifold(Index a, Index b, Index c, Index d) const;
+  bool GainsByMerging(
+    Index a, Index b, const RemeshVertex& vertex, bool forQuality, bool unfold) const;
   bool Collapse(Index h, bool forQuality, bool unfold);
   bool CanFlip(Index h) const;
   void Flip(Index h);

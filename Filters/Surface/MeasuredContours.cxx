@@ -106,6 +106,148 @@ bool MeasureSection(const ImageInterpolator& image, const ContourSettings& setti
   series /= series[0];
   return series.allFinite();
 }
+
+/// How many times branches go out from each point: two on a vessel's way, whether one branch or two;
+/// else an end or a node.
+std::map<std::int64_t, int> CountUses(const SweepTree& tree)
+{
+  const std::size_t n = tree.points.size();
+  std::map<std::int64_t, int> uses;
+  for (const SweepBranch& branch : tree.branches)
+  {
+    for (const std::int64_t p : branch.points)
+    {
+      if (p < 0 || p >= static_cast<std::int64_t>(n) || tree.radius.size() != n)
+      {
+        throw std::invalid_argument("MeasureContours: a branch names point " + std::to_string(p) +
+          " of " + std::to_string(std::min(n, tree.radius.size())));
+      }
+    }
+    for (std::size_t i = 0; i < branch.points.size(); ++i)
+    {
+      uses[branch.points[i]] += i == 0 || i + 1 == branch.points.size() ? 1 : 2;
+    }
+  }
+  return uses;
+}
+
+/// What is measured across a branch.
+struct Section
+{
+  Vector3 normal;
+  std::vector<double> contour; ///< empty: not this branch's
+  bool measured = false;
+};
+
+std::vector<Section> MeasureBranch(const ImageInterpolator& image, const ContourSettings& settings,
+  const SweepTree& tree, const std::vector<std::int64_t>& list,
+  const std::map<std::int64_t, int>& usesOfPoints)
+{
+  const auto uses = [&](std::int64_t p) { return usesOfPoints.at(p); };
+  const std::size_t count = list.size();
+  std::vector<double> s(count, 0.0);
+  for (std::size_t i = 1; i < count; ++i)
+  {
+    s[i] = s[i - 1] + (tree.points[list[i]] - tree.points[list[i - 1]]).norm();
+  }
+  std::vector<Section> sections(count);
+  std::vector<Series> series(count);
+  std::vector<Vector3> normals(count, Vector3::UnitX());
+  Vector3 normal = Vector3::Zero();
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    const double radius = tree.radius[list[i]];
+    std::size_t low = i;
+    std::size_t high = i;
+    while (low > 0 && s[i] - s[low] < radius)
+    {
+      --low;
+    }
+    while (high + 1 < count && s[high] - s[i] < radius)
+    {
+      ++high;
+    }
+    const Vector3 along = tree.points[list[high]] - tree.points[list[low]];
+    if (!(along.norm() > 0.0))
+    {
+      continue;
+    }
+    const Vector3 tangent = along.normalized();
+    normal -= normal.dot(tangent) * tangent;
+    normal = normal.norm() > 1e-6 ? Vector3(normal.normalized()) : tangent.unitOrthogonal();
+    normals[i] = normal;
+    const double room =
+      std::min(uses(list.front()) > 2 ? s[i] - 2.0 * tree.radius[list.front()] : 1e9,
+        uses(list.back()) > 2 ? s.back() - s[i] - 2.0 * tree.radius[list.back()] : 1e9);
+    if (room > 0.0 && radius > 0.0)
+    {
+      MeasureSection(
+        image, settings, tree.points[list[i]], normal, tangent.cross(normal), radius, series[i]);
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    const std::int64_t p = list[i];
+    const bool own = uses(p) <= 2 && (i > 0 || uses(p) == 1);
+    if (!own)
+    {
+      continue; // a node has no section of its own
+    }
+    Series sum = Series::Zero(2 * settings.harmonics + 1);
+    double weights = 0.0;
+    const double reach = tree.radius[p];
+    const auto add = [&](std::size_t j)
+    {
+      const double weight = 1.0 - std::abs(s[j] - s[i]) / (1.001 * reach);
+      // Where nothing was measured it is round.
+      sum[0] += weight;
+      weights += weight;
+      if (series[j].size() > 0)
+      {
+        sum.tail(sum.size() - 1) += weight * series[j].tail(sum.size() - 1);
+      }
+    };
+    for (std::size_t j = i; j < count && s[j] - s[i] < reach; ++j)
+    {
+      add(j);
+    }
+    for (std::size_t j = i; j-- > 0 && s[i] - s[j] < reach;)
+    {
+      add(j);
+    }
+    sum /= weights;
+    Section& section = sections[i];
+    section.measured = series[i].size() > 0;
+    section.normal = normals[i];
+    for (int k = 0; k < settings.samples; ++k)
+    {
+      const double value = sum.dot(Basis(2.0 * Pi * k / settings.samples, settings.harmonics));
+      section.contour.push_back(tree.radius[p] * std::clamp(value, 0.5, settings.reach));
+    }
+  }
+  return sections;
+}
+
+/// A node's contour is round, whatever its normal; it must not lie along the axis.
+void TurnNodes(const std::map<std::int64_t, int>& uses, SweepTree& tree)
+{
+  for (const SweepBranch& branch : tree.branches)
+  {
+    for (const std::int64_t p : { branch.points.front(), branch.points.back() })
+    {
+      if (uses.at(p) > 1 && branch.points.size() > 1)
+      {
+        const Vector3 along = p == branch.points.front()
+          ? Vector3(tree.points[branch.points[1]] - tree.points[p])
+          : Vector3(tree.points[p] - tree.points[branch.points[branch.points.size() - 2]]);
+        if (along.norm() > 0.0)
+        {
+          tree.contourNormals[p] = along.unitOrthogonal();
+        }
+      }
+    }
+  }
+}
 }
 
 void ContourSettings::Validate() const
@@ -122,23 +264,7 @@ double MeasureContours(const ImageInterpolator& image, const ContourSettings& se
 {
   settings.Validate();
   const std::size_t n = tree.points.size();
-  std::map<std::int64_t, int> uses;
-  for (const SweepBranch& branch : tree.branches)
-  {
-    for (const std::int64_t p : branch.points)
-    {
-      if (p < 0 || p >= static_cast<std::int64_t>(n) || tree.radius.size() != n)
-      {
-        throw std::invalid_argument("MeasureContours: a branch names point " + std::to_string(p) +
-          " of " + std::to_string(std::min(n, tree.radius.size())));
-      }
-    }
-    for (std::size_t i = 0; i < branch.points.size(); ++i)
-    {
-      // Two for a point on a vessel's way, whether one branch or two; else an end or a node.
-      uses[branch.points[i]] += i == 0 || i + 1 == branch.points.size() ? 1 : 2;
-    }
-  }
+  const std::map<std::int64_t, int> uses = CountUses(tree);
   tree.contourSamples = settings.samples;
   tree.contours.resize(n * settings.samples);
   tree.contourNormals.assign(n, Vector3::UnitX());
@@ -147,12 +273,6 @@ double MeasureContours(const ImageInterpolator& image, const ContourSettings& se
     std::fill_n(tree.contours.begin() + p * settings.samples, settings.samples, tree.radius[p]);
   }
   std::vector<char> measured(n, 0);
-  struct Section
-  {
-    Vector3 normal;
-    std::vector<double> contour; ///< empty: not this branch's
-    bool measured = false;
-  };
   std::vector<std::vector<Section>> sections(tree.branches.size());
   ParallelFor(
     static_cast<std::int64_t>(tree.branches.size()), 1,
@@ -160,89 +280,7 @@ double MeasureContours(const ImageInterpolator& image, const ContourSettings& se
     {
       for (std::int64_t b = first; b < last; ++b)
       {
-        const std::vector<std::int64_t>& list = tree.branches[b].points;
-        const std::size_t count = list.size();
-        std::vector<double> s(count, 0.0);
-        for (std::size_t i = 1; i < count; ++i)
-        {
-          s[i] = s[i - 1] + (tree.points[list[i]] - tree.points[list[i - 1]]).norm();
-        }
-        sections[b].resize(count);
-        std::vector<Series> series(count);
-        std::vector<Vector3> normals(count, Vector3::UnitX());
-        Vector3 normal = Vector3::Zero();
-        for (std::size_t i = 0; i < count; ++i)
-        {
-          const double radius = tree.radius[list[i]];
-          std::size_t low = i;
-          std::size_t high = i;
-          while (low > 0 && s[i] - s[low] < radius)
-          {
-            --low;
-          }
-          while (high + 1 < count && s[high] - s[i] < radius)
-          {
-            ++high;
-          }
-          const Vector3 along = tree.points[list[high]] - tree.points[list[low]];
-          if (!(along.norm() > 0.0))
-          {
-            continue;
-          }
-          const Vector3 tangent = along.normalized();
-          normal -= normal.dot(tangent) * tangent;
-          normal = normal.norm() > 1e-6 ? Vector3(normal.normalized()) : tangent.unitOrthogonal();
-          normals[i] = normal;
-          const double room =
-            std::min(uses[list.front()] > 2 ? s[i] - 2.0 * tree.radius[list.front()] : 1e9,
-              uses[list.back()] > 2 ? s.back() - s[i] - 2.0 * tree.radius[list.back()] : 1e9);
-          if (room > 0.0 && radius > 0.0)
-          {
-            MeasureSection(image, settings, tree.points[list[i]], normal, tangent.cross(normal),
-              radius, series[i]);
-          }
-        }
-        for (std::size_t i = 0; i < count; ++i)
-        {
-          const std::int64_t p = list[i];
-          const bool own = uses[p] <= 2 && (i > 0 || uses[p] == 1);
-          if (!own)
-          {
-            continue; // a node has no section of its own
-          }
-          Series sum = Series::Zero(2 * settings.harmonics + 1);
-          double weights = 0.0;
-          const double reach = tree.radius[p];
-          const auto add = [&](std::size_t j)
-          {
-            const double weight = 1.0 - std::abs(s[j] - s[i]) / (1.001 * reach);
-            // Where nothing was measured it is round.
-            sum[0] += weight;
-            weights += weight;
-            if (series[j].size() > 0)
-            {
-              sum.tail(sum.size() - 1) += weight * series[j].tail(sum.size() - 1);
-            }
-          };
-          for (std::size_t j = i; j < count && s[j] - s[i] < reach; ++j)
-          {
-            add(j);
-          }
-          for (std::size_t j = i; j-- > 0 && s[i] - s[j] < reach;)
-          {
-            add(j);
-          }
-          sum /= weights;
-          Section& section = sections[b][i];
-          section.measured = series[i].size() > 0;
-          section.normal = normals[i];
-          for (int k = 0; k < settings.samples; ++k)
-          {
-            const double value =
-              sum.dot(Basis(2.0 * Pi * k / settings.samples, settings.harmonics));
-            section.contour.push_back(tree.radius[p] * std::clamp(value, 0.5, settings.reach));
-          }
-        }
+        sections[b] = MeasureBranch(image, settings, tree, tree.branches[b].points, uses);
       }
     },
     progress);
@@ -261,23 +299,7 @@ double MeasureContours(const ImageInterpolator& image, const ContourSettings& se
       }
     }
   }
-  // A node's contour is round, whatever its normal; it must not lie along the axis.
-  for (const SweepBranch& branch : tree.branches)
-  {
-    for (const std::int64_t p : { branch.points.front(), branch.points.back() })
-    {
-      if (uses[p] > 1 && branch.points.size() > 1)
-      {
-        const Vector3 along = p == branch.points.front()
-          ? Vector3(tree.points[branch.points[1]] - tree.points[p])
-          : Vector3(tree.points[p] - tree.points[branch.points[branch.points.size() - 2]]);
-        if (along.norm() > 0.0)
-        {
-          tree.contourNormals[p] = along.unitOrthogonal();
-        }
-      }
-    }
-  }
+  TurnNodes(uses, tree);
   return n > 0
     ? static_cast<double>(std::count(measured.begin(), measured.end(), 1)) / static_cast<double>(n)
     : 0.0;

@@ -1,12 +1,9 @@
 #include "VesselSegmentation.h"
 
-#include "BlockValues.h"
 #include "DistanceTransform.h"
 #include "Median.h"
 #include "SlicePieces.h"
-#include "SparseVoxels.h"
-#include "VesselLinking.h"
-#include "VoxelLattice.h"
+#include "VoxelSegmentation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,121 +14,8 @@
 
 namespace coronary
 {
-namespace
-{
-/// What a voxel is found to be.
-enum State : unsigned char
-{
-  Unknown = 0,
-  Body = 1,   ///< aorta, chamber, great vessel
-  Vessel = 2, ///< collected
-  Band = 4,   ///< near the wall of what was collected
-  Leak = 16,  ///< larger than any vessel: not collected again
-  Bridge = 32 ///< on the way across a lesion: collected whatever it looks like
-};
-
-ProgressCallback Part(const ProgressCallback& progress, double from, double to)
-{
-  if (!progress)
-  {
-    return {};
-  }
-  return [progress, from, to](double f) { return progress(from + (to - from) * f); };
-}
-
-/// Steps 1 to 4 of the header for one type of voxel.
 template <typename T>
-class Segmentation
-{
-public:
-  Segmentation(const T* image, const ScalarImage& whole, const float* vesselness,
-    const VesselSegmentationSettings& settings)
-    : Image(image)
-    , Whole(whole)
-    , Vesselness(vesselness)
-    , Settings(settings)
-    , L(whole.grid)
-  {
-  }
-
-  VesselSegmentationResult Run(
-    const std::vector<VesselSeed>& seeds, bool probability, const ProgressCallback& progress);
-
-private:
-  struct Member
-  {
-    std::int64_t voxel;
-    float path; ///< mm from the seed
-    int seed;
-    std::int64_t before; ///< the voxel that it was reached from, -1 at the seed
-  };
-
-  float Share(std::int64_t p) const
-  {
-    return (static_cast<float>(this->Image[p]) - this->Tissue) * this->InverseContrast;
-  }
-  /// Bright as blood; or less bright, as thin vessels are, but tubular. NaN gives 0.
-  float Likelihood(std::int64_t p) const
-  {
-    const float share = this->Share(p);
-    const float blood = (share - 0.3f) * (1.0f / 0.45f);
-    const float thin = (share - 0.1f) * (1.0f / 0.35f);
-    const float tube = this->Vesselness[p] * this->InverseTubular;
-    const float dim =
-      std::min(thin > 0.0f ? thin : 0.0f, 1.0f) * std::min(tube > 0.0f ? tube : 0.0f, 1.0f);
-    return std::max(dim, std::min(blood > 0.0f ? blood : 0.0f, 1.0f));
-  }
-  BloodWindow MeasureWindow(const std::vector<std::array<int, 3>>& places) const;
-  double MeasureTubular(const std::vector<std::array<int, 3>>& places) const;
-  void FindBodies(const ProgressCallback& progress);
-  void FindNoisyBodies(const ProgressCallback& progress);
-  void Collect(const std::vector<VesselSeed>& seeds, const std::vector<std::array<int, 3>>& places,
-    const ProgressCallback& progress);
-  void CutLeakage();
-  void CrossLesions(const std::vector<VesselSeed>& seeds,
-    const std::vector<std::array<int, 3>>& places, const ProgressCallback& progress);
-  template <typename V>
-  SparseVoxels<V> Sparse(V nothing) const
-  {
-    return SparseVoxels<V>(
-      { 0, 0, 0 }, { this->L.Size[0] - 1, this->L.Size[1] - 1, this->L.Size[2] - 1 }, nothing);
-  }
-  /// Places in Members, -1: none.
-  SparseVoxels<std::int32_t> MemberNumbers() const
-  {
-    auto numbers = this->Sparse<std::int32_t>(-1);
-    for (std::size_t m = 0; m < this->Members.size(); ++m)
-    {
-      numbers.At(this->L.Place(this->Members[m].voxel)) = static_cast<std::int32_t>(m);
-    }
-    return numbers;
-  }
-  std::vector<VesselRoot> HiddenRoots(const std::vector<VesselSeed>& seeds, double seen) const;
-  void KeepConnected();
-  BlockValues MeasureBlocks(
-    const std::array<int, 3>& reach, const ProgressCallback& progress) const;
-  void RefineWall(std::vector<float>* probability, const ProgressCallback& progress);
-  void DropIslands();
-  void FillHoles();
-
-  const T* Image;
-  const ScalarImage& Whole;
-  const float* Vesselness;
-  const VesselSegmentationSettings& Settings;
-  VoxelLattice L;
-  float Tissue = 0.0f;
-  float InverseContrast = 1.0f;
-  float Tubular = 1.0f; ///< vesselness of a clear tube
-  float InverseTubular = 1.0f;
-  std::vector<unsigned char> States;
-  std::vector<Member> Members; ///< in order of their path length
-  double Leakage = 0.0;        ///< mm^3
-  std::vector<VesselLink> Links;
-  std::vector<ConsideredLink> Considered;
-};
-
-template <typename T>
-BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>& places) const
+BloodWindow VoxelSegmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>& places) const
 {
   // Blood: the brightest mean of 3 x 3 x 3 voxels near a seed. Tissue: the median of what is
   // darker than half of it a little farther away; fat and air count as none.
@@ -193,7 +77,7 @@ BloodWindow Segmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>
 /// Near the seeds the brightest vesselness of what is bright belongs to the vessels: most of the
 /// rest is inside of the aorta, and gives nearly none.
 template <typename T>
-double Segmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>>& places) const
+double VoxelSegmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>>& places) const
 {
   constexpr double radius = 20.0;
   constexpr double percentile = 0.995;
@@ -221,7 +105,7 @@ double Segmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>>& pl
 }
 
 template <typename T>
-void Segmentation<T>::FindBodies(const ProgressCallback& progress)
+void VoxelSegmentation<T>::FindBodies(const ProgressCallback& progress)
 {
   const std::array<int, 3>& blocks = this->L.Blocks;
   std::vector<unsigned char> blood(static_cast<std::size_t>(blocks[0]) * blocks[1] * blocks[2], 0);
@@ -263,9 +147,9 @@ void Segmentation<T>::FindBodies(const ProgressCallback& progress)
         }
       }
     },
-    Part(progress, 0.0, 0.3));
+    PartOf(progress, 0.0, 0.3));
   std::vector<unsigned char> body = OpenWithBall(blood.data(), blocks, this->L.BlockSpacing,
-    this->Settings.largestRadius, Part(progress, 0.3, 0.7));
+    this->Settings.largestRadius, PartOf(progress, 0.3, 0.7));
   blood = std::vector<unsigned char>();
   // The rim of a body is bright as well, and no vessel unless it is tubular.
   for (unsigned char& b : body)
@@ -274,7 +158,7 @@ void Segmentation<T>::FindBodies(const ProgressCallback& progress)
   }
   const double rim = 1.1 * this->L.BlockSpacing.maxCoeff();
   const std::vector<unsigned char> near =
-    NearZeros(body.data(), blocks, this->L.BlockSpacing, rim * rim, Part(progress, 0.7, 0.9));
+    NearZeros(body.data(), blocks, this->L.BlockSpacing, rim * rim, PartOf(progress, 0.7, 0.9));
   this->States.assign(
     static_cast<std::size_t>(this->L.Size[0]) * this->L.Size[1] * this->L.Size[2], Unknown);
   ParallelFor(
@@ -297,13 +181,13 @@ void Segmentation<T>::FindBodies(const ProgressCallback& progress)
         }
       }
     },
-    Part(progress, 0.9, 1.0));
+    PartOf(progress, 0.9, 1.0));
 }
 
 /// A chamber that is dimmer than the arteries, in much noise: so many of its voxels look like vessel that they hang
 /// together, though no ball is full of them. Means tell it.
 template <typename T>
-void Segmentation<T>::FindNoisyBodies(const ProgressCallback& progress)
+void VoxelSegmentation<T>::FindNoisyBodies(const ProgressCallback& progress)
 {
   constexpr double cellSize = 2.0; // mm
   // So many standard deviations above the mean a fortieth of all voxels looks like vessel by brightness. In a lattice of
@@ -352,7 +236,7 @@ void Segmentation<T>::FindNoisyBodies(const ProgressCallback& progress)
         }
       }
     },
-    Part(progress, 0.0, 0.5));
+    PartOf(progress, 0.0, 0.5));
   std::vector<double> noises;
   for (std::size_t c = 0; c < count; ++c)
   {
@@ -377,7 +261,7 @@ void Segmentation<T>::FindNoisyBodies(const ProgressCallback& progress)
   }
   // Vessels fill cells only in part: half a cell more is surely none.
   std::vector<unsigned char> body = OpenWithBall(bright.data(), cells, spacing,
-    this->Settings.largestRadius + 0.5 * spacing.maxCoeff(), Part(progress, 0.5, 1.0));
+    this->Settings.largestRadius + 0.5 * spacing.maxCoeff(), PartOf(progress, 0.5, 1.0));
   for (int k = 0; k < this->L.Size[2]; ++k)
   {
     for (int j = 0; j < this->L.Size[1]; ++j)
@@ -396,7 +280,7 @@ void Segmentation<T>::FindNoisyBodies(const ProgressCallback& progress)
 }
 
 template <typename T>
-void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
+void VoxelSegmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
   const std::vector<std::array<int, 3>>& places, const ProgressCallback& progress)
 {
   // The rim that belongs to no vessel is Body; around a seed the vessel begins in it.
@@ -515,7 +399,7 @@ void Segmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
 /// Slices of equal path length fall into connected pieces; a piece's parents are the pieces of the
 /// slice before that touch it.
 template <typename T>
-void Segmentation<T>::CutLeakage()
+void VoxelSegmentation<T>::CutLeakage()
 {
   const double thickness = std::max(1.5, 1.5 * this->L.Spacing.maxCoeff());
   const double largestArea =
@@ -635,7 +519,7 @@ void Segmentation<T>::CutLeakage()
  * @param seen  mm of vessel that are enough to go on from
  */
 template <typename T>
-std::vector<VesselRoot> Segmentation<T>::HiddenRoots(
+std::vector<VesselRoot> VoxelSegmentation<T>::HiddenRoots(
   const std::vector<VesselSeed>& seeds, double seen) const
 {
   constexpr double least = 2.0; // mm: less has no direction, and may be the aorta's blurred wall
@@ -683,7 +567,7 @@ std::vector<VesselRoot> Segmentation<T>::HiddenRoots(
 
 /// Round by round what hangs on nothing is linked to what is there, and collected from there on.
 template <typename T>
-void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
+void VoxelSegmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
   const std::vector<std::array<int, 3>>& places, const ProgressCallback& progress)
 {
   const ImageInterpolator interpolator(this->Whole);
@@ -736,7 +620,7 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
       break;
     }
     std::vector<VesselLink> links = linker.Find(
-      tree, Part(progress, static_cast<double>(round) / rounds, (round + 1.0) / rounds));
+      tree, PartOf(progress, static_cast<double>(round) / rounds, (round + 1.0) / rounds));
     for (ConsideredLink& link : linker.TakeConsidered())
     {
       this->Considered.push_back(std::move(link));
@@ -796,7 +680,7 @@ void Segmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
 /// A narrow place may lie within a wall that was put half way between wide places: what is behind it keeps the
 /// way that it was collected by.
 template <typename T>
-void Segmentation<T>::KeepConnected()
+void VoxelSegmentation<T>::KeepConnected()
 {
   const SparseVoxels<std::int32_t> numbers = this->MemberNumbers();
   constexpr unsigned char connected = 8;
@@ -851,297 +735,8 @@ void Segmentation<T>::KeepConnected()
   }
 }
 
-/**
- * Lumen and surroundings by blocks: the brightest smoothed member, and the mean outside the band.
- * @param reach  blocks around one that its values are taken from, for each axis
- */
 template <typename T>
-BlockValues Segmentation<T>::MeasureBlocks(
-  const std::array<int, 3>& reach, const ProgressCallback& progress) const
-{
-  BlockValues near(this->L.Blocks);
-  for (const Member& m : this->Members)
-  {
-    const std::array<int, 3> at = this->L.Place(m.voxel);
-    float sum = static_cast<float>(this->Image[m.voxel]);
-    int count = 1;
-    for (const VoxelLattice::Neighbour& n : this->L.Around)
-    {
-      if (std::abs(n.di) + std::abs(n.dj) + std::abs(n.dk) == 1 &&
-        this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk))
-      {
-        sum += static_cast<float>(this->Image[m.voxel + n.offset]);
-        ++count;
-      }
-    }
-    float& lumen = near.values[near.Number(this->L.PlaceOfBlock(at))].lumen;
-    lumen = std::max(lumen, sum / static_cast<float>(count));
-  }
-  near.Grow(reach, 2);
-  ParallelFor(
-    static_cast<std::int64_t>(near.values.size()), 4096,
-    [&](std::int64_t first, std::int64_t last)
-    {
-      for (std::int64_t n = first; n < last; ++n)
-      {
-        BlockValue& block = near.values[static_cast<std::size_t>(n)];
-        const std::array<int, 3> corner{ block.place[0] * this->L.Factor[0],
-          block.place[1] * this->L.Factor[1], block.place[2] * this->L.Factor[2] };
-        for (int k = corner[2]; k < std::min(this->L.Size[2], corner[2] + this->L.Factor[2]); ++k)
-        {
-          for (int j = corner[1]; j < std::min(this->L.Size[1], corner[1] + this->L.Factor[1]); ++j)
-          {
-            for (int i = corner[0]; i < std::min(this->L.Size[0], corner[0] + this->L.Factor[0]);
-                 ++i)
-            {
-              const std::int64_t p = this->L.Index(i, j, k);
-              const auto value = static_cast<float>(this->Image[p]);
-              if (this->States[p] == Unknown && std::isfinite(value) && this->Likelihood(p) < 0.5f)
-              {
-                block.outsideSum += value;
-                block.outsideCount += 1.0f;
-              }
-            }
-          }
-        }
-      }
-    },
-    progress);
-  return near;
-}
-
-template <typename T>
-void Segmentation<T>::RefineWall(std::vector<float>* probability, const ProgressCallback& progress)
-{
-  // Wide enough for the next voxel along each axis, mm.
-  const Vector3 band = (1.2 * this->L.Spacing).cwiseMax(0.8);
-  // How far from a voxel its lumen is looked for, mm: a place in the band must find it.
-  const Vector3 lumenReach = (1.2 * this->L.BlockSpacing).cwiseMax(1.5);
-  constexpr double surroundings = 1.8; // mm: how far the local values are taken from
-
-  // The band, from the members that have a neighbour outside.
-  std::vector<std::int64_t> candidates;
-  for (const Member& m : this->Members)
-  {
-    candidates.push_back(m.voxel);
-  }
-  for (std::size_t m = 0; m < this->Members.size(); ++m)
-  {
-    const std::array<int, 3> at = this->L.Place(this->Members[m].voxel);
-    const bool rim = std::any_of(this->L.Around.begin(), this->L.Around.end(),
-      [&](const VoxelLattice::Neighbour& n)
-      {
-        return this->L.Contains(at[0] + n.di, at[1] + n.dj, at[2] + n.dk) &&
-          this->States[this->Members[m].voxel + n.offset] == Unknown;
-      });
-    if (rim)
-    {
-      this->L.Ball(at, band.maxCoeff(),
-        [&](std::int64_t p, const std::array<int, 3>& place)
-        {
-          const Vector3 d = this->L.Spacing.cwiseProduct(
-            Vector3(place[0] - at[0], place[1] - at[1], place[2] - at[2]));
-          if (this->States[p] == Unknown && d.cwiseQuotient(band).squaredNorm() <= 1.0)
-          {
-            this->States[p] = Band;
-            candidates.push_back(p);
-          }
-        });
-    }
-  }
-
-  std::array<int, 3> reach;
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    reach[axis] =
-      std::max(1, static_cast<int>(std::lround(surroundings / this->L.BlockSpacing[axis])));
-  }
-  const BlockValues near = this->MeasureBlocks(reach, Part(progress, 0.2, 0.4));
-  // What the blocks around one count.
-  struct Neighbour
-  {
-    std::array<int, 3> step;
-    float weight;
-    bool lumen; ///< whether its lumen is looked at
-  };
-  std::vector<Neighbour> around;
-  for (int z = -reach[2]; z <= reach[2]; ++z)
-  {
-    for (int y = -reach[1]; y <= reach[1]; ++y)
-    {
-      for (int x = -reach[0]; x <= reach[0]; ++x)
-      {
-        const Vector3 d = this->L.BlockSpacing.cwiseProduct(Vector3(x, y, z));
-        around.push_back({ { x, y, z }, static_cast<float>(std::exp(-0.5 * d.squaredNorm())),
-          d.cwiseQuotient(lumenReach).squaredNorm() <= 1.0 });
-      }
-    }
-  }
-
-  // Half way between the two, per candidate.
-  if (probability != nullptr)
-  {
-    probability->assign(this->States.size(), 0.0f);
-  }
-  const float blood = this->Tissue + 1.0f / this->InverseContrast;
-  const float softness = 0.12f / this->InverseContrast;
-  std::vector<unsigned char> inside(candidates.size(), 0);
-  ParallelFor(
-    static_cast<std::int64_t>(candidates.size()), 4096,
-    [&](std::int64_t first, std::int64_t last)
-    {
-      for (std::int64_t n = first; n < last; ++n)
-      {
-        const std::int64_t p = candidates[n];
-        float brightest = -std::numeric_limits<float>::infinity();
-        float sum = 0.0f;
-        float weights = 0.0f;
-        const std::array<int, 3> at = this->L.PlaceOfBlock(this->L.Place(p));
-        for (const Neighbour& neighbour : around)
-        {
-          const BlockValue* block = near.Find(
-            { at[0] + neighbour.step[0], at[1] + neighbour.step[1], at[2] + neighbour.step[2] });
-          if (block == nullptr)
-          {
-            continue;
-          }
-          sum += neighbour.weight * block->outsideSum;
-          weights += neighbour.weight * block->outsideCount;
-          if (neighbour.lumen)
-          {
-            brightest = std::max(brightest, block->lumen);
-          }
-        }
-        brightest = std::min(brightest, blood);
-        const float outside = weights > 0.0f ? std::min(sum / weights, brightest) : this->Tissue;
-        const float value = static_cast<float>(this->Image[p]);
-        const float above = value - 0.5f * (brightest + outside);
-        inside[n] = above > 0.0f && std::isfinite(above) ? 1 : 0;
-        if (probability != nullptr && std::isfinite(above))
-        {
-          (*probability)[p] = 1.0f / (1.0f + std::exp(-above / softness));
-        }
-      }
-    },
-    Part(progress, 0.4, 1.0));
-  for (std::size_t n = 0; n < candidates.size(); ++n)
-  {
-    this->States[candidates[n]] = inside[n] ? Vessel : Unknown;
-  }
-}
-
-template <typename T>
-void Segmentation<T>::DropIslands()
-{
-  const auto least =
-    static_cast<std::size_t>(std::ceil(this->Settings.smallestIsland / this->L.VoxelVolume()));
-  constexpr unsigned char seen = 8;
-  std::vector<std::int64_t> piece;
-  for (std::size_t p = 0; p < this->States.size(); ++p)
-  {
-    if (this->States[p] != Vessel)
-    {
-      continue;
-    }
-    piece.assign(1, static_cast<std::int64_t>(p));
-    this->States[p] = seen;
-    for (std::size_t n = 0; n < piece.size(); ++n)
-    {
-      const std::array<int, 3> at = this->L.Place(piece[n]);
-      for (const VoxelLattice::Neighbour& next : this->L.Around)
-      {
-        const std::int64_t q = piece[n] + next.offset;
-        if (this->L.Contains(at[0] + next.di, at[1] + next.dj, at[2] + next.dk) &&
-          this->States[q] == Vessel)
-        {
-          this->States[q] = seen;
-          piece.push_back(q);
-        }
-      }
-    }
-    if (piece.size() < least)
-    {
-      for (const std::int64_t q : piece)
-      {
-        this->States[q] = Unknown;
-      }
-    }
-  }
-  for (unsigned char& state : this->States)
-  {
-    state = state == seen ? static_cast<unsigned char>(Vessel) : state;
-  }
-}
-
-/// Fills what is closed in on all sides: what a flood along faces from the box's border misses.
-template <typename T>
-void Segmentation<T>::FillHoles()
-{
-  std::array<int, 3> low = this->L.Size;
-  std::array<int, 3> high{ -1, -1, -1 };
-  for (std::size_t p = 0; p < this->States.size(); ++p)
-  {
-    if (this->States[p] == Vessel)
-    {
-      const std::array<int, 3> at = this->L.Place(static_cast<std::int64_t>(p));
-      for (int axis = 0; axis < 3; ++axis)
-      {
-        low[axis] = std::min(low[axis], at[axis]);
-        high[axis] = std::max(high[axis], at[axis]);
-      }
-    }
-  }
-  if (high[0] < 0)
-  {
-    return;
-  }
-  // One voxel of margin, so that the outside is connected.
-  const std::array<int, 3> n{ high[0] - low[0] + 3, high[1] - low[1] + 3, high[2] - low[2] + 3 };
-  std::vector<unsigned char> open(static_cast<std::size_t>(n[0]) * n[1] * n[2], 0);
-  const auto vessel = [&](const std::array<int, 3>& at)
-  {
-    const int i = at[0] + low[0] - 1;
-    const int j = at[1] + low[1] - 1;
-    const int k = at[2] + low[2] - 1;
-    return this->L.Contains(i, j, k) && this->States[this->L.Index(i, j, k)] == Vessel;
-  };
-  const auto index = [&](const std::array<int, 3>& at)
-  { return (static_cast<std::size_t>(at[2]) * n[1] + at[1]) * n[0] + at[0]; };
-  std::vector<std::array<int, 3>> stack{ { 0, 0, 0 } };
-  open[0] = 1;
-  while (!stack.empty())
-  {
-    const std::array<int, 3> at = stack.back();
-    stack.pop_back();
-    for (int face = 0; face < 6; ++face)
-    {
-      std::array<int, 3> next = at;
-      next[face / 2] += face % 2 ? 1 : -1;
-      if (next[face / 2] < 0 || next[face / 2] >= n[face / 2] || open[index(next)] || vessel(next))
-      {
-        continue;
-      }
-      open[index(next)] = 1;
-      stack.push_back(next);
-    }
-  }
-  for (int k = 1; k + 1 < n[2]; ++k)
-  {
-    for (int j = 1; j + 1 < n[1]; ++j)
-    {
-      for (int i = 1; i + 1 < n[0]; ++i)
-      {
-        if (!open[index({ i, j, k })])
-        {
-          this->States[this->L.Index(i + low[0] - 1, j + low[1] - 1, k + low[2] - 1)] = Vessel;
-        }
-      }
-    }
-  }
-}
-
-template <typename T>
-VesselSegmentationResult Segmentation<T>::Run(
+VesselSegmentationResult VoxelSegmentation<T>::Run(
   const std::vector<VesselSeed>& seeds, bool probability, const ProgressCallback& progress)
 {
   std::vector<std::array<int, 3>> places;
@@ -1174,14 +769,14 @@ VesselSegmentationResult Segmentation<T>::Run(
   this->InverseTubular = 1.0f / this->Tubular;
   result.tubular = this->Tubular;
 
-  this->FindBodies(Part(progress, 0.0, 0.2));
-  this->FindNoisyBodies(Part(progress, 0.2, 0.3));
-  this->Collect(seeds, places, Part(progress, 0.3, 0.5));
+  this->FindBodies(PartOf(progress, 0.0, 0.2));
+  this->FindNoisyBodies(PartOf(progress, 0.2, 0.3));
+  this->Collect(seeds, places, PartOf(progress, 0.3, 0.5));
   result.seedVolume.assign(seeds.size(), 0.0);
   this->CutLeakage();
   if (this->Settings.crossLesions)
   {
-    this->CrossLesions(seeds, places, Part(progress, 0.5, 0.6));
+    this->CrossLesions(seeds, places, PartOf(progress, 0.5, 0.6));
   }
   for (const Member& m : this->Members)
   {
@@ -1193,7 +788,7 @@ VesselSegmentationResult Segmentation<T>::Run(
   {
     const std::vector<unsigned char> collected =
       this->Settings.refineWall ? std::vector<unsigned char>() : this->States;
-    this->RefineWall(probability ? &result.probability : nullptr, Part(progress, 0.6, 0.9));
+    this->RefineWall(probability ? &result.probability : nullptr, PartOf(progress, 0.6, 0.9));
     if (!this->Settings.refineWall)
     {
       this->States = collected;
@@ -1227,7 +822,6 @@ VesselSegmentationResult Segmentation<T>::Run(
   }
   Report(progress, 1.0);
   return result;
-}
 }
 
 void VesselSegmentationSettings::Validate() const
@@ -1275,7 +869,7 @@ VesselSegmentationResult SegmentVessels(const ScalarImage& image, const float* v
   return std::visit(
     [&](const auto* values)
     {
-      Segmentation segmentation(values, image, vesselness, settings);
+      VoxelSegmentation segmentation(values, image, vesselness, settings);
       return segmentation.Run(seeds, probability, progress);
     },
     image.values);

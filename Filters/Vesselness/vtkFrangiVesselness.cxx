@@ -356,6 +356,10 @@ struct vtkFrangiVesselness::Internals
     vtkInformationVector** inputs, const Geometry& grid, const Extent& whole) const;
   void Measure(const MeasurementKey& key, const coronary::MultiscaleVesselness& vesselness,
     vtkInformationVector** inputs);
+  bool SetScale(vtkInformationVector** inputs, const Geometry& grid, const Extent& whole,
+    const Extent& region, coronary::VesselnessSettings& settings);
+  void Prepare(vtkImageData* input, const Geometry& grid, const Extent& out,
+    const coronary::VesselnessSettings& settings, vtkImageData* output) const;
   void Execute(vtkInformationVector** inputs, vtkInformation* outInfo);
   void WarnOfSigma(const Geometry& grid);
 };
@@ -619,6 +623,69 @@ void vtkFrangiVesselness::Internals::WarnOfSigma(const Geometry& grid)
   }
 }
 
+/// The scale of the structures, C or lambda 3, from a measurement of the image.
+/// @return whether there are any
+bool vtkFrangiVesselness::Internals::SetScale(vtkInformationVector** inputs, const Geometry& grid,
+  const Extent& whole, const Extent& region, coronary::VesselnessSettings& settings)
+{
+  vtkFrangiVesselness& self = *this->Self;
+  vtkInformation* inInfo = inputs[0]->GetInformationObject(0);
+  vtkInformation* maskInfo = inputs[1]->GetInformationObject(0);
+  MeasurementKey key;
+  key.image = vtkCoronary::UpstreamTime(inInfo);
+  key.mask = maskInfo ? vtkCoronary::UpstreamTime(maskInfo) : 0;
+  key.moment = vtkCoronary::NearestMoment(inInfo, self.AutomaticReferenceTime, self.ReferenceTime);
+  key.region = region;
+  key.whole = whole;
+  key.spacing = grid.spacing;
+  key.array = ChosenArray(self.GetInputArrayInformation(0));
+  key.sigmas = settings.sigmas;
+  key.method = self.Method;
+  key.bright = self.Bright;
+  if (!this->Measured || !(key == this->Key))
+  {
+    this->Measure(
+      key, coronary::MultiscaleVesselness(settings, Vector3(grid.spacing.data()), whole), inputs);
+    if (!(this->Extremes.hessianNorm > 0.0))
+    {
+      vtkWarningWithObjectMacro(
+        &self, "The image has no structure where C is measured: the vesselness is 0 everywhere.");
+    }
+  }
+  const bool structured = this->Extremes.hessianNorm > 0.0;
+  settings.jermanMaxima = this->Extremes.jermanMaxima;
+  settings.jermanMaxima.resize(settings.sigmas.size());
+  settings.c = structured ? 0.5 * this->Extremes.hessianNorm : 1.0;
+  return structured;
+}
+
+/// Grid and field data of the output.
+void vtkFrangiVesselness::Internals::Prepare(vtkImageData* input, const Geometry& grid,
+  const Extent& out, const coronary::VesselnessSettings& settings, vtkImageData* output) const
+{
+  const vtkFrangiVesselness& self = *this->Self;
+  output->Initialize();
+  output->SetExtent(Extent(out).data());
+  output->SetOrigin(grid.origin.data());
+  output->SetSpacing(grid.spacing.data());
+  output->SetDirectionMatrix(grid.direction.data());
+  output->GetFieldData()->PassData(input->GetFieldData());
+  if (input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
+  {
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(),
+      input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP()));
+  }
+  AddField(output, vtkCoronaryArrayNames::VesselnessSigmas, settings.sigmas);
+  if (self.Method == Frangi)
+  {
+    AddField(output, vtkCoronaryArrayNames::VesselnessC, { self.UsedC });
+  }
+  else if (self.Method == Jerman)
+  {
+    AddField(output, vtkCoronaryArrayNames::VesselnessLambda3, settings.jermanMaxima);
+  }
+}
+
 void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkInformation* outInfo)
 {
   vtkFrangiVesselness& self = *this->Self;
@@ -647,33 +714,7 @@ void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkI
     const bool automatic = self.Method == Frangi ? self.AutomaticC : self.Method == Jerman;
     if (automatic)
     {
-      MeasurementKey key;
-      key.image = vtkCoronary::UpstreamTime(inInfo);
-      key.mask = maskInfo ? vtkCoronary::UpstreamTime(maskInfo) : 0;
-      key.moment =
-        vtkCoronary::NearestMoment(inInfo, self.AutomaticReferenceTime, self.ReferenceTime);
-      key.region = region;
-      key.whole = whole;
-      key.spacing = grid.spacing;
-      key.array = ChosenArray(self.GetInputArrayInformation(0));
-      key.sigmas = settings.sigmas;
-      key.method = self.Method;
-      key.bright = self.Bright;
-      if (!this->Measured || !(key == this->Key))
-      {
-        this->Measure(key,
-          coronary::MultiscaleVesselness(settings, Vector3(grid.spacing.data()), whole), inputs);
-        structured = this->Extremes.hessianNorm > 0.0;
-        if (!structured)
-        {
-          vtkWarningWithObjectMacro(&self,
-            "The image has no structure where C is measured: the vesselness is 0 everywhere.");
-        }
-      }
-      structured = this->Extremes.hessianNorm > 0.0;
-      settings.jermanMaxima = this->Extremes.jermanMaxima;
-      settings.jermanMaxima.resize(settings.sigmas.size());
-      settings.c = structured ? 0.5 * this->Extremes.hessianNorm : 1.0;
+      structured = this->SetScale(inputs, grid, whole, region, settings);
     }
     self.UsedC = self.Method == Frangi && structured ? settings.c : 0.0;
   }
@@ -684,26 +725,7 @@ void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkI
   Extent out = ExtentOf(outInfo, SDDP::UPDATE_EXTENT());
   out = IsEmpty(out) ? EmptyExtent : out;
   const Extent part = Intersection(out, region);
-  output->Initialize();
-  output->SetExtent(out.data());
-  output->SetOrigin(grid.origin.data());
-  output->SetSpacing(grid.spacing.data());
-  output->SetDirectionMatrix(grid.direction.data());
-  output->GetFieldData()->PassData(input->GetFieldData());
-  if (input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
-  {
-    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(),
-      input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP()));
-  }
-  AddField(output, vtkCoronaryArrayNames::VesselnessSigmas, settings.sigmas);
-  if (self.Method == Frangi)
-  {
-    AddField(output, vtkCoronaryArrayNames::VesselnessC, { self.UsedC });
-  }
-  else if (self.Method == Jerman)
-  {
-    AddField(output, vtkCoronaryArrayNames::VesselnessLambda3, settings.jermanMaxima);
-  }
+  this->Prepare(input, grid, out, settings, output);
 
   const vtkSmartPointer<vtkFloatArray> values =
     NewArray(output, vtkCoronaryArrayNames::Vesselness, 1);

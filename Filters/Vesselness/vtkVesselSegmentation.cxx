@@ -32,6 +32,7 @@
 #include <cmath>
 #include <memory>
 #include <new>
+#include <optional>
 #include <stdexcept>
 
 using coronary::Vector3;
@@ -100,8 +101,6 @@ public:
     }
     return this->Copy.data();
   }
-
-  void Forget() { this->Copy = std::vector<float>(); }
 
   coronary::ScalarImage Image;
 
@@ -185,6 +184,131 @@ std::vector<double> DefaultScales(const Vector3& spacing)
   const double resolved = 0.5 * spacing.maxCoeff();
   const double low = std::min(largest, std::max(smallest, resolved));
   return coronary::VesselnessScales(low, largest, low < largest ? count : 1, false);
+}
+
+/// What begins a vessel. The ostia are empty where seeds were given.
+struct Origins
+{
+  std::vector<coronary::VesselSeed> seeds;
+  std::vector<coronary::CoronaryOstium> ostia;
+  coronary::AscendingAorta aorta;
+};
+
+/// @throws std::invalid_argument
+void RequireVolume(const coronary::ImageGrid& grid)
+{
+  const Extent& whole = grid.extent;
+  vtkCoronary::Require(whole[0] < whole[1] && whole[2] < whole[3] && whole[4] < whole[5],
+    "the image has " + std::to_string(whole[1] - whole[0] + 1) + " x " +
+      std::to_string(whole[3] - whole[2] + 1) + " x " + std::to_string(whole[5] - whole[4] + 1) +
+      " voxels: a three-dimensional image is needed");
+  vtkCoronary::Require(
+    (grid.direction * grid.direction.transpose()).isApprox(coronary::Matrix3::Identity(), 1e-4),
+    "the image's direction matrix is not orthonormal");
+}
+
+/// Points, with their axis where they have one.
+void AddSeeds(vtkPolyData* points, std::vector<coronary::VesselSeed>& seeds)
+{
+  vtkDataArray* axes = points->GetPointData()->GetArray(vtkCoronaryArrayNames::Axis);
+  for (vtkIdType n = 0; n < points->GetNumberOfPoints(); ++n)
+  {
+    coronary::VesselSeed seed;
+    points->GetPoint(n, seed.position.data());
+    if (axes && axes->GetNumberOfComponents() == 3)
+    {
+      axes->GetTuple(n, seed.axis.data());
+      const double length = seed.axis.norm();
+      seed.axis = length > 1e-9 && std::isfinite(length) ? Vector3(seed.axis / length)
+                                                         : Vector3(Vector3::Zero());
+    }
+    seeds.push_back(seed);
+  }
+}
+
+/// Vesselness of the whole image; without a window its own contrast sets the scale.
+std::vector<float> ComputeVesselness(vtkAlgorithm* self, const float* values,
+  const coronary::ImageGrid& grid, const std::optional<coronary::BloodWindow>& window)
+{
+  const Extent& whole = grid.extent;
+  coronary::VesselnessSettings frangi;
+  frangi.sigmas = DefaultScales(grid.spacing);
+  const coronary::MultiscaleVesselness unscaled(frangi, grid.spacing, whole);
+  const double middle = OstiaShare + 0.4 * VesselnessShare;
+  if (window)
+  {
+    // A vessel of full contrast has about this norm.
+    frangi.c = 0.25 * (window->blood - window->tissue);
+  }
+  else
+  {
+    frangi.c = 0.5 *
+      unscaled
+        .Measure(
+          { values, whole }, whole, nullptr, vtkCoronary::ProgressOf(self, OstiaShare, middle))
+        .hessianNorm;
+  }
+  std::vector<float> computed(
+    static_cast<std::size_t>(coronary::ScalarImage{ values, grid }.NumberOfVoxels()), 0.0f);
+  if (frangi.c > 0.0)
+  {
+    coronary::MultiscaleVesselness::Output to;
+    to.vesselness = computed.data();
+    coronary::MultiscaleVesselness(frangi, grid.spacing, whole)
+      .Compute({ values, whole }, whole, nullptr, to,
+        vtkCoronary::ProgressOf(self, middle, OstiaShare + VesselnessShare));
+  }
+  return computed;
+}
+
+/// Seeds with what is known of them, and the aorta's axis. Only the first piece has points.
+void WriteOrigins(const Origins& origins, const std::vector<double>& seedVolume, bool firstPiece,
+  vtkPolyData* seedsOutput, vtkPolyData* aortaOutput)
+{
+  const auto makeArray = [](vtkPolyData* data, const char* name, int components)
+  {
+    auto array = vtkSmartPointer<vtkDoubleArray>::New();
+    array->SetName(name);
+    array->SetNumberOfComponents(components);
+    data->GetPointData()->AddArray(array);
+    return array;
+  };
+  vtkNew<vtkStringArray> names;
+  names->SetName(vtkCoronaryArrayNames::Name);
+  seedsOutput->GetPointData()->AddArray(names);
+  const auto axes = makeArray(seedsOutput, vtkCoronaryArrayNames::Axis, 3);
+  const auto radii = makeArray(seedsOutput, vtkCoronaryArrayNames::Radius, 1);
+  const auto confidence = makeArray(seedsOutput, vtkCoronaryArrayNames::Confidence, 1);
+  const auto volumes = makeArray(seedsOutput, vtkCoronaryArrayNames::SeedVolume, 1);
+  const auto aortaRadii = makeArray(aortaOutput, vtkCoronaryArrayNames::Radius, 1);
+  if (!firstPiece)
+  {
+    return;
+  }
+  vtkNew<vtkCellArray> vertices;
+  for (std::size_t s = 0; s < origins.seeds.size(); ++s)
+  {
+    const vtkIdType id =
+      seedsOutput->GetPoints()->InsertNextPoint(origins.seeds[s].position.data());
+    vertices->InsertNextCell(1, &id);
+    names->InsertNextValue(origins.ostia.empty() ? std::to_string(s) : origins.ostia[s].name);
+    axes->InsertNextTuple(origins.seeds[s].axis.data());
+    radii->InsertNextValue(origins.ostia.empty() ? 0.0 : origins.ostia[s].radius);
+    confidence->InsertNextValue(origins.ostia.empty() ? 1.0 : origins.ostia[s].confidence);
+    volumes->InsertNextValue(seedVolume[s]);
+  }
+  seedsOutput->SetVerts(vertices);
+  vtkNew<vtkCellArray> lines;
+  if (!origins.aorta.sections.empty())
+  {
+    lines->InsertNextCell(static_cast<int>(origins.aorta.sections.size()));
+    for (const coronary::AorticSection& section : origins.aorta.sections)
+    {
+      lines->InsertCellPoint(aortaOutput->GetPoints()->InsertNextPoint(section.centre.data()));
+      aortaRadii->InsertNextValue(section.radius);
+    }
+  }
+  aortaOutput->SetLines(lines);
 }
 }
 
@@ -335,8 +459,7 @@ vtkDataArray* vtkVesselSegmentation::InputArray(vtkInformationVector** inputs, i
   return array;
 }
 
-void vtkVesselSegmentation::Execute(
-  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+coronary::VesselSegmentationSettings vtkVesselSegmentation::MakeSettings() const
 {
   coronary::VesselSegmentationSettings settings;
   vtkCoronary::Require(!this->AutomaticWindow ? this->BloodValue > this->TissueValue : true,
@@ -366,7 +489,36 @@ void vtkVesselSegmentation::Execute(
     settings.tubular = this->TubularVesselness;
   }
   settings.Validate();
+  return settings;
+}
 
+/// @throws std::runtime_error when there is none
+coronary::CoronaryOstia vtkVesselSegmentation::FindOstia(const coronary::ScalarImage& image)
+{
+  vtkCoronary::Require(this->AutomaticOstia,
+    "there is no seed: give points on the Seeds input or with AddSeed, or switch AutomaticOstia "
+    "on");
+  coronary::CoronaryOstia found = this->KnownOstia
+    ? *this->KnownOstia
+    : coronary::FindCoronaryOstia(image, {}, vtkCoronary::ProgressOf(this, 0.0, OstiaShare));
+  if (found.ostia.empty())
+  {
+    throw std::runtime_error("AutomaticOstia found no ostium (" + found.doubt +
+      "): give points on the Seeds input or with AddSeed");
+  }
+  if (!found.doubt.empty())
+  {
+    vtkWarningMacro("AutomaticOstia: " << found.doubt
+                                       << ". Look at output 1 before you trust it, and give "
+                                       << "seeds (Seeds input, AddSeed) where it is wrong.");
+  }
+  return found;
+}
+
+void vtkVesselSegmentation::Execute(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  coronary::VesselSegmentationSettings settings = this->MakeSettings();
   vtkImageData* input = vtkImageData::GetData(inputs[0]->GetInformationObject(0));
   vtkImageData* output = vtkImageData::GetData(outputs->GetInformationObject(MaskPort));
   vtkPolyData* seedsOutput = vtkPolyData::GetData(outputs->GetInformationObject(SeedsPort));
@@ -396,13 +548,7 @@ void vtkVesselSegmentation::Execute(
     output->GetPointData()->SetActiveScalars(vtkCoronaryArrayNames::VesselMask);
     return;
   }
-  vtkCoronary::Require(whole[0] < whole[1] && whole[2] < whole[3] && whole[4] < whole[5],
-    "the image has " + std::to_string(whole[1] - whole[0] + 1) + " x " +
-      std::to_string(whole[3] - whole[2] + 1) + " x " + std::to_string(whole[5] - whole[4] + 1) +
-      " voxels: a three-dimensional image is needed");
-  vtkCoronary::Require(
-    (grid.direction * grid.direction.transpose()).isApprox(coronary::Matrix3::Identity(), 1e-4),
-    "the image's direction matrix is not orthonormal");
+  RequireVolume(grid);
 
   // Inputs.
   vtkDataArray* imageArray = this->InputArray(inputs, 0);
@@ -418,67 +564,31 @@ void vtkVesselSegmentation::Execute(
       "the vesselness is on another grid than the image: extent, spacing, origin or direction "
       "differs");
   }
-  std::vector<coronary::VesselSeed> seeds;
-  std::vector<coronary::CoronaryOstium> ostia;
+  Origins origins;
   for (const std::array<double, 3>& seed : this->Seeds)
   {
-    seeds.push_back({ Vector3(seed.data()) });
+    origins.seeds.push_back({ Vector3(seed.data()) });
   }
   if (inputs[2]->GetNumberOfInformationObjects() > 0)
   {
-    vtkPolyData* points = vtkPolyData::GetData(inputs[2]->GetInformationObject(0));
-    vtkDataArray* axes = points->GetPointData()->GetArray(vtkCoronaryArrayNames::Axis);
-    for (vtkIdType n = 0; n < points->GetNumberOfPoints(); ++n)
-    {
-      coronary::VesselSeed seed;
-      points->GetPoint(n, seed.position.data());
-      if (axes && axes->GetNumberOfComponents() == 3)
-      {
-        axes->GetTuple(n, seed.axis.data());
-        const double length = seed.axis.norm();
-        seed.axis = length > 1e-9 && std::isfinite(length) ? Vector3(seed.axis / length)
-                                                           : Vector3(Vector3::Zero());
-      }
-      seeds.push_back(seed);
-    }
+    AddSeeds(vtkPolyData::GetData(inputs[2]->GetInformationObject(0)), origins.seeds);
   }
-
-  // Ostia.
-  coronary::AscendingAorta aorta;
-  if (seeds.empty())
+  if (origins.seeds.empty())
   {
-    vtkCoronary::Require(this->AutomaticOstia,
-      "there is no seed: give points on the Seeds input or with AddSeed, or switch AutomaticOstia "
-      "on");
-    const coronary::CoronaryOstia found = this->KnownOstia
-      ? *this->KnownOstia
-      : coronary::FindCoronaryOstia(
-          image.Image, {}, vtkCoronary::ProgressOf(this, 0.0, OstiaShare));
-    if (found.ostia.empty())
+    const coronary::CoronaryOstia found = this->FindOstia(image.Image);
+    origins.aorta = found.aorta;
+    origins.ostia = found.ostia;
+    for (const coronary::CoronaryOstium& ostium : found.ostia)
     {
-      throw std::runtime_error("AutomaticOstia found no ostium (" + found.doubt +
-        "): give points on the Seeds input or with AddSeed");
-    }
-    if (!found.doubt.empty())
-    {
-      vtkWarningMacro("AutomaticOstia: " << found.doubt
-                                         << ". Look at output 1 before you trust it, and give "
-                                         << "seeds (Seeds input, AddSeed) where it is wrong.");
-    }
-    aorta = found.aorta;
-    ostia = found.ostia;
-    for (const coronary::CoronaryOstium& ostium : ostia)
-    {
-      seeds.push_back({ ostium.position, ostium.axis });
+      origins.seeds.push_back({ ostium.position, ostium.axis });
     }
     if (this->AutomaticWindow)
     {
       settings.window =
-        coronary::BloodWindow{ coronary::CoronaryOstiaSettings().softTissue, aorta.mean };
+        coronary::BloodWindow{ coronary::CoronaryOstiaSettings().softTissue, found.aorta.mean };
     }
   }
 
-  // Vesselness, unless given.
   std::vector<float> computed;
   const float* vesselness = nullptr;
   std::unique_ptr<Voxels> givenVoxels;
@@ -489,39 +599,13 @@ void vtkVesselSegmentation::Execute(
   }
   else
   {
-    coronary::VesselnessSettings frangi;
-    frangi.sigmas = DefaultScales(grid.spacing);
-    const coronary::MultiscaleVesselness unscaled(frangi, grid.spacing, whole);
-    const float* values = image.Floats(imageArray);
-    const double middle = OstiaShare + 0.4 * VesselnessShare;
-    if (settings.window)
-    {
-      // A vessel of full contrast has about this norm.
-      frangi.c = 0.25 * (settings.window->blood - settings.window->tissue);
-    }
-    else
-    {
-      frangi.c = 0.5 *
-        unscaled
-          .Measure(
-            { values, whole }, whole, nullptr, vtkCoronary::ProgressOf(this, OstiaShare, middle))
-          .hessianNorm;
-    }
-    computed.assign(static_cast<std::size_t>(image.Image.NumberOfVoxels()), 0.0f);
-    if (frangi.c > 0.0)
-    {
-      coronary::MultiscaleVesselness::Output to;
-      to.vesselness = computed.data();
-      coronary::MultiscaleVesselness(frangi, grid.spacing, whole)
-        .Compute({ values, whole }, whole, nullptr, to,
-          vtkCoronary::ProgressOf(this, middle, OstiaShare + VesselnessShare));
-    }
+    computed = ComputeVesselness(this, image.Floats(imageArray), grid, settings.window);
     vesselness = computed.data();
   }
 
   const coronary::VesselSegmentationResult result =
-    coronary::SegmentVessels(image.Image, vesselness, seeds, settings, this->GenerateProbability,
-      vtkCoronary::ProgressOf(this, OstiaShare + VesselnessShare, 0.98));
+    coronary::SegmentVessels(image.Image, vesselness, origins.seeds, settings,
+      this->GenerateProbability, vtkCoronary::ProgressOf(this, OstiaShare + VesselnessShare, 0.98));
   Insert<vtkUnsignedCharArray>(output, vtkCoronaryArrayNames::VesselMask, result.mask, whole);
   output->GetPointData()->SetActiveScalars(vtkCoronaryArrayNames::VesselMask);
   if (this->GenerateProbability)
@@ -536,25 +620,18 @@ void vtkVesselSegmentation::Execute(
   output->GetFieldData()->AddArray(window);
   const std::vector<coronary::VesselBridge> bridges(result.links.begin(), result.links.end());
   vtkCoronary::SetBridges(output->GetFieldData(), bridges);
-  for (std::size_t s = 0; s < seeds.size(); ++s)
+  for (std::size_t s = 0; s < origins.seeds.size(); ++s)
   {
     if (!(result.seedVolume[s] > 0.0))
     {
-      const std::string name = ostia.empty() ? "seed " + std::to_string(s) : ostia[s].name;
-      vtkWarningMacro(<< "No vessel begins at " << name << " (" << seeds[s].position.transpose()
+      const std::string name =
+        origins.ostia.empty() ? "seed " + std::to_string(s) : origins.ostia[s].name;
+      vtkWarningMacro(<< "No vessel begins at " << name << " ("
+                      << origins.seeds[s].position.transpose()
                       << "): nothing there looks like one within 2 mm.");
     }
   }
 
-  // Seeds and aorta.
-  const auto makeArray = [](vtkPolyData* data, const char* name, int components)
-  {
-    auto array = vtkSmartPointer<vtkDoubleArray>::New();
-    array->SetName(name);
-    array->SetNumberOfComponents(components);
-    data->GetPointData()->AddArray(array);
-    return array;
-  };
   for (vtkPolyData* data : { seedsOutput, aortaOutput, bridgesOutput })
   {
     data->Initialize();
@@ -563,42 +640,13 @@ void vtkVesselSegmentation::Execute(
     data->SetPoints(points);
     data->GetFieldData()->PassData(input->GetFieldData());
   }
-  vtkNew<vtkStringArray> names;
-  names->SetName(vtkCoronaryArrayNames::Name);
-  seedsOutput->GetPointData()->AddArray(names);
-  const auto axes = makeArray(seedsOutput, vtkCoronaryArrayNames::Axis, 3);
-  const auto radii = makeArray(seedsOutput, vtkCoronaryArrayNames::Radius, 1);
-  const auto confidence = makeArray(seedsOutput, vtkCoronaryArrayNames::Confidence, 1);
-  const auto volumes = makeArray(seedsOutput, vtkCoronaryArrayNames::SeedVolume, 1);
-  const auto aortaRadii = makeArray(aortaOutput, vtkCoronaryArrayNames::Radius, 1);
-  if (outputs->GetInformationObject(SeedsPort)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
+  const bool firstPiece =
+    outputs->GetInformationObject(SeedsPort)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
+  WriteOrigins(origins, result.seedVolume, firstPiece, seedsOutput, aortaOutput);
+  if (firstPiece)
   {
-    return;
+    AddBridges(bridgesOutput, result.links);
   }
-  vtkNew<vtkCellArray> vertices;
-  for (std::size_t s = 0; s < seeds.size(); ++s)
-  {
-    const vtkIdType id = seedsOutput->GetPoints()->InsertNextPoint(seeds[s].position.data());
-    vertices->InsertNextCell(1, &id);
-    names->InsertNextValue(ostia.empty() ? std::to_string(s) : ostia[s].name);
-    axes->InsertNextTuple(seeds[s].axis.data());
-    radii->InsertNextValue(ostia.empty() ? 0.0 : ostia[s].radius);
-    confidence->InsertNextValue(ostia.empty() ? 1.0 : ostia[s].confidence);
-    volumes->InsertNextValue(result.seedVolume[s]);
-  }
-  seedsOutput->SetVerts(vertices);
-  vtkNew<vtkCellArray> lines;
-  if (!aorta.sections.empty())
-  {
-    lines->InsertNextCell(static_cast<int>(aorta.sections.size()));
-    for (const coronary::AorticSection& section : aorta.sections)
-    {
-      lines->InsertCellPoint(aortaOutput->GetPoints()->InsertNextPoint(section.centre.data()));
-      aortaRadii->InsertNextValue(section.radius);
-    }
-  }
-  aortaOutput->SetLines(lines);
-  AddBridges(bridgesOutput, result.links);
 }
 
 int vtkVesselSegmentation::RequestData(

@@ -65,6 +65,8 @@
 namespace coronary
 {
 struct CoronaryOstia;
+struct ScalarImage;
+struct VesselSegmentationSettings;
 }
 
 class VTKCORONARYVESSELNESS_EXPORT vtkVesselSegmentation : public vtkImageAlgorithm
@@ -241,7 +243,9 @@ private:
   vtkVesselSegmentation(const vtkVesselSegmentation&) = delete;
   void operator=(const vtkVesselSegmentation&) = delete;
 
+  coronary::VesselSegmentationSettings MakeSettings() const;
   vtkDataArray* InputArray(vtkInformationVector** inputs, int port);
+  coronary::CoronaryOstia FindOstia(const coronary::ScalarImage& image);
   void Execute(
     vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs);
 

@@ -1,59 +1,33 @@
-#include "SimulatorWindow.h"
+#include "vtkSessionWindow.h"
 
 #include "AtomicFile.h"
 #include "Command.h"
-#include "FluoroscopyWidget.h"
 #include "HeadlessSession.h"
 #include "HeartShell.h"
-#include "IgtlOutput.h"
 #include "InstrumentCatalogue.h"
 #include "Interruption.h"
-#include "KeyboardDevice.h"
-#include "PanelDevice.h"
 #include "RecordedDevices.h"
-#include "TraceWidget.h"
 #include "vtkEvaluationPictures.h"
-#include "vtkSimulatorScene.h"
-#include "vtkVideoFile.h"
 
-#include "QVTKOpenGLNativeWidget.h"
-#include "vtkGenericOpenGLRenderWindow.h"
-#include "vtkNew.h"
 #include "vtkRenderer.h"
 
+#include <QAction>
 #include <QApplication>
-#include <QCheckBox>
 #include <QCloseEvent>
-#include <QComboBox>
 #include <QDateTime>
 #include <QDir>
 #include <QDockWidget>
-#include <QDoubleSpinBox>
-#include <QElapsedTimer>
-#include <QFileDialog>
-#include <QFormLayout>
-#include <QGridLayout>
-#include <QGroupBox>
 #include <QJsonArray>
 #include <QJsonDocument>
 #include <QJsonObject>
 #include <QKeyEvent>
-#include <QLabel>
-#include <QMainWindow>
-#include <QMessageBox>
 #include <QOffscreenSurface>
 #include <QOpenGLContext>
-#include <QPlainTextEdit>
-#include <QPushButton>
 #include <QSaveFile>
-#include <QScrollArea>
 #include <QSignalBlocker>
-#include <QSlider>
 #include <QSplitter>
 #include <QStatusBar>
 #include <QSurfaceFormat>
-#include <QTimer>
-#include <QToolBar>
 #include <QVBoxLayout>
 
 #include <algorithm>
@@ -73,41 +47,6 @@ constexpr double WheelTurn = 15.0 * Degree; // a notch
 constexpr double DragTurn = 0.3 * Degree;   // of the C-arm, a pixel
 constexpr int PollInterval = 15;            // ms
 constexpr double VideoRate = 10.0;          // Hz
-
-struct StandardView
-{
-  const char* name;
-  double primary; // degrees
-  double secondary;
-};
-
-/// Views that coronary angiography is taught with.
-constexpr StandardView StandardViews[] = { { "AP", 0.0, 0.0 }, { "RAO 30", -30.0, 0.0 },
-  { "RAO 30 CRA 25", -30.0, 25.0 }, { "RAO 20 CAU 20", -20.0, -20.0 }, { "AP CRA 35", 0.0, 35.0 },
-  { "AP CAU 30", 0.0, -30.0 }, { "LAO 40", 40.0, 0.0 }, { "LAO 40 CRA 25", 40.0, 25.0 },
-  { "LAO 45 CAU 25 (spider)", 45.0, -25.0 }, { "LAO 90", 90.0, 0.0 } };
-
-QDoubleSpinBox* Number(
-  double low, double high, double step, int decimals, const QString& unit, const QString& help)
-{
-  auto* box = new QDoubleSpinBox;
-  box->setRange(low, high);
-  box->setSingleStep(step);
-  box->setDecimals(decimals);
-  box->setSuffix(unit.isEmpty() ? unit : " " + unit);
-  box->setToolTip(help);
-  box->setKeyboardTracking(false);
-  box->setFocusPolicy(Qt::ClickFocus);
-  return box;
-}
-
-QPushButton* Button(const QString& text, const QString& help)
-{
-  auto* button = new QPushButton(text);
-  button->setToolTip(help);
-  button->setFocusPolicy(Qt::NoFocus);
-  return button;
-}
 
 /// X11's name of a key, as the key map has it.
 std::string KeyName(const QKeyEvent& event)
@@ -161,123 +100,9 @@ std::string KeyName(const QKeyEvent& event)
   }
   return {};
 }
+}
 
-class Window : public QMainWindow
-{
-public:
-  Window(const SessionWorld& world, const WindowOptions& options);
-  ~Window() override;
-
-  /// @throws as SessionEngine, OpenDevice
-  void Begin(const std::string& record, const std::string& replay);
-
-  /// What went wrong first; empty: nothing did.
-  const QString& Trouble() const { return this->Trouble_; }
-
-protected:
-  void keyPressEvent(QKeyEvent* event) override;
-  void keyReleaseEvent(QKeyEvent* event) override;
-  void closeEvent(QCloseEvent* event) override;
-  void changeEvent(QEvent* event) override;
-
-private:
-  QWidget* MakePanel();
-  QGroupBox* MakeInstrumentGroup();
-  QGroupBox* MakeViewGroup();
-  QGroupBox* MakeXRayGroup();
-  QGroupBox* MakeContrastGroup();
-  QGroupBox* MakeHeartGroup();
-  QGroupBox* MakeAnatomyGroup();
-  QWidget* MakeMetrics();
-  void MakeToolBar();
-  void ConnectMouse();
-
-  void ShowScenario();
-  void Poll();
-  void ShowSession();
-  void ShowScene();
-  void ShowImage();
-  void SendPose();
-  void ShowNumbers(const SessionSnapshot& now);
-  void ShowDevices();
-  void ShowRates();
-  void ShowCine();
-  void TakeDueScreenshots();
-  void RecordVideo();
-
-  void PlaceView();
-  void TakeScenarioOf(const std::string& recording);
-  void Restart(const std::string& record, const std::string& replay);
-  void End();
-  void Post(const RecordedEvent& event);
-  void Problem(const QString& text);
-  void PressFluoroscopy();
-  void SaveScreenshot(const QString& path);
-  void SaveXRay(const QString& name);
-  void PrintRates() const;
-  void ToggleVideo(bool on);
-
-  SessionWorld World;
-  WindowOptions Options;
-  std::vector<std::shared_ptr<Device>> Hardware;
-  std::shared_ptr<KeyboardDevice> Keys;
-  std::shared_ptr<PanelDevice> Panel;
-  std::shared_ptr<DeviceMux> Mux;
-  std::unique_ptr<SessionEngine> Engine;
-  std::unique_ptr<vtkSimulatorScene> Scene;
-  std::unique_ptr<vtkVideoFile> Video;
-  std::unique_ptr<IgtlOutput> Igtl;
-  SessionSnapshot Now;
-  ShownImage Shown;
-  ImageMode Mode = ImageMode::Plain;
-  std::size_t NextScreenshot = 0;
-  QString Trouble_;
-  bool Replaying = false;
-  bool ViewIsOurs = false; ///< the panel's values are being set to what devices made of the view
-  double Primary = 0.0;    ///< that the panel asked for, radians
-  double Secondary = 0.0;
-  int DrawnFrames = 0;
-  double SceneFrameRate = 0.0;
-  QElapsedTimer Second;
-  QElapsedTimer Whole;
-  std::uint64_t AllDrawn = 0;
-  QElapsedTimer VideoClock;
-  std::int64_t Filmed = 0; ///< places of the film that have passed
-  QTimer Timer;
-
-  FluoroscopyWidget* Monitor = nullptr;
-  QVTKOpenGLNativeWidget* Anatomy = nullptr;
-  vtkNew<vtkGenericOpenGLRenderWindow> AnatomyWindow;
-  TraceWidget* Traces = nullptr;
-  QComboBox* WireChoice = nullptr;
-  QComboBox* CatheterChoice = nullptr;
-  QLabel* InstrumentText = nullptr;
-  QComboBox* ViewChoice = nullptr;
-  QDoubleSpinBox* PrimaryBox = nullptr;
-  QDoubleSpinBox* SecondaryBox = nullptr;
-  QDoubleSpinBox* DistanceBox = nullptr;
-  QDoubleSpinBox* TableBoxes[3] = { nullptr, nullptr, nullptr };
-  QPushButton* FluoroscopyButton = nullptr;
-  QCheckBox* FluoroscopyHold = nullptr;
-  QComboBox* FieldChoice = nullptr;
-  QComboBox* RateChoice = nullptr;
-  QComboBox* ModeChoice = nullptr;
-  QSlider* RunSlider = nullptr;
-  QSlider* FrameSlider = nullptr;
-  QDoubleSpinBox* InjectionBox = nullptr;
-  QLabel* ContrastText = nullptr;
-  QSlider* HeartSlider = nullptr;
-  QLabel* HeartText = nullptr;
-  QCheckBox* HeartPause = nullptr;
-  QLabel* MetricsText = nullptr;
-  QPlainTextEdit* Log = nullptr;
-  QLabel* DeviceText = nullptr;
-  QPushButton* ForceButton = nullptr;
-  QAction* PauseAction = nullptr;
-  QAction* VideoAction = nullptr;
-};
-
-Window::Window(const SessionWorld& world, const WindowOptions& options)
+SessionWindow::SessionWindow(const SessionWorld& world, const WindowOptions& options)
   : World(world)
   , Options(options)
 {
@@ -339,367 +164,14 @@ Window::Window(const SessionWorld& world, const WindowOptions& options)
   this->setFocusPolicy(Qt::StrongFocus);
 }
 
-Window::~Window()
+SessionWindow::~SessionWindow()
 {
   // The scene's renderer goes before the window that draws it.
   this->AnatomyWindow->RemoveRenderer(this->Scene->Renderer());
 }
 
-QWidget* Window::MakePanel()
-{
-  auto* inside = new QWidget;
-  auto* column = new QVBoxLayout(inside);
-  column->setContentsMargins(6, 6, 6, 6);
-  column->addWidget(this->MakeInstrumentGroup());
-  column->addWidget(this->MakeViewGroup());
-  column->addWidget(this->MakeXRayGroup());
-  column->addWidget(this->MakeContrastGroup());
-  column->addWidget(this->MakeHeartGroup());
-  column->addWidget(this->MakeAnatomyGroup());
-  this->ForceButton = Button("Confirm forces", "Hands are on the device and ready to feel forces");
-  this->ForceButton->hide();
-  QObject::connect(this->ForceButton, &QPushButton::clicked,
-    [this]
-    {
-      for (const std::shared_ptr<Device>& device : this->Hardware)
-      {
-        device->ConfirmForces();
-      }
-    });
-  this->Log = new QPlainTextEdit;
-  this->Log->setReadOnly(true);
-  this->Log->setMaximumBlockCount(500);
-  this->Log->setMinimumHeight(60);
-  this->Log->setFocusPolicy(Qt::ClickFocus);
-  column->addWidget(this->ForceButton);
-  column->addWidget(this->Log, 1);
-  auto* scroll = new QScrollArea;
-  scroll->setWidget(inside);
-  scroll->setWidgetResizable(true);
-  scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
-  scroll->setMinimumWidth(inside->minimumSizeHint().width() + 24);
-  return scroll;
-}
-
-QGroupBox* Window::MakeInstrumentGroup()
-{
-  auto* group = new QGroupBox("Instruments");
-  auto* form = new QFormLayout(group);
-  this->WireChoice = new QComboBox;
-  this->CatheterChoice = new QComboBox;
-  for (const CatalogueWire& one : BuiltInCatalogue().wires)
-  {
-    this->WireChoice->addItem(QString::fromStdString(one.wire.name));
-  }
-  for (const CatalogueCatheter& one : BuiltInCatalogue().catheters)
-  {
-    this->CatheterChoice->addItem(QString::fromStdString(one.catheter.name));
-  }
-  for (QComboBox* box : { this->WireChoice, this->CatheterChoice })
-  {
-    box->setFocusPolicy(Qt::NoFocus);
-    box->setToolTip("Taken at the next new session");
-  }
-  this->InstrumentText = new QLabel;
-  this->InstrumentText->setTextFormat(Qt::PlainText);
-  form->addRow("Wire", this->WireChoice);
-  form->addRow("Catheter", this->CatheterChoice);
-  form->addRow(this->InstrumentText);
-  return group;
-}
-
-QGroupBox* Window::MakeViewGroup()
-{
-  auto* group = new QGroupBox("C-arm and table");
-  auto* form = new QFormLayout(group);
-  this->ViewChoice = new QComboBox;
-  this->ViewChoice->addItem("Standard view ...");
-  for (const StandardView& view : StandardViews)
-  {
-    this->ViewChoice->addItem(view.name);
-  }
-  this->ViewChoice->setFocusPolicy(Qt::NoFocus);
-  this->PrimaryBox = Number(-105.0, 105.0, 5.0, 0, QChar(0x00B0), "LAO positive, RAO negative");
-  this->SecondaryBox =
-    Number(-50.0, 50.0, 5.0, 0, QChar(0x00B0), "Cranial positive, caudal negative");
-  this->DistanceBox = Number(900.0, 1300.0, 10.0, 0, "mm", "Source to detector");
-  form->addRow(this->ViewChoice);
-  form->addRow("LAO / RAO", this->PrimaryBox);
-  form->addRow("CRA / CAU", this->SecondaryBox);
-  form->addRow("SID", this->DistanceBox);
-  auto* table = new QHBoxLayout;
-  const char* const help[] = { "Towards the patient's left", "Backwards", "Towards the head" };
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    this->TableBoxes[axis] = Number(-200.0, 200.0, 5.0, 0, "", help[axis]);
-    table->addWidget(this->TableBoxes[axis]);
-  }
-  form->addRow("Table (mm)", table);
-  const auto place = [this](double) { this->PlaceView(); };
-  for (QDoubleSpinBox* box : { this->PrimaryBox, this->SecondaryBox, this->DistanceBox,
-         this->TableBoxes[0], this->TableBoxes[1], this->TableBoxes[2] })
-  {
-    QObject::connect(box, QOverload<double>::of(&QDoubleSpinBox::valueChanged), place);
-  }
-  QObject::connect(this->ViewChoice, QOverload<int>::of(&QComboBox::activated),
-    [this](int index)
-    {
-      if (index > 0)
-      {
-        const StandardView& view = StandardViews[index - 1];
-        this->PrimaryBox->setValue(view.primary);
-        this->SecondaryBox->setValue(view.secondary);
-        this->ViewChoice->setCurrentIndex(0);
-      }
-    });
-  return group;
-}
-
-QGroupBox* Window::MakeXRayGroup()
-{
-  auto* group = new QGroupBox("X-ray");
-  auto* form = new QFormLayout(group);
-  auto* row = new QHBoxLayout;
-  this->FluoroscopyButton = Button("Fluoroscopy", "Radiation while it is held; key: see Help");
-  auto* cine = Button("Cine", "A run that is stored, while it is held");
-  auto* mask = Button("Mask", "The next frame becomes the mask of subtraction and roadmap");
-  row->addWidget(this->FluoroscopyButton);
-  row->addWidget(cine);
-  row->addWidget(mask);
-  form->addRow(row);
-  this->FluoroscopyHold = new QCheckBox("Hold the pedal down");
-  this->FluoroscopyHold->setFocusPolicy(Qt::NoFocus);
-  form->addRow(this->FluoroscopyHold);
-  const auto pedal = [this](QPushButton* button, std::uint32_t bit)
-  {
-    QObject::connect(
-      button, &QPushButton::pressed, [this, bit] { this->Panel->SetPedal(bit, true); });
-    QObject::connect(
-      button, &QPushButton::released, [this, bit] { this->Panel->SetPedal(bit, false); });
-  };
-  pedal(cine, CinePedal);
-  pedal(mask, MaskPedal);
-  const auto fluoroscopy = [this] { this->PressFluoroscopy(); };
-  QObject::connect(this->FluoroscopyButton, &QPushButton::pressed, fluoroscopy);
-  QObject::connect(this->FluoroscopyButton, &QPushButton::released, fluoroscopy);
-  QObject::connect(this->FluoroscopyHold, &QCheckBox::toggled, fluoroscopy);
-  this->RateChoice = new QComboBox;
-  this->RateChoice->addItem("7.5 frames/s", 7.5);
-  this->RateChoice->addItem("15 frames/s", 15.0);
-  this->RateChoice->addItem("30 frames/s", 30.0);
-  this->ModeChoice = new QComboBox;
-  this->ModeChoice->addItems({ "Plain", "Subtraction (DSA)", "Roadmap" });
-  this->FieldChoice = new QComboBox;
-  for (const double field : { 130.0, 170.0, 200.0, 250.0, 300.0 })
-  {
-    this->FieldChoice->addItem(QString("%1 mm").arg(field), field);
-  }
-  for (QComboBox* box : { this->RateChoice, this->ModeChoice, this->FieldChoice })
-  {
-    box->setFocusPolicy(Qt::NoFocus);
-  }
-  form->addRow("Rate", this->RateChoice);
-  form->addRow("Image", this->ModeChoice);
-  form->addRow("Field", this->FieldChoice);
-  // What is chosen is for this session, if there is one, and for the next ones.
-  const auto set = [this](QComboBox* box, RecordedEvent::Kind kind, double ImagingSettings::*value)
-  {
-    QObject::connect(box, QOverload<int>::of(&QComboBox::activated),
-      [this, box, kind, value](int)
-      {
-        const double chosen = box->currentData().toDouble();
-        this->World.scenario.imaging.*value = chosen;
-        this->Post({ kind, chosen });
-      });
-  };
-  set(this->RateChoice, RecordedEvent::FrameRate, &ImagingSettings::frameRate);
-  set(this->FieldChoice, RecordedEvent::FieldOfView, &ImagingSettings::fieldOfView);
-  QObject::connect(this->ModeChoice, QOverload<int>::of(&QComboBox::activated),
-    [this](int index)
-    {
-      this->Mode = static_cast<ImageMode>(index);
-      if (this->Engine)
-      {
-        this->Engine->SetImageMode(this->Mode);
-      }
-    });
-  this->RunSlider = new QSlider(Qt::Horizontal);
-  this->FrameSlider = new QSlider(Qt::Horizontal);
-  for (QSlider* slider : { this->RunSlider, this->FrameSlider })
-  {
-    slider->setEnabled(false);
-    slider->setFocusPolicy(Qt::NoFocus);
-    QObject::connect(slider, &QSlider::sliderMoved, [this](int) { this->ShowCine(); });
-  }
-  this->RunSlider->setToolTip("Stored cine runs");
-  this->FrameSlider->setToolTip("Frames of the run");
-  form->addRow("Cine run", this->RunSlider);
-  form->addRow("Frame", this->FrameSlider);
-  return group;
-}
-
-QGroupBox* Window::MakeContrastGroup()
-{
-  auto* group = new QGroupBox("Contrast medium");
-  auto* form = new QFormLayout(group);
-  auto* inject = Button("Inject", "Pushes the syringe while it is held; key: see Help");
-  this->InjectionBox = Number(0.5, 10.0, 0.5, 1, "mL/s", "How fast the button pushes");
-  this->InjectionBox->setValue(3.0);
-  auto* row = new QHBoxLayout;
-  row->addWidget(inject);
-  row->addWidget(this->InjectionBox);
-  form->addRow(row);
-  this->ContrastText = new QLabel;
-  form->addRow(this->ContrastText);
-  QObject::connect(inject, &QPushButton::pressed,
-    [this] { this->Panel->SetInjection(this->InjectionBox->value()); });
-  QObject::connect(inject, &QPushButton::released, [this] { this->Panel->SetInjection(0.0); });
-  return group;
-}
-
-QGroupBox* Window::MakeHeartGroup()
-{
-  auto* group = new QGroupBox("Heart");
-  auto* form = new QFormLayout(group);
-  this->HeartSlider = new QSlider(Qt::Horizontal);
-  this->HeartSlider->setRange(40, 140);
-  this->HeartSlider->setFocusPolicy(Qt::NoFocus);
-  this->HeartText = new QLabel;
-  this->HeartPause = new QCheckBox("Standing still");
-  this->HeartPause->setFocusPolicy(Qt::NoFocus);
-  form->addRow(this->HeartText, this->HeartSlider);
-  form->addRow(this->HeartPause);
-  const auto set = [this]
-  {
-    const double rate = this->HeartPause->isChecked() ? 0.0 : this->HeartSlider->value();
-    this->HeartText->setText(QString("%1 /min").arg(this->HeartSlider->value()));
-    this->World.scenario.settings.heartRate = rate;
-    this->Post({ RecordedEvent::HeartRate, rate });
-  };
-  QObject::connect(this->HeartSlider, &QSlider::valueChanged, [set](int) { set(); });
-  QObject::connect(this->HeartPause, &QCheckBox::toggled, [set](bool) { set(); });
-  return group;
-}
-
-QGroupBox* Window::MakeAnatomyGroup()
-{
-  auto* group = new QGroupBox("Anatomy");
-  auto* grid = new QGridLayout(group);
-  auto* heart = new QCheckBox("Heart");
-  auto* medium = new QCheckBox("Contrast");
-  auto* opacity = new QSlider(Qt::Horizontal);
-  opacity->setRange(0, 100);
-  opacity->setValue(38);
-  opacity->setToolTip("Opacity of the arteries");
-  auto* asCArm = Button("As the C-arm", "Looks at the anatomy from the detector");
-  auto* front = Button("Front", "Looks at all of it from the front");
-  for (QCheckBox* box : { heart, medium })
-  {
-    box->setChecked(true);
-    box->setFocusPolicy(Qt::NoFocus);
-  }
-  heart->setChecked(this->Options.heart);
-  heart->setEnabled(this->Options.heart);
-  opacity->setFocusPolicy(Qt::NoFocus);
-  grid->addWidget(heart, 0, 0);
-  grid->addWidget(medium, 0, 1);
-  grid->addWidget(opacity, 1, 0, 1, 2);
-  grid->addWidget(asCArm, 2, 0);
-  grid->addWidget(front, 2, 1);
-  QObject::connect(heart, &QCheckBox::toggled, [this](bool on) { this->Scene->ShowHeart(on); });
-  QObject::connect(medium, &QCheckBox::toggled, [this](bool on) { this->Scene->ShowTracers(on); });
-  QObject::connect(opacity, &QSlider::valueChanged,
-    [this](int value) { this->Scene->SetWallOpacity(0.01 * value); });
-  QObject::connect(
-    asCArm, &QPushButton::clicked, [this] { this->Scene->LookAsCArm(this->Now.pose); });
-  QObject::connect(front, &QPushButton::clicked, [this] { this->Scene->LookFromFront(); });
-  return group;
-}
-
-QWidget* Window::MakeMetrics()
-{
-  this->MetricsText = new QLabel;
-  this->MetricsText->setTextFormat(Qt::PlainText);
-  this->MetricsText->setWordWrap(true);
-  this->MetricsText->setFixedWidth(400);
-  this->MetricsText->setMargin(8);
-  this->MetricsText->setStyleSheet("background: rgb(8, 10, 12); color: rgb(225, 232, 235);");
-  this->MetricsText->setToolTip("What distinguishes trainees");
-  return this->MetricsText;
-}
-
-void Window::MakeToolBar()
-{
-  QToolBar* bar = this->addToolBar("Session");
-  bar->setMovable(false);
-  const auto add = [&](const QString& text, const QString& help, auto action)
-  {
-    QAction* one = bar->addAction(text);
-    one->setToolTip(help);
-    QObject::connect(one, &QAction::triggered, action);
-    return one;
-  };
-  add("New session", "From the beginning, with the chosen instruments",
-    [this](bool) { this->Restart({}, {}); });
-  add("Record ...", "A new session that is recorded",
-    [this](bool)
-    {
-      const QString path = QFileDialog::getSaveFileName(
-        this, "Record a new session", "session.pcirec", "Recordings (*.pcirec)");
-      if (!path.isEmpty())
-      {
-        this->Restart(path.toStdString(), {});
-      }
-    });
-  add("Replay ...", "Goes through a recording",
-    [this](bool)
-    {
-      const QString path =
-        QFileDialog::getOpenFileName(this, "Replay", {}, "Recordings (*.pcirec)");
-      if (!path.isEmpty())
-      {
-        this->Restart({}, path.toStdString());
-      }
-    });
-  add("Stop", "Ends the session and finishes its recording", [this](bool) { this->End(); });
-  this->PauseAction = add("Pause", "Time stands still",
-    [this](bool on)
-    {
-      if (this->Engine)
-      {
-        this->Engine->SetPaused(on);
-      }
-    });
-  this->PauseAction->setCheckable(true);
-  bar->addSeparator();
-  add("Screenshot", "Saves a picture of the window in the current folder",
-    [this](bool)
-    {
-      this->SaveScreenshot(
-        "simulator-" + QDateTime::currentDateTime().toString("yyyyMMdd-HHmmss-zzz") + ".png");
-    });
-  this->VideoAction =
-    add("Video", "Films the window into a file", [this](bool on) { this->ToggleVideo(on); });
-  this->VideoAction->setCheckable(true);
-  bar->addSeparator();
-  add("Help", "Keys and mouse",
-    [this](bool)
-    {
-      QString text = "<table>";
-      for (const KeyBinding& binding : KeyboardDevice::KeyMap())
-      {
-        text +=
-          QString("<tr><td><b>%1</b>&nbsp;&nbsp;</td><td>%2</td></tr>")
-            .arg(QString(binding.key).toHtmlEscaped(), QString(binding.meaning).toHtmlEscaped());
-      }
-      text += "</table><p>Wheel on the X-ray image: the wire forth and back; with Shift it turns; "
-              "with Control the catheter. Right button drags the C-arm.</p>";
-      QMessageBox::information(this, "Keys and mouse", text);
-    });
-}
-
 /// The panel says what the next session begins with.
-void Window::ShowScenario()
+void SessionWindow::ShowScenario()
 {
   const Scenario& scenario = this->World.scenario;
   const auto choose = [](QComboBox* box, const QString& text, const QVariant& value)
@@ -727,13 +199,13 @@ void Window::ShowScenario()
     QString("%1 /min").arg(heartRate > 0.0 ? heartRate : this->HeartSlider->value()));
 }
 
-void Window::PressFluoroscopy()
+void SessionWindow::PressFluoroscopy()
 {
   this->Panel->SetPedal(
     FluoroscopyPedal, this->FluoroscopyButton->isDown() || this->FluoroscopyHold->isChecked());
 }
 
-void Window::ConnectMouse()
+void SessionWindow::ConnectMouse()
 {
   this->Monitor->wheelTurned = [this](double steps, Qt::KeyboardModifiers modifiers)
   {
@@ -761,7 +233,7 @@ void Window::ConnectMouse()
   };
 }
 
-void Window::PlaceView()
+void SessionWindow::PlaceView()
 {
   if (this->ViewIsOurs || !this->Mux)
   {
@@ -778,7 +250,7 @@ void Window::PlaceView()
   this->Mux->PlaceView(view);
 }
 
-void Window::Begin(const std::string& record, const std::string& replay)
+void SessionWindow::Begin(const std::string& record, const std::string& replay)
 {
   Scenario& scenario = this->World.scenario;
   if (replay.empty())
@@ -830,7 +302,7 @@ void Window::Begin(const std::string& record, const std::string& replay)
 }
 
 /// A recording is of its own instruments and settings; the vessels have to be the same.
-void Window::TakeScenarioOf(const std::string& recording)
+void SessionWindow::TakeScenarioOf(const std::string& recording)
 {
   HeadlessOptions options;
   options.replay = recording;
@@ -841,7 +313,7 @@ void Window::TakeScenarioOf(const std::string& recording)
   this->ShowScenario();
 }
 
-void Window::Restart(const std::string& record, const std::string& replay)
+void SessionWindow::Restart(const std::string& record, const std::string& replay)
 {
   this->End();
   try
@@ -859,7 +331,7 @@ void Window::Restart(const std::string& record, const std::string& replay)
   }
 }
 
-void Window::Post(const RecordedEvent& event)
+void SessionWindow::Post(const RecordedEvent& event)
 {
   if (this->Engine)
   {
@@ -867,7 +339,7 @@ void Window::Post(const RecordedEvent& event)
   }
 }
 
-void Window::End()
+void SessionWindow::End()
 {
   this->ToggleVideo(false);
   if (!this->Engine)
@@ -892,14 +364,14 @@ void Window::End()
 }
 
 /// The trainee is told now, whoever started the program when it ends.
-void Window::Problem(const QString& text)
+void SessionWindow::Problem(const QString& text)
 {
   this->Trouble_ = this->Trouble_.isEmpty() ? text : this->Trouble_;
   this->Log->appendPlainText(text);
   this->Monitor->SetBanner(text);
 }
 
-void Window::Poll()
+void SessionWindow::Poll()
 {
   if (Interruption() != 0)
   {
@@ -921,7 +393,7 @@ void Window::Poll()
   }
 }
 
-void Window::ShowSession()
+void SessionWindow::ShowSession()
 {
   this->ShowImage();
   this->ShowScene();
@@ -948,7 +420,7 @@ void Window::ShowSession()
   }
 }
 
-void Window::ShowScene()
+void SessionWindow::ShowScene()
 {
   if (!this->Engine->LatestScene(this->Now))
   {
@@ -966,7 +438,7 @@ void Window::ShowScene()
 }
 
 /// The wire's tip for others: its last axis is the way forward.
-void Window::SendPose()
+void SessionWindow::SendPose()
 {
   if (!this->Igtl || this->Now.wire.size() < 2)
   {
@@ -980,7 +452,7 @@ void Window::SendPose()
   this->Igtl->SendPose("WireTip", pose, this->Now.seconds);
 }
 
-void Window::ShowImage()
+void SessionWindow::ShowImage()
 {
   if (!this->Engine->LatestImage(this->Shown))
   {
@@ -996,7 +468,7 @@ void Window::ShowImage()
   }
 }
 
-void Window::ShowNumbers(const SessionSnapshot& now)
+void SessionWindow::ShowNumbers(const SessionSnapshot& now)
 {
   const TickReport& report = now.report;
   const auto& names = this->World.wall->Topology().groupName;
@@ -1075,7 +547,7 @@ void Window::ShowNumbers(const SessionSnapshot& now)
   }
 }
 
-void Window::ShowDevices()
+void SessionWindow::ShowDevices()
 {
   QString banner = this->Trouble_;
   bool awaits = false;
@@ -1092,7 +564,7 @@ void Window::ShowDevices()
   this->ForceButton->setVisible(awaits);
 }
 
-void Window::ShowRates()
+void SessionWindow::ShowRates()
 {
   if (this->Second.elapsed() < 1000)
   {
@@ -1122,7 +594,7 @@ void Window::ShowRates()
 }
 
 /// Over the whole session, for whoever runs it unattended.
-void Window::PrintRates() const
+void SessionWindow::PrintRates() const
 {
   const double seconds = 1e-3 * static_cast<double>(this->Whole.elapsed());
   const EngineRates rates = this->Engine->Rates();
@@ -1138,7 +610,7 @@ void Window::PrintRates() const
     static_cast<long long>(this->Scene->NumberOfTriangles()));
 }
 
-void Window::ShowCine()
+void SessionWindow::ShowCine()
 {
   if (!this->Engine || this->Now.radiating)
   {
@@ -1159,7 +631,7 @@ void Window::ShowCine()
   }
 }
 
-void Window::TakeDueScreenshots()
+void SessionWindow::TakeDueScreenshots()
 {
   while (this->NextScreenshot < this->Options.screenshotSeconds.size() &&
     this->Now.seconds >= this->Options.screenshotSeconds[this->NextScreenshot])
@@ -1180,7 +652,7 @@ bool SavePicture(const QImage& picture, const QString& path)
   return file.open(QIODevice::WriteOnly) && picture.save(&file, "PNG") && file.commit();
 }
 
-void Window::SaveScreenshot(const QString& path)
+void SessionWindow::SaveScreenshot(const QString& path)
 {
   if (!SavePicture(this->grab().toImage(), path))
   {
@@ -1191,7 +663,7 @@ void Window::SaveScreenshot(const QString& path)
 }
 
 /// The last X-ray image, and what was exposed.
-void Window::SaveXRay(const QString& name)
+void SessionWindow::SaveXRay(const QString& name)
 {
   const GreyImage& image = this->Shown.image;
   if (image.values.empty())
@@ -1223,7 +695,7 @@ void Window::SaveXRay(const QString& name)
   }
 }
 
-void Window::ToggleVideo(bool on)
+void SessionWindow::ToggleVideo(bool on)
 {
   if (!on)
   {
@@ -1259,7 +731,7 @@ void Window::ToggleVideo(bool on)
   }
 }
 
-void Window::RecordVideo()
+void SessionWindow::RecordVideo()
 {
   if (!this->Options.video.empty() && !this->Video && this->Now.tick > 0 &&
     !this->VideoClock.isValid())
@@ -1277,7 +749,7 @@ void Window::RecordVideo()
     static_cast<std::size_t>(picture.bytesPerLine()), seconds);
 }
 
-void Window::keyPressEvent(QKeyEvent* event)
+void SessionWindow::keyPressEvent(QKeyEvent* event)
 {
   const std::string key = KeyName(*event);
   if (event->isAutoRepeat() || key.empty() || !this->Keys || !this->Keys->Press(key))
@@ -1286,7 +758,7 @@ void Window::keyPressEvent(QKeyEvent* event)
   }
 }
 
-void Window::keyReleaseEvent(QKeyEvent* event)
+void SessionWindow::keyReleaseEvent(QKeyEvent* event)
 {
   const std::string key = KeyName(*event);
   if (event->isAutoRepeat() || key.empty() || !this->Keys || !this->Keys->Release(key))
@@ -1295,7 +767,7 @@ void Window::keyReleaseEvent(QKeyEvent* event)
   }
 }
 
-void Window::changeEvent(QEvent* event)
+void SessionWindow::changeEvent(QEvent* event)
 {
   // A key that is released in another window would be held for ever.
   if (event->type() == QEvent::ActivationChange && !this->isActiveWindow() && this->Keys)
@@ -1305,13 +777,11 @@ void Window::changeEvent(QEvent* event)
   QMainWindow::changeEvent(event);
 }
 
-void Window::closeEvent(QCloseEvent* event)
+void SessionWindow::closeEvent(QCloseEvent* event)
 {
   this->End();
   event->accept();
 }
-}
-
 void RequireOpenGL()
 {
   QOffscreenSurface surface;
@@ -1372,7 +842,7 @@ void RunWindow(const SessionWorld& world, const WindowOptions& options)
   QApplication application(count, arguments);
   QApplication::setApplicationDisplayName("DynamicCoronary simulator");
   RequireOpenGL();
-  Window window(world, options);
+  SessionWindow window(world, options);
   window.Begin(options.record, options.replay);
   window.show();
   QApplication::exec();

@@ -1,0 +1,387 @@
+#include "LineTracker.h"
+
+#include "DisplacementLabels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace coronary
+{
+namespace
+{
+/// Nothing is found better than that, or than a share of a voxel, mm.
+constexpr double TissueDeviation = 0.5;
+}
+
+void LineTracker::PlaceBox()
+{
+  this->Low = Vector3::Constant(std::numeric_limits<double>::infinity());
+  this->High = -this->Low;
+  for (const Vector3& place : this->Nodes.position)
+  {
+    this->Low = this->Low.cwiseMin(place);
+    this->High = this->High.cwiseMax(place);
+  }
+  const Vector3 margin = Vector3::Constant(
+    std::max(30.0, 2.0 * this->Settings.captureRange) + this->Settings.coarseRadius);
+  this->Low -= margin;
+  this->High += margin;
+}
+
+void LineTracker::LimitValues(std::vector<float> all)
+{
+  std::sort(all.begin(), all.end());
+  const float median = all[all.size() / 2];
+  const float spread =
+    std::max(all[all.size() * 9 / 10] - all[all.size() / 10], static_cast<float>(this->Contrast));
+  this->Limits = { median - spread, median + spread };
+}
+
+void LineTracker::SearchCoarsely()
+{
+  const std::size_t phases = this->Times.size();
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  const LabelLattice lattice{ static_cast<int>(std::ceil(
+                                this->Settings.captureRange / this->Settings.coarseSpacing)),
+    this->Settings.coarseSpacing };
+  const int blockReach = this->Coarse.reach + lattice.reach;
+  const int blockSide = 2 * blockReach + 1;
+
+  this->PlaceBox();
+
+  // The reference.
+  AveragedVolume averaged;
+  {
+    const ScalarImage image = this->Read(this->ReferenceTime);
+    this->Voxel = image.grid.spacing.maxCoeff();
+    averaged = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
+    this->Reference = SparseVolume(image, this->Nodes.position, this->Keep());
+  }
+  this->MeasureContrast();
+  const std::vector<std::vector<float>> weights = this->Settings.tissue
+    ? this->WithoutVessels(this->Coarse, 0.5 * this->Settings.coarseSpacing)
+    : std::vector<std::vector<float>>(nodes, this->Coarse.weights);
+  std::vector<std::vector<float>> wanted(nodes);
+  std::vector<float> all;
+  for (std::int64_t n = 0; n < nodes; ++n)
+  {
+    for (std::size_t p = 0; p < this->Coarse.places.size(); ++p)
+    {
+      wanted[n].push_back(averaged.Sample(this->Nodes.position[n] + this->Coarse.Offset(p)));
+      all.push_back(wanted[n].back());
+    }
+  }
+  this->LimitValues(std::move(all));
+  for (std::vector<float>& one : wanted)
+  {
+    std::transform(one.begin(), one.end(), one.begin(), this->Limits);
+  }
+
+  // Outwards from the reference, so that a neighbour in time is known.
+  std::vector<std::size_t> order(phases);
+  std::iota(order.begin(), order.end(), std::size_t{ 0 });
+  std::stable_sort(order.begin(), order.end(),
+    [&](std::size_t a, std::size_t b)
+    {
+      return CyclicDistance(this->Times[a], this->ReferenceTime) <
+        CyclicDistance(this->Times[b], this->ReferenceTime);
+    });
+  const std::vector<std::ptrdiff_t> guesses = this->Guesses(order);
+  this->Displacement.assign(phases, {});
+  this->Volumes.resize(phases);
+  this->Own.assign(phases, false);
+  const auto search = [&](
+                        std::size_t position, const ScalarImage& image, const AveragedVolume& moved)
+  {
+    const std::size_t phase = order[position];
+    std::vector<Vector3> places = guesses[position] < 0
+      ? std::vector<Vector3>(nodes, Vector3::Zero())
+      : this->Displacement[order[static_cast<std::size_t>(guesses[position])]];
+    std::vector<std::vector<float>> costs(nodes);
+    ParallelFor(
+      nodes, 4,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        std::vector<float> block(static_cast<std::size_t>(blockSide) * blockSide * blockSide);
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          const Vector3 centre = this->Nodes.position[n] + places[n];
+          std::size_t at = 0;
+          for (int k = -blockReach; k <= blockReach; ++k)
+          {
+            for (int j = -blockReach; j <= blockReach; ++j)
+            {
+              for (int i = -blockReach; i <= blockReach; ++i)
+              {
+                block[at++] = this->Limits(moved.Sample(centre + lattice.step * Vector3(i, j, k)));
+              }
+            }
+          }
+          SumsOfSquares(
+            block, blockSide, this->Coarse, weights[n], wanted[n], lattice.reach, costs[n]);
+        }
+      },
+      this->Part(0.6 * (static_cast<double>(position) + 0.3) / static_cast<double>(phases),
+        0.6 * static_cast<double>(position + 1) / static_cast<double>(phases)));
+    ToLikelihoods(costs, 30.0, 20.0, 0.1 * this->NoiseFloor());
+    const std::vector<Vector3> best = BestDisplacements(this->Nodes, lattice, costs, 0.5);
+    for (std::int64_t n = 0; n < nodes; ++n)
+    {
+      places[n] += best[n];
+    }
+    this->Volumes[phase] = SparseVolume(image, this->PlacesAt(places), this->Keep());
+    return places;
+  };
+  // A phase for each rank at a time: all read theirs at once, and search when the guess is known.
+  const auto ranks = static_cast<std::size_t>(this->Ranks.Size());
+  for (std::size_t first = 0; first < phases; first += ranks)
+  {
+    const std::size_t end = std::min(phases, first + ranks);
+    const std::size_t own = first + static_cast<std::size_t>(this->Ranks.Rank());
+    ScalarImage image;
+    AveragedVolume moved;
+    if (own < end)
+    {
+      this->Own[order[own]] = true;
+      image = this->Read(this->Times[order[own]]);
+      moved = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
+    }
+    std::vector<bool> ready;
+    const auto isOpen = [&](std::size_t position)
+    { return this->Displacement[order[position]].empty(); };
+    for (std::size_t open = end - first; open > 0;)
+    {
+      ready.assign(end - first, false);
+      for (std::size_t position = first; position < end; ++position)
+      {
+        const std::ptrdiff_t guess = guesses[position];
+        ready[position - first] =
+          isOpen(position) && (guess < 0 || !isOpen(static_cast<std::size_t>(guess)));
+      }
+      std::vector<std::vector<Vector3>> found(phases);
+      if (own < end && ready[own - first])
+      {
+        found[order[own]] = search(own, image, moved);
+      }
+      ShareLists(this->Ranks, found);
+      for (std::size_t position = first; position < end; ++position)
+      {
+        if (ready[position - first])
+        {
+          this->Displacement[order[position]] = std::move(found[order[position]]);
+          --open;
+        }
+      }
+    }
+  }
+  const Seen seen{ this->Displacement,
+    std::vector<std::vector<Matrix3>>(
+      phases, std::vector<Matrix3>(nodes, Matrix3::Identity() / (1.5 * 1.5))),
+    2.5 };
+  this->Fit({ &seen });
+}
+
+std::vector<std::ptrdiff_t> LineTracker::Guesses(const std::vector<std::size_t>& order) const
+{
+  std::vector<std::ptrdiff_t> guesses(order.size(), -1);
+  for (std::size_t position = 0; position < order.size(); ++position)
+  {
+    const double time = this->Times[order[position]];
+    double nearest = CyclicDistance(time, this->ReferenceTime);
+    for (std::size_t before = 0; before < position; ++before)
+    {
+      const double apart = CyclicDistance(time, this->Times[order[before]]);
+      if (apart < nearest)
+      {
+        nearest = apart;
+        guesses[position] = static_cast<std::ptrdiff_t>(before);
+      }
+    }
+  }
+  return guesses;
+}
+
+std::vector<std::vector<float>> LineTracker::WithoutVessels(const Patch& patch, double margin) const
+{
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  std::vector<std::vector<float>> weights(nodes, patch.weights);
+  const double reach = patch.reach * patch.step;
+  ParallelFor(nodes, 4,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const Vector3& centre = this->Nodes.position[n];
+        for (std::int64_t other = 0; other < nodes; ++other)
+        {
+          const int parent = this->Nodes.parent[other];
+          const Vector3& a = this->Nodes.position[other];
+          const Vector3& b = this->Nodes.position[parent >= 0 ? parent : other];
+          const double wall = NodeRadius(this->Nodes, static_cast<int>(other)) + margin;
+          if ((a - centre).norm() > reach + wall + (b - a).norm())
+          {
+            continue;
+          }
+          for (std::size_t p = 0; p < patch.places.size(); ++p)
+          {
+            if (NearestOnSegment(centre + patch.Offset(p), a, b).squaredDistance < wall * wall)
+            {
+              weights[n][p] = 0.0F;
+            }
+          }
+        }
+        const float sum = std::accumulate(weights[n].begin(), weights[n].end(), 0.0F);
+        for (float& weight : weights[n])
+        {
+          weight = sum > 0.1F ? weight / sum : 0.0F;
+        }
+      }
+    });
+  return weights;
+}
+
+LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
+{
+  const std::size_t phases = this->Times.size();
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  const LabelLattice lattice{ static_cast<int>(std::ceil(this->Settings.fineRange)), 1.0 };
+  const int blockReach = this->Fine.reach + lattice.reach;
+  const int blockSide = 2 * blockReach + 1;
+  const std::size_t samples = this->Fine.places.size();
+  const std::vector<std::vector<float>> weights = vessels
+    ? std::vector<std::vector<float>>(nodes, this->Fine.weights)
+    : this->WithoutVessels(this->Fine, 0.8);
+  Seen seen{ PerPhase(phases), std::vector<std::vector<Matrix3>>(phases), 1.5 };
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    if (!this->Own[k])
+    {
+      continue;
+    }
+    seen.information[k].assign(nodes, Matrix3::Zero());
+    const std::vector<Vector3> places = this->PlacesAt(this->Displacement[k]);
+    if (!std::all_of(places.begin(), places.end(),
+          [&](const Vector3& place)
+          { return this->Volumes[k].Covers(place, this->Keep() - SpareReach); }))
+    {
+      this->Volumes[k] = SparseVolume(this->Read(this->Times[k]), places, this->Keep());
+    }
+    std::vector<std::vector<float>> costs(nodes);
+    std::vector<std::vector<float>> blocks(nodes);
+    std::vector<std::vector<float>> expected(nodes);
+    std::vector<Matrix3> curvature(nodes, Matrix3::Zero());
+    std::vector<int> averaged(nodes, 1);
+    ParallelFor(
+      nodes, 4,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        for (std::int64_t n = first; n < last; ++n)
+        {
+          const Matrix3 back = this->Turn(static_cast<int>(n), this->Displacement[k]).transpose();
+          const std::vector<Vector3> smear = this->Smear(static_cast<int>(n), this->Times[k]);
+          averaged[n] = static_cast<int>(smear.size());
+          const auto expect = [&](const Vector3& offset)
+          {
+            float sum = 0.0F;
+            int count = 0;
+            for (const Vector3& moved : smear)
+            {
+              const float value =
+                this->Reference.Sample(this->Nodes.position[n] + back * (offset - moved));
+              if (!std::isnan(value))
+              {
+                sum += this->Limits(value);
+                ++count;
+              }
+            }
+            return count > 0 ? sum / static_cast<float>(count) : this->Limits.low;
+          };
+          std::vector<float>& wanted = expected[n];
+          wanted.resize(samples);
+          for (std::size_t p = 0; p < samples; ++p)
+          {
+            if (weights[n][p] <= 0.0F)
+            {
+              continue;
+            }
+            const Vector3 offset = this->Fine.Offset(p);
+            wanted[p] = expect(offset);
+            if (!vessels)
+            {
+              Vector3 gradient;
+              for (int axis = 0; axis < 3; ++axis)
+              {
+                const Vector3 away = 0.5 * Vector3::Unit(axis);
+                gradient[axis] = expect(offset + away) - expect(offset - away);
+              }
+              curvature[n] += weights[n][p] * gradient * gradient.transpose();
+            }
+          }
+          std::vector<float>& block = blocks[n];
+          block.reserve(static_cast<std::size_t>(blockSide) * blockSide * blockSide);
+          for (int c = -blockReach; c <= blockReach; ++c)
+          {
+            for (int b = -blockReach; b <= blockReach; ++b)
+            {
+              for (int a = -blockReach; a <= blockReach; ++a)
+              {
+                const float value = this->Volumes[k].Sample(places[n] + Vector3(a, b, c));
+                block.push_back(std::isnan(value) ? this->Limits.low : this->Limits(value));
+              }
+            }
+          }
+          SumsOfSquares(block, blockSide, this->Fine, weights[n], wanted, lattice.reach, costs[n]);
+        }
+      },
+      this->Part(progressFrom + 0.1 * static_cast<double>(k) / static_cast<double>(phases),
+        progressFrom + 0.1 * static_cast<double>(k + 1) / static_cast<double>(phases)));
+    const double noise = SignalCurvature::NoiseOf(curvature, averaged);
+    std::vector<float> least(nodes);
+    for (std::int64_t n = 0; n < nodes; ++n)
+    {
+      least[n] = *std::min_element(costs[n].begin(), costs[n].end());
+    }
+    ToLikelihoods(costs, 30.0, 15.0, 0.1 * this->NoiseFloor());
+    seen.displacement[k] = BestDisplacements(this->Nodes, lattice, costs, 0.25);
+    for (std::int64_t n = 0; n < nodes; ++n)
+    {
+      if (vessels)
+      {
+        // Is there a vessel where it was found?
+        const Vector3& shift = seen.displacement[k][n];
+        const int at[3] = { static_cast<int>(std::lround(shift[0])),
+          static_cast<int>(std::lround(shift[1])), static_cast<int>(std::lround(shift[2])) };
+        std::vector<float> there;
+        std::vector<float> wanted;
+        for (std::size_t p = 0; p < samples; ++p)
+        {
+          const std::array<int, 3>& place = this->Fine.places[p];
+          if (place[0] * place[0] + place[1] * place[1] + place[2] * place[2] <= 9)
+          {
+            there.push_back(blocks[n][((place[2] + at[2] + blockReach) * blockSide + place[1] +
+                                        at[1] + blockReach) *
+                blockSide +
+              place[0] + at[0] + blockReach]);
+            wanted.push_back(expected[n][p]);
+          }
+        }
+        const double trust = std::clamp((Correlation(there, wanted) - 0.4) / 0.4, 0.0, 1.0);
+        seen.information[k][n] = Matrix3::Identity() * (trust * trust / (0.6 * 0.6));
+      }
+      else
+      {
+        seen.information[k][n] =
+          Limited(SignalCurvature(curvature[n], noise / averaged[n]).Information() *
+              (30.0 / std::max<double>(least[n], this->NoiseFloor())),
+            std::max(TissueDeviation, 0.8 * this->Voxel));
+      }
+      seen.displacement[k][n] += this->Displacement[k][n];
+    }
+  }
+  ShareLists(this->Ranks, seen.displacement);
+  ShareLists(this->Ranks, seen.information);
+  return seen;
+}
+}
