@@ -172,6 +172,38 @@ struct TriangleBvh::Splitting
   }
 };
 
+int WindingAbove(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c)
+{
+  // How often the triangle's outline winds around the vertical through p. An edge is looked at
+  // from its lower end, whichever triangle asks.
+  const Vector3* const corners[3] = { &a, &b, &c };
+  int turns = 0;
+  for (int i = 0; i < 3; ++i)
+  {
+    const Vector3& from = *corners[i];
+    const Vector3& to = *corners[(i + 1) % 3];
+    const bool rises = from[1] <= p[1] && to[1] > p[1];
+    const bool falls = to[1] <= p[1] && from[1] > p[1];
+    if (rises || falls)
+    {
+      const Vector3& bottom = rises ? from : to;
+      const Vector3& top = rises ? to : from;
+      const double side =
+        (top[0] - bottom[0]) * (p[1] - bottom[1]) - (p[0] - bottom[0]) * (top[1] - bottom[1]);
+      if (side > 0.0)
+      {
+        turns += rises ? 1 : -1;
+      }
+    }
+  }
+  if (turns == 0)
+  {
+    return 0;
+  }
+  const Vector3 normal = (b - a).cross(c - a);
+  return normal[2] * normal.dot(a - p) > 0.0 ? turns : 0;
+}
+
 TriangleBvh::TriangleBvh() = default;
 TriangleBvh::TriangleBvh(const TriangleBvh& other) = default;
 TriangleBvh::TriangleBvh(TriangleBvh&& other) noexcept = default;
@@ -478,33 +510,7 @@ int TriangleBvh::Winding(const Vector3& p) const
   const auto visit = [&](std::int32_t triangle)
   {
     const std::array<std::int32_t, 3>& t = this->Corners[triangle];
-    // How often the triangle's outline winds around the vertical through p. An edge is looked at
-    // from its lower end, whichever triangle asks.
-    int turns = 0;
-    for (int i = 0; i < 3; ++i)
-    {
-      const Vector3& from = this->Points[t[i]];
-      const Vector3& to = this->Points[t[(i + 1) % 3]];
-      const bool rises = from[1] <= p[1] && to[1] > p[1];
-      const bool falls = to[1] <= p[1] && from[1] > p[1];
-      if (rises || falls)
-      {
-        const Vector3& bottom = rises ? from : to;
-        const Vector3& top = rises ? to : from;
-        const double side =
-          (top[0] - bottom[0]) * (p[1] - bottom[1]) - (p[0] - bottom[0]) * (top[1] - bottom[1]);
-        if (side > 0.0)
-        {
-          turns += rises ? 1 : -1;
-        }
-      }
-    }
-    if (turns != 0)
-    {
-      const Vector3& a = this->Points[t[0]];
-      const Vector3 normal = (this->Points[t[1]] - a).cross(this->Points[t[2]] - a);
-      winding += normal[2] * normal.dot(a - p) > 0.0 ? turns : 0;
-    }
+    winding += WindingAbove(p, this->Points[t[0]], this->Points[t[1]], this->Points[t[2]]);
   };
   std::vector<std::int32_t> stack{ 0 };
   while (!stack.empty())

@@ -45,6 +45,10 @@ struct TrianglePoint
 TrianglePoint NearestOnTriangle(
   const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c);
 
+/// What a triangle above p adds to how often a closed surface winds around p. Neighbouring triangles
+/// decide alike about a common edge.
+int WindingAbove(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c);
+
 /// Copies what it is made of. Queries may run on several threads, but not beside a Refit.
 class TriangleBvh
 {

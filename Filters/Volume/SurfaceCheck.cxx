@@ -1,6 +1,7 @@
 #include "SurfaceCheck.h"
 
 #include "TriangleIntersections.h"
+#include "TriangleSides.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,38 +12,6 @@ namespace coronary
 {
 namespace
 {
-/// One side of a triangle; equal edges follow each other when sorted.
-struct Side
-{
-  std::int64_t low;
-  std::int64_t high;
-  std::int64_t triangle;
-  bool rising; ///< the triangle runs from low to high
-
-  bool operator<(const Side& other) const
-  {
-    return std::tie(this->low, this->high, this->triangle) <
-      std::tie(other.low, other.high, other.triangle);
-  }
-};
-
-std::vector<Side> SidesOf(const std::vector<Triangle>& triangles)
-{
-  std::vector<Side> sides;
-  sides.reserve(3 * triangles.size());
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-  {
-    for (int i = 0; i < 3; ++i)
-    {
-      const std::int64_t a = triangles[t][i];
-      const std::int64_t b = triangles[t][(i + 1) % 3];
-      sides.push_back({ std::min(a, b), std::max(a, b), static_cast<std::int64_t>(t), a < b });
-    }
-  }
-  std::sort(sides.begin(), sides.end());
-  return sides;
-}
-
 Vector3 CentreOf(const std::vector<Vector3>& points, const Triangle& t)
 {
   return (points[t[0]] + points[t[1]] + points[t[2]]) / 3.0;
@@ -156,135 +125,19 @@ void CheckTriangles(const ClosedSurface& surface)
       doubled);
   }
 }
-}
 
-std::string Describe(const Vector3& position)
+/// Whom a triangle has at its sides, and whether they disagree about the common edge's direction.
+using Neighbours = std::vector<std::pair<std::int64_t, bool>>;
+
+/// Finds the components; turns triangles over where neighbours disagree, and components that are inside-out.
+/// @param neighbours  three a triangle
+/// @throws SurfaceError for a component without volume
+void OrientOutwards(ClosedSurface& surface, const Neighbours& neighbours)
 {
-  char text[96];
-  std::snprintf(text, sizeof text, "(%.4g, %.4g, %.4g)", position[0], position[1], position[2]);
-  return text;
-}
-
-std::string DescribeCells(std::vector<std::int64_t> cells, const Vector3& at)
-{
-  constexpr std::size_t shown = 5;
-  std::string text = cells.size() == 1 ? "cell " : "cells ";
-  for (std::size_t i = 0; i < std::min(shown, cells.size()); ++i)
-  {
-    text += (i == 0 ? "" : ", ") + std::to_string(cells[i]);
-  }
-  if (cells.size() > shown)
-  {
-    text += " and " + std::to_string(cells.size() - shown) + " more";
-  }
-  return text + (cells.size() == 1 ? " at " : ", the first at ") + Describe(at);
-}
-
-ClosedSurface CheckSurface(
-  const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
-{
-  if (triangles.empty())
-  {
-    throw SurfaceError("the surface is empty: it has no triangles", {});
-  }
-  const auto count = static_cast<std::int64_t>(points.size());
-  for (std::size_t i = 0; i < triangles.size(); ++i)
-  {
-    for (const std::int64_t point : triangles[i])
-    {
-      if (point < 0 || point >= count)
-      {
-        throw std::invalid_argument("cell " + std::to_string(i) + " of the surface has point " +
-          std::to_string(point) + ", which does not exist");
-      }
-      if (!points[point].allFinite())
-      {
-        throw std::invalid_argument(
-          "point " + std::to_string(point) + " of the surface is not finite");
-      }
-    }
-  }
-  ClosedSurface surface;
-  MergeEqualPoints(points, triangles, surface);
-  CheckTriangles(surface);
-
-  const std::vector<Side> sides = SidesOf(surface.triangles);
-  std::vector<std::int64_t> open;
-  std::vector<std::int64_t> crowded;
-  Vector3 openAt = Vector3::Zero();
-  Vector3 crowdedAt = Vector3::Zero();
-  std::size_t openEdges = 0;
-  std::size_t crowdedEdges = 0;
-  // Neighbours: three a triangle, with whether they disagree about the common edge's direction.
-  std::vector<std::pair<std::int64_t, bool>> neighbours(3 * triangles.size(), { -1, false });
-  std::vector<int> filled(triangles.size(), 0);
-  for (std::size_t first = 0, last = 0; first < sides.size(); first = last)
-  {
-    while (last < sides.size() && sides[last].low == sides[first].low &&
-      sides[last].high == sides[first].high)
-    {
-      ++last;
-    }
-    const Vector3 middle =
-      0.5 * (surface.points[sides[first].low] + surface.points[sides[first].high]);
-    if (last - first == 1)
-    {
-      openAt = openEdges++ == 0 ? middle : openAt;
-      open.push_back(sides[first].triangle);
-    }
-    else if (last - first > 2)
-    {
-      crowdedAt = crowdedEdges++ == 0 ? middle : crowdedAt;
-      for (std::size_t i = first; i < last; ++i)
-      {
-        crowded.push_back(sides[i].triangle);
-      }
-    }
-    else
-    {
-      const Side& one = sides[first];
-      const Side& other = sides[first + 1];
-      const bool disagree = one.rising == other.rising;
-      neighbours[3 * one.triangle + filled[one.triangle]++] = { other.triangle, disagree };
-      neighbours[3 * other.triangle + filled[other.triangle]++] = { one.triangle, disagree };
-    }
-  }
-  const auto unique = [](std::vector<std::int64_t>& cells)
-  {
-    std::vector<std::int64_t> kept;
-    std::vector<std::int64_t> sorted = cells;
-    std::sort(sorted.begin(), sorted.end());
-    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
-    // The first one stays first: the position belongs to it.
-    kept.push_back(cells.front());
-    for (const std::int64_t cell : sorted)
-    {
-      if (cell != cells.front())
-      {
-        kept.push_back(cell);
-      }
-    }
-    cells = kept;
-  };
-  if (!crowded.empty())
-  {
-    unique(crowded);
-    throw SurfaceError("the surface is not a manifold: " + std::to_string(crowdedEdges) +
-        " edges have more than two triangles; " + DescribeCells(crowded, crowdedAt),
-      crowded);
-  }
-  if (!open.empty())
-  {
-    unique(open);
-    throw SurfaceError("the surface is open: " + std::to_string(openEdges) +
-        " edges have one triangle only; " + DescribeCells(open, openAt),
-      open);
-  }
-
-  surface.component.assign(triangles.size(), -1);
+  surface.component.assign(surface.triangles.size(), -1);
   std::int64_t turned = 0;
   std::int64_t insideOut = 0;
-  for (std::size_t seed = 0; seed < triangles.size(); ++seed)
+  for (std::size_t seed = 0; seed < surface.triangles.size(); ++seed)
   {
     if (surface.component[seed] >= 0)
     {
@@ -294,7 +147,6 @@ ClosedSurface CheckSurface(
     std::vector<std::int64_t> members{ static_cast<std::int64_t>(seed) };
     std::vector<char> flip{ 0 };
     surface.component[seed] = component;
-    std::vector<std::int64_t> place(1, 0);
     for (std::size_t i = 0; i < members.size(); ++i)
     {
       for (int k = 0; k < 3; ++k)
@@ -353,6 +205,134 @@ ClosedSurface CheckSurface(
     surface.warnings.push_back(
       std::to_string(turned) + " triangles looked inwards and were turned over");
   }
+}
+}
+
+std::string Describe(const Vector3& position)
+{
+  char text[96];
+  std::snprintf(text, sizeof text, "(%.4g, %.4g, %.4g)", position[0], position[1], position[2]);
+  return text;
+}
+
+std::string DescribeCells(std::vector<std::int64_t> cells, const Vector3& at)
+{
+  constexpr std::size_t shown = 5;
+  std::string text = cells.size() == 1 ? "cell " : "cells ";
+  for (std::size_t i = 0; i < std::min(shown, cells.size()); ++i)
+  {
+    text += (i == 0 ? "" : ", ") + std::to_string(cells[i]);
+  }
+  if (cells.size() > shown)
+  {
+    text += " and " + std::to_string(cells.size() - shown) + " more";
+  }
+  return text + (cells.size() == 1 ? " at " : ", the first at ") + Describe(at);
+}
+
+void CheckCorners(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
+{
+  const auto count = static_cast<std::int64_t>(points.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+  {
+    for (const std::int64_t point : triangles[i])
+    {
+      if (point < 0 || point >= count)
+      {
+        throw std::invalid_argument("cell " + std::to_string(i) + " of the surface has point " +
+          std::to_string(point) + ", which does not exist");
+      }
+      if (!points[point].allFinite())
+      {
+        throw std::invalid_argument(
+          "point " + std::to_string(point) + " of the surface is not finite");
+      }
+    }
+  }
+}
+
+ClosedSurface CheckSurface(
+  const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
+{
+  if (triangles.empty())
+  {
+    throw SurfaceError("the surface is empty: it has no triangles", {});
+  }
+  CheckCorners(points, triangles);
+  ClosedSurface surface;
+  MergeEqualPoints(points, triangles, surface);
+  CheckTriangles(surface);
+
+  const std::vector<TriangleSide> sides =
+    SidesOf(surface.triangles, [](const Triangle& t) -> const Triangle& { return t; });
+  std::vector<std::int64_t> open;
+  std::vector<std::int64_t> crowded;
+  Vector3 openAt = Vector3::Zero();
+  Vector3 crowdedAt = Vector3::Zero();
+  std::size_t openEdges = 0;
+  std::size_t crowdedEdges = 0;
+  Neighbours neighbours(3 * triangles.size(), { -1, false });
+  std::vector<int> filled(triangles.size(), 0);
+  ForEdges(sides,
+    [&](std::size_t first, std::size_t size)
+    {
+      const Vector3 middle =
+        0.5 * (surface.points[sides[first].low] + surface.points[sides[first].high]);
+      if (size == 1)
+      {
+        openAt = openEdges++ == 0 ? middle : openAt;
+        open.push_back(sides[first].triangle);
+      }
+      else if (size > 2)
+      {
+        crowdedAt = crowdedEdges++ == 0 ? middle : crowdedAt;
+        for (std::size_t i = first; i < first + size; ++i)
+        {
+          crowded.push_back(sides[i].triangle);
+        }
+      }
+      else
+      {
+        const TriangleSide& one = sides[first];
+        const TriangleSide& other = sides[first + 1];
+        const bool disagree = one.rising == other.rising;
+        neighbours[3 * one.triangle + filled[one.triangle]++] = { other.triangle, disagree };
+        neighbours[3 * other.triangle + filled[other.triangle]++] = { one.triangle, disagree };
+      }
+    });
+  const auto unique = [](std::vector<std::int64_t>& cells)
+  {
+    std::vector<std::int64_t> kept;
+    std::vector<std::int64_t> sorted = cells;
+    std::sort(sorted.begin(), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+    // The first one stays first: the position belongs to it.
+    kept.push_back(cells.front());
+    for (const std::int64_t cell : sorted)
+    {
+      if (cell != cells.front())
+      {
+        kept.push_back(cell);
+      }
+    }
+    cells = kept;
+  };
+  if (!crowded.empty())
+  {
+    unique(crowded);
+    throw SurfaceError("the surface is not a manifold: " + std::to_string(crowdedEdges) +
+        " edges have more than two triangles; " + DescribeCells(crowded, crowdedAt),
+      crowded);
+  }
+  if (!open.empty())
+  {
+    unique(open);
+    throw SurfaceError("the surface is open: " + std::to_string(openEdges) +
+        " edges have one triangle only; " + DescribeCells(open, openAt),
+      open);
+  }
+
+  OrientOutwards(surface, neighbours);
   return surface;
 }
 

@@ -35,6 +35,9 @@ struct ClosedSurface
   std::vector<std::string> warnings;     ///< what was put right
 };
 
+/// @throws std::invalid_argument for a point that does not exist or a coordinate that is not finite
+void CheckCorners(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles);
+
 /**
  * Merges points at the very same place, turns triangles over where neighbours disagree and
  * components that are inside-out.

@@ -1,16 +1,14 @@
 #include "TetrahedralMesh.h"
 
+#include "MeshingPieces.h"
+#include "PartialProgress.h"
 #include "TetrahedralBoundary.h"
 #include "TriangleIntersections.h"
-#include "TriangleTree.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
-#include <optional>
-#include <unordered_map>
 
 #include <unistd.h>
 
@@ -20,256 +18,12 @@ namespace
 {
 using Edge = std::pair<std::int64_t, std::int64_t>;
 
-/// A skeleton's point so far outside, in local radii, is put on the surface: ends of centerlines are
-/// not exactly on the caps.
-constexpr double endTolerance = 0.1;
-/// An end so far below the wall, in edge lengths of it, is put on it too: the tetrahedra between would
-/// be flat, and refinement does not help where the wall has to stay.
-constexpr double endDepth = 0.1;
 /// When a flatter tetrahedron is left, it is tried once more; radians (5 degrees).
 constexpr double flatAngle = 0.0873;
 
 const char* WorkerName(TetrahedralBackend backend)
 {
   return backend == TetrahedralBackend::Cgal ? "coronary-cgal-worker" : "coronary-tetgen-worker";
-}
-
-ProgressCallback Part(const ProgressCallback& progress, double first, double last)
-{
-  if (!progress)
-  {
-    return {};
-  }
-  return [progress, first, last](double fraction)
-  { return progress(first + (last - first) * fraction); };
-}
-
-/// The vessel's radius anywhere: the nearest skeleton point's, or half the mean depth without one.
-class LocalRadius
-{
-public:
-  LocalRadius(const TetrahedralMeshInput& input, const ClosedSurface& surface)
-    : Points(input.skeletonPoints)
-    , Radius(input.skeletonRadius)
-  {
-    if (!this->Radius.empty())
-    {
-      for (const auto& [a, b] : input.skeletonEdges)
-      {
-        this->Segments.push_back({ a, b, b });
-      }
-      for (std::size_t i = 0; i < this->Points.size() && this->Segments.empty(); ++i)
-      {
-        const auto point = static_cast<std::int64_t>(i);
-        this->Segments.push_back({ point, point, point });
-      }
-    }
-    this->Tree = std::make_unique<TriangleTree>(this->Points, this->Segments);
-    double volume = 0.0;
-    double area = 0.0;
-    for (const double v : surface.volume)
-    {
-      volume += v;
-    }
-    for (const Triangle& t : surface.triangles)
-    {
-      const Vector3& a = surface.points[t[0]];
-      area += 0.5 * (surface.points[t[1]] - a).cross(surface.points[t[2]] - a).norm();
-    }
-    this->Mean = 2.0 * volume / area;
-  }
-
-  double At(const Vector3& p) const
-  {
-    const TriangleTree::Nearest nearest = this->Tree->Closest(p);
-    if (nearest.triangle < 0)
-    {
-      return this->Mean;
-    }
-    const Triangle& s = this->Segments[nearest.triangle];
-    const double length = (this->Points[s[1]] - this->Points[s[0]]).norm();
-    const double t =
-      length > 0.0 ? std::min(1.0, (nearest.point - this->Points[s[0]]).norm() / length) : 0.0;
-    return (1.0 - t) * this->Radius[s[0]] + t * this->Radius[s[1]];
-  }
-
-private:
-  const std::vector<Vector3>& Points;
-  const std::vector<double>& Radius;
-  std::vector<Triangle> Segments;
-  std::unique_ptr<TriangleTree> Tree;
-  double Mean = 0.0;
-};
-
-/// One component with what lies in it; points relative to a common origin.
-struct Piece
-{
-  std::vector<Vector3> points; ///< the surface's first
-  std::vector<std::int64_t> surfacePoint;
-  std::vector<std::int64_t> skeletonPoint;
-  std::vector<Triangle> triangles;
-  std::vector<std::int64_t> sourceCell;
-  std::vector<Edge> segments;
-  std::vector<std::int64_t> segmentSource;
-  std::vector<double> sizes;
-};
-
-double Sized(const Piece& piece, std::int64_t a, std::int64_t b)
-{
-  return (piece.points[a] - piece.points[b]).norm();
-}
-
-/**
- * Puts a point into the surface where it is nearest; returns the point's number.
- * @param tolerance  how far the surface may move, mm
- * @param reach      how far the point may move to one of the surface's, mm
- */
-std::int64_t InsertIntoSurface(Piece& piece, const Vector3& p, double tolerance, double reach)
-{
-  std::int64_t nearest = 0;
-  double best = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < piece.triangles.size(); ++i)
-  {
-    const Triangle& t = piece.triangles[i];
-    const double distance =
-      (ClosestPointOfTriangle(p, piece.points[t[0]], piece.points[t[1]], piece.points[t[2]]) - p)
-        .squaredNorm();
-    if (distance < best)
-    {
-      best = distance;
-      nearest = static_cast<std::int64_t>(i);
-    }
-  }
-  const Triangle found = piece.triangles[nearest];
-  const auto normal = [&](const Triangle& t)
-  {
-    const Vector3& a = piece.points[t[0]];
-    return Vector3((piece.points[t[1]] - a).cross(piece.points[t[2]] - a));
-  };
-  const double longest = std::max({ Sized(piece, found[0], found[1]),
-    Sized(piece, found[1], found[2]), Sized(piece, found[2], found[0]) });
-  for (const std::int64_t corner : found)
-  {
-    const double distance = (piece.points[corner] - p).norm();
-    if (piece.skeletonPoint[corner] >= 0)
-    {
-      continue;
-    }
-    if (distance <= tolerance)
-    {
-      return corner;
-    }
-    if (distance > 0.25 * longest)
-    {
-      continue;
-    }
-    // In the middle of a plane part, as a cap, the point can be shifted and the surface is the same,
-    // or changes by less than the tolerance.
-    bool movable = true;
-    const Vector3 before = piece.points[corner];
-    for (const Triangle& t : piece.triangles)
-    {
-      if (t[0] != corner && t[1] != corner && t[2] != corner)
-      {
-        continue;
-      }
-      const Vector3 plane = normal(t).normalized();
-      movable = movable && std::abs(plane.dot(p - before)) <= tolerance &&
-        plane.dot(normal(found).normalized()) > 0.9;
-      if (movable)
-      {
-        const double area = normal(t).norm();
-        piece.points[corner] = p;
-        movable = normal(t).dot(plane) > 0.3 * area;
-        piece.points[corner] = before;
-      }
-    }
-    if (movable)
-    {
-      piece.points[corner] = p;
-      return corner;
-    }
-  }
-  for (const std::int64_t corner : found)
-  {
-    if (piece.skeletonPoint[corner] < 0 &&
-      (piece.points[corner] - p).norm() <= std::min(reach, 0.1 * longest))
-    {
-      return corner;
-    }
-  }
-  const auto fresh = static_cast<std::int64_t>(piece.points.size());
-  piece.points.push_back(p);
-  piece.surfacePoint.push_back(-1);
-  piece.skeletonPoint.push_back(-1);
-  const auto replace = [&](std::int64_t triangle, const std::vector<Triangle>& parts)
-  {
-    piece.triangles[triangle] = parts[0];
-    for (std::size_t i = 1; i < parts.size(); ++i)
-    {
-      piece.triangles.push_back(parts[i]);
-      piece.sourceCell.push_back(piece.sourceCell[triangle]);
-    }
-  };
-  for (int i = 0; i < 3; ++i)
-  {
-    const std::int64_t a = found[i];
-    const std::int64_t b = found[(i + 1) % 3];
-    const double length = Sized(piece, a, b);
-    const double height =
-      (piece.points[b] - piece.points[a]).cross(p - piece.points[a]).norm() / length;
-    if (height > 0.15 * length)
-    {
-      continue;
-    }
-    for (std::size_t k = 0, count = piece.triangles.size(); k < count; ++k)
-    {
-      const Triangle t = piece.triangles[k];
-      for (int j = 0; j < 3; ++j)
-      {
-        const std::int64_t u = t[j];
-        const std::int64_t v = t[(j + 1) % 3];
-        if ((u == a && v == b) || (u == b && v == a))
-        {
-          const std::int64_t w = t[(j + 2) % 3];
-          replace(
-            static_cast<std::int64_t>(k), { Triangle{ u, fresh, w }, Triangle{ fresh, v, w } });
-        }
-      }
-    }
-    return fresh;
-  }
-  replace(nearest,
-    { Triangle{ found[0], found[1], fresh }, Triangle{ found[1], found[2], fresh },
-      Triangle{ found[2], found[0], fresh } });
-  return fresh;
-}
-
-bool Crosses(
-  const Vector3& p, const Vector3& q, const Vector3& a, const Vector3& b, const Vector3& c)
-{
-  const Vector3 normal = (b - a).cross(c - a);
-  const double from = normal.dot(p - a);
-  const double to = normal.dot(q - a);
-  if ((from > 0.0) == (to > 0.0) && from != 0.0 && to != 0.0)
-  {
-    return false;
-  }
-  if (from == to)
-  {
-    return false;
-  }
-  const Vector3 x = p + (q - p) * (from / (from - to));
-  const double tolerance = -1e-9 * normal.squaredNorm();
-  return normal.dot((b - a).cross(x - a)) >= tolerance &&
-    normal.dot((c - b).cross(x - b)) >= tolerance && normal.dot((a - c).cross(x - c)) >= tolerance;
-}
-
-std::string Millimetres(double value)
-{
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g mm", value);
-  return text;
 }
 
 /// Everything between the input and the mesh.
@@ -310,7 +64,7 @@ public:
     std::vector<MesherAnswer> answers;
     try
     {
-      answers = this->RunBackend(Part(this->Progress, 0.08, 0.7));
+      answers = this->RunBackend(PartOf(this->Progress, 0.08, 0.7));
     }
     catch (const MesherFailure& failure)
     {
@@ -321,7 +75,7 @@ public:
       this->Mesh.warnings.push_back(
         "the first try failed (" + std::string(failure.what()) + "), the second one succeeded");
       this->MakePieces();
-      answers = this->RunBackend(Part(this->Progress, 0.4, 0.7));
+      answers = this->RunBackend(PartOf(this->Progress, 0.4, 0.7));
     }
     this->Assemble(answers);
     this->TryAgainWhenFlat();
@@ -637,357 +391,18 @@ private:
 
   void MakePieces()
   {
-    const std::size_t count = this->Surface.volume.size();
-    this->SegmentTrees.clear();
-    this->Pieces.assign(count, {});
-    Vector3 low = this->Surface.points[0];
-    Vector3 high = low;
-    for (const Vector3& p : this->Surface.points)
-    {
-      low = low.cwiseMin(p);
-      high = high.cwiseMax(p);
-    }
-    this->Origin = 0.5 * (low + high);
-    std::vector<std::int64_t> number(this->Surface.points.size(), -1);
-    for (std::size_t i = 0; i < this->Surface.triangles.size(); ++i)
-    {
-      Piece& piece = this->Pieces[this->Surface.component[i]];
-      Triangle t = this->Surface.triangles[i];
-      for (std::int64_t& corner : t)
-      {
-        if (number[corner] < 0)
-        {
-          number[corner] = static_cast<std::int64_t>(piece.points.size());
-          piece.points.emplace_back(this->Surface.points[corner] - this->Origin);
-          piece.surfacePoint.push_back(this->Surface.sourcePoint[corner]);
-          piece.skeletonPoint.push_back(-1);
-        }
-        corner = number[corner];
-      }
-      piece.triangles.push_back(t);
-      piece.sourceCell.push_back(static_cast<std::int64_t>(i));
-    }
-    std::vector<std::unique_ptr<TriangleTree>> trees;
-    for (const Piece& piece : this->Pieces)
-    {
-      trees.push_back(std::make_unique<TriangleTree>(piece.points, piece.triangles));
-    }
-    for (std::size_t i = 0; i < count; ++i)
-    {
-      for (std::size_t j = 0; j < count; ++j)
-      {
-        if (i != j && trees[j]->Winding(this->Pieces[i].points[0]) != 0)
-        {
-          const std::int64_t cell = this->Pieces[i].sourceCell[0];
-          throw SurfaceError("a part of the surface lies inside another one: that with " +
-              DescribeCells({ cell }, this->Pieces[i].points[0] + this->Origin),
-            { cell });
-        }
-      }
-    }
-    this->PlaceSkeleton(trees);
-  }
-
-  void PlaceSkeleton(const std::vector<std::unique_ptr<TriangleTree>>& trees)
-  {
-    const std::vector<Vector3>& points = this->Input.skeletonPoints;
-    // Points of edges only; a skeleton without edges is a set of points.
-    std::vector<char> used(points.size(), this->Input.skeletonEdges.empty() ? 1 : 0);
-    for (const auto& [a, b] : this->Input.skeletonEdges)
-    {
-      used[a] = 1;
-      used[b] = 1;
-    }
-    struct Place
-    {
-      int piece = -1;
-      std::int64_t point = -1;
-    };
-    std::vector<Place> places(points.size());
-    std::map<std::array<double, 3>, std::size_t> first;
-    std::vector<std::pair<std::size_t, Vector3>> onWall;
-    std::size_t outside = 0;
-    const std::vector<char> isEnd = this->SkeletonEnds();
-    for (std::size_t i = 0; i < points.size(); ++i)
-    {
-      const auto [same, isNew] = first.try_emplace({ points[i][0], points[i][1], points[i][2] }, i);
-      if (used[i] == 0)
-      {
-        if (isNew)
-        {
-          first.erase(same);
-        }
-        continue;
-      }
-      if (!isNew)
-      {
-        places[i] = { -2, static_cast<std::int64_t>(same->second) };
-        continue;
-      }
-      const Vector3 p = points[i] - this->Origin;
-      const double radius = this->Input.skeletonRadius.empty() ? this->Radii->At(points[i])
-                                                               : this->Input.skeletonRadius[i];
-      TriangleTree::Nearest nearest;
-      for (std::size_t k = 0; k < trees.size(); ++k)
-      {
-        const TriangleTree::Nearest found = trees[k]->Closest(p);
-        if (nearest.triangle < 0 || found.distance < nearest.distance)
-        {
-          nearest = found;
-          places[i].piece = static_cast<int>(k);
-        }
-      }
-      if (nearest.distance <= 0.01 * radius)
-      {
-        onWall.emplace_back(i, p);
-        continue;
-      }
-      if (isEnd[i] != 0 && nearest.distance <= endTolerance * radius &&
-        nearest.distance <= endDepth * LongestSide(this->Pieces[places[i].piece], nearest.triangle))
-      {
-        onWall.emplace_back(i, nearest.point);
-        continue;
-      }
-      const int nearestPiece = places[i].piece;
-      places[i].piece = -1;
-      for (std::size_t k = 0; k < trees.size(); ++k)
-      {
-        if (trees[k]->Winding(p) != 0)
-        {
-          places[i].piece = static_cast<int>(k);
-        }
-      }
-      if (places[i].piece < 0 && nearest.distance <= endTolerance * radius)
-      {
-        places[i].piece = nearestPiece;
-        onWall.emplace_back(i, nearest.point);
-        continue;
-      }
-      if (places[i].piece < 0)
-      {
-        if (this->Settings.outside == OutsidePolicy::Refuse)
-        {
-          throw std::invalid_argument("skeleton point " + std::to_string(i) + " at " +
-            Describe(points[i]) + " lies " + Millimetres(nearest.distance) +
-            " outside of the surface");
-        }
-        ++outside;
-        continue;
-      }
-      Piece& piece = this->Pieces[places[i].piece];
-      places[i].point = static_cast<std::int64_t>(piece.points.size());
-      piece.points.push_back(p);
-      piece.surfacePoint.push_back(-1);
-      piece.skeletonPoint.push_back(static_cast<std::int64_t>(i));
-    }
-    std::size_t shifted = 0;
-    double shift = 0.0;
-    for (const auto& [i, place] : onWall)
-    {
-      Piece& piece = this->Pieces[places[i].piece];
-      const double radius = this->Input.skeletonRadius.empty() ? this->Radii->At(points[i])
-                                                               : this->Input.skeletonRadius[i];
-      places[i].point = InsertIntoSurface(
-        piece, place, 0.01 * radius, isEnd[i] != 0 ? endTolerance * radius : 0.01 * radius);
-      piece.skeletonPoint[places[i].point] = static_cast<std::int64_t>(i);
-      const double moved = (piece.points[places[i].point] + this->Origin - points[i]).norm();
-      if (moved > 0.01 * radius)
-      {
-        ++shifted;
-        shift = std::max(shift, moved);
-      }
-    }
-    for (Place& place : places)
-    {
-      if (place.piece == -2)
-      {
-        place = places[place.point];
-      }
-    }
-    if (shifted > 0)
-    {
-      this->Mesh.warnings.push_back(std::to_string(shifted) +
-        " skeleton points beside the surface were put on it; none was farther than " +
-        Millimetres(shift));
-    }
-    if (outside > 0)
-    {
-      this->Mesh.warnings.push_back(
-        std::to_string(outside) + " skeleton points outside of the surface were left out");
-    }
-
-    std::vector<std::vector<double>> wall(this->Pieces.size());
-    for (std::size_t k = 0; k < this->Pieces.size(); ++k)
-    {
-      wall[k] = this->WallSizes(this->Pieces[k]);
-      this->SetSizes(this->Pieces[k], *trees[k], wall[k]);
-    }
-    std::size_t through = 0;
-    std::map<std::pair<int, Edge>, std::int64_t> known;
-    for (std::size_t e = 0; e < this->Input.skeletonEdges.size(); ++e)
-    {
-      const auto& [a, b] = this->Input.skeletonEdges[e];
-      const Place& from = places[a];
-      const Place& to = places[b];
-      if (from.point < 0 || to.point < 0)
-      {
-        continue;
-      }
-      if (from.piece == to.piece && from.point == to.point)
-      {
-        continue;
-      }
-      if (from.piece != to.piece ||
-        this->LeavesSurface(this->Pieces[from.piece], from.point, to.point))
-      {
-        if (this->Settings.outside == OutsidePolicy::Refuse)
-        {
-          throw std::invalid_argument("skeleton edge " + std::to_string(e) + " from point " +
-            std::to_string(a) + " at " + Describe(points[a]) + " to point " + std::to_string(b) +
-            " leaves the surface");
-        }
-        ++through;
-        continue;
-      }
-      const Edge edge = std::minmax(from.point, to.point);
-      if (!known.try_emplace({ from.piece, edge }, static_cast<std::int64_t>(e)).second)
-      {
-        continue;
-      }
-      this->AddSegment(
-        this->Pieces[from.piece], from.point, to.point, static_cast<std::int64_t>(e));
-    }
-    if (through > 0)
-    {
-      this->Mesh.warnings.push_back(
-        std::to_string(through) + " skeleton edges that leave the surface were left out");
-    }
-  }
-
-  /// Per skeleton point: whether one edge only ends at its place.
-  std::vector<char> SkeletonEnds() const
-  {
-    const std::vector<Vector3>& points = this->Input.skeletonPoints;
-    std::map<std::array<double, 3>, int> edges;
-    for (const auto& [a, b] : this->Input.skeletonEdges)
-    {
-      if (points[a] != points[b])
-      {
-        ++edges[{ points[a][0], points[a][1], points[a][2] }];
-        ++edges[{ points[b][0], points[b][1], points[b][2] }];
-      }
-    }
-    std::vector<char> isEnd(points.size(), 0);
-    for (std::size_t i = 0; i < points.size(); ++i)
-    {
-      const auto found = edges.find({ points[i][0], points[i][1], points[i][2] });
-      isEnd[i] = found != edges.end() && found->second == 1 ? 1 : 0;
-    }
-    return isEnd;
-  }
-
-  static double LongestSide(const Piece& piece, std::int64_t triangle)
-  {
-    const Triangle& t = piece.triangles[triangle];
-    return std::max(
-      { Sized(piece, t[0], t[1]), Sized(piece, t[1], t[2]), Sized(piece, t[2], t[0]) });
-  }
-
-  std::vector<double> WallSizes(const Piece& piece) const
-  {
-    std::vector<double> sum(piece.points.size(), 0.0);
-    std::vector<int> count(piece.points.size(), 0);
-    for (const Triangle& t : piece.triangles)
-    {
-      for (int i = 0; i < 3; ++i)
-      {
-        sum[t[i]] += Sized(piece, t[i], t[(i + 1) % 3]);
-        ++count[t[i]];
-      }
-    }
-    for (std::size_t i = 0; i < sum.size(); ++i)
-    {
-      sum[i] = count[i] > 0 ? sum[i] / count[i] : 0.0;
-    }
-    return sum;
-  }
-
-  /// Wanted edge lengths: the wall's own, and inside by the radius, but not finer than the wall.
-  void SetSizes(Piece& piece, const TriangleTree& tree, const std::vector<double>& wall) const
-  {
-    const double factor = this->Settings.sizeFactor;
-    piece.sizes = wall;
-    for (std::size_t i = 0; i < piece.points.size(); ++i)
-    {
-      if (wall[i] == 0.0)
-      {
-        const std::int64_t triangle = tree.Closest(piece.points[i]).triangle;
-        const double near = wall[piece.triangles[triangle][0]];
-        const double radius = this->Radii->At(piece.points[i] + this->Origin);
-        piece.sizes[i] = std::max(near, (factor > 0.0 ? factor : 0.5) * radius);
-      }
-    }
-  }
-
-  bool LeavesSurface(const Piece& piece, std::int64_t from, std::int64_t to) const
-  {
-    const Vector3& p = piece.points[from];
-    const Vector3& q = piece.points[to];
-    bool crosses = false;
-    const TriangleTree* tree = nullptr;
-    for (const auto& [owner, known] : this->SegmentTrees)
-    {
-      if (owner == &piece)
-      {
-        tree = known.get();
-      }
-    }
-    if (tree == nullptr)
-    {
-      this->SegmentTrees.emplace_back(
-        &piece, std::make_unique<TriangleTree>(piece.points, piece.triangles));
-      tree = this->SegmentTrees.back().second.get();
-    }
-    tree->Visit(p.cwiseMin(q), p.cwiseMax(q),
-      [&](std::int64_t triangle)
-      {
-        const Triangle& t = piece.triangles[triangle];
-        const bool touches = std::any_of(
-          t.begin(), t.end(), [&](std::int64_t corner) { return corner == from || corner == to; });
-        crosses = crosses ||
-          (!touches && Crosses(p, q, piece.points[t[0]], piece.points[t[1]], piece.points[t[2]]));
-      });
-    return crosses || tree->Winding(0.5 * (p + q)) == 0;
-  }
-
-  static void AddSegment(Piece& piece, std::int64_t from, std::int64_t to, std::int64_t source)
-  {
-    const double length = Sized(piece, from, to);
-    const double wanted = 1.3 * std::min(piece.sizes[from], piece.sizes[to]);
-    const auto parts = static_cast<int>(std::clamp(std::ceil(length / wanted), 1.0, 10000.0));
-    std::int64_t last = from;
-    for (int i = 1; i <= parts; ++i)
-    {
-      std::int64_t next = to;
-      if (i < parts)
-      {
-        const double t = static_cast<double>(i) / parts;
-        next = static_cast<std::int64_t>(piece.points.size());
-        piece.points.emplace_back((1.0 - t) * piece.points[from] + t * piece.points[to]);
-        piece.sizes.push_back((1.0 - t) * piece.sizes[from] + t * piece.sizes[to]);
-        piece.surfacePoint.push_back(-1);
-        piece.skeletonPoint.push_back(-1);
-      }
-      piece.segments.emplace_back(last, next);
-      piece.segmentSource.push_back(source);
-      last = next;
-    }
+    MeshingPieces made =
+      MakeMeshingPieces(this->Input, this->Settings, this->Surface, *this->Radii);
+    this->Pieces = std::move(made.pieces);
+    this->Origin = made.origin;
+    this->Mesh.warnings.insert(
+      this->Mesh.warnings.end(), made.warnings.begin(), made.warnings.end());
   }
 
   std::vector<MesherAnswer> RunBackend(const ProgressCallback& progress)
   {
     std::vector<MesherRequest> requests;
-    for (const Piece& piece : this->Pieces)
+    for (const MeshingPiece& piece : this->Pieces)
     {
       MesherRequest request;
       request.radiusEdgeRatio = this->Settings.radiusEdgeRatio;
@@ -1030,7 +445,7 @@ private:
   }
 
   /// Edges where the surface bends by more than 50 degrees.
-  static void AddRims(const Piece& piece, MesherRequest& request)
+  static void AddRims(const MeshingPiece& piece, MesherRequest& request)
   {
     std::map<Edge, Vector3> normals;
     for (const Triangle& t : piece.triangles)
@@ -1050,7 +465,7 @@ private:
   }
 
   /// What a worker's status means, and the first place on the surface that it names.
-  std::string Explain(const MesherAnswer& answer, const Piece& piece) const
+  std::string Explain(const MesherAnswer& answer, const MeshingPiece& piece) const
   {
     const std::string name = WorkerName(this->Mesh.backend);
     std::string text;
@@ -1111,7 +526,7 @@ private:
     for (std::size_t k = 0; k < answers.size(); ++k)
     {
       const MesherAnswer& answer = answers[k];
-      const Piece& piece = this->Pieces[k];
+      const MeshingPiece& piece = this->Pieces[k];
       ComponentMesh& part = parts[k];
       for (std::size_t i = 0; i + 2 < answer.points.size(); i += 3)
       {
@@ -1177,7 +592,7 @@ private:
               parts[k].points, parts[k].cells, parts[k].fixed, parts[k].edges, improvement);
           }
         },
-        Part(this->Progress, 0.7, 0.9));
+        PartOf(this->Progress, 0.7, 0.9));
     }
     for (std::size_t k = 0; k < parts.size(); ++k)
     {
@@ -1194,8 +609,8 @@ private:
     this->Measure();
   }
 
-  void Append(const MesherAnswer& answer, const Piece& piece, const std::vector<Vector3>& points,
-    const std::vector<Tetrahedron>& cells, int region)
+  void Append(const MesherAnswer& answer, const MeshingPiece& piece,
+    const std::vector<Vector3>& points, const std::vector<Tetrahedron>& cells, int region)
   {
     const bool keepsSurface = this->Mesh.backend == TetrahedralBackend::TetGen;
     std::vector<std::int64_t> number(points.size(), -1);
@@ -1272,7 +687,7 @@ private:
     this->AppendSkeleton(answer, piece, cells, points.size(), number);
   }
 
-  void AppendBoundary(const Piece& piece, const std::vector<Vector3>& points,
+  void AppendBoundary(const MeshingPiece& piece, const std::vector<Vector3>& points,
     const std::vector<Tetrahedron>& cells, const std::vector<std::int64_t>& number,
     std::int64_t base)
   {
@@ -1330,7 +745,7 @@ private:
       this->Mesh.boundaryElement.end(), [base](std::int64_t cell) { return cell >= base; }));
   }
 
-  void AppendSkeleton(const MesherAnswer& answer, const Piece& piece,
+  void AppendSkeleton(const MesherAnswer& answer, const MeshingPiece& piece,
     const std::vector<Tetrahedron>& cells, std::size_t pointCount,
     const std::vector<std::int64_t>& number)
   {
@@ -1431,8 +846,7 @@ private:
   std::unique_ptr<LocalRadius> Radii;
   std::string Executable;
   Vector3 Origin = Vector3::Zero();
-  std::vector<Piece> Pieces;
-  mutable std::vector<std::pair<const Piece*, std::unique_ptr<TriangleTree>>> SegmentTrees;
+  std::vector<MeshingPiece> Pieces;
   TetrahedralMesh Mesh;
 };
 }

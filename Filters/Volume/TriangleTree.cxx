@@ -1,22 +1,13 @@
 #include "TriangleTree.h"
 
+#include "TriangleBvh.h"
+
 #include <algorithm>
 #include <limits>
 #include <numeric>
 
 namespace coronary
 {
-namespace
-{
-Vector3 ClosestPointOfSegment(const Vector3& p, const Vector3& a, const Vector3& b)
-{
-  const Vector3 along = b - a;
-  const double length = along.squaredNorm();
-  const double t = length > 0.0 ? std::clamp((p - a).dot(along) / length, 0.0, 1.0) : 0.0;
-  return a + t * along;
-}
-}
-
 Vector3 ClosestPointOfTriangle(
   const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c)
 {
@@ -34,8 +25,9 @@ Vector3 ClosestPointOfTriangle(
       return a + v * ab + w * ac;
     }
   }
-  Vector3 nearest = ClosestPointOfSegment(p, a, b);
-  for (const Vector3& other : { ClosestPointOfSegment(p, b, c), ClosestPointOfSegment(p, c, a) })
+  Vector3 nearest = NearestOnSegment(p, a, b).position;
+  for (const Vector3& other :
+    { NearestOnSegment(p, b, c).position, NearestOnSegment(p, c, a).position })
   {
     if ((other - p).squaredNorm() < (nearest - p).squaredNorm())
     {
@@ -211,38 +203,7 @@ int TriangleTree::Winding(const Vector3& p) const
     [&](std::int64_t triangle)
     {
       const Triangle& t = this->Triangles[triangle];
-      // How often the triangle's outline winds around the vertical through p. An edge is looked at
-      // from its lower end, whichever triangle asks.
-      int turns = 0;
-      for (int i = 0; i < 3; ++i)
-      {
-        const Vector3& from = this->Points[t[i]];
-        const Vector3& to = this->Points[t[(i + 1) % 3]];
-        const bool rises = from[1] <= p[1] && to[1] > p[1];
-        const bool falls = to[1] <= p[1] && from[1] > p[1];
-        if (rises || falls)
-        {
-          const Vector3& low = rises ? from : to;
-          const Vector3& top = rises ? to : from;
-          const double side =
-            (top[0] - low[0]) * (p[1] - low[1]) - (p[0] - low[0]) * (top[1] - low[1]);
-          if (side > 0.0)
-          {
-            turns += rises ? 1 : -1;
-          }
-        }
-      }
-      if (turns == 0)
-      {
-        return;
-      }
-      const Vector3& a = this->Points[t[0]];
-      const Vector3 normal = (this->Points[t[1]] - a).cross(this->Points[t[2]] - a);
-      const bool above = normal[2] * (normal.dot(a - p)) > 0.0;
-      if (above)
-      {
-        winding += turns;
-      }
+      winding += WindingAbove(p, this->Points[t[0]], this->Points[t[1]], this->Points[t[2]]);
     });
   return winding;
 }
