@@ -7,9 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -61,104 +59,33 @@ std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text
   return files;
 }
 
-bool IsSpace(char c)
-{
-  return c == ' ' || c == '\t' || c == '\n' || c == '\r';
-}
-
 bool IsControl(char c)
 {
   return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
 }
 
-/// The attributes of the element whose name ends at `at`; leaves `at` behind it.
-std::map<std::string, std::string> Attributes(
-  const std::string& path, const std::string& text, std::size_t& at)
+std::vector<TimedFile> ReadPvd(const std::string& path, const std::string& text)
 {
-  std::map<std::string, std::string> attributes;
-  while (true)
-  {
-    while (at < text.size() && (IsSpace(text[at]) || text[at] == '/'))
+  std::vector<TimedFile> files;
+  bool there = false;
+  ReadXml(text, path,
+    [&](const XmlElement& element)
     {
-      ++at;
-    }
-    if (at < text.size() && text[at] == '>')
-    {
-      ++at;
-      return attributes;
-    }
-    const std::size_t equals = text.find('=', at);
-    const std::size_t open =
-      equals == std::string::npos ? equals : text.find_first_of("\"'", equals);
-    const std::size_t close = open == std::string::npos ? open : text.find(text[open], open + 1);
-    if (close == std::string::npos)
-    {
-      Fail(path, "ends in the middle of an element");
-    }
-    std::string name = text.substr(at, equals - at);
-    while (!name.empty() && IsSpace(name.back()))
-    {
-      name.pop_back();
-    }
-    try
-    {
-      attributes[name] = UnescapedXml(text.substr(open + 1, close - open - 1));
-    }
-    catch (const std::runtime_error& error)
-    {
-      Fail(path, error.what());
-    }
-    at = close + 1;
-  }
-}
-
-std::vector<TimedFile> ReadPvd(const std::string& path, std::string text)
-{
-  for (std::size_t open = 0; (open = text.find("<!--", open)) != std::string::npos;)
-  {
-    const std::size_t close = text.find("-->", open);
-    if (close == std::string::npos)
-    {
-      Fail(path, "has a comment without end");
-    }
-    text.erase(open, close + 3 - open);
-  }
-  if (text.find("<VTKFile") == std::string::npos || text.find("<Collection") == std::string::npos)
+      there = there || element.Is("VTKFile/Collection");
+      if (!element.Is("VTKFile/Collection/DataSet"))
+      {
+        return;
+      }
+      const TimedFile file{ element.Required("file"), element.Number("timestep") };
+      if (!files.empty() && files.back().time == file.time)
+      {
+        element.Fail("has several files at the time " + element.String("timestep"));
+      }
+      files.push_back(file);
+    });
+  if (!there)
   {
     Fail(path, "is not a .pvd file");
-  }
-  if (text.find("</VTKFile") == std::string::npos)
-  {
-    Fail(path, "is not whole");
-  }
-  std::vector<TimedFile> files;
-  const std::string element = "<DataSet";
-  for (std::size_t at = 0; (at = text.find(element, at)) != std::string::npos;)
-  {
-    at += element.size();
-    const std::map<std::string, std::string> attributes = Attributes(path, text, at);
-    const std::string owner = "DataSet " + std::to_string(files.size());
-    const auto file = attributes.find("file");
-    if (file == attributes.end())
-    {
-      Fail(path, owner + " has no file");
-    }
-    const auto step = attributes.find("timestep");
-    if (step == attributes.end())
-    {
-      Fail(path, owner + " has no timestep");
-    }
-    char* end = nullptr;
-    const double time = std::strtod(step->second.c_str(), &end);
-    if (step->second.empty() || *end != '\0')
-    {
-      Fail(path, owner + " has no timestep that is a number");
-    }
-    if (!files.empty() && files.back().time == time)
-    {
-      Fail(path, "has several files at the time " + step->second);
-    }
-    files.push_back({ file->second, time });
   }
   return files;
 }

@@ -17,17 +17,6 @@ bool IsBlank(char c)
   return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v' || c == '\0';
 }
 
-/// For messages: what is in a damaged file may be anything.
-std::string Quoted(std::string_view word)
-{
-  std::string shown;
-  for (const char c : word.substr(0, 40))
-  {
-    shown += c >= ' ' && c <= '~' ? c : '?';
-  }
-  return "'" + shown + (word.size() > 40 ? "..'" : "'");
-}
-
 template <typename Value>
 bool Parse(std::string_view word, Value& value)
 {
@@ -164,6 +153,16 @@ void TextScanner::Fail(const std::string& what) const
 {
   throw std::runtime_error(
     "'" + this->Name + "', line " + std::to_string(this->Line) + ": " + what + ".");
+}
+
+std::string Quoted(std::string_view word)
+{
+  std::string shown;
+  for (const char c : word.substr(0, 40))
+  {
+    shown += c >= ' ' && c <= '~' ? c : '?';
+  }
+  return "'" + shown + (word.size() > 40 ? "..'" : "'");
 }
 
 void AppendNumber(std::string& text, double value)

@@ -369,12 +369,16 @@ TEST(SimVascular, OlderFilesWithTwoRootsAndSeveralTimes)
   EXPECT_EQ(path.timesteps, 2);
   const auto refuse = [](const std::string& bad, const std::string& part)
   { ExpectError([&] { (void)ParseSimVascularPath(bad, "bad.pth"); }, part); };
-  refuse("", "has no element 'path'");
+  refuse("", "line 1: is no XML: no element found");
+  refuse("<other/>", "has no element 'path'");
   refuse("<path>", "ends inside the element 'path'");
   refuse("<path></path>", "has no points");
-  refuse("<path></other>", "'other' ends, which is not open");
-  refuse("<path id=3></path>", "not quoted");
-  refuse("<!-- ", "truncated inside");
+  refuse("<path></other>", "line 1: is no XML: mismatched tag inside 'path'");
+  refuse("\n<path id=3></path>", "line 2: is no XML: not well-formed");
+  refuse("<!-- ", "unclosed token");
+  refuse("<format/><path><timestep><path_element><path_points><path_pointed><pos/></path_pointed>"
+         "</path_points></path_element></timestep></path>",
+    "has no points");
   std::string deep;
   for (int n = 0; n < 1000; ++n)
   {
