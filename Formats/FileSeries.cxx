@@ -3,6 +3,7 @@
 #include "BoundedJson.h"
 #include "ByteStream.h"
 #include "TextFile.h"
+#include "TextWords.h"
 #include "XmlText.h"
 
 #include <algorithm>
@@ -17,30 +18,13 @@ namespace fs = std::filesystem;
 
 namespace
 {
-[[noreturn]] void Fail(const std::string& path, const std::string& what)
-{
-  throw std::runtime_error("'" + path + "': " + what + ".");
-}
-
 std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text)
 {
-  nlohmann::json list;
-  try
-  {
-    list = ParseBoundedJson(text);
-  }
-  catch (const nlohmann::json::exception& error)
-  {
-    Fail(path, "is not JSON: " + JsonReason(error));
-  }
-  catch (const TooDeepJson& error)
-  {
-    Fail(path, error.what());
-  }
+  const nlohmann::json list = ParseBoundedJson(text, "'" + path + "'");
   const auto entries = list.find("files");
   if (entries == list.end() || !entries->is_array())
   {
-    Fail(path, "has no list 'files'");
+    FormatError(path, "has no list 'files'");
   }
   std::vector<TimedFile> files;
   for (const auto& entry : *entries)
@@ -48,11 +32,11 @@ std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text
     const std::string owner = "files[" + std::to_string(files.size()) + "]";
     if (!entry.is_object() || !entry.contains("name") || !entry["name"].is_string())
     {
-      Fail(path, owner + " has no 'name'");
+      FormatError(path, owner + " has no 'name'");
     }
     if (!entry.contains("time") || !entry["time"].is_number())
     {
-      Fail(path, owner + " has no 'time' that is a number");
+      FormatError(path, owner + " has no 'time' that is a number");
     }
     files.push_back({ entry["name"].get<std::string>(), entry["time"].get<double>() });
   }
@@ -85,7 +69,7 @@ std::vector<TimedFile> ReadPvd(const std::string& path, const std::string& text)
     });
   if (!there)
   {
-    Fail(path, "is not a .pvd file");
+    FormatError(path, "is not a .pvd file");
   }
   return files;
 }
@@ -99,12 +83,12 @@ std::vector<TimedFile> ReadFileSeries(const std::string& path)
   const char kind = first == std::string::npos ? '\0' : text[first];
   if (kind != '{' && kind != '<')
   {
-    Fail(path, "is neither a .series nor a .pvd file");
+    FormatError(path, "is neither a .series nor a .pvd file");
   }
   std::vector<TimedFile> files = kind == '{' ? ReadJson(path, text) : ReadPvd(path, text);
   if (files.empty())
   {
-    Fail(path, "lists no files");
+    FormatError(path, "lists no files");
   }
   const fs::path folder = fs::path(path).parent_path();
   for (std::size_t n = 0; n < files.size(); ++n)
@@ -112,13 +96,14 @@ std::vector<TimedFile> ReadFileSeries(const std::string& path)
     const std::string& name = files[n].path;
     if (name.empty() || std::any_of(name.begin(), name.end(), IsControl))
     {
-      Fail(path,
+      FormatError(path,
         "file " + std::to_string(n) +
           (name.empty() ? " has no name" : " has a control character in its name"));
     }
     if (!std::isfinite(files[n].time) || (n > 0 && !(files[n].time > files[n - 1].time)))
     {
-      Fail(path, "the time of '" + files[n].path + "' is not finite and after the one before");
+      FormatError(
+        path, "the time of '" + files[n].path + "' is not finite and after the one before");
     }
     files[n].path = (folder / files[n].path).lexically_normal().string();
   }

@@ -3,7 +3,7 @@
 #include "ByteStream.h"
 #include "TextFile.h"
 #include "TextScanner.h"
-#include "VolumeHeaderParsers.h"
+#include "TextWords.h"
 #include "XmlText.h"
 
 #include <algorithm>

@@ -44,9 +44,6 @@ private:
   char Comment = 0;
 };
 
-/// A word for a message, at most 40 bytes of it: what is in a damaged file may be anything.
-std::string Quoted(std::string_view word);
-
 /// Appends a number such that reading gives the same bits.
 void AppendNumber(std::string& text, double value);
 void AppendNumber(std::string& text, std::int64_t value);

@@ -1,7 +1,6 @@
 #include "XmlText.h"
 
-#include "TextScanner.h"
-#include "VolumeHeaderParsers.h"
+#include "TextWords.h"
 
 #include <expat.h>
 

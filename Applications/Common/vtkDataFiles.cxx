@@ -107,12 +107,6 @@ void CheckCellTypes(const std::string& path, vtkUnstructuredGrid* grid)
 }
 }
 
-bool EndsWith(const std::string& path, const std::string& end)
-{
-  return path.size() >= end.size() &&
-    path.compare(path.size() - end.size(), std::string::npos, end) == 0;
-}
-
 vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages)
 {
   vtkNew<vtkXMLPolyDataReader> reader;

@@ -252,7 +252,7 @@ TEST(Markups, Hostile)
 {
   const auto refuse = [](const std::string& text, const std::string& part)
   { ExpectError([&] { (void)ParseMarkups(text, "bad.mrk.json"); }, part); };
-  refuse("", "not valid JSON");
+  refuse("", "is not JSON");
   refuse("[]", "has no list 'markups'");
   refuse("{\"markups\": 3}", "has no list 'markups'");
   refuse("{\"markups\": [3]}", "markups[0] is not an object");
@@ -262,7 +262,7 @@ TEST(Markups, Hostile)
   refuse(MarkupsWith("", "{\"position\": [1, 2]}"), "position is not a list of three numbers");
   refuse(MarkupsWith("", "{\"position\": [1, 2, \"x\"]}"), "position[2] is not a finite number");
   refuse(MarkupsWith("", "{\"position\": [1, 2, 1e999]}"), "");
-  refuse(MarkupsWith("", "{\"position\": [1, 2, NaN]}"), "not valid JSON");
+  refuse(MarkupsWith("", "{\"position\": [1, 2, NaN]}"), "is not JSON");
   refuse(MarkupsWith(", \"coordinateSystem\": \"XYZ\"", OnePoint), "coordinateSystem is \"XYZ\"");
   refuse(MarkupsWith(", \"coordinateSystem\": 2", OnePoint), "coordinateSystem is 2");
   refuse(MarkupsWith(", \"coordinateUnits\": \"inch\"", OnePoint), "coordinateUnits");
