@@ -23,28 +23,29 @@ inline std::string JsonReason(const std::exception& error)
   return reason.size() > 160 ? reason.substr(0, 157) + "..." : reason;
 }
 
-/// Of JSON that is nested more than DeepestJson times: copies and comparisons of it would overflow the stack.
-struct TooDeepJson : std::runtime_error
-{
-  TooDeepJson()
-    : std::runtime_error("is nested more than " + std::to_string(DeepestJson) + " times")
-  {
-  }
-};
-
-/// @throws Json::exception: no JSON; TooDeepJson
+/// @param where  for messages: the file's name in quotes
+/// @throws std::runtime_error: no JSON, or nested more than DeepestJson times: copies and comparisons of it would overflow the
+///   stack
 template <typename Json = nlohmann::json>
-Json ParseBoundedJson(const std::string& text)
+Json ParseBoundedJson(const std::string& text, const std::string& where)
 {
-  return Json::parse(text,
-    [](int depth, typename Json::parse_event_t, Json&)
-    {
-      if (depth > DeepestJson)
+  try
+  {
+    return Json::parse(text,
+      [&](int depth, typename Json::parse_event_t, Json&)
       {
-        throw TooDeepJson();
-      }
-      return true;
-    });
+        if (depth > DeepestJson)
+        {
+          throw std::runtime_error(
+            where + " is nested more than " + std::to_string(DeepestJson) + " times.");
+        }
+        return true;
+      });
+  }
+  catch (const typename Json::exception& error)
+  {
+    throw std::runtime_error(where + " is not JSON: " + JsonReason(error) + ".");
+  }
 }
 }
 

@@ -1,6 +1,7 @@
 #include "DicomFile.h"
 
 #include "DicomStructure.h"
+#include "TextWords.h"
 
 #include <gdcmImageReader.h>
 #include <gdcmTrace.h>
@@ -17,11 +18,6 @@ namespace coronary
 namespace
 {
 const char* const RunLengthSyntax = "1.2.840.10008.1.2.5";
-
-[[noreturn]] void Fail(const std::string& path, const std::string& what)
-{
-  throw std::runtime_error("'" + path + "': " + what + ".");
-}
 
 // GDCM writes to the console by itself; what it finds is reported by our exceptions.
 void SilenceGdcm()
@@ -203,15 +199,15 @@ bool ReadFrame(const FrameData& data, const std::string& path, DicomFrame& frame
   const std::vector<double> s = data.Holder(0x00289110u, spacing).Numbers(spacing);
   if (p.size() != 3)
   {
-    Fail(path, "ImagePositionPatient is not three finite numbers");
+    FormatError(path, "ImagePositionPatient is not three finite numbers");
   }
   if (o.size() != 6)
   {
-    Fail(path, "ImageOrientationPatient is not six finite numbers");
+    FormatError(path, "ImageOrientationPatient is not six finite numbers");
   }
   if (s.size() != 2 || !(s[0] > 0.0) || !(s[1] > 0.0))
   {
-    Fail(path, "PixelSpacing is not two positive numbers");
+    FormatError(path, "PixelSpacing is not two positive numbers");
   }
   frame.position = Vector3(p[0], p[1], p[2]);
   frame.rowAxis = Vector3(o[0], o[1], o[2]);
@@ -220,7 +216,7 @@ bool ReadFrame(const FrameData& data, const std::string& path, DicomFrame& frame
     std::abs(frame.columnAxis.norm() - 1.0) > 1e-3 ||
     std::abs(frame.rowAxis.dot(frame.columnAxis)) > 1e-3)
   {
-    Fail(path, "the axes in ImageOrientationPatient are not perpendicular unit vectors");
+    FormatError(path, "the axes in ImageOrientationPatient are not perpendicular unit vectors");
   }
   frame.rowSpacing = s[0];
   frame.columnSpacing = s[1];
@@ -292,20 +288,20 @@ void ReadImageHeader(const DicomStructure& structure, DicomFile& file)
   file.isSigned = integer(0x00280103u, 0) == 1;
   if (file.rows < 1 || file.columns < 1)
   {
-    Fail(file.path, "the image has no rows or no columns");
+    FormatError(file.path, "the image has no rows or no columns");
   }
   if (file.bitsAllocated != 8 && file.bitsAllocated != 16 && file.bitsAllocated != 32)
   {
-    Fail(file.path, std::to_string(file.bitsAllocated) + " bits a voxel are not supported");
+    FormatError(file.path, std::to_string(file.bitsAllocated) + " bits a voxel are not supported");
   }
   if (file.bitsStored < 1 || file.bitsStored > file.bitsAllocated)
   {
-    Fail(file.path, "BitsStored is out of range");
+    FormatError(file.path, "BitsStored is out of range");
   }
   const int samples = integer(0x00280002u, 1);
   if (samples != 1)
   {
-    Fail(file.path, "image has " + std::to_string(samples) + " components; one is needed");
+    FormatError(file.path, "image has " + std::to_string(samples) + " components; one is needed");
   }
   file.sliceSpacing = data.Number(0x00180088u).value_or(data.Number(0x00180050u).value_or(0.0));
   file.acquisitionOrder = { data.Number(0x00200100u).value_or(0.0),
@@ -335,18 +331,9 @@ void ReadImageHeader(const DicomStructure& structure, DicomFile& file)
 
 std::optional<double> ParseDicomNumber(const std::string& text)
 {
-  const std::size_t first = text.find_first_not_of(" +");
-  if (first == std::string::npos)
-  {
-    return std::nullopt;
-  }
-  const std::size_t last = text.find_last_not_of(' ');
   double value = 0.0;
-  const char* end = text.data() + last + 1;
-  const std::from_chars_result result = std::from_chars(text.data() + first, end, value);
-  return result.ec == std::errc() && result.ptr == end && std::isfinite(value)
-    ? std::optional<double>(value)
-    : std::nullopt;
+  return ParseNumber(Trimmed(text), value) && std::isfinite(value) ? std::optional<double>(value)
+                                                                   : std::nullopt;
 }
 
 DicomFile ReadDicomHeader(const std::string& path)
@@ -488,7 +475,7 @@ std::vector<Fragment> ListFragments(const DicomFile& file, ByteStream& stream)
     }
     if (tag != item || length > file.pixelBytes || position + length > file.pixelBytes)
     {
-      Fail(file.path, "its compressed pixels are truncated or damaged");
+      FormatError(file.path, "its compressed pixels are truncated or damaged");
     }
     fragments.push_back({ position, length });
     position += length;
@@ -556,12 +543,12 @@ void CheckCodestreams(
       size.columns != static_cast<unsigned>(file.columns) || size.components != 1 ||
       size.bits < 2 || size.bits > static_cast<unsigned>(file.bitsAllocated))
     {
-      Fail(file.path, "its compressed pixels do not agree with its header");
+      FormatError(file.path, "its compressed pixels do not agree with its header");
     }
   }
   if (begins != file.frames.size())
   {
-    Fail(file.path, "its compressed pixels are damaged, or of a kind that is not supported");
+    FormatError(file.path, "its compressed pixels are damaged, or of a kind that is not supported");
   }
 }
 
@@ -617,7 +604,7 @@ void DecodeRunLength(const DicomFile& file, std::size_t frame, std::vector<unsig
   const std::string damaged = "its run-length encoded pixels are truncated or damaged";
   if (fragments.size() != file.frames.size() + 1 || fragments[frame + 1].size < 64)
   {
-    Fail(file.path, damaged);
+    FormatError(file.path, damaged);
   }
   std::vector<unsigned char> in(static_cast<std::size_t>(fragments[frame + 1].size));
   stream.Read(fragments[frame + 1].offset, in.data(), in.size(), in.size());
@@ -629,7 +616,7 @@ void DecodeRunLength(const DicomFile& file, std::size_t frame, std::vector<unsig
   };
   if (number(0) != valueBytes)
   {
-    Fail(file.path, damaged);
+    FormatError(file.path, damaged);
   }
   // The segments hold the bytes of all values, the most significant first.
   for (std::size_t segment = 0; segment < valueBytes; ++segment)
@@ -640,7 +627,7 @@ void DecodeRunLength(const DicomFile& file, std::size_t frame, std::vector<unsig
     if (first < 64 || first > last || last > in.size() ||
       !DecodeSegment(in.data() + first, in.data() + last, bytes.data() + byte, count, valueBytes))
     {
-      Fail(file.path, damaged);
+      FormatError(file.path, damaged);
     }
   }
 }
@@ -692,7 +679,7 @@ void DicomPixelReader::Internals::Decode(const DicomFile& file)
     gdcm::TransferSyntax::GetTSType(file.transferSyntax.c_str());
   if (syntax == gdcm::TransferSyntax::TS_END || !gdcm::TransferSyntax(syntax).IsEncapsulated())
   {
-    Fail(file.path, "its transfer syntax '" + file.transferSyntax + "' is not supported");
+    FormatError(file.path, "its transfer syntax '" + file.transferSyntax + "' is not supported");
   }
   std::istringstream stream(CleanFile(file));
   bool good = false;
@@ -705,7 +692,7 @@ void DicomPixelReader::Internals::Decode(const DicomFile& file)
     const gdcm::Image& image = reader.GetImage();
     if (good && image.GetBufferLength() != expected)
     {
-      Fail(file.path, "its pixels are not of the size that its header says");
+      FormatError(file.path, "its pixels are not of the size that its header says");
     }
     this->Values.resize(expected);
     good = good && image.GetBuffer(this->Values.data());
@@ -716,7 +703,7 @@ void DicomPixelReader::Internals::Decode(const DicomFile& file)
   }
   if (!good)
   {
-    Fail(file.path, "its pixels cannot be decoded; the file is truncated or damaged");
+    FormatError(file.path, "its pixels cannot be decoded; the file is truncated or damaged");
   }
   this->Path = file.path;
 }

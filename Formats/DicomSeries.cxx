@@ -1,6 +1,7 @@
 #include "DicomSeries.h"
 
 #include "DicomFile.h"
+#include "TextWords.h"
 
 #include <algorithm>
 #include <cmath>
@@ -52,11 +53,6 @@ std::string Text(const Vector3& v)
   return "(" + Text(v.x()) + ", " + Text(v.y()) + ", " + Text(v.z()) + ")";
 }
 
-[[noreturn]] void Fail(const std::string& folder, const std::string& what)
-{
-  throw std::runtime_error("'" + folder + "': " + what + ".");
-}
-
 std::string Join(const std::vector<std::string>& items)
 {
   std::string text;
@@ -95,7 +91,7 @@ std::vector<std::string> ListFiles(const std::string& folder, const Poll& poll)
   }
   if (error)
   {
-    Fail(folder, "cannot be read: " + error.message());
+    FormatError(folder, "cannot be read: " + error.message());
   }
   // The order of a folder is not the same everywhere.
   std::sort(paths.begin(), paths.end());
@@ -152,10 +148,10 @@ std::string DescribeSeries(const std::map<std::string, Files>& series)
 {
   if (series.size() == 1)
   {
-    Fail(
+    FormatError(
       folder, "the images of series " + DescribeSeries(series) + " do not form one volume: " + why);
   }
-  Fail(folder,
+  FormatError(folder,
     "mixed series: it holds " + std::to_string(series.size()) +
       " series that do not form one dataset (" + why + "): " + DescribeSeries(series) +
       ". Choose one with the property SeriesInstanceUID");
@@ -595,7 +591,7 @@ void CheckComplete(const Stack& stack, const std::string& folder)
   }
   if (!missing.empty())
   {
-    Fail(folder, "slices are missing: " + Join(missing));
+    FormatError(folder, "slices are missing: " + Join(missing));
   }
 }
 
@@ -653,7 +649,7 @@ double SliceSpacing(const Stack& stack, const std::string& folder, const Vector3
   const double pixel = std::min(frame.rowSpacing, frame.columnSpacing);
   if (sideways > pixel)
   {
-    Fail(folder,
+    FormatError(folder,
       "the slices are shifted sideways by up to " + Text(sideways) +
         " mm (a tilted gantry?), so they form no regular grid");
   }
@@ -686,7 +682,7 @@ std::vector<double> PhaseFractions(
     fractions.push_back(sum / static_cast<double>(stack.size()));
     if (p > 0 && !(fractions[p] > fractions[p - 1]))
     {
-      Fail(folder,
+      FormatError(folder,
         "the R-R fraction of phase " + std::to_string(p) + " is not greater than the one before");
     }
   }
@@ -753,7 +749,7 @@ Files DicomSeries::Select(const std::string& folder, const std::string& seriesUi
   }
   if (images.empty())
   {
-    Fail(folder,
+    FormatError(folder,
       "holds no DICOM images" + (skippedText.empty() ? "" : " (skipped: " + skippedText + ")"));
   }
   if (!seriesUid.empty())
@@ -762,7 +758,7 @@ Files DicomSeries::Select(const std::string& folder, const std::string& seriesUi
     const auto chosen = series.find(seriesUid);
     if (chosen == series.end())
     {
-      Fail(folder,
+      FormatError(folder,
         "has no series with the SeriesInstanceUID " + seriesUid + "; it holds " +
           DescribeSeries(series));
     }

@@ -3,13 +3,12 @@
 #include "BoundedJson.h"
 #include "ByteStream.h"
 #include "TextFile.h"
+#include "TextWords.h"
 #include "XmlText.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -19,30 +18,13 @@ namespace fs = std::filesystem;
 
 namespace
 {
-[[noreturn]] void Fail(const std::string& path, const std::string& what)
-{
-  throw std::runtime_error("'" + path + "': " + what + ".");
-}
-
 std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text)
 {
-  nlohmann::json list;
-  try
-  {
-    list = ParseBoundedJson(text);
-  }
-  catch (const nlohmann::json::exception& error)
-  {
-    Fail(path, "is not JSON: " + JsonReason(error));
-  }
-  catch (const TooDeepJson& error)
-  {
-    Fail(path, error.what());
-  }
+  const nlohmann::json list = ParseBoundedJson(text, "'" + path + "'");
   const auto entries = list.find("files");
   if (entries == list.end() || !entries->is_array())
   {
-    Fail(path, "has no list 'files'");
+    FormatError(path, "has no list 'files'");
   }
   std::vector<TimedFile> files;
   for (const auto& entry : *entries)
@@ -50,20 +32,15 @@ std::vector<TimedFile> ReadJson(const std::string& path, const std::string& text
     const std::string owner = "files[" + std::to_string(files.size()) + "]";
     if (!entry.is_object() || !entry.contains("name") || !entry["name"].is_string())
     {
-      Fail(path, owner + " has no 'name'");
+      FormatError(path, owner + " has no 'name'");
     }
     if (!entry.contains("time") || !entry["time"].is_number())
     {
-      Fail(path, owner + " has no 'time' that is a number");
+      FormatError(path, owner + " has no 'time' that is a number");
     }
     files.push_back({ entry["name"].get<std::string>(), entry["time"].get<double>() });
   }
   return files;
-}
-
-bool IsSpace(char c)
-{
-  return c == ' ' || c == '\t' || c == '\n' || c == '\r';
 }
 
 bool IsControl(char c)
@@ -71,94 +48,28 @@ bool IsControl(char c)
   return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
 }
 
-/// The attributes of the element whose name ends at `at`; leaves `at` behind it.
-std::map<std::string, std::string> Attributes(
-  const std::string& path, const std::string& text, std::size_t& at)
+std::vector<TimedFile> ReadPvd(const std::string& path, const std::string& text)
 {
-  std::map<std::string, std::string> attributes;
-  while (true)
-  {
-    while (at < text.size() && (IsSpace(text[at]) || text[at] == '/'))
-    {
-      ++at;
-    }
-    if (at < text.size() && text[at] == '>')
-    {
-      ++at;
-      return attributes;
-    }
-    const std::size_t equals = text.find('=', at);
-    const std::size_t open =
-      equals == std::string::npos ? equals : text.find_first_of("\"'", equals);
-    const std::size_t close = open == std::string::npos ? open : text.find(text[open], open + 1);
-    if (close == std::string::npos)
-    {
-      Fail(path, "ends in the middle of an element");
-    }
-    std::string name = text.substr(at, equals - at);
-    while (!name.empty() && IsSpace(name.back()))
-    {
-      name.pop_back();
-    }
-    try
-    {
-      attributes[name] = UnescapedXml(text.substr(open + 1, close - open - 1));
-    }
-    catch (const std::runtime_error& error)
-    {
-      Fail(path, error.what());
-    }
-    at = close + 1;
-  }
-}
-
-std::vector<TimedFile> ReadPvd(const std::string& path, std::string text)
-{
-  for (std::size_t open = 0; (open = text.find("<!--", open)) != std::string::npos;)
-  {
-    const std::size_t close = text.find("-->", open);
-    if (close == std::string::npos)
-    {
-      Fail(path, "has a comment without end");
-    }
-    text.erase(open, close + 3 - open);
-  }
-  if (text.find("<VTKFile") == std::string::npos || text.find("<Collection") == std::string::npos)
-  {
-    Fail(path, "is not a .pvd file");
-  }
-  if (text.find("</VTKFile") == std::string::npos)
-  {
-    Fail(path, "is not whole");
-  }
   std::vector<TimedFile> files;
-  const std::string element = "<DataSet";
-  for (std::size_t at = 0; (at = text.find(element, at)) != std::string::npos;)
+  bool there = false;
+  ReadXml(text, path,
+    [&](const XmlElement& element)
+    {
+      there = there || element.Is("VTKFile/Collection");
+      if (!element.Is("VTKFile/Collection/DataSet"))
+      {
+        return;
+      }
+      const TimedFile file{ element.Required("file"), element.Number("timestep") };
+      if (!files.empty() && files.back().time == file.time)
+      {
+        element.Fail("has several files at the time " + element.String("timestep"));
+      }
+      files.push_back(file);
+    });
+  if (!there)
   {
-    at += element.size();
-    const std::map<std::string, std::string> attributes = Attributes(path, text, at);
-    const std::string owner = "DataSet " + std::to_string(files.size());
-    const auto file = attributes.find("file");
-    if (file == attributes.end())
-    {
-      Fail(path, owner + " has no file");
-    }
-    const auto step = attributes.find("timestep");
-    if (step == attributes.end())
-    {
-      Fail(path, owner + " has no timestep");
-    }
-    char* end = nullptr;
-    const double time = std::strtod(step->second.c_str(), &end);
-    if (step->second.empty() || *end != '\0')
-    {
-      Fail(path, owner + " has no timestep that is a number");
-    }
-    if (!files.empty() && files.back().time == time)
-    {
-      Fail(path, "has several files at the time " + step->second);
-    }
-    files.push_back({ file->second, time });
+    FormatError(path, "is not a .pvd file");
   }
   return files;
 }
@@ -172,12 +83,12 @@ std::vector<TimedFile> ReadFileSeries(const std::string& path)
   const char kind = first == std::string::npos ? '\0' : text[first];
   if (kind != '{' && kind != '<')
   {
-    Fail(path, "is neither a .series nor a .pvd file");
+    FormatError(path, "is neither a .series nor a .pvd file");
   }
   std::vector<TimedFile> files = kind == '{' ? ReadJson(path, text) : ReadPvd(path, text);
   if (files.empty())
   {
-    Fail(path, "lists no files");
+    FormatError(path, "lists no files");
   }
   const fs::path folder = fs::path(path).parent_path();
   for (std::size_t n = 0; n < files.size(); ++n)
@@ -185,13 +96,14 @@ std::vector<TimedFile> ReadFileSeries(const std::string& path)
     const std::string& name = files[n].path;
     if (name.empty() || std::any_of(name.begin(), name.end(), IsControl))
     {
-      Fail(path,
+      FormatError(path,
         "file " + std::to_string(n) +
           (name.empty() ? " has no name" : " has a control character in its name"));
     }
     if (!std::isfinite(files[n].time) || (n > 0 && !(files[n].time > files[n - 1].time)))
     {
-      Fail(path, "the time of '" + files[n].path + "' is not finite and after the one before");
+      FormatError(
+        path, "the time of '" + files[n].path + "' is not finite and after the one before");
     }
     files[n].path = (folder / files[n].path).lexically_normal().string();
   }

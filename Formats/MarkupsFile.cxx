@@ -3,7 +3,7 @@
 #include "BoundedJson.h"
 #include "ByteStream.h"
 #include "TextFile.h"
-#include "VolumeHeaderParsers.h"
+#include "TextWords.h"
 
 #include <nlohmann/json.hpp>
 
@@ -278,26 +278,12 @@ const Markup::Measurement* Markup::Find(const std::string& measurement) const
 
 bool IsMarkupsFileName(const std::string& path)
 {
-  const std::string name = LowerCase(path);
-  const std::string end = ".mrk.json";
-  return name.size() >= end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+  return EndsWith(LowerCase(path), ".mrk.json");
 }
 
 std::vector<Markup> ParseMarkups(const std::string& text, const std::string& name)
 {
-  Json root;
-  try
-  {
-    root = ParseBoundedJson<Json>(text);
-  }
-  catch (const TooDeepJson& error)
-  {
-    FormatError(name, error.what());
-  }
-  catch (const Json::exception& error)
-  {
-    FormatError(name, "is not valid JSON: " + JsonReason(error));
-  }
+  const Json root = ParseBoundedJson<Json>(text, "'" + name + "'");
   if (!root.is_object() || !root.contains("markups") || !root["markups"].is_array())
   {
     FormatError(name, "has no list 'markups'");

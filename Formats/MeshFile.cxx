@@ -2,6 +2,7 @@
 
 #include "AtomicFile.h"
 #include "TextScanner.h"
+#include "TextWords.h"
 
 #include <charconv>
 #include <map>
@@ -11,12 +12,6 @@ namespace coronary
 {
 namespace
 {
-bool EndsWith(const std::string& text, const std::string& end)
-{
-  return text.size() >= end.size() &&
-    text.compare(text.size() - end.size(), std::string::npos, end) == 0;
-}
-
 Vector3 Point(TextScanner& file)
 {
   const double x = file.Coordinate();

@@ -153,7 +153,7 @@ Json ReadReport(const std::string& path)
 {
   try
   {
-    return ParseBoundedJson<Json>(ReadTextFile(path, "a report"));
+    return ParseBoundedJson<Json>(ReadTextFile(path, "a report"), path);
   }
   catch (const std::exception&)
   {

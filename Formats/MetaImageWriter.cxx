@@ -1,24 +1,17 @@
 #include "MetaImageWriter.h"
 
-#include "AtomicFile.h"
 #include "ByteStream.h"
-
-#include <zlib.h>
+#include "PackedFile.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <iomanip>
 #include <limits>
 #include <locale>
-#include <memory>
 #include <sstream>
 #include <stdexcept>
-#include <vector>
 
 namespace coronary
 {
@@ -57,107 +50,6 @@ std::string AnatomicalOrientation(const Matrix3& direction)
   return result;
 }
 
-class Output
-{
-public:
-  explicit Output(const std::string& path)
-    : Target(path)
-    , File(std::fopen(this->Target.TemporaryPath().c_str(), "wb"), &std::fclose)
-  {
-    if (!this->File)
-    {
-      this->Fail();
-    }
-  }
-
-  void Write(const void* data, std::size_t bytes)
-  {
-    if (std::fwrite(data, 1, bytes, this->File.get()) != bytes)
-    {
-      this->Fail();
-    }
-  }
-
-  void Write(const std::string& text) { this->Write(text.data(), text.size()); }
-
-  void WriteAt(long position, const std::string& text)
-  {
-    if (std::fseek(this->File.get(), position, SEEK_SET) != 0)
-    {
-      this->Fail();
-    }
-    this->Write(text);
-  }
-
-  void Commit()
-  {
-    // A full disk may show only when the buffer is flushed.
-    if (std::fclose(this->File.release()) != 0)
-    {
-      this->Fail();
-    }
-    this->Target.Commit();
-  }
-
-private:
-  [[noreturn]] void Fail()
-  {
-    throw std::runtime_error(
-      "Cannot write '" + this->Target.Path() + "': " + std::strerror(errno) + ".");
-  }
-
-  AtomicFile Target;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> File;
-};
-
-// Returns the number of bytes written.
-std::uint64_t WriteCompressed(
-  Output& output, const unsigned char* data, std::uint64_t bytes, const ProgressCallback& progress)
-{
-  z_stream stream{};
-  // Noisy voxels gain little from higher levels, which are several times slower.
-  if (deflateInit(&stream, 2) != Z_OK)
-  {
-    throw std::runtime_error("zlib can not be initialised.");
-  }
-  const std::unique_ptr<z_stream, int (*)(z_streamp)> guard(&stream, &deflateEnd);
-  std::vector<unsigned char> packed(BlockBytes);
-  std::uint64_t written = 0;
-  for (std::uint64_t position = 0; position < bytes;)
-  {
-    const auto block =
-      static_cast<std::size_t>(std::min<std::uint64_t>(BlockBytes, bytes - position));
-    // zlib's interface is not const-correct; it does not write to its input.
-    stream.next_in = const_cast<unsigned char*>(data + position);
-    stream.avail_in = static_cast<uInt>(block);
-    position += block;
-    do
-    {
-      stream.next_out = packed.data();
-      stream.avail_out = static_cast<uInt>(packed.size());
-      deflate(&stream, position == bytes ? Z_FINISH : Z_NO_FLUSH);
-      const std::size_t produced = packed.size() - stream.avail_out;
-      output.Write(packed.data(), produced);
-      written += produced;
-    } while (stream.avail_out == 0);
-    Report(progress, static_cast<double>(position) / static_cast<double>(bytes));
-  }
-  return written;
-}
-
-void WriteRaw(
-  Output& output, const unsigned char* data, std::uint64_t bytes, const ProgressCallback& progress)
-{
-  for (std::uint64_t position = 0; position < bytes;)
-  {
-    const auto block =
-      static_cast<std::size_t>(std::min<std::uint64_t>(BlockBytes, bytes - position));
-    output.Write(data + position, block);
-    position += block;
-    Report(progress, static_cast<double>(position) / static_cast<double>(bytes));
-  }
-}
-
 void Write(const std::string& path, const ImageGrid& grid, const void* values,
   std::size_t valueBytes, const char* elementType, bool compress, const ProgressCallback& progress)
 {
@@ -190,7 +82,7 @@ void Write(const std::string& path, const ImageGrid& grid, const void* values,
   header << "ObjectType = Image\nNDims = 3\nBinaryData = True\n"
          << "BinaryDataByteOrderMSB = " << (HostIsBigEndian() ? "True" : "False") << "\n"
          << "CompressedData = " << (compress ? "True" : "False") << "\n";
-  const long sizePosition = static_cast<long>(header.str().size());
+  const std::size_t sizePosition = header.str().size();
   const std::string sizeKey = "CompressedDataSize = ";
   if (compress)
   {
@@ -210,18 +102,21 @@ void Write(const std::string& path, const ImageGrid& grid, const void* values,
          << grid.spacing[1] << ' ' << grid.spacing[2] << "\nDimSize = " << size[0] << ' ' << size[1]
          << ' ' << size[2] << "\nElementType = " << elementType << "\nElementDataFile = LOCAL\n";
 
-  Output output(path);
-  output.Write(header.str());
+  PackedFile output(path, header.str(), compress ? Packing::Zlib : Packing::None);
   const auto* bytes = static_cast<const unsigned char*>(values);
   const std::uint64_t total = size[0] * size[1] * size[2] * valueBytes;
+  for (std::uint64_t position = 0; position < total;)
+  {
+    const auto block =
+      static_cast<std::size_t>(std::min<std::uint64_t>(BlockBytes, total - position));
+    output.Add(bytes + position, block);
+    position += block;
+    Report(progress, static_cast<double>(position) / static_cast<double>(total));
+  }
+  const std::uint64_t written = output.Finish();
   if (compress)
   {
-    const std::uint64_t written = WriteCompressed(output, bytes, total, progress);
-    output.WriteAt(sizePosition + static_cast<long>(sizeKey.size()), std::to_string(written));
-  }
-  else
-  {
-    WriteRaw(output, bytes, total, progress);
+    output.Overwrite(sizePosition + sizeKey.size(), std::to_string(written));
   }
   output.Commit();
 }

@@ -14,11 +14,6 @@ namespace
 // Single precision, in which voxels are read, holds all whole numbers up to here.
 constexpr std::int64_t LargestLabel = std::int64_t(1) << 24;
 
-bool EndsWith(const std::string& text, const std::string& end)
-{
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
 // In one line, whatever it is.
 std::string Quoted(const std::string& text)
 {

@@ -4,6 +4,7 @@
 #include "BoundedJson.h"
 #include "ByteStream.h"
 #include "TextFile.h"
+#include "TextWords.h"
 
 #include <cmath>
 #include <cstdint>
@@ -19,18 +20,13 @@ namespace
 {
 using Json = nlohmann::ordered_json;
 
-[[noreturn]] void Fail(const std::string& path, const std::string& what)
-{
-  throw std::runtime_error("'" + path + "': " + what + ".");
-}
-
 std::string ReadText(const std::string& path)
 {
   RequireFile(path);
   std::string text = ReadTextFile(path, "a description of a series");
   if (text.empty())
   {
-    Fail(path, "is empty");
+    FormatError(path, "is empty");
   }
   return text;
 }
@@ -86,7 +82,7 @@ double FiniteNumber(const Json& value, const std::string& path, const std::strin
 {
   if (!value.is_number() || !std::isfinite(value.get<double>()))
   {
-    Fail(path, name + " is not a finite number");
+    FormatError(path, name + " is not a finite number");
   }
   return value.get<double>();
 }
@@ -99,13 +95,13 @@ std::string Text(const Json& object, const char* key, const std::string& path,
   {
     if (required)
     {
-      Fail(path, owner + " has no '" + key + "'");
+      FormatError(path, owner + " has no '" + key + "'");
     }
     return {};
   }
   if (!found->is_string() || (required && found->get_ref<const std::string&>().empty()))
   {
-    Fail(path, owner + "." + key + " is not a text");
+    FormatError(path, owner + "." + key + " is not a text");
   }
   return found->get<std::string>();
 }
@@ -114,11 +110,11 @@ void Check(const SeriesDescription& description, const std::string& path)
 {
   if (!std::isfinite(description.cycleMs) || description.cycleMs < 0.0)
   {
-    Fail(path, "cycle_ms is not a positive number");
+    FormatError(path, "cycle_ms is not a positive number");
   }
   if (description.phases.empty())
   {
-    Fail(path, "has no phases");
+    FormatError(path, "has no phases");
   }
   for (std::size_t p = 0; p < description.phases.size(); ++p)
   {
@@ -126,22 +122,22 @@ void Check(const SeriesDescription& description, const std::string& path)
     const SeriesDescription::Phase& phase = description.phases[p];
     if (!std::isfinite(phase.fraction))
     {
-      Fail(path, name + ".fraction is not a finite number");
+      FormatError(path, name + ".fraction is not a finite number");
     }
     if (phase.image.empty())
     {
-      Fail(path, name + " has no 'image'");
+      FormatError(path, name + " has no 'image'");
     }
     if (p > 0 && !(phase.fraction > description.phases[p - 1].fraction))
     {
-      Fail(path, name + ".fraction is not greater than the fraction before it");
+      FormatError(path, name + ".fraction is not greater than the fraction before it");
     }
   }
   for (std::size_t s = 0; s < description.seeds.size(); ++s)
   {
     if (!description.seeds[s].position.allFinite())
     {
-      Fail(path,
+      FormatError(path,
         "seeds[" + std::to_string(s) + "] ('" + description.seeds[s].name +
           "'): position is not finite");
     }
@@ -153,12 +149,12 @@ SeriesDescription::Phase ParsePhase(
 {
   if (!entry.is_object())
   {
-    Fail(path, name + " is not an object");
+    FormatError(path, name + " is not an object");
   }
   SeriesDescription::Phase phase;
   if (!entry.contains("fraction"))
   {
-    Fail(path, name + " has no 'fraction'");
+    FormatError(path, name + " has no 'fraction'");
   }
   phase.fraction = FiniteNumber(entry["fraction"], path, name + ".fraction");
   phase.image = Text(entry, "image", path, name, true);
@@ -177,7 +173,7 @@ SeriesDescription::Seed ParseSeed(
 {
   if (!entry.is_object())
   {
-    Fail(path, name + " is not an object");
+    FormatError(path, name + " is not an object");
   }
   SeriesDescription::Seed seed;
   seed.name = Text(entry, "name", path, name, false);
@@ -185,7 +181,7 @@ SeriesDescription::Seed ParseSeed(
   const auto position = entry.find("position");
   if (position == entry.end() || !position->is_array() || position->size() != 3)
   {
-    Fail(path, title + " is not a list of three numbers");
+    FormatError(path, title + " is not a list of three numbers");
   }
   for (int axis = 0; axis < 3; ++axis)
   {
@@ -200,22 +196,10 @@ SeriesDescription::Seed ParseSeed(
 SeriesDescription ReadSeriesDescription(const std::string& path)
 {
   const std::string text = ReplaceNonFinite(ReadText(path));
-  Json root;
-  try
-  {
-    root = ParseBoundedJson<Json>(text);
-  }
-  catch (const Json::exception& error)
-  {
-    Fail(path, "is not valid JSON: " + JsonReason(error));
-  }
-  catch (const TooDeepJson& error)
-  {
-    Fail(path, error.what());
-  }
+  const Json root = ParseBoundedJson<Json>(text, "'" + path + "'");
   if (!root.is_object())
   {
-    Fail(path, "is not a JSON object");
+    FormatError(path, "is not a JSON object");
   }
   SeriesDescription description;
   if (root.contains("cycle_ms"))
@@ -223,12 +207,12 @@ SeriesDescription ReadSeriesDescription(const std::string& path)
     description.cycleMs = FiniteNumber(root["cycle_ms"], path, "cycle_ms");
     if (!(description.cycleMs > 0.0))
     {
-      Fail(path, "cycle_ms is not a positive number");
+      FormatError(path, "cycle_ms is not a positive number");
     }
   }
   if (!root.contains("phases") || !root["phases"].is_array())
   {
-    Fail(path, "has no list 'phases'");
+    FormatError(path, "has no list 'phases'");
   }
   for (const Json& entry : root["phases"])
   {
@@ -240,7 +224,7 @@ SeriesDescription ReadSeriesDescription(const std::string& path)
   {
     if (!seeds->is_array())
     {
-      Fail(path, "seeds is not a list");
+      FormatError(path, "seeds is not a list");
     }
     for (const Json& entry : *seeds)
     {
@@ -291,7 +275,7 @@ void WriteSeriesDescription(const std::string& path, const SeriesDescription& de
   }
   catch (const Json::exception& error)
   {
-    Fail(path, JsonReason(error));
+    FormatError(path, JsonReason(error));
   }
   WriteFileAtomically(path, text + "\n");
 }

@@ -3,236 +3,50 @@
 #include "ByteStream.h"
 #include "TextFile.h"
 #include "TextScanner.h"
-#include "VolumeHeaderParsers.h"
+#include "TextWords.h"
 #include "XmlText.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <map>
-#include <stdexcept>
+#include <string_view>
 
 namespace coronary
 {
 namespace
 {
 constexpr std::uint64_t LargestFile = 256u << 20;
-constexpr std::size_t DeepestElement = 32;
-
-/// The elements of an XML text one after the other. Text between tags means nothing in these files.
-class XmlScanner
+Vector3 Vector(const XmlElement& xml)
 {
-public:
-  XmlScanner(const std::string& text, const std::string& name)
-    : Text(text)
-    , Name(name)
+  return { xml.Number("x"), xml.Number("y"), xml.Number("z") };
+}
+
+/// What an element says of the path point whose element is at `point`.
+void ReadFrame(const XmlElement& xml, std::string_view point, PathFrame& frame)
+{
+  const std::string_view path = xml.path;
+  if (path.substr(0, point.size()) != point)
   {
+    return;
   }
-
-  /// The next begin of an element; false at the end of the text.
-  bool Next()
+  const std::string_view part = path.substr(point.size());
+  if (part.empty())
   {
-    if (this->Empty)
-    {
-      this->Open.pop_back();
-      this->Empty = false;
-    }
-    for (;;)
-    {
-      this->Position = this->Text.find('<', this->Position);
-      if (this->Position == std::string::npos)
-      {
-        if (!this->Open.empty())
-        {
-          this->Position = this->Text.size();
-          this->Fail("ends inside the element '" + this->Open.back() + "'");
-        }
-        return false;
-      }
-      if (this->Skip("<!--", "-->") || this->Skip("<?", "?>") || this->Skip("<!", ">"))
-      {
-        continue;
-      }
-      ++this->Position;
-      if (this->At() == '/')
-      {
-        ++this->Position;
-        this->End();
-        continue;
-      }
-      this->Begin();
-      return true;
-    }
+    frame.id = xml.Integer("id");
   }
-
-  /// Names of the elements that are open, with a slash between them: "path/timestep".
-  bool Is(const char* path) const
+  else if (part == "/pos")
   {
-    std::string open;
-    for (const std::string& name : this->Open)
-    {
-      open += (open.empty() ? "" : "/") + name;
-    }
-    return open == path;
+    frame.position = Vector(xml);
   }
-
-  double Number(const char* attribute) const
+  else if (part == "/tangent")
   {
-    const auto found = this->Attributes.find(attribute);
-    double value = 0.0;
-    if (found == this->Attributes.end())
-    {
-      this->Fail("'" + this->Open.back() + "' has no " + attribute);
-    }
-    if (!ParseNumber(found->second, value) || !std::isfinite(value))
-    {
-      this->Fail("'" + this->Open.back() + "': " + attribute + " is '" +
-        found->second.substr(0, 32) + "', which is not a finite number");
-    }
-    return value;
+    frame.tangent = Vector(xml);
   }
-
-  Vector3 Vector() const { return { this->Number("x"), this->Number("y"), this->Number("z") }; }
-
-  /// A whole number, 0 when it is missing.
-  int Integer(const char* attribute) const
+  else if (part == "/rotation")
   {
-    if (this->Attributes.count(attribute) == 0)
-    {
-      return 0;
-    }
-    const double value = this->Number(attribute);
-    if (value != std::rint(value) || std::abs(value) > 1e9)
-    {
-      this->Fail("'" + this->Open.back() + "': " + attribute + " is no whole number");
-    }
-    return static_cast<int>(value);
+    frame.rotation = Vector(xml);
   }
-
-  std::string String(const char* attribute) const
-  {
-    const auto found = this->Attributes.find(attribute);
-    return found == this->Attributes.end() ? std::string() : found->second;
-  }
-
-  [[noreturn]] void Fail(const std::string& what) const
-  {
-    const auto end =
-      this->Text.begin() + static_cast<std::ptrdiff_t>(std::min(this->Position, this->Text.size()));
-    FormatError(this->Name,
-      "line " + std::to_string(std::count(this->Text.begin(), end, '\n') + 1) + ": " + what);
-  }
-
-private:
-  char At() const { return this->Position < this->Text.size() ? this->Text[this->Position] : '\0'; }
-
-  bool Skip(const char* begin, const char* end)
-  {
-    if (this->Text.compare(this->Position, std::string(begin).size(), begin) != 0)
-    {
-      return false;
-    }
-    const std::size_t found = this->Text.find(end, this->Position);
-    if (found == std::string::npos)
-    {
-      this->Fail("is truncated inside '" + std::string(begin) + "'");
-    }
-    this->Position = found + std::string(end).size();
-    return true;
-  }
-
-  void SkipBlanks()
-  {
-    while (this->At() == ' ' || this->At() == '\t' || this->At() == '\n' || this->At() == '\r')
-    {
-      ++this->Position;
-    }
-  }
-
-  std::string Word()
-  {
-    const std::size_t end = this->Text.find_first_of(" \t\r\n=/><\"'", this->Position);
-    const std::size_t last = std::min(end, this->Text.size());
-    std::string word = this->Text.substr(this->Position, last - this->Position);
-    if (word.empty() || word.size() > 256)
-    {
-      this->Fail("is no XML: a name is expected");
-    }
-    this->Position = last;
-    return word;
-  }
-
-  void Begin()
-  {
-    if (this->Open.size() >= DeepestElement)
-    {
-      this->Fail("has more than " + std::to_string(DeepestElement) + " elements in each other");
-    }
-    this->Open.push_back(this->Word());
-    this->Attributes.clear();
-    for (;;)
-    {
-      this->SkipBlanks();
-      if (this->At() == '>')
-      {
-        ++this->Position;
-        return;
-      }
-      if (this->At() == '/' && this->Position + 1 < this->Text.size() &&
-        this->Text[this->Position + 1] == '>')
-      {
-        this->Position += 2;
-        this->Empty = true;
-        return;
-      }
-      const std::string name = this->Word();
-      this->SkipBlanks();
-      if (this->At() != '=')
-      {
-        this->Fail("is no XML: '" + name + "' has no value");
-      }
-      ++this->Position;
-      this->SkipBlanks();
-      const char quote = this->At();
-      const std::size_t end = quote == '"' || quote == '\''
-        ? this->Text.find(quote, this->Position + 1)
-        : std::string::npos;
-      if (end == std::string::npos)
-      {
-        this->Fail("is no XML: the value of '" + name + "' is not quoted, or truncated");
-      }
-      try
-      {
-        this->Attributes[name] =
-          UnescapedXml(this->Text.substr(this->Position + 1, end - this->Position - 1));
-      }
-      catch (const std::runtime_error& error)
-      {
-        this->Fail("is no XML: " + std::string(error.what()));
-      }
-      this->Position = end + 1;
-    }
-  }
-
-  void End()
-  {
-    const std::string name = this->Word();
-    this->SkipBlanks();
-    if (this->At() != '>' || this->Open.empty() || this->Open.back() != name)
-    {
-      this->Fail("is no XML: '" + name + "' ends, which is not open");
-    }
-    ++this->Position;
-    this->Open.pop_back();
-  }
-
-  const std::string& Text;
-  const std::string& Name;
-  std::size_t Position = 0;
-  std::vector<std::string> Open;
-  std::map<std::string, std::string> Attributes;
-  bool Empty = false;
-};
+}
 
 std::string Element(const std::string& name, const Vector3& vector)
 {
@@ -302,44 +116,36 @@ Vector3 SimVascularContour::Center() const
 
 SimVascularPath ParseSimVascularPath(const std::string& text, const std::string& name)
 {
-  XmlScanner xml(text, name);
   SimVascularPath path;
   bool there = false;
   int steps = 0;
-  while (xml.Next())
-  {
-    if (xml.Is("path"))
+  constexpr const char* Point = "path/timestep/path_element/path_points/path_point";
+  ReadXml(text, name,
+    [&](const XmlElement& xml)
     {
-      there = true;
-      path.id = xml.Integer("id");
-    }
-    steps += xml.Is("path/timestep") ? 1 : 0;
-    if (steps > 1)
-    {
-      continue;
-    }
-    if (xml.Is("path/timestep/path_element/control_points/point"))
-    {
-      path.controlPoints.push_back(xml.Vector());
-    }
-    else if (xml.Is("path/timestep/path_element/path_points/path_point"))
-    {
-      path.points.emplace_back();
-      path.points.back().id = xml.Integer("id");
-    }
-    else if (xml.Is("path/timestep/path_element/path_points/path_point/pos"))
-    {
-      path.points.back().position = xml.Vector();
-    }
-    else if (xml.Is("path/timestep/path_element/path_points/path_point/tangent"))
-    {
-      path.points.back().tangent = xml.Vector();
-    }
-    else if (xml.Is("path/timestep/path_element/path_points/path_point/rotation"))
-    {
-      path.points.back().rotation = xml.Vector();
-    }
-  }
+      if (xml.Is("path"))
+      {
+        there = true;
+        path.id = xml.Integer("id");
+      }
+      steps += xml.Is("path/timestep") ? 1 : 0;
+      if (steps > 1)
+      {
+        return;
+      }
+      if (xml.Is("path/timestep/path_element/control_points/point"))
+      {
+        path.controlPoints.push_back(Vector(xml));
+      }
+      if (xml.Is(Point))
+      {
+        path.points.emplace_back();
+      }
+      if (!path.points.empty())
+      {
+        ReadFrame(xml, Point, path.points.back());
+      }
+    });
   if (!there)
   {
     FormatError(name, "is no path of SimVascular: it has no element 'path'");
@@ -354,54 +160,44 @@ SimVascularPath ParseSimVascularPath(const std::string& text, const std::string&
 
 SimVascularContourGroup ParseSimVascularContours(const std::string& text, const std::string& name)
 {
-  XmlScanner xml(text, name);
   SimVascularContourGroup group;
   bool there = false;
   int steps = 0;
-  while (xml.Next())
-  {
-    if (xml.Is("contourgroup"))
+  ReadXml(text, name,
+    [&](const XmlElement& xml)
     {
-      there = true;
-      group.pathName = xml.String("path_name");
-      group.pathId = xml.Integer("path_id");
-    }
-    steps += xml.Is("contourgroup/timestep") ? 1 : 0;
-    if (steps > 1)
-    {
-      continue;
-    }
-    if (xml.Is("contourgroup/timestep/contour"))
-    {
-      group.contours.emplace_back();
-      group.contours.back().id = xml.Integer("id");
-      group.contours.back().type = xml.String("type");
-    }
-    else if (xml.Is("contourgroup/timestep/contour/path_point"))
-    {
-      group.contours.back().frame.id = xml.Integer("id");
-    }
-    else if (xml.Is("contourgroup/timestep/contour/path_point/pos"))
-    {
-      group.contours.back().frame.position = xml.Vector();
-    }
-    else if (xml.Is("contourgroup/timestep/contour/path_point/tangent"))
-    {
-      group.contours.back().frame.tangent = xml.Vector();
-    }
-    else if (xml.Is("contourgroup/timestep/contour/path_point/rotation"))
-    {
-      group.contours.back().frame.rotation = xml.Vector();
-    }
-    else if (xml.Is("contourgroup/timestep/contour/control_points/point"))
-    {
-      group.contours.back().controlPoints.push_back(xml.Vector());
-    }
-    else if (xml.Is("contourgroup/timestep/contour/contour_points/point"))
-    {
-      group.contours.back().contourPoints.push_back(xml.Vector());
-    }
-  }
+      if (xml.Is("contourgroup"))
+      {
+        there = true;
+        group.pathName = xml.String("path_name");
+        group.pathId = xml.Integer("path_id");
+      }
+      steps += xml.Is("contourgroup/timestep") ? 1 : 0;
+      if (steps > 1)
+      {
+        return;
+      }
+      if (xml.Is("contourgroup/timestep/contour"))
+      {
+        group.contours.emplace_back();
+        group.contours.back().id = xml.Integer("id");
+        group.contours.back().type = xml.String("type");
+      }
+      if (group.contours.empty())
+      {
+        return;
+      }
+      SimVascularContour& contour = group.contours.back();
+      ReadFrame(xml, "contourgroup/timestep/contour/path_point", contour.frame);
+      if (xml.Is("contourgroup/timestep/contour/control_points/point"))
+      {
+        contour.controlPoints.push_back(Vector(xml));
+      }
+      else if (xml.Is("contourgroup/timestep/contour/contour_points/point"))
+      {
+        contour.contourPoints.push_back(Vector(xml));
+      }
+    });
   if (!there)
   {
     FormatError(name, "are no contours of SimVascular: there is no element 'contourgroup'");

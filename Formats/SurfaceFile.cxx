@@ -1,9 +1,9 @@
 #include "SurfaceFile.h"
 
 #include "LittleEndian.h"
+#include "TextScanner.h"
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 #include <stdexcept>
 
@@ -11,15 +11,6 @@ namespace coronary
 {
 namespace
 {
-/// The shortest text that is read back to the same bits.
-template <typename Number>
-void AppendNumber(std::string& text, Number value)
-{
-  char digits[32];
-  const auto end = std::to_chars(digits, digits + sizeof(digits), value).ptr;
-  text.append(digits, end);
-}
-
 /// One line.
 std::string Line(std::string text)
 {

@@ -1,5 +1,7 @@
 #include "TextFile.h"
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <stdexcept>
 
@@ -10,7 +12,7 @@ std::string ReadTextFile(const std::string& path, const std::string& what, std::
   std::ifstream file(path, std::ios::binary);
   if (!file)
   {
-    throw std::runtime_error("Cannot open '" + path + "'.");
+    throw std::runtime_error("Cannot open '" + path + "': " + std::strerror(errno) + ".");
   }
   std::string text;
   char block[65536];

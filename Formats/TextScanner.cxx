@@ -1,11 +1,11 @@
 #include "TextScanner.h"
 
-#include <cerrno>
+#include "TextFile.h"
+#include "TextWords.h"
+
 #include <charconv>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
-#include <memory>
+#include <limits>
 #include <stdexcept>
 
 namespace coronary
@@ -15,17 +15,6 @@ namespace
 bool IsBlank(char c)
 {
   return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v' || c == '\0';
-}
-
-/// For messages: what is in a damaged file may be anything.
-std::string Quoted(std::string_view word)
-{
-  std::string shown;
-  for (const char c : word.substr(0, 40))
-  {
-    shown += c >= ' ' && c <= '~' ? c : '?';
-  }
-  return "'" + shown + (word.size() > 40 ? "..'" : "'");
 }
 
 template <typename Value>
@@ -42,25 +31,8 @@ bool Parse(std::string_view word, Value& value)
 
 TextScanner::TextScanner(const std::string& path)
   : Name(path)
+  , Contents(ReadTextFile(path, "a mesh or table", std::numeric_limits<std::uint64_t>::max() - 1))
 {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
-    std::fopen(path.c_str(), "rb"), &std::fclose);
-  bool good = file != nullptr;
-  char buffer[1 << 16];
-  while (good)
-  {
-    const std::size_t count = std::fread(buffer, 1, sizeof(buffer), file.get());
-    this->Contents.append(buffer, count);
-    if (count < sizeof(buffer))
-    {
-      good = std::ferror(file.get()) == 0;
-      break;
-    }
-  }
-  if (!good)
-  {
-    throw std::runtime_error("Cannot read '" + path + "': " + std::strerror(errno) + ".");
-  }
 }
 
 void TextScanner::SkipBlanks(bool overLines)

@@ -20,11 +20,6 @@ namespace
 // Deflate can not do better than this (zlib's technical details).
 constexpr std::uint64_t LargestDeflateRatio = 1032;
 
-bool EndsWith(const std::string& text, const std::string& end)
-{
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
 std::uint64_t NumberOfVoxels(const ImageGrid& grid)
 {
   std::uint64_t count = 1;
@@ -233,11 +228,6 @@ std::unique_ptr<VolumeSource> OpenVolumeFile(const std::string& path)
   return std::make_unique<VolumeFile>(ReadVolumeHeader(path));
 }
 
-void FormatError(const std::string& path, const std::string& what)
-{
-  throw std::runtime_error("'" + path + "': " + what + ".");
-}
-
 std::string ReadHeaderText(const std::string& path)
 {
   std::string text(1u << 20, '\0');
@@ -249,104 +239,6 @@ std::string ReadHeaderText(const std::string& path)
   }
   text.resize(static_cast<std::size_t>(file.gcount()));
   return text;
-}
-
-std::string NextLine(const std::string& text, std::size_t& position)
-{
-  const std::size_t end = std::min(text.find('\n', position), text.size());
-  std::string line = text.substr(position, end - position);
-  position = std::min(end + 1, text.size());
-  if (!line.empty() && line.back() == '\r')
-  {
-    line.pop_back();
-  }
-  return line;
-}
-
-std::string Trimmed(const std::string& text)
-{
-  const char* const blanks = " \t\r\n\f\v";
-  const std::size_t first = text.find_first_not_of(blanks);
-  if (first == std::string::npos)
-  {
-    return {};
-  }
-  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
-}
-
-std::string LowerCase(std::string text)
-{
-  for (char& c : text)
-  {
-    c = (c >= 'A' && c <= 'Z') ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return text;
-}
-
-std::vector<std::string> Words(const std::string& text)
-{
-  std::vector<std::string> words;
-  std::size_t position = 0;
-  for (;;)
-  {
-    const std::size_t first = text.find_first_not_of(" \t\r\n", position);
-    if (first == std::string::npos)
-    {
-      return words;
-    }
-    position = std::min(text.find_first_of(" \t\r\n", first), text.size());
-    words.push_back(text.substr(first, position - first));
-  }
-}
-
-bool ParseNumber(const std::string& text, double& value)
-{
-  const char* first = text.data();
-  const char* last = first + text.size();
-  // from_chars knows no leading plus.
-  if (first != last && *first == '+')
-  {
-    ++first;
-  }
-  const std::from_chars_result result = std::from_chars(first, last, value);
-  return result.ec == std::errc() && result.ptr == last;
-}
-
-std::vector<double> ParseNumbers(
-  const std::string& text, std::size_t count, const std::string& path, const std::string& key)
-{
-  std::vector<double> values;
-  for (const std::string& word : Words(text))
-  {
-    double value = 0.0;
-    if (!ParseNumber(word, value) || !std::isfinite(value))
-    {
-      FormatError(path, key + " holds '" + word.substr(0, 32) + "', which is not a finite number");
-    }
-    values.push_back(value);
-  }
-  if (values.size() != count)
-  {
-    FormatError(path,
-      key + " has " + std::to_string(values.size()) + " values instead of " +
-        std::to_string(count));
-  }
-  return values;
-}
-
-std::vector<int> ParseIntegers(const std::string& text, std::size_t count, int low,
-  const std::string& path, const std::string& key)
-{
-  std::vector<int> result;
-  for (const double value : ParseNumbers(text, count, path, key))
-  {
-    if (!IsIntegral(value) || value < low || value > std::numeric_limits<int>::max())
-    {
-      FormatError(path, key + " is out of range");
-    }
-    result.push_back(static_cast<int>(value));
-  }
-  return result;
 }
 
 bool ArePerpendicular(const Matrix3& axes)

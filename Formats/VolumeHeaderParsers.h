@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_VolumeHeaderParsers_h
 #define DynamicCoronary_VolumeHeaderParsers_h
 
+#include "TextWords.h"
 #include "VolumeFile.h"
 
 #include <cstdint>
@@ -24,31 +25,11 @@ std::map<std::string, std::string> ParseNrrdNotes(const std::string& text, const
 /// The first bytes of a text header that may be followed by voxels; at most 1 MiB.
 std::string ReadHeaderText(const std::string& path);
 
-/// The next line of `text` from `position` on, without its end; moves `position` behind it.
-std::string NextLine(const std::string& text, std::size_t& position);
-
-std::string Trimmed(const std::string& text);
-std::string LowerCase(std::string text);
-std::vector<std::string> Words(const std::string& text);
-
-/// The whole of `text` as one number, whatever the locale; false when it is none.
-bool ParseNumber(const std::string& text, double& value);
-
-/// `text` as exactly `count` finite numbers. @throws naming path and key
-std::vector<double> ParseNumbers(
-  const std::string& text, std::size_t count, const std::string& path, const std::string& key);
-
-/// The same for whole numbers from `low` to 2^31 - 1.
-std::vector<int> ParseIntegers(const std::string& text, std::size_t count, int low,
-  const std::string& path, const std::string& key);
-
 /// Sets the extent, spacing and direction from the image axes in world millimetres, and checks them.
 void SetAxes(VolumeHeader& header, const std::vector<int>& size, const Matrix3& axes);
 
 /// The image axes that SetAxes() takes are perpendicular to within 1e-3 (of unit length).
 bool ArePerpendicular(const Matrix3& axes);
-
-[[noreturn]] void FormatError(const std::string& path, const std::string& what);
 }
 
 #endif

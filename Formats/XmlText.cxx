@@ -1,116 +1,256 @@
 #include "XmlText.h"
 
+#include "TextWords.h"
+
+#include <expat.h>
+
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <stdexcept>
-#include <utility>
+#include <cmath>
+#include <exception>
+#include <memory>
+#include <new>
+#include <vector>
 
 namespace coronary
 {
 namespace
 {
-/// The number of "#65" or "#x41", or 0: a control character, a surrogate, or no number.
-std::uint32_t CharacterOf(const std::string& reference)
+constexpr std::size_t Deepest = 32; // VTK's own files have 7, SimVascular's 6
+// Expat looks again at a tag that is longer than what it was given, and copies what it is given.
+constexpr std::size_t Block = std::size_t(16) << 20;
+
+[[noreturn]] void FailAt(
+  std::string_view text, std::size_t byte, const std::string& file, const std::string& what)
 {
-  const bool hexadecimal = reference.compare(0, 2, "#x") == 0;
-  const std::size_t first = hexadecimal ? 2 : 1;
-  constexpr std::size_t MostDigits = 8;
-  if (reference.size() <= first || reference.size() > first + MostDigits ||
-    reference.find_first_not_of(hexadecimal ? "0123456789abcdefABCDEF" : "0123456789", first) !=
-      std::string::npos)
-  {
-    return 0;
-  }
-  const unsigned long number = std::stoul(reference.substr(first), nullptr, hexadecimal ? 16 : 10);
-  if (number == '\t' || number == '\n' || number == '\r')
-  {
-    return ' ';
-  }
-  const bool character =
-    number >= 0x20 && number <= 0x10FFFF && !(number >= 0xD800 && number <= 0xDFFF);
-  return character ? static_cast<std::uint32_t>(number) : 0;
+  const std::string_view before = text.substr(0, byte);
+  FormatError(file,
+    "line " + std::to_string(std::count(before.begin(), before.end(), '\n') + 1) + ": " + what);
 }
 
-void AppendUtf8(std::string& text, std::uint32_t character)
+/// Expat is C, through which no exception may pass: they wait until it has returned.
+class XmlReader
 {
-  const auto part = [&](std::uint32_t lead, int shift, std::uint32_t mask)
-  { text += static_cast<char>(lead | ((character >> shift) & mask)); };
-  if (character < 0x80)
+public:
+  XmlReader(const std::string& text, const std::string& file,
+    const std::function<void(const XmlElement&)>& use, std::string_view last)
+    : Parser(XML_ParserCreate(nullptr), &XML_ParserFree)
+    , Use(use)
+    , Last(last)
   {
-    part(0, 0, 0x7F);
-    return;
-  }
-  if (character < 0x800)
-  {
-    part(0xC0, 6, 0x1F);
-  }
-  else if (character < 0x10000)
-  {
-    part(0xE0, 12, 0x0F);
-    part(0x80, 6, 0x3F);
-  }
-  else
-  {
-    part(0xF0, 18, 0x07);
-    part(0x80, 12, 0x3F);
-    part(0x80, 6, 0x3F);
-  }
-  part(0x80, 0, 0x3F);
-}
-
-std::uint32_t Referenced(const std::string& reference)
-{
-  constexpr std::pair<const char*, char> Entities[] = { { "lt", '<' }, { "gt", '>' },
-    { "quot", '"' }, { "apos", '\'' }, { "amp", '&' } };
-  for (const auto& [name, character] : Entities)
-  {
-    if (reference == name)
+    if (!this->Parser)
     {
-      return static_cast<unsigned char>(character);
+      throw std::bad_alloc();
+    }
+    this->Element.text = text;
+    this->Element.file = file;
+  }
+
+  void Read()
+  {
+    if (this->ReadRoot() == XML_ERROR_JUNK_AFTER_DOC_ELEMENT)
+    {
+      this->Root = this->Place();
+      XML_ParserReset(this->Parser.get(), nullptr);
+      this->ReadRoot();
+    }
+    const XML_Error error = XML_GetErrorCode(this->Parser.get());
+    if (this->Failure)
+    {
+      std::rethrow_exception(this->Failure);
+    }
+    if (error == XML_ERROR_NONE || this->Stopped)
+    {
+      return;
+    }
+    const bool inside = !this->Element.path.empty();
+    const std::string name = Quoted(this->Element.Name());
+    if (error == XML_ERROR_NO_ELEMENTS && inside)
+    {
+      FailAt(this->Element.text, this->Element.text.size(), this->Element.file,
+        "ends inside the element " + name);
+    }
+    FailAt(this->Element.text, this->Place(), this->Element.file,
+      std::string("is no XML: ") + XML_ErrorString(error) + (inside ? " inside " + name : ""));
+  }
+
+private:
+  XML_Error ReadRoot()
+  {
+    XML_Parser parser = this->Parser.get();
+    XML_SetUserData(parser, this);
+    XML_SetElementHandler(parser, &XmlReader::Begin, &XmlReader::End);
+    XML_SetStartDoctypeDeclHandler(parser, &XmlReader::Doctype);
+    const std::string_view text = this->Element.text;
+    XML_Status status = XML_STATUS_OK;
+    for (std::size_t at = this->Root; status == XML_STATUS_OK;)
+    {
+      const std::size_t size = std::min(Block, text.size() - at);
+      const bool final = at + size == text.size();
+      status = XML_Parse(parser, text.data() + at, static_cast<int>(size), final);
+      at += size;
+      if (final)
+      {
+        break;
+      }
+    }
+    return XML_GetErrorCode(parser);
+  }
+
+  /// The byte of the text that expat is at.
+  std::size_t Place() const
+  {
+    const XML_Index index = XML_GetCurrentByteIndex(this->Parser.get());
+    return this->Root + static_cast<std::size_t>(std::max<XML_Index>(0, index));
+  }
+
+  template <typename Work>
+  void Guard(const Work& work)
+  {
+    try
+    {
+      work();
+    }
+    catch (...)
+    {
+      this->Failure = std::current_exception();
+      XML_StopParser(this->Parser.get(), XML_FALSE);
     }
   }
-  return !reference.empty() && reference[0] == '#' ? CharacterOf(reference) : 0;
-}
+
+  static void Begin(void* reader, const XML_Char* name, const XML_Char** attributes)
+  {
+    auto& self = *static_cast<XmlReader*>(reader);
+    self.Guard([&] { self.BeginElement(name, attributes); });
+  }
+
+  static void End(void* reader, const XML_Char*)
+  {
+    auto& self = *static_cast<XmlReader*>(reader);
+    self.Element.path.resize(self.Lengths.back());
+    self.Lengths.pop_back();
+  }
+
+  static void Doctype(void* reader, const XML_Char*, const XML_Char*, const XML_Char*, int)
+  {
+    auto& self = *static_cast<XmlReader*>(reader);
+    self.Guard(
+      [&]
+      {
+        FailAt(self.Element.text, self.Place(), self.Element.file,
+          "has a document type or entities, which are not read");
+      });
+  }
+
+  void BeginElement(const XML_Char* name, const XML_Char** attributes)
+  {
+    XmlElement& element = this->Element;
+    this->Lengths.push_back(element.path.size());
+    element.path += (element.path.empty() ? "" : "/") + std::string(name);
+    element.attributes.clear();
+    for (; *attributes; attributes += 2)
+    {
+      element.attributes.emplace(attributes[0], attributes[1]);
+    }
+    element.begin = this->Place();
+    element.end =
+      element.begin + static_cast<std::size_t>(XML_GetCurrentByteCount(this->Parser.get()));
+    if (this->Lengths.size() > Deepest)
+    {
+      element.Fail("has more than " + std::to_string(Deepest) + " elements in each other");
+    }
+    this->Use(element);
+    if (element.Name() == this->Last)
+    {
+      this->Stopped = true;
+      XML_StopParser(this->Parser.get(), XML_FALSE);
+    }
+  }
+
+  std::unique_ptr<XML_ParserStruct, decltype(&XML_ParserFree)> Parser;
+  const std::function<void(const XmlElement&)>& Use;
+  std::string_view Last;
+  XmlElement Element;
+  std::vector<std::size_t> Lengths; ///< of the path, before each open element
+  std::size_t Root = 0;             ///< where the text begins that expat reads
+  bool Stopped = false;
+  std::exception_ptr Failure;
+};
 }
 
-std::string EscapedXml(const std::string& text)
+std::string_view XmlElement::Name() const
+{
+  return std::string_view(this->path).substr(this->path.rfind('/') + 1);
+}
+
+std::string_view XmlElement::Parent() const
+{
+  const std::size_t slash = this->path.rfind('/');
+  const std::string_view around(this->path.data(), slash == std::string::npos ? 0 : slash);
+  return around.substr(around.rfind('/') + 1);
+}
+
+std::string XmlElement::String(const char* attribute) const
+{
+  const auto found = this->attributes.find(attribute);
+  return found == this->attributes.end() ? std::string() : found->second;
+}
+
+std::string XmlElement::Required(const char* attribute) const
+{
+  const auto found = this->attributes.find(attribute);
+  if (found == this->attributes.end())
+  {
+    this->Fail(Quoted(this->Name()) + " has no " + attribute);
+  }
+  return found->second;
+}
+
+double XmlElement::Number(const char* attribute) const
+{
+  const std::string word = this->Required(attribute);
+  double value = 0.0;
+  if (!ParseNumber(Trimmed(word), value) || !std::isfinite(value))
+  {
+    this->Fail(Quoted(this->Name()) + ": " + attribute + " is " + Quoted(word) +
+      ", which is not a finite number");
+  }
+  return value;
+}
+
+int XmlElement::Integer(const char* attribute) const
+{
+  const double value = this->attributes.count(attribute) == 0 ? 0.0 : this->Number(attribute);
+  if (value != std::rint(value) || std::abs(value) > 1e9)
+  {
+    this->Fail(Quoted(this->Name()) + ": " + attribute + " is no whole number");
+  }
+  return static_cast<int>(value);
+}
+
+void XmlElement::Fail(const std::string& what) const
+{
+  FailAt(this->text, this->begin, this->file, what);
+}
+
+void ReadXml(const std::string& text, const std::string& file,
+  const std::function<void(const XmlElement&)>& use, const char* last)
+{
+  XmlReader(text, file, use, last).Read();
+}
+
+std::string EscapedXml(std::string_view text)
 {
   std::string result;
   for (const char c : text)
   {
-    result += c == '&' ? "&amp;"
-      : c == '<'       ? "&lt;"
-      : c == '>'       ? "&gt;"
-      : c == '"'       ? "&quot;"
-                       : std::string(1, c);
-  }
-  return result;
-}
-
-std::string UnescapedXml(const std::string& value)
-{
-  std::string result;
-  for (std::size_t at = 0; at < value.size(); ++at)
-  {
-    if (value[at] == '\t' || value[at] == '\n' || value[at] == '\r')
-    {
-      result += ' ';
-      continue;
-    }
-    if (value[at] != '&')
-    {
-      result += value[at];
-      continue;
-    }
-    const std::size_t end = std::min(value.find(';', at), value.size());
-    const std::uint32_t character = Referenced(value.substr(at + 1, end - at - 1));
-    if (end == value.size() || character == 0)
-    {
-      throw std::runtime_error("a value has a reference ('&') that is not one of XML");
-    }
-    AppendUtf8(result, character);
-    at = end;
+    const bool blank = c == '\t' || c == '\n' || c == '\r';
+    result += c == '&'                       ? "&amp;"
+      : c == '<'                             ? "&lt;"
+      : c == '>'                             ? "&gt;"
+      : c == '"'                             ? "&quot;"
+      : blank                                ? "&#" + std::to_string(int(c)) + ";"
+      : static_cast<unsigned char>(c) < 0x20 ? " "
+                                             : std::string(1, c);
   }
   return result;
 }

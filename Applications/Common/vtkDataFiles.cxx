@@ -1,8 +1,7 @@
 #include "vtkDataFiles.h"
 
-#include "AppendedXmlData.h"
 #include "AtomicFile.h"
-#include "XmlDataCheck.h"
+#include "XmlDataFile.h"
 #include "vtkMessageTrap.h"
 
 #include "vtkCell.h"
@@ -22,6 +21,7 @@
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -35,23 +35,16 @@ void ReadXml(
   {
     throw std::runtime_error("Cannot open '" + path + "'.");
   }
-  const std::string text(std::istreambuf_iterator<char>(file), {});
+  std::string text(std::istreambuf_iterator<char>(file), {});
   if (!reader->CanReadFile(path.c_str()))
   {
     throw std::runtime_error("'" + path + "' is not a VTK XML " + what + " file.");
   }
-  try
-  {
-    CheckXmlData(text);
-  }
-  catch (const std::runtime_error& error)
-  {
-    throw std::runtime_error("'" + path + "' " + error.what() + ".");
-  }
+  text = ReadableXmlData(std::move(text), path);
   try
   {
     reader->ReadFromInputStringOn();
-    reader->SetInputString(WithInlineXmlData(text));
+    reader->SetInputString(text);
     reader->Update();
     messages.ThrowIfError();
   }
@@ -112,12 +105,6 @@ void CheckCellTypes(const std::string& path, vtkUnstructuredGrid* grid)
     }
   }
 }
-}
-
-bool EndsWith(const std::string& path, const std::string& end)
-{
-  return path.size() >= end.size() &&
-    path.compare(path.size() - end.size(), std::string::npos, end) == 0;
 }
 
 vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages)

@@ -5,6 +5,8 @@
 #ifndef vtkDataFiles_h
 #define vtkDataFiles_h
 
+#include "TextWords.h"
+
 #include "vtkSmartPointer.h"
 
 #include <string>
@@ -15,9 +17,6 @@ class vtkUnstructuredGrid;
 
 namespace coronary
 {
-/// Whether a path ends so; capitals count.
-bool EndsWith(const std::string& path, const std::string& end);
-
 /// Reads a .vtp file.
 /// @throws std::runtime_error naming the file
 vtkSmartPointer<vtkPolyData> ReadPolyData(const std::string& path, vtkMessageTrap& messages);

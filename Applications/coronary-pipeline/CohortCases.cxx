@@ -266,20 +266,7 @@ CohortCase CaseOf(
 
 Cohort ReadCohort(const std::string& path)
 {
-  const std::string text = ReadTextFile(path, "cases");
-  Json json;
-  try
-  {
-    json = ParseBoundedJson<Json>(text);
-  }
-  catch (const TooDeepJson& error)
-  {
-    throw std::runtime_error("'" + path + "' " + error.what());
-  }
-  catch (const Json::exception& error)
-  {
-    throw std::runtime_error("'" + path + "' is not JSON: " + JsonReason(error));
-  }
+  const Json json = ParseBoundedJson<Json>(ReadTextFile(path, "cases"), "'" + path + "'");
   const std::string where = "'" + path + "': cohort";
   RequireKnown(json, { "cases", "run", "evaluate" }, where);
   const Json run = json.value("run", Json::object());

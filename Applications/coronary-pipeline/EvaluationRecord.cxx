@@ -64,7 +64,7 @@ EvaluationRecord EvaluationRecord::Of(const std::string& text)
 {
   try
   {
-    const Json json = ParseBoundedJson<Json>(text);
+    const Json json = ParseBoundedJson<Json>(text, "the text");
     EvaluationRecord record;
     std::size_t at = 0;
     for (const EvaluationColumn& column : EvaluationColumns())

@@ -72,20 +72,8 @@ std::vector<double> NumbersOf(const nlohmann::json& parent, const char* name)
 /// What the report of `run` says of the motion.
 void ReadReport(const std::string& path, MovingModel& model)
 {
-  const std::string text = ReadTextFile(path, "the report of a run");
-  nlohmann::json report;
-  try
-  {
-    report = ParseBoundedJson(text);
-  }
-  catch (const nlohmann::json::exception&)
-  {
-    throw std::runtime_error("'" + path + "' is not the report of a run: it is no JSON.");
-  }
-  catch (const TooDeepJson& error)
-  {
-    throw std::runtime_error("'" + path + "' is not the report of a run: it " + error.what() + ".");
-  }
+  const nlohmann::json report =
+    ParseBoundedJson(ReadTextFile(path, "the report of a run"), "'" + path + "'");
   const auto motion = report.is_object() ? report.find("motion") : report.end();
   if (!report.is_object() || motion == report.end() || !motion->is_object())
   {

@@ -193,7 +193,7 @@ RunReport::RunReport(std::string folder, Json settings, Json input)
   }
   try
   {
-    this->Older = ParseBoundedJson<Json>(ReadTextFile(path.string(), "a report"));
+    this->Older = ParseBoundedJson<Json>(ReadTextFile(path.string(), "a report"), path.string());
   }
   catch (const std::exception&)
   {

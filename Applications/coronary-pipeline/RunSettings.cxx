@@ -378,20 +378,7 @@ void RunOptions::Assign(Setting& setting, const Json& value, const std::string& 
 
 void RunOptions::Read(const std::string& path)
 {
-  const std::string text = ReadTextFile(path, "settings");
-  Json json;
-  try
-  {
-    json = ParseBoundedJson<Json>(text);
-  }
-  catch (const Json::exception& error)
-  {
-    throw std::runtime_error("'" + path + "' is not JSON: " + JsonReason(error));
-  }
-  catch (const TooDeepJson& error)
-  {
-    throw std::runtime_error("'" + path + "' " + error.what() + ".");
-  }
+  const Json json = ParseBoundedJson<Json>(ReadTextFile(path, "settings"), "'" + path + "'");
   if (!json.is_object())
   {
     throw std::runtime_error("'" + path + "' is not a JSON object of settings.");

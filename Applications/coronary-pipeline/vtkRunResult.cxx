@@ -196,18 +196,8 @@ RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages)
     throw std::runtime_error(
       "'" + folder + "' has no centerline.vtp: let run go on with --resume --until centerline.");
   }
-  try
-  {
-    result.report = ParseBoundedJson<Json>(ReadTextFile(report.string(), "the report of a run"));
-  }
-  catch (const Json::exception& error)
-  {
-    throw std::runtime_error("'" + report.string() + "' is not JSON: " + JsonReason(error));
-  }
-  catch (const TooDeepJson& error)
-  {
-    throw std::runtime_error("'" + report.string() + "' " + error.what() + ".");
-  }
+  result.report = ParseBoundedJson<Json>(
+    ReadTextFile(report.string(), "the report of a run"), "'" + report.string() + "'");
   if (!result.report.is_object())
   {
     throw std::runtime_error("'" + report.string() + "' is not the report of a run.");

@@ -168,7 +168,7 @@ std::vector<double> DriveScript::HeartRates(double from, double to) const
 
 DriveScript DriveScriptFromText(const std::string& text, const std::string& origin)
 {
-  const nlohmann::json json = ParseJson(text, origin);
+  const nlohmann::json json = ParseBoundedJson(text, origin);
   JsonFields fields(json, origin);
   fields.RequireFormat("dynamiccoronary script", "script of driving");
   fields.Text("description", "");

@@ -248,7 +248,7 @@ const CatalogueCatheter& InstrumentCatalogue::Catheter(const std::string& name) 
 
 InstrumentCatalogue CatalogueFromText(const std::string& text, const std::string& origin)
 {
-  const Json json = ParseJson(text, origin);
+  const Json json = ParseBoundedJson(text, origin);
   JsonFields fields(json, origin);
   fields.RequireFormat("dynamiccoronary instruments", "catalogue of instruments");
   InstrumentCatalogue catalogue;

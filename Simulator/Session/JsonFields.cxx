@@ -1,7 +1,5 @@
 #include "JsonFields.h"
 
-#include "BoundedJson.h"
-
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
@@ -27,22 +25,6 @@ std::string RangeText(double low, double high)
   std::snprintf(text, sizeof(text), "a number from %g to %g", low, high);
   return text;
 }
-}
-
-nlohmann::json ParseJson(const std::string& text, const std::string& where)
-{
-  try
-  {
-    return ParseBoundedJson(text);
-  }
-  catch (const nlohmann::json::exception& error)
-  {
-    throw std::runtime_error(where + " is no JSON: " + JsonReason(error));
-  }
-  catch (const TooDeepJson& error)
-  {
-    throw std::runtime_error(where + " " + error.what() + ".");
-  }
 }
 
 JsonFields::JsonFields(const nlohmann::json& object, std::string where)

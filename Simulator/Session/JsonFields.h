@@ -1,11 +1,11 @@
 /**
  * @file JsonFields.h
- * @brief Reading JSON of others: every message says where, and no text is too deep or too large.
+ * @brief Reading JSON of others: every message says where.
  */
 #ifndef DynamicCoronary_JsonFields_h
 #define DynamicCoronary_JsonFields_h
 
-#include <nlohmann/json.hpp>
+#include "BoundedJson.h"
 
 #include <cstdint>
 #include <set>
@@ -13,10 +13,6 @@
 
 namespace coronary
 {
-/// @param where  for messages: the file's name in quotes
-/// @throws std::runtime_error: no JSON, or nested more than 64 times
-nlohmann::json ParseJson(const std::string& text, const std::string& where);
-
 /**
  * The members of one JSON object. Each is read once by its name and unit; Done() refuses what nobody read, so that
  * a name with a slip in it does not pass for an absent one.

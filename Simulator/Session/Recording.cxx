@@ -173,7 +173,7 @@ std::string HeaderText(const RecordingHeader& header)
     axes.push_back({ { "name", axis.name }, { "unit", axis.unit } });
   }
   const Json scenario =
-    header.scenario.empty() ? Json::object() : ParseJson(header.scenario, "The scenario");
+    header.scenario.empty() ? Json::object() : ParseBoundedJson(header.scenario, "The scenario");
   const std::string text = scenario.dump();
   Json json = { { "schema", 1 }, { "build", header.build }, { "scenario", scenario },
     { "scenario_hash", Hexadecimal(Fnv1a(text.data(), text.size())) },
@@ -185,7 +185,7 @@ std::string HeaderText(const RecordingHeader& header)
 RecordingHeader HeaderOf(const std::string& text, const std::string& origin, std::size_t& axisCount)
 {
   const std::string where = "The header of " + origin;
-  const Json json = ParseJson(text, where);
+  const Json json = ParseBoundedJson(text, where);
   JsonFields fields(json, where);
   if (fields.Whole("schema", 0, INT32_MAX, 0) != 1)
   {

@@ -416,7 +416,7 @@ bool BeginsArtery(const std::string& name, const std::string& artery)
 Scenario ScenarioFromText(
   const std::string& text, const std::string& origin, const std::string& folder)
 {
-  const Json json = ParseJson(text, origin);
+  const Json json = ParseBoundedJson(text, origin);
   JsonFields fields(json, origin);
   fields.RequireFormat("dynamiccoronary scenario", "scenario");
   Scenario scenario;
@@ -479,7 +479,7 @@ std::vector<BuiltInScenario> BuiltInScenarios()
   for (const embedded::NamedText* one = embedded::Scenarios; one->name; ++one)
   {
     const std::string where = std::string("The built-in scenario '") + one->name + "'";
-    const Json json = ParseJson(one->text, where);
+    const Json json = ParseBoundedJson(one->text, where);
     JsonFields fields(json, where);
     list.push_back({ one->name, fields.Text("description") });
   }

@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_SharedSurface_h
 #define DynamicCoronary_SharedSurface_h
 
-#include "AppendedXmlData.h"
+#include "XmlDataFile.h"
 
 #include "vtkCellArray.h"
 #include "vtkNew.h"
@@ -66,7 +66,7 @@ inline vtkSmartPointer<vtkPolyData> ReadSurface(const std::string& name)
   }
   vtkNew<vtkXMLPolyDataReader> reader;
   reader->ReadFromInputStringOn();
-  reader->SetInputString(coronary::WithInlineXmlData(text));
+  reader->SetInputString(coronary::ReadableXmlData(text, name));
   reader->Update();
   return reader->GetOutput();
 }

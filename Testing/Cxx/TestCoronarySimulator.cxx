@@ -290,7 +290,7 @@ TEST_F(TestCoronarySimulator, RefusesWrongImagesAndContrast)
   std::string text = ReadText(this->Folder / "changed.json");
   text.insert(text.size() - 1, R"(,"imaging":{"energy_keV":NaN})");
   coronary::WriteFileAtomically((this->Folder / "changed.json").string(), text);
-  this->ExpectFailure(1, "--scenario changed.json --ticks 10", "is no JSON");
+  this->ExpectFailure(1, "--scenario changed.json --ticks 10", "is not JSON");
 
   // A patient that is none.
   fs::create_directories(this->Folder / "empty");

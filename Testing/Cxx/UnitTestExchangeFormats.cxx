@@ -252,7 +252,7 @@ TEST(Markups, Hostile)
 {
   const auto refuse = [](const std::string& text, const std::string& part)
   { ExpectError([&] { (void)ParseMarkups(text, "bad.mrk.json"); }, part); };
-  refuse("", "not valid JSON");
+  refuse("", "is not JSON");
   refuse("[]", "has no list 'markups'");
   refuse("{\"markups\": 3}", "has no list 'markups'");
   refuse("{\"markups\": [3]}", "markups[0] is not an object");
@@ -262,7 +262,7 @@ TEST(Markups, Hostile)
   refuse(MarkupsWith("", "{\"position\": [1, 2]}"), "position is not a list of three numbers");
   refuse(MarkupsWith("", "{\"position\": [1, 2, \"x\"]}"), "position[2] is not a finite number");
   refuse(MarkupsWith("", "{\"position\": [1, 2, 1e999]}"), "");
-  refuse(MarkupsWith("", "{\"position\": [1, 2, NaN]}"), "not valid JSON");
+  refuse(MarkupsWith("", "{\"position\": [1, 2, NaN]}"), "is not JSON");
   refuse(MarkupsWith(", \"coordinateSystem\": \"XYZ\"", OnePoint), "coordinateSystem is \"XYZ\"");
   refuse(MarkupsWith(", \"coordinateSystem\": 2", OnePoint), "coordinateSystem is 2");
   refuse(MarkupsWith(", \"coordinateUnits\": \"inch\"", OnePoint), "coordinateUnits");
@@ -369,12 +369,16 @@ TEST(SimVascular, OlderFilesWithTwoRootsAndSeveralTimes)
   EXPECT_EQ(path.timesteps, 2);
   const auto refuse = [](const std::string& bad, const std::string& part)
   { ExpectError([&] { (void)ParseSimVascularPath(bad, "bad.pth"); }, part); };
-  refuse("", "has no element 'path'");
+  refuse("", "line 1: is no XML: no element found");
+  refuse("<other/>", "has no element 'path'");
   refuse("<path>", "ends inside the element 'path'");
   refuse("<path></path>", "has no points");
-  refuse("<path></other>", "'other' ends, which is not open");
-  refuse("<path id=3></path>", "not quoted");
-  refuse("<!-- ", "truncated inside");
+  refuse("<path></other>", "line 1: is no XML: mismatched tag inside 'path'");
+  refuse("\n<path id=3></path>", "line 2: is no XML: not well-formed");
+  refuse("<!-- ", "unclosed token");
+  refuse("<format/><path><timestep><path_element><path_points><path_pointed><pos/></path_pointed>"
+         "</path_points></path_element></timestep></path>",
+    "has no points");
   std::string deep;
   for (int n = 0; n < 1000; ++n)
   {

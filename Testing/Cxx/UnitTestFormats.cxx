@@ -229,8 +229,8 @@ TEST(SeriesDescription, BadInputGivesOneClearMessage)
   const std::string good = R"("phases":[{"fraction":0,"image":"a.mha"}])";
   EXPECT_EQ(message("{" + good + R"(,"note":[1,{"x":null}]})"), "no exception");
   ExpectMessage(message(""), { "series.json", "is empty" });
-  ExpectMessage(message("\x89PNG garbage"), { "series.json", "not valid JSON" });
-  ExpectMessage(message(R"({"phases":)"), { "series.json", "not valid JSON" });
+  ExpectMessage(message("\x89PNG garbage"), { "series.json", "is not JSON" });
+  ExpectMessage(message(R"({"phases":)"), { "series.json", "is not JSON" });
   ExpectMessage(message("[]"), { "not a JSON object" });
   ExpectMessage(message("{}"), { "no list 'phases'" });
   ExpectMessage(message(R"({"phases":[]})"), { "has no phases" });

@@ -1,7 +1,6 @@
 // Files of images, meshes, matrices, skeletons and lists of files.
 #include "FuzzHarness.h"
 
-#include "AppendedXmlData.h"
 #include "ByteStream.h"
 #include "CenterlineConversion.h"
 #include "DicomFile.h"
@@ -23,7 +22,7 @@
 #include "SkinWeightCache.h"
 #include "StlPlyFile.h"
 #include "VolumeFile.h"
-#include "XmlDataCheck.h"
+#include "XmlDataFile.h"
 
 #include <cmath>
 #include <cstring>
@@ -534,17 +533,13 @@ std::vector<std::string> MesherSeeds()
 }
 
 // VTK's XML, before VTK reads it --------------------------------------------------------------------------------------------
-void ReadAppendedXml(const std::string& bytes)
+void ReadXmlData(const std::string& bytes)
 {
-  Require(WithInlineXmlData(bytes).size() < 64 + 8 * bytes.size(), "text that grows without end");
+  Require(ReadableXmlData(bytes, "data.vtp").size() < 64 + 8 * bytes.size(),
+    "text that grows without end");
 }
 
-void CheckXml(const std::string& bytes)
-{
-  CheckXmlData(bytes);
-}
-
-std::vector<std::string> AppendedXmlSeeds()
+std::vector<std::string> XmlDataSeeds()
 {
   const std::string head =
     R"(<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt32">)"
@@ -561,7 +556,7 @@ std::vector<std::string> AppendedXmlSeeds()
   const std::string tail = "</AppendedData></VTKFile>";
   return { head + "<AppendedData encoding=\"raw\">_" + raw + tail,
     head + "<AppendedData encoding=\"base64\">_DAAAAGFiY2RlZmdoaWprbA==" + tail,
-    head.substr(0, 69) + R"( compressor="vtkZLibDataCompressor")" + head.substr(69) +
+    head.substr(0, 64) + R"( compressor="vtkZLibDataCompressor")" + head.substr(64) +
       "<AppendedData encoding=\"raw\">_" + packed + tail };
 }
 
@@ -734,8 +729,7 @@ std::vector<Harness> FormatHarnesses()
     { "skin-weights", ReadWeights, WeightSeeds },
     { "skin-weights-summed", ReadSummedWeights, WeightSeeds },
     { "mesher-message", ReadMesherMessages, MesherSeeds },
-    { "appended-xml", ReadAppendedXml, AppendedXmlSeeds },
-    { "xml-check", CheckXml, AppendedXmlSeeds },
+    { "xml-data", ReadXmlData, XmlDataSeeds },
     { "markups", ReadMarkups, MarkupsSeeds },
     { "segments", ReadSegments, SegmentsSeeds },
     { "segmentation", ReadSegmentation, SegmentationSeeds },

@@ -181,7 +181,7 @@ HandPlaces DeviceScenario::At(double seconds) const
 
 DeviceScenario DeviceScenarioFromText(const std::string& text, const std::string& origin)
 {
-  const nlohmann::json json = ParseJson(text, origin);
+  const nlohmann::json json = ParseBoundedJson(text, origin);
   JsonFields fields(json, origin);
   fields.RequireFormat("dynamiccoronary device scenario", "scenario of a device");
   fields.Text("description", "");

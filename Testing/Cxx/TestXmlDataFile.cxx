@@ -1,7 +1,8 @@
 // VTK's XML files of every appended form become readable; damaged ones are left to VTK's reader.
-#include "AppendedXmlData.h"
 #include "CounterRandom.h"
 #include "FilterMessages.h"
+#include "Refusals.h"
+#include "XmlDataFile.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -21,7 +22,7 @@
 
 #include <string>
 
-using coronary::WithInlineXmlData;
+using coronary::ReadableXmlData;
 
 namespace
 {
@@ -91,7 +92,7 @@ std::string Written(vtkPolyData* data, bool encoded, bool compressed, bool wide,
 }
 }
 
-TEST(AppendedXmlData, EveryFormIsReadAsItWas)
+TEST(XmlDataFile, EveryFormIsReadAsItWas)
 {
   vtkSmartPointer<vtkPolyData> data = Lines();
   for (int form = 0; form < 16; ++form)
@@ -100,7 +101,7 @@ TEST(AppendedXmlData, EveryFormIsReadAsItWas)
     const std::string text =
       Written(data, (form & 1) != 0, (form & 2) != 0, (form & 4) != 0, (form & 8) != 0);
     ASSERT_NE(text.find("<AppendedData"), std::string::npos);
-    const std::string inlined = WithInlineXmlData(text);
+    const std::string inlined = ReadableXmlData(text, "x.vtp");
     EXPECT_EQ(inlined.find("AppendedData"), std::string::npos);
     vtkNew<vtkXMLPolyDataReader> reader;
     reader->ReadFromInputStringOn();
@@ -127,18 +128,18 @@ TEST(AppendedXmlData, EveryFormIsReadAsItWas)
   }
 }
 
-TEST(AppendedXmlData, OtherTextsStayAsTheyAre)
+TEST(XmlDataFile, OtherTextsStayAsTheyAre)
 {
   for (const char* text :
-    { "", "no XML", "<AppendedData encoding=\"raw\">_</AppendedData>",
-      "<VTKFile type=\"PolyData\"></VTKFile>", "<VTKFile><AppendedData", "<VTKFile><AppendedData>_",
+    { "<AppendedData encoding=\"raw\">_</AppendedData>", "<VTKFile type=\"PolyData\"></VTKFile>",
+      "<VTKFile><AppendedData>_",
       "<VTKFile><DataArray format=\"appended\"/><AppendedData>_x</AppendedData></VTKFile>",
       "<VTKFile><DataArray format=\"appended\" offset=\"99999999999999999999999\"/>"
       "<AppendedData encoding=\"raw\">_x</AppendedData></VTKFile>",
       "<VTKFile compressor=\"z\"><DataArray format=\"appended\" offset=\"0\"/>"
       "<AppendedData encoding=\"raw\">_\xff\xff\xff\xff\xff\xff\xff\xff</AppendedData></VTKFile>" })
   {
-    EXPECT_EQ(WithInlineXmlData(text), text);
+    EXPECT_EQ(ReadableXmlData(text, "x.vtp"), text);
   }
   // Arrays that all lie in the same bytes: a file of a megabyte would become gigabytes.
   std::string many = "<VTKFile>";
@@ -148,10 +149,42 @@ TEST(AppendedXmlData, OtherTextsStayAsTheyAre)
   }
   many +=
     "<AppendedData encoding=\"base64\">_" + std::string(20000, 'A') + "</AppendedData></VTKFile>";
-  EXPECT_EQ(WithInlineXmlData(many), many);
+  EXPECT_EQ(ReadableXmlData(many, "x.vtp"), many);
 }
 
-TEST(AppendedXmlData, DamagedTextsDoNoHarm)
+TEST(XmlDataFile, RefusesWhatNoSoundFileHas)
+{
+  const auto refuse = [](const std::string& text, const std::string& part)
+  { ExpectError([&] { ReadableXmlData(text, "x.vtp"); }, "x.vtp", part); };
+  const auto piece = [](const std::string& counts, const std::string& arrays = "")
+  { return "<VTKFile>\n<Piece " + counts + ">" + arrays + "</Piece></VTKFile>"; };
+  EXPECT_NO_THROW(ReadableXmlData(piece("NumberOfPoints=' 3 '"), "x.vtp"));
+  refuse("", "line 1: is no XML");
+  refuse("no XML", "line 1: is no XML");
+  refuse("<VTKFile>\n<AppendedData", "line 2: is no XML");
+  refuse("<VTKFile>\n\n<Piece>", "line 3: ends inside the element 'Piece'");
+  refuse("<!DOCTYPE x [<!ENTITY a \"aa\"><!ENTITY b \"&a;&a;\">]><VTKFile>&b;</VTKFile>",
+    "a document type or entities");
+  for (const char* count : { "-1", "0.5", "", "x", "nan", "1\n2" })
+  {
+    refuse(piece("NumberOfPoints='" + std::string(count) + "'"), "line 2: ");
+  }
+  refuse(piece("NumberOfPoints='1000'"), "line 2: says more than it can hold: 1000 NumberOfPoints");
+  refuse(piece("NumberOfPolys='50' NumberOfLines='50'"), "100 cells");
+  refuse(piece("NumberOfPoints='50'",
+           "<PointData><DataArray NumberOfComponents='5' format='ascii'/></PointData>"),
+    "250 values in an array");
+  EXPECT_NO_THROW(ReadableXmlData(
+    "<VTKFile compressor='z'>\n<Piece NumberOfPoints='1000'></Piece></VTKFile>", "x.vtp"));
+  std::string deep = "<VTKFile>";
+  for (int n = 0; n < 40; ++n)
+  {
+    deep += "\n<a>";
+  }
+  refuse(deep, "line 33: has more than 32 elements in each other");
+}
+
+TEST(XmlDataFile, DamagedTextsDoNoHarm)
 {
   vtkSmartPointer<vtkPolyData> data = Lines();
   coronary::RandomStream random(5);
@@ -172,7 +205,14 @@ TEST(AppendedXmlData, DamagedTextsDoNoHarm)
         damaged.resize(
           static_cast<std::size_t>(random.Uniform() * static_cast<double>(text.size())));
       }
-      EXPECT_NO_THROW(WithInlineXmlData(damaged));
+      try
+      {
+        EXPECT_LT(ReadableXmlData(damaged, "x.vtp").size(), 5 * text.size());
+      }
+      catch (const std::runtime_error& error)
+      {
+        EXPECT_EQ(std::string(error.what()).rfind("'x.vtp': line ", 0), 0U) << error.what();
+      }
     }
   }
 }
