@@ -12,7 +12,7 @@
 #include "PanelDevice.h"
 #include "RecordedDevices.h"
 #include "TraceWidget.h"
-#include "vtkEvaluationPictures.h"
+#include "vtkDisplay.h"
 #include "vtkSimulatorScene.h"
 #include "vtkVideoFile.h"
 
