@@ -42,6 +42,9 @@ namespace coronary
 {
 namespace
 {
+/// Cases whose pictures the page has in it: they are 4 MB each. Of more it has links to them.
+constexpr std::size_t MostPictured = 10;
+
 struct EvaluateJob
 {
   std::vector<std::string> results;
@@ -84,9 +87,9 @@ private:
     const std::function<void(const PhaseFiles&)>& begin,
     const std::function<void(double)>& progress) const;
   EvaluationScene SceneOf(const CaseFiles& files, vtkMessageTrap& messages) const;
-  /// Into the folder, and into the page.
+  /// Into the folder, and into the page when there is one.
   static void Draw(const EvaluationScene& scene, const std::string& subfolder, StagedFolder& folder,
-    WebReview& review, std::vector<std::string>& files,
+    WebReview* review, std::vector<std::string>& files,
     const std::function<void(double)>& progress);
   /// The options that its tables come from, for the reader of a page.
   std::string CommandLine() const;
@@ -362,7 +365,7 @@ EvaluationScene EvaluateJob::SceneOf(const CaseFiles& files, vtkMessageTrap& mes
 }
 
 void EvaluateJob::Draw(const EvaluationScene& scene, const std::string& subfolder,
-  StagedFolder& folder, WebReview& review, std::vector<std::string>& files,
+  StagedFolder& folder, WebReview* review, std::vector<std::string>& files,
   const std::function<void(double)>& progress)
 {
   const auto add = [&](auto draw, const char* name, const char* title, double done)
@@ -371,7 +374,10 @@ void EvaluateJob::Draw(const EvaluationScene& scene, const std::string& subfolde
     files.push_back(subfolder + name);
     const std::string path = folder.Add(files.back());
     draw(scene, path);
-    review.AddIllustration(ReadTextFile(path, "a picture"), files.back(), title);
+    if (review)
+    {
+      review->AddIllustration(ReadTextFile(path, "a picture"), files.back(), title);
+    }
     progress(done);
     return path;
   };
@@ -558,7 +564,8 @@ void EvaluateJob::Run() const
       {
         const std::string subfolder =
           cases.size() == 1 ? "pictures/" : "pictures/" + std::to_string(n + 1) + "/";
-        Draw(scene, subfolder, folder, review, files, update);
+        Draw(scene, subfolder, folder, cases.size() <= MostPictured ? &review : nullptr, files,
+          update);
       }
     }
     files.emplace_back("table1.json");

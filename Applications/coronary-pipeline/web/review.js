@@ -594,7 +594,10 @@ class Review {
       rows.push(['Read from', `${model} (model), ${truth} (truth)`]);
     }
     if (this.data.files.length > 0) {
-      const links = this.data.files.flatMap((file) => [', ', element('a', { href: file }, [file])]);
+      // Of several cases each has its pictures in a folder of its own.
+      const own = this.data.cases.length > 1 ? `pictures/${this.index + 1}/` : '';
+      const files = this.data.files.filter((file) => file.startsWith(own) || !file.startsWith('pictures/'));
+      const links = files.flatMap((file) => [', ', element('a', { href: file }, [file])]);
       rows.push(['Files beside it', element('span', {}, links.slice(1))]);
     }
     if (this.compared) {
