@@ -47,7 +47,7 @@ echo "== From the images to the coronary arteries"
 
 echo "== The model against the truth: Table 1, ours beside the paper's"
 evaluate=("$pipeline" evaluate --result "$output/run" --truth "$output/phantom" --name "phantom 1"
-  --web --output "$output/evaluation")
+  --output "$output/evaluation")
 if [ "$pictures" = yes ]; then
   xvfb-run -a -s "-screen 0 1600x1000x24 -noreset" "${evaluate[@]}"
 else
@@ -109,8 +109,8 @@ What lies where
                                       review/review.html: its vessels in the image, straightened and in slabs
   $output/simulator/                  trajectory.pvd, forces.csv, tip.csv, statistics.json: a session of the simulator;
                                       angiogram/: X-ray frames of an injection
-  $output/evaluation/                 table1.csv, .json and .tex, report.html (tables, plots, pictures,
-                                      the beating tree), branches.csv, pictures/, plots/
+  $output/evaluation/                 review.html (the beating model, tables, plots, pictures),
+                                      table1.csv, .json and .tex, branches.csv, pictures/, plots/
   $output/phantom-motion.txt          amplitudes, speeds and rest windows per artery
 EOF
 if [ "$pictures" = yes ]; then

@@ -63,7 +63,7 @@ def make(build, work):
         pipeline("phantom", *options, "--phases", 6, "--spacing", 0.8, "--output", name, "--quiet")
         pipeline("run", name + "/series.json", "--output", name + "-run", "--quiet")
         pipeline("review", name + "-run", "--quiet")
-        pipeline("evaluate", "--result", name + "-run", "--truth", name, "--web", "--no-pictures", "--output", name + "-evaluation", "--quiet")
+        pipeline("evaluate", "--result", name + "-run", "--truth", name, "--no-pictures", "--output", name + "-evaluation", "--quiet")
     pipeline("phantom-motion", "--seed", 1)
     pipeline("inspect", "healthy/series.json")
     pipeline("sequence", "healthy-run", "--formats", "series,simvascular,vmtk,obj,ply,stl,gltf,gltf-json", "--velocity", "--phases", 4,

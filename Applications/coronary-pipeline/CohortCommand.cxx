@@ -122,7 +122,7 @@ void CohortJob::Declare(CLI::App& app)
     ->expected(2)
     ->type_name("K N");
   app.add_flag("--dry-run", this->DryRun, "Say what would be done, and do nothing");
-  app.add_flag("--no-pictures", this->NoPictures, "Tables and report without pictures");
+  app.add_flag("--no-pictures", this->NoPictures, "Without pictures/, which need a display");
   app
     .add_option(
       "--threads", this->Threads, "Number of threads of a case; 0: the cores over the jobs")

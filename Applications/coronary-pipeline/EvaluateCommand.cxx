@@ -4,8 +4,8 @@
 #include "DistanceOptions.h"
 #include "Evaluation.h"
 #include "EvaluationJson.h"
+#include "EvaluationPlots.h"
 #include "EvaluationRecord.h"
-#include "EvaluationReport.h"
 #include "Interruption.h"
 #include "MovingModel.h"
 #include "OptionChecks.h"
@@ -13,19 +13,18 @@
 #include "Ranks.h"
 #include "RunReview.h"
 #include "StagedFolder.h"
+#include "TextFile.h"
 #include "vtkDataFiles.h"
+#include "vtkDisplay.h"
 #include "vtkEvaluationPictures.h"
-#include "vtkEvaluationPlots.h"
 #include "vtkMessageTrap.h"
 #include "vtkSurfaceFile.h"
 #include "vtkSurfaceInput.h"
 #include "vtkWebReview.h"
 
-#include "vtkCellData.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
-#include "vtkStringArray.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,14 +35,15 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace coronary
 {
 namespace
 {
-/// A phase that more of the tree was lost in was not tracked really.
-constexpr double LeastTrackedShare = 0.5;
+/// Cases whose pictures the page has in it: they are 4 MB each. Of more it has links to them.
+constexpr std::size_t MostPictured = 10;
 
 struct EvaluateJob
 {
@@ -56,7 +56,6 @@ struct EvaluateJob
   MeshDistanceSettings distance;
   double timeTolerance = 1e-3;
   bool noPictures = false;
-  bool web = false;
   bool views = false;
   std::int64_t webTriangles = 0; ///< 0: as many as suit the number of phases
   std::string measureCache;
@@ -88,16 +87,17 @@ private:
     const std::function<void(const PhaseFiles&)>& begin,
     const std::function<void(double)>& progress) const;
   EvaluationScene SceneOf(const CaseFiles& files, vtkMessageTrap& messages) const;
-  static ReportCase Draw(const EvaluationScene& scene, const std::string& subfolder,
-    StagedFolder& folder, const std::function<void(double)>& progress);
+  /// Into the folder, and into the page when there is one.
+  static void Draw(const EvaluationScene& scene, const std::string& subfolder, StagedFolder& folder,
+    WebReview* review, std::vector<std::string>& files,
+    const std::function<void(double)>& progress);
   /// The options that its tables come from, for the reader of a page.
   std::string CommandLine() const;
   /// To the page what a result that run made says of itself.
   void AddRun(const std::string& result, const CaseEvaluation& evaluation, WebReview& review,
     std::vector<std::string>& complaints, vtkMessageTrap& messages) const;
-  void WriteReport(const std::vector<CaseEvaluation>& evaluations,
-    std::vector<ReportCase> illustrations, std::vector<std::string> plots,
-    const std::string& withoutPictures, const std::string& path) const;
+  /// How the evaluation was made, for the reader of the page.
+  ReviewOrigin Origin() const;
   std::vector<bool> WhichAreInterpolated(
     const MovingModel& model, const std::vector<TimedFile>& truth, CaseFiles& files) const;
 };
@@ -142,14 +142,10 @@ void EvaluateJob::Declare(CLI::App& app)
     ->check(Within(0.0, 1.0))
     ->type_name("FRACTION")
     ->capture_default_str();
-  app.add_flag("--no-pictures", this->noPictures, "Tables and report only");
-  app.add_flag("--web", this->web,
-    "Also review.html: one file for a web browser, without network, in which the beating model is "
-    "turned and compared");
+  app.add_flag("--no-pictures", this->noPictures, "Without pictures/, which need a display");
   app.add_flag("--views", this->views,
     "In review.html also straightened views and slabs of the vessels of a result that run made, in "
-    "the image that "
-    "it was found in");
+    "the image that it was found in");
   app
     .add_option("--web-triangles", this->webTriangles,
       "Triangles of a surface in review.html, at most about so many; 0: up to 150000, fewer for "
@@ -183,8 +179,8 @@ std::vector<bool> EvaluateJob::WhichAreInterpolated(
   {
     if (known)
     {
-      interpolated[n] = std::none_of(model.trackedTimes.begin(), model.trackedTimes.end(),
-        [&](double time) { return std::abs(time - truth[n].time) <= this->timeTolerance; });
+      interpolated[n] =
+        model.TrackingAt(truth[n].time, this->timeTolerance) == MovingModel::Tracking::None;
     }
     else
     {
@@ -192,16 +188,6 @@ std::vector<bool> EvaluateJob::WhichAreInterpolated(
     }
   }
   return interpolated;
-}
-
-std::string FolderName(const std::string& path)
-{
-  std::filesystem::path folder = std::filesystem::absolute(path).lexically_normal();
-  if (folder.filename().empty())
-  {
-    folder = folder.parent_path();
-  }
-  return folder.filename().string();
 }
 
 EvaluateJob::CaseFiles EvaluateJob::FindCase(std::size_t number) const
@@ -226,13 +212,8 @@ EvaluateJob::CaseFiles EvaluateJob::FindCase(std::size_t number) const
     one.phase.phase = static_cast<int>(n);
     one.phase.fraction = reference.time;
     one.phase.interpolated = interpolated[n];
-    for (std::size_t k = 0; k < model.trackedShare.size(); ++k)
-    {
-      if (std::abs(model.trackedTimes[k] - reference.time) <= this->timeTolerance)
-      {
-        one.phase.lost = !interpolated[n] && model.trackedShare[k] < LeastTrackedShare;
-      }
-    }
+    one.phase.lost = !interpolated[n] &&
+      model.TrackingAt(reference.time, this->timeTolerance) == MovingModel::Tracking::Lost;
     one.model = own->path;
     one.truth = reference.path;
     const TimedFile* modelLines =
@@ -270,15 +251,9 @@ BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* s
     return known ? vtkCoronary::TreeOf(surface, side) : BranchTree();
   }
   vtkSmartPointer<vtkPolyData> lines = ReadPolyData(path, messages);
-  auto* texts = vtkStringArray::SafeDownCast(
-    lines->GetCellData()->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
-  vtkDataArray* groups = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
-  if (labels && texts && groups)
+  if (labels)
   {
-    for (vtkIdType n = 0; n < texts->GetNumberOfValues(); ++n)
-    {
-      labels->emplace(static_cast<std::int64_t>(groups->GetTuple1(n)), texts->GetValue(n));
-    }
+    AddGroupNames(lines, *labels);
   }
   return vtkCoronary::TreeOf(lines, side);
 }
@@ -387,39 +362,41 @@ EvaluationScene EvaluateJob::SceneOf(const CaseFiles& files, vtkMessageTrap& mes
   return scene;
 }
 
-ReportCase EvaluateJob::Draw(const EvaluationScene& scene, const std::string& subfolder,
-  StagedFolder& folder, const std::function<void(double)>& progress)
+void EvaluateJob::Draw(const EvaluationScene& scene, const std::string& subfolder,
+  StagedFolder& folder, WebReview* review, std::vector<std::string>& files,
+  const std::function<void(double)>& progress)
 {
-  ReportCase pictures;
-  const auto add =
-    [&](auto draw, const char* name, const char* title, const char* caption, double done)
+  const auto add = [&](auto draw, const char* name, const char* title, double done)
   {
     ThrowIfInterrupted();
-    const std::string path = folder.Add(subfolder + name);
+    files.push_back(subfolder + name);
+    const std::string path = folder.Add(files.back());
     draw(scene, path);
-    pictures.pictures.push_back({ path, title, caption });
+    if (review)
+    {
+      review->AddIllustration(ReadTextFile(path, "a picture"), files.back(), title);
+    }
     progress(done);
+    return path;
   };
-  add(DrawOverlayGrid, "overlay.png", "Model over truth in every phase",
-    "Model red, truth green. Dashed frames: interpolated phases.", 0.4);
-  add(DrawDistances, "distances.png", "Distance of the model from the truth", "", 0.5);
-  add(DrawSequence, "sequence.png", "The moving tree",
-    "Centerlines of all phases by branch; paths of points over the cycle; meshes of three phases.",
+  const std::string first = add(DrawOverlayGrid, "overlay.png",
+    "Model (red) over truth (green) in every phase; dashed frames: interpolated", 0.4);
+  add(DrawDistances, "distances.png", "Distance of the model from the truth", 0.5);
+  add(DrawSequence, "sequence.png",
+    "Centerlines of all phases by branch, paths of points over the cycle, meshes of three phases",
     0.7);
   ThrowIfInterrupted();
-  const std::filesystem::path beating =
-    std::filesystem::path(pictures.pictures.front().path).parent_path();
-  pictures.beating = DrawBeating(scene, beating.string());
-  for (const std::string& path : pictures.beating)
+  for (const std::string& path :
+    DrawBeating(scene, std::filesystem::path(first).parent_path().string()))
   {
-    folder.Add(subfolder + std::filesystem::path(path).filename().string());
-  }
-  if (std::filesystem::exists(beating / "beating.gif"))
-  {
-    folder.Add(subfolder + "beating.gif");
+    const std::filesystem::path name = std::filesystem::path(path).filename();
+    folder.Add(subfolder + name.string());
+    if (name.extension() == ".gif")
+    {
+      files.push_back(subfolder + name.string());
+    }
   }
   progress(1.0);
-  return pictures;
 }
 
 std::string EvaluateJob::CommandLine() const
@@ -448,39 +425,27 @@ std::string EvaluateJob::CommandLine() const
   }
   line += this->untracked == "auto" ? "" : " --interpolated " + this->untracked;
   line += this->distance.clipEnds ? " --clip-ends" : "";
-  line += " --web";
   line += this->views ? " --views" : "";
   line += this->webTriangles == 0 ? "" : " --web-triangles " + std::to_string(this->webTriangles);
   return line + " --output " + quoted(this->output);
 }
 
-void EvaluateJob::WriteReport(const std::vector<CaseEvaluation>& evaluations,
-  std::vector<ReportCase> illustrations, std::vector<std::string> plots,
-  const std::string& withoutPictures, const std::string& path) const
+ReviewOrigin EvaluateJob::Origin() const
 {
-  EvaluationReport report;
-  report.title = "A moving model against the truth";
-  for (std::size_t n = 0; n < evaluations.size(); ++n)
+  ReviewOrigin origin;
+  origin.version = "coronary-pipeline " DYNAMICCORONARY_VERSION;
+  origin.command = this->CommandLine();
+  origin.settings = { { "Interpolated phases", this->untracked },
+    { "Hausdorff distance", "at most " + Format(this->distance.errorBound) + " mm too small" },
+    { "Ends of vessels",
+      this->distance.clipEnds
+        ? "left out, up to " + Format(this->distance.endLength) + " mm beyond the end"
+        : "compared as they are" } };
+  for (std::size_t n = 0; n < this->results.size(); ++n)
   {
-    report.settings.emplace_back(evaluations[n].name + ": model", this->results[n]);
-    report.settings.emplace_back(evaluations[n].name + ": truth", this->truths[n]);
+    origin.inputs.emplace_back(this->results[n], this->truths[n]);
   }
-  report.settings.emplace_back("Interpolated phases", this->untracked);
-  report.settings.emplace_back(
-    "Hausdorff distance at most too small by", Format(this->distance.errorBound) + " mm");
-  report.settings.emplace_back("Ends of vessels",
-    this->distance.clipEnds
-      ? "left out, up to " + Format(this->distance.endLength) + " mm beyond the end"
-      : "compared as they are");
-  report.settings.emplace_back("Program", "coronary-pipeline " DYNAMICCORONARY_VERSION);
-  report.cases = evaluations;
-  report.illustrations = std::move(illustrations);
-  report.plots = std::move(plots);
-  if (!withoutPictures.empty())
-  {
-    report.warnings.push_back(withoutPictures);
-  }
-  WriteEvaluationReport(report, path);
+  return origin;
 }
 
 void EvaluateJob::AddRun(const std::string& result, const CaseEvaluation& evaluation,
@@ -510,10 +475,6 @@ void EvaluateJob::AddRun(const std::string& result, const CaseEvaluation& evalua
 
 void EvaluateJob::Run() const
 {
-  if (this->views && !this->web)
-  {
-    throw UsageError("--views: only with --web");
-  }
   if (this->results.size() != this->truths.size())
   {
     throw UsageError("--result and --truth: one of each for every case, not " +
@@ -535,18 +496,15 @@ void EvaluateJob::Run() const
   const bool first = Ranks().IsFirst();
   const bool draw = first && !this->noPictures && CanDraw(why);
   const std::string withoutPictures =
-    draw || this->noPictures || !first ? "" : "there are no pictures and plots: " + why;
+    draw || this->noPictures || !first ? "" : "there are no pictures: " + why;
 
   StagedFolder folder(this->output, Ranks());
   vtkMessageTrap messages;
   std::vector<std::string> complaints;
   std::vector<CaseEvaluation> evaluations;
-  std::vector<ReportCase> illustrations;
-  std::vector<std::string> plots;
   try
   {
-    ProgressDisplay progress("step",
-      static_cast<int>(steps + (draw || this->web ? cases.size() : 0)), this->quiet || !first);
+    ProgressDisplay progress("step", static_cast<int>(steps + cases.size()), this->quiet || !first);
     const auto update = [&](double fraction) { progress.Update(fraction); };
     int step = 0;
     for (CaseFiles& files : cases)
@@ -568,56 +526,55 @@ void EvaluateJob::Run() const
       return;
     }
     const OthersWait alone(this->threads);
-    const std::string table = folder.Add("table1.csv");
-    WriteFileAtomically(table, EvaluationCsv(evaluations));
-    WriteFileAtomically(folder.Add("table1.tex"), EvaluationLatex(evaluations));
-    WriteFileAtomically(folder.Add("branches.csv"), BranchCsv(evaluations));
+    std::vector<std::string> files;
+    const auto write = [&](const std::string& name, const std::string& text)
+    {
+      files.push_back(name);
+      WriteFileAtomically(folder.Add(name), text);
+    };
+    write("table1.csv", EvaluationCsv(evaluations));
+    write("table1.tex", EvaluationLatex(evaluations));
+    write("branches.csv", BranchCsv(evaluations));
+    const std::vector<EvaluationPlot> plots = DrawPlots(evaluations);
+    for (const EvaluationPlot& plot : plots)
+    {
+      write("plots/" + plot.key + ".svg", plot.svg);
+    }
     WebReview review;
+    review.SetPlots(plots);
     const std::int64_t triangles = this->webTriangles > 0
       ? this->webTriangles
       : DefaultReviewTriangles(static_cast<std::int64_t>(steps));
-    for (std::size_t n = 0; (draw || this->web) && n < cases.size(); ++n)
+    for (std::size_t n = 0; n < cases.size(); ++n)
     {
       progress.BeginStep(step++, cases[n].evaluation.name + ", pictures");
       // What it has read goes with it.
       const EvaluationScene scene = SceneOf(cases[n], messages);
+      review.Add(evaluations[n],
+        MakeReviewCase(scene, triangles,
+          [&](double fraction)
+          {
+            update(fraction);
+            return Interruption() == 0;
+          }));
+      this->AddRun(this->results[n], evaluations[n], review, complaints, messages);
       if (draw)
       {
         const std::string subfolder =
           cases.size() == 1 ? "pictures/" : "pictures/" + std::to_string(n + 1) + "/";
-        illustrations.push_back(Draw(scene, subfolder, folder, update));
-      }
-      if (this->web)
-      {
-        review.Add(evaluations[n],
-          MakeReviewCase(scene, triangles,
-            [&](double fraction)
-            {
-              update(fraction);
-              return Interruption() == 0;
-            }));
-        this->AddRun(this->results[n], evaluations[n], review, complaints, messages);
+        Draw(scene, subfolder, folder, cases.size() <= MostPictured ? &review : nullptr, files,
+          update);
       }
     }
-    if (this->web)
+    files.emplace_back("table1.json");
+    ReviewOrigin origin = this->Origin();
+    origin.files = files;
+    if (!withoutPictures.empty())
     {
-      WriteFileAtomically(folder.Add("review.html"),
-        review.Html("coronary-pipeline " DYNAMICCORONARY_VERSION, this->CommandLine()));
+      origin.warnings.push_back(withoutPictures);
     }
-    if (draw)
-    {
-      const std::filesystem::path place = std::filesystem::path(table).parent_path() / "plots";
-      std::filesystem::create_directories(place);
-      plots = DrawPlots(evaluations, place.string());
-      for (const std::string& plot : plots)
-      {
-        const std::filesystem::path name = std::filesystem::path(plot).filename();
-        folder.Add("plots/" + name.string());
-        folder.Add("plots/" + std::filesystem::path(name).replace_extension(".png").string());
-      }
-    }
-    this->WriteReport(evaluations, std::move(illustrations), std::move(plots), withoutPictures,
-      folder.Add("report.html"));
+    WriteFileAtomically(folder.Add("review.html"), review.Html(origin));
+    // Where it stands, all others do.
     WriteFileAtomically(folder.Add("table1.json"), EvaluationJson(evaluations).dump(2) + "\n");
     messages.ThrowIfError();
     ThrowIfInterrupted();
@@ -656,9 +613,11 @@ Command MakeEvaluateCommand(CLI::App& program)
   CLI::App* app = program.add_subcommand(
     "evaluate", "A moving model against the truth, phase by phase: Table 1 of the paper");
   app->footer(
-    "Writes DIR/table1.csv, table1.tex, branches.csv, report.html, table1.json; and with a display "
-    "pictures/ (of several cases pictures/1/, ...) and plots/. On a machine without one: "
-    "xvfb-run -a coronary-pipeline evaluate ... With --web also DIR/review.html.");
+    "Writes DIR/review.html, one file for a web browser, without network: tables, plots, and the "
+    "beating model to be turned and compared; table1.csv, table1.tex, table1.json, branches.csv, "
+    "plots/; and with a display pictures/ (of several cases pictures/1/, ...). On a machine "
+    "without "
+    "one: xvfb-run -a coronary-pipeline evaluate ...");
   auto job = std::make_shared<EvaluateJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); }, true };

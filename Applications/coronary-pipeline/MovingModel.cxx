@@ -89,6 +89,21 @@ void ReadReport(const std::string& path, MovingModel& model)
 }
 }
 
+MovingModel::Tracking MovingModel::TrackingAt(double time, double tolerance) const
+{
+  // A phase that more of the tree was lost in was not tracked really.
+  constexpr double LeastShare = 0.5;
+  for (std::size_t k = 0; k < this->trackedTimes.size(); ++k)
+  {
+    if (std::abs(this->trackedTimes[k] - time) <= tolerance)
+    {
+      return k < this->trackedShare.size() && this->trackedShare[k] < LeastShare ? Tracking::Lost
+                                                                                 : Tracking::Seen;
+    }
+  }
+  return Tracking::None;
+}
+
 const TimedFile* MovingModel::At(const std::vector<TimedFile>& files, double time, double tolerance)
 {
   const TimedFile* best = nullptr;
@@ -170,5 +185,11 @@ MovingModel FindMovingModel(const std::string& path)
     model.centerlines = ReadList(centerlines);
   }
   return model;
+}
+
+std::string FolderName(const std::string& path)
+{
+  const fs::path folder = fs::absolute(path).lexically_normal();
+  return (folder.filename().empty() ? folder.parent_path() : folder).filename().string();
 }
 }

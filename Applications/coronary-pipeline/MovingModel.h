@@ -23,6 +23,14 @@ struct MovingModel
   std::vector<double> trackedTimes; ///< R-R fractions of the phases that were tracked
   std::vector<double> trackedShare; ///< one each: share of the tree that was to be seen
 
+  enum class Tracking
+  {
+    None, ///< not tracked, or not known
+    Lost, ///< to be tracked, but less than half of the tree was seen
+    Seen
+  };
+  Tracking TrackingAt(double time, double tolerance) const;
+
   /// The file at a time, or null.
   static const TimedFile* At(const std::vector<TimedFile>& files, double time, double tolerance);
 };
@@ -34,6 +42,9 @@ struct MovingModel
  * @throws std::runtime_error naming the folder or file and what is missing
  */
 MovingModel FindMovingModel(const std::string& path);
+
+/// The last name of a path, what a case is called by default.
+std::string FolderName(const std::string& path);
 }
 
 #endif

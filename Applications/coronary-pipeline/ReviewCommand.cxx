@@ -33,8 +33,6 @@ namespace
 {
 namespace fs = std::filesystem;
 
-/// A phase that more of the tree was lost in was not tracked really.
-constexpr double LeastTrackedShare = 0.5;
 constexpr double SameTime = 1e-3;
 
 bool IsFile(const fs::path& path)
@@ -138,15 +136,9 @@ void ReviewJob::FindPhases(Look& look) const
     PhaseEvaluation phase;
     phase.phase = static_cast<int>(n);
     phase.fraction = model.surfaces[n].time;
-    phase.interpolated = model.tracksKnown;
-    for (std::size_t k = 0; k < model.trackedTimes.size(); ++k)
-    {
-      if (std::abs(model.trackedTimes[k] - phase.fraction) <= SameTime)
-      {
-        phase.interpolated = false;
-        phase.lost = k < model.trackedShare.size() && model.trackedShare[k] < LeastTrackedShare;
-      }
-    }
+    const MovingModel::Tracking tracking = model.TrackingAt(phase.fraction, SameTime);
+    phase.interpolated = model.tracksKnown && tracking == MovingModel::Tracking::None;
+    phase.lost = tracking == MovingModel::Tracking::Lost;
     const auto away = [&](int index)
     {
       return std::abs(
@@ -168,11 +160,7 @@ ReviewJob::Look ReviewJob::Read(vtkMessageTrap& messages) const
 {
   Look look;
   look.run = OpenRun(this->result, this->images, !this->noPictures, messages);
-  std::error_code error;
-  const fs::path folder = fs::absolute(this->result, error).lexically_normal();
-  look.phases.name = !this->name.empty()
-    ? this->name
-    : (folder.filename().empty() ? folder.parent_path() : folder).filename().string();
+  look.phases.name = this->name.empty() ? FolderName(this->result) : this->name;
   this->FindPhases(look);
   return look;
 }
@@ -271,8 +259,8 @@ void ReviewJob::Run() const
     ThrowIfInterrupted();
     folder.TakePlaceOf(OlderPictures(this->Folder()));
     WriteFileAtomically(folder.Add("review.html"),
-      review.Html(
-        "coronary-pipeline " DYNAMICCORONARY_VERSION, "coronary-pipeline review " + this->result));
+      review.Html({ "coronary-pipeline " DYNAMICCORONARY_VERSION,
+        "coronary-pipeline review " + this->result, {}, {}, {}, {} }));
   }
   catch (const std::runtime_error& error)
   {

@@ -2,8 +2,8 @@
 
 #include "Base64.h"
 #include "EvaluationJson.h"
-#include "HtmlParts.h"
 #include "WebFiles.h"
+#include "XmlText.h"
 
 #include <zlib.h>
 
@@ -325,6 +325,23 @@ Json ColumnsJson()
   return columns;
 }
 
+/// Of each phase its branches; numbers that are not finite are null in JSON.
+Json BranchesJson(const CaseEvaluation& evaluation)
+{
+  Json phases = Json::array();
+  for (const PhaseEvaluation& phase : evaluation.phases)
+  {
+    phases.push_back(Json::array());
+    for (const BranchEvaluation& branch : phase.branches)
+    {
+      phases.back().push_back({ { "group", branch.group }, { "label", branch.label },
+        { "length", branch.length }, { "covered", branch.covered },
+        { "continuity", branch.continuity }, { "HD", branch.hausdorff }, { "mean", branch.mean } });
+    }
+  }
+  return phases;
+}
+
 /// The text with its marks, {{name}}, replaced; what is put in is not looked through.
 std::string Filled(const std::string& text, const std::map<std::string, std::string>& parts)
 {
@@ -380,6 +397,8 @@ void WebReview::Add(const CaseEvaluation& evaluation, const ReviewCase& shapes)
   {
     one["paper"].push_back(MeasuresJson(PaperMeasuresOf(phase)));
   }
+  one["branches"] = BranchesJson(evaluation);
+  one["pictures"] = Json::array();
   one["view"] = { { "left_anterior", shapes.leftAnterior }, { "cranial", shapes.cranial },
     { "centre", shapes.centre }, { "height", shapes.height }, { "aspect", shapes.aspect } };
   one["range"] = shapes.range;
@@ -396,6 +415,13 @@ std::size_t WebReview::AddPicture(const std::string& png)
   return this->Pictures.size() - 1;
 }
 
+void WebReview::AddIllustration(
+  const std::string& png, const std::string& file, const std::string& title)
+{
+  this->Cases.at(this->Cases.size() - 1)["pictures"].push_back(
+    { { "title", title }, { "file", file }, { "picture", this->AddPicture(png) } });
+}
+
 void WebReview::SetRun(Json run)
 {
   if (this->Cases.empty())
@@ -405,11 +431,24 @@ void WebReview::SetRun(Json run)
   this->Cases.back()["run"] = std::move(run);
 }
 
-std::string WebReview::Html(const std::string& version, const std::string& command) const
+std::string WebReview::Html(const ReviewOrigin& origin) const
 {
   Json data;
-  data["version"] = version;
-  data["command"] = command;
+  data["version"] = origin.version;
+  data["command"] = origin.command;
+  data["settings"] = origin.settings;
+  data["inputs"] = Json::array();
+  for (const auto& [model, truth] : origin.inputs)
+  {
+    data["inputs"].push_back({ { "model", model }, { "truth", truth } });
+  }
+  data["warnings"] = origin.warnings;
+  data["files"] = origin.files;
+  data["plots"] = Json::array();
+  for (const EvaluationPlot& plot : this->Plots)
+  {
+    data["plots"].push_back({ { "key", plot.key }, { "svg", plot.svg } });
+  }
   data["columns"] = ColumnsJson();
   data["paper"] = PaperJson();
   data["table1"] = EvaluationJson(this->Evaluations);
@@ -427,6 +466,6 @@ std::string WebReview::Html(const std::string& version, const std::string& comma
   }
   return Filled(web::Page,
     { { "style", web::Style }, { "script", web::Script }, { "data", JsonForHtml(data) },
-      { "shapes", blocks }, { "version", EscapedHtml(version) } });
+      { "shapes", blocks }, { "version", EscapedXml(origin.version) } });
 }
 }

@@ -1,6 +1,6 @@
 /**
  * @file WebReview.h
- * @brief An evaluation, or a run, as one HTML file in which the beating model is turned and compared with the truth.
+ * @brief The report of an evaluation, or of a run: one HTML file in which the beating model is turned and compared.
  *
  * The page needs no other file and no network. Its shapes are numbers: positions of 16 bits in the box around all
  * phases, distances of 16 bits, both as differences that deflate well. docs/evaluation.md has the form.
@@ -9,12 +9,14 @@
 #define DynamicCoronary_WebReview_h
 
 #include "Evaluation.h"
+#include "EvaluationPlots.h"
 
 #include <nlohmann/json.hpp>
 
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace coronary
@@ -93,6 +95,17 @@ PackedShapes PackShapes(const ReviewCase& shapes);
 /// As many triangles a surface as keep a page of so many phases, over all cases, small and quick.
 std::int64_t DefaultReviewTriangles(std::int64_t phases);
 
+/// What the page says of how it was made, and what lies beside it.
+struct ReviewOrigin
+{
+  std::string version;
+  std::string command;
+  std::vector<std::pair<std::string, std::string>> settings; ///< name, value
+  std::vector<std::pair<std::string, std::string>> inputs;   ///< model and truth of each case
+  std::vector<std::string> warnings;                         ///< besides those of the cases
+  std::vector<std::string> files; ///< that lie beside the page, relative to it
+};
+
 /// Collects cases and writes the page.
 class WebReview
 {
@@ -104,23 +117,27 @@ public:
   /// A PNG file that the page has in it. @return its number, for `run`
   std::size_t AddPicture(const std::string& png);
 
+  /// A picture of the last case that was added. @param file  where it is beside the page, too
+  void AddIllustration(const std::string& png, const std::string& file, const std::string& title);
+
   /**
    * What a run says of its last case that was added: its vessels with their pictures, warnings, findings.
    * docs/evaluation.md has the form.
    */
   void SetRun(nlohmann::ordered_json run);
 
-  /**
-   * The page, the same bytes of the same input. Every text in it is escaped.
-   * @param command  how it was made, for the reader
-   */
-  std::string Html(const std::string& version, const std::string& command) const;
+  /// Drawings of the measures, all cases in each.
+  void SetPlots(const std::vector<EvaluationPlot>& plots) { this->Plots = plots; }
+
+  /// The page, the same bytes of the same input. Every text in it is escaped.
+  std::string Html(const ReviewOrigin& origin) const;
 
 private:
   std::vector<CaseEvaluation> Evaluations;
   std::vector<nlohmann::ordered_json> Cases;
   std::vector<std::string> Blocks;   ///< deflated, in base 64
   std::vector<std::string> Pictures; ///< in base 64
+  std::vector<EvaluationPlot> Plots;
 };
 }
 

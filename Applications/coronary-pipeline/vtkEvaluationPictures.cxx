@@ -7,29 +7,26 @@
 #include "vtkScenePainter.h"
 #include "vtkSurfaceInput.h"
 
-#include "vtkAppendPolyData.h"
 #include "vtkCellArray.h"
 #include "vtkCellArrayIterator.h"
 #include "vtkCellData.h"
 #include "vtkColorTransferFunction.h"
 #include "vtkFloatArray.h"
+#include "vtkGlyph3D.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkPolyDataNormals.h"
-#include "vtkRenderWindow.h"
 #include "vtkSphereSource.h"
 #include "vtkTubeFilter.h"
 #include "vtkUnsignedCharArray.h"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <map>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -310,14 +307,46 @@ int DrawFrameKey(
   return x + 56 + page.Write(x + 56, y, text, 28, Black) + 44;
 }
 
+void DrawTitle(
+  PictureCanvas& page, const Stage& stage, const PictureView& view, const std::string& what = "")
+{
+  page.Write(Margin, Margin + 18, stage.Name() + what, 40, Black, Anchor::Left, true);
+  page.Write(page.Width() - Margin, Margin + 18, "view " + view.Name(), 28, Grey, Anchor::Right);
+}
+
 constexpr int FrameThickness = 4;
+constexpr int Inside = FrameThickness + 2;
 constexpr int Dash = 16;
 
-void DrawFrame(
-  PictureCanvas& page, int x, int y, int width, int height, const PhaseEvaluation& phase)
+/// Part of a page.
+struct Tile
 {
-  page.Frame(x, y, width, height, FrameThickness, phase.lost ? Orange : Black,
-    phase.interpolated ? Dash : 0);
+  int left;
+  int top;
+  int width;
+  int height;
+};
+
+void DrawFrame(PictureCanvas& page, const Tile& tile, const PhaseEvaluation& phase)
+{
+  page.Frame(tile.left, tile.top, tile.width, tile.height, FrameThickness,
+    phase.lost ? Orange : Black, phase.interpolated ? Dash : 0);
+}
+
+/// Above and below the picture of a large tile.
+constexpr int Band = 58;
+
+/// The phase's name above, its distances below; the picture fills what is between.
+void DrawLargeTile(
+  PictureCanvas& page, const Tile& tile, const PictureCanvas& picture, const PhaseEvaluation& phase)
+{
+  const int right = tile.left + tile.width - 22;
+  page.Draw(picture, tile.left + Inside, tile.top + Band);
+  page.Write(tile.left + 22, tile.top + 32, PhaseTitle(phase), 30, phase.lost ? Orange : Black,
+    Anchor::Left, true);
+  page.Write(right, tile.top + 32, Percent(phase), 26, Black, Anchor::Right);
+  page.Write(tile.left + 22, tile.top + tile.height - 31, Distances(phase), 26, Black);
+  DrawFrame(page, tile, phase);
 }
 
 /// The centre of a magnified view with the most points in it; the place that is shown stays away from its edges.
@@ -362,64 +391,6 @@ PictureCanvas PaintOverlay(
 }
 }
 
-bool CanDraw(std::string& why)
-{
-  vtkNew<vtkRenderWindow> window;
-  if (!window->IsA("vtkXOpenGLRenderWindow"))
-  {
-    return true;
-  }
-  void* library = dlopen("libX11.so.6", RTLD_NOW | RTLD_LOCAL);
-  if (!library)
-  {
-    why = "libX11.so.6 is missing";
-    return false;
-  }
-  using Open = void* (*)(const char*);
-  using Query = int (*)(void*, const char*, int*, int*, int*);
-  using Close = int (*)(void*);
-  const auto open = reinterpret_cast<Open>(dlsym(library, "XOpenDisplay"));
-  const auto query = reinterpret_cast<Query>(dlsym(library, "XQueryExtension"));
-  const auto close = reinterpret_cast<Close>(dlsym(library, "XCloseDisplay"));
-  bool there = false;
-  if (open && query && close)
-  {
-    void* display = open(nullptr);
-    const char* name = std::getenv("DISPLAY");
-    if (!display)
-    {
-      why = name && *name ? std::string("the X server '") + name + "' does not answer"
-                          : std::string("there is no display (DISPLAY is not set)");
-    }
-    else
-    {
-      int ignored[3];
-      there = query(display, "GLX", ignored, ignored + 1, ignored + 2) != 0;
-      if (!there)
-      {
-        why = std::string("the X server '") + (name ? name : "") + "' has no GLX";
-      }
-      // One connection stays until the end of the process: xvfb-run's server resets itself when its last
-      // client leaves, and whoever connects meanwhile, as between two windows of VTK's, is dropped.
-      static void* kept = nullptr;
-      if (there && !kept)
-      {
-        kept = display;
-      }
-      else
-      {
-        close(display);
-      }
-    }
-  }
-  else
-  {
-    why = "libX11.so.6 is not what it should be";
-  }
-  // The library stays: VTK uses it too.
-  return there;
-}
-
 void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
 {
   const Stage stage(scene);
@@ -440,8 +411,6 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
   const int first = shown == 0 ? 0 : std::clamp(focus - 1, 0, count - shown);
   const int largeWidth = shown == 0 ? 0 : (pageWidth - 2 * Margin - 2 * Gap) / 3;
   const int largeHeight = largeWidth * 3 / 4;
-  // Writing above and below what is magnified.
-  constexpr int Band = 60;
   const int largeInside = largeHeight - 2 * Band;
   const int gridBottom = Margin + Header + rows * (height + Gap);
   const int pageHeight = gridBottom + Margin + (shown == 0 ? 0 : 100 + largeHeight);
@@ -449,8 +418,7 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
   PictureCanvas page(pageWidth, pageHeight);
   const double aspect = double(width) / height;
   const PictureView view = stage.View(aspect, OverlayMargin);
-  page.Write(Margin, Margin + 16, stage.Name(), 40, Black, Anchor::Left, true);
-  page.Write(pageWidth - Margin, Margin + 16, "view " + view.Name(), 28, Grey, Anchor::Right);
+  DrawTitle(page, stage, view);
   int x = Margin;
   const int y = Margin + 92;
   x = DrawKey(page, x, y, Red, "model");
@@ -474,14 +442,13 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
       stage.SomeOf(focus), 0.5 * (side.at + side.nearest), close, double(largeWidth) / largeInside);
   }
 
-  const int inside = FrameThickness + 2;
   for (int k = 0; k < count; ++k)
   {
     const int left = Margin + (k % columns) * (width + Gap);
     const int top = Margin + Header + (k / columns) * (height + Gap);
     const PhaseEvaluation& phase = stage.Phase(k);
-    page.Draw(PaintOverlay(stage, k, view, width - 2 * inside, height - 2 * inside), left + inside,
-      top + inside);
+    page.Draw(PaintOverlay(stage, k, view, width - 2 * Inside, height - 2 * Inside), left + Inside,
+      top + Inside);
     page.Write(left + 18, top + 26, PhaseName(phase), 26, Black, Anchor::Left, true);
     page.Write(left + width - 18, top + 26, Percent(phase), 22, Black, Anchor::Right);
     page.Write(left + 18, top + height - 26, Distances(phase), 20, Grey);
@@ -492,16 +459,16 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
     if (k >= first && k < first + shown)
     {
       const std::array<double, 2> centre =
-        view.PixelOf(close.centre, width - 2 * inside, height - 2 * inside);
-      const double scale = (height - 2 * inside) / view.height;
+        view.PixelOf(close.centre, width - 2 * Inside, height - 2 * Inside);
+      const double scale = (height - 2 * Inside) / view.height;
       const int boxHeight = static_cast<int>(scale * close.height);
       const int boxWidth = boxHeight * largeWidth / largeInside;
-      page.Frame(left + inside + static_cast<int>(centre[0]) - boxWidth / 2,
-        top + inside + static_cast<int>(centre[1]) - boxHeight / 2, boxWidth, boxHeight, 2, Grey);
+      page.Frame(left + Inside + static_cast<int>(centre[0]) - boxWidth / 2,
+        top + Inside + static_cast<int>(centre[1]) - boxHeight / 2, boxWidth, boxHeight, 2, Grey);
     }
-    DrawFrame(page, left, top, width, height, phase);
+    DrawFrame(page, { left, top, width, height }, phase);
   }
-  DrawScaleBar(page, pageWidth - Margin, y + 12, view, height - 2 * inside);
+  DrawScaleBar(page, pageWidth - Margin, y + 12, view, height - 2 * Inside);
 
   if (shown > 0)
   {
@@ -512,15 +479,9 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
     const int top = gridBottom + 80;
     for (int k = 0; k < shown; ++k)
     {
-      const PhaseEvaluation& phase = stage.Phase(first + k);
-      const int left = Margin + k * (largeWidth + Gap);
-      page.Draw(PaintOverlay(stage, first + k, close, largeWidth - 2 * inside, largeInside),
-        left + inside, top + Band);
-      page.Write(left + 22, top + 32, PhaseTitle(phase), 30, phase.lost ? Orange : Black,
-        Anchor::Left, true);
-      page.Write(left + largeWidth - 22, top + 32, Percent(phase), 26, Black, Anchor::Right);
-      page.Write(left + 22, top + largeHeight - 32, Distances(phase), 26, Black);
-      DrawFrame(page, left, top, largeWidth, largeHeight, phase);
+      DrawLargeTile(page, { Margin + k * (largeWidth + Gap), top, largeWidth, largeHeight },
+        PaintOverlay(stage, first + k, close, largeWidth - 2 * Inside, largeInside),
+        stage.Phase(first + k));
     }
     DrawScaleBar(page, Margin + shown * (largeWidth + Gap) - Gap - 30, top + largeHeight - 18,
       close, largeInside);
@@ -663,20 +624,15 @@ void DrawDistances(const EvaluationScene& scene, const std::string& path)
   constexpr int Gap = 14;
   constexpr int Header = 90;
   constexpr int Footer = 130;
-  constexpr int Band = 56;
   const int columns = phases.size() == 1 ? 1 : 2;
   const int rows = (static_cast<int>(phases.size()) + 1) / 2;
   const int width = (PageWidth - 2 * Margin - (columns - 1) * Gap) / columns;
   const int height = std::min(width * 3 / 4, 1000);
   PictureCanvas page(PageWidth, 2 * Margin + Header + rows * (height + Gap) + Footer);
-  const int inside = FrameThickness + 2;
-  const PictureView view = stage.View(double(width - 2 * inside) / (height - 2 * Band), 0.02);
-  page.Write(Margin, Margin + 20, stage.Name() + ": distance of the model from the truth", 40,
-    Black, Anchor::Left, true);
-  page.Write(PageWidth - Margin, Margin + 20, "view " + view.Name(), 28, Grey, Anchor::Right);
+  const PictureView view = stage.View(double(width - 2 * Inside) / (height - 2 * Band), 0.02);
+  DrawTitle(page, stage, view, ": distance of the model from the truth");
   for (std::size_t k = 0; k < phases.size(); ++k)
   {
-    const PhaseEvaluation& phase = stage.Phase(phases[k]);
     vtkNew<vtkPolyData> coloured;
     coloured->ShallowCopy(stage.Model(phases[k]));
     vtkNew<vtkFloatArray> values;
@@ -692,13 +648,9 @@ void DrawDistances(const EvaluationScene& scene, const std::string& path)
     const int top = Margin + Header + static_cast<int>(k / 2) * (height + Gap);
     PictureItem item{ coloured, Grey };
     item.map = map;
-    page.Draw(stage.Painter().Paint({ item }, view, width - 2 * inside, height - 2 * Band),
-      left + inside, top + Band);
-    page.Write(
-      left + 22, top + 32, PhaseTitle(phase), 30, phase.lost ? Orange : Black, Anchor::Left, true);
-    page.Write(left + width - 22, top + 32, Percent(phase), 26, Black, Anchor::Right);
-    page.Write(left + 22, top + height - 30, Distances(phase), 26, Black);
-    DrawFrame(page, left, top, width, height, phase);
+    DrawLargeTile(page, { left, top, width, height },
+      stage.Painter().Paint({ item }, view, width - 2 * Inside, height - 2 * Band),
+      stage.Phase(phases[k]));
     if (k + 1 == phases.size())
     {
       DrawScaleBar(page, left + width - 30, top + height - 18, view, height - 2 * Band);
@@ -723,8 +675,7 @@ vtkSmartPointer<vtkPolyData> ColouredLines(
   vtkPolyData* lines, const std::map<long long, std::size_t>& ranks)
 {
   auto coloured = vtkSmartPointer<vtkPolyData>::New();
-  coloured->SetPoints(lines->GetPoints());
-  coloured->SetLines(lines->GetLines());
+  coloured->CopyStructure(lines);
   vtkDataArray* groups = lines->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
   vtkNew<vtkUnsignedCharArray> colours;
   colours->SetNumberOfComponents(3);
@@ -810,32 +761,28 @@ vtkSmartPointer<vtkPolyData> PathTubes(
   tubes->SetNumberOfSides(10);
   tubes->CappingOn();
   tubes->Update();
-  vtkSmartPointer<vtkPolyData> tube = vtkSmartPointer<vtkPolyData>::New();
-  tube->ShallowCopy(tubes->GetOutput());
-  return tube;
+  return tubes->GetOutput();
 }
 
 vtkSmartPointer<vtkPolyData> Spheres(
   vtkPolyData* tree, const std::vector<vtkIdType>& chosen, double radius)
 {
-  vtkNew<vtkAppendPolyData> all;
+  vtkNew<vtkPoints> points;
   for (const vtkIdType id : chosen)
   {
-    vtkNew<vtkSphereSource> sphere;
-    sphere->SetCenter(tree->GetPoint(id));
-    sphere->SetRadius(radius);
-    sphere->SetThetaResolution(14);
-    sphere->SetPhiResolution(10);
-    sphere->Update();
-    all->AddInputData(sphere->GetOutput());
+    points->InsertNextPoint(tree->GetPoint(id));
   }
-  vtkSmartPointer<vtkPolyData> result = vtkSmartPointer<vtkPolyData>::New();
-  if (!chosen.empty())
-  {
-    all->Update();
-    result->ShallowCopy(all->GetOutput());
-  }
-  return result;
+  vtkNew<vtkPolyData> places;
+  places->SetPoints(points);
+  vtkNew<vtkSphereSource> sphere;
+  sphere->SetRadius(radius);
+  sphere->SetThetaResolution(14);
+  sphere->SetPhiResolution(10);
+  vtkNew<vtkGlyph3D> spheres;
+  spheres->SetInputData(places);
+  spheres->SetSourceConnection(sphere->GetOutputPort());
+  spheres->Update();
+  return spheres->GetOutput();
 }
 
 /// Root of the mean squared move between two phases, of points that correspond; of the middle, where none do.
@@ -861,18 +808,21 @@ double MoveBetween(vtkPolyData* a, vtkPolyData* b)
   return std::sqrt(sum / static_cast<double>(a->GetNumberOfPoints()));
 }
 
+/// 0, 1, 2, ...
+std::vector<int> Numbers(int count)
+{
+  std::vector<int> numbers(static_cast<std::size_t>(count));
+  std::iota(numbers.begin(), numbers.end(), 0);
+  return numbers;
+}
+
 /// The two phases that are furthest apart, and the one that is furthest from both.
 std::vector<int> ThreePhases(const Stage& stage)
 {
   const int count = stage.Count();
   if (count <= 3)
   {
-    std::vector<int> all(count);
-    for (int k = 0; k < count; ++k)
-    {
-      all[k] = k;
-    }
-    return all;
+    return Numbers(count);
   }
   std::vector<std::vector<double>> moves(count, std::vector<double>(count, 0.0));
   int first = 0;
@@ -936,8 +886,7 @@ void DrawSequence(const EvaluationScene& scene, const std::string& path)
   const PictureView view = stage.View(double(width) / height, 0.02);
   // As wide as it is seen well, whatever the tree's size.
   const double unit = view.height / 1000.0;
-  page.Write(Margin, Margin + 16, stage.Name(), 40, Black, Anchor::Left, true);
-  page.Write(PageWidth - Margin, Margin + 16, "view " + view.Name(), 28, Grey, Anchor::Right);
+  DrawTitle(page, stage, view);
   const int titles = Margin + 100;
   const int top = Margin + Header;
   int left = Margin;
@@ -1005,11 +954,7 @@ std::vector<std::string> DrawBeating(const EvaluationScene& scene, const std::st
   const Stage stage(scene);
   constexpr int Side = 640;
   constexpr int Band = 44;
-  std::vector<int> order(stage.Count());
-  for (int k = 0; k < stage.Count(); ++k)
-  {
-    order[k] = k;
-  }
+  std::vector<int> order = Numbers(stage.Count());
   const bool fractions = std::all_of(
     order.begin(), order.end(), [&](int k) { return std::isfinite(stage.Phase(k).fraction); });
   if (fractions)
@@ -1047,7 +992,8 @@ std::vector<std::string> DrawBeating(const EvaluationScene& scene, const std::st
   }
   if (CanWriteGif())
   {
-    WriteAnimatedGif(frames, delays, folder + "/beating.gif");
+    written.push_back(folder + "/beating.gif");
+    WriteAnimatedGif(frames, delays, written.back());
   }
   return written;
 }

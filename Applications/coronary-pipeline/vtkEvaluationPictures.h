@@ -2,7 +2,7 @@
  * @file vtkEvaluationPictures.h
  * @brief The pictures of an evaluation: the paper's Figs. 5 and 6, distances in colours, the beating tree.
  *
- * All of them need a display, or a VTK that needs none: ask CanDraw first.
+ * All of them need a display, or a VTK that needs none: ask CanDraw (vtkDisplay.h) first.
  */
 #ifndef vtkEvaluationPictures_h
 #define vtkEvaluationPictures_h
@@ -41,13 +41,6 @@ struct EvaluationScene
 };
 
 /**
- * Whether pictures can be drawn here. VTK ends the process when it finds no X server, so this asks for one
- * before; a VTK made for EGL or OSMesa needs none.
- * @param why  what is missing, a sentence
- */
-bool CanDraw(std::string& why);
-
-/**
  * Fig. 6: model (red) over truth (green) in every phase, seen from one place; dashed frames around interpolated
  * phases, solid ones around tracked; beneath, the lost phase with the greatest HD (the phase with the greatest HD where
  * none is lost) and its neighbours, magnified. PNG, at least 2400 pixels wide.
@@ -66,7 +59,7 @@ void DrawSequence(const EvaluationScene& scene, const std::string& path);
 /**
  * The beating tree, a picture a phase, phases in the order of their fractions: `folder`/beating_NN.png, and
  * `folder`/beating.gif where the program was built with giflib.
- * @return the PNG files' paths, in order
+ * @return the files' paths, in this order
  */
 std::vector<std::string> DrawBeating(const EvaluationScene& scene, const std::string& folder);
 

@@ -2,13 +2,10 @@
 
 #include "vtkImageData.h"
 #include "vtkNew.h"
-#include "vtkPNGWriter.h"
-#include "vtkUnsignedCharArray.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <stdexcept>
 
 namespace coronary
 {
@@ -25,17 +22,7 @@ std::string Png(int width, int height, int components, Row row)
   {
     row(y, static_cast<unsigned char*>(image->GetScalarPointer(0, height - 1 - y, 0)));
   }
-  vtkNew<vtkPNGWriter> writer;
-  writer->SetInputData(image);
-  writer->WriteToMemoryOn();
-  writer->Write();
-  vtkUnsignedCharArray* bytes = writer->GetResult();
-  if (!bytes || bytes->GetNumberOfValues() == 0)
-  {
-    throw std::runtime_error("A picture could not be encoded.");
-  }
-  return { reinterpret_cast<const char*>(bytes->GetPointer(0)),
-    static_cast<std::size_t>(bytes->GetNumberOfValues()) };
+  return PngBytes(image);
 }
 }
 

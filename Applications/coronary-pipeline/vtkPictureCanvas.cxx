@@ -164,7 +164,7 @@ void PictureCanvas::WritePng(const std::string& path) const
   WritePngFile(image, path);
 }
 
-void WritePngFile(vtkImageData* image, const std::string& path)
+std::string PngBytes(vtkImageData* image)
 {
   // By way of memory: the writer itself says that the disk is full, whatever is wrong with a file.
   vtkNew<vtkPNGWriter> writer;
@@ -174,10 +174,17 @@ void WritePngFile(vtkImageData* image, const std::string& path)
   vtkUnsignedCharArray* bytes = writer->GetResult();
   if (!bytes || bytes->GetNumberOfValues() == 0)
   {
-    throw std::runtime_error("'" + path + "' could not be encoded.");
+    throw std::runtime_error("A picture could not be encoded.");
   }
+  return { reinterpret_cast<const char*>(bytes->GetPointer(0)),
+    static_cast<std::size_t>(bytes->GetNumberOfValues()) };
+}
+
+void WritePngFile(vtkImageData* image, const std::string& path)
+{
+  const std::string bytes = PngBytes(image);
   std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes->GetPointer(0)), bytes->GetNumberOfValues());
+  file << bytes;
   file.close();
   if (!file)
   {

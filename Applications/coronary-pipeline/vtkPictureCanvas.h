@@ -61,6 +61,9 @@ private:
   std::vector<unsigned char> Pixels;
 };
 
+/// The bytes of a PNG file.
+std::string PngBytes(vtkImageData* image);
+
 /// @throws std::runtime_error naming the file
 void WritePngFile(vtkImageData* image, const std::string& path);
 }

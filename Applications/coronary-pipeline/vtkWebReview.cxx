@@ -111,18 +111,6 @@ std::vector<std::optional<std::int64_t>> GroupsOfPoints(const SurfaceMesh& surfa
   return groups;
 }
 
-/// Names of the groups of a tree.
-void AddLabels(vtkPolyData* tree, std::map<std::int64_t, std::string>& labels)
-{
-  auto* texts = vtkStringArray::SafeDownCast(
-    tree->GetCellData()->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
-  vtkDataArray* groups = tree->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
-  for (vtkIdType n = 0; texts && groups && n < texts->GetNumberOfValues(); ++n)
-  {
-    labels.emplace(static_cast<std::int64_t>(groups->GetTuple1(n)), texts->GetValue(n));
-  }
-}
-
 /// A tree over the phases, and what it calls its groups.
 struct Lines
 {
@@ -225,7 +213,7 @@ Lines ReadLines(const EvaluationScene::Source& source, int count,
     {
       if (!last || !SameCells(last, tree, last->GetLines(), tree->GetLines()))
       {
-        AddLabels(tree, lines.labels);
+        AddGroupNames(tree, lines.labels);
         lines.series.topologies.push_back(
           TopologyOfLines(tree, lines.labels, branches, guessed, pieces));
       }
@@ -339,6 +327,17 @@ private:
   vtkSmartPointer<vtkPolyData> Last;
   ReviewSeries Series;
 };
+}
+
+void AddGroupNames(vtkPolyData* tree, std::map<std::int64_t, std::string>& names)
+{
+  auto* texts = vtkStringArray::SafeDownCast(
+    tree->GetCellData()->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
+  vtkDataArray* groups = tree->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds);
+  for (vtkIdType n = 0; texts && groups && n < texts->GetNumberOfValues(); ++n)
+  {
+    names.emplace(static_cast<std::int64_t>(groups->GetTuple1(n)), texts->GetValue(n));
+  }
 }
 
 ReviewCase MakeReviewCase(

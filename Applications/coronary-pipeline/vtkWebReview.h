@@ -10,6 +10,8 @@
 #include "vtkEvaluationPictures.h"
 
 #include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
 namespace coronary
@@ -24,6 +26,9 @@ namespace coronary
  */
 ReviewCase MakeReviewCase(
   const EvaluationScene& scene, std::int64_t triangles, const ProgressCallback& progress = {});
+
+/// What a tree calls its groups; names that are there already stay.
+void AddGroupNames(vtkPolyData* tree, std::map<std::int64_t, std::string>& names);
 
 /// A result without a truth.
 struct ResultScene

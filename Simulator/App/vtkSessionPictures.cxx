@@ -2,7 +2,7 @@
 
 #include "HeartShell.h"
 #include "SessionImager.h"
-#include "vtkEvaluationPictures.h"
+#include "vtkDisplay.h"
 #include "vtkPictureCanvas.h"
 #include "vtkScenePicture.h"
 #include "vtkSimulatorScene.h"

@@ -7,7 +7,7 @@
 #include "InstrumentCatalogue.h"
 #include "Interruption.h"
 #include "RecordedDevices.h"
-#include "vtkEvaluationPictures.h"
+#include "vtkDisplay.h"
 
 #include "vtkRenderer.h"
 

@@ -96,7 +96,7 @@ check_evaluate() {
   run 0 phantom --seed 5 --phases 3 --truth-only --quiet $coarse --output truth
   # The truth as a result of its own: all distances are 0, all branches there.
   run 0 evaluate --result truth --truth truth --output itself
-  for file in table1.csv table1.tex table1.json branches.csv; do
+  for file in table1.csv table1.tex table1.json branches.csv review.html plots/HD.svg; do
     [ -s itself/$file ] || fail "no itself/$file"
   done
   for key in HD HD95 MSD MSD_area RMS centerline_mean; do
@@ -803,6 +803,8 @@ check_ranks() {
   expect_same_results run1 run3 "run on 3 ranks gives other files"
   diff report1 report3 || fail "run on 3 ranks gives another report"
   diff -rq sequence1 sequence3 || fail "sequence on 3 ranks gives other files"
+  # The page tells where it was written to.
+  sed -i 's/--output table[13]/--output table/' table1/review.html table3/review.html
   diff -rq table1 table3 || fail "evaluate on 3 ranks gives other files"
   [ "$(find run1/motion -name 'surface_0*.vtp' | wc -l)" = 3 ] || fail "not all phases: $(ls run1/motion)"
   [ "$(find sequence1 -name 'mesh_surface_*.obj' | wc -l)" = 3 ] || fail "not all phases: $(ls sequence1)"
@@ -905,7 +907,9 @@ JSON
   run 1 cohort cases.json --output one --no-pictures --retry-failed --jobs 2
   grep -q '^\[3/3\]' stderr || fail "not all failed ones again: $(cat stderr)"
   expect_text stderr "2 of 4 cases failed: bad, slow"
-  for file in table1.csv table1.tex table1.json report.html; do
+  # The page has other words, too.
+  grep -o '"name":"[a-z]*"' one/evaluation/review.html >one/evaluation/names.txt
+  for file in table1.csv table1.tex table1.json names.txt; do
     grep -q made one/evaluation/$file || fail "no made in $file"
     grep -q given one/evaluation/$file || fail "no given in $file"
     grep -q slow one/evaluation/$file && fail "slow in $file"

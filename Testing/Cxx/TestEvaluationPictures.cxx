@@ -1,8 +1,8 @@
 // The pictures of a small made-up case: a forked tree that moves, its truth beside it. Pixels are counted.
 #include "Refusals.h"
 #include "vtkAnimatedGif.h"
+#include "vtkDisplay.h"
 #include "vtkEvaluationPictures.h"
-#include "vtkEvaluationPlots.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -15,7 +15,6 @@
 #include "vtkRenderWindow.h"
 #include "vtkTriangleFilter.h"
 #include "vtkTubeFilter.h"
-#include "vtkXMLDataParser.h"
 
 #include <gtest/gtest.h>
 
@@ -27,8 +26,6 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
-#include <regex>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -297,8 +294,9 @@ TEST_F(EvaluationPictures, SequenceHasPathsOnlyWithCenterlines)
 TEST_F(EvaluationPictures, BeatingIsInTheOrderOfTheFractions)
 {
   std::swap(this->Case.phases[1].fraction, this->Case.phases[3].fraction);
-  const std::vector<std::string> frames = DrawBeating(this->Scene, this->Folder);
-  ASSERT_EQ(frames.size(), 4U);
+  std::vector<std::string> frames = DrawBeating(this->Scene, this->Folder);
+  ASSERT_EQ(frames.size(), CanWriteGif() ? 5U : 4U);
+  frames.resize(4);
   std::vector<double> places;
   for (const std::string& path : frames)
   {
@@ -335,112 +333,6 @@ TEST_F(EvaluationPictures, BeatingIsInTheOrderOfTheFractions)
   EXPECT_EQ(controls, 4U);
 }
 
-std::string ReadText(const std::string& path)
-{
-  std::ifstream file(path);
-  return { std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>() };
-}
-
-TEST_F(EvaluationPictures, PlotsAreDrawnWhereValuesAre)
-{
-  const std::vector<std::string> plots = DrawPlots({ this->Case }, this->Folder);
-  ASSERT_EQ(plots.size(), 4U) << "measures that are known";
-  EXPECT_EQ(plots[0], this->Path("HD.svg"));
-  for (const std::string& plot : plots)
-  {
-    const Picture picture(plot.substr(0, plot.size() - 3) + "png");
-    EXPECT_EQ(picture.Width(), 1200);
-    EXPECT_EQ(picture.Height(), 720);
-    vtkNew<vtkXMLDataParser> parser;
-    parser->SetFileName(plot.c_str());
-    EXPECT_TRUE(parser->Parse()) << plot;
-    EXPECT_STREQ(parser->GetRootElement() ? parser->GetRootElement()->GetName() : "", "svg");
-    const std::string svg = ReadText(plot);
-    EXPECT_EQ(svg.find("matrix"), std::string::npos) << "the data's coordinates";
-    EXPECT_EQ(svg.find("clip-path"), std::string::npos);
-    EXPECT_EQ(svg.find("stroke-dasharray=\"8\"") != std::string::npos,
-      plot.find("length") == std::string::npos)
-      << "the paper's mean";
-  }
-}
-
-// HD is 2.0, 2.1, 2.2, 2.3, the detected length nearly the same in all: discs for the first, diamonds for the second and
-// fourth, a cross; marks in the legend are of 8 pixels.
-TEST_F(EvaluationPictures, MarksOfPlotsAreWhereTheirValuesAre)
-{
-  DrawPlots({ this->Case }, this->Folder);
-  for (const char* key : { "HD", "length_detected" })
-  {
-    SCOPED_TRACE(key);
-    const std::string svg = ReadText(this->Path(std::string(key) + ".svg"));
-    std::vector<std::array<double, 2>> places;
-    for (const char* mark : { "Circle", "Diamond", "Cross" })
-    {
-      const std::regex use(
-        std::string("<use x=\"([^\"]*)\" y=\"([^\"]*)\" width=\"([^\"]*)\" height=\"([^\"]*)\" "
-                    "xlink:href=\"#") +
-        mark + "\"");
-      for (std::sregex_iterator at(svg.begin(), svg.end(), use), end; at != end; ++at)
-      {
-        const double size = std::stod((*at)[3]);
-        EXPECT_NEAR(size, std::stod((*at)[4]), 1e-6) << "as wide as high";
-        if (size > 9.0)
-        {
-          EXPECT_LT(size, 20.0);
-          places.push_back({ std::stod((*at)[1]) + 0.5 * size, std::stod((*at)[2]) + 0.5 * size });
-        }
-      }
-    }
-    ASSERT_EQ(places.size(), 4U) << "one disc, two diamonds, one cross";
-    std::sort(places.begin(), places.end());
-    // Evenly spaced in both directions, upwards.
-    for (int k = 2; k < 4; ++k)
-    {
-      EXPECT_NEAR(places[k][0] - places[k - 1][0], places[1][0] - places[0][0], 0.1);
-      EXPECT_NEAR(places[k][1] - places[k - 1][1], places[1][1] - places[0][1], 0.1);
-    }
-    // The line goes through the middles of the marks.
-    std::smatch line;
-    ASSERT_TRUE(std::regex_search(
-      svg, line, std::regex("stroke=\"#0072b2\" stroke-width=\"1.5\"[^>]* points=\"([^\"]*)\"")));
-    std::string numbers = line[1];
-    std::replace(numbers.begin(), numbers.end(), ',', ' ');
-    std::istringstream stream(numbers);
-    for (const std::array<double, 2>& place : places)
-    {
-      double x = 0.0;
-      double y = 0.0;
-      ASSERT_TRUE(stream >> x >> y);
-      EXPECT_NEAR(x, place[0], 0.1);
-      EXPECT_NEAR(y, place[1], 0.1);
-    }
-    EXPECT_LT(places[1][1], places[0][1] - 2.0);
-    // The picture has the marks at the same places.
-    const Picture picture(this->Path(std::string(key) + ".png"));
-    for (int k : { 0, 1, 3 })
-    {
-      const std::array<int, 3> pixel = picture.At(int(places[k][0]), int(places[k][1]));
-      EXPECT_LT(pixel[0], 60) << k;
-      EXPECT_GT(pixel[2], 140) << k;
-    }
-  }
-}
-
-TEST_F(EvaluationPictures, PlotsOfSeveralCasesHaveAColourEach)
-{
-  CaseEvaluation second = this->Case;
-  second.name = "second";
-  for (PhaseEvaluation& phase : second.phases)
-  {
-    phase.measures.hausdorff *= 1.5;
-    phase.fraction = EvaluationMeasures::NaN; // over the number then
-  }
-  DrawPlots({ this->Case, second }, this->Folder);
-  const Picture picture(this->Path("HD.png"));
-  EXPECT_GT(picture.Count([](const auto& p) { return p[2] > p[0] + 100; }), 200) << "blue";
-  EXPECT_GT(picture.Count([](const auto& p) { return p[0] > p[2] + 100; }), 200) << "vermilion";
-}
-
 TEST_F(EvaluationPictures, WithoutNumbersThereIsStillAPicture)
 {
   this->Case.phases.resize(1);
@@ -449,17 +341,14 @@ TEST_F(EvaluationPictures, WithoutNumbersThereIsStillAPicture)
   DrawOverlayGrid(this->Scene, this->Path("one.png"));
   DrawSequence(this->Scene, this->Path("one-sequence.png"));
   EXPECT_GT(Picture(this->Path("one.png")).Count(IsRed), 3000);
-  EXPECT_EQ(DrawBeating(this->Scene, this->Folder).size(), 1U);
-  EXPECT_TRUE(DrawPlots({ this->Case }, this->Folder).empty());
+  EXPECT_EQ(DrawBeating(this->Scene, this->Folder).size(), CanWriteGif() ? 2U : 1U);
 }
 
 TEST_F(EvaluationPictures, ErrorsNameWhatIsWrong)
 {
   ExpectError(
     [&] { DrawOverlayGrid(this->Scene, this->Path("no/overlay.png")); }, "no/overlay.png");
-  EXPECT_THROW(DrawPlots({ this->Case }, this->Path("no")), std::runtime_error);
   EXPECT_THROW(DrawBeating(this->Scene, this->Path("no")), std::runtime_error);
-  EXPECT_THROW(DrawPlots({}, this->Folder), std::invalid_argument);
   EXPECT_THROW(DrawOverlayGrid(EvaluationScene(), this->Path("x.png")), std::invalid_argument);
   EvaluationScene empty = this->Scene;
   empty.store.reset();

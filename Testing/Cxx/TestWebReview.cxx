@@ -95,6 +95,12 @@ CaseEvaluation FourPhases()
     phase.fraction = 0.25 * k;
     phase.interpolated = k % 2 == 1;
     phase.measures.hausdorff = 2.0 + 0.1 * k;
+    BranchEvaluation branch;
+    branch.group = 7;
+    branch.label = Hostile;
+    branch.length = 80.0;
+    branch.covered = k == 3 ? 0.5 : 1.0;
+    phase.branches.push_back(branch);
     one.phases.push_back(phase);
   }
   return one;
@@ -249,7 +255,10 @@ protected:
   {
     WebReview review;
     review.Add(this->Evaluation, MakeReviewCase(this->Scene, triangles));
-    return Page(review.Html("coronary-pipeline 0", std::string("evaluate ") + Hostile));
+    review.AddIllustration("png", "pictures/overlay.png", Hostile);
+    review.SetPlots(DrawPlots({ this->Evaluation, this->Evaluation }));
+    return Page(review.Html({ "coronary-pipeline 0", std::string("evaluate ") + Hostile,
+      { { Hostile, Hostile } }, { { Hostile, Hostile } }, { Hostile }, { "table1.csv" } }));
   }
 
   CaseEvaluation Evaluation;
@@ -323,7 +332,7 @@ TEST_F(WebReviewPage, AResultWithoutATruthHasDashesWhereItWasGuessed)
     EXPECT_EQ(review.AddPicture("one"), 0U);
     EXPECT_EQ(review.AddPicture("two"), 1U);
     review.SetRun({ { "warnings", { Hostile } } });
-    const Page page(review.Html("coronary-pipeline 0", "review"));
+    const Page page(review.Html({ "coronary-pipeline 0", "review", {}, {}, {}, {} }));
     EXPECT_EQ(page.Element("<script type=\"text/plain\" id=\"picture-1\">"), "dHdv");
     const Json& one = page.Data["cases"][0];
     EXPECT_EQ(one["run"]["warnings"].size(), 1U);
@@ -466,8 +475,8 @@ TEST_F(WebReviewPage, HostileTextsStayTexts)
     }
     return found;
   };
-  EXPECT_EQ(count("<script"), 3) << "the data, the shapes of the case, the program";
-  EXPECT_EQ(count("</script>"), 3);
+  EXPECT_EQ(count("<script"), 4) << "the data, the shapes of the case, a picture, the program";
+  EXPECT_EQ(count("</script>"), 4);
   EXPECT_EQ(count("alert(1)</"), 0);
   EXPECT_EQ(count("<b>"), 0);
   EXPECT_EQ(count("src=\""), 0) << "nothing is loaded";
@@ -478,6 +487,18 @@ TEST_F(WebReviewPage, HostileTextsStayTexts)
   EXPECT_EQ(page.Data["cases"][0]["name"], expected);
   EXPECT_EQ(page.Data["table1"]["cases"][0]["name"], expected);
   EXPECT_EQ(page.Data["command"], "evaluate " + expected);
+  EXPECT_EQ(page.Data["settings"][0], Json::array({ expected, expected }));
+  EXPECT_EQ(page.Data["inputs"][0]["truth"], expected);
+  EXPECT_EQ(page.Data["warnings"][0], expected);
+  EXPECT_EQ(page.Data["files"], Json::array({ "table1.csv" }));
+  EXPECT_EQ(page.Data["cases"][0]["branches"][3][0]["label"], expected);
+  EXPECT_EQ(page.Data["cases"][0]["branches"][3][0]["covered"], 0.5);
+  EXPECT_TRUE(page.Data["cases"][0]["branches"][3][0]["HD"].is_null()) << "not known";
+  EXPECT_EQ(page.Data["cases"][0]["pictures"][0]["title"], expected);
+  EXPECT_EQ(page.Element("<script type=\"text/plain\" id=\"picture-0\">"), "cG5n");
+  ASSERT_EQ(page.Data["plots"].size(), 1U);
+  EXPECT_EQ(page.Data["plots"][0]["key"], "HD");
+  EXPECT_EQ(page.Data["plots"][0]["svg"].get<std::string>().find("<script"), std::string::npos);
   EXPECT_EQ(page.Html, this->Make(1500).Html) << "the same bytes again";
 }
 
@@ -487,7 +508,7 @@ TEST(WebReview, SeveralCasesAreInOnePage)
   const ReviewCase nothing;
   review.Add(FourPhases(), nothing);
   review.Add(FourPhases(), nothing);
-  const Page page(review.Html("0", ""));
+  const Page page(review.Html(ReviewOrigin()));
   EXPECT_EQ(page.Data["cases"].size(), 2U);
   EXPECT_TRUE(page.Data["cases"][1]["shapes"]["model"].is_null());
   EXPECT_EQ(page.Data["table1"]["cases"].size(), 2U);

@@ -170,7 +170,7 @@ def main():
             return pipeline("run", work / "phantom/series.json", *RUN, "--output", model, *arguments)
 
         def measure(*arguments):
-            return pipeline("evaluate", "--result", model, "--truth", model, "--no-pictures", "--web", "--quiet",
+            return pipeline("evaluate", "--result", model, "--truth", model, "--no-pictures", "--quiet",
                             "--output", work / "evaluation", *arguments)
 
         def meshes(*arguments):

@@ -118,7 +118,7 @@ void Cycle(const WorkFolder& work, const Settings& settings)
   Arguments first = run;
   first.push_back(result);
   Do(first);
-  Arguments evaluate{ "evaluate", "--quiet", "--web", "--result", result, "--truth",
+  Arguments evaluate{ "evaluate", "--quiet", "--result", result, "--truth",
     settings.quick ? result : phantom, "--output", work / "evaluation" };
   if (!settings.pictures)
   {

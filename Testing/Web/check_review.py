@@ -3,6 +3,7 @@
 Makes a small evaluation of two cases, opens its page, uses it as a reviewer does and looks at the pixels. Screenshots stay
 in the folder. Exit 125, which CTest takes as skipped, where there is no Chromium.
 """
+import csv
 import json
 import os
 import subprocess
@@ -30,7 +31,7 @@ def make_page(pipeline):
     for seed in ("5", "6"):
         run("phantom", "--seed", seed, *COARSE, "--output", "truth" + seed)
     run("evaluate", "--result", "truth6", "--truth", "truth5", "--name", HOSTILE, "--result", "truth5", "--truth", "truth5",
-        "--name", "itself", "--no-pictures", "--quiet", "--web", "--error-bound", "0.1", "--output", "evaluation")
+        "--name", "itself", "--no-pictures", "--quiet", "--error-bound", "0.1", "--output", "evaluation")
 
 
 def red(pixel):
@@ -123,6 +124,32 @@ def check_tables(page, table):
               "wrong numbers in Part B: %s" % row)
     paper = rows("#part-b tbody.paper tr")
     check(len(paper) == 6 and "4.96 ± 1.78" in paper[-1], "the paper's Part B is not there")
+
+
+def check_branches(page):
+    """Numbers as they are in branches.csv, over the phases, to the digits shown."""
+    with open("evaluation/branches.csv", encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["case"] == HOSTILE]
+    shown = page.evaluate("[...document.querySelectorAll('#branches tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))")
+    check([row[1] for row in shown] == sorted({row["group"] for row in rows}, key=int), "the branches are %s" % shown)
+    for label, group, phases, length, covered, least, *_, greatest in shown:
+        own = [row for row in rows if row["group"] == group]
+        values = {key: [float(row[key]) for row in own] for key in ("length_mm", "covered", "HD_mm")}
+        check((label, phases) == (own[0]["label"], str(len(own))), "a branch is called '%s'" % label)
+        for text, value, digits in ((length, sum(values["length_mm"]) / len(own), 1), (covered, sum(values["covered"]) / len(own), 3),
+                                    (least, min(values["covered"]), 3), (greatest, max(values["HD_mm"]), 3)):
+            check(abs(float(text) - value) < 0.6 * 0.1 ** digits, "%s says %s, not %g" % (label, text, value))
+
+
+def check_origin(page):
+    """What the evaluation was made of, and what lies beside it."""
+    about = page.evaluate("document.getElementById('about').textContent")
+    for text in ("truth6 (model), truth5 (truth)", "at most 0.1 mm too small", "compared as they are", "coronary-pipeline evaluate"):
+        check(text in about, "'%s' is not in: %s" % (text, about))
+    links = page.evaluate("[...document.querySelectorAll('#about a')].map((one) => one.getAttribute('href'))")
+    check({"table1.csv", "table1.tex", "table1.json", "branches.csv", "plots/HD.svg"} <= set(links), "links to %s" % links)
+    check(all(os.path.isfile(os.path.join("evaluation", link)) for link in links), "a link leads nowhere: %s" % links)
+    check(page.evaluate("document.querySelectorAll('#warnings li').length") > 0, "no warning of phases that nothing says were tracked")
 
 
 def check_fingers(user):
@@ -278,6 +305,16 @@ def review(page, url, table):
 
     page.click("#all-measures")
     check_tables(page, table)
+    check_branches(page)
+    check_origin(page)
+    keys = page.evaluate("[...document.querySelectorAll('.plot .title')].map((one) => one.textContent.trim().split(' ')[0])")
+    check(keys == [key for key, value in table["mean"].items() if value is not None], "plots of %s" % keys)
+    check(page.evaluate("[...document.querySelectorAll('.plot .case.here')].every((one) => one.dataset.case === '0')"),
+          "the other case is drawn as this one")
+    user.after(lambda: page.evaluate("(() => { const one = document.querySelector('.plot'), box = one.getBoundingClientRect();"
+                                     " one.dispatchEvent(new MouseEvent('click', { clientX: box.x + 0.5 * box.width, clientY: box.y + 9 })); })()"))
+    check(user.state("phase") == "1", "a click in a plot goes to phase " + user.state("phase"))
+    page.click("#part-a tbody tr:nth-child(1) td:nth-child(4)")
 
     # The other case: its own truth.
     page.click("#part-b tbody tr:nth-child(2) th")
@@ -294,6 +331,9 @@ def review(page, url, table):
     time.sleep(0.3)
     page.screenshot("narrow.png")
     check(page.evaluate("document.documentElement.scrollWidth") <= 390, "the page is wider than a telephone")
+    columns = page.evaluate("[...document.querySelectorAll('th, td, dt, dd, li, p, figcaption')].filter((one) => one.clientHeight >"
+                            " 4 * one.clientWidth && one.textContent.trim().length > 3).map((one) => one.textContent)")
+    check(not columns, "columns of one letter: %s" % columns)
     check_fingers(user)
 
     printed = page.evaluate("document.getElementById('print').src")
@@ -308,6 +348,7 @@ def review_in_old_browser(page, url):
     page.wait("document.getElementById('stage') && %s.state === 'trouble'" % STATE)
     check("DecompressionStream" in page.evaluate("document.getElementById('trouble').textContent"), "no sentence")
     check(page.evaluate("document.querySelectorAll('#part-a tbody tr').length") == 3, "no table")
+    check(page.evaluate("document.querySelectorAll('.plot').length") == 4, "no plots")
 
 
 def main():

@@ -248,7 +248,7 @@ def check_moving(pipeline):
     check(case["run"]["reference"] == 1 and case["run"]["warnings"] == ["centerline: something"], "the run says: %s" % case["run"]["warnings"])
     names = [one["name"] for one in case["run"]["vessels"]]
     check(any(name.startswith("LM, pLAD") for name in names) and any(name.startswith("pRCA") for name in names), "vessels: %s" % names)
-    run("evaluate", "--result", "beat", "--truth", "beat", "--no-pictures", "--quiet", "--web", "--error-bound", "0.1", "--output", "compared")
+    run("evaluate", "--result", "beat", "--truth", "beat", "--no-pictures", "--quiet", "--error-bound", "0.1", "--output", "compared")
     case = data_of("compared/review.html")["cases"][0]
     check(case["shapes"]["truth"] is not None and case["run"]["warnings"] == ["centerline: something"] and case["run"]["reference"] == 1,
           "an evaluation's page does not tell what the run says")

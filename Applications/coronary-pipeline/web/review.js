@@ -95,6 +95,7 @@ class Review {
     this.setRange(this.data.cases[index].range);
     this.run.fill(this.data.cases[index].run || null);
     this.run.mark(null);
+    this.fillPictures();
     byId('modes').hidden = !this.compared;
     byId('against').textContent = this.compared ? 'against the truth' : 'and the image it was found in';
     byId('transport').hidden = phases.length < 2;
@@ -141,16 +142,26 @@ class Review {
     fillPartA(byId('part-a'), this.data, this.index, all, (k) => this.goTo(k));
     fillPartB(byId('part-b'), this.data, all, (k) => k !== this.index && this.showCase(k));
     byId('part-b').querySelector(`[data-case="${this.index}"]`).setAttribute('aria-current', 'true');
-    byId('warnings').replaceChildren(...this.table.warnings.map((text) => element('li', {}, [text])));
-    this.plots = columnsOf(this.data, this.table.phases, all).map((column) =>
-      new Plot(column, this.table.phases, this.order, this.data.paper.part_a.mean[column.key], (k) => this.goTo(k)));
+    byId('warnings').replaceChildren(...[...this.table.warnings, ...this.data.warnings].map((text) => element('li', {}, [text])));
+    const keys = columnsOf(this.data, this.table.phases, all).map((column) => column.key);
+    this.plots = this.data.plots.filter((plot) => keys.includes(plot.key))
+      .map((plot) => new Plot(plot, this.index, this.table.phases, (k) => this.goTo(k)));
     byId('plots').replaceChildren(...this.plots.map((plot) => plot.svg));
-    byId('legend').replaceChildren(...['tracked', 'interpolated', 'lost'].map((kind) =>
-      element('span', {}, [drawing('svg', { viewBox: '-6 -6 12 12' }, [markOf(kind, 0, 0, 3.6)]), kind])),
-    element('span', {}, [drawing('svg', { viewBox: '0 0 24 12', class: 'wide' },
-      [drawing('line', { x1: 0, x2: 24, y1: 6, y2: 6, class: 'paper' })]), 'the paper’s mean, interpolated']));
     this.fillAbout();
     this.markPhase();
+  }
+
+  /** Those for papers, as they are in pictures/, and the branches. */
+  fillPictures() {
+    const { pictures, branches } = this.data.cases[this.index];
+    byId('of-branches').hidden = !fillBranches(byId('branches'), branches);
+    byId('of-pictures').hidden = pictures.length === 0;
+    byId('pictures').replaceChildren(...pictures.map(({ title, file, picture }) => {
+      const figure = element('figure', { class: 'later' }, [element('img', { alt: title, 'data-picture': picture }),
+        element('figcaption', {}, [title, ' (', element('a', { href: file }, [file]), ')'])]);
+      this.run.observer.observe(figure);
+      return figure;
+    }));
   }
 
   fillTicks() {
@@ -577,7 +588,18 @@ class Review {
 
   fillAbout() {
     const one = this.data.cases[this.index];
-    const rows = [['Made by', this.data.version], ['Command', this.data.command]];
+    const rows = [['Made by', this.data.version], ['Command', this.data.command], ...this.data.settings];
+    if (this.data.inputs.length > 0) {
+      const { model, truth } = this.data.inputs[this.index];
+      rows.push(['Read from', `${model} (model), ${truth} (truth)`]);
+    }
+    if (this.data.files.length > 0) {
+      // Of several cases each has its pictures in a folder of its own.
+      const own = this.data.cases.length > 1 ? `pictures/${this.index + 1}/` : '';
+      const files = this.data.files.filter((file) => file.startsWith(own) || !file.startsWith('pictures/'));
+      const links = files.flatMap((file) => [', ', element('a', { href: file }, [file])]);
+      rows.push(['Files beside it', element('span', {}, links.slice(1))]);
+    }
     if (this.compared) {
       rows.push(['Distances', 'of the surfaces as they were, to the nearest point of the other one’s triangles; negative: inside. The colours ' +
         `end at ±${one.range} mm as in the pictures: 99.5 % of the points are nearer there`]);

@@ -95,3 +95,37 @@ function fillPartB(table, data, all, onCase) {
     head, body, paper);
 }
 
+// What the table of branches has: measure, unit, what of its values over the phases, digits.
+const BRANCH_COLUMNS = [['length', 'mm', 'mean', 1], ['covered', '', 'mean', 3], ['covered', '', 'least', 3],
+  ['continuity', '', 'mean', 3], ['continuity', '', 'least', 3], ['mean', 'mm', 'mean', 3], ['HD', 'mm', 'mean', 3],
+  ['HD', 'mm', 'greatest', 3]];
+const BRANCH_NAMES = { mean: 'distance' };
+const OVER_PHASES = {
+  mean: (values) => values.reduce((sum, value) => sum + value, 0) / values.length,
+  least: (values) => Math.min(...values),
+  greatest: (values) => Math.max(...values),
+};
+
+/** A row a branch of the truth, over all phases. @param phases  the branches of each @return whether there are any */
+function fillBranches(table, phases) {
+  const branches = new Map();
+  for (const one of phases.flat()) {
+    branches.set(one.group, [...(branches.get(one.group) || []), one]);
+  }
+  const body = element('tbody');
+  for (const [group, all] of [...branches].sort((a, b) => a[0] - b[0])) {
+    const label = (all.find((one) => one.label) || { label: '–' }).label;
+    body.append(element('tr', {}, [element('th', { scope: 'row', class: 'text' }, [label]), cell(`${group}`), cell(`${all.length}`),
+      ...BRANCH_COLUMNS.map(([key, , what, digits]) => {
+        const values = all.map((one) => one[key]).filter(known);
+        return cell(values.length > 0 ? written(OVER_PHASES[what](values), digits) : '–');
+      })]));
+  }
+  table.replaceChildren(
+    element('caption', {}, ['Over all phases: what the model has of the truth’s branches, and how far their surface is from it.']),
+    element('thead', {}, [element('tr', {}, [element('th', { scope: 'col', class: 'text' }, ['Branch']),
+      ...['group', 'phases'].map((name) => element('th', { scope: 'col' }, [name])),
+      ...BRANCH_COLUMNS.map(([key, unit, what]) => element('th', { scope: 'col' }, [BRANCH_NAMES[key] || key,
+        element('small', {}, [` ${what}${unit ? `, ${unit}` : ''}`])]))])]), body);
+  return branches.size > 0;
+}

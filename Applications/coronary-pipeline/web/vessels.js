@@ -92,7 +92,7 @@ class RunPanel {
       .filter((entry) => entry.isIntersecting).forEach((entry) => this.load(entry.target)), { rootMargin: '800px' });
     byId('marks').addEventListener('change', (event) =>
       document.body.classList.toggle('bare', !event.target.checked));
-    addEventListener('beforeprint', () => document.querySelectorAll('.view').forEach((one) => this.load(one)));
+    addEventListener('beforeprint', () => document.querySelectorAll('.view, .later').forEach((one) => this.load(one)));
   }
 
   /** @param run  null: the case is not of a run */
