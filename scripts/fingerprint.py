@@ -21,7 +21,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Keys of JSON whose values tell of the run, not of its result.
 VOLATILE = {"seconds", "cpu_seconds", "peak_memory_mb", "run", "started", "start", "finished", "date", "host", "machine", "command", "threads",
-            "memory_mb", "version", "created", "when", "wall_seconds", "processor_seconds", "arguments"}
+            "memory_mb", "version", "created", "when", "wall_seconds", "processor_seconds", "arguments", "modified", "digest"}
 TIME = re.compile(rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?Z?")
 DURATION = re.compile(rb"\b\d+(\.\d+)? ?(s|ms|MB|GB)\b")
 
@@ -39,7 +39,7 @@ def content(path, work):
     data = path.read_bytes().replace(os.fsencode(str(work)), b"WORK")
     if path.suffix == ".json":
         return json.dumps(without_volatile(json.loads(data)), sort_keys=True).encode()
-    if path.suffix in {".html", ".txt", ".csv", ".tex"}:
+    if path.suffix in {".html", ".txt", ".csv", ".tex", ".pcirec"}:
         data = TIME.sub(b"TIME", data)
         if path.suffix in {".html", ".txt"}:
             data = DURATION.sub(b"DURATION", re.sub(rb'"(%s)":[^,}]*' % b"|".join(key.encode() for key in sorted(VOLATILE)), b"", data))
@@ -99,8 +99,12 @@ def main():
         work = pathlib.Path(arguments.keep.resolve() if arguments.keep else scratch)
         work.mkdir(parents=True, exist_ok=True)
         make(arguments.build.resolve(), work)
-        found = {str(path.relative_to(work)): hashlib.sha256(content(path, work)).hexdigest()[:16]
-                 for path in sorted(work.rglob("*")) if path.is_file() and not path.is_symlink()}
+        found = {}
+        for path in sorted(work.rglob("*")):
+            if path.is_file() and not path.is_symlink():
+                code = hashlib.sha256(content(path, work)).hexdigest()[:16]
+                # A cohort's kept measures are called by a digest of their inputs' times.
+                found[str(path.relative_to(work).with_stem(code) if path.parent.name == "measures" else path.relative_to(work))] = code
     text = "".join(f"{code} {name}\n" for name, code in found.items())
     if arguments.output:
         arguments.output.write_text(text)

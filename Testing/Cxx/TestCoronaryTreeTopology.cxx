@@ -552,5 +552,5 @@ TEST(CoronaryTreeTopology, PrintsItself)
   std::ostringstream text;
   filter->Print(text);
   EXPECT_NE(text.str().find("PruneRatio: 3"), std::string::npos);
-  EXPECT_NE(text.str().find("TortuosityArrayName: Tortuosity"), std::string::npos);
+  EXPECT_NE(text.str().find("InputRadiusArrayName: Automatic"), std::string::npos);
 }

@@ -974,7 +974,7 @@ TEST(FrangiVesselness, PrintsAllSettings)
   std::ostringstream text;
   filter->Print(text);
   for (const char* name : { "SigmaMin: 0.5", "SigmaMax: 2.5", "NumberOfScales: 5", "Method: 0",
-         "AutomaticC: 1", "UsedC: 0", "Region: 0 0", "VesselnessArrayName: Vesselness" })
+         "AutomaticC: 1", "UsedC: 0", "Region: 0 0" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }

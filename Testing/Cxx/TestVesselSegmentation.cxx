@@ -414,7 +414,7 @@ TEST(VesselSegmentation, PrintsItsSettings)
   filter->AddSeed(1.0, 2.0, 3.0);
   std::ostringstream text;
   filter->Print(text);
-  for (const char* word : { "Seed 0: 1 2 3", "AutomaticOstia", "LargestRadius", "MaskArrayName" })
+  for (const char* word : { "Seed 0: 1 2 3", "AutomaticOstia", "LargestRadius" })
   {
     EXPECT_NE(text.str().find(word), std::string::npos) << word;
   }
