@@ -15,11 +15,6 @@ constexpr std::size_t longestRim = 300;
 constexpr int smoothingRounds = 30;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-Vector3 AreaVector(const Vector3& a, const Vector3& b, const Vector3& c)
-{
-  return 0.5 * (b - a).cross(c - a);
-}
-
 /// Largest bend, then area; what can not be had is infinite.
 struct Weight
 {

@@ -13,6 +13,12 @@
 
 namespace coronary
 {
+/// Across a triangle, as long as its area.
+inline Vector3 AreaVector(const Vector3& a, const Vector3& b, const Vector3& c)
+{
+  return 0.5 * (b - a).cross(c - a);
+}
+
 /// Triangles over a rim's points (first) and new ones (after them).
 struct SurfacePatch
 {

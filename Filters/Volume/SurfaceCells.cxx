@@ -4,11 +4,6 @@
 
 namespace coronary
 {
-Vector3 AreaVector(const Vector3& a, const Vector3& b, const Vector3& c)
-{
-  return 0.5 * (b - a).cross(c - a);
-}
-
 double LeastAngle(const Vector3& a, const Vector3& b, const Vector3& c)
 {
   const double area = (b - a).cross(c - a).norm();

@@ -16,8 +16,6 @@ struct SurfaceCell
   bool band = false;   ///< joins two rims
 };
 
-Vector3 AreaVector(const Vector3& a, const Vector3& b, const Vector3& c);
-
 /// Radians; 0 for a triangle without area.
 double LeastAngle(const Vector3& a, const Vector3& b, const Vector3& c);
 

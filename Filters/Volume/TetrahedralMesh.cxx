@@ -1,5 +1,6 @@
 #include "TetrahedralMesh.h"
 
+#include "MeshQuality.h"
 #include "MeshingPieces.h"
 #include "PartialProgress.h"
 #include "TetrahedralBoundary.h"
@@ -531,6 +532,11 @@ private:
       for (std::size_t i = 0; i + 2 < answer.points.size(); i += 3)
       {
         part.points.emplace_back(answer.points[i], answer.points[i + 1], answer.points[i + 2]);
+        if (!part.points.back().allFinite())
+        {
+          throw MesherFailure(
+            std::string(WorkerName(this->Mesh.backend)) + " gave a point that is not finite");
+        }
       }
       for (std::size_t i = 0; i + 3 < answer.tetrahedra.size(); i += 4)
       {
@@ -606,7 +612,10 @@ private:
       this->Mesh.improvements.insertions += counts.insertions;
     }
     Report(this->Progress, 0.95);
-    this->Measure();
+    TetrahedraQuality quality = MeasureTetrahedra(this->Mesh.points, this->Mesh.tetrahedra);
+    this->Mesh.volume = std::move(quality.volume);
+    this->Mesh.minimumDihedral = std::move(quality.minimumDihedral);
+    this->Mesh.radiusEdgeRatio = std::move(quality.radiusEdgeRatio);
   }
 
   void Append(const MesherAnswer& answer, const MeshingPiece& piece,
@@ -796,30 +805,6 @@ private:
           Describe(this->Input.skeletonPoints[this->Input.skeletonEdges[edge].first]));
       }
     }
-  }
-
-  void Measure()
-  {
-    TetrahedralMesh& mesh = this->Mesh;
-    const std::size_t count = mesh.tetrahedra.size();
-    mesh.volume.resize(count);
-    mesh.minimumDihedral.resize(count);
-    mesh.radiusEdgeRatio.resize(count);
-    ParallelFor(static_cast<std::int64_t>(count), 4096,
-      [&](std::int64_t first, std::int64_t last)
-      {
-        for (std::int64_t i = first; i < last; ++i)
-        {
-          const Tetrahedron& t = mesh.tetrahedra[i];
-          const Vector3& a = mesh.points[t[0]];
-          const Vector3& b = mesh.points[t[1]];
-          const Vector3& c = mesh.points[t[2]];
-          const Vector3& d = mesh.points[t[3]];
-          mesh.volume[i] = TetrahedronVolume(a, b, c, d);
-          mesh.minimumDihedral[i] = MinimumDihedralAngle(a, b, c, d);
-          mesh.radiusEdgeRatio[i] = RadiusEdgeRatio(a, b, c, d);
-        }
-      });
   }
 
   void CheckVolumes() const
