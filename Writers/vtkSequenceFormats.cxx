@@ -217,12 +217,16 @@ void AddFields(const Files& shared, const PhaseMesh& phase, vtkDataSet* data)
 class NumberedFiles : public Format
 {
 public:
+  using Encoder = std::string (*)(const Files&, const PhaseMesh&);
+
   /// @param kind  in the report
-  NumberedFiles(Files& files, std::string kind, const std::string& stem, std::string extension)
+  NumberedFiles(
+    Files& files, std::string kind, const std::string& stem, std::string extension, Encoder encode)
     : Format(files)
     , Kind(std::move(kind))
     , Stem(files.prefix + stem)
     , Extension(std::move(extension))
+    , Encode(encode)
   {
   }
 
@@ -235,7 +239,7 @@ public:
 
   void Write(const PhaseMesh& phase) override
   {
-    this->Shared.Write(this->List.back().path, this->BytesOf(phase));
+    this->Shared.Write(this->List.back().path, this->Encode(this->Shared, phase));
   }
 
   void Finish(bool write, coronary::MeshSequenceReport& report) override
@@ -253,72 +257,12 @@ public:
     report.files.emplace_back(this->Kind, xml ? this->Stem + ".pvd" : list);
   }
 
-protected:
-  virtual std::string BytesOf(const PhaseMesh& phase) const = 0;
-
 private:
   const std::string Kind;
   const std::string Stem; ///< of the files' names
   const std::string Extension;
-  std::vector<coronary::TimedFile> List;
-};
-
-class VolumeFiles : public NumberedFiles
-{
-public:
-  VolumeFiles(Files& files)
-    : NumberedFiles(files, "volume", "volume", "vtu")
-  {
-  }
-
-protected:
-  std::string BytesOf(const PhaseMesh& phase) const override;
-};
-
-class SurfaceFiles : public NumberedFiles
-{
-public:
-  SurfaceFiles(Files& files)
-    : NumberedFiles(files, "surface", "surface", "vtp")
-  {
-  }
-
-protected:
-  std::string BytesOf(const PhaseMesh& phase) const override;
-};
-
-class VmtkFiles : public NumberedFiles
-{
-public:
-  VmtkFiles(Files& files)
-    : NumberedFiles(files, "vmtk", "vmtk", "vtu")
-  {
-  }
-
-protected:
-  std::string BytesOf(const PhaseMesh& phase) const override;
-};
-
-/// The surface in a format of other programs.
-class PlainFiles : public NumberedFiles
-{
-public:
-  using Encoder = std::string (*)(const coronary::FileSurface&);
-
-  /// @param values  whether displacements and velocities are wanted, as far as the mesh has them
-  PlainFiles(Files& files, const std::string& kind, Encoder encode, bool values)
-    : NumberedFiles(files, kind, "surface", kind)
-    , Encode(encode)
-    , Values(values)
-  {
-  }
-
-protected:
-  std::string BytesOf(const PhaseMesh& phase) const override;
-
-private:
   const Encoder Encode;
-  const bool Values;
+  std::vector<coronary::TimedFile> List;
 };
 
 /// A folder a phase with the mesh and each of its faces.
@@ -364,9 +308,8 @@ private:
   const bool Text;
 };
 
-std::string VolumeFiles::BytesOf(const PhaseMesh& phase) const
+std::string VolumeBytes(const Files& shared, const PhaseMesh& phase)
 {
-  const Files& shared = this->Shared;
   const Topology& topology = shared.topology;
   auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
   grid->ShallowCopy(phase.mesh);
@@ -387,9 +330,8 @@ std::string VolumeFiles::BytesOf(const PhaseMesh& phase) const
   return XmlOf(grid);
 }
 
-std::string SurfaceFiles::BytesOf(const PhaseMesh& phase) const
+std::string SurfaceBytes(const Files& shared, const PhaseMesh& phase)
 {
-  const Files& shared = this->Shared;
   const Topology& topology = shared.topology;
   auto surface = vtkSmartPointer<vtkPolyData>::New();
   if (topology.tetrahedra.empty())
@@ -423,9 +365,8 @@ std::string SurfaceFiles::BytesOf(const PhaseMesh& phase) const
   return XmlOf(surface);
 }
 
-std::string VmtkFiles::BytesOf(const PhaseMesh& phase) const
+std::string VmtkBytes(const Files& shared, const PhaseMesh& phase)
 {
-  const Files& shared = this->Shared;
   const Topology& topology = shared.topology;
   auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
   grid->SetPoints(phase.mesh->GetPoints());
@@ -447,9 +388,10 @@ std::string VmtkFiles::BytesOf(const PhaseMesh& phase) const
   return XmlOf(grid);
 }
 
-std::string PlainFiles::BytesOf(const PhaseMesh& phase) const
+/// The surface for formats of other programs.
+/// @param values  whether displacements and velocities are wanted, as far as the mesh has them
+coronary::FileSurface PlainSurface(const Files& shared, const PhaseMesh& phase, bool values)
 {
-  const Files& shared = this->Shared;
   coronary::FileSurface surface;
   std::ostringstream comment;
   comment << "DynamicCoronary, mm, LPS, time " << phase.time;
@@ -465,12 +407,27 @@ std::string PlainFiles::BytesOf(const PhaseMesh& phase) const
   {
     surface.faces.emplace_back(face.id, face.name);
   }
-  if (this->Values)
+  if (values)
   {
     AddVectors(phase.mesh, names::Displacement, "d", shared.surface.points, surface);
     AddVectors(phase.mesh, names::Velocity, "v", shared.surface.points, surface);
   }
-  return this->Encode(surface);
+  return surface;
+}
+
+std::string ObjBytes(const Files& shared, const PhaseMesh& phase)
+{
+  return coronary::ObjText(PlainSurface(shared, phase, false));
+}
+
+std::string PlyBytes(const Files& shared, const PhaseMesh& phase)
+{
+  return coronary::PlyBytes(PlainSurface(shared, phase, true));
+}
+
+std::string StlBytes(const Files& shared, const PhaseMesh& phase)
+{
+  return coronary::StlBytes(PlainSurface(shared, phase, false));
 }
 
 /// A face, or all of them, on points of its own.
@@ -603,30 +560,21 @@ std::vector<std::unique_ptr<Format>> MakeFormats(
   const FormatSettings& settings, Files& files, vtkPointSet* mesh, bool firstRank)
 {
   std::vector<std::unique_ptr<Format>> formats;
-  if (settings.series && !files.topology.tetrahedra.empty())
+  const auto add = [&](bool wanted, const char* kind, const char* stem, const char* extension,
+                     NumberedFiles::Encoder encode)
   {
-    formats.push_back(std::make_unique<VolumeFiles>(files));
-  }
-  if (settings.series)
-  {
-    formats.push_back(std::make_unique<SurfaceFiles>(files));
-  }
-  if (settings.vmtk)
-  {
-    formats.push_back(std::make_unique<VmtkFiles>(files));
-  }
-  if (settings.obj)
-  {
-    formats.push_back(std::make_unique<PlainFiles>(files, "obj", coronary::ObjText, false));
-  }
-  if (settings.ply)
-  {
-    formats.push_back(std::make_unique<PlainFiles>(files, "ply", coronary::PlyBytes, true));
-  }
-  if (settings.stl)
-  {
-    formats.push_back(std::make_unique<PlainFiles>(files, "stl", coronary::StlBytes, false));
-  }
+    if (wanted)
+    {
+      formats.push_back(std::make_unique<NumberedFiles>(files, kind, stem, extension, encode));
+    }
+  };
+  const bool volume = !files.topology.tetrahedra.empty();
+  add(settings.series && volume, "volume", "volume", "vtu", VolumeBytes);
+  add(settings.series, "surface", "surface", "vtp", SurfaceBytes);
+  add(settings.vmtk, "vmtk", "vmtk", "vtu", VmtkBytes);
+  add(settings.obj, "obj", "surface", "obj", ObjBytes);
+  add(settings.ply, "ply", "surface", "ply", PlyBytes);
+  add(settings.stl, "stl", "surface", "stl", StlBytes);
   if (settings.simVascular)
   {
     formats.push_back(std::make_unique<SimVascularFolders>(files, settings.simVascularUnit));

@@ -471,8 +471,8 @@ std::vector<BranchLocator::Found> Locate(const Samples& samples, const BranchLoc
   return found;
 }
 
-/// Common length by that of both branches; 0 below the gate, which is no match, and must not keep a branch from another
-/// one.
+/// Common length by that of both branches; 0 below the gate, which is no match, and must not keep a
+/// branch from another one.
 Eigen::MatrixXd OverlapOf(const Eigen::MatrixXd& common, const BranchMetrics& metrics, double gate)
 {
   Eigen::MatrixXd overlap(common.rows(), common.cols());
