@@ -522,8 +522,11 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
   const vtkIdType count = mesh->GetNumberOfPoints();
   auto* surface = vtkPolyData::SafeDownCast(mesh);
   auto* grid = vtkUnstructuredGrid::SafeDownCast(mesh);
-  const Origin origin = OriginOf(mesh, WeightArray(mesh, names::BoneIndices),
-    WeightArray(mesh, names::BoneWeightsCompact), rest, { this->Blend, this->Stretch ? 1 : 0 });
+  // In this order: what is missing first is named.
+  vtkDataArray* indices = WeightArray(mesh, names::BoneIndices);
+  vtkDataArray* weights = WeightArray(mesh, names::BoneWeightsCompact);
+  const Origin origin =
+    OriginOf(mesh, indices, weights, rest, { this->Blend, this->Stretch ? 1 : 0 });
   Setup* known = this->Data->Find(origin);
 
   const bool withTriangles = surface && this->ComputeNormals;
