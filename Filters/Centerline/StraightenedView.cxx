@@ -1,11 +1,12 @@
 #include "StraightenedView.h"
 
+#include "Require.h"
+
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 namespace coronary
 {
@@ -17,14 +18,6 @@ constexpr double MostPixels = 16e6;
 constexpr int MostRows = 2000;
 /// Directions that are nearer to each other than this give no plane, sine.
 constexpr double Parallel = 0.05;
-
-void Require(bool condition, const char* what)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(what);
-  }
-}
 
 /// A unit vector at right angles to another, the same for the same.
 Vector3 AnyNormal(const Vector3& direction)

@@ -148,14 +148,6 @@ std::vector<coronary::VesselBridge> BridgesOf(vtkFieldData* data)
   return bridges;
 }
 
-void Require(bool condition, const std::string& requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(requirement);
-  }
-}
-
 std::string PropertyMessage(std::string message, std::initializer_list<const char*> prefixes)
 {
   for (const std::string prefix : prefixes)

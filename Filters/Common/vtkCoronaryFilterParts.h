@@ -6,6 +6,7 @@
 #define vtkCoronaryFilterParts_h
 
 #include "Geometry.h"
+#include "Require.h"
 #include "ScalarImage.h"
 #include "VesselBridge.h"
 #include "vtkCoronaryCommonModule.h" // for the export macro
@@ -55,8 +56,7 @@ VTKCORONARYCOMMON_EXPORT void SetBridges(
 /// @throws std::invalid_argument that names the array that does not fit
 VTKCORONARYCOMMON_EXPORT std::vector<coronary::VesselBridge> BridgesOf(vtkFieldData* data);
 
-/// @throws std::invalid_argument(requirement) when `condition` does not hold
-VTKCORONARYCOMMON_EXPORT void Require(bool condition, const std::string& requirement);
+using coronary::Require;
 
 /// The message of an algorithm as the filter's: without the name of the settings' structure that it
 /// begins with, if it is one of `prefixes`, and with a capital letter; so that it begins with the

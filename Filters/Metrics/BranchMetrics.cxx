@@ -1,6 +1,7 @@
 #include "BranchMetrics.h"
 
 #include "PartialProgress.h"
+#include "Require.h"
 #include "SurfaceEnds.h" // for MergeCoincidentPoints
 #include "TriangleBvh.h"
 
@@ -8,7 +9,6 @@
 #include <cmath>
 #include <map>
 #include <set>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -16,14 +16,6 @@ namespace coronary
 {
 namespace
 {
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-
 double LengthOf(const std::vector<Vector3>& points)
 {
   double length = 0.0;

@@ -1,23 +1,13 @@
 #include "ComparedSide.h"
 
 #include "PartialProgress.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <stdexcept>
 
 namespace coronary
 {
-namespace
-{
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-}
-
 void CheckSurface(const SurfaceMesh& mesh, const std::string& name)
 {
   const auto points = static_cast<std::int64_t>(mesh.points.size());

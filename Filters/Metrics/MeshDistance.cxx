@@ -2,24 +2,16 @@
 
 #include "HausdorffSearch.h"
 #include "PartialProgress.h"
+#include "Require.h"
 #include "SurfaceSign.h"
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 namespace coronary
 {
 namespace
 {
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-
 /// Eq. 16 and the area for a side (group -1) or one of its groups.
 void MeasureVertices(const ComparedSide& side, const SurfaceMesh& mesh,
   const std::vector<std::int64_t>& groups, std::int64_t group, SideDistance& result)

@@ -1,5 +1,6 @@
 #include "MotionRegularization.h"
 
+#include "Require.h"
 #include "SkeletonPose.h"
 
 #include <Eigen/SparseCholesky>
@@ -12,7 +13,6 @@
 #include <memory>
 #include <numeric>
 #include <set>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -39,14 +39,6 @@ constexpr double Relaxation = 1.6;
 /// A corner that is beyond a limit at rest may become sharper by this share.
 constexpr double RestSlack = 0.1;
 constexpr std::int64_t Grain = 512;
-
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
 
 struct Segment
 {

@@ -1,6 +1,7 @@
 #include "PhaseInterpolation.h"
 
 #include "HarmonicFit.h"
+#include "Require.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -9,7 +10,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 
 namespace coronary
@@ -24,14 +24,6 @@ using Quaternion = Eigen::Quaterniond;
 
 /// Columns that one task works on.
 constexpr std::int64_t Grain = 8192;
-
-void Require(bool condition, const char* message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
 
 double Apart(double a, double b)
 {

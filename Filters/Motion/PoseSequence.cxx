@@ -1,21 +1,14 @@
 #include "PoseSequence.h"
 
+#include "Require.h"
+
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 namespace coronary
 {
 namespace
 {
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-
 /// An optional member: empty, or `count` values at every phase.
 template <typename Value>
 void RequireSizes(const std::vector<std::vector<Value>>& member, const char* name,

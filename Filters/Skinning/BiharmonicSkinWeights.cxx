@@ -1,26 +1,18 @@
 #include "BiharmonicSkinWeights.h"
 
 #include "PartialProgress.h"
+#include "Require.h"
 #include "SkinWeightOptimizer.h"
 #include "SkinWeightSystem.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 
 namespace coronary
 {
 namespace
 {
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-
 /// Weights without bounds: one linear solve for all bones.
 std::vector<std::vector<double>> SolveWithoutBounds(
   const SkinWeightSystem& system, SkinWeights& result, const ProgressCallback& progress)

@@ -1,26 +1,18 @@
 #include "CenterlineSkeleton.h"
 
 #include "CoronaryAnatomy.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
-#include <stdexcept>
 
 namespace coronary
 {
 namespace
 {
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-
 /// A polyline with a radius, addressed by the length along it.
 class Course
 {

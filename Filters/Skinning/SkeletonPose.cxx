@@ -1,5 +1,7 @@
 #include "SkeletonPose.h"
 
+#include "Require.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,23 +13,6 @@ namespace coronary
 {
 namespace
 {
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-
-/// Without making a string: for what is called in every frame.
-void Require(bool condition, const char* message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-
 void RequireNumber(std::size_t is, std::size_t wanted, const char* what, const char* of)
 {
   if (is != wanted)

@@ -1,6 +1,7 @@
 #include "SkinDeformation.h"
 
 #include "PartialProgress.h"
+#include "Require.h"
 #include "SkinKernels.h"
 
 #include <Eigen/LU>
@@ -27,23 +28,6 @@ constexpr double GreatestLeastRatio = 0.5;
 constexpr double RepairMargin = 0.01;
 constexpr double LeastRepairStretch = 0.2;
 constexpr int RepairPatience = 80; // sweeps
-
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
-
-/// Without making a string: for what is called in every frame.
-void Require(bool condition, const char* message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
 
 const SkinKernels* Find(SkinInstructions instructions)
 {

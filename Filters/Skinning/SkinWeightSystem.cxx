@@ -1,11 +1,12 @@
 #include "SkinWeightSystem.h"
 
+#include "Require.h"
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numeric>
 #include <queue>
-#include <stdexcept>
 #include <unordered_map>
 
 namespace coronary
@@ -13,14 +14,6 @@ namespace coronary
 namespace
 {
 using Tetrahedron = std::array<std::int64_t, 4>;
-
-void Require(bool condition, const std::string& message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
 
 std::string At(const Vector3& p)
 {
