@@ -15,7 +15,7 @@ namespace
 /// @param good     sample of the course that stands alone
 /// @param outside  distance from the parent's axis in its radii
 /// @returns the centres before `good`, nearest to the parent first
-std::vector<Vector3> FollowOuterWall(const VesselCourse& course, std::size_t good,
+std::vector<Vector3> FollowOuterWall(const MeasuredCourse& course, std::size_t good,
   const std::function<double(const Vector3&)>& outside, const CourseMeasurement& measurement)
 {
   const auto after = [&](double length) {
@@ -70,7 +70,7 @@ std::vector<Vector3> FollowOuterWall(const VesselCourse& course, std::size_t goo
 }
 }
 
-std::size_t JoinParent(VesselCourse& course, const CenterlineTree& tree,
+std::size_t JoinParent(MeasuredCourse& course, const CenterlineTree& tree,
   const std::vector<std::int64_t>& chain, std::int32_t owner, const CourseMeasurement& measurement)
 {
   const auto meeting = std::find(chain.begin(), chain.end(), owner) - chain.begin();
@@ -173,7 +173,7 @@ std::size_t JoinParent(VesselCourse& course, const CenterlineTree& tree,
   }
 
   // A straight line from axis to axis; its samples are guesses.
-  VesselCourse joined;
+  MeasuredCourse joined;
   const auto add = [&](const Vector3& point, double confidence)
   {
     joined.points.push_back(point);

@@ -6,7 +6,7 @@
 #define DynamicCoronary_BranchMouth_h
 
 #include "CenterlineTree.h"
-#include "VesselCourse.h"
+#include "MeasuredCourse.h"
 
 namespace coronary
 {
@@ -28,7 +28,7 @@ inline double LineDistance(const Vector3& point, const Vector3& origin, const Ve
  * @param owner  the point of them that the course's way met
  * @returns the index of the parent's point in the tree
  */
-std::size_t JoinParent(VesselCourse& course, const CenterlineTree& tree,
+std::size_t JoinParent(MeasuredCourse& course, const CenterlineTree& tree,
   const std::vector<std::int64_t>& chain, std::int32_t owner, const CourseMeasurement& measurement);
 }
 

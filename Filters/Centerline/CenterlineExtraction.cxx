@@ -6,10 +6,10 @@
 #include "ForkAxes.h"
 #include "GridIndex.h"
 #include "LesionCrossings.h"
+#include "MeasuredCourse.h"
 #include "OstialRoot.h"
 #include "ThinBranches.h"
 #include "TurnedBranches.h"
-#include "VesselCourse.h"
 #include "VesselMarch.h"
 
 #include <algorithm>
@@ -81,7 +81,7 @@ private:
   double SeedReach() const;
   bool PlaceSeeds();
   void MarchFromSeeds();
-  void Calibrate(const VesselCourse& course);
+  void Calibrate(const MeasuredCourse& course);
   void CorrectRadii();
   void SettleOstia();
   std::int64_t Append(const VesselWay& way, int treeId, bool wanted);
@@ -263,7 +263,7 @@ void Extractor::MarchFromSeeds()
 
 /// An ostium is at the edge of the aorta, its surroundings are not a vessel's: once a whole vessel is
 /// known, its lumen is what others are compared with.
-void Extractor::Calibrate(const VesselCourse& course)
+void Extractor::Calibrate(const MeasuredCourse& course)
 {
   if (!std::isnan(this->Courses.lumen.level))
   {
@@ -343,7 +343,7 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
   {
     point = this->FrameToWorld(point);
   }
-  VesselCourse course;
+  MeasuredCourse course;
   course.points = ResampleCurve(points, this->Courses.step);
   if (course.size() < 3)
   {
@@ -697,7 +697,7 @@ void Extractor::LengthenTips()
     std::vector<std::int64_t>& chain = this->Tree.branches[b].points;
     // With a part of what is known, so that it goes on smoothly.
     const std::size_t known = std::min<std::size_t>(paths[b].known, 12);
-    VesselCourse course;
+    MeasuredCourse course;
     for (std::size_t i = paths[b].known - known; i < paths[b].known; ++i)
     {
       course.points.push_back(this->Tree.points[static_cast<std::size_t>(chain[i])]);

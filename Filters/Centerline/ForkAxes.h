@@ -6,7 +6,7 @@
 #define DynamicCoronary_ForkAxes_h
 
 #include "CenterlineTree.h"
-#include "VesselCourse.h"
+#include "MeasuredCourse.h"
 
 namespace coronary
 {

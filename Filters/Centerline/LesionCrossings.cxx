@@ -22,7 +22,7 @@ bool IsOn(const VesselBridge& bridge, const Vector3& place, double reach)
 }
 }
 
-void MarkCrossings(VesselCourse& course, const std::vector<VesselBridge>& bridges,
+void MarkCrossings(MeasuredCourse& course, const std::vector<VesselBridge>& bridges,
   const CourseMeasurement& measurement)
 {
   course.crossing.assign(course.size(), 0);

@@ -6,13 +6,13 @@
 #define DynamicCoronary_LesionCrossings_h
 
 #include "CenterlineTree.h"
+#include "MeasuredCourse.h"
 #include "VesselBridge.h"
-#include "VesselCourse.h"
 
 namespace coronary
 {
 /// Which samples lie on a way across a lesion.
-void MarkCrossings(VesselCourse& course, const std::vector<VesselBridge>& bridges,
+void MarkCrossings(MeasuredCourse& course, const std::vector<VesselBridge>& bridges,
   const CourseMeasurement& measurement);
 
 /// What was guessed on the ways across lesions, and how certain it is that what lies behind them belongs to the tree.

@@ -1,4 +1,4 @@
-#include "VesselCourse.h"
+#include "MeasuredCourse.h"
 
 #include "CurveSmoothing.h"
 #include "Median.h"
@@ -33,7 +33,7 @@ std::vector<Vector3> Tangents(
 /// clear, and an aneurysm's are.
 /// @param before  radii upstream, the nearest last
 std::vector<double> Outgrowth(
-  const VesselCourse& course, std::vector<double> before, const CourseMeasurement& measurement)
+  const MeasuredCourse& course, std::vector<double> before, const CourseMeasurement& measurement)
 {
   constexpr double far = 25.0; // mm upstream that are compared
   constexpr double near = 4.0; // mm that may have begun to widen
@@ -70,7 +70,7 @@ CourseMeasurement::CourseMeasurement(const CenterlineSettings& chosen, const Ima
 {
 }
 
-void CourseMeasurement::Measure(VesselCourse& course, bool move) const
+void CourseMeasurement::Measure(MeasuredCourse& course, bool move) const
 {
   const std::vector<Vector3> tangents = Tangents(course.points, *this);
   course.radius.resize(course.size(), this->voxel);
@@ -111,7 +111,7 @@ void CourseMeasurement::Measure(VesselCourse& course, bool move) const
   }
 }
 
-void CourseMeasurement::Recentre(VesselCourse& course) const
+void CourseMeasurement::Recentre(MeasuredCourse& course) const
 {
   const std::vector<Vector3> tangents = Tangents(course.points, *this);
   const auto unseen = [&](std::size_t i)
@@ -172,7 +172,7 @@ void CourseMeasurement::Recentre(VesselCourse& course) const
   }
 }
 
-void CourseMeasurement::SmoothPositions(VesselCourse& course, double start, double end) const
+void CourseMeasurement::SmoothPositions(MeasuredCourse& course, double start, double end) const
 {
   std::vector<double> weights(course.size());
   for (std::size_t i = 0; i < course.size(); ++i)
@@ -186,7 +186,7 @@ void CourseMeasurement::SmoothPositions(VesselCourse& course, double start, doub
   course.points = SmoothCurve(course.points, weights, wavelength / this->step);
 }
 
-void CourseMeasurement::SmoothRadii(VesselCourse& course) const
+void CourseMeasurement::SmoothRadii(MeasuredCourse& course) const
 {
   std::vector<double> weights(course.size());
   for (std::size_t i = 0; i < course.size(); ++i)
@@ -228,7 +228,7 @@ void CourseMeasurement::SmoothRadii(VesselCourse& course) const
 }
 
 std::size_t CourseMeasurement::SeenUpTo(
-  const VesselCourse& course, double parentRadius, const std::vector<double>& before) const
+  const MeasuredCourse& course, double parentRadius, const std::vector<double>& before) const
 {
   const double gap =
     this->settings.maximumGap > 0.0 ? this->settings.maximumGap : 10.0 * this->voxel;

@@ -1,9 +1,9 @@
 /**
- * @file VesselCourse.h
+ * @file MeasuredCourse.h
  * @brief Samples along one path of an extraction: put on the axis, measured, smoothed, and cut where no vessel is seen.
  */
-#ifndef DynamicCoronary_VesselCourse_h
-#define DynamicCoronary_VesselCourse_h
+#ifndef DynamicCoronary_MeasuredCourse_h
+#define DynamicCoronary_MeasuredCourse_h
 
 #include "CenterlineExtraction.h"
 #include "LumenMeasurement.h"
@@ -15,7 +15,7 @@
 namespace coronary
 {
 /// Measured samples of one path, root first.
-struct VesselCourse
+struct MeasuredCourse
 {
   std::vector<Vector3> points; ///< mm, world
   std::vector<double> radius;
@@ -44,21 +44,21 @@ struct CourseMeasurement
   CourseMeasurement(const CenterlineSettings& settings, const ImageGrid& grid);
 
   /// Sections at all samples. @param move  whether points are put on their sections' centres
-  void Measure(VesselCourse& course, bool move) const;
+  void Measure(MeasuredCourse& course, bool move) const;
 
   /// Beside something much darker or brighter the speed is greatest off the axis, so that no section is found from
   /// there: sections are looked for around the points of longer parts that have none.
-  void Recentre(VesselCourse& course) const;
+  void Recentre(MeasuredCourse& course) const;
 
   /// @param start, end  least weights of the ends; samples weigh as much as their confidence
-  void SmoothPositions(VesselCourse& course, double start, double end) const;
+  void SmoothPositions(MeasuredCourse& course, double start, double end) const;
 
-  void SmoothRadii(VesselCourse& course) const;
+  void SmoothRadii(MeasuredCourse& course) const;
 
   /// @param before  radii upstream, the nearest last
   /// @returns the number of samples up to where a vessel is seen, 0 if there is none
   std::size_t SeenUpTo(
-    const VesselCourse& course, double parentRadius, const std::vector<double>& before) const;
+    const MeasuredCourse& course, double parentRadius, const std::vector<double>& before) const;
 
   const CenterlineSettings& settings;
   double voxel; ///< mm, edge of a cube as large as a voxel
