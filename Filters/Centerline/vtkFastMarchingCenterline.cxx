@@ -176,6 +176,217 @@ void AddCell(vtkCellArray* cells, const std::vector<std::int64_t>& ids)
   }
 }
 
+namespace names = vtkCoronaryArrayNames;
+using Branch = CenterlineTree::Branch;
+
+void FillTree(vtkPolyData* output, const coronary::CenterlineResult& result)
+{
+  const CenterlineTree& tree = result.tree;
+  AddPoints(output, tree.points);
+  vtkNew<vtkCellArray> lines;
+  for (const Branch& branch : tree.branches)
+  {
+    AddCell(lines, branch.points);
+  }
+  output->SetLines(lines);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Radius, tree.radius);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Abscissas, tree.abscissa);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Confidence, tree.confidence);
+  vtkCoronary::AddArray<vtkUnsignedCharArray>(output->GetPointData(), names::Bridged, tree.bridged);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    output->GetPointData(), names::BridgeConfidence, tree.bridgeConfidence);
+  vtkNew<vtkDoubleArray> veinPositions;
+  veinPositions->SetName(names::VeinPositions);
+  veinPositions->SetNumberOfComponents(3);
+  std::vector<double> veinLengths;
+  std::vector<double> veinProbabilities;
+  for (const coronary::RejectedVein& vein : result.veins)
+  {
+    veinPositions->InsertNextTuple(vein.position.data());
+    veinLengths.push_back(vein.length);
+    veinProbabilities.push_back(vein.probability);
+  }
+  output->GetFieldData()->AddArray(veinPositions);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetFieldData(), names::VeinLengths, veinLengths);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    output->GetFieldData(), names::VeinProbabilities, veinProbabilities);
+  vtkCellData* cells = output->GetCellData();
+  AddBranchValues<vtkIntArray>(
+    cells, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });
+  AddBranchValues<vtkIntArray>(
+    cells, names::ParentGroupIds, tree.branches, [](const Branch& b) { return b.parentGroupId; });
+  AddBranchValues<vtkIntArray>(
+    cells, names::TreeIds, tree.branches, [](const Branch& b) { return b.treeId; });
+  AddBranchValues<vtkDoubleArray>(
+    cells, names::Length, tree.branches, [](const Branch& b) { return b.length; });
+  AddBranchValues<vtkDoubleArray>(
+    cells, names::Tortuosity, tree.branches, [](const Branch& b) { return b.tortuosity; });
+}
+
+std::map<int, const Branch*> BranchesById(const CenterlineTree& tree)
+{
+  std::map<int, const Branch*> byId;
+  for (const Branch& branch : tree.branches)
+  {
+    byId[branch.groupId] = &branch;
+  }
+  return byId;
+}
+
+/// Points where the lines of VMTK's form end: first the targets, then the other tips.
+std::vector<std::int64_t> LineEnds(const coronary::CenterlineResult& result, bool findTips)
+{
+  const CenterlineTree& tree = result.tree;
+  std::vector<std::int64_t> ends;
+  for (const coronary::CenterlineEnd& target : result.targets)
+  {
+    if (target.point >= 0)
+    {
+      ends.push_back(target.point);
+    }
+  }
+  if (findTips)
+  {
+    for (const Branch& branch : tree.branches)
+    {
+      const bool tip = std::none_of(tree.branches.begin(), tree.branches.end(),
+        [&](const Branch& other) { return other.parentGroupId == branch.groupId; });
+      if (tip && std::find(ends.begin(), ends.end(), branch.points.back()) == ends.end())
+      {
+        ends.push_back(branch.points.back());
+      }
+    }
+  }
+  return ends;
+}
+
+/// VMTK's form: from the root to every end. Not by ToVmtkTracts: targets come first, and may lie within a branch.
+void FillLines(
+  vtkPolyData* output, const CenterlineTree& tree, const std::vector<std::int64_t>& ends)
+{
+  std::map<int, const Branch*> byId = BranchesById(tree);
+  std::map<std::int64_t, const Branch*> holder;
+  for (const Branch& branch : tree.branches)
+  {
+    for (std::size_t i = branch.parentGroupId == -1 ? 0 : 1; i < branch.points.size(); ++i)
+    {
+      holder[branch.points[i]] = &branch;
+    }
+  }
+  std::vector<Vector3> positions;
+  std::vector<double> radius;
+  std::vector<double> abscissa;
+  std::vector<double> confidence;
+  std::vector<int> centerlineIds;
+  std::vector<int> tractIds;
+  std::vector<int> groupIds;
+  vtkNew<vtkCellArray> tracts;
+  for (std::size_t line = 0; line < ends.size(); ++line)
+  {
+    std::vector<const Branch*> chain;
+    for (const Branch* branch = holder[ends[line]]; branch;
+         branch = branch->parentGroupId == -1 ? nullptr : byId[branch->parentGroupId])
+    {
+      chain.insert(chain.begin(), branch);
+    }
+    for (std::size_t tract = 0; tract < chain.size(); ++tract)
+    {
+      std::vector<std::int64_t> ids;
+      for (const std::int64_t point : chain[tract]->points)
+      {
+        const auto p = static_cast<std::size_t>(point);
+        ids.push_back(static_cast<std::int64_t>(positions.size()));
+        positions.push_back(tree.points[p]);
+        radius.push_back(tree.radius[p]);
+        abscissa.push_back(tree.abscissa[p]);
+        confidence.push_back(tree.confidence[p]);
+        if (point == ends[line])
+        {
+          break;
+        }
+      }
+      if (ids.size() < 2)
+      {
+        continue;
+      }
+      AddCell(tracts, ids);
+      centerlineIds.push_back(static_cast<int>(line));
+      tractIds.push_back(static_cast<int>(tract));
+      groupIds.push_back(chain[tract]->groupId);
+    }
+  }
+  AddPoints(output, positions);
+  output->SetLines(tracts);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Radius, radius);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Abscissas, abscissa);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Confidence, confidence);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::CenterlineIds, centerlineIds);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::TractIds, tractIds);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::GroupIds, groupIds);
+  vtkCoronary::AddArray<vtkIntArray>(
+    output->GetCellData(), names::Blanking, std::vector<int>(groupIds.size(), 0));
+}
+
+void FillBifurcations(vtkPolyData* output, const coronary::CenterlineResult& result)
+{
+  const CenterlineTree& tree = result.tree;
+  std::map<int, const Branch*> byId = BranchesById(tree);
+  std::vector<Vector3> forks;
+  std::vector<double> forkRadius;
+  std::vector<int> parents;
+  std::vector<int> trees;
+  std::size_t width = 2;
+  for (const coronary::CenterlineBifurcation& fork : result.bifurcations)
+  {
+    width = std::max(width, fork.daughterGroupIds.size());
+  }
+  vtkNew<vtkIntArray> daughters;
+  daughters->SetName(names::DaughterGroupIds);
+  daughters->SetNumberOfComponents(static_cast<int>(width));
+  vtkNew<vtkCellArray> vertices;
+  for (const coronary::CenterlineBifurcation& fork : result.bifurcations)
+  {
+    AddCell(vertices, { static_cast<std::int64_t>(forks.size()) });
+    forks.push_back(tree.points[static_cast<std::size_t>(fork.point)]);
+    forkRadius.push_back(tree.radius[static_cast<std::size_t>(fork.point)]);
+    parents.push_back(fork.parentGroupId);
+    trees.push_back(byId[fork.parentGroupId]->treeId);
+    std::vector<int> row(fork.daughterGroupIds);
+    row.resize(width, -1);
+    daughters->InsertNextTypedTuple(row.data());
+  }
+  AddPoints(output, forks);
+  output->SetVerts(vertices);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Radius, forkRadius);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetPointData(), names::ParentGroupIds, parents);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetPointData(), names::TreeIds, trees);
+  output->GetPointData()->AddArray(daughters);
+}
+
+/// What became of seeds and targets.
+void AddStatus(vtkFieldData* fields, const coronary::CenterlineResult& result)
+{
+  const auto addEnds = [&](const std::vector<coronary::CenterlineEnd>& list, const char* statusName,
+                         const char* messageName)
+  {
+    std::vector<int> status;
+    std::vector<std::string> messages;
+    for (const coronary::CenterlineEnd& end : list)
+    {
+      status.push_back(static_cast<int>(end.status));
+      messages.push_back(end.message.empty() ? coronary::EndStatusText(end.status) : end.message);
+    }
+    vtkCoronary::AddArray<vtkIntArray>(fields, statusName, status);
+    vtkCoronary::AddArray<vtkStringArray>(fields, messageName, messages);
+  };
+  addEnds(result.seeds, names::SeedStatus, names::SeedMessage);
+  addEnds(result.targets, names::TargetStatus, names::TargetMessage);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    fields, names::ImageBlur, std::vector<double>{ result.blur });
+  vtkCoronary::AddArray<vtkUnsignedCharArray>(fields, names::Complete,
+    std::vector<unsigned char>{ static_cast<unsigned char>(result.complete ? 1 : 0) });
+}
+
 /// Takes the message's first word as the name of a property.
 std::string PropertyMessage(std::string message)
 {
@@ -331,8 +542,18 @@ int vtkFastMarchingCenterline::RequestData(
   return 0;
 }
 
-void vtkFastMarchingCenterline::Execute(
-  bool wanted, vtkInformationVector** inputs, vtkInformationVector* outputs)
+/// What is extracted from, with what was made or copied for it.
+struct vtkFastMarchingCenterline::Source
+{
+  coronary::CenterlineInput input;
+  coronary::SurfaceDistance distance;
+  std::vector<float> speedCopy;
+  std::vector<unsigned char> maskCopy;
+  coronary::ScalarImage intensity;
+  std::vector<float> intensityCopy;
+};
+
+coronary::CenterlineSettings vtkFastMarchingCenterline::ExtractionSettings() const
 {
   coronary::CenterlineSettings settings;
   if (!this->AutomaticSpeedThreshold)
@@ -355,108 +576,134 @@ void vtkFastMarchingCenterline::Execute(
   settings.snapDistance = this->SnapDistance;
   settings.stepLimit = this->StepLimit;
   settings.voxelLimit = this->VoxelLimit;
+  settings.thinBranches = this->FollowThinBranches;
   settings.Validate();
   vtkCoronary::Require(std::isfinite(this->SurfaceSpacing) && this->SurfaceSpacing >= 0.0,
     "SurfaceSpacing must not be negative");
+  return settings;
+}
 
-  coronary::CenterlineInput input;
+void vtkFastMarchingCenterline::ReadSurface(vtkPolyData* surface, double end, Source& source)
+{
+  source.distance =
+    DistanceTo(surface, this->SurfaceSpacing, vtkCoronary::ProgressOf(this, 0.0, end));
+  const coronary::SurfaceDistance& distance = source.distance;
+  if (distance.openEdges > 0 || distance.doubtfulRows > 0)
+  {
+    vtkWarningMacro(
+      "The surface is not closed: " << distance.openEdges << " open edges. Close its ends first.");
+  }
+  source.input.grid = distance.grid;
+  source.input.wallDistance = distance.values.data();
+}
+
+void vtkFastMarchingCenterline::ReadImage(
+  vtkImageData* image, vtkInformationVector** inputs, Source& source)
+{
+  coronary::CenterlineInput& input = source.input;
+  input.grid = vtkCoronary::GridOf(image);
+  int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
+  const char* name = this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
+  // ParaView gives an empty name while it does not know the input's arrays.
+  vtkAbstractArray* any = name && *name == '\0'
+    ? image->GetPointData()->GetScalars()
+    : this->GetInputAbstractArrayToProcess(0, inputs, association);
+  vtkCoronary::Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
+    "the image's array belongs to the cells: point data are needed");
+  vtkDataArray* array = CheckedArray(any, image, "the image");
+  if (this->ImageKind == MaskImage)
+  {
+    input.mask = ValuesAs<vtkUnsignedCharArray>(array, source.maskCopy);
+    input.bridges = vtkCoronary::BridgesOf(image->GetFieldData());
+  }
+  else
+  {
+    input.speed = ValuesAs<vtkFloatArray>(array, source.speedCopy);
+    if (vtkImageData* mask = ImageOf(inputs[4]))
+    {
+      input.bridges = vtkCoronary::BridgesOf(mask->GetFieldData());
+      const coronary::ImageGrid grid = vtkCoronary::GridOf(mask);
+      vtkCoronary::Require(grid.extent == input.grid.extent &&
+          grid.origin.isApprox(input.grid.origin, 1e-5) &&
+          grid.spacing.isApprox(input.grid.spacing, 1e-5) &&
+          grid.direction.isApprox(input.grid.direction, 1e-5),
+        "the mask is on another grid than the image: extent, spacing, origin or direction "
+        "differs");
+      input.mask = ValuesAs<vtkUnsignedCharArray>(
+        CheckedArray(mask->GetPointData()->GetScalars() ? mask->GetPointData()->GetScalars()
+                                                        : mask->GetPointData()->GetAbstractArray(0),
+          mask, "the mask"),
+        source.maskCopy);
+    }
+  }
+}
+
+void vtkFastMarchingCenterline::ReadIntensity(vtkImageData* measured, Source& source) const
+{
+  if (!measured || measured->GetNumberOfPoints() == 0)
+  {
+    return;
+  }
+  vtkPointData* arrays = measured->GetPointData();
+  vtkAbstractArray* any = this->IntensityArrayName.empty()
+    ? arrays->GetScalars()
+    : arrays->GetAbstractArray(this->IntensityArrayName.c_str());
+  vtkCoronary::Require(any != nullptr || this->IntensityArrayName.empty(),
+    "the measured image has no point array '" + this->IntensityArrayName + "'");
+  vtkDataArray* array = CheckedArray(any, measured, "the measured image");
+  source.intensity = vtkCoronary::ScalarImageOf(measured, array, source.intensityCopy);
+  source.input.intensity = &source.intensity;
+}
+
+coronary::CenterlineResult vtkFastMarchingCenterline::Extract(
+  vtkInformationVector** inputs, const coronary::CenterlineSettings& settings, Source& source)
+{
+  vtkDataObject* data = vtkDataObject::GetData(inputs[0]->GetInformationObject(0));
+  double begin = 0.0;
+  if (auto* surface = vtkPolyData::SafeDownCast(data))
+  {
+    begin = 0.4;
+    this->ReadSurface(surface, begin, source);
+  }
+  else
+  {
+    this->ReadImage(vtkImageData::SafeDownCast(data), inputs, source);
+  }
+  this->ReadIntensity(ImageOf(inputs[3]), source);
+  const coronary::CenterlineInput& input = source.input;
+  const bool refine = this->RefineLumen && input.intensity;
+  const double end = refine ? 0.9 : 1.0;
+  coronary::CenterlineResult result =
+    coronary::ExtractCenterlines(input, settings, vtkCoronary::ProgressOf(this, begin, end));
+  if (refine && !result.tree.branches.empty() && result.blur > 0.0)
+  {
+    const coronary::TreeLumen lumen =
+      coronary::MeasureTreeLumen(result.tree, coronary::VesselPaths(result.tree), *input.intensity,
+        result.blur, vtkCoronary::ProgressOf(this, end, 1.0));
+    result.tree = coronary::WithLumen(std::move(result.tree), lumen.lumen);
+  }
+  return result;
+}
+
+void vtkFastMarchingCenterline::Execute(
+  bool wanted, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  coronary::CenterlineSettings settings = this->ExtractionSettings();
   vtkCoronary::Require(inputs[1]->GetNumberOfInformationObjects() > 0 || !this->SeedPoints.empty(),
     "there is no seed: connect the Seeds input or set SeedPoints");
-  input.seeds = PointsOf(inputs[1], this->SeedPoints);
-  input.targets = PointsOf(inputs[2], this->TargetPoints);
-  settings.findTips = this->FindTips || input.targets.empty();
-  settings.thinBranches = this->FollowThinBranches;
+  Source source;
+  source.input.seeds = PointsOf(inputs[1], this->SeedPoints);
+  source.input.targets = PointsOf(inputs[2], this->TargetPoints);
+  settings.findTips = this->FindTips || source.input.targets.empty();
   vtkDataObject* data = vtkDataObject::GetData(inputs[0]->GetInformationObject(0));
   auto* image = vtkImageData::SafeDownCast(data);
   auto* surface = vtkPolyData::SafeDownCast(data);
-  const bool empty = !wanted || input.seeds.empty() ||
+  const bool empty = !wanted || source.input.seeds.empty() ||
     (image ? image->GetNumberOfPoints() == 0 : surface->GetNumberOfPoints() == 0);
-
   coronary::CenterlineResult result;
   if (!empty)
   {
-    coronary::SurfaceDistance distance;
-    std::vector<float> speedCopy;
-    std::vector<unsigned char> maskCopy;
-    double begin = 0.0;
-    if (surface)
-    {
-      begin = 0.4;
-      distance =
-        DistanceTo(surface, this->SurfaceSpacing, vtkCoronary::ProgressOf(this, 0.0, begin));
-      if (distance.openEdges > 0 || distance.doubtfulRows > 0)
-      {
-        vtkWarningMacro("The surface is not closed: " << distance.openEdges
-                                                      << " open edges. Close its ends first.");
-      }
-      input.grid = distance.grid;
-      input.wallDistance = distance.values.data();
-    }
-    else
-    {
-      input.grid = vtkCoronary::GridOf(image);
-      int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-      const char* name = this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
-      // ParaView gives an empty name while it does not know the input's arrays.
-      vtkAbstractArray* any = name && *name == '\0'
-        ? image->GetPointData()->GetScalars()
-        : this->GetInputAbstractArrayToProcess(0, inputs, association);
-      vtkCoronary::Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
-        "the image's array belongs to the cells: point data are needed");
-      vtkDataArray* array = CheckedArray(any, image, "the image");
-      if (this->ImageKind == MaskImage)
-      {
-        input.mask = ValuesAs<vtkUnsignedCharArray>(array, maskCopy);
-        input.bridges = vtkCoronary::BridgesOf(image->GetFieldData());
-      }
-      else
-      {
-        input.speed = ValuesAs<vtkFloatArray>(array, speedCopy);
-        if (vtkImageData* mask = ImageOf(inputs[4]))
-        {
-          input.bridges = vtkCoronary::BridgesOf(mask->GetFieldData());
-          const coronary::ImageGrid grid = vtkCoronary::GridOf(mask);
-          vtkCoronary::Require(grid.extent == input.grid.extent &&
-              grid.origin.isApprox(input.grid.origin, 1e-5) &&
-              grid.spacing.isApprox(input.grid.spacing, 1e-5) &&
-              grid.direction.isApprox(input.grid.direction, 1e-5),
-            "the mask is on another grid than the image: extent, spacing, origin or direction "
-            "differs");
-          input.mask =
-            ValuesAs<vtkUnsignedCharArray>(CheckedArray(mask->GetPointData()->GetScalars()
-                                               ? mask->GetPointData()->GetScalars()
-                                               : mask->GetPointData()->GetAbstractArray(0),
-                                             mask, "the mask"),
-              maskCopy);
-        }
-      }
-    }
-    coronary::ScalarImage intensity;
-    std::vector<float> intensityCopy;
-    vtkImageData* measured = ImageOf(inputs[3]);
-    if (measured && measured->GetNumberOfPoints() > 0)
-    {
-      vtkPointData* arrays = measured->GetPointData();
-      vtkAbstractArray* any = this->IntensityArrayName.empty()
-        ? arrays->GetScalars()
-        : arrays->GetAbstractArray(this->IntensityArrayName.c_str());
-      vtkCoronary::Require(any != nullptr || this->IntensityArrayName.empty(),
-        "the measured image has no point array '" + this->IntensityArrayName + "'");
-      vtkDataArray* array = CheckedArray(any, measured, "the measured image");
-      intensity = vtkCoronary::ScalarImageOf(measured, array, intensityCopy);
-      input.intensity = &intensity;
-    }
-    const bool refine = this->RefineLumen && input.intensity;
-    const double end = refine ? 0.9 : 1.0;
-    result =
-      coronary::ExtractCenterlines(input, settings, vtkCoronary::ProgressOf(this, begin, end));
-    if (refine && !result.tree.branches.empty() && result.blur > 0.0)
-    {
-      const coronary::TreeLumen lumen =
-        coronary::MeasureTreeLumen(result.tree, coronary::VesselPaths(result.tree),
-          *input.intensity, result.blur, vtkCoronary::ProgressOf(this, end, 1.0));
-      result.tree = coronary::WithLumen(std::move(result.tree), lumen.lumen);
-    }
+    result = this->Extract(inputs, settings, source);
   }
   for (const std::string& message : result.messages)
   {
@@ -473,201 +720,15 @@ void vtkFastMarchingCenterline::Execute(
     }
   }
 
-  // The trees.
-  namespace names = vtkCoronaryArrayNames;
-  using Branch = CenterlineTree::Branch;
-  CenterlineTree& tree = result.tree;
-  vtkPolyData* treeOutput = vtkPolyData::GetData(outputs, TreePort);
-  AddPoints(treeOutput, tree.points);
-  vtkNew<vtkCellArray> lines;
-  for (const Branch& branch : tree.branches)
-  {
-    AddCell(lines, branch.points);
-  }
-  treeOutput->SetLines(lines);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    treeOutput->GetPointData(), vtkCoronaryArrayNames::Radius, tree.radius);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    treeOutput->GetPointData(), names::Abscissas, tree.abscissa);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    treeOutput->GetPointData(), vtkCoronaryArrayNames::Confidence, tree.confidence);
-  vtkCoronary::AddArray<vtkUnsignedCharArray>(
-    treeOutput->GetPointData(), names::Bridged, tree.bridged);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    treeOutput->GetPointData(), names::BridgeConfidence, tree.bridgeConfidence);
-  vtkNew<vtkDoubleArray> veinPositions;
-  veinPositions->SetName(names::VeinPositions);
-  veinPositions->SetNumberOfComponents(3);
-  std::vector<double> veinLengths;
-  std::vector<double> veinProbabilities;
-  for (const coronary::RejectedVein& vein : result.veins)
-  {
-    veinPositions->InsertNextTuple(vein.position.data());
-    veinLengths.push_back(vein.length);
-    veinProbabilities.push_back(vein.probability);
-  }
-  treeOutput->GetFieldData()->AddArray(veinPositions);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    treeOutput->GetFieldData(), names::VeinLengths, veinLengths);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    treeOutput->GetFieldData(), names::VeinProbabilities, veinProbabilities);
-  vtkCellData* cells = treeOutput->GetCellData();
-  AddBranchValues<vtkIntArray>(
-    cells, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });
-  AddBranchValues<vtkIntArray>(
-    cells, names::ParentGroupIds, tree.branches, [](const Branch& b) { return b.parentGroupId; });
-  AddBranchValues<vtkIntArray>(
-    cells, names::TreeIds, tree.branches, [](const Branch& b) { return b.treeId; });
-  AddBranchValues<vtkDoubleArray>(
-    cells, names::Length, tree.branches, [](const Branch& b) { return b.length; });
-  AddBranchValues<vtkDoubleArray>(
-    cells, names::Tortuosity, tree.branches, [](const Branch& b) { return b.tortuosity; });
-
-  // VMTK's form: from the root to every tip and every target.
-  std::map<int, const Branch*> byId;
-  std::map<std::int64_t, const Branch*> holder;
-  for (const Branch& branch : tree.branches)
-  {
-    byId[branch.groupId] = &branch;
-    for (std::size_t i = branch.parentGroupId == -1 ? 0 : 1; i < branch.points.size(); ++i)
-    {
-      holder[branch.points[i]] = &branch;
-    }
-  }
-  std::vector<std::int64_t> ends;
-  for (const coronary::CenterlineEnd& target : result.targets)
-  {
-    if (target.point >= 0)
-    {
-      ends.push_back(target.point);
-    }
-  }
-  if (settings.findTips)
-  {
-    for (const Branch& branch : tree.branches)
-    {
-      const bool tip = std::none_of(tree.branches.begin(), tree.branches.end(),
-        [&](const Branch& other) { return other.parentGroupId == branch.groupId; });
-      if (tip && std::find(ends.begin(), ends.end(), branch.points.back()) == ends.end())
-      {
-        ends.push_back(branch.points.back());
-      }
-    }
-  }
-  vtkPolyData* linesOutput = vtkPolyData::GetData(outputs, LinesPort);
-  std::vector<Vector3> positions;
-  std::vector<double> radius;
-  std::vector<double> abscissa;
-  std::vector<double> confidence;
-  std::vector<int> centerlineIds;
-  std::vector<int> tractIds;
-  std::vector<int> groupIds;
-  vtkNew<vtkCellArray> tracts;
-  for (std::size_t line = 0; line < ends.size(); ++line)
-  {
-    std::vector<const Branch*> chain;
-    for (const Branch* branch = holder[ends[line]]; branch;
-         branch = branch->parentGroupId == -1 ? nullptr : byId[branch->parentGroupId])
-    {
-      chain.insert(chain.begin(), branch);
-    }
-    for (std::size_t tract = 0; tract < chain.size(); ++tract)
-    {
-      std::vector<std::int64_t> ids;
-      for (const std::int64_t point : chain[tract]->points)
-      {
-        const auto p = static_cast<std::size_t>(point);
-        ids.push_back(static_cast<std::int64_t>(positions.size()));
-        positions.push_back(tree.points[p]);
-        radius.push_back(tree.radius[p]);
-        abscissa.push_back(tree.abscissa[p]);
-        confidence.push_back(tree.confidence[p]);
-        if (point == ends[line])
-        {
-          break;
-        }
-      }
-      if (ids.size() < 2)
-      {
-        continue;
-      }
-      AddCell(tracts, ids);
-      centerlineIds.push_back(static_cast<int>(line));
-      tractIds.push_back(static_cast<int>(tract));
-      groupIds.push_back(chain[tract]->groupId);
-    }
-  }
-  AddPoints(linesOutput, positions);
-  linesOutput->SetLines(tracts);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    linesOutput->GetPointData(), vtkCoronaryArrayNames::Radius, radius);
-  vtkCoronary::AddArray<vtkDoubleArray>(linesOutput->GetPointData(), names::Abscissas, abscissa);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    linesOutput->GetPointData(), vtkCoronaryArrayNames::Confidence, confidence);
-  vtkCoronary::AddArray<vtkIntArray>(
-    linesOutput->GetCellData(), names::CenterlineIds, centerlineIds);
-  vtkCoronary::AddArray<vtkIntArray>(linesOutput->GetCellData(), names::TractIds, tractIds);
-  vtkCoronary::AddArray<vtkIntArray>(linesOutput->GetCellData(), names::GroupIds, groupIds);
-  vtkCoronary::AddArray<vtkIntArray>(
-    linesOutput->GetCellData(), names::Blanking, std::vector<int>(groupIds.size(), 0));
-
-  // Bifurcations.
-  vtkPolyData* forksOutput = vtkPolyData::GetData(outputs, BifurcationsPort);
-  std::vector<Vector3> forks;
-  std::vector<double> forkRadius;
-  std::vector<int> parents;
-  std::vector<int> trees;
-  std::size_t width = 2;
-  for (const coronary::CenterlineBifurcation& fork : result.bifurcations)
-  {
-    width = std::max(width, fork.daughterGroupIds.size());
-  }
-  vtkNew<vtkIntArray> daughters;
-  daughters->SetName(names::DaughterGroupIds);
-  daughters->SetNumberOfComponents(static_cast<int>(width));
-  vtkNew<vtkCellArray> vertices;
-  for (const coronary::CenterlineBifurcation& fork : result.bifurcations)
-  {
-    AddCell(vertices, { static_cast<std::int64_t>(forks.size()) });
-    forks.push_back(tree.points[static_cast<std::size_t>(fork.point)]);
-    forkRadius.push_back(tree.radius[static_cast<std::size_t>(fork.point)]);
-    parents.push_back(fork.parentGroupId);
-    trees.push_back(byId[fork.parentGroupId]->treeId);
-    std::vector<int> row(fork.daughterGroupIds);
-    row.resize(width, -1);
-    daughters->InsertNextTypedTuple(row.data());
-  }
-  AddPoints(forksOutput, forks);
-  forksOutput->SetVerts(vertices);
-  vtkCoronary::AddArray<vtkDoubleArray>(
-    forksOutput->GetPointData(), vtkCoronaryArrayNames::Radius, forkRadius);
-  vtkCoronary::AddArray<vtkIntArray>(forksOutput->GetPointData(), names::ParentGroupIds, parents);
-  vtkCoronary::AddArray<vtkIntArray>(forksOutput->GetPointData(), names::TreeIds, trees);
-  forksOutput->GetPointData()->AddArray(daughters);
-
+  FillTree(vtkPolyData::GetData(outputs, TreePort), result);
+  FillLines(
+    vtkPolyData::GetData(outputs, LinesPort), result.tree, LineEnds(result, settings.findTips));
+  FillBifurcations(vtkPolyData::GetData(outputs, BifurcationsPort), result);
   for (const int port : { TreePort, LinesPort, BifurcationsPort })
   {
     vtkFieldData* fields = vtkPolyData::GetData(outputs, port)->GetFieldData();
     fields->PassData(data->GetFieldData());
-    const auto addEnds = [&](const std::vector<coronary::CenterlineEnd>& list,
-                           const char* statusName, const char* messageName)
-    {
-      std::vector<int> status;
-      std::vector<std::string> messages;
-      for (const coronary::CenterlineEnd& end : list)
-      {
-        status.push_back(static_cast<int>(end.status));
-        messages.push_back(end.message.empty() ? coronary::EndStatusText(end.status) : end.message);
-      }
-      vtkCoronary::AddArray<vtkIntArray>(fields, statusName, status);
-      vtkCoronary::AddArray<vtkStringArray>(fields, messageName, messages);
-    };
-    addEnds(result.seeds, names::SeedStatus, names::SeedMessage);
-    addEnds(result.targets, names::TargetStatus, names::TargetMessage);
-    vtkCoronary::AddArray<vtkDoubleArray>(
-      fields, names::ImageBlur, std::vector<double>{ result.blur });
-    vtkCoronary::AddArray<vtkUnsignedCharArray>(fields, names::Complete,
-      std::vector<unsigned char>{ static_cast<unsigned char>(result.complete ? 1 : 0) });
+    AddStatus(fields, result);
   }
 }
 

@@ -65,6 +65,14 @@
 #include <string> // for std::string
 #include <vector> // for std::vector
 
+class vtkImageData;
+
+namespace coronary
+{
+struct CenterlineResult;
+struct CenterlineSettings;
+}
+
 class VTKCORONARYCENTERLINE_EXPORT vtkFastMarchingCenterline : public vtkPolyDataAlgorithm
 {
 public:
@@ -302,6 +310,15 @@ private:
 
   /// @param wanted  false: only what an output without branches has
   void Execute(bool wanted, vtkInformationVector** inputs, vtkInformationVector* outputs);
+
+  struct Source;
+  coronary::CenterlineSettings ExtractionSettings() const;
+  /// @param end  progress when it is done
+  void ReadSurface(vtkPolyData* surface, double end, Source& source);
+  void ReadImage(vtkImageData* image, vtkInformationVector** inputs, Source& source);
+  void ReadIntensity(vtkImageData* measured, Source& source) const;
+  coronary::CenterlineResult Extract(
+    vtkInformationVector** inputs, const coronary::CenterlineSettings& settings, Source& source);
 
   Points SeedPoints;
   Points TargetPoints;

@@ -1,0 +1,205 @@
+#include "BranchMouth.h"
+
+#include "CurveSmoothing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+namespace coronary
+{
+namespace
+{
+/// Centres of a branch that leaves its parent's lumen, found by the part of its wall that is not the parent's.
+/// @param good     sample of the course that stands alone
+/// @param outside  distance from the parent's axis in its radii
+/// @returns the centres before `good`, nearest to the parent first
+std::vector<Vector3> FollowOuterWall(const MeasuredCourse& course, std::size_t good,
+  const std::function<double(const Vector3&)>& outside, const CourseMeasurement& measurement)
+{
+  const auto after = [&](double length) {
+    return std::min(course.size() - 1, good + static_cast<std::size_t>(length / measurement.step));
+  };
+  std::vector<double> radii;
+  std::vector<double> values;
+  for (std::size_t i = good; i <= after(3.0 * course.radius[good]); ++i)
+  {
+    if (course.confidence[i] >= measurement.settings.minimumConfidence)
+    {
+      radii.push_back(course.radius[i]);
+      values.push_back(course.lumen[i]);
+    }
+  }
+  if (radii.size() < 3)
+  {
+    return {};
+  }
+  std::sort(radii.begin(), radii.end());
+  std::sort(values.begin(), values.end());
+  const double radius = radii[radii.size() / 2];
+  const double lumen = values[values.size() / 2];
+  const auto isOwn = [&](const Vector3& wall) { return outside(wall) > 1.1; };
+
+  // The centre nearest to the parent last.
+  std::vector<Vector3> centres;
+  for (std::size_t i = after(1.5 * radius) + 1; i-- > good;)
+  {
+    centres.push_back(course.points[i]);
+  }
+  const std::size_t known = centres.size();
+  const auto chord =
+    std::max<std::size_t>(2, static_cast<std::size_t>(1.5 * radius / measurement.step));
+  while (centres.size() < known + 200)
+  {
+    const Vector3& last = centres.back();
+    const Vector3 back =
+      (last - centres[centres.size() - 1 - std::min(chord, centres.size() - 1)]).normalized();
+    const Vector3 next = last + measurement.step * back;
+    Vector3 centre;
+    if (!back.allFinite() || outside(next) < 0.25 || outside(next) >= outside(last) ||
+      !MeasureArc(
+        *measurement.image, next, back, radius, lumen, isOwn, measurement.lumen, centre) ||
+      (centre - next).norm() > 0.15 * radius)
+    {
+      break;
+    }
+    centres.push_back(centre);
+  }
+  return { centres.rbegin(), centres.rend() - static_cast<std::ptrdiff_t>(known) };
+}
+}
+
+std::size_t JoinParent(MeasuredCourse& course, const CenterlineTree& tree,
+  const std::vector<std::int64_t>& chain, std::int32_t owner, const CourseMeasurement& measurement)
+{
+  const auto meeting = std::find(chain.begin(), chain.end(), owner) - chain.begin();
+  const double parentRadius = tree.radius[static_cast<std::size_t>(owner)];
+  const auto window = static_cast<std::ptrdiff_t>(
+    std::ceil((3.5 * parentRadius + 3.0 * measurement.voxel) / measurement.step));
+  const auto low = std::max<std::ptrdiff_t>(0, meeting - window);
+  const auto high =
+    std::min<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(chain.size()) - 1, meeting + window);
+
+  const auto outside = [&](const Vector3& point)
+  {
+    // In units of the parent's radius.
+    double least = std::numeric_limits<double>::infinity();
+    for (std::ptrdiff_t i = low; i <= high; ++i)
+    {
+      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      least = std::min(least, (point - tree.points[p]).norm() / tree.radius[p]);
+    }
+    return least;
+  };
+
+  // The first part that is clearly a vessel of its own.
+  std::size_t first = 0;
+  while (first + 1 < course.size() && outside(course.points[first]) < 1.15)
+  {
+    ++first;
+  }
+  std::size_t good = first;
+  while (good < course.size() && course.confidence[good] < measurement.settings.minimumConfidence)
+  {
+    ++good;
+  }
+  if (good >= course.size())
+  {
+    good = std::min(first, course.size() - 1);
+  }
+  // A great branch stands alone far from the axis only: from there back into the parent's lumen, as
+  // far as its outer wall is to be seen. Not in masks and surfaces: there an axis is that of
+  // inscribed spheres, and a lumen that widens before it divides has no circle.
+  const bool great =
+    std::isnan(measurement.lumen.level) && course.radius[good] > GreatBranch * parentRadius;
+  const std::vector<Vector3> arcs =
+    great ? FollowOuterWall(course, good, outside, measurement) : std::vector<Vector3>();
+  std::vector<Vector3> samples = arcs;
+  // Over a short chord: a branch may turn within two radii of its mouth.
+  const double length =
+    std::max((arcs.empty() ? 1.4 : 1.0) * course.radius[good], 4.0 * measurement.voxel);
+  for (std::size_t i = good; i < course.size() && samples.size() * measurement.step <= length; ++i)
+  {
+    if (course.confidence[i] >= measurement.settings.minimumConfidence || i == good)
+    {
+      samples.push_back(course.points[i]);
+    }
+  }
+  samples.resize(std::min(
+    samples.size(), std::max<std::size_t>(4, static_cast<std::size_t>(length / measurement.step))));
+  auto best = static_cast<std::size_t>(owner);
+  double least = std::numeric_limits<double>::infinity();
+  if (samples.size() >= 3)
+  {
+    Vector3 direction = (samples.back() - samples.front()).normalized();
+    if (great)
+    {
+      // A great branch leaves in the direction of the flow and bends away, inside the lumen too.
+      const auto at = [&](std::ptrdiff_t i) -> const Vector3&
+      {
+        const std::int64_t p = chain[static_cast<std::size_t>(i)];
+        return tree.points[static_cast<std::size_t>(p)];
+      };
+      direction = (direction + GreatBranchBend * (at(high) - at(low)).normalized()).normalized();
+    }
+    for (std::ptrdiff_t i = low; i <= high; ++i)
+    {
+      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      // Behind the daughter's beginning, and not far away.
+      const double along = (tree.points[p] - samples.front()).dot(direction);
+      const double distance = LineDistance(tree.points[p], samples.front(), direction) +
+        (along > 0.0 ? 2.0 * along : 0.0) - 0.02 * along;
+      if (distance < least)
+      {
+        least = distance;
+        best = p;
+      }
+    }
+  }
+  if (least > 1.2 * parentRadius + measurement.voxel)
+  {
+    least = std::numeric_limits<double>::infinity();
+    for (std::ptrdiff_t i = low; i <= high; ++i)
+    {
+      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      const double distance = (tree.points[p] - course.points[good]).norm();
+      if (distance < least)
+      {
+        least = distance;
+        best = p;
+      }
+    }
+  }
+
+  // A straight line from axis to axis; its samples are guesses.
+  MeasuredCourse joined;
+  const auto add = [&](const Vector3& point, double confidence)
+  {
+    joined.points.push_back(point);
+    joined.radius.push_back(course.radius[good]);
+    joined.confidence.push_back(confidence);
+    joined.lumen.push_back(0.0);
+  };
+  const std::vector<Vector3> bridge = ResampleCurve(
+    { tree.points[best], arcs.empty() ? course.points[good] : arcs.front() }, measurement.step);
+  for (std::size_t i = 0; i + 1 < bridge.size(); ++i)
+  {
+    add(bridge[i], 0.0);
+  }
+  for (const Vector3& arc : arcs)
+  {
+    add(arc, 0.5 * course.confidence[good]);
+  }
+  joined.points.insert(joined.points.end(),
+    course.points.begin() + static_cast<std::ptrdiff_t>(good), course.points.end());
+  joined.radius.insert(joined.radius.end(),
+    course.radius.begin() + static_cast<std::ptrdiff_t>(good), course.radius.end());
+  joined.confidence.insert(joined.confidence.end(),
+    course.confidence.begin() + static_cast<std::ptrdiff_t>(good), course.confidence.end());
+  joined.lumen.insert(joined.lumen.end(), course.lumen.begin() + static_cast<std::ptrdiff_t>(good),
+    course.lumen.end());
+  course = std::move(joined);
+  return best;
+}
+}

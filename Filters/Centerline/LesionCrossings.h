@@ -1,0 +1,24 @@
+/**
+ * @file LesionCrossings.h
+ * @brief What of an extraction lies on the ways across lesions, where no vessel need be seen.
+ */
+#ifndef DynamicCoronary_LesionCrossings_h
+#define DynamicCoronary_LesionCrossings_h
+
+#include "CenterlineTree.h"
+#include "MeasuredCourse.h"
+#include "VesselBridge.h"
+
+namespace coronary
+{
+/// Which samples lie on a way across a lesion.
+void MarkCrossings(MeasuredCourse& course, const std::vector<VesselBridge>& bridges,
+  const CourseMeasurement& measurement);
+
+/// What was guessed on the ways across lesions, and how certain it is that what lies behind them belongs to the tree.
+/// @param tree  its `bridged` and `bridgeConfidence` are set
+void MarkBridged(CenterlineTree& tree, const std::vector<VesselBridge>& bridges,
+  const CourseMeasurement& measurement);
+}
+
+#endif
