@@ -138,6 +138,42 @@ inline double Solve(Terms& terms, double slowness, double latest)
   return SolveWithoutLatest(terms, slowness);
 }
 
+/// Upwind differences of first and second order along the axes.
+struct Differences
+{
+  double weight[3];      ///< 1/mm^2
+  double distance[2][3]; ///< mm, of differences of first and second order
+
+  explicit Differences(const Vector3& spacing)
+  {
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      this->weight[axis] = 1.0 / (spacing[axis] * spacing[axis]);
+      this->distance[0][axis] = spacing[axis];
+      this->distance[1][axis] = spacing[axis] / 1.5;
+    }
+  }
+
+  /// Which neighbours are known is as good as random: selections instead of branches.
+  template <bool SecondOrder>
+  inline __attribute__((always_inline)) void SetTerm(
+    Terms& terms, int axis, std::uint32_t nearest, std::uint32_t beyond, double origin) const
+  {
+    const bool known = IsFinal(nearest);
+    const float first = FromBits(nearest);
+    terms.first[axis] = known ? first - origin : 0.0;
+    terms.beta[axis] = terms.first[axis];
+    terms.alpha[axis] = known ? this->weight[axis] : 0.0;
+    if (SecondOrder)
+    {
+      const bool second = known && beyond <= nearest;
+      const float difference = second ? first - FromBits(beyond) : 0.0F;
+      terms.alpha[axis] *= second ? 2.25 : 1.0;
+      terms.beta[axis] += difference * Third;
+    }
+  }
+};
+
 /// What is read of a neighbour, side by side.
 struct Voxel
 {
@@ -145,6 +181,106 @@ struct Voxel
   float
     speedThenLength; ///< the speed is needed until the arrival is final, the length from then on
 };
+
+/// Not a prefetch: of many at a time the processor drops most.
+inline __attribute__((always_inline)) void Load(const Voxel* voxels, std::uint32_t voxel)
+{
+  const std::uint32_t bits = voxels[voxel].bits;
+  asm volatile("" : : "r"(bits)); // the compiler may not leave it out
+}
+
+/// The lines of memory that the update of a voxel's neighbours reads.
+template <typename Layout>
+inline __attribute__((always_inline)) void LoadAround(
+  const VoxelRegion& region, const Layout& layout, const Voxel* voxels, Address address)
+{
+  Address outwards[3]; // to the nearest next cell
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const std::array<Address, 4>& steps = region.Steps(address, axis);
+    Load(voxels, layout(address + steps[0]));
+    Load(voxels, layout(address + steps[3]));
+    outwards[axis] = steps[(address >> axis & 1) != 0 ? 2 : 1];
+  }
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    Load(voxels, layout(address + outwards[axis] + outwards[(axis + 1) % 3]));
+  }
+}
+
+/// Two steps down, one down, one up, two up along each axis.
+struct Neighbours
+{
+  std::uint32_t places[3][4];
+  std::uint32_t bits[3][4];
+};
+
+/// Of the two voxels beside a voxel along each axis those that the front reached first.
+struct Upwind
+{
+  std::uint32_t nearest[3];
+  bool up[3];
+  std::uint32_t earliest = 0; ///< axis
+
+  inline __attribute__((always_inline)) explicit Upwind(const Neighbours& around)
+  {
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      this->up[axis] = around.bits[axis][2] < around.bits[axis][1];
+      this->nearest[axis] = this->up[axis] ? around.bits[axis][2] : around.bits[axis][1];
+    }
+    this->earliest = this->nearest[1] < this->nearest[0] ? 1 : 0;
+    this->earliest = this->nearest[2] < this->nearest[this->earliest] ? 2 : this->earliest;
+  }
+
+  std::uint32_t Earliest(const Neighbours& around) const
+  {
+    return around.places[this->earliest][this->up[this->earliest] ? 2 : 1];
+  }
+};
+
+/// Length of the fastest path to a voxel whose arrival is final.
+template <bool SecondOrder>
+inline __attribute__((always_inline)) float PathLength(const Voxel* voxels, std::uint32_t voxel,
+  const Neighbours& around, const Upwind& upwind, const Differences& differences)
+{
+  std::uint32_t latestBits = 0;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    latestBits = std::max(latestBits, IsFinal(upwind.nearest[axis]) ? upwind.nearest[axis] : 0U);
+  }
+  const double origin = FromBits(latestBits);
+  Terms terms;
+  double along[3];
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const std::uint32_t beyond = upwind.up[axis] ? around.bits[axis][3] : around.bits[axis][0];
+    differences.SetTerm<SecondOrder>(terms, axis, upwind.nearest[axis], beyond, origin);
+    const bool known = IsFinal(upwind.nearest[axis]);
+    const double length = voxels[around.places[axis][upwind.up[axis] ? 2 : 1]].speedThenLength;
+    along[axis] = known ? length : 0.0;
+    if (SecondOrder)
+    {
+      const bool second = known && beyond <= upwind.nearest[axis];
+      const double former = voxels[around.places[axis][upwind.up[axis] ? 3 : 0]].speedThenLength;
+      along[axis] += second ? (length - former) * Third : 0.0;
+    }
+  }
+  const double value = Solve(terms, 1.0 / static_cast<double>(voxels[voxel].speedThenLength), 0.0);
+  // The path comes along the gradient: the derivative of its length in that direction is 1.
+  double sum = 0.0;
+  double weighted = 0.0;
+  double norm = 0.0;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const double rise = std::max(0.0, value - terms.beta[axis]);
+    sum += terms.alpha[axis] * rise;
+    weighted += terms.alpha[axis] * rise * along[axis];
+    norm += terms.alpha[axis] * rise * rise;
+  }
+  return sum > 0.0 ? static_cast<float>((weighted + std::sqrt(norm)) / sum)
+                   : voxels[upwind.Earliest(around)].speedThenLength;
+}
 
 /// The march itself.
 template <typename Layout>
@@ -278,63 +414,17 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
   std::uint8_t* const labels = this->Labels.Data();
   const bool oneLabel = this->OneLabel;
   const double limit = this->Settings.stopAtArrival;
-  double weight[3];      // 1/mm^2
-  double distance[2][3]; // mm, of differences of first and second order
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    const double spacing = this->Settings.spacing[axis];
-    weight[axis] = 1.0 / (spacing * spacing);
-    distance[0][axis] = spacing;
-    distance[1][axis] = spacing / 1.5;
-  }
+  const Differences differences(this->Settings.spacing);
   const auto bitsAt = [voxels](std::uint32_t voxel) { return voxels[voxel].bits; };
   const auto keep = [&](MarchingQueue::Entry entry)
   {
     return bitsAt(layout(MarchingQueue::Address(entry))) ==
       (MarchingQueue::ArrivalBits(entry) | OnFront);
   };
-  // Not prefetches: of many at a time the processor drops most.
-  const auto load = [voxels](std::uint32_t voxel)
-  {
-    const std::uint32_t bits = voxels[voxel].bits;
-    asm volatile("" : : "r"(bits)); // the compiler may not leave it out
-  };
   const auto expect = [&](MarchingQueue::Entry entry)
-  { load(layout(MarchingQueue::Address(entry))); };
+  { Load(voxels, layout(MarchingQueue::Address(entry))); };
   const auto prepare = [&](MarchingQueue::Entry entry)
-  {
-    const Address address = MarchingQueue::Address(entry);
-    Address outwards[3]; // to the nearest next cell
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      const std::array<Address, 4>& steps = region.Steps(address, axis);
-      load(layout(address + steps[0]));
-      load(layout(address + steps[3]));
-      outwards[axis] = steps[(address >> axis & 1) != 0 ? 2 : 1];
-    }
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      load(layout(address + outwards[axis] + outwards[(axis + 1) % 3]));
-    }
-  };
-
-  // Which neighbours are known is as good as random: selections instead of branches.
-  const auto setTerm =
-    [&](Terms& terms, int axis, std::uint32_t nearest, std::uint32_t beyond, double origin)
-  {
-    const bool known = IsFinal(nearest);
-    const float first = FromBits(nearest);
-    terms.first[axis] = known ? first - origin : 0.0;
-    terms.beta[axis] = terms.first[axis];
-    terms.alpha[axis] = known ? weight[axis] : 0.0;
-    if (SecondOrder)
-    {
-      const bool second = known && beyond <= nearest;
-      const float difference = second ? first - FromBits(beyond) : 0.0F;
-      terms.alpha[axis] *= second ? 2.25 : 1.0;
-      terms.beta[axis] += difference * Third;
-    }
-  };
+  { LoadAround(region, layout, voxels, MarchingQueue::Address(entry)); };
 
   std::uint32_t reached = 0;
   while (queue.Find(keep, expect, prepare))
@@ -360,16 +450,14 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
     const std::uint32_t voxel = layout(address);
     voxels[voxel].bits = arrivalBits;
 
-    // Two steps down, one down, one up, two up along each axis.
-    std::uint32_t places[3][4];
-    std::uint32_t bits[3][4];
+    Neighbours around;
     for (int axis = 0; axis < 3; ++axis)
     {
       const std::array<Address, 4>& steps = region.Steps(address, axis);
       for (int step = 0; step < 4; ++step)
       {
-        places[axis][step] = layout(address + steps[step]);
-        bits[axis][step] = bitsAt(places[axis][step]);
+        around.places[axis][step] = layout(address + steps[step]);
+        around.bits[axis][step] = bitsAt(around.places[axis][step]);
       }
     }
 
@@ -384,60 +472,15 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
     }
     else
     {
-      std::uint32_t nearest[3];
-      std::uint32_t earliest = 0;
-      bool up[3];
-      for (int axis = 0; axis < 3; ++axis)
-      {
-        up[axis] = bits[axis][2] < bits[axis][1];
-        nearest[axis] = up[axis] ? bits[axis][2] : bits[axis][1];
-      }
-      earliest = nearest[1] < nearest[0] ? 1 : 0;
-      earliest = nearest[2] < nearest[earliest] ? 2 : earliest;
+      const Upwind upwind(around);
       if (!oneLabel)
       {
-        labels[voxel] = labels[places[earliest][up[earliest] ? 2 : 1]];
+        labels[voxel] = labels[upwind.Earliest(around)];
       }
       if (WithLengths)
       {
-        std::uint32_t latestBits = 0;
-        for (int axis = 0; axis < 3; ++axis)
-        {
-          latestBits = std::max(latestBits, IsFinal(nearest[axis]) ? nearest[axis] : 0U);
-        }
-        const double origin = FromBits(latestBits);
-        Terms terms;
-        double along[3];
-        for (int axis = 0; axis < 3; ++axis)
-        {
-          const std::uint32_t beyond = up[axis] ? bits[axis][3] : bits[axis][0];
-          setTerm(terms, axis, nearest[axis], beyond, origin);
-          const bool known = IsFinal(nearest[axis]);
-          const double length = voxels[places[axis][up[axis] ? 2 : 1]].speedThenLength;
-          along[axis] = known ? length : 0.0;
-          if (SecondOrder)
-          {
-            const bool second = known && beyond <= nearest[axis];
-            const double former = voxels[places[axis][up[axis] ? 3 : 0]].speedThenLength;
-            along[axis] += second ? (length - former) * Third : 0.0;
-          }
-        }
-        const double value =
-          Solve(terms, 1.0 / static_cast<double>(voxels[voxel].speedThenLength), 0.0);
-        // The path comes along the gradient: the derivative of its length in that direction is 1.
-        double sum = 0.0;
-        double weighted = 0.0;
-        double norm = 0.0;
-        for (int axis = 0; axis < 3; ++axis)
-        {
-          const double rise = std::max(0.0, value - terms.beta[axis]);
-          sum += terms.alpha[axis] * rise;
-          weighted += terms.alpha[axis] * rise * along[axis];
-          norm += terms.alpha[axis] * rise * rise;
-        }
-        voxels[voxel].speedThenLength = sum > 0.0
-          ? static_cast<float>((weighted + std::sqrt(norm)) / sum)
-          : voxels[places[earliest][up[earliest] ? 2 : 1]].speedThenLength;
+        voxels[voxel].speedThenLength =
+          PathLength<SecondOrder>(voxels, voxel, around, upwind, differences);
       }
     }
 
@@ -445,24 +488,24 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
     {
       for (int side = 0; side < 2; ++side)
       {
-        const std::uint32_t before = bits[axis][1 + side];
-        const std::uint32_t opposite = bits[axis][3 * side];
+        const std::uint32_t before = around.bits[axis][1 + side];
+        const std::uint32_t opposite = around.bits[axis][3 * side];
         // Final, outside, or known already from its other side: then this one changes nothing.
         if (IsFinal(before) || before == Outside || opposite < arrivalBits)
         {
           continue;
         }
-        const std::uint32_t other = places[axis][1 + side];
+        const std::uint32_t other = around.places[axis][1 + side];
         const Address otherAddress = address + region.Steps(address, axis)[1 + side];
         const double slowness = 1.0 / static_cast<double>(voxels[other].speedThenLength);
-        const std::uint32_t behind = bits[axis][2 - side];
+        const std::uint32_t behind = around.bits[axis][2 - side];
         double value;
         if (before == NotReached)
         {
           // No other neighbour is known.
           const bool second = SecondOrder && behind <= arrivalBits;
           const float difference = second ? arrival - FromBits(behind) : 0.0F;
-          value = slowness * distance[second ? 1 : 0][axis] + difference * Third;
+          value = slowness * differences.distance[second ? 1 : 0][axis] + difference * Third;
         }
         else
         {
@@ -474,7 +517,7 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
             const std::uint32_t above = bitsAt(layout(otherAddress + steps[2]));
             const bool up = above < below;
             const std::uint32_t beyond = bitsAt(layout(otherAddress + (up ? steps[3] : steps[0])));
-            setTerm(terms, a, up ? above : below, beyond, arrival);
+            differences.SetTerm<SecondOrder>(terms, a, up ? above : below, beyond, arrival);
           }
           value = Solve(terms, slowness, 0.0);
         }
