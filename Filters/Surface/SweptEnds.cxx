@@ -36,7 +36,7 @@ std::string Millimetres(double length)
 }
 }
 
-std::string MendEnd(VesselCourse& course, const VesselAxis& axis, bool atStart, Vector3& place)
+std::string MendEnd(SweptAxis& course, const VesselAxis& axis, bool atStart, Vector3& place)
 {
   const std::vector<VesselAxis::Station>& stations = axis.AllStations();
   const double length = axis.Length();

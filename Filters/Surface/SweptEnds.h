@@ -13,7 +13,7 @@
 namespace coronary
 {
 /// A vessel's course: points, radii in mm, and the smoothing at each.
-struct VesselCourse
+struct SweptAxis
 {
   std::vector<Vector3> points;
   std::vector<double> radius;
@@ -30,7 +30,7 @@ struct VesselCourse
  * @param[out] place  of the end before
  * @return what was done, "" when the end is fit as it is
  */
-std::string MendEnd(VesselCourse& course, const VesselAxis& axis, bool atStart, Vector3& place);
+std::string MendEnd(SweptAxis& course, const VesselAxis& axis, bool atStart, Vector3& place);
 }
 
 #endif

@@ -93,7 +93,7 @@ struct SweptLumen::Build
   void MakeVessels();
   /// The axis of a course, whose free ends are mended where no tube can follow them.
   std::unique_ptr<VesselAxis> MakeAxis(
-    VesselCourse course, bool startOpen, bool endOpen, int firstGroup, int lastGroup);
+    SweptAxis course, bool startOpen, bool endOpen, int firstGroup, int lastGroup);
   void MakeVessel(Incidence arm, int tree, const std::vector<std::array<int, 2>>& partner,
     std::vector<char>& used, std::map<std::int64_t, double>& abscissa,
     std::map<std::int64_t, int>& junctionOfNode, std::map<std::int64_t, Vector3>& normalOfNode,

@@ -173,7 +173,7 @@ void SweptLumen::Build::MakeVessels()
 }
 
 std::unique_ptr<VesselAxis> SweptLumen::Build::MakeAxis(
-  VesselCourse course, bool startOpen, bool endOpen, int firstGroup, int lastGroup)
+  SweptAxis course, bool startOpen, bool endOpen, int firstGroup, int lastGroup)
 {
   const auto make = [&]()
   {
