@@ -1,18 +1,16 @@
 #include "vtkTGFReader.h"
 
-#include "CenterlineConversion.h"
+#include "TgfSkeleton.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkVesselTree.h"
 
-#include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDoubleArray.h"
 #include "vtkIdTypeArray.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkIntArray.h"
-#include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
@@ -43,22 +41,22 @@ void SetBones(
       branchTo[branch.points[i]] = &branch;
     }
   }
-  vtkNew<vtkCellArray> lines;
+  coronary::Polylines lines;
+  lines.points = skeleton.joints;
   std::vector<int> groups;
   std::vector<int> trees;
   std::vector<double> lengths;
   for (const auto& [from, to] : skeleton.bones)
   {
     const vtkIdType far = parent[to] == from ? to : from;
-    const vtkIdType ends[2] = { parent[far], far };
-    lines->InsertNextCell(2, ends);
+    lines.lines.push_back({ parent[far], far });
     groups.push_back(branchTo[far]->groupId);
     trees.push_back(branchTo[far]->treeId);
     lengths.push_back((skeleton.joints[to] - skeleton.joints[from]).norm());
   }
   std::vector<int> ids(skeleton.bones.size());
   std::iota(ids.begin(), ids.end(), 0);
-  output->SetLines(lines);
+  vtkCoronary::SetLines(output, lines);
   output->GetCellData()->Initialize();
   vtkCoronary::AddArray<vtkIdTypeArray>(output->GetPointData(), names::ParentJoint, parent);
   vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::BoneId, ids);

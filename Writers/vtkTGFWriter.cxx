@@ -1,7 +1,7 @@
 #include "vtkTGFWriter.h"
 
 #include "AtomicFile.h"
-#include "CenterlineConversion.h"
+#include "TgfSkeleton.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkVesselTree.h"
 
@@ -37,10 +37,8 @@ bool IsSkeleton(vtkPolyData* data)
 coronary::TgfSkeleton SkeletonOf(vtkPolyData* data)
 {
   coronary::TgfSkeleton skeleton;
-  for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
-  {
-    skeleton.joints.emplace_back(data->GetPoint(n));
-  }
+  const coronary::Polylines lines = vtkCoronary::LinesOf(data);
+  skeleton.joints = lines.points;
   vtkDataArray* parents = data->GetPointData()->GetArray(names::ParentJoint);
   vtkDataArray* ids = data->GetCellData()->GetArray(names::BoneId);
   std::vector<vtkIdType> order(data->GetNumberOfLines());
@@ -55,9 +53,7 @@ coronary::TgfSkeleton SkeletonOf(vtkPolyData* data)
   }
   for (const vtkIdType line : order)
   {
-    vtkIdType count = 0;
-    const vtkIdType* ends = nullptr;
-    data->GetLines()->GetCellAtId(line, count, ends);
+    const std::vector<std::int64_t>& ends = lines.lines[static_cast<std::size_t>(line)];
     const bool backwards =
       parents != nullptr && static_cast<vtkIdType>(parents->GetComponent(ends[0], 0)) == ends[1];
     skeleton.bones.push_back({ ends[backwards ? 1 : 0], ends[backwards ? 0 : 1] });

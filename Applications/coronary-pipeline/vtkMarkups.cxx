@@ -1,18 +1,17 @@
 #include "vtkMarkups.h"
 
-#include "CenterlineConversion.h"
+#include "TgfSkeleton.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
 #include "vtkSeeds.h"
 #include "vtkVesselTree.h"
 
-#include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkIdList.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
-#include "vtkPoints.h"
 #include "vtkStaticPointLocator.h"
 #include "vtkStringArray.h"
 
@@ -79,19 +78,16 @@ std::vector<Markup> CurvesOf(vtkPolyData* tree)
   {
     throw std::runtime_error("There are no lines to be curves.");
   }
-  vtkStringArray* labels = Texts(tree->GetCellData(), names::SegmentLabel);
   const std::vector<vtkDataArray*> arrays = Scalars(tree->GetPointData());
   std::vector<Markup> curves;
   std::set<std::string> used;
-  vtkNew<vtkIdList> ids;
-  const vtkIdType first = tree->GetNumberOfVerts();
-  for (vtkIdType line = 0; line < tree->GetNumberOfLines(); ++line)
+  for (const VesselTree::Branch& branch : vtkCoronary::BranchesOf(tree, nullptr).branches)
   {
-    tree->GetLines()->GetCellAtId(line, ids);
     Markup curve;
-    const std::string label = labels != nullptr ? labels->GetValue(first + line) : std::string();
-    curve.name = Unused(label.empty() ? "Branch " + std::to_string(line) : label, used);
-    curve.color = Colors[static_cast<std::size_t>(line) % Colors.size()];
+    const std::size_t number = curves.size();
+    curve.name =
+      Unused(branch.name.empty() ? "Branch " + std::to_string(number) : branch.name, used);
+    curve.color = Colors[number % Colors.size()];
     curve.glyphScale = 0.3;
     for (vtkDataArray* array : arrays)
     {
@@ -99,7 +95,7 @@ std::vector<Markup> CurvesOf(vtkPolyData* tree)
       const bool radius = name == names::Radius;
       const bool length = radius || name == names::Abscissas;
       Markup::Measurement values{ radius ? RadiusMeasurement : name, length ? "mm" : "", {} };
-      for (const vtkIdType id : *ids)
+      for (const std::int64_t id : branch.points)
       {
         values.values.push_back(array->GetComponent(id, 0));
       }
@@ -110,7 +106,7 @@ std::vector<Markup> CurvesOf(vtkPolyData* tree)
         curve.measurements.push_back(std::move(values));
       }
     }
-    for (const vtkIdType id : *ids)
+    for (const std::int64_t id : branch.points)
     {
       curve.points.push_back(
         { curve.name + "-" + std::to_string(curve.points.size() + 1), "", PointOf(tree, id) });
@@ -161,13 +157,9 @@ vtkSmartPointer<vtkPolyData> SeedsOf(const std::vector<Markup>& markups)
 vtkSmartPointer<vtkPolyData> LinesOf(
   const std::vector<Markup>& markups, double radius, const std::string& file)
 {
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  vtkNew<vtkCellArray> lines;
+  Polylines lines;
   vtkNew<vtkStringArray> labels;
   labels->SetName(names::SegmentLabel);
-  vtkNew<vtkDoubleArray> radii;
-  radii->SetName(names::Radius);
   for (const Markup& markup : markups)
   {
     const bool closed = markup.type == "ClosedCurve";
@@ -177,33 +169,32 @@ vtkSmartPointer<vtkPolyData> LinesOf(
     }
     const Markup::Measurement* widths = markup.Find(RadiusMeasurement);
     widths = widths != nullptr ? widths : markup.Find(names::Radius);
-    vtkNew<vtkIdList> ids;
+    std::vector<std::int64_t>& line = lines.lines.emplace_back();
     for (std::size_t n = 0; n < markup.points.size(); ++n)
     {
-      ids->InsertNextId(points->InsertNextPoint(markup.points[n].position.data()));
+      line.push_back(static_cast<std::int64_t>(lines.points.size()));
+      lines.points.push_back(markup.points[n].position);
       const double width = widths != nullptr ? widths->values[n] : radius;
       if (!(width >= 0.0 && std::isfinite(width)))
       {
         throw std::runtime_error("'" + file + "': the curve '" + markup.name +
           "' has a radius that is negative or not finite.");
       }
-      radii->InsertNextValue(width);
+      lines.radius.push_back(width);
     }
     if (closed)
     {
-      ids->InsertNextId(ids->GetId(0));
+      line.push_back(line.front());
     }
-    lines->InsertNextCell(ids);
     labels->InsertNextValue(markup.name);
   }
-  if (lines->GetNumberOfCells() == 0)
+  if (lines.lines.empty())
   {
     throw std::runtime_error("'" + file + "' has no curves of two or more points.");
   }
   auto data = vtkSmartPointer<vtkPolyData>::New();
-  data->SetPoints(points);
-  data->SetLines(lines);
-  data->GetPointData()->AddArray(radii);
+  vtkCoronary::SetLines(data, lines);
+  vtkCoronary::AddArray<vtkDoubleArray>(data->GetPointData(), names::Radius, lines.radius);
   data->GetCellData()->AddArray(labels);
   return data;
 }
@@ -227,14 +218,12 @@ vtkSmartPointer<vtkPolyData> TreeOfLines(vtkPolyData* lines, double tolerance)
     }
     return id;
   };
-  vtkNew<vtkIdList> ids;
+  const Polylines given = vtkCoronary::LinesOf(lines);
   vtkNew<vtkIdList> near;
-  const vtkIdType count = lines->GetNumberOfLines();
-  for (vtkIdType line = 0; line < count; ++line)
+  for (const std::vector<std::int64_t>& line : given.lines)
   {
-    lines->GetLines()->GetCellAtId(line, ids);
-    const std::set<vtkIdType> own(ids->begin(), ids->end());
-    for (const vtkIdType end : { ids->GetId(0), ids->GetId(ids->GetNumberOfIds() - 1) })
+    const std::set<vtkIdType> own(line.begin(), line.end());
+    for (const vtkIdType end : { line.front(), line.back() })
     {
       locator->FindPointsWithinRadius(tolerance, PointOf(lines, end).data(), near);
       vtkIdType best = end;
@@ -260,11 +249,10 @@ vtkSmartPointer<vtkPolyData> TreeOfLines(vtkPolyData* lines, double tolerance)
   vtkDataArray* widths = lines->GetPointData()->GetArray(names::Radius);
   vtkStringArray* labels = Texts(lines->GetCellData(), names::SegmentLabel);
   std::map<std::array<std::int64_t, 2>, vtkIdType> lineOf;
-  for (vtkIdType line = 0; line < count; ++line)
+  for (std::size_t line = 0; line < given.lines.size(); ++line)
   {
-    lines->GetLines()->GetCellAtId(line, ids);
     std::int64_t before = -1;
-    for (const vtkIdType id : *ids)
+    for (const vtkIdType id : given.lines[line])
     {
       const vtkIdType point = resolve(id);
       const auto found = joints.emplace(point, static_cast<std::int64_t>(joints.size()));
@@ -277,7 +265,7 @@ vtkSmartPointer<vtkPolyData> TreeOfLines(vtkPolyData* lines, double tolerance)
       if (before >= 0 && before != joint)
       {
         skeleton.bones.push_back({ before, joint });
-        lineOf[{ std::min(before, joint), std::max(before, joint) }] = line;
+        lineOf[{ std::min(before, joint), std::max(before, joint) }] = static_cast<vtkIdType>(line);
       }
       before = joint;
     }

@@ -12,7 +12,6 @@
 
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
-#include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkImageData.h"
 #include "vtkIntArray.h"
@@ -37,22 +36,7 @@ using Json = nlohmann::ordered_json;
 VesselTree TreeWithArrays(vtkPolyData* data)
 {
   VesselTree tree = vtkCoronary::TreeOf(data);
-  vtkPointData* arrays = data->GetPointData();
-  const auto each = [&](const char* name, const auto& take)
-  {
-    if (vtkDataArray* array = arrays->GetArray(name))
-    {
-      for (vtkIdType n = 0; n < array->GetNumberOfTuples(); ++n)
-      {
-        take(array->GetComponent(n, 0));
-      }
-    }
-  };
-  each(names::Confidence, [&](double value) { tree.confidence.push_back(value); });
-  each(names::Bridged,
-    [&](double value) { tree.bridged.push_back(static_cast<unsigned char>(value)); });
-  each(names::BridgeConfidence, [&](double value) { tree.bridgeConfidence.push_back(value); });
-  each(names::SegmentIds, [&](double value) { tree.segmentId.push_back(static_cast<int>(value)); });
+  vtkCoronary::AddPointValues(data, tree);
   return tree;
 }
 

@@ -1,6 +1,6 @@
 #include "vtkSimVascularForms.h"
 
-#include "CenterlineConversion.h"
+#include "TgfSkeleton.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkVesselTree.h"
@@ -9,7 +9,6 @@
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
-#include "vtkIdList.h"
 #include "vtkIntArray.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
@@ -20,6 +19,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 
@@ -66,17 +66,11 @@ std::vector<Stretch> StretchesOf(vtkPolyData* data)
   }
   // The name of a segment is found by the point before a branch's end: it is its own.
   std::map<std::int64_t, std::string> labelOf;
-  if (auto* labels =
-        vtkStringArray::SafeDownCast(data->GetCellData()->GetAbstractArray(names::SegmentLabel)))
+  for (const VesselTree::Branch& branch : vtkCoronary::BranchesOf(data, nullptr).branches)
   {
-    vtkNew<vtkIdList> ids;
-    for (vtkIdType line = 0; line < data->GetNumberOfLines(); ++line)
+    for (std::size_t n = 1; n < branch.points.size(); ++n)
     {
-      data->GetLines()->GetCellAtId(line, ids);
-      for (vtkIdType n = 1; n < ids->GetNumberOfIds(); ++n)
-      {
-        labelOf[ids->GetId(n)] = labels->GetValue(data->GetNumberOfVerts() + line);
-      }
+      labelOf[branch.points[n]] = branch.name;
     }
   }
   std::vector<Stretch> stretches;
@@ -367,17 +361,10 @@ SimVascularVessel VesselAlong(
 vtkSmartPointer<vtkPolyData> Polyline(
   const std::vector<Vector3>& points, const std::vector<double>& radii, const std::string& name)
 {
-  vtkNew<vtkPoints> places;
-  places->SetDataTypeToDouble();
-  vtkNew<vtkCellArray> lines;
-  lines->InsertNextCell(static_cast<int>(points.size()));
-  for (const Vector3& point : points)
-  {
-    lines->InsertCellPoint(places->InsertNextPoint(point.data()));
-  }
+  Polylines line{ points, radii, { std::vector<std::int64_t>(points.size()) }, {} };
+  std::iota(line.lines[0].begin(), line.lines[0].end(), 0);
   auto data = vtkSmartPointer<vtkPolyData>::New();
-  data->SetPoints(places);
-  data->SetLines(lines);
+  vtkCoronary::SetLines(data, line);
   vtkCoronary::AddArray<vtkDoubleArray>(data->GetPointData(), names::Radius, radii);
   vtkNew<vtkStringArray> label;
   label->SetName(names::SegmentLabel);
@@ -465,11 +452,9 @@ vtkSmartPointer<vtkPolyData> FromSimVascular(vtkPolyData* lines, double unit)
   const std::vector<double> radii = RadiiOf(lines, unit);
   const auto count = static_cast<std::size_t>(lines->GetNumberOfPoints());
   std::vector<std::vector<vtkIdType>> neighbours(count);
-  vtkNew<vtkIdList> ids;
-  for (vtkIdType line = 0; line < lines->GetNumberOfLines(); ++line)
+  for (const std::vector<std::int64_t>& line : vtkCoronary::LinesOf(lines).lines)
   {
-    lines->GetLines()->GetCellAtId(line, ids);
-    for (const vtkIdType id : *ids)
+    for (const std::int64_t id : line)
     {
       if (id < 0 || static_cast<std::size_t>(id) >= count)
       {
@@ -477,10 +462,10 @@ vtkSmartPointer<vtkPolyData> FromSimVascular(vtkPolyData* lines, double unit)
           std::to_string(id) + ", of " + std::to_string(count));
       }
     }
-    for (vtkIdType n = 1; n < ids->GetNumberOfIds(); ++n)
+    for (std::size_t n = 1; n < line.size(); ++n)
     {
-      neighbours[static_cast<std::size_t>(ids->GetId(n - 1))].push_back(ids->GetId(n));
-      neighbours[static_cast<std::size_t>(ids->GetId(n))].push_back(ids->GetId(n - 1));
+      neighbours[static_cast<std::size_t>(line[n - 1])].push_back(line[n]);
+      neighbours[static_cast<std::size_t>(line[n])].push_back(line[n - 1]);
     }
   }
   TgfSkeleton skeleton;

@@ -20,7 +20,7 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 constexpr double LongestLine = 1e6; ///< in median radii: edges lie in cells of two radii
 
-void Check(const Polylines& lines)
+void Check(const Polylines& lines, const std::vector<Vector3>& roots)
 {
   if (lines.radius.size() != lines.points.size())
   {
@@ -56,7 +56,7 @@ void Check(const Polylines& lines)
       }
     }
   }
-  for (const Vector3& root : lines.roots)
+  for (const Vector3& root : roots)
   {
     if (!root.allFinite())
     {
@@ -364,11 +364,11 @@ void TopologySettings::Validate() const
     "The least wavelength of the smoothing must be a finite number");
 }
 
-CenterlineTopology BuildTopology(
-  const Polylines& lines, const TopologySettings& settings, const ProgressCallback& progress)
+CenterlineTopology BuildTopology(const Polylines& lines, const TopologySettings& settings,
+  const std::vector<Vector3>& roots, const ProgressCallback& progress)
 {
   settings.Validate();
-  Check(lines);
+  Check(lines, roots);
   CenterlineTopology tree;
   const double radius = CheckedMedianRadius(lines);
   if (radius <= 0.0)
@@ -380,13 +380,13 @@ CenterlineTopology BuildTopology(
   graph.cellSize = 2.0 * radius;
   tree.mergedPoints = InsertLines(graph, lines, settings.mergeRatio, radius, progress);
   tree.closedGaps = CloseGaps(graph, settings.gapRatio);
-  const std::vector<int> roots = FindRoots(graph, lines.roots);
+  const std::vector<int> starts = FindRoots(graph, roots);
   std::vector<std::vector<int>> loops;
   std::vector<DraftBranch> drafts;
-  for (std::size_t r = 0; r < roots.size(); ++r)
+  for (std::size_t r = 0; r < starts.size(); ++r)
   {
-    CutLoops(graph, roots[r], loops);
-    DraftTree(graph, roots[r], static_cast<int>(r), drafts);
+    CutLoops(graph, starts[r], loops);
+    DraftTree(graph, starts[r], static_cast<int>(r), drafts);
   }
   Prune(graph, settings.pruneRatio, drafts, tree.prunedTwigs, tree.prunedLength);
   Report(progress, 0.5);

@@ -13,6 +13,7 @@
 
 #include "CurveGeometry.h"
 #include "ParallelFor.h"
+#include "Polylines.h"
 #include "VesselTree.h"
 
 #include <array>
@@ -21,18 +22,6 @@
 
 namespace coronary
 {
-/// Polylines over shared points.
-struct Polylines
-{
-  std::vector<Vector3> points; ///< mm
-  std::vector<double> radius;  ///< one a point, mm, positive
-  std::vector<std::vector<std::int64_t>> lines;
-
-  /// Where trees are known to start (ostia, seeds); may be empty. The tree whose end is nearest
-  /// starts there.
-  std::vector<Vector3> roots;
-};
-
 struct TopologySettings
 {
   /// An end of a line is joined to another piece nearer than this many radii. 0 to 20.
@@ -115,12 +104,14 @@ struct CenterlineTopology : VesselTree
  * with the largest radius. Points of a line that repeat the one before are dropped.
  * Lines with fewer than two distinct points are left out.
  *
+ * @param lines  one radius a point is needed, and positive; groups are not read
+ * @param roots  where trees are known to start (ostia, seeds); the tree whose end is nearest starts there
  * @throws std::invalid_argument for settings out of range, a radius or coordinate that is not
  *         finite, a point whose squared distance from the origin overflows, a radius that is not
  *         positive, an index out of range, or a line longer than a million median radii; Cancelled
  */
 CenterlineTopology BuildTopology(const Polylines& lines, const TopologySettings& settings = {},
-  const ProgressCallback& progress = {});
+  const std::vector<Vector3>& roots = {}, const ProgressCallback& progress = {});
 
 /// x with r_p^x = sum r_d^x, or NaN when a daughter is as wide as the parent or there is none.
 double SolveMurrayExponent(double parent, const std::vector<double>& daughters);

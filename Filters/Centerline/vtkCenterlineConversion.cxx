@@ -5,17 +5,13 @@
 #include "vtkCoronaryUpstream.h"
 #include "vtkVesselTree.h"
 
-#include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
 #include "vtkFieldData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
-#include "vtkIntArray.h"
-#include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
-#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 
@@ -51,31 +47,16 @@ void CopyRows(
 std::map<vtkIdType, vtkIdType> CellsByPoint(vtkPolyData* data)
 {
   std::map<vtkIdType, vtkIdType> cells;
-  vtkCellArray* lines = data->GetLines();
-  for (vtkIdType line = 0; line < lines->GetNumberOfCells(); ++line)
+  vtkIdType cell = data->GetNumberOfVerts();
+  for (const std::vector<std::int64_t>& line : vtkCoronary::LinesOf(data).lines)
   {
-    vtkIdType count = 0;
-    const vtkIdType* ids = nullptr;
-    lines->GetCellAtId(line, count, ids);
-    for (vtkIdType i = 1; i < count; ++i)
+    for (std::size_t i = 1; i < line.size(); ++i)
     {
-      cells[ids[i]] = data->GetNumberOfVerts() + line;
+      cells[line[i]] = cell;
     }
+    ++cell;
   }
   return cells;
-}
-
-template <typename Get>
-void AddCellValues(
-  vtkPolyData* data, const char* name, const std::vector<VmtkTract>& tracts, const Get& get)
-{
-  vtkNew<vtkIntArray> array;
-  array->SetName(name);
-  for (const VmtkTract& tract : tracts)
-  {
-    array->InsertNextValue(get(tract));
-  }
-  data->GetCellData()->AddArray(array);
 }
 }
 
@@ -103,30 +84,16 @@ void vtkCenterlineConversion::ToVmtk(vtkPolyData* input, vtkPolyData* output) co
   const VesselTree tree = vtkCoronary::TreeOf(input);
   const std::vector<VmtkTract> tracts = coronary::ToVmtkTracts(tree);
   const std::map<vtkIdType, vtkIdType> cellOf = CellsByPoint(input);
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  vtkNew<vtkCellArray> lines;
   std::vector<vtkIdType> pointRows;
   std::vector<vtkIdType> cellRows;
   for (const VmtkTract& tract : tracts)
   {
-    lines->InsertNextCell(static_cast<int>(tract.points.size()));
-    for (std::size_t i = 0; i < tract.points.size(); ++i)
-    {
-      lines->InsertCellPoint(points->InsertNextPoint(tract.points[i].data()));
-      pointRows.push_back(static_cast<vtkIdType>(tract.source[i]));
-    }
+    pointRows.insert(pointRows.end(), tract.source.begin(), tract.source.end());
     cellRows.push_back(cellOf.at(static_cast<vtkIdType>(tract.source[1])));
   }
-  output->SetPoints(points);
-  output->SetLines(lines);
   CopyRows(input->GetPointData(), output->GetPointData(), pointRows);
   CopyRows(input->GetCellData(), output->GetCellData(), cellRows);
-  AddCellValues(
-    output, names::CenterlineIds, tracts, [](const VmtkTract& t) { return t.centerlineId; });
-  AddCellValues(output, names::TractIds, tracts, [](const VmtkTract& t) { return t.tractId; });
-  AddCellValues(output, names::GroupIds, tracts, [](const VmtkTract& t) { return t.groupId; });
-  AddCellValues(output, names::Blanking, tracts, [](const VmtkTract& t) { return t.blanking; });
+  vtkCoronary::SetTracts(output, tracts);
   // As VMTK's form has it: parents follow from the order of the tracts, and are right after a split.
   output->GetCellData()->RemoveArray(names::ParentGroupIds);
 }

@@ -7,14 +7,12 @@
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkVesselTree.h"
 
-#include "vtkAbstractArray.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
-#include "vtkIdList.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkIntArray.h"
@@ -78,18 +76,6 @@ void AddRows(vtkFieldData* data, const std::string& name,
 }
 
 template <typename Get>
-auto OfBranches(const CenterlineTopology& tree, const Get& get)
-{
-  std::vector<decltype(get(tree.branches[0]))> values;
-  values.reserve(tree.branches.size());
-  for (const auto& branch : tree.branches)
-  {
-    values.push_back(get(branch));
-  }
-  return values;
-}
-
-template <typename Get>
 auto OfBifurcations(const CenterlineTopology& tree, const Get& get)
 {
   std::vector<decltype(get(tree.bifurcations[0]))> values;
@@ -125,26 +111,6 @@ public:
   {
     const CenterlineTopology& tree = this->Tree;
     const auto count = static_cast<vtkIdType>(tree.points.size());
-    vtkNew<vtkPoints> points;
-    points->SetDataType(
-      this->Input->GetPoints() != nullptr ? this->Input->GetPoints()->GetDataType() : VTK_DOUBLE);
-    points->SetNumberOfPoints(count);
-    for (vtkIdType i = 0; i < count; ++i)
-    {
-      points->SetPoint(i, tree.points[i].data());
-    }
-    vtkNew<vtkCellArray> lines;
-    for (const auto& branch : tree.branches)
-    {
-      lines->InsertNextCell(static_cast<int>(branch.points.size()));
-      for (const std::int64_t point : branch.points)
-      {
-        lines->InsertCellPoint(point);
-      }
-    }
-    output->SetPoints(points);
-    output->SetLines(lines);
-
     vtkPointData* data = output->GetPointData();
     vtkPointData* given = this->Input->GetPointData();
     data->CopyAllOn();
@@ -153,8 +119,8 @@ public:
     {
       data->CopyData(given, tree.source[i], i);
     }
-    vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Radius, tree.radius);
-    vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Abscissas, tree.abscissa);
+    vtkCoronary::SetTree(output, tree, vtkCoronary::BranchArrays::Named,
+      this->Input->GetPoints() != nullptr ? this->Input->GetPoints()->GetDataType() : VTK_DOUBLE);
     AddVectors(data, vtkCoronaryArrayNames::FrenetTangent, tree.tangent);
     AddVectors(data, vtkCoronaryArrayNames::FrenetNormal, tree.normal);
     AddVectors(data, vtkCoronaryArrayNames::FrenetBinormal, tree.binormal);
@@ -162,28 +128,6 @@ public:
     vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Torsion, tree.torsion);
     vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::SectionArea, tree.area);
     vtkCoronary::AddArray<vtkIntArray>(data, vtkCoronaryArrayNames::SegmentIds, tree.segmentId);
-
-    using Branch = coronary::VesselTree::Branch;
-    vtkCellData* cells = output->GetCellData();
-    const auto ints = [&](const std::string& name, int Branch::*member)
-    {
-      vtkCoronary::AddArray<vtkIntArray>(
-        cells, name, OfBranches(tree, [=](const Branch& branch) { return branch.*member; }));
-    };
-    ints(vtkCoronaryArrayNames::GroupIds, &Branch::groupId);
-    ints(vtkCoronaryArrayNames::ParentGroupIds, &Branch::parentGroupId);
-    ints(vtkCoronaryArrayNames::TreeIds, &Branch::treeId);
-    ints(vtkCoronaryArrayNames::BranchGeneration, &Branch::generation);
-    ints(vtkCoronaryArrayNames::StrahlerOrder, &Branch::strahlerOrder);
-    ints(vtkCoronaryArrayNames::SegmentIds, &Branch::segmentId);
-    vtkCoronary::AddArray<vtkStringArray>(cells, vtkCoronaryArrayNames::SegmentLabel,
-      OfBranches(tree,
-        [](const Branch& branch)
-        { return vtkStdString(coronary::SegmentName(branch.segmentId)); }));
-    vtkCoronary::AddArray<vtkDoubleArray>(cells, vtkCoronaryArrayNames::Length,
-      OfBranches(tree, [](const Branch& branch) { return branch.length; }));
-    vtkCoronary::AddArray<vtkDoubleArray>(cells, vtkCoronaryArrayNames::Tortuosity,
-      OfBranches(tree, [](const Branch& branch) { return branch.tortuosity; }));
   }
 
   void WriteBifurcations(vtkPolyData* output) const
@@ -239,9 +183,7 @@ public:
 
   void WriteLoops(vtkPolyData* output) const
   {
-    vtkNew<vtkPoints> points;
-    points->SetDataTypeToDouble();
-    vtkNew<vtkCellArray> lines;
+    coronary::Polylines lines;
     std::vector<double> lengths;
     for (const coronary::CenterlineLoop& loop : this->Tree.loops)
     {
@@ -250,16 +192,16 @@ public:
         continue;
       }
       lengths.push_back(loop.length);
-      lines->InsertNextCell(static_cast<int>(loop.points.size()) + 1);
-      const vtkIdType first = points->GetNumberOfPoints();
+      const auto first = static_cast<std::int64_t>(lines.points.size());
+      std::vector<std::int64_t>& line = lines.lines.emplace_back();
       for (const std::int64_t point : loop.points)
       {
-        lines->InsertCellPoint(points->InsertNextPoint(this->Tree.points[point].data()));
+        line.push_back(static_cast<std::int64_t>(lines.points.size()));
+        lines.points.push_back(this->Tree.points[point]);
       }
-      lines->InsertCellPoint(first);
+      line.push_back(first);
     }
-    output->SetPoints(points);
-    output->SetLines(lines);
+    vtkCoronary::SetLines(output, lines);
     vtkCoronary::AddArray<vtkDoubleArray>(
       output->GetCellData(), vtkCoronaryArrayNames::Length, lengths);
   }
@@ -407,35 +349,19 @@ int vtkCoronaryTreeTopology::RequestData(
     labeling.dominance = this->Dominance;
     labeling.orientationWeight = this->OrientationWeight;
     labeling.Validate();
-    coronary::Polylines set;
-    const vtkIdType lineCount = wanted ? input->GetNumberOfLines() : 0;
-    if (lineCount > 0)
+    coronary::Polylines lines;
+    std::vector<Vector3> starts;
+    if (wanted && input->GetNumberOfLines() > 0)
     {
-      vtkDataArray* radius =
-        vtkCoronary::RadiusOf(input, "The input has", this->InputRadiusArrayName);
-      const vtkIdType points = input->GetNumberOfPoints();
-      set.points.resize(points);
-      set.radius.resize(points);
-      for (vtkIdType i = 0; i < points; ++i)
-      {
-        input->GetPoint(i, set.points[i].data());
-        set.radius[i] = radius->GetComponent(i, 0);
-      }
-      vtkNew<vtkIdList> cell;
-      vtkCellArray* lines = input->GetLines();
-      for (lines->InitTraversal(); lines->GetNextCell(cell) != 0;)
-      {
-        set.lines.emplace_back(cell->begin(), cell->end());
-      }
+      lines = vtkCoronary::LinesOf(
+        input, vtkCoronary::RadiusOf(input, "The input has", this->InputRadiusArrayName));
       for (vtkIdType i = 0; roots != nullptr && i < roots->GetNumberOfPoints(); ++i)
       {
-        Vector3 root;
-        roots->GetPoint(i, root.data());
-        set.roots.push_back(root);
+        starts.emplace_back(roots->GetPoint(i));
       }
     }
     CenterlineTopology tree = coronary::BuildTopology(
-      set, settings, vtkCoronary::ProgressOf(this, 0.0, this->LabelSegments ? 0.3 : 1.0));
+      lines, settings, starts, vtkCoronary::ProgressOf(this, 0.0, this->LabelSegments ? 0.3 : 1.0));
     coronary::LabelingResult labels;
     if (this->LabelSegments)
     {

@@ -9,6 +9,7 @@
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -142,55 +143,13 @@ coronary::SurfaceDistance DistanceTo(
   return coronary::ComputeSurfaceDistance(points, triangles, spacing, 24000000, progress);
 }
 
-template <typename Array, typename Function>
-void AddBranchValues(vtkFieldData* data, const char* name,
-  const std::vector<VesselTree::Branch>& branches, const Function& valueOf)
-{
-  std::vector<std::decay_t<decltype(valueOf(VesselTree::Branch()))>> values;
-  values.reserve(branches.size());
-  for (const VesselTree::Branch& branch : branches)
-  {
-    values.push_back(valueOf(branch));
-  }
-  vtkCoronary::AddArray<Array>(data, name, values);
-}
-
-void AddPoints(vtkPolyData* output, const std::vector<Vector3>& positions)
-{
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  points->SetNumberOfPoints(static_cast<vtkIdType>(positions.size()));
-  for (std::size_t i = 0; i < positions.size(); ++i)
-  {
-    points->SetPoint(static_cast<vtkIdType>(i), positions[i].data());
-  }
-  output->SetPoints(points);
-}
-
-void AddCell(vtkCellArray* cells, const std::vector<std::int64_t>& ids)
-{
-  cells->InsertNextCell(static_cast<int>(ids.size()));
-  for (const std::int64_t id : ids)
-  {
-    cells->InsertCellPoint(static_cast<vtkIdType>(id));
-  }
-}
-
 namespace names = vtkCoronaryArrayNames;
 using Branch = VesselTree::Branch;
 
 void FillTree(vtkPolyData* output, const coronary::CenterlineResult& result)
 {
   const VesselTree& tree = result.tree;
-  AddPoints(output, tree.points);
-  vtkNew<vtkCellArray> lines;
-  for (const Branch& branch : tree.branches)
-  {
-    AddCell(lines, branch.points);
-  }
-  output->SetLines(lines);
-  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Radius, tree.radius);
-  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Abscissas, tree.abscissa);
+  vtkCoronary::SetTree(output, tree);
   vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Confidence, tree.confidence);
   vtkCoronary::AddArray<vtkUnsignedCharArray>(output->GetPointData(), names::Bridged, tree.bridged);
   vtkCoronary::AddArray<vtkDoubleArray>(
@@ -210,27 +169,6 @@ void FillTree(vtkPolyData* output, const coronary::CenterlineResult& result)
   vtkCoronary::AddArray<vtkDoubleArray>(output->GetFieldData(), names::VeinLengths, veinLengths);
   vtkCoronary::AddArray<vtkDoubleArray>(
     output->GetFieldData(), names::VeinProbabilities, veinProbabilities);
-  vtkCellData* cells = output->GetCellData();
-  AddBranchValues<vtkIntArray>(
-    cells, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });
-  AddBranchValues<vtkIntArray>(
-    cells, names::ParentGroupIds, tree.branches, [](const Branch& b) { return b.parentGroupId; });
-  AddBranchValues<vtkIntArray>(
-    cells, names::TreeIds, tree.branches, [](const Branch& b) { return b.treeId; });
-  AddBranchValues<vtkDoubleArray>(
-    cells, names::Length, tree.branches, [](const Branch& b) { return b.length; });
-  AddBranchValues<vtkDoubleArray>(
-    cells, names::Tortuosity, tree.branches, [](const Branch& b) { return b.tortuosity; });
-}
-
-std::map<int, const Branch*> BranchesById(const VesselTree& tree)
-{
-  std::map<int, const Branch*> byId;
-  for (const Branch& branch : tree.branches)
-  {
-    byId[branch.groupId] = &branch;
-  }
-  return byId;
 }
 
 /// Points where the lines of VMTK's form end: first the targets, then the other tips.
@@ -260,77 +198,38 @@ std::vector<std::int64_t> LineEnds(const coronary::CenterlineResult& result, boo
   return ends;
 }
 
-/// VMTK's form: from the root to every end. Not by ToVmtkTracts: targets come first, and may lie within a branch.
+/// VMTK's form, from the root to every end.
 void FillLines(vtkPolyData* output, const VesselTree& tree, const std::vector<std::int64_t>& ends)
 {
-  std::map<int, const Branch*> byId = BranchesById(tree);
-  std::map<std::int64_t, const Branch*> holder;
-  for (const Branch& branch : tree.branches)
+  const std::vector<coronary::VmtkTract> tracts = coronary::ToVmtkTracts(tree, ends);
+  vtkCoronary::SetTracts(output, tracts);
+  const auto add = [&](const char* name, const std::vector<double>& values)
   {
-    for (std::size_t i = branch.parentGroupId == -1 ? 0 : 1; i < branch.points.size(); ++i)
+    std::vector<double> along;
+    for (const coronary::VmtkTract& tract : tracts)
     {
-      holder[branch.points[i]] = &branch;
-    }
-  }
-  std::vector<Vector3> positions;
-  std::vector<double> radius;
-  std::vector<double> abscissa;
-  std::vector<double> confidence;
-  std::vector<int> centerlineIds;
-  std::vector<int> tractIds;
-  std::vector<int> groupIds;
-  vtkNew<vtkCellArray> tracts;
-  for (std::size_t line = 0; line < ends.size(); ++line)
-  {
-    std::vector<const Branch*> chain;
-    for (const Branch* branch = holder[ends[line]]; branch;
-         branch = branch->parentGroupId == -1 ? nullptr : byId[branch->parentGroupId])
-    {
-      chain.insert(chain.begin(), branch);
-    }
-    for (std::size_t tract = 0; tract < chain.size(); ++tract)
-    {
-      std::vector<std::int64_t> ids;
-      for (const std::int64_t point : chain[tract]->points)
+      for (const std::int64_t point : tract.source)
       {
-        const auto p = static_cast<std::size_t>(point);
-        ids.push_back(static_cast<std::int64_t>(positions.size()));
-        positions.push_back(tree.points[p]);
-        radius.push_back(tree.radius[p]);
-        abscissa.push_back(tree.abscissa[p]);
-        confidence.push_back(tree.confidence[p]);
-        if (point == ends[line])
-        {
-          break;
-        }
+        along.push_back(values[static_cast<std::size_t>(point)]);
       }
-      if (ids.size() < 2)
-      {
-        continue;
-      }
-      AddCell(tracts, ids);
-      centerlineIds.push_back(static_cast<int>(line));
-      tractIds.push_back(static_cast<int>(tract));
-      groupIds.push_back(chain[tract]->groupId);
     }
-  }
-  AddPoints(output, positions);
-  output->SetLines(tracts);
-  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Radius, radius);
-  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Abscissas, abscissa);
-  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Confidence, confidence);
-  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::CenterlineIds, centerlineIds);
-  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::TractIds, tractIds);
-  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::GroupIds, groupIds);
-  vtkCoronary::AddArray<vtkIntArray>(
-    output->GetCellData(), names::Blanking, std::vector<int>(groupIds.size(), 0));
+    vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), name, along);
+  };
+  add(names::Radius, tree.radius);
+  add(names::Abscissas, tree.abscissa);
+  add(names::Confidence, tree.confidence);
 }
 
 void FillBifurcations(vtkPolyData* output, const coronary::CenterlineResult& result)
 {
   const VesselTree& tree = result.tree;
-  std::map<int, const Branch*> byId = BranchesById(tree);
-  std::vector<Vector3> forks;
+  std::map<int, int> treeOf; // by group
+  for (const Branch& branch : tree.branches)
+  {
+    treeOf[branch.groupId] = branch.treeId;
+  }
+  vtkNew<vtkPoints> forks;
+  forks->SetDataTypeToDouble();
   std::vector<double> forkRadius;
   std::vector<int> parents;
   std::vector<int> trees;
@@ -345,16 +244,17 @@ void FillBifurcations(vtkPolyData* output, const coronary::CenterlineResult& res
   vtkNew<vtkCellArray> vertices;
   for (const coronary::CenterlineBifurcation& fork : result.bifurcations)
   {
-    AddCell(vertices, { static_cast<std::int64_t>(forks.size()) });
-    forks.push_back(tree.points[static_cast<std::size_t>(fork.point)]);
+    const vtkIdType id =
+      forks->InsertNextPoint(tree.points[static_cast<std::size_t>(fork.point)].data());
+    vertices->InsertNextCell(1, &id);
     forkRadius.push_back(tree.radius[static_cast<std::size_t>(fork.point)]);
     parents.push_back(fork.parentGroupId);
-    trees.push_back(byId[fork.parentGroupId]->treeId);
+    trees.push_back(treeOf[fork.parentGroupId]);
     std::vector<int> row(fork.daughterGroupIds);
     row.resize(width, -1);
     daughters->InsertNextTypedTuple(row.data());
   }
-  AddPoints(output, forks);
+  output->SetPoints(forks);
   output->SetVerts(vertices);
   vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Radius, forkRadius);
   vtkCoronary::AddArray<vtkIntArray>(output->GetPointData(), names::ParentGroupIds, parents);

@@ -172,4 +172,17 @@ VesselTree SplitAtBifurcations(const VesselTree& tree)
   MeasureTree(split);
   return split;
 }
+
+Polylines LinesOf(const VesselTree& tree)
+{
+  Polylines lines;
+  lines.points = tree.points;
+  lines.radius = tree.radius;
+  for (const Branch& branch : tree.branches)
+  {
+    lines.lines.push_back(branch.points);
+    lines.groups.push_back(branch.groupId);
+  }
+  return lines;
+}
 }

@@ -2,13 +2,19 @@
  * @file VesselTree.h
  * @brief The axes of a forest of vessels: what the stages after the image pass on.
  *
- * Names and conventions are those of PhantomTree (the truth), so that the two compare member by
- * member. Positions are LPS in mm.
+ * The only form of a tree: the phantom's truth (PhantomTree) and the ordered tree (CenterlineTopology) are this with what
+ * only they know. Lines that are no tree, or not yet, are Polylines. vtkVesselTree.h leads to poly data and back.
+ * Positions are LPS in mm.
  */
 #ifndef DynamicCoronary_VesselTree_h
 #define DynamicCoronary_VesselTree_h
 
 #include "Geometry.h"
+#include "Polylines.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
 
 namespace coronary
 {
@@ -21,7 +27,7 @@ namespace coronary
  * Algorithms give split trees, and take any.
  *
  * Per-point members other than `points` and `radius` may be empty: not known. Data of a shared
- * point belong to the parent.
+ * point belong to the parent. An algorithm that takes less than a tree says so.
  */
 struct VesselTree
 {
@@ -37,6 +43,7 @@ struct VesselTree
     int segmentId = 0;       ///< SegmentId of CoronaryAnatomy.h, 0 unknown
     double length = 0.0;     ///< mm
     double tortuosity = 0.0; ///< length / chord - 1
+    std::string name{};      ///< of the vessel, for messages; may be empty
   };
 
   std::vector<Vector3> points;    ///< mm
@@ -70,6 +77,9 @@ void MeasureTree(VesselTree& tree);
  * @throws std::invalid_argument as CheckTree
  */
 VesselTree SplitAtBifurcations(const VesselTree& tree);
+
+/// The branches as lines, with their group ids.
+Polylines LinesOf(const VesselTree& tree);
 }
 
 #endif

@@ -1,8 +1,10 @@
 #include "vtkVesselTree.h"
 
+#include "CoronaryAnatomy.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 
+#include "vtkAbstractArray.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
@@ -13,11 +15,16 @@
 #include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
+#include "vtkStringArray.h"
 
+#include <numeric>
 #include <set>
 #include <stdexcept>
+#include <type_traits>
+#include <utility>
 
 namespace names = vtkCoronaryArrayNames;
+using Branch = coronary::VesselTree::Branch;
 
 namespace
 {
@@ -60,15 +67,8 @@ void ForEachLine(vtkPolyData* data, const Visit& visit)
   }
 }
 
-coronary::Vector3 PointOf(vtkPolyData* data, vtkIdType id)
-{
-  coronary::Vector3 point;
-  data->GetPoint(id, point.data());
-  return point;
-}
-
 /// In the given order, but no daughter before its parent; what has none stays where it is.
-void ParentsFirst(std::vector<coronary::VesselTree::Branch>& branches)
+void ParentsFirst(std::vector<Branch>& branches)
 {
   std::set<int> all;
   for (const auto& branch : branches)
@@ -76,12 +76,12 @@ void ParentsFirst(std::vector<coronary::VesselTree::Branch>& branches)
     all.insert(branch.groupId);
   }
   std::set<int> placed;
-  std::vector<coronary::VesselTree::Branch> waiting;
+  std::vector<Branch> waiting;
   waiting.swap(branches);
   for (std::size_t before = waiting.size() + 1; before != waiting.size();)
   {
     before = waiting.size();
-    std::vector<coronary::VesselTree::Branch> later;
+    std::vector<Branch> later;
     for (auto& branch : waiting)
     {
       const int parent = branch.parentGroupId;
@@ -101,28 +101,35 @@ void ParentsFirst(std::vector<coronary::VesselTree::Branch>& branches)
   branches.insert(branches.end(), waiting.begin(), waiting.end());
 }
 
-template <typename Array, typename Get>
-void AddCellValues(vtkPolyData* data, const char* name,
-  const std::vector<coronary::VesselTree::Branch>& branches, const Get& get)
+/// Of each point the array's value, where it is one that can be used.
+template <typename Value>
+void TakePointValues(vtkPolyData* data, const char* name, std::vector<Value>& values)
 {
-  vtkNew<Array> array;
-  array->SetName(name);
-  for (const auto& branch : branches)
+  vtkDataArray* array = data->GetPointData()->GetArray(name);
+  if (array == nullptr || array->GetNumberOfComponents() != 1 ||
+    array->GetNumberOfTuples() != data->GetNumberOfPoints())
   {
-    array->InsertNextValue(get(branch));
+    return;
   }
-  data->GetCellData()->AddArray(array);
+  values.clear();
+  for (vtkIdType i = 0; i < array->GetNumberOfTuples(); ++i)
+  {
+    values.push_back(static_cast<Value>(array->GetComponent(i, 0)));
+  }
 }
 
-void AddPointValues(vtkPolyData* data, const std::string& name, const std::vector<double>& values)
+/// One value of each branch or tract.
+template <typename Array, typename Item, typename Get>
+void AddCellValues(
+  vtkPolyData* data, const char* name, const std::vector<Item>& items, const Get& get)
 {
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name.c_str());
-  for (const double value : values)
+  std::vector<std::decay_t<decltype(get(items.front()))>> values;
+  values.reserve(items.size());
+  for (const Item& item : items)
   {
-    array->InsertNextValue(value);
+    values.push_back(get(item));
   }
-  data->GetPointData()->AddArray(array);
+  vtkCoronary::AddArray<Array>(data->GetCellData(), name, values);
 }
 }
 
@@ -138,35 +145,80 @@ vtkCoronary::CenterlineForm vtkCoronary::FormOf(vtkPolyData* data)
                                                         : CenterlineForm::Unknown;
 }
 
+coronary::Polylines vtkCoronary::LinesOf(vtkPolyData* data, vtkDataArray* radius)
+{
+  coronary::Polylines lines;
+  const vtkIdType count = data->GetNumberOfPoints();
+  lines.points.resize(static_cast<std::size_t>(count));
+  for (vtkIdType i = 0; i < count; ++i)
+  {
+    data->GetPoint(i, lines.points[static_cast<std::size_t>(i)].data());
+    if (radius != nullptr)
+    {
+      lines.radius.push_back(radius->GetComponent(i, 0));
+    }
+  }
+  ForEachLine(
+    data, [&](vtkIdType, vtkIdList* ids) { lines.lines.emplace_back(ids->begin(), ids->end()); });
+  return lines;
+}
+
+coronary::VesselTree vtkCoronary::BranchesOf(vtkPolyData* data, vtkDataArray* radius)
+{
+  coronary::Polylines lines = LinesOf(data, radius);
+  coronary::VesselTree tree;
+  tree.points = std::move(lines.points);
+  tree.radius = std::move(lines.radius);
+  vtkCellData* cells = data->GetCellData();
+  const auto fits = [&](vtkAbstractArray* array)
+  { return array != nullptr && array->GetNumberOfTuples() >= data->GetNumberOfCells(); };
+  const auto read = [&](const char* name, const auto& take)
+  {
+    vtkDataArray* array = cells->GetArray(name);
+    for (std::size_t n = 0; fits(array) && n < tree.branches.size(); ++n)
+    {
+      // Vertices stand before the lines.
+      const vtkIdType cell = data->GetNumberOfVerts() + static_cast<vtkIdType>(n);
+      take(tree.branches[n], static_cast<int>(array->GetComponent(cell, 0)));
+    }
+  };
+  for (std::vector<std::int64_t>& points : lines.lines)
+  {
+    Branch branch;
+    branch.groupId = static_cast<int>(tree.branches.size());
+    branch.points = std::move(points);
+    tree.branches.push_back(std::move(branch));
+  }
+  read(names::GroupIds, [](Branch& branch, int value) { branch.groupId = value; });
+  read(names::ParentGroupIds, [](Branch& branch, int value) { branch.parentGroupId = value; });
+  read(names::TreeIds, [](Branch& branch, int value) { branch.treeId = value; });
+  read(names::SegmentIds, [](Branch& branch, int value) { branch.segmentId = value; });
+  auto* labels = vtkStringArray::SafeDownCast(cells->GetAbstractArray(names::SegmentLabel));
+  for (std::size_t n = 0; fits(labels) && n < tree.branches.size(); ++n)
+  {
+    tree.branches[n].name = labels->GetValue(data->GetNumberOfVerts() + static_cast<vtkIdType>(n));
+  }
+  return tree;
+}
+
 coronary::VesselTree vtkCoronary::TreeOf(vtkPolyData* data, Radii radii)
 {
   vtkDataArray* radius = RadiusFor(data, radii);
-  vtkDataArray* groups = Column(data->GetCellData(), names::GroupIds, "cell");
-  vtkDataArray* parents = Column(data->GetCellData(), names::ParentGroupIds, "cell");
-  vtkDataArray* trees = data->GetCellData()->GetArray(names::TreeIds);
-  vtkDataArray* segments = data->GetCellData()->GetArray(names::SegmentIds);
-  coronary::VesselTree tree;
-  const vtkIdType count = data->GetNumberOfPoints();
-  for (vtkIdType i = 0; i < count; ++i)
-  {
-    tree.points.push_back(PointOf(data, i));
-    tree.radius.push_back(radius != nullptr ? radius->GetComponent(i, 0) : 0.0);
-  }
-  ForEachLine(data,
-    [&](vtkIdType cell, vtkIdList* ids)
-    {
-      coronary::VesselTree::Branch branch;
-      branch.points.assign(ids->begin(), ids->end());
-      branch.groupId = static_cast<int>(groups->GetComponent(cell, 0));
-      branch.parentGroupId = static_cast<int>(parents->GetComponent(cell, 0));
-      branch.treeId = trees != nullptr ? static_cast<int>(trees->GetComponent(cell, 0)) : 0;
-      branch.segmentId =
-        segments != nullptr ? static_cast<int>(segments->GetComponent(cell, 0)) : 0;
-      tree.branches.push_back(std::move(branch));
-    });
+  Column(data->GetCellData(), names::GroupIds, "cell");
+  Column(data->GetCellData(), names::ParentGroupIds, "cell");
+  coronary::VesselTree tree = BranchesOf(data, radius);
+  tree.radius.resize(tree.points.size(), 0.0);
   ParentsFirst(tree.branches);
   coronary::MeasureTree(tree);
   return tree;
+}
+
+void vtkCoronary::AddPointValues(vtkPolyData* data, coronary::VesselTree& tree)
+{
+  TakePointValues(data, names::Confidence, tree.confidence);
+  TakePointValues(data, names::Bridged, tree.bridged);
+  TakePointValues(data, names::BridgeConfidence, tree.bridgeConfidence);
+  TakePointValues(data, names::SegmentIds, tree.segmentId);
 }
 
 std::vector<coronary::VmtkTract> vtkCoronary::TractsOf(vtkPolyData* data, Radii radii)
@@ -183,7 +235,7 @@ std::vector<coronary::VmtkTract> vtkCoronary::TractsOf(vtkPolyData* data, Radii 
       coronary::VmtkTract tract;
       for (const vtkIdType id : *ids)
       {
-        tract.points.push_back(PointOf(data, id));
+        tract.points.emplace_back(data->GetPoint(id));
         tract.radius.push_back(radius != nullptr ? radius->GetComponent(id, 0) : 0.0);
         tract.source.push_back(id);
       }
@@ -196,36 +248,78 @@ std::vector<coronary::VmtkTract> vtkCoronary::TractsOf(vtkPolyData* data, Radii 
   return tracts;
 }
 
-void vtkCoronary::SetTree(vtkPolyData* data, const coronary::VesselTree& tree)
+void vtkCoronary::SetTree(
+  vtkPolyData* data, const coronary::VesselTree& tree, BranchArrays arrays, int pointType)
 {
-  using Branch = coronary::VesselTree::Branch;
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (const coronary::Vector3& point : tree.points)
+  SetLines(data, coronary::LinesOf(tree), pointType);
+  AddArray<vtkDoubleArray>(data->GetPointData(), names::Radius, tree.radius);
+  AddArray<vtkDoubleArray>(data->GetPointData(), names::Abscissas, tree.abscissa);
+  const auto ints = [&](const char* name, int Branch::*member)
   {
-    points->InsertNextPoint(point.data());
+    AddCellValues<vtkIntArray>(
+      data, name, tree.branches, [=](const Branch& branch) { return branch.*member; });
+  };
+  const auto lengths = [&](const char* name, double Branch::*member)
+  {
+    AddCellValues<vtkDoubleArray>(
+      data, name, tree.branches, [=](const Branch& branch) { return branch.*member; });
+  };
+  ints(names::GroupIds, &Branch::groupId);
+  ints(names::ParentGroupIds, &Branch::parentGroupId);
+  ints(names::TreeIds, &Branch::treeId);
+  if (arrays == BranchArrays::Named)
+  {
+    ints(names::BranchGeneration, &Branch::generation);
+    ints(names::StrahlerOrder, &Branch::strahlerOrder);
+    ints(names::SegmentIds, &Branch::segmentId);
+    AddCellValues<vtkStringArray>(data, names::SegmentLabel, tree.branches,
+      [](const Branch& branch) { return vtkStdString(coronary::SegmentName(branch.segmentId)); });
   }
-  vtkNew<vtkCellArray> lines;
-  for (const Branch& branch : tree.branches)
+  lengths(names::Length, &Branch::length);
+  lengths(names::Tortuosity, &Branch::tortuosity);
+}
+
+void vtkCoronary::SetLines(vtkPolyData* data, const coronary::Polylines& lines, int pointType)
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataType(pointType);
+  points->SetNumberOfPoints(static_cast<vtkIdType>(lines.points.size()));
+  for (std::size_t i = 0; i < lines.points.size(); ++i)
   {
-    lines->InsertNextCell(static_cast<int>(branch.points.size()));
-    for (const std::int64_t point : branch.points)
+    points->SetPoint(static_cast<vtkIdType>(i), lines.points[i].data());
+  }
+  vtkNew<vtkCellArray> cells;
+  for (const std::vector<std::int64_t>& line : lines.lines)
+  {
+    cells->InsertNextCell(static_cast<int>(line.size()));
+    for (const std::int64_t point : line)
     {
-      lines->InsertCellPoint(static_cast<vtkIdType>(point));
+      cells->InsertCellPoint(static_cast<vtkIdType>(point));
     }
   }
   data->SetPoints(points);
-  data->SetLines(lines);
-  AddPointValues(data, names::Radius, tree.radius);
-  AddPointValues(data, names::Abscissas, tree.abscissa);
-  AddCellValues<vtkIntArray>(
-    data, names::GroupIds, tree.branches, [](const Branch& b) { return b.groupId; });
-  AddCellValues<vtkIntArray>(
-    data, names::ParentGroupIds, tree.branches, [](const Branch& b) { return b.parentGroupId; });
-  AddCellValues<vtkIntArray>(
-    data, names::TreeIds, tree.branches, [](const Branch& b) { return b.treeId; });
-  AddCellValues<vtkDoubleArray>(
-    data, names::Length, tree.branches, [](const Branch& b) { return b.length; });
-  AddCellValues<vtkDoubleArray>(
-    data, names::Tortuosity, tree.branches, [](const Branch& b) { return b.tortuosity; });
+  data->SetLines(cells);
+}
+
+void vtkCoronary::SetTracts(vtkPolyData* data, const std::vector<coronary::VmtkTract>& tracts)
+{
+  using coronary::VmtkTract;
+  coronary::Polylines lines;
+  for (const VmtkTract& tract : tracts)
+  {
+    lines.lines.emplace_back(tract.points.size());
+    std::iota(lines.lines.back().begin(), lines.lines.back().end(),
+      static_cast<std::int64_t>(lines.points.size()));
+    lines.points.insert(lines.points.end(), tract.points.begin(), tract.points.end());
+  }
+  SetLines(data, lines);
+  const auto ints = [&](const char* name, int VmtkTract::*member)
+  {
+    AddCellValues<vtkIntArray>(
+      data, name, tracts, [=](const VmtkTract& tract) { return tract.*member; });
+  };
+  ints(names::CenterlineIds, &VmtkTract::centerlineId);
+  ints(names::TractIds, &VmtkTract::tractId);
+  ints(names::GroupIds, &VmtkTract::groupId);
+  ints(names::Blanking, &VmtkTract::blanking);
 }

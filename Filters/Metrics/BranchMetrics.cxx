@@ -26,13 +26,12 @@ double LengthOf(const std::vector<Vector3>& points)
   return length;
 }
 
-void Check(const Polylines& tree, const std::string& side)
+void Check(const Polylines& set, const std::string& side)
 {
-  const Polylines& set = tree.lines;
   const auto count = static_cast<std::int64_t>(set.points.size());
   Require(set.radius.empty() || set.radius.size() == set.points.size(),
     side + " has another number of radii than of points");
-  Require(tree.groups.empty() || tree.groups.size() == set.lines.size(),
+  Require(set.groups.empty() || set.groups.size() == set.lines.size(),
     side + " has another number of groups than of lines");
   for (std::size_t i = 0; i < set.lines.size(); ++i)
   {

@@ -45,13 +45,6 @@ struct BranchMetricsSettings
   void Validate() const;
 };
 
-/// Lines of a tree from the roots to the tips, with a number for each line.
-struct Polylines
-{
-  Polylines lines;
-  std::vector<std::int64_t> groups; ///< one a line; empty: the number of the line
-};
-
 struct TreeBranch
 {
   std::vector<Vector3> points; ///< at least two

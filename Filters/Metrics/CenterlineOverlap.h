@@ -19,8 +19,8 @@
 #ifndef DynamicCoronary_CenterlineOverlap_h
 #define DynamicCoronary_CenterlineOverlap_h
 
-#include "CenterlineTopology.h" // for Polylines
 #include "ParallelFor.h"
+#include "Polylines.h"
 
 #include <cstdint>
 #include <limits>
@@ -185,7 +185,7 @@ struct TreeOverlap
  *
  * Lines hang together where the first point of one is a point of another, by index or by position.
  * Lines of the reference that run on top of each other count each time: split such a tree first
- * (BuildTopology). `roots` are not used, `radius` of the result may be empty.
+ * (BuildTopology). `radius` of the result may be empty, groups are not read.
  * @throws as CompareCenterlines; for an index out of range too
  */
 TreeOverlap CompareCenterlineTrees(const Polylines& reference, const Polylines& result,

@@ -5,13 +5,13 @@
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
-#include "vtkIdList.h"
 #include "vtkIdTypeArray.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -43,28 +43,6 @@ vtkStandardNewMacro(vtkCenterlineMetrics);
 namespace
 {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-
-Polylines Read(vtkPolyData* data, vtkDataArray* radius)
-{
-  Polylines set;
-  const vtkIdType points = data->GetNumberOfPoints();
-  set.points.resize(points);
-  for (vtkIdType i = 0; i < points; ++i)
-  {
-    data->GetPoint(i, set.points[i].data());
-    if (radius != nullptr)
-    {
-      set.radius.push_back(radius->GetComponent(i, 0));
-    }
-  }
-  vtkNew<vtkIdList> cell;
-  vtkCellArray* lines = data->GetLines();
-  for (lines->InitTraversal(); lines->GetNextCell(cell) != 0;)
-  {
-    set.lines.emplace_back(cell->begin(), cell->end());
-  }
-  return set;
-}
 
 template <typename Array>
 vtkNew<Array> Column(const char* name, vtkIdType rows)
@@ -222,10 +200,10 @@ int vtkCenterlineMetrics::RequestData(
     Polylines sets[2]; // reference, result
     if (wanted)
     {
-      sets[0] = Read(reference,
+      sets[0] = vtkCoronary::LinesOf(reference,
         reference->GetNumberOfLines() > 0 ? vtkCoronary::RadiusOf(reference, "The reference has")
                                           : nullptr);
-      sets[1] = Read(result, vtkCoronary::FindRadius(result));
+      sets[1] = vtkCoronary::LinesOf(result, vtkCoronary::FindRadius(result));
     }
     if (sets[0].lines.empty())
     {

@@ -3,6 +3,7 @@
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkVesselTree.h"
 
 #include "vtkAppendPolyData.h"
 #include "vtkCellArray.h"
@@ -276,30 +277,14 @@ namespace
 /// Cells of the groups' array count in VTK's order: vertices come before lines.
 coronary::Polylines TreeOfLines(vtkPolyData* data)
 {
-  coronary::Polylines tree;
-  vtkDataArray* radius = vtkCoronary::FindRadius(data);
-  tree.points.resize(data->GetNumberOfPoints());
-  for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i)
-  {
-    data->GetPoint(i, tree.points[i].data());
-    if (radius != nullptr)
-    {
-      tree.radius.push_back(radius->GetComponent(i, 0));
-    }
-  }
+  coronary::Polylines tree = LinesOf(data, FindRadius(data));
   const std::vector<std::int64_t> groups =
     IdsOf(data->GetCellData()->GetArray(vtkCoronaryArrayNames::GroupIds), data->GetNumberOfCells(),
       "cell");
-  vtkNew<vtkIdList> cell;
-  vtkCellArray* lines = data->GetLines();
-  vtkIdType number = data->GetNumberOfVerts();
-  for (lines->InitTraversal(); lines->GetNextCell(cell) != 0; ++number)
+  if (!groups.empty())
   {
-    tree.lines.emplace_back(cell->begin(), cell->end());
-    if (!groups.empty())
-    {
-      tree.groups.push_back(groups[number]);
-    }
+    const auto first = groups.begin() + data->GetNumberOfVerts();
+    tree.groups.assign(first, first + data->GetNumberOfLines());
   }
   return tree;
 }

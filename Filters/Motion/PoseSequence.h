@@ -1,11 +1,12 @@
 /**
  * @file PoseSequence.h
- * @brief Lines that move: a tree or a skeleton at several moments of the heart's cycle.
+ * @brief Lines that move: a tree or a skeleton (Polylines at rest) at several moments of the heart's cycle.
  */
 #ifndef DynamicCoronary_PoseSequence_h
 #define DynamicCoronary_PoseSequence_h
 
 #include "Geometry.h"
+#include "Polylines.h"
 
 #include <cstdint>
 #include <vector>
@@ -19,14 +20,6 @@ enum class TrackingStatus : int
   Weak = 1,    ///< seen badly: the neighbours in space and time count more
   Lost = 2,    ///< not seen, and too far from what was seen to be filled well
   Filled = 3,  ///< not seen; from its neighbours in space and time
-};
-
-/// The polylines of a tree or the bones of a skeleton, and where their points are at rest.
-struct Polylines
-{
-  std::vector<Vector3> rest;                    ///< mm
-  std::vector<double> radius;                   ///< lumen radius at rest, mm; may be empty
-  std::vector<std::vector<std::int64_t>> lines; ///< indices of points; lines share points
 };
 
 /// Positions of the same points at several phases. What is optional may be empty.
@@ -49,10 +42,6 @@ struct PoseSequence
  * not positive, a rotation that is zero.
  */
 void CheckPoseSequence(const PoseSequence& sequence, std::size_t points);
-
-/// @throws std::invalid_argument: a line of less than two points, an index out of range, a radius that is
-/// negative, a coordinate that is not finite
-void CheckPolylines(const Polylines& lines);
 }
 
 #endif

@@ -3,6 +3,7 @@
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -432,27 +433,7 @@ void WriteVarying(const Sequence& sequence, std::size_t k, vtkPointSet* output)
 
 coronary::Polylines LinesOf(vtkPolyData* data, vtkDataArray* radius)
 {
-  coronary::Polylines lines;
-  const vtkIdType points = data->GetNumberOfPoints();
-  lines.points.resize(static_cast<std::size_t>(points));
-  for (vtkIdType n = 0; n < points; ++n)
-  {
-    data->GetPoint(n, lines.points[static_cast<std::size_t>(n)].data());
-  }
-  if (radius != nullptr)
-  {
-    lines.radius.resize(lines.points.size());
-    for (vtkIdType n = 0; n < points; ++n)
-    {
-      lines.radius[static_cast<std::size_t>(n)] = radius->GetComponent(n, 0);
-    }
-  }
-  vtkNew<vtkIdList> ids;
-  for (vtkIdType c = 0; c < data->GetLines()->GetNumberOfCells(); ++c)
-  {
-    data->GetLines()->GetCellAtId(c, ids);
-    lines.lines.emplace_back(ids->begin(), ids->end());
-  }
+  coronary::Polylines lines = vtkCoronary::LinesOf(data, radius);
   coronary::CheckPolylines(lines);
   return lines;
 }

@@ -17,6 +17,7 @@
 #include "CoronaryAnatomy.h"
 #include "Geometry.h"
 #include "ParallelFor.h"
+#include "VesselTree.h"
 
 #include <memory>
 #include <string>
@@ -78,32 +79,14 @@ struct PhantomSettings
   void Validate() const;
 };
 
-/// One polyline of a tree, from its root-side end to its far end.
-struct OldPhantomBranch
+/// The vessels' axes at one moment, a split tree: 0 left, 1 right. Ids, order and counts are the same at every moment,
+/// and so are the abscissas: along the reference tree.
+struct PhantomTree : VesselTree
 {
-  std::vector<std::int64_t> points; ///< indices; the first is shared with the parent's last point
-  int groupId = 0;
-  int parentGroupId = -1;
-  int treeId = 0;     ///< 0 left, 1 right
-  int generation = 0; ///< 0 at a root
-  int strahlerOrder = 1;
-  int segmentId = 0;
-  double length = 0.0;     ///< mm
-  double tortuosity = 0.0; ///< length / chord - 1
-};
-
-/// The vessels' axes at one moment. Ids, order and counts are the same at every moment.
-struct PhantomTree
-{
-  std::vector<Vector3> points;  ///< mm
-  std::vector<double> radius;   ///< lumen radius, mm
-  std::vector<double> abscissa; ///< mm from the ostium along the reference tree
-  std::vector<int> segmentId;
   std::vector<Vector3> displacement; ///< mm from the reference position
   std::vector<Vector3> velocity;     ///< mm/s
   std::vector<double> visibility;    ///< 0 lost .. 1 full contrast at this moment: d / (d + blur),
                                      ///< times 0 where the phase is lost or the vessel occluded
-  std::vector<VesselTree::Branch> branches;
 };
 
 /// A closed, oriented, 2-manifold triangle mesh around the lumen. One connectivity at all moments.

@@ -4,6 +4,7 @@
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -124,33 +125,6 @@ coronary::ImageGrid Cover(
   return grid;
 }
 
-template <typename Array, typename Value>
-void AddValues(vtkFieldData* fields, const char* name, const std::vector<Value>& values)
-{
-  vtkNew<Array> array;
-  array->SetName(name);
-  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
-  for (std::size_t i = 0; i < values.size(); ++i)
-  {
-    array->SetValue(static_cast<vtkIdType>(i), values[i]);
-  }
-  fields->AddArray(array);
-}
-
-/// One value a branch.
-template <typename Array, typename Function>
-void AddBranchValues(vtkFieldData* fields, const char* name,
-  const std::vector<coronary::VesselTree::Branch>& branches, const Function& valueOf)
-{
-  std::vector<std::decay_t<decltype(valueOf(branches.front()))>> values;
-  values.reserve(branches.size());
-  for (const coronary::VesselTree::Branch& branch : branches)
-  {
-    values.push_back(valueOf(branch));
-  }
-  AddValues<Array>(fields, name, values);
-}
-
 vtkSmartPointer<vtkDoubleArray> MakeVectors(const std::vector<Vector3>& vectors)
 {
   auto array = vtkSmartPointer<vtkDoubleArray>::New();
@@ -191,50 +165,21 @@ void AddCell(vtkCellArray* cells, const Indices& indices)
 void SetTime(vtkDataObject* data, double time, double cycleLength)
 {
   data->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
-  AddValues<vtkDoubleArray>(
+  vtkCoronary::AddArray<vtkDoubleArray>(
     data->GetFieldData(), vtkCoronaryArrayNames::CycleLength, std::vector<double>{ cycleLength });
-  AddValues<vtkDoubleArray>(
+  vtkCoronary::AddArray<vtkDoubleArray>(
     data->GetFieldData(), vtkCoronaryArrayNames::PhaseTime, std::vector<double>{ time });
 }
 
 void FillTree(const coronary::PhantomTree& tree, vtkPolyData* output)
 {
   namespace names = vtkCoronaryArrayNames;
-
-  vtkNew<vtkCellArray> lines;
-  for (const VesselTree::Branch& branch : tree.branches)
-  {
-    AddCell(lines, branch.points);
-  }
-  output->SetPoints(MakePoints(tree.points));
-  output->SetLines(lines);
-
+  vtkCoronary::SetTree(output, tree, vtkCoronary::BranchArrays::Named);
   vtkPointData* points = output->GetPointData();
-  AddValues<vtkDoubleArray>(points, names::Radius, tree.radius);
-  AddValues<vtkDoubleArray>(points, names::Abscissas, tree.abscissa);
-  AddValues<vtkIntArray>(points, names::SegmentIds, tree.segmentId);
+  vtkCoronary::AddArray<vtkIntArray>(points, names::SegmentIds, tree.segmentId);
   AddVectors(points, names::Displacement, tree.displacement);
   AddVectors(points, names::Velocity, tree.velocity);
-  AddValues<vtkDoubleArray>(points, names::Visibility, tree.visibility);
-
-  vtkCellData* cells = output->GetCellData();
-  const auto addInts = [&](const char* name, int VesselTree::Branch::*member)
-  {
-    AddBranchValues<vtkIntArray>(
-      cells, name, tree.branches, [=](const VesselTree::Branch& branch) { return branch.*member; });
-  };
-  addInts(names::GroupIds, &VesselTree::Branch::groupId);
-  addInts(names::ParentGroupIds, &VesselTree::Branch::parentGroupId);
-  addInts(names::TreeIds, &VesselTree::Branch::treeId);
-  addInts(names::BranchGeneration, &VesselTree::Branch::generation);
-  addInts(names::StrahlerOrder, &VesselTree::Branch::strahlerOrder);
-  addInts(names::SegmentIds, &VesselTree::Branch::segmentId);
-  AddBranchValues<vtkStringArray>(cells, names::SegmentLabel, tree.branches,
-    [](const VesselTree::Branch& branch) { return coronary::SegmentName(branch.segmentId); });
-  AddBranchValues<vtkDoubleArray>(cells, names::Length, tree.branches,
-    [](const VesselTree::Branch& branch) { return branch.length; });
-  AddBranchValues<vtkDoubleArray>(cells, names::Tortuosity, tree.branches,
-    [](const VesselTree::Branch& branch) { return branch.tortuosity; });
+  vtkCoronary::AddArray<vtkDoubleArray>(points, names::Visibility, tree.visibility);
 }
 
 std::vector<Vector3> SurfaceVelocity(const coronary::CoronaryPhantom& phantom,
@@ -267,11 +212,11 @@ void FillSurface(const coronary::PhantomSurface& surface, const std::vector<Vect
   }
   output->SetPoints(MakePoints(surface.points));
   output->SetPolys(triangles);
-  AddValues<vtkIntArray>(output->GetPointData(), names::GroupIds, surface.groupId);
-  AddValues<vtkDoubleArray>(output->GetPointData(), names::Abscissas, surface.abscissa);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetPointData(), names::GroupIds, surface.groupId);
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::Abscissas, surface.abscissa);
   AddVectors(output->GetPointData(), names::Displacement, surface.displacement);
   AddVectors(output->GetPointData(), names::Velocity, velocity);
-  AddValues<vtkIntArray>(output->GetCellData(), names::CellEntityIds, surface.entityId);
+  vtkCoronary::AddArray<vtkIntArray>(output->GetCellData(), names::CellEntityIds, surface.entityId);
 }
 
 void FillOstia(const std::vector<coronary::PhantomOstium>& ostia, vtkPolyData* output)
@@ -291,9 +236,11 @@ void FillOstia(const std::vector<coronary::PhantomOstium>& ostia, vtkPolyData* o
   }
   output->SetPoints(MakePoints(positions));
   output->SetVerts(vertices);
-  AddValues<vtkStringArray>(output->GetPointData(), vtkCoronaryArrayNames::Name, labels);
+  vtkCoronary::AddArray<vtkStringArray>(
+    output->GetPointData(), vtkCoronaryArrayNames::Name, labels);
   AddVectors(output->GetPointData(), vtkCoronaryArrayNames::Axis, axes);
-  AddValues<vtkDoubleArray>(output->GetPointData(), vtkCoronaryArrayNames::Radius, radii);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    output->GetPointData(), vtkCoronaryArrayNames::Radius, radii);
 }
 
 void FillProbe(const coronary::CoronaryPhantom& phantom, double time, vtkPointSet* input,

@@ -5,8 +5,8 @@
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkVesselTree.h"
 
-#include "vtkCellArray.h"
 #include "vtkCellType.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
@@ -58,28 +58,24 @@ void ReadMesh(vtkUnstructuredGrid* mesh, SkinWeightInput& input)
 /// Points at one place are one joint.
 void ReadSkeleton(vtkPolyData* skeleton, SkinWeightInput& input)
 {
+  const coronary::Polylines lines = vtkCoronary::LinesOf(skeleton);
   std::map<std::array<double, 3>, std::int64_t> places;
-  std::vector<std::int64_t> jointOf(skeleton->GetNumberOfPoints());
-  for (vtkIdType i = 0; i < skeleton->GetNumberOfPoints(); ++i)
+  std::vector<std::int64_t> jointOf;
+  for (const coronary::Vector3& point : lines.points)
   {
-    std::array<double, 3> place{};
-    skeleton->GetPoint(i, place.data());
-    const auto [found, isNew] =
-      places.try_emplace(place, static_cast<std::int64_t>(input.joints.size()));
+    const auto [found, isNew] = places.try_emplace(
+      { point[0], point[1], point[2] }, static_cast<std::int64_t>(input.joints.size()));
     if (isNew)
     {
-      input.joints.emplace_back(place.data());
+      input.joints.push_back(point);
     }
-    jointOf[i] = found->second;
+    jointOf.push_back(found->second);
   }
-  vtkNew<vtkIdList> line;
-  vtkCellArray* lines = skeleton->GetLines();
-  for (vtkIdType l = 0; l < lines->GetNumberOfCells(); ++l)
+  for (const std::vector<std::int64_t>& line : lines.lines)
   {
-    lines->GetCellAtId(l, line);
-    for (vtkIdType i = 1; i < line->GetNumberOfIds(); ++i)
+    for (std::size_t i = 1; i < line.size(); ++i)
     {
-      input.bones.emplace_back(jointOf[line->GetId(i - 1)], jointOf[line->GetId(i)]);
+      input.bones.emplace_back(jointOf[line[i - 1]], jointOf[line[i]]);
     }
   }
 }

@@ -6,19 +6,15 @@
 #include "vtkCoronaryUpstream.h"
 #include "vtkVesselTree.h"
 
-#include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkIdTypeArray.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
 #include "vtkIntArray.h"
-#include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
-#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
@@ -90,28 +86,16 @@ int vtkCenterlineSkeleton::RequestData(
       "The lines are no tree (cell arrays GroupIds and ParentGroupIds): make one of them with "
       "vtkCoronaryTreeTopology");
     coronary::VesselTree tree = vtkCoronary::TreeOf(input);
-    vtkDataArray* segments = input->GetPointData()->GetArray(names::SegmentIds);
-    for (vtkIdType i = 0; segments != nullptr && i < segments->GetNumberOfTuples(); ++i)
-    {
-      tree.segmentId.push_back(static_cast<int>(segments->GetComponent(i, 0)));
-    }
+    vtkCoronary::AddPointValues(input, tree);
     const Skeleton skeleton = coronary::MakeCenterlineSkeleton(tree, settings);
 
-    vtkNew<vtkPoints> points;
-    points->SetDataTypeToDouble();
-    points->SetNumberOfPoints(static_cast<vtkIdType>(skeleton.joints.size()));
-    for (std::size_t i = 0; i < skeleton.joints.size(); ++i)
-    {
-      points->SetPoint(static_cast<vtkIdType>(i), skeleton.joints[i].data());
-    }
-    vtkNew<vtkCellArray> lines;
+    coronary::Polylines lines;
+    lines.points = skeleton.joints;
     for (const Skeleton::Bone& bone : skeleton.bones)
     {
-      const vtkIdType ends[2] = { bone.first, bone.second };
-      lines->InsertNextCell(2, ends);
+      lines.lines.push_back({ bone.first, bone.second });
     }
-    output->SetPoints(points);
-    output->SetLines(lines);
+    vtkCoronary::SetLines(output, lines);
     vtkPointData* data = output->GetPointData();
     vtkCoronary::AddArray<vtkIdTypeArray>(data, names::ParentJoint, skeleton.parent);
     vtkCoronary::AddArray<vtkDoubleArray>(data, names::Radius, skeleton.radius);

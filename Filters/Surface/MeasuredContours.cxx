@@ -229,7 +229,8 @@ std::vector<Section> MeasureBranch(const ImageInterpolator& image, const Contour
 }
 
 /// A node's contour is round, whatever its normal; it must not lie along the axis.
-void TurnNodes(const std::map<std::int64_t, int>& uses, VesselTree& tree)
+void TurnNodes(const std::map<std::int64_t, int>& uses, const VesselTree& tree,
+  std::vector<Vector3>& contourNormals)
 {
   for (const VesselTree::Branch& branch : tree.branches)
   {
@@ -242,7 +243,7 @@ void TurnNodes(const std::map<std::int64_t, int>& uses, VesselTree& tree)
           : Vector3(tree.points[p] - tree.points[branch.points[branch.points.size() - 2]]);
         if (along.norm() > 0.0)
         {
-          tree.contourNormals[p] = along.unitOrthogonal();
+          contourNormals[p] = along.unitOrthogonal();
         }
       }
     }
@@ -260,46 +261,46 @@ void ContourSettings::Validate() const
 }
 
 double MeasureContours(const ImageInterpolator& image, const ContourSettings& settings,
-  VesselTree& tree, const ProgressCallback& progress)
+  const VesselTree& tree, SweepSections& sections, const ProgressCallback& progress)
 {
   settings.Validate();
   const std::size_t n = tree.points.size();
   const std::map<std::int64_t, int> uses = CountUses(tree);
-  tree.contourSamples = settings.samples;
-  tree.contours.resize(n * settings.samples);
-  tree.contourNormals.assign(n, Vector3::UnitX());
+  sections.contourSamples = settings.samples;
+  sections.contours.resize(n * settings.samples);
+  sections.contourNormals.assign(n, Vector3::UnitX());
   for (std::size_t p = 0; p < n; ++p)
   {
-    std::fill_n(tree.contours.begin() + p * settings.samples, settings.samples, tree.radius[p]);
+    std::fill_n(sections.contours.begin() + p * settings.samples, settings.samples, tree.radius[p]);
   }
   std::vector<char> measured(n, 0);
-  std::vector<std::vector<Section>> sections(tree.branches.size());
+  std::vector<std::vector<Section>> measurements(tree.branches.size());
   ParallelFor(
     static_cast<std::int64_t>(tree.branches.size()), 1,
     [&](std::int64_t first, std::int64_t last)
     {
       for (std::int64_t b = first; b < last; ++b)
       {
-        sections[b] = MeasureBranch(image, settings, tree, tree.branches[b].points, uses);
+        measurements[b] = MeasureBranch(image, settings, tree, tree.branches[b].points, uses);
       }
     },
     progress);
-  for (std::size_t b = 0; b < sections.size(); ++b)
+  for (std::size_t b = 0; b < measurements.size(); ++b)
   {
-    for (std::size_t i = 0; i < sections[b].size(); ++i)
+    for (std::size_t i = 0; i < measurements[b].size(); ++i)
     {
-      const Section& section = sections[b][i];
+      const Section& section = measurements[b][i];
       const std::int64_t p = tree.branches[b].points[i];
       if (!section.contour.empty())
       {
         measured[p] = section.measured ? 1 : 0;
-        tree.contourNormals[p] = section.normal;
+        sections.contourNormals[p] = section.normal;
         std::copy(section.contour.begin(), section.contour.end(),
-          tree.contours.begin() + p * settings.samples);
+          sections.contours.begin() + p * settings.samples);
       }
     }
   }
-  TurnNodes(uses, tree);
+  TurnNodes(uses, tree, sections.contourNormals);
   return n > 0
     ? static_cast<double>(std::count(measured.begin(), measured.end(), 1)) / static_cast<double>(n)
     : 0.0;

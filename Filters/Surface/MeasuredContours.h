@@ -23,7 +23,7 @@ struct ContourSettings
 };
 
 /**
- * Sets the contours of a tree from an image in which vessels are brighter than what is around them.
+ * Measures the contours of a tree in an image in which vessels are brighter than what is around them.
  *
  * At each point rays go out in the plane across the axis to where the image has fallen half way
  * from the lumen to its least value behind the wall. Few harmonics are fitted to the rays that found
@@ -32,13 +32,14 @@ struct ContourSettings
  * radius, which knows of the image's blur. Within two radii of a node, where the rays run into the
  * other vessels, and where too few of them find a wall, the contour is round.
  *
- * @param tree  points, radius and branches are read, contours, contourSamples and contourNormals set
+ * @param tree      points, radius and the branches' points are read
+ * @param sections  contours, contourSamples and contourNormals are set
  * @return share of the points whose contour was measured, 0 to 1
  * @throws std::invalid_argument for settings, or a branch that names a point that is not there
  *         Cancelled
  */
 double MeasureContours(const ImageInterpolator& image, const ContourSettings& settings,
-  VesselTree& tree, const ProgressCallback& progress = {});
+  const VesselTree& tree, SweepSections& sections, const ProgressCallback& progress = {});
 }
 
 #endif

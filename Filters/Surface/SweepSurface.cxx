@@ -298,8 +298,9 @@ struct Sweep
   std::vector<Fault> faults; ///< left; none: the surface may be handed out
 };
 
-Sweep SweepOnce(const VesselTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
-  bool last, const ProgressCallback& progress);
+Sweep SweepOnce(const VesselTree& tree, const SweepSections& sections,
+  const SweepSettings& settings, const Reliefs& reliefs, bool last,
+  const ProgressCallback& progress);
 }
 
 void SweepSettings::Validate() const
@@ -328,8 +329,10 @@ namespace
 class Sweeper
 {
 public:
-  Sweeper(const VesselTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
+  Sweeper(const VesselTree& tree, const SweepSections& sections, const SweepSettings& settings,
+    const ProgressCallback& progress)
     : Input(tree)
+    , Sections(sections)
     , Tree(tree)
     , Settings(settings)
     , Progress(progress)
@@ -343,8 +346,8 @@ public:
       this->Last = sweep >= Sweeps;
       try
       {
-        Sweep result = SweepOnce(
-          this->Tree, this->Settings, this->Relief, this->FaultSweeps >= FaultReliefs, Progress);
+        Sweep result = SweepOnce(this->Tree, this->Sections, this->Settings, this->Relief,
+          this->FaultSweeps >= FaultReliefs, Progress);
         if (result.faults.empty())
         {
           return this->Finished(std::move(result.surface));
@@ -533,6 +536,7 @@ private:
   }
 
   const VesselTree& Input;
+  const SweepSections& Sections;
   VesselTree Tree;
   const SweepSettings& Settings;
   const ProgressCallback& Progress;
@@ -545,8 +549,8 @@ private:
 };
 }
 
-SweptSurface SweepVesselTree(
-  const VesselTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
+SweptSurface SweepVesselTree(const VesselTree& tree, const SweepSettings& settings,
+  const SweepSections& sections, const ProgressCallback& progress)
 {
   settings.Validate();
   if (tree.branches.empty())
@@ -563,7 +567,7 @@ SweptSurface SweepVesselTree(
       return progress(reported);
     };
   }
-  return Sweeper(tree, settings, rising).Run();
+  return Sweeper(tree, sections, settings, rising).Run();
 }
 
 namespace
@@ -741,8 +745,9 @@ bool MendTriangles(const SweptLumen& lumen, const VesselTree& tree,
 /**
  * @param last  what stays bad is not relieved any more: triangles are replaced even by poor ones
  */
-Sweep SweepOnce(const VesselTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
-  bool lastSweep, const ProgressCallback& progress)
+Sweep SweepOnce(const VesselTree& tree, const SweepSections& sections,
+  const SweepSettings& settings, const Reliefs& reliefs, bool lastSweep,
+  const ProgressCallback& progress)
 {
   Sweep sweep;
   SweptSurface& result = sweep.surface;
@@ -754,7 +759,7 @@ Sweep SweepOnce(const VesselTree& tree, const SweepSettings& settings, const Rel
     }
     return [&progress, from, to](double f) { return progress(from + (to - from) * f); };
   };
-  SweptLumen lumen(tree, settings, reliefs.places, reliefs.leftOut);
+  SweptLumen lumen(tree, sections, settings, reliefs.places, reliefs.leftOut);
   CheckSize(tree, settings);
   lumen.SetEdgeRetreat(BluntRetreat);
   Report(progress, 0.05);

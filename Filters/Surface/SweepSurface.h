@@ -13,26 +13,16 @@
 #include "Geometry.h"
 #include "ParallelFor.h"
 #include "VesselAxis.h"
+#include "VesselTree.h"
 
 #include <string>
 #include <vector>
 
 namespace coronary
 {
-/// One polyline of a tree, in the direction of flow.
-struct OldSweepBranch
+/// What may be known of the vessels beside axes and radii; all of it may be empty.
+struct SweepSections
 {
-  std::vector<std::int64_t> points; ///< indices; branches are joined where they share a point
-  int groupId = 0;
-  std::string name{}; ///< of the vessel, for messages; may be empty
-};
-
-/// What is swept: a forest of branches.
-struct VesselTree
-{
-  std::vector<Vector3> points; ///< mm
-  std::vector<double> radius;  ///< mm, positive
-  std::vector<VesselTree::Branch> branches;
   /// Cross-sections other than circles: for each point `contourSamples` radii in mm, in equal steps
   /// of the angle from `contourNormal` towards tangent x contourNormal. Empty: circles.
   std::vector<double> contours;
@@ -135,13 +125,16 @@ struct SweptSurface
  * smaller; triangles replaced. A branch for which nothing helps is left out from there on, and the
  * rest is made.
  *
+ * @param tree  points, radii (positive), and of the branches the points in the direction of flow, group ids and names
+ *              (for messages) are read. It need not pass CheckTree: branches are joined wherever they share a point,
+ *              parents are not asked for
  * @throws std::invalid_argument  naming the setting, or the branch and point that is wrong; when a
  *                                radius is below 1e-6 mm or the wall needs over 2e7 triangles
  *         std::runtime_error     when nothing of the tree can be meshed, naming the first reason
  *         Cancelled
  */
-SweptSurface SweepVesselTree(
-  const VesselTree& tree, const SweepSettings& settings, const ProgressCallback& progress = {});
+SweptSurface SweepVesselTree(const VesselTree& tree, const SweepSettings& settings,
+  const SweepSections& sections = {}, const ProgressCallback& progress = {});
 }
 
 #endif

@@ -396,11 +396,11 @@ void SweptLumen::Build::MendStub(const Arm& arm, const std::vector<Range>& other
 
 Vector3 SweptLumen::Build::EndNormal(std::int64_t point, const Vector3& outward) const
 {
-  if (this->input.endNormals.empty() || this->input.endNormals[point].squaredNorm() == 0.0)
+  if (this->sections.endNormals.empty() || this->sections.endNormals[point].squaredNorm() == 0.0)
   {
     return outward;
   }
-  Vector3 normal = this->input.endNormals[point].normalized();
+  Vector3 normal = this->sections.endNormals[point].normalized();
   normal *= normal.dot(outward) < 0.0 ? -1.0 : 1.0;
   if (normal.dot(outward) < 0.5)
   {

@@ -56,38 +56,38 @@ void SweptLumen::Build::Check() const
       throw std::invalid_argument(name + " has no length");
     }
   }
-  if (!this->input.endNormals.empty())
+  if (!this->sections.endNormals.empty())
   {
-    if (this->input.endNormals.size() != this->points.size())
+    if (this->sections.endNormals.size() != this->points.size())
     {
       throw std::invalid_argument("SweepVesselTree: " + std::to_string(this->points.size()) +
-        " points but " + std::to_string(this->input.endNormals.size()) + " normals of ends");
+        " points but " + std::to_string(this->sections.endNormals.size()) + " normals of ends");
     }
-    for (std::size_t i = 0; i < this->input.endNormals.size(); ++i)
+    for (std::size_t i = 0; i < this->sections.endNormals.size(); ++i)
     {
-      if (!this->input.endNormals[i].allFinite())
+      if (!this->sections.endNormals[i].allFinite())
       {
         throw std::invalid_argument(
           "SweepVesselTree: normal of the end at point " + std::to_string(i) + " is no number");
       }
     }
   }
-  if (this->input.contourSamples != 0)
+  if (this->sections.contourSamples != 0)
   {
     const std::size_t n = this->points.size();
-    if (this->input.contourSamples < 6 ||
-      this->input.contours.size() != n * this->input.contourSamples ||
-      this->input.contourNormals.size() != n)
+    if (this->sections.contourSamples < 6 ||
+      this->sections.contours.size() != n * this->sections.contourSamples ||
+      this->sections.contourNormals.size() != n)
     {
       throw std::invalid_argument(
         "SweepVesselTree: contours need at least 6 radii and one normal a point");
     }
-    for (std::size_t i = 0; i < this->input.contours.size(); ++i)
+    for (std::size_t i = 0; i < this->sections.contours.size(); ++i)
     {
-      if (!(this->input.contours[i] > 0.0) || !std::isfinite(this->input.contours[i]))
+      if (!(this->sections.contours[i] > 0.0) || !std::isfinite(this->sections.contours[i]))
       {
         throw std::invalid_argument("SweepVesselTree: contour of point " +
-          std::to_string(i / this->input.contourSamples) + " has a radius that is not positive");
+          std::to_string(i / this->sections.contourSamples) + " has a radius that is not positive");
       }
     }
   }

@@ -34,11 +34,12 @@ struct RoundUnion
 };
 }
 
-SweptLumen::SweptLumen(const VesselTree& tree, const SweepSettings& settings,
-  const std::vector<SweepRelief>& reliefs, const std::vector<SweepOmission>& leftOut)
+SweptLumen::SweptLumen(const VesselTree& tree, const SweepSections& sections,
+  const SweepSettings& settings, const std::vector<SweepRelief>& reliefs,
+  const std::vector<SweepOmission>& leftOut)
   : Clearance(settings.clearance)
 {
-  Build build(tree, settings, reliefs, *this);
+  Build build(tree, sections, settings, reliefs, *this);
   build.Check();
   build.FindLinks();
   for (const SweepOmission& omission : leftOut)

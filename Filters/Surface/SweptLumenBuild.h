@@ -38,6 +38,7 @@ struct SweptLumen::Build
   };
 
   const VesselTree& input;
+  const SweepSections& sections;
   const SweepSettings& settings;
   const std::vector<SweepRelief>& reliefs;
   SweptLumen& self;
@@ -56,9 +57,10 @@ struct SweptLumen::Build
   };
   std::vector<Node> nodes;
 
-  Build(const VesselTree& tree, const SweepSettings& s, const std::vector<SweepRelief>& places,
-    SweptLumen& lumen)
+  Build(const VesselTree& tree, const SweepSections& shape, const SweepSettings& s,
+    const std::vector<SweepRelief>& places, SweptLumen& lumen)
     : input(tree)
+    , sections(shape)
     , settings(s)
     , reliefs(places)
     , self(lumen)

@@ -261,7 +261,7 @@ void SweptLumen::Build::MakeVessel(Incidence arm, int tree,
   const auto seed = normalOfNode.find(course.front());
   axis.SetFrames(this->settings.frame,
     seed != normalOfNode.end() ? seed->second : axis.AllStations().front().normal);
-  if (this->input.contourSamples > 0)
+  if (this->sections.contourSamples > 0)
   {
     this->AddContours(axis, course);
   }
@@ -352,7 +352,7 @@ void SweptLumen::Build::MakeVessel(Incidence arm, int tree,
 
 void SweptLumen::Build::AddContours(VesselAxis& axis, const std::vector<std::int64_t>& course) const
 {
-  const int m = this->input.contourSamples;
+  const int m = this->sections.contourSamples;
   std::vector<double> at;
   std::vector<std::vector<double>> contours;
   double last = -1.0;
@@ -371,7 +371,7 @@ void SweptLumen::Build::AddContours(VesselAxis& axis, const std::vector<std::int
     }
     last = s;
     const Station station = axis.At(s);
-    const Vector3& given = this->input.contourNormals[source];
+    const Vector3& given = this->sections.contourNormals[source];
     const double turn = std::atan2(given.dot(station.binormal), given.dot(station.normal));
     std::vector<double> radii(m);
     for (int j = 0; j < m; ++j)
@@ -380,7 +380,7 @@ void SweptLumen::Build::AddContours(VesselAxis& axis, const std::vector<std::int
       const double x = (2.0 * Pi * j / m - turn) / (2.0 * Pi) * m;
       const double floor = std::floor(x);
       const int k = ((static_cast<int>(floor) % m) + m) % m;
-      const double* row = this->input.contours.data() + source * m;
+      const double* row = this->sections.contours.data() + source * m;
       radii[j] = (1.0 - (x - floor)) * row[k] + (x - floor) * row[(k + 1) % m];
     }
     at.push_back(s);

@@ -6,6 +6,7 @@
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -13,7 +14,6 @@
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
-#include "vtkIdList.h"
 #include "vtkIdTypeArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
@@ -98,6 +98,7 @@ class vtkFrenetSweepSurface::Reader
 {
 public:
   VesselTree tree;
+  coronary::SweepSections sections;
   bool hasSegmentIds = false;
   bool hasLabels = false;
   std::map<int, int> segmentIds;             ///< of each group
@@ -111,46 +112,26 @@ public:
       return;
     }
     vtkCellData* cells = input->GetCellData();
-    vtkDataArray* groups = cells->GetArray(vtkCoronaryArrayNames::GroupIds);
-    vtkDataArray* ids = cells->GetArray(vtkCoronaryArrayNames::SegmentIds);
-    auto* labels =
-      vtkStringArray::SafeDownCast(cells->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
-    this->hasSegmentIds = ids != nullptr;
-    this->hasLabels = labels != nullptr;
+    this->hasSegmentIds = cells->GetArray(vtkCoronaryArrayNames::SegmentIds) != nullptr;
+    this->hasLabels = vtkStringArray::SafeDownCast(
+                        cells->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel)) != nullptr;
     if (!wanted || input->GetNumberOfLines() == 0)
     {
       return;
     }
-    this->ReadPoints(self, input, hasImage);
-    const std::vector<std::int64_t> same = this->SamePlaces();
-    vtkIdType cell = input->GetNumberOfVerts(); // vertices come first in cell data
-    const auto of = [&](vtkDataArray* array)
-    { return static_cast<int>(array->GetComponent(cell, 0)); };
-    const auto fits = [&](vtkAbstractArray* array)
-    { return array != nullptr && array->GetNumberOfTuples() >= input->GetNumberOfCells(); };
-    vtkNew<vtkIdList> line;
-    vtkCellArray* lines = input->GetLines();
-    int number = 0;
-    for (lines->InitTraversal(); lines->GetNextCell(line) != 0; ++cell, ++number)
+    this->tree = vtkCoronary::BranchesOf(
+      input, vtkCoronary::RadiusOf(input, "The input has", self.InputRadiusArrayName));
+    this->ReadSections(self, input, hasImage);
+    this->firstAtPlace = this->SamePlaces();
+    for (VesselTree::Branch& branch : this->tree.branches)
     {
-      coronary::VesselTree::Branch branch;
-      branch.groupId = fits(groups) ? of(groups) : number;
-      for (vtkIdType i = 0; i < line->GetNumberOfIds(); ++i)
+      for (std::int64_t& point : branch.points)
       {
-        branch.points.push_back(same[line->GetId(i)]);
+        point = this->firstAtPlace[point];
       }
-      if (fits(ids))
-      {
-        this->segmentIds.emplace(branch.groupId, of(ids));
-      }
-      if (fits(labels))
-      {
-        this->segmentLabels.emplace(branch.groupId, labels->GetValue(cell));
-        branch.name = labels->GetValue(cell);
-      }
-      this->tree.branches.push_back(std::move(branch));
+      this->segmentIds.emplace(branch.groupId, branch.segmentId);
+      this->segmentLabels.emplace(branch.groupId, branch.name);
     }
-    this->firstAtPlace = same;
   }
 
   /// The first of the points at the same place, for each point.
@@ -167,17 +148,9 @@ private:
     return array;
   }
 
-  void ReadPoints(const vtkFrenetSweepSurface& self, vtkPolyData* input, bool hasImage)
+  void ReadSections(const vtkFrenetSweepSurface& self, vtkPolyData* input, bool hasImage)
   {
-    vtkDataArray* radius = vtkCoronary::RadiusOf(input, "The input has", self.InputRadiusArrayName);
     const vtkIdType count = input->GetNumberOfPoints();
-    this->tree.points.resize(count);
-    this->tree.radius.resize(count);
-    for (vtkIdType i = 0; i < count; ++i)
-    {
-      input->GetPoint(i, this->tree.points[i].data());
-      this->tree.radius[i] = radius->GetComponent(i, 0);
-    }
     if (!self.EndNormalArrayName.empty() && self.EndNormalArrayName != "None")
     {
       vtkDataArray* ends = Find(input, self.EndNormalArrayName);
@@ -186,10 +159,10 @@ private:
         throw std::invalid_argument(
           "The normals of the ends " + self.EndNormalArrayName + " must have 3 components");
       }
-      this->tree.endNormals.resize(count);
+      this->sections.endNormals.resize(count);
       for (vtkIdType i = 0; i < count; ++i)
       {
-        ends->GetTuple(i, this->tree.endNormals[i].data());
+        ends->GetTuple(i, this->sections.endNormals[i].data());
       }
     }
     if (hasImage || self.ContourArrayName.empty() || self.ContourArrayName == "None")
@@ -209,13 +182,13 @@ private:
       throw std::invalid_argument(std::string("The contour normals ") +
         vtkCoronaryArrayNames::FrenetNormal + " must have 3 components");
     }
-    this->tree.contourSamples = samples;
-    this->tree.contours.resize(static_cast<std::size_t>(count) * samples);
-    this->tree.contourNormals.resize(count);
+    this->sections.contourSamples = samples;
+    this->sections.contours.resize(static_cast<std::size_t>(count) * samples);
+    this->sections.contourNormals.resize(count);
     for (vtkIdType i = 0; i < count; ++i)
     {
-      contours->GetTuple(i, this->tree.contours.data() + i * samples);
-      normals->GetTuple(i, this->tree.contourNormals[i].data());
+      contours->GetTuple(i, this->sections.contours.data() + i * samples);
+      normals->GetTuple(i, this->sections.contourNormals[i].data());
     }
   }
 
@@ -489,7 +462,7 @@ void vtkFrenetSweepSurface::MeasureContoursIn(vtkInformationVector* images, Read
   const coronary::ScalarImage scalars = vtkCoronary::ScalarImageOf(image, values, copy);
   const coronary::ImageInterpolator interpolator(scalars);
   const double share = coronary::MeasureContours(
-    interpolator, {}, reader.tree, vtkCoronary::ProgressOf(this, 0.0, 0.1));
+    interpolator, {}, reader.tree, reader.sections, vtkCoronary::ProgressOf(this, 0.0, 0.1));
   if (share < 0.1)
   {
     vtkWarningMacro("Only " << static_cast<int>(std::lround(100.0 * share))
@@ -579,8 +552,8 @@ int vtkFrenetSweepSurface::RequestData(
     {
       this->MeasureContoursIn(inputs[1], reader);
     }
-    const SweptSurface surface = coronary::SweepVesselTree(
-      reader.tree, settings, vtkCoronary::ProgressOf(this, hasImage ? 0.1 : 0.0, 0.97));
+    const SweptSurface surface = coronary::SweepVesselTree(reader.tree, settings, reader.sections,
+      vtkCoronary::ProgressOf(this, hasImage ? 0.1 : 0.0, 0.97));
     const Writer writer(*this, reader, surface);
     writer.WriteSurface(surfaceOutput);
     writer.WritePatches(patchOutput);

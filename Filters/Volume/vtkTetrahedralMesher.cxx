@@ -6,6 +6,7 @@
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
 #include "vtkTriangleSurface.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -13,7 +14,6 @@
 #include "vtkDataArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
-#include "vtkIdList.h"
 #include "vtkIdTypeArray.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -43,21 +43,15 @@ namespace
 {
 void ReadSkeleton(vtkPolyData* skeleton, TetrahedralMeshInput& input)
 {
-  input.skeletonPoints = vtkCoronary::ReadPoints(skeleton);
-  if (vtkDataArray* radius = vtkCoronary::FindRadius(skeleton))
+  const coronary::Polylines lines =
+    vtkCoronary::LinesOf(skeleton, vtkCoronary::FindRadius(skeleton));
+  input.skeletonPoints = lines.points;
+  input.skeletonRadius = lines.radius;
+  for (const std::vector<std::int64_t>& line : lines.lines)
   {
-    for (vtkIdType i = 0; i < skeleton->GetNumberOfPoints(); ++i)
+    for (std::size_t i = 1; i < line.size(); ++i)
     {
-      input.skeletonRadius.push_back(radius->GetComponent(i, 0));
-    }
-  }
-  vtkNew<vtkIdList> cell;
-  vtkCellArray* lines = skeleton->GetLines();
-  for (lines->InitTraversal(); lines->GetNextCell(cell) != 0;)
-  {
-    for (vtkIdType i = 1; i < cell->GetNumberOfIds(); ++i)
-    {
-      input.skeletonEdges.emplace_back(cell->GetId(i - 1), cell->GetId(i));
+      input.skeletonEdges.emplace_back(line[i - 1], line[i]);
     }
   }
 }

@@ -6,6 +6,7 @@
 #include "vtkCoronaryArrayNames.h"
 #include "vtkDataFiles.h"
 #include "vtkSkeletonForms.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -13,7 +14,6 @@
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
-#include "vtkStringArray.h"
 #include "vtkUnstructuredGrid.h"
 
 #include <algorithm>
@@ -168,47 +168,40 @@ std::map<int, int> TakeTree(vtkPolyData* tree, const std::string& path, WallTopo
   {
     Fail(path, std::string("has no point array '") + names::Radius + "'");
   }
-  const std::vector<int> group = NumbersOfCells(tree, names::GroupIds, path);
-  const std::vector<int> parent = NumbersOfCells(tree, names::ParentGroupIds, path);
-  if (group.empty() || parent.empty())
+  if (NumbersOfCells(tree, names::GroupIds, path).empty() ||
+    NumbersOfCells(tree, names::ParentGroupIds, path).empty())
   {
     Fail(path,
       std::string("has no cell arrays '") + names::GroupIds + "' and '" + names::ParentGroupIds +
         "'");
   }
-  auto* label =
-    vtkStringArray::SafeDownCast(tree->GetCellData()->GetAbstractArray(names::SegmentLabel));
+  const VesselTree vessels = vtkCoronary::BranchesOf(tree, radius);
   std::map<int, int> branchOf;
-  for (vtkIdType cell = 0; cell < lines; ++cell)
+  for (const VesselTree::Branch& branch : vessels.branches)
   {
-    const auto n = static_cast<std::size_t>(cell);
-    if (!branchOf.emplace(group[n], static_cast<int>(cell)).second)
+    if (!branchOf.emplace(branch.groupId, static_cast<int>(branchOf.size())).second)
     {
-      Fail(path, "has two branches with the GroupId " + std::to_string(group[n]));
+      Fail(path, "has two branches with the GroupId " + std::to_string(branch.groupId));
     }
-    vtkIdType count = 0;
-    const vtkIdType* ids = nullptr;
-    tree->GetLines()->GetCellAtId(cell, count, ids);
     std::vector<Vector3> axis;
     std::vector<double> radii;
-    for (vtkIdType k = 0; k < count; ++k)
+    for (const std::int64_t p : branch.points)
     {
       // Where two points fall together there is no direction.
-      const Vector3 point(tree->GetPoint(ids[k]));
+      const Vector3& point = vessels.points[static_cast<std::size_t>(p)];
       if (axis.empty() || (point - axis.back()).norm() > 1e-6)
       {
         axis.push_back(point);
-        radii.push_back(radius->GetComponent(ids[k], 0));
+        radii.push_back(vessels.radius[static_cast<std::size_t>(p)]);
       }
     }
     topology.axis.push_back(std::move(axis));
     topology.axisRadius.push_back(std::move(radii));
-    const bool named = label && label->GetNumberOfValues() == lines;
-    topology.groupName.push_back(named ? std::string(label->GetValue(cell)) : std::string());
+    topology.groupName.push_back(branch.name);
   }
-  for (const int id : parent)
+  for (const VesselTree::Branch& branch : vessels.branches)
   {
-    const auto found = branchOf.find(id);
+    const auto found = branchOf.find(branch.parentGroupId);
     topology.parent.push_back(found == branchOf.end() ? -1 : found->second);
   }
   return branchOf;

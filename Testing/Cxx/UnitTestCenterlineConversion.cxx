@@ -1,10 +1,12 @@
 // Trees to the forms of other programs and back.
 
-#include "CenterlineConversion.h"
 #include "CoronaryPhantom.h"
+#include "TgfSkeleton.h"
+#include "VmtkTracts.h"
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <functional>
 #include <limits>
 #include <sstream>
@@ -20,18 +22,7 @@ VesselTree FromPhantom(int seed)
   PhantomSettings settings;
   settings.seed = static_cast<std::uint64_t>(seed);
   const PhantomTree truth = CoronaryPhantom(settings).Tree(0.75);
-  VesselTree tree;
-  tree.points = truth.points;
-  tree.radius = truth.radius;
-  for (const VesselTree::Branch& branch : truth.branches)
-  {
-    VesselTree::Branch copy;
-    copy.points = branch.points;
-    copy.groupId = branch.groupId;
-    copy.parentGroupId = branch.parentGroupId;
-    tree.branches.push_back(copy);
-  }
-  return SplitAtBifurcations(tree);
+  return SplitAtBifurcations(truth);
 }
 
 /// The same branches with the same parents; positions bit by bit, radii on request.
@@ -131,6 +122,39 @@ TEST(CenterlineConversion, AnUnsplitTreeIsSplitForVmtk)
   EXPECT_NE(tracts[0].centerlineId, tracts[2].centerlineId);
   EXPECT_EQ(tracts[0].points.back(), tracts[1].points.front());
   ExpectSame(SplitAtBifurcations(tree), FromVmtkTracts(tracts), true);
+}
+
+TEST(CenterlineConversion, PathsToGivenPoints)
+{
+  VesselTree tree;
+  for (int i = 0; i < 7; ++i)
+  {
+    tree.points.emplace_back(i, i > 4 ? 1.0 : 0.0, 0.0);
+  }
+  tree.radius = { 1.0, 1.1, 1.2, 1.3, 1.4, 0.5, 0.4 };
+  tree.branches.resize(3);
+  tree.branches[0].points = { 0, 1, 2 };
+  tree.branches[1].points = { 2, 3, 4 };
+  tree.branches[1].groupId = 1;
+  tree.branches[1].parentGroupId = 0;
+  tree.branches[2].points = { 2, 5 };
+  tree.branches[2].groupId = 2;
+  tree.branches[2].parentGroupId = 0;
+  // A tip, within a branch, the fork (it is the parent's), the root, a point of no branch.
+  const std::vector<VmtkTract> tracts = ToVmtkTracts(tree, { 5, 3, 2, 0, 6 });
+  const std::vector<std::vector<std::int64_t>> points = { { 0, 1, 2 }, { 2, 5 }, { 0, 1, 2 },
+    { 2, 3 }, { 0, 1, 2 } };
+  const std::vector<std::array<int, 3>> ids = { { 0, 0, 0 }, { 0, 1, 2 }, { 1, 0, 0 }, { 1, 1, 1 },
+    { 2, 0, 0 } };
+  ASSERT_EQ(tracts.size(), points.size());
+  for (std::size_t t = 0; t < tracts.size(); ++t)
+  {
+    EXPECT_EQ(tracts[t].source, points[t]) << t;
+    EXPECT_EQ(tracts[t].points.back(), tree.points[static_cast<std::size_t>(points[t].back())]);
+    EXPECT_EQ(tracts[t].centerlineId, ids[t][0]) << t;
+    EXPECT_EQ(tracts[t].tractId, ids[t][1]) << t;
+    EXPECT_EQ(tracts[t].groupId, ids[t][2]) << t;
+  }
 }
 
 TEST(CenterlineConversion, TgfThereAndBack)

@@ -79,18 +79,6 @@ Polylines Fork(bool second = true)
   return set;
 }
 
-Polylines FromPhantom(const PhantomTree& tree)
-{
-  Polylines set;
-  set.points = tree.points;
-  set.radius = tree.radius;
-  for (const VesselTree::Branch& branch : tree.branches)
-  {
-    set.lines.push_back(branch.points);
-  }
-  return set;
-}
-
 std::string Complaint(const std::function<void()>& call)
 {
   try
@@ -653,9 +641,9 @@ TEST(CenterlineTreeOverlap, PhantomTreesAndTheUnit)
 {
   PhantomSettings settings;
   settings.seed = 3;
-  const Polylines truth = FromPhantom(CoronaryPhantom(settings).Tree(0.75));
+  const Polylines truth = LinesOf(CoronaryPhantom(settings).Tree(0.75));
   settings.centerlineSpacing = 1.0;
-  const Polylines coarse = FromPhantom(CoronaryPhantom(settings).Tree(0.75));
+  const Polylines coarse = LinesOf(CoronaryPhantom(settings).Tree(0.75));
   const TreeOverlap overlap = CompareCenterlineTrees(truth, coarse);
   EXPECT_GT(overlap.total.overlap, 0.9999);
   EXPECT_LT(overlap.total.distance, 0.05);

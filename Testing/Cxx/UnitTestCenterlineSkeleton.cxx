@@ -61,25 +61,6 @@ VesselTree Arc(double bendRadius, double radius)
   return tree;
 }
 
-VesselTree OfPhantom(const PhantomTree& phantom)
-{
-  VesselTree tree;
-  tree.points = phantom.points;
-  tree.radius = phantom.radius;
-  tree.segmentId = phantom.segmentId;
-  for (const VesselTree::Branch& branch : phantom.branches)
-  {
-    VesselTree::Branch b;
-    b.points = branch.points;
-    b.groupId = branch.groupId;
-    b.parentGroupId = branch.parentGroupId;
-    b.treeId = branch.treeId;
-    b.segmentId = branch.segmentId;
-    tree.branches.push_back(b);
-  }
-  return tree;
-}
-
 std::string Complaint(const std::function<void(Skeleton&)>& damage)
 {
   Skeleton skeleton = MakeCenterlineSkeleton(Branching());
@@ -167,7 +148,7 @@ TEST(CenterlineSkeleton, PhantomsWithinTheLimits)
   {
     PhantomSettings settings;
     settings.seed = seed;
-    const VesselTree tree = OfPhantom(CoronaryPhantom(settings).Tree(0.75));
+    const VesselTree tree = CoronaryPhantom(settings).Tree(0.75);
     const Skeleton skeleton = MakeCenterlineSkeleton(tree);
     EXPECT_GT(skeleton.bones.size(), 60u);
     EXPECT_LT(skeleton.bones.size(), 400u);

@@ -92,18 +92,6 @@ LineMaker WholePaths(double spread = 0.0)
     { Base + aside, Fork + aside, RightTip }, [](double s) { return s <= 20.0 ? 2.0 : 1.2; });
   return maker;
 }
-
-Polylines PhantomLines(const PhantomTree& tree)
-{
-  Polylines set;
-  set.points = tree.points;
-  set.radius = tree.radius;
-  for (const VesselTree::Branch& branch : tree.branches)
-  {
-    set.lines.push_back(branch.points);
-  }
-  return set;
-}
 }
 
 TEST(CurveGeometry, HelixWithoutNoise)
@@ -291,8 +279,7 @@ TEST(CenterlineTopology, BifurcationsNearEachOtherStayTwo)
         }
         maker.Add(corners, Constant(2.0), 0.2);
       }
-      maker.set.roots = { Base };
-      const CenterlineTopology tree = BuildTopology(maker.set);
+      const CenterlineTopology tree = BuildTopology(maker.set, {}, { Base });
       ASSERT_EQ(tree.branches.size(), 5U);
       ASSERT_EQ(tree.bifurcations.size(), 2U);
       for (const Bifurcation& bifurcation : tree.bifurcations)
@@ -318,9 +305,8 @@ TEST(CenterlineTopology, DirectionsOfTheLinesDoNotMatter)
   EXPECT_LT((tree.points[tree.branches[0].points[0]] - Base).norm(), 1e-9);
 
   // Given roots go first.
-  Polylines given = WholePaths().set;
-  given.roots = { RightTip + Vector3(0.5, 0.5, 0.5) };
-  const CenterlineTopology other = BuildTopology(given);
+  const CenterlineTopology other =
+    BuildTopology(WholePaths().set, {}, { RightTip + Vector3(0.5, 0.5, 0.5) });
   EXPECT_LT((other.points[other.branches[0].points[0]] - RightTip).norm(), 1e-9);
 
   // A tree of equal calibre starts where its lines start.
@@ -478,7 +464,7 @@ TEST(CenterlineTopology, ReproducesThePhantomsTree)
     settings.ramus = seed == 22;
     const PhantomTree truth = CoronaryPhantom(settings).Tree(0.75);
     // As branches, and as whole paths from the ostia to the tips.
-    Polylines branches = PhantomLines(truth);
+    Polylines branches = LinesOf(truth);
     Polylines paths = branches;
     paths.lines.clear();
     std::map<int, int> daughters;
@@ -539,7 +525,7 @@ TEST(CenterlineTopology, UnitAndPlaceDoNotMatter)
 {
   PhantomSettings settings;
   settings.seed = 24;
-  Polylines lines = PhantomLines(CoronaryPhantom(settings).Tree(0.75));
+  Polylines lines = LinesOf(CoronaryPhantom(settings).Tree(0.75));
   const CenterlineTopology tree = BuildTopology(lines);
   Polylines moved = lines;
   const Matrix3 turn = Eigen::AngleAxisd(2.0, Vector3(1, 2, 3).normalized()).toRotationMatrix();
@@ -575,7 +561,7 @@ TEST(CenterlineTopology, NoiseAndTwigsDoNotTearTheTree)
     settings.dominance = static_cast<Dominance>(seed % 3);
     settings.ramus = seed % 2 == 0;
     const PhantomTree truth = CoronaryPhantom(settings).Tree(0.75);
-    Polylines lines = PhantomLines(truth);
+    Polylines lines = LinesOf(truth);
     RandomStream random(seed);
     for (Vector3& point : lines.points)
     {
@@ -592,7 +578,7 @@ TEST(CenterlineTopology, SameResultOnAnyNumberOfThreads)
 {
   PhantomSettings settings;
   settings.seed = 25;
-  const Polylines lines = PhantomLines(CoronaryPhantom(settings).Tree(0.4));
+  const Polylines lines = LinesOf(CoronaryPhantom(settings).Tree(0.4));
   SetNumberOfThreads(1);
   const CenterlineTopology one = BuildTopology(lines);
   SetNumberOfThreads(3);
@@ -650,5 +636,5 @@ TEST(CenterlineTopology, NothingAndNonsense)
   settings = {};
   settings.murrayExponent = std::nan("");
   EXPECT_NE(message(good, settings).find("Murray"), std::string::npos);
-  EXPECT_THROW(BuildTopology(good, {}, [](double) { return false; }), Cancelled);
+  EXPECT_THROW(BuildTopology(good, {}, {}, [](double) { return false; }), Cancelled);
 }

@@ -717,13 +717,7 @@ TEST(CenterlineTracking, DoesNotJumpToAVein)
   const double reference = 0.75;
   const PhantomTree rest = phantom.Tree(reference);
   const PhantomTree veinAtRest = phantom.Vein(reference);
-  Polylines lines;
-  lines.points = rest.points;
-  lines.radius = rest.radius;
-  for (const VesselTree::Branch& branch : rest.branches)
-  {
-    lines.lines.push_back(branch.points);
-  }
+  const Polylines lines = LinesOf(rest);
   // Beside the vein: nearer than the search reaches, and not where the two cross.
   std::vector<std::size_t> beside;
   for (std::size_t n = 0; n < rest.points.size(); ++n)

@@ -162,13 +162,8 @@ TEST(MotionRegularization, TheDefaultsHardlyMoveThePhantom)
   coronary::PhantomSettings settings;
   settings.centerlineSpacing = 2.0;
   const coronary::CoronaryPhantom phantom(settings);
-  const coronary::PhantomTree rest = phantom.Tree(0.75);
-  Polylines lines;
-  lines.points = rest.points;
-  for (const coronary::VesselTree::Branch& branch : rest.branches)
-  {
-    lines.lines.push_back(branch.points);
-  }
+  Polylines lines = coronary::LinesOf(phantom.Tree(0.75));
+  lines.radius.clear();
   PoseSequence truth;
   truth.times = coronary::PaperPhases();
   for (const double time : truth.times)

@@ -66,7 +66,6 @@ Polylines RandomTree(std::uint64_t seed)
   };
   set.points = { Vector3::Zero() };
   set.radius = { 2.0 };
-  set.roots = { Vector3::Zero() };
   const Vector3 trunk = grow(0, RandomDirection(random), 2.0, 30);
   const std::uint64_t branches = 1 + random.Bits() % 3;
   for (std::uint64_t b = 0; b < branches; ++b)
@@ -80,12 +79,9 @@ Polylines RandomTree(std::uint64_t seed)
 
 Polylines Moved(Polylines set, const Eigen::Isometry3d& motion)
 {
-  for (std::vector<Vector3>* points : { &set.points, &set.roots })
+  for (Vector3& point : set.points)
   {
-    for (Vector3& point : *points)
-    {
-      point = motion * point;
-    }
+    point = motion * point;
   }
   return set;
 }
@@ -109,18 +105,6 @@ bool AllFinite(const std::vector<Vector3>& points)
     }
   }
   return true;
-}
-
-VesselTree SweepInput(const VesselTree& tree)
-{
-  VesselTree input;
-  input.points = tree.points;
-  input.radius = tree.radius;
-  for (const VesselTree::Branch& branch : tree.branches)
-  {
-    input.branches.push_back({ branch.points, branch.groupId });
-  }
-  return input;
 }
 
 /// Edges that are not between two triangles of opposite directions.
@@ -192,7 +176,7 @@ TEST(RandomTrees, TopologyIsATreeThatMovesWithItsPoints)
   for (std::uint64_t seed = 1; seed <= 12; ++seed)
   {
     const Polylines set = RandomTree(seed);
-    const CenterlineTopology topology = BuildTopology(set);
+    const CenterlineTopology topology = BuildTopology(set, {}, { Vector3::Zero() });
     ASSERT_NO_THROW(CheckTree(topology)) << seed;
     EXPECT_EQ(topology.trees, 1) << seed;
     for (const VesselTree::Branch& branch : topology.branches)
@@ -204,7 +188,8 @@ TEST(RandomTrees, TopologyIsATreeThatMovesWithItsPoints)
     EXPECT_TRUE(AllFinite(topology.tangent) && AllFinite(topology.normal)) << seed;
 
     const Eigen::Isometry3d motion = RandomMotion(seed);
-    const CenterlineTopology moved = BuildTopology(Moved(set, motion));
+    const CenterlineTopology moved =
+      BuildTopology(Moved(set, motion), {}, { motion * Vector3::Zero() });
     ASSERT_EQ(moved.branches.size(), topology.branches.size()) << seed;
     ASSERT_EQ(moved.points.size(), topology.points.size()) << seed;
     for (std::size_t p = 0; p < moved.points.size(); ++p)
@@ -222,7 +207,7 @@ TEST(RandomTrees, SurfacesAreClosedAndOutside)
   for (const std::uint64_t seed : { 1, 2 })
   {
     const CenterlineTopology topology = BuildTopology(RandomTree(seed));
-    const SweptSurface surface = SweepVesselTree(SweepInput(topology), settings);
+    const SweptSurface surface = SweepVesselTree(topology, settings);
     EXPECT_EQ(OpenEdges(surface.triangles), 0U) << seed;
     EXPECT_TRUE(AllFinite(surface.points) && AllFinite(surface.normals)) << seed;
     EXPECT_GT(Volume(surface.points, surface.triangles), 0.0) << seed;
@@ -394,8 +379,10 @@ TEST(DegenerateTrees, FiniteOrRefused)
 
 TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
 {
-  const VesselTree good = { { { 0, 0, 0 }, { 0, 0, 2 }, { 0, 0, 4 }, { 0, 0, 6 } },
-    { 1.0, 1.0, 1.0, 1.0 }, { { { 0, 1, 2, 3 }, 0 } }, {}, 0, {}, {} };
+  VesselTree good;
+  good.points = { { 0, 0, 0 }, { 0, 0, 2 }, { 0, 0, 4 }, { 0, 0, 6 } };
+  good.radius = { 1.0, 1.0, 1.0, 1.0 };
+  good.branches = { { { 0, 1, 2, 3 }, 0 } };
   const auto changed = [&](const std::function<void(VesselTree&)>& change)
   {
     VesselTree tree = good;
@@ -405,7 +392,7 @@ TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
   // Of a branched tree, whose junction has to be meshed too.
   const auto scaled = [](double factor)
   {
-    VesselTree tree = SweepInput(BuildTopology(RandomTree(1)));
+    VesselTree tree = BuildTopology(RandomTree(1));
     for (std::size_t p = 0; p < tree.points.size(); ++p)
     {
       tree.points[p] *= factor;
@@ -644,11 +631,6 @@ PhaseInterpolationSettings SettingsOf(PhaseInterpolationMode mode)
   return settings;
 }
 
-Polylines LinesOf(const Polylines& set)
-{
-  return { set.points, set.radius, set.lines };
-}
-
 /// In one cycle that begins anywhere, none nearer to another than 0.03.
 std::vector<double> RandomPhases(RandomStream& random, std::size_t count)
 {
@@ -839,7 +821,7 @@ TEST(RandomMotion, InterpolationGoesThroughItsPhases)
 {
   for (std::uint64_t seed = 1; seed <= 8; ++seed)
   {
-    const Polylines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = RandomTree(seed);
     const PoseSequence sequence = RandomSequence(lines, seed);
     for (const PhaseInterpolationMode mode :
       { PhaseInterpolationMode::Linear, PhaseInterpolationMode::PeriodicCubic })
@@ -876,7 +858,7 @@ TEST(RandomMotion, InterpolationKnowsNoFirstPhaseAndItsVelocityIsTheDerivative)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 3);
-    const Polylines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = RandomTree(seed);
     const PoseSequence sequence = RandomSequence(lines, seed);
     for (const PhaseInterpolationMode mode : Modes)
     {
@@ -918,7 +900,7 @@ TEST(RandomMotion, InterpolationMovesWithTheWorld)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 4);
-    const Polylines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = RandomTree(seed);
     PoseSequence sequence = RandomSequence(lines, seed);
     Eigen::Affine3d shear(RandomMotion(seed));
     for (int n = 0; n < 9; ++n)
@@ -956,7 +938,7 @@ TEST(RandomMotion, WhatStandsStillKeepsStanding)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 5);
-    const Polylines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = RandomTree(seed);
     PoseSequence sequence = Standing(lines, RandomPhases(random, 7));
     DrawConfidence(sequence, random);
     InterpolatedPose pose;
@@ -981,7 +963,7 @@ TEST(RandomMotion, InterpolationDoesNotCountWhatHasNoConfidence)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 6);
-    const Polylines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = RandomTree(seed);
     // Low noise: single samples.
     PoseSequence sequence = Beating(lines, RandomPhases(random, 12), seed);
     const auto lost = Lose(sequence, random);
@@ -1047,7 +1029,7 @@ TEST(RandomMotion, RegularisationKeepsWhatHasNoEnergy)
   {
     RandomStream random(seed, 7);
     // Every phase has its own translation, of the whole tree: nothing bends, nothing stretches.
-    const Polylines tree = LinesOf(RandomTree(seed));
+    const Polylines tree = RandomTree(seed);
     PoseSequence sequence = Standing(tree, RandomPhases(random, 8));
     DrawConfidence(sequence, random);
     for (std::vector<Vector3>& points : sequence.points)
@@ -1095,7 +1077,7 @@ TEST(RandomMotion, RegularisationMovesWithTheWorldAndKnowsNoFirstPhase)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 8);
-    const Polylines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = RandomTree(seed);
     PoseSequence sequence = Beating(lines, RandomPhases(random, 8), seed);
     Jitter(sequence, random, 0.3);
     DrawConfidence(sequence, random);
@@ -1135,7 +1117,7 @@ TEST(RandomMotion, RegularisationDoesNotCountWhatHasNoConfidence)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 9);
-    const Polylines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = RandomTree(seed);
     PoseSequence sequence = Beating(lines, RandomPhases(random, 10), seed);
     const auto lost = Lose(sequence, random);
     const PoseSequence wrong = Misplaced(sequence, lost, 20.0, random);
@@ -1152,7 +1134,7 @@ TEST(RandomMotion, RegularisationKeepsItsLimitsOrSaysWhereNot)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 10);
-    const Polylines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = RandomTree(seed);
     PoseSequence sequence = Beating(lines, RandomPhases(random, 8), seed);
     const PoseSequence smooth = sequence;
     Jitter(sequence, random, 0.8);

@@ -249,18 +249,19 @@ TEST(SweepSurface, PatchesAreRoundSections)
 
 TEST(SweepSurface, EllipticContours)
 {
-  VesselTree tree = Straight(Vector3::Zero(), Vector3(0.0, 0.0, 20.0), 1.5);
-  tree.contourSamples = 32;
+  const VesselTree tree = Straight(Vector3::Zero(), Vector3(0.0, 0.0, 20.0), 1.5);
+  SweepSections sections;
+  sections.contourSamples = 32;
   for (std::size_t p = 0; p < tree.points.size(); ++p)
   {
-    tree.contourNormals.push_back(Vector3::UnitX());
+    sections.contourNormals.push_back(Vector3::UnitX());
     for (int k = 0; k < 32; ++k)
     {
       const double a = 2.0 * Pi * k / 32;
-      tree.contours.push_back(1.0 / std::hypot(std::cos(a) / 2.0, std::sin(a) / 1.2));
+      sections.contours.push_back(1.0 / std::hypot(std::cos(a) / 2.0, std::sin(a) / 1.2));
     }
   }
-  const SweptSurface surface = SweepVesselTree(tree, {});
+  const SweptSurface surface = SweepVesselTree(tree, {}, sections);
   ExpectSound(surface, 1, "ellipse");
   for (std::size_t t = 0; t < surface.triangles.size(); ++t)
   {
@@ -421,15 +422,7 @@ TEST(SweepSurface, SideVesselThatTurnsBackAtOnce)
   settings.stenoses = 26 % 4;
   settings.tortuosity = 1.5;
   settings.calibre = 0.95;
-  const PhantomTree truth = CoronaryPhantom(settings).Tree(0.3);
-  VesselTree tree;
-  tree.points = truth.points;
-  tree.radius = truth.radius;
-  for (const VesselTree::Branch& branch : truth.branches)
-  {
-    tree.branches.push_back({ branch.points, branch.groupId });
-  }
-  const SweptSurface surface = SweepVesselTree(tree, {});
+  const SweptSurface surface = SweepVesselTree(CoronaryPhantom(settings).Tree(0.3), {});
   ExpectSound(surface, 2, "phantom 26");
   EXPECT_TRUE(surface.remarks.empty()) << surface.remarks.front();
 }
@@ -472,19 +465,21 @@ TEST(SweepSurface, CapsAreFlatAndNumbered)
 
 TEST(SweepSurface, ObliqueEnds)
 {
-  VesselTree tree = Straight(Vector3::Zero(), Vector3(0.0, 0.0, 15.0), 1.5);
-  tree.endNormals.assign(tree.points.size(), Vector3::Zero());
+  const VesselTree tree = Straight(Vector3::Zero(), Vector3(0.0, 0.0, 15.0), 1.5);
+  SweepSections sections;
+  sections.endNormals.assign(tree.points.size(), Vector3::Zero());
   const Vector3 wanted = Vector3(std::sin(0.6), 0.0, std::cos(0.6));
-  tree.endNormals.back() = -3.0 * wanted; // length and sense do not matter
-  const SweptSurface surface = SweepVesselTree(tree, {});
+  sections.endNormals.back() = -3.0 * wanted; // length and sense do not matter
+  const SweptSurface surface = SweepVesselTree(tree, {}, sections);
   ExpectSound(surface, 1, "oblique");
   EXPECT_NEAR((surface.caps[1].normal - wanted).norm(), 0.0, 1e-9);
   for (const Vector3& p : surface.points)
   {
     EXPECT_LT((p - Vector3(0.0, 0.0, 15.0)).dot(wanted), 1e-6);
   }
-  tree.endNormals.back() = Vector3(1.0, 0.0, 0.2);
-  EXPECT_NE(MessageOf([&] { SweepVesselTree(tree, {}); }).find("at most 60"), std::string::npos);
+  sections.endNormals.back() = Vector3(1.0, 0.0, 0.2);
+  EXPECT_NE(
+    MessageOf([&] { SweepVesselTree(tree, {}, sections); }).find("at most 60"), std::string::npos);
 }
 
 TEST(SweepSurface, OpenEnds)
@@ -562,7 +557,7 @@ TEST(SweepSurface, Refusals)
 TEST(SweepSurface, Cancels)
 {
   const VesselTree tree = Straight(Vector3::Zero(), Vector3(10.0, 0.0, 0.0), 1.0);
-  EXPECT_THROW(SweepVesselTree(tree, {}, [](double) { return false; }), Cancelled);
+  EXPECT_THROW(SweepVesselTree(tree, {}, {}, [](double) { return false; }), Cancelled);
 }
 
 TEST(TriangleIntersections, TetrahedraApartTouchingAndInEachOther)

@@ -112,20 +112,27 @@ TEST(VesselTree, SplitBranchesTouchAtTheirEnds)
   }
 }
 
+TEST(VesselTree, AsLines)
+{
+  const VesselTree tree = Comb();
+  const Polylines lines = LinesOf(tree);
+  EXPECT_EQ(lines.points, tree.points);
+  EXPECT_EQ(lines.radius, tree.radius);
+  ASSERT_EQ(lines.lines.size(), tree.branches.size());
+  ASSERT_EQ(lines.groups.size(), tree.branches.size());
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
+  {
+    EXPECT_EQ(lines.lines[b], tree.branches[b].points);
+    EXPECT_EQ(lines.groups[b], tree.branches[b].groupId);
+  }
+  EXPECT_NO_THROW(CheckPolylines(lines));
+}
+
 TEST(VesselTree, ThePhantomsTreeIsOne)
 {
   const CoronaryPhantom phantom{ PhantomSettings{} };
   const PhantomTree truth = phantom.Tree(0.0);
-  VesselTree tree;
-  tree.points = truth.points;
-  tree.radius = truth.radius;
-  for (const VesselTree::Branch& branch : truth.branches)
-  {
-    tree.branches.emplace_back();
-    tree.branches.back().points = branch.points;
-    tree.branches.back().groupId = branch.groupId;
-    tree.branches.back().parentGroupId = branch.parentGroupId;
-  }
+  VesselTree tree = truth;
   MeasureTree(tree);
   for (std::size_t b = 0; b < tree.branches.size(); ++b)
   {

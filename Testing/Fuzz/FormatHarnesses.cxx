@@ -2,7 +2,6 @@
 #include "FuzzHarness.h"
 
 #include "ByteStream.h"
-#include "CenterlineConversion.h"
 #include "DicomFile.h"
 #include "DicomStructure.h"
 #include "EvaluationRecord.h"
@@ -21,6 +20,7 @@
 #include "SimVascularFile.h"
 #include "SkinWeightCache.h"
 #include "StlPlyFile.h"
+#include "TgfSkeleton.h"
 #include "VolumeFile.h"
 #include "XmlDataFile.h"
 

@@ -49,16 +49,4 @@ PhantomCase MakePhantomCase(std::uint64_t seed, bool varied)
   }
   return result;
 }
-
-VesselTree SweepTreeOf(const PhantomTree& truth)
-{
-  VesselTree tree;
-  tree.points = truth.points;
-  tree.radius = truth.radius;
-  for (const VesselTree::Branch& branch : truth.branches)
-  {
-    tree.branches.push_back({ branch.points, branch.groupId });
-  }
-  return tree;
-}
 }

@@ -6,7 +6,6 @@
 #define DynamicCoronary_PhantomCases_h
 
 #include "CoronaryPhantom.h"
-#include "SweepSurface.h"
 
 #include <cstdint>
 #include <string>
@@ -35,9 +34,6 @@ struct PhantomCase
 /// The phantom as it is by default; `varied`: dominance, ramus, stenoses, tortuosity, calibre and
 /// moment change with the seed.
 PhantomCase MakePhantomCase(std::uint64_t seed, bool varied);
-
-/// The true tree as the sweep takes it.
-VesselTree SweepTreeOf(const PhantomTree& truth);
 }
 
 #endif

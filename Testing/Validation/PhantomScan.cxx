@@ -37,13 +37,6 @@ CenterlineResult Extract(const PhantomScan& image)
   return ExtractCenterlines(input, CenterlineSettings());
 }
 
-Polylines LinesOf(const VesselTree& tree, const std::vector<Vector3>& roots)
-{
-  Polylines set = SetOf(tree);
-  set.roots = roots;
-  return set;
-}
-
 /// What the topology does not know of, of the points that it was made of.
 void PassOn(const VesselTree& from, CenterlineTopology& tree)
 {
@@ -143,7 +136,7 @@ FoundTree FindTree(const PhantomScan& image)
       MeasureTreeLumen(raw, VesselPaths(raw), image.Image(), found.extraction.blur);
     raw = WithLumen(std::move(raw), measured.lumen);
   }
-  found.tree = BuildTopology(LinesOf(raw, image.seeds));
+  found.tree = BuildTopology(LinesOf(raw), {}, image.seeds);
   found.labels = LabelSegments(found.tree);
   SplitAtSegmentBorders(found.tree);
   PassOn(raw, found.tree);
@@ -160,7 +153,7 @@ CenterlineTopology TreeOf(const PhantomScan& image, double* seconds, double* blu
   {
     *blur = extracted.blur;
   }
-  CenterlineTopology tree = BuildTopology(LinesOf(extracted.tree, image.seeds));
+  CenterlineTopology tree = BuildTopology(LinesOf(extracted.tree), {}, image.seeds);
   LabelSegments(tree);
   PassOn(extracted.tree, tree);
   AddSeconds(seconds, 1, ProcessorSeconds() - start);

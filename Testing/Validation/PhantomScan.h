@@ -61,20 +61,6 @@ FoundTree FindTree(const PhantomScan& image);
 /// @param blur     null, or room for the standard deviation of the image's blur as the extraction found it, mm
 CenterlineTopology TreeOf(
   const PhantomScan& image, double* seconds = nullptr, double* blur = nullptr);
-
-/// A tree as the measures of overlap take it.
-template <typename Tree>
-Polylines SetOf(const Tree& tree)
-{
-  Polylines set;
-  set.points = tree.points;
-  set.radius = tree.radius;
-  for (const auto& branch : tree.branches)
-  {
-    set.lines.push_back(branch.points);
-  }
-  return set;
-}
 }
 
 #endif

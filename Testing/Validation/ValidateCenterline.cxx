@@ -229,8 +229,8 @@ void CompareWithTruth(
   const CoronaryPhantom& phantom, const CenterlineTopology& tree, Outcome& outcome)
 {
   const PhantomTree truth = phantom.Tree(ReferencePhase);
-  const Polylines truthSet = SetOf(truth);
-  const Polylines foundSet = SetOf(tree);
+  const Polylines truthSet = LinesOf(truth);
+  const Polylines foundSet = LinesOf(tree);
   CenterlineOverlapSettings wide;
   wide.leastRadius = LeastRadius;
   const TreeOverlap overlap = CompareCenterlineTrees(truthSet, foundSet, wide);
@@ -431,7 +431,7 @@ bool PrintInvariance(const Case& test)
   Outcome outcome;
   const PhantomScan scan = MakeScan(phantom, test, outcome);
   const CenterlineTopology original = TreeOf(scan, outcome.seconds.data() + 2);
-  const Polylines originalSet = SetOf(original);
+  const Polylines originalSet = LinesOf(original);
   const Matrix3 turn =
     Eigen::AngleAxisd(0.7, Vector3(0.4, -1.0, 0.6).normalized()).toRotationMatrix();
   const std::vector<Frame> frames = {
@@ -454,7 +454,7 @@ bool PrintInvariance(const Case& test)
       seed = frame.Apply(seed);
     }
     const CenterlineTopology tree = TreeOf(moved, outcome.seconds.data() + 2);
-    Polylines back = SetOf(tree);
+    Polylines back = LinesOf(tree);
     for (Vector3& p : back.points)
     {
       p = frame.Undo(p);

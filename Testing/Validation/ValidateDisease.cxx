@@ -191,12 +191,10 @@ void WriteLines(const std::string& path, const Polylines& set)
 /// The surface as `run` makes it of the tree, failures included.
 void CompareSurface(const CoronaryPhantom& phantom, const VesselTree& tree, Outcome& outcome)
 {
-  VesselTree swept;
-  swept.points = tree.points;
-  swept.radius = tree.radius;
-  for (const VesselTree::Branch& branch : tree.branches)
+  VesselTree swept = tree;
+  for (VesselTree::Branch& branch : swept.branches)
   {
-    swept.branches.push_back({ branch.points, branch.groupId, SegmentName(branch.segmentId) });
+    branch.name = SegmentName(branch.segmentId);
   }
   SweptSurface surface;
   try
@@ -427,7 +425,7 @@ Outcome Run(const Condition& condition, std::uint64_t seed, const Options& optio
     relevant.leastRadius = LeastRadius;
     relevant.spacing = 0.1;
     const CenterlineOverlapMeasures total =
-      CompareCenterlineTrees(SetOf(truth), SetOf(found.tree), relevant).total;
+      CompareCenterlineTrees(LinesOf(truth), LinesOf(found.tree), relevant).total;
     outcome.overlap = total.overlap;
     outcome.toFirstError = total.overlapToFirstError;
     outcome.relevant = total.overlapRelevant;
@@ -457,8 +455,8 @@ Outcome Run(const Condition& condition, std::uint64_t seed, const Options& optio
     if (!options.lines.empty())
     {
       const std::string base = options.lines + "/" + condition.name + "-" + std::to_string(seed);
-      WriteLines(base + "-truth.vtk", SetOf(truth));
-      WriteLines(base + "-found.vtk", SetOf(found.tree));
+      WriteLines(base + "-truth.vtk", LinesOf(truth));
+      WriteLines(base + "-found.vtk", LinesOf(found.tree));
     }
   }
   catch (const std::exception& error)

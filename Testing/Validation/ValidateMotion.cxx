@@ -181,12 +181,7 @@ Outcome Run(const Case& test)
   if (test.trueTree)
   {
     const PhantomTree truth = phantom.Tree(ReferencePhase);
-    lines.points = truth.points;
-    lines.radius = truth.radius;
-    for (const VesselTree::Branch& branch : truth.branches)
-    {
-      lines.lines.push_back(branch.points);
-    }
+    lines = LinesOf(truth);
     for (const int id : truth.segmentId)
     {
       name.push_back(SegmentName(id));
@@ -195,12 +190,7 @@ Outcome Run(const Case& test)
   else
   {
     const CenterlineTopology tree = TreeOf(ScanPhantom(phantom, grid, ReferencePhase, false));
-    lines.points = tree.points;
-    lines.radius = tree.radius;
-    for (const VesselTree::Branch& branch : tree.branches)
-    {
-      lines.lines.push_back(branch.points);
-    }
+    lines = LinesOf(tree);
     for (const int id : tree.segmentId)
     {
       name.push_back(SegmentName(id));

@@ -120,18 +120,9 @@ Nearest NearestTruth(const PhantomTree& truth, const Vector3& position)
 /// vessels: to measure lesions alone, whether or not the extraction gets past them.
 VesselTree DisturbedTruth(const PhantomTree& truth, std::uint64_t seed)
 {
-  VesselTree tree;
-  tree.points = truth.points;
-  tree.radius = truth.radius;
-  tree.segmentId = truth.segmentId;
+  VesselTree tree = truth;
   for (const VesselTree::Branch& branch : truth.branches)
   {
-    VesselTree::Branch copy;
-    copy.points = branch.points;
-    copy.groupId = branch.groupId;
-    copy.parentGroupId = branch.parentGroupId;
-    copy.treeId = branch.treeId;
-    copy.segmentId = branch.segmentId;
     // A random walk that returns: about 0.1 mm over some millimetres.
     std::mt19937_64 random(seed * 1000 + static_cast<std::uint64_t>(branch.groupId));
     std::normal_distribution<double> normal;
@@ -149,7 +140,6 @@ VesselTree DisturbedTruth(const PhantomTree& truth, std::uint64_t seed)
       }
       tree.radius[branch.points[i]] = sum / weight;
     }
-    tree.branches.push_back(copy);
   }
   MeasureTree(tree);
   return tree;

@@ -165,18 +165,19 @@ Outcome Run(std::uint64_t seed, bool varied, double spacing, bool cut,
   PhantomCase which = MakePhantomCase(seed, varied);
   which.settings.surfaceSpacing = spacing;
   const CoronaryPhantom phantom(which.settings);
-  VesselTree tree = SweepTreeOf(phantom.Tree(which.moment));
+  const PhantomTree tree = phantom.Tree(which.moment);
   const PhantomSurface wall = phantom.Surface(which.moment);
+  SweepSections sections;
   if (cut)
   {
-    tree.endNormals = EndNormals(tree, wall);
+    sections.endNormals = EndNormals(tree, wall);
   }
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t processor = std::clock();
   SweptSurface surface;
   try
   {
-    surface = SweepVesselTree(tree, settings);
+    surface = SweepVesselTree(tree, settings, sections);
   }
   catch (const std::exception& error)
   {

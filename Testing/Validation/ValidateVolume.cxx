@@ -169,7 +169,7 @@ TetrahedralMeshInput PhantomInput(std::uint64_t seed, bool varied, bool swept, d
   TetrahedralMeshInput input;
   if (swept)
   {
-    SweptSurface surface = SweepVesselTree(SweepTreeOf(tree), {});
+    SweptSurface surface = SweepVesselTree(tree, {});
     input.points = std::move(surface.points);
     input.triangles = std::move(surface.triangles);
   }
