@@ -1,6 +1,7 @@
 // Our vesselness beside ITK's in the same run: time, memory, agreement. Tables in Markdown.
 
 #include "CoronaryPhantom.h"
+#include "KernelChoice.h"
 #include "MeasuredProcess.h"
 #include "MultiscaleVesselness.h"
 #include "ReferenceVesselness.h"
@@ -157,7 +158,7 @@ struct Variant
   VesselnessSettings settings = Settings();
   bool scale = false;
   bool direction = false;
-  VesselnessInstructions instructions = VesselnessInstructions::Widest;
+  Instructions instructions = Instructions::Widest;
 };
 
 std::vector<float> RunOurs(const float* values, const TestImage& image, const Variant& variant)
@@ -183,7 +184,7 @@ Measurement MeasureOurs(const TestImage& image, const Variant& variant, int thre
     [&]
     {
       SetNumberOfThreads(threads);
-      SetVesselnessInstructions(variant.instructions);
+      VesselnessKernelChoice().Select(variant.instructions);
       input = ToFloat(image);
     },
     [&] { result = RunOurs(input.data(), image, variant); },
@@ -658,11 +659,10 @@ void TableInstructions(const Options& options)
     SizeText(n).c_str(), ThreadsText(options.threads).c_str());
   std::printf("| | wall time, s | processor time, s |\n|---|---|---|\n");
   for (const auto& [name, instructions] :
-    { std::pair("SSE2 or whatever the compiler's default is", VesselnessInstructions::Baseline),
-      std::pair("AVX2", VesselnessInstructions::Avx2),
-      std::pair("AVX-512", VesselnessInstructions::Avx512) })
+    { std::pair("SSE2 or whatever the compiler's default is", Instructions::Baseline),
+      std::pair("AVX2", Instructions::Avx2), std::pair("AVX-512", Instructions::Avx512) })
   {
-    if (!SetVesselnessInstructions(instructions))
+    if (!VesselnessKernelChoice().Select(instructions))
     {
       std::printf("| %s | not on this processor | |\n", name);
       continue;
@@ -678,7 +678,7 @@ void TableInstructions(const Options& options)
     std::printf("| %s | %s | %s |\n", name, Spread(Each(runs, Wall)).c_str(),
       Spread(Each(runs, Processor)).c_str());
   }
-  SetVesselnessInstructions(VesselnessInstructions::Widest);
+  VesselnessKernelChoice().Select(Instructions::Widest);
 }
 
 void TableAgreement(const Options& options, Verdicts& verdicts)
