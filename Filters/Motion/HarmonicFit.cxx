@@ -1,5 +1,7 @@
 #include "HarmonicFit.h"
 
+#include "CyclicTime.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 

@@ -1,6 +1,7 @@
 #include "ContrastTracers.h"
 
 #include "CounterRandom.h"
+#include "CyclicTime.h"
 #include "Fnv1a.h"
 #include "KernelChoice.h"
 #include "Require.h"
@@ -99,11 +100,6 @@ const FluxTables& Tables()
 {
   static const FluxTables tables;
   return tables;
-}
-
-double FractionalPart(double a)
-{
-  return a - std::floor(a);
 }
 
 /// Speed as a part of that on the axis.
@@ -606,9 +602,8 @@ void ContrastTracers::Emit(double volume, bool down)
   for (std::int64_t k = 0; k < count; ++k)
   {
     const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
-    const float x = Tables().chordOf(static_cast<float>(FractionalPart(shiftX + alphaX * number)));
-    const float y =
-      Tables().placeOnChord(static_cast<float>(FractionalPart(shiftY + alphaY * number))) *
+    const float x = Tables().chordOf(static_cast<float>(Modulo(shiftX + alphaX * number)));
+    const float y = Tables().placeOnChord(static_cast<float>(Modulo(shiftY + alphaY * number))) *
       std::sqrt(std::max(1.0F - x * x, 0.0F));
     const double time = (static_cast<double>(k) + shiftTime) / static_cast<double>(count);
     Crossing crossing{ { segment, 0.0, x, y, volume / static_cast<double>(count) } };

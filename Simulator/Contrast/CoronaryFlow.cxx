@@ -1,5 +1,6 @@
 #include "CoronaryFlow.h"
 
+#include "CyclicTime.h"
 #include "Fnv1a.h"
 #include "Require.h"
 
@@ -30,12 +31,6 @@ constexpr RequireOf RequireSetting{ "coronary flow" };
 double HalfCosine(double a, double b, double t)
 {
   return a + (b - a) * 0.5 * (1.0 - std::cos(Pi * t));
-}
-
-double ModuloOne(double phase)
-{
-  const double part = phase - std::floor(phase);
-  return part < 1.0 ? part : 0.0;
 }
 
 /// When the valve closes.
@@ -134,7 +129,7 @@ void CoronaryFlowSettings::Validate() const
 double AorticPressure(const CoronaryFlowSettings& settings, double phase)
 {
   const double length = settings.systoleEnd - settings.ejectionBegin;
-  const double since = ModuloOne(ModuloOne(phase) - settings.ejectionBegin);
+  const double since = Modulo(Modulo(phase) - settings.ejectionBegin);
   const double notch = NotchPressure(settings);
   if (since < 0.5 * length)
   {
@@ -153,7 +148,7 @@ double AorticPressure(const CoronaryFlowSettings& settings, double phase)
 
 double VentricularPressure(const CoronaryFlowSettings& settings, double phase)
 {
-  const double u = ModuloOne(phase);
+  const double u = Modulo(phase);
   if (u < settings.ejectionBegin)
   {
     return HalfCosine(EndDiastolicPressure, settings.diastolicPressure, u / settings.ejectionBegin);
@@ -478,7 +473,7 @@ double CoronaryFlow::PeriodicRatioParts(int tree, double fraction, double& systo
   this->Ventricular = VentricularPressure(this->Settings_, 0.0);
   for (int k = 0; k < cycles * StepsOfCycle; ++k)
   {
-    const double phase = ModuloOne((k + 1.0) / StepsOfCycle);
+    const double phase = Modulo((k + 1.0) / StepsOfCycle);
     this->Advance(
       dt, AorticPressure(this->Settings_, phase), VentricularPressure(this->Settings_, phase));
     if (k >= (cycles - 1) * StepsOfCycle)

@@ -2,6 +2,7 @@
 
 #include "CatheterPath.h"
 #include "CosseratRod.h"
+#include "CyclicTime.h"
 #include "DisjointSets.h"
 #include "Fnv1a.h"
 #include "VesselWall.h"
@@ -634,7 +635,7 @@ void Intervention::Internals::Measure()
   const RodStep& step = this->Rod->LastStep();
   TickReport& report = this->Report;
   report.tick = this->Tick;
-  report.phase = this->Phase - std::floor(this->Phase);
+  report.phase = Modulo(this->Phase);
   report.inserted = std::max(0.0, this->Fed - this->CatheterTip);
   report.catheterTip = this->CatheterTip;
   report.jointGap = step.largestGap;
@@ -708,7 +709,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Wound = catheter.friction * catheter.TurnedAngle(catheter.length);
   data.Step = 1.0 / settings.tickRate;
   data.FrameSeconds = data.Step * settings.ticksPerFrame;
-  data.Phase = settings.startPhase - std::floor(settings.startPhase);
+  data.Phase = Modulo(settings.startPhase);
   data.MakeSegments();
   data.Spring =
     AlongWire(wire, 0.5 * wire.length, [](const WireSection& s) { return s.torsionalStiffness; }) /
@@ -749,7 +750,7 @@ const TickReport& Intervention::Step(const DriveInput& input)
   data.Wall->SetTime(inFrame);
   data.Path->SetTime(inFrame);
   data.Phase += data.Step * data.Settings.heartRate / 60.0;
-  data.Phase -= std::floor(data.Phase);
+  data.Phase = Modulo(data.Phase);
   data.Drive(input);
   data.Feed();
   const RodStep& step = data.Rod->Step(data.Step, &data);
