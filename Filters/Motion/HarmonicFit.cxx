@@ -1,6 +1,5 @@
 #include "HarmonicFit.h"
 
-#include "CyclicTime.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

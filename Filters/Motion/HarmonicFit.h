@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_HarmonicFit_h
 #define DynamicCoronary_HarmonicFit_h
 
+#include "CyclicTime.h"
 #include "PhaseInterpolation.h"
 
 #include <cmath>

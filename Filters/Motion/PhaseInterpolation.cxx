@@ -1,6 +1,5 @@
 #include "PhaseInterpolation.h"
 
-#include "CyclicTime.h"
 #include "HarmonicFit.h"
 #include "Require.h"
 
@@ -25,6 +24,12 @@ using Quaternion = Eigen::Quaterniond;
 
 /// Columns that one task works on.
 constexpr std::int64_t Grain = 8192;
+
+double Apart(double a, double b)
+{
+  const double gap = std::abs(a - b);
+  return std::min(gap, 1.0 - gap);
+}
 
 /// Second derivatives at the knots of the periodic cubic spline, as a matrix that is applied to the
 /// values there.
@@ -420,7 +425,7 @@ std::size_t PhaseInterpolation::NearestPhase(double time) const
   std::size_t nearest = 0;
   for (std::size_t k = 1; k < this->Times.size(); ++k)
   {
-    if (CyclicDistance(this->Times[k], phase) < CyclicDistance(this->Times[nearest], phase))
+    if (Apart(this->Times[k], phase) < Apart(this->Times[nearest], phase))
     {
       nearest = k;
     }
