@@ -1,6 +1,5 @@
 #include "HarmonicFit.h"
 
-
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 

@@ -20,12 +20,9 @@ bool BenchmarkOptions::Has(const char* table) const
 void BenchmarkOptions::AddTo(
   CLI::App& app, const std::string& peer, const std::vector<std::string>& allTables)
 {
-  if (!allTables.empty())
-  {
-    this->tables = allTables;
-    app.add_option("tables", this->tables, "Which tables (default: all)")
-      ->check(CLI::IsMember(allTables));
-  }
+  this->tables = allTables;
+  app.add_option("tables", this->tables, "Which tables (default: all)")
+    ->check(CLI::IsMember(allTables));
   app.add_option("--repeats", this->repeats, "Runs of each measurement")
     ->check(CLI::Range(1, 1000))
     ->capture_default_str();

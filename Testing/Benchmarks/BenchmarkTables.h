@@ -31,7 +31,7 @@ struct BenchmarkOptions
 
   bool Has(const char* table) const;
 
-  /// All but the size. @param peer  as in --without-itk @param allTables  empty: none to choose
+  /// All but the size. @param peer  as in --without-itk
   void AddTo(CLI::App& app, const std::string& peer, const std::vector<std::string>& allTables);
 };
 
