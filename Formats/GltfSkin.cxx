@@ -2,6 +2,7 @@
 
 #include "Base64.h"
 #include "LittleEndian.h"
+#include "Require.h"
 
 #include <nlohmann/json.hpp>
 
@@ -27,14 +28,6 @@ constexpr int UnsignedShort = 5123;
 constexpr int UnsignedInt = 5125;
 constexpr int VertexBuffer = 34962;
 constexpr int IndexBuffer = 34963;
-
-void Require(bool condition, const std::string& complaint)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(complaint);
-  }
-}
 
 /// LPS to glTF's axes.
 Vector3 Axes(const Vector3& v)

@@ -1,5 +1,6 @@
 #include "vtkEvaluationPictures.h"
 
+#include "Median.h"
 #include "MeshDistance.h"
 #include "vtkAnimatedGif.h"
 #include "vtkCoronaryArrayNames.h"
@@ -601,9 +602,7 @@ double DistanceRange(const std::vector<double>& distances)
     return 1.0;
   }
   // A few points far away must not take the colours from all others.
-  const auto place = all.begin() + static_cast<std::ptrdiff_t>(0.995 * (all.size() - 1));
-  std::nth_element(all.begin(), place, all.end());
-  return RoundUp(std::max(*place, 1e-3));
+  return RoundUp(std::max(InclusiveQuantileOf(std::move(all), 0.995), 1e-3));
 }
 
 void DrawDistances(const EvaluationScene& scene, const std::string& path)

@@ -1,5 +1,7 @@
 #include "vtkVesselPictures.h"
 
+#include "Median.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -183,14 +185,6 @@ double SizeOf(const std::vector<Vector3>& points)
   }
   return (high - low).norm();
 }
-
-/// Of the wide vessels' axes, which the many thin ones must not outnumber.
-double UpperQuartile(std::vector<double> values)
-{
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(3 * (values.size() - 1) / 4);
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
 }
 
 std::vector<VesselView> ViewsOf(const RunResult& result)
@@ -258,7 +252,8 @@ GreyWindow WindowOf(const RunResult& result, const ImageInterpolator& image)
   {
     return { -150.0, 850.0 };
   }
-  const double lumen = UpperQuartile(values);
+  // Of the wide vessels' axes, which the many thin ones must not outnumber.
+  const double lumen = InclusiveQuantileOf(std::move(values), 0.75);
   if (lumen > LeastLumen && lumen < GreatestLumen)
   {
     return { -150.0, std::max(500.0, 2.0 * lumen) };

@@ -165,7 +165,7 @@ bool Fit::FindExtent()
   const std::size_t known =
     Along(side, this->Alone, std::max(1.5 * this->Axes.sideRadius[this->Alone], 4.0 * this->Voxel));
   this->SideRadius =
-    MedianOf({ this->Axes.sideRadius.begin() + static_cast<std::ptrdiff_t>(this->Alone),
+    MedianOf<double>({ this->Axes.sideRadius.begin() + static_cast<std::ptrdiff_t>(this->Alone),
       this->Axes.sideRadius.begin() + static_cast<std::ptrdiff_t>(known) + 1 });
 
   // Behind the carina the vessels have their own walls again.
@@ -190,9 +190,9 @@ bool Fit::FindExtent()
     return false;
   }
   const std::vector<double>& radius = this->Axes.throughRadius;
-  this->FirstRadius = MedianOf({ radius.begin() + static_cast<std::ptrdiff_t>(before),
+  this->FirstRadius = MedianOf<double>({ radius.begin() + static_cast<std::ptrdiff_t>(before),
     radius.begin() + static_cast<std::ptrdiff_t>(this->First) + 1 });
-  this->LastRadius = MedianOf({ radius.begin() + static_cast<std::ptrdiff_t>(this->Last),
+  this->LastRadius = MedianOf<double>({ radius.begin() + static_cast<std::ptrdiff_t>(this->Last),
     radius.begin() + static_cast<std::ptrdiff_t>(after) + 1 });
   this->Inwards = (through[this->First] - through[before]).normalized();
   this->Outwards = (through[after] - through[this->Last]).normalized();

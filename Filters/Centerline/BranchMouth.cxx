@@ -1,6 +1,7 @@
 #include "BranchMouth.h"
 
 #include "CurveSmoothing.h"
+#include "Median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -35,10 +36,8 @@ std::vector<Vector3> FollowOuterWall(const MeasuredCourse& course, std::size_t g
   {
     return {};
   }
-  std::sort(radii.begin(), radii.end());
-  std::sort(values.begin(), values.end());
-  const double radius = radii[radii.size() / 2];
-  const double lumen = values[values.size() / 2];
+  const double radius = MedianOf(std::move(radii));
+  const double lumen = MedianOf(std::move(values));
   const auto isOwn = [&](const Vector3& wall) { return outside(wall) > 1.1; };
 
   // The centre nearest to the parent last.

@@ -2,12 +2,12 @@
 
 #include "BlurredDisc.h"
 #include "LumenMeasurement.h"
+#include "Median.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <stdexcept>
-#include <string>
 
 namespace coronary
 {
@@ -17,14 +17,6 @@ constexpr double DimmestLevel = 0.9;      ///< of the tree's usual one, that thr
 constexpr double SliceThickness = 3.0;    ///< mm, of Agatston's rule
 constexpr double LeastSliceArea = 1.0;    ///< mm^2, of Agatston's rule
 constexpr double HighestDensity = 3000.0; ///< HU, of what is taken for a deposit's own value
-
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("CalciumSettings: ") + requirement);
-  }
-}
 
 /// The voxels of an image by their index along the axes.
 struct Lattice
@@ -369,8 +361,7 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
   }
   if (outside.size() >= 8)
   {
-    std::nth_element(outside.begin(), outside.begin() + outside.size() / 2, outside.end());
-    surroundings.SetBackground(outside[outside.size() / 2]);
+    surroundings.SetBackground(MedianOf(std::move(outside)));
   }
   double bright = 0.0;
   double around = 0.0;
@@ -413,16 +404,17 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
 
 void CalciumSettings::Validate() const
 {
-  Require(this->wallDistance >= 0.5 && this->wallDistance <= 10.0,
+  constexpr RequireOf require{ "CalciumSettings" };
+  require(this->wallDistance >= 0.5 && this->wallDistance <= 10.0,
     "wallDistance must be from 0.5 to 10 mm");
-  Require(this->seedShare >= 0.1 && this->seedShare <= 2.0, "seedShare must be from 0.1 to 2");
-  Require(this->seedDeviations >= 2.0 && this->seedDeviations <= 20.0,
+  require(this->seedShare >= 0.1 && this->seedShare <= 2.0, "seedShare must be from 0.1 to 2");
+  require(this->seedDeviations >= 2.0 && this->seedDeviations <= 20.0,
     "seedDeviations must be from 2 to 20");
-  Require(this->growShare >= 0.0 && this->growShare <= this->seedShare,
+  require(this->growShare >= 0.0 && this->growShare <= this->seedShare,
     "growShare must be from 0 to seedShare");
-  Require(this->growDeviations >= 0.0 && this->growDeviations <= this->seedDeviations,
+  require(this->growDeviations >= 0.0 && this->growDeviations <= this->seedDeviations,
     "growDeviations must be from 0 to seedDeviations");
-  Require(this->leastVoxels >= 1, "leastVoxels must be at least 1");
+  require(this->leastVoxels >= 1, "leastVoxels must be at least 1");
 }
 
 std::int64_t CalciumMap::Find(std::int64_t offset) const

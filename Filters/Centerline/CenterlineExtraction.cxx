@@ -7,7 +7,9 @@
 #include "GridIndex.h"
 #include "LesionCrossings.h"
 #include "MeasuredCourse.h"
+#include "Median.h"
 #include "OstialRoot.h"
+#include "Require.h"
 #include "ThinBranches.h"
 #include "TurnedBranches.h"
 #include "VesselMarch.h"
@@ -17,21 +19,12 @@
 #include <map>
 #include <memory>
 #include <sstream>
-#include <stdexcept>
 
 namespace coronary
 {
 namespace
 {
 constexpr std::uint32_t None = VoxelRegion::notAMember;
-
-void Require(bool condition, const std::string& requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument("CenterlineSettings: " + requirement);
-  }
-}
 
 std::string Text(const Vector3& position)
 {
@@ -165,8 +158,7 @@ void Extractor::PrepareMeasurement()
         {
           values.push_back(reference.*member);
         }
-        std::sort(values.begin(), values.end());
-        return values[values.size() / 2];
+        return MedianOf(std::move(values));
       };
       this->Courses.lumen.reference = { median(&LumenReference::lumen), 0.0,
         median(&LumenReference::radius) };
@@ -281,13 +273,10 @@ void Extractor::Calibrate(const MeasuredCourse& course)
   }
   if (values.size() >= 10)
   {
-    const auto quartile = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 3 / 4);
-    std::nth_element(values.begin(), quartile, values.end());
-    this->Courses.lumen.reference.lumen = std::max(this->Courses.lumen.reference.lumen, *quartile);
+    this->Courses.lumen.reference.lumen =
+      std::max(this->Courses.lumen.reference.lumen, QuantileOf(std::move(values), 0.75));
     // The darkest surroundings: elsewhere muscle may lie against the vessel.
-    const auto dark = behind.begin() + static_cast<std::ptrdiff_t>(behind.size() / 4);
-    std::nth_element(behind.begin(), dark, behind.end());
-    this->Courses.lumen.reference.background = *dark;
+    this->Courses.lumen.reference.background = QuantileOf(std::move(behind), 0.25);
     this->Calibrated = true;
   }
 }
@@ -315,10 +304,8 @@ void Extractor::CorrectRadii()
     }
     if (blurs.size() >= 20)
     {
-      const auto middle = blurs.begin() + static_cast<std::ptrdiff_t>(blurs.size() / 2);
-      std::nth_element(blurs.begin(), middle, blurs.end());
-      this->Blur =
-        std::min(std::max(*middle, 0.4 * this->Courses.voxel), 2.0 * this->Courses.voxel);
+      this->Blur = std::min(
+        std::max(MedianOf(std::move(blurs)), 0.4 * this->Courses.voxel), 2.0 * this->Courses.voxel);
     }
   }
   this->Result.blur = this->Blur;
@@ -968,13 +955,17 @@ CenterlineResult Extractor::Run()
 
 void CenterlineSettings::Validate() const
 {
-  const auto length = [](double value, const char* name)
-  { Require(std::isfinite(value) && value >= 0.0, std::string(name) + " must not be negative"); };
-  Require(!std::isinf(this->speedThreshold), "speedThreshold must be finite");
-  Require(!std::isinf(this->intensityThreshold), "intensityThreshold must be finite");
-  Require(
+  constexpr RequireOf require{ "CenterlineSettings" };
+  const auto length = [&](double value, const char* name)
+  {
+    require(
+      std::isfinite(value) && value >= 0.0, (std::string(name) + " must not be negative").c_str());
+  };
+  require(!std::isinf(this->speedThreshold), "speedThreshold must be finite");
+  require(!std::isinf(this->intensityThreshold), "intensityThreshold must be finite");
+  require(
     this->speedExponent >= 0.5 && this->speedExponent <= 6.0, "speedExponent must be 0.5 to 6");
-  Require(this->minimumConfidence >= 0.0 && this->minimumConfidence <= 1.0,
+  require(this->minimumConfidence >= 0.0 && this->minimumConfidence <= 1.0,
     "minimumConfidence must be 0 to 1");
   length(this->minimumBranchLength, "minimumBranchLength");
   length(this->maximumGap, "maximumGap");
@@ -983,8 +974,8 @@ void CenterlineSettings::Validate() const
   length(this->smoothing, "smoothing");
   length(this->blur, "blur");
   length(this->snapDistance, "snapDistance");
-  Require(this->stepLimit > 0, "stepLimit must be positive");
-  Require(this->voxelLimit > 0, "voxelLimit must be positive");
+  require(this->stepLimit > 0, "stepLimit must be positive");
+  require(this->voxelLimit > 0, "voxelLimit must be positive");
 }
 
 const char* EndStatusText(EndStatus status)
@@ -1013,13 +1004,7 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   const CenterlineSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
-  const auto require = [](bool condition, const char* requirement)
-  {
-    if (!condition)
-    {
-      throw std::invalid_argument(std::string("CenterlineInput: ") + requirement);
-    }
-  };
+  constexpr RequireOf require{ "CenterlineInput" };
   require(input.speed || input.mask || input.wallDistance,
     "a speed, a mask or a wall distance is needed");
   require(!input.seeds.empty(), "at least one seed is needed");

@@ -4,6 +4,7 @@
 #include "DraftBranches.h"
 #include "LineGraph.h"
 #include "Median.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
@@ -340,13 +341,6 @@ void ComputeGeometry(
   }
 }
 
-void Require(bool condition, const char* message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
-  }
-}
 }
 
 void TopologySettings::Validate() const

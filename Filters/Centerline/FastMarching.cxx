@@ -1,13 +1,14 @@
 #include "FastMarching.h"
 
 #include "HugeArray.h"
+#include "KernelChoice.h"
 #include "MarchingQueue.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
-#include <string>
 #include <unordered_map>
 
 namespace coronary
@@ -46,14 +47,6 @@ inline float FromBits(std::uint32_t bits)
 inline bool IsFinal(std::uint32_t bits)
 {
   return bits < NotReached;
-}
-
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("FastMarching: ") + requirement);
-  }
 }
 
 /// Arrays over all addresses.
@@ -575,8 +568,7 @@ bool Front<Layout>::Run()
 #if defined(__x86_64__)
   // Shorter code, and counting the bits of a word is one instruction. Without fused multiplication:
   // the same result to the bit on any processor.
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
-    __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt"))
+  if (ProcessorHas(Instructions::Avx2))
   {
     return this->RunWithAvx2();
   }
@@ -606,19 +598,21 @@ FastMarching::FastMarching(const VoxelRegion& region, std::vector<float> speed,
   , Progress(progress)
   , Speeds(std::move(speed))
 {
-  Require(
+  constexpr RequireOf require{ "FastMarching" };
+  require(
     settings.spacing.allFinite() && settings.spacing.minCoeff() > 0.0, "spacing must be positive");
-  Require(settings.sourceRadius >= 0.0 && std::isfinite(settings.sourceRadius),
+  require(settings.sourceRadius >= 0.0 && std::isfinite(settings.sourceRadius),
     "sourceRadius must not be negative");
-  Require(!(settings.stopAtArrival < 0.0), "stopAtArrival must not be negative");
-  Require(this->Speeds.size() == region.Size(), "one speed for each voxel of the region is needed");
-  Require(std::all_of(this->Speeds.begin(), this->Speeds.end(),
+  require(!(settings.stopAtArrival < 0.0), "stopAtArrival must not be negative");
+  require(this->Speeds.size() == region.Size(), "one speed for each voxel of the region is needed");
+  require(std::all_of(this->Speeds.begin(), this->Speeds.end(),
             [](float value) { return value > 0.0F && value < Infinite; }),
     "speeds must be positive and finite");
 }
 
 bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
 {
+  constexpr RequireOf require{ "FastMarching" };
   const std::uint32_t count = this->Region.Size();
   if (this->Speeds.size() != count)
   {
@@ -626,8 +620,8 @@ bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
   }
   for (const FastMarchingSource& source : sources)
   {
-    Require(source.label >= 0 && source.label < noSource, "labels must be 0 to 254");
-    Require(source.index.allFinite(), "sources must be finite");
+    require(source.label >= 0 && source.label < noSource, "labels must be 0 to 254");
+    require(source.index.allFinite(), "sources must be finite");
   }
   if (count == 0)
   {

@@ -1,5 +1,7 @@
 #include "LineGraph.h"
 
+#include "DisjointSets.h"
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -612,17 +614,11 @@ int CloseGaps(LineGraph& graph, double gapRatio)
         return a.gap != b.gap ? a.gap < b.gap
                               : std::make_pair(a.end, a.target) < std::make_pair(b.end, b.target);
       });
-    std::vector<int> together(count);
-    std::iota(together.begin(), together.end(), 0);
-    const std::function<int(int)> find = [&](int c)
-    { return together[c] == c ? c : together[c] = find(together[c]); };
+    DisjointSets together(static_cast<std::size_t>(count));
     for (const Join& join : joins)
     {
-      const int a = find(piece[join.end]);
-      const int b = find(piece[join.target]);
-      if (a != b)
+      if (together.Join(piece[join.end], piece[join.target]))
       {
-        together[a] = b;
         graph.Link(join.end, join.target);
         // Neither is where the whole starts, unless it is the only such place.
         ++graph.others[join.end];

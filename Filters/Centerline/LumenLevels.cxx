@@ -3,6 +3,7 @@
 #include "BlurredDisc.h"
 #include "CurveSmoothing.h"
 #include "LumenMeasurement.h"
+#include "Median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,18 +22,6 @@ constexpr double UsualShare = 0.7; ///< of the wide places are dimmer: some were
 constexpr double DimmestShare = 0.6;    ///< of the usual contrast: what shows less is no wide lumen
 constexpr double LeastShare = 0.75;     ///< of the level upstream: what is below is the blur's
 constexpr double LeastWideLength = 8.0; ///< mm: fewer wide places tell nothing
-
-double Quantile(std::vector<double> values, double share)
-{
-  if (values.empty())
-  {
-    return 0.0;
-  }
-  const auto at =
-    values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 struct PointValues
 {
@@ -62,7 +51,7 @@ PointValues ValuesAt(const ImageInterpolator& image, const Vector3& position,
   values.share =
     (BlurredDisc(0.0, radius / blur) + directions * BlurredDisc(disc / blur, radius / blur)) /
     (directions + 1);
-  values.around = Quantile(ring, 0.25);
+  values.around = InclusiveQuantileOf(ring, 0.25);
   return values;
 }
 
@@ -114,11 +103,11 @@ double NoiseOnAxes(const VesselTree& tree, const std::vector<VesselPath>& paths,
       }
       if (near.size() >= least)
       {
-        deviations.push_back(std::abs(value - Quantile(std::move(near), 0.5)));
+        deviations.push_back(std::abs(value - InclusiveQuantileOf(std::move(near), 0.5)));
       }
     }
   }
-  return deviations.size() >= 10 ? 1.4826 * Quantile(std::move(deviations), 0.5) : usual;
+  return deviations.size() >= 10 ? 1.4826 * InclusiveQuantileOf(std::move(deviations), 0.5) : usual;
 }
 }
 
@@ -150,14 +139,15 @@ LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselP
     }
   }
   // A tree of thin vessels only: the brightest of them say most.
-  const double usual = wide.size() >= 10 ? Quantile(wide, UsualShare) : Quantile(thin, 0.9);
+  const double usual =
+    wide.size() >= 10 ? InclusiveQuantileOf(wide, UsualShare) : InclusiveQuantileOf(thin, 0.9);
   result.usual = usual;
   // Fat: the darkest that is common around vessels. What is darker than that by half of the contrast is the lung beside it.
-  const double middle = Quantile(around, 0.5);
+  const double middle = InclusiveQuantileOf(around, 0.5);
   around.erase(std::remove_if(around.begin(), around.end(),
                  [&](double value) { return value < middle - 0.5 * (usual - middle); }),
     around.end());
-  result.background = Quantile(around, 0.1);
+  result.background = InclusiveQuantileOf(around, 0.1);
   std::vector<char> counts(count, 0); // wide, and bright as contrast is
   for (const VesselPath& path : paths)
   {

@@ -1,5 +1,8 @@
 #include "LumenMeasurement.h"
 
+#include "Median.h"
+#include "VoxelCell.h"
+
 #include <Eigen/Dense>
 
 #include <algorithm>
@@ -173,8 +176,6 @@ ImageInterpolator::ImageInterpolator(const ScalarImage& image)
 {
   const ImageGrid& grid = image.grid;
   this->Inverse = grid.spacing.cwiseInverse().asDiagonal() * grid.direction.transpose();
-  const std::array<int, 3> size = image.Dimensions();
-  this->Steps = { 1, size[0], static_cast<std::int64_t>(size[0]) * size[1] };
 }
 
 bool ImageInterpolator::Contains(const Vector3& world) const
@@ -193,40 +194,9 @@ bool ImageInterpolator::Contains(const Vector3& world) const
 
 double ImageInterpolator::At(const Vector3& world) const
 {
-  const Vector3 index = this->ToIndex(world);
-  std::int64_t offset = 0;
-  std::int64_t next[3];
-  double fraction[3];
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    const int low = this->Image.grid.extent[2 * axis];
-    const int high = this->Image.grid.extent[2 * axis + 1];
-    const double x =
-      std::min(std::max(index[axis], static_cast<double>(low)), static_cast<double>(high));
-    const int floor = std::min(static_cast<int>(x), std::max(low, high - 1));
-    const int base = floor > x ? floor - 1 : floor;
-    fraction[axis] = x - base;
-    offset += (base - low) * this->Steps[axis];
-    next[axis] = base < high ? this->Steps[axis] : 0;
-  }
+  const VoxelCell<double> cell(this->ToIndex(world), this->Image.grid.extent);
   return std::visit(
-    [&](const auto* values)
-    {
-      const auto* v = values + offset;
-      const auto along = [&](std::int64_t o)
-      {
-        const double a = v[o];
-        return a + fraction[0] * (static_cast<double>(v[o + next[0]]) - a);
-      };
-      const auto plane = [&](std::int64_t o)
-      {
-        const double a = along(o);
-        return a + fraction[1] * (along(o + next[1]) - a);
-      };
-      const double a = plane(0);
-      return a + fraction[2] * (plane(next[2]) - a);
-    },
-    this->Image.values);
+    [&](const auto* values) { return cell.Interpolate(values); }, this->Image.values);
 }
 
 LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& position,
@@ -295,8 +265,7 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
       section.confidence = 0.0;
       return section;
     }
-    std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
-    const double median = distances[distances.size() / 2];
+    const double median = MedianOf(std::move(distances));
 
     // d(angle) = R + e . direction, without the rays that run far, twice.
     Vector3 fit(median, 0.0, 0.0);
@@ -327,8 +296,7 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
         section.confidence = 0.0;
         return section;
       }
-      std::nth_element(lows.begin(), lows.begin() + found / 2, lows.end());
-      behind = lows[static_cast<std::size_t>(found) / 2];
+      behind = MedianOf(std::move(lows));
       spread = std::sqrt(sum / found) / fit[0];
       normal.diagonal() += Vector3(0.0, 1e-3 * rays, 1e-3 * rays);
       fit = normal.ldlt().solve(right);

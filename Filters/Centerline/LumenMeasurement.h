@@ -28,7 +28,6 @@ public:
 private:
   ScalarImage Image;
   Matrix3 Inverse;
-  std::array<std::int64_t, 3> Steps;
 };
 
 /// What a lumen and its surroundings look like near a seed.

@@ -3,14 +3,15 @@
 #include "BlurredDisc.h"
 #include "CurveSmoothing.h"
 #include "LumenMeasurement.h"
+#include "Median.h"
 #include "PartialProgress.h"
+#include "Require.h"
 
 #include <Eigen/Dense>
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string>
 #include <unordered_set>
 
 namespace coronary
@@ -26,14 +27,6 @@ constexpr double RingStart = 1.8;           ///< blurs outside of the wall the s
 constexpr double RingEnd = 3.0;
 constexpr double CalciumHalo = 2.0; ///< blurs around an object that its blooming changes
 constexpr double LeastRays = 0.4;   ///< share of rays that have to count
-
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("RefinementSettings: ") + requirement);
-  }
-}
 
 /// Values of a section in polar coordinates around a place.
 struct PolarSection
@@ -206,8 +199,7 @@ private:
     {
       return false;
     }
-    std::nth_element(known.begin(), known.begin() + known.size() / 2, known.end());
-    const double usual = known[known.size() / 2];
+    const double usual = MedianOf(std::move(known));
     // A branch or a neighbour: no wall to be seen there.
     for (int ray = 0; ray < Rays; ++ray)
     {
@@ -442,11 +434,12 @@ struct PathWork
 
 void RefinementSettings::Validate() const
 {
-  Require(this->levelUncertainty >= 0.005 && this->levelUncertainty <= 0.5,
+  constexpr RequireOf require{ "RefinementSettings" };
+  require(this->levelUncertainty >= 0.005 && this->levelUncertainty <= 0.5,
     "levelUncertainty must be from 0.005 to 0.5");
-  Require(
+  require(
     this->wavelength >= 0.5 && this->wavelength <= 50.0, "wavelength must be from 0.5 to 50 mm");
-  Require(this->greatestArc >= 30.0 && this->greatestArc <= 300.0,
+  require(this->greatestArc >= 30.0 && this->greatestArc <= 300.0,
     "greatestArc must be from 30 to 300 degrees");
 }
 

@@ -53,8 +53,8 @@ std::vector<double> Outgrowth(
       continue;
     }
     // Lesions narrow what is upstream.
-    const double usual = QuantileOf({ before.begin() + static_cast<std::ptrdiff_t>(begin),
-                                      before.begin() + static_cast<std::ptrdiff_t>(end) },
+    const double usual = QuantileOf<double>({ before.begin() + static_cast<std::ptrdiff_t>(begin),
+                                              before.begin() + static_cast<std::ptrdiff_t>(end) },
       0.8);
     against[i] =
       std::clamp(std::log(course.radius[i] / (wide * usual + 0.5 * measurement.voxel)), 0.0, most);

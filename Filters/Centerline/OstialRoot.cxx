@@ -72,9 +72,8 @@ public:
     {
       radii.push_back(this->Radius(i));
     }
-    std::sort(radii.begin(), radii.end());
     constexpr double usual = 1.8; // mm
-    this->Unit = std::max(radii[radii.size() / 2] / usual, 1.5 * image.SmallestSpacing());
+    this->Unit = std::max(MedianOf(std::move(radii)) / usual, 1.5 * image.SmallestSpacing());
     this->Step = 0.3 * this->Unit;
     double length = 0.0;
     for (std::size_t i = 0; i < std::min(free + 1, branch.points.size()); ++i)

@@ -2,6 +2,8 @@
 
 #include "CoronaryAnatomy.h"
 #include "CurveSmoothing.h"
+#include "Median.h"
+#include "Require.h"
 #include "VesselTips.h"
 
 #include <Eigen/Dense>
@@ -31,14 +33,6 @@ constexpr double NormalQuantile = 1.645; ///< 5 % to either side
 constexpr double UncertainRange = 0.8;   ///< of degrees: one that wide tells nothing
 constexpr double OccludedRadius = 0.2;   ///< mm: less is no lumen that can be seen
 constexpr double LostRadius = 0.35;      ///< mm: a lumen that is thinner may be lost in the noise
-
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("GradingSettings: ") + requirement);
-  }
-}
 
 /// One vessel at equal steps.
 struct Profile
@@ -129,8 +123,7 @@ std::vector<double> StepsAt(const VesselTree& tree, const std::vector<VesselPath
     {
       continue;
     }
-    std::nth_element(radii.begin(), radii.begin() + radii.size() / 2, radii.end());
-    const double ratio = std::min(0.95, radii[radii.size() / 2] / std::max(own, 0.1));
+    const double ratio = std::min(0.95, MedianOf(std::move(radii)) / std::max(own, 0.1));
     const double step = own * (1.0 - std::pow(1.0 - std::pow(ratio, 7.0 / 3.0), 3.0 / 7.0));
     const auto bin = std::min(
       profile.size() - 1, static_cast<std::size_t>(std::lround(path.arc[place] / profile.step)));
@@ -532,13 +525,14 @@ void GradedPath::FindLesions(std::vector<Stenosis>& lesions) const
 
 void GradingSettings::Validate() const
 {
-  Require(this->leastDegree >= 0.05 && this->leastDegree <= 0.95,
+  constexpr RequireOf require{ "GradingSettings" };
+  require(this->leastDegree >= 0.05 && this->leastDegree <= 0.95,
     "leastDegree must be from 0.05 to 0.95");
-  Require(this->leastReferenceRadius >= 0.2 && this->leastReferenceRadius <= 3.0,
+  require(this->leastReferenceRadius >= 0.2 && this->leastReferenceRadius <= 3.0,
     "leastReferenceRadius must be from 0.2 to 3 mm");
-  Require(
+  require(
     this->wavelength >= 10.0 && this->wavelength <= 500.0, "wavelength must be from 10 to 500 mm");
-  Require(this->leastSignificance >= 0.0 && this->leastSignificance <= 20.0,
+  require(this->leastSignificance >= 0.0 && this->leastSignificance <= 20.0,
     "leastSignificance must be from 0 to 20");
 }
 

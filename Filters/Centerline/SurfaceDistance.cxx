@@ -1,24 +1,17 @@
 #include "SurfaceDistance.h"
 
+#include "Require.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 namespace coronary
 {
 namespace
 {
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("SurfaceDistance: ") + requirement);
-  }
-}
-
 std::int64_t CountOpenEdges(const std::vector<Triangle>& triangles)
 {
   std::vector<std::pair<std::int64_t, std::int64_t>> edges;
@@ -55,6 +48,7 @@ struct Extent
 
 Extent Measure(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
 {
+  constexpr RequireOf require{ "SurfaceDistance" };
   Vector3 low = Vector3::Constant(std::numeric_limits<double>::infinity());
   Vector3 high = -low;
   double volume = 0.0;
@@ -63,9 +57,9 @@ Extent Measure(const std::vector<Vector3>& points, const std::vector<Triangle>& 
   {
     for (const std::int64_t p : t)
     {
-      Require(p >= 0 && p < static_cast<std::int64_t>(points.size()),
+      require(p >= 0 && p < static_cast<std::int64_t>(points.size()),
         "a triangle refers to a point that does not exist");
-      Require(points[static_cast<std::size_t>(p)].allFinite(), "a point is not finite");
+      require(points[static_cast<std::size_t>(p)].allFinite(), "a point is not finite");
       low = low.cwiseMin(points[static_cast<std::size_t>(p)]);
       high = high.cwiseMax(points[static_cast<std::size_t>(p)]);
     }
@@ -341,15 +335,16 @@ SurfaceDistance ComputeSurfaceDistance(const std::vector<Vector3>& points,
   const std::vector<Triangle>& triangles, double spacing, std::int64_t maximumVoxels,
   const ProgressCallback& progress)
 {
-  Require(!triangles.empty(), "the surface has no triangles");
-  Require(std::isfinite(spacing) && spacing >= 0.0, "spacing must not be negative");
+  constexpr RequireOf require{ "SurfaceDistance" };
+  require(!triangles.empty(), "the surface has no triangles");
+  require(std::isfinite(spacing) && spacing >= 0.0, "spacing must not be negative");
   const Extent extent = Measure(points, triangles);
-  Require(extent.area > 0.0, "all triangles are degenerate");
+  require(extent.area > 0.0, "all triangles are degenerate");
   const Vector3 size = extent.high - extent.low;
   if (spacing == 0.0)
   {
     spacing = 0.5 * std::abs(extent.volume) / extent.area;
-    Require(spacing > 0.0, "the surface encloses nothing");
+    require(spacing > 0.0, "the surface encloses nothing");
   }
   const double most = static_cast<double>(maximumVoxels);
   const auto voxelsAt = [&](double h) { return (size / h + Vector3::Constant(7.0)).prod(); };

@@ -1,5 +1,7 @@
 #include "TgfSkeleton.h"
 
+#include "DisjointSets.h"
+
 #include <algorithm>
 #include <cmath>
 #include <istream>
@@ -63,20 +65,7 @@ VesselTree FromSkeleton(const TgfSkeleton& skeleton, double radius)
     }
   }
   // Sets of joints that hang together, to find loops.
-  std::vector<std::int64_t> leader(count);
-  for (std::int64_t j = 0; j < count; ++j)
-  {
-    leader[j] = j;
-  }
-  const auto leaderOf = [&](std::int64_t joint)
-  {
-    while (leader[joint] != joint)
-    {
-      leader[joint] = leader[leader[joint]];
-      joint = leader[joint];
-    }
-    return joint;
-  };
+  DisjointSets sets(static_cast<std::size_t>(count));
   std::vector<std::vector<std::int64_t>> neighbours(count);
   std::vector<int> arrivals(count, 0);
   for (std::size_t b = 0; b < skeleton.bones.size(); ++b)
@@ -87,12 +76,11 @@ VesselTree FromSkeleton(const TgfSkeleton& skeleton, double radius)
     {
       Fail(name + " refers to a joint that does not exist");
     }
-    if (leaderOf(from) == leaderOf(to))
+    if (!sets.Join(from, to))
     {
       Fail(name +
         (from == to ? " begins and ends at one joint" : " closes a loop, or is there twice"));
     }
-    leader[leaderOf(from)] = leaderOf(to);
     neighbours[from].push_back(to);
     neighbours[to].push_back(from);
     ++arrivals[to];
@@ -103,7 +91,7 @@ VesselTree FromSkeleton(const TgfSkeleton& skeleton, double radius)
   {
     if (!neighbours[j].empty())
     {
-      pieces[leaderOf(j)].push_back(j);
+      pieces[sets.Find(j)].push_back(j);
     }
   }
   std::vector<std::int64_t> roots;

@@ -1,13 +1,13 @@
 #include "ThinBranches.h"
 
+#include "Median.h"
 #include "ParallelFor.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <string>
 #include <unordered_map>
 
 namespace coronary
@@ -559,9 +559,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   {
     cores.push_back(samples[i].core);
   }
-  std::nth_element(
-    cores.begin(), cores.begin() + static_cast<std::ptrdiff_t>(cores.size() / 2), cores.end());
-  const double begin = cores[cores.size() / 2];
+  const double begin = MedianOf(std::move(cores));
   if (begin - lowest > DeepestValley * this->Settings.contrast + 2.0 * this->Noise)
   {
     return false;
@@ -611,14 +609,8 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
       cores.push_back(sample.core);
     }
   }
-  const auto median = [](std::vector<double>& values)
-  {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
   const double least = this->Settings.leastContrast * this->Settings.contrast;
-  const double usual = contrasts.empty() ? least : median(contrasts);
+  const double usual = contrasts.empty() ? least : MedianOf(std::move(contrasts));
   Bar bar;
   bar.least = 0.5 * least;
   bar.significance = 0.5 * this->Settings.significance;
@@ -626,7 +618,7 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   bar.goingBright = std::min(bar.going, 0.5 * least);
   if (!cores.empty())
   {
-    bar.bright = median(cores) - 0.5 * usual;
+    bar.bright = MedianOf(std::move(cores)) - 0.5 * usual;
   }
   bar.unknownGoesOn = true;
   const Vector3 direction = this->Turn(point(near), back.normalized());
@@ -719,26 +711,14 @@ double MeasureNoise(const ImageInterpolator& image, const VesselTree& tree, doub
       }
     }
   }
-  if (differences.empty())
-  {
-    return 0.0;
-  }
-  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-  std::nth_element(differences.begin(), middle, differences.end());
-  return *middle * 1.4826 / std::sqrt(6.0);
+  return MedianOf(std::move(differences)) * 1.4826 / std::sqrt(6.0);
 }
 
 namespace
 {
 void Check(const ThinBranchSettings& settings)
 {
-  const auto require = [](bool condition, const char* requirement)
-  {
-    if (!condition)
-    {
-      throw std::invalid_argument(std::string("ThinBranchSettings: ") + requirement);
-    }
-  };
+  constexpr RequireOf require{ "ThinBranchSettings" };
   require(settings.voxel > 0.0, "voxel must be positive");
   require(settings.step > 0.0, "step must be positive");
   require(settings.minimumLength > 0.0, "minimumLength must be positive");

@@ -78,9 +78,7 @@ double SpreadOfMedian(const std::vector<double>& values)
 /// Lesions narrow a vessel, nothing widens it: its radius is what most of it has at least.
 double UpperRadius(std::vector<double> values)
 {
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(4 * values.size() / 5);
-  std::nth_element(values.begin(), place, values.end());
-  return std::max(1e-9, *place);
+  return std::max(1e-9, QuantileOf(std::move(values), 0.8));
 }
 
 double Angle(const Vector3& a, const Vector3& b)

@@ -2,6 +2,8 @@
 
 #include "DistanceTransform.h"
 #include "GridIndex.h"
+#include "Median.h"
+#include "VoxelCell.h"
 
 #include <algorithm>
 #include <cmath>
@@ -154,11 +156,9 @@ void VesselMarch::March(const ImageInterpolator& image, const LumenReference& re
       speed[number] = values[GridOffset(this->Input.grid, index[0], index[1], index[2])];
     });
   // Relative to what vessels have here: the upper tenth.
-  std::vector<float> sorted = speed;
-  const std::size_t tenth = sorted.size() - 1 - sorted.size() / 10;
-  std::nth_element(
-    sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(tenth), sorted.end());
-  const double scale = std::max<double>(sorted[tenth] + shift, 1e-30);
+  const std::size_t tenth = speed.size() - 1 - speed.size() / 10;
+  const double scale =
+    std::max<double>(ValueOfRank(speed, static_cast<double>(tenth)) + shift, 1e-30);
   const double contrast = reference.lumen - reference.background;
   this->Members.ForEach(
     [&](std::uint32_t number, VoxelRegion::Address address)
@@ -244,17 +244,12 @@ bool VesselMarch::Gradient(const Vector3& index, Vector3& gradient) const
   double total = 0.0;
   const int base[3] = { static_cast<int>(std::floor(index[0])),
     static_cast<int>(std::floor(index[1])), static_cast<int>(std::floor(index[2])) };
+  const std::array<double, 3> part = { index[0] - base[0], index[1] - base[1], index[2] - base[2] };
   for (int corner = 0; corner < 8; ++corner)
   {
-    int at[3];
-    double weight = 1.0;
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      const int up = corner >> axis & 1;
-      at[axis] = base[axis] + up;
-      const double fraction = index[axis] - base[axis];
-      weight *= up ? fraction : 1.0 - fraction;
-    }
+    const int at[3] = { base[0] + (corner & 1), base[1] + (corner >> 1 & 1),
+      base[2] + (corner >> 2) };
+    const double weight = TrilinearWeight(corner, part);
     if (weight <= 0.0 || !this->Members.InBox(at[0], at[1], at[2]))
     {
       continue;

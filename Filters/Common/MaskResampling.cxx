@@ -1,6 +1,7 @@
 #include "MaskResampling.h"
 
 #include "ParallelFor.h"
+#include "VoxelCell.h"
 
 #include <algorithm>
 #include <array>
@@ -129,18 +130,18 @@ struct MaskView
   bool Linear(const Vector3& index) const
   {
     const Vector3 base = index.array().floor();
-    const Vector3 part = index - base;
+    const std::array<double, 3> part = { index[0] - base[0], index[1] - base[1],
+      index[2] - base[2] };
     double sum = 0.0;
     for (int corner = 0; corner < 8; ++corner)
     {
-      double weight = 1.0;
       std::array<std::int64_t, 3> at{};
       for (int axis = 0; axis < 3; ++axis)
       {
-        const int up = (corner >> axis) & 1;
-        weight *= up != 0 ? part[axis] : 1.0 - part[axis];
-        at[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(base[axis]) + up;
+        at[static_cast<std::size_t>(axis)] =
+          static_cast<std::int64_t>(base[axis]) + ((corner >> axis) & 1);
       }
+      const double weight = TrilinearWeight(corner, part);
       sum += weight > 0.0 && this->Whole(at[0], at[1], at[2]) ? weight : 0.0;
     }
     // What is half by rounding errors alone must not depend on them.

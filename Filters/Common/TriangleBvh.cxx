@@ -1,10 +1,10 @@
 #include "TriangleBvh.h"
 
+#include "KernelChoice.h"
 #include "ParallelFor.h"
 #include "TriangleBvhKernels.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -14,24 +14,6 @@ namespace coronary
 namespace
 {
 constexpr double GreatestCoordinate = 1e18;
-
-const BvhKernels* Find(BvhInstructions instructions)
-{
-#if defined(DYNAMICCORONARY_WIDE_KERNELS)
-  if (instructions != BvhInstructions::Baseline && __builtin_cpu_supports("avx2") &&
-    __builtin_cpu_supports("fma"))
-  {
-    return &BvhKernelsAvx2;
-  }
-#endif
-  return instructions == BvhInstructions::Avx2 ? nullptr : &BvhKernelsBaseline;
-}
-
-std::atomic<const BvhKernels*>& Selected()
-{
-  static std::atomic<const BvhKernels*> selected{ Find(BvhInstructions::Widest) };
-  return selected;
-}
 
 float RoundDown(double value)
 {
@@ -66,14 +48,14 @@ std::int64_t NumberOfNodes(std::int64_t leaves)
 }
 }
 
-bool SetBvhInstructions(BvhInstructions instructions)
+KernelChoice<BvhKernels>& BvhKernelChoice()
 {
-  const BvhKernels* kernels = Find(instructions);
-  if (kernels != nullptr)
-  {
-    Selected() = kernels;
-  }
-  return kernels != nullptr;
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<BvhKernels> choice(BvhKernelsBaseline, &BvhKernelsAvx2);
+#else
+  static KernelChoice<BvhKernels> choice(BvhKernelsBaseline);
+#endif
+  return choice;
 }
 
 TrianglePoint NearestOnTriangle(
@@ -483,7 +465,7 @@ TriangleBvh::Nearest TriangleBvh::Closest(const Vector3& p, double bound, std::i
     query.high[k] = RoundUp(p[k] - this->Centre[k]);
   }
   query.triangle = -1;
-  Selected().load(std::memory_order_relaxed)->closest(query);
+  BvhKernelChoice().Get().closest(query);
   if (query.triangle < 0)
   {
     // The inner loops and NearestOn differ by rounding.

@@ -134,15 +134,6 @@ private:
   Vector3 Centre = Vector3::Zero(); ///< what the boxes' coordinates are relative to
   double Size = 0.0;                ///< longest side of the box around all, when built
 };
-
-/// For tests: which loops run, in the whole process; false if that can not be.
-enum class BvhInstructions
-{
-  Widest, ///< that the processor runs: the default
-  Baseline,
-  Avx2
-};
-bool SetBvhInstructions(BvhInstructions instructions);
 }
 
 #endif

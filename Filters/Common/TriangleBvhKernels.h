@@ -6,6 +6,9 @@
 
 namespace coronary
 {
+template <typename Kernels>
+class KernelChoice;
+
 constexpr int BvhWidth = 8;
 constexpr int BvhLeafSize = 4;
 
@@ -42,6 +45,9 @@ struct BvhKernels
 {
   void (*closest)(BvhQuery& query);
 };
+
+/// Which set runs, in the whole process.
+KernelChoice<BvhKernels>& BvhKernelChoice();
 
 extern const BvhKernels BvhKernelsBaseline;
 extern const BvhKernels BvhKernelsAvx2;

@@ -1,5 +1,7 @@
 #include "Evaluation.h"
 
+#include "Median.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -276,10 +278,7 @@ void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& setti
         sum += one;
       }
       m.centerlineMean = sum / static_cast<double>(distances.size());
-      const auto place = distances.begin() +
-        static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(distances.size() - 1));
-      std::nth_element(distances.begin(), place, distances.end());
-      m.centerline95 = *place;
+      m.centerline95 = InclusiveQuantileOf(std::move(distances), 0.95);
     }
   }
   for (auto& [group, branch] : branches)

@@ -1,11 +1,12 @@
 #include "CenterlineTracking.h"
 
 #include "LineTracker.h"
+#include "Median.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -23,14 +24,6 @@ constexpr double WeakConfidence = 0.2;
 constexpr double FilledConfidence = 0.3; ///< at most
 constexpr double LostDeviation = 2.0;    ///< mm
 
-void RequireRange(const char* name, double value, double least, double greatest)
-{
-  if (!(value >= least && value <= greatest))
-  {
-    throw std::invalid_argument(std::string("CenterlineTrackingSettings: ") + name +
-      " must be from " + std::to_string(least) + " to " + std::to_string(greatest));
-  }
-}
 }
 
 ProgressCallback LineTracker::Part(double from, double to) const
@@ -126,8 +119,7 @@ void LineTracker::MeasureContrast()
       "Most of the lines are outside of the image at the reference time " +
       std::to_string(this->ReferenceTime));
   }
-  std::sort(contrasts.begin(), contrasts.end());
-  this->Contrast = contrasts[contrasts.size() / 2];
+  this->Contrast = MedianOf(std::move(contrasts));
   if (!(this->Contrast > 0.0))
   {
     throw std::invalid_argument("The image at the reference time " +
@@ -296,15 +288,16 @@ PoseSequence LineTracker::Run()
 
 void CenterlineTrackingSettings::Validate() const
 {
-  RequireRange("temporalWindow", this->temporalWindow, 0.0, 1.0);
-  RequireRange("cycleLength", this->cycleLength, 0.2, 5.0);
-  RequireRange("nodeSpacing", this->nodeSpacing, 0.5, 10.0);
-  RequireRange("coarseSpacing", this->coarseSpacing, 1.0, 4.0);
-  RequireRange("coarseRadius", this->coarseRadius, 4.0, 30.0);
-  RequireRange("captureRange", this->captureRange, 2.0, 40.0);
-  RequireRange("fineRadius", this->fineRadius, 2.0, 12.0);
-  RequireRange("fineRange", this->fineRange, 1.0, 12.0);
-  RequireRange("trackedDeviation", this->trackedDeviation, 0.05, 10.0);
+  constexpr RequireOf require{ "CenterlineTrackingSettings" };
+  require.Range("temporalWindow", this->temporalWindow, 0.0, 1.0);
+  require.Range("cycleLength", this->cycleLength, 0.2, 5.0);
+  require.Range("nodeSpacing", this->nodeSpacing, 0.5, 10.0);
+  require.Range("coarseSpacing", this->coarseSpacing, 1.0, 4.0);
+  require.Range("coarseRadius", this->coarseRadius, 4.0, 30.0);
+  require.Range("captureRange", this->captureRange, 2.0, 40.0);
+  require.Range("fineRadius", this->fineRadius, 2.0, 12.0);
+  require.Range("fineRange", this->fineRange, 1.0, 12.0);
+  require.Range("trackedDeviation", this->trackedDeviation, 0.05, 10.0);
   this->prior.Validate();
 }
 

@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_HarmonicFit_h
 #define DynamicCoronary_HarmonicFit_h
 
+#include "CyclicTime.h"
 #include "PhaseInterpolation.h"
 
 #include <cmath>
@@ -13,13 +14,6 @@ namespace coronary
 {
 /// A row a phase or a harmonic.
 using HarmonicRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// The time within its cycle, 0 to 1 (excluded).
-inline double Modulo(double time)
-{
-  const double rest = time - std::floor(time);
-  return rest < 1.0 ? rest : 0.0;
-}
 
 /// 1, cos, sin, cos 2 ... of a moment.
 Eigen::VectorXd Harmonics(double time, int order);

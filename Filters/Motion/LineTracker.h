@@ -6,6 +6,7 @@
 #define DynamicCoronary_LineTracker_h
 
 #include "CenterlineTracking.h"
+#include "CyclicTime.h"
 #include "LineNodes.h"
 #include "PatchMatching.h"
 #include "SparseVolume.h"
@@ -19,13 +20,6 @@ class WideningField;
 
 /// Beyond the patch, the search and the smearing: what the places may still move, mm.
 constexpr double SpareReach = 3.0;
-
-/// Distance of two times modulo the cycle.
-inline double CyclicDistance(double a, double b)
-{
-  const double apart = std::abs(a - b);
-  return std::abs(apart - std::round(apart));
-}
 
 inline double NodeRadius(const LineNodes& nodes, int node)
 {

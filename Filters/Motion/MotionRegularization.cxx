@@ -1,5 +1,6 @@
 #include "MotionRegularization.h"
 
+#include "CyclicTime.h"
 #include "Require.h"
 #include "SkeletonPose.h"
 
@@ -131,7 +132,7 @@ Problem::Problem(
   std::vector<double> times;
   for (const double time : sequence.times)
   {
-    times.push_back(time - std::floor(time));
+    times.push_back(Modulo(time));
   }
   this->order.resize(times.size());
   std::iota(this->order.begin(), this->order.end(), std::size_t{ 0 });

@@ -1,5 +1,7 @@
 #include "PatchMatching.h"
 
+#include "Median.h"
+
 #include <cmath>
 #include <numeric>
 
@@ -75,10 +77,7 @@ void ToLikelihoods(
   {
     least.push_back(*std::min_element(one.begin(), one.end()));
   }
-  std::vector<float> sorted = least;
-  std::nth_element(
-    sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const float typical = std::max(sorted[sorted.size() / 2], static_cast<float>(floor));
+  const float typical = std::max(MedianOf(least), static_cast<float>(floor));
   for (std::size_t n = 0; n < costs.size(); ++n)
   {
     const float scale = static_cast<float>(0.5 * independent) / std::max(least[n], typical);
@@ -118,13 +117,7 @@ double SignalCurvature::NoiseOf(
         averaged[n] * Eigen::SelfAdjointEigenSolver<Matrix3>(curvatures[n]).eigenvalues()[0]);
     }
   }
-  if (least.empty())
-  {
-    return 0.0;
-  }
-  const auto third = least.begin() + static_cast<std::ptrdiff_t>(least.size() / 3);
-  std::nth_element(least.begin(), third, least.end());
-  return std::max(*third, 0.0);
+  return std::max(QuantileOf(std::move(least), 1.0 / 3.0), 0.0);
 }
 
 Matrix3 Limited(const Matrix3& information, double deviation)

@@ -182,29 +182,10 @@ bool SparseVolume::Covers(const Vector3& place, double reach) const
 
 float AveragedVolume::Sample(const Vector3& world) const
 {
-  const Vector3 index = this->toIndex * (world - this->origin);
-  int corner[3];
-  float part[3];
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    const double limited = std::clamp(index[axis], 0.0, this->dimensions[axis] - 1.0);
-    corner[axis] =
-      std::clamp(static_cast<int>(limited), 0, std::max(this->dimensions[axis] - 2, 0));
-    part[axis] = static_cast<float>(limited - corner[axis]);
-  }
-  const std::int64_t x = this->dimensions[0] > 1 ? 1 : 0;
-  const std::int64_t y = this->dimensions[1] > 1 ? this->dimensions[0] : 0;
-  const std::int64_t z = this->dimensions[2] > 1
-    ? static_cast<std::int64_t>(this->dimensions[0]) * this->dimensions[1]
-    : 0;
-  const float* v = this->values.data() +
-    (static_cast<std::int64_t>(corner[2]) * this->dimensions[1] + corner[1]) * this->dimensions[0] +
-    corner[0];
-  const auto mix = [](float a, float b, float f) { return a + f * (b - a); };
-  const float near = mix(mix(v[0], v[x], part[0]), mix(v[y], v[y + x], part[0]), part[1]);
-  const float far =
-    mix(mix(v[z], v[z + x], part[0]), mix(v[z + y], v[z + y + x], part[0]), part[1]);
-  return mix(near, far, part[2]);
+  const std::array<int, 3>& n = this->dimensions;
+  const VoxelCell<float> cell(
+    this->toIndex * (world - this->origin), { 0, n[0] - 1, 0, n[1] - 1, 0, n[2] - 1 });
+  return cell.Interpolate(this->values.data());
 }
 
 AveragedVolume AverageBlocks(

@@ -7,6 +7,7 @@
 
 #include "ParallelFor.h"
 #include "ScalarImage.h"
+#include "VoxelCell.h"
 
 #include <cmath>
 #include <cstdint>
@@ -63,17 +64,10 @@ private:
     const std::int16_t* value = this->Values.data() +
       static_cast<std::int64_t>(brick) * (Stored * Stored * Stored) +
       ((k & 7) * Stored + (j & 7)) * Stored + (i & 7);
-    const auto fx = static_cast<float>(x - i);
-    const auto fy = static_cast<float>(y - j);
-    const auto fz = static_cast<float>(z - k);
-    constexpr int row = Stored;
-    constexpr int slice = Stored * Stored;
-    const auto along = [fx](const std::int16_t* p)
-    { return static_cast<float>(p[0]) + fx * static_cast<float>(p[1] - p[0]); };
-    const float near = along(value) + fy * (along(value + row) - along(value));
-    const float far =
-      along(value + slice) + fy * (along(value + slice + row) - along(value + slice));
-    return this->Offset + this->Scale * (near + fz * (far - near));
+    return this->Offset +
+      this->Scale *
+      Trilinear<float>(value, { 1, Stored, Stored * Stored },
+        { static_cast<float>(x - i), static_cast<float>(y - j), static_cast<float>(z - k) });
   }
 
   Vector3 Origin = Vector3::Zero();

@@ -1,5 +1,7 @@
 #include "TrajectoryModel.h"
 
+#include "Require.h"
+
 #include <Eigen/Cholesky>
 
 #include <algorithm>
@@ -13,15 +15,6 @@ namespace coronary
 namespace
 {
 constexpr double Turn = 6.283185307179586;
-
-void RequireRange(const char* name, double value, double least, double greatest)
-{
-  if (!(value >= least && value <= greatest))
-  {
-    throw std::invalid_argument(std::string("TrajectoryPrior: ") + name + " must be from " +
-      std::to_string(least) + " to " + std::to_string(greatest));
-  }
-}
 
 int Harmonic(Eigen::Index basis)
 {
@@ -142,14 +135,15 @@ std::vector<Eigen::MatrixXd> FitCommonMotion(const LineNodes& nodes,
 
 void TrajectoryPrior::Validate() const
 {
-  RequireRange("harmonics", this->harmonics, 1, 12);
-  RequireRange("amplitude", this->amplitude, 1e-3, 1e3);
-  RequireRange("decay", this->decay, 0.0, 4.0);
-  RequireRange("neighbourChange", this->neighbourChange, 1e-4, 1e2);
-  RequireRange("neighbourDecay", this->neighbourDecay, 0.0, 4.0);
-  RequireRange("commonDegree", this->commonDegree, 0, 4);
-  RequireRange("commonHarmonics", this->commonHarmonics, 1, 12);
-  RequireRange("commonDeviation", this->commonDeviation, 0.1, 100.0);
+  constexpr RequireOf require{ "TrajectoryPrior" };
+  require.Range("harmonics", this->harmonics, 1, 12);
+  require.Range("amplitude", this->amplitude, 1e-3, 1e3);
+  require.Range("decay", this->decay, 0.0, 4.0);
+  require.Range("neighbourChange", this->neighbourChange, 1e-4, 1e2);
+  require.Range("neighbourDecay", this->neighbourDecay, 0.0, 4.0);
+  require.Range("commonDegree", this->commonDegree, 0, 4);
+  require.Range("commonHarmonics", this->commonHarmonics, 1, 12);
+  require.Range("commonDeviation", this->commonDeviation, 0.1, 100.0);
 }
 
 Eigen::VectorXd PeriodicBasis(double time, int harmonics)

@@ -1,6 +1,7 @@
 #include "vtkCardiacPhaseInterpolator.h"
 
 #include "CoronaryAnatomy.h"
+#include "CyclicTime.h"
 #include "PhaseInterpolation.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
@@ -104,10 +105,7 @@ void RequirePositive(const std::vector<std::vector<double>>& values, const std::
   }
 }
 
-double Modulo(double time)
-{
-  return time - std::floor(time);
-}
+using coronary::Modulo;
 }
 
 void vtkCardiacPhaseInterpolator::Internals::Build(vtkCardiacPhaseInterpolator* self)

@@ -1,6 +1,7 @@
 #include "CoronaryPhantom.h"
 
 #include "CounterRandom.h"
+#include "Median.h"
 #include "PhantomAnatomy.h"
 #include "PhantomImage.h"
 #include "PhantomLumen.h"
@@ -162,13 +163,10 @@ struct CoronaryPhantom::Internals
       {
         value[p] = field(tree.points[p]);
       }
-      std::vector<double> sorted = value;
-      const auto rank =
-        static_cast<std::size_t>((1.0 - phase.fraction) * static_cast<double>(sorted.size() - 1));
-      std::nth_element(sorted.begin(), sorted.begin() + rank, sorted.end());
+      const double least = InclusiveQuantileOf(value, 1.0 - phase.fraction);
       for (std::size_t p = 0; p < value.size(); ++p)
       {
-        lost[p] = std::max(lost[p], SmoothStep((value[p] - sorted[rank]) / 0.2 + 0.5));
+        lost[p] = std::max(lost[p], SmoothStep((value[p] - least) / 0.2 + 0.5));
       }
     }
     return lost;

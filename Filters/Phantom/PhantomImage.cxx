@@ -1,6 +1,7 @@
 #include "PhantomImage.h"
 
 #include "CounterRandom.h"
+#include "CyclicTime.h"
 #include "PartialProgress.h"
 #include "PhantomNoise.h"
 #include "PhantomTissues.h"
@@ -678,7 +679,7 @@ PhantomImage::PhantomImage(
 
 double PhantomImage::NoiseLevel(double t, double wholePhaseLost) const
 {
-  const double cycle = t - std::floor(t);
+  const double cycle = Modulo(t);
   const double fullDose =
     SmoothStep((cycle - 0.55) / 0.08) * (1.0 - SmoothStep((cycle - 0.88) / 0.08));
   return this->Settings.noise * (1.0 + (this->Settings.systolicNoise - 1.0) * (1.0 - fullDose)) *

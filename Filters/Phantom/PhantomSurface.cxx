@@ -1,5 +1,7 @@
 #include "PhantomSurface.h"
 
+#include "DisjointSets.h"
+
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -52,19 +54,7 @@ private:
   {
     for (int inside = 0; inside < 256; ++inside)
     {
-      std::array<int, 12> parent;
-      for (int e = 0; e < 12; ++e)
-      {
-        parent[e] = e;
-      }
-      const auto root = [&](int e)
-      {
-        while (parent[e] != e)
-        {
-          e = parent[e];
-        }
-        return e;
-      };
+      DisjointSets joined(12);
       const auto crossing = [&](int e)
       { return ((inside >> Corners(e, 0)) & 1) != ((inside >> Corners(e, 1)) & 1); };
       for (int axis = 0; axis < 3; ++axis)
@@ -97,7 +87,7 @@ private:
                 }
                 else
                 {
-                  parent[root(e)] = root(first);
+                  joined.Join(e, first);
                 }
               }
             }
@@ -109,7 +99,7 @@ private:
             {
               if ((inside >> corner[c]) & 1)
               {
-                parent[root(edge[c])] = root(edge[(c + 3) % 4]);
+                joined.Join(edge[c], edge[(c + 3) % 4]);
               }
             }
           }
@@ -125,7 +115,7 @@ private:
           this->SheetOfEdge[inside][e] = -1;
           continue;
         }
-        int& n = number[root(e)];
+        int& n = number[joined.Find(e)];
         if (n < 0)
         {
           n = sheets++;

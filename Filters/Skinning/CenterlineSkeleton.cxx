@@ -1,12 +1,12 @@
 #include "CenterlineSkeleton.h"
 
 #include "CoronaryAnatomy.h"
+#include "DisjointSets.h"
 #include "Require.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <set>
 
 namespace coronary
@@ -182,16 +182,7 @@ void CheckSkeleton(const Skeleton& skeleton)
   Require(fits(skeleton.radius.size()), "the radii of the skeleton are not one for each joint");
   Require(fits(skeleton.parent.size()), "the parents of the joints are not one for each joint");
   Require(fits(skeleton.abscissa.size()), "the abscissas of the joints are not one for each joint");
-  std::vector<std::int64_t> root(joints);
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](std::int64_t j)
-  {
-    while (root[j] != j)
-    {
-      j = root[j] = root[root[j]];
-    }
-    return j;
-  };
+  DisjointSets joined(static_cast<std::size_t>(joints));
   std::set<std::pair<std::int64_t, std::int64_t>> pairs;
   for (std::size_t b = 0; b < skeleton.bones.size(); ++b)
   {
@@ -203,10 +194,7 @@ void CheckSkeleton(const Skeleton& skeleton)
       name + " has no length");
     Require(pairs.insert(std::minmax(bone.first, bone.second)).second,
       name + " lies between the same joints as another bone");
-    const std::int64_t a = find(bone.first);
-    const std::int64_t c = find(bone.second);
-    Require(a != c, name + " closes a ring of bones");
-    root[a] = c;
+    Require(joined.Join(bone.first, bone.second), name + " closes a ring of bones");
   }
 }
 

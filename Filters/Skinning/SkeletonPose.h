@@ -130,43 +130,11 @@ struct PoseEdit
   double reach = 0.0;
 };
 
-/// A list of edits on a skeleton, with undo and redo.
-class PoseEditor
-{
-public:
-  /// Begins at rest. @throws std::invalid_argument as SkeletonRig.
-  explicit PoseEditor(const Skeleton& rest);
-  /// Begins at a pose. @throws std::invalid_argument as SkeletonRig::Transform.
-  PoseEditor(const Skeleton& rest, const SkeletonPose& start);
-
-  const SkeletonRig& Rig() const { return this->Rig_; }
-  const SkeletonPose& Pose() const { return this->Current; }
-
-  /// Forgets what was undone before it.
-  /// @throws std::invalid_argument: no such joint, a value that is not finite or out of range, a bone
-  /// that would lose its length. The pose stays as it was.
-  void Apply(const PoseEdit& edit);
-  bool Undo();  ///< false when there is nothing to undo
-  bool Redo();  ///< false when there is nothing to redo
-  void Reset(); ///< back to the start; Redo brings the edits back one by one
-
-  /// Those that are in effect.
-  std::vector<PoseEdit> Edits() const
-  {
-    return { this->List.begin(), this->List.begin() + static_cast<std::ptrdiff_t>(this->Done) };
-  }
-
-private:
-  void Replay();
-
-  SkeletonRig Rig_;
-  SkeletonPose Start;
-  SkeletonPose Current;
-  std::vector<PoseEdit> List;
-  std::size_t Done = 0;
-};
-
-/// The pose after one edit. @throws std::invalid_argument as PoseEditor::Apply.
+/**
+ * The pose after one edit.
+ * @throws std::invalid_argument: no such joint, a value that is not finite or out of range, a bone that would lose
+ *   its length. The pose stays as it was.
+ */
 void ApplyPoseEdit(const SkeletonRig& rig, const PoseEdit& edit, SkeletonPose& pose);
 }
 

@@ -1,5 +1,6 @@
 #include "SkinDeformation.h"
 
+#include "KernelChoice.h"
 #include "PartialProgress.h"
 #include "Require.h"
 #include "SkinKernels.h"
@@ -8,7 +9,6 @@
 #include <Eigen/SVD>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -28,45 +28,6 @@ constexpr double GreatestLeastRatio = 0.5;
 constexpr double RepairMargin = 0.01;
 constexpr double LeastRepairStretch = 0.2;
 constexpr int RepairPatience = 80; // sweeps
-
-const SkinKernels* Find(SkinInstructions instructions)
-{
-  switch (instructions)
-  {
-#if defined(DYNAMICCORONARY_WIDE_KERNELS)
-    case SkinInstructions::Avx512:
-      return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-          __builtin_cpu_supports("avx512vl")
-        ? &SkinKernelsAvx512
-        : nullptr;
-    case SkinInstructions::Avx2:
-      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &SkinKernelsAvx2
-                                                                             : nullptr;
-#endif
-    case SkinInstructions::Baseline:
-      return &SkinKernelsBaseline;
-    default:
-      return nullptr;
-  }
-}
-
-const SkinKernels* FindWidest()
-{
-  for (const SkinInstructions wide : { SkinInstructions::Avx512, SkinInstructions::Avx2 })
-  {
-    if (const SkinKernels* kernels = Find(wide))
-    {
-      return kernels;
-    }
-  }
-  return &SkinKernelsBaseline;
-}
-
-std::atomic<const SkinKernels*>& Selected()
-{
-  static std::atomic<const SkinKernels*> selected{ FindWidest() };
-  return selected;
-}
 
 /// Memory in whole cache lines, as wide registers want it.
 template <typename T>
@@ -197,15 +158,15 @@ void RequireCorners(const std::vector<Cell>& cells, std::int64_t points, const c
 }
 }
 
-bool SetSkinInstructions(SkinInstructions instructions)
+KernelChoice<SkinKernels>& SkinKernelChoice()
 {
-  const SkinKernels* found =
-    instructions == SkinInstructions::Widest ? FindWidest() : Find(instructions);
-  if (found)
-  {
-    Selected() = found;
-  }
-  return found != nullptr;
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<SkinKernels> choice(
+    SkinKernelsBaseline, &SkinKernelsAvx2, &SkinKernelsAvx512);
+#else
+  static KernelChoice<SkinKernels> choice(SkinKernelsBaseline);
+#endif
+  return choice;
 }
 
 struct SkinDeformation::Internals
@@ -854,10 +815,10 @@ void SkinDeformation::Deform(
     static_cast<float>(posedCentre.y()), static_cast<float>(posedCentre.z()) };
   data.SetFloatFrame(Vector3(static_cast<double>(centre[0]), static_cast<double>(centre[1]),
     static_cast<double>(centre[2])));
-  const SkinKernels* kernels = Selected();
+  const SkinKernels& kernels = SkinKernelChoice().Get();
   const bool dual = data.Settings.blend == SkinBlend::DualQuaternion;
-  const auto kernel = data.Sections ? (dual ? kernels->dualSections : kernels->linearSections)
-                                    : (dual ? kernels->dual : kernels->linear);
+  const auto kernel = data.Sections ? (dual ? kernels.dualSections : kernels.linearSections)
+                                    : (dual ? kernels.dual : kernels.linear);
   const auto body = [&](std::int64_t first, std::int64_t last)
   { kernel(data.Blocks, data.Bones.data(), centre, first, last, positions); };
   For(static_cast<std::int64_t>(data.BlockOffset.size()) - 1, BlockGrain, body, progress);

@@ -6,6 +6,9 @@
 
 namespace coronary
 {
+template <typename Kernels>
+class KernelChoice;
+
 /// Points go through the loops in blocks of so many.
 constexpr int SkinLanes = 16;
 
@@ -49,16 +52,8 @@ struct SkinKernels
     std::int64_t first, std::int64_t last, float* result);
 };
 
-enum class SkinInstructions
-{
-  Widest, ///< that the processor runs: the default
-  Baseline,
-  Avx2,
-  Avx512
-};
-
-/// For tests: which of the sets of loops runs, in the whole process; false if that can not be.
-bool SetSkinInstructions(SkinInstructions instructions);
+/// Which set runs, in the whole process.
+KernelChoice<SkinKernels>& SkinKernelChoice();
 
 extern const SkinKernels SkinKernelsBaseline;
 extern const SkinKernels SkinKernelsAvx2;

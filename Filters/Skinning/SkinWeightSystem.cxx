@@ -1,5 +1,6 @@
 #include "SkinWeightSystem.h"
 
+#include "Median.h"
 #include "Require.h"
 
 #include <algorithm>
@@ -737,17 +738,13 @@ void MeasureBones(const SkinWeightInput& input, const ScaledMesh& mesh,
     if (!own.empty())
     {
       // Half of a cylinder is within 0.71 radii of its axis.
-      const auto middle = own.begin() + static_cast<std::ptrdiff_t>(own.size() / 2);
-      std::nth_element(own.begin(), middle, own.end());
-      radius = std::max(radius, *middle / 0.71);
+      radius = std::max(radius, MedianOf(std::move(own)) / 0.71);
     }
     radii.push_back(radius);
     const auto [first, second] = input.bones[b];
     system.diameters[b] = (mesh.joints[second] - mesh.joints[first]).norm() / (2.0 * radius);
   }
-  const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
-  std::nth_element(radii.begin(), middle, radii.end());
-  system.radius = *middle;
+  system.radius = MedianOf(std::move(radii));
 }
 
 /// The rows and columns `order` of a matrix, in that order.

@@ -1,9 +1,9 @@
 #include "SupernodalFactor.h"
 
+#include "KernelChoice.h"
 #include "SupernodalKernels.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <stdexcept>
 #include <type_traits>
@@ -12,47 +12,28 @@ namespace coronary
 {
 namespace
 {
-const SupernodalKernels* FindKernels(bool wide)
-{
-#if defined(DYNAMICCORONARY_WIDE_KERNELS)
-  if (wide)
-  {
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &SupernodalKernelsAvx2
-                                                                           : nullptr;
-  }
-#endif
-  return wide ? nullptr : &SupernodalKernelsBaseline;
-}
-
-std::atomic<const SupernodalKernels*>& Selected()
-{
-  static std::atomic<const SupernodalKernels*> selected{ FindKernels(true) ? FindKernels(true)
-                                                                           : FindKernels(false) };
-  return selected;
-}
-
 template <typename Real>
 const PanelKernels<Real>& Kernels()
 {
   if constexpr (std::is_same_v<Real, float>)
   {
-    return Selected().load()->single;
+    return SupernodalKernelChoice().Get().single;
   }
   else
   {
-    return Selected().load()->twice;
+    return SupernodalKernelChoice().Get().twice;
   }
 }
 }
 
-bool SetSupernodalWide(bool wide)
+KernelChoice<SupernodalKernels>& SupernodalKernelChoice()
 {
-  const SupernodalKernels* kernels = FindKernels(wide);
-  if (kernels)
-  {
-    Selected() = kernels;
-  }
-  return kernels != nullptr;
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<SupernodalKernels> choice(SupernodalKernelsBaseline, &SupernodalKernelsAvx2);
+#else
+  static KernelChoice<SupernodalKernels> choice(SupernodalKernelsBaseline);
+#endif
+  return choice;
 }
 
 template <typename Real>

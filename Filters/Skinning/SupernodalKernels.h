@@ -6,6 +6,9 @@
 
 namespace coronary
 {
+template <typename Kernels>
+class KernelChoice;
+
 /// Right-hand sides that are solved for together.
 constexpr int SupernodalColumns = 8;
 
@@ -41,11 +44,11 @@ struct SupernodalKernels
   PanelKernels<double> twice;
 };
 
+/// Which set runs, in the whole process.
+KernelChoice<SupernodalKernels>& SupernodalKernelChoice();
+
 extern const SupernodalKernels SupernodalKernelsBaseline;
 extern const SupernodalKernels SupernodalKernelsAvx2;
-
-/// For tests: which loops SupernodalFactor calls; false when this processor has not those.
-bool SetSupernodalWide(bool wide);
 }
 
 #endif

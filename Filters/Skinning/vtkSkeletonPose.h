@@ -28,7 +28,7 @@
  * would lose its length, lines that are no bones, a posed skeleton with other bones: one error and no output.
  * An aborted execution leaves an empty output and is started anew by the next request.
  *
- * @sa coronary::PoseEditor, vtkSkinDeformation
+ * @sa coronary::ApplyPoseEdit, vtkSkinDeformation
  */
 #ifndef vtkSkeletonPose_h
 #define vtkSkeletonPose_h

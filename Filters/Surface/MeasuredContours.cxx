@@ -1,5 +1,7 @@
 #include "MeasuredContours.h"
 
+#include "Require.h"
+
 #include <Eigen/Dense>
 
 #include <algorithm>
@@ -13,14 +15,6 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("ContourSettings: ") + requirement);
-  }
-}
 
 /// Relative radii as a series over the angle: 1, cos, sin, cos 2, ...
 using Series = Eigen::VectorXd;
@@ -253,11 +247,11 @@ void TurnNodes(const std::map<std::int64_t, int>& uses, const VesselTree& tree,
 
 void ContourSettings::Validate() const
 {
-  const auto between = [](double x, double low, double high) { return x >= low && x <= high; };
-  Require(this->samples >= 12 && this->samples <= 360, "samples must be 12 to 360");
-  Require(this->harmonics >= 1 && this->harmonics <= 4, "harmonics must be 1 to 4");
-  Require(between(this->reach, 1.1, 3.0), "reach must be 1.1 to 3");
-  Require(between(this->contrast, 0.1, 0.9), "contrast must be 0.1 to 0.9");
+  constexpr RequireOf require{ "ContourSettings" };
+  require(this->samples >= 12 && this->samples <= 360, "samples must be 12 to 360");
+  require(this->harmonics >= 1 && this->harmonics <= 4, "harmonics must be 1 to 4");
+  require(Within(this->reach, 1.1, 3.0), "reach must be 1.1 to 3");
+  require(Within(this->contrast, 0.1, 0.9), "contrast must be 0.1 to 0.9");
 }
 
 double MeasureContours(const ImageInterpolator& image, const ContourSettings& settings,

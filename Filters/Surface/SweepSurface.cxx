@@ -1,6 +1,7 @@
 #include "SweepSurface.h"
 
 #include "AdaptiveRemesher.h"
+#include "Require.h"
 #include "SweepRescue.h"
 #include "SweptFirstMesh.h"
 #include "SweptLumen.h"
@@ -215,13 +216,6 @@ std::vector<std::int64_t> FindFaults(const AdaptiveRemesher& mesh)
   return faults;
 }
 
-void Require(bool condition, const char* name, const char* range)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("SweepSettings: ") + name + " must be " + range);
-  }
-}
 }
 
 namespace
@@ -305,22 +299,22 @@ Sweep SweepOnce(const VesselTree& tree, const SweepSections& sections,
 
 void SweepSettings::Validate() const
 {
-  const auto between = [](double x, double low, double high) { return x >= low && x <= high; };
-  Require(std::isfinite(this->minimumEdgeLength) && this->minimumEdgeLength > 0.0,
-    "minimumEdgeLength", "positive");
-  Require(
+  constexpr RequireOf require{ "SweepSettings" };
+  require(std::isfinite(this->minimumEdgeLength) && this->minimumEdgeLength > 0.0,
+    "minimumEdgeLength must be positive");
+  require(
     std::isfinite(this->maximumEdgeLength) && this->maximumEdgeLength >= this->minimumEdgeLength,
-    "maximumEdgeLength", "at least minimumEdgeLength");
-  Require(std::isfinite(this->curvatureWeight) && this->curvatureWeight >= 0.0, "curvatureWeight",
-    "at least 0");
-  Require(between(this->edgeLengthPerRadius, 0.1, 0.7), "edgeLengthPerRadius", "0.1 to 0.7");
-  Require(between(this->gradation, 0.05, 1.0), "gradation", "0.05 to 1");
-  Require(between(this->blending, 0.1, 1.0), "blending", "0.1 to 1");
-  Require(between(this->edgeRetreat, 0.1, 2.0), "edgeRetreat", "0.1 to 2");
-  Require(between(this->smoothing, 0.0, GreatestSmoothing), "smoothing", "0 to 4");
-  Require(between(this->clearance, 0.0, 0.5), "clearance", "0 to 0.5");
-  Require(this->patchSamples >= 6 && this->patchSamples <= 360, "patchSamples", "6 to 360");
-  Require(between(this->patchSpacing, 0.1, 4.0), "patchSpacing", "0.1 to 4");
+    "maximumEdgeLength must be at least minimumEdgeLength");
+  require(std::isfinite(this->curvatureWeight) && this->curvatureWeight >= 0.0,
+    "curvatureWeight must be at least 0");
+  require(Within(this->edgeLengthPerRadius, 0.1, 0.7), "edgeLengthPerRadius must be 0.1 to 0.7");
+  require(Within(this->gradation, 0.05, 1.0), "gradation must be 0.05 to 1");
+  require(Within(this->blending, 0.1, 1.0), "blending must be 0.1 to 1");
+  require(Within(this->edgeRetreat, 0.1, 2.0), "edgeRetreat must be 0.1 to 2");
+  require(Within(this->smoothing, 0.0, GreatestSmoothing), "smoothing must be 0 to 4");
+  require(Within(this->clearance, 0.0, 0.5), "clearance must be 0 to 0.5");
+  require(this->patchSamples >= 6 && this->patchSamples <= 360, "patchSamples must be 6 to 360");
+  require(Within(this->patchSpacing, 0.1, 4.0), "patchSpacing must be 0.1 to 4");
 }
 
 namespace

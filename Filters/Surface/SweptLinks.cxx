@@ -1,9 +1,9 @@
+#include "DisjointSets.h"
 #include "SweptLumenBuild.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 namespace coronary
@@ -235,15 +235,7 @@ void SweptLumen::Build::Connect()
 {
   this->incidences.clear();
   this->treeOfNode.clear();
-  std::map<std::int64_t, std::int64_t> parent;
-  const auto root = [&](std::int64_t p)
-  {
-    while (parent.count(p) != 0 && parent[p] != p)
-    {
-      p = parent[p];
-    }
-    return p;
-  };
+  DisjointSets trees(this->points.size());
   for (std::size_t i = 0; i < this->links.size(); ++i)
   {
     const Link& link = this->links[i];
@@ -251,47 +243,31 @@ void SweptLumen::Build::Connect()
     {
       continue;
     }
-    const std::int64_t a = root(link.points.front());
-    std::int64_t b = root(link.points.back());
-    if (a == b)
+    if (!trees.Join(link.points.front(), link.points.back()))
     {
       this->OpenLoop(this->links[i]);
       if (!link.alive)
       {
         continue;
       }
-      b = link.points.back(); // an end of its own now
+      trees.Join(link.points.front(), link.points.back()); // an end of its own now
     }
-    parent.emplace(a, a);
-    parent[b] = a;
     this->incidences[link.points.front()].push_back({ static_cast<int>(i), true });
     this->incidences[link.points.back()].push_back({ static_cast<int>(i), false });
   }
-  std::map<std::int64_t, int> number;
-  for (const auto& node : this->incidences)
-  {
-    const std::int64_t r = root(node.first);
-    number.emplace(r, 0);
-  }
   // Trees in the order of the input.
-  int next = 0;
-  std::map<std::int64_t, bool> seen;
+  std::map<std::int64_t, int> number;
   for (const Link& link : this->links)
   {
     if (link.alive)
     {
-      const std::int64_t r = root(link.points.front());
-      if (!seen[r])
-      {
-        seen[r] = true;
-        number[r] = next++;
-      }
+      number.emplace(trees.Find(link.points.front()), static_cast<int>(number.size()));
     }
   }
-  self.TreeCount = next;
+  self.TreeCount = static_cast<int>(number.size());
   for (const auto& node : this->incidences)
   {
-    this->treeOfNode[node.first] = number[root(node.first)];
+    this->treeOfNode[node.first] = number[trees.Find(node.first)];
   }
 }
 

@@ -1,16 +1,16 @@
 #include "MultiscaleVesselness.h"
 
+#include "KernelChoice.h"
+#include "Require.h"
 #include "VesselnessKernels.h"
 
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
 #include <stdexcept>
-#include <string>
 
 namespace coronary
 {
@@ -90,52 +90,9 @@ std::vector<float> HalfKernel(double sigma, double spacing, int order)
   return std::vector<float>(kernel.begin(), kernel.end());
 }
 
-/// The loops of an instruction set, if they are in this library and this processor runs them.
-const VesselnessKernels* Find(VesselnessInstructions instructions)
-{
-  switch (instructions)
-  {
-#if defined(DYNAMICCORONARY_WIDE_KERNELS)
-    case VesselnessInstructions::Avx512:
-      return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-          __builtin_cpu_supports("avx512vl")
-        ? &VesselnessKernelsAvx512
-        : nullptr;
-    case VesselnessInstructions::Avx2:
-      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
-        ? &VesselnessKernelsAvx2
-        : nullptr;
-#endif
-    case VesselnessInstructions::Baseline:
-      return &VesselnessKernelsBaseline;
-    default:
-      return nullptr;
-  }
-}
-
-/// The widest that this processor runs.
-const VesselnessKernels* FindWidest()
-{
-  for (const VesselnessInstructions wide :
-    { VesselnessInstructions::Avx512, VesselnessInstructions::Avx2 })
-  {
-    if (const VesselnessKernels* kernels = Find(wide))
-    {
-      return kernels;
-    }
-  }
-  return &VesselnessKernelsBaseline;
-}
-
-std::atomic<const VesselnessKernels*>& Selected()
-{
-  static std::atomic<const VesselnessKernels*> selected{ FindWidest() };
-  return selected;
-}
-
 const VesselnessKernels& Kernels()
 {
-  return *Selected();
+  return VesselnessKernelChoice().Get();
 }
 
 /// Of a row of voxels from i0 to i1.
@@ -368,26 +325,20 @@ Eigen::Vector3f VesselAxis(const HessianRow& h, int i, float sign)
 }
 }
 
-bool SetVesselnessInstructions(VesselnessInstructions instructions)
+KernelChoice<VesselnessKernels>& VesselnessKernelChoice()
 {
-  const VesselnessKernels* found =
-    instructions == VesselnessInstructions::Widest ? FindWidest() : Find(instructions);
-  if (found)
-  {
-    Selected() = found;
-  }
-  return found != nullptr;
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<VesselnessKernels> choice(
+    VesselnessKernelsBaseline, &VesselnessKernelsAvx2, &VesselnessKernelsAvx512);
+#else
+  static KernelChoice<VesselnessKernels> choice(VesselnessKernelsBaseline);
+#endif
+  return choice;
 }
 
 void VesselnessSettings::Validate() const
 {
-  const auto require = [](bool condition, const char* message)
-  {
-    if (!condition)
-    {
-      throw std::invalid_argument(std::string("VesselnessSettings: ") + message);
-    }
-  };
+  constexpr RequireOf require{ "VesselnessSettings" };
   require(!this->sigmas.empty(), "sigmas is empty");
   for (const double sigma : this->sigmas)
   {

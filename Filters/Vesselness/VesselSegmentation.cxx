@@ -62,14 +62,11 @@ BloodWindow VoxelSegmentation<T>::MeasureWindow(const std::vector<std::array<int
       });
   }
   BloodWindow window;
-  std::sort(bloods.begin(), bloods.end());
-  window.blood = bloods[bloods.size() / 2];
+  window.blood = MedianOf(std::move(bloods));
   window.tissue = darker ? 0.0 : window.blood;
   if (!values.empty())
   {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    window.tissue = *middle;
+    window.tissue = MedianOf(std::move(values));
   }
   return window;
 }
@@ -94,14 +91,8 @@ double VoxelSegmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>
         }
       });
   }
-  if (values.empty())
-  {
-    return 1.0;
-  }
-  const auto place =
-    values.begin() + static_cast<std::ptrdiff_t>(percentile * static_cast<double>(values.size()));
-  std::nth_element(values.begin(), place, values.end());
-  return *place > 0.0f ? share * *place : 1.0;
+  const float bright = QuantileOf(std::move(values), percentile);
+  return bright > 0.0f ? share * bright : 1.0;
 }
 
 template <typename T>

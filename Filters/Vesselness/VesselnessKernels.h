@@ -4,6 +4,9 @@
 
 namespace coronary
 {
+template <typename Kernels>
+class KernelChoice;
+
 /// Rows are padded to a multiple of it, so that a voxel goes through the same instructions wherever
 /// a part begins.
 constexpr int VesselnessLanes = 16;
@@ -43,16 +46,8 @@ struct VesselnessKernels
   void (*lambda3)(const HessianRow& h, float sign, int width, float* result);
 };
 
-enum class VesselnessInstructions
-{
-  Widest, ///< that the processor runs: the default
-  Baseline,
-  Avx2,
-  Avx512
-};
-
-/// For tests: which of the sets of loops runs, in the whole process; false if that can not be.
-bool SetVesselnessInstructions(VesselnessInstructions instructions);
+/// Which set runs, in the whole process.
+KernelChoice<VesselnessKernels>& VesselnessKernelChoice();
 
 extern const VesselnessKernels VesselnessKernelsBaseline;
 extern const VesselnessKernels VesselnessKernelsAvx2;

@@ -7,6 +7,7 @@
 
 #include "ParallelFor.h"
 #include "ScalarImage.h"
+#include "VoxelCell.h"
 
 #include <cmath>
 #include <limits>
@@ -57,8 +58,6 @@ template <typename T>
 float InterpolateKnown(
   const T* values, const std::array<int, 3>& n, const std::array<double, 3>& position)
 {
-  std::array<int, 3> low;
-  std::array<float, 3> f;
   for (int axis = 0; axis < 3; ++axis)
   {
     // Half a voxel of border belongs to the image.
@@ -66,18 +65,15 @@ float InterpolateKnown(
     {
       return WorldVolume::Nothing;
     }
-    const double inside = std::clamp(position[axis], 0.0, n[axis] - 1.0);
-    low[axis] = std::min(static_cast<int>(inside), std::max(0, n[axis] - 2));
-    f[axis] = static_cast<float>(inside - low[axis]);
   }
-  const std::int64_t dx = n[0] > 1 ? 1 : 0;
-  const std::int64_t dy = n[1] > 1 ? n[0] : 0;
-  const std::int64_t dz = n[2] > 1 ? static_cast<std::int64_t>(n[0]) * n[1] : 0;
-  const T* p = values + (static_cast<std::int64_t>(low[2]) * n[1] + low[1]) * n[0] + low[0];
+  const VoxelCell<float> cell(position, { 0, n[0] - 1, 0, n[1] - 1, 0, n[2] - 1 });
+  const std::array<float, 3>& f = cell.part;
+  const T* p = values + cell.first;
   const auto row = [&](const T* q)
-  { return (1.0f - f[0]) * static_cast<float>(q[0]) + f[0] * static_cast<float>(q[dx]); };
-  const auto plane = [&](const T* q) { return (1.0f - f[1]) * row(q) + f[1] * row(q + dy); };
-  const float value = (1.0f - f[2]) * plane(p) + f[2] * plane(p + dz);
+  { return (1.0f - f[0]) * static_cast<float>(q[0]) + f[0] * static_cast<float>(q[cell.step[0]]); };
+  const auto plane = [&](const T* q)
+  { return (1.0f - f[1]) * row(q) + f[1] * row(q + cell.step[1]); };
+  const float value = (1.0f - f[2]) * plane(p) + f[2] * plane(p + cell.step[2]);
   if (std::isfinite(value))
   {
     return value;
@@ -86,10 +82,9 @@ float InterpolateKnown(
   float weights = 0.0f;
   for (int corner = 0; corner < 8; ++corner)
   {
-    const float at =
-      static_cast<float>(p[(corner & 1 ? dx : 0) + (corner & 2 ? dy : 0) + (corner & 4 ? dz : 0)]);
-    const float weight = (corner & 1 ? f[0] : 1.0f - f[0]) * (corner & 2 ? f[1] : 1.0f - f[1]) *
-      (corner & 4 ? f[2] : 1.0f - f[2]);
+    const float at = static_cast<float>(p[(corner & 1 ? cell.step[0] : 0) +
+      (corner & 2 ? cell.step[1] : 0) + (corner & 4 ? cell.step[2] : 0)]);
+    const float weight = TrilinearWeight(corner, f);
     if (std::isfinite(at))
     {
       sum += weight * at;

@@ -1,5 +1,7 @@
 #include "SurfaceCleaning.h"
 
+#include "DisjointSets.h"
+#include "Require.h"
 #include "SurfaceCheck.h"
 #include "SurfaceRims.h"
 #include "ThinTriangles.h"
@@ -19,37 +21,6 @@ namespace
 constexpr int mostRounds = 14;
 constexpr int foldRounds = 6;        ///< of these, also folds are taken out
 constexpr double foldCosine = -0.95; ///< of the angle between neighbours' normals: folded over
-
-/// Disjoint sets of numbers; the lowest stands for its set.
-class Sets
-{
-public:
-  explicit Sets(std::size_t count)
-    : Parent(count)
-  {
-    std::iota(this->Parent.begin(), this->Parent.end(), 0);
-  }
-
-  std::int64_t Find(std::int64_t i)
-  {
-    while (this->Parent[i] != i)
-    {
-      this->Parent[i] = this->Parent[this->Parent[i]];
-      i = this->Parent[i];
-    }
-    return i;
-  }
-
-  void Join(std::int64_t i, std::int64_t j)
-  {
-    i = this->Find(i);
-    j = this->Find(j);
-    this->Parent[std::max(i, j)] = std::min(i, j);
-  }
-
-private:
-  std::vector<std::int64_t> Parent;
-};
 
 /// A triangle's part of the winding number around a point, times 4 pi.
 /// Source: Van Oosterom and Strackee, IEEE Trans Biomed Eng 30, 1983.
@@ -185,7 +156,7 @@ private:
       }
     }
     std::sort(entries.begin(), entries.end());
-    Sets sets(this->Surface.points.size());
+    DisjointSets sets(this->Surface.points.size());
     for (const Entry& entry : entries)
     {
       for (std::int64_t x = -1; x <= 1; ++x)
@@ -673,7 +644,7 @@ private:
 
   /// Triangles that cut others, are at edges of more than two, or (on request) folded over.
   std::vector<char> Offenders(
-    std::int64_t& count, Sets& zones, Vector3& where, bool folds = false) const
+    std::int64_t& count, DisjointSets& zones, Vector3& where, bool folds = false) const
   {
     std::vector<char> bad(this->Surface.cells.size(), 0);
     std::vector<Triangle> triangles;
@@ -714,7 +685,7 @@ private:
   void CountIntersections()
   {
     Vector3 where = Vector3::Zero();
-    Sets zones(this->Surface.points.size());
+    DisjointSets zones(this->Surface.points.size());
     this->Offenders(this->Result.counts.selfIntersections, zones, where);
     const std::int64_t count = this->Result.counts.selfIntersections;
     if (count > 0)
@@ -742,7 +713,7 @@ private:
       this->Step(from + (to - from) * round / mostRounds);
       std::int64_t count = 0;
       Vector3 where = Vector3::Zero();
-      Sets zones(this->Surface.points.size());
+      DisjointSets zones(this->Surface.points.size());
       std::vector<char> bad = this->Offenders(count, zones, where, round < foldRounds);
       if (count == 0)
       {
@@ -826,7 +797,7 @@ private:
   }
 
   void DropInnerParts(const std::vector<SurfaceCell>& before, const std::vector<char>& touched,
-    Sets& zones, std::vector<char>& kinds)
+    DisjointSets& zones, std::vector<char>& kinds)
   {
     this->DropSmallComponents(1e-3 * this->Settings.smallestComponent, false);
     std::int64_t count = 0;
@@ -874,7 +845,7 @@ private:
     SurfaceCleaningCounts& counts = result.counts;
     std::int64_t offenders = 0;
     Vector3 where = Vector3::Zero();
-    Sets zones(this->Surface.points.size());
+    DisjointSets zones(this->Surface.points.size());
     this->Offenders(offenders, zones, where);
     counts.remainingIntersections = offenders;
     if (offenders > 0 && this->Settings.resolveIntersections)
@@ -1022,20 +993,13 @@ private:
 
 void SurfaceCleaningSettings::Validate() const
 {
-  const auto require = [](bool right, const char* text)
-  {
-    if (!right)
-    {
-      throw std::invalid_argument(text);
-    }
-  };
-  require(this->mergeTolerance >= 0.0 && this->mergeTolerance <= 0.01,
+  Require(this->mergeTolerance >= 0.0 && this->mergeTolerance <= 0.01,
     "the merge tolerance must be between 0 and 0.01");
-  require(this->smallestComponent >= 0.0 && this->smallestComponent <= 1.0,
+  Require(this->smallestComponent >= 0.0 && this->smallestComponent <= 1.0,
     "the smallest component must be between 0 and 1");
-  require(this->joinDistance >= 0.0 && this->joinDistance <= 10.0,
+  Require(this->joinDistance >= 0.0 && this->joinDistance <= 10.0,
     "the join distance must be between 0 and 10");
-  require(this->minimumAngle >= 0.0 && this->minimumAngle <= 0.5236,
+  Require(this->minimumAngle >= 0.0 && this->minimumAngle <= 0.5236,
     "the minimum angle must be between 0 and 30 degrees");
 }
 

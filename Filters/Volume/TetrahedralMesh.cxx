@@ -3,6 +3,7 @@
 #include "MeshQuality.h"
 #include "MeshingPieces.h"
 #include "PartialProgress.h"
+#include "Require.h"
 #include "TetrahedralBoundary.h"
 #include "TriangleIntersections.h"
 
@@ -838,31 +839,24 @@ private:
 
 void TetrahedralMeshSettings::Validate() const
 {
-  const auto require = [](bool right, const char* text)
-  {
-    if (!right)
-    {
-      throw std::invalid_argument(text);
-    }
-  };
-  require(
+  Require(
     this->backend >= TetrahedralBackend::Automatic && this->backend <= TetrahedralBackend::Cgal,
     "there is no such backend");
-  require(this->outside == OutsidePolicy::Refuse || this->outside == OutsidePolicy::LeaveOut,
+  Require(this->outside == OutsidePolicy::Refuse || this->outside == OutsidePolicy::LeaveOut,
     "there is no such treatment of skeleton points outside");
-  require(this->radiusEdgeRatio >= 1.1 && this->radiusEdgeRatio <= 10.0,
+  Require(this->radiusEdgeRatio >= 1.1 && this->radiusEdgeRatio <= 10.0,
     "the radius-edge ratio must be between 1.1 and 10");
-  require(this->minimumDihedral >= 0.0 && this->minimumDihedral <= 0.3491,
+  Require(this->minimumDihedral >= 0.0 && this->minimumDihedral <= 0.3491,
     "the minimum dihedral angle must be between 0 and 20 degrees");
-  require(this->minimumVolume >= 0.0 && std::isfinite(this->minimumVolume),
+  Require(this->minimumVolume >= 0.0 && std::isfinite(this->minimumVolume),
     "the minimum volume must not be negative");
-  require(this->unitLength > 0.0 && std::isfinite(this->unitLength),
+  Require(this->unitLength > 0.0 && std::isfinite(this->unitLength),
     "the length of the unit must be positive");
-  require(this->sizeFactor == 0.0 || (this->sizeFactor >= 0.05 && this->sizeFactor <= 10.0),
+  Require(this->sizeFactor == 0.0 || (this->sizeFactor >= 0.05 && this->sizeFactor <= 10.0),
     "the size factor must be 0 or between 0.05 and 10");
-  require(this->repairLimit > 0.0 && this->repairLimit <= 0.1,
+  Require(this->repairLimit > 0.0 && this->repairLimit <= 0.1,
     "the repair limit must be positive and at most 0.1");
-  require(
+  Require(
     this->timeLimit > 0.0 && std::isfinite(this->timeLimit), "the time limit must be positive");
 }
 

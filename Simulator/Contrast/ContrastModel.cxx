@@ -1,7 +1,7 @@
 #include "ContrastModel.h"
 
 #include "Fnv1a.h"
-#include "RequireRange.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@ constexpr double SmallestVolume = 1e-15; // of a slab without length, mL
 constexpr std::size_t CellsOfSlab =
   4; // in the mean; the more, the fewer cells have the end of a slab in them
 
-constexpr RequireRange Require{ "contrast" };
+constexpr RequireOf RequireSetting{ "contrast" };
 
 const ContrastSettings& Checked(const ContrastSettings& settings)
 {
@@ -30,8 +30,9 @@ void ContrastSettings::Validate() const
 {
   this->flow.Validate();
   this->tracers.Validate();
-  Require(Within(this->smoothing, 0.0, 20.0), "smoothing", this->smoothing, "0 to 20 mm");
-  Require(Within(this->flowDepression, 0.0, 1.0), "flowDepression", this->flowDepression, "0 to 1");
+  RequireSetting(Within(this->smoothing, 0.0, 20.0), "smoothing", this->smoothing, "0 to 20 mm");
+  RequireSetting(
+    Within(this->flowDepression, 0.0, 1.0), "flowDepression", this->flowDepression, "0 to 1");
 }
 
 ContrastModel::ContrastModel(
@@ -129,10 +130,10 @@ double ContrastModel::SlabVolume(std::size_t slab) const
 void ContrastModel::Step(
   double dt, double phase, double heartRate, double injection, const CatheterTip& tip)
 {
-  Require(Within(dt, 0.0005, 0.02), "time step", dt, "0.0005 to 0.02 s");
-  Require(std::isfinite(phase), "phase", phase, "finite");
-  Require(Within(heartRate, 0.0, 300.0), "heart rate", heartRate, "0 to 300 per minute");
-  Require(Within(injection, 0.0, 50.0), "injection", injection, "0 to 50 mL/s");
+  RequireSetting(Within(dt, 0.0005, 0.02), "time step", dt, "0.0005 to 0.02 s");
+  RequireSetting(std::isfinite(phase), "phase", phase, "finite");
+  RequireSetting(Within(heartRate, 0.0, 300.0), "heart rate", heartRate, "0 to 300 per minute");
+  RequireSetting(Within(injection, 0.0, 50.0), "injection", injection, "0 to 50 mL/s");
   if (injection > 0.0 && tip.branch != -1)
   {
     this->Flow_.Network().Locate(tip);

@@ -1,8 +1,10 @@
 #include "ContrastTracers.h"
 
 #include "CounterRandom.h"
+#include "CyclicTime.h"
 #include "Fnv1a.h"
-#include "RequireRange.h"
+#include "KernelChoice.h"
+#include "Require.h"
 #include "VesselFrames.h"
 
 #include <algorithm>
@@ -19,7 +21,7 @@ constexpr std::size_t BatchSize = 64;   // of crossings
 constexpr int CellsOfSegment = 64;      // for thinning
 constexpr int Crossings = 1000;         // of segments in a step; more are short of a fault
 
-constexpr RequireRange Require{ "contrast tracers" };
+constexpr RequireOf RequireSetting{ "contrast tracers" };
 
 /// Part of the flux of laminar flow through the unit circle that is on the side of x below h.
 double ExactFluxBelow(double h)
@@ -100,11 +102,6 @@ const FluxTables& Tables()
   return tables;
 }
 
-double FractionalPart(double a)
-{
-  return a - std::floor(a);
-}
-
 /// Speed as a part of that on the axis.
 template <typename Place>
 double Inside(const Place& place)
@@ -138,28 +135,27 @@ Vector3 AxisPoint(const FlowNetwork& network, int branch, double abscissa)
 }
 }
 
-MoveTracersFunction MoveTracersLoop()
+KernelChoice<TracerKernels>& TracerKernelChoice()
 {
-#ifdef DYNAMICCORONARY_WIDE_KERNELS
-  static const bool wide = __builtin_cpu_supports("avx2") != 0;
-  if (wide)
-  {
-    return MoveTracersAvx2;
-  }
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<TracerKernels> choice(TracerKernelsBaseline, &TracerKernelsAvx2);
+#else
+  static KernelChoice<TracerKernels> choice(TracerKernelsBaseline);
 #endif
-  return MoveTracersBaseline;
+  return choice;
 }
 
 void ContrastTracerSettings::Validate() const
 {
-  Require(Within(static_cast<double>(this->capacity), 1000.0, 1e7), "capacity",
+  RequireSetting(Within(static_cast<double>(this->capacity), 1000.0, 1e7), "capacity",
     static_cast<double>(this->capacity), "1000 to 10000000");
-  Require(Within(this->volume, 1e-7, 0.1), "volume", this->volume, "1e-7 to 0.1 mL");
-  Require(Within(this->radialDiffusivity, 0.0, 100.0), "radialDiffusivity", this->radialDiffusivity,
-    "0 to 100 mm^2/s");
-  Require(Within(this->axialDiffusivity, 0.0, 100.0), "axialDiffusivity", this->axialDiffusivity,
-    "0 to 100 mm^2/s");
-  Require(Within(this->blushTime, 0.05, 100.0), "blushTime", this->blushTime, "0.05 to 100 s");
+  RequireSetting(Within(this->volume, 1e-7, 0.1), "volume", this->volume, "1e-7 to 0.1 mL");
+  RequireSetting(Within(this->radialDiffusivity, 0.0, 100.0), "radialDiffusivity",
+    this->radialDiffusivity, "0 to 100 mm^2/s");
+  RequireSetting(Within(this->axialDiffusivity, 0.0, 100.0), "axialDiffusivity",
+    this->axialDiffusivity, "0 to 100 mm^2/s");
+  RequireSetting(
+    Within(this->blushTime, 0.05, 100.0), "blushTime", this->blushTime, "0.05 to 100 s");
 }
 
 ContrastTracers::ContrastTracers(
@@ -351,7 +347,7 @@ std::int64_t ContrastTracers::MoveWithinSegments()
     run.injectedPart = static_cast<float>(this->Flow.injector.volume / volume);
     run.injectedRate = static_cast<float>(2.0 * this->Dt * this->FlowTop[injected] / volume);
   }
-  return MoveTracersLoop()(run, this->Size_, this->Leaving.data());
+  return TracerKernelChoice().Get().move(run, this->Size_, this->Leaving.data());
 }
 
 void ContrastTracers::Move()
@@ -606,9 +602,8 @@ void ContrastTracers::Emit(double volume, bool down)
   for (std::int64_t k = 0; k < count; ++k)
   {
     const auto number = static_cast<double>(this->Emitted++ & 0xffffffffU);
-    const float x = Tables().chordOf(static_cast<float>(FractionalPart(shiftX + alphaX * number)));
-    const float y =
-      Tables().placeOnChord(static_cast<float>(FractionalPart(shiftY + alphaY * number))) *
+    const float x = Tables().chordOf(static_cast<float>(Modulo(shiftX + alphaX * number)));
+    const float y = Tables().placeOnChord(static_cast<float>(Modulo(shiftY + alphaY * number))) *
       std::sqrt(std::max(1.0F - x * x, 0.0F));
     const double time = (static_cast<double>(k) + shiftTime) / static_cast<double>(count);
     Crossing crossing{ { segment, 0.0, x, y, volume / static_cast<double>(count) } };

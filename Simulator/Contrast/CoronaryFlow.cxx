@@ -1,7 +1,8 @@
 #include "CoronaryFlow.h"
 
+#include "CyclicTime.h"
 #include "Fnv1a.h"
-#include "RequireRange.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,18 +25,12 @@ constexpr double FlowReserve = 4.0;       // Gould, Lipscomb, Hamilton, Am J Car
 constexpr double ExpansionLoss = 1.52;    // K_t of Seeley and Young
 constexpr int StepsOfCycle = 160;
 
-constexpr RequireRange Require{ "coronary flow" };
+constexpr RequireOf RequireSetting{ "coronary flow" };
 
 /// From `a` at t = 0 to `b` at t = 1, level at both.
 double HalfCosine(double a, double b, double t)
 {
   return a + (b - a) * 0.5 * (1.0 - std::cos(Pi * t));
-}
-
-double ModuloOne(double phase)
-{
-  const double part = phase - std::floor(phase);
-  return part < 1.0 ? part : 0.0;
 }
 
 /// When the valve closes.
@@ -88,41 +83,45 @@ double GreatestRadius(const std::vector<double>& abscissa, const std::vector<dou
 
 void CoronaryFlowSettings::Validate() const
 {
-  Require(Within(this->viscosity, 0.5, 20.0), "viscosity", this->viscosity, "0.5 to 20 mPa s");
-  Require(Within(this->density, 500.0, 2000.0), "density", this->density, "500 to 2000 kg/m^3");
-  Require(Within(this->systolicPressure, 20.0, 300.0), "systolicPressure", this->systolicPressure,
-    "20 to 300 mmHg");
-  Require(Within(this->diastolicPressure, 10.0, this->systolicPressure), "diastolicPressure",
+  RequireSetting(
+    Within(this->viscosity, 0.5, 20.0), "viscosity", this->viscosity, "0.5 to 20 mPa s");
+  RequireSetting(
+    Within(this->density, 500.0, 2000.0), "density", this->density, "500 to 2000 kg/m^3");
+  RequireSetting(Within(this->systolicPressure, 20.0, 300.0), "systolicPressure",
+    this->systolicPressure, "20 to 300 mmHg");
+  RequireSetting(Within(this->diastolicPressure, 10.0, this->systolicPressure), "diastolicPressure",
     this->diastolicPressure, "10 mmHg to systolicPressure");
-  Require(this->venousPressure >= -10.0 && this->venousPressure <= 30.0 &&
+  RequireSetting(this->venousPressure >= -10.0 && this->venousPressure <= 30.0 &&
       this->venousPressure < this->diastolicPressure,
     "venousPressure", this->venousPressure, "-10 to 30 mmHg and below diastolicPressure");
-  Require(
+  RequireSetting(
     Within(this->ejectionBegin, 0.01, 0.15), "ejectionBegin", this->ejectionBegin, "0.01 to 0.15");
-  Require(Within(this->systoleEnd, 0.2, 0.6), "systoleEnd", this->systoleEnd, "0.2 to 0.6");
-  Require(Within(this->leftAxialSpeed, 1.0, 200.0), "leftAxialSpeed", this->leftAxialSpeed,
+  RequireSetting(Within(this->systoleEnd, 0.2, 0.6), "systoleEnd", this->systoleEnd, "0.2 to 0.6");
+  RequireSetting(Within(this->leftAxialSpeed, 1.0, 200.0), "leftAxialSpeed", this->leftAxialSpeed,
     "1 to 200 cm/s");
-  Require(Within(this->rightAxialSpeed, 1.0, 200.0), "rightAxialSpeed", this->rightAxialSpeed,
-    "1 to 200 cm/s");
-  Require(Within(this->leftDiastolicRatio, 0.3, 5.0), "leftDiastolicRatio",
+  RequireSetting(Within(this->rightAxialSpeed, 1.0, 200.0), "rightAxialSpeed",
+    this->rightAxialSpeed, "1 to 200 cm/s");
+  RequireSetting(Within(this->leftDiastolicRatio, 0.3, 5.0), "leftDiastolicRatio",
     this->leftDiastolicRatio, "0.3 to 5");
-  Require(Within(this->rightDiastolicRatio, 0.3, 5.0), "rightDiastolicRatio",
+  RequireSetting(Within(this->rightDiastolicRatio, 0.3, 5.0), "rightDiastolicRatio",
     this->rightDiastolicRatio, "0.3 to 5");
-  Require(Within(this->outletExponent, 1.0, 4.0), "outletExponent", this->outletExponent, "1 to 4");
-  Require(
+  RequireSetting(
+    Within(this->outletExponent, 1.0, 4.0), "outletExponent", this->outletExponent, "1 to 4");
+  RequireSetting(
     Within(this->arterialShare, 0.05, 0.95), "arterialShare", this->arterialShare, "0.05 to 0.95");
-  Require(Within(this->outletTime, 0.02, 5.0), "outletTime", this->outletTime, "0.02 to 5 s");
-  Require(Within(this->referenceHeartRate, 30.0, 200.0), "referenceHeartRate",
+  RequireSetting(
+    Within(this->outletTime, 0.02, 5.0), "outletTime", this->outletTime, "0.02 to 5 s");
+  RequireSetting(Within(this->referenceHeartRate, 30.0, 200.0), "referenceHeartRate",
     this->referenceHeartRate, "30 to 200 per minute");
-  Require(Within(this->stenosisThreshold, 0.05, 0.9), "stenosisThreshold", this->stenosisThreshold,
-    "0.05 to 0.9");
-  Require(Within(this->stenosisNeighbourhood, 1.0, 100.0), "stenosisNeighbourhood",
+  RequireSetting(Within(this->stenosisThreshold, 0.05, 0.9), "stenosisThreshold",
+    this->stenosisThreshold, "0.05 to 0.9");
+  RequireSetting(Within(this->stenosisNeighbourhood, 1.0, 100.0), "stenosisNeighbourhood",
     this->stenosisNeighbourhood, "1 to 100 mm");
   for (const StatedStenosis& stenosis : this->stenoses)
   {
-    Require(Within(stenosis.diameterReduction, 0.0, 0.95), "diameterReduction of a stenosis",
+    RequireSetting(Within(stenosis.diameterReduction, 0.0, 0.95), "diameterReduction of a stenosis",
       stenosis.diameterReduction, "0 to 0.95");
-    Require(Within(stenosis.length, 0.5, 100.0), "length of a stenosis", stenosis.length,
+    RequireSetting(Within(stenosis.length, 0.5, 100.0), "length of a stenosis", stenosis.length,
       "0.5 to 100 mm");
   }
 }
@@ -130,7 +129,7 @@ void CoronaryFlowSettings::Validate() const
 double AorticPressure(const CoronaryFlowSettings& settings, double phase)
 {
   const double length = settings.systoleEnd - settings.ejectionBegin;
-  const double since = ModuloOne(ModuloOne(phase) - settings.ejectionBegin);
+  const double since = Modulo(Modulo(phase) - settings.ejectionBegin);
   const double notch = NotchPressure(settings);
   if (since < 0.5 * length)
   {
@@ -149,7 +148,7 @@ double AorticPressure(const CoronaryFlowSettings& settings, double phase)
 
 double VentricularPressure(const CoronaryFlowSettings& settings, double phase)
 {
-  const double u = ModuloOne(phase);
+  const double u = Modulo(phase);
   if (u < settings.ejectionBegin)
   {
     return HalfCosine(EndDiastolicPressure, settings.diastolicPressure, u / settings.ejectionBegin);
@@ -474,7 +473,7 @@ double CoronaryFlow::PeriodicRatioParts(int tree, double fraction, double& systo
   this->Ventricular = VentricularPressure(this->Settings_, 0.0);
   for (int k = 0; k < cycles * StepsOfCycle; ++k)
   {
-    const double phase = ModuloOne((k + 1.0) / StepsOfCycle);
+    const double phase = Modulo((k + 1.0) / StepsOfCycle);
     this->Advance(
       dt, AorticPressure(this->Settings_, phase), VentricularPressure(this->Settings_, phase));
     if (k >= (cycles - 1) * StepsOfCycle)
@@ -518,7 +517,8 @@ void CoronaryFlow::Settle(double phase)
 
 void CoronaryFlow::SetOutletFactor(int tree, double factor)
 {
-  Require(factor > 0.0 && factor < 1e6, "factor of the outlets' resistance", factor, "above 0");
+  RequireSetting(
+    factor > 0.0 && factor < 1e6, "factor of the outlets' resistance", factor, "above 0");
   this->OutletFactor[tree] = factor;
 }
 
@@ -656,10 +656,10 @@ void CoronaryFlow::SetInjector(double injection, const CatheterTip& tip)
 void CoronaryFlow::Step(
   double dt, double phase, double heartRate, double injection, const CatheterTip& tip)
 {
-  Require(dt > 0.0 && dt < 1e6, "time step", dt, "above 0 s");
-  Require(std::isfinite(phase), "phase", phase, "finite");
-  Require(Within(heartRate, 0.0, 1000.0), "heart rate", heartRate, "0 to 1000 per minute");
-  Require(Within(injection, 0.0, 1000.0), "injection", injection, "0 to 1000 mL/s");
+  RequireSetting(dt > 0.0 && dt < 1e6, "time step", dt, "above 0 s");
+  RequireSetting(std::isfinite(phase), "phase", phase, "finite");
+  RequireSetting(Within(heartRate, 0.0, 1000.0), "heart rate", heartRate, "0 to 1000 per minute");
+  RequireSetting(Within(injection, 0.0, 1000.0), "injection", injection, "0 to 1000 mL/s");
   if (!this->Started)
   {
     this->SetInjector(0.0, tip);

@@ -2,8 +2,10 @@
 
 #include <cstring>
 
-#ifndef DYNAMICCORONARY_TRACER_LOOP
-#define DYNAMICCORONARY_TRACER_LOOP MoveTracersBaseline
+#if defined(__AVX2__)
+#define CORONARY_TRACER_KERNELS TracerKernelsAvx2
+#else
+#define CORONARY_TRACER_KERNELS TracerKernelsBaseline
 #endif
 
 namespace coronary
@@ -119,10 +121,8 @@ std::int64_t ListBeyond(
   }
   return listed;
 }
-}
 
-std::int64_t DYNAMICCORONARY_TRACER_LOOP(
-  const TracerRun& run, std::int64_t count, std::int32_t* leaving)
+std::int64_t Move(const TracerRun& run, std::int64_t count, std::int32_t* leaving)
 {
   Block block;
   std::int64_t listed = 0;
@@ -140,4 +140,7 @@ std::int64_t DYNAMICCORONARY_TRACER_LOOP(
   }
   return listed;
 }
+}
+
+const TracerKernels CORONARY_TRACER_KERNELS{ &Move };
 }

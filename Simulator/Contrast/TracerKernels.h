@@ -6,6 +6,9 @@
 
 namespace coronary
 {
+template <typename Kernels>
+class KernelChoice;
+
 /// What the loop needs of a segment.
 struct TracerMotion
 {
@@ -29,16 +32,18 @@ struct TracerRun
   std::uint64_t random = 0;   ///< key of this step's random numbers
 };
 
-/// Moves tracers 0 to `count` - 1 as if no segment ended. Lists those that are beyond an end of theirs and returns how
-/// many; `leaving` has room for `count` + 1.
-using MoveTracersFunction = std::int64_t (*)(
-  const TracerRun& run, std::int64_t count, std::int32_t* leaving);
+struct TracerKernels
+{
+  /// Moves tracers 0 to `count` - 1 as if no segment ended. Lists those that are beyond an end of theirs and returns
+  /// how many; `leaving` has room for `count` + 1.
+  std::int64_t (*move)(const TracerRun& run, std::int64_t count, std::int32_t* leaving);
+};
 
-std::int64_t MoveTracersBaseline(const TracerRun& run, std::int64_t count, std::int32_t* leaving);
-std::int64_t MoveTracersAvx2(const TracerRun& run, std::int64_t count, std::int32_t* leaving);
+/// Which set runs, in the whole process.
+KernelChoice<TracerKernels>& TracerKernelChoice();
 
-/// The widest that this processor runs.
-MoveTracersFunction MoveTracersLoop();
+extern const TracerKernels TracerKernelsBaseline;
+extern const TracerKernels TracerKernelsAvx2;
 }
 
 #endif

@@ -5,26 +5,6 @@
 
 namespace coronary
 {
-const char* DeviceStateName(DeviceState state)
-{
-  switch (state)
-  {
-    case DeviceState::Connecting:
-      return "connecting";
-    case DeviceState::Running:
-      return "running";
-    case DeviceState::Stale:
-      return "stale";
-    case DeviceState::Disconnected:
-      return "disconnected";
-    case DeviceState::Refused:
-      return "refused";
-    case DeviceState::Ended:
-      return "ended";
-  }
-  return "unknown";
-}
-
 DeviceStatus WaitWhileConnecting(const Device& device, double seconds)
 {
   using Clock = std::chrono::steady_clock;

@@ -23,9 +23,6 @@ enum class DeviceState : std::uint8_t
   Ended         ///< a recording or a script that is over: its pose is held
 };
 
-/// "running", as in a status line.
-const char* DeviceStateName(DeviceState state);
-
 /// Bits of InputFrame::axes: what one source moves at a time.
 enum DeviceAxes : std::uint32_t
 {

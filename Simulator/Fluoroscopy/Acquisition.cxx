@@ -1,8 +1,7 @@
 #include "Acquisition.h"
 
-#include "RequireSetting.h"
-
 #include "Fnv1a.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,8 @@ namespace coronary
 {
 namespace
 {
+constexpr RequireOf RequireSetting{ "acquisition" };
+
 /// A whole number for all three: frames in two seconds.
 std::int64_t FramesInTwoSeconds(FrameRate rate)
 {
@@ -23,14 +24,13 @@ std::int64_t FramesInTwoSeconds(FrameRate rate)
 void RequireRate(const char* name, FrameRate rate)
 {
   const int value = static_cast<int>(rate);
-  RequireSetting("acquisition", value >= 0 && value <= static_cast<int>(FrameRate::F30), name,
-    value, "one of FrameRate's: 0, 1, 2");
+  RequireSetting(value >= 0 && value <= static_cast<int>(FrameRate::F30), name, value,
+    "one of FrameRate's: 0, 1, 2");
 }
 
 void RequireFieldArea(double area)
 {
-  RequireSetting("acquisition", area > 0.0 && area <= 5000.0, "area of the field", area,
-    "above 0, to 5000 cm^2");
+  RequireSetting(area > 0.0 && area <= 5000.0, "area of the field", area, "above 0, to 5000 cm^2");
 }
 
 template <typename T>
@@ -61,15 +61,15 @@ FrameRate FrameRateOf(double framesPerSecond)
 
 void AcquisitionSettings::Validate() const
 {
-  RequireSetting("acquisition", this->tickRate >= 100 && this->tickRate <= 100000, "tick rate",
-    this->tickRate, "100 to 100000 Hz");
+  RequireSetting(this->tickRate >= 100 && this->tickRate <= 100000, "tick rate", this->tickRate,
+    "100 to 100000 Hz");
   RequireRate("frame rate of fluoroscopy", this->fluoroscopyRate);
   RequireRate("frame rate of cine", this->cineRate);
-  RequireSetting("acquisition", this->fluoroscopyKerma > 0.0 && this->fluoroscopyKerma <= 10.0,
+  RequireSetting(this->fluoroscopyKerma > 0.0 && this->fluoroscopyKerma <= 10.0,
     "air kerma of a fluoroscopy frame", this->fluoroscopyKerma, "above 0, to 10 mGy");
-  RequireSetting("acquisition", this->cineKerma > 0.0 && this->cineKerma <= 10.0,
-    "air kerma of a cine frame", this->cineKerma, "above 0, to 10 mGy");
-  RequireSetting("acquisition", this->fluoroscopyPhotons >= 1.0 && this->fluoroscopyPhotons <= 1e6,
+  RequireSetting(this->cineKerma > 0.0 && this->cineKerma <= 10.0, "air kerma of a cine frame",
+    this->cineKerma, "above 0, to 10 mGy");
+  RequireSetting(this->fluoroscopyPhotons >= 1.0 && this->fluoroscopyPhotons <= 1e6,
     "photons a pixel", this->fluoroscopyPhotons, "1 to 1e6");
   RequireFieldArea(this->fieldArea);
 }
@@ -101,8 +101,7 @@ void ExposureClock::SetFieldArea(double area)
 
 void ExposureClock::SetDoseFactor(double factor)
 {
-  RequireSetting(
-    "acquisition", factor >= 0.1 && factor <= 10.0, "factor of the dose", factor, "0.1 to 10");
+  RequireSetting(factor >= 0.1 && factor <= 10.0, "factor of the dose", factor, "0.1 to 10");
   this->DoseFactor = factor;
 }
 

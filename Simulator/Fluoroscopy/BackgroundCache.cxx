@@ -1,5 +1,7 @@
 #include "BackgroundCache.h"
 
+#include "Require.h"
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -10,7 +12,6 @@
 #include <mutex>
 #include <optional>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -32,14 +33,6 @@ bool SameView(const CArmGeometry& a, const CArmGeometry& b)
 std::size_t BytesOf(const LineIntegrals& image)
 {
   return image.values.size() * sizeof(float);
-}
-
-void Require(bool possible, const char* what)
-{
-  if (!possible)
-  {
-    throw std::invalid_argument(std::string("background: ") + what);
-  }
 }
 
 /// Bands of rows, those in the middle first.
@@ -263,14 +256,15 @@ BackgroundCache::BackgroundCache(
   std::shared_ptr<const VolumeProjector> projector, const BackgroundCacheSettings& settings)
   : Data(std::make_unique<Implementation>())
 {
-  Require(projector != nullptr, "there is no projector");
-  Require(settings.previewSize >= 8 && settings.previewSize <= 8192,
+  constexpr RequireOf require{ "background" };
+  require(projector != nullptr, "there is no projector");
+  require(settings.previewSize >= 8 && settings.previewSize <= 8192,
     "the preview's size has to be within 8 to 8192");
-  Require(settings.bandRows >= 8 && settings.bandRows <= 8192,
+  require(settings.bandRows >= 8 && settings.bandRows <= 8192,
     "a band's rows have to be within 8 to 8192");
-  Require(settings.angleStep > 0.0 && settings.angleStep <= 0.1,
+  require(settings.angleStep > 0.0 && settings.angleStep <= 0.1,
     "the step of angles has to be positive, and at most 0.1 radians");
-  Require(settings.lengthStep > 0.0 && settings.lengthStep <= 10.0,
+  require(settings.lengthStep > 0.0 && settings.lengthStep <= 10.0,
     "the step of lengths has to be positive, and at most 10 mm");
   this->Data->projector = std::move(projector);
   this->Data->settings = settings;

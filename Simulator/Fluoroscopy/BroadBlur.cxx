@@ -1,6 +1,7 @@
 #include "BroadBlur.h"
 
 #include "DetectorKernels.h"
+#include "KernelChoice.h"
 
 #include <algorithm>
 #include <cmath>
@@ -86,7 +87,7 @@ void BlurMirroredRow(const float* in, int width, const std::vector<float>& half,
     middle[-r] = in[Mirrored(-r, width)];
     middle[width - 1 + r] = in[Mirrored(width - 1 + r, width)];
   }
-  DetectorLoops().blurAlong(middle, half.data(), radius, width, result);
+  DetectorKernelChoice().Get().blurAlong(middle, half.data(), radius, width, result);
 }
 
 void PointToMirroredRows(
@@ -121,7 +122,7 @@ void BroadBlur::Blur(const float* image)
   std::fill(this->Cells.begin(), this->Cells.end(), 0.0F);
   for (int row = 0; row < this->Rows; ++row)
   {
-    DetectorLoops().addCells(image + static_cast<std::size_t>(row) * this->Columns,
+    DetectorKernelChoice().Get().addCells(image + static_cast<std::size_t>(row) * this->Columns,
       this->CellColumns, share, columns,
       this->Cells.data() + static_cast<std::size_t>(row / this->CellRows) * columns);
   }
@@ -136,7 +137,7 @@ void BroadBlur::Blur(const float* image)
   for (int row = 0; row < rows; ++row)
   {
     PointToMirroredRows(this->Scratch.data(), columns, rows, row, around);
-    DetectorLoops().blurAcross(around.data(), this->Across.data(), radius, columns,
+    DetectorKernelChoice().Get().blurAcross(around.data(), this->Across.data(), radius, columns,
       this->Cells.data() + static_cast<std::size_t>(row) * columns);
   }
 }

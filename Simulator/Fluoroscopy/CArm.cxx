@@ -1,15 +1,15 @@
 #include "CArm.h"
 
-#include "RequireSetting.h"
+#include "Require.h"
 
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 namespace coronary
 {
 namespace
 {
+constexpr RequireOf RequireSetting{ "C-arm" };
+
 constexpr double Pi = 3.14159265358979323846;
 }
 
@@ -31,26 +31,23 @@ CArmGeometry::CArmGeometry(const CArmPose& pose, const DetectorFormat& format)
   , Format_(format)
 {
   // What is not finite fails every comparison.
+  RequireSetting(std::abs(pose.primary) <= Pi, "primary angle", pose.primary, "within -pi to pi");
   RequireSetting(
-    "C-arm", std::abs(pose.primary) <= Pi, "primary angle", pose.primary, "within -pi to pi");
-  RequireSetting("C-arm", std::abs(pose.secondary) <= Pi / 2, "secondary angle", pose.secondary,
-    "within -pi/2 to pi/2");
-  RequireSetting("C-arm", pose.sourceToIsocentre >= 100.0 && pose.sourceToIsocentre <= 5000.0,
+    std::abs(pose.secondary) <= Pi / 2, "secondary angle", pose.secondary, "within -pi/2 to pi/2");
+  RequireSetting(pose.sourceToIsocentre >= 100.0 && pose.sourceToIsocentre <= 5000.0,
     "source to isocentre", pose.sourceToIsocentre, "within 100 to 5000 mm");
-  RequireSetting("C-arm",
-    pose.sourceToDetector > pose.sourceToIsocentre && pose.sourceToDetector <= 10000.0,
+  RequireSetting(pose.sourceToDetector > pose.sourceToIsocentre && pose.sourceToDetector <= 10000.0,
     "source to detector", pose.sourceToDetector,
     "more than source to isocentre, and at most 10000 mm");
   RequireSetting(
-    "C-arm", pose.isocentre.norm() < 1e6, "isocentre", pose.isocentre.norm(), "near the patient");
+    pose.isocentre.norm() < 1e6, "isocentre", pose.isocentre.norm(), "near the patient");
   RequireSetting(
-    "C-arm", format.columns >= 1 && format.columns <= 8192, "columns", format.columns, "1 to 8192");
+    format.columns >= 1 && format.columns <= 8192, "columns", format.columns, "1 to 8192");
+  RequireSetting(format.rows >= 1 && format.rows <= 8192, "rows", format.rows, "1 to 8192");
   RequireSetting(
-    "C-arm", format.rows >= 1 && format.rows <= 8192, "rows", format.rows, "1 to 8192");
+    format.width > 0.0 && format.width <= 2000.0, "width", format.width, "up to 2000 mm");
   RequireSetting(
-    "C-arm", format.width > 0.0 && format.width <= 2000.0, "width", format.width, "up to 2000 mm");
-  RequireSetting("C-arm", format.height > 0.0 && format.height <= 2000.0, "height", format.height,
-    "up to 2000 mm");
+    format.height > 0.0 && format.height <= 2000.0, "height", format.height, "up to 2000 mm");
 
   const double sinA = std::sin(pose.primary);
   const double cosA = std::cos(pose.primary);

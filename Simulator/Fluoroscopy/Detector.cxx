@@ -1,14 +1,13 @@
 #include "Detector.h"
 
-#include "RequireSetting.h"
-
 #include "CounterRandom.h"
 #include "DetectorKernels.h"
 #include "FastMath.h"
+#include "KernelChoice.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
@@ -18,6 +17,8 @@ namespace coronary
 {
 namespace
 {
+constexpr RequireOf RequireSetting{ "detector" };
+
 std::vector<float> OpenShares(int count, double before, double after, double transmission)
 {
   std::vector<float> shares(static_cast<std::size_t>(count));
@@ -183,8 +184,6 @@ inline float PhotonsOf(const NoiseTables& tables, float mean, std::uint64_t bits
                     : mean + fewOrDeviation * tables.normal(bits);
 }
 
-std::atomic<bool> OnlyBaseline{ false };
-
 void RequireSameSize(const LineIntegrals& first, const LineIntegrals* other)
 {
   if (other &&
@@ -210,28 +209,21 @@ void RequireImage(const LineIntegrals& image)
 }
 }
 
-const DetectorKernels& DetectorLoops()
+KernelChoice<DetectorKernels>& DetectorKernelChoice()
 {
-#ifdef DYNAMICCORONARY_WIDE_KERNELS
-  static const bool wide = __builtin_cpu_supports("avx2") != 0;
-  if (wide && !OnlyBaseline)
-  {
-    return DetectorKernelsAvx2;
-  }
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<DetectorKernels> choice(DetectorKernelsBaseline, &DetectorKernelsAvx2);
+#else
+  static KernelChoice<DetectorKernels> choice(DetectorKernelsBaseline);
 #endif
-  return DetectorKernelsBaseline;
-}
-
-void UseBaselineDetectorLoops(bool baseline)
-{
-  OnlyBaseline = baseline;
+  return choice;
 }
 
 float PoissonPhotons(float mean, std::uint64_t bits)
 {
   std::int32_t table = 0;
   float fewOrDeviation = 0.0F;
-  DetectorLoops().photons(&mean, &bits, 1, &table, &fewOrDeviation);
+  DetectorKernelChoice().Get().photons(&mean, &bits, 1, &table, &fewOrDeviation);
   return PhotonsOf(Tables(), mean, bits, table, fewOrDeviation);
 }
 
@@ -248,27 +240,23 @@ float FastLog(float x)
 void DetectorSettings::Validate() const
 {
   // What is not finite fails every comparison.
-  RequireSetting("detector", this->glareFraction >= 0.0 && this->glareFraction <= 0.5,
-    "share of glare", this->glareFraction, "0 to 0.5");
-  RequireSetting("detector", this->glareSigma >= 4.0 && this->glareSigma <= 200.0, "width of glare",
+  RequireSetting(this->glareFraction >= 0.0 && this->glareFraction <= 0.5, "share of glare",
+    this->glareFraction, "0 to 0.5");
+  RequireSetting(this->glareSigma >= 4.0 && this->glareSigma <= 200.0, "width of glare",
     this->glareSigma, "4 to 200 pixels");
-  RequireSetting("detector", this->blurSigma >= 0.0 && this->blurSigma <= 3.0, "blur",
-    this->blurSigma, "0 to 3 pixels");
-  RequireSetting("detector", this->fluoroscopyLag >= 0.0 && this->fluoroscopyLag <= 0.95,
-    "lag in fluoroscopy", this->fluoroscopyLag, "0 to 0.95");
-  RequireSetting("detector", this->cineLag >= 0.0 && this->cineLag <= 0.95, "lag in cine",
-    this->cineLag, "0 to 0.95");
+  RequireSetting(
+    this->blurSigma >= 0.0 && this->blurSigma <= 3.0, "blur", this->blurSigma, "0 to 3 pixels");
+  RequireSetting(this->fluoroscopyLag >= 0.0 && this->fluoroscopyLag <= 0.95, "lag in fluoroscopy",
+    this->fluoroscopyLag, "0 to 0.95");
+  RequireSetting(
+    this->cineLag >= 0.0 && this->cineLag <= 0.95, "lag in cine", this->cineLag, "0 to 0.95");
   const auto shutter = [](const char* name, double value)
-  {
-    RequireSetting(
-      "detector", value >= 0.0 && value <= 0.45, name, value, "0 to 0.45 of the image");
-  };
+  { RequireSetting(value >= 0.0 && value <= 0.45, name, value, "0 to 0.45 of the image"); };
   shutter("left shutter", this->shutters.left);
   shutter("right shutter", this->shutters.right);
   shutter("top shutter", this->shutters.top);
   shutter("bottom shutter", this->shutters.bottom);
-  RequireSetting("detector",
-    this->shutters.transmission >= 0.0 && this->shutters.transmission <= 1.0,
+  RequireSetting(this->shutters.transmission >= 0.0 && this->shutters.transmission <= 1.0,
     "transmission of the shutters", this->shutters.transmission, "0 to 1");
 }
 
@@ -321,9 +309,8 @@ const std::vector<float>& Detector::Expose(const LineIntegrals& first, const Lin
   RequireImage(first);
   RequireSameSize(first, second);
   RequireSameSize(first, third);
-  RequireSetting(
-    "detector", photons > 0.0 && photons <= 1e7, "photons a pixel", photons, "above 0, to 1e7");
-  RequireSetting("detector", lag >= 0.0 && lag < 1.0, "lag", lag, "0 to below 1");
+  RequireSetting(photons > 0.0 && photons <= 1e7, "photons a pixel", photons, "above 0, to 1e7");
+  RequireSetting(lag >= 0.0 && lag < 1.0, "lag", lag, "0 to below 1");
   if (first.columns != this->Columns_ || first.rows != this->Rows_)
   {
     this->Resize(first.columns, first.rows);
@@ -347,7 +334,7 @@ const std::vector<float>& Detector::Expose(const LineIntegrals& first, const Lin
 void Detector::Transmit(
   const LineIntegrals& first, const LineIntegrals* second, const LineIntegrals* third)
 {
-  const DetectorKernels& loops = DetectorLoops();
+  const DetectorKernels& loops = DetectorKernelChoice().Get();
   const auto width = static_cast<std::size_t>(this->Columns_);
   for (std::size_t row = 0; row < static_cast<std::size_t>(this->Rows_); ++row)
   {
@@ -367,8 +354,8 @@ void Detector::DetectRow(int row, float photons, std::uint64_t key)
     this->Veil.Row(row, this->Scratch.data());
   }
   float* detected = this->Transmission.data() + begin;
-  DetectorLoops().mix(detected, this->Scratch.data(), photons * (1.0F - glare), photons * glare,
-    this->Columns_, detected);
+  DetectorKernelChoice().Get().mix(detected, this->Scratch.data(), photons * (1.0F - glare),
+    photons * glare, this->Columns_, detected);
   if (this->Settings_.noise)
   {
     this->AddNoise(detected, key + begin);
@@ -386,7 +373,7 @@ void Detector::AddNoise(float* row, std::uint64_t first)
   {
     this->Bits[i] = MixBits(first + i);
   }
-  DetectorLoops().photons(
+  DetectorKernelChoice().Get().photons(
     row, this->Bits.data(), this->Columns_, this->TableOf.data(), this->Scratch.data());
   for (std::size_t i = 0; i < width; ++i)
   {
@@ -396,7 +383,7 @@ void Detector::AddNoise(float* row, std::uint64_t first)
 
 void Detector::BlurAcrossRows(float lag)
 {
-  const DetectorKernels& loops = DetectorLoops();
+  const DetectorKernels& loops = DetectorKernelChoice().Get();
   const int radius = static_cast<int>(this->BlurKernel.size()) - 1;
   std::vector<const float*> around(2 * this->BlurKernel.size() - 1);
   for (int row = 0; row < this->Rows_; ++row)

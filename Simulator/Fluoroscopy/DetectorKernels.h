@@ -6,6 +6,9 @@
 
 namespace coronary
 {
+template <typename Kernels>
+class KernelChoice;
+
 /// Tables of Poisson's distribution: for means 0, 1 / PoissonTablesPerUnit, ... below LargestTabledMean.
 constexpr float LargestTabledMean = 32.0F;
 constexpr float PoissonTablesPerUnit = 4.0F;
@@ -39,11 +42,8 @@ struct DetectorKernels
     const float* values, float scale, float offset, std::int64_t count, std::uint8_t* grey);
 };
 
-/// The widest that this processor runs.
-const DetectorKernels& DetectorLoops();
-
-/// For tests: only the baseline's, in the whole process.
-void UseBaselineDetectorLoops(bool baseline);
+/// Which set runs, in the whole process.
+KernelChoice<DetectorKernels>& DetectorKernelChoice();
 
 extern const DetectorKernels DetectorKernelsBaseline;
 extern const DetectorKernels DetectorKernelsAvx2;

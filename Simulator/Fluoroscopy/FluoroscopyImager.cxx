@@ -1,8 +1,8 @@
 #include "FluoroscopyImager.h"
 
-#include "RequireSetting.h"
-
 #include "DetectorKernels.h"
+#include "KernelChoice.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +13,8 @@ namespace coronary
 {
 namespace
 {
+constexpr RequireOf RequireSetting{ "images" };
+
 constexpr float LeastSignal = 0.25F; ///< photons: what is shown as the darkest
 constexpr double HarmonisedWidths =
   12.0; ///< standard deviations of what is broad, in an image's width
@@ -49,22 +51,20 @@ std::size_t Bytes(const GreyImage& image)
 void ImagerSettings::Validate() const
 {
   this->detector.Validate();
-  RequireSetting(
-    "images", this->window >= 0.5 && this->window <= 20.0, "window", this->window, "0.5 to 20");
-  RequireSetting(
-    "images", this->level >= -10.0 && this->level <= 10.0, "level", this->level, "-10 to 10");
-  RequireSetting("images", this->harmonisation >= 0.0 && this->harmonisation <= 0.9,
-    "harmonisation", this->harmonisation, "0 to 0.9");
-  RequireSetting("images", this->exposureSeconds >= 0.01 && this->exposureSeconds <= 10.0,
+  RequireSetting(this->window >= 0.5 && this->window <= 20.0, "window", this->window, "0.5 to 20");
+  RequireSetting(this->level >= -10.0 && this->level <= 10.0, "level", this->level, "-10 to 10");
+  RequireSetting(this->harmonisation >= 0.0 && this->harmonisation <= 0.9, "harmonisation",
+    this->harmonisation, "0 to 0.9");
+  RequireSetting(this->exposureSeconds >= 0.01 && this->exposureSeconds <= 10.0,
     "time constant of the brightness", this->exposureSeconds, "0.01 to 10 s");
-  RequireSetting("images", this->subtractionWindow >= 0.1 && this->subtractionWindow <= 10.0,
+  RequireSetting(this->subtractionWindow >= 0.1 && this->subtractionWindow <= 10.0,
     "window of subtraction", this->subtractionWindow, "0.1 to 10");
-  RequireSetting("images", this->roadmapOpacity >= 0.0 && this->roadmapOpacity <= 1.0,
+  RequireSetting(this->roadmapOpacity >= 0.0 && this->roadmapOpacity <= 1.0,
     "opacity of the roadmap", this->roadmapOpacity, "0 to 1");
-  RequireSetting("images", this->roadmapThreshold >= 0.0 && this->roadmapThreshold <= 5.0,
+  RequireSetting(this->roadmapThreshold >= 0.0 && this->roadmapThreshold <= 5.0,
     "threshold of the roadmap", this->roadmapThreshold, "0 to 5");
-  RequireSetting("images", this->maskFrames >= 1 && this->maskFrames <= 64,
-    "number of frames of a mask", this->maskFrames, "1 to 64");
+  RequireSetting(this->maskFrames >= 1 && this->maskFrames <= 64, "number of frames of a mask",
+    this->maskFrames, "1 to 64");
 }
 
 FluoroscopyImager::FluoroscopyImager(const ImagerSettings& settings, std::uint64_t seed)
@@ -111,7 +111,7 @@ const GreyImage& FluoroscopyImager::Expose(const LineIntegrals& background,
   const std::vector<float>& signal = this->Detector_.Expose(background, &instruments, &contrast,
     exposure.photons, static_cast<std::uint64_t>(exposure.frame), lag);
   this->FitTo(background.columns, background.rows);
-  DetectorLoops().logarithm(signal.data(), LeastSignal,
+  DetectorKernelChoice().Get().logarithm(signal.data(), LeastSignal,
     std::log(static_cast<float>(exposure.photons)), static_cast<std::int64_t>(signal.size()),
     this->LogSignal.data());
   this->FollowBrightness(background, exposure);
@@ -223,7 +223,7 @@ void FluoroscopyImager::ShowPlain()
 {
   const double scale = 255.0 / this->Settings_.window;
   const double offset = 127.5 + scale * (this->Settings_.level - this->DisplayLevel_);
-  DetectorLoops().grey(this->LogSignal.data(), static_cast<float>(scale),
+  DetectorKernelChoice().Get().grey(this->LogSignal.data(), static_cast<float>(scale),
     static_cast<float>(offset), static_cast<std::int64_t>(this->LogSignal.size()),
     this->Shown_.values.data());
 }
@@ -252,7 +252,7 @@ void FluoroscopyImager::ShowSubtracted()
       this->GatherRoadmap();
     }
   }
-  DetectorLoops().grey(difference.data(), scale, 127.5F,
+  DetectorKernelChoice().Get().grey(difference.data(), scale, 127.5F,
     static_cast<std::int64_t>(difference.size()), this->Shown_.values.data());
 }
 

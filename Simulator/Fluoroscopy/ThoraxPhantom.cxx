@@ -1,19 +1,19 @@
 #include "ThoraxPhantom.h"
 
-#include "RequireSetting.h"
-
 #include "CounterRandom.h"
+#include "Require.h"
 #include "ThoraxAnatomy.h"
+#include "VoxelCell.h"
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 namespace coronary
 {
 namespace
 {
+constexpr RequireOf RequireSetting{ "thorax" };
+
 constexpr double Below = -208.0; ///< world z of the volume's ends, mm
 constexpr double Above = 148.0;
 constexpr int SlabThickness = 4; ///< slices that are made together
@@ -51,17 +51,15 @@ public:
     const Vector3 floor = place.array().floor();
     const Eigen::Vector3f f = (place - floor).cast<float>();
     const Eigen::Vector3i i = floor.cast<int>();
-    const auto at = [&](int x, int y, int z)
+    std::array<float, 8> cell{};
+    for (int corner = 0; corner < 8; ++corner)
     {
-      return this->Values[(static_cast<std::size_t>((i.z() + z) & Mask) * Side +
-                            static_cast<std::size_t>((i.y() + y) & Mask)) *
+      cell[corner] = this->Values[(static_cast<std::size_t>((i.z() + (corner >> 2)) & Mask) * Side +
+                                    static_cast<std::size_t>((i.y() + (corner >> 1 & 1)) & Mask)) *
           Side +
-        static_cast<std::size_t>((i.x() + x) & Mask)];
-    };
-    const auto along = [&](int y, int z)
-    { return at(0, y, z) + f.x() * (at(1, y, z) - at(0, y, z)); };
-    const auto plane = [&](int z) { return along(0, z) + f.y() * (along(1, z) - along(0, z)); };
-    return plane(0) + f.z() * (plane(1) - plane(0));
+        static_cast<std::size_t>((i.x() + (corner & 1)) & Mask)];
+    }
+    return Trilinear<float>(cell.data(), { 1, 2, 4 }, { f.x(), f.y(), f.z() });
   }
 
 private:
@@ -359,11 +357,11 @@ private:
 
 void ThoraxSettings::Validate() const
 {
-  RequireSetting("thorax", this->spacing >= 0.8 && this->spacing <= 6.0, "spacing", this->spacing,
-    "0.8 to 6 mm");
   RequireSetting(
-    "thorax", this->width >= 260.0 && this->width <= 420.0, "width", this->width, "260 to 420 mm");
-  RequireSetting("thorax", this->fat >= 4.0 && this->fat <= 40.0, "fat", this->fat, "4 to 40 mm");
+    this->spacing >= 0.8 && this->spacing <= 6.0, "spacing", this->spacing, "0.8 to 6 mm");
+  RequireSetting(
+    this->width >= 260.0 && this->width <= 420.0, "width", this->width, "260 to 420 mm");
+  RequireSetting(this->fat >= 4.0 && this->fat <= 40.0, "fat", this->fat, "4 to 40 mm");
 }
 
 HounsfieldVolume MakeThoraxPhantom(const ThoraxSettings& settings, const ProgressCallback& progress)

@@ -1,5 +1,6 @@
 #include "TubeProjection.h"
 
+#include "KernelChoice.h"
 #include "XRayKernels.h"
 
 #include <algorithm>
@@ -264,7 +265,7 @@ void AddTubes(const std::vector<Vector3>& points, const std::vector<TubeSection>
   const CArmGeometry& geometry, LineIntegrals& image)
 {
   const Beam beam(geometry);
-  PixelCollector collector(BestXRayKernels(), image);
+  PixelCollector collector(XRayKernelChoice().Get(), image);
   for (const Part& part : PartsOf(points, sections))
   {
     const TubeSection& section = *part.section;

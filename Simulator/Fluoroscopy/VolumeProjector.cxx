@@ -1,5 +1,6 @@
 #include "VolumeProjector.h"
 
+#include "KernelChoice.h"
 #include "XRayKernels.h"
 
 #include <Eigen/LU>
@@ -475,8 +476,7 @@ VolumeProjector::VolumeProjector(const ScalarImage& volume,
   data->spacing = grid.spacing;
   data->origin = grid.IndexToWorld(grid.extent[0] - 1, grid.extent[2] - 1, grid.extent[4] - 1);
   data->toIndex = grid.spacing.cwiseInverse().asDiagonal() * grid.direction.transpose();
-  data->kernels = settings.instructions == ProjectorInstructions::Baseline ? &XRayKernelsBaseline
-                                                                           : &BestXRayKernels();
+  data->kernels = &XRayKernelChoice().Get();
   this->Data = std::move(data);
 }
 

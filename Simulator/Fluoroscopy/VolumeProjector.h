@@ -25,19 +25,10 @@ struct PixelRectangle
   int rows = 0;
 };
 
-enum class ProjectorInstructions
-{
-  Automatic, ///< the widest of this processor
-  Baseline,
-  Avx2
-};
-
 struct VolumeProjectorSettings
 {
   /// A block of 8^3 voxels that attenuates nowhere more than this is passed over, 1/mm. 0 loses nothing.
   double negligible = 0.0;
-  /// Both give the same bits; Avx2 where it is missing is Baseline.
-  ProjectorInstructions instructions = ProjectorInstructions::Automatic;
 };
 
 /**

@@ -1,14 +1,15 @@
+#include "KernelChoice.h"
 #include "XRayKernels.h"
 
 namespace coronary
 {
-const XRayKernels& BestXRayKernels()
+KernelChoice<XRayKernels>& XRayKernelChoice()
 {
-#ifdef DYNAMICCORONARY_WIDE_KERNELS
-  static const bool wide = __builtin_cpu_supports("avx2") != 0;
-  return wide ? XRayKernelsAvx2 : XRayKernelsBaseline;
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<XRayKernels> choice(XRayKernelsBaseline, &XRayKernelsAvx2);
 #else
-  return XRayKernelsBaseline;
+  static KernelChoice<XRayKernels> choice(XRayKernelsBaseline);
 #endif
+  return choice;
 }
 }

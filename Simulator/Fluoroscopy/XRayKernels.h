@@ -7,6 +7,9 @@
 
 namespace coronary
 {
+template <typename Kernels>
+class KernelChoice;
+
 constexpr int XRayLanes = 8;
 
 /// Slices [first, last).
@@ -85,11 +88,11 @@ struct XRayKernels
   void (*addTube)(const TubePart& part, const TubePixels& list, float* pixels);
 };
 
+/// Which set runs, in the whole process.
+KernelChoice<XRayKernels>& XRayKernelChoice();
+
 extern const XRayKernels XRayKernelsBaseline;
 extern const XRayKernels XRayKernelsAvx2;
-
-/// The widest of this processor.
-const XRayKernels& BestXRayKernels();
 }
 
 #endif

@@ -2,6 +2,8 @@
 
 #include "CatheterPath.h"
 #include "CosseratRod.h"
+#include "CyclicTime.h"
+#include "DisjointSets.h"
 #include "Fnv1a.h"
 #include "VesselWall.h"
 #include "WallMotion.h"
@@ -392,34 +394,22 @@ WallTopology Intervention::Internals::EngagedTree()
 {
   // What is connected with the place where the catheter's tip is.
   const WallTopology& topology = this->Motion->Topology();
-  std::vector<std::int64_t> root(topology.points);
-  for (std::size_t i = 0; i < root.size(); ++i)
-  {
-    root[i] = static_cast<std::int64_t>(i);
-  }
-  const auto find = [&root](std::int64_t i)
-  {
-    while (root[i] != i)
-    {
-      root[i] = root[root[i]];
-      i = root[i];
-    }
-    return i;
-  };
+  const auto points = static_cast<std::int64_t>(topology.points);
+  DisjointSets trees(topology.points);
   for (const Triangle& corners : topology.triangles)
   {
-    root[find(corners[1])] = find(corners[0]);
-    root[find(corners[2])] = find(corners[0]);
+    trees.Join(corners[0], corners[1]);
+    trees.Join(corners[0], corners[2]);
   }
-  const std::int64_t wanted = find(topology.triangles[this->InletTriangle][0]);
-  std::vector<std::int64_t> place(root.size(), -1);
+  const std::int64_t wanted = trees.Find(topology.triangles[this->InletTriangle][0]);
+  std::vector<std::int64_t> place(topology.points, -1);
   WallTopology tree;
-  for (std::size_t i = 0; i < root.size(); ++i)
+  for (std::int64_t i = 0; i < points; ++i)
   {
-    if (find(static_cast<std::int64_t>(i)) == wanted)
+    if (trees.Find(i) == wanted)
     {
       place[i] = tree.points++;
-      this->TreePoints.push_back(static_cast<std::int64_t>(i));
+      this->TreePoints.push_back(i);
       if (!topology.group.empty())
       {
         tree.group.push_back(topology.group[i]);
@@ -645,7 +635,7 @@ void Intervention::Internals::Measure()
   const RodStep& step = this->Rod->LastStep();
   TickReport& report = this->Report;
   report.tick = this->Tick;
-  report.phase = this->Phase - std::floor(this->Phase);
+  report.phase = Modulo(this->Phase);
   report.inserted = std::max(0.0, this->Fed - this->CatheterTip);
   report.catheterTip = this->CatheterTip;
   report.jointGap = step.largestGap;
@@ -719,7 +709,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Wound = catheter.friction * catheter.TurnedAngle(catheter.length);
   data.Step = 1.0 / settings.tickRate;
   data.FrameSeconds = data.Step * settings.ticksPerFrame;
-  data.Phase = settings.startPhase - std::floor(settings.startPhase);
+  data.Phase = Modulo(settings.startPhase);
   data.MakeSegments();
   data.Spring =
     AlongWire(wire, 0.5 * wire.length, [](const WireSection& s) { return s.torsionalStiffness; }) /
@@ -760,7 +750,7 @@ const TickReport& Intervention::Step(const DriveInput& input)
   data.Wall->SetTime(inFrame);
   data.Path->SetTime(inFrame);
   data.Phase += data.Step * data.Settings.heartRate / 60.0;
-  data.Phase -= std::floor(data.Phase);
+  data.Phase = Modulo(data.Phase);
   data.Drive(input);
   data.Feed();
   const RodStep& step = data.Rod->Step(data.Step, &data);

@@ -876,11 +876,6 @@ Vector3 VesselWall::Velocity(const WallPlace& place) const
   return data.VelocityAt(data.PlaceOf[place.triangle], place.weights[1], place.weights[2]);
 }
 
-std::int64_t VesselWall::NumberOfPatches() const
-{
-  return static_cast<std::int64_t>(this->Data->Near.size());
-}
-
 std::uint64_t VesselWall::NumberOfSearches() const
 {
   return this->Data->Searches;

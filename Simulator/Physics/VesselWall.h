@@ -137,8 +137,6 @@ public:
   /// mm/s of the wall's material.
   Vector3 Velocity(const WallPlace& place) const;
 
-  std::int64_t NumberOfPatches() const;
-
   /// How often triangles had to be looked up for a sample, since the beginning: for measurements.
   std::uint64_t NumberOfSearches() const;
 

@@ -1,5 +1,7 @@
 #include "ContractionMotion.h"
 
+#include "CyclicTime.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -56,7 +58,7 @@ void ContractionSettings::Validate() const
 
 double ContractionCurve(double phase, double systole)
 {
-  const double t = phase - std::floor(phase);
+  const double t = Modulo(phase);
   const double filled = systole + EarlyFilling;
   return Step(t, Onset, systole) - (1.0 - Diastasis) * Step(t, systole, filled) -
     Diastasis * Step(t, AtrialStart, AtrialEnd);

@@ -261,11 +261,6 @@ const SessionReport& TrainingSession::Report() const
   return this->Data->Report;
 }
 
-const Exposure& TrainingSession::LastExposure() const
-{
-  return this->Data->Clock.Last();
-}
-
 const SessionMetrics& TrainingSession::Metrics() const
 {
   return this->Data->Metrics;

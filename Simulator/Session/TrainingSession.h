@@ -109,7 +109,6 @@ public:
   bool Apply(const RecordedEvent& event);
 
   const SessionReport& Report() const;
-  const coronary::Exposure& LastExposure() const; ///< meaningful once a frame was exposed
   const SessionMetrics& Metrics() const;
   const Intervention& Instruments() const;
   const ContrastModel& Contrast() const;

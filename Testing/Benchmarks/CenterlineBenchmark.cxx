@@ -1,5 +1,6 @@
 // Centerlines beside ITK's fast marching in the same run: time and memory. Tables in Markdown.
 
+#include "BenchmarkTables.h"
 #include "CenterlineExtraction.h"
 #include "CoronaryOstia.h"
 #include "CoronaryPhantom.h"
@@ -19,10 +20,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <exception>
-#include <fstream>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -46,60 +44,6 @@ constexpr double Rest = 0.75;
 
 const std::vector<std::string> AllTables = { "marching", "tree", "surface" };
 
-struct Options
-{
-  std::vector<std::string> tables = AllTables;
-  int size = 256;
-  int repeats = 3;
-  int threads = 2;
-  std::uint64_t seed = 1;
-  bool withoutItk = false;
-  bool strict = false;
-
-  bool Has(const char* table) const
-  {
-    return std::find(this->tables.begin(), this->tables.end(), table) != this->tables.end();
-  }
-};
-
-struct Verdicts
-{
-  bool disagreement = false;
-  bool missedTarget = false;
-};
-
-std::string Spread(const std::vector<double>& values)
-{
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  std::array<char, 100> text;
-  std::snprintf(text.data(), text.size(), "%.2f (%.2f to %.2f)", Median(values), *low, *high);
-  return text.data();
-}
-
-double PeakBytes(const std::vector<Measurement>& runs)
-{
-  const std::vector<double> growth =
-    Each(runs, [](const Measurement& m) { return static_cast<double>(m.peakGrowth); });
-  return *std::max_element(growth.begin(), growth.end());
-}
-
-template <typename Work>
-std::vector<Measurement> Repeat(const Options& options, const Work& work)
-{
-  std::vector<Measurement> runs;
-  runs.reserve(static_cast<std::size_t>(options.repeats));
-  for (int run = 0; run < options.repeats; ++run)
-  {
-    runs.push_back(work());
-  }
-  return runs;
-}
-
-const char* Verdict(bool met)
-{
-  return met ? "met" : "**MISSED**";
-}
-
 /// A phase of the phantom around the heart's middle, with what comes before the centerlines.
 struct Phase
 {
@@ -119,7 +63,7 @@ struct Phase
   SharedArray<int> count;
 };
 
-std::unique_ptr<Phase> MakePhase(const Options& options)
+std::unique_ptr<Phase> MakePhase(const BenchmarkOptions& options)
 {
   const int n = options.size;
   auto phase = std::make_unique<Phase>(static_cast<std::size_t>(n) * n * n);
@@ -178,7 +122,7 @@ std::vector<Vector3> SeedsOf(const Phase& phase)
 }
 
 /// Both march over every voxel, in the same speed, from one ostium.
-void TableMarching(const Options& options, Verdicts& verdicts)
+void TableMarching(const BenchmarkOptions& options, Verdicts& verdicts)
 {
   const std::unique_ptr<Phase> phase = MakePhase(options);
   const std::size_t voxels = phase->values.size();
@@ -245,7 +189,7 @@ void TableMarching(const Options& options, Verdicts& verdicts)
   const auto row = [&](const char* name, const std::vector<Measurement>& runs)
   {
     std::printf("| %s | %s | %s | %.1f |\n", name, Spread(Each(runs, Wall)).c_str(),
-      Spread(Each(runs, Processor)).c_str(), PeakBytes(runs) / static_cast<double>(voxels));
+      Spread(Each(runs, Processor)).c_str(), PeakGrowth(runs) / static_cast<double>(voxels));
     std::fflush(stdout);
   };
   const std::vector<Measurement> first = Repeat(options, [&] { return run(false, false); });
@@ -258,7 +202,7 @@ void TableMarching(const Options& options, Verdicts& verdicts)
   std::vector<Measurement> itk;
 #if defined(DYNAMICCORONARY_WITH_ITK)
   const SharedArray<float> theirs(voxels);
-  if (!options.withoutItk)
+  if (!options.withoutPeer)
   {
     itk = Repeat(options,
       [&]
@@ -278,7 +222,7 @@ void TableMarching(const Options& options, Verdicts& verdicts)
   }
 #endif
   std::printf("\n| | measured | target | |\n|---|---|---|---|\n");
-  const double bytes = PeakBytes(second) / static_cast<double>(voxels);
+  const double bytes = PeakGrowth(second) / static_cast<double>(voxels);
   const bool small = bytes <= MostBytesPerVoxel;
   verdicts.missedTarget |= !small;
   std::printf("| bytes a voxel, second order | %.1f | <= %.0f | %s |\n", bytes, MostBytesPerVoxel,
@@ -311,7 +255,7 @@ void TableMarching(const Options& options, Verdicts& verdicts)
   }
 }
 
-void TableTree(const Options& options, Verdicts& verdicts)
+void TableTree(const BenchmarkOptions& options, Verdicts& verdicts)
 {
   const std::unique_ptr<Phase> phase = MakePhase(options);
   std::printf("\n### Both trees from %d x %d x %d voxels, vesselness and mask given\n\n| | wall "
@@ -352,7 +296,7 @@ void TableTree(const Options& options, Verdicts& verdicts)
       within ? "in the mask" : "wherever there is vesselness", Spread(Each(runs, Wall)).c_str(),
       within ? Verdict(met) : "", Spread(Each(runs, Processor)).c_str(),
       static_cast<long long>(seen[0]), static_cast<long long>(seen[1]),
-      PeakBytes(runs) / static_cast<double>(phase->values.size()));
+      PeakGrowth(runs) / static_cast<double>(phase->values.size()));
     std::fflush(stdout);
   }
   std::printf("\nTarget: at most %.0f s in the mask.\n", MostTreeSeconds);
@@ -406,7 +350,7 @@ void MakeTube(int triangles, std::vector<Vector3>& points, std::vector<Triangle>
   }
 }
 
-void TableSurface(const Options& options, Verdicts& verdicts)
+void TableSurface(const BenchmarkOptions& options, Verdicts& verdicts)
 {
   std::vector<Vector3> points;
   std::vector<Triangle> faces;
@@ -449,15 +393,12 @@ void TableSurface(const Options& options, Verdicts& verdicts)
     Spread(Each(runs, Processor)).c_str(), seen[1], seen[0], whole ? "" : "**wrong**", truth);
 }
 
-int Run(const Options& options)
+int Run(const BenchmarkOptions& options)
 {
   Verdicts verdicts;
-  std::string load;
-  std::ifstream("/proc/loadavg") >> load;
-  std::printf("## Centerlines\n\n%d threads, load average %s at the start; phantom seed %llu; "
-              "medians (smallest to largest) of %d runs.\n",
-    options.threads, load.c_str(), static_cast<unsigned long long>(options.seed), options.repeats);
-  if (!HasItk || options.withoutItk)
+  std::printf("## Centerlines\n\n");
+  PrintMachine(options);
+  if (!HasItk || options.withoutPeer)
   {
     std::printf("The comparison with ITK is skipped: %s.\n",
       HasItk ? "as asked for" : "this program was built without ITK 5 (libinsighttoolkit5-dev)");
@@ -474,40 +415,19 @@ int Run(const Options& options)
   {
     TableSurface(options, verdicts);
   }
-  std::fflush(stdout);
-  if (verdicts.disagreement)
-  {
-    std::fprintf(stderr, "centerline-benchmark: the results disagree\n");
-    return 1;
-  }
-  if (verdicts.missedTarget && options.strict)
-  {
-    std::fprintf(stderr, "centerline-benchmark: a target of time or memory is missed\n");
-    return 1;
-  }
-  return 0;
+  return verdicts.ExitCode("centerline-benchmark", options.strict);
 }
 
 /// @return the exit code
 int Start(int argc, char** argv)
 {
-  Options options;
+  BenchmarkOptions options;
   CLI::App app("Time and memory of the centerlines, beside ITK's fast marching in the same run. "
                "Each measurement is a process of its own. Exit code 1 when results disagree.");
-  app.add_option("tables", options.tables, "Which tables (default: all)")
-    ->check(CLI::IsMember(AllTables));
   app.add_option("--size", options.size, "Voxels along each side of the same field of view")
     ->check(CLI::Range(64, 1024))
     ->capture_default_str();
-  app.add_option("--repeats", options.repeats, "Runs of each measurement")
-    ->check(CLI::Range(1, 1000))
-    ->capture_default_str();
-  app.add_option("--threads", options.threads, "Threads, where there are several")
-    ->check(CLI::Range(1, 1024))
-    ->capture_default_str();
-  app.add_option("--seed", options.seed, "Of the phantom")->capture_default_str();
-  app.add_flag("--without-itk", options.withoutItk, "Do not run ITK");
-  app.add_flag("--strict", options.strict, "Exit code 1 when a target of time or memory is missed");
+  options.AddTo(app, "itk", AllTables);
   CLI11_PARSE(app, argc, argv);
   return Run(options);
 }
@@ -515,17 +435,5 @@ int Start(int argc, char** argv)
 
 int main(int argc, char** argv)
 {
-  try
-  {
-    return Start(argc, argv);
-  }
-  catch (const std::exception& e)
-  {
-    std::fprintf(stderr, "centerline-benchmark: %s\n", e.what());
-  }
-  catch (...)
-  {
-    std::fputs("centerline-benchmark: unknown error\n", stderr);
-  }
-  return 1;
+  return coronary::RunBenchmark("centerline-benchmark", [&] { return Start(argc, argv); });
 }

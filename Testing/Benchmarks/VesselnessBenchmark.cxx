@@ -1,6 +1,8 @@
 // Our vesselness beside ITK's in the same run: time, memory, agreement. Tables in Markdown.
 
+#include "BenchmarkTables.h"
 #include "CoronaryPhantom.h"
+#include "KernelChoice.h"
 #include "MeasuredProcess.h"
 #include "MultiscaleVesselness.h"
 #include "ReferenceVesselness.h"
@@ -22,8 +24,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <exception>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -51,29 +51,10 @@ constexpr double LeastReferenceCorrelation = 0.9999;
 const std::vector<std::string> AllTables = { "itk", "clinical", "methods", "scales", "instructions",
   "agreement" };
 
-struct Options
+struct Options : BenchmarkOptions
 {
-  std::vector<std::string> tables = AllTables;
-  int size = 256;
   int agreementSize = 128;
   std::vector<int> clinicalSize = { 512, 512, 220 };
-  int repeats = 3;
-  int threads = 2;
-  std::uint64_t seed = 1;
-  bool withoutItk = false;
-  bool strict = false;
-
-  bool Has(const char* table) const
-  {
-    return std::find(this->tables.begin(), this->tables.end(), table) != this->tables.end();
-  }
-};
-
-/// What was missed, by severity.
-struct Verdicts
-{
-  bool disagreement = false;
-  bool missedTarget = false;
 };
 
 // ---------------------------------------------------------------------------------------------
@@ -157,7 +138,7 @@ struct Variant
   VesselnessSettings settings = Settings();
   bool scale = false;
   bool direction = false;
-  VesselnessInstructions instructions = VesselnessInstructions::Widest;
+  Instructions instructions = Instructions::Widest;
 };
 
 std::vector<float> RunOurs(const float* values, const TestImage& image, const Variant& variant)
@@ -183,7 +164,7 @@ Measurement MeasureOurs(const TestImage& image, const Variant& variant, int thre
     [&]
     {
       SetNumberOfThreads(threads);
-      SetVesselnessInstructions(variant.instructions);
+      VesselnessKernelChoice().Select(variant.instructions);
       input = ToFloat(image);
     },
     [&] { result = RunOurs(input.data(), image, variant); },
@@ -293,31 +274,10 @@ Measurement MeasureItk(const TestImage& image, const VesselnessSettings& setting
 // Statistics
 // ---------------------------------------------------------------------------------------------
 
-std::string Format(const char* format, double value)
-{
-  std::array<char, 64> text;
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
-
-/// Median (smallest to largest).
-std::string Spread(const std::vector<double>& values)
-{
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  std::string text = Format("%.2f", Median(values));
-  if (values.size() > 1)
-  {
-    text += " (" + Format("%.2f", *low) + " to " + Format("%.2f", *high) + ")";
-  }
-  return text;
-}
-
 /// Peak above the input, bytes a voxel; the largest of all runs.
 double BytesPerVoxel(const std::vector<Measurement>& runs, std::size_t voxels)
 {
-  const std::vector<double> growth =
-    Each(runs, [](const Measurement& m) { return static_cast<double>(m.peakGrowth); });
-  return *std::max_element(growth.begin(), growth.end()) / static_cast<double>(voxels);
+  return PeakGrowth(runs) / static_cast<double>(voxels);
 }
 
 struct Comparison
@@ -384,11 +344,6 @@ std::array<int, 3> BorderMargin(const VesselnessSettings& settings, const Vector
 // Tables
 // ---------------------------------------------------------------------------------------------
 
-const char* Verdict(bool met)
-{
-  return met ? "met" : "**missed**";
-}
-
 std::string SizeText(const Dimensions& n)
 {
   return std::to_string(n[0]) + "x" + std::to_string(n[1]) + "x" + std::to_string(n[2]);
@@ -397,26 +352,6 @@ std::string SizeText(const Dimensions& n)
 std::string ThreadsText(int threads)
 {
   return std::to_string(threads) + (threads == 1 ? " thread" : " threads");
-}
-
-void PrintMachine(const Options& options)
-{
-  std::string model = "unknown processor";
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);)
-  {
-    if (line.rfind("model name", 0) == 0)
-    {
-      model = line.substr(line.find(':') + 2);
-      break;
-    }
-  }
-  std::string load;
-  std::ifstream("/proc/loadavg") >> load;
-  std::printf("%s, %d cores, load average %s at the start; GCC %d.%d; phantom seed %llu; medians "
-              "(smallest to largest) of %d runs.\n",
-    model.c_str(), NumberOfThreads(), load.c_str(), __GNUC__, __GNUC_MINOR__,
-    static_cast<unsigned long long>(options.seed), options.repeats);
 }
 
 void TableItk(const Options& options, Verdicts& verdicts)
@@ -430,7 +365,7 @@ void TableItk(const Options& options, Verdicts& verdicts)
   std::vector<Measurement> ours;
   std::vector<Measurement> itk;
   std::vector<Measurement> itkFloat;
-  const SharedArray<float> oursResult(HasItk && !options.withoutItk ? voxels : 0);
+  const SharedArray<float> oursResult(HasItk && !options.withoutPeer ? voxels : 0);
   const SharedArray<float> itkResult(oursResult.size());
   for (int run = 0; run < options.repeats; ++run)
   {
@@ -438,7 +373,7 @@ void TableItk(const Options& options, Verdicts& verdicts)
     ours.push_back(MeasureFilter(*image, false, false, options.threads,
       oursResult.size() > 0 && run == 0 ? &oursResult : nullptr));
 #if defined(DYNAMICCORONARY_WITH_ITK)
-    if (!options.withoutItk)
+    if (!options.withoutPeer)
     {
       itk.push_back(MeasureItk(
         *image, variant.settings, true, options.threads, run == 0 ? &itkResult : nullptr));
@@ -528,12 +463,8 @@ void TableClinical(const Options& options, Verdicts& verdicts)
     { Row{ "float input, given c", false, false }, Row{ "short input, given c", true, false },
       Row{ "short input, c measured first", true, true } })
   {
-    std::vector<Measurement> runs;
-    runs.reserve(options.repeats);
-    for (int run = 0; run < options.repeats; ++run)
-    {
-      runs.push_back(MeasureFilter(*image, row.shortInput, row.automaticC, options.threads));
-    }
+    const std::vector<Measurement> runs = Repeat(options,
+      [&] { return MeasureFilter(*image, row.shortInput, row.automaticC, options.threads); });
     const std::vector<double> peaks =
       Each(runs, [](const Measurement& m) { return static_cast<double>(m.peak); });
     const double peak = *std::max_element(peaks.begin(), peaks.end());
@@ -594,13 +525,15 @@ void TableMethods(const Options& options)
     double bytes = 0.0;
     for (const int count : threads)
     {
-      std::vector<Measurement> runs;
-      for (int run = 0; run < options.repeats; ++run)
-      {
-        if (row.measureOnly)
+      const std::vector<Measurement> runs = Repeat(options,
+        [&]
         {
+          if (!row.measureOnly)
+          {
+            return MeasureOurs(*image, row.variant, count);
+          }
           std::vector<float> input;
-          runs.push_back(MeasureInChild(
+          return MeasureInChild(
             [&]
             {
               SetNumberOfThreads(count);
@@ -611,13 +544,8 @@ void TableMethods(const Options& options)
               const std::array<int, 6> extent = ExtentOf(n);
               MultiscaleVesselness(row.variant.settings, image->spacing, extent)
                 .Measure({ input.data(), extent }, extent, nullptr);
-            }));
-        }
-        else
-        {
-          runs.push_back(MeasureOurs(*image, row.variant, count));
-        }
-      }
+            });
+        });
       std::printf(" %s | %.2f |", Spread(Each(runs, Wall)).c_str(), Median(Each(runs, Processor)));
       bytes = BytesPerVoxel(runs, CountOf(n));
     }
@@ -637,12 +565,8 @@ void TableScales(const Options& options)
   {
     Variant variant;
     variant.settings.sigmas = { sigma };
-    std::vector<Measurement> runs;
-    runs.reserve(options.repeats);
-    for (int run = 0; run < options.repeats; ++run)
-    {
-      runs.push_back(MeasureOurs(*image, variant, options.threads));
-    }
+    const std::vector<Measurement> runs =
+      Repeat(options, [&] { return MeasureOurs(*image, variant, options.threads); });
     const int halo = MultiscaleVesselness(variant.settings, image->spacing, ExtentOf(n)).Halo()[0];
     std::printf("| %.1f | %d | %s | %s |\n", sigma, 2 * halo + 1, Spread(Each(runs, Wall)).c_str(),
       Spread(Each(runs, Processor)).c_str());
@@ -658,27 +582,22 @@ void TableInstructions(const Options& options)
     SizeText(n).c_str(), ThreadsText(options.threads).c_str());
   std::printf("| | wall time, s | processor time, s |\n|---|---|---|\n");
   for (const auto& [name, instructions] :
-    { std::pair("SSE2 or whatever the compiler's default is", VesselnessInstructions::Baseline),
-      std::pair("AVX2", VesselnessInstructions::Avx2),
-      std::pair("AVX-512", VesselnessInstructions::Avx512) })
+    { std::pair("SSE2 or whatever the compiler's default is", Instructions::Baseline),
+      std::pair("AVX2", Instructions::Avx2), std::pair("AVX-512", Instructions::Avx512) })
   {
-    if (!SetVesselnessInstructions(instructions))
+    if (!VesselnessKernelChoice().Select(instructions))
     {
       std::printf("| %s | not on this processor | |\n", name);
       continue;
     }
     Variant variant;
     variant.instructions = instructions;
-    std::vector<Measurement> runs;
-    runs.reserve(options.repeats);
-    for (int run = 0; run < options.repeats; ++run)
-    {
-      runs.push_back(MeasureOurs(*image, variant, options.threads));
-    }
+    const std::vector<Measurement> runs =
+      Repeat(options, [&] { return MeasureOurs(*image, variant, options.threads); });
     std::printf("| %s | %s | %s |\n", name, Spread(Each(runs, Wall)).c_str(),
       Spread(Each(runs, Processor)).c_str());
   }
-  SetVesselnessInstructions(VesselnessInstructions::Widest);
+  VesselnessKernelChoice().Select(Instructions::Widest);
 }
 
 void TableAgreement(const Options& options, Verdicts& verdicts)
@@ -751,7 +670,7 @@ void TableAgreement(const Options& options, Verdicts& verdicts)
       [](const Comparison& c)
       { return c.correlation > LeastReferenceCorrelation && c.largest <= LargestReferenceError; });
 #if defined(DYNAMICCORONARY_WITH_ITK)
-    if (!options.withoutItk)
+    if (!options.withoutPeer)
     {
       const SharedArray<float> itk(CountOf(n));
       MeasureItk(*image, variant.settings, true, options.threads, &itk);
@@ -774,7 +693,7 @@ int Run(const Options& options)
     std::printf("The comparison with ITK is skipped: this program was built without ITK 5 "
                 "(Debian: libinsighttoolkit5-dev).\n");
   }
-  else if (options.withoutItk)
+  else if (options.withoutPeer)
   {
     std::printf("The comparison with ITK is skipped, as asked for.\n");
   }
@@ -802,18 +721,7 @@ int Run(const Options& options)
   {
     TableAgreement(options, verdicts);
   }
-  std::fflush(stdout);
-  if (verdicts.disagreement)
-  {
-    std::fprintf(stderr, "vesselness-benchmark: the results disagree\n");
-    return 1;
-  }
-  if (verdicts.missedTarget && options.strict)
-  {
-    std::fprintf(stderr, "vesselness-benchmark: a target of time or memory is missed\n");
-    return 1;
-  }
-  return 0;
+  return verdicts.ExitCode("vesselness-benchmark", options.strict);
 }
 
 /// @return the exit code
@@ -822,8 +730,6 @@ int Start(int argc, char** argv)
   Options options;
   CLI::App app("Time, memory and agreement of the vesselness, beside ITK's in the same run. Each "
                "measurement is a process of its own. Exit code 1 when results disagree.");
-  app.add_option("tables", options.tables, "Which tables (default: all)")
-    ->check(CLI::IsMember(AllTables));
   app.add_option("--size", options.size, "Voxels along each side")
     ->check(CLI::Range(16, 1024))
     ->capture_default_str();
@@ -834,15 +740,7 @@ int Start(int argc, char** argv)
     ->expected(3)
     ->check(CLI::Range(16, 2048))
     ->capture_default_str();
-  app.add_option("--repeats", options.repeats, "Runs of each measurement")
-    ->check(CLI::Range(1, 1000))
-    ->capture_default_str();
-  app.add_option("--threads", options.threads, "Threads of each contestant")
-    ->check(CLI::Range(1, 1024))
-    ->capture_default_str();
-  app.add_option("--seed", options.seed, "Of the phantom")->capture_default_str();
-  app.add_flag("--without-itk", options.withoutItk, "Do not run ITK");
-  app.add_flag("--strict", options.strict, "Exit code 1 when a target of time or memory is missed");
+  options.AddTo(app, "itk", AllTables);
   CLI11_PARSE(app, argc, argv);
   return Run(options);
 }
@@ -850,17 +748,5 @@ int Start(int argc, char** argv)
 
 int main(int argc, char** argv)
 {
-  try
-  {
-    return Start(argc, argv);
-  }
-  catch (const std::exception& e)
-  {
-    std::fprintf(stderr, "vesselness-benchmark: %s\n", e.what());
-  }
-  catch (...)
-  {
-    std::fputs("vesselness-benchmark: unknown error\n", stderr);
-  }
-  return 1;
+  return coronary::RunBenchmark("vesselness-benchmark", [&] { return Start(argc, argv); });
 }

@@ -1,8 +1,9 @@
 #include "SurfaceMeasures.h"
 
+#include "DisjointSets.h"
+
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace coronary
 {
@@ -68,16 +69,7 @@ SurfaceMeasures MeasureSurface(
                             : x.triangle < y.triangle;
     });
   // Triangles joined by edges.
-  std::vector<std::int64_t> parent(triangles.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](std::int64_t t)
-  {
-    while (parent[t] != t)
-    {
-      t = parent[t] = parent[parent[t]];
-    }
-    return t;
-  };
+  DisjointSets pieces(triangles.size());
   std::vector<int> ends(points.size(), 0); // open edges of each point
   std::size_t edges = 0;
   for (std::size_t i = 0; i < halves.size();)
@@ -85,7 +77,7 @@ SurfaceMeasures MeasureSurface(
     std::size_t j = i + 1;
     while (j < halves.size() && halves[j].low == halves[i].low && halves[j].high == halves[i].high)
     {
-      parent[root(halves[j].triangle)] = root(halves[i].triangle);
+      pieces.Join(halves[j].triangle, halves[i].triangle);
       ++j;
     }
     ++edges;
@@ -146,7 +138,8 @@ SurfaceMeasures MeasureSurface(
   }
   for (std::size_t t = 0; t < triangles.size(); ++t)
   {
-    result.components += root(static_cast<std::int64_t>(t)) == static_cast<std::int64_t>(t) ? 1 : 0;
+    result.components +=
+      pieces.Find(static_cast<std::int64_t>(t)) == static_cast<std::int64_t>(t) ? 1 : 0;
   }
   result.eulerCharacteristic = static_cast<std::int64_t>(points.size() - result.unusedPoints) -
     static_cast<std::int64_t>(edges) + static_cast<std::int64_t>(triangles.size());

@@ -1,15 +1,23 @@
-// The pool of threads, the random numbers and the random fields that everything else uses.
+// The pool of threads, the random numbers and fields and the small forms that everything else uses.
 
 #include "CounterRandom.h"
+#include "CyclicTime.h"
+#include "DisjointSets.h"
 #include "Geometry.h"
+#include "KernelChoice.h"
+#include "Median.h"
 #include "ParallelFor.h"
+#include "Refusals.h"
+#include "Require.h"
 #include "SmoothRandomField.h"
+#include "VoxelCell.h"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -213,4 +221,106 @@ TEST(Geometry, NearestPlaceOfASegment)
   const coronary::SegmentPlace point = NearestOnSegment({ 1.0, 2.0, 5.0 }, a, a);
   EXPECT_DOUBLE_EQ(point.fraction, 0.0);
   EXPECT_DOUBLE_EQ(point.squaredDistance, 4.0);
+}
+
+TEST(VoxelCell, IsExactForALinearImageAndKeepsTheBorder)
+{
+  // 3 x 4 x 1 voxels whose indices begin at -1, 2 and 5.
+  const std::array<int, 6> extent = { -1, 1, 2, 5, 5, 5 };
+  std::vector<short> image;
+  for (int j = 2; j <= 5; ++j)
+  {
+    for (int i = -1; i <= 1; ++i)
+    {
+      image.push_back(static_cast<short>(10 * i - 3 * j));
+    }
+  }
+  const auto at = [&](double i, double j, double k)
+  { return VoxelCell<double>(Vector3(i, j, k), extent).Interpolate(image.data()); };
+  EXPECT_DOUBLE_EQ(at(0.25, 3.5, 5.0), 2.5 - 10.5);
+  EXPECT_DOUBLE_EQ(at(-0.75, 2.0, 5.0), -7.5 - 6.0);
+  EXPECT_DOUBLE_EQ(at(1.0, 5.0, 5.0), 10.0 - 15.0);
+  EXPECT_DOUBLE_EQ(at(9.0, 3.5, -4.0), 10.0 - 10.5);
+  EXPECT_DOUBLE_EQ(at(-9.0, 9.0, 99.0), -10.0 - 15.0);
+  const VoxelCell<double> cell(Vector3(0.25, 3.5, 5.0), extent);
+  double sum = 0.0;
+  double weights = 0.0;
+  for (int corner = 0; corner < 8; ++corner)
+  {
+    const double weight = TrilinearWeight(corner, cell.part);
+    sum += weight *
+      image[cell.first + (corner & 1) * cell.step[0] + (corner >> 1 & 1) * cell.step[1] +
+        (corner >> 2) * cell.step[2]];
+    weights += weight;
+  }
+  EXPECT_DOUBLE_EQ(weights, 1.0);
+  EXPECT_DOUBLE_EQ(sum, 2.5 - 10.5);
+}
+
+TEST(Median, IsTheUpperOneOfTwoAndQuantilesAreValuesOfTheList)
+{
+  EXPECT_EQ(MedianOf(std::vector<double>{}), 0.0);
+  EXPECT_EQ(MedianOf(std::vector<float>{ 3.0F, 1.0F, 2.0F }), 2.0F);
+  EXPECT_EQ(MedianOf(std::vector<double>{ 4.0, 1.0, 3.0, 2.0 }), 3.0);
+  const std::vector<double> values = { 50.0, 10.0, 40.0, 20.0, 30.0 };
+  EXPECT_EQ(QuantileOf(values, 0.0), 10.0);
+  EXPECT_EQ(QuantileOf(values, 0.8), 50.0);
+  EXPECT_EQ(InclusiveQuantileOf(values, 0.8), 40.0);
+  EXPECT_EQ(InclusiveQuantileOf(values, 1.0), 50.0);
+  EXPECT_EQ(InclusiveQuantileOf(std::vector<double>{}, 0.5), 0.0);
+}
+
+TEST(DisjointSets, JoinAndAreNamedByTheirLowest)
+{
+  DisjointSets sets(6);
+  EXPECT_TRUE(sets.Join(4, 2));
+  EXPECT_TRUE(sets.Join(5, 3));
+  EXPECT_TRUE(sets.Join(5, 4));
+  EXPECT_FALSE(sets.Join(3, 2));
+  for (const int i : { 2, 3, 4, 5 })
+  {
+    EXPECT_EQ(sets.Find(i), 2);
+  }
+  EXPECT_EQ(sets.Find(0), 0);
+  EXPECT_EQ(sets.Find(1), 1);
+}
+
+TEST(CyclicTime, IsWithinTheCycle)
+{
+  EXPECT_DOUBLE_EQ(Modulo(2.25), 0.25);
+  EXPECT_DOUBLE_EQ(Modulo(-0.25), 0.75);
+  EXPECT_EQ(Modulo(-1e-20), 0.0); // which is 1 by rounding
+  EXPECT_DOUBLE_EQ(CyclicDistance(0.9, 0.1), 0.2);
+  EXPECT_DOUBLE_EQ(CyclicDistance(0.1, 3.1), 0.0);
+}
+
+TEST(KernelChoice, TakesTheWidestThatIsThereAndRuns)
+{
+  const int baseline = 0;
+  const int avx2 = 1;
+  EXPECT_TRUE(ProcessorHas(Instructions::Baseline));
+  KernelChoice<int> alone(baseline);
+  EXPECT_EQ(&alone.Get(), &baseline);
+  EXPECT_FALSE(alone.Select(Instructions::Avx2));
+  EXPECT_FALSE(alone.Select(Instructions::Avx512));
+  KernelChoice<int> both(baseline, &avx2);
+  const int* widest = ProcessorHas(Instructions::Avx2) ? &avx2 : &baseline;
+  EXPECT_EQ(&both.Get(), widest);
+  EXPECT_TRUE(both.Select(Instructions::Baseline));
+  EXPECT_EQ(&both.Get(), &baseline);
+  EXPECT_EQ(both.Select(Instructions::Avx2), ProcessorHas(Instructions::Avx2));
+  EXPECT_TRUE(both.Select(Instructions::Widest));
+  EXPECT_EQ(&both.Get(), widest);
+}
+
+TEST(Require, SaysWhoseSettingIsWrong)
+{
+  constexpr RequireOf require{ "SomeSettings" };
+  require(true, "nothing");
+  require.Range("depth", 2.0, 2.0, 3.0);
+  ExpectRefusal([&] { require(false, "depth must be 1"); }, "SomeSettings: depth must be 1");
+  ExpectRefusal([&] { require(false, "depth", 7.0, "0 to 1 mm"); },
+    "SomeSettings: depth is 7.000000; it has to be 0 to 1 mm");
+  ExpectRefusal([&] { require.Range("depth", std::numeric_limits<double>::quiet_NaN(), 0.0, 1.0); },
+    "SomeSettings: depth must be from 0.000000 to 1.000000");
 }

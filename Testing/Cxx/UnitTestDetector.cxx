@@ -4,6 +4,7 @@
 #include "DetectorKernels.h"
 #include "FluoroscopyImager.h"
 #include "Fnv1a.h"
+#include "KernelChoice.h"
 #include "Refusals.h"
 
 #include <gtest/gtest.h>
@@ -360,9 +361,9 @@ TEST(Detector, sameSeedSameBitsOnAllProcessors)
   EXPECT_EQ(wide, hash(7, 3));
   EXPECT_NE(wide, hash(8, 3));
   EXPECT_NE(wide, hash(7, 4));
-  UseBaselineDetectorLoops(true);
+  ASSERT_TRUE(DetectorKernelChoice().Select(Instructions::Baseline));
   EXPECT_EQ(wide, hash(7, 3));
-  UseBaselineDetectorLoops(false);
+  DetectorKernelChoice().Select(Instructions::Widest);
 }
 
 TEST(Detector, staysFiniteForWhatLayersMayHold)

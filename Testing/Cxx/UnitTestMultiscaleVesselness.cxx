@@ -1,6 +1,7 @@
 // Vesselness against a direct double-precision computation, tubes of known size, and its promises.
 
 #include "CounterRandom.h"
+#include "KernelChoice.h"
 #include "MultiscaleVesselness.h"
 #include "VesselnessKernels.h"
 
@@ -303,17 +304,16 @@ TEST(MultiscaleVesselness, AllInstructionSetsAgree)
     VesselnessSettings settings = Standard();
     settings.method = method;
     settings.jermanMaxima.assign(settings.sigmas.size(), 300.0);
-    ASSERT_TRUE(SetVesselnessInstructions(VesselnessInstructions::Baseline));
+    ASSERT_TRUE(VesselnessKernelChoice().Select(Instructions::Baseline));
     const Result expected = Filter(volume, settings);
     const MultiscaleVesselness filter(settings, volume.spacing, volume.extent);
     const auto extremes = filter.Measure(volume.Block(), volume.extent, nullptr);
     const double largest =
       *std::max_element(expected.vesselness.begin(), expected.vesselness.end());
     EXPECT_GT(largest, 0.2);
-    for (const VesselnessInstructions wide :
-      { VesselnessInstructions::Avx2, VesselnessInstructions::Avx512 })
+    for (const Instructions wide : { Instructions::Avx2, Instructions::Avx512 })
     {
-      if (!SetVesselnessInstructions(wide))
+      if (!VesselnessKernelChoice().Select(wide))
       {
         std::cout << "not on this processor: " << static_cast<int>(wide) << "\n";
         continue;
@@ -343,7 +343,7 @@ TEST(MultiscaleVesselness, AllInstructionSetsAgree)
         }
       }
     }
-    SetVesselnessInstructions(VesselnessInstructions::Widest);
+    VesselnessKernelChoice().Select(Instructions::Widest);
   }
 }
 

@@ -9,8 +9,8 @@
 #include <random>
 
 using coronary::BoneTransform;
+using coronary::ApplyPoseEdit;
 using coronary::PoseEdit;
-using coronary::PoseEditor;
 using coronary::Quaternion;
 using coronary::Skeleton;
 using coronary::SkeletonPose;
@@ -285,22 +285,22 @@ TEST(SkeletonPose, RefusesWhatIsNoPose)
   ExpectRefusal([&] { SkeletonRig{ broken }; }, "bone 1");
 }
 
-TEST(PoseEditor, TurnsWhatIsBeyondTheJoint)
+TEST(PoseEdit, TurnsWhatIsBeyondTheJoint)
 {
-  PoseEditor editor(Fork());
-  const SkeletonPose rest = editor.Pose();
+  const SkeletonRig rig(Fork());
+  const SkeletonPose rest = rig.RestPose();
+  SkeletonPose pose = rest;
   PoseEdit edit;
   edit.joint = 2;
   edit.rotation = Turn(0.5 * Pi, Vector3::UnitY());
-  editor.Apply(edit);
-  const SkeletonPose& pose = editor.Pose();
+  ApplyPoseEdit(rig, edit, pose);
   for (const int still : { 0, 1, 2 })
   {
     EXPECT_EQ(pose.joints[still], rest.joints[still]);
   }
   EXPECT_LT((pose.joints[4] - Vector3(12.0, 0.0, 12.0)).norm(), 1e-12);
   EXPECT_LT((pose.joints[5] - Vector3(3.0, 1.0, 8.0)).norm(), 1e-12);
-  const std::vector<BoneTransform> bones = Transforms(editor.Rig(), pose);
+  const std::vector<BoneTransform> bones = Transforms(rig, pose);
   for (std::size_t b = 0; b < bones.size(); ++b)
   {
     // Nothing before the joint is turned or twisted.
@@ -309,110 +309,74 @@ TEST(PoseEditor, TurnsWhatIsBeyondTheJoint)
   }
 }
 
-TEST(PoseEditor, MovesAJointAloneOrWithWhatIsBeyond)
+TEST(PoseEdit, MovesAJointAloneOrWithWhatIsBeyond)
 {
-  PoseEditor editor(Fork());
+  const SkeletonRig rig(Fork());
+  SkeletonPose pose = rig.RestPose();
   PoseEdit edit;
   edit.joint = 3;
   edit.translation = { 6.0, 0.0, 0.0 };
-  editor.Apply(edit);
-  EXPECT_EQ(editor.Pose().joints[4], Vector3(6.0, 0.0, 24.0));
-  EXPECT_EQ(editor.Pose().joints[5], editor.Rig().Rest().joints[5]);
-  std::vector<BoneTransform> bones = Transforms(editor.Rig(), editor.Pose());
+  ApplyPoseEdit(rig, edit, pose);
+  EXPECT_EQ(pose.joints[4], Vector3(6.0, 0.0, 24.0));
+  EXPECT_EQ(pose.joints[5], rig.Rest().joints[5]);
+  std::vector<BoneTransform> bones = Transforms(rig, pose);
   EXPECT_NEAR(bones[2].stretch, std::sqrt(2.0), 1e-12);
   EXPECT_LT(Angle(bones[2].rotation, Turn(0.25 * Pi, Vector3::UnitY())), 1e-12);
   EXPECT_LT(Angle(bones[3].rotation, Quaternion::Identity()), 1e-12);
-  editor.Undo();
+  pose = rig.RestPose();
   edit.alone = true;
-  editor.Apply(edit);
-  EXPECT_EQ(editor.Pose().joints[4], Vector3(0.0, 0.0, 24.0));
-  EXPECT_EQ(editor.Pose().joints[3], Vector3(6.0, 0.0, 18.0));
+  ApplyPoseEdit(rig, edit, pose);
+  EXPECT_EQ(pose.joints[4], Vector3(0.0, 0.0, 24.0));
+  EXPECT_EQ(pose.joints[3], Vector3(6.0, 0.0, 18.0));
 }
 
-TEST(PoseEditor, TwistsAlongTheBoneAndAllBeyond)
+TEST(PoseEdit, TwistsAlongTheBoneAndAllBeyond)
 {
-  PoseEditor editor(Fork());
+  const SkeletonRig rig(Fork());
+  SkeletonPose pose = rig.RestPose();
   PoseEdit edit;
   edit.joint = 2;
   edit.twist = 0.5 * Pi;
-  editor.Apply(edit);
-  EXPECT_LT((editor.Pose().joints[5] - Vector3(-1.0, 4.0, 15.0)).norm(), 1e-12);
-  const std::vector<BoneTransform> bones = Transforms(editor.Rig(), editor.Pose());
+  ApplyPoseEdit(rig, edit, pose);
+  EXPECT_LT((pose.joints[5] - Vector3(-1.0, 4.0, 15.0)).norm(), 1e-12);
+  const std::vector<BoneTransform> bones = Transforms(rig, pose);
   EXPECT_EQ(bones[1].twist, edit.twist);
   EXPECT_LT(Angle(bones[1].rotation, Quaternion::Identity()), 1e-12);
   EXPECT_LT(Angle(bones[2].rotation, Turn(0.5 * Pi, Vector3::UnitZ())), 1e-12);
 }
 
-TEST(PoseEditor, CalibreFallsOffOnBothSides)
+TEST(PoseEdit, CalibreFallsOffOnBothSides)
 {
-  PoseEditor editor(Fork());
+  const SkeletonRig rig(Fork());
+  SkeletonPose pose = rig.RestPose();
   PoseEdit edit;
   edit.joint = 2;
   edit.calibre = 0.25;
-  editor.Apply(edit);
-  EXPECT_EQ(editor.Pose().calibre, (std::vector<double>{ 1, 1, 0.25, 1, 1, 1, 1 }));
+  ApplyPoseEdit(rig, edit, pose);
+  EXPECT_EQ(pose.calibre, (std::vector<double>{ 1, 1, 0.25, 1, 1, 1, 1 }));
   edit.reach = 12.0;
-  editor.Apply(edit);
-  EXPECT_NEAR(editor.Pose().calibre[2], 0.0625, 1e-15);
-  EXPECT_NEAR(editor.Pose().calibre[1], 0.5, 1e-12);
-  EXPECT_NEAR(editor.Pose().calibre[3], 0.5, 1e-12);
-  EXPECT_EQ(editor.Pose().calibre[0], 1.0);
+  ApplyPoseEdit(rig, edit, pose);
+  EXPECT_NEAR(pose.calibre[2], 0.0625, 1e-15);
+  EXPECT_NEAR(pose.calibre[1], 0.5, 1e-12);
+  EXPECT_NEAR(pose.calibre[3], 0.5, 1e-12);
+  EXPECT_EQ(pose.calibre[0], 1.0);
   const double along = (Vector3(4.0, 1.0, 15.0) - Vector3(0.0, 0.0, 12.0)).norm();
   EXPECT_NEAR(
-    editor.Pose().calibre[5], std::pow(0.25, 0.5 + 0.5 * std::cos(Pi * along / 12.0)), 1e-12);
+    pose.calibre[5], std::pow(0.25, 0.5 + 0.5 * std::cos(Pi * along / 12.0)), 1e-12);
 }
 
-TEST(PoseEditor, UndoesAndRedoes)
+TEST(PoseEdit, RefusesAndStaysAsItWas)
 {
-  PoseEditor editor(Fork());
-  EXPECT_FALSE(editor.Undo());
-  EXPECT_FALSE(editor.Redo());
-  std::vector<std::vector<Vector3>> history{ editor.Pose().joints };
-  for (int n = 0; n < 5; ++n)
-  {
-    PoseEdit edit;
-    edit.joint = n + 1;
-    edit.rotation = Turn(0.3 * n + 0.1, Vector3(1.0, n, 0.5));
-    edit.translation = { 0.1 * n, 0.2, 0.0 };
-    editor.Apply(edit);
-    history.push_back(editor.Pose().joints);
-  }
-  for (int n = 4; n >= 0; --n)
-  {
-    EXPECT_TRUE(editor.Undo());
-    EXPECT_EQ(editor.Pose().joints, history[n]);
-  }
-  EXPECT_FALSE(editor.Undo());
-  for (int n = 1; n <= 5; ++n)
-  {
-    EXPECT_TRUE(editor.Redo());
-    EXPECT_EQ(editor.Pose().joints, history[n]);
-  }
-  editor.Reset();
-  EXPECT_EQ(editor.Pose().joints, history[0]);
-  EXPECT_TRUE(editor.Edits().empty());
-  EXPECT_TRUE(editor.Redo());
-  EXPECT_EQ(editor.Pose().joints, history[1]);
-  // A new edit forgets what was undone.
-  PoseEdit other;
-  other.joint = 2;
-  editor.Apply(other);
-  EXPECT_FALSE(editor.Redo());
-  EXPECT_EQ(editor.Edits().size(), 2U);
-}
-
-TEST(PoseEditor, RefusesAndStaysAsItWas)
-{
-  PoseEditor editor(Fork());
-  const std::vector<Vector3> before = editor.Pose().joints;
+  const SkeletonRig rig(Fork());
+  SkeletonPose pose = rig.RestPose();
+  const std::vector<Vector3> before = pose.joints;
   const auto refuse = [&](const std::string& part, const auto& damage)
   {
     PoseEdit edit;
     edit.joint = 3;
     damage(edit);
-    ExpectRefusal([&] { editor.Apply(edit); }, part);
-    EXPECT_EQ(editor.Pose().joints, before);
-    EXPECT_TRUE(editor.Edits().empty());
+    ExpectRefusal([&] { ApplyPoseEdit(rig, edit, pose); }, part);
+    EXPECT_EQ(pose.joints, before);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
   refuse("joints 0 to 6", [](PoseEdit& e) { e.joint = 7; });

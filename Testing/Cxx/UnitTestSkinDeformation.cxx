@@ -1,5 +1,6 @@
 // Deformation against closed forms, both precisions, all instruction sets, without allocation.
 
+#include "KernelChoice.h"
 #include "ParallelFor.h"
 #include "Refusals.h"
 #include "SkinDeformation.h"
@@ -473,10 +474,10 @@ TEST(SkinDeformation, AllInstructionSetsAgreeWithDoublePrecision)
 {
   const Case made = RandomCase(6, 60, 5003, { 100.0, -60.0, 20.0 });
   int sets = 0;
-  for (const SkinInstructions instructions :
-    { SkinInstructions::Baseline, SkinInstructions::Avx2, SkinInstructions::Avx512 })
+  for (const Instructions instructions :
+    { Instructions::Baseline, Instructions::Avx2, Instructions::Avx512 })
   {
-    if (!SetSkinInstructions(instructions))
+    if (!SkinKernelChoice().Select(instructions))
     {
       continue;
     }
@@ -493,7 +494,7 @@ TEST(SkinDeformation, AllInstructionSetsAgreeWithDoublePrecision)
       }
     }
   }
-  SetSkinInstructions(SkinInstructions::Widest);
+  SkinKernelChoice().Select(Instructions::Widest);
   EXPECT_GE(sets, 1);
 }
 

@@ -1,6 +1,7 @@
 // The sparse Cholesky factor against a dense one: both precisions, every set of inner loops, kinds of matrices.
 
 #include "CounterRandom.h"
+#include "KernelChoice.h"
 #include "SupernodalFactor.h"
 #include "SupernodalKernels.h"
 
@@ -314,10 +315,10 @@ TEST(SupernodalPattern, IsAnOrderAndHoldsTheFactor)
 
 TEST(SupernodalFactor, SolvesInBothPrecisionsWithEveryLoop)
 {
-  for (const bool wide : { false, true })
+  for (const Instructions instructions : { Instructions::Baseline, Instructions::Avx2 })
   {
-    SCOPED_TRACE(wide ? "AVX2" : "baseline");
-    if (SetSupernodalWide(wide))
+    SCOPED_TRACE(instructions == Instructions::Avx2 ? "AVX2" : "baseline");
+    if (SupernodalKernelChoice().Select(instructions))
     {
       ExpectSolutions<double>(1e-12);
       ExpectSolutions<float>(2e-4);
@@ -351,8 +352,7 @@ TEST(SupernodalFactor, LoopsAgreeWithPlainOnes)
   for (const SupernodalKernels* kernels : {
          &SupernodalKernelsBaseline,
 #if defined(__x86_64__)
-           __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &SupernodalKernelsAvx2
-                                                                           : nullptr
+           ProcessorHas(Instructions::Avx2) ? &SupernodalKernelsAvx2 : nullptr
 #endif
        })
   {
@@ -464,7 +464,7 @@ TEST(SupernodalFactor, LoopsAgreeWithPlainOnes)
 
 TEST(SupernodalFactor, IsTheSameOnEveryRunAndRefusesWhatIsNotDefinite)
 {
-  SetSupernodalWide(true);
+  SupernodalKernelChoice().Select(Instructions::Widest);
   Eigen::MatrixXd dense = Grid(6, true);
   std::vector<std::int32_t> rows(dense.rows());
   std::iota(rows.begin(), rows.end(), 0);

@@ -1,8 +1,10 @@
 // Nearest triangles against a search through all of them.
 
+#include "KernelChoice.h"
 #include "ParallelFor.h"
 #include "Refusals.h"
 #include "TriangleBvh.h"
+#include "TriangleBvhKernels.h"
 
 #include <gtest/gtest.h>
 
@@ -71,17 +73,17 @@ std::vector<Vector3> Places(int count, unsigned int seed, const Vector3& centre 
   return places;
 }
 
-class WithInstructions : public testing::TestWithParam<BvhInstructions>
+class WithInstructions : public testing::TestWithParam<Instructions>
 {
 protected:
   void SetUp() override
   {
-    if (!SetBvhInstructions(this->GetParam()))
+    if (!BvhKernelChoice().Select(this->GetParam()))
     {
       GTEST_SKIP() << "not on this processor";
     }
   }
-  void TearDown() override { SetBvhInstructions(BvhInstructions::Widest); }
+  void TearDown() override { BvhKernelChoice().Select(Instructions::Widest); }
 };
 
 /// An octahedron whose triangles were quartered and put onto the unit sphere.
@@ -221,8 +223,8 @@ TEST_P(WithInstructions, RefitFollowsThePoints)
 }
 
 INSTANTIATE_TEST_SUITE_P(TriangleBvh, WithInstructions,
-  testing::Values(BvhInstructions::Baseline, BvhInstructions::Avx2),
-  [](const auto& test) { return test.param == BvhInstructions::Baseline ? "Baseline" : "Avx2"; });
+  testing::Values(Instructions::Baseline, Instructions::Avx2),
+  [](const auto& test) { return test.param == Instructions::Baseline ? "Baseline" : "Avx2"; });
 
 TEST(TriangleBvh, IsTheSameOnAnyNumberOfThreads)
 {

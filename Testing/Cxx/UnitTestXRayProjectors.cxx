@@ -3,6 +3,7 @@
 #include "ContrastProjector.h"
 #include "CounterRandom.h"
 #include "InstrumentProjector.h"
+#include "KernelChoice.h"
 #include "ParallelFor.h"
 #include "Refusals.h"
 #include "SurfaceTestMeshes.h"
@@ -556,7 +557,7 @@ TEST(InstrumentProjector, SameBitsFromAllProcessors)
     std::vector<float> baseline(203, 0.1F);
     std::vector<float> best(203, 0.1F);
     XRayKernelsBaseline.addTube(part, list, baseline.data());
-    BestXRayKernels().addTube(part, list, best.data());
+    XRayKernelChoice().Get().addTube(part, list, best.data());
     EXPECT_EQ(baseline, best);
   }
 }
@@ -871,9 +872,9 @@ TEST(VolumeProjector, SameBitsFromThreadsTilesAndProcessors)
   const ImageGrid grid = CentredGrid({ 90, 65, 60 }, Vector3(4.0, 4.0, 5.0));
   const std::vector<float> values = SampledEllipsoids(body, 0.0, grid);
   const VolumeProjector projector(ImageOf(values, grid), Itself);
-  VolumeProjectorSettings settings;
-  settings.instructions = ProjectorInstructions::Baseline;
-  const VolumeProjector baseline(ImageOf(values, grid), Itself, settings);
+  ASSERT_TRUE(XRayKernelChoice().Select(Instructions::Baseline));
+  const VolumeProjector baseline(ImageOf(values, grid), Itself);
+  XRayKernelChoice().Select(Instructions::Widest);
   for (const double primary : { 0.0, 44.0, 90.0 })
   {
     CArmPose pose;
