@@ -1,6 +1,6 @@
+#include "ByteOrder.h"
 #include "VolumeHeaderParsers.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -13,20 +13,12 @@ class Bytes
 {
 public:
   std::vector<unsigned char> Data;
-  bool Swap = false;
+  bool BigEndian = false;
 
   template <typename T>
   T Get(std::size_t offset) const
   {
-    std::array<unsigned char, sizeof(T)> raw{};
-    std::copy_n(this->Data.begin() + static_cast<std::ptrdiff_t>(offset), sizeof(T), raw.begin());
-    if (this->Swap)
-    {
-      std::reverse(raw.begin(), raw.end());
-    }
-    T value;
-    std::memcpy(&value, raw.data(), sizeof(T));
-    return value;
+    return NumberAt<T>(this->Data.data() + offset, this->BigEndian);
   }
 };
 
@@ -105,11 +97,10 @@ Nifti ParseHeader(const std::string& path, bool compressed, bool& bigEndian)
   Bytes bytes;
   bytes.Data.resize(540);
   const std::size_t got = stream.ReadSome(0, bytes.Data.data(), bytes.Data.size());
-  for (const bool swap : { false, true })
+  for (const bool order : { false, true })
   {
-    bytes.Swap = swap;
+    bigEndian = bytes.BigEndian = order;
     const auto size = bytes.Get<std::int32_t>(0);
-    bigEndian = HostIsBigEndian() != swap;
     if (size == 348 && got >= 348)
     {
       if (std::memcmp(bytes.Data.data() + 344, "n+1", 4) == 0)

@@ -2,7 +2,6 @@
 
 #include "ByteStream.h"
 #include "TextFile.h"
-#include "TextScanner.h"
 #include "TextWords.h"
 #include "XmlText.h"
 

@@ -1,12 +1,12 @@
-#include "StlPlyFile.h"
-
-#include "ByteStream.h"
+#include "ByteOrder.h"
+#include "MeshFile.h"
 #include "TextScanner.h"
+#include "TextWords.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <vector>
@@ -18,21 +18,6 @@ namespace
 [[noreturn]] void Refuse(const TextScanner& file, const std::string& what)
 {
   throw std::runtime_error("'" + file.Path() + "' " + what + ".");
-}
-
-/// A number out of bytes of an order that is given.
-template <typename T>
-T Stored(const char* from, bool bigEndian)
-{
-  std::array<char, sizeof(T)> bytes{};
-  std::memcpy(bytes.data(), from, sizeof(T));
-  if (bigEndian != HostIsBigEndian())
-  {
-    std::reverse(bytes.begin(), bytes.end());
-  }
-  T value;
-  std::memcpy(&value, bytes.data(), sizeof(T));
-  return value;
 }
 
 // STL -----------------------------------------------------------------------------------------------------------------
@@ -85,7 +70,7 @@ void ReadBinaryStl(const TextScanner& file, std::size_t count, FileMesh& mesh)
       Vector3 point;
       for (int axis = 0; axis < 3; ++axis, at += 4)
       {
-        point[axis] = static_cast<double>(Stored<float>(at, false));
+        point[axis] = static_cast<double>(NumberAt<float>(at, false));
       }
       if (!point.allFinite())
       {
@@ -119,10 +104,7 @@ void ReadTextStl(TextScanner& file, FileMesh& mesh)
     }
     else if (word == "vertex")
     {
-      const double x = file.Coordinate();
-      const double y = file.Coordinate();
-      const double z = file.Coordinate();
-      corners.push_back(merger.Add({ x, y, z }));
+      corners.push_back(merger.Add(file.Point()));
     }
     else if (word == "endfacet")
     {
@@ -221,15 +203,16 @@ public:
     switch (type.bytes)
     {
       case 1:
-        return type.kind == 'i' ? Stored<std::int8_t>(at, big) : Stored<std::uint8_t>(at, big);
+        return type.kind == 'i' ? NumberAt<std::int8_t>(at, big) : NumberAt<std::uint8_t>(at, big);
       case 2:
-        return type.kind == 'i' ? Stored<std::int16_t>(at, big) : Stored<std::uint16_t>(at, big);
+        return type.kind == 'i' ? NumberAt<std::int16_t>(at, big)
+                                : NumberAt<std::uint16_t>(at, big);
       case 4:
-        return type.kind == 'f' ? static_cast<double>(Stored<float>(at, big))
-          : type.kind == 'i'    ? static_cast<double>(Stored<std::int32_t>(at, big))
-                                : static_cast<double>(Stored<std::uint32_t>(at, big));
+        return type.kind == 'f' ? static_cast<double>(NumberAt<float>(at, big))
+          : type.kind == 'i'    ? static_cast<double>(NumberAt<std::int32_t>(at, big))
+                                : static_cast<double>(NumberAt<std::uint32_t>(at, big));
       default:
-        return Stored<double>(at, big);
+        return NumberAt<double>(at, big);
     }
   }
 
@@ -398,6 +381,14 @@ void ReadOthers(PlyValues& values, const PlyElement& element, FileMesh& mesh)
     }
   }
 }
+
+void AppendFloats(std::string& bytes, const Vector3& v)
+{
+  for (int c = 0; c < 3; ++c)
+  {
+    AppendLittleEndian(bytes, static_cast<float>(v[c]));
+  }
+}
 }
 
 FileMesh ReadStlFile(const std::string& path)
@@ -405,7 +396,7 @@ FileMesh ReadStlFile(const std::string& path)
   TextScanner file(path);
   const std::string& bytes = file.Text();
   const std::size_t claimed =
-    bytes.size() >= StlHead ? Stored<std::uint32_t>(bytes.data() + StlHead - 4, false) : 0;
+    bytes.size() >= StlHead ? NumberAt<std::uint32_t>(bytes.data() + StlHead - 4, false) : 0;
   const bool fits = bytes.size() >= StlHead && claimed == (bytes.size() - StlHead) / StlTriangle &&
     (bytes.size() - StlHead) % StlTriangle == 0;
   FileMesh mesh;
@@ -458,5 +449,65 @@ FileMesh ReadPlyFile(const std::string& path)
     }
   }
   return mesh;
+}
+
+std::string PlyBytes(const FileMesh& mesh)
+{
+  std::string file =
+    "ply\nformat binary_little_endian 1.0\ncomment " + InOneLine(mesh.comment) + "\n";
+  for (const auto& [id, name] : mesh.faces)
+  {
+    file += "comment face_id " + std::to_string(id) + " " + InOneLine(name) + "\n";
+  }
+  file += "element vertex " + std::to_string(mesh.points.size()) +
+    "\nproperty float x\nproperty float y\nproperty float z\n";
+  for (const auto& [name, values] : mesh.vertexValues)
+  {
+    file.append("property float ").append(name).append("\n");
+  }
+  file += "element face " + std::to_string(mesh.triangles.size()) +
+    "\nproperty list uchar int vertex_indices\nproperty int face_id\nend_header\n";
+  for (std::size_t n = 0; n < mesh.points.size(); ++n)
+  {
+    AppendFloats(file, mesh.points[n]);
+    for (const auto& [name, values] : mesh.vertexValues)
+    {
+      AppendLittleEndian(file, values[n]);
+    }
+  }
+  for (std::size_t n = 0; n < mesh.triangles.size(); ++n)
+  {
+    file += '\3';
+    for (const std::int64_t corner : mesh.triangles[n])
+    {
+      AppendLittleEndian(file, static_cast<std::int32_t>(corner));
+    }
+    AppendLittleEndian(file, static_cast<std::int32_t>(mesh.face[n]));
+  }
+  return file;
+}
+
+std::string StlBytes(const FileMesh& mesh)
+{
+  if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
+  {
+    throw std::invalid_argument("A surface has too many triangles for an .stl file");
+  }
+  constexpr std::size_t HeaderSize = 80;
+  std::string file = InOneLine(mesh.comment);
+  file.resize(HeaderSize, ' '); // may not begin with "solid", which a text file does
+  AppendLittleEndian(file, static_cast<std::uint32_t>(mesh.triangles.size()));
+  for (const Triangle& triangle : mesh.triangles)
+  {
+    const Vector3& a = mesh.points[static_cast<std::size_t>(triangle[0])];
+    const Vector3& b = mesh.points[static_cast<std::size_t>(triangle[1])];
+    const Vector3& c = mesh.points[static_cast<std::size_t>(triangle[2])];
+    AppendFloats(file, (b - a).cross(c - a).stableNormalized());
+    AppendFloats(file, a);
+    AppendFloats(file, b);
+    AppendFloats(file, c);
+    AppendLittleEndian(file, std::uint16_t{ 0 });
+  }
+  return file;
 }
 }

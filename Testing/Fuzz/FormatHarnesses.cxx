@@ -20,7 +20,6 @@
 #include "SeriesDescription.h"
 #include "SimVascularFile.h"
 #include "SkinWeightCache.h"
-#include "StlPlyFile.h"
 #include "VolumeFile.h"
 #include "XmlDataFile.h"
 
