@@ -2,6 +2,7 @@
 
 #include "GatedSeries.h"
 #include "LargePages.h"
+#include "TextWords.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 
@@ -251,10 +252,9 @@ private:
 
 std::unique_ptr<coronary::VolumeSource> OpenVti(const std::string& path)
 {
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-    [](char c) { return (c >= 'A' && c <= 'Z') ? static_cast<char>(c - 'A' + 'a') : c; });
-  return extension == ".vti" ? std::make_unique<VtiSource>(path) : nullptr;
+  return coronary::LowerCase(fs::path(path).extension().string()) == ".vti"
+    ? std::make_unique<VtiSource>(path)
+    : nullptr;
 }
 
 // What changes when a file does: names, sizes and times of all files that the paths stand for.
