@@ -109,12 +109,6 @@ std::array<int, 6> BoxOfLayer(
 }
 }
 
-bool IsSegmentationFileName(const std::string& path)
-{
-  const std::string name = LowerCase(path);
-  return EndsWith(name, ".seg.nrrd") || EndsWith(name, ".seg.nhdr");
-}
-
 std::vector<Segment> ParseSegments(const std::string& header, const std::string& name)
 {
   return SegmentsOf(ParseNrrdNotes(header, name), name);

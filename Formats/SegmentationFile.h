@@ -86,9 +86,6 @@ private:
   std::vector<Segment> List;
   std::vector<std::string> Notices;
 };
-
-/// Whether a name ends in .seg.nrrd or .seg.nhdr.
-bool IsSegmentationFileName(const std::string& path);
 }
 
 #endif

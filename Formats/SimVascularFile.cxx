@@ -153,7 +153,6 @@ SimVascularPath ParseSimVascularPath(const std::string& text, const std::string&
   {
     FormatError(name, "the path has no points");
   }
-  path.timesteps = steps;
   return path;
 }
 
@@ -209,7 +208,6 @@ SimVascularContourGroup ParseSimVascularContours(const std::string& text, const 
   {
     FormatError(name, "the group has no contours with points");
   }
-  group.timesteps = steps;
   return group;
 }
 
