@@ -128,18 +128,29 @@ void ReadTextStl(TextScanner& file, FileMesh& mesh)
 // PLY -----------------------------------------------------------------------------------------------------------------
 struct PlyType
 {
-  char kind = 'i'; ///< i, u or f: signed, unsigned, floating
-  int bytes = 0;
+  std::size_t bytes = 0;
+  double (*read)(const char* at, bool bigEndian) = nullptr;
 };
+
+template <typename Value>
+PlyType TypeFor()
+{
+  return { sizeof(Value), [](const char* at, bool bigEndian) {
+            return static_cast<double>(NumberAt<Value>(at, bigEndian));
+          } };
+}
 
 PlyType TypeOf(const TextScanner& file, std::string_view name)
 {
-  static const std::map<std::string_view, PlyType> types{ { "char", { 'i', 1 } },
-    { "int8", { 'i', 1 } }, { "uchar", { 'u', 1 } }, { "uint8", { 'u', 1 } },
-    { "short", { 'i', 2 } }, { "int16", { 'i', 2 } }, { "ushort", { 'u', 2 } },
-    { "uint16", { 'u', 2 } }, { "int", { 'i', 4 } }, { "int32", { 'i', 4 } },
-    { "uint", { 'u', 4 } }, { "uint32", { 'u', 4 } }, { "float", { 'f', 4 } },
-    { "float32", { 'f', 4 } }, { "double", { 'f', 8 } }, { "float64", { 'f', 8 } } };
+  static const std::map<std::string_view, PlyType> types{ { "char", TypeFor<std::int8_t>() },
+    { "int8", TypeFor<std::int8_t>() }, { "uchar", TypeFor<std::uint8_t>() },
+    { "uint8", TypeFor<std::uint8_t>() }, { "short", TypeFor<std::int16_t>() },
+    { "int16", TypeFor<std::int16_t>() }, { "ushort", TypeFor<std::uint16_t>() },
+    { "uint16", TypeFor<std::uint16_t>() }, { "int", TypeFor<std::int32_t>() },
+    { "int32", TypeFor<std::int32_t>() }, { "uint", TypeFor<std::uint32_t>() },
+    { "uint32", TypeFor<std::uint32_t>() }, { "float", TypeFor<float>() },
+    { "float32", TypeFor<float>() }, { "double", TypeFor<double>() },
+    { "float64", TypeFor<double>() } };
   const auto found = types.find(name);
   if (found == types.end())
   {
@@ -193,27 +204,13 @@ public:
     {
       return this->File.Number();
     }
-    if (this->Left() < static_cast<std::size_t>(type.bytes))
+    if (this->Left() < type.bytes)
     {
       Refuse(this->File, "ends before its last element");
     }
     const char* at = this->File.Text().data() + this->At;
-    this->At += static_cast<std::size_t>(type.bytes);
-    const bool big = this->Kind == Form::Big;
-    switch (type.bytes)
-    {
-      case 1:
-        return type.kind == 'i' ? NumberAt<std::int8_t>(at, big) : NumberAt<std::uint8_t>(at, big);
-      case 2:
-        return type.kind == 'i' ? NumberAt<std::int16_t>(at, big)
-                                : NumberAt<std::uint16_t>(at, big);
-      case 4:
-        return type.kind == 'f' ? static_cast<double>(NumberAt<float>(at, big))
-          : type.kind == 'i'    ? static_cast<double>(NumberAt<std::int32_t>(at, big))
-                                : static_cast<double>(NumberAt<std::uint32_t>(at, big));
-      default:
-        return NumberAt<double>(at, big);
-    }
+    this->At += type.bytes;
+    return type.read(at, this->Kind == Form::Big);
   }
 
   /// A whole number from 0 to `most`. @param what  it is, for the message

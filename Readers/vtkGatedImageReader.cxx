@@ -201,43 +201,9 @@ private:
 
   void SetType()
   {
-    using coronary::VoxelType;
     switch (this->VtkType)
     {
-      case VTK_CHAR:
-      case VTK_SIGNED_CHAR:
-        this->Type = VoxelType::Int8;
-        break;
-      case VTK_UNSIGNED_CHAR:
-        this->Type = VoxelType::UInt8;
-        break;
-      case VTK_SHORT:
-        this->Type = VoxelType::Int16;
-        break;
-      case VTK_UNSIGNED_SHORT:
-        this->Type = VoxelType::UInt16;
-        break;
-      case VTK_INT:
-        this->Type = VoxelType::Int32;
-        break;
-      case VTK_UNSIGNED_INT:
-        this->Type = VoxelType::UInt32;
-        break;
-      case VTK_FLOAT:
-        this->Type = VoxelType::Float32;
-        break;
-      case VTK_DOUBLE:
-        this->Type = VoxelType::Float64;
-        break;
-      case VTK_LONG:
-      case VTK_LONG_LONG:
-      case VTK_ID_TYPE:
-        this->Type = VoxelType::Int64;
-        break;
-      case VTK_UNSIGNED_LONG:
-      case VTK_UNSIGNED_LONG_LONG:
-        this->Type = VoxelType::UInt64;
-        break;
+      vtkTemplateMacro(this->Type = coronary::VoxelTypeOf<VTK_TT>());
       default:
         throw std::runtime_error("'" + this->Header.path + "': its scalars are no numbers.");
     }
