@@ -213,6 +213,12 @@ public:
     return type.read(at, this->Kind == Form::Big);
   }
 
+  /// How many numbers a property has of the element that comes next.
+  std::int64_t LengthOf(const PlyProperty& property)
+  {
+    return property.isList ? this->Whole(property.count, 4294967295.0, "a list of no length") : 1;
+  }
+
   /// A whole number from 0 to `most`. @param what  it is, for the message
   std::int64_t Whole(const PlyType& type, double most, const char* what)
   {
@@ -327,10 +333,7 @@ void ReadVertices(TextScanner& file, PlyValues& values, const PlyElement& elemen
     {
       const PlyProperty& property = element.properties[p];
       double value = 0.0;
-      for (std::int64_t left = property.isList
-             ? values.Whole(property.count, 4294967295.0, "a list of no length")
-             : 1;
-           left > 0; --left)
+      for (std::int64_t left = values.LengthOf(property); left > 0; --left)
       {
         value = values.Next(property.type);
       }
@@ -354,8 +357,7 @@ void ReadOthers(PlyValues& values, const PlyElement& element, FileMesh& mesh)
   {
     for (const PlyProperty& property : element.properties)
     {
-      std::int64_t left =
-        property.isList ? values.Whole(property.count, 4294967295.0, "a list of no length") : 1;
+      std::int64_t left = values.LengthOf(property);
       if (element.name != "face" ||
         (property.name != "vertex_indices" && property.name != "vertex_index"))
       {
