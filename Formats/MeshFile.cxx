@@ -214,7 +214,7 @@ FileMesh ReadMedit(TextScanner& file)
   return mesh;
 }
 
-/// Lines of a file: what stands before the numbers of each, the numbers plus one another, what stands behind.
+/// A line for each of `lines`: what stands before its numbers, the numbers, what stands behind them.
 template <typename Lines>
 void AppendLines(std::string& text, const char* before, const Lines& lines, const char* behind)
 {
