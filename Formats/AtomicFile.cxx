@@ -4,10 +4,8 @@
 #include <atomic>
 #include <cerrno>
 #include <chrono>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <random>
 #include <stdexcept>
 #include <system_error>
@@ -39,9 +37,9 @@ AtomicFile::AtomicFile(const std::string& path)
     const fs::path candidate = wanted.parent_path() /
       ("." + wanted.stem().string() + "." + std::to_string(random()) + "-" +
         std::to_string(counter++) + wanted.extension().string());
-    if (std::FILE* file = std::fopen(candidate.string().c_str(), "wbx"))
+    this->File.reset(std::fopen(candidate.string().c_str(), "wbx"));
+    if (this->File)
     {
-      std::fclose(file);
       this->Temporary = candidate.string();
       return;
     }
@@ -50,7 +48,12 @@ AtomicFile::AtomicFile(const std::string& path)
       break;
     }
   }
-  throw std::runtime_error("Cannot write '" + path + "': " + std::strerror(errno) + ".");
+  this->Fail();
+}
+
+void AtomicFile::Fail() const
+{
+  throw std::runtime_error("Cannot write '" + this->Final + "': " + std::strerror(errno) + ".");
 }
 
 AtomicFile::~AtomicFile()
@@ -62,8 +65,30 @@ AtomicFile::~AtomicFile()
   }
 }
 
+void AtomicFile::Write(const void* data, std::size_t bytes)
+{
+  if (std::fwrite(data, 1, bytes, this->File.get()) != bytes)
+  {
+    this->Fail();
+  }
+}
+
+void AtomicFile::Overwrite(std::size_t position, const std::string& text)
+{
+  if (std::fseek(this->File.get(), static_cast<long>(position), SEEK_SET) != 0)
+  {
+    this->Fail();
+  }
+  this->Write(text.data(), text.size());
+}
+
 void AtomicFile::Commit()
 {
+  // A full disk may show only when the buffer is flushed.
+  if (std::fclose(this->File.release()) != 0)
+  {
+    this->Fail();
+  }
   std::error_code error;
   fs::rename(this->Temporary, this->Final, error);
   if (error)
@@ -101,27 +126,8 @@ void RemoveAbandonedFiles(const std::string& path)
 
 void WriteFileAtomically(const std::string& path, const std::string& contents)
 {
-  AtomicFile target(path);
-  std::FILE* file = std::fopen(target.TemporaryPath().c_str(), "wb");
-  bool good = file != nullptr;
-  if (file)
-  {
-    good = std::fwrite(contents.data(), 1, contents.size(), file) == contents.size();
-    const int reason = errno;
-    // A full disk may show only when the buffer is flushed.
-    if (std::fclose(file) != 0)
-    {
-      good = false;
-    }
-    else
-    {
-      errno = reason;
-    }
-  }
-  if (!good)
-  {
-    throw std::runtime_error("Cannot write '" + path + "': " + std::strerror(errno) + ".");
-  }
-  target.Commit();
+  AtomicFile file(path);
+  file.Write(contents.data(), contents.size());
+  file.Commit();
 }
 }

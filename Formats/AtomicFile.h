@@ -5,6 +5,9 @@
 #ifndef DynamicCoronary_AtomicFile_h
 #define DynamicCoronary_AtomicFile_h
 
+#include <cstddef>
+#include <cstdio>
+#include <memory>
 #include <string>
 
 namespace coronary
@@ -25,21 +28,31 @@ public:
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Where to write: an existing, empty file in the folder of Path().
+  /// Where others may write instead of Write(): an existing, empty file in the folder of Path().
   const std::string& TemporaryPath() const { return this->Temporary; }
 
   /// The name that Commit() gives it.
   const std::string& Path() const { return this->Final; }
 
+  ///@{
+  /// Behind what was written, or over what is at a byte of the file already.
+  /// @throws std::runtime_error naming Path() and the reason (disk full, ...).
+  void Write(const void* data, std::size_t bytes);
+  void Overwrite(std::size_t position, const std::string& text);
+  ///@}
+
   /**
-   * Renames the temporary file to Path(), replacing what was there. Close it first.
-   * @throws std::runtime_error naming Path() when that fails.
+   * Renames the temporary file to Path(), replacing what was there. Others who write to it close it first.
+   * @throws std::runtime_error naming Path() and the reason when that fails.
    */
   void Commit();
 
 private:
+  [[noreturn]] void Fail() const;
+
   std::string Final;
   std::string Temporary; ///< empty once committed
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> File{ nullptr, &std::fclose };
 };
 
 /**

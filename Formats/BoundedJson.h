@@ -5,6 +5,8 @@
 #ifndef DynamicCoronary_BoundedJson_h
 #define DynamicCoronary_BoundedJson_h
 
+#include "Geometry.h"
+
 #include <nlohmann/json.hpp>
 
 #include <stdexcept>
@@ -47,6 +49,19 @@ Json ParseBoundedJson(const std::string& text, const std::string& where)
     throw std::runtime_error(where + " is not JSON: " + JsonReason(error) + ".");
   }
 }
+
+///@{
+/// Values out of JSON of others. @param file, place  for messages: the file's name, and what of it: "phases[3]"
+/// @throws std::runtime_error naming both, and what is wrong
+/// Of a member; empty: it is missing or null.
+std::string TextIn(const nlohmann::ordered_json& object, const char* member,
+  const std::string& file, const std::string& place);
+double FiniteIn(
+  const nlohmann::ordered_json& value, const std::string& file, const std::string& place);
+/// The member `position`: a list of three numbers.
+Vector3 PositionIn(
+  const nlohmann::ordered_json& object, const std::string& file, const std::string& place);
+///@}
 }
 
 #endif

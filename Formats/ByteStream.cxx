@@ -3,7 +3,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -202,23 +201,6 @@ std::uint64_t CheckedFileSize(const std::string& path)
     throw std::runtime_error("File '" + path + "' is empty.");
   }
   return size;
-}
-
-bool HostIsBigEndian()
-{
-  const std::uint16_t one = 1;
-  unsigned char first = 0;
-  std::memcpy(&first, &one, 1);
-  return first == 0;
-}
-
-void SwapBytes(std::vector<unsigned char>& bytes, std::size_t valueBytes)
-{
-  for (std::size_t i = 0; i + valueBytes <= bytes.size(); i += valueBytes)
-  {
-    std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(i),
-      bytes.begin() + static_cast<std::ptrdiff_t>(i + valueBytes));
-  }
 }
 
 bool IsGzipFile(const std::string& path)

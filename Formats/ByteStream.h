@@ -10,7 +10,6 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 namespace coronary
 {
@@ -63,11 +62,6 @@ void RequireFile(const std::string& path);
  * @throws std::runtime_error naming `path` when it is missing, a folder, empty or not readable
  */
 std::uint64_t CheckedFileSize(const std::string& path);
-
-bool HostIsBigEndian();
-
-/// Reverses the bytes of every value of `valueBytes` bytes.
-void SwapBytes(std::vector<unsigned char>& bytes, std::size_t valueBytes);
 
 /// True when the file begins as gzip files do.
 bool IsGzipFile(const std::string& path);

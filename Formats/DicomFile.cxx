@@ -1,5 +1,6 @@
 #include "DicomFile.h"
 
+#include "ByteOrder.h"
 #include "DicomStructure.h"
 #include "TextWords.h"
 
@@ -82,19 +83,12 @@ public:
   template <typename T>
   std::optional<double> Binary(std::uint32_t tag) const
   {
-    std::string raw = this->Raw(tag);
+    const std::string raw = this->Raw(tag);
     if (raw.size() < sizeof(T))
     {
       return std::nullopt;
     }
-    raw.resize(sizeof(T));
-    if (this->Structure->bigEndian != HostIsBigEndian())
-    {
-      std::reverse(raw.begin(), raw.end());
-    }
-    T value;
-    std::memcpy(&value, raw.data(), sizeof(T));
-    const auto number = static_cast<double>(value);
+    const auto number = static_cast<double>(NumberAt<T>(raw.data(), this->Structure->bigEndian));
     return std::isfinite(number) ? std::optional<double>(number) : std::nullopt;
   }
 
@@ -409,26 +403,28 @@ class Encoder
 public:
   std::string Bytes;
 
-  void Number(std::uint32_t value, unsigned bytes)
+  void Short(std::size_t value)
   {
-    for (unsigned b = 0; b < bytes; ++b)
-    {
-      this->Bytes += static_cast<char>(value >> (8 * b) & 255u);
-    }
+    AppendLittleEndian(this->Bytes, static_cast<std::uint16_t>(value));
+  }
+
+  void Long(std::size_t value)
+  {
+    AppendLittleEndian(this->Bytes, static_cast<std::uint32_t>(value));
   }
 
   void Tag(std::uint32_t tag)
   {
-    this->Number(tag >> 16, 2);
-    this->Number(tag & 0xffffu, 2);
+    this->Short(tag >> 16);
+    this->Short(tag & 0xffffu);
   }
 
   void Short(std::uint32_t tag, int value)
   {
     this->Tag(tag);
     this->Bytes += "US";
-    this->Number(2, 2);
-    this->Number(static_cast<std::uint32_t>(value), 2);
+    this->Short(2);
+    this->Short(static_cast<std::size_t>(value));
   }
 
   void Text(std::uint32_t tag, const char* representation, std::string value)
@@ -439,7 +435,7 @@ public:
     }
     this->Tag(tag);
     this->Bytes += representation;
-    this->Number(static_cast<std::uint32_t>(value.size()), 2);
+    this->Short(value.size());
     this->Bytes += value;
   }
 };
@@ -458,10 +454,9 @@ std::vector<Fragment> ListFragments(const DicomFile& file, ByteStream& stream)
   std::vector<Fragment> fragments;
   const auto number = [&](std::uint64_t position)
   {
-    std::array<unsigned char, 4> b{};
-    stream.Read(position, b.data(), b.size(), position + b.size());
-    return std::uint32_t(b[0]) | std::uint32_t(b[1]) << 8 | std::uint32_t(b[2]) << 16 |
-      std::uint32_t(b[3]) << 24;
+    std::array<unsigned char, 4> bytes{};
+    stream.Read(position, bytes.data(), bytes.size(), position + bytes.size());
+    return NumberAt<std::uint32_t>(bytes.data(), false);
   };
   std::uint64_t position = 0;
   for (;;)
@@ -608,12 +603,8 @@ void DecodeRunLength(const DicomFile& file, std::size_t frame, std::vector<unsig
   }
   std::vector<unsigned char> in(static_cast<std::size_t>(fragments[frame + 1].size));
   stream.Read(fragments[frame + 1].offset, in.data(), in.size(), in.size());
-  const auto number = [&in](std::size_t index)
-  {
-    const unsigned char* b = in.data() + 4 * index;
-    return std::size_t(b[0]) | std::size_t(b[1]) << 8 | std::size_t(b[2]) << 16 |
-      std::size_t(b[3]) << 24;
-  };
+  const auto number = [&in](std::size_t index) -> std::size_t
+  { return NumberAt<std::uint32_t>(in.data() + 4 * index, false); };
   if (number(0) != valueBytes)
   {
     FormatError(file.path, damaged);
@@ -646,8 +637,8 @@ std::string CleanFile(const DicomFile& file)
   all.Bytes = std::string(128, '\0') + "DICM";
   all.Tag(0x00020000u);
   all.Bytes += "UL";
-  all.Number(4, 2);
-  all.Number(static_cast<std::uint32_t>(meta.Bytes.size()), 4);
+  all.Short(4);
+  all.Long(meta.Bytes.size());
   all.Bytes += meta.Bytes;
   all.Text(0x00080016u, "UI", kind);
   all.Text(0x00080018u, "UI", "1.2.3");
@@ -665,7 +656,7 @@ std::string CleanFile(const DicomFile& file)
   all.Short(0x00280103u, file.isSigned ? 1 : 0);
   all.Tag(0x7fe00010u);
   all.Bytes += std::string("OB\0\0", 4);
-  all.Number(0xffffffffu, 4);
+  all.Long(0xffffffffu);
   all.Bytes += ReadFragments(file);
   return all.Bytes;
 }
@@ -737,11 +728,7 @@ VoxelType DicomPixelReader::Read(
   {
     ByteStream stream(file.path, file.pixelOffset, false);
     stream.Read(first, bytes.data(), size, size * file.frames.size());
-    const std::size_t valueBytes = VoxelBytes(TypeOf(file));
-    if (file.bigEndian != HostIsBigEndian() && valueBytes > 1)
-    {
-      SwapBytes(bytes, valueBytes);
-    }
+    ToHostOrder(bytes, VoxelBytes(TypeOf(file)), file.bigEndian);
   }
   ClearUnusedBits(file, bytes);
   return TypeOf(file);

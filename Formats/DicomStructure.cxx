@@ -1,5 +1,7 @@
 #include "DicomStructure.h"
 
+#include "ByteOrder.h"
+
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -112,12 +114,9 @@ private:
     {
       this->Damaged();
     }
-    std::uint32_t value = 0;
-    for (unsigned b = 0; b < bytes; ++b)
-    {
-      value |= this->Byte(position + b) << (8 * (this->BigEndian ? bytes - 1 - b : b));
-    }
-    return value;
+    const char* at = this->Bytes.data() + position;
+    return bytes == 2 ? NumberAt<std::uint16_t>(at, this->BigEndian)
+                      : NumberAt<std::uint32_t>(at, this->BigEndian);
   }
 
   std::uint32_t Tag(std::uint64_t position)

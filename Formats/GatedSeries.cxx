@@ -1,6 +1,7 @@
 #include "GatedSeries.h"
 
 #include "DicomSeries.h"
+#include "TextWords.h"
 #include "VolumeFile.h"
 
 #include <algorithm>
@@ -21,12 +22,7 @@ constexpr double GridTolerance = 1e-3; // mm
 
 bool IsDescription(const std::string& path)
 {
-  std::string extension = fs::path(path).extension().string();
-  for (char& c : extension)
-  {
-    c = (c >= 'A' && c <= 'Z') ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return extension == ".json";
+  return LowerCase(fs::path(path).extension().string()) == ".json";
 }
 
 std::unique_ptr<VolumeSource> Open(

@@ -1,7 +1,7 @@
 #include "GltfSkin.h"
 
 #include "Base64.h"
-#include "LittleEndian.h"
+#include "ByteOrder.h"
 #include "Require.h"
 
 #include <nlohmann/json.hpp>

@@ -5,8 +5,6 @@
 #include "TextFile.h"
 #include "TextWords.h"
 
-#include <nlohmann/json.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -31,19 +29,9 @@ struct Reader
 
   [[noreturn]] void Fail(const std::string& what) const { FormatError(this->file, what); }
 
-  /// A text, or empty when it is missing.
   std::string Text(const Json& object, const char* key, const std::string& owner) const
   {
-    const auto found = object.find(key);
-    if (found == object.end() || found->is_null())
-    {
-      return {};
-    }
-    if (!found->is_string())
-    {
-      this->Fail(owner + "." + key + " is not a text");
-    }
-    return found->get<std::string>();
+    return TextIn(object, key, this->file, owner);
   }
 
   /// What a position is multiplied with, to be LPS.
@@ -90,26 +78,6 @@ struct Reader
       owner + ".coordinateUnits is " + found->dump().substr(0, 32) + "; mm and um are known");
   }
 
-  Vector3 Position(const Json& point, const std::string& owner) const
-  {
-    const auto found = point.find("position");
-    if (found == point.end() || !found->is_array() || found->size() != 3)
-    {
-      this->Fail(owner + ".position is not a list of three numbers");
-    }
-    Vector3 position;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-    {
-      const Json& value = (*found)[axis];
-      if (!value.is_number() || !std::isfinite(value.get<double>()))
-      {
-        this->Fail(owner + ".position[" + std::to_string(axis) + "] is not a finite number");
-      }
-      position[static_cast<int>(axis)] = value.get<double>();
-    }
-    return position;
-  }
-
   void Points(const Json& markup, const std::string& owner, Markup& result,
     std::vector<std::size_t>& kept) const
   {
@@ -139,7 +107,7 @@ struct Reader
       Markup::Point point;
       point.label = this->Text(entry, "label", where);
       point.description = this->Text(entry, "description", where);
-      point.position = scale.cwiseProduct(this->Position(entry, where));
+      point.position = scale.cwiseProduct(PositionIn(entry, this->file, where + ".position"));
       result.points.push_back(point);
       kept.push_back(n);
     }

@@ -2,6 +2,7 @@
 
 #include "AtomicFile.h"
 #include "TextScanner.h"
+#include "TextWords.h"
 
 #include <cstring>
 
@@ -87,10 +88,7 @@ void WriteMatrixFile(
   const std::string& path, const Eigen::Ref<const Eigen::MatrixXd>& matrix, bool binary)
 {
   std::string text = binary ? "0 0\n" : "";
-  AppendNumber(text, static_cast<std::int64_t>(matrix.cols()));
-  text += ' ';
-  AppendNumber(text, static_cast<std::int64_t>(matrix.rows()));
-  text += '\n';
+  text += std::to_string(matrix.cols()) + ' ' + std::to_string(matrix.rows()) + '\n';
   for (Eigen::Index column = 0; column < matrix.cols(); ++column)
   {
     for (Eigen::Index row = 0; row < matrix.rows(); ++row)

@@ -4,7 +4,6 @@
 #include "TextScanner.h"
 #include "TextWords.h"
 
-#include <charconv>
 #include <map>
 #include <stdexcept>
 
@@ -12,14 +11,6 @@ namespace coronary
 {
 namespace
 {
-Vector3 Point(TextScanner& file)
-{
-  const double x = file.Coordinate();
-  const double y = file.Coordinate();
-  const double z = file.Coordinate();
-  return { x, y, z };
-}
-
 void AddPolygon(std::vector<Triangle>& triangles, const std::vector<std::int64_t>& corners)
 {
   for (std::size_t n = 2; n < corners.size(); ++n)
@@ -59,7 +50,7 @@ FileMesh ReadObj(TextScanner& file)
     const std::string_view keyword = file.Word();
     if (keyword == "v")
     {
-      mesh.points.push_back(Point(file));
+      mesh.points.push_back(file.Point());
     }
     else if (keyword == "f")
     {
@@ -78,8 +69,7 @@ FileMesh ReadObj(TextScanner& file)
         }
         const std::string_view first = word.substr(0, word.find('/'));
         std::int64_t index = 0;
-        const auto [end, error] = std::from_chars(first.data(), first.data() + first.size(), index);
-        if (error != std::errc() || end != first.data() + first.size() || index == 0)
+        if (!ParseNumber(first, index) || index == 0)
         {
           file.Fail("a face has a corner that is no number of a point");
         }
@@ -116,7 +106,7 @@ FileMesh ReadOff(TextScanner& file)
   file.SkipLine(); // the number of edges, which some leave out
   for (std::int64_t n = 0; n < points; ++n)
   {
-    mesh.points.push_back(Point(file));
+    mesh.points.push_back(file.Point());
     file.SkipLine();
   }
   std::vector<std::int64_t> corners;
@@ -174,7 +164,7 @@ FileMesh ReadMedit(TextScanner& file)
       const std::int64_t count = Count(file);
       for (std::int64_t n = 0; n < count; ++n)
       {
-        mesh.points.push_back(Point(file));
+        mesh.points.push_back(file.Point());
         file.Number(); // its reference
       }
       hasPoints = true;
@@ -224,23 +214,30 @@ FileMesh ReadMedit(TextScanner& file)
   return mesh;
 }
 
-void AppendPoint(std::string& text, const Vector3& point)
+/// A line for each of `lines`: what stands before its numbers, the numbers, what stands behind them.
+template <typename Lines>
+void AppendLines(std::string& text, const char* before, const Lines& lines, const char* behind)
 {
-  for (int c = 0; c < 3; ++c)
+  for (const auto& numbers : lines)
   {
-    text += c > 0 ? " " : "";
-    AppendNumber(text, point[c]);
+    text += before;
+    AppendNumbers(text, numbers);
+    text += behind;
   }
 }
 
+/// Cells whose corners count from 1.
 template <typename Cell>
-void AppendCell(std::string& text, const Cell& cell, std::int64_t firstIndex)
+std::vector<Cell> FromOne(std::vector<Cell> cells)
 {
-  for (std::size_t c = 0; c < cell.size(); ++c)
+  for (Cell& cell : cells)
   {
-    text += c > 0 ? " " : "";
-    AppendNumber(text, cell[c] + firstIndex);
+    for (std::int64_t& corner : cell)
+    {
+      ++corner;
+    }
   }
+  return cells;
 }
 
 void CheckMesh(const std::string& path, const FileMesh& mesh)
@@ -307,65 +304,53 @@ void WriteMeshFile(const std::string& path, const FileMesh& mesh)
   }
   CheckMesh(path, mesh);
   std::string text;
-  const auto count = [&](const std::string& before, std::size_t number)
-  {
-    text += before;
-    AppendNumber(text, static_cast<std::int64_t>(number));
-    text += '\n';
-  };
   if (EndsWith(path, ".obj"))
   {
-    for (const Vector3& point : mesh.points)
-    {
-      text += "v ";
-      AppendPoint(text, point);
-      text += '\n';
-    }
-    for (const Triangle& triangle : mesh.triangles)
-    {
-      text += "f ";
-      AppendCell(text, triangle, 1);
-      text += '\n';
-    }
+    text = ObjText(mesh);
   }
   else if (EndsWith(path, ".off"))
   {
     text = "OFF\n" + std::to_string(mesh.points.size()) + ' ' +
       std::to_string(mesh.triangles.size()) + " 0\n";
-    for (const Vector3& point : mesh.points)
-    {
-      AppendPoint(text, point);
-      text += '\n';
-    }
-    for (const Triangle& triangle : mesh.triangles)
-    {
-      text += "3 ";
-      AppendCell(text, triangle, 0);
-      text += '\n';
-    }
+    AppendLines(text, "", mesh.points, "\n");
+    AppendLines(text, "3 ", mesh.triangles, "\n");
   }
   else
   {
-    count("MeshVersionFormatted 2\nDimension 3\nVertices\n", mesh.points.size());
-    for (const Vector3& point : mesh.points)
+    text = "MeshVersionFormatted 2\nDimension 3\n";
+    const auto add = [&](const char* keyword, const auto& lines)
     {
-      AppendPoint(text, point);
-      text += " 0\n";
-    }
-    count("Triangles\n", mesh.triangles.size());
-    for (const Triangle& triangle : mesh.triangles)
-    {
-      AppendCell(text, triangle, 1);
-      text += " 0\n";
-    }
-    count("Tetrahedra\n", mesh.tetrahedra.size());
-    for (const auto& tetrahedron : mesh.tetrahedra)
-    {
-      AppendCell(text, tetrahedron, 1);
-      text += " 0\n";
-    }
+      text += keyword + std::string("\n") + std::to_string(lines.size()) + "\n";
+      AppendLines(text, "", lines, " 0\n");
+    };
+    add("Vertices", mesh.points);
+    add("Triangles", FromOne(mesh.triangles));
+    add("Tetrahedra", FromOne(mesh.tetrahedra));
     text += "End\n";
   }
   WriteFileAtomically(path, text);
+}
+
+std::string ObjText(const FileMesh& mesh)
+{
+  std::string text = mesh.comment.empty() ? "" : "# " + InOneLine(mesh.comment) + "\n";
+  AppendLines(text, "v ", mesh.points, "\n");
+  const std::vector<Triangle> triangles = FromOne(mesh.triangles);
+  if (mesh.faces.empty())
+  {
+    AppendLines(text, "f ", triangles, "\n");
+  }
+  for (const auto& [id, name] : mesh.faces)
+  {
+    text += "g " + name + "\n";
+    for (std::size_t n = 0; n < triangles.size(); ++n)
+    {
+      if (mesh.face[n] == id)
+      {
+        AppendLines(text, "f ", std::array<Triangle, 1>{ triangles[n] }, "\n");
+      }
+    }
+  }
+  return text;
 }
 }

@@ -1,31 +1,15 @@
 #include "VolumeHeaderParsers.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 
 namespace coronary
 {
 namespace
 {
-using Fields = std::map<std::string, std::string>;
-
-const std::string* Find(const Fields& fields, std::initializer_list<const char*> keys)
+bool IsTrue(const HeaderFields& fields, std::initializer_list<const char*> keys, bool otherwise)
 {
-  for (const char* key : keys)
-  {
-    const auto found = fields.find(key);
-    if (found != fields.end())
-    {
-      return &found->second;
-    }
-  }
-  return nullptr;
-}
-
-bool IsTrue(const Fields& fields, std::initializer_list<const char*> keys, bool otherwise)
-{
-  const std::string* value = Find(fields, keys);
+  const std::string* value = fields.Find(keys);
   return value ? (!value->empty() && ((*value)[0] == 'T' || (*value)[0] == 't' || *value == "1"))
                : otherwise;
 }
@@ -48,9 +32,9 @@ VoxelType TypeOf(const std::string& name, const std::string& path)
 }
 
 // Reads the "key = value" lines up to ElementDataFile, which is the last; returns where they end.
-std::size_t ReadFields(const std::string& path, Fields& fields)
+std::size_t ReadFields(HeaderFields& fields)
 {
-  const std::string text = ReadHeaderText(path);
+  const std::string text = ReadHeaderText(fields.path);
   std::size_t position = 0;
   while (position < text.size())
   {
@@ -65,34 +49,23 @@ std::size_t ReadFields(const std::string& path, Fields& fields)
       continue;
     }
     const std::string key = Trimmed(line.substr(0, equals));
-    fields[key] = Trimmed(line.substr(equals + 1));
+    fields.values[key] = Trimmed(line.substr(equals + 1));
     if (key == "ElementDataFile")
     {
       return position;
     }
   }
-  FormatError(path, "is not a MetaImage: no ElementDataFile in its header");
+  FormatError(fields.path, "is not a MetaImage: no ElementDataFile in its header");
 }
 
-std::string Required(const Fields& fields, const char* key, const std::string& path)
-{
-  const std::string* value = Find(fields, { key });
-  if (!value)
-  {
-    FormatError(path, std::string("the header has no ") + key);
-  }
-  return *value;
-}
-
-void SetGeometry(VolumeHeader& header, const Fields& fields, std::size_t dimensions)
+void SetGeometry(VolumeHeader& header, const HeaderFields& fields, std::size_t dimensions)
 {
   VolumeInfo& info = header.info;
-  std::vector<int> size =
-    ParseIntegers(Required(fields, "DimSize", info.path), dimensions, 1, info.path, "DimSize");
+  const std::vector<int> size = fields.Integers("DimSize", dimensions, 1);
   info.phases = dimensions == 4 ? size[3] : 1;
 
   std::vector<double> spacing(dimensions, 1.0);
-  if (const std::string* text = Find(fields, { "ElementSpacing", "ElementSize" }))
+  if (const std::string* text = fields.Find({ "ElementSpacing", "ElementSize" }))
   {
     spacing = ParseNumbers(*text, dimensions, info.path, "ElementSpacing");
   }
@@ -100,14 +73,14 @@ void SetGeometry(VolumeHeader& header, const Fields& fields, std::size_t dimensi
   {
     info.warnings.push_back("'" + info.path + "': no ElementSpacing; 1 mm is assumed.");
   }
-  const std::string* offset = Find(fields, { "Offset", "Origin", "Position" });
+  const std::string* offset = fields.Find({ "Offset", "Origin", "Position" });
   if (offset)
   {
     const std::vector<double> origin = ParseNumbers(*offset, dimensions, info.path, "Offset");
     info.grid.origin = Vector3(origin[0], origin[1], origin[2]);
   }
   Matrix3 axes = Matrix3::Identity();
-  if (const std::string* text = Find(fields, { "TransformMatrix", "Rotation", "Orientation" }))
+  if (const std::string* text = fields.Find({ "TransformMatrix", "Rotation", "Orientation" }))
   {
     const std::vector<double> matrix =
       ParseNumbers(*text, dimensions * dimensions, info.path, "TransformMatrix");
@@ -119,7 +92,7 @@ void SetGeometry(VolumeHeader& header, const Fields& fields, std::size_t dimensi
       }
     }
   }
-  else if (const std::string* letters = Find(fields, { "AnatomicalOrientation" }))
+  else if (const std::string* letters = fields.Find("AnatomicalOrientation"))
   {
     // ITK takes the identity then, and so every program built on it.
     if (*letters != "RAI" && letters->find('?') == std::string::npos)
@@ -147,41 +120,26 @@ VolumeHeader ReadMetaImageHeader(const std::string& path)
   VolumeHeader header;
   header.info.path = path;
   header.info.format = "MetaImage";
-  Fields fields;
-  const std::size_t headerSize = ReadFields(path, fields);
-
-  const int dimensions =
-    ParseIntegers(Required(fields, "NDims", path), 1, 1, path, "NDims").front();
-  if (dimensions != 3 && dimensions != 4)
+  HeaderFields fields{ path, {} };
+  const std::size_t headerSize = ReadFields(fields);
+  const int dimensions = fields.Dimensions("NDims");
+  const int channels = fields.Integer("ElementNumberOfChannels", 1, 1);
+  if (channels != 1)
   {
-    FormatError(path, "has " + std::to_string(dimensions) + " dimensions; 3 or 4 are needed");
-  }
-  if (const std::string* channels = Find(fields, { "ElementNumberOfChannels" }))
-  {
-    const int count = ParseIntegers(*channels, 1, 1, path, "ElementNumberOfChannels").front();
-    if (count != 1)
-    {
-      FormatError(path, "image has " + std::to_string(count) + " components; one is needed");
-    }
+    FormatError(path, "image has " + std::to_string(channels) + " components; one is needed");
   }
   if (!IsTrue(fields, { "BinaryData" }, true))
   {
     FormatError(path, "BinaryData = False (voxels as text) is not supported");
   }
-  header.type = TypeOf(Required(fields, "ElementType", path), path);
+  header.type = TypeOf(fields.Text("ElementType"), path);
   header.bigEndian = IsTrue(fields, { "BinaryDataByteOrderMSB", "ElementByteOrderMSB" }, false);
   header.compressed = IsTrue(fields, { "CompressedData" }, false);
-  if (const std::string* slope = Find(fields, { "ElementToIntensityFunctionSlope" }))
-  {
-    header.slope = ParseNumbers(*slope, 1, path, "ElementToIntensityFunctionSlope").front();
-  }
-  if (const std::string* offset = Find(fields, { "ElementToIntensityFunctionOffset" }))
-  {
-    header.intercept = ParseNumbers(*offset, 1, path, "ElementToIntensityFunctionOffset").front();
-  }
+  header.slope = fields.Number("ElementToIntensityFunctionSlope", 1.0);
+  header.intercept = fields.Number("ElementToIntensityFunctionOffset", 0.0);
   SetGeometry(header, fields, static_cast<std::size_t>(dimensions));
 
-  const std::string data = fields["ElementDataFile"];
+  const std::string& data = fields.Text("ElementDataFile");
   if (data == "LOCAL" || data == "Local" || data == "local")
   {
     header.dataFiles = { path };
@@ -193,19 +151,13 @@ VolumeHeader ReadMetaImageHeader(const std::string& path)
     FormatError(path,
       "ElementDataFile = " + data.substr(0, 64) + " is not supported; one file or LOCAL is needed");
   }
-  const std::filesystem::path file(data);
-  header.dataFiles = {
-    file.is_absolute() ? data : (std::filesystem::path(path).parent_path() / file).string()
-  };
-  if (const std::string* skip = Find(fields, { "HeaderSize" }))
+  header.dataFiles = { PathBeside(path, data) };
+  const int headerBytes = fields.Integer("HeaderSize", -1, 0);
+  if (headerBytes < 0)
   {
-    const int bytes = ParseIntegers(*skip, 1, -1, path, "HeaderSize").front();
-    if (bytes < 0)
-    {
-      FormatError(path, "HeaderSize = -1 is not supported");
-    }
-    header.dataOffset = static_cast<std::uint64_t>(bytes);
+    FormatError(path, "HeaderSize = -1 is not supported");
   }
+  header.dataOffset = static_cast<std::uint64_t>(headerBytes);
   return header;
 }
 }

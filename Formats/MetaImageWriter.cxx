@@ -1,6 +1,6 @@
 #include "MetaImageWriter.h"
 
-#include "ByteStream.h"
+#include "ByteOrder.h"
 #include "PackedFile.h"
 
 #include <algorithm>

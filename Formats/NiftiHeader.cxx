@@ -1,6 +1,6 @@
+#include "ByteOrder.h"
 #include "VolumeHeaderParsers.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -13,22 +13,16 @@ class Bytes
 {
 public:
   std::vector<unsigned char> Data;
-  bool Swap = false;
+  bool BigEndian = false;
 
   template <typename T>
   T Get(std::size_t offset) const
   {
-    std::array<unsigned char, sizeof(T)> raw{};
-    std::copy_n(this->Data.begin() + static_cast<std::ptrdiff_t>(offset), sizeof(T), raw.begin());
-    if (this->Swap)
-    {
-      std::reverse(raw.begin(), raw.end());
-    }
-    T value;
-    std::memcpy(&value, raw.data(), sizeof(T));
-    return value;
+    return NumberAt<T>(this->Data.data() + offset, this->BigEndian);
   }
 };
+
+using Affine = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
 struct Nifti
 {
@@ -43,59 +37,41 @@ struct Nifti
   int qform = 0;
   int sform = 0;
   std::array<double, 6> quaternion{}; ///< b, c, d, offset x, y, z
-  Eigen::Matrix<double, 3, 4> affine = Eigen::Matrix<double, 3, 4>::Zero();
+  Affine affine = Affine::Zero();
 };
 
-Nifti ParseFields1(const Bytes& bytes)
+/// Where the fields are: bytes from the beginning.
+struct Places
 {
-  Nifti n;
-  for (std::size_t i = 0; i < 8; ++i)
-  {
-    n.dim[i] = bytes.Get<std::int16_t>(40 + 2 * i);
-    n.pixdim[i] = bytes.Get<float>(76 + 4 * i);
-  }
-  n.datatype = bytes.Get<std::int16_t>(70);
-  n.offset = bytes.Get<float>(108);
-  n.slope = bytes.Get<float>(112);
-  n.intercept = bytes.Get<float>(116);
-  n.units = bytes.Data[123];
-  n.qform = bytes.Get<std::int16_t>(252);
-  n.sform = bytes.Get<std::int16_t>(254);
-  for (std::size_t i = 0; i < 6; ++i)
-  {
-    n.quaternion[i] = bytes.Get<float>(256 + 4 * i);
-  }
-  for (std::size_t i = 0; i < 12; ++i)
-  {
-    n.affine(static_cast<int>(i / 4), static_cast<int>(i % 4)) = bytes.Get<float>(280 + 4 * i);
-  }
-  return n;
-}
+  std::size_t dim, pixdim, datatype, offset, slope, intercept, qform, sform, quaternion, affine,
+    units;
+};
 
-Nifti ParseFields2(const Bytes& bytes)
+template <typename Size, typename Real, typename Offset, typename Code, typename Units>
+Nifti ParseFields(const Bytes& bytes, const Places& at)
 {
   Nifti n;
-  n.version2 = true;
+  const auto reals = [&bytes](std::size_t from, double* to, std::size_t count)
+  {
+    for (std::size_t i = 0; i < count; ++i)
+    {
+      to[i] = bytes.Get<Real>(from + i * sizeof(Real));
+    }
+  };
   for (std::size_t i = 0; i < 8; ++i)
   {
-    n.dim[i] = static_cast<double>(bytes.Get<std::int64_t>(16 + 8 * i));
-    n.pixdim[i] = bytes.Get<double>(104 + 8 * i);
+    n.dim[i] = static_cast<double>(bytes.Get<Size>(at.dim + i * sizeof(Size)));
   }
-  n.datatype = bytes.Get<std::int16_t>(12);
-  n.offset = static_cast<double>(bytes.Get<std::int64_t>(168));
-  n.slope = bytes.Get<double>(176);
-  n.intercept = bytes.Get<double>(184);
-  n.qform = bytes.Get<std::int32_t>(344);
-  n.sform = bytes.Get<std::int32_t>(348);
-  n.units = bytes.Get<std::int32_t>(500);
-  for (std::size_t i = 0; i < 6; ++i)
-  {
-    n.quaternion[i] = bytes.Get<double>(352 + 8 * i);
-  }
-  for (std::size_t i = 0; i < 12; ++i)
-  {
-    n.affine(static_cast<int>(i / 4), static_cast<int>(i % 4)) = bytes.Get<double>(400 + 8 * i);
-  }
+  reals(at.pixdim, n.pixdim.data(), 8);
+  reals(at.slope, &n.slope, 1);
+  reals(at.intercept, &n.intercept, 1);
+  reals(at.quaternion, n.quaternion.data(), 6);
+  reals(at.affine, n.affine.data(), 12);
+  n.datatype = bytes.Get<std::int16_t>(at.datatype);
+  n.offset = static_cast<double>(bytes.Get<Offset>(at.offset));
+  n.qform = bytes.Get<Code>(at.qform);
+  n.sform = bytes.Get<Code>(at.sform);
+  n.units = bytes.Get<Units>(at.units);
   return n;
 }
 
@@ -105,16 +81,16 @@ Nifti ParseHeader(const std::string& path, bool compressed, bool& bigEndian)
   Bytes bytes;
   bytes.Data.resize(540);
   const std::size_t got = stream.ReadSome(0, bytes.Data.data(), bytes.Data.size());
-  for (const bool swap : { false, true })
+  for (const bool order : { false, true })
   {
-    bytes.Swap = swap;
+    bigEndian = bytes.BigEndian = order;
     const auto size = bytes.Get<std::int32_t>(0);
-    bigEndian = HostIsBigEndian() != swap;
     if (size == 348 && got >= 348)
     {
       if (std::memcmp(bytes.Data.data() + 344, "n+1", 4) == 0)
       {
-        return ParseFields1(bytes);
+        return ParseFields<std::int16_t, float, float, std::int16_t, std::uint8_t>(
+          bytes, { 40, 76, 70, 108, 112, 116, 252, 254, 256, 280, 123 });
       }
       FormatError(path,
         "is no single-file NIfTI (its magic is not 'n+1'); .hdr/.img pairs and "
@@ -122,7 +98,10 @@ Nifti ParseHeader(const std::string& path, bool compressed, bool& bigEndian)
     }
     if (size == 540 && got >= 540 && std::memcmp(bytes.Data.data() + 4, "n+2", 4) == 0)
     {
-      return ParseFields2(bytes);
+      Nifti n = ParseFields<std::int64_t, double, std::int64_t, std::int32_t, std::int32_t>(
+        bytes, { 16, 104, 12, 168, 176, 184, 344, 348, 352, 400, 500 });
+      n.version2 = true;
+      return n;
     }
   }
   FormatError(path, "is not a NIfTI file, or it ends inside its header");

@@ -1,10 +1,7 @@
 #include "VolumeHeaderParsers.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <map>
 
@@ -12,13 +9,13 @@ namespace coronary
 {
 namespace
 {
-struct Fields
+/// Names in lower case.
+struct Fields : HeaderFields
 {
-  std::map<std::string, std::string> values; ///< keys in lower case
-  std::map<std::string, std::string> notes;  ///< "key:=value", as the writer spelled the key
-  std::vector<std::string> list;             ///< file names after "data file: LIST"
-  std::size_t end = 0;                       ///< where the header ends
-  bool closed = false;                       ///< by an empty line, so that data may follow
+  std::map<std::string, std::string> notes; ///< "key:=value", as the writer spelled the key
+  std::vector<std::string> list;            ///< file names after "data file: LIST"
+  std::size_t end = 0;                      ///< where the header ends
+  bool closed = false;                      ///< by an empty line, so that data may follow
 };
 
 // The value of a note: "\\n" and "\\\\" stand for the end of a line and a backslash.
@@ -42,6 +39,7 @@ Fields ParseFields(const std::string& text, const std::string& path)
     FormatError(path, "is not a NRRD file: it does not begin with 'NRRD000'");
   }
   Fields fields;
+  fields.path = path;
   std::size_t position = 0;
   NextLine(text, position);
   bool inList = false;
@@ -85,22 +83,6 @@ Fields ParseFields(const std::string& text, const std::string& path)
   }
   fields.end = position;
   return fields;
-}
-
-const std::string* Find(const Fields& fields, const char* key)
-{
-  const auto found = fields.values.find(key);
-  return found == fields.values.end() ? nullptr : &found->second;
-}
-
-std::string Required(const Fields& fields, const char* key, const std::string& path)
-{
-  const std::string* value = Find(fields, key);
-  if (!value)
-  {
-    FormatError(path, std::string("the header has no '") + key + "'");
-  }
-  return *value;
 }
 
 VoxelType TypeOf(const std::string& name, const std::string& path)
@@ -283,7 +265,7 @@ void SetGeometry(VolumeHeader& header, const Fields& fields, const std::vector<i
   Matrix3 axes = Matrix3::Identity();
   Vector3 origin = Vector3::Zero();
   Vector3 scale = Vector3::Ones();
-  if (const std::string* space = Find(fields, "space"))
+  if (const std::string* space = fields.Find("space"))
   {
     scale = SignsOfSpace(*space, info);
   }
@@ -291,7 +273,7 @@ void SetGeometry(VolumeHeader& header, const Fields& fields, const std::vector<i
   {
     info.warnings.push_back("'" + info.path + "': no 'space' in the header; LPS is assumed.");
   }
-  if (const std::string* units = Find(fields, "space units"))
+  if (const std::string* units = fields.Find("space units"))
   {
     const std::vector<std::string> words = QuotedWords(*units);
     for (std::size_t axis = 0; axis < std::min<std::size_t>(3, words.size()); ++axis)
@@ -313,7 +295,7 @@ void SetGeometry(VolumeHeader& header, const Fields& fields, const std::vector<i
       axes.col(a) = Vector3(vector[0], vector[1], vector[2]);
     }
   }
-  else if (const std::string* spacings = Find(fields, "spacings"))
+  else if (const std::string* spacings = fields.Find("spacings"))
   {
     const std::vector<std::string> words = Words(*spacings);
     for (int a = 0; a < 3; ++a)
@@ -331,7 +313,7 @@ void SetGeometry(VolumeHeader& header, const Fields& fields, const std::vector<i
   {
     info.warnings.push_back("'" + info.path + "': no voxel spacing; 1 mm is assumed.");
   }
-  if (const std::string* text = Find(fields, "space origin"))
+  if (const std::string* text = fields.Find("space origin"))
   {
     const std::vector<double> vector = ParseVector(*text, info.path, "space origin");
     if (vector.size() < 3)
@@ -363,7 +345,7 @@ std::uint64_t SkipLines(const std::string& file, std::uint64_t offset, int lines
 void SetData(VolumeHeader& header, const Fields& fields)
 {
   const std::string& path = header.info.path;
-  const std::string encoding = LowerCase(Required(fields, "encoding", path));
+  const std::string encoding = LowerCase(fields.Text("encoding"));
   header.compressed = encoding == "gzip" || encoding == "gz";
   if (!header.compressed && encoding != "raw")
   {
@@ -372,15 +354,14 @@ void SetData(VolumeHeader& header, const Fields& fields)
   }
   if (VoxelBytes(header.type) > 1)
   {
-    const std::string endian = LowerCase(Required(fields, "endian", path));
+    const std::string endian = LowerCase(fields.Text("endian"));
     if (endian != "big" && endian != "little")
     {
       FormatError(path, "endian is neither little nor big");
     }
     header.bigEndian = endian == "big";
   }
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  const std::string* data = Find(fields, "data file");
+  const std::string* data = fields.Find("data file");
   if (!data)
   {
     if (!fields.closed)
@@ -407,29 +388,22 @@ void SetData(VolumeHeader& header, const Fields& fields)
     }
     for (const std::string& name : names)
     {
-      const std::filesystem::path file(name);
-      header.dataFiles.push_back(file.is_absolute() ? name : (folder / file).string());
+      header.dataFiles.push_back(PathBeside(path, name));
       CheckedFileSize(header.dataFiles.back());
     }
   }
-  if (const std::string* skip = Find(fields, "line skip"))
+  const int lines = fields.Integer("line skip", 0, 0);
+  if (lines > 0 && header.dataFiles.size() > 1)
   {
-    const int lines = ParseIntegers(*skip, 1, 0, path, "line skip").front();
-    if (lines > 0 && header.dataFiles.size() > 1)
-    {
-      FormatError(path, "line skip with several data files is not supported");
-    }
-    header.dataOffset = SkipLines(header.dataFiles.front(), header.dataOffset, lines);
+    FormatError(path, "line skip with several data files is not supported");
   }
-  if (const std::string* skip = Find(fields, "byte skip"))
+  header.dataOffset = SkipLines(header.dataFiles.front(), header.dataOffset, lines);
+  const int bytes = fields.Integer("byte skip", -1, 0);
+  if (bytes < 0 || (bytes > 0 && header.compressed))
   {
-    const int bytes = ParseIntegers(*skip, 1, -1, path, "byte skip").front();
-    if (bytes < 0 || (bytes > 0 && header.compressed))
-    {
-      FormatError(path, "byte skip: " + *skip + " is not supported here");
-    }
-    header.dataOffset += static_cast<std::uint64_t>(bytes);
+    FormatError(path, "byte skip: " + fields.Text("byte skip") + " is not supported here");
   }
+  header.dataOffset += static_cast<std::uint64_t>(bytes);
 }
 }
 
@@ -446,17 +420,11 @@ VolumeHeader ReadNrrdHeader(const std::string& path)
   info.format = "NRRD";
   const Fields fields = ParseFields(ReadHeaderText(path), path);
   header.notes = fields.notes;
-  const int dimension =
-    ParseIntegers(Required(fields, "dimension", path), 1, 1, path, "dimension").front();
-  if (dimension != 3 && dimension != 4)
-  {
-    FormatError(path, "has " + std::to_string(dimension) + " dimensions; 3 or 4 are needed");
-  }
+  const int dimension = fields.Dimensions("dimension");
   const auto count = static_cast<std::size_t>(dimension);
-  const std::vector<int> size =
-    ParseIntegers(Required(fields, "sizes", path), count, 1, path, "sizes");
+  const std::vector<int> size = fields.Integers("sizes", count, 1);
   std::vector<std::string> kinds;
-  if (const std::string* text = Find(fields, "kinds"))
+  if (const std::string* text = fields.Find("kinds"))
   {
     kinds = Words(LowerCase(*text));
     if (kinds.size() != count)
@@ -467,7 +435,7 @@ VolumeHeader ReadNrrdHeader(const std::string& path)
     }
   }
   std::vector<std::vector<double>> directions;
-  if (const std::string* text = Find(fields, "space directions"))
+  if (const std::string* text = fields.Find("space directions"))
   {
     directions = ParseDirections(*text, path);
     if (directions.size() != count)
@@ -498,7 +466,7 @@ VolumeHeader ReadNrrdHeader(const std::string& path)
   }
   info.phases = phaseAxis >= 0 ? size[phaseAxis] : 1;
   header.phasesFirst = phaseAxis == 0;
-  header.type = TypeOf(Required(fields, "type", path), path);
+  header.type = TypeOf(fields.Text("type"), path);
   SetGeometry(header, fields, { size[spatialAxes[0]], size[spatialAxes[1]], size[spatialAxes[2]] },
     spatialAxes, directions);
   SetData(header, fields);

@@ -1,8 +1,8 @@
 #include "NrrdSequenceWriter.h"
 
-#include "ByteStream.h"
+#include "ByteOrder.h"
 #include "PackedFile.h"
-#include "TextScanner.h"
+#include "TextWords.h"
 
 #include <array>
 #include <cmath>
@@ -16,11 +16,7 @@ namespace
 std::string VectorText(const Vector3& vector)
 {
   std::string text = "(";
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    text += axis > 0 ? "," : "";
-    AppendNumber(text, vector[axis]);
-  }
+  AppendNumbers(text, vector, ",");
   return text + ")";
 }
 
@@ -83,11 +79,7 @@ void Write(const std::string& path, const ImageGrid& grid, const SequenceIndex& 
     "\"\nunits: \"\" \"\" \"\" \"" + index.unit +
     "\"\nspace origin: " + VectorText(grid.IndexToWorld(e[0], e[2], e[4])) +
     "\naxis 3 index type:=numeric\naxis 3 index values:=";
-  for (std::size_t n = 0; n < index.values.size(); ++n)
-  {
-    header += n > 0 ? " " : "";
-    AppendNumber(header, index.values[n]);
-  }
+  AppendNumbers(header, index.values);
   header += "\nDataNodeClassName:=vtkMRMLScalarVolumeNode\n\n";
   PackedFile output(path, header, compress ? Packing::Gzip : Packing::None);
   std::vector<T> volume(voxels);

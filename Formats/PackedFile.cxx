@@ -1,8 +1,6 @@
 #include "PackedFile.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <stdexcept>
 
 namespace coronary
@@ -13,12 +11,10 @@ constexpr std::size_t BlockBytes = 1u << 20;
 }
 
 PackedFile::PackedFile(const std::string& path, const std::string& header, Packing packing)
-  : Target(path)
-  , File(std::fopen(this->Target.TemporaryPath().c_str(), "wb"), &std::fclose)
+  : AtomicFile(path)
   , Kind(packing)
 {
   this->Write(header.data(), header.size());
-  this->Written = 0;
   if (packing == Packing::None)
   {
     return;
@@ -47,6 +43,7 @@ void PackedFile::Add(const void* data, std::size_t bytes)
   if (this->Kind == Packing::None)
   {
     this->Write(data, bytes);
+    this->Written += bytes;
     return;
   }
   const auto* from = static_cast<const unsigned char*>(data);
@@ -67,25 +64,6 @@ std::uint64_t PackedFile::Finish()
   return this->Written;
 }
 
-void PackedFile::Overwrite(std::size_t position, const std::string& text)
-{
-  if (std::fseek(this->File.get(), static_cast<long>(position), SEEK_SET) != 0)
-  {
-    this->Fail();
-  }
-  this->Write(text.data(), text.size());
-}
-
-void PackedFile::Commit()
-{
-  // A full disk may show only when the buffer is flushed.
-  if (std::fclose(this->File.release()) != 0)
-  {
-    this->Fail();
-  }
-  this->Target.Commit();
-}
-
 void PackedFile::Deflate(const void* data, std::size_t bytes, int flush)
 {
   // zlib's interface is not const-correct; it does not write to its input.
@@ -96,22 +74,9 @@ void PackedFile::Deflate(const void* data, std::size_t bytes, int flush)
     this->Stream.next_out = this->Packed.data();
     this->Stream.avail_out = static_cast<uInt>(this->Packed.size());
     deflate(&this->Stream, flush);
-    this->Write(this->Packed.data(), this->Packed.size() - this->Stream.avail_out);
+    const std::size_t size = this->Packed.size() - this->Stream.avail_out;
+    this->Write(this->Packed.data(), size);
+    this->Written += size;
   } while (this->Stream.avail_out == 0);
-}
-
-void PackedFile::Write(const void* data, std::size_t bytes)
-{
-  if (!this->File || std::fwrite(data, 1, bytes, this->File.get()) != bytes)
-  {
-    this->Fail();
-  }
-  this->Written += bytes;
-}
-
-void PackedFile::Fail() const
-{
-  throw std::runtime_error(
-    "Cannot write '" + this->Target.Path() + "': " + std::strerror(errno) + ".");
 }
 }

@@ -78,34 +78,6 @@ std::string ReplaceNonFinite(const std::string& text)
   return result;
 }
 
-double FiniteNumber(const Json& value, const std::string& path, const std::string& name)
-{
-  if (!value.is_number() || !std::isfinite(value.get<double>()))
-  {
-    FormatError(path, name + " is not a finite number");
-  }
-  return value.get<double>();
-}
-
-std::string Text(const Json& object, const char* key, const std::string& path,
-  const std::string& owner, bool required)
-{
-  const auto found = object.find(key);
-  if (found == object.end())
-  {
-    if (required)
-    {
-      FormatError(path, owner + " has no '" + key + "'");
-    }
-    return {};
-  }
-  if (!found->is_string() || (required && found->get_ref<const std::string&>().empty()))
-  {
-    FormatError(path, owner + "." + key + " is not a text");
-  }
-  return found->get<std::string>();
-}
-
 void Check(const SeriesDescription& description, const std::string& path)
 {
   if (!std::isfinite(description.cycleMs) || description.cycleMs < 0.0)
@@ -156,14 +128,14 @@ SeriesDescription::Phase ParsePhase(
   {
     FormatError(path, name + " has no 'fraction'");
   }
-  phase.fraction = FiniteNumber(entry["fraction"], path, name + ".fraction");
-  phase.image = Text(entry, "image", path, name, true);
-  phase.mask = Text(entry, "mask", path, name, false);
+  phase.fraction = FiniteIn(entry["fraction"], path, name + ".fraction");
+  phase.image = TextIn(entry, "image", path, name);
+  phase.mask = TextIn(entry, "mask", path, name);
   const auto truth = entry.find("truth");
   if (truth != entry.end() && truth->is_object())
   {
-    phase.surface = Text(*truth, "surface", path, name + ".truth", false);
-    phase.centerline = Text(*truth, "centerline", path, name + ".truth", false);
+    phase.surface = TextIn(*truth, "surface", path, name + ".truth");
+    phase.centerline = TextIn(*truth, "centerline", path, name + ".truth");
   }
   return phase;
 }
@@ -176,21 +148,10 @@ SeriesDescription::Seed ParseSeed(
     FormatError(path, name + " is not an object");
   }
   SeriesDescription::Seed seed;
-  seed.name = Text(entry, "name", path, name, false);
-  const std::string title = name + " ('" + seed.name + "'): position";
-  const auto position = entry.find("position");
-  if (position == entry.end() || !position->is_array() || position->size() != 3)
-  {
-    FormatError(path, title + " is not a list of three numbers");
-  }
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    seed.position[axis] =
-      FiniteNumber((*position)[axis], path, title + "[" + std::to_string(axis) + "]");
-  }
+  seed.name = TextIn(entry, "name", path, name);
+  seed.position = PositionIn(entry, path, name + " ('" + seed.name + "'): position");
   return seed;
 }
-
 }
 
 SeriesDescription ReadSeriesDescription(const std::string& path)
@@ -204,7 +165,7 @@ SeriesDescription ReadSeriesDescription(const std::string& path)
   SeriesDescription description;
   if (root.contains("cycle_ms"))
   {
-    description.cycleMs = FiniteNumber(root["cycle_ms"], path, "cycle_ms");
+    description.cycleMs = FiniteIn(root["cycle_ms"], path, "cycle_ms");
     if (!(description.cycleMs > 0.0))
     {
       FormatError(path, "cycle_ms is not a positive number");

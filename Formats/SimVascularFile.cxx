@@ -2,7 +2,6 @@
 
 #include "ByteStream.h"
 #include "TextFile.h"
-#include "TextScanner.h"
 #include "TextWords.h"
 #include "XmlText.h"
 
@@ -154,7 +153,6 @@ SimVascularPath ParseSimVascularPath(const std::string& text, const std::string&
   {
     FormatError(name, "the path has no points");
   }
-  path.timesteps = steps;
   return path;
 }
 
@@ -210,7 +208,6 @@ SimVascularContourGroup ParseSimVascularContours(const std::string& text, const 
   {
     FormatError(name, "the group has no contours with points");
   }
-  group.timesteps = steps;
   return group;
 }
 

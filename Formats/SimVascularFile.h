@@ -28,8 +28,7 @@ struct SimVascularPath
 {
   int id = 0;
   std::vector<Vector3> controlPoints;
-  std::vector<PathFrame> points;
-  int timesteps = 1; ///< in the file; the first one is what was read
+  std::vector<PathFrame> points; ///< of the first time step
 };
 
 struct SimVascularContour
@@ -51,8 +50,7 @@ struct SimVascularContourGroup
 {
   std::string pathName;
   int pathId = 0;
-  std::vector<SimVascularContour> contours;
-  int timesteps = 1; ///< in the file; the first one is what was read
+  std::vector<SimVascularContour> contours; ///< of the first time step
 };
 
 /**

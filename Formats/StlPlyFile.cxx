@@ -1,12 +1,12 @@
-#include "StlPlyFile.h"
-
-#include "ByteStream.h"
+#include "ByteOrder.h"
+#include "MeshFile.h"
 #include "TextScanner.h"
+#include "TextWords.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <vector>
@@ -18,21 +18,6 @@ namespace
 [[noreturn]] void Refuse(const TextScanner& file, const std::string& what)
 {
   throw std::runtime_error("'" + file.Path() + "' " + what + ".");
-}
-
-/// A number out of bytes of an order that is given.
-template <typename T>
-T Stored(const char* from, bool bigEndian)
-{
-  std::array<char, sizeof(T)> bytes{};
-  std::memcpy(bytes.data(), from, sizeof(T));
-  if (bigEndian != HostIsBigEndian())
-  {
-    std::reverse(bytes.begin(), bytes.end());
-  }
-  T value;
-  std::memcpy(&value, bytes.data(), sizeof(T));
-  return value;
 }
 
 // STL -----------------------------------------------------------------------------------------------------------------
@@ -85,7 +70,7 @@ void ReadBinaryStl(const TextScanner& file, std::size_t count, FileMesh& mesh)
       Vector3 point;
       for (int axis = 0; axis < 3; ++axis, at += 4)
       {
-        point[axis] = static_cast<double>(Stored<float>(at, false));
+        point[axis] = static_cast<double>(NumberAt<float>(at, false));
       }
       if (!point.allFinite())
       {
@@ -119,10 +104,7 @@ void ReadTextStl(TextScanner& file, FileMesh& mesh)
     }
     else if (word == "vertex")
     {
-      const double x = file.Coordinate();
-      const double y = file.Coordinate();
-      const double z = file.Coordinate();
-      corners.push_back(merger.Add({ x, y, z }));
+      corners.push_back(merger.Add(file.Point()));
     }
     else if (word == "endfacet")
     {
@@ -146,18 +128,29 @@ void ReadTextStl(TextScanner& file, FileMesh& mesh)
 // PLY -----------------------------------------------------------------------------------------------------------------
 struct PlyType
 {
-  char kind = 'i'; ///< i, u or f: signed, unsigned, floating
-  int bytes = 0;
+  std::size_t bytes = 0;
+  double (*read)(const char* at, bool bigEndian) = nullptr;
 };
+
+template <typename Value>
+PlyType TypeFor()
+{
+  return { sizeof(Value), [](const char* at, bool bigEndian) {
+            return static_cast<double>(NumberAt<Value>(at, bigEndian));
+          } };
+}
 
 PlyType TypeOf(const TextScanner& file, std::string_view name)
 {
-  static const std::map<std::string_view, PlyType> types{ { "char", { 'i', 1 } },
-    { "int8", { 'i', 1 } }, { "uchar", { 'u', 1 } }, { "uint8", { 'u', 1 } },
-    { "short", { 'i', 2 } }, { "int16", { 'i', 2 } }, { "ushort", { 'u', 2 } },
-    { "uint16", { 'u', 2 } }, { "int", { 'i', 4 } }, { "int32", { 'i', 4 } },
-    { "uint", { 'u', 4 } }, { "uint32", { 'u', 4 } }, { "float", { 'f', 4 } },
-    { "float32", { 'f', 4 } }, { "double", { 'f', 8 } }, { "float64", { 'f', 8 } } };
+  static const std::map<std::string_view, PlyType> types{ { "char", TypeFor<std::int8_t>() },
+    { "int8", TypeFor<std::int8_t>() }, { "uchar", TypeFor<std::uint8_t>() },
+    { "uint8", TypeFor<std::uint8_t>() }, { "short", TypeFor<std::int16_t>() },
+    { "int16", TypeFor<std::int16_t>() }, { "ushort", TypeFor<std::uint16_t>() },
+    { "uint16", TypeFor<std::uint16_t>() }, { "int", TypeFor<std::int32_t>() },
+    { "int32", TypeFor<std::int32_t>() }, { "uint", TypeFor<std::uint32_t>() },
+    { "uint32", TypeFor<std::uint32_t>() }, { "float", TypeFor<float>() },
+    { "float32", TypeFor<float>() }, { "double", TypeFor<double>() },
+    { "float64", TypeFor<double>() } };
   const auto found = types.find(name);
   if (found == types.end())
   {
@@ -211,26 +204,19 @@ public:
     {
       return this->File.Number();
     }
-    if (this->Left() < static_cast<std::size_t>(type.bytes))
+    if (this->Left() < type.bytes)
     {
       Refuse(this->File, "ends before its last element");
     }
     const char* at = this->File.Text().data() + this->At;
-    this->At += static_cast<std::size_t>(type.bytes);
-    const bool big = this->Kind == Form::Big;
-    switch (type.bytes)
-    {
-      case 1:
-        return type.kind == 'i' ? Stored<std::int8_t>(at, big) : Stored<std::uint8_t>(at, big);
-      case 2:
-        return type.kind == 'i' ? Stored<std::int16_t>(at, big) : Stored<std::uint16_t>(at, big);
-      case 4:
-        return type.kind == 'f' ? static_cast<double>(Stored<float>(at, big))
-          : type.kind == 'i'    ? static_cast<double>(Stored<std::int32_t>(at, big))
-                                : static_cast<double>(Stored<std::uint32_t>(at, big));
-      default:
-        return Stored<double>(at, big);
-    }
+    this->At += type.bytes;
+    return type.read(at, this->Kind == Form::Big);
+  }
+
+  /// How many numbers a property has of the element that comes next.
+  std::int64_t LengthOf(const PlyProperty& property)
+  {
+    return property.isList ? this->Whole(property.count, 4294967295.0, "a list of no length") : 1;
   }
 
   /// A whole number from 0 to `most`. @param what  it is, for the message
@@ -347,10 +333,7 @@ void ReadVertices(TextScanner& file, PlyValues& values, const PlyElement& elemen
     {
       const PlyProperty& property = element.properties[p];
       double value = 0.0;
-      for (std::int64_t left = property.isList
-             ? values.Whole(property.count, 4294967295.0, "a list of no length")
-             : 1;
-           left > 0; --left)
+      for (std::int64_t left = values.LengthOf(property); left > 0; --left)
       {
         value = values.Next(property.type);
       }
@@ -374,8 +357,7 @@ void ReadOthers(PlyValues& values, const PlyElement& element, FileMesh& mesh)
   {
     for (const PlyProperty& property : element.properties)
     {
-      std::int64_t left =
-        property.isList ? values.Whole(property.count, 4294967295.0, "a list of no length") : 1;
+      std::int64_t left = values.LengthOf(property);
       if (element.name != "face" ||
         (property.name != "vertex_indices" && property.name != "vertex_index"))
       {
@@ -398,6 +380,14 @@ void ReadOthers(PlyValues& values, const PlyElement& element, FileMesh& mesh)
     }
   }
 }
+
+void AppendFloats(std::string& bytes, const Vector3& v)
+{
+  for (int c = 0; c < 3; ++c)
+  {
+    AppendLittleEndian(bytes, static_cast<float>(v[c]));
+  }
+}
 }
 
 FileMesh ReadStlFile(const std::string& path)
@@ -405,7 +395,7 @@ FileMesh ReadStlFile(const std::string& path)
   TextScanner file(path);
   const std::string& bytes = file.Text();
   const std::size_t claimed =
-    bytes.size() >= StlHead ? Stored<std::uint32_t>(bytes.data() + StlHead - 4, false) : 0;
+    bytes.size() >= StlHead ? NumberAt<std::uint32_t>(bytes.data() + StlHead - 4, false) : 0;
   const bool fits = bytes.size() >= StlHead && claimed == (bytes.size() - StlHead) / StlTriangle &&
     (bytes.size() - StlHead) % StlTriangle == 0;
   FileMesh mesh;
@@ -458,5 +448,65 @@ FileMesh ReadPlyFile(const std::string& path)
     }
   }
   return mesh;
+}
+
+std::string PlyBytes(const FileMesh& mesh)
+{
+  std::string file =
+    "ply\nformat binary_little_endian 1.0\ncomment " + InOneLine(mesh.comment) + "\n";
+  for (const auto& [id, name] : mesh.faces)
+  {
+    file += "comment face_id " + std::to_string(id) + " " + InOneLine(name) + "\n";
+  }
+  file += "element vertex " + std::to_string(mesh.points.size()) +
+    "\nproperty float x\nproperty float y\nproperty float z\n";
+  for (const auto& [name, values] : mesh.vertexValues)
+  {
+    file.append("property float ").append(name).append("\n");
+  }
+  file += "element face " + std::to_string(mesh.triangles.size()) +
+    "\nproperty list uchar int vertex_indices\nproperty int face_id\nend_header\n";
+  for (std::size_t n = 0; n < mesh.points.size(); ++n)
+  {
+    AppendFloats(file, mesh.points[n]);
+    for (const auto& [name, values] : mesh.vertexValues)
+    {
+      AppendLittleEndian(file, values[n]);
+    }
+  }
+  for (std::size_t n = 0; n < mesh.triangles.size(); ++n)
+  {
+    file += '\3';
+    for (const std::int64_t corner : mesh.triangles[n])
+    {
+      AppendLittleEndian(file, static_cast<std::int32_t>(corner));
+    }
+    AppendLittleEndian(file, static_cast<std::int32_t>(mesh.face[n]));
+  }
+  return file;
+}
+
+std::string StlBytes(const FileMesh& mesh)
+{
+  if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
+  {
+    throw std::invalid_argument("A surface has too many triangles for an .stl file");
+  }
+  constexpr std::size_t HeaderSize = 80;
+  std::string file = InOneLine(mesh.comment);
+  file.resize(HeaderSize, ' '); // may not begin with "solid", which a text file does
+  AppendLittleEndian(file, static_cast<std::uint32_t>(mesh.triangles.size()));
+  for (const Triangle& triangle : mesh.triangles)
+  {
+    const Vector3& a = mesh.points[static_cast<std::size_t>(triangle[0])];
+    const Vector3& b = mesh.points[static_cast<std::size_t>(triangle[1])];
+    const Vector3& c = mesh.points[static_cast<std::size_t>(triangle[2])];
+    AppendFloats(file, (b - a).cross(c - a).stableNormalized());
+    AppendFloats(file, a);
+    AppendFloats(file, b);
+    AppendFloats(file, c);
+    AppendLittleEndian(file, std::uint16_t{ 0 });
+  }
+  return file;
 }
 }

@@ -3,7 +3,6 @@
 #include "TextFile.h"
 #include "TextWords.h"
 
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -15,17 +14,6 @@ namespace
 bool IsBlank(char c)
 {
   return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v' || c == '\0';
-}
-
-template <typename Value>
-bool Parse(std::string_view word, Value& value)
-{
-  if (!word.empty() && word.front() == '+')
-  {
-    word.remove_prefix(1);
-  }
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  return error == std::errc() && end == word.data() + word.size();
 }
 }
 
@@ -104,28 +92,32 @@ double TextScanner::Number()
 {
   const std::string_view word = this->Word();
   double value = 0.0;
-  if (!Parse(word, value))
+  if (!ParseNumber(word, value))
   {
     this->Fail(Quoted(word) + " is no number");
   }
   return value;
 }
 
-double TextScanner::Coordinate()
+Vector3 TextScanner::Point()
 {
-  const double value = this->Number();
-  if (!std::isfinite(value))
+  Vector3 point;
+  for (double& coordinate : point)
   {
-    this->Fail("a coordinate is not finite");
+    coordinate = this->Number();
+    if (!std::isfinite(coordinate))
+    {
+      this->Fail("a coordinate is not finite");
+    }
   }
-  return value;
+  return point;
 }
 
 std::int64_t TextScanner::Integer()
 {
   const std::string_view word = this->Word();
   std::int64_t value = 0;
-  if (!Parse(word, value))
+  if (!ParseNumber(word, value))
   {
     this->Fail(Quoted(word) + " is no integer");
   }
@@ -136,19 +128,5 @@ void TextScanner::Fail(const std::string& what) const
 {
   throw std::runtime_error(
     "'" + this->Name + "', line " + std::to_string(this->Line) + ": " + what + ".");
-}
-
-void AppendNumber(std::string& text, double value)
-{
-  char buffer[40];
-  const auto [end, error] = std::to_chars(std::begin(buffer), std::end(buffer), value);
-  text.append(std::begin(buffer), error == std::errc() ? end : std::begin(buffer));
-}
-
-void AppendNumber(std::string& text, std::int64_t value)
-{
-  char buffer[24];
-  const auto [end, error] = std::to_chars(std::begin(buffer), std::end(buffer), value);
-  text.append(std::begin(buffer), error == std::errc() ? end : std::begin(buffer));
 }
 }

@@ -2,6 +2,8 @@
 #ifndef DynamicCoronary_TextScanner_h
 #define DynamicCoronary_TextScanner_h
 
+#include "Geometry.h"
+
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -28,7 +30,7 @@ public:
   void SkipLine();         ///< the rest of this line
   void SkipCharacter();    ///< one of them, whichever it is; not at the end of the file
   double Number();         ///< the next word as a number, which may be nan or inf
-  double Coordinate();     ///< the next word as a finite number
+  Vector3 Point();         ///< the next three words as finite numbers
   std::int64_t Integer();  ///< the next word as an integer
 
   /// @throws std::runtime_error: file, line of the last word, what
@@ -43,10 +45,6 @@ private:
   std::int64_t Line = 1;
   char Comment = 0;
 };
-
-/// Appends a number such that reading gives the same bits.
-void AppendNumber(std::string& text, double value);
-void AppendNumber(std::string& text, std::int64_t value);
 }
 
 #endif

@@ -1,7 +1,6 @@
 #include "TextWords.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -21,6 +20,13 @@ std::string Quoted(std::string_view word)
     shown += c >= ' ' && c <= '~' ? c : '?';
   }
   return "'" + shown + (word.size() > 40 ? "..'" : "'");
+}
+
+std::string InOneLine(std::string text)
+{
+  std::replace_if(
+    text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  return text;
 }
 
 bool EndsWith(std::string_view text, std::string_view end)
@@ -74,19 +80,6 @@ std::vector<std::string> Words(const std::string& text)
     position = std::min(text.find_first_of(" \t\r\n", first), text.size());
     words.push_back(text.substr(first, position - first));
   }
-}
-
-bool ParseNumber(const std::string& text, double& value)
-{
-  const char* first = text.data();
-  const char* last = first + text.size();
-  // from_chars knows no leading plus.
-  if (first != last && *first == '+')
-  {
-    ++first;
-  }
-  const std::from_chars_result result = std::from_chars(first, last, value);
-  return result.ec == std::errc() && result.ptr == last;
 }
 
 std::vector<double> ParseNumbers(

@@ -1,5 +1,6 @@
 #include "VolumeFile.h"
 
+#include "ByteOrder.h"
 #include "VolumeHeaderParsers.h"
 
 #include <algorithm>
@@ -111,10 +112,7 @@ protected:
     {
       this->ReadBytes((phase * slices + k) * planeVoxels * valueBytes, plane.bytes, poll);
     }
-    if (this->Layout.bigEndian != HostIsBigEndian() && valueBytes > 1)
-    {
-      SwapBytes(plane.bytes, valueBytes);
-    }
+    ToHostOrder(plane.bytes, valueBytes, this->Layout.bigEndian);
   }
 
   void EndOfVolume() override
@@ -226,6 +224,60 @@ VolumeHeader ReadVolumeHeader(const std::string& path)
 std::unique_ptr<VolumeSource> OpenVolumeFile(const std::string& path)
 {
   return std::make_unique<VolumeFile>(ReadVolumeHeader(path));
+}
+
+const std::string* HeaderFields::Find(std::initializer_list<const char*> names) const
+{
+  for (const char* name : names)
+  {
+    const auto found = this->values.find(name);
+    if (found != this->values.end())
+    {
+      return &found->second;
+    }
+  }
+  return nullptr;
+}
+
+const std::string& HeaderFields::Text(const char* name) const
+{
+  const std::string* text = this->Find(name);
+  if (!text)
+  {
+    FormatError(this->path, std::string("the header has no '") + name + "'");
+  }
+  return *text;
+}
+
+std::vector<int> HeaderFields::Integers(const char* name, std::size_t count, int low) const
+{
+  return ParseIntegers(this->Text(name), count, low, this->path, name);
+}
+
+int HeaderFields::Integer(const char* name, int low, int otherwise) const
+{
+  return this->Find(name) ? this->Integer(name, low) : otherwise;
+}
+
+double HeaderFields::Number(const char* name, double otherwise) const
+{
+  const std::string* text = this->Find(name);
+  return text ? ParseNumbers(*text, 1, this->path, name).front() : otherwise;
+}
+
+int HeaderFields::Dimensions(const char* name) const
+{
+  const int dimensions = this->Integer(name, 1);
+  if (dimensions != 3 && dimensions != 4)
+  {
+    FormatError(this->path, "has " + std::to_string(dimensions) + " dimensions; 3 or 4 are needed");
+  }
+  return dimensions;
+}
+
+std::string PathBeside(const std::string& file, const std::string& name)
+{
+  return (fs::path(file).parent_path() / name).string();
 }
 
 std::string ReadHeaderText(const std::string& path)

@@ -67,57 +67,40 @@ bool Convert(
   return true;
 }
 
-template <typename T>
-bool ConvertRow(VoxelType type, const unsigned char* bytes, std::size_t count, double slope,
-  double intercept, T* values)
+/// Calls visit with a value of the type.
+template <typename Visit>
+auto VisitVoxel(VoxelType type, const Visit& visit)
 {
   switch (type)
   {
     case VoxelType::Int8:
-      return Convert<std::int8_t>(bytes, count, slope, intercept, values);
+      return visit(std::int8_t{});
     case VoxelType::UInt8:
-      return Convert<std::uint8_t>(bytes, count, slope, intercept, values);
+      return visit(std::uint8_t{});
     case VoxelType::Int16:
-      return Convert<std::int16_t>(bytes, count, slope, intercept, values);
+      return visit(std::int16_t{});
     case VoxelType::UInt16:
-      return Convert<std::uint16_t>(bytes, count, slope, intercept, values);
+      return visit(std::uint16_t{});
     case VoxelType::Int32:
-      return Convert<std::int32_t>(bytes, count, slope, intercept, values);
+      return visit(std::int32_t{});
     case VoxelType::UInt32:
-      return Convert<std::uint32_t>(bytes, count, slope, intercept, values);
+      return visit(std::uint32_t{});
     case VoxelType::Int64:
-      return Convert<std::int64_t>(bytes, count, slope, intercept, values);
+      return visit(std::int64_t{});
     case VoxelType::UInt64:
-      return Convert<std::uint64_t>(bytes, count, slope, intercept, values);
+      return visit(std::uint64_t{});
     case VoxelType::Float32:
-      return Convert<float>(bytes, count, slope, intercept, values);
+      return visit(float{});
     case VoxelType::Float64:
-      return Convert<double>(bytes, count, slope, intercept, values);
+      break;
   }
-  return false;
+  return visit(double{});
 }
 }
 
 std::size_t VoxelBytes(VoxelType type)
 {
-  switch (type)
-  {
-    case VoxelType::Int8:
-    case VoxelType::UInt8:
-      return 1;
-    case VoxelType::Int16:
-    case VoxelType::UInt16:
-      return 2;
-    case VoxelType::Int32:
-    case VoxelType::UInt32:
-    case VoxelType::Float32:
-      return 4;
-    case VoxelType::Int64:
-    case VoxelType::UInt64:
-    case VoxelType::Float64:
-      return 8;
-  }
-  return 0;
+  return VisitVoxel(type, [](auto value) { return sizeof(value); });
 }
 
 VolumeSource::~VolumeSource() = default;
@@ -162,8 +145,12 @@ bool VolumeSource::ReadPlanes(
     for (int j = extent[2]; j <= extent[3]; ++j)
     {
       const std::size_t first = static_cast<std::size_t>(j) * wholeRow + extent[0];
-      if (!ConvertRow(plane.type, plane.bytes.data() + first * size, rowLength, plane.slope,
-            plane.intercept, values))
+      const unsigned char* bytes = plane.bytes.data() + first * size;
+      const bool good = VisitVoxel(plane.type,
+        [&](auto stored) {
+          return Convert<decltype(stored)>(bytes, rowLength, plane.slope, plane.intercept, values);
+        });
+      if (!good)
       {
         return false;
       }

@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace coronary
@@ -29,6 +30,24 @@ enum class VoxelType
   Float32,
   Float64
 };
+
+/// Of a C++ type of numbers.
+template <typename Value>
+constexpr VoxelType VoxelTypeOf()
+{
+  constexpr bool isSigned = std::is_signed_v<Value>;
+  if constexpr (std::is_floating_point_v<Value>)
+  {
+    return sizeof(Value) == 4 ? VoxelType::Float32 : VoxelType::Float64;
+  }
+  else
+  {
+    return sizeof(Value) == 1 ? (isSigned ? VoxelType::Int8 : VoxelType::UInt8)
+      : sizeof(Value) == 2    ? (isSigned ? VoxelType::Int16 : VoxelType::UInt16)
+      : sizeof(Value) == 4    ? (isSigned ? VoxelType::Int32 : VoxelType::UInt32)
+                              : (isSigned ? VoxelType::Int64 : VoxelType::UInt64);
+  }
+}
 
 /// Bytes of one value.
 std::size_t VoxelBytes(VoxelType type);

@@ -1,10 +1,11 @@
 #include "XmlDataFile.h"
 
 #include "Base64.h"
+#include "ByteOrder.h"
+#include "TextWords.h"
 #include "XmlText.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -114,13 +115,9 @@ std::optional<std::string> EncodedArray(View data, const Layout& layout)
     {
       return {};
     }
-    std::uint64_t value = 0;
-    for (std::size_t k = 0; k < bytes; ++k)
-    {
-      const std::size_t from = layout.bigEndian ? k : bytes - 1 - k;
-      value = value << 8 | static_cast<unsigned char>(data[index * bytes + from]);
-    }
-    return static_cast<std::size_t>(value);
+    const char* at = data.data() + index * bytes;
+    return bytes == 8 ? NumberAt<std::uint64_t>(at, layout.bigEndian)
+                      : NumberAt<std::uint32_t>(at, layout.bigEndian);
   };
   const std::optional<std::size_t> first = header(0);
   if (!first)
@@ -162,11 +159,8 @@ std::optional<std::string> EncodedArray(View data, const Layout& layout)
 
 std::optional<std::size_t> Offset(const XmlElement& element)
 {
-  const std::string digits = element.String("offset");
   std::size_t value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  return error == std::errc() && end == digits.data() + digits.size() ? std::optional(value)
-                                                                      : std::nullopt;
+  return ParseNumber(element.String("offset"), value) ? std::optional(value) : std::nullopt;
 }
 
 /// The text with its appended data in the elements of the arrays; nothing when they are not understood.

@@ -2,6 +2,7 @@
 
 #include "GatedSeries.h"
 #include "LargePages.h"
+#include "TextWords.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 
@@ -200,43 +201,9 @@ private:
 
   void SetType()
   {
-    using coronary::VoxelType;
     switch (this->VtkType)
     {
-      case VTK_CHAR:
-      case VTK_SIGNED_CHAR:
-        this->Type = VoxelType::Int8;
-        break;
-      case VTK_UNSIGNED_CHAR:
-        this->Type = VoxelType::UInt8;
-        break;
-      case VTK_SHORT:
-        this->Type = VoxelType::Int16;
-        break;
-      case VTK_UNSIGNED_SHORT:
-        this->Type = VoxelType::UInt16;
-        break;
-      case VTK_INT:
-        this->Type = VoxelType::Int32;
-        break;
-      case VTK_UNSIGNED_INT:
-        this->Type = VoxelType::UInt32;
-        break;
-      case VTK_FLOAT:
-        this->Type = VoxelType::Float32;
-        break;
-      case VTK_DOUBLE:
-        this->Type = VoxelType::Float64;
-        break;
-      case VTK_LONG:
-      case VTK_LONG_LONG:
-      case VTK_ID_TYPE:
-        this->Type = VoxelType::Int64;
-        break;
-      case VTK_UNSIGNED_LONG:
-      case VTK_UNSIGNED_LONG_LONG:
-        this->Type = VoxelType::UInt64;
-        break;
+      vtkTemplateMacro(this->Type = coronary::VoxelTypeOf<VTK_TT>());
       default:
         throw std::runtime_error("'" + this->Header.path + "': its scalars are no numbers.");
     }
@@ -251,10 +218,9 @@ private:
 
 std::unique_ptr<coronary::VolumeSource> OpenVti(const std::string& path)
 {
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-    [](char c) { return (c >= 'A' && c <= 'Z') ? static_cast<char>(c - 'A' + 'a') : c; });
-  return extension == ".vti" ? std::make_unique<VtiSource>(path) : nullptr;
+  return coronary::LowerCase(fs::path(path).extension().string()) == ".vti"
+    ? std::make_unique<VtiSource>(path)
+    : nullptr;
 }
 
 // What changes when a file does: names, sizes and times of all files that the paths stand for.

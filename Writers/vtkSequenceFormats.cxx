@@ -2,7 +2,7 @@
 
 #include "AtomicFile.h"
 #include "FileSeries.h"
-#include "SurfaceFile.h"
+#include "MeshFile.h"
 #include "vtkBoneMotion.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
@@ -167,7 +167,7 @@ vtkSmartPointer<vtkPoints> PointsOf(
 
 /// A vector array of the mesh, if it has it, as three numbers a point: `letter` and x, y or z.
 void AddVectors(vtkPointSet* mesh, const char* name, const std::string& letter,
-  const std::vector<vtkIdType>& points, coronary::FileSurface& surface)
+  const std::vector<vtkIdType>& points, coronary::FileMesh& surface)
 {
   vtkDataArray* array = mesh->GetPointData()->GetArray(name);
   for (int c = 0; array != nullptr && array->GetNumberOfComponents() == 3 && c < 3; ++c)
@@ -390,9 +390,9 @@ std::string VmtkBytes(const Files& shared, const PhaseMesh& phase)
 
 /// The surface for formats of other programs.
 /// @param values  whether displacements and velocities are wanted, as far as the mesh has them
-coronary::FileSurface PlainSurface(const Files& shared, const PhaseMesh& phase, bool values)
+coronary::FileMesh PlainSurface(const Files& shared, const PhaseMesh& phase, bool values)
 {
-  coronary::FileSurface surface;
+  coronary::FileMesh surface;
   std::ostringstream comment;
   comment << "DynamicCoronary, mm, LPS, time " << phase.time;
   surface.comment = comment.str();

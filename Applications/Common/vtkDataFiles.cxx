@@ -1,6 +1,7 @@
 #include "vtkDataFiles.h"
 
 #include "AtomicFile.h"
+#include "TextFile.h"
 #include "XmlDataFile.h"
 #include "vtkMessageTrap.h"
 
@@ -18,8 +19,7 @@
 #include "vtkXMLUnstructuredGridWriter.h"
 
 #include <array>
-#include <fstream>
-#include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -30,12 +30,8 @@ namespace
 void ReadXml(
   const std::string& path, vtkXMLDataReader* reader, const char* what, vtkMessageTrap& messages)
 {
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-  {
-    throw std::runtime_error("Cannot open '" + path + "'.");
-  }
-  std::string text(std::istreambuf_iterator<char>(file), {});
+  std::string text =
+    ReadTextFile(path, "a VTK file", std::numeric_limits<std::uint64_t>::max() - 1);
   if (!reader->CanReadFile(path.c_str()))
   {
     throw std::runtime_error("'" + path + "' is not a VTK XML " + what + " file.");
@@ -53,10 +49,7 @@ void ReadXml(
     throw std::runtime_error("Cannot read '" + path + "': " + error.what());
   }
 }
-}
 
-namespace
-{
 /// That all corners are points: not all of VTK's filters look.
 void CheckCorners(const std::string& path, vtkCellArray* cells, vtkIdType points)
 {

@@ -30,14 +30,6 @@ std::string Text(double value, const char* format = "%.5g")
   return text;
 }
 
-/// Also without the characters that XML has not.
-std::string Escaped(std::string text)
-{
-  std::replace_if(
-    text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
-  return EscapedXml(text);
-}
-
 /// Values along an axis, and where its ends are in the drawing.
 struct PlotAxis
 {
@@ -84,7 +76,7 @@ std::string Line(double x1, double y1, double x2, double y2, const char* kind)
 std::string Words(double x, double y, const std::string& text, const char* anchor = "start")
 {
   return "<text x=\"" + Text(x) + "\" y=\"" + Text(y) + "\" text-anchor=\"" + anchor + "\">" +
-    Escaped(text) + "</text>\n";
+    EscapedXml(text) + "</text>\n";
 }
 
 struct MarkShape

@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -117,12 +116,8 @@ std::string EvaluationCache::NameOf(const std::vector<std::string>& files,
     {
       continue;
     }
-    std::ifstream file(path, std::ios::binary);
-    std::string content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    if (!file)
-    {
-      throw std::runtime_error("Cannot read '" + path + "'.");
-    }
+    const std::string content =
+      ReadTextFile(path, "a surface", std::numeric_limits<std::uint64_t>::max() - 1);
     key << content.size() << ' ' << Fnv1a(content.data(), content.size()) << '\n';
   }
   const std::string text = key.str();

@@ -140,9 +140,7 @@ SlicerSequence SlicerJob::WriteModels(const std::vector<TimedFile>& files, const
 {
   SlicerSequence sequence;
   sequence.name = name;
-  std::string folder = name;
-  std::transform(folder.begin(), folder.end(), folder.begin(),
-    [](char c) { return (c >= 'A' && c <= 'Z') ? static_cast<char>(c - 'A' + 'a') : c; });
+  const std::string folder = LowerCase(name);
   sequence.file = folder + ".seq.mrml";
   // Lines have no faces, which the other kinds are made of.
   const bool lines = name == "Centerlines";

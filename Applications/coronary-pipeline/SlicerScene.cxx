@@ -1,6 +1,6 @@
 #include "SlicerScene.h"
 
-#include "TextScanner.h"
+#include "TextWords.h"
 #include "XmlText.h"
 
 #include <algorithm>
@@ -63,10 +63,7 @@ std::string IndexAttributes(const SequenceIndex& index)
 std::string ColorOf(const SlicerSequence& sequence)
 {
   std::string color;
-  for (const double part : sequence.color)
-  {
-    color += (color.empty() ? "" : " ") + Number(part);
-  }
+  AppendNumbers(color, sequence.color);
   return color;
 }
 

@@ -1,9 +1,10 @@
 #include "vtkAnimatedGif.h"
 
+#include "AtomicFile.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <new>
 #include <stdexcept>
 
@@ -164,15 +165,9 @@ void WriteAnimatedGif(
       file.Require(EGifPutLine(file.Get(), line.data(), width));
     }
   }
-  std::ofstream stream(path, std::ios::binary);
-  stream << file.Finish();
-  stream.close();
-  if (!stream)
-  {
-    throw std::runtime_error("Can not write '" + path + "'.");
-  }
+  WriteFileAtomically(path, file.Finish());
 #else
-  throw std::runtime_error("Can not write '" + path + "': built without giflib.");
+  throw std::runtime_error("Cannot write '" + path + "': built without giflib.");
 #endif
 }
 }

@@ -1,7 +1,6 @@
 #include "vtkMarkedPicture.h"
 
 #include "vtkImageData.h"
-#include "vtkNew.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,23 +8,6 @@
 
 namespace coronary
 {
-namespace
-{
-/// @param row  of so many components, by its number from the top
-template <typename Row>
-std::string Png(int width, int height, int components, Row row)
-{
-  vtkNew<vtkImageData> image;
-  image->SetDimensions(width, height, 1);
-  image->AllocateScalars(VTK_UNSIGNED_CHAR, components);
-  for (int y = 0; y < height; ++y)
-  {
-    row(y, static_cast<unsigned char*>(image->GetScalarPointer(0, height - 1 - y, 0)));
-  }
-  return PngBytes(image);
-}
-}
-
 MarkedPicture::MarkedPicture(int width, int height, const Colour& background)
   : plain(width, height, background)
   , Layer(4 * std::size_t(width) * std::size_t(height))
@@ -170,7 +152,7 @@ std::string MarkedPicture::PlainPng() const
       grey = row[3 * x] == row[3 * x + 1] && row[3 * x] == row[3 * x + 2];
     }
   }
-  return Png(width, this->plain.Height(), grey ? 1 : 3,
+  return PngBytes(ImageOfRows(width, this->plain.Height(), grey ? 1 : 3,
     [&](int y, unsigned char* to)
     {
       const unsigned char* from = this->plain.Row(y);
@@ -182,21 +164,21 @@ std::string MarkedPicture::PlainPng() const
       {
         std::memcpy(to, from, 3 * std::size_t(width));
       }
-    });
+    }));
 }
 
 std::string MarkedPicture::LayerPng() const
 {
   const std::size_t bytes = 4 * std::size_t(this->plain.Width());
-  return Png(this->plain.Width(), this->plain.Height(), 4,
+  return PngBytes(ImageOfRows(this->plain.Width(), this->plain.Height(), 4,
     [&](int y, unsigned char* to)
-    { std::memcpy(to, this->Layer.data() + std::size_t(y) * bytes, bytes); });
+    { std::memcpy(to, this->Layer.data() + std::size_t(y) * bytes, bytes); }));
 }
 
 std::string MarkedPicture::WholePng() const
 {
   const int width = this->plain.Width();
-  return Png(width, this->plain.Height(), 3,
+  return PngBytes(ImageOfRows(width, this->plain.Height(), 3,
     [&](int y, unsigned char* to)
     {
       const unsigned char* below = this->plain.Row(y);
@@ -210,6 +192,6 @@ std::string MarkedPicture::WholePng() const
             (above[4 * x + c] * alpha + below[3 * x + c] * (255 - alpha) + 127) / 255);
         }
       }
-    });
+    }));
 }
 }

@@ -36,6 +36,49 @@ vtkSmartPointer<vtkPointSet> ReadPointSet(const std::string& path, vtkMessageTra
   return ReadUnstructuredGrid(path, messages);
 }
 
+void WriteVtk(const std::string& path, const FileMesh& mesh, vtkMessageTrap& messages)
+{
+  const vtkSmartPointer<vtkPolyData> surface = PolyDataOf(mesh);
+  if (EndsWith(path, ".vtu"))
+  {
+    vtkNew<vtkUnstructuredGrid> grid;
+    grid->SetPoints(surface->GetPoints());
+    for (const auto& tetrahedron : mesh.tetrahedra)
+    {
+      const vtkIdType ids[4] = { tetrahedron[0], tetrahedron[1], tetrahedron[2], tetrahedron[3] };
+      grid->InsertNextCell(VTK_TETRA, 4, ids);
+    }
+    // A volume's triangles are its surface: in VTK they follow from the tetrahedra.
+    for (std::size_t n = 0; mesh.tetrahedra.empty() && n < mesh.triangles.size(); ++n)
+    {
+      const vtkIdType ids[3] = { mesh.triangles[n][0], mesh.triangles[n][1], mesh.triangles[n][2] };
+      grid->InsertNextCell(VTK_TRIANGLE, 3, ids);
+    }
+    WriteUnstructuredGrid(path, grid, messages);
+    return;
+  }
+  WritePolyData(path, surface, messages);
+}
+
+Eigen::MatrixXd ArrayOf(vtkPointSet* data, const std::string& name, const std::string& path)
+{
+  vtkDataArray* array = data->GetPointData()->GetArray(name.c_str());
+  if (array == nullptr)
+  {
+    throw std::runtime_error("'" + path + "' has no point array '" + name + "'.");
+  }
+  Eigen::MatrixXd matrix(array->GetNumberOfTuples(), array->GetNumberOfComponents());
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
+  {
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column)
+    {
+      matrix(row, column) = array->GetComponent(row, static_cast<int>(column));
+    }
+  }
+  return matrix;
+}
+}
+
 FileMesh MeshOf(vtkPointSet* data, const std::string& path)
 {
   FileMesh mesh;
@@ -73,7 +116,7 @@ FileMesh MeshOf(vtkPointSet* data, const std::string& path)
   return mesh;
 }
 
-void WriteVtk(const std::string& path, const FileMesh& mesh, vtkMessageTrap& messages)
+vtkSmartPointer<vtkPolyData> PolyDataOf(const FileMesh& mesh)
 {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
@@ -81,53 +124,16 @@ void WriteVtk(const std::string& path, const FileMesh& mesh, vtkMessageTrap& mes
   {
     points->InsertNextPoint(point.data());
   }
-  if (EndsWith(path, ".vtu"))
-  {
-    vtkNew<vtkUnstructuredGrid> grid;
-    grid->SetPoints(points);
-    for (const auto& tetrahedron : mesh.tetrahedra)
-    {
-      const vtkIdType ids[4] = { tetrahedron[0], tetrahedron[1], tetrahedron[2], tetrahedron[3] };
-      grid->InsertNextCell(VTK_TETRA, 4, ids);
-    }
-    // A volume's triangles are its surface: in VTK they follow from the tetrahedra.
-    for (std::size_t n = 0; mesh.tetrahedra.empty() && n < mesh.triangles.size(); ++n)
-    {
-      const vtkIdType ids[3] = { mesh.triangles[n][0], mesh.triangles[n][1], mesh.triangles[n][2] };
-      grid->InsertNextCell(VTK_TRIANGLE, 3, ids);
-    }
-    WriteUnstructuredGrid(path, grid, messages);
-    return;
-  }
-  vtkNew<vtkPolyData> surface;
   vtkNew<vtkCellArray> polys;
   for (const Triangle& triangle : mesh.triangles)
   {
     const vtkIdType ids[3] = { triangle[0], triangle[1], triangle[2] };
     polys->InsertNextCell(3, ids);
   }
+  auto surface = vtkSmartPointer<vtkPolyData>::New();
   surface->SetPoints(points);
   surface->SetPolys(polys);
-  WritePolyData(path, surface, messages);
-}
-
-Eigen::MatrixXd ArrayOf(vtkPointSet* data, const std::string& name, const std::string& path)
-{
-  vtkDataArray* array = data->GetPointData()->GetArray(name.c_str());
-  if (array == nullptr)
-  {
-    throw std::runtime_error("'" + path + "' has no point array '" + name + "'.");
-  }
-  Eigen::MatrixXd matrix(array->GetNumberOfTuples(), array->GetNumberOfComponents());
-  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
-  {
-    for (Eigen::Index column = 0; column < matrix.cols(); ++column)
-    {
-      matrix(row, column) = array->GetComponent(row, static_cast<int>(column));
-    }
-  }
-  return matrix;
-}
+  return surface;
 }
 
 bool IsMeshConversion(const std::string& input, const std::string& output)

@@ -5,12 +5,25 @@
 #ifndef vtkMeshConversion_h
 #define vtkMeshConversion_h
 
+#include "MeshFile.h"
+
+#include "vtkSmartPointer.h"
+
 #include <string>
 
 class vtkMessageTrap;
+class vtkPointSet;
+class vtkPolyData;
 
 namespace coronary
 {
+/// Points, triangles (polygons as fans) and tetrahedra. @param path  for messages
+/// @throws std::runtime_error naming the file for other cells
+FileMesh MeshOf(vtkPointSet* data, const std::string& path);
+
+/// Points and triangles, in double precision.
+vtkSmartPointer<vtkPolyData> PolyDataOf(const FileMesh& mesh);
+
 /// Whether one of the names is that of a .obj, .off, .mesh, .dmat or .vtu file.
 bool IsMeshConversion(const std::string& input, const std::string& output);
 

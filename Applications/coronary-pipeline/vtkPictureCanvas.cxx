@@ -1,5 +1,7 @@
 #include "vtkPictureCanvas.h"
 
+#include "AtomicFile.h"
+
 #include "vtkImageData.h"
 #include "vtkNew.h"
 #include "vtkPNGWriter.h"
@@ -11,7 +13,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <stdexcept>
 
 namespace coronary
@@ -153,15 +154,23 @@ PictureCanvas PictureCanvas::Shrunk(int factor) const
 
 void PictureCanvas::WritePng(const std::string& path) const
 {
-  vtkNew<vtkImageData> image;
-  image->SetDimensions(this->Columns, this->Rows, 1);
-  image->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
-  for (int y = 0; y < this->Rows; ++y)
+  WritePngFile(ImageOfRows(this->Columns, this->Rows, 3,
+                 [&](int y, unsigned char* to)
+                 { std::memcpy(to, this->Row(y), 3 * std::size_t(this->Columns)); }),
+    path);
+}
+
+vtkSmartPointer<vtkImageData> ImageOfRows(
+  int width, int height, int components, const std::function<void(int, unsigned char*)>& row)
+{
+  auto image = vtkSmartPointer<vtkImageData>::New();
+  image->SetDimensions(width, height, 1);
+  image->AllocateScalars(VTK_UNSIGNED_CHAR, components);
+  for (int y = 0; y < height; ++y)
   {
-    std::memcpy(image->GetScalarPointer(0, this->Rows - 1 - y, 0), this->Row(y),
-      3 * std::size_t(this->Columns));
+    row(y, static_cast<unsigned char*>(image->GetScalarPointer(0, height - 1 - y, 0)));
   }
-  WritePngFile(image, path);
+  return image;
 }
 
 std::string PngBytes(vtkImageData* image)
@@ -182,13 +191,6 @@ std::string PngBytes(vtkImageData* image)
 
 void WritePngFile(vtkImageData* image, const std::string& path)
 {
-  const std::string bytes = PngBytes(image);
-  std::ofstream file(path, std::ios::binary);
-  file << bytes;
-  file.close();
-  if (!file)
-  {
-    throw std::runtime_error("Can not write '" + path + "'.");
-  }
+  WriteFileAtomically(path, PngBytes(image));
 }
 }

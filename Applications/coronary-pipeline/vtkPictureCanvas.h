@@ -5,7 +5,10 @@
 #ifndef vtkPictureCanvas_h
 #define vtkPictureCanvas_h
 
+#include "vtkSmartPointer.h"
+
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -60,6 +63,10 @@ private:
   int Rows = 0;
   std::vector<unsigned char> Pixels;
 };
+
+/// @param row  fills one, by its number from the top
+vtkSmartPointer<vtkImageData> ImageOfRows(
+  int width, int height, int components, const std::function<void(int y, unsigned char* to)>& row);
 
 /// The bytes of a PNG file.
 std::string PngBytes(vtkImageData* image);

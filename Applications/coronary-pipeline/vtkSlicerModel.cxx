@@ -1,13 +1,11 @@
 #include "vtkSlicerModel.h"
 
 #include "AtomicFile.h"
-#include "TextScanner.h"
 #include "vtkDataFiles.h"
+#include "vtkMeshConversion.h"
 #include "vtkMessageTrap.h"
 
-#include "vtkCellArray.h"
 #include "vtkFieldData.h"
-#include "vtkIdList.h"
 #include "vtkNew.h"
 #include "vtkPLYWriter.h"
 #include "vtkPolyData.h"
@@ -38,35 +36,6 @@ vtkSmartPointer<vtkPolyData> TrianglesOf(vtkPolyData* data, const std::string& p
     throw std::runtime_error("Cannot write '" + path + "': there are no triangles.");
   }
   return triangles->GetOutput();
-}
-
-std::string ObjText(vtkPolyData* data)
-{
-  std::string text = std::string("# ") + Title + "\n";
-  for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
-  {
-    double point[3];
-    data->GetPoint(n, point);
-    text += "v";
-    for (const double value : point)
-    {
-      text += " ";
-      AppendNumber(text, value);
-    }
-    text += "\n";
-  }
-  vtkNew<vtkIdList> ids;
-  for (vtkIdType cell = 0; cell < data->GetPolys()->GetNumberOfCells(); ++cell)
-  {
-    data->GetPolys()->GetCellAtId(cell, ids);
-    text += "f";
-    for (const vtkIdType id : *ids)
-    {
-      text += " " + std::to_string(id + 1);
-    }
-    text += "\n";
-  }
-  return text;
 }
 
 void CheckWritten(int good, const std::string& path, vtkMessageTrap& messages)
@@ -139,7 +108,9 @@ void WriteSlicerModel(const std::string& path, vtkPolyData* data, vtkMessageTrap
   }
   else if (EndsWith(path, ".obj"))
   {
-    WriteFileAtomically(path, ObjText(triangles));
+    FileMesh mesh = MeshOf(triangles, path);
+    mesh.comment = Title;
+    WriteFileAtomically(path, ObjText(mesh));
   }
   else
   {

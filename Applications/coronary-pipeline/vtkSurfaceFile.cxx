@@ -1,47 +1,21 @@
 #include "vtkSurfaceFile.h"
 
 #include "MeshFile.h"
-#include "StlPlyFile.h"
 #include "VolumeFile.h"
 #include "vtkDataFiles.h"
 #include "vtkMaskSurface.h"
+#include "vtkMeshConversion.h"
 #include "vtkMessageTrap.h"
 #include "vtkSurfaceInput.h"
 
-#include "vtkCellArray.h"
 #include "vtkGeometryFilter.h"
 #include "vtkNew.h"
-#include "vtkPoints.h"
 #include "vtkUnstructuredGrid.h"
 
-#include <fstream>
 #include <stdexcept>
 
 namespace coronary
 {
-namespace
-{
-vtkSmartPointer<vtkPolyData> Triangles(const FileMesh& mesh)
-{
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (const Vector3& point : mesh.points)
-  {
-    points->InsertNextPoint(point.data());
-  }
-  vtkNew<vtkCellArray> polys;
-  for (const Triangle& triangle : mesh.triangles)
-  {
-    const vtkIdType ids[3] = { triangle[0], triangle[1], triangle[2] };
-    polys->InsertNextCell(3, ids);
-  }
-  auto surface = vtkSmartPointer<vtkPolyData>::New();
-  surface->SetPoints(points);
-  surface->SetPolys(polys);
-  return surface;
-}
-}
-
 bool IsSurfaceFile(const std::string& path)
 {
   const auto ends = [&](const char* end) { return EndsWith(path, end); };
@@ -70,15 +44,15 @@ vtkSmartPointer<vtkPolyData> ReadSurface(
   }
   else if (EndsWith(path, ".stl"))
   {
-    surface = Triangles(ReadStlFile(path));
+    surface = PolyDataOf(ReadStlFile(path));
   }
   else if (EndsWith(path, ".ply"))
   {
-    surface = Triangles(ReadPlyFile(path));
+    surface = PolyDataOf(ReadPlyFile(path));
   }
   else
   {
-    surface = Triangles(ReadMeshFile(path));
+    surface = PolyDataOf(ReadMeshFile(path));
   }
   if (surface->GetNumberOfPolys() == 0 && surface->GetNumberOfStrips() == 0)
   {

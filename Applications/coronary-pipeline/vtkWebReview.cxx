@@ -327,6 +327,14 @@ private:
   vtkSmartPointer<vtkPolyData> Last;
   ReviewSeries Series;
 };
+
+void SetView(const PictureView& view, ReviewCase& review)
+{
+  review.leftAnterior = view.leftAnterior;
+  review.cranial = view.cranial;
+  review.height = view.height;
+  review.centre = { view.centre[0], view.centre[1], view.centre[2] };
+}
 }
 
 void AddGroupNames(vtkPolyData* tree, std::map<std::int64_t, std::string>& names)
@@ -344,11 +352,7 @@ ReviewCase MakeReviewCase(
   const EvaluationScene& scene, std::int64_t triangles, const ProgressCallback& progress)
 {
   ReviewCase review;
-  const PictureView view = OverlayView(scene, review.aspect);
-  review.leftAnterior = view.leftAnterior;
-  review.cranial = view.cranial;
-  review.height = view.height;
-  review.centre = { view.centre[0], view.centre[1], view.centre[2] };
+  SetView(OverlayView(scene, review.aspect), review);
 
   const int count = static_cast<int>(scene.evaluation->phases.size());
   Lines modelLines = ReadLines(scene.centerline, count);
@@ -433,12 +437,8 @@ ReviewCase MakeResultCase(
   {
     throw std::invalid_argument("The result to review has no points.");
   }
-  const PictureView view = FindView(points, points, ResultAspect, ResultMargin);
+  SetView(FindView(points, points, ResultAspect, ResultMargin), review);
   review.aspect = ResultAspect;
-  review.leftAnterior = view.leftAnterior;
-  review.cranial = view.cranial;
-  review.height = view.height;
-  review.centre = { view.centre[0], view.centre[1], view.centre[2] };
   return review;
 }
 }

@@ -8,7 +8,6 @@
 #include "vtkSimulatorScene.h"
 
 #include "vtkImageData.h"
-#include "vtkNew.h"
 
 #include <cstdio>
 #include <cstring>
@@ -24,16 +23,11 @@ constexpr double Degree = 3.14159265358979323846 / 180.0;
 
 void WriteGrey(const GreyImage& image, const std::string& path)
 {
-  vtkNew<vtkImageData> data;
-  data->SetDimensions(image.columns, image.rows, 1);
-  data->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
   const auto row = static_cast<std::size_t>(image.columns);
-  for (int y = 0; y < image.rows; ++y)
-  {
-    std::memcpy(data->GetScalarPointer(0, image.rows - 1 - y, 0),
-      &image.values[static_cast<std::size_t>(y) * row], row);
-  }
-  WritePngFile(data, path);
+  WritePngFile(ImageOfRows(image.columns, image.rows, 1,
+                 [&](int y, unsigned char* to)
+                 { std::memcpy(to, &image.values[static_cast<std::size_t>(y) * row], row); }),
+    path);
 }
 }
 

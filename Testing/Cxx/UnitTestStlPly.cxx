@@ -1,7 +1,7 @@
 // .stl and .ply files, and what damaged ones may not do.
 #include "FormatTestFiles.h"
+#include "MeshFile.h"
 #include "Refusals.h"
-#include "StlPlyFile.h"
 
 #include <gtest/gtest.h>
 

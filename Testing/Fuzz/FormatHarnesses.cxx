@@ -19,7 +19,6 @@
 #include "SeriesDescription.h"
 #include "SimVascularFile.h"
 #include "SkinWeightCache.h"
-#include "StlPlyFile.h"
 #include "TgfSkeleton.h"
 #include "VolumeFile.h"
 #include "XmlDataFile.h"
