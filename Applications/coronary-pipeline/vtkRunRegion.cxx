@@ -5,7 +5,7 @@
 #include "Interruption.h"
 #include "LargePages.h"
 #include "ParallelFor.h"
-#include "RankGroup.h"
+#include "Ranks.h"
 #include "RunSettings.h"
 #include "vtkGatedImageReader.h"
 
@@ -138,7 +138,7 @@ vtkSmartPointer<vtkImageData> HeartMask(RunStep& step)
 {
   RunInput& input = step.input;
   const std::string blocks =
-    step.ranks.FromFirst(input.Region ? input.Region->Blocks() : std::string());
+    Ranks().FromFirst(input.Region ? input.Region->Blocks() : std::string());
   if (blocks.empty())
   {
     return nullptr;

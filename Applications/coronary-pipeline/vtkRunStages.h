@@ -27,7 +27,6 @@ class vtkPolyData;
 
 namespace coronary
 {
-class RankGroup;
 class StagedFolder;
 class HeartRegion;
 struct CoronaryOstia;
@@ -83,7 +82,6 @@ struct RunStep
   RunInput& input;
   RunReport& report;               ///< of the stages before
   StagedFolder& folder;            ///< for the stage's files
-  RankGroup& ranks;                ///< that work on the stage together
   std::vector<std::string>& files; ///< names of those
   std::function<void(double)> progress;
   std::string summary;                    ///< a few words for the user
