@@ -21,6 +21,9 @@ CLI::Validator Within(double low, double high);
 
 /// A whole number from low to high.
 CLI::Validator WholeWithin(long low, long high);
+
+/// --size of a window in pixels, as 1500x860.
+CLI::Option* AddWindowSize(CLI::App& app, int& width, int& height);
 }
 
 #endif
