@@ -61,6 +61,14 @@ CLI::Validator WholeWithin(long low, long high)
     Range(first, last));
 }
 
+CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help)
+{
+  return app.add_option("--threads", threads, help)
+    ->check(WholeWithin(0, 1024))
+    ->type_name("N")
+    ->capture_default_str();
+}
+
 CLI::Option* AddWindowSize(CLI::App& app, int& width, int& height)
 {
   return app

@@ -132,12 +132,7 @@ void CohortJob::Declare(CLI::App& app)
     ->type_name("K N");
   app.add_flag("--dry-run", this->DryRun, "Say what would be done, and do nothing");
   app.add_flag("--no-pictures", this->NoPictures, "Without pictures/, which need a display");
-  app
-    .add_option(
-      "--threads", this->Threads, "Number of threads of a case; 0: the cores over the jobs")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  AddThreads(app, this->Threads, "Number of threads of a case; 0: the cores over the jobs");
   app.add_flag("--quiet", this->Quiet, "No progress and no summary");
 }
 

@@ -157,10 +157,7 @@ void EvaluateJob::Declare(CLI::App& app)
       "Folder in which the measures of phases are kept; the same files and settings are taken from "
       "there")
     ->type_name("DIR");
-  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "No progress and no table");
 }
 

@@ -54,7 +54,7 @@ private:
   /// Trees that a finished stage has lost are an error, or with --partial a warning.
   void TellLost(RunStage stage, const RunReport& report);
   /// The first rank looks for the reference phase, and all know it then.
-  void ShareReference(RunStep& step, ProgressDisplay& progress, int& number) const;
+  void ShareReference(RunStep& step, ProgressDisplay& progress, int& steps) const;
   void Commit(StagedFolder& folder, RunStage stage, const RunReport& report) const;
   void Stop(RunStage stage, const std::string& reason, RunReport& report) const;
   void Say(const std::string& words);
@@ -169,17 +169,23 @@ void RunJob::TellLost(RunStage stage, const RunReport& report)
   this->Warnings.insert(this->Warnings.end(), lost.begin(), lost.end());
 }
 
-void RunJob::ShareReference(RunStep& step, ProgressDisplay& progress, int& number) const
+void RunJob::ShareReference(RunStep& step, ProgressDisplay& progress, int& steps) const
 {
-  progress.BeginStep(number++, "reference phase");
+  progress.BeginStep(steps++, "reference phase");
   if (Ranks().IsFirst())
   {
     const OthersWait alone(this->Settings.threads);
     FindReference(step);
-    Ranks().FromFirst(step.report.Of("time").dump());
+    const ReferencePhase& chosen = *step.input.Chosen;
+    Ranks().FromFirst(Packed(std::vector<int>{ chosen.number }, std::vector<double>{ chosen.time },
+      std::vector<char>(chosen.image.begin(), chosen.image.end())));
     return;
   }
-  step.report.Set("time", nlohmann::ordered_json::parse(Ranks().FromFirst({})));
+  std::vector<int> number;
+  std::vector<double> time;
+  std::vector<char> image;
+  Unpack(Ranks().FromFirst({}), number, time, image);
+  step.input.Chosen = { number.front(), time.front(), std::string(image.begin(), image.end()) };
 }
 
 void RunJob::Make(
@@ -302,6 +308,7 @@ void RunJob::Run()
   RunReport report(this->Settings.output, this->Options.All(),
     DescribeInput(input.Files(), this->Settings.output));
   const std::vector<RunStage> stages = this->Plan(input, report);
+  input.Chosen = report.Reference();
   if (input.IsSurface())
   {
     report.Set("surface_input", this->Settings.input.front());
@@ -371,8 +378,7 @@ void RunJob::Run()
     return;
   }
   std::printf("%s: phase %d (%.1f %% R-R), %s\n", this->Settings.output.c_str(),
-    report.Of("phase").get<int>() + 1, 100.0 * report.Of("time").get<double>(),
-    this->Summary.c_str());
+    input.Chosen->number + 1, 100.0 * input.Chosen->time, this->Summary.c_str());
 }
 }
 

@@ -186,10 +186,7 @@ void SequenceJob::Declare(CLI::App& app)
     ->type_name("DEG")
     ->capture_default_str()
     ->group(files);
-  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "No progress and no summary");
 }
 

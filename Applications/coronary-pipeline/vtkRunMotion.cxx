@@ -138,8 +138,7 @@ Json WriteMovingMesh(MovingMesh& moving, const std::vector<double>& times, RunSt
 Json MakeRest(RunStep& step, const std::string& reason)
 {
   // The phase that it is, so that it can be compared with what is known of that, and one half a cycle away.
-  const Json phase = step.report.Of("time");
-  const double own = phase.is_number() ? phase.get<double>() : 0.0;
+  const double own = step.input.Chosen ? step.input.Chosen->time : 0.0;
   std::vector<double> times = step.input.Settings.moments;
   if (times.size() < 2)
   {

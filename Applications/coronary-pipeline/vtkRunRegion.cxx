@@ -83,7 +83,7 @@ void RequireOstia(const RunStep& step, const std::vector<double>& confidences)
       ? "No value is below 0, where HU have fat and air: take off what was added to them (1024, "
         "mostly)"
       : "It may have no contrast medium in the aorta, or not show the ascending aorta");
-  throw std::runtime_error("'" + step.report.Of("image").get<std::string>() + "': " + text + ".");
+  throw std::runtime_error("'" + step.input.Chosen->image + "': " + text + ".");
 }
 
 void FindHeart(RunStep& step)

@@ -178,7 +178,7 @@ void LoadReference(const RunStep& step, bool automatic, double time)
 
 void NeedReference(const RunStep& step)
 {
-  LoadReference(step, false, step.report.Of("time").get<double>());
+  LoadReference(step, false, step.input.Chosen->time);
 }
 
 void NeedVesselness(const RunStep& step)
@@ -239,7 +239,7 @@ vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, co
     // Of the reference no more is read than the slab and its surroundings.
     phase->SetInputConnection(step.input.Reader->GetOutputPort());
     phase->SetAutomatic(false);
-    phase->SetTime(step.report.Of("time").get<double>());
+    phase->SetTime(step.input.Chosen->time);
     vesselness->SetInputConnection(phase->GetOutputPort());
   }
   vesselness->UpdateInformation();
@@ -276,7 +276,7 @@ vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, co
 bool DoubtImage(RunStep& step)
 {
   vtkImageData* image = step.input.Reference;
-  const std::string name = "'" + step.report.Of("image").get<std::string>() + "'";
+  const std::string name = "'" + step.input.Chosen->image + "'";
   double spacing[3];
   image->GetSpacing(spacing);
   const double largest = *std::max_element(spacing, spacing + 3);
@@ -381,8 +381,7 @@ void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
     {
       throw;
     }
-    throw std::runtime_error("'" + step.report.Of("image").get<std::string>() +
-      "': no coronary ostium was found: " +
+    throw std::runtime_error("'" + step.input.Chosen->image + "': no coronary ostium was found: " +
       text.substr(text.find('(', begin) + 1, end - text.find('(', begin) - 1) +
       ". Give the ostia with --seed X Y Z (LPS, mm); of values that are no HU, --window TISSUE "
       "BLOOD too.");
@@ -449,7 +448,7 @@ Json MakeSegmentation(RunStep& step)
     return MakeGivenMask(step);
   }
   const RunSettings& settings = step.input.Settings;
-  const std::string givenMask = step.input.MaskOf(step.report.Of("phase").get<int>());
+  const std::string givenMask = step.input.MaskOf(step.input.Chosen->number);
   const std::vector<double>& given = step.input.Seeds;
   Json numbers = { { "file", "mask.mha" } };
   NeedVesselness(step);
@@ -992,9 +991,8 @@ void FindReference(RunStep& step)
     input.Reference = nullptr;
     LoadReference(step, false, reader->GetPhaseTime(phase));
   }
-  step.report.Set("phase", phase);
-  step.report.Set("time", reader->GetPhaseTime(phase));
-  step.report.Set("image", reader->GetPhaseFileName(phase));
+  input.Chosen = { phase, reader->GetPhaseTime(phase), reader->GetPhaseFileName(phase) };
+  step.report.SetReference(*input.Chosen);
   FindHeart(step);
 }
 

@@ -88,10 +88,7 @@ void Request::Declare(CLI::App& app)
     ->type_name("DIR")
     ->group(window);
 #endif
-  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  coronary::AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "No summary");
 }
 

@@ -148,12 +148,8 @@ void Request::Declare(CLI::App& app)
     ->type_name("FILE")
     ->group(questions);
 
-  app
-    .add_option("--threads", this->threads,
-      "Number of threads for what is made before the start; 0: all cores. A session has one")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  coronary::AddThreads(app, this->threads,
+    "Number of threads for what is made before the start; 0: all cores. A session has one");
   app.add_flag("--quiet", this->session.quiet, "No progress, no messages and no summary");
 }
 
