@@ -1,7 +1,5 @@
 #include "StagedFolder.h"
 
-#include "RankGroup.h"
-
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
@@ -108,37 +106,26 @@ void RemoveAbandoned(const std::string& folder, const std::string& except)
 }
 
 StagedFolder::StagedFolder(const std::string& folder)
-  : StagedFolder(folder, RankGroup::Alone())
+  : Folder(Normalized(folder))
+  , Created(MakeFolders(this->Folder))
 {
+  std::string name = (fs::path(this->Folder) / (std::string(StagingName) + "XXXXXX")).string();
+  if (!mkdtemp(name.data()))
+  {
+    const std::string reason = std::strerror(errno);
+    RemoveEmptyFolders(this->Created);
+    Fail(this->Folder, reason);
+  }
+  this->Staging = name;
+  this->Lock = LockFolder(name);
+  RemoveAbandoned(this->Folder, name);
 }
 
-StagedFolder::StagedFolder(const std::string& folder, RankGroup& ranks)
+StagedFolder::StagedFolder(const std::string& folder, const std::string& staging)
   : Folder(Normalized(folder))
-  , Owner(ranks.IsFirst())
+  , Staging(staging)
+  , Owner(false)
 {
-  if (this->Owner)
-  {
-    this->Created = MakeFolders(this->Folder);
-    std::string name = (fs::path(this->Folder) / (std::string(StagingName) + "XXXXXX")).string();
-    if (!mkdtemp(name.data()))
-    {
-      const std::string reason = std::strerror(errno);
-      RemoveEmptyFolders(this->Created);
-      Fail(this->Folder, reason);
-    }
-    this->Staging = name;
-    this->Lock = LockFolder(name);
-    RemoveAbandoned(this->Folder, name);
-  }
-  try
-  {
-    this->Staging = ranks.FromFirst(this->Staging);
-  }
-  catch (...)
-  {
-    this->Discard();
-    throw;
-  }
 }
 
 StagedFolder::~StagedFolder()

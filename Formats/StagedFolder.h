@@ -10,8 +10,6 @@
 
 namespace coronary
 {
-class RankGroup;
-
 /**
  * Files that belong together are written to a hidden folder inside the wanted one and moved out of
  * it by Commit(): an older set of the same names is never mixed with half of a new one.
@@ -27,11 +25,10 @@ public:
   explicit StagedFolder(const std::string& folder);
 
   /**
-   * One for several ranks, who all have to make it: each may Add() files and write them, and the first one alone
-   * commits, after it has added the others' names too.
-   * @throws as above; as RankGroup::Gather
+   * The same for a process that helps another one, whose unfinished files are in `staging`: files may be added and
+   * written. That process, after it has added their names too, commits them or takes them away.
    */
-  StagedFolder(const std::string& folder, RankGroup& ranks);
+  StagedFolder(const std::string& folder, const std::string& staging);
   ~StagedFolder();
   StagedFolder(const StagedFolder&) = delete;
   StagedFolder& operator=(const StagedFolder&) = delete;
@@ -41,6 +38,12 @@ public:
    * @throws std::runtime_error naming folder/name when that can not be a file.
    */
   std::string Add(const std::string& name);
+
+  /// Where its files are until they are committed.
+  const std::string& StagingPath() const { return this->Staging; }
+
+  /// False: it is another process's.
+  bool IsOwner() const { return this->Owner; }
 
   /// What was added, in its order.
   const std::vector<std::string>& Added() const { return this->Names; }
@@ -81,7 +84,7 @@ private:
   std::vector<std::string> Older;
   std::vector<std::string> Created; ///< folders to remove again, outermost first
   bool LastStays = false;
-  bool Owner = true; ///< of the folder; false: another rank removes it
+  const bool Owner = true; ///< of what is in Staging; false: another process is
 };
 }
 

@@ -1,8 +1,8 @@
 #include "vtkMeshSequenceWriter.h"
 
+#include "ItemSharing.h"
 #include "MeshSequenceReport.h"
 #include "PartialProgress.h"
-#include "RankGroup.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
@@ -45,7 +45,7 @@ std::string PhaseName(std::size_t phase, double time)
 }
 
 /// What the report has of a phase as plain numbers, and back.
-std::vector<double> NumbersOf(const coronary::MeshSequenceReport::Phase& phase)
+std::vector<double> NumbersOf(const vtkMeshSequence::PhaseMesh& phase)
 {
   const coronary::TetrahedraQuality& t = phase.tetrahedra;
   const coronary::TrianglesQuality& s = phase.surface;
@@ -81,43 +81,6 @@ void TakeNumbers(const std::vector<double>& numbers, coronary::MeshSequenceRepor
   const auto middle = next + 1 + static_cast<std::ptrdiff_t>(*next);
   t.inverted.assign(next + 1, middle);
   s.degenerate.assign(middle, numbers.end());
-}
-
-/// What every rank measured and wrote becomes known to all.
-void SharePhases(
-  coronary::RankGroup& ranks, coronary::MeshSequenceReport& report, coronary::StagedFolder& folder)
-{
-  if (ranks.Size() == 1)
-  {
-    return;
-  }
-  std::vector<std::vector<double>> numbers(report.phases.size());
-  for (std::size_t k = 0; k < numbers.size(); ++k)
-  {
-    if (ranks.Owns(k))
-    {
-      numbers[k] = NumbersOf(report.phases[k]);
-    }
-  }
-  coronary::ShareLists(ranks, numbers);
-  for (std::size_t k = 0; k < numbers.size(); ++k)
-  {
-    TakeNumbers(numbers[k], report.phases[k]);
-  }
-  std::string names;
-  for (const std::string& name : folder.Added())
-  {
-    names += name + '\n';
-  }
-  const std::vector<std::string> all = ranks.Gather(names);
-  for (std::size_t rank = 1; ranks.IsFirst() && rank < all.size(); ++rank)
-  {
-    std::istringstream lines(all[rank]);
-    for (std::string name; std::getline(lines, name);)
-    {
-      folder.Add(name);
-    }
-  }
 }
 
 /// One sentence about the phases that have inverted tetrahedra; empty when there are none.
@@ -329,32 +292,41 @@ public:
 
   void WriteAll();
 
+  /// Of the report, when all is written.
+  bool IsOwner() const { return this->Folder->IsOwner(); }
+
   coronary::MeshSequenceReport Result;
 
 private:
   vtkPointSet* MeshAt(std::size_t k);
-  void Begin(vtkPointSet* mesh);
-  bool NeedsMeshAt(std::size_t k) const;
-  coronary::MeshSequenceReport::Phase Name(std::size_t k);
+  void Begin();
+  void NamePhases();
+  void CollectBefore(std::size_t end);
   vtkMeshSequence::PhaseMesh Measure(std::size_t k, vtkPointSet* mesh) const;
-  void WritePhase(std::size_t k);
+  std::string WritePhase(std::size_t k);
+  void TakePhase(const std::string& bytes, coronary::MeshSequenceReport::Phase& entry);
   void Finish();
 
   vtkMeshSequenceWriter* Self;
   vtkInformation* Info;
-  coronary::RankGroup& Ranks;
+  coronary::ItemSharing& Sharing;
   coronary::ProgressCallback Progress;
   std::vector<double> Times;
   vtkCoronary::Moment Moment;
   vtkCoronary::UpstreamRequest Request;
-  std::unique_ptr<vtkMeshSequence::Files> Files; ///< when the first phase is known
+  std::pair<std::size_t, vtkPointSet*> Last{ 0,
+    nullptr };                                       ///< phase and mesh, as they were asked for
+  std::unique_ptr<coronary::StagedFolder> OwnFolder; ///< when the first phase is known
+  coronary::StagedFolder* Folder = nullptr;
+  std::unique_ptr<vtkMeshSequence::Files> Files;
   std::vector<std::unique_ptr<vtkMeshSequence::Format>> Formats;
+  std::size_t Collected = 0; ///< phases
 };
 
 vtkMeshSequenceWriter::Run::Run(vtkMeshSequenceWriter* self, vtkInformation* info)
   : Self(self)
   , Info(info)
-  , Ranks(self->Ranks != nullptr ? *self->Ranks : coronary::RankGroup::Alone())
+  , Sharing(self->Sharing != nullptr ? *self->Sharing : coronary::ItemSharing::None())
   , Progress(
       [self](double fraction)
       {
@@ -375,6 +347,10 @@ vtkMeshSequenceWriter::Run::Run(vtkMeshSequenceWriter* self, vtkInformation* inf
 /// @throws std::invalid_argument when it is empty or of another time
 vtkPointSet* vtkMeshSequenceWriter::Run::MeshAt(std::size_t k)
 {
+  if (this->Last.second != nullptr && this->Last.first == k)
+  {
+    return this->Last.second;
+  }
   const double time = this->Times[k];
   this->Moment.time = time;
   this->Request.Ask(nullptr, this->Moment);
@@ -390,13 +366,15 @@ vtkPointSet* vtkMeshSequenceWriter::Run::MeshAt(std::size_t k)
          << ": take its time steps, or put a vtkCardiacPhaseInterpolator before it";
     Require(std::abs(given - time) <= 1e-9 * std::max(1.0, std::abs(time)), text.str());
   }
+  this->Last = { k, mesh };
   return mesh;
 }
 
 /// The first phase says what all have to be like.
-void vtkMeshSequenceWriter::Run::Begin(vtkPointSet* mesh)
+void vtkMeshSequenceWriter::Run::Begin()
 {
   vtkMeshSequenceWriter* self = this->Self;
+  vtkPointSet* mesh = this->MeshAt(0);
   vtkMeshSequence::Topology topology = vtkMeshSequence::TopologyOf(
     mesh, vtkPolyData::SafeDownCast(self->GetInput(1)), names::CellEntityIds);
   Require(!topology.tetrahedra.empty() || (!self->WriteSimVascular && !self->WriteVmtk),
@@ -407,10 +385,18 @@ void vtkMeshSequenceWriter::Run::Begin(vtkPointSet* mesh)
   this->Result.faces = vtkMeshSequence::FacesOf(topology, self->FaceNames,
     vtkMeshSequence::NamesOfCaps(
       vtkPolyData::SafeDownCast(self->GetInput(2)), names::CellEntityIds));
-  const std::string stem = fs::path(self->FileName).stem().string();
-  this->Files = std::make_unique<vtkMeshSequence::Files>(self->FileName,
+  const fs::path path(self->FileName);
+  this->Folder = self->Folder;
+  if (this->Folder == nullptr)
+  {
+    this->OwnFolder = std::make_unique<coronary::StagedFolder>(
+      path.has_parent_path() ? path.parent_path().string() : ".");
+    this->Folder = this->OwnFolder.get();
+  }
+  const std::string stem = path.stem().string();
+  this->Files = std::make_unique<vtkMeshSequence::Files>(stem,
     self->PrefixFiles ? stem + "_" : std::string(), self->Digits, this->Times.size(),
-    std::move(topology), this->Result.faces, self->KeepWeights, this->Ranks);
+    std::move(topology), this->Result.faces, self->KeepWeights, *this->Folder);
   this->Result.prefix = this->Files->prefix;
   this->Result.surfacePoints = static_cast<std::int64_t>(this->Files->surface.points.size());
 
@@ -427,25 +413,36 @@ void vtkMeshSequenceWriter::Run::Begin(vtkPointSet* mesh)
   formats.gltfInfluences = self->GltfInfluences;
   formats.period = self->Period;
   formats.gltfLoop = self->GltfLoop;
-  this->Formats = vtkMeshSequence::MakeFormats(formats, *this->Files, mesh, this->Ranks.IsFirst());
+  this->Formats = vtkMeshSequence::MakeFormats(formats, *this->Files, mesh);
 }
 
-bool vtkMeshSequenceWriter::Run::NeedsMeshAt(std::size_t k) const
+void vtkMeshSequenceWriter::Run::NamePhases()
 {
-  return k == 0 || this->Ranks.Owns(k) ||
-    std::any_of(this->Formats.begin(), this->Formats.end(),
-      [](const auto& format) { return format->NeedsAll(); });
-}
-
-coronary::MeshSequenceReport::Phase vtkMeshSequenceWriter::Run::Name(std::size_t k)
-{
-  coronary::MeshSequenceReport::Phase entry;
-  entry.time = this->Times[k];
-  for (const auto& format : this->Formats)
+  for (std::size_t k = 0; k < this->Times.size(); ++k)
   {
-    format->Name(k, entry.time, entry);
+    coronary::MeshSequenceReport::Phase entry;
+    entry.time = this->Times[k];
+    for (const auto& format : this->Formats)
+    {
+      format->Name(k, entry.time, entry);
+    }
+    this->Result.phases.push_back(std::move(entry));
   }
-  return entry;
+}
+
+/// Files of all phases need the meshes of all of them, one after the other.
+void vtkMeshSequenceWriter::Run::CollectBefore(std::size_t end)
+{
+  for (; this->Collected < end; ++this->Collected)
+  {
+    for (const auto& format : this->Formats)
+    {
+      if (format->NeedsAll())
+      {
+        format->Collect(this->MeshAt(this->Collected), this->Times[this->Collected]);
+      }
+    }
+  }
 }
 
 vtkMeshSequence::PhaseMesh vtkMeshSequenceWriter::Run::Measure(
@@ -454,6 +451,7 @@ vtkMeshSequence::PhaseMesh vtkMeshSequenceWriter::Run::Measure(
   const vtkMeshSequence::Topology& topology = this->Files->topology;
   vtkMeshSequence::PhaseMesh phase;
   phase.mesh = mesh;
+  phase.index = k;
   phase.time = this->Times[k];
   try
   {
@@ -470,65 +468,71 @@ vtkMeshSequence::PhaseMesh vtkMeshSequenceWriter::Run::Measure(
   return phase;
 }
 
-void vtkMeshSequenceWriter::Run::WritePhase(std::size_t k)
+/// @return what was measured, and the names of the files, for all who share the phases
+std::string vtkMeshSequenceWriter::Run::WritePhase(std::size_t k)
 {
-  if (!this->NeedsMeshAt(k))
-  {
-    this->Result.phases.push_back(this->Name(k));
-    return;
-  }
   const auto count = static_cast<double>(this->Times.size());
   coronary::Report(this->Progress, static_cast<double>(k) / count);
+  this->CollectBefore(k);
   vtkPointSet* mesh = this->MeshAt(k);
-  if (!this->Files)
-  {
-    this->Begin(mesh);
-  }
-  coronary::MeshSequenceReport::Phase entry = this->Name(k);
+  this->CollectBefore(k + 1);
+  const std::size_t before = this->Folder->Added().size();
+  const vtkMeshSequence::PhaseMesh phase = this->Measure(k, mesh);
   for (const auto& format : this->Formats)
   {
-    format->Collect(mesh, entry.time);
+    coronary::Report(this->Progress, (static_cast<double>(k) + 0.5) / count);
+    format->Write(phase);
   }
-  if (this->Ranks.Owns(k))
+  std::vector<char> names;
+  for (std::size_t n = before; n < this->Folder->Added().size(); ++n)
   {
-    vtkMeshSequence::PhaseMesh phase = this->Measure(k, mesh);
-    for (const auto& format : this->Formats)
-    {
-      coronary::Report(this->Progress, (static_cast<double>(k) + 0.5) / count);
-      format->Write(phase);
-    }
-    entry.tetrahedra = std::move(phase.tetrahedra);
-    entry.tetrahedra.volume = {};
-    entry.tetrahedra.minimumDihedral = {};
-    entry.tetrahedra.radiusEdgeRatio = {};
-    entry.surface = std::move(phase.surface);
+    const std::string& name = this->Folder->Added()[n];
+    names.insert(names.end(), name.begin(), name.end());
+    names.push_back('\n');
   }
-  this->Result.phases.push_back(std::move(entry));
+  return coronary::Packed(NumbersOf(phase), names);
+}
+
+void vtkMeshSequenceWriter::Run::TakePhase(
+  const std::string& bytes, coronary::MeshSequenceReport::Phase& entry)
+{
+  std::vector<double> numbers;
+  std::vector<char> names;
+  coronary::Unpack(bytes, numbers, names);
+  TakeNumbers(numbers, entry);
+  const std::vector<std::string>& known = this->Folder->Added();
+  std::istringstream lines(std::string(names.begin(), names.end()));
+  for (std::string name; std::getline(lines, name);)
+  {
+    if (std::find(known.begin(), known.end(), name) == known.end())
+    {
+      this->Folder->Add(name);
+    }
+  }
 }
 
 /// Lists, the animation, the report; then the new files take the place of the old ones.
 void vtkMeshSequenceWriter::Run::Finish()
 {
-  vtkMeshSequence::Files& files = *this->Files;
-  const bool first = this->Ranks.IsFirst();
-  SharePhases(this->Ranks, this->Result, files.folder);
-  for (const auto& format : this->Formats)
+  this->CollectBefore(this->Times.size());
+  if (this->Folder->IsOwner())
   {
-    format->Finish(first, this->Result);
-  }
-  const std::string quality = files.prefix + "quality.csv";
-  this->Result.files.emplace_back("quality", quality);
-  if (first)
-  {
+    vtkMeshSequence::Files& files = *this->Files;
+    for (const auto& format : this->Formats)
+    {
+      format->Finish(this->Result);
+    }
+    const std::string quality = files.prefix + "quality.csv";
+    this->Result.files.emplace_back("quality", quality);
     files.Write(quality, coronary::MeshSequenceCsv(this->Result));
     files.Write(files.name + ".json", coronary::MeshSequenceJson(this->Result));
-    files.folder.TakePlaceOf(coronary::MeshSequenceFiles(this->Self->FileName));
+    this->Folder->TakePlaceOf(coronary::MeshSequenceFiles(this->Self->FileName));
   }
   this->Request.Restore();
   coronary::Report(this->Progress, 1.0);
-  if (first)
+  if (this->OwnFolder)
   {
-    files.folder.Commit();
+    this->OwnFolder->Commit();
   }
 }
 
@@ -536,9 +540,13 @@ void vtkMeshSequenceWriter::Run::WriteAll()
 {
   try
   {
-    for (std::size_t k = 0; k < this->Times.size(); ++k)
+    this->Begin();
+    this->NamePhases();
+    const std::vector<std::string> phases = this->Sharing.ResultsOfAll(
+      this->Times.size(), [this](std::size_t k) { return this->WritePhase(k); });
+    for (std::size_t k = 0; k < phases.size(); ++k)
     {
-      this->WritePhase(k);
+      this->TakePhase(phases[k], this->Result.phases[k]);
     }
     this->Finish();
   }
@@ -552,9 +560,9 @@ void vtkMeshSequenceWriter::Run::WriteAll()
     {
       // The input has said why; what came first counts.
     }
-    if (this->Files && dynamic_cast<const coronary::Cancelled*>(&error) == nullptr)
+    if (this->Folder != nullptr && dynamic_cast<const coronary::Cancelled*>(&error) == nullptr)
     {
-      throw std::runtime_error(this->Files->folder.Translate(error.what()));
+      throw std::runtime_error(this->Folder->Translate(error.what()));
     }
     throw;
   }
@@ -566,7 +574,7 @@ void vtkMeshSequenceWriter::WritePhases(vtkInformation* info)
   run.WriteAll();
   FillTable(run.Result, this->Quality);
   const std::string warning = InversionWarning(run.Result.phases);
-  if (!warning.empty() && (this->Ranks == nullptr || this->Ranks->IsFirst()))
+  if (!warning.empty() && run.IsOwner())
   {
     vtkWarningMacro(<< warning);
   }

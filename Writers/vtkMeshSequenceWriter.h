@@ -63,7 +63,8 @@ class vtkTable;
 
 namespace coronary
 {
-class RankGroup;
+class ItemSharing;
+class StagedFolder;
 }
 
 class VTKCORONARYWRITERS_EXPORT vtkMeshSequenceWriter : public vtkWriter
@@ -87,12 +88,14 @@ public:
 
 #ifndef __VTK_WRAP__
   /**
-   * Processes that write together, each its share of the phases; the first one writes the report and the lists.
-   * All have to write, to a folder that all see. Not owned; null (default): this process alone.
+   * Who writes which phases, to unfinished files that all of these have in common: for the folder of FileName, and
+   * committed by its owner when all have written. The owner also writes the report and the lists. Not owned;
+   * without (default): all is written here, and committed.
    */
-  void SetRanks(coronary::RankGroup* ranks)
+  void SetSharing(coronary::ItemSharing* sharing, coronary::StagedFolder* folder)
   {
-    this->Ranks = ranks;
+    this->Sharing = sharing;
+    this->Folder = folder;
   }
 #endif
 
@@ -288,7 +291,8 @@ private:
   std::map<int, std::string> FaceNames;
   vtkNew<vtkTable> Quality;
   bool Written = false;
-  coronary::RankGroup* Ranks = nullptr;
+  coronary::ItemSharing* Sharing = nullptr;
+  coronary::StagedFolder* Folder = nullptr;
 };
 
 #endif

@@ -22,11 +22,9 @@
 #include "vtkXMLUnstructuredGridWriter.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <sstream>
 #include <stdexcept>
 
-namespace fs = std::filesystem;
 namespace names = vtkCoronaryArrayNames;
 
 namespace vtkMeshSequence
@@ -239,20 +237,17 @@ public:
 
   void Write(const PhaseMesh& phase) override
   {
-    this->Shared.Write(this->List.back().path, this->Encode(this->Shared, phase));
+    this->Shared.Write(this->List[phase.index].path, this->Encode(this->Shared, phase));
   }
 
-  void Finish(bool write, coronary::MeshSequenceReport& report) override
+  void Finish(coronary::MeshSequenceReport& report) override
   {
     const std::string list = this->Stem + "." + this->Extension + ".series";
     const bool xml = this->Kind != this->Extension; // a .pvd list is for VTK's own
-    if (write)
+    this->Shared.Write(list, coronary::FileSeriesText(this->List));
+    if (xml)
     {
-      this->Shared.Write(list, coronary::FileSeriesText(this->List));
-      if (xml)
-      {
-        this->Shared.Write(this->Stem + ".pvd", coronary::PvdText(this->List));
-      }
+      this->Shared.Write(this->Stem + ".pvd", coronary::PvdText(this->List));
     }
     report.files.emplace_back(this->Kind, xml ? this->Stem + ".pvd" : list);
   }
@@ -277,20 +272,23 @@ public:
 
   void Name(std::size_t phase, double, coronary::MeshSequenceReport::Phase& entry) override
   {
-    this->Folder =
-      this->Shared.prefix + "simvascular/phase_" + this->Shared.Number(phase) + "/mesh-complete";
-    entry.files.emplace_back("simvascular", this->Folder);
+    entry.files.emplace_back("simvascular", this->FolderOf(phase));
   }
   void Write(const PhaseMesh& phase) override;
-  void Finish(bool, coronary::MeshSequenceReport&) override {}
+  void Finish(coronary::MeshSequenceReport&) override {}
 
 private:
-  const double Unit; ///< mm
-  std::string Folder;
+  std::string FolderOf(std::size_t phase) const
+  {
+    return this->Shared.prefix + "simvascular/phase_" + this->Shared.Number(phase) +
+      "/mesh-complete";
+  }
+
+  const double Unit;          ///< mm
   std::map<int, Patch> Faces; ///< made when they are first written
 };
 
-/// One file of all phases, which the first rank goes through.
+/// One file of all phases.
 class GltfAnimation : public Format
 {
 public:
@@ -300,7 +298,7 @@ public:
   void Write(const PhaseMesh&) override {}
   bool NeedsAll() const override { return true; }
   void Collect(vtkPointSet* mesh, double time) override { this->Gltf.AddPhase(mesh, time); }
-  void Finish(bool write, coronary::MeshSequenceReport& report) override;
+  void Finish(coronary::MeshSequenceReport& report) override;
 
 private:
   vtkGltfModel Gltf;
@@ -455,6 +453,7 @@ void SimVascularFolders::Write(const PhaseMesh& phase)
 {
   Files& shared = this->Shared;
   const Topology& topology = shared.topology;
+  const std::string folder = this->FolderOf(phase.index);
   vtkNew<vtkUnstructuredGrid> grid;
   const std::vector<std::int64_t> all = Numbered(static_cast<std::size_t>(topology.points));
   grid->SetPoints(PointsOf(phase.mesh, std::vector<vtkIdType>(all.begin(), all.end()), this->Unit));
@@ -463,8 +462,8 @@ void SimVascularFolders::Write(const PhaseMesh& phase)
   AddIds(grid->GetCellData(), GlobalElementID, Numbered(topology.tetrahedra.size()));
   vtkCoronary::AddArray<vtkIntArray>(
     grid->GetCellData(), ModelRegionID, std::vector<int>(topology.tetrahedra.size(), 1));
-  shared.Write(this->Folder + "/mesh-complete.mesh.vtu", XmlOf(grid));
-  shared.Write(this->Folder + "/mesh-complete.exterior.vtp",
+  shared.Write(folder + "/mesh-complete.mesh.vtu", XmlOf(grid));
+  shared.Write(folder + "/mesh-complete.exterior.vtp",
     XmlOf(FaceOf(topology, phase, shared.surface, this->Unit)));
   for (const auto& face : shared.faces)
   {
@@ -474,10 +473,10 @@ void SimVascularFolders::Write(const PhaseMesh& phase)
       patch = this->Faces.emplace(face.id, topology.PatchOf(face.id)).first;
     }
     const std::string text = XmlOf(FaceOf(topology, phase, patch->second, this->Unit));
-    shared.Write(this->Folder + "/mesh-surfaces/" + face.name + ".vtp", text);
+    shared.Write(folder + "/mesh-surfaces/" + face.name + ".vtp", text);
     if (face.id == WallId)
     {
-      shared.Write(this->Folder + "/walls_combined.vtp", text);
+      shared.Write(folder + "/walls_combined.vtp", text);
     }
   }
 }
@@ -506,7 +505,7 @@ GltfAnimation::GltfAnimation(const FormatSettings& settings, Files& files, vtkPo
   this->Gltf.Model.loop = settings.gltfLoop;
 }
 
-void GltfAnimation::Finish(bool, coronary::MeshSequenceReport& report)
+void GltfAnimation::Finish(coronary::MeshSequenceReport& report)
 {
   const auto write = [&](const char* kind, const char* extension, const std::string& bytes)
   {
@@ -525,17 +524,16 @@ void GltfAnimation::Finish(bool, coronary::MeshSequenceReport& report)
 }
 }
 
-Files::Files(const std::string& path, std::string begin, int leastDigits, std::size_t phaseCount,
+Files::Files(std::string ofReport, std::string begin, int leastDigits, std::size_t phaseCount,
   Topology same, std::vector<coronary::MeshSequenceReport::Face> named, bool weights,
-  coronary::RankGroup& ranks)
-  : name(fs::path(path).stem().string())
+  coronary::StagedFolder& to)
+  : name(std::move(ofReport))
   , prefix(std::move(begin))
   , topology(std::move(same))
   , faces(std::move(named))
   , keepWeights(weights)
   , surface(this->topology.PatchOf(0))
-  , folder(
-      fs::path(path).parent_path().empty() ? "." : fs::path(path).parent_path().string(), ranks)
+  , Folder(to)
   , Phases(phaseCount)
   , Digits(static_cast<std::size_t>(leastDigits))
 {
@@ -553,11 +551,11 @@ std::string Files::Number(std::size_t phase) const
 
 void Files::Write(const std::string& file, const std::string& bytes)
 {
-  coronary::WriteFileAtomically(this->folder.Add(file), bytes);
+  coronary::WriteFileAtomically(this->Folder.Add(file), bytes);
 }
 
 std::vector<std::unique_ptr<Format>> MakeFormats(
-  const FormatSettings& settings, Files& files, vtkPointSet* mesh, bool firstRank)
+  const FormatSettings& settings, Files& files, vtkPointSet* mesh)
 {
   std::vector<std::unique_ptr<Format>> formats;
   const auto add = [&](bool wanted, const char* kind, const char* stem, const char* extension,
@@ -579,7 +577,7 @@ std::vector<std::unique_ptr<Format>> MakeFormats(
   {
     formats.push_back(std::make_unique<SimVascularFolders>(files, settings.simVascularUnit));
   }
-  if ((settings.gltf || settings.gltfJson) && firstRank)
+  if ((settings.gltf || settings.gltfJson) && files.IsOwner())
   {
     formats.push_back(std::make_unique<GltfAnimation>(settings, files, mesh));
   }

@@ -17,6 +17,7 @@ namespace vtkMeshSequence
 struct PhaseMesh
 {
   vtkPointSet* mesh = nullptr;
+  std::size_t index = 0;
   double time = 0.0;
   coronary::TetrahedraQuality tetrahedra;
   coronary::TrianglesQuality surface;
@@ -26,14 +27,16 @@ struct PhaseMesh
 class Files
 {
 public:
-  /// @param path    of the report
+  /// @param ofReport its name, without its ending
   /// @param begin   what the names of files other than the report begin with
-  Files(const std::string& path, std::string begin, int leastDigits, std::size_t phaseCount,
+  /// @param to      where they are written to
+  Files(std::string ofReport, std::string begin, int leastDigits, std::size_t phaseCount,
     Topology same, std::vector<coronary::MeshSequenceReport::Face> named, bool weights,
-    coronary::RankGroup& ranks);
+    coronary::StagedFolder& to);
 
   std::string Number(std::size_t phase) const;
   void Write(const std::string& file, const std::string& bytes);
+  bool IsOwner() const { return this->Folder.IsOwner(); }
 
   const std::string name; ///< of the report, without its ending
   const std::string prefix;
@@ -42,14 +45,14 @@ public:
   const bool keepWeights; ///< whether the bones' weights go into the files
   const Patch surface;    ///< all of the boundary
   vtkSmartPointer<vtkCellArray> tetrahedra;
-  coronary::StagedFolder folder;
 
 private:
+  coronary::StagedFolder& Folder;
   std::size_t Phases;
   std::size_t Digits;
 };
 
-/// Phases come in their order. A rank names those of all and writes its own.
+/// Phases come in their order: all are named, then those are written that are written here.
 class Format
 {
 public:
@@ -64,17 +67,16 @@ public:
   /// Adds the phase's files to its entry.
   virtual void Name(std::size_t phase, double time, coronary::MeshSequenceReport::Phase& entry) = 0;
 
-  /// Of the phase that was named last.
   virtual void Write(const PhaseMesh& phase) = 0;
 
-  /// Whether this rank needs the mesh at phases that it does not write.
+  /// Whether it needs the mesh at phases that are not written here.
   virtual bool NeedsAll() const { return false; }
 
   /// Of every phase, if that is so.
   virtual void Collect(vtkPointSet*, double) {}
 
-  /// After the last phase: what is of all of them. @param write  on the first rank only
-  virtual void Finish(bool write, coronary::MeshSequenceReport& report) = 0;
+  /// After the last phase: what is of all of them.
+  virtual void Finish(coronary::MeshSequenceReport& report) = 0;
 
 protected:
   Files& Shared;
@@ -97,9 +99,9 @@ struct FormatSettings
   bool gltfLoop = true;
 };
 
-/// In the order of the report. @param mesh  at the first phase
+/// In the order of the report; those of all phases only where the owner of the folder is. @param mesh  at the first phase
 std::vector<std::unique_ptr<Format>> MakeFormats(
-  const FormatSettings& settings, Files& files, vtkPointSet* mesh, bool firstRank);
+  const FormatSettings& settings, Files& files, vtkPointSet* mesh);
 }
 
 #endif

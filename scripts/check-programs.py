@@ -17,7 +17,8 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # Where the options of a program are documented; of the commands of coronary-pipeline in a section each.
-PAGES = {"coronary-simulator": "docs/simulator-files.md", "coronary-device-emulator": "docs/device-protocol.md"}
+PAGES = {"coronary-simulator": "docs/simulator-files.md", "coronary-posing": "docs/posing.md",
+         "coronary-device-emulator": "docs/device-protocol.md"}
 COMMANDS_PAGE = "docs/programs.md"
 OPTION = re.compile(r"(?<![\w/-])--[a-z][\w-]*")
 # Not in every build tree: they need Google's benchmark library.
@@ -119,7 +120,7 @@ def check_line(programs, line, page, complaints):
         return
     names = [(index, os.path.basename(word)) for index, word in enumerate(words)]
     for index, name in names:
-        if not re.fullmatch(r"coronary-(pipeline|simulator|device-emulator)|validate-[\w-]+|[\w-]+-benchmark", name):
+        if not re.fullmatch(r"coronary-(pipeline|simulator|posing|device-emulator)|validate-[\w-]+|[\w-]+-benchmark", name):
             continue
         if words[index].startswith("scripts/") or not programs.exists(name):
             if words[index] == name and name not in OPTIONAL and index == 0:

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks that need no build: layers, formatting, XML, scripts, reference pages, links. Exit 1 when one of them fails.
+# Checks that need no build: layers, sizes, formatting, XML, scripts, reference pages, links. Exit 1 when one of them fails.
 set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -121,8 +121,14 @@ else
 fi
 
 if [ -z "$python3" ]; then
-  echo "skipped: reference pages and links (python3 is not installed)"
+  echo "skipped: layers, sizes, reference pages and links (python3 is not installed)"
 else
+  "$python3" scripts/check-layers.py || fail "a header of a layer above is included"
+  if "$python3" scripts/check-sizes.py; then
+    echo "ok: no file above 1,200 lines, no function above 150"
+  else
+    fail "files or functions that are too long"
+  fi
   "$python3" scripts/make-filter-reference.py --check || fail "reference of the filters"
   "$python3" scripts/check-links.py || fail "links of the documentation"
 fi

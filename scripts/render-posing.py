@@ -1,7 +1,7 @@
 #!/usr/bin/env pvpython
-"""What scripts/render-posing.sh needs besides coronary-simulator.
+"""What scripts/render-posing.sh needs besides coronary-posing.
 
-  pvpython scripts/render-posing.py moves RUN       two moves of joints for coronary-simulator --pose-move, one a line
+  pvpython scripts/render-posing.py moves RUN       two moves of joints for coronary-posing --pose-move, one a line
   pvpython scripts/render-posing.py join OUTPUT PICTURE...  pictures beside each other, without their white margins
 """
 import sys
@@ -12,7 +12,7 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkIOImage import vtkPNGReader, vtkPNGWriter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
-BONES = 6  # that share a bend, as in coronary-simulator
+BONES = 6  # that share a bend, as in coronary-posing
 SHARE = 0.55  # of the chord of those bones: how far the joint is moved
 MARGIN = 12  # pixels
 

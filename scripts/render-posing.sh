@@ -8,7 +8,7 @@ usage() {
 Usage: scripts/render-posing.sh OUTPUT.png RUN_DIR [MOVE MOVE]
   RUN_DIR  folder of 'coronary-pipeline run --until weights'
   MOVE     JOINT:DX,DY,DZ in mm; default: a joint half way of the longest vessel of each tree, aside
-The program is taken from build/paraview/bin, or where SIMULATOR says.
+The program is taken from build/paraview/bin, or where POSING says.
 EOF
 }
 
@@ -17,7 +17,7 @@ if [ $# -ne 2 ] && [ $# -ne 4 ]; then
   exit 2
 fi
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
-simulator="${SIMULATOR:-$root/build/paraview/bin/coronary-simulator}"
+posing="${POSING:-$root/build/paraview/bin/coronary-posing}"
 output="$1"
 run="$2"
 work="$(mktemp -d)"
@@ -28,7 +28,7 @@ if [ $# -eq 4 ]; then
 else
   mapfile -t moves < <(pvpython "$root/scripts/render-posing.py" moves "$run")
 fi
-"$simulator" --pose "$run" --screenshots "$work" --size 1400x960 \
+"$posing" "$run" --screenshots "$work" --size 1400x960 \
   --pose-move "${moves[0]}" --pose-move "${moves[1]}" >/dev/null
 pvpython "$root/scripts/render-posing.py" join "$output" "$work"/vessels_0[012].png
 echo "$output"

@@ -44,6 +44,7 @@ coronary-pipeline phantom --seed 1 --phases 3 --spacing 0.8 --output phantom --q
 coronary-pipeline run phantom/series.json --output run --quiet
 coronary-pipeline evaluate --result run --truth phantom --no-pictures --output evaluation | tail -n 3
 coronary-simulator --headless --scenario phantom-lca --output session --ticks 400 >/dev/null
+coronary-posing run --headless --pose-move 4:2,0,0 --pose-output pose.vtp --quiet
 coronary-device-emulator --help >/dev/null
 
 cat >autoload.py <<'PYTHON'

@@ -1,6 +1,7 @@
 #include "OptionChecks.h"
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <sstream>
 
@@ -58,5 +59,32 @@ CLI::Validator WholeWithin(long low, long high)
         : "'" + text + "' is not a whole number in " + Range(first, last);
     },
     Range(first, last));
+}
+
+CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help)
+{
+  return app.add_option("--threads", threads, help)
+    ->check(WholeWithin(0, 1024))
+    ->type_name("N")
+    ->capture_default_str();
+}
+
+CLI::Option* AddWindowSize(CLI::App& app, int& width, int& height)
+{
+  return app
+    .add_option_function<std::string>(
+      "--size",
+      [&width, &height](const std::string& text)
+      {
+        char rest = 0;
+        if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 640 ||
+          width > 8192 || height < 480 || height > 8192)
+        {
+          throw CLI::ValidationError(
+            "--size", "'" + text + "' is no size from 640x480 to 8192x8192");
+        }
+      },
+      "Of the window in pixels, as 1500x860")
+    ->type_name("WxH");
 }
 }

@@ -21,6 +21,13 @@ CLI::Validator Within(double low, double high);
 
 /// A whole number from low to high.
 CLI::Validator WholeWithin(long low, long high);
+
+/// --threads.
+CLI::Option* AddThreads(
+  CLI::App& app, int& threads, const std::string& help = "Number of threads; 0: all cores");
+
+/// --size of a window in pixels, as 1500x860.
+CLI::Option* AddWindowSize(CLI::App& app, int& width, int& height);
 }
 
 #endif

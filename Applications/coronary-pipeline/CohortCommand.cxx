@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -71,7 +72,14 @@ private:
   void Follow();
   ///@}
   int ThreadsOfACase() const;
-  void Begin(std::size_t number, const std::string& where);
+  ///@{
+  /// Of the cases at work in this process.
+  using HasEnded =
+    std::function<void(std::size_t number, const std::string& failure, double seconds)>;
+  void BeginHere(std::size_t number, const HasEnded& ended);
+  void LookHere(const HasEnded& ended);
+  void StopHere();
+  ///@}
   void End(std::size_t number, const std::string& failure, double seconds);
   void WriteList(const std::string& tables) const;
   /// Table 1 of the cases that are done. @return why there is none; empty: there is
@@ -94,6 +102,7 @@ private:
   std::vector<std::string> Digests;
   std::size_t Ended = 0;
   std::size_t Planned = 0;
+  std::map<std::size_t, std::unique_ptr<CohortWork>> AtWork; ///< here
 };
 
 void CohortJob::Declare(CLI::App& app)
@@ -123,12 +132,7 @@ void CohortJob::Declare(CLI::App& app)
     ->type_name("K N");
   app.add_flag("--dry-run", this->DryRun, "Say what would be done, and do nothing");
   app.add_flag("--no-pictures", this->NoPictures, "Without pictures/, which need a display");
-  app
-    .add_option(
-      "--threads", this->Threads, "Number of threads of a case; 0: the cores over the jobs")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  AddThreads(app, this->Threads, "Number of threads of a case; 0: the cores over the jobs");
   app.add_flag("--quiet", this->Quiet, "No progress and no summary");
 }
 
@@ -188,11 +192,6 @@ int CohortJob::ThreadsOfACase() const
   return this->Threads > 0 ? this->Threads : std::max(1, NumberOfThreads() / this->Jobs);
 }
 
-void CohortJob::Begin(std::size_t number, const std::string& where)
-{
-  this->Say(this->All.cases[number].name + ": begun" + where);
-}
-
 void CohortJob::End(std::size_t number, const std::string& failure, double seconds)
 {
   const CohortCase& one = this->All.cases[number];
@@ -237,51 +236,81 @@ const std::string Do = "do";
 const std::string Stop = "stop";
 const std::string Ended = "ended";
 const std::string Interrupted = "interrupted";
+
+void Send(int rank, const Json& json)
+{
+  Ranks().Send(rank, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+}
+
+void CohortJob::BeginHere(std::size_t number, const HasEnded& ended)
+{
+  try
+  {
+    this->AtWork[number] = std::make_unique<CohortWork>(
+      this->All.cases[number], this->All, this->Output, this->ThreadsOfACase());
+  }
+  catch (const std::exception& error)
+  {
+    this->AtWork.erase(number);
+    ended(number, error.what(), 0.0);
+  }
+}
+
+void CohortJob::LookHere(const HasEnded& ended)
+{
+  for (auto one = this->AtWork.begin(); one != this->AtWork.end();)
+  {
+    if (one->second->HasEnded())
+    {
+      ended(one->first, one->second->Failure(), one->second->Seconds());
+      one = this->AtWork.erase(one);
+    }
+    else
+    {
+      ++one;
+    }
+  }
+}
+
+void CohortJob::StopHere()
+{
+  for (auto& [number, work] : this->AtWork)
+  {
+    work->Stop();
+  }
 }
 
 void CohortJob::Lead(std::vector<std::size_t> open)
 {
   std::reverse(open.begin(), open.end()); // the next one is the last
-  const auto ranks = static_cast<std::size_t>(Ranks().Size());
-  std::vector<int> busy(ranks, 0);
-  std::map<std::size_t, std::unique_ptr<CohortWork>> own;
-  const auto next = [&]
+  const int ranks = Ranks().Size();
+  std::vector<int> busy(static_cast<std::size_t>(ranks), 0);
+  const HasEnded ended = [&](std::size_t number, const std::string& failure, double seconds)
+  {
+    --busy[0];
+    this->End(number, failure, seconds);
+  };
+  const auto begin = [&](int rank)
   {
     const std::size_t number = open.back();
     open.pop_back();
-    return number;
-  };
-  const auto begin = [&](std::size_t rank)
-  {
-    const std::size_t number = next();
-    this->Begin(number, ranks > 1 ? " on rank " + std::to_string(rank) : "");
-    ++busy[rank];
+    this->Say(this->All.cases[number].name + ": begun" +
+      (ranks > 1 ? " on rank " + std::to_string(rank) : ""));
+    ++busy[static_cast<std::size_t>(rank)];
     if (rank > 0)
     {
-      Ranks().Send(
-        static_cast<int>(rank), Json{ { message::Kind, message::Do }, { "case", number } }.dump());
+      message::Send(rank, { { message::Kind, message::Do }, { "case", number } });
       return;
     }
-    try
-    {
-      own[number] = std::make_unique<CohortWork>(
-        this->All.cases[number], this->All, this->Output, this->ThreadsOfACase());
-    }
-    catch (const std::exception& error)
-    {
-      --busy[0];
-      this->End(number, error.what(), 0.0);
-    }
+    this->BeginHere(number, ended);
   };
   const auto stopAll = [&]
   {
-    for (auto& [number, work] : own)
+    this->StopHere();
+    for (int rank = 1; rank < ranks; ++rank)
     {
-      work->Stop();
-    }
-    for (std::size_t rank = 1; rank < ranks; ++rank)
-    {
-      Ranks().Send(static_cast<int>(rank), Json{ { message::Kind, message::Stop } }.dump());
+      message::Send(rank, { { message::Kind, message::Stop } });
     }
   };
   try
@@ -291,27 +320,15 @@ void CohortJob::Lead(std::vector<std::size_t> open)
       ThrowIfInterrupted();
       for (int job = 0; job < this->Jobs; ++job)
       {
-        for (std::size_t rank = 0; rank < ranks && !open.empty(); ++rank)
+        for (int rank = 0; rank < ranks && !open.empty(); ++rank)
         {
-          if (busy[rank] <= job)
+          if (busy[static_cast<std::size_t>(rank)] <= job)
           {
             begin(rank);
           }
         }
       }
-      for (auto one = own.begin(); one != own.end();)
-      {
-        if (one->second->HasEnded())
-        {
-          this->End(one->first, one->second->Failure(), one->second->Seconds());
-          --busy[0];
-          one = own.erase(one);
-        }
-        else
-        {
-          ++one;
-        }
-      }
+      this->LookHere(ended);
       int rank = 0;
       for (std::string text; Ranks().Receive(rank, text);)
       {
@@ -338,15 +355,13 @@ void CohortJob::Lead(std::vector<std::size_t> open)
 
 void CohortJob::Follow()
 {
-  bool told = false; // of an interruption
-  std::map<std::size_t, std::unique_ptr<CohortWork>> own;
-  const auto tell = [](std::size_t number, const std::string& failure, double seconds)
+  const HasEnded ended = [](std::size_t number, const std::string& failure, double seconds)
   {
-    const Json json = { { message::Kind, message::Ended }, { "case", number },
-      { "failure", failure }, { "seconds", seconds } };
-    Ranks().Send(0, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+    message::Send(0,
+      { { message::Kind, message::Ended }, { "case", number }, { "failure", failure },
+        { "seconds", seconds } });
   };
-  for (;;)
+  for (bool told = false;;) // of an interruption
   {
     int rank = 0;
     for (std::string text; Ranks().Receive(rank, text);)
@@ -354,42 +369,20 @@ void CohortJob::Follow()
       const Json json = Json::parse(text);
       if (json[message::Kind] == message::Stop)
       {
-        for (auto& [number, work] : own)
-        {
-          work->Stop();
-        }
+        this->StopHere();
         return;
       }
-      const auto number = json["case"].get<std::size_t>();
-      try
-      {
-        own[number] = std::make_unique<CohortWork>(
-          this->All.cases[number], this->All, this->Output, this->ThreadsOfACase());
-      }
-      catch (const std::exception& error)
-      {
-        own.erase(number);
-        tell(number, error.what(), 0.0);
-      }
+      this->BeginHere(json["case"].get<std::size_t>(), ended);
     }
     if (Interruption() != 0 && !told)
     {
-      // The first rank ends all; until then nothing is begun or told here.
-      Ranks().Send(
-        0, Json{ { message::Kind, message::Interrupted }, { "signal", Interruption() } }.dump());
+      // The first rank ends all; until then nothing is told here.
+      message::Send(0, { { message::Kind, message::Interrupted }, { "signal", Interruption() } });
       told = true;
     }
-    for (auto one = own.begin(); one != own.end();)
+    if (!told)
     {
-      if (!told && one->second->HasEnded())
-      {
-        tell(one->first, one->second->Failure(), one->second->Seconds());
-        one = own.erase(one);
-      }
-      else
-      {
-        ++one;
-      }
+      this->LookHere(ended);
     }
     std::this_thread::sleep_for(Pause);
   }

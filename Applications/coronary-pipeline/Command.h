@@ -8,20 +8,12 @@
 #ifndef DynamicCoronary_Command_h
 #define DynamicCoronary_Command_h
 
-#include <CLI/CLI.hpp>
+#include "Program.h"
 
 #include <functional>
-#include <stdexcept>
 
 namespace coronary
 {
-/// The command line is wrong in a way that only the command itself can see: exit code 2.
-/// The message names the option.
-struct UsageError : std::runtime_error
-{
-  using std::runtime_error::runtime_error;
-};
-
 /// One command of the program.
 struct Command
 {

@@ -32,7 +32,6 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -84,7 +83,7 @@ private:
   EvaluationRecord Measure(const PhaseFiles& one, const EvaluationSettings& settings,
     vtkMessageTrap& messages, const std::function<void(double)>& progress) const;
   void Evaluate(CaseFiles& files, vtkMessageTrap& messages,
-    const std::function<void(const PhaseFiles&)>& begin,
+    const std::function<void(std::size_t phase)>& begin,
     const std::function<void(double)>& progress) const;
   EvaluationScene SceneOf(const CaseFiles& files, vtkMessageTrap& messages) const;
   /// Into the folder, and into the page when there is one.
@@ -158,10 +157,7 @@ void EvaluateJob::Declare(CLI::App& app)
       "Folder in which the measures of phases are kept; the same files and settings are taken from "
       "there")
     ->type_name("DIR");
-  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "No progress and no table");
 }
 
@@ -287,7 +283,7 @@ EvaluationRecord EvaluateJob::Measure(const PhaseFiles& one, const EvaluationSet
 }
 
 void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
-  const std::function<void(const PhaseFiles&)>& begin,
+  const std::function<void(std::size_t phase)>& begin,
   const std::function<void(double)>& progress) const
 {
   EvaluationSettings settings;
@@ -295,16 +291,11 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
   settings.distance.signedDistances = false;
   std::vector<std::string>& warnings = files.evaluation.warnings;
   const EvaluationCache cache(this->measureCache);
-  std::string own; // what this rank measured, a line a phase
-  for (std::size_t n = 0; n < files.phases.size(); ++n)
+  const auto measure = [&](std::size_t n)
   {
     const PhaseFiles& one = files.phases[n];
     ThrowIfInterrupted();
-    begin(one);
-    if (!Ranks().Owns(n))
-    {
-      continue;
-    }
+    begin(n);
     const std::string name = cache.NameOf(
       { one.model, one.truth, one.modelLines, one.truthLines }, this->segments, settings);
     EvaluationRecord record;
@@ -314,18 +305,12 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
       record = Measure(one, settings, messages, progress);
       cache.Write(name, record);
     }
-    own += record.Text() + '\n';
-  }
-  std::vector<std::istringstream> lines;
-  for (const std::string& text : Ranks().Gather(own))
-  {
-    lines.emplace_back(text);
-  }
+    return record.Text();
+  };
+  const std::vector<std::string> records = Ranks().ResultsOfAll(files.phases.size(), measure);
   for (std::size_t n = 0; n < files.phases.size(); ++n)
   {
-    std::string line;
-    std::getline(lines[n % lines.size()], line);
-    EvaluationRecord record = EvaluationRecord::Of(line);
+    EvaluationRecord record = EvaluationRecord::Of(records[n]);
     PhaseEvaluation& phase = files.phases[n].phase;
     phase.measures = record.measures;
     phase.branches = std::move(record.branches);
@@ -498,7 +483,8 @@ void EvaluateJob::Run() const
   const std::string withoutPictures =
     draw || this->noPictures || !first ? "" : "there are no pictures: " + why;
 
-  StagedFolder folder(this->output, Ranks());
+  const std::unique_ptr<StagedFolder> staged = Ranks().MakeFolder(this->output);
+  StagedFolder& folder = *staged;
   vtkMessageTrap messages;
   std::vector<std::string> complaints;
   std::vector<CaseEvaluation> evaluations;
@@ -511,12 +497,13 @@ void EvaluateJob::Run() const
     {
       this->Evaluate(
         files, messages,
-        [&](const PhaseFiles& one)
+        [&](std::size_t n)
         {
-          progress.BeginStep(
-            step++, files.evaluation.name + ", phase " + std::to_string(one.phase.phase));
+          progress.BeginStep(step + static_cast<int>(n),
+            files.evaluation.name + ", phase " + std::to_string(files.phases[n].phase.phase));
         },
         update);
+      step += static_cast<int>(files.phases.size());
       evaluations.push_back(files.evaluation);
     }
     messages.ThrowIfError();

@@ -25,7 +25,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -115,10 +114,7 @@ void PhantomJob::Declare(CLI::App& app)
     ->group("Truth")
     ->excludes(truthOnlyFlag);
   app.add_flag("--compress", this->compress, "Compress the images (zlib)");
-  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "Show no progress and no summary");
 }
 
@@ -240,23 +236,6 @@ double MeanSpeed(vtkPolyData* tree)
   return sum / static_cast<double>(std::max<vtkIdType>(1, velocity->GetNumberOfTuples()));
 }
 
-/// The times of numbered files, for ParaView.
-std::string Collection(const std::string& stem, const std::vector<std::string>& numbers,
-  const std::vector<double>& times)
-{
-  std::ostringstream text;
-  text.precision(std::numeric_limits<double>::max_digits10);
-  text
-    << "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n";
-  for (std::size_t i = 0; i < times.size(); ++i)
-  {
-    text << "    <DataSet timestep=\"" << times[i] << "\" file=\"" << stem << '_' << numbers[i]
-         << ".vtp\"/>\n";
-  }
-  text << "  </Collection>\n</VTKFile>\n";
-  return text.str();
-}
-
 std::string Percent(double fraction)
 {
   char text[32];
@@ -304,8 +283,12 @@ public:
     {
       for (const char* stem : { "surface", "centerline", "vein" })
       {
-        WriteFileAtomically(folder.Add("truth/" + std::string(stem) + ".pvd"),
-          Collection(stem, this->Numbers, this->Times));
+        std::vector<TimedFile> files;
+        for (std::size_t i = 0; i < this->Times.size(); ++i)
+        {
+          files.push_back({ std::string(stem) + "_" + this->Numbers[i] + ".vtp", this->Times[i] });
+        }
+        WriteFileAtomically(folder.Add("truth/" + std::string(stem) + ".pvd"), PvdText(files));
       }
     }
     if (!this->Job.truthOnly)

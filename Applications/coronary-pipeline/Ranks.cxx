@@ -3,10 +3,12 @@
 #include "Command.h"
 #include "Interruption.h"
 #include "ParallelFor.h"
+#include "StagedFolder.h"
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 #include <new>
 #include <sstream>
@@ -56,9 +58,9 @@ int StartedProcesses()
   return count;
 }
 
-std::unique_ptr<ProgramRanks>& Group()
+std::unique_ptr<RankGroup>& Group()
 {
-  static std::unique_ptr<ProgramRanks> group = std::make_unique<ProgramRanks>();
+  static std::unique_ptr<RankGroup> group = std::make_unique<RankGroup>();
   return group;
 }
 
@@ -104,7 +106,7 @@ std::string DescribeFailure()
   }
 }
 
-class MpiRanks : public ProgramRanks
+class MpiRanks : public RankGroup
 {
 public:
   MpiRanks();
@@ -366,32 +368,86 @@ bool MpiRanks::Receive(int& rank, std::string& message)
 #endif
 }
 
-void ProgramRanks::Agree(const std::function<void()>& work)
+std::vector<std::string> RankGroup::Results(const std::vector<std::size_t>& items, const Work& work)
+{
+  // What each rank did, one after the other, each behind its length.
+  std::string own;
+  for (const std::size_t item : items)
+  {
+    if (this->Owns(item))
+    {
+      const std::string result = work(item);
+      const std::uint64_t size = result.size();
+      own.append(reinterpret_cast<const char*>(&size), sizeof(size));
+      own += result;
+    }
+  }
+  std::vector<std::string> all = this->Gather(own);
+  std::vector<std::size_t> next(all.size(), 0);
+  std::vector<std::string> results;
+  for (const std::size_t item : items)
+  {
+    const std::size_t rank = item % all.size();
+    std::uint64_t size = 0;
+    std::memcpy(&size, all[rank].data() + next[rank], sizeof(size));
+    results.push_back(all[rank].substr(next[rank] + sizeof(size), size));
+    next[rank] += sizeof(size) + size;
+  }
+  return results;
+}
+
+std::vector<std::string> RankGroup::Gather(const std::string& own)
+{
+  return { own };
+}
+
+void RankGroup::Collect(const void* own, std::size_t size, void* all)
+{
+  std::memmove(all, own, size);
+}
+
+std::string RankGroup::FromFirst(const std::string& text)
+{
+  return this->Gather(this->IsFirst() ? text : std::string()).front();
+}
+
+std::unique_ptr<StagedFolder> RankGroup::MakeFolder(const std::string& folder)
+{
+  if (this->IsFirst())
+  {
+    auto own = std::make_unique<StagedFolder>(folder);
+    this->FromFirst(own->StagingPath());
+    return own;
+  }
+  return std::make_unique<StagedFolder>(folder, this->FromFirst({}));
+}
+
+void RankGroup::Agree(const std::function<void()>& work)
 {
   work();
 }
 
-int ProgramRanks::SharedCores() const
+int RankGroup::SharedCores() const
 {
   return 0;
 }
 
-int ProgramRanks::AllCores() const
+int RankGroup::AllCores() const
 {
   return 0;
 }
 
-void ProgramRanks::Send(int, const std::string&)
+void RankGroup::Send(int, const std::string&)
 {
   throw std::logic_error("there is no other rank");
 }
 
-bool ProgramRanks::Receive(int&, std::string&)
+bool RankGroup::Receive(int&, std::string&)
 {
   return false;
 }
 
-ProgramRanks& Ranks()
+RankGroup& Ranks()
 {
   return *Group();
 }
@@ -425,7 +481,7 @@ void StartRanks()
 
 void FinishRanks()
 {
-  Group() = std::make_unique<ProgramRanks>();
+  Group() = std::make_unique<RankGroup>();
 }
 
 const std::vector<std::string>& RankVariables()

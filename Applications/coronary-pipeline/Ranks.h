@@ -8,16 +8,59 @@
 #ifndef DynamicCoronary_Ranks_h
 #define DynamicCoronary_Ranks_h
 
-#include "RankGroup.h"
+#include "ItemSharing.h"
 
 #include <functional>
+#include <memory>
 #include <string>
+#include <vector>
 
 namespace coronary
 {
-class ProgramRanks : public RankGroup
+class StagedFolder;
+
+/// The base class is a process that works alone.
+class RankGroup : public ItemSharing
 {
 public:
+  /// Number of this process, from 0.
+  virtual int Rank() const { return 0; }
+
+  virtual int Size() const { return 1; }
+
+  bool IsFirst() const { return this->Rank() == 0; }
+
+  /// Whether an item is of this rank's share: they are dealt out in turn.
+  bool Owns(std::size_t item) const
+  {
+    return item % static_cast<std::size_t>(this->Size()) == static_cast<std::size_t>(this->Rank());
+  }
+
+  std::size_t AtOnce() const override { return static_cast<std::size_t>(this->Size()); }
+
+  /// All ranks have to call it. @throws as Gather
+  std::vector<std::string> Results(
+    const std::vector<std::size_t>& items, const Work& work) override;
+
+  /**
+   * Bytes of every rank, in the order of the ranks, on every rank. All ranks have to call it.
+   * @throws std::runtime_error, Cancelled: another rank failed instead of coming here, and why
+   */
+  virtual std::vector<std::string> Gather(const std::string& own);
+
+  /// Bytes of every rank one after the other on the first one. `all` has room for them; the others do not use it.
+  /// All ranks have to call it. @throws as Gather
+  virtual void Collect(const void* own, std::size_t size, void* all);
+
+  /// The text of the first rank on every rank. All ranks have to call it. @throws as Gather
+  std::string FromFirst(const std::string& text);
+
+  /**
+   * Unfinished files of all ranks, for a folder that all see; the first one owns and commits them. All ranks have to
+   * call it. @throws as StagedFolder and Gather
+   */
+  std::unique_ptr<StagedFolder> MakeFolder(const std::string& folder);
+
   /**
    * Does `work`, and comes back, or throws, on all ranks together: what one of them throws, all throw. All ranks
    * have to call it.
@@ -42,7 +85,7 @@ public:
 };
 
 /// Those of this process; before StartRanks() it is alone.
-ProgramRanks& Ranks();
+RankGroup& Ranks();
 
 /// Whether this process is the first, or the only one, as far as the environment says: also before StartRanks().
 bool IsFirstProcess();

@@ -111,10 +111,7 @@ void ReviewJob::Declare(CLI::App& app)
     ->check(WholeWithin(0, 10000000))
     ->type_name("N")
     ->capture_default_str();
-  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "No progress and no summary");
 }
 

@@ -48,14 +48,13 @@ public:
 private:
   /// What is kept of the folder; what is left to do.
   std::vector<RunStage> Plan(const RunInput& input, RunReport& report) const;
+  /// Of another rank than the first its share of it, or nothing but to wait.
   void Make(
     RunStage stage, RunInput& input, RunReport& report, ProgressDisplay& progress, int& number);
-  /// A stage on another rank than the first: its share of it, or nothing but to wait.
-  void Help(RunStage stage, RunInput& input, RunReport& report);
-  /// A stage ends on all ranks together. @return warnings of all
-  static std::vector<std::string> End(RunInput& input);
   /// Trees that a finished stage has lost are an error, or with --partial a warning.
   void TellLost(RunStage stage, const RunReport& report);
+  /// The first rank looks for the reference phase, and all know it then.
+  void ShareReference(RunStep& step, ProgressDisplay& progress, int& steps) const;
   void Commit(StagedFolder& folder, RunStage stage, const RunReport& report) const;
   void Stop(RunStage stage, const std::string& reason, RunReport& report) const;
   void Say(const std::string& words);
@@ -170,81 +169,80 @@ void RunJob::TellLost(RunStage stage, const RunReport& report)
   this->Warnings.insert(this->Warnings.end(), lost.begin(), lost.end());
 }
 
+void RunJob::ShareReference(RunStep& step, ProgressDisplay& progress, int& steps) const
+{
+  progress.BeginStep(steps++, "reference phase");
+  if (Ranks().IsFirst())
+  {
+    const OthersWait alone(this->Settings.threads);
+    FindReference(step);
+    const ReferencePhase& chosen = *step.input.Chosen;
+    Ranks().FromFirst(Packed(std::vector<int>{ chosen.number }, std::vector<double>{ chosen.time },
+      std::vector<char>(chosen.image.begin(), chosen.image.end())));
+    return;
+  }
+  std::vector<int> number;
+  std::vector<double> time;
+  std::vector<char> image;
+  Unpack(Ranks().FromFirst({}), number, time, image);
+  step.input.Chosen = { number.front(), time.front(), std::string(image.begin(), image.end()) };
+}
+
 void RunJob::Make(
   RunStage stage, RunInput& input, RunReport& report, ProgressDisplay& progress, int& number)
 {
   const RunClock clock;
-  StagedFolder folder(this->Settings.output, Ranks());
+  const bool first = Ranks().IsFirst();
+  const std::unique_ptr<StagedFolder> folder = Ranks().MakeFolder(this->Settings.output);
   try
   {
     std::vector<std::string> files;
-    RunStep step{ input, report, folder, Ranks(), files,
+    RunStep step{ input, report, *folder, files,
       [&](double fraction) { progress.Update(fraction); }, {} };
     if (stage == RunStage::Vesselness)
     {
-      const OthersWait alone(this->Settings.threads);
-      progress.BeginStep(number++, "reference phase");
-      FindReference(step);
-      Ranks().FromFirst(report.Of("time").dump());
+      this->ShareReference(step, progress, number);
     }
-    const auto alone =
-      IsShared(stage) ? nullptr : std::make_unique<OthersWait>(this->Settings.threads);
     progress.BeginStep(number++, RunStageNames()[static_cast<std::size_t>(stage)]);
-    const nlohmann::ordered_json numbers = MakeStage(stage, step);
-    ThrowIfInterrupted();
-    std::vector<std::pair<std::string, std::string>> sizes;
-    sizes.reserve(files.size());
-    for (const std::string& file : files)
-    {
-      sizes.emplace_back(file, folder.PathOf(file));
-    }
-    std::vector<std::string> warnings = End(input);
-    warnings.insert(warnings.end(), step.warnings.begin(), step.warnings.end());
-    this->Warnings.insert(this->Warnings.end(), warnings.begin(), warnings.end());
-    report.Finish(stage, numbers, clock, warnings, sizes);
-    this->Commit(folder, stage, report);
-    this->Changed = true;
-    Ranks().Gather("");
-    this->Say(step.summary);
-    this->TellLost(stage, report);
-  }
-  catch (const std::runtime_error& error)
-  {
-    ThrowIfInterrupted();
-    throw std::runtime_error(folder.Translate(error.what()));
-  }
-}
-
-std::vector<std::string> RunJob::End(RunInput& input)
-{
-  return LinesOfAll(input.Messages.TakeWarnings());
-}
-
-void RunJob::Help(RunStage stage, RunInput& input, RunReport& report)
-{
-  StagedFolder folder(this->Settings.output, Ranks());
-  try
-  {
-    std::vector<std::string> files;
-    RunStep step{ input, report, folder, Ranks(), files, [](double) {}, {} };
-    if (stage == RunStage::Vesselness)
-    {
-      report.Set("time", nlohmann::ordered_json::parse(Ranks().FromFirst("")));
-    }
+    nlohmann::ordered_json numbers;
     if (IsShared(stage))
     {
-      MakeStage(stage, step);
+      numbers = MakeStage(stage, step);
+    }
+    else if (first)
+    {
+      const OthersWait alone(this->Settings.threads);
+      numbers = MakeStage(stage, step);
     }
     ThrowIfInterrupted();
-    End(input);
+    // A stage ends on all ranks together.
+    std::vector<std::string> warnings = LinesOfAll(input.Messages.TakeWarnings());
+    if (first)
+    {
+      std::vector<std::pair<std::string, std::string>> sizes;
+      sizes.reserve(files.size());
+      for (const std::string& file : files)
+      {
+        sizes.emplace_back(file, folder->PathOf(file));
+      }
+      warnings.insert(warnings.end(), step.warnings.begin(), step.warnings.end());
+      this->Warnings.insert(this->Warnings.end(), warnings.begin(), warnings.end());
+      report.Finish(stage, numbers, clock, warnings, sizes);
+      this->Commit(*folder, stage, report);
+      this->Changed = true;
+    }
+    Ranks().Gather(""); // the files are in their place
+    if (first)
+    {
+      this->Say(step.summary);
+      this->TellLost(stage, report);
+    }
   }
   catch (const std::runtime_error& error)
   {
     ThrowIfInterrupted();
-    throw std::runtime_error(folder.Translate(error.what()));
+    throw std::runtime_error(folder->Translate(error.what()));
   }
-  // The files are in their place when the first rank has committed them.
-  Ranks().Gather("");
 }
 
 void RunJob::Stop(RunStage stage, const std::string& reason, RunReport& report) const
@@ -310,6 +308,7 @@ void RunJob::Run()
   RunReport report(this->Settings.output, this->Options.All(),
     DescribeInput(input.Files(), this->Settings.output));
   const std::vector<RunStage> stages = this->Plan(input, report);
+  input.Chosen = report.Reference();
   if (input.IsSurface())
   {
     report.Set("surface_input", this->Settings.input.front());
@@ -339,14 +338,7 @@ void RunJob::Run()
       ReleaseImages(input, stage);
       try
       {
-        if (!Ranks().IsFirst())
-        {
-          this->Help(stage, input, report);
-        }
-        else
-        {
-          this->Make(stage, input, report, progress, number);
-        }
+        this->Make(stage, input, report, progress, number);
       }
       catch (const Cancelled&)
       {
@@ -386,8 +378,7 @@ void RunJob::Run()
     return;
   }
   std::printf("%s: phase %d (%.1f %% R-R), %s\n", this->Settings.output.c_str(),
-    report.Of("phase").get<int>() + 1, 100.0 * report.Of("time").get<double>(),
-    this->Summary.c_str());
+    input.Chosen->number + 1, 100.0 * input.Chosen->time, this->Summary.c_str());
 }
 }
 

@@ -288,6 +288,23 @@ Json RunReport::Of(const std::string& name) const
   return this->Head.contains(name) ? this->Head[name] : Member(this->Numbers, name);
 }
 
+std::optional<ReferencePhase> RunReport::Reference() const
+{
+  if (!this->Head.contains("phase"))
+  {
+    return std::nullopt;
+  }
+  return ReferencePhase{ this->Head["phase"].get<int>(), this->Head["time"].get<double>(),
+    this->Head["image"].get<std::string>() };
+}
+
+void RunReport::SetReference(const ReferencePhase& reference)
+{
+  this->Set("phase", reference.number);
+  this->Set("time", reference.time);
+  this->Set("image", reference.image);
+}
+
 void RunReport::Set(const std::string& name, const Json& value)
 {
   this->Head[name] = value;

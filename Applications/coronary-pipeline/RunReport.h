@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include <chrono>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +39,14 @@ private:
 /// Greatest memory of the process so far, MB.
 double PeakMemory();
 
+/// The phase of a gated series in which the model is found.
+struct ReferencePhase
+{
+  int number = 0;
+  double time = 0.0; ///< fraction of R-R
+  std::string image; ///< its file
+};
+
 class RunReport
 {
 public:
@@ -62,7 +71,11 @@ public:
   /// What a finished stage tells; null when there is nothing.
   nlohmann::ordered_json Of(const std::string& name) const;
 
-  /// What the run as a whole tells: "phase", "time", ..
+  /// The reference phase; nothing: not chosen, or the input has no phases.
+  std::optional<ReferencePhase> Reference() const;
+  void SetReference(const ReferencePhase& reference);
+
+  /// What the run as a whole tells: "surface_input", ..
   void Set(const std::string& name, const nlohmann::ordered_json& value);
 
   /// A stage is finished; `files` are paths in the folder, and `sizes` where they are now.

@@ -66,224 +66,293 @@ RunStage RunSettings::Until() const
   return static_cast<RunStage>(std::find(names.begin(), names.end(), this->until) - names.begin());
 }
 
-RunOptions::Setting& RunOptions::Add(CLI::App& app, const std::string& group,
-  const std::string& option, const std::string& name, Value value, const std::string& help)
+/// Declares options one after the other; what follows Add() is about the one that it added.
+class RunOptions::Declaration
 {
-  Setting setting;
-  setting.name = name;
-  setting.value = value;
-  if (auto* const* flag = std::get_if<bool*>(&value))
+public:
+  Declaration(RunOptions& options, CLI::App& app)
+    : Options(options)
+    , App(app)
   {
-    setting.option = app.add_flag(option, **flag, help);
   }
-  else
+
+  /// Of the options that follow. @param stage  that they change; none: it is -1
+  void Begin(const std::string& group, int stage)
   {
-    std::visit(
-      [&](auto* variable)
-      {
-        if constexpr (!std::is_same_v<decltype(variable), bool*>)
-        {
-          setting.option = app.add_option(option, *variable, help);
-        }
-      },
-      value);
+    this->Group = group;
+    this->Stage = stage;
   }
-  if (!group.empty())
+  void Begin(const std::string& group, RunStage stage)
   {
-    setting.option->group(group);
+    this->Begin(group, static_cast<int>(stage));
   }
-  this->List.push_back(setting);
-  return this->List.back();
-}
+
+  /// @param type  of the value in the help; empty: the option's own
+  template <typename Variable>
+  Declaration& Add(const std::string& option, const std::string& name, Variable& value,
+    const std::string& type, const std::string& help)
+  {
+    Setting setting;
+    setting.name = name;
+    setting.value = &value;
+    setting.stage = this->Stage;
+    if constexpr (std::is_same_v<Variable, bool>)
+    {
+      setting.option = this->App.add_flag(option, value, help);
+    }
+    else
+    {
+      setting.option = this->App.add_option(option, value, help);
+    }
+    if (!this->Group.empty())
+    {
+      setting.option->group(this->Group);
+    }
+    if (!type.empty())
+    {
+      setting.option->type_name(type);
+    }
+    this->Options.List.push_back(setting);
+    return *this;
+  }
+
+  Declaration& ChangesNothing() { return this->Change(&Setting::stage, -1); }
+
+  Declaration& Check(const CLI::Validator& validator)
+  {
+    this->Last().check = validator;
+    this->Option().check(validator);
+    return *this;
+  }
+  Declaration& Between(double low, double high) { return this->Check(Within(low, high)); }
+
+  /// Two values.
+  Declaration& Pair()
+  {
+    this->Option().expected(2);
+    return this->Change(&Setting::count, 2);
+  }
+
+  /// Values with commas, or none.
+  Declaration& Commas()
+  {
+    this->Option().delimiter(',')->allow_extra_args(false);
+    return this->Optional();
+  }
+
+  /// Three values, or several times three, or none.
+  Declaration& Points()
+  {
+    this->Option().type_size(3)->expected(1, 100000)->allow_extra_args(false);
+    return this->Change(&Setting::points, true).Optional();
+  }
+
+  Declaration& Optional() { return this->Change(&Setting::optional, true); }
+
+  Declaration& ShowDefault()
+  {
+    this->Option().capture_default_str();
+    return *this;
+  }
+
+  CLI::Option& Option() { return *this->Last().option; }
+
+private:
+  Setting& Last() { return this->Options.List.back(); }
+
+  template <typename Member, typename Value>
+  Declaration& Change(Member Setting::*member, const Value& value)
+  {
+    this->Last().*member = value;
+    return *this;
+  }
+
+  RunOptions& Options;
+  CLI::App& App;
+  std::string Group;
+  int Stage = -1;
+};
 
 RunOptions::RunOptions(CLI::App& app, RunSettings& settings)
   : Settings(settings)
 {
-  const auto add = [&](const char* group, const char* option, const char* name, auto& value,
-                     const char* type, const char* help, int stage) -> Setting&
-  {
-    Setting& setting = this->Add(app, group, option, name, Value(&value), help);
-    setting.stage = stage;
-    if (*type != '\0')
-    {
-      setting.option->type_name(type);
-    }
-    return setting;
-  };
-  const auto check = [](Setting& setting, const CLI::Validator& validator)
-  {
-    setting.check = validator;
-    setting.option->check(validator);
-  };
-  const auto between = [&](Setting& setting, double low, double high) -> Setting&
-  {
-    check(setting, Within(low, high));
-    return setting;
-  };
-  const auto pair = [](Setting& setting)
-  {
-    setting.count = 2;
-    setting.option->expected(2);
-  };
-  const auto list = [](Setting& setting)
-  {
-    setting.optional = true;
-    setting.option->delimiter(',')->allow_extra_args(false);
-  };
-  constexpr int none = -1;
-  constexpr int vesselness = static_cast<int>(RunStage::Vesselness);
-  constexpr int segmentation = static_cast<int>(RunStage::Segmentation);
-  constexpr int centerline = static_cast<int>(RunStage::Centerline);
-  constexpr int surface = static_cast<int>(RunStage::Surface);
-  constexpr int weights = static_cast<int>(RunStage::Weights);
-  constexpr int motion = static_cast<int>(RunStage::Motion);
+  Declaration all(*this, app);
+  this->DeclareImages(all);
+  this->DeclareVessels(all);
+  this->DeclareModel(all);
+  this->DeclareMotion(all);
+}
 
-  add("", "PATH,--input", "input", settings.input, "PATH",
+void RunOptions::DeclareImages(Declaration& all)
+{
+  RunSettings& settings = this->Settings;
+  all.Begin("", -1);
+  all.Add("PATH,--input", "input", settings.input, "PATH",
     "A folder of DICOM files, a series.json, a 4-D volume, or one volume a phase; or a closed "
-    "surface: .vtp, .vtu, .obj, .off, .mesh, .stl or .ply",
-    none);
-  add("", "--output", "output", settings.output, "DIR",
-    "Folder to write to; made when it does not exist", none);
-  check(
-    add("", "--until", "until", settings.until, "STAGE",
-      "Last stage: vesselness, segmentation, centerline, surface, volume, weights or motion", none),
-    OneOf(RunStageNames()));
-  this->List.back().option->capture_default_str();
+    "surface: .vtp, .vtu, .obj, .off, .mesh, .stl or .ply");
+  all.Add("--output", "output", settings.output, "DIR",
+    "Folder to write to; made when it does not exist");
+  all
+    .Add("--until", "until", settings.until, "STAGE",
+      "Last stage: vesselness, segmentation, centerline, surface, volume, weights or motion")
+    .Check(OneOf(RunStageNames()))
+    .ShowDefault();
 
-  const char* group = "Image";
-  between(add(group, "--time", "time", settings.time, "FRACTION",
-            "Reference time, fraction of the R-R interval: the nearest phase is taken. Without it, "
-            "the quietest phase is found",
-            vesselness),
-    -100.0, 100.0)
-    .optional = true;
-  list(between(
-    add(group, "--fractions", "fractions", settings.fractions, "LIST",
-      "R-R fractions of the phases, instead of those in the files: 0,0.35,0.75", vesselness),
-    -100.0, 100.0));
-  between(add(group, "--cycle-ms", "cycle_ms", settings.cycleMs, "MS",
-            "R-R interval, in ms, for files that do not give it", vesselness),
-    1.0, 60000.0)
-    .option->capture_default_str();
-  add(group, "--series", "series", settings.series, "UID",
-    "The DICOM series to read from a folder with several", vesselness);
+  all.Begin("Image", RunStage::Vesselness);
+  all
+    .Add("--time", "time", settings.time, "FRACTION",
+      "Reference time, fraction of the R-R interval: the nearest phase is taken. Without it, "
+      "the quietest phase is found")
+    .Between(-100.0, 100.0)
+    .Optional();
+  all
+    .Add("--fractions", "fractions", settings.fractions, "LIST",
+      "R-R fractions of the phases, instead of those in the files: 0,0.35,0.75")
+    .Between(-100.0, 100.0)
+    .Commas();
+  all
+    .Add("--cycle-ms", "cycle_ms", settings.cycleMs, "MS",
+      "R-R interval, in ms, for files that do not give it")
+    .Between(1.0, 60000.0)
+    .ShowDefault();
+  all.Add("--series", "series", settings.series, "UID",
+    "The DICOM series to read from a folder with several");
+}
 
-  group = "Vessels";
-  pair(between(add(group, "--scales", "scales", settings.scales, "MIN MAX",
-                 "Smallest and largest scale of the vesselness, mm", vesselness),
-    0.05, 50.0));
-  this->List.back().option->capture_default_str();
-  between(add(group, "--c", "c", settings.c, "HU",
-            "Norm of the Hessian from which on structure counts, HU; 0: half the largest one",
-            vesselness),
-    0.0, 1e6)
-    .option->capture_default_str();
-  Setting& seed =
-    between(add(group, "--seed", "seed", settings.seeds, "X Y Z",
-              "A point in a vessel or on its ostium, LPS mm; may be repeated. "
-              "Without any, aorta and ostia, or the widest ends of a surface, are looked for",
-              segmentation),
-      -1e5, 1e5);
-  seed.option->type_size(3)->expected(1, 100000)->allow_extra_args(false);
-  seed.optional = true;
-  seed.points = true;
-  add(group, "--seed-file", "seed_file", settings.seedFile, "FILE",
-    "Points in vessels or on ostia as markups of 3D Slicer (.mrk.json), beside those of --seed",
-    segmentation);
-  add(group, "--mask", "mask", settings.mask, "FILE",
+void RunOptions::DeclareVessels(Declaration& all)
+{
+  RunSettings& settings = this->Settings;
+  all.Begin("Vessels", RunStage::Vesselness);
+  all
+    .Add("--scales", "scales", settings.scales, "MIN MAX",
+      "Smallest and largest scale of the vesselness, mm")
+    .Between(0.05, 50.0)
+    .Pair()
+    .ShowDefault();
+  all
+    .Add("--c", "c", settings.c, "HU",
+      "Norm of the Hessian from which on structure counts, HU; 0: half the largest one")
+    .Between(0.0, 1e6)
+    .ShowDefault();
+  all.Begin("Vessels", RunStage::Segmentation);
+  all
+    .Add("--seed", "seed", settings.seeds, "X Y Z",
+      "A point in a vessel or on its ostium, LPS mm; may be repeated. "
+      "Without any, aorta and ostia, or the widest ends of a surface, are looked for")
+    .Between(-1e5, 1e5)
+    .Points();
+  all.Add("--seed-file", "seed_file", settings.seedFile, "FILE",
+    "Points in vessels or on ostia as markups of 3D Slicer (.mrk.json), beside those of --seed");
+  all.Add("--mask", "mask", settings.mask, "FILE",
     "Mask of the vessels in the reference phase, instead of segmenting it: a .seg.nrrd of 3D "
     "Slicer, or "
-    "another volume. With it of several phases --time. Without it, that of a series.json",
-    segmentation);
-  add(group, "--mask-segment", "mask_segments", settings.maskSegments, "NAME",
-    "Name or ID of a segment of the mask; may be repeated. Without any, all of them", segmentation)
-    .option->allow_extra_args(false);
-  between(add(group, "--largest-radius", "largest_radius", settings.largestRadius, "MM",
-            "Blood that a ball of this radius fits into is aorta or chamber, mm", segmentation),
-    1.0, 50.0)
-    .option->capture_default_str();
-  pair(between(
-    add(group, "--window", "window", settings.window, "TISSUE BLOOD",
-      "Image values of tissue and of undiluted blood, instead of measuring them", segmentation),
-    -1e5, 1e5));
-  this->List.back().optional = true;
+    "another volume. With it of several phases --time. Without it, that of a series.json");
+  all
+    .Add("--mask-segment", "mask_segments", settings.maskSegments, "NAME",
+      "Name or ID of a segment of the mask; may be repeated. Without any, all of them")
+    .Option()
+    .allow_extra_args(false);
+  all
+    .Add("--largest-radius", "largest_radius", settings.largestRadius, "MM",
+      "Blood that a ball of this radius fits into is aorta or chamber, mm")
+    .Between(1.0, 50.0)
+    .ShowDefault();
+  all
+    .Add("--window", "window", settings.window, "TISSUE BLOOD",
+      "Image values of tissue and of undiluted blood, instead of measuring them")
+    .Between(-1e5, 1e5)
+    .Pair()
+    .Optional();
 
-  group = "Centerlines";
-  add(group, "--beyond-mask", "beyond_mask", settings.beyondMask, "",
+  all.Begin("Centerlines", RunStage::Centerline);
+  all.Add("--beyond-mask", "beyond_mask", settings.beyondMask, "",
     "March wherever a vessel is to be seen, not only inside the segmented lumen: some thin "
-    "vessels are followed farther, at the risk of others' lumens, and slower",
-    centerline);
-  between(add(group, "--least-branch", "least_branch", settings.leastBranch, "MM",
-            "Shorter branches are none, mm; 0: ten voxels", centerline),
-    0.0, 1000.0)
-    .option->capture_default_str();
-  check(add(group, "--centerline-steps", "centerline_steps", settings.centerlineSteps, "N",
-          "After so many points on the ways back from possible tips the trees are written as far "
-          "as they are found: a limit of work, the same on any machine",
-          centerline),
-    WholeWithin(1, 2000000000));
-  this->List.back().option->capture_default_str();
-  add(group, "!--no-labels", "labels", settings.labels, "",
-    "Give the segments no names: for trees that are not coronary", centerline);
-  add(group, "--partial", "partial", settings.partial, "",
-    "Go on when a tree is lost: an ostium that was not found, a seed from which no vessel was "
-    "followed. Without it the run ends there",
-    none);
+    "vessels are followed farther, at the risk of others' lumens, and slower");
+  all
+    .Add("--least-branch", "least_branch", settings.leastBranch, "MM",
+      "Shorter branches are none, mm; 0: ten voxels")
+    .Between(0.0, 1000.0)
+    .ShowDefault();
+  all
+    .Add("--centerline-steps", "centerline_steps", settings.centerlineSteps, "N",
+      "After so many points on the ways back from possible tips the trees are written as far "
+      "as they are found: a limit of work, the same on any machine")
+    .Check(WholeWithin(1, 2000000000))
+    .ShowDefault();
+  all.Add("!--no-labels", "labels", settings.labels, "",
+    "Give the segments no names: for trees that are not coronary");
+  all
+    .Add("--partial", "partial", settings.partial, "",
+      "Go on when a tree is lost: an ostium that was not found, a seed from which no vessel was "
+      "followed. Without it the run ends there")
+    .ChangesNothing();
+}
 
-  group = "Surface";
-  check(add(group, "--surface", "surface", settings.surface, "KIND",
-          "Of an input that is a surface: swept along its centerlines, or given, as it is but for "
-          "repairs",
-          surface),
-    OneOf({ "swept", "given" }));
-  this->List.back().option->capture_default_str();
-  pair(between(add(group, "--edges", "edges", settings.edges, "MIN MAX",
-                 "Length of the triangles' edges where the wall is most curved and where it is "
-                 "flat, mm",
-                 surface),
-    0.001, 100.0));
-  this->List.back().option->capture_default_str();
-  add(group, "--contours", "contours", settings.contours, "",
-    "Cross-sections as the image shows them, instead of round ones", surface);
-  add(group, "--open-ends", "open_ends", settings.openEnds, "",
-    "Inlets and outlets without caps; with --until surface", surface);
+void RunOptions::DeclareModel(Declaration& all)
+{
+  RunSettings& settings = this->Settings;
+  all.Begin("Surface", RunStage::Surface);
+  all
+    .Add("--surface", "surface", settings.surface, "KIND",
+      "Of an input that is a surface: swept along its centerlines, or given, as it is but for "
+      "repairs")
+    .Check(OneOf({ "swept", "given" }))
+    .ShowDefault();
+  all
+    .Add("--edges", "edges", settings.edges, "MIN MAX",
+      "Length of the triangles' edges where the wall is most curved and where it is "
+      "flat, mm")
+    .Between(0.001, 100.0)
+    .Pair()
+    .ShowDefault();
+  all.Add("--contours", "contours", settings.contours, "",
+    "Cross-sections as the image shows them, instead of round ones");
+  all.Add("--open-ends", "open_ends", settings.openEnds, "",
+    "Inlets and outlets without caps; with --until surface");
 
-  group = "Weights";
-  add(group, "--weight-cache", "weight_cache", settings.weightCache, "DIR",
-    "Folder in which skin weights are kept; the same mesh, bones and settings are read from there",
-    none);
-  add(group, "--leave-bones-outside", "leave_bones_outside", settings.leaveBonesOutside, "",
-    "Leave out bones that lie wholly outside of the mesh, with a warning, instead of failing",
-    weights);
+  all.Begin("Weights", RunStage::Weights);
+  all
+    .Add("--weight-cache", "weight_cache", settings.weightCache, "DIR",
+      "Folder in which skin weights are kept; the same mesh, bones and settings are read from "
+      "there")
+    .ChangesNothing();
+  all.Add("--leave-bones-outside", "leave_bones_outside", settings.leaveBonesOutside, "",
+    "Leave out bones that lie wholly outside of the mesh, with a warning, instead of failing");
+}
 
-  group = "Motion";
-  between(add(group, "--temporal-window-ms", "temporal_window_ms", settings.temporalWindowMs, "MS",
-            "Time over which an image was taken, ms: half a turn of the gantry, a quarter with two "
-            "sources",
-            motion),
-    0.0, 1000.0)
-    .option->capture_default_str();
-  check(add(group, "--tracked", "tracked", settings.tracked, "PHASES",
-          "Phases that are tracked: all, or even, every other one, and the others are interpolated",
-          motion),
-    OneOf({ "all", "even" }));
-  this->List.back().option->capture_default_str();
-  list(between(add(group, "--moments", "moments", settings.moments, "LIST",
-                 "R-R fractions at which the moved meshes are written; without it, at the phases "
-                 "of the series",
-                 motion),
-    -100.0, 100.0));
-  check(add(group, "--interpolation", "interpolation", settings.interpolation, "MODE",
-          "Between the tracked phases: linear, cubic or low-noise", motion),
-    OneOf(InterpolationModes()));
-  this->List.back().option->capture_default_str();
+void RunOptions::DeclareMotion(Declaration& all)
+{
+  RunSettings& settings = this->Settings;
+  all.Begin("Motion", RunStage::Motion);
+  all
+    .Add("--temporal-window-ms", "temporal_window_ms", settings.temporalWindowMs, "MS",
+      "Time over which an image was taken, ms: half a turn of the gantry, a quarter with two "
+      "sources")
+    .Between(0.0, 1000.0)
+    .ShowDefault();
+  all
+    .Add("--tracked", "tracked", settings.tracked, "PHASES",
+      "Phases that are tracked: all, or even, every other one, and the others are interpolated")
+    .Check(OneOf({ "all", "even" }))
+    .ShowDefault();
+  all
+    .Add("--moments", "moments", settings.moments, "LIST",
+      "R-R fractions at which the moved meshes are written; without it, at the phases "
+      "of the series")
+    .Between(-100.0, 100.0)
+    .Commas();
+  all
+    .Add("--interpolation", "interpolation", settings.interpolation, "MODE",
+      "Between the tracked phases: linear, cubic or low-noise")
+    .Check(OneOf(InterpolationModes()))
+    .ShowDefault();
 
-  add("", "--compress", "compress", settings.compress, "", "Compress the image files", none);
-  check(
-    add("", "--threads", "threads", settings.threads, "N", "Number of threads; 0: all cores", none),
-    WholeWithin(0, 1024));
-  this->List.back().option->capture_default_str();
-  add("", "--quiet", "quiet", settings.quiet, "", "No progress and no summary", none);
+  all.Begin("", -1);
+  all.Add("--compress", "compress", settings.compress, "", "Compress the image files");
+  all.Add("--threads", "threads", settings.threads, "N", "Number of threads; 0: all cores")
+    .Check(WholeWithin(0, 1024))
+    .ShowDefault();
+  all.Add("--quiet", "quiet", settings.quiet, "", "No progress and no summary");
 }
 
 void RunOptions::Assign(Setting& setting, const Json& value, const std::string& where)

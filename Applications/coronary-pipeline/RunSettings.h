@@ -118,8 +118,11 @@ private:
     bool points = false;   ///< a list of triples
   };
 
-  Setting& Add(CLI::App& app, const std::string& group, const std::string& option,
-    const std::string& name, Value value, const std::string& help);
+  class Declaration;
+  void DeclareImages(Declaration& all);
+  void DeclareVessels(Declaration& all);
+  void DeclareModel(Declaration& all);
+  void DeclareMotion(Declaration& all);
   static void Assign(
     Setting& setting, const nlohmann::ordered_json& value, const std::string& where);
 

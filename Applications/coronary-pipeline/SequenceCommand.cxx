@@ -3,6 +3,7 @@
 #include "OptionChecks.h"
 #include "ProgressDisplay.h"
 #include "Ranks.h"
+#include "StagedFolder.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
@@ -185,10 +186,7 @@ void SequenceJob::Declare(CLI::App& app)
     ->type_name("DEG")
     ->capture_default_str()
     ->group(files);
-  app.add_option("--threads", this->threads, "Number of threads; 0: all cores")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "No progress and no summary");
 }
 
@@ -327,11 +325,16 @@ void SequenceJob::Run() const
     moving.Writer->SetInputData(2, caps);
   }
   this->Choose(moving.Writer);
-  moving.Writer->SetRanks(&Ranks());
   progress.BeginStep(1, "phases");
+  const std::unique_ptr<StagedFolder> folder = Ranks().MakeFolder(this->output);
+  moving.Writer->SetSharing(&Ranks(), folder.get());
   moving.Write((fs::path(this->output) / "mesh.json").string(),
     this->PhaseTimes(source->GetTimes()), messages,
     [&](double fraction) { progress.Update(fraction); });
+  if (Ranks().IsFirst())
+  {
+    folder->Commit();
+  }
   for (const std::string& warning : LinesOfAll(messages.TakeWarnings()))
   {
     std::fprintf(stderr, "Warning: %s\n", warning.c_str());

@@ -1,28 +1,19 @@
 /**
  * coronary-pipeline: the project's batch program.
  *
- * Exit codes: 0 done; 1 failed, with one line that says why; 2 the command line is wrong;
- * 128 + n ended by signal n (130: Ctrl-C). Of several ranks (mpirun) the first one has it, the others 0.
+ * Exit codes are those of Program.h. Of several ranks (mpirun) the first one has it, the others 0.
  */
 #include "Command.h"
-#include "ErrorLine.h"
 #include "Interruption.h"
-#include "ParallelFor.h"
 #include "Ranks.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <exception>
-#include <iostream>
-#include <new>
 #include <string>
 #include <vector>
 
 namespace
 {
-constexpr int Failed = 1;
-constexpr int WrongUsage = 2;
-
 constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakePhantomCommand,
   coronary::MakePhantomMotionCommand,
@@ -37,46 +28,29 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakeConvertCommand,
 };
 
+/// Of several ranks one speaks.
 int Complain(const CLI::App* command, const std::string& message, int exitCode)
 {
-  if (coronary::IsFirstProcess())
-  {
-    const std::string name = command ? " " + command->get_name() : "";
-    std::fprintf(
-      stderr, "coronary-pipeline%s: %s\n", name.c_str(), coronary::ErrorLine(message).c_str());
-  }
-  return exitCode;
+  const std::string name =
+    command ? "coronary-pipeline " + command->get_name() : std::string("coronary-pipeline");
+  return coronary::IsFirstProcess() ? coronary::Complain(name, message, exitCode) : exitCode;
 }
 
 int RunCommand(const coronary::Command& command)
 {
-  try
-  {
-    coronary::StartRanks();
-    coronary::CatchInterruptions();
-    if (coronary::Ranks().Size() > 1 && !command.onRanks)
+  return coronary::ExitCodeOf(
+    [&]
     {
-      throw coronary::UsageError("this command works in one process: start it without mpirun");
-    }
-    coronary::Ranks().Agree(command.run);
-    return 0;
-  }
-  catch (const coronary::UsageError& error)
-  {
-    return Complain(command.options, error.what(), WrongUsage);
-  }
-  catch (const coronary::Cancelled&)
-  {
-    return Complain(command.options, "interrupted", 128 + coronary::Interruption());
-  }
-  catch (const std::bad_alloc&)
-  {
-    return Complain(command.options, "not enough memory", Failed);
-  }
-  catch (const std::exception& error)
-  {
-    return Complain(command.options, error.what(), Failed);
-  }
+      coronary::StartRanks();
+      coronary::CatchInterruptions(); // MPI has handlers of its own
+      if (coronary::Ranks().Size() > 1 && !command.onRanks)
+      {
+        throw coronary::UsageError("this command works in one process: start it without mpirun");
+      }
+      coronary::Ranks().Agree(command.run);
+    },
+    [&](const std::string& message, int exitCode)
+    { return Complain(command.options, message, exitCode); });
 }
 
 int Run(int argc, char** argv)
@@ -109,18 +83,18 @@ int Run(int argc, char** argv)
   }
   catch (const CLI::ParseError& error)
   {
-    return Complain(chosen() ? chosen()->options : nullptr, error.what(), WrongUsage);
+    return Complain(chosen() ? chosen()->options : nullptr, error.what(), coronary::UsageExitCode);
   }
   const std::vector<std::string> extras = program.remaining();
   if (!extras.empty())
   {
     const std::string kind = extras.front().front() == '-' ? "option" : "command";
-    return Complain(
-      nullptr, "unknown " + kind + " '" + extras.front() + "' (see --help)", WrongUsage);
+    return Complain(nullptr, "unknown " + kind + " '" + extras.front() + "' (see --help)",
+      coronary::UsageExitCode);
   }
   if (!chosen())
   {
-    return Complain(nullptr, "a command is required (see --help)", WrongUsage);
+    return Complain(nullptr, "a command is required (see --help)", coronary::UsageExitCode);
   }
   return RunCommand(*chosen());
 }
@@ -128,22 +102,19 @@ int Run(int argc, char** argv)
 
 int main(int argc, char** argv)
 {
-  int exitCode = Failed;
+  const coronary::Complaint complain = [](const std::string& message, int exitCode)
+  { return Complain(nullptr, message, exitCode); };
+  int exitCode = 0;
   try
   {
     exitCode = Run(argc, argv);
   }
   catch (const std::exception& error)
   {
-    return Complain(nullptr, error.what(), Failed);
+    return complain(error.what(), coronary::FailedExitCode);
   }
   coronary::FinishRanks();
-  // What was printed must have arrived: the reader may be a full disk.
-  std::cout.flush();
-  if (exitCode == 0 && (!std::cout || std::fflush(stdout) != 0))
-  {
-    return Complain(nullptr, "cannot write to the standard output", Failed);
-  }
+  exitCode = coronary::ExitCodeAfterOutput(exitCode, complain);
   // The starter ends all others as soon as one fails: the first one is to say it.
   return coronary::IsFirstProcess() ? exitCode : 0;
 }

@@ -3,7 +3,8 @@
 #include "AtomicFile.h"
 #include "FileSeries.h"
 #include "MeshSequenceReport.h"
-#include "RankGroup.h"
+#include "Ranks.h"
+#include "StagedFolder.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
@@ -25,6 +26,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -48,7 +50,7 @@ std::string WriteMovingLines(
     name.append(SeriesNumber(n, times.size(), PhaseDigits)).append(".vtp");
     files.push_back({ name, times[n] });
     const std::string path = step.Add("motion/" + files.back().path);
-    if (step.ranks.Owns(n))
+    if (Ranks().Owns(n))
     {
       UpdateAtTime(lines, 0, times[n], step.input.Messages, [](double) {});
       WritePolyData(
@@ -56,7 +58,7 @@ std::string WriteMovingLines(
     }
   }
   std::string list = "motion/" + stem + ".vtp.series";
-  if (step.ranks.IsFirst())
+  if (Ranks().IsFirst())
   {
     WriteFileAtomically(step.Add(list), FileSeriesText(files));
     WriteFileAtomically(step.Add("motion/" + stem + ".pvd"), PvdText(files));
@@ -98,7 +100,6 @@ void ConnectMesh(RunStep& step, vtkPolyData* skeleton, MovingMesh& moving)
   moving.Writer->SetInputData(2, ReadLines(step, "caps.vtp"));
   moving.Writer->PrefixFilesOff();
   moving.Writer->SetDigits(PhaseDigits);
-  moving.Writer->SetRanks(&step.ranks);
 }
 
 /// The moving mesh at these times, with the lists of all that is in motion/; those on the first rank.
@@ -107,11 +108,15 @@ Json WriteMovingMesh(MovingMesh& moving, const std::vector<double>& times, RunSt
 {
   const std::string name = "motion/mesh.json";
   const std::string path = step.Add(name);
+  const std::unique_ptr<StagedFolder> folder =
+    Ranks().MakeFolder(fs::path(path).parent_path().string());
+  moving.Writer->SetSharing(&Ranks(), folder.get());
   moving.Write(path, times, step.input.Messages, progress);
-  if (!step.ranks.IsFirst())
+  if (!Ranks().IsFirst())
   {
     return Json::object();
   }
+  folder->Commit();
   for (const std::string& file : MeshSequenceFiles(path))
   {
     if ("motion/" + file != name)
@@ -133,8 +138,7 @@ Json WriteMovingMesh(MovingMesh& moving, const std::vector<double>& times, RunSt
 Json MakeRest(RunStep& step, const std::string& reason)
 {
   // The phase that it is, so that it can be compared with what is known of that, and one half a cycle away.
-  const Json phase = step.report.Of("time");
-  const double own = phase.is_number() ? phase.get<double>() : 0.0;
+  const double own = step.input.Chosen ? step.input.Chosen->time : 0.0;
   std::vector<double> times = step.input.Settings.moments;
   if (times.size() < 2)
   {
@@ -160,7 +164,7 @@ Json MakeRest(RunStep& step, const std::string& reason)
   lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
   lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
   lists.update(WriteMovingMesh(moving, times, step, step.progress));
-  if (!step.ranks.IsFirst())
+  if (!Ranks().IsFirst())
   {
     return {};
   }
@@ -190,7 +194,7 @@ Json MakeMotion(RunStep& step)
   tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
   tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
                                                        : vtkCenterlineTracker::AllPhases);
-  tracker->SetRanks(&step.ranks);
+  tracker->SetSharing(&Ranks());
   const std::vector<double> times = Moments(step.input);
   vtkNew<vtkCardiacPhaseInterpolator> lines;
   lines->SetInputConnection(tracker->GetOutputPort(0));
@@ -207,7 +211,7 @@ Json MakeMotion(RunStep& step)
   lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
   lists.update(WriteMovingMesh(
     moving, times, step, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); }));
-  if (!step.ranks.IsFirst())
+  if (!Ranks().IsFirst())
   {
     return {};
   }

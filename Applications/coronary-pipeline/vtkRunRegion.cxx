@@ -5,7 +5,7 @@
 #include "Interruption.h"
 #include "LargePages.h"
 #include "ParallelFor.h"
-#include "RankGroup.h"
+#include "Ranks.h"
 #include "RunSettings.h"
 #include "vtkGatedImageReader.h"
 
@@ -83,7 +83,7 @@ void RequireOstia(const RunStep& step, const std::vector<double>& confidences)
       ? "No value is below 0, where HU have fat and air: take off what was added to them (1024, "
         "mostly)"
       : "It may have no contrast medium in the aorta, or not show the ascending aorta");
-  throw std::runtime_error("'" + step.report.Of("image").get<std::string>() + "': " + text + ".");
+  throw std::runtime_error("'" + step.input.Chosen->image + "': " + text + ".");
 }
 
 void FindHeart(RunStep& step)
@@ -138,7 +138,7 @@ vtkSmartPointer<vtkImageData> HeartMask(RunStep& step)
 {
   RunInput& input = step.input;
   const std::string blocks =
-    step.ranks.FromFirst(input.Region ? input.Region->Blocks() : std::string());
+    Ranks().FromFirst(input.Region ? input.Region->Blocks() : std::string());
   if (blocks.empty())
   {
     return nullptr;

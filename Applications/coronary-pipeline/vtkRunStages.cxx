@@ -10,7 +10,7 @@
 #include "MeshSequenceReport.h"
 #include "MetaImageWriter.h"
 #include "OptionChecks.h"
-#include "RankGroup.h"
+#include "Ranks.h"
 #include "SegmentationFile.h"
 #include "SeriesDescription.h"
 #include "StagedFolder.h"
@@ -178,7 +178,7 @@ void LoadReference(const RunStep& step, bool automatic, double time)
 
 void NeedReference(const RunStep& step)
 {
-  LoadReference(step, false, step.report.Of("time").get<double>());
+  LoadReference(step, false, step.input.Chosen->time);
 }
 
 void NeedVesselness(const RunStep& step)
@@ -220,13 +220,13 @@ void Update(vtkAlgorithm* algorithm, const RunStep& step)
 }
 
 /// The slices that a rank works on; none: the last is before the first.
-std::array<int, 6> SlabOf(const RankGroup& ranks, int rank, const int whole[6])
+std::array<int, 6> SlabOf(int rank, const int whole[6])
 {
   std::array<int, 6> slab;
   std::copy_n(whole, 6, slab.begin());
   const std::int64_t slices = whole[5] - whole[4] + 1;
-  slab[4] = whole[4] + static_cast<int>(slices * rank / ranks.Size());
-  slab[5] = whole[4] + static_cast<int>(slices * (rank + 1) / ranks.Size()) - 1;
+  slab[4] = whole[4] + static_cast<int>(slices * rank / Ranks().Size());
+  slab[5] = whole[4] + static_cast<int>(slices * (rank + 1) / Ranks().Size()) - 1;
   return slab;
 }
 
@@ -234,18 +234,18 @@ std::array<int, 6> SlabOf(const RankGroup& ranks, int rank, const int whole[6])
 vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, const RunStep& step)
 {
   vtkNew<vtkReferencePhase> phase; // lives as long as it is asked
-  if (!step.ranks.IsFirst())
+  if (!Ranks().IsFirst())
   {
     // Of the reference no more is read than the slab and its surroundings.
     phase->SetInputConnection(step.input.Reader->GetOutputPort());
     phase->SetAutomatic(false);
-    phase->SetTime(step.report.Of("time").get<double>());
+    phase->SetTime(step.input.Chosen->time);
     vesselness->SetInputConnection(phase->GetOutputPort());
   }
   vesselness->UpdateInformation();
   int whole[6];
   vesselness->GetOutputInformation(0)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
-  const std::array<int, 6> slab = SlabOf(step.ranks, step.ranks.Rank(), whole);
+  const std::array<int, 6> slab = SlabOf(Ranks().Rank(), whole);
   const float* own = nullptr;
   std::size_t size = 0;
   if (slab[4] <= slab[5])
@@ -256,7 +256,7 @@ vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, co
     size = static_cast<std::size_t>(vesselness->GetOutput()->GetNumberOfPoints()) * sizeof(float);
   }
   vtkSmartPointer<vtkImageData> all;
-  if (step.ranks.IsFirst())
+  if (Ranks().IsFirst())
   {
     all = vtkSmartPointer<vtkImageData>::New();
     all->CopyStructure(vesselness->GetOutput());
@@ -267,7 +267,7 @@ vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, co
     all->GetPointData()->SetScalars(values);
     all->GetFieldData()->PassData(vesselness->GetOutput()->GetFieldData());
   }
-  step.ranks.Collect(own, size, all ? all->GetScalarPointer() : nullptr);
+  Ranks().Collect(own, size, all ? all->GetScalarPointer() : nullptr);
   return all;
 }
 
@@ -276,7 +276,7 @@ vtkSmartPointer<vtkImageData> ComputeInSlabs(vtkFrangiVesselness* vesselness, co
 bool DoubtImage(RunStep& step)
 {
   vtkImageData* image = step.input.Reference;
-  const std::string name = "'" + step.report.Of("image").get<std::string>() + "'";
+  const std::string name = "'" + step.input.Chosen->image + "'";
   double spacing[3];
   image->GetSpacing(spacing);
   const double largest = *std::max_element(spacing, spacing + 3);
@@ -309,13 +309,13 @@ Json MakeVesselness(RunStep& step)
   vesselness->SetAutomaticC(!(settings.c > 0.0));
   vesselness->SetC(settings.c > 0.0 ? settings.c : 1.0);
   std::string doubt;
-  if (step.ranks.IsFirst())
+  if (Ranks().IsFirst())
   {
     NeedReference(step);
     doubt = DoubtImage(step) ? "no HU" : "";
     vesselness->SetInputData(step.input.Reference);
   }
-  if (!step.ranks.FromFirst(doubt).empty())
+  if (!Ranks().FromFirst(doubt).empty())
   {
     vesselness->SetAutomaticC(true);
   }
@@ -324,7 +324,7 @@ Json MakeVesselness(RunStep& step)
   {
     vesselness->SetInputData(1, heart);
   }
-  if (step.ranks.Size() > 1)
+  if (Ranks().Size() > 1)
   {
     step.input.Vesselness = ComputeInSlabs(vesselness, step);
   }
@@ -333,7 +333,7 @@ Json MakeVesselness(RunStep& step)
     Update(vesselness, step);
     step.input.Vesselness = Detached(vesselness->GetOutput());
   }
-  if (!step.ranks.IsFirst())
+  if (!Ranks().IsFirst())
   {
     return {};
   }
@@ -381,8 +381,7 @@ void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
     {
       throw;
     }
-    throw std::runtime_error("'" + step.report.Of("image").get<std::string>() +
-      "': no coronary ostium was found: " +
+    throw std::runtime_error("'" + step.input.Chosen->image + "': no coronary ostium was found: " +
       text.substr(text.find('(', begin) + 1, end - text.find('(', begin) - 1) +
       ". Give the ostia with --seed X Y Z (LPS, mm); of values that are no HU, --window TISSUE "
       "BLOOD too.");
@@ -449,7 +448,7 @@ Json MakeSegmentation(RunStep& step)
     return MakeGivenMask(step);
   }
   const RunSettings& settings = step.input.Settings;
-  const std::string givenMask = step.input.MaskOf(step.report.Of("phase").get<int>());
+  const std::string givenMask = step.input.MaskOf(step.input.Chosen->number);
   const std::vector<double>& given = step.input.Seeds;
   Json numbers = { { "file", "mask.mha" } };
   NeedVesselness(step);
@@ -992,9 +991,8 @@ void FindReference(RunStep& step)
     input.Reference = nullptr;
     LoadReference(step, false, reader->GetPhaseTime(phase));
   }
-  step.report.Set("phase", phase);
-  step.report.Set("time", reader->GetPhaseTime(phase));
-  step.report.Set("image", reader->GetPhaseFileName(phase));
+  input.Chosen = { phase, reader->GetPhaseTime(phase), reader->GetPhaseFileName(phase) };
+  step.report.SetReference(*input.Chosen);
   FindHeart(step);
 }
 

@@ -17,6 +17,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,6 @@ class vtkPolyData;
 
 namespace coronary
 {
-class RankGroup;
 class StagedFolder;
 class HeartRegion;
 struct CoronaryOstia;
@@ -69,6 +69,9 @@ public:
   std::shared_ptr<const HeartRegion> Region;
   ///@}
 
+  /// The reference phase, from FindReference() or a report; nothing: not chosen yet, or there are no phases.
+  std::optional<ReferencePhase> Chosen;
+
   ///@{
   /// Of the reference phase; null: not in memory.
   vtkSmartPointer<vtkImageData> Reference;
@@ -83,7 +86,6 @@ struct RunStep
   RunInput& input;
   RunReport& report;               ///< of the stages before
   StagedFolder& folder;            ///< for the stage's files
-  RankGroup& ranks;                ///< that work on the stage together
   std::vector<std::string>& files; ///< names of those
   std::function<void(double)> progress;
   std::string summary;                    ///< a few words for the user
@@ -105,7 +107,7 @@ vtkSmartPointer<vtkPolyData> ReadTree(const RunStep& step);
 /// Whether all ranks work on a stage; else the first one alone.
 bool IsShared(RunStage stage);
 
-/// The reference phase: number, time and file into the report, the image into the input.
+/// Chooses the reference phase, and loads its image.
 void FindReference(RunStep& step);
 
 /// Makes the files of a stage, those that are shared with all ranks. @return what the report tells of it, on the first

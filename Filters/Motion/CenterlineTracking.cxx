@@ -304,7 +304,7 @@ void CenterlineTrackingSettings::Validate() const
 PoseSequence TrackCenterlines(const Polylines& lines, double referenceTime,
   const std::vector<double>& times, const std::function<ScalarImage(double time)>& imageAt,
   const CenterlineTrackingSettings& settings, CenterlineTrackingReport* report,
-  const ProgressCallback& progress, RankGroup& ranks)
+  const ProgressCallback& progress, ItemSharing& sharing)
 {
   settings.Validate();
   CenterlineTrackingReport own;
@@ -330,7 +330,7 @@ PoseSequence TrackCenterlines(const Polylines& lines, double referenceTime,
         "The times of the phases do not increase: number " + std::to_string(k));
     }
   }
-  LineTracker tracker(lines, referenceTime, times, imageAt, settings, result, progress, ranks);
+  LineTracker tracker(lines, referenceTime, times, imageAt, settings, result, progress, sharing);
   return tracker.Run();
 }
 }

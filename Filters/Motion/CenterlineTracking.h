@@ -8,9 +8,9 @@
 #ifndef DynamicCoronary_CenterlineTracking_h
 #define DynamicCoronary_CenterlineTracking_h
 
+#include "ItemSharing.h"
 #include "ParallelFor.h"
 #include "PoseSequence.h"
-#include "RankGroup.h"
 #include "ScalarImage.h"
 #include "TrajectoryModel.h"
 
@@ -53,8 +53,8 @@ struct CenterlineTrackingReport
   int repeatedPhases = 0;            ///< how many such pairs
   std::vector<double> trackedShare;  ///< per phase: nodes that were tracked
   std::vector<std::string> warnings; ///< one sentence each
-  std::int64_t keptBytes = 0;        ///< of images, by this rank
-  int imagesRead = 0;                ///< by this rank
+  std::int64_t keptBytes = 0;        ///< of images, of the phases that were measured here
+  int imagesRead = 0;                ///< here
 };
 
 /**
@@ -62,18 +62,18 @@ struct CenterlineTrackingReport
  * @param referenceTime  of the lines, fraction of R-R
  * @param times          of the phases to track, strictly increasing
  * @param imageAt        gives the image of a time; one that was given before need not stay
- * @param ranks          the phases are dealt out to them: each reads, keeps and measures its own, and the reference.
- *   All get the whole result, bit by bit that of one. The wide search of a phase begins where a phase before it
- *   ended, so that two phases at a time are searched, whatever the number of ranks.
+ * @param sharing        who reads, keeps and measures which phases, which are its items from the reference outwards.
+ *   The result is the same whoever does. The wide search of a phase begins where a phase before it ended, so that
+ *   two phases at a time are searched, however many are done at once.
  * @return positions at `times`, with confidence, status and calibre
  * @throws std::invalid_argument naming a setting or what is wrong with the lines, times or images;
  * std::runtime_error: the lines were found in none of the phases; Cancelled; what imageAt throws, and
- * RankGroup::Gather
+ * ItemSharing::Results
  */
 PoseSequence TrackCenterlines(const Polylines& lines, double referenceTime,
   const std::vector<double>& times, const std::function<ScalarImage(double time)>& imageAt,
   const CenterlineTrackingSettings& settings = {}, CenterlineTrackingReport* report = nullptr,
-  const ProgressCallback& progress = {}, RankGroup& ranks = RankGroup::Alone());
+  const ProgressCallback& progress = {}, ItemSharing& sharing = ItemSharing::None());
 }
 
 #endif

@@ -13,6 +13,8 @@
 #include "TrajectoryModel.h"
 
 #include <functional>
+#include <string>
+#include <vector>
 
 namespace coronary
 {
@@ -34,7 +36,7 @@ public:
   LineTracker(const Polylines& lines, double referenceTime, const std::vector<double>& times,
     const std::function<ScalarImage(double time)>& imageAt,
     const CenterlineTrackingSettings& settings, CenterlineTrackingReport& report,
-    const ProgressCallback& progress, RankGroup& ranks)
+    const ProgressCallback& progress, ItemSharing& sharing)
     : Lines(lines)
     , ReferenceTime(referenceTime)
     , Times(times)
@@ -42,7 +44,7 @@ public:
     , Settings(settings)
     , Result(report)
     , Progress(progress)
-    , Ranks(ranks)
+    , Sharing(sharing)
     , Nodes(PlaceNodes(lines, settings.nodeSpacing))
     , Coarse(settings.coarseRadius, settings.coarseSpacing)
     , Fine(settings.fineRadius, 1.0)
@@ -86,8 +88,13 @@ private:
   /// Air and bone would outvote the rest. @param values  of the reference around all nodes
   void LimitValues(std::vector<float> values);
   void SearchCoarsely();
-  /// Positions in `order`, each of the phase whose place is the guess of the one at this position; none: -1.
-  std::vector<std::ptrdiff_t> Guesses(const std::vector<std::size_t>& order) const;
+  /// Outwards from the reference, so that a neighbour in time is known.
+  void SortPhases();
+  /// Positions in Order, each of the phase whose place is the guess of the one at this position; none: -1.
+  std::vector<std::ptrdiff_t> Guesses() const;
+  /// What is measured of each phase, by those who do it. @return per phase
+  std::vector<std::string> OfPhases(
+    const std::function<std::string(std::size_t phase)>& measure) const;
   /// Looks for the surroundings of the nodes without the vessels, which may be invisible, or with
   /// them.
   Seen SearchFinely(bool vessels, double progressFrom);
@@ -99,7 +106,7 @@ private:
   int Expect(std::size_t k, int n, Sight& sight, Matrix3& curvature) const;
   /// Gauss-Newton on the shift and a constant difference of brightness.
   void AlignNode(std::size_t k, std::int64_t n, const Sight& sight, double noisePerImage,
-    Vector3& measured, Matrix3& information);
+    Vector3& measured, Matrix3& information, double& correlation) const;
   void Finish(PoseSequence& sequence);
   /// Per phase: factor of the radius, of all vessels together.
   std::vector<double> MeasureCalibre() const;
@@ -136,7 +143,7 @@ private:
   const CenterlineTrackingSettings& Settings;
   CenterlineTrackingReport& Result;
   const ProgressCallback& Progress;
-  RankGroup& Ranks;
+  ItemSharing& Sharing;
 
   LineNodes Nodes;
   Patch Coarse;
@@ -148,8 +155,8 @@ private:
   double Contrast = 1.0; ///< of the vessels in the reference
   double Voxel = 0.4;    ///< largest edge of the reference's voxels, mm
   SparseVolume Reference;
-  std::vector<bool> Own;             ///< per phase: of this rank's share
-  std::vector<SparseVolume> Volumes; ///< per phase; empty where it is another rank's
+  std::vector<std::size_t> Order;    ///< phases from the reference outwards: the items of Sharing
+  std::vector<SparseVolume> Volumes; ///< per phase; empty where it is not measured here
   PerPhase Displacement;             ///< per phase and node: the present trajectories
   Trajectories Motion;
   Seen Surroundings; ///< where the tissue around the nodes was found; empty: not looked for

@@ -64,7 +64,7 @@ int LineTracker::Expect(std::size_t k, int n, Sight& sight, Matrix3& curvature) 
 }
 
 void LineTracker::AlignNode(std::size_t k, std::int64_t n, const Sight& sight, double noisePerImage,
-  Vector3& measured, Matrix3& information)
+  Vector3& measured, Matrix3& information, double& correlation) const
 {
   const std::size_t samples = this->Core.places.size();
   const std::vector<float>& wanted = sight.wanted;
@@ -144,7 +144,7 @@ void LineTracker::AlignNode(std::size_t k, std::int64_t n, const Sight& sight, d
       break;
     }
   }
-  this->Likeness[k][n] = likeness;
+  correlation = likeness;
   measured = this->Displacement[k][n] + shift;
   // Of the samples about one in eight says something of its own; patches of neighbours overlap.
   const double trust = std::clamp((likeness - 0.4) / 0.4, 0.0, 1.0);
@@ -161,19 +161,12 @@ void LineTracker::Align(double robustScale, double progressFrom)
 {
   const std::size_t phases = this->Times.size();
   const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
-  PerPhase measured(phases);
-  std::vector<std::vector<Matrix3>> information(phases);
-  this->Likeness.assign(phases, {});
   std::vector<Sight> sights(nodes);
-  for (std::size_t k = 0; k < phases; ++k)
+  const auto align = [&](std::size_t k)
   {
-    if (!this->Own[k])
-    {
-      continue;
-    }
-    measured[k].assign(nodes, Vector3::Zero());
-    information[k].assign(nodes, Matrix3::Zero());
-    this->Likeness[k].assign(nodes, 0.0);
+    std::vector<Vector3> measured(nodes, Vector3::Zero());
+    std::vector<Matrix3> information(nodes, Matrix3::Zero());
+    std::vector<double> likeness(nodes, 0.0);
     std::vector<Matrix3> expectedCurvature(nodes, Matrix3::Zero());
     std::vector<int> averaged(nodes, 1);
     const auto part = [&](double from, double to)
@@ -201,15 +194,19 @@ void LineTracker::Align(double robustScale, double progressFrom)
         for (std::int64_t n = first; n < last; ++n)
         {
           this->AlignNode(
-            k, n, sights[n], imageNoise / averaged[n], measured[k][n], information[k][n]);
+            k, n, sights[n], imageNoise / averaged[n], measured[n], information[n], likeness[n]);
         }
       },
       part(0.5, 1.0));
+    return Packed(measured, information, likeness);
+  };
+  Seen seen{ PerPhase(phases), std::vector<std::vector<Matrix3>>(phases), robustScale };
+  this->Likeness.assign(phases, {});
+  const std::vector<std::string> results = this->OfPhases(align);
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    Unpack(results[k], seen.displacement[k], seen.information[k], this->Likeness[k]);
   }
-  ShareLists(this->Ranks, measured);
-  ShareLists(this->Ranks, information);
-  ShareLists(this->Ranks, this->Likeness);
-  Seen seen{ std::move(measured), std::move(information), robustScale };
   this->Fit(this->WithSurroundings(seen));
   this->Vessels = std::move(seen);
 }

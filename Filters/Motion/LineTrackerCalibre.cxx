@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace coronary
 {
@@ -222,34 +223,34 @@ std::vector<double> LineTracker::MeasureCalibre() const
 {
   const std::size_t phases = this->Times.size();
   const std::size_t nodes = this->Nodes.size();
-  std::vector<std::vector<Widening>> estimates(phases);
-  for (std::size_t k = 0; k < phases; ++k)
+  const auto overNodes = [nodes](const auto& work)
   {
-    estimates[k].resize(this->Own[k] ? nodes : 0);
-  }
-  const std::vector<std::vector<int>> daughters = Daughters(this->Nodes);
-  ParallelFor(static_cast<std::int64_t>(nodes), 4,
-    [&](std::int64_t first, std::int64_t last)
-    {
-      for (auto n = static_cast<int>(first); n < last; ++n)
+    ParallelFor(static_cast<std::int64_t>(nodes), 4,
+      [&](std::int64_t first, std::int64_t last)
       {
-        const WideningField field(this->Nodes, daughters, n);
-        for (std::size_t k = 0; k < phases; ++k)
+        for (auto n = static_cast<int>(first); n < last; ++n)
         {
-          if (this->Own[k])
-          {
-            estimates[k][n] = this->MeasureWidening(k, n, field);
-          }
+          work(n);
         }
-      }
+      });
+  };
+  const std::vector<std::vector<int>> daughters = Daughters(this->Nodes);
+  std::vector<std::optional<WideningField>> fields(nodes);
+  overNodes([&](int n) { fields[n].emplace(this->Nodes, daughters, n); });
+  const std::vector<std::string> results = this->OfPhases(
+    [&](std::size_t k)
+    {
+      std::vector<Widening> estimates(nodes);
+      overNodes([&](int n) { estimates[n] = this->MeasureWidening(k, n, *fields[n]); });
+      return Packed(estimates);
     });
-  ShareLists(this->Ranks, estimates);
   // A node alone is too noisy: the weighted median of all.
   std::vector<double> widening(phases, 0.0);
   std::vector<double> trust(phases, 0.0);
   for (std::size_t k = 0; k < phases; ++k)
   {
-    std::vector<Widening>& all = estimates[k];
+    std::vector<Widening> all;
+    Unpack(results[k], all);
     std::sort(all.begin(), all.end(),
       [](const Widening& a, const Widening& b) { return a.value < b.value; });
     for (const Widening& one : all)

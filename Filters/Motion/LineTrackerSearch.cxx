@@ -79,26 +79,17 @@ void LineTracker::SearchCoarsely()
     std::transform(one.begin(), one.end(), one.begin(), this->Limits);
   }
 
-  // Outwards from the reference, so that a neighbour in time is known.
-  std::vector<std::size_t> order(phases);
-  std::iota(order.begin(), order.end(), std::size_t{ 0 });
-  std::stable_sort(order.begin(), order.end(),
-    [&](std::size_t a, std::size_t b)
-    {
-      return CyclicDistance(this->Times[a], this->ReferenceTime) <
-        CyclicDistance(this->Times[b], this->ReferenceTime);
-    });
-  const std::vector<std::ptrdiff_t> guesses = this->Guesses(order);
+  this->SortPhases();
+  const std::vector<std::ptrdiff_t> guesses = this->Guesses();
   this->Displacement.assign(phases, {});
   this->Volumes.resize(phases);
-  this->Own.assign(phases, false);
   const auto search = [&](
                         std::size_t position, const ScalarImage& image, const AveragedVolume& moved)
   {
-    const std::size_t phase = order[position];
+    const std::size_t phase = this->Order[position];
     std::vector<Vector3> places = guesses[position] < 0
       ? std::vector<Vector3>(nodes, Vector3::Zero())
-      : this->Displacement[order[static_cast<std::size_t>(guesses[position])]];
+      : this->Displacement[this->Order[static_cast<std::size_t>(guesses[position])]];
     std::vector<std::vector<float>> costs(nodes);
     ParallelFor(
       nodes, 4,
@@ -134,45 +125,36 @@ void LineTracker::SearchCoarsely()
     this->Volumes[phase] = SparseVolume(image, this->PlacesAt(places), this->Keep());
     return places;
   };
-  // A phase for each rank at a time: all read theirs at once, and search when the guess is known.
-  const auto ranks = static_cast<std::size_t>(this->Ranks.Size());
-  for (std::size_t first = 0; first < phases; first += ranks)
+  for (std::size_t first = 0; first < phases; first += this->Sharing.AtOnce())
   {
-    const std::size_t end = std::min(phases, first + ranks);
-    const std::size_t own = first + static_cast<std::size_t>(this->Ranks.Rank());
+    std::vector<std::size_t> open(std::min(phases - first, this->Sharing.AtOnce()));
+    std::iota(open.begin(), open.end(), first);
+    // Of these one is done here. Its image is read at once, and searched when the guess is known.
     ScalarImage image;
     AveragedVolume moved;
-    if (own < end)
+    this->Sharing.Results(open,
+      [&](std::size_t position)
+      {
+        image = this->Read(this->Times[this->Order[position]]);
+        moved = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
+        return std::string();
+      });
+    while (!open.empty())
     {
-      this->Own[order[own]] = true;
-      image = this->Read(this->Times[order[own]]);
-      moved = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
-    }
-    std::vector<bool> ready;
-    const auto isOpen = [&](std::size_t position)
-    { return this->Displacement[order[position]].empty(); };
-    for (std::size_t open = end - first; open > 0;)
-    {
-      ready.assign(end - first, false);
-      for (std::size_t position = first; position < end; ++position)
-      {
-        const std::ptrdiff_t guess = guesses[position];
-        ready[position - first] =
-          isOpen(position) && (guess < 0 || !isOpen(static_cast<std::size_t>(guess)));
-      }
-      std::vector<std::vector<Vector3>> found(phases);
-      if (own < end && ready[own - first])
-      {
-        found[order[own]] = search(own, image, moved);
-      }
-      ShareLists(this->Ranks, found);
-      for (std::size_t position = first; position < end; ++position)
-      {
-        if (ready[position - first])
+      const auto waiting = std::stable_partition(open.begin(), open.end(),
+        [&](std::size_t position)
         {
-          this->Displacement[order[position]] = std::move(found[order[position]]);
-          --open;
-        }
+          const std::ptrdiff_t guess = guesses[position];
+          return guess < 0 ||
+            !this->Displacement[this->Order[static_cast<std::size_t>(guess)]].empty();
+        });
+      const std::vector<std::size_t> ready(open.begin(), waiting);
+      open.erase(open.begin(), waiting);
+      const std::vector<std::string> found = this->Sharing.Results(
+        ready, [&](std::size_t position) { return Packed(search(position, image, moved)); });
+      for (std::size_t n = 0; n < ready.size(); ++n)
+      {
+        Unpack(found[n], this->Displacement[this->Order[ready[n]]]);
       }
     }
   }
@@ -183,16 +165,28 @@ void LineTracker::SearchCoarsely()
   this->Fit({ &seen });
 }
 
-std::vector<std::ptrdiff_t> LineTracker::Guesses(const std::vector<std::size_t>& order) const
+void LineTracker::SortPhases()
 {
-  std::vector<std::ptrdiff_t> guesses(order.size(), -1);
-  for (std::size_t position = 0; position < order.size(); ++position)
+  this->Order.resize(this->Times.size());
+  std::iota(this->Order.begin(), this->Order.end(), std::size_t{ 0 });
+  std::stable_sort(this->Order.begin(), this->Order.end(),
+    [&](std::size_t a, std::size_t b)
+    {
+      return CyclicDistance(this->Times[a], this->ReferenceTime) <
+        CyclicDistance(this->Times[b], this->ReferenceTime);
+    });
+}
+
+std::vector<std::ptrdiff_t> LineTracker::Guesses() const
+{
+  std::vector<std::ptrdiff_t> guesses(this->Order.size(), -1);
+  for (std::size_t position = 0; position < this->Order.size(); ++position)
   {
-    const double time = this->Times[order[position]];
+    const double time = this->Times[this->Order[position]];
     double nearest = CyclicDistance(time, this->ReferenceTime);
     for (std::size_t before = 0; before < position; ++before)
     {
-      const double apart = CyclicDistance(time, this->Times[order[before]]);
+      const double apart = CyclicDistance(time, this->Times[this->Order[before]]);
       if (apart < nearest)
       {
         nearest = apart;
@@ -201,6 +195,19 @@ std::vector<std::ptrdiff_t> LineTracker::Guesses(const std::vector<std::size_t>&
     }
   }
   return guesses;
+}
+
+std::vector<std::string> LineTracker::OfPhases(
+  const std::function<std::string(std::size_t phase)>& measure) const
+{
+  // Each by its position in Order, one phase after the other.
+  std::vector<std::size_t> items(this->Order.size());
+  for (std::size_t position = 0; position < items.size(); ++position)
+  {
+    items[this->Order[position]] = position;
+  }
+  return this->Sharing.Results(
+    items, [&](std::size_t position) { return measure(this->Order[position]); });
 }
 
 std::vector<std::vector<float>> LineTracker::WithoutVessels(const Patch& patch, double margin) const
@@ -253,14 +260,9 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
   const std::vector<std::vector<float>> weights = vessels
     ? std::vector<std::vector<float>>(nodes, this->Fine.weights)
     : this->WithoutVessels(this->Fine, 0.8);
-  Seen seen{ PerPhase(phases), std::vector<std::vector<Matrix3>>(phases), 1.5 };
-  for (std::size_t k = 0; k < phases; ++k)
+  const auto search = [&](std::size_t k)
   {
-    if (!this->Own[k])
-    {
-      continue;
-    }
-    seen.information[k].assign(nodes, Matrix3::Zero());
+    std::vector<Matrix3> information(nodes, Matrix3::Zero());
     const std::vector<Vector3> places = this->PlacesAt(this->Displacement[k]);
     if (!std::all_of(places.begin(), places.end(),
           [&](const Vector3& place)
@@ -344,13 +346,13 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
       least[n] = *std::min_element(costs[n].begin(), costs[n].end());
     }
     ToLikelihoods(costs, 30.0, 15.0, 0.1 * this->NoiseFloor());
-    seen.displacement[k] = BestDisplacements(this->Nodes, lattice, costs, 0.25);
+    std::vector<Vector3> displacement = BestDisplacements(this->Nodes, lattice, costs, 0.25);
     for (std::int64_t n = 0; n < nodes; ++n)
     {
       if (vessels)
       {
         // Is there a vessel where it was found?
-        const Vector3& shift = seen.displacement[k][n];
+        const Vector3& shift = displacement[n];
         const int at[3] = { static_cast<int>(std::lround(shift[0])),
           static_cast<int>(std::lround(shift[1])), static_cast<int>(std::lround(shift[2])) };
         std::vector<float> there;
@@ -368,20 +370,24 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
           }
         }
         const double trust = std::clamp((Correlation(there, wanted) - 0.4) / 0.4, 0.0, 1.0);
-        seen.information[k][n] = Matrix3::Identity() * (trust * trust / (0.6 * 0.6));
+        information[n] = Matrix3::Identity() * (trust * trust / (0.6 * 0.6));
       }
       else
       {
-        seen.information[k][n] =
-          Limited(SignalCurvature(curvature[n], noise / averaged[n]).Information() *
-              (30.0 / std::max<double>(least[n], this->NoiseFloor())),
-            std::max(TissueDeviation, 0.8 * this->Voxel));
+        information[n] = Limited(SignalCurvature(curvature[n], noise / averaged[n]).Information() *
+            (30.0 / std::max<double>(least[n], this->NoiseFloor())),
+          std::max(TissueDeviation, 0.8 * this->Voxel));
       }
-      seen.displacement[k][n] += this->Displacement[k][n];
+      displacement[n] += this->Displacement[k][n];
     }
+    return Packed(displacement, information);
+  };
+  Seen seen{ PerPhase(phases), std::vector<std::vector<Matrix3>>(phases), 1.5 };
+  const std::vector<std::string> results = this->OfPhases(search);
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    Unpack(results[k], seen.displacement[k], seen.information[k]);
   }
-  ShareLists(this->Ranks, seen.displacement);
-  ShareLists(this->Ranks, seen.information);
   return seen;
 }
 }

@@ -421,7 +421,7 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
       " is none of the time steps of the series");
   data.Poses = coronary::TrackCenterlines(data.Lines, data.Reference, times, imageAt, settings,
     &data.Report, vtkCoronary::ProgressOf(this),
-    this->Ranks != nullptr ? *this->Ranks : coronary::RankGroup::Alone());
+    this->Sharing != nullptr ? *this->Sharing : coronary::ItemSharing::None());
   ++data.Trackings;
   data.Known = true;
   data.KnownOf = this->GetMTime();

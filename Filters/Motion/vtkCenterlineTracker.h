@@ -58,7 +58,7 @@
 
 namespace coronary
 {
-class RankGroup;
+class ItemSharing;
 }
 
 class VTKCORONARYMOTION_EXPORT vtkCenterlineTracker : public vtkPolyDataAlgorithm
@@ -171,12 +171,11 @@ public:
 
 #ifndef __VTK_WRAP__
   /**
-   * Processes that track together: each reads and measures its share of the phases, and all have the same output.
-   * All have to be asked for it. Not owned; null (default): this process alone.
+   * Who reads and measures which phases; the output is the same. Not owned; null (default): all are measured here.
    */
-  void SetRanks(coronary::RankGroup* ranks)
+  void SetSharing(coronary::ItemSharing* sharing)
   {
-    this->Ranks = ranks;
+    this->Sharing = sharing;
   }
 #endif
 
@@ -212,7 +211,7 @@ private:
   double CycleLength = 0.8;
   double NodeSpacing = 2.0;
   double CaptureRange = 16.0;
-  coronary::RankGroup* Ranks = nullptr;
+  coronary::ItemSharing* Sharing = nullptr;
   struct Internals;
   std::unique_ptr<Internals> Data;
 };

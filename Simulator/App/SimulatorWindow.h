@@ -35,12 +35,6 @@ struct WindowOptions
 /// @throws UsageError: no such kind of device; std::runtime_error: no display, no place for a file
 void CheckWindow(const WindowOptions& options);
 
-/// @throws std::runtime_error: there is no display
-void RequireDisplay();
-
-/// Needs the QApplication. @throws std::runtime_error: the display has no OpenGL 3.2
-void RequireOpenGL();
-
 /**
  * Returns when the window has been closed. Needs a display with OpenGL 3.2.
  * @throws std::runtime_error: no OpenGL; what went wrong in the sessions, the first; devices, files as SessionEngine

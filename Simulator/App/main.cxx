@@ -2,57 +2,32 @@
  * coronary-simulator: a guidewire in beating coronary arteries, contrast medium and X-ray images, in a window or
  * without.
  *
- * Exit codes: 0 done; 1 failed, with one line that says why; 2 the command line is wrong;
- * 128 + n ended by signal n (130: Ctrl-C).
+ * Exit codes are those of Program.h.
  */
-#include "Command.h"
-#include "ErrorLine.h"
 #include "HeadlessSession.h"
-#include "Interruption.h"
 #include "OptionChecks.h"
 #include "ParallelFor.h"
-#include "PosingSession.h"
+#include "Program.h"
 #include "ProgressDisplay.h"
 #include "SessionWorld.h"
 #ifdef DYNAMICCORONARY_WITH_WINDOW
 #include "SimulatorWindow.h"
 #endif
 
-#include <algorithm>
 #include <cstdio>
-#include <exception>
-#include <iostream>
-#include <iterator>
-#include <new>
-#include <stdexcept>
 #include <string>
-#include <vector>
 
 namespace
 {
-constexpr int Failed = 1;
-constexpr int WrongUsage = 2;
-
-int Complain(const std::string& message, int exitCode)
-{
-  std::fprintf(stderr, "coronary-simulator: %s\n", coronary::ErrorLine(message).c_str());
-  return exitCode;
-}
-
 /// What the program is asked to do.
 struct Request
 {
   coronary::HeadlessOptions session;
 #ifdef DYNAMICCORONARY_WITH_WINDOW
   coronary::WindowOptions window;
-  std::string size;
   void DeclareWindow(CLI::App& app);
   void RunWindow() const;
 #endif
-  coronary::PosingOptions posing;
-  std::string pose;
-  void DeclarePosing(CLI::App& app);
-  void RunPosing() const;
   std::string dump;
   bool headless = false;
   bool printScenario = false;
@@ -154,7 +129,14 @@ void Request::Declare(CLI::App& app)
 #ifdef DYNAMICCORONARY_WITH_WINDOW
   this->DeclareWindow(app);
 #endif
-  this->DeclarePosing(app);
+  app
+    .add_option_function<std::string>("--pose",
+      [](const std::string& folder)
+      {
+        throw CLI::ValidationError(
+          "--pose", "posing is a program of its own: coronary-posing " + folder);
+      })
+    ->group(""); // it was one of these once
   const std::string questions = "Instead of a session";
   app.add_flag("--print-scenario", this->printScenario, "Print the scenario in effect as JSON")
     ->group(questions);
@@ -166,12 +148,8 @@ void Request::Declare(CLI::App& app)
     ->type_name("FILE")
     ->group(questions);
 
-  app
-    .add_option("--threads", this->threads,
-      "Number of threads for what is made before the start; 0: all cores. A session has one")
-    ->check(WholeWithin(0, 1024))
-    ->type_name("N")
-    ->capture_default_str();
+  coronary::AddThreads(app, this->threads,
+    "Number of threads for what is made before the start; 0: all cores. A session has one");
   app.add_flag("--quiet", this->session.quiet, "No progress, no messages and no summary");
 }
 
@@ -201,11 +179,6 @@ void Request::Run() const
     std::fputs(coronary::ScenarioText(coronary::ScenarioOf(this->session)).c_str(), stdout);
     return;
   }
-  if (!this->pose.empty())
-  {
-    this->RunPosing();
-    return;
-  }
   if (this->headless)
   {
     coronary::RunHeadless(this->session);
@@ -217,97 +190,6 @@ void Request::Run() const
   throw coronary::UsageError(
     "--headless is required: this program was built without its window (Qt5 and VTK's "
     "GUISupportQt were not found)");
-#endif
-}
-
-void Request::DeclarePosing(CLI::App& app)
-{
-  const std::string what = "Posing by hand";
-  auto* folder =
-    app
-      .add_option("--pose", this->pose,
-        "Folder of 'coronary-pipeline run --until weights': pose its skeleton, in place "
-        "of a session")
-      ->type_name("DIR")
-      ->group(what);
-  const char* const ofSessions[] = {
-    "--scenario",
-    "--vessels",
-    "--replay",
-    "--script",
-    "--ticks",
-    "--output",
-    "--xray",
-    "--record",
-#ifdef DYNAMICCORONARY_WITH_WINDOW
-    "--device",
-    "--screenshot-at",
-    "--video",
-    "--quit-after",
-#endif
-  };
-  for (const char* option : ofSessions)
-  {
-    folder->excludes(app.get_option(option));
-  }
-  app
-    .add_option_function<std::vector<std::string>>(
-      "--pose-move",
-      [this](const std::vector<std::string>& texts)
-      {
-        try
-        {
-          std::transform(texts.begin(), texts.end(), std::back_inserter(this->posing.moves),
-            coronary::PosingMoveOf);
-        }
-        catch (const std::invalid_argument& error)
-        {
-          throw CLI::ValidationError("--pose-move", error.what());
-        }
-      },
-      "Move a joint by so many mm; may be repeated")
-    ->type_name("JOINT:DX,DY,DZ")
-    ->needs(folder)
-    ->group(what);
-  app
-    .add_option("--pose-bones", this->posing.settings.bones,
-      "Bones before the moved joint that share the bend")
-    ->check(coronary::WholeWithin(1, 64))
-    ->capture_default_str()
-    ->type_name("N")
-    ->needs(folder)
-    ->group(what);
-  const auto file = [&](const char* name, std::string& path, const char* help)
-  { app.add_option(name, path, help)->type_name("FILE")->needs(folder)->group(what); };
-  file("--pose-start", this->posing.start, "Pose to begin with, .vtp");
-  file("--pose-output", this->posing.output, "Pose after the moves, .vtp");
-  file("--pose-surface", this->posing.surface, "Surface after the moves, .vtp");
-}
-
-void Request::RunPosing() const
-{
-  if (this->headless)
-  {
-    coronary::PoseWithoutWindow(this->pose, this->posing, this->session.quiet);
-    return;
-  }
-#ifdef DYNAMICCORONARY_WITH_WINDOW
-  coronary::PosingOptions options = this->posing;
-  options.screenshots = this->window.screenshots;
-  if (this->window.triangles != coronary::WindowOptions().triangles)
-  {
-    options.triangles = this->window.triangles;
-  }
-  if (!this->size.empty())
-  {
-    std::sscanf(this->size.c_str(), "%dx%d", &options.width, &options.height);
-  }
-  if (coronary::RunPosingWindow(this->pose, options) != 0)
-  {
-    throw std::runtime_error("posing failed");
-  }
-#else
-  throw coronary::UsageError("--pose needs --headless: this program was built without its window");
 #endif
 }
 
@@ -336,19 +218,7 @@ void Request::DeclareWindow(CLI::App& app)
     ->capture_default_str()
     ->type_name("N")
     ->group(what);
-  app.add_option("--size", this->size, "Of the window in pixels, as 1500x860")
-    ->check(
-      [](const std::string& text)
-      {
-        int width = 0;
-        int height = 0;
-        char rest = 0;
-        const bool good = std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) == 2 &&
-          width >= 640 && width <= 8192 && height >= 480 && height <= 8192;
-        return good ? std::string() : "'" + text + "' is no size from 640x480 to 8192x8192";
-      })
-    ->type_name("WxH")
-    ->group(what);
+  coronary::AddWindowSize(app, this->window.width, this->window.height)->group(what);
   auto* screenshots = app
                         .add_option("--screenshots", this->window.screenshots,
                           "Folder for pictures of the window; it has to exist")
@@ -395,10 +265,6 @@ void Request::RunWindow() const
   options.script = chosen.script;
   options.replay = chosen.replay;
   options.record = chosen.record;
-  if (!this->size.empty())
-  {
-    std::sscanf(this->size.c_str(), "%dx%d", &options.width, &options.height);
-  }
   options.quiet = chosen.quiet;
   coronary::CheckWindow(options);
   coronary::SessionWorld world;
@@ -418,62 +284,14 @@ void Request::RunWindow() const
 }
 #endif
 
-int Run(int argc, char** argv)
+}
+
+int main(int argc, char** argv)
 {
   CLI::App program("A guidewire in beating coronary arteries, contrast medium and X-ray images.",
     "coronary-simulator");
   program.set_version_flag("--version", "coronary-simulator " DYNAMICCORONARY_VERSION);
   Request request;
   request.Declare(program);
-  try
-  {
-    program.parse(argc, argv);
-  }
-  catch (const CLI::Success& wanted) // --help, --version
-  {
-    return program.exit(wanted);
-  }
-  catch (const CLI::ParseError& error)
-  {
-    return Complain(error.what(), WrongUsage);
-  }
-  try
-  {
-    coronary::CatchInterruptions();
-    request.Run();
-    return 0;
-  }
-  catch (const coronary::UsageError& error)
-  {
-    return Complain(error.what(), WrongUsage);
-  }
-  catch (const coronary::Cancelled&)
-  {
-    return Complain("interrupted", 128 + coronary::Interruption());
-  }
-  catch (const std::bad_alloc&)
-  {
-    return Complain("not enough memory", Failed);
-  }
-}
-}
-
-int main(int argc, char** argv)
-{
-  int exitCode = Failed;
-  try
-  {
-    exitCode = Run(argc, argv);
-  }
-  catch (const std::exception& error)
-  {
-    return Complain(error.what(), Failed);
-  }
-  // What was printed must have arrived: the reader may be a full disk.
-  std::cout.flush();
-  if (exitCode == 0 && (!std::cout || std::fflush(stdout) != 0))
-  {
-    return Complain("cannot write to the standard output", Failed);
-  }
-  return exitCode;
+  return coronary::RunProgram(program, argc, argv, [&] { request.Run(); });
 }

@@ -1,11 +1,11 @@
 #include "HeadlessSession.h"
 
 #include "AtomicFile.h"
-#include "Command.h"
 #include "DriveScript.h"
 #include "FileSeries.h"
 #include "InstrumentCatalogue.h"
 #include "Interruption.h"
+#include "Program.h"
 #include "ProgressDisplay.h"
 #include "Recording.h"
 #include "SessionImager.h"

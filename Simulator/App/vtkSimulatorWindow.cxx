@@ -1,13 +1,13 @@
 #include "vtkSessionWindow.h"
 
 #include "AtomicFile.h"
-#include "Command.h"
 #include "HeadlessSession.h"
 #include "HeartShell.h"
 #include "InstrumentCatalogue.h"
 #include "Interruption.h"
+#include "Program.h"
 #include "RecordedDevices.h"
-#include "vtkDisplay.h"
+#include "vtkWindowProgram.h"
 
 #include "vtkRenderer.h"
 
@@ -21,13 +21,10 @@
 #include <QJsonDocument>
 #include <QJsonObject>
 #include <QKeyEvent>
-#include <QOffscreenSurface>
-#include <QOpenGLContext>
 #include <QSaveFile>
 #include <QSignalBlocker>
 #include <QSplitter>
 #include <QStatusBar>
-#include <QSurfaceFormat>
 #include <QVBoxLayout>
 
 #include <algorithm>
@@ -782,32 +779,6 @@ void SessionWindow::closeEvent(QCloseEvent* event)
   this->End();
   event->accept();
 }
-void RequireOpenGL()
-{
-  QOffscreenSurface surface;
-  surface.setFormat(QSurfaceFormat::defaultFormat());
-  surface.create();
-  QOpenGLContext context;
-  context.setFormat(QSurfaceFormat::defaultFormat());
-  if (!surface.isValid() || !context.create() || !context.makeCurrent(&surface) ||
-    context.format().version() < qMakePair(3, 2))
-  {
-    throw std::runtime_error("The display has no OpenGL 3.2, which the view of the anatomy needs; "
-                             "sessions without a window run with --headless.");
-  }
-  context.doneCurrent();
-}
-
-void RequireDisplay()
-{
-  std::string why;
-  if (!CanDraw(why))
-  {
-    throw std::runtime_error("There is no display for the window (" + why +
-      "); sessions without one run with --headless.");
-  }
-}
-
 void CheckWindow(const WindowOptions& options)
 {
   RequireDisplay();
@@ -835,13 +806,7 @@ void CheckWindow(const WindowOptions& options)
 
 void RunWindow(const SessionWorld& world, const WindowOptions& options)
 {
-  QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
-  int count = 1;
-  std::string name = "coronary-simulator";
-  char* arguments[] = { name.data(), nullptr };
-  QApplication application(count, arguments);
-  QApplication::setApplicationDisplayName("DynamicCoronary simulator");
-  RequireOpenGL();
+  const vtkWindowProgram program("coronary-simulator", "DynamicCoronary simulator");
   SessionWindow window(world, options);
   window.Begin(options.record, options.replay);
   window.show();

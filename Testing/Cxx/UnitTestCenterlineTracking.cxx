@@ -7,7 +7,7 @@
 #include "LineNodes.h"
 #include "Refusals.h"
 #include "SparseVolume.h"
-#include "ThreadRanks.h"
+#include "ThreadSharing.h"
 #include "TrajectoryModel.h"
 #include "VesselImage.h"
 
@@ -625,14 +625,27 @@ TEST(CenterlineTracking, FollowsImagesOfVesselsAlone)
   }
 }
 
-TEST(CenterlineTracking, IsTheSameOnRanks)
+TEST(ItemSharing, PacksLists)
+{
+  const std::vector<Vector3> places = { { 1.0, 2.0, 3.0 }, { 4.0, 5.0, 6.0 } };
+  const std::vector<int> numbers = { 7 };
+  std::vector<Vector3> places2 = { Vector3::Zero() };
+  std::vector<char> none = { 'a' };
+  std::vector<int> numbers2;
+  Unpack(Packed(places, std::vector<char>(), numbers), places2, none, numbers2);
+  EXPECT_EQ(places2, places);
+  EXPECT_TRUE(none.empty());
+  EXPECT_EQ(numbers2, numbers);
+}
+
+TEST(CenterlineTracking, IsTheSameWhoeverMeasuresThePhases)
 {
   const Polylines lines = Fork();
   const std::vector<double> times = { 0.0, 0.15, 0.3, 0.5, 0.7, 0.9 };
   CenterlineTrackingSettings settings;
   settings.tissue = false;
   settings.cycleLength = 1.0;
-  const auto track = [&](RankGroup& ranks, double damaged, CenterlineTrackingReport& report)
+  const auto track = [&](ItemSharing& sharing, double damaged, CenterlineTrackingReport& report)
   {
     VesselImage image;
     return TrackCenterlines(
@@ -646,37 +659,38 @@ TEST(CenterlineTracking, IsTheSameOnRanks)
         image = Moved(Way(t));
         return image.View();
       },
-      settings, &report, {}, ranks);
+      settings, &report, {}, sharing);
   };
   CenterlineTrackingReport report;
-  const PoseSequence alone = track(RankGroup::Alone(), -1.0, report);
-  for (const int size : { 2, 8 })
+  const PoseSequence alone = track(ItemSharing::None(), -1.0, report);
+  for (const std::size_t size : { 2, 8 })
   {
-    std::vector<PoseSequence> poses(static_cast<std::size_t>(size));
+    std::vector<PoseSequence> poses(size);
     std::vector<CenterlineTrackingReport> reports(poses.size());
-    const std::vector<std::string> failures = ThreadRanks::Run(size,
-      [&](RankGroup& ranks) { poses[ranks.Rank()] = track(ranks, -1.0, reports[ranks.Rank()]); });
-    for (int rank = 0; rank < size; ++rank)
+    const std::vector<std::string> failures = ThreadSharing::Run(size,
+      [&](ItemSharing& sharing, std::size_t own)
+      { poses[own] = track(sharing, -1.0, reports[own]); });
+    for (std::size_t own = 0; own < size; ++own)
     {
-      ASSERT_EQ(failures[rank], "");
-      EXPECT_EQ(poses[rank].points, alone.points);
-      EXPECT_EQ(poses[rank].confidence, alone.confidence);
-      EXPECT_EQ(poses[rank].status, alone.status);
-      EXPECT_EQ(poses[rank].calibre, alone.calibre);
-      EXPECT_EQ(reports[rank].trackedShare, report.trackedShare);
+      ASSERT_EQ(failures[own], "");
+      EXPECT_EQ(poses[own].points, alone.points);
+      EXPECT_EQ(poses[own].confidence, alone.confidence);
+      EXPECT_EQ(poses[own].status, alone.status);
+      EXPECT_EQ(poses[own].calibre, alone.calibre);
+      EXPECT_EQ(reports[own].trackedShare, report.trackedShare);
       // The reference and its share, whatever it needed again.
-      EXPECT_LT(reports[rank].imagesRead, report.imagesRead);
+      EXPECT_LT(reports[own].imagesRead, report.imagesRead);
     }
   }
   // One that fails does not leave the others waiting.
-  const std::vector<std::string> failures = ThreadRanks::Run(2,
-    [&](RankGroup& ranks)
+  const std::vector<std::string> failures = ThreadSharing::Run(2,
+    [&](ItemSharing& sharing, std::size_t)
     {
       CenterlineTrackingReport own;
-      track(ranks, 0.3, own);
+      track(sharing, 0.3, own);
     });
-  EXPECT_TRUE((failures == std::vector<std::string>{ "damaged", "another rank failed" }) ||
-    (failures == std::vector<std::string>{ "another rank failed", "damaged" }));
+  EXPECT_TRUE((failures == std::vector<std::string>{ "damaged", "another one failed" }) ||
+    (failures == std::vector<std::string>{ "another one failed", "damaged" }));
 }
 
 namespace

@@ -21,6 +21,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -157,6 +158,55 @@ double DistanceToAxis(const PhantomTree& tree, const Vector3& point)
   return std::sqrt(least);
 }
 
+std::vector<double> EveryOther(const std::vector<double>& all, std::size_t step)
+{
+  std::vector<double> times;
+  for (std::size_t k = 0; k < all.size(); k += step)
+  {
+    times.push_back(all[k]);
+  }
+  return times;
+}
+
+/// Places of the lines at a phase against the truth. @param phase  of the poses; -1: it was not tracked
+/// @param truly  where the material of a point is
+Errors JudgePoints(const std::vector<Vector3>& points, const std::vector<double>& radius,
+  const std::function<Vector3(std::size_t p)>& truly, const PhantomTree& truth,
+  const std::vector<std::string>& name, const PoseSequence& poses, std::ptrdiff_t phase,
+  Outcome& outcome)
+{
+  const bool isTracked = phase >= 0;
+  Errors here;
+  for (std::size_t p = 0; p < points.size(); ++p)
+  {
+    if (radius[p] < LeastRadius)
+    {
+      continue;
+    }
+    const double distance = DistanceToAxis(truth, points[p]);
+    const double carried = (points[p] - truly(p)).norm();
+    here.Add(distance);
+    outcome.bySegment[name[p]].Add(carried);
+    (isTracked ? outcome.tracked : outcome.between).Add(distance);
+    if (!isTracked)
+    {
+      outcome.material.Add(carried);
+      continue;
+    }
+    outcome.materialTracked.Add(carried);
+    auto& bin = outcome.byConfidence[std::min<std::size_t>(
+      static_cast<std::size_t>(10.0 * poses.confidence[phase][p]), 9)];
+    ++bin[0];
+    bin[1] += carried <= 1.0 ? 1 : 0;
+    if (poses.status[phase][p] == TrackingStatus::Tracked)
+    {
+      ++outcome.called;
+      outcome.calledNear += carried <= 1.0 ? 1 : 0;
+    }
+  }
+  return here;
+}
+
 Outcome Run(const Case& test)
 {
   Outcome outcome;
@@ -165,11 +215,7 @@ Outcome Run(const Case& test)
   settings.temporalWindow = test.window;
   settings.noise = test.noise;
   const std::vector<double> all = PaperPhases();
-  std::vector<double> times;
-  for (std::size_t k = 0; k < all.size(); k += test.allPhases ? 1 : 2)
-  {
-    times.push_back(all[k]);
-  }
+  const std::vector<double> times = EveryOther(all, test.allPhases ? 1 : 2);
   if (test.lost)
   {
     settings.lostPhases = { { all[6], 1.0 }, { all[4], 0.4 }, { all[8], 0.4 } };
@@ -244,47 +290,12 @@ Outcome Run(const Case& test)
     const PhantomTree truth = phantom.Tree(all[k]);
     const auto own = std::find(times.begin(), times.end(), all[k]);
     const bool isTracked = own != times.end();
-    std::vector<Vector3> points;
-    if (isTracked)
-    {
-      points = poses.points[own - times.begin()];
-    }
-    else
-    {
-      interpolation.Evaluate(all[k], pose);
-      points = pose.points;
-    }
-    Errors here;
-    for (std::size_t p = 0; p < points.size(); ++p)
-    {
-      if (lines.radius[p] < LeastRadius)
-      {
-        continue;
-      }
-      const double distance = DistanceToAxis(truth, points[p]);
-      const double carried = (points[p] - phantom.Position(material[p], all[k])).norm();
-      here.Add(distance);
-      outcome.bySegment[name[p]].Add(carried);
-      (isTracked ? outcome.tracked : outcome.between).Add(distance);
-      if (isTracked)
-      {
-        outcome.materialTracked.Add(carried);
-        const std::size_t phase = own - times.begin();
-        auto& bin = outcome.byConfidence[std::min<std::size_t>(
-          static_cast<std::size_t>(10.0 * poses.confidence[phase][p]), 9)];
-        ++bin[0];
-        bin[1] += carried <= 1.0 ? 1 : 0;
-        if (poses.status[phase][p] == TrackingStatus::Tracked)
-        {
-          ++outcome.called;
-          outcome.calledNear += carried <= 1.0 ? 1 : 0;
-        }
-      }
-      else
-      {
-        outcome.material.Add(carried);
-      }
-    }
+    interpolation.Evaluate(all[k], pose);
+    const std::vector<Vector3>& points =
+      isTracked ? poses.points[own - times.begin()] : pose.points;
+    const Errors here = JudgePoints(
+      points, lines.radius, [&](std::size_t p) { return phantom.Position(material[p], all[k]); },
+      truth, name, poses, isTracked ? own - times.begin() : -1, outcome);
     outcome.byPhase.push_back(here.Mean());
     // Volumes: what the tracking makes of them, against the true motion of the same lines.
     double widening = 0.0;
@@ -324,17 +335,52 @@ Outcome Run(const Case& test)
     if (isTracked)
     {
       const std::vector<double>& found = poses.calibre[own - times.begin()];
-      double ratio = 0.0;
-      for (std::size_t n = 0; n < truth.radius.size(); ++n)
-      {
-        ratio += truth.radius[n] / reference.radius[n] / static_cast<double>(truth.radius.size());
-      }
       outcome.calibre.push_back(
         { std::accumulate(found.begin(), found.end(), 0.0) / static_cast<double>(found.size()),
-          ratio });
+          widening });
     }
   }
   return outcome;
+}
+
+void PrintDetails(Outcome& o)
+{
+  std::printf("by phase:");
+  for (const double value : o.byPhase)
+  {
+    std::printf(" %.2f", value);
+  }
+  std::printf("\ntracked share:");
+  for (const double value : o.trackedShare)
+  {
+    std::printf(" %.2f", value);
+  }
+  std::printf("\ncalibre:");
+  for (const std::array<double, 2>& value : o.calibre)
+  {
+    std::printf(" %.3f/%.3f", value[0], value[1]);
+  }
+  std::printf("\nwithin 1 mm, by confidence:");
+  for (const std::array<int, 2>& bin : o.byConfidence)
+  {
+    std::printf(" %.3f of %d,", bin[1] / std::max(1.0, 1.0 * bin[0]), bin[0]);
+  }
+  std::printf("\nvolumes that are off most:");
+  std::sort(o.branchVolumes.begin(), o.branchVolumes.end(),
+    [](const BranchVolume& a, const BranchVolume& b)
+    { return std::abs(a.volume - 1.0) > std::abs(b.volume - 1.0); });
+  for (std::size_t n = 0; n < std::min<std::size_t>(o.branchVolumes.size(), 8); ++n)
+  {
+    const BranchVolume& own = o.branchVolumes[n];
+    std::printf(" %s at %.3f %.3f (length %.3f of %.3f, calibre %.3f),", own.segment.c_str(),
+      own.time, own.volume, own.length, own.stretch, own.calibre);
+  }
+  std::printf("\nmaterial by segment:");
+  for (auto& [segment, errors] : o.bySegment)
+  {
+    std::printf(" %s %.2f/%.2f", segment.c_str(), errors.Mean(), errors.Percentile(0.95));
+  }
+  std::printf("\n");
 }
 }
 
@@ -435,42 +481,7 @@ int main(int argc, char** argv)
         o.volume.Percentile(1.0), o.imagesRead, o.seconds);
       if (details)
       {
-        std::printf("by phase:");
-        for (const double value : o.byPhase)
-        {
-          std::printf(" %.2f", value);
-        }
-        std::printf("\ntracked share:");
-        for (const double value : o.trackedShare)
-        {
-          std::printf(" %.2f", value);
-        }
-        std::printf("\ncalibre:");
-        for (const std::array<double, 2>& value : o.calibre)
-        {
-          std::printf(" %.3f/%.3f", value[0], value[1]);
-        }
-        std::printf("\nwithin 1 mm, by confidence:");
-        for (const std::array<int, 2>& bin : o.byConfidence)
-        {
-          std::printf(" %.3f of %d,", bin[1] / std::max(1.0, 1.0 * bin[0]), bin[0]);
-        }
-        std::printf("\nvolumes that are off most:");
-        std::sort(o.branchVolumes.begin(), o.branchVolumes.end(),
-          [](const BranchVolume& a, const BranchVolume& b)
-          { return std::abs(a.volume - 1.0) > std::abs(b.volume - 1.0); });
-        for (std::size_t n = 0; n < std::min<std::size_t>(o.branchVolumes.size(), 8); ++n)
-        {
-          const BranchVolume& own = o.branchVolumes[n];
-          std::printf(" %s at %.3f %.3f (length %.3f of %.3f, calibre %.3f),", own.segment.c_str(),
-            own.time, own.volume, own.length, own.stretch, own.calibre);
-        }
-        std::printf("\nmaterial by segment:");
-        for (auto& [segment, errors] : o.bySegment)
-        {
-          std::printf(" %s %.2f/%.2f", segment.c_str(), errors.Mean(), errors.Percentile(0.95));
-        }
-        std::printf("\n");
+        PrintDetails(o);
       }
       std::fflush(stdout);
     }

@@ -603,6 +603,35 @@ Geometry ParseSpacing(const std::string& text)
   return { text + " mm", spacing };
 }
 
+/// Sorted, each once, with the one that is always there.
+void Complete(std::vector<double>& values, double needed)
+{
+  values.push_back(needed);
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+}
+
+std::vector<Outcome> Segmented(const std::vector<Outcome>& outcomes)
+{
+  std::vector<Outcome> segmented;
+  std::copy_if(outcomes.begin(), outcomes.end(), std::back_inserter(segmented),
+    [](const Outcome& o) { return o.segmented; });
+  return segmented;
+}
+
+/// @param c  of the vesselness, HU
+void PrintHead(double c)
+{
+  std::printf(
+    "Phantoms at t = %.2f. Dice, recall and precision: voxels of truth or mask whose nearest tree "
+    "point (by distance\nminus radius) lies within %.1f mm and has a radius below %.2f mm are left "
+    "out; all others count, also leaks far\naway. Leak: mask more than %.1f mm from the wall of "
+    "any vessel, thin ones included. Seeds and window of the\nsegmentation come from the automatic "
+    "ostia; c of the vesselness: %s.\n",
+    ReferencePhase, LeakDistance, LeastRadius, LeakDistance,
+    c > 0.0 ? Format("%g HU", c).c_str() : "half the largest Hessian norm");
+}
+
 /// @return the exit code
 int Validate(int argc, char** argv)
 {
@@ -674,27 +703,14 @@ int Validate(int argc, char** argv)
   }
   const auto wanted = [&](const char* table)
   { return std::find(tables.begin(), tables.end(), table) != tables.end(); };
-  const auto complete = [](std::vector<double>& values, double needed)
-  {
-    values.push_back(needed);
-    std::sort(values.begin(), values.end());
-    values.erase(std::unique(values.begin(), values.end()), values.end());
-  };
   for (double& window : windows)
   {
     window = window == 1e3 * UsualWindow ? UsualWindow : 1e-3 * window;
   }
-  complete(windows, UsualWindow);
-  complete(noises, UsualNoise);
+  Complete(windows, UsualWindow);
+  Complete(noises, UsualNoise);
 
-  std::printf(
-    "Phantoms at t = %.2f. Dice, recall and precision: voxels of truth or mask whose nearest tree "
-    "point (by distance\nminus radius) lies within %.1f mm and has a radius below %.2f mm are left "
-    "out; all others count, also leaks far\naway. Leak: mask more than %.1f mm from the wall of "
-    "any vessel, thin ones included. Seeds and window of the\nsegmentation come from the automatic "
-    "ostia; c of the vesselness: %s.\n",
-    ReferencePhase, LeakDistance, LeastRadius, LeakDistance,
-    c > 0.0 ? Format("%g HU", c).c_str() : "half the largest Hessian norm");
+  PrintHead(c);
   std::vector<Outcome> outcomes;
   const auto run = [&](const Case& test, bool segment)
   {
@@ -739,9 +755,7 @@ int Validate(int argc, char** argv)
     }
   }
 
-  std::vector<Outcome> segmented;
-  std::copy_if(outcomes.begin(), outcomes.end(), std::back_inserter(segmented),
-    [](const Outcome& o) { return o.segmented; });
+  const std::vector<Outcome> segmented = Segmented(outcomes);
   bool met = true;
   if (wanted("sampling"))
   {

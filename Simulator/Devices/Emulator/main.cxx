@@ -1,22 +1,18 @@
 /**
  * coronary-device-emulator: a device for the simulator that is all software, on a pseudo-terminal.
  *
- * Exit codes: 0 done: its time is over, or its scenario unplugged it; 1 failed, with one line that says why; 2 the
- * command line is wrong; 128 + n ended by signal n.
+ * Exit codes are those of Program.h; done is, when its time is over, or its scenario unplugged it.
  */
 #include "DeviceLog.h"
 #include "Interruption.h"
 #include "OptionChecks.h"
+#include "Program.h"
 #include "PseudoTerminal.h"
 #include "ScriptedDevice.h"
 
-#include <CLI/CLI.hpp>
-
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -27,16 +23,7 @@
 
 namespace
 {
-constexpr int Failed = 1;
-constexpr int WrongUsage = 2;
 constexpr std::uint64_t Pause = 250; // microseconds
-
-int Complain(std::string message, int exitCode)
-{
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::fprintf(stderr, "coronary-device-emulator: %s\n", message.c_str());
-  return exitCode;
-}
 
 struct Request
 {
@@ -189,7 +176,9 @@ private:
   bool WasRelaxed = true;
 };
 
-int Run(int argc, char** argv)
+}
+
+int main(int argc, char** argv)
 {
   CLI::App program("A device for the simulator that is all software.", "coronary-device-emulator");
   program.set_version_flag("--version", "coronary-device-emulator " DYNAMICCORONARY_VERSION);
@@ -205,33 +194,7 @@ int Run(int argc, char** argv)
     ->type_name("S")
     ->capture_default_str();
   program.add_flag("--quiet", request.quiet, "Do not print the name of the pseudo-terminal");
-  try
-  {
-    program.parse(argc, argv);
-  }
-  catch (const CLI::Success& wanted) // --help, --version
-  {
-    return program.exit(wanted);
-  }
-  catch (const CLI::ParseError& error)
-  {
-    return Complain(error.what(), WrongUsage);
-  }
-  coronary::CatchInterruptions();
-  Emulator(request).Run();
+  const int exitCode = coronary::RunProgram(program, argc, argv, [&] { Emulator(request).Run(); });
   const int signal = coronary::Interruption();
-  return signal == 0 ? 0 : 128 + signal;
-}
-}
-
-int main(int argc, char** argv)
-{
-  try
-  {
-    return Run(argc, argv);
-  }
-  catch (const std::exception& error)
-  {
-    return Complain(error.what(), Failed);
-  }
+  return exitCode == 0 && signal != 0 ? 128 + signal : exitCode;
 }

@@ -1,9 +1,9 @@
 #include "Interruption.h"
 #include "PosingSession.h"
-#include "SimulatorWindow.h"
 #include "vtkMessageTrap.h"
 #include "vtkPosingModel.h"
 #include "vtkPosingScene.h"
+#include "vtkWindowProgram.h"
 
 #include "QVTKOpenGLNativeWidget.h"
 #include "vtkCamera.h"
@@ -33,7 +33,6 @@
 #include <QSlider>
 #include <QSpinBox>
 #include <QStatusBar>
-#include <QSurfaceFormat>
 #include <QTimer>
 #include <QToolBar>
 #include <QVBoxLayout>
@@ -641,7 +640,7 @@ void Window::ShowState()
 
 void Window::Problem(const QString& text)
 {
-  std::fprintf(stderr, "coronary-simulator: %s\n", text.toUtf8().constData());
+  std::fprintf(stderr, "coronary-posing: %s\n", text.toUtf8().constData());
   this->statusBar()->showMessage(text);
 }
 
@@ -730,14 +729,7 @@ void Window::Begin()
 
 int RunPosingWindow(const std::string& folder, const PosingOptions& options)
 {
-  RequireDisplay();
-  QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
-  int count = 1;
-  std::string name = "coronary-simulator";
-  char* arguments[] = { name.data(), nullptr };
-  QApplication application(count, arguments);
-  QApplication::setApplicationDisplayName("DynamicCoronary posing");
-  RequireOpenGL();
+  const vtkWindowProgram program("coronary-posing", "DynamicCoronary posing");
   vtkMessageTrap messages;
   Window window(folder, options, messages);
   window.show();
