@@ -348,7 +348,6 @@ vtkGatedImageReader::vtkGatedImageReader()
 
 vtkGatedImageReader::~vtkGatedImageReader()
 {
-  delete[] this->DirectoryName;
   delete[] this->SeriesInstanceUID;
 }
 
@@ -360,14 +359,6 @@ void vtkGatedImageReader::PrintSelf(ostream& os, vtkIndent indent)
   {
     os << indent.GetNextIndent() << name << "\n";
   }
-  os << indent << "DirectoryName: " << (this->DirectoryName ? this->DirectoryName : "(none)")
-     << "\n"
-     << indent
-     << "SeriesInstanceUID: " << (this->SeriesInstanceUID ? this->SeriesInstanceUID : "(none)")
-     << "\n"
-     << indent << "CycleLength: " << this->CycleLength << "\n"
-     << indent << "PhaseFractions: " << this->State->Fractions.size() << "\n"
-     << indent << "Number Of Phases: " << this->GetNumberOfPhases() << "\n";
 }
 
 void vtkGatedImageReader::AddFileName(const char* name)
@@ -492,11 +483,7 @@ int vtkGatedImageReader::RequestInformation(
   vtkInformation*, vtkInformationVector**, vtkInformationVector* outputVector)
 {
   Internals& state = *this->State;
-  std::vector<std::string> paths = state.FileNames;
-  if (paths.empty() && this->DirectoryName && this->DirectoryName[0] != '\0')
-  {
-    paths.emplace_back(this->DirectoryName);
-  }
+  const std::vector<std::string>& paths = state.FileNames;
   try
   {
     const std::string stamp = StampOf(FilesBehind(paths));

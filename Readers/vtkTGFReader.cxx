@@ -18,6 +18,7 @@
 #include "vtkPolyData.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 
+#include <algorithm>
 #include <fstream>
 #include <numeric>
 #include <stdexcept>
@@ -71,6 +72,7 @@ void SetBones(
 vtkTGFReader::vtkTGFReader()
 {
   this->SetNumberOfInputPorts(0);
+  this->SetNumberOfOutputPorts(2);
 }
 
 vtkTGFReader::~vtkTGFReader()
@@ -81,15 +83,19 @@ vtkTGFReader::~vtkTGFReader()
 int vtkTGFReader::RequestInformation(
   vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
 {
-  outputs->GetInformationObject(0)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+  {
+    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  }
   return 1;
 }
 
 int vtkTGFReader::RequestData(
-  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+  vtkInformation* request, vtkInformationVector**, vtkInformationVector* outputs)
 {
-  vtkInformation* info = outputs->GetInformationObject(0);
-  if (info->Get(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER()) > 0)
+  using SDDP = vtkStreamingDemandDrivenPipeline;
+  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  if (outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
   {
     return 1;
   }
@@ -110,13 +116,11 @@ int vtkTGFReader::RequestData(
     {
       throw std::invalid_argument("can not be read to its end");
     }
-    vtkPolyData* output = vtkPolyData::GetData(outputs, 0);
     const coronary::CenterlineTree tree = coronary::FromSkeleton(skeleton, this->Radius);
-    vtkCoronary::SetTree(output, tree);
-    if (this->OutputForm == SkeletonForm)
-    {
-      SetBones(output, skeleton, tree);
-    }
+    vtkCoronary::SetTree(vtkPolyData::GetData(outputs, TreePort), tree);
+    vtkPolyData* bones = vtkPolyData::GetData(outputs, SkeletonPort);
+    vtkCoronary::SetTree(bones, tree);
+    SetBones(bones, skeleton, tree);
     return 1;
   }
   catch (const std::exception& error)
@@ -131,5 +135,4 @@ void vtkTGFReader::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << '\n';
   os << indent << "Radius: " << this->Radius << '\n';
-  os << indent << "OutputForm: " << this->OutputForm << '\n';
 }

@@ -357,8 +357,7 @@ TEST(GatedImageReader, EveryFailureIsOneError)
   reader->SetFileName((folder / "cut.nii.gz").c_str());
   EXPECT_NE(
     reader.Error().find("cut.nii.gz' is truncated: expected 128352 bytes"), std::string::npos);
-  reader->RemoveAllFileNames();
-  reader->SetDirectoryName((folder / "nowhere").c_str());
+  reader->SetFileName((folder / "nowhere").c_str());
   EXPECT_NE(reader.Error().find("nowhere' does not exist"), std::string::npos);
   // And it recovers.
   WriteVti(folder / "a.vti", ObliqueImage(0));
@@ -449,7 +448,7 @@ TEST(RealData, CineSeriesIsOneDatasetOf25PhasesAnd6Positions)
     GTEST_SKIP() << "no real data at " << Data("biv-cine-dicom");
   }
   Reader reader;
-  reader->SetDirectoryName(Data("biv-cine-dicom").c_str());
+  reader->SetFileName(Data("biv-cine-dicom").c_str());
   const std::vector<double> steps = reader.TimeSteps();
   ASSERT_EQ(steps.size(), 25u);
   for (std::size_t p = 0; p < steps.size(); ++p)
@@ -497,7 +496,7 @@ TEST(RealData, ChestCtAgreesWithGdcm)
     GTEST_SKIP() << "no real data at " << Data("chest-ct-dicom");
   }
   Reader reader;
-  reader->SetDirectoryName(Data("chest-ct-dicom").c_str());
+  reader->SetFileName(Data("chest-ct-dicom").c_str());
   reader->Update();
   vtkImageData* image = reader->GetOutput();
   int dimensions[3];
