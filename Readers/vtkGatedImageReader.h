@@ -94,6 +94,10 @@ public:
   vtkGetMacro(CycleLength, double);
   ///@}
 
+  /// 1 when the name is that of a volume or of a JSON file, or when a folder has a DICOM file among its first ones; else
+  /// 0. For File > Open: nothing is promised.
+  int CanReadFile(const char* name);
+
   /// Number of phases found; 0 before UpdateInformation(), or when that failed.
   int GetNumberOfPhases();
 

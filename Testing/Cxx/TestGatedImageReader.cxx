@@ -359,6 +359,11 @@ TEST(GatedImageReader, EveryFailureIsOneError)
     reader.Error().find("cut.nii.gz' is truncated: expected 128352 bytes"), std::string::npos);
   reader->SetFileName((folder / "nowhere").c_str());
   EXPECT_NE(reader.Error().find("nowhere' does not exist"), std::string::npos);
+  // What File > Open asks.
+  EXPECT_EQ(reader->CanReadFile((folder / "cut.nii.gz").c_str()), 1);
+  EXPECT_EQ(reader->CanReadFile((folder / "notes.txt").c_str()), 0);
+  EXPECT_EQ(reader->CanReadFile((folder / ".").c_str()), 0);
+  EXPECT_EQ(reader->CanReadFile(nullptr), 0);
   // And it recovers.
   WriteVti(folder / "a.vti", ObliqueImage(0));
   reader->SetFileName((folder / "a.vti").c_str());
@@ -448,6 +453,7 @@ TEST(RealData, CineSeriesIsOneDatasetOf25PhasesAnd6Positions)
     GTEST_SKIP() << "no real data at " << Data("biv-cine-dicom");
   }
   Reader reader;
+  EXPECT_EQ(reader->CanReadFile(Data("biv-cine-dicom").c_str()), 1);
   reader->SetFileName(Data("biv-cine-dicom").c_str());
   const std::vector<double> steps = reader.TimeSteps();
   ASSERT_EQ(steps.size(), 25u);
