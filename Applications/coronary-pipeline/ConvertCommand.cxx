@@ -18,7 +18,6 @@
 #include "vtkAppendPolyData.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryTreeTopology.h"
 #include "vtkIdList.h"
@@ -28,6 +27,7 @@
 #include "vtkSmartPointer.h"
 #include "vtkTGFReader.h"
 #include "vtkTGFWriter.h"
+#include "vtkVesselTree.h"
 #include "vtkVmtkLines.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #include "vtkVmtkLines.h"
 
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -17,7 +17,7 @@
 #include <vector>
 
 namespace names = vtkCoronaryArrayNames;
-using coronary::CenterlineTree;
+using coronary::VesselTree;
 using coronary::VmtkTract;
 
 namespace
@@ -74,7 +74,7 @@ void vtkCoronary::ToVmtkLines(vtkPolyData* input, vtkPolyData* output)
   {
     return;
   }
-  const CenterlineTree tree = vtkCoronary::TreeOf(input);
+  const VesselTree tree = vtkCoronary::TreeOf(input);
   const std::vector<VmtkTract> tracts = coronary::ToVmtkTracts(tree);
   const std::map<vtkIdType, vtkIdType> cellOf = CellsByPoint(input);
   vtkNew<vtkPoints> points;
@@ -110,7 +110,7 @@ void vtkCoronary::FromVmtkLines(vtkPolyData* input, double tolerance, vtkPolyDat
   output->GetFieldData()->PassData(input->GetFieldData());
   const std::vector<VmtkTract> tracts = vtkCoronary::TractsOf(input);
   std::vector<coronary::TractPoint> origins;
-  CenterlineTree tree = coronary::FromVmtkTracts(tracts, tolerance, &origins);
+  VesselTree tree = coronary::FromVmtkTracts(tracts, tolerance, &origins);
   std::vector<vtkIdType> pointRows;
   pointRows.reserve(origins.size());
   for (const coronary::TractPoint& origin : origins)
@@ -119,7 +119,7 @@ void vtkCoronary::FromVmtkLines(vtkPolyData* input, double tolerance, vtkPolyDat
   }
   std::vector<vtkIdType> cellRows;
   vtkDataArray* trees = input->GetCellData()->GetArray(names::TreeIds);
-  for (CenterlineTree::Branch& branch : tree.branches)
+  for (VesselTree::Branch& branch : tree.branches)
   {
     const std::size_t tract = origins[static_cast<std::size_t>(branch.points[1])].tract;
     cellRows.push_back(input->GetNumberOfVerts() + static_cast<vtkIdType>(tract));

@@ -10,7 +10,7 @@
  * All point arrays go along with their points, all cell arrays with their branches: what VMTK's form does not need
  * (`SegmentLabel`, `TreeIds`, ...) is kept there, and comes back. Positions are double. Field data pass.
  *
- * @sa coronary::ToVmtkTracts, coronary::FromVmtkTracts, vtkCenterlineForms.h
+ * @sa coronary::ToVmtkTracts, coronary::FromVmtkTracts, vtkVesselTree.h
  */
 #ifndef vtkVmtkLines_h
 #define vtkVmtkLines_h

@@ -35,10 +35,9 @@
 
 using coronary::BranchAgreement;
 using coronary::BranchMetrics;
-using coronary::BranchTree;
 using coronary::CenterlineOverlapMeasures;
 using coronary::CenterlinePointMatch;
-using coronary::CenterlineSet;
+using coronary::Polylines;
 using coronary::TreeBranch;
 using coronary::TreeOverlap;
 using coronary::TreeOverlapRow;
@@ -139,7 +138,7 @@ void WriteTable(vtkTable* table, const TreeOverlap& overlap, bool paths, vtkStri
 }
 
 /// The points and lines of both sides, and what the comparison says of them.
-void WriteLines(vtkPolyData* output, const CenterlineSet* sets, const TreeOverlap& overlap)
+void WriteLines(vtkPolyData* output, const Polylines* sets, const TreeOverlap& overlap)
 {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
@@ -158,7 +157,7 @@ void WriteLines(vtkPolyData* output, const CenterlineSet* sets, const TreeOverla
   }
   for (int side = 0; side < 2; ++side)
   {
-    const CenterlineSet& set = sets[side];
+    const Polylines& set = sets[side];
     const std::vector<CenterlinePointMatch>& matches =
       side == 0 ? overlap.reference : overlap.result;
     const vtkIdType first = points->GetNumberOfPoints();
@@ -190,7 +189,7 @@ void WriteLines(vtkPolyData* output, const CenterlineSet* sets, const TreeOverla
 }
 
 /// Whether two single lines run against each other.
-bool RunsAgainst(const CenterlineSet* sets)
+bool RunsAgainst(const Polylines* sets)
 {
   const auto point = [&](int side, bool last) -> const Vector3&
   {
@@ -430,7 +429,7 @@ int vtkCenterlineMetrics::RequestUpdateExtent(
   return 1;
 }
 
-void vtkCenterlineMetrics::CompareLines(const BranchTree& result, const BranchTree& reference,
+void vtkCenterlineMetrics::CompareLines(const Polylines& result, const Polylines& reference,
   vtkPolyData* referenceData, vtkInformationVector* outputs)
 {
   coronary::CenterlineOverlapSettings settings;
@@ -441,7 +440,7 @@ void vtkCenterlineMetrics::CompareLines(const BranchTree& result, const BranchTr
   {
     throw std::invalid_argument("There is no method " + std::to_string(this->Method));
   }
-  CenterlineSet sets[2] = { reference.lines, result.lines };
+  Polylines sets[2] = { reference.lines, result.lines };
   if (sets[0].radius.empty())
   {
     sets[0].radius.assign(sets[0].points.size(), this->Tolerance);
@@ -463,7 +462,7 @@ void vtkCenterlineMetrics::CompareLines(const BranchTree& result, const BranchTr
 }
 
 void vtkCenterlineMetrics::CompareBranches(
-  const BranchTree& result, const BranchTree& reference, vtkInformationVector* outputs)
+  const Polylines& result, const Polylines& reference, vtkInformationVector* outputs)
 {
   coronary::BranchMetricsSettings settings;
   settings.tolerance = this->Tolerance;
@@ -490,9 +489,9 @@ int vtkCenterlineMetrics::RequestData(
     vtkCoronary::Require(mismatch.empty(), mismatch);
     const vtkSmartPointer<vtkPolyData> referenceData =
       vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ReferencePort], 0));
-    const BranchTree result = vtkCoronary::TreeOf(
+    const Polylines result = vtkCoronary::TreeOf(
       vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ResultPort], 0)), "result");
-    const BranchTree reference = vtkCoronary::TreeOf(referenceData, "reference");
+    const Polylines reference = vtkCoronary::TreeOf(referenceData, "reference");
     this->CompareBranches(result, reference, outputs);
     this->CompareLines(result, reference, referenceData, outputs);
     vtkCoronary::SetCommonTime(inputs, outputs);

@@ -75,7 +75,7 @@ class vtkPolyData;
 
 namespace coronary
 {
-struct BranchTree;
+struct Polylines;
 }
 
 class VTKCORONARYMETRICS_EXPORT vtkCenterlineMetrics : public vtkTableAlgorithm
@@ -185,9 +185,9 @@ protected:
     vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 
 private:
-  void CompareLines(const coronary::BranchTree& result, const coronary::BranchTree& reference,
+  void CompareLines(const coronary::Polylines& result, const coronary::Polylines& reference,
     vtkPolyData* referenceData, vtkInformationVector* outputs);
-  void CompareBranches(const coronary::BranchTree& result, const coronary::BranchTree& reference,
+  void CompareBranches(const coronary::Polylines& result, const coronary::Polylines& reference,
     vtkInformationVector* outputs);
 
   vtkCenterlineMetrics(const vtkCenterlineMetrics&) = delete;
