@@ -3,6 +3,7 @@
 #include "GatedSeries.h"
 #include "LargePages.h"
 #include "TextWords.h"
+#include "VolumeFile.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 
@@ -29,10 +30,12 @@
 #include "vtkXMLImageDataReader.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <new>
 #include <stdexcept>
@@ -223,6 +226,14 @@ std::unique_ptr<coronary::VolumeSource> OpenVti(const std::string& path)
     : nullptr;
 }
 
+// The mark of DICOM files, behind 128 bytes that are free.
+bool HasDicomMark(const fs::path& path)
+{
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, 132> start{};
+  return file.read(start.data(), start.size()) && std::memcmp(start.data() + 128, "DICM", 4) == 0;
+}
+
 // What changes when a file does: names, sizes and times of all files that the paths stand for.
 std::string StampOf(const std::vector<std::string>& paths)
 {
@@ -314,7 +325,6 @@ vtkGatedImageReader::vtkGatedImageReader()
 
 vtkGatedImageReader::~vtkGatedImageReader()
 {
-  delete[] this->DirectoryName;
   delete[] this->SeriesInstanceUID;
 }
 
@@ -326,14 +336,41 @@ void vtkGatedImageReader::PrintSelf(ostream& os, vtkIndent indent)
   {
     os << indent.GetNextIndent() << name << "\n";
   }
-  os << indent << "DirectoryName: " << (this->DirectoryName ? this->DirectoryName : "(none)")
-     << "\n"
-     << indent
+  os << indent
      << "SeriesInstanceUID: " << (this->SeriesInstanceUID ? this->SeriesInstanceUID : "(none)")
      << "\n"
      << indent << "CycleLength: " << this->CycleLength << "\n"
      << indent << "PhaseFractions: " << this->State->Fractions.size() << "\n"
      << indent << "Number Of Phases: " << this->GetNumberOfPhases() << "\n";
+}
+
+int vtkGatedImageReader::CanReadFile(const char* name)
+{
+  if (name == nullptr)
+  {
+    return 0;
+  }
+  std::error_code error;
+  if (!fs::is_directory(name, error))
+  {
+    return coronary::IsVolumeFileName(name) || fs::path(name).extension() == ".json" ? 1 : 0;
+  }
+  // Of a large archive not all files are opened.
+  constexpr int TriedFiles = 64;
+  int tried = 0;
+  for (fs::recursive_directory_iterator file(name, error), end; file != end && tried < TriedFiles;
+       file.increment(error))
+  {
+    if (file->is_regular_file(error))
+    {
+      ++tried;
+      if (HasDicomMark(file->path()))
+      {
+        return 1;
+      }
+    }
+  }
+  return 0;
 }
 
 void vtkGatedImageReader::AddFileName(const char* name)
@@ -458,11 +495,7 @@ int vtkGatedImageReader::RequestInformation(
   vtkInformation*, vtkInformationVector**, vtkInformationVector* outputVector)
 {
   Internals& state = *this->State;
-  std::vector<std::string> paths = state.FileNames;
-  if (paths.empty() && this->DirectoryName && this->DirectoryName[0] != '\0')
-  {
-    paths.emplace_back(this->DirectoryName);
-  }
+  const std::vector<std::string>& paths = state.FileNames;
   try
   {
     const std::string stamp = StampOf(FilesBehind(paths));

@@ -54,8 +54,8 @@ public:
 
   ///@{
   /**
-   * The files, in the order of the phases; a folder of DICOM files, a JSON file or a 4-D file stands
-   * alone. AddFileName ignores null and empty names. Default: none.
+   * The files, in the order of the phases; a folder of DICOM files (searched recursively), a JSON file or
+   * a 4-D file stands alone. AddFileName ignores null and empty names. Default: none.
    */
   void AddFileName(const char* name);
   void RemoveAllFileNames();
@@ -66,12 +66,6 @@ public:
 
   /// Reads this file alone: RemoveAllFileNames(), then AddFileName().
   void SetFileName(const char* name);
-
-  ///@{
-  /// A folder of DICOM files, searched recursively; used when there are no file names. Default: none.
-  vtkSetFilePathMacro(DirectoryName);
-  vtkGetFilePathMacro(DirectoryName);
-  ///@}
 
   ///@{
   /// The DICOM series to read from a folder that holds several. Default: none, all of the folder.
@@ -99,6 +93,10 @@ public:
   vtkSetMacro(CycleLength, double);
   vtkGetMacro(CycleLength, double);
   ///@}
+
+  /// 1 when the name is that of a volume or of a JSON file, or when a folder has a DICOM file among its first ones; else
+  /// 0. For File > Open: nothing is promised.
+  int CanReadFile(const char* name);
 
   /// Number of phases found; 0 before UpdateInformation(), or when that failed.
   int GetNumberOfPhases();
@@ -135,7 +133,6 @@ private:
   struct Internals;
   std::unique_ptr<Internals> State;
 
-  char* DirectoryName = nullptr;
   char* SeriesInstanceUID = nullptr;
   double CycleLength = 1.0;
 };

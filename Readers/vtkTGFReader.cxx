@@ -16,6 +16,7 @@
 #include "vtkPolyData.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 
+#include <algorithm>
 #include <fstream>
 #include <numeric>
 #include <stdexcept>
@@ -69,6 +70,7 @@ void SetBones(
 vtkTGFReader::vtkTGFReader()
 {
   this->SetNumberOfInputPorts(0);
+  this->SetNumberOfOutputPorts(2);
 }
 
 vtkTGFReader::~vtkTGFReader()
@@ -79,15 +81,19 @@ vtkTGFReader::~vtkTGFReader()
 int vtkTGFReader::RequestInformation(
   vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
 {
-  outputs->GetInformationObject(0)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
+  {
+    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  }
   return 1;
 }
 
 int vtkTGFReader::RequestData(
-  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+  vtkInformation* request, vtkInformationVector**, vtkInformationVector* outputs)
 {
-  vtkInformation* info = outputs->GetInformationObject(0);
-  if (info->Get(vtkStreamingDemandDrivenPipeline::UPDATE_PIECE_NUMBER()) > 0)
+  using SDDP = vtkStreamingDemandDrivenPipeline;
+  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  if (outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
   {
     return 1;
   }
@@ -108,13 +114,11 @@ int vtkTGFReader::RequestData(
     {
       throw std::invalid_argument("can not be read to its end");
     }
-    vtkPolyData* output = vtkPolyData::GetData(outputs, 0);
     const coronary::VesselTree tree = coronary::FromSkeleton(skeleton, this->Radius);
-    vtkCoronary::SetTree(output, tree);
-    if (this->OutputForm == SkeletonForm)
-    {
-      SetBones(output, skeleton, tree);
-    }
+    vtkCoronary::SetTree(vtkPolyData::GetData(outputs, TreePort), tree);
+    vtkPolyData* bones = vtkPolyData::GetData(outputs, SkeletonPort);
+    vtkCoronary::SetTree(bones, tree);
+    SetBones(bones, skeleton, tree);
     return 1;
   }
   catch (const std::exception& error)
@@ -129,5 +133,4 @@ void vtkTGFReader::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "FileName: " << (this->FileName ? this->FileName : "(none)") << '\n';
   os << indent << "Radius: " << this->Radius << '\n';
-  os << indent << "OutputForm: " << this->OutputForm << '\n';
 }

@@ -1,19 +1,19 @@
 /**
  * @class vtkTGFReader
- * @brief Reads a skeleton in Trivial Graph Format (.tgf, libigl and Blender) as centerlines or bones.
+ * @brief Reads a skeleton in Trivial Graph Format (.tgf, libigl and Blender) as centerlines and as bones.
  *
- * @par Output:
- * vtkPolyData: a point for each joint, in the order of the file (joints without bones are
+ * @par Output ports:
+ * vtkPolyData, both with a point for each joint, in the order of the file (joints without bones are
  * points without a line). A root is a joint at which bones only begin; where bones go both ways, the
  * first joint that is an end. Point data `MaximumInscribedSphereRadius` (double, mm): `Radius`
  * everywhere, as the format has none; `Abscissas` (double, mm from the root).
- * - TreeForm: a polyline for each way between roots, forks and ends. Cell data `GroupIds`,
+ * - 0, the tree: a polyline for each way between roots, forks and ends. Cell data `GroupIds`,
  *   `ParentGroupIds`, `TreeIds` (int), `Length` (double, mm), `Tortuosity` (double)
- * - SkeletonForm: a line of two points for each bone, in the order of the file, as of
+ * - 1, the skeleton: a line of two points for each bone, in the order of the file, as of
  *   vtkCenterlineSkeleton. Point data `ParentJoint` (vtkIdType, -1 at a root); cell data `BoneId` (int,
- *   the place in the file, from 0), `GroupIds`, `TreeIds` (int, those of TreeForm), `Length` (double, mm)
+ *   the place in the file, from 0), `GroupIds`, `TreeIds` (int, those of the tree), `Length` (double, mm)
  *
- * The output is whole in piece 0 and empty in every other piece.
+ * The outputs are whole in piece 0 and empty in every other piece.
  *
  * @par Time:
  * The file has no time, nor has the output.
@@ -49,17 +49,11 @@ public:
   vtkGetMacro(Radius, double);
   ///@}
 
-  enum OutputForms
+  enum OutputPorts
   {
-    TreeForm = 0,
-    SkeletonForm = 1
+    TreePort = 0,
+    SkeletonPort = 1
   };
-
-  ///@{
-  /// What the lines are: branches (default) or bones.
-  vtkSetClampMacro(OutputForm, int, TreeForm, SkeletonForm);
-  vtkGetMacro(OutputForm, int);
-  ///@}
 
 protected:
   vtkTGFReader();
@@ -76,7 +70,6 @@ private:
 
   char* FileName = nullptr;
   double Radius = 1.0;
-  int OutputForm = TreeForm;
 };
 
 #endif

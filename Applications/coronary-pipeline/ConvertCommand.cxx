@@ -18,7 +18,6 @@
 #include "vtkAppendPolyData.h"
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkCenterlineConversion.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryTreeTopology.h"
 #include "vtkIdList.h"
@@ -29,6 +28,7 @@
 #include "vtkTGFReader.h"
 #include "vtkTGFWriter.h"
 #include "vtkVesselTree.h"
+#include "vtkVmtkLines.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -72,6 +72,7 @@ private:
   vtkSmartPointer<vtkPolyData> Joined(vtkPolyData* lines, vtkMessageTrap& messages) const;
   vtkSmartPointer<vtkPolyData> AsTree(vtkPolyData* lines, vtkMessageTrap& messages) const;
   vtkSmartPointer<vtkPolyData> OneTree(vtkPolyData* tree) const;
+  vtkSmartPointer<vtkPolyData> Converted(vtkPolyData* lines, bool toTree) const;
   void WriteVessels(vtkPolyData* tree) const;
   /// @return what was written
   vtkSmartPointer<vtkPolyData> Write(
@@ -263,11 +264,10 @@ vtkSmartPointer<vtkPolyData> ConvertJob::Read(vtkMessageTrap& messages, bool& is
     vtkNew<vtkTGFReader> reader;
     reader->SetFileName(this->input.c_str());
     reader->SetRadius(this->radius);
-    reader->SetOutputForm(
-      this->form == "skeleton" ? vtkTGFReader::SkeletonForm : vtkTGFReader::TreeForm);
     reader->Update();
     ThrowIfError(messages, this->input);
-    return reader->GetOutput();
+    return reader->GetOutput(
+      this->form == "skeleton" ? vtkTGFReader::SkeletonPort : vtkTGFReader::TreePort);
   }
   if (IsMarkupsFileName(this->input))
   {
@@ -363,6 +363,33 @@ void ConvertJob::WriteVessels(vtkPolyData* tree) const
   std::printf("%s: %zu paths, %zu contours\n", this->output.c_str(), vessels.size(), contours);
 }
 
+vtkSmartPointer<vtkPolyData> ConvertJob::Converted(vtkPolyData* lines, bool toTree) const
+{
+  const vtkCoronary::CenterlineForm wanted =
+    toTree ? vtkCoronary::CenterlineForm::Tree : vtkCoronary::CenterlineForm::Vmtk;
+  if (vtkCoronary::FormOf(lines) == wanted)
+  {
+    return lines;
+  }
+  auto converted = vtkSmartPointer<vtkPolyData>::New();
+  try
+  {
+    if (toTree)
+    {
+      vtkCoronary::FromVmtkLines(lines, this->tolerance, converted);
+    }
+    else
+    {
+      vtkCoronary::ToVmtkLines(lines, converted);
+    }
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::runtime_error(this->input + ": " + error.what());
+  }
+  return converted;
+}
+
 vtkSmartPointer<vtkPolyData> ConvertJob::Write(
   vtkPolyData* lines, bool wasTree, vtkMessageTrap& messages) const
 {
@@ -389,17 +416,12 @@ vtkSmartPointer<vtkPolyData> ConvertJob::Write(
     WritePolyData(this->output, lines, messages);
     return lines;
   }
-  vtkNew<vtkCenterlineConversion> conversion;
-  conversion->SetInputData(lines);
-  conversion->SetTolerance(this->tolerance);
   const bool tree = this->form.empty() ? this->join || !wasTree : this->form != "vmtk";
-  conversion->SetOutputForm(
-    tree ? vtkCenterlineConversion::TreeForm : vtkCenterlineConversion::VmtkForm);
-  conversion->Update();
-  ThrowIfError(messages, this->input);
-  vtkSmartPointer<vtkPolyData> written = this->form == "simvascular"
-    ? ToSimVascular(this->OneTree(conversion->GetOutput()), this->Unit())
-    : vtkSmartPointer<vtkPolyData>(conversion->GetOutput());
+  vtkSmartPointer<vtkPolyData> written = this->Converted(lines, tree);
+  if (this->form == "simvascular")
+  {
+    written = ToSimVascular(this->OneTree(written), this->Unit());
+  }
   WritePolyData(this->output, written, messages);
   return written;
 }

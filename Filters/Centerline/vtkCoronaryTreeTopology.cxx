@@ -8,6 +8,7 @@
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
 #include "vtkVesselTree.h"
+#include "vtkVmtkLines.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -283,7 +284,7 @@ private:
 vtkCoronaryTreeTopology::vtkCoronaryTreeTopology()
 {
   this->SetNumberOfInputPorts(2);
-  this->SetNumberOfOutputPorts(3);
+  this->SetNumberOfOutputPorts(4);
 }
 
 void vtkCoronaryTreeTopology::SetRootData(vtkPolyData* roots)
@@ -324,8 +325,8 @@ int vtkCoronaryTreeTopology::RequestData(
 {
   vtkPolyData* input = vtkPolyData::GetData(inputs[0], 0);
   vtkPointSet* roots = vtkPointSet::GetData(inputs[1], 0);
-  vtkPolyData* output[3];
-  for (int port = 0; port < 3; ++port)
+  vtkPolyData* output[4];
+  for (int port = 0; port < 4; ++port)
   {
     output[port] = vtkPolyData::GetData(outputs, port);
   }
@@ -335,19 +336,16 @@ int vtkCoronaryTreeTopology::RequestData(
   {
     coronary::TopologySettings settings;
     settings.gapRatio = this->GapRatio;
-    settings.mergeRatio = this->MergeRatio;
     settings.pruneRatio = this->PruneRatio;
     settings.murrayExponent = this->MurrayExponent;
-    settings.smoothing.wavelength = this->AutomaticSmoothing ? -1.0 : this->SmoothingWavelength;
+    settings.smoothing.wavelength = this->SmoothingWavelength;
     settings.Validate();
-    if (!this->AutomaticSmoothing &&
-      !(this->SmoothingWavelength >= 0.0 && this->SmoothingWavelength <= 1000.0))
+    if (!(this->SmoothingWavelength <= 1000.0))
     {
-      throw std::invalid_argument("The smoothing wavelength must be from 0 to 1000");
+      throw std::invalid_argument("The smoothing wavelength must be at most 1000");
     }
     coronary::LabelingSettings labeling;
     labeling.dominance = this->Dominance;
-    labeling.orientationWeight = this->OrientationWeight;
     labeling.Validate();
     coronary::Polylines lines;
     std::vector<Vector3> starts;
@@ -366,10 +364,7 @@ int vtkCoronaryTreeTopology::RequestData(
     if (this->LabelSegments)
     {
       labels = coronary::LabelSegments(tree, labeling, vtkCoronary::ProgressOf(this, 0.3, 1.0));
-      if (this->SplitAtSegmentBorders)
-      {
-        coronary::SplitAtSegmentBorders(tree);
-      }
+      coronary::SplitAtSegmentBorders(tree);
     }
     const Writer writer(this, input, tree);
     writer.WriteTree(output[TreePort]);
@@ -386,6 +381,7 @@ int vtkCoronaryTreeTopology::RequestData(
       writer.WriteWarnings(output[TreePort], warnings);
       writer.WriteWarnings(output[BifurcationPort], warnings);
     }
+    vtkCoronary::ToVmtkLines(output[TreePort], output[VmtkPort]);
     if (!tree.loops.empty())
     {
       vtkWarningMacro(<< tree.loops.size() << (tree.loops.size() == 1 ? " loop was" : " loops were")
@@ -403,14 +399,10 @@ void vtkCoronaryTreeTopology::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "GapRatio: " << this->GapRatio << "\n";
-  os << indent << "MergeRatio: " << this->MergeRatio << "\n";
   os << indent << "PruneRatio: " << this->PruneRatio << "\n";
   os << indent << "MurrayExponent: " << this->MurrayExponent << "\n";
-  os << indent << "AutomaticSmoothing: " << this->AutomaticSmoothing << "\n";
   os << indent << "SmoothingWavelength: " << this->SmoothingWavelength << "\n";
   os << indent << "LabelSegments: " << this->LabelSegments << "\n";
-  os << indent << "SplitAtSegmentBorders: " << this->SplitAtSegmentBorders << "\n";
   os << indent << "Dominance: " << this->Dominance << "\n";
-  os << indent << "OrientationWeight: " << this->OrientationWeight << "\n";
   os << indent << "InputRadiusArrayName: " << this->InputRadiusArrayName << "\n";
 }

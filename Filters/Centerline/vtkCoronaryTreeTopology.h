@@ -43,8 +43,11 @@
  *   same with x = 7/3), `FinetRatio` (double, r_p / (r_1 + r_2)), `FittedExponent` (double, the x
  *   without residual, NaN where there is none). In doubles[n] a missing daughter is -1.
  * - 2, vtkPolyData: the loops that were found, as closed polylines. Cell data `Length` (double, mm).
+ * - 3, vtkPolyData: output 0 as VMTK's lines, as of vmtkbranchextractor: a polyline for each branch of each path from a
+ *   root to a tip, on top of each other. All arrays of output 0 but `ParentGroupIds`, and cell data `CenterlineIds`,
+ *   `TractIds`, `Blanking` (int).
  *
- * Field data of outputs 0 and 1: that of the input, `PrunedTwigs`, `ClosedGaps` (int),
+ * Field data of outputs 0, 1 and 3: that of the input, `PrunedTwigs`, `ClosedGaps` (int),
  * `LoopLengths` (double, mm), `FittedExponent` (double, over all bifurcations; no value where none
  * fits), and when labelled `Dominance` (string) and `HeartFrame` (double[16], 4x4 matrix row by row:
  * from world to heart coordinates in mm of the mean heart; first axis from the right coronary's to
@@ -92,7 +95,8 @@ public:
   {
     TreePort = 0,
     BifurcationPort = 1,
-    LoopPort = 2
+    LoopPort = 2,
+    VmtkPort = 3
   };
 
   enum DominanceTypes
@@ -131,15 +135,6 @@ public:
 
   ///@{
   /**
-   * A line that runs alongside another within this many radii is the same vessel, 0 to 1. With 0
-   * only points that coincide are merged. Default 0.5.
-   */
-  vtkSetMacro(MergeRatio, double);
-  vtkGetMacro(MergeRatio, double);
-  ///@}
-
-  ///@{
-  /**
    * A twig shorter than this many radii of the vessel that it leaves is removed, 0 to 100.
    * Default 3.
    */
@@ -157,16 +152,8 @@ public:
 
   ///@{
   /**
-   * Whether the smoothing before differentiation is found from the lines themselves. Default on.
-   */
-  vtkSetMacro(AutomaticSmoothing, bool);
-  vtkGetMacro(AutomaticSmoothing, bool);
-  vtkBooleanMacro(AutomaticSmoothing, bool);
-  ///@}
-
-  ///@{
-  /**
-   * Otherwise: wavelength that the smoothing halves, mm, 0 to 1000. Default 10.
+   * Wavelength that the smoothing before differentiation halves, mm, up to 1000. Negative, the default
+   * (-1): found from the lines themselves.
    */
   vtkSetMacro(SmoothingWavelength, double);
   vtkGetMacro(SmoothingWavelength, double);
@@ -174,21 +161,13 @@ public:
 
   ///@{
   /**
-   * Whether the segments are named. Off for trees that are not coronary. Default on.
+   * Whether the segments are named. Off for trees that are not coronary. Default on. A branch that runs
+   * through two segments, because the side branch between them was not found, is cut at their border:
+   * so the name of each line holds for all of it.
    */
   vtkSetMacro(LabelSegments, bool);
   vtkGetMacro(LabelSegments, bool);
   vtkBooleanMacro(LabelSegments, bool);
-  ///@}
-
-  ///@{
-  /**
-   * Whether a branch that runs through two segments, because the side branch between them was not
-   * found, is cut at their border: then the name of each line holds for all of it. Default on.
-   */
-  vtkSetMacro(SplitAtSegmentBorders, bool);
-  vtkGetMacro(SplitAtSegmentBorders, bool);
-  vtkBooleanMacro(SplitAtSegmentBorders, bool);
   ///@}
 
   ///@{
@@ -199,18 +178,9 @@ public:
   vtkGetMacro(Dominance, int);
   ///@}
 
-  ///@{
-  /**
-   * How much a heart turned away from its usual position in the patient (LPS) counts against a
-   * fit, 0 to 100. It matters only where the shape leaves a choice, as with few branches.
-   * Default 1.
-   */
-  vtkSetMacro(OrientationWeight, double);
-  vtkGetMacro(OrientationWeight, double);
-  ///@}
-
   vtkPolyData* GetBifurcations() { return this->GetOutput(BifurcationPort); }
   vtkPolyData* GetLoops() { return this->GetOutput(LoopPort); }
+  vtkPolyData* GetVmtkLines() { return this->GetOutput(VmtkPort); }
 
 protected:
   vtkCoronaryTreeTopology();
@@ -229,15 +199,11 @@ private:
   void operator=(const vtkCoronaryTreeTopology&) = delete;
 
   double GapRatio = 2.0;
-  double MergeRatio = 0.5;
   double PruneRatio = 3.0;
   double MurrayExponent = 3.0;
-  bool AutomaticSmoothing = true;
-  double SmoothingWavelength = 10.0;
+  double SmoothingWavelength = -1.0;
   bool LabelSegments = true;
-  bool SplitAtSegmentBorders = true;
   int Dominance = FindDominance;
-  double OrientationWeight = 1.0;
 
   std::string InputRadiusArrayName = "Automatic";
 

@@ -455,11 +455,11 @@ struct vtkFastMarchingCenterline::Source
 coronary::CenterlineSettings vtkFastMarchingCenterline::ExtractionSettings() const
 {
   coronary::CenterlineSettings settings;
-  if (!this->AutomaticSpeedThreshold)
+  if (this->SpeedThreshold > 0.0)
   {
     settings.speedThreshold = this->SpeedThreshold;
   }
-  if (!this->AutomaticIntensityThreshold)
+  if (this->IntensityThreshold != 0.0)
   {
     settings.intensityThreshold = this->IntensityThreshold;
   }
@@ -468,14 +468,8 @@ coronary::CenterlineSettings vtkFastMarchingCenterline::ExtractionSettings() con
   settings.minimumConfidence = this->MinimumConfidence;
   settings.maximumGap = this->MaximumGap;
   settings.maximumRadius = this->MaximumRadius;
-  settings.resampling = this->ResamplingStepLength;
-  settings.smoothing = this->SmoothingWavelength;
-  settings.snap = this->Snap;
-  settings.blur = this->Blur;
   settings.snapDistance = this->SnapDistance;
   settings.stepLimit = this->StepLimit;
-  settings.voxelLimit = this->VoxelLimit;
-  settings.thinBranches = this->FollowThinBranches;
   settings.Validate();
   vtkCoronary::Require(std::isfinite(this->SurfaceSpacing) && this->SurfaceSpacing >= 0.0,
     "SurfaceSpacing must not be negative");
@@ -570,7 +564,7 @@ coronary::CenterlineResult vtkFastMarchingCenterline::Extract(
   }
   this->ReadIntensity(ImageOf(inputs[3]), source);
   const coronary::CenterlineInput& input = source.input;
-  const bool refine = this->RefineLumen && input.intensity;
+  const bool refine = input.intensity != nullptr;
   const double end = refine ? 0.9 : 1.0;
   coronary::CenterlineResult result =
     coronary::ExtractCenterlines(input, settings, vtkCoronary::ProgressOf(this, begin, end));
@@ -637,25 +631,16 @@ void vtkFastMarchingCenterline::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "SeedPoints: " << this->SeedPoints.size() << '\n';
   os << indent << "TargetPoints: " << this->TargetPoints.size() << '\n';
   os << indent << "ImageKind: " << this->ImageKind << '\n';
-  os << indent << "AutomaticSpeedThreshold: " << this->AutomaticSpeedThreshold << '\n';
   os << indent << "SpeedThreshold: " << this->SpeedThreshold << '\n';
-  os << indent << "AutomaticIntensityThreshold: " << this->AutomaticIntensityThreshold << '\n';
   os << indent << "IntensityThreshold: " << this->IntensityThreshold << '\n';
   os << indent << "SpeedExponent: " << this->SpeedExponent << '\n';
   os << indent << "FindTips: " << this->FindTips << '\n';
-  os << indent << "FollowThinBranches: " << this->FollowThinBranches << '\n';
-  os << indent << "RefineLumen: " << this->RefineLumen << '\n';
   os << indent << "MinimumBranchLength: " << this->MinimumBranchLength << '\n';
   os << indent << "MinimumConfidence: " << this->MinimumConfidence << '\n';
   os << indent << "MaximumGap: " << this->MaximumGap << '\n';
   os << indent << "MaximumRadius: " << this->MaximumRadius << '\n';
-  os << indent << "ResamplingStepLength: " << this->ResamplingStepLength << '\n';
-  os << indent << "SmoothingWavelength: " << this->SmoothingWavelength << '\n';
-  os << indent << "Snap: " << this->Snap << '\n';
-  os << indent << "Blur: " << this->Blur << '\n';
   os << indent << "SnapDistance: " << this->SnapDistance << '\n';
   os << indent << "SurfaceSpacing: " << this->SurfaceSpacing << '\n';
   os << indent << "StepLimit: " << this->StepLimit << '\n';
-  os << indent << "VoxelLimit: " << this->VoxelLimit << '\n';
   os << indent << "IntensityArrayName: " << this->IntensityArrayName << '\n';
 }

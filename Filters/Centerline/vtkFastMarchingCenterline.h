@@ -125,24 +125,17 @@ public:
 
   ///@{
   /**
-   * Speeds at or below are no vessel. Automatic (default): 2 % of the speed's 99.99th percentile;
-   * with a mask none.
+   * Speeds at or below are no vessel. Default 0: 2 % of the speed's 99.99th percentile; with a mask none.
    */
-  vtkSetMacro(AutomaticSpeedThreshold, bool);
-  vtkGetMacro(AutomaticSpeedThreshold, bool);
-  vtkBooleanMacro(AutomaticSpeedThreshold, bool);
   vtkSetMacro(SpeedThreshold, double);
   vtkGetMacro(SpeedThreshold, double);
   ///@}
 
   ///@{
   /**
-   * Intensities at or below are no vessel. Automatic (default): 40 % of the way from the
-   * surroundings to the lumen as they are at the seeds; with a mask none.
+   * Intensities at or below are no vessel, HU. Default 0: 40 % of the way from the surroundings to the
+   * lumen as they are at the seeds; with a mask none.
    */
-  vtkSetMacro(AutomaticIntensityThreshold, bool);
-  vtkGetMacro(AutomaticIntensityThreshold, bool);
-  vtkBooleanMacro(AutomaticIntensityThreshold, bool);
   vtkSetMacro(IntensityThreshold, double);
   vtkGetMacro(IntensityThreshold, double);
   ///@}
@@ -162,26 +155,6 @@ public:
   vtkSetMacro(FindTips, bool);
   vtkGetMacro(FindTips, bool);
   vtkBooleanMacro(FindTips, bool);
-  ///@}
-
-  ///@{
-  /**
-   * Whether on images (input 2) also branches of about one voxel's radius are followed that the speed or the mask
-   * does not have. Only with tips. Default on.
-   */
-  vtkSetMacro(FollowThinBranches, bool);
-  vtkGetMacro(FollowThinBranches, bool);
-  vtkBooleanMacro(FollowThinBranches, bool);
-  ///@}
-
-  ///@{
-  /**
-   * Whether on images (input 3) centres and radii are measured once more as the lumen that calcium and narrowings leave:
-   * half-maximum widths can not get smaller than the blur. Default on.
-   */
-  vtkSetMacro(RefineLumen, bool);
-  vtkGetMacro(RefineLumen, bool);
-  vtkBooleanMacro(RefineLumen, bool);
   ///@}
 
   ///@{
@@ -218,39 +191,6 @@ public:
 
   ///@{
   /**
-   * Distance of the points along the branches, mm. Default 0: 0.6 voxels.
-   */
-  vtkSetMacro(ResamplingStepLength, double);
-  vtkGetMacro(ResamplingStepLength, double);
-  ///@}
-
-  ///@{
-  /**
-   * Wavelength that the smoothing halves, mm; twice of it passes. Default 0: 12 voxels.
-   */
-  vtkSetMacro(SmoothingWavelength, double);
-  vtkGetMacro(SmoothingWavelength, double);
-  ///@}
-
-  ///@{
-  /**
-   * Put points on the centre of the measured cross-section. Default on.
-   */
-  vtkSetMacro(Snap, bool);
-  vtkGetMacro(Snap, bool);
-  vtkBooleanMacro(Snap, bool);
-  ///@}
-
-  ///@{
-  /**
-   * Standard deviation of the image's blur, for which radii are corrected, mm. Default 0: measured.
-   */
-  vtkSetMacro(Blur, double);
-  vtkGetMacro(Blur, double);
-  ///@}
-
-  ///@{
-  /**
    * How far a seed or target may lie from a vessel, mm. Default 0: three voxels or the radius at the seeds.
    */
   vtkSetMacro(SnapDistance, double);
@@ -269,14 +209,11 @@ public:
   ///@{
   /**
    * The work ends, with a warning and what was found, after so many points on the ways back from
-   * possible tips (default 5 million; the largest trees take some hundred thousand), and does not
-   * begin with more voxels in the region (default 100 million). Both count work, not time: the
-   * result is the same on a slow or busy machine.
+   * possible tips. It counts work, not time: the result is the same on a slow or busy machine. Default
+   * 5 million; the largest trees take some hundred thousand.
    */
   vtkSetMacro(StepLimit, vtkIdType);
   vtkGetMacro(StepLimit, vtkIdType);
-  vtkSetMacro(VoxelLimit, vtkIdType);
-  vtkGetMacro(VoxelLimit, vtkIdType);
   ///@}
 
   ///@{
@@ -323,26 +260,17 @@ private:
   Points SeedPoints;
   Points TargetPoints;
   int ImageKind = SpeedImage;
-  bool AutomaticSpeedThreshold = true;
-  double SpeedThreshold = 0.01;
-  bool AutomaticIntensityThreshold = true;
-  double IntensityThreshold = 100.0;
+  double SpeedThreshold = 0.0;
+  double IntensityThreshold = 0.0;
   double SpeedExponent = 2.0;
   bool FindTips = false;
-  bool FollowThinBranches = true;
-  bool RefineLumen = true;
   double MinimumBranchLength = 0.0;
   double MinimumConfidence = 0.5;
   double MaximumGap = 0.0;
   double MaximumRadius = 0.0;
-  double ResamplingStepLength = 0.0;
-  double SmoothingWavelength = 0.0;
-  bool Snap = true;
-  double Blur = 0.0;
   double SnapDistance = 0.0;
   double SurfaceSpacing = 0.0;
   vtkIdType StepLimit = 5000000;
-  vtkIdType VoxelLimit = 100000000;
   std::string IntensityArrayName;
 };
 

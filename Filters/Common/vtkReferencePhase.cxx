@@ -26,7 +26,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 #include <vector>
 
@@ -37,8 +36,6 @@ namespace
 {
 constexpr int SampledSlices = 16;
 constexpr int BlockEdge = 4;
-/// Steps are often written with six digits.
-constexpr double TimeTolerance = 1e-6;
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Means over blocks of voxels; blocks at the far sides may be smaller.
@@ -239,12 +236,6 @@ int vtkReferencePhase::RequestData(
       {
         throw std::runtime_error("Time must be finite");
       }
-      if (this->Selection == Exact && std::abs(moment.time - this->Time) > TimeTolerance)
-      {
-        std::ostringstream message;
-        message << "Time " << this->Time << " is not available: the nearest is " << moment.time;
-        throw std::runtime_error(message.str());
-      }
     }
     else if (moment.exists && !this->Data->Knows(inInfo))
     {
@@ -306,6 +297,5 @@ void vtkReferencePhase::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Automatic: " << this->Automatic << "\n";
   os << indent << "Time: " << this->Time << "\n";
-  os << indent << "Selection: " << this->Selection << "\n";
   os << indent << "UsedTime: " << this->UsedTime << "\n";
 }

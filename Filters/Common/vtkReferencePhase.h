@@ -44,12 +44,6 @@ public:
   vtkTypeMacro(vtkReferencePhase, vtkPassInputTypeAlgorithm);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum Selections
-  {
-    Nearest = 0,
-    Exact = 1
-  };
-
   ///@{
   /**
    * Find the quietest phase. Default on.
@@ -61,21 +55,11 @@ public:
 
   ///@{
   /**
-   * The phase, when it is not found automatically: fraction of the R-R interval. Default 0.75.
+   * The phase, when it is not found automatically: fraction of the R-R interval. Of an input with time
+   * steps the nearest one is taken. Default 0.75.
    */
   vtkSetMacro(Time, double);
   vtkGetMacro(Time, double);
-  ///@}
-
-  ///@{
-  /**
-   * Take the step that is nearest to Time; or Time exactly, which fails unless it is a step of the
-   * input, or lies in the time range of an input without steps. Default nearest.
-   */
-  vtkSetMacro(Selection, int);
-  vtkGetMacro(Selection, int);
-  void SetSelectionToNearest() { this->SetSelection(Nearest); }
-  void SetSelectionToExact() { this->SetSelection(Exact); }
   ///@}
 
   /// The time of the last execution's output; NaN before it, and for data without time.
@@ -100,7 +84,6 @@ private:
 
   bool Automatic = true;
   double Time = 0.75;
-  int Selection = Nearest;
   double UsedTime;
 
   struct Internals;

@@ -1,15 +1,17 @@
 #include "vtkCenterlineMetrics.h"
 
+#include "BranchMetrics.h"
 #include "CenterlineOverlap.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkSurfaceInput.h"
 #include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkDataArray.h"
+#include "vtkDataObject.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkIdTypeArray.h"
@@ -28,11 +30,16 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
+using coronary::BranchAgreement;
+using coronary::BranchMetrics;
 using coronary::CenterlineOverlapMeasures;
 using coronary::CenterlinePointMatch;
 using coronary::Polylines;
+using coronary::TreeBranch;
 using coronary::TreeOverlap;
 using coronary::TreeOverlapRow;
 using coronary::Vector3;
@@ -43,6 +50,9 @@ vtkStandardNewMacro(vtkCenterlineMetrics);
 namespace
 {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
+
+/// How far apart two times may be to be one.
+constexpr double TimeTolerance = 1e-3;
 
 template <typename Array>
 vtkNew<Array> Column(const char* name, vtkIdType rows)
@@ -127,17 +137,247 @@ void WriteTable(vtkTable* table, const TreeOverlap& overlap, bool paths, vtkStri
     field(vtkCoronaryArrayNames::LongestMissed, overlap.longestMissed);
   }
 }
+
+/// The points and lines of both sides, and what the comparison says of them.
+void WriteLines(vtkPolyData* output, const Polylines* sets, const TreeOverlap& overlap)
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> lines;
+  vtkNew<vtkIntArray> match;
+  match->SetName(vtkCoronaryArrayNames::CenterlineMatch);
+  vtkNew<vtkDoubleArray> distance;
+  distance->SetName(vtkCoronaryArrayNames::CenterlineDistance);
+  vtkNew<vtkDoubleArray> radius;
+  radius->SetName(vtkCoronaryArrayNames::Radius);
+  vtkNew<vtkIntArray> pointSide;
+  vtkNew<vtkIntArray> cellSide;
+  for (vtkIntArray* array : { pointSide.Get(), cellSide.Get() })
+  {
+    array->SetName(vtkCoronaryArrayNames::FromReference);
+  }
+  for (int side = 0; side < 2; ++side)
+  {
+    const Polylines& set = sets[side];
+    const std::vector<CenterlinePointMatch>& matches =
+      side == 0 ? overlap.reference : overlap.result;
+    const vtkIdType first = points->GetNumberOfPoints();
+    for (std::size_t i = 0; i < set.points.size(); ++i)
+    {
+      points->InsertNextPoint(set.points[i].data());
+      match->InsertNextValue(static_cast<int>(matches[i].match));
+      distance->InsertNextValue(matches[i].distance);
+      radius->InsertNextValue(set.radius.empty() ? NaN : set.radius[i]);
+      pointSide->InsertNextValue(side == 0 ? 1 : 0);
+    }
+    for (const std::vector<std::int64_t>& line : set.lines)
+    {
+      lines->InsertNextCell(static_cast<int>(line.size()));
+      for (const std::int64_t point : line)
+      {
+        lines->InsertCellPoint(first + point);
+      }
+      cellSide->InsertNextValue(side == 0 ? 1 : 0);
+    }
+  }
+  output->SetPoints(points);
+  output->SetLines(lines);
+  output->GetPointData()->AddArray(match);
+  output->GetPointData()->AddArray(distance);
+  output->GetPointData()->AddArray(pointSide);
+  output->GetPointData()->AddArray(radius);
+  output->GetCellData()->AddArray(cellSide);
+}
+
+/// Whether two single lines run against each other.
+bool RunsAgainst(const Polylines* sets)
+{
+  const auto point = [&](int side, bool last) -> const Vector3&
+  {
+    const std::vector<std::int64_t>& line = sets[side].lines[0];
+    return sets[side].points[last ? line.back() : line.front()];
+  };
+  if (sets[0].lines[0].size() < 2 || sets[1].lines[0].size() < 2)
+  {
+    return false;
+  }
+  const double along =
+    (point(0, false) - point(1, false)).norm() + (point(0, true) - point(1, true)).norm();
+  const double against =
+    (point(0, false) - point(1, true)).norm() + (point(0, true) - point(1, false)).norm();
+  return against < along;
+}
+
+/// The names of the reference's lines; null where there are none, or other cells beside the lines.
+vtkStringArray* LabelsOf(vtkPolyData* reference, std::size_t lines)
+{
+  auto* labels = reference == nullptr
+    ? nullptr
+    : vtkStringArray::SafeDownCast(
+        reference->GetCellData()->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
+  return labels != nullptr && labels->GetNumberOfValues() == static_cast<vtkIdType>(lines) &&
+      reference->GetNumberOfCells() == labels->GetNumberOfValues()
+    ? labels
+    : nullptr;
+}
+
+std::vector<std::pair<const char*, double>> Totals(const BranchMetrics& m)
+{
+  return { { "BCR", m.completenessRatio }, { "BCS", m.continuityScore },
+    { "BCR_bounded", m.boundedCompleteness }, { "BCS_bounded", m.boundedContinuity },
+    { "BCS_matched", m.matchedLengthRatio }, { "LengthDetected", m.lengthDetected },
+    { "ReferenceBranches", static_cast<double>(m.reference.size()) },
+    { "ResultBranches", static_cast<double>(m.result.size()) },
+    { "MatchedBranches", static_cast<double>(m.matched) },
+    { "DetectedBranches", static_cast<double>(m.detected) },
+    { "FalseBranches", static_cast<double>(m.falseBranches) }, { "FalseLength", m.falseLength },
+    { "OV", m.overlap.overlap }, { "OF", m.overlap.overlapToFirstError },
+    { "OT", m.overlap.overlapRelevant }, { "AD", m.overlap.distance },
+    { "AI", m.overlap.distanceInside }, { "AT", m.overlap.distanceRelevant } };
+}
+
+void WriteTotals(vtkFieldData* field, const BranchMetrics& metrics)
+{
+  for (const auto& [name, value] : Totals(metrics))
+  {
+    vtkCoronary::AddArray<vtkDoubleArray>(field, name, std::vector<double>{ value });
+  }
+}
+
+void WriteBranchTable(vtkTable* table, const BranchMetrics& metrics)
+{
+  vtkFieldData* columns = table->GetRowData();
+  vtkNew<vtkStringArray> names;
+  names->SetName("Name");
+  for (const BranchAgreement& row : metrics.rows)
+  {
+    names->InsertNextValue(row.reference >= 0
+        ? "reference " + std::to_string(metrics.reference[row.reference].group)
+        : "result " + std::to_string(metrics.result[row.result].group));
+  }
+  columns->AddArray(names);
+  const auto numbers = [&](const char* name, auto get)
+  {
+    std::vector<double> values;
+    values.reserve(metrics.rows.size());
+    for (const BranchAgreement& row : metrics.rows)
+    {
+      values.push_back(get(row));
+    }
+    vtkCoronary::AddArray<vtkDoubleArray>(columns, name, values);
+  };
+  const auto ids = [&](const char* name, auto get)
+  {
+    std::vector<vtkIdType> values;
+    values.reserve(metrics.rows.size());
+    for (const BranchAgreement& row : metrics.rows)
+    {
+      values.push_back(static_cast<vtkIdType>(get(row)));
+    }
+    vtkCoronary::AddArray<vtkIdTypeArray>(columns, name, values);
+  };
+  const auto of = [](const std::vector<TreeBranch>& branches, std::int64_t number)
+  { return number >= 0 ? &branches[number] : nullptr; };
+  ids("ReferenceBranch", [](const BranchAgreement& row) { return row.reference; });
+  ids("ResultBranch", [](const BranchAgreement& row) { return row.result; });
+  ids("ReferenceGroup",
+    [&](const BranchAgreement& row)
+    {
+      const TreeBranch* branch = of(metrics.reference, row.reference);
+      return branch ? branch->group : -1;
+    });
+  ids("ResultGroup",
+    [&](const BranchAgreement& row)
+    {
+      const TreeBranch* branch = of(metrics.result, row.result);
+      return branch ? branch->group : -1;
+    });
+  numbers("ReferenceLength",
+    [&](const BranchAgreement& row)
+    {
+      const TreeBranch* branch = of(metrics.reference, row.reference);
+      return branch ? branch->length : NaN;
+    });
+  numbers("ResultLength",
+    [&](const BranchAgreement& row)
+    {
+      const TreeBranch* branch = of(metrics.result, row.result);
+      return branch ? branch->length : NaN;
+    });
+  numbers("LengthRatio", [](const BranchAgreement& row) { return row.lengthRatio; });
+  numbers("Overlap", [](const BranchAgreement& row) { return row.overlap; });
+  numbers("Covered", [](const BranchAgreement& row) { return row.covered; });
+  numbers("Continuity", [](const BranchAgreement& row) { return row.continuity; });
+  numbers("LongestGap", [](const BranchAgreement& row) { return row.longestGap; });
+  std::vector<int> detected;
+  detected.reserve(metrics.rows.size());
+  for (const BranchAgreement& row : metrics.rows)
+  {
+    detected.push_back(row.detected ? 1 : 0);
+  }
+  vtkCoronary::AddArray<vtkIntArray>(columns, "Detected", detected);
+  WriteTotals(table->GetFieldData(), metrics);
+}
+
+void WriteBranches(vtkPolyData* output, const BranchMetrics& metrics)
+{
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> lines;
+  std::vector<int> side;
+  std::vector<vtkIdType> group;
+  std::vector<double> length;
+  std::vector<vtkIdType> match(metrics.reference.size() + metrics.result.size(), -1);
+  std::vector<double> covered(match.size(), NaN);
+  for (const std::vector<TreeBranch>* branches : { &metrics.reference, &metrics.result })
+  {
+    for (const TreeBranch& branch : *branches)
+    {
+      lines->InsertNextCell(static_cast<int>(branch.points.size()));
+      for (const coronary::Vector3& point : branch.points)
+      {
+        lines->InsertCellPoint(points->InsertNextPoint(point.data()));
+      }
+      side.push_back(branches == &metrics.reference ? 1 : 0);
+      group.push_back(branch.group);
+      length.push_back(branch.length);
+    }
+  }
+  const std::size_t first = metrics.reference.size();
+  for (const BranchAgreement& row : metrics.rows)
+  {
+    if (row.reference >= 0)
+    {
+      match[row.reference] = row.result;
+      covered[row.reference] = row.covered;
+    }
+    if (row.result >= 0)
+    {
+      match[first + row.result] = row.reference;
+      covered[first + row.result] = row.covered;
+    }
+  }
+  output->SetPoints(points);
+  output->SetLines(lines);
+  vtkFieldData* cells = output->GetCellData();
+  vtkCoronary::AddArray<vtkIntArray>(cells, vtkCoronaryArrayNames::FromReference, side);
+  vtkCoronary::AddArray<vtkIdTypeArray>(cells, vtkCoronaryArrayNames::GroupIds, group);
+  vtkCoronary::AddArray<vtkIdTypeArray>(cells, vtkCoronaryArrayNames::BranchMatch, match);
+  vtkCoronary::AddArray<vtkDoubleArray>(cells, vtkCoronaryArrayNames::Covered, covered);
+  vtkCoronary::AddArray<vtkDoubleArray>(cells, vtkCoronaryArrayNames::Length, length);
+  WriteTotals(output->GetFieldData(), metrics);
+}
 }
 
 vtkCenterlineMetrics::vtkCenterlineMetrics()
 {
   this->SetNumberOfInputPorts(2);
-  this->SetNumberOfOutputPorts(2);
+  this->SetNumberOfOutputPorts(4);
 }
 
-void vtkCenterlineMetrics::SetReferenceData(vtkPolyData* reference)
+void vtkCenterlineMetrics::SetReferenceData(vtkDataObject* reference)
 {
-  this->SetInputData(ReferencePort, reference);
+  this->SetInputDataInternal(ReferencePort, reference);
 }
 
 vtkPolyData* vtkCenterlineMetrics::GetLines()
@@ -145,25 +385,38 @@ vtkPolyData* vtkCenterlineMetrics::GetLines()
   return vtkPolyData::SafeDownCast(this->GetOutputDataObject(LinesPort));
 }
 
+vtkTable* vtkCenterlineMetrics::GetBranchTable()
+{
+  return vtkTable::SafeDownCast(this->GetOutputDataObject(BranchTablePort));
+}
+
+vtkPolyData* vtkCenterlineMetrics::GetBranches()
+{
+  return vtkPolyData::SafeDownCast(this->GetOutputDataObject(BranchesPort));
+}
+
 int vtkCenterlineMetrics::FillInputPortInformation(int, vtkInformation* info)
 {
   info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
+  info->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkCompositeDataSet");
   return 1;
 }
 
 int vtkCenterlineMetrics::FillOutputPortInformation(int port, vtkInformation* info)
 {
-  info->Set(vtkDataObject::DATA_TYPE_NAME(), port == TablePort ? "vtkTable" : "vtkPolyData");
+  const bool table = port == TablePort || port == BranchTablePort;
+  info->Set(vtkDataObject::DATA_TYPE_NAME(), table ? "vtkTable" : "vtkPolyData");
   return 1;
 }
 
 int vtkCenterlineMetrics::RequestInformation(
-  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
   {
     outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
   }
+  vtkCoronary::PublishCommonTime(inputs, outputs);
   return 1;
 }
 
@@ -172,132 +425,83 @@ int vtkCenterlineMetrics::RequestUpdateExtent(
 {
   // Trees are compared as a whole.
   vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
+  const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
+  vtkCoronary::RequestCommonTime(inputs, outputs->GetInformationObject(port));
   return 1;
+}
+
+void vtkCenterlineMetrics::CompareLines(const Polylines& result, const Polylines& reference,
+  vtkPolyData* referenceData, vtkInformationVector* outputs)
+{
+  coronary::CenterlineOverlapSettings settings;
+  settings.relevantRadius = this->RelevantRadius;
+  settings.leastRadius = this->LeastRadius;
+  settings.Validate();
+  if (this->Method < AutomaticMethod || this->Method > PathMethod)
+  {
+    throw std::invalid_argument("There is no method " + std::to_string(this->Method));
+  }
+  Polylines sets[2] = { reference.lines, result.lines };
+  if (sets[0].radius.empty())
+  {
+    sets[0].radius.assign(sets[0].points.size(), this->Tolerance);
+  }
+  const bool single = sets[0].lines.size() == 1 && sets[1].lines.size() == 1;
+  const bool paths = this->Method == PathMethod || (this->Method == AutomaticMethod && single);
+  const auto progress = vtkCoronary::ProgressOf(this, 0.5, 1.0);
+  const TreeOverlap overlap = paths
+    ? coronary::CompareCenterlinePaths(sets[0], sets[1], settings, progress)
+    : coronary::CompareCenterlineTrees(sets[0], sets[1], settings, progress);
+  if (single && paths && RunsAgainst(sets))
+  {
+    vtkWarningMacro("The result's line runs against the reference's");
+  }
+  WriteTable(vtkTable::GetData(outputs, TablePort), overlap, paths,
+    LabelsOf(referenceData, sets[0].lines.size()));
+  sets[0].radius = reference.lines.radius;
+  WriteLines(vtkPolyData::GetData(outputs, LinesPort), sets, overlap);
+}
+
+void vtkCenterlineMetrics::CompareBranches(
+  const Polylines& result, const Polylines& reference, vtkInformationVector* outputs)
+{
+  coronary::BranchMetricsSettings settings;
+  settings.tolerance = this->Tolerance;
+  settings.detectedShare = this->DetectedShare;
+  settings.leastLength = this->LeastLength;
+  settings.Validate();
+  const BranchMetrics metrics =
+    coronary::CompareBranches(result, reference, settings, vtkCoronary::ProgressOf(this, 0.0, 0.5));
+  WriteBranchTable(vtkTable::GetData(outputs, BranchTablePort), metrics);
+  WriteBranches(vtkPolyData::GetData(outputs, BranchesPort), metrics);
 }
 
 int vtkCenterlineMetrics::RequestData(
   vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  vtkPolyData* result = vtkPolyData::GetData(inputs[ResultPort], 0);
-  vtkPolyData* reference = vtkPolyData::GetData(inputs[ReferencePort], 0);
-  vtkTable* table = vtkTable::GetData(outputs, TablePort);
-  vtkPolyData* linesOutput = vtkPolyData::GetData(outputs, LinesPort);
   const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
-  const bool wanted = outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
+  if (outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
+  {
+    return 1;
+  }
   try
   {
-    coronary::CenterlineOverlapSettings settings;
-    settings.spacing = this->Spacing;
-    settings.relevantRadius = this->RelevantRadius;
-    settings.leastRadius = this->LeastRadius;
-    settings.startLength = this->StartLength;
-    settings.clipStart = this->ClipStart;
-    settings.Validate();
-    if (this->Method < AutomaticMethod || this->Method > PathMethod)
-    {
-      throw std::invalid_argument("There is no method " + std::to_string(this->Method));
-    }
-    Polylines sets[2]; // reference, result
-    if (wanted)
-    {
-      sets[0] = vtkCoronary::LinesOf(reference,
-        reference->GetNumberOfLines() > 0 ? vtkCoronary::RadiusOf(reference, "The reference has")
-                                          : nullptr);
-      sets[1] = vtkCoronary::LinesOf(result, vtkCoronary::FindRadius(result));
-    }
-    if (sets[0].lines.empty())
-    {
-      sets[0].radius.assign(sets[0].points.size(), 0.0);
-    }
-    const bool single = sets[0].lines.size() == 1 && sets[1].lines.size() == 1;
-    const bool paths = this->Method == PathMethod || (this->Method == AutomaticMethod && single);
-    const auto progress = vtkCoronary::ProgressOf(this);
-    const TreeOverlap overlap = paths
-      ? coronary::CompareCenterlinePaths(sets[0], sets[1], settings, progress)
-      : coronary::CompareCenterlineTrees(sets[0], sets[1], settings, progress);
-    if (single && sets[0].lines[0].size() > 1 && sets[1].lines[0].size() > 1)
-    {
-      const auto point = [&](int side, bool last) -> const Vector3&
-      {
-        const std::vector<std::int64_t>& line = sets[side].lines[0];
-        return sets[side].points[last ? line.back() : line.front()];
-      };
-      const double along =
-        (point(0, false) - point(1, false)).norm() + (point(0, true) - point(1, true)).norm();
-      const double against =
-        (point(0, false) - point(1, true)).norm() + (point(0, true) - point(1, false)).norm();
-      if (paths && against < along)
-      {
-        vtkWarningMacro("The result's line runs against the reference's");
-      }
-    }
-
-    auto* labels = wanted ? vtkStringArray::SafeDownCast(reference->GetCellData()->GetAbstractArray(
-                              vtkCoronaryArrayNames::SegmentLabel))
-                          : nullptr;
-    // The names belong to the lines only where there are no other cells.
-    if (labels != nullptr &&
-      (labels->GetNumberOfValues() != static_cast<vtkIdType>(sets[0].lines.size()) ||
-        reference->GetNumberOfCells() != labels->GetNumberOfValues()))
-    {
-      labels = nullptr;
-    }
-    if (wanted)
-    {
-      WriteTable(table, overlap, paths, labels);
-    }
-
-    vtkNew<vtkPoints> points;
-    points->SetDataTypeToDouble();
-    vtkNew<vtkCellArray> lines;
-    vtkNew<vtkIntArray> match;
-    match->SetName(vtkCoronaryArrayNames::CenterlineMatch);
-    vtkNew<vtkDoubleArray> distance;
-    distance->SetName(vtkCoronaryArrayNames::CenterlineDistance);
-    vtkNew<vtkDoubleArray> radius;
-    radius->SetName(vtkCoronaryArrayNames::Radius);
-    vtkNew<vtkIntArray> pointSide;
-    vtkNew<vtkIntArray> cellSide;
-    for (vtkIntArray* array : { pointSide.Get(), cellSide.Get() })
-    {
-      array->SetName(vtkCoronaryArrayNames::FromReference);
-    }
-    for (int side = 0; side < 2; ++side)
-    {
-      const Polylines& set = sets[side];
-      const std::vector<CenterlinePointMatch>& matches =
-        side == 0 ? overlap.reference : overlap.result;
-      const vtkIdType first = points->GetNumberOfPoints();
-      for (std::size_t i = 0; i < set.points.size(); ++i)
-      {
-        points->InsertNextPoint(set.points[i].data());
-        match->InsertNextValue(static_cast<int>(matches[i].match));
-        distance->InsertNextValue(matches[i].distance);
-        radius->InsertNextValue(set.radius.empty() ? NaN : set.radius[i]);
-        pointSide->InsertNextValue(side == 0 ? 1 : 0);
-      }
-      for (const std::vector<std::int64_t>& line : set.lines)
-      {
-        lines->InsertNextCell(static_cast<int>(line.size()));
-        for (const std::int64_t point : line)
-        {
-          lines->InsertCellPoint(first + point);
-        }
-        cellSide->InsertNextValue(side == 0 ? 1 : 0);
-      }
-    }
-    linesOutput->SetPoints(points);
-    linesOutput->SetLines(lines);
-    linesOutput->GetPointData()->AddArray(match);
-    linesOutput->GetPointData()->AddArray(distance);
-    linesOutput->GetPointData()->AddArray(pointSide);
-    linesOutput->GetPointData()->AddArray(radius);
-    linesOutput->GetCellData()->AddArray(cellSide);
+    const std::string mismatch = vtkCoronary::TimeMismatch(inputs, TimeTolerance);
+    vtkCoronary::Require(mismatch.empty(), mismatch);
+    const vtkSmartPointer<vtkPolyData> referenceData =
+      vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ReferencePort], 0));
+    const Polylines result = vtkCoronary::TreeOf(
+      vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ResultPort], 0)), "result");
+    const Polylines reference = vtkCoronary::TreeOf(referenceData, "reference");
+    this->CompareBranches(result, reference, outputs);
+    this->CompareLines(result, reference, referenceData, outputs);
+    vtkCoronary::SetCommonTime(inputs, outputs);
     return 1;
   }
   catch (...)
   {
-    return vtkCoronary::FinishFailedRequest(this, outputs, "to compare the lines");
+    return vtkCoronary::FinishFailedRequest(
+      this, outputs, "to compare the lines", { "BranchMetricsSettings: " });
   }
 }
 
@@ -305,9 +509,9 @@ void vtkCenterlineMetrics::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Method: " << this->Method << "\n";
-  os << indent << "Spacing: " << this->Spacing << "\n";
   os << indent << "RelevantRadius: " << this->RelevantRadius << "\n";
   os << indent << "LeastRadius: " << this->LeastRadius << "\n";
-  os << indent << "StartLength: " << this->StartLength << "\n";
-  os << indent << "ClipStart: " << this->ClipStart << "\n";
+  os << indent << "Tolerance: " << this->Tolerance << "\n";
+  os << indent << "DetectedShare: " << this->DetectedShare << "\n";
+  os << indent << "LeastLength: " << this->LeastLength << "\n";
 }

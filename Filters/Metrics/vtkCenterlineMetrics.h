@@ -1,19 +1,27 @@
 /**
  * @class   vtkCenterlineMetrics
- * @brief   Agreement of centerlines with a reference: the overlap and distance measures of CAT08.
+ * @brief   Agreement of centerlines with a reference: overlap and distance (CAT08), and which branches
+ * were found (BCR and BCS of the paper, and bounded).
  *
  * Schaap et al., Med Image Anal 2009;13:701: OV, OF, OT, AD, AI, AT, from connections between
  * samples of both sides and the vessel's radius in the reference. Two lines are compared along an
  * ordered correspondence, as the challenge does; trees as a whole by nearest connections, or path
- * by path. See docs/metrics.md for the definitions.
+ * by path.
+ *
+ * Branches are the ways between forks and ends, found the same way on both sides, and matched one to
+ * one by their overlap. BCR and BCS are Eq. 17 of the paper and can exceed 1; BCR_bounded is the share
+ * of the reference's branches of which at least `DetectedShare` is covered, BCS_bounded the mean
+ * covered share of branches that hang on what they should. See docs/metrics.md for the definitions.
  *
  * @par Input ports:
- * - 0: vtkPolyData, the result; lines, other cells are ignored. A radius array is optional.
- * - 1: vtkPolyData, the reference; lines with a point array of radii:
- *   `MaximumInscribedSphereRadius`, or `Radius` where there is no such array.
+ * - 0: the result, vtkPolyData or a composite of vtkPolyData, whose blocks are one tree then.
+ * - 1: the reference, the same. Where it has no radii, `Tolerance` stands for them.
  *
- * Lines run from the root to the tips, and hang together where the first point of one is a point of
- * another, by index or by position.
+ * Either is centerlines (lines from root to tip that hang together where the first point of one is a
+ * point of another, by index or by position; optional point data `MaximumInscribedSphereRadius` or
+ * `Radius`, cell data `GroupIds`), or a surface whose points have the branch (`GroupIds`) and the way
+ * from the root (`Abscissas`): each branch is then the line through the middles of its points. A bare
+ * surface has no branches: give its centerline instead.
  *
  * @par Output ports:
  * - 0, vtkTable: one row for each line of the reference (or for each path from a root to a tip),
@@ -28,23 +36,34 @@
  *   false negative, 3 false positive, 0 not compared), `CenterlineDistance` (double, mm, of the
  *   shortest connection; NaN without one), `FromReference` (int, 0 or 1), and
  *   `MaximumInscribedSphereRadius` (double, mm, NaN unknown). Cell data `FromReference` (int).
- *
- * The output is whole in piece 0, and empty in every other piece. Blocks of a composite result are
- * treated one by one.
+ * - 2, vtkTable: a row for each branch of the reference, then for each branch of the result without a
+ *   match. Columns: `Name` (string), `ReferenceBranch`, `ResultBranch` (vtkIdType, cells of output 3
+ *   of either side, -1: none), `ReferenceGroup`, `ResultGroup` (vtkIdType, -1: none),
+ *   `ReferenceLength`, `ResultLength` (double, mm, NaN: none), `LengthRatio`, `Overlap`, `Covered`,
+ *   `Continuity` (double, 0 to 1 but for the ratio), `LongestGap` (double, mm), `Detected` (int).
+ *   Field data (double, one value each): `BCR`, `BCS`, `BCR_bounded`, `BCS_bounded`, `BCS_matched`,
+ *   `LengthDetected`, `ReferenceBranches`, `ResultBranches`, `MatchedBranches`, `DetectedBranches`,
+ *   `FalseBranches`, `FalseLength` (mm), `OV`, `OF`, `OT`, `AD`, `AI`, `AT`.
+ * - 3, vtkPolyData: the branches of both sides as lines, those of the reference first. Cell data
+ *   `FromReference` (int, 0 or 1), `GroupIds` (vtkIdType), `BranchMatch` (vtkIdType, number of the
+ *   matched branch on the other side, -1: none), `Covered` (double, 0 to 1), `Length` (double, mm).
+ *   The field data of output 2.
  *
  * @par Time:
- * The output has the time steps of the result (input 0); both inputs are asked for the same time.
+ * As vtkMeshDistanceMetrics, with times that are one when they differ by 1e-3 at most. The outputs are
+ * whole in piece 0, and empty in every other piece.
  *
  * @par Failure:
- * A setting out of range, a reference without radii, a radius that is negative or not finite, a
- * coordinate that is not finite: one error that names it, and no output. Without lines the output
- * has no row but the total. An aborted execution leaves an empty output and is started anew by the
- * next request.
+ * A setting out of range, a bare surface, a radius that is negative or not finite, a coordinate that is
+ * not finite, times that do not match: one error that names it, and no output. Without lines the first
+ * table has no row but the total, the second none, and measures are NaN. An aborted execution leaves
+ * empty outputs and is started anew by the next request.
  *
  * @par Sources:
- * Schaap et al., Med Image Anal 2009;13:701 (CAT08).
+ * Schaap et al., Med Image Anal 2009;13:701 (CAT08); Eq. 17 of Wang et al., arXiv 2503.02218.
  *
- * @sa coronary::CompareCenterlines, coronary::CompareCenterlineTrees, docs/metrics.md
+ * @sa coronary::CompareCenterlines, coronary::CompareCenterlineTrees, coronary::CompareBranches,
+ * vtkMeshDistanceMetrics, docs/metrics.md
  */
 #ifndef vtkCenterlineMetrics_h
 #define vtkCenterlineMetrics_h
@@ -52,9 +71,12 @@
 #include "vtkCoronaryMetricsModule.h" // for the export macro
 #include "vtkTableAlgorithm.h"
 
-#include <string> // for std::string
-
 class vtkPolyData;
+
+namespace coronary
+{
+struct Polylines;
+}
 
 class VTKCORONARYMETRICS_EXPORT vtkCenterlineMetrics : public vtkTableAlgorithm
 {
@@ -72,7 +94,9 @@ public:
   enum OutputPorts
   {
     TablePort = 0,
-    LinesPort = 1
+    LinesPort = 1,
+    BranchTablePort = 2,
+    BranchesPort = 3
   };
 
   enum Methods
@@ -90,7 +114,7 @@ public:
   {
     this->SetInputConnection(ReferencePort, output);
   }
-  void SetReferenceData(vtkPolyData* reference);
+  void SetReferenceData(vtkDataObject* reference);
   ///@}
 
   ///@{
@@ -99,14 +123,6 @@ public:
    */
   vtkSetMacro(Method, int);
   vtkGetMacro(Method, int);
-  ///@}
-
-  ///@{
-  /**
-   * Distance of the samples in mm, positive. Default 0.03, as the challenge has it.
-   */
-  vtkSetMacro(Spacing, double);
-  vtkGetMacro(Spacing, double);
   ///@}
 
   ///@{
@@ -128,23 +144,32 @@ public:
 
   ///@{
   /**
-   * Misses within this length from the reference's start do not end OF; mm, 0 or more. Default 5.
+   * A place of the reference is covered by what is within its radius, or this far where that is more;
+   * mm, positive. Default 1.
    */
-  vtkSetMacro(StartLength, double);
-  vtkGetMacro(StartLength, double);
+  vtkSetMacro(Tolerance, double);
+  vtkGetMacro(Tolerance, double);
   ///@}
 
   ///@{
   /**
-   * Whether the result is cut where it first passes the disc across the reference's start that is
-   * two radii wide. Paths only. Default on.
+   * Covered share from which a branch is detected, 0 to 1. Default 0.8.
    */
-  vtkSetMacro(ClipStart, bool);
-  vtkGetMacro(ClipStart, bool);
-  vtkBooleanMacro(ClipStart, bool);
+  vtkSetMacro(DetectedShare, double);
+  vtkGetMacro(DetectedShare, double);
+  ///@}
+
+  ///@{
+  /**
+   * Ends of a tree that are shorter are no branches; mm, 0 or more. Default 3.
+   */
+  vtkSetMacro(LeastLength, double);
+  vtkGetMacro(LeastLength, double);
   ///@}
 
   vtkPolyData* GetLines();
+  vtkTable* GetBranchTable();
+  vtkPolyData* GetBranches();
 
 protected:
   vtkCenterlineMetrics();
@@ -160,15 +185,20 @@ protected:
     vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 
 private:
+  void CompareLines(const coronary::Polylines& result, const coronary::Polylines& reference,
+    vtkPolyData* referenceData, vtkInformationVector* outputs);
+  void CompareBranches(const coronary::Polylines& result, const coronary::Polylines& reference,
+    vtkInformationVector* outputs);
+
   vtkCenterlineMetrics(const vtkCenterlineMetrics&) = delete;
   void operator=(const vtkCenterlineMetrics&) = delete;
 
   int Method = AutomaticMethod;
-  double Spacing = 0.03;
   double RelevantRadius = 0.75;
   double LeastRadius = 0.0;
-  double StartLength = 5.0;
-  bool ClipStart = true;
+  double Tolerance = 1.0;
+  double DetectedShare = 0.8;
+  double LeastLength = 3.0;
 };
 
 #endif

@@ -192,10 +192,12 @@ int vtkMeshDistanceMetrics::RequestData(
   {
     coronary::MeshDistanceSettings settings;
     settings.errorBound = this->ErrorBound;
-    settings.areaMeasures = this->AreaMeasures;
     settings.signedDistances = this->SignedDistances;
-    settings.clipEnds = this->ClipEnds;
-    settings.endLength = this->EndLength;
+    settings.clipEnds = this->EndLength != 0.0;
+    if (settings.clipEnds)
+    {
+      settings.endLength = this->EndLength;
+    }
     settings.names = { "the result", "the reference" };
     settings.Validate();
     vtkCoronary::Require(this->TimeTolerance >= 0.0, "TimeTolerance must be 0 or more");
@@ -207,7 +209,7 @@ int vtkMeshDistanceMetrics::RequestData(
       surfaces[side]->ShallowCopy(
         vtkCoronary::TrianglesOf(vtkDataObject::GetData(inputs[side], 0)));
       meshes[side] = vtkCoronary::SurfaceOf(surfaces[side], vtkCoronaryArrayNames::GroupIds,
-        this->ClipEnds ? vtkCoronaryArrayNames::CellEntityIds : std::string());
+        settings.clipEnds ? vtkCoronaryArrayNames::CellEntityIds : std::string());
     }
     const MeshDistance distances =
       coronary::CompareSurfaces(meshes[0], meshes[1], settings, vtkCoronary::ProgressOf(this));
@@ -248,9 +250,7 @@ void vtkMeshDistanceMetrics::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "ErrorBound: " << this->ErrorBound << "\n";
-  os << indent << "AreaMeasures: " << this->AreaMeasures << "\n";
   os << indent << "SignedDistances: " << this->SignedDistances << "\n";
-  os << indent << "ClipEnds: " << this->ClipEnds << "\n";
   os << indent << "EndLength: " << this->EndLength << "\n";
   os << indent << "TimeTolerance: " << this->TimeTolerance << "\n";
 }

@@ -12,7 +12,7 @@
  * - 1: the reference (B), the same.
  *
  * Polygons and strips are triangulated; lines and vertices are left out. Arrays, all optional: point or
- * cell data `GroupIds` (branch), cell data `CellEntityIds` (above 1: caps, for `ClipEnds`).
+ * cell data `GroupIds` (branch), cell data `CellEntityIds` (above 1: caps, for `EndLength`).
  *
  * @par Output ports:
  * - 0, vtkPolyData: the result, in triangles, with its arrays; point data `SurfaceDistance` (double, mm:
@@ -97,15 +97,6 @@ public:
 
   ///@{
   /**
-   * Whether the area-weighted measures are computed: MSD_area, RMS, HD95. Default on.
-   */
-  vtkSetMacro(AreaMeasures, bool);
-  vtkGetMacro(AreaMeasures, bool);
-  vtkBooleanMacro(AreaMeasures, bool);
-  ///@}
-
-  ///@{
-  /**
    * Whether distances are negative inside of a closed surface. Default on.
    */
   vtkSetMacro(SignedDistances, bool);
@@ -115,17 +106,8 @@ public:
 
   ///@{
   /**
-   * Whether ends of vessels are left out: caps (by `CellEntityIds`), and on both surfaces what lies
-   * beyond an end of either one. Default off.
-   */
-  vtkSetMacro(ClipEnds, bool);
-  vtkGetMacro(ClipEnds, bool);
-  vtkBooleanMacro(ClipEnds, bool);
-  ///@}
-
-  ///@{
-  /**
-   * How far beyond an end something still belongs to it; mm, positive. Default 3.
+   * Leave out the ends of vessels: caps (by `CellEntityIds`), and on both surfaces what lies beyond an
+   * end of either one, so far from it; mm, positive. Default 0: nothing is left out.
    */
   vtkSetMacro(EndLength, double);
   vtkGetMacro(EndLength, double);
@@ -160,10 +142,8 @@ private:
   void operator=(const vtkMeshDistanceMetrics&) = delete;
 
   double ErrorBound = 1e-3;
-  bool AreaMeasures = true;
   bool SignedDistances = true;
-  bool ClipEnds = false;
-  double EndLength = 3.0;
+  double EndLength = 0.0;
   double TimeTolerance = 1e-3;
 };
 

@@ -45,6 +45,9 @@ enum InputPorts
   SkeletonPort = 2
 };
 
+/// R-R interval in seconds where nothing says it.
+constexpr double UsualCycleLength = 0.8;
+
 /// mm: voxels of images of lines and surfaces, and their margin. As fine as a CT's.
 constexpr double DrawnSpacing = 0.5;
 constexpr double DrawnMargin = 3.0;
@@ -370,7 +373,7 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
     1e-3;
   const bool fromLines = !images && !(hasReference && IsSurface(vtkPolyData::SafeDownCast(first)));
   data.Cycle =
-    FieldValue(first, names::CycleLength, FieldValue(input, names::CycleLength, this->CycleLength));
+    FieldValue(first, names::CycleLength, FieldValue(input, names::CycleLength, UsualCycleLength));
   settings.cycleLength = data.Cycle;
 
   vtkCoronary::UpstreamRequest request(series, series);
@@ -561,7 +564,6 @@ void vtkCenterlineTracker::PrintSelf(ostream& os, vtkIndent indent)
      << indent << "ImageContent: " << this->ImageContent << "\n"
      << indent << "ImageArrayName: " << this->ImageArrayName << "\n"
      << indent << "TemporalWindow: " << this->TemporalWindow << "\n"
-     << indent << "CycleLength: " << this->CycleLength << "\n"
      << indent << "NodeSpacing: " << this->NodeSpacing << "\n"
      << indent << "CaptureRange: " << this->CaptureRange << "\n";
 }

@@ -28,7 +28,7 @@
  *   reference). Cell data `AxialStrain` (double: length / length at the reference - 1).
  * - 1: vtkPolyData, the skeleton with the same arrays, as vtkSkinDeformation takes it.
  * Both have TIME_STEPS and TIME_RANGE of the tracked phases; another time gives the nearest one. Field data:
- * that of the lines, `CycleLength` (double, s), `ReferenceTime` (double, fraction of R-R), `TrackedShare` (double, one value
+ * that of the lines, `CycleLength` (double, s; 0.8 where the inputs do not say it), `ReferenceTime` (double, fraction of R-R), `TrackedShare` (double, one value
  * a tracked phase: share of places that were tracked), `TrackingRepeatability` (double, mm: phases that show the same moment against each
  * other; NaN when there are none).
  *
@@ -146,14 +146,6 @@ public:
 
   ///@{
   /**
-   * R-R interval in seconds where the input has no field array `CycleLength`. Default 0.8.
-   */
-  vtkSetMacro(CycleLength, double);
-  vtkGetMacro(CycleLength, double);
-  ///@}
-
-  ///@{
-  /**
    * Greatest distance of the places that are tracked, along the vessels, mm. Default 2.
    */
   vtkSetMacro(NodeSpacing, double);
@@ -208,7 +200,6 @@ private:
   int ImageContent = Tomogram;
   std::string ImageArrayName;
   double TemporalWindow = 0.066;
-  double CycleLength = 0.8;
   double NodeSpacing = 2.0;
   double CaptureRange = 16.0;
   coronary::ItemSharing* Sharing = nullptr;

@@ -144,7 +144,6 @@ int vtkBiharmonicSkinWeights::RequestData(
     settings.tolerance = this->Tolerance;
     settings.iterations = this->Iterations;
     settings.neighbourhood = this->Neighbourhood;
-    settings.widen = this->Widen;
     settings.leaveOutside = this->LeaveOutside;
     settings.Validate();
     vtkCoronary::Require(
@@ -271,7 +270,6 @@ void vtkBiharmonicSkinWeights::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Tolerance: " << this->Tolerance << "\n";
   os << indent << "Iterations: " << this->Iterations << "\n";
   os << indent << "Neighbourhood: " << this->Neighbourhood << "\n";
-  os << indent << "Widen: " << this->Widen << "\n";
   os << indent << "LeaveOutside: " << this->LeaveOutside << "\n";
   os << indent << "Influences: " << this->Influences << "\n";
   os << indent << "Dense: " << this->Dense << "\n";

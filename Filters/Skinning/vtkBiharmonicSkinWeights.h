@@ -122,15 +122,6 @@ public:
 
   ///@{
   /**
-   * Whether the neighbourhood is widened until it changes nothing. Default on.
-   */
-  vtkSetMacro(Widen, bool);
-  vtkGetMacro(Widen, bool);
-  vtkBooleanMacro(Widen, bool);
-  ///@}
-
-  ///@{
-  /**
    * Whether bones wholly outside of the mesh are left out, with a warning: they have no weight anywhere, and
    * the bones keep their numbers. Else they are an error. Default off.
    */
@@ -185,7 +176,6 @@ private:
   double Tolerance = 1e-6;
   int Iterations = 2000;
   double Neighbourhood = 1.75;
-  bool Widen = true;
   bool LeaveOutside = false;
   int Influences = 8;
   bool Dense = false;

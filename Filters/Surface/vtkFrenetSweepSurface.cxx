@@ -532,11 +532,8 @@ int vtkFrenetSweepSurface::RequestData(
     settings.maximumEdgeLength = this->MaximumEdgeLength;
     settings.curvatureWeight = this->CurvatureWeight;
     settings.edgeLengthPerRadius = this->EdgeLengthPerRadius;
-    settings.gradation = this->Gradation;
     settings.blending = this->Blending;
-    settings.edgeRetreat = this->EdgeRetreat;
     settings.smoothing = this->Smoothing;
-    settings.clearance = this->Clearance;
     settings.capped = this->Capping;
     settings.patchSamples = this->PatchSamples;
     settings.patchSpacing = this->PatchSpacing;
@@ -588,11 +585,8 @@ void vtkFrenetSweepSurface::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MaximumEdgeLength: " << this->MaximumEdgeLength << "\n";
   os << indent << "CurvatureWeight: " << this->CurvatureWeight << "\n";
   os << indent << "EdgeLengthPerRadius: " << this->EdgeLengthPerRadius << "\n";
-  os << indent << "Gradation: " << this->Gradation << "\n";
   os << indent << "Blending: " << this->Blending << "\n";
-  os << indent << "EdgeRetreat: " << this->EdgeRetreat << "\n";
   os << indent << "Smoothing: " << this->Smoothing << "\n";
-  os << indent << "Clearance: " << this->Clearance << "\n";
   os << indent << "Capping: " << this->Capping << "\n";
   os << indent << "Frame: " << this->Frame << "\n";
   os << indent << "PatchSamples: " << this->PatchSamples << "\n";

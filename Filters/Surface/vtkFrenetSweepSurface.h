@@ -180,14 +180,6 @@ public:
 
   ///@{
   /**
-   * Greatest change of the edge length per length, 0.05 to 1. Default 0.25.
-   */
-  vtkSetMacro(Gradation, double);
-  vtkGetMacro(Gradation, double);
-  ///@}
-
-  ///@{
-  /**
    * Radius of the fillets between vessels in radii of the smaller one, 0.1 to 1. Default 0.5.
    */
   vtkSetMacro(Blending, double);
@@ -196,29 +188,10 @@ public:
 
   ///@{
   /**
-   * Fillets fade with the distance from the node. How far they move the edge between two vessels
-   * that leave each other at an acute angle at least, in radii of the smaller one, 0.1 to 2. Default
-   * 0.15.
-   */
-  vtkSetMacro(EdgeRetreat, double);
-  vtkGetMacro(EdgeRetreat, double);
-  ///@}
-
-  ///@{
-  /**
    * Waves of the axes shorter than this many radii are noise, 0 to 4. Default 0.5.
    */
   vtkSetMacro(Smoothing, double);
   vtkGetMacro(Smoothing, double);
-  ///@}
-
-  ///@{
-  /**
-   * Least gap between vessels that touch but do not join, in radii of the smaller one, 0 to 0.5.
-   * Default 0.05.
-   */
-  vtkSetMacro(Clearance, double);
-  vtkGetMacro(Clearance, double);
   ///@}
 
   ///@{
@@ -278,11 +251,8 @@ private:
   double MaximumEdgeLength = 0.7;
   double CurvatureWeight = 1.0;
   double EdgeLengthPerRadius = 0.5;
-  double Gradation = 0.25;
   double Blending = 0.5;
-  double EdgeRetreat = 0.15;
   double Smoothing = 0.5;
-  double Clearance = 0.05;
   bool Capping = true;
   int Frame = BlendedFrame;
   int PatchSamples = 24;

@@ -467,16 +467,13 @@ coronary::VesselSegmentationSettings vtkVesselSegmentation::MakeSettings() const
   vtkCoronary::Require(this->WeakThreshold > 0.0 && this->WeakThreshold <= this->StrongThreshold &&
       this->StrongThreshold <= 1.0,
     "WeakThreshold and StrongThreshold must satisfy 0 < WeakThreshold <= StrongThreshold <= 1");
-  vtkCoronary::Require(this->AutomaticTubular ||
-      (this->TubularVesselness > 0.0 && std::isfinite(this->TubularVesselness)),
-    "TubularVesselness must be positive");
+  vtkCoronary::Require(this->TubularVesselness >= 0.0 && std::isfinite(this->TubularVesselness),
+    "TubularVesselness must be 0 or more");
   settings.weak = this->WeakThreshold;
   settings.strong = this->StrongThreshold;
   settings.largestRadius = this->LargestRadius;
   settings.longestPath = this->LongestPath;
   settings.smallestIsland = this->SmallestIsland;
-  settings.fillHoles = this->FillHoles;
-  settings.refineWall = this->RefineWall;
   settings.crossLesions = this->CrossLesions;
   settings.longestGap = this->LongestGap;
   settings.leastLinkConfidence = this->LeastLinkConfidence;
@@ -484,7 +481,7 @@ coronary::VesselSegmentationSettings vtkVesselSegmentation::MakeSettings() const
   {
     settings.window = coronary::BloodWindow{ this->TissueValue, this->BloodValue };
   }
-  if (!this->AutomaticTubular)
+  if (this->TubularVesselness > 0.0)
   {
     settings.tubular = this->TubularVesselness;
   }
@@ -681,13 +678,10 @@ void vtkVesselSegmentation::PrintSelf(ostream& os, vtkIndent indent)
   print("BloodValue", this->BloodValue);
   print("WeakThreshold", this->WeakThreshold);
   print("StrongThreshold", this->StrongThreshold);
-  print("AutomaticTubular", this->AutomaticTubular);
   print("TubularVesselness", this->TubularVesselness);
   print("LargestRadius", this->LargestRadius);
   print("LongestPath", this->LongestPath);
   print("SmallestIsland", this->SmallestIsland);
-  print("FillHoles", this->FillHoles);
-  print("RefineWall", this->RefineWall);
   print("CrossLesions", this->CrossLesions);
   print("LongestGap", this->LongestGap);
   print("LeastLinkConfidence", this->LeastLinkConfidence);

@@ -147,12 +147,8 @@ public:
 
   ///@{
   /**
-   * Vesselness of a clear tube, positive (default 0.3), and whether it is measured around the seeds
-   * instead (default on).
+   * Vesselness of a clear tube, 0 or more. Default 0: it is measured around the seeds.
    */
-  vtkSetMacro(AutomaticTubular, bool);
-  vtkGetMacro(AutomaticTubular, bool);
-  vtkBooleanMacro(AutomaticTubular, bool);
   vtkSetMacro(TubularVesselness, double);
   vtkGetMacro(TubularVesselness, double);
   ///@}
@@ -179,18 +175,6 @@ public:
    */
   vtkSetMacro(SmallestIsland, double);
   vtkGetMacro(SmallestIsland, double);
-  ///@}
-
-  ///@{
-  /**
-   * Fill what is enclosed by vessel; put the wall at the local half maximum. Default on.
-   */
-  vtkSetMacro(FillHoles, bool);
-  vtkGetMacro(FillHoles, bool);
-  vtkBooleanMacro(FillHoles, bool);
-  vtkSetMacro(RefineWall, bool);
-  vtkGetMacro(RefineWall, bool);
-  vtkBooleanMacro(RefineWall, bool);
   ///@}
 
   ///@{
@@ -260,13 +244,10 @@ private:
   double BloodValue = 400.0;
   double WeakThreshold = 0.5;
   double StrongThreshold = 0.8;
-  bool AutomaticTubular = true;
-  double TubularVesselness = 0.3;
+  double TubularVesselness = 0.0;
   double LargestRadius = 4.5;
   double LongestPath = 400.0;
   double SmallestIsland = 2.0;
-  bool FillHoles = true;
-  bool RefineWall = true;
   bool GenerateProbability = false;
   std::string InputVesselnessArrayName;
 };

@@ -155,7 +155,6 @@ int vtkSurfaceCleaner::RequestData(
   try
   {
     coronary::SurfaceCleaningSettings settings;
-    settings.mergeTolerance = this->MergeTolerance;
     settings.smallestComponent = this->SmallestComponent;
     settings.joinDistance = this->JoinDistance;
     settings.fillHoles = this->FillHoles;
@@ -228,7 +227,6 @@ int vtkSurfaceCleaner::RequestData(
 void vtkSurfaceCleaner::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "MergeTolerance: " << this->MergeTolerance << "\n";
   os << indent << "SmallestComponent: " << this->SmallestComponent << "\n";
   os << indent << "JoinDistance: " << this->JoinDistance << "\n";
   os << indent << "FillHoles: " << this->FillHoles << "\n";

@@ -56,15 +56,6 @@ public:
 
   ///@{
   /**
-   * Points closer than this are one; in parts of the bounding box's diagonal, 0 to 0.01. Default
-   * 1e-6.
-   */
-  vtkSetMacro(MergeTolerance, double);
-  vtkGetMacro(MergeTolerance, double);
-  ///@}
-
-  ///@{
-  /**
    * A component with less than this part of the largest one's area is left out, 0 to 1. Default
    * 0.01.
    */
@@ -140,7 +131,6 @@ private:
   vtkSurfaceCleaner(const vtkSurfaceCleaner&) = delete;
   void operator=(const vtkSurfaceCleaner&) = delete;
 
-  double MergeTolerance = 1e-6;
   double SmallestComponent = 0.01;
   double JoinDistance = 1.0;
   bool FillHoles = true;

@@ -166,9 +166,7 @@ int vtkTetrahedralMesher::RequestData(
     settings.radiusEdgeRatio = this->RadiusEdgeRatio;
     settings.minimumDihedral = vtkMath::RadiansFromDegrees(this->MinimumDihedralAngle);
     settings.minimumVolume = this->MinimumVolume;
-    settings.unitLength = this->UnitLength;
     settings.sizeFactor = this->SizeFactor;
-    settings.improve = this->Improve;
     settings.repair = this->Repair;
     settings.outside =
       this->LeaveOutside ? coronary::OutsidePolicy::LeaveOut : coronary::OutsidePolicy::Refuse;
@@ -288,9 +286,7 @@ void vtkTetrahedralMesher::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "RadiusEdgeRatio: " << this->RadiusEdgeRatio << "\n";
   os << indent << "MinimumDihedralAngle: " << this->MinimumDihedralAngle << "\n";
   os << indent << "MinimumVolume: " << this->MinimumVolume << "\n";
-  os << indent << "UnitLength: " << this->UnitLength << "\n";
   os << indent << "SizeFactor: " << this->SizeFactor << "\n";
-  os << indent << "Improve: " << this->Improve << "\n";
   os << indent << "Repair: " << this->Repair << "\n";
   os << indent << "LeaveOutside: " << this->LeaveOutside << "\n";
   os << indent << "TimeLimit: " << this->TimeLimit << "\n";

@@ -124,28 +124,11 @@ public:
 
   ///@{
   /**
-   * Millimetres per unit of the input's coordinates, for MinimumVolume. Default 1.
-   */
-  vtkSetMacro(UnitLength, double);
-  vtkGetMacro(UnitLength, double);
-  ///@}
-
-  ///@{
-  /**
    * Edge length inside over the local radius, 0.05 to 10; never finer than the wall. 0, the default:
    * the edges grow from the wall inwards.
    */
   vtkSetMacro(SizeFactor, double);
   vtkGetMacro(SizeFactor, double);
-  ///@}
-
-  ///@{
-  /**
-   * Whether the worst tetrahedra are improved after the backend. Default on.
-   */
-  vtkSetMacro(Improve, bool);
-  vtkGetMacro(Improve, bool);
-  vtkBooleanMacro(Improve, bool);
   ///@}
 
   ///@{
@@ -218,9 +201,7 @@ private:
   double RadiusEdgeRatio = 1.4;
   double MinimumDihedralAngle = 15.0;
   double MinimumVolume = 1e-7;
-  double UnitLength = 1.0;
   double SizeFactor = 0.0;
-  bool Improve = true;
   bool Repair = true;
   bool LeaveOutside = false;
   double TimeLimit = 300.0;

@@ -1,13 +1,15 @@
-// vtkCenterlineConversion, vtkTGFWriter and vtkTGFReader through the VTK pipeline.
+// Trees as VMTK's lines and back, as functions and as an output of the topology; vtkTGFWriter and vtkTGFReader.
 #include "FilterMessages.h"
-#include "vtkCenterlineConversion.h"
 #include "vtkCoronaryPhantomSource.h"
+#include "vtkCoronaryTreeTopology.h"
 #include "vtkTGFReader.h"
 #include "vtkTGFWriter.h"
+#include "vtkVmtkLines.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
+#include "vtkFieldData.h"
 #include "vtkIdList.h"
 #include "vtkInformation.h"
 #include "vtkIntArray.h"
@@ -27,6 +29,7 @@
 #include <fstream>
 #include <map>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -44,13 +47,18 @@ vtkSmartPointer<vtkPolyData> PhantomTree()
   return tree;
 }
 
-vtkSmartPointer<vtkPolyData> Converted(vtkPolyData* input, int form)
+vtkSmartPointer<vtkPolyData> LinesOf(vtkPolyData* tree)
 {
-  vtkNew<vtkCenterlineConversion> filter;
-  filter->SetInputData(input);
-  filter->SetOutputForm(form);
-  filter->Update();
-  return filter->GetOutput();
+  auto lines = vtkSmartPointer<vtkPolyData>::New();
+  vtkCoronary::ToVmtkLines(tree, lines);
+  return lines;
+}
+
+vtkSmartPointer<vtkPolyData> TreeOf(vtkPolyData* lines, double tolerance = 1e-6)
+{
+  auto tree = vtkSmartPointer<vtkPolyData>::New();
+  vtkCoronary::FromVmtkLines(lines, tolerance, tree);
+  return tree;
 }
 
 /// What a branch is made of, by its group id: positions, radii, parent, name.
@@ -133,7 +141,7 @@ std::vector<std::string> JointsOf(const std::string& path, int& bones)
 TEST(CenterlineConversion, TreesComeBackFromVmtkForm)
 {
   const auto tree = PhantomTree();
-  const auto lines = Converted(tree, vtkCenterlineConversion::VmtkForm);
+  const auto lines = LinesOf(tree);
   vtkCellData* cells = lines->GetCellData();
   EXPECT_EQ(cells->GetArray("ParentGroupIds"), nullptr);
   for (const char* name : { "CenterlineIds", "TractIds", "GroupIds", "Blanking", "TreeIds" })
@@ -172,7 +180,7 @@ TEST(CenterlineConversion, TreesComeBackFromVmtkForm)
     }
   }
 
-  const auto back = Converted(lines, vtkCenterlineConversion::TreeForm);
+  const auto back = TreeOf(lines);
   EXPECT_EQ(back->GetNumberOfPoints(), tree->GetNumberOfPoints());
   EXPECT_EQ(back->GetCellData()->GetArray("CenterlineIds"), nullptr);
   EXPECT_TRUE(ContentsOf(back) == ContentsOf(tree));
@@ -185,13 +193,21 @@ TEST(CenterlineConversion, TreesComeBackFromVmtkForm)
   }
 }
 
-TEST(CenterlineConversion, TheWantedFormPassesThrough)
+TEST(CenterlineConversion, TheTopologyGivesAndTakesVmtkLines)
 {
-  const auto tree = PhantomTree();
-  const vtkMTimeType before = tree->GetMTime();
-  const auto same = Converted(tree, vtkCenterlineConversion::TreeForm);
-  EXPECT_EQ(same->GetPoints(), tree->GetPoints());
-  EXPECT_EQ(tree->GetMTime(), before);
+  vtkNew<vtkCoronaryTreeTopology> topology;
+  topology->SetInputData(PhantomTree());
+  topology->Update();
+  vtkPolyData* lines = topology->GetVmtkLines();
+  EXPECT_TRUE(ContentsOf(TreeOf(lines)) == ContentsOf(topology->GetOutput()));
+  EXPECT_NE(lines->GetFieldData()->GetAbstractArray("Dominance"), nullptr);
+  // Paths on top of each other are one tree again.
+  vtkNew<vtkCoronaryTreeTopology> again;
+  again->SetInputData(lines);
+  again->Update();
+  EXPECT_TRUE(ContentsOf(again->GetOutput()) == ContentsOf(topology->GetOutput()));
+  topology->UpdatePiece(1, 2, 0);
+  EXPECT_EQ(topology->GetVmtkLines()->GetNumberOfCells(), 0);
 }
 
 TEST(CenterlineConversion, KeepsTheInputAndItsOrderOfBranches)
@@ -225,44 +241,37 @@ TEST(CenterlineConversion, KeepsTheInputAndItsOrderOfBranches)
   add(data->GetCellData(), "GroupIds", { -7, 5, 9 });
   add(data->GetCellData(), "ParentGroupIds", { -7, 9, -1 });
   add(data->GetCellData(), "Mark", { 70, 50, 90 });
-  const auto vmtk = Converted(data, vtkCenterlineConversion::VmtkForm);
+  const auto vmtk = LinesOf(data);
   ASSERT_EQ(vmtk->GetNumberOfCells(), 2);
   vtkDataArray* mark = vmtk->GetCellData()->GetArray("Mark");
   EXPECT_EQ(mark->GetComponent(0, 0), 90.0);
   EXPECT_EQ(mark->GetComponent(1, 0), 50.0);
-  const auto back = Converted(vmtk, vtkCenterlineConversion::TreeForm);
+  const auto back = TreeOf(vmtk);
   EXPECT_EQ(back->GetNumberOfPoints(), 4);
   EXPECT_EQ(back->GetCellData()->GetArray("ParentGroupIds")->GetComponent(1, 0), 9.0);
   EXPECT_EQ(
     back->GetPointData()->GetArray("MaximumInscribedSphereRadius")->GetComponent(3, 0), 1.0);
 }
 
-TEST(CenterlineConversion, EmptyInputAndOtherPieces)
+TEST(CenterlineConversion, NothingOfNothing)
 {
   vtkNew<vtkPolyData> nothing;
-  EXPECT_EQ(Converted(nothing, vtkCenterlineConversion::VmtkForm)->GetNumberOfCells(), 0);
-  vtkNew<vtkCenterlineConversion> filter;
-  filter->SetInputData(PhantomTree());
-  filter->UpdatePiece(1, 2, 0);
-  EXPECT_EQ(filter->GetOutput()->GetNumberOfCells(), 0);
-  filter->UpdatePiece(0, 2, 0);
-  EXPECT_GT(filter->GetOutput()->GetNumberOfCells(), 0);
+  EXPECT_EQ(LinesOf(nothing)->GetNumberOfCells(), 0);
 }
 
 TEST(CenterlineConversion, RefusesByName)
 {
-  const auto refuse = [](vtkPolyData* data, const std::string& text, double tolerance = 1e-6)
+  const auto refuse = [](const auto& convert, const std::string& text)
   {
-    vtkNew<vtkCenterlineConversion> filter;
-    filter->SetInputData(data);
-    filter->SetOutputForm(data->GetCellData()->HasArray("ParentGroupIds")
-        ? vtkCenterlineConversion::VmtkForm
-        : vtkCenterlineConversion::TreeForm);
-    filter->SetTolerance(tolerance);
-    const Messages messages(filter);
-    filter->Update();
-    ExpectOneError(messages, text);
-    EXPECT_EQ(filter->GetOutput()->GetNumberOfCells(), 0);
+    try
+    {
+      convert();
+      FAIL() << "no refusal: " << text;
+    }
+    catch (const std::invalid_argument& error)
+    {
+      EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
+    }
   };
   const auto without = [](const char* point, const char* cell)
   {
@@ -271,13 +280,14 @@ TEST(CenterlineConversion, RefusesByName)
     tree->GetCellData()->RemoveArray(cell);
     return tree;
   };
-  refuse(without("MaximumInscribedSphereRadius", ""), "MaximumInscribedSphereRadius");
-  refuse(without("", "GroupIds"), "GroupIds");
-  refuse(without("", "ParentGroupIds"), "ParentGroupIds");
-  const auto lines = Converted(PhantomTree(), vtkCenterlineConversion::VmtkForm);
-  refuse(lines, "tolerance", -1.0);
+  refuse(
+    [&] { LinesOf(without("MaximumInscribedSphereRadius", "")); }, "MaximumInscribedSphereRadius");
+  refuse([&] { LinesOf(without("", "GroupIds")); }, "GroupIds");
+  refuse([&] { LinesOf(without("", "ParentGroupIds")); }, "ParentGroupIds");
+  const auto lines = LinesOf(PhantomTree());
+  refuse([&] { TreeOf(lines, -1.0); }, "tolerance");
   vtkIntArray::SafeDownCast(lines->GetCellData()->GetArray("TractIds"))->SetValue(0, 9);
-  refuse(lines, "tract");
+  refuse([&] { TreeOf(lines); }, "tract");
 }
 
 TEST(TGF, SkeletonsComeBack)
@@ -308,9 +318,10 @@ TEST(TGF, SkeletonsComeBack)
   EXPECT_EQ(static_cast<vtkIdType>(joints.size()), tree->GetNumberOfPoints());
   const std::string again = WorkFile("again.tgf");
   writer->SetFileName(again.c_str());
-  for (const int form : { vtkCenterlineConversion::TreeForm, vtkCenterlineConversion::VmtkForm })
+  const vtkSmartPointer<vtkPolyData> lines = LinesOf(read);
+  for (vtkPolyData* form : { read, lines.Get() })
   {
-    writer->SetInputData(Converted(read, form));
+    writer->SetInputData(form);
     EXPECT_EQ(writer->Write(), 1);
     int bonesAgain = 0;
     EXPECT_EQ(JointsOf(again, bonesAgain), joints);
@@ -356,16 +367,14 @@ TEST(TGF, RefusesByName)
   std::remove(path.c_str());
 }
 
-TEST(CenterlineConversion, PrintsAllSettings)
+TEST(TGF, PrintsAllSettings)
 {
   std::ostringstream text;
-  vtkNew<vtkCenterlineConversion> filter;
-  filter->Print(text);
   vtkNew<vtkTGFReader> reader;
   reader->Print(text);
   vtkNew<vtkTGFWriter> writer;
   writer->Print(text);
-  for (const char* name : { "OutputForm", "Tolerance", "FileName", "Radius" })
+  for (const char* name : { "Tolerance", "FileName", "Radius" })
   {
     EXPECT_NE(text.str().find(std::string(name) + ":"), std::string::npos) << name;
   }

@@ -1,17 +1,18 @@
-// vtkCenterlineMetrics through the VTK pipeline: table, lines, names, time, pieces, blocks, refusals.
+// vtkCenterlineMetrics through the VTK pipeline: tables, lines, branches, surfaces, names, time, pieces, blocks, refusals.
 #include "vtkCenterlineMetrics.h"
 
 #include "CenterlineOverlap.h"
+#include "CoronaryAnatomy.h"
 #include "FilterMessages.h"
 #include "ParallelFor.h"
 #include "vtkCoronaryPhantomSource.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
-#include "vtkCompositeDataPipeline.h"
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkFloatArray.h"
+#include "vtkIdList.h"
 #include "vtkIdTypeArray.h"
 #include "vtkInformation.h"
 #include "vtkIntArray.h"
@@ -63,17 +64,47 @@ vtkSmartPointer<vtkPolyData> MakeLines(const std::vector<std::array<double, 2>>&
   return data;
 }
 
-vtkSmartPointer<vtkPolyData> PhantomTree(int seed, double time = 0.75)
+vtkSmartPointer<vtkPolyData> Phantom(int port, int seed, double time = 0.75)
 {
   vtkNew<vtkCoronaryPhantomSource> source;
   source->SetSeed(seed);
+  source->SetSurfaceSpacing(0.8);
   source->UpdateInformation();
-  source->GetOutputInformation(vtkCoronaryPhantomSource::TreePort)
-    ->Set(vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(), time);
-  source->Update(vtkCoronaryPhantomSource::TreePort);
-  auto tree = vtkSmartPointer<vtkPolyData>::New();
-  tree->ShallowCopy(source->GetOutputDataObject(vtkCoronaryPhantomSource::TreePort));
-  return tree;
+  source->GetOutputInformation(port)->Set(
+    vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(), time);
+  source->Update(port);
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->ShallowCopy(source->GetOutputDataObject(port));
+  return data;
+}
+
+vtkSmartPointer<vtkPolyData> PhantomTree(int seed, double time = 0.75)
+{
+  return Phantom(vtkCoronaryPhantomSource::TreePort, seed, time);
+}
+
+/// Without some of its lines.
+vtkSmartPointer<vtkPolyData> Without(vtkPolyData* tree, vtkIdType last)
+{
+  auto part = vtkSmartPointer<vtkPolyData>::New();
+  part->SetPoints(tree->GetPoints());
+  part->GetPointData()->ShallowCopy(tree->GetPointData());
+  vtkNew<vtkCellArray> lines;
+  vtkNew<vtkIdList> ids;
+  for (vtkIdType i = 0; i + last < tree->GetNumberOfCells(); ++i)
+  {
+    tree->GetCellPoints(i, ids);
+    lines->InsertNextCell(ids);
+  }
+  part->SetLines(lines);
+  return part;
+}
+
+double Field(vtkDataObject* data, const char* name)
+{
+  vtkDataArray* array = data->GetFieldData()->GetArray(name);
+  EXPECT_NE(array, nullptr) << name;
+  return array ? array->GetComponent(0, 0) : std::numeric_limits<double>::quiet_NaN();
 }
 
 double Cell(vtkTable* table, vtkIdType row, const char* column)
@@ -94,6 +125,8 @@ void ExpectRefusal(vtkCenterlineMetrics* filter, const std::string& part)
   ExpectError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 0);
   EXPECT_EQ(filter->GetLines()->GetNumberOfPoints(), 0);
+  EXPECT_EQ(filter->GetBranchTable()->GetNumberOfRows(), 0);
+  EXPECT_EQ(filter->GetBranches()->GetNumberOfPoints(), 0);
 }
 }
 
@@ -221,10 +254,11 @@ TEST(CenterlineMetrics, FollowsTime)
   moving->SetSeed(62);
   vtkNew<vtkCenterlineMetrics> filter;
   filter->SetInputConnection(moving->GetOutputPort(vtkCoronaryPhantomSource::TreePort));
-  filter->SetReferenceData(PhantomTree(62, 0.75));
+  // The result's time step that is nearest to the request is compared.
+  filter->SetReferenceData(PhantomTree(62, coronary::PaperPhases()[14]));
   filter->UpdateInformation();
   std::vector<double> distances;
-  for (const double time : { 0.75, 0.35 })
+  for (const double time : { 0.76, 0.35 })
   {
     filter->GetOutputInformation(0)->Set(
       vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(), time);
@@ -262,52 +296,55 @@ TEST(CenterlineMetrics, EmptyInputsAndPieces)
   EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 2);
 }
 
-TEST(CenterlineMetrics, BlocksOneByOne)
+TEST(CenterlineMetrics, BlocksAreOneTree)
 {
   vtkNew<vtkMultiBlockDataSet> blocks;
   blocks->SetBlock(0, MakeLines({ { 0.0, 60.0 } }));
-  blocks->SetBlock(1, MakeLines({ { 0.0, 30.0 } }));
+  blocks->SetBlock(1, MakeLines({ { 20.0, 30.0 } }));
   vtkNew<vtkCenterlineMetrics> filter;
-  vtkNew<vtkCompositeDataPipeline> executive;
-  filter->SetExecutive(executive);
   filter->SetInputDataObject(0, blocks);
-  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }));
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 }, { 20.0, 60.0 } }));
   filter->Update();
-  auto* output = vtkMultiBlockDataSet::SafeDownCast(filter->GetOutputDataObject(0));
-  ASSERT_NE(output, nullptr);
-  ASSERT_EQ(output->GetNumberOfBlocks(), 2U);
-  EXPECT_DOUBLE_EQ(Total(vtkTable::SafeDownCast(output->GetBlock(0)), "OV"), 1.0);
-  EXPECT_NEAR(Total(vtkTable::SafeDownCast(output->GetBlock(1)), "OV"), 2052.0 / 3002.0, 1e-9);
+  EXPECT_EQ(filter->GetLines()->GetNumberOfLines(), 4);
+  EXPECT_EQ(Cell(filter->GetOutput(), 1, "FN"), 950.0);
 }
 
 TEST(CenterlineMetrics, RefusesWhatItCanNotUse)
 {
   vtkNew<vtkCenterlineMetrics> filter;
   filter->SetInputData(MakeLines({ { 0.0, 60.0 } }));
-  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }, nullptr));
-  ExpectRefusal(filter, "The reference has no point array MaximumInscribedSphereRadius or Radius");
   filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }));
   const auto bad = MakeLines({ { 0.0, 60.0 } });
   bad->GetPoints()->SetPoint(3, 0.0, std::numeric_limits<double>::quiet_NaN(), 0.0);
   filter->SetInputData(bad);
-  ExpectRefusal(filter, "point 3 of the result is not finite");
+  ExpectRefusal(filter, "oint 3 of the result is not finite");
   filter->SetInputData(MakeLines({ { 0.0, 60.0 } }, "Radius", -1.0));
   ExpectRefusal(filter, "radius of point 0 of the result");
   filter->SetInputData(MakeLines({ { 0.0, 60.0 } }));
-  filter->SetSpacing(0.0);
-  ExpectRefusal(filter, "the spacing must be positive");
-  filter->SetSpacing(0.03);
   filter->SetRelevantRadius(-1.0);
   ExpectRefusal(filter, "the relevant radius");
   filter->SetRelevantRadius(0.75);
-  filter->SetStartLength(-1.0);
-  ExpectRefusal(filter, "the start length");
-  filter->SetStartLength(5.0);
   filter->SetMethod(7);
   ExpectRefusal(filter, "There is no method 7");
   filter->SetMethod(vtkCenterlineMetrics::AutomaticMethod);
   filter->Update();
   EXPECT_NE(filter->GetLines()->GetPointData()->GetArray("CenterlineMatch"), nullptr);
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);
+}
+
+TEST(CenterlineMetrics, WithoutRadiiTheToleranceStandsForThem)
+{
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(MakeLines({ { 1.2, 60.0 } }));
+  filter->SetReferenceData(MakeLines({ { 0.0, 60.0 } }, nullptr));
+  filter->Update();
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 0.0);
+  EXPECT_TRUE(std::isnan(filter->GetLines()
+                           ->GetPointData()
+                           ->GetArray("MaximumInscribedSphereRadius")
+                           ->GetComponent(0, 0)));
+  filter->SetTolerance(1.5);
+  filter->Update();
   EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);
 }
 
@@ -343,14 +380,141 @@ TEST(CenterlineMetrics, AbortLeavesNothingAndTheNextRequestStartsAnew)
   EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);
 }
 
+TEST(BranchMetrics, PhantomTrees)
+{
+  const auto tree = PhantomTree(61);
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(tree);
+  filter->SetReferenceData(tree);
+  filter->Update();
+  vtkTable* table = filter->GetBranchTable();
+  const vtkIdType count = table->GetNumberOfRows();
+  EXPECT_GT(count, 8);
+  EXPECT_EQ(Field(table, "BCR"), 1.0);
+  EXPECT_EQ(Field(table, "BCS"), 1.0);
+  EXPECT_EQ(Field(table, "BCR_bounded"), 1.0);
+  EXPECT_EQ(Field(table, "BCS_bounded"), 1.0);
+  EXPECT_EQ(Field(table, "OV"), 1.0);
+  EXPECT_EQ(Field(table, "ReferenceBranches"), static_cast<double>(count));
+  vtkPolyData* branches = filter->GetBranches();
+  ASSERT_EQ(branches->GetNumberOfLines(), 2 * count);
+  auto* match = vtkIdTypeArray::SafeDownCast(branches->GetCellData()->GetArray("BranchMatch"));
+  ASSERT_NE(match, nullptr);
+  for (vtkIdType i = 0; i < count; ++i)
+  {
+    EXPECT_EQ(match->GetValue(i), i);
+    EXPECT_EQ(table->GetValueByName(i, "ResultBranch").ToInt(), static_cast<int>(i));
+    EXPECT_EQ(table->GetValueByName(i, "Detected").ToInt(), 1);
+  }
+  EXPECT_EQ(branches->GetCellData()->GetArray("FromReference")->GetComponent(0, 0), 1.0);
+  EXPECT_EQ(branches->GetCellData()->GetArray("FromReference")->GetComponent(count, 0), 0.0);
+
+  // Without the last two lines some branches are gone; what is left is as long as before or longer.
+  filter->SetInputData(Without(tree, 2));
+  filter->Update();
+  EXPECT_LT(Field(filter->GetBranchTable(), "BCR"), 1.0);
+  EXPECT_LT(Field(filter->GetBranchTable(), "BCR_bounded"), 1.0);
+  EXPECT_EQ(Field(filter->GetBranchTable(), "FalseBranches"), 0.0);
+  const double score = Field(filter->GetBranchTable(), "BCS");
+  coronary::SetNumberOfThreads(1);
+  filter->Modified();
+  filter->Update();
+  coronary::SetNumberOfThreads(0);
+  EXPECT_EQ(Field(filter->GetBranchTable(), "BCS"), score);
+}
+
+TEST(BranchMetrics, SurfacesByTheirGroups)
+{
+  const auto surface = Phantom(vtkCoronaryPhantomSource::SurfacePort, 61);
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(surface);
+  filter->SetReferenceData(surface);
+  filter->Update();
+  EXPECT_EQ(Field(filter->GetBranchTable(), "BCR"), 1.0);
+  EXPECT_NEAR(Field(filter->GetBranchTable(), "BCS"), 1.0, 1e-12);
+  EXPECT_DOUBLE_EQ(Total(filter->GetOutput(), "OV"), 1.0);
+  // A surface and the tree in it.
+  filter->SetReferenceData(PhantomTree(61));
+  filter->Update();
+  EXPECT_NEAR(Field(filter->GetBranchTable(), "BCR"), 1.0, 0.15);
+  EXPECT_GT(Field(filter->GetBranchTable(), "BCR_bounded"), 0.9);
+  // A bare surface.
+  vtkNew<vtkPolyData> bare;
+  bare->SetPoints(surface->GetPoints());
+  bare->SetPolys(surface->GetPolys());
+  filter->SetInputData(bare);
+  ExpectRefusal(filter,
+    "The result is a surface without the point array GroupIds: its branches are not known; give "
+    "its "
+    "centerline instead");
+}
+
+TEST(BranchMetrics, BlocksTimeAndPieces)
+{
+  vtkNew<vtkCoronaryPhantomSource> moving;
+  moving->SetSeed(62);
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputConnection(moving->GetOutputPort(vtkCoronaryPhantomSource::TreePort));
+  vtkNew<vtkMultiBlockDataSet> blocks;
+  blocks->SetBlock(1, PhantomTree(62));
+  filter->SetReferenceData(blocks);
+  filter->UpdateInformation();
+  ASSERT_TRUE(filter->GetOutputInformation(0)->Has(vtkStreamingDemandDrivenPipeline::TIME_RANGE()));
+  double detected[2];
+  for (int n = 0; n < 2; ++n)
+  {
+    filter->GetOutputInformation(0)->Set(
+      vtkStreamingDemandDrivenPipeline::UPDATE_TIME_STEP(), n == 0 ? 0.75 : 0.35);
+    filter->Update();
+    detected[n] = Field(filter->GetBranchTable(), "LengthDetected");
+    // All branches are there, wherever they are.
+    EXPECT_EQ(Field(filter->GetBranchTable(), "BCR"), 1.0);
+  }
+  EXPECT_GT(detected[0], 0.99);
+  EXPECT_LT(detected[1], 0.9);
+  filter->UpdatePiece(1, 2, 0);
+  EXPECT_EQ(filter->GetBranchTable()->GetNumberOfRows(), 0);
+}
+
+TEST(BranchMetrics, EmptyInputsAndRefusals)
+{
+  vtkNew<vtkPolyData> nothing;
+  vtkNew<vtkCenterlineMetrics> filter;
+  filter->SetInputData(nothing);
+  filter->SetReferenceData(nothing);
+  filter->Update();
+  EXPECT_EQ(filter->GetBranchTable()->GetNumberOfRows(), 0);
+  EXPECT_TRUE(std::isnan(Field(filter->GetBranchTable(), "BCR")));
+  const auto tree = PhantomTree(63);
+  filter->SetReferenceData(tree);
+  filter->Update();
+  EXPECT_EQ(Field(filter->GetBranchTable(), "BCR"), 0.0);
+  filter->SetInputData(tree);
+  filter->SetTolerance(0.0);
+  ExpectRefusal(filter, "Tolerance must be positive");
+  filter->SetTolerance(1.0);
+  filter->SetDetectedShare(2.0);
+  ExpectRefusal(filter, "DetectedShare");
+  filter->SetDetectedShare(0.8);
+  const auto bad = PhantomTree(63);
+  bad->GetPoints()->SetPoint(3, 0.0, std::numeric_limits<double>::quiet_NaN(), 0.0);
+  filter->SetInputData(bad);
+  ExpectRefusal(filter, "oint 3 of the result is not finite");
+  filter->SetInputData(tree);
+  UpdateAborted(filter);
+  EXPECT_EQ(filter->GetBranchTable()->GetNumberOfRows(), 0);
+  filter->Update();
+  EXPECT_EQ(Field(filter->GetBranchTable(), "BCR"), 1.0);
+}
+
 TEST(CenterlineMetrics, PrintsItsSettings)
 {
   vtkNew<vtkCenterlineMetrics> filter;
   filter->SetRelevantRadius(0.6);
   std::ostringstream text;
   filter->Print(text);
-  for (const char* name : { "Method: 0", "Spacing: 0.03", "RelevantRadius: 0.6", "LeastRadius: 0",
-         "StartLength: 5", "ClipStart: 1" })
+  for (const char* name : { "Method: 0", "RelevantRadius: 0.6", "LeastRadius: 0", "Tolerance: 1",
+         "DetectedShare: 0.8", "LeastLength: 3" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }

@@ -204,9 +204,8 @@ TEST(CenterlineSkeleton, ComesBackFromATgfFileBoneByBone)
       ASSERT_EQ(writer->Write(), 1);
       vtkNew<vtkTGFReader> reader;
       reader->SetFileName(path.c_str());
-      reader->SetOutputForm(vtkTGFReader::SkeletonForm);
       reader->Update();
-      vtkPolyData* read = reader->GetOutput();
+      vtkPolyData* read = reader->GetOutput(vtkTGFReader::SkeletonPort);
       ASSERT_EQ(read->GetNumberOfPoints(), skeleton->GetNumberOfPoints());
       ASSERT_EQ(read->GetNumberOfLines(), bones);
       for (vtkIdType j = 0; j < read->GetNumberOfPoints(); ++j)

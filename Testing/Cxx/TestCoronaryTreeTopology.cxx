@@ -507,8 +507,7 @@ TEST(CoronaryTreeTopology, BadInputIsNamed)
   filter->SetDominance(5);
   ExpectRefusal(filter, "dominance");
   filter->SetDominance(-1);
-  filter->AutomaticSmoothingOff();
-  filter->SetSmoothingWavelength(-2.0);
+  filter->SetSmoothingWavelength(2000.0);
   ExpectRefusal(filter, "smoothing wavelength");
   filter->SetSmoothingWavelength(5.0);
   filter->LabelSegmentsOff();

@@ -357,9 +357,13 @@ TEST(GatedImageReader, EveryFailureIsOneError)
   reader->SetFileName((folder / "cut.nii.gz").c_str());
   EXPECT_NE(
     reader.Error().find("cut.nii.gz' is truncated: expected 128352 bytes"), std::string::npos);
-  reader->RemoveAllFileNames();
-  reader->SetDirectoryName((folder / "nowhere").c_str());
+  reader->SetFileName((folder / "nowhere").c_str());
   EXPECT_NE(reader.Error().find("nowhere' does not exist"), std::string::npos);
+  // What File > Open asks.
+  EXPECT_EQ(reader->CanReadFile((folder / "cut.nii.gz").c_str()), 1);
+  EXPECT_EQ(reader->CanReadFile((folder / "notes.txt").c_str()), 0);
+  EXPECT_EQ(reader->CanReadFile((folder / ".").c_str()), 0);
+  EXPECT_EQ(reader->CanReadFile(nullptr), 0);
   // And it recovers.
   WriteVti(folder / "a.vti", ObliqueImage(0));
   reader->SetFileName((folder / "a.vti").c_str());
@@ -449,7 +453,8 @@ TEST(RealData, CineSeriesIsOneDatasetOf25PhasesAnd6Positions)
     GTEST_SKIP() << "no real data at " << Data("biv-cine-dicom");
   }
   Reader reader;
-  reader->SetDirectoryName(Data("biv-cine-dicom").c_str());
+  EXPECT_EQ(reader->CanReadFile(Data("biv-cine-dicom").c_str()), 1);
+  reader->SetFileName(Data("biv-cine-dicom").c_str());
   const std::vector<double> steps = reader.TimeSteps();
   ASSERT_EQ(steps.size(), 25u);
   for (std::size_t p = 0; p < steps.size(); ++p)
@@ -497,7 +502,7 @@ TEST(RealData, ChestCtAgreesWithGdcm)
     GTEST_SKIP() << "no real data at " << Data("chest-ct-dicom");
   }
   Reader reader;
-  reader->SetDirectoryName(Data("chest-ct-dicom").c_str());
+  reader->SetFileName(Data("chest-ct-dicom").c_str());
   reader->Update();
   vtkImageData* image = reader->GetOutput();
   int dimensions[3];

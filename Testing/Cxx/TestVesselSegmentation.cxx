@@ -289,13 +289,7 @@ TEST(VesselSegmentation, SaysWhatIsWrong)
   refuse([](auto* f) { f->SetLongestPath(-1.0); }, "LongestPath");
   refuse([](auto* f) { f->SetSmallestIsland(-1.0); }, "SmallestIsland");
   refuse([](auto* f) { f->SetWeakThreshold(0.9); }, "WeakThreshold");
-  refuse(
-    [](auto* f)
-    {
-      f->AutomaticTubularOff();
-      f->SetTubularVesselness(0.0);
-    },
-    "TubularVesselness");
+  refuse([](auto* f) { f->SetTubularVesselness(-1.0); }, "TubularVesselness");
   refuse(
     [](auto* f)
     {

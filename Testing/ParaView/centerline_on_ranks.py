@@ -15,11 +15,10 @@ require_ranks(ranks)
 phantom, centerline, topology = centerline_pipeline()
 truth = simple.ReferencePhase(simple.OutputPort(phantom, CENTERLINES), Automatic=0, Time=0.75)
 metrics = simple.CenterlineMetrics(Result=simple.OutputPort(topology, 0), Reference=truth)
-conversion = simple.CenterlineConversion(simple.OutputPort(centerline, TREE))
 found = []
 for name, source, port in (("tree", centerline, TREE), ("lines", centerline, LINES),
                            ("bifurcations", centerline, FORKS), ("names", topology, 0),
-                           ("conversion", conversion, 0)):
+                           ("VMTK's lines", topology, 3)):
     found += [name] + digest(fetch_whole(source, port, 0.75))
 table = fetch(metrics, 0, 0.75)
 overlap = table.GetColumnByName("OV")

@@ -1,6 +1,7 @@
 """What the ParaView tests share: the plugin, data, pictures, and the phantom's usual view."""
 import hashlib
 import os
+import struct
 import sys
 
 from paraview import servermanager, simple, smstate, smtrace
@@ -284,3 +285,28 @@ def show_phantom(phantom, view):
     view.CameraViewAngle = 17.0
     return image, surface, tree
 
+
+def write_dicom(folder):
+    """Two slices of one phase, with no more than a reader needs, in the folder `dicom`."""
+    def element(group, number, kind, value):
+        value = value if isinstance(value, bytes) else value.encode()
+        value += (b"\0" if kind == "UI" else b" ") * (len(value) % 2)
+        length = struct.pack("<HI", 0, len(value)) if kind == "OW" else struct.pack("<H", len(value))
+        return struct.pack("<HH", group, number) + kind.encode() + length + value
+
+    os.makedirs(os.path.join(folder, "dicom"), exist_ok=True)
+    for z in range(2):
+        meta = element(2, 0x10, "UI", "1.2.840.10008.1.2.1")
+        data = element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") + \
+            element(8, 0x18, "UI", "1.2.3.%d" % z) + element(8, 0x60, "CS", "CT") + \
+            element(0x20, 0x0d, "UI", "1.2") + element(0x20, 0x0e, "UI", "1.2.3") + \
+            element(0x20, 0x32, "DS", "0\\0\\%d" % z) + element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + \
+            element(0x28, 0x02, "US", struct.pack("<H", 1)) + element(0x28, 0x04, "CS", "MONOCHROME2") + \
+            element(0x28, 0x10, "US", struct.pack("<H", 2)) + \
+            element(0x28, 0x11, "US", struct.pack("<H", 2)) + element(0x28, 0x30, "DS", "1\\1")
+        for number, value in ((0x100, 16), (0x101, 16), (0x102, 15), (0x103, 0)):
+            data += element(0x28, number, "US", struct.pack("<H", value))
+        data += element(0x28, 0x1052, "DS", "-1024") + element(0x28, 0x1053, "DS", "1") + \
+            element(0x7fe0, 0x10, "OW", bytes(8))
+        with open(os.path.join(folder, "dicom", "%d.dcm" % z), "wb") as file:
+            file.write(bytes(128) + b"DICM" + element(2, 0, "UL", struct.pack("<I", len(meta))) + meta + data)

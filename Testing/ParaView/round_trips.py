@@ -1,7 +1,6 @@
 """Every proxy with other settings than its own, through a state file, a Python state and a trace; outputs too."""
 import glob
 import os
-import struct
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -9,7 +8,7 @@ from paraview import make_name_valid, simple
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
 
 from coronary_testing import (digest, fetch, find, load_plugin, require, require_states_restore,
-                              require_trace_repeats)
+                              require_trace_repeats, write_dicom)
 
 plugin, folder, xml_folder = sys.argv[1:4]
 # What a value by rule would make senseless: axes that are no rotation, times that do not increase.
@@ -21,8 +20,6 @@ SENSIBLE = {("CoronaryPhantomSource", "Direction"): [0, 1, 0, 1, 0, 0, 0, 0, -1]
             ("CoronaryGatedImageReader", "PhaseFractions"): [0.1, 0.6],
             ("CoronarySegmentationReader", "FileNames"): IMAGES,
             ("CoronarySegmentationReader", "PhaseFractions"): [0.1, 0.6],
-            ("CoronaryGatedDICOMFolder", "DirectoryName"): os.path.join(folder, "dicom"),
-            ("CoronaryGatedDICOMFolder", "SeriesInstanceUID"): "1.2.3",
             ("CoronaryTGFReader", "FileName"): os.path.join(folder, "tree.tgf")}
 # A file, a folder or an array of the input each has to be there.
 LEFT = ("FileListDomain", "ArrayListDomain", "ExtentDomain")
@@ -49,32 +46,6 @@ def write_images():
             file.write(b"ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nElementSpacing = 1 2 3\n"
                        b"ElementType = MET_UCHAR\nBinaryData = True\nElementDataFile = LOCAL\n")
             file.write(bytes(range(phase, 24 + phase)))
-
-
-def write_dicom():
-    """Two slices of one phase, with no more than a reader needs."""
-    def element(group, number, kind, value):
-        value = value if isinstance(value, bytes) else value.encode()
-        value += (b"\0" if kind == "UI" else b" ") * (len(value) % 2)
-        length = struct.pack("<HI", 0, len(value)) if kind == "OW" else struct.pack("<H", len(value))
-        return struct.pack("<HH", group, number) + kind.encode() + length + value
-
-    os.makedirs(os.path.join(folder, "dicom"), exist_ok=True)
-    for z in range(2):
-        meta = element(2, 0x10, "UI", "1.2.840.10008.1.2.1")
-        data = element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") + \
-            element(8, 0x18, "UI", "1.2.3.%d" % z) + element(8, 0x60, "CS", "CT") + \
-            element(0x20, 0x0d, "UI", "1.2") + element(0x20, 0x0e, "UI", "1.2.3") + \
-            element(0x20, 0x32, "DS", "0\\0\\%d" % z) + element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + \
-            element(0x28, 0x02, "US", struct.pack("<H", 1)) + element(0x28, 0x04, "CS", "MONOCHROME2") + \
-            element(0x28, 0x10, "US", struct.pack("<H", 2)) + \
-            element(0x28, 0x11, "US", struct.pack("<H", 2)) + element(0x28, 0x30, "DS", "1\\1")
-        for number, value in ((0x100, 16), (0x101, 16), (0x102, 15), (0x103, 0)):
-            data += element(0x28, number, "US", struct.pack("<H", value))
-        data += element(0x28, 0x1052, "DS", "-1024") + element(0x28, 0x1053, "DS", "1") + \
-            element(0x7fe0, 0x10, "OW", bytes(8))
-        with open(os.path.join(folder, "dicom", "%d.dcm" % z), "wb") as file:
-            file.write(bytes(128) + b"DICM" + element(2, 0, "UL", struct.pack("<I", len(meta))) + meta + data)
 
 
 def other_number(value, low, high, step):
@@ -180,13 +151,13 @@ def require_settings():
 
 
 def make_wall():
-    """What the other tests have no round trip of: readers, conversion, sweep, cleaner, mesher, metrics."""
+    """What the other tests have no round trip of: readers, topology, sweep, cleaner, mesher, metrics."""
     # Settings with the creation: a trace of a script records no others.
     tree = simple.TGFSkeletonReader(registrationName="Tree", FileName=os.path.join(folder, "tree.tgf"),
                                     Radius=1.5)
     truth = simple.TGFSkeletonReader(registrationName="Truth", Radius=1.4,
                                      FileName=os.path.join(folder, "truth.tgf"))
-    simple.CenterlineConversion(tree, registrationName="Conversion", Tolerance=1e-5)
+    simple.CoronaryTreeTopology(tree, registrationName="Names", PruneRatio=2.0, LabelSegments=0)
     wall = simple.FrenetSweepSurface(tree, registrationName="Wall", MinimumEdgeLength=0.6,
                                      MaximumEdgeLength=1.0, Blending=0.4, PatchSamples=12)
     simple.SurfaceCleaner(wall, registrationName="Clean", MinimumAngle=5.0, JoinDistance=0.5)
@@ -195,9 +166,11 @@ def make_wall():
     simple.TetrahedralMesher(wall, Skeleton=bones, registrationName="Mesh", RadiusEdgeRatio=1.6,
                              MinimumDihedralAngle=12.0)
     simple.CenterlineMetrics(Result=tree, Reference=truth, registrationName="Agreement",
-                             RelevantRadius=0.5, Spacing=0.1)
+                             RelevantRadius=0.5, DetectedShare=0.7)
     simple.GatedImageReader(registrationName="Images", CycleLength=0.9, PhaseFractions=[0.1, 0.6],
                             FileNames=IMAGES)
+    simple.GatedImageReader(registrationName="Folder", FileNames=[os.path.join(folder, "dicom")],
+                            SeriesInstanceUID="1.2.3")
 
 
 def leaves(data):
@@ -211,8 +184,8 @@ def leaves(data):
 def outputs():
     """A digest of each output of make_wall."""
     found = []
-    for name, ports in (("Conversion", (0,)), ("Wall", (0, 1, 2)), ("Clean", (0,)), ("Bones", (0,)),
-                        ("Mesh", (0, 1, 2)), ("Agreement", (1,))):
+    for name, ports in (("Names", (0, 3)), ("Wall", (0, 1, 2)), ("Clean", (0,)), ("Bones", (0,)),
+                        ("Mesh", (0, 1, 2)), ("Agreement", (1, 3))):
         for port in ports:
             data = fetch(find(name), port, 0.0)
             require(data.GetNumberOfPoints() > 2, "%s, port %d is empty" % (name, port))
@@ -224,6 +197,11 @@ def outputs():
         scalars = fetch(images, 0, time).GetPointData().GetScalars()
         found.append(("Images", time, bytes(memoryview(scalars))))
     require(found[-1][2] != found[-2][2], "the phases are the same")
+    found.append(("Folder", 0, bytes(memoryview(fetch(find("Folder"), 0, 0.0).GetPointData().GetScalars()))))
+    opened = simple.OpenDataFile(os.path.join(folder, "dicom"))
+    require(opened.GetXMLName() == "CoronaryGatedImageReader", "a folder opens with %s" % opened.GetXMLName())
+    require(fetch(opened, 0, 0.0).GetDimensions() == (2, 2, 2), "the folder of DICOM files")
+    simple.Delete(opened)
     return found
 
 
@@ -248,7 +226,7 @@ load_plugin(plugin)
 write_tree("tree.tgf", 8.0)
 write_tree("truth.tgf", 8.5)
 write_images()
-write_dicom()
+write_dicom(folder)
 require_trace_repeats(make_wall, outputs)
 simple.ResetSession()
 make_wall()

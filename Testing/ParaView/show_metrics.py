@@ -17,8 +17,8 @@ def metrics_pipeline():
                                        Tortuosity=0.9)
     distance = simple.MeshDistanceMetrics(
         Result=simple.OutputPort(result, SURFACE), Reference=simple.OutputPort(reference, SURFACE),
-        ErrorBound=0.01, ClipEnds=1, EndLength=2.0)
-    branches = simple.BranchMetrics(
+        ErrorBound=0.01, EndLength=2.0)
+    branches = simple.CenterlineMetrics(
         Result=simple.OutputPort(result, CENTERLINES),
         Reference=simple.OutputPort(reference, CENTERLINES), LeastLength=2.0, DetectedShare=0.7)
     return distance, branches
@@ -29,7 +29,7 @@ def numbers_of(distance, branches):
     table = fetch(distance, 2, TIME)
     last = table.GetNumberOfRows() - 1
     numbers = [table.GetColumnByName(name).GetValue(last) for name in ("HD", "MSD", "RMS", "HD95")]
-    field = fetch(branches, 0, TIME).GetFieldData()
+    field = fetch(branches, 2, TIME).GetFieldData()
     return numbers + [field.GetArray(name).GetValue(0)
                       for name in ("BCR", "BCS", "BCR_bounded", "OV")]
 
@@ -43,8 +43,9 @@ def outputs(distance, branches):
     times = list(distance.TimestepValues)
     require(len(times) == 20, "%d time steps" % len(times))
     require(fetch(distance, 2, TIME).GetNumberOfRows() > 10, "no rows of branches")
-    require(fetch(branches, 0, TIME).GetNumberOfRows() > 8, "no branches")
-    lines = fetch(branches, 1, TIME)
+    require(fetch(branches, 2, TIME).GetNumberOfRows() > 8, "no branches")
+    require(fetch(branches, 0, TIME).GetColumnByName("OV") is not None, "no lines of the reference")
+    lines = fetch(branches, 3, TIME)
     require(lines.GetNumberOfCells() > 16 and
             lines.GetCellData().GetArray("Covered") is not None, "no lines")
     # Another phase is another comparison.

@@ -1,32 +1,22 @@
-#include "vtkCenterlineConversion.h"
+#include "vtkVmtkLines.h"
 
 #include "vtkCoronaryArrayNames.h"
-#include "vtkCoronaryCompatibility.h"
-#include "vtkCoronaryUpstream.h"
 #include "vtkVesselTree.h"
 
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
 #include "vtkFieldData.h"
-#include "vtkInformation.h"
-#include "vtkInformationVector.h"
-#include "vtkObjectFactory.h"
+#include "vtkIntArray.h"
+#include "vtkNew.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
-#include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <map>
-#include <new>
-#include <stdexcept>
 #include <vector>
 
 namespace names = vtkCoronaryArrayNames;
 using coronary::VesselTree;
 using coronary::VmtkTract;
-using vtkCoronary::CenterlineForm;
-using SDDP = vtkStreamingDemandDrivenPipeline;
-
-vtkStandardNewMacro(vtkCenterlineConversion);
 
 namespace
 {
@@ -60,27 +50,13 @@ std::map<vtkIdType, vtkIdType> CellsByPoint(vtkPolyData* data)
 }
 }
 
-vtkCenterlineConversion::vtkCenterlineConversion()
+void vtkCoronary::ToVmtkLines(vtkPolyData* input, vtkPolyData* output)
 {
-}
-
-int vtkCenterlineConversion::RequestInformation(
-  vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
-{
-  outputs->GetInformationObject(0)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
-  return 1;
-}
-
-int vtkCenterlineConversion::RequestUpdateExtent(
-  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
-{
-  // A tree is converted as a whole.
-  vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
-  return 1;
-}
-
-void vtkCenterlineConversion::ToVmtk(vtkPolyData* input, vtkPolyData* output) const
-{
+  output->GetFieldData()->PassData(input->GetFieldData());
+  if (input->GetNumberOfLines() == 0)
+  {
+    return;
+  }
   const VesselTree tree = vtkCoronary::TreeOf(input);
   const std::vector<VmtkTract> tracts = coronary::ToVmtkTracts(tree);
   const std::map<vtkIdType, vtkIdType> cellOf = CellsByPoint(input);
@@ -98,11 +74,12 @@ void vtkCenterlineConversion::ToVmtk(vtkPolyData* input, vtkPolyData* output) co
   output->GetCellData()->RemoveArray(names::ParentGroupIds);
 }
 
-void vtkCenterlineConversion::ToTree(vtkPolyData* input, vtkPolyData* output) const
+void vtkCoronary::FromVmtkLines(vtkPolyData* input, double tolerance, vtkPolyData* output)
 {
+  output->GetFieldData()->PassData(input->GetFieldData());
   const std::vector<VmtkTract> tracts = vtkCoronary::TractsOf(input);
   std::vector<coronary::TractPoint> origins;
-  VesselTree tree = coronary::FromVmtkTracts(tracts, this->Tolerance, &origins);
+  VesselTree tree = coronary::FromVmtkTracts(tracts, tolerance, &origins);
   std::vector<vtkIdType> pointRows;
   pointRows.reserve(origins.size());
   for (const coronary::TractPoint& origin : origins)
@@ -127,63 +104,4 @@ void vtkCenterlineConversion::ToTree(vtkPolyData* input, vtkPolyData* output) co
     output->GetCellData()->RemoveArray(name);
   }
   vtkCoronary::SetTree(output, tree);
-}
-
-int vtkCenterlineConversion::RequestData(
-  vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
-{
-  vtkPolyData* input = vtkPolyData::GetData(inputs[0], 0);
-  vtkPolyData* output = vtkPolyData::GetData(outputs, 0);
-  output->GetFieldData()->PassData(input->GetFieldData());
-  if (outputs->GetInformationObject(0)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0 ||
-    input->GetNumberOfLines() == 0)
-  {
-    return 1;
-  }
-  try
-  {
-    if (this->OutputForm != TreeForm && this->OutputForm != VmtkForm)
-    {
-      throw std::invalid_argument("There is no form " + std::to_string(this->OutputForm));
-    }
-    const CenterlineForm form = vtkCoronary::FormOf(input);
-    if (form == CenterlineForm::Unknown)
-    {
-      throw std::invalid_argument(
-        "The lines are neither a tree (cell arrays GroupIds and ParentGroupIds) nor VMTK's "
-        "branches "
-        "(CenterlineIds, TractIds and GroupIds): make a tree of them with vtkCoronaryTreeTopology");
-    }
-    if ((form == CenterlineForm::Tree) == (this->OutputForm == TreeForm))
-    {
-      output->ShallowCopy(input);
-    }
-    else if (this->OutputForm == VmtkForm)
-    {
-      this->ToVmtk(input, output);
-    }
-    else
-    {
-      this->ToTree(input, output);
-    }
-    this->UpdateProgress(1.0);
-    return 1;
-  }
-  catch (const std::bad_alloc&)
-  {
-    vtkErrorMacro("Not enough memory to convert the centerlines");
-  }
-  catch (const std::exception& error)
-  {
-    vtkErrorMacro(<< error.what());
-  }
-  output->Initialize();
-  return 0;
-}
-
-void vtkCenterlineConversion::PrintSelf(ostream& os, vtkIndent indent)
-{
-  this->Superclass::PrintSelf(os, indent);
-  os << indent << "OutputForm: " << this->OutputForm << '\n';
-  os << indent << "Tolerance: " << this->Tolerance << '\n';
 }
