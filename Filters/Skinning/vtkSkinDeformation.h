@@ -14,9 +14,9 @@
  *   points bones, in the order of the indices.
  * - 2: vtkPolyData, the skeleton posed: the same cells, other points. Cell data `BoneRotation`
  *   (double[4], w x y z) and `BoneTwist` (double, radians), point data `CalibreFactor` (double): all optional. Without
- *   rotations bones turn with the least twist. For the velocity: point data `Velocity` (double[3], mm/s), and the derivatives
- *   of those that are there, `BoneAngularVelocity` (double[3], radians/s about axes of the world), `BoneTwistRate` (double,
- *   radians/s), `CalibreRate` (double, 1/s), as of vtkCardiacPhaseInterpolator. May have time; the output has the same.
+ *   rotations bones turn with the least twist. Their derivatives, as of vtkCardiacPhaseInterpolator, are for the velocity: point
+ *   data `Velocity` (double[3], mm/s), `CalibreRate` (double, 1/s), cell data `BoneAngularVelocity` (double[3], radians/s about axes
+ *   of the world), `BoneTwistRate` (double, radians/s). May have time; the output has the same.
  *
  * @par Output port:
  * - 0: the mesh with moved points. Cells and all other arrays are the input's own, but for its active
