@@ -6,7 +6,6 @@
 #include "vtkMeshSequenceWriter.h"
 #include "vtkSkinDeformation.h"
 
-#include <algorithm>
 #include <map>
 #include <stdexcept>
 
@@ -19,24 +18,6 @@ const std::map<std::string, int> Modes = {
   { "cubic", vtkCardiacPhaseInterpolator::PeriodicCubic },
   { "low-noise", vtkCardiacPhaseInterpolator::LowNoise },
 };
-
-/// The deformation takes velocities between the time steps around a moment: these are close to it, and on
-/// both sides of the first and of the last one too.
-void OfferMomentsAround(const std::vector<double>& times, vtkCardiacPhaseInterpolator* interpolator)
-{
-  double step = 0.002;
-  for (std::size_t k = 1; k < times.size(); ++k)
-  {
-    step = std::min(step, 0.25 * (times[k] - times[k - 1]));
-  }
-  interpolator->SetSteps(vtkCardiacPhaseInterpolator::ListedSteps);
-  for (const double time : times)
-  {
-    interpolator->AddStep(time - step);
-    interpolator->AddStep(time);
-    interpolator->AddStep(time + step);
-  }
-}
 }
 
 int InterpolationMode(const std::string& name)
@@ -68,10 +49,11 @@ MovingMesh::~MovingMesh() = default;
 void MovingMesh::Write(const std::string& path, const std::vector<double>& times,
   vtkMessageTrap& messages, const std::function<void(double)>& progress)
 {
-  OfferMomentsAround(times, this->Interpolator);
+  this->Interpolator->SetSteps(vtkCardiacPhaseInterpolator::ListedSteps);
   this->Writer->SetPhases(vtkMeshSequenceWriter::ListedTimes);
   for (const double time : times)
   {
+    this->Interpolator->AddStep(time);
     this->Writer->AddTime(time);
   }
   this->Writer->SetFileName(path.c_str());

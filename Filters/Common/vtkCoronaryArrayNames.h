@@ -201,8 +201,12 @@ constexpr const char* LeftOutBoneNames = "LeftOutBoneNames";   ///< string, of t
 constexpr const char* BoneRotation = "BoneRotation"; ///< double[4], w x y z, from rest, first joint
 constexpr const char* BoneTwist = "BoneTwist";       ///< double, radians along the bone
 constexpr const char* AxialStrain = "AxialStrain";   ///< double, posed length / rest length - 1
+constexpr const char* BoneAngularVelocity =
+  "BoneAngularVelocity"; ///< double[3], of BoneRotation, radians/s about axes of the world
+constexpr const char* BoneTwistRate = "BoneTwistRate"; ///< double, of BoneTwist, radians/s
 // Posed skeleton, point data.
 constexpr const char* CalibreFactor = "CalibreFactor";           ///< double, of the radius
+constexpr const char* CalibreRate = "CalibreRate";               ///< double, of CalibreFactor, 1/s
 constexpr const char* TrackingConfidence = "TrackingConfidence"; ///< double, 0 to 1
 constexpr const char* TrackingStatus = "TrackingStatus";         ///< int, coronary::TrackingStatus
 // Tracked lines, field data.

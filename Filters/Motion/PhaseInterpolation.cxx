@@ -1,10 +1,11 @@
 #include "PhaseInterpolation.h"
 
+#include "Dual.h"
 #include "HarmonicFit.h"
+#include "PeriodicSpline.h"
 #include "Require.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -31,32 +32,6 @@ double Apart(double a, double b)
   return std::min(gap, 1.0 - gap);
 }
 
-/// Second derivatives at the knots of the periodic cubic spline, as a matrix that is applied to the
-/// values there.
-MatrixXd SecondDerivatives(const std::vector<double>& knots)
-{
-  const auto count = static_cast<Index>(knots.size());
-  MatrixXd left = MatrixXd::Zero(count, count);
-  MatrixXd right = MatrixXd::Zero(count, count);
-  for (Index k = 0; k < count; ++k)
-  {
-    const Index before = (k + count - 1) % count;
-    const Index after = (k + 1) % count;
-    double h0 = knots[k] - knots[before];
-    double h1 = knots[after] - knots[k];
-    h0 += h0 <= 0.0 ? 1.0 : 0.0;
-    h1 += h1 <= 0.0 ? 1.0 : 0.0;
-    // += : with two knots the one before is the one after.
-    left(k, before) += h0;
-    left(k, k) += 2.0 * (h0 + h1);
-    left(k, after) += h1;
-    right(k, before) += 6.0 / h0;
-    right(k, k) -= 6.0 / h0 + 6.0 / h1;
-    right(k, after) += 6.0 / h1;
-  }
-  return left.partialPivLu().solve(right);
-}
-
 Vector3 Logarithm(Quaternion rotation)
 {
   if (rotation.w() < 0.0)
@@ -71,31 +46,27 @@ Vector3 Logarithm(Quaternion rotation)
   return 2.0 * std::atan2(sine, rotation.w()) / sine * rotation.vec();
 }
 
-Quaternion Exponential(const Vector3& vector)
+template <typename Scalar>
+Eigen::Quaternion<Scalar> Exponential(const Eigen::Matrix<Scalar, 3, 1>& vector)
 {
-  const double angle = vector.norm();
-  const double share = angle < 1e-9 ? 0.5 : std::sin(0.5 * angle) / angle;
-  Quaternion rotation;
-  rotation.w() = std::cos(0.5 * angle);
+  using std::cos;
+  using std::sin;
+  const Scalar angle = vector.norm();
+  const Scalar share = angle < 1e-9 ? Scalar(0.5) : sin(Scalar(0.5) * angle) / angle;
+  Eigen::Quaternion<Scalar> rotation;
+  rotation.w() = cos(Scalar(0.5) * angle);
   rotation.vec() = share * vector;
   return rotation;
 }
 
-/// Weights of four rows: the values at two knots, and the second derivatives there.
-struct CubicWeights
+/// Of mean Exponential(tangent), about axes of the world.
+Vector3 AngularVelocity(const Quaternion& mean, const Vector3& tangent, const Vector3& rate)
 {
-  double value[4];
-  double rate[4];
-};
-
-CubicWeights CubicAt(double share, double gap)
-{
-  const double a = 1.0 - share;
-  const double b = share;
-  const double h = gap * gap / 6.0;
-  CubicWeights weights = { { a, b, (a * a * a - a) * h, (b * b * b - b) * h },
-    { -1.0 / gap, 1.0 / gap, -(3.0 * a * a - 1.0) * gap / 6.0, (3.0 * b * b - 1.0) * gap / 6.0 } };
-  return weights;
+  const Eigen::Quaternion<Dual> turning = Exponential<Dual>(
+    { Dual(tangent.x(), rate.x()), Dual(tangent.y(), rate.y()), Dual(tangent.z(), rate.z()) });
+  const Quaternion now(turning.w().value, turning.x().value, turning.y().value, turning.z().value);
+  const Quaternion change(turning.w().rate, turning.x().rate, turning.y().rate, turning.z().rate);
+  return mean * Vector3(2.0 * (change * now.conjugate()).vec());
 }
 }
 
@@ -401,24 +372,6 @@ void PhaseInterpolation::MergeRotations(const PoseSequence& sequence)
   }
 }
 
-void PhaseInterpolation::Bracket(
-  double time, std::size_t& before, std::size_t& after, double& share) const
-{
-  Require(std::isfinite(time), "The time must be finite");
-  const double phase = Modulo(time);
-  const std::size_t count = this->Knots_.size();
-  after =
-    static_cast<std::size_t>(
-      std::upper_bound(this->Knots_.begin(), this->Knots_.end(), phase) - this->Knots_.begin()) %
-    count;
-  before = (after + count - 1) % count;
-  double gap = this->Knots_[after] - this->Knots_[before];
-  gap += gap <= 0.0 ? 1.0 : 0.0;
-  double since = phase - this->Knots_[before];
-  since += since < 0.0 ? 1.0 : 0.0;
-  share = since / gap;
-}
-
 std::size_t PhaseInterpolation::NearestPhase(double time) const
 {
   const double phase = Modulo(time);
@@ -435,21 +388,18 @@ std::size_t PhaseInterpolation::NearestPhase(double time) const
 
 void PhaseInterpolation::Evaluate(double time, InterpolatedPose& pose) const
 {
-  std::size_t before = 0;
-  std::size_t after = 0;
-  double share = 0.0;
-  this->Bracket(time, before, after, share);
-  double gap = this->Knots_[after] - this->Knots_[before];
-  gap += gap <= 0.0 ? 1.0 : 0.0;
-  const auto a = static_cast<Index>(before);
-  const auto b = static_cast<Index>(after);
+  Require(std::isfinite(time), "The time must be finite");
+  const KnotInterval interval = IntervalAt(this->Knots_, time);
+  const double share = interval.share;
+  const auto a = static_cast<Index>(interval.before);
+  const auto b = static_cast<Index>(interval.after);
   const bool linear = this->Settings.mode == PhaseInterpolationMode::Linear;
   const bool cubic = this->Settings.mode == PhaseInterpolationMode::PeriodicCubic;
-  const CubicWeights weights = CubicAt(share, gap);
+  const CubicWeights weights = CubicAt(interval);
   const VectorXd harmonics = linear || cubic ? VectorXd() : Harmonics(time, this->Fit_.order);
   const VectorXd rates = linear || cubic ? VectorXd() : HarmonicRates(time, this->Fit_.order);
 
-  // Columns first .. first + count of what is interpolated, into `value` and `rate` (may be null).
+  // Columns first .. first + count of what is interpolated, into `value` and its derivative into `rate`.
   const auto blend =
     [&](const Rows& values, const Rows& more, Index first, Index count, double* value, double* rate)
   {
@@ -459,10 +409,7 @@ void PhaseInterpolation::Evaluate(double time, InterpolatedPose& pose) const
     if (linear)
     {
       v = (1.0 - share) * va + share * vb;
-      if (rate)
-      {
-        Eigen::Map<Eigen::RowVectorXd>(rate, count) = (vb - va) / gap;
-      }
+      Eigen::Map<Eigen::RowVectorXd>(rate, count) = (vb - va) / interval.gap;
       return;
     }
     if (cubic)
@@ -471,11 +418,8 @@ void PhaseInterpolation::Evaluate(double time, InterpolatedPose& pose) const
       const auto mb = more.row(b).segment(first, count);
       v = weights.value[0] * va + weights.value[1] * vb + weights.value[2] * ma +
         weights.value[3] * mb;
-      if (rate)
-      {
-        Eigen::Map<Eigen::RowVectorXd>(rate, count) =
-          weights.rate[0] * va + weights.rate[1] * vb + weights.rate[2] * ma + weights.rate[3] * mb;
-      }
+      Eigen::Map<Eigen::RowVectorXd>(rate, count) =
+        weights.rate[0] * va + weights.rate[1] * vb + weights.rate[2] * ma + weights.rate[3] * mb;
       return;
     }
     v = more.row(0).segment(first, count);
@@ -483,14 +427,11 @@ void PhaseInterpolation::Evaluate(double time, InterpolatedPose& pose) const
     {
       v += harmonics[m] * more.row(m).segment(first, count);
     }
-    if (rate)
+    Eigen::Map<Eigen::RowVectorXd> r(rate, count);
+    r.setZero();
+    for (Index m = 1; m < more.rows(); ++m)
     {
-      Eigen::Map<Eigen::RowVectorXd> r(rate, count);
-      r.setZero();
-      for (Index m = 1; m < more.rows(); ++m)
-      {
-        r += rates[m] * more.row(m).segment(first, count);
-      }
+      r += rates[m] * more.row(m).segment(first, count);
     }
   };
 
@@ -511,13 +452,15 @@ void PhaseInterpolation::Evaluate(double time, InterpolatedPose& pose) const
       (1.0 - share) * this->Confidence.row(a) + share * this->Confidence.row(b);
   }
   pose.calibre.resize(static_cast<std::size_t>(this->LogCalibre.cols()));
+  pose.calibreRate.resize(pose.calibre.size());
   if (!pose.calibre.empty())
   {
     blend(this->LogCalibre, this->LogCalibreMore, 0, this->LogCalibre.cols(), pose.calibre.data(),
-      nullptr);
-    for (double& factor : pose.calibre)
+      pose.calibreRate.data());
+    for (std::size_t n = 0; n < pose.calibre.size(); ++n)
     {
-      factor = std::exp(factor);
+      pose.calibre[n] = std::exp(pose.calibre[n]);
+      pose.calibreRate[n] *= pose.calibre[n];
     }
   }
   if (this->Status.empty())
@@ -526,24 +469,30 @@ void PhaseInterpolation::Evaluate(double time, InterpolatedPose& pose) const
   }
   else
   {
-    pose.status = this->Status[share < 0.5 ? before : after];
+    pose.status = this->Status[share < 0.5 ? interval.before : interval.after];
   }
   const Index bones = this->Tangents.cols() / 3;
   pose.rotation.resize(static_cast<std::size_t>(bones));
+  pose.angularVelocity.resize(pose.rotation.size());
   for (Index bone = 0; bone < bones; ++bone)
   {
     const Quaternion& mean = this->MeanRotation[bone];
     if (linear)
     {
-      const Quaternion first = mean * Exponential(this->Tangents.row(a).segment<3>(3 * bone));
-      const Quaternion second = mean * Exponential(this->Tangents.row(b).segment<3>(3 * bone));
+      const Quaternion first =
+        mean * Exponential<double>(this->Tangents.row(a).segment<3>(3 * bone).transpose());
+      const Quaternion second =
+        mean * Exponential<double>(this->Tangents.row(b).segment<3>(3 * bone).transpose());
       pose.rotation[bone] = first.slerp(share, second);
+      pose.angularVelocity[bone] = Logarithm(second * first.conjugate()) / interval.gap;
     }
     else
     {
       Vector3 tangent;
-      blend(this->Tangents, this->TangentsMore, 3 * bone, 3, tangent.data(), nullptr);
+      Vector3 rate;
+      blend(this->Tangents, this->TangentsMore, 3 * bone, 3, tangent.data(), rate.data());
       pose.rotation[bone] = mean * Exponential(tangent);
+      pose.angularVelocity[bone] = AngularVelocity(mean, tangent, rate);
     }
   }
 }

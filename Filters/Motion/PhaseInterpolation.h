@@ -46,7 +46,9 @@ struct InterpolatedPose
   std::vector<double> confidence;           ///< linear in time
   std::vector<TrackingStatus> status;       ///< of the nearest phase
   std::vector<double> calibre;              ///< factor of the radius; its logarithm is interpolated
+  std::vector<double> calibreRate;          ///< per cycle
   std::vector<Eigen::Quaterniond> rotation; ///< unit
+  std::vector<Vector3> angularVelocity;     ///< radians per cycle, about axes of the world
 };
 
 /// What a LowNoise fit is made of.
@@ -89,9 +91,6 @@ public:
 
   /// Of the mode LowNoise.
   const LowNoiseFit& Fit() const { return this->Fit_; }
-
-  /// Knots before and after a moment, and where between them it is, 0 to 1.
-  void Bracket(double time, std::size_t& before, std::size_t& after, double& share) const;
 
   /// The index in the sequence of the phase that is nearest to a moment modulo one cycle.
   std::size_t NearestPhase(double time) const;

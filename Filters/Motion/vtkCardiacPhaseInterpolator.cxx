@@ -51,8 +51,12 @@ struct vtkCardiacPhaseInterpolator::Internals
   coronary::InterpolatedPose Shape;
 
   void Build(vtkCardiacPhaseInterpolator* self);
-  void WriteSections(vtkCardiacPhaseInterpolator* self, double time, vtkPointSet* output);
-  void WriteOthers(vtkCardiacPhaseInterpolator* self, double time, vtkPointSet* output);
+  /// @param cycle  seconds
+  void WriteSections(
+    vtkCardiacPhaseInterpolator* self, double time, double cycle, vtkPointSet* output);
+  void WriteOthers(
+    vtkCardiacPhaseInterpolator* self, double time, double cycle, vtkPointSet* output);
+  void WriteTwistRate(std::size_t before, std::size_t after, double seconds, vtkPointSet* output);
 };
 
 namespace
@@ -232,7 +236,7 @@ void vtkCardiacPhaseInterpolator::Internals::Build(vtkCardiacPhaseInterpolator* 
 }
 
 void vtkCardiacPhaseInterpolator::Internals::WriteSections(
-  vtkCardiacPhaseInterpolator* self, double time, vtkPointSet* output)
+  vtkCardiacPhaseInterpolator* self, double time, double cycle, vtkPointSet* output)
 {
   const std::size_t count = this->Pose.points.size();
   vtkPointData* pointData = output->GetPointData();
@@ -256,8 +260,9 @@ void vtkCardiacPhaseInterpolator::Internals::WriteSections(
   }
   for (std::size_t n = 0; n < count && (this->HasCalibre || ellipses); ++n)
   {
+    const double reference = this->ReferenceCalibre.empty() ? 1.0 : this->ReferenceCalibre[n];
     double factor = this->HasCalibre ? this->Pose.calibre[n] : 1.0;
-    factor /= this->ReferenceCalibre.empty() ? 1.0 : this->ReferenceCalibre[n];
+    factor /= reference;
     const double ratio = this->Axes
       ? std::min(1.0, std::exp(this->Shape.points[n].y() - this->Shape.points[n].x()))
       : evenRatio;
@@ -267,6 +272,9 @@ void vtkCardiacPhaseInterpolator::Internals::WriteSections(
     if (this->HasCalibre)
     {
       this->Pose.calibre[n] = std::sqrt(1.0 + section.areaStrain);
+      // At its limit a cross-section stands still.
+      this->Pose.calibreRate[n] =
+        section.clamped ? 0.0 : this->Pose.calibreRate[n] / (reference * cycle);
       strain[n] = section.areaStrain;
     }
     if (ellipses)
@@ -282,6 +290,7 @@ void vtkCardiacPhaseInterpolator::Internals::WriteSections(
   if (this->HasCalibre)
   {
     vtkCoronary::AddArray<vtkDoubleArray>(pointData, names::CalibreFactor, this->Pose.calibre);
+    vtkCoronary::AddArray<vtkDoubleArray>(pointData, names::CalibreRate, this->Pose.calibreRate);
     vtkCoronary::AddArray<vtkDoubleArray>(pointData, names::AreaStrain, strain);
   }
   if (radius)
@@ -298,7 +307,7 @@ void vtkCardiacPhaseInterpolator::Internals::WriteSections(
 }
 
 void vtkCardiacPhaseInterpolator::Internals::WriteOthers(
-  vtkCardiacPhaseInterpolator* self, double time, vtkPointSet* output)
+  vtkCardiacPhaseInterpolator* self, double time, double cycle, vtkPointSet* output)
 {
   const vtkPoseSequences::Sequence& data = this->Reader.Current();
   // The steps around the moment, modulo one cycle.
@@ -323,9 +332,8 @@ void vtkCardiacPhaseInterpolator::Internals::WriteOthers(
     }
     const std::string name = array.steps.front()->GetName();
     const bool written = !array.cell &&
-      (name == names::Velocity || name == names::AreaStrain ||
-        (name == this->RadiusName && this->HasCalibre) || name == names::EllipseMajor ||
-        name == names::EllipseMinor);
+      (name == names::AreaStrain || (name == this->RadiusName && this->HasCalibre) ||
+        name == names::EllipseMajor || name == names::EllipseMinor);
     if (written)
     {
       continue;
@@ -353,6 +361,34 @@ void vtkCardiacPhaseInterpolator::Internals::WriteOthers(
     }
     attributes->AddArray(result);
   }
+  this->WriteTwistRate(before, after, gap * cycle, output);
+}
+
+/// Twist is interpolated linearly, as all that is not the interpolation's own.
+void vtkCardiacPhaseInterpolator::Internals::WriteTwistRate(
+  std::size_t before, std::size_t after, double seconds, vtkPointSet* output)
+{
+  vtkDataArray* twist = output->GetCellData()->GetArray(names::BoneTwist);
+  if (!twist)
+  {
+    return;
+  }
+  std::vector<double> rates(static_cast<std::size_t>(twist->GetNumberOfTuples()), 0.0);
+  for (const VaryingArray& array : this->Reader.Current().varying)
+  {
+    if (array.cell && seconds > 0.0 &&
+      array.steps.front()->GetName() == std::string(names::BoneTwist))
+    {
+      auto* a = vtkDataArray::SafeDownCast(array.steps[before]);
+      auto* b = vtkDataArray::SafeDownCast(array.steps[after]);
+      for (std::size_t n = 0; n < rates.size(); ++n)
+      {
+        const auto bone = static_cast<vtkIdType>(n);
+        rates[n] = (b->GetComponent(bone, 0) - a->GetComponent(bone, 0)) / seconds;
+      }
+    }
+  }
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetCellData(), names::BoneTwistRate, rates);
 }
 
 vtkCardiacPhaseInterpolator::vtkCardiacPhaseInterpolator()
@@ -514,34 +550,22 @@ int vtkCardiacPhaseInterpolator::RequestData(
 
     vtkPoseSequences::Moment moment;
     moment.time = time;
+    moment.cycle = data.cycleLength > 0.0 ? data.cycleLength : this->CycleLength;
     moment.points = &pose.points;
+    moment.velocity = &pose.velocity;
+    moment.angularVelocity = pose.angularVelocity.empty() ? nullptr : &pose.angularVelocity;
     moment.confidence = pose.confidence.empty() ? nullptr : &pose.confidence;
     moment.status = pose.status.empty() ? nullptr : &pose.status;
     moment.rotation = pose.rotation.empty() ? nullptr : &pose.rotation;
     vtkPoseSequences::Write(data.first, moment, output);
-    this->Data->WriteOthers(this, phase, output);
-    this->Data->WriteSections(this, phase, output);
-
-    const double cycle = data.cycleLength > 0.0 ? data.cycleLength : this->CycleLength;
-    vtkNew<vtkDoubleArray> velocity;
-    velocity->SetName(names::Velocity);
-    velocity->SetNumberOfComponents(3);
-    velocity->SetNumberOfTuples(static_cast<vtkIdType>(pose.velocity.size()));
-    double* value = velocity->GetPointer(0);
-    for (const coronary::Vector3& perCycle : pose.velocity)
-    {
-      for (int axis = 0; axis < 3; ++axis)
-      {
-        *value++ = perCycle[axis] / cycle;
-      }
-    }
-    output->GetPointData()->AddArray(velocity);
+    this->Data->WriteOthers(this, phase, moment.cycle, output);
+    this->Data->WriteSections(this, phase, moment.cycle, output);
 
     vtkFieldData* fields = output->GetFieldData();
     const auto add = [fields](const char* name, const std::vector<double>& values)
     { vtkCoronary::AddArray<vtkDoubleArray>(fields, name, values); };
     add(names::PhaseTime, { time });
-    add(names::CycleLength, { cycle });
+    add(names::CycleLength, { moment.cycle });
     add(names::Repeatability, { this->Data->Motion->Repeatability() });
     if (this->Mode == LowNoise)
     {

@@ -21,9 +21,11 @@
  * @par Output port:
  * - 0: the input's type, cells and arrays, with the points of the moment. Point data: `Velocity`
  *   (double[3], mm/s, derivative of what is interpolated); `TrackingConfidence` and `TrackingStatus` where the
- *   input has them; where the calibre changes `CalibreFactor` (double, after the limit), `AreaStrain` (double,
- *   eps_r) and the radius (type as in the input, mm); with Ellipses, or where the input has them, `EllipseMajor` and
- *   `EllipseMinor` (double, mm). Cell data: `BoneRotation` where the input has it. Other arrays that
+ *   input has them; where the calibre changes `CalibreFactor` (double, after the limit), `CalibreRate` (double, 1/s, 0 at
+ *   the limit), `AreaStrain` (double, eps_r) and the radius (type as in the input, mm); with Ellipses, or where the input has them, `EllipseMajor` and
+ *   `EllipseMinor` (double, mm). Cell data: `BoneRotation` (double[4], w x y z), `BoneAngularVelocity`
+ *   (double[3], radians/s about axes of the world) where the input has rotations, `BoneTwistRate` (double, radians/s)
+ *   where it has twists. Other arrays that
  *   change with time are interpolated linearly when they hold floating-point numbers, else they are those of
  *   the nearest phase. Field data: `PhaseTime` (double, the time), `CycleLength` (double, s), `ClampedSections`
  *   (vtkIdType, points where eps_r was limited), `Repeatability` (double, mm, root mean square distance

@@ -146,9 +146,10 @@ void FindVarying(const std::vector<vtkSmartPointer<vtkPointSet>>& steps, bool ce
   {
     vtkAbstractArray* first = attributes(0)->GetAbstractArray(n);
     const std::string name = first->GetName() ? first->GetName() : "";
-    const bool ofPose = cell ? name == names::BoneRotation
+    const bool ofPose = cell ? name == names::BoneRotation || name == names::BoneAngularVelocity ||
+        name == names::BoneTwistRate
                              : name == names::TrackingConfidence || name == names::TrackingStatus ||
-        name == names::CalibreFactor;
+        name == names::CalibreFactor || name == names::CalibreRate || name == names::Velocity;
     if (name.empty() || ofPose)
     {
       continue;
@@ -354,6 +355,33 @@ const Sequence& Reader::Read(
   return this->Data;
 }
 
+namespace
+{
+/// Vectors by the second, or none.
+void SetRates(
+  vtkFieldData* data, const char* name, const std::vector<Vector3>* perCycle, double cycle)
+{
+  data->RemoveArray(name);
+  if (!perCycle)
+  {
+    return;
+  }
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name);
+  array->SetNumberOfComponents(3);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(perCycle->size()));
+  double* value = array->GetPointer(0);
+  for (const Vector3& rate : *perCycle)
+  {
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      *value++ = rate[axis] / cycle;
+    }
+  }
+  data->AddArray(array);
+}
+}
+
 Moment MomentOf(const coronary::PoseSequence& sequence, std::size_t k)
 {
   Moment moment;
@@ -412,6 +440,19 @@ void Write(vtkPointSet* like, const Moment& moment, vtkPointSet* output)
       array->SetTuple4(static_cast<vtkIdType>(n), q.w(), q.x(), q.y(), q.z());
     }
     output->GetCellData()->AddArray(array);
+  }
+  SetRates(output->GetPointData(), names::Velocity, moment.velocity, moment.cycle);
+  SetRates(output->GetCellData(), names::BoneAngularVelocity, moment.angularVelocity, moment.cycle);
+  output->GetCellData()->RemoveArray(names::BoneTwistRate);
+  output->GetPointData()->RemoveArray(names::CalibreRate);
+  if (moment.calibreRate)
+  {
+    std::vector<double> rates = *moment.calibreRate;
+    for (double& rate : rates)
+    {
+      rate /= moment.cycle;
+    }
+    vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::CalibreRate, rates);
   }
   output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), moment.time);
 }

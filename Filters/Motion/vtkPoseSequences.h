@@ -84,15 +84,19 @@ private:
 /// The time steps that a connection offers.
 std::vector<double> StepsOf(vtkInformation* info);
 
-/// One moment. Whatever is empty is not written.
+/// One moment. Whatever is empty is not written, and derivatives are removed: those of `like` are of other points.
 struct Moment
 {
-  double time = 0.0; ///< fraction of the R-R interval
+  double time = 0.0;  ///< fraction of the R-R interval
+  double cycle = 1.0; ///< seconds: derivatives are by the fraction, and written by the second
   const std::vector<coronary::Vector3>* points = nullptr;
   const std::vector<double>* confidence = nullptr;
   const std::vector<coronary::TrackingStatus>* status = nullptr;
   const std::vector<double>* calibre = nullptr;
   const std::vector<Eigen::Quaterniond>* rotation = nullptr;
+  const std::vector<coronary::Vector3>* velocity = nullptr;
+  const std::vector<double>* calibreRate = nullptr;
+  const std::vector<coronary::Vector3>* angularVelocity = nullptr;
 };
 
 /// Phase `k` of a sequence; the sequence has to live longer.

@@ -31,9 +31,61 @@ void RequireNumber(std::size_t is, std::size_t wanted, const char* what, const c
 /// Two joints nearer than this share of the rest length are one.
 constexpr double LeastStretch = 1e-9;
 
-Vector3 Beside(const Vector3& vector, const Vector3& axis)
+template <typename Scalar>
+using Vector = Eigen::Matrix<Scalar, 3, 1>;
+
+template <typename Scalar>
+Vector<Scalar> Beside(const Vector<Scalar>& vector, const Vector<Scalar>& axis)
 {
   return vector - vector.dot(axis) * axis;
+}
+
+bool IsFinite(double value)
+{
+  return std::isfinite(value);
+}
+
+bool IsFinite(const Dual& value)
+{
+  return isfinite(value);
+}
+
+template <typename Scalar>
+bool IsFinite(const Vector<Scalar>& vector)
+{
+  return IsFinite(vector.x()) && IsFinite(vector.y()) && IsFinite(vector.z());
+}
+
+/// As LeastRotation.
+template <typename Scalar>
+Eigen::Quaternion<Scalar> Carry(const Vector<Scalar>& from, const Vector<Scalar>& to)
+{
+  const Vector<Scalar> a = from.normalized();
+  const Vector<Scalar> b = to.normalized();
+  const Vector<Scalar> sum = a + b;
+  const Scalar length = sum.norm();
+  if (length > 1e-12)
+  {
+    // Half way between the two lies half the rotation.
+    const Vector<Scalar> half = sum / length;
+    const Vector<Scalar> axis = a.cross(half);
+    return Eigen::Quaternion<Scalar>(a.dot(half), axis.x(), axis.y(), axis.z()).normalized();
+  }
+  const Vector<Scalar> axis = a.unitOrthogonal();
+  return { Scalar(0.0), axis.x(), axis.y(), axis.z() };
+}
+
+/// The rotation vector of the way from one rotation to another, the shorter one.
+Vector3 RotationVector(const Quaternion& from, const Quaternion& to)
+{
+  const Eigen::AngleAxisd way(to.normalized() * from.normalized().conjugate());
+  return way.angle() * way.axis();
+}
+
+template <typename Part>
+void RequireSameParts(const Part& now, const Part& other)
+{
+  Require(now.size() == other.size(), "Poses of one motion have different parts");
 }
 
 /// Mm along the skeleton at rest from a joint to all others, infinite where there is no way.
@@ -71,19 +123,85 @@ std::vector<double> DistancesAlong(const SkeletonRig& rig, std::int64_t joint)
 
 Quaternion LeastRotation(const Vector3& from, const Vector3& to)
 {
-  const Vector3 a = from.normalized();
-  const Vector3 b = to.normalized();
-  const Vector3 sum = a + b;
-  const double length = sum.norm();
-  if (length > 1e-12)
+  return Carry<double>(from, to);
+}
+
+Eigen::Matrix<Dual, 3, 1> Moving(const Vector3& place, const Vector3& velocity)
+{
+  return { Dual(place.x(), velocity.x()), Dual(place.y(), velocity.y()),
+    Dual(place.z(), velocity.z()) };
+}
+
+Eigen::Quaternion<Dual> Turning(const Quaternion& rotation, const Vector3& angularVelocity)
+{
+  const Vector3 half = 0.5 * angularVelocity;
+  const Quaternion rate = Quaternion(0.0, half.x(), half.y(), half.z()) * rotation;
+  return { Dual(rotation.w(), rate.w()), Dual(rotation.x(), rate.x()), Dual(rotation.y(), rate.y()),
+    Dual(rotation.z(), rate.z()) };
+}
+
+void PoseNow(const MovingSkeletonPose& moving, SkeletonPose& pose)
+{
+  pose.joints.resize(moving.joints.size());
+  for (std::size_t j = 0; j < moving.joints.size(); ++j)
   {
-    // Half way between the two lies half the rotation.
-    const Vector3 half = sum / length;
-    const Vector3 axis = a.cross(half);
-    return Quaternion(a.dot(half), axis.x(), axis.y(), axis.z()).normalized();
+    const Vector<Dual>& joint = moving.joints[j];
+    pose.joints[j] = Vector3(joint.x().value, joint.y().value, joint.z().value);
   }
-  const Vector3 axis = a.unitOrthogonal();
-  return { 0.0, axis.x(), axis.y(), axis.z() };
+  pose.rotation.resize(moving.rotation.size());
+  for (std::size_t b = 0; b < moving.rotation.size(); ++b)
+  {
+    const Eigen::Quaternion<Dual>& q = moving.rotation[b];
+    pose.rotation[b] = Quaternion(q.w().value, q.x().value, q.y().value, q.z().value);
+  }
+  const auto valueOf = [](const Dual& number) { return number.value; };
+  pose.twist.resize(moving.twist.size());
+  std::transform(moving.twist.begin(), moving.twist.end(), pose.twist.begin(), valueOf);
+  pose.calibre.resize(moving.calibre.size());
+  std::transform(moving.calibre.begin(), moving.calibre.end(), pose.calibre.begin(), valueOf);
+}
+
+MovingSkeletonPose Differentiate(
+  const SkeletonPose& now, const std::vector<NeighbourPose>& neighbours)
+{
+  std::vector<Vector3> velocity(now.joints.size(), Vector3::Zero());
+  std::vector<Vector3> angular(now.rotation.size(), Vector3::Zero());
+  MovingSkeletonPose moving;
+  moving.twist.assign(now.twist.begin(), now.twist.end());
+  moving.calibre.assign(now.calibre.begin(), now.calibre.end());
+  for (const NeighbourPose& neighbour : neighbours)
+  {
+    const SkeletonPose& other = *neighbour.pose;
+    RequireSameParts(now.joints, other.joints);
+    RequireSameParts(now.rotation, other.rotation);
+    RequireSameParts(now.twist, other.twist);
+    RequireSameParts(now.calibre, other.calibre);
+    for (std::size_t j = 0; j < now.joints.size(); ++j)
+    {
+      velocity[j] += neighbour.weight * (other.joints[j] - now.joints[j]);
+    }
+    for (std::size_t b = 0; b < now.rotation.size(); ++b)
+    {
+      angular[b] += neighbour.weight * RotationVector(now.rotation[b], other.rotation[b]);
+    }
+    for (std::size_t b = 0; b < now.twist.size(); ++b)
+    {
+      moving.twist[b].rate += neighbour.weight * (other.twist[b] - now.twist[b]);
+    }
+    for (std::size_t j = 0; j < now.calibre.size(); ++j)
+    {
+      moving.calibre[j].rate += neighbour.weight * (other.calibre[j] - now.calibre[j]);
+    }
+  }
+  for (std::size_t j = 0; j < now.joints.size(); ++j)
+  {
+    moving.joints.push_back(Moving(now.joints[j], velocity[j]));
+  }
+  for (std::size_t b = 0; b < now.rotation.size(); ++b)
+  {
+    moving.rotation.push_back(Turning(now.rotation[b], angular[b]));
+  }
+  return moving;
 }
 
 SkeletonRig::SkeletonRig(const Skeleton& rest)
@@ -158,7 +276,7 @@ SkeletonRig::SkeletonRig(const Skeleton& rest)
       {
         const std::int64_t joint = rest.bones[bone].second;
         const Vector3 arm = rest.joints[joint] - head;
-        const Vector3 beside = Beside(arm, axis);
+        const Vector3 beside = Beside<double>(arm, axis);
         reach = std::max(reach, arm.norm());
         root.joints.push_back(joint);
         root.beside.push_back(beside);
@@ -200,8 +318,15 @@ SkeletonPose SkeletonRig::RestPose() const
   return pose;
 }
 
-void SkeletonRig::Transform(const SkeletonPose& pose, std::vector<BoneTransform>& transforms) const
+template <typename Scalar>
+void SkeletonRig::TransformOf(
+  const BasicSkeletonPose<Scalar>& pose, std::vector<BasicBoneTransform<Scalar>>& transforms) const
 {
+  using std::atan2;
+  using Rotation = Eigen::Quaternion<Scalar>;
+  using Turn = Eigen::AngleAxis<Scalar>;
+  const auto direction = [this](std::int64_t bone) -> Vector<Scalar>
+  { return this->Axes[bone].template cast<Scalar>(); };
   const std::size_t joints = this->Heads.size();
   const std::size_t bones = this->Axes.size();
   RequireNumber(pose.joints.size(), joints, "joints", "joints");
@@ -222,11 +347,11 @@ void SkeletonRig::Transform(const SkeletonPose& pose, std::vector<BoneTransform>
   }
   for (std::size_t j = 0; j < joints; ++j)
   {
-    if (!pose.joints[j].allFinite())
+    if (!IsFinite(pose.joints[j]))
     {
       Refuse("Joint", j, "has a coordinate that is not finite");
     }
-    if (calibrated && !(pose.calibre[j] > 0.0 && std::isfinite(pose.calibre[j])))
+    if (calibrated && !(pose.calibre[j] > 0.0 && IsFinite(pose.calibre[j])))
     {
       Refuse("Joint", j, "has a calibre factor that is not positive");
     }
@@ -237,28 +362,28 @@ void SkeletonRig::Transform(const SkeletonPose& pose, std::vector<BoneTransform>
   {
     const auto number = static_cast<std::size_t>(b);
     const Skeleton::Bone& bone = this->Skeleton_.bones[b];
-    BoneTransform& transform = transforms[b];
+    BasicBoneTransform<Scalar>& transform = transforms[b];
     transform.posedHead = pose.joints[bone.first];
-    const Vector3 along = pose.joints[bone.second] - transform.posedHead;
+    const Vector<Scalar> along = pose.joints[bone.second] - transform.posedHead;
     transform.stretch = along.norm() / this->Lengths[b];
-    if (!(transform.stretch > LeastStretch && std::isfinite(transform.stretch)))
+    if (!(transform.stretch > LeastStretch && IsFinite(transform.stretch)))
     {
       Refuse("Bone", number, "has no length: its joints are at the same place");
     }
-    transform.twist = twisted ? pose.twist[b] : 0.0;
-    if (!std::isfinite(transform.twist))
+    transform.twist = twisted ? pose.twist[b] : Scalar(0.0);
+    if (!IsFinite(transform.twist))
     {
       Refuse("Bone", number, "has a twist that is not finite");
     }
-    transform.calibreFirst = calibrated ? pose.calibre[bone.first] : 1.0;
-    transform.calibreSecond = calibrated ? pose.calibre[bone.second] : 1.0;
+    transform.calibreFirst = calibrated ? pose.calibre[bone.first] : Scalar(1.0);
+    transform.calibreSecond = calibrated ? pose.calibre[bone.second] : Scalar(1.0);
     const std::int64_t parent = this->Parents[b];
-    Quaternion before = Quaternion::Identity();
+    Rotation before = Rotation::Identity();
     if (rotated)
     {
       before = pose.rotation[b];
-      const double norm = before.norm();
-      if (!(norm > 1e-6 && std::isfinite(norm)))
+      const Scalar norm = before.norm();
+      if (!(norm > 1e-6 && IsFinite(norm)))
       {
         Refuse("Bone", number, "has a rotation that is zero or not finite");
       }
@@ -271,36 +396,49 @@ void SkeletonRig::Transform(const SkeletonPose& pose, std::vector<BoneTransform>
       const bool hangs = this->Skeleton_.bones[parent].second == bone.first;
       if (hangs && transforms[parent].twist != 0.0)
       {
-        before =
-          before * Quaternion(Eigen::AngleAxisd(transforms[parent].twist, this->Axes[parent]));
+        before = before * Rotation(Turn(transforms[parent].twist, direction(parent)));
       }
     }
-    transform.rotation = (LeastRotation(before * this->Axes[b], along) * before).normalized();
+    transform.rotation = (Carry<Scalar>(before * direction(b), along) * before).normalized();
     if (parent < 0)
     {
       const Root& root = this->Roots[nextRoot++];
       if (!rotated && !root.joints.empty())
       {
-        const Vector3 axis = along.normalized();
-        double sine = 0.0;
-        double cosine = 0.0;
+        const Vector<Scalar> axis = along.normalized();
+        Scalar sine = 0.0;
+        Scalar cosine = 0.0;
         for (std::size_t n = 0; n < root.joints.size(); ++n)
         {
-          const Vector3 is = Beside(pose.joints[root.joints[n]] - transform.posedHead, axis);
-          const Vector3 was = transform.rotation * root.beside[n];
+          const Vector<Scalar> is =
+            Beside<Scalar>(pose.joints[root.joints[n]] - transform.posedHead, axis);
+          const Vector<Scalar> was =
+            transform.rotation * Vector<Scalar>(root.beside[n].template cast<Scalar>());
           sine += axis.dot(was.cross(is));
           cosine += was.dot(is);
         }
         transform.rotation =
-          (Quaternion(Eigen::AngleAxisd(std::atan2(sine, cosine), axis)) * transform.rotation)
-            .normalized();
+          (Rotation(Turn(atan2(sine, cosine), axis)) * transform.rotation).normalized();
       }
     }
   }
 }
 
-void SkeletonRig::ConserveVolume(double share, std::vector<BoneTransform>& transforms) const
+void SkeletonRig::Transform(const SkeletonPose& pose, std::vector<BoneTransform>& transforms) const
 {
+  this->TransformOf(pose, transforms);
+}
+
+void SkeletonRig::Transform(
+  const MovingSkeletonPose& pose, std::vector<MovingBoneTransform>& transforms) const
+{
+  this->TransformOf(pose, transforms);
+}
+
+template <typename Scalar>
+void SkeletonRig::Conserve(double share, std::vector<BasicBoneTransform<Scalar>>& transforms) const
+{
+  using std::pow;
   Require(share >= 0.0 && share <= 1.0, "The share of the volume that is kept must be 0 to 1");
   RequireNumber(transforms.size(), this->Axes.size(), "bones", "bones");
   if (share == 0.0)
@@ -309,13 +447,13 @@ void SkeletonRig::ConserveVolume(double share, std::vector<BoneTransform>& trans
   }
   for (std::size_t j = 0; j < this->Heads.size(); ++j)
   {
-    double sum = 0.0;
+    Scalar sum = 0.0;
     double weight = 0.0;
     for (const auto* list : { &this->Heads[j], &this->Tails[j] })
     {
       for (const std::int64_t b : *list)
       {
-        sum += this->Lengths[b] * std::pow(transforms[b].stretch, -0.5 * share);
+        sum += this->Lengths[b] * pow(transforms[b].stretch, -0.5 * share);
         weight += this->Lengths[b];
       }
     }
@@ -328,6 +466,16 @@ void SkeletonRig::ConserveVolume(double share, std::vector<BoneTransform>& trans
       transforms[b].calibreSecond *= sum / weight;
     }
   }
+}
+
+void SkeletonRig::ConserveVolume(double share, std::vector<BoneTransform>& transforms) const
+{
+  this->Conserve(share, transforms);
+}
+
+void SkeletonRig::ConserveVolume(double share, std::vector<MovingBoneTransform>& transforms) const
+{
+  this->Conserve(share, transforms);
 }
 
 void ApplyPoseEdit(const SkeletonRig& rig, const PoseEdit& edit, SkeletonPose& pose)

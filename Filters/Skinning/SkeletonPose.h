@@ -9,6 +9,7 @@
 #define DynamicCoronary_SkeletonPose_h
 
 #include "CenterlineSkeleton.h"
+#include "Dual.h"
 #include "Geometry.h"
 
 #include <vector>
@@ -18,31 +19,67 @@ namespace coronary
 using Quaternion = Eigen::Quaterniond;
 
 /// Where the joints of a skeleton are. Whatever is optional may be empty.
-struct SkeletonPose
+template <typename Scalar>
+struct BasicSkeletonPose
 {
-  std::vector<Vector3> joints; ///< mm, as many as the rest skeleton has
+  std::vector<Eigen::Matrix<Scalar, 3, 1>> joints; ///< mm, as many as the rest skeleton has
   /// Optional, per bone: its rotation from rest at its first joint. What is missing to carry the bone's
   /// rest direction to the posed one is added by the least rotation. Without: least twist.
-  std::vector<Quaternion> rotation;
+  std::vector<Eigen::Quaternion<Scalar>> rotation;
   /// Optional, per bone: radians by which its second end is turned about the bone against its first
   /// one, evenly along the bone. Without rotations, what hangs on the bone is turned with it.
-  std::vector<double> twist;
-  std::vector<double> calibre; ///< optional, per joint: factor of the cross-section's radius, > 0
+  std::vector<Scalar> twist;
+  std::vector<Scalar> calibre; ///< optional, per joint: factor of the cross-section's radius, > 0
 };
+
+using SkeletonPose = BasicSkeletonPose<double>;
+
+/// A pose and how it changes: every number has its derivative by time, per second.
+using MovingSkeletonPose = BasicSkeletonPose<Dual>;
+
+/// A place that moves. @param velocity  mm per unit of time
+Eigen::Matrix<Dual, 3, 1> Moving(const Vector3& place, const Vector3& velocity);
+
+/// A rotation that goes on turning. @param angularVelocity  radians per unit of time, about axes of the world
+Eigen::Quaternion<Dual> Turning(const Quaternion& rotation, const Vector3& angularVelocity);
+
+/// What a moving pose is at the moment. Allocates nothing once `pose` has been used before.
+void PoseNow(const MovingSkeletonPose& moving, SkeletonPose& pose);
+
+/// A pose of the same motion at another time, and what it counts for.
+struct NeighbourPose
+{
+  const SkeletonPose* pose;
+  double weight; ///< 1/s
+};
+
+/**
+ * The derivative of a motion out of poses at other times: sum of weight (pose - now) over the neighbours; of
+ * rotations that of the rotation vectors from now to them.
+ * @throws std::invalid_argument: a neighbour has other parts than `now`
+ */
+MovingSkeletonPose Differentiate(
+  const SkeletonPose& now, const std::vector<NeighbourPose>& neighbours);
 
 /// What happens to a bone. A point p whose coordinate along the bone is x = d.(p - head), and t = x/L
 /// limited to 0 .. 1, goes to
 ///     posedHead + R [ (x + (stretch - 1) L t) d + c(t) Turn(d, twist t) (p - head - x d) ]
 /// with d, L the rest direction and length, R the rotation, c from calibreFirst to calibreSecond.
-struct BoneTransform
+template <typename Scalar>
+struct BasicBoneTransform
 {
-  Quaternion rotation = Quaternion::Identity(); ///< carries the rest direction to the posed one
-  Vector3 posedHead = Vector3::Zero();          ///< posed first joint, mm
-  double stretch = 1.0;                         ///< posed length / rest length, > 0
-  double twist = 0.0;                           ///< radians
-  double calibreFirst = 1.0;                    ///< > 0
-  double calibreSecond = 1.0;                   ///< > 0
+  /// Carries the rest direction to the posed one.
+  Eigen::Quaternion<Scalar> rotation = Eigen::Quaternion<Scalar>::Identity();
+  /// Posed first joint, mm.
+  Eigen::Matrix<Scalar, 3, 1> posedHead = Eigen::Matrix<Scalar, 3, 1>::Zero();
+  Scalar stretch = 1.0;       ///< posed length / rest length, > 0
+  Scalar twist = 0.0;         ///< radians
+  Scalar calibreFirst = 1.0;  ///< > 0
+  Scalar calibreSecond = 1.0; ///< > 0
 };
+
+using BoneTransform = BasicBoneTransform<double>;
+using MovingBoneTransform = BasicBoneTransform<Dual>; ///< with derivatives, per second
 
 /// The rotation by the least angle that carries `from` to `to` (any lengths but 0). Opposite
 /// directions: half a turn about an axis that depends on `from` only.
@@ -80,22 +117,36 @@ public:
   /// The rest pose: all optional parts are there.
   SkeletonPose RestPose() const;
 
+  ///@{
   /**
-   * Allocates nothing once `transforms` has been used before.
+   * Allocates nothing once `transforms` has been used before. Values of moving bones agree with those of
+   * the pose to rounding.
    * @throws std::invalid_argument: a wrong number of joints, rotations, twists or calibre factors; a
    * value that is not finite; a rotation that is zero; a factor that is not positive; a bone without
    * length.
    */
   void Transform(const SkeletonPose& pose, std::vector<BoneTransform>& transforms) const;
+  void Transform(
+    const MovingSkeletonPose& pose, std::vector<MovingBoneTransform>& transforms) const;
+  ///@}
 
+  ///@{
   /**
    * Cross-sections that answer to the stretch: the calibre factors at a joint are multiplied by the
    * mean of stretch^(-share/2) over its bones, weighted by their lengths. Share 1 keeps the volume.
    * @param share  0 (nothing) to 1
    */
   void ConserveVolume(double share, std::vector<BoneTransform>& transforms) const;
+  void ConserveVolume(double share, std::vector<MovingBoneTransform>& transforms) const;
+  ///@}
 
 private:
+  template <typename Scalar>
+  void TransformOf(const BasicSkeletonPose<Scalar>& pose,
+    std::vector<BasicBoneTransform<Scalar>>& transforms) const;
+  template <typename Scalar>
+  void Conserve(double share, std::vector<BasicBoneTransform<Scalar>>& transforms) const;
+
   struct Root
   {
     std::int64_t bone;

@@ -16,6 +16,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 namespace coronary
 {
@@ -52,27 +53,46 @@ struct LineAllocator
 
 using Floats = std::vector<float, LineAllocator<float>>;
 
-using Affine = Eigen::Matrix<double, 3, 4>;
+template <typename Scalar>
+using Vector = Eigen::Matrix<Scalar, 3, 1>;
 
-/// A bone's motion in double precision.
+template <typename Scalar>
+using Matrix = Eigen::Matrix<Scalar, 3, 3>;
+
+/// A bone's motion in double precision, or with its derivative.
+template <typename Scalar>
 struct Motion
 {
-  Matrix3 rotation;
-  Vector3 translation; ///< rotation and translation carry the bone's rest head to the posed one
-  Quaternion real;
-  Quaternion dual;
-  double stretch = 1.0; ///< 1 when bones are rigid
-  double twist = 0.0;
-  double calibreFirst = 1.0;
-  double calibreSecond = 1.0;
+  Vector<Scalar> posedHead;
+  Matrix<Scalar> rotation;
+  Vector<Scalar>
+    translation; ///< rotation and translation carry the bone's rest head to the posed one
+  Eigen::Quaternion<Scalar> real;
+  Eigen::Quaternion<Scalar> dual;
+  Scalar stretch = 1.0; ///< 1 when bones are rigid
+  Scalar twist = 0.0;
+  Scalar calibreFirst = 1.0;
+  Scalar calibreSecond = 1.0;
 };
 
 /// Everything but the rotation and translation, around one place of the bone at rest.
+template <typename Scalar>
 struct Local
 {
-  Vector3 point;
-  Matrix3 gradient; ///< with calibre and twist as they are at the place
+  Vector<Scalar> point;
+  Matrix3 gradient; ///< with calibre and twist as they are at the place; of positions only
 };
+
+/// Whether gradients are computed beside the places: they keep positions what they always were to the bit.
+template <typename Scalar>
+constexpr bool HasGradient = std::is_same_v<Scalar, double>;
+
+Matrix3 CrossOf(const Vector3& axis)
+{
+  Matrix3 cross;
+  cross << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
+  return cross;
+}
 
 template <typename Real>
 Vector3 PointAt(const Real* values, std::int64_t index)
@@ -193,10 +213,17 @@ struct SkinDeformation::Internals
   SkinBlocks Blocks{};
 
   // Of the frame.
+  double VolumeConservation = 0.0;
+  SkeletonPose Now;
   std::vector<BoneTransform> Transforms;
-  std::vector<Motion> Motions;
+  std::vector<MovingBoneTransform> MovingTransforms;
+  std::vector<Motion<double>> Motions;
+  std::vector<Motion<Dual>> MovingMotions;
   std::vector<SkinBone, LineAllocator<SkinBone>> Bones;
+  std::vector<MovingSkinBone, LineAllocator<MovingSkinBone>> MovingBones;
   bool Sections = false;
+  std::array<float, 3> FloatCentre{}; ///< of the posed bones
+  Vector3 PosedCentre = Vector3::Zero();
 
   std::vector<Triangle> Triangles;
   Rows TrianglesOf;
@@ -216,18 +243,33 @@ struct SkinDeformation::Internals
     const WorkParts parts(progress, { 0.35, 0.65 });
     this->ReadWeights(weights, parts(0));
     this->MakeBlocks(parts(1));
-    this->Transforms.resize(this->Rig.NumberOfBones());
-    this->Motions.resize(this->Rig.NumberOfBones());
-    this->Bones.resize(this->Rig.NumberOfBones());
   }
 
   void ReadWeights(const CompactSkinWeights& weights, const ProgressCallback& progress);
   void MakeBlocks(const ProgressCallback& progress);
-  void SetFrame(const std::vector<BoneTransform>& bones);
-  void SetFloatFrame(const Vector3& posedCentre);
-  Local LocalAt(std::int64_t bone, const Vector3& point) const;
-  Affine AffineAt(std::int64_t point) const;
-  Vector3 Deformed(std::int64_t point) const;
+  template <typename Scalar>
+  void SetPose(const BasicSkeletonPose<Scalar>& pose,
+    std::vector<BasicBoneTransform<Scalar>>& bones, std::vector<Motion<Scalar>>& motions);
+  void SetPose(const MovingSkeletonPose& pose);
+  template <typename Scalar>
+  void SetMotions(
+    const std::vector<BasicBoneTransform<Scalar>>& bones, std::vector<Motion<Scalar>>& motions);
+  /// @param store  called with a number of the bone and what it is
+  template <typename Scalar, typename Number, typename Store>
+  void SetBone(std::size_t number, const Motion<Scalar>& motion, const Store& store,
+    BasicSkinBone<Number>& bone) const;
+  void SetCentre();
+  template <typename Scalar>
+  Local<Scalar> LocalAt(
+    std::int64_t bone, const Motion<Scalar>& motion, const Vector3& point) const;
+  template <typename Scalar>
+  Vector<Scalar> PlaceOf(const std::vector<Motion<Scalar>>& motions, std::int64_t point) const;
+  Vector3 Deformed(std::int64_t point) const { return this->PlaceOf(this->Motions, point); }
+
+  void Deform(float* positions, const ProgressCallback& progress);
+  void Deform(double* positions, const ProgressCallback& progress);
+  void Deform(float* positions, float* velocities, const ProgressCallback& progress);
+  void Deform(double* positions, double* velocities, const ProgressCallback& progress);
 
   template <typename Real>
   void DisplacementsOf(
@@ -394,25 +436,48 @@ void SkinDeformation::Internals::MakeBlocks(const ProgressCallback& progress)
     count };
 }
 
-void SkinDeformation::Internals::SetFrame(const std::vector<BoneTransform>& bones)
+template <typename Scalar>
+void SkinDeformation::Internals::SetPose(const BasicSkeletonPose<Scalar>& pose,
+  std::vector<BasicBoneTransform<Scalar>>& bones, std::vector<Motion<Scalar>>& motions)
 {
-  if (bones.size() != this->Motions.size())
+  this->Rig.Transform(pose, bones);
+  this->Rig.ConserveVolume(this->VolumeConservation, bones);
+  this->SetMotions(bones, motions);
+}
+
+void SkinDeformation::Internals::SetPose(const MovingSkeletonPose& pose)
+{
+  PoseNow(pose, this->Now);
+  this->SetPose(this->Now, this->Transforms, this->Motions);
+  // The last one: what is 0 and changes is a section, too.
+  this->SetPose(pose, this->MovingTransforms, this->MovingMotions);
+}
+
+template <typename Scalar>
+void SkinDeformation::Internals::SetMotions(
+  const std::vector<BasicBoneTransform<Scalar>>& bones, std::vector<Motion<Scalar>>& motions)
+{
+  if (static_cast<std::int64_t>(bones.size()) != this->Rig.NumberOfBones())
   {
     throw std::invalid_argument("There are " + std::to_string(bones.size()) +
-      " moved bones, the rest skeleton has " + std::to_string(this->Motions.size()));
+      " moved bones, the rest skeleton has " + std::to_string(this->Rig.NumberOfBones()));
   }
+  motions.resize(bones.size());
   this->Sections = false;
   for (std::size_t b = 0; b < bones.size(); ++b)
   {
-    const BoneTransform& bone = bones[b];
-    Motion& motion = this->Motions[b];
+    const BasicBoneTransform<Scalar>& bone = bones[b];
+    Motion<Scalar>& motion = motions[b];
+    const Vector<Scalar> head =
+      this->Rig.Head(static_cast<std::int64_t>(b)).template cast<Scalar>();
+    motion.posedHead = bone.posedHead;
     motion.rotation = bone.rotation.toRotationMatrix();
-    motion.translation =
-      bone.posedHead - motion.rotation * this->Rig.Head(static_cast<std::int64_t>(b));
+    motion.translation = bone.posedHead - motion.rotation * head;
     motion.real = bone.rotation;
-    const Vector3 half = 0.5 * motion.translation;
-    motion.dual = Quaternion(0.0, half.x(), half.y(), half.z()) * motion.real;
-    motion.stretch = this->Settings.stretch ? bone.stretch : 1.0;
+    const Vector<Scalar> half = Scalar(0.5) * motion.translation;
+    motion.dual =
+      Eigen::Quaternion<Scalar>(Scalar(0.0), half.x(), half.y(), half.z()) * motion.real;
+    motion.stretch = this->Settings.stretch ? bone.stretch : Scalar(1.0);
     motion.twist = bone.twist;
     motion.calibreFirst = bone.calibreFirst;
     motion.calibreSecond = bone.calibreSecond;
@@ -421,142 +486,179 @@ void SkinDeformation::Internals::SetFrame(const std::vector<BoneTransform>& bone
   }
 }
 
-void SkinDeformation::Internals::SetFloatFrame(const Vector3& posedCentre)
+template <typename Scalar, typename Number, typename Store>
+void SkinDeformation::Internals::SetBone(std::size_t number, const Motion<Scalar>& motion,
+  const Store& store, BasicSkinBone<Number>& bone) const
 {
-  const auto storeAffine = [](float* to, const Matrix3& linear, const Vector3& shift)
+  const auto storeAffine = [&store](
+                             auto* to, const Matrix<Scalar>& linear, const Vector<Scalar>& shift)
   {
     for (int row = 0; row < 3; ++row)
     {
       for (int column = 0; column < 3; ++column)
       {
-        to[4 * row + column] = static_cast<float>(linear(row, column));
+        store(to[4 * row + column], linear(row, column));
       }
-      to[4 * row + 3] = static_cast<float>(shift[row]);
+      store(to[4 * row + 3], shift[row]);
     }
   };
+  const auto b = static_cast<std::int64_t>(number);
   const bool dual = this->Settings.blend == SkinBlend::DualQuaternion;
-  for (std::size_t b = 0; b < this->Motions.size(); ++b)
+  const Vector3& axis = this->Rig.Direction(b);
+  const Vector3 restHead = this->Rig.Head(b) - this->Centre;
+  const double length = this->Rig.Length(b);
+  const Vector<Scalar> direction = axis.cast<Scalar>();
+  const Vector<Scalar> head = restHead.cast<Scalar>();
+  const Vector<Scalar> centre = this->Centre.cast<Scalar>();
+  const Vector<Scalar> posed = this->PosedCentre.cast<Scalar>();
+  // From the middle of the mesh at rest to the middle of the posed skeleton.
+  const Vector<Scalar> shift = motion.translation + motion.rotation * centre - posed;
+  const Vector<Scalar> stretch = (motion.stretch - 1.0) * length * direction;
+  const Matrix3 restBeside = Matrix3::Identity() - axis * axis.transpose();
+  const Matrix<Scalar> beside = restBeside.cast<Scalar>();
+  const Matrix<Scalar> cross = CrossOf(axis).template cast<Scalar>();
+  if (dual)
   {
-    const auto number = static_cast<std::int64_t>(b);
-    const Motion& motion = this->Motions[b];
-    SkinBone& bone = this->Bones[b];
-    const Vector3& axis = this->Rig.Direction(number);
-    const Vector3 head = this->Rig.Head(number) - this->Centre;
-    const double length = this->Rig.Length(number);
-    // From the middle of the mesh at rest to the middle of the posed skeleton.
-    const Vector3 shift = motion.translation + motion.rotation * this->Centre - posedCentre;
-    const Vector3 stretch = (motion.stretch - 1.0) * length * axis;
-    const Matrix3 beside = Matrix3::Identity() - axis * axis.transpose();
-    Matrix3 cross;
-    cross << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
-    if (dual)
+    const Vector<Scalar> half = Scalar(0.5) * shift;
+    const Eigen::Quaternion<Scalar> second =
+      Eigen::Quaternion<Scalar>(Scalar(0.0), half.x(), half.y(), half.z()) * motion.real;
+    const Scalar values[8] = { motion.real.w(), motion.real.x(), motion.real.y(), motion.real.z(),
+      second.w(), second.x(), second.y(), second.z() };
+    for (int n = 0; n < 8; ++n)
     {
-      const Vector3 half = 0.5 * shift;
-      const Quaternion second = Quaternion(0.0, half.x(), half.y(), half.z()) * motion.real;
-      const double values[8] = { motion.real.w(), motion.real.x(), motion.real.y(), motion.real.z(),
-        second.w(), second.x(), second.y(), second.z() };
-      std::transform(std::begin(values), std::end(values), std::begin(bone.rigid),
-        [](double value) { return static_cast<float>(value); });
+      store(bone.rigid[n], values[n]);
     }
-    else
-    {
-      storeAffine(bone.rigid, motion.rotation, shift);
-    }
-    const Matrix3 to = dual ? Matrix3(Matrix3::Identity()) : motion.rotation;
-    const Vector3 posedStretch = to * stretch;
-    for (int c = 0; c < 3; ++c)
-    {
-      bone.stretch[c] = static_cast<float>(posedStretch[c]);
-      bone.along[c] = static_cast<float>(axis[c] / length);
-    }
-    bone.stretch[3] = 0.0F;
-    bone.along[3] = static_cast<float>(-axis.dot(head) / length);
-    storeAffine(bone.section, to * beside, -(to * beside * head));
-    storeAffine(bone.turned, to * cross, -(to * cross * head));
-    bone.calibre[0] = static_cast<float>(motion.calibreFirst);
-    bone.calibre[1] = static_cast<float>(motion.calibreSecond - motion.calibreFirst);
-    bone.twist = static_cast<float>(motion.twist);
-    bone.unused = 0.0F;
   }
+  else
+  {
+    storeAffine(bone.rigid, motion.rotation, shift);
+  }
+  const Matrix<Scalar> to = dual ? Matrix<Scalar>(Matrix<Scalar>::Identity()) : motion.rotation;
+  const Vector<Scalar> posedStretch = to * stretch;
+  for (int c = 0; c < 3; ++c)
+  {
+    store(bone.stretch[c], posedStretch[c]);
+    bone.along[c] = static_cast<float>(axis[c] / length);
+  }
+  bone.along[3] = static_cast<float>(-axis.dot(restHead) / length);
+  storeAffine(bone.section, to * beside, -(to * beside * head));
+  storeAffine(bone.turned, to * cross, -(to * cross * head));
+  store(bone.calibre[0], motion.calibreFirst);
+  store(bone.calibre[1], motion.calibreSecond - motion.calibreFirst);
+  store(bone.twist, motion.twist);
 }
 
-Local SkinDeformation::Internals::LocalAt(std::int64_t bone, const Vector3& point) const
+/// Near to where the mesh will be: single precision is best around it.
+void SkinDeformation::Internals::SetCentre()
 {
-  const Motion& motion = this->Motions[bone];
+  Vector3 centre = Vector3::Zero();
+  for (const Motion<double>& motion : this->Motions)
+  {
+    centre += motion.posedHead / static_cast<double>(this->Motions.size());
+  }
+  this->FloatCentre = { static_cast<float>(centre.x()), static_cast<float>(centre.y()),
+    static_cast<float>(centre.z()) };
+  this->PosedCentre = Vector3(static_cast<double>(this->FloatCentre[0]),
+    static_cast<double>(this->FloatCentre[1]), static_cast<double>(this->FloatCentre[2]));
+}
+
+template <typename Scalar>
+Local<Scalar> SkinDeformation::Internals::LocalAt(
+  std::int64_t bone, const Motion<Scalar>& motion, const Vector3& point) const
+{
+  using std::cos;
+  using std::sin;
   const Vector3& axis = this->Rig.Direction(bone);
   const double length = this->Rig.Length(bone);
   const Vector3 arm = point - this->Rig.Head(bone);
   const double x = axis.dot(arm);
   const double t = std::clamp(x / length, 0.0, 1.0);
   const Vector3 beside = arm - x * axis;
-  Local local{ point + (motion.stretch - 1.0) * length * t * axis, Matrix3::Identity() };
-  if (x > 0.0 && x < length)
+  const Vector<Scalar> direction = axis.cast<Scalar>();
+  Local<Scalar> local{ point.cast<Scalar>() + (motion.stretch - 1.0) * length * t * direction,
+    Matrix3::Identity() };
+  if constexpr (HasGradient<Scalar>)
   {
-    local.gradient += (motion.stretch - 1.0) * axis * axis.transpose();
+    if (x > 0.0 && x < length)
+    {
+      local.gradient += (motion.stretch - 1.0) * axis * axis.transpose();
+    }
   }
   if (this->Sections)
   {
-    const double calibre = motion.calibreFirst + (motion.calibreSecond - motion.calibreFirst) * t;
-    const double along = calibre * std::cos(motion.twist * t) - 1.0;
-    const double across = calibre * std::sin(motion.twist * t);
-    local.point += along * beside + across * axis.cross(beside);
-    Matrix3 cross;
-    cross << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
-    local.gradient += along * (Matrix3::Identity() - axis * axis.transpose()) + across * cross;
+    const Scalar calibre = motion.calibreFirst + (motion.calibreSecond - motion.calibreFirst) * t;
+    const Scalar along = calibre * cos(motion.twist * t) - 1.0;
+    const Scalar across = calibre * sin(motion.twist * t);
+    const Vector3 aside = axis.cross(beside);
+    local.point += along * beside.cast<Scalar>() + across * aside.cast<Scalar>();
+    if constexpr (HasGradient<Scalar>)
+    {
+      local.gradient +=
+        along * (Matrix3::Identity() - axis * axis.transpose()) + across * CrossOf(axis);
+    }
   }
   return local;
 }
 
-Affine SkinDeformation::Internals::AffineAt(std::int64_t point) const
+template <typename Scalar>
+Vector<Scalar> SkinDeformation::Internals::PlaceOf(
+  const std::vector<Motion<Scalar>>& motions, std::int64_t point) const
 {
   const Vector3& rest = this->Points[point];
   const std::int64_t first = this->Offset[point];
   const std::int64_t last = this->Offset[point + 1];
   Matrix3 linear = Matrix3::Zero();
-  Vector3 place = Vector3::Zero();
+  Vector<Scalar> place = Vector<Scalar>::Zero();
   if (this->Settings.blend == SkinBlend::Linear)
   {
     for (std::int64_t n = first; n < last; ++n)
     {
-      const Motion& motion = this->Motions[this->Bone[n]];
-      const Local local = this->LocalAt(this->Bone[n], rest);
-      linear += this->Weight[n] * motion.rotation * local.gradient;
-      place += this->Weight[n] * (motion.rotation * local.point + motion.translation);
+      const Motion<Scalar>& motion = motions[this->Bone[n]];
+      const Local<Scalar> local = this->LocalAt(this->Bone[n], motion, rest);
+      if constexpr (HasGradient<Scalar>)
+      {
+        linear += this->Weight[n] * motion.rotation * local.gradient;
+      }
+      place += Scalar(this->Weight[n]) * (motion.rotation * local.point + motion.translation);
     }
   }
   else
   {
-    const Quaternion& pivot = this->Motions[this->Bone[first]].real;
-    Eigen::Vector4d real = Eigen::Vector4d::Zero(); // x y z w
-    Eigen::Vector4d dual = Eigen::Vector4d::Zero();
+    using Coefficients = Eigen::Matrix<Scalar, 4, 1>;
+    const Eigen::Quaternion<Scalar>& pivot = motions[this->Bone[first]].real;
+    Coefficients real = Coefficients::Zero(); // x y z w
+    Coefficients dual = Coefficients::Zero();
     for (std::int64_t n = first; n < last; ++n)
     {
-      const Motion& motion = this->Motions[this->Bone[n]];
-      const Local local = this->LocalAt(this->Bone[n], rest);
-      linear += this->Weight[n] * local.gradient;
-      place += this->Weight[n] * local.point;
-      const double weight = motion.real.dot(pivot) < 0.0 ? -this->Weight[n] : this->Weight[n];
+      const Motion<Scalar>& motion = motions[this->Bone[n]];
+      const Local<Scalar> local = this->LocalAt(this->Bone[n], motion, rest);
+      if constexpr (HasGradient<Scalar>)
+      {
+        linear += this->Weight[n] * local.gradient;
+      }
+      place += Scalar(this->Weight[n]) * local.point;
+      const Scalar weight = motion.real.dot(pivot) < 0.0 ? -this->Weight[n] : this->Weight[n];
       real += weight * motion.real.coeffs();
       dual += weight * motion.dual.coeffs();
     }
-    const double norm = real.norm();
-    const Quaternion turn(Eigen::Vector4d(real / norm));
+    const Scalar norm = real.norm();
+    const Eigen::Quaternion<Scalar> turn(Coefficients(real / norm));
     // The translation is what a motion does to the origin.
-    const Quaternion shift = Quaternion(Eigen::Vector4d(dual / norm)) * turn.conjugate();
-    const Matrix3 rotation = turn.toRotationMatrix();
-    linear = rotation * linear;
-    place = rotation * place + 2.0 * shift.vec();
+    const Eigen::Quaternion<Scalar> shift =
+      Eigen::Quaternion<Scalar>(Coefficients(dual / norm)) * turn.conjugate();
+    const Matrix<Scalar> rotation = turn.toRotationMatrix();
+    if constexpr (HasGradient<Scalar>)
+    {
+      linear = rotation * linear;
+    }
+    place = rotation * place + Scalar(2.0) * shift.vec();
   }
-  Affine affine;
-  affine.leftCols<3>() = linear;
-  affine.col(3) = place - linear * rest;
-  return affine;
-}
-
-Vector3 SkinDeformation::Internals::Deformed(std::int64_t point) const
-{
-  const Affine affine = this->AffineAt(point);
-  return affine.leftCols<3>() * this->Points[point] + affine.col(3);
+  if constexpr (HasGradient<Scalar>)
+  {
+    const Vector3 constant = place - linear * rest;
+    return linear * rest + constant;
+  }
+  return place;
 }
 
 template <typename Real>
@@ -800,55 +902,124 @@ std::int64_t SkinDeformation::NumberOfPoints() const
   return static_cast<std::int64_t>(this->Data->Points.size());
 }
 
+void SkinDeformation::SetVolumeConservation(double share)
+{
+  Require(share >= 0.0 && share <= 1.0, "The share of the volume that is kept must be 0 to 1");
+  this->Data->VolumeConservation = share;
+}
+
+const std::vector<BoneTransform>& SkinDeformation::Bones() const
+{
+  return this->Data->Transforms;
+}
+
+void SkinDeformation::Internals::Deform(float* positions, const ProgressCallback& progress)
+{
+  this->SetCentre();
+  this->Bones.resize(this->Motions.size());
+  const auto store = [](float& to, double value) { to = static_cast<float>(value); };
+  for (std::size_t b = 0; b < this->Motions.size(); ++b)
+  {
+    this->SetBone(b, this->Motions[b], store, this->Bones[b]);
+  }
+  const bool dual = this->Settings.blend == SkinBlend::DualQuaternion;
+  const SkinPositions kernel = Selected().load()->positions[dual ? 1 : 0][this->Sections ? 1 : 0];
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  { kernel(this->Blocks, this->Bones.data(), this->FloatCentre.data(), first, last, positions); };
+  For(static_cast<std::int64_t>(this->BlockOffset.size()) - 1, BlockGrain, body, progress);
+}
+
+void SkinDeformation::Internals::Deform(
+  float* positions, float* velocities, const ProgressCallback& progress)
+{
+  this->SetCentre();
+  this->MovingBones.resize(this->Motions.size());
+  const auto storeValue = [](MovingFloat& to, double value)
+  { to.value = static_cast<float>(value); };
+  const auto storeRate = [](MovingFloat& to, const Dual& value)
+  { to.rate = static_cast<float>(value.rate); };
+  for (std::size_t b = 0; b < this->Motions.size(); ++b)
+  {
+    this->SetBone(b, this->Motions[b], storeValue, this->MovingBones[b]);
+    this->SetBone(b, this->MovingMotions[b], storeRate, this->MovingBones[b]);
+  }
+  const bool dual = this->Settings.blend == SkinBlend::DualQuaternion;
+  const SkinMotion kernel = Selected().load()->motion[dual ? 1 : 0][this->Sections ? 1 : 0];
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  {
+    kernel(this->Blocks, this->MovingBones.data(), this->FloatCentre.data(), first, last, positions,
+      velocities);
+  };
+  For(static_cast<std::int64_t>(this->BlockOffset.size()) - 1, BlockGrain, body, progress);
+}
+
+void SkinDeformation::Internals::Deform(double* positions, const ProgressCallback& progress)
+{
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t i = first; i < last; ++i)
+    {
+      StorePoint(positions, i, this->Deformed(i));
+    }
+  };
+  For(static_cast<std::int64_t>(this->Points.size()), PointGrain, body, progress);
+}
+
+void SkinDeformation::Internals::Deform(
+  double* positions, double* velocities, const ProgressCallback& progress)
+{
+  const auto body = [&](std::int64_t first, std::int64_t last)
+  {
+    for (std::int64_t i = first; i < last; ++i)
+    {
+      StorePoint(positions, i, this->Deformed(i));
+      const Vector<Dual> place = this->PlaceOf(this->MovingMotions, i);
+      StorePoint(velocities, i, Vector3(place.x().rate, place.y().rate, place.z().rate));
+    }
+  };
+  For(static_cast<std::int64_t>(this->Points.size()), PointGrain, body, progress);
+}
+
 void SkinDeformation::Deform(
   const std::vector<BoneTransform>& bones, float* positions, const ProgressCallback& progress)
 {
-  Internals& data = *this->Data;
-  data.SetFrame(bones);
-  // Near to where the mesh will be: single precision is best around it.
-  Vector3 posedCentre = Vector3::Zero();
-  for (const BoneTransform& bone : bones)
-  {
-    posedCentre += bone.posedHead / static_cast<double>(bones.size());
-  }
-  const float centre[3] = { static_cast<float>(posedCentre.x()),
-    static_cast<float>(posedCentre.y()), static_cast<float>(posedCentre.z()) };
-  data.SetFloatFrame(Vector3(static_cast<double>(centre[0]), static_cast<double>(centre[1]),
-    static_cast<double>(centre[2])));
-  const SkinKernels& kernels = SkinKernelChoice().Get();
-  const bool dual = data.Settings.blend == SkinBlend::DualQuaternion;
-  const auto kernel = data.Sections ? (dual ? kernels.dualSections : kernels.linearSections)
-                                    : (dual ? kernels.dual : kernels.linear);
-  const auto body = [&](std::int64_t first, std::int64_t last)
-  { kernel(data.Blocks, data.Bones.data(), centre, first, last, positions); };
-  For(static_cast<std::int64_t>(data.BlockOffset.size()) - 1, BlockGrain, body, progress);
+  this->Data->SetMotions(bones, this->Data->Motions);
+  this->Data->Deform(positions, progress);
 }
 
 void SkinDeformation::Deform(
   const std::vector<BoneTransform>& bones, double* positions, const ProgressCallback& progress)
 {
-  Internals& data = *this->Data;
-  data.SetFrame(bones);
-  const auto body = [&](std::int64_t first, std::int64_t last)
-  {
-    for (std::int64_t i = first; i < last; ++i)
-    {
-      StorePoint(positions, i, data.Deformed(i));
-    }
-  };
-  For(static_cast<std::int64_t>(data.Points.size()), PointGrain, body, progress);
+  this->Data->SetMotions(bones, this->Data->Motions);
+  this->Data->Deform(positions, progress);
 }
 
-void SkinDeformation::Deform(const SkeletonPose& pose, float* positions)
+void SkinDeformation::Deform(
+  const SkeletonPose& pose, float* positions, const ProgressCallback& progress)
 {
-  this->Data->Rig.Transform(pose, this->Data->Transforms);
-  this->Deform(this->Data->Transforms, positions);
+  this->Data->SetPose(pose, this->Data->Transforms, this->Data->Motions);
+  this->Data->Deform(positions, progress);
 }
 
-void SkinDeformation::Deform(const SkeletonPose& pose, double* positions)
+void SkinDeformation::Deform(
+  const SkeletonPose& pose, double* positions, const ProgressCallback& progress)
 {
-  this->Data->Rig.Transform(pose, this->Data->Transforms);
-  this->Deform(this->Data->Transforms, positions);
+  this->Data->SetPose(pose, this->Data->Transforms, this->Data->Motions);
+  this->Data->Deform(positions, progress);
+}
+
+void SkinDeformation::Deform(const MovingSkeletonPose& pose, float* positions, float* velocities,
+  const ProgressCallback& progress)
+{
+  this->Data->SetPose(pose);
+  this->Data->Deform(positions, velocities, progress);
+}
+
+void SkinDeformation::Deform(const MovingSkeletonPose& pose, double* positions, double* velocities,
+  const ProgressCallback& progress)
+{
+  this->Data->SetPose(pose);
+  this->Data->Deform(positions, velocities, progress);
 }
 
 void SkinDeformation::Displacements(
@@ -947,36 +1118,5 @@ double SkinDeformation::EntriesPerBlock() const
   return blocks == 0
     ? 0.0
     : static_cast<double>(this->Data->BlockBone.size()) / static_cast<double>(blocks);
-}
-
-namespace
-{
-template <typename Real>
-void Velocities(const Real* now, const Real* before, double seconds, std::int64_t values,
-  Real* velocities, const ProgressCallback& progress)
-{
-  Require(std::isfinite(seconds) && seconds != 0.0, "The time between two poses must not be 0");
-  const Real factor = static_cast<Real>(1.0 / seconds);
-  const auto body = [&](std::int64_t first, std::int64_t last)
-  {
-    for (std::int64_t n = first; n < last; ++n)
-    {
-      velocities[n] = (now[n] - before[n]) * factor;
-    }
-  };
-  For(values, 3 * PointGrain, body, progress);
-}
-}
-
-void SkinVelocities(const float* now, const float* before, double seconds, std::int64_t values,
-  float* velocities, const ProgressCallback& progress)
-{
-  Velocities(now, before, seconds, values, velocities, progress);
-}
-
-void SkinVelocities(const double* now, const double* before, double seconds, std::int64_t values,
-  double* velocities, const ProgressCallback& progress)
-{
-  Velocities(now, before, seconds, values, velocities, progress);
 }
 }

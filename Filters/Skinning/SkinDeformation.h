@@ -73,6 +73,10 @@ public:
   const SkeletonRig& Rig() const;
   std::int64_t NumberOfPoints() const;
 
+  /// How much cross-sections answer to the stretch of the bones of a pose: SkeletonRig::ConserveVolume. At
+  /// first 0, not at all. @throws std::invalid_argument  it is not 0 to 1
+  void SetVolumeConservation(double share);
+
   ///@{
   /**
    * Positions of all points, x y z after each other, in the order given, mm. Single precision is the fast
@@ -85,9 +89,24 @@ public:
     const ProgressCallback& progress = {});
   void Deform(const std::vector<BoneTransform>& bones, double* positions,
     const ProgressCallback& progress = {});
-  void Deform(const SkeletonPose& pose, float* positions);
-  void Deform(const SkeletonPose& pose, double* positions);
+  void Deform(const SkeletonPose& pose, float* positions, const ProgressCallback& progress = {});
+  void Deform(const SkeletonPose& pose, double* positions, const ProgressCallback& progress = {});
   ///@}
+
+  ///@{
+  /**
+   * Positions to the bit as those of the pose that it is at the moment, and in the same pass the velocities of
+   * all points, mm/s: the exact derivatives of their positions by time.
+   * @throws std::invalid_argument  as SkeletonRig::Transform
+   */
+  void Deform(const MovingSkeletonPose& pose, float* positions, float* velocities,
+    const ProgressCallback& progress = {});
+  void Deform(const MovingSkeletonPose& pose, double* positions, double* velocities,
+    const ProgressCallback& progress = {});
+  ///@}
+
+  /// Of the last pose.
+  const std::vector<BoneTransform>& Bones() const;
 
   ///@{
   /// positions - rest positions, mm.
@@ -145,13 +164,6 @@ private:
   struct Internals;
   std::unique_ptr<Internals> Data;
 };
-
-/// (now - before) / seconds for `values` values, mm/s. @throws std::invalid_argument: seconds are 0 or not
-/// finite
-void SkinVelocities(const float* now, const float* before, double seconds, std::int64_t values,
-  float* velocities, const ProgressCallback& progress = {});
-void SkinVelocities(const double* now, const double* before, double seconds, std::int64_t values,
-  double* velocities, const ProgressCallback& progress = {});
 }
 
 #endif

@@ -22,14 +22,114 @@ constexpr int Packs = SkinLanes / PackLanes;
 using Pack [[gnu::vector_size(PackBytes), gnu::may_alias]] = float;
 using IntPack [[gnu::vector_size(PackBytes)]] = std::int32_t;
 
+INLINE Pack Constant(float value)
+{
+  return value - Pack{}; // the compiler knows that this is the value; of + it does not
+}
+
+INLINE const Pack& Constant(const Pack& value)
+{
+  return value;
+}
+
+/// a b + c, rounded once where the processor can. The compiler does not do that by itself: which of the products of a
+/// sum it takes would depend on what else is computed.
+template <typename A, typename B, typename C>
+INLINE Pack MultiplyAdd(const A& a, const B& b, const C& c)
+{
+  const Pack x = Constant(a);
+  const Pack y = Constant(b);
+  const Pack z = Constant(c);
+#if defined(__AVX512F__)
+  return __builtin_ia32_vfmaddps512_mask(x, y, z, -1, 4); // 4: rounding as it is set
+#elif defined(__FMA__)
+  return __builtin_ia32_vfmaddps256(x, y, z);
+#else
+  return x * y + z;
+#endif
+}
+
+/// Packs with their derivatives by time: what is computed with them has its derivative beside it.
+struct MovingPack
+{
+  Pack value;
+  Pack rate;
+};
+
+INLINE MovingPack operator-(const MovingPack& a)
+{
+  return { -a.value, -a.rate };
+}
+
+INLINE MovingPack operator+(const MovingPack& a, const MovingPack& b)
+{
+  return { a.value + b.value, a.rate + b.rate };
+}
+
+INLINE MovingPack operator*(const MovingPack& a, const MovingPack& b)
+{
+  return { a.value * b.value, MultiplyAdd(a.rate, b.value, a.value * b.rate) };
+}
+
+INLINE MovingPack operator/(float a, const MovingPack& b)
+{
+  const Pack quotient = a / b.value;
+  return { quotient, -(quotient * b.rate / b.value) };
+}
+
+/// `c` is a MovingPack or a MovingFloat.
+template <typename C>
+INLINE MovingPack MultiplyAdd(const MovingFloat& a, const Pack& b, const C& c)
+{
+  return { MultiplyAdd(a.value, b, c.value), MultiplyAdd(a.rate, b, c.rate) };
+}
+
+INLINE MovingPack MultiplyAdd(const Pack& a, const MovingPack& b, const MovingPack& c)
+{
+  return { MultiplyAdd(a, b.value, c.value), MultiplyAdd(a, b.rate, c.rate) };
+}
+
+INLINE MovingPack MultiplyAdd(const MovingPack& a, const MovingPack& b, const MovingPack& c)
+{
+  return { MultiplyAdd(a.value, b.value, c.value),
+    MultiplyAdd(a.rate, b.value, MultiplyAdd(a.value, b.rate, c.rate)) };
+}
+
+INLINE MovingPack MultiplyAdd(const MovingPack& a, const MovingPack& b, float c)
+{
+  return { MultiplyAdd(a.value, b.value, c), MultiplyAdd(a.rate, b.value, a.value * b.rate) };
+}
+
+/// Results are computed in packs alone, or with their derivatives.
+template <typename Number>
+struct ValueOf;
+
+template <>
+struct ValueOf<float>
+{
+  using Type = Pack;
+  static INLINE Pack Still(const Pack& value) { return value; }
+  static INLINE float Now(float number) { return number; }
+};
+
+template <>
+struct ValueOf<MovingFloat>
+{
+  using Type = MovingPack;
+  static INLINE MovingPack Still(const Pack& value) { return { value, Pack{} }; }
+  static INLINE float Now(const MovingFloat& number) { return number.value; }
+};
+
 INLINE const Pack& Load(const float* from)
 {
   return *reinterpret_cast<const Pack*>(from);
 }
 
-INLINE Pack Affine(const float* row, const Pack& x, const Pack& y, const Pack& z)
+template <typename Number>
+INLINE typename ValueOf<Number>::Type Affine(
+  const Number* row, const Pack& x, const Pack& y, const Pack& z)
 {
-  return row[0] * x + (row[1] * y + (row[2] * z + row[3]));
+  return MultiplyAdd(row[0], x, MultiplyAdd(row[1], y, MultiplyAdd(row[2], z, row[3])));
 }
 
 INLINE Pack Limited(const Pack& t)
@@ -45,28 +145,51 @@ INLINE void SineCosine(const Pack& angle, Pack& sine, Pack& cosine)
 {
   // The nearest whole turn: adding and taking away 3 * 2^22 rounds to an integer.
   constexpr float Rounder = 12582912.0F;
-  const Pack turns = (angle * 0.159154943F + Rounder) - Rounder;
-  const Pack y = ((angle - turns * 6.28125F) - turns * 1.93530717958e-3F) * 0.25F;
+  const Pack turns = MultiplyAdd(angle, 0.159154943F, Rounder) - Rounder;
+  const Pack rest = MultiplyAdd(-turns, 6.28125F, angle);
+  const Pack y = MultiplyAdd(-turns, 1.93530717958e-3F, rest) * 0.25F;
   const Pack q = y * y;
-  const Pack s = y *
-    (1.0F +
-      q * (-1.66666667e-1F + q * (8.33333333e-3F + q * (-1.98412698e-4F + q * 2.75573192e-6F))));
-  const Pack c =
-    1.0F + q * (-0.5F + q * (4.16666667e-2F + q * (-1.38888889e-3F + q * 2.48015873e-5F)));
+  Pack s = MultiplyAdd(q, 2.75573192e-6F, -1.98412698e-4F);
+  s = MultiplyAdd(q, s, 8.33333333e-3F);
+  s = MultiplyAdd(q, s, -1.66666667e-1F);
+  s = y * MultiplyAdd(q, s, 1.0F);
+  Pack c = MultiplyAdd(q, 2.48015873e-5F, -1.38888889e-3F);
+  c = MultiplyAdd(q, c, 4.16666667e-2F);
+  c = MultiplyAdd(q, c, -0.5F);
+  c = MultiplyAdd(q, c, 1.0F);
   const Pack s2 = 2.0F * s * c;
-  const Pack c2 = 1.0F - 2.0F * s * s;
+  const Pack c2 = MultiplyAdd(-2.0F * s, s, 1.0F);
   sine = 2.0F * s2 * c2;
-  cosine = 1.0F - 2.0F * s2 * s2;
+  cosine = MultiplyAdd(-2.0F * s2, s2, 1.0F);
+}
+
+INLINE void SineCosine(const MovingPack& angle, MovingPack& sine, MovingPack& cosine)
+{
+  SineCosine(angle.value, sine.value, cosine.value);
+  sine.rate = cosine.value * angle.rate;
+  cosine.rate = -(sine.value * angle.rate);
+}
+
+INLINE Pack Times(float a, const Pack& b)
+{
+  return a * b;
+}
+
+INLINE MovingPack Times(const MovingFloat& a, const Pack& b)
+{
+  return { a.value * b, a.rate * b };
 }
 
 /// Factors of SkinBone::section and SkinBone::turned.
-INLINE void SectionFactors(const SkinBone& bone, const Pack& t, Pack& along, Pack& across)
+template <typename Number, typename Value>
+INLINE void SectionFactors(
+  const BasicSkinBone<Number>& bone, const Pack& t, Value& along, Value& across)
 {
-  const Pack calibre = bone.calibre[0] + bone.calibre[1] * t;
-  Pack sine;
-  Pack cosine;
-  SineCosine(bone.twist * t, sine, cosine);
-  along = calibre * cosine - 1.0F;
+  const Value calibre = MultiplyAdd(bone.calibre[1], t, bone.calibre[0]);
+  Value sine;
+  Value cosine;
+  SineCosine(Times(bone.twist, t), sine, cosine);
+  along = MultiplyAdd(calibre, cosine, -1.0F);
   across = calibre * sine;
 }
 
@@ -98,10 +221,25 @@ INLINE void Write(const SkinBlocks& blocks, std::int64_t at, const float* centre
   }
 }
 
-template <bool Sections>
-void Linear(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
-  std::int64_t first, std::int64_t last, float* result)
+INLINE void WriteMoved(const SkinBlocks& blocks, std::int64_t at, const float* centre,
+  const Pack* moved, float* positions, float*)
 {
+  Write(blocks, at, centre, moved[0], moved[1], moved[2], positions);
+}
+
+INLINE void WriteMoved(const SkinBlocks& blocks, std::int64_t at, const float* centre,
+  const MovingPack* moved, float* positions, float* velocities)
+{
+  const float still[3] = {};
+  Write(blocks, at, centre, moved[0].value, moved[1].value, moved[2].value, positions);
+  Write(blocks, at, still, moved[0].rate, moved[1].rate, moved[2].rate, velocities);
+}
+
+template <bool Sections, typename Number>
+INLINE void Linear(const SkinBlocks& blocks, const BasicSkinBone<Number>* bones,
+  const float* centre, std::int64_t first, std::int64_t last, float* positions, float* velocities)
+{
+  using Value = typename ValueOf<Number>::Type;
   for (std::int64_t block = first; block < last; ++block)
   {
     for (int p = 0; p < Packs; ++p)
@@ -110,44 +248,48 @@ void Linear(const SkinBlocks& blocks, const SkinBone* bones, const float* centre
       const Pack x = Load(blocks.x + at);
       const Pack y = Load(blocks.y + at);
       const Pack z = Load(blocks.z + at);
-      Pack sum[3] = {};
+      Value sum[3] = {};
       for (std::int32_t e = blocks.offset[block]; e < blocks.offset[block + 1]; ++e)
       {
-        const SkinBone& bone = bones[blocks.bone[e]];
+        const BasicSkinBone<Number>& bone = bones[blocks.bone[e]];
         const Pack weight =
           Load(blocks.weight + static_cast<std::int64_t>(e) * SkinLanes + p * PackLanes);
         const Pack t = Limited(Affine(bone.along, x, y, z));
-        Pack moved[3];
+        Value moved[3];
         for (int c = 0; c < 3; ++c)
         {
-          const float* row = bone.rigid + 4 * c;
-          moved[c] = row[0] * x + (row[1] * y + (row[2] * z + (bone.stretch[c] * t + row[3])));
+          const Number* row = bone.rigid + 4 * c;
+          moved[c] = MultiplyAdd(row[0], x,
+            MultiplyAdd(
+              row[1], y, MultiplyAdd(row[2], z, MultiplyAdd(bone.stretch[c], t, row[3]))));
         }
         if (Sections)
         {
-          Pack along;
-          Pack across;
+          Value along;
+          Value across;
           SectionFactors(bone, t, along, across);
           for (int c = 0; c < 3; ++c)
           {
-            moved[c] += along * Affine(bone.section + 4 * c, x, y, z) +
-              across * Affine(bone.turned + 4 * c, x, y, z);
+            moved[c] = moved[c] +
+              MultiplyAdd(along, Affine(bone.section + 4 * c, x, y, z),
+                across * Affine(bone.turned + 4 * c, x, y, z));
           }
         }
         for (int c = 0; c < 3; ++c)
         {
-          sum[c] += weight * moved[c];
+          sum[c] = MultiplyAdd(weight, moved[c], sum[c]);
         }
       }
-      Write(blocks, at, centre, sum[0], sum[1], sum[2], result);
+      WriteMoved(blocks, at, centre, sum, positions, velocities);
     }
   }
 }
 
-template <bool Sections>
-void Dual(const SkinBlocks& blocks, const SkinBone* bones, const float* centre, std::int64_t first,
-  std::int64_t last, float* result)
+template <bool Sections, typename Number>
+INLINE void Dual(const SkinBlocks& blocks, const BasicSkinBone<Number>* bones, const float* centre,
+  std::int64_t first, std::int64_t last, float* positions, float* velocities)
 {
+  using Value = typename ValueOf<Number>::Type;
   for (std::int64_t block = first; block < last; ++block)
   {
     for (int p = 0; p < Packs; ++p)
@@ -159,71 +301,110 @@ void Dual(const SkinBlocks& blocks, const SkinBone* bones, const float* centre, 
       alignas(64) float lanes[4][PackLanes];
       for (int n = 0; n < PackLanes; ++n)
       {
-        const float* real = bones[blocks.pivot[at + n]].rigid;
+        const Number* real = bones[blocks.pivot[at + n]].rigid;
         for (int c = 0; c < 4; ++c)
         {
-          lanes[c][n] = real[c];
+          lanes[c][n] = ValueOf<Number>::Now(real[c]);
         }
       }
       const Pack pivot[4] = { Load(lanes[0]), Load(lanes[1]), Load(lanes[2]), Load(lanes[3]) };
-      Pack blend[8] = {};
-      Pack place[3] = { x, y, z };
+      Value blend[8] = {};
+      Value place[3] = { ValueOf<Number>::Still(x), ValueOf<Number>::Still(y),
+        ValueOf<Number>::Still(z) };
       for (std::int32_t e = blocks.offset[block]; e < blocks.offset[block + 1]; ++e)
       {
-        const SkinBone& bone = bones[blocks.bone[e]];
+        const BasicSkinBone<Number>& bone = bones[blocks.bone[e]];
         const Pack weight =
           Load(blocks.weight + static_cast<std::int64_t>(e) * SkinLanes + p * PackLanes);
         const Pack t = Limited(Affine(bone.along, x, y, z));
         const Pack stretched = weight * t;
         for (int c = 0; c < 3; ++c)
         {
-          place[c] += bone.stretch[c] * stretched;
+          place[c] = MultiplyAdd(bone.stretch[c], stretched, place[c]);
         }
         if (Sections)
         {
-          Pack along;
-          Pack across;
+          Value along;
+          Value across;
           SectionFactors(bone, t, along, across);
           for (int c = 0; c < 3; ++c)
           {
-            place[c] += weight *
-              (along * Affine(bone.section + 4 * c, x, y, z) +
-                across * Affine(bone.turned + 4 * c, x, y, z));
+            place[c] = MultiplyAdd(weight,
+              MultiplyAdd(along, Affine(bone.section + 4 * c, x, y, z),
+                across * Affine(bone.turned + 4 * c, x, y, z)),
+              place[c]);
           }
         }
         // q and -q are the same rotation: the one on the side of the greatest weight's bone.
-        const float* q = bone.rigid;
-        const Pack side = q[0] * pivot[0] + (q[1] * pivot[1] + (q[2] * pivot[2] + q[3] * pivot[3]));
+        const Number* q = bone.rigid;
+        float real[4];
+        for (int c = 0; c < 4; ++c)
+        {
+          real[c] = ValueOf<Number>::Now(q[c]);
+        }
+        const Pack side = MultiplyAdd(real[0], pivot[0],
+          MultiplyAdd(real[1], pivot[1], MultiplyAdd(real[2], pivot[2], real[3] * pivot[3])));
         const Pack signedWeight = side < Pack{} ? -weight : weight;
         for (int c = 0; c < 8; ++c)
         {
-          blend[c] += signedWeight * q[c];
+          blend[c] = MultiplyAdd(q[c], signedWeight, blend[c]);
         }
       }
-      const Pack& w = blend[0];
-      const Pack* r = blend + 1;
-      const Pack& dw = blend[4];
-      const Pack* d = blend + 5;
-      const Pack twice = 2.0F / (w * w + r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
-      Pack inner[3];
-      Pack moved[3];
+      const Value& w = blend[0];
+      const Value* r = blend + 1;
+      const Value& dw = blend[4];
+      const Value* d = blend + 5;
+      const Value square =
+        MultiplyAdd(r[2], r[2], MultiplyAdd(r[1], r[1], MultiplyAdd(w, w, r[0] * r[0])));
+      const Value twice = 2.0F / square;
+      Value inner[3];
+      Value moved[3];
       for (int c = 0; c < 3; ++c)
       {
         const int i = (c + 1) % 3;
         const int j = (c + 2) % 3;
-        inner[c] = (r[i] * place[j] - r[j] * place[i]) + w * place[c];
+        inner[c] = MultiplyAdd(w, place[c], MultiplyAdd(r[i], place[j], -(r[j] * place[i])));
       }
       for (int c = 0; c < 3; ++c)
       {
         const int i = (c + 1) % 3;
         const int j = (c + 2) % 3;
-        const Pack turn = r[i] * inner[j] - r[j] * inner[i];
-        const Pack shift = (w * d[c] - dw * r[c]) + (r[i] * d[j] - r[j] * d[i]);
-        moved[c] = place[c] + twice * (turn + shift);
+        const Value turn = MultiplyAdd(r[i], inner[j], -(r[j] * inner[i]));
+        const Value shift =
+          MultiplyAdd(w, d[c], -(dw * r[c])) + MultiplyAdd(r[i], d[j], -(r[j] * d[i]));
+        moved[c] = MultiplyAdd(twice, turn + shift, place[c]);
       }
-      Write(blocks, at, centre, moved[0], moved[1], moved[2], result);
+      WriteMoved(blocks, at, centre, moved, positions, velocities);
     }
   }
+}
+
+template <bool DualQuaternions, bool Sections, typename Number>
+INLINE void Move(const SkinBlocks& blocks, const BasicSkinBone<Number>* bones, const float* centre,
+  std::int64_t first, std::int64_t last, float* positions, float* velocities)
+{
+  if (DualQuaternions)
+  {
+    Dual<Sections>(blocks, bones, centre, first, last, positions, velocities);
+  }
+  else
+  {
+    Linear<Sections>(blocks, bones, centre, first, last, positions, velocities);
+  }
+}
+
+template <bool DualQuaternions, bool Sections>
+void Positions(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
+  std::int64_t first, std::int64_t last, float* positions)
+{
+  Move<DualQuaternions, Sections>(blocks, bones, centre, first, last, positions, nullptr);
+}
+
+template <bool DualQuaternions, bool Sections>
+void Motion(const SkinBlocks& blocks, const MovingSkinBone* bones, const float* centre,
+  std::int64_t first, std::int64_t last, float* positions, float* velocities)
+{
+  Move<DualQuaternions, Sections>(blocks, bones, centre, first, last, positions, velocities);
 }
 }
 
@@ -236,6 +417,13 @@ const SkinKernels SkinKernelsAvx2
 #else
 const SkinKernels SkinKernelsBaseline{
 #endif
-  Linear<false>, Linear<true>, Dual<false>, Dual<true>
+  { { Positions<false, false>, Positions<false, true> },
+    { Positions<true, false>, Positions<true, true> } },
+  {
+    { Motion<false, false>, Motion<false, true> },
+    {
+      Motion<true, false>, Motion<true, true>
+    }
+  }
 };
 }

@@ -26,30 +26,43 @@ struct SkinBlocks
   std::int64_t points;        ///< all blocks but the last one are full
 };
 
-/// What the loops need of a bone. Affine maps are three rows of four.
-struct SkinBone
+/// A number of a bone that moves, with its derivative by time.
+struct MovingFloat
 {
-  float rigid[12];   ///< LinearBlend: rotation and translation; DualQuaternion: 4 real, 4 dual
-  float stretch[4];  ///< times t: what the stretch adds
-  float along[4];    ///< affine: t before it is limited to 0 .. 1
-  float section[12]; ///< of the part beside the bone
-  float turned[12];  ///< of the same, turned by a quarter about the bone
-  float calibre[2];  ///< factor at t = 0, its change to t = 1
-  float twist;       ///< radians at t = 1
-  float unused;
+  float value;
+  float rate;
 };
 
+/// What the loops need of a bone. Affine maps are three rows of four.
+template <typename Number>
+struct BasicSkinBone
+{
+  Number rigid[12];   ///< LinearBlend: rotation and translation; DualQuaternion: 4 real, 4 dual
+  Number stretch[4];  ///< times t: what the stretch adds
+  Number section[12]; ///< of the part beside the bone
+  Number turned[12];  ///< of the same, turned by a quarter about the bone
+  Number calibre[2];  ///< factor at t = 0, its change to t = 1
+  Number twist;       ///< radians at t = 1
+  Number unused;
+  float along[4]; ///< affine: t before it is limited to 0 .. 1
+};
+
+using SkinBone = BasicSkinBone<float>;
+using MovingSkinBone = BasicSkinBone<MovingFloat>;
+
+/// Blocks first to last - 1; `centre` is added to the positions, which go to 3 point, 3 point + 1, ...
+using SkinPositions = void (*)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
+  std::int64_t first, std::int64_t last, float* positions);
+
+/// The same positions to the bit, and velocities beside them.
+using SkinMotion = void (*)(const SkinBlocks& blocks, const MovingSkinBone* bones,
+  const float* centre, std::int64_t first, std::int64_t last, float* positions, float* velocities);
+
+/// The first index: linear, dual quaternions; the second one: with calibre and twist.
 struct SkinKernels
 {
-  /// Blocks first to last - 1; `centre` is added to the results, which go to 3 point, 3 point + 1, ...
-  void (*linear)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
-    std::int64_t first, std::int64_t last, float* result);
-  void (*linearSections)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
-    std::int64_t first, std::int64_t last, float* result);
-  void (*dual)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
-    std::int64_t first, std::int64_t last, float* result);
-  void (*dualSections)(const SkinBlocks& blocks, const SkinBone* bones, const float* centre,
-    std::int64_t first, std::int64_t last, float* result);
+  SkinPositions positions[2][2];
+  SkinMotion motion[2][2];
 };
 
 /// Which set runs, in the whole process.

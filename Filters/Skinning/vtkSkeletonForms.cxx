@@ -150,6 +150,53 @@ SkeletonPose PoseOf(
   return pose;
 }
 
+bool TellsVelocity(vtkPolyData* data)
+{
+  const auto lacks = [](vtkFieldData* arrays, const char* part, const char* rate)
+  { return arrays->HasArray(part) != 0 && arrays->HasArray(rate) == 0; };
+  return data->GetPointData()->HasArray(names::Velocity) != 0 &&
+    !lacks(data->GetPointData(), names::CalibreFactor, names::CalibreRate) &&
+    !lacks(data->GetCellData(), names::BoneRotation, names::BoneAngularVelocity) &&
+    !lacks(data->GetCellData(), names::BoneTwist, names::BoneTwistRate);
+}
+
+coronary::MovingSkeletonPose MovingPoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig)
+{
+  const SkeletonPose pose = PoseOf(data, rig);
+  const vtkIdType joints = rig.NumberOfJoints();
+  const vtkIdType first = FirstLine(data);
+  const vtkIdType bones = rig.NumberOfBones();
+  vtkDataArray* velocity = FindArray(data->GetPointData(), names::Velocity, 3, joints);
+  vtkDataArray* angular =
+    FindArray(data->GetCellData(), names::BoneAngularVelocity, 3, first + bones);
+  vtkDataArray* twist = FindArray(data->GetCellData(), names::BoneTwistRate, 1, first + bones);
+  vtkDataArray* calibre = FindArray(data->GetPointData(), names::CalibreRate, 1, joints);
+  Require(TellsVelocity(data), "The posed skeleton does not say how it moves");
+  const auto vector = [](vtkDataArray* array, vtkIdType n)
+  { return coronary::Vector3(array->GetTuple3(n)); };
+  coronary::MovingSkeletonPose moving;
+  for (vtkIdType n = 0; n < joints; ++n)
+  {
+    moving.joints.push_back(coronary::Moving(pose.joints[n], vector(velocity, n)));
+    if (!pose.calibre.empty())
+    {
+      moving.calibre.emplace_back(pose.calibre[n], calibre->GetComponent(n, 0));
+    }
+  }
+  for (vtkIdType n = 0; n < bones; ++n)
+  {
+    if (!pose.rotation.empty())
+    {
+      moving.rotation.push_back(coronary::Turning(pose.rotation[n], vector(angular, first + n)));
+    }
+    if (!pose.twist.empty())
+    {
+      moving.twist.emplace_back(pose.twist[n], twist->GetComponent(first + n, 0));
+    }
+  }
+  return moving;
+}
+
 void SetPose(vtkPolyData* rest, const SkeletonPose& pose,
   const std::vector<coronary::BoneTransform>& bones, vtkPolyData* output,
   const coronary::ProgressCallback& progress)
@@ -177,6 +224,11 @@ void SetPose(vtkPolyData* rest, const SkeletonPose& pose,
     output->GetCellData()->AddArray(array);
     return array.Get();
   };
+  // Those of the skeleton at rest are not the pose's.
+  output->GetPointData()->RemoveArray(names::Velocity);
+  output->GetPointData()->RemoveArray(names::CalibreRate);
+  output->GetCellData()->RemoveArray(names::BoneAngularVelocity);
+  output->GetCellData()->RemoveArray(names::BoneTwistRate);
   vtkDoubleArray* rotation = makeArray(names::BoneRotation, 4);
   vtkDoubleArray* twist = makeArray(names::BoneTwist, 1);
   vtkDoubleArray* strain = makeArray(names::AxialStrain, 1);

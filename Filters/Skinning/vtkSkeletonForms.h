@@ -31,6 +31,13 @@ coronary::Skeleton SkeletonOf(
 coronary::SkeletonPose PoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig,
   const coronary::ProgressCallback& progress = {});
 
+/// Whether a posed skeleton says how it moves: it has `Velocity`, and for each array of a pose its derivative
+/// (`BoneAngularVelocity`, `BoneTwistRate`, `CalibreRate`).
+bool TellsVelocity(vtkPolyData* data);
+
+/// A pose that says how it moves. @throws std::invalid_argument  as PoseOf
+coronary::MovingSkeletonPose MovingPoseOf(vtkPolyData* data, const coronary::SkeletonRig& rig);
+
 /// Makes `output` the skeleton `rest`, posed: its cells and arrays, other points, arrays of the pose.
 void SetPose(vtkPolyData* rest, const coronary::SkeletonPose& pose,
   const std::vector<coronary::BoneTransform>& bones, vtkPolyData* output,

@@ -46,7 +46,9 @@ class vtkDoubleArray;
 namespace coronary
 {
 class SkeletonRig;
-struct SkeletonPose;
+template <typename Scalar>
+struct BasicSkeletonPose;
+using SkeletonPose = BasicSkeletonPose<double>;
 }
 
 class VTKCORONARYSKINNING_EXPORT vtkSkeletonPose : public vtkPolyDataAlgorithm

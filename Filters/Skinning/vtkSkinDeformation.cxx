@@ -81,7 +81,6 @@ struct Setup
   bool hasTetrahedra = false;
   std::vector<vtkIdType> cells; ///< of the tetrahedra
   coronary::InversionReport report;
-  std::vector<coronary::BoneTransform> bones;
 };
 
 vtkDataArray* WeightArray(vtkPointSet* mesh, const std::string& name)
@@ -253,15 +252,32 @@ bool NamesItsTime(const OtherPose& other)
 }
 }
 
-/// Poses that the velocity is taken from: between two, or from the one asked for to two on one side.
+/// Where the velocity is from: the pose tells it, or poses at other times, on both sides or two on one side.
 struct vtkSkinDeformation::Stencil
 {
+  bool told = false;
   OtherPose first;
   OtherPose second;
   bool oneSided = false;
   double now = 0.0;
   double cycle = 1.0; ///< seconds per unit of time
   bool Exists() const { return this->first.pose != nullptr; }
+
+  /// By the parabola through the three poses, or the line through the two others.
+  coronary::MovingSkeletonPose Differentiate(
+    vtkPolyData* data, const coronary::SkeletonRig& rig) const
+  {
+    const coronary::SkeletonPose pose = vtkSkeletonForms::PoseOf(data, rig);
+    const coronary::SkeletonPose one = vtkSkeletonForms::PoseOf(this->first.pose, rig);
+    const coronary::SkeletonPose other = vtkSkeletonForms::PoseOf(this->second.pose, rig);
+    if (this->oneSided)
+    {
+      const double seconds = (this->first.time - this->now) * this->cycle;
+      return coronary::Differentiate(pose, { { &one, 2.0 / seconds }, { &other, -0.5 / seconds } });
+    }
+    const double seconds = (this->second.time - this->first.time) * this->cycle;
+    return coronary::Differentiate(pose, { { &one, -1.0 / seconds }, { &other, 1.0 / seconds } });
+  }
 };
 
 struct vtkSkinDeformation::Internals
@@ -450,26 +466,6 @@ Origin OriginOf(vtkPointSet* mesh, vtkObject* indices, vtkObject* weights, vtkPo
   return origin;
 }
 
-/// The parabola through three poses.
-/// @param nearer    first pose after now; its values are lost
-/// @param velocity  second pose after now, twice as far; then the velocity
-/// @param seconds   to the first one
-template <typename Array>
-void OneSidedVelocity(
-  Array* nearer, Array* now, Array* velocity, double seconds, const ProgressCallback& progress)
-{
-  const vtkIdType count = now->GetNumberOfValues();
-  const coronary::WorkParts differences(progress, { 1.0, 1.0 });
-  coronary::SkinVelocities(nearer->GetPointer(0), now->GetPointer(0), 0.5 * seconds, count,
-    nearer->GetPointer(0), differences(0));
-  coronary::SkinVelocities(velocity->GetPointer(0), now->GetPointer(0), 2.0 * seconds, count,
-    velocity->GetPointer(0), differences(1));
-  for (vtkIdType n = 0; n < count; ++n)
-  {
-    velocity->SetValue(n, nearer->GetValue(n) - velocity->GetValue(n));
-  }
-}
-
 /// Those of the mesh at rest.
 void RemoveNormals(vtkPointSet* output)
 {
@@ -538,18 +534,15 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
     SettingUp,
     ReadingTriangles,
     ReadingTetrahedra,
-    Earlier,
-    Later,
     Deforming,
-    Difference,
     Checking,
     Displacing,
     Shading
   };
   const coronary::WorkParts parts(progress,
     { known ? 0.0 : 8.0, newTriangles ? 2.0 : 0.0, newTetrahedra ? 4.0 : 0.0,
-      stencil.Exists() ? 2.0 : 0.0, stencil.Exists() ? 2.0 : 0.0, 2.0, stencil.Exists() ? 0.5 : 0.0,
-      withTetrahedra ? 3.0 : 0.0, 0.5, withTriangles ? 1.0 : 0.0 });
+      this->ComputeVelocity ? 4.0 : 2.0, withTetrahedra ? 3.0 : 0.0, 0.5,
+      withTriangles ? 1.0 : 0.0 });
   Setup& setup = known ? *known : this->Data->Make(origin, this, mesh, rest, parts(SettingUp));
   coronary::SkinDeformation& skin = *setup.skin;
   if (newTriangles)
@@ -576,53 +569,37 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
     array->SetNumberOfTuples(count);
     return array;
   };
-  const auto deform = [&](vtkPolyData* pose, Array* positions, Part part)
-  {
-    skin.Rig().Transform(vtkSkeletonForms::PoseOf(pose, skin.Rig()), setup.bones);
-    skin.Rig().ConserveVolume(this->VolumeConservation, setup.bones);
-    skin.Deform(setup.bones, positions->GetPointer(0), parts(part));
-  };
-
-  vtkPolyData* pose = vtkPolyData::GetData(inputs[2], 0);
+  vtkPolyData* poseData = vtkPolyData::GetData(inputs[2], 0);
+  skin.SetVolumeConservation(this->VolumeConservation);
   const auto positions = makeArray("Points");
   vtkSmartPointer<Array> velocity;
-  if (stencil.Exists())
+  if (stencil.told || stencil.Exists())
   {
-    const auto other = makeArray(nullptr);
     velocity = makeArray(names::Velocity);
-    deform(stencil.first.pose, other, Earlier);
-    deform(stencil.second.pose, velocity, Later);
-    deform(pose, positions, Deforming);
-    if (stencil.oneSided)
-    {
-      OneSidedVelocity(other.Get(), positions.Get(), velocity.Get(),
-        (stencil.first.time - stencil.now) * stencil.cycle, parts(Difference));
-    }
-    else
-    {
-      coronary::SkinVelocities(velocity->GetPointer(0), other->GetPointer(0),
-        (stencil.second.time - stencil.first.time) * stencil.cycle, 3 * count,
-        velocity->GetPointer(0), parts(Difference));
-    }
+    skin.Deform(stencil.told ? vtkSkeletonForms::MovingPoseOf(poseData, skin.Rig())
+                             : stencil.Differentiate(poseData, skin.Rig()),
+      positions->GetPointer(0), velocity->GetPointer(0), parts(Deforming));
   }
   else
   {
-    deform(pose, positions, Deforming);
+    skin.Deform(
+      vtkSkeletonForms::PoseOf(poseData, skin.Rig()), positions->GetPointer(0), parts(Deforming));
   }
   output->ShallowCopy(mesh);
   vtkNew<vtkPoints> points;
   points->SetData(positions);
   output->SetPoints(points);
   RemoveNormals(output);
-  output->GetFieldData()->PassData(pose->GetFieldData());
+  output->GetFieldData()->PassData(poseData->GetFieldData());
+  std::vector<coronary::BoneTransform> bones = skin.Bones();
   if (!this->Stretch)
   {
-    for (coronary::BoneTransform& bone : setup.bones)
+    for (coronary::BoneTransform& bone : bones)
     {
       bone.stretch = 1.0;
     }
   }
-  vtkBoneMotion::Set(output->GetFieldData(), skin.Rig(), setup.bones);
+  vtkBoneMotion::Set(output->GetFieldData(), skin.Rig(), bones);
 
   if (withTetrahedra)
   {
@@ -694,7 +671,10 @@ int vtkSkinDeformation::RequestData(
     Require(this->LeastVolumeRatio >= 0.0 && this->LeastVolumeRatio <= 0.5,
       "LeastVolumeRatio must be 0 to 0.5");
     Stencil stencil;
-    if (this->ComputeVelocity && mesh->GetNumberOfElements(vtkDataObject::POINT) > 0)
+    const bool wanted =
+      this->ComputeVelocity && mesh->GetNumberOfElements(vtkDataObject::POINT) > 0;
+    stencil.told = wanted && vtkSkeletonForms::TellsVelocity(vtkPolyData::GetData(inputs[2], 0));
+    if (wanted && !stencil.told)
     {
       this->FindStencil(inputs[2]->GetInformationObject(0), stencil);
       if (!stencil.Exists())

@@ -14,7 +14,9 @@
  *   points bones, in the order of the indices.
  * - 2: vtkPolyData, the skeleton posed: the same cells, other points. Cell data `BoneRotation`
  *   (double[4], w x y z) and `BoneTwist` (double, radians), point data `CalibreFactor` (double): all optional. Without
- *   rotations bones turn with the least twist. May have time; the output has the same.
+ *   rotations bones turn with the least twist. Their derivatives, as of vtkCardiacPhaseInterpolator, are for the velocity: point
+ *   data `Velocity` (double[3], mm/s), `CalibreRate` (double, 1/s), cell data `BoneAngularVelocity` (double[3], radians/s about axes
+ *   of the world), `BoneTwistRate` (double, radians/s). May have time; the output has the same.
  *
  * @par Output port:
  * - 0: the mesh with moved points. Cells and all other arrays are the input's own, but for its active
@@ -111,10 +113,11 @@ public:
 
   ///@{
   /**
-   * Whether the velocity is computed. Where poses come at any time (of vtkCardiacPhaseInterpolator, of a source
-   * with TIME_RANGE that gives what it is asked for), it is the central difference over two thousandths of the
-   * range, beyond the range's ends too when the source is periodic, else at its ends that of the parabola through
-   * the next three poses. Where they come at steps only, it is the difference of the steps before and after. Seconds by
+   * Whether the velocity is computed: the exact derivative of the points by time, out of that of the pose. Where the
+   * pose has `Velocity` and the derivative of all its other arrays, these are taken. Else the pose is differentiated: where
+   * poses come at any time (of a source with TIME_RANGE that gives what it is asked for), by the central difference over two
+   * thousandths of the range, beyond the range's ends too when the source is periodic, else at its ends by the parabola through
+   * the next three poses; where they come at steps only, by the difference of the steps before and after, in seconds by
    * the pose's field array `CycleLength`, those of a unit of time; without it time itself is taken for seconds.
    * Default off.
    */
@@ -177,7 +180,7 @@ private:
 
   struct Internals;
   struct Stencil;
-  /// Asks for the poses around the one that is there, which is there again in the end.
+  /// For poses without velocities: asks for those around the one that is there, which is there again in the end.
   void FindStencil(vtkInformation* poseInfo, Stencil& stencil);
   template <typename Array>
   void Execute(vtkPointSet* mesh, vtkInformationVector** inputs, const Stencil& stencil,

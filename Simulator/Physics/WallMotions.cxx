@@ -2,8 +2,6 @@
 
 #include "VesselWall.h"
 
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -190,122 +188,6 @@ void StillWallMotion::AxisPositions(double /*phase*/, std::vector<Vector3>& posi
   positions = this->Axis;
 }
 
-PeriodicPositions::PeriodicPositions(
-  const std::vector<double>& phases, const std::vector<std::vector<Vector3>>& positions)
-{
-  if (phases.empty() || phases.size() != positions.size())
-  {
-    throw std::invalid_argument("a motion has " + std::to_string(phases.size()) + " phases and " +
-      std::to_string(positions.size()) + " sets of positions");
-  }
-  const std::size_t count = phases.size();
-  std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t k = 0; k < count; ++k)
-  {
-    if (!std::isfinite(phases[k]))
-    {
-      throw std::invalid_argument("phase " + std::to_string(k) + " of a motion is not finite");
-    }
-    if (positions[k].size() != positions[0].size())
-    {
-      throw std::invalid_argument("phase " + std::to_string(k) + " of a motion has " +
-        std::to_string(positions[k].size()) + " points, and the first one has " +
-        std::to_string(positions[0].size()));
-    }
-    for (std::size_t i = 0; i < positions[k].size(); ++i)
-    {
-      if (!positions[k][i].allFinite())
-      {
-        throw std::invalid_argument("point " + std::to_string(i) + " of phase " +
-          std::to_string(k) + " of a motion is not finite");
-      }
-    }
-    const double phase = phases[k] - std::floor(phases[k]);
-    order.emplace_back(phase < 1.0 ? phase : 0.0, k);
-  }
-  std::sort(order.begin(), order.end());
-  Eigen::VectorXd step(count);
-  for (std::size_t k = 0; k < count; ++k)
-  {
-    this->Knots.push_back(order[k].first);
-    step[k] =
-      k + 1 < count ? order[k + 1].first - order[k].first : order[0].first + 1.0 - order[k].first;
-    if (step[k] < 0.001)
-    {
-      throw std::invalid_argument("the phases " + std::to_string(phases[order[k].second]) +
-        " and " + std::to_string(phases[order[(k + 1) % count].second]) +
-        " of a motion are nearer than 0.001, modulo one cycle");
-    }
-  }
-  this->Values = 3 * positions[0].size();
-  const auto values = static_cast<Eigen::Index>(this->Values);
-  const auto knots = static_cast<Eigen::Index>(count);
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  this->Sample.resize(count * this->Values);
-  Eigen::Map<Rows> sample(this->Sample.data(), knots, values);
-  for (Eigen::Index k = 0; k < knots; ++k)
-  {
-    const std::vector<Vector3>& from = positions[order[k].second];
-    for (std::size_t i = 0; i < from.size(); ++i)
-    {
-      sample.row(k).segment<3>(static_cast<Eigen::Index>(3 * i)) = from[i];
-    }
-  }
-  // Second derivatives: one linear map for all coordinates. Sums, as neighbours can be the same knot.
-  Eigen::MatrixXd left = Eigen::MatrixXd::Zero(knots, knots);
-  Eigen::MatrixXd right = left;
-  for (Eigen::Index k = 0; k < knots; ++k)
-  {
-    const Eigen::Index before = (k + knots - 1) % knots;
-    const Eigen::Index after = (k + 1) % knots;
-    left(k, before) += step[before] / 6.0;
-    left(k, k) += (step[before] + step[k]) / 3.0;
-    left(k, after) += step[k] / 6.0;
-    right(k, after) += 1.0 / step[k];
-    right(k, k) -= 1.0 / step[k] + 1.0 / step[before];
-    right(k, before) += 1.0 / step[before];
-  }
-  const Eigen::MatrixXd map = left.partialPivLu().solve(right);
-  this->Second.resize(this->Sample.size());
-  Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-    this->Second.data(), knots, values) = (map * sample).cast<float>();
-}
-
-void PeriodicPositions::Evaluate(double phase, std::vector<Vector3>& positions) const
-{
-  positions.resize(this->Values / 3);
-  if (positions.empty())
-  {
-    return;
-  }
-  const std::size_t count = this->Knots.size();
-  double x = std::isfinite(phase) ? phase - std::floor(phase) : 0.0;
-  x = x < 1.0 ? x : 0.0;
-  const auto after = std::upper_bound(this->Knots.begin(), this->Knots.end(), x);
-  const std::size_t i = (static_cast<std::size_t>(after - this->Knots.begin()) + count - 1) % count;
-  const std::size_t j = (i + 1) % count;
-  if (x < this->Knots.front())
-  {
-    x += 1.0;
-  }
-  const double length =
-    j > i ? this->Knots[j] - this->Knots[i] : this->Knots[j] + 1.0 - this->Knots[i];
-  const double b = (x - this->Knots[i]) / length;
-  const double a = 1.0 - b;
-  const double c = (a * a * a - a) * length * length / 6.0;
-  const double d = (b * b * b - b) * length * length / 6.0;
-  const double* first = this->Sample.data() + i * this->Values;
-  const double* second = this->Sample.data() + j * this->Values;
-  const float* firstBend = this->Second.data() + i * this->Values;
-  const float* secondBend = this->Second.data() + j * this->Values;
-  double* out = positions.front().data();
-  for (std::size_t n = 0; n < this->Values; ++n)
-  {
-    out[n] = a * first[n] + b * second[n] +
-      (c * static_cast<double>(firstBend[n]) + d * static_cast<double>(secondBend[n]));
-  }
-}
-
 SampledWallMotion::SampledWallMotion(WallTopology topology, const std::vector<double>& phases,
   const std::vector<std::vector<Vector3>>& positions, const std::vector<std::vector<Vector3>>& axis)
   : Topology_(std::move(topology))
@@ -346,51 +228,33 @@ void SampledWallMotion::AxisPositions(double phase, std::vector<Vector3>& positi
 
 SkinnedWallMotion::SkinnedWallMotion(WallTopology topology, const std::vector<Vector3>& rest,
   const CompactSkinWeights& weights, const std::vector<std::int64_t>& skinned,
-  const Skeleton& skeleton, const PoseSequence& poses,
-  const PhaseInterpolationSettings& interpolation, const SkinDeformationSettings& deformation)
+  const Skeleton& skeleton, const PoseSequence& poses, const BeatingModelSettings& settings)
   : Topology_(Checked(std::move(topology), rest))
-  , Interpolation(poses, interpolation)
-  , Skin(rest, Subset(weights, skinned), skeleton, deformation)
+  , Wall(rest, Subset(weights, skinned), skeleton, poses, settings)
 {
-  if (poses.points[0].size() != skeleton.joints.size())
-  {
-    throw std::invalid_argument("the skeleton has " + std::to_string(skeleton.joints.size()) +
-      " joints, and its poses have " + std::to_string(poses.points[0].size()));
-  }
   const std::vector<Vector3> axis = InOneList(this->Topology_.axis);
   if (!axis.empty())
   {
-    this->AxisSkin =
-      std::make_unique<SkinDeformation>(axis, HangOnNearest(axis, skeleton), skeleton, deformation);
+    this->Axis = std::make_unique<BeatingModel>(
+      axis, HangOnNearest(axis, skeleton), skeleton, poses, settings);
   }
-}
-
-void SkinnedWallMotion::Pose(double phase)
-{
-  this->Interpolation.Evaluate(std::isfinite(phase) ? phase : 0.0, this->Interpolated);
-  this->Posed.joints = this->Interpolated.points;
-  this->Posed.rotation = this->Interpolated.rotation;
-  this->Posed.calibre = this->Interpolated.calibre;
-  this->Skin.Rig().Transform(this->Posed, this->Bones);
 }
 
 void SkinnedWallMotion::Positions(double phase, std::vector<Vector3>& positions)
 {
-  this->Pose(phase);
   positions.resize(static_cast<std::size_t>(this->Topology_.points));
-  this->Skin.Deform(this->Bones, positions.front().data());
+  this->Wall.Positions(std::isfinite(phase) ? phase : 0.0, positions.front().data());
 }
 
 void SkinnedWallMotion::AxisPositions(double phase, std::vector<Vector3>& positions)
 {
-  if (!this->AxisSkin)
+  if (!this->Axis)
   {
     positions.clear();
     return;
   }
-  this->Pose(phase);
-  positions.resize(static_cast<std::size_t>(this->AxisSkin->NumberOfPoints()));
-  this->AxisSkin->Deform(this->Bones, positions.front().data());
+  positions.resize(static_cast<std::size_t>(this->Axis->NumberOfPoints()));
+  this->Axis->Positions(std::isfinite(phase) ? phase : 0.0, positions.front().data());
 }
 
 std::shared_ptr<WallMotion> SampleWallMotion(WallMotion& motion, int phases)

@@ -5,12 +5,9 @@
 #ifndef DynamicCoronary_WallMotions_h
 #define DynamicCoronary_WallMotions_h
 
-#include "BiharmonicSkinWeights.h"
-#include "CenterlineSkeleton.h"
+#include "BeatingModel.h"
 #include "CoronaryPhantom.h"
-#include "PhaseInterpolation.h"
-#include "PoseSequence.h"
-#include "SkinDeformation.h"
+#include "PeriodicSpline.h"
 #include "WallMotion.h"
 
 #include <memory>
@@ -43,29 +40,6 @@ private:
   std::vector<Vector3> Axis;
 };
 
-/// Coordinates over one cycle: through all samples, velocity and acceleration continuous (periodic cubic
-/// spline), exact at the samples.
-class PeriodicPositions
-{
-public:
-  /**
-   * @param phases     finite, in any order; modulo 1 no two are nearer to each other than 0.001
-   * @param positions  per phase: as many points as in the first one
-   * @throws std::invalid_argument: no phase, numbers that differ, a value that is not finite, phases too near
-   */
-  PeriodicPositions(
-    const std::vector<double>& phases, const std::vector<std::vector<Vector3>>& positions);
-
-  /// Any phase, modulo 1; one that is not finite is taken as 0.
-  void Evaluate(double phase, std::vector<Vector3>& positions) const;
-
-private:
-  std::vector<double> Knots;
-  std::size_t Values = 0;     ///< a phase
-  std::vector<double> Sample; ///< per knot: x y z of each point
-  std::vector<float> Second;  ///< second derivatives by phase, as Sample
-};
-
 /// One connectivity with positions at phases.
 class SampledWallMotion : public WallMotion
 {
@@ -89,7 +63,7 @@ private:
   std::vector<Vector3> RestAxis;
 };
 
-/// The skin of a skeleton whose poses are known at phases.
+/// A wall and its axis as beating models.
 class SkinnedWallMotion : public WallMotion
 {
 public:
@@ -100,29 +74,20 @@ public:
    * @param skinned   per point of the wall: which of these it is; empty: the same ones
    * @param skeleton  that the weights were made for
    * @param poses     its joints at phases; calibre (of joints) and rotations (of bones) are used if there
-   * @throws std::invalid_argument as CheckWall at rest, PhaseInterpolation and SkinDeformation; an index out
-   *         of range
+   * @throws std::invalid_argument as CheckWall at rest and BeatingModel; an index out of range
    */
   SkinnedWallMotion(WallTopology topology, const std::vector<Vector3>& rest,
     const CompactSkinWeights& weights, const std::vector<std::int64_t>& skinned,
-    const Skeleton& skeleton, const PoseSequence& poses,
-    const PhaseInterpolationSettings& interpolation = {},
-    const SkinDeformationSettings& deformation = {});
+    const Skeleton& skeleton, const PoseSequence& poses, const BeatingModelSettings& settings = {});
 
   const WallTopology& Topology() const override { return this->Topology_; }
   void Positions(double phase, std::vector<Vector3>& positions) override;
   void AxisPositions(double phase, std::vector<Vector3>& positions) override;
 
 private:
-  void Pose(double phase);
-
   WallTopology Topology_;
-  PhaseInterpolation Interpolation;
-  SkinDeformation Skin;
-  std::unique_ptr<SkinDeformation> AxisSkin;
-  InterpolatedPose Interpolated;
-  SkeletonPose Posed;
-  std::vector<BoneTransform> Bones;
+  BeatingModel Wall;
+  std::unique_ptr<BeatingModel> Axis;
 };
 
 /**

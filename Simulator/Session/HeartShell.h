@@ -6,9 +6,9 @@
 #define DynamicCoronary_HeartShell_h
 
 #include "CoronaryPhantom.h"
+#include "PeriodicSpline.h"
 #include "Scenario.h"
 #include "WallMotion.h"
-#include "WallMotions.h"
 
 #include <memory>
 #include <vector>

@@ -189,6 +189,39 @@ void Ours(benchmark::State& state)
   coronary::SetNumberOfThreads(0);
 }
 
+/// Positions and velocities. Argument: kind, threads.
+void WithVelocity(benchmark::State& state)
+{
+  const Frame& frame = TheFrame();
+  const auto kind = static_cast<Kind>(state.range(0));
+  coronary::SetNumberOfThreads(static_cast<int>(state.range(1)));
+  coronary::SkinDeformationSettings settings;
+  settings.blend = kind == Dual || kind == DualSections ? coronary::SkinBlend::DualQuaternion
+                                                        : coronary::SkinBlend::Linear;
+  coronary::SkinDeformation skin(frame.points, frame.weights, frame.skeleton, settings);
+  std::vector<coronary::MovingSkeletonPose> poses;
+  for (std::size_t k = 0; k < frame.poses.size(); ++k)
+  {
+    const coronary::SkeletonPose& next = frame.poses[(k + 1) % frame.poses.size()];
+    poses.push_back(coronary::Differentiate(frame.poses[k], { { &next, 25.0 } }));
+    if (kind == LinearSections || kind == DualSections)
+    {
+      poses.back().calibre.assign(next.joints.size(), coronary::Dual(1.02, 0.1));
+      poses.back().twist.assign(frame.skeleton.bones.size(), coronary::Dual(0.01, 0.1));
+    }
+  }
+  std::vector<float> positions(3 * frame.points.size());
+  std::vector<float> velocities(positions.size());
+  std::size_t phase = 0;
+  for (auto _ : state)
+  {
+    skin.Deform(poses[phase], positions.data(), velocities.data());
+    benchmark::DoNotOptimize(velocities.data());
+    phase = (phase + 1) % poses.size();
+  }
+  coronary::SetNumberOfThreads(0);
+}
+
 void InDouble(benchmark::State& state)
 {
   const Frame& frame = TheFrame();
@@ -308,6 +341,14 @@ BENCHMARK(Ours)
   ->Args({ Linear, 2 })
   ->Args({ Linear, 1 })
   ->Args({ LinearRigid, 2 })
+  ->Args({ LinearSections, 2 })
+  ->Args({ Dual, 2 })
+  ->Args({ DualSections, 2 })
+  ->Unit(benchmark::kMillisecond)
+  ->UseRealTime();
+BENCHMARK(WithVelocity)
+  ->ArgNames({ "kind", "threads" })
+  ->Args({ Linear, 2 })
   ->Args({ LinearSections, 2 })
   ->Args({ Dual, 2 })
   ->Args({ DualSections, 2 })

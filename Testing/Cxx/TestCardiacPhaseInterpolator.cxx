@@ -372,6 +372,47 @@ TEST(CardiacPhaseInterpolator, CrossSectionsFromARadiusThatChanges)
   EXPECT_NEAR(Point(filter, "EllipseMinor") / Point(filter, "EllipseMajor"), 0.8, 1e-12);
 }
 
+TEST(CardiacPhaseInterpolator, RatesAreTheDerivativesInSeconds)
+{
+  vtkNew<MovingSource> source;
+  source->Steps = { 0.0, 0.25, 0.5, 0.75 };
+  source->Calibre = true;
+  source->Rotation = true;
+  vtkNew<Filter> filter;
+  filter->SetInputConnection(source->GetOutputPort());
+  filter->SetCycleLength(0.5);
+  for (const int mode : { Filter::Linear, Filter::PeriodicCubic, Filter::LowNoise })
+  {
+    filter->SetMode(mode);
+    constexpr double Step = 1e-5;
+    const double time = 0.4;
+    const auto at = [&](double moment, const char* name, vtkIdType n)
+    {
+      filter->UpdateTimeStep(moment);
+      return Point(filter, name, n);
+    };
+    // The first point is at its limit all the time.
+    EXPECT_EQ(at(time, "CalibreRate", 0), 0.0);
+    const double change = at(time + Step, "CalibreFactor", 3) - at(time - Step, "CalibreFactor", 3);
+    EXPECT_NEAR(at(time, "CalibreRate", 3), change / (2.0 * Step * 0.5), 1e-6);
+    EXPECT_GT(std::abs(change), 1e-8);
+    const auto turned = [&](double moment)
+    {
+      filter->UpdateTimeStep(moment);
+      double q[4];
+      Output(filter)->GetCellData()->GetArray("BoneRotation")->GetTuple(0, q);
+      return 2.0 * std::atan2(q[3], q[0]);
+    };
+    const double angle = turned(time + Step) - turned(time - Step);
+    filter->UpdateTimeStep(time);
+    double angular[3];
+    Output(filter)->GetCellData()->GetArray("BoneAngularVelocity")->GetTuple(0, angular);
+    EXPECT_NEAR(angular[0], 0.0, 1e-12);
+    EXPECT_NEAR(angular[2], angle / (2.0 * Step * 0.5), 1e-5);
+    EXPECT_GT(std::abs(angular[2]), 0.1);
+  }
+}
+
 TEST(CardiacPhaseInterpolator, CrossSectionsFromFactorsAndEllipses)
 {
   vtkNew<MovingSource> source;

@@ -7,6 +7,7 @@
 #include "MeshDistance.h"
 #include "MotionRegularization.h"
 #include "MotionTestData.h"
+#include "PeriodicSpline.h"
 #include "PhaseInterpolation.h"
 #include "SkeletonPose.h"
 #include "SkinDeformation.h"
@@ -869,14 +870,12 @@ TEST(RandomMotion, InterpolationKnowsNoFirstPhaseAndItsVelocityIsTheDerivative)
       for (int n = 0; n < 5; ++n)
       {
         // Not at a phase, where the velocity of the linear one jumps.
-        std::size_t before = 0;
-        std::size_t after = 0;
         double share = 0.0;
         double time = 0.0;
         do
         {
           time = random.Uniform(-2.0, 2.0);
-          motion.Bracket(time, before, after, share);
+          share = IntervalAt(motion.Knots(), time).share;
         } while (share < 0.01 || share > 0.99);
         motion.Evaluate(time, pose);
         turned.Evaluate(time + 1.0, other);

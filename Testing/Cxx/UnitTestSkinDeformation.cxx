@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
@@ -542,20 +543,28 @@ TEST(SkinDeformation, FramesAllocateNothing)
     }
     InversionReport report;
     report.tetrahedra.reserve(mesh.tetrahedra.size());
-    const auto frame = [&](const SkeletonPose& pose)
+    std::vector<MovingSkeletonPose> moving;
+    for (const SkeletonPose& pose : poses)
     {
+      moving.push_back(Differentiate(pose, { { &poses[0], -1.0 } }));
+    }
+    std::vector<double> velocities(precise.size());
+    const auto frame = [&](std::size_t n)
+    {
+      const SkeletonPose& pose = poses[n];
       skin.Deform(pose, positions.data());
       skin.Deform(pose, precise.data());
       skin.Displacements(positions.data(), other.data());
       skin.NormalsOf(positions.data(), other.data());
       skin.CheckTetrahedra(positions.data(), report);
-      SkinVelocities(positions.data(), other.data(), 0.1, 3, other.data());
+      skin.Deform(moving[n], positions.data(), other.data());
+      skin.Deform(moving[n], precise.data(), velocities.data());
     };
-    frame(poses[0]); // starts the threads
+    frame(0); // starts the threads
     const long before = Allocations;
-    for (const SkeletonPose& pose : poses)
+    for (std::size_t n = 0; n < poses.size(); ++n)
     {
-      frame(pose);
+      frame(n);
     }
     EXPECT_EQ(Allocations - before, 0);
   }
@@ -613,15 +622,277 @@ TEST(SkinDeformation, NormalsOfTheDeformedTriangles)
   EXPECT_EQ(normals, std::vector<float>(normals.size(), 0.0F));
 }
 
-TEST(SkinDeformation, VelocitiesAreDifferences)
+namespace
 {
-  const std::vector<double> now{ 1.0, 2.0, 4.0 };
-  const std::vector<double> before{ 0.0, 2.0, 5.0 };
-  std::vector<double> velocities(3);
-  SkinVelocities(now.data(), before.data(), 0.5, 3, velocities.data());
-  EXPECT_EQ(velocities, (std::vector<double>{ 2.0, 0.0, -2.0 }));
-  ExpectRefusal(
-    [&] { SkinVelocities(now.data(), before.data(), 0.0, 3, velocities.data()); }, "must not be 0");
+/// Velocities of a moving pose in double precision; those in single precision and the positions are held against it.
+std::vector<Vector3> VelocitiesOf(SkinDeformation& skin, const MovingSkeletonPose& moving)
+{
+  const auto count = static_cast<std::size_t>(3 * skin.NumberOfPoints());
+  SkeletonPose pose;
+  PoseNow(moving, pose);
+  std::vector<double> still(count);
+  std::vector<double> positions(count);
+  std::vector<double> velocities(count);
+  skin.Deform(pose, still.data());
+  skin.Deform(moving, positions.data(), velocities.data());
+  EXPECT_EQ(positions, still);
+  std::vector<Vector3> result;
+  double size = 0.0;
+  for (std::size_t i = 0; i < count; i += 3)
+  {
+    result.emplace_back(velocities[i], velocities[i + 1], velocities[i + 2]);
+    size = std::max(size, result.back().norm());
+  }
+  for (const SkinInstructions instructions :
+    { SkinInstructions::Baseline, SkinInstructions::Avx2, SkinInstructions::Avx512 })
+  {
+    if (SetSkinInstructions(instructions))
+    {
+      std::vector<float> stillSingle(count);
+      std::vector<float> single(count);
+      std::vector<float> rates(count);
+      skin.Deform(pose, stillSingle.data());
+      skin.Deform(moving, single.data(), rates.data());
+      EXPECT_EQ(single, stillSingle);
+      EXPECT_LT(GreatestDistance(result, rates), 2e-5 * (1.0 + size));
+    }
+  }
+  SetSkinInstructions(SkinInstructions::Widest);
+  return result;
+}
+
+/// The pose a little later, by its own derivative.
+SkeletonPose Later(const MovingSkeletonPose& moving, double seconds)
+{
+  SkeletonPose pose;
+  PoseNow(moving, pose);
+  for (std::size_t j = 0; j < pose.joints.size(); ++j)
+  {
+    for (int c = 0; c < 3; ++c)
+    {
+      pose.joints[j][c] += seconds * moving.joints[j][c].rate;
+    }
+  }
+  for (std::size_t b = 0; b < pose.rotation.size(); ++b)
+  {
+    for (int c = 0; c < 4; ++c)
+    {
+      pose.rotation[b].coeffs()[c] += seconds * moving.rotation[b].coeffs()[c].rate;
+    }
+  }
+  for (std::size_t b = 0; b < pose.twist.size(); ++b)
+  {
+    pose.twist[b] += seconds * moving.twist[b].rate;
+  }
+  for (std::size_t j = 0; j < pose.calibre.size(); ++j)
+  {
+    pose.calibre[j] += seconds * moving.calibre[j].rate;
+  }
+  return pose;
+}
+
+/// A chain at rest and a tube around it, on which `move` is done.
+struct MovingTube
+{
+  Skeleton rest = Chain(3, 10.0);
+  std::vector<Vector3> points = Tube(2.0, 30.0, 31, 8);
+  MovingSkeletonPose pose;
+
+  template <typename Velocity>
+  explicit MovingTube(const Velocity& velocity)
+  {
+    for (const Vector3& joint : this->rest.joints)
+    {
+      this->pose.joints.push_back(Moving(joint, velocity(joint)));
+    }
+  }
+
+  template <typename Velocity>
+  void Expect(const Velocity& velocity, double conservation = 0.0) const
+  {
+    for (const SkinBlend blend : Blends)
+    {
+      CompactSkinWeights weights = Weights(static_cast<std::int64_t>(this->points.size()), 1);
+      for (std::size_t i = 0; i < this->points.size(); ++i)
+      {
+        weights.bone[i] = std::min(2, static_cast<int>(this->points[i].z() / 10.0));
+        weights.weight[i] = 1.0F;
+      }
+      SkinDeformation skin(this->points, weights, this->rest, With(blend));
+      skin.SetVolumeConservation(conservation);
+      const std::vector<Vector3> found = VelocitiesOf(skin, this->pose);
+      for (std::size_t i = 0; i < found.size(); ++i)
+      {
+        ASSERT_LT((found[i] - velocity(this->points[i])).norm(), 1e-9)
+          << i << ": " << found[i].transpose() << " at " << this->points[i].transpose();
+      }
+    }
+  }
+};
+}
+
+TEST(SkinDeformation, VelocityOfRigidMotionIsTheScrew)
+{
+  const Vector3 omega(0.7, -0.4, 1.1);
+  const auto screw = [&](const Vector3& p) -> Vector3
+  { return omega.cross(p - Vector3(5.0, 1.0, -2.0)) + 3.0 * omega; };
+  for (unsigned seed = 0; seed < 4; ++seed)
+  {
+    const Case made = RandomCase(seed, 40, 1003, { -150.0, 80.0, 30.0 });
+    for (const SkinBlend blend : Blends)
+    {
+      SkinDeformation skin(made.points, made.weights, made.skeleton, With(blend));
+      MovingSkeletonPose pose;
+      for (const Vector3& joint : made.skeleton.joints)
+      {
+        pose.joints.push_back(Moving(joint, screw(joint)));
+      }
+      const std::vector<Vector3> found = VelocitiesOf(skin, pose);
+      for (std::size_t i = 0; i < found.size(); ++i)
+      {
+        ASSERT_LT((found[i] - screw(made.points[i])).norm(), 1e-8) << seed << " " << i;
+      }
+    }
+  }
+}
+
+TEST(SkinDeformation, VelocityOfStretchAlongTheBones)
+{
+  const MovingTube tube([](const Vector3& p) -> Vector3 { return { 0.0, 0.0, 0.3 * p.z() }; });
+  tube.Expect([](const Vector3& p) -> Vector3 { return { 0.0, 0.0, 0.3 * p.z() }; });
+  // With the volume kept the calibre goes with stretch^(-1/2).
+  tube.Expect(
+    [](const Vector3& p) -> Vector3 {
+      return { -0.15 * p.x(), -0.15 * p.y(), 0.3 * p.z() };
+    },
+    1.0);
+}
+
+TEST(SkinDeformation, VelocityOfCalibreAndTwist)
+{
+  const auto still = [](const Vector3&) -> Vector3 { return Vector3::Zero(); };
+  MovingTube wider(still);
+  for (int joint = 0; joint < 4; ++joint)
+  {
+    wider.pose.calibre.emplace_back(1.0, 0.2 * joint); // evenly along the bones
+  }
+  wider.Expect(
+    [](const Vector3& p) -> Vector3 {
+      return { 0.02 * p.z() * p.x(), 0.02 * p.z() * p.y(), 0.0 };
+    });
+  MovingTube twisted(still);
+  twisted.pose.twist = { 0.0, 0.0, Dual(0.0, 0.8) };
+  twisted.Expect(
+    [](const Vector3& p) -> Vector3
+    {
+      const double rate = 0.8 * std::clamp((p.z() - 20.0) / 10.0, 0.0, 1.0);
+      return { -rate * p.y(), rate * p.x(), 0.0 };
+    });
+  // What hangs on a twisted bone turns with it.
+  twisted.pose.twist = { 0.0, Dual(0.0, 0.8), 0.0 };
+  twisted.Expect(
+    [](const Vector3& p) -> Vector3
+    {
+      const double rate = 0.8 * std::clamp((p.z() - 10.0) / 10.0, 0.0, 1.0);
+      return { -rate * p.y(), rate * p.x(), 0.0 };
+    });
+}
+
+TEST(SkinDeformation, VelocityIsTheLimitOfDifferences)
+{
+  for (unsigned seed = 0; seed < 6; ++seed)
+  {
+    const Case made = RandomCase(seed, 40, 503, { -50.0, 30.0, 10.0 });
+    for (const SkinBlend blend : Blends)
+    {
+      for (const bool rotated : { false, true })
+      {
+        SkinDeformation skin(made.points, made.weights, made.skeleton, With(blend));
+        skin.SetVolumeConservation(0.2 * seed);
+        SkeletonPose pose = RandomPose(skin.Rig(), seed, 0.3, true);
+        if (rotated)
+        {
+          std::vector<BoneTransform> bones;
+          skin.Rig().Transform(pose, bones);
+          for (const BoneTransform& bone : bones)
+          {
+            pose.rotation.push_back(bone.rotation);
+          }
+        }
+        MovingSkeletonPose moving;
+        std::mt19937 random(seed);
+        std::normal_distribution<double> normal;
+        const auto some = [&] { return Vector3(normal(random), normal(random), normal(random)); };
+        for (std::size_t j = 0; j < pose.joints.size(); ++j)
+        {
+          moving.joints.push_back(Moving(pose.joints[j], some()));
+          moving.calibre.emplace_back(pose.calibre[j], 0.1 * normal(random));
+        }
+        for (std::size_t b = 0; b < pose.twist.size(); ++b)
+        {
+          moving.twist.emplace_back(pose.twist[b], 0.3 * normal(random));
+          if (rotated)
+          {
+            moving.rotation.push_back(Turning(pose.rotation[b], 0.3 * some()));
+          }
+        }
+        const std::vector<Vector3> found = VelocitiesOf(skin, moving);
+        const auto difference = [&](double step)
+        {
+          const std::vector<Vector3> before = Deformed(skin, Later(moving, -step));
+          const std::vector<Vector3> after = Deformed(skin, Later(moving, step));
+          double worst = 0.0;
+          for (std::size_t i = 0; i < found.size(); ++i)
+          {
+            worst = std::max(worst, ((after[i] - before[i]) / (2.0 * step) - found[i]).norm());
+          }
+          return worst;
+        };
+        double size = 0.0;
+        for (const Vector3& velocity : found)
+        {
+          size = std::max(size, velocity.norm());
+        }
+        // Second order, down to rounding.
+        const double coarse = difference(1e-3);
+        const double fine = difference(1e-4);
+        EXPECT_LT(fine, 0.011 * coarse + 1e-8 * size) << seed;
+        EXPECT_LT(difference(1e-5), 1e-6 * size) << seed;
+      }
+    }
+  }
+}
+
+TEST(SkinDeformation, DerivativesOfPosesOutOfNeighbours)
+{
+  const SkeletonRig rig(Chain(2, 10.0));
+  const auto at = [&](double time)
+  {
+    SkeletonPose pose = rig.RestPose();
+    pose.joints[2] += Vector3(time * time, 2.0 * time, 0.0);
+    pose.rotation[1] = Quaternion(Eigen::AngleAxisd(0.5 * time, Vector3::UnitX()));
+    pose.rotation[1].coeffs() *= time > 0.0 ? -1.0 : 1.0; // the same rotation
+    pose.twist[0] = 3.0 * time;
+    pose.calibre[1] = 1.0 + 0.1 * time * time;
+    return pose;
+  };
+  const SkeletonPose now = at(0.2);
+  const SkeletonPose before = at(-0.1);
+  const SkeletonPose after = at(0.5);
+  const MovingSkeletonPose moving =
+    Differentiate(now, { { &before, -1.0 / 0.6 }, { &after, 1.0 / 0.6 } });
+  EXPECT_NEAR(moving.joints[2].x().rate, 0.4, 1e-12);
+  EXPECT_NEAR(moving.joints[2].y().rate, 2.0, 1e-12);
+  EXPECT_EQ(moving.joints[2].x().value, now.joints[2].x());
+  const Quaternion rate(moving.rotation[1].w().rate, moving.rotation[1].x().rate,
+    moving.rotation[1].y().rate, moving.rotation[1].z().rate);
+  const Vector3 angular = 2.0 * (rate * now.rotation[1].conjugate()).vec();
+  EXPECT_LT((angular - Vector3(0.5, 0.0, 0.0)).norm(), 1e-12);
+  EXPECT_NEAR(moving.twist[0].rate, 3.0, 1e-12);
+  EXPECT_NEAR(moving.calibre[1].rate, 0.04, 1e-12);
+  SkeletonPose other = now;
+  other.twist.clear();
+  ExpectRefusal([&] { Differentiate(now, { { &other, 1.0 } }); }, "different parts");
 }
 
 TEST(SkinDeformation, InvertedTetrahedraAreFoundAndRepaired)
