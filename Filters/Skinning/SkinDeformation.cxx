@@ -923,7 +923,7 @@ void SkinDeformation::Internals::Deform(float* positions, const ProgressCallback
     this->SetBone(b, this->Motions[b], store, this->Bones[b]);
   }
   const bool dual = this->Settings.blend == SkinBlend::DualQuaternion;
-  const SkinPositions kernel = Selected().load()->positions[dual ? 1 : 0][this->Sections ? 1 : 0];
+  const SkinPositions kernel = SkinKernelChoice().Get().positions[dual ? 1 : 0][this->Sections ? 1 : 0];
   const auto body = [&](std::int64_t first, std::int64_t last)
   { kernel(this->Blocks, this->Bones.data(), this->FloatCentre.data(), first, last, positions); };
   For(static_cast<std::int64_t>(this->BlockOffset.size()) - 1, BlockGrain, body, progress);
@@ -944,7 +944,7 @@ void SkinDeformation::Internals::Deform(
     this->SetBone(b, this->MovingMotions[b], storeRate, this->MovingBones[b]);
   }
   const bool dual = this->Settings.blend == SkinBlend::DualQuaternion;
-  const SkinMotion kernel = Selected().load()->motion[dual ? 1 : 0][this->Sections ? 1 : 0];
+  const SkinMotion kernel = SkinKernelChoice().Get().motion[dual ? 1 : 0][this->Sections ? 1 : 0];
   const auto body = [&](std::int64_t first, std::int64_t last)
   {
     kernel(this->Blocks, this->MovingBones.data(), this->FloatCentre.data(), first, last, positions,
