@@ -22,6 +22,7 @@ namespace
 using coronaryVersion1::GoneProperty;
 using coronaryVersion1::MergedProxy;
 using coronaryVersion1::MergedSwitch;
+using coronaryVersion1::RenamedProperty;
 
 bool Is(vtkPVXMLElement* element, const char* name)
 {
@@ -102,6 +103,7 @@ public:
       this->Properties(proxy);
       this->Switches(proxy);
       this->Successor(proxy);
+      Rename(proxy);
     }
   }
 
@@ -159,6 +161,22 @@ private:
       if (element != nullptr && IsSame(ValueOf(property), merged.Automatic))
       {
         element->SetAttribute("value", merged.Value);
+      }
+    }
+  }
+
+  /// After the successor has been found: its properties are meant.
+  static void Rename(vtkPVXMLElement* proxy)
+  {
+    for (const RenamedProperty& renamed : coronaryVersion1::RenamedProperties)
+    {
+      vtkPVXMLElement* property =
+        std::strcmp(proxy->GetAttributeOrEmpty("type"), renamed.Proxy) == 0
+        ? PropertyOf(proxy, renamed.Property)
+        : nullptr;
+      if (property != nullptr)
+      {
+        property->SetAttribute("name", renamed.Name);
       }
     }
   }

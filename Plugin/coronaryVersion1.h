@@ -50,6 +50,28 @@ constexpr MergedSwitch MergedSwitches[] = {
   { "CoronaryMeshDistanceMetrics", "ClipEnds", "0", "EndLength", "0" },
 };
 
+/// The same property under another name.
+struct RenamedProperty
+{
+  const char* Proxy;
+  const char* Property;
+  const char* Name;
+};
+
+constexpr RenamedProperty RenamedProperties[] = {
+  { "CoronaryCenterlineMetrics", "LeastRadius", "MinimumRadius" },
+  { "CoronaryCenterlineMetrics", "LeastLength", "MinimumLength" },
+  { "CoronaryMotionRegularizer", "GreatestBending", "MaximumBending" },
+  { "CoronaryMotionRegularizer", "LeastCurvatureRadius", "MinimumCurvatureRadius" },
+  { "CoronaryMotionRegularizer", "GreatestStrain", "MaximumStrain" },
+  { "CoronaryMotionRegularizer", "GreatestStep", "MaximumStep" },
+  { "CoronarySkinDeformation", "LeastVolumeRatio", "MinimumVolumeRatio" },
+  { "CoronarySurfaceCleaner", "SmallestComponent", "MinimumComponentShare" },
+  { "VesselSegmentation", "LargestRadius", "MaximumRadius" },
+  { "VesselSegmentation", "SmallestIsland", "MinimumIslandVolume" },
+  { "VesselSegmentation", "LeastLinkConfidence", "MinimumLinkConfidence" },
+};
+
 struct GoneProperty
 {
   const char* Proxy;

@@ -49,6 +49,7 @@ def require_pipeline():
     require(find("Distance").EndLength == 0.0, "ends")
     branches = find("Branches")
     require(branches.GetXMLName() == "CoronaryCenterlineMetrics" and branches.Tolerance == 1.5, "the branches")
+    require(branches.MinimumLength == 4.0, "the property that was LeastLength")
     require(find("Still branches").Input.Port == 3 and find("Still lines").Input.Port == 3, "the outputs")
     require(fetch(find("Still branches"), 0, 0.0).GetCellData().HasArray("BranchMatch"), "no branches")
     require(fetch(find("Still lines"), 0, 0.0).GetCellData().HasArray("TractIds"), "no lines of VMTK")
@@ -59,7 +60,9 @@ def require_pipeline():
 def require_true_table():
     """The table names what is gone, and nothing that is there."""
     with open(os.path.join(source, "Plugin", "coronaryVersion1.h")) as file:
-        rows = re.findall(r'\{\s*"(\w+)",\s*"(\w+)",\s*"([^"]*)",\s*("|FixedName|PhantomOption)', file.read())
+        text = file.read()
+    rows = re.findall(r'\{\s*"(\w+)",\s*"(\w+)",\s*"([^"]*)",\s*("|FixedName|PhantomOption)', text)
+    renamed = re.findall(r'\{\s*"(\w+)",\s*"(\w+)",\s*"(\w+)"\s*\}', text)
     there = {}
     for path in glob.glob(os.path.join(source, "ServerManagerXML", "*.xml")):
         for proxy in ElementTree.parse(path).getroot().iter():
@@ -69,6 +72,9 @@ def require_true_table():
     for name, gone, value, _ in rows:
         # Rows of switches have the property that is left in fourth place.
         require(gone not in there.get(name, ()), "%s.%s is there" % (name, gone))
+    require(renamed, "no renamed properties")
+    for name, old, new in renamed:
+        require(new in there[name] and old not in there[name], "%s.%s is not %s" % (name, old, new))
 
 
 def require_python_error():
