@@ -441,7 +441,7 @@ void vtkCenterlineMetrics::CompareLines(const Polylines& result, const Polylines
   {
     throw std::invalid_argument("There is no method " + std::to_string(this->Method));
   }
-  Polylines sets[2] = { reference.lines, result.lines };
+  Polylines sets[2] = { reference, result };
   if (sets[0].radius.empty())
   {
     sets[0].radius.assign(sets[0].points.size(), this->Tolerance);
@@ -458,7 +458,7 @@ void vtkCenterlineMetrics::CompareLines(const Polylines& result, const Polylines
   }
   WriteTable(vtkTable::GetData(outputs, TablePort), overlap, paths,
     LabelsOf(referenceData, sets[0].lines.size()));
-  sets[0].radius = reference.lines.radius;
+  sets[0].radius = reference.radius;
   WriteLines(vtkPolyData::GetData(outputs, LinesPort), sets, overlap);
 }
 
