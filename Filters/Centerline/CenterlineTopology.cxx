@@ -4,6 +4,7 @@
 #include "DraftBranches.h"
 #include "LineGraph.h"
 #include "Median.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
@@ -249,9 +250,8 @@ void AddLoops(CenterlineTopology& tree, const LineGraph& graph,
   }
 }
 
-int AssignStrahler(CenterlineTopology& tree, const std::vector<std::vector<int>>& daughters)
+void AssignStrahler(CenterlineTopology& tree, const std::vector<std::vector<int>>& daughters)
 {
-  int highest = 0;
   for (std::size_t b = tree.branches.size(); b-- > 0;)
   {
     int order = 1;
@@ -263,9 +263,7 @@ int AssignStrahler(CenterlineTopology& tree, const std::vector<std::vector<int>>
       order = std::max(order, below);
     }
     tree.branches[b].strahlerOrder = order + (same > 1 ? 1 : 0);
-    highest = std::max(highest, tree.branches[b].strahlerOrder);
   }
-  return highest;
 }
 
 void ComputeGeometry(
@@ -337,14 +335,6 @@ void ComputeGeometry(
       tree.curvature[way[i]] = curve.curvature[i];
       tree.torsion[way[i]] = curve.torsion[i];
     }
-  }
-}
-
-void Require(bool condition, const char* message)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(message);
   }
 }
 }

@@ -2,12 +2,12 @@
 
 #include "HugeArray.h"
 #include "MarchingQueue.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
-#include <string>
 #include <unordered_map>
 
 namespace coronary
@@ -46,14 +46,6 @@ inline float FromBits(std::uint32_t bits)
 inline bool IsFinal(std::uint32_t bits)
 {
   return bits < NotReached;
-}
-
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("FastMarching: ") + requirement);
-  }
 }
 
 /// Arrays over all addresses.
@@ -300,7 +292,7 @@ public:
   {
   }
   void Seed(const FastMarchingSource& source);
-  bool Run();
+  void Run();
   std::size_t MemorySize() const
   {
     return this->Voxels.MemorySize() + this->Labels.MemorySize() + this->Queue.MemorySize();
@@ -308,9 +300,9 @@ public:
 
 private:
   template <bool SecondOrder, bool WithLengths>
-  bool RunAs();
-  bool RunAny();
-  bool RunWithAvx2();
+  void RunAs();
+  void RunAny();
+  void RunWithAvx2();
 
   const VoxelRegion& Region;
   const FastMarchingSettings& Settings;
@@ -405,7 +397,7 @@ void Front<Layout>::Seed(const FastMarchingSource& source)
 
 template <typename Layout>
 template <bool SecondOrder, bool WithLengths>
-inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
+inline __attribute__((always_inline)) void Front<Layout>::RunAs()
 {
   const VoxelRegion& region = this->Region;
   const Layout layout = this->Place;
@@ -413,7 +405,6 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
   Voxel* const voxels = this->Voxels.Data();
   std::uint8_t* const labels = this->Labels.Data();
   const bool oneLabel = this->OneLabel;
-  const double limit = this->Settings.stopAtArrival;
   const Differences differences(this->Settings.spacing);
   const auto bitsAt = [voxels](std::uint32_t voxel) { return voxels[voxel].bits; };
   const auto keep = [&](MarchingQueue::Entry entry)
@@ -432,19 +423,11 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
     if (reached % CheckInterval == CheckInterval - 1)
     {
       Report(this->Progress, static_cast<double>(reached) / region.Size());
-      if (this->Settings.goOn && !this->Settings.goOn(reached))
-      {
-        return false;
-      }
     }
     const MarchingQueue::Entry entry = queue.Least();
     const float arrival = MarchingQueue::Arrival(entry);
     const std::uint32_t arrivalBits = MarchingQueue::ArrivalBits(entry);
     const Address address = MarchingQueue::Address(entry);
-    if (arrival > limit)
-    {
-      return false;
-    }
     queue.RemoveLeast();
     ++reached;
     const std::uint32_t voxel = layout(address);
@@ -548,11 +531,10 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
     }
   }
   Report(this->Progress, 1.0);
-  return true;
 }
 
 template <typename Layout>
-inline __attribute__((always_inline)) bool Front<Layout>::RunAny()
+inline __attribute__((always_inline)) void Front<Layout>::RunAny()
 {
   if (this->Settings.secondOrder)
   {
@@ -563,14 +545,14 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAny()
 
 #if defined(__x86_64__)
 template <typename Layout>
-__attribute__((target("avx2,bmi,bmi2,popcnt"))) bool Front<Layout>::RunWithAvx2()
+__attribute__((target("avx2,bmi,bmi2,popcnt"))) void Front<Layout>::RunWithAvx2()
 {
   return this->RunAny();
 }
 #endif
 
 template <typename Layout>
-bool Front<Layout>::Run()
+void Front<Layout>::Run()
 {
 #if defined(__x86_64__)
   // Shorter code, and counting the bits of a word is one instruction. Without fused multiplication:
@@ -606,18 +588,18 @@ FastMarching::FastMarching(const VoxelRegion& region, std::vector<float> speed,
   , Progress(progress)
   , Speeds(std::move(speed))
 {
-  Require(
-    settings.spacing.allFinite() && settings.spacing.minCoeff() > 0.0, "spacing must be positive");
+  Require(settings.spacing.allFinite() && settings.spacing.minCoeff() > 0.0,
+    "FastMarching: spacing must be positive");
   Require(settings.sourceRadius >= 0.0 && std::isfinite(settings.sourceRadius),
-    "sourceRadius must not be negative");
-  Require(!(settings.stopAtArrival < 0.0), "stopAtArrival must not be negative");
-  Require(this->Speeds.size() == region.Size(), "one speed for each voxel of the region is needed");
+    "FastMarching: sourceRadius must not be negative");
+  Require(this->Speeds.size() == region.Size(),
+    "FastMarching: one speed for each voxel of the region is needed");
   Require(std::all_of(this->Speeds.begin(), this->Speeds.end(),
             [](float value) { return value > 0.0F && value < Infinite; }),
-    "speeds must be positive and finite");
+    "FastMarching: speeds must be positive and finite");
 }
 
-bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
+void FastMarching::March(const std::vector<FastMarchingSource>& sources)
 {
   const std::uint32_t count = this->Region.Size();
   if (this->Speeds.size() != count)
@@ -626,12 +608,12 @@ bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
   }
   for (const FastMarchingSource& source : sources)
   {
-    Require(source.label >= 0 && source.label < noSource, "labels must be 0 to 254");
-    Require(source.index.allFinite(), "sources must be finite");
+    Require(source.label >= 0 && source.label < noSource, "FastMarching: labels must be 0 to 254");
+    Require(source.index.allFinite(), "FastMarching: sources must be finite");
   }
   if (count == 0)
   {
-    return true;
+    return;
   }
   if (static_cast<double>(this->Region.AddressCount()) <= MostAddressesPerMember * count)
   {
@@ -641,7 +623,7 @@ bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
 }
 
 template <typename Layout>
-bool FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingSource>& sources)
+void FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingSource>& sources)
 {
   const std::uint32_t count = this->Region.Size();
   const bool oneLabel = std::all_of(sources.begin(), sources.end(),
@@ -657,7 +639,7 @@ bool FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingS
   {
     front.Seed(source);
   }
-  const bool exhausted = front.Run();
+  front.Run();
 
   this->Times.resize(count);
   this->Lengths.resize(this->Settings.lengths ? count : 0);
@@ -684,7 +666,6 @@ bool FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingS
       const std::uint8_t label = oneLabel ? only : front.Labels.Data()[layout(address)];
       this->Labels[number] = this->Times[number] < Infinite ? label : noSource;
     });
-  return exhausted;
 }
 
 std::size_t FastMarching::MemorySize() const

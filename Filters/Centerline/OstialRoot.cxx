@@ -72,9 +72,8 @@ public:
     {
       radii.push_back(this->Radius(i));
     }
-    std::sort(radii.begin(), radii.end());
     constexpr double usual = 1.8; // mm
-    this->Unit = std::max(radii[radii.size() / 2] / usual, 1.5 * image.SmallestSpacing());
+    this->Unit = std::max(MedianOf(radii) / usual, 1.5 * image.SmallestSpacing());
     this->Step = 0.3 * this->Unit;
     double length = 0.0;
     for (std::size_t i = 0; i < std::min(free + 1, branch.points.size()); ++i)
@@ -130,20 +129,12 @@ public:
 private:
   static constexpr double Longest = 20.0; ///< units of vessel that are looked at
 
-  const Vector3& PointOf(std::int64_t p) const
-  {
-    return this->Tree.points[static_cast<std::size_t>(p)];
-  }
+  const Vector3& PointOf(std::int64_t p) const { return this->Tree.points[p]; }
   const Vector3& Point(std::size_t i) const { return this->PointOf(this->Branch.points[i]); }
-  double Radius(std::size_t i) const
-  {
-    return this->Tree.radius[static_cast<std::size_t>(this->Branch.points[i])];
-  }
+  double Radius(std::size_t i) const { return this->Tree.radius[this->Branch.points[i]]; }
   double Confidence(std::size_t i) const
   {
-    return this->Tree.confidence.empty()
-      ? 1.0
-      : this->Tree.confidence[static_cast<std::size_t>(this->Branch.points[i])];
+    return this->Tree.confidence.empty() ? 1.0 : this->Tree.confidence[this->Branch.points[i]];
   }
   /// The first point at least so far along, or the last one that may move.
   std::size_t At(double length) const
@@ -208,7 +199,7 @@ private:
       for (auto p = at; p != other.points.end() && p + 1 != other.points.end(); ++p)
       {
         length += (this->PointOf(*(p + 1)) - this->PointOf(*p)).norm();
-        const double own = this->Tree.radius[static_cast<std::size_t>(*(p + 1))];
+        const double own = this->Tree.radius[*(p + 1)];
         if (length > reach)
         {
           break;
@@ -417,7 +408,7 @@ std::vector<OstialRoot> SettleRoots(
   {
     if (branch.parentGroupId != -1)
     {
-      begins[static_cast<std::size_t>(branch.points.front())] = 1;
+      begins[branch.points.front()] = 1;
     }
   }
   std::vector<OstialRoot> result;
@@ -429,8 +420,7 @@ std::vector<OstialRoot> SettleRoots(
     }
     // Points that other branches begin at stay, and with them all that follow.
     std::size_t free = 0;
-    while (
-      free + 1 < branch.points.size() && !begins[static_cast<std::size_t>(branch.points[free])])
+    while (free + 1 < branch.points.size() && !begins[branch.points[free]])
     {
       ++free;
     }

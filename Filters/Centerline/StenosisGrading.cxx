@@ -2,6 +2,8 @@
 
 #include "CoronaryAnatomy.h"
 #include "CurveSmoothing.h"
+#include "Median.h"
+#include "TreeLinks.h"
 #include "VesselTips.h"
 
 #include <Eigen/Dense>
@@ -14,8 +16,12 @@ namespace coronary
 {
 namespace
 {
-constexpr double Bin = 1.0;               ///< mm, of the regression
-constexpr double Fine = 0.5;              ///< mm, of the profile
+constexpr double LeastDegree = 0.30; ///< of what is listed
+constexpr double Wavelength = 80.0;  ///< mm along a vessel of the healthy calibre's changes
+constexpr double LeastSignificance =
+  3.0;                       ///< standard deviations by which a narrowing exceeds its error
+constexpr double Bin = 1.0;  ///< mm, of the regression
+constexpr double Fine = 0.5; ///< mm, of the profile
 constexpr double ProfileWavelength = 3.0; ///< mm, that the graded profile halves
 constexpr double HealthySpread = 0.06;    ///< relative, of radii around the healthy calibre
 constexpr double MethodError = 0.04;      ///< mm, of a radius, beside the image's noise
@@ -31,14 +37,6 @@ constexpr double NormalQuantile = 1.645; ///< 5 % to either side
 constexpr double UncertainRange = 0.8;   ///< of degrees: one that wide tells nothing
 constexpr double OccludedRadius = 0.2;   ///< mm: less is no lumen that can be seen
 constexpr double LostRadius = 0.35;      ///< mm: a lumen that is thinner may be lost in the noise
-
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("GradingSettings: ") + requirement);
-  }
-}
 
 /// One vessel at equal steps.
 struct Profile
@@ -129,8 +127,7 @@ std::vector<double> StepsAt(const CenterlineTree& tree, const std::vector<Vessel
     {
       continue;
     }
-    std::nth_element(radii.begin(), radii.begin() + radii.size() / 2, radii.end());
-    const double ratio = std::min(0.95, radii[radii.size() / 2] / std::max(own, 0.1));
+    const double ratio = std::min(0.95, MedianOf(radii) / std::max(own, 0.1));
     const double step = own * (1.0 - std::pow(1.0 - std::pow(ratio, 7.0 / 3.0), 3.0 / 7.0));
     const auto bin = std::min(
       profile.size() - 1, static_cast<std::size_t>(std::lround(path.arc[place] / profile.step)));
@@ -182,12 +179,12 @@ std::vector<double> UpperStart(const Profile& profile)
   return start;
 }
 
-Reference Regress(const Profile& profile, const std::vector<double>& steps, double wavelength)
+Reference Regress(const Profile& profile, const std::vector<double>& steps)
 {
   const auto count = static_cast<Eigen::Index>(profile.size());
   Reference reference;
   reference.radius = UpperStart(profile);
-  const double samples = wavelength / profile.step / (2.0 * M_PI);
+  const double samples = Wavelength / profile.step / (2.0 * M_PI);
   // Data count with 1 / (spread^2); the curve may bend as much as the wavelength lets it.
   const double stiffness = std::pow(samples, 4);
   std::vector<double> weights(profile.size(), 0.0);
@@ -230,8 +227,7 @@ Reference Regress(const Profile& profile, const std::vector<double>& steps, doub
     for (Eigen::Index i = 0; i + 2 < count; ++i)
     {
       // A step between two samples makes the two second differences over it free.
-      const bool step =
-        steps[i + 1] > 0.0 || (i + 2 < count && steps[i + 1] > 0.0) || (i > 0 && steps[i] > 0.0);
+      const bool step = steps[i + 1] > 0.0 || (i > 0 && steps[i] > 0.0);
       if (!step)
       {
         add({ { i, 1.0 }, { i + 1, -2.0 }, { i + 2, 1.0 } }, stiffness);
@@ -288,11 +284,11 @@ std::vector<double> Closed(const std::vector<double>& values, double length)
   };
   for (std::ptrdiff_t i = 0; i < count; ++i)
   {
-    dilated[static_cast<std::size_t>(i)] = extreme(values, i, true);
+    dilated[i] = extreme(values, i, true);
   }
   for (std::ptrdiff_t i = 0; i < count; ++i)
   {
-    closed[static_cast<std::size_t>(i)] = extreme(dilated, i, false);
+    closed[i] = extreme(dilated, i, false);
   }
   return closed;
 }
@@ -303,9 +299,6 @@ struct GradedPath
   const CenterlineTree& tree;
   const VesselPath& path;
   const RefinedLumen& lumen;
-  const std::vector<unsigned char>& bridged;
-  const std::vector<double>& bridgeConfidence;
-  const GradingSettings& settings;
   Profile profile;
   std::vector<double> smooth;    ///< radius, mm
   std::vector<double> reference; ///< mm
@@ -318,7 +311,7 @@ struct GradedPath
   }
   bool IsBridged(std::size_t sample) const
   {
-    return !this->bridged.empty() && this->bridged[this->PointAt(sample)] != 0;
+    return coronary::IsBridged(this->tree, this->PointAt(sample));
   }
   bool IsHidden(std::size_t sample) const
   {
@@ -373,7 +366,7 @@ void GradedPath::DescribeEnd(const VesselTip& tip, std::vector<Stenosis>& lesion
     std::max(tip.before, RadiusBeforeTip(this->tree, this->path, farther[0], farther[1]));
   // What ends in full calibre shows no lesion.
   constexpr double narrowed = 0.85; // of the radius before
-  if (healthy < this->settings.leastReferenceRadius || tip.end > narrowed * tip.before)
+  if (healthy < LeastGradedRadius || tip.end > narrowed * tip.before)
   {
     return;
   }
@@ -412,9 +405,9 @@ void GradedPath::Describe(
     if (this->IsBridged(i))
     {
       lesion.bridged = true;
-      bridgeTrust = this->bridgeConfidence.empty()
+      bridgeTrust = this->tree.bridgeConfidence.empty()
         ? std::min(bridgeTrust, 0.5)
-        : std::min(bridgeTrust, this->bridgeConfidence[p]);
+        : std::min(bridgeTrust, this->tree.bridgeConfidence[p]);
     }
   }
   const auto samples = static_cast<double>(last - first + 1);
@@ -433,7 +426,7 @@ void GradedPath::Describe(
   const double referenceError = std::hypot(0.03 * healthy, 0.5 * this->spread);
   const double significance = (healthy - radius) / std::hypot(deviation, referenceError);
   // Behind calcium a narrowing can not be told from none: it is listed, with the range of all that it may be.
-  if (!lesion.interpolated && significance < this->settings.leastSignificance)
+  if (!lesion.interpolated && significance < LeastSignificance)
   {
     return;
   }
@@ -478,11 +471,10 @@ void GradedPath::FindLesions(std::vector<Stenosis>& lesions) const
   {
     // The worst place that is left, then down to half of it on either side.
     std::size_t least = count;
-    double worst = this->settings.leastDegree;
+    double worst = LeastDegree;
     for (std::size_t i = start; i + tip < count; ++i)
     {
-      if (taken[i] == 0 && this->degree[i] >= worst &&
-        this->reference[i] >= this->settings.leastReferenceRadius)
+      if (taken[i] == 0 && this->degree[i] >= worst && this->reference[i] >= LeastGradedRadius)
       {
         worst = this->degree[i];
         least = i;
@@ -528,18 +520,6 @@ void GradedPath::FindLesions(std::vector<Stenosis>& lesions) const
     }
   }
 }
-}
-
-void GradingSettings::Validate() const
-{
-  Require(this->leastDegree >= 0.05 && this->leastDegree <= 0.95,
-    "leastDegree must be from 0.05 to 0.95");
-  Require(this->leastReferenceRadius >= 0.2 && this->leastReferenceRadius <= 3.0,
-    "leastReferenceRadius must be from 0.2 to 3 mm");
-  Require(
-    this->wavelength >= 10.0 && this->wavelength <= 500.0, "wavelength must be from 10 to 500 mm");
-  Require(this->leastSignificance >= 0.0 && this->leastSignificance <= 20.0,
-    "leastSignificance must be from 0 to 20");
 }
 
 const char* LesionKindName(LesionKind kind)
@@ -601,17 +581,13 @@ double PopulationDiameter(int segmentId)
   }
 }
 
-StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
-  const RefinedLumen& lumen, const std::vector<unsigned char>& bridged,
-  const std::vector<double>& bridgeConfidence, const GradingSettings& settings)
+StenosisGrading GradeStenoses(
+  const CenterlineTree& tree, const std::vector<VesselPath>& paths, const RefinedLumen& lumen)
 {
-  settings.Validate();
   CheckTree(tree);
   const std::size_t points = tree.points.size();
   if (lumen.measured.size() != points || lumen.deviation.size() != points ||
-    lumen.calcium.size() != points || lumen.interpolated.size() != points ||
-    (!bridged.empty() && bridged.size() != points) ||
-    (!bridgeConfidence.empty() && bridgeConfidence.size() != points))
+    lumen.calcium.size() != points || lumen.interpolated.size() != points)
   {
     throw std::invalid_argument("GradeStenoses: arrays must have one value a point of the tree");
   }
@@ -619,6 +595,7 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
   result.degree.assign(points, 0.0);
   result.referenceRadius = tree.radius;
   const std::vector<VesselTip> tips = JudgeTips(tree, paths);
+  const std::vector<std::int64_t> branches = BranchesOfPoints(tree);
   for (std::size_t n = 0; n < paths.size(); ++n)
   {
     const VesselPath& path = paths[n];
@@ -628,10 +605,9 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
     {
       continue;
     }
-    const Reference reference =
-      Regress(coarse, StepsAt(tree, paths, n, coarse), settings.wavelength);
-    GradedPath graded{ tree, path, lumen, bridged, bridgeConfidence, settings,
-      Resample(path, lumen, Fine), {}, {}, {}, reference.spread };
+    const Reference reference = Regress(coarse, StepsAt(tree, paths, n, coarse));
+    GradedPath graded{ tree, path, lumen, Resample(path, lumen, Fine), {}, {}, {},
+      reference.spread };
     const auto referenceAt = [&](double arc)
     {
       const double at = std::clamp(arc / Bin, 0.0, static_cast<double>(coarse.size() - 1));
@@ -653,14 +629,13 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
         std::min(referenceAt(static_cast<double>(i) * Fine), ClosedMargin * open[i]));
       graded.degree.push_back(std::clamp(1.0 - graded.smooth[i] / graded.reference[i], 0.0, 1.0));
     }
-    for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
+    for (std::size_t i = path.FirstOwn(); i < path.points.size(); ++i)
     {
       const std::int64_t p = path.points[i];
       const auto sample = std::min(
         graded.profile.size() - 1, static_cast<std::size_t>(std::lround(path.arc[i] / Fine)));
       result.referenceRadius[p] = graded.reference[sample];
-      result.degree[p] = lumen.measured[p] > 0.0 || lumen.interpolated[p] != 0 ||
-          (!bridged.empty() && bridged[p] != 0)
+      result.degree[p] = lumen.measured[p] > 0.0 || lumen.interpolated[p] != 0 || IsBridged(tree, p)
         ? graded.degree[sample]
         : 0.0;
     }
@@ -670,15 +645,7 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
     {
       graded.DescribeEnd(tips[n], result.lesions);
     }
-    int treeId = 0;
-    for (const CenterlineTree::Branch& branch : tree.branches)
-    {
-      if (std::find(branch.points.begin(), branch.points.end(), path.points.back()) !=
-        branch.points.end())
-      {
-        treeId = branch.treeId;
-      }
-    }
+    const int treeId = tree.branches[branches[path.points.back()]].treeId;
     for (std::size_t l = before; l < result.lesions.size(); ++l)
     {
       result.lesions[l].treeId = treeId;

@@ -1,24 +1,17 @@
 #include "SurfaceDistance.h"
 
+#include "Require.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 namespace coronary
 {
 namespace
 {
-void Require(bool condition, const char* requirement)
-{
-  if (!condition)
-  {
-    throw std::invalid_argument(std::string("SurfaceDistance: ") + requirement);
-  }
-}
-
 std::int64_t CountOpenEdges(const std::vector<Triangle>& triangles)
 {
   std::vector<std::pair<std::int64_t, std::int64_t>> edges;
@@ -64,18 +57,18 @@ Extent Measure(const std::vector<Vector3>& points, const std::vector<Triangle>& 
     for (const std::int64_t p : t)
     {
       Require(p >= 0 && p < static_cast<std::int64_t>(points.size()),
-        "a triangle refers to a point that does not exist");
-      Require(points[static_cast<std::size_t>(p)].allFinite(), "a point is not finite");
-      low = low.cwiseMin(points[static_cast<std::size_t>(p)]);
-      high = high.cwiseMax(points[static_cast<std::size_t>(p)]);
+        "SurfaceDistance: a triangle refers to a point that does not exist");
+      Require(points[p].allFinite(), "SurfaceDistance: a point is not finite");
+      low = low.cwiseMin(points[p]);
+      high = high.cwiseMax(points[p]);
     }
   }
   for (const Triangle& t : triangles)
   {
     // Relative to a corner: far from the origin the volume would lose its digits.
-    const Vector3 a = points[static_cast<std::size_t>(t[0])] - low;
-    const Vector3 b = points[static_cast<std::size_t>(t[1])] - low;
-    const Vector3 c = points[static_cast<std::size_t>(t[2])] - low;
+    const Vector3 a = points[t[0]] - low;
+    const Vector3 b = points[t[1]] - low;
+    const Vector3 c = points[t[2]] - low;
     volume += a.dot(b.cross(c)) / 6.0;
     area += 0.5 * (b - a).cross(c - a).norm();
   }
@@ -104,8 +97,7 @@ public:
 private:
   Vector3 Corner(std::size_t t, int i) const
   {
-    return Vector3(
-      this->Points[static_cast<std::size_t>(this->Triangles[t][i])] - this->Result.grid.origin);
+    return Vector3(this->Points[this->Triangles[t][i]] - this->Result.grid.origin);
   }
 
   const std::vector<Vector3>& Points;
@@ -253,8 +245,8 @@ void DistanceField::Add(std::size_t t)
       if (inside(a, b, side(a, b)) && inside(b, c, side(b, c)) && inside(c, a, side(c, a)))
       {
         const double x = a[0] - ((y - a[1]) * normal[1] + (z - a[2]) * normal[2]) / normal[0];
-        this->Crossings[static_cast<std::size_t>(static_cast<std::int64_t>(k) * this->Size[1] + j)]
-          .emplace_back(static_cast<float>(x / spacing), normal[0] > 0.0 ? -1 : 1);
+        this->Crossings[static_cast<std::int64_t>(k) * this->Size[1] + j].emplace_back(
+          static_cast<float>(x / spacing), normal[0] > 0.0 ? -1 : 1);
       }
     }
   }
@@ -265,7 +257,7 @@ void DistanceField::MarkInside(int orientation)
   this->Inside.assign(this->Result.values.size(), 0);
   for (std::int64_t r = 0; r < static_cast<std::int64_t>(this->Crossings.size()); ++r)
   {
-    std::vector<std::pair<float, int>>& row = this->Crossings[static_cast<std::size_t>(r)];
+    std::vector<std::pair<float, int>>& row = this->Crossings[r];
     std::sort(row.begin(), row.end());
     int depth = 0;
     std::size_t next = 0;
@@ -285,7 +277,7 @@ void DistanceField::MarkInside(int orientation)
       {
         depth += orientation * row[next++].second;
       }
-      this->Inside[static_cast<std::size_t>(r * this->Size[0] + i)] = depth > 0;
+      this->Inside[r * this->Size[0] + i] = depth > 0;
     }
   }
 }
@@ -296,12 +288,12 @@ void DistanceField::PassInwards(bool forward)
   for (std::int64_t at = 0; at < static_cast<std::int64_t>(distance.size()); ++at)
   {
     const std::int64_t v = forward ? at : static_cast<std::int64_t>(distance.size()) - 1 - at;
-    if (!this->Inside[static_cast<std::size_t>(v)])
+    if (!this->Inside[v])
     {
       continue;
     }
-    float& best = distance[static_cast<std::size_t>(v)];
-    std::int32_t& triangle = this->Nearest[static_cast<std::size_t>(v)];
+    float& best = distance[v];
+    std::int32_t& triangle = this->Nearest[v];
     const std::int64_t k = v / this->SliceStep;
     const std::int64_t j = v % this->SliceStep / this->RowStep;
     const Vector3 p = this->Spacing * Vector3(v % this->RowStep, j, k);
@@ -310,7 +302,7 @@ void DistanceField::PassInwards(bool forward)
            this->RowStep + 1, this->SliceStep + 1, this->SliceStep + this->RowStep,
            this->RowStep - 1, this->SliceStep - 1, this->SliceStep - this->RowStep })
     {
-      const std::int32_t other = this->Nearest[static_cast<std::size_t>(v + direction * step)];
+      const std::int32_t other = this->Nearest[v + direction * step];
       if (other < 0 || other == triangle)
       {
         continue;
@@ -341,15 +333,16 @@ SurfaceDistance ComputeSurfaceDistance(const std::vector<Vector3>& points,
   const std::vector<Triangle>& triangles, double spacing, std::int64_t maximumVoxels,
   const ProgressCallback& progress)
 {
-  Require(!triangles.empty(), "the surface has no triangles");
-  Require(std::isfinite(spacing) && spacing >= 0.0, "spacing must not be negative");
+  Require(!triangles.empty(), "SurfaceDistance: the surface has no triangles");
+  Require(
+    std::isfinite(spacing) && spacing >= 0.0, "SurfaceDistance: spacing must not be negative");
   const Extent extent = Measure(points, triangles);
-  Require(extent.area > 0.0, "all triangles are degenerate");
+  Require(extent.area > 0.0, "SurfaceDistance: all triangles are degenerate");
   const Vector3 size = extent.high - extent.low;
   if (spacing == 0.0)
   {
     spacing = 0.5 * std::abs(extent.volume) / extent.area;
-    Require(spacing > 0.0, "the surface encloses nothing");
+    Require(spacing > 0.0, "SurfaceDistance: the surface encloses nothing");
   }
   const double most = static_cast<double>(maximumVoxels);
   const auto voxelsAt = [&](double h) { return (size / h + Vector3::Constant(7.0)).prod(); };

@@ -11,6 +11,7 @@
 #include <queue>
 #include <stdexcept>
 #include <unordered_set>
+#include <utility>
 
 namespace coronary
 {
@@ -22,7 +23,7 @@ BloodWindow VoxelSegmentation<T>::MeasureWindow(const std::vector<std::array<int
   constexpr double near = 2.5;
   constexpr double far = 12.0;
   std::vector<double> bloods;
-  std::vector<float> values;
+  std::vector<double> values;
   bool darker = false;
   for (const std::array<int, 3>& place : places)
   {
@@ -62,14 +63,11 @@ BloodWindow VoxelSegmentation<T>::MeasureWindow(const std::vector<std::array<int
       });
   }
   BloodWindow window;
-  std::sort(bloods.begin(), bloods.end());
-  window.blood = bloods[bloods.size() / 2];
+  window.blood = MedianOf(std::move(bloods));
   window.tissue = darker ? 0.0 : window.blood;
   if (!values.empty())
   {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    window.tissue = *middle;
+    window.tissue = MedianOf(std::move(values));
   }
   return window;
 }
@@ -82,7 +80,7 @@ double VoxelSegmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>
   constexpr double radius = 20.0;
   constexpr double percentile = 0.995;
   constexpr double share = 0.6;
-  std::vector<float> values;
+  std::vector<double> values;
   for (const std::array<int, 3>& place : places)
   {
     this->L.Ball(place, radius,
@@ -98,10 +96,8 @@ double VoxelSegmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>
   {
     return 1.0;
   }
-  const auto place =
-    values.begin() + static_cast<std::ptrdiff_t>(percentile * static_cast<double>(values.size()));
-  std::nth_element(values.begin(), place, values.end());
-  return *place > 0.0f ? share * *place : 1.0;
+  const double tube = QuantileOf(std::move(values), percentile);
+  return tube > 0.0 ? share * tube : 1.0;
 }
 
 template <typename T>
@@ -684,25 +680,15 @@ void VoxelSegmentation<T>::KeepConnected()
 {
   const SparseVoxels<std::int32_t> numbers = this->MemberNumbers();
   constexpr unsigned char connected = 8;
-  std::vector<std::int64_t> stack;
   const auto flood = [&](std::int64_t from)
   {
-    stack.assign(1, from);
-    this->States[from] = connected;
-    while (!stack.empty())
-    {
-      const std::int64_t at = stack.back();
-      stack.pop_back();
-      this->L.Neighbours(at,
-        [&](std::int64_t next, float)
-        {
-          if (this->States[next] == Vessel)
-          {
-            this->States[next] = connected;
-            stack.push_back(next);
-          }
-        });
-    }
+    this->L.Connected(from,
+      [this](std::int64_t voxel)
+      {
+        const bool vessel = this->States[voxel] == Vessel;
+        this->States[voxel] = vessel ? connected : this->States[voxel];
+        return vessel;
+      });
   };
   // In the order of their paths: what is before a member is decided when it comes.
   for (const Member& m : this->Members)

@@ -13,8 +13,7 @@ MeasuredLesions MeasureLesions(const CenterlineTree& tree, const ScalarImage& im
   MeasuredLesions measured{ MeasureTreeLumen(tree, paths, image, blur), {}, {} };
   const CenterlineTree& refined = measured.refined = WithLumen(tree, measured.lumen);
   MeasureCalcium(measured.calcium, refined, paths, image, measured.levels, blur);
-  measured.grading =
-    GradeStenoses(refined, paths, measured.lumen, refined.bridged, refined.bridgeConfidence);
+  measured.grading = GradeStenoses(refined, paths, measured.lumen);
   return measured;
 }
 
