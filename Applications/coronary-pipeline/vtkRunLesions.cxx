@@ -194,8 +194,7 @@ TreeLesions GradeTreeLesions(vtkPolyData* tree, vtkImageData* image, double blur
       MeasureTreeLumen(measurement.tree, measurement.paths, measurement.image, blur, report);
     MeasureCalcium(measurement.calcium, measurement.tree, measurement.paths, measurement.image,
       measurement.levels, blur);
-    grading = GradeStenoses(measurement.tree, measurement.paths, measurement.lumen,
-      measurement.tree.bridged, measurement.tree.bridgeConfidence);
+    grading = GradeStenoses(measurement.tree, measurement.paths, measurement.lumen);
   }
   for (const Stenosis& lesion : grading.lesions)
   {

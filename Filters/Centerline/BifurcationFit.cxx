@@ -1,5 +1,6 @@
 #include "BifurcationFit.h"
 
+#include "CrossFrame.h"
 #include "Median.h"
 #include "ParallelFor.h"
 
@@ -302,7 +303,7 @@ Eigen::VectorXd Fit::Residuals(const Eigen::VectorXd& p) const
   Eigen::VectorXd r(walls + 23);
   for (Eigen::Index i = 0; i < walls; ++i)
   {
-    const Vector3& wall = this->Walls[static_cast<std::size_t>(i)];
+    const Vector3& wall = this->Walls[i];
     const Foot onThrough = Nearest(wall, throughLine);
     const double share = std::clamp((onThrough.place - 1.0) / Pieces, 0.0, 1.0);
     const double throughRadius =
@@ -414,7 +415,7 @@ BifurcationFit Fit::Run(double leastTurn)
     return result;
   }
   const auto angle = [&](const Vector3& direction)
-  { return std::acos(std::clamp(this->Inwards.dot(direction.normalized()), -1.0, 1.0)); };
+  { return UnitAngle(this->Inwards, direction.normalized()); };
   result.turn =
     angle(this->Axes.side[this->End] - this->Axes.side[this->Alone]) - angle(this->Outwards);
   if (result.turn < leastTurn)

@@ -73,7 +73,7 @@ std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
   const std::vector<std::int64_t>& chain, std::int32_t owner, const CourseMeasurement& measurement)
 {
   const auto meeting = std::find(chain.begin(), chain.end(), owner) - chain.begin();
-  const double parentRadius = tree.radius[static_cast<std::size_t>(owner)];
+  const double parentRadius = tree.radius[owner];
   const auto window = static_cast<std::ptrdiff_t>(
     std::ceil((3.5 * parentRadius + 3.0 * measurement.voxel) / measurement.step));
   const auto low = std::max<std::ptrdiff_t>(0, meeting - window);
@@ -86,7 +86,7 @@ std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
     double least = std::numeric_limits<double>::infinity();
     for (std::ptrdiff_t i = low; i <= high; ++i)
     {
-      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      const auto p = static_cast<std::size_t>(chain[i]);
       least = std::min(least, (point - tree.points[p]).norm() / tree.radius[p]);
     }
     return least;
@@ -137,14 +137,14 @@ std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
       // A great branch leaves in the direction of the flow and bends away, inside the lumen too.
       const auto at = [&](std::ptrdiff_t i) -> const Vector3&
       {
-        const std::int64_t p = chain[static_cast<std::size_t>(i)];
-        return tree.points[static_cast<std::size_t>(p)];
+        const std::int64_t p = chain[i];
+        return tree.points[p];
       };
       direction = (direction + GreatBranchBend * (at(high) - at(low)).normalized()).normalized();
     }
     for (std::ptrdiff_t i = low; i <= high; ++i)
     {
-      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      const auto p = static_cast<std::size_t>(chain[i]);
       // Behind the daughter's beginning, and not far away.
       const double along = (tree.points[p] - samples.front()).dot(direction);
       const double distance = LineDistance(tree.points[p], samples.front(), direction) +
@@ -161,7 +161,7 @@ std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
     least = std::numeric_limits<double>::infinity();
     for (std::ptrdiff_t i = low; i <= high; ++i)
     {
-      const auto p = static_cast<std::size_t>(chain[static_cast<std::size_t>(i)]);
+      const auto p = static_cast<std::size_t>(chain[i]);
       const double distance = (tree.points[p] - course.points[good]).norm();
       if (distance < least)
       {
@@ -172,33 +172,14 @@ std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
   }
 
   // A straight line from axis to axis; its samples are guesses.
-  MeasuredCourse joined;
-  const auto add = [&](const Vector3& point, double confidence)
-  {
-    joined.points.push_back(point);
-    joined.radius.push_back(course.radius[good]);
-    joined.confidence.push_back(confidence);
-    joined.lumen.push_back(0.0);
-  };
-  const std::vector<Vector3> bridge = ResampleCurve(
+  std::vector<Vector3> start = ResampleCurve(
     { tree.points[best], arcs.empty() ? course.points[good] : arcs.front() }, measurement.step);
-  for (std::size_t i = 0; i + 1 < bridge.size(); ++i)
-  {
-    add(bridge[i], 0.0);
-  }
-  for (const Vector3& arc : arcs)
-  {
-    add(arc, 0.5 * course.confidence[good]);
-  }
-  joined.points.insert(joined.points.end(),
-    course.points.begin() + static_cast<std::ptrdiff_t>(good), course.points.end());
-  joined.radius.insert(joined.radius.end(),
-    course.radius.begin() + static_cast<std::ptrdiff_t>(good), course.radius.end());
-  joined.confidence.insert(joined.confidence.end(),
-    course.confidence.begin() + static_cast<std::ptrdiff_t>(good), course.confidence.end());
-  joined.lumen.insert(joined.lumen.end(), course.lumen.begin() + static_cast<std::ptrdiff_t>(good),
-    course.lumen.end());
-  course = std::move(joined);
+  start.pop_back();
+  const std::size_t straight = start.size();
+  start.insert(start.end(), arcs.begin(), arcs.end());
+  const double seen = 0.5 * course.confidence[good];
+  course.ReplaceStart(good, start);
+  std::fill_n(course.confidence.begin() + static_cast<std::ptrdiff_t>(straight), arcs.size(), seen);
   return best;
 }
 }

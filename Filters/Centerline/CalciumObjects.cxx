@@ -1,13 +1,17 @@
 #include "CalciumObjects.h"
 
 #include "BlurredDisc.h"
+#include "CrossFrame.h"
+#include "GridIndex.h"
 #include "LumenMeasurement.h"
 #include "Median.h"
 #include "Require.h"
+#include "VoxelLattice.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 namespace coronary
 {
@@ -17,66 +21,12 @@ constexpr double DimmestLevel = 0.9;      ///< of the tree's usual one, that thr
 constexpr double SliceThickness = 3.0;    ///< mm, of Agatston's rule
 constexpr double LeastSliceArea = 1.0;    ///< mm^2, of Agatston's rule
 constexpr double HighestDensity = 3000.0; ///< HU, of what is taken for a deposit's own value
-
-/// The voxels of an image by their index along the axes.
-struct Lattice
-{
-  explicit Lattice(const ScalarImage& image)
-    : grid(image.grid)
-    , size(image.Dimensions())
-  {
-    this->inverse =
-      this->grid.spacing.cwiseInverse().asDiagonal() * this->grid.direction.transpose();
-    this->volume = this->grid.spacing.prod();
-  }
-
-  std::array<std::int64_t, 3> IndexOf(std::int64_t offset) const
-  {
-    return { offset % this->size[0], offset / this->size[0] % this->size[1],
-      offset / this->size[0] / this->size[1] };
-  }
-  bool Contains(const std::array<std::int64_t, 3>& n) const
-  {
-    return n[0] >= 0 && n[1] >= 0 && n[2] >= 0 && n[0] < this->size[0] && n[1] < this->size[1] &&
-      n[2] < this->size[2];
-  }
-  std::int64_t OffsetOf(const std::array<std::int64_t, 3>& n) const
-  {
-    return (n[2] * this->size[1] + n[1]) * this->size[0] + n[0];
-  }
-  Vector3 PositionOf(const std::array<std::int64_t, 3>& n) const
-  {
-    return this->grid.IndexToWorld(static_cast<double>(n[0] + this->grid.extent[0]),
-      static_cast<double>(n[1] + this->grid.extent[2]),
-      static_cast<double>(n[2] + this->grid.extent[4]));
-  }
-  /// Relative to the first voxel, not rounded.
-  Vector3 ToIndex(const Vector3& position) const
-  {
-    return this->inverse * (position - this->grid.origin) -
-      Vector3(this->grid.extent[0], this->grid.extent[2], this->grid.extent[4]);
-  }
-
-  ImageGrid grid;
-  std::array<int, 3> size;
-  Matrix3 inverse;
-  double volume; ///< of a voxel, mm^3
-};
-
-template <typename Visit>
-void ForNeighbours(const Lattice& lattice, std::int64_t offset, const Visit& visit)
-{
-  const std::array<std::int64_t, 3> n = lattice.IndexOf(offset);
-  for (int side = 0; side < 27; ++side)
-  {
-    const std::array<std::int64_t, 3> other{ n[0] + side % 3 - 1, n[1] + side / 3 % 3 - 1,
-      n[2] + side / 9 - 1 };
-    if (side != 13 && lattice.Contains(other))
-    {
-      visit(lattice.OffsetOf(other));
-    }
-  }
-}
+constexpr double WallDistance = 2.5; ///< mm from the lumen's wall: what is farther off is no plaque
+constexpr double SeedShare = 0.30;   ///< of the lumen's contrast: above it an object's core
+constexpr double SeedDeviations = 5.0; ///< and so many standard deviations of the noise
+constexpr double GrowShare = 0.15;     ///< the same for its surroundings
+constexpr double GrowDeviations = 3.0;
+constexpr std::size_t LeastVoxels = 2; ///< of an object
 
 /// What a voxel has to be brighter than: where the lumen seems dim it may only be blurred.
 double LevelAt(const LumenLevels& levels, std::int64_t point)
@@ -91,14 +41,18 @@ double ContrastAt(const LumenLevels& levels, std::int64_t point)
 
 /// Voxels above the lower threshold beside the tree, by offset, without labels.
 std::vector<CalciumVoxel> BrightVoxels(const VesselTree& tree, const ScalarImage& image,
-  const LumenLevels& levels, const CalciumSettings& settings, const ProgressCallback& progress)
+  const LumenLevels& levels, const ProgressCallback& progress)
 {
-  const Lattice lattice(image);
+  const VoxelLattice lattice(image.grid);
+  const ImageInterpolator interpolator(image);
+  const std::array<int, 6>& e = image.grid.extent;
+  const Vector3 first(e[0], e[2], e[4]);
+  const std::array<int, 6> extent{ 0, e[1] - e[0], 0, e[3] - e[2], 0, e[5] - e[4] };
   const auto threshold = [&](std::size_t p)
   {
     return LevelAt(levels, static_cast<std::int64_t>(p)) +
-      std::max(settings.growShare * ContrastAt(levels, static_cast<std::int64_t>(p)),
-        settings.growDeviations * levels.noise);
+      std::max(GrowShare * ContrastAt(levels, static_cast<std::int64_t>(p)),
+        GrowDeviations * levels.noise);
   };
   std::unordered_map<std::int64_t, CalciumVoxel> found;
   for (std::size_t p = 0; p < tree.points.size(); ++p)
@@ -108,54 +62,35 @@ std::vector<CalciumVoxel> BrightVoxels(const VesselTree& tree, const ScalarImage
       Report(progress, static_cast<double>(p) / static_cast<double>(tree.points.size()));
     }
     const double least = threshold(p);
-    const double reach = tree.radius[p] + settings.wallDistance;
-    const Vector3 centre = lattice.ToIndex(tree.points[p]);
-    std::array<std::int64_t, 3> low;
-    std::array<std::int64_t, 3> high;
-    bool inside = true;
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      const double extent = reach / lattice.grid.spacing[axis];
-      low[axis] = std::max<std::int64_t>(0, std::llround(std::ceil(centre[axis] - extent)));
-      high[axis] = std::min<std::int64_t>(
-        lattice.size[axis] - 1, std::llround(std::floor(centre[axis] + extent)));
-      inside = inside && low[axis] <= high[axis];
-    }
-    if (!inside)
-    {
-      continue;
-    }
+    const double reach = tree.radius[p] + WallDistance;
+    // Relative to the first voxel.
+    const IndexBox box = BoxAround(interpolator.ToIndex(tree.points[p]) - first,
+      Vector3::Constant(reach).cwiseQuotient(lattice.Spacing), extent);
     std::visit(
       [&](const auto* values)
       {
-        std::array<std::int64_t, 3> n;
-        for (n[2] = low[2]; n[2] <= high[2]; ++n[2])
-        {
-          for (n[1] = low[1]; n[1] <= high[1]; ++n[1])
+        box.ForEach(
+          [&](int i, int j, int k)
           {
-            for (n[0] = low[0]; n[0] <= high[0]; ++n[0])
+            const std::int64_t offset = lattice.Index(i, j, k);
+            const auto value = static_cast<double>(values[offset]);
+            if (!(value > least))
             {
-              const std::int64_t offset = lattice.OffsetOf(n);
-              const auto value = static_cast<double>(values[offset]);
-              if (!(value > least))
-              {
-                continue;
-              }
-              const auto distance =
-                static_cast<float>((lattice.PositionOf(n) - tree.points[p]).norm());
-              if (static_cast<double>(distance) > reach)
-              {
-                continue;
-              }
-              const auto [voxel, isNew] = found.try_emplace(offset);
-              if (isNew || distance < voxel->second.distance)
-              {
-                voxel->second = { offset, 0, static_cast<std::int64_t>(p), distance,
-                  static_cast<float>(value) };
-              }
+              return;
             }
-          }
-        }
+            const auto distance =
+              static_cast<float>((lattice.World({ i, j, k }) - tree.points[p]).norm());
+            if (static_cast<double>(distance) > reach)
+            {
+              return;
+            }
+            const auto [voxel, isNew] = found.try_emplace(offset);
+            if (isNew || distance < voxel->second.distance)
+            {
+              voxel->second = { offset, 0, static_cast<std::int64_t>(p), distance,
+                static_cast<float>(value) };
+            }
+          });
       },
       image.values);
   }
@@ -184,22 +119,21 @@ void IndexVoxels(CalciumMap& map)
 
 /// Share of the full circle that an object takes around a section, degrees.
 double ArcAround(const CalciumMap& calcium, const std::vector<std::int64_t>& voxels,
-  const Lattice& lattice, const Vector3& centre, const Vector3& tangent)
+  const VoxelLattice& lattice, const Vector3& centre, const Vector3& tangent)
 {
   constexpr int bins = 72;
-  const double voxel = lattice.grid.spacing.maxCoeff();
-  const Vector3 u = tangent.unitOrthogonal();
-  const Vector3 v = tangent.cross(u);
+  const double voxel = lattice.Spacing.maxCoeff();
+  const CrossFrame frame(tangent);
   std::array<bool, bins> covered{};
   for (const std::int64_t n : voxels)
   {
-    const Vector3 offset = lattice.PositionOf(lattice.IndexOf(calcium.voxels[n].offset)) - centre;
+    const Vector3 offset = lattice.World(lattice.Place(calcium.voxels[n].offset)) - centre;
     if (std::abs(offset.dot(tangent)) > 0.75 * voxel)
     {
       continue;
     }
-    const double x = offset.dot(u);
-    const double y = offset.dot(v);
+    const double x = offset.dot(frame.u);
+    const double y = offset.dot(frame.v);
     const double half = std::atan2(0.5 * voxel, std::max(1e-6, std::hypot(x, y)));
     const double angle = std::atan2(y, x);
     const auto first = static_cast<int>(std::floor((angle - half) / (2.0 * M_PI) * bins));
@@ -213,7 +147,7 @@ double ArcAround(const CalciumMap& calcium, const std::vector<std::int64_t>& vox
 }
 
 double Score(
-  const CalciumMap& calcium, const std::vector<std::int64_t>& voxels, const Lattice& lattice)
+  const CalciumMap& calcium, const std::vector<std::int64_t>& voxels, const VoxelLattice& lattice)
 {
   struct Slice
   {
@@ -224,9 +158,9 @@ double Score(
   for (const std::int64_t n : voxels)
   {
     const CalciumVoxel& voxel = calcium.voxels[n];
-    const double z = lattice.PositionOf(lattice.IndexOf(voxel.offset))[2];
+    const double z = lattice.World(lattice.Place(voxel.offset))[2];
     Slice& slice = slices[std::llround(std::floor(z / SliceThickness))];
-    slice.volume += lattice.volume;
+    slice.volume += lattice.VoxelVolume();
     slice.peak = std::max(slice.peak, static_cast<double>(voxel.value));
   }
   double score = 0.0;
@@ -305,7 +239,7 @@ private:
 
 /// Density and volume up to half of the object's own contrast.
 void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
-  const std::vector<std::int64_t>& own, const Lattice& lattice, const ImageInterpolator& image,
+  const std::vector<std::int64_t>& own, const VoxelLattice& lattice, const ImageInterpolator& image,
   Surroundings& surroundings, double blur)
 {
   // The two brightest voxels together: one alone is the noise's.
@@ -328,15 +262,15 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
       member[calcium.voxels[n].offset] = true;
       region.push_back(calcium.voxels[n].offset);
     }
-    const auto rings = static_cast<int>(std::ceil(2.0 * blur / lattice.grid.spacing.minCoeff()));
+    const auto rings = static_cast<int>(std::ceil(2.0 * blur / lattice.Spacing.minCoeff()));
     std::size_t begin = 0;
     for (int ring = 0; ring < std::min(rings, 4); ++ring)
     {
       const std::size_t end = region.size();
       for (std::size_t n = begin; n < end; ++n)
       {
-        ForNeighbours(lattice, region[n],
-          [&](std::int64_t other)
+        lattice.Neighbours(region[n],
+          [&](std::int64_t other, float)
           {
             const std::int64_t known = calcium.Find(other);
             if ((known < 0 || calcium.voxels[known].label == object.label) &&
@@ -353,7 +287,7 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
   std::vector<double> outside;
   for (std::size_t n = outermost; n < region.size(); ++n)
   {
-    const Vector3 place = lattice.PositionOf(lattice.IndexOf(region[n]));
+    const Vector3 place = lattice.World(lattice.Place(region[n]));
     if (surroundings.LumenShare(place) < 0.05)
     {
       outside.push_back(image.At(place));
@@ -370,21 +304,21 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
     const CalciumVoxel& voxel = calcium.voxels[order[n]];
     bright += voxel.value / static_cast<double>(top);
     around +=
-      surroundings.At(lattice.PositionOf(lattice.IndexOf(voxel.offset))) / static_cast<double>(top);
+      surroundings.At(lattice.World(lattice.Place(voxel.offset))) / static_cast<double>(top);
   }
   // What is brighter than half of the peak, over what would be there, in eighths of voxels.
   const double excess = std::max(1.0, bright - around);
   double volume = 0.0;
   for (const std::int64_t offset : region)
   {
-    const Vector3 centre = lattice.PositionOf(lattice.IndexOf(offset));
+    const Vector3 centre = lattice.World(lattice.Place(offset));
     for (int corner = 0; corner < 8; ++corner)
     {
       const Vector3 shift((corner & 1) - 0.5, (corner >> 1 & 1) - 0.5, (corner >> 2) - 0.5);
       const Vector3 place =
-        centre + lattice.grid.direction * (0.5 * lattice.grid.spacing.cwiseProduct(shift));
+        centre + lattice.Grid.direction * (0.5 * lattice.Spacing.cwiseProduct(shift));
       volume +=
-        image.At(place) - surroundings.At(place) > 0.5 * excess ? lattice.volume / 8.0 : 0.0;
+        image.At(place) - surroundings.At(place) > 0.5 * excess ? lattice.VoxelVolume() / 8.0 : 0.0;
     }
   }
   // The ball that shows so much above half of its own peak.
@@ -402,21 +336,6 @@ void MeasureVolume(CalciumObject& object, const CalciumMap& calcium,
 }
 }
 
-void CalciumSettings::Validate() const
-{
-  constexpr RequireOf require{ "CalciumSettings" };
-  require(this->wallDistance >= 0.5 && this->wallDistance <= 10.0,
-    "wallDistance must be from 0.5 to 10 mm");
-  require(this->seedShare >= 0.1 && this->seedShare <= 2.0, "seedShare must be from 0.1 to 2");
-  require(this->seedDeviations >= 2.0 && this->seedDeviations <= 20.0,
-    "seedDeviations must be from 2 to 20");
-  require(this->growShare >= 0.0 && this->growShare <= this->seedShare,
-    "growShare must be from 0 to seedShare");
-  require(this->growDeviations >= 0.0 && this->growDeviations <= this->seedDeviations,
-    "growDeviations must be from 0 to seedDeviations");
-  require(this->leastVoxels >= 1, "leastVoxels must be at least 1");
-}
-
 std::int64_t CalciumMap::Find(std::int64_t offset) const
 {
   const auto found = this->index.find(offset);
@@ -429,13 +348,12 @@ int AgatstonWeight(double peak)
 }
 
 CalciumMap FindCalcium(const VesselTree& tree, const ScalarImage& image, const LumenLevels& levels,
-  const CalciumSettings& settings, const ProgressCallback& progress)
+  const ProgressCallback& progress)
 {
-  settings.Validate();
   CheckTree(tree);
-  const Lattice lattice(image);
+  const VoxelLattice lattice(image.grid);
   CalciumMap map;
-  map.voxels = BrightVoxels(tree, image, levels, settings, progress);
+  map.voxels = BrightVoxels(tree, image, levels, progress);
   IndexVoxels(map);
   struct Component
   {
@@ -446,33 +364,24 @@ CalciumMap FindCalcium(const VesselTree& tree, const ScalarImage& image, const L
   std::vector<char> seen(map.voxels.size(), 0);
   for (std::size_t start = 0; start < map.voxels.size(); ++start)
   {
-    if (seen[start] != 0)
-    {
-      continue;
-    }
-    seen[start] = 1;
-    Component component{ { static_cast<std::int64_t>(start) }, map.voxels[start].point };
+    Component component;
     bool dense = false;
-    for (std::size_t n = 0; n < component.voxels.size(); ++n)
+    component.firstPoint = map.voxels[start].point;
+    for (const std::int64_t offset : lattice.Connected(map.voxels[start].offset,
+           [&](std::int64_t other)
+           {
+             const std::int64_t index = map.Find(other);
+             return index >= 0 && std::exchange(seen[index], 1) == 0;
+           }))
     {
-      const CalciumVoxel& voxel = map.voxels[component.voxels[n]];
+      component.voxels.push_back(map.Find(offset));
+      const CalciumVoxel& voxel = map.voxels[component.voxels.back()];
       component.firstPoint = std::min(component.firstPoint, voxel.point);
       dense = dense ||
         static_cast<double>(voxel.value) > LevelAt(levels, voxel.point) +
-            std::max(settings.seedShare * ContrastAt(levels, voxel.point),
-              settings.seedDeviations * levels.noise);
-      ForNeighbours(lattice, voxel.offset,
-        [&](std::int64_t other)
-        {
-          const std::int64_t index = map.Find(other);
-          if (index >= 0 && seen[index] == 0)
-          {
-            seen[index] = 1;
-            component.voxels.push_back(index);
-          }
-        });
+            std::max(SeedShare * ContrastAt(levels, voxel.point), SeedDeviations * levels.noise);
     }
-    if (dense && static_cast<int>(component.voxels.size()) >= settings.leastVoxels)
+    if (dense && component.voxels.size() >= LeastVoxels)
     {
       components.push_back(std::move(component));
     }
@@ -501,13 +410,13 @@ void MeasureCalcium(CalciumMap& calcium, const VesselTree& tree,
   const std::vector<VesselPath>& paths, const ScalarImage& image, const LumenLevels& levels,
   double blur)
 {
-  const Lattice lattice(image);
+  const VoxelLattice lattice(image.grid);
   const ImageInterpolator values(image);
   std::vector<Vector3> tangents(tree.points.size(), Vector3::UnitZ());
   for (const VesselPath& path : paths)
   {
     const std::vector<Vector3> along = PathTangents(tree, path, 1.0);
-    for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
+    for (std::size_t i = path.FirstOwn(); i < path.points.size(); ++i)
     {
       tangents[path.points[i]] = along[i];
     }
@@ -533,7 +442,7 @@ void MeasureCalcium(CalciumMap& calcium, const VesselTree& tree,
         for (const std::int64_t v : own[n])
         {
           const CalciumVoxel& voxel = calcium.voxels[v];
-          const Vector3 position = lattice.PositionOf(lattice.IndexOf(voxel.offset));
+          const Vector3 position = lattice.World(lattice.Place(voxel.offset));
           const double more =
             std::max(1.0, static_cast<double>(voxel.value) - levels.level[voxel.point]);
           object.centre += more * position;
@@ -549,7 +458,7 @@ void MeasureCalcium(CalciumMap& calcium, const VesselTree& tree,
           touched.push_back(voxel.point);
         }
         object.centre /= weight;
-        object.volume = static_cast<double>(own[n].size()) * lattice.volume;
+        object.volume = static_cast<double>(own[n].size()) * lattice.VoxelVolume();
         std::sort(touched.begin(), touched.end());
         touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
         double nearest = 1e30;

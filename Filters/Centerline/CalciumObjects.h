@@ -17,20 +17,6 @@
 
 namespace coronary
 {
-struct CalciumSettings
-{
-  double wallDistance =
-    2.5; ///< mm from the lumen's wall, 0.5 to 10: what is farther off is no plaque
-  double seedShare = 0.30;     ///< of the lumen's contrast, 0.1 to 2: above it an object's core
-  double seedDeviations = 5.0; ///< and so many standard deviations of the noise, 2 to 20
-  double growShare = 0.15;     ///< the same for its surroundings, at most the core's
-  double growDeviations = 3.0;
-  int leastVoxels = 2; ///< of an object, at least 1
-
-  /// @throws std::invalid_argument that names the first setting out of range
-  void Validate() const;
-};
-
 /// A voxel of an object.
 struct CalciumVoxel
 {
@@ -72,10 +58,10 @@ int AgatstonWeight(double peak);
 
 /**
  * Connected objects above the local threshold, near the tree. Labels follow the tree from the roots.
- * @throws std::invalid_argument for settings out of range; Cancelled
+ * @throws std::invalid_argument as CheckTree; Cancelled
  */
 CalciumMap FindCalcium(const VesselTree& tree, const ScalarImage& image, const LumenLevels& levels,
-  const CalciumSettings& settings = {}, const ProgressCallback& progress = {});
+  const ProgressCallback& progress = {});
 
 /**
  * Fills the measures of all objects, with the lumen that was found beside them.

@@ -19,6 +19,8 @@
 #include <map>
 #include <memory>
 #include <sstream>
+#include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -59,10 +61,6 @@ public:
     std::vector<VeinBranch>& judged) const;
 
 private:
-  Vector3 FrameToWorld(const Vector3& frame) const
-  {
-    return this->Input.grid.origin + this->Input.grid.direction * frame;
-  }
   /// In the coordinates that the input was given in.
   Vector3 ToGiven(const Vector3& frame) const
   {
@@ -72,6 +70,7 @@ private:
   void PrepareMeasurement();
   double IntensityThreshold() const;
   double SeedReach() const;
+  std::uint32_t Locate(const Vector3& point, const std::string& name, CenterlineEnd& end) const;
   bool PlaceSeeds();
   void MarchFromSeeds();
   void Calibrate(const MeasuredCourse& course);
@@ -208,31 +207,42 @@ double Extractor::SeedReach() const
     : std::max(3.0 * this->Courses.voxel, this->Courses.lumen.reference.radius);
 }
 
-bool Extractor::PlaceSeeds()
+/// The member nearest to a given point, or None: then `end` says why.
+std::uint32_t Extractor::Locate(
+  const Vector3& point, const std::string& name, CenterlineEnd& end) const
 {
   const double reach = this->SeedReach();
+  const Vector3 index = GridIndex(this->Input.grid, point);
+  if (!IsInGrid(this->Input.grid, index))
+  {
+    end.status = EndStatus::OutsideImage;
+    end.message = name + " lies outside the image";
+    return None;
+  }
+  const std::uint32_t member = this->March.NearestMember(index, reach, false);
+  if (member == None)
+  {
+    end.status = EndStatus::OutsideRegion;
+    std::ostringstream text;
+    text << name << " has no vessel within " << reach
+         << " mm: no voxel there is above the threshold";
+    end.message = text.str();
+  }
+  return member;
+}
+
+bool Extractor::PlaceSeeds()
+{
   this->SeedMembers.assign(this->Input.seeds.size(), None);
   bool any = false;
   for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
   {
     CenterlineEnd& end = this->Result.seeds[s];
     end.treeId = static_cast<int>(s);
-    const Vector3 index = GridIndex(this->Input.grid, this->Input.seeds[s]);
     const std::string name = "seed " + std::to_string(s) + " at " + Text(this->Given.seeds[s]);
-    if (!IsInGrid(this->Input.grid, index))
-    {
-      end.status = EndStatus::OutsideImage;
-      end.message = name + " lies outside the image";
-      continue;
-    }
-    this->SeedMembers[s] = this->March.NearestMember(index, reach, false);
+    this->SeedMembers[s] = this->Locate(this->Input.seeds[s], name, end);
     if (this->SeedMembers[s] == None)
     {
-      end.status = EndStatus::OutsideRegion;
-      std::ostringstream text;
-      text << name << " has no vessel within " << reach
-           << " mm: no voxel there is above the threshold";
-      end.message = text.str();
       continue;
     }
     end.status = EndStatus::Reached;
@@ -325,19 +335,14 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
   {
     return -1;
   }
-  std::vector<Vector3> points(way.points.rbegin(), way.points.rend());
-  for (Vector3& point : points)
-  {
-    point = this->FrameToWorld(point);
-  }
   MeasuredCourse course;
-  course.points = ResampleCurve(points, this->Courses.step);
+  course.points = ResampleCurve({ way.points.rbegin(), way.points.rend() }, this->Courses.step);
   if (course.size() < 3)
   {
     return -1;
   }
   const bool root = way.owner == VesselWay::noOwner;
-  const double parentRadius = root ? 0.0 : this->Tree.radius[static_cast<std::size_t>(way.owner)];
+  const double parentRadius = root ? 0.0 : this->Tree.radius[way.owner];
   const double least = this->Settings.minimumBranchLength > 0.0
     ? this->Settings.minimumBranchLength
     : std::max(10.0 * this->Courses.voxel, 1.5 * parentRadius);
@@ -360,11 +365,10 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
     std::vector<double> before;
     if (!root)
     {
-      const auto parent =
-        static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(way.owner)]);
+      const auto parent = static_cast<std::size_t>(this->BranchOf[way.owner]);
       for (const std::int64_t p : this->Tree.branches[parent].points)
       {
-        before.push_back(this->Tree.radius[static_cast<std::size_t>(p)]);
+        before.push_back(this->Tree.radius[p]);
         if (p == way.owner)
         {
           break;
@@ -396,8 +400,7 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
   std::int64_t start = -1;
   if (!root)
   {
-    const auto parent =
-      static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(way.owner)]);
+    const auto parent = static_cast<std::size_t>(this->BranchOf[way.owner]);
     start = static_cast<std::int64_t>(
       JoinParent(course, this->Tree, this->Tree.branches[parent].points, way.owner, this->Courses));
   }
@@ -416,7 +419,7 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
   branch.treeId = treeId;
   if (!root)
   {
-    branch.parentGroupId = this->BranchOf[static_cast<std::size_t>(start)];
+    branch.parentGroupId = this->BranchOf[start];
     branch.points.push_back(start);
   }
   for (std::size_t i = root ? 0 : 1; i < course.size(); ++i)
@@ -442,50 +445,33 @@ void Extractor::Own(std::size_t index)
     const Vector3 centre = GridIndex(this->Input.grid, this->Tree.points[point]);
     const double own = this->Tree.radius[point] + 0.25 * this->Courses.voxel;
     const double cover = 1.3 * this->Tree.radius[point] + 1.5 * this->Courses.voxel;
-    const std::array<int, 6>& box = this->March.Region().Box();
-    int range[6];
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      const double steps = cover / this->Input.grid.spacing[axis];
-      range[2 * axis] =
-        static_cast<int>(std::max<double>(box[2 * axis], std::ceil(centre[axis] - steps)));
-      range[2 * axis + 1] =
-        static_cast<int>(std::min<double>(box[2 * axis + 1], std::floor(centre[axis] + steps)));
-    }
-    for (int k = range[4]; k <= range[5]; ++k)
-    {
-      for (int j = range[2]; j <= range[3]; ++j)
-      {
-        for (int i = range[0]; i <= range[1]; ++i)
+    const auto distanceTo = [&](const Vector3& from, const Vector3& to)
+    { return (to - from).cwiseProduct(this->Input.grid.spacing).norm(); };
+    BoxAround(centre, Vector3::Constant(cover).cwiseQuotient(this->Input.grid.spacing),
+      this->March.Region().Box())
+      .ForEach(
+        [&](int i, int j, int k)
         {
           const std::uint32_t number = this->March.Region().NumberOf(i, j, k);
           if (number == None)
           {
-            continue;
+            return;
           }
-          const double distance =
-            (Vector3(i, j, k) - centre).cwiseProduct(this->Input.grid.spacing).norm();
+          const Vector3 voxel(i, j, k);
+          const double distance = distanceTo(centre, voxel);
           if (distance > cover)
           {
-            continue;
+            return;
           }
           this->Covered[number] = true;
-          if (distance <= own)
+          const std::int32_t old = this->Owner[number];
+          if (distance <= own &&
+            (old == VesselWay::noOwner ||
+              distance < distanceTo(GridIndex(this->Input.grid, this->Tree.points[old]), voxel)))
           {
-            const std::int32_t old = this->Owner[number];
-            if (old == VesselWay::noOwner ||
-              distance <
-                (Vector3(i, j, k) -
-                  GridIndex(this->Input.grid, this->Tree.points[static_cast<std::size_t>(old)]))
-                  .cwiseProduct(this->Input.grid.spacing)
-                  .norm())
-            {
-              this->Owner[number] = static_cast<std::int32_t>(p);
-            }
+            this->Owner[number] = static_cast<std::int32_t>(p);
           }
-        }
-      }
-    }
+        });
   }
 }
 
@@ -597,7 +583,6 @@ bool Extractor::ThinBranchesFor(ThinBranchSettings& settings) const
     return false;
   }
   settings.voxel = this->Courses.voxel;
-  settings.step = this->Courses.step;
   settings.minimumLength = std::max(this->Settings.minimumBranchLength, 15.0 * this->Courses.voxel);
   settings.maximumLength = 200.0 * this->Courses.voxel;
   settings.contrast = contrast;
@@ -660,8 +645,7 @@ void Extractor::FollowThinBranches()
     VesselWay way;
     way.owner = branch.parent;
     way.points.assign(branch.points.rbegin(), branch.points.rend());
-    const auto parent =
-      static_cast<std::size_t>(this->BranchOf[static_cast<std::size_t>(branch.parent)]);
+    const auto parent = static_cast<std::size_t>(this->BranchOf[branch.parent]);
     this->Append(way, this->Tree.branches[parent].treeId, false);
   }
 }
@@ -687,7 +671,7 @@ void Extractor::LengthenTips()
     MeasuredCourse course;
     for (std::size_t i = paths[b].known - known; i < paths[b].known; ++i)
     {
-      course.points.push_back(this->Tree.points[static_cast<std::size_t>(chain[i])]);
+      course.points.push_back(this->Tree.points[chain[i]]);
     }
     course.points.insert(course.points.end(), paths[b].points.begin(), paths[b].points.end());
     course.points = ResampleCurve(course.points, this->Courses.step);
@@ -726,8 +710,7 @@ void Extractor::TurnBranches()
   {
     return;
   }
-  const auto at = [&](std::int64_t point)
-  { return Text(this->ToGiven(this->Tree.points[static_cast<std::size_t>(point)])); };
+  const auto at = [&](std::int64_t point) { return Text(this->ToGiven(this->Tree.points[point])); };
   std::vector<TurnedBranch> turned =
     FindTurnedBranches(*this->Courses.image, this->Tree, this->Courses.voxel);
   for (const TurnedBranch& one : turned)
@@ -743,7 +726,7 @@ void Extractor::TurnBranches()
       way.owner = static_cast<std::int32_t>(one.root);
       for (std::size_t i = one.contact; i < branch.points.size(); ++i)
       {
-        way.points.push_back(this->Tree.points[static_cast<std::size_t>(branch.points[i])]);
+        way.points.push_back(this->Tree.points[branch.points[i]]);
       }
       way.points.insert(way.points.end(), one.way.rbegin(), one.way.rend());
       joined = !this->Excluded.LeadsInside(one.way) && this->Append(way, branch.treeId, true) >= 0;
@@ -778,29 +761,16 @@ void Extractor::Remove(std::size_t index)
 
 void Extractor::FollowTargets()
 {
-  const double reach = this->SeedReach();
   for (std::size_t t = 0; t < this->Input.targets.size(); ++t)
   {
     CenterlineEnd& end = this->Result.targets[t];
-    const Vector3 index = GridIndex(this->Input.grid, this->Input.targets[t]);
     const std::string name = "target " + std::to_string(t) + " at " + Text(this->Given.targets[t]);
-    if (!IsInGrid(this->Input.grid, index))
+    if (this->Locate(this->Input.targets[t], name, end) == None)
     {
-      end.status = EndStatus::OutsideImage;
-      end.message = name + " lies outside the image";
       continue;
     }
-    const std::uint32_t nearest = this->March.NearestMember(index, reach, false);
-    if (nearest == None)
-    {
-      end.status = EndStatus::OutsideRegion;
-      std::ostringstream text;
-      text << name << " has no vessel within " << reach
-           << " mm: no voxel there is above the threshold";
-      end.message = text.str();
-      continue;
-    }
-    const std::uint32_t member = this->March.NearestMember(index, reach, true);
+    const Vector3 index = GridIndex(this->Input.grid, this->Input.targets[t]);
+    const std::uint32_t member = this->March.NearestMember(index, this->SeedReach(), true);
     if (member == None)
     {
       end.status = this->Result.complete ? EndStatus::NotConnected : EndStatus::LimitReached;

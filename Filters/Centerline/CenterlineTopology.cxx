@@ -250,9 +250,8 @@ void AddLoops(CenterlineTopology& tree, const LineGraph& graph,
   }
 }
 
-int AssignStrahler(CenterlineTopology& tree, const std::vector<std::vector<int>>& daughters)
+void AssignStrahler(CenterlineTopology& tree, const std::vector<std::vector<int>>& daughters)
 {
-  int highest = 0;
   for (std::size_t b = tree.branches.size(); b-- > 0;)
   {
     int order = 1;
@@ -264,9 +263,7 @@ int AssignStrahler(CenterlineTopology& tree, const std::vector<std::vector<int>>
       order = std::max(order, below);
     }
     tree.branches[b].strahlerOrder = order + (same > 1 ? 1 : 0);
-    highest = std::max(highest, tree.branches[b].strahlerOrder);
   }
-  return highest;
 }
 
 void ComputeGeometry(
@@ -340,7 +337,6 @@ void ComputeGeometry(
     }
   }
 }
-
 }
 
 void TopologySettings::Validate() const

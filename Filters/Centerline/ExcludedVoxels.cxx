@@ -49,28 +49,15 @@ void ExcludedVoxels::Close(const std::vector<VeinBranch>& found, const VesselTre
   const auto mark = [&](std::size_t p, double reach, unsigned char value)
   {
     const Vector3 centre = GridIndex(this->Grid, tree.points[p]);
-    const std::array<int, 6>& e = this->Grid.extent;
-    int range[6];
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      const double steps = reach / this->Grid.spacing[axis];
-      range[2 * axis] = std::max(e[2 * axis], static_cast<int>(std::ceil(centre[axis] - steps)));
-      range[2 * axis + 1] =
-        std::min(e[2 * axis + 1], static_cast<int>(std::floor(centre[axis] + steps)));
-    }
-    for (int k = range[4]; k <= range[5]; ++k)
-    {
-      for (int j = range[2]; j <= range[3]; ++j)
-      {
-        for (int i = range[0]; i <= range[1]; ++i)
+    BoxAround(centre, Vector3::Constant(reach).cwiseQuotient(this->Grid.spacing), this->Grid.extent)
+      .ForEach(
+        [&](int i, int j, int k)
         {
           if ((Vector3(i, j, k) - centre).cwiseProduct(this->Grid.spacing).norm() <= reach)
           {
             this->Flags[GridOffset(this->Grid, i, j, k)] = value;
           }
-        }
-      }
-    }
+        });
   };
   std::vector<char> closed(tree.points.size(), 0);
   for (const VeinBranch& vein : found)
@@ -81,9 +68,7 @@ void ExcludedVoxels::Close(const std::vector<VeinBranch>& found, const VesselTre
       const auto p = static_cast<std::size_t>(vein.closed[i]);
       closed[p] = 1;
       mark(p, tree.radius[p] + 0.5 * voxel, 1);
-      length += i == 0
-        ? 0.0
-        : (tree.points[p] - tree.points[static_cast<std::size_t>(vein.closed[i - 1])]).norm();
+      length += i == 0 ? 0.0 : (tree.points[p] - tree.points[vein.closed[i - 1]]).norm();
     }
     const Vector3& place = tree.points[static_cast<std::size_t>(vein.closed.front())];
     const auto known = std::find_if(veins.begin(), veins.end(),

@@ -293,7 +293,7 @@ public:
   {
   }
   void Seed(const FastMarchingSource& source);
-  bool Run();
+  void Run();
   std::size_t MemorySize() const
   {
     return this->Voxels.MemorySize() + this->Labels.MemorySize() + this->Queue.MemorySize();
@@ -301,9 +301,9 @@ public:
 
 private:
   template <bool SecondOrder, bool WithLengths>
-  bool RunAs();
-  bool RunAny();
-  bool RunWithAvx2();
+  void RunAs();
+  void RunAny();
+  void RunWithAvx2();
 
   const VoxelRegion& Region;
   const FastMarchingSettings& Settings;
@@ -398,7 +398,7 @@ void Front<Layout>::Seed(const FastMarchingSource& source)
 
 template <typename Layout>
 template <bool SecondOrder, bool WithLengths>
-inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
+inline __attribute__((always_inline)) void Front<Layout>::RunAs()
 {
   const VoxelRegion& region = this->Region;
   const Layout layout = this->Place;
@@ -406,7 +406,6 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
   Voxel* const voxels = this->Voxels.Data();
   std::uint8_t* const labels = this->Labels.Data();
   const bool oneLabel = this->OneLabel;
-  const double limit = this->Settings.stopAtArrival;
   const Differences differences(this->Settings.spacing);
   const auto bitsAt = [voxels](std::uint32_t voxel) { return voxels[voxel].bits; };
   const auto keep = [&](MarchingQueue::Entry entry)
@@ -425,19 +424,11 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
     if (reached % CheckInterval == CheckInterval - 1)
     {
       Report(this->Progress, static_cast<double>(reached) / region.Size());
-      if (this->Settings.goOn && !this->Settings.goOn(reached))
-      {
-        return false;
-      }
     }
     const MarchingQueue::Entry entry = queue.Least();
     const float arrival = MarchingQueue::Arrival(entry);
     const std::uint32_t arrivalBits = MarchingQueue::ArrivalBits(entry);
     const Address address = MarchingQueue::Address(entry);
-    if (arrival > limit)
-    {
-      return false;
-    }
     queue.RemoveLeast();
     ++reached;
     const std::uint32_t voxel = layout(address);
@@ -541,11 +532,10 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAs()
     }
   }
   Report(this->Progress, 1.0);
-  return true;
 }
 
 template <typename Layout>
-inline __attribute__((always_inline)) bool Front<Layout>::RunAny()
+inline __attribute__((always_inline)) void Front<Layout>::RunAny()
 {
   if (this->Settings.secondOrder)
   {
@@ -556,14 +546,14 @@ inline __attribute__((always_inline)) bool Front<Layout>::RunAny()
 
 #if defined(__x86_64__)
 template <typename Layout>
-__attribute__((target("avx2,bmi,bmi2,popcnt"))) bool Front<Layout>::RunWithAvx2()
+__attribute__((target("avx2,bmi,bmi2,popcnt"))) void Front<Layout>::RunWithAvx2()
 {
   return this->RunAny();
 }
 #endif
 
 template <typename Layout>
-bool Front<Layout>::Run()
+void Front<Layout>::Run()
 {
 #if defined(__x86_64__)
   // Shorter code, and counting the bits of a word is one instruction. Without fused multiplication:
@@ -603,14 +593,13 @@ FastMarching::FastMarching(const VoxelRegion& region, std::vector<float> speed,
     settings.spacing.allFinite() && settings.spacing.minCoeff() > 0.0, "spacing must be positive");
   require(settings.sourceRadius >= 0.0 && std::isfinite(settings.sourceRadius),
     "sourceRadius must not be negative");
-  require(!(settings.stopAtArrival < 0.0), "stopAtArrival must not be negative");
   require(this->Speeds.size() == region.Size(), "one speed for each voxel of the region is needed");
   require(std::all_of(this->Speeds.begin(), this->Speeds.end(),
             [](float value) { return value > 0.0F && value < Infinite; }),
-    "speeds must be positive and finite");
+    "FastMarching: speeds must be positive and finite");
 }
 
-bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
+void FastMarching::March(const std::vector<FastMarchingSource>& sources)
 {
   constexpr RequireOf require{ "FastMarching" };
   const std::uint32_t count = this->Region.Size();
@@ -625,7 +614,7 @@ bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
   }
   if (count == 0)
   {
-    return true;
+    return;
   }
   if (static_cast<double>(this->Region.AddressCount()) <= MostAddressesPerMember * count)
   {
@@ -635,7 +624,7 @@ bool FastMarching::March(const std::vector<FastMarchingSource>& sources)
 }
 
 template <typename Layout>
-bool FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingSource>& sources)
+void FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingSource>& sources)
 {
   const std::uint32_t count = this->Region.Size();
   const bool oneLabel = std::all_of(sources.begin(), sources.end(),
@@ -651,7 +640,7 @@ bool FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingS
   {
     front.Seed(source);
   }
-  const bool exhausted = front.Run();
+  front.Run();
 
   this->Times.resize(count);
   this->Lengths.resize(this->Settings.lengths ? count : 0);
@@ -678,7 +667,6 @@ bool FastMarching::MarchIn(const Layout& layout, const std::vector<FastMarchingS
       const std::uint8_t label = oneLabel ? only : front.Labels.Data()[layout(address)];
       this->Labels[number] = this->Times[number] < Infinite ? label : noSource;
     });
-  return exhausted;
 }
 
 std::size_t FastMarching::MemorySize() const

@@ -16,8 +16,9 @@
 #include "ParallelFor.h"
 #include "VoxelRegion.h"
 
-#include <functional>
-#include <limits>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace coronary
 {
@@ -33,12 +34,8 @@ struct FastMarchingSettings
   /// Around a source arrival is taken along straight lines up to this many mm; there a grid can
   /// not resolve the curvature of the front. 0: three of the greatest voxel edges.
   double sourceRadius = 0.0;
-  double stopAtArrival = std::numeric_limits<double>::infinity();
   bool secondOrder = true;
   bool lengths = true; ///< also the length of the fastest path to each voxel
-  /// Asked every 16384 voxels with the number of voxels reached; false ends the march early,
-  /// without an exception.
-  std::function<bool(std::uint32_t reached)> goOn;
 };
 
 /// The march over one region, from all sources at once. Deterministic; one thread.
@@ -57,10 +54,9 @@ public:
 
   /**
    * To be called once: the speeds are gone then.
-   * @returns whether the region is exhausted (false: stopped by a limit)
-   * @throws std::invalid_argument for sources out of range; std::logic_error at the second call
+   * @throws std::invalid_argument for sources out of range; std::logic_error at the second call; Cancelled
    */
-  bool March(const std::vector<FastMarchingSource>& sources);
+  void March(const std::vector<FastMarchingSource>& sources);
 
   /// Arrival of each member, infinite where the front has not come.
   const std::vector<float>& Arrival() const { return Times; }
@@ -76,7 +72,7 @@ public:
 
 private:
   template <typename Layout>
-  bool MarchIn(const Layout& layout, const std::vector<FastMarchingSource>& sources);
+  void MarchIn(const Layout& layout, const std::vector<FastMarchingSource>& sources);
 
   const VoxelRegion& Region;
   FastMarchingSettings Settings;

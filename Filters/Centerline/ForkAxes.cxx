@@ -2,6 +2,7 @@
 
 #include "BifurcationFit.h"
 #include "BranchMouth.h"
+#include "CrossFrame.h"
 
 #include <algorithm>
 #include <array>
@@ -10,6 +11,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <utility>
 
 namespace coronary
 {
@@ -42,9 +44,7 @@ bool Strand::Append(const VesselTree& tree, const std::vector<std::int64_t>& bra
   }
   for (std::size_t i = 1; i < branch.size(); ++i)
   {
-    this->length += (tree.points[static_cast<std::size_t>(branch[i])] -
-      tree.points[static_cast<std::size_t>(branch[i - 1])])
-                      .norm();
+    this->length += (tree.points[branch[i]] - tree.points[branch[i - 1]]).norm();
     this->points.push_back(branch[i]);
     if (this->length > reach)
     {
@@ -58,10 +58,9 @@ bool Strand::Append(const VesselTree& tree, const std::vector<std::int64_t>& bra
 Strand Upstream(const VesselTree& tree, std::size_t branch, double reach)
 {
   Strand strand;
-  for (int at = static_cast<int>(branch); at >= 0;
-       at = tree.branches[static_cast<std::size_t>(at)].parentGroupId)
+  for (int at = static_cast<int>(branch); at >= 0; at = tree.branches[at].parentGroupId)
   {
-    std::vector<std::int64_t> points = tree.branches[static_cast<std::size_t>(at)].points;
+    std::vector<std::int64_t> points = tree.branches[at].points;
     std::reverse(points.begin(), points.end());
     if (!strand.Append(tree, points, reach))
     {
@@ -83,7 +82,7 @@ Strand Downstream(const VesselTree& tree, std::size_t branch, double reach)
     for (std::size_t b = 0; b < tree.branches.size(); ++b)
     {
       const std::vector<std::int64_t>& own = tree.branches[b].points;
-      const double radius = tree.radius[static_cast<std::size_t>(own[own.size() / 2])];
+      const double radius = tree.radius[own[own.size() / 2]];
       if (tree.branches[b].parentGroupId == group && radius > widest)
       {
         widest = radius;
@@ -132,14 +131,27 @@ struct ForkFit
   Strand side;
 };
 
+/// The least of a measure of a curve's points, in a hundred steps, and the parameter where it is.
+template <typename Measure>
+std::pair<double, double> LeastAlong(const BezierCurve& curve, const Measure& measure)
+{
+  constexpr int pieces = 100;
+  std::pair<double, double> best{ std::numeric_limits<double>::infinity(), 0.0 };
+  for (int piece = 0; piece <= pieces; ++piece)
+  {
+    const double t = static_cast<double>(piece) / pieces;
+    const double value = measure(BezierPoint(curve, t));
+    best = value < best.first ? std::make_pair(value, t) : best;
+  }
+  return best;
+}
+
 /// Sets `turning` off from the straight axis of `parent` and `straight`, if these two are that.
 void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, std::size_t straight,
   const CourseMeasurement& measurement)
 {
-  const auto at = [&](std::int64_t point) -> Vector3&
-  { return tree.points[static_cast<std::size_t>(point)]; };
-  const auto radiusAt = [&](std::int64_t point) -> double&
-  { return tree.radius[static_cast<std::size_t>(point)]; };
+  const auto at = [&](std::int64_t point) -> Vector3& { return tree.points[point]; };
+  const auto radiusAt = [&](std::int64_t point) -> double& { return tree.radius[point]; };
   const auto after = [&](const std::vector<std::int64_t>& points, std::size_t from, double length)
   {
     std::size_t i = from;
@@ -177,7 +189,7 @@ void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, s
   const Vector3 forwards = (from - at(behind[lowest])).normalized();
   const Vector3 onwards = (at(ahead[highest]) - to).normalized();
   const Vector3 away = (at(aside[farthest]) - at(aside[out])).normalized();
-  const double bend = std::acos(std::min(1.0, std::max(-1.0, forwards.dot(onwards))));
+  const double bend = UnitAngle(forwards, onwards);
   if (bend > MostBend || forwards.dot(away) > std::cos(bend + LeastTurn))
   {
     return;
@@ -185,21 +197,12 @@ void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, s
   const double handle = (to - from).norm() / 3.0;
   const BezierCurve bezier{ from, from + handle * forwards, to - handle * onwards, to };
   const auto axis = [&](double t) { return BezierPoint(bezier, t); };
-  constexpr int pieces = 100;
   const auto distance = [&](const Vector3& point)
-  {
-    double least = std::numeric_limits<double>::infinity();
-    for (int piece = 0; piece <= pieces; ++piece)
-    {
-      least = std::min(least, (axis(static_cast<double>(piece) / pieces) - point).norm());
-    }
-    return least;
-  };
+  { return LeastAlong(bezier, [&](const Vector3& p) { return (p - point).norm(); }).first; };
   std::size_t alone = 1;
   while (alone < out &&
     (distance(at(aside[alone])) < 1.15 * wide ||
-      tree.confidence[static_cast<std::size_t>(aside[alone])] <
-        measurement.settings.minimumConfidence))
+      tree.confidence[aside[alone]] < measurement.settings.minimumConfidence))
   {
     ++alone;
   }
@@ -211,19 +214,10 @@ void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, s
   {
     direction = (direction + GreatBranchBend * forwards).normalized();
   }
-  double least = std::numeric_limits<double>::infinity();
-  double meeting = 0.0;
-  for (int piece = 0; piece <= pieces; ++piece)
-  {
-    const double t = static_cast<double>(piece) / pieces;
-    const double lateral = LineDistance(axis(t), origin, direction);
-    if (lateral < least)
-    {
-      least = lateral;
-      meeting = t;
-    }
-  }
-  if (least > wide || meeting < 0.02 || meeting > 0.98)
+  const auto nearest =
+    LeastAlong(bezier, [&](const Vector3& p) { return LineDistance(p, origin, direction); });
+  const double meeting = nearest.second;
+  if (nearest.first > wide || meeting < 0.02 || meeting > 0.98)
   {
     return;
   }
@@ -234,7 +228,7 @@ void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, s
     for (std::size_t i = 0; i < last; ++i)
     {
       at(points[i]) = curve(static_cast<double>(i) / static_cast<double>(last));
-      tree.confidence[static_cast<std::size_t>(points[i])] = 0.0;
+      tree.confidence[points[i]] = 0.0;
     }
   };
   place(aside, alone, [&](double t) -> Vector3 { return fork + t * (origin - fork); });
@@ -250,7 +244,7 @@ ForkFit FitFork(const VesselTree& tree, std::size_t parent, std::size_t turning,
   std::size_t straight, double leastTurn, const CourseMeasurement& measurement)
 {
   // As far as the fit looks; the vessel that goes straight on also across its other forks.
-  const double wide = tree.radius[static_cast<std::size_t>(tree.branches[parent].points.back())];
+  const double wide = tree.radius[tree.branches[parent].points.back()];
   const double reach = 8.0 * wide + 16.0 * measurement.voxel;
   const Strand before = Upstream(tree, parent, reach);
   const Strand behind = Downstream(tree, straight, reach);
@@ -273,13 +267,13 @@ ForkFit FitFork(const VesselTree& tree, std::size_t parent, std::size_t turning,
   axes.fork = result.fork;
   for (const std::int64_t point : result.through.points)
   {
-    axes.through.push_back(tree.points[static_cast<std::size_t>(point)]);
-    axes.throughRadius.push_back(tree.radius[static_cast<std::size_t>(point)]);
+    axes.through.push_back(tree.points[point]);
+    axes.throughRadius.push_back(tree.radius[point]);
   }
   for (const std::int64_t point : result.side.points)
   {
-    axes.side.push_back(tree.points[static_cast<std::size_t>(point)]);
-    axes.sideRadius.push_back(tree.radius[static_cast<std::size_t>(point)]);
+    axes.side.push_back(tree.points[point]);
+    axes.sideRadius.push_back(tree.radius[point]);
   }
   result.fit = FitBifurcation(*measurement.image, axes, measurement.lumen, leastTurn);
   return result;
@@ -295,19 +289,9 @@ void MoveFork(VesselTree& tree, const ForkFit& fork)
   {
     if (joint > fit.first && joint < fit.last)
     {
-      const Vector3& point = tree.points[static_cast<std::size_t>(fork.through.points[joint])];
-      double least = std::numeric_limits<double>::infinity();
-      constexpr int pieces = 100;
-      for (int i = 0; i <= pieces; ++i)
-      {
-        const double t = static_cast<double>(i) / pieces;
-        const double distance = (BezierPoint(fit.through, t) - point).norm();
-        if (distance < least)
-        {
-          least = distance;
-          knots[joint] = t;
-        }
-      }
+      const Vector3& point = tree.points[fork.through.points[joint]];
+      knots[joint] =
+        LeastAlong(fit.through, [&](const Vector3& p) { return (p - point).norm(); }).second;
     }
   }
   for (auto knot = knots.begin(); std::next(knot) != knots.end(); ++knot)
@@ -323,8 +307,7 @@ void MoveFork(VesselTree& tree, const ForkFit& fork)
     for (std::size_t i = from; i <= to; ++i)
     {
       const double f = static_cast<double>(i - from) / static_cast<double>(to - from);
-      tree.points[static_cast<std::size_t>(points[i])] =
-        BezierPoint(curve, start + f * (end - start));
+      tree.points[points[i]] = BezierPoint(curve, start + f * (end - start));
     }
   };
   for (auto knot = knots.begin(); std::next(knot) != knots.end(); ++knot)
@@ -341,7 +324,7 @@ void StraightenForks(
 {
   for (const auto& [parent, two] : ForksOfTwo(tree))
   {
-    const auto pathOf = [&](std::int64_t p) { return paths[static_cast<std::size_t>(p)]; };
+    const auto pathOf = [&](std::int64_t p) { return paths[p]; };
     const std::vector<std::int64_t>& before = tree.branches[parent].points;
     const int path = pathOf(before[before.size() - 2]);
     for (std::size_t turning = 0; turning < 2; ++turning)

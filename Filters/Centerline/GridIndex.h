@@ -7,6 +7,9 @@
 
 #include "Geometry.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 
 namespace coronary
@@ -53,6 +56,49 @@ inline std::size_t GridOffset(const ImageGrid& grid, int i, int j, int k)
   return (static_cast<std::size_t>(k - e[4]) * size[1] + static_cast<std::size_t>(j - e[2])) *
     size[0] +
     static_cast<std::size_t>(i - e[0]);
+}
+
+/// Inclusive ranges of indices; empty where a low one is above its high one.
+struct IndexBox
+{
+  std::array<int, 3> low;
+  std::array<int, 3> high;
+
+  bool IsEmpty() const { return low[0] > high[0] || low[1] > high[1] || low[2] > high[2]; }
+
+  /// Calls f(i, j, k), i fastest.
+  template <typename F>
+  void ForEach(const F& f) const
+  {
+    for (int k = low[2]; k <= high[2]; ++k)
+    {
+      for (int j = low[1]; j <= high[1]; ++j)
+      {
+        for (int i = low[0]; i <= high[0]; ++i)
+        {
+          f(i, j, k);
+        }
+      }
+    }
+  }
+};
+
+/// What of an extent is at most so many `steps` along each axis from a continuous index.
+inline IndexBox BoxAround(
+  const Vector3& index, const Vector3& steps, const std::array<int, 6>& extent)
+{
+  IndexBox box;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const double low = extent[2 * axis];
+    const double high = extent[2 * axis + 1];
+    const double first = std::ceil(index[axis] - steps[axis]);
+    const double last = std::floor(index[axis] + steps[axis]);
+    // Limited on both sides: what lies far outside is no integer.
+    box.low[axis] = static_cast<int>(std::clamp(first, low, high + 1.0));
+    box.high[axis] = static_cast<int>(std::clamp(last, low - 1.0, high));
+  }
+  return box;
 }
 }
 

@@ -48,9 +48,7 @@ void MarkBridged(
   const double reach = Reach(measurement);
   for (const VesselTree::Branch& branch : tree.branches)
   {
-    double certain = branch.parentGroupId < 0
-      ? 1.0
-      : tree.bridgeConfidence[static_cast<std::size_t>(branch.points[0])];
+    double certain = branch.parentGroupId < 0 ? 1.0 : tree.bridgeConfidence[branch.points[0]];
     std::vector<char> passed(bridges.size(), 0);
     std::vector<double> unseen(bridges.size(), 0.0); // mm along each
     for (std::size_t i = branch.parentGroupId < 0 ? 0 : 1; i < branch.points.size(); ++i)

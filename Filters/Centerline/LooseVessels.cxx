@@ -1,20 +1,21 @@
 #include "LooseVessels.h"
 
+#include "CheapestFirst.h"
+#include "CurveGeometry.h"
 #include "LumenMeasurement.h"
 #include "Median.h"
 #include "ParallelFor.h"
 #include "SegmentAtlas.h"
+#include "TreeLinks.h"
 #include "VoxelLattice.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <map>
-#include <queue>
 #include <stdexcept>
 #include <utility>
 
@@ -140,13 +141,14 @@ struct Tip
 std::vector<Tip> TipsOf(const VesselTree& tree)
 {
   std::vector<Tip> tips;
-  for (const VesselTree::Branch& branch : tree.branches)
+  const TreeLinks links(tree);
+  for (std::size_t b = 0; b < tree.branches.size(); ++b)
   {
-    if (std::any_of(tree.branches.begin(), tree.branches.end(),
-          [&](const VesselTree::Branch& other) { return other.parentGroupId == branch.groupId; }))
+    if (!links.IsTip(b))
     {
       continue;
     }
+    const VesselTree::Branch& branch = tree.branches[b];
     const Vector3& tip = tree.points[branch.points.back()];
     std::size_t back = branch.points.size() - 1;
     while (back > 0 && (tree.points[branch.points[back]] - tip).norm() < 2.0 * EndLength)
@@ -277,22 +279,7 @@ template <typename Take>
 void Search::AddPiece(
   std::int64_t first, const Take& take, std::vector<std::vector<std::int64_t>>& pieces) const
 {
-  if (!take(first))
-  {
-    return;
-  }
-  std::vector<std::int64_t> piece{ first };
-  for (std::size_t n = 0; n < piece.size(); ++n)
-  {
-    this->L.Neighbours(piece[n],
-      [&](std::int64_t next, float)
-      {
-        if (take(next))
-        {
-          piece.push_back(next);
-        }
-      });
-  }
+  std::vector<std::int64_t> piece = this->L.Connected(first, take);
   if (static_cast<double>(piece.size()) * std::cbrt(this->L.VoxelVolume()) >= LeastLength)
   {
     std::sort(piece.begin(), piece.end());
@@ -321,13 +308,12 @@ std::vector<std::vector<std::int64_t>> Search::Pieces() const
       high[axis] = std::max(high[axis], std::min(size[axis] - 1, (*at)[axis] + reach));
     }
     this->L.Ball(*at, this->I.tree.radius[p] + Outside,
-      [&](std::int64_t voxel, const std::array<int, 3>&)
-      { taken[static_cast<std::size_t>(voxel)] = 1; });
+      [&](std::int64_t voxel, const std::array<int, 3>&) { taken[voxel] = 1; });
   }
   const double least = LeastTube * this->Tube;
   const auto free = [&](std::int64_t voxel)
   {
-    if (taken[static_cast<std::size_t>(voxel)] != 0 || !(this->I.vesselness[voxel] >= least))
+    if (taken[voxel] != 0 || !(this->I.vesselness[voxel] >= least))
     {
       return false;
     }
@@ -337,7 +323,7 @@ std::vector<std::vector<std::int64_t>> Search::Pieces() const
   const auto take = [&](std::int64_t voxel)
   {
     const bool was = free(voxel);
-    taken[static_cast<std::size_t>(voxel)] |= was ? 1 : 0;
+    taken[voxel] |= was ? 1 : 0;
     return was;
   };
   // All that are free, slice by slice; pieces are then taken in this order.
@@ -355,7 +341,7 @@ std::vector<std::vector<std::int64_t>> Search::Pieces() const
             const std::int64_t voxel = this->L.Index(i, j, low[2] + static_cast<int>(slice));
             if (free(voxel))
             {
-              slices[static_cast<std::size_t>(slice)].push_back(voxel);
+              slices[slice].push_back(voxel);
             }
           }
         }
@@ -416,17 +402,15 @@ std::vector<Vector3> Search::Axis(const std::vector<std::int64_t>& piece) const
   const auto farthest = [&](std::size_t from)
   {
     std::vector<float> distance(piece.size(), std::numeric_limits<float>::infinity());
-    using Entry = std::pair<float, std::size_t>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+    CheapestFirst queue;
     distance[from] = 0.0F;
     before[from] = -1;
-    queue.push({ 0.0F, from });
+    queue.push({ 0.0F, static_cast<std::int64_t>(from) });
     std::size_t last = from;
     while (!queue.empty())
     {
-      // No structured binding: lambdas can not hold those everywhere.
-      const float length = queue.top().first;
-      const std::size_t at = queue.top().second;
+      const float length = queue.top().cost;
+      const auto at = static_cast<std::size_t>(queue.top().voxel);
       queue.pop();
       if (length > distance[at])
       {
@@ -441,7 +425,7 @@ std::vector<Vector3> Search::Axis(const std::vector<std::int64_t>& piece) const
           {
             return;
           }
-          const auto next = static_cast<std::size_t>(found - piece.begin());
+          const auto next = found - piece.begin();
           // Through the middle of the tube.
           const double tube = this->I.vesselness[voxel] / this->Tube;
           const auto cost = static_cast<float>(step / std::clamp(tube, 0.3, 1.5));
@@ -457,10 +441,9 @@ std::vector<Vector3> Search::Axis(const std::vector<std::int64_t>& piece) const
   };
   const std::size_t end = farthest(farthest(0));
   std::vector<Vector3> way;
-  for (auto at = static_cast<std::ptrdiff_t>(end); at >= 0;
-       at = before[static_cast<std::size_t>(at)])
+  for (auto at = static_cast<std::ptrdiff_t>(end); at >= 0; at = before[at])
   {
-    way.push_back(this->L.World(this->L.Place(piece[static_cast<std::size_t>(at)])));
+    way.push_back(this->L.World(this->L.Place(piece[at])));
   }
   const auto reach = static_cast<std::size_t>(1.5 / this->L.Spacing.minCoeff()) + 1;
   std::vector<Vector3> axis;
@@ -494,41 +477,48 @@ double Search::UsualContrast(double radius) const
   return MedianOf(usual);
 }
 
+/// Whether one of an axis' ends is one that a condition takes.
+/// @param takes  the end, and its direction into the axis
+template <typename Takes>
+bool AnyEnd(const std::vector<Vector3>& axis, const Takes& takes)
+{
+  const auto inside = std::min(axis.size() - 1, static_cast<std::size_t>(2.0 * EndLength / Step));
+  const auto end = [&](const Vector3& begin, const Vector3& inwards)
+  { return takes(begin, Vector3((inwards - begin).normalized())); };
+  return end(axis.front(), axis[inside]) || end(axis.back(), axis[axis.size() - 1 - inside]);
+}
+
 /// Whether an axis, from one of its ends, goes on where the tree ends.
 bool Search::GoesOn(const std::vector<Vector3>& axis) const
 {
-  const auto from = [&](const Vector3& begin, const Vector3& inwards)
-  {
-    const Vector3 along = (inwards - begin).normalized();
-    return std::any_of(this->Tips.begin(), this->Tips.end(),
-      [&](const Tip& tip)
-      {
-        const Vector3 gap = begin - tip.position;
-        // Over a short gap its direction says nothing.
-        const bool ahead = gap.norm() < Outside || gap.dot(tip.ahead) > OnwardCosine * gap.norm();
-        return gap.norm() < OnwardGap && ahead && along.dot(tip.ahead) > OnwardCosine;
-      });
-  };
-  const auto inside = std::min(axis.size() - 1, static_cast<std::size_t>(2.0 * EndLength / Step));
-  return from(axis.front(), axis[inside]) || from(axis.back(), axis[axis.size() - 1 - inside]);
+  return AnyEnd(axis,
+    [&](const Vector3& begin, const Vector3& along)
+    {
+      return std::any_of(this->Tips.begin(), this->Tips.end(),
+        [&](const Tip& tip)
+        {
+          const Vector3 gap = begin - tip.position;
+          // Over a short gap its direction says nothing.
+          const bool ahead = gap.norm() < Outside || gap.dot(tip.ahead) > OnwardCosine * gap.norm();
+          return gap.norm() < OnwardGap && ahead && along.dot(tip.ahead) > OnwardCosine;
+        });
+    });
 }
 
 /// Whether an axis, straight back from one of its ends, comes from the side of a vessel that flows its way.
 bool Search::ComesFromASide(const std::vector<Vector3>& axis) const
 {
-  const auto from = [&](const Vector3& begin, const Vector3& inwards)
-  {
-    const Vector3 along = (inwards - begin).normalized();
-    return std::any_of(this->Samples.begin(), this->Samples.end(),
-      [&](const Sample& sample)
-      {
-        const Vector3 gap = begin - sample.position;
-        return gap.norm() < OnwardGap && gap.dot(along) > SideCosine * gap.norm() &&
-          along.dot(sample.tangent) > 0.0;
-      });
-  };
-  const auto inside = std::min(axis.size() - 1, static_cast<std::size_t>(2.0 * EndLength / Step));
-  return from(axis.front(), axis[inside]) || from(axis.back(), axis[axis.size() - 1 - inside]);
+  return AnyEnd(axis,
+    [&](const Vector3& begin, const Vector3& along)
+    {
+      return std::any_of(this->Samples.begin(), this->Samples.end(),
+        [&](const Sample& sample)
+        {
+          const Vector3 gap = begin - sample.position;
+          return gap.norm() < OnwardGap && gap.dot(along) > SideCosine * gap.norm() &&
+            along.dot(sample.tangent) > 0.0;
+        });
+    });
 }
 
 /// Sections along an axis.
@@ -605,10 +595,7 @@ bool Search::Describe(
     sections.begin() + static_cast<std::ptrdiff_t>(last));
   vessel.points.assign(whole.begin() + static_cast<std::ptrdiff_t>(first),
     whole.begin() + static_cast<std::ptrdiff_t>(last));
-  for (std::size_t n = 1; n < vessel.points.size(); ++n)
-  {
-    vessel.length += (vessel.points[n] - vessel.points[n - 1]).norm();
-  }
+  vessel.length = PolylineLength(vessel.points);
   vessel.goesOn = vessel.length >= LeastOnward && this->GoesOn(vessel.points);
   const bool hangs =
     vessel.goesOn || (vessel.length >= LeastOnward && this->ComesFromASide(vessel.points));

@@ -1,9 +1,11 @@
 #include "LumenLevels.h"
 
 #include "BlurredDisc.h"
+#include "CrossFrame.h"
 #include "CurveSmoothing.h"
 #include "LumenMeasurement.h"
 #include "Median.h"
+#include "TreeLinks.h"
 
 #include <algorithm>
 #include <cmath>
@@ -34,16 +36,14 @@ PointValues ValuesAt(const ImageInterpolator& image, const Vector3& position,
   const Vector3& tangent, double radius, double blur)
 {
   constexpr int directions = 12;
-  const Vector3 u = tangent.unitOrthogonal();
-  const Vector3 v = tangent.cross(u);
+  const CrossFrame frame(tangent);
   PointValues values;
   values.lumen = image.At(position);
   std::vector<double> ring;
   const double disc = std::min(0.4 * radius, image.SmallestSpacing());
   for (int i = 0; i < directions; ++i)
   {
-    const double angle = 2.0 * M_PI * i / directions;
-    const Vector3 direction = std::cos(angle) * u + std::sin(angle) * v;
+    const Vector3 direction = frame.Ray(i, directions);
     values.lumen += image.At(position + disc * direction);
     ring.push_back(image.At(position + (radius + 2.5 * blur) * direction));
   }
@@ -70,7 +70,7 @@ double NoiseOnAxes(const VesselTree& tree, const std::vector<VesselPath>& paths,
   {
     std::vector<std::pair<double, double>> voxels; // mm along, value; each voxel once
     Vector3 before = Vector3::Constant(-1e9);
-    for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
+    for (std::size_t i = path.FirstOwn(); i < path.points.size(); ++i)
     {
       const std::int64_t p = path.points[i];
       if (counts[p] == 0 || !(tree.radius[p] > 2.5 * blur + 0.5 * values.SmallestSpacing()))
@@ -130,7 +130,7 @@ LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselP
   for (const VesselPath& path : paths)
   {
     const std::vector<Vector3> tangents = PathTangents(tree, path, 1.0);
-    for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
+    for (std::size_t i = path.FirstOwn(); i < path.points.size(); ++i)
     {
       const std::int64_t p = path.points[i];
       seen[p] = ValuesAt(values, tree.points[p], tangents[i], tree.radius[p], blur);
@@ -162,7 +162,7 @@ LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselP
       const double r = tree.radius[p] / blur;
       const double share = seen[p].share;
       own[i] = result.background + (seen[p].lumen - result.background) / std::max(share, 0.5);
-      const bool bridged = !tree.bridged.empty() && tree.bridged[p] != 0;
+      const bool bridged = IsBridged(tree, p);
       if (r > WideEnough && own[i] < BrightestShare * usual && !bridged &&
         own[i] - result.background > DimmestShare * (usual - result.background))
       {
@@ -175,13 +175,13 @@ LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselP
     const double before = path.parent < 0 ? usual : result.level[path.points.front()];
     if (first >= points || path.arc[last] - path.arc[first] < LeastWideLength)
     {
-      for (std::size_t i = path.parent < 0 ? 0 : 1; i < points; ++i)
+      for (std::size_t i = path.FirstOwn(); i < points; ++i)
       {
         result.level[path.points[i]] = before;
       }
       continue;
     }
-    const double step = std::max(1e-6, path.arc.back() / static_cast<double>(points - 1));
+    const double step = path.Step();
     // At its origin a vessel has its parent's blood.
     if (path.parent >= 0)
     {
@@ -202,7 +202,7 @@ LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselP
         robust[i] = weights[i] / ((1.0 + residual * residual) * (1.0 + residual * residual));
       }
     }
-    for (std::size_t i = path.parent < 0 ? 0 : 1; i < points; ++i)
+    for (std::size_t i = path.FirstOwn(); i < points; ++i)
     {
       // Blood loses some of its contrast on its way, and gains none.
       result.level[path.points[i]] = std::clamp(

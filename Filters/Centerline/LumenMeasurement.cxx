@@ -1,5 +1,6 @@
 #include "LumenMeasurement.h"
 
+#include "CrossFrame.h"
 #include "Median.h"
 #include "VoxelCell.h"
 
@@ -7,87 +8,105 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace coronary
 {
 namespace
 {
-/// Fibonacci points on a sphere.
-Vector3 SphereDirection(int index, int count)
-{
-  const double z = 1.0 - (2.0 * index + 1.0) / count;
-  const double angle = index * 2.399963229728653;
-  const double r = std::sqrt(std::max(0.0, 1.0 - z * z));
-  return { r * std::cos(angle), r * std::sin(angle), z };
-}
-
 struct Wall
 {
   double distance = 0.0; ///< mm; 0 where no wall was found
   double behind = 0.0;   ///< least value behind it
 };
 
-/// First fall along a ray, to `share` of the way up from its foot. Values are sampled every `step` up to `reach`.
-Wall FindWall(const ImageInterpolator& image, const Vector3& from, const Vector3& direction,
-  double lumen, double least, double floor, double step, double reach, double share)
+/// Where the wall is, for the radius.
+constexpr double HalfMaximum = 0.5;
+/// Higher up the fall, for the centre: what a vein against the wall adds is less there.
+constexpr double CentreLevel = 0.7;
+
+/// What rays of one lumen look for.
+struct WallSearch
+{
+  const ImageInterpolator& image;
+  double lumen; ///< image value
+  double least; ///< fall that is a wall
+  double floor; ///< what is darker is no part of a wall
+  double step;  ///< mm
+  double reach; ///< mm
+
+  /// @param leastShare  of the contrast, that falls at a wall
+  WallSearch(const ImageInterpolator& of, const LumenSettings& settings, double lumenValue,
+    double leastShare, double farthest)
+    : image(of)
+    , lumen(lumenValue)
+    , least(leastShare * (settings.reference.lumen - settings.reference.background))
+    , floor(settings.reference.background -
+        0.1 * (settings.reference.lumen - settings.reference.background))
+    , step(0.5 * of.SmallestSpacing())
+    , reach(farthest)
+  {
+  }
+
+  Wall Find(const Vector3& from, const Vector3& direction, double share = HalfMaximum) const;
+  Wall FindLevel(const Vector3& from, const Vector3& direction, double level) const;
+};
+
+/// First fall along a ray, to `share` of the way up from its foot.
+Wall WallSearch::Find(const Vector3& from, const Vector3& direction, double share) const
 {
   constexpr int capacity = 512;
   double values[capacity];
-  const int count = std::min(capacity, static_cast<int>(std::ceil(reach / step)) + 1);
-  values[0] = lumen;
-  double lowest = lumen;
+  const int count = std::min(capacity, static_cast<int>(std::ceil(this->reach / this->step)) + 1);
+  values[0] = this->lumen;
+  double lowest = this->lumen;
   int lowestAt = 0;
   int known = 1;
   for (int i = 1; i < count; ++i, ++known)
   {
     // Air behind the fat around a vessel is no part of its wall.
-    values[i] = std::max(floor, image.At(from + i * step * direction));
+    values[i] = std::max(this->floor, this->image.At(from + i * this->step * direction));
     if (values[i] < lowest)
     {
       lowest = values[i];
       lowestAt = i;
     }
     // Another bright thing behind the wall, or the fall is over.
-    else if (lumen - lowest > least &&
-      (values[i] > lowest + 0.25 * (lumen - lowest) || i - lowestAt > 5))
+    else if (this->lumen - lowest > this->least &&
+      (values[i] > lowest + 0.25 * (this->lumen - lowest) || i - lowestAt > 5))
     {
       break;
     }
   }
-  if (lumen - lowest < least)
+  if (this->lumen - lowest < this->least)
   {
     return {};
   }
   // The least value is the noise's; the wall's other side is the mean of the foot of the fall.
   int foot = lowestAt;
-  while (foot > 1 && values[foot - 1] < lowest + 0.15 * (lumen - lowest))
+  while (foot > 1 && values[foot - 1] < lowest + 0.15 * (this->lumen - lowest))
   {
     --foot;
   }
   const int last = std::min(known - 1, lowestAt + 4);
   double behind = 0.0;
   int feet = 0;
-  for (int i = foot; i <= last && values[i] < lowest + 0.25 * (lumen - lowest); ++i, ++feet)
+  for (int i = foot; i <= last && values[i] < lowest + 0.25 * (this->lumen - lowest); ++i, ++feet)
   {
     behind += values[i];
   }
   behind /= feet;
-  const double level = behind + share * (lumen - behind);
+  const double level = behind + share * (this->lumen - behind);
   for (int i = 1; i <= lowestAt; ++i)
   {
     if (values[i] <= level)
     {
       const double fraction = (values[i - 1] - level) / std::max(values[i - 1] - values[i], 1e-12);
-      return { (i - 1 + std::min(1.0, std::max(0.0, fraction))) * step, behind };
+      return { (i - 1 + std::min(1.0, std::max(0.0, fraction))) * this->step, behind };
     }
   }
   return {};
 }
-
-/// Where the wall is, for the radius.
-constexpr double HalfMaximum = 0.5;
-/// Higher up the fall, for the centre: what a vein against the wall adds is less there.
-constexpr double CentreLevel = 0.7;
 
 constexpr double TableStep = 0.05;
 
@@ -153,17 +172,16 @@ const std::vector<double>& HalfMaxima()
 }
 
 /// Crossing of a fixed level.
-Wall FindLevel(const ImageInterpolator& image, const Vector3& from, const Vector3& direction,
-  double centre, double level, double step, double reach)
+Wall WallSearch::FindLevel(const Vector3& from, const Vector3& direction, double level) const
 {
-  double previous = centre;
-  for (int i = 1; i * step <= reach; ++i)
+  double previous = this->lumen;
+  for (int i = 1; i * this->step <= this->reach; ++i)
   {
-    const double s = i * step;
-    const double value = image.At(from + s * direction);
+    const double s = i * this->step;
+    const double value = this->image.At(from + s * direction);
     if (value <= level && previous > level)
     {
-      return { s - step + step * (previous - level) / (previous - value), value };
+      return { s - this->step + this->step * (previous - level) / (previous - value), value };
     }
     previous = value;
   }
@@ -204,24 +222,15 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
 {
   const bool fixed = !std::isnan(settings.level);
   const int rays = settings.rays;
-  const double step = 0.5 * image.SmallestSpacing();
   const LumenReference& reference = settings.reference;
   const double contrast = reference.lumen - reference.background;
-  const double floor = reference.background - 0.1 * contrast;
-
-  const Vector3 axis = tangent.normalized();
-  const Vector3 u = axis.unitOrthogonal();
-  const Vector3 v = axis.cross(u);
-  const auto direction = [&](int ray)
-  {
-    const double angle = 2.0 * M_PI * ray / rays;
-    return Vector3(std::cos(angle) * u + std::sin(angle) * v);
-  };
+  const CrossFrame frame(tangent.normalized());
 
   LumenSection section;
   section.centre = position;
   section.radius = radiusGuess;
   const double reach = settings.maximumRadius + (fixed ? 0.0 : 3.0 * image.SmallestSpacing());
+  WallSearch search(image, settings, 0.0, 0.15, reach);
   std::vector<Wall> walls(rays);
   std::vector<char> good(rays);
   double offCentre = 0.0;
@@ -238,19 +247,17 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
     const double disc = std::min(0.35 * section.radius, image.SmallestSpacing());
     for (int ray = 0; ray < 8; ++ray)
     {
-      const double angle = 2.0 * M_PI * ray / 8;
-      lumen += image.At(section.centre + disc * (std::cos(angle) * u + std::sin(angle) * v));
+      lumen += image.At(section.centre + disc * frame.Ray(ray, 8));
     }
     section.lumen = lumen / 9.0;
+    search.lumen = section.lumen;
 
     std::vector<double> distances;
     for (int ray = 0; ray < rays; ++ray)
     {
       walls[ray] = fixed
-        ? FindLevel(
-            image, section.centre, direction(ray), section.lumen, settings.level, step, reach)
-        : FindWall(image, section.centre, direction(ray), section.lumen, 0.15 * contrast, floor,
-            step, reach, centred ? HalfMaximum : CentreLevel);
+        ? search.FindLevel(section.centre, frame.Ray(ray, rays), settings.level)
+        : search.Find(section.centre, frame.Ray(ray, rays), centred ? HalfMaximum : CentreLevel);
       if (walls[ray].distance > 0.0 && walls[ray].distance <= settings.maximumRadius)
       {
         distances.push_back(walls[ray].distance);
@@ -306,7 +313,7 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
     {
       break;
     }
-    const Vector3 shift = fit[1] * u + fit[2] * v;
+    const Vector3 shift = frame.Place(fit[1], fit[2]);
     offCentre = shift.norm();
     const double most = 0.7 * section.radius;
     section.centre += offCentre > most ? Vector3(most / offCentre * shift) : shift;
@@ -346,13 +353,9 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
 {
   using Vector2 = Eigen::Vector2d;
   constexpr int rays = 36;
-  const double step = 0.5 * image.SmallestSpacing();
-  const double contrast = settings.reference.lumen - settings.reference.background;
-  const double floor = settings.reference.background - 0.1 * contrast;
-  const double reach = 1.6 * radius + 3.0 * image.SmallestSpacing();
-  const Vector3 axis = tangent.normalized();
-  const Vector3 u = axis.unitOrthogonal();
-  const Vector3 v = axis.cross(u);
+  const WallSearch search(
+    image, settings, lumen, 0.15, 1.6 * radius + 3.0 * image.SmallestSpacing());
+  const CrossFrame frame(tangent.normalized());
   centre = position;
   for (int iteration = 0; iteration < 4; ++iteration)
   {
@@ -364,9 +367,8 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
     {
       const double angle = 2.0 * M_PI * ray / rays;
       const Vector2 row(std::cos(angle), std::sin(angle));
-      const Vector3 direction = row[0] * u + row[1] * v;
-      const Wall wall =
-        FindWall(image, centre, direction, lumen, 0.15 * contrast, floor, step, reach, HalfMaximum);
+      const Vector3 direction = frame.Place(row[0], row[1]);
+      const Wall wall = search.Find(centre, direction);
       const double residual = wall.distance - radius;
       if (wall.distance > 0.0 && std::abs(residual) < 0.5 * radius &&
         isOwn(centre + wall.distance * direction))
@@ -387,7 +389,7 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
       return std::sqrt(sum / found) < 0.25 * radius;
     }
     const Vector2 shift = (normal + 0.1 * Eigen::Matrix2d::Identity()).ldlt().solve(right);
-    centre += shift[0] * u + shift[1] * v;
+    centre += frame.Place(shift[0], shift[1]);
     if ((centre - position).norm() > 0.6 * radius)
     {
       return false;
@@ -399,21 +401,15 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
 std::vector<Vector3> MeasureWall(const ImageInterpolator& image, const Vector3& position,
   const Vector3& tangent, double radius, double lumen, const LumenSettings& settings)
 {
-  const double step = 0.5 * image.SmallestSpacing();
-  const double contrast = settings.reference.lumen - settings.reference.background;
-  const double floor = settings.reference.background - 0.1 * contrast;
-  const double reach = 1.8 * radius + 4.0 * image.SmallestSpacing();
-  const Vector3 axis = tangent.normalized();
-  const Vector3 u = axis.unitOrthogonal();
-  const Vector3 v = axis.cross(u);
+  // A fall of less than this share is a neighbour's side.
+  const WallSearch search(
+    image, settings, lumen, 0.4, 1.8 * radius + 4.0 * image.SmallestSpacing());
+  const CrossFrame frame(tangent.normalized());
   std::vector<Vector3> points;
   for (int ray = 0; ray < settings.rays; ++ray)
   {
-    const double angle = 2.0 * M_PI * ray / settings.rays;
-    const Vector3 direction = std::cos(angle) * u + std::sin(angle) * v;
-    // A fall of less than this is a neighbour's side.
-    const Wall wall =
-      FindWall(image, position, direction, lumen, 0.4 * contrast, floor, step, reach, HalfMaximum);
+    const Vector3 direction = frame.Ray(ray, settings.rays);
+    const Wall wall = search.Find(position, direction);
     if (wall.distance > 0.0)
     {
       points.emplace_back(position + wall.distance * direction);
@@ -438,14 +434,15 @@ bool MeasureReference(
   // What is less than the noise is no wall.
   const double least = 2.0 * (values[directions * 7 / 8] - values[directions / 8]);
 
+  WallSearch search(image, {}, reference.lumen, 0.0, 40.0 * spacing);
+  search.least = std::max(least, 1e-3 * std::abs(reference.lumen));
+  search.floor = -std::numeric_limits<double>::infinity();
   // Rays along the vessel come far, and those across find its wall.
   std::vector<double> behind;
   std::vector<double> distances;
   for (int i = 0; i < directions; ++i)
   {
-    const Wall wall = FindWall(image, seed, SphereDirection(i, directions), reference.lumen,
-      std::max(least, 1e-3 * std::abs(reference.lumen)), -std::numeric_limits<double>::infinity(),
-      0.5 * spacing, 40.0 * spacing, HalfMaximum);
+    const Wall wall = search.Find(seed, SphereDirection(i, directions));
     if (wall.distance > 0.0)
     {
       behind.push_back(wall.behind);
@@ -456,10 +453,8 @@ bool MeasureReference(
   {
     return false;
   }
-  std::sort(behind.begin(), behind.end());
-  std::sort(distances.begin(), distances.end());
-  reference.background = behind[behind.size() / 4];
-  reference.radius = distances[distances.size() / 3];
+  reference.background = QuantileOf(std::move(behind), 0.25);
+  reference.radius = QuantileOf(std::move(distances), 1.0 / 3.0);
   return reference.background < reference.lumen;
 }
 

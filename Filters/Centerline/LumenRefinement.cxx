@@ -1,11 +1,15 @@
 #include "LumenRefinement.h"
 
 #include "BlurredDisc.h"
+#include "CrossFrame.h"
 #include "CurveSmoothing.h"
+#include "GridIndex.h"
 #include "LumenMeasurement.h"
 #include "Median.h"
 #include "PartialProgress.h"
 #include "Require.h"
+#include "TreeLinks.h"
+#include "VoxelLattice.h"
 
 #include <Eigen/Dense>
 
@@ -26,20 +30,29 @@ constexpr double LeastBridgedRadius = 0.25; ///< mm
 constexpr double RingStart = 1.8;           ///< blurs outside of the wall the surroundings begin
 constexpr double RingEnd = 3.0;
 constexpr double CalciumHalo = 2.0; ///< blurs around an object that its blooming changes
-constexpr double LeastRays = 0.4;   ///< share of rays that have to count
+/// Of the contrast's brightness at a place, relative.
+constexpr double LevelUncertainty = 0.06;
+/// mm along a vessel that smoothing halves in the refined radii.
+constexpr double Wavelength = 3.0;
+/// Degrees of the wall behind calcium beyond which nothing is measured.
+constexpr double GreatestArc = 180.0;
+constexpr double LeastRays = 0.4; ///< share of rays that have to count
 
 /// Values of a section in polar coordinates around a place.
 struct PolarSection
 {
-  Vector3 centre;
-  Vector3 u;
-  Vector3 v;
   double step = 0.0; ///< mm between samples of a ray
   int count = 0;     ///< samples a ray; the first lies half a step from the centre
   std::vector<float> values;
   std::vector<char> hidden; ///< by calcium
 
   double Distance(int sample) const { return (sample + 0.5) * this->step; }
+  /// Cosine and sine.
+  static std::array<double, 2> Direction(int ray)
+  {
+    const double angle = 2.0 * M_PI * ray / Rays;
+    return { std::cos(angle), std::sin(angle) };
+  }
   std::size_t At(int ray, int sample) const
   {
     return static_cast<std::size_t>(ray) * this->count + sample;
@@ -108,17 +121,14 @@ private:
     const Vector3& position, const Vector3& tangent, double reach, bool calcium) const
   {
     PolarSection section;
-    section.centre = position;
-    section.u = tangent.unitOrthogonal();
-    section.v = tangent.cross(section.u);
+    const CrossFrame frame(tangent);
     section.step = 0.4 * this->Image.SmallestSpacing();
     section.count = std::max(4, static_cast<int>(std::ceil(reach / section.step)));
     section.values.resize(static_cast<std::size_t>(Rays) * section.count);
     section.hidden.assign(section.values.size(), 0);
     for (int ray = 0; ray < Rays; ++ray)
     {
-      const double angle = 2.0 * M_PI * ray / Rays;
-      const Vector3 direction = std::cos(angle) * section.u + std::sin(angle) * section.v;
+      const Vector3 direction = frame.Ray(ray, Rays);
       for (int s = 0; s < section.count; ++s)
       {
         const Vector3 place = position + section.Distance(s) * direction;
@@ -163,9 +173,7 @@ private:
     std::vector<double> known;
     for (int ray = 0; ray < Rays; ++ray)
     {
-      const double angle = 2.0 * M_PI * ray / Rays;
-      const double c = std::cos(angle);
-      const double s = std::sin(angle);
+      const auto [c, s] = PolarSection::Direction(ray);
       double sum = 0.0;
       double weight = 0.0;
       int all = 0;
@@ -256,9 +264,7 @@ private:
         {
           continue;
         }
-        const double angle = 2.0 * M_PI * ray / Rays;
-        const double c = std::cos(angle);
-        const double s = std::sin(angle);
+        const auto [c, s] = PolarSection::Direction(ray);
         for (int n = 0; n < section.count; ++n)
         {
           const double rho = section.Distance(n);
@@ -344,9 +350,7 @@ private:
     int rays = 0;
     for (int ray = 0; ray < Rays; ++ray)
     {
-      const double angle = 2.0 * M_PI * ray / Rays;
-      const double c = std::cos(angle);
-      const double s = std::sin(angle);
+      const auto [c, s] = PolarSection::Direction(ray);
       for (int n = 0; n < section.count; ++n)
       {
         const double rho = section.Distance(n);
@@ -373,35 +377,24 @@ private:
 std::unordered_set<std::int64_t> HiddenVoxels(
   const CalciumMap& calcium, const ScalarImage& image, double blur)
 {
-  const std::array<int, 3> size = image.Dimensions();
+  const VoxelLattice lattice(image.grid);
   const double reach = CalciumHalo * blur;
-  std::array<std::int64_t, 3> extent;
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    extent[axis] = static_cast<std::int64_t>(reach / image.grid.spacing[axis]);
-  }
+  const std::array<int, 3>& n = lattice.Size;
+  const std::array<int, 6> extent{ 0, n[0] - 1, 0, n[1] - 1, 0, n[2] - 1 };
   std::unordered_set<std::int64_t> hidden;
   for (const CalciumVoxel& voxel : calcium.voxels)
   {
-    const std::array<std::int64_t, 3> n{ voxel.offset % size[0], voxel.offset / size[0] % size[1],
-      voxel.offset / size[0] / size[1] };
-    for (std::int64_t k = -extent[2]; k <= extent[2]; ++k)
-    {
-      for (std::int64_t j = -extent[1]; j <= extent[1]; ++j)
-      {
-        for (std::int64_t i = -extent[0]; i <= extent[0]; ++i)
+    const std::array<int, 3> at = lattice.Place(voxel.offset);
+    const Vector3 centre(at[0], at[1], at[2]);
+    BoxAround(centre, Vector3::Constant(reach).cwiseQuotient(lattice.Spacing), extent)
+      .ForEach(
+        [&](int i, int j, int k)
         {
-          const Vector3 offset = image.grid.spacing.cwiseProduct(
-            Vector3(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)));
-          const std::array<std::int64_t, 3> m{ n[0] + i, n[1] + j, n[2] + k };
-          if (offset.norm() <= reach && m[0] >= 0 && m[1] >= 0 && m[2] >= 0 && m[0] < size[0] &&
-            m[1] < size[1] && m[2] < size[2])
+          if (lattice.Spacing.cwiseProduct(Vector3(i, j, k) - centre).norm() <= reach)
           {
-            hidden.insert((m[2] * size[1] + m[1]) * size[0] + m[0]);
+            hidden.insert(lattice.Index(i, j, k));
           }
-        }
-      }
-    }
+        });
   }
   return hidden;
 }
@@ -430,30 +423,12 @@ struct PathWork
   std::vector<char> besideCalcium;
   std::vector<Fit> fits;
 };
-}
-
-void RefinementSettings::Validate() const
-{
-  constexpr RequireOf require{ "RefinementSettings" };
-  require(this->levelUncertainty >= 0.005 && this->levelUncertainty <= 0.5,
-    "levelUncertainty must be from 0.005 to 0.5");
-  require(
-    this->wavelength >= 0.5 && this->wavelength <= 50.0, "wavelength must be from 0.5 to 50 mm");
-  require(this->greatestArc >= 30.0 && this->greatestArc <= 300.0,
-    "greatestArc must be from 30 to 300 degrees");
-}
-
-namespace
-{
 /// The parts of a refinement that all sections share.
 struct Refiner
 {
   const VesselTree& tree;
   const LumenLevels& levels;
-  const CalciumMap& calcium;
-  const ScalarImage& image;
   double blur;
-  const RefinementSettings& settings;
   SectionFitter fitter;
 
   void Prepare(PathWork& work, const std::vector<VesselPath>& paths, RefinedLumen& result) const;
@@ -462,7 +437,7 @@ struct Refiner
   void Finish(const PathWork& work, RefinedLumen& result) const;
   bool IsMeasured(const Fit& fit) const
   {
-    return fit.found && fit.hiddenArc <= this->settings.greatestArc &&
+    return fit.found && fit.hiddenArc <= GreatestArc &&
       fit.deviation < std::max(fit.radius, this->blur);
   }
 };
@@ -507,8 +482,7 @@ std::vector<double> Refiner::ExpectedRadii(const PathWork& work) const
   {
     return radii;
   }
-  const double step = std::max(1e-6, path.arc.back() / static_cast<double>(count - 1));
-  std::vector<double> smooth = SmoothSequence(radii, weights, 10.0 / step);
+  std::vector<double> smooth = SmoothSequence(radii, weights, 10.0 / path.Step());
   for (std::size_t i = 0; i < count; ++i)
   {
     radii[i] = work.besideCalcium[i] != 0
@@ -527,7 +501,7 @@ Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected)
   Prior prior;
   prior.radius = expected;
   prior.level = this->levels.level[p];
-  prior.levelDeviation = this->settings.levelUncertainty * contrast;
+  prior.levelDeviation = LevelUncertainty * contrast;
   prior.shift = std::max(0.25, 0.25 * expected);
   prior.noise = std::max(this->levels.noise, 0.01 * contrast);
   const double reach = 1.25 * expected + (RingEnd + 1.0) * this->blur + 0.5;
@@ -552,8 +526,7 @@ Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected)
     return best;
   }
   // The line may have been drawn onto the calcium: the lumen is looked for beside it.
-  const Vector3 u = tangent.unitOrthogonal();
-  const Vector3 v = tangent.cross(u);
+  const CrossFrame frame(tangent);
   const auto cost = [&](const Fit& fit)
   {
     return !this->IsMeasured(fit)
@@ -570,7 +543,7 @@ Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected)
       const double distance = away * std::max(0.8, expected);
       const double x = distance * std::cos(0.25 * M_PI * side);
       const double y = distance * std::sin(0.25 * M_PI * side);
-      Fit fit = this->fitter.Measure(position + x * u + y * v, tangent, prior, reach, true);
+      Fit fit = this->fitter.Measure(position + frame.Place(x, y), tangent, prior, reach, true);
       fit.x += x;
       fit.y += y;
       // Another lumen than this one is none of its.
@@ -622,7 +595,7 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
 {
   const VesselPath& path = *work.path;
   const std::size_t count = path.points.size();
-  const double step = std::max(1e-6, path.arc.back() / static_cast<double>(count - 1));
+  const double step = path.Step();
   std::vector<double> radii(count);
   std::vector<double> weights(count);
   std::array<std::vector<double>, 3> shifts;
@@ -653,8 +626,7 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
       shiftWeights[i] = 1.0;
       if (work.besideCalcium[i] != 0)
       {
-        const Vector3 u = work.tangents[i].unitOrthogonal();
-        const Vector3 shift = fit.x * u + fit.y * work.tangents[i].cross(u);
+        const Vector3 shift = CrossFrame(work.tangents[i]).Place(fit.x, fit.y);
         for (int axis = 0; axis < 3; ++axis)
         {
           shifts[axis][i] = shift[axis];
@@ -693,28 +665,28 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
   {
     return; // Nothing but calcium.
   }
-  std::vector<double> smooth = SmoothSequence(radii, weights, this->settings.wavelength / step);
+  std::vector<double> smooth = SmoothSequence(radii, weights, Wavelength / step);
   std::vector<double> robust = weights;
   for (std::size_t i = 0; i < count; ++i)
   {
     const double far = (radii[i] - smooth[i]) / (0.1 * std::max(smooth[i], this->blur));
     robust[i] /= 1.0 + far * far;
   }
-  smooth = SmoothSequence(radii, robust, this->settings.wavelength / step);
+  smooth = SmoothSequence(radii, robust, Wavelength / step);
   BridgeUnknown(path, unknown, smooth);
   if (moved)
   {
     for (std::vector<double>& shift : shifts)
     {
-      shift = SmoothSequence(shift, shiftWeights, this->settings.wavelength / step);
+      shift = SmoothSequence(shift, shiftWeights, Wavelength / step);
     }
   }
-  for (std::size_t i = path.parent < 0 ? 0 : 1; i < count; ++i)
+  for (std::size_t i = path.FirstOwn(); i < count; ++i)
   {
     const std::int64_t p = path.points[i];
     if (work.skipped[i] == 0)
     {
-      const bool bridged = !this->tree.bridged.empty() && this->tree.bridged[p] != 0;
+      const bool bridged = IsBridged(this->tree, p);
       // What is no more than the measurements' error changes nothing.
       const double change = smooth[i] - this->tree.radius[p];
       const double error = LeastChange + 0.02 * this->tree.radius[p];
@@ -736,13 +708,10 @@ std::vector<int> LabelsBeside(
 {
   std::vector<Vector3> positions;
   positions.reserve(calcium.voxels.size());
-  const std::array<int, 3> size = image.Dimensions();
+  const VoxelLattice lattice(image.grid);
   for (const CalciumVoxel& voxel : calcium.voxels)
   {
-    positions.push_back(
-      image.grid.IndexToWorld(static_cast<double>(voxel.offset % size[0] + image.grid.extent[0]),
-        static_cast<double>(voxel.offset / size[0] % size[1] + image.grid.extent[2]),
-        static_cast<double>(voxel.offset / size[0] / size[1] + image.grid.extent[4])));
+    positions.push_back(lattice.World(lattice.Place(voxel.offset)));
   }
   const double margin = (CalciumHalo + 1.0) * blur + 0.5 * image.grid.spacing.maxCoeff();
   std::vector<int> labels(tree.points.size(), 0);
@@ -769,9 +738,8 @@ std::vector<int> LabelsBeside(
 
 RefinedLumen RefineLumen(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, const LumenLevels& levels, const CalciumMap& calcium, double blur,
-  const RefinementSettings& settings, const ProgressCallback& progress)
+  const ProgressCallback& progress)
 {
-  settings.Validate();
   CheckTree(tree);
   if (!(blur > 0.0) || !std::isfinite(blur))
   {
@@ -787,7 +755,7 @@ RefinedLumen RefineLumen(const VesselTree& tree, const std::vector<VesselPath>& 
   result.interpolated.assign(count, 0);
   result.calcium = LabelsBeside(tree, calcium, image, blur);
   const std::unordered_set<std::int64_t> hidden = HiddenVoxels(calcium, image, blur);
-  const Refiner refiner{ tree, levels, calcium, image, blur, settings,
+  const Refiner refiner{ tree, levels, blur,
     SectionFitter(image, blur, levels.background, hidden) };
   struct Place
   {
@@ -835,9 +803,8 @@ TreeLumen MeasureTreeLumen(const VesselTree& tree, const std::vector<VesselPath>
   constexpr double calciumShare = 0.2; // of the time
   TreeLumen measured;
   measured.levels = MeasureLumenLevels(tree, paths, image, blur);
-  measured.calcium =
-    FindCalcium(tree, image, measured.levels, {}, PartOf(progress, 0.0, calciumShare));
-  measured.lumen = RefineLumen(tree, paths, image, measured.levels, measured.calcium, blur, {},
+  measured.calcium = FindCalcium(tree, image, measured.levels, PartOf(progress, 0.0, calciumShare));
+  measured.lumen = RefineLumen(tree, paths, image, measured.levels, measured.calcium, blur,
     PartOf(progress, calciumShare, 1.0));
   return measured;
 }

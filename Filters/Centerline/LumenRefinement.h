@@ -14,19 +14,6 @@
 
 namespace coronary
 {
-struct RefinementSettings
-{
-  double levelUncertainty =
-    0.06; ///< of the contrast's brightness at a place, relative, 0.005 to 0.5
-  double wavelength =
-    3.0; ///< mm along a vessel that smoothing halves in the refined radii, 0.5 to 50
-  double greatestArc =
-    180.0; ///< degrees of the wall behind calcium beyond which nothing is measured
-
-  /// @throws std::invalid_argument that names the first setting out of range
-  void Validate() const;
-};
-
 /// One value a point of the tree.
 struct RefinedLumen
 {
@@ -47,11 +34,11 @@ struct RefinedLumen
  * Sections in the mouth of a branch keep their radius; they are neither measured nor interpolated. Where the tree is
  * marked as bridged the radius does not get smaller than 0.25 mm, so that a vessel stays.
  * @param blur  standard deviation of the image's blur, mm, positive
- * @throws std::invalid_argument as CheckTree, or for settings out of range; Cancelled
+ * @throws std::invalid_argument as CheckTree, or for the blur; Cancelled
  */
 RefinedLumen RefineLumen(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, const LumenLevels& levels, const CalciumMap& calcium, double blur,
-  const RefinementSettings& settings = {}, const ProgressCallback& progress = {});
+  const ProgressCallback& progress = {});
 
 /// All that is measured of the lumen along a tree.
 struct TreeLumen

@@ -1,5 +1,6 @@
 #include "MeasuredCourse.h"
 
+#include "CrossFrame.h"
 #include "CurveSmoothing.h"
 #include "Median.h"
 #include "ParallelFor.h"
@@ -21,10 +22,9 @@ std::vector<Vector3> Tangents(
     std::max<std::ptrdiff_t>(1, std::lround(1.5 * measurement.voxel / measurement.step));
   for (std::ptrdiff_t i = 0; i <= last; ++i)
   {
-    const Vector3 chord = points[static_cast<std::size_t>(std::min(last, i + reach))] -
-      points[static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, i - reach))];
-    tangents[static_cast<std::size_t>(i)] =
-      chord.norm() > 0.0 ? Vector3(chord.normalized()) : Vector3::UnitX();
+    const Vector3 chord =
+      points[std::min(last, i + reach)] - points[std::max<std::ptrdiff_t>(0, i - reach)];
+    tangents[i] = chord.norm() > 0.0 ? Vector3(chord.normalized()) : Vector3::UnitX();
   }
   return tangents;
 }
@@ -61,6 +61,23 @@ std::vector<double> Outgrowth(
   }
   return against;
 }
+}
+
+void MeasuredCourse::ReplaceStart(std::size_t first, const std::vector<Vector3>& start)
+{
+  this->resize(this->size()); // what was not measured yet
+  const auto replace = [&](auto& values, auto value)
+  {
+    values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(first));
+    values.insert(values.begin(), start.size(), value);
+  };
+  replace(this->radius, this->radius[first]);
+  replace(this->confidence, 0.0);
+  replace(this->lumen, 0.0);
+  replace(this->behind, 0.0);
+  replace(this->crossing, '\0');
+  replace(this->points, Vector3(Vector3::Zero()));
+  std::copy(start.begin(), start.end(), this->points.begin());
 }
 
 CourseMeasurement::CourseMeasurement(const CenterlineSettings& chosen, const ImageGrid& grid)
@@ -132,17 +149,14 @@ void CourseMeasurement::Recentre(MeasuredCourse& course) const
         {
           for (std::int64_t n = first; n < last; ++n)
           {
-            LumenSection& found = best[static_cast<std::size_t>(n)];
+            LumenSection& found = best[n];
             const std::size_t i = begin + static_cast<std::size_t>(n);
-            const Vector3 u = tangents[i].unitOrthogonal();
-            const Vector3 v = tangents[i].cross(u);
+            const CrossFrame frame(tangents[i]);
             for (const double away : { 1.25, 2.5 })
             {
               for (int side = 0; side < 8; ++side)
               {
-                const double angle = 0.25 * M_PI * side;
-                const Vector3 place = course.points[i] +
-                  away * this->voxel * (std::cos(angle) * u + std::sin(angle) * v);
+                const Vector3 place = course.points[i] + away * this->voxel * frame.Ray(side, 8);
                 const LumenSection section =
                   MeasureLumen(*this->image, place, tangents[i], this->voxel, this->lumen);
                 // The same lumen: the point is in it.

@@ -34,6 +34,9 @@ struct MeasuredCourse
     behind.resize(count);
     crossing.resize(count);
   }
+
+  /// Puts points in the place of the samples before `first`, with its radius, and not seen at all.
+  void ReplaceStart(std::size_t first, const std::vector<Vector3>& start);
 };
 
 /// What the courses of one extraction are measured in and with.

@@ -129,20 +129,12 @@ public:
 private:
   static constexpr double Longest = 20.0; ///< units of vessel that are looked at
 
-  const Vector3& PointOf(std::int64_t p) const
-  {
-    return this->Tree.points[static_cast<std::size_t>(p)];
-  }
+  const Vector3& PointOf(std::int64_t p) const { return this->Tree.points[p]; }
   const Vector3& Point(std::size_t i) const { return this->PointOf(this->Branch.points[i]); }
-  double Radius(std::size_t i) const
-  {
-    return this->Tree.radius[static_cast<std::size_t>(this->Branch.points[i])];
-  }
+  double Radius(std::size_t i) const { return this->Tree.radius[this->Branch.points[i]]; }
   double Confidence(std::size_t i) const
   {
-    return this->Tree.confidence.empty()
-      ? 1.0
-      : this->Tree.confidence[static_cast<std::size_t>(this->Branch.points[i])];
+    return this->Tree.confidence.empty() ? 1.0 : this->Tree.confidence[this->Branch.points[i]];
   }
   /// The first point at least so far along, or the last one that may move.
   std::size_t At(double length) const
@@ -207,7 +199,7 @@ private:
       for (auto p = at; p != other.points.end() && p + 1 != other.points.end(); ++p)
       {
         length += (this->PointOf(*(p + 1)) - this->PointOf(*p)).norm();
-        const double own = this->Tree.radius[static_cast<std::size_t>(*(p + 1))];
+        const double own = this->Tree.radius[*(p + 1)];
         if (length > reach)
         {
           break;
@@ -416,7 +408,7 @@ std::vector<OstialRoot> SettleRoots(
   {
     if (branch.parentGroupId != -1)
     {
-      begins[static_cast<std::size_t>(branch.points.front())] = 1;
+      begins[branch.points.front()] = 1;
     }
   }
   std::vector<OstialRoot> result;
@@ -428,8 +420,7 @@ std::vector<OstialRoot> SettleRoots(
     }
     // Points that other branches begin at stay, and with them all that follow.
     std::size_t free = 0;
-    while (
-      free + 1 < branch.points.size() && !begins[static_cast<std::size_t>(branch.points[free])])
+    while (free + 1 < branch.points.size() && !begins[branch.points[free]])
     {
       ++free;
     }

@@ -199,7 +199,6 @@ SegmentAtlas Build()
   origin(Vessel::ObtuseMarginal, 2, Vessel::Circumflex, m2);
   origin(Vessel::ObtuseMarginal, 3, Vessel::Circumflex, m3);
   origin(Vessel::RightVentricular, 1, Vessel::RightCoronary, V(-35.0, -40.0, -27.5));
-  atlas.apexArc = builder.ArcAt(Vessel::AnteriorDescending, V(44.9, -71.9, -87.8));
   atlas.midLadEnd = builder.ArcAt(Vessel::AnteriorDescending, d3);
   atlas.acuteMarginArc = builder.ArcAt(Vessel::RightCoronary, margin);
   atlas.obtuseMarginArc = builder.ArcAt(Vessel::Circumflex, m1);

@@ -7,6 +7,7 @@
 
 #include "Geometry.h"
 
+#include <limits>
 #include <vector>
 
 namespace coronary
@@ -65,7 +66,6 @@ struct SegmentAtlas
   std::vector<AtlasOrigin> origins;
   Vector3 leftOstium;
   Vector3 rightOstium;
-  double apexArc;         ///< of the LAD at the apex
   double midLadEnd;       ///< arc where the LAD's middle segment ends
   double acuteMarginArc;  ///< of the RCA
   double obtuseMarginArc; ///< of the LCx where its first marginal leaves
@@ -78,6 +78,26 @@ struct SegmentAtlas
   /// The point of the epicardial ellipsoid at an azimuth about c (degrees, from a towards b) and a
   /// height below the groove (mm).
   Vector3 OnEpicardium(double azimuth, double height) const;
+
+  /// The nearest point of a vessel, null without any; and its squared distance, mm^2, infinite without any.
+  struct Nearest
+  {
+    const Point* point = nullptr;
+    double squared = std::numeric_limits<double>::infinity();
+  };
+  Nearest NearestOf(Vessel vessel, const Vector3& position) const
+  {
+    Nearest nearest;
+    for (const Point& one : this->points)
+    {
+      const double squared = (one.position - position).squaredNorm();
+      if (one.vessel == vessel && squared < nearest.squared)
+      {
+        nearest = { &one, squared };
+      }
+    }
+    return nearest;
+  }
 
   static const SegmentAtlas& Get();
 };

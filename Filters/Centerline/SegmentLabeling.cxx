@@ -385,17 +385,7 @@ AtlasPose Labeler::Refine(const AtlasPose& pose, const LabelAssignment& assignme
     {
       const LabelSample& sample = this->Pieces.samples[s];
       const Vector3 at = pose.Apply(sample.position);
-      const SegmentAtlas::Point* nearest = nullptr;
-      double best = Infinity;
-      for (const SegmentAtlas::Point& point : this->Atlas.points)
-      {
-        const double squared = (point.position - at).squaredNorm();
-        if (point.vessel == assignment.vessels[c] && squared < best)
-        {
-          best = squared;
-          nearest = &point;
-        }
-      }
+      const auto [nearest, best] = this->Atlas.NearestOf(assignment.vessels[c], at);
       if (nearest != nullptr)
       {
         const double ratio = best / (4.0 * Deviation * Deviation);
@@ -518,15 +508,9 @@ LabelingResult Labeler::Run(const ProgressCallback& progress)
     for (std::size_t s = this->Pieces.pieces[c].firstSample; s < this->Pieces.pieces[c].lastSample;
          ++s)
     {
-      double best = Infinity;
-      for (const SegmentAtlas::Point& point : this->Atlas.points)
-      {
-        if (point.vessel == assignment.vessels[c])
-        {
-          best = std::min(
-            best, (point.position - pose.Apply(this->Pieces.samples[s].position)).squaredNorm());
-        }
-      }
+      const double best =
+        this->Atlas.NearestOf(assignment.vessels[c], pose.Apply(this->Pieces.samples[s].position))
+          .squared;
       if (best < Infinity)
       {
         distance += std::sqrt(best);

@@ -155,17 +155,8 @@ double SegmentNamer::AtlasArc(V vessel, std::int64_t point) const
 {
   const Vector3 at =
     this->Pose.Apply((this->Tree.points[point] - this->Pieces.centre) / this->Pieces.unit);
-  double best = Infinity;
-  double arc = 0.0;
-  for (const SegmentAtlas::Point& candidate : this->Atlas.points)
-  {
-    if (candidate.vessel == vessel && (candidate.position - at).squaredNorm() < best)
-    {
-      best = (candidate.position - at).squaredNorm();
-      arc = candidate.arc;
-    }
-  }
-  return arc;
+  const SegmentAtlas::Nearest nearest = this->Atlas.NearestOf(vessel, at);
+  return nearest.point == nullptr ? 0.0 : nearest.point->arc;
 }
 
 /// What leaves a trunk and counts, in the order of the origins.

@@ -4,6 +4,7 @@
 #include "CurveSmoothing.h"
 #include "Median.h"
 #include "Require.h"
+#include "TreeLinks.h"
 #include "VesselTips.h"
 
 #include <Eigen/Dense>
@@ -16,8 +17,12 @@ namespace coronary
 {
 namespace
 {
-constexpr double Bin = 1.0;               ///< mm, of the regression
-constexpr double Fine = 0.5;              ///< mm, of the profile
+constexpr double LeastDegree = 0.30; ///< of what is listed
+constexpr double Wavelength = 80.0;  ///< mm along a vessel of the healthy calibre's changes
+constexpr double LeastSignificance =
+  3.0;                       ///< standard deviations by which a narrowing exceeds its error
+constexpr double Bin = 1.0;  ///< mm, of the regression
+constexpr double Fine = 0.5; ///< mm, of the profile
 constexpr double ProfileWavelength = 3.0; ///< mm, that the graded profile halves
 constexpr double HealthySpread = 0.06;    ///< relative, of radii around the healthy calibre
 constexpr double MethodError = 0.04;      ///< mm, of a radius, beside the image's noise
@@ -175,12 +180,12 @@ std::vector<double> UpperStart(const Profile& profile)
   return start;
 }
 
-Reference Regress(const Profile& profile, const std::vector<double>& steps, double wavelength)
+Reference Regress(const Profile& profile, const std::vector<double>& steps)
 {
   const auto count = static_cast<Eigen::Index>(profile.size());
   Reference reference;
   reference.radius = UpperStart(profile);
-  const double samples = wavelength / profile.step / (2.0 * M_PI);
+  const double samples = Wavelength / profile.step / (2.0 * M_PI);
   // Data count with 1 / (spread^2); the curve may bend as much as the wavelength lets it.
   const double stiffness = std::pow(samples, 4);
   std::vector<double> weights(profile.size(), 0.0);
@@ -223,8 +228,7 @@ Reference Regress(const Profile& profile, const std::vector<double>& steps, doub
     for (Eigen::Index i = 0; i + 2 < count; ++i)
     {
       // A step between two samples makes the two second differences over it free.
-      const bool step =
-        steps[i + 1] > 0.0 || (i + 2 < count && steps[i + 1] > 0.0) || (i > 0 && steps[i] > 0.0);
+      const bool step = steps[i + 1] > 0.0 || (i > 0 && steps[i] > 0.0);
       if (!step)
       {
         add({ { i, 1.0 }, { i + 1, -2.0 }, { i + 2, 1.0 } }, stiffness);
@@ -281,11 +285,11 @@ std::vector<double> Closed(const std::vector<double>& values, double length)
   };
   for (std::ptrdiff_t i = 0; i < count; ++i)
   {
-    dilated[static_cast<std::size_t>(i)] = extreme(values, i, true);
+    dilated[i] = extreme(values, i, true);
   }
   for (std::ptrdiff_t i = 0; i < count; ++i)
   {
-    closed[static_cast<std::size_t>(i)] = extreme(dilated, i, false);
+    closed[i] = extreme(dilated, i, false);
   }
   return closed;
 }
@@ -296,9 +300,6 @@ struct GradedPath
   const VesselTree& tree;
   const VesselPath& path;
   const RefinedLumen& lumen;
-  const std::vector<unsigned char>& bridged;
-  const std::vector<double>& bridgeConfidence;
-  const GradingSettings& settings;
   Profile profile;
   std::vector<double> smooth;    ///< radius, mm
   std::vector<double> reference; ///< mm
@@ -311,7 +312,7 @@ struct GradedPath
   }
   bool IsBridged(std::size_t sample) const
   {
-    return !this->bridged.empty() && this->bridged[this->PointAt(sample)] != 0;
+    return coronary::IsBridged(this->tree, this->PointAt(sample));
   }
   bool IsHidden(std::size_t sample) const
   {
@@ -366,7 +367,7 @@ void GradedPath::DescribeEnd(const VesselTip& tip, std::vector<Stenosis>& lesion
     std::max(tip.before, RadiusBeforeTip(this->tree, this->path, farther[0], farther[1]));
   // What ends in full calibre shows no lesion.
   constexpr double narrowed = 0.85; // of the radius before
-  if (healthy < this->settings.leastReferenceRadius || tip.end > narrowed * tip.before)
+  if (healthy < LeastGradedRadius || tip.end > narrowed * tip.before)
   {
     return;
   }
@@ -405,9 +406,9 @@ void GradedPath::Describe(
     if (this->IsBridged(i))
     {
       lesion.bridged = true;
-      bridgeTrust = this->bridgeConfidence.empty()
+      bridgeTrust = this->tree.bridgeConfidence.empty()
         ? std::min(bridgeTrust, 0.5)
-        : std::min(bridgeTrust, this->bridgeConfidence[p]);
+        : std::min(bridgeTrust, this->tree.bridgeConfidence[p]);
     }
   }
   const auto samples = static_cast<double>(last - first + 1);
@@ -426,7 +427,7 @@ void GradedPath::Describe(
   const double referenceError = std::hypot(0.03 * healthy, 0.5 * this->spread);
   const double significance = (healthy - radius) / std::hypot(deviation, referenceError);
   // Behind calcium a narrowing can not be told from none: it is listed, with the range of all that it may be.
-  if (!lesion.interpolated && significance < this->settings.leastSignificance)
+  if (!lesion.interpolated && significance < LeastSignificance)
   {
     return;
   }
@@ -471,11 +472,10 @@ void GradedPath::FindLesions(std::vector<Stenosis>& lesions) const
   {
     // The worst place that is left, then down to half of it on either side.
     std::size_t least = count;
-    double worst = this->settings.leastDegree;
+    double worst = LeastDegree;
     for (std::size_t i = start; i + tip < count; ++i)
     {
-      if (taken[i] == 0 && this->degree[i] >= worst &&
-        this->reference[i] >= this->settings.leastReferenceRadius)
+      if (taken[i] == 0 && this->degree[i] >= worst && this->reference[i] >= LeastGradedRadius)
       {
         worst = this->degree[i];
         least = i;
@@ -521,19 +521,6 @@ void GradedPath::FindLesions(std::vector<Stenosis>& lesions) const
     }
   }
 }
-}
-
-void GradingSettings::Validate() const
-{
-  constexpr RequireOf require{ "GradingSettings" };
-  require(this->leastDegree >= 0.05 && this->leastDegree <= 0.95,
-    "leastDegree must be from 0.05 to 0.95");
-  require(this->leastReferenceRadius >= 0.2 && this->leastReferenceRadius <= 3.0,
-    "leastReferenceRadius must be from 0.2 to 3 mm");
-  require(
-    this->wavelength >= 10.0 && this->wavelength <= 500.0, "wavelength must be from 10 to 500 mm");
-  require(this->leastSignificance >= 0.0 && this->leastSignificance <= 20.0,
-    "leastSignificance must be from 0 to 20");
 }
 
 const char* LesionKindName(LesionKind kind)
@@ -595,17 +582,13 @@ double PopulationDiameter(int segmentId)
   }
 }
 
-StenosisGrading GradeStenoses(const VesselTree& tree, const std::vector<VesselPath>& paths,
-  const RefinedLumen& lumen, const std::vector<unsigned char>& bridged,
-  const std::vector<double>& bridgeConfidence, const GradingSettings& settings)
+StenosisGrading GradeStenoses(
+  const VesselTree& tree, const std::vector<VesselPath>& paths, const RefinedLumen& lumen)
 {
-  settings.Validate();
   CheckTree(tree);
   const std::size_t points = tree.points.size();
   if (lumen.measured.size() != points || lumen.deviation.size() != points ||
-    lumen.calcium.size() != points || lumen.interpolated.size() != points ||
-    (!bridged.empty() && bridged.size() != points) ||
-    (!bridgeConfidence.empty() && bridgeConfidence.size() != points))
+    lumen.calcium.size() != points || lumen.interpolated.size() != points)
   {
     throw std::invalid_argument("GradeStenoses: arrays must have one value a point of the tree");
   }
@@ -613,6 +596,7 @@ StenosisGrading GradeStenoses(const VesselTree& tree, const std::vector<VesselPa
   result.degree.assign(points, 0.0);
   result.referenceRadius = tree.radius;
   const std::vector<VesselTip> tips = JudgeTips(tree, paths);
+  const std::vector<std::int64_t> branches = BranchesOfPoints(tree);
   for (std::size_t n = 0; n < paths.size(); ++n)
   {
     const VesselPath& path = paths[n];
@@ -622,10 +606,9 @@ StenosisGrading GradeStenoses(const VesselTree& tree, const std::vector<VesselPa
     {
       continue;
     }
-    const Reference reference =
-      Regress(coarse, StepsAt(tree, paths, n, coarse), settings.wavelength);
-    GradedPath graded{ tree, path, lumen, bridged, bridgeConfidence, settings,
-      Resample(path, lumen, Fine), {}, {}, {}, reference.spread };
+    const Reference reference = Regress(coarse, StepsAt(tree, paths, n, coarse));
+    GradedPath graded{ tree, path, lumen, Resample(path, lumen, Fine), {}, {}, {},
+      reference.spread };
     const auto referenceAt = [&](double arc)
     {
       const double at = std::clamp(arc / Bin, 0.0, static_cast<double>(coarse.size() - 1));
@@ -647,14 +630,13 @@ StenosisGrading GradeStenoses(const VesselTree& tree, const std::vector<VesselPa
         std::min(referenceAt(static_cast<double>(i) * Fine), ClosedMargin * open[i]));
       graded.degree.push_back(std::clamp(1.0 - graded.smooth[i] / graded.reference[i], 0.0, 1.0));
     }
-    for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
+    for (std::size_t i = path.FirstOwn(); i < path.points.size(); ++i)
     {
       const std::int64_t p = path.points[i];
       const auto sample = std::min(
         graded.profile.size() - 1, static_cast<std::size_t>(std::lround(path.arc[i] / Fine)));
       result.referenceRadius[p] = graded.reference[sample];
-      result.degree[p] = lumen.measured[p] > 0.0 || lumen.interpolated[p] != 0 ||
-          (!bridged.empty() && bridged[p] != 0)
+      result.degree[p] = lumen.measured[p] > 0.0 || lumen.interpolated[p] != 0 || IsBridged(tree, p)
         ? graded.degree[sample]
         : 0.0;
     }
@@ -664,15 +646,7 @@ StenosisGrading GradeStenoses(const VesselTree& tree, const std::vector<VesselPa
     {
       graded.DescribeEnd(tips[n], result.lesions);
     }
-    int treeId = 0;
-    for (const VesselTree::Branch& branch : tree.branches)
-    {
-      if (std::find(branch.points.begin(), branch.points.end(), path.points.back()) !=
-        branch.points.end())
-      {
-        treeId = branch.treeId;
-      }
-    }
+    const int treeId = tree.branches[branches[path.points.back()]].treeId;
     for (std::size_t l = before; l < result.lesions.size(); ++l)
     {
       result.lesions[l].treeId = treeId;

@@ -54,17 +54,7 @@ struct Stenosis
   bool interpolated = false; ///< calcium hides the narrowest place: the true one may be narrower
 };
 
-struct GradingSettings
-{
-  double leastDegree = 0.30;          ///< of what is listed, 0.05 to 0.95
-  double leastReferenceRadius = 0.75; ///< mm, 0.2 to 3: thinner vessels are not graded
-  double wavelength = 80.0; ///< mm along a vessel of the healthy calibre's changes, 10 to 500
-  double leastSignificance =
-    3.0; ///< standard deviations by which a narrowing exceeds its error, 0 to 20
-
-  /// @throws std::invalid_argument that names the first setting out of range
-  void Validate() const;
-};
+constexpr double LeastGradedRadius = 0.75; ///< mm: thinner healthy vessels are not graded
 
 struct StenosisGrading
 {
@@ -74,14 +64,11 @@ struct StenosisGrading
 };
 
 /**
- * @param lumen            of the same tree
- * @param bridged          one value a point, 1: guessed across a gap; may be empty
- * @param bridgeConfidence one value a point, 0 to 1; may be empty
- * @throws std::invalid_argument as CheckTree, for arrays of another length, or for settings out of range
+ * @param lumen  of the same tree
+ * @throws std::invalid_argument as CheckTree, or for a lumen of another number of points
  */
-StenosisGrading GradeStenoses(const VesselTree& tree, const std::vector<VesselPath>& paths,
-  const RefinedLumen& lumen, const std::vector<unsigned char>& bridged = {},
-  const std::vector<double>& bridgeConfidence = {}, const GradingSettings& settings = {});
+StenosisGrading GradeStenoses(
+  const VesselTree& tree, const std::vector<VesselPath>& paths, const RefinedLumen& lumen);
 
 /// Mean diameter of a segment in the middle of its length, men with right dominance, mm (Dodge 1992); 0: not known.
 double PopulationDiameter(int segmentId);

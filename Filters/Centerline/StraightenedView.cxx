@@ -1,5 +1,6 @@
 #include "StraightenedView.h"
 
+#include "CurveGeometry.h"
 #include "Require.h"
 
 #include <Eigen/Eigenvalues>
@@ -51,20 +52,16 @@ std::vector<Vector3> Tangents(const std::vector<Vector3>& positions, double step
       {
         const auto weight =
           weights[static_cast<std::size_t>(std::max(std::abs(k), std::abs(k + 1)))];
-        sum += weight *
-          (positions[static_cast<std::size_t>(from + 1)] -
-            positions[static_cast<std::size_t>(from)]);
+        sum += weight * (positions[from + 1] - positions[from]);
       }
     }
     if (sum.norm() < 1e-6 * step)
     {
       const std::int64_t from = std::min(n, count - 2);
-      sum =
-        positions[static_cast<std::size_t>(from + 1)] - positions[static_cast<std::size_t>(from)];
+      sum = positions[from + 1] - positions[from];
     }
-    tangents[static_cast<std::size_t>(n)] = sum.norm() > 0.0
-      ? Vector3(sum.normalized())
-      : (n > 0 ? tangents[static_cast<std::size_t>(n - 1)] : Vector3::UnitX());
+    tangents[n] =
+      sum.norm() > 0.0 ? Vector3(sum.normalized()) : (n > 0 ? tangents[n - 1] : Vector3::UnitX());
   }
   return tangents;
 }
@@ -124,11 +121,7 @@ VesselCourse FollowAxis(const std::vector<Vector3>& axis, double step, double sm
     "A vessel's axis has coordinates that are not finite.");
   Require(step > 0.0 && std::isfinite(step), "The step along a vessel has to be above 0.");
   Require(smoothing >= 0.0 && std::isfinite(smoothing), "The smoothing of tangents is negative.");
-  double length = 0.0;
-  for (std::size_t k = 1; k < axis.size(); ++k)
-  {
-    length += (axis[k] - axis[k - 1]).norm();
-  }
+  const double length = PolylineLength(axis);
   Require(length > 0.0, "A vessel's axis has no length.");
   Require(length / step < MostPlaces, "A vessel has more than a million steps.");
 
@@ -186,7 +179,7 @@ std::array<GreyPicture, 2> StraightenVessel(const ImageInterpolator& image,
     {
       for (std::int64_t n = first; n < last; ++n)
       {
-        GreyPicture& cut = cuts[static_cast<std::size_t>(n / cuts[0].height)];
+        GreyPicture& cut = cuts[n / cuts[0].height];
         const auto& across = n < cuts[0].height ? course.normal : course.binormal;
         const auto row = n % cuts[0].height;
         const double aside = double(half - row) * course.step;
@@ -316,7 +309,7 @@ std::vector<float> DepthsAlong(const SlabPlane& plane, const std::vector<Vector3
             sum += near * near * place[2];
             weights += near * near;
           }
-          depths[static_cast<std::size_t>(y * plane.width + x)] = static_cast<float>(sum / weights);
+          depths[y * plane.width + x] = static_cast<float>(sum / weights);
         }
       }
     },

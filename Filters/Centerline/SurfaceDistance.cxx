@@ -67,9 +67,9 @@ Extent Measure(const std::vector<Vector3>& points, const std::vector<Triangle>& 
   for (const Triangle& t : triangles)
   {
     // Relative to a corner: far from the origin the volume would lose its digits.
-    const Vector3 a = points[static_cast<std::size_t>(t[0])] - low;
-    const Vector3 b = points[static_cast<std::size_t>(t[1])] - low;
-    const Vector3 c = points[static_cast<std::size_t>(t[2])] - low;
+    const Vector3 a = points[t[0]] - low;
+    const Vector3 b = points[t[1]] - low;
+    const Vector3 c = points[t[2]] - low;
     volume += a.dot(b.cross(c)) / 6.0;
     area += 0.5 * (b - a).cross(c - a).norm();
   }
@@ -98,8 +98,7 @@ public:
 private:
   Vector3 Corner(std::size_t t, int i) const
   {
-    return Vector3(
-      this->Points[static_cast<std::size_t>(this->Triangles[t][i])] - this->Result.grid.origin);
+    return Vector3(this->Points[this->Triangles[t][i]] - this->Result.grid.origin);
   }
 
   const std::vector<Vector3>& Points;
@@ -247,8 +246,8 @@ void DistanceField::Add(std::size_t t)
       if (inside(a, b, side(a, b)) && inside(b, c, side(b, c)) && inside(c, a, side(c, a)))
       {
         const double x = a[0] - ((y - a[1]) * normal[1] + (z - a[2]) * normal[2]) / normal[0];
-        this->Crossings[static_cast<std::size_t>(static_cast<std::int64_t>(k) * this->Size[1] + j)]
-          .emplace_back(static_cast<float>(x / spacing), normal[0] > 0.0 ? -1 : 1);
+        this->Crossings[static_cast<std::int64_t>(k) * this->Size[1] + j].emplace_back(
+          static_cast<float>(x / spacing), normal[0] > 0.0 ? -1 : 1);
       }
     }
   }
@@ -259,7 +258,7 @@ void DistanceField::MarkInside(int orientation)
   this->Inside.assign(this->Result.values.size(), 0);
   for (std::int64_t r = 0; r < static_cast<std::int64_t>(this->Crossings.size()); ++r)
   {
-    std::vector<std::pair<float, int>>& row = this->Crossings[static_cast<std::size_t>(r)];
+    std::vector<std::pair<float, int>>& row = this->Crossings[r];
     std::sort(row.begin(), row.end());
     int depth = 0;
     std::size_t next = 0;
@@ -279,7 +278,7 @@ void DistanceField::MarkInside(int orientation)
       {
         depth += orientation * row[next++].second;
       }
-      this->Inside[static_cast<std::size_t>(r * this->Size[0] + i)] = depth > 0;
+      this->Inside[r * this->Size[0] + i] = depth > 0;
     }
   }
 }
@@ -290,12 +289,12 @@ void DistanceField::PassInwards(bool forward)
   for (std::int64_t at = 0; at < static_cast<std::int64_t>(distance.size()); ++at)
   {
     const std::int64_t v = forward ? at : static_cast<std::int64_t>(distance.size()) - 1 - at;
-    if (!this->Inside[static_cast<std::size_t>(v)])
+    if (!this->Inside[v])
     {
       continue;
     }
-    float& best = distance[static_cast<std::size_t>(v)];
-    std::int32_t& triangle = this->Nearest[static_cast<std::size_t>(v)];
+    float& best = distance[v];
+    std::int32_t& triangle = this->Nearest[v];
     const std::int64_t k = v / this->SliceStep;
     const std::int64_t j = v % this->SliceStep / this->RowStep;
     const Vector3 p = this->Spacing * Vector3(v % this->RowStep, j, k);
@@ -304,7 +303,7 @@ void DistanceField::PassInwards(bool forward)
            this->RowStep + 1, this->SliceStep + 1, this->SliceStep + this->RowStep,
            this->RowStep - 1, this->SliceStep - 1, this->SliceStep - this->RowStep })
     {
-      const std::int32_t other = this->Nearest[static_cast<std::size_t>(v + direction * step)];
+      const std::int32_t other = this->Nearest[v + direction * step];
       if (other < 0 || other == triangle)
       {
         continue;

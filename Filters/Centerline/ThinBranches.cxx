@@ -1,5 +1,6 @@
 #include "ThinBranches.h"
 
+#include "CrossFrame.h"
 #include "Median.h"
 #include "ParallelFor.h"
 #include "Require.h"
@@ -9,6 +10,7 @@
 #include <cmath>
 #include <limits>
 #include <unordered_map>
+#include <utility>
 
 namespace coronary
 {
@@ -20,16 +22,20 @@ constexpr double LeastDeparture = 0.35;
 constexpr double FullDeparture = 40.0;
 /// Share of the contrast by which the way from the parent may be darker than the branch itself.
 constexpr double DeepestValley = 0.1;
+/// Share of the contrast that a path must show on every side, mean.
+constexpr double LeastContrast = 0.12;
+/// Standard errors of noise that the path's mean must exceed.
+constexpr double Significance = 8.0;
 /// Distance of a path's samples, in voxels.
 constexpr double Stride = 0.75;
 /// How far a tip is followed, in voxels.
 constexpr double MostBeyondTip = 30.0;
 
 /// The lumens of a tree, for "how far is the nearest wall".
-class TreeLumen
+class LumenDistance
 {
 public:
-  TreeLumen(const VesselTree& tree, double reach)
+  LumenDistance(const VesselTree& tree, double reach)
     : Tree(tree)
     , Reach(reach)
   {
@@ -64,8 +70,7 @@ public:
       }
       for (const std::int32_t p : cell->second)
       {
-        const double wall = (this->Tree.points[static_cast<std::size_t>(p)] - position).norm() -
-          this->Tree.radius[static_cast<std::size_t>(p)];
+        const double wall = (this->Tree.points[p] - position).norm() - this->Tree.radius[p];
         if (wall < nearest.wall || (wall == nearest.wall && p < nearest.point))
         {
           nearest = { wall, p };
@@ -106,7 +111,7 @@ public:
   {
     for (const VesselTree::Branch& branch : tree.branches)
     {
-      this->Joint[static_cast<std::size_t>(branch.points.front())] = 1;
+      this->Joint[branch.points.front()] = 1;
     }
   }
 
@@ -129,7 +134,7 @@ private:
   };
 
   std::vector<Spot> FindSpots() const;
-  double Core(const Vector3& position, const Vector3& u, const Vector3& v) const;
+  double Core(const Vector3& position, const CrossFrame& frame) const;
   double Profile(const Vector3& position, const Vector3& tangent) const;
   double Ahead(const Vector3& position, const Vector3& direction) const;
   bool Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const;
@@ -160,7 +165,7 @@ private:
   const ImageInterpolator& Image;
   const VesselTree& Tree;
   const ThinBranchSettings& Settings;
-  TreeLumen Lumen;
+  LumenDistance Lumen;
   double Noise;
   std::vector<char> Joint; ///< of a point of the tree: a branch begins there
 };
@@ -178,7 +183,7 @@ std::vector<Finder::Spot> Finder::FindSpots() const
       continue;
     }
     const auto point = [&](std::size_t i) -> const Vector3&
-    { return this->Tree.points[static_cast<std::size_t>(branch.points[i])]; };
+    { return this->Tree.points[branch.points[i]]; };
     // A frame that does not turn about the axis.
     std::vector<Vector3> across(count);
     std::vector<Vector3> tangents(count);
@@ -201,8 +206,7 @@ std::vector<Finder::Spot> Finder::FindSpots() const
       const auto place = [&](std::size_t row, int angle) -> Vector3
       {
         const std::size_t i = row * stride;
-        const double radius =
-          this->Tree.radius[static_cast<std::size_t>(branch.points[i])] + away * voxel;
+        const double radius = this->Tree.radius[branch.points[i]] + away * voxel;
         const double a = 2.0 * M_PI * angle / around;
         return point(i) +
           radius * (std::cos(a) * across[i] + std::sin(a) * tangents[i].cross(across[i]));
@@ -221,8 +225,7 @@ std::vector<Finder::Spot> Finder::FindSpots() const
         });
       for (std::size_t row = 0; row < rows; ++row)
       {
-        const double radius =
-          this->Tree.radius[static_cast<std::size_t>(branch.points[row * stride])] + away * voxel;
+        const double radius = this->Tree.radius[branch.points[row * stride]] + away * voxel;
         const int reach = std::max(
           1, std::min(around / 6, static_cast<int>(voxel / (2.0 * M_PI * radius / around))));
         for (int angle = 0; angle < around; ++angle)
@@ -250,15 +253,14 @@ std::vector<Finder::Spot> Finder::FindSpots() const
           }
           const Vector3 position = place(row, angle);
           // What a branch that is known covers is no new one.
-          const TreeLumen::Nearest nearest = this->Lumen(position);
+          const LumenDistance::Nearest nearest = this->Lumen(position);
           if (nearest.wall < (away - 0.5) * voxel || !this->Image.Contains(position))
           {
             continue;
           }
           const auto parent = static_cast<std::int32_t>(branch.points[row * stride]);
-          spots.push_back({ position,
-            (position - this->Tree.points[static_cast<std::size_t>(parent)]).normalized(),
-            parent });
+          spots.push_back(
+            { position, (position - this->Tree.points[parent]).normalized(), parent });
         }
       }
     }
@@ -266,28 +268,26 @@ std::vector<Finder::Spot> Finder::FindSpots() const
   return spots;
 }
 
-double Finder::Core(const Vector3& position, const Vector3& u, const Vector3& v) const
+double Finder::Core(const Vector3& position, const CrossFrame& frame) const
 {
-  const double offset = 0.5 * this->Settings.voxel;
+  const Vector3 u = 0.5 * this->Settings.voxel * frame.u;
+  const Vector3 v = 0.5 * this->Settings.voxel * frame.v;
   return 0.2 *
-    (this->Image.At(position) + this->Image.At(position + offset * u) +
-      this->Image.At(position - offset * u) + this->Image.At(position + offset * v) +
-      this->Image.At(position - offset * v));
+    (this->Image.At(position) + this->Image.At(position + u) + this->Image.At(position - u) +
+      this->Image.At(position + v) + this->Image.At(position - v));
 }
 
 /// Core over the mean of the ring.
 double Finder::Profile(const Vector3& position, const Vector3& tangent) const
 {
-  const Vector3 u = tangent.unitOrthogonal();
-  const Vector3 v = tangent.cross(u);
+  const CrossFrame frame(tangent);
   const double ring = 2.5 * this->Settings.voxel;
   double sum = 0.0;
   for (int i = 0; i < 6; ++i)
   {
-    const double angle = 2.0 * M_PI * i / 6.0;
-    sum += this->Image.At(position + ring * (std::cos(angle) * u + std::sin(angle) * v));
+    sum += this->Image.At(position + ring * frame.Ray(i, 6));
   }
-  return this->Core(position, u, v) - sum / 6.0;
+  return this->Core(position, frame) - sum / 6.0;
 }
 
 double Finder::Ahead(const Vector3& position, const Vector3& direction) const
@@ -303,16 +303,14 @@ double Finder::Ahead(const Vector3& position, const Vector3& direction) const
 bool Finder::Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const
 {
   const double voxel = this->Settings.voxel;
-  const Vector3 u = tangent.unitOrthogonal();
-  const Vector3 v = tangent.cross(u);
+  const CrossFrame frame(tangent);
   sample.position = position;
-  sample.core = this->Core(position, u, v);
+  sample.core = this->Core(position, frame);
   std::array<double, Sectors> sectors;
   int known = 0;
   for (int i = 0; i < Sectors; ++i)
   {
-    const double angle = 2.0 * M_PI * i / Sectors;
-    const Vector3 side = std::cos(angle) * u + std::sin(angle) * v;
+    const Vector3 side = frame.Ray(i, Sectors);
     const Vector3 place = position + 3.0 * voxel * side;
     if (this->Lumen(place).wall < 1.5 * voxel)
     {
@@ -348,13 +346,10 @@ Vector3 Finder::Turn(const Vector3& position, const Vector3& direction) const
   for (const double cone : { 0.3, 0.12 })
   {
     const Vector3 from = best;
-    const Vector3 u = from.unitOrthogonal();
-    const Vector3 v = from.cross(u);
+    const CrossFrame frame(from);
     for (int i = 0; i < 8; ++i)
     {
-      const double angle = 2.0 * M_PI * i / 8.0;
-      const Vector3 turned =
-        (from + std::tan(cone) * (std::cos(angle) * u + std::sin(angle) * v)).normalized();
+      const Vector3 turned = (from + std::tan(cone) * frame.Ray(i, 8)).normalized();
       const double value = this->Ahead(position, turned);
       if (value > greatest)
       {
@@ -369,17 +364,16 @@ Vector3 Finder::Turn(const Vector3& position, const Vector3& direction) const
 /// Towards the top of the parabola through the core's values across.
 Vector3 Finder::Centre(const Vector3& position, const Vector3& tangent) const
 {
-  const Vector3 u = tangent.unitOrthogonal();
-  const Vector3 v = tangent.cross(u);
+  const CrossFrame frame(tangent);
   const double h = 0.75 * this->Settings.voxel;
   const auto value = [&](const Vector3& p)
   {
-    return this->Core(p, u, v) + this->Core(p + this->Settings.voxel * tangent, u, v) +
-      this->Core(p - this->Settings.voxel * tangent, u, v);
+    return this->Core(p, frame) + this->Core(p + this->Settings.voxel * tangent, frame) +
+      this->Core(p - this->Settings.voxel * tangent, frame);
   };
   Vector3 centre = position;
   const double here = value(position);
-  for (const Vector3& side : { u, v })
+  for (const Vector3& side : { frame.u, frame.v })
   {
     const double above = value(position + h * side);
     const double below = value(position - h * side);
@@ -480,10 +474,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   constexpr int directions = 80;
   for (int i = 0; i < directions; ++i)
   {
-    const double z = 1.0 - (2.0 * i + 1.0) / directions;
-    const double angle = i * 2.399963229728653;
-    const double r = std::sqrt(std::max(0.0, 1.0 - z * z));
-    const Vector3 candidate(r * std::cos(angle), r * std::sin(angle), z);
+    const Vector3 candidate = SphereDirection(i, directions);
     if (candidate.dot(spot.outwards) < 0.25)
     {
       continue;
@@ -495,7 +486,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
       direction = candidate;
     }
   }
-  const double least = this->Settings.leastContrast * this->Settings.contrast;
+  const double least = LeastContrast * this->Settings.contrast;
   if (greatest < least)
   {
     return false;
@@ -507,7 +498,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   const auto most = static_cast<std::size_t>(this->Settings.maximumLength / step);
   Bar bar;
   bar.least = least;
-  bar.significance = this->Settings.significance;
+  bar.significance = Significance;
   bar.going = 0.5 * least;
   if (!this->Walk(position, direction, most, 0, bar, samples))
   {
@@ -609,11 +600,11 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
       cores.push_back(sample.core);
     }
   }
-  const double least = this->Settings.leastContrast * this->Settings.contrast;
+  const double least = LeastContrast * this->Settings.contrast;
   const double usual = contrasts.empty() ? least : MedianOf(std::move(contrasts));
   Bar bar;
   bar.least = 0.5 * least;
-  bar.significance = 0.5 * this->Settings.significance;
+  bar.significance = 0.5 * Significance;
   bar.going = std::max(0.25 * least, 0.5 * usual);
   bar.goingBright = std::min(bar.going, 0.5 * least);
   if (!cores.empty())
@@ -622,7 +613,7 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   }
   bar.unknownGoesOn = true;
   const Vector3 direction = this->Turn(point(near), back.normalized());
-  const double radius = this->Tree.radius[static_cast<std::size_t>(branch.points.back())];
+  const double radius = this->Tree.radius[branch.points.back()];
   const auto own = static_cast<std::size_t>((passed(near) + radius) / (Stride * voxel)) + 3;
   std::vector<Sample> samples;
   double contrast = 0.0;
@@ -689,20 +680,17 @@ double MeasureNoise(const ImageInterpolator& image, const VesselTree& tree, doub
     for (std::size_t i = 4; i + 4 < branch.points.size(); i += 4)
     {
       const auto p = static_cast<std::size_t>(branch.points[i]);
-      const Vector3 chord = tree.points[static_cast<std::size_t>(branch.points[i + 4])] -
-        tree.points[static_cast<std::size_t>(branch.points[i - 4])];
+      const Vector3 chord = tree.points[branch.points[i + 4]] - tree.points[branch.points[i - 4]];
       if (!(chord.norm() > 0.0))
       {
         continue;
       }
       const Vector3 tangent = chord.normalized();
-      const Vector3 u = tangent.unitOrthogonal();
-      const Vector3 v = tangent.cross(u);
+      const CrossFrame frame(tangent);
       const double away = tree.radius[p] + 4.0 * voxel;
       for (int side = 0; side < 6; ++side)
       {
-        const double angle = M_PI * side / 3.0;
-        const Vector3 place = tree.points[p] + away * (std::cos(angle) * u + std::sin(angle) * v);
+        const Vector3 place = tree.points[p] + away * frame.Ray(side, 6);
         if (image.Contains(place))
         {
           differences.push_back(std::abs(image.At(place - 3.0 * voxel * tangent) -
@@ -714,34 +702,27 @@ double MeasureNoise(const ImageInterpolator& image, const VesselTree& tree, doub
   return MedianOf(std::move(differences)) * 1.4826 / std::sqrt(6.0);
 }
 
-namespace
-{
-void Check(const ThinBranchSettings& settings)
+void ThinBranchSettings::Validate() const
 {
   constexpr RequireOf require{ "ThinBranchSettings" };
-  require(settings.voxel > 0.0, "voxel must be positive");
-  require(settings.step > 0.0, "step must be positive");
-  require(settings.minimumLength > 0.0, "minimumLength must be positive");
-  require(settings.maximumLength >= settings.minimumLength,
-    "maximumLength must not be below minimumLength");
-  require(settings.contrast > 0.0, "contrast must be positive");
+  require(this->voxel > 0.0, "voxel must be positive");
+  require(this->minimumLength > 0.0, "minimumLength must be positive");
   require(
-    settings.leastContrast >= 0.0 && settings.leastContrast <= 1.0, "leastContrast must be 0 to 1");
-  require(settings.significance >= 0.0, "significance must not be negative");
-}
+    this->maximumLength >= this->minimumLength, "maximumLength must not be below minimumLength");
+  require(this->contrast > 0.0, "contrast must be positive");
 }
 
 std::vector<ThinBranch> FindThinBranches(
   const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
 {
-  Check(settings);
+  settings.Validate();
   return Finder(image, tree, settings).Run();
 }
 
 std::vector<TipPath> FollowTips(
   const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
 {
-  Check(settings);
+  settings.Validate();
   const Finder finder(image, tree, settings);
   std::vector<TipPath> paths(tree.branches.size());
   ParallelFor(static_cast<std::int64_t>(paths.size()), 1,

@@ -23,12 +23,12 @@ namespace coronary
 struct ThinBranchSettings
 {
   double voxel = 0.4;          ///< edge of a voxel (of its cube), mm, > 0
-  double step = 0.24;          ///< distance of a path's points, mm, > 0
   double minimumLength = 6.0;  ///< mm outside of the parent's lumen, > 0
   double maximumLength = 80.0; ///< mm
   double contrast = 500.0;     ///< image value of a great vessel's lumen over its surroundings, > 0
-  double leastContrast = 0.12; ///< share of it that a path must show on every side, mean, 0 to 1
-  double significance = 8.0;   ///< standard errors of noise that the path's mean must exceed
+
+  /// @throws std::invalid_argument that names the first setting out of range
+  void Validate() const;
 };
 
 struct ThinBranch
@@ -64,7 +64,7 @@ struct TipPath
  * enough for a mask. The last two voxels before a tip are followed anew: they may lead into a corner of a mask.
  * @param tree  every branch ends in a tip
  * @returns one path a branch; empty also where it leads into another vessel. `minimumLength` does not
- *          apply, half of `significance` is enough. The same on any number of threads.
+ *          apply, and half of the significance is enough. The same on any number of threads.
  * @throws std::invalid_argument that names the setting out of range
  */
 std::vector<TipPath> FollowTips(

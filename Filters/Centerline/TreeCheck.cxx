@@ -1,6 +1,7 @@
 #include "TreeCheck.h"
 
 #include "SegmentAtlas.h"
+#include "TreeLinks.h"
 #include "VesselTips.h"
 
 #include <algorithm>
@@ -340,20 +341,19 @@ void Checker::Tips()
   const std::vector<VesselPath> paths = VesselPaths(this->Tree);
   const double calibre = TipCalibre(this->Tree, paths);
   const std::vector<VesselTip> tips = JudgeTips(this->Tree, paths);
+  const std::vector<std::int64_t> branches = BranchesOfPoints(this->Tree);
   for (std::size_t n = 0; n < paths.size(); ++n)
   {
     const VesselPath& path = paths[n];
     const std::int64_t tip = path.points.back();
-    const auto last = std::find_if(this->Tree.branches.begin(), this->Tree.branches.end(),
-      [tip](const VesselTree::Branch& one) { return one.points.back() == tip; });
-    const VesselTree::Branch& branch = *last;
+    const std::int64_t last = branches[tip];
+    const VesselTree::Branch& branch = this->Tree.branches[last];
     if (branch.treeId < 0)
     {
       continue;
     }
     const Vector3& place = this->Tree.points[tip];
-    const std::string name =
-      this->NameOf(static_cast<std::size_t>(last - this->Tree.branches.begin()));
+    const std::string name = this->NameOf(last);
     if (this->Tree.abscissa[tip] > LongestPath)
     {
       this->Warn(name + " ends at " + At(place) + ", " + Rounded(this->Tree.abscissa[tip]) +

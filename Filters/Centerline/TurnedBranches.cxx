@@ -1,12 +1,17 @@
 #include "TurnedBranches.h"
 
+#include "CheapestFirst.h"
+#include "CrossFrame.h"
+#include "CurveGeometry.h"
+#include "GridIndex.h"
 #include "Median.h"
+#include "TreeLinks.h"
+#include "VoxelLattice.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <queue>
 #include <stdexcept>
 
 namespace coronary
@@ -27,26 +32,15 @@ constexpr double MostDetour = 1.6; ///< length of a way over the distance of its
 constexpr double Cone = 0.65; ///< cosine
 constexpr double ConeReach = 5.0;
 
-/// Length along a branch's points, mm.
-std::vector<double> Lengths(const VesselTree& tree, const std::vector<std::int64_t>& points)
-{
-  std::vector<double> along(points.size(), 0.0);
-  for (std::size_t i = 1; i < points.size(); ++i)
-  {
-    along[i] = along[i - 1] + (tree.points[points[i]] - tree.points[points[i - 1]]).norm();
-  }
-  return along;
-}
-
 class TurnedFinder
 {
 public:
   TurnedFinder(const ImageInterpolator& image, const VesselTree& tree, double voxel)
     : Image(image)
     , Tree(tree)
+    , Links(tree)
     , Voxel(voxel)
   {
-    CheckTree(tree);
     if (!(voxel > 0.0))
     {
       throw std::invalid_argument("turned branches: a voxel must be longer than 0");
@@ -73,6 +67,7 @@ private:
 
   const ImageInterpolator& Image;
   const VesselTree& Tree;
+  const TreeLinks Links;
   double Voxel;
 };
 
@@ -80,26 +75,23 @@ TurnedFinder::Upstream TurnedFinder::Above(std::size_t branch) const
 {
   Upstream above;
   std::int64_t from = this->Tree.branches[branch].points.front();
-  for (int parent = this->Tree.branches[branch].parentGroupId; parent >= 0;)
+  for (std::int64_t up = this->Links.parent[branch]; up >= 0; up = this->Links.parent[up])
   {
-    const auto at = std::find_if(this->Tree.branches.begin(), this->Tree.branches.end(),
-      [&](const VesselTree::Branch& one) { return one.groupId == parent; });
-    const std::vector<std::int64_t>& points = at->points;
+    const std::vector<std::int64_t>& points = this->Tree.branches[up].points;
     const auto end = std::find(points.begin(), points.end(), from);
     for (auto i = std::distance(points.begin(), end); i >= 0; --i)
     {
-      above.points.push_back(points[static_cast<std::size_t>(i)]);
+      above.points.push_back(points[i]);
     }
     from = points.front();
-    parent = at->parentGroupId;
-    if (parent >= 0)
+    if (!this->Links.IsRoot(up))
     {
       above.points.pop_back(); // the next one has it as well
     }
   }
   const std::size_t count = above.points.size();
   const auto at = [&](std::size_t i) -> const Vector3&
-  { return this->Tree.points[static_cast<std::size_t>(above.points[i])]; };
+  { return this->Tree.points[above.points[i]]; };
   for (std::size_t i = 0; i < count; ++i)
   {
     std::size_t up = i;
@@ -117,7 +109,7 @@ TurnedFinder::Upstream TurnedFinder::Above(std::size_t branch) const
 bool TurnedFinder::RunsBack(std::size_t branch, const Upstream& above, TurnedBranch& turned) const
 {
   const std::vector<std::int64_t>& points = this->Tree.branches[branch].points;
-  const std::vector<double> along = Lengths(this->Tree, points);
+  const std::vector<double> along = ArcLengths(this->Tree, points);
   const auto begin = static_cast<std::size_t>(points.front());
   const double mouth = this->Tree.radius[begin] + 1.0;
   const auto within = [&](double passed)
@@ -135,9 +127,7 @@ bool TurnedFinder::RunsBack(std::size_t branch, const Upstream& above, TurnedBra
   }
   const Vector3 leaving =
     this->Tree.points[points[within(mouth + Straight)]] - this->Tree.points[points[turned.contact]];
-  const double angle =
-    std::acos(std::clamp(leaving.normalized().dot(above.flow.front()), -1.0, 1.0));
-  if (!(angle > AgainstFlow))
+  if (!(UnitAngle(leaving.normalized(), above.flow.front()) > AgainstFlow))
   {
     return false;
   }
@@ -152,8 +142,8 @@ bool TurnedFinder::RunsBack(std::size_t branch, const Upstream& above, TurnedBra
     for (std::size_t n = 0; n < above.points.size(); ++n)
     {
       const auto p = static_cast<std::size_t>(above.points[n]);
-      const double away = (this->Tree.points[p] - here).norm() - this->Tree.radius[p] -
-        this->Tree.radius[static_cast<std::size_t>(points[i])];
+      const double away =
+        (this->Tree.points[p] - here).norm() - this->Tree.radius[p] - this->Tree.radius[points[i]];
       if (away < gap)
       {
         gap = away;
@@ -180,13 +170,11 @@ std::pair<double, double> TurnedFinder::Values(const TurnedBranch& turned) const
       continue;
     }
     own.push_back(this->Image.At(this->Tree.points[p]));
-    const Vector3 u = tangent.unitOrthogonal();
-    const Vector3 v = tangent.cross(u);
+    const CrossFrame frame(tangent);
     for (int side = 0; side < 8; ++side)
     {
-      const double turn = M_PI * side / 4.0;
-      around.push_back(this->Image.At(this->Tree.points[p] +
-        (this->Tree.radius[p] + 2.0 * this->Voxel) * (std::cos(turn) * u + std::sin(turn) * v)));
+      around.push_back(this->Image.At(
+        this->Tree.points[p] + (this->Tree.radius[p] + 2.0 * this->Voxel) * frame.Ray(side, 8)));
     }
   }
   // Half of it may be another vessel or a chamber.
@@ -229,11 +217,7 @@ bool TurnedFinder::IsSeen(const std::vector<Vector3>& way, double own, double ar
 bool TurnedFinder::IsWay(
   const std::vector<Vector3>& way, const Vector3& flow, double own, double around) const
 {
-  double length = 0.0;
-  for (std::size_t i = 1; i < way.size(); ++i)
-  {
-    length += (way[i] - way[i - 1]).norm();
-  }
+  const double length = PolylineLength(way);
   const Vector3 leaving = way[std::min<std::size_t>(way.size() - 1, 6)] - way.front();
   // A root against the flow again is none.
   return length <= LongestWay && length <= MostDetour * (way.back() - way.front()).norm() + 1.5 &&
@@ -245,7 +229,7 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
 {
   const std::vector<std::int64_t>& points = this->Tree.branches[turned.branch].points;
   const Vector3& end = this->Tree.points[points.back()];
-  const std::vector<double> along = Lengths(this->Tree, points);
+  const std::vector<double> along = ArcLengths(this->Tree, points);
   std::size_t back = points.size() - 1;
   while (back > turned.contact && along.back() - along[back] < 0.5 * Straight)
   {
@@ -258,43 +242,29 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
     return;
   }
   const int reach = static_cast<int>(std::ceil(LongestWay / this->Voxel));
-  const int size = 2 * reach + 1;
-  const auto number = [&](int i, int j, int k)
-  { return (static_cast<std::size_t>(k) * size + j) * size + i; };
-  const auto place = [&](std::size_t n) -> Vector3
-  {
-    const int i = static_cast<int>(n % size);
-    const int j = static_cast<int>(n / size % size);
-    const int k = static_cast<int>(n / size / size);
-    return end + this->Voxel * Vector3(i - reach, j - reach, k - reach);
-  };
+  ImageGrid grid;
+  grid.extent = { -reach, reach, -reach, reach, -reach, reach };
+  grid.origin = end;
+  grid.spacing.setConstant(this->Voxel);
+  const VoxelLattice lattice(grid);
   // Lumens: of what is upstream, where the way may end, and of all else, where it may not pass.
   constexpr std::int32_t open = -1;
   constexpr std::int32_t closed = -2;
-  std::vector<std::int32_t> lumen(static_cast<std::size_t>(size) * size * size, open);
+  const std::int64_t size = lattice.Size[0];
+  std::vector<std::int32_t> lumen(size * size * size, open);
   const auto mark = [&](std::size_t p, std::int32_t value)
   {
     const Vector3 at = (this->Tree.points[p] - end) / this->Voxel + Vector3::Constant(reach);
     const double radius = this->Tree.radius[p] / this->Voxel;
-    std::array<int, 6> box;
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      box[2 * axis] = std::max(0, static_cast<int>(std::ceil(at[axis] - radius)));
-      box[2 * axis + 1] = std::min(size - 1, static_cast<int>(std::floor(at[axis] + radius)));
-    }
-    for (int k = box[4]; k <= box[5]; ++k)
-    {
-      for (int j = box[2]; j <= box[3]; ++j)
-      {
-        for (int i = box[0]; i <= box[1]; ++i)
+    BoxAround(at, Vector3::Constant(radius), { 0, 2 * reach, 0, 2 * reach, 0, 2 * reach })
+      .ForEach(
+        [&](int i, int j, int k)
         {
           if ((Vector3(i, j, k) - at).norm() <= radius)
           {
-            lumen[number(i, j, k)] = value;
+            lumen[lattice.Index(i, j, k)] = value;
           }
-        }
-      }
-    }
+        });
   };
   for (const VesselTree::Branch& branch : this->Tree.branches)
   {
@@ -302,33 +272,24 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
     {
       for (const std::int64_t p : branch.points)
       {
-        mark(static_cast<std::size_t>(p), closed);
+        mark(p, closed);
       }
     }
   }
   for (std::size_t n = 0; n < above.points.size(); ++n)
   {
-    mark(static_cast<std::size_t>(above.points[n]), static_cast<std::int32_t>(n));
+    mark(above.points[n], static_cast<std::int32_t>(n));
   }
-  struct Entry
-  {
-    float cost;
-    std::size_t voxel;
-    bool operator<(const Entry& other) const
-    {
-      return this->cost != other.cost ? this->cost > other.cost : this->voxel > other.voxel;
-    }
-  };
   std::vector<float> cost(lumen.size(), std::numeric_limits<float>::infinity());
   std::vector<std::int64_t> before(lumen.size(), -1);
-  std::priority_queue<Entry> queue;
-  const std::size_t start = number(reach, reach, reach);
+  CheapestFirst queue;
+  const std::int64_t start = lattice.Index(reach, reach, reach);
   cost[start] = 0.0F;
   queue.push({ 0.0F, start });
   std::int64_t arrived = -1;
-  while (!queue.empty() && arrived < 0)
+  while (!queue.empty())
   {
-    const Entry top = queue.top();
+    const WaitingVoxel top = queue.top();
     queue.pop();
     if (top.cost > cost[top.voxel])
     {
@@ -336,23 +297,19 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
     }
     if (top.voxel != start && lumen[top.voxel] >= 0)
     {
-      arrived = static_cast<std::int64_t>(top.voxel);
+      arrived = top.voxel;
       break;
     }
-    const int i = static_cast<int>(top.voxel % size);
-    const int j = static_cast<int>(top.voxel / size % size);
-    const int k = static_cast<int>(top.voxel / size / size);
-    for (int near = 0; near < 27; ++near)
+    const std::array<int, 3> from = lattice.Place(top.voxel);
+    for (const VoxelLattice::Neighbour& near : lattice.Around)
     {
-      const int ni = i + near % 3 - 1;
-      const int nj = j + near / 3 % 3 - 1;
-      const int nk = k + near / 9 - 1;
-      if (near == 13 || std::min({ ni, nj, nk }) < 0 || std::max({ ni, nj, nk }) >= size)
+      const std::array<int, 3> to{ from[0] + near.di, from[1] + near.dj, from[2] + near.dk };
+      if (!lattice.Contains(to[0], to[1], to[2]))
       {
         continue;
       }
-      const std::size_t next = number(ni, nj, nk);
-      const Vector3 at = place(next);
+      const std::int64_t next = top.voxel + near.offset;
+      const Vector3 at = lattice.World(to);
       const Vector3 offset = at - end;
       if (lumen[next] == closed || !this->Image.Contains(at) ||
         (offset.norm() < ConeReach && offset.dot(ahead) < Cone * offset.norm()))
@@ -360,12 +317,12 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
         continue;
       }
       const double share = std::clamp((this->Image.At(at) - around) / (own - around), 0.0, 1.0);
-      const double step = this->Voxel * Vector3(ni - i, nj - j, nk - k).norm();
+      const double step = this->Voxel * Vector3(near.di, near.dj, near.dk).norm();
       const auto more = static_cast<float>(step / (0.03 + share * share));
       if (top.cost + more < cost[next])
       {
         cost[next] = top.cost + more;
-        before[next] = static_cast<std::int64_t>(top.voxel);
+        before[next] = top.voxel;
         queue.push({ cost[next], next });
       }
     }
@@ -375,11 +332,11 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
     return;
   }
   std::vector<Vector3> way;
-  for (std::int64_t at = arrived; at >= 0; at = before[static_cast<std::size_t>(at)])
+  for (std::int64_t at = arrived; at >= 0; at = before[at])
   {
-    way.push_back(place(static_cast<std::size_t>(at)));
+    way.push_back(lattice.World(lattice.Place(at)));
   }
-  const auto meeting = static_cast<std::size_t>(lumen[static_cast<std::size_t>(arrived)]);
+  const std::int32_t meeting = lumen[arrived];
   if (this->IsWay(way, above.flow[meeting], own, around))
   {
     turned.root = above.points[meeting];
@@ -389,18 +346,10 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
 
 std::vector<TurnedBranch> TurnedFinder::Run() const
 {
-  std::vector<char> parts(this->Tree.branches.size(), 0);
-  for (std::size_t b = 0; b < parts.size(); ++b)
-  {
-    for (const VesselTree::Branch& other : this->Tree.branches)
-    {
-      parts[b] |= other.parentGroupId == this->Tree.branches[b].groupId ? 1 : 0;
-    }
-  }
   std::vector<TurnedBranch> found;
   for (std::size_t b = 0; b < this->Tree.branches.size(); ++b)
   {
-    if (parts[b] != 0 || this->Tree.branches[b].parentGroupId < 0)
+    if (!this->Links.IsTip(b) || this->Links.IsRoot(b))
     {
       continue;
     }

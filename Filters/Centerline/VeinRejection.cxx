@@ -1,15 +1,17 @@
 #include "VeinRejection.h"
 
+#include "CrossFrame.h"
 #include "FittedOdds.h"
 #include "Median.h"
+#include "TreeLinks.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <optional>
 #include <set>
+#include <utility>
 
 namespace coronary
 {
@@ -61,17 +63,20 @@ constexpr std::array<FittedSign, NumberOfVeinSigns> Signs{ {
   { "no_brightness", -0.04 },
 } };
 
+/// Robust standard deviation of values around their middle.
+double SpreadAround(double middle, std::vector<double> values)
+{
+  for (double& value : values)
+  {
+    value = std::abs(value - middle);
+  }
+  return 1.4826 * MedianOf(std::move(values));
+}
+
 /// Standard deviation of a median by noise: samples within about 1 mm are not independent.
 double SpreadOfMedian(const std::vector<double>& values)
 {
-  std::vector<double> off;
-  const double middle = MedianOf(values);
-  off.reserve(values.size());
-  for (const double value : values)
-  {
-    off.push_back(std::abs(value - middle));
-  }
-  return 1.4826 * MedianOf(off) /
+  return SpreadAround(MedianOf(values), values) /
     std::sqrt(std::max(1.0, static_cast<double>(values.size()) / 4.0));
 }
 
@@ -81,23 +86,18 @@ double UpperRadius(std::vector<double> values)
   return std::max(1e-9, QuantileOf(std::move(values), 0.8));
 }
 
-double Angle(const Vector3& a, const Vector3& b)
-{
-  return std::acos(std::clamp(a.dot(b), -1.0, 1.0));
-}
-
 class VeinFinder
 {
 public:
   VeinFinder(const VesselTree& tree, const ImageInterpolator& image,
     const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
     : Tree(tree)
+    , Links(tree)
     , Image(image)
     , Closed(closed)
     , Blur(blur)
     , Contrast(reference.lumen - reference.background)
   {
-    CheckTree(tree);
     this->Value.resize(tree.points.size());
     this->GivenBack.resize(tree.points.size());
     for (std::size_t p = 0; p < tree.points.size(); ++p)
@@ -110,19 +110,10 @@ public:
       this->Value[p] = seen / kept;
       this->GivenBack[p] = seen / kept - seen;
     }
-    this->Daughters.resize(tree.branches.size());
-    for (std::size_t b = 0; b < tree.branches.size(); ++b)
-    {
-      this->Index[tree.branches[b].groupId] = b;
-      if (tree.branches[b].parentGroupId >= 0)
-      {
-        this->Daughters[this->Index.at(tree.branches[b].parentGroupId)].push_back(b);
-      }
-    }
     std::vector<double> tips;
     for (std::size_t b = 0; b < tree.branches.size(); ++b)
     {
-      if (this->Daughters[b].empty())
+      if (this->Links.IsTip(b))
       {
         tips.push_back(std::log(this->TipRadius(this->Down(b, Unlimited))));
       }
@@ -143,6 +134,7 @@ private:
   /// A branch that may be a vein's.
   struct Arm
   {
+    std::size_t number = 0; ///< of the branch where it begins
     VeinBranch branch;
     Course course;
     double brightness = 0.0; ///< step from the artery, share of the contrast, negative: darker
@@ -175,10 +167,7 @@ private:
     double radius = 0.0;
   };
 
-  const Vector3& At(std::int64_t point) const
-  {
-    return this->Tree.points[static_cast<std::size_t>(point)];
-  }
+  const Vector3& At(std::int64_t point) const { return this->Tree.points[point]; }
   Course Down(std::size_t branch, double reach, std::vector<double>* forks = nullptr) const;
   Course Up(std::size_t branch, double reach) const;
   std::vector<double> Values(const std::vector<double>& of, const Course& run, double from) const;
@@ -197,6 +186,7 @@ private:
   void FindOpposites(std::vector<Arm>& arms) const;
 
   const VesselTree& Tree;
+  const TreeLinks Links;
   const ImageInterpolator& Image;
   const std::function<bool(const Vector3&)>& Closed;
   double Blur;
@@ -207,8 +197,6 @@ private:
   double Natural = 0.01;         ///< how they differ
   std::vector<double> Value;     ///< share of the contrast at a point
   std::vector<double> GivenBack; ///< of it, for the blur
-  std::map<int, std::size_t> Index;
-  std::vector<std::vector<std::size_t>> Daughters;
 };
 
 /// A branch and those that go straight on.
@@ -230,7 +218,7 @@ VeinFinder::Course VeinFinder::Down(
         return run;
       }
     }
-    if (this->Daughters[branch].empty())
+    if (this->Links.IsTip(branch))
     {
       return run;
     }
@@ -243,7 +231,7 @@ VeinFinder::Course VeinFinder::Down(
       this->At(points[points.size() > chord ? points.size() - 1 - chord : 0]))
                             .normalized();
     double straightest = -2.0;
-    for (const std::size_t daughter : this->Daughters[branch])
+    for (const std::size_t daughter : this->Links.daughters[branch])
     {
       const std::vector<std::int64_t>& own = this->Tree.branches[daughter].points;
       const double straight =
@@ -262,10 +250,9 @@ VeinFinder::Course VeinFinder::Up(std::size_t branch, double reach) const
 {
   Course run;
   double passed = 0.0;
-  int parent = this->Tree.branches[branch].parentGroupId;
-  while (parent >= 0)
+  for (std::int64_t b = this->Links.parent[branch]; b >= 0; b = this->Links.parent[b])
   {
-    const VesselTree::Branch& up = this->Tree.branches[this->Index.at(parent)];
+    const VesselTree::Branch& up = this->Tree.branches[b];
     for (std::size_t i = up.points.size() - 1; i > 0; --i)
     {
       passed += (this->At(up.points[i]) - this->At(up.points[i - 1])).norm();
@@ -275,7 +262,6 @@ VeinFinder::Course VeinFinder::Up(std::size_t branch, double reach) const
         return run;
       }
     }
-    parent = up.parentGroupId;
   }
   return run;
 }
@@ -287,7 +273,7 @@ std::vector<double> VeinFinder::Values(
   for (const auto& [point, passed] : run)
   {
     if (passed >= from && this->Tree.radius[point] >= LeastRadius * this->Blur &&
-      (this->Tree.bridged.empty() || this->Tree.bridged[point] == 0))
+      !IsBridged(this->Tree, point))
     {
       values.push_back(of[point]);
     }
@@ -300,8 +286,7 @@ std::vector<double> VeinFinder::Radii(const Course& run, double from, double to)
   std::vector<double> radii;
   for (const auto& [point, passed] : run)
   {
-    if (passed >= from && passed < to &&
-      (this->Tree.bridged.empty() || this->Tree.bridged[point] == 0) &&
+    if (passed >= from && passed < to && !IsBridged(this->Tree, point) &&
       (this->Tree.confidence.empty() || this->Tree.confidence[point] >= 0.5))
     {
       radii.push_back(this->Tree.radius[point]);
@@ -422,10 +407,7 @@ void VeinFinder::Beside(Arm& arm) const
     {
       arm.beside += length;
       const auto clear = [&](std::size_t p)
-      {
-        return this->Tree.radius[p] >= LeastRadius * this->Blur &&
-          (this->Tree.bridged.empty() || this->Tree.bridged[p] == 0);
-      };
+      { return this->Tree.radius[p] >= LeastRadius * this->Blur && !IsBridged(this->Tree, p); };
       if (clear(point) && clear(*nearest))
       {
         steps.push_back(this->Value[point] - this->Value[*nearest]);
@@ -450,6 +432,7 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch, double r
   {
     return std::nullopt;
   }
+  arm.number = branch;
   arm.branch.groupId = this->Tree.branches[branch].groupId;
   double widest = 0.0;
   for (const auto& [point, passed] : up)
@@ -518,7 +501,7 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch, double r
     this->Tree.points[within(down, mouth + Straight)] - this->Tree.points[within(down, mouth)];
   if (flow.norm() > 0.0 && leaving.norm() > 0.0)
   {
-    arm.takeOff = Angle(flow.normalized(), leaving.normalized());
+    arm.takeOff = UnitAngle(flow.normalized(), leaving.normalized());
   }
   this->Beside(arm);
   return arm;
@@ -565,10 +548,9 @@ std::optional<VeinFinder::Place> VeinFinder::Between(std::size_t a, std::size_t 
   const auto parents = [&](std::size_t branch)
   {
     std::vector<std::size_t> up;
-    for (int parent = this->Tree.branches[branch].parentGroupId; parent >= 0;
-         parent = this->Tree.branches[up.back()].parentGroupId)
+    for (std::int64_t at = this->Links.parent[branch]; at >= 0; at = this->Links.parent[at])
     {
-      up.push_back(this->Index.at(parent));
+      up.push_back(at);
     }
     return up;
   };
@@ -608,37 +590,32 @@ std::optional<VeinFinder::Place> VeinFinder::Between(std::size_t a, std::size_t 
   const auto others = [&]
   {
     std::vector<std::size_t> result;
-    for (const std::size_t daughter : this->Daughters[top])
+    const auto look = [&](std::size_t branch)
     {
-      if (daughter != a && daughter != b && on.count(daughter) == 0)
-      {
-        result.push_back(daughter);
-      }
-    }
-    for (const std::size_t branch : on)
-    {
-      for (const std::size_t daughter : this->Daughters[branch])
+      for (const std::size_t daughter : this->Links.daughters[branch])
       {
         if (daughter != a && daughter != b && on.count(daughter) == 0)
         {
           result.push_back(daughter);
         }
       }
-    }
+    };
+    look(top);
+    std::for_each(on.begin(), on.end(), look);
     return result;
   };
   Place place;
   place.others = others();
   // Where two vessels touch, the way into the other one may look like a short branch.
   double stem = length;
-  while (place.others.empty() && this->Tree.branches[top].parentGroupId >= 0)
+  while (place.others.empty() && !this->Links.IsRoot(top))
   {
     add(top);
     if (length - stem > LongestStem)
     {
       return std::nullopt;
     }
-    top = this->Index.at(this->Tree.branches[top].parentGroupId);
+    top = this->Links.parent[top];
     place.others = others();
   }
   if (place.others.empty() || length > TouchLength)
@@ -652,7 +629,7 @@ std::optional<VeinFinder::Place> VeinFinder::Between(std::size_t a, std::size_t 
       place.through.push_back(static_cast<std::size_t>(point));
     }
   }
-  const Course up = this->Up(this->Daughters[top].front(), Near);
+  const Course up = this->Up(this->Links.daughters[top].front(), Near);
   for (const Step& step : up)
   {
     place.through.push_back(step.point);
@@ -729,9 +706,7 @@ std::optional<VeinFinder::Side> VeinFinder::SideOf(const Course& course, const P
 /// with directions at random.
 std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b) const
 {
-  const std::size_t branchA = this->Index.at(a.branch.groupId);
-  const std::size_t branchB = this->Index.at(b.branch.groupId);
-  const std::optional<Place> place = this->Between(branchA, branchB);
+  const std::optional<Place> place = this->Between(a.number, b.number);
   if (!place)
   {
     return std::nullopt;
@@ -746,7 +721,7 @@ std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b) const
   const auto unlike = [&](const Side& side)
   {
     return std::abs(std::log(side.radius / place->radiusBefore)) / (2.0 * SameRadius) +
-      Angle(side.outwards, place->flow) / 0.5;
+      UnitAngle(side.outwards, place->flow) / 0.5;
   };
   double goesOn = std::numeric_limits<double>::infinity();
   for (const std::size_t branch : place->others)
@@ -759,11 +734,11 @@ std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b) const
     }
   }
   const Vector3 chord = sideB->position - sideA->position;
-  double bend = Angle(-sideA->outwards, sideB->outwards);
+  double bend = UnitAngle(-sideA->outwards, sideB->outwards);
   if (chord.norm() > 1.0)
   {
-    bend = std::max({ bend, Angle(-sideA->outwards, chord.normalized()),
-      Angle(sideB->outwards, chord.normalized()) });
+    bend = std::max({ bend, UnitAngle(-sideA->outwards, chord.normalized()),
+      UnitAngle(sideB->outwards, chord.normalized()) });
   }
   const double step = std::log(sideA->radius / sideB->radius) / SameRadius;
   const double turn = bend / ThroughBend;
@@ -819,7 +794,7 @@ void VeinFinder::FindOpposites(std::vector<Arm>& arms) const
 /// mm at which an arm becomes a vein: what is judged as one may be an artery up to where the vein touches it.
 double VeinFinder::VeinBegin(const Arm& arm) const
 {
-  const std::size_t branch = this->Index.at(arm.branch.groupId);
+  const std::size_t branch = arm.number;
   std::vector<double> places;
   this->Down(branch, Far, &places);
   if (const std::optional<double> narrow = this->Narrowest(arm.course))
@@ -896,13 +871,7 @@ std::vector<VeinBranch> VeinFinder::Run()
   if (!steps.empty())
   {
     this->Usual = std::clamp(MedianOf(steps), -0.1, 0.0);
-    std::vector<double> off;
-    off.reserve(steps.size());
-    for (const double step : steps)
-    {
-      off.push_back(std::abs(step - this->Usual));
-    }
-    this->Natural = std::max(this->Natural, 1.4826 * MedianOf(off));
+    this->Natural = std::max(this->Natural, SpreadAround(this->Usual, steps));
   }
   this->FindOpposites(arms);
   std::vector<VeinBranch> branches;

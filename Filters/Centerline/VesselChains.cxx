@@ -1,5 +1,6 @@
 #include "VesselChains.h"
 
+#include "TreeLinks.h"
 #include "VesselPaths.h"
 
 #include <algorithm>
@@ -18,22 +19,14 @@ public:
     , Names(names)
     , LeadIn(leadIn)
     , Paths(VesselPaths(tree))
-    , Owner(tree.points.size(), 0)
+    , Owner(BranchesOfPoints(tree))
     , Leaving(this->Paths.size())
   {
-    for (std::size_t b = 0; b < tree.branches.size(); ++b)
-    {
-      const VesselTree::Branch& branch = tree.branches[b];
-      for (std::size_t i = branch.parentGroupId < 0 ? 0 : 1; i < branch.points.size(); ++i)
-      {
-        this->Owner[static_cast<std::size_t>(branch.points[i])] = b;
-      }
-    }
     for (std::size_t p = 0; p < this->Paths.size(); ++p)
     {
       if (this->Paths[p].parent >= 0)
       {
-        this->Leaving[static_cast<std::size_t>(this->Paths[p].parent)].push_back(p);
+        this->Leaving[this->Paths[p].parent].push_back(p);
       }
     }
     for (std::size_t p = 0; p < this->Paths.size(); ++p)
@@ -69,20 +62,19 @@ private:
   /// The place on its parent's path where a path begins.
   std::size_t OriginOf(std::size_t path) const
   {
-    const std::vector<std::int64_t>& parent =
-      this->Paths[static_cast<std::size_t>(this->Paths[path].parent)].points;
+    const std::vector<std::int64_t>& parent = this->Paths[this->Paths[path].parent].points;
     return static_cast<std::size_t>(
       std::find(parent.begin(), parent.end(), this->Paths[path].points.front()) - parent.begin());
   }
 
-  std::size_t BranchAt(const VesselPath& path, std::size_t place) const
+  std::int64_t BranchAt(const VesselPath& path, std::size_t place) const
   {
-    return this->Owner[static_cast<std::size_t>(path.points[place])];
+    return this->Owner[path.points[place]];
   }
 
   std::string NameAt(const VesselPath& path, std::size_t place) const
   {
-    const std::size_t branch = this->BranchAt(path, place);
+    const std::int64_t branch = this->BranchAt(path, place);
     return this->Names[branch].empty()
       ? "branch " + std::to_string(this->Tree.branches[branch].groupId)
       : this->Names[branch];
@@ -94,7 +86,7 @@ private:
     VesselChain chain;
     if (path.parent >= 0)
     {
-      const VesselPath& parent = this->Paths[static_cast<std::size_t>(path.parent)];
+      const VesselPath& parent = this->Paths[path.parent];
       const std::size_t last = this->OriginOf(number);
       std::size_t first = last;
       while (first > 0 && parent.arc[last] - parent.arc[first] < this->LeadIn)
@@ -133,7 +125,7 @@ private:
   const std::vector<std::string>& Names;
   const double LeadIn;
   std::vector<VesselPath> Paths;
-  std::vector<std::size_t> Owner; ///< of a point: its branch; a shared one is the parent's
+  std::vector<std::int64_t> Owner; ///< of a point: its branch; a shared one is the parent's
   std::vector<std::vector<std::size_t>>
     Leaving; ///< of a path: those that leave it, by their origin
 };

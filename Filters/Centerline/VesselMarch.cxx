@@ -197,32 +197,18 @@ void VesselMarch::March(const ImageInterpolator& image, const LumenReference& re
 
 std::uint32_t VesselMarch::NearestMember(const Vector3& index, double reach, bool reachedOnly) const
 {
-  const std::array<int, 6>& box = this->Members.Box();
-  if (this->Members.Size() == 0)
-  {
-    return None;
-  }
-  std::array<int, 6> range;
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    const double steps = reach / this->Input.grid.spacing[axis] + 0.5;
-    range[2 * axis] =
-      static_cast<int>(std::max<double>(box[2 * axis], std::ceil(index[axis] - steps)));
-    range[2 * axis + 1] =
-      static_cast<int>(std::min<double>(box[2 * axis + 1], std::floor(index[axis] + steps)));
-  }
   std::uint32_t nearest = None;
   double least = std::numeric_limits<double>::infinity();
-  for (int k = range[4]; k <= range[5]; ++k)
-  {
-    for (int j = range[2]; j <= range[3]; ++j)
-    {
-      for (int i = range[0]; i <= range[1]; ++i)
+  const Vector3 steps =
+    Vector3::Constant(reach).cwiseQuotient(this->Input.grid.spacing) + Vector3::Constant(0.5);
+  BoxAround(index, steps, this->Members.Box())
+    .ForEach(
+      [&](int i, int j, int k)
       {
         const std::uint32_t number = this->Members.NumberOf(i, j, k);
         if (number == None || (reachedOnly && !std::isfinite(this->Front->Arrival()[number])))
         {
-          continue;
+          return;
         }
         const double distance =
           (Vector3(i, j, k) - index).cwiseProduct(this->Input.grid.spacing).norm();
@@ -231,9 +217,7 @@ std::uint32_t VesselMarch::NearestMember(const Vector3& index, double reach, boo
           least = distance;
           nearest = number;
         }
-      }
-    }
-  }
+      });
   return nearest;
 }
 

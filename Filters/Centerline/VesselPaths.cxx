@@ -1,9 +1,9 @@
 #include "VesselPaths.h"
 
 #include "CoronaryAnatomy.h"
+#include "TreeLinks.h"
 
 #include <algorithm>
-#include <map>
 
 namespace coronary
 {
@@ -77,23 +77,13 @@ Course CourseAt(const VesselTree& tree, const VesselTree::Branch& branch, bool a
 std::vector<VesselPath> VesselPaths(const VesselTree& given)
 {
   const VesselTree tree = SplitAtBifurcations(given);
-  std::map<int, std::size_t> byId;
-  for (std::size_t b = 0; b < tree.branches.size(); ++b)
-  {
-    byId[tree.branches[b].groupId] = b;
-  }
-  std::vector<std::vector<std::size_t>> daughters(tree.branches.size());
+  const TreeLinks links(tree);
   std::vector<std::size_t> origins;
   for (std::size_t b = 0; b < tree.branches.size(); ++b)
   {
-    const int parent = tree.branches[b].parentGroupId;
-    if (parent < 0)
+    if (links.IsRoot(b))
     {
       origins.push_back(b);
-    }
-    else
-    {
-      daughters[byId.at(parent)].push_back(b);
     }
   }
   std::vector<VesselPath> paths;
@@ -114,15 +104,16 @@ std::vector<VesselPath> VesselPaths(const VesselTree& given)
           path.arc.back() + (tree.points[points[i]] - tree.points[points[i - 1]]).norm());
         path.points.push_back(points[i]);
       }
-      if (daughters[branch].empty())
+      const std::vector<std::size_t>& daughters = links.daughters[branch];
+      if (daughters.empty())
       {
         break;
       }
       const int family = FamilyOf(tree.branches[branch].segmentId);
       const Course before = CourseAt(tree, tree.branches[branch], true);
-      std::size_t best = daughters[branch].front();
+      std::size_t best = daughters.front();
       double bestScore = -1.0;
-      for (const std::size_t daughter : daughters[branch])
+      for (const std::size_t daughter : daughters)
       {
         const Course after = CourseAt(tree, tree.branches[daughter], false);
         double score = after.radius * (1.0 + 0.5 * before.direction.dot(after.direction));
@@ -136,11 +127,11 @@ std::vector<VesselPath> VesselPaths(const VesselTree& given)
           best = daughter;
         }
       }
-      if (daughters[branch].size() > 1)
+      if (daughters.size() > 1)
       {
         path.forks.push_back(path.points.size() - 1);
       }
-      for (const std::size_t daughter : daughters[branch])
+      for (const std::size_t daughter : daughters)
       {
         if (daughter != best)
         {

@@ -7,6 +7,8 @@
 
 #include "VesselTree.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 namespace coronary
@@ -18,6 +20,15 @@ struct VesselPath
   std::vector<double> arc;          ///< mm from the first point
   std::vector<std::size_t> forks;   ///< places in `points` where other vessels leave
   int parent = -1; ///< index of the path that it leaves, which stands before it; -1: a root
+
+  /// Place of the first point that is no point of the parent's.
+  std::size_t FirstOwn() const { return this->parent < 0 ? 0 : 1; }
+
+  /// Mean distance of points, mm.
+  double Step() const
+  {
+    return std::max(1e-6, this->arc.back() / static_cast<double>(this->points.size() - 1));
+  }
 };
 
 /**

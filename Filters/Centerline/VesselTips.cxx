@@ -44,7 +44,7 @@ double RadiusBeforeTip(const VesselTree& tree, const VesselPath& path, double fr
 {
   std::vector<double> radii;
   // The first point of a branch is its parent's.
-  for (std::size_t i = path.parent < 0 ? 0 : 1; i < path.points.size(); ++i)
+  for (std::size_t i = path.FirstOwn(); i < path.points.size(); ++i)
   {
     const double back = path.arc.back() - path.arc[i];
     if (back >= from && back <= to)

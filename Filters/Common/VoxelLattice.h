@@ -167,6 +167,26 @@ public:
       }
     }
   }
+  /// What hangs together with a voxel by any of the 26 neighbours, nearest first; nothing if that is not taken.
+  /// @param take  whether a voxel is free; it is not any more
+  template <typename Take>
+  std::vector<std::int64_t> Connected(std::int64_t first, const Take& take) const
+  {
+    std::vector<std::int64_t> piece;
+    const auto add = [&](std::int64_t voxel)
+    {
+      if (take(voxel))
+      {
+        piece.push_back(voxel);
+      }
+    };
+    add(first);
+    for (std::size_t n = 0; n < piece.size(); ++n)
+    {
+      this->Neighbours(piece[n], [&](std::int64_t next, float) { add(next); });
+    }
+    return piece;
+  }
 
   std::array<int, 3> Size;
   Vector3 Spacing;

@@ -3,6 +3,7 @@
 #include "AorticTubes.h"
 #include "Median.h"
 #include "OstialOutlets.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <array>
@@ -360,21 +361,14 @@ AscendingAorta AortaOf(const Candidate& candidate, const std::vector<double>& le
 
 void CoronaryOstiaSettings::Validate() const
 {
-  const auto check = [](bool good, const char* what)
-  {
-    if (!good)
-    {
-      throw std::invalid_argument(what);
-    }
-  };
-  check(this->smallestAorta >= 4.0 && this->smallestAorta < this->largestAorta &&
+  Require(this->smallestAorta >= 4.0 && this->smallestAorta < this->largestAorta &&
       this->largestAorta <= 60.0,
     "aortic radii must satisfy 4 <= smallestAorta < largestAorta <= 60 mm");
-  check(
+  Require(
     this->largestVessel >= 1.0 && this->largestVessel <= 8.0, "largestVessel must be 1 to 8 mm");
-  check(
+  Require(
     this->vesselLength >= 10.0 && this->vesselLength <= 80.0, "vesselLength must be 10 to 80 mm");
-  check(std::isfinite(this->softTissue) && this->smallestBlood > this->softTissue &&
+  Require(std::isfinite(this->softTissue) && this->smallestBlood > this->softTissue &&
       std::isfinite(this->smallestBlood),
     "smallestBlood must be above softTissue");
 }

@@ -1,13 +1,16 @@
 #include "HiddenMouths.h"
 
+#include "CheapestFirst.h"
+#include "CrossFrame.h"
 #include "DistanceTransform.h"
+#include "VoxelLattice.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <queue>
 #include <unordered_map>
+#include <utility>
 
 namespace coronary
 {
@@ -37,6 +40,7 @@ class MouthSearch
 public:
   MouthSearch(const MouthImage& image, double longest, double shortest)
     : I(image)
+    , L(image.volume.Grid())
     , Hidden(longest)
     , Longest(longest + Stump)
     , Shortest(shortest)
@@ -67,30 +71,6 @@ private:
   float Seen(std::int64_t p) const { return std::clamp(this->Tube(p) / VisibleTube, 0.0F, 1.0F); }
   Vector3 World(std::int64_t p) const { return this->I.volume.World(this->I.volume.Place(p)); }
 
-  template <typename F>
-  void Neighbours(std::int64_t p, const F& f) const
-  {
-    const std::array<int, 3> at = this->I.volume.Place(p);
-    const std::array<int, 3>& n = this->I.volume.size;
-    for (int dk = -1; dk <= 1; ++dk)
-    {
-      for (int dj = -1; dj <= 1; ++dj)
-      {
-        for (int di = -1; di <= 1; ++di)
-        {
-          const int i = at[0] + di;
-          const int j = at[1] + dj;
-          const int k = at[2] + dk;
-          if ((di != 0 || dj != 0 || dk != 0) && i >= 0 && j >= 0 && k >= 0 && i < n[0] &&
-            j < n[1] && k < n[2])
-          {
-            f(this->I.volume.Index(i, j, k),
-              static_cast<float>(this->I.volume.spacing * std::sqrt(di * di + dj * dj + dk * dk)));
-          }
-        }
-      }
-    }
-  }
   /// Where paths go from a voxel.
   enum class Onwards
   {
@@ -122,6 +102,7 @@ private:
   void Follow(HiddenMouth& mouth);
 
   const MouthImage& I;
+  const VoxelLattice L; ///< of the volume
   const double Hidden;  ///< mm that are not seen, at most
   const double Longest; ///< mm from the aorta
   const double Shortest;
@@ -135,33 +116,22 @@ template <typename Cost, typename Arrive>
 std::vector<Reached> MouthSearch::Paths(
   std::int64_t start, float reach, const Cost& cost, const Arrive& arrive)
 {
-  struct Entry
-  {
-    float distance;
-    std::int64_t voxel;
-    std::int32_t before;
-    bool operator<(const Entry& other) const
-    {
-      return this->distance != other.distance ? this->distance > other.distance
-                                              : this->voxel > other.voxel;
-    }
-  };
   std::vector<Reached> reached;
   std::vector<std::int64_t> touched{ start };
-  std::priority_queue<Entry> queue;
+  CheapestFirst queue;
   this->Best[start] = 0.0F;
   queue.push({ 0.0F, start, -1 });
   while (!queue.empty())
   {
-    const Entry top = queue.top();
+    const WaitingVoxel top = queue.top();
     queue.pop();
-    if (top.distance > this->Best[top.voxel])
+    if (top.cost > this->Best[top.voxel])
     {
       continue;
     }
     this->Best[top.voxel] = -1.0F; // done
     const auto place = static_cast<std::int32_t>(reached.size());
-    reached.push_back({ top.voxel, top.distance, top.before });
+    reached.push_back({ top.voxel, top.cost, top.before });
     const Onwards onwards = arrive(reached.back());
     if (onwards == Onwards::Nowhere)
     {
@@ -171,14 +141,14 @@ std::vector<Reached> MouthSearch::Paths(
     {
       continue;
     }
-    this->Neighbours(top.voxel,
+    this->L.Neighbours(top.voxel,
       [&](std::int64_t next, float step)
       {
         if (this->Best[next] < 0.0F)
         {
           return;
         }
-        const float total = top.distance + cost(next, step);
+        const float total = top.cost + cost(next, step);
         if (total <= reach && total < this->Best[next])
         {
           if (this->Best[next] == Infinite)
@@ -207,24 +177,12 @@ std::vector<std::vector<std::int64_t>> MouthSearch::Pieces()
   std::vector<std::vector<std::int64_t>> pieces;
   for (std::int64_t p = 0; p < voxels; ++p)
   {
-    if (this->Number[p] != 0 || !this->Orphaned(p))
-    {
-      continue;
-    }
-    std::vector<std::int64_t> piece{ p };
-    this->Number[p] = 1;
-    for (std::size_t n = 0; n < piece.size(); ++n)
-    {
-      this->Neighbours(piece[n],
-        [&](std::int64_t next, float)
-        {
-          if (this->Number[next] == 0 && this->Orphaned(next))
-          {
-            this->Number[next] = 1;
-            piece.push_back(next);
-          }
-        });
-    }
+    std::vector<std::int64_t> piece = this->L.Connected(p,
+      [&](std::int64_t next)
+      {
+        return this->Number[next] == 0 && this->Orphaned(next) &&
+          std::exchange(this->Number[next], 1) == 0;
+      });
     if (piece.size() >= least &&
       std::any_of(piece.begin(), piece.end(), [this](std::int64_t q) { return this->NearWall(q); }))
     {
@@ -321,7 +279,7 @@ std::vector<PieceEnd> MouthSearch::EndsOf(const std::vector<Reached>& piece)
   for (const Reached& r : piece)
   {
     bool greatest = true;
-    this->Neighbours(r.voxel,
+    this->L.Neighbours(r.voxel,
       [&](std::int64_t next, float)
       {
         const auto other = away.find(next);
@@ -391,7 +349,7 @@ std::optional<HiddenMouth> MouthSearch::MouthOf(const PieceEnd& end)
         return Onwards::Everywhere;
       }
       const Vector3 chord = this->World(here.voxel) - end.position;
-      const double angle = std::acos(std::clamp(end.outwards.dot(chord.normalized()), -1.0, 1.0));
+      const double angle = UnitAngle(end.outwards, chord.normalized());
       const double total = here.distance * (1.0 + angle * angle);
       if (angle < widest && total < least)
       {
@@ -405,9 +363,9 @@ std::optional<HiddenMouth> MouthSearch::MouthOf(const PieceEnd& end)
   {
     return std::nullopt;
   }
-  for (std::int32_t at = best; at >= 0; at = paths[static_cast<std::size_t>(at)].before)
+  for (std::int32_t at = best; at >= 0; at = paths[at].before)
   {
-    const std::int64_t voxel = paths[static_cast<std::size_t>(at)].voxel;
+    const std::int64_t voxel = paths[at].voxel;
     if (!mouth.way.empty())
     {
       const double step = (this->World(voxel) - this->World(mouth.way.back())).norm();
@@ -428,10 +386,9 @@ void MouthSearch::Follow(HiddenMouth& mouth)
   const std::vector<Reached> piece = this->Within(mouth.way.back(), Infinite);
   mouth.length += piece.back().distance;
   mouth.volume = static_cast<double>(piece.size()) * std::pow(this->I.volume.spacing, 3);
-  for (auto at = static_cast<std::int32_t>(piece.size()) - 1; at >= 0;
-       at = piece[static_cast<std::size_t>(at)].before)
+  for (auto at = static_cast<std::int32_t>(piece.size()) - 1; at >= 0; at = piece[at].before)
   {
-    mouth.along.push_back(piece[static_cast<std::size_t>(at)].voxel);
+    mouth.along.push_back(piece[at].voxel);
   }
   std::reverse(mouth.along.begin(), mouth.along.end());
 }

@@ -1,12 +1,16 @@
 #include "MaskTrees.h"
 
 #include "DistanceTransform.h"
+#include "GridIndex.h"
+#include "VoxelLattice.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -22,47 +26,11 @@ constexpr double LargestHeart = 260.0; ///< mm
 
 constexpr int MostNamed = 5; ///< pieces that are left out, one by one
 
-/// The part of the grid that is worked on: around all that is in the mask, with a voxel of air.
-struct Part
-{
-  std::array<int, 3> first;
-  std::array<int, 3> size;
-  std::int64_t Count() const
-  {
-    return static_cast<std::int64_t>(this->size[0]) * this->size[1] * this->size[2];
-  }
-  std::size_t Number(int i, int j, int k) const
-  {
-    return (static_cast<std::size_t>(k) * this->size[1] + j) * this->size[0] + i;
-  }
-  std::array<int, 3> Index(std::size_t number) const
-  {
-    const auto row = number / this->size[0];
-    return { static_cast<int>(number % this->size[0]), static_cast<int>(row % this->size[1]),
-      static_cast<int>(row / this->size[1]) };
-  }
-  template <typename Visit>
-  void Neighbours(std::size_t number, const Visit& visit) const
-  {
-    const std::array<int, 3> at = this->Index(number);
-    for (int k = std::max(0, at[2] - 1); k <= std::min(this->size[2] - 1, at[2] + 1); ++k)
-    {
-      for (int j = std::max(0, at[1] - 1); j <= std::min(this->size[1] - 1, at[1] + 1); ++j)
-      {
-        for (int i = std::max(0, at[0] - 1); i <= std::min(this->size[0] - 1, at[0] + 1); ++i)
-        {
-          visit(this->Number(i, j, k));
-        }
-      }
-    }
-  }
-};
-
 /// Voxels that hang together, and where they touch the aorta.
 struct Piece
 {
-  std::vector<std::size_t> voxels;
-  std::vector<std::size_t> contact;
+  std::vector<std::int64_t> voxels;
+  std::vector<std::int64_t> contact;
   double diagonal = 0.0;
   double reach = 0.0; ///< mm away from the aorta
 };
@@ -81,45 +49,36 @@ public:
     : Grid(grid)
     , Mask(mask)
     , Voxel(grid.spacing.prod())
+    , Box(grid)
   {
   }
 
   MaskTrees Run(double largestRadius, const ProgressCallback& progress);
 
 private:
-  Vector3 Place(std::size_t number) const;
-  std::size_t Whole(std::size_t number) const;
+  Vector3 Place(std::int64_t number) const { return this->Box.World(this->Box.Place(number)); }
+  std::size_t Whole(std::int64_t number) const;
   bool Crop();
   void CutAorta(double radius, const ProgressCallback& progress);
   std::vector<Piece> Pieces() const;
-  std::vector<std::size_t> LargestPatch(const std::vector<std::size_t>& voxels) const;
+  std::vector<std::int64_t> LargestPatch(const std::vector<std::int64_t>& voxels) const;
   void Question();
 
   const ImageGrid& Grid;
   const std::vector<unsigned char>& Mask;
   const double Voxel;
-  Part Box;
+  VoxelLattice Box; ///< what is worked on: around all that is in the mask, with a voxel of air
   std::vector<unsigned char> Inside; ///< of the box: 0 nothing, 1 vessel, 2 aorta
   std::vector<float> FromAorta;      ///< squared, mm^2; empty without one
   MaskTrees Result;
 };
 
-Vector3 Finder::Place(std::size_t number) const
+/// Number in the mask of a voxel of the box.
+std::size_t Finder::Whole(std::int64_t number) const
 {
-  const std::array<int, 3> at = this->Box.Index(number);
-  return this->Grid.IndexToWorld(this->Grid.extent[0] + this->Box.first[0] + at[0],
-    this->Grid.extent[2] + this->Box.first[1] + at[1],
-    this->Grid.extent[4] + this->Box.first[2] + at[2]);
-}
-
-std::size_t Finder::Whole(std::size_t number) const
-{
-  const std::array<int, 3> at = this->Box.Index(number);
-  const std::array<int, 6>& e = this->Grid.extent;
-  return (static_cast<std::size_t>(this->Box.first[2] + at[2]) * (e[3] - e[2] + 1) +
-           (this->Box.first[1] + at[1])) *
-    (e[1] - e[0] + 1) +
-    (this->Box.first[0] + at[0]);
+  const std::array<int, 3> at = this->Box.Place(number);
+  const std::array<int, 6>& e = this->Box.Grid.extent;
+  return GridOffset(this->Grid, e[0] + at[0], e[2] + at[1], e[4] + at[2]);
 }
 
 bool Finder::Crop()
@@ -151,12 +110,14 @@ bool Finder::Crop()
   {
     return false;
   }
+  ImageGrid box = this->Grid;
   for (int axis = 0; axis < 3; ++axis)
   {
-    this->Box.first[axis] = std::max(0, low[axis] - 1);
-    this->Box.size[axis] = std::min(size[axis] - 1, high[axis] + 1) - this->Box.first[axis] + 1;
+    box.extent[2 * axis] = e[2 * axis] + std::max(0, low[axis] - 1);
+    box.extent[2 * axis + 1] = e[2 * axis] + std::min(size[axis] - 1, high[axis] + 1);
   }
-  this->Inside.assign(static_cast<std::size_t>(this->Box.Count()), 0);
+  this->Box = VoxelLattice(box);
+  this->Inside.assign(GridSize(box), 0);
   for (std::size_t n = 0; n < this->Inside.size(); ++n)
   {
     this->Inside[n] = this->Mask[this->Whole(n)] != 0 ? 1 : 0;
@@ -167,7 +128,7 @@ bool Finder::Crop()
 void Finder::CutAorta(double radius, const ProgressCallback& progress)
 {
   const std::vector<unsigned char> body =
-    OpenWithBall(this->Inside.data(), this->Box.size, this->Grid.spacing, radius, progress);
+    OpenWithBall(this->Inside.data(), this->Box.Size, this->Grid.spacing, radius, progress);
   const auto count = std::count(body.begin(), body.end(), 1);
   const double ball = 4.0 / 3.0 * 3.14159265358979323846 * radius * radius * radius;
   if (static_cast<double>(count) * this->Voxel < LeastAorta * ball)
@@ -180,15 +141,16 @@ void Finder::CutAorta(double radius, const ProgressCallback& progress)
   {
     if (body[n] != 0)
     {
-      this->Box.Neighbours(n,
-        [&](std::size_t other)
+      this->Inside[n] = 2;
+      this->Box.Neighbours(static_cast<std::int64_t>(n),
+        [&](std::int64_t other, float)
         { this->Inside[other] = this->Inside[other] != 0 ? 2 : this->Inside[other]; });
     }
   }
   std::vector<unsigned char> outside(body.size());
   std::transform(this->Inside.begin(), this->Inside.end(), outside.begin(),
     [](unsigned char value) { return value == 2 ? 0 : 1; });
-  this->FromAorta = SquaredDistanceTransform(outside.data(), this->Box.size, this->Grid.spacing);
+  this->FromAorta = SquaredDistanceTransform(outside.data(), this->Box.Size, this->Grid.spacing);
   this->Result.aortaVolume =
     static_cast<double>(std::count(this->Inside.begin(), this->Inside.end(), 2)) * this->Voxel;
 }
@@ -199,18 +161,18 @@ std::vector<Piece> Finder::Pieces() const
   std::vector<char> done(this->Inside.size(), 0);
   for (std::size_t n = 0; n < this->Inside.size(); ++n)
   {
-    if (this->Inside[n] != 1 || done[n] != 0)
+    Piece piece;
+    piece.voxels = this->Box.Connected(static_cast<std::int64_t>(n),
+      [&](std::int64_t other)
+      { return this->Inside[other] == 1 && std::exchange(done[other], 1) == 0; });
+    if (piece.voxels.empty())
     {
       continue;
     }
-    Piece piece;
-    piece.voxels.push_back(n);
-    done[n] = 1;
-    Vector3 low = this->Place(n);
+    Vector3 low = this->Place(piece.voxels.front());
     Vector3 high = low;
-    for (std::size_t at = 0; at < piece.voxels.size(); ++at)
+    for (const std::int64_t voxel : piece.voxels)
     {
-      const std::size_t voxel = piece.voxels[at];
       const Vector3 place = this->Place(voxel);
       low = low.cwiseMin(place);
       high = high.cwiseMax(place);
@@ -219,16 +181,8 @@ std::vector<Piece> Finder::Pieces() const
         piece.reach = std::max(piece.reach, std::sqrt(static_cast<double>(this->FromAorta[voxel])));
       }
       bool touches = false;
-      this->Box.Neighbours(voxel,
-        [&](std::size_t other)
-        {
-          touches = touches || this->Inside[other] == 2;
-          if (this->Inside[other] == 1 && done[other] == 0)
-          {
-            done[other] = 1;
-            piece.voxels.push_back(other);
-          }
-        });
+      this->Box.Neighbours(
+        voxel, [&](std::int64_t other, float) { touches = touches || this->Inside[other] == 2; });
       if (touches)
       {
         piece.contact.push_back(voxel);
@@ -243,36 +197,15 @@ std::vector<Piece> Finder::Pieces() const
 }
 
 /// Of voxels those that hang together and are most.
-std::vector<std::size_t> Finder::LargestPatch(const std::vector<std::size_t>& voxels) const
+std::vector<std::int64_t> Finder::LargestPatch(const std::vector<std::int64_t>& voxels) const
 {
-  std::vector<std::size_t> sorted = voxels;
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<char> done(sorted.size(), 0);
-  std::vector<std::size_t> best;
-  for (std::size_t n = 0; n < sorted.size(); ++n)
+  std::set<std::int64_t> left(voxels.begin(), voxels.end());
+  std::vector<std::int64_t> best;
+  while (!left.empty())
   {
-    if (done[n] != 0)
-    {
-      continue;
-    }
-    std::vector<std::size_t> patch{ sorted[n] };
-    done[n] = 1;
-    for (std::size_t at = 0; at < patch.size(); ++at)
-    {
-      const std::size_t voxel = patch[at];
-      this->Box.Neighbours(voxel,
-        [&](std::size_t other)
-        {
-          const auto found = std::lower_bound(sorted.begin(), sorted.end(), other);
-          const auto k = static_cast<std::size_t>(found - sorted.begin());
-          if (found != sorted.end() && *found == other && done[k] == 0)
-          {
-            done[k] = 1;
-            patch.push_back(other);
-          }
-        });
-    }
-    best = patch.size() > best.size() ? patch : best;
+    std::vector<std::int64_t> patch = this->Box.Connected(
+      *left.begin(), [&](std::int64_t voxel) { return left.erase(voxel) != 0; });
+    best = patch.size() > best.size() ? std::move(patch) : best;
   }
   return best;
 }
@@ -306,15 +239,15 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
   this->CutAorta(largestRadius,
     progress ? [&](double fraction) { return progress(0.8 * fraction); } : ProgressCallback());
   this->Result.vessels.assign(this->Mask.size(), 0);
-  const auto place = [&](const std::vector<std::size_t>& voxels)
+  const auto place = [&](const std::vector<std::int64_t>& voxels)
   {
     Vector3 middle = Vector3::Zero();
-    for (const std::size_t voxel : voxels)
+    for (const std::int64_t voxel : voxels)
     {
       middle += this->Place(voxel) / static_cast<double>(voxels.size());
     }
     const auto nearest = std::min_element(voxels.begin(), voxels.end(),
-      [&](std::size_t a, std::size_t b) {
+      [&](std::int64_t a, std::int64_t b) {
         return (this->Place(a) - middle).squaredNorm() < (this->Place(b) - middle).squaredNorm();
       });
     return this->Place(*nearest);
@@ -322,7 +255,7 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
   std::vector<float> depth;
   if (!this->Result.hasAorta)
   {
-    depth = SquaredDistanceTransform(this->Inside.data(), this->Box.size, this->Grid.spacing);
+    depth = SquaredDistanceTransform(this->Inside.data(), this->Box.Size, this->Grid.spacing);
   }
   Vector3 low = Vector3::Constant(1e300);
   Vector3 high = -low;
@@ -355,9 +288,9 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
     one.seed = this->Result.hasAorta
       ? place(this->LargestPatch(piece.contact))
       : this->Place(*std::max_element(piece.voxels.begin(), piece.voxels.end(),
-          [&](std::size_t a, std::size_t b) { return depth[a] < depth[b]; }));
+          [&](std::int64_t a, std::int64_t b) { return depth[a] < depth[b]; }));
     this->Result.trees.push_back(one);
-    for (const std::size_t voxel : piece.voxels)
+    for (const std::int64_t voxel : piece.voxels)
     {
       this->Result.vessels[this->Whole(voxel)] = 1;
       low = low.cwiseMin(this->Place(voxel));

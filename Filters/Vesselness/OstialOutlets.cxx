@@ -1,9 +1,11 @@
 #include "OstialOutlets.h"
 
+#include "CheapestFirst.h"
 #include "DistanceTransform.h"
 #include "HiddenMouths.h"
 #include "Median.h"
 #include "MultiscaleVesselness.h"
+#include "VoxelLattice.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -11,7 +13,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <queue>
 
 namespace coronary
 {
@@ -312,16 +313,7 @@ void OutletSearch::March()
   this->Length.assign(voxels, -1.0f);
   this->Root.assign(voxels, -1);
   this->Before.assign(voxels, -1);
-  struct Entry
-  {
-    float cost;
-    std::int64_t voxel;
-    bool operator<(const Entry& other) const
-    {
-      return this->cost != other.cost ? this->cost > other.cost : this->voxel > other.voxel;
-    }
-  };
-  std::priority_queue<Entry> queue;
+  CheapestFirst queue;
   for (std::size_t p = 0; p < voxels; ++p)
   {
     if (this->Body[p] == 2)
@@ -333,58 +325,40 @@ void OutletSearch::March()
       queue.push({ 0.0f, index });
     }
   }
-  const std::array<int, 3>& n = this->Volume.size;
+  const VoxelLattice lattice(this->Volume.Grid());
   while (!queue.empty())
   {
-    const Entry top = queue.top();
+    const WaitingVoxel top = queue.top();
     queue.pop();
     const std::int64_t p = top.voxel;
     if (top.cost > cost[p])
     {
       continue;
     }
-    const std::array<int, 3> at = this->Volume.Place(p);
-    for (int dz = -1; dz <= 1; ++dz)
-    {
-      for (int dy = -1; dy <= 1; ++dy)
+    lattice.Neighbours(p,
+      [&](std::int64_t q, float step)
       {
-        for (int dx = -1; dx <= 1; ++dx)
+        if (this->Body[q])
         {
-          const std::array<int, 3> next{ at[0] + dx, at[1] + dy, at[2] + dz };
-          if (next[0] < 0 || next[1] < 0 || next[2] < 0 || next[0] >= n[0] || next[1] >= n[1] ||
-            next[2] >= n[2])
-          {
-            continue;
-          }
-          const std::int64_t q = this->Volume.Index(next[0], next[1], next[2]);
-          if (this->Body[q])
-          {
-            continue;
-          }
-          const auto step =
-            static_cast<float>(this->Volume.spacing * std::sqrt(dx * dx + dy * dy + dz * dz));
-          const float brightness = this->Brightness(q);
-          const float total = cost[p] + step / (0.01f + brightness * brightness * brightness);
-          if (!(total < cost[q]))
-          {
-            continue;
-          }
-          // The path may pass a narrowing, but no wall and gap.
-          const float length = this->Length[p] + step;
-          const float dark = this->Shade[p] + step * (1.0f - brightness);
-          if (length > longest || dark > 4.0f + 0.08f * std::max(0.0f, length - 10.0f))
-          {
-            continue;
-          }
-          cost[q] = total;
-          this->Shade[q] = dark;
-          this->Length[q] = length;
-          this->Root[q] = this->Root[p];
-          this->Before[q] = p;
-          queue.push({ total, q });
+          return;
         }
-      }
-    }
+        const float brightness = this->Brightness(q);
+        const float total = cost[p] + step / (0.01f + brightness * brightness * brightness);
+        // The path may pass a narrowing, but no wall and gap.
+        const float length = this->Length[p] + step;
+        const float dark = this->Shade[p] + step * (1.0f - brightness);
+        if (!(total < cost[q]) || length > longest ||
+          dark > 4.0f + 0.08f * std::max(0.0f, length - 10.0f))
+        {
+          return;
+        }
+        cost[q] = total;
+        this->Shade[q] = dark;
+        this->Length[q] = length;
+        this->Root[q] = this->Root[p];
+        this->Before[q] = p;
+        queue.push({ total, q });
+      });
   }
 }
 

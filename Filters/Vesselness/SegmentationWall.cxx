@@ -195,29 +195,15 @@ void VoxelSegmentation<T>::DropIslands()
   const auto least =
     static_cast<std::size_t>(std::ceil(this->Settings.smallestIsland / this->L.VoxelVolume()));
   constexpr unsigned char seen = 8;
-  std::vector<std::int64_t> piece;
   for (std::size_t p = 0; p < this->States.size(); ++p)
   {
-    if (this->States[p] != Vessel)
-    {
-      continue;
-    }
-    piece.assign(1, static_cast<std::int64_t>(p));
-    this->States[p] = seen;
-    for (std::size_t n = 0; n < piece.size(); ++n)
-    {
-      const std::array<int, 3> at = this->L.Place(piece[n]);
-      for (const VoxelLattice::Neighbour& next : this->L.Around)
+    const std::vector<std::int64_t> piece = this->L.Connected(static_cast<std::int64_t>(p),
+      [this](std::int64_t voxel)
       {
-        const std::int64_t q = piece[n] + next.offset;
-        if (this->L.Contains(at[0] + next.di, at[1] + next.dj, at[2] + next.dk) &&
-          this->States[q] == Vessel)
-        {
-          this->States[q] = seen;
-          piece.push_back(q);
-        }
-      }
-    }
+        const bool vessel = this->States[voxel] == Vessel;
+        this->States[voxel] = vessel ? seen : this->States[voxel];
+        return vessel;
+      });
     if (piece.size() < least)
     {
       for (const std::int64_t q : piece)

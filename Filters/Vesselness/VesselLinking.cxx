@@ -1,5 +1,8 @@
 #include "VesselLinking.h"
 
+#include "BifurcationFit.h"
+#include "CheapestFirst.h"
+#include "CrossFrame.h"
 #include "FittedOdds.h"
 #include "Median.h"
 #include "SparseVoxels.h"
@@ -10,7 +13,7 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <queue>
+#include <utility>
 
 namespace coronary
 {
@@ -56,11 +59,6 @@ constexpr std::array<FittedSign, NumberOfLinkSigns> Signs{ {
   { "clear", 0.81 },
 } };
 
-double Angle(const Vector3& a, const Vector3& b)
-{
-  return std::acos(std::clamp(a.dot(b), -1.0, 1.0));
-}
-
 /// Voxels that hang together, with distances within them.
 class VoxelPiece
 {
@@ -75,7 +73,7 @@ public:
   std::size_t Size() const { return this->Voxels.size(); }
   const std::vector<std::int64_t>& All() const { return this->Voxels; }
   bool Has(std::int64_t voxel) const { return this->Number.Get(this->L.Place(voxel)) >= 0; }
-  std::int64_t Voxel(std::int32_t n) const { return this->Voxels[static_cast<std::size_t>(n)]; }
+  std::int64_t Voxel(std::int32_t n) const { return this->Voxels[n]; }
   Vector3 Position(std::int32_t n) const { return this->L.World(this->L.Place(this->Voxel(n))); }
 
   /// Calls f(number, mm) for the neighbours that belong to the piece.
@@ -103,45 +101,35 @@ public:
   };
   std::vector<Reached> Around(std::int32_t start, float reach) const
   {
-    struct Entry
-    {
-      float distance;
-      std::int32_t number;
-      std::int32_t before;
-      bool operator<(const Entry& other) const
-      {
-        return this->distance != other.distance ? this->distance > other.distance
-                                                : this->number > other.number;
-      }
-    };
     std::vector<Reached> reached;
     thread_local std::vector<char> done; // 0 between calls
     done.resize(std::max(done.size(), this->Size()), 0);
-    std::priority_queue<Entry> queue;
+    CheapestFirst queue;
     queue.push({ 0.0F, start, -1 });
     while (!queue.empty())
     {
-      const Entry top = queue.top();
+      const WaitingVoxel top = queue.top();
       queue.pop();
-      if (done[static_cast<std::size_t>(top.number)] != 0)
+      if (done[top.voxel] != 0)
       {
         continue;
       }
-      done[static_cast<std::size_t>(top.number)] = 1;
+      done[top.voxel] = 1;
+      const auto number = static_cast<std::int32_t>(top.voxel);
       const auto place = static_cast<std::int32_t>(reached.size());
-      reached.push_back({ top.number, top.distance, top.before });
-      this->Neighbours(top.number,
+      reached.push_back({ number, top.cost, top.before });
+      this->Neighbours(number,
         [&](std::int32_t next, float length)
         {
-          if (top.distance + length <= reach && done[static_cast<std::size_t>(next)] == 0)
+          if (top.cost + length <= reach && done[next] == 0)
           {
-            queue.push({ top.distance + length, next, place });
+            queue.push({ top.cost + length, next, place });
           }
         });
     }
     for (const Reached& r : reached)
     {
-      done[static_cast<std::size_t>(r.number)] = 0;
+      done[r.number] = 0;
     }
     return reached;
   }
@@ -297,7 +285,7 @@ std::vector<std::vector<std::int64_t>> Linker::Pieces(
             if (this->I.tube(p) >= LeastTube && this->I.share(p) <= TooBright &&
               this->I.couldBelong(p))
             {
-              found[static_cast<std::size_t>(slice)].push_back(p);
+              found[slice].push_back(p);
             }
           }
         }
@@ -308,11 +296,6 @@ std::vector<std::vector<std::int64_t>> Linker::Pieces(
   {
     all.insert(all.end(), slice.begin(), slice.end());
   }
-  const auto place = [&](std::int64_t voxel) -> std::ptrdiff_t
-  {
-    const auto at = std::lower_bound(all.begin(), all.end(), voxel);
-    return at != all.end() && *at == voxel ? at - all.begin() : -1;
-  };
   std::vector<char> seen(all.size(), 0);
   std::vector<std::vector<std::int64_t>> pieces;
   // A tube of two voxels' area and the least length has this many.
@@ -320,25 +303,12 @@ std::vector<std::vector<std::int64_t>> Linker::Pieces(
     static_cast<std::size_t>(this->Settings.leastPiece / std::cbrt(this->L.VoxelVolume()) * 1.5);
   for (std::size_t n = 0; n < all.size(); ++n)
   {
-    if (seen[n] != 0)
-    {
-      continue;
-    }
-    std::vector<std::int64_t> piece{ all[n] };
-    seen[n] = 1;
-    for (std::size_t m = 0; m < piece.size(); ++m)
-    {
-      this->L.Neighbours(piece[m],
-        [&](std::int64_t next, float)
-        {
-          const std::ptrdiff_t at = place(next);
-          if (at >= 0 && seen[static_cast<std::size_t>(at)] == 0)
-          {
-            seen[static_cast<std::size_t>(at)] = 1;
-            piece.push_back(next);
-          }
-        });
-    }
+    std::vector<std::int64_t> piece = this->L.Connected(all[n],
+      [&](std::int64_t voxel)
+      {
+        const auto at = std::lower_bound(all.begin(), all.end(), voxel);
+        return at != all.end() && *at == voxel && std::exchange(seen[at - all.begin()], 1) == 0;
+      });
     if (piece.size() >= least)
     {
       std::sort(piece.begin(), piece.end());
@@ -437,7 +407,7 @@ std::vector<VesselEnd> Linker::EndsOf(
   std::vector<float> away(piece.Size(), 0.0F);
   for (const VoxelPiece::Reached& r : distances)
   {
-    away[static_cast<std::size_t>(r.number)] = r.distance;
+    away[r.number] = r.distance;
   }
   std::vector<std::int32_t> tips;
   for (std::size_t n = 0; n < piece.Size(); ++n)
@@ -447,7 +417,7 @@ std::vector<VesselEnd> Linker::EndsOf(
     piece.Neighbours(here,
       [&](std::int32_t next, float)
       {
-        const float other = away[static_cast<std::size_t>(next)];
+        const float other = away[next];
         greatest = greatest && (other < away[n] || (other == away[n] && next > here));
       });
     if (greatest)
@@ -459,8 +429,8 @@ std::vector<VesselEnd> Linker::EndsOf(
   std::sort(tips.begin(), tips.end(),
     [&](std::int32_t a, std::int32_t b)
     {
-      const float da = away[static_cast<std::size_t>(a)];
-      const float db = away[static_cast<std::size_t>(b)];
+      const float da = away[a];
+      const float db = away[b];
       return da != db ? da > db : a < b;
     });
   std::vector<VesselEnd> ends;
@@ -488,10 +458,9 @@ double Linker::Growth(const VoxelPiece& piece, const VesselEnd& end) const
 {
   const std::vector<VoxelPiece::Reached> reached = piece.Around(end.number, 45.0F);
   std::vector<std::int32_t> way;
-  for (auto at = static_cast<std::int32_t>(reached.size()) - 1; at >= 0;
-       at = reached[static_cast<std::size_t>(at)].before)
+  for (auto at = static_cast<std::int32_t>(reached.size()) - 1; at >= 0; at = reached[at].before)
   {
-    way.push_back(reached[static_cast<std::size_t>(at)].number);
+    way.push_back(reached[at].number);
   }
   std::reverse(way.begin(), way.end());
   std::vector<double> near;
@@ -565,15 +534,6 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
   const double gap = (target - end.position).norm();
   const double reach = 0.75 * gap + 3.0;
   const Vector3 middle = 0.5 * (target + end.position);
-  struct Entry
-  {
-    float cost;
-    std::int64_t voxel;
-    bool operator<(const Entry& other) const
-    {
-      return this->cost != other.cost ? this->cost > other.cost : this->voxel > other.voxel;
-    }
-  };
   // A voxel is looked at once, however many neighbours lead to it.
   struct Known
   {
@@ -593,13 +553,13 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
     high[axis] = std::max(high[axis], startAt[axis]);
   }
   SparseVoxels<Known> known(low, high, { -1, Unreached, -1.0F, false });
-  std::priority_queue<Entry> queue;
+  CheapestFirst queue;
   known.At(startAt) = { -1, 0.0F, 1.0F, false };
   queue.push({ 0.0F, start });
   std::int64_t arrived = -1;
   while (!queue.empty())
   {
-    const Entry top = queue.top();
+    const WaitingVoxel top = queue.top();
     queue.pop();
     const std::array<int, 3> at = this->L.Place(top.voxel);
     Known& here = known.At(at);
@@ -669,8 +629,8 @@ bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& t
 bool Linker::Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const
 {
   const double gap = (end.position - tip.position).norm();
-  const Vector3 a = tip.position + gap / 3.0 * tip.outwards;
-  const Vector3 b = end.position + gap / 3.0 * end.outwards;
+  const BezierCurve curve{ tip.position, tip.position + gap / 3.0 * tip.outwards,
+    end.position + gap / 3.0 * end.outwards, end.position };
   // An end's axis may begin outside of its voxels: the way begins within both.
   constexpr double inside = 1.5; // mm
   const double more = gap > 0.0 ? inside / gap : 0.0;
@@ -690,9 +650,7 @@ bool Linker::Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link)
     {
       return end.position - gap * (t - 1.0) * end.outwards;
     }
-    const double u = 1.0 - t;
-    return u * u * u * tip.position + 3.0 * u * u * t * a + 3.0 * u * t * t * b +
-      t * t * t * end.position;
+    return BezierPoint(curve, t);
   };
   for (int step = 0; step <= steps; ++step)
   {
@@ -743,8 +701,8 @@ bool Linker::Strays(
 {
   const Vector3 chord = tip.position - end.position;
   const double gap = chord.norm();
-  if (tip.root > 0.0 || gap < LeastFacing || Angle(end.outwards, chord / gap) > Facing ||
-    Angle(tip.outwards, -chord / gap) > Facing)
+  if (tip.root > 0.0 || gap < LeastFacing || UnitAngle(end.outwards, chord / gap) > Facing ||
+    UnitAngle(tip.outwards, -chord / gap) > Facing)
   {
     return false;
   }
@@ -837,8 +795,8 @@ void Linker::Describe(
     wall ? 1.0 : 0.0,
     link.unseen / 6.0,
     std::max(0.0, link.unseen - FreeGap) / 8.0,
-    chordWeight * turn(Angle(end.outwards, chord), 0.7),
-    wall ? 0.0 : chordWeight * turn(Angle(tip->outwards, -chord), 0.7),
+    chordWeight * turn(UnitAngle(end.outwards, chord), 0.7),
+    wall ? 0.0 : chordWeight * turn(UnitAngle(tip->outwards, -chord), 0.7),
     std::max(0.0, -wider - 0.7),
     // The tip may lie in the lesion: then what follows is wider, but not twice as wide.
     wall ? 0.0 : std::max(0.0, wider - 0.25),
@@ -896,7 +854,7 @@ void Linker::DescribeAll(
     {
       for (std::int64_t n = first; n < last; ++n)
       {
-        const auto& [voxels, description] = unknown[static_cast<std::size_t>(n)];
+        const auto& [voxels, description] = unknown[n];
         std::optional<Orphan> orphan = this->Describe(*voxels);
         if (orphan)
         {
@@ -921,7 +879,7 @@ std::vector<Vector3> Linker::Behind(const VoxelPiece& piece, const VesselEnd& en
   const std::vector<VoxelPiece::Reached> reached = piece.Around(end.number, reach);
   for (std::size_t n = 0; n < reached.size(); n += stride)
   {
-    const std::int64_t voxel = piece.All()[static_cast<std::size_t>(reached[n].number)];
+    const std::int64_t voxel = piece.All()[reached[n].number];
     places.push_back(this->L.World(this->L.Place(voxel)));
   }
   return places;
@@ -981,7 +939,8 @@ VesselLink Linker::BestLink(
       const double gap = chord.norm();
       if (gap > this->Settings.longestGap ||
         (gap > 4.0 &&
-          (Angle(end.outwards, chord / gap) > 1.2 || Angle(tip.outwards, -chord / gap) > 1.2)))
+          (UnitAngle(end.outwards, chord / gap) > 1.2 ||
+            UnitAngle(tip.outwards, -chord / gap) > 1.2)))
       {
         continue;
       }
@@ -1002,7 +961,7 @@ VesselLink Linker::BestLink(
           }
           const Vector3 chord = this->L.World(place) - end.position;
           const double gap = std::max(1e-6, chord.norm());
-          const double angle = Angle(end.outwards, chord / gap);
+          const double angle = UnitAngle(end.outwards, chord / gap);
           const double cost = gap * (1.0 + angle * angle);
           if ((angle < 0.9 || gap < 2.5) && cost < least)
           {
@@ -1062,8 +1021,7 @@ std::vector<VesselLink> Linker::Run(
     {
       for (std::int64_t n = first; n < last; ++n)
       {
-        best[static_cast<std::size_t>(n)] = this->BestLink(
-          *orphans[static_cast<std::size_t>(n)], tips, considered[static_cast<std::size_t>(n)]);
+        best[n] = this->BestLink(*orphans[n], tips, considered[n]);
       }
     },
     [&](double fraction) { return !progress || progress(0.5 + 0.5 * fraction); });

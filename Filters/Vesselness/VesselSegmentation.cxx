@@ -11,6 +11,7 @@
 #include <queue>
 #include <stdexcept>
 #include <unordered_set>
+#include <utility>
 
 namespace coronary
 {
@@ -22,7 +23,7 @@ BloodWindow VoxelSegmentation<T>::MeasureWindow(const std::vector<std::array<int
   constexpr double near = 2.5;
   constexpr double far = 12.0;
   std::vector<double> bloods;
-  std::vector<float> values;
+  std::vector<double> values;
   bool darker = false;
   for (const std::array<int, 3>& place : places)
   {
@@ -79,7 +80,7 @@ double VoxelSegmentation<T>::MeasureTubular(const std::vector<std::array<int, 3>
   constexpr double radius = 20.0;
   constexpr double percentile = 0.995;
   constexpr double share = 0.6;
-  std::vector<float> values;
+  std::vector<double> values;
   for (const std::array<int, 3>& place : places)
   {
     this->L.Ball(place, radius,
@@ -675,25 +676,15 @@ void VoxelSegmentation<T>::KeepConnected()
 {
   const SparseVoxels<std::int32_t> numbers = this->MemberNumbers();
   constexpr unsigned char connected = 8;
-  std::vector<std::int64_t> stack;
   const auto flood = [&](std::int64_t from)
   {
-    stack.assign(1, from);
-    this->States[from] = connected;
-    while (!stack.empty())
-    {
-      const std::int64_t at = stack.back();
-      stack.pop_back();
-      this->L.Neighbours(at,
-        [&](std::int64_t next, float)
-        {
-          if (this->States[next] == Vessel)
-          {
-            this->States[next] = connected;
-            stack.push_back(next);
-          }
-        });
-    }
+    this->L.Connected(from,
+      [this](std::int64_t voxel)
+      {
+        const bool vessel = this->States[voxel] == Vessel;
+        this->States[voxel] = vessel ? connected : this->States[voxel];
+        return vessel;
+      });
   };
   // In the order of their paths: what is before a member is decided when it comes.
   for (const Member& m : this->Members)

@@ -49,6 +49,15 @@ struct WorldVolume
   {
     return this->axes.transpose() * (world - this->corner) / this->spacing;
   }
+  ImageGrid Grid() const
+  {
+    ImageGrid grid;
+    grid.extent = { 0, this->size[0] - 1, 0, this->size[1] - 1, 0, this->size[2] - 1 };
+    grid.origin = this->corner;
+    grid.spacing.setConstant(this->spacing);
+    grid.direction = this->axes;
+    return grid;
+  }
   /// Trilinear; Nothing outside.
   float At(const Vector3& world) const;
 };

@@ -58,7 +58,7 @@ std::pair<double, double> ErrorsAt(double h, bool secondOrder, const Vector3& as
   const double speed = 2.5;
   FastMarching marching(
     region, std::vector<float>(region.Size(), static_cast<float>(speed)), settings);
-  EXPECT_TRUE(marching.March({ { Vector3::Zero(), 3 } }));
+  marching.March({ { Vector3::Zero(), 3 } });
   double greatest = 0.0;
   double sum = 0.0;
   double lengthError = 0.0;
@@ -218,7 +218,7 @@ TEST(FastMarching, FullBoxAndRegionAreTheSame)
     settings.spacing = Vector3(0.3, 0.4, 0.5);
     settings.lengths = lengths;
     FastMarching marching(region, speed, settings);
-    EXPECT_TRUE(marching.March({ { Vector3(3.2, 4, 5), 4 }, { Vector3(45, 40, 33), 7 } }));
+    marching.March({ { Vector3(3.2, 4, 5), 4 }, { Vector3(45, 40, 33), 7 } });
     EXPECT_EQ(marching.Length().size(), lengths ? region.Size() : 0U);
     for (int k = 0; k < n; ++k)
     {
@@ -306,7 +306,7 @@ TEST(FastMarching, BendsAroundCornersAndStopsAtGaps)
   settings.spacing = Vector3(0.5, 0.5, 2.0);
   settings.sourceRadius = 1e-9;
   FastMarching marching(region, std::vector<float>(region.Size(), 1.0F), settings);
-  EXPECT_TRUE(marching.March({ { Vector3(0, 0, 0), 0 } }));
+  marching.March({ { Vector3(0, 0, 0), 0 } });
   EXPECT_NEAR(marching.Arrival()[region.NumberOf(10, 14, 0)], 12.0, 0.6);
   EXPECT_NEAR(marching.Length()[region.NumberOf(10, 14, 0)], 12.0, 0.6);
   EXPECT_TRUE(std::isinf(marching.Arrival()[region.NumberOf(10, 16, 0)]));
@@ -330,29 +330,15 @@ TEST(FastMarching, SourcesShareTheRegion)
     });
 }
 
-TEST(FastMarching, LimitsAndMemory)
+TEST(FastMarching, RefusalsAndMemory)
 {
   const VoxelRegion region =
     MakeRegion({ 0, 63, 0, 63, 0, 63 }, [](int, int, int) { return true; });
   FastMarchingSettings settings;
-  settings.stopAtArrival = 10.0;
   FastMarching marching(region, std::vector<float>(region.Size(), 1.0F), settings);
-  EXPECT_FALSE(marching.March({ { Vector3(32, 32, 32), 0 } }));
-  EXPECT_TRUE(std::isinf(marching.Arrival()[0]));
-  EXPECT_EQ(marching.Source()[0], FastMarching::noSource);
+  marching.March({ { Vector3(32, 32, 32), 0 } });
   EXPECT_NEAR(marching.Arrival()[region.NumberOf(32, 32, 41)], 9.0, 0.05);
-
-  settings = {};
-  std::uint32_t seen = 0;
-  settings.goOn = [&](std::uint32_t reached)
-  {
-    seen = reached;
-    return reached < 50000;
-  };
-  FastMarching limited(region, std::vector<float>(region.Size(), 1.0F), settings);
-  EXPECT_FALSE(limited.March({ { Vector3(32, 32, 32), 0 } }));
-  EXPECT_LT(seen, 70000u);
-  EXPECT_LE(limited.MemorySize(), 24u * region.Size());
+  EXPECT_LE(marching.MemorySize(), 24u * region.Size());
 
   FastMarching cancelled(region, std::vector<float>(region.Size(), 1.0F), FastMarchingSettings{},
     [](double) { return false; });
@@ -360,7 +346,6 @@ TEST(FastMarching, LimitsAndMemory)
   std::vector<float> speed(region.Size(), 1.0F);
   speed[17] = 0.0F;
   EXPECT_THROW(FastMarching(region, speed, FastMarchingSettings{}), std::invalid_argument);
-  settings = {};
   settings.spacing[1] = 0.0;
   EXPECT_THROW(
     FastMarching(region, std::vector<float>(region.Size(), 1.0F), settings), std::invalid_argument);

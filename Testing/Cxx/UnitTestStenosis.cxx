@@ -330,15 +330,15 @@ TEST(StenosisGrading, BridgedLesionsSaySo)
   VesselTree tree = LineWith(1.5);
   const std::vector<VesselPath> paths = VesselPaths(tree);
   const Measured measured = MeasureAll(tube, tree);
-  std::vector<unsigned char> bridged(tree.points.size(), 0);
-  std::vector<double> confidence(tree.points.size(), 1.0);
+  const StenosisGrading plain = GradeStenoses(tree, paths, measured.lumen);
+  tree.bridged.assign(tree.points.size(), 0);
+  tree.bridgeConfidence.assign(tree.points.size(), 1.0);
   for (std::size_t p = 110; p < 130; ++p)
   {
-    bridged[p] = 1;
-    confidence[p] = 0.6;
+    tree.bridged[p] = 1;
+    tree.bridgeConfidence[p] = 0.6;
   }
-  const StenosisGrading plain = GradeStenoses(tree, paths, measured.lumen);
-  const StenosisGrading grading = GradeStenoses(tree, paths, measured.lumen, bridged, confidence);
+  const StenosisGrading grading = GradeStenoses(tree, paths, measured.lumen);
   ASSERT_EQ(grading.lesions.size(), 1U);
   ASSERT_EQ(plain.lesions.size(), 1U);
   EXPECT_TRUE(grading.lesions.front().bridged);
@@ -355,8 +355,7 @@ TEST(StenosisGrading, NoLumenIsARangeAsWell)
   tree.bridged.assign(tree.points.size(), 0);
   std::fill(tree.bridged.begin() + 100, tree.bridged.begin() + 140, 1);
   const Measured measured = MeasureAll(tube, tree);
-  const StenosisGrading grading =
-    GradeStenoses(tree, VesselPaths(tree), measured.lumen, tree.bridged);
+  const StenosisGrading grading = GradeStenoses(tree, VesselPaths(tree), measured.lumen);
   ASSERT_EQ(grading.lesions.size(), 1U);
   const Stenosis& lesion = grading.lesions.front();
   EXPECT_EQ(lesion.kind, LesionKind::Occluded);
@@ -539,19 +538,10 @@ TEST(StenosisGrading, RefusesWhatItCanNotUse)
   const std::vector<VesselPath> paths = VesselPaths(tree);
   ExpectRefusal([&] { MeasureLumenLevels(tree, paths, tube.image, 0.0); }, "blur");
   const LumenLevels levels = MeasureLumenLevels(tree, paths, tube.image, Blur);
-  CalciumSettings calcium;
-  calcium.wallDistance = 0.0;
-  ExpectRefusal([&] { FindCalcium(tree, tube.image, levels, calcium); }, "wallDistance");
-  RefinementSettings refinement;
-  refinement.wavelength = 0.0;
-  ExpectRefusal(
-    [&] { RefineLumen(tree, paths, tube.image, levels, {}, Blur, refinement); }, "wavelength");
-  GradingSettings grading;
-  grading.leastDegree = 0.0;
-  ExpectRefusal([&] { GradeStenoses(tree, paths, {}, {}, {}, grading); }, "leastDegree");
+  ExpectRefusal([&] { RefineLumen(tree, paths, tube.image, levels, {}, 0.0); }, "blur");
   ExpectRefusal([&] { GradeStenoses(tree, paths, {}); }, "one value a point");
   ExpectThrown<Cancelled>([&]
-    { RefineLumen(tree, paths, tube.image, levels, {}, Blur, {}, [](double) { return false; }); },
+    { RefineLumen(tree, paths, tube.image, levels, {}, Blur, [](double) { return false; }); },
     "cancelled");
 }
 

@@ -13,8 +13,7 @@ MeasuredLesions MeasureLesions(const VesselTree& tree, const ScalarImage& image,
   MeasuredLesions measured{ MeasureTreeLumen(tree, paths, image, blur), {}, {} };
   const VesselTree& refined = measured.refined = WithLumen(tree, measured.lumen);
   MeasureCalcium(measured.calcium, refined, paths, image, measured.levels, blur);
-  measured.grading =
-    GradeStenoses(refined, paths, measured.lumen, refined.bridged, refined.bridgeConfidence);
+  measured.grading = GradeStenoses(refined, paths, measured.lumen);
   return measured;
 }
 

@@ -38,10 +38,7 @@ struct LesionMatch
   /// 1 mm or more is left: wide enough to be measured by its edge.
   bool Wide() const { return this->truth.leastRadius >= 0.5; }
   /// Healthy, the vessel is as wide as those that are graded.
-  bool Graded() const
-  {
-    return this->truth.referenceRadius >= GradingSettings().leastReferenceRadius;
-  }
+  bool Graded() const { return this->truth.referenceRadius >= LeastGradedRadius; }
 };
 
 /// Each true lesion with the nearest measured one within 6 mm that is not another's.

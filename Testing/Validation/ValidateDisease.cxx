@@ -678,8 +678,7 @@ bool PrintLesions(const std::vector<Row>& rows, const Options& options)
               "within %.0f points | mean error | in range | not listed | not reached | narrow | in "
               "range | mean error | not listed | not reached | thin | in range | not reached "
               "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-    100.0 * GradedDegree, 2.0 * GradingSettings().leastReferenceRadius,
-    100.0 * DegreeTally::LargestError);
+    100.0 * GradedDegree, 2.0 * LeastGradedRadius, 100.0 * DegreeTally::LargestError);
   const auto print =
     [](const char* name, const DegreeTally& w, const DegreeTally& n, const DegreeTally& t)
   {
