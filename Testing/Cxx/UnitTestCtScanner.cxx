@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <utility>
 
 using namespace coronary;
@@ -16,6 +17,7 @@ using namespace coronary;
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
+constexpr double FirstAngle = 0.3; ///< of the tube in the first view, rad
 
 /// The VCT with cells `factor` times as wide and high, and as many fewer views.
 ScannerSettings Coarse(int factor)
@@ -30,9 +32,9 @@ ScannerSettings Coarse(int factor)
   return s;
 }
 
-/// Tubes along z, reconstructed in the central plane; 1 is water.
-std::vector<float> Reconstruct(
-  const ScannerSettings& settings, const std::vector<ScannedTube>& tubes, const ImageGrid& grid)
+/// Tubes along z that may move from view to view, reconstructed in the central plane; 1 is water.
+std::vector<float> Reconstruct(const ScannerSettings& settings,
+  const std::function<std::vector<ScannedTube>(int view)>& tubesOf, const ImageGrid& grid)
 {
   const ScannerPhysics physics(settings);
   const ScannerProjector projector(settings);
@@ -42,9 +44,9 @@ std::vector<float> Reconstruct(
   ViewPaths paths;
   for (int v = 0; v < settings.HalfScanViews(); ++v)
   {
-    angles.push_back(0.3 + v * settings.ViewAngle());
+    angles.push_back(FirstAngle + v * settings.ViewAngle());
     projector.Clear(paths);
-    projector.Add(tubes, {}, { angles.back(), Vector3::Zero() }, paths);
+    projector.Add(tubesOf(v), {}, { angles.back(), Vector3::Zero() }, paths);
     std::vector<float>& view = views.emplace_back(paths[0].size());
     physics.Measure({ paths[0].data(), paths[1].data(), paths[2].data() }, 1.0,
       MixBits(static_cast<std::uint64_t>(v)), view.data());
@@ -55,6 +57,13 @@ std::vector<float> Reconstruct(
     static_cast<std::size_t>(e[1] - e[0] + 1) * (e[3] - e[2] + 1) * (e[5] - e[4] + 1));
   reconstruction.BackProject(angles, views, Vector3::Zero(), grid, image.data(), {});
   return image;
+}
+
+std::vector<float> Reconstruct(
+  const ScannerSettings& settings, const std::vector<ScannedTube>& tubes, const ImageGrid& grid)
+{
+  return Reconstruct(
+    settings, [&](int) { return tubes; }, grid);
 }
 
 ImageGrid Plane(int size, double spacing)
@@ -69,6 +78,24 @@ ImageGrid Plane(int size, double spacing)
 ScannedTube Cylinder(double x, double y, double radius, const MaterialAmounts& amounts)
 {
   return { { x, y, -200.0 }, { x, y, 200.0 }, radius, radius, false, amounts };
+}
+
+/// What cells, focal spot, rays and straight lines between columns leave of a frequency, and a wire.
+/// @param share  of Nyquist's frequency
+double DesignedModulation(const ScannerSettings& s, double share, double wire)
+{
+  const double pitch = s.ColumnPitch() * s.sourceToAxis;
+  const double f = share * 0.5 / pitch;
+  const double width = s.channelPitch * s.fill;
+  const double spot = s.focalSpot * (s.sourceToDetector / s.sourceToAxis - 1.0) / 2.3548;
+  // Three neighbours, two rays a cell, straight lines, a disc.
+  const double blur = (width * width / 12.0 + spot * spot) / (s.channelPitch * s.channelPitch);
+  const double cells = 1.0 - blur * (1.0 - std::cos(Pi * share));
+  const double rays = std::cos(0.25 * Pi * share);
+  const double line = share > 0.0 ? std::sin(0.5 * Pi * share) / (0.5 * Pi * share) : 1.0;
+  const double u = 2.0 * Pi * f * wire;
+  const double disc = u > 0.0 ? 2.0 * std::cyl_bessel_j(1.0, u) / u : 1.0;
+  return HalfScanReconstruction::Window(s.kernel, share) * line * line * cells * rays * disc;
 }
 
 /// A ray of ScannerProjector: sub-ray `a`, `b` of 2 x 2 in a cell.
@@ -381,21 +408,7 @@ TEST(CtScanner, KernelsResolveWhatTheyAreDesignedFor)
       return sum;
     };
     // The lowest frequencies need a wider image: the ratio of two others is compared.
-    const auto designed = [&](double share)
-    {
-      const double f = share * 0.5 / pitch;
-      const double sinc = std::sin(Pi * f * pitch) / (Pi * f * pitch);
-      const double width = settings.channelPitch * settings.fill;
-      const double spot =
-        settings.focalSpot * (settings.sourceToDetector / settings.sourceToAxis - 1.0) / 2.3548;
-      const double blur =
-        (width * width / 12.0 + spot * spot) / (settings.channelPitch * settings.channelPitch);
-      // Three neighbours, two rays a cell, a disc.
-      const double cells = 1.0 - blur * (1.0 - std::cos(Pi * share));
-      const double rays = std::cos(0.25 * Pi * share);
-      const double disc = 2.0 * std::cyl_bessel_j(1.0, 2.0 * Pi * f * 0.25) / (2.0 * Pi * f * 0.25);
-      return HalfScanReconstruction::Window(kernel, share) * sinc * sinc * cells * rays * disc;
-    };
+    const auto designed = [&](double share) { return DesignedModulation(settings, share, 0.25); };
     const double unit = modulation(0.15 * 0.5 / pitch) / designed(0.15);
     for (const double share : { 0.3, 0.45, 0.6, 0.75 })
     {
@@ -403,6 +416,91 @@ TEST(CtScanner, KernelsResolveWhatTheyAreDesignedFor)
         << static_cast<int>(kernel) << ' ' << share;
     }
   }
+}
+
+TEST(CtScanner, WhatMovesIsASumOverItsPlaces)
+{
+  // A wire that goes 6 mm along a line in a half scan, against the filtered line integrals of a point,
+  // summed view by view without detector, voxels or interpolation.
+  ScannerSettings settings;
+  settings.rows = 2;
+  settings.kernel = ReconstructionKernel::Soft;
+  constexpr double radius = 0.3;
+  const int count = settings.HalfScanViews();
+  const auto placeOf = [&](int view)
+  {
+    const double u = static_cast<double>(view) / (count - 1) - 0.5;
+    return Eigen::Vector2d(14.0 + 6.0 * u, -11.0 + 2.0 * u);
+  };
+  constexpr int size = 56;
+  ImageGrid grid = Plane(size, 0.4);
+  grid.origin += Vector3(14.0, -11.0, 0.0);
+  const std::vector<float> image = Reconstruct(
+    settings,
+    [&](int view) -> std::vector<ScannedTube>
+    {
+      const Eigen::Vector2d at = placeOf(view);
+      return { Cylinder(at[0], at[1], radius, { 1.0f, 0.0f, 0.0f }) };
+    },
+    grid);
+
+  // The point's kernel over the angle from it, in steps of a twentieth of a column.
+  const double pitch = settings.ColumnPitch();
+  constexpr int fine = 20;
+  std::vector<double> kernel(80 * fine);
+  for (std::size_t n = 0; n < kernel.size(); ++n)
+  {
+    const double angle = static_cast<double>(n) / fine * pitch;
+    constexpr int steps = 600;
+    for (int k = 0; k < steps; ++k)
+    {
+      const double share = (k + 0.5) / steps;
+      const double f = 0.5 * share / pitch;
+      kernel[n] += 2.0 * f * DesignedModulation(settings, share, radius) *
+        std::cos(2.0 * Pi * f * angle) * 0.5 / pitch / steps;
+    }
+  }
+  const HalfScanReconstruction reconstruction(settings);
+  std::vector<double> sum(image.size());
+  for (int v = 0; v < count; ++v)
+  {
+    const double beta = FirstAngle + v * settings.ViewAngle();
+    const Eigen::Vector2d tube =
+      settings.sourceToAxis * Eigen::Vector2d(std::cos(beta), std::sin(beta));
+    const auto fanAngle = [&](const Eigen::Vector2d& at)
+    {
+      const Eigen::Vector2d to = at - tube;
+      return std::remainder(std::atan2(to[1], to[0]) - beta - Pi, 2.0 * Pi);
+    };
+    const Eigen::Vector2d at = placeOf(v);
+    const double gamma = fanAngle(at);
+    const double column = gamma / pitch + 0.5 * (settings.channels - 1) + settings.channelOffset;
+    const double weight = reconstruction.Weight(v, column) * settings.sourceToAxis *
+      std::cos(gamma) * Pi * radius * radius / (at - tube).norm() * settings.ViewAngle();
+    for (int j = 0; j < size; ++j)
+    {
+      for (int i = 0; i < size; ++i)
+      {
+        const Vector3 p = grid.IndexToWorld(i, j, 0);
+        const Eigen::Vector2d pixel(p[0], p[1]);
+        const double away = std::abs(fanAngle(pixel) - gamma) / pitch * fine;
+        sum[j * size + i] += weight * kernel[static_cast<std::size_t>(std::lround(away))] /
+          (pixel - tube).squaredNorm();
+      }
+    }
+  }
+  double peak = 0.0;
+  double squares = 0.0;
+  double worst = 0.0;
+  for (std::size_t n = 0; n < sum.size(); ++n)
+  {
+    peak = std::max(peak, sum[n]);
+    worst = std::max(worst, std::abs(image[n] - sum[n]));
+    squares += (image[n] - sum[n]) * (image[n] - sum[n]);
+  }
+  EXPECT_GT(peak, 0.01);
+  EXPECT_LT(worst, 0.1 * peak);
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(sum.size())), 0.02 * peak);
 }
 
 TEST(CtScanner, NoiseFollowsKernelAndDose)
