@@ -8,6 +8,7 @@
 #include "OptionChecks.h"
 #include "PhantomOptions.h"
 #include "ProgressDisplay.h"
+#include "ScannerOptions.h"
 #include "SeriesDescription.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
@@ -18,8 +19,10 @@
 #include "vtkCoronaryPhantomSource.h"
 #include "vtkDataArray.h"
 #include "vtkImageData.h"
+#include "vtkInformation.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 
 #include <algorithm>
@@ -36,6 +39,7 @@ namespace coronary
 namespace
 {
 constexpr const char* SeriesName = "series.json";
+constexpr const char* ScanName = "scan.json";
 
 // Share of a phase's time that its parts take, for the progress.
 constexpr double TruthShare = 0.3;
@@ -45,6 +49,8 @@ struct PhantomJob
 {
   PhantomSettings settings;
   PhaseOptions phases;
+  ScannerOptions scanner;
+  ScannerSettings scan; ///< what scanner.Settings() says
   std::vector<double> spacing = { 0.5 };
   std::vector<double> origin;
   std::vector<double> direction;
@@ -105,6 +111,7 @@ void PhantomJob::Declare(CLI::App& app)
     ->type_name("COSINE")
     ->group(grid);
 
+  this->scanner.AddTo(app);
   AddTruthOptions(app, this->settings);
   CLI::Option* truthOnlyFlag =
     app
@@ -113,6 +120,7 @@ void PhantomJob::Declare(CLI::App& app)
   app.add_flag("--no-truth", this->noTruth, "Write no truth")
     ->group("Truth")
     ->excludes(truthOnlyFlag);
+  truthOnlyFlag->excludes(app.get_option("--scanner"));
   app.add_flag("--compress", this->compress, "Compress the images (zlib)");
   AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "Show no progress and no summary");
@@ -120,7 +128,7 @@ void PhantomJob::Declare(CLI::App& app)
 
 void PhantomJob::CheckCombinations()
 {
-  if (this->settings.temporalWindow > 0.5 * this->settings.cycleLength)
+  if (!this->scanner.Given() && this->settings.temporalWindow > 0.5 * this->settings.cycleLength)
   {
     throw UsageError("--window: " + Format(1000.0 * this->settings.temporalWindow) +
       " ms is more than half of the cycle (--cycle-ms " +
@@ -259,6 +267,10 @@ public:
       this->Numbers.push_back(SeriesNumber(i, times.size()));
     }
     this->Series.cycleMs = 1000.0 * job.settings.cycleLength;
+    if (job.scanner.Given())
+    {
+      this->MakeScanner();
+    }
   }
 
   void Write(StagedFolder& folder)
@@ -291,6 +303,11 @@ public:
         WriteFileAtomically(folder.Add("truth/" + std::string(stem) + ".pvd"), PvdText(files));
       }
     }
+    if (this->Scanner)
+    {
+      WriteFileAtomically(
+        folder.Add(ScanName), DescribeScan(this->Job.scan, *this->Scanner, this->Times));
+    }
     if (!this->Job.truthOnly)
     {
       WriteSeriesDescription(folder.Add(SeriesName), this->Series);
@@ -317,6 +334,18 @@ public:
   }
 
 private:
+  /// A scanner with the heart in it, before anything is computed: a wrong setting is told at once.
+  void MakeScanner()
+  {
+    this->Source->UpdateInformation();
+    vtkInformation* image = this->Source->GetOutputInformation(vtkCoronaryPhantomSource::ImagePort);
+    image->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), this->Grid.extent.data());
+    image->Get(vtkDataObject::ORIGIN(), this->Grid.origin.data());
+    image->Get(vtkDataObject::SPACING(), this->Grid.spacing.data());
+    this->Phantom = std::make_unique<CoronaryPhantom>(this->Job.settings);
+    this->Scanner = std::make_unique<CtScanner>(*this->Phantom, this->Job.scan, this->Grid);
+  }
+
   /// Brings a port up to date; the progress of the phase goes from `first` to `last`.
   void Update(int port, double time, double first, double last)
   {
@@ -371,17 +400,34 @@ private:
     const double written = std::min(1.0, first + RenderShare);
     phase.image = "phase_" + this->Numbers[index] + ".mha";
     const std::string path = folder.Add(phase.image);
+    const auto write = [&](const short* values)
+    {
+      WriteMetaImage(path, this->Grid, values, this->Job.compress,
+        [&](double fraction)
+        {
+          this->Progress.Update(written + (1.0 - written) * fraction);
+          return Interruption() == 0;
+        });
+    };
+    if (this->Scanner)
+    {
+      const std::array<int, 6>& e = this->Grid.extent;
+      std::vector<std::int16_t> values(
+        static_cast<std::size_t>(e[1] - e[0] + 1) * (e[3] - e[2] + 1) * (e[5] - e[4] + 1));
+      this->Scanner->Scan(phase.fraction, values.data(),
+        [&](double fraction)
+        {
+          this->Progress.Update(first + (written - first) * fraction);
+          return Interruption() == 0;
+        });
+      write(values.data());
+      return;
+    }
     this->Update(vtkCoronaryPhantomSource::ImagePort, phase.fraction, first, written);
     auto* image = vtkImageData::SafeDownCast(
       this->Source->GetOutputDataObject(vtkCoronaryPhantomSource::ImagePort));
     this->Grid = vtkCoronary::GridOf(image);
-    WriteMetaImage(path, this->Grid, static_cast<const short*>(image->GetScalarPointer()),
-      this->Job.compress,
-      [&](double fraction)
-      {
-        this->Progress.Update(written + (1.0 - written) * fraction);
-        return Interruption() == 0;
-      });
+    write(static_cast<const short*>(image->GetScalarPointer()));
     image->ReleaseData();
   }
 
@@ -393,6 +439,8 @@ private:
   vtkMessageTrap Messages;
   SeriesDescription Series;
   ImageGrid Grid;
+  std::unique_ptr<CoronaryPhantom> Phantom; ///< that the scanner sees
+  std::unique_ptr<CtScanner> Scanner;       ///< none: images by a formula
   double ReferenceTime = 0.0;
   bool ReferenceIsLost = false;
   double LeastSpeed = 0.0;
@@ -404,6 +452,13 @@ void PhantomJob::Run()
   const std::vector<double> times = this->phases.Phases();
   this->settings.lostPhases = this->phases.LostPhases(times);
   SetNumberOfThreads(this->threads);
+  if (this->scanner.Given())
+  {
+    this->scan = this->scanner.Settings(this->settings.seed);
+    // The truth's visibility is that of the scanner's temporal resolution.
+    this->settings.temporalWindow =
+      std::min(0.5 * this->settings.cycleLength, 0.5 * this->scan.turnTime / this->scan.sources);
+  }
 
   vtkNew<vtkCoronaryPhantomSource> source;
   this->Configure(source, times);
@@ -433,7 +488,7 @@ Command MakePhantomCommand(CLI::App& program)
   CLI::App* app = program.add_subcommand(
     "phantom", "Make a gated CT series of a beating coronary tree, with its exact truth");
   app->footer("Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp "
-              "and, last, DIR/series.json, with NN from 00.");
+              "and, last, DIR/series.json, with NN from 00; with --scanner DIR/scan.json, too.");
   auto job = std::make_shared<PhantomJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

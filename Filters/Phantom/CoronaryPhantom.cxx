@@ -125,6 +125,19 @@ struct CoronaryPhantom::Internals
     return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach);
   }
 
+  /// All that images are made of, with the weight 1.
+  PhantomMoment Moment(double t) const
+  {
+    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t) };
+    moment.tree = this->Move(this->Anatomy.tree, t, this->RadiusFactor(t));
+    moment.vein = this->Move(this->Anatomy.vein, t, 1.0);
+    for (const Plaque& plaque : this->Anatomy.plaques)
+    {
+      moment.plaques.push_back(this->Motion.Position(plaque.centre, t));
+    }
+    return moment;
+  }
+
   /// The lumen with every point at its reference position.
   PhantomLumen RestingLumen(double reach) const
   {
@@ -432,14 +445,8 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
   {
     const double u = (m + 0.5) / count - 0.5; // of 1.2 windows
     const double weight = 1.0 - SmoothStep((std::abs(1.2 * u) - 0.4) / 0.2);
-    PhantomMoment moment{ t + 1.2 * u * window, weight, {}, {}, {}, {} };
-    moment.endNormals = data.EndNormals(moment.t);
-    moment.tree = data.Move(data.Anatomy.tree, moment.t, data.RadiusFactor(moment.t));
-    moment.vein = data.Move(data.Anatomy.vein, moment.t, 1.0);
-    for (const Plaque& plaque : data.Anatomy.plaques)
-    {
-      moment.plaques.push_back(data.Motion.Position(plaque.centre, moment.t));
-    }
+    PhantomMoment moment = data.Moment(t + 1.2 * u * window);
+    moment.weight = weight;
     sum += weight;
     moments.push_back(std::move(moment));
   }
@@ -450,6 +457,87 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
   double wholePhase = 0.0;
   const std::vector<double> lost = data.Lost(t, wholePhase);
   data.Image.Render(grid, part, t, moments, lost, wholePhase, values, progress);
+}
+
+std::vector<PhantomTube> CoronaryPhantom::Tubes(double t) const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  const PhantomSettings& settings = this->Data->Settings;
+  const PhantomTree tree = this->Data->Move(anatomy.tree, t, this->Data->RadiusFactor(t));
+  std::vector<PhantomTube> tubes;
+  const AxisStep* before = nullptr;
+  for (const AxisStep& step : anatomy.steps)
+  {
+    if (anatomy.occluded[step.first] || anatomy.occluded[step.second])
+    {
+      before = nullptr;
+      continue;
+    }
+    // A side vessel's first point is its parent's, with the parent's radius.
+    const double start = anatomy.pointVessel[step.first] == step.vessel ? tree.radius[step.first]
+                                                                        : tree.radius[step.second];
+    const double path = 0.5 * (tree.abscissa[step.first] + tree.abscissa[step.second]);
+    tubes.push_back(
+      { tree.points[step.first], tree.points[step.second], start, tree.radius[step.second],
+        before != nullptr && before->second == step.first && before->vessel == step.vessel,
+        settings.lumenHU + settings.attenuationGradient * path / 10.0,
+        anatomy.intramural[step.vessel] != 0 });
+    before = &step;
+  }
+  return tubes;
+}
+
+void CoronaryPhantom::RenderMaterials(const ImageGrid& grid, double t,
+  const PhantomMaterials& materials, const std::array<float*, 3>& maps,
+  const ProgressCallback& progress) const
+{
+  const Internals& data = *this->Data;
+  const auto tissueOf = [](const Tissues::Layer& layer)
+  {
+    if (layer.content != Tissues::Content::Tissue)
+    {
+      return PhantomTissue::Blood;
+    }
+    const float value = layer.value;
+    return value > 200.0f ? PhantomTissue::Calcified
+      : value > 60.0f     ? PhantomTissue::Muscle
+      : value > 0.0f      ? PhantomTissue::Soft
+      : value > -300.0f   ? PhantomTissue::Fat
+                          : PhantomTissue::Lung;
+  };
+  std::vector<PhantomPalette> palettes(3);
+  const auto mix = [&](PhantomTissue tissue, double value, const auto& store)
+  {
+    const std::array<float, 3> amounts = materials(tissue, value);
+    for (std::size_t m = 0; m < palettes.size(); ++m)
+    {
+      store(palettes[m], amounts[m]);
+    }
+  };
+  for (const Tissues::Layer& layer : Tissues(data.Settings, data.Anatomy).Layers)
+  {
+    mix(tissueOf(layer), layer.value,
+      [](PhantomPalette& palette, float amount) { palette.layers.push_back(amount); });
+  }
+  mix(PhantomTissue::Lung, Tissues::Background,
+    [](PhantomPalette& palette, float amount) { palette.background = amount; });
+  mix(PhantomTissue::Fat, Fat, [](PhantomPalette& palette, float amount) { palette.fat = amount; });
+  mix(PhantomTissue::Muscle, Muscle,
+    [](PhantomPalette& palette, float amount) { palette.muscle = amount; });
+  mix(PhantomTissue::Blood, data.Settings.veinHU,
+    [](PhantomPalette& palette, float amount) { palette.vein = amount; });
+  data.Image.RenderMaps(grid, data.Moment(t), palettes, { maps[0], maps[1], maps[2] }, progress);
+}
+
+CoronaryPhantom::Box CoronaryPhantom::Body() const
+{
+  const Tissues::Shape thorax = Tissues(this->Data->Settings, this->Data->Anatomy).Shapes.front();
+  return { thorax.a - thorax.b, thorax.a + thorax.b };
+}
+
+double CoronaryPhantom::CoatValue(bool inMuscle)
+{
+  return inMuscle ? Muscle : Fat;
 }
 
 std::vector<PhantomMotionSummary> CoronaryPhantom::SummarizeMotion() const

@@ -19,6 +19,7 @@
 #include "ParallelFor.h"
 #include "VesselTree.h"
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -135,6 +136,31 @@ struct PhantomPlaque
   double value = 0.0;      ///< HU before blurring
 };
 
+/// A piece of an artery's lumen at one moment, as a scanner's rays meet it: a straight cone.
+struct PhantomTube
+{
+  Vector3 start; ///< mm
+  Vector3 end;
+  double startRadius; ///< mm, across the axis
+  double endRadius;
+  bool round;    ///< another piece ends at `start`: a ball fills the bend between them
+  double value;  ///< HU
+  bool inMuscle; ///< the coat around it is muscle, else fat
+};
+
+enum class PhantomTissue
+{
+  Lung,
+  Fat,
+  Soft,
+  Muscle,   ///< perfused
+  Blood,    ///< with contrast medium
+  Calcified ///< bone, plaque
+};
+
+/// Amounts of three basis materials in a tissue of so many HU.
+using PhantomMaterials = std::function<std::array<float, 3>(PhantomTissue, double hounsfield)>;
+
 /// How a vessel moves over one cycle.
 struct PhantomMotionSummary
 {
@@ -216,6 +242,29 @@ public:
    */
   void Render(const ImageGrid& grid, const std::array<int, 6>& part, double t, std::int16_t* values,
     const ProgressCallback& progress = {}) const;
+
+  /// All arteries at time t, but where they are occluded.
+  std::vector<PhantomTube> Tubes(double t) const;
+
+  /**
+   * Three basis materials of all tissues at time t, sharp but for the voxels' own size. In place of
+   * arteries and plaques there is their coat: Tubes() and Plaques() have these exactly.
+   * @param maps  [i][j][k], k fastest, over grid.extent
+   * @throws Cancelled; std::invalid_argument for a grid that is not one
+   */
+  void RenderMaterials(const ImageGrid& grid, double t, const PhantomMaterials& materials,
+    const std::array<float*, 3>& maps, const ProgressCallback& progress = {}) const;
+
+  /// The trunk, which does not end above and below.
+  struct Box
+  {
+    Vector3 low; ///< mm
+    Vector3 high;
+  };
+  Box Body() const;
+
+  /// HU of the coat of arteries in muscle, and in fat.
+  static double CoatValue(bool inMuscle);
 
   /// Motion of each named vessel, from the tree at 200 moments.
   std::vector<PhantomMotionSummary> SummarizeMotion() const;

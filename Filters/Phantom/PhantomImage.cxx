@@ -4,7 +4,6 @@
 #include "CyclicTime.h"
 #include "PartialProgress.h"
 #include "PhantomNoise.h"
-#include "PhantomTissues.h"
 
 #include <algorithm>
 #include <cmath>
@@ -199,9 +198,10 @@ struct Tiles
 class Rendering
 {
 public:
+  /// @param pointSpread  standard deviations along the image's axes, mm
   Rendering(const PhantomSettings& settings, const PhantomAnatomy& anatomy, const ImageGrid& grid,
     const std::array<int, 6>& part, const std::vector<PhantomMoment>& moments,
-    const std::vector<double>& lost);
+    const std::vector<double>& lost, const Vector3& pointSpread);
 
   /// Finds where the material at the tile corners rests; in between the field is near linear.
   void PlaceCorners(const PhantomMotion& motion, const ProgressCallback& progress);
@@ -209,6 +209,9 @@ public:
   /// Renders all bands into the part's values, x fastest.
   void Run(
     const CorrelatedNoise& noise, std::int16_t* values, const ProgressCallback& progress) const;
+
+  /// Renders all tissues but arteries and plaques, in the palette's colours; k fastest.
+  void RunMap(const PhantomPalette& palette, float* map, const ProgressCallback& progress);
 
 private:
   /// Tiles of one z and a few y, all x. Big enough that the noise's halo stays small.
@@ -220,13 +223,14 @@ private:
     std::array<int, 6> box; ///< inclusive index ranges
     std::vector<float> signal;
 
-    float* Row(int j, int k)
+    std::size_t Place(int j, int k) const
     {
-      return &this->signal[(static_cast<std::size_t>(k - this->box[4]) *
-                               (this->box[3] - this->box[2] + 1) +
-                             (j - this->box[2])) *
-        (this->box[1] - this->box[0] + 1)];
+      return (static_cast<std::size_t>(k - this->box[4]) * (this->box[3] - this->box[2] + 1) +
+               (j - this->box[2])) *
+        (this->box[1] - this->box[0] + 1);
     }
+    float* Row(int j, int k) { return &this->signal[this->Place(j, k)]; }
+    const float* Row(int j, int k) const { return &this->signal[this->Place(j, k)]; }
   };
 
   /// A tile at one moment, and what of the anatomy can matter inside it.
@@ -256,7 +260,8 @@ private:
     }
   };
 
-  void RenderBand(std::int64_t number, const CorrelatedNoise& noise, std::int16_t* values) const;
+  Band RenderBand(std::int64_t number) const;
+  void Store(const Band& band, std::int16_t* values) const;
   void Locate(const Band& band, int tileX, int tileY, Tile& tile) const;
   void Collect(std::size_t moment, int tileX, int tileY, int tileZ, Tile& tile) const;
   void Paint(const Tile& tile, Tissues::Row& samples, Band& band) const;
@@ -274,6 +279,8 @@ private:
   const std::vector<double>& Lost;
   const DiscTable& Disc = DiscTable::Instance();
   Tissues Around;
+  PhantomPalette Palette;
+  bool Vessels = true; ///< arteries and plaques are painted
   Tiles Grid;
   Vector3 Variance; ///< of the blur along the image's axes, mm^2
   Matrix3 Covariance;
@@ -288,7 +295,7 @@ private:
 
 Rendering::Rendering(const PhantomSettings& settings, const PhantomAnatomy& anatomy,
   const ImageGrid& grid, const std::array<int, 6>& part, const std::vector<PhantomMoment>& moments,
-  const std::vector<double>& lost)
+  const std::vector<double>& lost, const Vector3& pointSpread)
   : Settings(settings)
   , Anatomy(anatomy)
   , Moments(moments)
@@ -298,10 +305,11 @@ Rendering::Rendering(const PhantomSettings& settings, const PhantomAnatomy& anat
   , BandTiles(std::max(1, 48 / this->Grid.size[1]))
   , BandsInY((this->Grid.count[1] + this->BandTiles - 1) / this->BandTiles)
 {
+  this->Palette.vein = static_cast<float>(settings.veinHU);
   // The voxel is an average over its box: that blurs like a standard deviation of spacing/sqrt(12).
   for (int axis = 0; axis < 3; ++axis)
   {
-    const double psf = settings.pointSpread[axis];
+    const double psf = pointSpread[axis];
     this->Variance[axis] = psf * psf + grid.spacing[axis] * grid.spacing[axis] / 12.0;
   }
   this->Covariance = grid.direction * this->Variance.asDiagonal() * grid.direction.transpose();
@@ -361,14 +369,52 @@ void Rendering::Run(
     {
       for (std::int64_t band = first; band < last; ++band)
       {
-        this->RenderBand(band, noise, values);
+        Band rendered = this->RenderBand(band);
+        noise.Add(rendered.box, rendered.signal);
+        this->Store(rendered, values);
       }
     },
     progress);
 }
 
-void Rendering::RenderBand(
-  std::int64_t number, const CorrelatedNoise& noise, std::int16_t* values) const
+void Rendering::RunMap(const PhantomPalette& palette, float* map, const ProgressCallback& progress)
+{
+  this->Palette = palette;
+  this->Vessels = false;
+  for (std::size_t i = 0; i < palette.layers.size(); ++i)
+  {
+    this->Around.Layers[i].value = palette.layers[i];
+  }
+  const std::array<int, 6>& part = this->Grid.part;
+  const std::int64_t slices = part[5] - part[4] + 1;
+  const std::int64_t rows = part[3] - part[2] + 1;
+  ParallelFor(
+    static_cast<std::int64_t>(this->Grid.count[2]) * this->BandsInY, 1,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t number = first; number < last; ++number)
+      {
+        const Band band = this->RenderBand(number);
+        const std::int64_t columns = part[1] - part[0] + 1;
+        const std::int64_t plane = columns * (band.box[3] - band.box[2] + 1);
+        for (int j = band.box[2]; j <= band.box[3]; ++j)
+        {
+          const float* in = band.Row(j, band.box[4]);
+          float* out = map + (j - part[2]) * slices + (band.box[4] - part[4]);
+          for (std::int64_t i = 0; i < columns; ++i)
+          {
+            for (std::int64_t k = 0; k <= band.box[5] - band.box[4]; ++k)
+            {
+              out[i * rows * slices + k] = in[k * plane + i];
+            }
+          }
+        }
+      }
+    },
+    progress);
+}
+
+Rendering::Band Rendering::RenderBand(std::int64_t number) const
 {
   const std::array<int, 6>& part = this->Grid.part;
   Band band;
@@ -398,8 +444,13 @@ void Rendering::RenderBand(
       }
     }
   }
-  noise.Add(band.box, band.signal);
+  return band;
+}
 
+void Rendering::Store(const Band& band, std::int16_t* values) const
+{
+  const std::array<int, 6>& part = this->Grid.part;
+  const int nx = part[1] - part[0] + 1;
   const std::int64_t rowStride = nx;
   const std::int64_t sliceStride = rowStride * (part[3] - part[2] + 1);
   for (int k = band.box[4]; k <= band.box[5]; ++k)
@@ -468,7 +519,7 @@ void Rendering::Collect(std::size_t moment, int tileX, int tileY, int tileZ, Til
     }
   }
   tile.plaques.clear();
-  for (std::size_t p = 0; p < now.plaques.size(); ++p)
+  for (std::size_t p = 0; this->Vessels && p < now.plaques.size(); ++p)
   {
     const double radius = this->Anatomy.plaques[p].radius;
     if ((now.plaques[p] - tile.centre).norm() < tile.ball + radius + this->Reach)
@@ -485,7 +536,7 @@ void Rendering::Paint(const Tile& tile, Tissues::Row& samples, Band& band) const
   const std::vector<TileLayers::Active>& layers = tile.layers.layers;
   const bool uniform = tile.Uniform();
   const float uniformValue =
-    tile.weight * (layers.empty() ? Tissues::Background : layers.back().value);
+    tile.weight * (layers.empty() ? this->Palette.background : layers.back().value);
   for (int k = tile.box[4]; k <= tile.box[5]; ++k)
   {
     for (int j = tile.box[2]; j <= tile.box[3]; ++j)
@@ -516,8 +567,11 @@ void Rendering::Paint(const Tile& tile, Tissues::Row& samples, Band& band) const
         const Vector3 world = this->Grid.grid.IndexToWorld(i, j, k);
         float value = painted[i - tile.base[0]];
         value = this->PaintVein(tile, world, value);
-        value = this->PaintPlaques(tile, world, value);
-        value = this->PaintVessel(this->Moments[tile.moment], vessel[i - tile.base[0]], value);
+        if (this->Vessels)
+        {
+          value = this->PaintPlaques(tile, world, value);
+          value = this->PaintVessel(this->Moments[tile.moment], vessel[i - tile.base[0]], value);
+        }
         row[i - band.box[0]] += tile.weight * value;
       }
     }
@@ -565,7 +619,7 @@ void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int 
   PhantomLumen::Sample* vessel, float* painted) const
 {
   const std::vector<TileLayers::Active>& layers = tile.layers.layers;
-  std::fill(painted, painted + samples.count, Tissues::Background);
+  std::fill(painted, painted + samples.count, this->Palette.background);
   std::size_t layer = 0;
   for (; layer < layers.size() && layers[layer].content != Tissues::Content::GreatVessel; ++layer)
   {
@@ -586,16 +640,32 @@ void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int 
       const bool inMuscle = this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel];
       float& value = painted[i - tile.base[0]];
       const auto d = static_cast<float>(sample.distance);
-      if (!inMuscle || value > Muscle)
+      // In the map of a material muscle is not told from blood: there it coats all of the vessel.
+      if (!inMuscle || !this->Vessels || value > Muscle)
       {
         const float coat = NormalIntegral::Of(inMuscle ? (2.0f - d) / 0.45f : (1.9f - d) / 0.35f);
-        value += coat * ((inMuscle ? Muscle : Fat) - value);
+        value += coat * ((inMuscle ? this->Palette.muscle : this->Palette.fat) - value);
       }
     }
   }
   for (; layer < layers.size(); ++layer)
   {
     PaintRow(this->Around, layers[layer], samples, painted);
+  }
+  if (!this->Vessels && !tile.candidates.Empty())
+  {
+    // Where an artery begins in the aorta's wall, too, what it takes the place of is its coat.
+    for (int i = tile.box[0]; i <= tile.box[1]; ++i)
+    {
+      const PhantomLumen::Sample& sample = vessel[i - tile.base[0]];
+      if (sample.step >= 0)
+      {
+        const bool inMuscle = this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel];
+        float& value = painted[i - tile.base[0]];
+        value += NormalIntegral::Of(static_cast<float>(-sample.distance / this->MeanBlur)) *
+          ((inMuscle ? this->Palette.muscle : this->Palette.fat) - value);
+      }
+    }
   }
 }
 
@@ -622,7 +692,7 @@ float Rendering::PaintVein(const Tile& tile, const Vector3& world, float value) 
   return value +
     this->Disc(static_cast<float>(std::max(0.0, nearest + radius)) * scale,
       static_cast<float>(radius) * scale) *
-    (static_cast<float>(this->Settings.veinHU) - value);
+    (this->Palette.vein - value);
 }
 
 float Rendering::PaintPlaques(const Tile& tile, const Vector3& world, float value) const
@@ -715,7 +785,8 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
   {
     return;
   }
-  Rendering rendering(this->Settings, this->Anatomy, grid, part, moments, lost);
+  Rendering rendering(this->Settings, this->Anatomy, grid, part, moments, lost,
+    Eigen::Map<const Vector3>(this->Settings.pointSpread));
   rendering.PlaceCorners(this->Motion, PartOf(progress, 0.0, 0.15));
 
   std::uint64_t momentKey = 0;
@@ -724,5 +795,23 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
   const CorrelatedNoise noise(grid, this->Settings.noiseCorrelation,
     this->NoiseLevel(t, wholePhaseLost), MixBits(MixBits(this->Settings.seed + 77) ^ momentKey));
   rendering.Run(noise, values, PartOf(progress, 0.15, 1.0));
+}
+
+void PhantomImage::RenderMaps(const ImageGrid& grid, const PhantomMoment& moment,
+  const std::vector<PhantomPalette>& palettes, const std::vector<float*>& maps,
+  const ProgressCallback& progress) const
+{
+  RequireGrid(grid, grid.extent);
+  const std::vector<PhantomMoment> moments{ moment };
+  Rendering rendering(
+    this->Settings, this->Anatomy, grid, grid.extent, moments, {}, Vector3::Zero());
+  rendering.PlaceCorners(this->Motion, PartOf(progress, 0.0, 0.5));
+  for (std::size_t p = 0; p < palettes.size(); ++p)
+  {
+    const double share = 0.5 / static_cast<double>(palettes.size());
+    rendering.RunMap(palettes[p], maps[p],
+      PartOf(
+        progress, 0.5 + share * static_cast<double>(p), 0.5 + share * static_cast<double>(p + 1)));
+  }
 }
 }

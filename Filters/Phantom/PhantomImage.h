@@ -6,9 +6,20 @@
 #define DynamicCoronary_PhantomImage_h
 
 #include "PhantomLumen.h"
+#include "PhantomTissues.h"
 
 namespace coronary
 {
+/// What the parts of the anatomy are painted with: Hounsfield units, or the amount of a material.
+struct PhantomPalette
+{
+  std::vector<float> layers; ///< of Tissues::Layers; empty: their own values
+  float background = Tissues::Background;
+  float fat = Fat;
+  float muscle = Muscle;
+  float vein = 0.0f;
+};
+
 /// Everything of one moment inside the temporal window.
 struct PhantomMoment
 {
@@ -35,6 +46,15 @@ public:
   void Render(const ImageGrid& grid, const std::array<int, 6>& part, double t,
     const std::vector<PhantomMoment>& moments, const std::vector<double>& lost,
     double wholePhaseLost, std::int16_t* values, const ProgressCallback& progress) const;
+
+  /**
+   * Renders the whole grid at one moment, sharp but for the voxels' own size, without arteries and
+   * plaques: where they are, there is their coat.
+   * @param maps  one for each palette: [i][j][k], k fastest
+   */
+  void RenderMaps(const ImageGrid& grid, const PhantomMoment& moment,
+    const std::vector<PhantomPalette>& palettes, const std::vector<float*>& maps,
+    const ProgressCallback& progress) const;
 
   /// Standard deviation of the noise at time t, HU.
   double NoiseLevel(double t, double wholePhaseLost) const;

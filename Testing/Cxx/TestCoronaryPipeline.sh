@@ -264,6 +264,60 @@ check_files() {
   expect_text stdout "Phase 3 (106.0 % R-R)"
 }
 
+check_scanner() {
+  # Few and wide cells: the road, not the image.
+  cat >scanner.json <<END
+{ "preset": "single-350", "channels": 111, "channel_pitch_mm": 8.19, "rows": 8, "row_pitch_mm": 8.79,
+  "views_per_turn": 120, "anatomy_spacing_mm": 4, "anatomy_step_s": 0.05, "extrasystole": 2 }
+END
+  image="--quiet --spacing 4 --fractions 0.4,0.75 --calcified-plaques 3 $coarse"
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 $image --scanner scanner.json --output made
+  for file in phase_00.mha phase_01.mha truth/surface_01.vtp scan.json series.json; do
+    [ -s "made/$file" ] || fail "no $file"
+  done
+  [ "$(find made -type f | wc -l)" -eq 13 ] || fail "other files than expected: $(find made)"
+  for text in '"channels": 111' '"kernel": "standard"' '"temporal_resolution_ms": 175.0' '"rr_ms": 480.0' '"mAs"'; do
+    expect_text made/scan.json "$text"
+  done
+  cmp -s made/phase_00.mha made/phase_01.mha && fail "two phases look the same"
+  run 0 inspect made/series.json
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 $image --scanner scanner.json --threads 1 --output again
+  diff -r made again || fail "one thread gave other files"
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 $image --scanner scanner.json --kernel sharp --no-truth --output sharp
+  cmp -s made/phase_00.mha sharp/phase_00.mha && fail "another kernel gave the same image"
+
+  for bad in '--window 66' '--noise 3' '--lost 1' '--direction 1 0 0 0 1 0 0 0 1' '--truth-only'; do
+    # shellcheck disable=SC2086
+    run 2 phantom --scanner wide-280 $bad --output out
+    expect_one_line "coronary-pipeline phantom" --scanner
+  done
+  run 2 phantom --kernel soft --output out
+  expect_one_line "coronary-pipeline phantom" --kernel
+  run 2 phantom --scanner nothing --output out
+  expect_one_line "coronary-pipeline phantom" "single-350, single-330"
+  while read -r reason json; do
+    echo "$json" >bad.json
+    run 1 phantom --scanner bad.json --spacing 4 --output out
+    expect_one_line "coronary-pipeline phantom" "$reason"
+  done <<END
+object [1]
+preset { "preset": 5 }
+single-350 { "preset": "triple" }
+not.known { "pitch": 1 }
+number { "rows": "many" }
+whole { "rows": 8.5 }
+rows { "rows": 1000 }
+kernel { "kernel": "hard" }
+multiple.of.4 { "sources": 2, "views_per_turn": 985 }
+fit.into.the.field { "channels": 400 }
+half.scan.takes { "turn_s": 1.5 }
+END
+  [ ! -e out ] || fail "a folder was made for nothing"
+}
+
 check_options() {
   run 0 --version
   run 0 --help

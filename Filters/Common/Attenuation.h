@@ -25,16 +25,18 @@ enum class XRayMaterial
   CorticalBone,
   SoftTissue,
   Lung, ///< inflated
+  Adipose,
+  Blood,
   Ptfe,
   Nylon,        ///< polyamide 12
   BariumPolymer ///< polyamide 12 with 40 % of its mass of barium sulphate
 };
 
-constexpr std::array<XRayMaterial, 13> AllXRayMaterials{ XRayMaterial::Water,
+constexpr std::array<XRayMaterial, 15> AllXRayMaterials{ XRayMaterial::Water,
   XRayMaterial::ContrastMedium, XRayMaterial::StainlessSteel, XRayMaterial::Nitinol,
   XRayMaterial::Platinum, XRayMaterial::Tungsten, XRayMaterial::Gold, XRayMaterial::CorticalBone,
-  XRayMaterial::SoftTissue, XRayMaterial::Lung, XRayMaterial::Ptfe, XRayMaterial::Nylon,
-  XRayMaterial::BariumPolymer };
+  XRayMaterial::SoftTissue, XRayMaterial::Lung, XRayMaterial::Adipose, XRayMaterial::Blood,
+  XRayMaterial::Ptfe, XRayMaterial::Nylon, XRayMaterial::BariumPolymer };
 
 /// What a material is made of.
 struct XRayMaterialData
@@ -53,6 +55,13 @@ struct XRayMaterialData
  * Tissues: ICRU report 44. The contrast medium is iodine in water, OfContrastMedium().
  */
 const XRayMaterialData& DataOf(XRayMaterial material);
+
+/// @param formula  chemical @param energy  keV @return cm^2/g
+/// @throws std::runtime_error when xraylib has none
+double MassAttenuation(const char* formula, double energy);
+
+/// @param energy  keV @return 1/mm
+double LinearAttenuation(XRayMaterial material, double energy);
 
 /// Linear attenuation coefficients at one energy, which stands for a tube's spectrum.
 class Attenuation

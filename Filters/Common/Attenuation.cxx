@@ -46,6 +46,12 @@ const std::array<Data, AllXRayMaterials.size()>& Table()
     { "lung", 0.26,
       { { "H", 0.103 }, { "C", 0.105 }, { "N", 0.031 }, { "O", 0.749 }, { "Na", 0.002 },
         { "P", 0.002 }, { "S", 0.003 }, { "Cl", 0.003 }, { "K", 0.002 } } },
+    { "adipose tissue", 0.95,
+      { { "H", 0.114 }, { "C", 0.598 }, { "N", 0.007 }, { "O", 0.278 }, { "Na", 0.001 },
+        { "S", 0.001 }, { "Cl", 0.001 } } },
+    { "blood", 1.06,
+      { { "H", 0.102 }, { "C", 0.110 }, { "N", 0.033 }, { "O", 0.745 }, { "Na", 0.001 },
+        { "P", 0.001 }, { "S", 0.002 }, { "Cl", 0.003 }, { "K", 0.002 }, { "Fe", 0.001 } } },
     { "PTFE", 2.2, { { "C2F4", 1.0 } } },
     { "nylon", NylonDensity, { { "C12H23NO", 1.0 } } },
     { "polymer with barium sulphate",
@@ -53,32 +59,6 @@ const std::array<Data, AllXRayMaterials.size()>& Table()
       { { "C12H23NO", 1.0 - BariumShare }, { "BaSO4", BariumShare } } },
   } };
   return table;
-}
-
-/// cm^2/g
-double MassAttenuation(const char* formula, double energy)
-{
-  xrl_error* error = nullptr;
-  const double value = CS_Total_CP(formula, energy, &error);
-  if (error != nullptr)
-  {
-    const std::string reason = error->message;
-    xrl_error_free(error);
-    throw std::runtime_error(std::string("xraylib: attenuation of ") + formula + " at " +
-      std::to_string(energy) + " keV: " + reason);
-  }
-  return value;
-}
-
-/// 1/mm
-double LinearAttenuation(const Data& data, double energy)
-{
-  double sum = 0.0;
-  for (const Data::Part& part : data.parts)
-  {
-    sum += part.share * MassAttenuation(part.formula, energy);
-  }
-  return 0.1 * data.density * sum;
 }
 
 void RequireEnergy(const char* which, double energy, double low, double high)
@@ -97,6 +77,31 @@ const XRayMaterialData& DataOf(XRayMaterial material)
   return Table().at(static_cast<std::size_t>(material));
 }
 
+double MassAttenuation(const char* formula, double energy)
+{
+  xrl_error* error = nullptr;
+  const double value = CS_Total_CP(formula, energy, &error);
+  if (error != nullptr)
+  {
+    const std::string reason = error->message;
+    xrl_error_free(error);
+    throw std::runtime_error(std::string("xraylib: attenuation of ") + formula + " at " +
+      std::to_string(energy) + " keV: " + reason);
+  }
+  return value;
+}
+
+double LinearAttenuation(XRayMaterial material, double energy)
+{
+  const Data& data = DataOf(material);
+  double sum = 0.0;
+  for (const Data::Part& part : data.parts)
+  {
+    sum += part.share * MassAttenuation(part.formula, energy);
+  }
+  return 0.1 * data.density * sum;
+}
+
 Attenuation::Attenuation(double energy, double ctEnergy)
   : Energy_(energy)
   , Coefficients{}
@@ -105,11 +110,11 @@ Attenuation::Attenuation(double energy, double ctEnergy)
   RequireEnergy("the CT's effective energy", ctEnergy, 40.0, 120.0);
   for (std::size_t k = 0; k < AllXRayMaterials.size(); ++k)
   {
-    this->Coefficients[k] = LinearAttenuation(DataOf(AllXRayMaterials[k]), energy);
+    this->Coefficients[k] = LinearAttenuation(AllXRayMaterials[k], energy);
   }
   this->Iodine = MassAttenuation("I", energy);
-  const double water = LinearAttenuation(DataOf(XRayMaterial::Water), ctEnergy);
-  const double bone = LinearAttenuation(DataOf(XRayMaterial::CorticalBone), ctEnergy);
+  const double water = LinearAttenuation(XRayMaterial::Water, ctEnergy);
+  const double bone = LinearAttenuation(XRayMaterial::CorticalBone, ctEnergy);
   this->BoneHounsfield = 1000.0 * (bone - water) / water;
 }
 

@@ -1,0 +1,208 @@
+#include "ScannerOptions.h"
+
+#include "Command.h"
+#include "TextFile.h"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+namespace coronary
+{
+namespace
+{
+using Json = nlohmann::ordered_json;
+
+constexpr const char* Kernels[] = { "soft", "standard", "sharp" };
+
+ReconstructionKernel KernelOf(const std::string& name, const std::string& where)
+{
+  for (int k = 0; k < 3; ++k)
+  {
+    if (name == Kernels[k])
+    {
+      return static_cast<ReconstructionKernel>(k);
+    }
+  }
+  throw std::runtime_error(where + ": '" + name + "' is none of soft, standard, sharp");
+}
+
+std::string TextOf(const Json& value, const std::string& where)
+{
+  if (!value.is_string())
+  {
+    throw std::runtime_error(where + " has to be a text");
+  }
+  return value.get<std::string>();
+}
+
+ScannerSettings ReadScanner(const std::string& path)
+{
+  const Json json = Json::parse(ReadTextFile(path, "a scanner"), nullptr, false);
+  if (!json.is_object())
+  {
+    throw std::runtime_error("'" + path + "' is not a JSON object");
+  }
+  const std::string file = "'" + path + "': ";
+  ScannerSettings settings;
+  const auto preset = json.find("preset");
+  if (preset != json.end())
+  {
+    try
+    {
+      settings = ScannerPreset(TextOf(*preset, file + "preset"));
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw std::runtime_error(file + error.what());
+    }
+  }
+  for (const auto& [key, value] : json.items())
+  {
+    const std::string where = file + key;
+    if (key == "preset")
+    {
+      continue;
+    }
+    if (key == "kernel")
+    {
+      settings.kernel = KernelOf(TextOf(value, where), where);
+      continue;
+    }
+    const auto& numbers = AllScannerNumbers();
+    const auto number = std::find_if(numbers.begin(), numbers.end(),
+      [&name = key](const ScannerNumber& one) { return name == one.name; });
+    if (number == numbers.end())
+    {
+      throw std::runtime_error(where + " is not known");
+    }
+    if (!value.is_number())
+    {
+      throw std::runtime_error(where + " has to be a number");
+    }
+    const double given = value.get<double>();
+    if (const auto* whole = std::get_if<int ScannerSettings::*>(&number->member))
+    {
+      if (given != std::floor(given) || std::abs(given) > 1e6)
+      {
+        throw std::runtime_error(where + " has to be a whole number");
+      }
+      settings.*(*whole) = static_cast<int>(given);
+    }
+    else
+    {
+      settings.*std::get<double ScannerSettings::*>(number->member) = given;
+    }
+  }
+  try
+  {
+    settings.Validate();
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::runtime_error(file + error.what());
+  }
+  return settings;
+}
+}
+
+void ScannerOptions::AddTo(CLI::App& app)
+{
+  std::string presets;
+  for (const std::string& name : ScannerPresets())
+  {
+    presets += (presets.empty() ? "" : ", ") + name;
+  }
+  const std::string group = "Scanner";
+  CLI::Option* option =
+    app
+      .add_option("--scanner", this->scanner,
+        "Images as a simulated CT scanner sees the beating heart, view by view, instead of by a "
+        "formula: " +
+          presets + ", or a JSON file")
+      ->check(CLI::Validator(
+        [](std::string& text) { return text.empty() ? "a name is needed" : std::string(); }, ""))
+      ->type_name("PRESET|FILE")
+      ->group(group);
+  app.add_option("--kernel", this->kernel, "Kernel of its reconstruction")
+    ->check(CLI::IsMember({ "soft", "standard", "sharp" }).description("soft|standard|sharp"))
+    ->type_name("KERNEL")
+    ->needs(option)
+    ->group(group);
+  // What the scanner's physics decide.
+  for (const char* formula : { "--window", "--noise", "--noise-correlation", "--systolic-noise",
+         "--point-spread", "--lost", "--direction" })
+  {
+    option->excludes(app.get_option(formula));
+  }
+}
+
+ScannerSettings ScannerOptions::Settings(std::uint64_t seed) const
+{
+  ScannerSettings settings;
+  const auto& presets = ScannerPresets();
+  if (std::find(presets.begin(), presets.end(), this->scanner) != presets.end())
+  {
+    settings = ScannerPreset(this->scanner);
+  }
+  else if (std::filesystem::exists(this->scanner))
+  {
+    settings = ReadScanner(this->scanner);
+  }
+  else
+  {
+    try
+    {
+      ScannerPreset(this->scanner);
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw UsageError(
+        std::string("--scanner: ") + error.what() + "; nor is there a file of that name");
+    }
+  }
+  if (!this->kernel.empty())
+  {
+    settings.kernel = KernelOf(this->kernel, "--kernel");
+  }
+  settings.seed = seed;
+  return settings;
+}
+
+std::string DescribeScan(
+  const ScannerSettings& settings, const CtScanner& scanner, const std::vector<double>& phases)
+{
+  Json json;
+  Json& numbers = json["scanner"];
+  numbers["kernel"] = Kernels[static_cast<int>(settings.kernel)];
+  for (const ScannerNumber& number : AllScannerNumbers())
+  {
+    std::visit([&](auto member) { numbers[number.name] = settings.*member; }, number.member);
+  }
+  json["views"] = settings.HalfScanViews();
+  json["half_scan_ms"] = 1000.0 * settings.HalfScanTime();
+  json["temporal_resolution_ms"] = 500.0 * settings.turnTime / settings.sources;
+  json["field_mm"] = 2.0 * settings.FieldRadius();
+  // All views together last as long whether one or two tubes take them.
+  const double exposure = settings.milliamperes * settings.turnTime *
+    static_cast<double>(settings.HalfScanViews()) / settings.viewsPerTurn;
+  for (const double phase : phases)
+  {
+    Json one;
+    one["fraction"] = phase;
+    for (const ScannedSlab& slab : scanner.Slabs(phase))
+    {
+      const ScannerSlab& s = slab.slab;
+      one["slabs"].push_back(
+        { { "z", s.centre }, { "beat_start_s", s.start }, { "rr_ms", 1000.0 * s.interval },
+          { "gantry_angle", s.gantryAngle }, { "shift", { s.shift[0], s.shift[1], s.shift[2] } },
+          { "iodine", s.iodine }, { "first_phase", slab.firstPhase },
+          { "last_phase", slab.lastPhase }, { "mAs", exposure * slab.current } });
+    }
+    json["phases"].push_back(one);
+  }
+  return json.dump(2) + "\n";
+}
+}

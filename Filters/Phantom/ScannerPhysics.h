@@ -1,0 +1,119 @@
+/**
+ * @file ScannerPhysics.h
+ * @brief X-rays from the tube through matter into a detector cell, at all energies.
+ *
+ * Matter is told by three basis materials; what is none of them is the sum of water and
+ * hydroxyapatite that attenuates most like it (Alvarez and Macovski, Phys Med Biol 1976;21:733).
+ */
+#ifndef DynamicCoronary_ScannerPhysics_h
+#define DynamicCoronary_ScannerPhysics_h
+
+#include "Attenuation.h"
+#include "ScannerSettings.h"
+
+#include <Eigen/Core>
+
+namespace coronary
+{
+/// Basis materials: water (of 1 g/cm^3), iodine (mg/mL), hydroxyapatite (mg/cm^3).
+constexpr int BasisMaterials = 3;
+/// How much of each there is at a place, or along a path (times mm).
+using MaterialAmounts = Eigen::Array3f;
+
+/**
+ * Tungsten tube: Kramers' law with the anode's own absorption, and the K lines above 69.5 kV whose
+ * yield follows Green and Cosslett, J Phys D 1968;1:425. Absolute output: calibrated at 120 kV.
+ */
+class TubeSpectrum
+{
+public:
+  /// @param aluminium  filter, mm
+  TubeSpectrum(double kilovolts, double aluminium);
+
+  std::vector<double> energies; ///< keV, of the bins
+  std::vector<double> photons;  ///< of the bins, per mm^2 at 1 m and mAs
+};
+
+/// What a detector cell gets, in keV, and with which variance.
+struct CellSignal
+{
+  double mean;
+  double variance; ///< of the photons' number and energy, keV^2
+};
+
+/// From path lengths to corrected line integrals.
+class ScannerPhysics
+{
+public:
+  explicit ScannerPhysics(const ScannerSettings& settings);
+
+  /// HU of a mixture in a thin layer behind 28 cm of water on the central ray.
+  double Hounsfield(const MaterialAmounts& amounts) const;
+
+  /// Signal of a cell behind path lengths (mm times amount) in one view, without blur.
+  CellSignal Signal(int column, const MaterialAmounts& path) const;
+
+  /// Mean energy of what is detected behind a path, weighted by energy as the detector does, keV.
+  double DetectedEnergy(int column, const MaterialAmounts& path) const;
+
+  /// Photons that reach a cell in one view.
+  double Photons(int column, const MaterialAmounts& path) const;
+
+  /**
+   * Turns a view's path lengths into line integrals of an ideal scanner in water, in units of mm of
+   * water: intensities, blur of focal spot and cells, noise, logarithm, water correction.
+   * @param paths    of each basis material, [column][row]
+   * @param current  share of the tube current
+   * @param key      names the view among all of the scan
+   * @param result   [column][row]
+   */
+  void Measure(const std::array<const float*, BasisMaterials>& paths, double current,
+    std::uint64_t key, float* result) const;
+
+  /// Water path that gives a column the log signal, mm.
+  double WaterPath(int column, double logSignal) const;
+
+private:
+  void Blur(std::vector<float>& values) const;
+
+  const ScannerSettings Settings;
+  std::vector<double> Energies;
+  Eigen::ArrayXXd Coefficients; ///< 1/mm of each basis material (columns) at the energies
+  Eigen::ArrayXXf Weights;      ///< photons at an energy (rows) into a cell of a column, one view
+  Eigen::ArrayXf AirSignal;     ///< keV of a column
+  Eigen::ArrayXXd Correction;   ///< polynomial of each column
+  Eigen::ArrayXd Detected;      ///< weights behind 28 cm of water
+  std::vector<float> ColumnBlur;
+  std::vector<float> RowBlur;
+};
+
+/// Poisson number of a mean, a function of the key alone; beyond 1,000 from a normal number.
+double PoissonNumber(double mean, std::uint64_t key);
+
+/**
+ * Amounts of basis materials in a tissue that looks like `hounsfield` at 120 kV: lung and fat of that
+ * density, soft tissue, blood or muscle with iodine, bone or plaque with hydroxyapatite.
+ */
+class TissueMaterials
+{
+public:
+  TissueMaterials();
+
+  MaterialAmounts Lung(double hounsfield) const;
+  MaterialAmounts Fat(double hounsfield) const;
+  MaterialAmounts Soft(double hounsfield) const;
+  MaterialAmounts Muscle(double hounsfield) const; ///< with iodine above 55 HU
+  MaterialAmounts Blood(double hounsfield) const;  ///< with iodine above its own
+  MaterialAmounts Calcified(double hounsfield) const;
+
+private:
+  MaterialAmounts Scaled(const MaterialAmounts& tissue, double hounsfield) const;
+
+  ScannerPhysics Reference; ///< at 120 kV
+  MaterialAmounts Adipose;
+  MaterialAmounts SoftTissue;
+  MaterialAmounts BloodAmounts;
+};
+}
+
+#endif

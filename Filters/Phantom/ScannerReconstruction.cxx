@@ -1,0 +1,208 @@
+#include "ScannerReconstruction.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+constexpr int FrequencySteps = 1024;
+constexpr int BlockRows = 4; ///< of pixels that share a pass over the views
+
+/// Values between samples at equal steps from 0 to 1, by the polynomial through all five.
+double Quartic(const double (&samples)[5], double at)
+{
+  double sum = 0.0;
+  for (int i = 0; i < 5; ++i)
+  {
+    double part = samples[i];
+    for (int j = 0; j < 5; ++j)
+    {
+      part *= j == i ? 1.0 : (4.0 * at - j) / (i - j);
+    }
+    sum += part;
+  }
+  return sum;
+}
+}
+
+HalfScanReconstruction::HalfScanReconstruction(const ScannerSettings& settings)
+  : Settings(settings)
+  , HalfFan(0.5 * ((settings.HalfScanViews() - 1) * settings.ViewAngle() - Pi))
+  , Kernel(settings.channels)
+{
+  // Fourier integral of the windowed ramp, straight between samples, over [0, Nyquist]; exact for
+  // those pieces, so that far values of the kernel do not come out of cancellation.
+  const double pitch = settings.ColumnPitch();
+  const double step = 0.5 / pitch / FrequencySteps;
+  std::vector<double> ramp(FrequencySteps + 1);
+  for (int k = 0; k <= FrequencySteps; ++k)
+  {
+    ramp[k] = k * step * Window(settings.kernel, static_cast<double>(k) / FrequencySteps);
+  }
+  for (int n = 0; n < settings.channels; ++n)
+  {
+    double sum = 0.0;
+    if (n == 0)
+    {
+      for (int k = 0; k < FrequencySteps; ++k)
+      {
+        sum += 0.5 * (ramp[k] + ramp[k + 1]) * step;
+      }
+    }
+    else
+    {
+      const double omega = 2.0 * Pi * n * pitch;
+      sum = ramp[FrequencySteps] * std::sin(omega * FrequencySteps * step) / omega;
+      for (int k = 0; k < FrequencySteps; ++k)
+      {
+        sum += (ramp[k + 1] - ramp[k]) / step *
+          (std::cos(omega * (k + 1) * step) - std::cos(omega * k * step)) / (omega * omega);
+      }
+    }
+    const double angle = n * pitch;
+    const double fan = n == 0 ? 1.0 : angle / std::sin(angle);
+    // Twice the integral for negative frequencies; once the pitch for the sum over columns.
+    this->Kernel[n] = static_cast<float>(2.0 * sum * fan * fan * pitch);
+  }
+}
+
+double HalfScanReconstruction::Window(ReconstructionKernel kernel, double frequency)
+{
+  switch (kernel)
+  {
+    case ReconstructionKernel::Soft:
+      return Quartic({ 1.0, 0.82, 0.46, 0.16, 0.0 }, frequency);
+    case ReconstructionKernel::Standard:
+      return Quartic({ 1.0, 0.93, 0.74, 0.44, 0.05 }, frequency);
+    case ReconstructionKernel::Sharp:
+      break;
+  }
+  return Quartic({ 1.0, 1.05, 1.17, 1.22, 0.92 }, frequency);
+}
+
+double HalfScanReconstruction::Weight(int view, double column) const
+{
+  const double beta = view * this->Settings.ViewAngle();
+  const double gamma = this->Settings.ColumnAngle(column);
+  const double whole = Pi + 2.0 * this->HalfFan;
+  const auto ramp = [](double way, double width)
+  {
+    const double sine = std::sin(0.25 * Pi * way / width);
+    return sine * sine;
+  };
+  if (beta < 2.0 * (this->HalfFan - gamma))
+  {
+    return ramp(beta, this->HalfFan - gamma);
+  }
+  if (beta > Pi - 2.0 * gamma)
+  {
+    return ramp(whole - beta, this->HalfFan + gamma);
+  }
+  return 1.0;
+}
+
+void HalfScanReconstruction::Filter(int view, float* values) const
+{
+  const ScannerSettings& s = this->Settings;
+  const int rows = s.rows;
+  std::vector<float> weighted(static_cast<std::size_t>(s.channels) * rows);
+  for (int c = 0; c < s.channels; ++c)
+  {
+    const double weight = this->Weight(view, c) * s.sourceToAxis * std::cos(s.ColumnAngle(c));
+    for (int r = 0; r < rows; ++r)
+    {
+      const double rise = s.RowHeight(r) / s.sourceToDetector;
+      const std::size_t at = static_cast<std::size_t>(c) * rows + r;
+      weighted[at] = values[at] * static_cast<float>(weight / std::sqrt(1.0 + rise * rise));
+    }
+  }
+  std::fill(values, values + weighted.size(), 0.0f);
+  for (int c = 0; c < s.channels; ++c)
+  {
+    float* out = values + static_cast<std::size_t>(c) * rows;
+    for (int n = 0; n < s.channels; ++n)
+    {
+      const float h = this->Kernel[std::abs(c - n)];
+      const float* in = &weighted[static_cast<std::size_t>(n) * rows];
+      for (int r = 0; r < rows; ++r)
+      {
+        out[r] += h * in[r];
+      }
+    }
+  }
+}
+
+void HalfScanReconstruction::BackProject(const std::vector<double>& angles,
+  const std::vector<std::vector<float>>& views, const Vector3& axis, const ImageGrid& grid,
+  float* values, const ProgressCallback& progress) const
+{
+  const ScannerSettings& s = this->Settings;
+  const std::array<int, 6>& e = grid.extent;
+  const int nx = e[1] - e[0] + 1;
+  const int ny = e[3] - e[2] + 1;
+  const int nz = e[5] - e[4] + 1;
+  const Vector3 corner = grid.IndexToWorld(e[0], e[2], e[4]);
+  const int rows = s.rows;
+  const auto lastRow = static_cast<float>(rows - 1);
+  std::vector<Eigen::Vector2d> towards(angles.size()); // the tube, seen from the axis
+  for (std::size_t v = 0; v < angles.size(); ++v)
+  {
+    towards[v] = { std::cos(angles[v]), std::sin(angles[v]) };
+  }
+  const auto block = [&](std::int64_t first, std::int64_t last)
+  {
+    std::vector<float> line(rows + 1);
+    std::fill(values + first * nx * nz, values + last * nx * nz, 0.0f);
+    for (std::size_t v = 0; v < angles.size(); ++v)
+    {
+      const std::vector<float>& view = views[v];
+      for (std::int64_t j = first; j < last; ++j)
+      {
+        const double y = corner[1] + static_cast<double>(j) * grid.spacing[1] - axis[1];
+        for (int i = 0; i < nx; ++i)
+        {
+          const double x = corner[0] + i * grid.spacing[0] - axis[0];
+          // From the tube: along the central ray, and to its left.
+          const double along = s.sourceToAxis - (x * towards[v][0] + y * towards[v][1]);
+          const double left = x * towards[v][1] - y * towards[v][0];
+          const double column =
+            std::atan2(left, along) / s.ColumnPitch() + 0.5 * (s.channels - 1) + s.channelOffset;
+          const int c = static_cast<int>(column);
+          if (column < 0.0 || c + 1 >= s.channels)
+          {
+            continue;
+          }
+          const double square = along * along + left * left;
+          const auto right = static_cast<float>((column - c) / square);
+          const auto rest = static_cast<float>(1.0 / square) - right;
+          const float* one = &view[static_cast<std::size_t>(c) * rows];
+          const float* other = one + rows;
+          for (int r = 0; r < rows; ++r)
+          {
+            line[r] = rest * one[r] + right * other[r];
+          }
+          line[rows] = line[rows - 1];
+          const double scale = s.sourceToDetector / (std::sqrt(square) * s.rowPitch);
+          const auto start = static_cast<float>((corner[2] - axis[2]) * scale + 0.5 * (rows - 1));
+          const auto slope = static_cast<float>(grid.spacing[2] * scale);
+          float* out = values + (j * nx + i) * nz;
+          for (int k = 0; k < nz; ++k)
+          {
+            const float row =
+              std::min(lastRow, std::max(0.0f, start + static_cast<float>(k) * slope));
+            const int r = static_cast<int>(row);
+            out[k] += line[r] + (row - static_cast<float>(r)) * (line[r + 1] - line[r]);
+          }
+        }
+      }
+    }
+    const auto turn = static_cast<float>(s.ViewAngle());
+    std::for_each(
+      values + first * nx * nz, values + last * nx * nz, [turn](float& value) { value *= turn; });
+  };
+  ParallelFor(ny, BlockRows, block, progress);
+}
+}

@@ -1,0 +1,236 @@
+#include "ScannerSettings.h"
+
+#include "CounterRandom.h"
+#include "Require.h"
+
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+namespace coronary
+{
+namespace
+{
+constexpr double Pi = 3.14159265358979323846;
+constexpr std::uint64_t BeatPurpose = 401;
+constexpr std::uint64_t SlabPurpose = 402;
+constexpr int BeatsBefore = 2;    ///< the first slab's beat
+constexpr double EarlyBeat = 0.6; ///< an extrasystole's interval, share of the mean
+}
+
+const std::vector<ScannerNumber>& AllScannerNumbers()
+{
+  using S = ScannerSettings;
+  static const std::vector<ScannerNumber> numbers{
+    { "source_to_axis_mm", &S::sourceToAxis, 300.0, 1000.0 },
+    { "source_to_detector_mm", &S::sourceToDetector, 300.0, 2000.0 },
+    { "channels", &S::channels, 16, 4096 },
+    { "channel_pitch_mm", &S::channelPitch, 0.1, 40.0 },
+    { "channel_offset", &S::channelOffset, -2.0, 2.0 },
+    { "rows", &S::rows, 2, 640 },
+    { "row_pitch_mm", &S::rowPitch, 0.1, 40.0 },
+    { "fill", &S::fill, 0.1, 1.0 },
+    { "focal_spot_mm", &S::focalSpot, 0.0, 3.0 },
+    { "views_per_turn", &S::viewsPerTurn, 60, 5000 },
+    { "turn_s", &S::turnTime, 0.1, 2.0 },
+    { "sources", &S::sources, 1, 2 },
+    { "kilovolts", &S::kilovolts, 70.0, 140.0 },
+    { "milliamperes", &S::milliamperes, 10.0, 1500.0 },
+    { "aluminium_mm", &S::aluminium, 1.0, 20.0 },
+    { "systolic_current", &S::systolicCurrent, 0.04, 1.0 },
+    { "electronic_noise", &S::electronicNoise, 0.0, 1e5 },
+    { "electrons_per_kev", &S::electronsPerKeV, 1.0, 1000.0 },
+    { "noise", &S::noise, 0, 1 },
+    { "overlap", &S::overlap, 0.0, 0.5 },
+    { "beat_deviation", &S::beatDeviation, 0.0, 0.3 },
+    { "heart_shift_mm", &S::heartShift, 0.0, 5.0 },
+    { "breathing_mm", &S::breathing, -20.0, 20.0 },
+    { "extrasystole", &S::extrasystole, 0, 200 },
+    { "contrast_loss", &S::contrastLoss, 0.0, 0.3 },
+    { "anatomy_spacing_mm", &S::anatomySpacing, 0.2, 4.0 },
+    { "anatomy_step_s", &S::anatomyStep, 0.001, 0.1 },
+  };
+  return numbers;
+}
+
+void ScannerSettings::Validate() const
+{
+  for (const ScannerNumber& number : AllScannerNumbers())
+  {
+    const double value =
+      std::visit([this](auto member) { return static_cast<double>(this->*member); }, number.member);
+    std::ostringstream message;
+    message << "scanner: " << number.name << " is " << value << ", it must lie within "
+            << number.low << " to " << number.high;
+    Require(value >= number.low && value <= number.high, message.str());
+  }
+  Require(this->sourceToDetector > this->sourceToAxis,
+    "scanner: the detector is nearer to the tube than the axis: source_to_detector_mm has to "
+    "be above source_to_axis_mm");
+  Require(this->sources == 1 || this->viewsPerTurn % 4 == 0,
+    "scanner: the views of a quarter turn, by which two sources stand apart, are not a whole "
+    "number: "
+    "views_per_turn has to be a multiple of 4");
+  Require(this->HalfFan() < 0.25 * Pi,
+    "scanner: the fan is wider than 90 degrees: channels times channel_pitch_mm is too long an arc "
+    "for source_to_detector_mm");
+  Require(0.5 * this->rows * this->rowPitch < 0.3 * this->sourceToDetector,
+    "scanner: the cone is too wide to be reconstructed from a circle: rows times row_pitch_mm has "
+    "to stay below 0.6 source_to_detector_mm");
+}
+
+double ScannerSettings::HalfFan() const
+{
+  return std::max(-this->ColumnAngle(0.0), this->ColumnAngle(this->channels - 1.0));
+}
+
+double ScannerSettings::FieldRadius() const
+{
+  const double least = std::min(-this->ColumnAngle(0.0), this->ColumnAngle(this->channels - 1.0));
+  return this->sourceToAxis * std::sin(least);
+}
+
+int ScannerSettings::HalfScanViews() const
+{
+  return static_cast<int>(std::ceil((Pi + 2.0 * this->HalfFan()) / this->ViewAngle())) + 1;
+}
+
+double ScannerSettings::HalfScanTime() const
+{
+  const double turns = this->HalfScanViews() * this->ViewAngle() / (2.0 * Pi);
+  // Two sources share the way: each goes half of it, and starts a quarter turn after the other.
+  return this->turnTime * (this->sources == 1 ? turns : turns - 0.25);
+}
+
+const std::vector<std::string>& ScannerPresets()
+{
+  static const std::vector<std::string> names{ "single-350", "single-330", "dual-280", "dual-250",
+    "wide-280" };
+  return names;
+}
+
+ScannerSettings ScannerPreset(const std::string& name)
+{
+  ScannerSettings s; // GE LightSpeed VCT
+  if (name == "single-350")
+  {
+    return s;
+  }
+  if (name == "wide-280")
+  {
+    s.rows = 256; // 160 mm at the axis: the whole heart in one beat
+    s.turnTime = 0.28;
+    return s;
+  }
+  if (name == "single-330") // Siemens Sensation 64
+  {
+    s.sourceToAxis = 570.0;
+    s.sourceToDetector = 1040.0;
+    s.channels = 672;
+    s.channelPitch = 1.44;
+    s.rowPitch = 0.6 * 1040.0 / 570.0;
+    s.viewsPerTurn = 1160;
+    s.turnTime = 0.33;
+    return s;
+  }
+  if (name == "dual-280" || name == "dual-250") // Siemens Definition Flash and Force
+  {
+    const bool force = name == "dual-250";
+    s.sourceToAxis = 595.0;
+    s.sourceToDetector = 1085.6;
+    s.channels = force ? 920 : 736;
+    s.channelPitch = force ? 1.286 * 736.0 / 920.0 : 1.286;
+    s.rows = force ? 96 : 64;
+    s.rowPitch = 0.6 * 1085.6 / 595.0;
+    s.viewsPerTurn = 1152;
+    s.turnTime = force ? 0.25 : 0.28;
+    s.sources = 2;
+    return s;
+  }
+  std::string list;
+  for (const std::string& known : ScannerPresets())
+  {
+    list += (list.empty() ? "" : ", ") + known;
+  }
+  throw std::invalid_argument("scanner: no preset '" + name + "'; there are " + list);
+}
+
+ScannerSchedule::ScannerSchedule(
+  const ScannerSettings& settings, double low, double high, double cycleLength)
+  : Height(settings.SlabHeight())
+  , Step((1.0 - settings.overlap) * settings.SlabHeight())
+{
+  settings.Validate();
+  Require(settings.HalfScanTime() < cycleLength,
+    "scanner: a half scan takes " + std::to_string(std::lround(1000.0 * settings.HalfScanTime())) +
+      " ms, longer than the R-R interval of " + std::to_string(std::lround(1000.0 * cycleLength)) +
+      " ms: shorten turn_s");
+  const int count =
+    1 + std::max(0, static_cast<int>(std::ceil((high - low - this->Height) / this->Step - 1e-9)));
+  Require(count <= 200, "scanner: the image takes more than 200 slabs: the rows are too few");
+  RandomStream beats(settings.seed, BeatPurpose);
+  RandomStream slabs(settings.seed, SlabPurpose);
+  std::vector<double> intervals(2 * count + 2 * BeatsBefore + 2);
+  for (double& interval : intervals)
+  {
+    interval = cycleLength * (1.0 + settings.beatDeviation * beats.Normal(2.0));
+  }
+  if (settings.extrasystole > 0 && settings.extrasystole <= count)
+  {
+    // The early beat, and the pause after it: together they last two beats.
+    const std::size_t early = BeatsBefore + 2 * (settings.extrasystole - 1);
+    intervals[early] = EarlyBeat * cycleLength;
+    intervals[early + 1] = (2.0 - EarlyBeat) * cycleLength;
+  }
+  this->Peaks.push_back(0.0);
+  for (const double interval : intervals)
+  {
+    this->Peaks.push_back(this->Peaks.back() + interval);
+  }
+  const double first = 0.5 * (low + high) - 0.5 * (count - 1) * this->Step;
+  for (int s = 0; s < count; ++s)
+  {
+    ScannerSlab slab;
+    const std::size_t beat = BeatsBefore + 2 * s;
+    // From the head to the feet.
+    slab.centre = first + (count - 1 - s) * this->Step;
+    slab.start = this->Peaks[beat];
+    slab.interval = intervals[beat];
+    slab.gantryAngle = slabs.Uniform(0.0, 2.0 * Pi);
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      slab.shift[axis] = settings.heartShift * slabs.Normal(2.0);
+    }
+    if (count > 1)
+    {
+      slab.shift[2] -= settings.breathing * s / (count - 1);
+    }
+    slab.iodine = std::pow(1.0 - settings.contrastLoss, s);
+    this->Slabs_.push_back(slab);
+  }
+}
+
+double ScannerSchedule::Phase(double seconds) const
+{
+  const auto next = std::upper_bound(this->Peaks.begin() + 1, this->Peaks.end() - 1, seconds);
+  const double interval = *next - *(next - 1);
+  return static_cast<double>(next - this->Peaks.begin() - 1 - BeatsBefore) +
+    (seconds - *(next - 1)) / interval;
+}
+
+double ScannerSchedule::Weight(std::size_t slab, double z) const
+{
+  const auto raw = [&](const ScannerSlab& one)
+  {
+    const double inside = 0.5 * this->Height - std::abs(z - one.centre) + 1e-6;
+    const double ramp = std::max(1e-3, this->Height - this->Step);
+    return std::clamp(inside / ramp, 0.0, 1.0);
+  };
+  double sum = 0.0;
+  for (const ScannerSlab& one : this->Slabs_)
+  {
+    sum += raw(one);
+  }
+  return sum > 0.0 ? raw(this->Slabs_[slab]) / sum : 0.0;
+}
+}

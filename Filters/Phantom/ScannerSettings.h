@@ -1,0 +1,148 @@
+/**
+ * @file ScannerSettings.h
+ * @brief What a simulated CT scanner is, and when it looks: geometry, tube, beats.
+ *
+ * Third-generation geometry: tube and detector turn together about the z axis, the detector is an arc
+ * about the focal spot. docs/scanner.md has the sources of all numbers.
+ */
+#ifndef DynamicCoronary_ScannerSettings_h
+#define DynamicCoronary_ScannerSettings_h
+
+#include "Geometry.h"
+
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace coronary
+{
+enum class ReconstructionKernel
+{
+  Soft,
+  Standard,
+  Sharp
+};
+
+/// Everything that decides what a scanner sees. Defaults: a single source with 64 rows. Names, units and
+/// ranges of the numbers: AllScannerNumbers().
+struct ScannerSettings
+{
+  // Geometry.
+  double sourceToAxis = 541.0;
+  double sourceToDetector = 949.075;
+  int channels = 888; ///< detector columns
+  double channelPitch = 1.0239;
+  double channelOffset = 0.25; ///< of the arc's middle from the central ray, columns
+  int rows = 64;
+  double rowPitch = 1.0988; ///< at the detector
+  double fill = 0.85;       ///< active share of a cell's width and height
+  double focalSpot = 0.9;
+  int viewsPerTurn = 984;
+  double turnTime = 0.35;
+  int sources = 1; ///< two stand at a right angle
+
+  // Tube.
+  double kilovolts = 120.0;
+  double milliamperes = 600.0;     ///< of each tube
+  double aluminium = 3.0;          ///< flat filter
+  double systolicCurrent = 1.0;    ///< share of the current before 55 and after 96 % R-R
+  double electronicNoise = 3500.0; ///< standard deviation, electrons
+  double electronsPerKeV = 17.0;
+  int noise = 1; ///< 0: neither Poisson nor electronic noise
+
+  // Time. Slab s is seen in beat 2 s: the table moves during the beats between.
+  double overlap = 0.125;      ///< share of a slab that the next one sees again
+  double beatDeviation = 0.03; ///< relative standard deviation of the R-R intervals
+  double heartShift = 0.75;    ///< standard deviation of a slab's shift along each axis
+  double breathing = 0.0;      ///< towards the feet over the whole scan
+  int extrasystole = 0;        ///< slab whose beat is cut short, counted from 1; 0: none
+  double contrastLoss = 0.0;   ///< share of the iodine from slab to slab
+
+  // Computing.
+  ReconstructionKernel kernel = ReconstructionKernel::Standard;
+  double anatomySpacing = 0.5; ///< voxels of the material maps
+  double anatomyStep = 0.008;  ///< between two maps
+  std::uint64_t seed = 1;      ///< of noise, beats and shifts
+
+  /// @throws std::invalid_argument that names the first setting at fault
+  void Validate() const;
+
+  /// Angle of a detector column at the focal spot, rad.
+  double ColumnPitch() const { return this->channelPitch / this->sourceToDetector; }
+  double ColumnAngle(double column) const
+  {
+    return (column - 0.5 * (this->channels - 1) - this->channelOffset) * this->ColumnPitch();
+  }
+  /// Height of a row on the detector over the central plane, mm.
+  double RowHeight(double row) const { return (row - 0.5 * (this->rows - 1)) * this->rowPitch; }
+  /// Greatest angle between a ray and the central ray, rad.
+  double HalfFan() const;
+  /// Radius of the circle that all views see, mm.
+  double FieldRadius() const;
+  /// Height of a slab at the axis, mm.
+  double SlabHeight() const
+  {
+    return this->rows * this->rowPitch * this->sourceToAxis / this->sourceToDetector;
+  }
+  double ViewAngle() const { return 2.0 * 3.14159265358979323846 / this->viewsPerTurn; }
+  /// Views of a half scan: 180 degrees and the fan.
+  int HalfScanViews() const;
+  /// From the first view of a half scan to its last, s.
+  double HalfScanTime() const;
+};
+
+/// A number of ScannerSettings, as files name it.
+struct ScannerNumber
+{
+  const char* name;
+  std::variant<double ScannerSettings::*, int ScannerSettings::*> member;
+  double low;
+  double high;
+};
+const std::vector<ScannerNumber>& AllScannerNumbers();
+
+/// Names of the presets, as options take them.
+const std::vector<std::string>& ScannerPresets();
+
+/// @throws std::invalid_argument that lists the presets
+ScannerSettings ScannerPreset(const std::string& name);
+
+/// One slab of a step-and-shoot scan.
+struct ScannerSlab
+{
+  double centre = 0.0;             ///< z, mm
+  double start = 0.0;              ///< of its beat, s
+  double interval = 0.0;           ///< R-R of that beat, s
+  double gantryAngle = 0.0;        ///< of the first tube at `start`, rad
+  Vector3 shift = Vector3::Zero(); ///< of the patient, mm
+  double iodine = 1.0;             ///< factor on all iodine
+};
+
+/// When the heart beats, and which slab is seen in which beat.
+class ScannerSchedule
+{
+public:
+  /**
+   * @param low, high    z range to be seen, mm
+   * @param cycleLength  mean R-R interval, s
+   * @throws std::invalid_argument for settings that can not be
+   */
+  ScannerSchedule(const ScannerSettings& settings, double low, double high, double cycleLength);
+
+  const std::vector<ScannerSlab>& Slabs() const { return this->Slabs_; }
+
+  /// Phase of the heart at a moment: whole numbers at the R peaks, straight between.
+  double Phase(double seconds) const;
+
+  /// Share of a slab in the image at height z: 1 but where slabs overlap, there straight ramps.
+  double Weight(std::size_t slab, double z) const;
+
+private:
+  double Height;
+  double Step;
+  std::vector<double> Peaks; ///< s; the first is that of beat -2
+  std::vector<ScannerSlab> Slabs_;
+};
+}
+
+#endif
