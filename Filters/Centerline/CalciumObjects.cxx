@@ -98,7 +98,7 @@ double ContrastAt(const LumenLevels& levels, std::int64_t point)
 }
 
 /// Voxels above the lower threshold beside the tree, by offset, without labels.
-std::vector<CalciumVoxel> BrightVoxels(const CenterlineTree& tree, const ScalarImage& image,
+std::vector<CalciumVoxel> BrightVoxels(const VesselTree& tree, const ScalarImage& image,
   const LumenLevels& levels, const CalciumSettings& settings, const ProgressCallback& progress)
 {
   const Lattice lattice(image);
@@ -253,7 +253,7 @@ double Score(
 class Surroundings
 {
 public:
-  Surroundings(const CenterlineTree& tree, const LumenLevels& levels, double blur,
+  Surroundings(const VesselTree& tree, const LumenLevels& levels, double blur,
     const Vector3& centre, double reach)
     : Tree(tree)
     , Levels(levels)
@@ -304,7 +304,7 @@ public:
   }
 
 private:
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const LumenLevels& Levels;
   double Blur;
   double Background;
@@ -436,8 +436,8 @@ int AgatstonWeight(double peak)
   return peak < 130.0 ? 0 : std::min(4, static_cast<int>(std::max(1.0, std::floor(peak / 100.0))));
 }
 
-CalciumMap FindCalcium(const CenterlineTree& tree, const ScalarImage& image,
-  const LumenLevels& levels, const CalciumSettings& settings, const ProgressCallback& progress)
+CalciumMap FindCalcium(const VesselTree& tree, const ScalarImage& image, const LumenLevels& levels,
+  const CalciumSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
   CheckTree(tree);
@@ -505,7 +505,7 @@ CalciumMap FindCalcium(const CenterlineTree& tree, const ScalarImage& image,
   return map;
 }
 
-void MeasureCalcium(CalciumMap& calcium, const CenterlineTree& tree,
+void MeasureCalcium(CalciumMap& calcium, const VesselTree& tree,
   const std::vector<VesselPath>& paths, const ScalarImage& image, const LumenLevels& levels,
   double blur)
 {

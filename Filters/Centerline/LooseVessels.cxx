@@ -137,14 +137,13 @@ struct Tip
 };
 
 /// Ends of branches without daughters, with the direction of their last millimetres.
-std::vector<Tip> TipsOf(const CenterlineTree& tree)
+std::vector<Tip> TipsOf(const VesselTree& tree)
 {
   std::vector<Tip> tips;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (std::any_of(tree.branches.begin(), tree.branches.end(),
-          [&](const CenterlineTree::Branch& other)
-          { return other.parentGroupId == branch.groupId; }))
+          [&](const VesselTree::Branch& other) { return other.parentGroupId == branch.groupId; }))
     {
       continue;
     }
@@ -247,9 +246,9 @@ Sample Search::Measure(
 
 void Search::MeasureTree()
 {
-  const CenterlineTree& tree = this->I.tree;
+  const VesselTree& tree = this->I.tree;
   std::vector<double> thin;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t i = 2; i + 2 < branch.points.size(); i += 2)
     {

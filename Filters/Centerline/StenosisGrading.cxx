@@ -98,7 +98,7 @@ Profile Resample(const VesselPath& path, const RefinedLumen& lumen, double step)
 }
 
 /// How much narrower a vessel may become where others leave, in steps of the profile, mm. 0: nothing leaves.
-std::vector<double> StepsAt(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+std::vector<double> StepsAt(const VesselTree& tree, const std::vector<VesselPath>& paths,
   std::size_t number, const Profile& profile)
 {
   const VesselPath& path = paths[number];
@@ -300,7 +300,7 @@ std::vector<double> Closed(const std::vector<double>& values, double length)
 /// What grading one vessel needs.
 struct GradedPath
 {
-  const CenterlineTree& tree;
+  const VesselTree& tree;
   const VesselPath& path;
   const RefinedLumen& lumen;
   const std::vector<unsigned char>& bridged;
@@ -601,7 +601,7 @@ double PopulationDiameter(int segmentId)
   }
 }
 
-StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+StenosisGrading GradeStenoses(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const RefinedLumen& lumen, const std::vector<unsigned char>& bridged,
   const std::vector<double>& bridgeConfidence, const GradingSettings& settings)
 {
@@ -671,7 +671,7 @@ StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<Vess
       graded.DescribeEnd(tips[n], result.lesions);
     }
     int treeId = 0;
-    for (const CenterlineTree::Branch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       if (std::find(branch.points.begin(), branch.points.end(), path.points.back()) !=
         branch.points.end())

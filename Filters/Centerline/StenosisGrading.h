@@ -79,7 +79,7 @@ struct StenosisGrading
  * @param bridgeConfidence one value a point, 0 to 1; may be empty
  * @throws std::invalid_argument as CheckTree, for arrays of another length, or for settings out of range
  */
-StenosisGrading GradeStenoses(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+StenosisGrading GradeStenoses(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const RefinedLumen& lumen, const std::vector<unsigned char>& bridged = {},
   const std::vector<double>& bridgeConfidence = {}, const GradingSettings& settings = {});
 

@@ -29,7 +29,7 @@ constexpr double MostBeyondTip = 30.0;
 class TreeLumen
 {
 public:
-  TreeLumen(const CenterlineTree& tree, double reach)
+  TreeLumen(const VesselTree& tree, double reach)
     : Tree(tree)
     , Reach(reach)
   {
@@ -87,7 +87,7 @@ private:
     return part(0, i) << 42 | part(1, j) << 21 | part(2, k);
   }
 
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   double Reach;
   double Cell = 1.0;
   std::unordered_map<std::int64_t, std::vector<std::int32_t>> Cells;
@@ -96,8 +96,7 @@ private:
 class Finder
 {
 public:
-  Finder(
-    const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+  Finder(const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
     : Image(image)
     , Tree(tree)
     , Settings(settings)
@@ -105,14 +104,14 @@ public:
     , Noise(MeasureNoise(image, tree, settings.voxel))
     , Joint(tree.points.size(), 0)
   {
-    for (const CenterlineTree::Branch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       this->Joint[static_cast<std::size_t>(branch.points.front())] = 1;
     }
   }
 
   std::vector<ThinBranch> Run() const;
-  TipPath FollowTip(const CenterlineTree::Branch& branch) const;
+  TipPath FollowTip(const VesselTree::Branch& branch) const;
 
 private:
   struct Spot
@@ -159,7 +158,7 @@ private:
   bool Follow(const Spot& spot, ThinBranch& branch) const;
 
   const ImageInterpolator& Image;
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const ThinBranchSettings& Settings;
   TreeLumen Lumen;
   double Noise;
@@ -171,7 +170,7 @@ std::vector<Finder::Spot> Finder::FindSpots() const
 {
   const double voxel = this->Settings.voxel;
   std::vector<Spot> spots;
-  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     const std::size_t count = branch.points.size();
     if (count < 3)
@@ -577,7 +576,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   return true;
 }
 
-TipPath Finder::FollowTip(const CenterlineTree::Branch& branch) const
+TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
 {
   const double voxel = this->Settings.voxel;
   const auto index = [&](std::size_t i) { return static_cast<std::size_t>(branch.points[i]); };
@@ -690,10 +689,10 @@ std::vector<ThinBranch> Finder::Run() const
 }
 }
 
-double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+double MeasureNoise(const ImageInterpolator& image, const VesselTree& tree, double voxel)
 {
   std::vector<double> differences;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t i = 4; i + 4 < branch.points.size(); i += 4)
     {
@@ -753,14 +752,14 @@ void Check(const ThinBranchSettings& settings)
 }
 
 std::vector<ThinBranch> FindThinBranches(
-  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
 {
   Check(settings);
   return Finder(image, tree, settings).Run();
 }
 
 std::vector<TipPath> FollowTips(
-  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
 {
   Check(settings);
   const Finder finder(image, tree, settings);

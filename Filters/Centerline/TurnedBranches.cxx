@@ -28,7 +28,7 @@ constexpr double Cone = 0.65; ///< cosine
 constexpr double ConeReach = 5.0;
 
 /// Length along a branch's points, mm.
-std::vector<double> Lengths(const CenterlineTree& tree, const std::vector<std::int64_t>& points)
+std::vector<double> Lengths(const VesselTree& tree, const std::vector<std::int64_t>& points)
 {
   std::vector<double> along(points.size(), 0.0);
   for (std::size_t i = 1; i < points.size(); ++i)
@@ -41,7 +41,7 @@ std::vector<double> Lengths(const CenterlineTree& tree, const std::vector<std::i
 class TurnedFinder
 {
 public:
-  TurnedFinder(const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+  TurnedFinder(const ImageInterpolator& image, const VesselTree& tree, double voxel)
     : Image(image)
     , Tree(tree)
     , Voxel(voxel)
@@ -72,7 +72,7 @@ private:
   std::pair<double, double> Values(const TurnedBranch& turned) const;
 
   const ImageInterpolator& Image;
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   double Voxel;
 };
 
@@ -83,7 +83,7 @@ TurnedFinder::Upstream TurnedFinder::Above(std::size_t branch) const
   for (int parent = this->Tree.branches[branch].parentGroupId; parent >= 0;)
   {
     const auto at = std::find_if(this->Tree.branches.begin(), this->Tree.branches.end(),
-      [&](const CenterlineTree::Branch& one) { return one.groupId == parent; });
+      [&](const VesselTree::Branch& one) { return one.groupId == parent; });
     const std::vector<std::int64_t>& points = at->points;
     const auto end = std::find(points.begin(), points.end(), from);
     for (auto i = std::distance(points.begin(), end); i >= 0; --i)
@@ -296,7 +296,7 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
       }
     }
   };
-  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     if (&branch != &this->Tree.branches[turned.branch])
     {
@@ -392,7 +392,7 @@ std::vector<TurnedBranch> TurnedFinder::Run() const
   std::vector<char> parts(this->Tree.branches.size(), 0);
   for (std::size_t b = 0; b < parts.size(); ++b)
   {
-    for (const CenterlineTree::Branch& other : this->Tree.branches)
+    for (const VesselTree::Branch& other : this->Tree.branches)
     {
       parts[b] |= other.parentGroupId == this->Tree.branches[b].groupId ? 1 : 0;
     }
@@ -417,7 +417,7 @@ std::vector<TurnedBranch> TurnedFinder::Run() const
 }
 
 std::vector<TurnedBranch> FindTurnedBranches(
-  const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+  const ImageInterpolator& image, const VesselTree& tree, double voxel)
 {
   return TurnedFinder(image, tree, voxel).Run();
 }

@@ -91,7 +91,7 @@ double Angle(const Vector3& a, const Vector3& b)
 class VeinFinder
 {
 public:
-  VeinFinder(const CenterlineTree& tree, const ImageInterpolator& image,
+  VeinFinder(const VesselTree& tree, const ImageInterpolator& image,
     const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
     : Tree(tree)
     , Image(image)
@@ -198,7 +198,7 @@ private:
   std::optional<double> Through(const Arm& a, const Arm& b) const;
   void FindOpposites(std::vector<Arm>& arms) const;
 
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const ImageInterpolator& Image;
   const std::function<bool(const Vector3&)>& Closed;
   double Blur;
@@ -267,7 +267,7 @@ VeinFinder::Course VeinFinder::Up(std::size_t branch, double reach) const
   int parent = this->Tree.branches[branch].parentGroupId;
   while (parent >= 0)
   {
-    const CenterlineTree::Branch& up = this->Tree.branches[this->Index.at(parent)];
+    const VesselTree::Branch& up = this->Tree.branches[this->Index.at(parent)];
     for (std::size_t i = up.points.size() - 1; i > 0; --i)
     {
       passed += (this->At(up.points[i]) - this->At(up.points[i - 1])).norm();
@@ -935,7 +935,7 @@ const std::array<const char*, NumberOfVeinSigns>& VeinSignNames()
   return names;
 }
 
-std::vector<VeinBranch> JudgeBranches(const CenterlineTree& tree, const ImageInterpolator& image,
+std::vector<VeinBranch> JudgeBranches(const VesselTree& tree, const ImageInterpolator& image,
   const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
 {
   return VeinFinder(tree, image, reference, blur, closed).Run();

@@ -13,7 +13,7 @@ namespace
 class Joiner
 {
 public:
-  Joiner(const CenterlineTree& tree, const std::vector<std::string>& names, double leadIn)
+  Joiner(const VesselTree& tree, const std::vector<std::string>& names, double leadIn)
     : Tree(tree)
     , Names(names)
     , LeadIn(leadIn)
@@ -23,7 +23,7 @@ public:
   {
     for (std::size_t b = 0; b < tree.branches.size(); ++b)
     {
-      const CenterlineTree::Branch& branch = tree.branches[b];
+      const VesselTree::Branch& branch = tree.branches[b];
       for (std::size_t i = branch.parentGroupId < 0 ? 0 : 1; i < branch.points.size(); ++i)
       {
         this->Owner[static_cast<std::size_t>(branch.points[i])] = b;
@@ -109,7 +109,7 @@ private:
     }
     chain.points.insert(chain.points.end(), path.points.begin(), path.points.end());
     chain.arc.insert(chain.arc.end(), path.arc.begin(), path.arc.end());
-    const CenterlineTree::Branch& begin = this->Tree.branches[this->BranchAt(path, 1)];
+    const VesselTree::Branch& begin = this->Tree.branches[this->BranchAt(path, 1)];
     chain.groupId = begin.groupId;
     chain.treeId = begin.treeId;
     for (std::size_t k = 1; k < path.points.size(); ++k)
@@ -129,7 +129,7 @@ private:
     return chain;
   }
 
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const std::vector<std::string>& Names;
   const double LeadIn;
   std::vector<VesselPath> Paths;
@@ -140,7 +140,7 @@ private:
 }
 
 std::vector<VesselChain> JoinVessels(
-  const CenterlineTree& tree, const std::vector<std::string>& names, double leadIn)
+  const VesselTree& tree, const std::vector<std::string>& names, double leadIn)
 {
   if (names.size() != tree.branches.size())
   {

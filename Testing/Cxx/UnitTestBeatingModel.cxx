@@ -33,13 +33,13 @@ Model PhantomModel(const CoronaryPhantom& phantom, int phases)
   Model model;
   const PhantomTree tree = phantom.Tree(0.0);
   // The longest branch of each tree.
-  std::array<const PhantomBranch*, 2> longest{};
-  for (const PhantomBranch& branch : tree.branches)
+  std::array<const VesselTree::Branch*, 2> longest{};
+  for (const VesselTree::Branch& branch : tree.branches)
   {
-    const PhantomBranch*& best = longest[branch.treeId];
+    const VesselTree::Branch*& best = longest[branch.treeId];
     best = !best || branch.points.size() > best->points.size() ? &branch : best;
   }
-  const PhantomBranch& branch = *longest[0];
+  const VesselTree::Branch& branch = *longest[0];
   for (std::size_t n = 0; n < branch.points.size(); n += 6)
   {
     const std::int64_t p = branch.points[n];
