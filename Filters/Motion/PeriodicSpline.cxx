@@ -62,6 +62,31 @@ CubicWeights CubicAt(const KnotInterval& interval)
     { -1.0 / gap, 1.0 / gap, -(3.0 * a * a - 1.0) * gap / 6.0, (3.0 * b * b - 1.0) * gap / 6.0 } };
 }
 
+namespace
+{
+/// SecondDerivatives by the equations divided by 6: recorded sessions hold the bits of these.
+Eigen::MatrixXd RecordedDerivatives(const std::vector<double>& knots)
+{
+  const auto count = static_cast<Eigen::Index>(knots.size());
+  const auto step = [&](Eigen::Index k)
+  { return k + 1 < count ? knots[k + 1] - knots[k] : knots[0] + 1.0 - knots[k]; };
+  Eigen::MatrixXd left = Eigen::MatrixXd::Zero(count, count);
+  Eigen::MatrixXd right = left;
+  for (Eigen::Index k = 0; k < count; ++k)
+  {
+    const Eigen::Index before = (k + count - 1) % count;
+    const Eigen::Index after = (k + 1) % count;
+    left(k, before) += step(before) / 6.0;
+    left(k, k) += (step(before) + step(k)) / 3.0;
+    left(k, after) += step(k) / 6.0;
+    right(k, after) += 1.0 / step(k);
+    right(k, k) -= 1.0 / step(k) + 1.0 / step(before);
+    right(k, before) += 1.0 / step(before);
+  }
+  return left.partialPivLu().solve(right);
+}
+}
+
 PeriodicPositions::PeriodicPositions(
   const std::vector<double>& phases, const std::vector<std::vector<Vector3>>& positions)
 {
@@ -124,7 +149,7 @@ PeriodicPositions::PeriodicPositions(
   }
   this->Second.resize(this->Sample.size());
   Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-    this->Second.data(), knots, values) = (SecondDerivatives(this->Knots) * sample).cast<float>();
+    this->Second.data(), knots, values) = (RecordedDerivatives(this->Knots) * sample).cast<float>();
 }
 
 void PeriodicPositions::Evaluate(double phase, std::vector<Vector3>& positions) const
