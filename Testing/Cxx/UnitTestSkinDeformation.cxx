@@ -643,10 +643,10 @@ std::vector<Vector3> VelocitiesOf(SkinDeformation& skin, const MovingSkeletonPos
     result.emplace_back(velocities[i], velocities[i + 1], velocities[i + 2]);
     size = std::max(size, result.back().norm());
   }
-  for (const SkinInstructions instructions :
-    { SkinInstructions::Baseline, SkinInstructions::Avx2, SkinInstructions::Avx512 })
+  for (const Instructions instructions :
+    { Instructions::Baseline, Instructions::Avx2, Instructions::Avx512 })
   {
-    if (SetSkinInstructions(instructions))
+    if (SkinKernelChoice().Select(instructions))
     {
       std::vector<float> stillSingle(count);
       std::vector<float> single(count);
@@ -657,7 +657,7 @@ std::vector<Vector3> VelocitiesOf(SkinDeformation& skin, const MovingSkeletonPos
       EXPECT_LT(GreatestDistance(result, rates), 2e-5 * (1.0 + size));
     }
   }
-  SetSkinInstructions(SkinInstructions::Widest);
+  SkinKernelChoice().Select(Instructions::Widest);
   return result;
 }
 
