@@ -1,9 +1,9 @@
 #include "vtkTGFReader.h"
 
 #include "CenterlineConversion.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -31,10 +31,10 @@ namespace
 {
 /// Bones instead of the branches of the tree that was found in them.
 void SetBones(
-  vtkPolyData* output, const coronary::TgfSkeleton& skeleton, const coronary::CenterlineTree& tree)
+  vtkPolyData* output, const coronary::TgfSkeleton& skeleton, const coronary::VesselTree& tree)
 {
   std::vector<vtkIdType> parent(skeleton.joints.size(), -1);
-  std::vector<const coronary::CenterlineTree::Branch*> branchTo(skeleton.joints.size(), nullptr);
+  std::vector<const coronary::VesselTree::Branch*> branchTo(skeleton.joints.size(), nullptr);
   for (const auto& branch : tree.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
@@ -111,7 +111,7 @@ int vtkTGFReader::RequestData(
       throw std::invalid_argument("can not be read to its end");
     }
     vtkPolyData* output = vtkPolyData::GetData(outputs, 0);
-    const coronary::CenterlineTree tree = coronary::FromSkeleton(skeleton, this->Radius);
+    const coronary::VesselTree tree = coronary::FromSkeleton(skeleton, this->Radius);
     vtkCoronary::SetTree(output, tree);
     if (this->OutputForm == SkeletonForm)
     {

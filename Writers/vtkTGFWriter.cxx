@@ -2,8 +2,8 @@
 
 #include "AtomicFile.h"
 #include "CenterlineConversion.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"

@@ -19,7 +19,6 @@
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkCenterlineConversion.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryTreeTopology.h"
 #include "vtkIdList.h"
@@ -29,6 +28,7 @@
 #include "vtkSmartPointer.h"
 #include "vtkTGFReader.h"
 #include "vtkTGFWriter.h"
+#include "vtkVesselTree.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -240,7 +240,7 @@ EvaluateJob::CaseFiles EvaluateJob::FindCase(std::size_t number) const
 }
 
 /// The tree of a phase: its centerline, or what the surface knows of its branches.
-BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* side,
+Polylines ReadTree(const std::string& path, vtkPolyData* surface, const char* side,
   vtkMessageTrap& messages, std::map<std::int64_t, std::string>* labels)
 {
   if (path.empty())
@@ -248,7 +248,7 @@ BranchTree ReadTree(const std::string& path, vtkPolyData* surface, const char* s
     vtkPointData* arrays = surface->GetPointData();
     const bool known = arrays->HasArray(vtkCoronaryArrayNames::GroupIds) != 0 &&
       arrays->HasArray(vtkCoronaryArrayNames::Abscissas) != 0;
-    return known ? vtkCoronary::TreeOf(surface, side) : BranchTree();
+    return known ? vtkCoronary::TreeOf(surface, side) : Polylines();
   }
   vtkSmartPointer<vtkPolyData> lines = ReadPolyData(path, messages);
   if (labels)

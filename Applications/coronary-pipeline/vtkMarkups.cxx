@@ -1,9 +1,9 @@
 #include "vtkMarkups.h"
 
 #include "CenterlineConversion.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkSeeds.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -282,7 +282,7 @@ vtkSmartPointer<vtkPolyData> TreeOfLines(vtkPolyData* lines, double tolerance)
       before = joint;
     }
   }
-  CenterlineTree tree = FromSkeleton(skeleton);
+  VesselTree tree = FromSkeleton(skeleton);
   tree.radius = radii;
   auto data = vtkSmartPointer<vtkPolyData>::New();
   vtkCoronary::SetTree(data, tree);
@@ -290,7 +290,7 @@ vtkSmartPointer<vtkPolyData> TreeOfLines(vtkPolyData* lines, double tolerance)
   {
     vtkNew<vtkStringArray> texts;
     texts->SetName(names::SegmentLabel);
-    for (const CenterlineTree::Branch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       const std::int64_t a = branch.points[0];
       const std::int64_t b = branch.points[1];

@@ -8,7 +8,7 @@
 #include "MetaImageWriter.h"
 #include "StenosisGrading.h"
 #include "VesselPaths.h"
-#include "vtkCenterlineForms.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
@@ -34,9 +34,9 @@ namespace names = vtkCoronaryArrayNames;
 using Json = nlohmann::ordered_json;
 
 /// The tree with all that its arrays tell.
-CenterlineTree TreeWithArrays(vtkPolyData* data)
+VesselTree TreeWithArrays(vtkPolyData* data)
 {
-  CenterlineTree tree = vtkCoronary::TreeOf(data);
+  VesselTree tree = vtkCoronary::TreeOf(data);
   vtkPointData* arrays = data->GetPointData();
   const auto each = [&](const char* name, const auto& take)
   {
@@ -68,7 +68,7 @@ ProgressCallback ProgressOf(const std::function<void(double)>& progress)
 /// An image, a tree in it, and what was measured of both.
 struct Measurement : TreeLumen
 {
-  CenterlineTree tree;
+  VesselTree tree;
   std::vector<VesselPath> paths;
   std::vector<float> copy;
   ScalarImage image;
@@ -117,7 +117,7 @@ std::string Row(const Stenosis& lesion)
 
 Json DescribeCalcium(const Measurement& measurement)
 {
-  const CenterlineTree& tree = measurement.tree;
+  const VesselTree& tree = measurement.tree;
   Json objects = Json::array();
   std::map<std::string, double> scores;
   double score = 0.0;

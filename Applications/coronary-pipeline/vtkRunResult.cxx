@@ -2,12 +2,12 @@
 
 #include "BoundedJson.h"
 #include "TextFile.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkDataFiles.h"
 #include "vtkGatedImageReader.h"
 #include "vtkMessageTrap.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
@@ -69,7 +69,7 @@ void TakeNames(vtkPolyData* lines, RunResult& result)
   {
     cellOf.emplace(static_cast<int>(groups->GetTuple1(k)), k);
   }
-  for (CenterlineTree::Branch& branch : result.tree.branches)
+  for (VesselTree::Branch& branch : result.tree.branches)
   {
     const auto cell = cellOf.find(branch.groupId);
     const bool known = cell != cellOf.end();

@@ -5,9 +5,9 @@
 #ifndef vtkRunResult_h
 #define vtkRunResult_h
 
-#include "CenterlineTree.h"
 #include "LumenMeasurement.h"
 #include "ParallelFor.h"
+#include "VesselTree.h"
 
 #include "vtkImageData.h"
 #include "vtkPolyData.h"
@@ -55,7 +55,7 @@ struct RunResult
   nlohmann::ordered_json report; ///< an object
   double time = 0.0;             ///< of the reference phase, fraction of R-R
   vtkSmartPointer<vtkPolyData> lines;
-  CenterlineTree tree;
+  VesselTree tree;
   std::vector<std::string> names; ///< of the tree's branches, SCCT; empty where there is none
 
   ///@{

@@ -1,9 +1,9 @@
 #include "vtkRunTrees.h"
 
 #include "LooseVessels.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
@@ -182,7 +182,7 @@ void AddLooseVessels(
   heart.size = 1.0 / heart.axes.row(0).norm();
   heart.axes *= heart.size;
   heart.origin = -heart.size * (heart.axes.transpose() * shift);
-  const CenterlineTree lines = vtkCoronary::TreeOf(tree);
+  const VesselTree lines = vtkCoronary::TreeOf(tree);
   std::vector<float> imageCopy;
   std::vector<float> copy;
   const ScalarImage tubes =

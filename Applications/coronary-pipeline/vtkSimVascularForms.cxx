@@ -1,9 +1,9 @@
 #include "vtkSimVascularForms.h"
 
 #include "CenterlineConversion.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -50,17 +50,17 @@ struct Stretch
 /// Branches with one daughter joined to it; the root comes first, parents before daughters.
 std::vector<Stretch> StretchesOf(vtkPolyData* data)
 {
-  const CenterlineTree whole = vtkCoronary::TreeOf(data);
-  const CenterlineTree tree = SplitAtBifurcations(whole);
+  const VesselTree whole = vtkCoronary::TreeOf(data);
+  const VesselTree tree = SplitAtBifurcations(whole);
   const auto roots = std::count_if(tree.branches.begin(), tree.branches.end(),
-    [](const CenterlineTree::Branch& branch) { return branch.parentGroupId == -1; });
+    [](const VesselTree::Branch& branch) { return branch.parentGroupId == -1; });
   if (roots != 1)
   {
     throw std::runtime_error("The centerlines are " + std::to_string(roots) +
       " trees or branches at the root, SimVascular's are one: choose one with --tree.");
   }
   std::map<int, int> daughters;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     ++daughters[branch.parentGroupId];
   }
@@ -81,7 +81,7 @@ std::vector<Stretch> StretchesOf(vtkPolyData* data)
   }
   std::vector<Stretch> stretches;
   std::map<int, std::size_t> stretchOf;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     const bool root = branch.parentGroupId == -1;
     const bool goesOn = !root && daughters[branch.parentGroupId] == 1;
@@ -541,7 +541,7 @@ vtkSmartPointer<vtkPolyData> FromSimVascular(vtkPolyData* lines, double unit)
       }
     }
   }
-  CenterlineTree tree = FromSkeleton(skeleton);
+  VesselTree tree = FromSkeleton(skeleton);
   tree.radius = used;
   auto data = vtkSmartPointer<vtkPolyData>::New();
   vtkCoronary::SetTree(data, tree);

@@ -649,7 +649,7 @@ void VesselPainter::DrawTree(MarkedPicture& picture, const SlabPlane& plane,
       depths.empty() ? 0.0 : depths[static_cast<std::size_t>(row * plane.width + column)];
     return std::abs(place[2] - middle) <= half;
   };
-  for (const CenterlineTree::Branch& branch : this->Result.tree.branches)
+  for (const VesselTree::Branch& branch : this->Result.tree.branches)
   {
     std::vector<Sight> sights;
     std::vector<MarkedPicture::Place> places;

@@ -16,7 +16,7 @@ constexpr double Pi = 3.14159265358979323846;
 constexpr double Infinity = std::numeric_limits<double>::infinity();
 
 /// Direction of a branch over a stretch from one of its ends, by a fitted line; away from the end.
-Vector3 EndDirection(const CenterlineTopology& tree, const CenterlineTree::Branch& branch,
+Vector3 EndDirection(const CenterlineTopology& tree, const VesselTree::Branch& branch,
   bool fromStart, double low, double high)
 {
   Vector3 meanPoint = Vector3::Zero();
@@ -59,8 +59,8 @@ Vector3 EndDirection(const CenterlineTopology& tree, const CenterlineTree::Branc
 }
 
 /// Median radius of a branch between two distances from one of its ends.
-double EndCalibre(const CenterlineTopology& tree, const CenterlineTree::Branch& branch,
-  bool fromStart, double low, double high)
+double EndCalibre(const CenterlineTopology& tree, const VesselTree::Branch& branch, bool fromStart,
+  double low, double high)
 {
   std::vector<double> values;
   double arc = 0.0;
@@ -146,7 +146,7 @@ double FitExponent(const std::vector<Bifurcation>& bifurcations)
 }
 }
 
-int ChooseContinuation(const CenterlineTopology& tree, const CenterlineTree::Branch& parent,
+int ChooseContinuation(const CenterlineTopology& tree, const VesselTree::Branch& parent,
   const std::vector<int>& daughters)
 {
   const double r = EndCalibre(tree, parent, false, 0.0, 3.0 * tree.radius[parent.points.back()]);
@@ -155,7 +155,7 @@ int ChooseContinuation(const CenterlineTopology& tree, const CenterlineTree::Bra
   double least = Infinity;
   for (const int d : daughters)
   {
-    const CenterlineTree::Branch& daughter = tree.branches[d];
+    const VesselTree::Branch& daughter = tree.branches[d];
     const double turn = AngleBetween(course, EndDirection(tree, daughter, true, 0.5 * r, 4.0 * r));
     const double calibre = EndCalibre(tree, daughter, true, r, 4.0 * r);
     // Thirty degrees of turn weigh as much as a calibre of two thirds.
@@ -189,7 +189,7 @@ double SolveMurrayExponent(double parent, const std::vector<double>& daughters)
 void DescribeBifurcations(
   CenterlineTopology& tree, const std::vector<std::vector<int>>& daughters, double exponent)
 {
-  for (const CenterlineTree::Branch& parent : tree.branches)
+  for (const VesselTree::Branch& parent : tree.branches)
   {
     std::vector<int> leaving = daughters[parent.groupId];
     if (leaving.size() < 2)

@@ -11,7 +11,7 @@ namespace coronary
 {
 /// The daughter that carries the vessel on: little turn, much calibre.
 /// @param daughters  indices of branches
-int ChooseContinuation(const CenterlineTopology& tree, const CenterlineTree::Branch& parent,
+int ChooseContinuation(const CenterlineTopology& tree, const VesselTree::Branch& parent,
   const std::vector<int>& daughters);
 
 /**

@@ -69,7 +69,7 @@ std::vector<Vector3> FollowOuterWall(const MeasuredCourse& course, std::size_t g
 }
 }
 
-std::size_t JoinParent(MeasuredCourse& course, const CenterlineTree& tree,
+std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
   const std::vector<std::int64_t>& chain, std::int32_t owner, const CourseMeasurement& measurement)
 {
   const auto meeting = std::find(chain.begin(), chain.end(), owner) - chain.begin();

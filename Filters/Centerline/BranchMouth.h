@@ -5,8 +5,8 @@
 #ifndef DynamicCoronary_BranchMouth_h
 #define DynamicCoronary_BranchMouth_h
 
-#include "CenterlineTree.h"
 #include "MeasuredCourse.h"
+#include "VesselTree.h"
 
 namespace coronary
 {
@@ -28,7 +28,7 @@ inline double LineDistance(const Vector3& point, const Vector3& origin, const Ve
  * @param owner  the point of them that the course's way met
  * @returns the index of the parent's point in the tree
  */
-std::size_t JoinParent(MeasuredCourse& course, const CenterlineTree& tree,
+std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
   const std::vector<std::int64_t>& chain, std::int32_t owner, const CourseMeasurement& measurement);
 }
 

@@ -39,7 +39,7 @@ double ContrastAt(const LumenLevels& levels, std::int64_t point)
 }
 
 /// Voxels above the lower threshold beside the tree, by offset, without labels.
-std::vector<CalciumVoxel> BrightVoxels(const CenterlineTree& tree, const ScalarImage& image,
+std::vector<CalciumVoxel> BrightVoxels(const VesselTree& tree, const ScalarImage& image,
   const LumenLevels& levels, const ProgressCallback& progress)
 {
   const VoxelLattice lattice(image.grid);
@@ -178,7 +178,7 @@ double Score(
 class Surroundings
 {
 public:
-  Surroundings(const CenterlineTree& tree, const LumenLevels& levels, double blur,
+  Surroundings(const VesselTree& tree, const LumenLevels& levels, double blur,
     const Vector3& centre, double reach)
     : Tree(tree)
     , Levels(levels)
@@ -229,7 +229,7 @@ public:
   }
 
 private:
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const LumenLevels& Levels;
   double Blur;
   double Background;
@@ -346,8 +346,8 @@ int AgatstonWeight(double peak)
   return peak < 130.0 ? 0 : std::min(4, static_cast<int>(std::max(1.0, std::floor(peak / 100.0))));
 }
 
-CalciumMap FindCalcium(const CenterlineTree& tree, const ScalarImage& image,
-  const LumenLevels& levels, const ProgressCallback& progress)
+CalciumMap FindCalcium(const VesselTree& tree, const ScalarImage& image, const LumenLevels& levels,
+  const ProgressCallback& progress)
 {
   CheckTree(tree);
   const VoxelLattice lattice(image.grid);
@@ -405,7 +405,7 @@ CalciumMap FindCalcium(const CenterlineTree& tree, const ScalarImage& image,
   return map;
 }
 
-void MeasureCalcium(CalciumMap& calcium, const CenterlineTree& tree,
+void MeasureCalcium(CalciumMap& calcium, const VesselTree& tree,
   const std::vector<VesselPath>& paths, const ScalarImage& image, const LumenLevels& levels,
   double blur)
 {

@@ -60,8 +60,8 @@ int AgatstonWeight(double peak);
  * Connected objects above the local threshold, near the tree. Labels follow the tree from the roots.
  * @throws std::invalid_argument as CheckTree; Cancelled
  */
-CalciumMap FindCalcium(const CenterlineTree& tree, const ScalarImage& image,
-  const LumenLevels& levels, const ProgressCallback& progress = {});
+CalciumMap FindCalcium(const VesselTree& tree, const ScalarImage& image, const LumenLevels& levels,
+  const ProgressCallback& progress = {});
 
 /**
  * Fills the measures of all objects, with the lumen that was found beside them.
@@ -72,7 +72,7 @@ CalciumMap FindCalcium(const CenterlineTree& tree, const ScalarImage& image,
  * vessels it is another measure than Agatston's.
  * @param tree  with the radii and positions of the lumen that is left, and abscissas
  */
-void MeasureCalcium(CalciumMap& calcium, const CenterlineTree& tree,
+void MeasureCalcium(CalciumMap& calcium, const VesselTree& tree,
   const std::vector<VesselPath>& paths, const ScalarImage& image, const LumenLevels& levels,
   double blur);
 }

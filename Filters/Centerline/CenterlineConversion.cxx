@@ -14,7 +14,7 @@ namespace coronary
 {
 namespace
 {
-using Branch = CenterlineTree::Branch;
+using Branch = VesselTree::Branch;
 
 [[noreturn]] void Fail(const std::string& message)
 {
@@ -45,7 +45,7 @@ void CheckTract(const VmtkTract& tract, std::size_t index)
 }
 }
 
-std::vector<VmtkTract> ToVmtkTracts(const CenterlineTree& given)
+std::vector<VmtkTract> ToVmtkTracts(const VesselTree& given)
 {
   CheckTree(given);
   // Whole branches only: a path that leaves a branch in its middle would cut it.
@@ -62,7 +62,7 @@ std::vector<VmtkTract> ToVmtkTracts(const CenterlineTree& given)
     }
     return true;
   }();
-  const CenterlineTree tree = isSplit ? given : SplitAtBifurcations(given);
+  const VesselTree tree = isSplit ? given : SplitAtBifurcations(given);
   std::map<int, const Branch*> byGroup;
   std::set<int> parents;
   for (const Branch& branch : tree.branches)
@@ -107,7 +107,7 @@ std::vector<VmtkTract> ToVmtkTracts(const CenterlineTree& given)
   return tracts;
 }
 
-CenterlineTree FromVmtkTracts(
+VesselTree FromVmtkTracts(
   const std::vector<VmtkTract>& tracts, double tolerance, std::vector<TractPoint>* origins)
 {
   if (origins != nullptr)
@@ -128,7 +128,7 @@ CenterlineTree FromVmtkTracts(
         " on centerline " + std::to_string(tracts[t].centerlineId) + ", as another one");
     }
   }
-  CenterlineTree tree;
+  VesselTree tree;
   std::map<int, std::size_t> branchOf; // by group
   for (const auto& [path, parts] : paths)
   {
@@ -194,7 +194,7 @@ CenterlineTree FromVmtkTracts(
   return tree;
 }
 
-TgfSkeleton ToSkeleton(const CenterlineTree& tree)
+TgfSkeleton ToSkeleton(const VesselTree& tree)
 {
   CheckTree(tree);
   TgfSkeleton skeleton;
@@ -220,7 +220,7 @@ TgfSkeleton ToSkeleton(const CenterlineTree& tree)
   return skeleton;
 }
 
-CenterlineTree FromSkeleton(const TgfSkeleton& skeleton, double radius)
+VesselTree FromSkeleton(const TgfSkeleton& skeleton, double radius)
 {
   if (!(radius >= 0.0 && std::isfinite(radius)))
   {
@@ -298,7 +298,7 @@ CenterlineTree FromSkeleton(const TgfSkeleton& skeleton, double radius)
   }
   std::sort(roots.begin(), roots.end());
 
-  CenterlineTree tree;
+  VesselTree tree;
   tree.points = skeleton.joints;
   tree.radius.assign(skeleton.joints.size(), radius);
   struct Start

@@ -11,7 +11,7 @@
 #ifndef DynamicCoronary_CenterlineConversion_h
 #define DynamicCoronary_CenterlineConversion_h
 
-#include "CenterlineTree.h"
+#include "VesselTree.h"
 
 #include <array>
 #include <iosfwd>
@@ -44,7 +44,7 @@ struct TractPoint
 };
 
 /// @throws std::invalid_argument as CheckTree
-std::vector<VmtkTract> ToVmtkTracts(const CenterlineTree& tree);
+std::vector<VmtkTract> ToVmtkTracts(const VesselTree& tree);
 
 /**
  * The tree that the tracts cover: of tracts of one group the first one counts. A tract whose path
@@ -55,7 +55,7 @@ std::vector<VmtkTract> ToVmtkTracts(const CenterlineTree& tree);
  *         radii, not finite, its path's tract number missing or twice, a group with two parents, or
  *         without a point that its parent has too (within `tolerance`, mm)
  */
-CenterlineTree FromVmtkTracts(const std::vector<VmtkTract>& tracts, double tolerance = 1e-6,
+VesselTree FromVmtkTracts(const std::vector<VmtkTract>& tracts, double tolerance = 1e-6,
   std::vector<TractPoint>* origins = nullptr);
 
 /// Joints and bones.
@@ -67,7 +67,7 @@ struct TgfSkeleton
 
 /// Every point that a branch uses becomes a joint, in the order of the branches; every step a bone.
 /// @throws std::invalid_argument as CheckTree
-TgfSkeleton ToSkeleton(const CenterlineTree& tree);
+TgfSkeleton ToSkeleton(const VesselTree& tree);
 
 /**
  * Branches are the ways between roots, forks and ends. A root is a joint at which bones only begin,
@@ -76,7 +76,7 @@ TgfSkeleton ToSkeleton(const CenterlineTree& tree);
  * @throws std::invalid_argument that names the bone: an index out of range, from a joint to itself,
  *         twice, or closing a loop; a joint or radius that is not finite
  */
-CenterlineTree FromSkeleton(const TgfSkeleton& skeleton, double radius = 1.0);
+VesselTree FromSkeleton(const TgfSkeleton& skeleton, double radius = 1.0);
 
 /**
  * Trivial Graph Format as libigl writes and reads it: "index x y z" lines with indices from 1, "#",

@@ -100,7 +100,7 @@ private:
   std::vector<std::uint32_t> SeedMembers;
   std::vector<std::int32_t> Owner; ///< of a member: the point of the tree whose lumen it is in
   std::vector<bool> Covered;       ///< members where no further tip is looked for
-  CenterlineTree Tree;             ///< not split
+  VesselTree Tree;                 ///< not split
   std::vector<double> PointLumen;  ///< image value at a point of the tree
   bool Calibrated = false;
   std::vector<std::int32_t> BranchOf; ///< of a point of the tree
@@ -414,7 +414,7 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
   }
   this->Courses.SmoothRadii(course);
 
-  CenterlineTree::Branch branch;
+  VesselTree::Branch branch;
   branch.groupId = static_cast<int>(this->Tree.branches.size());
   branch.treeId = treeId;
   if (!root)
@@ -438,7 +438,7 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
 
 void Extractor::Own(std::size_t index)
 {
-  const CenterlineTree::Branch& branch = this->Tree.branches[index];
+  const VesselTree::Branch& branch = this->Tree.branches[index];
   for (const std::int64_t p : branch.points)
   {
     const auto point = static_cast<std::size_t>(p);
@@ -597,7 +597,7 @@ bool Extractor::ExcludeVeins(
   {
     return false;
   }
-  const CenterlineTree& tree = this->Result.tree;
+  const VesselTree& tree = this->Result.tree;
   std::vector<VeinBranch> found;
   const auto closedBefore = [&](const Vector3& point) { return this->Excluded.Contains(point); };
   for (VeinBranch& branch : JudgeBranches(
@@ -715,7 +715,7 @@ void Extractor::TurnBranches()
     FindTurnedBranches(*this->Courses.image, this->Tree, this->Courses.voxel);
   for (const TurnedBranch& one : turned)
   {
-    const CenterlineTree::Branch branch = this->Tree.branches[one.branch];
+    const VesselTree::Branch branch = this->Tree.branches[one.branch];
     const std::string text = "a vessel of " + std::to_string(std::lround(one.length)) +
       " mm from " + at(branch.points.back()) + " to " + at(branch.points.front()) +
       " touches another one at its end";
@@ -747,7 +747,7 @@ void Extractor::Remove(std::size_t index)
   const auto removed = static_cast<int>(index);
   const int parent = this->Tree.branches[index].parentGroupId;
   this->Tree.branches.erase(this->Tree.branches.begin() + removed);
-  for (CenterlineTree::Branch& branch : this->Tree.branches)
+  for (VesselTree::Branch& branch : this->Tree.branches)
   {
     branch.groupId -= branch.groupId > removed ? 1 : 0;
     branch.parentGroupId -= branch.parentGroupId > removed ? 1 : 0;
@@ -819,7 +819,7 @@ void Extractor::Finish()
 {
   for (std::size_t s = 0; s < this->Input.seeds.size(); ++s)
   {
-    for (const CenterlineTree::Branch& branch : this->Tree.branches)
+    for (const VesselTree::Branch& branch : this->Tree.branches)
     {
       if (branch.parentGroupId == -1 && branch.treeId == static_cast<int>(s))
       {
@@ -848,7 +848,7 @@ void Extractor::Finish()
     MeasureTree(this->Result.tree);
   }
   std::map<std::int64_t, CenterlineBifurcation> joints;
-  for (const CenterlineTree::Branch& branch : this->Result.tree.branches)
+  for (const VesselTree::Branch& branch : this->Result.tree.branches)
   {
     if (branch.parentGroupId != -1)
     {

@@ -9,12 +9,12 @@
 #ifndef DynamicCoronary_CenterlineExtraction_h
 #define DynamicCoronary_CenterlineExtraction_h
 
-#include "CenterlineTree.h"
 #include "Geometry.h"
 #include "ParallelFor.h"
 #include "ScalarImage.h"
 #include "VeinRejection.h"
 #include "VesselBridge.h"
+#include "VesselTree.h"
 
 #include <limits>
 #include <string>
@@ -107,7 +107,7 @@ struct RejectedVein
 
 struct CenterlineResult
 {
-  CenterlineTree tree;                ///< split; treeId is the seed's index
+  VesselTree tree;                    ///< split; treeId is the seed's index
   std::vector<CenterlineEnd> seeds;   ///< one for each seed
   std::vector<CenterlineEnd> targets; ///< one for each target
   std::vector<CenterlineBifurcation> bifurcations;

@@ -21,7 +21,7 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 constexpr double LongestLine = 1e6; ///< in median radii: edges lie in cells of two radii
 
-void Check(const CenterlineSet& lines)
+void Check(const Polylines& lines)
 {
   if (lines.radius.size() != lines.points.size())
   {
@@ -67,7 +67,7 @@ void Check(const CenterlineSet& lines)
 }
 
 /// @returns the median radius of the points that lines have, mm; 0 if no line has a length
-double CheckedMedianRadius(const CenterlineSet& lines)
+double CheckedMedianRadius(const Polylines& lines)
 {
   std::vector<double> radii;
   double extent = 0.0;
@@ -111,7 +111,7 @@ std::vector<std::int64_t> FillBranches(CenterlineTopology& tree, const LineGraph
   for (const int d : which)
   {
     const DraftBranch& draft = drafts[d];
-    CenterlineTree::Branch branch;
+    VesselTree::Branch branch;
     branch.groupId = static_cast<int>(tree.branches.size());
     indexOf[d] = branch.groupId;
     branch.parentGroupId = draft.parent < 0 ? -1 : indexOf[draft.parent];
@@ -197,7 +197,7 @@ std::vector<std::vector<int>> LinkBranches(CenterlineTopology& tree)
   tree.continuation.assign(tree.branches.size(), -1);
   tree.inLoop.assign(tree.branches.size(), 0);
   std::map<int, int> treeNumber;
-  for (CenterlineTree::Branch& branch : tree.branches)
+  for (VesselTree::Branch& branch : tree.branches)
   {
     treeNumber.emplace(branch.treeId, static_cast<int>(treeNumber.size()));
     branch.treeId = treeNumber[branch.treeId];
@@ -239,7 +239,7 @@ void AddLoops(CenterlineTopology& tree, const LineGraph& graph,
         members.insert(index[loop[i]]);
       }
     }
-    for (const CenterlineTree::Branch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       if (members.count(branch.points[branch.points.size() / 2]) > 0)
       {
@@ -282,7 +282,7 @@ void ComputeGeometry(
   }
   // Whole vessels, so that a bifurcation on the way does not disturb their geometry.
   std::vector<int> heads;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.parentGroupId < 0 || tree.continuation[branch.parentGroupId] != branch.groupId)
     {
@@ -355,7 +355,7 @@ void TopologySettings::Validate() const
 }
 
 CenterlineTopology BuildTopology(
-  const CenterlineSet& lines, const TopologySettings& settings, const ProgressCallback& progress)
+  const Polylines& lines, const TopologySettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
   Check(lines);

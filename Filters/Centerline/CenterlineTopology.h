@@ -11,9 +11,9 @@
 #ifndef DynamicCoronary_CenterlineTopology_h
 #define DynamicCoronary_CenterlineTopology_h
 
-#include "CenterlineTree.h"
 #include "CurveGeometry.h"
 #include "ParallelFor.h"
+#include "VesselTree.h"
 
 #include <array>
 #include <string>
@@ -22,7 +22,7 @@
 namespace coronary
 {
 /// Polylines over shared points.
-struct CenterlineSet
+struct Polylines
 {
   std::vector<Vector3> points; ///< mm
   std::vector<double> radius;  ///< one a point, mm, positive
@@ -84,7 +84,7 @@ struct CenterlineLoop
 
 /// A split forest, ordered: depth first, the vessel's continuation before its side branches; group
 /// ids are the indices of the branches. Points are as given, not smoothed.
-struct CenterlineTopology : CenterlineTree
+struct CenterlineTopology : VesselTree
 {
   // One value a point.
   std::vector<std::int64_t> source; ///< index of the point in the input
@@ -119,7 +119,7 @@ struct CenterlineTopology : CenterlineTree
  *         finite, a point whose squared distance from the origin overflows, a radius that is not
  *         positive, an index out of range, or a line longer than a million median radii; Cancelled
  */
-CenterlineTopology BuildTopology(const CenterlineSet& lines, const TopologySettings& settings = {},
+CenterlineTopology BuildTopology(const Polylines& lines, const TopologySettings& settings = {},
   const ProgressCallback& progress = {});
 
 /// x with r_p^x = sum r_d^x, or NaN when a daughter is as wide as the parent or there is none.

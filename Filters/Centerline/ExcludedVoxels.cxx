@@ -41,7 +41,7 @@ bool ExcludedVoxels::LeadsInside(const std::vector<Vector3>& points) const
   return length > LongestCrossing || 4 * inside > points.size();
 }
 
-void ExcludedVoxels::Close(const std::vector<VeinBranch>& found, const CenterlineTree& tree,
+void ExcludedVoxels::Close(const std::vector<VeinBranch>& found, const VesselTree& tree,
   double voxel, std::vector<RejectedVein>& veins)
 {
   this->Flags.resize(GridSize(this->Grid), 0);
@@ -92,7 +92,7 @@ void ExcludedVoxels::Close(const std::vector<VeinBranch>& found, const Centerlin
     }
   }
   // What leaves a vein may be an artery that it crosses: the way across stays open.
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     const auto first = static_cast<std::size_t>(branch.points.front());
     const auto second = static_cast<std::size_t>(branch.points[1]);

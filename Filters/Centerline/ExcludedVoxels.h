@@ -34,7 +34,7 @@ public:
    * @param voxel  mm, edge of a voxel
    * @param veins  one is added for each of `found`, or joined to one at the same place
    */
-  void Close(const std::vector<VeinBranch>& found, const CenterlineTree& tree, double voxel,
+  void Close(const std::vector<VeinBranch>& found, const VesselTree& tree, double voxel,
     std::vector<RejectedVein>& veins);
 
 private:

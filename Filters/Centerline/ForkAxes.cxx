@@ -29,11 +29,10 @@ struct Strand
   double length = 0.0;             ///< mm
 
   /// @returns false when it has become longer than `reach`: the rest is left out
-  bool Append(const CenterlineTree& tree, const std::vector<std::int64_t>& branch, double reach);
+  bool Append(const VesselTree& tree, const std::vector<std::int64_t>& branch, double reach);
 };
 
-bool Strand::Append(
-  const CenterlineTree& tree, const std::vector<std::int64_t>& branch, double reach)
+bool Strand::Append(const VesselTree& tree, const std::vector<std::int64_t>& branch, double reach)
 {
   if (this->points.empty())
   {
@@ -56,7 +55,7 @@ bool Strand::Append(
 }
 
 /// A branch from its end on against the flow.
-Strand Upstream(const CenterlineTree& tree, std::size_t branch, double reach)
+Strand Upstream(const VesselTree& tree, std::size_t branch, double reach)
 {
   Strand strand;
   for (int at = static_cast<int>(branch); at >= 0; at = tree.branches[at].parentGroupId)
@@ -72,7 +71,7 @@ Strand Upstream(const CenterlineTree& tree, std::size_t branch, double reach)
 }
 
 /// A branch and the widest ones that follow.
-Strand Downstream(const CenterlineTree& tree, std::size_t branch, double reach)
+Strand Downstream(const VesselTree& tree, std::size_t branch, double reach)
 {
   Strand strand;
   double widest = 1.0;
@@ -101,7 +100,7 @@ struct Fork
 };
 
 /// Forks of two daughters, in the order of their points. Branches are split there, and numbered by their groups.
-std::vector<Fork> ForksOfTwo(const CenterlineTree& tree)
+std::vector<Fork> ForksOfTwo(const VesselTree& tree)
 {
   std::map<std::int64_t, std::vector<std::size_t>> daughters;
   for (std::size_t b = 0; b < tree.branches.size(); ++b)
@@ -148,8 +147,8 @@ std::pair<double, double> LeastAlong(const BezierCurve& curve, const Measure& me
 }
 
 /// Sets `turning` off from the straight axis of `parent` and `straight`, if these two are that.
-void StraightenFork(CenterlineTree& tree, std::size_t parent, std::size_t turning,
-  std::size_t straight, const CourseMeasurement& measurement)
+void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, std::size_t straight,
+  const CourseMeasurement& measurement)
 {
   const auto at = [&](std::int64_t point) -> Vector3& { return tree.points[point]; };
   const auto radiusAt = [&](std::int64_t point) -> double& { return tree.radius[point]; };
@@ -241,7 +240,7 @@ void StraightenFork(CenterlineTree& tree, std::size_t parent, std::size_t turnin
   place(ahead, high, [&](double t) { return axis(meeting + (1.0 - meeting) * t); });
 }
 
-ForkFit FitFork(const CenterlineTree& tree, std::size_t parent, std::size_t turning,
+ForkFit FitFork(const VesselTree& tree, std::size_t parent, std::size_t turning,
   std::size_t straight, double leastTurn, const CourseMeasurement& measurement)
 {
   // As far as the fit looks; the vessel that goes straight on also across its other forks.
@@ -281,7 +280,7 @@ ForkFit FitFork(const CenterlineTree& tree, std::size_t parent, std::size_t turn
 }
 
 /// Puts the axes of a bifurcation where the fit has them; other forks stay where they are along theirs.
-void MoveFork(CenterlineTree& tree, const ForkFit& fork)
+void MoveFork(VesselTree& tree, const ForkFit& fork)
 {
   const BifurcationFit& fit = fork.fit;
   std::map<std::size_t, double> knots{ { fit.first, 0.0 }, { fork.fork, fit.meeting },
@@ -320,8 +319,8 @@ void MoveFork(CenterlineTree& tree, const ForkFit& fork)
 }
 }
 
-void StraightenForks(CenterlineTree& tree, const std::vector<std::int32_t>& paths,
-  const CourseMeasurement& measurement)
+void StraightenForks(
+  VesselTree& tree, const std::vector<std::int32_t>& paths, const CourseMeasurement& measurement)
 {
   for (const auto& [parent, two] : ForksOfTwo(tree))
   {
@@ -339,7 +338,7 @@ void StraightenForks(CenterlineTree& tree, const std::vector<std::int32_t>& path
   }
 }
 
-void FitForks(CenterlineTree& tree, const CourseMeasurement& measurement)
+void FitForks(VesselTree& tree, const CourseMeasurement& measurement)
 {
   for (const auto& [parent, two] : ForksOfTwo(tree))
   {

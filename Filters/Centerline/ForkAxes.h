@@ -5,8 +5,8 @@
 #ifndef DynamicCoronary_ForkAxes_h
 #define DynamicCoronary_ForkAxes_h
 
-#include "CenterlineTree.h"
 #include "MeasuredCourse.h"
+#include "VesselTree.h"
 
 namespace coronary
 {
@@ -16,12 +16,12 @@ namespace coronary
  * @param tree   split, numbered by groups
  * @param paths  for each point the path that it was found on
  */
-void StraightenForks(CenterlineTree& tree, const std::vector<std::int32_t>& paths,
-  const CourseMeasurement& measurement);
+void StraightenForks(
+  VesselTree& tree, const std::vector<std::int32_t>& paths, const CourseMeasurement& measurement);
 
 /// The axes at the mouths of branches, as the wall around them has it. For images, not for fixed levels.
 /// @param tree  split, numbered by groups
-void FitForks(CenterlineTree& tree, const CourseMeasurement& measurement);
+void FitForks(VesselTree& tree, const CourseMeasurement& measurement);
 }
 
 #endif

@@ -36,8 +36,8 @@ void MarkCrossings(MeasuredCourse& course, const std::vector<VesselBridge>& brid
   }
 }
 
-void MarkBridged(CenterlineTree& tree, const std::vector<VesselBridge>& bridges,
-  const CourseMeasurement& measurement)
+void MarkBridged(
+  VesselTree& tree, const std::vector<VesselBridge>& bridges, const CourseMeasurement& measurement)
 {
   tree.bridged.assign(tree.points.size(), 0);
   tree.bridgeConfidence.assign(tree.points.size(), 1.0);
@@ -46,7 +46,7 @@ void MarkBridged(CenterlineTree& tree, const std::vector<VesselBridge>& bridges,
     return;
   }
   const double reach = Reach(measurement);
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     double certain = branch.parentGroupId < 0 ? 1.0 : tree.bridgeConfidence[branch.points[0]];
     std::vector<char> passed(bridges.size(), 0);

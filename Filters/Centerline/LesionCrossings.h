@@ -5,9 +5,9 @@
 #ifndef DynamicCoronary_LesionCrossings_h
 #define DynamicCoronary_LesionCrossings_h
 
-#include "CenterlineTree.h"
 #include "MeasuredCourse.h"
 #include "VesselBridge.h"
+#include "VesselTree.h"
 
 namespace coronary
 {
@@ -17,8 +17,8 @@ void MarkCrossings(MeasuredCourse& course, const std::vector<VesselBridge>& brid
 
 /// What was guessed on the ways across lesions, and how certain it is that what lies behind them belongs to the tree.
 /// @param tree  its `bridged` and `bridgeConfidence` are set
-void MarkBridged(CenterlineTree& tree, const std::vector<VesselBridge>& bridges,
-  const CourseMeasurement& measurement);
+void MarkBridged(
+  VesselTree& tree, const std::vector<VesselBridge>& bridges, const CourseMeasurement& measurement);
 }
 
 #endif

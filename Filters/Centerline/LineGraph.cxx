@@ -39,7 +39,7 @@ public:
 
   int MergedPoints = 0;
 
-  void Insert(const CenterlineSet& set, const std::vector<std::int64_t>& line)
+  void Insert(const Polylines& set, const std::vector<std::int64_t>& line)
   {
     // Vertices of the line; points that coincide with one of the graph are that one.
     std::vector<int> chain;
@@ -505,7 +505,7 @@ NearestEdge LineGraph::FindNearest(
   return nearest;
 }
 
-int InsertLines(LineGraph& graph, const CenterlineSet& lines, double mergeRatio, double radius,
+int InsertLines(LineGraph& graph, const Polylines& lines, double mergeRatio, double radius,
   const ProgressCallback& progress)
 {
   // The longest first: the others are measured against them.

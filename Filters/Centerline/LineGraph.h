@@ -72,7 +72,7 @@ struct LineGraph
  * @param progress    0 to 0.4
  * @returns the number of points that another line already had
  */
-int InsertLines(LineGraph& graph, const CenterlineSet& lines, double mergeRatio, double radius,
+int InsertLines(LineGraph& graph, const Polylines& lines, double mergeRatio, double radius,
   const ProgressCallback& progress);
 
 /// Ties pieces together whose ends nearly meet. @returns how many

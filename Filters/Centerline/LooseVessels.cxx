@@ -138,7 +138,7 @@ struct Tip
 };
 
 /// Ends of branches without daughters, with the direction of their last millimetres.
-std::vector<Tip> TipsOf(const CenterlineTree& tree)
+std::vector<Tip> TipsOf(const VesselTree& tree)
 {
   std::vector<Tip> tips;
   const TreeLinks links(tree);
@@ -148,7 +148,7 @@ std::vector<Tip> TipsOf(const CenterlineTree& tree)
     {
       continue;
     }
-    const CenterlineTree::Branch& branch = tree.branches[b];
+    const VesselTree::Branch& branch = tree.branches[b];
     const Vector3& tip = tree.points[branch.points.back()];
     std::size_t back = branch.points.size() - 1;
     while (back > 0 && (tree.points[branch.points[back]] - tip).norm() < 2.0 * EndLength)
@@ -248,9 +248,9 @@ Sample Search::Measure(
 
 void Search::MeasureTree()
 {
-  const CenterlineTree& tree = this->I.tree;
+  const VesselTree& tree = this->I.tree;
   std::vector<double> thin;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t i = 2; i + 2 < branch.points.size(); i += 2)
     {

@@ -9,10 +9,10 @@
 #ifndef DynamicCoronary_LooseVessels_h
 #define DynamicCoronary_LooseVessels_h
 
-#include "CenterlineTree.h"
 #include "ScalarImage.h"
 #include "SegmentLabeling.h"
 #include "TreeCheck.h"
+#include "VesselTree.h"
 
 #include <string>
 #include <vector>
@@ -41,7 +41,7 @@ struct LooseVesselInput
 {
   ScalarImage image;                 ///< that the tree was found in
   const float* vesselness = nullptr; ///< one value a voxel
-  const CenterlineTree& tree;        ///< named, mm
+  const VesselTree& tree;            ///< named, mm
   HeartPose heart;                   ///< by its names
   double tissue = 0.0;               ///< image value of muscle
   double blood = 0.0;                ///< of undiluted contrast medium

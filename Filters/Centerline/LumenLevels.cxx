@@ -68,7 +68,7 @@ PointValues ValuesAt(const ImageInterpolator& image, const Vector3& position,
 
 /// Of single voxels on the axes of wide vessels, against what is around them along the axis: calcium and narrowings are
 /// outliers, and blood that changes from place to place is no noise.
-double NoiseOnAxes(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+double NoiseOnAxes(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ImageInterpolator& values, const ScalarImage& image, double blur,
   const std::vector<char>& counts, double usual)
 {
@@ -122,7 +122,7 @@ double NoiseOnAxes(const CenterlineTree& tree, const std::vector<VesselPath>& pa
 }
 }
 
-LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, double blur)
 {
   CheckTree(tree);

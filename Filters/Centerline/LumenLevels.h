@@ -27,7 +27,7 @@ struct LumenLevels
  * @param blur  standard deviation of the image's blur, mm, positive
  * @throws std::invalid_argument as CheckTree, or for a blur that is not positive
  */
-LumenLevels MeasureLumenLevels(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, double blur);
 }
 

@@ -400,7 +400,7 @@ std::unordered_set<std::int64_t> HiddenVoxels(
 
 /// Whether a section lies in the lumen of the vessel that this one leaves.
 bool InParent(
-  const CenterlineTree& tree, const VesselPath& parent, const Vector3& position, double margin)
+  const VesselTree& tree, const VesselPath& parent, const Vector3& position, double margin)
 {
   for (const std::int64_t p : parent.points)
   {
@@ -425,7 +425,7 @@ struct PathWork
 /// The parts of a refinement that all sections share.
 struct Refiner
 {
-  const CenterlineTree& tree;
+  const VesselTree& tree;
   const LumenLevels& levels;
   double blur;
   SectionFitter fitter;
@@ -703,7 +703,7 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
 
 /// The object beside each point: within the blooming around its lumen.
 std::vector<int> LabelsBeside(
-  const CenterlineTree& tree, const CalciumMap& calcium, const ScalarImage& image, double blur)
+  const VesselTree& tree, const CalciumMap& calcium, const ScalarImage& image, double blur)
 {
   std::vector<Vector3> positions;
   positions.reserve(calcium.voxels.size());
@@ -735,7 +735,7 @@ std::vector<int> LabelsBeside(
 }
 }
 
-RefinedLumen RefineLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+RefinedLumen RefineLumen(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, const LumenLevels& levels, const CalciumMap& calcium, double blur,
   const ProgressCallback& progress)
 {
@@ -796,7 +796,7 @@ RefinedLumen RefineLumen(const CenterlineTree& tree, const std::vector<VesselPat
   return result;
 }
 
-TreeLumen MeasureTreeLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+TreeLumen MeasureTreeLumen(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, double blur, const ProgressCallback& progress)
 {
   constexpr double calciumShare = 0.2; // of the time
@@ -808,7 +808,7 @@ TreeLumen MeasureTreeLumen(const CenterlineTree& tree, const std::vector<VesselP
   return measured;
 }
 
-CenterlineTree WithLumen(CenterlineTree tree, const RefinedLumen& lumen)
+VesselTree WithLumen(VesselTree tree, const RefinedLumen& lumen)
 {
   tree.points = lumen.points;
   tree.radius = lumen.radius;

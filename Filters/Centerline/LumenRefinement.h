@@ -36,7 +36,7 @@ struct RefinedLumen
  * @param blur  standard deviation of the image's blur, mm, positive
  * @throws std::invalid_argument as CheckTree, or for the blur; Cancelled
  */
-RefinedLumen RefineLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+RefinedLumen RefineLumen(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, const LumenLevels& levels, const CalciumMap& calcium, double blur,
   const ProgressCallback& progress = {});
 
@@ -54,11 +54,11 @@ struct TreeLumen
  * @param blur   standard deviation of the image's blur, mm, positive
  * @throws std::invalid_argument as CheckTree; Cancelled
  */
-TreeLumen MeasureTreeLumen(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+TreeLumen MeasureTreeLumen(const VesselTree& tree, const std::vector<VesselPath>& paths,
   const ScalarImage& image, double blur, const ProgressCallback& progress = {});
 
 /// A tree with the lumen that was measured of it.
-CenterlineTree WithLumen(CenterlineTree tree, const RefinedLumen& lumen);
+VesselTree WithLumen(VesselTree tree, const RefinedLumen& lumen);
 }
 
 #endif

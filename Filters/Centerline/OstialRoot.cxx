@@ -59,7 +59,7 @@ Ring MeasureRing(const ImageInterpolator& image, const Vector3& position, const 
 class RootCourse
 {
 public:
-  RootCourse(CenterlineTree& tree, const CenterlineTree::Branch& branch, std::size_t free,
+  RootCourse(VesselTree& tree, const VesselTree::Branch& branch, std::size_t free,
     const ImageInterpolator& image, const LumenSettings& settings)
     : Tree(tree)
     , Branch(branch)
@@ -191,7 +191,7 @@ private:
     const double reach = 10.0 * this->Unit;
     double sum = 0.0;
     const std::int64_t fork = this->Branch.points[std::min(free, this->Branch.points.size() - 1)];
-    for (const CenterlineTree::Branch& other : this->Tree.branches)
+    for (const VesselTree::Branch& other : this->Tree.branches)
     {
       const auto at = std::find(other.points.begin(), other.points.end(), fork);
       std::vector<double> radii;
@@ -389,8 +389,8 @@ private:
     return smooth;
   }
 
-  CenterlineTree& Tree;
-  const CenterlineTree::Branch& Branch;
+  VesselTree& Tree;
+  const VesselTree::Branch& Branch;
   const ImageInterpolator& Image;
   const LumenSettings& Settings;
   double Unit = 1.0;           ///< mm
@@ -401,10 +401,10 @@ private:
 }
 
 std::vector<OstialRoot> SettleRoots(
-  CenterlineTree& tree, const ImageInterpolator& image, const LumenSettings& settings)
+  VesselTree& tree, const ImageInterpolator& image, const LumenSettings& settings)
 {
   std::vector<char> begins(tree.points.size(), 0);
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.parentGroupId != -1)
     {
@@ -412,7 +412,7 @@ std::vector<OstialRoot> SettleRoots(
     }
   }
   std::vector<OstialRoot> result;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.parentGroupId != -1)
     {

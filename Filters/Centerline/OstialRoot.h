@@ -9,8 +9,8 @@
 #ifndef DynamicCoronary_OstialRoot_h
 #define DynamicCoronary_OstialRoot_h
 
-#include "CenterlineTree.h"
 #include "LumenMeasurement.h"
+#include "VesselTree.h"
 
 #include <vector>
 
@@ -37,7 +37,7 @@ struct OstialRoot
  * @return          one for each root, in the order of the branches
  */
 std::vector<OstialRoot> SettleRoots(
-  CenterlineTree& tree, const ImageInterpolator& image, const LumenSettings& settings);
+  VesselTree& tree, const ImageInterpolator& image, const LumenSettings& settings);
 }
 
 #endif

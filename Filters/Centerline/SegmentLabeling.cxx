@@ -565,7 +565,7 @@ LabelingResult LabelSegments(
 int SplitAtSegmentBorders(CenterlineTopology& tree)
 {
   const std::size_t count = tree.branches.size();
-  std::vector<CenterlineTree::Branch> branches;
+  std::vector<VesselTree::Branch> branches;
   std::vector<double> meanRadius;
   std::vector<char> inLoop;
   std::vector<int> first(count, 0);
@@ -573,7 +573,7 @@ int SplitAtSegmentBorders(CenterlineTopology& tree)
   int cuts = 0;
   for (std::size_t b = 0; b < count; ++b)
   {
-    const CenterlineTree::Branch& branch = tree.branches[b];
+    const VesselTree::Branch& branch = tree.branches[b];
     // Where stretches of one segment start, as indices of steps.
     std::vector<std::size_t> starts{ 1 };
     const auto segmentOf = [&](std::size_t step) { return tree.segmentId[branch.points[step]]; };
@@ -612,7 +612,7 @@ int SplitAtSegmentBorders(CenterlineTopology& tree)
     for (std::size_t p = 0; p < starts.size(); ++p)
     {
       const std::size_t end = p + 1 < starts.size() ? starts[p + 1] : branch.points.size();
-      CenterlineTree::Branch piece = branch;
+      VesselTree::Branch piece = branch;
       piece.points.assign(branch.points.begin() + static_cast<std::ptrdiff_t>(starts[p]) - 1,
         branch.points.begin() + static_cast<std::ptrdiff_t>(end));
       piece.groupId = static_cast<int>(branches.size());

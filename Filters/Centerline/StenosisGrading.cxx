@@ -96,7 +96,7 @@ Profile Resample(const VesselPath& path, const RefinedLumen& lumen, double step)
 }
 
 /// How much narrower a vessel may become where others leave, in steps of the profile, mm. 0: nothing leaves.
-std::vector<double> StepsAt(const CenterlineTree& tree, const std::vector<VesselPath>& paths,
+std::vector<double> StepsAt(const VesselTree& tree, const std::vector<VesselPath>& paths,
   std::size_t number, const Profile& profile)
 {
   const VesselPath& path = paths[number];
@@ -296,7 +296,7 @@ std::vector<double> Closed(const std::vector<double>& values, double length)
 /// What grading one vessel needs.
 struct GradedPath
 {
-  const CenterlineTree& tree;
+  const VesselTree& tree;
   const VesselPath& path;
   const RefinedLumen& lumen;
   Profile profile;
@@ -582,7 +582,7 @@ double PopulationDiameter(int segmentId)
 }
 
 StenosisGrading GradeStenoses(
-  const CenterlineTree& tree, const std::vector<VesselPath>& paths, const RefinedLumen& lumen)
+  const VesselTree& tree, const std::vector<VesselPath>& paths, const RefinedLumen& lumen)
 {
   CheckTree(tree);
   const std::size_t points = tree.points.size();

@@ -68,7 +68,7 @@ struct StenosisGrading
  * @throws std::invalid_argument as CheckTree, or for a lumen of another number of points
  */
 StenosisGrading GradeStenoses(
-  const CenterlineTree& tree, const std::vector<VesselPath>& paths, const RefinedLumen& lumen);
+  const VesselTree& tree, const std::vector<VesselPath>& paths, const RefinedLumen& lumen);
 
 /// Mean diameter of a segment in the middle of its length, men with right dominance, mm (Dodge 1992); 0: not known.
 double PopulationDiameter(int segmentId);

@@ -35,7 +35,7 @@ constexpr double MostBeyondTip = 30.0;
 class LumenDistance
 {
 public:
-  LumenDistance(const CenterlineTree& tree, double reach)
+  LumenDistance(const VesselTree& tree, double reach)
     : Tree(tree)
     , Reach(reach)
   {
@@ -92,7 +92,7 @@ private:
     return part(0, i) << 42 | part(1, j) << 21 | part(2, k);
   }
 
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   double Reach;
   double Cell = 1.0;
   std::unordered_map<std::int64_t, std::vector<std::int32_t>> Cells;
@@ -101,8 +101,7 @@ private:
 class Finder
 {
 public:
-  Finder(
-    const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+  Finder(const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
     : Image(image)
     , Tree(tree)
     , Settings(settings)
@@ -110,14 +109,14 @@ public:
     , Noise(MeasureNoise(image, tree, settings.voxel))
     , Joint(tree.points.size(), 0)
   {
-    for (const CenterlineTree::Branch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       this->Joint[branch.points.front()] = 1;
     }
   }
 
   std::vector<ThinBranch> Run() const;
-  TipPath FollowTip(const CenterlineTree::Branch& branch) const;
+  TipPath FollowTip(const VesselTree::Branch& branch) const;
 
 private:
   struct Spot
@@ -164,7 +163,7 @@ private:
   bool Follow(const Spot& spot, ThinBranch& branch) const;
 
   const ImageInterpolator& Image;
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const ThinBranchSettings& Settings;
   LumenDistance Lumen;
   double Noise;
@@ -176,7 +175,7 @@ std::vector<Finder::Spot> Finder::FindSpots() const
 {
   const double voxel = this->Settings.voxel;
   std::vector<Spot> spots;
-  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     const std::size_t count = branch.points.size();
     if (count < 3)
@@ -565,7 +564,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   return true;
 }
 
-TipPath Finder::FollowTip(const CenterlineTree::Branch& branch) const
+TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
 {
   const double voxel = this->Settings.voxel;
   const auto index = [&](std::size_t i) { return static_cast<std::size_t>(branch.points[i]); };
@@ -672,10 +671,10 @@ std::vector<ThinBranch> Finder::Run() const
 }
 }
 
-double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+double MeasureNoise(const ImageInterpolator& image, const VesselTree& tree, double voxel)
 {
   std::vector<double> differences;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t i = 4; i + 4 < branch.points.size(); i += 4)
     {
@@ -712,14 +711,14 @@ void ThinBranchSettings::Validate() const
 }
 
 std::vector<ThinBranch> FindThinBranches(
-  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
 {
   settings.Validate();
   return Finder(image, tree, settings).Run();
 }
 
 std::vector<TipPath> FollowTips(
-  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings)
+  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
 {
   settings.Validate();
   const Finder finder(image, tree, settings);

@@ -11,9 +11,9 @@
 #ifndef DynamicCoronary_ThinBranches_h
 #define DynamicCoronary_ThinBranches_h
 
-#include "CenterlineTree.h"
 #include "Geometry.h"
 #include "LumenMeasurement.h"
+#include "VesselTree.h"
 
 #include <cstdint>
 #include <vector>
@@ -42,7 +42,7 @@ struct ThinBranch
 
 /// Standard deviation of the image's noise around the vessels, by second differences along them;
 /// robust to edges. 0 if the tree has no room around it.
-double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, double voxel);
+double MeasureNoise(const ImageInterpolator& image, const VesselTree& tree, double voxel);
 
 /**
  * @param tree  points, radii (mm) and branches; not changed
@@ -50,7 +50,7 @@ double MeasureNoise(const ImageInterpolator& image, const CenterlineTree& tree, 
  * @throws std::invalid_argument that names the setting out of range
  */
 std::vector<ThinBranch> FindThinBranches(
-  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings);
+  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings);
 
 /// How a branch goes on beyond its tip.
 struct TipPath
@@ -68,7 +68,7 @@ struct TipPath
  * @throws std::invalid_argument that names the setting out of range
  */
 std::vector<TipPath> FollowTips(
-  const ImageInterpolator& image, const CenterlineTree& tree, const ThinBranchSettings& settings);
+  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings);
 }
 
 #endif

@@ -133,7 +133,7 @@ Checker::Checker(const CenterlineTopology& tree, const LabelingResult& labels)
   , Inverse(labels.fit.matrix.inverse())
 {
   this->Trust = std::exp(-std::max(0.0, labels.meanDistance - UncertainFit) / UncertainFit);
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.parentGroupId < 0 && branch.treeId >= 0 && branch.treeId < 2 &&
       this->Roots[static_cast<std::size_t>(branch.treeId)] < 0)
@@ -152,7 +152,7 @@ void Checker::Warn(
 Checker::Course Checker::Of(std::initializer_list<int> segments) const
 {
   Course course;
-  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
     {
@@ -304,7 +304,7 @@ void Checker::BackOfTheHeart()
   double least = std::numeric_limits<double>::infinity();
   const Course trunk = left ? this->Of({ ProximalLCx, DistalLCx, LeftPLB, LeftPDA })
                             : this->Of({ ProximalRCA, MidRCA, DistalRCA, RightPDA, RightPLB });
-  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     if (branch.treeId == (left ? 0 : 1))
     {
@@ -347,7 +347,7 @@ void Checker::Tips()
     const VesselPath& path = paths[n];
     const std::int64_t tip = path.points.back();
     const std::int64_t last = branches[tip];
-    const CenterlineTree::Branch& branch = this->Tree.branches[last];
+    const VesselTree::Branch& branch = this->Tree.branches[last];
     if (branch.treeId < 0)
     {
       continue;
@@ -412,7 +412,7 @@ void Checker::Territories()
     return result;
   };
   std::vector<Vector3> mean;
-  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     for (std::size_t i = 0; branch.treeId >= 0 && i < branch.points.size(); ++i)
     {
@@ -527,7 +527,7 @@ std::vector<TreeWarning> CheckCoronaryTrees(
     scaled.radius[i] /= unit;
     scaled.abscissa[i] /= unit;
   }
-  for (CenterlineTree::Branch& branch : scaled.branches)
+  for (VesselTree::Branch& branch : scaled.branches)
   {
     branch.length /= unit;
   }

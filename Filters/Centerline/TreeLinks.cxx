@@ -4,7 +4,7 @@
 
 namespace coronary
 {
-TreeLinks::TreeLinks(const CenterlineTree& tree)
+TreeLinks::TreeLinks(const VesselTree& tree)
   : parent(tree.branches.size(), -1)
   , daughters(tree.branches.size())
 {
@@ -22,12 +22,12 @@ TreeLinks::TreeLinks(const CenterlineTree& tree)
   }
 }
 
-std::vector<std::int64_t> BranchesOfPoints(const CenterlineTree& tree)
+std::vector<std::int64_t> BranchesOfPoints(const VesselTree& tree)
 {
   std::vector<std::int64_t> branches(tree.points.size(), -1);
   for (std::size_t b = 0; b < tree.branches.size(); ++b)
   {
-    const CenterlineTree::Branch& branch = tree.branches[b];
+    const VesselTree::Branch& branch = tree.branches[b];
     for (std::size_t i = branch.parentGroupId < 0 ? 0 : 1; i < branch.points.size(); ++i)
     {
       branches[branch.points[i]] = static_cast<std::int64_t>(b);
@@ -36,7 +36,7 @@ std::vector<std::int64_t> BranchesOfPoints(const CenterlineTree& tree)
   return branches;
 }
 
-std::vector<double> ArcLengths(const CenterlineTree& tree, const std::vector<std::int64_t>& points)
+std::vector<double> ArcLengths(const VesselTree& tree, const std::vector<std::int64_t>& points)
 {
   std::vector<double> arc(points.size(), 0.0);
   for (std::size_t i = 1; i < points.size(); ++i)

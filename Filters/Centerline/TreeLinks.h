@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_TreeLinks_h
 #define DynamicCoronary_TreeLinks_h
 
-#include "CenterlineTree.h"
+#include "VesselTree.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace coronary
 struct TreeLinks
 {
   /// @throws std::invalid_argument as CheckTree
-  explicit TreeLinks(const CenterlineTree& tree);
+  explicit TreeLinks(const VesselTree& tree);
 
   bool IsRoot(std::size_t branch) const { return this->parent[branch] < 0; }
   bool IsTip(std::size_t branch) const { return this->daughters[branch].empty(); }
@@ -27,16 +27,16 @@ struct TreeLinks
 };
 
 /// Of each point the branch that it belongs to, a shared one to the parent; -1 without any.
-std::vector<std::int64_t> BranchesOfPoints(const CenterlineTree& tree);
+std::vector<std::int64_t> BranchesOfPoints(const VesselTree& tree);
 
 /// Whether a point was not seen but guessed on a way across a lesion.
-inline bool IsBridged(const CenterlineTree& tree, std::size_t point)
+inline bool IsBridged(const VesselTree& tree, std::size_t point)
 {
   return !tree.bridged.empty() && tree.bridged[point] != 0;
 }
 
 /// Of each of some points in order: mm along them from the first one.
-std::vector<double> ArcLengths(const CenterlineTree& tree, const std::vector<std::int64_t>& points);
+std::vector<double> ArcLengths(const VesselTree& tree, const std::vector<std::int64_t>& points);
 }
 
 #endif

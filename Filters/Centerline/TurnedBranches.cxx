@@ -35,7 +35,7 @@ constexpr double ConeReach = 5.0;
 class TurnedFinder
 {
 public:
-  TurnedFinder(const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+  TurnedFinder(const ImageInterpolator& image, const VesselTree& tree, double voxel)
     : Image(image)
     , Tree(tree)
     , Links(tree)
@@ -66,7 +66,7 @@ private:
   std::pair<double, double> Values(const TurnedBranch& turned) const;
 
   const ImageInterpolator& Image;
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const TreeLinks Links;
   double Voxel;
 };
@@ -266,7 +266,7 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
           }
         });
   };
-  for (const CenterlineTree::Branch& branch : this->Tree.branches)
+  for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     if (&branch != &this->Tree.branches[turned.branch])
     {
@@ -366,7 +366,7 @@ std::vector<TurnedBranch> TurnedFinder::Run() const
 }
 
 std::vector<TurnedBranch> FindTurnedBranches(
-  const ImageInterpolator& image, const CenterlineTree& tree, double voxel)
+  const ImageInterpolator& image, const VesselTree& tree, double voxel)
 {
   return TurnedFinder(image, tree, voxel).Run();
 }

@@ -8,8 +8,8 @@
 #ifndef DynamicCoronary_TurnedBranches_h
 #define DynamicCoronary_TurnedBranches_h
 
-#include "CenterlineTree.h"
 #include "LumenMeasurement.h"
+#include "VesselTree.h"
 
 #include <cstdint>
 #include <vector>
@@ -35,7 +35,7 @@ struct TurnedBranch
  * @throws std::invalid_argument as CheckTree
  */
 std::vector<TurnedBranch> FindTurnedBranches(
-  const ImageInterpolator& image, const CenterlineTree& tree, double voxel);
+  const ImageInterpolator& image, const VesselTree& tree, double voxel);
 }
 
 #endif

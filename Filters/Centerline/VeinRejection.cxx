@@ -89,7 +89,7 @@ double UpperRadius(std::vector<double> values)
 class VeinFinder
 {
 public:
-  VeinFinder(const CenterlineTree& tree, const ImageInterpolator& image,
+  VeinFinder(const VesselTree& tree, const ImageInterpolator& image,
     const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
     : Tree(tree)
     , Links(tree)
@@ -185,7 +185,7 @@ private:
   std::optional<double> Through(const Arm& a, const Arm& b) const;
   void FindOpposites(std::vector<Arm>& arms) const;
 
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const TreeLinks Links;
   const ImageInterpolator& Image;
   const std::function<bool(const Vector3&)>& Closed;
@@ -252,7 +252,7 @@ VeinFinder::Course VeinFinder::Up(std::size_t branch, double reach) const
   double passed = 0.0;
   for (std::int64_t b = this->Links.parent[branch]; b >= 0; b = this->Links.parent[b])
   {
-    const CenterlineTree::Branch& up = this->Tree.branches[b];
+    const VesselTree::Branch& up = this->Tree.branches[b];
     for (std::size_t i = up.points.size() - 1; i > 0; --i)
     {
       passed += (this->At(up.points[i]) - this->At(up.points[i - 1])).norm();
@@ -902,7 +902,7 @@ const std::array<const char*, NumberOfVeinSigns>& VeinSignNames()
   return names;
 }
 
-std::vector<VeinBranch> JudgeBranches(const CenterlineTree& tree, const ImageInterpolator& image,
+std::vector<VeinBranch> JudgeBranches(const VesselTree& tree, const ImageInterpolator& image,
   const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
 {
   return VeinFinder(tree, image, reference, blur, closed).Run();

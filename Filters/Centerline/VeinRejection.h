@@ -11,8 +11,8 @@
 #ifndef DynamicCoronary_VeinRejection_h
 #define DynamicCoronary_VeinRejection_h
 
-#include "CenterlineTree.h"
 #include "LumenMeasurement.h"
+#include "VesselTree.h"
 
 #include <array>
 #include <cstddef>
@@ -44,7 +44,7 @@ struct VeinBranch
  * @returns the branches of 8 mm and more that leave another one, a parent before its daughters
  * @throws std::invalid_argument as CheckTree
  */
-std::vector<VeinBranch> JudgeBranches(const CenterlineTree& tree, const ImageInterpolator& image,
+std::vector<VeinBranch> JudgeBranches(const VesselTree& tree, const ImageInterpolator& image,
   const LumenReference& reference, double blur,
   const std::function<bool(const Vector3&)>& closed = {});
 }

@@ -14,7 +14,7 @@ namespace
 class Joiner
 {
 public:
-  Joiner(const CenterlineTree& tree, const std::vector<std::string>& names, double leadIn)
+  Joiner(const VesselTree& tree, const std::vector<std::string>& names, double leadIn)
     : Tree(tree)
     , Names(names)
     , LeadIn(leadIn)
@@ -101,7 +101,7 @@ private:
     }
     chain.points.insert(chain.points.end(), path.points.begin(), path.points.end());
     chain.arc.insert(chain.arc.end(), path.arc.begin(), path.arc.end());
-    const CenterlineTree::Branch& begin = this->Tree.branches[this->BranchAt(path, 1)];
+    const VesselTree::Branch& begin = this->Tree.branches[this->BranchAt(path, 1)];
     chain.groupId = begin.groupId;
     chain.treeId = begin.treeId;
     for (std::size_t k = 1; k < path.points.size(); ++k)
@@ -121,7 +121,7 @@ private:
     return chain;
   }
 
-  const CenterlineTree& Tree;
+  const VesselTree& Tree;
   const std::vector<std::string>& Names;
   const double LeadIn;
   std::vector<VesselPath> Paths;
@@ -132,7 +132,7 @@ private:
 }
 
 std::vector<VesselChain> JoinVessels(
-  const CenterlineTree& tree, const std::vector<std::string>& names, double leadIn)
+  const VesselTree& tree, const std::vector<std::string>& names, double leadIn)
 {
   if (names.size() != tree.branches.size())
   {

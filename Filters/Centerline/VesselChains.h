@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_VesselChains_h
 #define DynamicCoronary_VesselChains_h
 
-#include "CenterlineTree.h"
+#include "VesselTree.h"
 
 #include <string>
 #include <vector>
@@ -48,7 +48,7 @@ struct VesselChain
  * @throws std::invalid_argument for another number of names than branches; as CheckTree
  */
 std::vector<VesselChain> JoinVessels(
-  const CenterlineTree& tree, const std::vector<std::string>& names, double leadIn = 8.0);
+  const VesselTree& tree, const std::vector<std::string>& names, double leadIn = 8.0);
 }
 
 #endif

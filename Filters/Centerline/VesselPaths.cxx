@@ -38,7 +38,7 @@ struct Course
   Vector3 direction = Vector3::Zero();
 };
 
-Course CourseAt(const CenterlineTree& tree, const CenterlineTree::Branch& branch, bool atEnd)
+Course CourseAt(const VesselTree& tree, const VesselTree::Branch& branch, bool atEnd)
 {
   constexpr double near = 2.0;
   constexpr double far = 8.0;
@@ -74,9 +74,9 @@ Course CourseAt(const CenterlineTree& tree, const CenterlineTree::Branch& branch
 }
 }
 
-std::vector<VesselPath> VesselPaths(const CenterlineTree& given)
+std::vector<VesselPath> VesselPaths(const VesselTree& given)
 {
-  const CenterlineTree tree = SplitAtBifurcations(given);
+  const VesselTree tree = SplitAtBifurcations(given);
   const TreeLinks links(tree);
   std::vector<std::size_t> origins;
   for (std::size_t b = 0; b < tree.branches.size(); ++b)
@@ -146,7 +146,7 @@ std::vector<VesselPath> VesselPaths(const CenterlineTree& given)
   return paths;
 }
 
-std::vector<Vector3> PathTangents(const CenterlineTree& tree, const VesselPath& path, double reach)
+std::vector<Vector3> PathTangents(const VesselTree& tree, const VesselPath& path, double reach)
 {
   const std::size_t count = path.points.size();
   std::vector<Vector3> tangents(count, Vector3::UnitZ());

@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_VesselPaths_h
 #define DynamicCoronary_VesselPaths_h
 
-#include "CenterlineTree.h"
+#include "VesselTree.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -36,10 +36,10 @@ struct VesselPath
  * left main into the LAD), or else the wide and straight one.
  * @throws std::invalid_argument as CheckTree
  */
-std::vector<VesselPath> VesselPaths(const CenterlineTree& tree);
+std::vector<VesselPath> VesselPaths(const VesselTree& tree);
 
 /// Unit tangents of a path, by chords over `reach` mm to either side.
-std::vector<Vector3> PathTangents(const CenterlineTree& tree, const VesselPath& path, double reach);
+std::vector<Vector3> PathTangents(const VesselTree& tree, const VesselPath& path, double reach);
 }
 
 #endif

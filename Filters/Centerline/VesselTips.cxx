@@ -27,7 +27,7 @@ constexpr std::array<FittedSign, NumberOfTipSigns> Signs{ {
 } };
 
 /// A right coronary artery that is not dominant ends in full calibre.
-bool IsTrunkOfRca(const CenterlineTree& tree, const VesselPath& path)
+bool IsTrunkOfRca(const VesselTree& tree, const VesselPath& path)
 {
   const int segment = tree.segmentId.empty() ? 0 : tree.segmentId[path.points.back()];
   return segment == ProximalRCA || segment == MidRCA || segment == DistalRCA;
@@ -40,7 +40,7 @@ const std::array<const char*, NumberOfTipSigns>& TipSignNames()
   return names;
 }
 
-double RadiusBeforeTip(const CenterlineTree& tree, const VesselPath& path, double from, double to)
+double RadiusBeforeTip(const VesselTree& tree, const VesselPath& path, double from, double to)
 {
   std::vector<double> radii;
   // The first point of a branch is its parent's.
@@ -55,7 +55,7 @@ double RadiusBeforeTip(const CenterlineTree& tree, const VesselPath& path, doubl
   return MedianOf(radii);
 }
 
-double TipCalibre(const CenterlineTree& tree, const std::vector<VesselPath>& paths)
+double TipCalibre(const VesselTree& tree, const std::vector<VesselPath>& paths)
 {
   std::vector<double> radii;
   for (const VesselPath& path : paths)
@@ -65,7 +65,7 @@ double TipCalibre(const CenterlineTree& tree, const std::vector<VesselPath>& pat
   return radii.empty() ? 1.0 : std::clamp(MedianOf(radii) / UsualTip, 0.9, 1.3);
 }
 
-std::vector<VesselTip> JudgeTips(const CenterlineTree& tree, const std::vector<VesselPath>& paths)
+std::vector<VesselTip> JudgeTips(const VesselTree& tree, const std::vector<VesselPath>& paths)
 {
   const double calibre = TipCalibre(tree, paths);
   std::vector<VesselTip> tips;

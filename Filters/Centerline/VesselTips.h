@@ -33,13 +33,13 @@ constexpr double LeastGoingOn = 0.3;
  * @param tree   in mm, with the radius of the lumen that is left
  * @param paths  of that tree
  */
-std::vector<VesselTip> JudgeTips(const CenterlineTree& tree, const std::vector<VesselPath>& paths);
+std::vector<VesselTip> JudgeTips(const VesselTree& tree, const std::vector<VesselPath>& paths);
 
 /// How much wider than usual the vessels of a heart end, 0.9 to 1.3: when most of its ends are cut, they are no measure.
-double TipCalibre(const CenterlineTree& tree, const std::vector<VesselPath>& paths);
+double TipCalibre(const VesselTree& tree, const std::vector<VesselPath>& paths);
 
 /// Median radius between two distances from a vessel's tip, mm; 0 where there is no point.
-double RadiusBeforeTip(const CenterlineTree& tree, const VesselPath& path, double from, double to);
+double RadiusBeforeTip(const VesselTree& tree, const VesselPath& path, double from, double to);
 }
 
 #endif

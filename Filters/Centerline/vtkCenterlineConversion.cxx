@@ -1,9 +1,9 @@
 #include "vtkCenterlineConversion.h"
 
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -25,7 +25,7 @@
 #include <vector>
 
 namespace names = vtkCoronaryArrayNames;
-using coronary::CenterlineTree;
+using coronary::VesselTree;
 using coronary::VmtkTract;
 using vtkCoronary::CenterlineForm;
 using SDDP = vtkStreamingDemandDrivenPipeline;
@@ -100,7 +100,7 @@ int vtkCenterlineConversion::RequestUpdateExtent(
 
 void vtkCenterlineConversion::ToVmtk(vtkPolyData* input, vtkPolyData* output) const
 {
-  const CenterlineTree tree = vtkCoronary::TreeOf(input);
+  const VesselTree tree = vtkCoronary::TreeOf(input);
   const std::vector<VmtkTract> tracts = coronary::ToVmtkTracts(tree);
   const std::map<vtkIdType, vtkIdType> cellOf = CellsByPoint(input);
   vtkNew<vtkPoints> points;
@@ -135,7 +135,7 @@ void vtkCenterlineConversion::ToTree(vtkPolyData* input, vtkPolyData* output) co
 {
   const std::vector<VmtkTract> tracts = vtkCoronary::TractsOf(input);
   std::vector<coronary::TractPoint> origins;
-  CenterlineTree tree = coronary::FromVmtkTracts(tracts, this->Tolerance, &origins);
+  VesselTree tree = coronary::FromVmtkTracts(tracts, this->Tolerance, &origins);
   std::vector<vtkIdType> pointRows;
   pointRows.reserve(origins.size());
   for (const coronary::TractPoint& origin : origins)
@@ -144,7 +144,7 @@ void vtkCenterlineConversion::ToTree(vtkPolyData* input, vtkPolyData* output) co
   }
   std::vector<vtkIdType> cellRows;
   vtkDataArray* trees = input->GetCellData()->GetArray(names::TreeIds);
-  for (CenterlineTree::Branch& branch : tree.branches)
+  for (VesselTree::Branch& branch : tree.branches)
   {
     const std::size_t tract = origins[static_cast<std::size_t>(branch.points[1])].tract;
     cellRows.push_back(input->GetNumberOfVerts() + static_cast<vtkIdType>(tract));

@@ -163,7 +163,7 @@ public:
     vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::SectionArea, tree.area);
     vtkCoronary::AddArray<vtkIntArray>(data, vtkCoronaryArrayNames::SegmentIds, tree.segmentId);
 
-    using Branch = coronary::CenterlineTree::Branch;
+    using Branch = coronary::VesselTree::Branch;
     vtkCellData* cells = output->GetCellData();
     const auto ints = [&](const std::string& name, int Branch::*member)
     {
@@ -407,7 +407,7 @@ int vtkCoronaryTreeTopology::RequestData(
     labeling.dominance = this->Dominance;
     labeling.orientationWeight = this->OrientationWeight;
     labeling.Validate();
-    coronary::CenterlineSet set;
+    coronary::Polylines set;
     const vtkIdType lineCount = wanted ? input->GetNumberOfLines() : 0;
     if (lineCount > 0)
     {

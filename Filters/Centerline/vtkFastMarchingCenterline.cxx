@@ -36,8 +36,8 @@
 #include <new>
 #include <stdexcept>
 
-using coronary::CenterlineTree;
 using coronary::Vector3;
+using coronary::VesselTree;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
 vtkStandardNewMacro(vtkFastMarchingCenterline);
@@ -144,11 +144,11 @@ coronary::SurfaceDistance DistanceTo(
 
 template <typename Array, typename Function>
 void AddBranchValues(vtkFieldData* data, const char* name,
-  const std::vector<CenterlineTree::Branch>& branches, const Function& valueOf)
+  const std::vector<VesselTree::Branch>& branches, const Function& valueOf)
 {
-  std::vector<std::decay_t<decltype(valueOf(CenterlineTree::Branch()))>> values;
+  std::vector<std::decay_t<decltype(valueOf(VesselTree::Branch()))>> values;
   values.reserve(branches.size());
-  for (const CenterlineTree::Branch& branch : branches)
+  for (const VesselTree::Branch& branch : branches)
   {
     values.push_back(valueOf(branch));
   }
@@ -177,11 +177,11 @@ void AddCell(vtkCellArray* cells, const std::vector<std::int64_t>& ids)
 }
 
 namespace names = vtkCoronaryArrayNames;
-using Branch = CenterlineTree::Branch;
+using Branch = VesselTree::Branch;
 
 void FillTree(vtkPolyData* output, const coronary::CenterlineResult& result)
 {
-  const CenterlineTree& tree = result.tree;
+  const VesselTree& tree = result.tree;
   AddPoints(output, tree.points);
   vtkNew<vtkCellArray> lines;
   for (const Branch& branch : tree.branches)
@@ -223,7 +223,7 @@ void FillTree(vtkPolyData* output, const coronary::CenterlineResult& result)
     cells, names::Tortuosity, tree.branches, [](const Branch& b) { return b.tortuosity; });
 }
 
-std::map<int, const Branch*> BranchesById(const CenterlineTree& tree)
+std::map<int, const Branch*> BranchesById(const VesselTree& tree)
 {
   std::map<int, const Branch*> byId;
   for (const Branch& branch : tree.branches)
@@ -236,7 +236,7 @@ std::map<int, const Branch*> BranchesById(const CenterlineTree& tree)
 /// Points where the lines of VMTK's form end: first the targets, then the other tips.
 std::vector<std::int64_t> LineEnds(const coronary::CenterlineResult& result, bool findTips)
 {
-  const CenterlineTree& tree = result.tree;
+  const VesselTree& tree = result.tree;
   std::vector<std::int64_t> ends;
   for (const coronary::CenterlineEnd& target : result.targets)
   {
@@ -261,8 +261,7 @@ std::vector<std::int64_t> LineEnds(const coronary::CenterlineResult& result, boo
 }
 
 /// VMTK's form: from the root to every end. Not by ToVmtkTracts: targets come first, and may lie within a branch.
-void FillLines(
-  vtkPolyData* output, const CenterlineTree& tree, const std::vector<std::int64_t>& ends)
+void FillLines(vtkPolyData* output, const VesselTree& tree, const std::vector<std::int64_t>& ends)
 {
   std::map<int, const Branch*> byId = BranchesById(tree);
   std::map<std::int64_t, const Branch*> holder;
@@ -329,7 +328,7 @@ void FillLines(
 
 void FillBifurcations(vtkPolyData* output, const coronary::CenterlineResult& result)
 {
-  const CenterlineTree& tree = result.tree;
+  const VesselTree& tree = result.tree;
   std::map<int, const Branch*> byId = BranchesById(tree);
   std::vector<Vector3> forks;
   std::vector<double> forkRadius;

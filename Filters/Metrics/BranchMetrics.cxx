@@ -26,9 +26,9 @@ double LengthOf(const std::vector<Vector3>& points)
   return length;
 }
 
-void Check(const BranchTree& tree, const std::string& side)
+void Check(const Polylines& tree, const std::string& side)
 {
-  const CenterlineSet& set = tree.lines;
+  const Polylines& set = tree.lines;
   const auto count = static_cast<std::int64_t>(set.points.size());
   Require(set.radius.empty() || set.radius.size() == set.points.size(),
     side + " has another number of radii than of points");
@@ -54,13 +54,13 @@ void Check(const BranchTree& tree, const std::string& side)
 class TreeGraph
 {
 public:
-  explicit TreeGraph(const BranchTree& tree)
+  explicit TreeGraph(const Polylines& tree)
     : Tree(tree)
-    , Place(MergeCoincidentPoints(tree.lines.points))
+    , Place(MergeCoincidentPoints(tree.points))
   {
-    for (std::size_t line = 0; line < tree.lines.lines.size(); ++line)
+    for (std::size_t line = 0; line < tree.lines.size(); ++line)
     {
-      const std::vector<std::int64_t>& points = tree.lines.lines[line];
+      const std::vector<std::int64_t>& points = tree.lines[line];
       for (std::size_t i = 1; i < points.size(); ++i)
       {
         const std::int32_t from = this->Place[points[i - 1]];
@@ -142,9 +142,7 @@ private:
     double length = 0.0;
     for (std::size_t i = 1; i < walk.places.size(); ++i)
     {
-      length +=
-        (this->Tree.lines.points[walk.places[i]] - this->Tree.lines.points[walk.places[i - 1]])
-          .norm();
+      length += (this->Tree.points[walk.places[i]] - this->Tree.points[walk.places[i - 1]]).norm();
     }
     return length;
   }
@@ -198,10 +196,10 @@ private:
     std::map<std::size_t, double> share;
     for (std::size_t i = 0; i < walk.places.size(); ++i)
     {
-      branch.points.push_back(this->Tree.lines.points[walk.places[i]]);
-      if (!this->Tree.lines.radius.empty())
+      branch.points.push_back(this->Tree.points[walk.places[i]]);
+      if (!this->Tree.radius.empty())
       {
-        branch.radius.push_back(this->Tree.lines.radius[walk.places[i]]);
+        branch.radius.push_back(this->Tree.radius[walk.places[i]]);
       }
       if (i > 0)
       {
@@ -241,7 +239,7 @@ private:
     }
   }
 
-  const BranchTree& Tree;
+  const Polylines& Tree;
   std::vector<std::int32_t> Place;
   std::set<std::pair<std::int32_t, std::int32_t>> Known;
   std::map<std::int32_t, std::vector<Step>> Next;
@@ -425,9 +423,9 @@ std::vector<std::int64_t> Assign(const Eigen::MatrixXd& gain)
 }
 
 /// The branches as lines again, for the overlap measures.
-CenterlineSet LinesOf(const std::vector<TreeBranch>& branches, double tolerance, bool needsRadius)
+Polylines LinesOf(const std::vector<TreeBranch>& branches, double tolerance, bool needsRadius)
 {
-  CenterlineSet set;
+  Polylines set;
   for (const TreeBranch& branch : branches)
   {
     set.lines.emplace_back();
@@ -493,7 +491,7 @@ void BranchMetricsSettings::Validate() const
     "BranchMetricsSettings: leastLength must be 0 or more");
 }
 
-std::vector<TreeBranch> FindBranches(const BranchTree& tree, const BranchMetricsSettings& settings)
+std::vector<TreeBranch> FindBranches(const Polylines& tree, const BranchMetricsSettings& settings)
 {
   settings.Validate();
   Check(tree, "the tree");
@@ -503,37 +501,37 @@ std::vector<TreeBranch> FindBranches(const BranchTree& tree, const BranchMetrics
   }
   std::vector<TreeBranch> branches;
   std::set<std::int32_t> inner;
-  const std::vector<std::int32_t> place = MergeCoincidentPoints(tree.lines.points);
-  for (const std::vector<std::int64_t>& line : tree.lines.lines)
+  const std::vector<std::int32_t> place = MergeCoincidentPoints(tree.points);
+  for (const std::vector<std::int64_t>& line : tree.lines)
   {
     for (std::size_t i = 1; i < line.size(); ++i)
     {
       inner.insert(place[line[i]]);
     }
   }
-  for (std::size_t i = 0; i < tree.lines.lines.size(); ++i)
+  for (std::size_t i = 0; i < tree.lines.size(); ++i)
   {
     TreeBranch branch;
-    for (const std::int64_t point : tree.lines.lines[i])
+    for (const std::int64_t point : tree.lines[i])
     {
-      branch.points.push_back(tree.lines.points[point]);
-      if (!tree.lines.radius.empty())
+      branch.points.push_back(tree.points[point]);
+      if (!tree.radius.empty())
       {
-        branch.radius.push_back(tree.lines.radius[point]);
+        branch.radius.push_back(tree.radius[point]);
       }
     }
     branch.length = LengthOf(branch.points);
     branch.group = tree.groups.empty() ? static_cast<std::int64_t>(i) : tree.groups[i];
     if (branch.points.size() > 1 && branch.length > 0.0 && branch.length >= settings.leastLength)
     {
-      branch.isRoot = inner.count(place[tree.lines.lines[i].front()]) == 0;
+      branch.isRoot = inner.count(place[tree.lines[i].front()]) == 0;
       branches.push_back(std::move(branch));
     }
   }
   return branches;
 }
 
-BranchTree TreeOfSurface(const std::vector<Vector3>& points, const std::vector<std::int64_t>& group,
+Polylines TreeOfSurface(const std::vector<Vector3>& points, const std::vector<std::int64_t>& group,
   const std::vector<double>& abscissa, double spacing)
 {
   Require(group.size() == points.size() && abscissa.size() == points.size(),
@@ -568,14 +566,14 @@ BranchTree TreeOfSurface(const std::vector<Vector3>& points, const std::vector<s
     slice.abscissa += abscissa[i];
     slice.points.push_back(i);
   }
-  BranchTree tree;
+  Polylines tree;
   for (const auto& [id, ofGroup] : slices)
   {
     if (ofGroup.size() < 2)
     {
       continue;
     }
-    const auto firstPoint = static_cast<std::int64_t>(tree.lines.points.size());
+    const auto firstPoint = static_cast<std::int64_t>(tree.points.size());
     std::vector<double> where;
     for (const auto& [number, slice] : ofGroup)
     {
@@ -586,38 +584,37 @@ BranchTree TreeOfSurface(const std::vector<Vector3>& points, const std::vector<s
       {
         radius += (points[i] - middle).norm() / count;
       }
-      tree.lines.points.push_back(middle);
-      tree.lines.radius.push_back(radius);
+      tree.points.push_back(middle);
+      tree.radius.push_back(radius);
       where.push_back(slice.abscissa / count);
     }
     // The slices' middles lie half a slice inside of the ends: the line goes on straight to these.
     const auto [least, greatest] = ends[id];
     const auto extend = [&, first = least, last = greatest](bool atEnd)
     {
-      const std::int64_t size = static_cast<std::int64_t>(tree.lines.points.size()) - firstPoint;
+      const std::int64_t size = static_cast<std::int64_t>(tree.points.size()) - firstPoint;
       const std::int64_t a = atEnd ? size - 1 : 0;
       const std::int64_t b = atEnd ? size - 2 : 1;
       const double gap = atEnd ? last - where[a] : where[a] - first;
       const double apart = std::abs(where[a] - where[b]);
-      const Vector3 end = tree.lines.points[firstPoint + a];
-      return apart > 0.0 ? Vector3(end + gap / apart * (end - tree.lines.points[firstPoint + b]))
-                         : end;
+      const Vector3 end = tree.points[firstPoint + a];
+      return apart > 0.0 ? Vector3(end + gap / apart * (end - tree.points[firstPoint + b])) : end;
     };
     const Vector3 begin = extend(false);
     const Vector3 finish = extend(true);
-    tree.lines.points[firstPoint] = begin;
-    tree.lines.points.back() = finish;
-    tree.lines.lines.emplace_back();
-    for (auto p = firstPoint; p < static_cast<std::int64_t>(tree.lines.points.size()); ++p)
+    tree.points[firstPoint] = begin;
+    tree.points.back() = finish;
+    tree.lines.emplace_back();
+    for (auto p = firstPoint; p < static_cast<std::int64_t>(tree.points.size()); ++p)
     {
-      tree.lines.lines.back().push_back(p);
+      tree.lines.back().push_back(p);
     }
     tree.groups.push_back(id);
   }
   return tree;
 }
 
-BranchMetrics CompareBranches(const BranchTree& result, const BranchTree& reference,
+BranchMetrics CompareBranches(const Polylines& result, const Polylines& reference,
   const BranchMetricsSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();

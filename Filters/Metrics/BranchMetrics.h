@@ -46,9 +46,9 @@ struct BranchMetricsSettings
 };
 
 /// Lines of a tree from the roots to the tips, with a number for each line.
-struct BranchTree
+struct Polylines
 {
-  CenterlineSet lines;
+  Polylines lines;
   std::vector<std::int64_t> groups; ///< one a line; empty: the number of the line
 };
 
@@ -67,14 +67,14 @@ struct TreeBranch
  * @throws std::invalid_argument for an index out of range, a coordinate or radius that is not finite
  */
 std::vector<TreeBranch> FindBranches(
-  const BranchTree& tree, const BranchMetricsSettings& settings = {});
+  const Polylines& tree, const BranchMetricsSettings& settings = {});
 
 /// A surface with branches as a tree: the middles of its points along each branch.
 /// @param group     branch of each point
 /// @param abscissa  way from the root of each point, along the tree
 /// @param spacing   distance of the middles, positive
 /// @throws std::invalid_argument if the numbers of values differ
-BranchTree TreeOfSurface(const std::vector<Vector3>& points, const std::vector<std::int64_t>& group,
+Polylines TreeOfSurface(const std::vector<Vector3>& points, const std::vector<std::int64_t>& group,
   const std::vector<double>& abscissa, double spacing = 1.0);
 
 struct BranchAgreement
@@ -127,7 +127,7 @@ struct BranchMetrics
  * one, within the tolerance, over both lengths.
  * @throws as FindBranches; for settings out of range; Cancelled
  */
-BranchMetrics CompareBranches(const BranchTree& result, const BranchTree& reference,
+BranchMetrics CompareBranches(const Polylines& result, const Polylines& reference,
   const BranchMetricsSettings& settings = {}, const ProgressCallback& progress = {});
 }
 

@@ -49,7 +49,7 @@ void CheckRadius(
   }
 }
 
-void CheckSet(const CenterlineSet& set, bool needRadius, const char* side)
+void CheckSet(const Polylines& set, bool needRadius, const char* side)
 {
   CheckPoints(set.points, side);
   CheckRadius(set.radius, set.points.size(), needRadius, side);
@@ -416,7 +416,7 @@ struct Path
   std::vector<std::int64_t> points; ///< of the set
 };
 
-std::vector<Path> PathsOf(const CenterlineSet& set, const LineTree& tree)
+std::vector<Path> PathsOf(const Polylines& set, const LineTree& tree)
 {
   std::vector<Path> paths;
   for (std::size_t l = 0; l < tree.lines.size(); ++l)
@@ -442,7 +442,7 @@ std::vector<Path> PathsOf(const CenterlineSet& set, const LineTree& tree)
   return paths;
 }
 
-CenterlineSamples SamplePath(const CenterlineSet& set, const Path& path, double spacing)
+CenterlineSamples SamplePath(const Polylines& set, const Path& path, double spacing)
 {
   std::vector<Vector3> points;
   std::vector<double> radius;
@@ -461,7 +461,7 @@ CenterlineSamples SamplePath(const CenterlineSet& set, const Path& path, double 
 class TreeComparison
 {
 public:
-  TreeComparison(const CenterlineSet& reference, const CenterlineSet& result,
+  TreeComparison(const Polylines& reference, const Polylines& result,
     const CenterlineOverlapSettings& settings, const ProgressCallback& progress);
 
   TreeOverlap Run();
@@ -475,8 +475,8 @@ private:
   void MatchResult();
   TreeOverlap Finish() const;
 
-  const CenterlineSet& Reference;
-  const CenterlineSet& Result;
+  const Polylines& Reference;
+  const Polylines& Result;
   const CenterlineOverlapSettings& Settings;
   const ProgressCallback& Progress;
   const LineTree Truth;
@@ -496,7 +496,7 @@ private:
   std::vector<std::vector<char>> Reached; ///< from the roots without a miss
 };
 
-TreeComparison::TreeComparison(const CenterlineSet& reference, const CenterlineSet& result,
+TreeComparison::TreeComparison(const Polylines& reference, const Polylines& result,
   const CenterlineOverlapSettings& settings, const ProgressCallback& progress)
   : Reference(reference)
   , Result(result)
@@ -812,7 +812,7 @@ LineOverlap CompareCenterlines(const OverlapLine& reference, const OverlapLine& 
   return overlap;
 }
 
-TreeOverlap CompareCenterlineTrees(const CenterlineSet& reference, const CenterlineSet& result,
+TreeOverlap CompareCenterlineTrees(const Polylines& reference, const Polylines& result,
   const CenterlineOverlapSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
@@ -823,7 +823,7 @@ TreeOverlap CompareCenterlineTrees(const CenterlineSet& reference, const Centerl
   return overlap;
 }
 
-TreeOverlap CompareCenterlinePaths(const CenterlineSet& reference, const CenterlineSet& result,
+TreeOverlap CompareCenterlinePaths(const Polylines& reference, const Polylines& result,
   const CenterlineOverlapSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
@@ -837,7 +837,7 @@ TreeOverlap CompareCenterlinePaths(const CenterlineSet& reference, const Centerl
     CenterlineSamples samples;
     std::unique_ptr<SampleSearch> search;
 
-    Candidate(const CenterlineSet& set, const Path& path, double spacing)
+    Candidate(const Polylines& set, const Path& path, double spacing)
       : samples(SamplePath(set, path, spacing))
       , search(
           std::make_unique<SampleSearch>(std::vector<const CenterlineSamples*>{ &this->samples }))

@@ -19,7 +19,7 @@
 #ifndef DynamicCoronary_CenterlineOverlap_h
 #define DynamicCoronary_CenterlineOverlap_h
 
-#include "CenterlineTopology.h" // for CenterlineSet
+#include "CenterlineTopology.h" // for Polylines
 #include "ParallelFor.h"
 
 #include <cstdint>
@@ -188,7 +188,7 @@ struct TreeOverlap
  * (BuildTopology). `roots` are not used, `radius` of the result may be empty.
  * @throws as CompareCenterlines; for an index out of range too
  */
-TreeOverlap CompareCenterlineTrees(const CenterlineSet& reference, const CenterlineSet& result,
+TreeOverlap CompareCenterlineTrees(const Polylines& reference, const Polylines& result,
   const CenterlineOverlapSettings& settings = {}, const ProgressCallback& progress = {});
 
 /**
@@ -201,7 +201,7 @@ TreeOverlap CompareCenterlineTrees(const CenterlineSet& reference, const Centerl
  * CompareCenterlineTrees counts it.
  * @throws as CompareCenterlineTrees
  */
-TreeOverlap CompareCenterlinePaths(const CenterlineSet& reference, const CenterlineSet& result,
+TreeOverlap CompareCenterlinePaths(const Polylines& reference, const Polylines& result,
   const CenterlineOverlapSettings& settings = {}, const ProgressCallback& progress = {});
 }
 

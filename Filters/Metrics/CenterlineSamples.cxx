@@ -123,7 +123,7 @@ std::int64_t SamplesBeforeStart(const CenterlineSamples& reference, const Center
   return 0;
 }
 
-LineTree::LineTree(const CenterlineSet& set, double spacing)
+LineTree::LineTree(const Polylines& set, double spacing)
   : lines(set.lines.size())
 {
   double length = 0.0;
@@ -175,7 +175,7 @@ std::vector<std::vector<char>> LineTree::WideUpTo(double radius) const
   return wide;
 }
 
-void LineTree::FindParents(const CenterlineSet& set)
+void LineTree::FindParents(const Polylines& set)
 {
   struct Use
   {

@@ -241,7 +241,7 @@ struct LineTree
   std::vector<Line> lines;
   std::vector<int> order; ///< parents first
 
-  LineTree(const CenterlineSet& set, double spacing);
+  LineTree(const Polylines& set, double spacing);
 
   bool Exists(int line) const { return !this->lines[line].samples.points.empty(); }
 
@@ -266,7 +266,7 @@ struct LineTree
   }
 
 private:
-  void FindParents(const CenterlineSet& set);
+  void FindParents(const Polylines& set);
 };
 }
 

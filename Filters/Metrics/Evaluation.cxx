@@ -15,7 +15,7 @@ constexpr double SampleDistance = 0.25; // mm
 
 /// From samples of lines, where they are wide enough, to the nearest point of other lines.
 std::vector<double> DistancesFrom(
-  const CenterlineSet& lines, const CenterlineSet& others, double leastRadius)
+  const Polylines& lines, const Polylines& others, double leastRadius)
 {
   struct Segment
   {
@@ -239,7 +239,7 @@ void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& setti
       branches[one.group].mean = one.distance.mean;
     }
   }
-  if (!input.truthTree.lines.lines.empty() && !input.modelTree.lines.lines.empty())
+  if (!input.truthTree.lines.empty() && !input.modelTree.lines.empty())
   {
     const BranchMetrics trees = CompareBranches(input.modelTree, input.truthTree, settings.branches,
       [&](double fraction) { return !progress || progress(0.6 + 0.3 * fraction); });
@@ -267,7 +267,7 @@ void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& setti
       }
     }
     std::vector<double> distances =
-      DistancesFrom(input.truthTree.lines, input.modelTree.lines, settings.relevantRadius);
+      DistancesFrom(input.truthTree, input.modelTree, settings.relevantRadius);
     if (!distances.empty())
     {
       double sum = 0.0;

@@ -95,8 +95,8 @@ struct EvaluationInput
 {
   SurfaceMesh model;
   SurfaceMesh truth;
-  BranchTree modelTree;
-  BranchTree truthTree;
+  Polylines modelTree;
+  Polylines truthTree;
   std::map<std::int64_t, std::string> labels; ///< names of the truth's groups
 };
 

@@ -35,7 +35,7 @@
 
 using coronary::BranchAgreement;
 using coronary::BranchMetrics;
-using coronary::BranchTree;
+using coronary::Polylines;
 using coronary::TreeBranch;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -265,9 +265,9 @@ int vtkBranchMetrics::RequestData(
     vtkCoronary::Require(this->TimeTolerance >= 0.0, "TimeTolerance must be 0 or more");
     const std::string mismatch = vtkCoronary::TimeMismatch(inputs, this->TimeTolerance);
     vtkCoronary::Require(mismatch.empty(), mismatch);
-    const BranchTree result = vtkCoronary::TreeOf(
+    const Polylines result = vtkCoronary::TreeOf(
       vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ResultPort], 0)), "result");
-    const BranchTree reference = vtkCoronary::TreeOf(
+    const Polylines reference = vtkCoronary::TreeOf(
       vtkCoronary::PolyDataOf(vtkDataObject::GetData(inputs[ReferencePort], 0)), "reference");
     const BranchMetrics metrics =
       coronary::CompareBranches(result, reference, settings, vtkCoronary::ProgressOf(this));

@@ -32,7 +32,7 @@
 
 using coronary::CenterlineOverlapMeasures;
 using coronary::CenterlinePointMatch;
-using coronary::CenterlineSet;
+using coronary::Polylines;
 using coronary::TreeOverlap;
 using coronary::TreeOverlapRow;
 using coronary::Vector3;
@@ -44,9 +44,9 @@ namespace
 {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
-CenterlineSet Read(vtkPolyData* data, vtkDataArray* radius)
+Polylines Read(vtkPolyData* data, vtkDataArray* radius)
 {
-  CenterlineSet set;
+  Polylines set;
   const vtkIdType points = data->GetNumberOfPoints();
   set.points.resize(points);
   for (vtkIdType i = 0; i < points; ++i)
@@ -219,7 +219,7 @@ int vtkCenterlineMetrics::RequestData(
     {
       throw std::invalid_argument("There is no method " + std::to_string(this->Method));
     }
-    CenterlineSet sets[2]; // reference, result
+    Polylines sets[2]; // reference, result
     if (wanted)
     {
       sets[0] = Read(reference,
@@ -286,7 +286,7 @@ int vtkCenterlineMetrics::RequestData(
     }
     for (int side = 0; side < 2; ++side)
     {
-      const CenterlineSet& set = sets[side];
+      const Polylines& set = sets[side];
       const std::vector<CenterlinePointMatch>& matches =
         side == 0 ? overlap.reference : overlap.result;
       const vtkIdType first = points->GetNumberOfPoints();

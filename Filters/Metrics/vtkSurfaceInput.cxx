@@ -274,17 +274,17 @@ void SetCommonTime(vtkInformationVector** inputs, vtkInformationVector* outputs)
 namespace
 {
 /// Cells of the groups' array count in VTK's order: vertices come before lines.
-coronary::BranchTree TreeOfLines(vtkPolyData* data)
+coronary::Polylines TreeOfLines(vtkPolyData* data)
 {
-  coronary::BranchTree tree;
+  coronary::Polylines tree;
   vtkDataArray* radius = vtkCoronary::FindRadius(data);
-  tree.lines.points.resize(data->GetNumberOfPoints());
+  tree.points.resize(data->GetNumberOfPoints());
   for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i)
   {
-    data->GetPoint(i, tree.lines.points[i].data());
+    data->GetPoint(i, tree.points[i].data());
     if (radius != nullptr)
     {
-      tree.lines.radius.push_back(radius->GetComponent(i, 0));
+      tree.radius.push_back(radius->GetComponent(i, 0));
     }
   }
   const std::vector<std::int64_t> groups =
@@ -295,7 +295,7 @@ coronary::BranchTree TreeOfLines(vtkPolyData* data)
   vtkIdType number = data->GetNumberOfVerts();
   for (lines->InitTraversal(); lines->GetNextCell(cell) != 0; ++number)
   {
-    tree.lines.lines.emplace_back(cell->begin(), cell->end());
+    tree.lines.emplace_back(cell->begin(), cell->end());
     if (!groups.empty())
     {
       tree.groups.push_back(groups[number]);
@@ -305,7 +305,7 @@ coronary::BranchTree TreeOfLines(vtkPolyData* data)
 }
 }
 
-coronary::BranchTree TreeOf(vtkPolyData* data, const std::string& side)
+coronary::Polylines TreeOf(vtkPolyData* data, const std::string& side)
 {
   if (data == nullptr || data->GetNumberOfCells() == 0)
   {

@@ -70,7 +70,7 @@ VTKCORONARYMETRICS_EXPORT void SetCommonTime(
  * @param side  "result" or "reference", for messages
  * @throws std::invalid_argument naming an array that is missing or does not fit
  */
-VTKCORONARYMETRICS_EXPORT coronary::BranchTree TreeOf(vtkPolyData* data, const std::string& side);
+VTKCORONARYMETRICS_EXPORT coronary::Polylines TreeOf(vtkPolyData* data, const std::string& side);
 }
 
 #endif

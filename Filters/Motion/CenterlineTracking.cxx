@@ -246,7 +246,7 @@ void LineTracker::Finish(PoseSequence& sequence)
     std::vector<Vector3> moved = this->Nodes.AtPoints(this->Displacement[k]);
     for (std::size_t p = 0; p < moved.size(); ++p)
     {
-      moved[p] += this->Lines.rest[p];
+      moved[p] += this->Lines.points[p];
     }
     sequence.points.push_back(std::move(moved));
     sequence.confidence.push_back(this->Nodes.AtPoints(confidence));
@@ -261,7 +261,7 @@ void LineTracker::Finish(PoseSequence& sequence)
                                                 : TrackingStatus::Filled;
     }
     sequence.status.push_back(std::move(status));
-    sequence.calibre.emplace_back(this->Lines.rest.size(), calibre[k]);
+    sequence.calibre.emplace_back(this->Lines.points.size(), calibre[k]);
   }
   if (best < 0.05)
   {
@@ -308,7 +308,7 @@ void CenterlineTrackingSettings::Validate() const
   this->prior.Validate();
 }
 
-PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
+PoseSequence TrackCenterlines(const Polylines& lines, double referenceTime,
   const std::vector<double>& times, const std::function<ScalarImage(double time)>& imageAt,
   const CenterlineTrackingSettings& settings, CenterlineTrackingReport* report,
   const ProgressCallback& progress, RankGroup& ranks)
@@ -317,7 +317,7 @@ PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
   CenterlineTrackingReport own;
   CenterlineTrackingReport& result = report != nullptr ? *report : own;
   result = {};
-  if (lines.rest.empty())
+  if (lines.points.empty())
   {
     throw std::invalid_argument("The lines to track have no points");
   }

@@ -70,7 +70,7 @@ struct CenterlineTrackingReport
  * std::runtime_error: the lines were found in none of the phases; Cancelled; what imageAt throws, and
  * RankGroup::Gather
  */
-PoseSequence TrackCenterlines(const MovingLines& lines, double referenceTime,
+PoseSequence TrackCenterlines(const Polylines& lines, double referenceTime,
   const std::vector<double>& times, const std::function<ScalarImage(double time)>& imageAt,
   const CenterlineTrackingSettings& settings = {}, CenterlineTrackingReport* report = nullptr,
   const ProgressCallback& progress = {}, RankGroup& ranks = RankGroup::Alone());

@@ -78,10 +78,10 @@ void FindTangents(const std::vector<std::vector<Link>>& links, LineNodes& nodes)
 }
 }
 
-LineNodes PlaceNodes(const MovingLines& lines, double spacing)
+LineNodes PlaceNodes(const Polylines& lines, double spacing)
 {
-  CheckMovingLines(lines);
-  const std::size_t count = lines.rest.size();
+  CheckPolylines(lines);
+  const std::size_t count = lines.points.size();
   // Ends and meetings of lines: every point that is not in the middle of exactly one line.
   std::vector<int> uses(count, 0);
   std::vector<char> end(count, 0);
@@ -113,7 +113,8 @@ LineNodes PlaceNodes(const MovingLines& lines, double spacing)
   {
     if (nodeOf[point] < 0)
     {
-      nodeOf[point] = addNode(lines.rest[point], lines.radius.empty() ? 0.0 : lines.radius[point]);
+      nodeOf[point] =
+        addNode(lines.points[point], lines.radius.empty() ? 0.0 : lines.radius[point]);
       nodes.points[point] = { nodeOf[point], nodeOf[point], 0.0 };
     }
     return nodeOf[point];
@@ -134,7 +135,7 @@ LineNodes PlaceNodes(const MovingLines& lines, double spacing)
       for (std::size_t n = first; n < last; ++n)
       {
         along[n + 1 - first] =
-          along[n - first] + (lines.rest[line[n + 1]] - lines.rest[line[n]]).norm();
+          along[n - first] + (lines.points[line[n + 1]] - lines.points[line[n]]).norm();
       }
       const double length = along.back();
       const int steps = std::max(1, static_cast<int>(std::ceil(length / spacing - 1e-9)));
@@ -152,7 +153,7 @@ LineNodes PlaceNodes(const MovingLines& lines, double spacing)
           1.0);
         const std::int64_t a = line[first + segment];
         const std::int64_t b = line[first + segment + 1];
-        chain.push_back(addNode(lines.rest[a] * (1.0 - share) + lines.rest[b] * share,
+        chain.push_back(addNode(lines.points[a] * (1.0 - share) + lines.points[b] * share,
           lines.radius.empty() ? 0.0 : lines.radius[a] * (1.0 - share) + lines.radius[b] * share));
       }
       chain.push_back(nodeAt(line[last]));

@@ -51,9 +51,9 @@ struct LineNodes
  * Points that are on no line stand alone, as trees of one node. Of a ring of lines one step has no
  * effect: a forest has none.
  * @param spacing  greatest distance of neighbouring nodes along the lines, mm
- * @throws std::invalid_argument  as CheckMovingLines
+ * @throws std::invalid_argument  as CheckPolylines
  */
-LineNodes PlaceNodes(const MovingLines& lines, double spacing);
+LineNodes PlaceNodes(const Polylines& lines, double spacing);
 }
 
 #endif

@@ -37,7 +37,7 @@ inline double NodeRadius(const LineNodes& nodes, int node)
 class LineTracker
 {
 public:
-  LineTracker(const MovingLines& lines, double referenceTime, const std::vector<double>& times,
+  LineTracker(const Polylines& lines, double referenceTime, const std::vector<double>& times,
     const std::function<ScalarImage(double time)>& imageAt,
     const CenterlineTrackingSettings& settings, CenterlineTrackingReport& report,
     const ProgressCallback& progress, RankGroup& ranks)
@@ -135,7 +135,7 @@ private:
   Matrix3 Turn(int node, const std::vector<Vector3>& displacement) const;
   std::vector<Vector3> PlacesAt(const std::vector<Vector3>& displacement) const;
 
-  const MovingLines& Lines;
+  const Polylines& Lines;
   const double ReferenceTime;
   const std::vector<double>& Times;
   const std::function<ScalarImage(double time)>& ImageAt;

@@ -98,7 +98,7 @@ struct Problem
   std::vector<Corner> corners;
   std::vector<std::vector<std::pair<std::int64_t, double>>> neighbours; ///< and lengths at rest
 
-  Problem(const PoseSequence& sequence, const MovingLines& lines,
+  Problem(const PoseSequence& sequence, const Polylines& lines,
     const MotionRegularizationSettings& wanted);
 
   Index Unknown(std::int64_t point, std::int64_t phase) const
@@ -121,10 +121,10 @@ struct Problem
   void Terms(const Function& row) const;
 };
 
-Problem::Problem(const PoseSequence& sequence, const MovingLines& lines,
-  const MotionRegularizationSettings& wanted)
+Problem::Problem(
+  const PoseSequence& sequence, const Polylines& lines, const MotionRegularizationSettings& wanted)
   : settings(wanted)
-  , points(static_cast<std::int64_t>(lines.rest.size()))
+  , points(static_cast<std::int64_t>(lines.points.size()))
   , phases(static_cast<std::int64_t>(sequence.NumberOfPhases()))
 {
   Require(this->phases >= 2, "The sequence has one phase: its motion needs at least two");
@@ -144,14 +144,14 @@ Problem::Problem(const PoseSequence& sequence, const MovingLines& lines,
     this->gap.push_back(std::max(LeastGap, between * static_cast<double>(this->phases)));
   }
 
-  this->neighbours.resize(lines.rest.size());
+  this->neighbours.resize(lines.points.size());
   std::set<std::pair<std::int64_t, std::int64_t>> known;
   for (std::size_t n = 0; n < lines.lines.size(); ++n)
   {
     const std::vector<std::int64_t>& line = lines.lines[n];
     for (std::size_t p = 1; p < line.size(); ++p)
     {
-      const double length = (lines.rest[line[p]] - lines.rest[line[p - 1]]).norm();
+      const double length = (lines.points[line[p]] - lines.points[line[p - 1]]).norm();
       Require(length > 0.0, "A segment of line " + std::to_string(n) + " has no length at rest");
       if (!known.insert(std::minmax(line[p - 1], line[p])).second)
       {
@@ -163,8 +163,8 @@ Problem::Problem(const PoseSequence& sequence, const MovingLines& lines,
     }
     for (std::size_t p = 1; p + 1 < line.size(); ++p)
     {
-      const Vector3 first = lines.rest[line[p]] - lines.rest[line[p - 1]];
-      const Vector3 second = lines.rest[line[p + 1]] - lines.rest[line[p]];
+      const Vector3 first = lines.points[line[p]] - lines.points[line[p - 1]];
+      const Vector3 second = lines.points[line[p + 1]] - lines.points[line[p]];
       const double bending = Bending(first, second);
       this->corners.push_back({ line[p - 1], line[p], line[p + 1], bending,
         CurvatureRadius(first.norm(), second.norm(), bending) });
@@ -192,8 +192,8 @@ Problem::Problem(const PoseSequence& sequence, const MovingLines& lines,
     {
       continue;
     }
-    const Vector3 first = lines.rest[line.back()] - lines.rest[line.front()];
-    const Vector3 second = lines.rest[after] - lines.rest[line.back()];
+    const Vector3 first = lines.points[line.back()] - lines.points[line.front()];
+    const Vector3 second = lines.points[after] - lines.points[line.back()];
     const double bending = Bending(first, second);
     this->corners.push_back({ line.front(), line.back(), after, bending,
       CurvatureRadius(first.norm(), second.norm(), bending) });
@@ -588,20 +588,20 @@ private:
 };
 
 /// Rest positions of all unknowns: with them taken away, all energies are of what is left.
-Positions OriginOf(const Problem& problem, const MovingLines& lines)
+Positions OriginOf(const Problem& problem, const Polylines& lines)
 {
   Positions origin(problem.points * problem.phases, 3);
   Vector3 centre = Vector3::Zero();
-  for (const Vector3& point : lines.rest)
+  for (const Vector3& point : lines.points)
   {
-    centre += point / static_cast<double>(lines.rest.size());
+    centre += point / static_cast<double>(lines.points.size());
   }
   const bool plain = problem.settings.energy == MotionEnergy::Position;
   for (std::int64_t point = 0; point < problem.points; ++point)
   {
     for (std::int64_t k = 0; k < problem.phases; ++k)
     {
-      origin.row(problem.Unknown(point, k)) = (plain ? centre : lines.rest[point]).transpose();
+      origin.row(problem.Unknown(point, k)) = (plain ? centre : lines.points[point]).transpose();
     }
   }
   return origin;
@@ -861,7 +861,7 @@ void MarkClamps(const Problem& problem, const Limits& limits, const Positions& p
 }
 
 /// Strain and stress of all lines at one phase.
-void MeasureStrain(const MovingLines& lines, const std::vector<Vector3>& now, double youngsModulus,
+void MeasureStrain(const Polylines& lines, const std::vector<Vector3>& now, double youngsModulus,
   RegularizedMotion& result)
 {
   result.strain.emplace_back();
@@ -872,7 +872,7 @@ void MeasureStrain(const MovingLines& lines, const std::vector<Vector3>& now, do
     double length = 0.0;
     for (std::size_t p = 1; p < line.size(); ++p)
     {
-      rest += (lines.rest[line[p]] - lines.rest[line[p - 1]]).norm();
+      rest += (lines.points[line[p]] - lines.points[line[p - 1]]).norm();
       length += (now[line[p]] - now[line[p - 1]]).norm();
     }
     result.strain.back().push_back(length / rest - 1.0);
@@ -882,7 +882,7 @@ void MeasureStrain(const MovingLines& lines, const std::vector<Vector3>& now, do
 
 /// Bones turn with their joints.
 void TurnBones(
-  const PoseSequence& sequence, const MovingLines& lines, std::size_t k, PoseSequence& poses)
+  const PoseSequence& sequence, const Polylines& lines, std::size_t k, PoseSequence& poses)
 {
   const std::vector<Vector3>& now = poses.points[k];
   for (std::size_t n = 0; !sequence.rotation.empty() &&
@@ -971,29 +971,29 @@ void MotionRegularizationSettings::Validate() const
 }
 
 MotionEnergies EnergiesOf(const PoseSequence& sequence, const PoseSequence& data,
-  const MovingLines& lines, const MotionRegularizationSettings& settings)
+  const Polylines& lines, const MotionRegularizationSettings& settings)
 {
   settings.Validate();
-  CheckMovingLines(lines);
-  CheckPoseSequence(sequence, lines.rest.size());
-  CheckPoseSequence(data, lines.rest.size());
+  CheckPolylines(lines);
+  CheckPoseSequence(sequence, lines.points.size());
+  CheckPoseSequence(data, lines.points.size());
   Require(data.times == sequence.times, "The motion and the data have other phases");
   const Problem problem(data, lines, settings);
   return EnergiesOfPositions(problem, problem.PositionsOf(sequence), OriginOf(problem, lines),
     problem.PositionsOf(data), data);
 }
 
-RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const MovingLines& lines,
+RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const Polylines& lines,
   const MotionRegularizationSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
-  CheckMovingLines(lines);
-  CheckPoseSequence(sequence, lines.rest.size());
+  CheckPolylines(lines);
+  CheckPoseSequence(sequence, lines.points.size());
   const Problem problem(sequence, lines, settings);
   const Index size = problem.points * problem.phases;
   RegularizedMotion result;
   result.poses = sequence;
-  result.clamps.assign(sequence.NumberOfPhases(), std::vector<int>(lines.rest.size(), 0));
+  result.clamps.assign(sequence.NumberOfPhases(), std::vector<int>(lines.points.size(), 0));
   const Positions input = problem.PositionsOf(sequence);
   const Positions origin = OriginOf(problem, lines);
   Positions positions = input;

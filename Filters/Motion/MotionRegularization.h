@@ -107,12 +107,12 @@ struct RegularizedMotion
  *
  * The same input gives the same bits on any number of threads.
  */
-RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const MovingLines& lines,
+RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const Polylines& lines,
   const MotionRegularizationSettings& settings = {}, const ProgressCallback& progress = {});
 
 /// Eq. 14 and what is minimised, for a motion `sequence` around the data `data`.
 MotionEnergies EnergiesOf(const PoseSequence& sequence, const PoseSequence& data,
-  const MovingLines& lines, const MotionRegularizationSettings& settings);
+  const Polylines& lines, const MotionRegularizationSettings& settings);
 }
 
 #endif

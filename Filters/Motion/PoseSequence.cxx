@@ -83,16 +83,16 @@ void CheckPoseSequence(const PoseSequence& sequence, std::size_t points)
   }
 }
 
-void CheckMovingLines(const MovingLines& lines)
+void CheckPolylines(const Polylines& lines)
 {
-  const auto points = static_cast<std::int64_t>(lines.rest.size());
-  for (const Vector3& point : lines.rest)
+  const auto points = static_cast<std::int64_t>(lines.points.size());
+  for (const Vector3& point : lines.points)
   {
     Require(point.allFinite(), "A coordinate of the lines is not finite");
   }
-  Require(lines.radius.empty() || lines.radius.size() == lines.rest.size(),
+  Require(lines.radius.empty() || lines.radius.size() == lines.points.size(),
     "The lines have " + std::to_string(lines.radius.size()) + " radii for " +
-      std::to_string(lines.rest.size()) + " points");
+      std::to_string(lines.points.size()) + " points");
   for (const double radius : lines.radius)
   {
     Require(std::isfinite(radius) && radius >= 0.0, "A radius is negative or not finite");

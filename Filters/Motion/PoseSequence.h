@@ -22,7 +22,7 @@ enum class TrackingStatus : int
 };
 
 /// The polylines of a tree or the bones of a skeleton, and where their points are at rest.
-struct MovingLines
+struct Polylines
 {
   std::vector<Vector3> rest;                    ///< mm
   std::vector<double> radius;                   ///< lumen radius at rest, mm; may be empty
@@ -52,7 +52,7 @@ void CheckPoseSequence(const PoseSequence& sequence, std::size_t points);
 
 /// @throws std::invalid_argument: a line of less than two points, an index out of range, a radius that is
 /// negative, a coordinate that is not finite
-void CheckMovingLines(const MovingLines& lines);
+void CheckPolylines(const Polylines& lines);
 }
 
 #endif

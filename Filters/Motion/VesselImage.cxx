@@ -246,9 +246,9 @@ private:
 };
 }
 
-VesselImage RenderLines(const MovingLines& lines, double spacing, double margin)
+VesselImage RenderLines(const Polylines& lines, double spacing, double margin)
 {
-  CheckMovingLines(lines);
+  CheckPolylines(lines);
   if (lines.lines.empty())
   {
     throw std::invalid_argument("There are no lines");
@@ -263,8 +263,8 @@ VesselImage RenderLines(const MovingLines& lines, double spacing, double margin)
     for (const std::int64_t point : line)
     {
       const Vector3 reach = Vector3::Constant(radiusOf(point) + margin);
-      low = low.cwiseMin(lines.rest[point] - reach);
-      high = high.cwiseMax(lines.rest[point] + reach);
+      low = low.cwiseMin(lines.points[point] - reach);
+      high = high.cwiseMax(lines.points[point] + reach);
     }
   }
   VesselImage image = ImageAround(low, high, spacing);
@@ -275,8 +275,8 @@ VesselImage RenderLines(const MovingLines& lines, double spacing, double margin)
   {
     for (std::size_t n = 0; n + 1 < line.size(); ++n)
     {
-      const Vector3& a = lines.rest[line[n]];
-      const Vector3& b = lines.rest[line[n + 1]];
+      const Vector3& a = lines.points[line[n]];
+      const Vector3& b = lines.points[line[n + 1]];
       const double radius = std::max(radiusOf(line[n]), radiusOf(line[n + 1]));
       int first[3];
       int last[3];

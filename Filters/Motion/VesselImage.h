@@ -32,9 +32,9 @@ struct VesselImage
  * @param spacing  of the voxels, mm, positive; made larger where the image would have more than 64
  *                 million voxels
  * @param margin   mm around the vessels, 0 or more
- * @throws std::invalid_argument  no lines, or as CheckMovingLines
+ * @throws std::invalid_argument  no lines, or as CheckPolylines
  */
-VesselImage RenderLines(const MovingLines& lines, double spacing, double margin);
+VesselImage RenderLines(const Polylines& lines, double spacing, double margin);
 
 /**
  * The share of each voxel that is inside: exact along the first axis, four samples across it. What more

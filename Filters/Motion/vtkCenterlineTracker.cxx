@@ -78,7 +78,7 @@ struct Foot
   double fraction = 0.0;
 };
 
-std::vector<Foot> FeetOf(const coronary::MovingLines& lines, vtkPolyData* points)
+std::vector<Foot> FeetOf(const coronary::Polylines& lines, vtkPolyData* points)
 {
   std::vector<Foot> feet;
   for (vtkIdType n = 0; n < points->GetNumberOfPoints(); ++n)
@@ -91,7 +91,7 @@ std::vector<Foot> FeetOf(const coronary::MovingLines& lines, vtkPolyData* points
       for (std::size_t i = 0; i + 1 < line.size(); ++i)
       {
         const coronary::SegmentPlace nearest =
-          coronary::NearestOnSegment(place, lines.rest[line[i]], lines.rest[line[i + 1]]);
+          coronary::NearestOnSegment(place, lines.points[line[i]], lines.points[line[i + 1]]);
         if (nearest.squaredDistance < least)
         {
           least = nearest.squaredDistance;
@@ -178,7 +178,7 @@ struct vtkCenterlineTracker::Internals
   vtkCoronary::Moment LastAsked;
   int Trackings = 0;
 
-  coronary::MovingLines Lines;
+  coronary::Polylines Lines;
   PoseSequence Poses;
   coronary::CenterlineTrackingReport Report;
   double Reference = 0.0;
@@ -523,7 +523,7 @@ int vtkCenterlineTracker::RequestData(
         const Foot& foot = feet[n];
         const auto between = [&foot](const auto& values)
         { return values[foot.first] + foot.fraction * (values[foot.second] - values[foot.first]); };
-        const Vector3 shift = between(data.Poses.points[phase]) - between(data.Lines.rest);
+        const Vector3 shift = between(data.Poses.points[phase]) - between(data.Lines.points);
         joints.push_back(Vector3(skeleton->GetPoint(static_cast<vtkIdType>(n))) + shift);
         confidence.push_back(between(data.Poses.confidence[phase]));
         calibre.push_back(between(data.Poses.calibre[phase]));

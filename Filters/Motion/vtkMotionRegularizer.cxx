@@ -184,20 +184,20 @@ int vtkMotionRegularizer::RequestData(
       data.Solved = false;
       auto* first = vtkPolyData::SafeDownCast(sequence.first);
       RequireLines(first, "The input");
-      coronary::MovingLines lines = vtkPoseSequences::LinesOf(first, nullptr);
+      coronary::Polylines lines = vtkPoseSequences::LinesOf(first, nullptr);
       if (Connected(inputs[1]))
       {
         vtkPolyData* rest = vtkPolyData::GetData(inputs[1]->GetInformationObject(0));
         Require(
           rest != nullptr, "The lines at rest are composite data: a single poly data is needed");
-        const coronary::MovingLines still = vtkPoseSequences::LinesOf(rest, nullptr);
-        Require(still.rest.size() == lines.rest.size() && still.lines == lines.lines,
+        const coronary::Polylines still = vtkPoseSequences::LinesOf(rest, nullptr);
+        Require(still.points.size() == lines.points.size() && still.lines == lines.lines,
           "The lines at rest are not those of the input");
-        lines.rest = still.rest;
+        lines.points = still.points;
       }
       else
       {
-        lines.rest = sequence.poses.points[Nearest(times, this->ReferenceTime, this->Period)];
+        lines.points = sequence.poses.points[Nearest(times, this->ReferenceTime, this->Period)];
       }
       coronary::PoseSequence poses = sequence.poses;
       for (double& time : poses.times)

@@ -430,18 +430,18 @@ void WriteVarying(const Sequence& sequence, std::size_t k, vtkPointSet* output)
   }
 }
 
-coronary::MovingLines LinesOf(vtkPolyData* data, vtkDataArray* radius)
+coronary::Polylines LinesOf(vtkPolyData* data, vtkDataArray* radius)
 {
-  coronary::MovingLines lines;
+  coronary::Polylines lines;
   const vtkIdType points = data->GetNumberOfPoints();
-  lines.rest.resize(static_cast<std::size_t>(points));
+  lines.points.resize(static_cast<std::size_t>(points));
   for (vtkIdType n = 0; n < points; ++n)
   {
-    data->GetPoint(n, lines.rest[static_cast<std::size_t>(n)].data());
+    data->GetPoint(n, lines.points[static_cast<std::size_t>(n)].data());
   }
   if (radius != nullptr)
   {
-    lines.radius.resize(lines.rest.size());
+    lines.radius.resize(lines.points.size());
     for (vtkIdType n = 0; n < points; ++n)
     {
       lines.radius[static_cast<std::size_t>(n)] = radius->GetComponent(n, 0);
@@ -453,7 +453,7 @@ coronary::MovingLines LinesOf(vtkPolyData* data, vtkDataArray* radius)
     data->GetLines()->GetCellAtId(c, ids);
     lines.lines.emplace_back(ids->begin(), ids->end());
   }
-  coronary::CheckMovingLines(lines);
+  coronary::CheckPolylines(lines);
   return lines;
 }
 }

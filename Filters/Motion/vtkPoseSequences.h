@@ -110,9 +110,9 @@ void WriteVarying(const Sequence& sequence, std::size_t k, vtkPointSet* output);
 /**
  * Lines, vertices at rest and radii of poly data.
  * @param radius  mm, one value a point; null: no radii
- * @throws std::invalid_argument as coronary::CheckMovingLines
+ * @throws std::invalid_argument as coronary::CheckPolylines
  */
-coronary::MovingLines LinesOf(vtkPolyData* data, vtkDataArray* radius);
+coronary::Polylines LinesOf(vtkPolyData* data, vtkDataArray* radius);
 }
 
 #endif

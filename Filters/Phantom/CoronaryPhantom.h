@@ -79,7 +79,7 @@ struct PhantomSettings
 };
 
 /// One polyline of a tree, from its root-side end to its far end.
-struct PhantomBranch
+struct OldPhantomBranch
 {
   std::vector<std::int64_t> points; ///< indices; the first is shared with the parent's last point
   int groupId = 0;
@@ -103,7 +103,7 @@ struct PhantomTree
   std::vector<Vector3> velocity;     ///< mm/s
   std::vector<double> visibility;    ///< 0 lost .. 1 full contrast at this moment: d / (d + blur),
                                      ///< times 0 where the phase is lost or the vessel occluded
-  std::vector<PhantomBranch> branches;
+  std::vector<VesselTree::Branch> branches;
 };
 
 /// A closed, oriented, 2-manifold triangle mesh around the lumen. One connectivity at all moments.

@@ -542,7 +542,7 @@ PhantomTree MakeVein(const HeartFrame& frame, const std::vector<DenseVessel>& ar
   LiftOverArteries(frame, arteries, course);
 
   PhantomTree vein;
-  PhantomBranch branch;
+  VesselTree::Branch branch;
   branch.treeId = 2;
   const double length = course.arc.back();
   const int count = std::max(2, static_cast<int>(std::lround(length / spacing)));
@@ -873,7 +873,7 @@ void AnatomyBuilder::Cut(std::size_t v, std::int64_t origin, int parentGroup)
   {
     const bool toEnd = next == this->Children[v].size();
     const double to = toEnd ? vessel.arc.back() : this->Children[v][next].first;
-    PhantomBranch branch;
+    VesselTree::Branch branch;
     branch.groupId = static_cast<int>(this->Anatomy.tree.branches.size());
     branch.parentGroupId = group;
     branch.treeId = plan.tree;

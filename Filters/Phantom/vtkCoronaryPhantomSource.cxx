@@ -140,11 +140,11 @@ void AddValues(vtkFieldData* fields, const char* name, const std::vector<Value>&
 /// One value a branch.
 template <typename Array, typename Function>
 void AddBranchValues(vtkFieldData* fields, const char* name,
-  const std::vector<coronary::PhantomBranch>& branches, const Function& valueOf)
+  const std::vector<coronary::VesselTree::Branch>& branches, const Function& valueOf)
 {
   std::vector<std::decay_t<decltype(valueOf(branches.front()))>> values;
   values.reserve(branches.size());
-  for (const coronary::PhantomBranch& branch : branches)
+  for (const coronary::VesselTree::Branch& branch : branches)
   {
     values.push_back(valueOf(branch));
   }
@@ -199,11 +199,10 @@ void SetTime(vtkDataObject* data, double time, double cycleLength)
 
 void FillTree(const coronary::PhantomTree& tree, vtkPolyData* output)
 {
-  using coronary::PhantomBranch;
   namespace names = vtkCoronaryArrayNames;
 
   vtkNew<vtkCellArray> lines;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     AddCell(lines, branch.points);
   }
@@ -219,23 +218,23 @@ void FillTree(const coronary::PhantomTree& tree, vtkPolyData* output)
   AddValues<vtkDoubleArray>(points, names::Visibility, tree.visibility);
 
   vtkCellData* cells = output->GetCellData();
-  const auto addInts = [&](const char* name, int PhantomBranch::*member)
+  const auto addInts = [&](const char* name, int VesselTree::Branch::*member)
   {
     AddBranchValues<vtkIntArray>(
-      cells, name, tree.branches, [=](const PhantomBranch& branch) { return branch.*member; });
+      cells, name, tree.branches, [=](const VesselTree::Branch& branch) { return branch.*member; });
   };
-  addInts(names::GroupIds, &PhantomBranch::groupId);
-  addInts(names::ParentGroupIds, &PhantomBranch::parentGroupId);
-  addInts(names::TreeIds, &PhantomBranch::treeId);
-  addInts(names::BranchGeneration, &PhantomBranch::generation);
-  addInts(names::StrahlerOrder, &PhantomBranch::strahlerOrder);
-  addInts(names::SegmentIds, &PhantomBranch::segmentId);
+  addInts(names::GroupIds, &VesselTree::Branch::groupId);
+  addInts(names::ParentGroupIds, &VesselTree::Branch::parentGroupId);
+  addInts(names::TreeIds, &VesselTree::Branch::treeId);
+  addInts(names::BranchGeneration, &VesselTree::Branch::generation);
+  addInts(names::StrahlerOrder, &VesselTree::Branch::strahlerOrder);
+  addInts(names::SegmentIds, &VesselTree::Branch::segmentId);
   AddBranchValues<vtkStringArray>(cells, names::SegmentLabel, tree.branches,
-    [](const PhantomBranch& branch) { return coronary::SegmentName(branch.segmentId); });
-  AddBranchValues<vtkDoubleArray>(
-    cells, names::Length, tree.branches, [](const PhantomBranch& branch) { return branch.length; });
+    [](const VesselTree::Branch& branch) { return coronary::SegmentName(branch.segmentId); });
+  AddBranchValues<vtkDoubleArray>(cells, names::Length, tree.branches,
+    [](const VesselTree::Branch& branch) { return branch.length; });
   AddBranchValues<vtkDoubleArray>(cells, names::Tortuosity, tree.branches,
-    [](const PhantomBranch& branch) { return branch.tortuosity; });
+    [](const VesselTree::Branch& branch) { return branch.tortuosity; });
 }
 
 std::vector<Vector3> SurfaceVelocity(const coronary::CoronaryPhantom& phantom,

@@ -17,7 +17,7 @@ namespace
 class Course
 {
 public:
-  Course(const CenterlineTree& tree, const CenterlineTree::Branch& branch)
+  Course(const VesselTree& tree, const VesselTree::Branch& branch)
     : Tree(tree)
     , Branch(branch)
     , Along(branch.points.size(), 0.0)
@@ -75,8 +75,8 @@ private:
     return { i, span > 0.0 ? std::clamp((s - this->Along[i]) / span, 0.0, 1.0) : 0.0 };
   }
 
-  const CenterlineTree& Tree;
-  const CenterlineTree::Branch& Branch;
+  const VesselTree& Tree;
+  const VesselTree::Branch& Branch;
   std::vector<double> Along;
 };
 
@@ -210,16 +210,15 @@ void CheckSkeleton(const Skeleton& skeleton)
   }
 }
 
-Skeleton MakeCenterlineSkeleton(
-  const CenterlineTree& input, const CenterlineSkeletonSettings& settings)
+Skeleton MakeCenterlineSkeleton(const VesselTree& input, const CenterlineSkeletonSettings& settings)
 {
   settings.Validate();
-  CenterlineTree tree = SplitAtBifurcations(input);
+  VesselTree tree = SplitAtBifurcations(input);
   MeasureTree(tree);
   // Splitting numbers the branches anew; the names and ids shall be those of the input.
   // A point other than a branch's first belongs to that branch alone.
   std::vector<int> groupOfPoint(input.points.size(), -1);
-  for (const CenterlineTree::Branch& branch : input.branches)
+  for (const VesselTree::Branch& branch : input.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
     {
@@ -259,7 +258,7 @@ Skeleton MakeCenterlineSkeleton(
   };
   while (!stack.empty())
   {
-    const CenterlineTree::Branch& branch = tree.branches[stack.back()];
+    const VesselTree::Branch& branch = tree.branches[stack.back()];
     stack.pop_back();
     const Course course(tree, branch);
     const int groupId = groupOfPoint[branch.points[1]];

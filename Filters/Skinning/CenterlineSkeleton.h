@@ -5,8 +5,8 @@
 #ifndef DynamicCoronary_CenterlineSkeleton_h
 #define DynamicCoronary_CenterlineSkeleton_h
 
-#include "CenterlineTree.h"
 #include "Geometry.h"
+#include "VesselTree.h"
 
 #include <string>
 #include <vector>
@@ -67,7 +67,7 @@ void CheckSkeleton(const Skeleton& skeleton);
  * @throws std::invalid_argument naming the setting, or as CheckTree; a branch without length
  */
 Skeleton MakeCenterlineSkeleton(
-  const CenterlineTree& tree, const CenterlineSkeletonSettings& settings = {});
+  const VesselTree& tree, const CenterlineSkeletonSettings& settings = {});
 }
 
 #endif

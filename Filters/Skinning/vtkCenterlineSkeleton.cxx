@@ -1,10 +1,10 @@
 #include "vtkCenterlineSkeleton.h"
 
 #include "CenterlineSkeleton.h"
-#include "vtkCenterlineForms.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
@@ -89,7 +89,7 @@ int vtkCenterlineSkeleton::RequestData(
     vtkCoronary::Require(vtkCoronary::FormOf(input) == vtkCoronary::CenterlineForm::Tree,
       "The lines are no tree (cell arrays GroupIds and ParentGroupIds): make one of them with "
       "vtkCoronaryTreeTopology");
-    coronary::CenterlineTree tree = vtkCoronary::TreeOf(input);
+    coronary::VesselTree tree = vtkCoronary::TreeOf(input);
     vtkDataArray* segments = input->GetPointData()->GetArray(names::SegmentIds);
     for (vtkIdType i = 0; segments != nullptr && i < segments->GetNumberOfTuples(); ++i)
     {

@@ -109,11 +109,11 @@ bool MeasureSection(const ImageInterpolator& image, const ContourSettings& setti
 
 /// How many times branches go out from each point: two on a vessel's way, whether one branch or two;
 /// else an end or a node.
-std::map<std::int64_t, int> CountUses(const SweepTree& tree)
+std::map<std::int64_t, int> CountUses(const VesselTree& tree)
 {
   const std::size_t n = tree.points.size();
   std::map<std::int64_t, int> uses;
-  for (const SweepBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (const std::int64_t p : branch.points)
     {
@@ -140,7 +140,7 @@ struct Section
 };
 
 std::vector<Section> MeasureBranch(const ImageInterpolator& image, const ContourSettings& settings,
-  const SweepTree& tree, const std::vector<std::int64_t>& list,
+  const VesselTree& tree, const std::vector<std::int64_t>& list,
   const std::map<std::int64_t, int>& usesOfPoints)
 {
   const auto uses = [&](std::int64_t p) { return usesOfPoints.at(p); };
@@ -229,9 +229,9 @@ std::vector<Section> MeasureBranch(const ImageInterpolator& image, const Contour
 }
 
 /// A node's contour is round, whatever its normal; it must not lie along the axis.
-void TurnNodes(const std::map<std::int64_t, int>& uses, SweepTree& tree)
+void TurnNodes(const std::map<std::int64_t, int>& uses, VesselTree& tree)
 {
-  for (const SweepBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (const std::int64_t p : { branch.points.front(), branch.points.back() })
     {
@@ -260,7 +260,7 @@ void ContourSettings::Validate() const
 }
 
 double MeasureContours(const ImageInterpolator& image, const ContourSettings& settings,
-  SweepTree& tree, const ProgressCallback& progress)
+  VesselTree& tree, const ProgressCallback& progress)
 {
   settings.Validate();
   const std::size_t n = tree.points.size();

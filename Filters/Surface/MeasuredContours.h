@@ -38,7 +38,7 @@ struct ContourSettings
  *         Cancelled
  */
 double MeasureContours(const ImageInterpolator& image, const ContourSettings& settings,
-  SweepTree& tree, const ProgressCallback& progress = {});
+  VesselTree& tree, const ProgressCallback& progress = {});
 }
 
 #endif

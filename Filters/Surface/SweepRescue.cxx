@@ -52,7 +52,7 @@ std::int64_t EulerOf(std::size_t points, std::size_t triangles)
   return static_cast<std::int64_t>(points) - static_cast<std::int64_t>(triangles) / 2;
 }
 
-double LengthOf(const SweepTree& tree, const std::vector<std::int64_t>& list)
+double LengthOf(const VesselTree& tree, const std::vector<std::int64_t>& list)
 {
   double length = 0.0;
   for (std::size_t i = 1; i < list.size(); ++i)
@@ -63,7 +63,7 @@ double LengthOf(const SweepTree& tree, const std::vector<std::int64_t>& list)
 }
 
 /// Distance of a place from the polyline of a branch.
-double DistanceTo(const SweepTree& tree, const std::vector<std::int64_t>& list,
+double DistanceTo(const VesselTree& tree, const std::vector<std::int64_t>& list,
   const Vector3& place, std::size_t& at)
 {
   double best = std::numeric_limits<double>::max();
@@ -80,10 +80,10 @@ double DistanceTo(const SweepTree& tree, const std::vector<std::int64_t>& list,
 }
 }
 
-std::string VesselName(const SweepTree& tree, int groupId)
+std::string VesselName(const VesselTree& tree, int groupId)
 {
   const auto found = std::find_if(tree.branches.begin(), tree.branches.end(),
-    [&](const SweepBranch& branch) { return branch.groupId == groupId; });
+    [&](const VesselTree::Branch& branch) { return branch.groupId == groupId; });
   const std::string group = "group " + std::to_string(groupId);
   return found == tree.branches.end() || found->name.empty() ? group
                                                              : found->name + " (" + group + ")";
@@ -98,7 +98,7 @@ std::string SweepPlace(const Vector3& position)
 }
 
 void AddRepair(std::vector<SweepRepair>& repairs, std::vector<std::string>& remarks,
-  const SweepTree& tree, int groupId, const std::string& what, const Vector3& place)
+  const VesselTree& tree, int groupId, const std::string& what, const Vector3& place)
 {
   const std::string vessel = VesselName(tree, groupId);
   repairs.push_back({ groupId, vessel, what, place });
@@ -106,7 +106,7 @@ void AddRepair(std::vector<SweepRepair>& repairs, std::vector<std::string>& rema
 }
 
 void AddLeftOut(std::vector<SweepLeftOut>& leftOut, std::vector<std::string>& remarks,
-  const SweepTree& tree, int groupId, const std::string& reason, const Vector3& place,
+  const VesselTree& tree, int groupId, const std::string& reason, const Vector3& place,
   double length)
 {
   const std::string vessel = VesselName(tree, groupId);
@@ -118,7 +118,7 @@ void AddLeftOut(std::vector<SweepLeftOut>& leftOut, std::vector<std::string>& re
   remarks.push_back(text.str());
 }
 
-SweepCut CutTree(SweepTree& tree, int groupId, const Vector3& place, double reach)
+SweepCut CutTree(VesselTree& tree, int groupId, const Vector3& place, double reach)
 {
   SweepCut cut;
   int branch = -1;
@@ -207,7 +207,7 @@ SweepCut CutTree(SweepTree& tree, int groupId, const Vector3& place, double reac
     more = false;
     for (std::size_t b = 0; b < tree.branches.size(); ++b)
     {
-      SweepBranch& other = tree.branches[b];
+      VesselTree::Branch& other = tree.branches[b];
       if (static_cast<int>(b) == branch || removed[b] != 0 || other.points.empty() ||
         gone.count(other.points.front()) == 0)
       {
@@ -220,7 +220,7 @@ SweepCut CutTree(SweepTree& tree, int groupId, const Vector3& place, double reac
       gone.insert(other.points.begin(), other.points.end());
     }
   }
-  std::vector<SweepBranch> stay;
+  std::vector<VesselTree::Branch> stay;
   for (std::size_t b = 0; b < tree.branches.size(); ++b)
   {
     if (removed[b] == 0)

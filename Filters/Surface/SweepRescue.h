@@ -11,18 +11,18 @@
 namespace coronary
 {
 /// "R-PDA (group 4)"; "group 4" where the group has no name.
-std::string VesselName(const SweepTree& tree, int groupId);
+std::string VesselName(const VesselTree& tree, int groupId);
 
 /// "(12.5, -3, 40.1)"
 std::string SweepPlace(const Vector3& position);
 
 /// Adds what was changed with its sentence.
 void AddRepair(std::vector<SweepRepair>& repairs, std::vector<std::string>& remarks,
-  const SweepTree& tree, int groupId, const std::string& what, const Vector3& place);
+  const VesselTree& tree, int groupId, const std::string& what, const Vector3& place);
 
 /// Adds what is missing with its sentence, which says what helps.
 void AddLeftOut(std::vector<SweepLeftOut>& leftOut, std::vector<std::string>& remarks,
-  const SweepTree& tree, int groupId, const std::string& reason, const Vector3& place,
+  const VesselTree& tree, int groupId, const std::string& reason, const Vector3& place,
   double length);
 
 /// Two vessels that run through each other without joining; the tree can not be swept with both.
@@ -49,7 +49,7 @@ struct SweepCut
  * @param reach    so far from the place nothing of the branch stays, mm
  * @return what was taken away, never nothing while the group has a branch
  */
-SweepCut CutTree(SweepTree& tree, int groupId, const Vector3& place, double reach);
+SweepCut CutTree(VesselTree& tree, int groupId, const Vector3& place, double reach);
 
 /// Triangles with what belongs to them, as a remesher leaves them.
 struct RescueMesh

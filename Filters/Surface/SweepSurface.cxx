@@ -42,10 +42,10 @@ constexpr double LeastRadius = 1e-6;
 constexpr double MostTriangles = 2e7;
 
 /// A wall too fine or too large for any mesh: wrong units, mostly. The branches are checked already.
-void CheckSize(const SweepTree& tree, const SweepSettings& settings)
+void CheckSize(const VesselTree& tree, const SweepSettings& settings)
 {
   double triangles = 0.0;
-  for (const SweepBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t i = 0; i < branch.points.size(); ++i)
     {
@@ -298,7 +298,7 @@ struct Sweep
   std::vector<Fault> faults; ///< left; none: the surface may be handed out
 };
 
-Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
+Sweep SweepOnce(const VesselTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
   bool last, const ProgressCallback& progress);
 }
 
@@ -328,7 +328,7 @@ namespace
 class Sweeper
 {
 public:
-  Sweeper(const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
+  Sweeper(const VesselTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
     : Input(tree)
     , Tree(tree)
     , Settings(settings)
@@ -390,7 +390,7 @@ private:
     std::set<std::int64_t> missing;
     if (!surface.leftOut.empty())
     {
-      for (const SweepBranch& branch : this->Input.branches)
+      for (const VesselTree::Branch& branch : this->Input.branches)
       {
         missing.insert(branch.points.begin(), branch.points.end());
       }
@@ -452,14 +452,14 @@ private:
   /// Cuts, of several branches, that with which the least is lost.
   void CutLeast(const std::vector<Choice>& choices, double reach, const std::string& reason)
   {
-    SweepTree best;
+    VesselTree best;
     SweepCut least;
     for (const Choice& choice : choices)
     {
       // Who fails again loses more.
       const auto before = this->Cuts.find(choice.first);
       const double more = before == this->Cuts.end() ? 1.0 : std::pow(CutGrowth, before->second);
-      SweepTree tree = this->Tree;
+      VesselTree tree = this->Tree;
       SweepCut cut = CutTree(tree, choice.first, choice.second, more * reach);
       // A tree without its inlet is worth less than any branch.
       if (!cut.parts.empty() &&
@@ -532,8 +532,8 @@ private:
     }
   }
 
-  const SweepTree& Input;
-  SweepTree Tree;
+  const VesselTree& Input;
+  VesselTree Tree;
   const SweepSettings& Settings;
   const ProgressCallback& Progress;
   Reliefs Relief;
@@ -546,7 +546,7 @@ private:
 }
 
 SweptSurface SweepVesselTree(
-  const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
+  const VesselTree& tree, const SweepSettings& settings, const ProgressCallback& progress)
 {
   settings.Validate();
   if (tree.branches.empty())
@@ -707,8 +707,8 @@ std::vector<std::int64_t> CellsOfBadEdges(const std::vector<Triangle>& triangles
 }
 
 /// Replaces bad triangles where they are. @return whether that gave a sound mesh
-bool MendTriangles(const SweptLumen& lumen, const SweepTree& tree, const std::vector<Fault>& faults,
-  double leastAngle, RescueMesh& mesh, SweptSurface& result)
+bool MendTriangles(const SweptLumen& lumen, const VesselTree& tree,
+  const std::vector<Fault>& faults, double leastAngle, RescueMesh& mesh, SweptSurface& result)
 {
   if (!CleanSweptMesh(mesh, lumen.Trees(), leastAngle))
   {
@@ -741,7 +741,7 @@ bool MendTriangles(const SweptLumen& lumen, const SweepTree& tree, const std::ve
 /**
  * @param last  what stays bad is not relieved any more: triangles are replaced even by poor ones
  */
-Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
+Sweep SweepOnce(const VesselTree& tree, const SweepSettings& settings, const Reliefs& reliefs,
   bool lastSweep, const ProgressCallback& progress)
 {
   Sweep sweep;
@@ -767,7 +767,7 @@ Sweep SweepOnce(const SweepTree& tree, const SweepSettings& settings, const Reli
   // Caps: roots first, then tips, both in the order of the input's branches.
   const auto& tips = lumen.Tips();
   std::map<std::int64_t, std::size_t> rank;
-  for (const SweepBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (const std::int64_t p : { branch.points.front(), branch.points.back() })
     {

@@ -20,7 +20,7 @@
 namespace coronary
 {
 /// One polyline of a tree, in the direction of flow.
-struct SweepBranch
+struct OldSweepBranch
 {
   std::vector<std::int64_t> points; ///< indices; branches are joined where they share a point
   int groupId = 0;
@@ -28,11 +28,11 @@ struct SweepBranch
 };
 
 /// What is swept: a forest of branches.
-struct SweepTree
+struct VesselTree
 {
   std::vector<Vector3> points; ///< mm
   std::vector<double> radius;  ///< mm, positive
-  std::vector<SweepBranch> branches;
+  std::vector<VesselTree::Branch> branches;
   /// Cross-sections other than circles: for each point `contourSamples` radii in mm, in equal steps
   /// of the angle from `contourNormal` towards tangent x contourNormal. Empty: circles.
   std::vector<double> contours;
@@ -141,7 +141,7 @@ struct SweptSurface
  *         Cancelled
  */
 SweptSurface SweepVesselTree(
-  const SweepTree& tree, const SweepSettings& settings, const ProgressCallback& progress = {});
+  const VesselTree& tree, const SweepSettings& settings, const ProgressCallback& progress = {});
 }
 
 #endif

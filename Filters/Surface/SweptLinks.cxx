@@ -25,7 +25,7 @@ void SweptLumen::Build::Check() const
   }
   for (std::size_t b = 0; b < this->input.branches.size(); ++b)
   {
-    const SweepBranch& branch = this->input.branches[b];
+    const VesselTree::Branch& branch = this->input.branches[b];
     const std::string name = "SweepVesselTree: branch " + std::to_string(b) + " (group " +
       std::to_string(branch.groupId) + ")";
     for (const std::int64_t p : branch.points)
@@ -97,7 +97,7 @@ void SweptLumen::Build::FindLinks()
 {
   std::map<std::int64_t, int> degree;
   std::vector<std::vector<std::int64_t>> clean;
-  for (const SweepBranch& branch : this->input.branches)
+  for (const VesselTree::Branch& branch : this->input.branches)
   {
     // Repeated points say nothing, but an end must stay where other branches join it.
     std::vector<std::int64_t> kept;

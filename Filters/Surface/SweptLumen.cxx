@@ -34,7 +34,7 @@ struct RoundUnion
 };
 }
 
-SweptLumen::SweptLumen(const SweepTree& tree, const SweepSettings& settings,
+SweptLumen::SweptLumen(const VesselTree& tree, const SweepSettings& settings,
   const std::vector<SweepRelief>& reliefs, const std::vector<SweepOmission>& leftOut)
   : Clearance(settings.clearance)
 {

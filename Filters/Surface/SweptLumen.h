@@ -141,7 +141,7 @@ public:
   };
 
   /// @throws std::invalid_argument as SweepVesselTree; SweepCollision (SweepRescue.h)
-  SweptLumen(const SweepTree& tree, const SweepSettings& settings,
+  SweptLumen(const VesselTree& tree, const SweepSettings& settings,
     const std::vector<SweepRelief>& reliefs = {}, const std::vector<SweepOmission>& leftOut = {});
 
   const std::vector<Vessel>& Vessels() const { return this->VesselList; }

@@ -37,7 +37,7 @@ struct SweptLumen::Build
     bool atStart;
   };
 
-  const SweepTree& input;
+  const VesselTree& input;
   const SweepSettings& settings;
   const std::vector<SweepRelief>& reliefs;
   SweptLumen& self;
@@ -56,7 +56,7 @@ struct SweptLumen::Build
   };
   std::vector<Node> nodes;
 
-  Build(const SweepTree& tree, const SweepSettings& s, const std::vector<SweepRelief>& places,
+  Build(const VesselTree& tree, const SweepSettings& s, const std::vector<SweepRelief>& places,
     SweptLumen& lumen)
     : input(tree)
     , settings(s)

@@ -37,9 +37,9 @@
 #include <stdexcept>
 #include <utility>
 
-using coronary::SweepTree;
 using coronary::SweptSurface;
 using coronary::Vector3;
+using coronary::VesselTree;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
 vtkStandardNewMacro(vtkFrenetSweepSurface);
@@ -97,7 +97,7 @@ auto Collect(const std::vector<Item>& items, const Get& get)
 class vtkFrenetSweepSurface::Reader
 {
 public:
-  SweepTree tree;
+  VesselTree tree;
   bool hasSegmentIds = false;
   bool hasLabels = false;
   std::map<int, int> segmentIds;             ///< of each group
@@ -133,7 +133,7 @@ public:
     int number = 0;
     for (lines->InitTraversal(); lines->GetNextCell(line) != 0; ++cell, ++number)
     {
-      coronary::SweepBranch branch;
+      coronary::VesselTree::Branch branch;
       branch.groupId = fits(groups) ? of(groups) : number;
       for (vtkIdType i = 0; i < line->GetNumberOfIds(); ++i)
       {

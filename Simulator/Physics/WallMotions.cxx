@@ -431,7 +431,7 @@ WallTopology PhantomAxes(const CoronaryPhantom& phantom)
   WallTopology topology;
   const PhantomTree tree = phantom.Tree(0.0);
   const std::map<int, int> branchOf = BranchesByGroup(tree);
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     topology.axis.emplace_back();
     topology.axisRadius.emplace_back();
@@ -489,7 +489,7 @@ std::shared_ptr<WallMotion> MakePhantomWallMotion(
     positions.push_back(std::move(surface.points));
     const PhantomTree moved = phantom.Tree(time);
     axis.emplace_back();
-    for (const PhantomBranch& branch : moved.branches)
+    for (const VesselTree::Branch& branch : moved.branches)
     {
       for (const std::int64_t p : branch.points)
       {

@@ -430,7 +430,7 @@ void TableSurface(const Options& options, Verdicts& verdicts)
         },
         [&]
         {
-          for (const CenterlineTree::Branch& branch : result.tree.branches)
+          for (const VesselTree::Branch& branch : result.tree.branches)
           {
             seen[0] = std::max(seen[0], branch.length);
           }

@@ -40,13 +40,13 @@ int NumberOfPoints()
 }
 
 /// Branches of thirty points, one after the other on a bow.
-coronary::MovingLines Lines()
+coronary::Polylines Lines()
 {
-  coronary::MovingLines lines;
+  coronary::Polylines lines;
   for (int n = 0; n < NumberOfPoints(); ++n)
   {
     const double s = 0.6 * n;
-    lines.rest.emplace_back(
+    lines.points.emplace_back(
       40.0 * std::cos(0.02 * s), 40.0 * std::sin(0.02 * s), 0.2 * s + 3.0 * std::sin(0.1 * s));
     if (n > 0 && n % 30 == 0)
     {
@@ -68,7 +68,7 @@ Vector3 Beat(const Vector3& rest, double t)
   return Eigen::AngleAxisd(0.1 * s, Vector3::UnitZ()) * rest + Vector3(2.0, -1.0, 9.0) * s;
 }
 
-coronary::PoseSequence Motion(const coronary::MovingLines& lines, bool spoiled)
+coronary::PoseSequence Motion(const coronary::Polylines& lines, bool spoiled)
 {
   coronary::PoseSequence motion;
   motion.times = coronary::PaperPhases();
@@ -78,11 +78,11 @@ coronary::PoseSequence Motion(const coronary::MovingLines& lines, bool spoiled)
   {
     motion.points.emplace_back();
     motion.confidence.emplace_back();
-    for (std::size_t n = 0; n < lines.rest.size(); ++n)
+    for (std::size_t n = 0; n < lines.points.size(); ++n)
     {
       const bool lost = spoiled && (k == 6 || ((k == 5 || k == 7) && n % 50 < 20));
       const double scatter = lost ? 20.0 : 1.0;
-      motion.points.back().push_back(Beat(lines.rest[n], motion.times[k]) +
+      motion.points.back().push_back(Beat(lines.points[n], motion.times[k]) +
         scatter * Vector3(noise(random), noise(random), noise(random)));
       motion.confidence.back().push_back(lost ? 0.02 : 0.95);
     }
@@ -96,7 +96,7 @@ class Source : public vtkPolyDataAlgorithm
 public:
   static Source* New();
   vtkTypeMacro(Source, vtkPolyDataAlgorithm);
-  coronary::MovingLines Rest = Lines();
+  coronary::Polylines Rest = Lines();
 
 protected:
   Source() { this->SetNumberOfInputPorts(0); }
@@ -117,7 +117,7 @@ protected:
     const double time = info->Get(SDDP::UPDATE_TIME_STEP());
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
-    for (const Vector3& rest : this->Rest.rest)
+    for (const Vector3& rest : this->Rest.points)
     {
       points->InsertNextPoint(Beat(rest, time).data());
     }
@@ -187,7 +187,7 @@ BENCHMARK(Prepare)->ArgsProduct({ { 0, 1, 2 }, { 0, 1 } })->Unit(benchmark::kMil
 
 void Regularize(benchmark::State& state)
 {
-  const coronary::MovingLines lines = Lines();
+  const coronary::Polylines lines = Lines();
   const coronary::PoseSequence motion = Motion(lines, state.range(0) != 0);
   int iterations = 0;
   for (auto _ : state)

@@ -32,12 +32,12 @@ struct Case
 SkinWeightInput MeshedTrees(double boneLength, double edgeLength, double sizeFactor)
 {
   constexpr int branchBones = 6;
-  SweepTree tree;
+  VesselTree tree;
   std::vector<std::pair<std::int64_t, std::int64_t>> bones;
   RandomStream random(1);
   const auto grow = [&](std::int64_t from, Vector3 direction, double last)
   {
-    SweepBranch branch;
+    VesselTree::Branch branch;
     branch.groupId = static_cast<int>(tree.branches.size());
     branch.points = { from };
     const double first = tree.radius[from];

@@ -120,7 +120,7 @@ double AxisError(vtkPolyData* found, const coronary::PhantomTree& truth)
     }
     const Vector3 place(found->GetPoint(n));
     double least = std::numeric_limits<double>::infinity();
-    for (const coronary::PhantomBranch& branch : truth.branches)
+    for (const coronary::VesselTree::Branch& branch : truth.branches)
     {
       for (std::size_t p = 0; p + 1 < branch.points.size(); ++p)
       {

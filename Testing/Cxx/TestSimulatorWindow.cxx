@@ -130,7 +130,7 @@ double Darkness(const CoronaryPhantom& phantom, const Frame& frame, const std::s
   const CArmGeometry geometry(pose, format);
   const PhantomTree tree = phantom.Tree(frame.about["phase"].get<double>());
   std::vector<double> darker;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (SegmentName(branch.segmentId) != name)
     {

@@ -14,17 +14,17 @@ namespace
 {
 /// Adds a straight line of points 0.5 mm apart.
 void AddLine(
-  BranchTree& tree, const Vector3& from, const Vector3& to, double radius, std::int64_t group)
+  Polylines& tree, const Vector3& from, const Vector3& to, double radius, std::int64_t group)
 {
   const int steps = static_cast<int>(std::lround((to - from).norm() / 0.5));
-  tree.lines.lines.emplace_back();
+  tree.lines.emplace_back();
   for (int i = 0; i <= steps; ++i)
   {
-    tree.lines.lines.back().push_back(static_cast<std::int64_t>(tree.lines.points.size()));
-    tree.lines.points.emplace_back(i == 0 ? from
-        : i == steps                      ? to
-                                          : Vector3(from + (to - from) * i / steps));
-    tree.lines.radius.push_back(radius);
+    tree.lines.back().push_back(static_cast<std::int64_t>(tree.points.size()));
+    tree.points.emplace_back(i == 0 ? from
+        : i == steps                ? to
+                                    : Vector3(from + (to - from) * i / steps));
+    tree.radius.push_back(radius);
   }
   tree.groups.push_back(group);
 }
@@ -35,9 +35,9 @@ const Vector3 TipA(50, 0, 0);
 const Vector3 TipB(20, 25, 0);
 
 /// A trunk of 20 mm, and branches of 30 and 25 mm.
-BranchTree Reference()
+Polylines Reference()
 {
-  BranchTree tree;
+  Polylines tree;
   AddLine(tree, Root, Fork, 2.0, 5);
   AddLine(tree, Fork, TipA, 1.5, 6);
   AddLine(tree, Fork, TipB, 1.5, 7);
@@ -71,7 +71,7 @@ TEST(BranchMetrics, ATreeAgreesWithItself)
 TEST(BranchMetrics, BranchesDoNotDependOnHowTheLinesAreCut)
 {
   // The trunk in two lines, as where a segment's name changes; and as VMTK has it, whole paths.
-  BranchTree cut;
+  Polylines cut;
   AddLine(cut, Root, { 8, 0, 0 }, 2.0, 1);
   AddLine(cut, { 8, 0, 0 }, Fork, 2.0, 2);
   AddLine(cut, Fork, TipA, 1.5, 3);
@@ -80,13 +80,13 @@ TEST(BranchMetrics, BranchesDoNotDependOnHowTheLinesAreCut)
   ASSERT_EQ(branches.size(), 3U);
   EXPECT_NEAR(branches[0].length, 20.0, 1e-12);
   EXPECT_EQ(branches[0].group, 2); // the longer piece's
-  BranchTree paths = Reference();
+  Polylines paths = Reference();
   for (const int line : { 1, 2 })
   {
-    std::vector<std::int64_t>& points = paths.lines.lines[line];
-    points.insert(points.begin(), paths.lines.lines[0].begin(), paths.lines.lines[0].end());
+    std::vector<std::int64_t>& points = paths.lines[line];
+    points.insert(points.begin(), paths.lines[0].begin(), paths.lines[0].end());
   }
-  paths.lines.lines.erase(paths.lines.lines.begin());
+  paths.lines.erase(paths.lines.begin());
   paths.groups.erase(paths.groups.begin());
   const BranchMetrics m = CompareBranches(paths, cut);
   EXPECT_EQ(m.completenessRatio, 1.0);
@@ -99,7 +99,7 @@ TEST(BranchMetrics, BranchesDoNotDependOnHowTheLinesAreCut)
 
 TEST(BranchMetrics, ShortTwigsAreNoBranches)
 {
-  BranchTree twigs = Reference();
+  Polylines twigs = Reference();
   AddLine(twigs, { 30, 0, 0 }, { 30, -2, 0 }, 0.5, 8);
   AddLine(twigs, { 20, 10, 0 }, { 18, 10, 0 }, 0.5, 9);
   // A short trunk is one, whatever its length.
@@ -114,7 +114,7 @@ TEST(BranchMetrics, ShortTwigsAreNoBranches)
   EXPECT_EQ(n.boundedCompleteness, 1.0);
   // The paper's ratio is above 1 for a tree with false branches; half a twig is inside the vessel.
   EXPECT_EQ(n.falseBranches, 2);
-  BranchTree shortTrunk;
+  Polylines shortTrunk;
   AddLine(shortTrunk, { 18, 0, 0 }, Fork, 2.0, 5);
   AddLine(shortTrunk, Fork, TipA, 1.5, 6);
   AddLine(shortTrunk, Fork, TipB, 1.5, 7);
@@ -124,7 +124,7 @@ TEST(BranchMetrics, ShortTwigsAreNoBranches)
 TEST(BranchMetrics, AMissingBranchAndAShortOne)
 {
   // Branch A is there up to 40 (20 of 30 mm), B is missing, and there is a false one of 10 mm.
-  BranchTree result;
+  Polylines result;
   AddLine(result, Root, Fork, 2.0, 1);
   AddLine(result, Fork, { 40, 0, 0 }, 1.5, 2);
   AddLine(result, Fork, { 20, 0, 10 }, 1.5, 3);
@@ -154,7 +154,7 @@ TEST(BranchMetrics, DetectedFromTheGivenShareOn)
 {
   for (const double end : { 43.0, 41.0 })
   {
-    BranchTree result;
+    Polylines result;
     AddLine(result, Root, Fork, 2.0, 1);
     AddLine(result, Fork, { end, 0, 0 }, 1.5, 2);
     AddLine(result, Fork, TipB, 1.5, 3);
@@ -169,7 +169,7 @@ TEST(BranchMetrics, DetectedFromTheGivenShareOn)
 
 TEST(BranchMetrics, GapsAndBranchesThatHangOnNothing)
 {
-  BranchTree result;
+  Polylines result;
   AddLine(result, Root, Fork, 2.0, 1);
   // A with a gap from 30 to 38; B begins 8 mm from the fork.
   AddLine(result, Fork, { 30, 0, 0 }, 1.5, 2);
@@ -186,7 +186,7 @@ TEST(BranchMetrics, GapsAndBranchesThatHangOnNothing)
   EXPECT_LE(m.boundedContinuity, 1.0);
 
   // Without the trunk, nothing leads to B.
-  BranchTree loose;
+  Polylines loose;
   AddLine(loose, { 20, 8, 0 }, TipB, 1.5, 4);
   const BranchMetrics n = CompareBranches(loose, Reference());
   EXPECT_GT(n.rows[2].covered, 0.7);
@@ -197,10 +197,10 @@ TEST(BranchMetrics, MatchingIsTheBestOfAll)
 {
   // Two branches of the reference would like the same one of the result. The nearer one has it, and
   // the other its second best.
-  BranchTree reference;
+  Polylines reference;
   AddLine(reference, { 0, 0, 0 }, { 40, 0, 0 }, 1.0, 1);
   AddLine(reference, { 0, 1.2, 0 }, { 40, 1.2, 0 }, 1.0, 2);
-  BranchTree result;
+  Polylines result;
   AddLine(result, { 0, 0.5, 0 }, { 40, 0.5, 0 }, 1.0, 10);
   AddLine(result, { 0, 2.0, 0 }, { 40, 2.0, 0 }, 1.0, 11);
   const BranchMetrics m = CompareBranches(result, reference);
@@ -236,8 +236,8 @@ TEST(BranchMetrics, ASurfaceIsATreeByItsGroups)
   };
   addTube(Root, Fork, 2.0, 0.0, 5);
   addTube(Fork, TipA, 1.5, 20.0, 6);
-  const BranchTree tree = TreeOfSurface(points, groups, abscissas);
-  ASSERT_EQ(tree.lines.lines.size(), 2U);
+  const Polylines tree = TreeOfSurface(points, groups, abscissas);
+  ASSERT_EQ(tree.lines.size(), 2U);
   const std::vector<TreeBranch> branches = FindBranches(tree);
   ASSERT_EQ(branches.size(), 2U);
   EXPECT_NEAR(branches[0].length, 20.0, 1e-9);
@@ -252,7 +252,7 @@ TEST(BranchMetrics, ASurfaceIsATreeByItsGroups)
 
 TEST(BranchMetrics, EmptySidesAndBadInput)
 {
-  const BranchTree nothing;
+  const Polylines nothing;
   const BranchMetrics none = CompareBranches(nothing, nothing);
   EXPECT_TRUE(std::isnan(none.completenessRatio));
   EXPECT_TRUE(none.rows.empty());
@@ -266,14 +266,14 @@ TEST(BranchMetrics, EmptySidesAndBadInput)
   EXPECT_TRUE(std::isnan(extra.completenessRatio));
   EXPECT_EQ(extra.falseBranches, 3);
   EXPECT_EQ(extra.rows.size(), 3U);
-  BranchTree bad = Reference();
-  bad.lines.points[3][0] = std::numeric_limits<double>::quiet_NaN();
+  Polylines bad = Reference();
+  bad.points[3][0] = std::numeric_limits<double>::quiet_NaN();
   ExpectRefusal([&] { CompareBranches(bad, Reference()); }, "point 3 of the result is not finite");
   bad = Reference();
-  bad.lines.radius[2] = -1.0;
+  bad.radius[2] = -1.0;
   ExpectRefusal([&] { CompareBranches(Reference(), bad); }, "radius of point 2 of the reference");
   bad = Reference();
-  bad.lines.lines[0][0] = 9999;
+  bad.lines[0][0] = 9999;
   ExpectRefusal([&] { CompareBranches(bad, Reference()); }, "refers to point 9999");
   BranchMetricsSettings settings;
   settings.spacing = 0.0;
@@ -284,14 +284,14 @@ TEST(BranchMetrics, EmptySidesAndBadInput)
   EXPECT_THROW(
     CompareBranches(Reference(), Reference(), {}, [](double) { return false; }), Cancelled);
   // Radii are not needed.
-  BranchTree plain = Reference();
-  plain.lines.radius.clear();
+  Polylines plain = Reference();
+  plain.radius.clear();
   EXPECT_EQ(CompareBranches(plain, plain).continuityScore, 1.0);
 }
 
 TEST(BranchMetrics, LoopsAndDoubledLinesEnd)
 {
-  BranchTree ring;
+  Polylines ring;
   AddLine(ring, { 0, 0, 0 }, { 10, 0, 0 }, 1.0, 1);
   AddLine(ring, { 10, 0, 0 }, { 10, 10, 0 }, 1.0, 2);
   AddLine(ring, { 10, 10, 0 }, { 0, 0, 0 }, 1.0, 3);
@@ -300,9 +300,9 @@ TEST(BranchMetrics, LoopsAndDoubledLinesEnd)
   ASSERT_EQ(branches.size(), 1U);
   EXPECT_NEAR(branches[0].length, 20.0 + std::sqrt(200.0), 1e-9);
   // A line of one point, and one that stays where it is.
-  BranchTree dots;
-  dots.lines.points = { { 1, 1, 1 }, { 1, 1, 1 } };
-  dots.lines.lines = { { 0 }, { 0, 1 }, {} };
+  Polylines dots;
+  dots.points = { { 1, 1, 1 }, { 1, 1, 1 } };
+  dots.lines = { { 0 }, { 0, 1 }, {} };
   EXPECT_TRUE(FindBranches(dots).empty());
   EXPECT_EQ(CompareBranches(dots, Reference()).completenessRatio, 0.0);
 }

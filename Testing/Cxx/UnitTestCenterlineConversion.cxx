@@ -15,17 +15,17 @@ using namespace coronary;
 
 namespace
 {
-CenterlineTree FromPhantom(int seed)
+VesselTree FromPhantom(int seed)
 {
   PhantomSettings settings;
   settings.seed = static_cast<std::uint64_t>(seed);
   const PhantomTree truth = CoronaryPhantom(settings).Tree(0.75);
-  CenterlineTree tree;
+  VesselTree tree;
   tree.points = truth.points;
   tree.radius = truth.radius;
-  for (const PhantomBranch& branch : truth.branches)
+  for (const VesselTree::Branch& branch : truth.branches)
   {
-    CenterlineTree::Branch copy;
+    VesselTree::Branch copy;
     copy.points = branch.points;
     copy.groupId = branch.groupId;
     copy.parentGroupId = branch.parentGroupId;
@@ -35,13 +35,13 @@ CenterlineTree FromPhantom(int seed)
 }
 
 /// The same branches with the same parents; positions bit by bit, radii on request.
-void ExpectSame(const CenterlineTree& a, const CenterlineTree& b, bool radii)
+void ExpectSame(const VesselTree& a, const VesselTree& b, bool radii)
 {
   ASSERT_EQ(a.branches.size(), b.branches.size());
-  for (const CenterlineTree::Branch& x : a.branches)
+  for (const VesselTree::Branch& x : a.branches)
   {
-    const CenterlineTree::Branch* y = nullptr;
-    for (const CenterlineTree::Branch& other : b.branches)
+    const VesselTree::Branch* y = nullptr;
+    for (const VesselTree::Branch& other : b.branches)
     {
       const bool same = a.points[x.points.front()] == b.points[other.points.front()] &&
         a.points[x.points[1]] == b.points[other.points[1]];
@@ -94,7 +94,7 @@ TEST(CenterlineConversion, VmtkThereAndBack)
 {
   for (const int seed : { 5, 6 })
   {
-    const CenterlineTree tree = FromPhantom(seed);
+    const VesselTree tree = FromPhantom(seed);
     const std::vector<VmtkTract> tracts = ToVmtkTracts(tree);
     // Every tip has a path of its own, from a root on.
     int paths = 0;
@@ -104,7 +104,7 @@ TEST(CenterlineConversion, VmtkThereAndBack)
     }
     EXPECT_GT(paths, 10);
     EXPECT_GT(tracts.size(), tree.branches.size());
-    const CenterlineTree back = FromVmtkTracts(tracts);
+    const VesselTree back = FromVmtkTracts(tracts);
     ExpectSame(tree, back, true);
     EXPECT_EQ(tree.points.size(), back.points.size());
   }
@@ -112,7 +112,7 @@ TEST(CenterlineConversion, VmtkThereAndBack)
 
 TEST(CenterlineConversion, AnUnsplitTreeIsSplitForVmtk)
 {
-  CenterlineTree tree;
+  VesselTree tree;
   for (int i = 0; i < 5; ++i)
   {
     tree.points.emplace_back(i, 0.0, 0.0);
@@ -137,7 +137,7 @@ TEST(CenterlineConversion, TgfThereAndBack)
 {
   for (const int seed : { 5, 6 })
   {
-    const CenterlineTree tree = FromPhantom(seed);
+    const VesselTree tree = FromPhantom(seed);
     const TgfSkeleton skeleton = ToSkeleton(tree);
     EXPECT_EQ(skeleton.joints.size(), tree.points.size());
     EXPECT_EQ(skeleton.bones.size() + 2, skeleton.joints.size()); // two trees
@@ -146,7 +146,7 @@ TEST(CenterlineConversion, TgfThereAndBack)
     const TgfSkeleton read = ReadTgf(stream);
     EXPECT_EQ(read.joints, skeleton.joints);
     EXPECT_EQ(read.bones, skeleton.bones);
-    const CenterlineTree back = FromSkeleton(read, 0.7);
+    const VesselTree back = FromSkeleton(read, 0.7);
     ExpectSame(tree, back, false);
     EXPECT_EQ(back.radius.front(), 0.7);
   }
@@ -161,7 +161,7 @@ TEST(CenterlineConversion, TgfOfOthers)
   ASSERT_EQ(skeleton.joints.size(), 4U);
   ASSERT_EQ(skeleton.bones.size(), 3U);
   // Bones only begin at joint 3, in the middle: it is the root.
-  const CenterlineTree tree = FromSkeleton(skeleton);
+  const VesselTree tree = FromSkeleton(skeleton);
   ASSERT_EQ(tree.branches.size(), 2U);
   EXPECT_EQ(tree.branches[0].parentGroupId, -1);
   EXPECT_EQ(tree.branches[1].parentGroupId, -1);

@@ -143,7 +143,7 @@ struct Deviation
   double greatest = 0.0;
 };
 
-Deviation Compare(const CenterlineTree& tree, const Tube& tube, double unit = 1.0)
+Deviation Compare(const VesselTree& tree, const Tube& tube, double unit = 1.0)
 {
   Deviation deviation;
   for (std::size_t i = 0; i < tree.points.size(); ++i)
@@ -596,7 +596,7 @@ TEST(CenterlineExtraction, TheForkOfALongBranchThatTurnsOffIsWhereTheAxesMeet)
       result.tree.points[static_cast<std::size_t>(result.bifurcations.front().point)];
     EXPECT_LT((found - fork).norm(), 0.5);
     // The straight axis stays one, and no point goes back.
-    for (const CenterlineTree::Branch& branch : result.tree.branches)
+    for (const VesselTree::Branch& branch : result.tree.branches)
     {
       for (std::size_t i = 2; i < branch.points.size(); ++i)
       {

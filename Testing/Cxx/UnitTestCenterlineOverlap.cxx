@@ -40,7 +40,7 @@ OverlapLine Join(OverlapLine a, const OverlapLine& b)
   return a;
 }
 
-void AddLine(CenterlineSet& set, const OverlapLine& line)
+void AddLine(Polylines& set, const OverlapLine& line)
 {
   set.lines.emplace_back();
   for (std::size_t i = 0; i < line.points.size(); ++i)
@@ -66,9 +66,9 @@ OverlapLine Between(const Vector3& a, const Vector3& b, double radiusA, double r
 
 /// A trunk of 20 mm and two daughters of 30 mm; the second is thinner than the relevant radius but
 /// for its first third.
-CenterlineSet Fork(bool second = true)
+Polylines Fork(bool second = true)
 {
-  CenterlineSet set;
+  Polylines set;
   const Vector3 fork(20.0, 0.0, 0.0);
   AddLine(set, Between(Vector3::Zero(), fork, 2.0, 2.0));
   AddLine(set, Between(fork, fork + 30.0 * Vector3(0.6, 0.8, 0.0), 1.5, 1.5));
@@ -79,12 +79,12 @@ CenterlineSet Fork(bool second = true)
   return set;
 }
 
-CenterlineSet FromPhantom(const PhantomTree& tree)
+Polylines FromPhantom(const PhantomTree& tree)
 {
-  CenterlineSet set;
+  Polylines set;
   set.points = tree.points;
   set.radius = tree.radius;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     set.lines.push_back(branch.points);
   }
@@ -419,7 +419,7 @@ TEST(CenterlineOverlap, NothingOnOneSide)
 
 TEST(CenterlineTreeOverlap, ATreeIsLikeItself)
 {
-  const CenterlineSet tree = Fork();
+  const Polylines tree = Fork();
   for (const TreeOverlap& overlap :
     { CompareCenterlineTrees(tree, tree), CompareCenterlinePaths(tree, tree) })
   {
@@ -477,7 +477,7 @@ TEST(CenterlineTreeOverlap, AMissingBranch)
 
 TEST(CenterlineTreeOverlap, AFalseBranch)
 {
-  CenterlineSet result = Fork();
+  Polylines result = Fork();
   // Upwards from the middle of the trunk: 2 mm of it are in the lumen.
   AddLine(result, Between(Vector3(10.0, 0.0, 0.0), Vector3(10.0, 0.0, 12.0), 1.0, 1.0));
   const TreeOverlap overlap = CompareCenterlineTrees(Fork(), result);
@@ -495,7 +495,7 @@ TEST(CenterlineTreeOverlap, AFalseBranch)
 
 TEST(CenterlineTreeOverlap, AFalseWayRunsOverSeveralLines)
 {
-  CenterlineSet result = Fork();
+  Polylines result = Fork();
   const Vector3 start(10.0, 0.0, 0.0);
   const Vector3 middle(10.0, 0.0, 6.0);
   AddLine(result, Between(start, middle, 1.0, 1.0));
@@ -506,7 +506,7 @@ TEST(CenterlineTreeOverlap, AFalseWayRunsOverSeveralLines)
 
 TEST(CenterlineTreeOverlap, RowsAddUpToTheTotal)
 {
-  CenterlineSet result = Fork();
+  Polylines result = Fork();
   for (Vector3& p : result.points)
   {
     p += Vector3(0.3, 0.4, 0.5);
@@ -537,14 +537,14 @@ TEST(CenterlineTreeOverlap, RowsAddUpToTheTotal)
 TEST(CenterlineTreeOverlap, ThinEndsAreNotRelevant)
 {
   // The thin daughter is relevant for 10 of its 30 mm; the result ends after 12.
-  CenterlineSet result = Fork(false);
+  Polylines result = Fork(false);
   const Vector3 fork(20.0, 0.0, 0.0);
   AddLine(result, Between(fork, fork + 12.0 * Vector3(0.6, -0.8, 0.0), 0.9, 0.8));
   const TreeOverlap overlap = CompareCenterlineTrees(Fork(), result);
   EXPECT_DOUBLE_EQ(overlap.total.overlapRelevant, 1.0);
   EXPECT_LT(overlap.total.overlap, 0.95);
   // A result that runs on beyond the reference's end is false, but not in the relevant part.
-  CenterlineSet longer = Fork(false);
+  Polylines longer = Fork(false);
   AddLine(longer, Between(fork, fork + 12.0 * Vector3(0.6, -0.8, 0.0), 0.9, 0.8));
   const TreeOverlap beyond = CompareCenterlineTrees(result, Fork());
   EXPECT_DOUBLE_EQ(beyond.total.overlapRelevant, 1.0);
@@ -562,7 +562,7 @@ TEST(CenterlineTreeOverlap, ThinVesselsCanBeLeftOut)
   EXPECT_NEAR(missing.longestMissed, 9.0, 0.3);
   EXPECT_EQ(missing.reference.back().match, CenterlineMatch::NotCompared);
   // What is off the course there is neither right nor wrong; elsewhere it is.
-  CenterlineSet result = Fork();
+  Polylines result = Fork();
   const Vector3 thin = result.points[result.lines[2][25]];
   const Vector3 wide = result.points[result.lines[1][25]];
   AddLine(result, Between(thin, thin + Vector3(0.0, 0.0, 12.0), 0.5, 0.5));
@@ -579,7 +579,7 @@ TEST(CenterlineTreeOverlap, ThinVesselsCanBeLeftOut)
 TEST(CenterlineTreeOverlap, LinesHangTogetherByIndexAndByPosition)
 {
   // The fork with shared points, its daughters one after the other from the middle of a line.
-  CenterlineSet shared;
+  Polylines shared;
   for (int i = 0; i <= 50; ++i)
   {
     shared.points.emplace_back(i, 0.0, 0.0);
@@ -599,7 +599,7 @@ TEST(CenterlineTreeOverlap, LinesHangTogetherByIndexAndByPosition)
   {
     shared.lines[1].push_back(i);
   }
-  CenterlineSet split;
+  Polylines split;
   AddLine(split, Between({ 20.0, 0.0, 0.0 }, { 50.0, 0.0, 0.0 }, 1.0, 1.0));
   AddLine(split, Between({ 20.0, 0.0, 0.0 }, { 20.0, 20.0, 0.0 }, 1.0, 1.0));
   AddLine(split, Between({ 0.0, 0.0, 0.0 }, { 20.0, 0.0, 0.0 }, 1.0, 1.0));
@@ -619,8 +619,8 @@ TEST(CenterlineTreeOverlap, LinesHangTogetherByIndexAndByPosition)
 TEST(CenterlineTreeOverlap, WholePathsOnTopOfEachOther)
 {
   // VMTK's form: one line a path. Lines that begin in each other must not hang up the search.
-  CenterlineSet paths;
-  const CenterlineSet fork = Fork();
+  Polylines paths;
+  const Polylines fork = Fork();
   for (const int daughter : { 1, 2 })
   {
     paths.lines.emplace_back();
@@ -639,7 +639,7 @@ TEST(CenterlineTreeOverlap, WholePathsOnTopOfEachOther)
   ASSERT_EQ(overlap.rows.size(), 2U);
   EXPECT_EQ(overlap.rows[1].resultLines, (std::vector<std::int64_t>{ 1 }));
 
-  CenterlineSet ring;
+  Polylines ring;
   const auto corner = [](double angle)
   { return Vector3(10.0 * std::cos(angle), 10.0 * std::sin(angle), 0.0); };
   AddLine(ring, Between(corner(0.0), corner(2.0), 1.0, 1.0));
@@ -653,9 +653,9 @@ TEST(CenterlineTreeOverlap, PhantomTreesAndTheUnit)
 {
   PhantomSettings settings;
   settings.seed = 3;
-  const CenterlineSet truth = FromPhantom(CoronaryPhantom(settings).Tree(0.75));
+  const Polylines truth = FromPhantom(CoronaryPhantom(settings).Tree(0.75));
   settings.centerlineSpacing = 1.0;
-  const CenterlineSet coarse = FromPhantom(CoronaryPhantom(settings).Tree(0.75));
+  const Polylines coarse = FromPhantom(CoronaryPhantom(settings).Tree(0.75));
   const TreeOverlap overlap = CompareCenterlineTrees(truth, coarse);
   EXPECT_GT(overlap.total.overlap, 0.9999);
   EXPECT_LT(overlap.total.distance, 0.05);
@@ -663,7 +663,7 @@ TEST(CenterlineTreeOverlap, PhantomTreesAndTheUnit)
   EXPECT_EQ(overlap.rows.size(), truth.lines.size());
 
   // The same in metres, turned and shifted, on one thread.
-  const auto move = [](CenterlineSet set)
+  const auto move = [](Polylines set)
   {
     const Matrix3 turn = Eigen::AngleAxisd(1.1, Vector3(1.0, 2.0, -1.0).normalized()).matrix();
     for (Vector3& p : set.points)
@@ -680,7 +680,7 @@ TEST(CenterlineTreeOverlap, PhantomTreesAndTheUnit)
   metres.spacing *= 1e-3;
   metres.relevantRadius *= 1e-3;
   metres.startLength *= 1e-3;
-  CenterlineSet shifted = coarse;
+  Polylines shifted = coarse;
   for (Vector3& p : shifted.points)
   {
     p += Vector3(0.7, 0.0, 0.0);
@@ -730,7 +730,7 @@ TEST(CenterlineOverlap, WhatCanNotBeUsedIsNamed)
   ObserverAgreement observers;
   observers.distance = { 1.0 };
   expect("observer distances", [&] { CompareCenterlines(line, line, {}, observers); });
-  CenterlineSet set = Fork();
+  Polylines set = Fork();
   set.lines[1][4] = 4711;
   expect("line 1 of the result refers to point 4711", [&] { CompareCenterlineTrees(Fork(), set); });
   expect("line 1 of the reference", [&] { CompareCenterlinePaths(set, Fork()); });

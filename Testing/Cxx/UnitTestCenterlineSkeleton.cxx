@@ -16,9 +16,9 @@ using namespace coronary;
 namespace
 {
 /// A trunk of 40 mm along x with a side branch of 20 mm at 16 mm; not split.
-CenterlineTree Branching(double radius = 2.0)
+VesselTree Branching(double radius = 2.0)
 {
-  CenterlineTree tree;
+  VesselTree tree;
   for (int i = 0; i <= 80; ++i)
   {
     tree.points.emplace_back(0.5 * i, 0.0, 0.0);
@@ -46,9 +46,9 @@ CenterlineTree Branching(double radius = 2.0)
 }
 
 /// An arc of a circle.
-CenterlineTree Arc(double bendRadius, double radius)
+VesselTree Arc(double bendRadius, double radius)
 {
-  CenterlineTree tree;
+  VesselTree tree;
   const double length = 40.0;
   tree.branches.resize(1);
   for (int i = 0; i <= 400; ++i)
@@ -61,15 +61,15 @@ CenterlineTree Arc(double bendRadius, double radius)
   return tree;
 }
 
-CenterlineTree OfPhantom(const PhantomTree& phantom)
+VesselTree OfPhantom(const PhantomTree& phantom)
 {
-  CenterlineTree tree;
+  VesselTree tree;
   tree.points = phantom.points;
   tree.radius = phantom.radius;
   tree.segmentId = phantom.segmentId;
-  for (const PhantomBranch& branch : phantom.branches)
+  for (const VesselTree::Branch& branch : phantom.branches)
   {
-    CenterlineTree::Branch b;
+    VesselTree::Branch b;
     b.points = branch.points;
     b.groupId = branch.groupId;
     b.parentGroupId = branch.parentGroupId;
@@ -167,7 +167,7 @@ TEST(CenterlineSkeleton, PhantomsWithinTheLimits)
   {
     PhantomSettings settings;
     settings.seed = seed;
-    const CenterlineTree tree = OfPhantom(CoronaryPhantom(settings).Tree(0.75));
+    const VesselTree tree = OfPhantom(CoronaryPhantom(settings).Tree(0.75));
     const Skeleton skeleton = MakeCenterlineSkeleton(tree);
     EXPECT_GT(skeleton.bones.size(), 60u);
     EXPECT_LT(skeleton.bones.size(), 400u);
@@ -179,10 +179,10 @@ TEST(CenterlineSkeleton, PhantomsWithinTheLimits)
       EXPECT_TRUE(names.insert(bone.name).second) << bone.name;
       total += bone.length;
     }
-    CenterlineTree measured = tree;
+    VesselTree measured = tree;
     MeasureTree(measured);
     double expected = 0.0;
-    for (const CenterlineTree::Branch& branch : measured.branches)
+    for (const VesselTree::Branch& branch : measured.branches)
     {
       expected += branch.length;
     }
@@ -232,8 +232,8 @@ TEST(CenterlineSkeleton, BadInput)
   settings = {};
   settings.radiusFactor = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(MakeCenterlineSkeleton(Branching(), settings), std::invalid_argument);
-  CenterlineTree tree = Branching();
+  VesselTree tree = Branching();
   tree.points[3][1] = std::numeric_limits<double>::infinity();
   EXPECT_THROW(MakeCenterlineSkeleton(tree), std::invalid_argument);
-  EXPECT_TRUE(MakeCenterlineSkeleton(CenterlineTree()).bones.empty());
+  EXPECT_TRUE(MakeCenterlineSkeleton(VesselTree()).bones.empty());
 }

@@ -48,7 +48,7 @@ double RootMeanSquare(const std::vector<double>& values, double truth)
 /// Lines from lists of corners, 0.5 mm steps; the points of different lines are not shared.
 struct LineMaker
 {
-  CenterlineSet set;
+  Polylines set;
 
   std::vector<std::int64_t> Add(const std::vector<Vector3>& corners,
     const std::function<double(double)>& radius, double step = 0.5)
@@ -93,12 +93,12 @@ LineMaker WholePaths(double spread = 0.0)
   return maker;
 }
 
-CenterlineSet PhantomLines(const PhantomTree& tree)
+Polylines PhantomLines(const PhantomTree& tree)
 {
-  CenterlineSet set;
+  Polylines set;
   set.points = tree.points;
   set.radius = tree.radius;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     set.lines.push_back(branch.points);
   }
@@ -318,7 +318,7 @@ TEST(CenterlineTopology, DirectionsOfTheLinesDoNotMatter)
   EXPECT_LT((tree.points[tree.branches[0].points[0]] - Base).norm(), 1e-9);
 
   // Given roots go first.
-  CenterlineSet given = WholePaths().set;
+  Polylines given = WholePaths().set;
   given.roots = { RightTip + Vector3(0.5, 0.5, 0.5) };
   const CenterlineTopology other = BuildTopology(given);
   EXPECT_LT((other.points[other.branches[0].points[0]] - RightTip).norm(), 1e-9);
@@ -478,15 +478,15 @@ TEST(CenterlineTopology, ReproducesThePhantomsTree)
     settings.ramus = seed == 22;
     const PhantomTree truth = CoronaryPhantom(settings).Tree(0.75);
     // As branches, and as whole paths from the ostia to the tips.
-    CenterlineSet branches = PhantomLines(truth);
-    CenterlineSet paths = branches;
+    Polylines branches = PhantomLines(truth);
+    Polylines paths = branches;
     paths.lines.clear();
     std::map<int, int> daughters;
-    for (const PhantomBranch& branch : truth.branches)
+    for (const VesselTree::Branch& branch : truth.branches)
     {
       ++daughters[branch.parentGroupId];
     }
-    for (const PhantomBranch& tip : truth.branches)
+    for (const VesselTree::Branch& tip : truth.branches)
     {
       if (daughters.count(tip.groupId) > 0)
       {
@@ -500,15 +500,15 @@ TEST(CenterlineTopology, ReproducesThePhantomsTree)
       }
       paths.lines.push_back(line);
     }
-    for (const CenterlineSet& lines : { branches, paths })
+    for (const Polylines& lines : { branches, paths })
     {
       const CenterlineTopology tree = BuildTopology(lines);
       ASSERT_EQ(tree.branches.size(), truth.branches.size());
       EXPECT_EQ(tree.points.size(), truth.points.size());
       EXPECT_EQ(tree.trees, 2);
       EXPECT_EQ(tree.prunedTwigs, 0);
-      std::map<std::int64_t, const PhantomBranch*> byTip;
-      for (const PhantomBranch& branch : truth.branches)
+      std::map<std::int64_t, const VesselTree::Branch*> byTip;
+      for (const VesselTree::Branch& branch : truth.branches)
       {
         byTip[branch.points.back()] = &branch;
       }
@@ -516,7 +516,7 @@ TEST(CenterlineTopology, ReproducesThePhantomsTree)
       {
         const auto found = byTip.find(tree.source[branch.points.back()]);
         ASSERT_NE(found, byTip.end());
-        const PhantomBranch& same = *found->second;
+        const VesselTree::Branch& same = *found->second;
         EXPECT_EQ(branch.points.size(), same.points.size());
         EXPECT_EQ(branch.generation, same.generation);
         EXPECT_EQ(branch.strahlerOrder, same.strahlerOrder);
@@ -539,9 +539,9 @@ TEST(CenterlineTopology, UnitAndPlaceDoNotMatter)
 {
   PhantomSettings settings;
   settings.seed = 24;
-  CenterlineSet lines = PhantomLines(CoronaryPhantom(settings).Tree(0.75));
+  Polylines lines = PhantomLines(CoronaryPhantom(settings).Tree(0.75));
   const CenterlineTopology tree = BuildTopology(lines);
-  CenterlineSet moved = lines;
+  Polylines moved = lines;
   const Matrix3 turn = Eigen::AngleAxisd(2.0, Vector3(1, 2, 3).normalized()).toRotationMatrix();
   for (std::size_t i = 0; i < moved.points.size(); ++i)
   {
@@ -575,7 +575,7 @@ TEST(CenterlineTopology, NoiseAndTwigsDoNotTearTheTree)
     settings.dominance = static_cast<Dominance>(seed % 3);
     settings.ramus = seed % 2 == 0;
     const PhantomTree truth = CoronaryPhantom(settings).Tree(0.75);
-    CenterlineSet lines = PhantomLines(truth);
+    Polylines lines = PhantomLines(truth);
     RandomStream random(seed);
     for (Vector3& point : lines.points)
     {
@@ -592,7 +592,7 @@ TEST(CenterlineTopology, SameResultOnAnyNumberOfThreads)
 {
   PhantomSettings settings;
   settings.seed = 25;
-  const CenterlineSet lines = PhantomLines(CoronaryPhantom(settings).Tree(0.4));
+  const Polylines lines = PhantomLines(CoronaryPhantom(settings).Tree(0.4));
   SetNumberOfThreads(1);
   const CenterlineTopology one = BuildTopology(lines);
   SetNumberOfThreads(3);
@@ -607,13 +607,13 @@ TEST(CenterlineTopology, SameResultOnAnyNumberOfThreads)
 TEST(CenterlineTopology, NothingAndNonsense)
 {
   EXPECT_TRUE(BuildTopology({}).branches.empty());
-  CenterlineSet point;
+  Polylines point;
   point.points = { Vector3(1, 1, 1) };
   point.radius = { 1.0 };
   point.lines = { { 0 }, { 0, 0 }, {} };
   EXPECT_TRUE(BuildTopology(point).branches.empty());
 
-  const auto message = [](const CenterlineSet& set, const TopologySettings& settings = {})
+  const auto message = [](const Polylines& set, const TopologySettings& settings = {})
   {
     try
     {
@@ -625,9 +625,9 @@ TEST(CenterlineTopology, NothingAndNonsense)
     }
     return std::string();
   };
-  CenterlineSet good = WholePaths().set;
+  Polylines good = WholePaths().set;
   EXPECT_EQ(message(good), "");
-  CenterlineSet bad = good;
+  Polylines bad = good;
   bad.radius[5] = 0.0;
   EXPECT_NE(message(bad).find("radius of point 5"), std::string::npos);
   bad = good;

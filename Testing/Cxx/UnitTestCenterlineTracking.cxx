@@ -26,18 +26,18 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 
 /// A trunk of 40 mm along z, and a branch from its middle along x.
-MovingLines Fork()
+Polylines Fork()
 {
-  MovingLines lines;
+  Polylines lines;
   for (int n = 0; n <= 80; ++n)
   {
-    lines.rest.emplace_back(0.0, 0.0, 0.5 * n);
+    lines.points.emplace_back(0.0, 0.0, 0.5 * n);
   }
   for (int n = 1; n <= 40; ++n)
   {
-    lines.rest.emplace_back(0.5 * n, 0.0, 20.0);
+    lines.points.emplace_back(0.5 * n, 0.0, 20.0);
   }
-  lines.radius.assign(lines.rest.size(), 1.5);
+  lines.radius.assign(lines.points.size(), 1.5);
   lines.lines.resize(3);
   for (int n = 0; n <= 80; ++n)
   {
@@ -57,11 +57,11 @@ MovingLines Fork()
 
 LineNodes Chain(int count, double step)
 {
-  MovingLines lines;
+  Polylines lines;
   lines.lines.emplace_back();
   for (int n = 0; n < count; ++n)
   {
-    lines.rest.emplace_back(step * n, 0.0, 0.0);
+    lines.points.emplace_back(step * n, 0.0, 0.0);
     lines.lines[0].push_back(n);
   }
   return PlaceNodes(lines, step * 1.001);
@@ -70,10 +70,10 @@ LineNodes Chain(int count, double step)
 
 TEST(LineNodes, AreEvenAndShareTheFork)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   const LineNodes nodes = PlaceNodes(lines, 2.0);
   EXPECT_EQ(nodes.size(), 1u + 10u + 10u + 10u);
-  ASSERT_EQ(nodes.points.size(), lines.rest.size());
+  ASSERT_EQ(nodes.points.size(), lines.points.size());
   int roots = 0;
   for (std::size_t n = 0; n < nodes.size(); ++n)
   {
@@ -95,20 +95,20 @@ TEST(LineNodes, AreEvenAndShareTheFork)
   const std::vector<double> at = nodes.AtPoints(values);
   for (std::size_t p = 0; p < at.size(); ++p)
   {
-    EXPECT_NEAR(at[p], 3.0 * lines.rest[p][0] - 2.0 * lines.rest[p][2] + 1.0, 1e-9);
+    EXPECT_NEAR(at[p], 3.0 * lines.points[p][0] - 2.0 * lines.points[p][2] + 1.0, 1e-9);
   }
 }
 
 TEST(LineNodes, TakeRingsLonePointsAndLinesWithoutLength)
 {
-  MovingLines lines;
+  Polylines lines;
   for (int n = 0; n < 12; ++n)
   {
-    lines.rest.emplace_back(10.0 * std::cos(Pi * n / 6.0), 10.0 * std::sin(Pi * n / 6.0), 0.0);
+    lines.points.emplace_back(10.0 * std::cos(Pi * n / 6.0), 10.0 * std::sin(Pi * n / 6.0), 0.0);
   }
-  lines.rest.emplace_back(50.0, 0.0, 0.0); // alone
-  lines.rest.emplace_back(60.0, 0.0, 0.0); // a line of
-  lines.rest.emplace_back(60.0, 0.0, 0.0); // no length
+  lines.points.emplace_back(50.0, 0.0, 0.0); // alone
+  lines.points.emplace_back(60.0, 0.0, 0.0); // a line of
+  lines.points.emplace_back(60.0, 0.0, 0.0); // no length
   lines.lines = { { 0, 1, 2, 3, 4, 5, 6 }, { 6, 7, 8, 9, 10, 11, 0 }, { 13, 14 } };
   const LineNodes nodes = PlaceNodes(lines, 1.0);
   EXPECT_EQ(nodes.order.size(), nodes.size());
@@ -162,8 +162,8 @@ TEST(Trajectories, FollowPreciseMeasurementsOfAPeriodicMotion)
 TEST(Trajectories, AreTheDenseSolution)
 {
   // Five nodes on a fork: the tree's elimination against one dense system.
-  MovingLines lines;
-  lines.rest = { { 0, 0, 0 }, { 0, 0, 3 }, { 0, 0, 5 }, { 2, 0, 4 }, { 4, 0, 4 } };
+  Polylines lines;
+  lines.points = { { 0, 0, 0 }, { 0, 0, 3 }, { 0, 0, 5 }, { 2, 0, 4 }, { 4, 0, 4 } };
   lines.lines = { { 0, 1 }, { 1, 2 }, { 1, 3 }, { 3, 4 } };
   const LineNodes nodes = PlaceNodes(lines, 10.0);
   ASSERT_EQ(nodes.size(), 5u);
@@ -266,14 +266,14 @@ TEST(Trajectories, TakeFromOtherVesselsWhatTheirOwnDoesNotShow)
 {
   // The heart shortens along x. A vessel along x is seen across its way only; another tree, farther along
   // x, lies across and shows how much.
-  MovingLines lines;
+  Polylines lines;
   for (int n = 0; n <= 10; ++n)
   {
-    lines.rest.emplace_back(4.0 * n, 0.0, 0.0);
+    lines.points.emplace_back(4.0 * n, 0.0, 0.0);
   }
   for (int n = 0; n <= 10; ++n)
   {
-    lines.rest.emplace_back(40.0, 5.0 + 4.0 * n, 3.0);
+    lines.points.emplace_back(40.0, 5.0 + 4.0 * n, 3.0);
   }
   lines.lines = { { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10 },
     { 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 } };
@@ -573,8 +573,8 @@ namespace
 /// An image of the fork, moved by `shift`.
 VesselImage Moved(const Vector3& shift)
 {
-  MovingLines lines = Fork();
-  for (Vector3& point : lines.rest)
+  Polylines lines = Fork();
+  for (Vector3& point : lines.points)
   {
     point += shift;
   }
@@ -590,7 +590,7 @@ Vector3 Way(double t)
 
 TEST(CenterlineTracking, FollowsImagesOfVesselsAlone)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   std::vector<double> times;
   for (int k = 0; k < 10; ++k)
   {
@@ -610,15 +610,15 @@ TEST(CenterlineTracking, FollowsImagesOfVesselsAlone)
   CenterlineTrackingReport report;
   const PoseSequence poses = TrackCenterlines(lines, 0.0, times, imageAt, settings, &report);
   ASSERT_EQ(poses.points.size(), times.size());
-  CheckPoseSequence(poses, lines.rest.size());
+  CheckPoseSequence(poses, lines.points.size());
   EXPECT_EQ(report.imagesRead, reads);
   for (std::size_t k = 0; k < times.size(); ++k)
   {
     double mean = 0.0;
-    for (std::size_t p = 0; p < lines.rest.size(); ++p)
+    for (std::size_t p = 0; p < lines.points.size(); ++p)
     {
-      mean += (poses.points[k][p] - lines.rest[p] - Way(times[k])).norm() /
-        static_cast<double>(lines.rest.size());
+      mean += (poses.points[k][p] - lines.points[p] - Way(times[k])).norm() /
+        static_cast<double>(lines.points.size());
     }
     EXPECT_LT(mean, 0.3) << "phase " << k;
     EXPECT_GT(report.trackedShare[k], 0.8);
@@ -627,7 +627,7 @@ TEST(CenterlineTracking, FollowsImagesOfVesselsAlone)
 
 TEST(CenterlineTracking, IsTheSameOnRanks)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   const std::vector<double> times = { 0.0, 0.15, 0.3, 0.5, 0.7, 0.9 };
   CenterlineTrackingSettings settings;
   settings.tissue = false;
@@ -684,7 +684,7 @@ namespace
 double DistanceToAxes(const PhantomTree& tree, const Vector3& place)
 {
   double least = std::numeric_limits<double>::infinity();
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t n = 0; n + 1 < branch.points.size(); ++n)
     {
@@ -717,10 +717,10 @@ TEST(CenterlineTracking, DoesNotJumpToAVein)
   const double reference = 0.75;
   const PhantomTree rest = phantom.Tree(reference);
   const PhantomTree veinAtRest = phantom.Vein(reference);
-  MovingLines lines;
-  lines.rest = rest.points;
+  Polylines lines;
+  lines.points = rest.points;
   lines.radius = rest.radius;
-  for (const PhantomBranch& branch : rest.branches)
+  for (const VesselTree::Branch& branch : rest.branches)
   {
     lines.lines.push_back(branch.points);
   }
@@ -777,7 +777,7 @@ TEST(CenterlineTracking, DoesNotJumpToAVein)
 
 TEST(CenterlineTracking, FillsAPhaseWithoutVessels)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   std::vector<double> times;
   for (int k = 0; k < 10; ++k)
   {
@@ -801,16 +801,16 @@ TEST(CenterlineTracking, FillsAPhaseWithoutVessels)
   EXPECT_LT(report.trackedShare[4], 0.01);
   ASSERT_EQ(report.warnings.size(), 1u);
   EXPECT_NE(report.warnings[0].find("lost"), std::string::npos);
-  for (std::size_t p = 0; p < lines.rest.size(); ++p)
+  for (std::size_t p = 0; p < lines.points.size(); ++p)
   {
     EXPECT_NE(poses.status[4][p], TrackingStatus::Tracked);
-    EXPECT_LT((poses.points[4][p] - lines.rest[p] - Way(times[4])).norm(), 1.5);
+    EXPECT_LT((poses.points[4][p] - lines.points[p] - Way(times[4])).norm(), 1.5);
   }
 }
 
 TEST(CenterlineTracking, MeasuresPhasesThatShowTheSameMoment)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   const std::vector<double> times = { 0.0, 0.25, 0.5, 0.75, 1.005 };
   VesselImage image;
   const auto imageAt = [&](double t)
@@ -830,7 +830,7 @@ TEST(CenterlineTracking, MeasuresPhasesThatShowTheSameMoment)
 
 TEST(CenterlineTracking, RefusesWhatIsWrong)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   VesselImage image = Moved(Vector3::Zero());
   const auto imageAt = [&](double) { return image.View(); };
   const auto track = [&](const std::vector<double>& times, double reference = 0.0)

@@ -44,7 +44,7 @@ Root MakeRoot(std::uint64_t seed, Dominance dominance, double spacing, double an
   Root root;
   root.truth = phantom.Ostia(Phase);
   const PhantomTree tree = phantom.Tree(Phase);
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.treeId == 0)
     {

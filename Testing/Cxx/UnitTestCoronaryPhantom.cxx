@@ -64,7 +64,7 @@ const PhantomMotionSummary& Find(
 std::set<std::string> Labels(const CoronaryPhantom& phantom)
 {
   std::set<std::string> labels;
-  for (const PhantomBranch& branch : phantom.Tree(0.0).branches)
+  for (const VesselTree::Branch& branch : phantom.Tree(0.0).branches)
   {
     labels.insert(SegmentName(branch.segmentId));
   }
@@ -191,7 +191,7 @@ TEST(CoronaryPhantom, TreeIsConnectedLabelledAndOrdered)
     int roots = 0;
     for (std::size_t b = 0; b < tree.branches.size(); ++b)
     {
-      const PhantomBranch& branch = tree.branches[b];
+      const VesselTree::Branch& branch = tree.branches[b];
       EXPECT_EQ(branch.groupId, static_cast<int>(b));
       ASSERT_GE(branch.points.size(), 3u);
       EXPECT_FALSE(SegmentName(branch.segmentId).empty());
@@ -204,7 +204,7 @@ TEST(CoronaryPhantom, TreeIsConnectedLabelledAndOrdered)
       else
       {
         ASSERT_LT(branch.parentGroupId, branch.groupId);
-        const PhantomBranch& parent = tree.branches[branch.parentGroupId];
+        const VesselTree::Branch& parent = tree.branches[branch.parentGroupId];
         EXPECT_EQ(branch.points.front(), parent.points.back());
         EXPECT_EQ(branch.generation, parent.generation + 1);
         EXPECT_EQ(branch.treeId, parent.treeId);
@@ -252,7 +252,7 @@ TEST(CoronaryPhantom, CalibresFollowDodgeForTheMeanHeart)
   settings.areaPulse = 0.0;
   const PhantomTree tree = CoronaryPhantom(settings).Tree(0.0);
   std::map<std::string, double> first;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     const auto middle = branch.points[branch.points.size() / (branch.length < 25.0 ? 2 : 12)];
     first.emplace(SegmentName(branch.segmentId), 2.0 * tree.radius[middle]);
@@ -289,7 +289,7 @@ TEST(CoronaryPhantom, LumenDistanceIsMinusTheRadiusOnTheAxis)
   for (const double t : { 0.0, 0.35 })
   {
     const PhantomTree tree = phantom.Tree(t);
-    for (const PhantomBranch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       const auto middle = branch.points[branch.points.size() / 2];
       if (branch.length < 15.0)
@@ -450,7 +450,7 @@ TEST(CoronaryPhantom, SurfaceIsClosedOrientedAndOnTheLumen)
     // The volume of the tubes, less what neighbours share at the bifurcations.
     const PhantomTree tree = phantom.Tree(0.0);
     double tubes = 0.0;
-    for (const PhantomBranch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       for (std::size_t i = 1; i < branch.points.size(); ++i)
       {
@@ -548,7 +548,7 @@ TEST(PhantomImage, TissuesHaveTheirValues)
   EXPECT_NEAR(ValueAt(phantom, root, t), 430, 1);
 
   const PhantomTree tree = phantom.Tree(t);
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.points.size() < 24)
     {
@@ -607,7 +607,7 @@ TEST(PhantomImage, SeptalBranchesRunThroughMuscleNotBlood)
     const CoronaryPhantom phantom(settings);
     const PhantomTree tree = phantom.Tree(0.75);
     int sections = 0;
-    for (const PhantomBranch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       if (branch.segmentId < FirstSeptal || branch.segmentId > ThirdSeptal)
       {

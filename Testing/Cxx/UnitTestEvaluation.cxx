@@ -14,23 +14,23 @@ using namespace coronary;
 
 namespace
 {
-void AddLine(BranchTree& tree, const Vector3& from, const Vector3& to, double radius)
+void AddLine(Polylines& tree, const Vector3& from, const Vector3& to, double radius)
 {
   const int steps = static_cast<int>(std::lround((to - from).norm()));
   tree.groups.push_back(static_cast<std::int64_t>(tree.groups.size()));
-  tree.lines.lines.emplace_back();
+  tree.lines.emplace_back();
   for (int i = 0; i <= steps; ++i)
   {
-    tree.lines.lines.back().push_back(static_cast<std::int64_t>(tree.lines.points.size()));
-    tree.lines.points.emplace_back(from + (to - from) * i / steps);
-    tree.lines.radius.push_back(radius);
+    tree.lines.back().push_back(static_cast<std::int64_t>(tree.points.size()));
+    tree.points.emplace_back(from + (to - from) * i / steps);
+    tree.radius.push_back(radius);
   }
 }
 
 /// A trunk of 20 mm along x and two branches; the model's lies `shift` mm higher.
-BranchTree Tree(double shift, bool complete)
+Polylines Tree(double shift, bool complete)
 {
-  BranchTree tree;
+  Polylines tree;
   const Vector3 up(0, 0, shift);
   AddLine(tree, Vector3(0, 0, 0) + up, Vector3(20, 0, 0) + up, 1.5);
   AddLine(tree, Vector3(20, 0, 0) + up, Vector3(50, 0, 0) + up, 1.2);

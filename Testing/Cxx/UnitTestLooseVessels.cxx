@@ -53,11 +53,11 @@ protected:
   /// What is found with the tree without a segment's branches and all that hangs on them.
   static std::vector<LooseVessel> Find(int without, std::vector<Vector3>* gone = nullptr)
   {
-    CenterlineSet set;
+    Polylines set;
     set.points = Truth.points;
     set.radius = Truth.radius;
     std::set<int> cut;
-    for (const PhantomBranch& branch : Truth.branches)
+    for (const VesselTree::Branch& branch : Truth.branches)
     {
       if (branch.segmentId == without || cut.count(branch.parentGroupId) != 0)
       {
@@ -188,7 +188,7 @@ TEST_F(LooseVessels, AShortRestBehindALesionIsTold)
   const std::vector<std::int16_t> values = Values;
   const std::vector<float> vesselness = Vesselness;
   std::vector<Vector3> rest;
-  for (const PhantomBranch& branch : Truth.branches)
+  for (const VesselTree::Branch& branch : Truth.branches)
   {
     if (branch.segmentId != SecondObtuseMarginal)
     {
@@ -222,7 +222,7 @@ TEST_F(LooseVessels, WithoutContrastOrTreeThereIsNoMeasure)
   ScalarImage image;
   image.grid = Grid;
   image.values = static_cast<const std::int16_t*>(Values.data());
-  const CenterlineTree none;
+  const VesselTree none;
   EXPECT_TRUE(
     FindLooseVessels({ image, Vesselness.data(), none, HeartPose(), 50.0, 420.0 }).empty());
   EXPECT_THROW(FindLooseVessels({ image, Vesselness.data(), none, HeartPose(), 50.0, 50.0 }),

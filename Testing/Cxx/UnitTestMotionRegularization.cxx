@@ -15,7 +15,7 @@
 using coronary::MotionEnergies;
 using coronary::MotionEnergy;
 using coronary::MotionRegularizationSettings;
-using coronary::MovingLines;
+using coronary::Polylines;
 using coronary::PoseSequence;
 using coronary::RegularizedMotion;
 using coronary::RegularizeMotion;
@@ -27,29 +27,29 @@ constexpr double Pi = 3.14159265358979323846;
 constexpr double Infinity = std::numeric_limits<double>::infinity();
 
 /// One line along x with `points` points of `step` mm.
-MovingLines Straight(int points, double step)
+Polylines Straight(int points, double step)
 {
-  MovingLines lines;
+  Polylines lines;
   lines.lines.emplace_back();
   for (int n = 0; n < points; ++n)
   {
-    lines.rest.emplace_back(step * n, 0.0, 0.0);
+    lines.points.emplace_back(step * n, 0.0, 0.0);
     lines.lines[0].push_back(n);
   }
   return lines;
 }
 
 /// A line with a side branch at its middle, curved.
-MovingLines Fork()
+Polylines Fork()
 {
-  MovingLines lines;
+  Polylines lines;
   for (int n = 0; n < 21; ++n)
   {
-    lines.rest.emplace_back(2.0 * n, 5.0 * std::sin(0.1 * n), 0.0);
+    lines.points.emplace_back(2.0 * n, 5.0 * std::sin(0.1 * n), 0.0);
   }
   for (int n = 1; n < 8; ++n)
   {
-    lines.rest.push_back(lines.rest[10] + Vector3(1.2 * n, 0.0, 1.6 * n));
+    lines.points.push_back(lines.points[10] + Vector3(1.2 * n, 0.0, 1.6 * n));
   }
   lines.lines = { {}, { 10 } };
   for (int n = 0; n < 21; ++n)
@@ -83,14 +83,14 @@ Vector3 Beat(const Vector3& rest, double t)
 
 template <typename Function>
 PoseSequence Move(
-  const MovingLines& lines, const std::vector<double>& times, const Function& function)
+  const Polylines& lines, const std::vector<double>& times, const Function& function)
 {
   PoseSequence sequence;
   sequence.times = times;
   for (const double time : times)
   {
     sequence.points.emplace_back();
-    for (const Vector3& rest : lines.rest)
+    for (const Vector3& rest : lines.points)
     {
       sequence.points.back().push_back(function(rest, time));
     }
@@ -141,7 +141,7 @@ MotionRegularizationSettings NoWeights()
 
 TEST(MotionRegularization, SmoothMotionStays)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   const PoseSequence motion = Move(lines, Even(20), Beat);
   const RegularizedMotion same = RegularizeMotion(motion, lines, NoWeights());
   EXPECT_LT(Greatest(same.poses, motion), 1e-6);
@@ -163,9 +163,9 @@ TEST(MotionRegularization, TheDefaultsHardlyMoveThePhantom)
   settings.centerlineSpacing = 2.0;
   const coronary::CoronaryPhantom phantom(settings);
   const coronary::PhantomTree rest = phantom.Tree(0.75);
-  MovingLines lines;
-  lines.rest = rest.points;
-  for (const coronary::PhantomBranch& branch : rest.branches)
+  Polylines lines;
+  lines.points = rest.points;
+  for (const coronary::VesselTree::Branch& branch : rest.branches)
   {
     lines.lines.push_back(branch.points);
   }
@@ -204,7 +204,7 @@ TEST(MotionRegularization, TheDefaultsHardlyMoveThePhantom)
 
 TEST(MotionRegularization, ASpikeInALostNodeIsRemoved)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   const PoseSequence truth = Move(lines, Even(20), Beat);
   PoseSequence spoiled = truth;
   SetConfidence(spoiled, 1.0);
@@ -225,13 +225,13 @@ TEST(MotionRegularization, ASpikeInALostNodeIsRemoved)
 
 TEST(MotionRegularization, AWholeLostPhaseIsFilled)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   const PoseSequence truth = Move(lines, Even(20), Beat);
   PoseSequence spoiled = truth;
   SetConfidence(spoiled, 1.0);
-  for (std::size_t n = 0; n < lines.rest.size(); ++n)
+  for (std::size_t n = 0; n < lines.points.size(); ++n)
   {
-    spoiled.points[12][n] = lines.rest[n];
+    spoiled.points[12][n] = lines.points[n];
     spoiled.confidence[12][n] = 0.0;
   }
   const RegularizedMotion result = RegularizeMotion(spoiled, lines);
@@ -240,7 +240,7 @@ TEST(MotionRegularization, AWholeLostPhaseIsFilled)
 
 TEST(MotionRegularization, WellTrackedPointsMoveByTheToleranceAtMost)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   PoseSequence motion = Move(lines, Even(12), Beat);
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0.0, 1.0);
@@ -248,7 +248,7 @@ TEST(MotionRegularization, WellTrackedPointsMoveByTheToleranceAtMost)
   SetConfidence(motion, 0.0);
   for (std::size_t k = 0; k < 12; ++k)
   {
-    for (std::size_t n = 0; n < lines.rest.size(); ++n)
+    for (std::size_t n = 0; n < lines.points.size(); ++n)
     {
       motion.points[k][n] += Vector3(noise(random), noise(random), noise(random));
       motion.confidence[k][n] = any(random);
@@ -265,7 +265,7 @@ TEST(MotionRegularization, WellTrackedPointsMoveByTheToleranceAtMost)
     double others = 0.0;
     for (std::size_t k = 0; k < 12; ++k)
     {
-      for (std::size_t n = 0; n < lines.rest.size(); ++n)
+      for (std::size_t n = 0; n < lines.points.size(); ++n)
       {
         const double moved = (result.poses.points[k][n] - motion.points[k][n]).norm();
         if (motion.confidence[k][n] >= 0.6)
@@ -285,7 +285,7 @@ TEST(MotionRegularization, WellTrackedPointsMoveByTheToleranceAtMost)
 
 TEST(MotionRegularization, AStretchedLineComesBackToTheLimit)
 {
-  const MovingLines lines = Straight(11, 4.0);
+  const Polylines lines = Straight(11, 4.0);
   const auto stretched = [](const Vector3& rest, double t) -> Vector3 {
     return { rest.x() * (t > 0.45 && t < 0.7 ? 1.5 : 1.0), 0.0, 0.0 };
   };
@@ -317,7 +317,7 @@ TEST(MotionRegularization, AStretchedLineComesBackToTheLimit)
 
 TEST(MotionRegularization, CornersAreKeptWithinTheLimits)
 {
-  MovingLines lines = Straight(9, 3.0);
+  Polylines lines = Straight(9, 3.0);
   const auto kinked = [](const Vector3& rest, double t) -> Vector3
   {
     // A kink of 100 degrees at x = 12, at one phase.
@@ -358,8 +358,8 @@ TEST(MotionRegularization, CornersAreKeptWithinTheLimits)
     EXPECT_GT(radius, 5.8) << n;
   }
   // What is sharp at rest may stay so.
-  MovingLines sharp = lines;
-  for (Vector3& point : sharp.rest)
+  Polylines sharp = lines;
+  for (Vector3& point : sharp.points)
   {
     point = kinked(point, 0.5);
   }
@@ -370,7 +370,7 @@ TEST(MotionRegularization, CornersAreKeptWithinTheLimits)
 
 TEST(MotionRegularization, StepsBetweenPhasesAreKept)
 {
-  const MovingLines lines = Straight(5, 4.0);
+  const Polylines lines = Straight(5, 4.0);
   const PoseSequence motion = Move(lines, Even(8),
     [](const Vector3& rest, double t) -> Vector3
     { return rest + Vector3(0, t == 0.5 ? 10.0 : 0.0, 0); });
@@ -392,7 +392,7 @@ TEST(MotionRegularization, StepsBetweenPhasesAreKept)
 TEST(MotionRegularization, ClosedFormOfTheEnergies)
 {
   // A straight line that goes to and fro as a whole: Laplacian only at the ends.
-  const MovingLines lines = Straight(7, 2.0);
+  const Polylines lines = Straight(7, 2.0);
   const int phases = 10;
   const double amplitude = 4.0;
   const PoseSequence motion = Move(lines, Even(phases),
@@ -420,8 +420,8 @@ TEST(MotionRegularization, ClosedFormOfTheEnergies)
 TEST(MotionRegularization, EquationsAreThoseOfTheMinimum)
 {
   // One harmonic of one point: the minimum has the amplitude 1 / (1 + w e), e: energy over norm.
-  MovingLines lines;
-  lines.rest = { Vector3(1, 2, 3) };
+  Polylines lines;
+  lines.points = { Vector3(1, 2, 3) };
   const int phases = 16;
   const PoseSequence motion = Move(lines, Even(phases),
     [&](const Vector3& rest, double t) -> Vector3
@@ -439,7 +439,7 @@ TEST(MotionRegularization, EquationsAreThoseOfTheMinimum)
 TEST(MotionRegularization, VelocityIsDiffusedAlongTheVessel)
 {
   // Neighbours that move against each other: Eq. 13 evens their velocity out, not their places.
-  const MovingLines lines = Straight(40, 1.0);
+  const Polylines lines = Straight(40, 1.0);
   const PoseSequence motion = Move(lines, Even(12),
     [&](const Vector3& rest, double t) -> Vector3
     {
@@ -464,7 +464,7 @@ TEST(MotionRegularization, VelocityIsDiffusedAlongTheVessel)
 
 TEST(MotionRegularization, MovesAndScalesWithTheWorld)
 {
-  MovingLines lines = Fork();
+  Polylines lines = Fork();
   PoseSequence motion = Move(lines, coronary::PaperPhases(), Beat);
   SetConfidence(motion, 0.9);
   motion.points[4][7] += Vector3(5, 5, -5);
@@ -478,7 +478,7 @@ TEST(MotionRegularization, MovesAndScalesWithTheWorld)
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(2.0, Vector3(0.0, 0.6, -0.8)));
   const auto map = [&](const Vector3& p) -> Vector3
   { return scale * (turn * p) + Vector3(300, -120, 44); };
-  for (Vector3& point : lines.rest)
+  for (Vector3& point : lines.points)
   {
     point = map(point);
   }
@@ -497,7 +497,7 @@ TEST(MotionRegularization, MovesAndScalesWithTheWorld)
   EXPECT_EQ(here.clamps, there.clamps);
   for (std::size_t k = 0; k < 20; ++k)
   {
-    for (std::size_t n = 0; n < lines.rest.size(); ++n)
+    for (std::size_t n = 0; n < lines.points.size(); ++n)
     {
       EXPECT_LT((map(here.poses.points[k][n]) - there.poses.points[k][n]).norm(), 1e-6);
     }
@@ -514,7 +514,7 @@ TEST(MotionRegularization, MovesAndScalesWithTheWorld)
 
 TEST(MotionRegularization, SameBitsOnAnyNumberOfThreads)
 {
-  const MovingLines lines = Fork();
+  const Polylines lines = Fork();
   PoseSequence motion = Move(lines, Even(20), Beat);
   SetConfidence(motion, 0.9);
   motion.points[4][7] += Vector3(5, 5, -5);
@@ -536,10 +536,10 @@ TEST(MotionRegularization, SameBitsOnAnyNumberOfThreads)
 
 TEST(MotionRegularization, BonesTurnWithTheirJoints)
 {
-  MovingLines bones;
+  Polylines bones;
   for (int n = 0; n < 6; ++n)
   {
-    bones.rest.emplace_back(5.0 * n, 0.0, 0.0);
+    bones.points.emplace_back(5.0 * n, 0.0, 0.0);
     if (n > 0)
     {
       bones.lines.push_back({ n - 1, n });
@@ -568,13 +568,13 @@ TEST(MotionRegularization, BonesTurnWithTheirJoints)
       EXPECT_LT((result.poses.rotation[k][b] * Vector3::UnitX() - now).norm(), 1e-9);
     }
   }
-  EXPECT_LT((result.poses.points[3][5] - Beat(bones.rest[5], 3.0 / 8.0)).norm(), 0.5);
+  EXPECT_LT((result.poses.points[3][5] - Beat(bones.points[5], 3.0 / 8.0)).norm(), 0.5);
   EXPECT_NE(result.clamps[3][4] & coronary::ClampBending, 0);
 }
 
 TEST(MotionRegularization, Nothing)
 {
-  MovingLines none;
+  Polylines none;
   PoseSequence motion;
   motion.times = { 0.0, 0.5 };
   motion.points.resize(2);
@@ -585,11 +585,11 @@ TEST(MotionRegularization, Nothing)
 
 TEST(MotionRegularization, Refusals)
 {
-  const MovingLines good = Straight(4, 2.0);
+  const Polylines good = Straight(4, 2.0);
   const PoseSequence motion = Move(good, Even(4), Beat);
   const auto refuse = [&](const std::string& part, const auto& spoil)
   {
-    MovingLines lines = good;
+    Polylines lines = good;
     PoseSequence sequence = motion;
     MotionRegularizationSettings settings;
     spoil(sequence, lines, settings);
@@ -599,7 +599,7 @@ TEST(MotionRegularization, Refusals)
   refuse("one phase", [](auto& s, auto&, auto&) { s.times.resize(1), s.points.resize(1); });
   refuse("points", [](auto& s, auto&, auto&) { s.points[2].pop_back(); });
   refuse("not finite", [&](auto& s, auto&, auto&) { s.points[2][1].x() = nan; });
-  refuse("no length at rest", [](auto&, auto& l, auto&) { l.rest[2] = l.rest[1]; });
+  refuse("no length at rest", [](auto&, auto& l, auto&) { l.points[2] = l.points[1]; });
   refuse("does not exist", [](auto&, auto& l, auto&) { l.lines[0].push_back(4); });
   refuse("temporalWeight", [](auto&, auto&, auto& set) { set.temporalWeight = -1.0; });
   refuse("spatialWeight", [&](auto&, auto&, auto& set) { set.spatialWeight = nan; });

@@ -41,7 +41,7 @@ struct Picture
     }
   }
 
-  std::vector<OstialRoot> Settle(CenterlineTree& tree) const
+  std::vector<OstialRoot> Settle(VesselTree& tree) const
   {
     LumenSettings settings;
     settings.reference.lumen = Lumen;
@@ -61,10 +61,10 @@ double Tube(const Vector3& p, const Vector3& from, const Vector3& axis, double r
 }
 
 /// A line of a tree that comes out of the half space at x < 0 with a bend and the width of a funnel.
-CenterlineTree BentTree(const Vector3& axis, double radius)
+VesselTree BentTree(const Vector3& axis, double radius)
 {
-  CenterlineTree tree;
-  CenterlineTree::Branch branch;
+  VesselTree tree;
+  VesselTree::Branch branch;
   const Vector3 across = axis.unitOrthogonal();
   for (int i = 0; i <= 60; ++i)
   {
@@ -91,8 +91,8 @@ TEST(OstialRoot, BeginsWhereTheVesselLeavesTheWall)
       const Vector3 axis(std::cos(angle), std::sin(angle), 0.0);
       const Picture picture([&](const Vector3& p)
         { return std::min(p[0], Tube(p, Vector3::Zero(), axis, radius, 0.0)); });
-      CenterlineTree tree = BentTree(axis, radius);
-      const CenterlineTree before = tree;
+      VesselTree tree = BentTree(axis, radius);
+      const VesselTree before = tree;
       const std::vector<OstialRoot> roots = picture.Settle(tree);
       ASSERT_EQ(roots.size(), 1u);
       ASSERT_TRUE(roots[0].found);
@@ -122,7 +122,7 @@ TEST(OstialRoot, FunnelsBelongToTheAorta)
   const Vector3 axis = Vector3::UnitX();
   const Picture picture(
     [&](const Vector3& p) { return std::min(p[0], Tube(p, Vector3::Zero(), axis, 2.0, 4.0)); });
-  CenterlineTree tree = BentTree(axis, 2.0);
+  VesselTree tree = BentTree(axis, 2.0);
   const std::vector<OstialRoot> roots = picture.Settle(tree);
   ASSERT_TRUE(roots.at(0).found);
   EXPECT_GT(roots[0].position[0], 0.5);
@@ -138,13 +138,13 @@ TEST(OstialRoot, TheFunnelOfAShortMainStemIsNotItsWidth)
   constexpr double depth = 5.0;
   const Picture picture([&](const Vector3& p)
     { return std::min(p[0], Tube(p, Vector3::Zero(), axis, radius, depth)); });
-  CenterlineTree tree = BentTree(axis, radius);
+  VesselTree tree = BentTree(axis, radius);
   for (std::size_t i = 0; i < tree.points.size(); ++i)
   {
     const double open = std::clamp(depth - tree.points[i][0], 0.0, depth);
     tree.radius[i] = radius + 0.5 * open * open / depth;
   }
-  CenterlineTree::Branch side;
+  VesselTree::Branch side;
   side.groupId = 1;
   side.parentGroupId = 0;
   side.points = { 44, static_cast<std::int64_t>(tree.points.size()) };
@@ -174,7 +174,7 @@ TEST(OstialRoot, AFullWidthBeforeALesionIsTheVessel)
     };
     const Picture picture([&](const Vector3& p)
       { return std::min(p[0], Tube(p, Vector3::Zero(), axis, radius(p[0]), 0.0)); });
-    CenterlineTree tree = BentTree(axis, healthy);
+    VesselTree tree = BentTree(axis, healthy);
     for (std::size_t i = 0; i < tree.points.size(); ++i)
     {
       const double along = tree.points[i][0];
@@ -195,8 +195,8 @@ TEST(OstialRoot, SeedsInsideOfVesselsStayWhereTheyAre)
 {
   const Vector3 axis = Vector3::UnitX();
   const Picture picture([&](const Vector3& p) { return Tube(p, Vector3::Zero(), axis, 1.8, 0.0); });
-  CenterlineTree tree;
-  CenterlineTree::Branch branch;
+  VesselTree tree;
+  VesselTree::Branch branch;
   for (int i = 0; i < 60; ++i)
   {
     branch.points.push_back(i);
@@ -218,8 +218,8 @@ TEST(OstialRoot, NothingAtOrBehindABranchMoves)
     [&](const Vector3& p) { return std::min(p[0], Tube(p, Vector3::Zero(), axis, 2.0, 0.0)); });
   for (const std::int64_t fork : { 3, 34 })
   {
-    CenterlineTree tree = BentTree(axis, 2.0);
-    CenterlineTree::Branch side;
+    VesselTree tree = BentTree(axis, 2.0);
+    VesselTree::Branch side;
     side.groupId = 1;
     side.parentGroupId = 0;
     side.points = { fork, static_cast<std::int64_t>(tree.points.size()) };
@@ -227,7 +227,7 @@ TEST(OstialRoot, NothingAtOrBehindABranchMoves)
     tree.radius.push_back(1.0);
     tree.confidence.push_back(1.0);
     tree.branches.push_back(side);
-    const CenterlineTree before = tree;
+    const VesselTree before = tree;
     const std::vector<OstialRoot> roots = picture.Settle(tree);
     ASSERT_EQ(roots.size(), 1u);
     EXPECT_EQ(roots[0].found, fork == 34);

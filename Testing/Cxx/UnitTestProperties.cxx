@@ -47,10 +47,10 @@ Vector3 RandomDirection(RandomStream& random)
 }
 
 /// Lines from one root: a trunk, and branches that leave it and each other sideways.
-CenterlineSet RandomTree(std::uint64_t seed)
+Polylines RandomTree(std::uint64_t seed)
 {
   RandomStream random(seed);
-  CenterlineSet set;
+  Polylines set;
   const auto grow = [&](std::int64_t from, Vector3 direction, double radius, int steps)
   {
     std::vector<std::int64_t> line{ from };
@@ -78,7 +78,7 @@ CenterlineSet RandomTree(std::uint64_t seed)
   return set;
 }
 
-CenterlineSet Moved(CenterlineSet set, const Eigen::Isometry3d& motion)
+Polylines Moved(Polylines set, const Eigen::Isometry3d& motion)
 {
   for (std::vector<Vector3>* points : { &set.points, &set.roots })
   {
@@ -111,12 +111,12 @@ bool AllFinite(const std::vector<Vector3>& points)
   return true;
 }
 
-SweepTree SweepInput(const CenterlineTree& tree)
+VesselTree SweepInput(const VesselTree& tree)
 {
-  SweepTree input;
+  VesselTree input;
   input.points = tree.points;
   input.radius = tree.radius;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     input.branches.push_back({ branch.points, branch.groupId });
   }
@@ -191,11 +191,11 @@ TEST(RandomTrees, TopologyIsATreeThatMovesWithItsPoints)
 {
   for (std::uint64_t seed = 1; seed <= 12; ++seed)
   {
-    const CenterlineSet set = RandomTree(seed);
+    const Polylines set = RandomTree(seed);
     const CenterlineTopology topology = BuildTopology(set);
     ASSERT_NO_THROW(CheckTree(topology)) << seed;
     EXPECT_EQ(topology.trees, 1) << seed;
-    for (const CenterlineTree::Branch& branch : topology.branches)
+    for (const VesselTree::Branch& branch : topology.branches)
     {
       EXPECT_GT(branch.length, 0.0) << seed;
       EXPECT_GE(branch.tortuosity, -1e-12) << seed;
@@ -307,17 +307,17 @@ TEST(RandomTrees, RigidPosesCarryTheSkinRigidly)
 
 TEST(DegenerateTrees, FiniteOrRefused)
 {
-  const CenterlineSet good = RandomTree(1);
-  const auto changed = [&](const std::function<void(CenterlineSet&)>& change)
+  const Polylines good = RandomTree(1);
+  const auto changed = [&](const std::function<void(Polylines&)>& change)
   {
-    CenterlineSet set = good;
+    Polylines set = good;
     change(set);
     return set;
   };
   const auto scaled = [&](double factor)
   {
     return changed(
-      [&](CenterlineSet& set)
+      [&](Polylines& set)
       {
         for (Vector3& point : set.points)
         {
@@ -329,21 +329,21 @@ TEST(DegenerateTrees, FiniteOrRefused)
         }
       });
   };
-  const std::map<std::string, CenterlineSet> sets = {
+  const std::map<std::string, Polylines> sets = {
     { "nothing", {} },
-    { "nan", changed([](CenterlineSet& s) { s.points[5].x() = Nan; }) },
-    { "infinite", changed([](CenterlineSet& s) { s.points[5].x() = Infinity; }) },
-    { "nan radius", changed([](CenterlineSet& s) { s.radius[5] = Nan; }) },
-    { "negative radius", changed([](CenterlineSet& s) { s.radius[5] = -1.0; }) },
-    { "no radii", changed([](CenterlineSet& s) { s.radius.clear(); }) },
+    { "nan", changed([](Polylines& s) { s.points[5].x() = Nan; }) },
+    { "infinite", changed([](Polylines& s) { s.points[5].x() = Infinity; }) },
+    { "nan radius", changed([](Polylines& s) { s.radius[5] = Nan; }) },
+    { "negative radius", changed([](Polylines& s) { s.radius[5] = -1.0; }) },
+    { "no radii", changed([](Polylines& s) { s.radius.clear(); }) },
     { "one point", { { Vector3::Zero() }, { 1.0 }, { { 0 } }, {} } },
     { "line without length",
       { { Vector3::Zero(), Vector3::Zero() }, { 1.0, 1.0 }, { { 0, 1 } }, {} } },
     { "all points the same",
-      changed([](CenterlineSet& s) { s.points.assign(s.points.size(), Vector3(1, 2, 3)); }) },
+      changed([](Polylines& s) { s.points.assign(s.points.size(), Vector3(1, 2, 3)); }) },
     { "straight",
       changed(
-        [](CenterlineSet& s)
+        [](Polylines& s)
         {
           for (std::size_t p = 0; p < s.points.size(); ++p)
           {
@@ -352,21 +352,21 @@ TEST(DegenerateTrees, FiniteOrRefused)
         }) },
     { "every line twice",
       changed(
-        [](CenterlineSet& s)
+        [](Polylines& s)
         {
           const auto lines = s.lines;
           s.lines.insert(s.lines.end(), lines.begin(), lines.end());
         }) },
     { "there and back",
       changed(
-        [](CenterlineSet& s)
+        [](Polylines& s)
         {
           const std::vector<std::int64_t> line = s.lines[0];
           s.lines[0].insert(s.lines[0].end(), line.rbegin(), line.rend());
         }) },
-    { "index outside", changed([](CenterlineSet& s) { s.lines[0][3] = 1 << 20; }) },
-    { "index negative", changed([](CenterlineSet& s) { s.lines[0][3] = -1; }) },
-    { "empty line", changed([](CenterlineSet& s) { s.lines.emplace_back(); }) },
+    { "index outside", changed([](Polylines& s) { s.lines[0][3] = 1 << 20; }) },
+    { "index negative", changed([](Polylines& s) { s.lines[0][3] = -1; }) },
+    { "empty line", changed([](Polylines& s) { s.lines.emplace_back(); }) },
     { "tiny", scaled(1e-9) },
     { "huge", scaled(1e9) },
     { "beyond", scaled(1e300) },
@@ -379,7 +379,7 @@ TEST(DegenerateTrees, FiniteOrRefused)
       continue;
     }
     EXPECT_TRUE(AllFinite(topology.points)) << name;
-    for (const CenterlineTree::Branch& branch : topology.branches)
+    for (const VesselTree::Branch& branch : topology.branches)
     {
       EXPECT_TRUE(std::isfinite(branch.length)) << name;
     }
@@ -394,18 +394,18 @@ TEST(DegenerateTrees, FiniteOrRefused)
 
 TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
 {
-  const SweepTree good = { { { 0, 0, 0 }, { 0, 0, 2 }, { 0, 0, 4 }, { 0, 0, 6 } },
+  const VesselTree good = { { { 0, 0, 0 }, { 0, 0, 2 }, { 0, 0, 4 }, { 0, 0, 6 } },
     { 1.0, 1.0, 1.0, 1.0 }, { { { 0, 1, 2, 3 }, 0 } }, {}, 0, {}, {} };
-  const auto changed = [&](const std::function<void(SweepTree&)>& change)
+  const auto changed = [&](const std::function<void(VesselTree&)>& change)
   {
-    SweepTree tree = good;
+    VesselTree tree = good;
     change(tree);
     return tree;
   };
   // Of a branched tree, whose junction has to be meshed too.
   const auto scaled = [](double factor)
   {
-    SweepTree tree = SweepInput(BuildTopology(RandomTree(1)));
+    VesselTree tree = SweepInput(BuildTopology(RandomTree(1)));
     for (std::size_t p = 0; p < tree.points.size(); ++p)
     {
       tree.points[p] *= factor;
@@ -413,26 +413,26 @@ TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
     }
     return tree;
   };
-  const std::map<std::string, SweepTree> trees = {
+  const std::map<std::string, VesselTree> trees = {
     { "good", good },
     { "nothing", {} },
-    { "nan", changed([](SweepTree& t) { t.points[1].x() = Nan; }) },
-    { "infinite", changed([](SweepTree& t) { t.points[1].x() = Infinity; }) },
-    { "no radius", changed([](SweepTree& t) { t.radius[2] = 0.0; }) },
-    { "nan radius", changed([](SweepTree& t) { t.radius[2] = Nan; }) },
-    { "one point", changed([](SweepTree& t) { t.branches[0].points = { 1 }; }) },
-    { "no point", changed([](SweepTree& t) { t.branches[0].points = {}; }) },
-    { "outside", changed([](SweepTree& t) { t.branches[0].points[1] = 99; }) },
+    { "nan", changed([](VesselTree& t) { t.points[1].x() = Nan; }) },
+    { "infinite", changed([](VesselTree& t) { t.points[1].x() = Infinity; }) },
+    { "no radius", changed([](VesselTree& t) { t.radius[2] = 0.0; }) },
+    { "nan radius", changed([](VesselTree& t) { t.radius[2] = Nan; }) },
+    { "one point", changed([](VesselTree& t) { t.branches[0].points = { 1 }; }) },
+    { "no point", changed([](VesselTree& t) { t.branches[0].points = {}; }) },
+    { "outside", changed([](VesselTree& t) { t.branches[0].points[1] = 99; }) },
     { "all the same",
-      changed([](SweepTree& t) { t.points.assign(t.points.size(), Vector3(1, 2, 3)); }) },
-    { "a point twice", changed([](SweepTree& t) { t.points[2] = t.points[1]; }) },
+      changed([](VesselTree& t) { t.points.assign(t.points.size(), Vector3(1, 2, 3)); }) },
+    { "a point twice", changed([](VesselTree& t) { t.points[2] = t.points[1]; }) },
     { "tiny", scaled(1e-9) },
     { "small", scaled(1e-6) },
     { "huge", scaled(1e9) },
     { "beyond", scaled(1e300) },
     { "doubled",
       changed(
-        [](SweepTree& t)
+        [](VesselTree& t)
         {
           t.points.insert(t.points.end(), t.points.begin(), t.points.end());
           t.radius.assign(8, 1.0);
@@ -440,7 +440,7 @@ TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
         }) },
     { "a side branch within the trunk",
       changed(
-        [](SweepTree& t)
+        [](VesselTree& t)
         {
           t.points.insert(t.points.end(), { { 0.1, 0, 4 }, { 0.2, 0, 6 }, { 0.3, 0, 9 } });
           t.radius.assign(7, 1.0);
@@ -448,7 +448,7 @@ TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
         }) },
     { "two branches one on the other",
       changed(
-        [](SweepTree& t)
+        [](VesselTree& t)
         {
           t.points.insert(
             t.points.end(), { { 0, 0, 8 }, { 0, 0, 10 }, { 0, 0, 7.5 }, { 0, 0, 11 } });
@@ -458,7 +458,7 @@ TEST(DegenerateTrees, SurfacesAreClosedOrRefused)
         }) },
     { "back into the trunk",
       changed(
-        [](SweepTree& t)
+        [](VesselTree& t)
         {
           t.points.insert(t.points.end(), { { 0, 0, 3 }, { 0, 0, 1 } });
           t.radius.assign(6, 1.0);
@@ -644,7 +644,7 @@ PhaseInterpolationSettings SettingsOf(PhaseInterpolationMode mode)
   return settings;
 }
 
-MovingLines LinesOf(const CenterlineSet& set)
+Polylines LinesOf(const Polylines& set)
 {
   return { set.points, set.radius, set.lines };
 }
@@ -670,16 +670,16 @@ std::vector<double> RandomPhases(RandomStream& random, std::size_t count)
 }
 
 /// Rest as it is at every phase.
-PoseSequence Standing(const MovingLines& lines, std::vector<double> times)
+PoseSequence Standing(const Polylines& lines, std::vector<double> times)
 {
   PoseSequence sequence;
-  sequence.points.assign(times.size(), lines.rest);
+  sequence.points.assign(times.size(), lines.points);
   sequence.times = std::move(times);
   return sequence;
 }
 
 /// Two harmonics, which every point follows in its own measure.
-PoseSequence Beating(const MovingLines& lines, const std::vector<double>& times, std::uint64_t seed)
+PoseSequence Beating(const Polylines& lines, const std::vector<double>& times, std::uint64_t seed)
 {
   RandomStream random(seed, 1);
   PoseSequence sequence = Standing(lines, times);
@@ -722,7 +722,7 @@ void DrawConfidence(PoseSequence& sequence, RandomStream& random)
 }
 
 /// All that a sequence can have.
-PoseSequence RandomSequence(const MovingLines& lines, std::uint64_t seed)
+PoseSequence RandomSequence(const Polylines& lines, std::uint64_t seed)
 {
   RandomStream random(seed, 2);
   PoseSequence sequence = Standing(lines, RandomPhases(random, 4 + random.Bits() % 9));
@@ -732,7 +732,7 @@ PoseSequence RandomSequence(const MovingLines& lines, std::uint64_t seed)
   {
     sequence.status.emplace_back();
     sequence.calibre.emplace_back();
-    for (std::size_t p = 0; p < lines.rest.size(); ++p)
+    for (std::size_t p = 0; p < lines.points.size(); ++p)
     {
       sequence.status.back().push_back(static_cast<TrackingStatus>(random.Bits() % 4));
       sequence.calibre.back().push_back(random.Uniform(0.8, 1.25));
@@ -839,7 +839,7 @@ TEST(RandomMotion, InterpolationGoesThroughItsPhases)
 {
   for (std::uint64_t seed = 1; seed <= 8; ++seed)
   {
-    const MovingLines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = LinesOf(RandomTree(seed));
     const PoseSequence sequence = RandomSequence(lines, seed);
     for (const PhaseInterpolationMode mode :
       { PhaseInterpolationMode::Linear, PhaseInterpolationMode::PeriodicCubic })
@@ -855,7 +855,7 @@ TEST(RandomMotion, InterpolationGoesThroughItsPhases)
           motion.Evaluate(sequence.times[k] + cycle, pose);
           EXPECT_LT(Farthest(pose.points, sequence.points[k]), 1e-9) << seed << " phase " << k;
           EXPECT_EQ(pose.status, sequence.status[k]) << seed << " phase " << k;
-          for (std::size_t p = 0; p < lines.rest.size(); ++p)
+          for (std::size_t p = 0; p < lines.points.size(); ++p)
           {
             ASSERT_NEAR(pose.confidence[p], sequence.confidence[k][p], 1e-9) << seed;
             ASSERT_NEAR(pose.calibre[p], sequence.calibre[k][p], 1e-9) << seed;
@@ -876,7 +876,7 @@ TEST(RandomMotion, InterpolationKnowsNoFirstPhaseAndItsVelocityIsTheDerivative)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 3);
-    const MovingLines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = LinesOf(RandomTree(seed));
     const PoseSequence sequence = RandomSequence(lines, seed);
     for (const PhaseInterpolationMode mode : Modes)
     {
@@ -903,7 +903,7 @@ TEST(RandomMotion, InterpolationKnowsNoFirstPhaseAndItsVelocityIsTheDerivative)
         InterpolatedPose sooner;
         motion.Evaluate(time - step, sooner);
         motion.Evaluate(time + step, other);
-        for (std::size_t p = 0; p < lines.rest.size(); ++p)
+        for (std::size_t p = 0; p < lines.points.size(); ++p)
         {
           const Vector3 rate = (other.points[p] - sooner.points[p]) / (2.0 * step);
           ASSERT_LT((rate - pose.velocity[p]).norm(), 1e-3 * (1.0 + rate.norm())) << seed;
@@ -918,7 +918,7 @@ TEST(RandomMotion, InterpolationMovesWithTheWorld)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 4);
-    const MovingLines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = LinesOf(RandomTree(seed));
     PoseSequence sequence = RandomSequence(lines, seed);
     Eigen::Affine3d shear(RandomMotion(seed));
     for (int n = 0; n < 9; ++n)
@@ -939,7 +939,7 @@ TEST(RandomMotion, InterpolationMovesWithTheWorld)
         const double time = random.Uniform(-2.0, 2.0);
         motion.Evaluate(time, pose);
         mapped.Evaluate(time, other);
-        for (std::size_t p = 0; p < lines.rest.size(); ++p)
+        for (std::size_t p = 0; p < lines.points.size(); ++p)
         {
           ASSERT_LT((map * pose.points[p] - other.points[p]).norm(), anyMap ? 1e-9 : 0.01) << seed;
           ASSERT_LT(
@@ -956,7 +956,7 @@ TEST(RandomMotion, WhatStandsStillKeepsStanding)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 5);
-    const MovingLines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = LinesOf(RandomTree(seed));
     PoseSequence sequence = Standing(lines, RandomPhases(random, 7));
     DrawConfidence(sequence, random);
     InterpolatedPose pose;
@@ -964,9 +964,9 @@ TEST(RandomMotion, WhatStandsStillKeepsStanding)
     {
       const PhaseInterpolation motion(sequence, SettingsOf(mode));
       motion.Evaluate(random.Uniform(-2.0, 2.0), pose);
-      EXPECT_LT(Farthest(pose.points, lines.rest), 1e-6) << seed;
+      EXPECT_LT(Farthest(pose.points, lines.points), 1e-6) << seed;
       EXPECT_LT(
-        Farthest(pose.velocity, std::vector<Vector3>(lines.rest.size(), Vector3::Zero())), 1e-6)
+        Farthest(pose.velocity, std::vector<Vector3>(lines.points.size(), Vector3::Zero())), 1e-6)
         << seed;
     }
     const RegularizedMotion regular = RegularizeMotion(sequence, lines);
@@ -981,7 +981,7 @@ TEST(RandomMotion, InterpolationDoesNotCountWhatHasNoConfidence)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 6);
-    const MovingLines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = LinesOf(RandomTree(seed));
     // Low noise: single samples.
     PoseSequence sequence = Beating(lines, RandomPhases(random, 12), seed);
     const auto lost = Lose(sequence, random);
@@ -1002,7 +1002,7 @@ TEST(RandomMotion, InterpolationDoesNotCountWhatHasNoConfidence)
       right.Evaluate(time, a);
       other.Evaluate(time, b);
       double farthest = 0.0;
-      for (std::size_t p = 0; p < lines.rest.size(); ++p)
+      for (std::size_t p = 0; p < lines.points.size(); ++p)
       {
         // A point that nobody has ever seen is somewhere.
         farthest = std::max(farthest, seen(p) ? (a.points[p] - b.points[p]).norm() : 0.0);
@@ -1013,15 +1013,15 @@ TEST(RandomMotion, InterpolationDoesNotCountWhatHasNoConfidence)
     // Through the phases: one of two repetitions.
     PoseSequence twice = Beating(lines, { 0.0, 0.004, 0.3, 0.304, 0.55, 0.8, 0.805 }, seed);
     DrawConfidence(twice, random);
-    twice.calibre.assign(7, std::vector<double>(lines.rest.size(), 1.0));
+    twice.calibre.assign(7, std::vector<double>(lines.points.size(), 1.0));
     for (const std::size_t k : { 1, 2, 6 })
     {
-      twice.confidence[k].assign(lines.rest.size(), 0.0);
+      twice.confidence[k].assign(lines.points.size(), 0.0);
     }
     wrong = twice;
     for (const std::size_t k : { 1, 2, 6 })
     {
-      for (std::size_t p = 0; p < lines.rest.size(); ++p)
+      for (std::size_t p = 0; p < lines.points.size(); ++p)
       {
         wrong.points[k][p] += 50.0 * RandomDirection(random);
         wrong.calibre[k][p] = random.Uniform(0.5, 2.0);
@@ -1047,7 +1047,7 @@ TEST(RandomMotion, RegularisationKeepsWhatHasNoEnergy)
   {
     RandomStream random(seed, 7);
     // Every phase has its own translation, of the whole tree: nothing bends, nothing stretches.
-    const MovingLines tree = LinesOf(RandomTree(seed));
+    const Polylines tree = LinesOf(RandomTree(seed));
     PoseSequence sequence = Standing(tree, RandomPhases(random, 8));
     DrawConfidence(sequence, random);
     for (std::vector<Vector3>& points : sequence.points)
@@ -1065,13 +1065,13 @@ TEST(RandomMotion, RegularisationKeepsWhatHasNoEnergy)
     EXPECT_EQ(moved.violations, 0) << seed;
 
     // A straight vessel of uneven segments that is turned, stretched and sheared stays straight.
-    MovingLines straight;
-    straight.rest = { Vector3::Zero() };
+    Polylines straight;
+    straight.points = { Vector3::Zero() };
     straight.lines = { { 0 } };
     const Vector3 direction = RandomDirection(random);
     for (int n = 1; n < 30; ++n)
     {
-      straight.rest.emplace_back(straight.rest.back() + random.Uniform(0.3, 2.0) * direction);
+      straight.points.emplace_back(straight.points.back() + random.Uniform(0.3, 2.0) * direction);
       straight.lines[0].push_back(n);
     }
     PoseSequence affine = Standing(straight, RandomPhases(random, 8));
@@ -1095,7 +1095,7 @@ TEST(RandomMotion, RegularisationMovesWithTheWorldAndKnowsNoFirstPhase)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 8);
-    const MovingLines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = LinesOf(RandomTree(seed));
     PoseSequence sequence = Beating(lines, RandomPhases(random, 8), seed);
     Jitter(sequence, random, 0.3);
     DrawConfidence(sequence, random);
@@ -1106,8 +1106,8 @@ TEST(RandomMotion, RegularisationMovesWithTheWorldAndKnowsNoFirstPhase)
       settings.energy = energy;
       const RegularizedMotion regular = RegularizeMotion(sequence, lines, settings);
       const Eigen::Isometry3d motion = RandomMotion(seed);
-      MovingLines there = lines;
-      for (Vector3& point : there.rest)
+      Polylines there = lines;
+      for (Vector3& point : there.points)
       {
         point = motion * point;
       }
@@ -1135,7 +1135,7 @@ TEST(RandomMotion, RegularisationDoesNotCountWhatHasNoConfidence)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 9);
-    const MovingLines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = LinesOf(RandomTree(seed));
     PoseSequence sequence = Beating(lines, RandomPhases(random, 10), seed);
     const auto lost = Lose(sequence, random);
     const PoseSequence wrong = Misplaced(sequence, lost, 20.0, random);
@@ -1152,7 +1152,7 @@ TEST(RandomMotion, RegularisationKeepsItsLimitsOrSaysWhereNot)
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
   {
     RandomStream random(seed, 10);
-    const MovingLines lines = LinesOf(RandomTree(seed));
+    const Polylines lines = LinesOf(RandomTree(seed));
     PoseSequence sequence = Beating(lines, RandomPhases(random, 8), seed);
     const PoseSequence smooth = sequence;
     Jitter(sequence, random, 0.8);
@@ -1188,7 +1188,7 @@ TEST(RandomMotion, RegularisationKeepsItsLimitsOrSaysWhereNot)
           const auto a = static_cast<std::size_t>(line[p - 1]);
           const auto b = static_cast<std::size_t>(line[p]);
           const double now = (points[b] - points[a]).norm();
-          const double then = (lines.rest[b] - lines.rest[a]).norm();
+          const double then = (lines.points[b] - lines.points[a]).norm();
           beyond += std::abs(now - then) > settings.greatestStrain * then + slack ? 1 : 0;
           length += now;
           rest += then;

@@ -12,10 +12,10 @@
 #include <random>
 #include <string>
 
-using coronary::MovingLines;
 using coronary::PhaseInterpolation;
 using coronary::PhaseInterpolationMode;
 using coronary::PhaseInterpolationSettings;
+using coronary::Polylines;
 using coronary::PoseSequence;
 using coronary::Vector3;
 
@@ -86,7 +86,7 @@ std::vector<int> Path(const Surface& surface, int from, int to)
 
 /// Lines over the heart, from its base to its apex and around, at all frames. A node is a mean of points of
 /// the surface, always the same ones.
-bool RealMotion(MovingLines& lines, PoseSequence& motion)
+bool RealMotion(Polylines& lines, PoseSequence& motion)
 {
   std::vector<Surface> frames(Frames);
   for (int k = 0; k < Frames; ++k)
@@ -152,7 +152,7 @@ bool RealMotion(MovingLines& lines, PoseSequence& motion)
       }
     }
   }
-  lines.rest = motion.points[18]; // mid-diastole
+  lines.points = motion.points[18]; // mid-diastole
   return lines.lines.size() >= 3;
 }
 
@@ -224,7 +224,7 @@ PoseSequence Denoised(const PoseSequence& motion, coronary::LowNoiseFit& fit)
 
 TEST(RealMotion, HeldOutFrames)
 {
-  MovingLines lines;
+  Polylines lines;
   PoseSequence raw;
   if (!RealMotion(lines, raw))
   {
@@ -233,19 +233,20 @@ TEST(RealMotion, HeldOutFrames)
   coronary::LowNoiseFit fit;
   const PoseSequence smooth = Denoised(raw, fit);
   double amplitude = 0.0;
-  for (std::size_t n = 0; n < lines.rest.size(); ++n)
+  for (std::size_t n = 0; n < lines.points.size(); ++n)
   {
     double most = 0.0;
     for (int k = 0; k < Frames; ++k)
     {
       most = std::max(most, (raw.points[k][n] - raw.points[0][n]).norm());
     }
-    amplitude += most / static_cast<double>(lines.rest.size());
+    amplitude += most / static_cast<double>(lines.points.size());
   }
   std::printf("%zu points on %zu lines, moving by %.1f mm on average; scatter of the frames %.2f "
               "mm rms, rank %d "
               "order %d ridge %g\n",
-    lines.rest.size(), lines.lines.size(), amplitude, fit.residual, fit.rank, fit.order, fit.ridge);
+    lines.points.size(), lines.lines.size(), amplitude, fit.residual, fit.rank, fit.order,
+    fit.ridge);
   const char* names[] = { "linear", "periodic cubic", "low noise" };
   const auto hold = [&](
                       const PoseSequence& motion, const char* what, double noise, Errors errors[3])
@@ -285,7 +286,7 @@ TEST(RealMotion, HeldOutFrames)
 
 TEST(RealMotion, LostFramesAndLostPoints)
 {
-  MovingLines lines;
+  Polylines lines;
   PoseSequence raw;
   if (!RealMotion(lines, raw))
   {
@@ -293,14 +294,14 @@ TEST(RealMotion, LostFramesAndLostPoints)
   }
   coronary::LowNoiseFit fit;
   const PoseSequence motion = Denoised(raw, fit);
-  lines.rest = motion.points[18];
+  lines.points = motion.points[18];
   PoseSequence spoiled = Select(motion, 1, 0.2);
   std::mt19937 random(9);
   std::normal_distribution<double> any(0.0, 4.0);
   for (int k = 0; k < Frames; ++k)
   {
-    spoiled.confidence.emplace_back(lines.rest.size(), 0.95);
-    for (std::size_t n = 0; n < lines.rest.size(); ++n)
+    spoiled.confidence.emplace_back(lines.points.size(), 0.95);
+    for (std::size_t n = 0; n < lines.points.size(); ++n)
     {
       // One systolic frame wholly, and 40 % in two others, in stretches.
       if (k == 8 || ((k == 6 || k == 11) && n % 20 < 8))
@@ -319,7 +320,7 @@ TEST(RealMotion, LostFramesAndLostPoints)
   double moved = 0.0;
   for (int k = 0; k < Frames; ++k)
   {
-    for (std::size_t n = 0; n < lines.rest.size(); ++n)
+    for (std::size_t n = 0; n < lines.points.size(); ++n)
     {
       const double b = (spoiled.points[k][n] - motion.points[k][n]).norm();
       const double a = (result.poses.points[k][n] - motion.points[k][n]).norm();
@@ -337,7 +338,7 @@ TEST(RealMotion, LostFramesAndLostPoints)
       }
     }
   }
-  const double all = static_cast<double>(Frames) * static_cast<double>(lines.rest.size());
+  const double all = static_cast<double>(Frames) * static_cast<double>(lines.points.size());
   std::printf(
     "regularised: all points %.3f -> %.3f mm, lost ones %.2f -> %.2f mm, tracked ones moved "
     "by %.2f mm at most, %d iterations, %d limits left\n",

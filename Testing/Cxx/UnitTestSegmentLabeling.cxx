@@ -33,7 +33,7 @@ struct Degradation
 
 struct Case
 {
-  CenterlineSet lines;
+  Polylines lines;
   std::vector<int> truth; ///< segment of every point; -1 on a spurious twig
 };
 
@@ -58,7 +58,7 @@ Case Degrade(const PhantomTree& tree, const Degradation& how, std::uint64_t seed
     result.truth.push_back(tree.segmentId[i]);
   }
   std::vector<int> daughters(tree.branches.size(), 0);
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.parentGroupId >= 0)
     {
@@ -67,7 +67,7 @@ Case Degrade(const PhantomTree& tree, const Degradation& how, std::uint64_t seed
   }
   const std::set<int> mains = { ProximalRCA, MidRCA, DistalRCA, RightPDA, LeftMain, ProximalLAD,
     MidLAD, DistalLAD, ProximalLCx, DistalLCx, LeftPDA, RightPLB, LeftPLB };
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     std::vector<std::int64_t> line = branch.points;
     if (daughters[branch.groupId] == 0)
@@ -303,7 +303,7 @@ TEST(SegmentLabeling, NamesDoNotJumpWithASetting)
         ++ends[line.front()];
         ++ends[line.back()];
       }
-      CenterlineSet other = whole.lines;
+      Polylines other = whole.lines;
       for (Vector3& p : other.points)
       {
         p +=
@@ -455,7 +455,7 @@ TEST(SegmentLabeling, AnyOrientationAndUnit)
     const Vector3 axis = Vector3(random.Normal(), random.Normal(), random.Normal()).normalized();
     const Matrix3 turn = Eigen::AngleAxisd(random.Uniform(-Pi, Pi), axis).toRotationMatrix();
     const double unit = i % 2 == 0 ? 1.0 : 1e-3;
-    CenterlineSet moved = whole.lines;
+    Polylines moved = whole.lines;
     for (std::size_t p = 0; p < moved.points.size(); ++p)
     {
       moved.points[p] = unit * (turn * moved.points[p] + Vector3(500, -500, 500));
@@ -551,7 +551,7 @@ TEST(SegmentLabeling, WhatIsNoCoronaryTree)
   EXPECT_EQ(LabelSegments(nothing).meanDistance, 0.0);
 
   // A straight vessel of 400 mm, as an aorta has: no crash, and no name for most of it.
-  CenterlineSet aorta;
+  Polylines aorta;
   for (int i = 0; i <= 400; ++i)
   {
     aorta.points.emplace_back(0.0, 0.0, i);

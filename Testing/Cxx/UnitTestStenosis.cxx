@@ -78,10 +78,10 @@ struct Tube
 };
 
 /// One branch along the tube, with the given radius everywhere.
-CenterlineTree LineWith(double radius, const Vector3& off = Vector3::Zero())
+VesselTree LineWith(double radius, const Vector3& off = Vector3::Zero())
 {
-  CenterlineTree tree;
-  CenterlineTree::Branch branch;
+  VesselTree tree;
+  VesselTree::Branch branch;
   branch.segmentId = MidLAD;
   for (double z = 0.0; z <= TubeLength; z += 0.25)
   {
@@ -100,11 +100,11 @@ struct Measured : TreeLumen
   StenosisGrading grading;
 };
 
-Measured MeasureAll(const Tube& tube, const CenterlineTree& tree)
+Measured MeasureAll(const Tube& tube, const VesselTree& tree)
 {
   const std::vector<VesselPath> paths = VesselPaths(tree);
   Measured result{ MeasureTreeLumen(tree, paths, tube.image, Blur), {} };
-  const CenterlineTree refined = WithLumen(tree, result.lumen);
+  const VesselTree refined = WithLumen(tree, result.lumen);
   MeasureCalcium(result.calcium, refined, paths, tube.image, result.levels, Blur);
   result.grading = GradeStenoses(refined, paths, result.lumen);
   return result;
@@ -154,10 +154,10 @@ TEST(BlurredDisc, BallsHaveTheirLimits)
 TEST(VesselPaths, TheNameCarriesAVesselOn)
 {
   // A trunk, a wide straight daughter and a thin one that turns off.
-  CenterlineTree tree;
+  VesselTree tree;
   const auto line = [&](int id, int parent, int segment, const Vector3& to, double radius)
   {
-    CenterlineTree::Branch branch;
+    VesselTree::Branch branch;
     branch.groupId = id;
     branch.parentGroupId = parent;
     branch.segmentId = segment;
@@ -202,7 +202,7 @@ TEST(LumenRefinement, MeasuresLumensAboveAndBelowTheBlur)
     tube.Render();
     SCOPED_TRACE(radius);
     // Widths that were measured in the usual way do not get below the blur.
-    CenterlineTree tree = LineWith(2.0, Vector3(0.1, -0.1, 0.0));
+    VesselTree tree = LineWith(2.0, Vector3(0.1, -0.1, 0.0));
     for (std::size_t p = 0; p < tree.points.size(); ++p)
     {
       tree.radius[p] = tree.points[p][2] < 25.0 ? 2.0 : std::max(0.7, 1.2 * radius);
@@ -301,7 +301,7 @@ TEST(StenosisGrading, AVesselThatIsLostInALesionSaysSo)
     tube.radius = [=](double z)
     { return healthy(z) * (1.0 - degree * std::exp(-0.5 * std::pow((z - 58.0) / 2.5, 2))); };
     tube.Render();
-    CenterlineTree tree = LineWith(1.2);
+    VesselTree tree = LineWith(1.2);
     const std::size_t last = 222; // z = 55.5
     tree.points.resize(last + 1);
     tree.radius.resize(last + 1);
@@ -327,7 +327,7 @@ TEST(StenosisGrading, AVesselThatIsLostInALesionSaysSo)
 TEST(StenosisGrading, BridgedLesionsSaySo)
 {
   const Tube tube = Narrowed(1.6, 0.9);
-  CenterlineTree tree = LineWith(1.5);
+  VesselTree tree = LineWith(1.5);
   const std::vector<VesselPath> paths = VesselPaths(tree);
   const Measured measured = MeasureAll(tube, tree);
   const StenosisGrading plain = GradeStenoses(tree, paths, measured.lumen);
@@ -351,7 +351,7 @@ TEST(StenosisGrading, NoLumenIsARangeAsWell)
 {
   // A lumen of 0.3 mm radius and none look the same in noise.
   const Tube tube = Narrowed(1.6, 1.0);
-  CenterlineTree tree = LineWith(1.5);
+  VesselTree tree = LineWith(1.5);
   tree.bridged.assign(tree.points.size(), 0);
   std::fill(tree.bridged.begin() + 100, tree.bridged.begin() + 140, 1);
   const Measured measured = MeasureAll(tube, tree);
@@ -371,7 +371,7 @@ TEST(CalciumObjects, BallsBesideTheLumenAreMeasuredAndTheLumenStays)
   tube.balls = { { Vector3(2.4, 0.0, 20.0), 1.0 }, { Vector3(0.0, -2.5, 42.0), 0.8 } };
   tube.Render();
   // The line was drawn towards the first one.
-  CenterlineTree tree = LineWith(1.5);
+  VesselTree tree = LineWith(1.5);
   for (Vector3& point : tree.points)
   {
     point[0] += 0.8 * std::exp(-0.5 * std::pow((point[2] - 20.0) / 2.0, 2));
@@ -484,7 +484,7 @@ TEST(LumenLevels, TheLungBesideAVesselIsNotItsBackground)
   Tube tube;
   tube.radius = [](double) { return 1.5; };
   tube.Render();
-  const CenterlineTree tree = LineWith(1.5);
+  const VesselTree tree = LineWith(1.5);
   const std::vector<VesselPath> paths = VesselPaths(tree);
   const double fat = MeasureLumenLevels(tree, paths, tube.image, Blur).background;
   EXPECT_NEAR(fat, Fat, 10.0);
@@ -518,7 +518,7 @@ TEST(StenosisGrading, TheSameOnAnyNumberOfThreads)
   Tube tube = Narrowed(1.6, 0.7);
   tube.balls = { { Vector3(2.4, 0.0, 20.0), 1.0 } };
   tube.Render();
-  const CenterlineTree tree = LineWith(1.5);
+  const VesselTree tree = LineWith(1.5);
   SetNumberOfThreads(1);
   const Measured one = MeasureAll(tube, tree);
   SetNumberOfThreads(4);
@@ -534,7 +534,7 @@ TEST(StenosisGrading, TheSameOnAnyNumberOfThreads)
 TEST(StenosisGrading, RefusesWhatItCanNotUse)
 {
   const Tube tube = Narrowed(1.6, 0.5);
-  const CenterlineTree tree = LineWith(1.5);
+  const VesselTree tree = LineWith(1.5);
   const std::vector<VesselPath> paths = VesselPaths(tree);
   ExpectRefusal([&] { MeasureLumenLevels(tree, paths, tube.image, 0.0); }, "blur");
   const LumenLevels levels = MeasureLumenLevels(tree, paths, tube.image, Blur);

@@ -357,12 +357,12 @@ TEST(StraightenedView, TheSameOnAnyNumberOfThreads)
 namespace
 {
 /// A left tree: LM to LAD (two pieces, a diagonal between them) and LCx; points 1 mm apart.
-CenterlineTree LeftTree(std::vector<std::string>& names)
+VesselTree LeftTree(std::vector<std::string>& names)
 {
-  CenterlineTree tree;
+  VesselTree tree;
   const auto add = [&](int parent, std::int64_t from, const Vector3& way, int count, int segment)
   {
-    CenterlineTree::Branch branch;
+    VesselTree::Branch branch;
     branch.groupId = static_cast<int>(tree.branches.size());
     branch.parentGroupId = parent;
     if (from < 0)
@@ -394,7 +394,7 @@ CenterlineTree LeftTree(std::vector<std::string>& names)
 TEST(JoinVessels, ArteriesGoOnByName)
 {
   std::vector<std::string> names;
-  const CenterlineTree tree = LeftTree(names);
+  const VesselTree tree = LeftTree(names);
   const std::vector<VesselChain> chains = JoinVessels(tree, names, 4.0);
   ASSERT_EQ(chains.size(), 3U);
   EXPECT_EQ(chains[0].name, "LM, pLAD, mLAD");
@@ -420,9 +420,9 @@ TEST(JoinVessels, ArteriesGoOnByName)
 TEST(JoinVessels, WithoutNamesTheStraightOne)
 {
   std::vector<std::string> names;
-  CenterlineTree tree = LeftTree(names);
+  VesselTree tree = LeftTree(names);
   names.assign(names.size(), "");
-  for (CenterlineTree::Branch& branch : tree.branches)
+  for (VesselTree::Branch& branch : tree.branches)
   {
     branch.segmentId = 0;
   }
@@ -441,7 +441,7 @@ TEST(JoinVessels, WithoutNamesTheStraightOne)
 TEST(JoinVessels, BranchesThatLeaveInTheMiddle)
 {
   std::vector<std::string> names;
-  CenterlineTree tree = LeftTree(names);
+  VesselTree tree = LeftTree(names);
   tree.branches[2].points.front() = tree.branches[0].points[5]; // the LCx leaves the LM half way
   const std::vector<VesselChain> chains = JoinVessels(tree, names, 3.0);
   ASSERT_EQ(chains[0].forks.size(), 2U);

@@ -25,9 +25,9 @@ using Course = std::function<std::pair<Vector3, double>(double)>;
 
 /// Adds a branch that begins in point `first`, -1 in one of its own. @return its points
 std::vector<std::int64_t> Add(
-  SweepTree& tree, int group, std::int64_t first, int steps, const Course& course)
+  VesselTree& tree, int group, std::int64_t first, int steps, const Course& course)
 {
-  SweepBranch branch;
+  VesselTree::Branch branch;
   branch.groupId = group;
   branch.name = "Vessel" + std::to_string(group);
   for (int i = 0; i <= steps; ++i)
@@ -52,7 +52,8 @@ Course Line(const Vector3& from, const Vector3& to, double radius)
 }
 
 /// What every surface of a hostile tree must be; and that nothing is lost in silence.
-void ExpectSoundOrNamed(const SweepTree& tree, const SweptSurface& surface, const std::string& what)
+void ExpectSoundOrNamed(
+  const VesselTree& tree, const SweptSurface& surface, const std::string& what)
 {
   SCOPED_TRACE(what);
   ASSERT_FALSE(surface.triangles.empty());
@@ -72,7 +73,7 @@ void ExpectSoundOrNamed(const SweepTree& tree, const SweptSurface& surface, cons
     EXPECT_TRUE(part.place.allFinite());
     EXPECT_NE(part.vessel.find("Vessel" + std::to_string(part.groupId)), std::string::npos);
   }
-  for (const SweepBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     EXPECT_EQ(told.count(branch.groupId), 1U) << "group " << branch.groupId << " is lost";
   }
@@ -82,9 +83,9 @@ void ExpectSoundOrNamed(const SweepTree& tree, const SweptSurface& surface, cons
 }
 
 /// A root that comes out of a wide mouth in an arc, with a side branch behind it.
-SweepTree Mouth(double slope, double bendRadius)
+VesselTree Mouth(double slope, double bendRadius)
 {
-  SweepTree tree;
+  VesselTree tree;
   const double arc = 0.5 * Pi * bendRadius;
   const auto trunk = Add(tree, 0, -1, 100,
     [=](double t)
@@ -101,22 +102,22 @@ SweepTree Mouth(double slope, double bendRadius)
 }
 
 /// A trunk of radius 1.5 along z, 40 mm, and a branch of radius `radius` that leaves it at `at`.
-SweepTree TrunkAnd(double at, double radius, const std::function<Vector3(double)>& course)
+VesselTree TrunkAnd(double at, double radius, const std::function<Vector3(double)>& course)
 {
-  SweepTree tree;
+  VesselTree tree;
   const auto trunk = Add(tree, 0, -1, 120, Line(Vector3::Zero(), Vector3(0.0, 0.0, 40.0), 1.5));
   Add(tree, 1, trunk[static_cast<std::size_t>(3.0 * at)], 60,
     [&](double t) { return std::make_pair(course(t), radius); });
   return tree;
 }
 
-SweepTree Random(unsigned seed)
+VesselTree Random(unsigned seed)
 {
   std::mt19937 engine(seed);
   // The library's distributions differ between compilers.
   const auto uniform = [&](double low, double high)
   { return low + (high - low) * static_cast<double>(engine()) / 4294967296.0; };
-  SweepTree tree;
+  VesselTree tree;
   const auto walk = [&](int group, std::int64_t from, double length, double radius)
   {
     Vector3 place = from < 0 ? Vector3::Zero() : tree.points[from];
@@ -149,7 +150,7 @@ TEST(SweepRescue, MouthsThatFoldOverTheirCaps)
   {
     for (const double bend : { 2.0, 4.0, 8.0 })
     {
-      const SweepTree tree = Mouth(slope, bend);
+      const VesselTree tree = Mouth(slope, bend);
       const SweptSurface surface = SweepVesselTree(tree, {});
       const std::string what = std::to_string(slope) + " " + std::to_string(bend);
       ExpectSoundOrNamed(tree, surface, what);
@@ -173,7 +174,7 @@ TEST(SweepRescue, TipsThatFlareAndCurl)
 {
   for (const double slope : { 1.0, 2.0 })
   {
-    SweepTree tree;
+    VesselTree tree;
     Add(tree, 0, -1, 100,
       [=](double t)
       {
@@ -184,7 +185,7 @@ TEST(SweepRescue, TipsThatFlareAndCurl)
   }
   for (const double bend : { 0.5, 1.0, 1.5 })
   {
-    SweepTree tree;
+    VesselTree tree;
     Add(tree, 0, -1, 140,
       [=](double t)
       {
@@ -204,19 +205,19 @@ TEST(SweepRescue, BranchesThatRunBesideOrThroughOthers)
 {
   for (const double gap : { 0.3, 1.0, 2.6 })
   {
-    const SweepTree back = TrunkAnd(24.0, 1.0,
+    const VesselTree back = TrunkAnd(24.0, 1.0,
       [=](double t) { return Vector3(gap * std::min(1.0, 10.0 * t), 0.0, 24.0 - 15.0 * t); });
     ExpectSoundOrNamed(back, SweepVesselTree(back, {}), "back " + std::to_string(gap));
   }
   for (const double gap : { 0.2, 0.8 })
   {
-    const SweepTree along = TrunkAnd(15.0, 0.8,
+    const VesselTree along = TrunkAnd(15.0, 0.8,
       [=](double t) { return Vector3(gap * std::min(1.0, 8.0 * t), 0.0, 15.0 + 20.0 * t); });
     ExpectSoundOrNamed(along, SweepVesselTree(along, {}), "along " + std::to_string(gap));
   }
   for (const double gap : { 0.0, 0.3, 2.0 })
   {
-    SweepTree tree;
+    VesselTree tree;
     Add(tree, 0, -1, 120, Line(Vector3::Zero(), Vector3(0.0, 0.0, 40.0), 1.5));
     Add(tree, 1, -1, 90, Line(Vector3(-15.0, gap, 20.0), Vector3(15.0, gap, 20.0), 1.0));
     const SweptSurface surface = SweepVesselTree(tree, {});
@@ -237,13 +238,13 @@ TEST(SweepRescue, ShortBranchesStenosesAndSteps)
 {
   for (const double length : { 0.3, 1.7, 2.2 })
   {
-    const SweepTree tree =
+    const VesselTree tree =
       TrunkAnd(15.0, 0.8, [=](double t) { return Vector3(length * t, 0.0, 15.0); });
     ExpectSoundOrNamed(tree, SweepVesselTree(tree, {}), "short " + std::to_string(length));
   }
   for (const double width : { 0.4, 1.0 })
   {
-    SweepTree tree;
+    VesselTree tree;
     Add(tree, 0, -1, 240,
       [=](double t)
       {
@@ -254,7 +255,7 @@ TEST(SweepRescue, ShortBranchesStenosesAndSteps)
     ExpectSoundOrNamed(tree, surface, "stenosis " + std::to_string(width));
     EXPECT_TRUE(surface.leftOut.empty());
   }
-  SweepTree tree;
+  VesselTree tree;
   Add(tree, 0, -1, 90,
     [](double t) { return std::make_pair(Vector3(0.0, 0.0, 30.0 * t), t < 0.5 ? 2.0 : 0.6); });
   ExpectSoundOrNamed(tree, SweepVesselTree(tree, {}), "step");
@@ -262,7 +263,7 @@ TEST(SweepRescue, ShortBranchesStenosesAndSteps)
 
 TEST(SweepRescue, LoopsAreOpened)
 {
-  SweepTree tree;
+  VesselTree tree;
   const auto trunk = Add(tree, 0, -1, 90, Line(Vector3::Zero(), Vector3(0.0, 0.0, 30.0), 1.5));
   Add(tree, 1, trunk[30], 60,
     [](double t)
@@ -280,7 +281,7 @@ TEST(SweepRescue, RandomTrees)
 {
   for (unsigned seed = 1; seed <= 3; ++seed)
   {
-    const SweepTree tree = Random(seed);
+    const VesselTree tree = Random(seed);
     const SweptSurface surface = SweepVesselTree(tree, {});
     ExpectSoundOrNamed(tree, surface, "seed " + std::to_string(seed));
     if (seed == 1)
@@ -294,7 +295,7 @@ TEST(SweepRescue, RandomTrees)
 
 TEST(SweepRescue, NothingIsSaidOfHealthyVessels)
 {
-  const SweepTree tree =
+  const VesselTree tree =
     TrunkAnd(15.0, 0.9, [](double t) { return Vector3(14.0 * t, 0.0, 15.0 + 10.0 * t); });
   const SweptSurface surface = SweepVesselTree(tree, {});
   ExpectSoundOrNamed(tree, surface, "healthy");
@@ -307,14 +308,14 @@ TEST(SweepRescue, NothingIsSaidOfHealthyVessels)
 TEST(SweepRescue, CutsTakeWhatHangsBehindThem)
 {
   // A trunk of 40 mm; one branch of 10 mm at 12, one of 20 mm at 30, and one of 5 mm on that.
-  SweepTree whole;
+  VesselTree whole;
   const auto trunk = Add(whole, 0, -1, 120, Line(Vector3::Zero(), Vector3(0.0, 0.0, 40.0), 1.0));
   Add(whole, 1, trunk[36], 30, Line(Vector3(0.0, 0.0, 12.0), Vector3(10.0, 0.0, 12.0), 0.5));
   const auto side =
     Add(whole, 2, trunk[90], 60, Line(Vector3(0.0, 0.0, 30.0), Vector3(20.0, 0.0, 30.0), 0.5));
   Add(whole, 3, side[30], 30, Line(Vector3(10.0, 0.0, 30.0), Vector3(10.0, 5.0, 30.0), 0.4));
 
-  SweepTree tree = whole;
+  VesselTree tree = whole;
   SweepCut cut = CutTree(tree, 0, Vector3(0.0, 0.0, 20.0), 2.0 - 1e-9);
   ASSERT_EQ(tree.branches.size(), 2U);
   EXPECT_NEAR(cut.length, 22.0 + 20.0 + 5.0, 1e-6);
@@ -340,7 +341,7 @@ TEST(SweepRescue, CutsTakeWhatHangsBehindThem)
 
 TEST(SweepRescue, TrianglesAreReplacedWhereTheyAreBad)
 {
-  SweepTree tree;
+  VesselTree tree;
   Add(tree, 0, -1, 60, Line(Vector3::Zero(), Vector3(0.0, 0.0, 20.0), 1.5));
   const SweptSurface surface = SweepVesselTree(tree, {});
   RescueMesh mesh;

@@ -24,10 +24,10 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 
 /// Adds a branch from point `first` (-1: a new one) along a curve.
-std::int64_t AddBranch(SweepTree& tree, int group, std::int64_t first, int steps,
+std::int64_t AddBranch(VesselTree& tree, int group, std::int64_t first, int steps,
   const std::function<Vector3(double)>& place, const std::function<double(double)>& radius)
 {
-  SweepBranch branch;
+  VesselTree::Branch branch;
   branch.groupId = group;
   for (int i = 0; i <= steps; ++i)
   {
@@ -45,7 +45,7 @@ std::int64_t AddBranch(SweepTree& tree, int group, std::int64_t first, int steps
   return branch.points.back();
 }
 
-std::int64_t AddLine(SweepTree& tree, int group, std::int64_t first, const Vector3& from,
+std::int64_t AddLine(VesselTree& tree, int group, std::int64_t first, const Vector3& from,
   const Vector3& to, double radius)
 {
   return AddBranch(
@@ -53,17 +53,17 @@ std::int64_t AddLine(SweepTree& tree, int group, std::int64_t first, const Vecto
     [=](double) { return radius; });
 }
 
-SweepTree Straight(const Vector3& from, const Vector3& to, double radius)
+VesselTree Straight(const Vector3& from, const Vector3& to, double radius)
 {
-  SweepTree tree;
+  VesselTree tree;
   AddLine(tree, 7, -1, from, to, radius);
   return tree;
 }
 
 /// A trunk along z and two daughters that leave it by +-`degrees`.
-SweepTree Fork(double degrees, double trunk, double daughter, const Vector3& at = Vector3::Zero())
+VesselTree Fork(double degrees, double trunk, double daughter, const Vector3& at = Vector3::Zero())
 {
-  SweepTree tree;
+  VesselTree tree;
   const double a = degrees * Pi / 180.0;
   const std::int64_t node = AddLine(tree, 1, -1, at - Vector3(0.0, 0.0, 15.0), at, trunk);
   const Vector3 left = 18.0 * Vector3(std::sin(a), 0.0, std::cos(a));
@@ -194,7 +194,7 @@ TEST(SweepSurface, QuarterTorus)
 {
   const double bend = 8.0;
   const double radius = 2.0;
-  SweepTree tree;
+  VesselTree tree;
   AddBranch(
     tree, 0, -1, 60,
     [=](double t)
@@ -249,7 +249,7 @@ TEST(SweepSurface, PatchesAreRoundSections)
 
 TEST(SweepSurface, EllipticContours)
 {
-  SweepTree tree = Straight(Vector3::Zero(), Vector3(0.0, 0.0, 20.0), 1.5);
+  VesselTree tree = Straight(Vector3::Zero(), Vector3(0.0, 0.0, 20.0), 1.5);
   tree.contourSamples = 32;
   for (std::size_t p = 0; p < tree.points.size(); ++p)
   {
@@ -314,7 +314,7 @@ TEST(SweepSurface, Forks)
 
 TEST(SweepSurface, FourDaughtersOfOnePoint)
 {
-  SweepTree tree;
+  VesselTree tree;
   const std::int64_t node = AddLine(tree, 0, -1, Vector3(0.0, 0.0, -12.0), Vector3::Zero(), 2.0);
   for (int k = 0; k < 4; ++k)
   {
@@ -330,8 +330,8 @@ TEST(SweepSurface, FourDaughtersOfOnePoint)
 TEST(SweepSurface, HairpinAtAnEndIsLeftOut)
 {
   // From the wall inwards, and back along the vessel.
-  SweepTree tree;
-  SweepBranch branch;
+  VesselTree tree;
+  VesselTree::Branch branch;
   const auto add = [&](const Vector3& p)
   {
     branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
@@ -355,17 +355,17 @@ TEST(SweepSurface, HairpinAtAnEndIsLeftOut)
 
 TEST(SweepSurface, KinkOfNinetyDegrees)
 {
-  SweepTree tree;
+  VesselTree tree;
   const std::int64_t corner = AddLine(tree, 0, -1, Vector3(0.0, 0.0, -12.0), Vector3::Zero(), 1.5);
   AddLine(tree, 1, corner, Vector3::Zero(), Vector3(12.0, 0.0, 0.0), 1.5);
   ExpectSound(SweepVesselTree(tree, {}), 1, "kink");
 }
 
 /// Up, down again beside itself by `depth`, and up.
-SweepTree Zigzag(double width, double depth)
+VesselTree Zigzag(double width, double depth)
 {
-  SweepTree tree;
-  SweepBranch branch;
+  VesselTree tree;
+  VesselTree::Branch branch;
   const auto add = [&](const Vector3& p)
   {
     branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
@@ -422,10 +422,10 @@ TEST(SweepSurface, SideVesselThatTurnsBackAtOnce)
   settings.tortuosity = 1.5;
   settings.calibre = 0.95;
   const PhantomTree truth = CoronaryPhantom(settings).Tree(0.3);
-  SweepTree tree;
+  VesselTree tree;
   tree.points = truth.points;
   tree.radius = truth.radius;
-  for (const PhantomBranch& branch : truth.branches)
+  for (const VesselTree::Branch& branch : truth.branches)
   {
     tree.branches.push_back({ branch.points, branch.groupId });
   }
@@ -439,7 +439,7 @@ TEST(SweepSurface, NeighboursDoNotMerge)
   // Half a millimetre between the walls, then less than nothing.
   for (const double gap : { 0.5, 0.02, -0.15 })
   {
-    SweepTree tree;
+    VesselTree tree;
     AddLine(tree, 0, -1, Vector3(0.0, 0.0, -15.0), Vector3(0.0, 0.0, 15.0), 1.5);
     AddLine(tree, 1, -1, Vector3(2.5 + gap, -12.0, -3.0), Vector3(2.5 + gap, 12.0, 3.0), 1.0);
     ExpectSound(SweepVesselTree(tree, {}), 2, "gap " + std::to_string(gap));
@@ -472,7 +472,7 @@ TEST(SweepSurface, CapsAreFlatAndNumbered)
 
 TEST(SweepSurface, ObliqueEnds)
 {
-  SweepTree tree = Straight(Vector3::Zero(), Vector3(0.0, 0.0, 15.0), 1.5);
+  VesselTree tree = Straight(Vector3::Zero(), Vector3(0.0, 0.0, 15.0), 1.5);
   tree.endNormals.assign(tree.points.size(), Vector3::Zero());
   const Vector3 wanted = Vector3(std::sin(0.6), 0.0, std::cos(0.6));
   tree.endNormals.back() = -3.0 * wanted; // length and sense do not matter
@@ -503,7 +503,7 @@ TEST(SweepSurface, OpenEnds)
 
 TEST(SweepSurface, StenosisIsResolved)
 {
-  SweepTree tree;
+  VesselTree tree;
   AddBranch(
     tree, 0, -1, 120, [](double t) { return Vector3(30.0 * t, 0.0, 0.0); },
     [](double t) { return 1.5 - 1.2 * std::exp(-std::pow((t - 0.5) / 0.06, 2.0)); });
@@ -522,7 +522,7 @@ TEST(SweepSurface, StenosisIsResolved)
 
 TEST(SweepSurface, SameTwice)
 {
-  const SweepTree tree = Fork(30.0, 1.8, 1.4, Vector3(5.0, 60.0, -9.0));
+  const VesselTree tree = Fork(30.0, 1.8, 1.4, Vector3(5.0, 60.0, -9.0));
   const SweptSurface one = SweepVesselTree(tree, {});
   const SweptSurface other = SweepVesselTree(tree, {});
   EXPECT_EQ(one.points, other.points);
@@ -531,11 +531,11 @@ TEST(SweepSurface, SameTwice)
 
 TEST(SweepSurface, Refusals)
 {
-  const SweepTree good = Straight(Vector3::Zero(), Vector3(10.0, 0.0, 0.0), 1.0);
-  const auto messageOf = [](const SweepTree& tree, const SweepSettings& settings = {})
+  const VesselTree good = Straight(Vector3::Zero(), Vector3(10.0, 0.0, 0.0), 1.0);
+  const auto messageOf = [](const VesselTree& tree, const SweepSettings& settings = {})
   { return MessageOf([&] { SweepVesselTree(tree, settings); }); };
   EXPECT_EQ(messageOf(good), "");
-  SweepTree tree = good;
+  VesselTree tree = good;
   tree.radius[3] = 0.0;
   EXPECT_NE(messageOf(tree).find("point 3"), std::string::npos);
   tree = good;
@@ -561,7 +561,7 @@ TEST(SweepSurface, Refusals)
 
 TEST(SweepSurface, Cancels)
 {
-  const SweepTree tree = Straight(Vector3::Zero(), Vector3(10.0, 0.0, 0.0), 1.0);
+  const VesselTree tree = Straight(Vector3::Zero(), Vector3(10.0, 0.0, 0.0), 1.0);
   EXPECT_THROW(SweepVesselTree(tree, {}, [](double) { return false; }), Cancelled);
 }
 

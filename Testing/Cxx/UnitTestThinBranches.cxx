@@ -58,7 +58,7 @@ struct Scene
 {
   ScalarImage image;
   std::vector<float> values;
-  CenterlineTree trunk;
+  VesselTree trunk;
 
   /// @param add  image value before the trunk is drawn
   explicit Scene(const std::function<double(const Vector3&)>& add, double noise,
@@ -88,7 +88,7 @@ struct Scene
       }
     }
     this->image.values = static_cast<const float*>(this->values.data());
-    CenterlineTree::Branch branch;
+    VesselTree::Branch branch;
     for (int i = 0; i <= 125; ++i)
     {
       const double z = -15.0 + 0.24 * i;
@@ -217,11 +217,11 @@ TEST(ThinBranches, SameOnAnyNumberOfThreads)
 }
 
 /// A tree of the trunk and the first `known` mm of the branch.
-CenterlineTree TreeWithTip(const Scene& scene, double known)
+VesselTree TreeWithTip(const Scene& scene, double known)
 {
-  CenterlineTree tree = scene.trunk;
+  VesselTree tree = scene.trunk;
   const Vector3 direction = (BranchEnd - BranchStart).normalized();
-  CenterlineTree::Branch branch;
+  VesselTree::Branch branch;
   branch.groupId = 1;
   branch.parentGroupId = 0;
   for (int i = 0; 2.0 + 0.24 * i <= known; ++i)
@@ -234,7 +234,7 @@ CenterlineTree TreeWithTip(const Scene& scene, double known)
   return tree;
 }
 
-std::vector<Vector3> FollowTip(const Scene& scene, const CenterlineTree& tree)
+std::vector<Vector3> FollowTip(const Scene& scene, const VesselTree& tree)
 {
   ThinBranchSettings settings;
   settings.voxel = 0.4;
@@ -255,7 +255,7 @@ TEST(ThinBranches, TipsGoOnToTheEndOfTheVessel)
           ", known " + std::to_string(known));
         const Scene scene(
           [&](const Vector3& p) { return WithBranch(p, radius, background); }, 25.0);
-        const CenterlineTree tree = TreeWithTip(scene, known);
+        const VesselTree tree = TreeWithTip(scene, known);
         const std::vector<Vector3> path = FollowTip(scene, tree);
         ASSERT_FALSE(path.empty());
         EXPECT_LT((path.front() - tree.points.back()).norm(), 1.4);
@@ -277,7 +277,7 @@ TEST(ThinBranches, TipsEndWhereTheVesselDoes)
     {
       const Scene scene([&](const Vector3& p) { return WithBranch(p, 0.5, background); }, 40.0,
         Vector3::Constant(0.4), seed);
-      const CenterlineTree tree = TreeWithTip(scene, (BranchEnd - BranchStart).norm());
+      const VesselTree tree = TreeWithTip(scene, (BranchEnd - BranchStart).norm());
       for (const Vector3& p : FollowTip(scene, tree))
       {
         EXPECT_LT((p - BranchEnd).norm(), 1.2) << "seed " << seed << " in " << background;
@@ -297,8 +297,8 @@ TEST(ThinBranches, TipsDoNotGoOnIntoAnotherVessel)
       return thin + TubeShare(p, BranchEnd - across, BranchEnd + across, 1.2) * (Blood - thin);
     },
     25.0);
-  CenterlineTree tree = TreeWithTip(scene, 9.0);
-  CenterlineTree::Branch other;
+  VesselTree tree = TreeWithTip(scene, 9.0);
+  VesselTree::Branch other;
   other.groupId = 2;
   for (int i = -25; i <= 25; ++i)
   {

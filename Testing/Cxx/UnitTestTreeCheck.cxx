@@ -23,7 +23,7 @@ PhantomTree TreeOf(std::uint64_t seed, int dominance, bool ramus = false)
 
 struct Cut
 {
-  CenterlineSet lines;
+  Polylines lines;
   Vector3 place = Vector3::Zero(); ///< of the new end
 };
 
@@ -34,7 +34,7 @@ Cut CutOff(const PhantomTree& tree, int segment, double share)
   cut.lines.points = tree.points;
   cut.lines.radius = tree.radius;
   std::set<int> gone;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (gone.count(branch.parentGroupId) != 0)
     {
@@ -56,7 +56,7 @@ Cut CutOff(const PhantomTree& tree, int segment, double share)
   return cut;
 }
 
-std::vector<TreeWarning> Check(const CenterlineSet& lines)
+std::vector<TreeWarning> Check(const Polylines& lines)
 {
   CenterlineTopology tree = BuildTopology(lines);
   const LabelingResult labels = LabelSegments(tree);
@@ -143,7 +143,7 @@ TEST(TreeCheck, AVesselThatWidensIsDoubted)
   const PhantomTree tree = TreeOf(321, 0);
   Cut whole = CutOff(tree, -1, 1.0);
   std::string name;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.segmentId == FirstDiagonal)
     {
@@ -164,10 +164,10 @@ TEST(TreeCheck, AVesselThatWidensIsDoubted)
 TEST(TreeCheck, OneTreeAloneAndOtherUnits)
 {
   const PhantomTree tree = TreeOf(331, 0);
-  CenterlineSet left;
+  Polylines left;
   left.points = tree.points;
   left.radius = tree.radius;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.treeId == 0)
     {

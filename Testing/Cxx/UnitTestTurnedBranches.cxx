@@ -63,17 +63,17 @@ struct Scene
 };
 
 /// The trunk, and a branch that leaves it at a height.
-CenterlineTree TreeWith(double begin, const std::function<Vector3(double)>& course, double length)
+VesselTree TreeWith(double begin, const std::function<Vector3(double)>& course, double length)
 {
-  CenterlineTree tree;
-  CenterlineTree::Branch trunk;
+  VesselTree tree;
+  VesselTree::Branch trunk;
   for (double z = 0.0; z >= -42.0; z -= 0.3)
   {
     trunk.points.push_back(static_cast<std::int64_t>(tree.points.size()));
     tree.points.emplace_back(0.0, 0.0, z);
     tree.radius.push_back(Trunk);
   }
-  CenterlineTree::Branch branch;
+  VesselTree::Branch branch;
   branch.groupId = 1;
   branch.parentGroupId = 0;
   branch.points.push_back(std::lround(-begin / 0.3));
@@ -88,7 +88,7 @@ CenterlineTree TreeWith(double begin, const std::function<Vector3(double)>& cour
 }
 
 /// The twin, followed up from where it touches the trunk.
-CenterlineTree Turned()
+VesselTree Turned()
 {
   return TreeWith(
     Touch, [](double passed) { return TwinAt(Touch + passed); }, 11.0);
@@ -101,7 +101,7 @@ TEST(TurnedBranches, ABranchThatWasEnteredFromItsEndBeginsUpstream)
   {
     SCOPED_TRACE(faint);
     const Scene scene(faint);
-    const CenterlineTree tree = Turned();
+    const VesselTree tree = Turned();
     const std::vector<TurnedBranch> found =
       FindTurnedBranches(ImageInterpolator(scene.image), tree, 0.5);
     ASSERT_EQ(found.size(), 1u);
@@ -133,15 +133,15 @@ TEST(TurnedBranches, OtherBranchesStay)
   const Scene scene(1.0);
   const ImageInterpolator image(scene.image);
   // With the flow.
-  const CenterlineTree down = TreeWith(
+  const VesselTree down = TreeWith(
     Fork, [](double passed) { return TwinAt(Fork - passed); }, 18.0);
   EXPECT_TRUE(FindTurnedBranches(image, down, 0.5).empty());
   // Against it, and away from the trunk.
-  const CenterlineTree away = TreeWith(
+  const VesselTree away = TreeWith(
     Touch, [](double passed) { return Vector3(0.9 * passed, 0.0, Touch + 0.45 * passed); }, 20.0);
   EXPECT_TRUE(FindTurnedBranches(image, away, 0.5).empty());
   // At a right angle.
-  const CenterlineTree across = TreeWith(
+  const VesselTree across = TreeWith(
     Touch, [](double passed) { return Vector3(passed, 0.0, Touch); }, 12.0);
   EXPECT_TRUE(FindTurnedBranches(image, across, 0.5).empty());
   EXPECT_THROW(FindTurnedBranches(image, down, 0.0), std::invalid_argument);

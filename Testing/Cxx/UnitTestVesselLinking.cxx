@@ -428,7 +428,7 @@ TEST(VesselLinking, CenterlinesSayWhatTheyDidNotSee)
   input.intensity = &image;
   input.seeds = { Vector3(2.0, 0.0, 0.0) };
   input.bridges.assign(segmentation.links.begin(), segmentation.links.end());
-  const CenterlineTree tree = ExtractCenterlines(input, {}).tree;
+  const VesselTree tree = ExtractCenterlines(input, {}).tree;
   ASSERT_EQ(tree.bridged.size(), tree.points.size());
   ASSERT_EQ(tree.bridgeConfidence.size(), tree.points.size());
   double farthest = 0.0;
@@ -466,7 +466,7 @@ TEST(VesselLinking, CenterlinesSayWhatTheyDidNotSee)
   {
     bridge.points[n][1] += 5.0;
   }
-  const CenterlineTree beside = ExtractCenterlines(input, {}).tree;
+  const VesselTree beside = ExtractCenterlines(input, {}).tree;
   ASSERT_FALSE(beside.points.empty());
   for (std::size_t p = 0; p < beside.points.size(); ++p)
   {

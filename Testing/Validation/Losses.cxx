@@ -71,7 +71,7 @@ private:
 };
 
 /// Whether a step of a branch has to be found: not what is thin to its end; what is thin in a lesion only counts.
-bool Counts(const PhantomTree& truth, const PhantomBranch& branch, std::size_t step)
+bool Counts(const PhantomTree& truth, const VesselTree::Branch& branch, std::size_t step)
 {
   const auto wide = [&](std::int64_t q)
   { return truth.radius[static_cast<std::size_t>(q)] >= LeastRadius; };
@@ -157,13 +157,13 @@ double ShareNearArteries(const PhantomTree& truth, const std::vector<Vector3>& p
   return places.empty() ? 0.0 : static_cast<double>(on) / static_cast<double>(places.size());
 }
 
-LengthComparison CompareLengths(const PhantomTree& truth, const CenterlineTree& tree)
+LengthComparison CompareLengths(const PhantomTree& truth, const VesselTree& tree)
 {
   LengthComparison result;
   double all = 0.0;
   Joiner missed(truth.points.size());
   std::vector<int> treeOf(truth.points.size(), 0);
-  for (const PhantomBranch& branch : truth.branches)
+  for (const VesselTree::Branch& branch : truth.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
     {
@@ -190,7 +190,7 @@ LengthComparison CompareLengths(const PhantomTree& truth, const CenterlineTree& 
       stretch.treeId = treeOf[static_cast<std::size_t>(point)];
     });
   Joiner wrong(tree.points.size());
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
     {

@@ -40,7 +40,7 @@ struct LengthComparison
 };
 
 /// The truth's and the result's lengths within a distance of each other.
-LengthComparison CompareLengths(const PhantomTree& truth, const CenterlineTree& tree);
+LengthComparison CompareLengths(const PhantomTree& truth, const VesselTree& tree);
 
 /// The share of a line, by length, that is artery.
 double ShareOnArteries(const PhantomTree& truth, const std::vector<Vector3>& line);

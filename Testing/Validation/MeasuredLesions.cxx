@@ -7,11 +7,11 @@
 
 namespace coronary
 {
-MeasuredLesions MeasureLesions(const CenterlineTree& tree, const ScalarImage& image, double blur)
+MeasuredLesions MeasureLesions(const VesselTree& tree, const ScalarImage& image, double blur)
 {
   const std::vector<VesselPath> paths = VesselPaths(tree);
   MeasuredLesions measured{ MeasureTreeLumen(tree, paths, image, blur), {}, {} };
-  const CenterlineTree& refined = measured.refined = WithLumen(tree, measured.lumen);
+  const VesselTree& refined = measured.refined = WithLumen(tree, measured.lumen);
   MeasureCalcium(measured.calcium, refined, paths, image, measured.levels, blur);
   measured.grading = GradeStenoses(refined, paths, measured.lumen);
   return measured;

@@ -16,13 +16,13 @@ namespace coronary
 {
 struct MeasuredLesions : TreeLumen
 {
-  CenterlineTree refined;  ///< the given tree with this lumen
+  VesselTree refined;      ///< the given tree with this lumen
   StenosisGrading grading; ///< of the refined tree
 };
 
 /// @param blur  standard deviation of the image's blur, mm, positive
 /// @throws std::invalid_argument as CheckTree
-MeasuredLesions MeasureLesions(const CenterlineTree& tree, const ScalarImage& image, double blur);
+MeasuredLesions MeasureLesions(const VesselTree& tree, const ScalarImage& image, double blur);
 
 /// What became of a true lesion.
 struct LesionMatch

@@ -136,7 +136,7 @@ std::vector<Vector3> Beginning(const PhantomTree& tree, int treeId, double from,
 {
   std::vector<Vector3> line;
   int group = -1;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     if (branch.treeId == treeId && branch.parentGroupId == group)
     {

@@ -50,12 +50,12 @@ PhantomCase MakePhantomCase(std::uint64_t seed, bool varied)
   return result;
 }
 
-SweepTree SweepTreeOf(const PhantomTree& truth)
+VesselTree SweepTreeOf(const PhantomTree& truth)
 {
-  SweepTree tree;
+  VesselTree tree;
   tree.points = truth.points;
   tree.radius = truth.radius;
-  for (const PhantomBranch& branch : truth.branches)
+  for (const VesselTree::Branch& branch : truth.branches)
   {
     tree.branches.push_back({ branch.points, branch.groupId });
   }

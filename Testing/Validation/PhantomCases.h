@@ -37,7 +37,7 @@ struct PhantomCase
 PhantomCase MakePhantomCase(std::uint64_t seed, bool varied);
 
 /// The true tree as the sweep takes it.
-SweepTree SweepTreeOf(const PhantomTree& truth);
+VesselTree SweepTreeOf(const PhantomTree& truth);
 }
 
 #endif

@@ -37,15 +37,15 @@ CenterlineResult Extract(const PhantomScan& image)
   return ExtractCenterlines(input, CenterlineSettings());
 }
 
-CenterlineSet LinesOf(const CenterlineTree& tree, const std::vector<Vector3>& roots)
+Polylines LinesOf(const VesselTree& tree, const std::vector<Vector3>& roots)
 {
-  CenterlineSet set = SetOf(tree);
+  Polylines set = SetOf(tree);
   set.roots = roots;
   return set;
 }
 
 /// What the topology does not know of, of the points that it was made of.
-void PassOn(const CenterlineTree& from, CenterlineTopology& tree)
+void PassOn(const VesselTree& from, CenterlineTopology& tree)
 {
   for (const std::int64_t source : tree.source)
   {
@@ -136,7 +136,7 @@ FoundTree FindTree(const PhantomScan& image)
 {
   FoundTree found;
   found.extraction = Extract(image);
-  CenterlineTree& raw = found.extraction.tree;
+  VesselTree& raw = found.extraction.tree;
   if (!raw.branches.empty() && found.extraction.blur > 0.0)
   {
     const TreeLumen measured =

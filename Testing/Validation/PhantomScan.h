@@ -64,9 +64,9 @@ CenterlineTopology TreeOf(
 
 /// A tree as the measures of overlap take it.
 template <typename Tree>
-CenterlineSet SetOf(const Tree& tree)
+Polylines SetOf(const Tree& tree)
 {
-  CenterlineSet set;
+  Polylines set;
   set.points = tree.points;
   set.radius = tree.radius;
   for (const auto& branch : tree.branches)

@@ -188,7 +188,7 @@ void CompareNames(const PhantomTree& truth, const CenterlineTopology& found,
 {
   double right = 0.0;
   double named = 0.0;
-  for (const PhantomBranch& branch : truth.branches)
+  for (const VesselTree::Branch& branch : truth.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
     {
@@ -229,8 +229,8 @@ void CompareWithTruth(
   const CoronaryPhantom& phantom, const CenterlineTopology& tree, Outcome& outcome)
 {
   const PhantomTree truth = phantom.Tree(ReferencePhase);
-  const CenterlineSet truthSet = SetOf(truth);
-  const CenterlineSet foundSet = SetOf(tree);
+  const Polylines truthSet = SetOf(truth);
+  const Polylines foundSet = SetOf(tree);
   CenterlineOverlapSettings wide;
   wide.leastRadius = LeastRadius;
   const TreeOverlap overlap = CompareCenterlineTrees(truthSet, foundSet, wide);
@@ -239,7 +239,7 @@ void CompareWithTruth(
   const TreeOverlap all = CompareCenterlineTrees(truthSet, foundSet);
   outcome.all = all.total;
   outcome.paths = CompareCenterlinePaths(truthSet, foundSet).total;
-  CenterlineSet tolerant = truthSet;
+  Polylines tolerant = truthSet;
   for (double& radius : tolerant.radius)
   {
     radius = std::max(radius, BesideVessel);
@@ -431,7 +431,7 @@ bool PrintInvariance(const Case& test)
   Outcome outcome;
   const PhantomScan scan = MakeScan(phantom, test, outcome);
   const CenterlineTopology original = TreeOf(scan, outcome.seconds.data() + 2);
-  const CenterlineSet originalSet = SetOf(original);
+  const Polylines originalSet = SetOf(original);
   const Matrix3 turn =
     Eigen::AngleAxisd(0.7, Vector3(0.4, -1.0, 0.6).normalized()).toRotationMatrix();
   const std::vector<Frame> frames = {
@@ -454,7 +454,7 @@ bool PrintInvariance(const Case& test)
       seed = frame.Apply(seed);
     }
     const CenterlineTopology tree = TreeOf(moved, outcome.seconds.data() + 2);
-    CenterlineSet back = SetOf(tree);
+    Polylines back = SetOf(tree);
     for (Vector3& p : back.points)
     {
       p = frame.Undo(p);

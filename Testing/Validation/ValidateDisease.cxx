@@ -156,7 +156,7 @@ double ThreadSeconds()
 }
 
 /// Lines of the truth and the result as a legacy VTK file, to be looked at.
-void WriteLines(const std::string& path, const CenterlineSet& set)
+void WriteLines(const std::string& path, const Polylines& set)
 {
   std::ofstream file(path);
   file << "# vtk DataFile Version 3.0\nlines\nASCII\nDATASET POLYDATA\nPOINTS " << set.points.size()
@@ -189,12 +189,12 @@ void WriteLines(const std::string& path, const CenterlineSet& set)
 }
 
 /// The surface as `run` makes it of the tree, failures included.
-void CompareSurface(const CoronaryPhantom& phantom, const CenterlineTree& tree, Outcome& outcome)
+void CompareSurface(const CoronaryPhantom& phantom, const VesselTree& tree, Outcome& outcome)
 {
-  SweepTree swept;
+  VesselTree swept;
   swept.points = tree.points;
   swept.radius = tree.radius;
-  for (const CenterlineTree::Branch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     swept.branches.push_back({ branch.points, branch.groupId, SegmentName(branch.segmentId) });
   }
@@ -314,7 +314,7 @@ std::string LinkRows(const PhantomTree& truth, const std::vector<ConsideredLink>
 }
 
 /// What each tip was judged by: the vessel goes on where a loss begins within some millimetres.
-std::string TipRows(const LengthComparison& lengths, const CenterlineTree& tree)
+std::string TipRows(const LengthComparison& lengths, const VesselTree& tree)
 {
   constexpr double ahead = 4.0; // mm
   constexpr double rest =

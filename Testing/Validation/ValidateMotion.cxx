@@ -145,7 +145,7 @@ std::vector<std::int16_t> ImageAt(
 double DistanceToAxis(const PhantomTree& tree, const Vector3& point)
 {
   double least = std::numeric_limits<double>::infinity();
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t n = 0; n + 1 < branch.points.size(); ++n)
     {
@@ -176,14 +176,14 @@ Outcome Run(const Case& test)
   }
   const CoronaryPhantom phantom(settings);
   const ImageGrid grid = phantom.DefaultGrid(test.spacing, test.margin);
-  MovingLines lines;
+  Polylines lines;
   std::vector<std::string> name;
   if (test.trueTree)
   {
     const PhantomTree truth = phantom.Tree(ReferencePhase);
-    lines.rest = truth.points;
+    lines.points = truth.points;
     lines.radius = truth.radius;
-    for (const PhantomBranch& branch : truth.branches)
+    for (const VesselTree::Branch& branch : truth.branches)
     {
       lines.lines.push_back(branch.points);
     }
@@ -195,9 +195,9 @@ Outcome Run(const Case& test)
   else
   {
     const CenterlineTopology tree = TreeOf(ScanPhantom(phantom, grid, ReferencePhase, false));
-    lines.rest = tree.points;
+    lines.points = tree.points;
     lines.radius = tree.radius;
-    for (const CenterlineTree::Branch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       lines.lines.push_back(branch.points);
     }
@@ -239,10 +239,10 @@ Outcome Run(const Case& test)
   outcome.imagesRead = report.imagesRead;
   outcome.trackedShare = report.trackedShare;
 
-  std::vector<Vector3> material(lines.rest.size());
+  std::vector<Vector3> material(lines.points.size());
   for (std::size_t p = 0; p < material.size(); ++p)
   {
-    material[p] = phantom.ReferencePosition(lines.rest[p], ReferencePhase);
+    material[p] = phantom.ReferencePosition(lines.points[p], ReferencePhase);
   }
   const PhantomTree reference = phantom.Tree(ReferencePhase);
   PhaseInterpolationSettings between;
@@ -315,7 +315,7 @@ Outcome Run(const Case& test)
         const std::int64_t p = line[n];
         const std::int64_t q = line[n + 1];
         const double area = lines.radius[p] * lines.radius[p] + lines.radius[q] * lines.radius[q];
-        length += (lines.rest[q] - lines.rest[p]).norm();
+        length += (lines.points[q] - lines.points[p]).norm();
         const double carried = (points[q] - points[p]).norm();
         const double truly =
           (phantom.Position(material[q], all[k]) - phantom.Position(material[p], all[k])).norm();

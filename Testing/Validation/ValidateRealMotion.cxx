@@ -222,12 +222,12 @@ public:
       { { 108, 0.08 }, { 150, 0.08 }, { 190, 0.11 }, { 220, 0.13 }, { 240, 0.15 } }, 1.7, 0.9);
     this->AddVessel(circumflex, 0.5, { { 180, 0.1 }, { 185, 0.4 }, { 190, 0.65 } }, 1.2, 0.8);
     this->AddVessel(circumflex, 0.85, { { 225, 0.14 }, { 224, 0.4 }, { 226, 0.6 } }, 1.1, 0.8);
-    this->Lines.rest = this->At(this->Rest);
-    CheckMovingLines(this->Lines);
+    this->Lines.points = this->At(this->Rest);
+    CheckPolylines(this->Lines);
   }
 
   /// The lines at the reference.
-  const MovingLines& Reference() const { return this->Lines; }
+  const Polylines& Reference() const { return this->Lines; }
 
   /// The points where the heart has moved to.
   std::vector<Vector3> At(const std::vector<Vector3>& heart) const
@@ -445,7 +445,7 @@ private:
   Vector3 Right;
   Vector3 Front;
   std::vector<Vessel> Vessels;
-  MovingLines Lines;
+  Polylines Lines;
 };
 
 /// What a CT of the moving heart shows.
@@ -590,7 +590,7 @@ private:
   std::vector<float> LumenOf(const std::vector<Vector3>& points) const
   {
     std::vector<float> lumen(this->Voxels, 0.0F);
-    const MovingLines& lines = this->Tree.Reference();
+    const Polylines& lines = this->Tree.Reference();
     const double spacing = this->Grid.spacing[0];
     for (const std::vector<std::int64_t>& line : lines.lines)
     {
@@ -697,7 +697,7 @@ struct Errors
 };
 
 double DistanceToAxis(
-  const MovingLines& lines, const std::vector<Vector3>& points, const Vector3& place)
+  const Polylines& lines, const std::vector<Vector3>& points, const Vector3& place)
 {
   double least = std::numeric_limits<double>::infinity();
   for (const std::vector<std::int64_t>& line : lines.lines)
@@ -712,8 +712,8 @@ double DistanceToAxis(
 }
 
 /// Lines as a legacy VTK file.
-void WriteLines(const std::string& path, const MovingLines& lines,
-  const std::vector<Vector3>& points, const std::vector<double>& errors)
+void WriteLines(const std::string& path, const Polylines& lines, const std::vector<Vector3>& points,
+  const std::vector<double>& errors)
 {
   std::ofstream file(path);
   file << "# vtk DataFile Version 3.0\nlines\nASCII\nDATASET POLYDATA\nPOINTS " << points.size()
@@ -778,7 +778,7 @@ bool Run(const Settings& options)
 {
   const Heart heart(options.data, options.asMeasured);
   const CarriedTree tree(heart);
-  const MovingLines& lines = tree.Reference();
+  const Polylines& lines = tree.Reference();
   Scanner scanner(heart, tree, options.spacing, options.window, options.quick ? 3 : 5);
 
   std::vector<std::vector<Vector3>> truth;
@@ -791,7 +791,7 @@ bool Run(const Settings& options)
   }
   for (int k = 0; k < Frames; ++k)
   {
-    for (std::size_t n = 0; n < lines.rest.size(); ++n)
+    for (std::size_t n = 0; n < lines.points.size(); ++n)
     {
       excursion = std::max(excursion, (truth[k][n] - truth[ReferenceFrame][n]).norm());
       step = std::max(step, k < 2 ? 0.0 : (truth[k][n] - truth[k - 2][n]).norm());
@@ -809,7 +809,7 @@ bool Run(const Settings& options)
   std::printf(
     "A measured heart%s: %zu points on %zu vessels, up to %.1f mm from the reference and "
     "%.1f mm between any two frames, %.1f mm between tracked frames that follow each other\n",
-    options.asMeasured ? ", frames as they are" : "", lines.rest.size(), lines.lines.size(),
+    options.asMeasured ? ", frames as they are" : "", lines.points.size(), lines.lines.size(),
     excursion, range, step);
   if (!options.asMeasured)
   {

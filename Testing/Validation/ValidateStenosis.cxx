@@ -97,7 +97,7 @@ struct Nearest
 Nearest NearestTruth(const PhantomTree& truth, const Vector3& position)
 {
   Nearest nearest;
-  for (const PhantomBranch& branch : truth.branches)
+  for (const VesselTree::Branch& branch : truth.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
     {
@@ -118,15 +118,15 @@ Nearest NearestTruth(const PhantomTree& truth, const Vector3& position)
 
 /// Lines as an extraction gives them, off the axes by chance and with radii that are too smooth, wherever the truth has
 /// vessels: to measure lesions alone, whether or not the extraction gets past them.
-CenterlineTree DisturbedTruth(const PhantomTree& truth, std::uint64_t seed)
+VesselTree DisturbedTruth(const PhantomTree& truth, std::uint64_t seed)
 {
-  CenterlineTree tree;
+  VesselTree tree;
   tree.points = truth.points;
   tree.radius = truth.radius;
   tree.segmentId = truth.segmentId;
-  for (const PhantomBranch& branch : truth.branches)
+  for (const VesselTree::Branch& branch : truth.branches)
   {
-    CenterlineTree::Branch copy;
+    VesselTree::Branch copy;
     copy.points = branch.points;
     copy.groupId = branch.groupId;
     copy.parentGroupId = branch.parentGroupId;
@@ -182,7 +182,7 @@ double VisibleVolume(const CoronaryPhantom& phantom, const PhantomPlaque& plaque
   return static_cast<double>(inside) * step * step * step;
 }
 
-void CompareLesions(const CoronaryPhantom& phantom, const CenterlineTree& tree,
+void CompareLesions(const CoronaryPhantom& phantom, const VesselTree& tree,
   const StenosisGrading& grading, Outcome& outcome)
 {
   const auto seed = static_cast<unsigned long long>(phantom.Settings().seed);
@@ -272,8 +272,8 @@ void CompareCalcium(const CoronaryPhantom& phantom, const CalciumMap& calcium, O
   }
 }
 
-void CompareRadii(const PhantomTree& truth, const CenterlineTree& tree,
-  const CenterlineTree& refined, const RefinedLumen& lumen, Outcome& outcome)
+void CompareRadii(const PhantomTree& truth, const VesselTree& tree, const VesselTree& refined,
+  const RefinedLumen& lumen, Outcome& outcome)
 {
   for (std::size_t p = 0; p < tree.points.size(); ++p)
   {
@@ -303,7 +303,7 @@ void Run(const Case& test, const Options& options, Outcome& outcome)
   ScalarImage image;
   PhantomScan scan;
   std::vector<std::int16_t> values;
-  CenterlineTree tree;
+  VesselTree tree;
   double blur = 0.0;
   if (options.trueAxes)
   {

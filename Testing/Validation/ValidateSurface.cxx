@@ -82,7 +82,7 @@ struct Outcome
 };
 
 /// The phantom's ends are cut by planes that move with the tissue: they are part of the truth.
-std::vector<Vector3> EndNormals(const SweepTree& tree, const PhantomSurface& wall)
+std::vector<Vector3> EndNormals(const VesselTree& tree, const PhantomSurface& wall)
 {
   std::vector<Vector3> normals(tree.points.size(), Vector3::Zero());
   std::map<int, std::pair<Vector3, Vector3>> caps; // area vector, and centre times area
@@ -104,7 +104,7 @@ std::vector<Vector3> EndNormals(const SweepTree& tree, const PhantomSurface& wal
   {
     const Vector3 centre = entry.second.second / entry.second.first.norm();
     std::int64_t nearest = tree.branches.front().points.front();
-    for (const SweepBranch& branch : tree.branches)
+    for (const VesselTree::Branch& branch : tree.branches)
     {
       for (const std::int64_t p : { branch.points.front(), branch.points.back() })
       {
@@ -165,7 +165,7 @@ Outcome Run(std::uint64_t seed, bool varied, double spacing, bool cut,
   PhantomCase which = MakePhantomCase(seed, varied);
   which.settings.surfaceSpacing = spacing;
   const CoronaryPhantom phantom(which.settings);
-  SweepTree tree = SweepTreeOf(phantom.Tree(which.moment));
+  VesselTree tree = SweepTreeOf(phantom.Tree(which.moment));
   const PhantomSurface wall = phantom.Surface(which.moment);
   if (cut)
   {

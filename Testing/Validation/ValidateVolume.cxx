@@ -181,7 +181,7 @@ TetrahedralMeshInput PhantomInput(std::uint64_t seed, bool varied, bool swept, d
   }
   input.skeletonPoints = tree.points;
   input.skeletonRadius = tree.radius;
-  for (const PhantomBranch& branch : tree.branches)
+  for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
     {

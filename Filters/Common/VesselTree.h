@@ -1,12 +1,12 @@
 /**
- * @file CenterlineTree.h
+ * @file VesselTree.h
  * @brief The axes of a forest of vessels: what the stages after the image pass on.
  *
  * Names and conventions are those of PhantomTree (the truth), so that the two compare member by
  * member. Positions are LPS in mm.
  */
-#ifndef DynamicCoronary_CenterlineTree_h
-#define DynamicCoronary_CenterlineTree_h
+#ifndef DynamicCoronary_VesselTree_h
+#define DynamicCoronary_VesselTree_h
 
 #include "Geometry.h"
 
@@ -23,7 +23,7 @@ namespace coronary
  * Per-point members other than `points` and `radius` may be empty: not known. Data of a shared
  * point belong to the parent.
  */
-struct CenterlineTree
+struct VesselTree
 {
   struct Branch
   {
@@ -57,11 +57,11 @@ struct CenterlineTree
  * index out of range, a branch of less than two points, a group id twice, a parent that does not
  * exist, stands later or does not have the first point, a value that is not finite, a radius < 0.
  */
-void CheckTree(const CenterlineTree& tree);
+void CheckTree(const VesselTree& tree);
 
 /// Fills `abscissa` and the branches' `length` and `tortuosity`.
 /// @throws std::invalid_argument as CheckTree
-void MeasureTree(CenterlineTree& tree);
+void MeasureTree(VesselTree& tree);
 
 /**
  * The same forest with branches that touch at their ends only. Branches are cut where others
@@ -69,7 +69,7 @@ void MeasureTree(CenterlineTree& tree);
  * of the branch they were cut from; length and tortuosity are measured anew.
  * @throws std::invalid_argument as CheckTree
  */
-CenterlineTree SplitAtBifurcations(const CenterlineTree& tree);
+VesselTree SplitAtBifurcations(const VesselTree& tree);
 }
 
 #endif

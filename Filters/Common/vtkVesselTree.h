@@ -1,12 +1,12 @@
 /**
- * @file vtkCenterlineForms.h
+ * @file vtkVesselTree.h
  * @brief Poly data that hold a tree of centerlines: as a tree, or as VMTK's lines.
  */
-#ifndef vtkCenterlineForms_h
-#define vtkCenterlineForms_h
+#ifndef vtkVesselTree_h
+#define vtkVesselTree_h
 
 #include "CenterlineConversion.h"
-#include "CenterlineTree.h"
+#include "VesselTree.h"
 #include "vtkCoronaryCommonModule.h" // for the export macro
 
 #include <vector>
@@ -37,7 +37,7 @@ enum class Radii
  * Polylines as the branches of a tree; points keep their indices.
  * @throws std::invalid_argument naming the array that is missing or unfit, or as coronary::CheckTree
  */
-VTKCORONARYCOMMON_EXPORT coronary::CenterlineTree TreeOf(
+VTKCORONARYCOMMON_EXPORT coronary::VesselTree TreeOf(
   vtkPolyData* data, Radii radii = Radii::Needed);
 
 /**
@@ -49,7 +49,7 @@ VTKCORONARYCOMMON_EXPORT std::vector<coronary::VmtkTract> TractsOf(
 
 /// Points, lines, and the arrays of a tree: `MaximumInscribedSphereRadius`, `Abscissas`;
 /// `GroupIds`, `ParentGroupIds`, `TreeIds`, `Length`, `Tortuosity`. Arrays of these names are replaced.
-VTKCORONARYCOMMON_EXPORT void SetTree(vtkPolyData* data, const coronary::CenterlineTree& tree);
+VTKCORONARYCOMMON_EXPORT void SetTree(vtkPolyData* data, const coronary::VesselTree& tree);
 }
 
 #endif

@@ -1,7 +1,7 @@
 // The tree type: what it refuses, lengths along it, cutting at bifurcations.
 
-#include "CenterlineTree.h"
 #include "CoronaryPhantom.h"
+#include "VesselTree.h"
 
 #include <gtest/gtest.h>
 
@@ -14,9 +14,9 @@ using namespace coronary;
 namespace
 {
 /// A trunk along x with a side branch at its middle, and a twig on that; not split.
-CenterlineTree Comb()
+VesselTree Comb()
 {
-  CenterlineTree tree;
+  VesselTree tree;
   for (int i = 0; i < 5; ++i)
   {
     tree.points.emplace_back(2.0 * i, 0.0, 0.0);
@@ -42,9 +42,9 @@ CenterlineTree Comb()
   return tree;
 }
 
-std::string Complaint(const std::function<void(CenterlineTree&)>& damage)
+std::string Complaint(const std::function<void(VesselTree&)>& damage)
 {
-  CenterlineTree tree = Comb();
+  VesselTree tree = Comb();
   damage(tree);
   try
   {
@@ -58,28 +58,27 @@ std::string Complaint(const std::function<void(CenterlineTree&)>& damage)
 }
 }
 
-TEST(CenterlineTree, DamageIsNamed)
+TEST(VesselTree, DamageIsNamed)
 {
-  EXPECT_EQ(Complaint([](CenterlineTree&) {}), "");
-  const auto expect = [](
-                        const std::string& part, const std::function<void(CenterlineTree&)>& damage)
+  EXPECT_EQ(Complaint([](VesselTree&) {}), "");
+  const auto expect = [](const std::string& part, const std::function<void(VesselTree&)>& damage)
   { EXPECT_NE(Complaint(damage).find(part), std::string::npos) << Complaint(damage); };
-  expect("radius has 8", [](CenterlineTree& t) { t.radius.pop_back(); });
-  expect("confidence has 2", [](CenterlineTree& t) { t.confidence.assign(2, 1.0); });
+  expect("radius has 8", [](VesselTree& t) { t.radius.pop_back(); });
+  expect("confidence has 2", [](VesselTree& t) { t.confidence.assign(2, 1.0); });
   expect("point 3 is not finite",
-    [](CenterlineTree& t) { t.points[3].x() = std::numeric_limits<double>::quiet_NaN(); });
-  expect("radius of point 1 is negative", [](CenterlineTree& t) { t.radius[1] = -1.0; });
-  expect("less than two points", [](CenterlineTree& t) { t.branches[2].points.pop_back(); });
-  expect("point 9, which does not exist", [](CenterlineTree& t) { t.branches[2].points[1] = 9; });
-  expect("occurs twice", [](CenterlineTree& t) { t.branches[2].groupId = 7; });
-  expect("parent 12 of branch 5", [](CenterlineTree& t) { t.branches[2].parentGroupId = 12; });
-  expect("stands later", [](CenterlineTree& t) { std::swap(t.branches[0], t.branches[1]); });
-  expect("does not begin on its parent", [](CenterlineTree& t) { t.branches[2].points[0] = 4; });
+    [](VesselTree& t) { t.points[3].x() = std::numeric_limits<double>::quiet_NaN(); });
+  expect("radius of point 1 is negative", [](VesselTree& t) { t.radius[1] = -1.0; });
+  expect("less than two points", [](VesselTree& t) { t.branches[2].points.pop_back(); });
+  expect("point 9, which does not exist", [](VesselTree& t) { t.branches[2].points[1] = 9; });
+  expect("occurs twice", [](VesselTree& t) { t.branches[2].groupId = 7; });
+  expect("parent 12 of branch 5", [](VesselTree& t) { t.branches[2].parentGroupId = 12; });
+  expect("stands later", [](VesselTree& t) { std::swap(t.branches[0], t.branches[1]); });
+  expect("does not begin on its parent", [](VesselTree& t) { t.branches[2].points[0] = 4; });
 }
 
-TEST(CenterlineTree, AbscissasRunOnFromTheParent)
+TEST(VesselTree, AbscissasRunOnFromTheParent)
 {
-  CenterlineTree tree = Comb();
+  VesselTree tree = Comb();
   MeasureTree(tree);
   EXPECT_DOUBLE_EQ(tree.abscissa[4], 8.0);
   EXPECT_DOUBLE_EQ(tree.abscissa[7], 4.0 + 9.0);
@@ -88,9 +87,9 @@ TEST(CenterlineTree, AbscissasRunOnFromTheParent)
   EXPECT_NEAR(tree.branches[1].tortuosity, 0.0, 1e-15);
 }
 
-TEST(CenterlineTree, SplitBranchesTouchAtTheirEnds)
+TEST(VesselTree, SplitBranchesTouchAtTheirEnds)
 {
-  const CenterlineTree split = SplitAtBifurcations(Comb());
+  const VesselTree split = SplitAtBifurcations(Comb());
   ASSERT_EQ(split.branches.size(), 5u);
   const std::vector<std::vector<std::int64_t>> expected = { { 0, 1, 2 }, { 2, 3, 4 }, { 2, 5 },
     { 5, 6, 7 }, { 5, 8 } };
@@ -104,7 +103,7 @@ TEST(CenterlineTree, SplitBranchesTouchAtTheirEnds)
   }
   EXPECT_DOUBLE_EQ(split.branches[3].length, 6.0);
   // Splitting what is split changes nothing.
-  const CenterlineTree again = SplitAtBifurcations(split);
+  const VesselTree again = SplitAtBifurcations(split);
   ASSERT_EQ(again.branches.size(), split.branches.size());
   for (std::size_t b = 0; b < again.branches.size(); ++b)
   {
@@ -113,14 +112,14 @@ TEST(CenterlineTree, SplitBranchesTouchAtTheirEnds)
   }
 }
 
-TEST(CenterlineTree, ThePhantomsTreeIsOne)
+TEST(VesselTree, ThePhantomsTreeIsOne)
 {
   const CoronaryPhantom phantom{ PhantomSettings{} };
   const PhantomTree truth = phantom.Tree(0.0);
-  CenterlineTree tree;
+  VesselTree tree;
   tree.points = truth.points;
   tree.radius = truth.radius;
-  for (const PhantomBranch& branch : truth.branches)
+  for (const VesselTree::Branch& branch : truth.branches)
   {
     tree.branches.emplace_back();
     tree.branches.back().points = branch.points;

@@ -1,4 +1,4 @@
-#include "CenterlineTree.h"
+#include "VesselTree.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,11 +10,11 @@ namespace coronary
 {
 namespace
 {
-using Branch = CenterlineTree::Branch;
+using Branch = VesselTree::Branch;
 
 [[noreturn]] void Fail(const std::string& message)
 {
-  throw std::invalid_argument("CenterlineTree: " + message);
+  throw std::invalid_argument("VesselTree: " + message);
 }
 
 template <typename Value>
@@ -44,7 +44,7 @@ std::string NameOf(const Branch& branch)
 }
 }
 
-void CheckTree(const CenterlineTree& tree)
+void CheckTree(const VesselTree& tree)
 {
   const std::size_t count = tree.points.size();
   CheckSize(tree.radius, count, "radius", true);
@@ -106,7 +106,7 @@ void CheckTree(const CenterlineTree& tree)
   }
 }
 
-void MeasureTree(CenterlineTree& tree)
+void MeasureTree(VesselTree& tree)
 {
   CheckTree(tree);
   tree.abscissa.assign(tree.points.size(), 0.0);
@@ -126,7 +126,7 @@ void MeasureTree(CenterlineTree& tree)
   }
 }
 
-CenterlineTree SplitAtBifurcations(const CenterlineTree& tree)
+VesselTree SplitAtBifurcations(const VesselTree& tree)
 {
   CheckTree(tree);
   std::vector<char> cut(tree.points.size(), 0);
@@ -138,7 +138,7 @@ CenterlineTree SplitAtBifurcations(const CenterlineTree& tree)
     }
   }
 
-  CenterlineTree split = tree;
+  VesselTree split = tree;
   split.branches.clear();
   std::map<int, std::map<std::int64_t, int>> endingAt; // of an old branch: point, new group id
   for (const Branch& branch : tree.branches)

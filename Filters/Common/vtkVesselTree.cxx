@@ -1,4 +1,4 @@
-#include "vtkCenterlineForms.h"
+#include "vtkVesselTree.h"
 
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
@@ -68,7 +68,7 @@ coronary::Vector3 PointOf(vtkPolyData* data, vtkIdType id)
 }
 
 /// In the given order, but no daughter before its parent; what has none stays where it is.
-void ParentsFirst(std::vector<coronary::CenterlineTree::Branch>& branches)
+void ParentsFirst(std::vector<coronary::VesselTree::Branch>& branches)
 {
   std::set<int> all;
   for (const auto& branch : branches)
@@ -76,12 +76,12 @@ void ParentsFirst(std::vector<coronary::CenterlineTree::Branch>& branches)
     all.insert(branch.groupId);
   }
   std::set<int> placed;
-  std::vector<coronary::CenterlineTree::Branch> waiting;
+  std::vector<coronary::VesselTree::Branch> waiting;
   waiting.swap(branches);
   for (std::size_t before = waiting.size() + 1; before != waiting.size();)
   {
     before = waiting.size();
-    std::vector<coronary::CenterlineTree::Branch> later;
+    std::vector<coronary::VesselTree::Branch> later;
     for (auto& branch : waiting)
     {
       const int parent = branch.parentGroupId;
@@ -103,7 +103,7 @@ void ParentsFirst(std::vector<coronary::CenterlineTree::Branch>& branches)
 
 template <typename Array, typename Get>
 void AddCellValues(vtkPolyData* data, const char* name,
-  const std::vector<coronary::CenterlineTree::Branch>& branches, const Get& get)
+  const std::vector<coronary::VesselTree::Branch>& branches, const Get& get)
 {
   vtkNew<Array> array;
   array->SetName(name);
@@ -138,14 +138,14 @@ vtkCoronary::CenterlineForm vtkCoronary::FormOf(vtkPolyData* data)
                                                         : CenterlineForm::Unknown;
 }
 
-coronary::CenterlineTree vtkCoronary::TreeOf(vtkPolyData* data, Radii radii)
+coronary::VesselTree vtkCoronary::TreeOf(vtkPolyData* data, Radii radii)
 {
   vtkDataArray* radius = RadiusFor(data, radii);
   vtkDataArray* groups = Column(data->GetCellData(), names::GroupIds, "cell");
   vtkDataArray* parents = Column(data->GetCellData(), names::ParentGroupIds, "cell");
   vtkDataArray* trees = data->GetCellData()->GetArray(names::TreeIds);
   vtkDataArray* segments = data->GetCellData()->GetArray(names::SegmentIds);
-  coronary::CenterlineTree tree;
+  coronary::VesselTree tree;
   const vtkIdType count = data->GetNumberOfPoints();
   for (vtkIdType i = 0; i < count; ++i)
   {
@@ -155,7 +155,7 @@ coronary::CenterlineTree vtkCoronary::TreeOf(vtkPolyData* data, Radii radii)
   ForEachLine(data,
     [&](vtkIdType cell, vtkIdList* ids)
     {
-      coronary::CenterlineTree::Branch branch;
+      coronary::VesselTree::Branch branch;
       branch.points.assign(ids->begin(), ids->end());
       branch.groupId = static_cast<int>(groups->GetComponent(cell, 0));
       branch.parentGroupId = static_cast<int>(parents->GetComponent(cell, 0));
@@ -196,9 +196,9 @@ std::vector<coronary::VmtkTract> vtkCoronary::TractsOf(vtkPolyData* data, Radii 
   return tracts;
 }
 
-void vtkCoronary::SetTree(vtkPolyData* data, const coronary::CenterlineTree& tree)
+void vtkCoronary::SetTree(vtkPolyData* data, const coronary::VesselTree& tree)
 {
-  using Branch = coronary::CenterlineTree::Branch;
+  using Branch = coronary::VesselTree::Branch;
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   for (const coronary::Vector3& point : tree.points)
