@@ -795,6 +795,6 @@ TEST(CoronaryPhantomSource, DefaultsAreThoseOfTheProxy)
     }
     ++compared;
   }
-  EXPECT_EQ(compared, 35);
+  EXPECT_EQ(compared, 25);
 }
 }

@@ -637,7 +637,7 @@ TEST(FrenetSweepSurface, Prints)
   vtkNew<vtkFrenetSweepSurface> filter;
   std::ostringstream text;
   filter->Print(text);
-  for (const char* name : { "EdgeRetreat", "EndNormalArrayName", "InputImageArrayName", "Frame" })
+  for (const char* name : { "Blending", "EndNormalArrayName", "InputImageArrayName", "Frame" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos);
   }

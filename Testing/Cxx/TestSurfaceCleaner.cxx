@@ -243,9 +243,9 @@ TEST(SurfaceCleaner, PrintsItsSettings)
   vtkNew<vtkSurfaceCleaner> filter;
   std::ostringstream text;
   filter->Print(text);
-  for (const char* name : { "MergeTolerance: 1e-06", "SmallestComponent: 0.01", "JoinDistance: 1",
-         "FillHoles: 1", "CapEnds: 1", "ResolveIntersections: 1", "MinimumAngle: 10",
-         "EntityArrayName: CellEntityIds" })
+  for (const char* name :
+    { "SmallestComponent: 0.01", "JoinDistance: 1", "FillHoles: 1", "CapEnds: 1",
+      "ResolveIntersections: 1", "MinimumAngle: 10", "EntityArrayName: CellEntityIds" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
