@@ -641,7 +641,7 @@ TEST(BiharmonicSkinWeightsFilter, PrintsItsSettings)
   std::ostringstream text;
   filter->Print(text);
   for (const char* name : { "Mode: 0", "Tolerance: 1e-06", "Iterations: 2000",
-         "Neighbourhood: 1.75", "Widen: 1", "Influences: 8", "Dense: 1", "CacheFolder: " })
+         "Neighbourhood: 1.75", "Influences: 8", "Dense: 1", "CacheFolder: " })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }

@@ -228,7 +228,7 @@ check_files() {
     '"name": "LCA"' '"name": "RCA"' '"position"'; do
     expect_text made/here/series.json "$text"
   done
-  expect_text made/here/truth/surface.pvd 'timestep="0.34999999999999998" file="surface_01.vtp"'
+  expect_text made/here/truth/surface.pvd 'timestep="0.35" group="" part="0" file="surface_01.vtp"'
   expect_text made/here/phase_00.mha "DimSize = 20 20 20"
   expect_text made/here/phase_00.mha "Offset = -40 -40 -40"
   for array in MaximumInscribedSphereRadius Abscissas SegmentIds Displacement Velocity GroupIds \

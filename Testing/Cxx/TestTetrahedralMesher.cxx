@@ -302,8 +302,8 @@ TEST(TetrahedralMesherPrints, ItsSettings)
   std::ostringstream text;
   filter->Print(text);
   for (const char* name : { "Backend: 0", "RadiusEdgeRatio: 1.4", "MinimumDihedralAngle: 15",
-         "MinimumVolume: 1e-07", "UnitLength: 1", "SizeFactor: 0", "Improve: 1", "Repair: 1",
-         "LeaveOutside: 0", "TimeLimit: 300", "EntityArrayName: CellEntityIds" })
+         "MinimumVolume: 1e-07", "SizeFactor: 0", "Repair: 1", "LeaveOutside: 0", "TimeLimit: 300",
+         "EntityArrayName: CellEntityIds" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
