@@ -250,10 +250,10 @@ std::string SkipReason(const DicomStructure& structure)
 void CheckPixelSize(const DicomFile& file)
 {
   // Encoders of constant images reach some hundreds.
-  constexpr std::uint64_t largestRatio = 10000;
+  constexpr std::uint64_t maximumRatio = 10000;
   const std::uint64_t expected = std::uint64_t(file.rows) * std::uint64_t(file.columns) *
     std::uint64_t(file.frames.size()) * std::uint64_t(file.bitsAllocated) / 8;
-  if (file.pixelBytes < (file.encapsulated ? expected / largestRatio : expected))
+  if (file.pixelBytes < (file.encapsulated ? expected / maximumRatio : expected))
   {
     throw std::runtime_error("'" + file.path + "' is truncated: expected " +
       std::to_string(expected) + " bytes of voxels, got " + std::to_string(file.pixelBytes) + ".");

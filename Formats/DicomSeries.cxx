@@ -599,12 +599,12 @@ void CheckComplete(const Stack& stack, const std::string& folder)
 std::string UnevenSlices(const Stack& stack, const std::vector<double>& sorted, double mean)
 {
   const double median = sorted[sorted.size() / 2];
-  double largest = 0.0;
+  double maximum = 0.0;
   std::vector<std::string> gaps;
   for (std::size_t s = 0; s < stack.size(); ++s)
   {
     const double even = stack.front().front().along + mean * static_cast<double>(s);
-    largest = std::max(largest, std::abs(stack[s].front().along - even));
+    maximum = std::max(maximum, std::abs(stack[s].front().along - even));
     const double gap = s > 0 ? stack[s].front().along - stack[s - 1].front().along : 0.0;
     if (gap > 1.5 * median)
     {
@@ -613,7 +613,7 @@ std::string UnevenSlices(const Stack& stack, const std::vector<double>& sorted, 
   }
   return "The slices are " + Text(sorted.front()) + " to " + Text(sorted.back()) +
     " mm apart; the mean, " + Text(mean) + " mm, is used, which puts slices up to " +
-    Text(largest) + " mm from their true positions." +
+    Text(maximum) + " mm from their true positions." +
     (gaps.empty() ? "" : " Slices seem to be missing: " + Join(gaps) + ".");
 }
 

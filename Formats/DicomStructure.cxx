@@ -31,10 +31,10 @@ bool IsWanted(std::uint32_t tag)
   return std::binary_search(std::begin(wanted), std::end(wanted), tag);
 }
 
-class Walker
+class Parser
 {
 public:
-  Walker(const std::string& path, DicomStructure& structure)
+  Parser(const std::string& path, DicomStructure& structure)
     : Path(path)
     , Structure(structure)
     , Stream(path, std::ios::binary)
@@ -58,10 +58,10 @@ public:
       return;
     }
     this->Structure.isDicom = true;
-    position = this->WalkMetaInformation(position);
+    position = this->ParseMetaInformation(position);
     this->SetSyntax(position);
     position =
-      this->WalkDataSet(position, this->Size, this->Explicit, 0, false, &this->Structure.data);
+      this->ParseDataSet(position, this->Size, this->Explicit, 0, false, &this->Structure.data);
     this->Bytes.resize(static_cast<std::size_t>(position));
     this->Structure.header = std::move(this->Bytes);
     this->Structure.bigEndian = this->BigEndian;
@@ -180,7 +180,7 @@ private:
   }
 
   // Group 0002 is explicit little endian whatever follows.
-  std::uint64_t WalkMetaInformation(std::uint64_t position)
+  std::uint64_t ParseMetaInformation(std::uint64_t position)
   {
     while (this->Has(position + 8) && this->Tag(position) >> 16 == 2)
     {
@@ -223,7 +223,7 @@ private:
   }
 
   // Returns where the data set ends: at `end`, behind its delimiter, or at the pixel data.
-  std::uint64_t WalkDataSet(std::uint64_t position, std::uint64_t end, bool isExplicit, int depth,
+  std::uint64_t ParseDataSet(std::uint64_t position, std::uint64_t end, bool isExplicit, int depth,
     bool delimited, DicomDataSet* into)
   {
     if (depth > DeepestNesting)
@@ -248,7 +248,7 @@ private:
         kept = &into->elements[element.tag];
         *kept = {};
       }
-      position = this->WalkValue(element, end, isExplicit, depth, kept);
+      position = this->ParseValue(element, end, isExplicit, depth, kept);
     }
     if (delimited)
     {
@@ -257,7 +257,7 @@ private:
     return position;
   }
 
-  std::uint64_t WalkValue(
+  std::uint64_t ParseValue(
     const Element& element, std::uint64_t end, bool isExplicit, int depth, DicomElement* kept)
   {
     const bool mayNest =
@@ -266,7 +266,7 @@ private:
     const bool inner = isExplicit && element.representation != "UN";
     if (element.length == UndefinedLength)
     {
-      return this->WalkItems(element.value, end, inner, depth + 1, true, mayNest, kept);
+      return this->ParseItems(element.value, end, inner, depth + 1, true, mayNest, kept);
     }
     const std::uint64_t last = element.value + element.length;
     if (last > end || last > this->Size)
@@ -275,7 +275,7 @@ private:
     }
     if (mayNest && this->BeginsWithItem(element))
     {
-      this->WalkItems(element.value, last, inner, depth + 1, false, true, kept);
+      this->ParseItems(element.value, last, inner, depth + 1, false, true, kept);
     }
     else if (kept)
     {
@@ -285,7 +285,7 @@ private:
     return last;
   }
 
-  std::uint64_t WalkItems(std::uint64_t position, std::uint64_t end, bool isExplicit, int depth,
+  std::uint64_t ParseItems(std::uint64_t position, std::uint64_t end, bool isExplicit, int depth,
     bool delimited, bool nested, DicomElement* kept)
   {
     while (position < end)
@@ -306,7 +306,7 @@ private:
       }
       if (item.length == UndefinedLength)
       {
-        position = this->WalkDataSet(item.value, end, isExplicit, depth, true, into);
+        position = this->ParseDataSet(item.value, end, isExplicit, depth, true, into);
         continue;
       }
       const std::uint64_t last = item.value + item.length;
@@ -316,7 +316,7 @@ private:
       }
       if (nested)
       {
-        this->WalkDataSet(item.value, last, isExplicit, depth, false, into);
+        this->ParseDataSet(item.value, last, isExplicit, depth, false, into);
       }
       position = last;
     }
@@ -347,7 +347,7 @@ private:
 DicomStructure ReadDicomStructure(const std::string& path)
 {
   DicomStructure structure;
-  Walker(path, structure).Run();
+  Parser(path, structure).Run();
   return structure;
 }
 }

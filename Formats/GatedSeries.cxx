@@ -61,15 +61,15 @@ std::string Text(const std::array<int, 3>& d)
 // The largest distance between the corners of two grids of equal dimensions.
 double CornerDistance(const ImageGrid& a, const ImageGrid& b)
 {
-  double largest = 0.0;
+  double maximum = 0.0;
   for (int corner = 0; corner < 8; ++corner)
   {
     const double i = (corner & 1) != 0 ? a.extent[1] : 0;
     const double j = (corner & 2) != 0 ? a.extent[3] : 0;
     const double k = (corner & 4) != 0 ? a.extent[5] : 0;
-    largest = std::max(largest, (a.IndexToWorld(i, j, k) - b.IndexToWorld(i, j, k)).norm());
+    maximum = std::max(maximum, (a.IndexToWorld(i, j, k) - b.IndexToWorld(i, j, k)).norm());
   }
-  return largest;
+  return maximum;
 }
 }
 

@@ -160,17 +160,17 @@ public:
     Json accessor = this->Accessor(Float, values.size() / components, TypeOf(components));
     if (bounds)
     {
-      std::vector<float> least(components, std::numeric_limits<float>::max());
-      std::vector<float> greatest(components, std::numeric_limits<float>::lowest());
+      std::vector<float> minimum(components, std::numeric_limits<float>::max());
+      std::vector<float> maximum(components, std::numeric_limits<float>::lowest());
       for (std::size_t n = 0; n < values.size(); ++n)
       {
-        float& low = least[n % components];
-        float& high = greatest[n % components];
+        float& low = minimum[n % components];
+        float& high = maximum[n % components];
         low = std::min(low, values[n]);
         high = std::max(high, values[n]);
       }
-      accessor["min"] = least;
-      accessor["max"] = greatest;
+      accessor["min"] = minimum;
+      accessor["max"] = maximum;
     }
     return this->Add(values, std::move(accessor));
   }
@@ -294,7 +294,7 @@ public:
       const Quaternion before = bone.parent < 0 ? Quaternion::Identity()
                                                 : this->Rest[static_cast<std::size_t>(bone.parent)];
       const Vector3 axis = before * Vector3::UnitY();
-      this->Rest[b] = (LeastRotation(axis, along) * before).normalized();
+      this->Rest[b] = (ShortestRotation(axis, along) * before).normalized();
     }
   }
 
@@ -806,7 +806,7 @@ private:
     for (const GltfKey& key : this->Keys)
     {
       phases.push_back(key.phase);
-      deviations.push_back(std::round(key.largestDeviation * 1e6) / 1e6);
+      deviations.push_back(std::round(key.maximumDeviation * 1e6) / 1e6);
     }
     return { { "unit", "m" }, { "axes", "+X left, +Y superior, +Z anterior" },
       { "source_axes", "LPS" }, { "source_unit", "mm" }, { "from_source", "(x, z, -y) / 1000" },
@@ -863,7 +863,7 @@ double GltfSkin::Deviation(
     "The deviation of a glTF skin needs as many bones and points as it has");
   const std::vector<EndMap> maps = EndMaps(this->Model.bones, motion);
   const auto count = static_cast<std::size_t>(this->Count);
-  double largest = 0.0;
+  double maximumDistance = 0.0;
   for (std::size_t n = 0; n < moved.size(); ++n)
   {
     Vector3 position = Vector3::Zero();
@@ -872,9 +872,9 @@ double GltfSkin::Deviation(
       position +=
         static_cast<double>(this->Weight[k]) * maps[this->Joint[k]](this->Model.points[n]);
     }
-    largest = std::max(largest, (position - moved[n]).norm());
+    maximumDistance = std::max(maximumDistance, (position - moved[n]).norm());
   }
-  return largest;
+  return maximumDistance;
 }
 
 std::string GltfBinary(const GltfModel& model, const GltfSkin& skin)

@@ -41,7 +41,7 @@ struct GltfKey
   double phase = 0.0;                ///< in units of the cycle
   std::vector<BoneTransform> motion; ///< one a bone
   /// Of the nodes' blend from the moved surface, as GltfSkin::Deviation tells; goes into `extras`.
-  double largestDeviation = 0.0; ///< mm
+  double maximumDeviation = 0.0; ///< mm
 };
 
 struct GltfModel
@@ -78,7 +78,7 @@ public:
   {
     return this->Weight;
   }                                                      ///< sum of a point 1; 0 if unused
-  float LargestDropped() const { return this->Dropped; } ///< sum of weights left out at a point
+  float MaximumDropped() const { return this->Dropped; } ///< sum of weights left out at a point
 
   /**
    * The greatest distance of the points, as the nodes place them, from given ones, mm.

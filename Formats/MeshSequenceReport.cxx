@@ -44,12 +44,12 @@ Json QualityOf(const MeshSequenceReport& report, const MeshSequenceReport::Phase
     row["inverted_tetrahedra"] = t.inverted.size();
     row["poor_tetrahedra"] = t.poor;
     row["poor_fraction"] = PoorFraction(report, phase);
-    row["least_volume_mm3"] = t.leastVolume;
-    row["least_volume_id"] = t.leastVolumeAt;
-    row["least_dihedral_angle_deg"] = t.leastDihedralAngle * Degrees;
-    row["least_dihedral_angle_id"] = t.leastDihedralAngleAt;
-    row["greatest_radius_edge_ratio"] = t.greatestRadiusEdgeRatio;
-    row["greatest_radius_edge_ratio_id"] = t.greatestRadiusEdgeRatioAt;
+    row["least_volume_mm3"] = t.minimumVolume;
+    row["least_volume_id"] = t.minimumVolumeAt;
+    row["least_dihedral_angle_deg"] = t.minimumDihedralAngle * Degrees;
+    row["least_dihedral_angle_id"] = t.minimumDihedralAngleAt;
+    row["greatest_radius_edge_ratio"] = t.maximumRadiusEdgeRatio;
+    row["greatest_radius_edge_ratio_id"] = t.maximumRadiusEdgeRatioAt;
     row["total_volume_mm3"] = t.totalVolume;
   }
   else
@@ -58,7 +58,7 @@ Json QualityOf(const MeshSequenceReport& report, const MeshSequenceReport::Phase
   }
   row["surface_area_mm2"] = phase.surface.area;
   row["degenerate_triangles"] = phase.surface.degenerate.size();
-  row["least_triangle_angle_deg"] = phase.surface.leastAngle * Degrees;
+  row["least_triangle_angle_deg"] = phase.surface.minimumAngle * Degrees;
   return row;
 }
 

@@ -284,8 +284,8 @@ VolumeHeader ReadNiftiHeader(const std::string& path)
     header.slope = n.slope;
     header.intercept = n.intercept;
   }
-  const double smallest = n.version2 ? 540 : 348;
-  if (!(n.offset >= smallest && n.offset <= 1e9))
+  const double minimum = n.version2 ? 540 : 348;
+  if (!(n.offset >= minimum && n.offset <= 1e9))
   {
     FormatError(path, "vox_offset is out of range");
   }

@@ -12,7 +12,7 @@ namespace coronary
 namespace
 {
 // Single precision, in which voxels are read, holds all whole numbers up to here.
-constexpr std::int64_t LargestLabel = std::int64_t(1) << 24;
+constexpr std::int64_t MaximumLabel = std::int64_t(1) << 24;
 
 // In one line, whatever it is.
 std::string Quoted(const std::string& text)
@@ -57,7 +57,7 @@ std::vector<Segment> SegmentsOf(
     };
     segment.layer = whole("Layer", static_cast<int>(segments.size()));
     segment.value = whole("LabelValue", 1);
-    if (segment.value > LargestLabel)
+    if (segment.value > MaximumLabel)
     {
       FormatError(path, prefix + "LabelValue is above 16777216");
     }
@@ -152,7 +152,7 @@ std::vector<Segment> SegmentationFile::Choose(const std::vector<std::string>& wa
         name.compare(0, prefix.size(), prefix) == 0 ? name.substr(prefix.size()) : name;
       double value = 0.0;
       if (!ParseNumber(text, value) || value != std::rint(value) || value < 1.0 ||
-        value > static_cast<double>(LargestLabel))
+        value > static_cast<double>(MaximumLabel))
       {
         FormatError(this->Name,
           "has no names of segments, so that " + Quoted(name) +

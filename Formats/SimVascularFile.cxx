@@ -14,7 +14,7 @@ namespace coronary
 {
 namespace
 {
-constexpr std::uint64_t LargestFile = 256u << 20;
+constexpr std::uint64_t MaximumFile = 256u << 20;
 Vector3 Vector(const XmlElement& xml)
 {
   return { xml.Number("x"), xml.Number("y"), xml.Number("z") };
@@ -255,6 +255,6 @@ std::string SimVascularContourText(const SimVascularContourGroup& group)
 std::string ReadSimVascularFile(const std::string& path)
 {
   RequireFile(path);
-  return ReadTextFile(path, "a path or contours", LargestFile);
+  return ReadTextFile(path, "a path or contours", MaximumFile);
 }
 }

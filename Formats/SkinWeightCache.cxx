@@ -117,12 +117,12 @@ void ForMembers(Weights& w, const Visit& visit)
   visit(w.residualEverywhere);
   visit(w.energy);
   visit(w.energyGap);
-  visit(w.largestSum);
-  visit(w.smallestSum);
+  visit(w.maximumSum);
+  visit(w.minimumSum);
   visit(w.constraintResidual);
   visit(w.fixedPoints);
   visit(w.samples);
-  visit(w.largestDomainShare);
+  visit(w.maximumDomainShare);
   visit(w.leftOut);
 }
 

@@ -7,7 +7,7 @@
 
 namespace coronary
 {
-std::string ReadTextFile(const std::string& path, const std::string& what, std::uint64_t largest)
+std::string ReadTextFile(const std::string& path, const std::string& what, std::uint64_t maximum)
 {
   std::ifstream file(path, std::ios::binary);
   if (!file)
@@ -16,11 +16,11 @@ std::string ReadTextFile(const std::string& path, const std::string& what, std::
   }
   std::string text;
   char block[65536];
-  while (text.size() <= largest && (file.read(block, sizeof(block)) || file.gcount() > 0))
+  while (text.size() <= maximum && (file.read(block, sizeof(block)) || file.gcount() > 0))
   {
     text.append(block, static_cast<std::size_t>(file.gcount()));
   }
-  if (text.size() > largest)
+  if (text.size() > maximum)
   {
     throw std::runtime_error("'" + path + "': is too large for " + what + ".");
   }

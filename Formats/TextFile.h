@@ -11,7 +11,7 @@
 namespace coronary
 {
 /// In bytes: a list or description of a hundred thousand entries is smaller.
-constexpr std::uint64_t LargestTextFile = 64u << 20;
+constexpr std::uint64_t MaximumTextFile = 64u << 20;
 
 /**
  * Reads a file, which may be a pipe, to its end. Callers that shall not wait for a pipe RequireFile() before.
@@ -20,7 +20,7 @@ constexpr std::uint64_t LargestTextFile = 64u << 20;
  * @throws std::runtime_error naming `path` when it can not be opened or read, or has more than `largest` bytes
  */
 std::string ReadTextFile(
-  const std::string& path, const std::string& what, std::uint64_t largest = LargestTextFile);
+  const std::string& path, const std::string& what, std::uint64_t maximum = MaximumTextFile);
 }
 
 #endif

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 namespace
 {
 // Deflate can not do better than this (zlib's technical details).
-constexpr std::uint64_t LargestDeflateRatio = 1032;
+constexpr std::uint64_t MaximumDeflateRatio = 1032;
 
 std::uint64_t NumberOfVoxels(const ImageGrid& grid)
 {
@@ -67,7 +67,7 @@ void CheckSizes(const VolumeHeader& header)
         std::to_string(expected / files) + " bytes of voxels, got " + std::to_string(available) +
         ".");
     }
-    if (header.compressed && expected / files / LargestDeflateRatio > size)
+    if (header.compressed && expected / files / MaximumDeflateRatio > size)
     {
       throw std::runtime_error("'" + file + "' is truncated: the header promises " +
         std::to_string(expected / files) + " bytes of voxels, more than its " +

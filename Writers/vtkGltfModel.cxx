@@ -89,6 +89,6 @@ void vtkGltfModel::AddPhase(vtkPointSet* mesh, double time)
   coronary::GltfKey key;
   key.phase = time;
   key.motion = vtkBoneMotion::MotionOf(mesh->GetFieldData());
-  key.largestDeviation = this->Skin->Deviation(key.motion, PositionsOf(mesh, this->Points));
+  key.maximumDeviation = this->Skin->Deviation(key.motion, PositionsOf(mesh, this->Points));
   this->Model.keys.push_back(std::move(key));
 }

@@ -49,11 +49,11 @@ std::vector<double> NumbersOf(const vtkMeshSequence::PhaseMesh& phase)
 {
   const coronary::TetrahedraQuality& t = phase.tetrahedra;
   const coronary::TrianglesQuality& s = phase.surface;
-  std::vector<double> numbers = { phase.time, static_cast<double>(t.poor), t.leastVolume,
-    static_cast<double>(t.leastVolumeAt), t.totalVolume, t.leastDihedralAngle,
-    static_cast<double>(t.leastDihedralAngleAt), t.greatestRadiusEdgeRatio,
-    static_cast<double>(t.greatestRadiusEdgeRatioAt), s.area, s.enclosedVolume, s.leastAngle,
-    static_cast<double>(s.leastAngleAt), static_cast<double>(t.inverted.size()) };
+  std::vector<double> numbers = { phase.time, static_cast<double>(t.poor), t.minimumVolume,
+    static_cast<double>(t.minimumVolumeAt), t.totalVolume, t.minimumDihedralAngle,
+    static_cast<double>(t.minimumDihedralAngleAt), t.maximumRadiusEdgeRatio,
+    static_cast<double>(t.maximumRadiusEdgeRatioAt), s.area, s.enclosedVolume, s.minimumAngle,
+    static_cast<double>(s.minimumAngleAt), static_cast<double>(t.inverted.size()) };
   numbers.insert(numbers.end(), t.inverted.begin(), t.inverted.end());
   numbers.insert(numbers.end(), s.degenerate.begin(), s.degenerate.end());
   return numbers;
@@ -67,17 +67,17 @@ void TakeNumbers(const std::vector<double>& numbers, coronary::MeshSequenceRepor
   coronary::TrianglesQuality& s = phase.surface;
   phase.time = *next++;
   t.poor = whole();
-  t.leastVolume = *next++;
-  t.leastVolumeAt = whole();
+  t.minimumVolume = *next++;
+  t.minimumVolumeAt = whole();
   t.totalVolume = *next++;
-  t.leastDihedralAngle = *next++;
-  t.leastDihedralAngleAt = whole();
-  t.greatestRadiusEdgeRatio = *next++;
-  t.greatestRadiusEdgeRatioAt = whole();
+  t.minimumDihedralAngle = *next++;
+  t.minimumDihedralAngleAt = whole();
+  t.maximumRadiusEdgeRatio = *next++;
+  t.maximumRadiusEdgeRatioAt = whole();
   s.area = *next++;
   s.enclosedVolume = *next++;
-  s.leastAngle = *next++;
-  s.leastAngleAt = whole();
+  s.minimumAngle = *next++;
+  s.minimumAngleAt = whole();
   const auto middle = next + 1 + static_cast<std::ptrdiff_t>(*next);
   t.inverted.assign(next + 1, middle);
   s.degenerate.assign(middle, numbers.end());
@@ -114,9 +114,9 @@ void FillTable(const coronary::MeshSequenceReport& report, vtkTable* table)
   const bool volume = report.tetrahedra > 0;
   std::vector<std::pair<const char*, std::vector<double>>> columns = { { "Phase", {} },
     { names::PhaseTime, {} }, { names::InvertedTetrahedra, {} }, { "PoorTetrahedra", {} },
-    { names::PoorFraction, {} }, { names::LeastVolume, {} }, { names::LeastDihedralAngle, {} },
-    { names::GreatestRadiusEdgeRatio, {} }, { names::TotalVolume, {} }, { names::SurfaceArea, {} },
-    { "DegenerateTriangles", {} } };
+    { names::PoorFraction, {} }, { names::MeshMinimumVolume, {} },
+    { names::MeshMinimumDihedralAngle, {} }, { names::MeshMaximumRadiusEdgeRatio, {} },
+    { names::TotalVolume, {} }, { names::SurfaceArea, {} }, { "DegenerateTriangles", {} } };
   for (std::size_t k = 0; k < report.phases.size(); ++k)
   {
     const auto& phase = report.phases[k];
@@ -124,7 +124,7 @@ void FillTable(const coronary::MeshSequenceReport& report, vtkTable* table)
     const double values[] = { static_cast<double>(k), phase.time,
       static_cast<double>(t.inverted.size()), static_cast<double>(t.poor),
       volume ? static_cast<double>(t.poor) / static_cast<double>(report.tetrahedra) : 0.0,
-      t.leastVolume, t.leastDihedralAngle, t.greatestRadiusEdgeRatio,
+      t.minimumVolume, t.minimumDihedralAngle, t.maximumRadiusEdgeRatio,
       volume ? t.totalVolume : phase.surface.enclosedVolume, phase.surface.area,
       static_cast<double>(phase.surface.degenerate.size()) };
     for (std::size_t c = 0; c < columns.size(); ++c)

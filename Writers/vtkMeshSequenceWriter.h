@@ -27,8 +27,8 @@
  * - NAME_quality.csv, and NAME.json: quality, faces and files
  *
  * Tetrahedra come out with `TetrahedronVolume`, `MinimumDihedralAngle`, `RadiusEdgeRatio` of the phase, and field
- * data `PhaseTime`, `InvertedTetrahedra` (ids), `PoorFraction`, `LeastVolume`, `LeastDihedralAngle`,
- * `GreatestRadiusEdgeRatio`, `TotalVolume`, `SurfaceArea`. A mesh whose tetrahedra are nearly all inside out at the
+ * data `PhaseTime`, `InvertedTetrahedra` (ids), `PoorFraction`, `MeshMinimumVolume`, `MeshMinimumDihedralAngle`,
+ * `MeshMaximumRadiusEdgeRatio`, `TotalVolume`, `SurfaceArea`. A mesh whose tetrahedra are nearly all inside out at the
  * first phase has another order of corners, and is turned over at all phases.
  *
  * With PrefixFiles off, `NAME_` is left out: surface_000.vtp. Digits is the least number of digits of a phase.
@@ -243,7 +243,7 @@ public:
 
   /**
    * Of the last Write(): a row a phase with `Phase`, `PhaseTime`, `InvertedTetrahedra`, `PoorTetrahedra`,
-   * `PoorFraction`, `LeastVolume` (mm^3), `LeastDihedralAngle` (radians), `GreatestRadiusEdgeRatio`,
+   * `PoorFraction`, `MeshMinimumVolume` (mm^3), `MeshMinimumDihedralAngle` (radians), `MeshMaximumRadiusEdgeRatio`,
    * `TotalVolume` (mm^3; of a surface, what it encloses), `SurfaceArea` (mm^2), `DegenerateTriangles`. Empty after a failure.
    */
   vtkTable* GetQuality();

@@ -203,10 +203,10 @@ void AddFields(const Files& shared, const PhaseMesh& phase, vtkDataSet* data)
     fields->AddArray(inverted);
     AddNumber(fields, names::PoorFraction,
       static_cast<double>(quality.poor) / static_cast<double>(shared.topology.tetrahedra.size()));
-    AddNumber(fields, names::LeastVolume, quality.leastVolume);
+    AddNumber(fields, names::MeshMinimumVolume, quality.minimumVolume);
     AddNumber(fields, names::TotalVolume, quality.totalVolume);
-    AddNumber(fields, names::LeastDihedralAngle, quality.leastDihedralAngle);
-    AddNumber(fields, names::GreatestRadiusEdgeRatio, quality.greatestRadiusEdgeRatio);
+    AddNumber(fields, names::MeshMinimumDihedralAngle, quality.minimumDihedralAngle);
+    AddNumber(fields, names::MeshMaximumRadiusEdgeRatio, quality.maximumRadiusEdgeRatio);
   }
   data->SetFieldData(fields);
 }
@@ -524,7 +524,7 @@ void GltfAnimation::Finish(coronary::MeshSequenceReport& report)
 }
 }
 
-Files::Files(std::string ofReport, std::string begin, int leastDigits, std::size_t phaseCount,
+Files::Files(std::string ofReport, std::string begin, int minimumDigits, std::size_t phaseCount,
   Topology same, std::vector<coronary::MeshSequenceReport::Face> named, bool weights,
   coronary::StagedFolder& to)
   : name(std::move(ofReport))
@@ -535,7 +535,7 @@ Files::Files(std::string ofReport, std::string begin, int leastDigits, std::size
   , surface(this->topology.PatchOf(0))
   , Folder(to)
   , Phases(phaseCount)
-  , Digits(static_cast<std::size_t>(leastDigits))
+  , Digits(static_cast<std::size_t>(minimumDigits))
 {
   if (!this->topology.tetrahedra.empty())
   {

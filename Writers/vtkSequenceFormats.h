@@ -30,7 +30,7 @@ public:
   /// @param ofReport its name, without its ending
   /// @param begin   what the names of files other than the report begin with
   /// @param to      where they are written to
-  Files(std::string ofReport, std::string begin, int leastDigits, std::size_t phaseCount,
+  Files(std::string ofReport, std::string begin, int minimumDigits, std::size_t phaseCount,
     Topology same, std::vector<coronary::MeshSequenceReport::Face> named, bool weights,
     coronary::StagedFolder& to);
 

@@ -92,13 +92,13 @@ void ReadReport(const std::string& path, MovingModel& model)
 MovingModel::Tracking MovingModel::TrackingAt(double time, double tolerance) const
 {
   // A phase that more of the tree was lost in was not tracked really.
-  constexpr double LeastShare = 0.5;
+  constexpr double MinimumShare = 0.5;
   for (std::size_t k = 0; k < this->trackedTimes.size(); ++k)
   {
     if (std::abs(this->trackedTimes[k] - time) <= tolerance)
     {
-      return k < this->trackedShare.size() && this->trackedShare[k] < LeastShare ? Tracking::Lost
-                                                                                 : Tracking::Seen;
+      return k < this->trackedShare.size() && this->trackedShare[k] < MinimumShare ? Tracking::Lost
+                                                                                   : Tracking::Seen;
     }
   }
   return Tracking::None;

@@ -368,13 +368,13 @@ private:
     const double speed =
       MeanSpeed(this->PolyData(vtkCoronaryPhantomSource::TreePort, time, 0.0, 0.0));
     if (this->Series.seeds.empty() || (this->ReferenceIsLost && !isLost) ||
-      (this->ReferenceIsLost == isLost && speed < this->LeastSpeed))
+      (this->ReferenceIsLost == isLost && speed < this->MinimumSpeed))
     {
       this->Series.seeds =
         SeedsOf(this->PolyData(vtkCoronaryPhantomSource::OstiaPort, time, 0.0, 0.0));
       this->ReferenceTime = time;
       this->ReferenceIsLost = isLost;
-      this->LeastSpeed = speed;
+      this->MinimumSpeed = speed;
     }
   }
 
@@ -443,7 +443,7 @@ private:
   std::unique_ptr<CtScanner> Scanner;       ///< none: images by a formula
   double ReferenceTime = 0.0;
   bool ReferenceIsLost = false;
-  double LeastSpeed = 0.0;
+  double MinimumSpeed = 0.0;
 };
 
 void PhantomJob::Run()

@@ -253,7 +253,7 @@ void RunOptions::DeclareVessels(Declaration& all)
     .Option()
     .allow_extra_args(false);
   all
-    .Add("--largest-radius", "largest_radius", settings.largestRadius, "MM",
+    .Add("--largest-radius", "largest_radius", settings.maximumRadius, "MM",
       "Blood that a ball of this radius fits into is aorta or chamber, mm")
     .Between(1.0, 50.0)
     .ShowDefault();
@@ -269,7 +269,7 @@ void RunOptions::DeclareVessels(Declaration& all)
     "March wherever a vessel is to be seen, not only inside the segmented lumen: some thin "
     "vessels are followed farther, at the risk of others' lumens, and slower");
   all
-    .Add("--least-branch", "least_branch", settings.leastBranch, "MM",
+    .Add("--least-branch", "least_branch", settings.minimumBranch, "MM",
       "Shorter branches are none, mm; 0: ten voxels")
     .Between(0.0, 1000.0)
     .ShowDefault();

@@ -47,11 +47,11 @@ struct RunSettings
   std::string seedFile; ///< markups
   std::string mask;
   std::vector<std::string> maskSegments;
-  double largestRadius = 4.5;
+  double maximumRadius = 4.5;
   std::vector<double> window;
 
   bool beyondMask = false;
-  double leastBranch = 0.0;
+  double minimumBranch = 0.0;
   int centerlineSteps = 5000000;
   bool labels = true;
   bool partial = false;

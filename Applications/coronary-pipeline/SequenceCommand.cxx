@@ -256,7 +256,7 @@ std::string SequenceJob::Summary(vtkTable* quality) const
   double angle[2];
   double volume[2];
   double poorest[2];
-  column(vtkCoronaryArrayNames::LeastDihedralAngle)->GetRange(angle);
+  column(vtkCoronaryArrayNames::MeshMinimumDihedralAngle)->GetRange(angle);
   column(vtkCoronaryArrayNames::TotalVolume)->GetRange(volume);
   column(vtkCoronaryArrayNames::PoorFraction)->GetRange(poorest);
   char text[240];

@@ -17,8 +17,8 @@ namespace coronary
 {
 namespace
 {
-constexpr double LargestPosition = 65535.0;
-constexpr double LargestDistance = 32767.0;
+constexpr double MaximumPosition = 65535.0;
+constexpr double MaximumDistance = 32767.0;
 constexpr std::int16_t UnknownDistance = -32768;
 
 using Json = nlohmann::ordered_json;
@@ -145,20 +145,20 @@ struct PositionGrid
     constexpr double Huge = std::numeric_limits<double>::max();
     for (std::size_t axis = 0; axis < 3; ++axis)
     {
-      double least = Huge;
-      double greatest = -Huge;
+      double minimum = Huge;
+      double maximum = -Huge;
       for (const ReviewFrame& frame : series.frames)
       {
         for (std::size_t k = axis; k < frame.positions.size(); k += 3)
         {
-          least = std::min(least, double(frame.positions[k]));
-          greatest = std::max(greatest, double(frame.positions[k]));
+          minimum = std::min(minimum, double(frame.positions[k]));
+          maximum = std::max(maximum, double(frame.positions[k]));
         }
       }
-      if (least <= greatest)
+      if (minimum <= maximum)
       {
-        this->low[axis] = least;
-        this->step[axis] = (greatest - least) / LargestPosition;
+        this->low[axis] = minimum;
+        this->step[axis] = (maximum - minimum) / MaximumPosition;
       }
     }
   }
@@ -172,7 +172,7 @@ struct PositionGrid
       const double number = this->step[axis] > 0.0
         ? std::round((double(positions[k]) - this->low[axis]) / this->step[axis])
         : 0.0;
-      numbers[k] = static_cast<std::uint16_t>(std::clamp(number, 0.0, LargestPosition));
+      numbers[k] = static_cast<std::uint16_t>(std::clamp(number, 0.0, MaximumPosition));
     }
     return numbers;
   }
@@ -180,16 +180,15 @@ struct PositionGrid
 
 double DistanceStep(const ReviewSeries& series)
 {
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (const ReviewFrame& frame : series.frames)
   {
     for (const float distance : frame.distances)
     {
-      greatest =
-        std::isfinite(distance) ? std::max(greatest, std::abs(double(distance))) : greatest;
+      maximum = std::isfinite(distance) ? std::max(maximum, std::abs(double(distance))) : maximum;
     }
   }
-  return greatest > 0.0 ? greatest / LargestDistance : 1.0;
+  return maximum > 0.0 ? maximum / MaximumDistance : 1.0;
 }
 
 std::vector<std::uint16_t> DistanceNumbers(const std::vector<float>& distances, double step)
@@ -199,7 +198,7 @@ std::vector<std::uint16_t> DistanceNumbers(const std::vector<float>& distances, 
   {
     const std::int16_t number = std::isfinite(distances[k])
       ? static_cast<std::int16_t>(
-          std::clamp(std::round(distances[k] / step), -LargestDistance, LargestDistance))
+          std::clamp(std::round(distances[k] / step), -MaximumDistance, MaximumDistance))
       : UnknownDistance;
     numbers[k] = static_cast<std::uint16_t>(number);
   }
@@ -375,8 +374,8 @@ std::int64_t DefaultReviewTriangles(std::int64_t phases)
   // A surface of the pipeline as it is; twenty phases of two make a page of about 15 MB, and so do more phases.
   constexpr std::int64_t Most = 150000;
   constexpr std::int64_t OfAllPhases = 3000000;
-  constexpr std::int64_t Least = 4000;
-  return std::clamp(OfAllPhases / std::max<std::int64_t>(1, phases), Least, Most);
+  constexpr std::int64_t Minimum = 4000;
+  return std::clamp(OfAllPhases / std::max<std::int64_t>(1, phases), Minimum, Most);
 }
 
 void WebReview::Add(const CaseEvaluation& evaluation, const ReviewCase& shapes)

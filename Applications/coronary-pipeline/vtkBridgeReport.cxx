@@ -27,7 +27,7 @@ std::pair<std::string, double> NearestVessel(vtkPolyData* tree, const Vector3& p
 {
   auto* labels = vtkStringArray::SafeDownCast(
     tree->GetCellData()->GetAbstractArray(vtkCoronaryArrayNames::SegmentLabel));
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   vtkIdType nearest = -1;
   for (vtkIdType cell = 0; cell < tree->GetNumberOfCells(); ++cell)
   {
@@ -35,15 +35,15 @@ std::pair<std::string, double> NearestVessel(vtkPolyData* tree, const Vector3& p
     for (vtkIdType n = 0; n < points->GetNumberOfIds(); ++n)
     {
       const double distance = (Vector3(tree->GetPoint(points->GetId(n))) - place).norm();
-      if (distance < least)
+      if (distance < minimum)
       {
-        least = distance;
+        minimum = distance;
         nearest = cell;
       }
     }
   }
   const std::string name = labels && nearest >= 0 ? std::string(labels->GetValue(nearest)) : "";
-  return { name.empty() ? "unnamed branch" : name, least };
+  return { name.empty() ? "unnamed branch" : name, minimum };
 }
 
 nlohmann::ordered_json Place(const Vector3& p)

@@ -493,7 +493,7 @@ void DrawOverlayGrid(const EvaluationScene& scene, const std::string& path)
 namespace
 {
 /// Dark to bright, even steps to the eye (viridis), in the order of the distance.
-vtkSmartPointer<vtkColorTransferFunction> DistanceColours(double greatest)
+vtkSmartPointer<vtkColorTransferFunction> DistanceColours(double maximum)
 {
   constexpr std::array<std::array<double, 3>, 6> Viridis = { { { 0.267, 0.005, 0.329 },
     { 0.254, 0.265, 0.530 }, { 0.164, 0.471, 0.558 }, { 0.135, 0.659, 0.518 },
@@ -501,7 +501,7 @@ vtkSmartPointer<vtkColorTransferFunction> DistanceColours(double greatest)
   auto map = vtkSmartPointer<vtkColorTransferFunction>::New();
   for (std::size_t k = 0; k < Viridis.size(); ++k)
   {
-    const double at = greatest * static_cast<double>(k) / (Viridis.size() - 1);
+    const double at = maximum * static_cast<double>(k) / (Viridis.size() - 1);
     map->AddRGBPoint(at, Viridis[k][0], Viridis[k][1], Viridis[k][2]);
   }
   map->SetNanColor(0.7, 0.7, 0.7);
@@ -523,12 +523,12 @@ double RoundUp(double value)
 }
 
 void DrawColourBar(PictureCanvas& page, int x, int y, int width, int height,
-  vtkColorTransferFunction* map, double greatest)
+  vtkColorTransferFunction* map, double maximum)
 {
   for (int column = 0; column < width; ++column)
   {
     double rgb[3];
-    map->GetColor(greatest * (column + 0.5) / width, rgb);
+    map->GetColor(maximum * (column + 0.5) / width, rgb);
     page.Fill(x + column, y, 1, height,
       { static_cast<unsigned char>(std::lround(255.0 * rgb[0])),
         static_cast<unsigned char>(std::lround(255.0 * rgb[1])),
@@ -542,7 +542,7 @@ void DrawColourBar(PictureCanvas& page, int x, int y, int width, int height,
     page.Fill(at, y + height, 2, 8, Black);
     char text[32];
     std::snprintf(
-      text, sizeof(text), "%s%.3g", k == Ticks ? "\xE2\x89\xA5 " : "", greatest * k / Ticks);
+      text, sizeof(text), "%s%.3g", k == Ticks ? "\xE2\x89\xA5 " : "", maximum * k / Ticks);
     page.Write(at, y + height + 26, text, 26, Black, Anchor::Centre);
   }
 }
@@ -617,8 +617,8 @@ void DrawDistances(const EvaluationScene& scene, const std::string& path)
     const std::vector<double>& one = distances.back().pointDistancesA;
     all.insert(all.end(), one.begin(), one.end());
   }
-  const double greatest = DistanceRange(all);
-  const vtkSmartPointer<vtkColorTransferFunction> map = DistanceColours(greatest);
+  const double maximum = DistanceRange(all);
+  const vtkSmartPointer<vtkColorTransferFunction> map = DistanceColours(maximum);
 
   constexpr int Gap = 14;
   constexpr int Header = 90;
@@ -657,7 +657,7 @@ void DrawDistances(const EvaluationScene& scene, const std::string& path)
   }
   const int bar = Margin + Header + rows * (height + Gap) + 40;
   page.Write(PageWidth / 2 - 520, bar + 20, "distance (mm)", 30, Black, Anchor::Right);
-  DrawColourBar(page, PageWidth / 2 - 480, bar, 960, 40, map, greatest);
+  DrawColourBar(page, PageWidth / 2 - 480, bar, 960, 40, map, maximum);
   page.WritePng(path);
 }
 

@@ -72,9 +72,9 @@ std::string NameOf(int segmentId)
 Json Describe(const Stenosis& lesion)
 {
   return { { "vessel", NameOf(lesion.segmentId) }, { "position", Position(lesion.position) },
-    { "abscissa_start_mm", lesion.abscissaStart }, { "abscissa_least_mm", lesion.abscissaLeast },
+    { "abscissa_start_mm", lesion.abscissaStart }, { "abscissa_least_mm", lesion.abscissaMinimum },
     { "abscissa_end_mm", lesion.abscissaEnd }, { "length_mm", lesion.length },
-    { "least_diameter_mm", lesion.leastDiameter },
+    { "least_diameter_mm", lesion.minimumDiameter },
     { "reference_diameter_mm", lesion.referenceDiameter },
     { "population_diameter_mm",
       lesion.populationDiameter > 0.0 ? Json(lesion.populationDiameter) : Json() },
@@ -91,8 +91,8 @@ std::string Row(const Stenosis& lesion)
   std::snprintf(row.data(), row.size(),
     "%s,%.2f,%.2f,%.2f,%.1f,%.1f,%.1f,%.1f,%.2f,%.2f,%.1f,%.0f,%.0f,%.0f,%.0f,%s,%.2f,%d,%d\n",
     NameOf(lesion.segmentId).c_str(), lesion.position[0], lesion.position[1], lesion.position[2],
-    lesion.abscissaStart, lesion.abscissaLeast, lesion.abscissaEnd, lesion.length,
-    lesion.leastDiameter, lesion.referenceDiameter, lesion.populationDiameter,
+    lesion.abscissaStart, lesion.abscissaMinimum, lesion.abscissaEnd, lesion.length,
+    lesion.minimumDiameter, lesion.referenceDiameter, lesion.populationDiameter,
     100.0 * lesion.degree, 100.0 * lesion.areaDegree, 100.0 * lesion.degreeLow,
     100.0 * lesion.degreeHigh, LesionKindName(lesion.kind), lesion.confidence,
     lesion.bridged ? 1 : 0, lesion.interpolated ? 1 : 0);

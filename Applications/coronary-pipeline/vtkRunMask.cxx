@@ -109,7 +109,7 @@ Json MakeGivenMask(RunStep& step)
   MaskTrees found;
   try
   {
-    found = FindMaskTrees(mask.grid, mask.voxels, settings.largestRadius,
+    found = FindMaskTrees(mask.grid, mask.voxels, settings.maximumRadius,
       [&](double fraction)
       {
         step.progress(0.6 * fraction);

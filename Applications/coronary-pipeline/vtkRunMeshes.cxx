@@ -75,7 +75,7 @@ bool PlaceIn(const std::string& message, double place[3])
 }
 }
 
-void RequireVessels(vtkPolyData* tree, const std::string& path, double largestRadius)
+void RequireVessels(vtkPolyData* tree, const std::string& path, double maximumRadius)
 {
   vtkDataArray* radii = tree->GetPointData()->GetArray(names::Radius);
   vtkIdType widest = 0;
@@ -83,7 +83,7 @@ void RequireVessels(vtkPolyData* tree, const std::string& path, double largestRa
   {
     widest = radii->GetTuple1(n) > radii->GetTuple1(widest) ? n : widest;
   }
-  const double limit = WidestVessel * largestRadius;
+  const double limit = WidestVessel * maximumRadius;
   if (radii->GetTuple1(widest) > limit)
   {
     double p[3];
@@ -92,7 +92,7 @@ void RequireVessels(vtkPolyData* tree, const std::string& path, double largestRa
     std::snprintf(text, sizeof(text),
       "' has a radius of %.1f mm at (%.1f, %.1f, %.1f), more than twice --largest-radius (%g mm): "
       "the tree runs into a chamber or a great vessel",
-      radii->GetTuple1(widest), p[0], p[1], p[2], largestRadius);
+      radii->GetTuple1(widest), p[0], p[1], p[2], maximumRadius);
     throw std::runtime_error(
       "'" + path + text + "; give seeds, a window, larger scales or another --largest-radius.");
   }

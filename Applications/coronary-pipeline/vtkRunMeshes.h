@@ -21,10 +21,10 @@ namespace coronary
 /**
  * A tree in images that runs into a chamber has no wall that could be swept in finite time.
  * @param path           of the tree, for the message
- * @param largestRadius  of a vessel, mm
+ * @param maximumRadius  of a vessel, mm
  * @throws std::runtime_error naming the widest place
  */
-void RequireVessels(vtkPolyData* tree, const std::string& path, double largestRadius);
+void RequireVessels(vtkPolyData* tree, const std::string& path, double maximumRadius);
 
 /// `repairs`: {vessel, what, place} and `left_out`: {vessel, reason, place, length_mm} of a swept surface.
 void DescribeChanges(vtkPolyData* surface, nlohmann::ordered_json& numbers);

@@ -181,7 +181,7 @@ Json MakeMotion(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
   vtkMessageTrap& messages = step.input.Messages;
-  const std::string still = step.input.WhyStill();
+  const std::string still = step.input.ReasonWithoutMotion();
   if (!still.empty())
   {
     return MakeRest(step, still);

@@ -10,7 +10,7 @@
 namespace coronary
 {
 /**
- * Tracks the tree through the phases and writes motion/. Where RunInput::WhyStill() names a reason, every
+ * Tracks the tree through the phases and writes motion/. Where RunInput::ReasonWithoutMotion() names a reason, every
  * moment has the pose at rest, a warning says so, and the report has `at_rest`.
  * @return what the report tells of it, on the first rank @throws std::runtime_error, Cancelled
  */

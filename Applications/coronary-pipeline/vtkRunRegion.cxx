@@ -37,8 +37,8 @@ void RangeOf(vtkImageData* image, double range[2])
     vtkCoronary::ScalarImageOf(image, image->GetPointData()->GetScalars(), copy);
   const std::int64_t slices = voxels.Dimensions()[2];
   const std::int64_t slice = voxels.NumberOfVoxels() / std::max<std::int64_t>(1, slices);
-  std::vector<double> least(static_cast<std::size_t>(slices), VTK_DOUBLE_MAX);
-  std::vector<double> greatest(static_cast<std::size_t>(slices), VTK_DOUBLE_MIN);
+  std::vector<double> minimum(static_cast<std::size_t>(slices), VTK_DOUBLE_MAX);
+  std::vector<double> maximum(static_cast<std::size_t>(slices), VTK_DOUBLE_MIN);
   std::visit(
     [&](const auto* values)
     {
@@ -55,20 +55,20 @@ void RangeOf(vtkImageData* image, double range[2])
               low = values[v] < low ? values[v] : low;
               high = values[v] > high ? values[v] : high;
             }
-            least[k] = low;
-            greatest[k] = high;
+            minimum[k] = low;
+            maximum[k] = high;
           }
         });
     },
     voxels.values);
-  range[0] = slices > 0 ? *std::min_element(least.begin(), least.end()) : VTK_DOUBLE_MAX;
-  range[1] = slices > 0 ? *std::max_element(greatest.begin(), greatest.end()) : VTK_DOUBLE_MIN;
+  range[0] = slices > 0 ? *std::min_element(minimum.begin(), minimum.end()) : VTK_DOUBLE_MAX;
+  range[1] = slices > 0 ? *std::max_element(maximum.begin(), maximum.end()) : VTK_DOUBLE_MIN;
 }
 
 void RequireOstia(const RunStep& step, const std::vector<double>& confidences)
 {
   const auto best = std::max_element(confidences.begin(), confidences.end());
-  if (best == confidences.end() || *best >= LeastOstialConfidence)
+  if (best == confidences.end() || *best >= MinimumOstialConfidence)
   {
     return;
   }
@@ -95,7 +95,7 @@ void FindHeart(RunStep& step)
   RangeOf(image, range);
   // With c measured the region would have a say in it.
   if (!input.Seeds.empty() || input.HasMasks() || settings.beyondMask || !(settings.c > 0.0) ||
-    range[1] - range[0] < LeastRangeOfHU)
+    range[1] - range[0] < MinimumRangeOfHU)
   {
     return;
   }

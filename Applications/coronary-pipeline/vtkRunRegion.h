@@ -16,13 +16,13 @@ class vtkImageData;
 namespace coronary
 {
 /// Images with fewer values between the least and the greatest are in another unit than HU.
-constexpr double LeastRangeOfHU = 400.0;
+constexpr double MinimumRangeOfHU = 400.0;
 
 /// The least and the greatest value; VTK's own way to them took more than a second of a run.
 void RangeOf(vtkImageData* image, double range[2]);
 
 /// Ostia that are all less sure than this are none: nine such runs of ten go through something else.
-constexpr double LeastOstialConfidence = 0.1;
+constexpr double MinimumOstialConfidence = 0.1;
 
 /**
  * Ends a run whose ostia were looked for and can not be believed.

@@ -105,7 +105,7 @@ namespace
 constexpr double SurfaceSnapDistance = 3.0;
 
 /// Voxels, mm, in which coronary arteries can still be followed.
-constexpr double LargestVoxel = 1.25;
+constexpr double MaximumVoxel = 1.25;
 
 /// The number of the phase at a time.
 int PhaseAt(vtkGatedImageReader* reader, double time)
@@ -279,18 +279,18 @@ bool DoubtImage(RunStep& step)
   const std::string name = "'" + step.input.Chosen->image + "'";
   double spacing[3];
   image->GetSpacing(spacing);
-  const double largest = *std::max_element(spacing, spacing + 3);
-  if (largest > LargestVoxel)
+  const double maximum = *std::max_element(spacing, spacing + 3);
+  if (maximum > MaximumVoxel)
   {
-    step.warnings.push_back(name + " has voxels of " + Format(largest) +
-      " mm: arteries narrower than " + Format(2.0 * largest) +
+    step.warnings.push_back(name + " has voxels of " + Format(maximum) +
+      " mm: arteries narrower than " + Format(2.0 * maximum) +
       " mm are not resolved, and will be missing or end early; take a reconstruction of at most " +
       Format(0.7) + " mm");
   }
   double range[2];
   RangeOf(image, range);
   const bool unknown =
-    range[1] - range[0] < LeastRangeOfHU && step.input.Settings.c == RunSettings().c;
+    range[1] - range[0] < MinimumRangeOfHU && step.input.Settings.c == RunSettings().c;
   if (unknown)
   {
     step.warnings.push_back(name + " has values from " + Format(range[0]) + " to " +
@@ -361,7 +361,7 @@ void Segment(const RunStep& step, vtkSmartPointer<vtkImageData>& mask,
     segmentation->AddSeed(given[n], given[n + 1], given[n + 2]);
   }
   segmentation->SetKnownOstia(step.input.Ostia);
-  segmentation->SetLargestRadius(settings.largestRadius);
+  segmentation->SetMaximumRadius(settings.maximumRadius);
   if (!settings.window.empty())
   {
     segmentation->AutomaticWindowOff();
@@ -554,7 +554,7 @@ Json MakeCenterline(RunStep& step)
   Json numbers = { { "file", "centerline.vtp" }, { "bifurcations_file", "bifurcations.vtp" },
     { "lines_file", "centerline_lines.vtp" }, { "status_file", "status.csv" } };
   vtkNew<vtkFastMarchingCenterline> centerline;
-  centerline->SetMinimumBranchLength(settings.leastBranch);
+  centerline->SetMinimumBranchLength(settings.minimumBranch);
   centerline->SetStepLimit(settings.centerlineSteps);
   vtkSmartPointer<vtkPolyData> seeds;
   if (step.input.IsSurface())
@@ -644,7 +644,7 @@ Json MakeCenterline(RunStep& step)
       step.warnings.push_back(warning);
     }
   }
-  // Of a surface without seeds every piece is a tree, also crumbs without a vessel.
+  // Of a surface without seeds every piece is a tree, also fragments without a vessel.
   numbers["lost"] =
     step.input.IsSurface() && step.input.Seeds.empty() ? Json::array() : TreesNotFound(trees);
   numbers["checks"] = DescribeChecks(tree);
@@ -675,7 +675,7 @@ Json MakeSurface(RunStep& step)
   const auto tree = ReadTree(step);
   if (!step.input.IsSurface())
   {
-    RequireVessels(tree, PathOf(step, "centerline.vtp"), settings.largestRadius);
+    RequireVessels(tree, PathOf(step, "centerline.vtp"), settings.maximumRadius);
   }
   if (given)
   {
@@ -748,8 +748,9 @@ Json MakeVolume(RunStep& step)
       backend && backend->GetNumberOfValues() > 0 ? std::string(backend->GetValue(0))
                                                   : std::string() },
     { "tetrahedra", volume->GetNumberOfCells() }, { "points", volume->GetNumberOfPoints() },
-    { "least_dihedral_angle_rad", Numbers(volume, vtkCoronaryArrayNames::LeastDihedralAngle) },
-    { "least_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::LeastVolume) },
+    { "least_dihedral_angle_rad",
+      Numbers(volume, vtkCoronaryArrayNames::MeshMinimumDihedralAngle) },
+    { "least_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::MeshMinimumVolume) },
     { "total_volume_mm3", Numbers(volume, vtkCoronaryArrayNames::TotalVolume) },
     { "tries", Numbers(volume, vtkCoronaryArrayNames::Tries) }, { "helped_by", helped } };
 }
@@ -949,7 +950,7 @@ std::vector<std::string> RunInput::Files() const
   return files;
 }
 
-std::string RunInput::WhyStill() const
+std::string RunInput::ReasonWithoutMotion() const
 {
   if (this->IsSurface() || this->IsMask())
   {

@@ -55,7 +55,7 @@ public:
   bool HasMasks() const;
 
   /// Why there is no motion in it; empty when there is.
-  std::string WhyStill() const;
+  std::string ReasonWithoutMotion() const;
 
   const RunSettings& Settings;
   vtkMessageTrap& Messages;

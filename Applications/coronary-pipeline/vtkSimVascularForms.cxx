@@ -38,7 +38,7 @@ constexpr const char* Path = "Path";
 constexpr const char* SectionArea = "CenterlineSectionArea";
 
 /// A branch between forks, with its own points: the first one is that of the fork.
-struct Stretch
+struct BranchPath
 {
   std::vector<Vector3> points;
   std::vector<double> radius;
@@ -48,7 +48,7 @@ struct Stretch
 };
 
 /// Branches with one daughter joined to it; the root comes first, parents before daughters.
-std::vector<Stretch> StretchesOf(vtkPolyData* data)
+std::vector<BranchPath> BranchPathsOf(vtkPolyData* data)
 {
   const VesselTree whole = vtkCoronary::TreeOf(data);
   const VesselTree tree = SplitAtBifurcations(whole);
@@ -73,7 +73,7 @@ std::vector<Stretch> StretchesOf(vtkPolyData* data)
       labelOf[branch.points[n]] = branch.name;
     }
   }
-  std::vector<Stretch> stretches;
+  std::vector<BranchPath> branchPaths;
   std::map<int, std::size_t> stretchOf;
   for (const VesselTree::Branch& branch : tree.branches)
   {
@@ -81,44 +81,44 @@ std::vector<Stretch> StretchesOf(vtkPolyData* data)
     const bool goesOn = !root && daughters[branch.parentGroupId] == 1;
     if (!goesOn)
     {
-      Stretch stretch;
-      stretch.label = labelOf[branch.points[1]];
+      BranchPath branchPath;
+      branchPath.label = labelOf[branch.points[1]];
       if (!root)
       {
-        stretch.parent = stretchOf.at(branch.parentGroupId);
-        stretches[stretch.parent].daughters.push_back(stretches.size());
+        branchPath.parent = stretchOf.at(branch.parentGroupId);
+        branchPaths[branchPath.parent].daughters.push_back(branchPaths.size());
       }
-      stretches.push_back(stretch);
+      branchPaths.push_back(branchPath);
     }
-    const std::size_t number = goesOn ? stretchOf.at(branch.parentGroupId) : stretches.size() - 1;
+    const std::size_t number = goesOn ? stretchOf.at(branch.parentGroupId) : branchPaths.size() - 1;
     stretchOf[branch.groupId] = number;
     for (std::size_t n = goesOn ? 1 : 0; n < branch.points.size(); ++n)
     {
       const auto point = static_cast<std::size_t>(branch.points[n]);
-      stretches[number].points.push_back(tree.points[point]);
-      stretches[number].radius.push_back(tree.radius[point]);
+      branchPaths[number].points.push_back(tree.points[point]);
+      branchPaths[number].radius.push_back(tree.radius[point]);
     }
   }
-  return stretches;
+  return branchPaths;
 }
 
 /// The longest step is halved until there are enough of them.
-void Refine(Stretch& stretch, std::size_t steps)
+void Refine(BranchPath& branchPath, std::size_t steps)
 {
-  while (stretch.points.size() < steps + 1)
+  while (branchPath.points.size() < steps + 1)
   {
     std::size_t longest = 1;
-    for (std::size_t n = 1; n < stretch.points.size(); ++n)
+    for (std::size_t n = 1; n < branchPath.points.size(); ++n)
     {
       const auto length = [&](std::size_t k)
-      { return (stretch.points[k] - stretch.points[k - 1]).norm(); };
+      { return (branchPath.points[k] - branchPath.points[k - 1]).norm(); };
       longest = length(n) > length(longest) ? n : longest;
     }
     const auto at = static_cast<std::ptrdiff_t>(longest);
-    const Vector3 point = 0.5 * (stretch.points[longest] + stretch.points[longest - 1]);
-    const double radius = 0.5 * (stretch.radius[longest] + stretch.radius[longest - 1]);
-    stretch.points.insert(stretch.points.begin() + at, point);
-    stretch.radius.insert(stretch.radius.begin() + at, radius);
+    const Vector3 point = 0.5 * (branchPath.points[longest] + branchPath.points[longest - 1]);
+    const double radius = 0.5 * (branchPath.radius[longest] + branchPath.radius[longest - 1]);
+    branchPath.points.insert(branchPath.points.begin() + at, point);
+    branchPath.radius.insert(branchPath.radius.begin() + at, radius);
   }
 }
 
@@ -142,9 +142,9 @@ struct Output
   std::vector<double> path;
   std::vector<double> radius;
   std::vector<Vector3> normal;
-  std::vector<std::size_t> stretch; ///< that the point belongs to
+  std::vector<std::size_t> branchPath; ///< that the point belongs to
 
-  vtkIdType Add(const Stretch& from, std::size_t number, std::size_t n, int branchId, int fork,
+  vtkIdType Add(const BranchPath& from, std::size_t number, std::size_t n, int branchId, int fork,
     double along, double unit)
   {
     this->branch.push_back(branchId);
@@ -152,24 +152,24 @@ struct Output
     this->path.push_back(along / unit);
     this->radius.push_back(from.radius[n] / unit);
     this->normal.push_back(Tangent(from.points, n));
-    this->stretch.push_back(number);
+    this->branchPath.push_back(number);
     const Vector3 place = from.points[n] / unit;
     return this->points->InsertNextPoint(place.data());
   }
 };
 
 /// Which ways to the outlets go through each stretch, by number.
-std::vector<std::vector<int>> WaysThrough(const std::vector<Stretch>& stretches)
+std::vector<std::vector<int>> PathsThrough(const std::vector<BranchPath>& branchPaths)
 {
-  std::vector<std::vector<int>> ways(stretches.size());
+  std::vector<std::vector<int>> ways(branchPaths.size());
   int outlets = 0;
-  for (std::size_t n = 0; n < stretches.size(); ++n)
+  for (std::size_t n = 0; n < branchPaths.size(); ++n)
   {
-    if (!stretches[n].daughters.empty())
+    if (!branchPaths[n].daughters.empty())
     {
       continue;
     }
-    for (std::size_t at = n;; at = stretches[at].parent)
+    for (std::size_t at = n;; at = branchPaths[at].parent)
     {
       ways[at].push_back(outlets);
       if (at == 0)
@@ -182,7 +182,7 @@ std::vector<std::vector<int>> WaysThrough(const std::vector<Stretch>& stretches)
   return ways;
 }
 
-void AddArrays(vtkPolyData* data, const Output& output, const std::vector<Stretch>& stretches)
+void AddArrays(vtkPolyData* data, const Output& output, const std::vector<BranchPath>& branchPaths)
 {
   vtkPointData* arrays = data->GetPointData();
   std::vector<int> ids(output.branch.size());
@@ -214,15 +214,15 @@ void AddArrays(vtkPolyData* data, const Output& output, const std::vector<Stretc
     normals->InsertNextTuple(normal.data());
   }
   arrays->AddArray(normals);
-  const std::vector<std::vector<int>> ways = WaysThrough(stretches);
+  const std::vector<std::vector<int>> ways = PathsThrough(branchPaths);
   vtkNew<vtkIntArray> centerlines;
   centerlines->SetName(CenterlineId);
   centerlines->SetNumberOfComponents(static_cast<int>(ways.front().size()));
-  centerlines->SetNumberOfTuples(static_cast<vtkIdType>(output.stretch.size()));
+  centerlines->SetNumberOfTuples(static_cast<vtkIdType>(output.branchPath.size()));
   centerlines->Fill(0.0);
-  for (std::size_t n = 0; n < output.stretch.size(); ++n)
+  for (std::size_t n = 0; n < output.branchPath.size(); ++n)
   {
-    for (const int way : ways[output.stretch[n]])
+    for (const int way : ways[output.branchPath[n]])
     {
       centerlines->SetComponent(static_cast<vtkIdType>(n), way, 1.0);
     }
@@ -381,49 +381,49 @@ bool IsSimVascularCenterline(vtkPolyData* lines)
 
 vtkSmartPointer<vtkPolyData> ToSimVascular(vtkPolyData* tree, double unit)
 {
-  std::vector<Stretch> stretches = StretchesOf(tree);
+  std::vector<BranchPath> branchPaths = BranchPathsOf(tree);
   // The fork, one point of the bifurcation, two of the branch, the next fork.
-  for (Stretch& stretch : stretches)
+  for (BranchPath& branchPath : branchPaths)
   {
-    Refine(stretch, 4);
+    Refine(branchPath, 4);
   }
   Output output;
-  std::vector<vtkIdType> forkPoint(stretches.size(), -1);
-  std::vector<int> forkId(stretches.size(), -1);
+  std::vector<vtkIdType> forkPoint(branchPaths.size(), -1);
+  std::vector<int> forkId(branchPaths.size(), -1);
   int forks = 0;
-  for (std::size_t number = 0; number < stretches.size(); ++number)
+  for (std::size_t number = 0; number < branchPaths.size(); ++number)
   {
-    const Stretch& stretch = stretches[number];
+    const BranchPath& branchPath = branchPaths[number];
     const bool root = number == 0;
-    const bool ends = stretch.daughters.empty();
-    const std::size_t last = stretch.points.size() - 1;
+    const bool ends = branchPath.daughters.empty();
+    const std::size_t last = branchPath.points.size() - 1;
     const std::size_t lastOfBranch = ends ? last : last - 1;
-    vtkIdType before = root ? -1 : forkPoint[stretch.parent];
-    const double reach = root ? 0.0 : stretches[stretch.parent].radius.back();
+    vtkIdType before = root ? -1 : forkPoint[branchPath.parent];
+    const double reach = root ? 0.0 : branchPaths[branchPath.parent].radius.back();
     double along = 0.0;
     double fromFork = 0.0;
     bool inFork = !root;
     for (std::size_t n = root ? 0 : 1; n <= last; ++n)
     {
-      const double step = n > 0 ? (stretch.points[n] - stretch.points[n - 1]).norm() : 0.0;
+      const double step = n > 0 ? (branchPath.points[n] - branchPath.points[n - 1]).norm() : 0.0;
       fromFork += step;
       // The first point is in the bifurcation, the last two of the branch are not.
       const bool fork = inFork && (n == 1 || (fromFork < reach && n + 1 < lastOfBranch));
       vtkIdType id = -1;
       if (fork)
       {
-        id = output.Add(stretch, number, n, -1, forkId[stretch.parent], fromFork, unit);
+        id = output.Add(branchPath, number, n, -1, forkId[branchPath.parent], fromFork, unit);
       }
       else if (n <= lastOfBranch)
       {
         along += inFork || n == 0 ? 0.0 : step;
         inFork = false;
-        id = output.Add(stretch, number, n, static_cast<int>(number), -1, along, unit);
+        id = output.Add(branchPath, number, n, static_cast<int>(number), -1, along, unit);
       }
       else
       {
         forkId[number] = forks++;
-        id = output.Add(stretch, number, n, -1, forkId[number], 0.0, unit);
+        id = output.Add(branchPath, number, n, -1, forkId[number], 0.0, unit);
         forkPoint[number] = id;
       }
       if (before >= 0)
@@ -437,7 +437,7 @@ vtkSmartPointer<vtkPolyData> ToSimVascular(vtkPolyData* tree, double unit)
   auto data = vtkSmartPointer<vtkPolyData>::New();
   data->SetPoints(output.points);
   data->SetLines(output.lines);
-  AddArrays(data, output, stretches);
+  AddArrays(data, output, branchPaths);
   return data;
 }
 
@@ -535,10 +535,10 @@ vtkSmartPointer<vtkPolyData> FromSimVascular(vtkPolyData* lines, double unit)
 
 std::vector<SimVascularVessel> VesselsOf(vtkPolyData* tree, double unit)
 {
-  const std::vector<Stretch> stretches = StretchesOf(tree);
+  const std::vector<BranchPath> branchPaths = BranchPathsOf(tree);
   const auto width = [&](std::size_t number)
   {
-    const std::vector<double>& radius = stretches[number].radius;
+    const std::vector<double>& radius = branchPaths[number].radius;
     const std::size_t some = std::min<std::size_t>(radius.size(), 11);
     double sum = 0.0;
     for (std::size_t n = 1; n < some; ++n)
@@ -556,17 +556,18 @@ std::vector<SimVascularVessel> VesselsOf(vtkPolyData* tree, double unit)
     std::vector<double> radii;
     for (std::size_t at = starts[n];;)
     {
-      const Stretch& stretch = stretches[at];
+      const BranchPath& branchPath = branchPaths[at];
       const std::ptrdiff_t skip = points.empty() ? 0 : 1;
-      points.insert(points.end(), stretch.points.begin() + skip, stretch.points.end());
-      radii.insert(radii.end(), stretch.radius.begin() + skip, stretch.radius.end());
-      if (stretch.daughters.empty())
+      points.insert(points.end(), branchPath.points.begin() + skip, branchPath.points.end());
+      radii.insert(radii.end(), branchPath.radius.begin() + skip, branchPath.radius.end());
+      if (branchPath.daughters.empty())
       {
         break;
       }
-      const std::size_t next = *std::max_element(stretch.daughters.begin(), stretch.daughters.end(),
-        [&](std::size_t a, std::size_t b) { return width(a) < width(b); });
-      for (const std::size_t daughter : stretch.daughters)
+      const std::size_t next =
+        *std::max_element(branchPath.daughters.begin(), branchPath.daughters.end(),
+          [&](std::size_t a, std::size_t b) { return width(a) < width(b); });
+      for (const std::size_t daughter : branchPath.daughters)
       {
         if (daughter != next)
         {
@@ -576,7 +577,7 @@ std::vector<SimVascularVessel> VesselsOf(vtkPolyData* tree, double unit)
       at = next;
     }
     SimVascularVessel vessel = VesselAlong(points, radii, unit);
-    const std::string& label = stretches[starts[n]].label;
+    const std::string& label = branchPaths[starts[n]].label;
     const std::string stem = FileName(label.empty() ? "vessel_" + std::to_string(n) : label);
     vessel.name = stem;
     for (int again = 2; !used.insert(vessel.name).second; ++again)

@@ -35,7 +35,7 @@ constexpr int NameBand = 24;
 constexpr int RulerBand = 53; // two rows of names
 constexpr int DiameterBand = 84;
 constexpr int AttenuationBand = 60;
-constexpr int LeastWidth = 300;
+constexpr int MinimumWidth = 300;
 
 constexpr Colour Black = { 0, 0, 0 };
 constexpr Colour Panel = { 22, 24, 28 };
@@ -238,8 +238,8 @@ std::vector<VesselView> ViewsOf(const RunResult& result)
 
 GreyWindow WindowOf(const RunResult& result, const ImageInterpolator& image)
 {
-  constexpr double LeastLumen = 120.0; // HU, of contrast in an artery
-  constexpr double GreatestLumen = 1500.0;
+  constexpr double MinimumLumen = 120.0; // HU, of contrast in an artery
+  constexpr double MaximumLumen = 1500.0;
   std::vector<double> values;
   for (const Vector3& point : result.tree.points)
   {
@@ -254,7 +254,7 @@ GreyWindow WindowOf(const RunResult& result, const ImageInterpolator& image)
   }
   // Of the wide vessels' axes, which the many thin ones must not outnumber.
   const double lumen = InclusiveQuantileOf(std::move(values), 0.75);
-  if (lumen > LeastLumen && lumen < GreatestLumen)
+  if (lumen > MinimumLumen && lumen < MaximumLumen)
   {
     return { -150.0, std::max(500.0, 2.0 * lumen) };
   }
@@ -328,18 +328,17 @@ void VesselPainter::DrawCut(MarkedPicture& picture, const GreyPicture& cut, int 
 }
 
 VesselPainter::Profile VesselPainter::ProfileOf(
-  const VesselView& view, const VesselCourse& course) const
+  const VesselView& view, const FramedCurve& curve) const
 {
   const std::vector<std::int64_t>& points = view.chain.points;
   const auto known = [&](const std::vector<double>& values)
   { return HasValues(values, this->Result) ? Picked(values, points) : std::vector<double>(); };
   Profile profile;
-  profile.radius = course.Interpolated(Picked(this->Result.tree.radius, points));
+  profile.radius = curve.Interpolated(Picked(this->Result.tree.radius, points));
   const auto sampled = [&](const std::vector<double>& values, bool nearest)
   {
     const std::vector<double> picked = known(values);
-    return picked.empty() ? picked
-                          : (nearest ? course.Nearest(picked) : course.Interpolated(picked));
+    return picked.empty() ? picked : (nearest ? curve.Nearest(picked) : curve.Interpolated(picked));
   };
   profile.reference = sampled(this->Result.reference, false);
   profile.stenosis = sampled(this->Result.stenosis, false);
@@ -350,7 +349,7 @@ VesselPainter::Profile VesselPainter::ProfileOf(
   {
     sights.push_back(static_cast<double>(SightOf(this->Result, point)));
   }
-  for (const double sight : course.Nearest(sights))
+  for (const double sight : curve.Nearest(sights))
   {
     profile.sight.push_back(static_cast<Sight>(std::lround(sight)));
   }
@@ -379,26 +378,26 @@ void VesselPainter::DrawWalls(
   }
 }
 
-void VesselPainter::DrawCalcium(MarkedPicture& picture, const VesselCourse& course,
+void VesselPainter::DrawCalcium(MarkedPicture& picture, const FramedCurve& curve,
   const std::vector<Vector3>& across, int x, int y) const
 {
   if (this->Calcium.Empty())
   {
     return;
   }
-  const int half = static_cast<int>(std::lround(this->Settings.halfWidth / course.step));
+  const int half = static_cast<int>(std::lround(this->Settings.halfWidth / curve.step));
   const auto inside = [&](int column, int row)
   {
-    if (column < 0 || column >= static_cast<int>(course.position.size()) || std::abs(row) > half)
+    if (column < 0 || column >= static_cast<int>(curve.position.size()) || std::abs(row) > half)
     {
       return false;
     }
     const auto k = static_cast<std::size_t>(column);
-    return this->Calcium.At(course.position[k] + row * course.step * across[k]) != 0;
+    return this->Calcium.At(curve.position[k] + row * curve.step * across[k]) != 0;
   };
   for (int row = -half; row <= half; ++row)
   {
-    for (int column = 0; column < static_cast<int>(course.position.size()); ++column)
+    for (int column = 0; column < static_cast<int>(curve.position.size()); ++column)
     {
       if (inside(column, row) &&
         !(inside(column - 1, row) && inside(column + 1, row) && inside(column, row - 1) &&
@@ -411,10 +410,10 @@ void VesselPainter::DrawCalcium(MarkedPicture& picture, const VesselCourse& cour
 }
 
 void VesselPainter::DrawRuler(MarkedPicture& picture, const VesselView& view,
-  const VesselCourse& course, double lead, int x, int y) const
+  const FramedCurve& curve, double lead, int x, int y) const
 {
   const auto at = [&](double arc)
-  { return x + static_cast<int>(std::lround((arc + lead) / course.step)); };
+  { return x + static_cast<int>(std::lround((arc + lead) / curve.step)); };
   PictureCanvas& canvas = picture.plain;
   for (int arc = 0; arc <= static_cast<int>(view.chain.Length()); arc += 5)
   {
@@ -448,22 +447,22 @@ void VesselPainter::DrawDiameter(MarkedPicture& picture, const Profile& profile,
   PictureCanvas& canvas = picture.plain;
   const int width = static_cast<int>(profile.radius.size());
   const int height = DiameterBand - 14;
-  double greatest = 2.0;
+  double maximum = 2.0;
   for (const std::vector<double>* values : { &profile.radius, &profile.reference })
   {
     for (const double value : *values)
     {
-      greatest = std::isfinite(value) ? std::max(greatest, 2.0 * value) : greatest;
+      maximum = std::isfinite(value) ? std::max(maximum, 2.0 * value) : maximum;
     }
   }
-  greatest = std::min(2.0 * std::ceil(0.5 * greatest), 40.0);
+  maximum = std::min(2.0 * std::ceil(0.5 * maximum), 40.0);
   canvas.Fill(x, y, width, height, Panel);
-  const double scale = height / greatest;
+  const double scale = height / maximum;
   for (int k = 0; k <= 2; ++k)
   {
-    const int row = y + height - static_cast<int>(std::lround(0.5 * k * greatest * scale));
+    const int row = y + height - static_cast<int>(std::lround(0.5 * k * maximum * scale));
     canvas.Fill(x, std::min(row, y + height - 1), width, 1, Dim);
-    canvas.Write(x - 6, row, Text("%g", 0.5 * k * greatest), 11, Soft, Anchor::Right);
+    canvas.Write(x - 6, row, Text("%g", 0.5 * k * maximum), 11, Soft, Anchor::Right);
   }
   canvas.Write(4, y + height / 2, "\xC3\x98", 12, Soft);
   const auto bottom = double(y + height);
@@ -498,14 +497,14 @@ void VesselPainter::DrawDiameter(MarkedPicture& picture, const Profile& profile,
   for (std::size_t begin = 0; begin < profile.sureness.size(); ++begin)
   {
     std::size_t end = begin;
-    double least = 1.0;
+    double minimum = 1.0;
     while (end < profile.sureness.size() && profile.sight[end] == Sight::Bridged)
     {
-      least = std::min(least, profile.sureness[end++]);
+      minimum = std::min(minimum, profile.sureness[end++]);
     }
     if (end > begin)
     {
-      picture.Write(x + static_cast<int>((begin + end) / 2), y + height - 9, Text("%.2f", least),
+      picture.Write(x + static_cast<int>((begin + end) / 2), y + height - 9, Text("%.2f", minimum),
         11, Bridge, Anchor::Centre);
       begin = end;
     }
@@ -566,22 +565,22 @@ ViewPicture VesselPainter::Straightened(
   const VesselView& view, const ProgressCallback& progress) const
 {
   const double whole = view.chain.arc.back() - view.chain.arc.front();
-  const VesselCourse course = FollowAxis(
+  const FramedCurve curve = FollowAxis(
     AxisOf(this->Result, view.chain), std::max(1.0 / PixelsPerMillimetre, whole / MostColumns));
-  const auto cuts = StraightenVessel(this->Image, course, this->Settings.halfWidth, progress);
-  const Profile profile = this->ProfileOf(view, course);
+  const auto cuts = StraightenVessel(this->Image, curve, this->Settings.halfWidth, progress);
+  const Profile profile = this->ProfileOf(view, curve);
   const int columns = cuts[0].width;
   const int rows = cuts[0].height;
   const int gap = 4;
   const int ruler = NameBand + 2 * rows + gap;
-  MarkedPicture picture(std::max(LeastWidth, LeftMargin + columns + RightMargin),
+  MarkedPicture picture(std::max(MinimumWidth, LeftMargin + columns + RightMargin),
     ruler + RulerBand + DiameterBand + AttenuationBand, Black);
   const int x = LeftMargin;
   const int firstRow = NameBand;
   const int secondRow = NameBand + rows + gap;
   const double lead = -view.chain.arc.front();
   const auto at = [&](double arc)
-  { return x + static_cast<int>(std::lround((arc + lead) / course.step)); };
+  { return x + static_cast<int>(std::lround((arc + lead) / curve.step)); };
 
   int free = 0;
   if (lead > 0.0)
@@ -607,8 +606,8 @@ ViewPicture VesselPainter::Straightened(
     picture.plain.Write(
       x - 6, row + rows / 2, number == 0 ? "0\xC2\xB0" : "90\xC2\xB0", 11, Soft, Anchor::Right);
     this->DrawCalcium(
-      picture, course, number == 0 ? course.normal : course.binormal, x, row + rows / 2);
-    this->DrawWalls(picture, profile, course.step, x, row + rows / 2);
+      picture, curve, number == 0 ? curve.normal : curve.binormal, x, row + rows / 2);
+    this->DrawWalls(picture, profile, curve.step, x, row + rows / 2);
     if (lead > 0.0)
     {
       picture.Line(
@@ -618,13 +617,12 @@ ViewPicture VesselPainter::Straightened(
     ++number;
   }
   // 5 mm, upright.
-  picture.plain.Fill(
-    x - 24, firstRow + rows / 2 + 14, 2, static_cast<int>(5.0 / course.step), Soft);
-  this->DrawRuler(picture, view, course, lead, x, ruler + 2);
+  picture.plain.Fill(x - 24, firstRow + rows / 2 + 14, 2, static_cast<int>(5.0 / curve.step), Soft);
+  this->DrawRuler(picture, view, curve, lead, x, ruler + 2);
   this->DrawDiameter(picture, profile, x, ruler + RulerBand);
   this->DrawAttenuation(picture, cuts[0], x, ruler + RulerBand + DiameterBand);
   return { std::move(picture),
-    { { "left", at(0.0) }, { "per_mm", 1.0 / course.step }, { "top", firstRow },
+    { { "left", at(0.0) }, { "per_mm", 1.0 / curve.step }, { "top", firstRow },
       { "bottom", ruler } } };
 }
 

@@ -82,12 +82,12 @@ public:
 
 private:
   struct Profile;
-  Profile ProfileOf(const VesselView& view, const VesselCourse& course) const;
+  Profile ProfileOf(const VesselView& view, const FramedCurve& curve) const;
   void DrawCut(MarkedPicture& picture, const GreyPicture& cut, int x, int y) const;
   void DrawWalls(MarkedPicture& picture, const Profile& profile, double step, int x, int y) const;
-  void DrawCalcium(MarkedPicture& picture, const VesselCourse& course,
+  void DrawCalcium(MarkedPicture& picture, const FramedCurve& curve,
     const std::vector<Vector3>& across, int x, int y) const;
-  void DrawRuler(MarkedPicture& picture, const VesselView& view, const VesselCourse& course,
+  void DrawRuler(MarkedPicture& picture, const VesselView& view, const FramedCurve& curve,
     double lead, int x, int y) const;
   void DrawDiameter(MarkedPicture& picture, const Profile& profile, int x, int y) const;
   void DrawAttenuation(MarkedPicture& picture, const GreyPicture& cut, int x, int y) const;

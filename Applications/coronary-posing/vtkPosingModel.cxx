@@ -373,7 +373,7 @@ vtkSmartPointer<vtkPolyData> vtkPosingModel::Moved(vtkPolyData* start, const Vec
   {
     // A bone turns about its first joint with all beyond it, the rest of the chain too.
     const Vector3 here = places[k];
-    const Quaternion turn = LeastRotation(here - places[k - 1], bent[k] - places[k - 1]);
+    const Quaternion turn = ShortestRotation(here - places[k - 1], bent[k] - places[k - 1]);
     for (std::size_t n = k; n < chain.size(); ++n)
     {
       places[n] = bent[k] + turn * (places[n] - here);
@@ -563,7 +563,7 @@ void vtkPosingModel::MakeReport(vtkPolyData* pose)
   {
     const float* value = moved->GetPointer(3 * n);
     const double length = std::hypot(value[0], value[1], value[2]);
-    report.greatestDisplacement = std::max(report.greatestDisplacement, length);
+    report.maximumDisplacement = std::max(report.maximumDisplacement, length);
   }
   auto* ratios = vtkDoubleArray::SafeDownCast(skin->GetCellData()->GetArray(names::VolumeRatio));
   for (vtkIdType n = 0; ratios && n < ratios->GetNumberOfTuples(); ++n)
@@ -573,8 +573,8 @@ void vtkPosingModel::MakeReport(vtkPolyData* pose)
     {
       continue;
     }
-    report.leastVolumeRatio = std::min(report.leastVolumeRatio, ratio);
-    report.greatestVolumeRatio = std::max(report.greatestVolumeRatio, ratio);
+    report.minimumVolumeRatio = std::min(report.minimumVolumeRatio, ratio);
+    report.maximumVolumeRatio = std::max(report.maximumVolumeRatio, ratio);
   }
   report.inverted =
     skin->GetFieldData()->GetAbstractArray(names::InvertedTetrahedra)->GetNumberOfValues();
@@ -585,7 +585,7 @@ void vtkPosingModel::MakeReport(vtkPolyData* pose)
   {
     const double length = (PointOf(pose, bones[b].second) - PointOf(pose, bones[b].first)).norm();
     const double strain = length / this->Rig.Length(static_cast<std::int64_t>(b)) - 1.0;
-    report.greatestStrain = std::max(report.greatestStrain, std::abs(strain));
+    report.maximumStrain = std::max(report.maximumStrain, std::abs(strain));
   }
   this->Report_ = report;
 }
@@ -635,8 +635,8 @@ void PoseWithoutWindow(const std::string& folder, const PosingOptions& options, 
     const PosingReport& report = model.Report();
     std::printf("%zu moves: greatest displacement %.2f mm, greatest strain of a bone %.2f, volume "
                 "ratios %.2f to %.2f, %lld tetrahedra inverted, %lld repaired\n",
-      options.moves.size(), report.greatestDisplacement, report.greatestStrain,
-      report.leastVolumeRatio, report.greatestVolumeRatio, static_cast<long long>(report.inverted),
+      options.moves.size(), report.maximumDisplacement, report.maximumStrain,
+      report.minimumVolumeRatio, report.maximumVolumeRatio, static_cast<long long>(report.inverted),
       static_cast<long long>(report.repaired));
   }
 }

@@ -30,10 +30,10 @@ namespace coronary
 /// What the deformation has come to.
 struct PosingReport
 {
-  double greatestDisplacement = 0.0;    ///< of a point of the mesh, mm
-  double greatestStrain = 0.0;          ///< of a bone, |posed / rest length - 1|
-  double leastVolumeRatio = 1.0;        ///< signed volume of a tetrahedron / that at rest
-  double greatestVolumeRatio = 1.0;     ///< the same
+  double maximumDisplacement = 0.0;     ///< of a point of the mesh, mm
+  double maximumStrain = 0.0;           ///< of a bone, |posed / rest length - 1|
+  double minimumVolumeRatio = 1.0;      ///< signed volume of a tetrahedron / that at rest
+  double maximumVolumeRatio = 1.0;      ///< the same
   std::int64_t inverted = 0;            ///< tetrahedra that are inverted, after a repair
   std::int64_t repaired = 0;            ///< tetrahedra that were repaired
   double deformationMilliseconds = 0.0; ///< wall time of the last pose and deformation

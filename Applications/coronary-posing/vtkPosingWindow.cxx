@@ -624,10 +624,10 @@ void Window::ShowState()
   this->StateText->setText(
     QString("Greatest displacement %1 mm    Strain of bones %2    Volume ratios %3 to %4    "
             "Inverted %5, repaired %6    ")
-      .arg(report.greatestDisplacement, 0, 'f', 2)
-      .arg(report.greatestStrain, 0, 'f', 2)
-      .arg(report.leastVolumeRatio, 0, 'f', 2)
-      .arg(report.greatestVolumeRatio, 0, 'f', 2)
+      .arg(report.maximumDisplacement, 0, 'f', 2)
+      .arg(report.maximumStrain, 0, 'f', 2)
+      .arg(report.minimumVolumeRatio, 0, 'f', 2)
+      .arg(report.maximumVolumeRatio, 0, 'f', 2)
       .arg(report.inverted)
       .arg(report.repaired) +
     QString("%1 ms a frame, skin %2 ms, %3 triangles")

@@ -94,11 +94,11 @@ public:
     : Image(image)
     , Axes(axes)
     , Settings(settings)
-    , Voxel(image.SmallestSpacing())
+    , Voxel(image.MinimumSpacing())
   {
   }
 
-  BifurcationFit Run(double leastTurn);
+  BifurcationFit Run(double minimumTurn);
 
 private:
   bool FindExtent();
@@ -407,7 +407,7 @@ Eigen::MatrixXd Fit::Minimize(
   return normal;
 }
 
-BifurcationFit Fit::Run(double leastTurn)
+BifurcationFit Fit::Run(double minimumTurn)
 {
   BifurcationFit result;
   if (!this->FindExtent())
@@ -418,7 +418,7 @@ BifurcationFit Fit::Run(double leastTurn)
   { return UnitAngle(this->Inwards, direction.normalized()); };
   result.turn =
     angle(this->Axes.side[this->End] - this->Axes.side[this->Alone]) - angle(this->Outwards);
-  if (result.turn < leastTurn)
+  if (result.turn < minimumTurn)
   {
     return result;
   }
@@ -477,8 +477,8 @@ Vector3 BezierPoint(const BezierCurve& curve, double t)
 }
 
 BifurcationFit FitBifurcation(const ImageInterpolator& image, const BifurcationAxes& axes,
-  const LumenSettings& settings, double leastTurn)
+  const LumenSettings& settings, double minimumTurn)
 {
-  return Fit(image, axes, settings).Run(leastTurn);
+  return Fit(image, axes, settings).Run(minimumTurn);
 }
 }

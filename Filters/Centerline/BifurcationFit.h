@@ -57,12 +57,12 @@ struct BifurcationFit
  * Fits both axes around a bifurcation to the wall, for images and not for fixed levels.
  *
  * The wall, and the fork as it was given, are weighed by their variances.
- * @param leastTurn  radians that the side daughter turns by more than the other one: less is not fitted
+ * @param minimumTurn  radians that the side daughter turns by more than the other one: less is not fitted
  * @returns not found where an axis ends too near, the daughters do not part, or the wall is not that of
  *          two tubes
  */
 BifurcationFit FitBifurcation(const ImageInterpolator& image, const BifurcationAxes& axes,
-  const LumenSettings& settings, double leastTurn);
+  const LumenSettings& settings, double minimumTurn);
 }
 
 #endif

@@ -152,7 +152,7 @@ int ChooseContinuation(const CenterlineTopology& tree, const VesselTree::Branch&
   const double r = EndCalibre(tree, parent, false, 0.0, 3.0 * tree.radius[parent.points.back()]);
   const Vector3 course = -EndDirection(tree, parent, false, 0.0, 4.0 * r);
   int best = -1;
-  double least = Infinity;
+  double minimum = Infinity;
   for (const int d : daughters)
   {
     const VesselTree::Branch& daughter = tree.branches[d];
@@ -160,9 +160,9 @@ int ChooseContinuation(const CenterlineTopology& tree, const VesselTree::Branch&
     const double calibre = EndCalibre(tree, daughter, true, r, 4.0 * r);
     // Thirty degrees of turn weigh as much as a calibre of two thirds.
     const double cost = turn / (Pi / 6.0) - std::log(calibre / r) / std::log(1.5);
-    if (cost < least)
+    if (cost < minimum)
     {
-      least = cost;
+      minimum = cost;
       best = d;
     }
   }
@@ -171,13 +171,13 @@ int ChooseContinuation(const CenterlineTopology& tree, const VesselTree::Branch&
 
 double SolveMurrayExponent(double parent, const std::vector<double>& daughters)
 {
-  constexpr double greatest = 20.0;
-  if (daughters.size() < 2 || MurrayResidual(parent, daughters, greatest) < 0.0)
+  constexpr double maximum = 20.0;
+  if (daughters.size() < 2 || MurrayResidual(parent, daughters, maximum) < 0.0)
   {
     return std::numeric_limits<double>::quiet_NaN();
   }
   double low = 0.0;
-  double high = greatest;
+  double high = maximum;
   for (int i = 0; i < 100; ++i)
   {
     const double middle = 0.5 * (low + high);

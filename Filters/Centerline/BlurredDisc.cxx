@@ -9,8 +9,8 @@ namespace coronary
 namespace
 {
 constexpr double Step = 0.1;
-constexpr double LargestRadius = 8.0;
-constexpr double LargestDistance = 12.0;
+constexpr double MaximumRadius = 8.0;
+constexpr double MaximumDistance = 12.0;
 constexpr int RadiusCount = 81;
 constexpr int DistanceCount = 121;
 
@@ -77,7 +77,7 @@ const std::vector<float>& Shapes()
 BlurredProfile::BlurredProfile(double radius)
   : Radius(radius)
 {
-  if (radius > 0.0 && radius < LargestRadius - Step)
+  if (radius > 0.0 && radius < MaximumRadius - Step)
   {
     const double r = radius / Step;
     const int i = static_cast<int>(r);
@@ -99,7 +99,7 @@ double BlurredProfile::At(double distance) const
     const double inwards = 0.5 / std::max(distance, 0.5 * this->Radius);
     return 0.5 * std::erfc((distance + inwards - this->Radius) / std::sqrt(2.0));
   }
-  if (distance >= LargestDistance - Step)
+  if (distance >= MaximumDistance - Step)
   {
     return 0.0;
   }

@@ -13,23 +13,22 @@ namespace coronary
 namespace
 {
 /// Centres of a branch that leaves its parent's lumen, found by the part of its wall that is not the parent's.
-/// @param good     sample of the course that stands alone
+/// @param good     sample of the path that stands alone
 /// @param outside  distance from the parent's axis in its radii
 /// @returns the centres before `good`, nearest to the parent first
-std::vector<Vector3> FollowOuterWall(const MeasuredCourse& course, std::size_t good,
-  const std::function<double(const Vector3&)>& outside, const CourseMeasurement& measurement)
+std::vector<Vector3> FollowOuterWall(const MeasuredPath& path, std::size_t good,
+  const std::function<double(const Vector3&)>& outside, const PathMeasurement& measurement)
 {
-  const auto after = [&](double length) {
-    return std::min(course.size() - 1, good + static_cast<std::size_t>(length / measurement.step));
-  };
+  const auto after = [&](double length)
+  { return std::min(path.size() - 1, good + static_cast<std::size_t>(length / measurement.step)); };
   std::vector<double> radii;
   std::vector<double> values;
-  for (std::size_t i = good; i <= after(3.0 * course.radius[good]); ++i)
+  for (std::size_t i = good; i <= after(3.0 * path.radius[good]); ++i)
   {
-    if (course.confidence[i] >= measurement.settings.minimumConfidence)
+    if (path.confidence[i] >= measurement.settings.minimumConfidence)
     {
-      radii.push_back(course.radius[i]);
-      values.push_back(course.lumen[i]);
+      radii.push_back(path.radius[i]);
+      values.push_back(path.lumen[i]);
     }
   }
   if (radii.size() < 3)
@@ -44,7 +43,7 @@ std::vector<Vector3> FollowOuterWall(const MeasuredCourse& course, std::size_t g
   std::vector<Vector3> centres;
   for (std::size_t i = after(1.5 * radius) + 1; i-- > good;)
   {
-    centres.push_back(course.points[i]);
+    centres.push_back(path.points[i]);
   }
   const std::size_t known = centres.size();
   const auto chord =
@@ -69,8 +68,8 @@ std::vector<Vector3> FollowOuterWall(const MeasuredCourse& course, std::size_t g
 }
 }
 
-std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
-  const std::vector<std::int64_t>& chain, std::int32_t owner, const CourseMeasurement& measurement)
+std::size_t JoinParent(MeasuredPath& path, const VesselTree& tree,
+  const std::vector<std::int64_t>& chain, std::int32_t owner, const PathMeasurement& measurement)
 {
   const auto meeting = std::find(chain.begin(), chain.end(), owner) - chain.begin();
   const double parentRadius = tree.radius[owner];
@@ -83,52 +82,52 @@ std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
   const auto outside = [&](const Vector3& point)
   {
     // In units of the parent's radius.
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (std::ptrdiff_t i = low; i <= high; ++i)
     {
       const auto p = static_cast<std::size_t>(chain[i]);
-      least = std::min(least, (point - tree.points[p]).norm() / tree.radius[p]);
+      minimum = std::min(minimum, (point - tree.points[p]).norm() / tree.radius[p]);
     }
-    return least;
+    return minimum;
   };
 
   // The first part that is clearly a vessel of its own.
   std::size_t first = 0;
-  while (first + 1 < course.size() && outside(course.points[first]) < 1.15)
+  while (first + 1 < path.size() && outside(path.points[first]) < 1.15)
   {
     ++first;
   }
   std::size_t good = first;
-  while (good < course.size() && course.confidence[good] < measurement.settings.minimumConfidence)
+  while (good < path.size() && path.confidence[good] < measurement.settings.minimumConfidence)
   {
     ++good;
   }
-  if (good >= course.size())
+  if (good >= path.size())
   {
-    good = std::min(first, course.size() - 1);
+    good = std::min(first, path.size() - 1);
   }
   // A great branch stands alone far from the axis only: from there back into the parent's lumen, as
   // far as its outer wall is to be seen. Not in masks and surfaces: there an axis is that of
   // inscribed spheres, and a lumen that widens before it divides has no circle.
   const bool great =
-    std::isnan(measurement.lumen.level) && course.radius[good] > GreatBranch * parentRadius;
+    std::isnan(measurement.lumen.level) && path.radius[good] > GreatBranch * parentRadius;
   const std::vector<Vector3> arcs =
-    great ? FollowOuterWall(course, good, outside, measurement) : std::vector<Vector3>();
+    great ? FollowOuterWall(path, good, outside, measurement) : std::vector<Vector3>();
   std::vector<Vector3> samples = arcs;
   // Over a short chord: a branch may turn within two radii of its mouth.
   const double length =
-    std::max((arcs.empty() ? 1.4 : 1.0) * course.radius[good], 4.0 * measurement.voxel);
-  for (std::size_t i = good; i < course.size() && samples.size() * measurement.step <= length; ++i)
+    std::max((arcs.empty() ? 1.4 : 1.0) * path.radius[good], 4.0 * measurement.voxel);
+  for (std::size_t i = good; i < path.size() && samples.size() * measurement.step <= length; ++i)
   {
-    if (course.confidence[i] >= measurement.settings.minimumConfidence || i == good)
+    if (path.confidence[i] >= measurement.settings.minimumConfidence || i == good)
     {
-      samples.push_back(course.points[i]);
+      samples.push_back(path.points[i]);
     }
   }
   samples.resize(std::min(
     samples.size(), std::max<std::size_t>(4, static_cast<std::size_t>(length / measurement.step))));
   auto best = static_cast<std::size_t>(owner);
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   if (samples.size() >= 3)
   {
     Vector3 direction = (samples.back() - samples.front()).normalized();
@@ -149,23 +148,23 @@ std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
       const double along = (tree.points[p] - samples.front()).dot(direction);
       const double distance = LineDistance(tree.points[p], samples.front(), direction) +
         (along > 0.0 ? 2.0 * along : 0.0) - 0.02 * along;
-      if (distance < least)
+      if (distance < minimum)
       {
-        least = distance;
+        minimum = distance;
         best = p;
       }
     }
   }
-  if (least > 1.2 * parentRadius + measurement.voxel)
+  if (minimum > 1.2 * parentRadius + measurement.voxel)
   {
-    least = std::numeric_limits<double>::infinity();
+    minimum = std::numeric_limits<double>::infinity();
     for (std::ptrdiff_t i = low; i <= high; ++i)
     {
       const auto p = static_cast<std::size_t>(chain[i]);
-      const double distance = (tree.points[p] - course.points[good]).norm();
-      if (distance < least)
+      const double distance = (tree.points[p] - path.points[good]).norm();
+      if (distance < minimum)
       {
-        least = distance;
+        minimum = distance;
         best = p;
       }
     }
@@ -173,13 +172,13 @@ std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
 
   // A straight line from axis to axis; its samples are guesses.
   std::vector<Vector3> start = ResampleCurve(
-    { tree.points[best], arcs.empty() ? course.points[good] : arcs.front() }, measurement.step);
+    { tree.points[best], arcs.empty() ? path.points[good] : arcs.front() }, measurement.step);
   start.pop_back();
   const std::size_t straight = start.size();
   start.insert(start.end(), arcs.begin(), arcs.end());
-  const double seen = 0.5 * course.confidence[good];
-  course.ReplaceStart(good, start);
-  std::fill_n(course.confidence.begin() + static_cast<std::ptrdiff_t>(straight), arcs.size(), seen);
+  const double seen = 0.5 * path.confidence[good];
+  path.ReplaceStart(good, start);
+  std::fill_n(path.confidence.begin() + static_cast<std::ptrdiff_t>(straight), arcs.size(), seen);
   return best;
 }
 }

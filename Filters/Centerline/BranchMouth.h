@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_BranchMouth_h
 #define DynamicCoronary_BranchMouth_h
 
-#include "MeasuredCourse.h"
+#include "MeasuredPath.h"
 #include "VesselTree.h"
 
 namespace coronary
@@ -22,14 +22,14 @@ inline double LineDistance(const Vector3& point, const Vector3& origin, const Ve
 }
 
 /**
- * Replaces the part of a course inside its parent's lumen by the meeting of the two axes.
+ * Replaces the part of a path inside its parent's lumen by the meeting of the two axes.
  * @param tree   points and radii
  * @param chain  the parent's points
- * @param owner  the point of them that the course's way met
+ * @param owner  the point of them that the path's way met
  * @returns the index of the parent's point in the tree
  */
-std::size_t JoinParent(MeasuredCourse& course, const VesselTree& tree,
-  const std::vector<std::int64_t>& chain, std::int32_t owner, const CourseMeasurement& measurement);
+std::size_t JoinParent(MeasuredPath& path, const VesselTree& tree,
+  const std::vector<std::int64_t>& chain, std::int32_t owner, const PathMeasurement& measurement);
 }
 
 #endif

@@ -19,14 +19,14 @@ namespace
 {
 constexpr double DimmestLevel = 0.9;      ///< of the tree's usual one, that thresholds start from
 constexpr double SliceThickness = 3.0;    ///< mm, of Agatston's rule
-constexpr double LeastSliceArea = 1.0;    ///< mm^2, of Agatston's rule
+constexpr double MinimumSliceArea = 1.0;  ///< mm^2, of Agatston's rule
 constexpr double HighestDensity = 3000.0; ///< HU, of what is taken for a deposit's own value
 constexpr double WallDistance = 2.5; ///< mm from the lumen's wall: what is farther off is no plaque
 constexpr double SeedShare = 0.30;   ///< of the lumen's contrast: above it an object's core
 constexpr double SeedDeviations = 5.0; ///< and so many standard deviations of the noise
 constexpr double GrowShare = 0.15;     ///< the same for its surroundings
 constexpr double GrowDeviations = 3.0;
-constexpr std::size_t LeastVoxels = 2; ///< of an object
+constexpr std::size_t MinimumVoxels = 2; ///< of an object
 
 /// What a voxel has to be brighter than: where the lumen seems dim it may only be blurred.
 double LevelAt(const LumenLevels& levels, std::int64_t point)
@@ -61,7 +61,7 @@ std::vector<CalciumVoxel> BrightVoxels(const VesselTree& tree, const ScalarImage
     {
       Report(progress, static_cast<double>(p) / static_cast<double>(tree.points.size()));
     }
-    const double least = threshold(p);
+    const double minimum = threshold(p);
     const double reach = tree.radius[p] + WallDistance;
     // Relative to the first voxel.
     const IndexBox box = BoxAround(interpolator.ToIndex(tree.points[p]) - first,
@@ -74,7 +74,7 @@ std::vector<CalciumVoxel> BrightVoxels(const VesselTree& tree, const ScalarImage
           {
             const std::int64_t offset = lattice.Index(i, j, k);
             const auto value = static_cast<double>(values[offset]);
-            if (!(value > least))
+            if (!(value > minimum))
             {
               return;
             }
@@ -167,7 +167,7 @@ double Score(
   for (const auto& [number, slice] : slices)
   {
     const double area = slice.volume / SliceThickness;
-    if (area >= LeastSliceArea)
+    if (area >= MinimumSliceArea)
     {
       score += area * AgatstonWeight(slice.peak);
     }
@@ -381,7 +381,7 @@ CalciumMap FindCalcium(const VesselTree& tree, const ScalarImage& image, const L
         static_cast<double>(voxel.value) > LevelAt(levels, voxel.point) +
             std::max(SeedShare * ContrastAt(levels, voxel.point), SeedDeviations * levels.noise);
     }
-    if (dense && component.voxels.size() >= LeastVoxels)
+    if (dense && component.voxels.size() >= MinimumVoxels)
     {
       components.push_back(std::move(component));
     }

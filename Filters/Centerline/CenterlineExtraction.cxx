@@ -6,7 +6,7 @@
 #include "ForkAxes.h"
 #include "GridIndex.h"
 #include "LesionCrossings.h"
-#include "MeasuredCourse.h"
+#include "MeasuredPath.h"
 #include "Median.h"
 #include "OstialRoot.h"
 #include "Require.h"
@@ -48,7 +48,7 @@ public:
     , Excluded(excluded)
     , Settings(settings)
     , Progress(progress)
-    , Courses(settings, input.grid)
+    , Paths(settings, input.grid)
     , March(input, settings)
   {
   }
@@ -73,10 +73,10 @@ private:
   std::uint32_t Locate(const Vector3& point, const std::string& name, CenterlineEnd& end) const;
   bool PlaceSeeds();
   void MarchFromSeeds();
-  void Calibrate(const MeasuredCourse& course);
+  void Calibrate(const MeasuredPath& path);
   void CorrectRadii();
   void SettleOstia();
-  std::int64_t Append(const VesselWay& way, int treeId, bool wanted);
+  std::int64_t Append(const MinimalPath& way, int treeId, bool wanted);
   void Own(std::size_t branch);
   void FindTips();
   bool ThinBranchesFor(ThinBranchSettings& settings) const;
@@ -94,7 +94,7 @@ private:
   const ProgressCallback& Progress;
   std::vector<std::int16_t> MaskImage;
   ScalarImage MeasuredImage;
-  CourseMeasurement Courses;
+  PathMeasurement Paths;
   double Blur = 0.0;
   VesselMarch March;
   std::vector<std::uint32_t> SeedMembers;
@@ -117,7 +117,7 @@ void Extractor::PrepareMeasurement()
   else if (this->Input.wallDistance)
   {
     this->MeasuredImage = { this->Input.wallDistance, this->Input.grid };
-    this->Courses.lumen.level = 0.0;
+    this->Paths.lumen.level = 0.0;
   }
   else if (this->Input.mask && !this->Input.speed)
   {
@@ -125,24 +125,24 @@ void Extractor::PrepareMeasurement()
     std::transform(this->Input.mask, this->Input.mask + voxels, this->MaskImage.begin(),
       [](unsigned char value) { return static_cast<std::int16_t>(value ? 100 : 0); });
     this->MeasuredImage = { this->MaskImage.data(), this->Input.grid };
-    this->Courses.lumen.level = 50.0;
+    this->Paths.lumen.level = 50.0;
   }
   else
   {
     this->MeasuredImage = { this->Input.speed, this->Input.grid };
   }
-  this->Courses.image = std::make_unique<ImageInterpolator>(this->MeasuredImage);
-  this->Blur = this->Settings.blur > 0.0 ? this->Settings.blur : 0.8 * this->Courses.voxel;
+  this->Paths.image = std::make_unique<ImageInterpolator>(this->MeasuredImage);
+  this->Blur = this->Settings.blur > 0.0 ? this->Settings.blur : 0.8 * this->Paths.voxel;
 
   // What a lumen looks like: the median of what the seeds show.
   std::vector<LumenReference> seen;
-  if (std::isnan(this->Courses.lumen.level))
+  if (std::isnan(this->Paths.lumen.level))
   {
     for (const Vector3& seed : this->Input.seeds)
     {
       LumenReference reference;
-      if (this->Courses.image->Contains(seed) &&
-        MeasureReference(*this->Courses.image, seed, reference))
+      if (this->Paths.image->Contains(seed) &&
+        MeasureReference(*this->Paths.image, seed, reference))
       {
         seen.push_back(reference);
       }
@@ -159,30 +159,30 @@ void Extractor::PrepareMeasurement()
         }
         return MedianOf(std::move(values));
       };
-      this->Courses.lumen.reference = { median(&LumenReference::lumen), 0.0,
+      this->Paths.lumen.reference = { median(&LumenReference::lumen), 0.0,
         median(&LumenReference::radius) };
-      this->Courses.lumen.reference.background = std::min_element(seen.begin(), seen.end(),
+      this->Paths.lumen.reference.background = std::min_element(seen.begin(), seen.end(),
         [](const LumenReference& a, const LumenReference& b)
         { return a.background < b.background; })->background;
     }
   }
-  this->Courses.lumen.maximumRadius = this->Settings.maximumRadius;
-  if (this->Courses.lumen.maximumRadius == 0.0)
+  this->Paths.lumen.maximumRadius = this->Settings.maximumRadius;
+  if (this->Paths.lumen.maximumRadius == 0.0)
   {
-    if (!std::isnan(this->Courses.lumen.level))
+    if (!std::isnan(this->Paths.lumen.level))
     {
       const float* distance = this->March.WallDistance();
-      this->Courses.lumen.maximumRadius =
+      this->Paths.lumen.maximumRadius =
         1.5 * static_cast<double>(*std::max_element(distance, distance + voxels)) +
-        this->Courses.voxel;
+        this->Paths.voxel;
     }
     else
     {
       // Seeds beside the axis show less than the vessel's width: 3 mm, as coronary arteries have, are always looked for.
       // No scanner's voxels are smaller than 0.02 mm: then the unit is the metre.
-      const double usual = this->Courses.voxel < 0.02 ? 0.003 : 3.0;
-      this->Courses.lumen.maximumRadius =
-        std::max({ 2.0 * this->Courses.lumen.reference.radius, 6.0 * this->Courses.voxel, usual });
+      const double usual = this->Paths.voxel < 0.02 ? 0.003 : 3.0;
+      this->Paths.lumen.maximumRadius =
+        std::max({ 2.0 * this->Paths.lumen.reference.radius, 6.0 * this->Paths.voxel, usual });
     }
   }
 }
@@ -194,8 +194,8 @@ double Extractor::IntensityThreshold() const
   {
     return -std::numeric_limits<double>::infinity();
   }
-  return std::isnan(this->Settings.intensityThreshold) ? this->Courses.lumen.reference.background +
-      0.4 * (this->Courses.lumen.reference.lumen - this->Courses.lumen.reference.background)
+  return std::isnan(this->Settings.intensityThreshold) ? this->Paths.lumen.reference.background +
+      0.4 * (this->Paths.lumen.reference.lumen - this->Paths.lumen.reference.background)
                                                        : this->Settings.intensityThreshold;
 }
 
@@ -204,7 +204,7 @@ double Extractor::SeedReach() const
 {
   return this->Settings.snapDistance > 0.0
     ? this->Settings.snapDistance
-    : std::max(3.0 * this->Courses.voxel, this->Courses.lumen.reference.radius);
+    : std::max(3.0 * this->Paths.voxel, this->Paths.lumen.reference.radius);
 }
 
 /// The member nearest to a given point, or None: then `end` says why.
@@ -256,8 +256,7 @@ void Extractor::MarchFromSeeds()
   const ProgressCallback progress = this->Progress
     ? ProgressCallback([&](double fraction) { return this->Progress(0.1 + 0.5 * fraction); })
     : ProgressCallback();
-  this->March.March(
-    *this->Courses.image, this->Courses.lumen.reference, this->SeedMembers, progress);
+  this->March.March(*this->Paths.image, this->Paths.lumen.reference, this->SeedMembers, progress);
   this->Result.memory = this->March.MemorySize() +
     this->March.Region().Size() * (sizeof(float) + sizeof(std::int32_t)) +
     this->MaskImage.size() * sizeof(std::int16_t);
@@ -265,28 +264,28 @@ void Extractor::MarchFromSeeds()
 
 /// An ostium is at the edge of the aorta, its surroundings are not a vessel's: once a whole vessel is
 /// known, its lumen is what others are compared with.
-void Extractor::Calibrate(const MeasuredCourse& course)
+void Extractor::Calibrate(const MeasuredPath& path)
 {
-  if (!std::isnan(this->Courses.lumen.level))
+  if (!std::isnan(this->Paths.lumen.level))
   {
     return;
   }
   std::vector<double> values;
   std::vector<double> behind;
-  for (std::size_t i = 0; i < course.size(); ++i)
+  for (std::size_t i = 0; i < path.size(); ++i)
   {
-    if (course.confidence[i] > 0.8)
+    if (path.confidence[i] > 0.8)
     {
-      values.push_back(course.lumen[i]);
-      behind.push_back(course.behind[i]);
+      values.push_back(path.lumen[i]);
+      behind.push_back(path.behind[i]);
     }
   }
   if (values.size() >= 10)
   {
-    this->Courses.lumen.reference.lumen =
-      std::max(this->Courses.lumen.reference.lumen, QuantileOf(std::move(values), 0.75));
+    this->Paths.lumen.reference.lumen =
+      std::max(this->Paths.lumen.reference.lumen, QuantileOf(std::move(values), 0.75));
     // The darkest surroundings: elsewhere muscle may lie against the vessel.
-    this->Courses.lumen.reference.background = QuantileOf(std::move(behind), 0.25);
+    this->Paths.lumen.reference.background = QuantileOf(std::move(behind), 0.25);
     this->Calibrated = true;
   }
 }
@@ -299,7 +298,7 @@ void Extractor::CorrectRadii()
   {
     return;
   }
-  const LumenReference& reference = this->Courses.lumen.reference;
+  const LumenReference& reference = this->Paths.lumen.reference;
   const double contrast = reference.lumen - reference.background;
   if (this->Settings.blur == 0.0 && contrast > 0.0)
   {
@@ -315,53 +314,53 @@ void Extractor::CorrectRadii()
     if (blurs.size() >= 20)
     {
       this->Blur = std::min(
-        std::max(MedianOf(std::move(blurs)), 0.4 * this->Courses.voxel), 2.0 * this->Courses.voxel);
+        std::max(MedianOf(std::move(blurs)), 0.4 * this->Paths.voxel), 2.0 * this->Paths.voxel);
     }
   }
   this->Result.blur = this->Blur;
   // A vessel thinner than half the blur shows less than 12 % of its contrast: what is seen is wider,
   // and what was measured narrower, or continued into the parent, is not the vessel's width.
-  const double least = 0.5 * this->Blur;
+  const double minimum = 0.5 * this->Blur;
   for (double& radius : this->Tree.radius)
   {
-    radius = std::max(least, RadiusFromHalfMaximum(radius, this->Blur));
+    radius = std::max(minimum, RadiusFromHalfMaximum(radius, this->Blur));
   }
 }
 
 /// @returns the last point of the new branch in the tree, or -1 if there is none
-std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
+std::int64_t Extractor::Append(const MinimalPath& way, int treeId, bool wanted)
 {
   if (!way.closed)
   {
     return -1;
   }
-  MeasuredCourse course;
-  course.points = ResampleCurve({ way.points.rbegin(), way.points.rend() }, this->Courses.step);
-  if (course.size() < 3)
+  MeasuredPath path;
+  path.points = ResampleCurve({ way.points.rbegin(), way.points.rend() }, this->Paths.step);
+  if (path.size() < 3)
   {
     return -1;
   }
-  const bool root = way.owner == VesselWay::noOwner;
+  const bool root = way.owner == MinimalPath::noOwner;
   const double parentRadius = root ? 0.0 : this->Tree.radius[way.owner];
-  const double least = this->Settings.minimumBranchLength > 0.0
+  const double minimum = this->Settings.minimumBranchLength > 0.0
     ? this->Settings.minimumBranchLength
-    : std::max(10.0 * this->Courses.voxel, 1.5 * parentRadius);
-  if (!wanted && (course.size() - 1) * this->Courses.step < least)
+    : std::max(10.0 * this->Paths.voxel, 1.5 * parentRadius);
+  if (!wanted && (path.size() - 1) * this->Paths.step < minimum)
   {
     return -1;
   }
 
   // Steps of voxels gone; then the sections of a path that is still off the axis.
-  course.confidence.assign(course.size(), 1.0);
-  this->Courses.SmoothPositions(course, 10.0, 10.0);
-  this->Courses.Measure(course, this->Settings.snap);
+  path.confidence.assign(path.size(), 1.0);
+  this->Paths.SmoothPositions(path, 10.0, 10.0);
+  this->Paths.Measure(path, this->Settings.snap);
   if (this->Settings.snap)
   {
-    this->Courses.Recentre(course);
+    this->Paths.Recentre(path);
   }
   if (!wanted)
   {
-    MarkCrossings(course, this->Input.bridges, this->Courses);
+    MarkCrossings(path, this->Input.bridges, this->Paths);
     std::vector<double> before;
     if (!root)
     {
@@ -375,26 +374,26 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
         }
       }
     }
-    const std::size_t end = this->Courses.SeenUpTo(
-      course, root ? this->Courses.lumen.maximumRadius : parentRadius, before);
-    course.resize(end);
-    if ((static_cast<double>(end) - 1.0) * this->Courses.step < least)
+    const std::size_t end =
+      this->Paths.SeenUpTo(path, root ? this->Paths.lumen.maximumRadius : parentRadius, before);
+    path.resize(end);
+    if ((static_cast<double>(end) - 1.0) * this->Paths.step < minimum)
     {
       return -1;
     }
   }
   if (root && !this->Calibrated)
   {
-    this->Calibrate(course);
+    this->Calibrate(path);
   }
   if (this->Settings.snap)
   {
     for (int round = 0; round < 2; ++round)
     {
-      this->Courses.SmoothPositions(course, root ? 0.05 : 0.0, 0.0);
-      course.points = ResampleCurve(course.points, this->Courses.step);
-      course.resize(course.points.size());
-      this->Courses.Measure(course, true);
+      this->Paths.SmoothPositions(path, root ? 0.05 : 0.0, 0.0);
+      path.points = ResampleCurve(path.points, this->Paths.step);
+      path.resize(path.points.size());
+      this->Paths.Measure(path, true);
     }
   }
   std::int64_t start = -1;
@@ -402,17 +401,17 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
   {
     const auto parent = static_cast<std::size_t>(this->BranchOf[way.owner]);
     start = static_cast<std::int64_t>(
-      JoinParent(course, this->Tree, this->Tree.branches[parent].points, way.owner, this->Courses));
+      JoinParent(path, this->Tree, this->Tree.branches[parent].points, way.owner, this->Paths));
   }
-  if (course.size() < 3)
+  if (path.size() < 3)
   {
     return -1;
   }
   if (this->Settings.snap)
   {
-    this->Courses.SmoothPositions(course, root ? 0.05 : 1e3, 0.0);
+    this->Paths.SmoothPositions(path, root ? 0.05 : 1e3, 0.0);
   }
-  this->Courses.SmoothRadii(course);
+  this->Paths.SmoothRadii(path);
 
   VesselTree::Branch branch;
   branch.groupId = static_cast<int>(this->Tree.branches.size());
@@ -422,13 +421,13 @@ std::int64_t Extractor::Append(const VesselWay& way, int treeId, bool wanted)
     branch.parentGroupId = this->BranchOf[start];
     branch.points.push_back(start);
   }
-  for (std::size_t i = root ? 0 : 1; i < course.size(); ++i)
+  for (std::size_t i = root ? 0 : 1; i < path.size(); ++i)
   {
     branch.points.push_back(static_cast<std::int64_t>(this->Tree.points.size()));
-    this->Tree.points.push_back(course.points[i]);
-    this->Tree.radius.push_back(course.radius[i]);
-    this->Tree.confidence.push_back(course.confidence[i]);
-    this->PointLumen.push_back(course.lumen[i]);
+    this->Tree.points.push_back(path.points[i]);
+    this->Tree.radius.push_back(path.radius[i]);
+    this->Tree.confidence.push_back(path.confidence[i]);
+    this->PointLumen.push_back(path.lumen[i]);
     this->BranchOf.push_back(branch.groupId);
   }
   this->Tree.branches.push_back(branch);
@@ -443,8 +442,8 @@ void Extractor::Own(std::size_t index)
   {
     const auto point = static_cast<std::size_t>(p);
     const Vector3 centre = GridIndex(this->Input.grid, this->Tree.points[point]);
-    const double own = this->Tree.radius[point] + 0.25 * this->Courses.voxel;
-    const double cover = 1.3 * this->Tree.radius[point] + 1.5 * this->Courses.voxel;
+    const double own = this->Tree.radius[point] + 0.25 * this->Paths.voxel;
+    const double cover = 1.3 * this->Tree.radius[point] + 1.5 * this->Paths.voxel;
     const auto distanceTo = [&](const Vector3& from, const Vector3& to)
     { return (to - from).cwiseProduct(this->Input.grid.spacing).norm(); };
     BoxAround(centre, Vector3::Constant(cover).cwiseQuotient(this->Input.grid.spacing),
@@ -466,7 +465,7 @@ void Extractor::Own(std::size_t index)
           this->Covered[number] = true;
           const std::int32_t old = this->Owner[number];
           if (distance <= own &&
-            (old == VesselWay::noOwner ||
+            (old == MinimalPath::noOwner ||
               distance < distanceTo(GridIndex(this->Input.grid, this->Tree.points[old]), voxel)))
           {
             this->Owner[number] = static_cast<std::int32_t>(p);
@@ -486,12 +485,13 @@ void Extractor::FindTips()
     VoxelRegion::Address address;
   };
   std::vector<Tip> tips;
-  const double least = this->Settings.minimumBranchLength > 0.0 ? this->Settings.minimumBranchLength
-                                                                : 10.0 * this->Courses.voxel;
+  const double minimum = this->Settings.minimumBranchLength > 0.0
+    ? this->Settings.minimumBranchLength
+    : 10.0 * this->Paths.voxel;
   this->March.Region().ForEach(
     [&](std::uint32_t number, VoxelRegion::Address address)
     {
-      if (!std::isfinite(length[number]) || length[number] < least)
+      if (!std::isfinite(length[number]) || length[number] < minimum)
       {
         return;
       }
@@ -546,8 +546,8 @@ void Extractor::FindTips()
       return;
     }
     const std::array<int, 3> index = this->March.Region().IndexOf(tip.address);
-    const VesselWay way =
-      this->March.WayBack(Vector3(index[0], index[1], index[2]), tip.number, this->Owner);
+    const MinimalPath way =
+      this->March.Backtrack(Vector3(index[0], index[1], index[2]), tip.number, this->Owner);
     steps += static_cast<std::int64_t>(way.points.size());
     if (this->Append(way, this->March.Marched().Source()[tip.number], false) >= 0)
     {
@@ -576,15 +576,15 @@ void Extractor::FindTips()
 bool Extractor::ThinBranchesFor(ThinBranchSettings& settings) const
 {
   const double contrast =
-    this->Courses.lumen.reference.lumen - this->Courses.lumen.reference.background;
+    this->Paths.lumen.reference.lumen - this->Paths.lumen.reference.background;
   if (!this->Settings.thinBranches || !this->Input.intensity || !this->Calibrated ||
     !(contrast > 0.0))
   {
     return false;
   }
-  settings.voxel = this->Courses.voxel;
-  settings.minimumLength = std::max(this->Settings.minimumBranchLength, 15.0 * this->Courses.voxel);
-  settings.maximumLength = 200.0 * this->Courses.voxel;
+  settings.voxel = this->Paths.voxel;
+  settings.minimumLength = std::max(this->Settings.minimumBranchLength, 15.0 * this->Paths.voxel);
+  settings.maximumLength = 200.0 * this->Paths.voxel;
   settings.contrast = contrast;
   return true;
 }
@@ -600,8 +600,8 @@ bool Extractor::ExcludeVeins(
   const VesselTree& tree = this->Result.tree;
   std::vector<VeinBranch> found;
   const auto closedBefore = [&](const Vector3& point) { return this->Excluded.Contains(point); };
-  for (VeinBranch& branch : JudgeBranches(
-         tree, *this->Courses.image, this->Courses.lumen.reference, this->Blur, closedBefore))
+  for (VeinBranch& branch :
+    JudgeBranches(tree, *this->Paths.image, this->Paths.lumen.reference, this->Blur, closedBefore))
   {
     if (branch.probability >= 0.5)
     {
@@ -613,7 +613,7 @@ bool Extractor::ExcludeVeins(
   {
     return false;
   }
-  excluded.Close(found, tree, this->Courses.voxel, veins);
+  excluded.Close(found, tree, this->Paths.voxel, veins);
   return true;
 }
 
@@ -627,22 +627,21 @@ void Extractor::FollowThinBranches()
   }
   // Several spots lead to one vessel: what was followed once, whether to keep or not, is done.
   std::vector<Vector3> done;
-  for (const ThinBranch& branch : FindThinBranches(*this->Courses.image, this->Tree, settings))
+  for (const ThinBranch& branch : FindThinBranches(*this->Paths.image, this->Tree, settings))
   {
     std::size_t known = 0;
     for (const Vector3& point : branch.points)
     {
       known += std::any_of(done.begin(), done.end(),
-        [&](const Vector3& other) {
-          return (other - point).squaredNorm() < 4.0 * this->Courses.voxel * this->Courses.voxel;
-        });
+        [&](const Vector3& other)
+        { return (other - point).squaredNorm() < 4.0 * this->Paths.voxel * this->Paths.voxel; });
     }
     if (2 * known > branch.points.size() || this->Excluded.LeadsInside(branch.points))
     {
       continue;
     }
     done.insert(done.end(), branch.points.begin(), branch.points.end());
-    VesselWay way;
+    MinimalPath way;
     way.owner = branch.parent;
     way.points.assign(branch.points.rbegin(), branch.points.rend());
     const auto parent = static_cast<std::size_t>(this->BranchOf[branch.parent]);
@@ -658,7 +657,7 @@ void Extractor::LengthenTips()
   {
     return;
   }
-  const std::vector<TipPath> paths = FollowTips(*this->Courses.image, this->Tree, settings);
+  const std::vector<TipPath> paths = FollowTips(*this->Paths.image, this->Tree, settings);
   for (std::size_t b = 0; b < paths.size(); ++b)
   {
     if (paths[b].points.empty() || this->Excluded.LeadsInside(paths[b].points))
@@ -668,20 +667,20 @@ void Extractor::LengthenTips()
     std::vector<std::int64_t>& chain = this->Tree.branches[b].points;
     // With a part of what is known, so that it goes on smoothly.
     const std::size_t known = std::min<std::size_t>(paths[b].known, 12);
-    MeasuredCourse course;
+    MeasuredPath path;
     for (std::size_t i = paths[b].known - known; i < paths[b].known; ++i)
     {
-      course.points.push_back(this->Tree.points[chain[i]]);
+      path.points.push_back(this->Tree.points[chain[i]]);
     }
-    course.points.insert(course.points.end(), paths[b].points.begin(), paths[b].points.end());
-    course.points = ResampleCurve(course.points, this->Courses.step);
-    course.confidence.assign(course.size(), 0.2);
-    std::fill_n(course.confidence.begin(), std::min(known, course.size()), 1.0);
-    this->Courses.SmoothPositions(course, 1e3, 0.0);
-    this->Courses.Measure(course, false);
-    this->Courses.SmoothRadii(course);
+    path.points.insert(path.points.end(), paths[b].points.begin(), paths[b].points.end());
+    path.points = ResampleCurve(path.points, this->Paths.step);
+    path.confidence.assign(path.size(), 0.2);
+    std::fill_n(path.confidence.begin(), std::min(known, path.size()), 1.0);
+    this->Paths.SmoothPositions(path, 1e3, 0.0);
+    this->Paths.Measure(path, false);
+    this->Paths.SmoothRadii(path);
     std::size_t at = paths[b].known;
-    for (std::size_t i = known; i < course.size(); ++i, ++at)
+    for (std::size_t i = known; i < path.size(); ++i, ++at)
     {
       if (at == chain.size())
       {
@@ -693,10 +692,10 @@ void Extractor::LengthenTips()
         this->BranchOf.push_back(static_cast<std::int32_t>(b));
       }
       const auto point = static_cast<std::size_t>(chain[at]);
-      this->Tree.points[point] = course.points[i];
-      this->Tree.radius[point] = course.radius[i];
-      this->Tree.confidence[point] = course.confidence[i];
-      this->PointLumen[point] = course.lumen[i];
+      this->Tree.points[point] = path.points[i];
+      this->Tree.radius[point] = path.radius[i];
+      this->Tree.confidence[point] = path.confidence[i];
+      this->PointLumen[point] = path.lumen[i];
     }
     chain.resize(at);
     this->Own(b);
@@ -706,13 +705,13 @@ void Extractor::LengthenTips()
 /// Branches that were entered from their ends begin where they leave their own vessel.
 void Extractor::TurnBranches()
 {
-  if (!this->Courses.image || !std::isnan(this->Courses.lumen.level) || this->Tree.branches.empty())
+  if (!this->Paths.image || !std::isnan(this->Paths.lumen.level) || this->Tree.branches.empty())
   {
     return;
   }
   const auto at = [&](std::int64_t point) { return Text(this->ToGiven(this->Tree.points[point])); };
   std::vector<TurnedBranch> turned =
-    FindTurnedBranches(*this->Courses.image, this->Tree, this->Courses.voxel);
+    FindTurnedBranches(*this->Paths.image, this->Tree, this->Paths.voxel);
   for (const TurnedBranch& one : turned)
   {
     const VesselTree::Branch branch = this->Tree.branches[one.branch];
@@ -722,7 +721,7 @@ void Extractor::TurnBranches()
     bool joined = false;
     if (one.root >= 0)
     {
-      VesselWay way;
+      MinimalPath way;
       way.owner = static_cast<std::int32_t>(one.root);
       for (std::size_t i = one.contact; i < branch.points.size(); ++i)
       {
@@ -782,13 +781,13 @@ void Extractor::FollowTargets()
     end.treeId = this->March.Marched().Source()[member];
     const Vector3 from =
       this->March.MemberAt(index) == member ? index : this->March.IndexOf(member);
-    if (this->Owner[member] != VesselWay::noOwner)
+    if (this->Owner[member] != MinimalPath::noOwner)
     {
       end.status = EndStatus::Reached;
       end.point = this->Owner[member];
       continue;
     }
-    end.point = this->Append(this->March.WayBack(from, member, this->Owner), end.treeId, true);
+    end.point = this->Append(this->March.Backtrack(from, member, this->Owner), end.treeId, true);
     end.status = end.point >= 0 ? EndStatus::Reached : EndStatus::TooShort;
     if (end.point < 0)
     {
@@ -800,11 +799,11 @@ void Extractor::FollowTargets()
 /// Trees that come out of a wide body begin where their vessel leaves it.
 void Extractor::SettleOstia()
 {
-  if (!this->Settings.snap || !this->Courses.image || !std::isnan(this->Courses.lumen.level))
+  if (!this->Settings.snap || !this->Paths.image || !std::isnan(this->Paths.lumen.level))
   {
     return;
   }
-  for (const OstialRoot& root : SettleRoots(this->Tree, *this->Courses.image, this->Courses.lumen))
+  for (const OstialRoot& root : SettleRoots(this->Tree, *this->Paths.image, this->Paths.lumen))
   {
     if (!root.found)
     {
@@ -834,16 +833,16 @@ void Extractor::Finish()
         Text(this->Given.seeds[s]) + " has no branch that is long and clear enough";
     }
   }
-  MarkBridged(this->Tree, this->Input.bridges, this->Courses);
+  MarkBridged(this->Tree, this->Input.bridges, this->Paths);
   this->CorrectRadii();
   this->SettleOstia();
   this->Result.tree = SplitAtBifurcations(this->Tree);
   if (this->Settings.snap)
   {
-    StraightenForks(this->Result.tree, this->BranchOf, this->Courses);
-    if (std::isnan(this->Courses.lumen.level))
+    StraightenForks(this->Result.tree, this->BranchOf, this->Paths);
+    if (std::isnan(this->Paths.lumen.level))
     {
-      FitForks(this->Result.tree, this->Courses);
+      FitForks(this->Result.tree, this->Paths);
     }
     MeasureTree(this->Result.tree);
   }
@@ -870,7 +869,7 @@ CenterlineResult Extractor::Run()
   this->Result.targets.resize(this->Input.targets.size());
   this->PrepareMeasurement();
   Report(this->Progress, 0.05);
-  this->March.MakeRegion(*this->Courses.image, this->IntensityThreshold(), this->Excluded.Voxels());
+  this->March.MakeRegion(*this->Paths.image, this->IntensityThreshold(), this->Excluded.Voxels());
   this->Result.regionVoxels = this->March.Region().Size();
   Report(this->Progress, 0.1);
   if (this->March.Region().Size() == 0)
@@ -898,7 +897,7 @@ CenterlineResult Extractor::Run()
   if (any)
   {
     this->MarchFromSeeds();
-    this->Owner.assign(this->March.Region().Size(), VesselWay::noOwner);
+    this->Owner.assign(this->March.Region().Size(), MinimalPath::noOwner);
     this->Covered.assign(this->March.Region().Size(), false);
     if (this->Settings.findTips || this->Input.targets.empty())
     {
@@ -1041,7 +1040,7 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   result.veins = std::move(veins);
   for (VeinBranch& branch : judged)
   {
-    std::for_each(branch.course.begin(), branch.course.end(), toWorld);
+    std::for_each(branch.path.begin(), branch.path.end(), toWorld);
   }
   result.judged = std::move(judged);
   std::for_each(result.tree.points.begin(), result.tree.points.end(), toWorld);

@@ -316,7 +316,7 @@ void ComputeGeometry(
         }
         CurveSmoothing used = smoothing;
         // Bends shorter than two diameters are the detector's, not the vessel's.
-        used.leastWavelength = std::max(used.leastWavelength, 4.0 * MedianOf(radii));
+        used.minimumWavelength = std::max(used.minimumWavelength, 4.0 * MedianOf(radii));
         courses[h].curve = ComputeCurveGeometry(positions, used);
       }
     },
@@ -350,7 +350,7 @@ void TopologySettings::Validate() const
     "Murray's exponent must be from 0.5 to 10");
   Require(std::isfinite(this->smoothing.wavelength),
     "The wavelength of the smoothing must be a finite number");
-  Require(std::isfinite(this->smoothing.leastWavelength),
+  Require(std::isfinite(this->smoothing.minimumWavelength),
     "The least wavelength of the smoothing must be a finite number");
 }
 

@@ -405,7 +405,7 @@ CurveGeometry ComputeCurveGeometry(
   {
     throw std::invalid_argument("A curve needs at least one point");
   }
-  if (!std::isfinite(smoothing.wavelength) || !std::isfinite(smoothing.leastWavelength))
+  if (!std::isfinite(smoothing.wavelength) || !std::isfinite(smoothing.minimumWavelength))
   {
     throw std::invalid_argument("The wavelength of the smoothing must be a finite number");
   }
@@ -425,7 +425,8 @@ CurveGeometry ComputeCurveGeometry(
 
   // Not more splines than the points can decide about, nor shorter than the smoothing leaves over.
   const double chords = PolylineLength(points);
-  double shortest = smoothing.wavelength >= 0.0 ? smoothing.wavelength : smoothing.leastWavelength;
+  double shortest =
+    smoothing.wavelength >= 0.0 ? smoothing.wavelength : smoothing.minimumWavelength;
   const double wanted = shortest > 0.0
     ? std::min(static_cast<double>(distinct), 8.0 * chords / shortest + 4.0)
     : static_cast<double>(distinct);
@@ -446,21 +447,22 @@ CurveGeometry ComputeCurveGeometry(
   {
     spline.SetParameters(parameters);
     const double unit = intervals / length;
-    const double least =
-      std::max(2.0 * intervals / static_cast<double>(distinct), smoothing.leastWavelength * unit);
+    const double minimum =
+      std::max(2.0 * intervals / static_cast<double>(distinct), smoothing.minimumWavelength * unit);
     if (smoothing.wavelength >= 0.0)
     {
       found = std::max(smoothing.wavelength * unit, 0.1);
     }
     else
     {
-      const double most = std::max(4.0 * intervals, 2.0 * least);
+      const double most = std::max(4.0 * intervals, 2.0 * minimum);
       constexpr int steps = 40;
       double best = std::numeric_limits<double>::infinity();
       found = most;
       for (int step = 0; step <= steps; ++step)
       {
-        const double wavelength = least * std::pow(most / least, static_cast<double>(step) / steps);
+        const double wavelength =
+          minimum * std::pow(most / minimum, static_cast<double>(step) / steps);
         const double score = spline.Fit(wavelength);
         if (score < best)
         {

@@ -27,7 +27,7 @@ struct CurveSmoothing
   double wavelength = -1.0;
 
   /// Lower limit of the wavelength that is found, in the unit of the points.
-  double leastWavelength = 0.0;
+  double minimumWavelength = 0.0;
 };
 
 /// One value a point of the curve.

@@ -425,11 +425,11 @@ inline __attribute__((always_inline)) void Front<Layout>::RunAs()
     {
       Report(this->Progress, static_cast<double>(reached) / region.Size());
     }
-    const MarchingQueue::Entry entry = queue.Least();
+    const MarchingQueue::Entry entry = queue.Minimum();
     const float arrival = MarchingQueue::Arrival(entry);
     const std::uint32_t arrivalBits = MarchingQueue::ArrivalBits(entry);
     const Address address = MarchingQueue::Address(entry);
-    queue.RemoveLeast();
+    queue.RemoveMinimum();
     ++reached;
     const std::uint32_t voxel = layout(address);
     voxels[voxel].bits = arrivalBits;

@@ -19,10 +19,10 @@ namespace
 {
 /// A vessel goes straight on if it bends by no more, and the other one by so much more. Radians.
 constexpr double MostBend = 0.5;
-constexpr double LeastTurn = 0.35;
+constexpr double MinimumTurn = 0.35;
 
 /// Points of a tree one after the other, across forks.
-struct Strand
+struct TreePath
 {
   std::vector<std::int64_t> points;
   std::vector<std::size_t> joints; ///< numbers of the forks between its ends
@@ -32,7 +32,7 @@ struct Strand
   bool Append(const VesselTree& tree, const std::vector<std::int64_t>& branch, double reach);
 };
 
-bool Strand::Append(const VesselTree& tree, const std::vector<std::int64_t>& branch, double reach)
+bool TreePath::Append(const VesselTree& tree, const std::vector<std::int64_t>& branch, double reach)
 {
   if (this->points.empty())
   {
@@ -55,27 +55,27 @@ bool Strand::Append(const VesselTree& tree, const std::vector<std::int64_t>& bra
 }
 
 /// A branch from its end on against the flow.
-Strand Upstream(const VesselTree& tree, std::size_t branch, double reach)
+TreePath Upstream(const VesselTree& tree, std::size_t branch, double reach)
 {
-  Strand strand;
+  TreePath path;
   for (int at = static_cast<int>(branch); at >= 0; at = tree.branches[at].parentGroupId)
   {
     std::vector<std::int64_t> points = tree.branches[at].points;
     std::reverse(points.begin(), points.end());
-    if (!strand.Append(tree, points, reach))
+    if (!path.Append(tree, points, reach))
     {
       break;
     }
   }
-  return strand;
+  return path;
 }
 
 /// A branch and the widest ones that follow.
-Strand Downstream(const VesselTree& tree, std::size_t branch, double reach)
+TreePath Downstream(const VesselTree& tree, std::size_t branch, double reach)
 {
-  Strand strand;
+  TreePath path;
   double widest = 1.0;
-  while (widest > 0.0 && strand.Append(tree, tree.branches[branch].points, reach))
+  while (widest > 0.0 && path.Append(tree, tree.branches[branch].points, reach))
   {
     widest = 0.0;
     const int group = tree.branches[branch].groupId;
@@ -90,7 +90,7 @@ Strand Downstream(const VesselTree& tree, std::size_t branch, double reach)
       }
     }
   }
-  return strand;
+  return path;
 }
 
 struct Fork
@@ -126,14 +126,14 @@ std::vector<Fork> ForksOfTwo(const VesselTree& tree)
 struct ForkFit
 {
   BifurcationFit fit;
-  Strand through;
+  TreePath through;
   std::size_t fork = 0; ///< number in `through`
-  Strand side;
+  TreePath side;
 };
 
 /// The least of a measure of a curve's points, in a hundred steps, and the parameter where it is.
 template <typename Measure>
-std::pair<double, double> LeastAlong(const BezierCurve& curve, const Measure& measure)
+std::pair<double, double> MinimumAlong(const BezierCurve& curve, const Measure& measure)
 {
   constexpr int pieces = 100;
   std::pair<double, double> best{ std::numeric_limits<double>::infinity(), 0.0 };
@@ -148,7 +148,7 @@ std::pair<double, double> LeastAlong(const BezierCurve& curve, const Measure& me
 
 /// Sets `turning` off from the straight axis of `parent` and `straight`, if these two are that.
 void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, std::size_t straight,
-  const CourseMeasurement& measurement)
+  const PathMeasurement& measurement)
 {
   const auto at = [&](std::int64_t point) -> Vector3& { return tree.points[point]; };
   const auto radiusAt = [&](std::int64_t point) -> double& { return tree.radius[point]; };
@@ -190,7 +190,7 @@ void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, s
   const Vector3 onwards = (at(ahead[highest]) - to).normalized();
   const Vector3 away = (at(aside[farthest]) - at(aside[out])).normalized();
   const double bend = UnitAngle(forwards, onwards);
-  if (bend > MostBend || forwards.dot(away) > std::cos(bend + LeastTurn))
+  if (bend > MostBend || forwards.dot(away) > std::cos(bend + MinimumTurn))
   {
     return;
   }
@@ -198,7 +198,7 @@ void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, s
   const BezierCurve bezier{ from, from + handle * forwards, to - handle * onwards, to };
   const auto axis = [&](double t) { return BezierPoint(bezier, t); };
   const auto distance = [&](const Vector3& point)
-  { return LeastAlong(bezier, [&](const Vector3& p) { return (p - point).norm(); }).first; };
+  { return MinimumAlong(bezier, [&](const Vector3& p) { return (p - point).norm(); }).first; };
   std::size_t alone = 1;
   while (alone < out &&
     (distance(at(aside[alone])) < 1.15 * wide ||
@@ -215,7 +215,7 @@ void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, s
     direction = (direction + GreatBranchBend * forwards).normalized();
   }
   const auto nearest =
-    LeastAlong(bezier, [&](const Vector3& p) { return LineDistance(p, origin, direction); });
+    MinimumAlong(bezier, [&](const Vector3& p) { return LineDistance(p, origin, direction); });
   const double meeting = nearest.second;
   if (nearest.first > wide || meeting < 0.02 || meeting > 0.98)
   {
@@ -241,13 +241,13 @@ void StraightenFork(VesselTree& tree, std::size_t parent, std::size_t turning, s
 }
 
 ForkFit FitFork(const VesselTree& tree, std::size_t parent, std::size_t turning,
-  std::size_t straight, double leastTurn, const CourseMeasurement& measurement)
+  std::size_t straight, double minimumTurn, const PathMeasurement& measurement)
 {
   // As far as the fit looks; the vessel that goes straight on also across its other forks.
   const double wide = tree.radius[tree.branches[parent].points.back()];
   const double reach = 8.0 * wide + 16.0 * measurement.voxel;
-  const Strand before = Upstream(tree, parent, reach);
-  const Strand behind = Downstream(tree, straight, reach);
+  const TreePath before = Upstream(tree, parent, reach);
+  const TreePath behind = Downstream(tree, straight, reach);
   ForkFit result;
   result.fork = before.points.size() - 1;
   result.through.points.assign(before.points.rbegin(), before.points.rend());
@@ -275,7 +275,7 @@ ForkFit FitFork(const VesselTree& tree, std::size_t parent, std::size_t turning,
     axes.side.push_back(tree.points[point]);
     axes.sideRadius.push_back(tree.radius[point]);
   }
-  result.fit = FitBifurcation(*measurement.image, axes, measurement.lumen, leastTurn);
+  result.fit = FitBifurcation(*measurement.image, axes, measurement.lumen, minimumTurn);
   return result;
 }
 
@@ -291,7 +291,7 @@ void MoveFork(VesselTree& tree, const ForkFit& fork)
     {
       const Vector3& point = tree.points[fork.through.points[joint]];
       knots[joint] =
-        LeastAlong(fit.through, [&](const Vector3& p) { return (p - point).norm(); }).second;
+        MinimumAlong(fit.through, [&](const Vector3& p) { return (p - point).norm(); }).second;
     }
   }
   for (auto knot = knots.begin(); std::next(knot) != knots.end(); ++knot)
@@ -320,7 +320,7 @@ void MoveFork(VesselTree& tree, const ForkFit& fork)
 }
 
 void StraightenForks(
-  VesselTree& tree, const std::vector<std::int32_t>& paths, const CourseMeasurement& measurement)
+  VesselTree& tree, const std::vector<std::int32_t>& paths, const PathMeasurement& measurement)
 {
   for (const auto& [parent, two] : ForksOfTwo(tree))
   {
@@ -338,18 +338,18 @@ void StraightenForks(
   }
 }
 
-void FitForks(VesselTree& tree, const CourseMeasurement& measurement)
+void FitForks(VesselTree& tree, const PathMeasurement& measurement)
 {
   for (const auto& [parent, two] : ForksOfTwo(tree))
   {
     // Which one goes straight on is seen by the angles, or else by the wall.
     std::array<ForkFit, 2> fits;
-    for (const double leastTurn : { LeastTurn, -2.0 * LeastTurn })
+    for (const double minimumTurn : { MinimumTurn, -2.0 * MinimumTurn })
     {
       for (std::size_t turning = 0; turning < 2; ++turning)
       {
         fits[turning] =
-          FitFork(tree, parent, two[turning], two[1 - turning], leastTurn, measurement);
+          FitFork(tree, parent, two[turning], two[1 - turning], minimumTurn, measurement);
       }
       if (fits[0].fit.found || fits[1].fit.found)
       {

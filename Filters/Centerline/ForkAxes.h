@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_ForkAxes_h
 #define DynamicCoronary_ForkAxes_h
 
-#include "MeasuredCourse.h"
+#include "MeasuredPath.h"
 #include "VesselTree.h"
 
 namespace coronary
@@ -17,11 +17,11 @@ namespace coronary
  * @param paths  for each point the path that it was found on
  */
 void StraightenForks(
-  VesselTree& tree, const std::vector<std::int32_t>& paths, const CourseMeasurement& measurement);
+  VesselTree& tree, const std::vector<std::int32_t>& paths, const PathMeasurement& measurement);
 
 /// The axes at the mouths of branches, as the wall around them has it. For images, not for fixed levels.
 /// @param tree  split, numbered by groups
-void FitForks(VesselTree& tree, const CourseMeasurement& measurement);
+void FitForks(VesselTree& tree, const PathMeasurement& measurement);
 }
 
 #endif

@@ -16,8 +16,8 @@
 namespace coronary
 {
 // All lengths are millimetres of the mean heart.
-constexpr double Deviation = 8.0; ///< of a vessel's course between individuals
-constexpr double Misfit = 4.5;    ///< greatest cost of an observation
+constexpr double PositionDeviation = 8.0;      ///< of a vessel's course between individuals
+constexpr double MaximumObservationCost = 4.5; ///< greatest cost of an observation
 
 enum class TreeSide
 {

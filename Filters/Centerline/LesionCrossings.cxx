@@ -7,10 +7,10 @@ namespace coronary
 {
 namespace
 {
-constexpr double LeastUnseen = 1.5; ///< mm of a way across a lesion that are a passage
+constexpr double MinimumUnseen = 1.5; ///< mm of a way across a lesion that are a passage
 
 /// Mm to a way across a lesion that are on it.
-double Reach(const CourseMeasurement& measurement)
+double Reach(const PathMeasurement& measurement)
 {
   return 2.0 * measurement.voxel + 0.5 * measurement.step;
 }
@@ -22,22 +22,22 @@ bool IsOn(const VesselBridge& bridge, const Vector3& place, double reach)
 }
 }
 
-void MarkCrossings(MeasuredCourse& course, const std::vector<VesselBridge>& bridges,
-  const CourseMeasurement& measurement)
+void MarkCrossings(
+  MeasuredPath& path, const std::vector<VesselBridge>& bridges, const PathMeasurement& measurement)
 {
-  course.crossing.assign(course.size(), 0);
+  path.crossing.assign(path.size(), 0);
   const double reach = Reach(measurement);
   for (const VesselBridge& bridge : bridges)
   {
-    for (std::size_t i = 0; i < course.size(); ++i)
+    for (std::size_t i = 0; i < path.size(); ++i)
     {
-      course.crossing[i] = course.crossing[i] != 0 || IsOn(bridge, course.points[i], reach);
+      path.crossing[i] = path.crossing[i] != 0 || IsOn(bridge, path.points[i], reach);
     }
   }
 }
 
 void MarkBridged(
-  VesselTree& tree, const std::vector<VesselBridge>& bridges, const CourseMeasurement& measurement)
+  VesselTree& tree, const std::vector<VesselBridge>& bridges, const PathMeasurement& measurement)
 {
   tree.bridged.assign(tree.points.size(), 0);
   tree.bridgeConfidence.assign(tree.points.size(), 1.0);
@@ -71,7 +71,7 @@ void MarkBridged(
         // ends does not pass.
         const Vector3& middle = bridge.points[bridge.points.size() / 2];
         if (passed[b] == 0 &&
-          (unseen[b] >= LeastUnseen || (middle - tree.points[p]).squaredNorm() <= reach * reach))
+          (unseen[b] >= MinimumUnseen || (middle - tree.points[p]).squaredNorm() <= reach * reach))
         {
           passed[b] = 1;
           certain *= bridge.confidence;

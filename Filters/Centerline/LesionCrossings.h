@@ -5,20 +5,20 @@
 #ifndef DynamicCoronary_LesionCrossings_h
 #define DynamicCoronary_LesionCrossings_h
 
-#include "MeasuredCourse.h"
+#include "MeasuredPath.h"
 #include "VesselBridge.h"
 #include "VesselTree.h"
 
 namespace coronary
 {
 /// Which samples lie on a way across a lesion.
-void MarkCrossings(MeasuredCourse& course, const std::vector<VesselBridge>& bridges,
-  const CourseMeasurement& measurement);
+void MarkCrossings(
+  MeasuredPath& path, const std::vector<VesselBridge>& bridges, const PathMeasurement& measurement);
 
 /// What was guessed on the ways across lesions, and how certain it is that what lies behind them belongs to the tree.
 /// @param tree  its `bridged` and `bridgeConfidence` are set
 void MarkBridged(
-  VesselTree& tree, const std::vector<VesselBridge>& bridges, const CourseMeasurement& measurement);
+  VesselTree& tree, const std::vector<VesselBridge>& bridges, const PathMeasurement& measurement);
 }
 
 #endif

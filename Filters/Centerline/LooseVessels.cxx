@@ -23,11 +23,11 @@ namespace coronary
 {
 namespace
 {
-constexpr double LeastLength = 8.0; ///< mm
-constexpr double Margin = 20.0;     ///< mm around the tree: half the way between its branches
+constexpr double MinimumLength = 8.0; ///< mm
+constexpr double Margin = 20.0;       ///< mm around the tree: half the way between its branches
 /// Vesselness of a piece's voxels, in that on the axes of thin arteries: it falls so far towards their walls.
-constexpr double LeastTube = 0.2;
-constexpr double LeastShare = 0.15;    ///< of the contrast between muscle and blood
+constexpr double MinimumTube = 0.2;
+constexpr double MinimumShare = 0.15;  ///< of the contrast between muscle and blood
 constexpr double TooBright = 1.6;      ///< the same: bone
 constexpr double Thin = 1.2;           ///< mm, radius
 constexpr double Step = 1.0;           ///< mm between sections
@@ -49,8 +49,8 @@ constexpr double EndLength = 3.0; ///< mm over which an end's radius is taken
 constexpr double OnwardGap = 15.0;    ///< mm from the tip
 constexpr double OnwardCosine = 0.75; ///< of the angles between the tip, the gap and what goes on
 constexpr double OnwardOdds = 2.0;
-constexpr double SideCosine = 0.5;  ///< the same, of what comes from the side of a vessel
-constexpr double LeastOnward = 5.0; ///< mm of either
+constexpr double SideCosine = 0.5;    ///< the same, of what comes from the side of a vessel
+constexpr double MinimumOnward = 5.0; ///< mm of either
 /// Mean distance of true arteries from those of the mean heart is less; beyond it grows doubt.
 constexpr double UsualAway = 10.0; ///< mm of the mean heart
 
@@ -205,7 +205,7 @@ private:
   bool GoesOn(const std::vector<Vector3>& axis) const;
   bool ComesFromASide(const std::vector<Vector3>& axis) const;
   std::vector<Section> Sections(const std::vector<Vector3>& axis) const;
-  static std::pair<std::size_t, std::size_t> BestStretch(const std::vector<Section>& sections);
+  static std::pair<std::size_t, std::size_t> BestInterval(const std::vector<Section>& sections);
   bool Describe(
     const std::vector<Vector3>& whole, std::vector<Section> sections, LooseVessel& vessel) const;
   std::vector<std::vector<std::int64_t>> Rest(const std::vector<std::int64_t>& piece,
@@ -280,7 +280,7 @@ void Search::AddPiece(
   std::int64_t first, const Take& take, std::vector<std::vector<std::int64_t>>& pieces) const
 {
   std::vector<std::int64_t> piece = this->L.Connected(first, take);
-  if (static_cast<double>(piece.size()) * std::cbrt(this->L.VoxelVolume()) >= LeastLength)
+  if (static_cast<double>(piece.size()) * std::cbrt(this->L.VoxelVolume()) >= MinimumLength)
   {
     std::sort(piece.begin(), piece.end());
     pieces.push_back(std::move(piece));
@@ -310,15 +310,15 @@ std::vector<std::vector<std::int64_t>> Search::Pieces() const
     this->L.Ball(*at, this->I.tree.radius[p] + Outside,
       [&](std::int64_t voxel, const std::array<int, 3>&) { taken[voxel] = 1; });
   }
-  const double least = LeastTube * this->Tube;
+  const double minimum = MinimumTube * this->Tube;
   const auto free = [&](std::int64_t voxel)
   {
-    if (taken[voxel] != 0 || !(this->I.vesselness[voxel] >= least))
+    if (taken[voxel] != 0 || !(this->I.vesselness[voxel] >= minimum))
     {
       return false;
     }
     const double share = this->Share(voxel);
-    return share >= LeastShare && share <= TooBright;
+    return share >= MinimumShare && share <= TooBright;
   };
   const auto take = [&](std::int64_t voxel)
   {
@@ -363,14 +363,14 @@ double Search::Away(const Vector3& position, std::string* name) const
 {
   const SegmentAtlas& atlas = SegmentAtlas::Get();
   const Vector3 place = atlas.axes.transpose() * this->I.heart.ToHeart(position) + atlas.origin;
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   const SegmentAtlas::Point* nearest = nullptr;
   for (const SegmentAtlas::Point& point : atlas.points)
   {
     const double away = (point.position - place).squaredNorm();
-    if (away < least)
+    if (away < minimum)
     {
-      least = away;
+      minimum = away;
       nearest = &point;
     }
   }
@@ -378,7 +378,7 @@ double Search::Away(const Vector3& position, std::string* name) const
   {
     *name = NameOf(*nearest);
   }
-  return std::sqrt(least);
+  return std::sqrt(minimum);
 }
 
 /// Whether most of a piece is where arteries run: vessels of the lung and ribs are many.
@@ -564,7 +564,7 @@ std::vector<Search::Section> Search::Sections(const std::vector<Vector3>& axis) 
 }
 
 /// The stretch that looks most like an artery: an artery and a vein that touch are one piece of voxels.
-std::pair<std::size_t, std::size_t> Search::BestStretch(const std::vector<Section>& sections)
+std::pair<std::size_t, std::size_t> Search::BestInterval(const std::vector<Section>& sections)
 {
   std::pair<std::size_t, std::size_t> best{ 0, 0 };
   double most = 0.0;
@@ -590,16 +590,16 @@ std::pair<std::size_t, std::size_t> Search::BestStretch(const std::vector<Sectio
 bool Search::Describe(
   const std::vector<Vector3>& whole, std::vector<Section> sections, LooseVessel& vessel) const
 {
-  const auto [first, last] = BestStretch(sections);
+  const auto [first, last] = BestInterval(sections);
   sections.assign(sections.begin() + static_cast<std::ptrdiff_t>(first),
     sections.begin() + static_cast<std::ptrdiff_t>(last));
   vessel.points.assign(whole.begin() + static_cast<std::ptrdiff_t>(first),
     whole.begin() + static_cast<std::ptrdiff_t>(last));
   vessel.length = PolylineLength(vessel.points);
-  vessel.goesOn = vessel.length >= LeastOnward && this->GoesOn(vessel.points);
+  vessel.goesOn = vessel.length >= MinimumOnward && this->GoesOn(vessel.points);
   const bool hangs =
-    vessel.goesOn || (vessel.length >= LeastOnward && this->ComesFromASide(vessel.points));
-  if (vessel.length < LeastLength && !hangs)
+    vessel.goesOn || (vessel.length >= MinimumOnward && this->ComesFromASide(vessel.points));
+  if (vessel.length < MinimumLength && !hangs)
   {
     return false;
   }
@@ -718,10 +718,10 @@ std::vector<LooseVessel> Search::VesselsOf(std::vector<std::int64_t> piece) cons
   std::vector<std::vector<std::int64_t>> parts{ std::move(piece) };
   for (int n = 0; n < most && !parts.empty(); ++n)
   {
-    const auto largest = std::max_element(
+    const auto maximum = std::max_element(
       parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
-    const std::vector<std::int64_t> part = std::move(*largest);
-    parts.erase(largest);
+    const std::vector<std::int64_t> part = std::move(*maximum);
+    parts.erase(maximum);
     if (!this->IsOnHeart(part))
     {
       continue;

@@ -21,9 +21,9 @@ constexpr double Spread = 0.07;         ///< of levels, relative; what is farthe
 constexpr double BrightestShare = 1.25; ///< of the tree's median: what is above is calcium
 
 constexpr double UsualShare = 0.7; ///< of the wide places are dimmer: some were only taken for wide
-constexpr double DimmestShare = 0.6;    ///< of the usual contrast: what shows less is no wide lumen
-constexpr double LeastShare = 0.75;     ///< of the level upstream: what is below is the blur's
-constexpr double LeastWideLength = 8.0; ///< mm: fewer wide places tell nothing
+constexpr double DimmestShare = 0.6;  ///< of the usual contrast: what shows less is no wide lumen
+constexpr double MinimumShare = 0.75; ///< of the level upstream: what is below is the blur's
+constexpr double MinimumWideLength = 8.0; ///< mm: fewer wide places tell nothing
 
 struct PointValues
 {
@@ -40,7 +40,7 @@ PointValues ValuesAt(const ImageInterpolator& image, const Vector3& position,
   PointValues values;
   values.lumen = image.At(position);
   std::vector<double> ring;
-  const double disc = std::min(0.4 * radius, image.SmallestSpacing());
+  const double disc = std::min(0.4 * radius, image.MinimumSpacing());
   for (int i = 0; i < directions; ++i)
   {
     const Vector3 direction = frame.Ray(i, directions);
@@ -63,7 +63,7 @@ double NoiseOnAxes(const VesselTree& tree, const std::vector<VesselPath>& paths,
 {
   constexpr double around =
     10.0; // mm, of the axis to either side: farther than noise hangs together
-  constexpr std::size_t least = 5;
+  constexpr std::size_t minimum = 5;
   const std::array<int, 3> size = image.Dimensions();
   std::vector<double> deviations;
   for (const VesselPath& path : paths)
@@ -73,7 +73,7 @@ double NoiseOnAxes(const VesselTree& tree, const std::vector<VesselPath>& paths,
     for (std::size_t i = path.FirstOwn(); i < path.points.size(); ++i)
     {
       const std::int64_t p = path.points[i];
-      if (counts[p] == 0 || !(tree.radius[p] > 2.5 * blur + 0.5 * values.SmallestSpacing()))
+      if (counts[p] == 0 || !(tree.radius[p] > 2.5 * blur + 0.5 * values.MinimumSpacing()))
       {
         continue;
       }
@@ -101,7 +101,7 @@ double NoiseOnAxes(const VesselTree& tree, const std::vector<VesselPath>& paths,
           near.push_back(other);
         }
       }
-      if (near.size() >= least)
+      if (near.size() >= minimum)
       {
         deviations.push_back(std::abs(value - InclusiveQuantileOf(std::move(near), 0.5)));
       }
@@ -173,7 +173,7 @@ LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselP
       }
     }
     const double before = path.parent < 0 ? usual : result.level[path.points.front()];
-    if (first >= points || path.arc[last] - path.arc[first] < LeastWideLength)
+    if (first >= points || path.arc[last] - path.arc[first] < MinimumWideLength)
     {
       for (std::size_t i = path.FirstOwn(); i < points; ++i)
       {
@@ -206,7 +206,7 @@ LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselP
     {
       // Blood loses some of its contrast on its way, and gains none.
       result.level[path.points[i]] = std::clamp(
-        smooth[std::clamp(i, first, last)], LeastShare * before, BrightestShare * before);
+        smooth[std::clamp(i, first, last)], MinimumShare * before, BrightestShare * before);
     }
   }
   result.noise = NoiseOnAxes(tree, paths, values, image, blur, counts, 0.05 * usual);

@@ -29,21 +29,21 @@ constexpr double CentreLevel = 0.7;
 struct WallSearch
 {
   const ImageInterpolator& image;
-  double lumen; ///< image value
-  double least; ///< fall that is a wall
-  double floor; ///< what is darker is no part of a wall
-  double step;  ///< mm
-  double reach; ///< mm
+  double lumen;   ///< image value
+  double minimum; ///< fall that is a wall
+  double floor;   ///< what is darker is no part of a wall
+  double step;    ///< mm
+  double reach;   ///< mm
 
-  /// @param leastShare  of the contrast, that falls at a wall
+  /// @param minimumShare  of the contrast, that falls at a wall
   WallSearch(const ImageInterpolator& of, const LumenSettings& settings, double lumenValue,
-    double leastShare, double farthest)
+    double minimumShare, double farthest)
     : image(of)
     , lumen(lumenValue)
-    , least(leastShare * (settings.reference.lumen - settings.reference.background))
+    , minimum(minimumShare * (settings.reference.lumen - settings.reference.background))
     , floor(settings.reference.background -
         0.1 * (settings.reference.lumen - settings.reference.background))
-    , step(0.5 * of.SmallestSpacing())
+    , step(0.5 * of.MinimumSpacing())
     , reach(farthest)
   {
   }
@@ -72,13 +72,13 @@ Wall WallSearch::Find(const Vector3& from, const Vector3& direction, double shar
       lowestAt = i;
     }
     // Another bright thing behind the wall, or the fall is over.
-    else if (this->lumen - lowest > this->least &&
+    else if (this->lumen - lowest > this->minimum &&
       (values[i] > lowest + 0.25 * (this->lumen - lowest) || i - lowestAt > 5))
     {
       break;
     }
   }
-  if (this->lumen - lowest < this->least)
+  if (this->lumen - lowest < this->minimum)
   {
     return {};
   }
@@ -229,7 +229,7 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
   LumenSection section;
   section.centre = position;
   section.radius = radiusGuess;
-  const double reach = settings.maximumRadius + (fixed ? 0.0 : 3.0 * image.SmallestSpacing());
+  const double reach = settings.maximumRadius + (fixed ? 0.0 : 3.0 * image.MinimumSpacing());
   WallSearch search(image, settings, 0.0, 0.15, reach);
   std::vector<Wall> walls(rays);
   std::vector<char> good(rays);
@@ -244,7 +244,7 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
     const bool centred = fixed || settled || iteration == lastRound;
     // The lumen's value over a small disc, which noise moves less than one point.
     double lumen = image.At(section.centre);
-    const double disc = std::min(0.35 * section.radius, image.SmallestSpacing());
+    const double disc = std::min(0.35 * section.radius, image.MinimumSpacing());
     for (int ray = 0; ray < 8; ++ray)
     {
       lumen += image.At(section.centre + disc * frame.Ray(ray, 8));
@@ -339,7 +339,7 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
   {
     // A small lumen is blurred: a disc of radius r shows 1 - exp(-r^2 / 2 blur^2) of its contrast.
     const double relative = (section.lumen - reference.background) / contrast;
-    const double blur = 1.1 * image.SmallestSpacing();
+    const double blur = 1.1 * image.MinimumSpacing();
     const double expected = 1.0 - std::exp(-section.radius * section.radius / (2.0 * blur * blur));
     section.confidence *= ramp(relative / std::min(1.0, expected + 0.05), 0.45, 0.7) *
       ramp((section.lumen - behind) / contrast, 0.15, 0.3);
@@ -354,7 +354,7 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
   using Vector2 = Eigen::Vector2d;
   constexpr int rays = 36;
   const WallSearch search(
-    image, settings, lumen, 0.15, 1.6 * radius + 3.0 * image.SmallestSpacing());
+    image, settings, lumen, 0.15, 1.6 * radius + 3.0 * image.MinimumSpacing());
   const CrossFrame frame(tangent.normalized());
   centre = position;
   for (int iteration = 0; iteration < 4; ++iteration)
@@ -402,8 +402,7 @@ std::vector<Vector3> MeasureWall(const ImageInterpolator& image, const Vector3& 
   const Vector3& tangent, double radius, double lumen, const LumenSettings& settings)
 {
   // A fall of less than this share is a neighbour's side.
-  const WallSearch search(
-    image, settings, lumen, 0.4, 1.8 * radius + 4.0 * image.SmallestSpacing());
+  const WallSearch search(image, settings, lumen, 0.4, 1.8 * radius + 4.0 * image.MinimumSpacing());
   const CrossFrame frame(tangent.normalized());
   std::vector<Vector3> points;
   for (int ray = 0; ray < settings.rays; ++ray)
@@ -422,7 +421,7 @@ bool MeasureReference(
   const ImageInterpolator& image, const Vector3& seed, LumenReference& reference)
 {
   constexpr int directions = 64;
-  const double spacing = image.SmallestSpacing();
+  const double spacing = image.MinimumSpacing();
   std::vector<double> values;
   values.reserve(directions);
   for (int i = 0; i < directions; ++i)
@@ -432,10 +431,10 @@ bool MeasureReference(
   std::sort(values.begin(), values.end());
   reference.lumen = values[directions / 2];
   // What is less than the noise is no wall.
-  const double least = 2.0 * (values[directions * 7 / 8] - values[directions / 8]);
+  const double minimum = 2.0 * (values[directions * 7 / 8] - values[directions / 8]);
 
   WallSearch search(image, {}, reference.lumen, 0.0, 40.0 * spacing);
-  search.least = std::max(least, 1e-3 * std::abs(reference.lumen));
+  search.minimum = std::max(minimum, 1e-3 * std::abs(reference.lumen));
   search.floor = -std::numeric_limits<double>::infinity();
   // Rays along the vessel come far, and those across find its wall.
   std::vector<double> behind;

@@ -22,7 +22,7 @@ public:
 
   double At(const Vector3& world) const;
   bool Contains(const Vector3& world) const;
-  double SmallestSpacing() const { return Image.grid.spacing.minCoeff(); }
+  double MinimumSpacing() const { return Image.grid.spacing.minCoeff(); }
   Vector3 ToIndex(const Vector3& world) const { return Inverse * (world - Image.grid.origin); }
 
 private:

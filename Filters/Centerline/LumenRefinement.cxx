@@ -23,11 +23,11 @@ namespace coronary
 namespace
 {
 constexpr int Rays = 24;
-constexpr double LeastRadius = 0.05;        ///< mm
-constexpr double GreatestGrowth = 1.4;      ///< of a radius by its measurement anew
-constexpr double LeastChange = 0.05;        ///< mm, of a radius: less counts little
-constexpr double LeastBridgedRadius = 0.25; ///< mm
-constexpr double RingStart = 1.8;           ///< blurs outside of the wall the surroundings begin
+constexpr double MinimumRadius = 0.05;        ///< mm
+constexpr double MaximumGrowth = 1.4;         ///< of a radius by its measurement anew
+constexpr double MinimumChange = 0.05;        ///< mm, of a radius: less counts little
+constexpr double MinimumBridgedRadius = 0.25; ///< mm
+constexpr double RingStart = 1.8;             ///< blurs outside of the wall the surroundings begin
 constexpr double RingEnd = 3.0;
 constexpr double CalciumHalo = 2.0; ///< blurs around an object that its blooming changes
 /// Of the contrast's brightness at a place, relative.
@@ -35,8 +35,8 @@ constexpr double LevelUncertainty = 0.06;
 /// mm along a vessel that smoothing halves in the refined radii.
 constexpr double Wavelength = 3.0;
 /// Degrees of the wall behind calcium beyond which nothing is measured.
-constexpr double GreatestArc = 180.0;
-constexpr double LeastRays = 0.4; ///< share of rays that have to count
+constexpr double MaximumArc = 180.0;
+constexpr double MinimumRays = 0.4; ///< share of rays that have to count
 
 /// Values of a section in polar coordinates around a place.
 struct PolarSection
@@ -122,7 +122,7 @@ private:
   {
     PolarSection section;
     const CrossFrame frame(tangent);
-    section.step = 0.4 * this->Image.SmallestSpacing();
+    section.step = 0.4 * this->Image.MinimumSpacing();
     section.count = std::max(4, static_cast<int>(std::ceil(reach / section.step)));
     section.values.resize(static_cast<std::size_t>(Rays) * section.count);
     section.hidden.assign(section.values.size(), 0);
@@ -203,7 +203,7 @@ private:
         known.push_back(own[ray]);
       }
     }
-    if (static_cast<double>(known.size()) < LeastRays * Rays)
+    if (static_cast<double>(known.size()) < MinimumRays * Rays)
     {
       return false;
     }
@@ -233,7 +233,7 @@ private:
       around[ray] = neighbours > 0 ? sum / neighbours : usual;
       left += counts[ray];
     }
-    return left >= LeastRays * Rays;
+    return left >= MinimumRays * Rays;
   }
 
   /// Gauss-Newton for centre, radius and level, with surroundings that are given.
@@ -243,7 +243,7 @@ private:
     using Matrix4 = Eigen::Matrix4d;
     using Vector4 = Eigen::Vector4d;
     // Noise is the same over about a voxel: so many independent values there are.
-    const double correlated = std::max(0.9 * this->Image.SmallestSpacing(), this->Blur);
+    const double correlated = std::max(0.9 * this->Image.MinimumSpacing(), this->Blur);
     const double patch = 4.0 * M_PI * correlated * correlated;
     const double most = section.count * section.step - RingStart * this->Blur;
     double noise = std::max(prior.noise, 1e-6);
@@ -333,7 +333,7 @@ private:
       }
       fit.x += change[0];
       fit.y += change[1];
-      fit.radius = std::clamp(fit.radius + change[2], LeastRadius, std::max(LeastRadius, most));
+      fit.radius = std::clamp(fit.radius + change[2], MinimumRadius, std::max(MinimumRadius, most));
       fit.level += change[3];
       fit.deviation = std::sqrt(std::max(0.0, covariance(2, 2)));
       fit.found = std::isfinite(fit.radius) && std::isfinite(fit.x) && std::isfinite(fit.y);
@@ -437,7 +437,7 @@ struct Refiner
   void Finish(const PathWork& work, RefinedLumen& result) const;
   bool IsMeasured(const Fit& fit) const
   {
-    return fit.found && fit.hiddenArc <= GreatestArc &&
+    return fit.found && fit.hiddenArc <= MaximumArc &&
       fit.deviation < std::max(fit.radius, this->blur);
   }
 };
@@ -535,7 +535,7 @@ Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected)
         std::pow((fit.level - prior.level) / prior.levelDeviation, 2) +
         std::pow(std::hypot(fit.x, fit.y) / std::max(0.8, expected), 2);
   };
-  double least = cost(best);
+  double minimum = cost(best);
   for (const double away : { 0.5, 1.0 })
   {
     for (int side = 0; side < 8; ++side)
@@ -547,9 +547,9 @@ Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected)
       fit.x += x;
       fit.y += y;
       // Another lumen than this one is none of its.
-      if (cost(fit) < 0.8 * least && std::hypot(fit.x, fit.y) < expected + fit.radius)
+      if (cost(fit) < 0.8 * minimum && std::hypot(fit.x, fit.y) < expected + fit.radius)
       {
-        least = cost(fit);
+        minimum = cost(fit);
         best = fit;
       }
     }
@@ -619,7 +619,7 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
       shiftWeights[i] = 1e3;
     }
     // Much wider than rays found it: a neighbour without a wall between, no lumen of its own.
-    else if (this->IsMeasured(fit) && fit.radius <= GreatestGrowth * radii[i] + 0.2)
+    else if (this->IsMeasured(fit) && fit.radius <= MaximumGrowth * radii[i] + 0.2)
     {
       radii[i] = fit.radius;
       weights[i] = 1.0 / (fit.deviation * fit.deviation + 0.0025);
@@ -689,11 +689,11 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
       const bool bridged = IsBridged(this->tree, p);
       // What is no more than the measurements' error changes nothing.
       const double change = smooth[i] - this->tree.radius[p];
-      const double error = LeastChange + 0.02 * this->tree.radius[p];
+      const double error = MinimumChange + 0.02 * this->tree.radius[p];
       const double radius =
         this->tree.radius[p] + change * change * change / (change * change + error * error);
       // A way across an occlusion stays a vessel.
-      result.radius[p] = std::max(bridged ? LeastBridgedRadius : LeastRadius, radius);
+      result.radius[p] = std::max(bridged ? MinimumBridgedRadius : MinimumRadius, radius);
     }
     if (moved && work.skipped[i] == 0)
     {

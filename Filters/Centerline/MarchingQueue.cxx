@@ -85,7 +85,7 @@ void MarchingQueue::SiftDown(std::size_t at, Entry entry)
   heap[at] = entry;
 }
 
-void MarchingQueue::RemoveLeast()
+void MarchingQueue::RemoveMinimum()
 {
   const Entry last = this->Heap.back();
   this->Heap.pop_back();
@@ -109,7 +109,7 @@ void MarchingQueue::ChangeWidth(double factor)
   std::vector<Entry> heap;
   heap.swap(this->Heap);
   // What leaves next is the least of all, and nothing enters before it.
-  Entry least = heap.empty() ? ~Entry{ 0 } : heap.front();
+  Entry minimum = heap.empty() ? ~Entry{ 0 } : heap.front();
   for (std::uint32_t level = 0; level < Levels; ++level)
   {
     for (std::uint32_t digit = 0; digit < 256; ++digit)
@@ -122,13 +122,13 @@ void MarchingQueue::ChangeWidth(double factor)
       taken.push_back(list);
       for (const Chunk* chunk = list; chunk != nullptr; chunk = chunk->older)
       {
-        least = std::min(
-          least, *std::min_element(chunk->entries.begin(), chunk->entries.begin() + chunk->count));
+        minimum = std::min(minimum,
+          *std::min_element(chunk->entries.begin(), chunk->entries.begin() + chunk->count));
       }
     }
   }
   this->SetWidth(factor / this->PerWidth);
-  this->Current = this->BucketOf(least);
+  this->Current = this->BucketOf(minimum);
   for (Chunk* list : taken)
   {
     this->PushAll(list);
@@ -141,7 +141,7 @@ void MarchingQueue::ChangeWidth(double factor)
 
 void MarchingQueue::Split()
 {
-  if (this->Current < LargestToRefine)
+  if (this->Current < MaximumToRefine)
   {
     this->ChangeWidth(1.0 / 16.0);
   }

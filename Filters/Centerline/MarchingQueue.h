@@ -92,7 +92,7 @@ public:
         {
           return true;
         }
-        this->RemoveLeast();
+        this->RemoveMinimum();
       }
       if (!this->Advance(keep, expect, prepare))
       {
@@ -101,9 +101,9 @@ public:
     }
   }
 
-  Entry Least() const { return this->Heap.front(); }
+  Entry Minimum() const { return this->Heap.front(); }
 
-  void RemoveLeast();
+  void RemoveMinimum();
 
   /// Greatest number of bytes that it has held.
   std::size_t MemorySize() const
@@ -122,9 +122,9 @@ private:
   static constexpr std::uint32_t CountedBuckets = 64;
   static constexpr std::size_t SmallHeap = 2048;
   static constexpr std::uint32_t MostPerBucket = 192;
-  static constexpr std::uint32_t LeastPerBucket = 12;
-  static constexpr std::uint32_t LargestToRefine = 1U << 24;
-  static constexpr std::uint32_t LargestBucket = 1U << 31;
+  static constexpr std::uint32_t MinimumPerBucket = 12;
+  static constexpr std::uint32_t MaximumToRefine = 1U << 24;
+  static constexpr std::uint32_t MaximumBucket = 1U << 31;
 
   struct Chunk
   {
@@ -183,8 +183,8 @@ private:
       this->Buckets = 0;
       this->Dealt = 0;
       // Arrivals that are all the same can not be told apart by any width.
-      const bool narrower = each > MostPerBucket && this->Current < LargestToRefine;
-      if (narrower || each < LeastPerBucket)
+      const bool narrower = each > MostPerBucket && this->Current < MaximumToRefine;
+      if (narrower || each < MinimumPerBucket)
       {
         this->ChangeWidth(narrower ? 0.25 : 4.0);
         return true;
@@ -202,7 +202,7 @@ private:
     }
     const std::uint32_t below = level + 1 == Levels ? ~0U : (1U << (8 * (level + 1))) - 1;
     const std::uint32_t next = (this->Current & ~below) | digit << (8 * level);
-    if (next > LargestBucket && this->PerWidth > 1e-300)
+    if (next > MaximumBucket && this->PerWidth > 1e-300)
     {
       this->ChangeWidth(4.0);
       return true;

@@ -56,10 +56,10 @@ Ring MeasureRing(const ImageInterpolator& image, const Vector3& position, const 
 }
 
 /// The beginning of one tree.
-class RootCourse
+class RootAxis
 {
 public:
-  RootCourse(VesselTree& tree, const VesselTree::Branch& branch, std::size_t free,
+  RootAxis(VesselTree& tree, const VesselTree::Branch& branch, std::size_t free,
     const ImageInterpolator& image, const LumenSettings& settings)
     : Tree(tree)
     , Branch(branch)
@@ -73,7 +73,7 @@ public:
       radii.push_back(this->Radius(i));
     }
     constexpr double usual = 1.8; // mm
-    this->Unit = std::max(MedianOf(std::move(radii)) / usual, 1.5 * image.SmallestSpacing());
+    this->Unit = std::max(MedianOf(std::move(radii)) / usual, 1.5 * image.MinimumSpacing());
     this->Step = 0.3 * this->Unit;
     double length = 0.0;
     for (std::size_t i = 0; i < std::min(free + 1, branch.points.size()); ++i)
@@ -164,8 +164,8 @@ private:
         radii.push_back(this->Radius(j));
         clear = clear && this->Confidence(j) >= seen;
       }
-      const auto [least, most] = std::minmax_element(radii.begin(), radii.end());
-      if (clear && *most - *least <= steady * 0.5 * (*most + *least))
+      const auto [minimum, most] = std::minmax_element(radii.begin(), radii.end());
+      if (clear && *most - *minimum <= steady * 0.5 * (*most + *minimum))
       {
         healthy = std::max(healthy, MedianOf(radii));
       }
@@ -248,7 +248,7 @@ private:
    */
   bool FollowBack(std::size_t clear, std::vector<Vector3>& course, std::size_t& last) const
   {
-    constexpr double leastClosed = 0.5;
+    constexpr double minimumClosed = 0.5;
     constexpr double whole = 0.85;          // share of the wall that shows where the middle is
     constexpr double funnel = 1.25;         // of the healthy radius
     const double beyond = 5.0 * this->Unit; // before the tree's first point
@@ -265,7 +265,7 @@ private:
     const double lumen = MedianOf(values);
     Ring ring = MeasureRing(this->Image, start, back, 1.2 * this->Radius(clear) + 0.2 * this->Unit,
       lumen, this->Settings);
-    if (ring.closed < leastClosed || !(ring.radius > 0.0))
+    if (ring.closed < minimumClosed || !(ring.radius > 0.0))
     {
       return false;
     }
@@ -284,7 +284,7 @@ private:
       {
         break; // the vessel's own end
       }
-      opened = ring.closed < leastClosed || ring.radius > funnel * radius;
+      opened = ring.closed < minimumClosed || ring.radius > funnel * radius;
       if (opened)
       {
         break;
@@ -424,7 +424,7 @@ std::vector<OstialRoot> SettleRoots(
     {
       ++free;
     }
-    result.push_back(RootCourse(tree, branch, free, image, settings).Settle());
+    result.push_back(RootAxis(tree, branch, free, image, settings).Settle());
   }
   return result;
 }

@@ -173,8 +173,8 @@ Labeler::Candidate Labeler::Align(
       pair(sample->position, nearest->position, sample->weight / ((1.0 + ratio) * (1.0 + ratio)));
       const Vector3 course = (pose.matrix * sample->tangent).normalized();
       residual += sample->weight / weights *
-        std::min(Misfit,
-          best / (2.0 * Deviation * Deviation) +
+        std::min(MaximumObservationCost,
+          best / (2.0 * PositionDeviation * PositionDeviation) +
             CourseWeight * (1.0 - course.dot(nearest->tangent)));
     }
     for (std::size_t i = 0; i < trees.size(); ++i)
@@ -186,7 +186,7 @@ Labeler::Candidate Labeler::Align(
         (4.0 * scale * scale);
       pair(this->Pieces.rootPosition[trees[i]], ostium,
         0.1 * weights / ((1.0 + ratio) * (1.0 + ratio)));
-      residual += 0.1 * std::min(Misfit, 2.0 * ratio);
+      residual += 0.1 * std::min(MaximumObservationCost, 2.0 * ratio);
     }
     if (round == rounds)
     {
@@ -282,14 +282,15 @@ std::vector<VesselCosts> Labeler::Compare(const AtlasPose& pose) const
       const Vector3 at = pose.Apply(this->Pieces.samples[s].position);
       const Vector3 course = (pose.matrix * this->Pieces.samples[s].tangent).normalized();
       VesselCosts best;
-      best.fill(Misfit);
+      best.fill(MaximumObservationCost);
       for (const SegmentAtlas::Point& point : this->Atlas.points)
       {
-        const double near = (point.position - at).squaredNorm() * (0.5 / (Deviation * Deviation));
-        double& least = best[IndexOf(point.vessel)];
-        if (near < least)
+        const double near =
+          (point.position - at).squaredNorm() * (0.5 / (PositionDeviation * PositionDeviation));
+        double& minimum = best[IndexOf(point.vessel)];
+        if (near < minimum)
         {
-          least = std::min(least, near + CourseWeight * (1.0 - course.dot(point.tangent)));
+          minimum = std::min(minimum, near + CourseWeight * (1.0 - course.dot(point.tangent)));
         }
       }
       best[IndexOf(Vessel::Other)] = Unnamed;
@@ -388,7 +389,7 @@ AtlasPose Labeler::Refine(const AtlasPose& pose, const LabelAssignment& assignme
       const auto [nearest, best] = this->Atlas.NearestOf(assignment.vessels[c], at);
       if (nearest != nullptr)
       {
-        const double ratio = best / (4.0 * Deviation * Deviation);
+        const double ratio = best / (4.0 * PositionDeviation * PositionDeviation);
         add(sample.position, nearest->position, sample.weight / ((1.0 + ratio) * (1.0 + ratio)));
       }
     }
@@ -586,14 +587,14 @@ int SplitAtSegmentBorders(CenterlineTopology& tree)
       }
       return length;
     };
-    const double least = 2.0 * tree.meanRadius[b];
+    const double minimum = 2.0 * tree.meanRadius[b];
     for (std::size_t i = 2; i < branch.points.size(); ++i)
     {
       if (segmentOf(i) == segmentOf(i - 1))
       {
         continue;
       }
-      if (lengthOf(starts.back(), i) >= least)
+      if (lengthOf(starts.back(), i) >= minimum)
       {
         starts.push_back(i);
       }
@@ -603,7 +604,7 @@ int SplitAtSegmentBorders(CenterlineTopology& tree)
       }
       // Else the short stretch stays the beginning of the one that follows.
     }
-    while (starts.size() > 1 && lengthOf(starts.back(), branch.points.size()) < least)
+    while (starts.size() > 1 && lengthOf(starts.back(), branch.points.size()) < minimum)
     {
       starts.pop_back();
     }

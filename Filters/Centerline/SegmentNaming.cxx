@@ -12,7 +12,7 @@ namespace
 using V = Vessel;
 
 constexpr double Infinity = std::numeric_limits<double>::infinity();
-constexpr double LeastNumbered = 8.0;   ///< shorter side branches are not counted
+constexpr double MinimumNumbered = 8.0; ///< shorter side branches are not counted
 constexpr double OriginDeviation = 8.0; ///< of a side branch's origin along its vessel
 constexpr double NumberedCourse = 1.0;  ///< weight of a side branch's course beside its origin
 constexpr double SkippedNumber = 2.0;   ///< cost of a first, second, ... branch that is not there
@@ -167,7 +167,7 @@ std::vector<SideBranch> SegmentNamer::SideBranches(V trunk, V kind) const
   {
     const LabelPiece& chunk = this->Pieces.pieces[c];
     if (this->Assignment.vessels[c] == kind && chunk.startsBranch && chunk.parent >= 0 &&
-      this->Assignment.vessels[chunk.parent] == trunk && this->Pieces.below[c] >= LeastNumbered)
+      this->Assignment.vessels[chunk.parent] == trunk && this->Pieces.below[c] >= MinimumNumbered)
     {
       const std::int64_t origin = this->Tree.branches[chunk.branch].points[0];
       found.push_back({ static_cast<int>(c), origin, this->Tree.abscissa[origin],
@@ -206,14 +206,14 @@ std::vector<double> SegmentNamer::CourseCosts(int start, std::size_t numbers) co
     for (std::size_t s = chunk.firstSample; s < chunk.lastSample; ++s)
     {
       const Vector3 at = this->Pose.Apply(this->Pieces.samples[s].position);
-      std::vector<double> best(numbers, Misfit);
+      std::vector<double> best(numbers, MaximumObservationCost);
       for (const SegmentAtlas::Point& point : this->Atlas.points)
       {
         if (point.vessel == kind)
         {
-          double& least = best[point.number - 1];
-          least =
-            std::min(least, (point.position - at).squaredNorm() * (0.5 / (Deviation * Deviation)));
+          double& minimum = best[point.number - 1];
+          minimum = std::min(minimum,
+            (point.position - at).squaredNorm() * (0.5 / (PositionDeviation * PositionDeviation)));
         }
       }
       for (std::size_t k = 0; k < numbers; ++k)
@@ -243,7 +243,7 @@ std::vector<SideBranch> SegmentNamer::Number(V trunk, V kind)
     for (std::size_t k = 0; k < arcs.size(); ++k)
     {
       const double off = (branch.arc - arcs[k]) / OriginDeviation;
-      cost[k] += std::min(Misfit, 0.5 * off * off);
+      cost[k] += std::min(MaximumObservationCost, 0.5 * off * off);
     }
     costs.push_back(cost);
   }

@@ -17,9 +17,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double LeastDegree = 0.30; ///< of what is listed
-constexpr double Wavelength = 80.0;  ///< mm along a vessel of the healthy calibre's changes
-constexpr double LeastSignificance =
+constexpr double MinimumDegree = 0.30; ///< of what is listed
+constexpr double Wavelength = 80.0;    ///< mm along a vessel of the healthy calibre's changes
+constexpr double MinimumSignificance =
   3.0;                       ///< standard deviations by which a narrowing exceeds its error
 constexpr double Bin = 1.0;  ///< mm, of the regression
 constexpr double Fine = 0.5; ///< mm, of the profile
@@ -277,11 +277,11 @@ std::vector<double> Closed(const std::vector<double>& values, double length)
   const auto reach = static_cast<std::ptrdiff_t>(std::lround(0.5 * length));
   std::vector<double> dilated(values.size());
   std::vector<double> closed(values.size());
-  const auto extreme = [&](const std::vector<double>& from, std::ptrdiff_t i, bool greatest)
+  const auto extreme = [&](const std::vector<double>& from, std::ptrdiff_t i, bool maximum)
   {
     const auto first = from.begin() + std::max<std::ptrdiff_t>(0, i - reach);
     const auto last = from.begin() + std::min(count, i + reach + 1);
-    return greatest ? *std::max_element(first, last) : *std::min_element(first, last);
+    return maximum ? *std::max_element(first, last) : *std::min_element(first, last);
   };
   for (std::ptrdiff_t i = 0; i < count; ++i)
   {
@@ -319,27 +319,27 @@ struct GradedPath
     return this->lumen.interpolated[this->PointAt(sample)] != 0;
   }
   void Describe(
-    std::size_t first, std::size_t least, std::size_t last, std::vector<Stenosis>& lesions) const;
+    std::size_t first, std::size_t minimum, std::size_t last, std::vector<Stenosis>& lesions) const;
   void FindLesions(std::vector<Stenosis>& lesions) const;
   void DescribeEnd(const VesselTip& tip, std::vector<Stenosis>& lesions) const;
 
 private:
-  void Place(std::size_t first, std::size_t least, std::size_t last, Stenosis& lesion) const;
+  void Place(std::size_t first, std::size_t minimum, std::size_t last, Stenosis& lesion) const;
   void Grade(
     double radius, double healthy, double radiusError, double healthyError, Stenosis& lesion) const;
 };
 
 /// Where a lesion is, by samples of the profile.
 void GradedPath::Place(
-  std::size_t first, std::size_t least, std::size_t last, Stenosis& lesion) const
+  std::size_t first, std::size_t minimum, std::size_t last, Stenosis& lesion) const
 {
-  lesion.point = this->PointAt(least);
+  lesion.point = this->PointAt(minimum);
   lesion.position = this->tree.points[lesion.point];
   lesion.segmentId = this->tree.segmentId.empty() ? 0 : this->tree.segmentId[lesion.point];
   const auto abscissa = [&](std::size_t sample)
   { return this->tree.abscissa.empty() ? 0.0 : this->tree.abscissa[this->PointAt(sample)]; };
   lesion.abscissaStart = abscissa(first);
-  lesion.abscissaLeast = abscissa(least);
+  lesion.abscissaMinimum = abscissa(minimum);
   lesion.abscissaEnd = abscissa(last);
   lesion.length = static_cast<double>(last - first) * this->profile.step;
   lesion.populationDiameter = PopulationDiameter(lesion.segmentId);
@@ -349,7 +349,7 @@ void GradedPath::Place(
 void GradedPath::Grade(
   double radius, double healthy, double radiusError, double healthyError, Stenosis& lesion) const
 {
-  lesion.leastDiameter = 2.0 * radius;
+  lesion.minimumDiameter = 2.0 * radius;
   lesion.referenceDiameter = 2.0 * healthy;
   lesion.degree = std::clamp(1.0 - radius / healthy, 0.0, 1.0);
   lesion.areaDegree = 1.0 - std::pow(1.0 - lesion.degree, 2);
@@ -367,7 +367,7 @@ void GradedPath::DescribeEnd(const VesselTip& tip, std::vector<Stenosis>& lesion
     std::max(tip.before, RadiusBeforeTip(this->tree, this->path, farther[0], farther[1]));
   // What ends in full calibre shows no lesion.
   constexpr double narrowed = 0.85; // of the radius before
-  if (healthy < LeastGradedRadius || tip.end > narrowed * tip.before)
+  if (healthy < MinimumGradedRadius || tip.end > narrowed * tip.before)
   {
     return;
   }
@@ -388,10 +388,10 @@ void GradedPath::DescribeEnd(const VesselTip& tip, std::vector<Stenosis>& lesion
 }
 
 void GradedPath::Describe(
-  std::size_t first, std::size_t least, std::size_t last, std::vector<Stenosis>& lesions) const
+  std::size_t first, std::size_t minimum, std::size_t last, std::vector<Stenosis>& lesions) const
 {
-  const double radius = this->smooth[least];
-  const double healthy = this->reference[least];
+  const double radius = this->smooth[minimum];
+  const double healthy = this->reference[minimum];
   Stenosis lesion;
   double calcium = 0.0;
   double hidden = 0.0;
@@ -412,26 +412,26 @@ void GradedPath::Describe(
     }
   }
   const auto samples = static_cast<double>(last - first + 1);
-  lesion.interpolated = this->IsHidden(least);
+  lesion.interpolated = this->IsHidden(minimum);
   // In a mouth nothing is measured; a lesion that is mostly unseen must be bridged or behind calcium.
   if (measured + hidden < 0.5 * samples && !lesion.bridged)
   {
     return;
   }
-  double deviation = std::hypot(
-    MethodError, this->profile.weight[least] > 0.0 ? this->profile.deviation[least] : 0.3 * radius);
+  double deviation = std::hypot(MethodError,
+    this->profile.weight[minimum] > 0.0 ? this->profile.deviation[minimum] : 0.3 * radius);
   deviation = std::hypot(deviation, BlurError * radius * std::exp(-radius / 0.5));
   // A part of the wall is behind calcium.
   deviation =
-    std::hypot(deviation, 0.35 * healthy * this->lumen.calciumArc[this->PointAt(least)] / 360.0);
+    std::hypot(deviation, 0.35 * healthy * this->lumen.calciumArc[this->PointAt(minimum)] / 360.0);
   const double referenceError = std::hypot(0.03 * healthy, 0.5 * this->spread);
   const double significance = (healthy - radius) / std::hypot(deviation, referenceError);
   // Behind calcium a narrowing can not be told from none: it is listed, with the range of all that it may be.
-  if (!lesion.interpolated && significance < LeastSignificance)
+  if (!lesion.interpolated && significance < MinimumSignificance)
   {
     return;
   }
-  this->Place(first, least, last, lesion);
+  this->Place(first, minimum, last, lesion);
   this->Grade(radius, healthy, deviation, referenceError, lesion);
   const bool occluded = radius <= OccludedRadius && lesion.degree > 0.85;
   if (occluded)
@@ -471,23 +471,23 @@ void GradedPath::FindLesions(std::vector<Stenosis>& lesions) const
   for (;;)
   {
     // The worst place that is left, then down to half of it on either side.
-    std::size_t least = count;
-    double worst = LeastDegree;
+    std::size_t minimum = count;
+    double worst = MinimumDegree;
     for (std::size_t i = start; i + tip < count; ++i)
     {
-      if (taken[i] == 0 && this->degree[i] >= worst && this->reference[i] >= LeastGradedRadius)
+      if (taken[i] == 0 && this->degree[i] >= worst && this->reference[i] >= MinimumGradedRadius)
       {
         worst = this->degree[i];
-        least = i;
+        minimum = i;
       }
     }
-    if (least == count)
+    if (minimum == count)
     {
       return;
     }
-    const double border = 0.5 * this->degree[least];
-    std::size_t first = least;
-    std::size_t last = least;
+    const double border = 0.5 * this->degree[minimum];
+    std::size_t first = minimum;
+    std::size_t last = minimum;
     while (first > 0 && this->degree[first - 1] > border)
     {
       --first;
@@ -517,7 +517,7 @@ void GradedPath::FindLesions(std::vector<Stenosis>& lesions) const
     // A vessel that only ever gets narrower to its end has no lesion there, but its end.
     if (!overlap && last + tip < count + tip / 2)
     {
-      this->Describe(first, least, last, lesions);
+      this->Describe(first, minimum, last, lesions);
     }
   }
 }
@@ -642,7 +642,7 @@ StenosisGrading GradeStenoses(
     }
     const std::size_t before = result.lesions.size();
     graded.FindLesions(result.lesions);
-    if (tips[n].goesOn >= LeastGoingOn)
+    if (tips[n].goesOn >= MinimumGoingOn)
     {
       graded.DescribeEnd(tips[n], result.lesions);
     }
@@ -654,7 +654,7 @@ StenosisGrading GradeStenoses(
   }
   std::stable_sort(result.lesions.begin(), result.lesions.end(),
     [](const Stenosis& a, const Stenosis& b)
-    { return a.treeId != b.treeId ? a.treeId < b.treeId : a.abscissaLeast < b.abscissaLeast; });
+    { return a.treeId != b.treeId ? a.treeId < b.treeId : a.abscissaMinimum < b.abscissaMinimum; });
   return result;
 }
 }

@@ -36,11 +36,11 @@ struct Stenosis
   Vector3 position = Vector3::Zero(); ///< mm
   int treeId = 0;
   int segmentId = 0;
-  double abscissaStart = 0.0; ///< mm from the root: where half of the narrowing is reached
-  double abscissaLeast = 0.0; ///< of the narrowest place
+  double abscissaStart = 0.0;   ///< mm from the root: where half of the narrowing is reached
+  double abscissaMinimum = 0.0; ///< of the narrowest place
   double abscissaEnd = 0.0;
   double length = 0.0;            ///< mm, from start to end
-  double leastDiameter = 0.0;     ///< mm
+  double minimumDiameter = 0.0;   ///< mm
   double referenceDiameter = 0.0; ///< mm, of the healthy vessel at the narrowest place
   double populationDiameter =
     0.0;               ///< mm, mean of the segment in men with right dominance; 0: not known
@@ -54,7 +54,7 @@ struct Stenosis
   bool interpolated = false; ///< calcium hides the narrowest place: the true one may be narrower
 };
 
-constexpr double LeastGradedRadius = 0.75; ///< mm: thinner healthy vessels are not graded
+constexpr double MinimumGradedRadius = 0.75; ///< mm: thinner healthy vessels are not graded
 
 struct StenosisGrading
 {

@@ -24,9 +24,9 @@ constexpr double Parallel = 0.05;
 Vector3 AnyNormal(const Vector3& direction)
 {
   Vector3 axis = Vector3::Zero();
-  Eigen::Index least = 0;
-  direction.cwiseAbs().minCoeff(&least);
-  axis[least] = 1.0;
+  Eigen::Index minimum = 0;
+  direction.cwiseAbs().minCoeff(&minimum);
+  axis[minimum] = 1.0;
   return (axis - axis.dot(direction) * direction).normalized();
 }
 
@@ -88,7 +88,7 @@ Vector3 Carried(const Vector3& normal, const Vector3& way, const Vector3& from, 
 }
 }
 
-std::vector<double> VesselCourse::Interpolated(const std::vector<double>& values) const
+std::vector<double> FramedCurve::Interpolated(const std::vector<double>& values) const
 {
   std::vector<double> result;
   for (const double one : this->place)
@@ -103,7 +103,7 @@ std::vector<double> VesselCourse::Interpolated(const std::vector<double>& values
   return result;
 }
 
-std::vector<double> VesselCourse::Nearest(const std::vector<double>& values) const
+std::vector<double> FramedCurve::Nearest(const std::vector<double>& values) const
 {
   std::vector<double> result;
   for (const double one : this->place)
@@ -114,7 +114,7 @@ std::vector<double> VesselCourse::Nearest(const std::vector<double>& values) con
   return result;
 }
 
-VesselCourse FollowAxis(const std::vector<Vector3>& axis, double step, double smoothing)
+FramedCurve FollowAxis(const std::vector<Vector3>& axis, double step, double smoothing)
 {
   Require(axis.size() >= 2, "A vessel's axis has at least two points.");
   Require(std::all_of(axis.begin(), axis.end(), [](const Vector3& p) { return p.allFinite(); }),
@@ -125,8 +125,8 @@ VesselCourse FollowAxis(const std::vector<Vector3>& axis, double step, double sm
   Require(length > 0.0, "A vessel's axis has no length.");
   Require(length / step < MostPlaces, "A vessel has more than a million steps.");
 
-  VesselCourse course;
-  course.step = step;
+  FramedCurve curve;
+  curve.step = step;
   // A shorter vessel has its two ends' neighbourhood at least.
   const auto count =
     std::max<std::size_t>(2, static_cast<std::size_t>(length / step * (1.0 + 1e-12)) + 1);
@@ -143,33 +143,33 @@ VesselCourse FollowAxis(const std::vector<Vector3>& axis, double step, double sm
       span = (axis[piece] - axis[piece - 1]).norm();
     }
     const double part = span > 0.0 ? std::clamp((arc - before) / span, 0.0, 1.0) : 0.0;
-    course.position.emplace_back(axis[piece - 1] + part * (axis[piece] - axis[piece - 1]));
-    course.place.push_back(double(piece - 1) + part);
+    curve.position.emplace_back(axis[piece - 1] + part * (axis[piece] - axis[piece - 1]));
+    curve.place.push_back(double(piece - 1) + part);
   }
-  course.tangent = Tangents(course.position, step, smoothing);
-  course.normal.push_back(AnyNormal(course.tangent.front()));
+  curve.tangent = Tangents(curve.position, step, smoothing);
+  curve.normal.push_back(AnyNormal(curve.tangent.front()));
   for (std::size_t n = 1; n < count; ++n)
   {
-    course.normal.push_back(Carried(course.normal.back(),
-      course.position[n] - course.position[n - 1], course.tangent[n - 1], course.tangent[n]));
+    curve.normal.push_back(Carried(curve.normal.back(), curve.position[n] - curve.position[n - 1],
+      curve.tangent[n - 1], curve.tangent[n]));
   }
   for (std::size_t n = 0; n < count; ++n)
   {
-    course.binormal.emplace_back(course.tangent[n].cross(course.normal[n]));
+    curve.binormal.emplace_back(curve.tangent[n].cross(curve.normal[n]));
   }
-  return course;
+  return curve;
 }
 
 std::array<GreyPicture, 2> StraightenVessel(const ImageInterpolator& image,
-  const VesselCourse& course, double halfWidth, const ProgressCallback& progress)
+  const FramedCurve& curve, double halfWidth, const ProgressCallback& progress)
 {
-  Require(halfWidth > 0.0 && halfWidth / course.step < 0.5 * MostRows,
+  Require(halfWidth > 0.0 && halfWidth / curve.step < 0.5 * MostRows,
     "The width of a straightened view is out of range.");
-  const int half = std::max(1, static_cast<int>(std::lround(halfWidth / course.step)));
+  const int half = std::max(1, static_cast<int>(std::lround(halfWidth / curve.step)));
   std::array<GreyPicture, 2> cuts;
   for (GreyPicture& cut : cuts)
   {
-    cut.width = static_cast<int>(course.position.size());
+    cut.width = static_cast<int>(curve.position.size());
     cut.height = 2 * half + 1;
     cut.values.resize(static_cast<std::size_t>(cut.width) * static_cast<std::size_t>(cut.height));
   }
@@ -180,13 +180,13 @@ std::array<GreyPicture, 2> StraightenVessel(const ImageInterpolator& image,
       for (std::int64_t n = first; n < last; ++n)
       {
         GreyPicture& cut = cuts[n / cuts[0].height];
-        const auto& across = n < cuts[0].height ? course.normal : course.binormal;
+        const auto& across = n < cuts[0].height ? curve.normal : curve.binormal;
         const auto row = n % cuts[0].height;
-        const double aside = double(half - row) * course.step;
+        const double aside = double(half - row) * curve.step;
         float* values = cut.values.data() + row * cut.width;
-        for (std::size_t x = 0; x < course.position.size(); ++x)
+        for (std::size_t x = 0; x < curve.position.size(); ++x)
         {
-          const Vector3 place = course.position[x] + aside * across[x];
+          const Vector3 place = curve.position[x] + aside * across[x];
           values[x] = image.Contains(place) ? static_cast<float>(image.At(place)) : Outside;
         }
       }
@@ -269,9 +269,9 @@ SlabPlane PlaneOfVessel(
   }
   // The largest part of the direction decides the side, so that noise does not: from the front, the head, the left.
   const Vector3 wanted(0.3, -1.0, 0.6);
-  Eigen::Index greatest = 0;
-  towards.cwiseAbs().cwiseProduct(wanted.cwiseAbs()).maxCoeff(&greatest);
-  if (towards[greatest] * wanted[greatest] < 0.0)
+  Eigen::Index maximum = 0;
+  towards.cwiseAbs().cwiseProduct(wanted.cwiseAbs()).maxCoeff(&maximum);
+  if (towards[maximum] * wanted[maximum] < 0.0)
   {
     towards = -towards;
   }
@@ -329,7 +329,7 @@ GreyPicture ProjectSlab(const ImageInterpolator& image, const SlabPlane& plane,
   Require(depths.empty() || depths.size() == picture.values.size(),
     "A slab has another number of depths than pixels.");
   // Finer than the voxels, that no bright one is passed.
-  const int samples = 1 + static_cast<int>(std::ceil(thickness / (0.7 * image.SmallestSpacing())));
+  const int samples = 1 + static_cast<int>(std::ceil(thickness / (0.7 * image.MinimumSpacing())));
   const double between = samples > 1 ? thickness / (samples - 1) : 0.0;
   ParallelFor(
     plane.height, 4,

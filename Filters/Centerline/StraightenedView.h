@@ -34,7 +34,7 @@ struct GreyPicture
 };
 
 /// Places at equal steps along a vessel's axis, with a frame. Vectors are unit and at right angles.
-struct VesselCourse
+struct FramedCurve
 {
   double step = 0.0;             ///< mm of arc between two places
   std::vector<Vector3> position; ///< on the axis as it was given, mm
@@ -56,16 +56,16 @@ struct VesselCourse
  * @throws std::invalid_argument for less than two points, an axis without length, coordinates that are not finite,
  *         a step that is not above 0 or gives more than a million places, or a smoothing below 0
  */
-VesselCourse FollowAxis(const std::vector<Vector3>& axis, double step, double smoothing = 1.0);
+FramedCurve FollowAxis(const std::vector<Vector3>& axis, double step, double smoothing = 1.0);
 
 /**
- * Two straightened cuts of a vessel at right angles: a column a place of the course, rows along its normal and along
- * its binormal, the axis in the middle row, positive above; pixels are course.step wide and high.
+ * Two straightened cuts of a vessel at right angles: a column a place of the curve, rows along its normal and along
+ * its binormal, the axis in the middle row, positive above; pixels are curve.step wide and high.
  * @param halfWidth  mm to each side of the axis
  * @throws std::invalid_argument for a half width that is not above 0 or wider than 1000 pixels; Cancelled
  */
 std::array<GreyPicture, 2> StraightenVessel(const ImageInterpolator& image,
-  const VesselCourse& course, double halfWidth, const ProgressCallback& progress = {});
+  const FramedCurve& curve, double halfWidth, const ProgressCallback& progress = {});
 
 /// A picture's plane. Vectors are unit and at right angles; a viewer looks against `towards`.
 struct SlabPlane

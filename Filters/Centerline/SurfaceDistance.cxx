@@ -196,15 +196,15 @@ void DistanceField::Add(std::size_t t)
   const Vector3 a = this->Corner(t, 0);
   const Vector3 b = this->Corner(t, 1);
   const Vector3 c = this->Corner(t, 2);
-  const Vector3 least = a.cwiseMin(b).cwiseMin(c);
-  const Vector3 greatest = a.cwiseMax(b).cwiseMax(c);
+  const Vector3 minimum = a.cwiseMin(b).cwiseMin(c);
+  const Vector3 maximum = a.cwiseMax(b).cwiseMax(c);
   int range[6];
   for (int axis = 0; axis < 3; ++axis)
   {
     range[2 * axis] =
-      std::max(0, static_cast<int>(std::ceil((least[axis] - this->Band) / spacing)));
+      std::max(0, static_cast<int>(std::ceil((minimum[axis] - this->Band) / spacing)));
     range[2 * axis + 1] = std::min(
-      this->Size[axis] - 1, static_cast<int>(std::floor((greatest[axis] + this->Band) / spacing)));
+      this->Size[axis] - 1, static_cast<int>(std::floor((maximum[axis] + this->Band) / spacing)));
   }
   const Vector3 normal = (b - a).cross(c - a);
   for (int k = range[4]; k <= range[5]; ++k)

@@ -18,12 +18,12 @@ namespace
 {
 constexpr int Sectors = 8;
 /// Share of a branch's length by which it must depart from the tree, up to a length in voxels.
-constexpr double LeastDeparture = 0.35;
+constexpr double MinimumDeparture = 0.35;
 constexpr double FullDeparture = 40.0;
 /// Share of the contrast by which the way from the parent may be darker than the branch itself.
 constexpr double DeepestValley = 0.1;
 /// Share of the contrast that a path must show on every side, mean.
-constexpr double LeastContrast = 0.12;
+constexpr double MinimumContrast = 0.12;
 /// Standard errors of noise that the path's mean must exceed.
 constexpr double Significance = 8.0;
 /// Distance of a path's samples, in voxels.
@@ -128,7 +128,7 @@ private:
   struct Sample
   {
     Vector3 position;
-    double least; ///< core over the second brightest sector around it
+    double minimum; ///< core over the second brightest sector around it
     double core;
     double wall; ///< mm from the tree's lumen
   };
@@ -143,7 +143,7 @@ private:
   /// What a path must show.
   struct Bar
   {
-    double least = 0.0;        ///< contrast to any side, mean of the path
+    double minimum = 0.0;      ///< contrast to any side, mean of the path
     double significance = 0.0; ///< standard errors, mean of the path
     double going = 0.0;        ///< contrast that speaks neither for going on nor against it
     /// The same where the core is this bright: what is beside the vessel changes, not the vessel.
@@ -156,7 +156,7 @@ private:
       return sample.core >= this->bright ? this->goingBright : this->going;
     }
   };
-  bool Walk(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
+  bool Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
     const Bar& bar, std::vector<Sample>& samples) const;
   bool IsVessel(const std::vector<Sample>& samples, const Bar& bar, double& contrast,
     double& significance) const;
@@ -231,8 +231,8 @@ std::vector<Finder::Spot> Finder::FindSpots() const
         for (int angle = 0; angle < around; ++angle)
         {
           const double here = map[row * around + static_cast<std::size_t>(angle)];
-          bool greatest = true;
-          for (std::size_t r = row > 1 ? row - 2 : 0; greatest && r <= std::min(rows - 1, row + 2);
+          bool maximum = true;
+          for (std::size_t r = row > 1 ? row - 2 : 0; maximum && r <= std::min(rows - 1, row + 2);
                ++r)
           {
             for (int a = angle - reach; a <= angle + reach; ++a)
@@ -242,12 +242,12 @@ std::vector<Finder::Spot> Finder::FindSpots() const
               const bool before = r < row || (r == row && a < angle);
               if (before ? other >= here : other > here)
               {
-                greatest = false;
+                maximum = false;
                 break;
               }
             }
           }
-          if (!greatest)
+          if (!maximum)
           {
             continue;
           }
@@ -334,7 +334,7 @@ bool Finder::Evidence(const Vector3& position, const Vector3& tangent, Sample& s
     second = std::max(second, std::min(value, brightest));
     brightest = std::max(brightest, value);
   }
-  sample.least = sample.core - second;
+  sample.minimum = sample.core - second;
   return true;
 }
 
@@ -342,7 +342,7 @@ bool Finder::Evidence(const Vector3& position, const Vector3& tangent, Sample& s
 Vector3 Finder::Turn(const Vector3& position, const Vector3& direction) const
 {
   Vector3 best = direction;
-  double greatest = this->Ahead(position, direction);
+  double maximum = this->Ahead(position, direction);
   for (const double cone : { 0.3, 0.12 })
   {
     const Vector3 from = best;
@@ -351,9 +351,9 @@ Vector3 Finder::Turn(const Vector3& position, const Vector3& direction) const
     {
       const Vector3 turned = (from + std::tan(cone) * frame.Ray(i, 8)).normalized();
       const double value = this->Ahead(position, turned);
-      if (value > greatest)
+      if (value > maximum)
       {
-        greatest = value;
+        maximum = value;
         best = turned;
       }
     }
@@ -387,7 +387,7 @@ Vector3 Finder::Centre(const Vector3& position, const Vector3& tangent) const
 /// Follows the tube, as far as the path speaks for a vessel.
 /// @param ownLumen  so many samples may lie in the tree's lumen
 /// @returns false if it leads into a vessel that is known
-bool Finder::Walk(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
+bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
   const Bar& bar, std::vector<Sample>& samples) const
 {
   const double step = Stride * this->Settings.voxel;
@@ -397,7 +397,7 @@ bool Finder::Walk(Vector3 position, Vector3 direction, std::size_t most, std::si
     Sample sample;
     if (!this->Evidence(position, direction, sample))
     {
-      sample.least = bar.unknownGoesOn ? bar.Going(sample) : 0.0;
+      sample.minimum = bar.unknownGoesOn ? bar.Going(sample) : 0.0;
     }
     sample.wall = this->Lumen(position).wall;
     if (sample.wall < 0.0 && samples.size() >= ownLumen)
@@ -410,7 +410,7 @@ bool Finder::Walk(Vector3 position, Vector3 direction, std::size_t most, std::si
       double recent = 0.0;
       for (std::size_t i = samples.size() - window; i < samples.size(); ++i)
       {
-        recent += (samples[i].least - bar.Going(samples[i])) / static_cast<double>(window);
+        recent += (samples[i].minimum - bar.Going(samples[i])) / static_cast<double>(window);
       }
       if (recent < 0.0)
       {
@@ -433,7 +433,7 @@ bool Finder::Walk(Vector3 position, Vector3 direction, std::size_t most, std::si
   double top = 0.0;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {
-    sum += samples[i].least - bar.Going(samples[i]);
+    sum += samples[i].minimum - bar.Going(samples[i]);
     if (sum > top)
     {
       top = sum;
@@ -453,14 +453,14 @@ bool Finder::IsVessel(
   std::size_t clear = 0;
   for (const Sample& sample : samples)
   {
-    contrast += sample.least / count;
-    clear += sample.least >= bar.Going(sample) ? 1 : 0;
+    contrast += sample.minimum / count;
+    clear += sample.minimum >= bar.Going(sample) ? 1 : 0;
   }
   // Samples three voxels apart are independent; four in the core, four in a sector.
   const double independent = std::max(1.0, count * Stride / 3.0);
   significance =
     contrast / std::max(this->Noise * std::sqrt(0.5 / independent), 1e-9 * this->Settings.contrast);
-  return contrast >= bar.least && significance >= bar.significance &&
+  return contrast >= bar.minimum && significance >= bar.significance &&
     static_cast<double>(clear) >= 0.8 * count;
 }
 
@@ -470,7 +470,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   const double step = Stride * voxel;
   // The first direction: of all that lead away.
   Vector3 direction = spot.outwards;
-  double greatest = -std::numeric_limits<double>::infinity();
+  double maximum = -std::numeric_limits<double>::infinity();
   constexpr int directions = 80;
   for (int i = 0; i < directions; ++i)
   {
@@ -480,14 +480,14 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
       continue;
     }
     const double value = this->Ahead(spot.position, candidate);
-    if (value > greatest)
+    if (value > maximum)
     {
-      greatest = value;
+      maximum = value;
       direction = candidate;
     }
   }
-  const double least = LeastContrast * this->Settings.contrast;
-  if (greatest < least)
+  const double minimum = MinimumContrast * this->Settings.contrast;
+  if (maximum < minimum)
   {
     return false;
   }
@@ -497,10 +497,10 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   const Vector3 position = this->Centre(spot.position, direction);
   const auto most = static_cast<std::size_t>(this->Settings.maximumLength / step);
   Bar bar;
-  bar.least = least;
+  bar.minimum = minimum;
   bar.significance = Significance;
-  bar.going = 0.5 * least;
-  if (!this->Walk(position, direction, most, 0, bar, samples))
+  bar.going = 0.5 * minimum;
+  if (!this->Trace(position, direction, most, 0, bar, samples))
   {
     return false;
   }
@@ -530,7 +530,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
     farthest = std::max(farthest, nearest);
   }
   branch.length = static_cast<double>(end) * step + samples.front().wall;
-  if (farthest < LeastDeparture * std::min(branch.length, FullDeparture * voxel))
+  if (farthest < MinimumDeparture * std::min(branch.length, FullDeparture * voxel))
   {
     return false;
   }
@@ -596,17 +596,17 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
     Sample sample;
     if (this->Evidence(point(i), back.normalized(), sample))
     {
-      contrasts.push_back(sample.least);
+      contrasts.push_back(sample.minimum);
       cores.push_back(sample.core);
     }
   }
-  const double least = LeastContrast * this->Settings.contrast;
-  const double usual = contrasts.empty() ? least : MedianOf(std::move(contrasts));
+  const double minimum = MinimumContrast * this->Settings.contrast;
+  const double usual = contrasts.empty() ? minimum : MedianOf(std::move(contrasts));
   Bar bar;
-  bar.least = 0.5 * least;
+  bar.minimum = 0.5 * minimum;
   bar.significance = 0.5 * Significance;
-  bar.going = std::max(0.25 * least, 0.5 * usual);
-  bar.goingBright = std::min(bar.going, 0.5 * least);
+  bar.going = std::max(0.25 * minimum, 0.5 * usual);
+  bar.goingBright = std::min(bar.going, 0.5 * minimum);
   if (!cores.empty())
   {
     bar.bright = MedianOf(std::move(cores)) - 0.5 * usual;
@@ -618,7 +618,7 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   std::vector<Sample> samples;
   double contrast = 0.0;
   double significance = 0.0;
-  if (!this->Walk(this->Centre(point(near), direction), direction,
+  if (!this->Trace(this->Centre(point(near), direction), direction,
         own + static_cast<std::size_t>(MostBeyondTip / Stride), own, bar, samples) ||
     samples.size() < 4 || !this->IsVessel(samples, bar, contrast, significance))
   {

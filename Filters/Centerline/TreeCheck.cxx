@@ -21,20 +21,20 @@ constexpr double Degrees = 180.0 / 3.14159265358979323846;
 constexpr double LongestMain = 25.0; ///< of left mains
 constexpr double LongestPath =
   270.0; ///< from an ostium to the tip of a posterior descending artery
-constexpr double LeastApex =
+constexpr double MinimumApex =
   66.0; ///< depth that an anterior descending artery reaches; the apex is at 91.5
-constexpr double LeastCircumflex = 25.0; ///< of circumflex and marginals together
-constexpr double LeastDescending = 15.0; ///< of a posterior descending artery
-constexpr double FarFromCrux = 25.0;     ///< of the right coronary artery's nearest point
-constexpr double NearestOstia = 6.0;     ///< of two ostia
-constexpr double FarthestOstia = 70.0;   ///< of two ostia
-constexpr double TipLength = 3.0;        ///< over which a tip's radius is taken
-constexpr double BeforeTip = 15.0;       ///< a lesion at the tip narrows less than this
-constexpr double WideTip = 0.78;         ///< radius with which no whole vessel ends, for usual tips
-constexpr double WideBeforeTip = 0.95;   ///< the same before the tip
-constexpr double SmallVesselsTip = 1.3;  ///< of a right coronary artery that is not dominant
-constexpr double Widening = 1.4;         ///< arteries taper
-constexpr double UncertainFit = 8.0;     ///< mean distance from the mean heart's vessels
+constexpr double MinimumCircumflex = 25.0; ///< of circumflex and marginals together
+constexpr double MinimumDescending = 15.0; ///< of a posterior descending artery
+constexpr double FarFromCrux = 25.0;       ///< of the right coronary artery's nearest point
+constexpr double NearestOstia = 6.0;       ///< of two ostia
+constexpr double FarthestOstia = 70.0;     ///< of two ostia
+constexpr double TipLength = 3.0;          ///< over which a tip's radius is taken
+constexpr double BeforeTip = 15.0;         ///< a lesion at the tip narrows less than this
+constexpr double WideTip = 0.78;        ///< radius with which no whole vessel ends, for usual tips
+constexpr double WideBeforeTip = 0.95;  ///< the same before the tip
+constexpr double SmallVesselsTip = 1.3; ///< of a right coronary artery that is not dominant
+constexpr double Widening = 1.4;        ///< arteries taper
+constexpr double UncertainFit = 8.0;    ///< mean distance from the mean heart's vessels
 
 /// Who feeds a wall.
 enum class Feeder
@@ -99,13 +99,13 @@ public:
 
 private:
   /// A trunk: all points with one of some names.
-  struct Course
+  struct Axis
   {
     double length = 0.0;
     std::int64_t last = -1; ///< point farthest from the ostium
   };
 
-  Course Of(std::initializer_list<int> segments) const;
+  Axis Of(std::initializer_list<int> segments) const;
   /// On the mean heart, in its frame: a, b, and the depth below the groove.
   Vector3 OnHeart(std::int64_t point) const;
   Vector3 FromMeanHeart(const Vector3& position) const;
@@ -149,9 +149,9 @@ void Checker::Warn(
   this->Warnings.push_back({ what, vessel, place, std::min(0.99, sure) });
 }
 
-Checker::Course Checker::Of(std::initializer_list<int> segments) const
+Checker::Axis Checker::Of(std::initializer_list<int> segments) const
 {
-  Course course;
+  Axis course;
   for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     for (std::size_t i = 1; i < branch.points.size(); ++i)
@@ -238,7 +238,7 @@ bool Checker::Trees()
 void Checker::LeftTrunks()
 {
   const Vector3& root = this->Tree.points[this->Roots[0]];
-  const Course main = this->Of({ LeftMain });
+  const Axis main = this->Of({ LeftMain });
   if (main.length > LongestMain)
   {
     this->Warn("LM is " + Rounded(main.length) + " mm long, up to " +
@@ -246,7 +246,7 @@ void Checker::LeftTrunks()
         " mm: an artery that leaves it may be missing",
       "LM", this->Tree.points[main.last], Sure(main.length - LongestMain, 10.0));
   }
-  const Course descending = this->Of({ ProximalLAD, MidLAD, DistalLAD });
+  const Axis descending = this->Of({ ProximalLAD, MidLAD, DistalLAD });
   if (descending.last < 0)
   {
     this->Warn("the left coronary tree at " + At(root) + " has no LAD", "LAD", root, 0.95);
@@ -265,25 +265,25 @@ void Checker::LeftTrunks()
         deepest = point;
       }
     }
-    if (depth < LeastApex)
+    if (depth < MinimumApex)
     {
       const Vector3& place = this->Tree.points[deepest];
       this->Warn("the LAD ends at " + At(place) + ", about " +
           Rounded((91.5 - depth) * this->Labels.heart.size) + " mm before the apex, after " +
           Rounded(descending.length) + " mm",
         SegmentName(this->Tree.segmentId[deepest]), place,
-        this->Trust * Sure(LeastApex - depth, 12.0));
+        this->Trust * Sure(MinimumApex - depth, 12.0));
     }
   }
-  const Course circumflex = this->Of({ ProximalLCx, DistalLCx, FirstObtuseMarginal,
+  const Axis circumflex = this->Of({ ProximalLCx, DistalLCx, FirstObtuseMarginal,
     SecondObtuseMarginal, ThirdObtuseMarginal, LeftPLB, LeftPDA });
-  if (circumflex.length < LeastCircumflex)
+  if (circumflex.length < MinimumCircumflex)
   {
     const Vector3& place = circumflex.last >= 0 ? this->Tree.points[circumflex.last] : root;
     this->Warn(circumflex.last < 0 ? "the left coronary tree at " + At(root) + " has no LCx"
                                    : "LCx and its marginals end at " + At(place) + " after " +
           Rounded(circumflex.length) + " mm",
-      "LCx", place, Sure(LeastCircumflex - circumflex.length, 10.0));
+      "LCx", place, Sure(MinimumCircumflex - circumflex.length, 10.0));
   }
 }
 
@@ -300,18 +300,18 @@ void Checker::BackOfTheHeart()
   {
     crux = point.vessel == Vessel::RightCoronary ? point.position : crux;
   }
-  const Course down = left ? this->Of({ LeftPDA }) : this->Of({ RightPDA, InferiorRightBranch });
-  double least = std::numeric_limits<double>::infinity();
-  const Course trunk = left ? this->Of({ ProximalLCx, DistalLCx, LeftPLB, LeftPDA })
-                            : this->Of({ ProximalRCA, MidRCA, DistalRCA, RightPDA, RightPLB });
+  const Axis down = left ? this->Of({ LeftPDA }) : this->Of({ RightPDA, InferiorRightBranch });
+  double minimum = std::numeric_limits<double>::infinity();
+  const Axis trunk = left ? this->Of({ ProximalLCx, DistalLCx, LeftPLB, LeftPDA })
+                          : this->Of({ ProximalRCA, MidRCA, DistalRCA, RightPDA, RightPLB });
   for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     if (branch.treeId == (left ? 0 : 1))
     {
       for (const std::int64_t point : branch.points)
       {
-        least =
-          std::min(least, (this->Labels.fit.ToMeanHeart(this->Tree.points[point]) - crux).norm());
+        minimum =
+          std::min(minimum, (this->Labels.fit.ToMeanHeart(this->Tree.points[point]) - crux).norm());
       }
     }
   }
@@ -321,17 +321,17 @@ void Checker::BackOfTheHeart()
     return;
   }
   const Vector3& end = this->Tree.points[trunk.last];
-  if (least > FarFromCrux)
+  if (minimum > FarFromCrux)
   {
     this->Warn("the " + name + " does not reach the crux: it ends at " + At(end) + ", about " +
-        Rounded(least * this->Labels.heart.size) + " mm before it",
+        Rounded(minimum * this->Labels.heart.size) + " mm before it",
       SegmentName(this->Tree.segmentId[trunk.last]), end,
-      this->Trust * Sure(least - FarFromCrux, 15.0));
+      this->Trust * Sure(minimum - FarFromCrux, 15.0));
   }
-  else if (down.length < LeastDescending)
+  else if (down.length < MinimumDescending)
   {
     this->Warn("there is no posterior descending artery: the " + name + " ends at " + At(end),
-      left ? "L-PDA" : "R-PDA", end, this->Trust * Sure(LeastDescending - down.length, 10.0));
+      left ? "L-PDA" : "R-PDA", end, this->Trust * Sure(MinimumDescending - down.length, 10.0));
   }
 }
 
@@ -374,7 +374,7 @@ void Checker::Tips()
         name, place, Sure(excess, 0.4));
       continue;
     }
-    if (tips[n].goesOn >= LeastGoingOn)
+    if (tips[n].goesOn >= MinimumGoingOn)
     {
       this->Warn(name + " ends at " + At(place) + " where it narrows, from " +
           Rounded(tips[n].before, 1) + " to " + Rounded(tips[n].end, 1) +
@@ -454,18 +454,18 @@ void Checker::Territories()
       const Vector3 middle = wall.part > 0.0
         ? this->Atlas.OnEpicardium(anterior + wall.part * (posterior - anterior), wall.height)
         : this->Atlas.OnEpicardium(0.0, wall.height);
-      double least = std::numeric_limits<double>::infinity();
+      double minimum = std::numeric_limits<double>::infinity();
       for (const Vector3& point : mean)
       {
-        least = std::min(least, (point - middle).squaredNorm());
+        minimum = std::min(minimum, (point - middle).squaredNorm());
       }
-      least = std::sqrt(least) - wall.reach;
-      if (least > 0.0)
+      minimum = std::sqrt(minimum) - wall.reach;
+      if (minimum > 0.0)
       {
         walls += (walls.empty() ? "" : ", ") + std::string(wall.name);
-        if (least > excess)
+        if (minimum > excess)
         {
-          excess = least;
+          excess = minimum;
           place = this->FromMeanHeart(middle);
         }
       }

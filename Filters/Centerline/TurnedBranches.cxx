@@ -18,14 +18,14 @@ namespace coronary
 {
 namespace
 {
-constexpr double AgainstFlow = 2.0; ///< rad between the flow and what leaves against it
-constexpr double Straight = 6.0;    ///< mm along which a direction is measured
-constexpr double Beside = 8.0;      ///< mm between walls of vessels that run side by side
-constexpr double Parallel = 0.65;   ///< cosine between their courses
-constexpr double LongestWay = 30.0; ///< mm to the true root
+constexpr double AgainstFlow = 2.0;  ///< rad between the flow and what leaves against it
+constexpr double Straight = 6.0;     ///< mm along which a direction is measured
+constexpr double Beside = 8.0;       ///< mm between walls of vessels that run side by side
+constexpr double Parallel = 0.65;    ///< cosine between their courses
+constexpr double LongestPath = 30.0; ///< mm to the true root
 /// Contrast along a way, as a share of the branch's own: mean, and least over 2 mm.
 constexpr double MeanShare = 0.5;
-constexpr double LeastShare = 0.3;
+constexpr double MinimumShare = 0.3;
 constexpr double Window = 2.0;
 constexpr double MostDetour = 1.6; ///< length of a way over the distance of its ends
 /// The way leaves the end in the branch's own direction, not across to what is beside it.
@@ -61,7 +61,8 @@ private:
   bool RunsBack(std::size_t branch, const Upstream& above, TurnedBranch& turned) const;
   void FindRoot(const Upstream& above, TurnedBranch& turned) const;
   bool IsSeen(const std::vector<Vector3>& way, double own, double around) const;
-  bool IsWay(const std::vector<Vector3>& way, const Vector3& flow, double own, double around) const;
+  bool IsPath(
+    const std::vector<Vector3>& way, const Vector3& flow, double own, double around) const;
   /// Of the vessel and of what is around it, without what other vessels cover.
   std::pair<double, double> Values(const TurnedBranch& turned) const;
 
@@ -198,7 +199,7 @@ bool TurnedFinder::IsSeen(const std::vector<Vector3>& way, double own, double ar
     1, std::min(shares.size(), static_cast<std::size_t>(Window / (0.5 * this->Voxel))));
   double sum = 0.0;
   double all = 0.0;
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < shares.size(); ++i)
   {
     const double share = std::min(1.0, shares[i]);
@@ -206,21 +207,21 @@ bool TurnedFinder::IsSeen(const std::vector<Vector3>& way, double own, double ar
     sum += share - (i >= window ? std::min(1.0, shares[i - window]) : 0.0);
     if (i + 1 >= window)
     {
-      least = std::min(least, sum / static_cast<double>(window));
+      minimum = std::min(minimum, sum / static_cast<double>(window));
     }
   }
   return !shares.empty() && all >= MeanShare * static_cast<double>(shares.size()) &&
-    least >= LeastShare;
+    minimum >= MinimumShare;
 }
 
 /// Whether a way, from its root on, is one that a branch takes.
-bool TurnedFinder::IsWay(
+bool TurnedFinder::IsPath(
   const std::vector<Vector3>& way, const Vector3& flow, double own, double around) const
 {
   const double length = PolylineLength(way);
   const Vector3 leaving = way[std::min<std::size_t>(way.size() - 1, 6)] - way.front();
   // A root against the flow again is none.
-  return length <= LongestWay && length <= MostDetour * (way.back() - way.front()).norm() + 1.5 &&
+  return length <= LongestPath && length <= MostDetour * (way.back() - way.front()).norm() + 1.5 &&
     leaving.normalized().dot(flow) >= std::cos(AgainstFlow) && this->IsSeen(way, own, around);
 }
 
@@ -241,7 +242,7 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
   {
     return;
   }
-  const int reach = static_cast<int>(std::ceil(LongestWay / this->Voxel));
+  const int reach = static_cast<int>(std::ceil(LongestPath / this->Voxel));
   ImageGrid grid;
   grid.extent = { -reach, reach, -reach, reach, -reach, reach };
   grid.origin = end;
@@ -337,7 +338,7 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
     way.push_back(lattice.World(lattice.Place(at)));
   }
   const std::int32_t meeting = lumen[arrived];
-  if (this->IsWay(way, above.flow[meeting], own, around))
+  if (this->IsPath(way, above.flow[meeting], own, around))
   {
     turned.root = above.points[meeting];
     turned.way = std::move(way);

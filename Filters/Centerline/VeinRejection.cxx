@@ -20,9 +20,9 @@ namespace
 constexpr double Near = 20.0; ///< mm from a fork that are compared
 constexpr double Far = 40.0;  ///< mm of a branch that are looked at
 constexpr double Unlimited = std::numeric_limits<double>::infinity();
-constexpr double LeastLength = 8.0; ///< mm: what is shorter shows too little
-constexpr double LeastRadius = 2.0; ///< blurs: thinner lumens are darker for the blur alone
-constexpr double Straight = 6.0;    ///< mm along which a direction is measured
+constexpr double MinimumLength = 8.0; ///< mm: what is shorter shows too little
+constexpr double MinimumRadius = 2.0; ///< blurs: thinner lumens are darker for the blur alone
+constexpr double Straight = 6.0;      ///< mm along which a direction is measured
 /// Few branches touch by chance: 3 in 100. Behind a lesion it is the chance that what was linked is none of the tree.
 constexpr double Prior = -3.5;
 constexpr double CutReach = 1.0;     ///< mm beyond a tip's wall
@@ -130,13 +130,13 @@ private:
     std::size_t point;
     double passed;
   };
-  using Course = std::vector<Step>;
+  using Path = std::vector<Step>;
   /// A branch that may be a vein's.
   struct Arm
   {
     std::size_t number = 0; ///< of the branch where it begins
     VeinBranch branch;
-    Course course;
+    Path path;
     double brightness = 0.0; ///< step from the artery, share of the contrast, negative: darker
     double error = 0.0;      ///< of it, by noise; 0: not known
     double beside = 0.0;     ///< mm beside another artery
@@ -168,20 +168,20 @@ private:
   };
 
   const Vector3& At(std::int64_t point) const { return this->Tree.points[point]; }
-  Course Down(std::size_t branch, double reach, std::vector<double>* forks = nullptr) const;
-  Course Up(std::size_t branch, double reach) const;
-  std::vector<double> Values(const std::vector<double>& of, const Course& run, double from) const;
-  std::vector<double> Radii(const Course& run, double from, double to) const;
-  double TipRadius(const Course& course) const;
-  bool GoesOn(const Course& course) const;
-  bool IsCut(const Course& course) const;
+  Path Down(std::size_t branch, double reach, std::vector<double>* forks = nullptr) const;
+  Path Up(std::size_t branch, double reach) const;
+  std::vector<double> Values(const std::vector<double>& of, const Path& run, double from) const;
+  std::vector<double> Radii(const Path& run, double from, double to) const;
+  double TipRadius(const Path& path) const;
+  bool GoesOn(const Path& path) const;
+  bool IsCut(const Path& path) const;
   void Beside(Arm& arm) const;
   std::optional<Arm> Describe(std::size_t branch, double reach) const;
   double VeinBegin(const Arm& arm) const;
-  std::optional<double> Narrowest(const Course& course) const;
+  std::optional<double> Narrowest(const Path& path) const;
   void Weigh(Arm& arm) const;
   std::optional<Place> Between(std::size_t a, std::size_t b) const;
-  std::optional<Side> SideOf(const Course& course, const Place& place) const;
+  std::optional<Side> SideOf(const Path& path, const Place& place) const;
   std::optional<double> Through(const Arm& a, const Arm& b) const;
   void FindOpposites(std::vector<Arm>& arms) const;
 
@@ -201,10 +201,10 @@ private:
 
 /// A branch and those that go straight on.
 /// @param forks  gets the mm at which it parts, if wanted
-VeinFinder::Course VeinFinder::Down(
+VeinFinder::Path VeinFinder::Down(
   std::size_t branch, double reach, std::vector<double>* forks) const
 {
-  Course run;
+  Path run;
   double passed = 0.0;
   for (;;)
   {
@@ -246,9 +246,9 @@ VeinFinder::Course VeinFinder::Down(
 }
 
 /// From a branch's first point towards the root.
-VeinFinder::Course VeinFinder::Up(std::size_t branch, double reach) const
+VeinFinder::Path VeinFinder::Up(std::size_t branch, double reach) const
 {
-  Course run;
+  Path run;
   double passed = 0.0;
   for (std::int64_t b = this->Links.parent[branch]; b >= 0; b = this->Links.parent[b])
   {
@@ -267,12 +267,12 @@ VeinFinder::Course VeinFinder::Up(std::size_t branch, double reach) const
 }
 
 std::vector<double> VeinFinder::Values(
-  const std::vector<double>& of, const Course& run, double from) const
+  const std::vector<double>& of, const Path& run, double from) const
 {
   std::vector<double> values;
   for (const auto& [point, passed] : run)
   {
-    if (passed >= from && this->Tree.radius[point] >= LeastRadius * this->Blur &&
+    if (passed >= from && this->Tree.radius[point] >= MinimumRadius * this->Blur &&
       !IsBridged(this->Tree, point))
     {
       values.push_back(of[point]);
@@ -281,7 +281,7 @@ std::vector<double> VeinFinder::Values(
   return values;
 }
 
-std::vector<double> VeinFinder::Radii(const Course& run, double from, double to) const
+std::vector<double> VeinFinder::Radii(const Path& run, double from, double to) const
 {
   std::vector<double> radii;
   for (const auto& [point, passed] : run)
@@ -296,20 +296,20 @@ std::vector<double> VeinFinder::Radii(const Course& run, double from, double to)
 }
 
 /// Of its last 3 mm.
-double VeinFinder::TipRadius(const Course& course) const
+double VeinFinder::TipRadius(const Path& path) const
 {
-  const double length = course.empty() ? 0.0 : course.back().passed;
-  std::vector<double> radii = this->Radii(course, length - 3.0, length + 1.0);
+  const double length = path.empty() ? 0.0 : path.back().passed;
+  std::vector<double> radii = this->Radii(path, length - 3.0, length + 1.0);
   return radii.empty() ? this->Blur : std::max(1e-9, MedianOf(std::move(radii)));
 }
 
 /// Whether there is blood, and no calcium, ahead of a tip.
-bool VeinFinder::GoesOn(const Course& course) const
+bool VeinFinder::GoesOn(const Path& path) const
 {
-  const double length = course.back().passed;
+  const double length = path.back().passed;
   std::vector<double> own;
-  Vector3 before = this->Tree.points[course.front().point];
-  for (const auto& [point, passed] : course)
+  Vector3 before = this->Tree.points[path.front().point];
+  for (const auto& [point, passed] : path)
   {
     if (passed >= length - Straight)
     {
@@ -320,9 +320,9 @@ bool VeinFinder::GoesOn(const Course& course) const
       before = this->Tree.points[point];
     }
   }
-  const Vector3& tip = this->Tree.points[course.back().point];
+  const Vector3& tip = this->Tree.points[path.back().point];
   const Vector3 ahead = (tip - before).normalized();
-  const double radius = this->TipRadius(course);
+  const double radius = this->TipRadius(path);
   std::vector<double> values;
   for (double s = 1.5 * radius; s <= 1.5 * radius + 2.0; s += 0.25)
   {
@@ -333,14 +333,14 @@ bool VeinFinder::GoesOn(const Course& course) const
 }
 
 /// Whether a course ends where something was closed.
-bool VeinFinder::IsCut(const Course& course) const
+bool VeinFinder::IsCut(const Path& path) const
 {
   if (!this->Closed)
   {
     return false;
   }
-  const double reach = this->TipRadius(course) + CutReach;
-  const Vector3& tip = this->Tree.points[course.back().point];
+  const double reach = this->TipRadius(path) + CutReach;
+  const Vector3& tip = this->Tree.points[path.back().point];
   for (int direction = 0; direction < 27; ++direction)
   {
     const Vector3 way =
@@ -360,11 +360,11 @@ bool VeinFinder::IsCut(const Course& course) const
 /// brighter it is than that, side by side.
 void VeinFinder::Beside(Arm& arm) const
 {
-  const Course& course = arm.course;
+  const Path& path = arm.path;
   // Of the course itself, and what leaves it.
   std::set<std::size_t> own;
   std::set<std::int64_t> points;
-  for (const Step& step : course)
+  for (const Step& step : path)
   {
     points.insert(static_cast<std::int64_t>(step.point));
   }
@@ -378,7 +378,7 @@ void VeinFinder::Beside(Arm& arm) const
   }
   std::vector<double> steps;
   double before = 0.0;
-  for (const auto& [point, passed] : course)
+  for (const auto& [point, passed] : path)
   {
     const double length = passed - before;
     before = passed;
@@ -407,7 +407,7 @@ void VeinFinder::Beside(Arm& arm) const
     {
       arm.beside += length;
       const auto clear = [&](std::size_t p)
-      { return this->Tree.radius[p] >= LeastRadius * this->Blur && !IsBridged(this->Tree, p); };
+      { return this->Tree.radius[p] >= MinimumRadius * this->Blur && !IsBridged(this->Tree, p); };
       if (clear(point) && clear(*nearest))
       {
         steps.push_back(this->Value[point] - this->Value[*nearest]);
@@ -425,10 +425,10 @@ void VeinFinder::Beside(Arm& arm) const
 std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch, double reach) const
 {
   Arm arm;
-  arm.course = this->Down(branch, reach);
-  const Course& down = arm.course;
-  const Course up = this->Up(branch, Near);
-  if (down.empty() || up.empty() || down.back().passed < LeastLength)
+  arm.path = this->Down(branch, reach);
+  const Path& down = arm.path;
+  const Path up = this->Up(branch, Near);
+  if (down.empty() || up.empty() || down.back().passed < MinimumLength)
   {
     return std::nullopt;
   }
@@ -462,10 +462,10 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch, double r
         MedianOf(this->Values(this->GivenBack, up, mouth));
       arm.error = std::hypot(SpreadOfMedian(own), SpreadOfMedian(before), 0.5 * given);
     }
-    const std::vector<double> early = this->Radii(down, mouth, mouth + LeastLength);
+    const std::vector<double> early = this->Radii(down, mouth, mouth + MinimumLength);
     if (!early.empty())
     {
-      const std::vector<double> near = this->Radii(up, 1.5, 1.5 + LeastLength);
+      const std::vector<double> near = this->Radii(up, 1.5, 1.5 + MinimumLength);
       arm.calibre = MedianOf(early) / (near.empty() ? std::max(1e-9, widest) : UpperRadius(near));
     }
   }
@@ -474,7 +474,8 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch, double r
   const std::vector<double> first = this->Radii(down, mouth, mouth + third);
   const std::vector<double> second = this->Radii(down, mouth + third, length - third);
   const std::vector<double> last = this->Radii(down, length - third, length + 1.0);
-  if (length - mouth >= LeastLength && std::min({ first.size(), second.size(), last.size() }) >= 3)
+  if (length - mouth >= MinimumLength &&
+    std::min({ first.size(), second.size(), last.size() }) >= 3)
   {
     const double middle = UpperRadius(second);
     // As between its halves.
@@ -489,7 +490,7 @@ std::optional<VeinFinder::Arm> VeinFinder::Describe(std::size_t branch, double r
     arm.goesOn = !arm.cut && this->GoesOn(down);
   }
   // Directions of the flow before, and of what leaves.
-  const auto within = [](const Course& run, double passed)
+  const auto within = [](const Path& run, double passed)
   {
     const auto at =
       std::find_if(run.begin(), run.end(), [&](const Step& step) { return step.passed >= passed; });
@@ -535,7 +536,7 @@ void VeinFinder::Weigh(Arm& arm) const
     arm.goesOn || arm.cut ? 0.0 : blunt,
     std::clamp(arm.takeOff - 1.8, 0.0, 1.0),
     std::clamp(arm.through, 0.0, 6.0),
-    std::max(0.0, 20.0 - arm.course.back().passed) / 20.0,
+    std::max(0.0, 20.0 - arm.path.back().passed) / 20.0,
     known ? 0.0 : 1.0,
   };
   arm.branch.probability =
@@ -629,7 +630,7 @@ std::optional<VeinFinder::Place> VeinFinder::Between(std::size_t a, std::size_t 
       place.through.push_back(static_cast<std::size_t>(point));
     }
   }
-  const Course up = this->Up(this->Links.daughters[top].front(), Near);
+  const Path up = this->Up(this->Links.daughters[top].front(), Near);
   for (const Step& step : up)
   {
     place.through.push_back(step.point);
@@ -641,7 +642,7 @@ std::optional<VeinFinder::Place> VeinFinder::Between(std::size_t a, std::size_t 
       place.through.push_back(step.point);
     }
   }
-  const std::vector<double> before = this->Radii(up, 2.0, 2.0 + LeastLength);
+  const std::vector<double> before = this->Radii(up, 2.0, 2.0 + MinimumLength);
   const auto back =
     std::find_if(up.begin(), up.end(), [](const Step& step) { return step.passed >= Straight; });
   if (before.empty() || back == up.end())
@@ -655,12 +656,12 @@ std::optional<VeinFinder::Place> VeinFinder::Between(std::size_t a, std::size_t 
 }
 
 /// Where an arm is by itself: outside of the artery's wall.
-std::optional<VeinFinder::Side> VeinFinder::SideOf(const Course& course, const Place& place) const
+std::optional<VeinFinder::Side> VeinFinder::SideOf(const Path& path, const Place& place) const
 {
   std::size_t first = 0;
-  for (; first < course.size() && course[first].passed < LeastLength; ++first)
+  for (; first < path.size() && path[first].passed < MinimumLength; ++first)
   {
-    const std::size_t own = course[first].point;
+    const std::size_t own = path[first].point;
     const bool inside = std::any_of(place.through.begin(), place.through.end(),
       [&](std::size_t q)
       {
@@ -673,11 +674,11 @@ std::optional<VeinFinder::Side> VeinFinder::SideOf(const Course& course, const P
     }
   }
   std::size_t last = first;
-  while (last + 1 < course.size() && course[last].passed < course[first].passed + Straight)
+  while (last + 1 < path.size() && path[last].passed < path[first].passed + Straight)
   {
     ++last;
   }
-  if (first >= course.size() || course[last].passed - course[first].passed < 0.4 * Straight)
+  if (first >= path.size() || path[last].passed - path[first].passed < 0.4 * Straight)
   {
     return std::nullopt;
   }
@@ -688,16 +689,16 @@ std::optional<VeinFinder::Side> VeinFinder::SideOf(const Course& course, const P
   const auto count = static_cast<double>(last - first + 1);
   for (std::size_t i = first; i <= last; ++i)
   {
-    middle += this->Tree.points[course[i].point] / count;
-    passed += course[i].passed / count;
-    radii.push_back(this->Tree.radius[course[i].point]);
+    middle += this->Tree.points[path[i].point] / count;
+    passed += path[i].passed / count;
+    radii.push_back(this->Tree.radius[path[i].point]);
   }
   for (std::size_t i = first; i <= last; ++i)
   {
-    side.outwards += (course[i].passed - passed) * (this->Tree.points[course[i].point] - middle);
+    side.outwards += (path[i].passed - passed) * (this->Tree.points[path[i].point] - middle);
   }
   side.outwards.normalize();
-  side.position = middle - (passed - course[first].passed) * side.outwards;
+  side.position = middle - (passed - path[first].passed) * side.outwards;
   side.radius = std::max(1e-9, MedianOf(radii));
   return side.outwards.allFinite() ? std::optional<Side>(side) : std::nullopt;
 }
@@ -711,8 +712,8 @@ std::optional<double> VeinFinder::Through(const Arm& a, const Arm& b) const
   {
     return std::nullopt;
   }
-  const std::optional<Side> sideA = this->SideOf(a.course, *place);
-  const std::optional<Side> sideB = this->SideOf(b.course, *place);
+  const std::optional<Side> sideA = this->SideOf(a.path, *place);
+  const std::optional<Side> sideB = this->SideOf(b.path, *place);
   if (!sideA || !sideB)
   {
     return std::nullopt;
@@ -797,7 +798,7 @@ double VeinFinder::VeinBegin(const Arm& arm) const
   const std::size_t branch = arm.number;
   std::vector<double> places;
   this->Down(branch, Far, &places);
-  if (const std::optional<double> narrow = this->Narrowest(arm.course))
+  if (const std::optional<double> narrow = this->Narrowest(arm.path))
   {
     places.insert(std::upper_bound(places.begin(), places.end(), *narrow), *narrow);
   }
@@ -820,32 +821,31 @@ double VeinFinder::VeinBegin(const Arm& arm) const
 }
 
 /// mm at which a course is narrowest, where it widens on both sides of it: an artery's thin end may touch a vein.
-std::optional<double> VeinFinder::Narrowest(const Course& course) const
+std::optional<double> VeinFinder::Narrowest(const Path& path) const
 {
   constexpr double around = 1.5;  // mm
   constexpr double widens = 1.15; // of the radius
-  const double length = course.empty() ? 0.0 : course.back().passed;
-  double least = std::numeric_limits<double>::infinity();
+  const double length = path.empty() ? 0.0 : path.back().passed;
+  double minimum = std::numeric_limits<double>::infinity();
   double place = 0.0;
-  for (const Step& step : course)
+  for (const Step& step : path)
   {
-    if (step.passed < LeastLength || step.passed > length - LeastLength)
+    if (step.passed < MinimumLength || step.passed > length - MinimumLength)
     {
       continue;
     }
-    const std::vector<double> radii =
-      this->Radii(course, step.passed - around, step.passed + around);
-    const double radius = radii.empty() ? least : MedianOf(radii);
-    if (radius < least)
+    const std::vector<double> radii = this->Radii(path, step.passed - around, step.passed + around);
+    const double radius = radii.empty() ? minimum : MedianOf(radii);
+    if (radius < minimum)
     {
-      least = radius;
+      minimum = radius;
       place = step.passed;
     }
   }
-  const std::vector<double> before = this->Radii(course, 0.0, place);
-  const std::vector<double> behind = this->Radii(course, place, length + 1.0);
-  if (before.empty() || behind.empty() || UpperRadius(before) < widens * least ||
-    UpperRadius(behind) < widens * least)
+  const std::vector<double> before = this->Radii(path, 0.0, place);
+  const std::vector<double> behind = this->Radii(path, place, length + 1.0);
+  if (before.empty() || behind.empty() || UpperRadius(before) < widens * minimum ||
+    UpperRadius(behind) < widens * minimum)
   {
     return std::nullopt;
   }
@@ -882,9 +882,9 @@ std::vector<VeinBranch> VeinFinder::Run()
     // What ends as wide as a vein is one to its end; else an artery may have been entered through it.
     const double begin = branch.probability >= 0.5 ? this->VeinBegin(arm) : 0.0;
     const double end = arm.blunt > 0.35 ? 2.0 * Far : begin + CloseLength;
-    for (const Step& step : arm.course)
+    for (const Step& step : arm.path)
     {
-      branch.course.push_back(this->Tree.points[step.point]);
+      branch.path.push_back(this->Tree.points[step.point]);
       if (step.passed > begin && (branch.closed.empty() || step.passed <= end))
       {
         branch.closed.push_back(static_cast<std::int64_t>(step.point));

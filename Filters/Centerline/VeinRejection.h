@@ -32,7 +32,7 @@ struct VeinBranch
   double probability = 0.0; ///< of a vein, 0 to 1
   bool known = false;       ///< nothing before it was bridged: all signs could be measured
   std::array<double, NumberOfVeinSigns> signs{};
-  std::vector<Vector3> course;      ///< mm, from its begin on, 40 mm straight on
+  std::vector<Vector3> path;        ///< mm, from its begin on, 40 mm straight on
   std::vector<std::int64_t> closed; ///< points of it that are the vein's for certain, if it is one
 };
 

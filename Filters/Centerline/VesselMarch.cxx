@@ -19,20 +19,20 @@ constexpr std::uint32_t None = VoxelRegion::notAMember;
 /// 2 % of the 99.99th percentile, by a histogram relative to the greatest: any speed, any unit.
 double AutomaticSpeedThreshold(const float* speed, std::int64_t voxels)
 {
-  float greatest = 0.0F;
+  float maximum = 0.0F;
   for (std::int64_t v = 0; v < voxels; ++v)
   {
-    greatest = std::isfinite(speed[v]) ? std::max(greatest, speed[v]) : greatest;
+    maximum = std::isfinite(speed[v]) ? std::max(maximum, speed[v]) : maximum;
   }
   std::vector<std::int64_t> histogram(1000, 0);
-  if (greatest > 0.0F)
+  if (maximum > 0.0F)
   {
     for (std::int64_t v = 0; v < voxels; ++v)
     {
-      if (std::isfinite(speed[v]) && speed[v] > 1e-3F * greatest)
+      if (std::isfinite(speed[v]) && speed[v] > 1e-3F * maximum)
       {
         ++histogram[std::min<std::size_t>(
-          999, static_cast<std::size_t>(1000.0F * speed[v] / greatest))];
+          999, static_cast<std::size_t>(1000.0F * speed[v] / maximum))];
       }
     }
   }
@@ -43,7 +43,7 @@ double AutomaticSpeedThreshold(const float* speed, std::int64_t voxels)
   {
     above += histogram[--bin];
   }
-  return 0.02 * static_cast<double>(greatest) * static_cast<double>(bin + 1) / 1000.0;
+  return 0.02 * static_cast<double>(maximum) * static_cast<double>(bin + 1) / 1000.0;
 }
 }
 
@@ -198,7 +198,7 @@ void VesselMarch::March(const ImageInterpolator& image, const LumenReference& re
 std::uint32_t VesselMarch::NearestMember(const Vector3& index, double reach, bool reachedOnly) const
 {
   std::uint32_t nearest = None;
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   const Vector3 steps =
     Vector3::Constant(reach).cwiseQuotient(this->Input.grid.spacing) + Vector3::Constant(0.5);
   BoxAround(index, steps, this->Members.Box())
@@ -212,9 +212,9 @@ std::uint32_t VesselMarch::NearestMember(const Vector3& index, double reach, boo
         }
         const double distance =
           (Vector3(i, j, k) - index).cwiseProduct(this->Input.grid.spacing).norm();
-        if (distance < least)
+        if (distance < minimum)
         {
-          least = distance;
+          minimum = distance;
           nearest = number;
         }
       });
@@ -266,7 +266,7 @@ bool VesselMarch::Gradient(const Vector3& index, Vector3& gradient) const
   return true;
 }
 
-VesselWay VesselMarch::WayBack(
+MinimalPath VesselMarch::Backtrack(
   const Vector3& from, std::uint32_t member, const std::vector<std::int32_t>& owner) const
 {
   const std::vector<float>& arrival = this->Front->Arrival();
@@ -281,7 +281,7 @@ VesselWay VesselMarch::WayBack(
     return number != None && std::isfinite(arrival[number]) ? number : None;
   };
 
-  VesselWay way;
+  MinimalPath way;
   Vector3 at = from.cwiseProduct(this->Input.grid.spacing);
   way.points.push_back(at);
   std::uint32_t here = member;
@@ -293,7 +293,7 @@ VesselWay VesselMarch::WayBack(
   const double near = 1.5 * this->Input.grid.spacing.maxCoeff();
   for (;;)
   {
-    if (owner[here] != VesselWay::noOwner)
+    if (owner[here] != MinimalPath::noOwner)
     {
       way.owner = owner[here];
       return way;

@@ -17,7 +17,7 @@
 namespace coronary
 {
 /// A way through the region, in mm along the axes of the grid (index times spacing).
-struct VesselWay
+struct MinimalPath
 {
   static constexpr std::int32_t noOwner = -1;
 
@@ -64,8 +64,8 @@ public:
   const FastMarching& Marched() const { return *Front; }
 
   /// Against the front.
-  /// @param owner  of each member: the point of the tree whose lumen it is in, or VesselWay::noOwner
-  VesselWay WayBack(
+  /// @param owner  of each member: the point of the tree whose lumen it is in, or MinimalPath::noOwner
+  MinimalPath Backtrack(
     const Vector3& from, std::uint32_t member, const std::vector<std::int32_t>& owner) const;
 
   /// Bytes at most, after the march.

@@ -32,19 +32,19 @@ int FamilyOf(int segment)
 }
 
 /// Mean radius and direction of the part of a branch between two distances from one of its ends, mm.
-struct Course
+struct BranchEnd
 {
   double radius = 0.0;
   Vector3 direction = Vector3::Zero();
 };
 
-Course CourseAt(const VesselTree& tree, const VesselTree::Branch& branch, bool atEnd)
+BranchEnd EndOf(const VesselTree& tree, const VesselTree::Branch& branch, bool atEnd)
 {
   constexpr double near = 2.0;
   constexpr double far = 8.0;
   const std::size_t count = branch.points.size();
   const auto at = [&](std::size_t i) { return branch.points[atEnd ? count - 1 - i : i]; };
-  Course course;
+  BranchEnd end;
   double arc = 0.0;
   double weight = 0.0;
   Vector3 from = tree.points[at(0)];
@@ -60,7 +60,7 @@ Course CourseAt(const VesselTree& tree, const VesselTree::Branch& branch, bool a
     to = tree.points[at(i)];
     if (arc > near || i + 1 == count)
     {
-      course.radius += std::max(step, 1e-9) * tree.radius[at(i)];
+      end.radius += std::max(step, 1e-9) * tree.radius[at(i)];
       weight += std::max(step, 1e-9);
     }
   }
@@ -68,9 +68,9 @@ Course CourseAt(const VesselTree& tree, const VesselTree::Branch& branch, bool a
   {
     from = tree.points[at(0)];
   }
-  course.radius = weight > 0.0 ? course.radius / weight : tree.radius[at(0)];
-  course.direction = (atEnd ? from - to : to - from).normalized();
-  return course;
+  end.radius = weight > 0.0 ? end.radius / weight : tree.radius[at(0)];
+  end.direction = (atEnd ? from - to : to - from).normalized();
+  return end;
 }
 }
 
@@ -110,12 +110,12 @@ std::vector<VesselPath> VesselPaths(const VesselTree& given)
         break;
       }
       const int family = FamilyOf(tree.branches[branch].segmentId);
-      const Course before = CourseAt(tree, tree.branches[branch], true);
+      const BranchEnd before = EndOf(tree, tree.branches[branch], true);
       std::size_t best = daughters.front();
       double bestScore = -1.0;
       for (const std::size_t daughter : daughters)
       {
-        const Course after = CourseAt(tree, tree.branches[daughter], false);
+        const BranchEnd after = EndOf(tree, tree.branches[daughter], false);
         double score = after.radius * (1.0 + 0.5 * before.direction.dot(after.direction));
         if (family != 0 && FamilyOf(tree.branches[daughter].segmentId) == family)
         {

@@ -26,7 +26,7 @@ struct VesselTip
 };
 
 /// Of a vessel that goes on: it is told. Whole vessels of healthy phantoms have 0.26 at most.
-constexpr double LeastGoingOn = 0.3;
+constexpr double MinimumGoingOn = 0.3;
 
 /**
  * One for each vessel. Of less than 4 mm nothing can be said: there it does not go on, and neither does what is named RCA.

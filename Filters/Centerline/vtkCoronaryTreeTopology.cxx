@@ -41,7 +41,7 @@ namespace
 constexpr double NoDaughter = -1.0;
 
 /// As many daughters as the arrays of a bifurcation have room for at least.
-constexpr int LeastDaughters = 3;
+constexpr int MinimumDaughters = 3;
 
 void AddVectors(vtkFieldData* data, const std::string& name, const std::vector<Vector3>& values)
 {
@@ -140,7 +140,7 @@ public:
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
     vtkNew<vtkCellArray> vertices;
-    int width = LeastDaughters;
+    int width = MinimumDaughters;
     for (const Bifurcation& bifurcation : tree.bifurcations)
     {
       const vtkIdType id = points->InsertNextPoint(tree.points[bifurcation.point].data());

@@ -143,8 +143,8 @@ private:
   }
   Ranges AlongI(int j, int k, float* row) const;
   void Slice(int k);
-  void Least(float* best, const Range& open, const float* other, const Range& finite, double square,
-    Range& grown) const;
+  void Minimum(float* best, const Range& open, const float* other, const Range& finite,
+    double square, Range& grown) const;
   void Finish(int j, int k, float* best, unsigned char* result) const;
 
   const unsigned char* Mask;
@@ -202,7 +202,7 @@ BallWindow::Ranges BallWindow::AlongI(int j, int k, float* row) const
 }
 
 /// The distances over a row that is some steps away take part where this row's are open.
-void BallWindow::Least(float* best, const Range& open, const float* other, const Range& finite,
+void BallWindow::Minimum(float* best, const Range& open, const float* other, const Range& finite,
   double square, Range& grown) const
 {
   const int first = std::max(open.first, finite.first);
@@ -243,7 +243,7 @@ void BallWindow::Slice(int k)
     {
       if (from != j)
       {
-        this->Least(best, ranges[j].open, &rows[static_cast<std::size_t>(from) * nx],
+        this->Minimum(best, ranges[j].open, &rows[static_cast<std::size_t>(from) * nx],
           ranges[from].finite, this->Squares[1][std::abs(from - j)], known.finite);
       }
     }
@@ -263,7 +263,7 @@ void BallWindow::Finish(int j, int k, float* best, unsigned char* result) const
     const std::size_t other = this->Row(j, from);
     if (from != k)
     {
-      this->Least(best, this->Known[row].open, &this->Squared[other * nx],
+      this->Minimum(best, this->Known[row].open, &this->Squared[other * nx],
         this->Known[other].finite, this->Squares[2][std::abs(from - k)], grown);
     }
   }

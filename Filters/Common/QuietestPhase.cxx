@@ -42,16 +42,16 @@ std::size_t QuietestPhase(
   }
   const std::size_t last = times.size() - 1;
   std::size_t quietest = 0;
-  double least = std::numeric_limits<double>::max();
+  double minimum = std::numeric_limits<double>::max();
   double before = 0.0;
   for (std::size_t n = 0; n < last + 1; ++n)
   {
     const double after = n < last ? MeanDifference(samples[n], samples[n + 1]) : 0.0;
     const double span = times[n < last ? n + 1 : n] - times[n > 0 ? n - 1 : n];
     const double motion = span > 0.0 ? (before + after) / span : 0.0;
-    if (motion < least)
+    if (motion < minimum)
     {
-      least = motion;
+      minimum = motion;
       quietest = n;
     }
     before = after;

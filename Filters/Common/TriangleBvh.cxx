@@ -13,7 +13,7 @@ namespace coronary
 {
 namespace
 {
-constexpr double GreatestCoordinate = 1e18;
+constexpr double MaximumCoordinate = 1e18;
 
 float RoundDown(double value)
 {
@@ -258,7 +258,7 @@ void TriangleBvh::CheckPoints() const
     for (const std::int32_t corner : this->Corners[i])
     {
       // NaN fails the comparison.
-      if (!(this->Points[corner].array().abs() <= GreatestCoordinate).all())
+      if (!(this->Points[corner].array().abs() <= MaximumCoordinate).all())
       {
         throw std::invalid_argument("point " + std::to_string(corner) + " of triangle " +
           std::to_string(i) + " is not finite or beyond 1e18");
@@ -442,7 +442,7 @@ void TriangleBvh::Refit(const std::vector<float>& points)
 TriangleBvh::Nearest TriangleBvh::Closest(const Vector3& p, double bound, std::int64_t hint) const
 {
   Nearest nearest;
-  if (this->Leaves.empty() || !(bound >= 0.0) || !(p.array().abs() <= GreatestCoordinate).all())
+  if (this->Leaves.empty() || !(bound >= 0.0) || !(p.array().abs() <= MaximumCoordinate).all())
   {
     return nearest;
   }

@@ -113,9 +113,9 @@ void Closest(BvhQuery& query)
 {
   const auto toFloat = [](double bound)
   {
-    constexpr double greatest = 3.4028234663852886e38;
-    return bound < greatest / Slack ? static_cast<float>(bound) * Slack + 1e-44F
-                                    : static_cast<float>(greatest);
+    constexpr double maximum = 3.4028234663852886e38;
+    return bound < maximum / Slack ? static_cast<float>(bound) * Slack + 1e-44F
+                                   : static_cast<float>(maximum);
   };
   float bound = toFloat(query.squaredDistance);
   Waiting stack[StackSize];

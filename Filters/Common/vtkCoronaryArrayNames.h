@@ -166,11 +166,11 @@ constexpr const char* SkeletonEdgeId = "SkeletonEdgeId";
 constexpr const char* Backend = "Backend";                       ///< string
 constexpr const char* Tries = "Tries";                           ///< int, 2 after a repair
 constexpr const char* RepairDisplacement = "RepairDisplacement"; ///< double, mm
-constexpr const char* LeastDihedralAngle = "LeastDihedralAngle"; ///< double, radians
-constexpr const char* PoorFraction = "PoorFraction";             ///< double, below 15 degrees
-constexpr const char* LeastVolume = "LeastVolume";               ///< double, mm^3
-constexpr const char* TotalVolume = "TotalVolume";               ///< double, mm^3
-constexpr const char* GreatestRadiusEdgeRatio = "GreatestRadiusEdgeRatio"; ///< double
+constexpr const char* MeshMinimumDihedralAngle = "MeshMinimumDihedralAngle"; ///< double, radians
+constexpr const char* PoorFraction = "PoorFraction";           ///< double, below 15 degrees
+constexpr const char* MeshMinimumVolume = "MeshMinimumVolume"; ///< double, mm^3
+constexpr const char* TotalVolume = "TotalVolume";             ///< double, mm^3
+constexpr const char* MeshMaximumRadiusEdgeRatio = "MeshMaximumRadiusEdgeRatio"; ///< double
 constexpr const char* Warnings = "Warnings"; ///< string, one a warning
 // Skeleton (with radius and abscissa, GroupIds, TreeIds, SegmentIds, Length), point data.
 constexpr const char* ParentJoint =
@@ -235,7 +235,7 @@ constexpr const char* MotionObjective = "MotionObjective"; ///< double[2], what 
 constexpr const char* ClampedPoints = "ClampedPoints";     ///< vtkIdType[5], one a limit
 constexpr const char* LimitViolations = "LimitViolations"; ///< vtkIdType, that are left
 constexpr const char* LimitIterations = "LimitIterations"; ///< int
-constexpr const char* GreatestMove = "GreatestMove";       ///< double, mm
+constexpr const char* MaximumMove = "MaximumMove";         ///< double, mm
 // Deformed mesh, cell data.
 constexpr const char* VolumeRatio = "VolumeRatio"; ///< double, against rest, below 0 inverted
 // Deformed mesh, field data.
@@ -257,7 +257,7 @@ constexpr const char* LeftOutPlaces = "LeftOutPlaces";   ///< double[3], mm
 constexpr const char* LeftOutLengths = "LeftOutLengths"; ///< double, mm
 constexpr const char* LeftOutPoints = "LeftOutPoints";   ///< idtype, of the tree
 constexpr const char* Repaired = "Repaired";             ///< uchar, 1: triangles were replaced
-constexpr const char* GreatestDisplacement = "GreatestDisplacement"; ///< double, mm
+constexpr const char* MaximumDisplacement = "MaximumDisplacement"; ///< double, mm
 }
 
 #endif

@@ -75,39 +75,39 @@ public:
     }
   }
 
-  std::vector<TreeBranch> Branches(double leastLength)
+  std::vector<TreeBranch> Branches(double minimumLength)
   {
     for (;;)
     {
-      const std::vector<Walk> walks = this->Walks();
-      std::vector<const Walk*> twigs;
-      for (const Walk& walk : walks)
+      const std::vector<Chain> chains = this->Chains();
+      std::vector<const Chain*> twigs;
+      for (const Chain& chain : chains)
       {
-        const bool ends = this->Next.at(walk.places.back()).empty() &&
-          this->Previous.at(walk.places.back()).size() == 1;
-        const bool begins = this->Previous.at(walk.places.front()).empty() &&
-          this->Next.at(walk.places.front()).size() == 1;
-        if (ends && !begins && this->LengthOfWalk(walk) < leastLength)
+        const bool ends = this->Next.at(chain.places.back()).empty() &&
+          this->Previous.at(chain.places.back()).size() == 1;
+        const bool begins = this->Previous.at(chain.places.front()).empty() &&
+          this->Next.at(chain.places.front()).size() == 1;
+        if (ends && !begins && this->LengthOfChain(chain) < minimumLength)
         {
-          twigs.push_back(&walk);
+          twigs.push_back(&chain);
         }
       }
       if (twigs.empty())
       {
         std::vector<TreeBranch> branches;
-        branches.reserve(walks.size());
-        for (const Walk& walk : walks)
+        branches.reserve(chains.size());
+        for (const Chain& chain : chains)
         {
-          branches.push_back(this->BranchOf(walk));
+          branches.push_back(this->BranchOf(chain));
         }
         return branches;
       }
       // Of twigs at one fork the shortest goes first: what is left of the fork may be one branch then.
-      std::map<std::int32_t, const Walk*> shortest;
-      for (const Walk* twig : twigs)
+      std::map<std::int32_t, const Chain*> shortest;
+      for (const Chain* twig : twigs)
       {
-        const Walk*& best = shortest[twig->places.front()];
-        if (best == nullptr || this->LengthOfWalk(*twig) < this->LengthOfWalk(*best))
+        const Chain*& best = shortest[twig->places.front()];
+        if (best == nullptr || this->LengthOfChain(*twig) < this->LengthOfChain(*best))
         {
           best = twig;
         }
@@ -125,7 +125,7 @@ private:
     std::int32_t to;
     std::size_t line;
   };
-  struct Walk
+  struct Chain
   {
     std::vector<std::int32_t> places;
     std::vector<std::size_t> lines; ///< of each step
@@ -136,33 +136,34 @@ private:
     return this->Next.at(place).size() == 1 && this->Previous.at(place).size() == 1;
   }
 
-  double LengthOfWalk(const Walk& walk) const
+  double LengthOfChain(const Chain& chain) const
   {
     double length = 0.0;
-    for (std::size_t i = 1; i < walk.places.size(); ++i)
+    for (std::size_t i = 1; i < chain.places.size(); ++i)
     {
-      length += (this->Tree.points[walk.places[i]] - this->Tree.points[walk.places[i - 1]]).norm();
+      length +=
+        (this->Tree.points[chain.places[i]] - this->Tree.points[chain.places[i - 1]]).norm();
     }
     return length;
   }
 
-  std::vector<Walk> Walks() const
+  std::vector<Chain> Chains() const
   {
-    std::vector<Walk> walks;
+    std::vector<Chain> chains;
     std::set<std::int32_t> passed;
     const auto follow = [&](std::int32_t from, const Step& first)
     {
-      Walk walk;
-      walk.places = { from, first.to };
-      walk.lines = { first.line };
-      while (this->Passes(walk.places.back()) && walk.places.back() != from)
+      Chain chain;
+      chain.places = { from, first.to };
+      chain.lines = { first.line };
+      while (this->Passes(chain.places.back()) && chain.places.back() != from)
       {
-        passed.insert(walk.places.back());
-        const Step& step = this->Next.at(walk.places.back()).front();
-        walk.places.push_back(step.to);
-        walk.lines.push_back(step.line);
+        passed.insert(chain.places.back());
+        const Step& step = this->Next.at(chain.places.back()).front();
+        chain.places.push_back(step.to);
+        chain.lines.push_back(step.line);
       }
-      walks.push_back(std::move(walk));
+      chains.push_back(std::move(chain));
     };
     for (const auto& [place, steps] : this->Next)
     {
@@ -184,25 +185,25 @@ private:
       }
     }
     // In the order of their lines, as they were given.
-    std::stable_sort(walks.begin(), walks.end(),
-      [](const Walk& s, const Walk& t) { return s.lines.front() < t.lines.front(); });
-    return walks;
+    std::stable_sort(chains.begin(), chains.end(),
+      [](const Chain& s, const Chain& t) { return s.lines.front() < t.lines.front(); });
+    return chains;
   }
 
-  TreeBranch BranchOf(const Walk& walk) const
+  TreeBranch BranchOf(const Chain& chain) const
   {
     TreeBranch branch;
     std::map<std::size_t, double> share;
-    for (std::size_t i = 0; i < walk.places.size(); ++i)
+    for (std::size_t i = 0; i < chain.places.size(); ++i)
     {
-      branch.points.push_back(this->Tree.points[walk.places[i]]);
+      branch.points.push_back(this->Tree.points[chain.places[i]]);
       if (!this->Tree.radius.empty())
       {
-        branch.radius.push_back(this->Tree.radius[walk.places[i]]);
+        branch.radius.push_back(this->Tree.radius[chain.places[i]]);
       }
       if (i > 0)
       {
-        share[walk.lines[i - 1]] += (branch.points[i] - branch.points[i - 1]).norm();
+        share[chain.lines[i - 1]] += (branch.points[i] - branch.points[i - 1]).norm();
       }
     }
     branch.length = LengthOf(branch.points);
@@ -212,28 +213,28 @@ private:
       })->first;
     branch.group =
       this->Tree.groups.empty() ? static_cast<std::int64_t>(line) : this->Tree.groups[line];
-    branch.isRoot = this->Previous.at(walk.places.front()).empty();
+    branch.isRoot = this->Previous.at(chain.places.front()).empty();
     return branch;
   }
 
-  void Remove(const Walk& walk)
+  void Remove(const Chain& chain)
   {
-    for (std::size_t i = 1; i < walk.places.size(); ++i)
+    for (std::size_t i = 1; i < chain.places.size(); ++i)
     {
-      const std::int32_t from = walk.places[i - 1];
-      const std::int32_t to = walk.places[i];
+      const std::int32_t from = chain.places[i - 1];
+      const std::int32_t to = chain.places[i];
       std::vector<Step>& next = this->Next[from];
       next.erase(
         std::find_if(next.begin(), next.end(), [&](const Step& step) { return step.to == to; }));
       std::vector<std::int32_t>& previous = this->Previous[to];
       previous.erase(std::find(previous.begin(), previous.end(), from));
     }
-    for (std::size_t i = 1; i < walk.places.size(); ++i)
+    for (std::size_t i = 1; i < chain.places.size(); ++i)
     {
-      if (this->Next[walk.places[i]].empty() && this->Previous[walk.places[i]].empty())
+      if (this->Next[chain.places[i]].empty() && this->Previous[chain.places[i]].empty())
       {
-        this->Next.erase(walk.places[i]);
-        this->Previous.erase(walk.places[i]);
+        this->Next.erase(chain.places[i]);
+        this->Previous.erase(chain.places[i]);
       }
     }
   }
@@ -369,7 +370,7 @@ std::vector<std::int64_t> Assign(const Eigen::MatrixXd& gain)
     {
       used[column] = 1;
       const Eigen::Index current = rowOf[column];
-      double least = std::numeric_limits<double>::infinity();
+      double minimum = std::numeric_limits<double>::infinity();
       Eigen::Index next = 0;
       for (Eigen::Index j = 1; j <= n; ++j)
       {
@@ -382,9 +383,9 @@ std::vector<std::int64_t> Assign(const Eigen::MatrixXd& gain)
             slack[j] = reduced;
             before[j] = column;
           }
-          if (slack[j] < least)
+          if (slack[j] < minimum)
           {
-            least = slack[j];
+            minimum = slack[j];
             next = j;
           }
         }
@@ -393,12 +394,12 @@ std::vector<std::int64_t> Assign(const Eigen::MatrixXd& gain)
       {
         if (used[j] != 0)
         {
-          rowPotential[rowOf[j]] += least;
-          columnPotential[j] -= least;
+          rowPotential[rowOf[j]] += minimum;
+          columnPotential[j] -= minimum;
         }
         else
         {
-          slack[j] -= least;
+          slack[j] -= minimum;
         }
       }
       column = next;
@@ -486,8 +487,8 @@ void BranchMetricsSettings::Validate() const
     "BranchMetricsSettings: tolerance must be positive");
   Require(share(detectedShare), "BranchMetricsSettings: detectedShare must be from 0 to 1");
   Require(share(overlapGate), "BranchMetricsSettings: overlapGate must be from 0 to 1");
-  Require(leastLength >= 0.0 && std::isfinite(leastLength),
-    "BranchMetricsSettings: leastLength must be 0 or more");
+  Require(minimumLength >= 0.0 && std::isfinite(minimumLength),
+    "BranchMetricsSettings: minimumLength must be 0 or more");
 }
 
 std::vector<TreeBranch> FindBranches(const Polylines& tree, const BranchMetricsSettings& settings)
@@ -496,7 +497,7 @@ std::vector<TreeBranch> FindBranches(const Polylines& tree, const BranchMetricsS
   Check(tree, "the tree");
   if (!settings.linesAreBranches)
   {
-    return TreeGraph(tree).Branches(settings.leastLength);
+    return TreeGraph(tree).Branches(settings.minimumLength);
   }
   std::vector<TreeBranch> branches;
   std::set<std::int32_t> inner;
@@ -521,7 +522,7 @@ std::vector<TreeBranch> FindBranches(const Polylines& tree, const BranchMetricsS
     }
     branch.length = LengthOf(branch.points);
     branch.group = tree.groups.empty() ? static_cast<std::int64_t>(i) : tree.groups[i];
-    if (branch.points.size() > 1 && branch.length > 0.0 && branch.length >= settings.leastLength)
+    if (branch.points.size() > 1 && branch.length > 0.0 && branch.length >= settings.minimumLength)
     {
       branch.isRoot = inner.count(place[tree.lines[i].front()]) == 0;
       branches.push_back(std::move(branch));
@@ -588,8 +589,8 @@ Polylines TreeOfSurface(const std::vector<Vector3>& points, const std::vector<st
       where.push_back(slice.abscissa / count);
     }
     // The slices' middles lie half a slice inside of the ends: the line goes on straight to these.
-    const auto [least, greatest] = ends[id];
-    const auto extend = [&, first = least, last = greatest](bool atEnd)
+    const auto [minimum, maximum] = ends[id];
+    const auto extend = [&, first = minimum, last = maximum](bool atEnd)
     {
       const std::int64_t size = static_cast<std::int64_t>(tree.points.size()) - firstPoint;
       const std::int64_t a = atEnd ? size - 1 : 0;

@@ -36,7 +36,7 @@ struct BranchMetricsSettings
   double overlapGate = 0.25;  ///< least overlap of a matched pair, 0 to 1
 
   /// Ends of a tree that are shorter are no branches, on both sides. 0 or more.
-  double leastLength = 3.0;
+  double minimumLength = 3.0;
 
   /// Take each line as a branch, as it was given, instead.
   bool linesAreBranches = false;

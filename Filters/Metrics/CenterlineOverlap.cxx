@@ -17,7 +17,7 @@ namespace
 using Measures = CenterlineOverlapMeasures;
 constexpr double NaN = Measures::NaN;
 constexpr double Infinite = std::numeric_limits<double>::infinity();
-constexpr double LargestPairs = 4e10; // 5 GB of directions
+constexpr double MaximumPairs = 4e10; // 5 GB of directions
 constexpr double CoarseSteps = 10.0;  // of the spacing, to choose which paths are compared
 
 void CheckPoints(const std::vector<Vector3>& points, const char* side)
@@ -187,7 +187,7 @@ std::vector<Connection> Correspond(const CenterlineSamples& reference,
 {
   const std::int64_t rows = reference.Count();
   const std::int64_t columns = result.Count();
-  if (static_cast<double>(rows) * static_cast<double>(columns) > LargestPairs)
+  if (static_cast<double>(rows) * static_cast<double>(columns) > MaximumPairs)
   {
     FailOverlap("lines of " + std::to_string(rows) + " and " + std::to_string(columns) +
       " samples are too long to be compared; take a larger spacing");
@@ -512,7 +512,7 @@ TreeComparison::TreeComparison(const Polylines& reference, const Polylines& resu
   , FoundMatches(this->Found.lines.size())
   , FoundRadius(this->Truth.lines.size())
   , Relevant(this->Truth.WideUpTo(settings.relevantRadius))
-  , Counts(this->Truth.WideUpTo(settings.leastRadius))
+  , Counts(this->Truth.WideUpTo(settings.minimumRadius))
   , Reached(this->Truth.lines.size())
 {
   for (const LineTree* tree : { &this->Truth, &this->Found })
@@ -751,7 +751,7 @@ void CenterlineOverlapSettings::Validate() const
   };
   check("the spacing", this->spacing, false);
   check("the relevant radius", this->relevantRadius, true);
-  check("the least radius", this->leastRadius, true);
+  check("the least radius", this->minimumRadius, true);
   check("the start length", this->startLength, true);
 }
 

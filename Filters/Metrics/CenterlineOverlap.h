@@ -38,7 +38,7 @@ struct CenterlineOverlapSettings
 
   /// Vessels are left out where no radius at or downstream is this large, together with what of the
   /// result is nearest to such a place: neither right nor wrong. Trees as a whole only. 0 or more.
-  double leastRadius = 0.0;
+  double minimumRadius = 0.0;
 
   /// Misses this near to the reference's start do not end OF: where the vessel leaves the aorta is
   /// a matter of opinion. 0 or more.

@@ -7,7 +7,7 @@ namespace coronary
 {
 namespace
 {
-constexpr double LargestSamples = 2e8; // of one side
+constexpr double MaximumSamples = 2e8; // of one side
 
 struct Positions
 {
@@ -38,7 +38,7 @@ CenterlineSamples SampleLine(const std::vector<Vector3>& points, const std::vect
     return samples;
   }
   samples.length = abscissa.back();
-  if (samples.length / spacing > LargestSamples)
+  if (samples.length / spacing > MaximumSamples)
   {
     FailOverlap("a line of length " + std::to_string(samples.length) +
       " has too many samples of spacing " + std::to_string(spacing));
@@ -141,7 +141,7 @@ LineTree::LineTree(const Polylines& set, double spacing)
     }
     this->lines[l].samples = SampleLine(points, radius, {}, spacing);
     length += this->lines[l].samples.length;
-    if (length / spacing > LargestSamples)
+    if (length / spacing > MaximumSamples)
     {
       FailOverlap("the lines have too many samples of spacing " + std::to_string(spacing));
     }

@@ -123,7 +123,7 @@ void MeasurePoints(
       other.Closest(side.surface.points[point], std::numeric_limits<double>::infinity(), hint);
     side.distance[point] = side.nearest[point].distance;
   };
-  double least = -1.0;
+  double minimum = -1.0;
   // One in so many shows how great the greatest distance is at least.
   constexpr std::int64_t sampling = 16;
   if (!all)
@@ -140,7 +140,7 @@ void MeasurePoints(
       });
     for (std::int64_t i = 0; i < count / sampling; ++i)
     {
-      least = std::max(least, side.distance[side.pointOrder[sampling * i]]);
+      minimum = std::max(minimum, side.distance[side.pointOrder[sampling * i]]);
     }
   }
   // Ranges that begin at a sample, so that what is stored does not depend on them.
@@ -161,7 +161,7 @@ void MeasurePoints(
             const TrianglePoint near = !all && hint >= 0
               ? other.NearestOn(hint, side.surface.points[point])
               : TrianglePoint();
-            if (near.squaredDistance <= least * least && least > 0.0)
+            if (near.squaredDistance <= minimum * minimum && minimum > 0.0)
             {
               side.nearest[point].triangle = hint;
               side.distance[point] = std::sqrt(near.squaredDistance);

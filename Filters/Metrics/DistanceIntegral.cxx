@@ -10,8 +10,8 @@ namespace coronary
 {
 namespace
 {
-constexpr double LeastParts = 20000.0; ///< of a surface's area
-constexpr int GreatestGrid = 512;      ///< edges along a triangle's side
+constexpr double MinimumParts = 20000.0; ///< of a surface's area
+constexpr int MaximumGrid = 512;         ///< edges along a triangle's side
 constexpr int ErrorSamples = 1024;
 constexpr int MaximumRounds = 8;
 
@@ -81,14 +81,14 @@ double Percentile95(std::vector<const DistancePart*> parts)
                   [&](const DistancePart* part)
                   {
                     const auto& [a, b, c] = part->corner;
-                    const double least = std::min({ a, b, c, part->centroid });
-                    const double greatest = std::max({ a, b, c, part->centroid });
-                    if (greatest <= low)
+                    const double minimum = std::min({ a, b, c, part->centroid });
+                    const double maximum = std::max({ a, b, c, part->centroid });
+                    if (maximum <= low)
                     {
                       below.Add(part->area);
                       return true;
                     }
-                    return least > high;
+                    return minimum > high;
                   }),
       parts.end());
   }
@@ -141,8 +141,8 @@ void DistanceIntegral::Start(const ProgressCallback& progress)
   std::vector<std::int64_t> firstPart(count + 1, 0);
   for (std::int64_t i = 0; i < count; ++i)
   {
-    const double parts = total.Value() > 0.0 ? LeastParts * area[i] / total.Value() : 0.0;
-    this->Grid[i] = std::clamp(static_cast<int>(std::ceil(std::sqrt(parts))), 1, GreatestGrid);
+    const double parts = total.Value() > 0.0 ? MinimumParts * area[i] / total.Value() : 0.0;
+    this->Grid[i] = std::clamp(static_cast<int>(std::ceil(std::sqrt(parts))), 1, MaximumGrid);
     firstPart[i + 1] = firstPart[i] + static_cast<std::int64_t>(this->Grid[i]) * this->Grid[i];
   }
   this->Gridded = firstPart[count];

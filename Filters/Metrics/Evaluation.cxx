@@ -17,7 +17,7 @@ constexpr double SampleDistance = 0.25; // mm
 
 /// From samples of lines, where they are wide enough, to the nearest point of other lines.
 std::vector<double> DistancesFrom(
-  const Polylines& lines, const Polylines& others, double leastRadius)
+  const Polylines& lines, const Polylines& others, double minimumRadius)
 {
   struct Segment
   {
@@ -46,7 +46,7 @@ std::vector<double> DistancesFrom(
       {
         const double t = (part + 0.5) / parts;
         if (lines.radius.empty() ||
-          (1.0 - t) * lines.radius[a] + t * lines.radius[b] >= leastRadius)
+          (1.0 - t) * lines.radius[a] + t * lines.radius[b] >= minimumRadius)
         {
           samples.emplace_back((1.0 - t) * lines.points[a] + t * lines.points[b]);
         }
@@ -63,14 +63,14 @@ std::vector<double> DistancesFrom(
     {
       for (std::int64_t i = first; i < last; ++i)
       {
-        double least = std::numeric_limits<double>::infinity();
+        double minimum = std::numeric_limits<double>::infinity();
         for (const Segment& segment : segments)
         {
-          least = std::min(least,
+          minimum = std::min(minimum,
             NearestOnSegment(samples[static_cast<std::size_t>(i)], segment.a, segment.b)
               .squaredDistance);
         }
-        distances[static_cast<std::size_t>(i)] = std::sqrt(least);
+        distances[static_cast<std::size_t>(i)] = std::sqrt(minimum);
       }
     });
   return distances;

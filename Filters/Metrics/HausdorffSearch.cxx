@@ -137,15 +137,15 @@ double HausdorffSearch::UpperBound(const Piece& piece, std::int32_t extra, doubl
   }
   const auto tryOne = [&](std::int32_t triangle)
   {
-    double greatest = 0.0;
-    for (int k = 0; k < 3 && greatest < upper; ++k)
+    double maximum = 0.0;
+    for (int k = 0; k < 3 && maximum < upper; ++k)
     {
-      greatest = std::max(greatest,
+      maximum = std::max(maximum,
         piece.nearest[k] == triangle
           ? piece.distance[k]
           : std::sqrt(this->To.tree.NearestOn(triangle, piece.corner[k]).squaredDistance));
     }
-    upper = std::min(upper, greatest);
+    upper = std::min(upper, maximum);
   };
   for (int i = 0; i < 3 && upper > enough; ++i)
   {
@@ -316,8 +316,8 @@ bool HausdorffSearch::CanBeGreater(const Piece& piece) const
 
 void HausdorffSearch::Discard(const Piece& piece)
 {
-  double& greatest = this->Discarded[this->From.groupOf[piece.triangle]];
-  greatest = std::max(greatest, piece.upper);
+  double& maximum = this->Discarded[this->From.groupOf[piece.triangle]];
+  maximum = std::max(maximum, piece.upper);
 }
 
 void HausdorffSearch::Run(const std::vector<DistancePart>& parts, const ProgressCallback& progress)

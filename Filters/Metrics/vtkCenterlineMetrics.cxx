@@ -435,7 +435,7 @@ void vtkCenterlineMetrics::CompareLines(const Polylines& result, const Polylines
 {
   coronary::CenterlineOverlapSettings settings;
   settings.relevantRadius = this->RelevantRadius;
-  settings.leastRadius = this->LeastRadius;
+  settings.minimumRadius = this->MinimumRadius;
   settings.Validate();
   if (this->Method < AutomaticMethod || this->Method > PathMethod)
   {
@@ -468,7 +468,7 @@ void vtkCenterlineMetrics::CompareBranches(
   coronary::BranchMetricsSettings settings;
   settings.tolerance = this->Tolerance;
   settings.detectedShare = this->DetectedShare;
-  settings.leastLength = this->LeastLength;
+  settings.minimumLength = this->MinimumLength;
   settings.Validate();
   const BranchMetrics metrics =
     coronary::CompareBranches(result, reference, settings, vtkCoronary::ProgressOf(this, 0.0, 0.5));
@@ -510,8 +510,8 @@ void vtkCenterlineMetrics::PrintSelf(ostream& os, vtkIndent indent)
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Method: " << this->Method << "\n";
   os << indent << "RelevantRadius: " << this->RelevantRadius << "\n";
-  os << indent << "LeastRadius: " << this->LeastRadius << "\n";
+  os << indent << "MinimumRadius: " << this->MinimumRadius << "\n";
   os << indent << "Tolerance: " << this->Tolerance << "\n";
   os << indent << "DetectedShare: " << this->DetectedShare << "\n";
-  os << indent << "LeastLength: " << this->LeastLength << "\n";
+  os << indent << "MinimumLength: " << this->MinimumLength << "\n";
 }

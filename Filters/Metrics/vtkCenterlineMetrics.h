@@ -138,8 +138,8 @@ public:
    * Vessels are left out where no radius at or downstream is this large, in mm, and so is what of the
    * result is nearest to such a place. Whole trees only. 0 or more. Default 0.
    */
-  vtkSetMacro(LeastRadius, double);
-  vtkGetMacro(LeastRadius, double);
+  vtkSetMacro(MinimumRadius, double);
+  vtkGetMacro(MinimumRadius, double);
   ///@}
 
   ///@{
@@ -163,8 +163,8 @@ public:
   /**
    * Ends of a tree that are shorter are no branches; mm, 0 or more. Default 3.
    */
-  vtkSetMacro(LeastLength, double);
-  vtkGetMacro(LeastLength, double);
+  vtkSetMacro(MinimumLength, double);
+  vtkGetMacro(MinimumLength, double);
   ///@}
 
   vtkPolyData* GetLines();
@@ -195,10 +195,10 @@ private:
 
   int Method = AutomaticMethod;
   double RelevantRadius = 0.75;
-  double LeastRadius = 0.0;
+  double MinimumRadius = 0.0;
   double Tolerance = 1.0;
   double DetectedShare = 0.8;
-  double LeastLength = 3.0;
+  double MinimumLength = 3.0;
 };
 
 #endif

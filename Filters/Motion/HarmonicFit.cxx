@@ -18,7 +18,7 @@ constexpr double Pi = 3.14159265358979323846;
 /// Columns that one task works on.
 constexpr std::int64_t Grain = 8192;
 /// Of the Fourier fit, relative to its diagonal: enough to be solvable at any set of phases.
-constexpr double LeastRidge = 1e-9;
+constexpr double MinimumRidge = 1e-9;
 constexpr double Ridges[] = { 0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3 };
 /// End of the weighted fit: the greatest change of a fitted position in one iteration, mm.
 constexpr double FitTolerance = 1e-3;
@@ -31,7 +31,7 @@ VectorXd Penalty(int order, double ridge, double samples)
   VectorXd penalty = VectorXd::Zero(2 * order + 1);
   for (int m = 1; m <= order; ++m)
   {
-    const double strength = 0.5 * samples * (ridge * (std::pow(m, 4) - 1.0) + LeastRidge);
+    const double strength = 0.5 * samples * (ridge * (std::pow(m, 4) - 1.0) + MinimumRidge);
     penalty[2 * m - 1] = strength;
     penalty[2 * m] = strength;
   }
@@ -246,11 +246,11 @@ void LowNoiseFitter::Fill()
 std::vector<LowNoiseFitter::Choice> LowNoiseFitter::Choices() const
 {
   const Index knots = this->Points.rows();
-  const int ranks = std::min<int>(this->Settings.greatestRank, static_cast<int>(knots) - 2);
+  const int ranks = std::min<int>(this->Settings.maximumRank, static_cast<int>(knots) - 2);
   std::vector<Choice> choices;
   for (int rank = 1; rank <= std::max(1, ranks); ++rank)
   {
-    for (int order = 1; order <= this->Settings.greatestOrder; ++order)
+    for (int order = 1; order <= this->Settings.maximumOrder; ++order)
     {
       for (const double ridge : Ridges)
       {

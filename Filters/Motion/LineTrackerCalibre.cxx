@@ -81,20 +81,20 @@ public:
         for (int i = 0; i < Side; ++i, ++index)
         {
           const Vector3 place = Spacing * Vector3(i, j, k) - Vector3::Constant(Reach);
-          double least = Beyond;
+          double minimum = Beyond;
           Vector3 out = Vector3::Zero();
           for (const Step& step : steps)
           {
             const SegmentPlace near = NearestOnSegment(place, step.start, step.end);
             const double fromWall =
               std::sqrt(near.squaredDistance) - step.radius - near.fraction * step.wider;
-            if (fromWall < least)
+            if (fromWall < minimum)
             {
-              least = fromWall;
+              minimum = fromWall;
               out = place - near.position;
             }
           }
-          const double share = std::clamp((Beyond - least) / (Beyond - Within), 0.0, 1.0);
+          const double share = std::clamp((Beyond - minimum) / (Beyond - Within), 0.0, 1.0);
           this->Values[index] = (share * out).cast<float>();
         }
       }

@@ -340,10 +340,10 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
       this->Part(progressFrom + 0.1 * static_cast<double>(k) / static_cast<double>(phases),
         progressFrom + 0.1 * static_cast<double>(k + 1) / static_cast<double>(phases)));
     const double noise = SignalCurvature::NoiseOf(curvature, averaged);
-    std::vector<float> least(nodes);
+    std::vector<float> minimum(nodes);
     for (std::int64_t n = 0; n < nodes; ++n)
     {
-      least[n] = *std::min_element(costs[n].begin(), costs[n].end());
+      minimum[n] = *std::min_element(costs[n].begin(), costs[n].end());
     }
     ToLikelihoods(costs, 30.0, 15.0, 0.1 * this->NoiseFloor());
     std::vector<Vector3> displacement = BestDisplacements(this->Nodes, lattice, costs, 0.25);
@@ -375,7 +375,7 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
       else
       {
         information[n] = Limited(SignalCurvature(curvature[n], noise / averaged[n]).Information() *
-            (30.0 / std::max<double>(least[n], this->NoiseFloor())),
+            (30.0 / std::max<double>(minimum[n], this->NoiseFloor())),
           std::max(TissueDeviation, 0.8 * this->Voxel));
       }
       displacement[n] += this->Displacement[k][n];

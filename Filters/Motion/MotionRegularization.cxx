@@ -27,9 +27,9 @@ using Sparse = Eigen::SparseMatrix<double>;
 
 constexpr double Pi = 3.14159265358979323846;
 /// Weight of a sample of no confidence at all: without it, nothing but smoothness would hold a point.
-constexpr double LeastWeight = 1e-6;
+constexpr double MinimumWeight = 1e-6;
 /// Gaps between phases that are shorter than this share of the mean one count as so long.
-constexpr double LeastGap = 0.1;
+constexpr double MinimumGap = 0.1;
 /// Of the limits against the data, in the method of multipliers: enough for limits that are not convex.
 constexpr double FirstPenalty = 10.0;
 /// Where they are not kept after so many iterations, it becomes ten times as much.
@@ -142,7 +142,7 @@ Problem::Problem(
   {
     double between = times[this->order[this->Next(k)]] - times[this->order[k]];
     between += k == this->phases - 1 ? 1.0 : 0.0;
-    this->gap.push_back(std::max(LeastGap, between * static_cast<double>(this->phases)));
+    this->gap.push_back(std::max(MinimumGap, between * static_cast<double>(this->phases)));
   }
 
   this->neighbours.resize(lines.points.size());
@@ -208,7 +208,7 @@ double Problem::WeightOf(const PoseSequence& sequence, std::int64_t point, std::
     return 1.0;
   }
   const double confidence = sequence.confidence[this->order[phase]][point];
-  return std::max(LeastWeight, confidence * confidence);
+  return std::max(MinimumWeight, confidence * confidence);
 }
 
 bool Problem::WellTracked(
@@ -349,13 +349,13 @@ Limits::Limits(const Problem& wholeProblem, const PoseSequence& sequence, const 
   for (std::int64_t k = 0; k < this->Whole.phases; ++k)
   {
     for (std::size_t n = 0;
-         std::isfinite(settings.greatestStrain) && n < this->Whole.segments.size(); ++n)
+         std::isfinite(settings.maximumStrain) && n < this->Whole.segments.size(); ++n)
     {
       const Segment& segment = this->Whole.segments[n];
       this->List.push_back({ Limit::Strain, n,
         { this->Whole.Unknown(segment.first, k), this->Whole.Unknown(segment.second, k), -1 }, k });
     }
-    const bool bent = settings.greatestBending < Pi || settings.leastCurvatureRadius > 0.0;
+    const bool bent = settings.maximumBending < Pi || settings.minimumCurvatureRadius > 0.0;
     for (std::size_t n = 0; bent && n < this->Whole.corners.size(); ++n)
     {
       const Corner& corner = this->Whole.corners[n];
@@ -366,7 +366,7 @@ Limits::Limits(const Problem& wholeProblem, const PoseSequence& sequence, const 
     }
     for (std::int64_t point = 0; point < this->Whole.points; ++point)
     {
-      if (std::isfinite(settings.greatestStep))
+      if (std::isfinite(settings.maximumStep))
       {
         this->List.push_back({ Limit::Step, 0,
           { this->Whole.Unknown(point, k), this->Whole.Unknown(point, this->Whole.Next(k)), -1 },
@@ -398,9 +398,9 @@ void Limits::Values(std::size_t n, const Positions& at, Vector3 values[2]) const
 double Limits::BendingLimit(const Corner& corner, double first, double second, int& bit) const
 {
   const MotionRegularizationSettings& settings = this->Whole.settings;
-  const double byAngle = std::max(settings.greatestBending, corner.bending * (1.0 + RestSlack));
+  const double byAngle = std::max(settings.maximumBending, corner.bending * (1.0 + RestSlack));
   const double byRadius = BendingAt(first, second,
-    std::min(settings.leastCurvatureRadius, corner.curvatureRadius * (1.0 - RestSlack)));
+    std::min(settings.minimumCurvatureRadius, corner.curvatureRadius * (1.0 - RestSlack)));
   bit = byAngle <= byRadius ? ClampBending : ClampCurvature;
   return std::min(byAngle, byRadius);
 }
@@ -416,7 +416,7 @@ int Limits::Project(std::size_t n, Vector3 values[2]) const
       const double rest = this->Whole.segments[limit.item].length;
       const double length = values[0].norm();
       const double wanted = std::clamp(
-        length, rest * (1.0 - settings.greatestStrain), rest * (1.0 + settings.greatestStrain));
+        length, rest * (1.0 - settings.maximumStrain), rest * (1.0 + settings.maximumStrain));
       if (wanted == length)
       {
         return 0;
@@ -455,7 +455,7 @@ int Limits::Project(std::size_t n, Vector3 values[2]) const
     case Limit::Tolerance:
     default:
     {
-      const double most = limit.kind == Limit::Step ? settings.greatestStep : settings.tolerance;
+      const double most = limit.kind == Limit::Step ? settings.maximumStep : settings.tolerance;
       const double length = values[0].norm();
       if (length <= most)
       {
@@ -896,7 +896,7 @@ void TurnBones(
     const Vector3 turned = now[tail] - now[head];
     if (old.norm() > 0.0 && turned.norm() > 0.0)
     {
-      poses.rotation[k][n] = (LeastRotation(old, turned) * sequence.rotation[k][n]).normalized();
+      poses.rotation[k][n] = (ShortestRotation(old, turned) * sequence.rotation[k][n]).normalized();
     }
   }
 }
@@ -956,13 +956,13 @@ void MotionRegularizationSettings::Validate() const
   notNegative(this->temporalWeight, "temporalWeight");
   notNegative(this->spatialWeight, "spatialWeight");
   notNegative(this->velocityWeight, "velocityWeight");
-  Require(this->greatestBending >= 0.01 && this->greatestBending <= Pi + 1e-9,
-    "greatestBending must be 0.01 to pi");
-  notNegative(this->leastCurvatureRadius, "leastCurvatureRadius");
-  Require(this->greatestStrain >= 0.001 &&
-      (this->greatestStrain <= 0.9 || std::isinf(this->greatestStrain)),
-    "greatestStrain must be 0.001 to 0.9, or infinite");
-  Require(this->greatestStep > 0.0, "greatestStep must be greater than 0");
+  Require(this->maximumBending >= 0.01 && this->maximumBending <= Pi + 1e-9,
+    "maximumBending must be 0.01 to pi");
+  notNegative(this->minimumCurvatureRadius, "minimumCurvatureRadius");
+  Require(
+    this->maximumStrain >= 0.001 && (this->maximumStrain <= 0.9 || std::isinf(this->maximumStrain)),
+    "maximumStrain must be 0.001 to 0.9, or infinite");
+  Require(this->maximumStep > 0.0, "maximumStep must be greater than 0");
   Require(this->wellTracked >= 0.0 && this->wellTracked <= 1.0, "wellTracked must be 0 to 1");
   notNegative(this->tolerance, "tolerance");
   Require(std::isfinite(this->youngsModulus) && this->youngsModulus > 0.0,
@@ -1027,7 +1027,7 @@ RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const Polylines
     }
     MarkClamps(problem, limits, positions, bits, result);
     result.after = EnergiesOfPositions(problem, positions, origin, input, sequence);
-    result.greatestMove = (positions - input).rowwise().norm().maxCoeff();
+    result.maximumMove = (positions - input).rowwise().norm().maxCoeff();
   }
   for (std::int64_t k = 0; k < problem.phases; ++k)
   {

@@ -38,10 +38,10 @@ struct MotionRegularizationSettings
     0.02; ///< 1 / lambda of Eq. 13: smoothing of the velocity along vessels, 0 or more
 
   // Limits.
-  double greatestBending = 1.0471975511965976; ///< between segments, radians, 0.01 to pi (no limit)
-  double leastCurvatureRadius = 1.0;           ///< mm, 0 (no limit) or more
-  double greatestStrain = 0.25; ///< |length / rest length - 1|, 0.001 to 0.9; infinite: no limit
-  double greatestStep = 15.0; ///< delta: of a point between two phases, mm, > 0; infinite: no limit
+  double maximumBending = 1.0471975511965976; ///< between segments, radians, 0.01 to pi (no limit)
+  double minimumCurvatureRadius = 1.0;        ///< mm, 0 (no limit) or more
+  double maximumStrain = 0.25; ///< |length / rest length - 1|, 0.001 to 0.9; infinite: no limit
+  double maximumStep = 15.0; ///< delta: of a point between two phases, mm, > 0; infinite: no limit
 
   double wellTracked = 0.8; ///< from this confidence on a point is moved by no more than ...
   double tolerance = 0.3;   ///< mm, 0 or more
@@ -88,8 +88,8 @@ struct RegularizedMotion
   /// Segments, corners and steps that are still beyond a limit by more than the precision allows: the
   /// tolerance of well-tracked points stands against it.
   std::int64_t violations = 0;
-  int iterations = 0;        ///< 0: no limit was touched
-  double greatestMove = 0.0; ///< mm
+  int iterations = 0;       ///< 0: no limit was touched
+  double maximumMove = 0.0; ///< mm
 };
 
 /**

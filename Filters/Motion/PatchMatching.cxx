@@ -71,19 +71,19 @@ void SumsOfSquares(const std::vector<float>& block, int blockSide, const Patch& 
 void ToLikelihoods(
   std::vector<std::vector<float>>& costs, double independent, double limit, double floor)
 {
-  std::vector<float> least;
-  least.reserve(costs.size());
+  std::vector<float> minimum;
+  minimum.reserve(costs.size());
   for (const std::vector<float>& one : costs)
   {
-    least.push_back(*std::min_element(one.begin(), one.end()));
+    minimum.push_back(*std::min_element(one.begin(), one.end()));
   }
-  const float typical = std::max(MedianOf(least), static_cast<float>(floor));
+  const float typical = std::max(MedianOf(minimum), static_cast<float>(floor));
   for (std::size_t n = 0; n < costs.size(); ++n)
   {
-    const float scale = static_cast<float>(0.5 * independent) / std::max(least[n], typical);
+    const float scale = static_cast<float>(0.5 * independent) / std::max(minimum[n], typical);
     for (float& value : costs[n])
     {
-      value = std::min((value - least[n]) * scale, static_cast<float>(limit));
+      value = std::min((value - minimum[n]) * scale, static_cast<float>(limit));
     }
   }
 }
@@ -108,16 +108,16 @@ double Correlation(const std::vector<float>& a, const std::vector<float>& b)
 double SignalCurvature::NoiseOf(
   const std::vector<Matrix3>& curvatures, const std::vector<int>& averaged)
 {
-  std::vector<double> least;
+  std::vector<double> minimum;
   for (std::size_t n = 0; n < curvatures.size(); ++n)
   {
     if (curvatures[n].trace() > 0.0)
     {
-      least.push_back(
+      minimum.push_back(
         averaged[n] * Eigen::SelfAdjointEigenSolver<Matrix3>(curvatures[n]).eigenvalues()[0]);
     }
   }
-  return std::max(QuantileOf(std::move(least), 1.0 / 3.0), 0.0);
+  return std::max(QuantileOf(std::move(minimum), 1.0 / 3.0), 0.0);
 }
 
 Matrix3 Limited(const Matrix3& information, double deviation)

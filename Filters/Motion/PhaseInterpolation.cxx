@@ -78,10 +78,10 @@ void PhaseInterpolationSettings::Validate() const
     "mode must be linear, periodic cubic or low noise");
   Require(
     this->mergeTolerance >= 0.0 && this->mergeTolerance <= 0.1, "mergeTolerance must be 0 to 0.1");
-  Require(this->greatestRank >= 1 && this->greatestRank <= 20, "greatestRank must be 1 to 20");
-  Require(this->greatestOrder >= 1 && this->greatestOrder <= 20, "greatestOrder must be 1 to 20");
-  Require(
-    this->leastConfidence >= 0.0 && this->leastConfidence <= 1.0, "leastConfidence must be 0 to 1");
+  Require(this->maximumRank >= 1 && this->maximumRank <= 20, "maximumRank must be 1 to 20");
+  Require(this->maximumOrder >= 1 && this->maximumOrder <= 20, "maximumOrder must be 1 to 20");
+  Require(this->minimumConfidence >= 0.0 && this->minimumConfidence <= 1.0,
+    "minimumConfidence must be 0 to 1");
 }
 
 PhaseInterpolation::PhaseInterpolation(const PoseSequence& sequence,
@@ -106,7 +106,8 @@ PhaseInterpolation::PhaseInterpolation(const PoseSequence& sequence,
     Rows weights = Rows::Ones(this->Points.rows(), this->Points.cols() / 3);
     if (this->Confidence.size() > 0)
     {
-      weights = (this->Confidence.array() < settings.leastConfidence).select(0.0, this->Confidence);
+      weights =
+        (this->Confidence.array() < settings.minimumConfidence).select(0.0, this->Confidence);
     }
     this->Fit_ =
       LowNoiseFitter(this->Knots_, this->Points, weights, settings, progress).Run(this->PointsMore);

@@ -29,10 +29,10 @@ struct PhaseInterpolationSettings
   /// Phases that are nearer to each other than this, modulo one cycle, are repetitions of one, which
   /// gets their mean weighted by confidence. Fraction of the R-R interval, 0 (only equal ones) to 0.1.
   double mergeTolerance = 0.01;
-  int greatestRank = 6;  ///< of LowNoise: most spatial modes that are tried, 1 to 20
-  int greatestOrder = 8; ///< of LowNoise: most harmonics that are tried, 1 to 20
+  int maximumRank = 6;  ///< of LowNoise: most spatial modes that are tried, 1 to 20
+  int maximumOrder = 8; ///< of LowNoise: most harmonics that are tried, 1 to 20
   /// Of LowNoise: below it a sample counts for nothing; 0 to 1. Others count by their confidence.
-  double leastConfidence = 0.05;
+  double minimumConfidence = 0.05;
 
   /// @throws std::invalid_argument that names the first setting out of range
   void Validate() const;

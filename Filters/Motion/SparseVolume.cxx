@@ -106,8 +106,8 @@ SparseVolume::SparseVolume(
       else
       {
         // 65,536 steps between the least and the greatest value.
-        auto least = std::numeric_limits<double>::infinity();
-        double greatest = -least;
+        auto minimum = std::numeric_limits<double>::infinity();
+        double maximum = -minimum;
         for (std::int32_t brick = 0; brick < bricks; ++brick)
         {
           forEach(brick,
@@ -116,18 +116,18 @@ SparseVolume::SparseVolume(
               const auto value = static_cast<double>(voxel);
               if (std::isfinite(value))
               {
-                least = std::min(least, value);
-                greatest = std::max(greatest, value);
+                minimum = std::min(minimum, value);
+                maximum = std::max(maximum, value);
               }
             });
         }
-        if (!(least <= greatest))
+        if (!(minimum <= maximum))
         {
-          least = greatest = 0.0;
+          minimum = maximum = 0.0;
         }
-        const double scale = greatest > least ? (greatest - least) / 65535.0 : 1.0;
+        const double scale = maximum > minimum ? (maximum - minimum) / 65535.0 : 1.0;
         this->Scale = static_cast<float>(scale);
-        this->Offset = static_cast<float>(least + 32768.0 * scale);
+        this->Offset = static_cast<float>(minimum + 32768.0 * scale);
         ParallelFor(bricks, 64,
           [&](std::int64_t first, std::int64_t last)
           {
@@ -138,7 +138,7 @@ SparseVolume::SparseVolume(
                 {
                   const auto value = static_cast<double>(voxel);
                   out = static_cast<std::int16_t>(
-                    std::isfinite(value) ? std::lround((value - least) / scale) - 32768 : -32768);
+                    std::isfinite(value) ? std::lround((value - minimum) / scale) - 32768 : -32768);
                 });
             }
           });
@@ -195,15 +195,15 @@ AveragedVolume AverageBlocks(
   const std::array<int, 3> size = image.Dimensions();
   const Matrix3 toIndex = IndexFromWorld(grid);
   const Vector3 origin = grid.IndexToWorld(grid.extent[0], grid.extent[2], grid.extent[4]);
-  Vector3 least = Vector3::Constant(std::numeric_limits<double>::infinity());
-  Vector3 greatest = -least;
+  Vector3 minimum = Vector3::Constant(std::numeric_limits<double>::infinity());
+  Vector3 maximum = -minimum;
   for (int corner = 0; corner < 8; ++corner)
   {
     const Vector3 world((corner & 1) != 0 ? high[0] : low[0], (corner & 2) != 0 ? high[1] : low[1],
       (corner & 4) != 0 ? high[2] : low[2]);
     const Vector3 index = toIndex * (world - origin);
-    least = least.cwiseMin(index);
-    greatest = greatest.cwiseMax(index);
+    minimum = minimum.cwiseMin(index);
+    maximum = maximum.cwiseMax(index);
   }
   int block[3];
   int first[3];
@@ -213,9 +213,9 @@ AveragedVolume AverageBlocks(
     block[axis] =
       std::clamp(static_cast<int>(std::lround(spacing / grid.spacing[axis])), 1, size[axis]);
     first[axis] =
-      std::clamp(static_cast<int>(std::floor(least[axis])), 0, size[axis] - block[axis]);
+      std::clamp(static_cast<int>(std::floor(minimum[axis])), 0, size[axis] - block[axis]);
     const int last =
-      std::clamp(static_cast<int>(std::ceil(greatest[axis])), first[axis], size[axis] - 1);
+      std::clamp(static_cast<int>(std::ceil(maximum[axis])), first[axis], size[axis] - 1);
     result.dimensions[axis] = std::max(1, (last - first[axis] + 1) / block[axis]);
   }
   const Vector3 middle(first[0] + 0.5 * (block[0] - 1), first[1] + 0.5 * (block[1] - 1),

@@ -129,8 +129,8 @@ void vtkCardiacPhaseInterpolator::Internals::Build(vtkCardiacPhaseInterpolator* 
   coronary::PhaseInterpolationSettings settings;
   settings.mode = static_cast<coronary::PhaseInterpolationMode>(self->Mode);
   settings.mergeTolerance = self->MergeTolerance;
-  settings.greatestRank = self->GreatestRank;
-  settings.greatestOrder = self->GreatestOrder;
+  settings.maximumRank = self->MaximumRank;
+  settings.maximumOrder = self->MaximumOrder;
 
   vtkPointData* pointData = data.first->GetPointData();
   bool radiusVaries = false;
@@ -591,8 +591,8 @@ void vtkCardiacPhaseInterpolator::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MergeTolerance: " << this->MergeTolerance << '\n';
   os << indent << "Period: " << this->Period << '\n';
   os << indent << "CycleLength: " << this->CycleLength << '\n';
-  os << indent << "GreatestRank: " << this->GreatestRank << '\n';
-  os << indent << "GreatestOrder: " << this->GreatestOrder << '\n';
+  os << indent << "MaximumRank: " << this->MaximumRank << '\n';
+  os << indent << "MaximumOrder: " << this->MaximumOrder << '\n';
   os << indent << "AreaStrainLimit: " << this->AreaStrainLimit << '\n';
   os << indent << "ReferenceTime: " << this->ReferenceTime << '\n';
   os << indent << "Ellipses: " << this->Ellipses << '\n';

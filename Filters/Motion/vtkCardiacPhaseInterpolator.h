@@ -116,10 +116,10 @@ public:
   /**
    * Most spatial modes and most harmonics that the mode low noise tries, each 1 to 20. Defaults 6 and 8.
    */
-  vtkSetMacro(GreatestRank, int);
-  vtkGetMacro(GreatestRank, int);
-  vtkSetMacro(GreatestOrder, int);
-  vtkGetMacro(GreatestOrder, int);
+  vtkSetMacro(MaximumRank, int);
+  vtkGetMacro(MaximumRank, int);
+  vtkSetMacro(MaximumOrder, int);
+  vtkGetMacro(MaximumOrder, int);
   ///@}
 
   ///@{
@@ -222,8 +222,8 @@ private:
   double MergeTolerance = 0.01;
   double Period = 1.0;
   double CycleLength = 0.8;
-  int GreatestRank = 6;
-  int GreatestOrder = 8;
+  int MaximumRank = 6;
+  int MaximumOrder = 8;
   double AreaStrainLimit = 0.05;
   double ReferenceTime = 0.75;
   bool Ellipses = false;

@@ -87,7 +87,7 @@ std::vector<Foot> FeetOf(const coronary::Polylines& lines, vtkPolyData* points)
   for (vtkIdType n = 0; n < points->GetNumberOfPoints(); ++n)
   {
     const Vector3 place(points->GetPoint(n));
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     Foot best;
     for (const std::vector<std::int64_t>& line : lines.lines)
     {
@@ -95,9 +95,9 @@ std::vector<Foot> FeetOf(const coronary::Polylines& lines, vtkPolyData* points)
       {
         const coronary::SegmentPlace nearest =
           coronary::NearestOnSegment(place, lines.points[line[i]], lines.points[line[i + 1]]);
-        if (nearest.squaredDistance < least)
+        if (nearest.squaredDistance < minimum)
         {
-          least = nearest.squaredDistance;
+          minimum = nearest.squaredDistance;
           best = { line[i], line[i + 1], nearest.fraction };
         }
       }

@@ -161,9 +161,9 @@ int vtkMotionRegularizer::RequestData(
       "The input is composite data: a single poly data is needed");
     Require(std::isfinite(this->Period) && this->Period > 0.0, "Period must be greater than 0");
     Require(std::isfinite(this->ReferenceTime), "ReferenceTime must be finite");
-    Require(this->GreatestBending >= 1.0 && this->GreatestBending <= 180.0,
-      "GreatestBending must be 1 to 180 degrees");
-    Require(this->GreatestStep >= 0.0, "GreatestStep must be 0 or more");
+    Require(this->MaximumBending >= 1.0 && this->MaximumBending <= 180.0,
+      "MaximumBending must be 1 to 180 degrees");
+    Require(this->MaximumStep >= 0.0, "MaximumStep must be 0 or more");
     Internals& data = *this->Data;
     if (!data.Reader.Knows(inInfo))
     {
@@ -209,11 +209,11 @@ int vtkMotionRegularizer::RequestData(
       settings.temporalWeight = this->TemporalWeight;
       settings.spatialWeight = this->SpatialWeight;
       settings.velocityWeight = this->VelocityWeight;
-      settings.greatestBending = vtkMath::RadiansFromDegrees(this->GreatestBending);
-      settings.leastCurvatureRadius = this->LeastCurvatureRadius;
+      settings.maximumBending = vtkMath::RadiansFromDegrees(this->MaximumBending);
+      settings.minimumCurvatureRadius = this->MinimumCurvatureRadius;
       constexpr double None = std::numeric_limits<double>::infinity();
-      settings.greatestStrain = this->GreatestStrain == 0.0 ? None : this->GreatestStrain;
-      settings.greatestStep = this->GreatestStep == 0.0 ? None : this->GreatestStep;
+      settings.maximumStrain = this->MaximumStrain == 0.0 ? None : this->MaximumStrain;
+      settings.maximumStep = this->MaximumStep == 0.0 ? None : this->MaximumStep;
       settings.wellTracked = this->WellTracked;
       settings.tolerance = this->Tolerance;
       settings.youngsModulus = this->YoungsModulus;
@@ -269,7 +269,7 @@ int vtkMotionRegularizer::RequestData(
     add(names::SpatialEnergy, { motion.before.spatial, motion.after.spatial });
     add(names::TotalEnergy, { motion.before.total, motion.after.total });
     add(names::MotionObjective, { motion.before.objective, motion.after.objective });
-    add(names::GreatestMove, { motion.greatestMove });
+    add(names::MaximumMove, { motion.maximumMove });
     vtkCoronary::AddArray<vtkIdTypeArray>(fields, names::ClampedPoints,
       std::vector<vtkIdType>(motion.clamped.begin(), motion.clamped.end()));
     vtkCoronary::AddArray<vtkIdTypeArray>(
@@ -292,10 +292,10 @@ void vtkMotionRegularizer::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "TemporalWeight: " << this->TemporalWeight << '\n';
   os << indent << "SpatialWeight: " << this->SpatialWeight << '\n';
   os << indent << "VelocityWeight: " << this->VelocityWeight << '\n';
-  os << indent << "GreatestBending: " << this->GreatestBending << '\n';
-  os << indent << "LeastCurvatureRadius: " << this->LeastCurvatureRadius << '\n';
-  os << indent << "GreatestStrain: " << this->GreatestStrain << '\n';
-  os << indent << "GreatestStep: " << this->GreatestStep << '\n';
+  os << indent << "MaximumBending: " << this->MaximumBending << '\n';
+  os << indent << "MinimumCurvatureRadius: " << this->MinimumCurvatureRadius << '\n';
+  os << indent << "MaximumStrain: " << this->MaximumStrain << '\n';
+  os << indent << "MaximumStep: " << this->MaximumStep << '\n';
   os << indent << "WellTracked: " << this->WellTracked << '\n';
   os << indent << "Tolerance: " << this->Tolerance << '\n';
   os << indent << "YoungsModulus: " << this->YoungsModulus << '\n';

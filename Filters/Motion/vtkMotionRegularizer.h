@@ -23,7 +23,7 @@
  *   Field data, the same at all times: `TemporalEnergy`, `SpatialEnergy`, `TotalEnergy` (double, two values: before and
  *   after; Eq. 14, mm^2), `MotionObjective` (double, two values: what is minimised), `ClampedPoints` (vtkIdType, five
  *   values: points and phases for each bit), `LimitViolations` (vtkIdType, limits that are not kept),
- *   `LimitIterations` (int), `GreatestMove` (double, mm), `PhaseTime` (double, the time step).
+ *   `LimitIterations` (int), `MaximumMove` (double, mm), `PhaseTime` (double, the time step).
  *
  * The output is whole in piece 0, and empty in every other piece. An empty input gives an empty output.
  *
@@ -95,32 +95,32 @@ public:
    * Greatest angle between successive segments, in degrees: 1 to 180 (no limit). Default 60. A corner that is
    * beyond this or the next limit at rest may be a tenth sharper than there.
    */
-  vtkSetMacro(GreatestBending, double);
-  vtkGetMacro(GreatestBending, double);
+  vtkSetMacro(MaximumBending, double);
+  vtkGetMacro(MaximumBending, double);
   ///@}
 
   ///@{
   /**
    * Least radius of curvature, mm: of the circle through three successive points. 0 (no limit) or more. Default 1.
    */
-  vtkSetMacro(LeastCurvatureRadius, double);
-  vtkGetMacro(LeastCurvatureRadius, double);
+  vtkSetMacro(MinimumCurvatureRadius, double);
+  vtkGetMacro(MinimumCurvatureRadius, double);
   ///@}
 
   ///@{
   /**
    * Greatest |length / rest length - 1| of a segment: 0.001 to 0.9, or 0 for no limit. Default 0.25.
    */
-  vtkSetMacro(GreatestStrain, double);
-  vtkGetMacro(GreatestStrain, double);
+  vtkSetMacro(MaximumStrain, double);
+  vtkGetMacro(MaximumStrain, double);
   ///@}
 
   ///@{
   /**
    * delta: greatest distance of a point between two successive phases, mm; 0 for no limit. Default 15.
    */
-  vtkSetMacro(GreatestStep, double);
-  vtkGetMacro(GreatestStep, double);
+  vtkSetMacro(MaximumStep, double);
+  vtkGetMacro(MaximumStep, double);
   ///@}
 
   ///@{
@@ -194,10 +194,10 @@ private:
   double TemporalWeight = 0.005;
   double SpatialWeight = 0.1;
   double VelocityWeight = 0.02;
-  double GreatestBending = 60.0;
-  double LeastCurvatureRadius = 1.0;
-  double GreatestStrain = 0.25;
-  double GreatestStep = 15.0;
+  double MaximumBending = 60.0;
+  double MinimumCurvatureRadius = 1.0;
+  double MaximumStrain = 0.25;
+  double MaximumStep = 15.0;
   double WellTracked = 0.8;
   double Tolerance = 0.3;
   double YoungsModulus = 1.55;

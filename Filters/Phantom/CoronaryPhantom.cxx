@@ -176,10 +176,10 @@ struct CoronaryPhantom::Internals
       {
         value[p] = field(tree.points[p]);
       }
-      const double least = InclusiveQuantileOf(value, 1.0 - phase.fraction);
+      const double minimum = InclusiveQuantileOf(value, 1.0 - phase.fraction);
       for (std::size_t p = 0; p < value.size(); ++p)
       {
-        lost[p] = std::max(lost[p], SmoothStep((value[p] - least) / 0.2 + 0.5));
+        lost[p] = std::max(lost[p], SmoothStep((value[p] - minimum) / 0.2 + 0.5));
       }
     }
     return lost;
@@ -270,8 +270,8 @@ std::vector<PhantomStenosis> CoronaryPhantom::Stenoses(double t) const
     stenosis.abscissa = tree.abscissa[narrowing.point];
     stenosis.length = narrowing.width;
     stenosis.degree = narrowing.degree;
-    stenosis.leastRadius = tree.radius[narrowing.point];
-    stenosis.referenceRadius = stenosis.leastRadius / (1.0 - narrowing.degree);
+    stenosis.minimumRadius = tree.radius[narrowing.point];
+    stenosis.referenceRadius = stenosis.minimumRadius / (1.0 - narrowing.degree);
     result.push_back(stenosis);
   }
   return result;

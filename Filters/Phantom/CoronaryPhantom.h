@@ -120,7 +120,7 @@ struct PhantomStenosis
   double abscissa = 0.0;        ///< mm from the ostium along the reference tree
   double length = 0.0;          ///< mm along the vessel, at half the depth of the narrowing
   double degree = 0.0;          ///< share of the diameter that is gone, 0 to 1
-  double leastRadius = 0.0;     ///< mm, that is left
+  double minimumRadius = 0.0;   ///< mm, that is left
   double referenceRadius = 0.0; ///< mm, without the lesion
 };
 

@@ -1,7 +1,7 @@
 #include "PhantomAnatomy.h"
 
 #include "CounterRandom.h"
-#include "PhantomCourses.h"
+#include "PhantomVesselPlans.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 
 /// The lumen's least radius in mm, so that its surface can be meshed however tight a stenosis is.
-constexpr double SmallestRadius = 0.2;
+constexpr double MinimumRadius = 0.2;
 
 // Streams of the random generator, so that one part of the anatomy does not shift another.
 enum Purpose : std::uint64_t
@@ -155,7 +155,7 @@ double HeartSize(const PhantomSettings& settings)
 }
 
 /// Puts a mean-heart control point where this heart has it.
-Vector3 Place(const Control& control, Course course, const HeartFrame& mean,
+Vector3 Place(const Control& control, VesselDepth depth, const HeartFrame& mean,
   const Variation& variation, double size)
 {
   const Vector3 q = mean.ToHeart(control.position);
@@ -163,7 +163,7 @@ Vector3 Place(const Control& control, Course course, const HeartFrame& mean,
   const double below = SmoothStep((q[2] + 10.0) / 12.0);
   const Vector3 varied = control.position + variation(control.position) * (0.4 + 0.6 * below);
   Vector3 p = mean.ToHeart(varied);
-  if (course == Course::Epicardial)
+  if (depth == VesselDepth::Epicardial)
   {
     const double level = HeartFrame::Level(p);
     const double wanted = 1.0 + 0.3 * (level - 1.0);
@@ -472,9 +472,9 @@ void LiftOverArteries(
         for (std::size_t n = 0; n < artery.points.size(); ++n)
         {
           const Vector3 away = p - artery.points[n];
-          const double least =
+          const double minimum =
             artery.radius[n] + VeinRadius(course.arc[i] / course.arc.back()) + walls;
-          const double missing = least * least - away.squaredNorm();
+          const double missing = minimum * minimum - away.squaredNorm();
           if (missing > 0.0)
           {
             const double up = away.dot(outwards[i]);
@@ -641,7 +641,7 @@ AnatomyBuilder::AnatomyBuilder(PhantomAnatomy& anatomy, const PhantomSettings& s
   {
     this->ByName[this->Plans[v].name] = v;
     this->Anatomy.vesselNames.push_back(this->Plans[v].name);
-    this->Anatomy.intramural.push_back(this->Plans[v].course == Course::Intramural);
+    this->Anatomy.intramural.push_back(this->Plans[v].depth == VesselDepth::Intramural);
   }
   this->OccludedVessel = this->ByName.at("RCA");
 }
@@ -697,7 +697,7 @@ void AnatomyBuilder::GrowVessel(std::size_t v, RandomStream& calibre)
   std::vector<Vector3> controls;
   for (const Control& control : plan.controls)
   {
-    controls.push_back(Place(control, plan.course, mean, this->Varied, this->Anatomy.frame.size));
+    controls.push_back(Place(control, plan.depth, mean, this->Varied, this->Anatomy.frame.size));
   }
   const double parentRadius = this->LeaveParent(plan, vessel, controls);
   const CubicCurve curve(controls);
@@ -736,7 +736,7 @@ void AnatomyBuilder::GrowVessel(std::size_t v, RandomStream& calibre)
     }
     // A side vessel is never as wide as the vessel that it leaves.
     const double widest = parentRadius > 0.0 ? 0.9 * parentRadius : diameter;
-    vessel.radius.push_back(std::max(SmallestRadius, std::min(0.5 * diameter, widest)));
+    vessel.radius.push_back(std::max(MinimumRadius, std::min(0.5 * diameter, widest)));
   }
 }
 
@@ -800,7 +800,7 @@ void AnatomyBuilder::PlaceLesions()
     for (std::size_t i = 0; i < vessel.points.size(); ++i)
     {
       const double u = (vessel.arc[i] - position) / width;
-      vessel.radius[i] = std::max(SmallestRadius,
+      vessel.radius[i] = std::max(MinimumRadius,
         vessel.radius[i] * (1.0 - this->Settings.stenosisDegree * std::exp(-0.5 * u * u)));
     }
   }
@@ -956,13 +956,13 @@ std::int64_t AnatomyBuilder::NearestPoint(const Lesion& lesion) const
   const Vector3 place =
     AtArc(this->Dense[lesion.host], this->Dense[lesion.host].points, lesion.arc);
   std::int64_t nearest = 0;
-  double least = std::numeric_limits<double>::max();
+  double minimum = std::numeric_limits<double>::max();
   for (std::size_t p = 0; p < this->Anatomy.tree.points.size(); ++p)
   {
     const double distance = (this->Anatomy.tree.points[p] - place).squaredNorm();
-    if (this->Anatomy.pointVessel[p] == static_cast<int>(lesion.host) && distance < least)
+    if (this->Anatomy.pointVessel[p] == static_cast<int>(lesion.host) && distance < minimum)
     {
-      least = distance;
+      minimum = distance;
       nearest = static_cast<std::int64_t>(p);
     }
   }

@@ -59,8 +59,8 @@ private:
 class DiscTable
 {
 public:
-  static constexpr double SmallestRadius = 0.25;
-  static constexpr double LargestRadius = 8.0;
+  static constexpr double MinimumRadius = 0.25;
+  static constexpr double MaximumRadius = 8.0;
   static constexpr int RadiusSteps = 62; // of 0.125
   static constexpr int RimSteps = 96;    // of 0.125, from -8 to 4
 
@@ -72,29 +72,29 @@ public:
 
   float operator()(float offset, float radius) const
   {
-    if (radius > static_cast<float>(LargestRadius))
+    if (radius > static_cast<float>(MaximumRadius))
     {
       // Towards the half space the difference goes with the curvature.
       const float half = NormalIntegral::Of(radius - offset);
-      const auto largest = static_cast<float>(LargestRadius);
+      const auto maximum = static_cast<float>(MaximumRadius);
       return half +
-        ((*this)(std::max(0.0f, offset - radius + largest), largest) - half) * largest / radius;
+        ((*this)(std::max(0.0f, offset - radius + maximum), maximum) - half) * maximum / radius;
     }
     float scale = 1.0f;
-    if (radius < static_cast<float>(SmallestRadius))
+    if (radius < static_cast<float>(MinimumRadius))
     {
       // A thin disc answers in proportion to its area.
-      const float ratio = radius / static_cast<float>(SmallestRadius);
+      const float ratio = radius / static_cast<float>(MinimumRadius);
       scale = ratio * ratio;
-      offset += static_cast<float>(SmallestRadius) - radius;
-      radius = static_cast<float>(SmallestRadius);
+      offset += static_cast<float>(MinimumRadius) - radius;
+      radius = static_cast<float>(MinimumRadius);
     }
     const float rim = (offset - radius + 8.0f) * 8.0f;
     if (rim >= static_cast<float>(RimSteps))
     {
       return 0.0f;
     }
-    const float r = (radius - static_cast<float>(SmallestRadius)) * 8.0f;
+    const float r = (radius - static_cast<float>(MinimumRadius)) * 8.0f;
     const int i = static_cast<int>(r);
     const int j = static_cast<int>(std::max(0.0f, rim));
     const float f = r - static_cast<float>(i);
@@ -113,7 +113,7 @@ private:
     {
       for (int j = 0; j <= RimSteps; ++j)
       {
-        const double radius = SmallestRadius + 0.125 * i;
+        const double radius = MinimumRadius + 0.125 * i;
         const double offset = std::max(0.0, radius - 8.0 + 0.125 * j);
         this->Values[i * (RimSteps + 1) + j] =
           j == RimSteps ? 0.0f : static_cast<float>(Integrate(offset, radius));

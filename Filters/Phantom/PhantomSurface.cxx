@@ -395,7 +395,7 @@ bool IsClosedManifold(const Mesh& mesh)
   return true;
 }
 
-double SmallestAngle(const Vector3& a, const Vector3& b, const Vector3& c)
+double MinimumAngle(const Vector3& a, const Vector3& b, const Vector3& c)
 {
   const auto angle = [](const Vector3& p, const Vector3& q, const Vector3& r)
   {
@@ -454,7 +454,7 @@ private:
   const Vector3& At(std::int64_t p) const { return this->M.points[p]; }
   double Quality(std::int64_t a, std::int64_t b, std::int64_t c) const
   {
-    return SmallestAngle(this->At(a), this->At(b), this->At(c));
+    return MinimumAngle(this->At(a), this->At(b), this->At(c));
   }
 
   /// The point across the directed edge, and its triangle.
@@ -512,18 +512,18 @@ private:
       return false;
     }
     int longest = 0;
-    int least = 0;
+    int minimum = 0;
     double length[3];
     for (int c = 0; c < 3; ++c)
     {
       length[c] = (this->At(triangle[c]) - this->At(triangle[(c + 1) % 3])).norm();
       longest = length[c] > length[longest] ? c : longest;
-      least = length[c] < length[least] ? c : least;
+      minimum = length[c] < length[minimum] ? c : minimum;
     }
     return this->Flip(t, triangle[longest], triangle[(longest + 1) % 3]) ||
-      (length[least] < shortest &&
-        (this->Collapse(triangle[least], triangle[(least + 1) % 3]) ||
-          this->Collapse(triangle[(least + 1) % 3], triangle[least])));
+      (length[minimum] < shortest &&
+        (this->Collapse(triangle[minimum], triangle[(minimum + 1) % 3]) ||
+          this->Collapse(triangle[(minimum + 1) % 3], triangle[minimum])));
   }
 
   bool Flip(std::size_t t, std::int64_t a, std::int64_t b)

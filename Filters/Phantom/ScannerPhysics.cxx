@@ -11,9 +11,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double BinWidth = 4.0;     // keV
-constexpr double LeastEnergy = 18.0; // keV: nothing below leaves the tube's filter
-constexpr double KEdge = 69.5;       // of tungsten, keV
+constexpr double BinWidth = 4.0;       // keV
+constexpr double MinimumEnergy = 18.0; // keV: nothing below leaves the tube's filter
+constexpr double KEdge = 69.5;         // of tungsten, keV
 // Tungsten that X-rays pass on their way out at 120 kV, cm: a mean depth of 4 um under 7 degrees.
 // Electrons go as deep as the square of the voltage (Thomson and Whiddington).
 constexpr double AnodePath = 3.3e-3;
@@ -109,17 +109,17 @@ TubeSpectrum::TubeSpectrum(double kilovolts, double aluminium)
   };
   const auto add = [&](double energy, double number)
   {
-    const auto bin = static_cast<std::size_t>((energy - LeastEnergy) / BinWidth);
+    const auto bin = static_cast<std::size_t>((energy - MinimumEnergy) / BinWidth);
     while (this->energies.size() <= bin)
     {
       this->energies.push_back(
-        LeastEnergy + BinWidth * (static_cast<double>(this->energies.size()) + 0.5));
+        MinimumEnergy + BinWidth * (static_cast<double>(this->energies.size()) + 0.5));
       this->photons.push_back(0.0);
     }
     this->photons[bin] += number;
   };
   constexpr double step = 0.5;
-  for (double energy = LeastEnergy + 0.5 * step; energy < kilovolts; energy += step)
+  for (double energy = MinimumEnergy + 0.5 * step; energy < kilovolts; energy += step)
   {
     add(energy, Output * (kilovolts / energy - 1.0) * step * filtered(energy));
   }

@@ -86,8 +86,8 @@ double ScannerSettings::HalfFan() const
 
 double ScannerSettings::FieldRadius() const
 {
-  const double least = std::min(-this->ColumnAngle(0.0), this->ColumnAngle(this->channels - 1.0));
-  return this->sourceToAxis * std::sin(least);
+  const double minimum = std::min(-this->ColumnAngle(0.0), this->ColumnAngle(this->channels - 1.0));
+  return this->sourceToAxis * std::sin(minimum);
 }
 
 int ScannerSettings::HalfScanViews() const

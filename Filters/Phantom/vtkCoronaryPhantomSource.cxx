@@ -75,9 +75,9 @@ private:
 
 namespace
 {
-constexpr double SmallestSpacing = 0.05;
-constexpr double GreatestSpacing = 20.0;
-constexpr int GreatestDimension = 16384;
+constexpr double MinimumSpacing = 0.05;
+constexpr double MaximumSpacing = 20.0;
+constexpr int MaximumDimension = 16384;
 
 bool AllFinite(const double* values, int count)
 {
@@ -118,7 +118,7 @@ coronary::ImageGrid Cover(
   {
     // Rounding must not add a voxel where the box is a whole number of them.
     const double steps = std::ceil((high[axis] - low[axis]) / spacing[axis] - 1e-6);
-    vtkCoronary::Require(steps < GreatestDimension, "Spacing is too small for the automatic grid");
+    vtkCoronary::Require(steps < MaximumDimension, "Spacing is too small for the automatic grid");
     grid.extent[2 * axis] = 0;
     grid.extent[2 * axis + 1] = static_cast<int>(steps);
   }
@@ -636,11 +636,11 @@ void vtkCoronaryPhantomSource::GenerateImage(
 coronary::ImageGrid vtkCoronaryPhantomSource::MakeGrid()
 {
   vtkCoronary::Require(std::all_of(this->Spacing, this->Spacing + 3,
-                         [](double s) { return s >= SmallestSpacing && s <= GreatestSpacing; }),
+                         [](double s) { return s >= MinimumSpacing && s <= MaximumSpacing; }),
     "Spacing must be 0.05 to 20 mm");
   vtkCoronary::Require(AllFinite(this->Origin, 3), "Origin must be finite");
   vtkCoronary::Require(std::all_of(this->Dimensions, this->Dimensions + 3,
-                         [](int n) { return n >= 1 && n <= GreatestDimension; }),
+                         [](int n) { return n >= 1 && n <= MaximumDimension; }),
     "Dimensions must be 1 to 16384");
 
   const Vector3 spacing(this->Spacing);

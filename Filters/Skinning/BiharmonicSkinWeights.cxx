@@ -105,8 +105,8 @@ void Normalize(Rows& rows, SkinWeights& result)
     {
       sum += w.weight;
     }
-    result.largestSum = std::max(result.largestSum, sum);
-    result.smallestSum = std::min(result.smallestSum, sum);
+    result.maximumSum = std::max(result.maximumSum, sum);
+    result.minimumSum = std::min(result.minimumSum, sum);
     if (sum > 0.0)
     {
       for (RowWeight& w : row)
@@ -204,7 +204,7 @@ SkinWeights ComputeSkinWeights(const SkinWeightInput& input, const SkinWeightSet
       {
         // No bone reached this point; the nearest one takes it along.
         rows[r].push_back({ system.nearest[r], 1.0 });
-        result.smallestSum = 0.0;
+        result.minimumSum = 0.0;
       }
     }
     Normalize(rows, result);
@@ -320,7 +320,7 @@ CompactSkinWeights CompactWeights(const SkinWeights& weights, int influences)
       compact.weight[i * influences + k] = static_cast<float>(row[k].weight * factor);
     }
     compact.dropped[i] = static_cast<float>(dropped);
-    compact.largestDropped = std::max(compact.largestDropped, dropped);
+    compact.maximumDropped = std::max(compact.maximumDropped, dropped);
   }
   return compact;
 }

@@ -85,15 +85,15 @@ struct SkinWeights
   /// Proven bound on the share of `energy` that is above the least possible one, with all bones
   /// allowed everywhere (Frank-Wolfe gap). Not less than 0 but for rounding.
   double energyGap = 0.0;
-  double largestSum = 1.0;  ///< of a row, before it was divided by it
-  double smallestSum = 1.0; ///< of a row, before it was divided by it
+  double maximumSum = 1.0; ///< of a row, before it was divided by it
+  double minimumSum = 1.0; ///< of a row, before it was divided by it
   /// Greatest distance of a weight on a bone from its wanted value, where bones run between points.
   double constraintResidual = 0.0;
   std::int64_t fixedPoints = 0;      ///< points of the mesh on bones
   std::int64_t samples = 0;          ///< places of bones between the points of the mesh
   std::vector<double> lengthOutside; ///< per bone: unit of length outside of the mesh
   std::vector<std::int64_t> leftOut; ///< bones wholly outside of the mesh, ascending
-  double largestDomainShare = 1.0;   ///< of the points in which a bone may have weight
+  double maximumDomainShare = 1.0;   ///< of the points in which a bone may have weight
 };
 
 /**
@@ -120,7 +120,7 @@ struct CompactSkinWeights
   std::vector<std::int32_t> bone; ///< points * influences, greatest weight first; 0 when unused
   std::vector<float> weight;      ///< the same size; sum 1, 0 when unused
   std::vector<float> dropped;     ///< per point: weight that was left out (and shared by the rest)
-  double largestDropped = 0.0;
+  double maximumDropped = 0.0;
 };
 
 /// @param influences  1 to 64

@@ -14,10 +14,10 @@ namespace coronary
 namespace
 {
 /// A polyline with a radius, addressed by the length along it.
-class Course
+class BranchCurve
 {
 public:
-  Course(const VesselTree& tree, const VesselTree::Branch& branch)
+  BranchCurve(const VesselTree& tree, const VesselTree::Branch& branch)
     : Tree(tree)
     , Branch(branch)
     , Along(branch.points.size(), 0.0)
@@ -83,9 +83,10 @@ private:
 /// Where the joints of a branch stand, from 0 to its length.
 constexpr double MostBonesOfBranch = 1e5; // a vessel has some dozens
 
-std::vector<double> PlaceJoints(const Course& course, const CenterlineSkeletonSettings& settings)
+std::vector<double> PlaceJoints(
+  const BranchCurve& curve, const CenterlineSkeletonSettings& settings)
 {
-  const double length = course.Length();
+  const double length = curve.Length();
   // The number of wanted bones up to s; even steps of it are the bones.
   Require(length <= MostBonesOfBranch * settings.minimumLength,
     "a branch of " + std::to_string(length) + " mm is too long for bones of minimumLength " +
@@ -96,9 +97,9 @@ std::vector<double> PlaceJoints(const Course& course, const CenterlineSkeletonSe
   for (int k = 0; k < samples; ++k)
   {
     const double s = (k + 0.5) * step;
-    const double radius = course.Radius(s);
+    const double radius = curve.Radius(s);
     double wanted = settings.radiusFactor * radius;
-    const double curvature = course.Curvature(s, 0.5 * settings.minimumLength);
+    const double curvature = curve.Curvature(s, 0.5 * settings.minimumLength);
     if (curvature > 0.0)
     {
       wanted = std::min(wanted, std::sqrt(8.0 * settings.sagittaRatio * radius / curvature));
@@ -142,9 +143,9 @@ std::vector<double> PlaceJoints(const Course& course, const CenterlineSkeletonSe
 }
 
 /// The points of the line, but for those on top of the one before.
-std::vector<double> DistinctStations(const Course& course)
+std::vector<double> DistinctStations(const BranchCurve& curve)
 {
-  std::vector<double> places = course.Stations();
+  std::vector<double> places = curve.Stations();
   places.erase(std::unique(places.begin(), places.end()), places.end());
   return places;
 }
@@ -236,10 +237,11 @@ Skeleton MakeCenterlineSkeleton(const VesselTree& input, const CenterlineSkeleto
   Skeleton skeleton;
   std::map<std::int64_t, std::int64_t> jointOfPoint;
   std::map<std::string, int> counters;
-  const auto addJoint = [&](const Course& course, double s, double abscissa, std::int64_t parent)
+  const auto addJoint = [&](
+                          const BranchCurve& curve, double s, double abscissa, std::int64_t parent)
   {
-    skeleton.joints.push_back(course.Position(s));
-    skeleton.radius.push_back(course.Radius(s));
+    skeleton.joints.push_back(curve.Position(s));
+    skeleton.radius.push_back(curve.Radius(s));
     skeleton.abscissa.push_back(abscissa);
     skeleton.parent.push_back(parent);
     return static_cast<std::int64_t>(skeleton.joints.size()) - 1;
@@ -248,27 +250,27 @@ Skeleton MakeCenterlineSkeleton(const VesselTree& input, const CenterlineSkeleto
   {
     const VesselTree::Branch& branch = tree.branches[stack.back()];
     stack.pop_back();
-    const Course course(tree, branch);
+    const BranchCurve curve(tree, branch);
     const int groupId = groupOfPoint[branch.points[1]];
-    Require(course.Length() > 0.0, "branch " + std::to_string(groupId) + " has no length");
+    Require(curve.Length() > 0.0, "branch " + std::to_string(groupId) + " has no length");
     const double start = tree.abscissa[branch.points.front()];
     const std::vector<double> places =
-      settings.everyStep ? DistinctStations(course) : PlaceJoints(course, settings);
+      settings.everyStep ? DistinctStations(curve) : PlaceJoints(curve, settings);
     auto [joint, isNew] = jointOfPoint.try_emplace(branch.points.front(), -1);
     if (isNew)
     {
-      joint->second = addJoint(course, 0.0, start, -1);
+      joint->second = addJoint(curve, 0.0, start, -1);
     }
     std::int64_t last = joint->second;
     for (std::size_t i = 1; i < places.size(); ++i)
     {
       Skeleton::Bone bone;
       bone.first = last;
-      bone.second = last = addJoint(course, places[i], start + places[i], last);
+      bone.second = last = addJoint(curve, places[i], start + places[i], last);
       bone.id = static_cast<int>(skeleton.bones.size());
       bone.groupId = groupId;
       bone.treeId = branch.treeId;
-      bone.segmentId = course.SegmentId(0.5 * (places[i - 1] + places[i]));
+      bone.segmentId = curve.SegmentId(0.5 * (places[i - 1] + places[i]));
       const std::string prefix = NamePrefix(bone.segmentId, groupId);
       bone.name = prefix + std::to_string(++counters[prefix]);
       bone.length = places[i] - places[i - 1];

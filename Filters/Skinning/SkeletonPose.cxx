@@ -29,7 +29,7 @@ void RequireNumber(std::size_t is, std::size_t wanted, const char* what, const c
 }
 
 /// Two joints nearer than this share of the rest length are one.
-constexpr double LeastStretch = 1e-9;
+constexpr double MinimumStretch = 1e-9;
 
 template <typename Scalar>
 using Vector = Eigen::Matrix<Scalar, 3, 1>;
@@ -56,7 +56,7 @@ bool IsFinite(const Vector<Scalar>& vector)
   return IsFinite(vector.x()) && IsFinite(vector.y()) && IsFinite(vector.z());
 }
 
-/// As LeastRotation.
+/// As ShortestRotation.
 template <typename Scalar>
 Eigen::Quaternion<Scalar> Carry(const Vector<Scalar>& from, const Vector<Scalar>& to)
 {
@@ -121,7 +121,7 @@ std::vector<double> DistancesAlong(const SkeletonRig& rig, std::int64_t joint)
 }
 }
 
-Quaternion LeastRotation(const Vector3& from, const Vector3& to)
+Quaternion ShortestRotation(const Vector3& from, const Vector3& to)
 {
   return Carry<double>(from, to);
 }
@@ -366,7 +366,7 @@ void SkeletonRig::TransformOf(
     transform.posedHead = pose.joints[bone.first];
     const Vector<Scalar> along = pose.joints[bone.second] - transform.posedHead;
     transform.stretch = along.norm() / this->Lengths[b];
-    if (!(transform.stretch > LeastStretch && IsFinite(transform.stretch)))
+    if (!(transform.stretch > MinimumStretch && IsFinite(transform.stretch)))
     {
       Refuse("Bone", number, "has no length: its joints are at the same place");
     }

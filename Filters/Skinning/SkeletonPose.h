@@ -83,7 +83,7 @@ using MovingBoneTransform = BasicBoneTransform<Dual>; ///< with derivatives, per
 
 /// The rotation by the least angle that carries `from` to `to` (any lengths but 0). Opposite
 /// directions: half a turn about an axis that depends on `from` only.
-Quaternion LeastRotation(const Vector3& from, const Vector3& to);
+Quaternion ShortestRotation(const Vector3& from, const Vector3& to);
 
 /**
  * What follows from a rest skeleton alone, for poses frame by frame.

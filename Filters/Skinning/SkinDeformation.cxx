@@ -25,9 +25,9 @@ namespace
 constexpr std::int64_t BlockGrain = 64;
 constexpr std::int64_t PointGrain = 4096;
 constexpr int RepairSweeps = 400;
-constexpr double GreatestLeastRatio = 0.5;
+constexpr double MaximumOfMinimumRatio = 0.5;
 constexpr double RepairMargin = 0.01;
-constexpr double LeastRepairStretch = 0.2;
+constexpr double MinimumRepairStretch = 0.2;
 constexpr int RepairPatience = 80; // sweeps
 
 /// Memory in whole cache lines, as wide registers want it.
@@ -279,14 +279,14 @@ struct SkinDeformation::Internals
   template <typename Real>
   double RatioOf(const Real* positions, std::int64_t tetrahedron) const;
   template <typename Real>
-  void Check(const Real* positions, InversionReport& report, double leastRatio,
+  void Check(const Real* positions, InversionReport& report, double minimumRatio,
     const ProgressCallback& progress);
   template <typename Real>
-  void Repair(
-    Real* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress);
+  void Repair(Real* positions, InversionReport& report, double minimumRatio,
+    const ProgressCallback& progress);
   /// Gives one tetrahedron the nearest shape that has the wanted share of its volume at rest.
   template <typename Real>
-  void Unfold(Real* positions, std::int64_t tetrahedron, double wantedRatio, double least) const;
+  void Unfold(Real* positions, std::int64_t tetrahedron, double wantedRatio, double minimum) const;
 };
 
 void SkinDeformation::Internals::ReadWeights(
@@ -723,7 +723,7 @@ double SkinDeformation::Internals::RatioOf(const Real* positions, std::int64_t t
 
 template <typename Real>
 void SkinDeformation::Internals::Check(const Real* positions, InversionReport& report,
-  double leastRatio, const ProgressCallback& progress)
+  double minimumRatio, const ProgressCallback& progress)
 {
   const auto body = [&](std::int64_t first, std::int64_t last)
   {
@@ -735,35 +735,35 @@ void SkinDeformation::Internals::Check(const Real* positions, InversionReport& r
   const auto count = static_cast<std::int64_t>(this->Tetrahedra.size());
   For(count, PointGrain, body, progress);
   report.tetrahedra.clear();
-  report.leastRatio = count > 0 ? std::numeric_limits<double>::infinity() : 1.0;
+  report.minimumRatio = count > 0 ? std::numeric_limits<double>::infinity() : 1.0;
   for (std::int64_t n = 0; n < count; ++n)
   {
-    report.leastRatio = std::min(report.leastRatio, this->Ratio[n]);
-    if (!(this->Ratio[n] > leastRatio))
+    report.minimumRatio = std::min(report.minimumRatio, this->Ratio[n]);
+    if (!(this->Ratio[n] > minimumRatio))
     {
       report.tetrahedra.push_back(n);
     }
   }
   report.found = static_cast<std::int64_t>(report.tetrahedra.size());
   report.movedPoints = 0;
-  report.largestMove = 0.0;
+  report.maximumMove = 0.0;
   report.sweeps = 0;
 }
 
 template <typename Real>
 void SkinDeformation::Internals::Repair(
-  Real* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress)
+  Real* positions, InversionReport& report, double minimumRatio, const ProgressCallback& progress)
 {
-  Require(leastRatio >= 0.0 && leastRatio <= GreatestLeastRatio,
+  Require(minimumRatio >= 0.0 && minimumRatio <= MaximumOfMinimumRatio,
     "The least ratio of volumes that a repair can reach is 0 to 0.5");
-  this->Check(positions, report, leastRatio, PartOf(progress, 0.0, 0.3));
+  this->Check(positions, report, minimumRatio, PartOf(progress, 0.0, 0.3));
   if (report.found == 0)
   {
     SkipProgress(progress, 0.3, 1.0);
     return;
   }
   // Rounding of the positions must not undo it.
-  const double wanted = 1.05 * leastRatio + RepairMargin;
+  const double wanted = 1.05 * minimumRatio + RepairMargin;
   std::vector<char> moves(this->Points.size(), 0);
   std::vector<std::int64_t> moved;
   std::vector<char> queued(this->Tetrahedra.size(), 0);
@@ -778,7 +778,7 @@ void SkinDeformation::Internals::Repair(
     }
     // What has come to no end by now turns each other over: less is asked of each.
     const double stretch =
-      LeastRepairStretch * std::pow(0.5, static_cast<double>(report.sweeps / RepairPatience));
+      MinimumRepairStretch * std::pow(0.5, static_cast<double>(report.sweeps / RepairPatience));
     // How many sweeps it will be is not known: each one takes a tenth of what is left.
     const double left = 0.6 * std::pow(0.9, report.sweeps);
     const ProgressCallback sweepProgress = PartOf(progress, 0.9 - left, 0.9 - 0.9 * left);
@@ -787,7 +787,7 @@ void SkinDeformation::Internals::Repair(
     {
       const std::int64_t n = report.tetrahedra[at];
       sweepReport(static_cast<std::int64_t>(at));
-      if (this->RatioOf(positions, n) > leastRatio)
+      if (this->RatioOf(positions, n) > minimumRatio)
       {
         continue; // a neighbour's repair was its own
       }
@@ -814,7 +814,7 @@ void SkinDeformation::Internals::Repair(
     next.erase(std::remove_if(next.begin(), next.end(),
                  [&](std::int64_t n)
                  {
-                   const bool fine = this->RatioOf(positions, n) > leastRatio;
+                   const bool fine = this->RatioOf(positions, n) > minimumRatio;
                    queued[n] = fine ? 0 : queued[n];
                    return fine;
                  }),
@@ -824,20 +824,20 @@ void SkinDeformation::Internals::Repair(
   SkipProgress(progress, 0.9 - 0.6 * std::pow(0.9, report.sweeps), 0.9);
   const std::int64_t found = report.found;
   const int sweeps = report.sweeps;
-  this->Check(positions, report, leastRatio, PartOf(progress, 0.9, 1.0));
+  this->Check(positions, report, minimumRatio, PartOf(progress, 0.9, 1.0));
   report.found = found;
   report.sweeps = sweeps;
   report.movedPoints = static_cast<std::int64_t>(moved.size());
   for (const std::int64_t i : moved)
   {
-    report.largestMove =
-      std::max(report.largestMove, (PointAt(positions, i) - this->Deformed(i)).norm());
+    report.maximumMove =
+      std::max(report.maximumMove, (PointAt(positions, i) - this->Deformed(i)).norm());
   }
 }
 
 template <typename Real>
 void SkinDeformation::Internals::Unfold(
-  Real* positions, std::int64_t tetrahedron, double wantedRatio, double least) const
+  Real* positions, std::int64_t tetrahedron, double wantedRatio, double minimum) const
 {
   const std::array<std::int64_t, 4>& corners = this->Tetrahedra[tetrahedron];
   Vector3 restCentre = Vector3::Zero();
@@ -868,11 +868,11 @@ void SkinDeformation::Internals::Unfold(
     u.col(2) = -u.col(2);
     stretches[2] = -stretches[2];
   }
-  Vector3 wanted = stretches.cwiseMax(least);
+  Vector3 wanted = stretches.cwiseMax(minimum);
   while (wanted.prod() < wantedRatio)
   {
-    least *= 1.1;
-    wanted = stretches.cwiseMax(least);
+    minimum *= 1.1;
+    wanted = stretches.cwiseMax(minimum);
   }
   const Matrix3 gradient = u * wanted.asDiagonal() * svd.matrixV().transpose();
   for (const std::int64_t corner : corners)
@@ -923,7 +923,8 @@ void SkinDeformation::Internals::Deform(float* positions, const ProgressCallback
     this->SetBone(b, this->Motions[b], store, this->Bones[b]);
   }
   const bool dual = this->Settings.blend == SkinBlend::DualQuaternion;
-  const SkinPositions kernel = SkinKernelChoice().Get().positions[dual ? 1 : 0][this->Sections ? 1 : 0];
+  const SkinPositions kernel =
+    SkinKernelChoice().Get().positions[dual ? 1 : 0][this->Sections ? 1 : 0];
   const auto body = [&](std::int64_t first, std::int64_t last)
   { kernel(this->Blocks, this->Bones.data(), this->FloatCentre.data(), first, last, positions); };
   For(static_cast<std::int64_t>(this->BlockOffset.size()) - 1, BlockGrain, body, progress);
@@ -1084,27 +1085,27 @@ void SkinDeformation::SetTetrahedra(
 }
 
 void SkinDeformation::CheckTetrahedra(const float* positions, InversionReport& report,
-  double leastRatio, const ProgressCallback& progress) const
+  double minimumRatio, const ProgressCallback& progress) const
 {
-  this->Data->Check(positions, report, leastRatio, progress);
+  this->Data->Check(positions, report, minimumRatio, progress);
 }
 
 void SkinDeformation::CheckTetrahedra(const double* positions, InversionReport& report,
-  double leastRatio, const ProgressCallback& progress) const
+  double minimumRatio, const ProgressCallback& progress) const
 {
-  this->Data->Check(positions, report, leastRatio, progress);
+  this->Data->Check(positions, report, minimumRatio, progress);
 }
 
 void SkinDeformation::RepairTetrahedra(
-  float* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress)
+  float* positions, InversionReport& report, double minimumRatio, const ProgressCallback& progress)
 {
-  this->Data->Repair(positions, report, leastRatio, progress);
+  this->Data->Repair(positions, report, minimumRatio, progress);
 }
 
 void SkinDeformation::RepairTetrahedra(
-  double* positions, InversionReport& report, double leastRatio, const ProgressCallback& progress)
+  double* positions, InversionReport& report, double minimumRatio, const ProgressCallback& progress)
 {
-  this->Data->Repair(positions, report, leastRatio, progress);
+  this->Data->Repair(positions, report, minimumRatio, progress);
 }
 
 const std::vector<double>& SkinDeformation::VolumeRatios() const

@@ -39,9 +39,9 @@ struct InversionReport
 {
   std::int64_t found = 0;               ///< before a repair
   std::vector<std::int64_t> tetrahedra; ///< that are left, ascending
-  double leastRatio = 1.0;              ///< of signed volume to that at rest, at the end
+  double minimumRatio = 1.0;            ///< of signed volume to that at rest, at the end
   std::int64_t movedPoints = 0;         ///< by the repair
-  double largestMove = 0.0;             ///< mm
+  double maximumMove = 0.0;             ///< mm
   int sweeps = 0;
 };
 
@@ -132,10 +132,10 @@ public:
   void SetTetrahedra(const std::vector<std::array<std::int64_t, 4>>& tetrahedra,
     const ProgressCallback& progress = {});
   ///@{
-  /// @param leastRatio  tetrahedra at or below this share of their volume at rest are reported
-  void CheckTetrahedra(const float* positions, InversionReport& report, double leastRatio = 0.0,
+  /// @param minimumRatio  tetrahedra at or below this share of their volume at rest are reported
+  void CheckTetrahedra(const float* positions, InversionReport& report, double minimumRatio = 0.0,
     const ProgressCallback& progress = {}) const;
-  void CheckTetrahedra(const double* positions, InversionReport& report, double leastRatio = 0.0,
+  void CheckTetrahedra(const double* positions, InversionReport& report, double minimumRatio = 0.0,
     const ProgressCallback& progress = {}) const;
   ///@}
   /// Signed volume against rest of every tetrahedron, of the last check or repair.
@@ -148,12 +148,12 @@ public:
    * further where the wanted volume asks for it; its middle stays. Nothing else is moved. What is left
    * after 400 sweeps is reported. May allocate where something is inverted.
    * @param positions   of the last call of Deform
-   * @param leastRatio  0 to 0.5
-   * @throws std::invalid_argument: leastRatio is out of range
+   * @param minimumRatio  0 to 0.5
+   * @throws std::invalid_argument: minimumRatio is out of range
    */
-  void RepairTetrahedra(float* positions, InversionReport& report, double leastRatio = 0.0,
+  void RepairTetrahedra(float* positions, InversionReport& report, double minimumRatio = 0.0,
     const ProgressCallback& progress = {});
-  void RepairTetrahedra(double* positions, InversionReport& report, double leastRatio = 0.0,
+  void RepairTetrahedra(double* positions, InversionReport& report, double minimumRatio = 0.0,
     const ProgressCallback& progress = {});
   ///@}
 

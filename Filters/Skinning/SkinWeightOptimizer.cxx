@@ -16,8 +16,8 @@ constexpr std::int64_t ValuesAtOnce = 1 << 15;
 constexpr std::int64_t RowsAtOnce = 1 << 11;
 constexpr double Relaxation = 1.6;
 constexpr int CheckEvery = 10;
-constexpr double LeastRho = 0.02;
-constexpr double GreatestRho = 2.0;
+constexpr double MinimumRho = 0.02;
+constexpr double MaximumRho = 2.0;
 constexpr int MostPolishSteps = 10;
 // Beyond it one exact step costs more than what the alternating directions took.
 constexpr std::int64_t MostUnknowns = 8000;
@@ -42,7 +42,7 @@ SkinWeightOptimizer::SkinWeightOptimizer(
 {
   // Between the diagonal and what smooth weights feel of the energy, which falls with the fourth power
   // of the points across a vessel.
-  this->Rho = std::clamp(0.8 / (system.radius * system.radius), LeastRho, 0.2);
+  this->Rho = std::clamp(0.8 / (system.radius * system.radius), MinimumRho, 0.2);
   if (this->Joint && settings.widen && this->Reach > FirstReach)
   {
     this->Reach = FirstReach;
@@ -474,13 +474,13 @@ void SkinWeightOptimizer::JudgeRows(const Values& z, const Values& gradient, Val
         for (std::int64_t r = part * RowsAtOnce; r < std::min(q.rows, (part + 1) * RowsAtOnce); ++r)
         {
           double highest = -std::numeric_limits<double>::infinity();
-          double least = std::numeric_limits<double>::infinity();
+          double minimum = std::numeric_limits<double>::infinity();
           double work = 0.0;
           double worst = 0.0;
           for (std::int64_t p = this->PairOffset[r]; p < this->PairOffset[r + 1]; ++p)
           {
             const std::int64_t v = this->PairIndex[p];
-            least = std::min(least, gradient[v]);
+            minimum = std::min(minimum, gradient[v]);
             work += z[v] * gradient[v];
             if (this->Joint)
             {
@@ -497,9 +497,9 @@ void SkinWeightOptimizer::JudgeRows(const Values& z, const Values& gradient, Val
           if (this->Joint)
           {
             // The multiplier in the middle of its bounds.
-            worst = std::max(0.0, 0.5 * (highest - least));
-            multiplier[r] = 0.5 * (highest + least);
-            lowest[r] = least;
+            worst = std::max(0.0, 0.5 * (highest - minimum));
+            multiplier[r] = 0.5 * (highest + minimum);
+            lowest[r] = minimum;
             partial[part].gap += work;
           }
           partial[part].inside = std::max(partial[part].inside, worst / this->System.diagonal[r]);
@@ -605,7 +605,8 @@ void SkinWeightOptimizer::Balance(
   {
     return;
   }
-  const double wanted = std::clamp(this->Rho * std::clamp(ratio, 0.1, 10.0), LeastRho, GreatestRho);
+  const double wanted =
+    std::clamp(this->Rho * std::clamp(ratio, 0.1, 10.0), MinimumRho, MaximumRho);
   // A new factor costs as much as several iterations.
   if (std::max(wanted, this->Rho) < 1.5 * std::min(wanted, this->Rho))
   {
@@ -942,13 +943,13 @@ void SkinWeightOptimizer::Describe(SkinWeights& result) const
   result.energy = this->Quality.energy;
   result.energyGap =
     this->Quality.energy > 0.0 ? this->Quality.gap / this->Quality.energy : this->Quality.gap;
-  std::size_t largest = 0;
+  std::size_t maximum = 0;
   for (const Group& group : this->Groups)
   {
-    largest = std::max(largest, group.rows.size());
+    maximum = std::max(maximum, group.rows.size());
   }
-  result.largestDomainShare = this->System.energy.rows == 0
+  result.maximumDomainShare = this->System.energy.rows == 0
     ? 1.0
-    : static_cast<double>(largest) / static_cast<double>(this->System.energy.rows);
+    : static_cast<double>(maximum) / static_cast<double>(this->System.energy.rows);
 }
 }

@@ -306,7 +306,7 @@ public:
   {
     const auto found = this->Cells.find(Key(Cell(position)));
     std::int64_t best = -1;
-    double bestLeast = -1e-6;
+    double bestMinimum = -1e-6;
     if (found != this->Cells.end())
     {
       for (const std::size_t t : found->second)
@@ -314,7 +314,7 @@ public:
         const Tetrahedron& tetrahedron = (*this->Mesh.tetrahedra)[t];
         const double whole = SixVolumes(this->Mesh.points, tetrahedron);
         std::array<double, 4> place{};
-        double least = 1.0;
+        double minimum = 1.0;
         for (int a = 0; a < 4; ++a)
         {
           std::array<Vector3, 4> corner;
@@ -325,11 +325,11 @@ public:
           place[a] =
             (corner[1] - corner[0]).dot((corner[2] - corner[0]).cross(corner[3] - corner[0])) /
             whole;
-          least = std::min(least, place[a]);
+          minimum = std::min(minimum, place[a]);
         }
-        if (least > bestLeast)
+        if (minimum > bestMinimum)
         {
-          bestLeast = least;
+          bestMinimum = minimum;
           best = static_cast<std::int64_t>(t);
           barycentric = place;
         }

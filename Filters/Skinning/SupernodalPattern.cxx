@@ -167,7 +167,7 @@ std::vector<Index> ColumnCounts(const Graph& graph, const std::vector<Index>& pa
     }
   }
   std::vector<Index> lastLeaf(count, -1); // of the tree of a row's entries
-  std::vector<Index> greatest(count, -1); // first descendant among these leaves
+  std::vector<Index> maximum(count, -1);  // first descendant among these leaves
   std::vector<Index> ancestor(count);
   std::iota(ancestor.begin(), ancestor.end(), 0);
   for (Index column = 0; column < count; ++column)
@@ -179,11 +179,11 @@ std::vector<Index> ColumnCounts(const Graph& graph, const std::vector<Index>& pa
     for (SuiteSparse_long a = graph.offset[column]; a < graph.offset[column + 1]; ++a)
     {
       const auto row = static_cast<Index>(graph.column[a]);
-      if (row <= column || firstDescendant[column] <= greatest[row])
+      if (row <= column || firstDescendant[column] <= maximum[row])
       {
         continue;
       }
-      greatest[row] = firstDescendant[column];
+      maximum[row] = firstDescendant[column];
       const Index before = lastLeaf[row];
       lastLeaf[row] = column;
       ++counts[column];

@@ -246,7 +246,7 @@ int vtkBiharmonicSkinWeights::RequestData(
     numbers(names::WeightsResidual, { weights.residual, weights.residualEverywhere });
     numbers(names::WeightsEnergy, { weights.energy });
     numbers(names::WeightsEnergyGap, { weights.energyGap });
-    numbers(names::WeightsRowSums, { weights.smallestSum, weights.largestSum });
+    numbers(names::WeightsRowSums, { weights.minimumSum, weights.maximumSum });
     numbers(names::WeightsOnBones, { weights.constraintResidual });
     numbers(names::BoneLengthOutside, weights.lengthOutside);
     if (this->LeaveOutside)

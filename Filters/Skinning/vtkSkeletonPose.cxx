@@ -153,7 +153,7 @@ void vtkSkeletonPose::Move(const coronary::SkeletonRig& rig, coronary::SkeletonP
     const Vector3 head = pose.joints[rig.Rest().bones[bone].first];
     vtkCoronary::Require((wanted - head).norm() > 0.0,
       "JointPosition is that of the joint before: the bone would lose its length");
-    edit.rotation = coronary::LeastRotation(here - head, wanted - head);
+    edit.rotation = coronary::ShortestRotation(here - head, wanted - head);
     if (this->MoveMode == TurnBoneOnly)
     {
       wanted = head + (here - head).norm() * (wanted - head).normalized();

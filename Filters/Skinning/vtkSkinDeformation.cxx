@@ -606,12 +606,12 @@ void vtkSkinDeformation::Execute(vtkPointSet* mesh, vtkInformationVector** input
     if (this->Tetrahedra == RepairTetrahedra)
     {
       skin.RepairTetrahedra(
-        positions->GetPointer(0), setup.report, this->LeastVolumeRatio, parts(Checking));
+        positions->GetPointer(0), setup.report, this->MinimumVolumeRatio, parts(Checking));
     }
     else
     {
       skin.CheckTetrahedra(
-        positions->GetPointer(0), setup.report, this->LeastVolumeRatio, parts(Checking));
+        positions->GetPointer(0), setup.report, this->MinimumVolumeRatio, parts(Checking));
     }
     const std::vector<vtkIdType> left = ReportTetrahedra(setup, output);
     if (!left.empty())
@@ -668,8 +668,8 @@ int vtkSkinDeformation::RequestData(
   {
     Require(this->VolumeConservation >= 0.0 && this->VolumeConservation <= 1.0,
       "VolumeConservation must be 0 to 1");
-    Require(this->LeastVolumeRatio >= 0.0 && this->LeastVolumeRatio <= 0.5,
-      "LeastVolumeRatio must be 0 to 0.5");
+    Require(this->MinimumVolumeRatio >= 0.0 && this->MinimumVolumeRatio <= 0.5,
+      "MinimumVolumeRatio must be 0 to 0.5");
     Stencil stencil;
     const bool wanted =
       this->ComputeVelocity && mesh->GetNumberOfElements(vtkDataObject::POINT) > 0;
@@ -731,5 +731,5 @@ void vtkSkinDeformation::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ComputeVelocity: " << this->ComputeVelocity << '\n';
   os << indent << "ComputeNormals: " << this->ComputeNormals << '\n';
   os << indent << "Tetrahedra: " << this->Tetrahedra << '\n';
-  os << indent << "LeastVolumeRatio: " << this->LeastVolumeRatio << '\n';
+  os << indent << "MinimumVolumeRatio: " << this->MinimumVolumeRatio << '\n';
 }

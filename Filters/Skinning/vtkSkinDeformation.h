@@ -155,8 +155,8 @@ public:
   /**
    * Tetrahedra at or below this share of their volume at rest count as inverted, 0 to 0.5. Default 0.
    */
-  vtkSetMacro(LeastVolumeRatio, double);
-  vtkGetMacro(LeastVolumeRatio, double);
+  vtkSetMacro(MinimumVolumeRatio, double);
+  vtkGetMacro(MinimumVolumeRatio, double);
   ///@}
 
   /// For tests: how often a mesh and its weights were read.
@@ -195,7 +195,7 @@ private:
   bool ComputeVelocity = false;
   bool ComputeNormals = false;
   int Tetrahedra = RepairTetrahedra;
-  double LeastVolumeRatio = 0.0;
+  double MinimumVolumeRatio = 0.0;
   std::unique_ptr<Internals> Data;
 };
 

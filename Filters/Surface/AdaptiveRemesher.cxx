@@ -9,7 +9,7 @@ namespace coronary
 namespace
 {
 /// Cosine between a triangle's normal and the surface's below which it counts as turned over.
-constexpr double LeastFacing = 0.5;
+constexpr double MinimumFacing = 0.5;
 /// Triangles with a smaller angle are got rid of at the cost of uneven edges, degrees.
 constexpr double HardAngle = 16.0;
 constexpr double Degree = 3.14159265358979323846 / 180.0;
@@ -127,7 +127,7 @@ void AdaptiveRemesher::AroundVertex(Index v, const Visit& visit) const
 }
 
 /// Cosine of the smallest angle: the greatest of the three; 2 for a triangle without area.
-double AdaptiveRemesher::SmallestCosine(const Vector3& a, const Vector3& b, const Vector3& c) const
+double AdaptiveRemesher::MinimumCosine(const Vector3& a, const Vector3& b, const Vector3& c) const
 {
   const Vector3 u = b - a;
   const Vector3 v = c - b;
@@ -146,7 +146,7 @@ double AdaptiveRemesher::SmallestCosine(const Vector3& a, const Vector3& b, cons
 /// Smallest angle in a measure that rises with it: minus its cosine.
 double AdaptiveRemesher::Quality(Index a, Index b, Index c) const
 {
-  return -this->SmallestCosine(this->P(a), this->P(b), this->P(c));
+  return -this->MinimumCosine(this->P(a), this->P(b), this->P(c));
 }
 
 double AdaptiveRemesher::TriangleQuality(Index t) const
@@ -344,7 +344,7 @@ bool AdaptiveRemesher::GainsByMerging(
         {
           return;
         }
-        const double quality = -this->SmallestCosine(vertex.position, this->P(p), this->P(q));
+        const double quality = -this->MinimumCosine(vertex.position, this->P(p), this->P(q));
         after = std::min(after, quality);
         const double wanted = 0.5 * (vertex.size + this->V[p].size);
         const double length = (vertex.position - this->P(p)).norm();
@@ -355,7 +355,7 @@ bool AdaptiveRemesher::GainsByMerging(
         const bool wall = this->Entity[e / 3] == 1;
         const double now = this->Facing(e / 3, vertex, this->V[p], this->V[q]);
         facesAfter = std::min(facesAfter, now);
-        if (!unfold && now < std::min(LeastFacing, was))
+        if (!unfold && now < std::min(MinimumFacing, was))
         {
           allowed = false;
         }
@@ -494,7 +494,7 @@ bool AdaptiveRemesher::CanFlip(Index h) const
     this->Facing(g / 3, this->V[b], this->V[a], this->V[d]));
   const double is = std::min(this->Facing(t, this->V[a], this->V[d], this->V[c]),
     this->Facing(t, this->V[d], this->V[b], this->V[c]));
-  return is >= std::min(LeastFacing, was);
+  return is >= std::min(MinimumFacing, was);
 }
 
 void AdaptiveRemesher::Flip(Index h)
@@ -728,7 +728,7 @@ bool AdaptiveRemesher::KeepsFacing(Index v, const RemeshVertex& moved) const
         const RemeshVertex& p = this->V[this->To(e)];
         const RemeshVertex& q = this->V[this->Apex(e)];
         const double now = this->Facing(e / 3, moved, p, q);
-        keeps = now >= LeastFacing || now >= this->Facing(e / 3, this->V[v], p, q);
+        keeps = now >= MinimumFacing || now >= this->Facing(e / 3, this->V[v], p, q);
       }
     });
   return keeps;
@@ -741,7 +741,7 @@ double AdaptiveRemesher::WorstAround(Index v, const Vector3& position) const
     [&](Index e)
     {
       worst = std::min(
-        worst, -this->SmallestCosine(position, this->P(this->To(e)), this->P(this->Apex(e))));
+        worst, -this->MinimumCosine(position, this->P(this->To(e)), this->P(this->Apex(e))));
     });
   return worst;
 }

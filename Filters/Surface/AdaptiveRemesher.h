@@ -77,7 +77,7 @@ private:
   }
   bool IsFeature(Index h) const { return this->Entity[h / 3] != this->Entity[this->Twin[h] / 3]; }
   bool Dead(Index t) const { return this->Corner[3 * t] < 0; }
-  double SmallestCosine(const Vector3& a, const Vector3& b, const Vector3& c) const;
+  double MinimumCosine(const Vector3& a, const Vector3& b, const Vector3& c) const;
   double Quality(Index a, Index b, Index c) const;
   double TriangleQuality(Index t) const;
   double Facing(Index t, const RemeshVertex& a, const RemeshVertex& b, const RemeshVertex& c) const;

@@ -520,7 +520,7 @@ private:
 JunctionMesh MeshJunction(const SweptLumen& lumen, int junction)
 {
   const SweptLumen::Junction& j = lumen.Junctions()[junction];
-  double cell = 0.2 * j.smallestRadius;
+  double cell = 0.2 * j.minimumRadius;
   for (int attempt = 0; attempt < 6; ++attempt)
   {
     Attempt run(

@@ -36,7 +36,7 @@ bool MeasureSection(const ImageInterpolator& image, const ContourSettings& setti
   const Vector3& centre, const Vector3& normal, const Vector3& binormal, double radius,
   Series& series)
 {
-  const double step = std::min(0.1 * radius, 0.25 * image.SmallestSpacing());
+  const double step = std::min(0.1 * radius, 0.25 * image.MinimumSpacing());
   const double lumen = image.At(centre);
   const int steps = static_cast<int>(std::ceil((settings.reach + 0.4) * radius / step));
   std::vector<double> fall(settings.samples);
@@ -46,13 +46,13 @@ bool MeasureSection(const ImageInterpolator& image, const ContourSettings& setti
   {
     const double angle = 2.0 * Pi * k / settings.samples;
     const Vector3 way = std::cos(angle) * normal + std::sin(angle) * binormal;
-    int least = 0;
+    int minimum = 0;
     for (int i = 0; i <= steps; ++i)
     {
       values[i] = image.At(centre + i * step * way);
-      least = values[i] < values[least] ? i : least;
+      minimum = values[i] < values[minimum] ? i : minimum;
     }
-    fall[k] = image.Contains(centre + steps * step * way) ? lumen - values[least] : 0.0;
+    fall[k] = image.Contains(centre + steps * step * way) ? lumen - values[minimum] : 0.0;
     const double level = lumen - 0.5 * fall[k];
     int i = 0;
     while (i < steps && values[i + 1] > level)

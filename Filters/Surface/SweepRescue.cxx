@@ -15,7 +15,7 @@ namespace coronary
 namespace
 {
 /// What stays of a branch that is shorter than so many radii can not be seen outside its parent.
-constexpr double LeastStub = 3.0;
+constexpr double MinimumStub = 3.0;
 /// The volume may change by this share when triangles are replaced.
 constexpr double VolumeChange = 0.02;
 
@@ -31,19 +31,19 @@ double SignedVolume(const std::vector<Vector3>& points, const std::vector<Triang
   return volume;
 }
 
-double LeastAngleOf(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
+double MinimumAngleOf(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
 {
-  double least = 180.0;
+  double minimum = 180.0;
   for (const Triangle& t : triangles)
   {
     for (int c = 0; c < 3; ++c)
     {
       const Vector3 u = points[t[(c + 1) % 3]] - points[t[c]];
       const Vector3 v = points[t[(c + 2) % 3]] - points[t[c]];
-      least = std::min(least, std::atan2(u.cross(v).norm(), u.dot(v)) * 180.0 / M_PI);
+      minimum = std::min(minimum, std::atan2(u.cross(v).norm(), u.dot(v)) * 180.0 / M_PI);
     }
   }
-  return least;
+  return minimum;
 }
 
 /// Vertices minus edges plus triangles of a closed surface.
@@ -167,7 +167,7 @@ SweepCut CutTree(VesselTree& tree, int groupId, const Vector3& place, double rea
   const bool root = users[list.front()].size() == 1;
   const bool carries = users[list.back()].size() > 1;
   const auto begin = list.begin();
-  const double stub = LeastStub * tree.radius[list[at]];
+  const double stub = MinimumStub * tree.radius[list[at]];
   const double head = before < 2 ? 0.0 : LengthOf(tree, { begin, begin + signedOf(before) });
   const double tail =
     after + 1 >= list.size() ? 0.0 : LengthOf(tree, { begin + signedOf(after), list.end() });
@@ -250,7 +250,7 @@ std::vector<std::int64_t> CellsThatFail(
   }
 }
 
-bool CleanSweptMesh(RescueMesh& mesh, int components, double leastAngle)
+bool CleanSweptMesh(RescueMesh& mesh, int components, double minimumAngle)
 {
   std::vector<Vector3> points;
   points.reserve(mesh.vertices.size());
@@ -259,7 +259,7 @@ bool CleanSweptMesh(RescueMesh& mesh, int components, double leastAngle)
     points.push_back(vertex.position);
   }
   SurfaceCleaningSettings settings;
-  settings.smallestComponent = 1e-3;
+  settings.minimumComponentShare = 1e-3;
   settings.joinDistance = 0.0;
   CleanedSurface clean;
   try
@@ -280,7 +280,7 @@ bool CleanSweptMesh(RescueMesh& mesh, int components, double leastAngle)
   const double before = SignedVolume(points, mesh.triangles);
   const double volume = SignedVolume(clean.points, clean.triangles);
   if (std::abs(volume - before) > VolumeChange * std::abs(before) ||
-    LeastAngleOf(clean.points, clean.triangles) < leastAngle)
+    MinimumAngleOf(clean.points, clean.triangles) < minimumAngle)
   {
     return false;
   }

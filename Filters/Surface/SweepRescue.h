@@ -66,9 +66,9 @@ struct RescueMesh
  *
  * @param components  closed surfaces that it must have before and after
  * @return whether the result has passed the tetrahedral mesher's check, has all caps, no handles and
- *         about the same volume, and no angle below `leastAngle` degrees; else the mesh is unchanged
+ *         about the same volume, and no angle below `minimumAngle` degrees; else the mesh is unchanged
  */
-bool CleanSweptMesh(RescueMesh& mesh, int components, double leastAngle);
+bool CleanSweptMesh(RescueMesh& mesh, int components, double minimumAngle);
 
 /// Cells at which the tetrahedral mesher would refuse the surface; empty when it would not.
 std::vector<std::int64_t> CellsThatFail(

@@ -23,12 +23,12 @@ constexpr double Pi = 3.14159265358979323846;
 /// Retreat of the edges between vessels with which remeshing begins, in radii.
 constexpr double BluntRetreat = 0.6;
 /// Smaller angles are repaired, degrees: a little more than what is promised.
-constexpr double LeastAngle = 12.0;
+constexpr double MinimumCornerAngle = 12.0;
 constexpr int Repairs = 3;
 constexpr std::size_t Heap = 2000; ///< faulty triangles
 constexpr int RemeshingAttempts = 3;
-constexpr double GreatestSmoothing = 4.0; ///< of the axes, radii
-constexpr double LeastBlending = 0.1;
+constexpr double MaximumSmoothing = 4.0; ///< of the axes, radii
+constexpr double MinimumBlending = 0.1;
 constexpr int FaultReliefs = 1;    ///< times that faults of the finished mesh are relieved
 constexpr double FaultReach = 4.0; ///< of such a relief, in radii
 constexpr int Sweeps = 64;         ///< at most, with what each one could not mesh relieved
@@ -39,7 +39,7 @@ constexpr double NeedAngle = 0.5;
 constexpr double CutReach = 2.0;
 constexpr double CutGrowth = 3.0;
 /// Below, the areas of triangles vanish in what the angles are made of; mm.
-constexpr double LeastRadius = 1e-6;
+constexpr double MinimumRadius = 1e-6;
 constexpr double MostTriangles = 2e7;
 
 /// A wall too fine or too large for any mesh: wrong units, mostly. The branches are checked already.
@@ -52,11 +52,11 @@ void CheckSize(const VesselTree& tree, const SweepSettings& settings)
     {
       const std::int64_t p = branch.points[i];
       const double radius = tree.radius[p];
-      if (radius < LeastRadius)
+      if (radius < MinimumRadius)
       {
         std::ostringstream text;
         text << "SweepVesselTree: radius " << radius << " mm at point " << p << ", it must be "
-             << LeastRadius << " mm or more";
+             << MinimumRadius << " mm or more";
         throw std::invalid_argument(text.str());
       }
       if (i > 0)
@@ -196,7 +196,7 @@ std::vector<std::int64_t> FindFaults(const AdaptiveRemesher& mesh)
     faults.push_back(pair.first);
     faults.push_back(pair.second);
   }
-  const double greatest = std::cos(LeastAngle * Pi / 180.0);
+  const double maximum = std::cos(MinimumCornerAngle * Pi / 180.0);
   for (std::size_t t = 0; t < triangles.size(); ++t)
   {
     for (int c = 0; c < 3; ++c)
@@ -204,7 +204,7 @@ std::vector<std::int64_t> FindFaults(const AdaptiveRemesher& mesh)
       const Vector3& p = points[triangles[t][c]];
       const Vector3 u = points[triangles[t][(c + 1) % 3]] - p;
       const Vector3 v = points[triangles[t][(c + 2) % 3]] - p;
-      if (!(u.dot(v) < greatest * u.norm() * v.norm()))
+      if (!(u.dot(v) < maximum * u.norm() * v.norm()))
       {
         faults.push_back(static_cast<std::int64_t>(t));
         break;
@@ -245,13 +245,13 @@ struct Reliefs
       this->groups.push_back(group);
     }
     SweepRelief& place = this->places[i];
-    if (place.smoothing >= GreatestSmoothing)
+    if (place.smoothing >= MaximumSmoothing)
     {
       return false;
     }
     place.reach = std::max(place.reach, reach + (place.centre - centre).norm());
-    place.smoothing = std::clamp(2.0 * place.smoothing, 1.0, GreatestSmoothing);
-    place.blending = std::max(LeastBlending, 0.7 * place.blending);
+    place.smoothing = std::clamp(2.0 * place.smoothing, 1.0, MaximumSmoothing);
+    place.blending = std::max(MinimumBlending, 0.7 * place.blending);
     return true;
   }
 
@@ -311,7 +311,7 @@ void SweepSettings::Validate() const
   require(Within(this->gradation, 0.05, 1.0), "gradation must be 0.05 to 1");
   require(Within(this->blending, 0.1, 1.0), "blending must be 0.1 to 1");
   require(Within(this->edgeRetreat, 0.1, 2.0), "edgeRetreat must be 0.1 to 2");
-  require(Within(this->smoothing, 0.0, GreatestSmoothing), "smoothing must be 0 to 4");
+  require(Within(this->smoothing, 0.0, MaximumSmoothing), "smoothing must be 0 to 4");
   require(Within(this->clearance, 0.0, 0.5), "clearance must be 0 to 0.5");
   require(this->patchSamples >= 6 && this->patchSamples <= 360, "patchSamples must be 6 to 360");
   require(Within(this->patchSpacing, 0.1, 4.0), "patchSpacing must be 0.1 to 4");
@@ -357,8 +357,8 @@ public:
       }
       catch (const SweepCollision& collision)
       {
-        this->CutLeast({ { collision.groups[0], collision.places[0] },
-                         { collision.groups[1], collision.places[1] } },
+        this->CutMinimum({ { collision.groups[0], collision.places[0] },
+                           { collision.groups[1], collision.places[1] } },
           collision.reach, "it runs through another vessel without joining it");
       }
       if (this->Tree.branches.empty())
@@ -440,17 +440,17 @@ private:
   {
     for (const Fault& fault : this->Apart(faults, CutReach))
     {
-      this->CutLeast({ { fault.group, fault.position } }, CutReach * fault.radius,
+      this->CutMinimum({ { fault.group, fault.position } }, CutReach * fault.radius,
         "no sound triangles could be made of its wall");
     }
     this->FaultSweeps = 0;
   }
 
   /// Cuts, of several branches, that with which the least is lost.
-  void CutLeast(const std::vector<Choice>& choices, double reach, const std::string& reason)
+  void CutMinimum(const std::vector<Choice>& choices, double reach, const std::string& reason)
   {
     VesselTree best;
-    SweepCut least;
+    SweepCut minimum;
     for (const Choice& choice : choices)
     {
       // Who fails again loses more.
@@ -460,10 +460,10 @@ private:
       SweepCut cut = CutTree(tree, choice.first, choice.second, more * reach);
       // A tree without its inlet is worth less than any branch.
       if (!cut.parts.empty() &&
-        (least.parts.empty() ||
-          std::make_pair(cut.atRoot, cut.length) < std::make_pair(least.atRoot, least.length)))
+        (minimum.parts.empty() ||
+          std::make_pair(cut.atRoot, cut.length) < std::make_pair(minimum.atRoot, minimum.length)))
       {
-        least = std::move(cut);
+        minimum = std::move(cut);
         best = std::move(tree);
       }
     }
@@ -471,7 +471,7 @@ private:
     {
       ++this->Cuts[choice.first];
     }
-    if (least.parts.empty())
+    if (minimum.parts.empty())
     {
       // The group is gone already, with one that was cut before.
       if (this->Last)
@@ -480,15 +480,15 @@ private:
       }
       return;
     }
-    for (std::size_t i = 0; i < least.parts.size(); ++i)
+    for (std::size_t i = 0; i < minimum.parts.size(); ++i)
     {
-      const SweepLeftOut& part = least.parts[i];
+      const SweepLeftOut& part = minimum.parts[i];
       if (part.length <= 0.0)
       {
         continue; // a point that was added to its end
       }
       AddLeftOut(this->LeftOut, this->Remarks, this->Input, part.groupId,
-        i == 0 ? reason : "it comes from " + least.parts[0].vessel + ", which is left out",
+        i == 0 ? reason : "it comes from " + minimum.parts[0].vessel + ", which is left out",
         part.place, part.length);
     }
     this->Tree = std::move(best);
@@ -524,7 +524,7 @@ private:
       {
         choices.emplace_back(g, place.centre);
       }
-      this->CutLeast(choices, this->Last ? 2.0 * place.reach : 0.5 * place.reach,
+      this->CutMinimum(choices, this->Last ? 2.0 * place.reach : 0.5 * place.reach,
         "no wall can be resolved there");
     }
   }
@@ -706,9 +706,9 @@ std::vector<std::int64_t> CellsOfBadEdges(const std::vector<Triangle>& triangles
 
 /// Replaces bad triangles where they are. @return whether that gave a sound mesh
 bool MendTriangles(const SweptLumen& lumen, const VesselTree& tree,
-  const std::vector<Fault>& faults, double leastAngle, RescueMesh& mesh, SweptSurface& result)
+  const std::vector<Fault>& faults, double minimumAngle, RescueMesh& mesh, SweptSurface& result)
 {
-  if (!CleanSweptMesh(mesh, lumen.Trees(), leastAngle))
+  if (!CleanSweptMesh(mesh, lumen.Trees(), minimumAngle))
   {
     return false;
   }

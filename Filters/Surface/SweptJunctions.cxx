@@ -14,7 +14,7 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 constexpr int RingSamples = 16;
 /// Tubes bent more than this (radius times curvature) are not meshed ring by ring.
-constexpr double GreatestBend = 0.75;
+constexpr double MaximumBend = 0.75;
 /// A junction's arms are cut where other walls are a fillet's radius and this many radii away.
 constexpr double CutMargin = 0.45;
 /// Fillets end this many radii of the greater and of the smaller vessel away from the node, and
@@ -148,7 +148,7 @@ bool SweptLumen::Build::IsClear(const Span& span, double s, const Junction& junc
 {
   const VesselAxis& axis = *self.VesselList[span.vessel].axis;
   const Station station = axis.At(s);
-  if (station.curvature.norm() * station.radius > GreatestBend)
+  if (station.curvature.norm() * station.radius > MaximumBend)
   {
     return false;
   }
@@ -157,7 +157,7 @@ bool SweptLumen::Build::IsClear(const Span& span, double s, const Junction& junc
   for (int i = axis.PieceAt(std::max(0.0, s - share * station.radius)); i <= last; ++i)
   {
     const Station& near = axis.AllStations()[i];
-    if (near.curvature.norm() * near.radius > GreatestBend)
+    if (near.curvature.norm() * near.radius > MaximumBend)
     {
       return false;
     }
@@ -181,7 +181,7 @@ bool SweptLumen::Build::IsClear(const Span& span, double s, const Junction& junc
       const VesselAxis& other = *self.VesselList[range.vessel].axis;
       const int piece = other.NearestPiece(x, range.firstPiece, range.lastPiece, distance);
       const double smaller = std::min(station.radius, other.AllStations()[piece].radius);
-      const double rounding = std::max(LeastFillet * smaller, fillet.RadiusAt(x));
+      const double rounding = std::max(MinimumFillet * smaller, fillet.RadiusAt(x));
       if (distance < share * (rounding + CutMargin * smaller))
       {
         return false;
@@ -444,7 +444,7 @@ void SweptLumen::Build::FinishJunctions()
       continue;
     }
     std::map<int, std::pair<double, double>> extent;
-    junction.smallestRadius = std::numeric_limits<double>::max();
+    junction.minimumRadius = std::numeric_limits<double>::max();
     const auto grow = [&](int vessel, double a, double b)
     {
       const double low = std::min(a, b);
@@ -469,11 +469,11 @@ void SweptLumen::Build::FinishJunctions()
     for (const auto& e : extent)
     {
       junction.ranges.push_back(this->MakeRange(e.first, e.second.first, e.second.second));
-      for (double s = e.second.first;; s += 0.3 * junction.smallestRadius)
+      for (double s = e.second.first;; s += 0.3 * junction.minimumRadius)
       {
         const double at = std::min(s, e.second.second);
         const double r = this->CalibreAt(e.first, at);
-        junction.smallestRadius = std::min(junction.smallestRadius, r);
+        junction.minimumRadius = std::min(junction.minimumRadius, r);
         if (s >= e.second.second)
         {
           break;
@@ -481,7 +481,7 @@ void SweptLumen::Build::FinishJunctions()
       }
     }
     // A fillet must end before the cuts, where the gap is known.
-    junction.greatestFillet =
+    junction.maximumFillet =
       std::max(0.02, 0.9 * junction.share * (this->settings.blending + CutMargin) - 0.05);
     junction.fillets.clear();
     for (int a = 0; a < static_cast<int>(junction.ranges.size()); ++a)
@@ -540,7 +540,7 @@ void SweptLumen::Build::SplitFolds()
       {
         continue;
       }
-      const bool folds = station.curvature.norm() * station.radius > GreatestBend;
+      const bool folds = station.curvature.norm() * station.radius > MaximumBend;
       if (folds && low < 0.0)
       {
         low = station.s - station.radius;

@@ -121,8 +121,8 @@ void SweptLumen::EvaluateJunction(
     // at the same depth. Of vessels that all end in the node none is wider there: always the ball.
     Vector3 fade = Vector3::Zero();
     const double round =
-      std::min(fillet.RadiusAt(position, &fade), junction.greatestFillet * fillet.calibre);
-    const double reach = std::max(round, LeastFillet * fillet.calibre);
+      std::min(fillet.RadiusAt(position, &fade), junction.maximumFillet * fillet.calibre);
+    const double reach = std::max(round, MinimumFillet * fillet.calibre);
     if (std::max(a.distance, b.distance) > reach)
     {
       continue;
@@ -135,18 +135,18 @@ void SweptLumen::EvaluateJunction(
     const double scale = 1.0 / (1.0 - bent * bent);
     const double widening = cosine < 0.0 ? RoundedDepth / (1.0 - sine) : 1.0;
     double k = widening * round;
-    double least = LeastFillet * fillet.calibre;
+    double minimum = MinimumFillet * fillet.calibre;
     if (cosine < 0.0)
     {
-      least = std::min(least, this->EdgeRetreat * fillet.calibre * sine / (1.0 - sine));
+      minimum = std::min(minimum, this->EdgeRetreat * fillet.calibre * sine / (1.0 - sine));
     }
-    if (least > k)
+    if (minimum > k)
     {
       // Two walls that come close without meeting have no edge between them. Where the planes
       // meet, the walls must do so too.
       const double outside = std::max(a.distance, b.distance);
       double open = 1.0;
-      if (outside > 0.01 * least)
+      if (outside > 0.01 * minimum)
       {
         const double toA = (a.distance - bent * b.distance) * scale;
         const double toB = (b.distance - bent * a.distance) * scale;
@@ -161,9 +161,9 @@ void SweptLumen::EvaluateJunction(
         }
         open = SmoothStep((0.8 - gap / outside) / 0.35);
       }
-      if (least * open > k)
+      if (minimum * open > k)
       {
-        k = least * open;
+        k = minimum * open;
         fade.setZero();
       }
     }

@@ -120,11 +120,11 @@ public:
     std::vector<Range> ranges;
     std::vector<Fillet> fillets;
     Vector3 centre = Vector3::Zero();
-    double smallestRadius = 0.0;
-    double share = 1.0;          ///< of the normal margin at the cuts
-    double greatestFillet = 0.0; ///< in radii
-    std::vector<int> nodes;      ///< spans inside
-    std::vector<int> members;    ///< the nodes' numbers
+    double minimumRadius = 0.0;
+    double share = 1.0;         ///< of the normal margin at the cuts
+    double maximumFillet = 0.0; ///< in radii
+    std::vector<int> nodes;     ///< spans inside
+    std::vector<int> members;   ///< the nodes' numbers
   };
 
   /// A free end with its cap.

@@ -17,7 +17,7 @@
 namespace coronary
 {
 /// Radius of the fillet that is left where others have faded, in radii of the smaller vessel.
-constexpr double LeastFillet = 0.12;
+constexpr double MinimumFillet = 0.12;
 
 struct SweptLumen::Build
 {

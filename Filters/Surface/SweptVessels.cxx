@@ -13,7 +13,7 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 /// Cosine of the angle by which a vessel may bend where others leave it: a tube that bends more has
 /// a fold on its inner side, and is taken as two that meet.
-constexpr double LeastStraightness = 0.7;
+constexpr double MinimumStraightness = 0.7;
 /// What being next in the input counts against straightness and even radii, when it is asked which
 /// vessel goes on where several leave.
 constexpr double FirstPreference = 0.1;
@@ -98,7 +98,7 @@ std::pair<int, int> SweptLumen::Build::PassThrough(
       }
       const double straight = -direction[i].dot(direction[j]);
       const double even = std::min(r[i], r[j]) / std::max(r[i], r[j]);
-      if (straight < LeastStraightness || (even < 0.5 && straight < 0.9))
+      if (straight < MinimumStraightness || (even < 0.5 && straight < 0.9))
       {
         continue;
       }

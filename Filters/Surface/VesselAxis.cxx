@@ -122,7 +122,7 @@ void SolveBanded(std::vector<std::array<double, 4>>& matrix, std::vector<Vector4
  * coefficients are held small where the points alone do not decide.
  */
 Spline Fit(const std::vector<double>& t, const std::vector<Vector4>& values,
-  const std::vector<double>& leastKnots)
+  const std::vector<double>& minimumKnots)
 {
   Spline spline;
   spline.knots.assign(4, 0.0);
@@ -130,8 +130,8 @@ Spline Fit(const std::vector<double>& t, const std::vector<Vector4>& values,
   const double length = t.back();
   for (std::size_t i = 1; i + 1 < t.size(); ++i)
   {
-    const double least = leastKnots[i];
-    if (t[i] - last >= least && length - t[i] >= least)
+    const double minimum = minimumKnots[i];
+    if (t[i] - last >= minimum && length - t[i] >= minimum)
     {
       spline.knots.push_back(t[i]);
       last = t[i];
@@ -224,17 +224,17 @@ VesselAxis::VesselAxis(const std::vector<Vector3>& points, const std::vector<dou
 {
   std::vector<double> t;
   std::vector<Vector4> values;
-  std::vector<double> leastKnots; // distances, mm
-  double smallest = radius.front();
+  std::vector<double> minimumKnots; // distances, mm
+  double minimumRadius = radius.front();
   for (std::size_t i = 0; i < points.size(); ++i)
   {
-    smallest = std::min(smallest, radius[i]);
+    minimumRadius = std::min(minimumRadius, radius[i]);
     const Vector4 value(points[i][0], points[i][1], points[i][2], radius[i]);
     if (t.empty())
     {
       t.push_back(0.0);
       values.push_back(value);
-      leastKnots.push_back(smoothing[i] * radius[i]);
+      minimumKnots.push_back(smoothing[i] * radius[i]);
       continue;
     }
     const double step = (value.head<3>() - values.back().head<3>()).norm();
@@ -242,10 +242,10 @@ VesselAxis::VesselAxis(const std::vector<Vector3>& points, const std::vector<dou
     {
       t.push_back(t.back() + step);
       values.push_back(value);
-      leastKnots.push_back(smoothing[i] * radius[i]);
+      minimumKnots.push_back(smoothing[i] * radius[i]);
     }
   }
-  const Spline spline = Fit(t, values, leastKnots);
+  const Spline spline = Fit(t, values, minimumKnots);
 
   // Stations at a third of the radius, by arc length (three-point Gauss quadrature).
   double s = 0.0;
@@ -264,8 +264,8 @@ VesselAxis::VesselAxis(const std::vector<Vector3>& points, const std::vector<dou
     const Vector3 cross = first.cross(second);
     const double square = cross.squaredNorm();
     station.torsion = square > 1e-12 ? cross.dot(Vector3(d[3].head<3>())) / square : 0.0;
-    station.radius = std::max(d[0][3], 0.5 * smallest);
-    station.slope = d[0][3] > 0.5 * smallest ? d[1][3] / speed : 0.0;
+    station.radius = std::max(d[0][3], 0.5 * minimumRadius);
+    station.slope = d[0][3] > 0.5 * minimumRadius ? d[1][3] / speed : 0.0;
     this->Stations.push_back(station);
   };
   add(0.0);

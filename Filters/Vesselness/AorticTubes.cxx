@@ -16,7 +16,7 @@ constexpr double RimGradient = 25.0; ///< HU/mm that make an edge
 constexpr int Rays = 48;
 
 /// Rays that must meet a rim: half of those that the field of view does not cut, a fifth of all.
-std::size_t LeastRim(int unknown)
+std::size_t MinimumRim(int unknown)
 {
   return static_cast<std::size_t>(std::max(Rays / 5, (Rays - unknown) / 2));
 }
@@ -74,7 +74,8 @@ public:
   std::vector<Disc> Find(const CoronaryOstiaSettings& settings) const
   {
     const double h = this->Volume.spacing;
-    const int radii = 1 + static_cast<int>((settings.largestAorta - settings.smallestAorta) / h);
+    const int radii =
+      1 + static_cast<int>((settings.maximumAorticRadius - settings.minimumAorticRadius) / h);
     const std::size_t pixels = this->Smooth.size();
     std::vector<float> votes(pixels * radii, 0.0f);
     for (int y = 1; y + 1 < this->Ny; ++y)
@@ -90,7 +91,7 @@ public:
         }
         for (int r = 0; r < radii; ++r)
         {
-          const double distance = settings.smallestAorta / h + r;
+          const double distance = settings.minimumAorticRadius / h + r;
           const int cx = static_cast<int>(std::lround(x + distance * gx / size));
           const int cy = static_cast<int>(std::lround(y + distance * gy / size));
           if (cx >= 0 && cy >= 0 && cx < this->Nx && cy < this->Ny)
@@ -148,8 +149,8 @@ public:
         continue;
       }
       taken.push_back({ x, y });
-      Disc disc{ x, y, settings.smallestAorta + h * bestRadius[order[n]], 0.0, 0.0 };
-      if (this->Fit(disc, settings) && disc.mean >= settings.smallestBlood)
+      Disc disc{ x, y, settings.minimumAorticRadius + h * bestRadius[order[n]], 0.0, 0.0 };
+      if (this->Fit(disc, settings) && disc.mean >= settings.minimumBlood)
       {
         const bool same = std::any_of(result.begin(), result.end(),
           [&](const Disc& other)
@@ -248,7 +249,7 @@ private:
           points.push_back({ disc.x + place / h * cosine, disc.y + place / h * sine });
         }
       }
-      if (distances.size() < LeastRim(unknown))
+      if (distances.size() < MinimumRim(unknown))
       {
         return false;
       }
@@ -269,7 +270,7 @@ private:
           rim.push_back(p);
         }
       }
-      if (rim.size() < LeastRim(unknown))
+      if (rim.size() < MinimumRim(unknown))
       {
         return false;
       }
@@ -277,8 +278,8 @@ private:
       const double cx = 0.5 * solution[0];
       const double cy = 0.5 * solution[1];
       const double radius = std::sqrt(std::max(0.0, solution[2] + cx * cx + cy * cy)) * h;
-      if (!(std::hypot(cx, cy) * h < disc.radius) || !(radius > settings.smallestAorta) ||
-        !(radius < settings.largestAorta))
+      if (!(std::hypot(cx, cy) * h < disc.radius) || !(radius > settings.minimumAorticRadius) ||
+        !(radius < settings.maximumAorticRadius))
       {
         return false;
       }
@@ -449,7 +450,7 @@ public:
           points.push_back({ place * along.dot(u), place * along.dot(v) });
         }
       }
-      if (distances.size() < LeastRim(unknown))
+      if (distances.size() < MinimumRim(unknown))
       {
         return 0.0;
       }
@@ -467,15 +468,15 @@ public:
           rim.push_back(p);
         }
       }
-      if (rim.size() < LeastRim(unknown))
+      if (rim.size() < MinimumRim(unknown))
       {
         return 0.0;
       }
       const Vector3 solution = normal.ldlt().solve(right);
       const Vector3 move = 0.5 * solution[0] * u + 0.5 * solution[1] * v;
       const double radius = std::sqrt(std::max(0.0, solution[2] + move.squaredNorm()));
-      if (!(move.norm() < section.radius) || !(radius > this->Settings.smallestAorta) ||
-        !(radius < this->Settings.largestAorta))
+      if (!(move.norm() < section.radius) || !(radius > this->Settings.minimumAorticRadius) ||
+        !(radius < this->Settings.maximumAorticRadius))
       {
         return 0.0;
       }
@@ -560,11 +561,11 @@ private:
 void Follow(const WorldVolume& volume, const CoronaryOstiaSettings& settings, double blood,
   double farthest, std::vector<AorticSection>& chain, std::vector<double>& scores)
 {
-  constexpr double step = 1.5;   // mm
-  constexpr double reach = 12.0; // mm of chain that gives its direction
-  constexpr int longestGap = 3;  // steps
-  constexpr double least = 0.35; // score
-  const double largestTurn = std::cos(75.0 * Pi / 180.0);
+  constexpr double step = 1.5;     // mm
+  constexpr double reach = 12.0;   // mm of chain that gives its direction
+  constexpr int longestGap = 3;    // steps
+  constexpr double minimum = 0.35; // score
+  const double maximumTurn = std::cos(75.0 * Pi / 180.0);
   const PlaneFit fit(volume, settings);
   const Vector3 first = chain.back().normal;
   double length = 0.0;
@@ -578,7 +579,7 @@ void Follow(const WorldVolume& volume, const CoronaryOstiaSettings& settings, do
     AorticSection found = next;
     double mean = 0.0;
     const double score = fit.Fit(found, mean);
-    const bool good = score > least && mean >= settings.smallestBlood &&
+    const bool good = score > minimum && mean >= settings.minimumBlood &&
       std::abs(mean - blood) < 0.2 * blood && (found.centre - next.centre).norm() < 2.0 + missed &&
       std::abs(found.radius - chain.back().radius) < 1.5 * (1 + missed);
     if (!good)
@@ -601,7 +602,7 @@ void Follow(const WorldVolume& volume, const CoronaryOstiaSettings& settings, do
     {
       chain.back().normal = (0.7 * found.normal + 0.3 * chord.normalized()).normalized();
     }
-    if (chain.back().normal.dot(first) < largestTurn)
+    if (chain.back().normal.dot(first) < maximumTurn)
     {
       return; // the arch
     }
@@ -644,7 +645,7 @@ AorticTube SliceSquare(
   // From the middle of the best 12 mm.
   const std::size_t window = std::min<std::size_t>(8, tube.sections.size());
   std::size_t best = 0;
-  double greatest = -1.0;
+  double maximum = -1.0;
   for (std::size_t n = 0; n + window <= tube.sections.size(); ++n)
   {
     double sum = 0.0;
@@ -652,9 +653,9 @@ AorticTube SliceSquare(
     {
       sum += tube.scores[m];
     }
-    if (sum > greatest)
+    if (sum > maximum)
     {
-      greatest = sum;
+      maximum = sum;
       best = n;
     }
   }
@@ -667,7 +668,7 @@ AorticTube SliceSquare(
   result.mean = tube.mean;
   double mean = 0.0;
   const double score = fit.Fit(middle, mean);
-  if (!(score > 0.0) || !(mean >= settings.smallestBlood))
+  if (!(score > 0.0) || !(mean >= settings.minimumBlood))
   {
     return result;
   }
@@ -712,15 +713,15 @@ TubeAxis::TubeAxis(const std::vector<AorticSection>& sections)
 TubeAxis::Place TubeAxis::At(const Vector3& p) const
 {
   Place place;
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (std::size_t n = 1; n < this->Sections.size(); ++n)
   {
     const AorticSection& a = this->Sections[n - 1];
     const AorticSection& b = this->Sections[n];
     const SegmentPlace near = NearestOnSegment(p, a.centre, b.centre);
-    if (near.squaredDistance < least)
+    if (near.squaredDistance < minimum)
     {
-      least = near.squaredDistance;
+      minimum = near.squaredDistance;
       place.centre = near.position;
       place.radius = a.radius + near.fraction * (b.radius - a.radius);
       place.direction = (b.centre - a.centre).normalized();
@@ -728,7 +729,7 @@ TubeAxis::Place TubeAxis::At(const Vector3& p) const
         near.fraction * (this->Lengths[n] - this->Lengths[n - 1]) - this->Bottom;
     }
   }
-  place.distance = std::sqrt(least);
+  place.distance = std::sqrt(minimum);
   return place;
 }
 

@@ -19,9 +19,9 @@ constexpr double Pi = 3.14159265358979323846;
 
 /// Log of how much more likely a value is for a coronary artery than for something else: `best` at
 /// the middle, falling with the square of the distance, never below `least`.
-double Evidence(double distance, double width, double best, double least)
+double Evidence(double distance, double width, double best, double minimum)
 {
-  return std::max(least, best - 0.5 * std::pow(distance / width, 2));
+  return std::max(minimum, best - 0.5 * std::pow(distance / width, 2));
 }
 
 /// What speaks for an outlet as the left or the right ostium, whatever the other one is.
@@ -37,7 +37,7 @@ double RoleEvidence(const Outlet& outlet, bool left, const CoronaryOstiaSettings
   const double length = std::min(1.0, outlet.ostium.length / settings.vesselLength);
   sum += 1.0 - 5.0 * (1.0 - length);
   const double r = outlet.ostium.radius;
-  const double usual = 0.7 * settings.largestVessel;
+  const double usual = 0.7 * settings.maximumVesselRadius;
   sum += Evidence(std::max({ 0.0, 2.0 * (0.9 - r), r - usual }), 0.5, 0.5, -4.0);
   // The rims of chambers are bright and long as well, but no tubes. That a rim points at the aorta is no rare chance:
   // what does not hang on it must be a clear tube.
@@ -361,16 +361,16 @@ AscendingAorta AortaOf(const Candidate& candidate, const std::vector<double>& le
 
 void CoronaryOstiaSettings::Validate() const
 {
-  Require(this->smallestAorta >= 4.0 && this->smallestAorta < this->largestAorta &&
-      this->largestAorta <= 60.0,
-    "aortic radii must satisfy 4 <= smallestAorta < largestAorta <= 60 mm");
-  Require(
-    this->largestVessel >= 1.0 && this->largestVessel <= 8.0, "largestVessel must be 1 to 8 mm");
+  Require(this->minimumAorticRadius >= 4.0 &&
+      this->minimumAorticRadius < this->maximumAorticRadius && this->maximumAorticRadius <= 60.0,
+    "aortic radii must satisfy 4 <= minimumAorticRadius < maximumAorticRadius <= 60 mm");
+  Require(this->maximumVesselRadius >= 1.0 && this->maximumVesselRadius <= 8.0,
+    "maximumVesselRadius must be 1 to 8 mm");
   Require(
     this->vesselLength >= 10.0 && this->vesselLength <= 80.0, "vesselLength must be 10 to 80 mm");
-  Require(std::isfinite(this->softTissue) && this->smallestBlood > this->softTissue &&
-      std::isfinite(this->smallestBlood),
-    "smallestBlood must be above softTissue");
+  Require(std::isfinite(this->softTissue) && this->minimumBlood > this->softTissue &&
+      std::isfinite(this->minimumBlood),
+    "minimumBlood must be above softTissue");
 }
 
 CoronaryOstia FindCoronaryOstia(
@@ -396,7 +396,7 @@ CoronaryOstia FindCoronaryOstia(
     const Hypothesis& best = explanations.front();
     const Candidate& chosen = candidates[best.tube];
     // Across the body there is always something: not worth a name without likelihood.
-    const double least = chosen.prior < 0.0 ? 0.1 : 0.0;
+    const double minimum = chosen.prior < 0.0 ? 0.1 : 0.0;
     std::vector<double> levels;
     const auto add = [&](int outlet, bool left)
     {
@@ -405,7 +405,7 @@ CoronaryOstia FindCoronaryOstia(
         CoronaryOstium ostium = chosen.around.outlets[outlet].ostium;
         ostium.name = left ? "LCA" : "RCA";
         ostium.confidence = Agreement(explanations, candidates, ostium.position, left);
-        if (ostium.confidence < least)
+        if (ostium.confidence < minimum)
         {
           return;
         }

@@ -20,12 +20,12 @@ namespace coronary
 {
 struct CoronaryOstiaSettings
 {
-  double smallestAorta = 8.0;   ///< radius, mm
-  double largestAorta = 32.0;   ///< radius, mm
-  double largestVessel = 4.5;   ///< coronary radius, mm; what is thicker counts as a large body
-  double vesselLength = 40.0;   ///< mm that must hang on an ostium for full confidence
-  double softTissue = 50.0;     ///< HU of muscle without contrast medium
-  double smallestBlood = 150.0; ///< HU below which the aorta would not be contrast-enhanced
+  double minimumAorticRadius = 8.0;  ///< radius, mm
+  double maximumAorticRadius = 32.0; ///< radius, mm
+  double maximumVesselRadius = 4.5; ///< coronary radius, mm; what is thicker counts as a large body
+  double vesselLength = 40.0;       ///< mm that must hang on an ostium for full confidence
+  double softTissue = 50.0;         ///< HU of muscle without contrast medium
+  double minimumBlood = 150.0;      ///< HU below which the aorta would not be contrast-enhanced
 
   /// @throws std::invalid_argument that names the first setting that is out of range
   void Validate() const;

@@ -59,13 +59,13 @@ public:
 
 private:
   static constexpr double Stump = 8.0;       ///< mm of vessel before the lesion that may be seen
-  static constexpr float LeastTube = 0.3F;   ///< of a clear tube's, that a piece has
+  static constexpr float MinimumTube = 0.3F; ///< of a clear tube's, that a piece has
   static constexpr float VisibleTube = 0.2F; ///< the same, that a thin lumen has
 
   bool Orphaned(std::int64_t p) const
   {
     return this->I.body[p] == 0 && this->I.reached[p] < 0.0F && this->I.likeness[p] > 0.5F &&
-      this->Tube(p) >= LeastTube;
+      this->Tube(p) >= MinimumTube;
   }
   float Tube(std::int64_t p) const { return this->I.tubeness[p] / this->I.clearTube; }
   float Seen(std::int64_t p) const { return std::clamp(this->Tube(p) / VisibleTube, 0.0F, 1.0F); }
@@ -173,7 +173,7 @@ std::vector<std::vector<std::int64_t>> MouthSearch::Pieces()
   const auto voxels = static_cast<std::int64_t>(this->I.volume.values.size());
   this->Number.assign(static_cast<std::size_t>(voxels), 0);
   // A tube of two voxels' area and the least length has this many.
-  const auto least = static_cast<std::size_t>(2.0 * this->Shortest / this->I.volume.spacing);
+  const auto minimum = static_cast<std::size_t>(2.0 * this->Shortest / this->I.volume.spacing);
   std::vector<std::vector<std::int64_t>> pieces;
   for (std::int64_t p = 0; p < voxels; ++p)
   {
@@ -183,7 +183,7 @@ std::vector<std::vector<std::int64_t>> MouthSearch::Pieces()
         return this->Number[next] == 0 && this->Orphaned(next) &&
           std::exchange(this->Number[next], 1) == 0;
       });
-    if (piece.size() >= least &&
+    if (piece.size() >= minimum &&
       std::any_of(piece.begin(), piece.end(), [this](std::int64_t q) { return this->NearWall(q); }))
     {
       std::sort(piece.begin(), piece.end());
@@ -278,16 +278,16 @@ std::vector<PieceEnd> MouthSearch::EndsOf(const std::vector<Reached>& piece)
   std::vector<Reached> tips;
   for (const Reached& r : piece)
   {
-    bool greatest = true;
+    bool maximum = true;
     this->L.Neighbours(r.voxel,
       [&](std::int64_t next, float)
       {
         const auto other = away.find(next);
-        greatest = greatest &&
+        maximum = maximum &&
           (other == away.end() || other->second < r.distance ||
             (other->second == r.distance && next > r.voxel));
       });
-    if (greatest)
+    if (maximum)
     {
       tips.push_back(r);
     }
@@ -329,10 +329,10 @@ std::optional<HiddenMouth> MouthSearch::MouthOf(const PieceEnd& end)
     const float seen = this->Seen(q);
     // Bright and no tube: the rim of a chamber.
     const bool rim =
-      this->I.body[q] == 0 && this->I.likeness[q] > 0.5F && this->Tube(q) < LeastTube;
+      this->I.body[q] == 0 && this->I.likeness[q] > 0.5F && this->Tube(q) < MinimumTube;
     return step * (1.0F - 0.85F * seen + (rim ? 1.0F : 0.0F));
   };
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   std::int32_t best = -1;
   std::int32_t count = 0;
   HiddenMouth mouth;
@@ -340,7 +340,7 @@ std::optional<HiddenMouth> MouthSearch::MouthOf(const PieceEnd& end)
     [&](const Reached& here)
     {
       const std::int32_t place = count++;
-      if (here.distance >= least)
+      if (here.distance >= minimum)
       {
         return Onwards::Nowhere;
       }
@@ -351,9 +351,9 @@ std::optional<HiddenMouth> MouthSearch::MouthOf(const PieceEnd& end)
       const Vector3 chord = this->World(here.voxel) - end.position;
       const double angle = UnitAngle(end.outwards, chord.normalized());
       const double total = here.distance * (1.0 + angle * angle);
-      if (angle < widest && total < least)
+      if (angle < widest && total < minimum)
       {
-        least = total;
+        minimum = total;
         best = place;
         mouth.turn = angle;
       }
@@ -404,7 +404,8 @@ std::vector<HiddenMouth> MouthSearch::Run()
     const double volume = static_cast<double>(piece.size()) * std::pow(this->I.volume.spacing, 3);
     // A tube, not a lump.
     if (length < this->Shortest ||
-      volume > M_PI * std::pow(0.6 * this->I.largestVessel, 2) * length || this->InLung(piece))
+      volume > M_PI * std::pow(0.6 * this->I.maximumVesselRadius, 2) * length ||
+      this->InLung(piece))
     {
       continue;
     }

@@ -21,7 +21,7 @@ struct MouthImage
   const std::vector<float>& reached;      ///< negative: no vessel leads from the aorta to here
   float clearTube = 0.3F;                 ///< vesselness of a clear tube
   float lung = -500.0F;                   ///< HU that no tissue of the heart is below
-  double largestVessel = 4.5;             ///< radius, mm
+  double maximumVesselRadius = 4.5;       ///< radius, mm
 };
 
 /// Where a piece of vessel would begin on the aorta, were the way to it visible.

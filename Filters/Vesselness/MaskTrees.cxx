@@ -16,13 +16,13 @@ namespace coronary
 {
 namespace
 {
-constexpr double LeastTree = 15.0; ///< mm, diagonal of its box
-constexpr double LeastReach =
+constexpr double MinimumTree = 15.0; ///< mm, diagonal of its box
+constexpr double MinimumReach =
   10.0; ///< mm that a tree leads away from the aorta: its sharp rims do not
-constexpr double LeastNamed = 3.0;     ///< mm^3; smaller crumbs are not worth a remark
-constexpr double LeastAorta = 3.0;     ///< volumes of the ball
-constexpr double SmallestHeart = 60.0; ///< mm, diagonal of the box around the trees of one heart
-constexpr double LargestHeart = 260.0; ///< mm
+constexpr double MinimumNamed = 3.0;   ///< mm^3; smaller fragments are not worth a remark
+constexpr double MinimumAorta = 3.0;   ///< volumes of the ball
+constexpr double MinimumHeart = 60.0;  ///< mm, diagonal of the box around the trees of one heart
+constexpr double MaximumHeart = 260.0; ///< mm
 
 constexpr int MostNamed = 5; ///< pieces that are left out, one by one
 
@@ -53,7 +53,7 @@ public:
   {
   }
 
-  MaskTrees Run(double largestRadius, const ProgressCallback& progress);
+  MaskTrees Run(double maximumRadius, const ProgressCallback& progress);
 
 private:
   Vector3 Place(std::int64_t number) const { return this->Box.World(this->Box.Place(number)); }
@@ -61,7 +61,7 @@ private:
   bool Crop();
   void CutAorta(double radius, const ProgressCallback& progress);
   std::vector<Piece> Pieces() const;
-  std::vector<std::int64_t> LargestPatch(const std::vector<std::int64_t>& voxels) const;
+  std::vector<std::int64_t> MaximumPatch(const std::vector<std::int64_t>& voxels) const;
   void Question();
 
   const ImageGrid& Grid;
@@ -131,7 +131,7 @@ void Finder::CutAorta(double radius, const ProgressCallback& progress)
     OpenWithBall(this->Inside.data(), this->Box.Size, this->Grid.spacing, radius, progress);
   const auto count = std::count(body.begin(), body.end(), 1);
   const double ball = 4.0 / 3.0 * 3.14159265358979323846 * radius * radius * radius;
-  if (static_cast<double>(count) * this->Voxel < LeastAorta * ball)
+  if (static_cast<double>(count) * this->Voxel < MinimumAorta * ball)
   {
     return;
   }
@@ -197,7 +197,7 @@ std::vector<Piece> Finder::Pieces() const
 }
 
 /// Of voxels those that hang together and are most.
-std::vector<std::int64_t> Finder::LargestPatch(const std::vector<std::int64_t>& voxels) const
+std::vector<std::int64_t> Finder::MaximumPatch(const std::vector<std::int64_t>& voxels) const
 {
   std::set<std::int64_t> left(voxels.begin(), voxels.end());
   std::vector<std::int64_t> best;
@@ -214,7 +214,7 @@ std::vector<std::int64_t> Finder::LargestPatch(const std::vector<std::int64_t>& 
 void Finder::Question()
 {
   const double size = this->Result.size;
-  if (size >= SmallestHeart && size <= LargestHeart)
+  if (size >= MinimumHeart && size <= MaximumHeart)
   {
     return;
   }
@@ -222,7 +222,7 @@ void Finder::Question()
   const bool unit = (this->Grid.spacing - Vector3::Ones()).norm() < 1e-9;
   std::snprintf(text, sizeof(text),
     "the trees of the mask are %.0f mm in size, those of human hearts %.0f to %.0f mm%s", size,
-    SmallestHeart, LargestHeart,
+    MinimumHeart, MaximumHeart,
     unit
       ? ": its voxels of exactly 1 mm are what a header without a voxel size says; give the file "
         "that of its image"
@@ -230,13 +230,13 @@ void Finder::Question()
   this->Result.remarks.emplace_back(text);
 }
 
-MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
+MaskTrees Finder::Run(double maximumRadius, const ProgressCallback& progress)
 {
   if (!this->Crop())
   {
     throw std::invalid_argument("the mask is empty");
   }
-  this->CutAorta(largestRadius,
+  this->CutAorta(maximumRadius,
     progress ? [&](double fraction) { return progress(0.8 * fraction); } : ProgressCallback());
   this->Result.vessels.assign(this->Mask.size(), 0);
   const auto place = [&](const std::vector<std::int64_t>& voxels)
@@ -264,11 +264,11 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
   for (const Piece& piece : this->Pieces())
   {
     const double volume = static_cast<double>(piece.voxels.size()) * this->Voxel;
-    const bool tree = piece.diagonal >= LeastTree &&
-      (!this->Result.hasAorta || (!piece.contact.empty() && piece.reach >= LeastReach));
+    const bool tree = piece.diagonal >= MinimumTree &&
+      (!this->Result.hasAorta || (!piece.contact.empty() && piece.reach >= MinimumReach));
     if (!tree)
     {
-      if (volume >= LeastNamed && piece.contact.empty())
+      if (volume >= MinimumNamed && piece.contact.empty())
       {
         ++pieces;
         leftOut += volume;
@@ -286,7 +286,7 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
     MaskTree one;
     one.volume = volume;
     one.seed = this->Result.hasAorta
-      ? place(this->LargestPatch(piece.contact))
+      ? place(this->MaximumPatch(piece.contact))
       : this->Place(*std::max_element(piece.voxels.begin(), piece.voxels.end(),
           [&](std::int64_t a, std::int64_t b) { return depth[a] < depth[b]; }));
     this->Result.trees.push_back(one);
@@ -318,7 +318,7 @@ MaskTrees Finder::Run(double largestRadius, const ProgressCallback& progress)
 }
 
 MaskTrees FindMaskTrees(const ImageGrid& grid, const std::vector<unsigned char>& mask,
-  double largestRadius, const ProgressCallback& progress)
+  double maximumRadius, const ProgressCallback& progress)
 {
   std::size_t voxels = 1;
   for (int axis = 0; axis < 3; ++axis)
@@ -330,10 +330,10 @@ MaskTrees FindMaskTrees(const ImageGrid& grid, const std::vector<unsigned char>&
   {
     throw std::invalid_argument("the mask has another number of voxels than its grid");
   }
-  if (!(largestRadius > 0.0))
+  if (!(maximumRadius > 0.0))
   {
     throw std::invalid_argument("the largest radius must be positive");
   }
-  return Finder(grid, mask).Run(largestRadius, progress);
+  return Finder(grid, mask).Run(maximumRadius, progress);
 }
 }

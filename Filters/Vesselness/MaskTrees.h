@@ -36,11 +36,11 @@ struct MaskTrees
 
 /**
  * @param mask           0 or not, one a voxel of `grid`, i fastest
- * @param largestRadius  of coronary arteries, mm: what is thicker is aorta
+ * @param maximumRadius  of coronary arteries, mm: what is thicker is aorta
  * @throws std::invalid_argument when the mask has another number of voxels than its grid, or no tree; Cancelled
  */
 MaskTrees FindMaskTrees(const ImageGrid& grid, const std::vector<unsigned char>& mask,
-  double largestRadius, const ProgressCallback& progress = {});
+  double maximumRadius, const ProgressCallback& progress = {});
 }
 
 #endif

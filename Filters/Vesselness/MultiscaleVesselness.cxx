@@ -584,7 +584,7 @@ MultiscaleVesselness::Extremes MultiscaleVesselness::Measure(const VoxelBlock& i
         ? mask + ((piece.k - part[4]) * static_cast<std::int64_t>(ny) + (piece.j - part[2])) * nx +
           (piece.i0 - part[0])
         : nullptr;
-      const auto largest = [&]
+      const auto maximumOf = [&]
       {
         // Not max_element: a NaN in front would hide the rest of the row.
         float result = 0.0f;
@@ -597,12 +597,12 @@ MultiscaleVesselness::Extremes MultiscaleVesselness::Measure(const VoxelBlock& i
         return result;
       };
       Kernels().squaredNorm(hessian, width, measure.data());
-      const double norm = std::sqrt(double{ largest() });
+      const double norm = std::sqrt(double{ maximumOf() });
       double strongest = 0.0;
       if (jerman)
       {
         Kernels().lambda3(hessian, sign, width, measure.data());
-        strongest = largest();
+        strongest = maximumOf();
       }
       const std::lock_guard<std::mutex> lock(mutex);
       extremes.hessianNorm = std::max(extremes.hessianNorm, norm);

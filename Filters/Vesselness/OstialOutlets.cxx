@@ -229,8 +229,8 @@ void OutletSearch::Bodies(const ProgressCallback& progress)
     blood[p] = this->Volume.values[p] > this->Half ? 1 : 0;
   }
   const Vector3 spacing = Vector3::Constant(this->Volume.spacing);
-  this->Body =
-    OpenWithBall(blood.data(), this->Volume.size, spacing, this->Settings.largestVessel, progress);
+  this->Body = OpenWithBall(
+    blood.data(), this->Volume.size, spacing, this->Settings.maximumVesselRadius, progress);
   ParallelFor(this->Volume.size[2], 4,
     [&](std::int64_t first, std::int64_t last)
     {
@@ -438,7 +438,7 @@ std::vector<Outlet> OutletSearch::Find() const
   MouthImage image{ this->Volume, this->Body, this->Likeness, this->Tubeness, this->Length };
   image.lung = static_cast<float>(
     this->Settings.softTissue - 1.5 * (this->BloodMean - this->Settings.softTissue));
-  image.largestVessel = this->Settings.largestVessel;
+  image.maximumVesselRadius = this->Settings.maximumVesselRadius;
   for (const HiddenMouth& mouth : FindHiddenMouths(image, farthest, tree))
   {
     result.push_back(this->Describe(mouth));
@@ -489,12 +489,12 @@ bool OutletSearch::Describe(Outlet& outlet, const std::vector<std::int64_t>& mem
   std::reverse(path.begin(), path.end());
 
   constexpr double start = 10.0;
-  constexpr double least = 4.0;
+  constexpr double minimum = 4.0;
   constexpr double most = 45.0;
   int count = 0;
   for (const std::int64_t p : path)
   {
-    if (this->Length[p] < least || this->Length[p] > most)
+    if (this->Length[p] < minimum || this->Length[p] > most)
     {
       continue;
     }
@@ -817,7 +817,7 @@ void OutletSearch::FollowToWall(CoronaryOstium& ostium) const
   constexpr double step = 0.5;
   constexpr double farthest = 12.0;
   Vector3 axis = ostium.axis;
-  double radius = std::clamp(ostium.radius, 0.8, this->Settings.largestVessel);
+  double radius = std::clamp(ostium.radius, 0.8, this->Settings.maximumVesselRadius);
   for (int pass = 0; pass < 2; ++pass)
   {
     this->Recentre(ostium.position, radius, axis, true);

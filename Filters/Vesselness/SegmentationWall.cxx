@@ -192,8 +192,8 @@ void VoxelSegmentation<T>::RefineWall(
 template <typename T>
 void VoxelSegmentation<T>::DropIslands()
 {
-  const auto least =
-    static_cast<std::size_t>(std::ceil(this->Settings.smallestIsland / this->L.VoxelVolume()));
+  const auto minimum =
+    static_cast<std::size_t>(std::ceil(this->Settings.minimumIslandVolume / this->L.VoxelVolume()));
   constexpr unsigned char seen = 8;
   for (std::size_t p = 0; p < this->States.size(); ++p)
   {
@@ -204,7 +204,7 @@ void VoxelSegmentation<T>::DropIslands()
         this->States[voxel] = vessel ? seen : this->States[voxel];
         return vessel;
       });
-    if (piece.size() < least)
+    if (piece.size() < minimum)
     {
       for (const std::int64_t q : piece)
       {

@@ -21,7 +21,7 @@ namespace
 {
 constexpr float Unreached = std::numeric_limits<float>::infinity();
 /// Vesselness, in that of a clear tube, that a piece's voxels have at least: bones and chambers have less.
-constexpr float LeastTube = 0.3F;
+constexpr float MinimumTube = 0.3F;
 /// Vesselness, in the same unit, that tells a thin lumen or a wall's tube from noise.
 constexpr float VisibleTube = 0.2F;
 /// Brighter than blood by this factor is bone or calcium, darker than tissue by it is lung.
@@ -34,10 +34,10 @@ constexpr double WallGap = 8.0;  ///< mm: longest link to a wall
 constexpr double FreeGap = 12.0; ///< mm: longer ones need more than ends that point at each other
 /// Ends that face each other are one vessel's, and it runs between them as a smooth curve does: a way that strays from it by
 /// this share of the gap is another thing's, unless it is as clear as a vessel.
-constexpr double Facing = 0.6;      ///< rad of each end to the other
-constexpr double LeastFacing = 5.0; ///< mm: nearer ends may face anywhere
-constexpr double Straying = 0.2;    ///< of the gap
-constexpr double ClearTube = 0.5;   ///< vesselness, in that of a clear tube, throughout
+constexpr double Facing = 0.6;        ///< rad of each end to the other
+constexpr double MinimumFacing = 5.0; ///< mm: nearer ends may face anywhere
+constexpr double Straying = 0.2;      ///< of the gap
+constexpr double ClearTube = 0.5;     ///< vesselness, in that of a clear tube, throughout
 
 /// Fitted to the links that came to mind in phantoms (scripts/fit-odds.sh).
 constexpr double Intercept = 1.33;
@@ -183,7 +183,7 @@ public:
   {
     this->Lumen.reference.lumen = image.blood;
     this->Lumen.reference.background = image.tissue;
-    this->Lumen.maximumRadius = image.largestRadius;
+    this->Lumen.maximumRadius = image.maximumRadius;
   }
 
   std::vector<VesselLink> Run(
@@ -224,7 +224,7 @@ private:
     std::vector<ConsideredLink>& considered) const;
   float Evidence(std::int64_t voxel) const;
   float Price(std::int64_t voxel) const;
-  bool Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target, double within,
+  bool FindPath(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target, double within,
     VesselLink& link) const;
   bool Curve(const VesselEnd& end, const VesselEnd& tip, VesselLink& link) const;
   double Clearest(const VesselLink& link) const;
@@ -282,7 +282,7 @@ std::vector<std::vector<std::int64_t>> Linker::Pieces(
           for (int i = low[0]; i <= high[0]; ++i)
           {
             const std::int64_t p = this->L.Index(i, j, low[2] + static_cast<int>(slice));
-            if (this->I.tube(p) >= LeastTube && this->I.share(p) <= TooBright &&
+            if (this->I.tube(p) >= MinimumTube && this->I.share(p) <= TooBright &&
               this->I.couldBelong(p))
             {
               found[slice].push_back(p);
@@ -299,8 +299,8 @@ std::vector<std::vector<std::int64_t>> Linker::Pieces(
   std::vector<char> seen(all.size(), 0);
   std::vector<std::vector<std::int64_t>> pieces;
   // A tube of two voxels' area and the least length has this many.
-  const auto least =
-    static_cast<std::size_t>(this->Settings.leastPiece / std::cbrt(this->L.VoxelVolume()) * 1.5);
+  const auto minimum =
+    static_cast<std::size_t>(this->Settings.minimumPiece / std::cbrt(this->L.VoxelVolume()) * 1.5);
   for (std::size_t n = 0; n < all.size(); ++n)
   {
     std::vector<std::int64_t> piece = this->L.Connected(all[n],
@@ -309,7 +309,7 @@ std::vector<std::vector<std::int64_t>> Linker::Pieces(
         const auto at = std::lower_bound(all.begin(), all.end(), voxel);
         return at != all.end() && *at == voxel && std::exchange(seen[at - all.begin()], 1) == 0;
       });
-    if (piece.size() >= least)
+    if (piece.size() >= minimum)
     {
       std::sort(piece.begin(), piece.end());
       pieces.push_back(std::move(piece));
@@ -412,15 +412,15 @@ std::vector<VesselEnd> Linker::EndsOf(
   std::vector<std::int32_t> tips;
   for (std::size_t n = 0; n < piece.Size(); ++n)
   {
-    bool greatest = true;
+    bool maximum = true;
     const auto here = static_cast<std::int32_t>(n);
     piece.Neighbours(here,
       [&](std::int32_t next, float)
       {
         const float other = away[next];
-        greatest = greatest && (other < away[n] || (other == away[n] && next > here));
+        maximum = maximum && (other < away[n] || (other == away[n] && next > here));
       });
-    if (greatest)
+    if (maximum)
     {
       tips.push_back(here);
     }
@@ -502,8 +502,8 @@ std::optional<Linker::Orphan> Linker::Describe(std::vector<std::int64_t> voxels)
   const std::vector<VoxelPiece::Reached> distances = orphan.piece.Around(first, Unreached);
   orphan.length = distances.back().distance;
   // A tube, not a lump.
-  if (orphan.length < this->Settings.leastPiece ||
-    volume > M_PI * std::pow(0.6 * this->I.largestRadius, 2) * orphan.length)
+  if (orphan.length < this->Settings.minimumPiece ||
+    volume > M_PI * std::pow(0.6 * this->I.maximumRadius, 2) * orphan.length)
   {
     return std::nullopt;
   }
@@ -523,12 +523,12 @@ float Linker::Price(std::int64_t voxel) const
 {
   const float price = 1.0F - 0.85F * this->Evidence(voxel);
   // Bright and no tube: the rim of a chamber.
-  return this->I.share(voxel) > 0.5F && this->I.tube(voxel) < LeastTube ? price + 1.0F : price;
+  return this->I.share(voxel) > 0.5F && this->I.tube(voxel) < MinimumTube ? price + 1.0F : price;
 }
 
 /// The cheapest way from an end of a piece to the tree, near a target.
 /// @param within  mm from the target that count as there
-bool Linker::Way(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target,
+bool Linker::FindPath(const VoxelPiece& piece, const VesselEnd& end, const Vector3& target,
   double within, VesselLink& link) const
 {
   const double gap = (target - end.position).norm();
@@ -701,7 +701,7 @@ bool Linker::Strays(
 {
   const Vector3 chord = tip.position - end.position;
   const double gap = chord.norm();
-  if (tip.root > 0.0 || gap < LeastFacing || UnitAngle(end.outwards, chord / gap) > Facing ||
+  if (tip.root > 0.0 || gap < MinimumFacing || UnitAngle(end.outwards, chord / gap) > Facing ||
     UnitAngle(tip.outwards, -chord / gap) > Facing)
   {
     return false;
@@ -709,12 +709,12 @@ bool Linker::Strays(
   double farthest = 0.0;
   for (const Vector3& point : way.points)
   {
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (const Vector3& other : curve.points)
     {
-      least = std::min(least, (other - point).norm());
+      minimum = std::min(minimum, (other - point).norm());
     }
-    farthest = std::max(farthest, least);
+    farthest = std::max(farthest, minimum);
   }
   return farthest > Straying * gap && this->Clearest(way) < ClearTube;
 }
@@ -766,9 +766,9 @@ void Linker::Describe(
   // Over a short gap the chord says nothing.
   const double chordWeight = std::min(1.0, gap / 4.0);
   const Vector3 chord = gap > 0.0 ? Vector3((from - end.position) / gap) : end.outwards;
-  constexpr double greatestTurn = 6.0;
+  constexpr double maximumTurn = 6.0;
   const auto turn = [&](double angle, double scale)
-  { return std::min(greatestTurn, (angle / scale) * (angle / scale)); };
+  { return std::min(maximumTurn, (angle / scale) * (angle / scale)); };
   const bool root = tip != nullptr && tip->root > 0.0;
   link.radiusBefore =
     tip != nullptr && (tip->radius > 0.0 || root) ? tip->radius : this->RadiusByVolume(from);
@@ -781,9 +781,9 @@ void Linker::Describe(
   const double wider = link.radiusBefore > 0.0
     ? std::log(std::max(1e-9, std::max(end.radius, thick)) / link.radiusBefore)
     : 0.0;
-  const double least = 0.3; // mm: what is thinner is not measured
-  const double grown = std::log(orphan.growth[number] * std::max(end.radius, least) /
-    std::max({ link.radiusBefore, end.radius, least }));
+  const double minimum = 0.3; // mm: what is thinner is not measured
+  const double grown = std::log(orphan.growth[number] * std::max(end.radius, minimum) /
+    std::max({ link.radiusBefore, end.radius, minimum }));
   const double abrupt = std::min(end.radius, link.radiusBefore);
   // What is darker than the tree's vessel there is a vein; a root has no vessel to compare with.
   const double brighter = root
@@ -898,7 +898,7 @@ VesselLink Linker::BestLink(
     const auto consider = [&](const Vector3& target, double within, const VesselEnd* tip)
     {
       VesselLink link;
-      const bool way = this->Way(orphan.piece, end, target, within, link);
+      const bool way = this->FindPath(orphan.piece, end, target, within, link);
       // Where hardly anything is seen, the cheapest way follows what is no vessel.
       VesselLink curve;
       VesselEnd facing;
@@ -947,7 +947,7 @@ VesselLink Linker::BestLink(
       consider(tip.position, 2.0 + tip.root, &tip);
     }
     // The wall of the tree ahead.
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     Vector3 wall = Vector3::Zero();
     const std::optional<std::array<int, 3>> at = this->L.Nearest(end.position);
     if (at)
@@ -963,14 +963,14 @@ VesselLink Linker::BestLink(
           const double gap = std::max(1e-6, chord.norm());
           const double angle = UnitAngle(end.outwards, chord / gap);
           const double cost = gap * (1.0 + angle * angle);
-          if ((angle < 0.9 || gap < 2.5) && cost < least)
+          if ((angle < 0.9 || gap < 2.5) && cost < minimum)
           {
-            least = cost;
+            minimum = cost;
             wall = this->L.World(place);
           }
         });
     }
-    if (std::isfinite(least))
+    if (std::isfinite(minimum))
     {
       consider(wall, 1.5, nullptr);
     }
@@ -1034,7 +1034,7 @@ std::vector<VesselLink> Linker::Run(
   for (VesselLink& link : best)
   {
     // A piece may have no way at all.
-    if (!link.voxels.empty() && link.confidence >= this->Settings.leastConfidence)
+    if (!link.voxels.empty() && link.confidence >= this->Settings.minimumConfidence)
     {
       links.push_back(std::move(link));
     }

@@ -62,7 +62,7 @@ struct LinkingImage
   const ImageInterpolator& image;
   double blood = 0.0;                            ///< image value of undiluted contrast medium
   double tissue = 0.0;                           ///< of muscle
-  double largestRadius = 4.5;                    ///< mm
+  double maximumRadius = 4.5;                    ///< mm
   std::function<float(std::int64_t)> share;      ///< of the contrast between tissue and blood
   std::function<float(std::int64_t)> tube;       ///< vesselness over that of a clear tube
   std::function<bool(std::int64_t)> couldBelong; ///< vessel-like, and free
@@ -73,9 +73,9 @@ struct LinkingImage
 
 struct LinkingSettings
 {
-  double leastPiece = 8.0;      ///< mm, length of a piece worth a link, > 0
-  double longestGap = 25.0;     ///< mm between ends that point at each other, >= 0
-  double leastConfidence = 0.5; ///< of a link, 0 to 1
+  double minimumPiece = 8.0;      ///< mm, length of a piece worth a link, > 0
+  double longestGap = 25.0;       ///< mm between ends that point at each other, >= 0
+  double minimumConfidence = 0.5; ///< of a link, 0 to 1
 };
 
 /// Finds links, round by round: what was found out of pieces that are the same a round later is kept.

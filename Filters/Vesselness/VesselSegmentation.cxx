@@ -141,7 +141,7 @@ void VoxelSegmentation<T>::FindBodies(const ProgressCallback& progress)
     },
     PartOf(progress, 0.0, 0.3));
   std::vector<unsigned char> body = OpenWithBall(blood.data(), blocks, this->L.BlockSpacing,
-    this->Settings.largestRadius, PartOf(progress, 0.3, 0.7));
+    this->Settings.maximumRadius, PartOf(progress, 0.3, 0.7));
   blood = std::vector<unsigned char>();
   // The rim of a body is bright as well, and no vessel unless it is tubular.
   for (unsigned char& b : body)
@@ -241,19 +241,19 @@ void VoxelSegmentation<T>::FindNoisyBodies(const ProgressCallback& progress)
     }
   }
   const double weakShare = 0.3 + 0.45 * this->Settings.weak;
-  const double least = weakShare - exceeded * MedianOf(std::move(noises));
-  if (least >= 0.5)
+  const double minimum = weakShare - exceeded * MedianOf(std::move(noises));
+  if (minimum >= 0.5)
   {
     return; // FindBodies() has them
   }
   std::vector<unsigned char> bright(count);
   for (std::size_t c = 0; c < count; ++c)
   {
-    bright[c] = means[c] > least ? 1 : 0;
+    bright[c] = means[c] > minimum ? 1 : 0;
   }
   // Vessels fill cells only in part: half a cell more is surely none.
   std::vector<unsigned char> body = OpenWithBall(bright.data(), cells, spacing,
-    this->Settings.largestRadius + 0.5 * spacing.maxCoeff(), PartOf(progress, 0.5, 1.0));
+    this->Settings.maximumRadius + 0.5 * spacing.maxCoeff(), PartOf(progress, 0.5, 1.0));
   for (int k = 0; k < this->L.Size[2]; ++k)
   {
     for (int j = 0; j < this->L.Size[1]; ++j)
@@ -294,7 +294,7 @@ void VoxelSegmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
           {
             this->States[p] = Body;
           }
-          else if (across < 0.75 * this->Settings.largestRadius && this->States[p] == Body)
+          else if (across < 0.75 * this->Settings.maximumRadius && this->States[p] == Body)
           {
             this->States[p] = Unknown;
           }
@@ -378,10 +378,10 @@ void VoxelSegmentation<T>::Collect(const std::vector<VesselSeed>& seeds,
       {
         continue;
       }
-      float& least = shortest.At(at[0] + n.di, at[1] + n.dj, at[2] + n.dk);
-      if (path < least)
+      float& minimum = shortest.At(at[0] + n.di, at[1] + n.dj, at[2] + n.dk);
+      if (path < minimum)
       {
-        least = path;
+        minimum = path;
         queue.push({ path, top.origin / ways * ways + static_cast<std::int32_t>(w), q });
       }
     }
@@ -394,8 +394,8 @@ template <typename T>
 void VoxelSegmentation<T>::CutLeakage()
 {
   const double thickness = std::max(1.5, 1.5 * this->L.Spacing.maxCoeff());
-  const double largestArea =
-    1.6 * 3.14159265358979 * this->Settings.largestRadius * this->Settings.largestRadius;
+  const double maximumArea =
+    1.6 * 3.14159265358979 * this->Settings.maximumRadius * this->Settings.maximumRadius;
   const SparseVoxels<std::int32_t> numbers = this->MemberNumbers();
   const auto sliceOf = [&](std::int32_t m)
   { return static_cast<int>(this->Members[m].path / thickness); };
@@ -449,9 +449,9 @@ void VoxelSegmentation<T>::CutLeakage()
   for (SlicePiece& piece : pieces)
   {
     const double area = static_cast<double>(piece.voxels) * this->L.VoxelVolume() / thickness;
-    const bool rim = area > 0.15 * largestArea && piece.tube < 0.5f * this->Tubular;
-    piece.dropped = (area > largestArea && piece.slice > 0) ||
-      (rim && thickness * piece.slice > 2.0 * this->Settings.largestRadius);
+    const bool rim = area > 0.15 * maximumArea && piece.tube < 0.5f * this->Tubular;
+    piece.dropped = (area > maximumArea && piece.slice > 0) ||
+      (rim && thickness * piece.slice > 2.0 * this->Settings.maximumRadius);
   }
   std::vector<std::pair<std::int32_t, std::int32_t>> contacts;
   for (std::size_t m = 0; m < this->Members.size(); ++m)
@@ -514,7 +514,7 @@ template <typename T>
 std::vector<VesselRoot> VoxelSegmentation<T>::HiddenRoots(
   const std::vector<VesselSeed>& seeds, double seen) const
 {
-  constexpr double least = 2.0; // mm: less has no direction, and may be the aorta's blurred wall
+  constexpr double minimum = 2.0; // mm: less has no direction, and may be the aorta's blurred wall
   std::vector<const Member*> farthest(seeds.size(), nullptr);
   for (const Member& m : this->Members)
   {
@@ -533,8 +533,8 @@ std::vector<VesselRoot> VoxelSegmentation<T>::HiddenRoots(
       continue;
     }
     const Vector3 axis = seeds[s].axis.normalized();
-    VesselRoot root{ seeds[s].position + least * axis, axis, least };
-    if (path > least)
+    VesselRoot root{ seeds[s].position + minimum * axis, axis, minimum };
+    if (path > minimum)
     {
       // The middle of its blunt end.
       Vector3 sum = Vector3::Zero();
@@ -568,7 +568,7 @@ void VoxelSegmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
   std::vector<std::int64_t> bare;
   LinkingImage image{ this->L, interpolator,
     static_cast<double>(this->Tissue + 1.0f / this->InverseContrast),
-    static_cast<double>(this->Tissue), this->Settings.largestRadius,
+    static_cast<double>(this->Tissue), this->Settings.maximumRadius,
     [this](std::int64_t p) { return this->Share(p); },
     [this](std::int64_t p) { return this->Vesselness[p] * this->InverseTubular; },
     [this, weak](std::int64_t p)
@@ -577,7 +577,7 @@ void VoxelSegmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
     { return this->States[p] == Vessel || std::find(bare.begin(), bare.end(), p) != bare.end(); },
     [this](std::int64_t p) { return this->States[p] == Body || this->States[p] == Leak; }, {} };
   LinkingSettings settings;
-  settings.leastConfidence = this->Settings.leastLinkConfidence;
+  settings.minimumConfidence = this->Settings.minimumLinkConfidence;
   settings.longestGap = this->Settings.longestGap;
   // Each round can only add; more than a handful of lesions in a row does not happen.
   constexpr int rounds = 8;
@@ -591,7 +591,7 @@ void VoxelSegmentation<T>::CrossLesions(const std::vector<VesselSeed>& seeds,
     {
       tree.emplace_back(m.voxel, m.path);
     }
-    image.roots = this->HiddenRoots(seeds, settings.leastPiece);
+    image.roots = this->HiddenRoots(seeds, settings.minimumPiece);
     bare.clear();
     for (const VesselRoot& root : image.roots)
     {
@@ -824,14 +824,14 @@ void VesselSegmentationSettings::Validate() const
   check(!this->tubular || (*this->tubular > 0.0 && std::isfinite(*this->tubular)),
     "tubular must be positive");
   check(
-    this->largestRadius >= 1.0 && this->largestRadius <= 50.0, "largestRadius must be 1 to 50 mm");
+    this->maximumRadius >= 1.0 && this->maximumRadius <= 50.0, "maximumRadius must be 1 to 50 mm");
   check(
     this->longestPath > 0.0 && std::isfinite(this->longestPath), "longestPath must be positive");
   check(this->longestGap >= 0.0 && this->longestGap <= 40.0, "longestGap must be 0 to 40 mm");
-  check(this->leastLinkConfidence >= 0.0 && this->leastLinkConfidence <= 1.0,
-    "leastLinkConfidence must be 0 to 1");
-  check(this->smallestIsland >= 0.0 && std::isfinite(this->smallestIsland),
-    "smallestIsland must not be negative");
+  check(this->minimumLinkConfidence >= 0.0 && this->minimumLinkConfidence <= 1.0,
+    "minimumLinkConfidence must be 0 to 1");
+  check(this->minimumIslandVolume >= 0.0 && std::isfinite(this->minimumIslandVolume),
+    "minimumIslandVolume must not be negative");
 }
 
 VesselSegmentationResult SegmentVessels(const ScalarImage& image, const float* vesselness,

@@ -2,7 +2,7 @@
  * @file VesselSegmentation.h
  * @brief The coronary lumen as voxels: what hangs on the ostia, cut off from aorta and chambers.
  *
- * 1. Large bodies of blood (aorta, chambers, great vessels) are what a ball of LargestRadius
+ * 1. Large bodies of blood (aorta, chambers, great vessels) are what a ball of MaximumRadius
  *    covers; they are taken out.
  * 2. Hysteresis: from the seeds on, connected voxels that look like vessel (bright as blood, or
  *    less bright but tubular) are collected, together with their path length from the seed.
@@ -45,14 +45,14 @@ struct VesselSegmentationSettings
   double strong = 0.8;           ///< likelihood of vessel that a connected piece must reach, 0 to 1
   double weak = 0.5;             ///< likelihood down to which it goes on, 0 to strong
   std::optional<double> tubular; ///< vesselness of a clear tube; not given: measured at the seeds
-  double largestRadius = 4.5;    ///< mm: what is thicker is aorta or chamber, 1 to 50
+  double maximumRadius = 4.5;    ///< mm: what is thicker is aorta or chamber, 1 to 50
   double longestPath = 400.0;    ///< mm along the vessels from the seed, > 0
-  double smallestIsland = 2.0;   ///< mm^3: smaller pieces are dropped, >= 0
-  bool fillHoles = true;         ///< fill what is enclosed by vessel
-  bool refineWall = true;        ///< step 4; else the collected voxels are the result
-  bool crossLesions = true;      ///< link pieces behind lesions to what hangs on the seeds
-  double longestGap = 25.0;      ///< mm that such a link may have, 0 to 40
-  double leastLinkConfidence = 0.5; ///< that a link must have, 0 to 1
+  double minimumIslandVolume = 2.0;   ///< mm^3: smaller pieces are dropped, >= 0
+  bool fillHoles = true;              ///< fill what is enclosed by vessel
+  bool refineWall = true;             ///< step 4; else the collected voxels are the result
+  bool crossLesions = true;           ///< link pieces behind lesions to what hangs on the seeds
+  double longestGap = 25.0;           ///< mm that such a link may have, 0 to 40
+  double minimumLinkConfidence = 0.5; ///< that a link must have, 0 to 1
 
   /// @throws std::invalid_argument that names the first setting that is out of range
   void Validate() const;

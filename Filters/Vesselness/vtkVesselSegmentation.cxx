@@ -178,12 +178,12 @@ void AddBridges(vtkPolyData* output, const std::vector<coronary::VesselLink>& li
 /// Smallest and largest scale of the vesselness that is computed here, mm.
 std::vector<double> DefaultScales(const Vector3& spacing)
 {
-  constexpr double smallest = 0.5;
-  constexpr double largest = 2.5;
+  constexpr double minimum = 0.5;
+  constexpr double maximum = 2.5;
   constexpr int count = 5;
   const double resolved = 0.5 * spacing.maxCoeff();
-  const double low = std::min(largest, std::max(smallest, resolved));
-  return coronary::VesselnessScales(low, largest, low < largest ? count : 1, false);
+  const double low = std::min(maximum, std::max(minimum, resolved));
+  return coronary::VesselnessScales(low, maximum, low < maximum ? count : 1, false);
 }
 
 /// What begins a vessel. The ostia are empty where seeds were given.
@@ -471,12 +471,12 @@ coronary::VesselSegmentationSettings vtkVesselSegmentation::MakeSettings() const
     "TubularVesselness must be 0 or more");
   settings.weak = this->WeakThreshold;
   settings.strong = this->StrongThreshold;
-  settings.largestRadius = this->LargestRadius;
+  settings.maximumRadius = this->MaximumRadius;
   settings.longestPath = this->LongestPath;
-  settings.smallestIsland = this->SmallestIsland;
+  settings.minimumIslandVolume = this->MinimumIslandVolume;
   settings.crossLesions = this->CrossLesions;
   settings.longestGap = this->LongestGap;
-  settings.leastLinkConfidence = this->LeastLinkConfidence;
+  settings.minimumLinkConfidence = this->MinimumLinkConfidence;
   if (!this->AutomaticWindow)
   {
     settings.window = coronary::BloodWindow{ this->TissueValue, this->BloodValue };
@@ -679,11 +679,11 @@ void vtkVesselSegmentation::PrintSelf(ostream& os, vtkIndent indent)
   print("WeakThreshold", this->WeakThreshold);
   print("StrongThreshold", this->StrongThreshold);
   print("TubularVesselness", this->TubularVesselness);
-  print("LargestRadius", this->LargestRadius);
+  print("MaximumRadius", this->MaximumRadius);
   print("LongestPath", this->LongestPath);
-  print("SmallestIsland", this->SmallestIsland);
+  print("MinimumIslandVolume", this->MinimumIslandVolume);
   print("CrossLesions", this->CrossLesions);
   print("LongestGap", this->LongestGap);
-  print("LeastLinkConfidence", this->LeastLinkConfidence);
+  print("MinimumLinkConfidence", this->MinimumLinkConfidence);
   print("GenerateProbability", this->GenerateProbability);
 }

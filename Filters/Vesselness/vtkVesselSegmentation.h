@@ -157,8 +157,8 @@ public:
   /**
    * Radius in mm from which on blood counts as aorta or chamber, 1 to 50. Default 4.5.
    */
-  vtkSetMacro(LargestRadius, double);
-  vtkGetMacro(LargestRadius, double);
+  vtkSetMacro(MaximumRadius, double);
+  vtkGetMacro(MaximumRadius, double);
   ///@}
 
   ///@{
@@ -173,22 +173,22 @@ public:
   /**
    * Pieces below this volume in mm^3 are dropped, 0 or more. Default 2.
    */
-  vtkSetMacro(SmallestIsland, double);
-  vtkGetMacro(SmallestIsland, double);
+  vtkSetMacro(MinimumIslandVolume, double);
+  vtkGetMacro(MinimumIslandVolume, double);
   ///@}
 
   ///@{
   /**
    * Go on behind lesions: pieces of vessel that no seed reaches are linked by their ends (default on), across at most
-   * LongestGap mm (default 25, 0 to 40), when the link has at least LeastLinkConfidence (default 0.5, 0 to 1).
+   * LongestGap mm (default 25, 0 to 40), when the link has at least MinimumLinkConfidence (default 0.5, 0 to 1).
    */
   vtkSetMacro(CrossLesions, bool);
   vtkGetMacro(CrossLesions, bool);
   vtkBooleanMacro(CrossLesions, bool);
   vtkSetMacro(LongestGap, double);
   vtkGetMacro(LongestGap, double);
-  vtkSetMacro(LeastLinkConfidence, double);
-  vtkGetMacro(LeastLinkConfidence, double);
+  vtkSetMacro(MinimumLinkConfidence, double);
+  vtkGetMacro(MinimumLinkConfidence, double);
   ///@}
 
   ///@{
@@ -238,16 +238,16 @@ private:
   bool AutomaticOstia = true;
   bool CrossLesions = true;
   double LongestGap = 25.0;
-  double LeastLinkConfidence = 0.5;
+  double MinimumLinkConfidence = 0.5;
   bool AutomaticWindow = true;
   double TissueValue = 50.0;
   double BloodValue = 400.0;
   double WeakThreshold = 0.5;
   double StrongThreshold = 0.8;
   double TubularVesselness = 0.0;
-  double LargestRadius = 4.5;
+  double MaximumRadius = 4.5;
   double LongestPath = 400.0;
-  double SmallestIsland = 2.0;
+  double MinimumIslandVolume = 2.0;
   bool GenerateProbability = false;
   std::string InputVesselnessArrayName;
 };

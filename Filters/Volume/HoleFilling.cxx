@@ -407,15 +407,15 @@ SurfacePatch TriangulateBand(const std::vector<Vector3>& first, const std::vecto
   // second one backwards.
   std::size_t a0 = 0;
   std::size_t b0 = 0;
-  double least = infinity;
+  double minimum = infinity;
   for (std::size_t i = 0; i < n; ++i)
   {
     for (std::size_t j = 0; j < m; ++j)
     {
       const double distance = (first[i] - second[j]).squaredNorm();
-      if (distance < least)
+      if (distance < minimum)
       {
-        least = distance;
+        minimum = distance;
         a0 = i;
         b0 = j;
       }

@@ -78,20 +78,20 @@ TetrahedraQuality MeasureTetrahedra(const std::vector<Vector3>& points,
     {
       ++quality.poor;
     }
-    if (n == 0 || volume < quality.leastVolume)
+    if (n == 0 || volume < quality.minimumVolume)
     {
-      quality.leastVolume = volume;
-      quality.leastVolumeAt = at;
+      quality.minimumVolume = volume;
+      quality.minimumVolumeAt = at;
     }
-    if (n == 0 || quality.minimumDihedral[n] < quality.leastDihedralAngle)
+    if (n == 0 || quality.minimumDihedral[n] < quality.minimumDihedralAngle)
     {
-      quality.leastDihedralAngle = quality.minimumDihedral[n];
-      quality.leastDihedralAngleAt = at;
+      quality.minimumDihedralAngle = quality.minimumDihedral[n];
+      quality.minimumDihedralAngleAt = at;
     }
-    if (n == 0 || quality.radiusEdgeRatio[n] > quality.greatestRadiusEdgeRatio)
+    if (n == 0 || quality.radiusEdgeRatio[n] > quality.maximumRadiusEdgeRatio)
     {
-      quality.greatestRadiusEdgeRatio = quality.radiusEdgeRatio[n];
-      quality.greatestRadiusEdgeRatioAt = at;
+      quality.maximumRadiusEdgeRatio = quality.radiusEdgeRatio[n];
+      quality.maximumRadiusEdgeRatioAt = at;
     }
   }
   return quality;
@@ -121,10 +121,10 @@ TrianglesQuality MeasureTriangles(
     {
       quality.degenerate.push_back(static_cast<std::int64_t>(n));
     }
-    if (n == 0 || angle < quality.leastAngle)
+    if (n == 0 || angle < quality.minimumAngle)
     {
-      quality.leastAngle = angle;
-      quality.leastAngleAt = static_cast<std::int64_t>(n);
+      quality.minimumAngle = angle;
+      quality.minimumAngleAt = static_cast<std::int64_t>(n);
     }
   }
   return quality;

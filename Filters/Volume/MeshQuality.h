@@ -20,13 +20,13 @@ struct TetrahedraQuality
 {
   std::vector<std::int64_t> inverted; ///< tetrahedra of volume 0 or less, ascending
   std::int64_t poor = 0;              ///< with a dihedral angle below the limit; inverted ones too
-  double leastVolume = 0.0;           ///< mm^3, negative when inverted
-  std::int64_t leastVolumeAt = -1;    ///< the tetrahedron; -1: there are none
+  double minimumVolume = 0.0;         ///< mm^3, negative when inverted
+  std::int64_t minimumVolumeAt = -1;  ///< the tetrahedron; -1: there are none
   double totalVolume = 0.0;           ///< mm^3; what is inverted counts as negative
-  double leastDihedralAngle = 0.0;    ///< radians, 0 when inverted
-  std::int64_t leastDihedralAngleAt = -1;
-  double greatestRadiusEdgeRatio = 0.0; ///< infinite when one is flat
-  std::int64_t greatestRadiusEdgeRatioAt = -1;
+  double minimumDihedralAngle = 0.0;  ///< radians, 0 when inverted
+  std::int64_t minimumDihedralAngleAt = -1;
+  double maximumRadiusEdgeRatio = 0.0; ///< infinite when one is flat
+  std::int64_t maximumRadiusEdgeRatioAt = -1;
 
   std::vector<double> volume;          ///< per tetrahedron, mm^3
   std::vector<double> minimumDihedral; ///< per tetrahedron, radians
@@ -37,9 +37,9 @@ struct TrianglesQuality
 {
   std::vector<std::int64_t> degenerate; ///< triangles without area, ascending
   double area = 0.0;                    ///< of all, mm^2
-  double enclosedVolume = 0.0;    ///< mm^3, of a closed surface; negative when it looks inwards
-  double leastAngle = 0.0;        ///< radians, 0 when degenerate
-  std::int64_t leastAngleAt = -1; ///< the triangle; -1: there are none
+  double enclosedVolume = 0.0;      ///< mm^3, of a closed surface; negative when it looks inwards
+  double minimumAngle = 0.0;        ///< radians, 0 when degenerate
+  std::int64_t minimumAngleAt = -1; ///< the triangle; -1: there are none
 };
 
 /**

@@ -197,7 +197,7 @@ public:
       return 0.0; // it has ended
     }
     const double used = static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-    if (used > this->Used + LeastWork)
+    if (used > this->Used + MinimumWork)
     {
       this->Used = used;
       this->LastWork = now;
@@ -256,7 +256,7 @@ public:
   }
 
 private:
-  static constexpr double LeastWork = 0.01; ///< s
+  static constexpr double MinimumWork = 0.01; ///< s
   static constexpr std::size_t maximumPrinted = 65536;
   static constexpr std::size_t maximumQuoted = 400;
 

@@ -4,7 +4,7 @@
 
 namespace coronary
 {
-double LeastAngle(const Vector3& a, const Vector3& b, const Vector3& c)
+double MinimumCornerAngle(const Vector3& a, const Vector3& b, const Vector3& c)
 {
   const double area = (b - a).cross(c - a).norm();
   return std::min({ std::atan2(area, (b - a).dot(c - a)), std::atan2(area, (c - b).dot(a - b)),

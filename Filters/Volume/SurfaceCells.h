@@ -17,7 +17,7 @@ struct SurfaceCell
 };
 
 /// Radians; 0 for a triangle without area.
-double LeastAngle(const Vector3& a, const Vector3& b, const Vector3& c);
+double MinimumCornerAngle(const Vector3& a, const Vector3& b, const Vector3& c);
 
 struct SurfaceCells
 {
@@ -39,7 +39,7 @@ struct SurfaceCells
   }
   double Angle(const SurfaceCell& cell) const
   {
-    return LeastAngle(
+    return MinimumCornerAngle(
       this->At(cell.corners[0]), this->At(cell.corners[1]), this->At(cell.corners[2]));
   }
 

@@ -66,7 +66,7 @@ public:
     this->CutNonManifoldEdges();
     this->Orient(true);
     this->SplitPinches(true);
-    this->DropSmallComponents(this->Settings.smallestComponent, true);
+    this->DropSmallComponents(this->Settings.minimumComponentShare, true);
     this->Step(0.1);
     this->CountIntersections();
     this->Improve(true);
@@ -79,7 +79,7 @@ public:
     this->Improve(false);
     this->Step(0.75);
     this->ResolveIntersections(0.75, 0.92);
-    this->DropSmallComponents(this->Settings.smallestComponent, true);
+    this->DropSmallComponents(this->Settings.minimumComponentShare, true);
     this->Orient(false);
     this->Finish();
     this->Step(1.0);
@@ -495,14 +495,14 @@ private:
     {
       return;
     }
-    const double least = part * *std::max_element(area.begin(), area.end());
+    const double minimum = part * *std::max_element(area.begin(), area.end());
     std::vector<char> bad(this->Surface.cells.size(), 0);
     std::vector<char> small(count, 0);
     Vector3 where = Vector3::Zero();
     std::int64_t dropped = 0;
     for (std::size_t i = 0; i < this->Surface.cells.size(); ++i)
     {
-      if (area[component[i]] < least)
+      if (area[component[i]] < minimum)
       {
         bad[i] = 1;
         if (small[component[i]] == 0)
@@ -555,13 +555,13 @@ private:
     {
       return inner;
     }
-    const std::int64_t largest = std::max_element(area.begin(), area.end()) - area.begin();
+    const std::int64_t maximum = std::max_element(area.begin(), area.end()) - area.begin();
     ParallelFor(count, 1,
       [&](std::int64_t first, std::int64_t last)
       {
         for (std::int64_t c = first; c < last; ++c)
         {
-          if (c == largest)
+          if (c == maximum)
           {
             continue;
           }
@@ -799,7 +799,7 @@ private:
   void DropInnerParts(const std::vector<SurfaceCell>& before, const std::vector<char>& touched,
     DisjointSets& zones, std::vector<char>& kinds)
   {
-    this->DropSmallComponents(1e-3 * this->Settings.smallestComponent, false);
+    this->DropSmallComponents(1e-3 * this->Settings.minimumComponentShare, false);
     std::int64_t count = 0;
     const std::vector<std::int64_t> component = this->Surface.Components(count);
     const std::vector<char> inner = this->InnerComponents(component, count, before);
@@ -952,7 +952,7 @@ private:
       result.sourcePoint.push_back(this->Surface.source[i]);
       if (this->Surface.source[i] >= 0)
       {
-        result.greatestDisplacement = std::max(result.greatestDisplacement,
+        result.maximumDisplacement = std::max(result.maximumDisplacement,
           (this->Surface.points[i] - this->InputPoints[this->Surface.source[i]]).norm());
       }
     }
@@ -995,7 +995,7 @@ void SurfaceCleaningSettings::Validate() const
 {
   Require(this->mergeTolerance >= 0.0 && this->mergeTolerance <= 0.01,
     "the merge tolerance must be between 0 and 0.01");
-  Require(this->smallestComponent >= 0.0 && this->smallestComponent <= 1.0,
+  Require(this->minimumComponentShare >= 0.0 && this->minimumComponentShare <= 1.0,
     "the smallest component must be between 0 and 1");
   Require(this->joinDistance >= 0.0 && this->joinDistance <= 10.0,
     "the join distance must be between 0 and 10");

@@ -17,7 +17,7 @@ struct SurfaceCleaningSettings
 {
   double mergeTolerance =
     1e-6; ///< points closer than this are one, parts of the diagonal, 0 to 0.01
-  double smallestComponent =
+  double minimumComponentShare =
     0.01;                    ///< a component with less area than this part of the largest one's
                              ///< is left out, 0 to 1
   double joinDistance = 1.0; ///< open ends that face each other at less than this, in their radii,
@@ -70,7 +70,7 @@ struct CleanedSurface
                         ///< largest cap is the first
   std::vector<int> component; ///< per triangle: from 0, the one with the largest area first
   std::int64_t components = 0;
-  double greatestDisplacement = 0.0; ///< of an input point that is still there, mm
+  double maximumDisplacement = 0.0; ///< of an input point that is still there, mm
   SurfaceCleaningCounts counts;
   std::vector<std::string> repairs;  ///< one sentence for each kind of repair, with the first place
   std::vector<std::string> warnings; ///< what could not be put right
@@ -78,7 +78,7 @@ struct CleanedSurface
 
 /**
  * Merges points, leaves out degenerate and doubled triangles, cuts the surface open where it is not
- * a manifold, orients it outwards, leaves out crumbs and what lies inside, joins open ends that face
+ * a manifold, orients it outwards, leaves out fragments and what lies inside, joins open ends that face
  * each other, closes holes, caps vessels' ends, takes out triangles that cut others (with what is
  * then inside) and closes what that opens, and betters the shapes of thin triangles.
  *

@@ -50,12 +50,12 @@ double Gap(const SurfaceCells& surface, const SurfaceRim& one, const SurfaceRim&
   double sum = 0.0;
   for (const std::int64_t p : one.points)
   {
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (const std::int64_t q : other.points)
     {
-      least = std::min(least, (surface.At(p) - surface.At(q)).squaredNorm());
+      minimum = std::min(minimum, (surface.At(p) - surface.At(q)).squaredNorm());
     }
-    sum += std::sqrt(least);
+    sum += std::sqrt(minimum);
   }
   return sum / static_cast<double>(one.points.size());
 }

@@ -90,14 +90,14 @@ private:
   /// The retry when a tetrahedron stayed flat: the surface beside it moves within the repair limit.
   void TryAgainWhenFlat()
   {
-    if (!this->Settings.improve || this->LeastAngle() >= flatAngle)
+    if (!this->Settings.improve || this->MinimumDihedral() >= flatAngle)
     {
       return;
     }
     const std::vector<std::int64_t> cells = this->SurfaceBesideFlat();
     if (this->Settings.repair && this->Mesh.tries == 1 && !cells.empty())
     {
-      const double before = this->LeastAngle();
+      const double before = this->MinimumDihedral();
       TetrahedralMesh first = std::move(this->Mesh);
       this->Mesh = {};
       this->Mesh.backend = first.backend;
@@ -109,7 +109,7 @@ private:
         {
           this->MakePieces();
           this->Assemble(this->RunBackend({}));
-          better = this->LeastAngle() > before;
+          better = this->MinimumDihedral() > before;
         }
       }
       catch (const MesherFailure&)
@@ -208,17 +208,17 @@ private:
 
   void SayRepaired(const std::vector<Vector3>& before)
   {
-    double greatest = 0.0;
+    double maximum = 0.0;
     for (std::size_t i = 0; i < before.size(); ++i)
     {
-      greatest = std::max(greatest, (this->Surface.points[i] - before[i]).norm());
+      maximum = std::max(maximum, (this->Surface.points[i] - before[i]).norm());
     }
-    this->Mesh.repairDisplacement = greatest;
+    this->Mesh.repairDisplacement = maximum;
     this->Mesh.warnings.push_back(
-      "the surface was repaired; no point moved farther than " + Millimetres(greatest));
+      "the surface was repaired; no point moved farther than " + Millimetres(maximum));
   }
 
-  double LeastAngle() const
+  double MinimumDihedral() const
   {
     return *std::min_element(this->Mesh.minimumDihedral.begin(), this->Mesh.minimumDihedral.end());
   }
@@ -588,7 +588,7 @@ private:
       ImprovementSettings improvement;
       improvement.wantedSine = std::sin(std::max(this->Settings.minimumDihedral, 0.1));
       const double unit = this->Settings.unitLength;
-      improvement.leastVolume = this->Settings.minimumVolume / (unit * unit * unit);
+      improvement.minimumVolume = this->Settings.minimumVolume / (unit * unit * unit);
       ParallelFor(
         static_cast<std::int64_t>(parts.size()), 1,
         [&](std::int64_t first, std::int64_t last)
@@ -811,15 +811,15 @@ private:
   void CheckVolumes() const
   {
     const TetrahedralMesh& mesh = this->Mesh;
-    const auto least = std::min_element(mesh.volume.begin(), mesh.volume.end());
+    const auto minimum = std::min_element(mesh.volume.begin(), mesh.volume.end());
     const double unit = this->Settings.unitLength;
-    if (!(*least * unit * unit * unit > this->Settings.minimumVolume))
+    if (!(*minimum * unit * unit * unit > this->Settings.minimumVolume))
     {
-      const Tetrahedron& t = mesh.tetrahedra[least - mesh.volume.begin()];
+      const Tetrahedron& t = mesh.tetrahedra[minimum - mesh.volume.begin()];
       char text[160];
       std::snprintf(text, sizeof text,
         "a tetrahedron at %s has the volume %.3g mm^3, the least allowed is %.3g",
-        Describe(mesh.points[t[0]]).c_str(), *least * unit * unit * unit,
+        Describe(mesh.points[t[0]]).c_str(), *minimum * unit * unit * unit,
         this->Settings.minimumVolume);
       throw MesherFailure(text);
     }

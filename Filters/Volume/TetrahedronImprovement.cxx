@@ -97,11 +97,11 @@ private:
   {
     const double sine =
       MinimumDihedralSine(this->Points[a], this->Points[b], this->Points[c], this->Points[d]);
-    if (this->Settings.leastVolume > 0.0 && sine > 0.0)
+    if (this->Settings.minimumVolume > 0.0 && sine > 0.0)
     {
       const double volume =
         TetrahedronVolume(this->Points[a], this->Points[b], this->Points[c], this->Points[d]);
-      return sine * std::min(1.0, volume / (2.0 * this->Settings.leastVolume));
+      return sine * std::min(1.0, volume / (2.0 * this->Settings.minimumVolume));
     }
     return sine;
   }
@@ -237,7 +237,7 @@ private:
 
   bool RemoveEdge(std::int64_t a, std::int64_t b)
   {
-    constexpr std::size_t largestRing = 10;
+    constexpr std::size_t maximumRing = 10;
     if (this->IsKept(a, b))
     {
       return false;
@@ -254,7 +254,7 @@ private:
       }
     }
     const std::size_t n = cells.size();
-    if (n < 3 || n > largestRing)
+    if (n < 3 || n > maximumRing)
     {
       return false;
     }
@@ -276,8 +276,8 @@ private:
       return false;
     }
     const double worst = this->Worst(cells);
-    std::array<std::array<double, largestRing>, largestRing> best{};
-    std::array<std::array<std::size_t, largestRing>, largestRing> choice{};
+    std::array<std::array<double, maximumRing>, maximumRing> best{};
+    std::array<std::array<std::size_t, maximumRing>, maximumRing> choice{};
     for (std::size_t length = 1; length < n; ++length)
     {
       for (std::size_t i = 0; i + length < n; ++i)
@@ -486,7 +486,7 @@ private:
   /// A new point in the first one's middle, in a cavity around all that is star-shaped from it.
   bool Insert(std::int64_t cell, const Ids& seeds)
   {
-    constexpr std::size_t largestCavity = 40;
+    constexpr std::size_t maximumCavity = 40;
     const Tetrahedron t = this->Cells[cell];
     const auto point = static_cast<std::int64_t>(this->Points.size());
     const Tetrahedron& first = this->Cells[seeds[0]];
@@ -518,7 +518,7 @@ private:
           const double quality = this->Quality(face[0], face[2], face[1], point);
           const bool good =
             quality > this->Settings.wantedSine || (quality > 2.0 * wanted && quality > 0.1);
-          if (!good && other >= 0 && cavity.size() < largestCavity)
+          if (!good && other >= 0 && cavity.size() < maximumCavity)
           {
             cavity.insert(other);
             grown = true;

@@ -17,8 +17,8 @@ struct ImprovementSettings
 {
   double wantedSine =
     0.26; ///< tetrahedra below this least sine of the dihedral angles are worked on
-  double leastVolume = 0.0; ///< smaller ones count as bad, mm^3
-  int passes = 8;           ///< at most
+  double minimumVolume = 0.0; ///< smaller ones count as bad, mm^3
+  int passes = 8;             ///< at most
 };
 
 struct ImprovementCounts

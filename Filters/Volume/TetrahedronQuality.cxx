@@ -29,7 +29,7 @@ double MinimumDihedralAngle(const Vector3& a, const Vector3& b, const Vector3& c
     return 0.0;
   }
   const std::array<Vector3, 4> normals = FaceNormals(a, b, c, d);
-  double least = M_PI;
+  double minimum = M_PI;
   for (int i = 0; i < 4; ++i)
   {
     for (int j = i + 1; j < 4; ++j)
@@ -37,10 +37,10 @@ double MinimumDihedralAngle(const Vector3& a, const Vector3& b, const Vector3& c
       // Well conditioned near 0 and 180 degrees too.
       const double angle =
         M_PI - std::atan2(normals[i].cross(normals[j]).norm(), normals[i].dot(normals[j]));
-      least = std::min(least, angle);
+      minimum = std::min(minimum, angle);
     }
   }
-  return least;
+  return minimum;
 }
 
 double RadiusEdgeRatio(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d)
@@ -71,13 +71,13 @@ double MinimumDihedralSine(const Vector3& a, const Vector3& b, const Vector3& c,
   // sine = 3 volume length / (2 area area), here with six volumes and double areas.
   const auto squaredSine = [&](const Vector3& p, const Vector3& q, int i, int j)
   { return (q - p).squaredNorm() / (squares[i] * squares[j]); };
-  const double least =
+  const double minimum =
     std::min({ squaredSine(a, b, 2, 3), squaredSine(a, c, 1, 3), squaredSine(a, d, 1, 2),
       squaredSine(b, c, 0, 3), squaredSine(b, d, 0, 2), squaredSine(c, d, 0, 1) });
-  if (!std::isfinite(least))
+  if (!std::isfinite(minimum))
   {
     return 0.0;
   }
-  return volume * std::sqrt(least);
+  return volume * std::sqrt(minimum);
 }
 }

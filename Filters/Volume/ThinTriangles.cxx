@@ -121,7 +121,7 @@ private:
     const Vector3 old = AreaVector(
       this->Surface.At(before[0]), this->Surface.At(before[1]), this->Surface.At(before[2]));
     const Vector3 now = AreaVector(after[0], after[1], after[2]);
-    const double angle = LeastAngle(
+    const double angle = MinimumCornerAngle(
       this->Surface.At(before[0]), this->Surface.At(before[1]), this->Surface.At(before[2]));
     const Vector3& reference = angle > 0.035 ? old : mean;
     return now.dot(reference) > most * now.norm() * reference.norm();
@@ -183,7 +183,10 @@ private:
     const Triangle first{ a, q, p };
     const Triangle second{ q, b, p };
     const auto angle = [&](const Triangle& x)
-    { return LeastAngle(this->Surface.At(x[0]), this->Surface.At(x[1]), this->Surface.At(x[2])); };
+    {
+      return MinimumCornerAngle(
+        this->Surface.At(x[0]), this->Surface.At(x[1]), this->Surface.At(x[2]));
+    };
     const double before = std::min(angle(t), angle(u));
     if (!(std::min(angle(first), angle(second)) > before + 1e-6))
     {
@@ -275,7 +278,7 @@ private:
       {
         return false;
       }
-      after = std::min(after, LeastAngle(moved[0], moved[1], moved[2]));
+      after = std::min(after, MinimumCornerAngle(moved[0], moved[1], moved[2]));
       distance = std::min(distance,
         (ClosestPointOfTriangle(this->Surface.At(from), moved[0], moved[1], moved[2]) -
           this->Surface.At(from))
@@ -353,7 +356,7 @@ private:
           moved[i] = t[i] == point ? next : this->Surface.At(t[i]);
         }
         right = right && this->Keeps(t, moved, mean, 0.9);
-        after = std::min(after, LeastAngle(moved[0], moved[1], moved[2]));
+        after = std::min(after, MinimumCornerAngle(moved[0], moved[1], moved[2]));
       }
       if (right && after > before + 1e-6 && distance < deviation * this->MeanEdge(fans, point))
       {

@@ -99,8 +99,8 @@ void WriteSummary(vtkFieldData* field, const CleanedSurface& surface)
   };
   sentences(vtkCoronaryArrayNames::Repairs, surface.repairs);
   sentences(vtkCoronaryArrayNames::Warnings, surface.warnings);
-  vtkCoronary::AddArray<vtkDoubleArray>(field, vtkCoronaryArrayNames::GreatestDisplacement,
-    std::vector<double>{ surface.greatestDisplacement });
+  vtkCoronary::AddArray<vtkDoubleArray>(field, vtkCoronaryArrayNames::MaximumDisplacement,
+    std::vector<double>{ surface.maximumDisplacement });
   using Counts = SurfaceCleaningCounts;
   for (const auto& [name, member] :
     std::initializer_list<std::pair<const char*, std::int64_t Counts::*>>{
@@ -155,7 +155,7 @@ int vtkSurfaceCleaner::RequestData(
   try
   {
     coronary::SurfaceCleaningSettings settings;
-    settings.smallestComponent = this->SmallestComponent;
+    settings.minimumComponentShare = this->MinimumComponentShare;
     settings.joinDistance = this->JoinDistance;
     settings.fillHoles = this->FillHoles;
     settings.capEnds = this->CapEnds;
@@ -227,7 +227,7 @@ int vtkSurfaceCleaner::RequestData(
 void vtkSurfaceCleaner::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "SmallestComponent: " << this->SmallestComponent << "\n";
+  os << indent << "MinimumComponentShare: " << this->MinimumComponentShare << "\n";
   os << indent << "JoinDistance: " << this->JoinDistance << "\n";
   os << indent << "FillHoles: " << this->FillHoles << "\n";
   os << indent << "CapEnds: " << this->CapEnds << "\n";

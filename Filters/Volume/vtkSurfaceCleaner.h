@@ -19,7 +19,7 @@
  *   follow after the input's greatest, the largest cap first), `RegionIds` (int, component, from 0,
  *   the largest first);
  * - field data `Repairs` (string, a sentence for each kind of repair, with the first place),
- *   `Warnings` (string, what could not be put right), `GreatestDisplacement` (double, mm, of a point
+ *   `Warnings` (string, what could not be put right), `MaximumDisplacement` (double, mm, of a point
  *   of the input that is still there), and counts (vtkIdType, 1 value): `MergedPoints`,
  *   `DegenerateTriangles`, `DuplicateTriangles`, `NonManifoldEdges`, `NonManifoldPoints`,
  *   `TurnedTriangles`, `SmallComponents`, `InnerComponents`, `SelfIntersections`, `JoinedEnds`,
@@ -59,8 +59,8 @@ public:
    * A component with less than this part of the largest one's area is left out, 0 to 1. Default
    * 0.01.
    */
-  vtkSetMacro(SmallestComponent, double);
-  vtkGetMacro(SmallestComponent, double);
+  vtkSetMacro(MinimumComponentShare, double);
+  vtkGetMacro(MinimumComponentShare, double);
   ///@}
 
   ///@{
@@ -131,7 +131,7 @@ private:
   vtkSurfaceCleaner(const vtkSurfaceCleaner&) = delete;
   void operator=(const vtkSurfaceCleaner&) = delete;
 
-  double SmallestComponent = 0.01;
+  double MinimumComponentShare = 0.01;
   double JoinDistance = 1.0;
   bool FillHoles = true;
   bool CapEnds = true;

@@ -68,17 +68,17 @@ void WriteSummary(vtkFieldData* field, const TetrahedralMesh& mesh)
     field, vtkCoronaryArrayNames::Tries, std::vector<int>{ mesh.tries });
   number(vtkCoronaryArrayNames::RepairDisplacement, mesh.repairDisplacement);
   const double poor = vtkMath::RadiansFromDegrees(15.0);
-  number(vtkCoronaryArrayNames::LeastDihedralAngle,
+  number(vtkCoronaryArrayNames::MeshMinimumDihedralAngle,
     *std::min_element(mesh.minimumDihedral.begin(), mesh.minimumDihedral.end()));
   number(vtkCoronaryArrayNames::PoorFraction,
     static_cast<double>(std::count_if(mesh.minimumDihedral.begin(), mesh.minimumDihedral.end(),
       [poor](double angle) { return angle < poor; })) /
       static_cast<double>(mesh.minimumDihedral.size()));
-  number(
-    vtkCoronaryArrayNames::LeastVolume, *std::min_element(mesh.volume.begin(), mesh.volume.end()));
+  number(vtkCoronaryArrayNames::MeshMinimumVolume,
+    *std::min_element(mesh.volume.begin(), mesh.volume.end()));
   number(vtkCoronaryArrayNames::TotalVolume,
     std::accumulate(mesh.volume.begin(), mesh.volume.end(), 0.0));
-  number(vtkCoronaryArrayNames::GreatestRadiusEdgeRatio,
+  number(vtkCoronaryArrayNames::MeshMaximumRadiusEdgeRatio,
     *std::max_element(mesh.radiusEdgeRatio.begin(), mesh.radiusEdgeRatio.end()));
   vtkNew<vtkStringArray> warnings;
   warnings->SetName(vtkCoronaryArrayNames::Warnings);

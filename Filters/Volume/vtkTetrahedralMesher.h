@@ -18,9 +18,9 @@
  *   -1 elsewhere). Cell data `RegionIds` (int, number of the component, from 0 in the order of the
  *   surface's cells), `CellEntityIds` (int, 0), `TetrahedronVolume` (double, mm^3),
  *   `MinimumDihedralAngle` (double, radians), `RadiusEdgeRatio` (double). Field data, the summary:
- *   `Backend` (string), `Tries` (int), `RepairDisplacement` (double, mm), `LeastDihedralAngle`
- *   (double, radians), `PoorFraction` (double: share of tetrahedra below 15 degrees), `LeastVolume`,
- *   `TotalVolume` (double, mm^3), `GreatestRadiusEdgeRatio` (double), `Warnings` (string).
+ *   `Backend` (string), `Tries` (int), `RepairDisplacement` (double, mm), `MeshMinimumDihedralAngle`
+ *   (double, radians), `PoorFraction` (double: share of tetrahedra below 15 degrees), `MeshMinimumVolume`,
+ *   `TotalVolume` (double, mm^3), `MeshMaximumRadiusEdgeRatio` (double), `Warnings` (string).
  * - 1, vtkPolyData: the boundary, on the same points. Cell data of the input's surface, with
  *   `CellEntityIds`, and `SurfaceCellId`, `TetrahedronId` (vtkIdType); point data as of port 0.
  * - 2, vtkPolyData: the mesh's edges along the skeleton, on the same points. Cell data

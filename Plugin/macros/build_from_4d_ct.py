@@ -60,7 +60,7 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
         AutomaticC=int(not c > 0.0), C=c if c > 0.0 else 1.0))
     segmentation = simple.VesselSegmentation(
         reference, registrationName="3 Segmentation and ostia", Vesselness=vesselness,
-        SeedPoints=list(seed), LargestRadius=largest_radius)
+        SeedPoints=list(seed), MaximumRadius=largest_radius)
     if window:
         segmentation.AutomaticWindow = 0
         segmentation.TissueValue, segmentation.BloodValue = window

@@ -28,17 +28,17 @@ void SessionStatistics::Add(const TickReport& report)
   this->TicksWithContact += report.contacts > 0 ? 1 : 0;
   this->Contacts += static_cast<std::uint64_t>(std::max(0, report.contacts));
   this->MostContacts = std::max(this->MostContacts, report.contacts);
-  this->LargestPenetration_ = std::max(this->LargestPenetration_, report.largestPenetration);
+  this->MaximumPenetration_ = std::max(this->MaximumPenetration_, report.maximumPenetration);
   this->SumOfPenetrations += report.meanPenetration * std::max(0, report.contacts);
-  this->LargestGap = std::max(this->LargestGap, report.jointGap);
+  this->MaximumGap = std::max(this->MaximumGap, report.jointGap);
   this->Outside += static_cast<std::uint64_t>(std::max(0, report.outside));
-  this->LargestProximalForce = std::max(this->LargestProximalForce, std::abs(report.proximalForce));
-  this->LargestProximalTorque =
-    std::max(this->LargestProximalTorque, std::abs(report.proximalTorque));
-  this->LargestTipForce = std::max(this->LargestTipForce, report.tipForce);
-  this->LargestContactForce = std::max(this->LargestContactForce, report.greatestForce);
+  this->MaximumProximalForce = std::max(this->MaximumProximalForce, std::abs(report.proximalForce));
+  this->MaximumProximalTorque =
+    std::max(this->MaximumProximalTorque, std::abs(report.proximalTorque));
+  this->MaximumTipForce = std::max(this->MaximumTipForce, report.tipForce);
+  this->MaximumContactForce = std::max(this->MaximumContactForce, report.maximumForce);
   this->SumOfTipForces += report.tipForce;
-  this->LargestInserted = std::max(this->LargestInserted, report.inserted);
+  this->MaximumInserted = std::max(this->MaximumInserted, report.inserted);
   this->Last = report;
   if (report.branch >= 0)
   {
@@ -92,20 +92,20 @@ nlohmann::json SessionStatistics::ToJson() const
   }
   return { { "ticks", this->Count },
     { "penetration",
-      { { "largest_mm", this->LargestPenetration_ },
+      { { "largest_mm", this->MaximumPenetration_ },
         { "mean_of_contacts_mm", mean(this->SumOfPenetrations, this->Contacts) } } },
-    { "largest_joint_gap_mm", this->LargestGap },
+    { "largest_joint_gap_mm", this->MaximumGap },
     { "contacts",
       { { "mean", mean(static_cast<double>(this->Contacts), this->Count) },
         { "most", this->MostContacts }, { "ticks_with_contact", this->TicksWithContact } } },
     { "samples_put_back_into_the_lumen", this->Outside },
     { "forces",
-      { { "largest_proximal_N", this->LargestProximalForce },
-        { "largest_proximal_N_mm", this->LargestProximalTorque },
-        { "largest_tip_N", this->LargestTipForce },
+      { { "largest_proximal_N", this->MaximumProximalForce },
+        { "largest_proximal_N_mm", this->MaximumProximalTorque },
+        { "largest_tip_N", this->MaximumTipForce },
         { "mean_tip_N", mean(this->SumOfTipForces, this->Count) },
-        { "largest_contact_N", this->LargestContactForce } } },
-    { "inserted", { { "largest_mm", this->LargestInserted }, { "last_mm", this->Last.inserted } } },
+        { "largest_contact_N", this->MaximumContactForce } } },
+    { "inserted", { { "largest_mm", this->MaximumInserted }, { "last_mm", this->Last.inserted } } },
     { "branches", branches }, { "messages", said }, { "number_of_messages", this->MessageCount } };
 }
 }

@@ -26,7 +26,7 @@ public:
 
   std::uint64_t Ticks() const { return this->Count; }
   std::uint64_t Messages() const { return this->MessageCount; }
-  double LargestPenetration() const { return this->LargestPenetration_; }
+  double MaximumPenetration() const { return this->MaximumPenetration_; }
   std::vector<std::string> Branches() const; ///< in the order in which they were reached
 
   nlohmann::json ToJson() const;
@@ -51,16 +51,16 @@ private:
   std::uint64_t TicksWithContact = 0;
   std::uint64_t Contacts = 0;
   int MostContacts = 0;
-  double LargestPenetration_ = 0.0;
+  double MaximumPenetration_ = 0.0;
   double SumOfPenetrations = 0.0; ///< of the samples that touch
-  double LargestGap = 0.0;
+  double MaximumGap = 0.0;
   std::uint64_t Outside = 0;
-  double LargestProximalForce = 0.0;
-  double LargestProximalTorque = 0.0;
-  double LargestTipForce = 0.0;
-  double LargestContactForce = 0.0;
+  double MaximumProximalForce = 0.0;
+  double MaximumProximalTorque = 0.0;
+  double MaximumTipForce = 0.0;
+  double MaximumContactForce = 0.0;
   double SumOfTipForces = 0.0;
-  double LargestInserted = 0.0;
+  double MaximumInserted = 0.0;
   TickReport Last;
   std::vector<Visit> Visits;
   std::vector<Said> List;

@@ -153,8 +153,8 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
     { "fluoroscopy_s", metrics.fluoroscopySeconds }, { "cine_s", metrics.cineSeconds },
     { "frames", metrics.frames }, { "air_kerma_mGy", metrics.airKerma },
     { "dose_area_Gy_cm2", metrics.doseAreaProduct }, { "contrast_mL", metrics.contrast },
-    { "greatest_wall_force_N", metrics.greatestWallForce },
-    { "greatest_tip_force_N", metrics.greatestTipForce },
+    { "greatest_wall_force_N", metrics.maximumWallForce },
+    { "greatest_tip_force_N", metrics.maximumTipForce },
     { "forceful_tip_s", metrics.forcefulSeconds }, { "wire_travel_mm", metrics.wireTravel },
     { "wire_turning_rad", metrics.wireTurning }, { "deepest_mm", metrics.deepest },
     { "path", branches } };
@@ -210,8 +210,8 @@ public:
     std::snprintf(text, sizeof(text),
       "%llu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%.9g,%.9g,%.9g,%d,%s\n",
       static_cast<unsigned long long>(this->Tick), seconds, report.phase, report.inserted,
-      report.proximalForce, report.proximalTorque, report.tipForce, report.greatestForce,
-      report.contacts, report.largestPenetration, report.meanPenetration, report.jointGap,
+      report.proximalForce, report.proximalTorque, report.tipForce, report.maximumForce,
+      report.contacts, report.maximumPenetration, report.meanPenetration, report.jointGap,
       report.outside, named ? topology.groupName[branch].c_str() : "");
     this->Forces += text;
     const ContrastBalance medium = session.Contrast().Balance();
@@ -471,7 +471,7 @@ public:
     std::printf(
       "%s: %llu ticks, %.3g s; greatest penetration %.3g mm; %llu messages; branches: %s\n",
       this->World.scenario.name.c_str(), static_cast<unsigned long long>(this->Tick),
-      static_cast<double>(this->Tick) / this->Rate, this->Statistics.LargestPenetration(),
+      static_cast<double>(this->Tick) / this->Rate, this->Statistics.MaximumPenetration(),
       static_cast<unsigned long long>(this->Statistics.Messages()),
       branches.empty() ? "none" : branches.c_str());
     const SessionMetrics& metrics = this->Session.Metrics();
@@ -706,7 +706,7 @@ void DumpRecording(const std::string& path)
         json["proximal_N"] = item.forces.proximalForce;
         json["proximal_N_mm"] = item.forces.proximalTorque;
         json["tip_N"] = item.forces.tipForce;
-        json["greatest_N"] = item.forces.greatestForce;
+        json["greatest_N"] = item.forces.maximumForce;
         break;
       case RecordType::Event:
         json["type"] = "event";

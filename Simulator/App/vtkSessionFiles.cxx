@@ -95,7 +95,7 @@ void WriteInstruments(const std::string& path, const Intervention& intervention,
   AddField(data, "ProximalForce", report.proximalForce);
   AddField(data, "ProximalTorque", report.proximalTorque);
   AddField(data, "TipForce", report.tipForce);
-  AddField(data, "GreatestForce", report.greatestForce);
+  AddField(data, "MaximumForce", report.maximumForce);
   WritePolyData(path, data, messages);
 }
 

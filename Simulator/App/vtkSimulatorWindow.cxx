@@ -511,7 +511,7 @@ void SessionWindow::ShowNumbers(const SessionSnapshot& now)
       .arg(QChar(0x00B2))
       .arg(metrics.frames)
       .arg(metrics.contrast, 0, 'f', 1)
-      .arg(metrics.greatestWallForce, 0, 'f', 2) +
+      .arg(metrics.maximumWallForce, 0, 'f', 2) +
     QString("Wire moved  %1 mm, turned %2, deepest %3 mm\nPath  %4")
       .arg(metrics.wireTravel, 0, 'f', 0)
       .arg(QString::number(metrics.wireTurning / (2.0 * M_PI), 'f', 1) + " turns")

@@ -11,9 +11,9 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-constexpr double DepressedFlow = 0.45;   // of the flow before
-constexpr double DepressionTime = 1.9;   // s, of each of two filters
-constexpr double SmallestVolume = 1e-15; // of a slab without length, mL
+constexpr double DepressedFlow = 0.45;  // of the flow before
+constexpr double DepressionTime = 1.9;  // s, of each of two filters
+constexpr double MinimumVolume = 1e-15; // of a slab without length, mL
 constexpr std::size_t CellsOfSlab =
   4; // in the mean; the more, the fewer cells have the end of a slab in them
 
@@ -124,7 +124,7 @@ void ContrastModel::MakeSmoothing()
 /// Slabs without volume take their neighbours' fraction.
 double ContrastModel::SlabVolume(std::size_t slab) const
 {
-  return std::max(this->Slabs_[slab].volume, SmallestVolume);
+  return std::max(this->Slabs_[slab].volume, MinimumVolume);
 }
 
 void ContrastModel::Step(

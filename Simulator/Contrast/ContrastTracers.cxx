@@ -112,11 +112,11 @@ double Inside(const Place& place)
 /// Keeps a tracer off the wall itself, where nothing moves.
 void KeepInside(float& x, float& y)
 {
-  constexpr float largest = 0.9999F;
+  constexpr float maximum = 0.9999F;
   const float square = x * x + y * y;
-  if (square > largest * largest)
+  if (square > maximum * maximum)
   {
-    const float scale = largest / std::sqrt(square);
+    const float scale = maximum / std::sqrt(square);
     x *= scale;
     y *= scale;
   }
@@ -266,7 +266,7 @@ void ContrastTracers::PrepareMotion(double dt, const TracerFlow& flow)
   this->Dt = dt;
   for (std::size_t s = 0; s < this->Segments.size(); ++s)
   {
-    const Stretch& segment = this->Segments[s];
+    const TracerSegment& segment = this->Segments[s];
     const bool here = static_cast<int>(s) == flow.injector.segment;
     this->FlowBottom[s] = (*flow.flow)[s];
     this->FlowTop[s] = here ? flow.flowAbove : this->FlowBottom[s];
@@ -476,7 +476,7 @@ bool ContrastTracers::Cross(Crossing& crossing)
 bool ContrastTracers::Reach(Crossing& crossing) const
 {
   Tracer& tracer = crossing.tracer;
-  const Stretch& segment = this->Segments[tracer.segment];
+  const TracerSegment& segment = this->Segments[tracer.segment];
   const bool atBeginning = tracer.lumen < 0.0;
   if (!atBeginning && tracer.lumen <= segment.volume)
   {
@@ -503,7 +503,7 @@ bool ContrastTracers::Enter(Crossing& crossing)
   const int node = crossing.node;
   if (tracer.segment >= 0)
   {
-    const Stretch& segment = this->Segments[tracer.segment];
+    const TracerSegment& segment = this->Segments[tracer.segment];
     const double way = crossing.left * Inside(tracer); // mL of lumen for each mL/s
     tracer.lumen = segment.above == node ? way * this->FlowTop[tracer.segment]
                                          : segment.volume + way * this->FlowBottom[tracer.segment];

@@ -102,7 +102,7 @@ private:
     double left = 0.0;      ///< twice the time left, s
     std::int64_t place = 0; ///< in the arrays
   };
-  struct Stretch
+  struct TracerSegment
   {
     int above;     ///< node
     int below;     ///< node
@@ -150,7 +150,7 @@ private:
   std::uint64_t Steps = 0;
   std::uint64_t Emitted = 0;
   double TracerVolume; ///< mL, now
-  std::vector<Stretch> Segments;
+  std::vector<TracerSegment> Segments;
   std::vector<Junction> Junctions;
   std::vector<TracerMotion> Motions;
   std::vector<float> AxialSteps;  ///< half width of a step along the segment, of its volume

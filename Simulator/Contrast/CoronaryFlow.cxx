@@ -65,19 +65,19 @@ const CoronaryFlowSettings& Checked(const CoronaryFlowSettings& settings)
   return settings;
 }
 
-double GreatestRadius(const std::vector<double>& abscissa, const std::vector<double>& radius,
+double MaximumRadius(const std::vector<double>& abscissa, const std::vector<double>& radius,
   std::size_t k, double from, double to)
 {
-  double greatest = radius[k];
+  double maximum = radius[k];
   for (std::size_t i = k; i > 0 && abscissa[i - 1] >= from; --i)
   {
-    greatest = std::max(greatest, radius[i - 1]);
+    maximum = std::max(maximum, radius[i - 1]);
   }
   for (std::size_t i = k + 1; i < abscissa.size() && abscissa[i] <= to; ++i)
   {
-    greatest = std::max(greatest, radius[i]);
+    maximum = std::max(maximum, radius[i]);
   }
-  return greatest;
+  return maximum;
 }
 }
 
@@ -235,8 +235,8 @@ void CoronaryFlow::FindStenoses()
     };
     for (std::size_t k = 0; k < s.size(); ++k)
     {
-      const double reference = std::min(GreatestRadius(s, radius, k, s[k] - near, s[k]),
-        GreatestRadius(s, radius, k, s[k], s[k] + near));
+      const double reference = std::min(MaximumRadius(s, radius, k, s[k] - near, s[k]),
+        MaximumRadius(s, radius, k, s[k], s[k] + near));
       if (radius[k] >= (1.0 - this->Settings_.stenosisThreshold) * reference)
       {
         close();

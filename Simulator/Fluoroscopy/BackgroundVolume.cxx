@@ -14,11 +14,11 @@ namespace coronary
 {
 namespace
 {
-constexpr int LeastVoxels = 16;      ///< along each axis
-constexpr double LeastLength = 50.0; ///< mm
-constexpr double MostSpacing = 10.0; ///< mm
-constexpr double LeastTissue = 0.02; ///< share of voxels between -200 and 300 HU
-constexpr double LeastAir =
+constexpr int MinimumVoxels = 16;      ///< along each axis
+constexpr double MinimumLength = 50.0; ///< mm
+constexpr double MostSpacing = 10.0;   ///< mm
+constexpr double MinimumTissue = 0.02; ///< share of voxels between -200 and 300 HU
+constexpr double MinimumAir =
   0.005; ///< share of voxels below -500 HU: lungs or what is around the patient
 constexpr double MostOutside = 0.02; ///< share of voxels above 4000, which no scanner's HU are
 
@@ -71,7 +71,7 @@ void RequireCt(const VolumeInfo& info, const std::string& path)
   for (std::size_t axis = 0; axis < 3; ++axis)
   {
     const double spacing = info.grid.spacing[static_cast<Eigen::Index>(axis)];
-    if (size[axis] < LeastVoxels || static_cast<double>(size[axis]) * spacing < LeastLength)
+    if (size[axis] < MinimumVoxels || static_cast<double>(size[axis]) * spacing < MinimumLength)
     {
       Refuse(path,
         "it has " + std::to_string(size[axis]) + " voxels of " + std::to_string(spacing) +
@@ -108,7 +108,7 @@ public:
     this->Air += value < -500.0F ? 1 : 0;
     this->Tissue += value > -200.0F && value < 300.0F ? 1 : 0;
     this->Beyond += value > 4000.0F ? 1 : 0;
-    this->Least = std::min(this->Least, value);
+    this->Minimum = std::min(this->Minimum, value);
     this->Most = std::max(this->Most, value);
   }
 
@@ -118,14 +118,14 @@ public:
     {
       Refuse(path, std::to_string(this->Unnumbered) + " of its values are no numbers");
     }
-    const std::string range = "its values, " + std::to_string(std::lround(this->Least)) + " to " +
+    const std::string range = "its values, " + std::to_string(std::lround(this->Minimum)) + " to " +
       std::to_string(std::lround(this->Most)) + ", are no Hounsfield units: ";
-    if (this->Share(this->Air) < LeastAir)
+    if (this->Share(this->Air) < MinimumAir)
     {
       Refuse(
         path, range + Percent(this->Share(this->Air)) + " are those of air or lung, below -500");
     }
-    if (this->Share(this->Tissue) < LeastTissue)
+    if (this->Share(this->Tissue) < MinimumTissue)
     {
       Refuse(path,
         range + Percent(this->Share(this->Tissue)) + " are those of soft tissue, -200 to 300");
@@ -147,7 +147,7 @@ private:
   std::int64_t Air = 0;
   std::int64_t Tissue = 0;
   std::int64_t Beyond = 0;
-  float Least = std::numeric_limits<float>::infinity();
+  float Minimum = std::numeric_limits<float>::infinity();
   float Most = -std::numeric_limits<float>::infinity();
 };
 

@@ -103,7 +103,7 @@ public:
   }
 
 private:
-  static constexpr int RowCount = static_cast<int>(LargestTabledMean * PoissonTablesPerUnit);
+  static constexpr int RowCount = static_cast<int>(MaximumTabledMean * PoissonTablesPerUnit);
   static constexpr int SlotCount = 128; ///< numbers from 0 to 127: 128 photons of 32 never come
 
   /// Probabilities of a mean, times SlotCount.

@@ -9,7 +9,7 @@ namespace coronary
 namespace
 {
 /// Air noise of a CT can make a line integral a little negative; more is taken as this.
-constexpr float LeastIntegral = -1.0F;
+constexpr float MinimumIntegral = -1.0F;
 
 template <typename Sum>
 void TransmitRow(
@@ -20,7 +20,7 @@ void TransmitRow(
     const float integral = sum(i);
     // What is no number passes nothing.
     const float x =
-      integral >= LeastIntegral ? -integral : (integral < 0.0F ? -LeastIntegral : -87.0F);
+      integral >= MinimumIntegral ? -integral : (integral < 0.0F ? -MinimumIntegral : -87.0F);
     result[i] = fastmath::Exp(x) * (columnShutter[i] * rowShutter);
   }
 }
@@ -80,7 +80,7 @@ void Photons(const float* mean, const std::uint64_t* bits, int width, std::int32
   for (int i = 0; i < width; ++i)
   {
     const float positive = mean[i] > 0.0F ? mean[i] : 0.0F;
-    const bool tabled = positive < LargestTabledMean;
+    const bool tabled = positive < MaximumTabledMean;
     const float limited = tabled ? positive : 0.0F;
     const auto row = static_cast<std::int32_t>(limited * PoissonTablesPerUnit);
     const float rest = limited - static_cast<float>(row) / PoissonTablesPerUnit;
@@ -178,11 +178,11 @@ void Lag(const float* fresh, float lag, int width, float* held)
 }
 
 void Logarithm(
-  const float* signal, float least, float unattenuated, std::int64_t count, float* result)
+  const float* signal, float minimum, float unattenuated, std::int64_t count, float* result)
 {
   for (std::int64_t i = 0; i < count; ++i)
   {
-    result[i] = fastmath::Log(signal[i] > least ? signal[i] : least) - unattenuated;
+    result[i] = fastmath::Log(signal[i] > minimum ? signal[i] : minimum) - unattenuated;
   }
 }
 

@@ -9,8 +9,8 @@ namespace coronary
 template <typename Kernels>
 class KernelChoice;
 
-/// Tables of Poisson's distribution: for means 0, 1 / PoissonTablesPerUnit, ... below LargestTabledMean.
-constexpr float LargestTabledMean = 32.0F;
+/// Tables of Poisson's distribution: for means 0, 1 / PoissonTablesPerUnit, ... below MaximumTabledMean.
+constexpr float MaximumTabledMean = 32.0F;
 constexpr float PoissonTablesPerUnit = 4.0F;
 
 struct DetectorKernels
@@ -21,7 +21,7 @@ struct DetectorKernels
   /// result = direct * transmission + veiled * veil
   void (*mix)(const float* transmission, const float* veil, float direct, float veiled, int width,
     float* result);
-  /// What Poisson numbers need beside table look-ups. Below LargestTabledMean: which table, and a Poisson number of
+  /// What Poisson numbers need beside table look-ups. Below MaximumTabledMean: which table, and a Poisson number of
   /// what the mean is above the table's, from the lower 32 bits. From there on: the standard deviation, table -1.
   void (*photons)(const float* mean, const std::uint64_t* bits, int width, std::int32_t* table,
     float* fewOrDeviation);
@@ -36,7 +36,7 @@ struct DetectorKernels
   void (*lag)(const float* fresh, float lag, int width, float* held);
   /// result = ln(max(signal, least)) - unattenuated
   void (*logarithm)(
-    const float* signal, float least, float unattenuated, std::int64_t count, float* result);
+    const float* signal, float minimum, float unattenuated, std::int64_t count, float* result);
   /// grey = scale * value + offset, rounded and limited to 0 .. 255
   void (*grey)(
     const float* values, float scale, float offset, std::int64_t count, std::uint8_t* grey);

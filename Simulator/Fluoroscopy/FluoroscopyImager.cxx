@@ -15,7 +15,7 @@ namespace
 {
 constexpr RequireOf RequireSetting{ "images" };
 
-constexpr float LeastSignal = 0.25F; ///< photons: what is shown as the darkest
+constexpr float MinimumSignal = 0.25F; ///< photons: what is shown as the darkest
 constexpr double HarmonisedWidths =
   12.0; ///< standard deviations of what is broad, in an image's width
 constexpr float RoadmapSmoothing = 0.3F; ///< weight of a new frame in the gathered vessels
@@ -111,7 +111,7 @@ const GreyImage& FluoroscopyImager::Expose(const LineIntegrals& background,
   const std::vector<float>& signal = this->Detector_.Expose(background, &instruments, &contrast,
     exposure.photons, static_cast<std::uint64_t>(exposure.frame), lag);
   this->FitTo(background.columns, background.rows);
-  DetectorKernelChoice().Get().logarithm(signal.data(), LeastSignal,
+  DetectorKernelChoice().Get().logarithm(signal.data(), MinimumSignal,
     std::log(static_cast<float>(exposure.photons)), static_cast<std::int64_t>(signal.size()),
     this->LogSignal.data());
   this->FollowBrightness(background, exposure);

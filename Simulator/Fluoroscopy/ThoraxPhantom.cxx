@@ -245,8 +245,8 @@ private:
     const Vector3 margin = Vector3::Constant(this->Spacing);
     const Vector3 low = (box.low - margin - this->Volume.grid.origin) / this->Spacing;
     const Vector3 high = (box.high + margin - this->Volume.grid.origin) / this->Spacing;
-    const auto first = [](double value, int least)
-    { return std::max(least, static_cast<int>(std::floor(std::max(value, -1e6)))); };
+    const auto first = [](double value, int minimum)
+    { return std::max(minimum, static_cast<int>(std::floor(std::max(value, -1e6)))); };
     const auto last = [](double value, int most)
     { return std::min(most, static_cast<int>(std::ceil(std::min(value, 1e6)))); };
     return { first(low.x(), 0), last(high.x(), slab.columns - 1), first(low.y(), 0),

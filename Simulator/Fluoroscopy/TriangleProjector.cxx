@@ -14,7 +14,7 @@ namespace coronary
 namespace
 {
 constexpr const char* What = "surface";
-constexpr double LeastDepth = 10.0; // mm from the source
+constexpr double MinimumDepth = 10.0; // mm from the source
 
 void CheckClosed(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
 {
@@ -103,7 +103,7 @@ public:
       nearest = std::min(nearest, this->Seen.back().z());
       farthest = std::max(farthest, this->Seen.back().z());
     }
-    RequireWithin(What, "its distance from the source", nearest, LeastDepth, 1e7);
+    RequireWithin(What, "its distance from the source", nearest, MinimumDepth, 1e7);
     this->Reference = 0.5 * (nearest + farthest) / geometry.Pose().sourceToDetector;
   }
 

@@ -14,10 +14,10 @@ namespace coronary
 namespace
 {
 // Nearer to the source than this is nothing.
-constexpr double LeastDepth = 10.0;  // mm
-constexpr double LeastRadius = 1e-4; // mm
+constexpr double MinimumDepth = 10.0;  // mm
+constexpr double MinimumRadius = 1e-4; // mm
 // A sharper bend than 120 degrees is cut straight at both its sides.
-constexpr double LeastCosine = 0.5;
+constexpr double MinimumCosine = 0.5;
 
 /// The rays of an image.
 struct Beam
@@ -65,7 +65,7 @@ std::vector<Part> PartsOf(
     Part& after = parts[k];
     const Vector3 sum = before.axis + after.axis;
     const double cosine = 0.5 * sum.norm(); // of half the bend
-    if (cosine > LeastCosine)
+    if (cosine > MinimumCosine)
     {
       before.cut[1] = after.cut[0] = sum / (2.0 * cosine * cosine);
     }
@@ -90,7 +90,7 @@ void CrossPlanes(const Vector3& v, const Vector3& ray, const Beam& beam, PixelPl
 }
 
 /// @param ray  to the pixel that offsets are counted from
-TubePart KernelPart(const Part& part, const Vector3& ray, const Beam& beam, double greatestDepth)
+TubePart KernelPart(const Part& part, const Vector3& ray, const Beam& beam, double maximumDepth)
 {
   const Vector3 from = beam.geometry.Source() - part.first;
   const Vector3 moment = from.cross(part.axis);
@@ -106,15 +106,15 @@ TubePart KernelPart(const Part& part, const Vector3& ray, const Beam& beam, doub
   {
     kernel.crossCut[end] = PlaneOf(part.cut[end].cross(part.axis), ray, beam);
     kernel.rayCut[end] = PlaneOf(part.cut[end], ray, beam);
-    kernel.outer[end] = static_cast<float>(std::max(LeastRadius, part.section->outer[end]));
+    kernel.outer[end] = static_cast<float>(std::max(MinimumRadius, part.section->outer[end]));
     kernel.inner[end] = static_cast<float>(part.section->inner[end]);
   }
   kernel.length = static_cast<float>(part.length);
   kernel.inverseLength = static_cast<float>(1.0 / part.length);
   kernel.step = std::max(std::abs(kernel.moment.b), std::abs(kernel.moment.c));
   const double pixel = std::max(beam.nextColumn.norm(), beam.nextRow.norm());
-  kernel.greatestPixel =
-    static_cast<float>(pixel * greatestDepth / beam.geometry.Pose().sourceToDetector);
+  kernel.maximumPixel =
+    static_cast<float>(pixel * maximumDepth / beam.geometry.Pose().sourceToDetector);
   kernel.attenuation = static_cast<float>(part.section->attenuation);
   return kernel;
 }
@@ -161,7 +161,7 @@ Band BandOf(const Part& part, const Vector3& start, const Vector3& end, const Be
 {
   const double pitch = std::min(beam.nextColumn.norm(), beam.nextRow.norm());
   const double radius = std::max(part.section->outer[0], part.section->outer[1]);
-  const double depth = std::max(LeastDepth, std::min(start.z(), end.z()) - radius);
+  const double depth = std::max(MinimumDepth, std::min(start.z(), end.z()) - radius);
   // Off the centre a circle's shadow is an ellipse.
   const Vector3 ray =
     beam.geometry.PixelPosition(0.5 * (start.x() + end.x()), 0.5 * (start.y() + end.y())) -
@@ -235,7 +235,7 @@ void AddPart(
 {
   const Vector3 start = beam.geometry.Project(part.first);
   const Vector3 end = beam.geometry.Project(part.last);
-  if (start.z() < LeastDepth || end.z() < LeastDepth)
+  if (start.z() < MinimumDepth || end.z() < MinimumDepth)
   {
     return;
   }
@@ -269,7 +269,7 @@ void AddTubes(const std::vector<Vector3>& points, const std::vector<TubeSection>
   for (const Part& part : PartsOf(points, sections))
   {
     const TubeSection& section = *part.section;
-    if (section.attenuation > 0.0 && std::max(section.outer[0], section.outer[1]) > LeastRadius)
+    if (section.attenuation > 0.0 && std::max(section.outer[0], section.outer[1]) > MinimumRadius)
     {
       AddPart(part, beam, image, collector);
     }
@@ -290,13 +290,13 @@ void RequireFormat(const char* what, const CArmGeometry& geometry, const LineInt
 }
 
 void RequireWithin(
-  const char* what, const char* property, double value, double least, double greatest)
+  const char* what, const char* property, double value, double minimum, double maximum)
 {
-  if (!(value >= least && value <= greatest))
+  if (!(value >= minimum && value <= maximum))
   {
     throw std::invalid_argument(std::string(what) + ": " + property + " is " +
-      std::to_string(value) + "; it has to be within " + std::to_string(least) + " to " +
-      std::to_string(greatest));
+      std::to_string(value) + "; it has to be within " + std::to_string(minimum) + " to " +
+      std::to_string(maximum));
   }
 }
 

@@ -24,7 +24,7 @@ void AddTubes(const std::vector<Vector3>& points, const std::vector<TubeSection>
 /// @throws std::invalid_argument naming what is projected
 void RequireFormat(const char* what, const CArmGeometry& geometry, const LineIntegrals& image);
 void RequireWithin(
-  const char* what, const char* property, double value, double least, double greatest);
+  const char* what, const char* property, double value, double minimum, double maximum);
 void RequirePoints(const char* what, const std::vector<Vector3>& points);
 }
 

@@ -20,8 +20,8 @@ namespace
 constexpr int BlockSize = 8; // voxels
 constexpr int TileSize = 8;  // pixels: as many columns as a packet has rays
 constexpr double Steps = 65535.0;
-constexpr double GreatestAttenuation = 100.0; // 1/mm
-constexpr std::int64_t GreatestSize = std::int64_t{ 1 } << 30;
+constexpr double MaximumAttenuation = 100.0; // 1/mm
+constexpr std::int64_t MaximumSize = std::int64_t{ 1 } << 30;
 static_assert(TileSize == XRayLanes);
 
 using Sizes = std::array<int, 3>;
@@ -34,7 +34,7 @@ std::int64_t Product(const Sizes& n)
 float CheckedAttenuation(const std::function<double(double)>& attenuation, double value)
 {
   const double result = attenuation(value);
-  if (!(result >= 0.0 && result < GreatestAttenuation))
+  if (!(result >= 0.0 && result < MaximumAttenuation))
   {
     throw std::invalid_argument("volume: the attenuation of the value " + std::to_string(value) +
       " is " + std::to_string(result) + " 1/mm; it has to be within 0 to 100");
@@ -178,7 +178,7 @@ bool AllFollow(const Corners& corners, int axis)
 void CheckGrid(const ScalarImage& volume)
 {
   const Sizes n = volume.Dimensions();
-  if (n[0] < 1 || n[1] < 1 || n[2] < 1 || volume.NumberOfVoxels() > GreatestSize ||
+  if (n[0] < 1 || n[1] < 1 || n[2] < 1 || volume.NumberOfVoxels() > MaximumSize ||
     std::max({ n[0], n[1], n[2] }) > 1 << 15)
   {
     throw std::invalid_argument("volume: it has " + std::to_string(n[0]) + " x " +
@@ -205,7 +205,7 @@ struct VolumeProjector::Volume
   std::vector<std::uint16_t> byI; ///< i next to each other, then j
   std::vector<std::uint16_t> byJ; ///< j next to each other, then k
   Sizes blocks{};
-  std::vector<std::uint16_t> blockGreatest; ///< in each block, i fastest
+  std::vector<std::uint16_t> blockMaximum; ///< in each block, i fastest
   std::uint16_t negligible = 0;
   float scale = 0.0F;                ///< 1/mm
   Vector3 origin{ Vector3::Zero() }; ///< of index 0, 0, 0
@@ -262,7 +262,7 @@ void VolumeProjector::Volume::FillBlocks()
   {
     this->blocks[a] = (this->size[a] + BlockSize - 1) / BlockSize;
   }
-  this->blockGreatest.assign(Product(this->blocks), 0);
+  this->blockMaximum.assign(Product(this->blocks), 0);
   ParallelFor(this->blocks[2], 1,
     [&](std::int64_t first, std::int64_t last)
     {
@@ -275,8 +275,8 @@ void VolumeProjector::Volume::FillBlocks()
           const std::uint16_t* row =
             &this->byI[(static_cast<std::int64_t>(k) * this->size[1] + j) * this->size[0]];
           std::uint16_t* blockRow =
-            &this->blockGreatest[(static_cast<std::int64_t>(k / BlockSize) * this->blocks[1] +
-                                   j / BlockSize) *
+            &this->blockMaximum[(static_cast<std::int64_t>(k / BlockSize) * this->blocks[1] +
+                                  j / BlockSize) *
               this->blocks[0]];
           for (int i = 0; i < this->size[0]; ++i)
           {
@@ -299,8 +299,8 @@ SliceVolume VolumeProjector::Volume::Slices(const AxisOrder& order) const
   view.sliceStride = order.slice == 1 ? row : slice;
   view.rowStride = static_cast<std::int32_t>(order.slice == 1 ? slice : row);
   view.middle = this->size[order.slice] / 2;
-  view.greatestU = below(order.u);
-  view.greatestV = below(order.v);
+  view.maximumU = below(order.u);
+  view.maximumV = below(order.v);
   return view;
 }
 
@@ -312,8 +312,7 @@ bool VolumeProjector::Volume::IsEmpty(const Sizes& first, const Sizes& last) con
     for (int j = first[1] / BlockSize; j <= last[1] / BlockSize; ++j)
     {
       const std::uint16_t* row =
-        &this
-           ->blockGreatest[(static_cast<std::int64_t>(k) * this->blocks[1] + j) * this->blocks[0]];
+        &this->blockMaximum[(static_cast<std::int64_t>(k) * this->blocks[1] + j) * this->blocks[0]];
       for (int i = first[0] / BlockSize; i <= last[0] / BlockSize; ++i)
       {
         if (row[i] > this->negligible)
@@ -370,11 +369,11 @@ void VolumeProjector::Volume::FindRuns(
     bool beside = false;
     for (int a = 0; a < 3; ++a)
     {
-      const double greatest = this->size[a] - 1;
+      const double maximum = this->size[a] - 1;
       // A little more than the kernel's rounding.
-      beside = beside || high[a] < -0.01 || low[a] > greatest + 0.01;
-      from[a] = static_cast<int>(std::clamp(std::floor(low[a] - 0.01), 0.0, greatest));
-      to[a] = static_cast<int>(std::clamp(std::floor(high[a] + 1.01), 0.0, greatest));
+      beside = beside || high[a] < -0.01 || low[a] > maximum + 0.01;
+      from[a] = static_cast<int>(std::clamp(std::floor(low[a] - 0.01), 0.0, maximum));
+      to[a] = static_cast<int>(std::clamp(std::floor(high[a] + 1.01), 0.0, maximum));
     }
     from[axis] = first;
     to[axis] = last - 1;

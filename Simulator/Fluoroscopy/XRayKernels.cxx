@@ -89,8 +89,8 @@ void SumSlices(
   const Floats firstSlice = Load(packet.firstSlice);
   const Floats lastSlice = Load(packet.lastSlice);
   const Floats zero = {};
-  const Floats greatestU = Same(volume.greatestU);
-  const Floats greatestV = Same(volume.greatestV);
+  const Floats maximumU = Same(volume.maximumU);
+  const Floats maximumV = Same(volume.maximumV);
   Floats sum = Load(packet.sum);
   for (int run = 0; run < numberOfRuns; ++run)
   {
@@ -99,8 +99,8 @@ void SumSlices(
     {
       const Floats from = Same(static_cast<float>(k - volume.middle));
       // Beside the volume is its border, which is 0.
-      const Floats u = Clamped(startU + slopeU * from, zero, greatestU);
-      const Floats v = Clamped(startV + slopeV * from, zero, greatestV);
+      const Floats u = Clamped(startU + slopeU * from, zero, maximumU);
+      const Floats v = Clamped(startV + slopeV * from, zero, maximumV);
       const Integers column = __builtin_convertvector(u, Integers);
       const Integers row = __builtin_convertvector(v, Integers);
       const Floats restU = u - __builtin_convertvector(column, Floats);
@@ -147,8 +147,8 @@ inline Floats CircleIntegral(Floats u)
 inline Floats MeanChord(Floats radius, Floats distance, Floats pixel)
 {
   const Floats one = Same(1.0F);
-  const Floats least = 0.01F * radius;
-  const Floats width = pixel > least ? pixel : least;
+  const Floats minimum = 0.01F * radius;
+  const Floats width = pixel > minimum ? pixel : minimum;
   const Floats inverse = 1.0F / (radius * width);
   const Floats scale = inverse * width;
   const Floats high = Clamped((distance + 0.5F * width) * scale, -one, one);
@@ -175,15 +175,15 @@ inline Floats TubeValue(const TubePart& part, Floats i, Floats j)
     mixed += c * At(part.along[k], i, j);
   }
   // A ray along the axis has no place that is nearest; from 0.06 degrees on nothing changes any more.
-  const Floats least = 1e-6F * squaredRay;
-  squaredCross = squaredCross > least ? squaredCross : least;
+  const Floats minimum = 1e-6F * squaredRay;
+  squaredCross = squaredCross > minimum ? squaredCross : minimum;
   const Floats inverseCross = 1.0F / SquareRoot(squaredCross);
   const Floats inverseRay = 1.0F / SquareRoot(squaredRay);
   const Floats inverseSine = inverseCross * squaredRay * inverseRay;
   const Floats distance = At(part.moment, i, j) * inverseCross;
   const Floats place = mixed * inverseCross * inverseCross;
   Floats pixel = part.step * inverseCross;
-  pixel = pixel < part.greatestPixel ? pixel : Same(part.greatestPixel);
+  pixel = pixel < part.maximumPixel ? pixel : Same(part.maximumPixel);
 
   const Floats fraction = Clamped(place * part.inverseLength, zero, one);
   const Floats outer = part.outer[0] + fraction * (part.outer[1] - part.outer[0]);

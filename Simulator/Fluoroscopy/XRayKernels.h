@@ -38,8 +38,8 @@ struct SliceVolume
   std::ptrdiff_t sliceStride;
   std::int32_t rowStride; ///< from v to v + 1
   int middle;             ///< slice
-  float greatestU;        ///< just below the last index
-  float greatestV;
+  float maximumU;         ///< just below the last index
+  float maximumV;
 };
 
 /// a + b i + c j, i and j being columns and rows from a pixel near the segment.
@@ -67,8 +67,8 @@ struct TubePart
   float outer[2]; ///< radius at its ends, mm
   float inner[2]; ///< 0: solid
   float step; ///< of the distance between axis and ray, from pixel to pixel, times |axis x d|; mm^2
-  float greatestPixel; ///< a pixel's size where the segment is, mm
-  float attenuation;   ///< 1/mm
+  float maximumPixel; ///< a pixel's size where the segment is, mm
+  float attenuation;  ///< 1/mm
 };
 
 /// Some pixels, all different; what lies beyond `count` up to a multiple of the lanes is read, and not used.

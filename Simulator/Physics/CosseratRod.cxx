@@ -14,7 +14,7 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 constexpr int MostRounds = 12;        // in which contacts are added to an iteration
 constexpr double PressDepth = 0.005;  // mm
-constexpr double LeastCalm = 0.02;    // N/mm
+constexpr double MinimumCalm = 0.02;  // N/mm
 constexpr double MostCalm = 100.0;    // N/mm
 constexpr double HoldStiffness = 1e8; // N/mm and N mm/rad
 constexpr double TurnArm = 0.25;      // mm, at which a turn counts as a move across
@@ -168,7 +168,7 @@ void RodSettings::Validate() const
   RequirePositive(this->reach, "reach");
   RequirePositive(this->softness, "softness");
   RequirePositive(this->frictionStiffness, "frictionStiffness");
-  RequirePositive(this->largestMove, "largestMove");
+  RequirePositive(this->maximumMove, "maximumMove");
 }
 
 CosseratRod::CosseratRod(std::int64_t capacity, const RodSettings& settings)
@@ -366,14 +366,14 @@ void CosseratRod::Predict(double seconds)
   {
     this->Carried[k] = known < 0 ? Vector3(Vector3::Zero()) : this->Carried[known];
   }
-  double largest = 0.0;
+  double maximum = 0.0;
   for (std::int64_t i = 0; i < count; ++i)
   {
-    largest = std::max(largest, this->Carried[i].squaredNorm());
+    maximum = std::max(maximum, this->Carried[i].squaredNorm());
   }
-  largest = std::sqrt(largest);
+  maximum = std::sqrt(maximum);
   const double share =
-    largest > this->Settings.largestMove ? this->Settings.largestMove / largest : 1.0;
+    maximum > this->Settings.maximumMove ? this->Settings.maximumMove / maximum : 1.0;
   for (std::int64_t i = 0; i < count; ++i)
   {
     Body& body = this->Bodies[i];
@@ -822,8 +822,8 @@ double CosseratRod::Update(double& scale)
   }
   move = std::sqrt(move);
   turn = std::sqrt(turn);
-  const double largest = std::max(move, 2.0 * turn);
-  scale = largest > this->Settings.largestMove ? this->Settings.largestMove / largest : 1.0;
+  const double maximum = std::max(move, 2.0 * turn);
+  scale = maximum > this->Settings.maximumMove ? this->Settings.maximumMove / maximum : 1.0;
   for (std::int64_t j = 0; j + 1 < this->Size(); ++j)
   {
     Body& a = this->Bodies[j];
@@ -869,7 +869,7 @@ void CosseratRod::Finish(double seconds)
     state.moment = this->Bodies[j + 1].orientation * moment;
     state.localMoment = moment;
     const Vector3 gap = this->LastEnd(j) - this->FirstEnd(j + 1);
-    this->Last.largestGap = std::max(this->Last.largestGap, gap.norm());
+    this->Last.maximumGap = std::max(this->Last.maximumGap, gap.norm());
     state.oldAngle =
       RotationVector(this->Bodies[j].orientation.conjugate() * this->Bodies[j + 1].orientation);
   }
@@ -924,7 +924,7 @@ void CosseratRod::Finish(double seconds)
     ++this->Last.touching;
     const double depth = std::max(0.0, -plane.contact.gap);
     sum += depth;
-    this->Last.largestPenetration = std::max(this->Last.largestPenetration, depth);
+    this->Last.maximumPenetration = std::max(this->Last.maximumPenetration, depth);
     this->Touched.push_back(plane.contact);
   }
   this->Last.meanPenetration = this->Last.touching > 0 ? sum / this->Last.touching : 0.0;
@@ -964,7 +964,7 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
   }
   for (int iteration = 0; iteration < this->Settings.iterations; ++iteration)
   {
-    if (surface && iteration > 0 && this->Last.largestUpdate > this->Settings.tolerance)
+    if (surface && iteration > 0 && this->Last.maximumUpdate > this->Settings.tolerance)
     {
       this->FindContacts(seconds, *surface); // planes do not follow a bent wall far
     }
@@ -987,7 +987,7 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
         {
           break;
         }
-        this->Calm = std::max(LeastCalm, 8.0 * this->Calm);
+        this->Calm = std::max(MinimumCalm, 8.0 * this->Calm);
         ++this->Last.calmed;
       }
       else if (exact)
@@ -1001,21 +1001,21 @@ const RodStep& CosseratRod::Step(double seconds, ContactSurface* surface)
       }
     }
     double scale = 1.0;
-    this->Last.largestUpdate =
+    this->Last.maximumUpdate =
       solved ? this->Update(scale) : std::numeric_limits<double>::infinity();
-    if (!std::isfinite(this->Last.largestUpdate))
+    if (!std::isfinite(this->Last.maximumUpdate))
     {
       this->Last.finite = false;
       this->Restore();
       return this->Last;
     }
-    if (scale == 1.0 && this->Last.largestUpdate < this->Settings.tolerance)
+    if (scale == 1.0 && this->Last.maximumUpdate < this->Settings.tolerance)
     {
       break;
     }
   }
   this->Finish(seconds);
-  this->Calm = this->Calm > LeastCalm ? 0.25 * this->Calm : 0.0;
+  this->Calm = this->Calm > MinimumCalm ? 0.25 * this->Calm : 0.0;
   return this->Last;
 }
 

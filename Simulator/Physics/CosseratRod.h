@@ -65,11 +65,11 @@ struct RodContact
 
 struct RodStep
 {
-  double largestGap = 0.0;         ///< mm, of a joint
-  double largestPenetration = 0.0; ///< mm
+  double maximumGap = 0.0;         ///< mm, of a joint
+  double maximumPenetration = 0.0; ///< mm
   double meanPenetration = 0.0;    ///< mm, over all contacts with a force
   int touching = 0;                ///< contacts with a force
-  double largestUpdate = 0.0;      ///< mm, of the last iteration
+  double maximumUpdate = 0.0;      ///< mm, of the last iteration
   int pressed = 0;                 ///< planes that came to be contacts within the step
   int calmed = 0; ///< times that the equations were damped more, to keep moves across within trust
   int indefinite = 0;        ///< iterations whose exact matrix was not positive definite
@@ -85,7 +85,7 @@ struct RodSettings
   double reach = 0.3;              ///< mm: how far away surfaces are asked for contacts, positive
   double softness = 0.02;          ///< mm: distance over which a contact comes into force, positive
   double frictionStiffness = 20.0; ///< N/mm of a contact that sticks, positive
-  double largestMove = 0.4;        ///< mm and, for turns, half as many rad: limit of an iteration
+  double maximumMove = 0.4;        ///< mm and, for turns, half as many rad: limit of an iteration
   int samples = 2; ///< of a segment that are asked for contacts, 1 to 4, evenly spread
   /// mm by which a segment may move across in a step, beside what the walls carry it: a rod that snaps over takes
   /// several steps for it. 0: any way. For rods that are so light that nothing else slows them down.

@@ -24,12 +24,13 @@ void Require(double value, double low, double high, const std::string& whose,
   }
 }
 
-void RequirePieces(std::size_t count, std::size_t least, const std::string& whose, const char* what)
+void RequirePieces(
+  std::size_t count, std::size_t minimum, const std::string& whose, const char* what)
 {
-  if (count < least || count > MostPieces)
+  if (count < minimum || count > MostPieces)
   {
     throw std::invalid_argument(whose + " has " + std::to_string(count) + " " + what + ", not " +
-      std::to_string(least) + " to " + std::to_string(MostPieces) + ".");
+      std::to_string(minimum) + " to " + std::to_string(MostPieces) + ".");
   }
 }
 }

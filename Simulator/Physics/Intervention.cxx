@@ -26,7 +26,7 @@ constexpr double StartInside =
 constexpr double SoftTip = 3.0;   // mm of the catheter
 constexpr double LossTime = 2e-3; // s
 constexpr double SpinDrag = 1e-6; // N s
-constexpr int LeastSegments = 4;
+constexpr int MinimumSegments = 4;
 constexpr double CatheterReach = 10.0; // mm into the vessel
 
 void RequireWithin(double value, double low, double high, const char* name)
@@ -90,8 +90,8 @@ void InterventionSettings::Validate() const
   RequireWithin(this->wallFriction, 0.0, 10.0, "wallFriction");
   RequireWithin(this->wallStiffness, 0.1, 1000.0, "wallStiffness");
   RequireWithin(this->drag, 0.0, 10.0, "drag");
-  RequireWithin(this->largestSpeed, 1.0, 2000.0, "largestSpeed");
-  RequireWithin(this->largestTurning, 1.0, 1000.0, "largestTurning");
+  RequireWithin(this->maximumSpeed, 1.0, 2000.0, "maximumSpeed");
+  RequireWithin(this->maximumTurning, 1.0, 1000.0, "maximumTurning");
 }
 
 struct Intervention::Internals : ContactSurface
@@ -135,7 +135,7 @@ struct Intervention::Internals : ContactSurface
   double CatheterTip = 0.0; // u
   double CatheterAngle = 0.0;
   double HandSpeed = 0.0;
-  double Wound = 0.0; // exponent of the capstan equation for the whole catheter
+  double CapstanExponent = 0.0; // exponent of the capstan equation for the whole catheter
 
   struct Sane
   {
@@ -462,7 +462,7 @@ void Intervention::Internals::PlaceOnPath()
 {
   const double datum = this->CatheterTip - this->Settings.insideCatheter;
   while (
-    this->Rod->Size() < LeastSegments || this->Fed - this->Places[this->Rod->Size() - 1] > datum)
+    this->Rod->Size() < MinimumSegments || this->Fed - this->Places[this->Rod->Size() - 1] > datum)
   {
     this->AppendSegment();
   }
@@ -497,14 +497,14 @@ void Intervention::Internals::Drive(const DriveInput& input)
     this->HandSpeed = 0.0;
     return;
   }
-  const double most = this->Settings.largestSpeed * this->Step;
+  const double most = this->Settings.maximumSpeed * this->Step;
   double way = input.wirePosition - this->HandPosition;
   if (std::abs(way) > most * (1.0 + 1e-9))
   {
     this->Say(Notice::TooFast);
     way = std::clamp(way, -most, most);
   }
-  const double mostTurn = this->Settings.largestTurning * this->Step;
+  const double mostTurn = this->Settings.maximumTurning * this->Step;
   double turn = input.wireAngle - this->HandAngle;
   if (std::abs(turn) > mostTurn * (1.0 + 1e-9))
   {
@@ -533,11 +533,11 @@ void Intervention::Internals::Feed()
 {
   const double lag = this->Rod->Lag(this->Rod->Size() - 1);
   const double datum = this->CatheterTip - this->Settings.insideCatheter;
-  const double least = datum + this->Places[LeastSegments - 1];
-  if (this->Fed < least)
+  const double minimum = datum + this->Places[MinimumSegments - 1];
+  if (this->Fed < minimum)
   {
     this->Say(Notice::WireAtTip);
-    this->Fed = least;
+    this->Fed = minimum;
   }
   const double most = datum + this->Places[this->Settings.capacity - 1];
   if (this->Fed > most)
@@ -552,7 +552,7 @@ void Intervention::Internals::Feed()
     this->AppendSegment();
   }
   while (
-    this->Rod->Size() > LeastSegments && this->Fed - this->Places[this->Rod->Size() - 2] < datum)
+    this->Rod->Size() > MinimumSegments && this->Fed - this->Places[this->Rod->Size() - 2] < datum)
   {
     this->Rod->RemoveLast();
   }
@@ -638,11 +638,11 @@ void Intervention::Internals::Measure()
   report.phase = Modulo(this->Phase);
   report.inserted = std::max(0.0, this->Fed - this->CatheterTip);
   report.catheterTip = this->CatheterTip;
-  report.jointGap = step.largestGap;
+  report.jointGap = step.maximumGap;
   report.tipForce = 0.0;
-  report.greatestForce = 0.0;
+  report.maximumForce = 0.0;
   report.contacts = 0;
-  report.largestPenetration = 0.0;
+  report.maximumPenetration = 0.0;
   report.meanPenetration = 0.0;
   for (const RodContact& contact : this->Rod->Contacts())
   {
@@ -654,8 +654,8 @@ void Intervention::Internals::Measure()
     const double force = std::hypot(contact.force, contact.friction.norm());
     const double depth = std::max(0.0, -contact.gap);
     ++report.contacts;
-    report.greatestForce = std::max(report.greatestForce, force);
-    report.largestPenetration = std::max(report.largestPenetration, depth);
+    report.maximumForce = std::max(report.maximumForce, force);
+    report.maximumPenetration = std::max(report.maximumPenetration, depth);
     report.meanPenetration += depth;
     if (this->Places[contact.segment] < 3.0)
     {
@@ -675,7 +675,7 @@ void Intervention::Internals::Measure()
   report.proximalTorque = this->Spring * this->Rod->Lag(last);
   // The catheter's bends multiply what the hand feels (capstan), against the way that it moves.
   const double sense = std::clamp(this->HandSpeed, -1.0, 1.0); // mm/s
-  report.proximalForce = force.dot(forward) * std::exp(sense * this->Wound);
+  report.proximalForce = force.dot(forward) * std::exp(sense * this->CapstanExponent);
   if (report.inserted <= 0.0)
   {
     report.branch = -1;
@@ -706,7 +706,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Wire = wire;
   data.Catheter = catheter;
   data.Settings = settings;
-  data.Wound = catheter.friction * catheter.TurnedAngle(catheter.length);
+  data.CapstanExponent = catheter.friction * catheter.TurnedAngle(catheter.length);
   data.Step = 1.0 / settings.tickRate;
   data.FrameSeconds = data.Step * settings.ticksPerFrame;
   data.Phase = Modulo(settings.startPhase);
@@ -720,7 +720,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   RodSettings rod;
   rod.mediumFollowsWalls = true;
   rod.reach = 0.08; // a little less than `trust`: what comes nearer is seen in the next tick
-  rod.largestMove = 1.0;
+  rod.maximumMove = 1.0;
   rod.trust = 0.1;
   data.Rod = std::make_unique<CosseratRod>(settings.capacity, rod);
   data.InVessel.assign(settings.capacity * data.Rod->SamplesPerSegment(), 0);
@@ -754,14 +754,14 @@ const TickReport& Intervention::Step(const DriveInput& input)
   data.Drive(input);
   data.Feed();
   const RodStep& step = data.Rod->Step(data.Step, &data);
-  if (!step.finite || step.largestGap > 5.0)
+  if (!step.finite || step.maximumGap > 5.0)
   {
     data.Reset();
   }
   else
   {
     data.PutBack();
-    if (data.Tick % 200 == 0 && step.largestGap < 0.05 && data.Report.outside == 0)
+    if (data.Tick % 200 == 0 && step.maximumGap < 0.05 && data.Report.outside == 0)
     {
       data.KeepSane();
     }

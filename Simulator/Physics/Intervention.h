@@ -43,8 +43,8 @@ struct InterventionSettings
   /// Pa s: per length, across and along the wire, against blood that moves with the walls. Blood's own is about
   /// 0.025; a hundred times that calms the jumps of the light tip, and is still nothing against friction.
   double drag = 2.5;
-  double largestSpeed = 300.0; ///< mm/s by which hands can advance; more is clamped, with a message
-  double largestTurning = 30.0; ///< rad/s, likewise
+  double maximumSpeed = 300.0; ///< mm/s by which hands can advance; more is clamped, with a message
+  double maximumTurning = 30.0; ///< rad/s, likewise
 
   /// @throws std::invalid_argument naming the setting
   void Validate() const;
@@ -60,9 +60,9 @@ struct TickReport
   double proximalForce = 0.0;      ///< N, against advancing
   double proximalTorque = 0.0;     ///< N mm, against turning
   double tipForce = 0.0;           ///< N between the wire's last 3 mm and the wall
-  double greatestForce = 0.0;      ///< N of a sample's contact
+  double maximumForce = 0.0;       ///< N of a sample's contact
   int contacts = 0;                ///< samples that press on the wall
-  double largestPenetration = 0.0; ///< mm into the wall
+  double maximumPenetration = 0.0; ///< mm into the wall
   double meanPenetration = 0.0;    ///< mm, over the samples that touch
   double jointGap = 0.0;           ///< mm, greatest
   int outside = 0; ///< samples whose centre was outside of the lumen and was put back

@@ -178,7 +178,7 @@ void VesselWall::Internals::ForEachNear(
 
 WallMemory& VesselWall::Internals::Of(std::int64_t index)
 {
-  std::int32_t slot = this->Known_(index);
+  std::int32_t slot = this->FindSlot(index);
   if (slot >= 0)
   {
     return this->Memories[slot];
@@ -270,7 +270,7 @@ double VesselWall::Internals::Collect(
   memory.radius = radius;
   memory.clearance = radius;
   memory.list.clear();
-  double least = Infinity;
+  double minimum = Infinity;
   this->MarkAround(memory.patch);
   this->ForEachNear(p, memory.velocity, memory.window, radius,
     [&](std::int32_t triangle)
@@ -293,10 +293,10 @@ double VesselWall::Internals::Collect(
         memory.list.push_back({ triangle, static_cast<float>(distance), static_cast<float>(speed),
           0.0f, { 0.0f, 0.0f, 0.0f } });
         memory.clearance = std::min(memory.clearance, distance - memory.window * speed);
-        least = std::min(least, distance);
+        minimum = std::min(minimum, distance);
       }
     });
-  return least;
+  return minimum;
 }
 
 void VesselWall::Internals::Know(WallMemory& memory, const Vector3& p, double distance)
@@ -621,7 +621,7 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
   Internals& data = *this->Data;
   const double range = sample.radius + reach;
   if (!UsableWallPoint(sample.centre) || !(sample.radius >= 0.0 && reach >= 0.0) ||
-    !(range <= GreatestWallCoordinate))
+    !(range <= MaximumWallCoordinate))
   {
     return;
   }
@@ -783,7 +783,7 @@ void VesselWall::Place(std::int64_t sample, std::int64_t triangle)
 bool VesselWall::PlaceBeside(std::int64_t sample, std::int64_t neighbour)
 {
   Internals& data = *this->Data;
-  const std::int32_t slot = data.Known_(neighbour);
+  const std::int32_t slot = data.FindSlot(neighbour);
   if (slot < 0 || data.Memories[slot].patch < 0)
   {
     return false;
@@ -832,7 +832,7 @@ void VesselWall::Within(const Vector3& p, double distance, std::vector<std::int6
   {
     return;
   }
-  const double bound = std::min(distance, 4.0 * GreatestWallCoordinate);
+  const double bound = std::min(distance, 4.0 * MaximumWallCoordinate);
   data.ForEachNear(p, Vector3::Zero(), 0.0, bound,
     [&](std::int32_t triangle)
     {

@@ -15,7 +15,7 @@
 
 namespace coronary
 {
-constexpr double GreatestWallCoordinate = 1e5;
+constexpr double MaximumWallCoordinate = 1e5;
 constexpr int WallBoxWidth = 8;
 constexpr int WallLeafSize = 4;
 constexpr double Infinity = std::numeric_limits<double>::infinity();
@@ -127,7 +127,7 @@ struct WallMemory
 
 inline bool UsableWallPoint(const Vector3& p)
 {
-  return (p.array().abs() <= GreatestWallCoordinate).all(); // false for NaN
+  return (p.array().abs() <= MaximumWallCoordinate).all(); // false for NaN
 }
 
 inline Vector3 UnitOrZero(const Vector3& v)
@@ -407,7 +407,7 @@ struct VesselWall::Internals
     auto x = static_cast<std::uint64_t>(index) * 0x9E3779B97F4A7C15ull;
     return static_cast<std::size_t>(x ^ (x >> 29));
   }
-  std::int32_t Known_(std::int64_t index) const
+  std::int32_t FindSlot(std::int64_t index) const
   {
     const std::size_t mask = this->Table.size() - 1;
     for (std::size_t i = Hash(index) & mask;; i = (i + 1) & mask)

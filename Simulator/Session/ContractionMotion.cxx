@@ -12,7 +12,7 @@ namespace coronary
 {
 namespace
 {
-constexpr double LeastHeight = 20.0; // mm
+constexpr double MinimumHeight = 20.0; // mm
 constexpr int SpeedSteps = 200;
 
 // Fractions of R-R of the curve's parts; systole is a setting.
@@ -100,11 +100,12 @@ ContractionMotion::ContractionMotion(
       { return (a - this->Used.base).squaredNorm() < (b - this->Used.base).squaredNorm(); });
   }
   this->Height = (this->Used.apex - this->Used.base).norm();
-  if (!(this->Height >= LeastHeight))
+  if (!(this->Height >= MinimumHeight))
   {
     char text[120];
     std::snprintf(text, sizeof(text),
-      "Contraction: base and apex are %.3g mm apart, less than %g mm.", this->Height, LeastHeight);
+      "Contraction: base and apex are %.3g mm apart, less than %g mm.", this->Height,
+      MinimumHeight);
     throw std::invalid_argument(text);
   }
   this->Axis = (this->Used.apex - this->Used.base) / this->Height;
@@ -112,14 +113,14 @@ ContractionMotion::ContractionMotion(
   this->Line = this->PlacesOf(line);
 
   // Speed is nearly proportional to the amplitudes; what twist makes of it is settled by going on.
-  this->Peak = this->GreatestSpeed();
+  this->Peak = this->MaximumSpeed();
   while (this->Peak > this->Used.peakSpeed)
   {
     const double share = 0.9999 * this->Used.peakSpeed / this->Peak;
     this->Used.axial *= share;
     this->Used.radial *= share;
     this->Used.twist *= share;
-    this->Peak = this->GreatestSpeed();
+    this->Peak = this->MaximumSpeed();
   }
 }
 
@@ -156,7 +157,7 @@ void ContractionMotion::Move(
   }
 }
 
-double ContractionMotion::GreatestSpeed() const
+double ContractionMotion::MaximumSpeed() const
 {
   // A sample of the points is enough: the field is smooth.
   std::vector<Place> places = this->Line;
@@ -167,18 +168,18 @@ double ContractionMotion::GreatestSpeed() const
   }
   std::vector<Vector3> before;
   std::vector<Vector3> now;
-  double greatest = 0.0;
+  double maximum = 0.0;
   this->Move(places, 0.0, before);
   for (int k = 1; k <= SpeedSteps; ++k)
   {
     this->Move(places, static_cast<double>(k) / SpeedSteps, now);
     for (std::size_t n = 0; n < now.size(); ++n)
     {
-      greatest = std::max(greatest, (now[n] - before[n]).squaredNorm());
+      maximum = std::max(maximum, (now[n] - before[n]).squaredNorm());
     }
     now.swap(before);
   }
-  return std::sqrt(greatest) * SpeedSteps / this->Used.cycleLength;
+  return std::sqrt(maximum) * SpeedSteps / this->Used.cycleLength;
 }
 
 void ContractionMotion::Positions(double phase, std::vector<Vector3>& positions)

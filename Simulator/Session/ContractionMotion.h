@@ -58,7 +58,7 @@ private:
 
   std::vector<Place> PlacesOf(const std::vector<Vector3>& points) const;
   void Move(const std::vector<Place>& places, double phase, std::vector<Vector3>& positions) const;
-  double GreatestSpeed() const;
+  double MaximumSpeed() const;
 
   std::shared_ptr<WallMotion> Rest;
   ContractionSettings Used;

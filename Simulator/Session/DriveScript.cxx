@@ -17,10 +17,10 @@ constexpr std::size_t MostPieces = 100000;
 constexpr double LongestPiece = 36000.0; // s
 constexpr double FurthestAdvance =
   1e6; // mm: what is absurd is clamped by the simulation, with a message
-constexpr double GreatestTurn = 1e7; // degrees
-constexpr double GreatestHeartRate = 240.0;
+constexpr double MaximumTurn = 1e7; // degrees
+constexpr double MaximumHeartRate = 240.0;
 constexpr double MostContrast = 1000.0;  // mL
-constexpr double GreatestAngle = 360.0;  // degrees, of the C-arm
+constexpr double MaximumAngle = 360.0;   // degrees, of the C-arm
 constexpr double FurthestTable = 1000.0; // mm
 
 std::uint32_t PedalsOf(JsonFields& fields)
@@ -57,19 +57,19 @@ DrivePiece PieceOf(JsonFields& member)
   const auto advance = [&](const char* name, double most)
   { return member.Number(name, -most, most, 0.0); };
   piece.wireAdvance = advance("wire_mm", FurthestAdvance);
-  piece.wireTurn = Degree * advance("wire_deg", GreatestTurn);
+  piece.wireTurn = Degree * advance("wire_deg", MaximumTurn);
   piece.catheterAdvance = advance("catheter_mm", FurthestAdvance);
-  piece.catheterTurn = Degree * advance("catheter_deg", GreatestTurn);
+  piece.catheterTurn = Degree * advance("catheter_deg", MaximumTurn);
   piece.inject = member.Number("inject_mL", 0.0, MostContrast, 0.0);
-  piece.primaryTurn = Degree * advance("primary_deg", GreatestAngle);
-  piece.secondaryTurn = Degree * advance("secondary_deg", GreatestAngle);
+  piece.primaryTurn = Degree * advance("primary_deg", MaximumAngle);
+  piece.secondaryTurn = Degree * advance("secondary_deg", MaximumAngle);
   piece.detectorLift = advance("source_to_detector_mm", FurthestTable);
   piece.tableMove = { advance("table_x_mm", FurthestTable), advance("table_y_mm", FurthestTable),
     advance("table_z_mm", FurthestTable) };
   piece.setsPedals = member.Has("pedals");
   piece.pedals = piece.setsPedals ? PedalsOf(member) : 0U;
   piece.setsHeartRate = member.Has("heart_rate_bpm");
-  piece.heartRate = member.Number("heart_rate_bpm", 0.0, GreatestHeartRate, 0.0);
+  piece.heartRate = member.Number("heart_rate_bpm", 0.0, MaximumHeartRate, 0.0);
   member.Done();
   return piece;
 }

@@ -387,7 +387,7 @@ void RecordingWriter::Force(std::uint64_t tick, const RecordedForces& forces)
 {
   std::string payload;
   for (const float value :
-    { forces.proximalForce, forces.proximalTorque, forces.tipForce, forces.greatestForce })
+    { forces.proximalForce, forces.proximalTorque, forces.tipForce, forces.maximumForce })
   {
     std::uint32_t bits = 0;
     std::memcpy(&bits, &value, sizeof(bits));
@@ -637,8 +637,8 @@ struct RecordingReader::Internals
   bool Decode(const std::string& payload, RecordedItem& item)
   {
     // What a later writer adds at the end of a payload is left alone.
-    static constexpr std::array<std::size_t, 8> least{ 0, 0, 16, 9, 8, 8, 0, 56 };
-    if (payload.size() < least[static_cast<std::size_t>(item.type)])
+    static constexpr std::array<std::size_t, 8> minimum{ 0, 0, 16, 9, 8, 8, 0, 56 };
+    if (payload.size() < minimum[static_cast<std::size_t>(item.type)])
     {
       return this->Damaged("a chunk is too short for its type");
     }

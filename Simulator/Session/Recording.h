@@ -56,7 +56,7 @@ struct RecordedForces
   float proximalForce = 0.0F;  ///< N
   float proximalTorque = 0.0F; ///< N mm
   float tipForce = 0.0F;       ///< N
-  float greatestForce = 0.0F;  ///< N
+  float maximumForce = 0.0F;   ///< N
 };
 
 /// What the user did beside driving.

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr double Degree = M_PI / 180.0;
-constexpr double GreatestSeed = 9007199254740992.0; // 2^53: every JSON reader holds it exactly
+constexpr double MaximumSeed = 9007199254740992.0; // 2^53: every JSON reader holds it exactly
 
 const char* const DominanceNames[] = { "right", "left", "balanced" };
 const char* const MotionNames[] = { "automatic", "tracked", "still", "contraction" };
@@ -41,8 +41,8 @@ std::vector<NumberEntry> NumbersOf(InterventionSettings& s)
     { "engagement_mm", &s.engagement, 0.5, 10.0 },
     { "wall_friction_factor", &s.wallFriction, 0.0, 10.0 },
     { "wall_stiffness_N_per_mm", &s.wallStiffness, 0.1, 1000.0 },
-    { "drag_Pa_s", &s.drag, 0.0, 10.0 }, { "largest_speed_mm_s", &s.largestSpeed, 1.0, 2000.0 },
-    { "largest_turning_rad_s", &s.largestTurning, 1.0, 1000.0 } };
+    { "drag_Pa_s", &s.drag, 0.0, 10.0 }, { "largest_speed_mm_s", &s.maximumSpeed, 1.0, 2000.0 },
+    { "largest_turning_rad_s", &s.maximumTurning, 1.0, 1000.0 } };
 }
 
 std::vector<NumberEntry> NumbersOf(PhantomSettings& s)
@@ -456,7 +456,7 @@ Scenario ScenarioFromText(
   scenario.imaging = ImagingOf(part("imaging"), origin + ", imaging", folder);
   scenario.contrast = ContrastOf(part("contrast"), origin + ", contrast");
   scenario.seed =
-    static_cast<std::uint64_t>(fields.Whole("seed", 0, static_cast<std::int64_t>(GreatestSeed), 1));
+    static_cast<std::uint64_t>(fields.Whole("seed", 0, static_cast<std::int64_t>(MaximumSeed), 1));
   fields.Done();
   return scenario;
 }

@@ -17,8 +17,8 @@ constexpr double SteepestSecondary = 55.0 * M_PI / 180.0;
 constexpr double NearestDetector = 50.0;    // mm behind the isocentre
 constexpr double FurthestDetector = 1500.0; // mm from the source
 constexpr double FurthestTable = 500.0;     // mm
-constexpr double SmallestField = 80.0;      // mm
-constexpr double GreatestField = 400.0;     // mm
+constexpr double MinimumField = 80.0;       // mm
+constexpr double MaximumField = 400.0;      // mm
 
 double Limited(double value, double low, double high, double otherwise)
 {
@@ -152,8 +152,8 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   metrics.airKerma = total.airKerma;
   metrics.doseAreaProduct = total.doseAreaProduct;
   metrics.contrast = this->Medium.Balance().injected;
-  metrics.greatestWallForce = std::max(metrics.greatestWallForce, tick.greatestForce);
-  metrics.greatestTipForce = std::max(metrics.greatestTipForce, tick.tipForce);
+  metrics.maximumWallForce = std::max(metrics.maximumWallForce, tick.maximumForce);
+  metrics.maximumTipForce = std::max(metrics.maximumTipForce, tick.tipForce);
   metrics.forcefulSeconds += tick.tipForce > ForcefulTip ? seconds : 0.0;
   const double travel = std::abs(input.drive.wirePosition - this->Last.drive.wirePosition);
   const double turn = std::abs(input.drive.wireAngle - this->Last.drive.wireAngle);
@@ -184,7 +184,7 @@ RecordingHeader HeaderOf(const Scenario& scenario, std::uint64_t wallHash, const
 RecordedForces ForcesOf(const TickReport& report)
 {
   return { static_cast<float>(report.proximalForce), static_cast<float>(report.proximalTorque),
-    static_cast<float>(report.tipForce), static_cast<float>(report.greatestForce) };
+    static_cast<float>(report.tipForce), static_cast<float>(report.maximumForce) };
 }
 
 SessionInput StartInputOf(const Scenario& scenario)
@@ -248,7 +248,7 @@ bool TrainingSession::Apply(const RecordedEvent& event)
       data.Clock.SetFluoroscopyRate(FrameRateOf(event.value));
       return true;
     case RecordedEvent::FieldOfView:
-      data.Field = std::clamp(event.value, SmallestField, GreatestField);
+      data.Field = std::clamp(event.value, MinimumField, MaximumField);
       data.SetField();
       return true;
     default:

@@ -27,16 +27,16 @@ struct SessionMetrics
   double procedureSeconds = 0.0;
   double fluoroscopySeconds = 0.0; ///< pedal down, cine included
   double cineSeconds = 0.0;
-  std::int64_t frames = 0;        ///< exposed
-  double airKerma = 0.0;          ///< mGy at the reference point
-  double doseAreaProduct = 0.0;   ///< Gy cm^2
-  double contrast = 0.0;          ///< mL of contrast medium
-  double greatestWallForce = 0.0; ///< N of one contact
-  double greatestTipForce = 0.0;  ///< N
-  double forcefulSeconds = 0.0;   ///< tip force above ForcefulTip
-  double wireTravel = 0.0;        ///< mm, forth and back together
-  double wireTurning = 0.0;       ///< radians, left and right together
-  double deepest = 0.0;           ///< mm of wire beyond the catheter's tip
+  std::int64_t frames = 0;       ///< exposed
+  double airKerma = 0.0;         ///< mGy at the reference point
+  double doseAreaProduct = 0.0;  ///< Gy cm^2
+  double contrast = 0.0;         ///< mL of contrast medium
+  double maximumWallForce = 0.0; ///< N of one contact
+  double maximumTipForce = 0.0;  ///< N
+  double forcefulSeconds = 0.0;  ///< tip force above ForcefulTip
+  double wireTravel = 0.0;       ///< mm, forth and back together
+  double wireTurning = 0.0;      ///< radians, left and right together
+  double deepest = 0.0;          ///< mm of wire beyond the catheter's tip
   std::vector<int> branches; ///< in which the tip has been, in the order in which they were reached
 };
 

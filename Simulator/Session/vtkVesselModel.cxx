@@ -210,7 +210,7 @@ std::map<int, int> TakeTree(vtkPolyData* tree, const std::string& path, WallTopo
 /// The branch whose axis is nearest, in its radii.
 int NearestBranch(const WallTopology& topology, const Vector3& point)
 {
-  double least = std::numeric_limits<double>::max();
+  double minimum = std::numeric_limits<double>::max();
   int nearest = -1;
   for (std::size_t b = 0; b < topology.axis.size(); ++b)
   {
@@ -221,9 +221,9 @@ int NearestBranch(const WallTopology& topology, const Vector3& point)
       const double radius = topology.axisRadius[b][k - 1] +
         place.fraction * (topology.axisRadius[b][k] - topology.axisRadius[b][k - 1]);
       const double away = place.squaredDistance / std::max(1e-6, radius * radius);
-      if (away < least)
+      if (away < minimum)
       {
-        least = away;
+        minimum = away;
         nearest = static_cast<int>(b);
       }
     }

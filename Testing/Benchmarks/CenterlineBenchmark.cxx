@@ -35,11 +35,11 @@ constexpr bool HasItk = false;
 #endif
 
 // What has to be reached.
-constexpr double LeastSpeedUp = 8.0;
+constexpr double MinimumSpeedUp = 8.0;
 constexpr double MostBytesPerVoxel = 24.0;
 constexpr double MostTreeSeconds = 2.0;
 constexpr double MostSurfaceSeconds = 3.0;
-constexpr double LargestMeanDifference = 0.02; // of arrival, relative, both of first order
+constexpr double MaximumMeanDifference = 0.02; // of arrival, relative, both of first order
 constexpr double Rest = 0.75;
 
 const std::vector<std::string> AllTables = { "marching", "tree", "surface" };
@@ -232,7 +232,7 @@ void TableMarching(const BenchmarkOptions& options, Verdicts& verdicts)
     const auto ratio = [&](const char* name, const std::vector<Measurement>& runs, bool isTarget)
     {
       const double times = Median(Each(itk, Processor)) / Median(Each(runs, Processor));
-      const bool met = times >= LeastSpeedUp;
+      const bool met = times >= MinimumSpeedUp;
       verdicts.missedTarget |= isTarget && !met;
       std::printf("| ITK's processor time over ours, %s | %.1f | %s | %s |\n", name, times,
         isTarget ? ">= 8" : "", isTarget ? Verdict(met) : "");
@@ -247,10 +247,10 @@ void TableMarching(const BenchmarkOptions& options, Verdicts& verdicts)
       difference += std::abs(static_cast<double>(firstArrival[v]) - theirs[v]);
       sum += theirs[v];
     }
-    const bool agree = difference / sum <= LargestMeanDifference;
+    const bool agree = difference / sum <= MaximumMeanDifference;
     verdicts.disagreement |= !agree;
     std::printf("| mean difference of arrival, both of first order | %.4f | <= %.2f | %s |\n",
-      difference / sum, LargestMeanDifference, Verdict(agree));
+      difference / sum, MaximumMeanDifference, Verdict(agree));
 #endif
   }
 }

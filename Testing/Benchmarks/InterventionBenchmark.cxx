@@ -70,7 +70,7 @@ void RodAlone(benchmark::State& state)
   rod.SetForce(count - 1, Vector3(1e-4, 0.0, 0.0));
   for (auto _ : state)
   {
-    benchmark::DoNotOptimize(rod.Step(5e-4).largestGap);
+    benchmark::DoNotOptimize(rod.Step(5e-4).maximumGap);
   }
 }
 BENCHMARK(RodAlone)->Arg(60)->Arg(100)->Arg(200)->Unit(benchmark::kMicrosecond);

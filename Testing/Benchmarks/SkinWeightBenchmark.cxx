@@ -230,7 +230,7 @@ int Run(int argc, char** argv)
                   "peak %.2f GB\n",
         mode == SkinWeightMode::Joint ? "Joint" : "Independent", clock.Wall(), clock.Processor(),
         weights.iterations, weights.polishSteps, weights.residual, weights.residualEverywhere,
-        weights.energyGap, weights.smallestSum, weights.largestSum,
+        weights.energyGap, weights.minimumSum, weights.maximumSum,
         static_cast<double>(weights.bone.size()) / static_cast<double>(input.points.size()),
         PeakGigabytes());
       std::fflush(stdout);

@@ -146,7 +146,7 @@ VesselWall Fresh(const VesselWallSettings& settings = {})
 }
 
 /// Branches from a root to the far end of the longest way.
-std::vector<int> LongestWay()
+std::vector<int> LongestPath()
 {
   const WallTopology& topology = Wall()->Topology();
   std::vector<int> best;
@@ -191,7 +191,7 @@ const std::vector<std::vector<Vector3>>& Centres(double aside)
   std::vector<std::size_t> places;
   std::vector<double> radius;
   std::vector<Vector3> rest;
-  for (const int b : LongestWay())
+  for (const int b : LongestPath())
   {
     for (std::size_t i = 1; i < topology.axis[b].size(); ++i)
     {
@@ -406,9 +406,9 @@ void Exactness(benchmark::State& state)
         {
           const Vector3& a = points[triangles[t][0]];
           // What is clearly further than the best one and the range needs no look.
-          const double least = (a - p).norm() -
+          const double minimum = (a - p).norm() -
             std::max((points[triangles[t][1]] - a).norm(), (points[triangles[t][2]] - a).norm());
-          if (least > best + 1e-6 && least > range + 1e-6)
+          if (minimum > best + 1e-6 && minimum > range + 1e-6)
           {
             continue;
           }

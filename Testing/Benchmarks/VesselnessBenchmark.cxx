@@ -40,13 +40,13 @@ constexpr bool HasItk = false;
 #endif
 
 // What has to be reached.
-constexpr double LeastSpeedUp = 15.0;
+constexpr double MinimumSpeedUp = 15.0;
 constexpr double MostBytesPerVoxel = 16.0;
 constexpr double MostClinicalSeconds = 20.0;
 constexpr double MostClinicalMemory = 1.5e9;
-constexpr double LeastCorrelation = 0.999;
-constexpr double LargestReferenceError = 1e-3;
-constexpr double LeastReferenceCorrelation = 0.9999;
+constexpr double MinimumCorrelation = 0.999;
+constexpr double MaximumReferenceError = 1e-3;
+constexpr double MinimumReferenceCorrelation = 0.9999;
 
 const std::vector<std::string> AllTables = { "itk", "clinical", "methods", "scales", "instructions",
   "agreement" };
@@ -284,7 +284,7 @@ struct Comparison
 {
   double correlation = 0.0;
   double rms = 0.0;
-  double largest = 0.0; ///< where not left out
+  double maximum = 0.0; ///< where not left out
 };
 
 /// Of the voxels that are at least `margin` away from every border.
@@ -316,7 +316,7 @@ Comparison Compare(const float* a, const float* b, const Dimensions& n,
         sumAB += x * y;
         if (!leaveOut || !leaveOut[row + i])
         {
-          result.largest = std::max(result.largest, std::abs(x - y));
+          result.maximum = std::max(result.maximum, std::abs(x - y));
         }
       }
     }
@@ -411,9 +411,9 @@ void TableItk(const Options& options, Verdicts& verdicts)
       walls.push_back(theirs[run].wall / ours[run].wall);
       processors.push_back(theirs[run].processor / ours[run].processor);
     }
-    const bool met = Median(walls) >= LeastSpeedUp;
+    const bool met = Median(walls) >= MinimumSpeedUp;
     std::printf("| vtkFrangiVesselness: times faster than %s, wall time | %s | %s | %s |\n", name,
-      Spread(walls).c_str(), isTarget ? Format(">= %.0f", LeastSpeedUp).c_str() : "",
+      Spread(walls).c_str(), isTarget ? Format(">= %.0f", MinimumSpeedUp).c_str() : "",
       isTarget ? Verdict(met) : "");
     std::printf("| the same, processor time | %s | | |\n", Spread(processors).c_str());
     verdicts.missedTarget |= isTarget && !met;
@@ -433,9 +433,9 @@ void TableItk(const Options& options, Verdicts& verdicts)
     const std::array<int, 3> margin = BorderMargin(variant.settings, image->spacing);
     const Comparison inside = Compare(oursResult.data(), itkResult.data(), n, margin);
     const Comparison all = Compare(oursResult.data(), itkResult.data(), n, { 0, 0, 0 });
-    const bool agrees = inside.correlation > LeastCorrelation;
+    const bool agrees = inside.correlation > MinimumCorrelation;
     std::printf("| correlation with ITK, %d voxels from the borders | %.5f | > %.3f | %s |\n",
-      margin[0], inside.correlation, LeastCorrelation, Verdict(agrees));
+      margin[0], inside.correlation, MinimumCorrelation, Verdict(agrees));
     std::printf("| correlation with ITK, all voxels | %.5f | | |\n", all.correlation);
     verdicts.disagreement |= !agrees;
   }
@@ -660,22 +660,23 @@ void TableAgreement(const Options& options, Verdicts& verdicts)
       const Comparison c = Compare(a, b, n, margin, atJump.data());
       const bool met = target.empty() || reached(c);
       std::printf("| %s %s | %.0f | %s | %.6f | %.1e | %.1e | %s | %s |\n", SizeText(n).c_str(),
-        test.name, test.c, pair, c.correlation, c.rms, c.largest, target.c_str(),
+        test.name, test.c, pair, c.correlation, c.rms, c.maximum, target.c_str(),
         target.empty() ? "" : Verdict(met));
       verdicts.disagreement |= !met;
     };
     row("ours, reference", ours.data(), reference.data(),
-      "> " + Format("%.4f", LeastReferenceCorrelation) +
-        ", largest <= " + Format("%.0e", LargestReferenceError),
-      [](const Comparison& c)
-      { return c.correlation > LeastReferenceCorrelation && c.largest <= LargestReferenceError; });
+      "> " + Format("%.4f", MinimumReferenceCorrelation) +
+        ", largest <= " + Format("%.0e", MaximumReferenceError),
+      [](const Comparison& c) {
+        return c.correlation > MinimumReferenceCorrelation && c.maximum <= MaximumReferenceError;
+      });
 #if defined(DYNAMICCORONARY_WITH_ITK)
     if (!options.withoutPeer)
     {
       const SharedArray<float> itk(CountOf(n));
       MeasureItk(*image, variant.settings, true, options.threads, &itk);
-      row("ours, ITK", ours.data(), itk.data(), "> " + Format("%.3f", LeastCorrelation),
-        [](const Comparison& c) { return c.correlation > LeastCorrelation; });
+      row("ours, ITK", ours.data(), itk.data(), "> " + Format("%.3f", MinimumCorrelation),
+        [](const Comparison& c) { return c.correlation > MinimumCorrelation; });
       row(
         "ITK, reference", itk.data(), reference.data(), "", [](const Comparison&) { return true; });
     }

@@ -14,10 +14,10 @@ inline coronary::MotionRegularizationSettings NoLimits()
 {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   coronary::MotionRegularizationSettings settings;
-  settings.greatestBending = EIGEN_PI;
-  settings.leastCurvatureRadius = 0.0;
-  settings.greatestStrain = infinity;
-  settings.greatestStep = infinity;
+  settings.maximumBending = EIGEN_PI;
+  settings.minimumCurvatureRadius = 0.0;
+  settings.maximumStrain = infinity;
+  settings.maximumStep = infinity;
   return settings;
 }
 

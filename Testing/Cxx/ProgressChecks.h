@@ -20,12 +20,12 @@
 
 /// The largest step from one report of progress to the next during an update. On one thread: with more,
 /// the one that reports may be asleep while others work.
-inline double LargestProgressStep(vtkAlgorithm* algorithm)
+inline double MaximumProgressStep(vtkAlgorithm* algorithm)
 {
   struct Seen
   {
     double last = 0.0;
-    double largest = 0.0;
+    double maximum = 0.0;
   } seen;
   vtkNew<vtkCallbackCommand> watch;
   watch->SetClientData(&seen);
@@ -35,7 +35,7 @@ inline double LargestProgressStep(vtkAlgorithm* algorithm)
       auto& progress = *static_cast<Seen*>(data);
       const double now = static_cast<vtkAlgorithm*>(sender)->GetProgress();
       EXPECT_GE(now, progress.last - 1e-12);
-      progress.largest = std::max(progress.largest, now - progress.last);
+      progress.maximum = std::max(progress.maximum, now - progress.last);
       progress.last = now;
     });
   const unsigned long tag = algorithm->AddObserver(vtkCommand::ProgressEvent, watch);
@@ -44,7 +44,7 @@ inline double LargestProgressStep(vtkAlgorithm* algorithm)
   coronary::SetNumberOfThreads(0);
   algorithm->RemoveObserver(tag);
   EXPECT_EQ(seen.last, 1.0);
-  return seen.largest;
+  return seen.maximum;
 }
 
 /// Updates, aborts when progress has come to `share`, and says how many seconds that took; no time at

@@ -14,14 +14,14 @@ constexpr double Degrees = 180.0 / 3.14159265358979323846;
 
 double SurfaceMeasures::WorstAngle() const
 {
-  return this->smallestAngle.empty()
+  return this->minimumAngle.empty()
     ? 0.0
-    : *std::min_element(this->smallestAngle.begin(), this->smallestAngle.end());
+    : *std::min_element(this->minimumAngle.begin(), this->minimumAngle.end());
 }
 
 double SurfaceMeasures::ShareBelow(double degrees) const
 {
-  const auto below = std::count_if(this->smallestAngle.begin(), this->smallestAngle.end(),
+  const auto below = std::count_if(this->minimumAngle.begin(), this->minimumAngle.end(),
     [=](double angle) { return angle < degrees; });
   return static_cast<double>(below) / std::max<double>(1.0, static_cast<double>(this->triangles));
 }
@@ -43,7 +43,7 @@ SurfaceMeasures MeasureSurface(
   halves.reserve(3 * triangles.size());
   for (std::size_t t = 0; t < triangles.size(); ++t)
   {
-    double smallest = 180.0;
+    double minimum = 180.0;
     for (int c = 0; c < 3; ++c)
     {
       const std::int64_t a = triangles[t][c];
@@ -51,9 +51,9 @@ SurfaceMeasures MeasureSurface(
       halves.push_back({ std::min(a, b), std::max(a, b), a < b, static_cast<std::int64_t>(t) });
       const Vector3 u = points[b] - points[a];
       const Vector3 v = points[triangles[t][(c + 2) % 3]] - points[a];
-      smallest = std::min(smallest, Degrees * std::atan2(u.cross(v).norm(), u.dot(v)));
+      minimum = std::min(minimum, Degrees * std::atan2(u.cross(v).norm(), u.dot(v)));
     }
-    result.smallestAngle.push_back(smallest);
+    result.minimumAngle.push_back(minimum);
     const Vector3& a = points[triangles[t][0]];
     const Vector3& b = points[triangles[t][1]];
     const Vector3& c = points[triangles[t][2]];

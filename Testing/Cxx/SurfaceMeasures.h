@@ -25,7 +25,7 @@ struct SurfaceMeasures
   std::int64_t eulerCharacteristic = 0; ///< 2 for each closed component of genus 0
   double volume = 0.0;                  ///< mm^3, positive when oriented outwards
   double area = 0.0;                    ///< mm^2
-  std::vector<double> smallestAngle;    ///< of each triangle, degrees
+  std::vector<double> minimumAngle;     ///< of each triangle, degrees
 
   bool Closed() const { return this->openEdges == 0 && this->badEdges == 0; }
   bool Manifold() const { return this->badEdges == 0 && this->badPoints == 0; }

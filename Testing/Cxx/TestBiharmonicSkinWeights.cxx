@@ -195,13 +195,13 @@ TEST(BiharmonicSkinWeightsFilter, WeightsOfAComb)
     }
     EXPECT_NEAR(sum, 1.0, 1e-9);
     double kept = 0.0;
-    double greatest = 1.0;
+    double maximum = 1.0;
     for (int k = 0; k < 8; ++k)
     {
       const auto b = static_cast<int>(bones->GetComponent(i, k));
       const double w = compact->GetComponent(i, k);
-      EXPECT_LE(w, greatest + 1e-6);
-      greatest = w;
+      EXPECT_LE(w, maximum + 1e-6);
+      maximum = w;
       kept += w;
       EXPECT_EQ(b < 0, w == 0.0);
       if (b >= 0)
@@ -331,8 +331,8 @@ TEST(BiharmonicSkinWeightsFilter, PhantomTreesWithTheBonesAmongTheEdges)
     EXPECT_GT(Field(output, "WeightsEnergy"), 0.0);
     vtkDataArray* all = PointArray(output, "BoneWeights");
     vtkDataArray* few = PointArray(output, "BoneWeightsCompact");
-    double least = 0.0;
-    double greatest = 0.0;
+    double minimum = 0.0;
+    double maximum = 0.0;
     double worst = 0.0;
     for (vtkIdType i = 0; i < all->GetNumberOfTuples(); ++i)
     {
@@ -341,8 +341,8 @@ TEST(BiharmonicSkinWeightsFilter, PhantomTreesWithTheBonesAmongTheEdges)
       {
         const double w = all->GetComponent(i, b);
         ASSERT_TRUE(std::isfinite(w));
-        least = std::min(least, w);
-        greatest = std::max(greatest, w);
+        minimum = std::min(minimum, w);
+        maximum = std::max(maximum, w);
         sum += w;
       }
       worst = std::max(worst, std::abs(sum - 1.0));
@@ -355,12 +355,12 @@ TEST(BiharmonicSkinWeightsFilter, PhantomTreesWithTheBonesAmongTheEdges)
     }
     EXPECT_LE(worst, 1e-6);
     // They overshoot without bounds, but stay weights.
-    EXPECT_EQ(least < -0.01, !bounded);
-    EXPECT_EQ(greatest > 1.01, !bounded);
-    EXPECT_GT(least, -5.0);
-    EXPECT_LT(greatest, 5.0);
-    RecordProperty("least" + std::to_string(mode), std::to_string(least));
-    RecordProperty("greatest" + std::to_string(mode), std::to_string(greatest));
+    EXPECT_EQ(minimum < -0.01, !bounded);
+    EXPECT_EQ(maximum > 1.01, !bounded);
+    EXPECT_GT(minimum, -5.0);
+    EXPECT_LT(maximum, 5.0);
+    RecordProperty("least" + std::to_string(mode), std::to_string(minimum));
+    RecordProperty("greatest" + std::to_string(mode), std::to_string(maximum));
   }
 }
 

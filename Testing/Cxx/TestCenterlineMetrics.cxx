@@ -513,8 +513,8 @@ TEST(CenterlineMetrics, PrintsItsSettings)
   filter->SetRelevantRadius(0.6);
   std::ostringstream text;
   filter->Print(text);
-  for (const char* name : { "Method: 0", "RelevantRadius: 0.6", "LeastRadius: 0", "Tolerance: 1",
-         "DetectedShare: 0.8", "LeastLength: 3" })
+  for (const char* name : { "Method: 0", "RelevantRadius: 0.6", "MinimumRadius: 0", "Tolerance: 1",
+         "DetectedShare: 0.8", "MinimumLength: 3" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }

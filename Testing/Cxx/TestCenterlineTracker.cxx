@@ -119,18 +119,18 @@ double AxisError(vtkPolyData* found, const coronary::PhantomTree& truth)
       continue;
     }
     const Vector3 place(found->GetPoint(n));
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (const coronary::VesselTree::Branch& branch : truth.branches)
     {
       for (std::size_t p = 0; p + 1 < branch.points.size(); ++p)
       {
-        least = std::min(least,
+        minimum = std::min(minimum,
           coronary::NearestOnSegment(
             place, truth.points[branch.points[p]], truth.points[branch.points[p + 1]])
             .squaredDistance);
       }
     }
-    sum += std::sqrt(least);
+    sum += std::sqrt(minimum);
     ++count;
   }
   return sum / static_cast<double>(count);
@@ -267,15 +267,15 @@ TEST(CenterlineTracker, MovesTheSkeleton)
   {
     double joint[3];
     posed->GetPoint(n, joint);
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (vtkIdType p = 0; p < tree->GetNumberOfPoints(); ++p)
     {
       double point[3];
       tree->GetPoint(p, point);
-      least =
-        std::min(least, std::hypot(point[0] - joint[0], point[1] - joint[1], point[2] - joint[2]));
+      minimum = std::min(
+        minimum, std::hypot(point[0] - joint[0], point[1] - joint[1], point[2] - joint[2]));
     }
-    EXPECT_LT(least, 0.5);
+    EXPECT_LT(minimum, 0.5);
   }
 
   // The two outputs may be asked for different times.

@@ -146,7 +146,7 @@ TEST_P(TestCoronaryPipelineNames, AreThoseOfAnotherSetting)
   const std::vector<NamedPiece> usual = this->Names("default");
   ASSERT_GT(usual.size(), 300U);
   // In coarse voxels the dominance may be in doubt, and with it one name behind.
-  for (const auto& [other, least] :
+  for (const auto& [other, minimum] :
     { std::pair("narrow", 0.97), std::pair("seeds", 0.97), std::pair("voxels", 0.95) })
   {
     const Agreement agreement = Compare(usual, this->Names(other));
@@ -157,7 +157,7 @@ TEST_P(TestCoronaryPipelineNames, AreThoseOfAnotherSetting)
     }
     // Coarser voxels show less of the thin ends.
     EXPECT_GT(agreement.both, 0.8 * agreement.all) << other;
-    EXPECT_GT(agreement.same, least * agreement.both) << other << ":" << changed;
+    EXPECT_GT(agreement.same, minimum * agreement.both) << other << ":" << changed;
   }
 }
 

@@ -120,17 +120,17 @@ TEST(FastMarchingCenterline, ThePhantomsTreeFromItsImage)
   const auto nearest = [](vtkPolyData* data, const Vector3& p)
   {
     vtkIdType best = 0;
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
     {
       const double d = (Vector3(data->GetPoint(n)) - p).squaredNorm();
-      if (d < least)
+      if (d < minimum)
       {
-        least = d;
+        minimum = d;
         best = n;
       }
     }
-    return std::make_pair(best, std::sqrt(least));
+    return std::make_pair(best, std::sqrt(minimum));
   };
   int found = 0;
   int all = 0;
@@ -391,12 +391,12 @@ TEST(FastMarchingCenterline, CoronariesOfTheVisibleHuman)
   for (vtkIdType n = 0; n < surface->GetNumberOfPoints(); n += 7)
   {
     const Vector3 p(surface->GetPoint(n));
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (vtkIdType m = 0; m < tree->GetNumberOfPoints(); ++m)
     {
-      least = std::min(least, (Vector3(tree->GetPoint(m)) - p).norm() / radius->GetTuple1(m));
+      minimum = std::min(minimum, (Vector3(tree->GetPoint(m)) - p).norm() / radius->GetTuple1(m));
     }
-    missed += least > 2.5 ? 1 : 0;
+    missed += minimum > 2.5 ? 1 : 0;
   }
   const double share = 7.0 * missed / static_cast<double>(surface->GetNumberOfPoints());
   std::cout << tree->GetNumberOfLines() << " branches, " << 100.0 * share
@@ -434,12 +434,13 @@ TEST(FastMarchingCenterline, AortaAgreesWithVmtk)
   double sum = 0.0;
   for (vtkIdType n = 0; n < tree->GetNumberOfPoints(); ++n)
   {
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (vtkIdType m = 0; m < theirs->GetNumberOfPoints(); ++m)
     {
-      least = std::min(least, (Vector3(theirs->GetPoint(m)) - Vector3(tree->GetPoint(n))).norm());
+      minimum =
+        std::min(minimum, (Vector3(theirs->GetPoint(m)) - Vector3(tree->GetPoint(n))).norm());
     }
-    sum += least / static_cast<double>(tree->GetNumberOfPoints());
+    sum += minimum / static_cast<double>(tree->GetNumberOfPoints());
   }
   std::cout << tree->GetNumberOfLines() << " branches, mean distance " << sum << " mm\n";
   EXPECT_LT(sum, 0.5 * 0.879);

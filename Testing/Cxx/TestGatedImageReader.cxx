@@ -386,7 +386,7 @@ TEST(GatedImageReader, AbortAndProgress)
   {
     int calls = 0;
     double last = 0.0;
-    double largestStep = 0.0;
+    double maximumStep = 0.0;
     bool abort = false;
   } watch;
   vtkNew<vtkCallbackCommand> command;
@@ -396,7 +396,7 @@ TEST(GatedImageReader, AbortAndProgress)
     {
       auto* w = static_cast<Watch*>(data);
       const double now = *static_cast<double*>(amount);
-      w->largestStep = std::max(w->largestStep, now - w->last);
+      w->maximumStep = std::max(w->maximumStep, now - w->last);
       w->last = now;
       ++w->calls;
       if (w->abort && now > 0.3)
@@ -409,7 +409,7 @@ TEST(GatedImageReader, AbortAndProgress)
   reader->AddObserver(vtkCommand::ProgressEvent, command);
   reader->Update();
   EXPECT_GE(watch.calls, 50);
-  EXPECT_LE(watch.largestStep, 0.02);
+  EXPECT_LE(watch.maximumStep, 0.02);
   EXPECT_EQ(reader->GetOutput()->GetNumberOfPoints(), 64 * 64 * 100);
   watch = Watch();
   watch.abort = true;

@@ -315,12 +315,12 @@ TEST(MeshDistanceMetrics, PhantomAgainstItselfAtAnotherTime)
   EXPECT_GT(Total(table, "HD"), 2.0);
   EXPECT_LT(Total(table, "MSD"), Total(table, "HD"));
   EXPECT_NE(table->GetFieldData()->GetAbstractArray("PhaseTime"), nullptr);
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (vtkIdType row = 0; row + 1 < table->GetNumberOfRows(); ++row)
   {
-    greatest = std::max(greatest, table->GetValueByName(row, "HD").ToDouble());
+    maximum = std::max(maximum, table->GetValueByName(row, "HD").ToDouble());
   }
-  EXPECT_EQ(greatest, Total(table, "HD"));
+  EXPECT_EQ(maximum, Total(table, "HD"));
   const double mean = Total(table, "MSD_area");
   coronary::SetNumberOfThreads(1);
   filter->Modified();
@@ -406,7 +406,7 @@ TEST(MeshDistanceMetrics, ProgressAndAbort)
   vtkNew<vtkMeshDistanceMetrics> filter;
   filter->SetInputData(Ball(2.0, 0.3, 6));
   filter->SetReferenceData(Ball(1.9, 0.0, 6));
-  EXPECT_LE(LargestProgressStep(filter), 0.021);
+  EXPECT_LE(MaximumProgressStep(filter), 0.021);
   filter->Modified();
   UpdateAborted(filter);
   EXPECT_EQ(filter->GetTable()->GetNumberOfRows(), 0);

@@ -341,8 +341,8 @@ TEST_F(TestMeshSequenceWriter, AllPhasesHaveOneTopologyAndTheIdsOfTheBoundary)
     const auto quality = Measure(volume);
     EXPECT_EQ(Values(volume->GetCellData(), "TetrahedronVolume"), quality.volume);
     EXPECT_EQ(Values(volume->GetCellData(), "MinimumDihedralAngle"), quality.minimumDihedral);
-    EXPECT_EQ(
-      Values(volume->GetFieldData(), "LeastDihedralAngle").at(0), quality.leastDihedralAngle);
+    EXPECT_EQ(Values(volume->GetFieldData(), "MeshMinimumDihedralAngle").at(0),
+      quality.minimumDihedralAngle);
     EXPECT_TRUE(Values(volume->GetFieldData(), "InvertedTetrahedra").empty());
     EXPECT_NEAR(Enclosed(surface), quality.totalVolume, 1e-9 * quality.totalVolume);
     vtkTable* table = this->Writer->GetQuality();
@@ -352,8 +352,8 @@ TEST_F(TestMeshSequenceWriter, AllPhasesHaveOneTopologyAndTheIdsOfTheBoundary)
   }
   // Shear keeps the volume of a bar: 3 x 3 x 10 mm.
   EXPECT_NEAR(this->Writer->GetQuality()->GetValueByName(4, "TotalVolume").ToDouble(), 90.0, 0.05);
-  EXPECT_LT(this->Writer->GetQuality()->GetValueByName(4, "LeastDihedralAngle").ToDouble(),
-    this->Writer->GetQuality()->GetValueByName(0, "LeastDihedralAngle").ToDouble());
+  EXPECT_LT(this->Writer->GetQuality()->GetValueByName(4, "MeshMinimumDihedralAngle").ToDouble(),
+    this->Writer->GetQuality()->GetValueByName(0, "MeshMinimumDihedralAngle").ToDouble());
   EXPECT_FALSE(fs::exists(this->Folder / "bar_simvascular"));
   EXPECT_FALSE(fs::exists(this->Folder / "bar_vmtk.pvd"));
   EXPECT_EQ(this->Report()["phases"].size(), 5U);
@@ -550,7 +550,7 @@ TEST_F(TestMeshSequenceWriter, AFoldIsReportedWhereItIs)
     std::vector<double>(quality.inverted.begin(), quality.inverted.end()));
   EXPECT_EQ(this->Writer->GetQuality()->GetValueByName(0, "InvertedTetrahedra").ToDouble(),
     static_cast<double>(quality.inverted.size()));
-  EXPECT_LT(this->Writer->GetQuality()->GetValueByName(0, "LeastVolume").ToDouble(), 0.0);
+  EXPECT_LT(this->Writer->GetQuality()->GetValueByName(0, "MeshMinimumVolume").ToDouble(), 0.0);
   std::ifstream csv(this->Folder / "bar_quality.csv");
   std::string line;
   ASSERT_TRUE(std::getline(csv, line) && std::getline(csv, line));
@@ -740,7 +740,7 @@ TEST_F(TestMeshSequenceWriter, GltfShowsTheMovedSurface)
   std::ifstream stream(this->Folder / "bar_skin.glb", std::ios::binary);
   const GltfEvaluator file(std::string(std::istreambuf_iterator<char>(stream), {}));
   ASSERT_EQ(file.Times().size(), 11U);
-  double largestMove = 0.0;
+  double maximumMove = 0.0;
   for (int k = 0; k < 11; ++k)
   {
     const auto surface =
@@ -769,12 +769,12 @@ TEST_F(TestMeshSequenceWriter, GltfShowsTheMovedSurface)
       {
         const coronary::Vector3 truth(surface->GetPoint(point));
         ASSERT_LT((vertices[n] - truth).norm(), 1e-4) << "key " << k;
-        largestMove = std::max(largestMove, (rest[n] - truth).norm());
+        maximumMove = std::max(maximumMove, (rest[n] - truth).norm());
         ++n;
       }
     }
   }
-  EXPECT_GT(largestMove, 2.0);
+  EXPECT_GT(maximumMove, 2.0);
 
   // VTK's own reader. A new one each time: asked for a second time, it leaves the last primitive where it was.
   for (const int key : { 3, 8 })

@@ -140,7 +140,7 @@ TEST(MotionRegularizer, SolvesOnceAndAnswersEveryStep)
     0.005 * Field(filter, "TemporalEnergy", 1) + 0.1 * Field(filter, "SpatialEnergy", 1), 1e-9);
   EXPECT_GT(Field(filter, "ClampedPoints", 2), 0);
   EXPECT_EQ(Field(filter, "LimitViolations"), 0);
-  EXPECT_NEAR(Field(filter, "GreatestMove"), 9.0, 0.2);
+  EXPECT_NEAR(Field(filter, "MaximumMove"), 9.0, 0.2);
   // Other weights: solved again, not read again.
   filter->SetSpatialWeight(0.2);
   filter->UpdateTimeStep(0.4);
@@ -319,16 +319,16 @@ TEST(MotionRegularizer, RefusesWithOneMessage)
     "VelocityWeight must", [&] { filter->SetVelocityWeight(-1); },
     [&] { filter->SetVelocityWeight(0); });
   setting(
-    "GreatestBending must", [&] { filter->SetGreatestBending(181); },
-    [&] { filter->SetGreatestBending(180); });
+    "MaximumBending must", [&] { filter->SetMaximumBending(181); },
+    [&] { filter->SetMaximumBending(180); });
   setting(
-    "LeastCurvatureRadius must", [&] { filter->SetLeastCurvatureRadius(-1); },
-    [&] { filter->SetLeastCurvatureRadius(0); });
+    "MinimumCurvatureRadius must", [&] { filter->SetMinimumCurvatureRadius(-1); },
+    [&] { filter->SetMinimumCurvatureRadius(0); });
   setting(
-    "GreatestStrain must", [&] { filter->SetGreatestStrain(0.95); },
-    [&] { filter->SetGreatestStrain(0); });
+    "MaximumStrain must", [&] { filter->SetMaximumStrain(0.95); },
+    [&] { filter->SetMaximumStrain(0); });
   setting(
-    "GreatestStep must", [&] { filter->SetGreatestStep(-1); }, [&] { filter->SetGreatestStep(0); });
+    "MaximumStep must", [&] { filter->SetMaximumStep(-1); }, [&] { filter->SetMaximumStep(0); });
   setting(
     "WellTracked must", [&] { filter->SetWellTracked(2); }, [&] { filter->SetWellTracked(0.8); });
   setting(

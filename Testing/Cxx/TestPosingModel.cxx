@@ -101,9 +101,9 @@ TEST_F(TestPosingModel, BeginsAtRest)
   EXPECT_TRUE(model->Daughters(4).empty());
   EXPECT_FALSE(model->CanUndo());
   EXPECT_FALSE(model->CanRedo());
-  EXPECT_LT(model->Report().greatestDisplacement, 1e-5);
-  EXPECT_NEAR(model->Report().leastVolumeRatio, 1.0, 1e-4);
-  EXPECT_NEAR(model->Report().greatestVolumeRatio, 1.0, 1e-4);
+  EXPECT_LT(model->Report().maximumDisplacement, 1e-5);
+  EXPECT_NEAR(model->Report().minimumVolumeRatio, 1.0, 1e-4);
+  EXPECT_NEAR(model->Report().maximumVolumeRatio, 1.0, 1e-4);
   EXPECT_EQ(model->Report().inverted, 0);
 }
 
@@ -134,7 +134,7 @@ TEST_F(TestPosingModel, WhatIsBeyondGoesWithAJoint)
     }
   }
   EXPECT_GT(far, 0);
-  EXPECT_NEAR(model->Report().greatestStrain, std::hypot(2.0, 6.0) / 5.0 - 1.0, 1e-12);
+  EXPECT_NEAR(model->Report().maximumStrain, std::hypot(2.0, 6.0) / 5.0 - 1.0, 1e-12);
 }
 
 TEST_F(TestPosingModel, OnlyTheJointMovesAlone)
@@ -166,15 +166,15 @@ TEST_F(TestPosingModel, TheSkinIsThatOfTheFilter)
   filter->Update();
   auto* wanted = vtkPointSet::SafeDownCast(filter->GetOutputDataObject(0));
   ASSERT_EQ(wanted->GetNumberOfPoints(), model->Skin()->GetNumberOfPoints());
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (vtkIdType n = 0; n < wanted->GetNumberOfPoints(); ++n)
   {
     EXPECT_EQ(Vector3(wanted->GetPoint(n)), Vector3(model->Skin()->GetPoint(n))) << n;
     const double* was = model->BoundaryAtRest()->GetPoint(n);
-    greatest = std::max(greatest, (Vector3(wanted->GetPoint(n)) - Vector3(was)).norm());
+    maximum = std::max(maximum, (Vector3(wanted->GetPoint(n)) - Vector3(was)).norm());
   }
-  EXPECT_NEAR(model->Report().greatestDisplacement, greatest, 1e-5);
-  EXPECT_GT(greatest, 2.0);
+  EXPECT_NEAR(model->Report().maximumDisplacement, maximum, 1e-5);
+  EXPECT_GT(maximum, 2.0);
 }
 
 TEST_F(TestPosingModel, BonesShareABendAndKeepTheirLengths)
@@ -188,7 +188,7 @@ TEST_F(TestPosingModel, BonesShareABendAndKeepTheirLengths)
   model->EndMove();
   EXPECT_LT((model->Joint(4) - wanted).norm(), 1e-6);
   EXPECT_LT((model->Joint(1) - Vector3(0.0, 0.0, 5.0)).norm(), 1e-12);
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (int joint = 1; joint <= Bones; ++joint)
   {
     EXPECT_NEAR(LengthInto(*model, joint), 5.0, 1e-10) << joint;
@@ -196,12 +196,12 @@ TEST_F(TestPosingModel, BonesShareABendAndKeepTheirLengths)
     const Vector3 before = joint > 1
       ? Vector3((model->Joint(joint - 1) - model->Joint(joint - 2)).normalized())
       : Vector3::UnitZ();
-    greatest = std::max(greatest, std::acos(std::min(1.0, along.dot(before))));
+    maximum = std::max(maximum, std::acos(std::min(1.0, along.dot(before))));
   }
   // With equal turns the chord of three bones is 5 (1 + 2 cos turn).
   const double evenest = std::acos(0.5 * (std::hypot(4.0, 13.0) / 5.0 - 1.0));
-  EXPECT_LT(greatest, 1.25 * evenest);
-  EXPECT_LT(model->Report().greatestStrain, 1e-10);
+  EXPECT_LT(maximum, 1.25 * evenest);
+  EXPECT_LT(model->Report().maximumStrain, 1e-10);
   EXPECT_EQ(model->Report().inverted, 0);
 }
 
@@ -218,7 +218,7 @@ TEST_F(TestPosingModel, OutOfReachABoneKeepsItsLengthOrStretches)
   model->SetSettings(Dragging(JointDrag::Turn, 2, false));
   model->Move({ 30.0, 0.0, 0.0 });
   EXPECT_LT((model->Joint(4) - Vector3(30.0, 0.0, 20.0)).norm(), 1e-9);
-  EXPECT_GT(model->Report().greatestStrain, 1.0);
+  EXPECT_GT(model->Report().maximumStrain, 1.0);
 }
 
 TEST_F(TestPosingModel, UndoRedoAndResetAreExact)

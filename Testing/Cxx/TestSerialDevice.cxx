@@ -182,8 +182,8 @@ public:
     {
       const double before = this->input.drive.wirePosition;
       this->input = this->mux.Next(this->tick, Tick);
-      this->largestStep =
-        std::max(this->largestStep, std::abs(this->input.drive.wirePosition - before));
+      this->maximumStep =
+        std::max(this->maximumStep, std::abs(this->input.drive.wirePosition - before));
       ++this->tick;
     }
     if (this->tick < due)
@@ -242,7 +242,7 @@ public:
   SessionInput input;
   ForceFrame force;
   bool beats = true;
-  double largestStep = 0.0;
+  double maximumStep = 0.0;
   std::uint64_t tick = 0;
 
 private:
@@ -349,11 +349,11 @@ TEST(SerialDevice, PulledOutAndBack)
   EXPECT_EQ(loop.input.drive.wirePosition, held.drive.wirePosition);
   EXPECT_EQ(loop.input.syringe, held.syringe);
   EXPECT_TRUE(Contains(loop.device->Status().text, hardware.Path()));
-  loop.largestStep = 0.0;
+  loop.maximumStep = 0.0;
   hardware.pulled = false;
   ASSERT_TRUE(loop.Reaches(DeviceState::Running));
   loop.Until([&] { return loop.input.drive.wirePosition > held.drive.wirePosition + 5.0; }, 5.0);
-  EXPECT_LT(loop.largestStep, 0.5); // mm in a tick; the hands had moved by 10 and more
+  EXPECT_LT(loop.maximumStep, 0.5); // mm in a tick; the hands had moved by 10 and more
   EXPECT_TRUE(loop.device->Status().awaitsForces);
   EXPECT_EQ(hardware.motor, 0.0);
 }

@@ -201,13 +201,13 @@ TEST(SkeletonPose, ReportsOftenAndStopsAtOnce)
   const auto posed = ChainSkeleton(400);
   vtkNew<vtkSkeletonPose> filter;
   filter->SetInputData(ChainSkeleton(400));
-  EXPECT_LT(LargestProgressStep(filter), 0.02);
+  EXPECT_LT(MaximumProgressStep(filter), 0.02);
   filter->SetInputData(1, posed);
   for (int n = 0; n < 300; ++n)
   {
     filter->AddEdit(n, 0, 0, 1, 0, 0, 0, 0, 1.1, 50);
   }
-  EXPECT_LT(LargestProgressStep(filter), 0.02);
+  EXPECT_LT(MaximumProgressStep(filter), 0.02);
   for (const double share : { 0.0, 0.005, 0.5, 0.99 })
   {
     Messages messages(filter);

@@ -542,9 +542,9 @@ TEST(SkinDeformation, ReportsOftenAndStopsAtOnce)
   blocks->DoublePrecisionOn();
   for (const auto& filter : { surface.Get(), grid.Get(), blocks.Get() })
   {
-    EXPECT_LT(LargestProgressStep(filter), 0.02);
+    EXPECT_LT(MaximumProgressStep(filter), 0.02);
     filter->Modified(); // the mesh is remembered: other shares of the time
-    EXPECT_LT(LargestProgressStep(filter), 0.02);
+    EXPECT_LT(MaximumProgressStep(filter), 0.02);
     const vtkIdType points =
       filter->GetOutputDataObject(0)->GetNumberOfElements(vtkDataObject::POINT);
     EXPECT_GT(points, 100);
@@ -660,9 +660,9 @@ TEST(SkinDeformation, RefusesWithOneMessage)
   filter->SetVolumeConservation(2.0);
   refuse("VolumeConservation", whole);
   filter->SetVolumeConservation(0.0);
-  filter->SetLeastVolumeRatio(0.7);
-  refuse("LeastVolumeRatio", whole);
-  filter->SetLeastVolumeRatio(0.0);
+  filter->SetMinimumVolumeRatio(0.7);
+  refuse("MinimumVolumeRatio", whole);
+  filter->SetMinimumVolumeRatio(0.0);
   filter->Modified();
   filter->Update();
   EXPECT_GT(Output(filter)->GetNumberOfPoints(), 0);

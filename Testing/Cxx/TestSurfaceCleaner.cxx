@@ -132,7 +132,7 @@ TEST(SurfaceCleaner, ClosesATubeAndKeepsItsData)
   EXPECT_EQ(Field(surface, "Caps"), 2.0);
   EXPECT_EQ(Field(surface, "OpenEdges"), 0.0);
   EXPECT_EQ(Field(surface, "SelfIntersections"), 0.0);
-  EXPECT_LT(Field(surface, "GreatestDisplacement"), 1e-12);
+  EXPECT_LT(Field(surface, "MaximumDisplacement"), 1e-12);
   auto* repairs =
     vtkStringArray::SafeDownCast(surface->GetFieldData()->GetAbstractArray("Repairs"));
   ASSERT_NE(repairs, nullptr);
@@ -244,7 +244,7 @@ TEST(SurfaceCleaner, PrintsItsSettings)
   std::ostringstream text;
   filter->Print(text);
   for (const char* name :
-    { "SmallestComponent: 0.01", "JoinDistance: 1", "FillHoles: 1", "CapEnds: 1",
+    { "MinimumComponentShare: 0.01", "JoinDistance: 1", "FillHoles: 1", "CapEnds: 1",
       "ResolveIntersections: 1", "MinimumAngle: 10", "EntityArrayName: CellEntityIds" })
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
@@ -295,8 +295,8 @@ TEST(SurfaceCleaner, ForeignSurfacesComeOutClosedAndAreMeshed)
     mesher->Update();
     ASSERT_GT(mesher->GetOutput()->GetNumberOfCells(), 0);
     EXPECT_EQ(Field(mesher->GetOutput(), "Tries"), 1.0);
-    EXPECT_GT(Field(mesher->GetOutput(), "LeastVolume"), 1e-7);
-    EXPECT_GE(Field(mesher->GetOutput(), "LeastDihedralAngle"), 5.0 * M_PI / 180.0);
+    EXPECT_GT(Field(mesher->GetOutput(), "MeshMinimumVolume"), 1e-7);
+    EXPECT_GE(Field(mesher->GetOutput(), "MeshMinimumDihedralAngle"), 5.0 * M_PI / 180.0);
     EXPECT_LE(Field(mesher->GetOutput(), "PoorFraction"), 0.01);
   }
 }

@@ -131,7 +131,7 @@ TEST_F(TetrahedralMesher, CubeWithALine)
   }
   EXPECT_NEAR(sum, 1.0, 1e-12);
   EXPECT_NEAR(Field(volume, "TotalVolume"), 1.0, 1e-12);
-  EXPECT_DOUBLE_EQ(Field(volume, "LeastDihedralAngle"), angles->GetRange()[0]);
+  EXPECT_DOUBLE_EQ(Field(volume, "MeshMinimumDihedralAngle"), angles->GetRange()[0]);
   EXPECT_EQ(Field(volume, "Tries"), 1.0);
   EXPECT_EQ(
     vtkStringArray::SafeDownCast(volume->GetFieldData()->GetAbstractArray("Backend"))->GetValue(0),
@@ -200,9 +200,9 @@ TEST_F(TetrahedralMesher, PhantomTreesReachTheNumbers)
   filter->Update();
   vtkUnstructuredGrid* volume = filter->GetOutput();
   ASSERT_GT(volume->GetNumberOfCells(), 10000);
-  EXPECT_GE(Field(volume, "LeastDihedralAngle"), 5.0 * M_PI / 180.0);
+  EXPECT_GE(Field(volume, "MeshMinimumDihedralAngle"), 5.0 * M_PI / 180.0);
   EXPECT_LE(Field(volume, "PoorFraction"), 0.01);
-  EXPECT_GT(Field(volume, "LeastVolume"), 1e-7);
+  EXPECT_GT(Field(volume, "MeshMinimumVolume"), 1e-7);
   EXPECT_EQ(volume->GetCellData()->GetArray("RegionIds")->GetRange()[1], 1.0);
   // Every point of the trees, but for the doubled ones where branches meet.
   vtkPolyData* tree =

@@ -285,9 +285,9 @@ TEST(VesselSegmentation, SaysWhatIsWrong)
       << "wanted '" << word << "', got " << testing::PrintToString(messages.Errors);
     EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0) << word;
   };
-  refuse([](auto* f) { f->SetLargestRadius(0.0); }, "LargestRadius");
+  refuse([](auto* f) { f->SetMaximumRadius(0.0); }, "MaximumRadius");
   refuse([](auto* f) { f->SetLongestPath(-1.0); }, "LongestPath");
-  refuse([](auto* f) { f->SetSmallestIsland(-1.0); }, "SmallestIsland");
+  refuse([](auto* f) { f->SetMinimumIslandVolume(-1.0); }, "MinimumIslandVolume");
   refuse([](auto* f) { f->SetWeakThreshold(0.9); }, "WeakThreshold");
   refuse([](auto* f) { f->SetTubularVesselness(-1.0); }, "TubularVesselness");
   refuse(
@@ -408,7 +408,7 @@ TEST(VesselSegmentation, PrintsItsSettings)
   filter->AddSeed(1.0, 2.0, 3.0);
   std::ostringstream text;
   filter->Print(text);
-  for (const char* word : { "Seed 0: 1 2 3", "AutomaticOstia", "LargestRadius" })
+  for (const char* word : { "Seed 0: 1 2 3", "AutomaticOstia", "MaximumRadius" })
   {
     EXPECT_NE(text.str().find(word), std::string::npos) << word;
   }

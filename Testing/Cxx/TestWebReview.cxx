@@ -36,7 +36,7 @@ using Json = nlohmann::json;
 
 constexpr const char* Hostile =
   "</script><script>alert(1)</script> <b>&amp; \"'\\ \xF0\x9F\xAB\x80 \xFF";
-constexpr double LargestError = 0.01;
+constexpr double MaximumError = 0.01;
 
 /// A forked tree of lines that moves to the left and grows.
 vtkSmartPointer<vtkPolyData> Tree(double left, double stretch, int steps = 30)
@@ -298,7 +298,7 @@ TEST_F(WebReviewPage, AllTrianglesComeBackWithinTheStatedError)
         {
           // Points are of single precision.
           const double stated = 0.5 * layout["step"][axis].get<double>() + 5e-6;
-          ASSERT_LT(stated, LargestError);
+          ASSERT_LT(stated, MaximumError);
           ASSERT_NEAR(decoded.positions[std::size_t(k)][n][axis], own.points[n][axis], stated);
         }
         ASSERT_NEAR(decoded.distances[std::size_t(k)][n], expected.pointDistancesA[n],
@@ -306,14 +306,14 @@ TEST_F(WebReviewPage, AllTrianglesComeBackWithinTheStatedError)
       }
     }
     EXPECT_EQ(layout["deviation"], 0.0);
-    EXPECT_LT(layout["distance_step"].get<double>(), LargestError);
+    EXPECT_LT(layout["distance_step"].get<double>(), MaximumError);
   }
   // Outside and inside.
   const Decoded model(shapes["model"], bytes);
-  const auto [least, greatest] =
+  const auto [minimum, maximum] =
     std::minmax_element(model.distances[0].begin(), model.distances[0].end());
-  EXPECT_LT(*least, -0.5);
-  EXPECT_GT(*greatest, 1.0);
+  EXPECT_LT(*minimum, -0.5);
+  EXPECT_GT(*maximum, 1.0);
 }
 
 TEST_F(WebReviewPage, AResultWithoutATruthHasDashesWhereItWasGuessed)
@@ -393,7 +393,7 @@ TEST_F(WebReviewPage, ReducedSurfacesKeepPointsAndSayHowFarOffTheyAre)
   EXPECT_LT(stated, 0.5);
   const std::set<unsigned int> used(decoded.cells[0].begin(), decoded.cells[0].end());
   EXPECT_EQ(used.size(), decoded.positions[0].size()) << "no point without triangle";
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (int k = 0; k < 4; ++k)
   {
     const SurfaceMesh whole = vtkCoronary::SurfaceOf(this->Scene.model(k), "", "");
@@ -404,7 +404,7 @@ TEST_F(WebReviewPage, ReducedSurfacesKeepPointsAndSayHowFarOffTheyAre)
       shown.triangles.push_back(
         { decoded.cells[0][n], decoded.cells[0][n + 1], decoded.cells[0][n + 2] });
     }
-    greatest = std::max(greatest, CompareSurfaces(shown, whole).hausdorff);
+    maximum = std::max(maximum, CompareSurfaces(shown, whole).hausdorff);
     // Each of its points is one of the whole surface, with the distance that it has there.
     const SurfaceMesh truth = vtkCoronary::SurfaceOf(this->Scene.truth(k), "", "");
     const MeshDistance expected = CompareSurfaces(whole, truth);
@@ -419,12 +419,12 @@ TEST_F(WebReviewPage, ReducedSurfacesKeepPointsAndSayHowFarOffTheyAre)
           nearest = m;
         }
       }
-      ASSERT_LT((whole.points[nearest] - shown.points[n]).norm(), LargestError);
+      ASSERT_LT((whole.points[nearest] - shown.points[n]).norm(), MaximumError);
       ASSERT_NEAR(
-        decoded.distances[std::size_t(k)][n], expected.pointDistancesA[nearest], 2 * LargestError);
+        decoded.distances[std::size_t(k)][n], expected.pointDistancesA[nearest], 2 * MaximumError);
     }
   }
-  EXPECT_NEAR(greatest, stated, 0.02);
+  EXPECT_NEAR(maximum, stated, 0.02);
 }
 
 TEST_F(WebReviewPage, LinesHaveTheirNames)
@@ -441,7 +441,7 @@ TEST_F(WebReviewPage, LinesHaveTheirNames)
     const std::size_t point = label["point"];
     EXPECT_EQ(point % 31, 15U) << "the middle of a line";
   }
-  EXPECT_NEAR(lines.positions[3][0].x(), 11.0, LargestError);
+  EXPECT_NEAR(lines.positions[3][0].x(), 11.0, MaximumError);
   EXPECT_EQ(page.Data["cases"][0]["view"]["centre"].size(), 3U);
 }
 
@@ -458,7 +458,7 @@ TEST_F(WebReviewPage, AnotherConnectivityIsAnotherTopology)
   ASSERT_EQ(decoded.positions[3].size(), last.points.size());
   for (std::size_t n = 0; n < last.points.size(); ++n)
   {
-    ASSERT_LT((decoded.positions[3][n] - last.points[n]).norm(), LargestError);
+    ASSERT_LT((decoded.positions[3][n] - last.points[n]).norm(), MaximumError);
   }
 }
 

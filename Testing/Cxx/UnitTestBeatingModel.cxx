@@ -93,7 +93,7 @@ Model PhantomModel(const CoronaryPhantom& phantom, int phases)
 struct Error
 {
   double rootMeanSquare = 0.0;
-  double greatest = 0.0;
+  double maximum = 0.0;
 };
 
 Error Between(const std::vector<double>& a, const std::vector<double>& b)
@@ -104,7 +104,7 @@ Error Between(const std::vector<double>& a, const std::vector<double>& b)
     const double squared =
       (Vector3(a[n], a[n + 1], a[n + 2]) - Vector3(b[n], b[n + 1], b[n + 2])).squaredNorm();
     error.rootMeanSquare += squared * 3.0 / static_cast<double>(a.size());
-    error.greatest = std::max(error.greatest, std::sqrt(squared));
+    error.maximum = std::max(error.maximum, std::sqrt(squared));
   }
   error.rootMeanSquare = std::sqrt(error.rootMeanSquare);
   return error;
@@ -166,7 +166,7 @@ TEST(BeatingModel, VelocitiesAreTheDerivativesOfThePositions)
             size = std::max(size, std::abs(after[n]));
           }
           EXPECT_GT(size, 1.0);
-          EXPECT_LT(Between(after, velocities).greatest, 1e-5 * size)
+          EXPECT_LT(Between(after, velocities).maximum, 1e-5 * size)
             << static_cast<int>(mode) << static_cast<int>(blend) << rotated << " at " << time;
         }
       }
@@ -202,14 +202,14 @@ TEST(BeatingModel, VelocitiesAreThoseOfThePhantom)
       }
       const Error error = Between(truth, velocities);
       worst.rootMeanSquare = std::max(worst.rootMeanSquare, error.rootMeanSquare);
-      worst.greatest = std::max(worst.greatest, error.greatest);
+      worst.maximum = std::max(worst.maximum, error.maximum);
     }
     std::printf("%s: RMS %.3f, greatest %.3f of %.1f mm/s\n",
       blend == SkinBlend::Linear ? "linear" : "dual quaternions", worst.rootMeanSquare,
-      worst.greatest, fastest);
+      worst.maximum, fastest);
     EXPECT_GT(fastest, 30.0);
     EXPECT_LT(worst.rootMeanSquare, 1.5);
-    EXPECT_LT(worst.greatest, 2.5);
+    EXPECT_LT(worst.maximum, 2.5);
   }
 }
 

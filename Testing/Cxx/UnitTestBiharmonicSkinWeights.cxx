@@ -273,9 +273,9 @@ TEST(BiharmonicSkinWeights, IndependentAgreesWithInteriorPoint)
   EXPECT_TRUE(weights.converged);
   EXPECT_NEAR(weights.energy / Energy(q, reference), 1.0, 1e-8);
   const Eigen::VectorXd sums = reference.rowwise().sum();
-  EXPECT_NEAR(weights.largestSum, std::max(1.0, sums.maxCoeff()), 1e-5);
-  EXPECT_NEAR(weights.smallestSum, std::min(1.0, sums.minCoeff()), 1e-5);
-  EXPECT_GT(weights.largestSum, 1.001);
+  EXPECT_NEAR(weights.maximumSum, std::max(1.0, sums.maxCoeff()), 1e-5);
+  EXPECT_NEAR(weights.minimumSum, std::min(1.0, sums.minCoeff()), 1e-5);
+  EXPECT_GT(weights.maximumSum, 1.001);
   const Eigen::MatrixXd normalized = sums.cwiseInverse().asDiagonal() * reference;
   EXPECT_LT((Dense(weights) - normalized).cwiseAbs().maxCoeff(), 1e-5);
   ExpectWeights(weights);
@@ -414,7 +414,7 @@ TEST(BiharmonicSkinWeights, NeighbourhoodChangesNothingThatMatters)
   const SkinWeights everywhere = ComputeSkinWeights(input, Settings(SkinWeightMode::Joint, 0.0));
   SkinWeightSettings settings = Settings(SkinWeightMode::Joint, 1.75);
   const SkinWeights near = ComputeSkinWeights(input, settings);
-  EXPECT_LT(near.largestDomainShare, 0.9);
+  EXPECT_LT(near.maximumDomainShare, 0.9);
   EXPECT_TRUE(near.converged);
   EXPECT_LE(near.residualEverywhere, 10.0 * settings.tolerance);
   EXPECT_LT(near.energyGap, 1e-3);
@@ -423,7 +423,7 @@ TEST(BiharmonicSkinWeights, NeighbourhoodChangesNothingThatMatters)
   settings.neighbourhood = 0.5;
   settings.widen = false;
   const SkinWeights narrow = ComputeSkinWeights(input, settings);
-  EXPECT_LT(narrow.largestDomainShare, near.largestDomainShare);
+  EXPECT_LT(narrow.maximumDomainShare, near.maximumDomainShare);
   EXPECT_GT(narrow.residualEverywhere, 100.0 * settings.tolerance);
   EXPECT_GT(narrow.energy, everywhere.energy * (1.0 + 1e-6));
   EXPECT_LE(narrow.energy - everywhere.energy, (narrow.energyGap + 1e-9) * narrow.energy);
@@ -451,7 +451,7 @@ TEST(BiharmonicSkinWeights, WeightsFindWhereTheyLive)
   {
     const SkinWeightInput input = MovedComb(branches, bones, cells, half);
     const SkinWeights everywhere = ComputeSkinWeights(input, Settings(SkinWeightMode::Joint, 0.0));
-    EXPECT_EQ(everywhere.largestDomainShare, 1.0);
+    EXPECT_EQ(everywhere.maximumDomainShare, 1.0);
     for (const double neighbourhood : { 0.01, 0.5, 1.75 })
     {
       SCOPED_TRACE(std::to_string(cells) + " cells, " + std::to_string(neighbourhood));
@@ -460,7 +460,7 @@ TEST(BiharmonicSkinWeights, WeightsFindWhereTheyLive)
       EXPECT_TRUE(w.converged);
       EXPECT_LE(w.residual, settings.tolerance);
       EXPECT_LE(w.residualEverywhere, 10.0 * settings.tolerance);
-      EXPECT_LT(w.largestDomainShare, cells == 8 ? 0.8 : 1.01);
+      EXPECT_LT(w.maximumDomainShare, cells == 8 ? 0.8 : 1.01);
       EXPECT_NEAR(w.energy, everywhere.energy, 2e-4 * everywhere.energy);
       EXPECT_LT((Dense(w) - Dense(everywhere)).cwiseAbs().maxCoeff(), 3e-4);
     }
@@ -475,7 +475,7 @@ TEST(BiharmonicSkinWeights, IndependentModeIsLibigls)
   {
     const SkinWeights weights =
       ComputeSkinWeights(input, Settings(SkinWeightMode::Independent, neighbourhood));
-    EXPECT_GT(weights.largestSum, 1.01); // else the modes would not differ
+    EXPECT_GT(weights.maximumSum, 1.01); // else the modes would not differ
     const Eigen::MatrixXd dense = Dense(weights);
     ASSERT_EQ(dense.cols(), 5);
     for (Eigen::Index i = 0; i < dense.rows(); ++i)
@@ -550,7 +550,7 @@ TEST(BiharmonicSkinWeights, Compact)
   for (const int influences : { 1, 2, 8 })
   {
     const CompactSkinWeights compact = CompactWeights(weights, influences);
-    double largest = 0.0;
+    double maximum = 0.0;
     for (std::size_t i = 0; i + 1 < weights.offset.size(); ++i)
     {
       float sum = 0.0f;
@@ -563,14 +563,14 @@ TEST(BiharmonicSkinWeights, Compact)
         }
       }
       ASSERT_NEAR(sum, 1.0f, 1e-6f);
-      largest = std::max(largest, static_cast<double>(compact.dropped[i]));
+      maximum = std::max(maximum, static_cast<double>(compact.dropped[i]));
       if (weights.offset[i + 1] - weights.offset[i] <= influences)
       {
         ASSERT_EQ(compact.dropped[i], 0.0f);
       }
     }
-    EXPECT_NEAR(compact.largestDropped, largest, 1e-7);
-    EXPECT_GT(compact.largestDropped, influences < 3 ? 0.05 : -1.0);
+    EXPECT_NEAR(compact.maximumDropped, maximum, 1e-7);
+    EXPECT_GT(compact.maximumDropped, influences < 3 ? 0.05 : -1.0);
   }
   EXPECT_THROW(CompactWeights(weights, 0), std::invalid_argument);
 }

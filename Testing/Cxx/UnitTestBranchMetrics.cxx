@@ -107,7 +107,7 @@ TEST(BranchMetrics, ShortTwigsAreNoBranches)
   EXPECT_EQ(m.result.size(), 3U);
   EXPECT_EQ(m.completenessRatio, 1.0);
   BranchMetricsSettings all;
-  all.leastLength = 0.0;
+  all.minimumLength = 0.0;
   const BranchMetrics n = CompareBranches(twigs, Reference(), all);
   EXPECT_EQ(n.result.size(), 7U);
   EXPECT_EQ(n.completenessRatio, 7.0 / 3.0);

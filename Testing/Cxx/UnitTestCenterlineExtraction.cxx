@@ -26,15 +26,15 @@ struct Tube
 
 double DistanceToPolyline(const Vector3& p, const std::vector<Vector3>& line)
 {
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < line.size(); ++i)
   {
     const Vector3 d = line[i] - line[i - 1];
     const double t =
       std::min(1.0, std::max(0.0, (p - line[i - 1]).dot(d) / std::max(d.squaredNorm(), 1e-12)));
-    least = std::min(least, (line[i - 1] + t * d - p).norm());
+    minimum = std::min(minimum, (line[i - 1] + t * d - p).norm());
   }
-  return least;
+  return minimum;
 }
 
 /// A soft-walled image of tubes with noise, its ideal vesselness, and its mask.
@@ -140,7 +140,7 @@ struct Deviation
 {
   double axis = 0.0;
   double radius = 0.0;
-  double greatest = 0.0;
+  double maximum = 0.0;
 };
 
 Deviation Compare(const VesselTree& tree, const Tube& tube, double unit = 1.0)
@@ -150,7 +150,7 @@ Deviation Compare(const VesselTree& tree, const Tube& tube, double unit = 1.0)
   {
     const double d = DistanceToPolyline(tree.points[i] / unit, tube.axis);
     deviation.axis += d / static_cast<double>(tree.points.size());
-    deviation.greatest = std::max(deviation.greatest, d);
+    deviation.maximum = std::max(deviation.maximum, d);
     deviation.radius +=
       std::abs(tree.radius[i] / unit - tube.radius) / static_cast<double>(tree.points.size());
   }
@@ -352,7 +352,7 @@ TEST(SurfaceDistance, ExactInACylinder)
     EXPECT_EQ(distance.doubtfulRows, 0);
     const std::array<int, 6>& e = distance.grid.extent;
     std::size_t v = 0;
-    double greatest = 0.0;
+    double maximum = 0.0;
     for (int k = e[4]; k <= e[5]; ++k)
     {
       for (int j = e[2]; j <= e[3]; ++j)
@@ -365,7 +365,7 @@ TEST(SurfaceDistance, ExactInACylinder)
           const double exact = std::min(radial, axial);
           if (exact > 0.0)
           {
-            greatest = std::max(greatest, std::abs(distance.values[v] - exact));
+            maximum = std::max(maximum, std::abs(distance.values[v] - exact));
           }
           else if (exact < -0.01)
           {
@@ -374,7 +374,7 @@ TEST(SurfaceDistance, ExactInACylinder)
         }
       }
     }
-    EXPECT_LT(greatest, 0.025) << inverted;
+    EXPECT_LT(maximum, 0.025) << inverted;
     for (Triangle& triangle : triangles)
     {
       std::swap(triangle[0], triangle[1]);
@@ -399,7 +399,7 @@ TEST(CenterlineExtraction, StraightAndHelicalTubesOnObliqueGrids)
     const Deviation deviation = Compare(result.tree, tube);
     EXPECT_LT(deviation.axis, 0.08);
     // The tube ends round: the tip may be as far beyond the axis.
-    EXPECT_LT(deviation.greatest, tube.radius);
+    EXPECT_LT(deviation.maximum, tube.radius);
     EXPECT_LT(deviation.radius, 0.1);
     // Neither cut corners nor a smoother may shorten it.
     EXPECT_NEAR(result.tree.branches[0].length, Length(tube.axis), 1.5 + 0.02 * Length(tube.axis));
@@ -607,10 +607,10 @@ TEST(CenterlineExtraction, TheForkOfALongBranchThatTurnsOffIsWhereTheAxesMeet)
     }
     for (std::size_t p = 0; p < result.tree.points.size(); ++p)
     {
-      double least = std::numeric_limits<double>::infinity();
+      double minimum = std::numeric_limits<double>::infinity();
       for (const Tube& tube : tubes)
       {
-        least = std::min(least, DistanceToPolyline(result.tree.points[p], tube.axis));
+        minimum = std::min(minimum, DistanceToPolyline(result.tree.points[p], tube.axis));
       }
       // At its tip a vessel is seen up to a radius farther than its axis.
       const bool tip = std::any_of(tubes.begin(), tubes.end(),
@@ -618,7 +618,7 @@ TEST(CenterlineExtraction, TheForkOfALongBranchThatTurnsOffIsWhereTheAxesMeet)
           return tube.axis.back() != fork &&
             (result.tree.points[p] - tube.axis.back()).norm() < 1.6;
         });
-      EXPECT_TRUE(tip || least < 0.3) << result.tree.points[p].transpose() << ": " << least;
+      EXPECT_TRUE(tip || minimum < 0.3) << result.tree.points[p].transpose() << ": " << minimum;
     }
   }
 }

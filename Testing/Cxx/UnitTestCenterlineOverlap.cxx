@@ -269,7 +269,7 @@ TEST(CenterlineOverlap, TheLeastSumOfAllCorrespondences)
     };
     const OverlapLine a = walk(6);
     const OverlapLine b = walk(5);
-    const std::function<double(int, int)> least = [&](int i, int j) -> double
+    const std::function<double(int, int)> minimum = [&](int i, int j) -> double
     {
       const double here = (a.points[i] - b.points[j]).norm();
       if (i == 0 && j == 0)
@@ -277,14 +277,14 @@ TEST(CenterlineOverlap, TheLeastSumOfAllCorrespondences)
         return here;
       }
       double before = std::numeric_limits<double>::infinity();
-      before = i > 0 ? std::min(before, least(i - 1, j)) : before;
-      before = j > 0 ? std::min(before, least(i, j - 1)) : before;
+      before = i > 0 ? std::min(before, minimum(i - 1, j)) : before;
+      before = j > 0 ? std::min(before, minimum(i, j - 1)) : before;
       return before + here;
     };
     CenterlineOverlapSettings settings;
     settings.spacing = 1.0;
     settings.clipStart = false;
-    EXPECT_NEAR(CompareCenterlines(a, b, settings).measures.distance * 10.0, least(5, 4), 1e-9);
+    EXPECT_NEAR(CompareCenterlines(a, b, settings).measures.distance * 10.0, minimum(5, 4), 1e-9);
   }
 }
 
@@ -542,7 +542,7 @@ TEST(CenterlineTreeOverlap, ThinEndsAreNotRelevant)
 TEST(CenterlineTreeOverlap, ThinVesselsCanBeLeftOut)
 {
   CenterlineOverlapSettings settings;
-  settings.leastRadius = 0.75;
+  settings.minimumRadius = 0.75;
   // The thin daughter counts for 10 of its 30 mm, and is missing.
   const TreeOverlap missing = CompareCenterlineTrees(Fork(), Fork(false), settings);
   EXPECT_NEAR(missing.rows[2].measures.referenceLength, 10.0, 0.1);
@@ -559,7 +559,7 @@ TEST(CenterlineTreeOverlap, ThinVesselsCanBeLeftOut)
   AddLine(result, Between(wide, wide + Vector3(0.0, 0.0, 12.0), 0.5, 0.5));
   EXPECT_LT(CompareCenterlineTrees(Fork(), result, settings).total.overlap, 0.95);
   EXPECT_NEAR(CompareCenterlineTrees(Fork(), result, settings).longestFalse, 10.5, 0.05);
-  settings.leastRadius = -1.0;
+  settings.minimumRadius = -1.0;
   EXPECT_NE(Complaint([&] { CompareCenterlineTrees({}, {}, settings); }).find("the least radius"),
     std::string::npos);
 }

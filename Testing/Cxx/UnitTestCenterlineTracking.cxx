@@ -344,7 +344,7 @@ TEST(DisplacementLabels, AreTheBestOfAll)
     const double stiffness = 0.6;
     const auto place = [](int label)
     { return Vector3(label % 3 - 1, label / 3 % 3 - 1, label / 9 - 1); };
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     int best[3] = { 0, 0, 0 };
     for (int a = 0; a < 27; ++a)
     {
@@ -355,9 +355,9 @@ TEST(DisplacementLabels, AreTheBestOfAll)
           const double sum = costs[0][a] + costs[1][b] + costs[2][c] +
             ((place(a) - place(b)).squaredNorm() + (place(b) - place(c)).squaredNorm()) /
               (2.0 * stiffness * stiffness * 2.0);
-          if (sum < least)
+          if (sum < minimum)
           {
-            least = sum;
+            minimum = sum;
             best[0] = a;
             best[1] = b;
             best[2] = c;
@@ -697,17 +697,17 @@ namespace
 {
 double DistanceToAxes(const PhantomTree& tree, const Vector3& place)
 {
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t n = 0; n + 1 < branch.points.size(); ++n)
     {
-      least = std::min(least,
+      minimum = std::min(minimum,
         NearestOnSegment(place, tree.points[branch.points[n]], tree.points[branch.points[n + 1]])
           .squaredDistance);
     }
   }
-  return std::sqrt(least);
+  return std::sqrt(minimum);
 }
 
 /// How many of the places, given as they were found, are nearer to the vein than to the arteries.

@@ -35,9 +35,9 @@ void StandStill(CoronaryFlow& flow, double phase, double injection = 0.0, Cathet
   }
 }
 
-double LargestImbalance(const CoronaryFlow& flow)
+double MaximumImbalance(const CoronaryFlow& flow)
 {
-  double largest = 0.0;
+  double maximum = 0.0;
   for (const FlowNode& node : flow.Network().Nodes())
   {
     if (node.above >= 0 && !node.below.empty())
@@ -47,10 +47,10 @@ double LargestImbalance(const CoronaryFlow& flow)
       {
         sum -= flow.FlowAtBeginning(s);
       }
-      largest = std::max(largest, std::abs(sum));
+      maximum = std::max(maximum, std::abs(sum));
     }
   }
-  return largest;
+  return maximum;
 }
 
 struct Cycle
@@ -123,7 +123,7 @@ TEST(CoronaryFlow, NodesBalanceAndSegmentsObeyTheirLaw)
   {
     const double injection = k % 200 < 100 ? 0.02 * (k % 100) : 0.0;
     flow.Step(Dt, 0.00625 * k, 75.0, injection, { (7 * k) % 30, 0.37 * (k % 90) });
-    imbalance = std::max(imbalance, LargestImbalance(flow));
+    imbalance = std::max(imbalance, MaximumImbalance(flow));
   }
   Row("node balance in a phantom, injecting: mL/s", 0.0, imbalance, "1e-12");
   EXPECT_LT(imbalance, 1e-12);
@@ -310,7 +310,7 @@ TEST(CoronaryFlow, InjectionDisplacesBlood)
   EXPECT_GT(flow.Pressure()[1], tip);
   StandStill(flow, 0.5, 3.0 * free, { 1, 20.0 });
   EXPECT_LT(flow.FlowAtBeginning(1), -1.8 * free);
-  EXPECT_LT(LargestImbalance(flow), 1e-12);
+  EXPECT_LT(MaximumImbalance(flow), 1e-12);
   // In the aorta it changes nothing.
   StandStill(flow, 0.5, 5.0, { -1, 0.0 });
   EXPECT_NEAR(flow.Flow()[1], free, 1e-9);
@@ -376,7 +376,7 @@ TEST(CoronaryFlow, CalibratesOtherTrees)
     EXPECT_GT(cycle.ratio[0], 1.8);
     EXPECT_LT(cycle.ratio[0], 2.1);
     EXPECT_GT(cycle.mean[0], 0.0);
-    EXPECT_LT(LargestImbalance(flow), 1e-12);
+    EXPECT_LT(MaximumImbalance(flow), 1e-12);
   }
   const CoronaryFlow flow(bush, {});
   EXPECT_EQ(flow.Network().Branches()[0].segments.size(), 9U);

@@ -371,20 +371,20 @@ TEST(CoronaryOstia, RefusesSettingsAndImagesByName)
       message);
   };
   using S = CoronaryOstiaSettings;
-  refused("smallestAorta", [](S& s) { s.smallestAorta = 3.0; });
-  refused("smallestAorta", [](S& s) { s.smallestAorta = s.largestAorta; });
-  refused("smallestAorta", [&](S& s) { s.smallestAorta = nan; });
-  refused("largestAorta", [](S& s) { s.largestAorta = 61.0; });
-  refused("largestAorta", [&](S& s) { s.largestAorta = nan; });
-  refused("largestVessel", [](S& s) { s.largestVessel = 0.9; });
-  refused("largestVessel", [](S& s) { s.largestVessel = 9.0; });
-  refused("largestVessel", [&](S& s) { s.largestVessel = nan; });
+  refused("minimumAorticRadius", [](S& s) { s.minimumAorticRadius = 3.0; });
+  refused("minimumAorticRadius", [](S& s) { s.minimumAorticRadius = s.maximumAorticRadius; });
+  refused("minimumAorticRadius", [&](S& s) { s.minimumAorticRadius = nan; });
+  refused("maximumAorticRadius", [](S& s) { s.maximumAorticRadius = 61.0; });
+  refused("maximumAorticRadius", [&](S& s) { s.maximumAorticRadius = nan; });
+  refused("maximumVesselRadius", [](S& s) { s.maximumVesselRadius = 0.9; });
+  refused("maximumVesselRadius", [](S& s) { s.maximumVesselRadius = 9.0; });
+  refused("maximumVesselRadius", [&](S& s) { s.maximumVesselRadius = nan; });
   refused("vesselLength", [](S& s) { s.vesselLength = 5.0; });
   refused("vesselLength", [](S& s) { s.vesselLength = 90.0; });
   refused("vesselLength", [&](S& s) { s.vesselLength = nan; });
   refused("softTissue", [&](S& s) { s.softTissue = nan; });
-  refused("smallestBlood", [](S& s) { s.smallestBlood = s.softTissue; });
-  refused("smallestBlood", [](S& s) { s.smallestBlood = std::numeric_limits<double>::infinity(); });
+  refused("minimumBlood", [](S& s) { s.minimumBlood = s.softTissue; });
+  refused("minimumBlood", [](S& s) { s.minimumBlood = std::numeric_limits<double>::infinity(); });
 
   const auto image = [&](const std::function<void(ImageGrid&)>& change)
   {

@@ -795,12 +795,12 @@ TEST(CoronaryPhantom, LesionsAreInTheTreeAndInTheImage)
   settings.stenosisDegree = 0.7;
   const PhantomTree narrowed = CoronaryPhantom(settings).Tree(0.0);
   ASSERT_EQ(healthy.points.size(), narrowed.points.size());
-  double least = 1.0;
+  double minimum = 1.0;
   for (std::size_t p = 0; p < healthy.points.size(); ++p)
   {
-    least = std::min(least, narrowed.radius[p] / healthy.radius[p]);
+    minimum = std::min(minimum, narrowed.radius[p] / healthy.radius[p]);
   }
-  EXPECT_NEAR(least, 0.3, 0.05);
+  EXPECT_NEAR(minimum, 0.3, 0.05);
 
   settings.chronicOcclusion = true;
   const CoronaryPhantom occluded(settings);

@@ -64,9 +64,9 @@ void Settle(
   for (int k = 0; k < most && calm < 5; ++k)
   {
     ASSERT_TRUE(rod.Step(seconds, surface).finite);
-    calm = rod.LastStep().largestUpdate < 1e-11 ? calm + 1 : 0;
+    calm = rod.LastStep().maximumUpdate < 1e-11 ? calm + 1 : 0;
   }
-  ASSERT_EQ(5, calm) << "did not settle: " << rod.LastStep().largestUpdate;
+  ASSERT_EQ(5, calm) << "did not settle: " << rod.LastStep().maximumUpdate;
 }
 
 double CantileverDeflection(int joints)
@@ -607,10 +607,10 @@ TEST(CosseratRod, KeepsInAShakenTube)
       {
         continue; // it was bent against its shape at rest, and let go
       }
-      ASSERT_LT(step.largestPenetration, 0.1);
-      ASSERT_LT(step.largestGap, 0.005);
-      deepest = std::max(deepest, step.largestPenetration);
-      widest = std::max(widest, step.largestGap);
+      ASSERT_LT(step.maximumPenetration, 0.1);
+      ASSERT_LT(step.maximumGap, 0.005);
+      deepest = std::max(deepest, step.maximumPenetration);
+      widest = std::max(widest, step.maximumGap);
       mean += step.meanPenetration;
       touched += step.touching;
       for (int i = 0; i < 60; ++i)

@@ -65,7 +65,7 @@ struct MuxBench
   std::shared_ptr<TestDevice> second = std::make_shared<TestDevice>();
   DeviceMux mux;
   std::uint64_t tick = 0;
-  double largestStep = 0.0;
+  double maximumStep = 0.0;
 
   double Run(double seconds)
   {
@@ -75,7 +75,7 @@ struct MuxBench
       const double before = this->last.drive.wirePosition;
       this->last = this->mux.Next(this->tick++, Tick);
       at = this->last.drive.wirePosition;
-      this->largestStep = std::max(this->largestStep, std::abs(at - before));
+      this->maximumStep = std::max(this->maximumStep, std::abs(at - before));
     }
     return at;
   }
@@ -141,7 +141,7 @@ TEST(SerialDevice, HandshakeAndPlaces)
   EXPECT_NEAR(bench.frame.input.primary, 2.0, 4e-4);
   EXPECT_EQ(bench.frame.input.pedals, static_cast<std::uint32_t>(CinePedal));
   EXPECT_EQ(bench.frame.buttons, 2U);
-  EXPECT_LT(bench.largestStep, 0.056); // even, although states come at half the rate of ticks
+  EXPECT_LT(bench.maximumStep, 0.056); // even, although states come at half the rate of ticks
   EXPECT_EQ(bench.serial.Status().glitches, 0U);
   EXPECT_TRUE(Says(bench.serial, "EMU-0001"));
 }
@@ -175,13 +175,13 @@ TEST(SerialDevice, ShortSilenceIsCaughtUpEvenly)
   bench.Run(0.1);
   EXPECT_EQ(bench.State(), DeviceState::Stale);
   bench.line.silent = false;
-  bench.largestStep = 0.0;
+  bench.maximumStep = 0.0;
   bench.Run(0.01);
   EXPECT_EQ(bench.State(), DeviceState::Running);
   bench.atTick = nullptr;
   bench.Run(0.4);
   EXPECT_NEAR(bench.frame.input.drive.wirePosition, bench.Place(AxisKind::WireAdvance), 0.006);
-  EXPECT_LT(bench.largestStep, 2 * 0.056); // on top of the movement that goes on
+  EXPECT_LT(bench.maximumStep, 2 * 0.056); // on top of the movement that goes on
 }
 
 TEST(SerialDevice, LostAndFoundWithoutAJump)
@@ -206,11 +206,11 @@ TEST(SerialDevice, LostAndFoundWithoutAJump)
   bench.Run(2.0);
   bench.line.gone = false;
   bench.line.opening = PortOpening::Open;
-  bench.largestStep = 0.0;
+  bench.maximumStep = 0.0;
   EXPECT_LT(bench.Until([&] { return bench.State() == DeviceState::Running; }), 5.1);
   bench.Run(0.5);
   EXPECT_EQ(bench.frame.input.drive.wirePosition, before);
-  EXPECT_EQ(bench.largestStep, 0.0);
+  EXPECT_EQ(bench.maximumStep, 0.0);
   EXPECT_EQ(bench.serial.Status().glitches, 0U);
   // No forces before the trainee says so.
   EXPECT_TRUE(bench.serial.Status().awaitsForces);
@@ -296,9 +296,9 @@ TEST(SerialDevice, SlowDevice)
   ASSERT_EQ(bench.State(), DeviceState::Running);
   bench.atTick = [&] { bench.Place(AxisKind::WireAdvance) += 0.01; };
   bench.Run(0.5);
-  bench.largestStep = 0.0;
+  bench.maximumStep = 0.0;
   bench.Run(1.0);
-  EXPECT_LT(bench.largestStep, 0.0106); // not 0.16 mm every 8 ms
+  EXPECT_LT(bench.maximumStep, 0.0106); // not 0.16 mm every 8 ms
   // Slower than it said: silence again and again.
   bench.line.device.Settings().rate = 20;
   EXPECT_LT(bench.Until([&] { return bench.State() == DeviceState::Stale; }), 0.06);
@@ -311,14 +311,14 @@ TEST(SerialDevice, GlitchesAreNoMovement)
   bench.Run(0.5);
   const double before = bench.frame.input.drive.wirePosition;
   const double places = bench.Place(AxisKind::WireAdvance);
-  bench.largestStep = 0.0;
+  bench.maximumStep = 0.0;
   bench.line.device.JumpCounts(100000);
   bench.Run(0.2);
   EXPECT_EQ(bench.serial.Status().glitches, 7U); // one of each axis
   bench.line.device.JumpCounts(std::numeric_limits<std::int32_t>::min());
   bench.Run(0.2);
   EXPECT_EQ(bench.serial.Status().glitches, 14U);
-  EXPECT_LT(bench.largestStep, 0.056);
+  EXPECT_LT(bench.maximumStep, 0.056);
   // Of each jump the movement within one state is lost.
   EXPECT_NEAR(bench.frame.input.drive.wirePosition - before,
     bench.Place(AxisKind::WireAdvance) - places, 2 * 0.1 + 0.006);
@@ -363,7 +363,7 @@ TEST(SerialDevice, DisturbedLine)
   EXPECT_NEAR(bench.serial.Status().errorsPerSecond, 20.0, 2.0);
   EXPECT_TRUE(Says(bench.serial, "disturbed"));
   const double held = bench.frame.input.drive.wirePosition;
-  bench.largestStep = 0.0;
+  bench.maximumStep = 0.0;
   bench.atTick = [&] { bench.Place(AxisKind::WireAdvance) += 0.05; };
   bench.Run(0.5);
   EXPECT_EQ(bench.frame.input.drive.wirePosition, held);
@@ -372,7 +372,7 @@ TEST(SerialDevice, DisturbedLine)
   bench.Run(2.5);
   EXPECT_EQ(bench.State(), DeviceState::Running);
   EXPECT_EQ(bench.frame.input.drive.wirePosition, held);
-  EXPECT_EQ(bench.largestStep, 0.0);
+  EXPECT_EQ(bench.maximumStep, 0.0);
 }
 
 TEST(SerialDevice, LostRepeatedAndReorderedStatesLoseNothing)
@@ -429,11 +429,11 @@ TEST(SerialDevice, ForcesAreClampedAndRiseSlowly)
   EXPECT_TRUE(bench.serial.Status().awaitsForces);
   EXPECT_EQ(bench.line.device.Motors()[0], 0.0);
   bench.serial.ConfirmForces();
-  double largest = 0.0;
+  double maximum = 0.0;
   double last = 0.0;
   bench.atTick = [&]
   {
-    largest = std::max(largest, std::abs(bench.line.device.Motors()[0] - last));
+    maximum = std::max(maximum, std::abs(bench.line.device.Motors()[0] - last));
     last = bench.line.device.Motors()[0];
   };
   bench.Run(0.015);
@@ -441,7 +441,7 @@ TEST(SerialDevice, ForcesAreClampedAndRiseSlowly)
   bench.Run(0.1);
   EXPECT_NEAR(bench.line.device.Motors()[0], -2.0, 1e-6);
   EXPECT_NEAR(bench.line.device.Motors()[3], 0.015, 1e-6);
-  EXPECT_LE(largest, 0.11 * 2.0); // full force in 20 ms, states of the motor each ms or so
+  EXPECT_LE(maximum, 0.11 * 2.0); // full force in 20 ms, states of the motor each ms or so
   EXPECT_FALSE(bench.line.device.Clamped());
 }
 
@@ -542,13 +542,13 @@ TEST(SerialDevice, PauseOfThePhysicsOrOfTheThreadIsNoJump)
     bench.atTick = [&] { bench.Place(AxisKind::WireAdvance) += 0.05; };
     bench.Run(0.2);
     const double before = bench.frame.input.drive.wirePosition;
-    bench.largestStep = 0.0;
+    bench.maximumStep = 0.0;
     (ofThread ? bench.ioAlive : bench.alive) = false;
     bench.Run(1.0);
     bench.ioAlive = bench.alive = true;
     bench.Run(0.1);
     EXPECT_EQ(bench.State(), DeviceState::Running);
-    EXPECT_LT(bench.largestStep, 0.056);
+    EXPECT_LT(bench.maximumStep, 0.056);
     EXPECT_NEAR(bench.frame.input.drive.wirePosition, before + 10.0, 0.3);
   }
 }
@@ -563,11 +563,11 @@ TEST(SerialDevice, ZeroAndCalibrationMoveNothing)
   bench.Run(0.01);
   const double before = bench.frame.input.drive.wirePosition;
   EXPECT_GT(before, 19.0);
-  bench.largestStep = 0.0;
+  bench.maximumStep = 0.0;
   bench.serial.Zero(1U << static_cast<unsigned>(AxisKind::WireAdvance));
   bench.Run(0.1);
   EXPECT_EQ(bench.frame.input.drive.wirePosition, before);
-  EXPECT_EQ(bench.largestStep, 0.0);
+  EXPECT_EQ(bench.maximumStep, 0.0);
   EXPECT_EQ(bench.serial.Status().glitches, 0U);
   // Moves on as far as before.
   bench.atTick = [&] { bench.Place(AxisKind::WireAdvance) += 0.02; };
@@ -639,7 +639,7 @@ TEST(DeviceMux, EarlierTakesWhenItMovesLaterWhenThatRests)
   bench.second->Speed = 10.0;
   bench.Run(0.1);
   EXPECT_EQ(bench.mux.Follows(0), 1);
-  EXPECT_LT(bench.largestStep, 0.0101);
+  EXPECT_LT(bench.maximumStep, 0.0101);
 }
 
 TEST(DeviceMux, LostDeviceIsHeldUntilANewMovement)
@@ -669,12 +669,12 @@ TEST(DeviceMux, LostDeviceIsHeldUntilANewMovement)
   const double after = bench.Run(0.1);
   bench.first->Frame.input.drive.wirePosition += 300.0;
   bench.first->Frame.state = DeviceState::Running;
-  EXPECT_LT(bench.largestStep, 0.0101);
+  EXPECT_LT(bench.maximumStep, 0.0101);
   EXPECT_NEAR(bench.Run(1.0), after, 0.0101);
   bench.first->Speed = 5.0;
   EXPECT_NEAR(bench.Run(1.0), after + 5.0, 0.3);
   EXPECT_EQ(bench.mux.Follows(0), 0);
-  EXPECT_LT(bench.largestStep, 0.0101);
+  EXPECT_LT(bench.maximumStep, 0.0101);
 }
 
 TEST(DeviceMux, SyringeIsHeldWhenItsDeviceIsLost)

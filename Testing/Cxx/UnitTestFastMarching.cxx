@@ -59,7 +59,7 @@ std::pair<double, double> ErrorsAt(double h, bool secondOrder, const Vector3& as
   FastMarching marching(
     region, std::vector<float>(region.Size(), static_cast<float>(speed)), settings);
   marching.March({ { Vector3::Zero(), 3 } });
-  double greatest = 0.0;
+  double maximum = 0.0;
   double sum = 0.0;
   double lengthError = 0.0;
   int others = 0;
@@ -68,16 +68,16 @@ std::pair<double, double> ErrorsAt(double h, bool secondOrder, const Vector3& as
     {
       const double distance = spacing.cwiseProduct(Index(region, address)).norm();
       const double error = std::abs(marching.Arrival()[number] * speed - distance);
-      greatest = std::max(greatest, error);
+      maximum = std::max(maximum, error);
       sum += error;
       // Along straight rays the length is the distance.
       lengthError = std::max(lengthError, std::abs(marching.Length()[number] - distance));
       others += marching.Source()[number] != 3;
     });
   // The fastest path is straight, so its length is the distance.
-  EXPECT_LT(lengthError, 1.05 * greatest + 1e-4);
+  EXPECT_LT(lengthError, 1.05 * maximum + 1e-4);
   EXPECT_EQ(others, 0);
-  return { greatest, sum / region.Size() };
+  return { maximum, sum / region.Size() };
 }
 }
 
@@ -182,9 +182,9 @@ TEST(MarchingQueue, LeavesInOrderWhateverTheWidth)
       while (!reference.empty())
       {
         ASSERT_TRUE(queue.Find(keep, ignore, ignore));
-        ASSERT_EQ(queue.Least(), reference.top());
-        now = MarchingQueue::Arrival(queue.Least());
-        queue.RemoveLeast();
+        ASSERT_EQ(queue.Minimum(), reference.top());
+        now = MarchingQueue::Arrival(queue.Minimum());
+        queue.RemoveMinimum();
         reference.pop();
         for (int more = 0; more < 2 && drawn < 60000; ++more)
         {
@@ -284,17 +284,17 @@ TEST(FastMarching, LinearSpeedHasAClosedForm)
   settings.sourceRadius = 1.5;
   FastMarching marching(region, speed, settings);
   marching.March({ { Vector3::Zero(), 0 } });
-  double greatest = 0.0;
+  double maximum = 0.0;
   region.ForEach(
     [&](std::uint32_t number, VoxelRegion::Address address)
     {
       const double d = spacing.cwiseProduct(Index(region, address)).norm();
       const double exact =
         std::acosh(1.0 + g * g * d * d / (2.0 * f0 * static_cast<double>(speed[number]))) / g;
-      greatest = std::max(greatest, std::abs(marching.Arrival()[number] - exact) / (exact + 1.0));
+      maximum = std::max(maximum, std::abs(marching.Arrival()[number] - exact) / (exact + 1.0));
     });
-  std::cout << "greatest error " << greatest << '\n';
-  EXPECT_LT(greatest, 0.015);
+  std::cout << "greatest error " << maximum << '\n';
+  EXPECT_LT(maximum, 0.015);
 }
 
 TEST(FastMarching, BendsAroundCornersAndStopsAtGaps)

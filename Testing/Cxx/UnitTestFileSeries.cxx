@@ -280,7 +280,7 @@ TEST(UnitTestMeshSequenceReport, NumbersAndNames)
   report.phases[1].time = 0.6;
   report.phases[1].tetrahedra.inverted = { 1, 3 };
   report.phases[1].tetrahedra.poor = 3;
-  report.phases[1].tetrahedra.greatestRadiusEdgeRatio = std::numeric_limits<double>::infinity();
+  report.phases[1].tetrahedra.maximumRadiusEdgeRatio = std::numeric_limits<double>::infinity();
   report.phases[1].files = { { "volume", "m_volume_001.vtu" } };
 
   const auto json = nlohmann::json::parse(coronary::MeshSequenceJson(report));

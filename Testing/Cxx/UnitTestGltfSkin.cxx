@@ -127,21 +127,21 @@ std::vector<std::vector<Vector3>> AddKeys(const coronary::SkeletonRig& rig, Gltf
     {
       truth.back().emplace_back(positions[3 * n], positions[3 * n + 1], positions[3 * n + 2]);
     }
-    key.largestDeviation = skin.Deviation(key.motion, truth.back());
+    key.maximumDeviation = skin.Deviation(key.motion, truth.back());
     model.keys.push_back(key);
   }
   return truth;
 }
 
-double LargestDistance(const std::vector<Vector3>& a, const std::vector<Vector3>& b)
+double MaximumDistance(const std::vector<Vector3>& a, const std::vector<Vector3>& b)
 {
   EXPECT_EQ(a.size(), b.size());
-  double largest = 0.0;
+  double maximumDistance = 0.0;
   for (std::size_t n = 0; n < std::min(a.size(), b.size()); ++n)
   {
-    largest = std::max(largest, (a[n] - b[n]).norm());
+    maximumDistance = std::max(maximumDistance, (a[n] - b[n]).norm());
   }
-  return largest;
+  return maximumDistance;
 }
 
 /// The limit of single precision: positions a third of a metre away have steps of 3e-5 mm.
@@ -157,22 +157,22 @@ TEST(GltfSkin, ViewersSeeTheDeformedPointsAtEveryKey)
   {
     GltfModel model = ModelOf(rig, 3);
     const GltfSkin skin(model, 8);
-    EXPECT_LT(skin.LargestDropped(), 1e-7F);
+    EXPECT_LT(skin.MaximumDropped(), 1e-7F);
     const auto truth = AddKeys(rig, model, skin, Phases, calibre);
     const GltfEvaluator file(coronary::GltfBinary(model, skin));
     ASSERT_EQ(file.Times().size(), Phases.size() + 1);
     for (std::size_t k = 0; k < truth.size(); ++k)
     {
-      EXPECT_GT(LargestDistance(truth[k], model.points), 0.5) << "does not move";
-      EXPECT_LT(LargestDistance(file.Vertices("wall", static_cast<int>(k)), truth[k]), FloatError)
+      EXPECT_GT(MaximumDistance(truth[k], model.points), 0.5) << "does not move";
+      EXPECT_LT(MaximumDistance(file.Vertices("wall", static_cast<int>(k)), truth[k]), FloatError)
         << "calibre " << calibre << ", key " << k;
-      EXPECT_LT(model.keys[k].largestDeviation, 5e-5);
+      EXPECT_LT(model.keys[k].maximumDeviation, 5e-5);
     }
     // The last key is the first one again.
-    EXPECT_EQ(LargestDistance(
+    EXPECT_EQ(MaximumDistance(
                 file.Vertices("wall", static_cast<int>(truth.size())), file.Vertices("wall", 0)),
       0.0);
-    EXPECT_LT(LargestDistance(file.Vertices("wall", -1), model.points), FloatError);
+    EXPECT_LT(MaximumDistance(file.Vertices("wall", -1), model.points), FloatError);
   }
 }
 
@@ -181,22 +181,22 @@ TEST(GltfSkin, FewerInfluencesDeviateByWhatIsReported)
   const coronary::SkeletonRig rig(Tree());
   GltfModel model = ModelOf(rig, 6);
   const GltfSkin skin(model, 4);
-  EXPECT_GT(skin.LargestDropped(), 0.01F);
+  EXPECT_GT(skin.MaximumDropped(), 0.01F);
   const auto truth = AddKeys(rig, model, skin, Phases, true);
   const GltfEvaluator file(coronary::GltfBinary(model, skin));
   for (std::size_t k = 0; k < truth.size(); ++k)
   {
-    const double seen = LargestDistance(file.Vertices("wall", static_cast<int>(k)), truth[k]);
+    const double seen = MaximumDistance(file.Vertices("wall", static_cast<int>(k)), truth[k]);
     EXPECT_GT(seen, 0.001);
-    EXPECT_NEAR(seen, model.keys[k].largestDeviation, FloatError);
+    EXPECT_NEAR(seen, model.keys[k].maximumDeviation, FloatError);
     EXPECT_NEAR(file.Document["scenes"][0]["extras"]["largest_deviation_mm"][k].get<double>(), seen,
       FloatError);
   }
   GltfModel more = ModelOf(rig, 6);
   const GltfSkin whole(more, 12);
   AddKeys(rig, more, whole, Phases, true);
-  EXPECT_LT(whole.LargestDropped(), 1e-7F);
-  EXPECT_LT(more.keys[1].largestDeviation, 5e-5);
+  EXPECT_LT(whole.MaximumDropped(), 1e-7F);
+  EXPECT_LT(more.keys[1].maximumDeviation, 5e-5);
 }
 
 TEST(GltfSkin, TwistIsBlendedLinearly)
@@ -207,8 +207,8 @@ TEST(GltfSkin, TwistIsBlendedLinearly)
   constexpr double Twist = 0.2;
   AddKeys(rig, model, skin, { 0.25 }, false, Twist);
   // A chord instead of an arc: r twist^2 / 8, at most 3 mm from the bone.
-  EXPECT_LT(model.keys[0].largestDeviation, 1.05 * 3.5 * Twist * Twist / 8.0);
-  EXPECT_GT(model.keys[0].largestDeviation, 0.005);
+  EXPECT_LT(model.keys[0].maximumDeviation, 1.05 * 3.5 * Twist * Twist / 8.0);
+  EXPECT_GT(model.keys[0].maximumDeviation, 0.005);
 }
 
 TEST(GltfSkin, TimesAxesBoundsAndWeights)
@@ -242,15 +242,15 @@ TEST(GltfSkin, TimesAxesBoundsAndWeights)
     file.Document["accessors"][file.Attributes("wall")["POSITION"].get<std::size_t>()];
   for (std::size_t c = 0; c < 3; ++c)
   {
-    double least = positions[c];
-    double greatest = positions[c];
+    double minimum = positions[c];
+    double maximum = positions[c];
     for (std::size_t n = c; n < positions.size(); n += 3)
     {
-      least = std::min(least, positions[n]);
-      greatest = std::max(greatest, positions[n]);
+      minimum = std::min(minimum, positions[n]);
+      maximum = std::max(maximum, positions[n]);
     }
-    EXPECT_EQ(accessor["min"][c].get<float>(), static_cast<float>(least));
-    EXPECT_EQ(accessor["max"][c].get<float>(), static_cast<float>(greatest));
+    EXPECT_EQ(accessor["min"][c].get<float>(), static_cast<float>(minimum));
+    EXPECT_EQ(accessor["max"][c].get<float>(), static_cast<float>(maximum));
   }
   const std::vector<float>& weights = skin.Weights();
   for (std::size_t n = 0; n < weights.size(); n += 8)

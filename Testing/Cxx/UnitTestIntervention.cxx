@@ -75,7 +75,7 @@ TEST(Intervention, FollowsTheBeatingWall)
   {
     input.wirePosition += 20.0 / 2000.0;
     const TickReport& report = intervention.Step(input);
-    deepest = std::max(deepest, report.largestPenetration);
+    deepest = std::max(deepest, report.maximumPenetration);
     widest = std::max(widest, report.jointGap);
     ASSERT_EQ(0, report.outside) << "tick " << k;
   }
@@ -122,7 +122,7 @@ TEST_P(Replay, ReachesItsBranch)
   for (; replay.At(tick, input, events); ++tick)
   {
     const TickReport& report = intervention.Step(input.drive);
-    deepest = std::max(deepest, report.largestPenetration);
+    deepest = std::max(deepest, report.maximumPenetration);
     widest = std::max(widest, report.jointGap);
     sum += report.meanPenetration;
     ASSERT_EQ(0, report.outside) << "tick " << tick;

@@ -117,12 +117,12 @@ protected:
   }
   static double Distance(const Vector3& place, const std::vector<Vector3>& points)
   {
-    double least = 1e9;
+    double minimum = 1e9;
     for (const Vector3& point : points)
     {
-      least = std::min(least, (point - place).norm());
+      minimum = std::min(minimum, (point - place).norm());
     }
-    return least;
+    return minimum;
   }
 
   static PhantomTree Truth;

@@ -1,4 +1,4 @@
-// Masks without an image: the aorta is cut off, trees begin where they touched it, crumbs and doubtful sizes are told.
+// Masks without an image: the aorta is cut off, trees begin where they touched it, fragments and doubtful sizes are told.
 
 #include "MaskTrees.h"
 
@@ -22,7 +22,7 @@ struct Scene
   ImageGrid grid;
   std::vector<unsigned char> mask;
 
-  Scene(double spacing, bool aorta, bool crumb)
+  Scene(double spacing, bool aorta, bool fragment)
   {
     const int half = static_cast<int>(50.0 / spacing);
     this->grid.extent = { 0, 2 * half, 0, 2 * half, 0, 2 * half };
@@ -39,7 +39,7 @@ struct Scene
           const bool right = DistanceToSegment(p, Vector3(-10, 0, 0), Vector3(-45, -10, -40)) < 1.6;
           const bool body = aorta && p.head<2>().norm() < 14.0 && p[2] > -20.0;
           const bool piece =
-            crumb && DistanceToSegment(p, Vector3(0, 40, 0), Vector3(0, 40, 6)) < 1.2;
+            fragment && DistanceToSegment(p, Vector3(0, 40, 0), Vector3(0, 40, 6)) < 1.2;
           this->mask.push_back(left || right || body || piece ? 1 : 0);
         }
       }

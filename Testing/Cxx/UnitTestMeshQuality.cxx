@@ -42,10 +42,10 @@ TEST(UnitTestMeshQuality, CubeHasItsVolumeAndArea)
   EXPECT_TRUE(quality.inverted.empty());
   EXPECT_EQ(quality.poor, 0);
   EXPECT_NEAR(quality.totalVolume, 1.0, 1e-12);
-  EXPECT_NEAR(quality.leastVolume, 1.0 / 6.0, 1e-12);
-  EXPECT_NEAR(quality.leastDihedralAngle, 45.0 * Degree, 1e-9);
+  EXPECT_NEAR(quality.minimumVolume, 1.0 / 6.0, 1e-12);
+  EXPECT_NEAR(quality.minimumDihedralAngle, 45.0 * Degree, 1e-9);
   // The circumscribed sphere is the cube's.
-  EXPECT_NEAR(quality.greatestRadiusEdgeRatio, 0.5 * std::sqrt(3.0), 1e-9);
+  EXPECT_NEAR(quality.maximumRadiusEdgeRatio, 0.5 * std::sqrt(3.0), 1e-9);
   ASSERT_EQ(quality.volume.size(), 6U);
   ASSERT_EQ(quality.minimumDihedral.size(), 6U);
   ASSERT_EQ(quality.radiusEdgeRatio.size(), 6U);
@@ -65,7 +65,7 @@ TEST(UnitTestMeshQuality, CubeHasItsVolumeAndArea)
   const auto surface = coronary::MeasureTriangles(cube.points, triangles);
   EXPECT_NEAR(surface.area, 6.0, 1e-12);
   EXPECT_NEAR(surface.enclosedVolume, 1.0, 1e-12); // outwards
-  EXPECT_NEAR(surface.leastAngle, 45.0 * Degree, 1e-9);
+  EXPECT_NEAR(surface.minimumAngle, 45.0 * Degree, 1e-9);
   EXPECT_TRUE(surface.degenerate.empty());
 }
 
@@ -76,7 +76,7 @@ TEST(UnitTestMeshQuality, InvertedOnesAreNamed)
   const auto all = coronary::MeasureTetrahedra(cube.points, cube.tetrahedra);
   EXPECT_EQ(all.inverted, (std::vector<std::int64_t>{ 0, 1, 2, 3, 4, 5 }));
   EXPECT_EQ(all.poor, 6);
-  EXPECT_EQ(all.leastDihedralAngle, 0.0);
+  EXPECT_EQ(all.minimumDihedralAngle, 0.0);
   EXPECT_LT(all.totalVolume, 0.0);
 
   const Cube good;
@@ -84,9 +84,9 @@ TEST(UnitTestMeshQuality, InvertedOnesAreNamed)
   std::swap(one[3][1], one[3][2]);
   const auto single = coronary::MeasureTetrahedra(good.points, one);
   EXPECT_EQ(single.inverted, (std::vector<std::int64_t>{ 3 }));
-  EXPECT_EQ(single.leastVolumeAt, 3);
-  EXPECT_EQ(single.leastDihedralAngleAt, 3);
-  EXPECT_NEAR(single.leastVolume, -1.0 / 6.0, 1e-12);
+  EXPECT_EQ(single.minimumVolumeAt, 3);
+  EXPECT_EQ(single.minimumDihedralAngleAt, 3);
+  EXPECT_NEAR(single.minimumVolume, -1.0 / 6.0, 1e-12);
   EXPECT_NEAR(single.totalVolume, 4.0 / 6.0, 1e-12);
   EXPECT_EQ(single.poor, 1);
 }
@@ -98,15 +98,15 @@ TEST(UnitTestMeshQuality, FlatOnesCountAsInvertedAndPoorOnesByTheLimit)
   const auto flat = coronary::MeasureTetrahedra(points, one);
   EXPECT_EQ(flat.inverted.size(), 1U);
   EXPECT_EQ(flat.poor, 1);
-  EXPECT_TRUE(std::isinf(flat.greatestRadiusEdgeRatio));
-  EXPECT_EQ(flat.greatestRadiusEdgeRatioAt, 0);
+  EXPECT_TRUE(std::isinf(flat.maximumRadiusEdgeRatio));
+  EXPECT_EQ(flat.maximumRadiusEdgeRatioAt, 0);
 
   // The face over the long edge leans by its height over the distance from that edge.
   points[3] = { 0.25, 0.25, std::tan(16.0 * Degree) * 0.25 * std::sqrt(2.0) * 1.0 };
-  const double least = coronary::MeasureTetrahedra(points, one).leastDihedralAngle;
-  EXPECT_EQ(coronary::MeasureTetrahedra(points, one, least - 1e-9).poor, 0);
-  EXPECT_EQ(coronary::MeasureTetrahedra(points, one, least + 1e-9).poor, 1);
-  EXPECT_NEAR(least, 16.0 * Degree, 1e-9);
+  const double minimum = coronary::MeasureTetrahedra(points, one).minimumDihedralAngle;
+  EXPECT_EQ(coronary::MeasureTetrahedra(points, one, minimum - 1e-9).poor, 0);
+  EXPECT_EQ(coronary::MeasureTetrahedra(points, one, minimum + 1e-9).poor, 1);
+  EXPECT_NEAR(minimum, 16.0 * Degree, 1e-9);
 }
 
 TEST(UnitTestMeshQuality, TrianglesWithoutAreaAreNamed)
@@ -114,17 +114,17 @@ TEST(UnitTestMeshQuality, TrianglesWithoutAreaAreNamed)
   const std::vector<Vector3> points = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 }, { 2, 0, 0 } };
   const auto quality = coronary::MeasureTriangles(points, { { 0, 1, 2 }, { 0, 1, 3 } });
   EXPECT_EQ(quality.degenerate, (std::vector<std::int64_t>{ 1 }));
-  EXPECT_EQ(quality.leastAngle, 0.0);
-  EXPECT_EQ(quality.leastAngleAt, 1);
+  EXPECT_EQ(quality.minimumAngle, 0.0);
+  EXPECT_EQ(quality.minimumAngleAt, 1);
   EXPECT_NEAR(quality.area, 0.5, 1e-15);
 }
 
 TEST(UnitTestMeshQuality, EmptyMeshes)
 {
   const auto tetrahedra = coronary::MeasureTetrahedra({}, {});
-  EXPECT_EQ(tetrahedra.leastVolumeAt, -1);
+  EXPECT_EQ(tetrahedra.minimumVolumeAt, -1);
   EXPECT_EQ(tetrahedra.totalVolume, 0.0);
-  EXPECT_EQ(coronary::MeasureTriangles({}, {}).leastAngleAt, -1);
+  EXPECT_EQ(coronary::MeasureTriangles({}, {}).minimumAngleAt, -1);
   EXPECT_TRUE(coronary::BoundaryFaces({}).empty());
 }
 

@@ -104,17 +104,17 @@ void SetConfidence(PoseSequence& sequence, double value)
     sequence.times.size(), std::vector<double>(sequence.points[0].size(), value));
 }
 
-double Greatest(const PoseSequence& a, const PoseSequence& b)
+double Maximum(const PoseSequence& a, const PoseSequence& b)
 {
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (std::size_t k = 0; k < a.points.size(); ++k)
   {
     for (std::size_t n = 0; n < a.points[k].size(); ++n)
     {
-      greatest = std::max(greatest, (a.points[k][n] - b.points[k][n]).norm());
+      maximum = std::max(maximum, (a.points[k][n] - b.points[k][n]).norm());
     }
   }
-  return greatest;
+  return maximum;
 }
 
 double Mean(const PoseSequence& a, const PoseSequence& b)
@@ -144,7 +144,7 @@ TEST(MotionRegularization, SmoothMotionStays)
   const Polylines lines = Fork();
   const PoseSequence motion = Move(lines, Even(20), Beat);
   const RegularizedMotion same = RegularizeMotion(motion, lines, NoWeights());
-  EXPECT_LT(Greatest(same.poses, motion), 1e-6);
+  EXPECT_LT(Maximum(same.poses, motion), 1e-6);
   EXPECT_EQ(same.iterations, 0);
   EXPECT_EQ(same.violations, 0);
   for (const std::int64_t count : same.clamped)
@@ -153,7 +153,7 @@ TEST(MotionRegularization, SmoothMotionStays)
   }
   // With the weights of the defaults: less than a tenth of a tracking error.
   const RegularizedMotion smoothed = RegularizeMotion(motion, lines);
-  EXPECT_LT(Greatest(smoothed.poses, motion), 0.03);
+  EXPECT_LT(Maximum(smoothed.poses, motion), 0.03);
   EXPECT_LE(smoothed.after.objective, smoothed.before.objective);
 }
 
@@ -172,9 +172,9 @@ TEST(MotionRegularization, TheDefaultsHardlyMoveThePhantom)
   }
   const RegularizedMotion smoothed = RegularizeMotion(truth, lines);
   RecordProperty("mean", std::to_string(Mean(smoothed.poses, truth)));
-  RecordProperty("greatest", std::to_string(Greatest(smoothed.poses, truth)));
+  RecordProperty("greatest", std::to_string(Maximum(smoothed.poses, truth)));
   EXPECT_LT(Mean(smoothed.poses, truth), 0.03);
-  EXPECT_LT(Greatest(smoothed.poses, truth), 0.3);
+  EXPECT_LT(Maximum(smoothed.poses, truth), 0.3);
   // Noise of 0.3 mm an axis becomes less.
   PoseSequence noisy = truth;
   std::mt19937 random(11);
@@ -209,7 +209,7 @@ TEST(MotionRegularization, ASpikeInALostNodeIsRemoved)
     spoiled.confidence[8][n] = 0.0;
   }
   const RegularizedMotion result = RegularizeMotion(spoiled, lines);
-  EXPECT_LT(Greatest(result.poses, truth), 0.15);
+  EXPECT_LT(Maximum(result.poses, truth), 0.15);
   EXPECT_EQ(result.violations, 0);
   EXPECT_NE(result.clamps[8][6] & (coronary::ClampStrain | coronary::ClampStep), 0);
   EXPECT_EQ(result.clamps[2][15], 0);
@@ -230,7 +230,7 @@ TEST(MotionRegularization, AWholeLostPhaseIsFilled)
     spoiled.confidence[12][n] = 0.0;
   }
   const RegularizedMotion result = RegularizeMotion(spoiled, lines);
-  EXPECT_LT(Greatest(result.poses, truth), 0.3);
+  EXPECT_LT(Maximum(result.poses, truth), 0.3);
 }
 
 TEST(MotionRegularization, WellTrackedPointsMoveByTheToleranceAtMost)
@@ -285,8 +285,8 @@ TEST(MotionRegularization, AStretchedLineComesBackToTheLimit)
     return { rest.x() * (t > 0.45 && t < 0.7 ? 1.5 : 1.0), 0.0, 0.0 };
   };
   MotionRegularizationSettings settings = NoWeights();
-  settings.greatestStrain = 0.1;
-  settings.greatestStep = Infinity;
+  settings.maximumStrain = 0.1;
+  settings.maximumStep = Infinity;
   const PoseSequence motion = Move(lines, Even(6), stretched);
   const RegularizedMotion result = RegularizeMotion(motion, lines, settings);
   EXPECT_GT(result.iterations, 0);
@@ -328,9 +328,9 @@ TEST(MotionRegularization, CornersAreKeptWithinTheLimits)
     return std::atan2(a.cross(b).norm(), a.dot(b));
   };
   MotionRegularizationSettings settings = NoWeights();
-  settings.greatestStep = Infinity;
-  settings.leastCurvatureRadius = 0.0;
-  settings.greatestBending = 0.5;
+  settings.maximumStep = Infinity;
+  settings.minimumCurvatureRadius = 0.0;
+  settings.maximumBending = 0.5;
   const RegularizedMotion bent = RegularizeMotion(motion, lines, settings);
   for (int n = 1; n < 8; ++n)
   {
@@ -341,8 +341,8 @@ TEST(MotionRegularization, CornersAreKeptWithinTheLimits)
   EXPECT_EQ(bent.clamps[0][4], 0);
   EXPECT_EQ(bent.violations, 0);
 
-  settings.greatestBending = Pi;
-  settings.leastCurvatureRadius = 6.0;
+  settings.maximumBending = Pi;
+  settings.minimumCurvatureRadius = 6.0;
   const RegularizedMotion round = RegularizeMotion(motion, lines, settings);
   EXPECT_EQ(round.violations, 0);
   EXPECT_EQ(round.clamps[2][4] & coronary::ClampCurvature, coronary::ClampCurvature);
@@ -359,8 +359,8 @@ TEST(MotionRegularization, CornersAreKeptWithinTheLimits)
     point = kinked(point, 0.5);
   }
   const PoseSequence still = Move(sharp, Even(4), [](const Vector3& rest, double) { return rest; });
-  settings.greatestBending = 0.5;
-  EXPECT_LT(Greatest(RegularizeMotion(still, sharp, settings).poses, still), 1e-6);
+  settings.maximumBending = 0.5;
+  EXPECT_LT(Maximum(RegularizeMotion(still, sharp, settings).poses, still), 1e-6);
 }
 
 TEST(MotionRegularization, StepsBetweenPhasesAreKept)
@@ -370,7 +370,7 @@ TEST(MotionRegularization, StepsBetweenPhasesAreKept)
     [](const Vector3& rest, double t) -> Vector3
     { return rest + Vector3(0, t == 0.5 ? 10.0 : 0.0, 0); });
   MotionRegularizationSettings settings = NoWeights();
-  settings.greatestStep = 3.0;
+  settings.maximumStep = 3.0;
   const RegularizedMotion result = RegularizeMotion(motion, lines, settings);
   EXPECT_EQ(result.violations, 0);
   for (std::size_t k = 0; k < 8; ++k)
@@ -484,8 +484,8 @@ TEST(MotionRegularization, MovesAndScalesWithTheWorld)
       point = map(point);
     }
   }
-  settings.leastCurvatureRadius *= scale;
-  settings.greatestStep *= scale;
+  settings.minimumCurvatureRadius *= scale;
+  settings.maximumStep *= scale;
   settings.tolerance *= scale;
   settings.precision *= scale;
   const RegularizedMotion there = RegularizeMotion(motion, lines, settings);
@@ -504,7 +504,7 @@ TEST(MotionRegularization, MovesAndScalesWithTheWorld)
   {
     time += 3.25;
   }
-  EXPECT_LT(Greatest(RegularizeMotion(later, lines, settings).poses, there.poses), 1e-6);
+  EXPECT_LT(Maximum(RegularizeMotion(later, lines, settings).poses, there.poses), 1e-6);
 }
 
 TEST(MotionRegularization, SameBitsOnAnyNumberOfThreads)
@@ -599,10 +599,11 @@ TEST(MotionRegularization, Refusals)
   refuse("temporalWeight", [](auto&, auto&, auto& set) { set.temporalWeight = -1.0; });
   refuse("spatialWeight", [&](auto&, auto&, auto& set) { set.spatialWeight = nan; });
   refuse("velocityWeight", [](auto&, auto&, auto& set) { set.velocityWeight = Infinity; });
-  refuse("greatestBending", [](auto&, auto&, auto& set) { set.greatestBending = 0.0; });
-  refuse("leastCurvatureRadius", [](auto&, auto&, auto& set) { set.leastCurvatureRadius = -1.0; });
-  refuse("greatestStrain", [](auto&, auto&, auto& set) { set.greatestStrain = 0.0; });
-  refuse("greatestStep", [&](auto&, auto&, auto& set) { set.greatestStep = nan; });
+  refuse("maximumBending", [](auto&, auto&, auto& set) { set.maximumBending = 0.0; });
+  refuse(
+    "minimumCurvatureRadius", [](auto&, auto&, auto& set) { set.minimumCurvatureRadius = -1.0; });
+  refuse("maximumStrain", [](auto&, auto&, auto& set) { set.maximumStrain = 0.0; });
+  refuse("maximumStep", [&](auto&, auto&, auto& set) { set.maximumStep = nan; });
   refuse("wellTracked", [](auto&, auto&, auto& set) { set.wellTracked = 2.0; });
   refuse("tolerance", [](auto&, auto&, auto& set) { set.tolerance = -0.1; });
   refuse("youngsModulus", [](auto&, auto&, auto& set) { set.youngsModulus = 0.0; });

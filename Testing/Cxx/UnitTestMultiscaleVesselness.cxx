@@ -308,9 +308,9 @@ TEST(MultiscaleVesselness, AllInstructionSetsAgree)
     const Result expected = Filter(volume, settings);
     const MultiscaleVesselness filter(settings, volume.spacing, volume.extent);
     const auto extremes = filter.Measure(volume.Block(), volume.extent, nullptr);
-    const double largest =
+    const double maximumValue =
       *std::max_element(expected.vesselness.begin(), expected.vesselness.end());
-    EXPECT_GT(largest, 0.2);
+    EXPECT_GT(maximumValue, 0.2);
     for (const Instructions wide : { Instructions::Avx2, Instructions::Avx512 })
     {
       if (!VesselnessKernelChoice().Select(wide))
@@ -330,14 +330,14 @@ TEST(MultiscaleVesselness, AllInstructionSetsAgree)
       for (std::size_t at = 0; at < found.vesselness.size(); ++at)
       {
         different +=
-          std::abs(found.vesselness[at] - expected.vesselness[at]) > 1e-4 * largest ? 1 : 0;
+          std::abs(found.vesselness[at] - expected.vesselness[at]) > 1e-4 * maximumValue ? 1 : 0;
       }
       EXPECT_LE(different, found.vesselness.size() / 20000);
       for (std::size_t at = 0; at < found.vesselness.size(); at += 7)
       {
         const Eigen::Map<const Eigen::Vector3f> a(&expected.direction[3 * at]);
         const Eigen::Map<const Eigen::Vector3f> b(&found.direction[3 * at]);
-        if (expected.vesselness[at] > 0.1 * largest && expected.scale[at] == found.scale[at])
+        if (expected.vesselness[at] > 0.1 * maximumValue && expected.scale[at] == found.scale[at])
         {
           EXPECT_GT(std::abs(a.dot(b)), 0.9999f);
         }

@@ -69,14 +69,14 @@ std::vector<double> Even(int count)
   return times;
 }
 
-double Greatest(const std::vector<Vector3>& a, const std::vector<Vector3>& b)
+double Maximum(const std::vector<Vector3>& a, const std::vector<Vector3>& b)
 {
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (std::size_t n = 0; n < a.size(); ++n)
   {
-    greatest = std::max(greatest, (a[n] - b[n]).norm());
+    maximum = std::max(maximum, (a[n] - b[n]).norm());
   }
-  return greatest;
+  return maximum;
 }
 
 std::vector<Vector3> At(const PhaseInterpolation& motion, double time)
@@ -122,7 +122,7 @@ TEST(PhaseInterpolation, AnyTimeModuloOneCycle)
     {
       for (const double cycles : { -3.0, 1.0, 250.0 })
       {
-        EXPECT_LT(Greatest(At(motion, time), At(motion, time + cycles)), 1e-9);
+        EXPECT_LT(Maximum(At(motion, time), At(motion, time + cycles)), 1e-9);
       }
     }
   }
@@ -138,7 +138,7 @@ TEST(PhaseInterpolation, ThroughThePhases)
     const PhaseInterpolation motion(sequence, With(mode));
     for (std::size_t k = 0; k < times.size(); ++k)
     {
-      EXPECT_LT(Greatest(At(motion, times[k]), sequence.points[k]), 1e-12);
+      EXPECT_LT(Maximum(At(motion, times[k]), sequence.points[k]), 1e-12);
       EXPECT_EQ(motion.NearestPhase(times[k] + 2.001), k);
     }
     EXPECT_EQ(motion.Repeatability(), 0.0);
@@ -158,8 +158,8 @@ TEST(PhaseInterpolation, CubicIsSmoothAtThePhasesAndAtTheSeam)
     InterpolatedPose after;
     motion.Evaluate(time - 1e-9, before);
     motion.Evaluate(time + 1e-9, after);
-    EXPECT_LT(Greatest(before.points, after.points), 1e-6);
-    EXPECT_LT(Greatest(before.velocity, after.velocity), 1e-4);
+    EXPECT_LT(Maximum(before.points, after.points), 1e-6);
+    EXPECT_LT(Maximum(before.velocity, after.velocity), 1e-4);
     // Accelerations, from velocities on either side.
     InterpolatedPose earlier;
     InterpolatedPose later;
@@ -180,12 +180,12 @@ TEST(PhaseInterpolation, CubicConvergesWithTheFourthPower)
   {
     const PhaseInterpolation motion(
       Sample(Even(phases), 6, Smooth), With(PhaseInterpolationMode::PeriodicCubic));
-    double greatest = 0.0;
+    double maximum = 0.0;
     for (int k = 0; k < 97; ++k)
     {
-      greatest = std::max(greatest, Greatest(At(motion, k / 97.0), Truth(k / 97.0, 6)));
+      maximum = std::max(maximum, Maximum(At(motion, k / 97.0), Truth(k / 97.0, 6)));
     }
-    return greatest;
+    return maximum;
   };
   EXPECT_NEAR(error(20) / error(40), 16.0, 3.0);
 }
@@ -196,8 +196,8 @@ TEST(PhaseInterpolation, TwoPhasesAreEnough)
   {
     const PoseSequence sequence = Sample({ 0.25, 0.75 }, 3, Smooth);
     const PhaseInterpolation motion(sequence, With(mode));
-    EXPECT_LT(Greatest(At(motion, 0.25), sequence.points[0]), 1e-6);
-    EXPECT_LT(Greatest(At(motion, 0.75), sequence.points[1]), 1e-6);
+    EXPECT_LT(Maximum(At(motion, 0.25), sequence.points[0]), 1e-6);
+    EXPECT_LT(Maximum(At(motion, 0.75), sequence.points[1]), 1e-6);
     for (const Vector3& point : At(motion, 0.6))
     {
       EXPECT_TRUE(point.allFinite());
@@ -237,17 +237,17 @@ TEST(PhaseInterpolation, ThePapersRepetitionsAreBroughtTogether)
     EXPECT_NEAR(motion.Knots()[0], 0.5 * (0.00842 + 0.0016), 2e-4); // phases 2 and 19
     // The same motion seen twice at different moments: next to no difference is left.
     EXPECT_LT(motion.Repeatability(), 0.02);
-    double greatest = 0.0;
+    double maximum = 0.0;
     for (int k = 0; k < 50; ++k)
     {
-      greatest = std::max(greatest, Greatest(At(motion, k / 50.0), Truth(k / 50.0, 6)));
+      maximum = std::max(maximum, Maximum(At(motion, k / 50.0), Truth(k / 50.0, 6)));
     }
-    EXPECT_LT(greatest, mode == PhaseInterpolationMode::Linear ? 0.6 : 0.05);
+    EXPECT_LT(maximum, mode == PhaseInterpolationMode::Linear ? 0.6 : 0.05);
   }
   // With another tolerance they stay apart.
   const PhaseInterpolation apart(sequence, With(PhaseInterpolationMode::Linear, 0.001));
   EXPECT_EQ(apart.Knots().size(), 20U);
-  EXPECT_LT(Greatest(At(apart, times[18]), sequence.points[18]), 1e-12);
+  EXPECT_LT(Maximum(At(apart, times[18]), sequence.points[18]), 1e-12);
 }
 
 TEST(PhaseInterpolation, MergingDoesNotChangeASteadyMotion)
@@ -305,7 +305,7 @@ TEST(PhaseInterpolation, LowNoiseFindsTheMotionUnderNoise)
   EXPECT_EQ(exact.Fit().rank, 2);
   EXPECT_GE(exact.Fit().order, 3);
   EXPECT_LT(exact.Fit().predicted, 1e-6);
-  EXPECT_LT(Greatest(At(exact, 0.777), Truth(0.777, points)), 1e-6);
+  EXPECT_LT(Maximum(At(exact, 0.777), Truth(0.777, points)), 1e-6);
 
   std::mt19937 random(7);
   std::normal_distribution<double> noise(0.0, 0.3);
@@ -360,12 +360,12 @@ TEST(PhaseInterpolation, LowNoiseFillsWhatIsLost)
   }
   const PhaseInterpolation motion(sequence, With(PhaseInterpolationMode::LowNoise));
   EXPECT_GT(motion.Fit().iterations, 0);
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (const double time : { 6.0 / 17.0, 6.5 / 17.0, 7.0 / 17.0 })
   {
-    greatest = std::max(greatest, Greatest(At(motion, time), Truth(time, points)));
+    maximum = std::max(maximum, Maximum(At(motion, time), Truth(time, points)));
   }
-  EXPECT_LT(greatest, 0.5);
+  EXPECT_LT(maximum, 0.5);
 }
 
 TEST(PhaseInterpolation, OddPhasesOfThePhantomFromEvenOnes)
@@ -575,9 +575,9 @@ TEST(PhaseInterpolation, Refusals)
   refuse("points", [](auto& s, auto&) { s.points[1].pop_back(); });
   refuse("fewer than two different phases", [](auto& s, auto&) { s.times = { 0.0, 1.0 }; });
   refuse("mergeTolerance", [](auto&, auto& set) { set.mergeTolerance = 0.2; });
-  refuse("greatestRank", [](auto&, auto& set) { set.greatestRank = 0; });
-  refuse("greatestOrder", [](auto&, auto& set) { set.greatestOrder = 21; });
-  refuse("leastConfidence", [&](auto&, auto& set) { set.leastConfidence = nan; });
+  refuse("maximumRank", [](auto&, auto& set) { set.maximumRank = 0; });
+  refuse("maximumOrder", [](auto&, auto& set) { set.maximumOrder = 21; });
+  refuse("minimumConfidence", [&](auto&, auto& set) { set.minimumConfidence = nan; });
   refuse("mode", [](auto&, auto& set) { set.mode = static_cast<PhaseInterpolationMode>(3); });
   const PhaseInterpolation motion(good);
   InterpolatedPose pose;

@@ -627,15 +627,15 @@ PhaseInterpolationSettings SettingsOf(PhaseInterpolationMode mode)
 {
   PhaseInterpolationSettings settings;
   settings.mode = mode;
-  settings.greatestRank = 2; // fewer to try: quicker
-  settings.greatestOrder = 3;
+  settings.maximumRank = 2; // fewer to try: quicker
+  settings.maximumOrder = 3;
   return settings;
 }
 
 /// In one cycle that begins anywhere, none nearer to another than 0.03.
 std::vector<double> RandomPhases(RandomStream& random, std::size_t count)
 {
-  constexpr double least = 0.03;
+  constexpr double minimum = 0.03;
   std::vector<double> gaps(count);
   double sum = 0.0;
   for (double& gap : gaps)
@@ -647,7 +647,7 @@ std::vector<double> RandomPhases(RandomStream& random, std::size_t count)
   for (std::size_t k = 1; k < count; ++k)
   {
     times.push_back(
-      times.back() + least + (1.0 - least * static_cast<double>(count)) * gaps[k] / sum);
+      times.back() + minimum + (1.0 - minimum * static_cast<double>(count)) * gaps[k] / sum);
   }
   return times;
 }
@@ -1139,8 +1139,8 @@ TEST(RandomMotion, RegularisationKeepsItsLimitsOrSaysWhereNot)
     Jitter(sequence, random, 0.8);
     DrawConfidence(sequence, random);
     MotionRegularizationSettings settings;
-    settings.greatestStrain = 0.15;
-    settings.greatestStep = 6.0;
+    settings.maximumStrain = 0.15;
+    settings.maximumStep = 6.0;
     const RegularizedMotion regular = RegularizeMotion(sequence, lines, settings);
     EXPECT_GT(regular.iterations, 0) << seed;
     const double slack = 3.0 * settings.precision;
@@ -1153,7 +1153,7 @@ TEST(RandomMotion, RegularisationKeepsItsLimitsOrSaysWhereNot)
       EXPECT_TRUE(AllFinite(points)) << seed;
       for (std::size_t p = 0; p < points.size(); ++p)
       {
-        beyond += (next[p] - points[p]).norm() > settings.greatestStep + slack ? 1 : 0;
+        beyond += (next[p] - points[p]).norm() > settings.maximumStep + slack ? 1 : 0;
         if (sequence.confidence[k][p] >= settings.wellTracked)
         {
           EXPECT_LE((points[p] - sequence.points[k][p]).norm(), settings.tolerance + slack) << seed;
@@ -1170,7 +1170,7 @@ TEST(RandomMotion, RegularisationKeepsItsLimitsOrSaysWhereNot)
           const auto b = static_cast<std::size_t>(line[p]);
           const double now = (points[b] - points[a]).norm();
           const double then = (lines.points[b] - lines.points[a]).norm();
-          beyond += std::abs(now - then) > settings.greatestStrain * then + slack ? 1 : 0;
+          beyond += std::abs(now - then) > settings.maximumStrain * then + slack ? 1 : 0;
           length += now;
           rest += then;
         }

@@ -159,7 +159,7 @@ bool RealMotion(Polylines& lines, PoseSequence& motion)
 struct Errors
 {
   double mean = 0.0;
-  double greatest = 0.0;
+  double maximum = 0.0;
 };
 
 Errors ErrorsOf(
@@ -175,7 +175,7 @@ Errors ErrorsOf(
     {
       const double error = (pose.points[n] - truth.points[k][n]).norm();
       errors.mean += error;
-      errors.greatest = std::max(errors.greatest, error);
+      errors.maximum = std::max(errors.maximum, error);
       ++count;
     }
   }
@@ -263,7 +263,7 @@ TEST(RealMotion, HeldOutFrames)
       settings.mode = static_cast<PhaseInterpolationMode>(mode);
       errors[mode] = ErrorsOf(PhaseInterpolation(known, settings), motion, out);
       std::printf("%s, noise %.1f mm an axis, %-14s mean %.3f greatest %.2f mm\n", what, noise,
-        names[mode], errors[mode].mean, errors[mode].greatest);
+        names[mode], errors[mode].mean, errors[mode].maximum);
     }
   };
   Errors frames[3];

@@ -132,8 +132,8 @@ TEST(UnitTestScenario, EverySettingArrives)
   EXPECT_EQ(s.settings.wallFriction, 2.5);
   EXPECT_EQ(s.settings.wallStiffness, 7.0);
   EXPECT_EQ(s.settings.drag, 0.5);
-  EXPECT_EQ(s.settings.largestSpeed, 50.0);
-  EXPECT_EQ(s.settings.largestTurning, 6.0);
+  EXPECT_EQ(s.settings.maximumSpeed, 50.0);
+  EXPECT_EQ(s.settings.maximumTurning, 6.0);
   EXPECT_EQ(s.vessels.phantom.seed, 9U);
   EXPECT_EQ(s.vessels.phantom.dominance, coronary::Dominance::Left);
   EXPECT_EQ(s.vessels.phantom.stenoses, 3);

@@ -27,7 +27,7 @@ struct Degradation
   int twigs = 0;             ///< spurious, 1 to 5 mm long
   double lostBranches = 0.0; ///< probability that a side branch is missing
   double lostEnds = 0.0;     ///< greatest share of a last branch that is missing
-  double greatestTurn = 0.0; ///< about each axis, radians
+  double maximumTurn = 0.0;  ///< about each axis, radians
   bool move = false;         ///< shift by up to 500 mm, scale by 0.8 to 1.25
 };
 
@@ -41,7 +41,7 @@ Case Degrade(const PhantomTree& tree, const Degradation& how, std::uint64_t seed
 {
   Case result;
   RandomStream random(seed, 4711);
-  const auto turn = [&]() { return random.Uniform(-how.greatestTurn, how.greatestTurn + 1e-12); };
+  const auto turn = [&]() { return random.Uniform(-how.maximumTurn, how.maximumTurn + 1e-12); };
   const Matrix3 rotation = (Eigen::AngleAxisd(turn(), Vector3::UnitX()) *
     Eigen::AngleAxisd(turn(), Vector3::UnitY()) * Eigen::AngleAxisd(turn(), Vector3::UnitZ()))
                              .toRotationMatrix();
@@ -234,7 +234,7 @@ TEST(SegmentLabeling, NoiseTwigsAndOtherPatients)
   how.noise = 0.4;
   how.calibreNoise = 0.1;
   how.twigs = 10;
-  how.greatestTurn = 25.0 * Pi / 180.0;
+  how.maximumTurn = 25.0 * Pi / 180.0;
   how.move = true;
   Confusion confusion;
   for (std::uint64_t seed = 111; seed <= 115; ++seed)
@@ -259,7 +259,7 @@ TEST(SegmentLabeling, MissingBranchesAndEnds)
   how.twigs = 10;
   how.lostBranches = 0.2;
   how.lostEnds = 0.4;
-  how.greatestTurn = 25.0 * Pi / 180.0;
+  how.maximumTurn = 25.0 * Pi / 180.0;
   how.move = true;
   Confusion confusion;
   int wrong = 0;

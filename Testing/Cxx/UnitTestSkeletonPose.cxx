@@ -8,8 +8,8 @@
 #include <limits>
 #include <random>
 
-using coronary::BoneTransform;
 using coronary::ApplyPoseEdit;
+using coronary::BoneTransform;
 using coronary::PoseEdit;
 using coronary::Quaternion;
 using coronary::Skeleton;
@@ -107,15 +107,15 @@ TEST(SkeletonPose, LeastRotationCarriesAndTurnsNoMore)
     {
       to = -from + 1e-4 * to; // nearly opposite
     }
-    const Quaternion rotation = coronary::LeastRotation(from, to);
+    const Quaternion rotation = coronary::ShortestRotation(from, to);
     EXPECT_LT((rotation * from.normalized() - to.normalized()).norm(), n % 4 == 0 ? 1e-9 : 1e-14);
     // About an axis across both: no twist.
     EXPECT_LT(std::abs(rotation.vec().dot(from.normalized())), 1e-10);
   }
-  const Quaternion half = coronary::LeastRotation({ 0, 0, 2 }, { 0, 0, -3 });
+  const Quaternion half = coronary::ShortestRotation({ 0, 0, 2 }, { 0, 0, -3 });
   EXPECT_LT((half * Vector3(0, 0, 1) - Vector3(0, 0, -1)).norm(), 1e-14);
   EXPECT_LT(
-    Angle(coronary::LeastRotation({ 1, 2, 3 }, { 2, 4, 6 }), Quaternion::Identity()), 1e-15);
+    Angle(coronary::ShortestRotation({ 1, 2, 3 }, { 2, 4, 6 }), Quaternion::Identity()), 1e-15);
 }
 
 TEST(SkeletonPose, RigidMotionGivesItsRotationToEveryBone)
@@ -179,25 +179,25 @@ TEST(SkeletonPose, RotationsDependContinuouslyOnThePose)
     }
     return Transforms(rig, pose);
   };
-  const auto greatestStep = [&](int steps)
+  const auto maximumStep = [&](int steps)
   {
-    double greatest = 0.0;
+    double maximum = 0.0;
     std::vector<BoneTransform> before = at(0.0);
     for (int n = 1; n <= steps; ++n)
     {
       const std::vector<BoneTransform> now = at(static_cast<double>(n) / steps);
       for (std::size_t b = 0; b < now.size(); ++b)
       {
-        greatest = std::max(greatest, Angle(now[b].rotation, before[b].rotation));
+        maximum = std::max(maximum, Angle(now[b].rotation, before[b].rotation));
       }
       before = now;
     }
-    return greatest;
+    return maximum;
   };
   // A jump would not get smaller with the steps.
-  const double fine = greatestStep(2000);
+  const double fine = maximumStep(2000);
   EXPECT_GT(fine, 0.001);
-  EXPECT_LT(greatestStep(20000), 0.11 * fine);
+  EXPECT_LT(maximumStep(20000), 0.11 * fine);
   // One cycle later it is what it was.
   const std::vector<BoneTransform> start = at(0.0);
   const std::vector<BoneTransform> end = at(1.0);
@@ -361,8 +361,7 @@ TEST(PoseEdit, CalibreFallsOffOnBothSides)
   EXPECT_NEAR(pose.calibre[3], 0.5, 1e-12);
   EXPECT_EQ(pose.calibre[0], 1.0);
   const double along = (Vector3(4.0, 1.0, 15.0) - Vector3(0.0, 0.0, 12.0)).norm();
-  EXPECT_NEAR(
-    pose.calibre[5], std::pow(0.25, 0.5 + 0.5 * std::cos(Pi * along / 12.0)), 1e-12);
+  EXPECT_NEAR(pose.calibre[5], std::pow(0.25, 0.5 + 0.5 * std::cos(Pi * along / 12.0)), 1e-12);
 }
 
 TEST(PoseEdit, RefusesAndStaysAsItWas)

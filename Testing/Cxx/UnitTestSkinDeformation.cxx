@@ -237,14 +237,14 @@ std::vector<Vector3> Deformed(SkinDeformation& skin, const SkeletonPose& pose)
   return points;
 }
 
-double GreatestDistance(const std::vector<Vector3>& a, const std::vector<float>& b)
+double MaximumDistance(const std::vector<Vector3>& a, const std::vector<float>& b)
 {
-  double greatest = 0.0;
+  double maximum = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i)
   {
-    greatest = std::max(greatest, (a[i] - Vector3(b[3 * i], b[3 * i + 1], b[3 * i + 2])).norm());
+    maximum = std::max(maximum, (a[i] - Vector3(b[3 * i], b[3 * i + 1], b[3 * i + 2])).norm());
   }
-  return greatest;
+  return maximum;
 }
 
 constexpr std::array<SkinBlend, 2> Blends{ SkinBlend::Linear, SkinBlend::DualQuaternion };
@@ -274,17 +274,17 @@ TEST(SkinDeformation, RigidMotionIsReproduced)
         pose.joints.push_back(rotation * joint + shift);
       }
       const std::vector<Vector3> moved = Deformed(skin, pose);
-      double greatest = 0.0;
+      double maximum = 0.0;
       double size = 0.0;
       for (std::size_t i = 0; i < moved.size(); ++i)
       {
-        greatest = std::max(greatest, (moved[i] - (rotation * made.points[i] + shift)).norm());
+        maximum = std::max(maximum, (moved[i] - (rotation * made.points[i] + shift)).norm());
         size = std::max(size, moved[i].norm());
       }
-      EXPECT_LT(greatest, 1e-9);
+      EXPECT_LT(maximum, 1e-9);
       std::vector<float> single(3 * made.points.size());
       skin.Deform(pose, single.data());
-      EXPECT_LT(GreatestDistance(moved, single), 4e-7 * size);
+      EXPECT_LT(MaximumDistance(moved, single), 4e-7 * size);
     }
   }
 }
@@ -379,7 +379,7 @@ TEST(SkinDeformation, TwistOfAStraightTubeIsEven)
     }
     std::vector<float> single(3 * points.size());
     skin.Deform(pose, single.data());
-    EXPECT_LT(GreatestDistance(moved, single), 1e-5);
+    EXPECT_LT(MaximumDistance(moved, single), 1e-5);
   }
 }
 
@@ -491,7 +491,7 @@ TEST(SkinDeformation, AllInstructionSetsAgreeWithDoublePrecision)
         const SkeletonPose pose = RandomPose(skin.Rig(), 3, 1.0, sections);
         std::vector<float> single(3 * made.points.size());
         skin.Deform(pose, single.data());
-        EXPECT_LT(GreatestDistance(Deformed(skin, pose), single), 1e-4);
+        EXPECT_LT(MaximumDistance(Deformed(skin, pose), single), 1e-4);
       }
     }
   }
@@ -654,7 +654,7 @@ std::vector<Vector3> VelocitiesOf(SkinDeformation& skin, const MovingSkeletonPos
       skin.Deform(pose, stillSingle.data());
       skin.Deform(moving, single.data(), rates.data());
       EXPECT_EQ(single, stillSingle);
-      EXPECT_LT(GreatestDistance(result, rates), 2e-5 * (1.0 + size));
+      EXPECT_LT(MaximumDistance(result, rates), 2e-5 * (1.0 + size));
     }
   }
   SkinKernelChoice().Select(Instructions::Widest);
@@ -914,7 +914,7 @@ TEST(SkinDeformation, InvertedTetrahedraAreFoundAndRepaired)
     skin.Deform(skin.Rig().RestPose(), positions.data());
     skin.CheckTetrahedra(positions.data(), report);
     EXPECT_EQ(report.found, 0);
-    EXPECT_NEAR(report.leastRatio, 1.0, 1e-12);
+    EXPECT_NEAR(report.minimumRatio, 1.0, 1e-12);
 
     // A gentle bend needs no repair, and gets none.
     pose.joints = { rest.joints[0], rest.joints[1],
@@ -937,12 +937,12 @@ TEST(SkinDeformation, InvertedTetrahedraAreFoundAndRepaired)
     skin.CheckTetrahedra(positions.data(), report);
     EXPECT_GT(report.found, 10);
     EXPECT_EQ(report.found, static_cast<std::int64_t>(report.tetrahedra.size()));
-    EXPECT_LT(report.leastRatio, 0.0);
+    EXPECT_LT(report.minimumRatio, 0.0);
     skin.RepairTetrahedra(positions.data(), report, 0.01);
     EXPECT_TRUE(report.tetrahedra.empty()) << report.tetrahedra.size() << " left";
-    EXPECT_GT(report.leastRatio, 0.01);
-    EXPECT_LT(report.largestMove, 1.5);
-    EXPECT_GT(report.largestMove, 0.0);
+    EXPECT_GT(report.minimumRatio, 0.01);
+    EXPECT_LT(report.maximumMove, 1.5);
+    EXPECT_GT(report.maximumMove, 0.0);
     std::int64_t moved = 0;
     for (std::size_t i = 0; i < bar.points.size(); ++i)
     {
@@ -954,7 +954,7 @@ TEST(SkinDeformation, InvertedTetrahedraAreFoundAndRepaired)
     EXPECT_LE(moved, report.movedPoints);
     EXPECT_LT(moved, static_cast<std::int64_t>(bar.points.size() / 2));
     skin.CheckTetrahedra(positions.data(), report);
-    EXPECT_GT(report.leastRatio, 0.01);
+    EXPECT_GT(report.minimumRatio, 0.01);
   }
 }
 

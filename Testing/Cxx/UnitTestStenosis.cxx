@@ -271,9 +271,9 @@ TEST(StenosisGrading, DegreesAreThoseOfTheTube)
     EXPECT_EQ(lesion.segmentId, MidLAD);
     EXPECT_FALSE(lesion.bridged);
     // The tree's own radius follows.
-    const double least =
+    const double minimum =
       *std::min_element(measured.lumen.radius.begin() + 40, measured.lumen.radius.end() - 40);
-    EXPECT_NEAR(least, 1.6 * (1.0 - degree), 0.1);
+    EXPECT_NEAR(minimum, 1.6 * (1.0 - degree), 0.1);
   }
 }
 
@@ -451,11 +451,11 @@ TEST(CalciumObjects, BehindItTheRadiusGoesFromWhatIsBeforeToWhatIsBehind)
   ASSERT_GT(first, 10);
   ASSERT_GT(last, first + 4);
   const std::vector<double>& radius = measured.lumen.radius;
-  const double least = std::min(radius[first - 1], radius[last + 1]);
+  const double minimum = std::min(radius[first - 1], radius[last + 1]);
   const double most = std::max(radius[first - 1], radius[last + 1]);
   for (auto i = first; i <= last; ++i)
   {
-    EXPECT_GT(radius[i], least - 0.1) << i;
+    EXPECT_GT(radius[i], minimum - 0.1) << i;
     EXPECT_LT(radius[i], most + 0.1) << i;
   }
 }
@@ -560,7 +560,7 @@ TEST(PhantomLesions, AreWhatTheTreeShows)
   ASSERT_EQ(phantom.Stenoses(0.3).size(), 3U);
   for (const PhantomStenosis& stenosis : phantom.Stenoses(0.3))
   {
-    EXPECT_EQ(stenosis.leastRadius, tree.radius[stenosis.point]);
+    EXPECT_EQ(stenosis.minimumRadius, tree.radius[stenosis.point]);
     EXPECT_EQ(stenosis.position, tree.points[stenosis.point]);
     EXPECT_NEAR(
       stenosis.degree, 1.0 - tree.radius[stenosis.point] / without.radius[stenosis.point], 0.01);
@@ -569,7 +569,7 @@ TEST(PhantomLesions, AreWhatTheTreeShows)
     // It is the narrowest place around.
     for (std::int64_t p = stenosis.point - 3; p <= stenosis.point + 3; ++p)
     {
-      EXPECT_GE(tree.radius[p], 0.99 * stenosis.leastRadius);
+      EXPECT_GE(tree.radius[p], 0.99 * stenosis.minimumRadius);
     }
   }
   ASSERT_EQ(phantom.Plaques(0.3).size(), 5U);

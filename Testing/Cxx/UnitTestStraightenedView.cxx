@@ -76,19 +76,19 @@ double WidthAt(const GreyPicture& cut, int x, double level, double step)
 TEST(FollowAxis, StepsAndFrameOfAStraightAxis)
 {
   const std::vector<Vector3> axis = { { 1, 2, 3 }, { 1, 2, 3 }, { 1, 2, 8 }, { 1, 2, 13.1 } };
-  const VesselCourse course = FollowAxis(axis, 0.5);
-  ASSERT_EQ(course.position.size(), 21U);
-  for (std::size_t n = 0; n < course.position.size(); ++n)
+  const FramedCurve curve = FollowAxis(axis, 0.5);
+  ASSERT_EQ(curve.position.size(), 21U);
+  for (std::size_t n = 0; n < curve.position.size(); ++n)
   {
-    EXPECT_NEAR((course.position[n] - Vector3(1, 2, 3 + 0.5 * double(n))).norm(), 0.0, 1e-12);
-    EXPECT_NEAR((course.tangent[n] - Vector3::UnitZ()).norm(), 0.0, 1e-12);
-    EXPECT_NEAR((course.normal[n] - course.normal[0]).norm(), 0.0, 1e-12);
-    EXPECT_NEAR((course.tangent[n].cross(course.normal[n]) - course.binormal[n]).norm(), 0, 1e-12);
+    EXPECT_NEAR((curve.position[n] - Vector3(1, 2, 3 + 0.5 * double(n))).norm(), 0.0, 1e-12);
+    EXPECT_NEAR((curve.tangent[n] - Vector3::UnitZ()).norm(), 0.0, 1e-12);
+    EXPECT_NEAR((curve.normal[n] - curve.normal[0]).norm(), 0.0, 1e-12);
+    EXPECT_NEAR((curve.tangent[n].cross(curve.normal[n]) - curve.binormal[n]).norm(), 0, 1e-12);
   }
   // Values at the points, between them and the nearest.
-  const std::vector<double> between = course.Interpolated({ 0.0, 10.0, 20.0, 30.0 });
+  const std::vector<double> between = curve.Interpolated({ 0.0, 10.0, 20.0, 30.0 });
   EXPECT_NEAR(between[4], 10.0 + 10.0 * 2.0 / 5.0, 1e-12);
-  EXPECT_EQ(course.Nearest({ 0.0, 10.0, 20.0, 30.0 })[8], 20.0);
+  EXPECT_EQ(curve.Nearest({ 0.0, 10.0, 20.0, 30.0 })[8], 20.0);
 }
 
 TEST(FollowAxis, TheFrameDoesNotTwist)
@@ -101,17 +101,17 @@ TEST(FollowAxis, TheFrameDoesNotTwist)
   const auto helix = [&](double t)
   { return Vector3(radius * std::cos(t), radius * std::sin(t), pitch * t); };
   const double end = 2.0 * Pi;
-  const VesselCourse course = FollowAxis(Curve(helix, 0.0, end, 2000), 0.1, 0.3);
+  const FramedCurve curve = FollowAxis(Curve(helix, 0.0, end, 2000), 0.1, 0.3);
   const auto angle = [&](std::size_t n)
   {
-    const double t = double(n) * course.step / speed;
+    const double t = double(n) * curve.step / speed;
     const Vector3 inwards(-std::cos(t), -std::sin(t), 0.0);
-    const Vector3 frenet = course.tangent[n].cross(inwards);
-    return std::atan2(course.normal[n].dot(frenet), course.normal[n].dot(inwards));
+    const Vector3 frenet = curve.tangent[n].cross(inwards);
+    return std::atan2(curve.normal[n].dot(frenet), curve.normal[n].dot(inwards));
   };
   const std::size_t first = 20;
-  const std::size_t last = course.position.size() - 21;
-  const double expected = -torsion * double(last - first) * course.step;
+  const std::size_t last = curve.position.size() - 21;
+  const double expected = -torsion * double(last - first) * curve.step;
   const double turned = angle(last) - angle(first);
   EXPECT_NEAR(std::remainder(turned - expected, 2.0 * Pi), 0.0, 5e-3);
   EXPECT_GT(std::abs(expected), 1.5); // the Frenet frame would not pass
@@ -142,18 +142,18 @@ TEST(StraightenVessel, LinearImageInEveryPixel)
   const ImageInterpolator image(scene.image);
   const auto arch = [](double t)
   { return Vector3(10.0 * std::cos(t), 10.0 * std::sin(t), 2.0 * t); };
-  const VesselCourse course = FollowAxis(Curve(arch, 0.0, 2.5, 100), 0.25);
-  const auto cuts = StraightenVessel(image, course, 5.0);
+  const FramedCurve curve = FollowAxis(Curve(arch, 0.0, 2.5, 100), 0.25);
+  const auto cuts = StraightenVessel(image, curve, 5.0);
   for (const int cut : { 0, 1 })
   {
-    const auto& across = cut == 0 ? course.normal : course.binormal;
-    ASSERT_EQ(cuts[cut].width, static_cast<int>(course.position.size()));
+    const auto& across = cut == 0 ? curve.normal : curve.binormal;
+    ASSERT_EQ(cuts[cut].width, static_cast<int>(curve.position.size()));
     ASSERT_EQ(cuts[cut].height, 41);
     for (int y = 0; y < 41; ++y)
     {
       for (int x = 0; x < cuts[cut].width; ++x)
       {
-        const Vector3 place = course.position[x] + 0.25 * (20 - y) * across[x];
+        const Vector3 place = curve.position[x] + 0.25 * (20 - y) * across[x];
         ASSERT_NEAR(cuts[cut].At(x, y), 100.0 + slope.dot(place), 1e-3) << x << ' ' << y;
       }
     }
@@ -175,8 +175,8 @@ TEST(StraightenVessel, ACurvedTubeBecomesStraight)
   const ImageInterpolator image(scene.image);
   const auto circle = [&](double t)
   { return Vector3(ring * std::cos(t), ring * std::sin(t), 0.0); };
-  const VesselCourse course = FollowAxis(Curve(circle, 0.2, 2.8, 150), 0.2);
-  const auto cuts = StraightenVessel(image, course, 4.0);
+  const FramedCurve curve = FollowAxis(Curve(circle, 0.2, 2.8, 150), 0.2);
+  const auto cuts = StraightenVessel(image, curve, 4.0);
   for (const GreyPicture& cut : cuts)
   {
     const int middle = cut.height / 2;
@@ -192,7 +192,7 @@ TEST(StraightenVessel, ACurvedTubeBecomesStraight)
   // An axis 1 mm beside the vessel shows it 1 mm beside.
   const auto beside = [&](double t)
   { return Vector3(ring * std::cos(t), ring * std::sin(t), 1.0); };
-  const VesselCourse off = FollowAxis(Curve(beside, 0.2, 2.8, 150), 0.2);
+  const FramedCurve off = FollowAxis(Curve(beside, 0.2, 2.8, 150), 0.2);
   const auto moved = StraightenVessel(image, off, 4.0);
   double sums[2] = { 0.0, 0.0 };
   const int x = moved[0].width / 2;
@@ -216,8 +216,8 @@ TEST(StraightenVessel, OutsideOfTheImageIsMarked)
 {
   const Scene scene([](const Vector3&) { return 7.0; }, 11, 1.0); // -5 to 5
   const ImageInterpolator image(scene.image);
-  const VesselCourse course = FollowAxis({ { -8, 0, 0 }, { 8, 0, 0 } }, 0.5);
-  for (const GreyPicture& cut : StraightenVessel(image, course, 2.0))
+  const FramedCurve curve = FollowAxis({ { -8, 0, 0 }, { 8, 0, 0 } }, 0.5);
+  for (const GreyPicture& cut : StraightenVessel(image, curve, 2.0))
   {
     for (int x = 0; x < cut.width; ++x)
     {
@@ -235,9 +235,9 @@ TEST(StraightenVessel, OutsideOfTheImageIsMarked)
       }
     }
   }
-  EXPECT_THROW(StraightenVessel(image, course, 0.0), std::invalid_argument);
-  EXPECT_THROW(StraightenVessel(image, course, 1e4), std::invalid_argument);
-  EXPECT_THROW(StraightenVessel(image, course, 2.0, [](double) { return false; }), Cancelled);
+  EXPECT_THROW(StraightenVessel(image, curve, 0.0), std::invalid_argument);
+  EXPECT_THROW(StraightenVessel(image, curve, 1e4), std::invalid_argument);
+  EXPECT_THROW(StraightenVessel(image, curve, 2.0, [](double) { return false; }), Cancelled);
 }
 
 TEST(SlabPlane, LooksAsReadersDo)
@@ -332,14 +332,14 @@ TEST(StraightenedView, TheSameOnAnyNumberOfThreads)
   const Scene scene([](const Vector3& p) { return std::sin(p.x()) + p.y() * p.z(); }, 40, 0.7);
   const ImageInterpolator image(scene.image);
   const auto arch = [](double t) { return Vector3(8.0 * std::cos(t), 8.0 * std::sin(t), t); };
-  const VesselCourse course = FollowAxis(Curve(arch, 0.0, 2.5, 100), 0.25);
-  const SlabPlane plane = PlaneOfVessel(course.position, 5.0, 0.5);
+  const FramedCurve curve = FollowAxis(Curve(arch, 0.0, 2.5, 100), 0.25);
+  const SlabPlane plane = PlaneOfVessel(curve.position, 5.0, 0.5);
   std::vector<float> first;
   for (const int threads : { 1, 3 })
   {
     SetNumberOfThreads(threads);
-    std::vector<float> values = StraightenVessel(image, course, 4.0)[1].values;
-    const auto slab = ProjectSlab(image, plane, DepthsAlong(plane, course.position), 8.0).values;
+    std::vector<float> values = StraightenVessel(image, curve, 4.0)[1].values;
+    const auto slab = ProjectSlab(image, plane, DepthsAlong(plane, curve.position), 8.0).values;
     values.insert(values.end(), slab.begin(), slab.end());
     if (first.empty())
     {

@@ -136,19 +136,19 @@ bool Says(const std::vector<std::string>& sentences, const std::string& part)
     [&](const std::string& text) { return text.find(part) != std::string::npos; });
 }
 
-double LeastAngle(const CleanedSurface& surface)
+double MinimumCornerAngle(const CleanedSurface& surface)
 {
-  double least = M_PI;
+  double minimum = M_PI;
   for (const Triangle& t : surface.triangles)
   {
     for (int i = 0; i < 3; ++i)
     {
       const Vector3 u = surface.points[t[(i + 1) % 3]] - surface.points[t[i]];
       const Vector3 v = surface.points[t[(i + 2) % 3]] - surface.points[t[i]];
-      least = std::min(least, std::atan2(u.cross(v).norm(), u.dot(v)));
+      minimum = std::min(minimum, std::atan2(u.cross(v).norm(), u.dot(v)));
     }
   }
-  return least;
+  return minimum;
 }
 }
 
@@ -161,7 +161,7 @@ TEST(SurfaceCleaning, OpenEndsGetFlatCaps)
   EXPECT_EQ(surface.counts.filledHoles, 0);
   EXPECT_EQ(surface.counts.badTriangles, 0);
   EXPECT_EQ(surface.components, 1);
-  EXPECT_LT(surface.greatestDisplacement, 1e-12);
+  EXPECT_LT(surface.maximumDisplacement, 1e-12);
   // The wall stays what it was, to the last bit but for the rims.
   for (std::size_t i = 0; i < tube.triangles.size(); ++i)
   {
@@ -189,7 +189,7 @@ TEST(SurfaceCleaning, OpenEndsGetFlatCaps)
   const double polygon = 12.0 * std::sin(2.0 * M_PI / 24.0);
   EXPECT_NEAR(area[1], polygon, 1e-9);
   EXPECT_NEAR(area[2], polygon, 1e-9);
-  EXPECT_GT(LeastAngle(surface), 20.0 * M_PI / 180.0);
+  EXPECT_GT(MinimumCornerAngle(surface), 20.0 * M_PI / 180.0);
 }
 
 TEST(SurfaceCleaning, TheLargestCapIsTheFirst)
@@ -238,8 +238,8 @@ TEST(SurfaceCleaning, ObliqueRimsAreNotMovedFarFromTheirPlane)
   const CleanedSurface surface = Clean(mesh);
   ExpectClean(surface);
   EXPECT_EQ(surface.counts.caps, 2);
-  EXPECT_GT(surface.greatestDisplacement, 0.02);
-  EXPECT_LT(surface.greatestDisplacement, 0.15);
+  EXPECT_GT(surface.maximumDisplacement, 0.02);
+  EXPECT_LT(surface.maximumDisplacement, 0.15);
 }
 
 TEST(SurfaceCleaning, HolesOfTheWallAreFilledAlongIt)
@@ -377,7 +377,7 @@ TEST(SurfaceCleaning, CrumbsAndWhatLiesInsideAreLeftOut)
   EXPECT_EQ(surface.counts.caps, 2);
 
   SurfaceCleaningSettings all;
-  all.smallestComponent = 0.0;
+  all.minimumComponentShare = 0.0;
   EXPECT_EQ(Clean(mesh, all).components, 2);
 }
 
@@ -468,12 +468,12 @@ TEST(SurfaceCleaning, ThinTrianglesAreBettered)
   ExpectClean(surface);
   EXPECT_GT(surface.counts.badTriangles, 60);
   EXPECT_EQ(surface.counts.remainingBadTriangles, 0);
-  EXPECT_GE(LeastAngle(surface), 10.0 * M_PI / 180.0);
+  EXPECT_GE(MinimumCornerAngle(surface), 10.0 * M_PI / 180.0);
   EXPECT_NEAR(Volume(surface), Volume(Clean(Tube())), 0.05);
 
   SurfaceCleaningSettings none;
   none.minimumAngle = 0.0;
-  EXPECT_LT(LeastAngle(Clean(mesh, none)), 3.0 * M_PI / 180.0);
+  EXPECT_LT(MinimumCornerAngle(Clean(mesh, none)), 3.0 * M_PI / 180.0);
 }
 
 TEST(SurfaceCleaning, AMoebiusStripIsCutOpen)
@@ -626,7 +626,7 @@ TEST(SurfaceCleaning, RefusesWhatMakesNoSense)
   settings.mergeTolerance = 0.5;
   EXPECT_NE(message(Tube(), settings).find("merge tolerance"), std::string::npos);
   settings = {};
-  settings.smallestComponent = -1.0;
+  settings.minimumComponentShare = -1.0;
   EXPECT_NE(message(Tube(), settings).find("smallest component"), std::string::npos);
   settings = {};
   settings.joinDistance = 11.0;

@@ -21,11 +21,11 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 
 /// A place with a radius, at a share of a branch.
-using Course = std::function<std::pair<Vector3, double>(double)>;
+using Curve = std::function<std::pair<Vector3, double>(double)>;
 
 /// Adds a branch that begins in point `first`, -1 in one of its own. @return its points
 std::vector<std::int64_t> Add(
-  VesselTree& tree, int group, std::int64_t first, int steps, const Course& course)
+  VesselTree& tree, int group, std::int64_t first, int steps, const Curve& curve)
 {
   VesselTree::Branch branch;
   branch.groupId = group;
@@ -37,7 +37,7 @@ std::vector<std::int64_t> Add(
       branch.points.push_back(first);
       continue;
     }
-    const auto [place, radius] = course(static_cast<double>(i) / steps);
+    const auto [place, radius] = curve(static_cast<double>(i) / steps);
     branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
     tree.points.push_back(place);
     tree.radius.push_back(radius);
@@ -46,7 +46,7 @@ std::vector<std::int64_t> Add(
   return tree.branches.back().points;
 }
 
-Course Line(const Vector3& from, const Vector3& to, double radius)
+Curve Line(const Vector3& from, const Vector3& to, double radius)
 {
   return [=](double t) { return std::make_pair(Vector3(from + t * (to - from)), radius); };
 }
@@ -102,12 +102,12 @@ VesselTree Mouth(double slope, double bendRadius)
 }
 
 /// A trunk of radius 1.5 along z, 40 mm, and a branch of radius `radius` that leaves it at `at`.
-VesselTree TrunkAnd(double at, double radius, const std::function<Vector3(double)>& course)
+VesselTree TrunkAnd(double at, double radius, const std::function<Vector3(double)>& curve)
 {
   VesselTree tree;
   const auto trunk = Add(tree, 0, -1, 120, Line(Vector3::Zero(), Vector3(0.0, 0.0, 40.0), 1.5));
   Add(tree, 1, trunk[static_cast<std::size_t>(3.0 * at)], 60,
-    [&](double t) { return std::make_pair(course(t), radius); });
+    [&](double t) { return std::make_pair(curve(t), radius); });
   return tree;
 }
 

@@ -293,20 +293,20 @@ TEST(SweepSurface, Forks)
     std::set<int> groups;
     for (std::size_t p = 0; p < surface.points.size(); ++p)
     {
-      double least = std::numeric_limits<double>::max();
+      double minimum = std::numeric_limits<double>::max();
       for (int k = 0; k < 3; ++k)
       {
         const double along = std::max(0.0, surface.points[p].dot(ways[k]));
-        least = std::min(least, (surface.points[p] - along * ways[k]).norm() - radii[k]);
+        minimum = std::min(minimum, (surface.points[p] - along * ways[k]).norm() - radii[k]);
       }
       const bool inCap = std::abs(surface.normals[p].dot(surface.caps[0].normal)) > 0.999 ||
         std::abs(surface.normals[p].dot(surface.caps[1].normal)) > 0.999 ||
         std::abs(surface.normals[p].dot(surface.caps[2].normal)) > 0.999;
       if (!inCap && surface.points[p].norm() > 8.0)
       {
-        EXPECT_NEAR(least, 0.0, 0.15);
+        EXPECT_NEAR(minimum, 0.0, 0.15);
       }
-      EXPECT_LT(least, 1.2);
+      EXPECT_LT(minimum, 1.2);
       groups.insert(surface.groupId[p]);
     }
     EXPECT_EQ(groups, (std::set<int>{ 1, 2, 3 }));
@@ -504,15 +504,15 @@ TEST(SweepSurface, StenosisIsResolved)
     [](double t) { return 1.5 - 1.2 * std::exp(-std::pow((t - 0.5) / 0.06, 2.0)); });
   const SweptSurface surface = SweepVesselTree(tree, {});
   ExpectSound(surface, 1, "stenosis");
-  double least = 10.0;
+  double minimum = 10.0;
   for (const Vector3& p : surface.points)
   {
     if (std::abs(p[0] - 15.0) < 0.3)
     {
-      least = std::min(least, std::hypot(p[1], p[2]));
+      minimum = std::min(minimum, std::hypot(p[1], p[2]));
     }
   }
-  EXPECT_NEAR(least, 0.3, 0.02);
+  EXPECT_NEAR(minimum, 0.3, 0.02);
 }
 
 TEST(SweepSurface, SameTwice)

@@ -67,13 +67,13 @@ std::vector<TreeWarning> Check(const Polylines& lines)
 /// The warning of an end in full calibre that is nearest to a place.
 double NearestEnd(const std::vector<TreeWarning>& warnings, const Vector3& place)
 {
-  double least = 1e9;
+  double minimum = 1e9;
   for (const TreeWarning& warning : warnings)
   {
     const bool end = warning.what.find("full calibre") != std::string::npos;
-    least = end ? std::min(least, (warning.place - place).norm()) : least;
+    minimum = end ? std::min(minimum, (warning.place - place).norm()) : minimum;
   }
-  return least;
+  return minimum;
 }
 
 bool Says(const std::vector<TreeWarning>& warnings, const std::string& words)

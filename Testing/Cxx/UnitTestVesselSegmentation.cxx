@@ -143,14 +143,14 @@ ImageGrid Oblique(const Vector3& spacing = Vector3(0.45, 0.5, 0.6))
   // Around what lies between -8 and 24 mm in x and y, and -8 and 8 mm in z.
   const Vector3 low(-13.0, -8.0, -9.0);
   const Vector3 high(28.0, 32.0, 9.0);
-  Vector3 least = Vector3::Constant(std::numeric_limits<double>::max());
-  Vector3 most = -least;
+  Vector3 minimum = Vector3::Constant(std::numeric_limits<double>::max());
+  Vector3 most = -minimum;
   for (int corner = 0; corner < 8; ++corner)
   {
     const Vector3 p(
       (corner & 1 ? high : low)[0], (corner & 2 ? high : low)[1], (corner & 4 ? high : low)[2]);
     const Vector3 local = grid.direction.transpose() * p;
-    least = least.cwiseMin(local);
+    minimum = minimum.cwiseMin(local);
     most = most.cwiseMax(local);
   }
   const int first[3] = { 7, -30, 100 };
@@ -159,8 +159,8 @@ ImageGrid Oblique(const Vector3& spacing = Vector3(0.45, 0.5, 0.6))
   {
     grid.extent[2 * axis] = first[axis];
     grid.extent[2 * axis + 1] =
-      first[axis] + static_cast<int>((most[axis] - least[axis]) / spacing[axis]);
-    start[axis] = least[axis] - first[axis] * spacing[axis];
+      first[axis] + static_cast<int>((most[axis] - minimum[axis]) / spacing[axis]);
+    start[axis] = minimum[axis] - first[axis] * spacing[axis];
   }
   grid.origin = grid.direction * start;
   return grid;
@@ -392,7 +392,7 @@ TEST(VesselSegmentation, IslandsAreDropped)
   const VesselSegmentationResult both = image.Run();
   EXPECT_NEAR(image.Volume(both, inBead), 14.1, 3.0);
   EXPECT_NEAR(both.seedVolume.at(1), 14.1, 6.0);
-  image.settings.smallestIsland = 30.0;
+  image.settings.minimumIslandVolume = 30.0;
   const VesselSegmentationResult large = image.Run(true);
   EXPECT_EQ(image.Volume(large, inBead), 0.0);
   EXPECT_EQ(image.Volume(large), image.Volume(both) - image.Volume(both, inBead));
@@ -618,13 +618,13 @@ TEST(VesselSegmentation, RefusesSeedsAndSettingsByName)
   refused("weak", [&](S& s) { s.weak = nan; });
   refused("tubular", [](S& s) { s.tubular = 0.0; });
   refused("tubular", [&](S& s) { s.tubular = infinity; });
-  refused("largestRadius", [](S& s) { s.largestRadius = 0.5; });
-  refused("largestRadius", [](S& s) { s.largestRadius = 51.0; });
-  refused("largestRadius", [&](S& s) { s.largestRadius = nan; });
+  refused("maximumRadius", [](S& s) { s.maximumRadius = 0.5; });
+  refused("maximumRadius", [](S& s) { s.maximumRadius = 51.0; });
+  refused("maximumRadius", [&](S& s) { s.maximumRadius = nan; });
   refused("longestPath", [](S& s) { s.longestPath = 0.0; });
   refused("longestPath", [&](S& s) { s.longestPath = infinity; });
-  refused("smallestIsland", [](S& s) { s.smallestIsland = -1.0; });
-  refused("smallestIsland", [&](S& s) { s.smallestIsland = nan; });
+  refused("minimumIslandVolume", [](S& s) { s.minimumIslandVolume = -1.0; });
+  refused("minimumIslandVolume", [&](S& s) { s.minimumIslandVolume = nan; });
 }
 
 TEST(VesselSegmentation, SameBitsOnAnyNumberOfThreads)

@@ -125,7 +125,7 @@ LineIntegrals Reduced(const LineIntegrals& image, int n)
 struct Difference
 {
   double rms = 0.0;
-  double greatest = 0.0;
+  double maximum = 0.0;
 };
 
 Difference Between(const LineIntegrals& a, const LineIntegrals& b)
@@ -135,13 +135,13 @@ Difference Between(const LineIntegrals& a, const LineIntegrals& b)
   {
     const double off = std::abs(double(a.values[k]) - b.values[k]);
     difference.rms += off * off / static_cast<double>(a.values.size());
-    difference.greatest = std::max(difference.greatest, off);
+    difference.maximum = std::max(difference.maximum, off);
   }
   difference.rms = std::sqrt(difference.rms);
   return difference;
 }
 
-double Greatest(const LineIntegrals& image)
+double Maximum(const LineIntegrals& image)
 {
   return *std::max_element(image.values.begin(), image.values.end());
 }
@@ -289,7 +289,7 @@ TEST(TriangleProjector, EveryRayLeavesAsOftenAsItEnters)
   {
     const CArmGeometry geometry = CArmAt(primary, 0.0, 129, 64.5);
     const LineIntegrals image = Surface(Sphere(20.0, 3), 1.0, geometry);
-    EXPECT_LE(Greatest(image), 40.0 + 1e-4);
+    EXPECT_LE(Maximum(image), 40.0 + 1e-4);
     EXPECT_GE(*std::min_element(image.values.begin(), image.values.end()), -1e-6);
     EXPECT_NEAR(At(image, 64, 64), 40.0, 1e-5);
     // The mirror image is the same: no line through the middle is lost or twice there.
@@ -369,7 +369,7 @@ TEST(TriangleProjector, InwardsIsOutwards)
   {
     std::swap(t[1], t[2]);
   }
-  EXPECT_LE(Between(image, Surface(mesh, 1.0, geometry)).greatest, 1e-5);
+  EXPECT_LE(Between(image, Surface(mesh, 1.0, geometry)).maximum, 1e-5);
 }
 
 TEST(InstrumentProjector, CylinderIsItsDiameterOverTheSine)
@@ -487,9 +487,9 @@ TEST(InstrumentProjector, BendsAreThoseOfMitredTubes)
       const LineIntegrals reference =
         Reduced(Surface(MitredTube(points, radius, 48), 1.0, CArmAt(primary, 10.0, 1280, 64.0)), 8);
       const Difference difference = Between(image, reference);
-      const double greatest = Greatest(reference);
-      worst = std::max(worst, difference.greatest / greatest);
-      worstRms = std::max(worstRms, difference.rms / greatest);
+      const double maximum = Maximum(reference);
+      worst = std::max(worst, difference.maximum / maximum);
+      worstRms = std::max(worstRms, difference.rms / maximum);
       EXPECT_NEAR(
         Total(image, geometry) / Total(reference, CArmAt(primary, 10.0, 160, 64.0)), 1.0, 0.005);
     }
@@ -509,7 +509,7 @@ TEST(InstrumentProjector, AlongTheViewAChordIsAsLongAsTheSegment)
     const Vector3 way(std::sin(tilt * Degrees), -std::cos(tilt * Degrees), 0.0);
     const LineIntegrals image = Instrument(Straight(-5.0 * way, 5.0 * way, 2.0, 0.3, 5), geometry);
     worst = std::max(worst, std::abs(At(image, 128, 128) / 3.0 - 1.0));
-    EXPECT_LE(Greatest(image), 3.05);
+    EXPECT_LE(Maximum(image), 3.05);
   }
   Row("instrument: cylinder of 10 mm seen along its axis, mu L", 0.0, worst, "0.2 %");
   EXPECT_LE(worst, 2e-3);
@@ -544,7 +544,7 @@ TEST(InstrumentProjector, SameBitsFromAllProcessors)
     part.length = 2.0F;
     part.inverseLength = 0.5F;
     part.step = 1.0F;
-    part.greatestPixel = 0.3F;
+    part.maximumPixel = 0.3F;
     part.attenuation = 0.7F;
     TubePixels list;
     list.count = 203;
@@ -572,10 +572,10 @@ TEST(InstrumentProjector, RefusesWhatIsNoInstrument)
   ExpectRefusal([&] { Instrument(chain, geometry); }, "outer radius");
   chain = Straight(Vector3::Zero(), Vector3(NAN, 0, 0), 1.0, 1.0);
   ExpectRefusal([&] { Instrument(chain, geometry); }, "point");
-  EXPECT_EQ(Greatest(Instrument({}, geometry)), 0.0);
+  EXPECT_EQ(Maximum(Instrument({}, geometry)), 0.0);
   // Behind the source, and points that lie on each other.
   chain = Straight(Vector3(0, 900, 0), Vector3(0, 900, 0), 1.0, 1.0, 3);
-  EXPECT_EQ(Greatest(Instrument(chain, geometry)), 0.0);
+  EXPECT_EQ(Maximum(Instrument(chain, geometry)), 0.0);
 }
 
 TEST(ContrastProjector, FrustumKeepsItsVolume)
@@ -621,7 +621,7 @@ TEST(ContrastProjector, SlabsHaveNoSeams)
     AddContrast({ branch }, 0.28, geometry, image);
     const LineIntegrals whole =
       Instrument(Straight(branch.points.front(), branch.points.back(), 1.5, 0.28), geometry);
-    worst = std::max(worst, Between(image, whole).greatest / Greatest(whole));
+    worst = std::max(worst, Between(image, whole).maximum / Maximum(whole));
   }
   Row("contrast: 100 slabs against one cylinder, greatest difference / greatest", 0.0, worst,
     "0.5 %");
@@ -646,7 +646,7 @@ TEST(ContrastProjector, UnevenCenterlinesDoNotShine)
   LineIntegrals image(512, 512);
   AddContrast({ branch }, 1.0, geometry, image);
   EXPECT_GE(*std::min_element(image.values.begin(), image.values.end()), -0.15);
-  EXPECT_LE(Greatest(image), 6.5);
+  EXPECT_LE(Maximum(image), 6.5);
   const double all = TotalOf(branch.points, branch.radii, geometry);
   EXPECT_NEAR(Total(image, geometry) / all, 1.0, 0.03);
 }
@@ -862,7 +862,7 @@ TEST(VolumeProjector, DoesNotDependOnAxesOfTheImage)
   {
     const CArmGeometry geometry = CArmAt(primary, 20.0, 64);
     const LineIntegrals image = projectorA.Project(geometry);
-    EXPECT_LE(Between(image, projectorB.Project(geometry)).greatest, 2e-4 * Greatest(image));
+    EXPECT_LE(Between(image, projectorB.Project(geometry)).maximum, 2e-4 * Maximum(image));
   }
 }
 
@@ -955,9 +955,9 @@ TEST(VolumeProjector, EmptySpaceIsPassedOverWithoutLoss)
   const LineIntegrals without = VolumeProjector(ImageOf(faint, grid), Itself).Project(geometry);
   const LineIntegrals skipped =
     VolumeProjector(ImageOf(faint, grid), Itself, settings).Project(geometry);
-  EXPECT_GT(Greatest(with), 0.1);
-  EXPECT_LE(Between(with, without).greatest, 6e-4);
-  EXPECT_LE(Between(with, skipped).greatest, 3e-4);
+  EXPECT_GT(Maximum(with), 0.1);
+  EXPECT_LE(Between(with, without).maximum, 6e-4);
+  EXPECT_LE(Between(with, skipped).maximum, 3e-4);
 }
 
 TEST(VolumeProjector, WholeNumbersAreAsGoodAsRealOnes)

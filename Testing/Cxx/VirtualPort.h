@@ -129,7 +129,7 @@ struct VirtualBench
   bool ioAlive = true; ///< the thread of the device runs
   bool commands = false;
   coronary::ForceFrame force;
-  double largestStep = 0.0; ///< mm or radians of the wire in one tick
+  double maximumStep = 0.0; ///< mm or radians of the wire in one tick
   std::function<void()> atTick;
 
   void Step()
@@ -150,8 +150,8 @@ struct VirtualBench
     }
     const coronary::DriveInput before = this->frame.input.drive;
     this->serial.Read(this->tick, 1e-6 * Period, this->frame);
-    this->largestStep = std::max(
-      { this->largestStep, std::abs(this->frame.input.drive.wirePosition - before.wirePosition),
+    this->maximumStep = std::max(
+      { this->maximumStep, std::abs(this->frame.input.drive.wirePosition - before.wirePosition),
         std::abs(this->frame.input.drive.wireAngle - before.wireAngle) });
     if (this->commands)
     {

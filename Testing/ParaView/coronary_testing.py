@@ -57,7 +57,7 @@ def tracking_pipeline():
         simple.OutputPort(phantom, IMAGE), Centerlines=lines, Skeleton=skeleton,
         NodeSpacing=5.0, CaptureRange=14.0, TrackedPhases="List", TrackedTimes=[0.05, 0.2, 0.36, 0.75])
     regularized = simple.MotionRegularizer(
-        Motion=simple.OutputPort(tracker, TRACKED_LINES), GreatestBending=50.0)
+        Motion=simple.OutputPort(tracker, TRACKED_LINES), MaximumBending=50.0)
     moment = simple.CardiacPhaseInterpolator(regularized, Mode="Low Noise", Ellipses=1)
     return phantom, tracker, regularized, moment
 

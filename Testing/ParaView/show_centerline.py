@@ -41,7 +41,7 @@ def outputs(phantom, centerline, topology):
     truth.Time = 0.75
     metrics = simple.CenterlineMetrics(
         Result=simple.OutputPort(topology, 0), Reference=truth)
-    metrics.LeastRadius = 0.75
+    metrics.MinimumRadius = 0.75
     table = fetch(metrics, 0, 0.75)
     overlap = table.GetColumnByName("OV")
     total = overlap.GetValue(overlap.GetNumberOfTuples() - 1)

@@ -20,7 +20,7 @@ def metrics_pipeline():
         ErrorBound=0.01, EndLength=2.0)
     branches = simple.CenterlineMetrics(
         Result=simple.OutputPort(result, CENTERLINES),
-        Reference=simple.OutputPort(reference, CENTERLINES), LeastLength=2.0, DetectedShare=0.7)
+        Reference=simple.OutputPort(reference, CENTERLINES), MinimumLength=2.0, DetectedShare=0.7)
     return distance, branches
 
 

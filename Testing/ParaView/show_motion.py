@@ -16,14 +16,14 @@ def motion_pipeline():
     phantom = simple.CoronaryPhantom(registrationName="Phantom", CenterlineSpacing=2.0)
     regularized = simple.MotionRegularizer(
         Motion=simple.OutputPort(phantom, CENTERLINES), registrationName="Regularized",
-        GreatestBending=50.0)
+        MaximumBending=50.0)
     moment = simple.CardiacPhaseInterpolator(
         regularized, registrationName="Moment", Mode="Periodic Cubic", Ellipses=1)
     return phantom, regularized, moment
 
 
 def moved():
-    require(find("Regularized").GreatestBending == 50.0, "the limit")
+    require(find("Regularized").MaximumBending == 50.0, "the limit")
     return content(fetch(find("Moment"), 0, 0.41))
 
 

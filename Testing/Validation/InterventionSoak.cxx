@@ -144,10 +144,10 @@ int main(int argc, char** argv)
       input.wireAngle += turning / options.tickRate;
       const TickReport& report = intervention.Step(input);
       lost += report.outside;
-      deep = std::max(deep, report.largestPenetration);
+      deep = std::max(deep, report.maximumPenetration);
       sum += report.meanPenetration;
       gap = std::max(gap, report.jointGap);
-      force = std::max(force, report.greatestForce);
+      force = std::max(force, report.maximumForce);
       inserted = std::max(inserted, report.inserted);
       for (const std::string& message : intervention.TakeMessages())
       {

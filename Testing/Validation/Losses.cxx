@@ -14,9 +14,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double NamesWithin = 15.0; ///< mm
-constexpr double LeastShare = 0.25;  ///< of a loss that a named vessel holds
-constexpr double LeastStretch = 3.0; ///< mm: shorter ones are no reason for a warning
+constexpr double NamesWithin = 15.0;   ///< mm
+constexpr double MinimumShare = 0.25;  ///< of a loss that a named vessel holds
+constexpr double MinimumStretch = 3.0; ///< mm: shorter ones are no reason for a warning
 
 /// Steps of a tree's branches that are marked, joined where they touch.
 class Joiner
@@ -35,24 +35,24 @@ public:
   }
   /// @param describe  takes a step's end and length, and adds what it knows to its stretch
   template <typename F>
-  std::vector<Stretch> Stretches(const std::vector<Vector3>& points, const F& describe)
+  std::vector<LostPath> LostPaths(const std::vector<Vector3>& points, const F& describe)
   {
-    std::map<std::size_t, Stretch> found;
+    std::map<std::size_t, LostPath> found;
     for (const auto& [from, to] : this->Steps)
     {
-      Stretch& stretch = found[this->Root(static_cast<std::size_t>(to))];
+      LostPath& path = found[this->Root(static_cast<std::size_t>(to))];
       const double length = (points[to] - points[from]).norm();
-      stretch.length += length;
-      stretch.points.push_back(points[to]);
-      describe(stretch, to, length);
+      path.length += length;
+      path.points.push_back(points[to]);
+      describe(path, to, length);
     }
-    std::vector<Stretch> list;
-    for (auto& [root, stretch] : found)
+    std::vector<LostPath> list;
+    for (auto& [root, path] : found)
     {
-      list.push_back(std::move(stretch));
+      list.push_back(std::move(path));
     }
     std::stable_sort(list.begin(), list.end(),
-      [](const Stretch& a, const Stretch& b) { return a.length > b.length; });
+      [](const LostPath& a, const LostPath& b) { return a.length > b.length; });
     return list;
   }
 
@@ -74,7 +74,7 @@ private:
 bool Counts(const PhantomTree& truth, const VesselTree::Branch& branch, std::size_t step)
 {
   const auto wide = [&](std::int64_t q)
-  { return truth.radius[static_cast<std::size_t>(q)] >= LeastRadius; };
+  { return truth.radius[static_cast<std::size_t>(q)] >= MinimumRadius; };
   return truth.visibility[static_cast<std::size_t>(branch.points[step])] <= 0.0 ||
     wide(branch.points[step]) || wide(branch.points.back()) ||
     std::any_of(
@@ -109,15 +109,15 @@ bool Holds(const std::string& artery, int segment, int treeId)
 
 double Distance(const Vector3& place, const std::vector<Vector3>& points)
 {
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (const Vector3& point : points)
   {
-    least = std::min(least, (point - place).squaredNorm());
+    minimum = std::min(minimum, (point - place).squaredNorm());
   }
-  return std::sqrt(least);
+  return std::sqrt(minimum);
 }
 
-std::string Stretch::Text() const
+std::string LostPath::Text() const
 {
   std::string text;
   double longest = 0.0;
@@ -127,7 +127,7 @@ std::string Stretch::Text() const
   }
   for (const auto& [segment, part] : this->segments)
   {
-    if (part >= std::min(longest, LeastStretch))
+    if (part >= std::min(longest, MinimumStretch))
     {
       const std::string name = SegmentName(segment);
       text += (text.empty() ? "" : ", ") + (name.empty() ? "none" : name) + " " +
@@ -183,11 +183,11 @@ LengthComparison CompareLengths(const PhantomTree& truth, const VesselTree& tree
     }
   }
   result.found = all > 0.0 ? 1.0 - result.missed / all : 0.0;
-  result.losses = missed.Stretches(truth.points,
-    [&](Stretch& stretch, std::int64_t point, double length)
+  result.losses = missed.LostPaths(truth.points,
+    [&](LostPath& path, std::int64_t point, double length)
     {
-      stretch.segments[truth.segmentId[point]] += length;
-      stretch.treeId = treeOf[static_cast<std::size_t>(point)];
+      path.segments[truth.segmentId[point]] += length;
+      path.treeId = treeOf[static_cast<std::size_t>(point)];
     });
   Joiner wrong(tree.points.size());
   for (const VesselTree::Branch& branch : tree.branches)
@@ -201,8 +201,8 @@ LengthComparison CompareLengths(const PhantomTree& truth, const VesselTree& tree
       }
     }
   }
-  result.extras = wrong.Stretches(tree.points, [](Stretch&, std::int64_t, double) {});
-  for (const Stretch& extra : result.extras)
+  result.extras = wrong.LostPaths(tree.points, [](LostPath&, std::int64_t, double) {});
+  for (const LostPath& extra : result.extras)
   {
     result.wrong += extra.length;
   }
@@ -284,7 +284,7 @@ std::vector<Said> WarningsOf(const SweptSurface& surface)
   return list;
 }
 
-bool Names(const Said& said, const Stretch& loss)
+bool Names(const Said& said, const LostPath& loss)
 {
   for (const Vector3& place : said.places)
   {
@@ -301,27 +301,27 @@ bool Names(const Said& said, const Stretch& loss)
       ? length
       : 0.0;
   }
-  return held > 0.0 && held >= LeastShare * loss.length;
+  return held > 0.0 && held >= MinimumShare * loss.length;
 }
 
 bool IsJustified(
   const Said& said, const LengthComparison& lengths, const std::vector<Vector3>& troubles)
 {
-  const auto names = [&](const Stretch& stretch)
-  { return stretch.length >= LeastStretch && Names(said, stretch); };
+  const auto names = [&](const LostPath& path)
+  { return path.length >= MinimumStretch && Names(said, path); };
   return std::any_of(lengths.losses.begin(), lengths.losses.end(), names) ||
     std::any_of(lengths.extras.begin(), lengths.extras.end(), names) ||
     std::any_of(said.places.begin(), said.places.end(),
       [&](const Vector3& place) { return Distance(place, troubles) <= NamesWithin; });
 }
 
-std::vector<Stretch> Untold(const LengthComparison& lengths, const std::vector<Said>& said)
+std::vector<LostPath> Untold(const LengthComparison& lengths, const std::vector<Said>& said)
 {
-  std::vector<Stretch> untold;
-  for (const Stretch& loss : lengths.losses)
+  std::vector<LostPath> untold;
+  for (const LostPath& loss : lengths.losses)
   {
-    if (lengths.missed <= LargestUntold ||
-      (loss.length <= LargestUntold && &loss != &lengths.losses.front()))
+    if (lengths.missed <= MaximumUntold ||
+      (loss.length <= MaximumUntold && &loss != &lengths.losses.front()))
     {
       break; // what follows is shorter
     }

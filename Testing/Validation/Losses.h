@@ -15,11 +15,11 @@
 
 namespace coronary
 {
-constexpr double LeastRadius = 0.5; ///< mm: thinner vessels need not be found
-constexpr double FoundWithin = 1.5; ///< mm from an axis
+constexpr double MinimumRadius = 0.5; ///< mm: thinner vessels need not be found
+constexpr double FoundWithin = 1.5;   ///< mm from an axis
 
 /// Connected true vessel that was not found, or vessel that is not there.
-struct Stretch
+struct LostPath
 {
   double length = 0.0; ///< mm
   std::vector<Vector3> points;
@@ -32,11 +32,11 @@ struct Stretch
 
 struct LengthComparison
 {
-  double found = 0.0;          ///< share of the true length
-  double missed = 0.0;         ///< mm
-  double wrong = 0.0;          ///< mm of the result that is no artery
-  std::vector<Stretch> losses; ///< what was missed, longest first
-  std::vector<Stretch> extras; ///< what is no artery, longest first
+  double found = 0.0;           ///< share of the true length
+  double missed = 0.0;          ///< mm
+  double wrong = 0.0;           ///< mm of the result that is no artery
+  std::vector<LostPath> losses; ///< what was missed, longest first
+  std::vector<LostPath> extras; ///< what is no artery, longest first
 };
 
 /// The truth's and the result's lengths within a distance of each other.
@@ -70,7 +70,7 @@ std::vector<Said> WarningsOf(const SweptSurface& surface);
  * Whether a warning says where a loss is: its place is within 15 mm of it, or its vessel is the SCCT segment of a quarter of
  * it or more, or a whole artery (LAD, LCx, LCA, RCA) that a quarter of it or more belongs to.
  */
-bool Names(const Said& said, const Stretch& loss);
+bool Names(const Said& said, const LostPath& loss);
 
 /// Whether there is a reason for a warning: a loss or an extra of 3 mm or more that it names, or a true lesion or a wrong
 /// ostium within 15 mm.
@@ -81,8 +81,8 @@ bool IsJustified(
  * The losses that a case has to tell of and does not: none when no more than 10 mm are missed in all; else the longest loss
  * and every one above 10 mm has to be named.
  */
-std::vector<Stretch> Untold(const LengthComparison& lengths, const std::vector<Said>& said);
-constexpr double LargestUntold = 10.0; ///< mm
+std::vector<LostPath> Untold(const LengthComparison& lengths, const std::vector<Said>& said);
+constexpr double MaximumUntold = 10.0; ///< mm
 }
 
 #endif

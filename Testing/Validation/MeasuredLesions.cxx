@@ -63,7 +63,7 @@ void DegreeTally::Add(const LesionMatch& match)
     return;
   }
   ++this->listed;
-  this->within += std::abs(match.error) <= LargestError ? 1 : 0;
+  this->within += std::abs(match.error) <= MaximumError ? 1 : 0;
   this->inRange += match.inRange ? 1 : 0;
   this->sum += match.error;
 }

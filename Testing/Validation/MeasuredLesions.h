@@ -36,9 +36,9 @@ struct LesionMatch
   bool inRange = false; ///< the true degree lies in the stated range
 
   /// 1 mm or more is left: wide enough to be measured by its edge.
-  bool Wide() const { return this->truth.leastRadius >= 0.5; }
+  bool Wide() const { return this->truth.minimumRadius >= 0.5; }
   /// Healthy, the vessel is as wide as those that are graded.
-  bool Graded() const { return this->truth.referenceRadius >= LeastGradedRadius; }
+  bool Graded() const { return this->truth.referenceRadius >= MinimumGradedRadius; }
 };
 
 /// Each true lesion with the nearest measured one within 6 mm that is not another's.
@@ -48,10 +48,10 @@ std::vector<LesionMatch> MatchLesions(const std::vector<PhantomStenosis>& truth,
 /// How well degrees are measured.
 struct DegreeTally
 {
-  static constexpr double LargestError = 0.10; ///< of the diameter, absolute
+  static constexpr double MaximumError = 0.10; ///< of the diameter, absolute
 
   int listed = 0;
-  int within = 0;  ///< LargestError
+  int within = 0;  ///< MaximumError
   int inRange = 0; ///< the true degree lies in the stated range
   double sum = 0.0;
   int unreached = 0; ///< lesions without a tree

@@ -87,12 +87,12 @@ public:
 
   static double DistanceTo(const std::vector<Vector3>& line, const Vector3& p)
   {
-    double least = 1e9;
+    double minimum = 1e9;
     for (std::size_t n = 1; n < line.size(); ++n)
     {
-      least = std::min(least, NearestOnSegment(p, line[n - 1], line[n]).squaredDistance);
+      minimum = std::min(minimum, NearestOnSegment(p, line[n - 1], line[n]).squaredDistance);
     }
-    return std::sqrt(least);
+    return std::sqrt(minimum);
   }
 
 private:
@@ -103,7 +103,7 @@ private:
 };
 
 /// A smooth course from a place with a direction to another one.
-std::vector<Vector3> Course(
+std::vector<Vector3> CurveThrough(
   const Vector3& from, const Vector3& start, const Vector3& to, const Vector3& end)
 {
   std::vector<Vector3> line;
@@ -161,16 +161,16 @@ std::vector<Vector3> Beginning(const PhantomTree& tree, int treeId, double from,
 /// mm outside of the arteries' wall, as if they were made of balls; 20 mm and more are as good as any
 double OutsideVessels(const Work& work, const Vector3& p)
 {
-  double least = 20.0;
+  double minimum = 20.0;
   for (std::size_t n = 0; n < work.tree.points.size(); n += 2)
   {
     const double square = (work.tree.points[n] - p).squaredNorm();
     if (square < 625.0)
     {
-      least = std::min(least, std::sqrt(square) - work.tree.radius[n]);
+      minimum = std::min(minimum, std::sqrt(square) - work.tree.radius[n]);
     }
   }
-  return least;
+  return minimum;
 }
 
 /// mm outside of the wall of the root and the ascending aorta
@@ -321,8 +321,8 @@ void RaiseOstium(Work& work, Painter& painter, int treeId, double rise)
   }
   PhantomOstium ostium = old;
   ostium.position = above + low * outward;
-  const std::vector<Vector3> line =
-    Course(ostium.position - 2.0 * outward, outward, rest.front(), rest.back() - rest.front());
+  const std::vector<Vector3> line = CurveThrough(
+    ostium.position - 2.0 * outward, outward, rest.front(), rest.back() - rest.front());
   painter.Tube(line, 0.9 * old.radius, work.bloodValue - 10.0);
   ostium.axis = (outward - 0.3 * root.axis).normalized();
   work.result.truth.insert(work.result.truth.begin() + treeId, ostium);
@@ -354,7 +354,7 @@ void BrightNeighbours(Work& work, Painter& painter)
     });
   // The appendage: a curved finger from the atrium over the left main.
   const Vector3& left = work.phantom->Ostia(work.recipe.moment)[0].position;
-  const std::vector<Vector3> finger = Course(left + Vector3(16, 12, 4), Vector3(0, -1, 0.3),
+  const std::vector<Vector3> finger = CurveThrough(left + Vector3(16, 12, 4), Vector3(0, -1, 0.3),
     left + Vector3(14, -16, 9), Vector3(-0.6, -1, 0));
   painter.Paint(0.95 * blood,
     [&](const Vector3& p)
@@ -382,19 +382,20 @@ void Abdomen(Work& work, RandomStream& random)
     const Vector3 from = c + Vector3(side * (radius - 2.0), 0.0, random.Uniform(-6.0, 6.0));
     const Vector3 to =
       from + Vector3(side * 45.0, random.Uniform(-5.0, 15.0), random.Uniform(-20.0, 5.0));
-    painter.Tube(Course(from, Vector3(side, -0.4, 0), to, Vector3(side, 0.5, 0)),
+    painter.Tube(CurveThrough(from, Vector3(side, -0.4, 0), to, Vector3(side, 0.5, 0)),
       random.Uniform(2.2, 3.2), 390.0);
   }
   const Vector3 from = c + Vector3(0.0, -radius + 2.0, 14.0);
   painter.Tube(
-    Course(from, Vector3(0, -1, 0), from + Vector3(10, -18, -35), Vector3(0, 0, -1)), 3.0, 390.0);
+    CurveThrough(from, Vector3(0, -1, 0), from + Vector3(10, -18, -35), Vector3(0, 0, -1)), 3.0,
+    390.0);
   work.result.truth.clear();
 }
 
-Matrix3 Tilt(RandomStream& random, double least, double most)
+Matrix3 Tilt(RandomStream& random, double minimum, double most)
 {
   const double about = random.Uniform(0.0, 2.0 * Pi);
-  const double tilt = Degrees(random.Uniform(least, most));
+  const double tilt = Degrees(random.Uniform(minimum, most));
   const double roll = Degrees(random.Uniform(-15.0, 15.0));
   return (Eigen::AngleAxisd(tilt, Vector3(std::cos(about), std::sin(about), 0.0)) *
     Eigen::AngleAxisd(roll, Vector3::UnitZ()))
@@ -525,8 +526,8 @@ void Change(const std::string& group, RandomStream& random, Work& work)
     const Vector3 turned =
       Eigen::AngleAxisd(Degrees(random.Uniform(28.0, 42.0)), -root.axis) * outward;
     const Vector3 from = root.centre + (root.radius - 1.0) * turned + 3.0 * root.axis;
-    painter.Tube(
-      Course(from, turned, from + 12.0 * turned + Vector3(12, -18, -12), Vector3(0.6, -0.3, -1.0)),
+    painter.Tube(CurveThrough(from, turned, from + 12.0 * turned + Vector3(12, -18, -12),
+                   Vector3(0.6, -0.3, -1.0)),
       random.Uniform(0.7, 1.1), blood - 20.0);
   }
   else if (is("high take-off"))
@@ -569,9 +570,11 @@ void Change(const std::string& group, RandomStream& random, Work& work)
       bright);
     const Vector3 side = a.pulmonaryBase + 40.0 * a.pulmonaryAxis;
     painter.Tube(
-      Course(side, Vector3(1, 0.5, 0), side + Vector3(45, 20, 5), Vector3(1, 0, 0)), 4.0, bright);
-    painter.Tube(Course(side, Vector3(-1, 0.5, 0), side + Vector3(-50, 20, 5), Vector3(-1, 0, 0)),
-      4.0, bright);
+      CurveThrough(side, Vector3(1, 0.5, 0), side + Vector3(45, 20, 5), Vector3(1, 0, 0)), 4.0,
+      bright);
+    painter.Tube(
+      CurveThrough(side, Vector3(-1, 0.5, 0), side + Vector3(-50, 20, 5), Vector3(-1, 0, 0)), 4.0,
+      bright);
     work.result.truth.clear();
   }
   else if (is("abdomen"))

@@ -26,22 +26,22 @@ namespace
 using namespace coronary;
 
 // What has to be reached in each phantom.
-constexpr double LeastOverlap = 0.97;       // OV and OT, vessels of LeastRadius or more
-constexpr double LargestDistance = 0.20;    // AI, mm
-constexpr double LargestRadiusError = 0.15; // mean, mm
+constexpr double MinimumOverlap = 0.97;     // OV and OT, vessels of MinimumRadius or more
+constexpr double MaximumDistance = 0.20;    // AI, mm
+constexpr double MaximumRadiusError = 0.15; // mean, mm
 constexpr double BifurcationDistance = 1.5; // mm
-constexpr double LargestFalseBranch = 8.0;  // mm
-constexpr double LeastNamedShare = 0.95;    // of the labelled length
+constexpr double MaximumFalseBranch = 8.0;  // mm
+constexpr double MinimumNamedShare = 0.95;  // of the labelled length
 // Of the same voxels' tree in another frame:
-constexpr double LargestMeanDifference = 0.02; // mm
-constexpr double LargestDifference = 0.05;     // voxels
+constexpr double MaximumMeanDifference = 0.02; // mm
+constexpr double MaximumDifference = 0.05;     // voxels
 // In the coarse voxels of the quick run:
-constexpr double LeastQuickOverlap = 0.95;
+constexpr double MinimumQuickOverlap = 0.95;
 
 constexpr double ReferencePhase = 0.75;
-constexpr double LeastRadius = 0.75;  // mm
-constexpr double BranchLength = 10.0; // mm: shorter branches' bifurcations need not be found
-constexpr double BesideVessel = 1.5;  // mm from any axis: nearer is no false branch
+constexpr double MinimumRadius = 0.75; // mm
+constexpr double BranchLength = 10.0;  // mm: shorter branches' bifurcations need not be found
+constexpr double BesideVessel = 1.5;   // mm from any axis: nearer is no false branch
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
 struct Case
@@ -56,10 +56,10 @@ struct Case
 struct Outcome
 {
   std::string failure;             ///< empty, or why there is no tree
-  CenterlineOverlapMeasures tree;  ///< vessels of LeastRadius or more, whole tree
+  CenterlineOverlapMeasures tree;  ///< vessels of MinimumRadius or more, whole tree
   CenterlineOverlapMeasures all;   ///< of any radius
   CenterlineOverlapMeasures paths; ///< ordered correspondence, all paths together
-  double longestMissed = NaN;      ///< mm, vessels of LeastRadius or more
+  double longestMissed = NaN;      ///< mm, vessels of MinimumRadius or more
   double longestFalse = NaN;       ///< mm, more than BesideVessel from any axis
   int bifurcations = 0;
   int bifurcationsFound = 0;
@@ -71,11 +71,12 @@ struct Outcome
 
   bool Met() const
   {
-    return this->failure.empty() && this->tree.overlap >= LeastOverlap &&
-      this->tree.overlapRelevant >= LeastOverlap && this->tree.distanceInside <= LargestDistance &&
-      this->tree.radiusError <= LargestRadiusError &&
-      this->bifurcationsFound == this->bifurcations && this->longestFalse <= LargestFalseBranch &&
-      this->namedShare >= LeastNamedShare;
+    return this->failure.empty() && this->tree.overlap >= MinimumOverlap &&
+      this->tree.overlapRelevant >= MinimumOverlap &&
+      this->tree.distanceInside <= MaximumDistance &&
+      this->tree.radiusError <= MaximumRadiusError &&
+      this->bifurcationsFound == this->bifurcations && this->longestFalse <= MaximumFalseBranch &&
+      this->namedShare >= MinimumNamedShare;
   }
 };
 
@@ -86,13 +87,13 @@ struct Outcome
 struct Fork
 {
   Vector3 point;
-  std::vector<int> segments; ///< of the branches that begin there
-  double leastRadius = 0.0;  ///< mm, in the middle of the thinnest of them
+  std::vector<int> segments;  ///< of the branches that begin there
+  double minimumRadius = 0.0; ///< mm, in the middle of the thinnest of them
 };
 
 /// Where two or more branches begin that are long enough, counted to their farthest tip.
 template <typename Tree>
-std::vector<Fork> ForksOf(const Tree& tree, double leastLength)
+std::vector<Fork> ForksOf(const Tree& tree, double minimumLength)
 {
   std::map<int, double> depth; // by group id
   for (auto branch = tree.branches.rbegin(); branch != tree.branches.rend(); ++branch)
@@ -108,7 +109,7 @@ std::vector<Fork> ForksOf(const Tree& tree, double leastLength)
   std::map<std::int64_t, Fork> forks;
   for (const auto& branch : tree.branches)
   {
-    if (depth[branch.groupId] <= leastLength)
+    if (depth[branch.groupId] <= minimumLength)
     {
       continue;
     }
@@ -116,7 +117,7 @@ std::vector<Fork> ForksOf(const Tree& tree, double leastLength)
     const auto [fork, isNew] = forks.try_emplace(branch.points.front());
     fork->second.point = tree.points[branch.points.front()];
     fork->second.segments.push_back(branch.segmentId);
-    fork->second.leastRadius = isNew ? radius : std::min(radius, fork->second.leastRadius);
+    fork->second.minimumRadius = isNew ? radius : std::min(radius, fork->second.minimumRadius);
   }
   std::vector<Fork> result;
   for (const auto& [point, fork] : forks)
@@ -176,7 +177,7 @@ void CompareForks(std::uint64_t seed, const std::vector<Fork>& truth,
       }
       std::array<char, 160> row;
       std::snprintf(row.data(), row.size(), "| %llu | %s | %.2f | %.2f |",
-        static_cast<unsigned long long>(seed), names.c_str(), truth[t].leastRadius, nearest[t]);
+        static_cast<unsigned long long>(seed), names.c_str(), truth[t].minimumRadius, nearest[t]);
       outcome.missed.emplace_back(row.data());
     }
   }
@@ -199,13 +200,13 @@ void CompareNames(const PhantomTree& truth, const CenterlineTopology& found,
       }
       const double length = (truth.points[point] - truth.points[branch.points[i - 1]]).norm();
       std::size_t nearest = 0;
-      double least = std::numeric_limits<double>::infinity();
+      double minimum = std::numeric_limits<double>::infinity();
       for (std::size_t n = 0; n < found.points.size(); ++n)
       {
         const double distance = (found.points[n] - truth.points[point]).squaredNorm();
-        if (distance < least)
+        if (distance < minimum)
         {
-          least = distance;
+          minimum = distance;
           nearest = n;
         }
       }
@@ -232,7 +233,7 @@ void CompareWithTruth(
   const Polylines truthSet = LinesOf(truth);
   const Polylines foundSet = LinesOf(tree);
   CenterlineOverlapSettings wide;
-  wide.leastRadius = LeastRadius;
+  wide.minimumRadius = MinimumRadius;
   const TreeOverlap overlap = CompareCenterlineTrees(truthSet, foundSet, wide);
   outcome.tree = overlap.total;
   outcome.longestMissed = overlap.longestMissed;
@@ -306,14 +307,14 @@ std::string Row(const Outcome& o)
   {
     seconds += s;
   }
-  return Number("%.3f", m.overlap, m.overlap >= LeastOverlap) + " | " +
-    Number("%.3f", m.overlapRelevant, m.overlapRelevant >= LeastOverlap) + " | " +
-    Number("%.3f", m.distanceInside, m.distanceInside <= LargestDistance) + " | " +
-    Number("%.3f", m.radiusError, m.radiusError <= LargestRadiusError) + " | " +
+  return Number("%.3f", m.overlap, m.overlap >= MinimumOverlap) + " | " +
+    Number("%.3f", m.overlapRelevant, m.overlapRelevant >= MinimumOverlap) + " | " +
+    Number("%.3f", m.distanceInside, m.distanceInside <= MaximumDistance) + " | " +
+    Number("%.3f", m.radiusError, m.radiusError <= MaximumRadiusError) + " | " +
     Number("%+.3f", m.radiusBias, true) + " | " + bifurcations.data() + " | " +
-    Number("%.1f", o.longestFalse, o.longestFalse <= LargestFalseBranch) + " | " +
+    Number("%.1f", o.longestFalse, o.longestFalse <= MaximumFalseBranch) + " | " +
     Number("%.1f", o.longestMissed, true) + " | " +
-    Number("%.3f", o.namedShare, o.namedShare >= LeastNamedShare) + " | " +
+    Number("%.3f", o.namedShare, o.namedShare >= MinimumNamedShare) + " | " +
     Number("%.3f", o.all.overlap, true) + " | " + Number("%.3f", o.paths.overlap, true) + " | " +
     Number("%.3f", o.paths.overlapRelevant, true) + " | " +
     Number("%.3f", o.paths.distanceInside, true) + " | " + std::to_string(o.branches) + " | " +
@@ -351,8 +352,8 @@ bool PrintTable(const std::vector<Case>& cases, bool details, bool quick)
     }
     std::fflush(stdout);
     met = met &&
-      (quick ? o.failure.empty() && o.tree.overlap >= LeastQuickOverlap &&
-            o.tree.distanceInside <= LargestDistance && o.longestFalse <= LargestFalseBranch
+      (quick ? o.failure.empty() && o.tree.overlap >= MinimumQuickOverlap &&
+            o.tree.distanceInside <= MaximumDistance && o.longestFalse <= MaximumFalseBranch
              : o.Met());
     for (std::size_t i = 0; i < seconds.size(); ++i)
     {
@@ -371,7 +372,7 @@ bool PrintTable(const std::vector<Case>& cases, bool details, bool quick)
   {
     std::printf("\nLimits in coarse voxels: OV at least %.2f, AI at most %.2f mm, no false branch "
                 "longer than %.0f mm: %s\n",
-      LeastQuickOverlap, LargestDistance, LargestFalseBranch, Verdict(met));
+      MinimumQuickOverlap, MaximumDistance, MaximumFalseBranch, Verdict(met));
   }
   else
   {
@@ -379,8 +380,8 @@ bool PrintTable(const std::vector<Case>& cases, bool details, bool quick)
       "\nLimits: OV and OT at least %.2f, AI at most %.2f mm, radius error at most %.2f mm, "
       "all bifurcations, no false branch longer than %.0f mm, %.0f %% of the length with "
       "the right name: %s\n",
-      LeastOverlap, LargestDistance, LargestRadiusError, LargestFalseBranch,
-      100.0 * LeastNamedShare, Verdict(met));
+      MinimumOverlap, MaximumDistance, MaximumRadiusError, MaximumFalseBranch,
+      100.0 * MinimumNamedShare, Verdict(met));
   }
   if (details && !missed.empty())
   {
@@ -464,12 +465,12 @@ bool PrintInvariance(const Case& test)
       radius /= frame.scale;
     }
     const TreeOverlap overlap = CompareCenterlineTrees(originalSet, back);
-    double largest = 0.0;
+    double maximum = 0.0;
     for (const auto* side : { &overlap.reference, &overlap.result })
     {
       for (const CenterlinePointMatch& match : *side)
       {
-        largest = std::max(largest, std::isnan(match.distance) ? 0.0 : match.distance);
+        maximum = std::max(maximum, std::isnan(match.distance) ? 0.0 : match.distance);
       }
     }
     std::size_t same = 0;
@@ -477,20 +478,20 @@ bool PrintInvariance(const Case& test)
     {
       same += tree.branches[b].segmentId == original.branches[b].segmentId ? 1 : 0;
     }
-    const double limit = LargestDifference * test.spacing;
-    const bool good = tree.branches.size() == original.branches.size() && largest <= limit &&
-      overlap.total.distance <= LargestMeanDifference && same == original.branches.size();
+    const double limit = MaximumDifference * test.spacing;
+    const bool good = tree.branches.size() == original.branches.size() && maximum <= limit &&
+      overlap.total.distance <= MaximumMeanDifference && same == original.branches.size();
     met = met && good;
     std::printf("| %s | %zu of %zu | %s | %s | %.4f | %zu of %zu |\n", frame.name,
       tree.branches.size(), original.branches.size(),
-      Number("%.4f", overlap.total.distance, overlap.total.distance <= LargestMeanDifference)
+      Number("%.4f", overlap.total.distance, overlap.total.distance <= MaximumMeanDifference)
         .c_str(),
-      Number("%.4f", largest, largest <= limit).c_str(), overlap.total.radiusError, same,
+      Number("%.4f", maximum, maximum <= limit).c_str(), overlap.total.radiusError, same,
       original.branches.size());
   }
   std::printf("\nLimit: the same branches and names, at most %.2f mm apart in the mean and %.2f "
               "voxels anywhere: %s\n",
-    LargestMeanDifference, LargestDifference, Verdict(met));
+    MaximumMeanDifference, MaximumDifference, Verdict(met));
   return met;
 }
 }
@@ -549,7 +550,7 @@ int main(int argc, char** argv)
       "longer than %.0f mm to their farthest tip, found within %.1f mm,\none to one. Longest false "
       "branch: more than %.1f mm from any axis, and outside of the lumen. Right names: share of\n"
       "the found length that has a segment in the truth.\n\n",
-      ReferencePhase, window, noise, spacing, trueOstia ? "true" : "automatic", LeastRadius,
+      ReferencePhase, window, noise, spacing, trueOstia ? "true" : "automatic", MinimumRadius,
       BranchLength, BifurcationDistance, BesideVessel);
     bool met = PrintTable(cases, details, quick);
     if (invariance || quick)

@@ -35,22 +35,22 @@ namespace
 using namespace coronary;
 
 constexpr double ReferencePhase = 0.75;
-constexpr double LargestFalse = 5.0;            // mm a tree
-constexpr double LeastMeanOF = 0.90;            // overlap until the first error, mean of all cases
-constexpr double LargestSurfaceDistance = 0.25; // mm, two-sided mean, mean of a condition
-constexpr double GradedDegree = 0.5;  // lesions of this diameter stenosis and more are judged
-constexpr double LeastWithin = 0.90;  // of them with a lumen of 1 mm or more, within 10 points
-constexpr double LeastInRange = 0.90; // of the narrower ones, in the stated range of 90 %
+constexpr double MaximumFalse = 5.0;            // mm a tree
+constexpr double MinimumMeanOF = 0.90;          // overlap until the first error, mean of all cases
+constexpr double MaximumSurfaceDistance = 0.25; // mm, two-sided mean, mean of a condition
+constexpr double GradedDegree = 0.5;    // lesions of this diameter stenosis and more are judged
+constexpr double MinimumWithin = 0.90;  // of them with a lumen of 1 mm or more, within 10 points
+constexpr double MinimumInRange = 0.90; // of the narrower ones, in the stated range of 90 %
 // In the coarse voxels of the quick run:
-constexpr double LeastQuickFound = 0.85;
-constexpr double LargestQuickFalse = 10.0;  // mm a tree
-constexpr double LargestQuickSurface = 0.7; // mm
+constexpr double MinimumQuickFound = 0.85;
+constexpr double MaximumQuickFalse = 10.0;  // mm a tree
+constexpr double MaximumQuickSurface = 0.7; // mm
 
 /// A kind of case, what it changes, and the share of the tree that must be found.
 struct Condition
 {
   const char* name;
-  double leastFound;
+  double minimumFound;
   std::function<void(PhantomSettings&)> change;
   double spacing = 0.5; ///< mm
   bool healthy = false;
@@ -133,13 +133,13 @@ struct Outcome
   DegreeTally thin;           ///< the same, in vessels that are too thin to be graded
   std::vector<std::string> lesions;
   std::vector<Warned> warnings;
-  std::vector<Stretch> untold;
+  std::vector<LostPath> untold;
   std::string branches; ///< rows of the table of branches
   std::string links;    ///< rows of the table of links
   std::string tips;     ///< rows of the table of tips
   double seconds = 0.0; ///< of processor time, with the picture and the truth
 
-  bool HasToTell() const { return this->lengths.missed > LargestUntold; }
+  bool HasToTell() const { return this->lengths.missed > MaximumUntold; }
   int Alarms() const
   {
     return static_cast<int>(std::count_if(this->warnings.begin(), this->warnings.end(),
@@ -251,7 +251,7 @@ void CompareLesions(
     std::array<char, 200> row;
     std::snprintf(row.data(), row.size(),
       "%s of %.0f %% (%.2f mm left): ", SegmentName(match.truth.segmentId).c_str(),
-      100.0 * match.truth.degree, 2.0 * match.truth.leastRadius);
+      100.0 * match.truth.degree, 2.0 * match.truth.minimumRadius);
     std::string text = row.data();
     if (match.lesion < 0)
     {
@@ -292,8 +292,8 @@ std::string BranchRows(const PhantomTree& truth, const std::vector<VeinBranch>& 
   std::string rows;
   for (const VeinBranch& branch : judged)
   {
-    rows += OddsRow(ShareOnArteries(truth, branch.course), branch.known, branch.probability,
-      branch.course.back(), branch.signs);
+    rows += OddsRow(ShareOnArteries(truth, branch.path), branch.known, branch.probability,
+      branch.path.back(), branch.signs);
   }
   return rows;
 }
@@ -326,7 +326,7 @@ std::string TipRows(const LengthComparison& lengths, const VesselTree& tree)
     const VesselTip& tip = tips[n];
     const Vector3& place = tree.points[paths[n].points.back()];
     double lost = 0.0;
-    for (const Stretch& loss : lengths.losses)
+    for (const LostPath& loss : lengths.losses)
     {
       if (Distance(place, loss.points) < ahead)
       {
@@ -362,12 +362,12 @@ std::vector<Vector3> Troubles(const CoronaryPhantom& phantom, const PhantomScan&
   }
   for (const Vector3& seed : scan.seeds)
   {
-    double least = wrongOstium + 1.0;
+    double minimum = wrongOstium + 1.0;
     for (const PhantomOstium& ostium : phantom.Ostia(ReferencePhase))
     {
-      least = std::min(least, (ostium.position - seed).norm());
+      minimum = std::min(minimum, (ostium.position - seed).norm());
     }
-    if (least > wrongOstium)
+    if (minimum > wrongOstium)
     {
       places.push_back(seed);
     }
@@ -382,7 +382,7 @@ void JudgeWarnings(bool healthy, const std::vector<Vector3>& troubles, Outcome& 
   for (Warned& warned : outcome.warnings)
   {
     all.push_back(warned.said);
-    for (const Stretch& loss : outcome.lengths.losses)
+    for (const LostPath& loss : outcome.lengths.losses)
     {
       if (loss.length >= 3.0 && Names(warned.said, loss))
       {
@@ -422,7 +422,7 @@ Outcome Run(const Condition& condition, std::uint64_t seed, const Options& optio
     const PhantomTree truth = phantom.Tree(ReferencePhase);
     outcome.lengths = CompareLengths(truth, found.tree);
     CenterlineOverlapSettings relevant;
-    relevant.leastRadius = LeastRadius;
+    relevant.minimumRadius = MinimumRadius;
     relevant.spacing = 0.1;
     const CenterlineOverlapMeasures total =
       CompareCenterlineTrees(LinesOf(truth), LinesOf(found.tree), relevant).total;
@@ -473,7 +473,7 @@ struct Summary
   int phantoms = 0;
   int failed = 0;
   double found = 0.0; ///< sums, unless said otherwise
-  double least = 1.0;
+  double minimum = 1.0;
   double wrong = 0.0; ///< mm a tree
   double most = 0.0;
   double toFirstError = 0.0;
@@ -498,12 +498,12 @@ struct Summary
     if (!o.failure.empty())
     {
       ++this->failed;
-      this->least = 0.0;
+      this->minimum = 0.0;
       return;
     }
     constexpr double trees = 2.0;
     this->found += o.lengths.found;
-    this->least = std::min(this->least, o.lengths.found);
+    this->minimum = std::min(this->minimum, o.lengths.found);
     this->wrong += o.lengths.wrong / trees;
     this->most = std::max(this->most, o.lengths.wrong / trees);
     this->toFirstError += o.toFirstError;
@@ -530,14 +530,14 @@ struct Row
   Summary summary;
 };
 
-std::string Joined(const std::vector<Stretch>& stretches, double least)
+std::string Joined(const std::vector<LostPath>& paths, double minimum)
 {
   std::string text;
-  for (const Stretch& stretch : stretches)
+  for (const LostPath& path : paths)
   {
-    if (stretch.length >= least)
+    if (path.length >= minimum)
     {
-      text += (text.empty() ? "" : "; ") + stretch.Text();
+      text += (text.empty() ? "" : "; ") + path.Text();
     }
   }
   return text;
@@ -553,8 +553,8 @@ void PrintHead(const Options& options)
               "the swept surface and the phantom's whole wall. Lesions: those of %.0f %% or "
               "more\nwhere 1 mm or more is left, within %.0f points, of all. Told: of more than "
               "%.0f mm missed, the longest loss and every one above %.0f mm.\n\n",
-    ReferencePhase, options.trueOstia ? "true" : "automatic", LeastRadius, FoundWithin,
-    100.0 * GradedDegree, 100.0 * DegreeTally::LargestError, LargestUntold, LargestUntold);
+    ReferencePhase, options.trueOstia ? "true" : "automatic", MinimumRadius, FoundWithin,
+    100.0 * GradedDegree, 100.0 * DegreeTally::MaximumError, MaximumUntold, MaximumUntold);
   std::printf(
     "| condition | seed | found | missed, mm | false, mm | OV | OF | OT | AI, mm | surface, mm | "
     "left out, mm | lesions | told | warnings without reason | CPU, s | missed of "
@@ -598,7 +598,7 @@ std::string Details(const Condition& condition, std::uint64_t seed, const Outcom
   {
     text += begin + "no surface: " + o.surfaceFailure + "\n";
   }
-  for (const Stretch& loss : o.untold)
+  for (const LostPath& loss : o.untold)
   {
     std::array<char, 120> place;
     const Vector3& p = loss.points.front();
@@ -633,17 +633,17 @@ bool PrintSummaries(const std::vector<Row>& rows, const Options& options)
   int phantoms = 0;
   for (const auto& [condition, s] : rows)
   {
-    const double wanted = options.quick ? LeastQuickFound : condition.leastFound;
+    const double wanted = options.quick ? MinimumQuickFound : condition.minimumFound;
     const int without = options.surface ? s.phantoms - s.failed - s.surfaces : 0;
     const bool met = s.failed == 0 && s.Mean(s.found) >= wanted &&
-      s.Mean(s.wrong) <= (options.quick ? LargestQuickFalse : LargestFalse) && without == 0 &&
+      s.Mean(s.wrong) <= (options.quick ? MaximumQuickFalse : MaximumFalse) && without == 0 &&
       (!options.surface ||
-        s.MeanSurface() <= (options.quick ? LargestQuickSurface : LargestSurfaceDistance));
+        s.MeanSurface() <= (options.quick ? MaximumQuickSurface : MaximumSurfaceDistance));
     all = all && met;
     firstErrors += s.toFirstError;
     phantoms += s.phantoms;
     std::printf("| %s | %d | %d | %.3f | %.2f | %.3f | %.1f | %.1f | %.3f | %.3f | %.3f | ",
-      condition.name, s.phantoms, s.failed, s.Mean(s.found), wanted, s.least, s.Mean(s.wrong),
+      condition.name, s.phantoms, s.failed, s.Mean(s.found), wanted, s.minimum, s.Mean(s.wrong),
       s.most, s.Mean(s.overlap), s.Mean(s.toFirstError), s.Mean(s.relevant));
     if (options.surface)
     {
@@ -657,13 +657,13 @@ bool PrintSummaries(const std::vector<Row>& rows, const Options& options)
     std::printf("%.0f | %s |\n", s.Mean(s.seconds), met ? "met" : "**MISSED**");
   }
   const double mean = phantoms > 0 ? firstErrors / phantoms : 0.0;
-  const bool ordered = options.quick || mean >= LeastMeanOF;
+  const bool ordered = options.quick || mean >= MinimumMeanOF;
   std::printf(
     "\nOF over all: %.3f, wanted %.2f: %s. In the mean of a condition false at most %.0f mm "
     "a tree, surface at most %.2f mm.\n",
-    mean, options.quick ? 0.0 : LeastMeanOF, ordered ? "met" : "**MISSED**",
-    options.quick ? LargestQuickFalse : LargestFalse,
-    options.quick ? LargestQuickSurface : LargestSurfaceDistance);
+    mean, options.quick ? 0.0 : MinimumMeanOF, ordered ? "met" : "**MISSED**",
+    options.quick ? MaximumQuickFalse : MaximumFalse,
+    options.quick ? MaximumQuickSurface : MaximumSurfaceDistance);
   return all && ordered && phantoms > 0;
 }
 
@@ -678,7 +678,7 @@ bool PrintLesions(const std::vector<Row>& rows, const Options& options)
               "within %.0f points | mean error | in range | not listed | not reached | narrow | in "
               "range | mean error | not listed | not reached | thin | in range | not reached "
               "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-    100.0 * GradedDegree, 2.0 * LeastGradedRadius, 100.0 * DegreeTally::LargestError);
+    100.0 * GradedDegree, 2.0 * MinimumGradedRadius, 100.0 * DegreeTally::MaximumError);
   const auto print =
     [](const char* name, const DegreeTally& w, const DegreeTally& n, const DegreeTally& t)
   {
@@ -700,17 +700,17 @@ bool PrintLesions(const std::vector<Row>& rows, const Options& options)
     }
   }
   print("all", wide, narrow, thin);
-  const auto judge = [&](const char* what, int part, const DegreeTally& tally, double least)
+  const auto judge = [&](const char* what, int part, const DegreeTally& tally, double minimum)
   {
-    const bool met = options.quick || part >= least * tally.Lesions();
+    const bool met = options.quick || part >= minimum * tally.Lesions();
     std::printf("%s: %s of %d, wanted %.0f %%: %s.\n", what,
       ShareText(part, tally.Lesions()).c_str(), tally.Lesions(),
-      options.quick ? 0.0 : 100.0 * least, met ? "met" : "**MISSED**");
+      options.quick ? 0.0 : 100.0 * minimum, met ? "met" : "**MISSED**");
     return met;
   };
   std::printf("\n");
-  const bool within = judge("Wide lesions within 10 points", wide.within, wide, LeastWithin);
-  return judge("Narrow ones in the stated range", narrow.inRange, narrow, LeastInRange) && within;
+  const bool within = judge("Wide lesions within 10 points", wide.within, wide, MinimumWithin);
+  return judge("Narrow ones in the stated range", narrow.inRange, narrow, MinimumInRange) && within;
 }
 
 /// @return whether all losses are told, and no healthy heart is warned of
@@ -718,7 +718,7 @@ bool PrintWarnings(const std::vector<Row>& rows, const Options& options)
 {
   std::printf("\n| condition | phantoms | miss more than %.0f mm | of them told | warnings without "
               "reason | |\n|---|---|---|---|---|---|\n",
-    LargestUntold);
+    MaximumUntold);
   bool all = true;
   int toTell = 0;
   int untold = 0;
@@ -733,7 +733,7 @@ bool PrintWarnings(const std::vector<Row>& rows, const Options& options)
   }
   std::printf("\nTold: %d of %d cases that miss more than %.0f mm. Wanted: all, and no warning of "
               "healthy hearts.\n",
-    toTell - untold, toTell, LargestUntold);
+    toTell - untold, toTell, MaximumUntold);
   return all;
 }
 

@@ -33,18 +33,18 @@ namespace
 using namespace coronary;
 
 constexpr double ReferencePhase = 0.75;
-constexpr double LeastRadius = 0.75; // mm
-constexpr double LeastLength = 10.0; // mm, of branches whose volumes are compared
+constexpr double MinimumRadius = 0.75; // mm
+constexpr double MinimumLength = 10.0; // mm, of branches whose volumes are compared
 
 // What has to be reached in each phantom; distances at phases that were not tracked.
-constexpr double LargestMean = 0.30;        // mm, window up to 66 ms
-constexpr double LargestPercentile = 0.80;  // mm, 95 %, window up to 66 ms
-constexpr double LargestIdealMean = 0.20;   // mm, no window
-constexpr double LargestBlurredMean = 0.60; // mm, longer windows
-constexpr double LargestLossyMean = 0.45;   // mm, --lost
-constexpr double LeastCalledNear = 0.95;    // of the places called tracked, within 1 mm
-constexpr double LargestVolumeError = 0.05; // of a branch, any phase
-constexpr double LargestQuickMean = 0.60;   // mm, in the coarse voxels of the quick run
+constexpr double MaximumMean = 0.30;        // mm, window up to 66 ms
+constexpr double MaximumPercentile = 0.80;  // mm, 95 %, window up to 66 ms
+constexpr double MaximumIdealMean = 0.20;   // mm, no window
+constexpr double MaximumBlurredMean = 0.60; // mm, longer windows
+constexpr double MaximumLossyMean = 0.45;   // mm, --lost
+constexpr double MinimumCalledNear = 0.95;  // of the places called tracked, within 1 mm
+constexpr double MaximumVolumeError = 0.05; // of a branch, any phase
+constexpr double MaximumQuickMean = 0.60;   // mm, in the coarse voxels of the quick run
 
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -145,17 +145,17 @@ std::vector<std::int16_t> ImageAt(
 
 double DistanceToAxis(const PhantomTree& tree, const Vector3& point)
 {
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (const VesselTree::Branch& branch : tree.branches)
   {
     for (std::size_t n = 0; n + 1 < branch.points.size(); ++n)
     {
       const Vector3& a = tree.points[branch.points[n]];
       const Vector3& b = tree.points[branch.points[n + 1]];
-      least = std::min(least, NearestOnSegment(point, a, b).squaredDistance);
+      minimum = std::min(minimum, NearestOnSegment(point, a, b).squaredDistance);
     }
   }
-  return std::sqrt(least);
+  return std::sqrt(minimum);
 }
 
 std::vector<double> EveryOther(const std::vector<double>& all, std::size_t step)
@@ -179,7 +179,7 @@ Errors JudgePoints(const std::vector<Vector3>& points, const std::vector<double>
   Errors here;
   for (std::size_t p = 0; p < points.size(); ++p)
   {
-    if (radius[p] < LeastRadius)
+    if (radius[p] < MinimumRadius)
     {
       continue;
     }
@@ -325,7 +325,7 @@ Outcome Run(const Case& test)
         found += area * calibre * calibre * carried;
         right += area * widening * widening * truly;
       }
-      if (length >= LeastLength && lines.radius[line[line.size() / 2]] >= LeastRadius)
+      if (length >= MinimumLength && lines.radius[line[line.size() / 2]] >= MinimumRadius)
       {
         outcome.volume.Add(std::abs(found / right - 1.0));
         outcome.branchVolumes.push_back({ name[line[line.size() / 2]], all[k], found / right,
@@ -449,16 +449,16 @@ int main(int argc, char** argv)
       test.spacing, window, test.noise, test.allPhases ? "all" : "every other one",
       test.trueTree ? "true" : "found",
       test.lost ? ", one systolic phase lost wholly and 40 % of the nodes in two others" : "",
-      test.regularize ? ", regularized" : "", LeastRadius, LeastLength);
+      test.regularize ? ", regularized" : "", MinimumRadius, MinimumLength);
     std::printf(
       "| seed | mean between, mm | 95 %% | material, mm | mean tracked, mm | 95 %% | called "
       "tracked | of them near | repeat, mm | volume error | greatest | images | s |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-    const double mean = quick ? LargestQuickMean
-      : test.lost             ? LargestLossyMean
-      : test.window > 0.07    ? LargestBlurredMean
-      : test.window > 0.0     ? LargestMean
-                              : LargestIdealMean;
+    const double mean = quick ? MaximumQuickMean
+      : test.lost             ? MaximumLossyMean
+      : test.window > 0.07    ? MaximumBlurredMean
+      : test.window > 0.0     ? MaximumMean
+                              : MaximumIdealMean;
     bool met = true;
     double volumes = 0.0;
     double sumOfMeans = 0.0;
@@ -468,8 +468,8 @@ int main(int argc, char** argv)
       Outcome o = Run(test);
       Errors& judged = test.allPhases ? o.tracked : o.between;
       sumOfMeans += judged.Mean();
-      met = met && o.calledNear >= LeastCalledNear * o.called &&
-        (quick || test.lost || test.window > 0.07 || judged.Percentile(0.95) <= LargestPercentile);
+      met = met && o.calledNear >= MinimumCalledNear * o.called &&
+        (quick || test.lost || test.window > 0.07 || judged.Percentile(0.95) <= MaximumPercentile);
       volumes = std::max(volumes, o.volume.Percentile(1.0));
       const double all = static_cast<double>(o.tracked.values.size());
       std::printf("| %llu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | "
@@ -492,12 +492,12 @@ int main(int argc, char** argv)
       "within 1 mm: %s\n",
       overall, mean,
       quick || test.lost || test.window > 0.07 ? "" : ", 95 % of each within 0.80 mm",
-      100.0 * LeastCalledNear, met ? "met" : "**MISSED**");
+      100.0 * MinimumCalledNear, met ? "met" : "**MISSED**");
     if (!quick)
     {
-      const bool good = volumes <= LargestVolumeError;
+      const bool good = volumes <= MaximumVolumeError;
       std::printf("Volume of every branch within %.0f %%: %s (greatest %.1f %%)\n",
-        100.0 * LargestVolumeError, good ? "met" : "**MISSED**", 100.0 * volumes);
+        100.0 * MaximumVolumeError, good ? "met" : "**MISSED**", 100.0 * volumes);
       met = met && good;
     }
     return met ? 0 : 1;

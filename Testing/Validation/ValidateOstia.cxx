@@ -22,10 +22,10 @@ namespace
 {
 using namespace coronary;
 
-constexpr double Tolerance = 3.0;  // mm: about a vessel's radius and the wall's uncertainty
-constexpr double LeastShare = 0.9; // of the ostia that there are, in images as they should be
-constexpr double Sure = 0.8;       // a wrong answer with more is the worst there is
-constexpr double LargestSureShare = 0.01; // of all answers, wrong and sure of it
+constexpr double Tolerance = 3.0;    // mm: about a vessel's radius and the wall's uncertainty
+constexpr double MinimumShare = 0.9; // of the ostia that there are, in images as they should be
+constexpr double Sure = 0.8;         // a wrong answer with more is the worst there is
+constexpr double MaximumSureShare = 0.01; // of all answers, wrong and sure of it
 constexpr int Bins = 5;
 
 /// One reported ostium.
@@ -178,10 +178,10 @@ bool PrintGroups(const std::vector<Result>& results)
   {
     return true;
   }
-  const bool met = found >= LeastShare * there;
+  const bool met = found >= MinimumShare * there;
   std::printf("\nOf the ostia in images that are as they should be %.1f %% are within %.0f mm. "
               "Limit: %.0f %%: %s\n",
-    100.0 * found / there, Tolerance, 100.0 * LeastShare, met ? "met" : "**MISSED**");
+    100.0 * found / there, Tolerance, 100.0 * MinimumShare, met ? "met" : "**MISSED**");
   return met;
 }
 
@@ -219,9 +219,9 @@ bool PrintConfidence(const std::vector<Answer>& answers)
               "bins) %.3f, by chance alone %.3f\n",
     brier / count, base * (1.0 - base), Bins, CalibrationError(answers, right),
     ChanceError(answers));
-  const bool met = sure <= LargestSureShare * count;
+  const bool met = sure <= MaximumSureShare * count;
   std::printf("\nWrong with a confidence above %.1f: %d of %zu answers. Limit: %.0f %%: %s\n", Sure,
-    sure, answers.size(), 100.0 * LargestSureShare, met ? "met" : "**MISSED**");
+    sure, answers.size(), 100.0 * MaximumSureShare, met ? "met" : "**MISSED**");
   return met;
 }
 

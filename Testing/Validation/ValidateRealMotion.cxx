@@ -32,8 +32,8 @@ constexpr double Pi = 3.14159265358979323846;
 constexpr int NoData = 125; // what CTest takes as skipped
 
 // What must be reached, mm, of the whole run and of the quick one.
-constexpr double LargestMean[2] = { 0.40, 0.6 };
-constexpr double LargestPercentile[2] = { 0.9, 2.0 };
+constexpr double MaximumMean[2] = { 0.40, 0.6 };
+constexpr double MaximumPercentile[2] = { 0.9, 2.0 };
 
 double TimeOf(int frame)
 {
@@ -699,16 +699,16 @@ struct Errors
 double DistanceToAxis(
   const Polylines& lines, const std::vector<Vector3>& points, const Vector3& place)
 {
-  double least = std::numeric_limits<double>::infinity();
+  double minimum = std::numeric_limits<double>::infinity();
   for (const std::vector<std::int64_t>& line : lines.lines)
   {
     for (std::size_t n = 0; n + 1 < line.size(); ++n)
     {
-      least = std::min(
-        least, NearestOnSegment(place, points[line[n]], points[line[n + 1]]).squaredDistance);
+      minimum = std::min(
+        minimum, NearestOnSegment(place, points[line[n]], points[line[n + 1]]).squaredDistance);
     }
   }
-  return std::sqrt(least);
+  return std::sqrt(minimum);
 }
 
 /// Lines as a legacy VTK file.
@@ -910,10 +910,10 @@ bool Run(const Settings& options)
     static_cast<double>(nearAxis) / std::max(called, 1),
     static_cast<double>(near) / std::max(called, 1), report.imagesRead);
   const int judged = options.asMeasured ? 0 : 1; // frames that scatter cannot be interpolated
-  const bool met = across[judged].Mean() <= LargestMean[options.quick] &&
-    across[judged].Percentile(0.95) <= LargestPercentile[options.quick];
+  const bool met = across[judged].Mean() <= MaximumMean[options.quick] &&
+    across[judged].Percentile(0.95) <= MaximumPercentile[options.quick];
   std::printf("%s frames: mean at most %.2f mm, 95 %% at most %.2f mm: %s\n",
-    judged != 0 ? "Other" : "Tracked", LargestMean[options.quick], LargestPercentile[options.quick],
+    judged != 0 ? "Other" : "Tracked", MaximumMean[options.quick], MaximumPercentile[options.quick],
     met ? "met" : "**MISSED**");
   return met;
 }

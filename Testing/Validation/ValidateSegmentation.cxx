@@ -27,15 +27,15 @@ namespace
 using namespace coronary;
 
 // What has to be reached.
-constexpr double LeastDice = 0.85;         // at the usual window and noise
-constexpr double LargestOstiumError = 2.0; // mm
+constexpr double MinimumDice = 0.85;       // at the usual window and noise
+constexpr double MaximumOstiumError = 2.0; // mm
 constexpr double OstiaShare = 0.95;        // of the phantoms
 
 constexpr double ReferencePhase = 0.75;
-constexpr double UsualWindow = 0.066; // s
-constexpr double UsualNoise = 25.0;   // HU
-constexpr double LeastRadius = 0.75;  // mm: thinner vessels are left out of Dice
-constexpr double LeakDistance = 1.5;  // mm from the wall of any vessel
+constexpr double UsualWindow = 0.066;  // s
+constexpr double UsualNoise = 25.0;    // HU
+constexpr double MinimumRadius = 0.75; // mm: thinner vessels are left out of Dice
+constexpr double LeakDistance = 1.5;   // mm from the wall of any vessel
 constexpr double Infinite = std::numeric_limits<double>::infinity();
 
 // ---------------------------------------------------------------------------------------------
@@ -234,7 +234,7 @@ void CompareMasks(const CoronaryPhantom& phantom, const ImageGrid& grid,
           continue;
         }
         const std::optional<NearestBall> ball = search.Find(grid.IndexToWorld(i, j, k));
-        if (ball && ball->radius < LeastRadius)
+        if (ball && ball->radius < MinimumRadius)
         {
           thin += inTruth ? 1.0 : 0.0;
           thinFound += inTruth && inMask ? 1.0 : 0.0;
@@ -373,7 +373,7 @@ double Mean(const Outcomes& outcomes, const Value& value)
 }
 
 template <typename Value>
-double Largest(const Outcomes& outcomes, const Value& value)
+double Maximum(const Outcomes& outcomes, const Value& value)
 {
   double result = -Infinite;
   for (const Outcome* o : outcomes)
@@ -411,13 +411,13 @@ std::string QualityRow(const std::string& name, const Outcomes& outcomes)
   const auto leak = [](const Outcome& o) { return o.leak; };
   return "| " + name + " | " + std::to_string(outcomes.size()) + " | " +
     Format("%.3f", Mean(outcomes, [](const Outcome& o) { return o.dice; })) + " | " +
-    Format("%.3f", -Largest(outcomes, [](const Outcome& o) { return -o.dice; })) + " | " +
+    Format("%.3f", -Maximum(outcomes, [](const Outcome& o) { return -o.dice; })) + " | " +
     Format("%.3f", Mean(outcomes, [](const Outcome& o) { return o.recall; })) + " | " +
     Format("%.3f", Mean(outcomes, [](const Outcome& o) { return o.precision; })) + " | " +
     Format("%.2f", Mean(outcomes, [](const Outcome& o) { return o.thinRecall; })) + " | " +
-    Format("%.1f", Mean(outcomes, leak)) + " | " + Format("%.1f", Largest(outcomes, leak)) + " | " +
+    Format("%.1f", Mean(outcomes, leak)) + " | " + Format("%.1f", Maximum(outcomes, leak)) + " | " +
     Format("%.2f", Mean(outcomes, ostia)) + " | " +
-    Format("%.2f", Largest(outcomes, [](const Outcome& o) { return o.WorstOstium(); })) + " |\n";
+    Format("%.2f", Maximum(outcomes, [](const Outcome& o) { return o.WorstOstium(); })) + " |\n";
 }
 
 /// @return whether the limit is met everywhere
@@ -447,11 +447,11 @@ bool PrintDiceBySeed(const std::vector<Outcome>& all, const std::vector<Geometry
       seed = o.test.seed;
       std::printf("\n| %llu |", static_cast<unsigned long long>(seed));
     }
-    const bool good = o.dice >= LeastDice;
+    const bool good = o.dice >= MinimumDice;
     met &= good;
     std::printf(good ? " %.3f |" : " **%.3f** |", o.dice);
   }
-  std::printf("\n\nLimit: at least %.2f in each: %s\n", LeastDice, Verdict(met));
+  std::printf("\n\nLimit: at least %.2f in each: %s\n", MinimumDice, Verdict(met));
   return met;
 }
 
@@ -523,27 +523,27 @@ bool PrintOstia(const std::vector<Outcome>& all, const std::vector<std::uint64_t
       continue;
     }
     ++phantoms;
-    good += o->WorstOstium() <= LargestOstiumError ? 1 : 0;
+    good += o->WorstOstium() <= MaximumOstiumError ? 1 : 0;
     std::printf("| %llu | %s | %s | %.2f | %.2f | %s |\n", static_cast<unsigned long long>(seed),
       Format("%.2f", o->ostia[0].error).c_str(), Format("%.2f", o->ostia[1].error).c_str(),
       o->ostia[0].confidence, o->ostia[1].confidence, o->doubt.c_str());
   }
-  const int least = static_cast<int>(std::ceil(OstiaShare * phantoms - 1e-9));
-  std::printf("\nBoth within %.0f mm: %d of %d phantoms. Limit: %d: %s\n", LargestOstiumError, good,
-    phantoms, least, Verdict(good >= least));
-  return good >= least;
+  const int minimum = static_cast<int>(std::ceil(OstiaShare * phantoms - 1e-9));
+  std::printf("\nBoth within %.0f mm: %d of %d phantoms. Limit: %d: %s\n", MaximumOstiumError, good,
+    phantoms, minimum, Verdict(good >= minimum));
+  return good >= minimum;
 }
 
 /// @return whether enough images have both ostia within the limit
 bool PrintAllOstia(const std::vector<Outcome>& all)
 {
   const auto good = std::count_if(
-    all.begin(), all.end(), [](const Outcome& o) { return o.WorstOstium() <= LargestOstiumError; });
+    all.begin(), all.end(), [](const Outcome& o) { return o.WorstOstium() <= MaximumOstiumError; });
   const auto count = static_cast<double>(all.size());
-  const auto least = static_cast<long>(std::ceil(OstiaShare * count - 1e-9));
+  const auto minimum = static_cast<long>(std::ceil(OstiaShare * count - 1e-9));
   std::printf("\nBoth ostia within %.0f mm: %ld of all %zu images of this run. Limit: %ld: %s\n",
-    LargestOstiumError, static_cast<long>(good), all.size(), least, Verdict(good >= least));
-  return good >= least;
+    MaximumOstiumError, static_cast<long>(good), all.size(), minimum, Verdict(good >= minimum));
+  return good >= minimum;
 }
 
 void PrintCases(const std::vector<Outcome>& all)
@@ -628,7 +628,7 @@ void PrintHead(double c)
     "out; all others count, also leaks far\naway. Leak: mask more than %.1f mm from the wall of "
     "any vessel, thin ones included. Seeds and window of the\nsegmentation come from the automatic "
     "ostia; c of the vesselness: %s.\n",
-    ReferencePhase, LeakDistance, LeastRadius, LeakDistance,
+    ReferencePhase, LeakDistance, MinimumRadius, LeakDistance,
     c > 0.0 ? Format("%g HU", c).c_str() : "half the largest Hessian norm");
 }
 

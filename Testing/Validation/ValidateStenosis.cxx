@@ -25,11 +25,11 @@ namespace
 using namespace coronary;
 
 constexpr double ReferencePhase = 0.75;
-constexpr double LeastShare = 0.90;         // of lesions above 50 % with a lumen of 1 mm or more
+constexpr double MinimumShare = 0.90;       // of lesions above 50 % with a lumen of 1 mm or more
 constexpr double TrueBlur = 0.40;           // mm, of the phantoms' images between voxels of 0.5 mm
-constexpr double LargestRadiusError = 0.20; // mean, mm, beside calcium
-constexpr double LargestFalse = 0.1;        // lesions a healthy phantom
-constexpr double LeastRadius = 0.75;        // mm, of what radii are compared at
+constexpr double MaximumRadiusError = 0.20; // mean, mm, beside calcium
+constexpr double MaximumFalse = 0.1;        // lesions a healthy phantom
+constexpr double MinimumRadius = 0.75;      // mm, of what radii are compared at
 
 struct Case
 {
@@ -186,7 +186,7 @@ void CompareLesions(const CoronaryPhantom& phantom, const VesselTree& tree,
     if (match.lesion < 0)
     {
       std::snprintf(row.data(), row.size(), "| %llu | %s | %.0f | %.2f | %.2f | %s | | | | |", seed,
-        truth.vessel.c_str(), 100.0 * truth.degree, 2.0 * truth.leastRadius,
+        truth.vessel.c_str(), 100.0 * truth.degree, 2.0 * truth.minimumRadius,
         2.0 * truth.referenceRadius, match.reached ? "not listed" : "not reached");
       outcome.rows.emplace_back(row.data());
       continue;
@@ -195,9 +195,9 @@ void CompareLesions(const CoronaryPhantom& phantom, const VesselTree& tree,
     const Stenosis& lesion = grading.lesions[static_cast<std::size_t>(match.lesion)];
     std::snprintf(row.data(), row.size(),
       "| %llu | %s | %.0f | %.2f | %.2f | %.0f | %.0f..%.0f | %.2f | %.2f | %s %.1f |", seed,
-      truth.vessel.c_str(), 100.0 * truth.degree, 2.0 * truth.leastRadius,
+      truth.vessel.c_str(), 100.0 * truth.degree, 2.0 * truth.minimumRadius,
       2.0 * truth.referenceRadius, 100.0 * lesion.degree, 100.0 * lesion.degreeLow,
-      100.0 * lesion.degreeHigh, lesion.leastDiameter, lesion.referenceDiameter,
+      100.0 * lesion.degreeHigh, lesion.minimumDiameter, lesion.referenceDiameter,
       LesionKindName(lesion.kind), match.distance);
     outcome.rows.emplace_back(row.data());
   }
@@ -210,8 +210,8 @@ void CompareLesions(const CoronaryPhantom& phantom, const VesselTree& tree,
       std::array<char, 300> row;
       std::snprintf(row.data(), row.size(),
         "| %llu | %s at %.0f mm | none | | | %.0f | %.0f..%.0f | %.2f | %.2f | %s |", seed,
-        SegmentName(lesion.segmentId).c_str(), lesion.abscissaLeast, 100.0 * lesion.degree,
-        100.0 * lesion.degreeLow, 100.0 * lesion.degreeHigh, lesion.leastDiameter,
+        SegmentName(lesion.segmentId).c_str(), lesion.abscissaMinimum, 100.0 * lesion.degree,
+        100.0 * lesion.degreeLow, 100.0 * lesion.degreeHigh, lesion.minimumDiameter,
         lesion.referenceDiameter, LesionKindName(lesion.kind));
       outcome.rows.emplace_back(row.data());
     }
@@ -229,14 +229,14 @@ void CompareCalcium(const CoronaryPhantom& phantom, const CalciumMap& calcium, O
     ++outcome.plaques;
     outcome.trueVolume += visible;
     std::size_t best = used.size();
-    double least = plaque.radius + 1.0;
+    double minimum = plaque.radius + 1.0;
     for (std::size_t o = 0; o < used.size(); ++o)
     {
       const double distance = (calcium.objects[o].centre - plaque.centre).norm();
       const double reach = plaque.radius + std::cbrt(calcium.objects[o].volume) + 0.5;
-      if (distance < std::max(least, 0.0) || (best == used.size() && distance < reach))
+      if (distance < std::max(minimum, 0.0) || (best == used.size() && distance < reach))
       {
-        least = distance;
+        minimum = distance;
         best = o;
       }
     }
@@ -269,7 +269,7 @@ void CompareRadii(const PhantomTree& truth, const VesselTree& tree, const Vessel
   {
     const Nearest before = NearestTruth(truth, tree.points[p]);
     const Nearest after = NearestTruth(truth, refined.points[p]);
-    if (before.distance > 1.5 || before.radius < LeastRadius)
+    if (before.distance > 1.5 || before.radius < MinimumRadius)
     {
       continue;
     }
@@ -482,27 +482,27 @@ int main(int argc, char** argv)
     if (wide.listed > 0)
     {
       const double share = static_cast<double>(wide.within) / wide.listed;
-      met = met && share >= LeastShare;
+      met = met && share >= MinimumShare;
       std::printf("\nWide lesions within %.0f points: %.0f %%, at least %.0f %% wanted: %s\n",
-        100.0 * DegreeTally::LargestError, 100.0 * share, 100.0 * LeastShare,
-        share >= LeastShare ? "met" : "**MISSED**");
+        100.0 * DegreeTally::MaximumError, 100.0 * share, 100.0 * MinimumShare,
+        share >= MinimumShare ? "met" : "**MISSED**");
     }
     if (healthy > 0)
     {
       const double rate = falseOnHealthy / static_cast<double>(healthy);
-      met = met && rate <= LargestFalse;
+      met = met && rate <= MaximumFalse;
       std::printf("\nFalse lesions a healthy phantom: %.2f, at most %.1f wanted: %s\n", rate,
-        LargestFalse, rate <= LargestFalse ? "met" : "**MISSED**");
+        MaximumFalse, rate <= MaximumFalse ? "met" : "**MISSED**");
     }
     for (std::size_t c = 0; c < cases.size(); ++c)
     {
       if (cases[c].settings.calcifiedPlaques > 0)
       {
         const double error = Mean(Absolute(outcomes[c].besideAfter));
-        met = met && error <= LargestRadiusError;
+        met = met && error <= MaximumRadiusError;
         std::printf("\nRadius error beside calcium, %s: %.3f mm, at most %.2f wanted: %s\n",
-          cases[c].name.c_str(), error, LargestRadiusError,
-          error <= LargestRadiusError ? "met" : "**MISSED**");
+          cases[c].name.c_str(), error, MaximumRadiusError,
+          error <= MaximumRadiusError ? "met" : "**MISSED**");
       }
     }
     return met ? 0 : 1;

@@ -28,13 +28,13 @@ namespace
 using namespace coronary;
 
 // What has to be reached.
-constexpr double LeastAngle = 10.0;          // degrees, of every triangle
+constexpr double MinimumCornerAngle = 10.0;  // degrees, of every triangle
 constexpr double GoodAngle = 20.0;           // degrees
 constexpr double GoodAngleShare = 0.995;     // of the triangles
 constexpr double EdgeTolerance = 0.3;        // of the wanted length
 constexpr double EdgeShare = 0.95;           // of the edges
-constexpr double LargestMeanDistance = 0.05; // mm, each way
-constexpr double LargestDistance = 0.25;     // mm, each way
+constexpr double MaximumMeanDistance = 0.05; // mm, each way
+constexpr double MaximumDistance = 0.25;     // mm, each way
 constexpr double LongestTime = 10.0;         // s on two cores: not more than this of one core
 constexpr double TimedTriangles = 1e5;
 
@@ -47,9 +47,9 @@ struct Outcome
   std::size_t intersections = 0;
   double edgesGood = 0.0; ///< share
   double meanThere = 0.0; ///< from the surface to the wall, mm
-  double largestThere = 0.0;
+  double maximumThere = 0.0;
   double meanBack = 0.0; ///< from the wall to the surface, mm
-  double largestBack = 0.0;
+  double maximumBack = 0.0;
   double volumeError = 0.0; ///< relative
   double seconds = 0.0;
   double processorSeconds = 0.0;
@@ -64,13 +64,13 @@ struct Outcome
   }
   bool Shapely() const
   {
-    return this->measures.WorstAngle() >= LeastAngle &&
+    return this->measures.WorstAngle() >= MinimumCornerAngle &&
       this->measures.ShareBelow(GoodAngle) <= 1.0 - GoodAngleShare && this->edgesGood >= EdgeShare;
   }
   bool Near() const
   {
-    return std::max(this->meanThere, this->meanBack) <= LargestMeanDistance &&
-      std::max(this->largestThere, this->largestBack) <= LargestDistance;
+    return std::max(this->meanThere, this->meanBack) <= MaximumMeanDistance &&
+      std::max(this->maximumThere, this->maximumBack) <= MaximumDistance;
   }
   bool Quick() const
   {
@@ -120,7 +120,7 @@ std::vector<Vector3> EndNormals(const VesselTree& tree, const PhantomSurface& wa
 }
 
 void Distances(const std::vector<Vector3>& from, const TriangleTree& to, double& mean,
-  double& largest, Vector3& where)
+  double& maximum, Vector3& where)
 {
   std::vector<double> distance(from.size());
   ParallelFor(static_cast<std::int64_t>(from.size()), 256,
@@ -131,13 +131,13 @@ void Distances(const std::vector<Vector3>& from, const TriangleTree& to, double&
         distance[i] = to.Closest(from[i]).distance;
       }
     });
-  mean = largest = 0.0;
+  mean = maximum = 0.0;
   for (std::size_t i = 0; i < from.size(); ++i)
   {
     mean += distance[i] / static_cast<double>(from.size());
-    if (distance[i] > largest)
+    if (distance[i] > maximum)
     {
-      largest = distance[i];
+      maximum = distance[i];
       where = from[i];
     }
   }
@@ -198,9 +198,9 @@ Outcome Run(std::uint64_t seed, bool varied, double spacing, bool cut,
   Vector3 there = Vector3::Zero();
   Vector3 back = Vector3::Zero();
   Distances(surface.points, TriangleTree(wall.points, wall.triangles), outcome.meanThere,
-    outcome.largestThere, there);
+    outcome.maximumThere, there);
   Distances(wall.points, TriangleTree(surface.points, surface.triangles), outcome.meanBack,
-    outcome.largestBack, back);
+    outcome.maximumBack, back);
   outcome.volumeError =
     outcome.measures.volume / MeasureSurface(wall.points, wall.triangles).volume - 1.0;
   if (!folder.empty())
@@ -208,14 +208,14 @@ Outcome Run(std::uint64_t seed, bool varied, double spacing, bool cut,
     WriteObj(folder + "/surface-" + outcome.variant + "-" + std::to_string(seed) + ".obj", surface);
   }
   const std::size_t worst = static_cast<std::size_t>(
-    std::min_element(outcome.measures.smallestAngle.begin(), outcome.measures.smallestAngle.end()) -
-    outcome.measures.smallestAngle.begin());
+    std::min_element(outcome.measures.minimumAngle.begin(), outcome.measures.minimumAngle.end()) -
+    outcome.measures.minimumAngle.begin());
   const Vector3& thin = surface.points[surface.triangles[worst][0]];
   std::fprintf(stderr,
     "seed %llu %s: farthest at (%.2f, %.2f, %.2f), %.3f mm; of the wall at (%.2f, %.2f, %.2f), "
     "%.3f mm; smallest angle at (%.2f, %.2f, %.2f), %.1f; %zu pairs cut; %.1f s\n",
     static_cast<unsigned long long>(seed), outcome.variant.c_str(), there[0], there[1], there[2],
-    outcome.largestThere, back[0], back[1], back[2], outcome.largestBack, thin[0], thin[1], thin[2],
+    outcome.maximumThere, back[0], back[1], back[2], outcome.maximumBack, thin[0], thin[1], thin[2],
     outcome.measures.WorstAngle(), pairs.size(), outcome.processorSeconds);
   for (std::size_t i = 0; i < std::min<std::size_t>(5, pairs.size()); ++i)
   {
@@ -248,8 +248,8 @@ void Print(const std::vector<Outcome>& outcomes)
                 "%+.2f %% | %.1f | %s |\n",
       static_cast<unsigned long long>(o.seed), o.variant.c_str(), o.measures.triangles,
       o.Sound() ? "yes" : "**no**", o.measures.WorstAngle(),
-      100.0 * o.measures.ShareBelow(GoodAngle), 100.0 * o.edgesGood, o.meanThere, o.largestThere,
-      o.meanBack, o.largestBack, 100.0 * o.volumeError, o.processorSeconds,
+      100.0 * o.measures.ShareBelow(GoodAngle), 100.0 * o.edgesGood, o.meanThere, o.maximumThere,
+      o.meanBack, o.maximumBack, 100.0 * o.volumeError, o.processorSeconds,
       o.Met() ? "met" : "**MISSED**");
   }
 }
@@ -308,8 +308,8 @@ int main(int argc, char** argv)
     "at least %.0f; %.0f %% of the edges within %.0f %% of h; distance between\nthe "
     "surface's points and the phantom's wall, and back, at most %.2f mm in the mean and "
     "%.2f mm anywhere; at most %.0f s\nof one core for 100,000 triangles.\n\n",
-    LeastAngle, 100.0 * GoodAngleShare, GoodAngle, 100.0 * EdgeShare, 100.0 * EdgeTolerance,
-    LargestMeanDistance, LargestDistance, LongestTime);
+    MinimumCornerAngle, 100.0 * GoodAngleShare, GoodAngle, 100.0 * EdgeShare, 100.0 * EdgeTolerance,
+    MaximumMeanDistance, MaximumDistance, LongestTime);
   std::vector<Outcome> outcomes;
   try
   {

@@ -36,14 +36,14 @@ namespace
 using namespace coronary;
 
 // What has to be reached in each mesh.
-constexpr double LeastAngle = 5.0; // degrees, dihedral
-constexpr double PoorAngle = 15.0; // degrees
-constexpr double LargestPoorShare = 0.01;
-constexpr double LeastVolume = 1e-7;    // mm^3
-constexpr double LargestSeconds = 20.0; // of processor time for 100,000 triangles, with TetGen
+constexpr double MinimumCornerAngle = 5.0; // degrees, dihedral
+constexpr double PoorAngle = 15.0;         // degrees
+constexpr double MaximumPoorShare = 0.01;
+constexpr double MeshMinimumVolume = 1e-7; // mm^3
+constexpr double MaximumSeconds = 20.0;    // of processor time for 100,000 triangles, with TetGen
 constexpr int MostTries = 2;
 // Ends outside of their caps are put on them; a segment that is not there would be 0.5.
-constexpr double LargestLengthLost = 0.25; // mm
+constexpr double MaximumLengthLost = 0.25; // mm
 
 /// Of this process and of its meshers, seconds.
 double ProcessorTime()
@@ -66,9 +66,9 @@ struct Outcome
   std::size_t triangles = 0;
   std::size_t tetrahedra = 0;
   int tries = 0;
-  double leastAngle = 0.0; // degrees
+  double minimumAngle = 0.0; // degrees
   double poorShare = 0.0;
-  double leastVolume = 0.0;
+  double minimumVolume = 0.0;
   std::size_t inverted = 0;
   std::size_t pointsLost = 0;
   double lengthLost = 0.0; // of the skeleton, mm
@@ -76,11 +76,11 @@ struct Outcome
 
   bool Reached(bool timed) const
   {
-    return this->failure.empty() && this->leastAngle >= LeastAngle &&
-      this->poorShare <= LargestPoorShare && this->leastVolume > LeastVolume &&
+    return this->failure.empty() && this->minimumAngle >= MinimumCornerAngle &&
+      this->poorShare <= MaximumPoorShare && this->minimumVolume > MeshMinimumVolume &&
       this->inverted == 0 && this->tries <= MostTries && this->pointsLost == 0 &&
-      std::abs(this->lengthLost) < LargestLengthLost &&
-      (!timed || this->seconds <= LargestSeconds * std::max(1.0, 1e-5 * this->triangles));
+      std::abs(this->lengthLost) < MaximumLengthLost &&
+      (!timed || this->seconds <= MaximumSeconds * std::max(1.0, 1e-5 * this->triangles));
   }
 };
 
@@ -90,8 +90,8 @@ void Measure(const TetrahedralMeshInput& input, const TetrahedralMesh& mesh, Out
   outcome.triangles = input.triangles.size();
   outcome.tetrahedra = mesh.tetrahedra.size();
   outcome.tries = mesh.tries;
-  outcome.leastAngle = 180.0;
-  outcome.leastVolume = std::numeric_limits<double>::infinity();
+  outcome.minimumAngle = 180.0;
+  outcome.minimumVolume = std::numeric_limits<double>::infinity();
   Vector3 where = Vector3::Zero();
   std::size_t poor = 0;
   for (const Tetrahedron& t : mesh.tetrahedra)
@@ -102,10 +102,10 @@ void Measure(const TetrahedralMeshInput& input, const TetrahedralMesh& mesh, Out
     const Vector3& d = mesh.points[t[3]];
     const double volume = TetrahedronVolume(a, b, c, d);
     const double angle = MinimumDihedralAngle(a, b, c, d) * 180.0 / M_PI;
-    outcome.leastVolume = std::min(outcome.leastVolume, volume);
-    if (angle < outcome.leastAngle)
+    outcome.minimumVolume = std::min(outcome.minimumVolume, volume);
+    if (angle < outcome.minimumAngle)
     {
-      outcome.leastAngle = angle;
+      outcome.minimumAngle = angle;
       where = (a + b + c + d) / 4.0;
     }
     outcome.inverted += volume <= 0.0 ? 1 : 0;
@@ -113,7 +113,7 @@ void Measure(const TetrahedralMeshInput& input, const TetrahedralMesh& mesh, Out
   }
   outcome.poorShare = static_cast<double>(poor) / static_cast<double>(mesh.tetrahedra.size());
   std::fprintf(stderr, "%s: flattest at (%.3f, %.3f, %.3f), %.2f degrees\n", outcome.name.c_str(),
-    where[0], where[1], where[2], outcome.leastAngle);
+    where[0], where[1], where[2], outcome.minimumAngle);
   for (const std::string& warning : mesh.warnings)
   {
     std::fprintf(stderr, "  %s\n", warning.c_str());
@@ -224,8 +224,9 @@ bool Print(const Outcome& outcome, bool timed)
   else
   {
     std::printf("| %s | %zu | %zu | %d | %.1f | %.4f | %.1e | %.1f | %s |\n", outcome.name.c_str(),
-      outcome.triangles, outcome.tetrahedra, outcome.tries, outcome.leastAngle,
-      100.0 * outcome.poorShare, outcome.leastVolume, outcome.seconds, reached ? "yes" : "**no**");
+      outcome.triangles, outcome.tetrahedra, outcome.tries, outcome.minimumAngle,
+      100.0 * outcome.poorShare, outcome.minimumVolume, outcome.seconds,
+      reached ? "yes" : "**no**");
   }
   std::fflush(stdout);
   return reached;
@@ -296,10 +297,10 @@ int Run(int argc, char** argv)
     "Wanted: dihedral angles of at least %.0f degrees, at most %.0f %% of the tetrahedra below "
     "%.0f degrees, volumes above %.0e mm^3,\nno inverted one, all points and segments of "
     "the centerlines in the mesh, at most %d tries",
-    LeastAngle, 100.0 * LargestPoorShare, PoorAngle, LeastVolume, MostTries);
+    MinimumCornerAngle, 100.0 * MaximumPoorShare, PoorAngle, MeshMinimumVolume, MostTries);
   if (timed)
   {
-    std::printf(", %.0f s of processor time for 100,000 triangles", LargestSeconds);
+    std::printf(", %.0f s of processor time for 100,000 triangles", MaximumSeconds);
   }
   std::printf(".\n\n");
   std::printf(

@@ -41,7 +41,7 @@ struct FaultName
   FaultKind kind;
   bool counts; ///< has 'count', else 'ms' or nothing
   bool lasts;
-  std::int64_t least;
+  std::int64_t minimum;
   std::int64_t most;
 };
 constexpr std::int64_t Most32 = std::numeric_limits<std::int32_t>::max();
@@ -106,7 +106,7 @@ DeviceFault FaultOf(const nlohmann::json& entry, const std::string& where)
   fault.kind = found->kind;
   if (found->counts)
   {
-    fault.count = fields.Whole("count", found->least, found->most, 1);
+    fault.count = fields.Whole("count", found->minimum, found->most, 1);
   }
   if (found->lasts)
   {

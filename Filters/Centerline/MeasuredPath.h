@@ -1,9 +1,9 @@
 /**
- * @file MeasuredCourse.h
+ * @file MeasuredPath.h
  * @brief Samples along one path of an extraction: put on the axis, measured, smoothed, and cut where no vessel is seen.
  */
-#ifndef DynamicCoronary_MeasuredCourse_h
-#define DynamicCoronary_MeasuredCourse_h
+#ifndef DynamicCoronary_MeasuredPath_h
+#define DynamicCoronary_MeasuredPath_h
 
 #include "CenterlineExtraction.h"
 #include "LumenMeasurement.h"
@@ -15,7 +15,7 @@
 namespace coronary
 {
 /// Measured samples of one path, root first.
-struct MeasuredCourse
+struct MeasuredPath
 {
   std::vector<Vector3> points; ///< mm, world
   std::vector<double> radius;
@@ -39,29 +39,29 @@ struct MeasuredCourse
   void ReplaceStart(std::size_t first, const std::vector<Vector3>& start);
 };
 
-/// What the courses of one extraction are measured in and with.
-struct CourseMeasurement
+/// What the paths of one extraction are measured in and with.
+struct PathMeasurement
 {
   /// @param settings  must outlive this
   /// @param grid      that is marched in; its voxels and the settings give the lengths
-  CourseMeasurement(const CenterlineSettings& settings, const ImageGrid& grid);
+  PathMeasurement(const CenterlineSettings& settings, const ImageGrid& grid);
 
   /// Sections at all samples. @param move  whether points are put on their sections' centres
-  void Measure(MeasuredCourse& course, bool move) const;
+  void Measure(MeasuredPath& path, bool move) const;
 
   /// Beside something much darker or brighter the speed is greatest off the axis, so that no section is found from
   /// there: sections are looked for around the points of longer parts that have none.
-  void Recentre(MeasuredCourse& course) const;
+  void Recentre(MeasuredPath& path) const;
 
   /// @param start, end  least weights of the ends; samples weigh as much as their confidence
-  void SmoothPositions(MeasuredCourse& course, double start, double end) const;
+  void SmoothPositions(MeasuredPath& path, double start, double end) const;
 
-  void SmoothRadii(MeasuredCourse& course) const;
+  void SmoothRadii(MeasuredPath& path) const;
 
   /// @param before  radii upstream, the nearest last
   /// @returns the number of samples up to where a vessel is seen, 0 if there is none
   std::size_t SeenUpTo(
-    const MeasuredCourse& course, double parentRadius, const std::vector<double>& before) const;
+    const MeasuredPath& path, double parentRadius, const std::vector<double>& before) const;
 
   const CenterlineSettings& settings;
   double voxel; ///< mm, edge of a cube as large as a voxel

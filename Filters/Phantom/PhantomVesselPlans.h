@@ -1,9 +1,9 @@
 /**
- * @file PhantomCourses.h
+ * @file PhantomVesselPlans.h
  * @brief Courses and calibres of the coronary arteries of the mean heart.
  */
-#ifndef DynamicCoronary_PhantomCourses_h
-#define DynamicCoronary_PhantomCourses_h
+#ifndef DynamicCoronary_PhantomVesselPlans_h
+#define DynamicCoronary_PhantomVesselPlans_h
 
 #include "PhantomMotion.h"
 
@@ -21,7 +21,7 @@ struct Control
 };
 
 /// How much a vessel is drawn to the epicardial surface.
-enum class Course
+enum class VesselDepth
 {
   Epicardial,
   Intramural
@@ -32,7 +32,7 @@ struct VesselPlan
   std::string name;
   int tree;
   std::string parent; ///< empty: starts at an ostium
-  Course course;
+  VesselDepth depth;
   std::vector<Control> controls;
   /// Segment from the start, then from the origin of the named child vessel on.
   int segment;
