@@ -9,6 +9,7 @@
 
 #include "vtkSmartPointer.h"
 
+#include <stdexcept>
 #include <string>
 
 class vtkMessageTrap;
@@ -34,6 +35,21 @@ void WritePolyData(const std::string& path, vtkPolyData* data, vtkMessageTrap& m
 /// @throws std::runtime_error naming the file
 void WriteUnstructuredGrid(
   const std::string& path, vtkUnstructuredGrid* data, vtkMessageTrap& messages);
+
+/// Does something with what was read. What an algorithm refuses is told with the file that it is from.
+/// @throws std::runtime_error in place of std::invalid_argument
+template <typename Function>
+auto About(const std::string& path, const Function& function)
+{
+  try
+  {
+    return function();
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::runtime_error("'" + path + "': " + error.what());
+  }
+}
 }
 
 #endif

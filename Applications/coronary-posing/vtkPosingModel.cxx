@@ -60,20 +60,6 @@ std::string FileOfRun(const std::string& folder, const char* name)
   return path;
 }
 
-/// What an algorithm says of data, with the file that they are from.
-template <typename Function>
-auto About(const std::string& path, const Function& function)
-{
-  try
-  {
-    return function();
-  }
-  catch (const std::invalid_argument& error)
-  {
-    throw std::runtime_error("'" + path + "': " + error.what());
-  }
-}
-
 SkeletonRig RigOf(vtkPolyData* rest, const std::string& folder)
 {
   return About(FileOfRun(folder, "skeleton.vtp"),

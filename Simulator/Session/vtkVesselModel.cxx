@@ -40,20 +40,6 @@ constexpr int SampledPhases = 40; // of a motion that hangs on a skeleton
   throw std::runtime_error("'" + path + "' " + what + ".");
 }
 
-/// What an algorithm says of data, with the file that they are from.
-template <typename Function>
-auto About(const std::string& path, const Function& function)
-{
-  try
-  {
-    return function();
-  }
-  catch (const std::invalid_argument& error)
-  {
-    throw std::runtime_error("'" + path + "': " + error.what());
-  }
-}
-
 bool IsFile(const std::string& path)
 {
   std::error_code ignored;
