@@ -807,10 +807,6 @@ Json MakeWeights(RunStep& step)
 
 constexpr int PhaseDigits = 2;
 
-}
-
-namespace
-{
 /// The masks of a series.json, one a phase; empty when none of them has one.
 std::vector<std::string> MasksOfSeries(const std::string& path)
 {

@@ -94,7 +94,6 @@ const char* NameOf(coronary::Dominance dominance)
     : dominance == coronary::Dominance::Left     ? "left"
                                                  : "balanced";
 }
-
 }
 
 /// The outputs, out of the algorithm's result.

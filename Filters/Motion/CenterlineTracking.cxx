@@ -23,7 +23,6 @@ constexpr double TrackedConfidence = 0.5;
 constexpr double WeakConfidence = 0.2;
 constexpr double FilledConfidence = 0.3; ///< at most
 constexpr double LostDeviation = 2.0;    ///< mm
-
 }
 
 ProgressCallback LineTracker::Part(double from, double to) const

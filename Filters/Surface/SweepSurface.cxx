@@ -216,10 +216,6 @@ std::vector<std::int64_t> FindFaults(const AdaptiveRemesher& mesh)
   return faults;
 }
 
-}
-
-namespace
-{
 /// What is changed where the tree cannot be meshed as it is.
 struct Reliefs
 {

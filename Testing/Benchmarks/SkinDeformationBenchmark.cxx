@@ -157,17 +157,22 @@ enum Kind
   DualSections
 };
 
+coronary::SkinDeformation SkinOf(const Frame& frame, Kind kind)
+{
+  coronary::SkinDeformationSettings settings;
+  settings.blend = kind == Dual || kind == DualSections ? coronary::SkinBlend::DualQuaternion
+                                                        : coronary::SkinBlend::Linear;
+  settings.stretch = kind != LinearRigid;
+  return { frame.points, frame.weights, frame.skeleton, settings };
+}
+
 /// Arguments: kind, threads.
 void Ours(benchmark::State& state)
 {
   const Frame& frame = TheFrame();
   const auto kind = static_cast<Kind>(state.range(0));
   coronary::SetNumberOfThreads(static_cast<int>(state.range(1)));
-  coronary::SkinDeformationSettings settings;
-  settings.blend = kind == Dual || kind == DualSections ? coronary::SkinBlend::DualQuaternion
-                                                        : coronary::SkinBlend::Linear;
-  settings.stretch = kind != LinearRigid;
-  coronary::SkinDeformation skin(frame.points, frame.weights, frame.skeleton, settings);
+  coronary::SkinDeformation skin = SkinOf(frame, kind);
   std::vector<coronary::SkeletonPose> poses = frame.poses;
   if (kind == LinearSections || kind == DualSections)
   {
@@ -189,16 +194,13 @@ void Ours(benchmark::State& state)
   coronary::SetNumberOfThreads(0);
 }
 
-/// Positions and velocities. Argument: kind, threads.
+/// Positions and velocities. Arguments: kind, threads.
 void WithVelocity(benchmark::State& state)
 {
   const Frame& frame = TheFrame();
   const auto kind = static_cast<Kind>(state.range(0));
   coronary::SetNumberOfThreads(static_cast<int>(state.range(1)));
-  coronary::SkinDeformationSettings settings;
-  settings.blend = kind == Dual || kind == DualSections ? coronary::SkinBlend::DualQuaternion
-                                                        : coronary::SkinBlend::Linear;
-  coronary::SkinDeformation skin(frame.points, frame.weights, frame.skeleton, settings);
+  coronary::SkinDeformation skin = SkinOf(frame, kind);
   std::vector<coronary::MovingSkeletonPose> poses;
   for (std::size_t k = 0; k < frame.poses.size(); ++k)
   {
