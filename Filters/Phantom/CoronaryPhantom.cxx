@@ -480,7 +480,7 @@ std::vector<PhantomTube> CoronaryPhantom::Tubes(double t) const
     tubes.push_back(
       { tree.points[step.first], tree.points[step.second], start, tree.radius[step.second],
         before != nullptr && before->second == step.first && before->vessel == step.vessel,
-        settings.lumenHU + settings.attenuationGradient * path / 10.0,
+        PhantomTissue::Blood, settings.lumenHU + settings.attenuationGradient * path / 10.0,
         anatomy.intramural[step.vessel] != 0 });
     before = &step;
   }

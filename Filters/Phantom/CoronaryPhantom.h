@@ -136,6 +136,17 @@ struct PhantomPlaque
   double value = 0.0;      ///< HU before blurring
 };
 
+enum class PhantomTissue
+{
+  Lung,
+  Fat,
+  Soft,
+  Muscle,    ///< perfused
+  Blood,     ///< with contrast medium
+  Calcified, ///< bone, plaque
+  Metal      ///< stents, leads
+};
+
 /// A piece of an artery's lumen at one moment, as a scanner's rays meet it: a straight cone.
 struct PhantomTube
 {
@@ -143,19 +154,10 @@ struct PhantomTube
   Vector3 end;
   double startRadius; ///< mm, across the axis
   double endRadius;
-  bool round;    ///< another piece ends at `start`: a ball fills the bend between them
+  bool round; ///< another piece ends at `start`: a ball fills the bend between them
+  PhantomTissue tissue;
   double value;  ///< HU
   bool inMuscle; ///< the coat around it is muscle, else fat
-};
-
-enum class PhantomTissue
-{
-  Lung,
-  Fat,
-  Soft,
-  Muscle,   ///< perfused
-  Blood,    ///< with contrast medium
-  Calcified ///< bone, plaque
 };
 
 /// Amounts of three basis materials in a tissue of so many HU.

@@ -4,8 +4,8 @@
 #include "PartialProgress.h"
 #include "PhantomMotion.h"
 #include "Require.h"
+#include "ScannedAnatomy.h"
 #include "ScannerPhysics.h"
-#include "ScannerProjection.h"
 #include "ScannerReconstruction.h"
 
 #include <algorithm>
@@ -34,21 +34,19 @@ struct TimedView
 struct CtScanner::Internals
 {
   Internals(const CoronaryPhantom& phantom, const ScannerSettings& settings, const ImageGrid& grid)
-    : Phantom(phantom)
-    , Settings(settings)
+    : Settings(settings)
+    , Anatomy(phantom)
     , Grid(grid)
-    , Cycle(phantom.Settings().cycleLength)
+    , Cycle(this->Anatomy.CycleLength())
     , Schedule(settings, this->Height(grid.extent[4]), this->Height(grid.extent[5]), this->Cycle)
     , Physics(settings)
-    , Projector(this->Settings)
     , Reconstruction(this->Settings)
   {
     Require((grid.direction - Matrix3::Identity()).norm() < 1e-6,
       "scanner: it makes axial slices: the image's direction has to be the identity");
-    const CoronaryPhantom::Box body = phantom.Body();
+    const CoronaryPhantom::Box body = this->Anatomy.Body();
     this->Axis = 0.5 * (body.low + body.high);
     this->BodyRadius = 0.5 * std::max(body.high[0] - body.low[0], body.high[1] - body.low[1]);
-    this->Body = body;
     Require(this->BodyRadius < settings.FieldRadius(),
       "scanner: the patient does not fit into the field of " +
         std::to_string(std::lround(2.0 * settings.FieldRadius())) +
@@ -79,27 +77,18 @@ struct CtScanner::Internals
   }
 
   std::vector<TimedView> Views(std::size_t slabNumber, double phase) const;
-  std::vector<ScannedTube> Tubes(const ScannerSlab& slab, double phase) const;
-  std::vector<ScannedBall> Balls(const ScannerSlab& slab, double phase) const;
-  MaterialAmounts Amounts(PhantomTissue tissue, double hounsfield, double iodine) const;
-  ImageGrid MapGrid(const ScannerSlab& slab) const;
-  void RenderMaps(const ScannerSlab& slab, double phase, MaterialVolume& volume,
-    const ProgressCallback& progress) const;
   void Project(const ScannerSlab& slab, const std::vector<TimedView>& views,
     std::vector<std::vector<float>>& data, const ProgressCallback& progress) const;
   void AddSlab(std::size_t number, double phase, std::vector<float>& image,
     const ProgressCallback& progress) const;
 
-  const CoronaryPhantom& Phantom;
   const ScannerSettings Settings;
+  const ScannedPhantom Anatomy;
   const ImageGrid Grid;
   const double Cycle; ///< mean R-R interval, s
   const ScannerSchedule Schedule;
   const ScannerPhysics Physics;
-  const ScannerProjector Projector;
   const HalfScanReconstruction Reconstruction;
-  const TissueMaterials Tissue;
-  CoronaryPhantom::Box Body;
   Vector3 Axis;
   double BodyRadius; ///< mm
 };
@@ -132,104 +121,6 @@ std::vector<TimedView> CtScanner::Internals::Views(std::size_t slabNumber, doubl
   return views;
 }
 
-MaterialAmounts CtScanner::Internals::Amounts(
-  PhantomTissue tissue, double hounsfield, double iodine) const
-{
-  MaterialAmounts amounts;
-  switch (tissue)
-  {
-    case PhantomTissue::Lung:
-      return this->Tissue.Lung(hounsfield);
-    case PhantomTissue::Fat:
-      return this->Tissue.Fat(hounsfield);
-    case PhantomTissue::Soft:
-      return this->Tissue.Soft(hounsfield);
-    case PhantomTissue::Calcified:
-      return this->Tissue.Calcified(hounsfield);
-    case PhantomTissue::Muscle:
-      amounts = this->Tissue.Muscle(hounsfield);
-      break;
-    case PhantomTissue::Blood:
-      amounts = this->Tissue.Blood(hounsfield);
-      break;
-  }
-  amounts[1] *= static_cast<float>(iodine);
-  return amounts;
-}
-
-std::vector<ScannedTube> CtScanner::Internals::Tubes(const ScannerSlab& slab, double phase) const
-{
-  const double reach = 0.5 * (this->MapGrid(slab).extent[5] + 1) * this->Settings.anatomySpacing;
-  const MaterialAmounts coats[2] = { this->Amounts(PhantomTissue::Fat,
-                                       CoronaryPhantom::CoatValue(false), slab.iodine),
-    this->Amounts(PhantomTissue::Muscle, CoronaryPhantom::CoatValue(true), slab.iodine) };
-  std::vector<ScannedTube> tubes;
-  for (const PhantomTube& tube : this->Phantom.Tubes(phase))
-  {
-    const Vector3 start = tube.start + slab.shift;
-    if (std::abs(start[2] - slab.centre) < reach)
-    {
-      tubes.push_back({ start, tube.end + slab.shift, tube.startRadius, tube.endRadius, tube.round,
-        this->Amounts(PhantomTissue::Blood, tube.value, slab.iodine) -
-          coats[tube.inMuscle ? 1 : 0] });
-    }
-  }
-  return tubes;
-}
-
-std::vector<ScannedBall> CtScanner::Internals::Balls(const ScannerSlab& slab, double phase) const
-{
-  const MaterialAmounts coat =
-    this->Amounts(PhantomTissue::Fat, CoronaryPhantom::CoatValue(false), slab.iodine);
-  std::vector<ScannedBall> balls;
-  for (const PhantomPlaque& plaque : this->Phantom.Plaques(phase))
-  {
-    balls.push_back({ plaque.centre + slab.shift, plaque.radius,
-      this->Amounts(PhantomTissue::Calcified, plaque.value, slab.iodine) - coat });
-  }
-  return balls;
-}
-
-/// Voxels around all that the rays of a slab meet.
-ImageGrid CtScanner::Internals::MapGrid(const ScannerSlab& slab) const
-{
-  const ScannerSettings& s = this->Settings;
-  ImageGrid grid;
-  grid.spacing = Vector3::Constant(s.anatomySpacing);
-  const double height =
-    (0.5 * s.rows * s.rowPitch) * (s.sourceToAxis + this->BodyRadius) / s.sourceToDetector;
-  Vector3 half = 0.5 * (this->Body.high - this->Body.low) + Vector3::Constant(s.anatomySpacing);
-  half[2] = height + s.anatomySpacing;
-  Vector3 centre = this->Axis + slab.shift;
-  centre[2] = slab.centre;
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    const int steps = static_cast<int>(std::ceil(2.0 * half[axis] / s.anatomySpacing));
-    grid.extent[2 * axis] = 0;
-    grid.extent[2 * axis + 1] = steps;
-    grid.origin[axis] = centre[axis] - 0.5 * steps * s.anatomySpacing;
-  }
-  return grid;
-}
-
-void CtScanner::Internals::RenderMaps(const ScannerSlab& slab, double phase, MaterialVolume& volume,
-  const ProgressCallback& progress) const
-{
-  const ImageGrid grid = this->MapGrid(slab);
-  volume.SetGrid(grid);
-  ImageGrid atRest = grid; // the patient is elsewhere: so are the places of the phantom
-  atRest.origin -= slab.shift;
-  this->Phantom.RenderMaterials(
-    atRest, phase,
-    [&](PhantomTissue tissue, double hounsfield)
-    {
-      const MaterialAmounts amounts = this->Amounts(tissue, hounsfield, slab.iodine);
-      return std::array<float, 3>{ amounts[0], amounts[1], amounts[2] };
-    },
-    { volume.maps[0].data(), volume.maps[1].data(), volume.maps[2].data() }, progress);
-  volume.FindColumns();
-}
-
 void CtScanner::Internals::Project(const ScannerSlab& slab, const std::vector<TimedView>& views,
   std::vector<std::vector<float>>& data, const ProgressCallback& progress) const
 {
@@ -241,7 +132,8 @@ void CtScanner::Internals::Project(const ScannerSlab& slab, const std::vector<Ti
   { return static_cast<std::int64_t>(std::floor(view.seconds / s.anatomyStep)); };
   Vector3 axis = this->Axis;
   axis[2] = slab.centre;
-  MaterialVolume volume;
+  ScannedPatient patient(this->Anatomy, s);
+  const auto stateAt = [&](double phase) { return PatientState{ phase, slab.shift, slab.iodine }; };
   for (std::size_t first = 0; first < inTime.size();)
   {
     const std::int64_t moment = momentOf(inTime[first]);
@@ -253,9 +145,9 @@ void CtScanner::Internals::Project(const ScannerSlab& slab, const std::vector<Ti
     const auto share = [&](std::size_t n)
     { return static_cast<double>(n) / static_cast<double>(inTime.size()); };
     const double mapped = share(first) + 0.4 * (share(last) - share(first));
-    this->RenderMaps(slab,
-      this->Schedule.Phase((static_cast<double>(moment) + 0.5) * s.anatomyStep), volume,
-      PartOf(progress, share(first), mapped));
+    patient.Prepare(
+      stateAt(this->Schedule.Phase((static_cast<double>(moment) + 0.5) * s.anatomyStep)),
+      slab.centre, PartOf(progress, share(first), mapped));
     ParallelFor(
       static_cast<std::int64_t>(last - first), 1,
       [&](std::int64_t begin, std::int64_t end)
@@ -264,11 +156,7 @@ void CtScanner::Internals::Project(const ScannerSlab& slab, const std::vector<Ti
         for (std::int64_t n = begin; n < end; ++n)
         {
           const TimedView& view = inTime[first + n];
-          const ScannerView stand{ view.angle, axis };
-          this->Projector.Clear(paths);
-          this->Projector.Add(volume, stand, paths);
-          this->Projector.Add(
-            this->Tubes(slab, view.phase), this->Balls(slab, view.phase), stand, paths);
+          patient.Project({ view.angle, axis }, stateAt(view.phase), paths);
           std::vector<float>& result = data[view.number];
           result.resize(static_cast<std::size_t>(s.channels) * s.rows);
           this->Physics.Measure({ paths[0].data(), paths[1].data(), paths[2].data() },
