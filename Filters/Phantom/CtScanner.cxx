@@ -125,7 +125,7 @@ struct CtScanner::Internals
     const std::vector<GatedStack>& stacks, std::size_t number, std::array<int, 2>& range) const;
   std::vector<Job> Jobs(const ScanStore& store) const;
   void FindCurrents(const ProgressCallback& progress);
-  void TakeViews(const std::vector<ViewKey>& views,
+  void TakeViews(const std::vector<ViewKey>& views, ScannedPatient& patient,
     std::map<ViewKey, std::vector<std::vector<float>>>& taken,
     const ProgressCallback& progress) const;
   void Reconstruct(const Job& job, const std::map<ViewKey, std::vector<std::vector<float>>>& taken,
@@ -267,13 +267,12 @@ void CtScanner::Internals::FindCurrents(const ProgressCallback& progress)
 }
 
 /// Line integrals of views that are close in time, for each level of current.
-void CtScanner::Internals::TakeViews(const std::vector<ViewKey>& views,
+void CtScanner::Internals::TakeViews(const std::vector<ViewKey>& views, ScannedPatient& patient,
   std::map<ViewKey, std::vector<std::vector<float>>>& taken, const ProgressCallback& progress) const
 {
   const ScannerSettings& s = this->Settings;
   // The same for the same view, whichever others are taken with it.
   const double middle = (this->Step(views.front()) + 0.5) * s.anatomyStep;
-  ScannedPatient patient(this->Anatomy, s);
   patient.Prepare(this->Patient(middle), this->Schedule.Table(middle), PartOf(progress, 0.0, 0.5));
   for (const ViewKey& view : views)
   {
@@ -401,6 +400,7 @@ void CtScanner::Scan(ScanStore& store, const ProgressCallback& progress)
     return PartOf(progress, first, 0.01 + 0.99 * spent / whole);
   };
   std::map<ViewKey, std::vector<std::vector<float>>> taken;
+  ScannedPatient patient(data.Anatomy, data.Settings);
   std::size_t ready = 0;
   for (auto view = lastUse.begin(); view != lastUse.end();)
   {
@@ -410,7 +410,7 @@ void CtScanner::Scan(ScanStore& store, const ProgressCallback& progress)
     {
       together.push_back(view->first);
     }
-    data.TakeViews(together, taken, next(ViewCost * static_cast<double>(together.size())));
+    data.TakeViews(together, patient, taken, next(ViewCost * static_cast<double>(together.size())));
     for (; ready < jobs.size() && jobs[ready].last <= together.back(); ++ready)
     {
       data.Reconstruct(jobs[ready], taken, store, next(costOf(jobs[ready])));

@@ -30,6 +30,9 @@ public:
   /// The trunk, which does not end above and below.
   virtual CoronaryPhantom::Box Body() const = 0;
 
+  /// Around all that moves; its height does not count. What moves beyond it is seen at rest.
+  virtual CoronaryPhantom::Box Moving() const { return this->Body(); }
+
   /// All matter, but what Tubes() and Balls() have, in voxels.
   virtual void Render(const PatientState& state, const ImageGrid& grid, MaterialVolume& volume,
     const ProgressCallback& progress) const = 0;
@@ -45,13 +48,11 @@ public:
 class ScannedPhantom : public ScannedAnatomy
 {
 public:
-  explicit ScannedPhantom(const CoronaryPhantom& phantom)
-    : Phantom(phantom)
-  {
-  }
+  explicit ScannedPhantom(const CoronaryPhantom& phantom);
 
   double CycleLength() const override { return this->Phantom.Settings().cycleLength; }
   CoronaryPhantom::Box Body() const override { return this->Phantom.Body(); }
+  CoronaryPhantom::Box Moving() const override { return this->Heart; }
   void Render(const PatientState& state, const ImageGrid& grid, MaterialVolume& volume,
     const ProgressCallback& progress) const override;
   std::vector<ScannedTube> Tubes(const PatientState& state) const override;
@@ -62,9 +63,14 @@ private:
 
   const CoronaryPhantom& Phantom;
   const TissueMaterials Tissue;
+  CoronaryPhantom::Box Heart;
 };
 
-/// The patient in the scanner during a short time: made ready once, then seen by many views.
+/**
+ * The patient in the scanner during a short time: made ready once, then seen by many views. The chest
+ * stands still, in voxels twice as wide, kept as long as the table is near; the heart's box, with what the
+ * shift moves, is rendered anew. Between them one fades into the other.
+ */
 class ScannedPatient
 {
 public:
@@ -81,10 +87,19 @@ public:
   void Project(const ScannerView& view, const PatientState& state, ViewPaths& paths) const;
 
 private:
+  void PrepareStill(double iodine, double height, const ProgressCallback& progress);
+  ImageGrid Grid(const CoronaryPhantom::Box& box, double low, double high, double spacing) const;
+  void Fade(MaterialVolume& volume, bool inside) const;
+
   const ScannedAnatomy& Anatomy;
   const ScannerSettings& Settings;
   const ScannerProjector Projector;
-  MaterialVolume Volume;
+  const CoronaryPhantom::Box Body;
+  const CoronaryPhantom::Box Heart;
+  double Reach; ///< of the rays from the central plane, within the body, mm
+  MaterialVolume Still;
+  MaterialVolume Beating;
+  std::array<int, 2> StillKey{ 0, -1 }; ///< step of height and of iodine that the chest is made for
 };
 }
 

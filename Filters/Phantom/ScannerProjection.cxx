@@ -1,5 +1,7 @@
 #include "ScannerProjection.h"
 
+#include "ScannerKernels.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,9 +11,9 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-constexpr int SubRays = 2;       ///< along both sides of a cell, through tubes and balls
-constexpr int Neighbours = 16;   ///< detector columns whose rays go side by side
-constexpr double Gathered = 2.0; ///< mm of a ray on which its rise is taken as none
+constexpr int SubRays = 2;     ///< along both sides of a cell, through tubes and balls
+constexpr int Neighbours = 16; ///< detector columns whose rays go side by side
+constexpr int Gathered = 4; ///< columns of voxels on a ray between which its rise is taken as none
 
 /// Along a ray, in units of its parameter.
 struct Interval
@@ -136,7 +138,7 @@ Interval ThroughTube(const Vector3& from, const Vector3& ray, const ScannedTube&
 
 /**
  * The rays of one detector column, which lie over each other. Columns of voxels that they pass close
- * together are added first and read at the rays' heights once: within `Gathered` a ray hardly rises.
+ * together are added first and read at the rays' heights once: on such a way a ray hardly rises.
  */
 class RayFan
 {
@@ -144,13 +146,12 @@ public:
   /// @param middle  of the central plane over the lowest slice, mm
   RayFan(const ScannerSettings& settings, double middle, double spacing, int slices)
     : Settings(settings)
+    , Kernels(ScannerKernelChoice().Get())
     , Slices(slices)
     , Spacing(spacing)
     , Middle(middle / spacing)
     , Columns(static_cast<std::size_t>(BasisMaterials) * (slices + 1))
     , Totals(static_cast<std::size_t>(BasisMaterials) * settings.rows)
-    , Places(settings.rows)
-    , Fractions(settings.rows)
   {
   }
 
@@ -162,22 +163,12 @@ public:
   {
     const double scale =
       0.5 * (ways[0] + ways[1]) / (this->Settings.sourceToDetector * this->Spacing);
-    const auto first = static_cast<float>(this->Middle + this->Settings.RowHeight(0.0) * scale);
-    const auto pitch = static_cast<float>(this->Settings.rowPitch * scale);
-    const auto top = static_cast<float>(this->Slices - 1);
-    const int rows = this->Settings.rows;
-    for (int r = 0; r < rows; ++r)
-    {
-      const float z = std::min(top, std::max(0.0f, first + static_cast<float>(r) * pitch));
-      this->Places[r] = static_cast<int>(z);
-      this->Fractions[r] = z - static_cast<float>(this->Places[r]);
-    }
-    this->Low = this->Places[0];
-    this->High = std::min(this->Slices - 1, this->Places[rows - 1] + 1);
-    for (bool& any : this->Any)
-    {
-      any = false;
-    }
+    this->First = static_cast<float>(this->Middle + this->Settings.RowHeight(0.0) * scale);
+    this->Pitch = static_cast<float>(this->Settings.rowPitch * scale);
+    const float top = this->First + static_cast<float>(this->Settings.rows - 1) * this->Pitch;
+    this->Low = std::clamp(static_cast<int>(this->First), 0, this->Slices - 1);
+    this->High = std::clamp(static_cast<int>(top) + 2, 0, this->Slices - 1);
+    std::fill(std::begin(this->Any), std::end(this->Any), false);
   }
 
   void Gather(
@@ -187,30 +178,21 @@ public:
     if (!this->Any[material])
     {
       this->Any[material] = true;
-      std::fill(column + this->Low, column + this->High + 1, 0.0f);
+      std::fill(column + this->Low, column + this->High + 2, 0.0f);
     }
-    for (int k = this->Low; k <= this->High; ++k)
-    {
-      column[k] += leftWeight * left[k] + rightWeight * right[k];
-    }
+    this->Kernels.gather(left + this->Low, leftWeight, right + this->Low, rightWeight,
+      column + this->Low, this->High - this->Low + 1);
   }
 
   void Spread()
   {
-    const int rows = this->Settings.rows;
     for (int m = 0; m < BasisMaterials; ++m)
     {
-      if (!this->Any[m])
+      if (this->Any[m])
       {
-        continue;
-      }
-      float* column = &this->Columns[static_cast<std::size_t>(m) * (this->Slices + 1)];
-      column[this->High + 1] = column[this->High];
-      float* sum = &this->Totals[static_cast<std::size_t>(m) * rows];
-      for (int r = 0; r < rows; ++r)
-      {
-        const float* z = column + this->Places[r];
-        sum[r] += z[0] + this->Fractions[r] * (z[1] - z[0]);
+        this->Kernels.addLine(&this->Columns[static_cast<std::size_t>(m) * (this->Slices + 1)],
+          this->Slices, this->First, this->Pitch,
+          &this->Totals[static_cast<std::size_t>(m) * this->Settings.rows], this->Settings.rows);
       }
     }
   }
@@ -222,16 +204,17 @@ public:
 
 private:
   const ScannerSettings& Settings;
+  const ScannerKernels& Kernels;
   int Slices;
   double Spacing;
-  double Middle; ///< of the central plane, in slices
-  int Low = 0;   ///< slices that the rays touch
+  double Middle;      ///< of the central plane, in slices
+  float First = 0.0f; ///< slice of the lowest ray
+  float Pitch = 0.0f; ///< slices between rays
+  int Low = 0;        ///< slices that the rays touch
   int High = 0;
   bool Any[BasisMaterials] = {};
   std::vector<float> Columns;
   std::vector<float> Totals;
-  std::vector<int> Places;
-  std::vector<float> Fractions;
 };
 
 /// Range of sub-rays around the shadow of a ball.
@@ -310,26 +293,30 @@ void ScannerProjector::Add(
     }
     const std::size_t step = along == 0 ? size[1] : 1; // in columns of voxels
     const std::size_t sideStep = along == 0 ? 1 : size[1];
-    const int gathered = std::max(1, static_cast<int>(Gathered / grid.spacing[along]));
-    for (int first = 0; first < size[along]; first += gathered)
+    for (int first = 0; first < size[along]; first += Gathered)
     {
-      const int last = std::min(size[along], first + gathered) - 1;
+      const int last = std::min(size[along], first + Gathered) - 1;
       for (int c = begin; c < end; ++c)
       {
         RayFan& fan = fans[c - begin];
         const std::array<double, 2>& direction = directions[c];
         const auto wayTo = [&](double n)
         { return (corner[along] + n * grid.spacing[along] - source[along]) / direction[along]; };
+        const auto sideAt = [&](double n) {
+          return (source[across] + wayTo(n) * direction[across] - corner[across]) /
+            grid.spacing[across];
+        };
         const double ways[2] = { wayTo(first), wayTo(last) };
-        if (std::min(ways[0], ways[1]) <= 0.0)
+        const double sides[2] = { sideAt(first), sideAt(last) };
+        if (std::min(ways[0], ways[1]) <= 0.0 || std::max(sides[0], sides[1]) <= -1.0 ||
+          std::min(sides[0], sides[1]) >= size[across])
         {
           continue;
         }
         fan.Place(ways);
         for (int n = first; n <= last; ++n)
         {
-          const double side =
-            (source[across] + wayTo(n) * direction[across] - corner[across]) / grid.spacing[across];
+          const double side = sideAt(n);
           if (side <= -1.0 || side >= size[across])
           {
             continue;

@@ -1,6 +1,6 @@
 #include "ScannerReconstruction.h"
 
-#include "ReconstructionKernels.h"
+#include "ScannerKernels.h"
 
 #include <algorithm>
 #include <cmath>
@@ -30,13 +30,12 @@ double Quartic(const double (&samples)[5], double at)
 }
 }
 
-KernelChoice<ReconstructionKernels>& ReconstructionKernelChoice()
+KernelChoice<ScannerKernels>& ScannerKernelChoice()
 {
 #if defined(DYNAMICCORONARY_WIDE_KERNELS)
-  static KernelChoice<ReconstructionKernels> choice(
-    ReconstructionKernelsBaseline, &ReconstructionKernelsAvx2);
+  static KernelChoice<ScannerKernels> choice(ScannerKernelsBaseline, &ScannerKernelsAvx2);
 #else
-  static KernelChoice<ReconstructionKernels> choice(ReconstructionKernelsBaseline);
+  static KernelChoice<ScannerKernels> choice(ScannerKernelsBaseline);
 #endif
   return choice;
 }
@@ -136,7 +135,7 @@ void HalfScanReconstruction::Filter(int view, float share, const float* values,
       weighted[at] = values[at] * static_cast<float>(weight / std::sqrt(1.0 + rise * rise));
     }
   }
-  ReconstructionKernelChoice().Get().convolve(
+  ScannerKernelChoice().Get().convolve(
     this->Kernel.data(), weighted.data(), s.channels, rows, columns[0], columns[1], result);
 }
 
@@ -187,7 +186,7 @@ void HalfScanReconstruction::BackProject(const std::vector<FilteredView>& views,
   const int ny = e[3] - e[2] + 1;
   const int nz = e[5] - e[4] + 1;
   const Vector3 corner = grid.IndexToWorld(e[0], e[2], e[4]);
-  const ReconstructionKernels& kernels = ReconstructionKernelChoice().Get();
+  const ScannerKernels& kernels = ScannerKernelChoice().Get();
   const auto block = [&](std::int64_t first, std::int64_t last)
   {
     std::vector<float> line(s.rows + 1);

@@ -1,9 +1,10 @@
 /**
- * @file ReconstructionKernels.h
- * @brief Inner loops of filtered back-projection, compiled for several generations of processors.
+ * @file ScannerKernels.h
+ * @brief Inner loops of projection and filtered back-projection, compiled for several generations of
+ * processors.
  */
-#ifndef DynamicCoronary_ReconstructionKernels_h
-#define DynamicCoronary_ReconstructionKernels_h
+#ifndef DynamicCoronary_ScannerKernels_h
+#define DynamicCoronary_ScannerKernels_h
 
 #include "KernelChoice.h"
 
@@ -32,8 +33,14 @@ struct BackProjectedRow
   float* out;  ///< [pixel][voxel], added to
 };
 
-struct ReconstructionKernels
+struct ScannerKernels
 {
+  /// out[k] += leftWeight left[k] + rightWeight right[k]
+  void (*gather)(const float* left, float leftWeight, const float* right, float rightWeight,
+    float* out, int count);
+  /// out[k] += the line at start + k slope, straight between its values, beyond its ends as they are.
+  /// Room for one more value behind the line is read, but does not count.
+  void (*addLine)(const float* line, int values, float start, float slope, float* out, int count);
   /// out[c][r] = sum over n of kernel[|c - n|] in[n][r], for the columns first..last
   void (*convolve)(
     const float* kernel, const float* in, int channels, int rows, int first, int last, float* out);
@@ -41,10 +48,10 @@ struct ReconstructionKernels
 };
 
 /// Which set runs, in the whole process.
-KernelChoice<ReconstructionKernels>& ReconstructionKernelChoice();
+KernelChoice<ScannerKernels>& ScannerKernelChoice();
 
-extern const ReconstructionKernels ReconstructionKernelsBaseline;
-extern const ReconstructionKernels ReconstructionKernelsAvx2;
+extern const ScannerKernels ScannerKernelsBaseline;
+extern const ScannerKernels ScannerKernelsAvx2;
 }
 
 #endif

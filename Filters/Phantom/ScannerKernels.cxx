@@ -1,12 +1,12 @@
-// Compiled once for the baseline processor and, by ReconstructionKernelsAvx2.cxx, once more, so it may
+// Compiled once for the baseline processor and, by ScannerKernelsAvx2.cxx, once more, so it may
 // include nothing that emits shared inline functions: the linker could keep the widest of them.
-#include "ReconstructionKernels.h"
+#include "ScannerKernels.h"
 
 #if defined(__AVX2__)
 #include <immintrin.h>
-#define CORONARY_RECONSTRUCTION_KERNELS ReconstructionKernelsAvx2
+#define CORONARY_SCANNER_KERNELS ScannerKernelsAvx2
 #else
-#define CORONARY_RECONSTRUCTION_KERNELS ReconstructionKernelsBaseline
+#define CORONARY_SCANNER_KERNELS ScannerKernelsBaseline
 #endif
 
 namespace coronary
@@ -31,6 +31,20 @@ inline void Store(float* to, Pack values)
 inline int Distance(int a, int b)
 {
   return a < b ? b - a : a - b;
+}
+
+void Gather(
+  const float* left, float leftWeight, const float* right, float rightWeight, float* out, int count)
+{
+  int k = 0;
+  for (; k + Lanes <= count; k += Lanes)
+  {
+    Store(out + k, Load(out + k) + (leftWeight * Load(left + k) + rightWeight * Load(right + k)));
+  }
+  for (; k < count; ++k)
+  {
+    out[k] += leftWeight * left[k] + rightWeight * right[k];
+  }
 }
 
 void Convolve(
@@ -92,34 +106,33 @@ inline double ArcTangent(double t)
                           s * (0.0429096138 + s * (-0.0161657367 + s * 0.0028662257))))))));
 }
 
-/// Adds values between the rows of a line to voxels; beyond its ends it stays the same.
-void AddLine(const float* line, int rows, float start, float slope, float* out, int voxels)
+void AddLine(const float* line, int values, float start, float slope, float* out, int count)
 {
-  const auto lastRow = static_cast<float>(rows - 1);
+  const auto last = static_cast<float>(values - 1);
   int k = 0;
 #if defined(__AVX2__)
   const __m256 steps = _mm256_setr_ps(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f);
   const __m256 slopes = _mm256_set1_ps(slope);
-  for (; k + Lanes <= voxels; k += Lanes)
+  for (; k + Lanes <= count; k += Lanes)
   {
     const __m256 at = _mm256_add_ps(steps, _mm256_set1_ps(static_cast<float>(k)));
-    __m256 row = _mm256_fmadd_ps(at, slopes, _mm256_set1_ps(start));
-    row = _mm256_min_ps(_mm256_set1_ps(lastRow), _mm256_max_ps(_mm256_setzero_ps(), row));
-    const __m256i whole = _mm256_cvttps_epi32(row);
+    __m256 place = _mm256_fmadd_ps(at, slopes, _mm256_set1_ps(start));
+    place = _mm256_min_ps(_mm256_set1_ps(last), _mm256_max_ps(_mm256_setzero_ps(), place));
+    const __m256i whole = _mm256_cvttps_epi32(place);
     const __m256 low = _mm256_i32gather_ps(line, whole, 4);
     const __m256 high = _mm256_i32gather_ps(line + 1, whole, 4);
-    const __m256 rest = _mm256_sub_ps(row, _mm256_cvtepi32_ps(whole));
+    const __m256 rest = _mm256_sub_ps(place, _mm256_cvtepi32_ps(whole));
     const __m256 value = _mm256_fmadd_ps(rest, _mm256_sub_ps(high, low), low);
     _mm256_storeu_ps(out + k, _mm256_add_ps(_mm256_loadu_ps(out + k), value));
   }
 #endif
-  for (; k < voxels; ++k)
+  for (; k < count; ++k)
   {
-    float row = start + static_cast<float>(k) * slope;
-    row = row < 0.0f ? 0.0f : row;
-    row = row > lastRow ? lastRow : row;
-    const int whole = static_cast<int>(row);
-    out[k] += line[whole] + (row - static_cast<float>(whole)) * (line[whole + 1] - line[whole]);
+    float place = start + static_cast<float>(k) * slope;
+    place = place < 0.0f ? 0.0f : place;
+    place = place > last ? last : place;
+    const int whole = static_cast<int>(place);
+    out[k] += line[whole] + (place - static_cast<float>(whole)) * (line[whole + 1] - line[whole]);
   }
 }
 
@@ -167,5 +180,5 @@ void BackProject(const BackProjectedRow& b)
 }
 }
 
-const ReconstructionKernels CORONARY_RECONSTRUCTION_KERNELS{ Convolve, BackProject };
+const ScannerKernels CORONARY_SCANNER_KERNELS{ Gather, AddLine, Convolve, BackProject };
 }
