@@ -37,8 +37,9 @@ MaterialAmounts ScannedPhantom::Amounts(
     case PhantomTissue::Soft:
       return this->Tissue.Soft(hounsfield);
     case PhantomTissue::Calcified:
-    case PhantomTissue::Metal:
       return this->Tissue.Calcified(hounsfield);
+    case PhantomTissue::Metal:
+      return this->Tissue.Metal();
     case PhantomTissue::Muscle:
       amounts = this->Tissue.Muscle(hounsfield);
       break;

@@ -390,6 +390,7 @@ TissueMaterials::TissueMaterials()
   , Adipose(Decompose(XRayMaterial::Adipose))
   , SoftTissue(Decompose(XRayMaterial::SoftTissue))
   , BloodAmounts(Decompose(XRayMaterial::Blood))
+  , Steel(Decompose(XRayMaterial::StainlessSteel))
 {
 }
 

@@ -118,6 +118,9 @@ public:
   MaterialAmounts Muscle(double hounsfield) const; ///< with iodine above 55 HU
   MaterialAmounts Blood(double hounsfield) const;  ///< with iodine above its own
   MaterialAmounts Calcified(double hounsfield) const;
+  /// Stainless steel, as stents and leads are of: its K edges lie below all energies of a tube, so that it is
+  /// a sum of water and hydroxyapatite, too, within 3 % from 40 to 120 keV.
+  const MaterialAmounts& Metal() const { return this->Steel; }
 
 private:
   MaterialAmounts Scaled(const MaterialAmounts& tissue, double hounsfield) const;
@@ -126,6 +129,7 @@ private:
   MaterialAmounts Adipose;
   MaterialAmounts SoftTissue;
   MaterialAmounts BloodAmounts;
+  MaterialAmounts Steel;
 };
 }
 

@@ -15,6 +15,9 @@ constexpr int SubRays = 2;     ///< along both sides of a cell, through tubes an
 constexpr int Neighbours = 16; ///< detector columns whose rays go side by side
 constexpr int Gathered = 4; ///< columns of voxels on a ray between which its rise is taken as none
 
+constexpr double ThinRadius = 0.1; ///< mm, of tubes that could fall between rays
+constexpr double ThinStep = 0.1;   ///< mm along them
+
 /// Along a ray, in units of its parameter.
 struct Interval
 {
@@ -358,6 +361,41 @@ void ScannerProjector::Add(
   }
 }
 
+/// A volume's share of a cell is that volume over the section of the cell's beam.
+void ScannerProjector::AddThin(
+  const ScannedTube& tube, const ScannerView& view, ViewPaths& paths) const
+{
+  const ScannerSettings& s = this->Settings;
+  const Vector3 source = view.axis +
+    Vector3(s.sourceToAxis * std::cos(view.angle), s.sourceToAxis * std::sin(view.angle), 0.0);
+  const double length = (tube.end - tube.start).norm();
+  const int steps = std::max(1, static_cast<int>(std::ceil(length / ThinStep)));
+  for (int n = 0; n < steps; ++n)
+  {
+    const double u = (n + 0.5) / steps;
+    const double radius = (1.0 - u) * tube.startRadius + u * tube.endRadius;
+    const Vector3 to = (1.0 - u) * tube.start + u * tube.end - source;
+    const double way = std::max(1.0, std::hypot(to[0], to[1]));
+    const double off = std::remainder(std::atan2(to[1], to[0]) - view.angle - Pi, 2.0 * Pi);
+    const double scale = s.sourceToDetector / way;
+    const long column =
+      std::lround(off / s.ColumnPitch() + 0.5 * (s.channels - 1) + s.channelOffset);
+    const long row = std::lround(to[2] * scale / s.rowPitch + 0.5 * (s.rows - 1));
+    if (column < 0 || column >= s.channels || row < 0 || row >= s.rows)
+    {
+      continue;
+    }
+    // The beam's section across the plane's ray; the ray itself is longer by as much as it rises.
+    const double section = s.channelPitch * s.rowPitch / (scale * scale) * way / to.norm();
+    const auto path = static_cast<float>(Pi * radius * radius * length / steps / section);
+    const std::size_t cell = static_cast<std::size_t>(column) * s.rows + row;
+    for (int m = 0; m < BasisMaterials; ++m)
+    {
+      paths[m][cell] += path * tube.difference[m];
+    }
+  }
+}
+
 void ScannerProjector::Add(const std::vector<ScannedTube>& tubes,
   const std::vector<ScannedBall>& balls, const ScannerView& view, ViewPaths& paths) const
 {
@@ -420,6 +458,11 @@ void ScannerProjector::Add(const std::vector<ScannedTube>& tubes,
   for (std::size_t t = 0; t < tubes.size(); ++t)
   {
     const ScannedTube& tube = tubes[t];
+    if (std::max(tube.startRadius, tube.endRadius) < ThinRadius)
+    {
+      this->AddThin(tube, view, paths);
+      continue;
+    }
     Shadow shadow = nothing;
     shadowOf(tube.start, tube.startRadius, shadow);
     if (tube.round)

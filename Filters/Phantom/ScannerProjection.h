@@ -71,11 +71,17 @@ public:
   /// slices go on.
   void Add(const MaterialVolume& volume, const ScannerView& view, ViewPaths& paths) const;
 
-  /// Adds tubes and balls; a cell has the mean of 2 x 2 rays. Where tubes overlap the first counts.
+  /**
+   * Adds tubes and balls; a cell has the mean of 2 x 2 rays. Where tubes overlap the first counts. Tubes
+   * that are thinner than 0.1 mm, such as struts, would fall between rays: the cell that one is
+   * before gets all of its volume, whatever else is there.
+   */
   void Add(const std::vector<ScannedTube>& tubes, const std::vector<ScannedBall>& balls,
     const ScannerView& view, ViewPaths& paths) const;
 
 private:
+  void AddThin(const ScannedTube& tube, const ScannerView& view, ViewPaths& paths) const;
+
   const ScannerSettings& Settings;
 };
 }

@@ -266,6 +266,54 @@ TEST(CtScanner, TubesAndBallsAreExact)
   EXPECT_LE(worst, 1e-4);
 }
 
+TEST(CtScanner, ThinTubesKeepTheirVolume)
+{
+  // Sum over the cells of path times the beam's section at the strut: its volume, wherever it lies.
+  const ScannerSettings settings;
+  const ScannerProjector projector(settings);
+  const MaterialAmounts one(1.0f, 0.0f, 0.0f);
+  ViewPaths paths;
+  for (const double angle : { 0.2, 1.9, 4.4 })
+  {
+    for (const double radius : { 0.04, 0.0999 })
+    {
+      const ScannerView view{ angle, Vector3(1.0, 2.0, 3.0) };
+      const Vector3 from(14.3, -8.1, 5.2);
+      const Vector3 to = from + Vector3(0.9, 0.7, 1.3);
+      projector.Clear(paths);
+      projector.Add({ { from, to, radius, radius, false, one } }, {}, view, paths);
+      double sum = 0.0;
+      for (const float path : paths[0])
+      {
+        sum += path;
+      }
+      const Vector3 middle = 0.5 * (from + to) - view.axis -
+        settings.sourceToAxis * Vector3(std::cos(angle), std::sin(angle), 0.0);
+      const double scale = settings.sourceToDetector / std::hypot(middle[0], middle[1]);
+      const double section = settings.channelPitch * settings.rowPitch / (scale * scale);
+      const double volume = Pi * radius * radius * (to - from).norm();
+      // Rays through a tube of 0.2 mm are few.
+      EXPECT_NEAR(sum * section / volume, 1.0, radius < 0.1 ? 0.01 : 0.15)
+        << angle << ' ' << radius;
+    }
+  }
+}
+
+TEST(CtScanner, MetalIsSteel)
+{
+  // A strut's signal is that of steel at all energies that come through a patient.
+  const MaterialAmounts metal = TissueMaterials().Metal();
+  for (const double energy : { 40.0, 60.0, 80.0, 100.0, 120.0 })
+  {
+    const double water = LinearAttenuation(XRayMaterial::Water, energy);
+    const double apatite = 1e-4 * MassAttenuation("Ca10P6O26H2", energy);
+    EXPECT_NEAR((metal[0] * water + metal[2] * apatite) /
+        LinearAttenuation(XRayMaterial::StainlessSteel, energy),
+      1.0, 0.03)
+      << energy;
+  }
+}
+
 TEST(CtScanner, WhatOverlapsCountsOnce)
 {
   const ScannerSettings settings = Coarse(4);
