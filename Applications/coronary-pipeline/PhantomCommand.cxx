@@ -2,6 +2,7 @@
 
 #include "AtomicFile.h"
 #include "CoronaryPhantom.h"
+#include "DiseaseOptions.h"
 #include "FileSeries.h"
 #include "Interruption.h"
 #include "MetaImageWriter.h"
@@ -49,6 +50,7 @@ struct PhantomJob
 {
   PhantomSettings settings;
   PhaseOptions phases;
+  DiseaseOptions disease;
   ScannerOptions scanner;
   ScannerSettings scan; ///< what scanner.Settings() says
   std::vector<double> spacing = { 0.5 };
@@ -80,6 +82,7 @@ void PhantomJob::Declare(CLI::App& app)
   this->phases.AddTo(app);
   AddHeartOptions(app, this->settings);
   AddImagingOptions(app, this->settings);
+  this->disease.AddTo(app);
 
   const std::string grid = "Image grid";
   app
@@ -177,6 +180,7 @@ void PhantomJob::Configure(vtkCoronaryPhantomSource* source, const std::vector<d
   source->SetStenosisDegree(s.stenosisDegree);
   source->SetCalcifiedPlaques(s.calcifiedPlaques);
   source->SetChronicOcclusion(s.chronicOcclusion);
+  source->SetDisease(s.disease);
   source->SetCycleLength(s.cycleLength);
   source->SetMotionAmplitude(s.motionAmplitude);
   source->SetAxialMotionRight(s.axialMotionRight);
@@ -449,6 +453,7 @@ private:
 void PhantomJob::Run()
 {
   this->CheckCombinations();
+  this->disease.Apply(this->settings);
   const std::vector<double> times = this->phases.Phases();
   this->settings.lostPhases = this->phases.LostPhases(times);
   SetNumberOfThreads(this->threads);

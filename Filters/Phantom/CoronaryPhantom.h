@@ -17,6 +17,7 @@
 #include "CoronaryAnatomy.h"
 #include "Geometry.h"
 #include "ParallelFor.h"
+#include "PhantomDisease.h"
 #include "VesselTree.h"
 
 #include <functional>
@@ -45,9 +46,10 @@ struct PhantomSettings
   double calibreVariation = 0.10; ///< relative standard deviation of a vessel's diameter, 0 to 0.3
   double tortuosity = 1.0;        ///< factor on the lateral waves of the vessels, 0 to 3
   int stenoses = 0;               ///< number of narrowings, placed by the seed, 0 to 20
-  double stenosisDegree = 0.5;    ///< their diameter reduction, 0 to 0.95 (radius at least 0.2 mm)
+  double stenosisDegree = 0.5;    ///< their diameter reduction, 0 to 0.99
   int calcifiedPlaques = 0;       ///< number of calcifications, placed by the seed, 0 to 50
   bool chronicOcclusion = false;  ///< close 15 mm of the mid RCA; filled from its far end on
+  PhantomDisease disease;         ///< beside these three
 
   // Motion.
   double cycleLength = 0.8;       ///< R-R interval in seconds, 0.3 to 3
@@ -147,7 +149,7 @@ enum class PhantomTissue
   Metal      ///< stents, leads
 };
 
-/// A piece of an artery's lumen at one moment, as a scanner's rays meet it: a straight cone.
+/// A piece of an artery, a plaque or a device at one moment, as rays meet it: a straight cone.
 struct PhantomTube
 {
   Vector3 start; ///< mm
@@ -204,7 +206,7 @@ public:
   std::vector<PhantomOstium> Ostia(double t) const;
 
   ///@{
-  /// The lesions that PhantomSettings asks for, in the order in which they were placed.
+  /// Narrowings of all kinds, and balls of calcium.
   std::vector<PhantomStenosis> Stenoses(double t) const;
   std::vector<PhantomPlaque> Plaques(double t) const;
   ///@}
@@ -215,6 +217,13 @@ public:
    * @throws Cancelled
    */
   PhantomSurface Surface(double t, const ProgressCallback& progress = {}) const;
+
+  /**
+   * The outer wall of all arteries, closed like the lumen's: around plaques, stents and occlusions,
+   * and the lumen's wall elsewhere. One connectivity at all times.
+   * @throws Cancelled
+   */
+  PhantomSurface OuterWall(double t, const ProgressCallback& progress = {}) const;
 
   /// Signed distance to the wall at time t in mm, negative inside; exact near the wall, bounded
   /// by +-`farAway` elsewhere.
@@ -245,7 +254,8 @@ public:
   void Render(const ImageGrid& grid, const std::array<int, 6>& part, double t, std::int16_t* values,
     const ProgressCallback& progress = {}) const;
 
-  /// All arteries at time t, but where they are occluded.
+  /// All arteries at time t, but where they are occluded, and what lesions are made of: where tubes
+  /// overlap, the first of them counts.
   std::vector<PhantomTube> Tubes(double t) const;
 
   /**

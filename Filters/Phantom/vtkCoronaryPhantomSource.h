@@ -67,6 +67,7 @@
 namespace coronary
 {
 struct ImageGrid;
+struct PhantomDisease;
 }
 
 class VTKCORONARYPHANTOM_EXPORT vtkCoronaryPhantomSource : public vtkAlgorithm
@@ -157,7 +158,7 @@ public:
 
   ///@{
   /**
-   * Number of narrowings, 0 to 20, and their diameter reduction, 0 to 0.95. Defaults 0 and 0.5.
+   * Number of narrowings, 0 to 20, and their diameter reduction, 0 to 0.99. Defaults 0 and 0.5.
    */
   void SetStenoses(int count);
   int GetStenoses();
@@ -180,6 +181,16 @@ public:
   void SetChronicOcclusion(bool occlusion);
   bool GetChronicOcclusion();
   vtkBooleanMacro(ChronicOcclusion, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Disease of the arteries beside these: names of coronary::DiseasePresets(), apart by commas, or
+   * any list in C++. Default none.
+   */
+  void SetDiseases(const char* names);
+  const char* GetDiseases();
+  void SetDisease(const coronary::PhantomDisease& disease);
   ///@}
 
   ///@{
