@@ -153,11 +153,12 @@ struct CoronaryPhantom::Internals
   PhantomLumen Lumen(double t, double reach) const
   {
     const PhantomTree tree = this->Arteries(t);
-    return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach);
+    return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach,
+      this->Anatomy.occluded);
   }
 
-  /// The outer wall, as a lumen of its own; Outer has to be there.
-  PhantomLumen Wall(double t, double reach) const
+  /// The outer walls, like a tree of lumens.
+  PhantomTree Walls(double t) const
   {
     PhantomTree tree = this->Arteries(t);
     const PhantomTree& rest = this->Anatomy.tree;
@@ -175,7 +176,7 @@ struct CoronaryPhantom::Internals
       const double grown = this->Anatomy.occluded[p] ? 0.0 : tree.radius[p] - rest.radius[p];
       tree.radius[p] = this->Anatomy.wallRadius[p] + grown;
     }
-    return PhantomLumen(*this->Outer, tree.points, tree.radius, this->EndNormals(t), reach);
+    return tree;
   }
 
   /// A resting surface at time t, on the wall that `lumen` is.
@@ -185,9 +186,14 @@ struct CoronaryPhantom::Internals
   /// All that images are made of, with the weight 1.
   PhantomMoment Moment(double t) const
   {
-    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t), this->Parts(t) };
+    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t),
+      this->Parts(t), {} };
     moment.tree = this->Arteries(t);
     moment.vein = this->Move(this->Anatomy.vein, t, 1.0);
+    if (!this->Anatomy.parts.empty())
+    {
+      moment.wall = this->Walls(t);
+    }
     for (const Plaque& plaque : this->Anatomy.plaques)
     {
       moment.plaques.push_back(this->Motion.Position(plaque.centre, t));
@@ -209,7 +215,7 @@ struct CoronaryPhantom::Internals
     {
       normals.push_back((tree.points[end.point] - tree.points[end.neighbour]).normalized());
     }
-    return PhantomLumen(anatomy, tree.points, radius, normals, reach);
+    return PhantomLumen(anatomy, tree.points, radius, normals, reach, anatomy.occluded);
   }
 
   /// Share of the contrast that is lost at each tree point, and over the whole image.
@@ -428,7 +434,10 @@ PhantomSurface CoronaryPhantom::OuterWall(double t, const ProgressCallback& prog
       data.Outer = std::move(outer);
     }
   }
-  return data.Carry(data.RestWall, data.Wall(t, 2.5), t, from, progress);
+  const PhantomTree wall = data.Walls(t);
+  const PhantomLumen lumen(
+    *data.Outer, wall.points, wall.radius, data.EndNormals(t), 2.5, data.Outer->occluded);
+  return data.Carry(data.RestWall, lumen, t, from, progress);
 }
 
 PhantomSurface CoronaryPhantom::Internals::Carry(const PhantomSurface& rest,

@@ -291,14 +291,15 @@ private:
     Vector3 corner[8]; ///< from the corners to where their material rests
     TileLayers layers;
     PhantomLumen::Candidates candidates;
+    PhantomLumen::Candidates walls;
     std::vector<Extra> vein;
     std::vector<std::pair<Extra, float>> plaques; ///< with their HU
     std::vector<const PartPiece*> parts;          ///< in the order of their layers
 
     bool OnlyTissues() const
     {
-      return this->candidates.Empty() && this->vein.empty() && this->plaques.empty() &&
-        this->parts.empty();
+      return this->candidates.Empty() && this->walls.Empty() && this->vein.empty() &&
+        this->plaques.empty() && this->parts.empty();
     }
     bool Uniform() const
     {
@@ -319,7 +320,6 @@ private:
   float PaintVein(const Tile& tile, const Vector3& world, float value) const;
   float PaintPlaques(const Tile& tile, const Vector3& world, float value) const;
   float PaintParts(const Tile& tile, const Vector3& world, bool metal, float value) const;
-  float WallBeyondLumen(const PhantomLumen::Sample& sample) const;
   float PaintVessel(
     const PhantomMoment& moment, const PhantomLumen::Sample& sample, float value) const;
 
@@ -337,9 +337,9 @@ private:
   double MeanBlur; ///< mm
   double Reach;    ///< mm from a wall at which it can still be seen
   std::vector<std::unique_ptr<PhantomLumen>> Lumens; ///< of each moment
+  std::vector<std::unique_ptr<PhantomLumen>> Walls;  ///< the same; empty: they are the lumens'
   std::vector<std::vector<Extra>> Veins;
   std::vector<std::vector<PartPiece>> Parts; ///< of each moment
-  std::vector<float> WallExtra;              ///< per tree point, mm; empty: no outer walls
   std::vector<Eigen::Vector3f> Rest;         ///< from each tile corner and moment to where it rests
   int BandTiles;
   int BandsInY;
@@ -367,22 +367,16 @@ Rendering::Rendering(const PhantomSettings& settings, const PhantomAnatomy& anat
   this->Covariance = grid.direction * this->Variance.asDiagonal() * grid.direction.transpose();
   this->MeanBlur = std::sqrt(this->Variance.mean());
   this->Reach = std::max(3.4, Saturated * std::sqrt(this->Variance.maxCoeff()) + 0.5);
-  if (!anatomy.parts.empty())
-  {
-    float farthest = 0.0f;
-    for (std::size_t p = 0; p < anatomy.wallRadius.size(); ++p)
-    {
-      const double lumen = anatomy.occluded[p] ? 0.0 : anatomy.tree.radius[p];
-      this->WallExtra.push_back(static_cast<float>(
-        std::max(0.0, anatomy.wallOffset[p].norm() + anatomy.wallRadius[p] - lumen)));
-      farthest = std::max(farthest, this->WallExtra.back());
-    }
-    this->Reach += farthest;
-  }
+  const std::vector<char> open(anatomy.occluded.size(), 0);
   for (const PhantomMoment& moment : moments)
   {
-    this->Lumens.push_back(std::make_unique<PhantomLumen>(
-      anatomy, moment.tree.points, moment.tree.radius, moment.endNormals, this->Reach));
+    this->Lumens.push_back(std::make_unique<PhantomLumen>(anatomy, moment.tree.points,
+      moment.tree.radius, moment.endNormals, this->Reach, anatomy.occluded));
+    if (!moment.wall.points.empty())
+    {
+      this->Walls.push_back(std::make_unique<PhantomLumen>(anatomy, moment.wall.points,
+        moment.wall.radius, moment.endNormals, this->Reach, open));
+    }
     std::vector<Extra>& pieces = this->Veins.emplace_back();
     const PhantomTree& vein = moment.vein;
     for (std::size_t p = 0; p + 1 < vein.points.size(); p += 2)
@@ -581,6 +575,10 @@ void Rendering::Collect(std::size_t moment, int tileX, int tileY, int tileZ, Til
   DecideLayers(this->Around, restCentre, frame.ToHeart(restCentre),
     (tile.ball + spread) / std::min(1.0, frame.size), this->MeanBlur, tile.layers);
   this->Lumens[moment]->Collect(tile.centre, tile.ball, tile.candidates);
+  if (!this->Walls.empty())
+  {
+    this->Walls[moment]->Collect(tile.centre, tile.ball, tile.walls);
+  }
   tile.vein.clear();
   for (const Extra& piece : this->Veins[moment])
   {
@@ -714,23 +712,28 @@ void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int 
   {
     PaintRow(this->Around, layers[layer], samples, painted);
   }
-  if (!tile.candidates.Empty())
+  if (!tile.candidates.Empty() || !tile.walls.Empty())
   {
     for (int i = tile.box[0]; i <= tile.box[1]; ++i)
     {
+      const Vector3 world = this->Grid.grid.IndexToWorld(i, j, k);
       PhantomLumen::Sample& sample = vessel[i - tile.base[0]];
-      sample =
-        this->Lumens[tile.moment]->Evaluate(this->Grid.grid.IndexToWorld(i, j, k), tile.candidates);
-      if (sample.step < 0)
+      sample = this->Lumens[tile.moment]->Evaluate(world, tile.candidates);
+      const PhantomLumen::Sample outer = this->Walls.empty()
+        ? sample
+        : this->Walls[tile.moment]->Evaluate(world, tile.walls);
+      if (outer.step < 0)
       {
         continue;
       }
       // Epicardial vessels lie in fat, intramural ones in muscle: where they touch a chamber, too.
-      const bool inMuscle = this->Anatomy.steps[sample.step].inMuscle;
+      const AxisStep& step = this->Anatomy.steps[outer.step];
+      const bool inMuscle = step.inMuscle;
+      const bool bridged = inMuscle && this->Anatomy.intramural[step.vessel] == 0;
       float& value = painted[i - tile.base[0]];
-      const float d = static_cast<float>(sample.distance) - this->WallBeyondLumen(sample);
+      const auto d = static_cast<float>(outer.distance);
       // In the map of a material muscle is not told from blood: there it coats all of the vessel.
-      if (!inMuscle || !this->Vessels || value > Muscle)
+      if (!inMuscle || bridged || !this->Vessels || value > Muscle)
       {
         const float coat = NormalIntegral::Of(inMuscle ? (2.0f - d) / 0.45f : (1.9f - d) / 0.35f);
         value += coat * ((inMuscle ? this->Palette.muscle : this->Palette.fat) - value);
@@ -822,18 +825,6 @@ float Rendering::PaintParts(const Tile& tile, const Vector3& world, bool metal, 
     }
   }
   return value;
-}
-
-/// How far the outer wall is from the lumen where it is farthest, mm.
-float Rendering::WallBeyondLumen(const PhantomLumen::Sample& sample) const
-{
-  if (this->WallExtra.empty())
-  {
-    return 0.0f;
-  }
-  const AxisStep& step = this->Anatomy.steps[sample.step];
-  const auto u = static_cast<float>(sample.fraction);
-  return (1.0f - u) * this->WallExtra[step.first] + u * this->WallExtra[step.second];
 }
 
 float Rendering::PaintVessel(
