@@ -233,4 +233,71 @@ void DiseaseOptions::Apply(PhantomSettings& settings) const
   settings.veinHU = this->Vein->count() > 0 ? vein : settings.veinHU;
   settings.noise = this->Noise->count() > 0 ? noise : settings.noise;
 }
+
+bool IsDiseased(const PhantomSettings& settings)
+{
+  const PhantomDisease& disease = settings.disease;
+  return settings.stenoses > 0 || settings.calcifiedPlaques > 0 || settings.chronicOcclusion ||
+    !disease.lesions.empty() || !disease.grafts.empty() || disease.leads ||
+    disease.origin != CoronaryOrigin::Usual;
+}
+
+std::string DescribeDisease(const CoronaryPhantom& phantom)
+{
+  const PhantomDisease& disease = phantom.Settings().disease;
+  Json json;
+  json["origin"] = OriginNames()[static_cast<std::size_t>(disease.origin)];
+  json["leads"] = disease.leads;
+  json["body_fat_mm"] = disease.bodyFat;
+  json["lesions"] = Json::array();
+  double calcium = 0.0;
+  double score = 0.0;
+  for (const PhantomLesionTruth& truth : phantom.Lesions())
+  {
+    Json one;
+    one["kind"] = LesionKindName(truth.lesion.kind);
+    one["vessel"] = truth.lesion.vessel;
+    one["segment"] = SegmentName(truth.segmentId);
+    one["position_mm"] = truth.middle;
+    one["abscissa_mm"] = truth.abscissa;
+    one["length_mm"] = truth.lesion.length;
+    one["degree_diameter"] = truth.degree;
+    one["degree_area"] = truth.areaDegree;
+    one["minimum_radius_mm"] = truth.minimumRadius;
+    one["reference_radius_mm"] = truth.referenceRadius;
+    one["wall_radius_mm"] = truth.wallRadius;
+    one["fibrous_mm3"] = truth.fibrousVolume;
+    one["lipid_mm3"] = truth.lipidVolume;
+    one["calcium_mm3"] = truth.calciumVolume;
+    one["agatston"] = truth.agatston;
+    Json& asked = one["asked"];
+    for (const LesionNumber& number : AllLesionNumbers())
+    {
+      asked[number.name] = truth.lesion.*number.member;
+    }
+    calcium += truth.calciumVolume;
+    score += truth.agatston;
+    json["lesions"].push_back(one);
+  }
+  json["calcium_mm3"] = calcium;
+  json["agatston"] = score;
+  for (const PhantomGraft& graft : disease.grafts)
+  {
+    json["grafts"].push_back({ { "name", graft.name },
+      { "from", graft.mammary ? "mammary" : "aorta" }, { "vessel", graft.vessel },
+      { "position_mm", graft.position }, { "diameter_mm", graft.diameter } });
+  }
+  for (const PhantomVessel& vessel : phantom.Vessels())
+  {
+    Json one;
+    one["name"] = vessel.name;
+    one["parent"] = vessel.parent;
+    one["tree"] = vessel.treeId;
+    one["length_mm"] = vessel.length;
+    one["occluded_mm"] = vessel.occlusions;
+    one["late_from_mm"] = vessel.lateFrom < 0.0 ? Json() : Json(vessel.lateFrom);
+    json["vessels"].push_back(one);
+  }
+  return json.dump(2) + "\n";
+}
 }

@@ -35,7 +35,10 @@ private:
   const CLI::Option* Noise = nullptr;
 };
 
-/// What a phantom suffers from and what of it was measured, as JSON.
+/// Whether the arteries differ from healthy ones.
+bool IsDiseased(const PhantomSettings& settings);
+
+/// What a phantom suffers from, how much of it there truly is, and its vessels, as JSON.
 std::string DescribeDisease(const CoronaryPhantom& phantom);
 }
 

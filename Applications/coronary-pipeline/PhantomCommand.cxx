@@ -41,6 +41,7 @@ namespace
 {
 constexpr const char* SeriesName = "series.json";
 constexpr const char* ScanName = "scan.json";
+constexpr const char* DiseaseName = "truth/disease.json";
 
 // Share of a phase's time that its parts take, for the progress.
 constexpr double TruthShare = 0.3;
@@ -271,6 +272,10 @@ public:
       this->Numbers.push_back(SeriesNumber(i, times.size()));
     }
     this->Series.cycleMs = 1000.0 * job.settings.cycleLength;
+    if (!job.noTruth && IsDiseased(job.settings))
+    {
+      this->Stems.emplace_back("wall");
+    }
     if (job.scanner.Given())
     {
       this->MakeScanner();
@@ -297,14 +302,19 @@ public:
     }
     if (!this->Job.noTruth)
     {
-      for (const char* stem : { "surface", "centerline", "vein" })
+      for (const std::string& stem : this->Stems)
       {
         std::vector<TimedFile> files;
         for (std::size_t i = 0; i < this->Times.size(); ++i)
         {
-          files.push_back({ std::string(stem) + "_" + this->Numbers[i] + ".vtp", this->Times[i] });
+          files.push_back({ stem + "_" + this->Numbers[i] + ".vtp", this->Times[i] });
         }
-        WriteFileAtomically(folder.Add("truth/" + std::string(stem) + ".pvd"), PvdText(files));
+        WriteFileAtomically(folder.Add("truth/" + stem + ".pvd"), PvdText(files));
+      }
+      if (IsDiseased(this->Job.settings))
+      {
+        const CoronaryPhantom phantom(this->Job.settings);
+        WriteFileAtomically(folder.Add(DiseaseName), DescribeDisease(phantom));
       }
     }
     if (this->Scanner)
@@ -394,6 +404,10 @@ private:
       return name;
     };
     write(vtkCoronaryPhantomSource::VeinPort, "vein");
+    if (IsDiseased(this->Job.settings))
+    {
+      write(vtkCoronaryPhantomSource::WallPort, "wall");
+    }
     phase.centerline = write(vtkCoronaryPhantomSource::TreePort, "centerline");
     phase.surface = write(vtkCoronaryPhantomSource::SurfacePort, "surface");
   }
@@ -439,6 +453,7 @@ private:
   vtkCoronaryPhantomSource* Source;
   const std::vector<double>& Times;
   std::vector<std::string> Numbers;
+  std::vector<std::string> Stems{ "surface", "centerline", "vein" }; ///< of the truth's files
   ProgressDisplay Progress;
   vtkMessageTrap Messages;
   SeriesDescription Series;
@@ -492,8 +507,10 @@ Command MakePhantomCommand(CLI::App& program)
 {
   CLI::App* app = program.add_subcommand(
     "phantom", "Make a gated CT series of a beating coronary tree, with its exact truth");
-  app->footer("Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp "
-              "and, last, DIR/series.json, with NN from 00; with --scanner DIR/scan.json, too.");
+  app->footer(
+    "Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp "
+    "and, last, DIR/series.json, with NN from 00; with --scanner DIR/scan.json, too; with "
+    "disease DIR/truth/disease.json and wall_NN.vtp.");
   auto job = std::make_shared<PhantomJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

@@ -4,6 +4,7 @@
 #include "Median.h"
 #include "PartialProgress.h"
 #include "PhantomAnatomy.h"
+#include "PhantomComposition.h"
 #include "PhantomImage.h"
 #include "PhantomLumen.h"
 #include "PhantomMotion.h"
@@ -153,8 +154,8 @@ struct CoronaryPhantom::Internals
   PhantomLumen Lumen(double t, double reach) const
   {
     const PhantomTree tree = this->Arteries(t);
-    return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach,
-      this->Anatomy.occluded);
+    return PhantomLumen(
+      this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach, this->Anatomy.occluded);
   }
 
   /// The outer walls, like a tree of lumens.
@@ -186,8 +187,7 @@ struct CoronaryPhantom::Internals
   /// All that images are made of, with the weight 1.
   PhantomMoment Moment(double t) const
   {
-    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t),
-      this->Parts(t), {} };
+    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t), this->Parts(t), {} };
     moment.tree = this->Arteries(t);
     moment.vein = this->Move(this->Anatomy.vein, t, 1.0);
     if (!this->Anatomy.parts.empty())
@@ -358,6 +358,85 @@ std::vector<PhantomStenosis> CoronaryPhantom::Stenoses(double t) const
     result.push_back(stenosis);
   }
   return result;
+}
+
+std::vector<PhantomLesionTruth> CoronaryPhantom::Lesions() const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  const PhantomTree& tree = anatomy.tree;
+  const PhantomLumen lumen = this->Data->RestingLumen(anatomy, 1.0, 0.0);
+  std::vector<PhantomLesionTruth> result;
+  int spots = 0;
+  for (std::size_t n = 0; n < anatomy.lesions.size(); ++n)
+  {
+    const PlacedLesion& placed = anatomy.lesions[n];
+    PhantomLesionTruth truth;
+    truth.lesion = placed.lesion;
+    truth.middle = placed.middle;
+    truth.point = placed.point;
+    // On a plateau the middle is named.
+    const bool wider = placed.lesion.kind == LesionKind::Ectasia;
+    const auto leftAt = [&](std::int64_t p)
+    { return anatomy.occluded[p] ? 0.0 : tree.radius[p] / anatomy.healthyRadius[p]; };
+    for (std::size_t p = 0; p < tree.points.size(); ++p)
+    {
+      const bool within = anatomy.pointVessel[p] == placed.vessel &&
+        std::abs(anatomy.pointArc[p] - placed.middle) <= 0.5 * placed.lesion.length;
+      const double here = leftAt(static_cast<std::int64_t>(p));
+      const double most = leftAt(truth.point);
+      if (within && (wider ? here - most : most - here) > 1e-6)
+      {
+        truth.point = static_cast<std::int64_t>(p);
+      }
+    }
+    truth.segmentId = tree.segmentId[truth.point];
+    truth.abscissa = tree.abscissa[truth.point];
+    truth.referenceRadius = anatomy.healthyRadius[truth.point];
+    truth.minimumRadius = leftAt(truth.point) * truth.referenceRadius;
+    truth.wallRadius = anatomy.wallRadius[truth.point];
+    const double left = leftAt(truth.point);
+    truth.degree = 1.0 - left;
+    truth.areaDegree = 1.0 - left * left;
+    const int spot = placed.lesion.kind == LesionKind::Spot ? spots++ : -1;
+    MeasureComposition(anatomy, lumen, static_cast<int>(n), spot, truth);
+    result.push_back(std::move(truth));
+  }
+  return result;
+}
+
+std::vector<PhantomVessel> CoronaryPhantom::Vessels() const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  std::vector<PhantomVessel> vessels(anatomy.vesselNames.size());
+  for (std::size_t v = 0; v < vessels.size(); ++v)
+  {
+    vessels[v].name = anatomy.vesselNames[v];
+  }
+  for (const Junction& junction : anatomy.junctions)
+  {
+    vessels[junction.childVessel].parent = anatomy.vesselNames[junction.parentVessel];
+  }
+  for (const AxisStep& step : anatomy.steps)
+  {
+    PhantomVessel& vessel = vessels[step.vessel];
+    const double arc = anatomy.pointArc[step.second];
+    vessel.treeId = anatomy.tree.branches[step.branch].treeId;
+    vessel.length = std::max(vessel.length, arc);
+    const bool late = anatomy.contrastChange[step.second] < 0.0 && !anatomy.occluded[step.second];
+    if (late && (vessel.lateFrom < 0.0 || arc < vessel.lateFrom))
+    {
+      vessel.lateFrom = arc;
+    }
+  }
+  for (const PlacedLesion& placed : anatomy.lesions)
+  {
+    if (placed.lesion.kind == LesionKind::Occlusion)
+    {
+      const double half = 0.5 * placed.lesion.length;
+      vessels[placed.vessel].occlusions.push_back({ placed.middle - half, placed.middle + half });
+    }
+  }
+  return vessels;
 }
 
 std::vector<PhantomPlaque> CoronaryPhantom::Plaques(double t) const

@@ -138,6 +138,36 @@ struct PhantomPlaque
   double value = 0.0;      ///< HU before blurring
 };
 
+/// What a lesion truly is: at rest, without the pulse. Volumes by sampling at 0.1 mm.
+struct PhantomLesionTruth
+{
+  PhantomLesion lesion;       ///< as asked for
+  int segmentId = 0;          ///< of `point`
+  std::int64_t point = -1;    ///< of PhantomTree, where the lumen differs most from the healthy one
+  double middle = 0.0;        ///< mm from the vessel's origin
+  double abscissa = 0.0;      ///< of `point`, mm from the ostium
+  double degree = 0.0;        ///< share of the diameter that is gone; below 0: wider; 1: occluded
+  double areaDegree = 0.0;    ///< share of the area that is gone
+  double minimumRadius = 0.0; ///< mm, at `point`
+  double referenceRadius = 0.0; ///< mm, there, without lesions
+  double wallRadius = 0.0;      ///< mm, of the outer wall there
+  double fibrousVolume = 0.0;   ///< mm^3, with the rim of a core
+  double lipidVolume = 0.0;     ///< mm^3
+  double calciumVolume = 0.0;   ///< mm^3
+  double agatston = 0.0;        ///< of the calcium alone, see docs/phantom.md
+};
+
+/// A vessel by its name.
+struct PhantomVessel
+{
+  std::string name;
+  std::string parent;                            ///< empty: an ostium
+  int treeId = 0;                                ///< 0 left, 1 right, 3 a graft
+  double length = 0.0;                           ///< mm
+  std::vector<std::array<double, 2>> occlusions; ///< from, to, mm from its origin
+  double lateFrom = -1.0;                        ///< fills late from here on, mm; -1: does not
+};
+
 enum class PhantomTissue
 {
   Lung,
@@ -202,6 +232,11 @@ public:
 
   /// The great cardiac vein beside the LAD and in the AV groove: one branch, treeId 2.
   PhantomTree Vein(double t) const;
+
+  /// All lesions: those that settings ask for by number, those of the disease, balls of calcium.
+  std::vector<PhantomLesionTruth> Lesions() const;
+
+  std::vector<PhantomVessel> Vessels() const;
 
   std::vector<PhantomOstium> Ostia(double t) const;
 

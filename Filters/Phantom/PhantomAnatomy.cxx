@@ -593,7 +593,7 @@ private:
   double LeaveParent(
     const VesselPlan& plan, DenseVessel& vessel, std::vector<Vector3>& controls) const;
   void GrowVessel(std::size_t v, double calibre);
-  bool ClearOfJunctions(std::size_t host, double s, double distance) const;
+  bool Clear(std::size_t host, double s, double distance) const;
   std::pair<std::size_t, double> PickPlace(RandomStream& random, int number, double distance) const;
   void RaiseRightOstium();
   void GrowGraft(const PhantomGraft& graft);
@@ -882,8 +882,17 @@ std::vector<Vector3> AnatomyBuilder::CourseOfGraft(
   return course;
 }
 
-bool AnatomyBuilder::ClearOfJunctions(std::size_t host, double s, double distance) const
+/// Neither at a bifurcation nor at another lesion with a wall.
+bool AnatomyBuilder::Clear(std::size_t host, double s, double distance) const
 {
+  for (const PlacedLesion& placed : this->Anatomy.lesions)
+  {
+    if (placed.HasWall() && placed.vessel == static_cast<int>(host) &&
+      std::abs(placed.middle - s) < placed.HalfExtent() + distance)
+    {
+      return false;
+    }
+  }
   for (const DenseVessel& child : this->Dense)
   {
     if (child.parent == host && std::abs(child.parentArc - s) < distance)
@@ -904,7 +913,7 @@ std::pair<std::size_t, double> AnatomyBuilder::PickPlace(
   const std::size_t host = this->ByName.at(hosts[number % hosts.size()]);
   const double last = std::min(80.0, this->Dense[host].arc.back() - 10.0);
   double s = random.Uniform(8.0, last);
-  for (int attempt = 0; attempt < 200 && !this->ClearOfJunctions(host, s, distance); ++attempt)
+  for (int attempt = 0; attempt < 200 && !this->Clear(host, s, distance); ++attempt)
   {
     s = random.Uniform(8.0, last);
   }
@@ -952,6 +961,7 @@ std::vector<PhantomLesion> AnatomyBuilder::CountedSpots() const
     spot.position = position;
     spot.angle = random.Uniform(0.0, 360.0);
     spot.calciumThickness = 2.0 * random.Uniform(0.5, 1.2);
+    spot.length = spot.calciumThickness;
     spots.push_back(spot);
   }
   return spots;
@@ -967,10 +977,6 @@ void AnatomyBuilder::PlaceLesions()
   {
     this->AddLesion(lesion, "");
   }
-  for (const PhantomLesion& spot : this->CountedSpots())
-  {
-    this->AddLesion(spot, "");
-  }
   const std::vector<PhantomLesion>& wanted = this->Settings.disease.lesions;
   for (std::size_t n = 0; n < wanted.size(); ++n)
   {
@@ -979,6 +985,10 @@ void AnatomyBuilder::PlaceLesions()
         ") ");
   }
   this->RefuseOverlaps();
+  for (const PhantomLesion& spot : this->CountedSpots())
+  {
+    this->AddLesion(spot, "");
+  }
   for (const PlacedLesion& placed : this->Anatomy.lesions)
   {
     DenseVessel& vessel = this->Dense[placed.vessel];
@@ -1023,7 +1033,7 @@ void AnatomyBuilder::AddLesion(const PhantomLesion& lesion, const std::string& w
   this->Anatomy.lesions.push_back(placed);
 }
 
-/// Two outer walls can not be in one place.
+/// Two outer walls can not be in one place, nor a ball of calcium in a wall.
 void AnatomyBuilder::RefuseOverlaps() const
 {
   const std::vector<PlacedLesion>& lesions = this->Anatomy.lesions;
@@ -1031,8 +1041,11 @@ void AnatomyBuilder::RefuseOverlaps() const
   {
     for (std::size_t a = 0; a < b; ++a)
     {
-      const bool apart = lesions[a].vessel != lesions[b].vessel || !lesions[a].HasWall() ||
-        !lesions[b].HasWall() ||
+      const auto spot = [](const PlacedLesion& placed)
+      { return placed.lesion.kind == LesionKind::Spot; };
+      const bool apart = lesions[a].vessel != lesions[b].vessel ||
+        !(lesions[a].HasWall() || spot(lesions[a])) ||
+        !(lesions[b].HasWall() || spot(lesions[b])) || (spot(lesions[a]) && spot(lesions[b])) ||
         std::abs(lesions[a].middle - lesions[b].middle) >=
           lesions[a].HalfExtent() + lesions[b].HalfExtent();
       Require(apart,

@@ -88,7 +88,7 @@ struct PhantomAnatomy
   std::vector<Junction> junctions;
   std::vector<VesselEnd> ends;
   std::vector<Plaque> plaques;
-  std::vector<PlacedLesion> lesions; ///< in the order of the settings, those of counts first
+  std::vector<PlacedLesion> lesions; ///< counted ones, those of the disease, counted spots
   std::vector<PhantomPart> parts;    ///< in the order of their layers
   std::vector<std::string> vesselNames;
 

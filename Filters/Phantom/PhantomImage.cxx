@@ -374,8 +374,8 @@ Rendering::Rendering(const PhantomSettings& settings, const PhantomAnatomy& anat
       moment.tree.radius, moment.endNormals, this->Reach, anatomy.occluded));
     if (!moment.wall.points.empty())
     {
-      this->Walls.push_back(std::make_unique<PhantomLumen>(anatomy, moment.wall.points,
-        moment.wall.radius, moment.endNormals, this->Reach, open));
+      this->Walls.push_back(std::make_unique<PhantomLumen>(
+        anatomy, moment.wall.points, moment.wall.radius, moment.endNormals, this->Reach, open));
     }
     std::vector<Extra>& pieces = this->Veins.emplace_back();
     const PhantomTree& vein = moment.vein;
@@ -719,9 +719,8 @@ void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int 
       const Vector3 world = this->Grid.grid.IndexToWorld(i, j, k);
       PhantomLumen::Sample& sample = vessel[i - tile.base[0]];
       sample = this->Lumens[tile.moment]->Evaluate(world, tile.candidates);
-      const PhantomLumen::Sample outer = this->Walls.empty()
-        ? sample
-        : this->Walls[tile.moment]->Evaluate(world, tile.walls);
+      const PhantomLumen::Sample outer =
+        this->Walls.empty() ? sample : this->Walls[tile.moment]->Evaluate(world, tile.walls);
       if (outer.step < 0)
       {
         continue;

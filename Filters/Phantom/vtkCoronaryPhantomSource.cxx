@@ -295,7 +295,7 @@ vtkCoronaryPhantomSource::vtkCoronaryPhantomSource()
   : Data(std::make_unique<Internals>())
 {
   this->SetNumberOfInputPorts(1);
-  this->SetNumberOfOutputPorts(ProbePort + 1);
+  this->SetNumberOfOutputPorts(WallPort + 1);
 }
 
 vtkCoronaryPhantomSource::~vtkCoronaryPhantomSource() = default;
@@ -621,11 +621,14 @@ void vtkCoronaryPhantomSource::Generate(
       FillTree(first ? phantom.Tree(time) : coronary::PhantomTree(), output);
       break;
     case SurfacePort:
+    case WallPort:
     {
       coronary::PhantomSurface surface;
       if (first)
       {
-        surface = phantom.Surface(time, vtkCoronary::ProgressOf(this, 0.0, 0.8));
+        const coronary::ProgressCallback progress = vtkCoronary::ProgressOf(this, 0.0, 0.8);
+        surface =
+          port == WallPort ? phantom.OuterWall(time, progress) : phantom.Surface(time, progress);
       }
       const std::vector<Vector3> velocity =
         SurfaceVelocity(phantom, surface, time, vtkCoronary::ProgressOf(this, 0.8, 1.0));

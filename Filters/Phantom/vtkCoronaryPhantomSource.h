@@ -38,6 +38,8 @@
  * - 5, type of the input: the points of the input, taken as reference positions, where they are
  *   at the time. Adds the point data `Displacement` (double[3], mm) and `Velocity` (double[3],
  *   mm/s) to what the input has. Empty vtkPolyData without an input.
+ * - 6, vtkPolyData: outer wall of the arteries, arrays as port 2: around plaques, stents and
+ *   occlusions, elsewhere it is the lumen's wall.
  *
  * @par Input port:
  * 0, optional, one vtkPointSet: points to be carried by the motion to output 5.
@@ -84,7 +86,8 @@ public:
     SurfacePort = 2,
     OstiaPort = 3,
     VeinPort = 4,
-    ProbePort = 5
+    ProbePort = 5,
+    WallPort = 6
   };
 
   enum DominanceTypes
