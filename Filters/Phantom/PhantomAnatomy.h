@@ -57,12 +57,6 @@ struct AorticRoot
   double radius;                         ///< mm
 };
 
-/// Outward normal of the heart's surface at a vessel, perpendicular to the vessel.
-Vector3 EpicardialNormal(const HeartFrame& frame, const Vector3& position, const Vector3& tangent);
-
-/// `count` + 1 places on a smooth curve through points.
-std::vector<Vector3> SmoothCourse(const std::vector<Vector3>& points, int count);
-
 /// Number of the tree that a graft is, beside the left and the right one and the veins.
 constexpr int GraftTree = 3;
 

@@ -1,6 +1,6 @@
 #include "PhantomParts.h"
 
-#include "PhantomAnatomy.h"
+#include "PhantomCourses.h"
 
 #include <algorithm>
 #include <cmath>
