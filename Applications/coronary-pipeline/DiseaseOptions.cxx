@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 
 namespace coronary
@@ -123,7 +122,7 @@ PhantomGraft GraftOf(const Json& json, const std::string& where)
 
 void AddJson(const Json& json, PhantomSettings& settings)
 {
-  Require(json.is_object(), "is not a JSON object");
+  Require(json.is_object(), "it is not a JSON object");
   PhantomDisease& disease = settings.disease;
   for (const auto& [key, value] : json.items())
   {

@@ -144,6 +144,7 @@ private:
   std::vector<PhantomLesion> CountedSpots() const;
   void AddLesion(const PhantomLesion& lesion, const std::string& where);
   void RefuseOverlaps() const;
+  Vector3 TangentAt(std::size_t v, double arc) const;
   void MakeSpot(const PlacedLesion& placed);
   void FillLate(const PlacedLesion& occlusion);
   std::int64_t AddPoint(std::size_t v, double arc, double abscissa, int segment);
@@ -381,11 +382,12 @@ std::vector<Vector3> AnatomyBuilder::CourseOfGraft(
                             .normalized();
   const Vector3 normal = EpicardialNormal(frame, end, tangent);
   const Vector3 landing = end - 7.0 * tangent + 5.0 * normal;
+  constexpr double clear = 18.0; // mm from the pulmonary trunk's axis
   std::vector<Vector3> course;
   if (graft.mammary)
   {
     // Beside the breast bone.
-    course = { Vector3(2.0, -74.0, 90.0), Vector3(0.0, -76.0, 60.0), Vector3(2.0, -78.0, 30.0) };
+    course = { Vector3(0.0, -76.0, 60.0), Vector3(0.0, -77.0, 45.0), Vector3(2.0, -78.0, 30.0) };
   }
   else
   {
@@ -395,6 +397,15 @@ std::vector<Vector3> AnatomyBuilder::CourseOfGraft(
     const Vector3 middle = root.centre + height * root.axis;
     course = { middle + 0.85 * root.radius * outwards,
       middle + (0.85 * root.radius + 6.0) * outwards };
+    const Vector3& trunk = this->Anatomy.pulmonaryAxis;
+    const Vector3 overTrunk = this->Anatomy.pulmonaryBase + 40.0 * trunk;
+    if (landing[0] > overTrunk[0])
+    {
+      // To the left side around the front of the pulmonary trunk.
+      Vector3 front(0.35, -1.0, 0.0);
+      front = (front - front.dot(trunk) * trunk).normalized();
+      course.push_back(overTrunk + clear * front);
+    }
   }
   // Along a great circle of the epicardium, well above it.
   const auto scaled = [&](const Vector3& p) -> Vector3
@@ -412,7 +423,6 @@ std::vector<Vector3> AnatomyBuilder::CourseOfGraft(
     // In front of the pulmonary trunk.
     const Vector3 off = p - this->Anatomy.pulmonaryBase;
     const Vector3 across = off - off.dot(this->Anatomy.pulmonaryAxis) * this->Anatomy.pulmonaryAxis;
-    constexpr double clear = 18.0; // mm from its axis
     if (across.norm() < clear && off.dot(this->Anatomy.pulmonaryAxis) > -20.0)
     {
       p += (clear - across.norm()) * across.normalized();
@@ -501,7 +511,14 @@ std::vector<PhantomLesion> AnatomyBuilder::CountedSpots() const
     PhantomLesion spot = UsualLesion("spot");
     spot.vessel = this->Plans[host].name;
     spot.position = position;
-    spot.angle = random.Uniform(0.0, 360.0);
+    // Its side is drawn about any direction across the vessel.
+    const Vector3 centre = AtArc(this->Dense[host], this->Dense[host].points, position);
+    const Vector3 tangent = this->TangentAt(host, position);
+    const Vector3 side = tangent.unitOrthogonal();
+    const double angle = random.Uniform(0.0, 2.0 * Pi);
+    const Vector3 out = std::cos(angle) * side + std::sin(angle) * tangent.cross(side);
+    const Vector3 normal = EpicardialNormal(this->Anatomy.frame, centre, tangent);
+    spot.angle = std::atan2(out.dot(normal.cross(tangent)), out.dot(normal)) * 180.0 / Pi;
     spot.calciumThickness = 2.0 * random.Uniform(0.5, 1.2);
     spot.length = spot.calciumThickness;
     spots.push_back(spot);
@@ -600,14 +617,19 @@ void AnatomyBuilder::RefuseOverlaps() const
   }
 }
 
+Vector3 AnatomyBuilder::TangentAt(std::size_t v, double arc) const
+{
+  const DenseVessel& vessel = this->Dense[v];
+  return (AtArc(vessel, vessel.points, arc + 0.5) - AtArc(vessel, vessel.points, arc - 0.5))
+    .normalized();
+}
+
 void AnatomyBuilder::MakeSpot(const PlacedLesion& placed)
 {
   const DenseVessel& vessel = this->Dense[placed.vessel];
   const double position = placed.middle;
   const Vector3 centre = AtArc(vessel, vessel.points, position);
-  const Vector3 tangent =
-    (AtArc(vessel, vessel.points, position + 0.5) - AtArc(vessel, vessel.points, position - 0.5))
-      .normalized();
+  const Vector3 tangent = this->TangentAt(placed.vessel, position);
   const Vector3 normal = EpicardialNormal(this->Anatomy.frame, centre, tangent);
   const double angle = placed.lesion.angle * Pi / 180.0;
   const Vector3 out = std::cos(angle) * normal + std::sin(angle) * normal.cross(tangent);
