@@ -184,7 +184,7 @@ const std::vector<std::pair<std::string, Change>>& Presets()
     { "napkin-ring", Adds({ NapkinRing() }) },
     { "diffuse",
       Adds({ Make("plaque", "LAD", 65.0, 70.0, 0.4, [](L& l) { l.remodelling = 1.0; }),
-        Make("plaque", "RCA", 60.0, 80.0, 0.35, [](L& l) { l.eccentricity = 0.4; }) }) },
+        Make("plaque", "RCA", 36.0, 64.0, 0.35, [](L& l) { l.eccentricity = 0.4; }) }) },
     { "occluded", Adds(Occluded()) },
     { "stented", Adds(Stented()) },
     { "graft",
@@ -193,7 +193,7 @@ const std::vector<std::pair<std::string, Change>>& Presets()
         s.disease.lesions.push_back(Make("occlusion", "LAD", 40.0, 15.0, 0.0));
         s.disease.lesions.push_back(Make("plaque", "RCA", 45.0, 12.0, 0.8, Eccentric));
         s.disease.grafts.push_back({ "LIMA", true, "LAD", 75.0, 2.4 });
-        s.disease.grafts.push_back({ "SVG1", false, "RCA", 90.0, 3.6 });
+        s.disease.grafts.push_back({ "SVG1", false, "RCA", 66.0, 3.6 });
         s.disease.grafts.push_back({ "SVG2", false, "OM1", 25.0, 3.4 });
       } },
     { "anomalous", Begins(CoronaryOrigin::CircumflexFromRight) },
