@@ -2,6 +2,7 @@
 
 #include "AtomicFile.h"
 #include "CoronaryPhantom.h"
+#include "DiseaseOptions.h"
 #include "FileSeries.h"
 #include "Interruption.h"
 #include "MetaImageWriter.h"
@@ -44,6 +45,7 @@ namespace
 constexpr const char* SeriesName = "series.json";
 constexpr const char* ScanName = "scan.json";
 constexpr const char* PartsName = "scan-parts";
+constexpr const char* DiseaseName = "truth/disease.json";
 
 // Share of a phase's time that its parts take, for the progress.
 constexpr double TruthShare = 0.3;
@@ -53,6 +55,7 @@ struct PhantomJob
 {
   PhantomSettings settings;
   PhaseOptions phases;
+  DiseaseOptions disease;
   ScannerOptions scanner;
   ScannerSettings scan; ///< what scanner.Settings() says
   std::vector<ScanVariant> variants;
@@ -86,6 +89,7 @@ void PhantomJob::Declare(CLI::App& app)
   this->phases.AddTo(app);
   AddHeartOptions(app, this->settings);
   AddImagingOptions(app, this->settings);
+  this->disease.AddTo(app);
 
   const std::string grid = "Image grid";
   app
@@ -183,6 +187,7 @@ void PhantomJob::Configure(vtkCoronaryPhantomSource* source, const std::vector<d
   source->SetStenosisDegree(s.stenosisDegree);
   source->SetCalcifiedPlaques(s.calcifiedPlaques);
   source->SetChronicOcclusion(s.chronicOcclusion);
+  source->SetDisease(s.disease);
   source->SetCycleLength(s.cycleLength);
   source->SetMotionAmplitude(s.motionAmplitude);
   source->SetAxialMotionRight(s.axialMotionRight);
@@ -300,6 +305,10 @@ public:
       this->Numbers.push_back(SeriesNumber(i, times.size()));
     }
     this->Series.cycleMs = 1000.0 * job.settings.cycleLength;
+    if (!job.noTruth && IsDiseased(job.settings))
+    {
+      this->Stems.emplace_back("wall");
+    }
     if (job.scanner.Given())
     {
       this->MakeScanner();
@@ -331,14 +340,19 @@ public:
     }
     if (!this->Job.noTruth)
     {
-      for (const char* stem : { "surface", "centerline", "vein" })
+      for (const std::string& stem : this->Stems)
       {
         std::vector<TimedFile> files;
         for (std::size_t i = 0; i < this->Times.size(); ++i)
         {
-          files.push_back({ std::string(stem) + "_" + this->Numbers[i] + ".vtp", this->Times[i] });
+          files.push_back({ stem + "_" + this->Numbers[i] + ".vtp", this->Times[i] });
         }
-        WriteFileAtomically(folder.Add("truth/" + std::string(stem) + ".pvd"), PvdText(files));
+        WriteFileAtomically(folder.Add("truth/" + stem + ".pvd"), PvdText(files));
+      }
+      if (IsDiseased(this->Job.settings))
+      {
+        const CoronaryPhantom phantom(this->Job.settings);
+        WriteFileAtomically(folder.Add(DiseaseName), DescribeDisease(phantom));
       }
     }
     if (this->Scanner)
@@ -481,6 +495,10 @@ private:
       return name;
     };
     write(vtkCoronaryPhantomSource::VeinPort, "vein");
+    if (IsDiseased(this->Job.settings))
+    {
+      write(vtkCoronaryPhantomSource::WallPort, "wall");
+    }
     phase.centerline = write(vtkCoronaryPhantomSource::TreePort, "centerline");
     phase.surface = write(vtkCoronaryPhantomSource::SurfacePort, "surface");
   }
@@ -531,6 +549,7 @@ private:
   vtkCoronaryPhantomSource* Source;
   const std::vector<double>& Times;
   std::vector<std::string> Numbers;
+  std::vector<std::string> Stems{ "surface", "centerline", "vein" }; ///< of the truth's files
   ProgressDisplay Progress;
   vtkMessageTrap Messages;
   SeriesDescription Series;
@@ -547,6 +566,7 @@ private:
 void PhantomJob::Run()
 {
   this->CheckCombinations();
+  this->disease.Apply(this->settings);
   const std::vector<double> times = this->phases.Phases();
   this->settings.lostPhases = this->phases.LostPhases(times);
   SetNumberOfThreads(this->threads);
@@ -587,10 +607,12 @@ Command MakePhantomCommand(CLI::App& program)
 {
   CLI::App* app = program.add_subcommand(
     "phantom", "Make a gated CT series of a beating coronary tree, with its exact truth");
-  app->footer("Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp "
-              "and, last, DIR/series.json, with NN from 00; with --scanner DIR/scan.json, too: "
-              "what is in DIR/scan-parts "
-              "until all is written lets a scan that was stopped go on.");
+  app->footer(
+    "Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp "
+    "and, last, DIR/series.json, with NN from 00; with disease DIR/truth/disease.json and "
+    "wall_NN.vtp; with --scanner DIR/scan.json: what is in DIR/scan-parts until all is written "
+    "lets "
+    "a scan that was stopped go on.");
   auto job = std::make_shared<PhantomJob>();
   job->Declare(*app);
   return { app,

@@ -102,7 +102,7 @@ void AddHeartOptions(CLI::App& app, PhantomSettings& s)
   anatomy.AddNumber(
     "--tortuosity", s.tortuosity, 0.0, 3.0, "FACTOR", "Factor on the vessels' lateral waves");
   anatomy.AddNumber("--stenoses", s.stenoses, 0, 20, "N", "Number of narrowings");
-  anatomy.AddNumber("--stenosis-degree", s.stenosisDegree, 0.0, 0.95, "RATIO",
+  anatomy.AddNumber("--stenosis-degree", s.stenosisDegree, 0.0, 0.99, "RATIO",
     "Diameter reduction of the narrowings");
   anatomy.AddNumber(
     "--calcified-plaques", s.calcifiedPlaques, 0, 50, "N", "Number of calcifications in the walls");

@@ -2,7 +2,9 @@
 
 #include "CounterRandom.h"
 #include "Median.h"
+#include "PartialProgress.h"
 #include "PhantomAnatomy.h"
+#include "PhantomComposition.h"
 #include "PhantomImage.h"
 #include "PhantomLumen.h"
 #include "PhantomMotion.h"
@@ -41,7 +43,7 @@ void PhantomSettings::Validate() const
   Require("calibreVariation", this->calibreVariation, 0.0, 0.3);
   Require("tortuosity", this->tortuosity, 0.0, 3.0);
   Require("stenoses", this->stenoses, 0, 20);
-  Require("stenosisDegree", this->stenosisDegree, 0.0, 0.95);
+  Require("stenosisDegree", this->stenosisDegree, 0.0, 0.99);
   Require("calcifiedPlaques", this->calcifiedPlaques, 0, 50);
   Require("cycleLength", this->cycleLength, 0.3, 3.0);
   Require("motionAmplitude", this->motionAmplitude, 0.0, 1.3);
@@ -69,6 +71,7 @@ void PhantomSettings::Validate() const
   }
   Require("centerlineSpacing", this->centerlineSpacing, 0.1, 5.0);
   Require("surfaceSpacing", this->surfaceSpacing, 0.15, 1.5);
+  this->disease.Validate();
 }
 
 struct CoronaryPhantom::Internals
@@ -106,6 +109,35 @@ struct CoronaryPhantom::Internals
     return tree;
   }
 
+  /// The arteries: stents hold their lumen, muscle bridges squeeze it.
+  PhantomTree Arteries(double t) const
+  {
+    const double factor = this->RadiusFactor(t);
+    PhantomTree tree = this->Move(this->Anatomy.tree, t, factor);
+    if (!this->Anatomy.lesions.empty())
+    {
+      const double systole = std::clamp(PhantomMotion::Activation(t), 0.0, 1.0);
+      for (std::size_t p = 0; p < tree.points.size(); ++p)
+      {
+        tree.radius[p] = this->Anatomy.tree.radius[p] * (this->Anatomy.rigid[p] ? 1.0 : factor) *
+          (1.0 - this->Anatomy.squeeze[p] * systole);
+      }
+    }
+    return tree;
+  }
+
+  /// Cones of each of the anatomy's parts.
+  std::vector<std::vector<PhantomTube>> Parts(double t) const
+  {
+    std::vector<std::vector<PhantomTube>> parts;
+    for (const PhantomPart& part : this->Anatomy.parts)
+    {
+      part.Place([&](const Vector3& rest) { return this->Motion.Position(rest, t); },
+        this->RadiusFactor(t) - 1.0, parts.emplace_back());
+    }
+    return parts;
+  }
+
   /// Normals of the flat ends: the planes move with the tissue.
   std::vector<Vector3> EndNormals(double t) const
   {
@@ -121,16 +153,47 @@ struct CoronaryPhantom::Internals
 
   PhantomLumen Lumen(double t, double reach) const
   {
-    const PhantomTree tree = this->Move(this->Anatomy.tree, t, this->RadiusFactor(t));
-    return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach);
+    const PhantomTree tree = this->Arteries(t);
+    return PhantomLumen(
+      this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach, this->Anatomy.occluded);
   }
+
+  /// The outer walls, like a tree of lumens.
+  PhantomTree Walls(double t) const
+  {
+    PhantomTree tree = this->Arteries(t);
+    const PhantomTree& rest = this->Anatomy.tree;
+    for (std::size_t p = 0; p < tree.points.size(); ++p)
+    {
+      const double offset = this->Anatomy.wallOffset[p].norm();
+      if (offset > 0.0)
+      {
+        // As PhantomPart::Place: thicknesses stay.
+        const Vector3 towards =
+          this->Motion.Position(rest.points[p] + this->Anatomy.wallOffset[p] / offset, t) -
+          tree.points[p];
+        tree.points[p] += offset * towards.normalized();
+      }
+      const double grown = this->Anatomy.occluded[p] ? 0.0 : tree.radius[p] - rest.radius[p];
+      tree.radius[p] = this->Anatomy.wallRadius[p] + grown;
+    }
+    return tree;
+  }
+
+  /// A resting surface at time t, on the wall that `lumen` is.
+  PhantomSurface Carry(const PhantomSurface& rest, const PhantomLumen& lumen, double t, double from,
+    const ProgressCallback& progress) const;
 
   /// All that images are made of, with the weight 1.
   PhantomMoment Moment(double t) const
   {
-    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t) };
-    moment.tree = this->Move(this->Anatomy.tree, t, this->RadiusFactor(t));
+    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t), this->Parts(t), {} };
+    moment.tree = this->Arteries(t);
     moment.vein = this->Move(this->Anatomy.vein, t, 1.0);
+    if (!this->Anatomy.parts.empty())
+    {
+      moment.wall = this->Walls(t);
+    }
     for (const Plaque& plaque : this->Anatomy.plaques)
     {
       moment.plaques.push_back(this->Motion.Position(plaque.centre, t));
@@ -138,16 +201,21 @@ struct CoronaryPhantom::Internals
     return moment;
   }
 
-  /// The lumen with every point at its reference position.
-  PhantomLumen RestingLumen(double reach) const
+  /// The lumen with every point at its reference position, and nowhere narrower than so.
+  PhantomLumen RestingLumen(const PhantomAnatomy& anatomy, double reach, double minimumRadius) const
   {
-    const PhantomTree& tree = this->Anatomy.tree;
+    const PhantomTree& tree = anatomy.tree;
+    std::vector<double> radius = tree.radius;
+    for (double& r : radius)
+    {
+      r = std::max(r, minimumRadius);
+    }
     std::vector<Vector3> normals;
-    for (const VesselEnd& end : this->Anatomy.ends)
+    for (const VesselEnd& end : anatomy.ends)
     {
       normals.push_back((tree.points[end.point] - tree.points[end.neighbour]).normalized());
     }
-    return PhantomLumen(this->Anatomy, tree.points, tree.radius, normals, reach);
+    return PhantomLumen(anatomy, tree.points, radius, normals, reach, anatomy.occluded);
   }
 
   /// Share of the contrast that is lost at each tree point, and over the whole image.
@@ -191,7 +259,9 @@ struct CoronaryPhantom::Internals
   PhantomImage Image;
 
   std::mutex SurfaceMutex;
-  PhantomSurface RestSurface; ///< empty until the first call of Surface
+  PhantomSurface RestSurface;            ///< empty until the first call of Surface
+  std::unique_ptr<PhantomAnatomy> Outer; ///< the outer walls as lumens; none until OuterWall
+  PhantomSurface RestWall;
 };
 
 CoronaryPhantom::CoronaryPhantom(const PhantomSettings& settings)
@@ -226,7 +296,7 @@ Vector3 CoronaryPhantom::ReferencePosition(const Vector3& position, double t) co
 PhantomTree CoronaryPhantom::Tree(double t) const
 {
   const PhantomAnatomy& anatomy = this->Data->Anatomy;
-  PhantomTree tree = this->Data->Move(anatomy.tree, t, this->Data->RadiusFactor(t));
+  PhantomTree tree = this->Data->Arteries(t);
   double wholePhase = 0.0;
   const std::vector<double> lost = this->Data->Lost(t, wholePhase);
   const double window = this->Data->Settings.temporalWindow / this->Data->Settings.cycleLength;
@@ -247,6 +317,13 @@ PhantomTree CoronaryPhantom::Tree(double t) const
     }
     const double diameter = 2.0 * tree.radius[p];
     tree.visibility[p] = anatomy.occluded[p] ? 0.0 : (1.0 - lost[p]) * diameter / (diameter + blur);
+    if (anatomy.contrastChange[p] < 0.0)
+    {
+      const PhantomSettings& settings = this->Data->Settings;
+      const double usual =
+        settings.lumenHU + settings.attenuationGradient * anatomy.tree.abscissa[p] / 10.0;
+      tree.visibility[p] *= std::max(0.0, 1.0 + anatomy.contrastChange[p] / std::max(1.0, usual));
+    }
   }
   return tree;
 }
@@ -255,26 +332,111 @@ std::vector<PhantomStenosis> CoronaryPhantom::Stenoses(double t) const
 {
   const PhantomAnatomy& anatomy = this->Data->Anatomy;
   std::vector<PhantomStenosis> result;
-  if (anatomy.narrowings.empty())
-  {
-    return result;
-  }
   const PhantomTree tree = this->Tree(t);
-  for (const Narrowing& narrowing : anatomy.narrowings)
+  for (const PlacedLesion& placed : anatomy.lesions)
   {
+    // As the tree has it at that point, all lesions there together.
+    const double degree =
+      1.0 - anatomy.tree.radius[placed.point] / anatomy.healthyRadius[placed.point];
+    const bool narrows = placed.lesion.kind == LesionKind::Stenosis ||
+      ((placed.lesion.kind == LesionKind::Plaque || placed.lesion.kind == LesionKind::Stent) &&
+        placed.lesion.degree > 0.0);
+    if (!narrows)
+    {
+      continue;
+    }
     PhantomStenosis stenosis;
-    stenosis.vessel = anatomy.vesselNames[narrowing.vessel];
-    stenosis.point = narrowing.point;
-    stenosis.segmentId = tree.segmentId[narrowing.point];
-    stenosis.position = tree.points[narrowing.point];
-    stenosis.abscissa = tree.abscissa[narrowing.point];
-    stenosis.length = narrowing.width;
-    stenosis.degree = narrowing.degree;
-    stenosis.minimumRadius = tree.radius[narrowing.point];
-    stenosis.referenceRadius = stenosis.minimumRadius / (1.0 - narrowing.degree);
+    stenosis.vessel = anatomy.vesselNames[placed.vessel];
+    stenosis.point = placed.point;
+    stenosis.segmentId = tree.segmentId[placed.point];
+    stenosis.position = tree.points[placed.point];
+    stenosis.abscissa = tree.abscissa[placed.point];
+    stenosis.length = placed.lesion.length;
+    stenosis.degree = degree;
+    stenosis.minimumRadius = tree.radius[placed.point];
+    stenosis.referenceRadius = stenosis.minimumRadius / (1.0 - degree);
     result.push_back(stenosis);
   }
   return result;
+}
+
+std::vector<PhantomLesionTruth> CoronaryPhantom::Lesions() const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  const PhantomTree& tree = anatomy.tree;
+  const PhantomLumen lumen = this->Data->RestingLumen(anatomy, 1.0, 0.0);
+  std::vector<PhantomLesionTruth> result;
+  int spots = 0;
+  for (std::size_t n = 0; n < anatomy.lesions.size(); ++n)
+  {
+    const PlacedLesion& placed = anatomy.lesions[n];
+    PhantomLesionTruth truth;
+    truth.lesion = placed.lesion;
+    truth.middle = placed.middle;
+    truth.point = placed.point;
+    // On a plateau the middle is named.
+    const bool wider = placed.lesion.kind == LesionKind::Ectasia;
+    const auto leftAt = [&](std::int64_t p)
+    { return anatomy.occluded[p] ? 0.0 : tree.radius[p] / anatomy.healthyRadius[p]; };
+    for (std::size_t p = 0; p < tree.points.size(); ++p)
+    {
+      const bool within = anatomy.pointVessel[p] == placed.vessel &&
+        std::abs(anatomy.pointArc[p] - placed.middle) <= 0.5 * placed.lesion.length;
+      const double here = leftAt(static_cast<std::int64_t>(p));
+      const double most = leftAt(truth.point);
+      if (within && (wider ? here - most : most - here) > 1e-6)
+      {
+        truth.point = static_cast<std::int64_t>(p);
+      }
+    }
+    truth.segmentId = tree.segmentId[truth.point];
+    truth.abscissa = tree.abscissa[truth.point];
+    truth.referenceRadius = anatomy.healthyRadius[truth.point];
+    truth.minimumRadius = leftAt(truth.point) * truth.referenceRadius;
+    truth.wallRadius = anatomy.wallRadius[truth.point];
+    const double left = leftAt(truth.point);
+    truth.degree = 1.0 - left;
+    truth.areaDegree = 1.0 - left * left;
+    const int spot = placed.lesion.kind == LesionKind::Spot ? spots++ : -1;
+    MeasureComposition(anatomy, lumen, static_cast<int>(n), spot, truth);
+    result.push_back(std::move(truth));
+  }
+  return result;
+}
+
+std::vector<PhantomVessel> CoronaryPhantom::Vessels() const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  std::vector<PhantomVessel> vessels(anatomy.vesselNames.size());
+  for (std::size_t v = 0; v < vessels.size(); ++v)
+  {
+    vessels[v].name = anatomy.vesselNames[v];
+  }
+  for (const Junction& junction : anatomy.junctions)
+  {
+    vessels[junction.childVessel].parent = anatomy.vesselNames[junction.parentVessel];
+  }
+  for (const AxisStep& step : anatomy.steps)
+  {
+    PhantomVessel& vessel = vessels[step.vessel];
+    const double arc = anatomy.pointArc[step.second];
+    vessel.treeId = anatomy.tree.branches[step.branch].treeId;
+    vessel.length = std::max(vessel.length, arc);
+    const bool late = anatomy.contrastChange[step.second] < 0.0 && !anatomy.occluded[step.second];
+    if (late && (vessel.lateFrom < 0.0 || arc < vessel.lateFrom))
+    {
+      vessel.lateFrom = arc;
+    }
+  }
+  for (const PlacedLesion& placed : anatomy.lesions)
+  {
+    if (placed.lesion.kind == LesionKind::Occlusion)
+    {
+      const double half = 0.5 * placed.lesion.length;
+      vessels[placed.vessel].occlusions.push_back({ placed.middle - half, placed.middle + half });
+    }
+  }
+  return vessels;
 }
 
 std::vector<PhantomPlaque> CoronaryPhantom::Plaques(double t) const
@@ -285,7 +447,7 @@ std::vector<PhantomPlaque> CoronaryPhantom::Plaques(double t) const
   {
     result.push_back({ anatomy.vesselNames[plaque.vessel], anatomy.tree.segmentId[plaque.point],
       plaque.point, anatomy.tree.abscissa[plaque.point], this->Position(plaque.centre, t),
-      plaque.radius, Plaque::Value });
+      plaque.radius, plaque.value });
   }
   return result;
 }
@@ -323,28 +485,58 @@ PhantomSurface CoronaryPhantom::Surface(double t, const ProgressCallback& progre
     if (data.RestSurface.points.empty())
     {
       from = 0.7;
-      data.RestSurface = MeshLumen(anatomy, data.RestingLumen(2.5), data.Settings.surfaceSpacing,
-        progress ? ProgressCallback([&](double f) { return progress(0.7 * f); })
-                 : ProgressCallback());
+      data.RestSurface = MeshLumen(anatomy, data.RestingLumen(anatomy, 2.5, MinimumMeshedRadius),
+        data.Settings.surfaceSpacing, PartOf(progress, 0.0, from));
     }
   }
-  PhantomSurface surface = data.RestSurface;
-  const PhantomLumen lumen = data.Lumen(t, 2.5);
+  return data.Carry(data.RestSurface, data.Lumen(t, 2.5), t, from, progress);
+}
+
+PhantomSurface CoronaryPhantom::OuterWall(double t, const ProgressCallback& progress) const
+{
+  Internals& data = *this->Data;
+  double from = 0.0;
+  {
+    const std::lock_guard<std::mutex> lock(data.SurfaceMutex);
+    if (!data.Outer)
+    {
+      from = 0.7;
+      auto outer = std::make_unique<PhantomAnatomy>(data.Anatomy);
+      for (std::size_t p = 0; p < outer->tree.points.size(); ++p)
+      {
+        outer->tree.points[p] += outer->wallOffset[p];
+        outer->tree.radius[p] = outer->wallRadius[p];
+        outer->occluded[p] = 0;
+      }
+      data.RestWall = MeshLumen(*outer, data.RestingLumen(*outer, 2.5, MinimumMeshedRadius),
+        data.Settings.surfaceSpacing, PartOf(progress, 0.0, from));
+      data.Outer = std::move(outer);
+    }
+  }
+  const PhantomTree wall = data.Walls(t);
+  const PhantomLumen lumen(
+    *data.Outer, wall.points, wall.radius, data.EndNormals(t), 2.5, data.Outer->occluded);
+  return data.Carry(data.RestWall, lumen, t, from, progress);
+}
+
+PhantomSurface CoronaryPhantom::Internals::Carry(const PhantomSurface& rest,
+  const PhantomLumen& lumen, double t, double from, const ProgressCallback& progress) const
+{
+  PhantomSurface surface = rest;
   ParallelFor(
     static_cast<std::int64_t>(surface.points.size()), 512,
     [&](std::int64_t first, std::int64_t last)
     {
       for (std::int64_t p = first; p < last; ++p)
       {
-        const Vector3 rest = surface.points[p];
-        Vector3 position = data.Motion.Position(rest, t);
+        const Vector3 before = surface.points[p];
+        Vector3 position = this->Motion.Position(before, t);
         lumen.Project(position, 1e-4);
         surface.points[p] = position;
-        surface.displacement[p] = position - rest;
+        surface.displacement[p] = position - before;
       }
     },
-    progress ? ProgressCallback([&](double f) { return progress(from + (1.0 - from) * f); })
-             : ProgressCallback());
+    PartOf(progress, from, 1.0));
   return surface;
 }
 
@@ -463,8 +655,20 @@ std::vector<PhantomTube> CoronaryPhantom::Tubes(double t) const
 {
   const PhantomAnatomy& anatomy = this->Data->Anatomy;
   const PhantomSettings& settings = this->Data->Settings;
-  const PhantomTree tree = this->Data->Move(anatomy.tree, t, this->Data->RadiusFactor(t));
+  const PhantomTree tree = this->Data->Arteries(t);
+  const std::vector<std::vector<PhantomTube>> parts = this->Data->Parts(t);
   std::vector<PhantomTube> tubes;
+  const auto addLayers = [&](PartLayer from, PartLayer to)
+  {
+    for (std::size_t n = parts.size(); n-- > 0;)
+    {
+      if (anatomy.parts[n].layer >= from && anatomy.parts[n].layer <= to)
+      {
+        tubes.insert(tubes.end(), parts[n].begin(), parts[n].end());
+      }
+    }
+  };
+  addLayers(PartLayer::Metal, PartLayer::Metal);
   const AxisStep* before = nullptr;
   for (const AxisStep& step : anatomy.steps)
   {
@@ -477,13 +681,16 @@ std::vector<PhantomTube> CoronaryPhantom::Tubes(double t) const
     const double start = anatomy.pointVessel[step.first] == step.vessel ? tree.radius[step.first]
                                                                         : tree.radius[step.second];
     const double path = 0.5 * (tree.abscissa[step.first] + tree.abscissa[step.second]);
+    const double change =
+      0.5 * (anatomy.contrastChange[step.first] + anatomy.contrastChange[step.second]);
     tubes.push_back(
       { tree.points[step.first], tree.points[step.second], start, tree.radius[step.second],
         before != nullptr && before->second == step.first && before->vessel == step.vessel,
-        PhantomTissue::Blood, settings.lumenHU + settings.attenuationGradient * path / 10.0,
-        anatomy.intramural[step.vessel] != 0 });
+        PhantomTissue::Blood,
+        settings.lumenHU + settings.attenuationGradient * path / 10.0 + change, step.inMuscle });
     before = &step;
   }
+  addLayers(PartLayer::Wall, PartLayer::Calcium);
   return tubes;
 }
 

@@ -17,6 +17,7 @@
 #include "CoronaryAnatomy.h"
 #include "Geometry.h"
 #include "ParallelFor.h"
+#include "PhantomDisease.h"
 #include "VesselTree.h"
 
 #include <functional>
@@ -45,9 +46,10 @@ struct PhantomSettings
   double calibreVariation = 0.10; ///< relative standard deviation of a vessel's diameter, 0 to 0.3
   double tortuosity = 1.0;        ///< factor on the lateral waves of the vessels, 0 to 3
   int stenoses = 0;               ///< number of narrowings, placed by the seed, 0 to 20
-  double stenosisDegree = 0.5;    ///< their diameter reduction, 0 to 0.95 (radius at least 0.2 mm)
+  double stenosisDegree = 0.5;    ///< their diameter reduction, 0 to 0.99
   int calcifiedPlaques = 0;       ///< number of calcifications, placed by the seed, 0 to 50
   bool chronicOcclusion = false;  ///< close 15 mm of the mid RCA; filled from its far end on
+  PhantomDisease disease;         ///< beside these three
 
   // Motion.
   double cycleLength = 0.8;       ///< R-R interval in seconds, 0.3 to 3
@@ -136,6 +138,36 @@ struct PhantomPlaque
   double value = 0.0;      ///< HU before blurring
 };
 
+/// What a lesion truly is: at rest, without the pulse. Volumes by sampling at 0.1 mm.
+struct PhantomLesionTruth
+{
+  PhantomLesion lesion;       ///< as asked for
+  int segmentId = 0;          ///< of `point`
+  std::int64_t point = -1;    ///< of PhantomTree, where the lumen differs most from the healthy one
+  double middle = 0.0;        ///< mm from the vessel's origin
+  double abscissa = 0.0;      ///< of `point`, mm from the ostium
+  double degree = 0.0;        ///< share of the diameter that is gone; below 0: wider; 1: occluded
+  double areaDegree = 0.0;    ///< share of the area that is gone
+  double minimumRadius = 0.0; ///< mm, at `point`
+  double referenceRadius = 0.0; ///< mm, there, without lesions
+  double wallRadius = 0.0;      ///< mm, of the outer wall there
+  double fibrousVolume = 0.0;   ///< mm^3, with the rim of a core
+  double lipidVolume = 0.0;     ///< mm^3
+  double calciumVolume = 0.0;   ///< mm^3
+  double agatston = 0.0;        ///< of the calcium alone, see docs/phantom.md
+};
+
+/// A vessel by its name.
+struct PhantomVessel
+{
+  std::string name;
+  std::string parent;                            ///< empty: an ostium
+  int treeId = 0;                                ///< 0 left, 1 right, 3 a graft
+  double length = 0.0;                           ///< mm
+  std::vector<std::array<double, 2>> occlusions; ///< from, to, mm from its origin
+  double lateFrom = -1.0;                        ///< fills late from here on, mm; -1: does not
+};
+
 enum class PhantomTissue
 {
   Lung,
@@ -147,7 +179,7 @@ enum class PhantomTissue
   Metal      ///< stents, leads
 };
 
-/// A piece of an artery's lumen at one moment, as a scanner's rays meet it: a straight cone.
+/// A piece of an artery, a plaque or a device at one moment, as rays meet it: a straight cone.
 struct PhantomTube
 {
   Vector3 start; ///< mm
@@ -201,10 +233,15 @@ public:
   /// The great cardiac vein beside the LAD and in the AV groove: one branch, treeId 2.
   PhantomTree Vein(double t) const;
 
+  /// All lesions: those that settings ask for by number, those of the disease, balls of calcium.
+  std::vector<PhantomLesionTruth> Lesions() const;
+
+  std::vector<PhantomVessel> Vessels() const;
+
   std::vector<PhantomOstium> Ostia(double t) const;
 
   ///@{
-  /// The lesions that PhantomSettings asks for, in the order in which they were placed.
+  /// Narrowings of all kinds, and balls of calcium.
   std::vector<PhantomStenosis> Stenoses(double t) const;
   std::vector<PhantomPlaque> Plaques(double t) const;
   ///@}
@@ -215,6 +252,13 @@ public:
    * @throws Cancelled
    */
   PhantomSurface Surface(double t, const ProgressCallback& progress = {}) const;
+
+  /**
+   * The outer wall of all arteries, closed like the lumen's: around plaques, stents and occlusions,
+   * and the lumen's wall elsewhere. One connectivity at all times.
+   * @throws Cancelled
+   */
+  PhantomSurface OuterWall(double t, const ProgressCallback& progress = {}) const;
 
   /// Signed distance to the wall at time t in mm, negative inside; exact near the wall, bounded
   /// by +-`farAway` elsewhere.
@@ -245,7 +289,8 @@ public:
   void Render(const ImageGrid& grid, const std::array<int, 6>& part, double t, std::int16_t* values,
     const ProgressCallback& progress = {}) const;
 
-  /// All arteries at time t, but where they are occluded.
+  /// All arteries at time t, but where they are occluded, and what lesions are made of: where tubes
+  /// overlap, the first of them counts.
   std::vector<PhantomTube> Tubes(double t) const;
 
   /**

@@ -1,7 +1,8 @@
 #include "PhantomAnatomy.h"
 
-#include "CounterRandom.h"
+#include "PhantomCourses.h"
 #include "PhantomVesselPlans.h"
+#include "Require.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +17,7 @@ namespace
 {
 constexpr double Pi = 3.14159265358979323846;
 
-/// The lumen's least radius in mm, so that its surface can be meshed however tight a stenosis is.
+/// A healthy vessel's least radius in mm.
 constexpr double MinimumRadius = 0.2;
 
 // Streams of the random generator, so that one part of the anatomy does not shift another.
@@ -31,92 +32,6 @@ enum Purpose : std::uint64_t
   Stenoses = 107,
   Plaques = 108
 };
-
-/// A C2 cubic through points, with natural ends, parametrised by chord length.
-class CubicCurve
-{
-public:
-  CubicCurve(std::vector<Vector3> points)
-    : Points(std::move(points))
-  {
-    const std::size_t n = this->Points.size();
-    this->Knots.assign(n, 0.0);
-    for (std::size_t i = 1; i < n; ++i)
-    {
-      // Centripetal steps keep the curve from overshooting where control points crowd.
-      this->Knots[i] =
-        this->Knots[i - 1] + std::sqrt((this->Points[i] - this->Points[i - 1]).norm());
-    }
-    // Tridiagonal system for the second derivatives.
-    this->Second.assign(n, Vector3::Zero());
-    std::vector<double> upper(n, 0.0);
-    std::vector<Vector3> right(n, Vector3::Zero());
-    for (std::size_t i = 1; i + 1 < n; ++i)
-    {
-      const double h0 = this->Knots[i] - this->Knots[i - 1];
-      const double h1 = this->Knots[i + 1] - this->Knots[i];
-      const Vector3 rhs = 6.0 *
-        ((this->Points[i + 1] - this->Points[i]) / h1 -
-          (this->Points[i] - this->Points[i - 1]) / h0);
-      const double pivot = 2.0 * (h0 + h1) - h0 * upper[i - 1];
-      upper[i] = h1 / pivot;
-      right[i] = (rhs - h0 * right[i - 1]) / pivot;
-    }
-    for (std::size_t i = n - 1; i-- > 1;)
-    {
-      this->Second[i] = right[i] - upper[i] * this->Second[i + 1];
-    }
-  }
-
-  double End() const { return this->Knots.back(); }
-  double Knot(std::size_t i) const { return this->Knots[i]; }
-
-  Vector3 operator()(double u) const
-  {
-    const auto upper = std::upper_bound(this->Knots.begin() + 1, this->Knots.end() - 1, u);
-    const std::size_t i = upper - this->Knots.begin();
-    const double h = this->Knots[i] - this->Knots[i - 1];
-    const double a = (this->Knots[i] - u) / h;
-    const double b = 1.0 - a;
-    return a * this->Points[i - 1] + b * this->Points[i] +
-      ((a * a * a - a) * this->Second[i - 1] + (b * b * b - b) * this->Second[i]) * h * h / 6.0;
-  }
-
-private:
-  std::vector<Vector3> Points;
-  std::vector<double> Knots;
-  std::vector<Vector3> Second;
-};
-
-/// A vessel's axis in fine steps, before it is cut into branches.
-struct DenseVessel
-{
-  std::vector<Vector3> points;
-  std::vector<double> arc;
-  std::vector<double> radius;
-  std::size_t parent = std::numeric_limits<std::size_t>::max();
-  double parentArc = 0.0;
-};
-
-void ComputeArc(DenseVessel& vessel)
-{
-  vessel.arc.assign(vessel.points.size(), 0.0);
-  for (std::size_t i = 1; i < vessel.points.size(); ++i)
-  {
-    vessel.arc[i] = vessel.arc[i - 1] + (vessel.points[i] - vessel.points[i - 1]).norm();
-  }
-}
-
-/// Index and fraction of an arc length.
-template <typename Value>
-Value AtArc(const DenseVessel& vessel, const std::vector<Value>& values, double arc)
-{
-  const auto upper = std::upper_bound(vessel.arc.begin() + 1, vessel.arc.end() - 1, arc);
-  const std::size_t i = upper - vessel.arc.begin();
-  const double f =
-    std::clamp((arc - vessel.arc[i - 1]) / (vessel.arc[i] - vessel.arc[i - 1]), 0.0, 1.0);
-  return values[i - 1] * (1.0 - f) + values[i] * f;
-}
 
 /// The random parts of the anatomy, all zero for seed 0.
 class Variation
@@ -173,52 +88,6 @@ Vector3 Place(const Control& control, VesselDepth depth, const HeartFrame& mean,
   return mean.ToWorld(p) * size;
 }
 
-/// Outward normal of the heart's surface at a vessel, perpendicular to the vessel.
-Vector3 EpicardialNormal(const HeartFrame& frame, const Vector3& position, const Vector3& tangent)
-{
-  const Vector3 heart = frame.ToHeart(position) - HeartFrame::Centre;
-  const Vector3 normal =
-    frame.axes.transpose() * heart.cwiseQuotient(HeartFrame::Radii.cwiseProduct(HeartFrame::Radii));
-  return (normal - normal.dot(tangent) * tangent).normalized();
-}
-
-/// Lateral waves: coronary arteries wind, more so towards their ends.
-void AddWaves(DenseVessel& vessel, const HeartFrame& frame, double strength, RandomStream& random)
-{
-  struct Wave
-  {
-    double number, phase, phaseNormal;
-  };
-  Wave waves[3];
-  for (Wave& wave : waves)
-  {
-    wave.number = 2.0 * Pi / random.Uniform(14.0, 36.0);
-    wave.phase = random.Uniform(0.0, 2.0 * Pi);
-    wave.phaseNormal = random.Uniform(0.0, 2.0 * Pi);
-  }
-  const double length = vessel.arc.back();
-  const std::vector<Vector3> points = vessel.points;
-  for (std::size_t i = 0; i < points.size(); ++i)
-  {
-    const std::size_t before = i == 0 ? 0 : i - 1;
-    const std::size_t after = std::min(points.size() - 1, i + 1);
-    const Vector3 tangent = (points[after] - points[before]).normalized();
-    const Vector3 normal = EpicardialNormal(frame, points[i], tangent);
-    const Vector3 lateral = normal.cross(tangent);
-    const double s = vessel.arc[i];
-    const double envelope = strength * SmoothStep((s - 2.0) / 14.0) *
-      (0.35 + 0.45 * std::min(1.0, s / std::max(60.0, length)));
-    double along = 0.0;
-    double out = 0.0;
-    for (const Wave& wave : waves)
-    {
-      along += std::sin(wave.number * s + wave.phase);
-      out += std::sin(wave.number * s + wave.phaseNormal);
-    }
-    vessel.points[i] += envelope * (0.8 * along * lateral + 0.25 * out * normal);
-  }
-}
-
 /// Monotone-safe interpolation of the control diameters over the control points' arc lengths.
 double InterpolateDiameter(
   const std::vector<double>& at, const std::vector<double>& diameter, double s)
@@ -227,341 +96,6 @@ double InterpolateDiameter(
   const std::size_t i = upper - at.begin();
   const double f = std::clamp((s - at[i - 1]) / (at[i] - at[i - 1]), 0.0, 1.0);
   return diameter[i - 1] + f * (diameter[i] - diameter[i - 1]);
-}
-
-/// Where a vessel hangs, from itself up to its root: vessel, and arc at which the path leaves it.
-std::vector<std::pair<std::size_t, double>> PathToRoot(
-  const std::vector<DenseVessel>& vessels, std::size_t v, double arc)
-{
-  std::vector<std::pair<std::size_t, double>> path;
-  for (;;)
-  {
-    path.emplace_back(v, arc);
-    if (vessels[v].parent >= vessels.size())
-    {
-      return path;
-    }
-    arc = vessels[v].parentArc;
-    v = vessels[v].parent;
-  }
-}
-
-/// Length of the way through the tree between two points; infinite between the two trees.
-double TreeDistance(
-  const std::vector<DenseVessel>& vessels, std::size_t u, double arcU, std::size_t v, double arcV)
-{
-  const auto pathU = PathToRoot(vessels, u, arcU);
-  const auto pathV = PathToRoot(vessels, v, arcV);
-  double climbU = 0.0;
-  for (const auto& atU : pathU)
-  {
-    double climbV = 0.0;
-    for (const auto& atV : pathV)
-    {
-      if (atU.first == atV.first)
-      {
-        return climbU + climbV + std::abs(atU.second - atV.second);
-      }
-      climbV += atV.second;
-    }
-    climbU += atU.second;
-  }
-  return std::numeric_limits<double>::max();
-}
-
-/// New arc lengths after the points have moved; the attachments of side vessels move along.
-void UpdateArc(std::vector<DenseVessel>& vessels, std::size_t moved)
-{
-  DenseVessel& vessel = vessels[moved];
-  const std::vector<double> before = vessel.arc;
-  ComputeArc(vessel);
-  for (DenseVessel& child : vessels)
-  {
-    if (child.parent == moved)
-    {
-      const auto index =
-        std::lower_bound(before.begin(), before.end(), child.parentArc - 1e-9) - before.begin();
-      child.parentArc = vessel.arc[std::min<std::size_t>(index, vessel.arc.size() - 1)];
-    }
-  }
-}
-
-/**
- * Moves what runs through the aortic root, or along its wall, outwards: some random courses of the
- * left main would have it there. A smooth map of space, so that vessels stay joined; the ostia
- * stay where they are.
- */
-void KeepOutOfAorta(std::vector<DenseVessel>& vessels, const AorticRoot& root,
-  const Vector3& leftOstium, const Vector3& rightOstium)
-{
-  constexpr double inner = 6.0;      // mm inside the wall
-  constexpr double outer = 8.0;      // mm outside: nothing moves from there on
-  constexpr double clearance = 4.2;  // mm outside, where `inner` goes
-  constexpr double departure = 10.0; // mm from the ostium to full clearance
-  for (DenseVessel& vessel : vessels)
-  {
-    for (Vector3& p : vessel.points)
-    {
-      const double height =
-        std::clamp((p - root.centre).dot(root.axis), -AorticRoot::Below, AorticRoot::Above);
-      const Vector3 fromAxis = p - root.centre - height * root.axis;
-      const double distance = fromAxis.norm();
-      const double outside = distance - root.radius;
-      if (outside >= outer || distance < 1e-6)
-      {
-        continue;
-      }
-      const double wanted = outside < -inner
-        ? clearance
-        : clearance + (outside + inner) * (outer - clearance) / (outer + inner);
-      const double ostium = std::min((p - leftOstium).norm(), (p - rightOstium).norm());
-      p += SmoothStep(ostium / departure) * (wanted - outside) / distance * fromAxis;
-    }
-  }
-  for (std::size_t v = 0; v < vessels.size(); ++v)
-  {
-    UpdateArc(vessels, v);
-  }
-}
-
-/**
- * Pushes vessels apart that the random courses brought too close: two points of different vessels
- * keep 0.7 mm between their walls, less only where they have just parted. Without this some seeds
- * would have vessels that run into each other.
- */
-void Separate(std::vector<DenseVessel>& vessels)
-{
-  constexpr double gap = 0.7;       // mm between walls
-  constexpr double parting = 0.35;  // tan(half the least angle of departure), 39 degrees
-  constexpr double smoothing = 4.0; // mm along the vessel
-  constexpr int rounds = 60;
-  std::vector<std::vector<double>> attachments(vessels.size());
-  for (const DenseVessel& vessel : vessels)
-  {
-    if (vessel.parent < vessels.size())
-    {
-      attachments[vessel.parent].push_back(vessel.parentArc);
-    }
-  }
-  // Every few samples are enough: about 1 mm.
-  const auto strideOf = [](const DenseVessel& vessel)
-  {
-    return std::max<std::size_t>(
-      1, static_cast<std::size_t>(static_cast<double>(vessel.points.size()) / vessel.arc.back()));
-  };
-  for (int round = 0; round < rounds; ++round)
-  {
-    bool moved = false;
-    for (std::size_t u = 0; u < vessels.size(); ++u)
-    {
-      DenseVessel& vessel = vessels[u];
-      const std::size_t stride = strideOf(vessel);
-      std::vector<std::pair<double, Vector3>> pushes;
-      for (std::size_t v = 0; v < vessels.size(); ++v)
-      {
-        // Of two vessels the one without side vessels gives way, else the later one.
-        const bool gives =
-          attachments[u].empty() != attachments[v].empty() ? attachments[u].empty() : u > v;
-        if (u == v || !gives)
-        {
-          continue;
-        }
-        const DenseVessel& other = vessels[v];
-        const std::size_t otherStride = strideOf(other);
-        for (std::size_t i = 0; i < vessel.points.size(); i += stride)
-        {
-          double nearest = 64.0;
-          std::size_t at = 0;
-          for (std::size_t j = 0; j < other.points.size(); j += otherStride)
-          {
-            const double squared = (vessel.points[i] - other.points[j]).squaredNorm();
-            if (squared < nearest)
-            {
-              nearest = squared;
-              at = j;
-            }
-          }
-          const double full = vessel.radius[i] + other.radius[at] + gap;
-          if (nearest >= full * full)
-          {
-            continue;
-          }
-          const double wanted =
-            std::min(full, parting * TreeDistance(vessels, u, vessel.arc[i], v, other.arc[at]));
-          const double distance = std::sqrt(nearest);
-          if (distance < wanted - 0.02)
-          {
-            pushes.emplace_back(vessel.arc[i],
-              (vessel.points[i] - other.points[at]) *
-                ((wanted - distance) / std::max(0.1, distance)));
-          }
-        }
-      }
-      if (pushes.empty())
-      {
-        continue;
-      }
-      moved = true;
-      for (std::size_t i = 0; i < vessel.points.size(); ++i)
-      {
-        const double s = vessel.arc[i];
-        Vector3 sum = Vector3::Zero();
-        double weights = 0.0;
-        double strongest = 0.0;
-        for (const auto& push : pushes)
-        {
-          const double d = (s - push.first) / smoothing;
-          const double weight = std::exp(-0.5 * d * d);
-          sum += weight * push.second;
-          weights += weight;
-          strongest = std::max(strongest, weight);
-        }
-        // Attachments stay where they are.
-        double free = vessel.parent < vessels.size() ? SmoothStep(s / 4.0) : SmoothStep(s / 20.0);
-        for (const double attachment : attachments[u])
-        {
-          free *= SmoothStep(std::abs(s - attachment) / 5.0);
-        }
-        if (weights > 1e-12)
-        {
-          vessel.points[i] += 0.6 * free * strongest * sum / weights;
-        }
-      }
-      UpdateArc(vessels, u);
-      attachments[u].clear();
-      for (const DenseVessel& child : vessels)
-      {
-        if (child.parent == u)
-        {
-          attachments[u].push_back(child.parentArc);
-        }
-      }
-    }
-    if (!moved)
-    {
-      break;
-    }
-  }
-}
-
-double VeinRadius(double along)
-{
-  return 0.8 + 0.9 * along;
-}
-
-/// Veins cross arteries on the side away from the heart, and do not share their lumens: both walls are between them.
-void LiftOverArteries(
-  const HeartFrame& frame, const std::vector<DenseVessel>& arteries, DenseVessel& course)
-{
-  constexpr double walls = 0.7;  // mm: half a millimetre is the artery's
-  constexpr double slope = 10.0; // mm along the vein to each side of what it crosses
-  constexpr int rounds = 20;
-  const std::size_t count = course.points.size();
-  for (int round = 0; round < rounds; ++round)
-  {
-    std::vector<double> lift(count, 0.0);
-    std::vector<Vector3> outwards(count);
-    for (std::size_t i = 0; i < count; ++i)
-    {
-      const Vector3& p = course.points[i];
-      const Vector3 tangent =
-        course.points[std::min(i + 1, count - 1)] - course.points[i > 0 ? i - 1 : 0];
-      outwards[i] = EpicardialNormal(frame, p, tangent.normalized());
-      for (const DenseVessel& artery : arteries)
-      {
-        for (std::size_t n = 0; n < artery.points.size(); ++n)
-        {
-          const Vector3 away = p - artery.points[n];
-          const double minimum =
-            artery.radius[n] + VeinRadius(course.arc[i] / course.arc.back()) + walls;
-          const double missing = minimum * minimum - away.squaredNorm();
-          if (missing > 0.0)
-          {
-            const double up = away.dot(outwards[i]);
-            lift[i] = std::max(lift[i], std::sqrt(up * up + missing) - up);
-          }
-        }
-      }
-    }
-    if (*std::max_element(lift.begin(), lift.end()) < 0.01)
-    {
-      break;
-    }
-    // As little as needed there, and gently up to it.
-    for (std::size_t i = 0; i < count; ++i)
-    {
-      double most = 0.0;
-      for (std::size_t n = 0; n < count; ++n)
-      {
-        const double off = std::abs(course.arc[n] - course.arc[i]) / slope;
-        most = std::max(most, off < 1.0 ? lift[n] * (1.0 - SmoothStep(off)) : 0.0);
-      }
-      course.points[i] += most * outwards[i];
-    }
-    ComputeArc(course);
-  }
-}
-
-/// The great cardiac vein: beside the LAD from the apex up to its first diagonal, then in the groove
-/// beside the circumflex from its first marginal on.
-PhantomTree MakeVein(const HeartFrame& frame, const std::vector<DenseVessel>& arteries,
-  const DenseVessel& anterior, double firstDiagonal, const DenseVessel& circumflex,
-  double firstMarginal, double spacing)
-{
-  const auto beside = [&](const DenseVessel& vessel, double arc, double away, double out)
-  {
-    const Vector3 p = AtArc(vessel, vessel.points, arc);
-    const Vector3 tangent =
-      (AtArc(vessel, vessel.points, arc + 1.0) - AtArc(vessel, vessel.points, arc - 1.0))
-        .normalized();
-    const Vector3 normal = EpicardialNormal(frame, p, tangent);
-    return Vector3(p + away * normal.cross(tangent) + out * normal);
-  };
-  std::vector<Vector3> controls;
-  double arc = std::min(115.0, anterior.arc.back() - 25.0);
-  while (arc > firstDiagonal + 4.0)
-  {
-    controls.push_back(beside(anterior, arc, AtArc(anterior, anterior.radius, arc) + 2.4, 0.4));
-    arc -= 12.0;
-  }
-  arc = firstMarginal - 2.0;
-  while (arc < std::min(circumflex.arc.back() - 2.0, 75.0))
-  {
-    controls.push_back(
-      beside(circumflex, arc, -AtArc(circumflex, circumflex.radius, arc) - 2.8, 0.6));
-    arc += 9.0;
-  }
-  const CubicCurve curve(controls);
-  DenseVessel course;
-  constexpr int fine = 400;
-  for (int i = 0; i <= fine; ++i)
-  {
-    course.points.push_back(curve(curve.End() * i / fine));
-  }
-  ComputeArc(course);
-  LiftOverArteries(frame, arteries, course);
-
-  PhantomTree vein;
-  VesselTree::Branch branch;
-  branch.treeId = 2;
-  const double length = course.arc.back();
-  const int count = std::max(2, static_cast<int>(std::lround(length / spacing)));
-  for (int i = 0; i <= count; ++i)
-  {
-    const double s = length * i / count;
-    branch.points.push_back(i);
-    vein.points.push_back(AtArc(course, course.points, s));
-    vein.radius.push_back(VeinRadius(s / length));
-    vein.abscissa.push_back(s);
-    vein.segmentId.push_back(0);
-  }
-  branch.length = length;
-  branch.tortuosity = length / (vein.points.back() - vein.points.front()).norm() - 1.0;
-  vein.branches.push_back(branch);
-  vein.displacement.assign(vein.points.size(), Vector3::Zero());
-  vein.velocity = vein.displacement;
-  vein.visibility.assign(vein.points.size(), 1.0);
-  return vein;
 }
 
 int Strahler(PhantomTree& tree, std::size_t branch)
@@ -590,6 +124,7 @@ public:
 
   void GrowVessels();
   void PlaceRoot();
+  void GrowGrafts();
   void PlaceLesions();
   void CutIntoBranches();
   void LocateLesions();
@@ -597,35 +132,32 @@ public:
   void PlacePulmonaryTrunk();
 
 private:
-  /// Where on which vessel; points of the tree are not known yet.
-  struct Lesion
-  {
-    std::size_t host;
-    double arc;
-    double width;
-  };
-
   double LeaveParent(
     const VesselPlan& plan, DenseVessel& vessel, std::vector<Vector3>& controls) const;
-  void GrowVessel(std::size_t v, RandomStream& calibre);
-  bool ClearOfJunctions(std::size_t host, double s, double distance) const;
+  void GrowVessel(std::size_t v, double calibre);
+  bool Clear(std::size_t host, double s, double distance) const;
   std::pair<std::size_t, double> PickPlace(RandomStream& random, int number, double distance) const;
+  void RaiseRightOstium();
+  void GrowGraft(const PhantomGraft& graft);
+  std::vector<Vector3> CourseOfGraft(const PhantomGraft& graft, std::size_t target) const;
+  std::vector<PhantomLesion> CountedLesions() const;
+  std::vector<PhantomLesion> CountedSpots() const;
+  void AddLesion(const PhantomLesion& lesion, const std::string& where);
+  void RefuseOverlaps() const;
+  Vector3 TangentAt(std::size_t v, double arc) const;
+  void MakeSpot(const PlacedLesion& placed);
+  void FillLate(const PlacedLesion& occlusion);
   std::int64_t AddPoint(std::size_t v, double arc, double abscissa, int segment);
   void Cut(std::size_t v, std::int64_t origin, int parentGroup);
-  std::int64_t NearestPoint(const Lesion& lesion) const;
+  std::int64_t NearestPoint(const PlacedLesion& placed) const;
 
   PhantomAnatomy& Anatomy;
   const PhantomSettings& Settings;
   const Variation Varied;
-  const std::vector<VesselPlan> Plans;
+  std::vector<VesselPlan> Plans;
   std::map<std::string, std::size_t> ByName;
   std::vector<DenseVessel> Dense;
-  std::vector<std::vector<double>> Healthy; ///< radii before the lesions
-  std::vector<Lesion> Narrowed;
-  std::vector<Lesion> Calcified;
-  double OcclusionStart = 0.0;
-  double OcclusionEnd = 0.0;
-  std::size_t OccludedVessel;
+  std::vector<std::vector<double>> Healthy;                          ///< radii before the lesions
   std::vector<std::vector<std::pair<double, std::size_t>>> Children; ///< arc of the origin, vessel
 };
 
@@ -643,7 +175,6 @@ AnatomyBuilder::AnatomyBuilder(PhantomAnatomy& anatomy, const PhantomSettings& s
     this->Anatomy.vesselNames.push_back(this->Plans[v].name);
     this->Anatomy.intramural.push_back(this->Plans[v].depth == VesselDepth::Intramural);
   }
-  this->OccludedVessel = this->ByName.at("RCA");
 }
 
 /// Starts a side vessel on its parent.
@@ -681,15 +212,31 @@ double AnatomyBuilder::LeaveParent(
 
 void AnatomyBuilder::GrowVessels()
 {
-  RandomStream calibre(this->Settings.seed, Calibre);
-  for (std::size_t v = 0; v < this->Plans.size(); ++v)
+  RandomStream random(this->Settings.seed, Calibre);
+  std::vector<double> factors(this->Plans.size(), this->Settings.calibre);
+  for (double& factor : factors)
   {
-    this->GrowVessel(v, calibre);
+    factor *=
+      this->Settings.seed == 0 ? 1.0 : 1.0 + this->Settings.calibreVariation * random.Normal(2.0);
+  }
+  // Parents first, wherever they stand: an anomalous vessel may hang on a later one.
+  for (std::size_t grown = 0; grown < this->Plans.size();)
+  {
+    for (std::size_t v = 0; v < this->Plans.size(); ++v)
+    {
+      const std::string& parent = this->Plans[v].parent;
+      if (this->Dense[v].points.empty() &&
+        (parent.empty() || !this->Dense[this->ByName.at(parent)].points.empty()))
+      {
+        this->GrowVessel(v, factors[v]);
+        ++grown;
+      }
+    }
   }
 }
 
 /// Course and calibre.
-void AnatomyBuilder::GrowVessel(std::size_t v, RandomStream& calibre)
+void AnatomyBuilder::GrowVessel(std::size_t v, double calibre)
 {
   static const HeartFrame mean;
   const VesselPlan& plan = this->Plans[v];
@@ -716,15 +263,13 @@ void AnatomyBuilder::GrowVessel(std::size_t v, RandomStream& calibre)
 
   std::vector<double> at;
   std::vector<double> diameters;
-  const double vesselFactor = this->Settings.calibre *
-    (this->Settings.seed == 0 ? 1.0 : 1.0 + this->Settings.calibreVariation * calibre.Normal(2.0));
   for (std::size_t c = 0; c < controls.size(); ++c)
   {
     const double position = curve.Knot(c) / curve.End() * fine;
     const auto index = std::min(static_cast<std::size_t>(position), vessel.arc.size() - 2);
     at.push_back(vessel.arc[index] +
       (position - static_cast<double>(index)) * (vessel.arc[index + 1] - vessel.arc[index]));
-    diameters.push_back(plan.controls[c].diameter * vesselFactor);
+    diameters.push_back(plan.controls[c].diameter * calibre);
   }
   for (double s : vessel.arc)
   {
@@ -740,23 +285,166 @@ void AnatomyBuilder::GrowVessel(std::size_t v, RandomStream& calibre)
   }
 }
 
-/// The aortic root goes through both ostia.
+/// The aortic root goes through both ostia, where they usually are.
 void AnatomyBuilder::PlaceRoot()
 {
-  this->Anatomy.leftOstium = this->Dense[this->ByName.at("LAD")].points.front();
+  static const HeartFrame mean;
+  const bool single = this->Settings.disease.origin == CoronaryOrigin::SingleRight;
+  this->Anatomy.leftOstium = single ? Place({ Vector3::Zero(), 0.0 }, VesselDepth::Epicardial, mean,
+                                        this->Varied, this->Anatomy.frame.size)
+                                    : this->Dense[this->ByName.at("LAD")].points.front();
   this->Anatomy.rightOstium = this->Dense[this->ByName.at("RCA")].points.front();
   this->Anatomy.root.centre = 0.5 * (this->Anatomy.leftOstium + this->Anatomy.rightOstium);
   this->Anatomy.root.radius = 0.5 * (this->Anatomy.leftOstium - this->Anatomy.rightOstium).norm();
   const Vector3 across = (this->Anatomy.leftOstium - this->Anatomy.rightOstium).normalized();
   const Vector3 up(-0.30, -0.20, 0.93);
   this->Anatomy.root.axis = (up - up.dot(across) * across).normalized();
-  KeepOutOfAorta(
-    this->Dense, this->Anatomy.root, this->Anatomy.leftOstium, this->Anatomy.rightOstium);
+  KeepOutOfAorta(this->Dense, this->Anatomy.root,
+    single ? this->Anatomy.rightOstium : this->Anatomy.leftOstium, this->Anatomy.rightOstium);
   Separate(this->Dense);
+  if (this->Settings.disease.origin == CoronaryOrigin::HighRight)
+  {
+    this->RaiseRightOstium();
+  }
 }
 
-bool AnatomyBuilder::ClearOfJunctions(std::size_t host, double s, double distance) const
+/// Up along the aorta's wall, and the vessel's beginning with it.
+void AnatomyBuilder::RaiseRightOstium()
 {
+  constexpr double rise = 15.0;  // mm
+  constexpr double along = 22.0; // mm of the vessel that come along
+  const AorticRoot& root = this->Anatomy.root;
+  DenseVessel& right = this->Dense[this->ByName.at("RCA")];
+  const Vector3 outwards = (right.points.front() - root.centre).normalized();
+  // The aorta tapers above its sinuses, as the tissues have it.
+  const double radius = root.radius * (1.0 - 0.15 * (rise - 8.0) / 30.0);
+  const Vector3 place = root.centre + rise * root.axis + radius * outwards;
+  const Vector3 shift = place - right.points.front();
+  double reach = along;
+  for (const DenseVessel& child : this->Dense)
+  {
+    reach = child.parent == this->ByName.at("RCA") ? std::min(reach, child.parentArc) : reach;
+  }
+  for (std::size_t i = 0; i < right.points.size(); ++i)
+  {
+    right.points[i] += (1.0 - SmoothStep(right.arc[i] / reach)) * shift;
+  }
+  this->Anatomy.rightOstium = place;
+  UpdateArc(this->Dense, this->ByName.at("RCA"));
+}
+
+void AnatomyBuilder::GrowGrafts()
+{
+  for (const PhantomGraft& graft : this->Settings.disease.grafts)
+  {
+    this->GrowGraft(graft);
+  }
+}
+
+void AnatomyBuilder::GrowGraft(const PhantomGraft& graft)
+{
+  const std::string where = "PhantomSettings: graft " + graft.name + ": ";
+  const auto target = this->ByName.find(graft.vessel);
+  Require(target != this->ByName.end(), where + "there is no vessel " + graft.vessel);
+  Require(this->ByName.count(graft.name) == 0, where + "there is a vessel of that name");
+  const DenseVessel& host = this->Dense[target->second];
+  Require(graft.position < host.arc.back() - 3.0,
+    where + graft.vessel + " is only " + std::to_string(std::lround(host.arc.back())) + " mm long");
+  DenseVessel vessel;
+  vessel.points = SmoothCourse(this->CourseOfGraft(graft, target->second), 600);
+  ComputeArc(vessel);
+  // Narrower at its end, so that it is sewn into the vessel's side.
+  const double narrow =
+    std::min(0.5 * graft.diameter, 0.85 * AtArc(host, host.radius, graft.position));
+  for (const double s : vessel.arc)
+  {
+    const double open = SmoothStep((vessel.arc.back() - s) / 8.0);
+    vessel.radius.push_back(narrow + open * (0.5 * graft.diameter - narrow));
+  }
+  this->ByName[graft.name] = this->Plans.size();
+  this->Plans.push_back({ graft.name, GraftTree, "", VesselDepth::Epicardial, {}, 0, {} });
+  this->Dense.push_back(std::move(vessel));
+  this->Children.emplace_back();
+  this->Anatomy.vesselNames.push_back(graft.name);
+  this->Anatomy.intramural.push_back(0);
+}
+
+/// From the chest wall or the aorta over the heart's surface to the vessel's side.
+std::vector<Vector3> AnatomyBuilder::CourseOfGraft(
+  const PhantomGraft& graft, std::size_t target) const
+{
+  const HeartFrame& frame = this->Anatomy.frame;
+  const AorticRoot& root = this->Anatomy.root;
+  const DenseVessel& host = this->Dense[target];
+  const Vector3 end = AtArc(host, host.points, graft.position);
+  const Vector3 tangent = (AtArc(host, host.points, graft.position + 1.0) -
+    AtArc(host, host.points, graft.position - 1.0))
+                            .normalized();
+  const Vector3 normal = EpicardialNormal(frame, end, tangent);
+  const Vector3 landing = end - 7.0 * tangent + 5.0 * normal;
+  constexpr double clear = 18.0; // mm from the pulmonary trunk's axis
+  std::vector<Vector3> course;
+  if (graft.mammary)
+  {
+    // Beside the breast bone.
+    course = { Vector3(0.0, -76.0, 60.0), Vector3(0.0, -77.0, 45.0), Vector3(2.0, -78.0, 30.0) };
+  }
+  else
+  {
+    constexpr double height = 48.0; // mm above the sinuses
+    Vector3 outwards = (landing - root.centre).normalized() - 1.2 * Vector3::UnitY();
+    outwards = (outwards - outwards.dot(root.axis) * root.axis).normalized();
+    const Vector3 middle = root.centre + height * root.axis;
+    course = { middle + 0.85 * root.radius * outwards,
+      middle + (0.85 * root.radius + 6.0) * outwards };
+    const Vector3& trunk = this->Anatomy.pulmonaryAxis;
+    const Vector3 overTrunk = this->Anatomy.pulmonaryBase + 40.0 * trunk;
+    if (landing[0] > overTrunk[0])
+    {
+      // To the left side around the front of the pulmonary trunk.
+      Vector3 front(0.35, -1.0, 0.0);
+      front = (front - front.dot(trunk) * trunk).normalized();
+      course.push_back(overTrunk + clear * front);
+    }
+  }
+  // Along a great circle of the epicardium, well above it.
+  const auto scaled = [&](const Vector3& p) -> Vector3
+  { return (frame.ToHeart(p) - HeartFrame::Centre).cwiseQuotient(HeartFrame::Radii); };
+  const Vector3 from = scaled(course.back());
+  const Vector3 to = scaled(landing);
+  constexpr int waypoints = 6;
+  for (int i = 1; i <= waypoints; ++i)
+  {
+    const double u = static_cast<double>(i) / (waypoints + 1);
+    const Vector3 direction = ((1.0 - u) * from.normalized() + u * to.normalized()).normalized();
+    const double level = (1.0 - u) * from.norm() + u * to.norm() + 0.25 * u * (1.0 - u);
+    Vector3 p = frame.ToWorld(
+      HeartFrame::Centre + direction.cwiseProduct(HeartFrame::Radii) * std::max(1.1, level));
+    // In front of the pulmonary trunk.
+    const Vector3 off = p - this->Anatomy.pulmonaryBase;
+    const Vector3 across = off - off.dot(this->Anatomy.pulmonaryAxis) * this->Anatomy.pulmonaryAxis;
+    if (across.norm() < clear && off.dot(this->Anatomy.pulmonaryAxis) > -20.0)
+    {
+      p += (clear - across.norm()) * across.normalized();
+    }
+    course.push_back(p);
+  }
+  course.push_back(landing);
+  course.push_back(end);
+  return course;
+}
+
+/// Neither at a bifurcation nor at another lesion with a wall.
+bool AnatomyBuilder::Clear(std::size_t host, double s, double distance) const
+{
+  for (const PlacedLesion& placed : this->Anatomy.lesions)
+  {
+    if (placed.HasWall() && placed.vessel == static_cast<int>(host) &&
+      std::abs(placed.middle - s) < placed.HalfExtent() + distance)
+    {
+      return false;
+    }
+  }
   for (const DenseVessel& child : this->Dense)
   {
     if (child.parent == host && std::abs(child.parentArc - s) < distance)
@@ -777,11 +465,65 @@ std::pair<std::size_t, double> AnatomyBuilder::PickPlace(
   const std::size_t host = this->ByName.at(hosts[number % hosts.size()]);
   const double last = std::min(80.0, this->Dense[host].arc.back() - 10.0);
   double s = random.Uniform(8.0, last);
-  for (int attempt = 0; attempt < 200 && !this->ClearOfJunctions(host, s, distance); ++attempt)
+  for (int attempt = 0; attempt < 200 && !this->Clear(host, s, distance); ++attempt)
   {
     s = random.Uniform(8.0, last);
   }
   return { host, s };
+}
+
+/// What the settings ask for by number: places are the seed's.
+std::vector<PhantomLesion> AnatomyBuilder::CountedLesions() const
+{
+  std::vector<PhantomLesion> lesions;
+  RandomStream random(this->Settings.seed, Stenoses);
+  for (int n = 0; n < this->Settings.stenoses; ++n)
+  {
+    const auto [host, position] = this->PickPlace(random, n, 5.0);
+    PhantomLesion lesion = UsualLesion("stenosis");
+    lesion.vessel = this->Plans[host].name;
+    lesion.position = position;
+    lesion.length = random.Uniform(6.0, 12.0);
+    lesion.degree = this->Settings.stenosisDegree;
+    lesions.push_back(lesion);
+  }
+  if (this->Settings.chronicOcclusion)
+  {
+    const double origin = this->Dense[this->ByName.at("RV1")].parentArc;
+    const double next = this->Dense[this->ByName.at("AM1")].parentArc;
+    PhantomLesion lesion = UsualLesion("occlusion");
+    lesion.vessel = "RCA";
+    lesion.length = std::min(15.0, next - origin - 8.0);
+    lesion.position = 0.5 * (origin + next);
+    lesions.push_back(lesion);
+  }
+  return lesions;
+}
+
+/// The same for balls of calcium.
+std::vector<PhantomLesion> AnatomyBuilder::CountedSpots() const
+{
+  std::vector<PhantomLesion> spots;
+  RandomStream random(this->Settings.seed, Plaques);
+  for (int n = 0; n < this->Settings.calcifiedPlaques; ++n)
+  {
+    const auto [host, position] = this->PickPlace(random, n, 3.0);
+    PhantomLesion spot = UsualLesion("spot");
+    spot.vessel = this->Plans[host].name;
+    spot.position = position;
+    // Its side is drawn about any direction across the vessel.
+    const Vector3 centre = AtArc(this->Dense[host], this->Dense[host].points, position);
+    const Vector3 tangent = this->TangentAt(host, position);
+    const Vector3 side = tangent.unitOrthogonal();
+    const double angle = random.Uniform(0.0, 2.0 * Pi);
+    const Vector3 out = std::cos(angle) * side + std::sin(angle) * tangent.cross(side);
+    const Vector3 normal = EpicardialNormal(this->Anatomy.frame, centre, tangent);
+    spot.angle = std::atan2(out.dot(normal.cross(tangent)), out.dot(normal)) * 180.0 / Pi;
+    spot.calciumThickness = 2.0 * random.Uniform(0.5, 1.2);
+    spot.length = spot.calciumThickness;
+    spots.push_back(spot);
+  }
+  return spots;
 }
 
 void AnatomyBuilder::PlaceLesions()
@@ -790,45 +532,155 @@ void AnatomyBuilder::PlaceLesions()
   {
     this->Healthy.push_back(vessel.radius);
   }
-  RandomStream stenosisRandom(this->Settings.seed, Stenoses);
-  for (int n = 0; n < this->Settings.stenoses; ++n)
+  for (const PhantomLesion& lesion : this->CountedLesions())
   {
-    const auto [host, position] = this->PickPlace(stenosisRandom, n, 5.0);
-    const double width = stenosisRandom.Uniform(6.0, 12.0) / 2.3548;
-    this->Narrowed.push_back({ host, position, 2.3548 * width });
-    DenseVessel& vessel = this->Dense[host];
+    this->AddLesion(lesion, "");
+  }
+  const std::vector<PhantomLesion>& wanted = this->Settings.disease.lesions;
+  for (std::size_t n = 0; n < wanted.size(); ++n)
+  {
+    this->AddLesion(wanted[n],
+      "PhantomSettings: lesions[" + std::to_string(n) + "] (" + LesionKindName(wanted[n].kind) +
+        ") ");
+  }
+  this->RefuseOverlaps();
+  for (const PhantomLesion& spot : this->CountedSpots())
+  {
+    this->AddLesion(spot, "");
+  }
+  for (const PlacedLesion& placed : this->Anatomy.lesions)
+  {
+    DenseVessel& vessel = this->Dense[placed.vessel];
     for (std::size_t i = 0; i < vessel.points.size(); ++i)
     {
-      const double u = (vessel.arc[i] - position) / width;
-      vessel.radius[i] = std::max(MinimumRadius,
-        vessel.radius[i] * (1.0 - this->Settings.stenosisDegree * std::exp(-0.5 * u * u)));
+      vessel.radius[i] *= placed.LumenFactor(vessel.arc[i]);
     }
   }
-  RandomStream plaqueRandom(this->Settings.seed, Plaques);
-  for (int n = 0; n < this->Settings.calcifiedPlaques; ++n)
+  for (const PlacedLesion& placed : this->Anatomy.lesions)
   {
-    const auto [host, position] = this->PickPlace(plaqueRandom, n, 3.0);
-    const DenseVessel& vessel = this->Dense[host];
-    const Vector3 centre = AtArc(vessel, vessel.points, position);
-    const Vector3 tangent =
-      (AtArc(vessel, vessel.points, position + 0.5) - AtArc(vessel, vessel.points, position - 0.5))
-        .normalized();
-    const Vector3 side = tangent.unitOrthogonal();
-    const double angle = plaqueRandom.Uniform(0.0, 2.0 * Pi);
-    const Vector3 out = std::cos(angle) * side + std::sin(angle) * tangent.cross(side);
-    const double radius = plaqueRandom.Uniform(0.5, 1.2);
-    this->Anatomy.plaques.push_back(
-      { centre + out * (AtArc(vessel, vessel.radius, position) + 0.5 * radius), radius,
-        static_cast<int>(host), -1 });
-    this->Calcified.push_back({ host, position, 2.0 * radius });
+    if (placed.lesion.kind == LesionKind::Spot)
+    {
+      this->MakeSpot(placed);
+    }
   }
-  if (this->Settings.chronicOcclusion)
+}
+
+/// @param where  begins what is said of a lesion that does not fit
+void AnatomyBuilder::AddLesion(const PhantomLesion& lesion, const std::string& where)
+{
+  const auto found = this->ByName.find(lesion.vessel);
+  std::string names;
+  for (const VesselPlan& plan : this->Plans)
   {
-    const double origin = this->Dense[this->ByName.at("RV1")].parentArc;
-    const double next = this->Dense[this->ByName.at("AM1")].parentArc;
-    const double length = std::min(15.0, next - origin - 8.0);
-    this->OcclusionStart = 0.5 * (origin + next - length);
-    this->OcclusionEnd = this->OcclusionStart + length;
+    names += (names.empty() ? "" : ", ") + plan.name;
+  }
+  Require(
+    found != this->ByName.end(), where + "is on " + lesion.vessel + ", which is none of " + names);
+  const double whole = this->Dense[found->second].arc.back();
+  PlacedLesion placed;
+  placed.lesion = lesion;
+  placed.vessel = static_cast<int>(found->second);
+  placed.middle = lesion.relative ? lesion.position * whole : lesion.position;
+  if (!where.empty())
+  {
+    const double half = 0.5 * lesion.length;
+    const auto text = [](double value) { return std::to_string(std::lround(value)); };
+    Require(placed.middle - half >= 0.0 && placed.middle + half <= whole,
+      where + "goes from " + text(placed.middle - half) + " to " + text(placed.middle + half) +
+        " mm, " + lesion.vessel + " from 0 to " + text(whole));
+  }
+  this->Anatomy.lesions.push_back(placed);
+}
+
+/// Two outer walls can not be in one place, nor a ball of calcium in a wall.
+void AnatomyBuilder::RefuseOverlaps() const
+{
+  const std::vector<PlacedLesion>& lesions = this->Anatomy.lesions;
+  for (std::size_t b = 0; b < lesions.size(); ++b)
+  {
+    for (std::size_t a = 0; a < b; ++a)
+    {
+      const auto spot = [](const PlacedLesion& placed)
+      { return placed.lesion.kind == LesionKind::Spot; };
+      const bool apart = lesions[a].vessel != lesions[b].vessel ||
+        !(lesions[a].HasWall() || spot(lesions[a])) ||
+        !(lesions[b].HasWall() || spot(lesions[b])) || (spot(lesions[a]) && spot(lesions[b])) ||
+        std::abs(lesions[a].middle - lesions[b].middle) >=
+          lesions[a].HalfExtent() + lesions[b].HalfExtent();
+      Require(apart,
+        "PhantomSettings: on " + lesions[b].lesion.vessel + " the " +
+          LesionKindName(lesions[a].lesion.kind) + " at " +
+          std::to_string(std::lround(lesions[a].middle)) + " mm overlaps the " +
+          LesionKindName(lesions[b].lesion.kind) + " at " +
+          std::to_string(std::lround(lesions[b].middle)) + " mm, with its shoulders");
+    }
+  }
+}
+
+Vector3 AnatomyBuilder::TangentAt(std::size_t v, double arc) const
+{
+  const DenseVessel& vessel = this->Dense[v];
+  return (AtArc(vessel, vessel.points, arc + 0.5) - AtArc(vessel, vessel.points, arc - 0.5))
+    .normalized();
+}
+
+void AnatomyBuilder::MakeSpot(const PlacedLesion& placed)
+{
+  const DenseVessel& vessel = this->Dense[placed.vessel];
+  const double position = placed.middle;
+  const Vector3 centre = AtArc(vessel, vessel.points, position);
+  const Vector3 tangent = this->TangentAt(placed.vessel, position);
+  const Vector3 normal = EpicardialNormal(this->Anatomy.frame, centre, tangent);
+  const double angle = placed.lesion.angle * Pi / 180.0;
+  const Vector3 out = std::cos(angle) * normal + std::sin(angle) * normal.cross(tangent);
+  const double radius = 0.5 * placed.lesion.calciumThickness;
+  this->Anatomy.plaques.push_back(
+    { centre + out * (AtArc(vessel, vessel.radius, position) + 0.5 * radius), radius,
+      placed.lesion.calciumValue, placed.vessel, -1 });
+}
+
+/// What lies behind an occlusion is filled from its far end: dimmer the nearer it is.
+void AnatomyBuilder::FillLate(const PlacedLesion& occlusion)
+{
+  constexpr double rise = 0.5; // HU a mm away from the lesion: 5.1 +- 13.4 a cm in 94 occlusions
+  const double first = occlusion.middle - 0.5 * occlusion.lesion.length;
+  // Where each vessel begins to fill late.
+  std::vector<double> from(this->Dense.size(), std::numeric_limits<double>::max());
+  from[occlusion.vessel] = first;
+  for (bool more = true; more;)
+  {
+    more = false;
+    for (std::size_t v = 0; v < this->Dense.size(); ++v)
+    {
+      const std::size_t parent = this->Dense[v].parent;
+      if (parent < this->Dense.size() && this->Dense[v].parentArc >= from[parent] && from[v] > 0.0)
+      {
+        from[v] = 0.0;
+        more = true;
+      }
+    }
+  }
+  const PhantomTree& tree = this->Anatomy.tree;
+  double start = 0.0;
+  for (std::size_t p = 0; p < tree.points.size(); ++p)
+  {
+    if (this->Anatomy.pointVessel[p] == occlusion.vessel && this->Anatomy.pointArc[p] <= first)
+    {
+      start = std::max(start, tree.abscissa[p]);
+    }
+  }
+  start += occlusion.lesion.length;
+  for (std::size_t p = 0; p < tree.points.size(); ++p)
+  {
+    if (this->Anatomy.pointArc[p] >= from[this->Anatomy.pointVessel[p]])
+    {
+      const double usual =
+        this->Settings.lumenHU + this->Settings.attenuationGradient * tree.abscissa[p] / 10.0;
+      const double late = occlusion.lesion.fill * this->Settings.lumenHU +
+        rise * std::max(0.0, tree.abscissa[p] - start);
+      double& change = this->Anatomy.contrastChange[p];
+      change = std::min(change, late - usual);
+    }
   }
 }
 
@@ -840,8 +692,24 @@ std::int64_t AnatomyBuilder::AddPoint(std::size_t v, double arc, double abscissa
   this->Anatomy.tree.abscissa.push_back(abscissa);
   this->Anatomy.tree.segmentId.push_back(segment);
   this->Anatomy.pointVessel.push_back(static_cast<int>(v));
-  this->Anatomy.occluded.push_back(this->Settings.chronicOcclusion && v == this->OccludedVessel &&
-    arc >= this->OcclusionStart && arc <= this->OcclusionEnd);
+  this->Anatomy.pointArc.push_back(arc);
+  this->Anatomy.healthyRadius.push_back(AtArc(vessel, this->Healthy[v], arc));
+  char occluded = 0;
+  char rigid = 0;
+  double squeeze = 0.0;
+  for (const PlacedLesion& placed : this->Anatomy.lesions)
+  {
+    if (placed.vessel == static_cast<int>(v))
+    {
+      occluded |= placed.Blocks(arc);
+      const double profile = placed.Profile(arc);
+      rigid |= placed.lesion.kind == LesionKind::Stent && profile > 0.5;
+      squeeze += placed.lesion.kind == LesionKind::Bridge ? placed.lesion.degree * profile : 0.0;
+    }
+  }
+  this->Anatomy.occluded.push_back(occluded);
+  this->Anatomy.rigid.push_back(rigid);
+  this->Anatomy.squeeze.push_back(std::min(0.99, squeeze));
   return static_cast<std::int64_t>(this->Anatomy.tree.points.size()) - 1;
 }
 
@@ -858,7 +726,10 @@ void AnatomyBuilder::Cut(std::size_t v, std::int64_t origin, int parentGroup)
   if (last < 0)
   {
     last = this->AddPoint(v, 0.0, 0.0, segment);
-    this->Anatomy.ends.push_back({ static_cast<int>(v), last, last + 1, plan.tree == 0 ? 2 : 3 });
+    this->Anatomy.ends.push_back({ static_cast<int>(v), last, last + 1,
+      plan.tree == 0     ? 2
+        : plan.tree == 1 ? 3
+                         : 4 + static_cast<int>(this->Anatomy.ends.size()) });
   }
   struct Waiting
   {
@@ -886,7 +757,8 @@ void AnatomyBuilder::Cut(std::size_t v, std::int64_t origin, int parentGroup)
     {
       const double arc = from + (to - from) * i / count;
       const std::int64_t point = this->AddPoint(v, arc, base + arc, segment);
-      this->Anatomy.steps.push_back({ last, point, static_cast<int>(v), branch.groupId });
+      this->Anatomy.steps.push_back({ last, point, static_cast<int>(v), branch.groupId,
+        this->Anatomy.intramural[v] != 0 || this->Anatomy.squeeze[point] > 0.0 });
       branch.points.push_back(point);
       last = point;
     }
@@ -951,16 +823,14 @@ void AnatomyBuilder::CutIntoBranches()
   }
 }
 
-std::int64_t AnatomyBuilder::NearestPoint(const Lesion& lesion) const
+std::int64_t AnatomyBuilder::NearestPoint(const PlacedLesion& placed) const
 {
-  const Vector3 place =
-    AtArc(this->Dense[lesion.host], this->Dense[lesion.host].points, lesion.arc);
   std::int64_t nearest = 0;
   double minimum = std::numeric_limits<double>::max();
   for (std::size_t p = 0; p < this->Anatomy.tree.points.size(); ++p)
   {
-    const double distance = (this->Anatomy.tree.points[p] - place).squaredNorm();
-    if (this->Anatomy.pointVessel[p] == static_cast<int>(lesion.host) && distance < minimum)
+    const double distance = std::abs(this->Anatomy.pointArc[p] - placed.middle);
+    if (this->Anatomy.pointVessel[p] == placed.vessel && distance < minimum)
     {
       minimum = distance;
       nearest = static_cast<std::int64_t>(p);
@@ -969,20 +839,31 @@ std::int64_t AnatomyBuilder::NearestPoint(const Lesion& lesion) const
   return nearest;
 }
 
-/// Names the points of the tree that the lesions lie at.
+/// What lesions are once the tree is made: named points, late contrast, walls.
 void AnatomyBuilder::LocateLesions()
 {
-  for (const Lesion& lesion : this->Narrowed)
+  PhantomAnatomy& anatomy = this->Anatomy;
+  const std::size_t count = anatomy.tree.points.size();
+  anatomy.contrastChange.assign(count, 0.0);
+  anatomy.wallOffset.assign(count, Vector3::Zero());
+  anatomy.wallRadius = anatomy.tree.radius;
+  std::size_t spot = 0;
+  for (PlacedLesion& placed : anatomy.lesions)
   {
-    const double left =
-      AtArc(this->Dense[lesion.host], this->Dense[lesion.host].radius, lesion.arc);
-    const double whole = AtArc(this->Dense[lesion.host], this->Healthy[lesion.host], lesion.arc);
-    this->Anatomy.narrowings.push_back({ static_cast<int>(lesion.host), this->NearestPoint(lesion),
-      lesion.width, 1.0 - left / whole });
+    placed.point = this->NearestPoint(placed);
+    if (placed.lesion.kind == LesionKind::Spot)
+    {
+      anatomy.plaques[spot++].point = placed.point;
+    }
+    if (placed.lesion.kind == LesionKind::Occlusion)
+    {
+      this->FillLate(placed);
+    }
   }
-  for (std::size_t p = 0; p < this->Calcified.size(); ++p)
+  BuildParts(anatomy);
+  if (this->Settings.disease.leads)
   {
-    this->Anatomy.plaques[p].point = this->NearestPoint(this->Calcified[p]);
+    AddLeads(anatomy);
   }
 }
 
@@ -1012,10 +893,11 @@ PhantomAnatomy::PhantomAnatomy(const PhantomSettings& settings)
   AnatomyBuilder builder(*this, settings);
   builder.GrowVessels();
   builder.PlaceRoot();
+  builder.PlacePulmonaryTrunk();
+  builder.GrowGrafts();
   builder.PlaceLesions();
   builder.CutIntoBranches();
   builder.LocateLesions();
   builder.AddVein();
-  builder.PlacePulmonaryTrunk();
 }
 }

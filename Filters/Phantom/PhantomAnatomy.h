@@ -5,28 +5,18 @@
 #ifndef DynamicCoronary_PhantomAnatomy_h
 #define DynamicCoronary_PhantomAnatomy_h
 
-#include "PhantomMotion.h"
+#include "PhantomParts.h"
 
 namespace coronary
 {
 /// A calcification on a vessel's wall.
 struct Plaque
 {
-  static constexpr float Value = 850.0f; ///< HU
-
   Vector3 centre;     ///< mm, at rest
   double radius;      ///< mm
+  double value;       ///< HU
   int vessel;         ///< that it lies on
   std::int64_t point; ///< of the tree, nearest along the vessel
-};
-
-/// A place where a vessel is narrowed on purpose.
-struct Narrowing
-{
-  int vessel;
-  std::int64_t point; ///< of the tree, where it is narrowest
-  double width;       ///< mm along the vessel, at half its depth
-  double degree;      ///< share of the diameter that is gone there, lesions that overlap together
 };
 
 /// A place where a side vessel leaves its parent.
@@ -54,6 +44,7 @@ struct AxisStep
   std::int64_t second;
   int vessel;
   int branch;
+  bool inMuscle; ///< no fat around it
 };
 
 /// The aorta where the coronary arteries leave it: a capsule along the axis.
@@ -66,6 +57,9 @@ struct AorticRoot
   double radius;                         ///< mm
 };
 
+/// Number of the tree that a graft is, beside the left and the right one and the veins.
+constexpr int GraftTree = 3;
+
 /// Arterial trees at rest. "Vessel" means a smooth tube with a name (the LAD from the left main to
 /// the apex); "branch" means its piece between two bifurcations, as in the output tree.
 struct PhantomAnatomy
@@ -75,13 +69,21 @@ struct PhantomAnatomy
   HeartFrame frame;
   PhantomTree tree; ///< at rest; displacement and velocity zero
   std::vector<int> pointVessel;
-  std::vector<char> occluded;   ///< per point
-  std::vector<char> intramural; ///< per vessel: runs in the myocardium, without fat
+  std::vector<double> pointArc;       ///< per point: mm from its vessel's origin
+  std::vector<double> healthyRadius;  ///< per point: without lesions, mm
+  std::vector<char> occluded;         ///< per point
+  std::vector<char> rigid;            ///< per point: a stent holds it
+  std::vector<double> squeeze;        ///< per point: share of the radius that systole takes
+  std::vector<double> contrastChange; ///< per point: HU against the usual course of contrast
+  std::vector<Vector3> wallOffset;    ///< per point: from the axis to the outer wall's middle, mm
+  std::vector<double> wallRadius;     ///< per point: mm; the lumen's where there is no own wall
+  std::vector<char> intramural;       ///< per vessel: runs in the myocardium, without fat
   std::vector<AxisStep> steps;
   std::vector<Junction> junctions;
   std::vector<VesselEnd> ends;
   std::vector<Plaque> plaques;
-  std::vector<Narrowing> narrowings;
+  std::vector<PlacedLesion> lesions; ///< counted ones, those of the disease, counted spots
+  std::vector<PhantomPart> parts;    ///< in the order of their layers
   std::vector<std::string> vesselNames;
 
   PhantomTree vein;

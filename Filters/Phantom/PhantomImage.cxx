@@ -152,6 +152,52 @@ struct Extra
   double reach;
 };
 
+/// One cone of a lesion's part.
+struct PartPiece
+{
+  PartPiece(const PhantomTube& tube, int number, const Matrix3& covariance)
+    : start(tube.start)
+    , axis(tube.end - tube.start)
+    , length(this->axis.norm())
+    , radius(tube.startRadius)
+    , widening(tube.endRadius - tube.startRadius)
+    , part(number)
+  {
+    this->axis /= std::max(1e-9, this->length);
+    const double along = this->axis.dot(covariance * this->axis);
+    this->alongScale = static_cast<float>(1.0 / std::sqrt(along));
+    this->acrossScale = static_cast<float>(1.0 / std::sqrt(0.5 * (covariance.trace() - along)));
+  }
+
+  /// How much of a voxel's response lies in it: a Gaussian over a disc, between two planes.
+  float Coverage(const DiscTable& disc, const Vector3& world) const
+  {
+    const Vector3 offset = world - this->start;
+    const double u = offset.dot(this->axis);
+    const float between =
+      NormalIntegral::Of(static_cast<float>(this->length - u) * this->alongScale) -
+      NormalIntegral::Of(static_cast<float>(-u) * this->alongScale);
+    if (between <= 0.0f)
+    {
+      return 0.0f;
+    }
+    const double away = (offset - u * this->axis).norm();
+    const double r =
+      this->radius + this->widening * std::clamp(u / std::max(1e-9, this->length), 0.0, 1.0);
+    return between *
+      disc(static_cast<float>(away) * this->acrossScale, static_cast<float>(r) * this->acrossScale);
+  }
+
+  Vector3 start;
+  Vector3 axis; ///< unit vector
+  double length;
+  double radius;
+  double widening;
+  int part;
+  float alongScale; ///< 1 / standard deviation of the blur along the axis
+  float acrossScale;
+};
+
 /// The image's index grid in tiles, so that any part of the image gets the same values.
 struct Tiles
 {
@@ -245,12 +291,15 @@ private:
     Vector3 corner[8]; ///< from the corners to where their material rests
     TileLayers layers;
     PhantomLumen::Candidates candidates;
+    PhantomLumen::Candidates walls;
     std::vector<Extra> vein;
-    std::vector<Extra> plaques;
+    std::vector<std::pair<Extra, float>> plaques; ///< with their HU
+    std::vector<const PartPiece*> parts;          ///< in the order of their layers
 
     bool OnlyTissues() const
     {
-      return this->candidates.Empty() && this->vein.empty() && this->plaques.empty();
+      return this->candidates.Empty() && this->walls.Empty() && this->vein.empty() &&
+        this->plaques.empty() && this->parts.empty();
     }
     bool Uniform() const
     {
@@ -270,6 +319,7 @@ private:
     PhantomLumen::Sample* vessel, float* painted) const;
   float PaintVein(const Tile& tile, const Vector3& world, float value) const;
   float PaintPlaques(const Tile& tile, const Vector3& world, float value) const;
+  float PaintParts(const Tile& tile, const Vector3& world, bool metal, float value) const;
   float PaintVessel(
     const PhantomMoment& moment, const PhantomLumen::Sample& sample, float value) const;
 
@@ -287,8 +337,10 @@ private:
   double MeanBlur; ///< mm
   double Reach;    ///< mm from a wall at which it can still be seen
   std::vector<std::unique_ptr<PhantomLumen>> Lumens; ///< of each moment
+  std::vector<std::unique_ptr<PhantomLumen>> Walls;  ///< the same; empty: they are the lumens'
   std::vector<std::vector<Extra>> Veins;
-  std::vector<Eigen::Vector3f> Rest; ///< from each tile corner and moment to where it rests
+  std::vector<std::vector<PartPiece>> Parts; ///< of each moment
+  std::vector<Eigen::Vector3f> Rest;         ///< from each tile corner and moment to where it rests
   int BandTiles;
   int BandsInY;
 };
@@ -315,10 +367,16 @@ Rendering::Rendering(const PhantomSettings& settings, const PhantomAnatomy& anat
   this->Covariance = grid.direction * this->Variance.asDiagonal() * grid.direction.transpose();
   this->MeanBlur = std::sqrt(this->Variance.mean());
   this->Reach = std::max(3.4, Saturated * std::sqrt(this->Variance.maxCoeff()) + 0.5);
+  const std::vector<char> open(anatomy.occluded.size(), 0);
   for (const PhantomMoment& moment : moments)
   {
-    this->Lumens.push_back(std::make_unique<PhantomLumen>(
-      anatomy, moment.tree.points, moment.tree.radius, moment.endNormals, this->Reach));
+    this->Lumens.push_back(std::make_unique<PhantomLumen>(anatomy, moment.tree.points,
+      moment.tree.radius, moment.endNormals, this->Reach, anatomy.occluded));
+    if (!moment.wall.points.empty())
+    {
+      this->Walls.push_back(std::make_unique<PhantomLumen>(
+        anatomy, moment.wall.points, moment.wall.radius, moment.endNormals, this->Reach, open));
+    }
     std::vector<Extra>& pieces = this->Veins.emplace_back();
     const PhantomTree& vein = moment.vein;
     for (std::size_t p = 0; p + 1 < vein.points.size(); p += 2)
@@ -326,6 +384,14 @@ Rendering::Rendering(const PhantomSettings& settings, const PhantomAnatomy& anat
       const std::size_t q = std::min(p + 2, vein.points.size() - 1);
       pieces.push_back({ vein.points[p], vein.points[q] - vein.points[p], vein.radius[p],
         vein.radius[p] + this->Reach });
+    }
+    std::vector<PartPiece>& parts = this->Parts.emplace_back();
+    for (std::size_t n = 0; n < moment.parts.size(); ++n)
+    {
+      for (const PhantomTube& tube : moment.parts[n])
+      {
+        parts.emplace_back(tube, static_cast<int>(n), this->Covariance);
+      }
     }
   }
 }
@@ -509,6 +575,10 @@ void Rendering::Collect(std::size_t moment, int tileX, int tileY, int tileZ, Til
   DecideLayers(this->Around, restCentre, frame.ToHeart(restCentre),
     (tile.ball + spread) / std::min(1.0, frame.size), this->MeanBlur, tile.layers);
   this->Lumens[moment]->Collect(tile.centre, tile.ball, tile.candidates);
+  if (!this->Walls.empty())
+  {
+    this->Walls[moment]->Collect(tile.centre, tile.ball, tile.walls);
+  }
   tile.vein.clear();
   for (const Extra& piece : this->Veins[moment])
   {
@@ -524,7 +594,19 @@ void Rendering::Collect(std::size_t moment, int tileX, int tileY, int tileZ, Til
     const double radius = this->Anatomy.plaques[p].radius;
     if ((now.plaques[p] - tile.centre).norm() < tile.ball + radius + this->Reach)
     {
-      tile.plaques.push_back({ now.plaques[p], Vector3::Zero(), radius, 0.0 });
+      tile.plaques.emplace_back(Extra{ now.plaques[p], Vector3::Zero(), radius, 0.0 },
+        static_cast<float>(this->Anatomy.plaques[p].value));
+    }
+  }
+  tile.parts.clear();
+  for (const PartPiece& piece : this->Parts[moment])
+  {
+    const double reach =
+      std::max(piece.radius, piece.radius + piece.widening) + 0.5 * piece.length + this->Reach;
+    if ((piece.start + 0.5 * piece.length * piece.axis - tile.centre).squaredNorm() <
+      (tile.ball + reach) * (tile.ball + reach))
+    {
+      tile.parts.push_back(&piece);
     }
   }
 }
@@ -570,8 +652,13 @@ void Rendering::Paint(const Tile& tile, Tissues::Row& samples, Band& band) const
         if (this->Vessels)
         {
           value = this->PaintPlaques(tile, world, value);
-          value = this->PaintVessel(this->Moments[tile.moment], vessel[i - tile.base[0]], value);
+          value = this->PaintParts(tile, world, false, value);
+          if (!tile.candidates.Empty())
+          {
+            value = this->PaintVessel(this->Moments[tile.moment], vessel[i - tile.base[0]], value);
+          }
         }
+        value = this->PaintParts(tile, world, true, value);
         row[i - band.box[0]] += tile.weight * value;
       }
     }
@@ -625,23 +712,27 @@ void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int 
   {
     PaintRow(this->Around, layers[layer], samples, painted);
   }
-  if (!tile.candidates.Empty())
+  if (!tile.candidates.Empty() || !tile.walls.Empty())
   {
     for (int i = tile.box[0]; i <= tile.box[1]; ++i)
     {
+      const Vector3 world = this->Grid.grid.IndexToWorld(i, j, k);
       PhantomLumen::Sample& sample = vessel[i - tile.base[0]];
-      sample =
-        this->Lumens[tile.moment]->Evaluate(this->Grid.grid.IndexToWorld(i, j, k), tile.candidates);
-      if (sample.step < 0)
+      sample = this->Lumens[tile.moment]->Evaluate(world, tile.candidates);
+      const PhantomLumen::Sample outer =
+        this->Walls.empty() ? sample : this->Walls[tile.moment]->Evaluate(world, tile.walls);
+      if (outer.step < 0)
       {
         continue;
       }
       // Epicardial vessels lie in fat, intramural ones in muscle: where they touch a chamber, too.
-      const bool inMuscle = this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel];
+      const AxisStep& step = this->Anatomy.steps[outer.step];
+      const bool inMuscle = step.inMuscle;
+      const bool bridged = inMuscle && this->Anatomy.intramural[step.vessel] == 0;
       float& value = painted[i - tile.base[0]];
-      const auto d = static_cast<float>(sample.distance);
+      const auto d = static_cast<float>(outer.distance);
       // In the map of a material muscle is not told from blood: there it coats all of the vessel.
-      if (!inMuscle || !this->Vessels || value > Muscle)
+      if (!inMuscle || bridged || !this->Vessels || value > Muscle)
       {
         const float coat = NormalIntegral::Of(inMuscle ? (2.0f - d) / 0.45f : (1.9f - d) / 0.35f);
         value += coat * ((inMuscle ? this->Palette.muscle : this->Palette.fat) - value);
@@ -660,7 +751,7 @@ void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int 
       const PhantomLumen::Sample& sample = vessel[i - tile.base[0]];
       if (sample.step >= 0)
       {
-        const bool inMuscle = this->Anatomy.intramural[this->Anatomy.steps[sample.step].vessel];
+        const bool inMuscle = this->Anatomy.steps[sample.step].inMuscle;
         float& value = painted[i - tile.base[0]];
         value += NormalIntegral::Of(static_cast<float>(-sample.distance / this->MeanBlur)) *
           ((inMuscle ? this->Palette.muscle : this->Palette.fat) - value);
@@ -697,12 +788,40 @@ float Rendering::PaintVein(const Tile& tile, const Vector3& world, float value) 
 
 float Rendering::PaintPlaques(const Tile& tile, const Vector3& world, float value) const
 {
-  for (const Extra& plaque : tile.plaques)
+  for (const auto& [plaque, hounsfield] : tile.plaques)
   {
     // Dense calcium blooms.
     const double blur = std::sqrt(this->MeanBlur * this->MeanBlur + 0.3 * 0.3);
     const double d = (world - plaque.start).norm() - plaque.radius;
-    value += NormalIntegral::Of(static_cast<float>(-d / blur)) * (Plaque::Value - value);
+    value += NormalIntegral::Of(static_cast<float>(-d / blur)) * (hounsfield - value);
+  }
+  return value;
+}
+
+/**
+ * The lesions' parts, without metal or of metal alone. In the map of a material all of them are
+ * their coat.
+ */
+float Rendering::PaintParts(const Tile& tile, const Vector3& world, bool metal, float value) const
+{
+  for (std::size_t n = 0; n < tile.parts.size();)
+  {
+    const int number = tile.parts[n]->part;
+    const PhantomPart& part = this->Anatomy.parts[number];
+    const bool wanted = (part.layer == PartLayer::Metal) == metal || !this->Vessels;
+    float coverage = 0.0f;
+    // Pieces of one part follow each other, and together they are it.
+    for (; n < tile.parts.size() && tile.parts[n]->part == number; ++n)
+    {
+      coverage += wanted ? tile.parts[n]->Coverage(this->Disc, world) : 0.0f;
+    }
+    if (coverage > 0.0f)
+    {
+      const float colour = this->Vessels ? static_cast<float>(part.value)
+        : part.inMuscle                  ? this->Palette.muscle
+                                         : this->Palette.fat;
+      value += std::min(1.0f, coverage) * (colour - value);
+    }
   }
   return value;
 }
@@ -726,8 +845,10 @@ float Rendering::PaintVessel(
   const double path =
     moment.tree.abscissa[step.first] * (1.0 - u) + moment.tree.abscissa[step.second] * u;
   const double hidden = this->Lost[step.first] * (1.0 - u) + this->Lost[step.second] * u;
-  const auto contrast =
-    static_cast<float>(this->Settings.lumenHU + this->Settings.attenuationGradient * path / 10.0);
+  const double change = this->Anatomy.contrastChange[step.first] * (1.0 - u) +
+    this->Anatomy.contrastChange[step.second] * u;
+  const auto contrast = static_cast<float>(
+    this->Settings.lumenHU + this->Settings.attenuationGradient * path / 10.0 + change);
   return value +
     static_cast<float>(1.0 - 0.92 * hidden) * this->Disc(offset * scale, radius * scale) *
     (contrast - value);

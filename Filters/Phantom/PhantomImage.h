@@ -28,7 +28,9 @@ struct PhantomMoment
   PhantomTree tree;
   PhantomTree vein;
   std::vector<Vector3> plaques;
-  std::vector<Vector3> endNormals; ///< as PhantomLumen takes them
+  std::vector<Vector3> endNormals;             ///< as PhantomLumen takes them
+  std::vector<std::vector<PhantomTube>> parts; ///< cones of each of the anatomy's parts
+  PhantomTree wall;                            ///< outer walls; empty: they are the lumen's
 };
 
 /**

@@ -42,7 +42,8 @@ double RoundUnion(double a, double b, double k)
 }
 
 PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vector3>& points,
-  const std::vector<double>& radius, const std::vector<Vector3>& endNormals, double reach)
+  const std::vector<double>& radius, const std::vector<Vector3>& endNormals, double reach,
+  const std::vector<char>& blocked)
   : Limit(reach)
 {
   const auto add =
@@ -59,7 +60,7 @@ PhantomLumen::PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vect
     const AxisStep& step = anatomy.steps[s];
     stepOfPoint[step.first] = static_cast<std::int32_t>(s);
     stepOfPoint[step.second] = static_cast<std::int32_t>(s);
-    if (anatomy.occluded[step.first] || anatomy.occluded[step.second])
+    if (blocked[step.first] || blocked[step.second])
     {
       continue;
     }

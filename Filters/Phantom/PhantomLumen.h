@@ -41,9 +41,11 @@ public:
    * @param points, radius  of the anatomy's tree at the moment in question
    * @param endNormals      outward unit normals of the flat ends, in the order of anatomy.ends
    * @param reach           distances beyond it are cut to it, mm
+   * @param blocked         per point: no lumen there
    */
   PhantomLumen(const PhantomAnatomy& anatomy, const std::vector<Vector3>& points,
-    const std::vector<double>& radius, const std::vector<Vector3>& endNormals, double reach);
+    const std::vector<double>& radius, const std::vector<Vector3>& endNormals, double reach,
+    const std::vector<char>& blocked);
 
   Sample Evaluate(const Vector3& position) const;
   Sample Evaluate(const Vector3& position, const Candidates& candidates) const;

@@ -721,8 +721,8 @@ PhantomSurface MeshLumen(const PhantomAnatomy& anatomy, const PhantomLumen& lume
     return [&progress, from, to](double f) { return progress(from + (to - from) * f); };
   };
   // A grid that is coarse for the thinnest vessel would cut it to pieces.
-  edgeLength = std::min(
-    edgeLength, 0.85 * *std::min_element(anatomy.tree.radius.begin(), anatomy.tree.radius.end()));
+  const double thinnest = *std::min_element(anatomy.tree.radius.begin(), anatomy.tree.radius.end());
+  edgeLength = std::min(edgeLength, 0.85 * std::max(MinimumMeshedRadius, thinnest));
   Mesh mesh;
   constexpr int attempts = 6;
   for (int attempt = 0;; ++attempt)

@@ -9,6 +9,9 @@
 
 namespace coronary
 {
+/// No lumen is meshed that is narrower, mm: such a mesh is drawn to the true wall afterwards.
+constexpr double MinimumMeshedRadius = 0.2;
+
 /**
  * Dual marching cubes on a sparse grid (one vertex for each sheet of the surface in a cell), then
  * tangential smoothing and projection onto the lumen's wall. The mesh is closed, oriented and

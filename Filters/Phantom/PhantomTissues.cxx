@@ -40,7 +40,8 @@ Tissues::Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy)
   const Vector3& r = HeartFrame::Radii;
 
   // Thorax, in world coordinates: it does not move.
-  const int thorax = worldEllipsoid(Vector3(-35.0, 15.0, -30.0), Vector3(165.0, 112.0, 900.0));
+  const int thorax = worldEllipsoid(Vector3(-35.0, 15.0, -30.0),
+    Vector3(165.0, 112.0, 900.0) + settings.disease.bodyFat * Vector3(1.0, 1.0, 0.0));
   const int pleura = worldEllipsoid(Vector3(-35.0, 12.0, -30.0), Vector3(142.0, 90.0, 900.0));
   const int spine = capsule(Vector3(-35.0, 84.0, -400.0), Vector3(-35.0, 84.0, 400.0), 19.0, 19.0);
   const int sternum = worldEllipsoid(Vector3(-35.0, -82.0, -20.0), Vector3(20.0, 6.5, 120.0));

@@ -1,5 +1,7 @@
 #include "PhantomVesselPlans.h"
 
+#include <algorithm>
+
 namespace coronary
 {
 namespace
@@ -191,6 +193,67 @@ void PlanRightTree(const PhantomSettings& settings, std::vector<VesselPlan>& pla
       InferiorRightBranch, {} });
   }
 }
+
+/// From the right artery's beginning around the back of the aorta: between it and the left atrium.
+std::vector<Control> BehindAorta(double diameter)
+{
+  return { At(-18.8, -32.4, -16.3, diameter), At(-26.0, -23.5, -18.0, diameter),
+    At(-27.5, -8.5, -16.5, diameter), At(-19.5, 3.0, -12.0, diameter),
+    At(-7.0, 7.5, -7.0, diameter) };
+}
+
+/// Moves a vessel's origin to the right artery, and its side vessels to the right tree.
+void HangOnRight(const std::string& name, std::vector<VesselPlan>& plans)
+{
+  std::vector<std::string> moved{ name };
+  for (VesselPlan& plan : plans)
+  {
+    if (plan.name == name)
+    {
+      plan.parent = "RCA";
+      plan.tree = 1;
+    }
+    else if (std::find(moved.begin(), moved.end(), plan.parent) != moved.end())
+    {
+      // Parents come before their side vessels.
+      plan.tree = 1;
+      moved.push_back(plan.name);
+    }
+  }
+}
+
+void PlanOrigins(CoronaryOrigin origin, std::vector<VesselPlan>& plans)
+{
+  const auto planOf = [&](const char* name) -> VesselPlan&
+  {
+    return *std::find_if(
+      plans.begin(), plans.end(), [=](const VesselPlan& plan) { return plan.name == name; });
+  };
+  VesselPlan& left = planOf("LAD");
+  VesselPlan& circumflex = planOf("LCx");
+  if (origin == CoronaryOrigin::CircumflexFromRight)
+  {
+    HangOnRight("LCx", plans);
+    std::vector<Control> course = BehindAorta(3.0);
+    course.push_back(At(5.0, 9.5, -8.0, 3.0));
+    course.push_back(At(14.0, 9.0, -12.0, 3.0));
+    // On in the groove.
+    course.insert(course.end(), circumflex.controls.begin() + 4, circumflex.controls.end());
+    circumflex.controls = course;
+    // Without a fork there is no left main.
+    left.segment = ProximalLAD;
+    left.changes.erase(left.changes.begin());
+  }
+  else if (origin == CoronaryOrigin::SingleRight)
+  {
+    HangOnRight("LAD", plans);
+    std::vector<Control> course = BehindAorta(3.4);
+    course.push_back(At(3.0, 6.5, -2.0, 3.4));
+    course.push_back(At(8.5, 1.5, 0.0, 3.4));
+    course.insert(course.end(), left.controls.begin() + 2, left.controls.end());
+    left.controls = course;
+  }
+}
 }
 
 std::vector<VesselPlan> PlanVessels(const PhantomSettings& settings)
@@ -198,6 +261,7 @@ std::vector<VesselPlan> PlanVessels(const PhantomSettings& settings)
   std::vector<VesselPlan> plans;
   PlanLeftTree(settings, plans);
   PlanRightTree(settings, plans);
+  PlanOrigins(settings.disease.origin, plans);
   return plans;
 }
 }

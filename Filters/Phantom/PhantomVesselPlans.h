@@ -40,7 +40,7 @@ struct VesselPlan
 };
 /// Control points: Dodge 1988 (positions) and 1992 (diameters of right-dominant men), in the order
 /// of the vessel; points that Dodge does not give are placed by azimuth and height. Parents come
-/// before their side vessels.
+/// before their side vessels, but for vessels with an anomalous origin.
 std::vector<VesselPlan> PlanVessels(const PhantomSettings& settings);
 }
 

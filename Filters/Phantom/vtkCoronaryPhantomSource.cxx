@@ -28,6 +28,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -39,6 +40,7 @@ using SDDP = vtkStreamingDemandDrivenPipeline;
 struct vtkCoronaryPhantomSource::Internals
 {
   coronary::PhantomSettings Settings;
+  std::string Diseases; ///< presets, apart by commas
   vtkTimeStamp SettingsTime;
   std::vector<double> Phases = coronary::PaperPhases();
 
@@ -48,7 +50,20 @@ struct vtkCoronaryPhantomSource::Internals
     {
       this->Built.reset();
       this->BoxSpacing = 0.0;
-      this->Built = std::make_unique<coronary::CoronaryPhantom>(this->Settings);
+      coronary::PhantomSettings settings = this->Settings;
+      std::istringstream names(this->Diseases);
+      for (std::string name; std::getline(names, name, ',');)
+      {
+        try
+        {
+          coronary::AddDisease(name, settings);
+        }
+        catch (const std::invalid_argument& error)
+        {
+          throw std::invalid_argument(std::string("Diseases: ") + error.what());
+        }
+      }
+      this->Built = std::make_unique<coronary::CoronaryPhantom>(settings);
       this->BuiltTime.Modified();
     }
     return *this->Built;
@@ -280,7 +295,7 @@ vtkCoronaryPhantomSource::vtkCoronaryPhantomSource()
   : Data(std::make_unique<Internals>())
 {
   this->SetNumberOfInputPorts(1);
-  this->SetNumberOfOutputPorts(ProbePort + 1);
+  this->SetNumberOfOutputPorts(WallPort + 1);
 }
 
 vtkCoronaryPhantomSource::~vtkCoronaryPhantomSource() = default;
@@ -348,6 +363,23 @@ void vtkCoronaryPhantomSource::SetPointSpread(double i, double j, double k)
 double* vtkCoronaryPhantomSource::GetPointSpread()
 {
   return this->Data->Settings.pointSpread;
+}
+
+void vtkCoronaryPhantomSource::SetDiseases(const char* names)
+{
+  this->Set(this->Data->Diseases, std::string(names ? names : ""));
+}
+
+const char* vtkCoronaryPhantomSource::GetDiseases()
+{
+  return this->Data->Diseases.c_str();
+}
+
+void vtkCoronaryPhantomSource::SetDisease(const coronary::PhantomDisease& disease)
+{
+  this->Data->Settings.disease = disease;
+  this->Data->SettingsTime.Modified();
+  this->Modified();
 }
 
 void vtkCoronaryPhantomSource::AddLostPhase(double time, double fraction)
@@ -589,11 +621,14 @@ void vtkCoronaryPhantomSource::Generate(
       FillTree(first ? phantom.Tree(time) : coronary::PhantomTree(), output);
       break;
     case SurfacePort:
+    case WallPort:
     {
       coronary::PhantomSurface surface;
       if (first)
       {
-        surface = phantom.Surface(time, vtkCoronary::ProgressOf(this, 0.0, 0.8));
+        const coronary::ProgressCallback progress = vtkCoronary::ProgressOf(this, 0.0, 0.8);
+        surface =
+          port == WallPort ? phantom.OuterWall(time, progress) : phantom.Surface(time, progress);
       }
       const std::vector<Vector3> velocity =
         SurfaceVelocity(phantom, surface, time, vtkCoronary::ProgressOf(this, 0.8, 1.0));
@@ -686,6 +721,7 @@ void vtkCoronaryPhantomSource::PrintSelf(ostream& os, vtkIndent indent)
   print("StenosisDegree", settings.stenosisDegree);
   print("CalcifiedPlaques", settings.calcifiedPlaques);
   print("ChronicOcclusion", settings.chronicOcclusion);
+  print("Diseases", this->Data->Diseases);
   print("CycleLength", settings.cycleLength);
   print("MotionAmplitude", settings.motionAmplitude);
   print("AxialMotionRight", settings.axialMotionRight);

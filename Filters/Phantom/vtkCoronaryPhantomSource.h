@@ -38,6 +38,8 @@
  * - 5, type of the input: the points of the input, taken as reference positions, where they are
  *   at the time. Adds the point data `Displacement` (double[3], mm) and `Velocity` (double[3],
  *   mm/s) to what the input has. Empty vtkPolyData without an input.
+ * - 6, vtkPolyData: outer wall of the arteries, arrays as port 2: around plaques, stents and
+ *   occlusions, elsewhere it is the lumen's wall.
  *
  * @par Input port:
  * 0, optional, one vtkPointSet: points to be carried by the motion to output 5.
@@ -67,6 +69,7 @@
 namespace coronary
 {
 struct ImageGrid;
+struct PhantomDisease;
 }
 
 class VTKCORONARYPHANTOM_EXPORT vtkCoronaryPhantomSource : public vtkAlgorithm
@@ -83,7 +86,8 @@ public:
     SurfacePort = 2,
     OstiaPort = 3,
     VeinPort = 4,
-    ProbePort = 5
+    ProbePort = 5,
+    WallPort = 6
   };
 
   enum DominanceTypes
@@ -157,7 +161,7 @@ public:
 
   ///@{
   /**
-   * Number of narrowings, 0 to 20, and their diameter reduction, 0 to 0.95. Defaults 0 and 0.5.
+   * Number of narrowings, 0 to 20, and their diameter reduction, 0 to 0.99. Defaults 0 and 0.5.
    */
   void SetStenoses(int count);
   int GetStenoses();
@@ -180,6 +184,16 @@ public:
   void SetChronicOcclusion(bool occlusion);
   bool GetChronicOcclusion();
   vtkBooleanMacro(ChronicOcclusion, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Disease of the arteries beside these: names of coronary::DiseasePresets(), apart by commas, or
+   * any list in C++. Default none.
+   */
+  void SetDiseases(const char* names);
+  const char* GetDiseases();
+  void SetDisease(const coronary::PhantomDisease& disease);
   ///@}
 
   ///@{
