@@ -8,9 +8,11 @@
 #include "OptionChecks.h"
 #include "PhantomOptions.h"
 #include "ProgressDisplay.h"
+#include "ScanFolder.h"
 #include "ScannerOptions.h"
 #include "SeriesDescription.h"
 #include "StagedFolder.h"
+#include "TextFile.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 
@@ -28,6 +30,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -40,6 +43,7 @@ namespace
 {
 constexpr const char* SeriesName = "series.json";
 constexpr const char* ScanName = "scan.json";
+constexpr const char* PartsName = "scan-parts";
 
 // Share of a phase's time that its parts take, for the progress.
 constexpr double TruthShare = 0.3;
@@ -51,6 +55,8 @@ struct PhantomJob
   PhaseOptions phases;
   ScannerOptions scanner;
   ScannerSettings scan; ///< what scanner.Settings() says
+  std::vector<ScanVariant> variants;
+  std::string given; ///< all options that decide what the images are, as text
   std::vector<double> spacing = { 0.5 };
   std::vector<double> origin;
   std::vector<double> direction;
@@ -251,6 +257,32 @@ std::string Percent(double fraction)
   return text;
 }
 
+/// All options that decide what the images are, with the contents of files that they name.
+std::string GivenOptions(const CLI::App& app)
+{
+  std::string text = "version " DYNAMICCORONARY_VERSION "\n";
+  for (const CLI::Option* option : app.get_options())
+  {
+    const std::string name = option->get_name();
+    if (name == "--output" || name == "--threads" || name == "--quiet" || name == "--compress" ||
+      name == "--no-truth" || option->empty())
+    {
+      continue;
+    }
+    text += name;
+    for (const std::string& value : option->results())
+    {
+      text += " " + value;
+      if (std::filesystem::is_regular_file(value))
+      {
+        text += "\n" + ReadTextFile(value, "an option's file") + "\n";
+      }
+    }
+    text += "\n";
+  }
+  return text;
+}
+
 /// Makes the files of one series, phase by phase.
 class SeriesWriter
 {
@@ -260,7 +292,8 @@ public:
     : Job(job)
     , Source(source)
     , Times(times)
-    , Progress("phase", static_cast<int>(times.size()), job.quiet)
+    , Progress(job.scanner.Given() ? "step" : "phase",
+        static_cast<int>(times.size()) + (job.scanner.Given() ? 1 : 0), job.quiet)
   {
     for (std::size_t i = 0; i < times.size(); ++i)
     {
@@ -275,9 +308,14 @@ public:
 
   void Write(StagedFolder& folder)
   {
+    if (this->Scanner)
+    {
+      this->Scan();
+    }
     for (std::size_t i = 0; i < this->Times.size(); ++i)
     {
-      this->Progress.BeginStep(static_cast<int>(i), Percent(this->Times[i]));
+      this->Progress.BeginStep(
+        static_cast<int>(i) + (this->Scanner ? 1 : 0), Percent(this->Times[i]));
       SeriesDescription::Phase phase;
       phase.fraction = this->Times[i];
       this->FindSeeds(this->Times[i]);
@@ -305,12 +343,12 @@ public:
     }
     if (this->Scanner)
     {
-      WriteFileAtomically(
-        folder.Add(ScanName), DescribeScan(this->Job.scan, *this->Scanner, this->Times));
+      WriteFileAtomically(folder.Add(ScanName),
+        DescribeScan(this->Job.scan, *this->Scanner, this->Times, this->Job.variants));
     }
     if (!this->Job.truthOnly)
     {
-      WriteSeriesDescription(folder.Add(SeriesName), this->Series);
+      this->WriteSeries(folder);
     }
     ThrowIfInterrupted();
     this->Messages.PrintWarnings();
@@ -333,6 +371,15 @@ public:
     return text.str();
   }
 
+  /// The files are in place: the parts that they were made of are not needed any more.
+  void Done()
+  {
+    if (this->Parts)
+    {
+      this->Parts->Remove();
+    }
+  }
+
 private:
   /// A scanner with the heart in it, before anything is computed: a wrong setting is told at once.
   void MakeScanner()
@@ -343,7 +390,51 @@ private:
     image->Get(vtkDataObject::ORIGIN(), this->Grid.origin.data());
     image->Get(vtkDataObject::SPACING(), this->Grid.spacing.data());
     this->Phantom = std::make_unique<CoronaryPhantom>(this->Job.settings);
-    this->Scanner = std::make_unique<CtScanner>(*this->Phantom, this->Job.scan, this->Grid);
+    this->Anatomy = std::make_unique<ScannedPhantom>(*this->Phantom);
+    this->Scanner = std::make_unique<CtScanner>(
+      *this->Anatomy, this->Job.scan, this->Grid, this->Times, this->Job.variants);
+  }
+
+  /// All views, and what is made of them; parts of a scan that was stopped are taken over.
+  void Scan()
+  {
+    const std::string where = this->Job.output + "/" + PartsName;
+    this->Parts =
+      std::make_unique<ScanFolder>(where, this->Job.given + DescribeScanner(this->Job.scan));
+    if (this->Parts->Found() > 0 && !this->Job.quiet)
+    {
+      std::printf(
+        "%s: %d parts of this scan were made before\n", where.c_str(), this->Parts->Found());
+    }
+    this->Progress.BeginStep(0, "views and slices");
+    this->Scanner->Scan(*this->Parts,
+      [&](double fraction)
+      {
+        this->Progress.Update(fraction);
+        return Interruption() == 0;
+      });
+  }
+
+  /// One series.json; of several variants each has one in its folder, the truth is common.
+  void WriteSeries(StagedFolder& folder)
+  {
+    if (this->Job.variants.size() < 2)
+    {
+      WriteSeriesDescription(folder.Add(SeriesName), this->Series);
+      return;
+    }
+    for (const ScanVariant& variant : this->Job.variants)
+    {
+      SeriesDescription series = this->Series;
+      for (SeriesDescription::Phase& phase : series.phases)
+      {
+        for (std::string* truth : { &phase.surface, &phase.centerline })
+        {
+          *truth = truth->empty() ? "" : "../" + *truth;
+        }
+      }
+      WriteSeriesDescription(folder.Add(VariantName(variant) + "/" + SeriesName), series);
+    }
   }
 
   /// Brings a port up to date; the progress of the phase goes from `first` to `last`.
@@ -399,35 +490,40 @@ private:
     const double first = this->Job.noTruth ? 0.0 : TruthShare;
     const double written = std::min(1.0, first + RenderShare);
     phase.image = "phase_" + this->Numbers[index] + ".mha";
-    const std::string path = folder.Add(phase.image);
-    const auto write = [&](const short* values)
+    const auto report = [&](double fraction)
     {
-      WriteMetaImage(path, this->Grid, values, this->Job.compress,
-        [&](double fraction)
-        {
-          this->Progress.Update(written + (1.0 - written) * fraction);
-          return Interruption() == 0;
-        });
+      this->Progress.Update(fraction);
+      return Interruption() == 0;
+    };
+    const auto write = [&](const std::string& name, const short* values, double begin, double end)
+    {
+      WriteMetaImage(folder.Add(name), this->Grid, values, this->Job.compress,
+        [&](double fraction) { return report(begin + (end - begin) * fraction); });
     };
     if (this->Scanner)
     {
       const std::array<int, 6>& e = this->Grid.extent;
       std::vector<std::int16_t> values(
         static_cast<std::size_t>(e[1] - e[0] + 1) * (e[3] - e[2] + 1) * (e[5] - e[4] + 1));
-      this->Scanner->Scan(phase.fraction, values.data(),
-        [&](double fraction)
-        {
-          this->Progress.Update(first + (written - first) * fraction);
-          return Interruption() == 0;
-        });
-      write(values.data());
+      const std::size_t count = this->Job.variants.size();
+      for (std::size_t v = 0; v < count; ++v)
+      {
+        const auto share = [&](double done) {
+          return first +
+            (1.0 - first) * (static_cast<double>(v) + done) / static_cast<double>(count);
+        };
+        this->Scanner->Image(index, v, *this->Parts, values.data(),
+          [&](double fraction) { return report(share(0.5 * fraction)); });
+        const std::string in = count > 1 ? VariantName(this->Job.variants[v]) + "/" : "";
+        write(in + phase.image, values.data(), share(0.5), share(1.0));
+      }
       return;
     }
     this->Update(vtkCoronaryPhantomSource::ImagePort, phase.fraction, first, written);
     auto* image = vtkImageData::SafeDownCast(
       this->Source->GetOutputDataObject(vtkCoronaryPhantomSource::ImagePort));
     this->Grid = vtkCoronary::GridOf(image);
-    write(static_cast<const short*>(image->GetScalarPointer()));
+    write(phase.image, static_cast<const short*>(image->GetScalarPointer()), written, 1.0);
     image->ReleaseData();
   }
 
@@ -440,7 +536,9 @@ private:
   SeriesDescription Series;
   ImageGrid Grid;
   std::unique_ptr<CoronaryPhantom> Phantom; ///< that the scanner sees
-  std::unique_ptr<CtScanner> Scanner;       ///< none: images by a formula
+  std::unique_ptr<ScannedAnatomy> Anatomy;
+  std::unique_ptr<CtScanner> Scanner; ///< none: images by a formula
+  std::unique_ptr<ScanFolder> Parts;
   double ReferenceTime = 0.0;
   bool ReferenceIsLost = false;
   double MinimumSpeed = 0.0;
@@ -455,6 +553,7 @@ void PhantomJob::Run()
   if (this->scanner.Given())
   {
     this->scan = this->scanner.Settings(this->settings.seed);
+    this->variants = this->scanner.Variants(this->scan);
     // The truth's visibility is that of the scanner's temporal resolution.
     this->settings.temporalWindow =
       std::min(0.5 * this->settings.cycleLength, 0.5 * this->scan.turnTime / this->scan.sources);
@@ -469,13 +568,14 @@ void PhantomJob::Run()
     SeriesWriter writer(*this, source, times);
     writer.Write(folder);
     summary = writer.Summary();
+    folder.Commit();
+    writer.Done();
   }
   catch (const std::runtime_error& error)
   {
     ThrowIfInterrupted();
     throw std::runtime_error(folder.Translate(error.what()));
   }
-  folder.Commit();
   if (!this->quiet)
   {
     std::printf("%s: %s\n", this->output.c_str(), summary.c_str());
@@ -488,9 +588,16 @@ Command MakePhantomCommand(CLI::App& program)
   CLI::App* app = program.add_subcommand(
     "phantom", "Make a gated CT series of a beating coronary tree, with its exact truth");
   app->footer("Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp "
-              "and, last, DIR/series.json, with NN from 00; with --scanner DIR/scan.json, too.");
+              "and, last, DIR/series.json, with NN from 00; with --scanner DIR/scan.json, too: "
+              "what is in DIR/scan-parts "
+              "until all is written lets a scan that was stopped go on.");
   auto job = std::make_shared<PhantomJob>();
   job->Declare(*app);
-  return { app, [job] { job->Run(); } };
+  return { app,
+    [job, app]
+    {
+      job->given = GivenOptions(*app);
+      job->Run();
+    } };
 }
 }

@@ -1,6 +1,7 @@
 #include "ScannerOptions.h"
 
 #include "Command.h"
+#include "OptionChecks.h"
 #include "TextFile.h"
 
 #include <nlohmann/json.hpp>
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 
 namespace coronary
 {
@@ -126,9 +128,22 @@ void ScannerOptions::AddTo(CLI::App& app)
         [](std::string& text) { return text.empty() ? "a name is needed" : std::string(); }, ""))
       ->type_name("PRESET|FILE")
       ->group(group);
-  app.add_option("--kernel", this->kernel, "Kernel of its reconstruction")
+  app
+    .add_option("--kernel", this->kernels,
+      "Kernels of its reconstruction; with several, or several --image-noise, there is a folder "
+      "for each "
+      "pair, all from the same views")
     ->check(CLI::IsMember({ "soft", "standard", "sharp" }).description("soft|standard|sharp"))
-    ->type_name("KERNEL")
+    ->delimiter(',')
+    ->type_name("KERNEL,...")
+    ->needs(option)
+    ->group(group);
+  app
+    .add_option("--image-noise", this->imageNoise,
+      "Noise in the middle of the patient, in HU, that sets the tube current; one or several")
+    ->check(Within(1.0, 500.0))
+    ->delimiter(',')
+    ->type_name("HU,...")
     ->needs(option)
     ->group(group);
   // What the scanner's physics decide.
@@ -163,43 +178,114 @@ ScannerSettings ScannerOptions::Settings(std::uint64_t seed) const
         std::string("--scanner: ") + error.what() + "; nor is there a file of that name");
     }
   }
-  if (!this->kernel.empty())
+  if (!this->kernels.empty())
   {
-    settings.kernel = KernelOf(this->kernel, "--kernel");
+    settings.kernel = KernelOf(this->kernels.front(), "--kernel");
+  }
+  if (!this->imageNoise.empty())
+  {
+    settings.imageNoise = this->imageNoise.front();
   }
   settings.seed = seed;
   return settings;
 }
 
-std::string DescribeScan(
-  const ScannerSettings& settings, const CtScanner& scanner, const std::vector<double>& phases)
+std::vector<ScanVariant> ScannerOptions::Variants(const ScannerSettings& settings) const
 {
-  Json json;
-  Json& numbers = json["scanner"];
+  std::vector<ReconstructionKernel> chosen;
+  for (const std::string& name : this->kernels)
+  {
+    chosen.push_back(KernelOf(name, "--kernel"));
+  }
+  if (chosen.empty())
+  {
+    chosen.push_back(settings.kernel);
+  }
+  std::vector<double> levels = this->imageNoise;
+  if (levels.empty())
+  {
+    levels.push_back(settings.imageNoise);
+  }
+  std::vector<ScanVariant> variants;
+  for (const ReconstructionKernel kernel : chosen)
+  {
+    for (const double level : levels)
+    {
+      const auto same = [&](const ScanVariant& one)
+      { return one.kernel == kernel && one.imageNoise == level; };
+      if (std::any_of(variants.begin(), variants.end(), same))
+      {
+        throw UsageError("--kernel, --image-noise: one of them is given twice");
+      }
+      variants.push_back({ kernel, level });
+    }
+  }
+  return variants;
+}
+
+std::string VariantName(const ScanVariant& variant)
+{
+  std::string name = Kernels[static_cast<int>(variant.kernel)];
+  if (variant.imageNoise > 0.0)
+  {
+    std::ostringstream level;
+    level << variant.imageNoise;
+    name += "-" + level.str();
+  }
+  return name;
+}
+
+namespace
+{
+Json ScannerJson(const ScannerSettings& settings)
+{
+  Json numbers;
   numbers["kernel"] = Kernels[static_cast<int>(settings.kernel)];
   for (const ScannerNumber& number : AllScannerNumbers())
   {
     std::visit([&](auto member) { numbers[number.name] = settings.*member; }, number.member);
   }
+  return numbers;
+}
+}
+
+std::string DescribeScanner(const ScannerSettings& settings)
+{
+  return ScannerJson(settings).dump(2) + "\n";
+}
+
+std::string DescribeScan(const ScannerSettings& settings, const CtScanner& scanner,
+  const std::vector<double>& phases, const std::vector<ScanVariant>& variants)
+{
+  Json json;
+  json["scanner"] = ScannerJson(settings);
   json["views"] = settings.HalfScanViews();
   json["half_scan_ms"] = 1000.0 * settings.HalfScanTime();
   json["temporal_resolution_ms"] = 500.0 * settings.turnTime / settings.sources;
   json["field_mm"] = 2.0 * settings.FieldRadius();
   // All views together last as long whether one or two tubes take them.
-  const double exposure = settings.milliamperes * settings.turnTime *
-    static_cast<double>(settings.HalfScanViews()) / settings.viewsPerTurn;
-  for (const double phase : phases)
+  const double time =
+    settings.turnTime * static_cast<double>(settings.HalfScanViews()) / settings.viewsPerTurn;
+  for (std::size_t v = 0; v < variants.size(); ++v)
+  {
+    const double current = scanner.Milliamperes(v);
+    json["images"].push_back({ { "kernel", Kernels[static_cast<int>(variants[v].kernel)] },
+      { "image_noise_hu", variants[v].imageNoise }, { "milliamperes", current },
+      { "half_scan_mAs", current * time } });
+  }
+  for (std::size_t p = 0; p < phases.size(); ++p)
   {
     Json one;
-    one["fraction"] = phase;
-    for (const ScannedSlab& slab : scanner.Slabs(phase))
+    one["fraction"] = phases[p];
+    for (const ScannedStack& scanned : scanner.Stacks(p))
     {
-      const ScannerSlab& s = slab.slab;
-      one["slabs"].push_back(
-        { { "z", s.centre }, { "beat_start_s", s.start }, { "rr_ms", 1000.0 * s.interval },
-          { "gantry_angle", s.gantryAngle }, { "shift", { s.shift[0], s.shift[1], s.shift[2] } },
-          { "iodine", s.iodine }, { "first_phase", slab.firstPhase },
-          { "last_phase", slab.lastPhase }, { "mAs", exposure * slab.current } });
+      const GatedStack& stack = scanned.stack;
+      one["stacks"].push_back({ { "z", stack.centre }, { "beats", stack.beats },
+        { "rr_ms", 1000.0 * scanned.interval }, { "first_angle", stack.firstAngle },
+        { "shift", { scanned.shift[0], scanned.shift[1], scanned.shift[2] } },
+        { "iodine", scanned.iodine }, { "first_phase", scanned.firstPhase },
+        { "last_phase", scanned.lastPhase }, { "farthest_view_ms", 1000.0 * stack.worst },
+        { "current", scanned.current } });
     }
     json["phases"].push_back(one);
   }

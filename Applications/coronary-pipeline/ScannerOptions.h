@@ -17,8 +17,9 @@ namespace coronary
 /// `--scanner` and what belongs to it.
 struct ScannerOptions
 {
-  std::string scanner; ///< preset or file; empty: no scanner
-  std::string kernel;  ///< empty: as the preset or the file says
+  std::string scanner;              ///< preset or file; empty: no scanner
+  std::vector<std::string> kernels; ///< empty: as the preset or the file says
+  std::vector<double> imageNoise;   ///< HU; empty: as the preset or the file says
 
   void AddTo(CLI::App& app);
 
@@ -30,11 +31,20 @@ struct ScannerOptions
    * @throws UsageError, std::runtime_error: one sentence that names the file and the entry at fault
    */
   ScannerSettings Settings(std::uint64_t seed) const;
+
+  /// All pairs of kernels and noise levels that were asked for.
+  std::vector<ScanVariant> Variants(const ScannerSettings& settings) const;
 };
 
+/// Folder of a variant's images among several: soft, soft-20.
+std::string VariantName(const ScanVariant& variant);
+
 /// What was scanned when and with how much, as JSON.
-std::string DescribeScan(
-  const ScannerSettings& settings, const CtScanner& scanner, const std::vector<double>& phases);
+std::string DescribeScan(const ScannerSettings& settings, const CtScanner& scanner,
+  const std::vector<double>& phases, const std::vector<ScanVariant>& variants);
+
+/// The settings alone.
+std::string DescribeScanner(const ScannerSettings& settings);
 }
 
 #endif

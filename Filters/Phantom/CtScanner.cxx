@@ -1,56 +1,78 @@
 #include "CtScanner.h"
 
 #include "CounterRandom.h"
+#include "EdgeSmoothing.h"
 #include "PartialProgress.h"
 #include "PhantomMotion.h"
 #include "Require.h"
-#include "ScannedAnatomy.h"
 #include "ScannerPhysics.h"
 #include "ScannerReconstruction.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr std::uint64_t NoisePurpose = 403;
-// Shares of a slab's time, for the progress.
-constexpr double ProjectionShare = 0.7;
+constexpr double PartUnit = 8.0; ///< parts are kept in eighths of HU
+constexpr int NoiseViews = 8;    ///< of so many views one tells the noise
+// Times of a view and of back-projecting a voxel, s: for the progress.
+constexpr double ViewCost = 0.03;
+constexpr double VoxelCost = 2e-9;
 
-/// A view of a half scan.
-struct TimedView
+/// A view of the scan: number in time, tube.
+using ViewKey = std::pair<std::int64_t, int>;
+
+/// Slices of one phase to be made of the same views.
+struct Job
 {
-  int number;   ///< in the order of angles
-  double angle; ///< of the tube, rad
-  double seconds;
-  double phase;      ///< of the heart
-  std::uint64_t key; ///< of its noise
+  std::string name;
+  GatedStack stack;
+  ImageGrid grid; ///< extent: its slices
+  ViewKey last;   ///< of its views
 };
+
+std::uint64_t NoiseKey(std::uint64_t seed, const ViewKey& view)
+{
+  return MixBits(MixBits(seed) + NoisePurpose +
+    MixBits(static_cast<std::uint64_t>(2 * view.first + view.second)));
+}
 }
 
 struct CtScanner::Internals
 {
-  Internals(const CoronaryPhantom& phantom, const ScannerSettings& settings, const ImageGrid& grid)
+  Internals(const ScannedAnatomy& anatomy, const ScannerSettings& settings, const ImageGrid& grid,
+    const std::vector<double>& phases, const std::vector<ScanVariant>& variants)
     : Settings(settings)
-    , Anatomy(phantom)
+    , Anatomy(anatomy)
     , Grid(grid)
-    , Cycle(this->Anatomy.CycleLength())
-    , Schedule(settings, this->Height(grid.extent[4]), this->Height(grid.extent[5]), this->Cycle)
+    , Phases(phases)
+    , Variants(variants)
+    , Schedule(
+        settings, this->Height(grid.extent[4]), this->Height(grid.extent[5]), anatomy.CycleLength())
     , Physics(settings)
-    , Reconstruction(this->Settings)
   {
     Require((grid.direction - Matrix3::Identity()).norm() < 1e-6,
       "scanner: it makes axial slices: the image's direction has to be the identity");
-    const CoronaryPhantom::Box body = this->Anatomy.Body();
+    if (this->Variants.empty())
+    {
+      this->Variants.push_back({ settings.kernel, settings.imageNoise });
+    }
+    for (const ScanVariant& variant : this->Variants)
+    {
+      this->Reconstructions.emplace_back(this->Settings, variant.kernel);
+    }
+    this->Currents.assign(this->Variants.size(), 1.0);
+    const CoronaryPhantom::Box body = anatomy.Body();
     this->Axis = 0.5 * (body.low + body.high);
-    this->BodyRadius = 0.5 * std::max(body.high[0] - body.low[0], body.high[1] - body.low[1]);
-    Require(this->BodyRadius < settings.FieldRadius(),
-      "scanner: the patient does not fit into the field of " +
-        std::to_string(std::lround(2.0 * settings.FieldRadius())) +
-        " mm: more channels, or a longer channel_pitch_mm");
+    const double radius = 0.5 * std::max(body.high[0] - body.low[0], body.high[1] - body.low[1]);
+    const std::string field = std::to_string(std::lround(2.0 * settings.FieldRadius())) + " mm";
+    Require(radius < settings.FieldRadius(),
+      "scanner: the patient does not fit into the field of " + field +
+        ": more channels, or a longer channel_pitch_mm");
     const std::array<int, 6>& e = grid.extent;
     for (const int i : { e[0], e[1] })
     {
@@ -58,8 +80,7 @@ struct CtScanner::Internals
       {
         const Vector3 corner = grid.IndexToWorld(i, j, e[4]) - this->Axis;
         Require(std::hypot(corner[0], corner[1]) < settings.FieldRadius(),
-          "scanner: the image reaches out of the field of " +
-            std::to_string(std::lround(2.0 * settings.FieldRadius())) + " mm around x " +
+          "scanner: the image reaches out of the field of " + field + " around x " +
             std::to_string(std::lround(this->Axis[0])) + ", y " +
             std::to_string(std::lround(this->Axis[1])) + " mm");
       }
@@ -76,188 +97,397 @@ struct CtScanner::Internals
     return this->Settings.systolicCurrent + (1.0 - this->Settings.systolicCurrent) * full;
   }
 
-  std::vector<TimedView> Views(std::size_t slabNumber, double phase) const;
-  void Project(const ScannerSlab& slab, const std::vector<TimedView>& views,
-    std::vector<std::vector<float>>& data, const ProgressCallback& progress) const;
-  void AddSlab(std::size_t number, double phase, std::vector<float>& image,
+  PatientState Patient(double seconds) const
+  {
+    return { this->Schedule.Phase(seconds), this->Schedule.Shift(seconds),
+      this->Schedule.Iodine(seconds) };
+  }
+
+  ScannerView Stand(const ViewKey& view) const
+  {
+    Vector3 axis = this->Axis;
+    axis[2] = this->Schedule.Table(this->Schedule.Seconds(view.first));
+    return { this->Schedule.Angle(view.first, view.second), axis };
+  }
+
+  static std::string PartName(std::size_t phase, std::size_t stack, std::size_t variant)
+  {
+    return std::to_string(phase) + "-" + std::to_string(stack) + "-" + std::to_string(variant);
+  }
+
+  bool Slices(
+    const std::vector<GatedStack>& stacks, std::size_t number, std::array<int, 2>& range) const;
+  std::vector<Job> Jobs(const ScanStore& store) const;
+  void FindCurrents(const ProgressCallback& progress);
+  void TakeViews(const std::vector<ViewKey>& views,
+    std::map<ViewKey, std::vector<std::vector<float>>>& taken,
     const ProgressCallback& progress) const;
+  void Reconstruct(const Job& job, const std::map<ViewKey, std::vector<std::vector<float>>>& taken,
+    ScanStore& store, const ProgressCallback& progress) const;
 
   const ScannerSettings Settings;
-  const ScannedPhantom Anatomy;
+  const ScannedAnatomy& Anatomy;
   const ImageGrid Grid;
-  const double Cycle; ///< mean R-R interval, s
+  const std::vector<double> Phases;
+  std::vector<ScanVariant> Variants;
   const ScannerSchedule Schedule;
   const ScannerPhysics Physics;
-  const HalfScanReconstruction Reconstruction;
+  std::vector<HalfScanReconstruction> Reconstructions;
+  std::vector<double> Currents; ///< share of the settings' current
+  std::vector<double> Levels;   ///< the different ones among them
   Vector3 Axis;
-  double BodyRadius; ///< mm
 };
 
-/// The views of a half scan, in the order of their angles.
-std::vector<TimedView> CtScanner::Internals::Views(std::size_t slabNumber, double phase) const
+/// The slices in which a stack has a share.
+bool CtScanner::Internals::Slices(
+  const std::vector<GatedStack>& stacks, std::size_t number, std::array<int, 2>& range) const
 {
-  const ScannerSettings& s = this->Settings;
-  const ScannerSlab& slab = this->Schedule.Slabs()[slabNumber];
-  const int count = s.HalfScanViews();
-  const int quarter = s.viewsPerTurn / 4;
-  // The second tube stands a quarter turn ahead: it takes the rest of the angles in the same time.
-  const int turned = s.sources == 1 ? count : count - quarter;
-  const double step = s.turnTime / s.viewsPerTurn;
-  const auto first =
-    static_cast<std::int64_t>(std::lround(phase * this->Cycle / step - 0.5 * (turned - 1)));
-  const std::uint64_t scan = MixBits(MixBits(s.seed) + NoisePurpose + slabNumber);
-  std::vector<TimedView> views(count);
-  for (int i = 0; i < count; ++i)
+  range = { this->Grid.extent[5] + 1, this->Grid.extent[4] - 1 };
+  for (int k = this->Grid.extent[4]; k <= this->Grid.extent[5]; ++k)
   {
-    const bool second = s.sources == 2 && i >= count / 2;
-    const std::int64_t number = first + i - (second ? quarter : 0);
-    TimedView& view = views[i];
-    view.number = i;
-    view.angle = slab.gantryAngle + static_cast<double>(first + i) * s.ViewAngle();
-    view.seconds = slab.start + static_cast<double>(number) * step;
-    view.phase = this->Schedule.Phase(view.seconds);
-    view.key = MixBits(scan + static_cast<std::uint64_t>(2 * number + (second ? 1 : 0)));
+    if (this->Schedule.Weights(stacks, this->Height(k))[number] > 0.0)
+    {
+      range = { std::min(range[0], k), k };
+    }
   }
-  return views;
+  return range[0] <= range[1];
 }
 
-void CtScanner::Internals::Project(const ScannerSlab& slab, const std::vector<TimedView>& views,
-  std::vector<std::vector<float>>& data, const ProgressCallback& progress) const
+/// What the store does not have, in the order in which views come.
+std::vector<Job> CtScanner::Internals::Jobs(const ScanStore& store) const
 {
-  const ScannerSettings& s = this->Settings;
-  std::vector<TimedView> inTime = views;
-  std::stable_sort(inTime.begin(), inTime.end(),
-    [](const TimedView& a, const TimedView& b) { return a.seconds < b.seconds; });
-  const auto momentOf = [&](const TimedView& view)
-  { return static_cast<std::int64_t>(std::floor(view.seconds / s.anatomyStep)); };
-  Vector3 axis = this->Axis;
-  axis[2] = slab.centre;
-  ScannedPatient patient(this->Anatomy, s);
-  const auto stateAt = [&](double phase) { return PatientState{ phase, slab.shift, slab.iodine }; };
-  for (std::size_t first = 0; first < inTime.size();)
+  std::vector<Job> jobs;
+  for (std::size_t p = 0; p < this->Phases.size(); ++p)
   {
-    const std::int64_t moment = momentOf(inTime[first]);
-    std::size_t last = first;
-    while (last < inTime.size() && momentOf(inTime[last]) == moment)
+    const std::vector<GatedStack> stacks = this->Schedule.Stacks(this->Phases[p]);
+    for (std::size_t n = 0; n < stacks.size(); ++n)
     {
-      ++last;
+      bool done = true;
+      for (std::size_t v = 0; v < this->Variants.size(); ++v)
+      {
+        done = done && store.Has(PartName(p, n, v));
+      }
+      std::array<int, 2> slices;
+      if (done || !this->Slices(stacks, n, slices))
+      {
+        continue;
+      }
+      Job job{ std::to_string(p) + "-" + std::to_string(n), stacks[n], this->Grid, {} };
+      job.grid.extent[4] = slices[0];
+      job.grid.extent[5] = slices[1];
+      for (const GatedView& view : stacks[n].views)
+      {
+        job.last = std::max(job.last, ViewKey{ view.number, view.tube });
+      }
+      jobs.push_back(std::move(job));
     }
-    const auto share = [&](std::size_t n)
-    { return static_cast<double>(n) / static_cast<double>(inTime.size()); };
-    const double mapped = share(first) + 0.4 * (share(last) - share(first));
-    patient.Prepare(
-      stateAt(this->Schedule.Phase((static_cast<double>(moment) + 0.5) * s.anatomyStep)),
-      slab.centre, PartOf(progress, share(first), mapped));
+  }
+  std::stable_sort(
+    jobs.begin(), jobs.end(), [](const Job& a, const Job& b) { return a.last < b.last; });
+  return jobs;
+}
+
+/// Sets the tube as a scanner does that knows the patient: noise in the middle of the body, at the
+/// middle height of the image, by the reconstruction's weights on the views' own variances.
+void CtScanner::Internals::FindCurrents(const ProgressCallback& progress)
+{
+  const double middle =
+    0.5 * (this->Height(this->Grid.extent[4]) + this->Height(this->Grid.extent[5]));
+  const bool wanted = std::any_of(this->Variants.begin(), this->Variants.end(),
+    [](const ScanVariant& variant) { return variant.imageNoise > 0.0; });
+  if (wanted)
+  {
+    const std::vector<GatedStack> stacks = this->Schedule.Stacks(this->Phases.front());
+    const auto stack = std::min_element(stacks.begin(), stacks.end(),
+      [&](const GatedStack& a, const GatedStack& b)
+      { return std::abs(a.centre - middle) < std::abs(b.centre - middle); });
+    ScannedPatient patient(this->Anatomy, this->Settings);
+    const PatientState state = this->Patient(stack->middle);
+    patient.Prepare(state, stack->centre, PartOf(progress, 0.0, 0.5));
+    const int count = static_cast<int>(stack->views.size() + NoiseViews - 1) / NoiseViews;
+    std::vector<std::vector<std::array<double, 2>>> sums(
+      count, std::vector<std::array<double, 2>>(this->Variants.size()));
     ParallelFor(
-      static_cast<std::int64_t>(last - first), 1,
+      count, 1,
       [&](std::int64_t begin, std::int64_t end)
       {
         ViewPaths paths;
+        TransmittedView transmitted;
         for (std::int64_t n = begin; n < end; ++n)
         {
-          const TimedView& view = inTime[first + n];
-          patient.Project({ view.angle, axis }, stateAt(view.phase), paths);
-          std::vector<float>& result = data[view.number];
-          result.resize(static_cast<std::size_t>(s.channels) * s.rows);
-          this->Physics.Measure({ paths[0].data(), paths[1].data(), paths[2].data() },
-            this->Current(view.phase), view.key, result.data());
-          this->Reconstruction.Filter(view.number, result.data());
+          const GatedView& view = stack->views[n * NoiseViews];
+          ScannerView stand = this->Stand({ view.number, view.tube });
+          stand.axis[2] = stack->centre;
+          patient.Project(stand, state, paths);
+          this->Physics.Transmit(
+            { paths[0].data(), paths[1].data(), paths[2].data() }, transmitted);
+          for (std::size_t v = 0; v < this->Variants.size(); ++v)
+          {
+            const std::vector<double> weights = this->Reconstructions[v].AxisWeights(view.position);
+            for (int c = 0; c < this->Settings.channels; ++c)
+            {
+              const std::array<double, 2> variance =
+                this->Physics.Variance(transmitted, c, this->Settings.rows / 2);
+              for (const int part : { 0, 1 })
+              {
+                sums[n][v][part] += NoiseViews * view.weight * weights[c] * 1e6 * variance[part];
+              }
+            }
+          }
         }
       },
-      PartOf(progress, mapped, share(last)));
-    first = last;
+      PartOf(progress, 0.5, 1.0));
+    for (std::size_t v = 0; v < this->Variants.size(); ++v)
+    {
+      std::array<double, 2> sum{ 0.0, 0.0 };
+      for (const auto& one : sums)
+      {
+        sum[0] += one[v][0];
+        sum[1] += one[v][1];
+      }
+      const double noise = this->Variants[v].imageNoise;
+      if (noise > 0.0)
+      {
+        // photons / current + electronics / current^2 = noise^2
+        const double half = 0.5 * sum[0] / (noise * noise);
+        this->Currents[v] = half + std::sqrt(half * half + sum[1] / (noise * noise));
+      }
+    }
   }
+  this->Levels = this->Currents;
+  std::sort(this->Levels.begin(), this->Levels.end());
+  this->Levels.erase(std::unique(this->Levels.begin(), this->Levels.end()), this->Levels.end());
 }
 
-void CtScanner::Internals::AddSlab(std::size_t number, double phase, std::vector<float>& image,
+/// Line integrals of views that are close in time, for each level of current.
+void CtScanner::Internals::TakeViews(const std::vector<ViewKey>& views,
+  std::map<ViewKey, std::vector<std::vector<float>>>& taken, const ProgressCallback& progress) const
+{
+  const ScannerSettings& s = this->Settings;
+  const double middle = 0.5 *
+    (this->Schedule.Seconds(views.front().first) + this->Schedule.Seconds(views.back().first));
+  ScannedPatient patient(this->Anatomy, s);
+  patient.Prepare(this->Patient(middle), this->Schedule.Table(middle), PartOf(progress, 0.0, 0.5));
+  for (const ViewKey& view : views)
+  {
+    taken[view].assign(this->Levels.size(), {});
+  }
+  ParallelFor(
+    static_cast<std::int64_t>(views.size()), 1,
+    [&](std::int64_t begin, std::int64_t end)
+    {
+      ViewPaths paths;
+      TransmittedView transmitted;
+      for (std::int64_t n = begin; n < end; ++n)
+      {
+        const PatientState state = this->Patient(this->Schedule.Seconds(views[n].first));
+        patient.Project(this->Stand(views[n]), state, paths);
+        this->Physics.Transmit({ paths[0].data(), paths[1].data(), paths[2].data() }, transmitted);
+        std::vector<std::vector<float>>& levels = taken.at(views[n]);
+        for (std::size_t level = 0; level < levels.size(); ++level)
+        {
+          levels[level].resize(static_cast<std::size_t>(s.channels) * s.rows);
+          this->Physics.Detect(transmitted, this->Levels[level] * this->Current(state.phase),
+            NoiseKey(s.seed, views[n]), levels[level].data());
+        }
+      }
+    },
+    PartOf(progress, 0.5, 1.0));
+}
+
+void CtScanner::Internals::Reconstruct(const Job& job,
+  const std::map<ViewKey, std::vector<std::vector<float>>>& taken, ScanStore& store,
   const ProgressCallback& progress) const
 {
-  const ScannerSlab& slab = this->Schedule.Slabs()[number];
-  ImageGrid part = this->Grid;
-  std::array<int, 6>& e = part.extent;
-  while (e[4] <= e[5] && this->Schedule.Weight(number, this->Height(e[4])) <= 0.0)
-  {
-    ++e[4];
-  }
-  while (e[5] > e[4] && this->Schedule.Weight(number, this->Height(e[5])) <= 0.0)
-  {
-    --e[5];
-  }
-  if (e[4] > e[5])
-  {
-    return; // between two slices
-  }
-  const std::vector<TimedView> views = this->Views(number, phase);
-  std::vector<std::vector<float>> data(views.size());
-  this->Project(slab, views, data, PartOf(progress, 0.0, ProjectionShare));
-  std::vector<double> angles(views.size());
-  std::transform(
-    views.begin(), views.end(), angles.begin(), [](const TimedView& view) { return view.angle; });
+  const std::array<int, 6>& e = job.grid.extent;
   const std::size_t nx = e[1] - e[0] + 1;
   const std::size_t ny = e[3] - e[2] + 1;
   const std::size_t nz = e[5] - e[4] + 1;
   std::vector<float> values(nx * ny * nz);
-  Vector3 axis = this->Axis;
-  axis[2] = slab.centre;
-  this->Reconstruction.BackProject(
-    angles, data, axis, part, values.data(), PartOf(progress, ProjectionShare, 1.0));
-  for (std::size_t k = 0; k < nz; ++k)
+  std::vector<std::int16_t> part(values.size());
+  std::vector<FilteredView> filtered(job.stack.views.size());
+  for (std::size_t v = 0; v < this->Variants.size(); ++v)
   {
-    const int slice = e[4] + static_cast<int>(k);
-    const auto weight = static_cast<float>(this->Schedule.Weight(number, this->Height(slice)));
-    float* out = &image[(slice - this->Grid.extent[4]) * nx * ny];
-    for (std::size_t n = 0; n < nx * ny; ++n)
+    const std::string name = job.name + "-" + std::to_string(v);
+    if (store.Has(name))
     {
-      out[n] += weight * values[n * nz + k];
+      continue;
     }
+    const auto share = [&](double done)
+    { return (static_cast<double>(v) + done) / static_cast<double>(this->Variants.size()); };
+    const HalfScanReconstruction& reconstruction = this->Reconstructions[v];
+    const std::array<int, 2> columns = reconstruction.Columns(this->Axis, job.grid);
+    const std::size_t level =
+      std::lower_bound(this->Levels.begin(), this->Levels.end(), this->Currents[v]) -
+      this->Levels.begin();
+    ParallelFor(
+      static_cast<std::int64_t>(filtered.size()), 4,
+      [&](std::int64_t begin, std::int64_t end)
+      {
+        for (std::int64_t n = begin; n < end; ++n)
+        {
+          const GatedView& view = job.stack.views[n];
+          const std::vector<float>& line = taken.at({ view.number, view.tube })[level];
+          const ScannerView stand = this->Stand({ view.number, view.tube });
+          filtered[n].angle = stand.angle;
+          filtered[n].height = stand.axis[2];
+          filtered[n].values.resize(line.size());
+          reconstruction.Filter(
+            view.position, view.weight, line.data(), columns, filtered[n].values.data());
+        }
+      },
+      PartOf(progress, share(0.0), share(0.3)));
+    reconstruction.BackProject(
+      filtered, this->Axis, job.grid, values.data(), PartOf(progress, share(0.3), share(1.0)));
+    for (std::size_t k = 0; k < nz; ++k)
+    {
+      for (std::size_t n = 0; n < nx * ny; ++n)
+      {
+        const float hounsfield =
+          std::clamp(1000.0f * (values[n * nz + k] - 1.0f), -1024.0f, 3071.0f);
+        part[k * nx * ny + n] =
+          static_cast<std::int16_t>(std::lround(static_cast<float>(PartUnit) * hounsfield));
+      }
+    }
+    store.Put(name, part);
   }
 }
 
-CtScanner::CtScanner(
-  const CoronaryPhantom& phantom, const ScannerSettings& settings, const ImageGrid& grid)
-  : Data(std::make_unique<Internals>(phantom, settings, grid))
+CtScanner::CtScanner(const ScannedAnatomy& anatomy, const ScannerSettings& settings,
+  const ImageGrid& grid, const std::vector<double>& phases,
+  const std::vector<ScanVariant>& variants)
+  : Data(std::make_unique<Internals>(anatomy, settings, grid, phases, variants))
 {
 }
 
 CtScanner::~CtScanner() = default;
 
-void CtScanner::Scan(double phase, std::int16_t* values, const ProgressCallback& progress) const
+void CtScanner::Scan(ScanStore& store, const ProgressCallback& progress)
+{
+  Internals& data = *this->Data;
+  const ScannerSettings& s = data.Settings;
+  data.FindCurrents(PartOf(progress, 0.0, 0.01));
+  const std::vector<Job> jobs = data.Jobs(store);
+  std::map<ViewKey, std::size_t> lastUse; // the job after which a view is not needed
+  for (std::size_t j = 0; j < jobs.size(); ++j)
+  {
+    for (const GatedView& view : jobs[j].stack.views)
+    {
+      lastUse[{ view.number, view.tube }] = j;
+    }
+  }
+  const auto costOf = [&](const Job& job)
+  {
+    const std::array<int, 6>& e = job.grid.extent;
+    return VoxelCost * (e[1] - e[0] + 1) * (e[3] - e[2] + 1) * (e[5] - e[4] + 1) *
+      static_cast<double>(job.stack.views.size() * data.Variants.size());
+  };
+  double whole = ViewCost * static_cast<double>(lastUse.size());
+  for (const Job& job : jobs)
+  {
+    whole += costOf(job);
+  }
+  double spent = 0.0;
+  const auto next = [&](double cost)
+  {
+    const double first = 0.01 + 0.99 * spent / whole;
+    spent += cost;
+    return PartOf(progress, first, 0.01 + 0.99 * spent / whole);
+  };
+  const auto momentOf = [&](const ViewKey& view)
+  { return std::floor(data.Schedule.Seconds(view.first) / s.anatomyStep); };
+  std::map<ViewKey, std::vector<std::vector<float>>> taken;
+  std::size_t ready = 0;
+  for (auto view = lastUse.begin(); view != lastUse.end();)
+  {
+    std::vector<ViewKey> together;
+    const double moment = momentOf(view->first);
+    for (; view != lastUse.end() && momentOf(view->first) == moment; ++view)
+    {
+      together.push_back(view->first);
+    }
+    data.TakeViews(together, taken, next(ViewCost * static_cast<double>(together.size())));
+    for (; ready < jobs.size() && jobs[ready].last <= together.back(); ++ready)
+    {
+      data.Reconstruct(jobs[ready], taken, store, next(costOf(jobs[ready])));
+      for (auto old = taken.begin(); old != taken.end();)
+      {
+        old = lastUse.at(old->first) <= ready ? taken.erase(old) : std::next(old);
+      }
+    }
+  }
+}
+
+void CtScanner::Image(std::size_t phase, std::size_t variant, const ScanStore& store,
+  std::int16_t* values, const ProgressCallback& progress) const
 {
   const Internals& data = *this->Data;
   const std::array<int, 6>& e = data.Grid.extent;
-  std::vector<float> image(
-    static_cast<std::size_t>(e[1] - e[0] + 1) * (e[3] - e[2] + 1) * (e[5] - e[4] + 1));
-  const std::size_t count = data.Schedule.Slabs().size();
-  for (std::size_t s = 0; s < count; ++s)
+  const std::size_t plane = static_cast<std::size_t>(e[1] - e[0] + 1) * (e[3] - e[2] + 1);
+  std::vector<float> image(plane * (e[5] - e[4] + 1));
+  const std::vector<GatedStack> stacks = data.Schedule.Stacks(data.Phases[phase]);
+  for (std::size_t n = 0; n < stacks.size(); ++n)
   {
-    const auto share = [&](std::size_t n)
-    { return static_cast<double>(n) / static_cast<double>(count); };
-    data.AddSlab(s, phase, image, PartOf(progress, share(s), share(s + 1)));
+    std::array<int, 2> slices;
+    if (!data.Slices(stacks, n, slices))
+    {
+      continue;
+    }
+    const std::vector<std::int16_t> part = store.Get(Internals::PartName(phase, n, variant));
+    for (int k = slices[0]; k <= slices[1]; ++k)
+    {
+      const auto weight =
+        static_cast<float>(data.Schedule.Weights(stacks, data.Height(k))[n] / PartUnit);
+      const std::int16_t* from = &part[(k - slices[0]) * plane];
+      float* to = &image[(k - e[4]) * plane];
+      for (std::size_t i = 0; i < plane; ++i)
+      {
+        to[i] += weight * static_cast<float>(from[i]);
+      }
+    }
+  }
+  if (data.Settings.iterative > 0.0)
+  {
+    SmoothWithinEdges(image, { e[1] - e[0] + 1, e[3] - e[2] + 1, e[5] - e[4] + 1 },
+      data.Settings.iterative, progress);
   }
   std::transform(image.begin(), image.end(), values,
-    [](float water)
-    {
-      return static_cast<std::int16_t>(
-        std::lround(std::clamp(1000.0f * (water - 1.0f), -1024.0f, 3071.0f)));
-    });
+    [](float hounsfield)
+    { return static_cast<std::int16_t>(std::lround(std::clamp(hounsfield, -1024.0f, 3071.0f))); });
 }
 
-std::vector<ScannedSlab> CtScanner::Slabs(double phase) const
+std::vector<ScannedStack> CtScanner::Stacks(std::size_t phase) const
 {
   const Internals& data = *this->Data;
-  std::vector<ScannedSlab> slabs;
-  for (std::size_t s = 0; s < data.Schedule.Slabs().size(); ++s)
+  std::vector<ScannedStack> result;
+  for (GatedStack& stack : data.Schedule.Stacks(data.Phases[phase]))
   {
-    const std::vector<TimedView> views = data.Views(s, phase);
-    ScannedSlab scanned{ data.Schedule.Slabs()[s], views.front().phase, views.front().phase, 0.0 };
-    for (const TimedView& view : views)
+    const PatientState middle = data.Patient(stack.middle);
+    ScannedStack scanned;
+    scanned.shift = middle.shift;
+    scanned.iodine = middle.iodine;
+    scanned.interval = data.Schedule.Beat(stack.beats.front()).interval;
+    scanned.firstPhase = std::numeric_limits<double>::max();
+    scanned.lastPhase = -scanned.firstPhase;
+    scanned.current = 0.0;
+    double weights = 0.0;
+    for (const GatedView& view : stack.views)
     {
-      scanned.firstPhase = std::min(scanned.firstPhase, view.phase);
-      scanned.lastPhase = std::max(scanned.lastPhase, view.phase);
-      scanned.current += data.Current(view.phase) / static_cast<double>(views.size());
+      const double heart = data.Schedule.Phase(data.Schedule.Seconds(view.number));
+      scanned.firstPhase = std::min(scanned.firstPhase, heart);
+      scanned.lastPhase = std::max(scanned.lastPhase, heart);
+      scanned.current += view.weight * data.Current(heart);
+      weights += view.weight;
     }
-    slabs.push_back(scanned);
+    scanned.current /= weights;
+    scanned.stack = std::move(stack);
+    result.push_back(std::move(scanned));
   }
-  return slabs;
+  return result;
+}
+
+double CtScanner::Milliamperes(std::size_t variant) const
+{
+  return this->Data->Settings.milliamperes * this->Data->Currents.at(variant);
 }
 }

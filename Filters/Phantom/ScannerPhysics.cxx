@@ -281,14 +281,14 @@ void ScannerPhysics::Blur(std::vector<float>& values) const
   }
 }
 
-void ScannerPhysics::Measure(const std::array<const float*, BasisMaterials>& paths, double current,
-  std::uint64_t key, float* result) const
+void ScannerPhysics::Transmit(
+  const std::array<const float*, BasisMaterials>& paths, TransmittedView& view) const
 {
   const ScannerSettings& s = this->Settings;
   const int rows = s.rows;
   const std::size_t cells = static_cast<std::size_t>(s.channels) * rows;
-  std::vector<float> transmitted(cells); // share of the signal without a patient
-  std::vector<float> quantum(cells);     // keV that one effective photon brings
+  view.share.resize(cells);
+  view.quantum.resize(cells);
   Eigen::ArrayXf depth(rows);
   Eigen::ArrayXf mean(rows);
   Eigen::ArrayXf variance(rows);
@@ -318,10 +318,17 @@ void ScannerPhysics::Measure(const std::array<const float*, BasisMaterials>& pat
       mean += depth;
       variance += energy * depth;
     }
-    Eigen::Map<Eigen::ArrayXf>(&transmitted[first], rows) = mean / this->AirSignal[c];
-    Eigen::Map<Eigen::ArrayXf>(&quantum[first], rows) = variance / mean.max(1e-20f);
+    Eigen::Map<Eigen::ArrayXf>(&view.share[first], rows) = mean / this->AirSignal[c];
+    Eigen::Map<Eigen::ArrayXf>(&view.quantum[first], rows) = variance / mean.max(1e-20f);
   }
-  this->Blur(transmitted);
+  this->Blur(view.share);
+}
+
+void ScannerPhysics::Detect(
+  const TransmittedView& view, double current, std::uint64_t key, float* result) const
+{
+  const ScannerSettings& s = this->Settings;
+  const int rows = s.rows;
   const double electronic = s.electronicNoise / s.electronsPerKeV;
   for (int c = 0; c < s.channels; ++c)
   {
@@ -329,18 +336,32 @@ void ScannerPhysics::Measure(const std::array<const float*, BasisMaterials>& pat
     for (int r = 0; r < rows; ++r)
     {
       const std::size_t at = static_cast<std::size_t>(c) * rows + r;
-      double signal = air * transmitted[at];
+      double signal = air * view.share[at];
       if (s.noise != 0)
       {
         const std::uint64_t cellKey = MixBits(key + at);
-        signal = quantum[at] * PoissonNumber(signal / quantum[at], cellKey) +
+        signal = view.quantum[at] * PoissonNumber(signal / view.quantum[at], cellKey) +
           electronic * RandomStream(cellKey, 1).Normal();
       }
       // A cell that saw nothing is taken to have seen a photon.
-      signal = std::max(signal, static_cast<double>(quantum[at]));
+      signal = std::max(signal, static_cast<double>(view.quantum[at]));
       result[at] = static_cast<float>(this->WaterPath(c, std::log(air / signal)));
     }
   }
+}
+
+std::array<double, 2> ScannerPhysics::Variance(
+  const TransmittedView& view, int column, int row) const
+{
+  const std::size_t at = static_cast<std::size_t>(column) * this->Settings.rows + row;
+  const double air = this->AirSignal[column];
+  const double signal = air * view.share[at];
+  const double log = std::log(air / signal);
+  constexpr double step = 1e-3;
+  const double slope = (this->WaterPath(column, log + step) - this->WaterPath(column, log)) / step;
+  const double electronic = this->Settings.electronicNoise / this->Settings.electronsPerKeV;
+  const double unit = slope * slope / (signal * signal);
+  return { unit * signal * view.quantum[at], unit * electronic * electronic };
 }
 
 double PoissonNumber(double mean, std::uint64_t key)

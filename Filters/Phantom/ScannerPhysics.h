@@ -41,6 +41,13 @@ struct CellSignal
   double variance; ///< of the photons' number and energy, keV^2
 };
 
+/// What comes through the patient, [column][row].
+struct TransmittedView
+{
+  std::vector<float> share;   ///< of the signal without a patient
+  std::vector<float> quantum; ///< keV that one effective photon brings
+};
+
 /// From path lengths to corrected line integrals.
 class ScannerPhysics
 {
@@ -59,16 +66,22 @@ public:
   /// Photons that reach a cell in one view.
   double Photons(int column, const MaterialAmounts& path) const;
 
+  /// What comes through the patient in a view: intensities, blurred by focal spot and cells.
+  /// @param paths  of each basis material, [column][row]
+  void Transmit(const std::array<const float*, BasisMaterials>& paths, TransmittedView& view) const;
+
   /**
-   * Turns a view's path lengths into line integrals of an ideal scanner in water, in units of mm of
-   * water: intensities, blur of focal spot and cells, noise, logarithm, water correction.
-   * @param paths    of each basis material, [column][row]
+   * Turns it into line integrals of an ideal scanner in water, in units of mm of water: noise,
+   * logarithm, water correction.
    * @param current  share of the tube current
    * @param key      names the view among all of the scan
    * @param result   [column][row]
    */
-  void Measure(const std::array<const float*, BasisMaterials>& paths, double current,
-    std::uint64_t key, float* result) const;
+  void Detect(const TransmittedView& view, double current, std::uint64_t key, float* result) const;
+
+  /// Variance of what Detect() says of a cell, mm^2 of water: of photons (falls with the current) and of
+  /// electronics (falls with its square).
+  std::array<double, 2> Variance(const TransmittedView& view, int column, int row) const;
 
   /// Water path that gives a column the log signal, mm.
   double WaterPath(int column, double logSignal) const;

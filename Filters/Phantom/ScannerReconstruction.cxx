@@ -28,7 +28,8 @@ double Quartic(const double (&samples)[5], double at)
 }
 }
 
-HalfScanReconstruction::HalfScanReconstruction(const ScannerSettings& settings)
+HalfScanReconstruction::HalfScanReconstruction(
+  const ScannerSettings& settings, ReconstructionKernel kernel)
   : Settings(settings)
   , HalfFan(0.5 * ((settings.HalfScanViews() - 1) * settings.ViewAngle() - Pi))
   , Kernel(settings.channels)
@@ -40,7 +41,7 @@ HalfScanReconstruction::HalfScanReconstruction(const ScannerSettings& settings)
   std::vector<double> ramp(FrequencySteps + 1);
   for (int k = 0; k <= FrequencySteps; ++k)
   {
-    ramp[k] = k * step * Window(settings.kernel, static_cast<double>(k) / FrequencySteps);
+    ramp[k] = k * step * Window(kernel, static_cast<double>(k) / FrequencySteps);
   }
   for (int n = 0; n < settings.channels; ++n)
   {
@@ -104,14 +105,17 @@ double HalfScanReconstruction::Weight(int view, double column) const
   return 1.0;
 }
 
-void HalfScanReconstruction::Filter(int view, float* values) const
+void HalfScanReconstruction::Filter(int view, float share, const float* values,
+  const std::array<int, 2>& columns, float* result) const
 {
   const ScannerSettings& s = this->Settings;
   const int rows = s.rows;
-  std::vector<float> weighted(static_cast<std::size_t>(s.channels) * rows);
+  thread_local std::vector<float> weighted;
+  weighted.resize(static_cast<std::size_t>(s.channels) * rows);
   for (int c = 0; c < s.channels; ++c)
   {
-    const double weight = this->Weight(view, c) * s.sourceToAxis * std::cos(s.ColumnAngle(c));
+    const double weight =
+      share * this->Weight(view, c) * s.sourceToAxis * std::cos(s.ColumnAngle(c));
     for (int r = 0; r < rows; ++r)
     {
       const double rise = s.RowHeight(r) / s.sourceToDetector;
@@ -119,10 +123,10 @@ void HalfScanReconstruction::Filter(int view, float* values) const
       weighted[at] = values[at] * static_cast<float>(weight / std::sqrt(1.0 + rise * rise));
     }
   }
-  std::fill(values, values + weighted.size(), 0.0f);
-  for (int c = 0; c < s.channels; ++c)
+  for (int c = columns[0]; c <= columns[1]; ++c)
   {
-    float* out = values + static_cast<std::size_t>(c) * rows;
+    float* out = result + static_cast<std::size_t>(c) * rows;
+    std::fill(out, out + rows, 0.0f);
     for (int n = 0; n < s.channels; ++n)
     {
       const float h = this->Kernel[std::abs(c - n)];
@@ -135,9 +139,46 @@ void HalfScanReconstruction::Filter(int view, float* values) const
   }
 }
 
-void HalfScanReconstruction::BackProject(const std::vector<double>& angles,
-  const std::vector<std::vector<float>>& views, const Vector3& axis, const ImageGrid& grid,
-  float* values, const ProgressCallback& progress) const
+std::array<int, 2> HalfScanReconstruction::Columns(const Vector3& axis, const ImageGrid& grid) const
+{
+  const ScannerSettings& s = this->Settings;
+  double radius = 0.0;
+  for (const int i : { grid.extent[0], grid.extent[1] })
+  {
+    for (const int j : { grid.extent[2], grid.extent[3] })
+    {
+      const Vector3 corner = grid.IndexToWorld(i, j, grid.extent[4]) - axis;
+      radius = std::max(radius, std::hypot(corner[0], corner[1]));
+    }
+  }
+  const double reach = std::asin(std::min(1.0, radius / s.sourceToAxis)) / s.ColumnPitch();
+  const double middle = 0.5 * (s.channels - 1) + s.channelOffset;
+  return { std::clamp(static_cast<int>(middle - reach), 0, s.channels - 1),
+    std::clamp(static_cast<int>(middle + reach) + 1, 0, s.channels - 1) };
+}
+
+std::vector<double> HalfScanReconstruction::AxisWeights(int view) const
+{
+  const ScannerSettings& s = this->Settings;
+  const double middle = 0.5 * (s.channels - 1) + s.channelOffset;
+  const int before = std::clamp(static_cast<int>(middle), 0, s.channels - 2);
+  const double after = middle - before;
+  // A slice lies anywhere between two rows.
+  constexpr double betweenRows = 2.0 / 3.0;
+  std::vector<double> squares(s.channels);
+  for (int c = 0; c < s.channels; ++c)
+  {
+    const double kernel = (1.0 - after) * this->Kernel[std::abs(before - c)] +
+      after * this->Kernel[std::abs(before + 1 - c)];
+    const double weight =
+      s.ViewAngle() / s.sourceToAxis * this->Weight(view, c) * std::cos(s.ColumnAngle(c)) * kernel;
+    squares[c] = betweenRows * weight * weight;
+  }
+  return squares;
+}
+
+void HalfScanReconstruction::BackProject(const std::vector<FilteredView>& views,
+  const Vector3& axis, const ImageGrid& grid, float* values, const ProgressCallback& progress) const
 {
   const ScannerSettings& s = this->Settings;
   const std::array<int, 6>& e = grid.extent;
@@ -147,18 +188,19 @@ void HalfScanReconstruction::BackProject(const std::vector<double>& angles,
   const Vector3 corner = grid.IndexToWorld(e[0], e[2], e[4]);
   const int rows = s.rows;
   const auto lastRow = static_cast<float>(rows - 1);
-  std::vector<Eigen::Vector2d> towards(angles.size()); // the tube, seen from the axis
-  for (std::size_t v = 0; v < angles.size(); ++v)
+  std::vector<Eigen::Vector2d> towards(views.size()); // the tube, seen from the axis
+  for (std::size_t v = 0; v < views.size(); ++v)
   {
-    towards[v] = { std::cos(angles[v]), std::sin(angles[v]) };
+    towards[v] = { std::cos(views[v].angle), std::sin(views[v].angle) };
   }
   const auto block = [&](std::int64_t first, std::int64_t last)
   {
     std::vector<float> line(rows + 1);
     std::fill(values + first * nx * nz, values + last * nx * nz, 0.0f);
-    for (std::size_t v = 0; v < angles.size(); ++v)
+    for (std::size_t v = 0; v < views.size(); ++v)
     {
-      const std::vector<float>& view = views[v];
+      const std::vector<float>& view = views[v].values;
+      const double height = corner[2] - views[v].height;
       for (std::int64_t j = first; j < last; ++j)
       {
         const double y = corner[1] + static_cast<double>(j) * grid.spacing[1] - axis[1];
@@ -186,7 +228,7 @@ void HalfScanReconstruction::BackProject(const std::vector<double>& angles,
           }
           line[rows] = line[rows - 1];
           const double scale = s.sourceToDetector / (std::sqrt(square) * s.rowPitch);
-          const auto start = static_cast<float>((corner[2] - axis[2]) * scale + 0.5 * (rows - 1));
+          const auto start = static_cast<float>(height * scale + 0.5 * (rows - 1));
           const auto slope = static_cast<float>(grid.spacing[2] * scale);
           float* out = values + (j * nx + i) * nz;
           for (int k = 0; k < nz; ++k)

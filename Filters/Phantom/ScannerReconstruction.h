@@ -13,10 +13,19 @@
 
 namespace coronary
 {
+/// A view that was filtered.
+struct FilteredView
+{
+  double angle;              ///< of the tube, rad
+  double height;             ///< of the central plane, mm
+  std::vector<float> values; ///< [column][row]
+};
+
 class HalfScanReconstruction
 {
 public:
-  explicit HalfScanReconstruction(const ScannerSettings& settings);
+  /// @param settings  has to live as long; its kernel does not count
+  HalfScanReconstruction(const ScannerSettings& settings, ReconstructionKernel kernel);
 
   /// Window on the ramp at a frequency. @param frequency  share of Nyquist's, 0 to 1
   static double Window(ReconstructionKernel kernel, double frequency);
@@ -28,21 +37,36 @@ public:
    */
   double Weight(int view, double column) const;
 
-  /// Weights and filters a view in place, [column][row], in mm of water.
-  void Filter(int view, float* values) const;
+  /**
+   * Weights and filters the middle columns of a view.
+   * @param view     from the first of the half scan
+   * @param share    of the view among those at its angle
+   * @param values   mm of water, [column][row]
+   * @param columns  first and last that are needed of the result; the others are not written
+   * @param result   [column][row]
+   */
+  void Filter(int view, float share, const float* values, const std::array<int, 2>& columns,
+    float* result) const;
+
+  /// First and last column in whose rays a grid's slices can lie, from any angle.
+  std::array<int, 2> Columns(const Vector3& axis, const ImageGrid& grid) const;
+
+  /**
+   * What noise of the views becomes in an image's axis of rotation: each result is the sum of the views'
+   * cells times a weight; the squares of these weights for the columns of a view.
+   * @param view  from the first of the half scan
+   */
+  std::vector<double> AxisWeights(int view) const;
 
   /**
    * Back-projects filtered views onto slices.
-   * @param angles   of the tube in the views, rad
-   * @param views    filtered, [column][row] each
-   * @param axis     a point of the axis in the central plane, mm
+   * @param axis     a point of the axis, mm; its height does not count
    * @param grid     direction identity; all of grid.extent is made
    * @param values   1 is water; [j][i][k], k fastest
    * @throws Cancelled
    */
-  void BackProject(const std::vector<double>& angles, const std::vector<std::vector<float>>& views,
-    const Vector3& axis, const ImageGrid& grid, float* values,
-    const ProgressCallback& progress) const;
+  void BackProject(const std::vector<FilteredView>& views, const Vector3& axis,
+    const ImageGrid& grid, float* values, const ProgressCallback& progress) const;
 
 private:
   const ScannerSettings& Settings;

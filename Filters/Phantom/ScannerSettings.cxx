@@ -1,6 +1,5 @@
 #include "ScannerSettings.h"
 
-#include "CounterRandom.h"
 #include "Require.h"
 
 #include <cmath>
@@ -12,10 +11,6 @@ namespace coronary
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-constexpr std::uint64_t BeatPurpose = 401;
-constexpr std::uint64_t SlabPurpose = 402;
-constexpr int BeatsBefore = 2;    ///< the first slab's beat
-constexpr double EarlyBeat = 0.6; ///< an extrasystole's interval, share of the mean
 }
 
 const std::vector<ScannerNumber>& AllScannerNumbers()
@@ -41,12 +36,16 @@ const std::vector<ScannerNumber>& AllScannerNumbers()
     { "electronic_noise", &S::electronicNoise, 0.0, 1e5 },
     { "electrons_per_kev", &S::electronsPerKeV, 1.0, 1000.0 },
     { "noise", &S::noise, 0, 1 },
+    { "pitch", &S::pitch, 0.0, 1.5 },
+    { "segments", &S::segments, 1, 4 },
     { "overlap", &S::overlap, 0.0, 0.5 },
     { "beat_deviation", &S::beatDeviation, 0.0, 0.3 },
     { "heart_shift_mm", &S::heartShift, 0.0, 5.0 },
     { "breathing_mm", &S::breathing, -20.0, 20.0 },
-    { "extrasystole", &S::extrasystole, 0, 200 },
+    { "extrasystole", &S::extrasystole, 0, 1000 },
     { "contrast_loss", &S::contrastLoss, 0.0, 0.3 },
+    { "image_noise_hu", &S::imageNoise, 0.0, 500.0 },
+    { "iterative", &S::iterative, 0.0, 0.8 },
     { "anatomy_spacing_mm", &S::anatomySpacing, 0.2, 4.0 },
     { "anatomy_step_s", &S::anatomyStep, 0.001, 0.1 },
   };
@@ -71,6 +70,8 @@ void ScannerSettings::Validate() const
     "scanner: the views of a quarter turn, by which two sources stand apart, are not a whole "
     "number: "
     "views_per_turn has to be a multiple of 4");
+  Require(this->imageNoise <= 0.0 || this->noise != 0,
+    "scanner: image_noise_hu asks for noise, noise 0 for none");
   Require(this->HalfFan() < 0.25 * Pi,
     "scanner: the fan is wider than 90 degrees: channels times channel_pitch_mm is too long an arc "
     "for source_to_detector_mm");
@@ -105,7 +106,7 @@ double ScannerSettings::HalfScanTime() const
 const std::vector<std::string>& ScannerPresets()
 {
   static const std::vector<std::string> names{ "single-350", "single-330", "dual-280", "dual-250",
-    "wide-280" };
+    "wide-280", "helical-350", "helical-330", "helical-280" };
   return names;
 }
 
@@ -115,6 +116,18 @@ ScannerSettings ScannerPreset(const std::string& name)
   if (name == "single-350")
   {
     return s;
+  }
+  if (name.rfind("helical-", 0) == 0)
+  {
+    for (const char* known : { "single-350", "single-330", "dual-280" })
+    {
+      if (name.substr(name.size() - 3) == std::string(known).substr(std::string(known).size() - 3))
+      {
+        s = ScannerPreset(known);
+        s.pitch = 0.2;
+        return s;
+      }
+    }
   }
   if (name == "wide-280")
   {
@@ -153,84 +166,5 @@ ScannerSettings ScannerPreset(const std::string& name)
     list += (list.empty() ? "" : ", ") + known;
   }
   throw std::invalid_argument("scanner: no preset '" + name + "'; there are " + list);
-}
-
-ScannerSchedule::ScannerSchedule(
-  const ScannerSettings& settings, double low, double high, double cycleLength)
-  : Height(settings.SlabHeight())
-  , Step((1.0 - settings.overlap) * settings.SlabHeight())
-{
-  settings.Validate();
-  Require(settings.HalfScanTime() < cycleLength,
-    "scanner: a half scan takes " + std::to_string(std::lround(1000.0 * settings.HalfScanTime())) +
-      " ms, longer than the R-R interval of " + std::to_string(std::lround(1000.0 * cycleLength)) +
-      " ms: shorten turn_s");
-  const int count =
-    1 + std::max(0, static_cast<int>(std::ceil((high - low - this->Height) / this->Step - 1e-9)));
-  Require(count <= 200, "scanner: the image takes more than 200 slabs: the rows are too few");
-  RandomStream beats(settings.seed, BeatPurpose);
-  RandomStream slabs(settings.seed, SlabPurpose);
-  std::vector<double> intervals(2 * count + 2 * BeatsBefore + 2);
-  for (double& interval : intervals)
-  {
-    interval = cycleLength * (1.0 + settings.beatDeviation * beats.Normal(2.0));
-  }
-  if (settings.extrasystole > 0 && settings.extrasystole <= count)
-  {
-    // The early beat, and the pause after it: together they last two beats.
-    const std::size_t early = BeatsBefore + 2 * (settings.extrasystole - 1);
-    intervals[early] = EarlyBeat * cycleLength;
-    intervals[early + 1] = (2.0 - EarlyBeat) * cycleLength;
-  }
-  this->Peaks.push_back(0.0);
-  for (const double interval : intervals)
-  {
-    this->Peaks.push_back(this->Peaks.back() + interval);
-  }
-  const double first = 0.5 * (low + high) - 0.5 * (count - 1) * this->Step;
-  for (int s = 0; s < count; ++s)
-  {
-    ScannerSlab slab;
-    const std::size_t beat = BeatsBefore + 2 * s;
-    // From the head to the feet.
-    slab.centre = first + (count - 1 - s) * this->Step;
-    slab.start = this->Peaks[beat];
-    slab.interval = intervals[beat];
-    slab.gantryAngle = slabs.Uniform(0.0, 2.0 * Pi);
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      slab.shift[axis] = settings.heartShift * slabs.Normal(2.0);
-    }
-    if (count > 1)
-    {
-      slab.shift[2] -= settings.breathing * s / (count - 1);
-    }
-    slab.iodine = std::pow(1.0 - settings.contrastLoss, s);
-    this->Slabs_.push_back(slab);
-  }
-}
-
-double ScannerSchedule::Phase(double seconds) const
-{
-  const auto next = std::upper_bound(this->Peaks.begin() + 1, this->Peaks.end() - 1, seconds);
-  const double interval = *next - *(next - 1);
-  return static_cast<double>(next - this->Peaks.begin() - 1 - BeatsBefore) +
-    (seconds - *(next - 1)) / interval;
-}
-
-double ScannerSchedule::Weight(std::size_t slab, double z) const
-{
-  const auto raw = [&](const ScannerSlab& one)
-  {
-    const double inside = 0.5 * this->Height - std::abs(z - one.centre) + 1e-6;
-    const double ramp = std::max(1e-3, this->Height - this->Step);
-    return std::clamp(inside / ramp, 0.0, 1.0);
-  };
-  double sum = 0.0;
-  for (const ScannerSlab& one : this->Slabs_)
-  {
-    sum += raw(one);
-  }
-  return sum > 0.0 ? raw(this->Slabs_[slab]) / sum : 0.0;
 }
 }

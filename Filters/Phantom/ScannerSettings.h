@@ -1,6 +1,6 @@
 /**
  * @file ScannerSettings.h
- * @brief What a simulated CT scanner is, and when it looks: geometry, tube, beats.
+ * @brief What a simulated CT scanner is: geometry, tube, beats, reconstruction.
  *
  * Third-generation geometry: tube and detector turn together about the z axis, the detector is an arc
  * about the focal spot. docs/scanner.md has the sources of all numbers.
@@ -50,16 +50,22 @@ struct ScannerSettings
   double electronsPerKeV = 17.0;
   int noise = 1; ///< 0: neither Poisson nor electronic noise
 
-  // Time. Slab s is seen in beat 2 s: the table moves during the beats between.
-  double overlap = 0.125;      ///< share of a slab that the next one sees again
+  // Time.
+  double pitch = 0.0;          ///< table feed of a turn over the rows' height; 0: step and shoot
+  int segments = 1;            ///< beats that share the angles of a half scan
+  double overlap = 0.125;      ///< share of a slab that the next one sees again; of a beat's feed
   double beatDeviation = 0.03; ///< relative standard deviation of the R-R intervals
-  double heartShift = 0.75;    ///< standard deviation of a slab's shift along each axis
+  double heartShift = 0.87;    ///< standard deviation of a beat's shift along each axis
   double breathing = 0.0;      ///< towards the feet over the whole scan
-  int extrasystole = 0;        ///< slab whose beat is cut short, counted from 1; 0: none
-  double contrastLoss = 0.0;   ///< share of the iodine from slab to slab
+  int extrasystole = 0;        ///< beat of the scan that is cut short, counted from 1; 0: none
+  double contrastLoss = 0.0;   ///< share of the iodine from beat to beat
+
+  // Reconstruction.
+  ReconstructionKernel kernel = ReconstructionKernel::Standard;
+  double imageNoise = 0.0; ///< HU in the middle of the patient: sets the current; 0: `milliamperes`
+  double iterative = 0.0;  ///< share of the noise that smoothing within edges takes away
 
   // Computing.
-  ReconstructionKernel kernel = ReconstructionKernel::Standard;
   double anatomySpacing = 0.5; ///< voxels of the material maps
   double anatomyStep = 0.008;  ///< between two maps
   std::uint64_t seed = 1;      ///< of noise, beats and shifts
@@ -107,42 +113,6 @@ const std::vector<std::string>& ScannerPresets();
 /// @throws std::invalid_argument that lists the presets
 ScannerSettings ScannerPreset(const std::string& name);
 
-/// One slab of a step-and-shoot scan.
-struct ScannerSlab
-{
-  double centre = 0.0;             ///< z, mm
-  double start = 0.0;              ///< of its beat, s
-  double interval = 0.0;           ///< R-R of that beat, s
-  double gantryAngle = 0.0;        ///< of the first tube at `start`, rad
-  Vector3 shift = Vector3::Zero(); ///< of the patient, mm
-  double iodine = 1.0;             ///< factor on all iodine
-};
-
-/// When the heart beats, and which slab is seen in which beat.
-class ScannerSchedule
-{
-public:
-  /**
-   * @param low, high    z range to be seen, mm
-   * @param cycleLength  mean R-R interval, s
-   * @throws std::invalid_argument for settings that can not be
-   */
-  ScannerSchedule(const ScannerSettings& settings, double low, double high, double cycleLength);
-
-  const std::vector<ScannerSlab>& Slabs() const { return this->Slabs_; }
-
-  /// Phase of the heart at a moment: whole numbers at the R peaks, straight between.
-  double Phase(double seconds) const;
-
-  /// Share of a slab in the image at height z: 1 but where slabs overlap, there straight ramps.
-  double Weight(std::size_t slab, double z) const;
-
-private:
-  double Height;
-  double Step;
-  std::vector<double> Peaks; ///< s; the first is that of beat -2
-  std::vector<ScannerSlab> Slabs_;
-};
 }
 
 #endif

@@ -1,6 +1,7 @@
 // The simulated CT scanner against closed forms: spectrum and materials, line integrals, reconstruction,
 // slabs and beats, and the phantom through all of it.
 #include "CtScanner.h"
+#include "EdgeSmoothing.h"
 #include "ScannerReconstruction.h"
 
 #include "CounterRandom.h"
@@ -10,6 +11,7 @@
 
 #include <cmath>
 #include <functional>
+#include <tuple>
 #include <utility>
 
 using namespace coronary;
@@ -38,24 +40,26 @@ std::vector<float> Reconstruct(const ScannerSettings& settings,
 {
   const ScannerPhysics physics(settings);
   const ScannerProjector projector(settings);
-  const HalfScanReconstruction reconstruction(settings);
-  std::vector<double> angles;
-  std::vector<std::vector<float>> views;
+  const HalfScanReconstruction reconstruction(settings, settings.kernel);
+  std::vector<FilteredView> views;
   ViewPaths paths;
+  TransmittedView transmitted;
   for (int v = 0; v < settings.HalfScanViews(); ++v)
   {
-    angles.push_back(FirstAngle + v * settings.ViewAngle());
+    const double angle = FirstAngle + v * settings.ViewAngle();
     projector.Clear(paths);
-    projector.Add(tubesOf(v), {}, { angles.back(), Vector3::Zero() }, paths);
-    std::vector<float>& view = views.emplace_back(paths[0].size());
-    physics.Measure({ paths[0].data(), paths[1].data(), paths[2].data() }, 1.0,
-      MixBits(static_cast<std::uint64_t>(v)), view.data());
-    reconstruction.Filter(v, view.data());
+    projector.Add(tubesOf(v), {}, { angle, Vector3::Zero() }, paths);
+    std::vector<float> line(paths[0].size());
+    physics.Transmit({ paths[0].data(), paths[1].data(), paths[2].data() }, transmitted);
+    physics.Detect(transmitted, 1.0, MixBits(static_cast<std::uint64_t>(v)), line.data());
+    FilteredView& view =
+      views.emplace_back(FilteredView{ angle, 0.0, std::vector<float>(line.size()) });
+    reconstruction.Filter(v, 1.0f, line.data(), { 0, settings.channels - 1 }, view.values.data());
   }
   const std::array<int, 6>& e = grid.extent;
   std::vector<float> image(
     static_cast<std::size_t>(e[1] - e[0] + 1) * (e[3] - e[2] + 1) * (e[5] - e[4] + 1));
-  reconstruction.BackProject(angles, views, Vector3::Zero(), grid, image.data(), {});
+  reconstruction.BackProject(views, Vector3::Zero(), grid, image.data(), {});
   return image;
 }
 
@@ -318,7 +322,7 @@ TEST(CtScanner, VoxelsAreProjectedAsFineAsTheyAre)
 TEST(CtScanner, WeightsOfARayFromBothSidesSumToOne)
 {
   const ScannerSettings settings = Coarse(2);
-  const HalfScanReconstruction reconstruction(settings);
+  const HalfScanReconstruction reconstruction(settings, settings.kernel);
   const int count = settings.HalfScanViews();
   int pairs = 0;
   for (int v = 0; v < count; v += 5)
@@ -460,7 +464,7 @@ TEST(CtScanner, WhatMovesIsASumOverItsPlaces)
         std::cos(2.0 * Pi * f * angle) * 0.5 / pitch / steps;
     }
   }
-  const HalfScanReconstruction reconstruction(settings);
+  const HalfScanReconstruction reconstruction(settings, settings.kernel);
   std::vector<double> sum(image.size());
   for (int v = 0; v < count; ++v)
   {
@@ -546,46 +550,271 @@ TEST(CtScanner, NoiseFollowsKernelAndDose)
   EXPECT_NEAR(deviation() / standard, 2.0, 0.1);
 }
 
-TEST(CtScanner, SlabsCoverTheImageInBeatsOfTheirOwn)
+TEST(CtScanner, StacksCoverTheImage)
+{
+  for (const double pitch : { 0.0, 0.15 })
+  {
+    for (const int segments : { 1, 2 })
+    {
+      ScannerSettings settings;
+      settings.pitch = pitch;
+      settings.segments = segments;
+      const ScannerSchedule schedule(settings, -60.0, 70.0, 0.8);
+      for (const double phase : { 0.0, 0.4, 1.0 })
+      {
+        const std::vector<GatedStack> stacks = schedule.Stacks(phase);
+        if (pitch == 0.0)
+        {
+          ASSERT_EQ(stacks.size(), 4u);
+        }
+        for (double z = -60.0; z <= 70.0; z += 0.7)
+        {
+          const std::vector<double> weights = schedule.Weights(stacks, z);
+          double sum = 0.0;
+          for (std::size_t s = 0; s < stacks.size(); ++s)
+          {
+            sum += weights[s];
+            if (weights[s] > 0.0)
+            {
+              // All of the views have the slice before the detector.
+              for (const GatedView& view : stacks[s].views)
+              {
+                EXPECT_LE(std::abs(schedule.Table(schedule.Seconds(view.number)) - z),
+                  0.5 * settings.SlabHeight() + 1e-9);
+              }
+            }
+          }
+          EXPECT_NEAR(sum, 1.0, 1e-12) << z;
+        }
+      }
+    }
+  }
+}
+
+TEST(CtScanner, StepAndShootSeesSlabsInBeatsOfTheirOwn)
 {
   ScannerSettings settings;
   const ScannerSchedule schedule(settings, -60.0, 70.0, 0.8);
-  ASSERT_EQ(schedule.Slabs().size(), 4u);
-  for (double z = -60.0; z <= 70.0; z += 0.7)
+  const std::vector<GatedStack> stacks = schedule.Stacks(0.5);
+  for (int s = 0; s < static_cast<int>(stacks.size()); ++s)
   {
-    double sum = 0.0;
-    for (std::size_t s = 0; s < schedule.Slabs().size(); ++s)
-    {
-      sum += schedule.Weight(s, z);
-    }
-    EXPECT_NEAR(sum, 1.0, 1e-12) << z;
+    EXPECT_EQ(stacks[s].beats, std::vector<int>{ 2 * s });
+    const ScannerBeat& beat = schedule.Beat(2 * s);
+    EXPECT_NEAR(schedule.Phase(beat.start), 2.0 * s, 1e-9);
+    EXPECT_NEAR(schedule.Phase(beat.start + 0.5 * beat.interval), 2.0 * s + 0.5, 1e-9);
+    EXPECT_NEAR(beat.interval, 0.8, 0.8 * 0.061);
+    // Triggered by the mean interval; the heart is in one place in all of the beat.
+    EXPECT_NEAR(stacks[s].middle - beat.start, 0.4, 1e-9);
+    EXPECT_LT((schedule.Shift(beat.start + 0.4) - beat.shift).norm(), 1e-12);
+    EXPECT_LT(beat.shift.cwiseAbs().maxCoeff(), 2.0 * settings.heartShift + 1e-9);
   }
-  for (std::size_t s = 0; s < schedule.Slabs().size(); ++s)
-  {
-    const ScannerSlab& slab = schedule.Slabs()[s];
-    const double beat = schedule.Phase(slab.start);
-    EXPECT_NEAR(beat, 2.0 * static_cast<double>(s), 1e-9);
-    EXPECT_NEAR(schedule.Phase(slab.start + 0.5 * slab.interval), beat + 0.5, 1e-9);
-    EXPECT_NEAR(slab.interval, 0.8, 0.8 * 0.061);
-    EXPECT_LT(slab.shift.cwiseAbs().maxCoeff(), 2.0 * settings.heartShift + 1e-9);
-  }
-  settings.extrasystole = 2;
+  settings.extrasystole = 3;
   const ScannerSchedule early(settings, -60.0, 70.0, 0.8);
-  EXPECT_NEAR(early.Slabs()[1].interval, 0.48, 1e-9);
+  EXPECT_NEAR(early.Beat(2).interval, 0.48, 1e-9);
   // What is triggered at 75 % of a usual beat sees the next one.
-  EXPECT_GT(early.Phase(early.Slabs()[1].start + 0.6), 3.0);
+  EXPECT_GT(early.Phase(early.Beat(2).start + 0.6), 3.0);
+  // Gated afterwards it is a share of the beat's own interval.
+  settings.pitch = 0.15;
+  const ScannerSchedule helical(settings, -60.0, 70.0, 0.8);
+  for (const GatedStack& stack : helical.Stacks(0.75))
+  {
+    EXPECT_NEAR(helical.Phase(stack.middle), stack.beats.front() + 0.75, 1e-9);
+  }
+}
+
+TEST(CtScanner, ViewsAreThoseNearestToTheWantedMoment)
+{
+  const auto stackOf = [](const ScannerSettings& settings, double cycle)
+  {
+    const ScannerSchedule schedule(settings, -15.0, 15.0, cycle);
+    const GatedStack stack = schedule.Stacks(0.6).front();
+    // Every angle counts once, and has the angle of its position.
+    std::vector<double> sums(settings.HalfScanViews());
+    for (const GatedView& view : stack.views)
+    {
+      sums[view.position] += view.weight;
+      const double wanted = stack.firstAngle + view.position * settings.ViewAngle();
+      EXPECT_NEAR(
+        std::remainder(schedule.Angle(view.number, view.tube) - wanted, 2.0 * Pi), 0.0, 1e-9);
+    }
+    for (const double sum : sums)
+    {
+      EXPECT_NEAR(sum, 1.0, 1e-5);
+    }
+    return stack;
+  };
+  ScannerSettings settings;
+  settings.beatDeviation = 0.0;
+  const double view = settings.turnTime / settings.viewsPerTurn;
+  const GatedStack one = stackOf(settings, 0.8);
+  EXPECT_EQ(one.views.size(), static_cast<std::size_t>(settings.HalfScanViews()));
+  EXPECT_NEAR(one.worst, 0.5 * settings.HalfScanTime(), view);
+  // A second tube, and a second beat, bring the views nearer; but for blending at the seams.
+  ScannerSettings dual = settings;
+  dual.sources = 2;
+  EXPECT_NEAR(stackOf(dual, 0.8).worst, 0.5 * dual.HalfScanTime(), 0.01);
+  ScannerSettings two = settings;
+  two.segments = 2;
+  EXPECT_LT(stackOf(two, 0.8).worst, 0.65 * one.worst);
+  // Beats that are whole turns bring the same angles again: nothing is won.
+  EXPECT_NEAR(stackOf(two, 2.0 * settings.turnTime).worst, one.worst, 0.01);
+}
+
+/// A still cylinder of water with a wire in it.
+class StillCylinder : public ScannedAnatomy
+{
+public:
+  double CycleLength() const override { return 0.8; }
+  CoronaryPhantom::Box Body() const override
+  {
+    return { Vector3(-120.0, -120.0, -1.0), Vector3(120.0, 120.0, 1.0) };
+  }
+  void Render(const PatientState&, const ImageGrid& grid, MaterialVolume& volume,
+    const ProgressCallback&) const override
+  {
+    volume.SetGrid(grid);
+    for (std::vector<float>& map : volume.maps)
+    {
+      std::fill(map.begin(), map.end(), 0.0f);
+    }
+    volume.FindColumns();
+  }
+  std::vector<ScannedTube> Tubes(const PatientState&) const override
+  {
+    return { Cylinder(18.0, -12.0, 2.0, { 1.0f, 14.0f, 0.0f }),
+      Cylinder(0.0, 0.0, 115.0, { 1.0f, 0.0f, 0.0f }) };
+  }
+  std::vector<ScannedBall> Balls(const PatientState&) const override { return {}; }
+};
+
+TEST(CtScanner, WaysOfScanningAgreeOnWhatIsStill)
+{
+  const StillCylinder anatomy;
+  ImageGrid grid = Plane(48, 2.0);
+  grid.spacing[2] = 4.0;
+  grid.extent[5] = 9;
+  const std::size_t plane = 48 * 48;
+  for (const auto& [pitch, segments, sources] : { std::tuple{ 0.0, 1, 1 }, std::tuple{ 0.2, 1, 1 },
+         std::tuple{ 0.0, 2, 1 }, std::tuple{ 0.15, 2, 1 }, std::tuple{ 0.2, 1, 2 } })
+  {
+    ScannerSettings settings = Coarse(8);
+    settings.pitch = pitch;
+    settings.segments = segments;
+    settings.sources = sources;
+    settings.anatomySpacing = 4.0;
+    CtScanner scanner(anatomy, settings, grid, { 0.3, 0.75 });
+    MemoryScanStore store;
+    scanner.Scan(store);
+    for (const std::size_t phase : { 0, 1 })
+    {
+      std::vector<std::int16_t> image(10 * plane);
+      scanner.Image(phase, 0, store, image.data());
+      double wire = 0.0;
+      Vector3 centre = Vector3::Zero();
+      for (int k = 0; k < 10; ++k)
+      {
+        for (int j = 0; j < 48; ++j)
+        {
+          for (int i = 0; i < 48; ++i)
+          {
+            const Vector3 p = grid.IndexToWorld(i, j, k);
+            const double value = image[k * plane + j * 48 + i];
+            const double away = std::hypot(p[0] - 18.0, p[1] + 12.0);
+            if (away < 10.0)
+            {
+              wire += value;
+              centre += value * p;
+            }
+            else if (away > 25.0)
+            {
+              EXPECT_NEAR(value, 0.0, 25.0) << pitch << ' ' << segments << ' ' << sources;
+            }
+          }
+        }
+      }
+      EXPECT_NEAR(centre[0] / wire, 18.0, 0.3) << pitch << ' ' << segments << ' ' << sources;
+      EXPECT_NEAR(centre[1] / wire, -12.0, 0.3) << pitch << ' ' << segments << ' ' << sources;
+    }
+  }
+}
+
+TEST(CtScanner, TheCurrentIsThatOfTheWantedNoise)
+{
+  const StillCylinder anatomy;
+  const ImageGrid grid = Plane(48, 0.8);
+  ScannerSettings settings = Coarse(4);
+  settings.rows = 4;
+  settings.noise = 1;
+  settings.anatomySpacing = 4.0;
+  const std::vector<ScanVariant> variants{ { ReconstructionKernel::Soft, 15.0 },
+    { ReconstructionKernel::Standard, 15.0 }, { ReconstructionKernel::Standard, 45.0 } };
+  CtScanner scanner(anatomy, settings, grid, { 0.75 }, variants);
+  MemoryScanStore store;
+  scanner.Scan(store);
+  for (std::size_t v = 0; v < variants.size(); ++v)
+  {
+    std::vector<std::int16_t> image(48 * 48);
+    scanner.Image(0, v, store, image.data());
+    double squares = 0.0;
+    int count = 0;
+    for (int j = 0; j < 48; ++j)
+    {
+      for (int i = 0; i < 48; ++i)
+      {
+        const Vector3 p = grid.IndexToWorld(i, j, 0);
+        if (std::hypot(p[0] - 18.0, p[1] + 12.0) > 8.0)
+        {
+          squares += static_cast<double>(image[j * 48 + i]) * image[j * 48 + i];
+          ++count;
+        }
+      }
+    }
+    // The slice lies at one place between two rows, not anywhere.
+    EXPECT_NEAR(std::sqrt(squares / count) / variants[v].imageNoise, 0.87, 0.12) << v;
+  }
+  EXPECT_GT(scanner.Milliamperes(1), 1.5 * scanner.Milliamperes(0));
+  EXPECT_GT(scanner.Milliamperes(1), 8.0 * scanner.Milliamperes(2));
+}
+
+TEST(CtScanner, SmoothingWithinEdgesTakesNoise)
+{
+  const std::array<int, 3> size{ 60, 60, 24 };
+  std::vector<float> image(60 * 60 * 24);
+  std::vector<float> clean(image.size());
+  RandomStream random(5);
+  for (std::size_t n = 0; n < image.size(); ++n)
+  {
+    clean[n] = n % 60 < 30 ? 0.0f : 400.0f;
+    image[n] = clean[n] + static_cast<float>(30.0 * random.Normal());
+  }
+  EXPECT_NEAR(ImageNoise(image, size), 30.0, 2.0);
+  const std::vector<float> before = image;
+  for (const double share : { 0.3, 0.6 })
+  {
+    image = before;
+    SmoothWithinEdges(image, size, share);
+    EXPECT_NEAR(ImageNoise(image, size), 30.0 * (1.0 - share), 2.0);
+    // The edge is as high as it was, one voxel beside it.
+    double step = 0.0;
+    for (std::size_t row = 0; row < image.size(); row += 60)
+    {
+      step += (image[row + 30] - image[row + 29]) / (60.0 * 24.0);
+    }
+    EXPECT_NEAR(step, 400.0, 60.0) << share;
+  }
 }
 
 TEST(CtScanner, RefusesWhatCanNotBe)
 {
   const CoronaryPhantom phantom{ PhantomSettings() };
+  const ScannedPhantom anatomy(phantom);
   const ImageGrid grid = phantom.DefaultGrid(4.0);
   const auto refused = [&](const char* reason, const auto& change)
   {
     ScannerSettings settings;
     ImageGrid image = grid;
     change(settings, image);
-    ExpectRefusal([&] { CtScanner(phantom, settings, image); }, reason);
+    ExpectRefusal([&] { CtScanner(anatomy, settings, image, { 0.75 }); }, reason);
   };
   refused("kilovolts is 60", [](ScannerSettings& s, ImageGrid&) { s.kilovolts = 60.0; });
   refused("rows", [](ScannerSettings& s, ImageGrid&) { s.rows = 0; });
@@ -599,6 +828,19 @@ TEST(CtScanner, RefusesWhatCanNotBe)
       s.sources = 2;
       s.viewsPerTurn = 985;
     });
+  refused("leaves holes", [](ScannerSettings& s, ImageGrid&) { s.pitch = 0.5; });
+  refused("leaves holes",
+    [](ScannerSettings& s, ImageGrid&)
+    {
+      s.pitch = 0.2;
+      s.segments = 3;
+    });
+  refused("image_noise_hu",
+    [](ScannerSettings& s, ImageGrid&)
+    {
+      s.imageNoise = 20.0;
+      s.noise = 0;
+    });
   refused("half scan takes", [](ScannerSettings& s, ImageGrid&) { s.turnTime = 1.5; });
   refused("does not fit into the field", [](ScannerSettings& s, ImageGrid&) { s.channels = 500; });
   refused("reaches out of the field",
@@ -607,7 +849,7 @@ TEST(CtScanner, RefusesWhatCanNotBe)
   ExpectRefusal([] { ScannerPreset("none"); }, "single-350, single-330, dual-280");
   for (const std::string& name : ScannerPresets())
   {
-    EXPECT_NO_THROW(CtScanner(phantom, ScannerPreset(name), grid)) << name;
+    EXPECT_NO_THROW(CtScanner(anatomy, ScannerPreset(name), grid, { 0.75 })) << name;
   }
 }
 
@@ -630,9 +872,12 @@ TEST(CtScanner, SeesTheHeart)
     settings.heartShift = 0.0;
     settings.beatDeviation = 0.0;
     settings.noise = 1;
-    const CtScanner scanner(phantom, settings, grid);
+    const ScannedPhantom anatomy(phantom);
+    CtScanner scanner(anatomy, settings, grid, { 0.35, 0.7 });
     std::vector<std::int16_t> image(formula.size());
-    scanner.Scan(0.7, image.data());
+    MemoryScanStore store;
+    scanner.Scan(store);
+    scanner.Image(1, 0, store, image.data());
     // Where the formula's image is even, the scanner's has the same value in the mean.
     for (const auto& [value, tolerance] :
       // Blood hardens the beam for itself.
@@ -651,9 +896,14 @@ TEST(CtScanner, SeesTheHeart)
       ASSERT_GT(count, 100);
       EXPECT_NEAR(sum / count, value, tolerance) << sources;
     }
+    // One thread, and a scan that goes on where another one was stopped, come to the same.
     std::vector<std::int16_t> again(image.size());
     SetNumberOfThreads(1);
-    scanner.Scan(0.7, again.data());
+    MemoryScanStore halfway;
+    halfway.Put("0-0-0", store.Get("0-0-0"));
+    halfway.Put("1-1-0", store.Get("1-1-0"));
+    scanner.Scan(halfway);
+    scanner.Image(1, 0, halfway, again.data());
     SetNumberOfThreads(0);
     EXPECT_EQ(image, again);
   }
