@@ -58,11 +58,29 @@ def digest_of_program(program, build):
     return digest_of_files([program] + sorted(libraries))
 
 
-def kept(folder, key, make):
+def kept(folder, key, make, goes_on=False):
     """The result of make(folder), from the last time when that was with the same key.
 
-    `make` fills a folder of another name, which takes its place when all is there; an interrupted one is made anew.
+    `make` fills a folder of another name, which takes its place when all is there. An interrupted one is made anew, unless
+    `make` says that it goes on with what it finds.
     """
+    result = finished(folder, key)
+    if result is not None:
+        return result
+    partial = folder + ".partial"
+    if not goes_on:
+        shutil.rmtree(partial, ignore_errors=True)
+    os.makedirs(partial, exist_ok=True)
+    result = make(partial)
+    with open(os.path.join(partial, "kept.json"), "w", encoding="utf-8") as file:
+        json.dump({"key": key, "result": result}, file, indent=1)
+    shutil.rmtree(folder, ignore_errors=True)
+    os.rename(partial, folder)
+    return result
+
+
+def finished(folder, key):
+    """What `kept` would give without making anything; None when it is not there."""
     try:
         with open(os.path.join(folder, "kept.json"), encoding="utf-8") as file:
             old = json.load(file)
@@ -70,12 +88,4 @@ def kept(folder, key, make):
             return old["result"]
     except (OSError, ValueError, KeyError):
         pass
-    partial = folder + ".partial"
-    shutil.rmtree(partial, ignore_errors=True)
-    os.makedirs(partial)
-    result = make(partial)
-    with open(os.path.join(partial, "kept.json"), "w", encoding="utf-8") as file:
-        json.dump({"key": key, "result": result}, file, indent=1)
-    shutil.rmtree(folder, ignore_errors=True)
-    os.rename(partial, folder)
-    return result
+    return None

@@ -18,14 +18,15 @@ from kept_results import Failed, digest, kept
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PEERS = os.path.join(ROOT, "Testing", "Validation", "peers")
 PARAMETERS = os.path.join(PEERS, "cardiac-ct-bspline.txt")
-FORMULA = ["--fractions=0,0.15,0.3,0.45,0.6,0.75", "--spacing", "0.6"]
+SIX = ["--fractions=0,0.15,0.3,0.45,0.6,0.75", "--spacing", "0.6"]
+FOUR = ["--fractions=0,0.2,0.4,0.75", "--spacing", "0.6"]
 SCANNED = ["--fractions=0.35,0.75", "--spacing", "0.6", "--scanner", os.path.join(PEERS, "dual-coarse.json")]
 # Name, options of `coronary-pipeline phantom`.
 CASES = [
-    ("healthy 101", ["--seed", "101"] + FORMULA),
-    ("healthy 102", ["--seed", "102"] + FORMULA),
-    ("healthy 103", ["--seed", "103"] + FORMULA),
-    ("stenosed 104", ["--seed", "104", "--stenoses", "4", "--stenosis-degree", "0.7"] + FORMULA),
+    ("healthy 101", ["--seed", "101"] + SIX),
+    ("healthy 102", ["--seed", "102"] + FOUR),
+    ("healthy 103", ["--seed", "103"] + FOUR),
+    ("stenosed 104", ["--seed", "104", "--stenoses", "4", "--stenosis-degree", "0.7"] + FOUR),
     ("scanned 105", ["--seed", "105"] + SCANNED),
 ]
 QUICK_CASES = [("quick 101", ["--seed", "101", "--fractions=0.35,0.75", "--spacing", "0.9"])]
