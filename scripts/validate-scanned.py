@@ -23,12 +23,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SCANNERS = os.path.join(ROOT, "Testing", "Validation", "scans")
 # One heart, so that rows differ in what their axes say alone: options of `coronary-pipeline phantom`.
 HEART = ["--seed", "711"]
-ANATOMIES = {
-    "healthy": [],
-    "stenosed": ["--stenoses", "4", "--stenosis-degree", "0.7"],
-    "calcified": ["--calcified-plaques", "25"],
-    "occluded": ["--chronic-occlusion"],
-}
+ANATOMIES = {"healthy": [], **{name: ["--disease", name]
+                               for name in ("stenosed", "calcified", "stented", "occluded", "anomalous")}}
 # Scanner file, and what `run` is told of its temporal window in ms.
 SCANS = {"dual-66": 66, "single-140": 140, "single-140-misfit": 140}
 PHASES = {"systole": 0.35, "rest": 0.75}
@@ -36,8 +32,10 @@ KERNELS = ["soft", "sharp"]
 NOISES = [20, 40, 60]  # HU
 GRID = ["--spacing", "0.5"]
 RUN = ["--partial"]  # a lost tree is a row, not an end
-QUICK = {"ANATOMIES": {"healthy": []}, "SCANS": {"quick": 66}, "KERNELS": ["soft"], "NOISES": [20],
-         "GRID": ["--spacing", "0.9", "--surface-spacing", "0.8"], "RUN": ["--partial", "--edges", "0.5", "1.5"]}
+# Wide vessels, since the quick scanner is coarse.
+QUICK = {"HEART": HEART + ["--calibre", "1.4"], "ANATOMIES": {"healthy": []}, "SCANS": {"quick": 66}, "KERNELS": ["sharp"],
+         "NOISES": [30], "GRID": ["--spacing", "0.8", "--surface-spacing", "0.8"],
+         "RUN": ["--partial", "--edges", "0.5", "1.5"]}
 
 FOUND_WITHIN = 1.5  # mm from an axis, beside how far the scan shifts the heart
 CONFIDENT = 0.8     # from this confidence on a wrong branch counts
@@ -101,11 +99,18 @@ class Matrix:
         anatomy, scan = wanted[0].anatomy, wanted[0].scan
         kernels = [kernel for kernel in KERNELS if any(one.kernel == kernel for one in wanted)]
         noises = [noise for noise in NOISES if any(one.noise == noise for one in wanted)]
-        folder = os.path.join(self.folder, anatomy, scan, "images")
-        kept(folder, digest(self.scan_key(anatomy, scan), kernels, noises), lambda partial: self.pipeline(
-            partial, "phantom", *HEART, *ANATOMIES[anatomy], "--scanner", self.scanner(scan), "--kernel", ",".join(kernels),
-            "--image-noise", ",".join(str(noise) for noise in noises),
-            "--fractions", ",".join(str(fraction) for fraction in PHASES.values()), *GRID, "--output", partial), goes_on=True)
+        folder, key = os.path.join(self.folder, anatomy, scan, "images"), self.scan_key(anatomy, scan)
+
+        def make(partial):
+            self.pipeline(partial, "phantom", *HEART, *ANATOMIES[anatomy], "--scanner", self.scanner(scan),
+                          "--kernel", ",".join(kernels), "--image-noise", ",".join(str(noise) for noise in noises),
+                          "--fractions", ",".join(str(fraction) for fraction in PHASES.values()), *GRID, "--output", partial)
+            return [Series(anatomy, scan, kernel, noise).image for kernel in kernels for noise in noises]
+
+        have = finished(folder, key) or []
+        if not all(one.image in have for one in wanted):
+            shutil.rmtree(folder, ignore_errors=True)
+            kept(folder, key, make, goes_on=True)
         return folder
 
     def measure(self, series, images, folder):
