@@ -110,6 +110,12 @@ struct CtScanner::Internals
     return { this->Schedule.Angle(view.first, view.second), axis };
   }
 
+  /// Views of one step see the same maps of the anatomy.
+  double Step(const ViewKey& view) const
+  {
+    return std::floor(this->Schedule.Seconds(view.first) / this->Settings.anatomyStep);
+  }
+
   static std::string PartName(std::size_t phase, std::size_t stack, std::size_t variant)
   {
     return std::to_string(phase) + "-" + std::to_string(stack) + "-" + std::to_string(variant);
@@ -193,8 +199,9 @@ void CtScanner::Internals::FindCurrents(const ProgressCallback& progress)
 {
   const double middle =
     0.5 * (this->Height(this->Grid.extent[4]) + this->Height(this->Grid.extent[5]));
-  const bool wanted = std::any_of(this->Variants.begin(), this->Variants.end(),
-    [](const ScanVariant& variant) { return variant.imageNoise > 0.0; });
+  const bool wanted = this->Settings.noise != 0 &&
+    std::any_of(this->Variants.begin(), this->Variants.end(),
+      [](const ScanVariant& variant) { return variant.imageNoise > 0.0; });
   if (wanted)
   {
     const std::vector<GatedStack> stacks = this->Schedule.Stacks(this->Phases.front());
@@ -264,8 +271,8 @@ void CtScanner::Internals::TakeViews(const std::vector<ViewKey>& views,
   std::map<ViewKey, std::vector<std::vector<float>>>& taken, const ProgressCallback& progress) const
 {
   const ScannerSettings& s = this->Settings;
-  const double middle = 0.5 *
-    (this->Schedule.Seconds(views.front().first) + this->Schedule.Seconds(views.back().first));
+  // The same for the same view, whichever others are taken with it.
+  const double middle = (this->Step(views.front()) + 0.5) * s.anatomyStep;
   ScannedPatient patient(this->Anatomy, s);
   patient.Prepare(this->Patient(middle), this->Schedule.Table(middle), PartOf(progress, 0.0, 0.5));
   for (const ViewKey& view : views)
@@ -365,7 +372,6 @@ CtScanner::~CtScanner() = default;
 void CtScanner::Scan(ScanStore& store, const ProgressCallback& progress)
 {
   Internals& data = *this->Data;
-  const ScannerSettings& s = data.Settings;
   data.FindCurrents(PartOf(progress, 0.0, 0.01));
   const std::vector<Job> jobs = data.Jobs(store);
   std::map<ViewKey, std::size_t> lastUse; // the job after which a view is not needed
@@ -394,15 +400,13 @@ void CtScanner::Scan(ScanStore& store, const ProgressCallback& progress)
     spent += cost;
     return PartOf(progress, first, 0.01 + 0.99 * spent / whole);
   };
-  const auto momentOf = [&](const ViewKey& view)
-  { return std::floor(data.Schedule.Seconds(view.first) / s.anatomyStep); };
   std::map<ViewKey, std::vector<std::vector<float>>> taken;
   std::size_t ready = 0;
   for (auto view = lastUse.begin(); view != lastUse.end();)
   {
     std::vector<ViewKey> together;
-    const double moment = momentOf(view->first);
-    for (; view != lastUse.end() && momentOf(view->first) == moment; ++view)
+    const double step = data.Step(view->first);
+    for (; view != lastUse.end() && data.Step(view->first) == step; ++view)
     {
       together.push_back(view->first);
     }

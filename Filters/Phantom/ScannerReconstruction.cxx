@@ -1,5 +1,7 @@
 #include "ScannerReconstruction.h"
 
+#include "ReconstructionKernels.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -26,6 +28,17 @@ double Quartic(const double (&samples)[5], double at)
   }
   return sum;
 }
+}
+
+KernelChoice<ReconstructionKernels>& ReconstructionKernelChoice()
+{
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<ReconstructionKernels> choice(
+    ReconstructionKernelsBaseline, &ReconstructionKernelsAvx2);
+#else
+  static KernelChoice<ReconstructionKernels> choice(ReconstructionKernelsBaseline);
+#endif
+  return choice;
 }
 
 HalfScanReconstruction::HalfScanReconstruction(
@@ -123,20 +136,8 @@ void HalfScanReconstruction::Filter(int view, float share, const float* values,
       weighted[at] = values[at] * static_cast<float>(weight / std::sqrt(1.0 + rise * rise));
     }
   }
-  for (int c = columns[0]; c <= columns[1]; ++c)
-  {
-    float* out = result + static_cast<std::size_t>(c) * rows;
-    std::fill(out, out + rows, 0.0f);
-    for (int n = 0; n < s.channels; ++n)
-    {
-      const float h = this->Kernel[std::abs(c - n)];
-      const float* in = &weighted[static_cast<std::size_t>(n) * rows];
-      for (int r = 0; r < rows; ++r)
-      {
-        out[r] += h * in[r];
-      }
-    }
-  }
+  ReconstructionKernelChoice().Get().convolve(
+    this->Kernel.data(), weighted.data(), s.channels, rows, columns[0], columns[1], result);
 }
 
 std::array<int, 2> HalfScanReconstruction::Columns(const Vector3& axis, const ImageGrid& grid) const
@@ -186,59 +187,21 @@ void HalfScanReconstruction::BackProject(const std::vector<FilteredView>& views,
   const int ny = e[3] - e[2] + 1;
   const int nz = e[5] - e[4] + 1;
   const Vector3 corner = grid.IndexToWorld(e[0], e[2], e[4]);
-  const int rows = s.rows;
-  const auto lastRow = static_cast<float>(rows - 1);
-  std::vector<Eigen::Vector2d> towards(views.size()); // the tube, seen from the axis
-  for (std::size_t v = 0; v < views.size(); ++v)
-  {
-    towards[v] = { std::cos(views[v].angle), std::sin(views[v].angle) };
-  }
+  const ReconstructionKernels& kernels = ReconstructionKernelChoice().Get();
   const auto block = [&](std::int64_t first, std::int64_t last)
   {
-    std::vector<float> line(rows + 1);
+    std::vector<float> line(s.rows + 1);
     std::fill(values + first * nx * nz, values + last * nx * nz, 0.0f);
-    for (std::size_t v = 0; v < views.size(); ++v)
+    for (const FilteredView& view : views)
     {
-      const std::vector<float>& view = views[v].values;
-      const double height = corner[2] - views[v].height;
       for (std::int64_t j = first; j < last; ++j)
       {
-        const double y = corner[1] + static_cast<double>(j) * grid.spacing[1] - axis[1];
-        for (int i = 0; i < nx; ++i)
-        {
-          const double x = corner[0] + i * grid.spacing[0] - axis[0];
-          // From the tube: along the central ray, and to its left.
-          const double along = s.sourceToAxis - (x * towards[v][0] + y * towards[v][1]);
-          const double left = x * towards[v][1] - y * towards[v][0];
-          const double column =
-            std::atan2(left, along) / s.ColumnPitch() + 0.5 * (s.channels - 1) + s.channelOffset;
-          const int c = static_cast<int>(column);
-          if (column < 0.0 || c + 1 >= s.channels)
-          {
-            continue;
-          }
-          const double square = along * along + left * left;
-          const auto right = static_cast<float>((column - c) / square);
-          const auto rest = static_cast<float>(1.0 / square) - right;
-          const float* one = &view[static_cast<std::size_t>(c) * rows];
-          const float* other = one + rows;
-          for (int r = 0; r < rows; ++r)
-          {
-            line[r] = rest * one[r] + right * other[r];
-          }
-          line[rows] = line[rows - 1];
-          const double scale = s.sourceToDetector / (std::sqrt(square) * s.rowPitch);
-          const auto start = static_cast<float>(height * scale + 0.5 * (rows - 1));
-          const auto slope = static_cast<float>(grid.spacing[2] * scale);
-          float* out = values + (j * nx + i) * nz;
-          for (int k = 0; k < nz; ++k)
-          {
-            const float row =
-              std::min(lastRow, std::max(0.0f, start + static_cast<float>(k) * slope));
-            const int r = static_cast<int>(row);
-            out[k] += line[r] + (row - static_cast<float>(r)) * (line[r + 1] - line[r]);
-          }
-        }
+        kernels.backProject({ view.values.data(), s.channels, s.rows,
+          0.5 * (s.channels - 1) + s.channelOffset, s.ColumnPitch(),
+          { std::cos(view.angle), std::sin(view.angle) }, s.sourceToAxis, corner[0] - axis[0],
+          grid.spacing[0], corner[1] + static_cast<double>(j) * grid.spacing[1] - axis[1],
+          corner[2] - view.height, grid.spacing[2], s.sourceToDetector / s.rowPitch, nx, nz,
+          line.data(), values + j * nx * nz });
       }
     }
     const auto turn = static_cast<float>(s.ViewAngle());

@@ -70,8 +70,6 @@ void ScannerSettings::Validate() const
     "scanner: the views of a quarter turn, by which two sources stand apart, are not a whole "
     "number: "
     "views_per_turn has to be a multiple of 4");
-  Require(this->imageNoise <= 0.0 || this->noise != 0,
-    "scanner: image_noise_hu asks for noise, noise 0 for none");
   Require(this->HalfFan() < 0.25 * Pi,
     "scanner: the fan is wider than 90 degrees: channels times channel_pitch_mm is too long an arc "
     "for source_to_detector_mm");
@@ -113,6 +111,7 @@ const std::vector<std::string>& ScannerPresets()
 ScannerSettings ScannerPreset(const std::string& name)
 {
   ScannerSettings s; // GE LightSpeed VCT
+  s.imageNoise = 25.0;
   if (name == "single-350")
   {
     return s;

@@ -48,7 +48,7 @@ struct ScannerSettings
   double systolicCurrent = 1.0;    ///< share of the current before 55 and after 96 % R-R
   double electronicNoise = 3500.0; ///< standard deviation, electrons
   double electronsPerKeV = 17.0;
-  int noise = 1; ///< 0: neither Poisson nor electronic noise
+  int noise = 1; ///< 0: neither Poisson nor electronic noise, whatever imageNoise says
 
   // Time.
   double pitch = 0.0;          ///< table feed of a turn over the rows' height; 0: step and shoot

@@ -268,7 +268,7 @@ check_scanner() {
   # Few and wide cells: the road, not the image.
   cat >scanner.json <<END
 { "preset": "single-350", "channels": 111, "channel_pitch_mm": 8.19, "rows": 8, "row_pitch_mm": 8.79,
-  "views_per_turn": 120, "anatomy_spacing_mm": 4, "anatomy_step_s": 0.05, "extrasystole": 2 }
+  "views_per_turn": 120, "anatomy_spacing_mm": 4, "anatomy_step_s": 0.05, "extrasystole": 3 }
 END
   image="--quiet --spacing 4 --fractions 0.4,0.75 --calcified-plaques 3 $coarse"
   # shellcheck disable=SC2086
@@ -277,7 +277,7 @@ END
     [ -s "made/$file" ] || fail "no $file"
   done
   [ "$(find made -type f | wc -l)" -eq 13 ] || fail "other files than expected: $(find made)"
-  for text in '"channels": 111' '"kernel": "standard"' '"temporal_resolution_ms": 175.0' '"rr_ms": 480.0' '"mAs"'; do
+  for text in '"channels": 111' '"kernel": "standard"' '"temporal_resolution_ms": 175.0' '"rr_ms": 480.0' '"half_scan_mAs"'; do
     expect_text made/scan.json "$text"
   done
   cmp -s made/phase_00.mha made/phase_01.mha && fail "two phases look the same"
@@ -288,6 +288,34 @@ END
   # shellcheck disable=SC2086
   run 0 phantom --seed 5 $image --scanner scanner.json --kernel sharp --no-truth --output sharp
   cmp -s made/phase_00.mha sharp/phase_00.mha && fail "another kernel gave the same image"
+
+  # Several images of the same views; each is what it would be alone.
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 $image --scanner scanner.json --kernel soft,sharp --image-noise 20,60 \
+    --output several
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 $image --scanner scanner.json --kernel soft --image-noise 60 --no-truth --output alone
+  cmp several/soft-60/phase_01.mha alone/phase_01.mha || fail "several images are others than one alone"
+  cmp -s several/soft-20/phase_01.mha alone/phase_01.mha && fail "more noise gave the same image"
+  run 0 inspect --all several/sharp-20/series.json
+  # The table moves, two beats share the angles; a scan that was stopped goes on.
+  helical="phantom --seed 5 $image --scanner helical.json --no-truth"
+  sed 's/"extrasystole": 3/"pitch": 0.15, "segments": 2, "iterative": 0.3/' scanner.json >helical.json
+  # shellcheck disable=SC2086
+  run 0 $helical --output helical
+  expect_text helical/scan.json '"pitch": 0.15'
+  # shellcheck disable=SC2086
+  "$program" $helical --threads 1 --output stopped >/dev/null 2>&1 &
+  job=$!
+  until [ -n "$(find stopped -name '*.part' 2>/dev/null)" ] || ! kill -0 "$job" 2>/dev/null; do
+    sleep 0.01
+  done
+  kill -INT "$job" 2>/dev/null || fail "the scan ended before it could be stopped"
+  wait "$job"
+  [ -d stopped/scan-parts ] || fail "no parts are left of a scan that was stopped"
+  # shellcheck disable=SC2086
+  run 0 ${helical#--quiet} --output stopped
+  diff -r helical stopped || fail "a scan that went on gave other files"
 
   for bad in '--window 66' '--noise 3' '--lost 1' '--direction 1 0 0 0 1 0 0 0 1' '--truth-only'; do
     # shellcheck disable=SC2086
@@ -306,7 +334,8 @@ END
 object [1]
 preset { "preset": 5 }
 single-350 { "preset": "triple" }
-not.known { "pitch": 1 }
+not.known { "speed": 1 }
+leaves.holes { "pitch": 1 }
 number { "rows": "many" }
 whole { "rows": 8.5 }
 rows { "rows": 1000 }

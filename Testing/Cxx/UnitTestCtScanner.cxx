@@ -835,12 +835,6 @@ TEST(CtScanner, RefusesWhatCanNotBe)
       s.pitch = 0.2;
       s.segments = 3;
     });
-  refused("image_noise_hu",
-    [](ScannerSettings& s, ImageGrid&)
-    {
-      s.imageNoise = 20.0;
-      s.noise = 0;
-    });
   refused("half scan takes", [](ScannerSettings& s, ImageGrid&) { s.turnTime = 1.5; });
   refused("does not fit into the field", [](ScannerSettings& s, ImageGrid&) { s.channels = 500; });
   refused("reaches out of the field",
