@@ -4,12 +4,14 @@
 elastix registers the reference phase of each series to every other one, with one published kind of parameters for all
 (Testing/Validation/peers/cardiac-ct-bspline.txt); its displacement carries our model and the true one from the reference
 phase to the others. `coronary-pipeline evaluate` measures all models. Tables in Markdown on standard output.
+ITK's objectness and connected threshold, from the true ostia, are measured beside our model of the reference phase.
 Finished parts are kept under --output: started again, it goes on where it was.
 """
 import argparse
 import json
 import os
 import shutil
+import subprocess
 import sys
 
 import kept_results
@@ -63,6 +65,7 @@ class Peers:
             raise Failed("no %s: build the tree first (cmake --build --preset paraview)" % self.program)
         self.elastix, self.transformix, self.pvpython = needed("elastix"), needed("transformix"), needed("pvpython")
         self.parameters = parameters(options.quick)
+        self.itk = os.path.join(options.build, "bin", "itk-segmentation")
         self.version = kept_results.digest_of_program(self.program, options.build)
         self.threads = str(options.threads or os.cpu_count())
 
@@ -70,8 +73,8 @@ class Peers:
         return kept_results.run([self.program, *words, "--quiet", "--threads", self.threads],
                                 os.path.join(folder, words[0] + ".log"))
 
-    def points(self, *words):
-        kept_results.run([self.pvpython, os.path.join(ROOT, "scripts", "vtp-points.py"), *words])
+    def points(self, *words, log=None):
+        kept_results.run([self.pvpython, os.path.join(ROOT, "scripts", "vtp-points.py"), *words], log)
 
     def case(self, name, phantom):
         base = os.path.join(self.options.output, "peers", name.replace(" ", "-"))
@@ -99,7 +102,12 @@ class Peers:
         say("%s: carried models, measures" % name)
         measured = kept(os.path.join(base, "measured"), digest(key, reference, self.parameters),
                         lambda folder: self.measure(base, reference, phases, folder))
-        return {"name": name, "whole": whole, "elastix": cost, "measured": measured, "others": others}
+        rest = None
+        if os.access(self.itk, os.X_OK):
+            say("%s: ITK" % name)
+            rest = kept(os.path.join(base, "itk"), digest(key, reference, kept_results.digest_of_files([self.itk])),
+                        lambda folder: self.segment(base, reference, folder))
+        return {"name": name, "whole": whole, "elastix": cost, "measured": measured, "others": others, "rest": rest}
 
     def ours(self, series, folder):
         result = os.path.join(folder, "run")
@@ -119,6 +127,35 @@ class Peers:
         image = os.path.join(series, "phase_%02d.mha")
         return kept_results.run([self.elastix, "-f", image % reference, "-m", image % phase, "-p", file, "-out", folder,
                                  "-threads", self.threads], os.path.join(folder, "log"))
+
+    def segment(self, base, reference, folder):
+        """ITK's mask of the reference phase; its wall and ours against the true one."""
+        truth, mask = os.path.join(base, "phantom", "truth"), os.path.join(folder, "mask.mha")
+        roots = os.path.join(folder, "roots.txt")
+        self.points("roots", os.path.join(truth, "centerline_%02d.vtp" % reference), log=roots)
+        with open(roots, encoding="utf-8") as file:
+            ostia = [word for root in file for word in ["--ostium", *root.split()]]
+        usage = kept_results.run([self.itk, os.path.join(base, "phantom", "phase_%02d.mha" % reference), mask, "--threads",
+                                  self.threads, *ostia], os.path.join(folder, "log"))
+        wall = os.path.join(folder, "wall.vtp")
+        kept_results.run([self.program, "convert", mask, wall], os.path.join(folder, "log"))
+        ours = os.path.join(base, "ours", "run")
+        with open(os.path.join(ours, "report.json"), encoding="utf-8") as file:
+            stages = {stage["name"]: stage for stage in json.load(file)["stages"]}
+        until = [stages[name] for name in ("vesselness", "segmentation", "centerline", "surface")]
+        walls = {"ours": os.path.join(ours, "motion", "surface_%02d.vtp" % reference), "ITK": wall}
+        return {"ITK": usage, "ours": {"seconds": sum(stage["seconds"] for stage in until),
+                                       "cpu_seconds": sum(stage["cpu_seconds"] for stage in until),
+                                       "peak_mb": until[-1]["peak_memory_mb"]},
+                "distances": {name: self.distances(path, os.path.join(truth, "surface_%02d.vtp" % reference))
+                              for name, path in walls.items()}}
+
+    def distances(self, wall, truth):
+        told = subprocess.run([self.program, "metrics", wall, truth, "--json", "--error-bound", "0.01"], capture_output=True,
+                              stdin=subprocess.DEVNULL, text=True, check=False)
+        if told.returncode:
+            raise Failed(told.stderr.strip())
+        return {key: json.loads(told.stdout)[key] for key in ("MSD", "MSD_BA", "HD95", "HD")}
 
     def measure(self, base, reference, phases, folder):
         """Part A of Table 1 for each model."""
@@ -194,6 +231,20 @@ def print_tables(cases):
         print("| %s | %d | %.0f | %.0f | %.0f | %.0f | %.2f | %.0f | %.0f | %.2f |" % (
             case["name"], len(case["others"]), motion["seconds"], motion["cpu_seconds"], whole["seconds"], whole["cpu_seconds"],
             whole["peak_mb"] / 1024.0, peer["seconds"], peer["cpu_seconds"], peer["peak_mb"] / 1024.0))
+
+    print("\nThe wall in the reference phase. ITK: objectness (the scales and c of ours), region of at least 0.1 and 200 HU that hangs on "
+          "the true ostia; ours from the images alone, stages to `surface`. MSD: from the model to the truth, and back.\n")
+    if any(case["rest"] is None for case in cases):
+        print("**ITK was not compared**: itk-segmentation was not built (scripts/install-dependencies.sh --developer).\n")
+    print("| case | model | MSD | MSD, back | HD95 | HD | wall, s | processor, s | peak, GB |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for case in cases:
+        for model in ("ours", "ITK") if case["rest"] else ():
+            far, cost = case["rest"]["distances"][model], case["rest"][model]
+            print("| %s | %s | %.2f | %.2f | %.2f | %.1f | %.0f | %.0f | %.2f |" % (
+                case["name"], model, far["MSD"], far["MSD_BA"], far["HD95"], far["HD"], cost["seconds"], cost["cpu_seconds"],
+                cost["peak_mb"] / 1024.0))
+    print("\n**VMTK was not compared**: Debian 12 has no package of it.")
 
 
 def main():

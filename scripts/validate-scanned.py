@@ -73,7 +73,7 @@ class Matrix:
         self.threads = str(options.threads or os.cpu_count())
 
     def pipeline(self, folder, *words):
-        return kept_results.run([self.program, *words, "--quiet", "--threads", self.threads],
+        return kept_results.run([self.program, *words, "--threads", self.threads],
                                 os.path.join(folder, words[0] + ".log"))
 
     def scanner(self, scan):

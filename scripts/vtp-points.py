@@ -3,6 +3,7 @@
 
 Usage: vtp-points.py write FILE.vtp POINTS.txt
        vtp-points.py move FILE.vtp OUTPUTPOINTS.txt MOVED.vtp
+       vtp-points.py roots CENTERLINE.vtp        # where its trees begin: x y z, a line each
 """
 import re
 import sys
@@ -48,11 +49,21 @@ def move(path, text, moved):
         raise RuntimeError("'%s' can not be written" % moved)
 
 
+def print_roots(path):
+    data = read(path)
+    parents = data.GetCellData().GetArray("ParentGroupIds")
+    for cell in range(data.GetNumberOfCells()):
+        if parents.GetValue(cell) < 0:
+            print("%.9g %.9g %.9g" % data.GetPoint(data.GetCell(cell).GetPointId(0)))
+
+
 def main(words):
     if len(words) == 3 and words[0] == "write":
         write_points(*words[1:])
     elif len(words) == 4 and words[0] == "move":
         move(*words[1:])
+    elif len(words) == 2 and words[0] == "roots":
+        print_roots(words[1])
     else:
         sys.stderr.write(__doc__)
         return 2
