@@ -23,7 +23,7 @@ COMMANDS_PAGE = "docs/programs.md"
 OPTION = re.compile(r"(?<![\w/-])--[a-z][\w-]*")
 # Not in every build tree: they need Google's benchmark library.
 OPTIONAL = {"skin-deformation-benchmark", "motion-benchmark", "vessel-wall-benchmark", "intervention-benchmark",
-            "contrast-benchmark", "fluoroscopy-benchmark", "detector-benchmark"}
+            "contrast-benchmark", "fluoroscopy-benchmark", "detector-benchmark", "scanner-benchmark"}
 
 
 class Programs:
