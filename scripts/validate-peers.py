@@ -11,6 +11,7 @@ import argparse
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -265,6 +266,7 @@ def main():
 
 if __name__ == "__main__":
     try:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that the program that runs is ended, too
         main()
     except Failed as failure:
         sys.exit("validate-peers: %s" % failure)

@@ -11,7 +11,7 @@ Usage: scripts/validate.sh [--build DIR] [--output DIR] [--quick] [--list] [TABL
   --quick       a small form of each table: whether everything runs and agrees. Its numbers
                 are not those of the documentation, and its times are worth nothing
   --list        name the tables with their commands, run nothing
-Without TABLE all of them, which takes more than a day, most of it `scanned`. That and `peers` go on where they were stopped.
+Without TABLE all of them, which takes most of a day. `scanned` and `peers` go on where they were stopped.
 Times are worth something on a quiet machine only.
 Exit code 1 when a program fails or a target is missed.
 EOF
