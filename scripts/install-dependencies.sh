@@ -9,7 +9,7 @@ Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--no-tes
   --check      change nothing; name what is missing and exit 1, exit 0 when all is there
   --tree TREE  packages of one tree only (both without this option)
   --no-tests   without the browser and what else only tests use
-  --developer  clang, valgrind, heaptrack, clang-tidy, shellcheck and ITK (the benchmarks compare with it) as well
+  --developer  clang, valgrind, heaptrack, clang-tidy, shellcheck, and ITK and elastix, which are compared with, as well
 Runs as root, or through sudo. Run again, it changes nothing.
 EOF
 }
@@ -35,7 +35,7 @@ vtk=(
 )
 # For tests that skip without them.
 tests=(chromium nodejs curl ca-certificates)
-developer=(clang libclang-rt-14-dev valgrind heaptrack clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev plastimatch)
+developer=(clang libclang-rt-14-dev valgrind heaptrack clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev plastimatch elastix)
 
 check_only=no
 tree=all

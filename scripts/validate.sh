@@ -11,7 +11,8 @@ Usage: scripts/validate.sh [--build DIR] [--output DIR] [--quick] [--list] [TABL
   --quick       a small form of each table: whether everything runs and agrees. Its numbers
                 are not those of the documentation, and its times are worth nothing
   --list        name the tables with their commands, run nothing
-Without TABLE all of them, which takes hours. Times are worth something on a quiet machine only.
+Without TABLE all of them, which takes most of a day. `scanned` and `peers` go on where they were stopped.
+Times are worth something on a quiet machine only.
 Exit code 1 when a program fails or a target is missed.
 EOF
 }
@@ -47,6 +48,8 @@ tables=(
   "motion-lost | validate-motion --seeds 101..110 --lost | -"
   "motion-measured-heart | validate-real-motion | validate-real-motion --quick"
   "evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation --seeds 101 --lost none --spacing 0.6"
+  "scanned | scripts/validate-scanned.py --build BUILD --output OUTPUT | scripts/validate-scanned.py --quick --build BUILD --output OUTPUT"
+  "peers | scripts/validate-peers.py --build BUILD --output OUTPUT | scripts/validate-peers.py --quick --build BUILD --output OUTPUT"
   "simulator | scripts/validate-simulator.sh BUILD | scripts/validate-simulator.sh --quick BUILD"
 )
 

@@ -1,0 +1,77 @@
+#!/usr/bin/env pvpython
+"""Points of a .vtp file as text, and back: what elastix' transformix reads and writes.
+
+Usage: vtp-points.py write FILE.vtp POINTS.txt
+       vtp-points.py move FILE.vtp OUTPUTPOINTS.txt MOVED.vtp
+       vtp-points.py roots CENTERLINE.vtp        # where its trees begin: x y z, a line each
+"""
+import re
+import sys
+
+from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLPolyDataWriter
+
+OUTPUT_POINT = re.compile(r"OutputPoint = \[ ([^\]]*)\]")
+
+
+def read(path):
+    reader = vtkXMLPolyDataReader()
+    reader.SetFileName(path)
+    reader.Update()
+    if reader.GetErrorCode() or not reader.GetOutput().GetNumberOfPoints():
+        raise RuntimeError("'%s' has no points" % path)
+    return reader.GetOutput()
+
+
+def write_points(path, text):
+    data = read(path)
+    with open(text, "w", encoding="ascii") as file:
+        file.write("point\n%d\n" % data.GetNumberOfPoints())
+        for n in range(data.GetNumberOfPoints()):
+            file.write("%.9g %.9g %.9g\n" % data.GetPoint(n))
+
+
+def move(path, text, moved):
+    data = read(path)
+    points = vtkPoints()
+    points.SetDataTypeToDouble()
+    with open(text, encoding="ascii") as file:
+        for line in file:
+            points.InsertNextPoint(*(float(word) for word in OUTPUT_POINT.search(line).group(1).split()))
+    if points.GetNumberOfPoints() != data.GetNumberOfPoints():
+        raise RuntimeError("'%s' has %d points, '%s' %d" % (text, points.GetNumberOfPoints(), path, data.GetNumberOfPoints()))
+    data.SetPoints(points)
+    writer = vtkXMLPolyDataWriter()
+    writer.SetFileName(moved)
+    writer.SetInputData(data)
+    writer.SetDataModeToBinary()
+    if not writer.Write():
+        raise RuntimeError("'%s' can not be written" % moved)
+
+
+def print_roots(path):
+    data = read(path)
+    parents = data.GetCellData().GetArray("ParentGroupIds")
+    for cell in range(data.GetNumberOfCells()):
+        if parents.GetValue(cell) < 0:
+            print("%.9g %.9g %.9g" % data.GetPoint(data.GetCell(cell).GetPointId(0)))
+
+
+def main(words):
+    if len(words) == 3 and words[0] == "write":
+        write_points(*words[1:])
+    elif len(words) == 4 and words[0] == "move":
+        move(*words[1:])
+    elif len(words) == 2 and words[0] == "roots":
+        print_roots(words[1])
+    else:
+        sys.stderr.write(__doc__)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except (OSError, RuntimeError) as error:
+        sys.exit("vtp-points: %s" % error)
