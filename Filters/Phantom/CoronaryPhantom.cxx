@@ -50,6 +50,7 @@ void PhantomSettings::Validate() const
   Require("regionalLag", this->regionalLag, 0.0, 0.05);
   Require("regionalAmplitude", this->regionalAmplitude, 0.0, 0.1);
   Require("beatVariation", this->beatVariation, 0.0, 0.1);
+  Require("beatIrregularity", this->beatIrregularity, 0.0, 5.0);
   Require("areaPulse", this->areaPulse, 0.0, 0.3);
   Require("temporalWindow", this->temporalWindow, 0.0, 0.5 * this->cycleLength);
   Require("noise", this->noise, 0.0, 200.0);
@@ -93,13 +94,14 @@ struct CoronaryPhantom::Internals
     return std::sqrt(1.0 + this->Settings.areaPulse * PhantomMotion::PressurePulse(t));
   }
 
-  /// A resting tree, moved to time t.
-  PhantomTree Move(const PhantomTree& rest, double t, double radiusFactor) const
+  /// A resting tree, moved to time t of a beat.
+  PhantomTree Move(
+    const PhantomTree& rest, double t, const Vector3& shift, double radiusFactor) const
   {
     PhantomTree tree = rest;
     for (std::size_t p = 0; p < tree.points.size(); ++p)
     {
-      tree.points[p] = this->Motion.Position(rest.points[p], t, &tree.velocity[p]);
+      tree.points[p] = this->Motion.Position(rest.points[p], t, shift, &tree.velocity[p]);
       tree.displacement[p] = tree.points[p] - rest.points[p];
       tree.radius[p] *= radiusFactor;
     }
@@ -107,33 +109,34 @@ struct CoronaryPhantom::Internals
   }
 
   /// Normals of the flat ends: the planes move with the tissue.
-  std::vector<Vector3> EndNormals(double t) const
+  std::vector<Vector3> EndNormals(double t, const Vector3& shift) const
   {
     const std::vector<Vector3>& points = this->Anatomy.tree.points;
     std::vector<Vector3> normals;
     for (const VesselEnd& end : this->Anatomy.ends)
     {
       const Vector3 atRest = (points[end.point] - points[end.neighbour]).normalized();
-      normals.push_back(this->Motion.PlaneNormal(points[end.point], atRest, t));
+      normals.push_back(this->Motion.PlaneNormal(points[end.point], atRest, t, shift));
     }
     return normals;
   }
 
   PhantomLumen Lumen(double t, double reach) const
   {
-    const PhantomTree tree = this->Move(this->Anatomy.tree, t, this->RadiusFactor(t));
-    return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach);
+    const Vector3 shift = this->Motion.BeatShift(t);
+    const PhantomTree tree = this->Move(this->Anatomy.tree, t, shift, this->RadiusFactor(t));
+    return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t, shift), reach);
   }
 
-  /// All that images are made of, with the weight 1.
-  PhantomMoment Moment(double t) const
+  /// All that images are made of at time t of a beat, with the weight 1.
+  PhantomMoment Moment(double t, const Vector3& shift) const
   {
-    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t) };
-    moment.tree = this->Move(this->Anatomy.tree, t, this->RadiusFactor(t));
-    moment.vein = this->Move(this->Anatomy.vein, t, 1.0);
+    PhantomMoment moment{ t, shift, 1.0, {}, {}, {}, this->EndNormals(t, shift) };
+    moment.tree = this->Move(this->Anatomy.tree, t, shift, this->RadiusFactor(t));
+    moment.vein = this->Move(this->Anatomy.vein, t, shift, 1.0);
     for (const Plaque& plaque : this->Anatomy.plaques)
     {
-      moment.plaques.push_back(this->Motion.Position(plaque.centre, t));
+      moment.plaques.push_back(this->Motion.Position(plaque.centre, t, shift));
     }
     return moment;
   }
@@ -208,25 +211,27 @@ const PhantomSettings& CoronaryPhantom::Settings() const
 
 Vector3 CoronaryPhantom::Position(const Vector3& reference, double t) const
 {
-  return this->Data->Motion.Position(reference, t);
+  return this->Data->Motion.Position(reference, t, this->Data->Motion.BeatShift(t));
 }
 
 Vector3 CoronaryPhantom::Velocity(const Vector3& reference, double t) const
 {
   Vector3 velocity;
-  this->Data->Motion.Position(reference, t, &velocity);
+  this->Data->Motion.Position(reference, t, Vector3::Zero(), &velocity);
   return velocity;
 }
 
 Vector3 CoronaryPhantom::ReferencePosition(const Vector3& position, double t) const
 {
-  return this->Data->Motion.ReferencePosition(position, t, position, 1e-7);
+  const PhantomMotion& motion = this->Data->Motion;
+  return motion.ReferencePosition(position, t, motion.BeatShift(t), position, 1e-7);
 }
 
 PhantomTree CoronaryPhantom::Tree(double t) const
 {
   const PhantomAnatomy& anatomy = this->Data->Anatomy;
-  PhantomTree tree = this->Data->Move(anatomy.tree, t, this->Data->RadiusFactor(t));
+  const Vector3 shift = this->Data->Motion.BeatShift(t);
+  PhantomTree tree = this->Data->Move(anatomy.tree, t, shift, this->Data->RadiusFactor(t));
   double wholePhase = 0.0;
   const std::vector<double> lost = this->Data->Lost(t, wholePhase);
   const double window = this->Data->Settings.temporalWindow / this->Data->Settings.cycleLength;
@@ -236,11 +241,11 @@ PhantomTree CoronaryPhantom::Tree(double t) const
     double blur = 0.0;
     if (window > 0.0)
     {
-      Vector3 before = this->Data->Motion.Position(anatomy.tree.points[p], t - 0.5 * window);
+      Vector3 before = this->Data->Motion.Position(anatomy.tree.points[p], t - 0.5 * window, shift);
       for (int i = 1; i <= pieces; ++i)
       {
         const Vector3 after = this->Data->Motion.Position(
-          anatomy.tree.points[p], t + window * (double(i) / pieces - 0.5));
+          anatomy.tree.points[p], t + window * (double(i) / pieces - 0.5), shift);
         blur += (after - before).norm();
         before = after;
       }
@@ -292,7 +297,7 @@ std::vector<PhantomPlaque> CoronaryPhantom::Plaques(double t) const
 
 PhantomTree CoronaryPhantom::Vein(double t) const
 {
-  return this->Data->Move(this->Data->Anatomy.vein, t, 1.0);
+  return this->Data->Move(this->Data->Anatomy.vein, t, this->Data->Motion.BeatShift(t), 1.0);
 }
 
 std::vector<PhantomOstium> CoronaryPhantom::Ostia(double t) const
@@ -330,6 +335,7 @@ PhantomSurface CoronaryPhantom::Surface(double t, const ProgressCallback& progre
   }
   PhantomSurface surface = data.RestSurface;
   const PhantomLumen lumen = data.Lumen(t, 2.5);
+  const Vector3 shift = data.Motion.BeatShift(t);
   ParallelFor(
     static_cast<std::int64_t>(surface.points.size()), 512,
     [&](std::int64_t first, std::int64_t last)
@@ -337,7 +343,7 @@ PhantomSurface CoronaryPhantom::Surface(double t, const ProgressCallback& progre
       for (std::int64_t p = first; p < last; ++p)
       {
         const Vector3 rest = surface.points[p];
-        Vector3 position = data.Motion.Position(rest, t);
+        Vector3 position = data.Motion.Position(rest, t, shift);
         lumen.Project(position, 1e-4);
         surface.points[p] = position;
         surface.displacement[p] = position - rest;
@@ -400,7 +406,8 @@ ImageGrid CoronaryPhantom::DefaultGrid(double spacing, double margin) const
   {
     for (std::size_t p = 0; p < rest.points.size(); p += 4)
     {
-      const Vector3 position = this->Position(rest.points[p], static_cast<double>(m) / moments);
+      const Vector3 position = this->Data->Motion.Position(
+        rest.points[p], static_cast<double>(m) / moments, Vector3::Zero());
       low = low.cwiseMin(position);
       high = high.cwiseMax(position);
     }
@@ -423,6 +430,7 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
 {
   const Internals& data = *this->Data;
   const double window = data.Settings.temporalWindow / data.Settings.cycleLength;
+  const Vector3 shift = data.Motion.BeatShift(t);
 
   // Moments through the window, weighted like a half scan: flat, with soft ends, and as wide at
   // half its height as the window. As many as the fastest point needs for steps of 0.5 mm.
@@ -432,10 +440,10 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
     double farthest = 0.0;
     for (std::size_t p = 0; p < data.Anatomy.tree.points.size(); p += 20)
     {
-      const Vector3& rest = data.Anatomy.tree.points[p];
-      farthest = std::max(farthest,
-        (data.Motion.Position(rest, t + 0.6 * window) - data.Motion.Position(rest, t)).norm() +
-          (data.Motion.Position(rest, t) - data.Motion.Position(rest, t - 0.6 * window)).norm());
+      const auto at = [&](double time)
+      { return data.Motion.Position(data.Anatomy.tree.points[p], time, shift); };
+      farthest = std::max(
+        farthest, (at(t + 0.6 * window) - at(t)).norm() + (at(t) - at(t - 0.6 * window)).norm());
     }
     count = std::clamp(2 * static_cast<int>(std::ceil(farthest)) + 1, 5, 15);
   }
@@ -445,7 +453,7 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
   {
     const double u = (m + 0.5) / count - 0.5; // of 1.2 windows
     const double weight = 1.0 - SmoothStep((std::abs(1.2 * u) - 0.4) / 0.2);
-    PhantomMoment moment = data.Moment(t + 1.2 * u * window);
+    PhantomMoment moment = data.Moment(t + 1.2 * u * window, shift);
     moment.weight = weight;
     sum += weight;
     moments.push_back(std::move(moment));
@@ -463,7 +471,8 @@ std::vector<PhantomTube> CoronaryPhantom::Tubes(double t) const
 {
   const PhantomAnatomy& anatomy = this->Data->Anatomy;
   const PhantomSettings& settings = this->Data->Settings;
-  const PhantomTree tree = this->Data->Move(anatomy.tree, t, this->Data->RadiusFactor(t));
+  const PhantomTree tree =
+    this->Data->Move(anatomy.tree, t, this->Data->Motion.BeatShift(t), this->Data->RadiusFactor(t));
   std::vector<PhantomTube> tubes;
   const AxisStep* before = nullptr;
   for (const AxisStep& step : anatomy.steps)
@@ -526,7 +535,8 @@ void CoronaryPhantom::RenderMaterials(const ImageGrid& grid, double t,
     [](PhantomPalette& palette, float amount) { palette.muscle = amount; });
   mix(PhantomTissue::Blood, data.Settings.veinHU,
     [](PhantomPalette& palette, float amount) { palette.vein = amount; });
-  data.Image.RenderMaps(grid, data.Moment(t), palettes, { maps[0], maps[1], maps[2] }, progress);
+  data.Image.RenderMaps(grid, data.Moment(t, data.Motion.BeatShift(t)), palettes,
+    { maps[0], maps[1], maps[2] }, progress);
 }
 
 CoronaryPhantom::Box CoronaryPhantom::Body() const
@@ -590,8 +600,8 @@ std::vector<PhantomMotionSummary> CoronaryPhantom::SummarizeMotion() const
       for (int m = 0; m < moments; ++m)
       {
         Vector3 velocity;
-        path[m] =
-          this->Data->Motion.Position(rest.points[p], static_cast<double>(m) / moments, &velocity);
+        path[m] = this->Data->Motion.Position(
+          rest.points[p], static_cast<double>(m) / moments, Vector3::Zero(), &velocity);
         speedSum += velocity.norm();
         summary.peakSpeed = std::max(summary.peakSpeed, velocity.norm());
       }
