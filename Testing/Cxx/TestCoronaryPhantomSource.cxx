@@ -796,6 +796,6 @@ TEST(CoronaryPhantomSource, DefaultsAreThoseOfTheProxy)
     }
     ++compared;
   }
-  EXPECT_EQ(compared, 25);
+  EXPECT_EQ(compared, 26);
 }
 }
