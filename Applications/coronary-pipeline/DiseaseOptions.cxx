@@ -254,7 +254,7 @@ std::string DescribeDisease(const CoronaryPhantom& phantom)
   for (const PhantomLesionTruth& truth : phantom.Lesions())
   {
     Json one;
-    one["kind"] = LesionKindName(truth.lesion.kind);
+    one["kind"] = PhantomLesionKindName(truth.lesion.kind);
     one["vessel"] = truth.lesion.vessel;
     one["segment"] = SegmentName(truth.segmentId);
     one["position_mm"] = truth.middle;

@@ -195,6 +195,7 @@ void PhantomJob::Configure(vtkCoronaryPhantomSource* source, const std::vector<d
   source->SetRegionalLag(s.regionalLag);
   source->SetRegionalAmplitude(s.regionalAmplitude);
   source->SetBeatVariation(s.beatVariation);
+  source->SetBeatIrregularity(s.beatIrregularity);
   source->SetAreaPulse(s.areaPulse);
   source->SetTemporalWindow(s.temporalWindow);
   source->SetNoise(s.noise);

@@ -148,7 +148,7 @@ void ScannerOptions::AddTo(CLI::App& app)
     ->group(group);
   // What the scanner's physics decide.
   for (const char* formula : { "--window", "--noise", "--noise-correlation", "--systolic-noise",
-         "--point-spread", "--lost", "--direction" })
+         "--point-spread", "--lost", "--direction", "--beat-irregularity" })
   {
     option->excludes(app.get_option(formula));
   }

@@ -52,6 +52,7 @@ void PhantomSettings::Validate() const
   Require("regionalLag", this->regionalLag, 0.0, 0.05);
   Require("regionalAmplitude", this->regionalAmplitude, 0.0, 0.1);
   Require("beatVariation", this->beatVariation, 0.0, 0.1);
+  Require("beatIrregularity", this->beatIrregularity, 0.0, 5.0);
   Require("areaPulse", this->areaPulse, 0.0, 0.3);
   Require("temporalWindow", this->temporalWindow, 0.0, 0.5 * this->cycleLength);
   Require("noise", this->noise, 0.0, 200.0);
@@ -96,13 +97,14 @@ struct CoronaryPhantom::Internals
     return std::sqrt(1.0 + this->Settings.areaPulse * PhantomMotion::PressurePulse(t));
   }
 
-  /// A resting tree, moved to time t.
-  PhantomTree Move(const PhantomTree& rest, double t, double radiusFactor) const
+  /// A resting tree, moved to time t of a beat.
+  PhantomTree Move(
+    const PhantomTree& rest, double t, const Vector3& shift, double radiusFactor) const
   {
     PhantomTree tree = rest;
     for (std::size_t p = 0; p < tree.points.size(); ++p)
     {
-      tree.points[p] = this->Motion.Position(rest.points[p], t, &tree.velocity[p]);
+      tree.points[p] = this->Motion.Position(rest.points[p], t, shift, &tree.velocity[p]);
       tree.displacement[p] = tree.points[p] - rest.points[p];
       tree.radius[p] *= radiusFactor;
     }
@@ -110,10 +112,10 @@ struct CoronaryPhantom::Internals
   }
 
   /// The arteries: stents hold their lumen, muscle bridges squeeze it.
-  PhantomTree Arteries(double t) const
+  PhantomTree Arteries(double t, const Vector3& shift) const
   {
     const double factor = this->RadiusFactor(t);
-    PhantomTree tree = this->Move(this->Anatomy.tree, t, factor);
+    PhantomTree tree = this->Move(this->Anatomy.tree, t, shift, factor);
     if (!this->Anatomy.lesions.empty())
     {
       const double systole = std::clamp(PhantomMotion::Activation(t), 0.0, 1.0);
@@ -127,41 +129,42 @@ struct CoronaryPhantom::Internals
   }
 
   /// Cones of each of the anatomy's parts.
-  std::vector<std::vector<PhantomTube>> Parts(double t) const
+  std::vector<std::vector<PhantomTube>> Parts(double t, const Vector3& shift) const
   {
     std::vector<std::vector<PhantomTube>> parts;
     for (const PhantomPart& part : this->Anatomy.parts)
     {
-      part.Place([&](const Vector3& rest) { return this->Motion.Position(rest, t); },
+      part.Place([&](const Vector3& rest) { return this->Motion.Position(rest, t, shift); },
         this->RadiusFactor(t) - 1.0, parts.emplace_back());
     }
     return parts;
   }
 
   /// Normals of the flat ends: the planes move with the tissue.
-  std::vector<Vector3> EndNormals(double t) const
+  std::vector<Vector3> EndNormals(double t, const Vector3& shift) const
   {
     const std::vector<Vector3>& points = this->Anatomy.tree.points;
     std::vector<Vector3> normals;
     for (const VesselEnd& end : this->Anatomy.ends)
     {
       const Vector3 atRest = (points[end.point] - points[end.neighbour]).normalized();
-      normals.push_back(this->Motion.PlaneNormal(points[end.point], atRest, t));
+      normals.push_back(this->Motion.PlaneNormal(points[end.point], atRest, t, shift));
     }
     return normals;
   }
 
   PhantomLumen Lumen(double t, double reach) const
   {
-    const PhantomTree tree = this->Arteries(t);
-    return PhantomLumen(
-      this->Anatomy, tree.points, tree.radius, this->EndNormals(t), reach, this->Anatomy.occluded);
+    const Vector3 shift = this->Motion.BeatShift(t);
+    const PhantomTree tree = this->Arteries(t, shift);
+    return PhantomLumen(this->Anatomy, tree.points, tree.radius, this->EndNormals(t, shift), reach,
+      this->Anatomy.occluded);
   }
 
   /// The outer walls, like a tree of lumens.
-  PhantomTree Walls(double t) const
+  PhantomTree Walls(double t, const Vector3& shift) const
   {
-    PhantomTree tree = this->Arteries(t);
+    PhantomTree tree = this->Arteries(t, shift);
     const PhantomTree& rest = this->Anatomy.tree;
     for (std::size_t p = 0; p < tree.points.size(); ++p)
     {
@@ -170,7 +173,7 @@ struct CoronaryPhantom::Internals
       {
         // As PhantomPart::Place: thicknesses stay.
         const Vector3 towards =
-          this->Motion.Position(rest.points[p] + this->Anatomy.wallOffset[p] / offset, t) -
+          this->Motion.Position(rest.points[p] + this->Anatomy.wallOffset[p] / offset, t, shift) -
           tree.points[p];
         tree.points[p] += offset * towards.normalized();
       }
@@ -184,19 +187,20 @@ struct CoronaryPhantom::Internals
   PhantomSurface Carry(const PhantomSurface& rest, const PhantomLumen& lumen, double t, double from,
     const ProgressCallback& progress) const;
 
-  /// All that images are made of, with the weight 1.
-  PhantomMoment Moment(double t) const
+  /// All that images are made of at time t of a beat, with the weight 1.
+  PhantomMoment Moment(double t, const Vector3& shift) const
   {
-    PhantomMoment moment{ t, 1.0, {}, {}, {}, this->EndNormals(t), this->Parts(t), {} };
-    moment.tree = this->Arteries(t);
-    moment.vein = this->Move(this->Anatomy.vein, t, 1.0);
+    PhantomMoment moment{ t, shift, 1.0, {}, {}, {}, this->EndNormals(t, shift),
+      this->Parts(t, shift), {} };
+    moment.tree = this->Arteries(t, shift);
+    moment.vein = this->Move(this->Anatomy.vein, t, shift, 1.0);
     if (!this->Anatomy.parts.empty())
     {
-      moment.wall = this->Walls(t);
+      moment.wall = this->Walls(t, shift);
     }
     for (const Plaque& plaque : this->Anatomy.plaques)
     {
-      moment.plaques.push_back(this->Motion.Position(plaque.centre, t));
+      moment.plaques.push_back(this->Motion.Position(plaque.centre, t, shift));
     }
     return moment;
   }
@@ -278,25 +282,27 @@ const PhantomSettings& CoronaryPhantom::Settings() const
 
 Vector3 CoronaryPhantom::Position(const Vector3& reference, double t) const
 {
-  return this->Data->Motion.Position(reference, t);
+  return this->Data->Motion.Position(reference, t, this->Data->Motion.BeatShift(t));
 }
 
 Vector3 CoronaryPhantom::Velocity(const Vector3& reference, double t) const
 {
   Vector3 velocity;
-  this->Data->Motion.Position(reference, t, &velocity);
+  this->Data->Motion.Position(reference, t, Vector3::Zero(), &velocity);
   return velocity;
 }
 
 Vector3 CoronaryPhantom::ReferencePosition(const Vector3& position, double t) const
 {
-  return this->Data->Motion.ReferencePosition(position, t, position, 1e-7);
+  const PhantomMotion& motion = this->Data->Motion;
+  return motion.ReferencePosition(position, t, motion.BeatShift(t), position, 1e-7);
 }
 
 PhantomTree CoronaryPhantom::Tree(double t) const
 {
   const PhantomAnatomy& anatomy = this->Data->Anatomy;
-  PhantomTree tree = this->Data->Arteries(t);
+  const Vector3 shift = this->Data->Motion.BeatShift(t);
+  PhantomTree tree = this->Data->Arteries(t, shift);
   double wholePhase = 0.0;
   const std::vector<double> lost = this->Data->Lost(t, wholePhase);
   const double window = this->Data->Settings.temporalWindow / this->Data->Settings.cycleLength;
@@ -306,11 +312,11 @@ PhantomTree CoronaryPhantom::Tree(double t) const
     double blur = 0.0;
     if (window > 0.0)
     {
-      Vector3 before = this->Data->Motion.Position(anatomy.tree.points[p], t - 0.5 * window);
+      Vector3 before = this->Data->Motion.Position(anatomy.tree.points[p], t - 0.5 * window, shift);
       for (int i = 1; i <= pieces; ++i)
       {
         const Vector3 after = this->Data->Motion.Position(
-          anatomy.tree.points[p], t + window * (double(i) / pieces - 0.5));
+          anatomy.tree.points[p], t + window * (double(i) / pieces - 0.5), shift);
         blur += (after - before).norm();
         before = after;
       }
@@ -338,8 +344,9 @@ std::vector<PhantomStenosis> CoronaryPhantom::Stenoses(double t) const
     // As the tree has it at that point, all lesions there together.
     const double degree =
       1.0 - anatomy.tree.radius[placed.point] / anatomy.healthyRadius[placed.point];
-    const bool narrows = placed.lesion.kind == LesionKind::Stenosis ||
-      ((placed.lesion.kind == LesionKind::Plaque || placed.lesion.kind == LesionKind::Stent) &&
+    const bool narrows = placed.lesion.kind == PhantomLesionKind::Stenosis ||
+      ((placed.lesion.kind == PhantomLesionKind::Plaque ||
+         placed.lesion.kind == PhantomLesionKind::Stent) &&
         placed.lesion.degree > 0.0);
     if (!narrows)
     {
@@ -375,7 +382,7 @@ std::vector<PhantomLesionTruth> CoronaryPhantom::Lesions() const
     truth.middle = placed.middle;
     truth.point = placed.point;
     // On a plateau the middle is named.
-    const bool wider = placed.lesion.kind == LesionKind::Ectasia;
+    const bool wider = placed.lesion.kind == PhantomLesionKind::Ectasia;
     const auto leftAt = [&](std::int64_t p)
     { return anatomy.occluded[p] ? 0.0 : tree.radius[p] / anatomy.healthyRadius[p]; };
     for (std::size_t p = 0; p < tree.points.size(); ++p)
@@ -397,7 +404,7 @@ std::vector<PhantomLesionTruth> CoronaryPhantom::Lesions() const
     const double left = leftAt(truth.point);
     truth.degree = 1.0 - left;
     truth.areaDegree = 1.0 - left * left;
-    const int spot = placed.lesion.kind == LesionKind::Spot ? spots++ : -1;
+    const int spot = placed.lesion.kind == PhantomLesionKind::Spot ? spots++ : -1;
     MeasureComposition(anatomy, lumen, static_cast<int>(n), spot, truth);
     result.push_back(std::move(truth));
   }
@@ -430,7 +437,7 @@ std::vector<PhantomVessel> CoronaryPhantom::Vessels() const
   }
   for (const PlacedLesion& placed : anatomy.lesions)
   {
-    if (placed.lesion.kind == LesionKind::Occlusion)
+    if (placed.lesion.kind == PhantomLesionKind::Occlusion)
     {
       const double half = 0.5 * placed.lesion.length;
       vessels[placed.vessel].occlusions.push_back({ placed.middle - half, placed.middle + half });
@@ -454,7 +461,7 @@ std::vector<PhantomPlaque> CoronaryPhantom::Plaques(double t) const
 
 PhantomTree CoronaryPhantom::Vein(double t) const
 {
-  return this->Data->Move(this->Data->Anatomy.vein, t, 1.0);
+  return this->Data->Move(this->Data->Anatomy.vein, t, this->Data->Motion.BeatShift(t), 1.0);
 }
 
 std::vector<PhantomOstium> CoronaryPhantom::Ostia(double t) const
@@ -513,9 +520,10 @@ PhantomSurface CoronaryPhantom::OuterWall(double t, const ProgressCallback& prog
       data.Outer = std::move(outer);
     }
   }
-  const PhantomTree wall = data.Walls(t);
+  const Vector3 shift = data.Motion.BeatShift(t);
+  const PhantomTree wall = data.Walls(t, shift);
   const PhantomLumen lumen(
-    *data.Outer, wall.points, wall.radius, data.EndNormals(t), 2.5, data.Outer->occluded);
+    *data.Outer, wall.points, wall.radius, data.EndNormals(t, shift), 2.5, data.Outer->occluded);
   return data.Carry(data.RestWall, lumen, t, from, progress);
 }
 
@@ -523,6 +531,7 @@ PhantomSurface CoronaryPhantom::Internals::Carry(const PhantomSurface& rest,
   const PhantomLumen& lumen, double t, double from, const ProgressCallback& progress) const
 {
   PhantomSurface surface = rest;
+  const Vector3 shift = this->Motion.BeatShift(t);
   ParallelFor(
     static_cast<std::int64_t>(surface.points.size()), 512,
     [&](std::int64_t first, std::int64_t last)
@@ -530,7 +539,7 @@ PhantomSurface CoronaryPhantom::Internals::Carry(const PhantomSurface& rest,
       for (std::int64_t p = first; p < last; ++p)
       {
         const Vector3 before = surface.points[p];
-        Vector3 position = this->Motion.Position(before, t);
+        Vector3 position = this->Motion.Position(before, t, shift);
         lumen.Project(position, 1e-4);
         surface.points[p] = position;
         surface.displacement[p] = position - before;
@@ -592,7 +601,8 @@ ImageGrid CoronaryPhantom::DefaultGrid(double spacing, double margin) const
   {
     for (std::size_t p = 0; p < rest.points.size(); p += 4)
     {
-      const Vector3 position = this->Position(rest.points[p], static_cast<double>(m) / moments);
+      const Vector3 position = this->Data->Motion.Position(
+        rest.points[p], static_cast<double>(m) / moments, Vector3::Zero());
       low = low.cwiseMin(position);
       high = high.cwiseMax(position);
     }
@@ -615,6 +625,7 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
 {
   const Internals& data = *this->Data;
   const double window = data.Settings.temporalWindow / data.Settings.cycleLength;
+  const Vector3 shift = data.Motion.BeatShift(t);
 
   // Moments through the window, weighted like a half scan: flat, with soft ends, and as wide at
   // half its height as the window. As many as the fastest point needs for steps of 0.5 mm.
@@ -624,10 +635,10 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
     double farthest = 0.0;
     for (std::size_t p = 0; p < data.Anatomy.tree.points.size(); p += 20)
     {
-      const Vector3& rest = data.Anatomy.tree.points[p];
-      farthest = std::max(farthest,
-        (data.Motion.Position(rest, t + 0.6 * window) - data.Motion.Position(rest, t)).norm() +
-          (data.Motion.Position(rest, t) - data.Motion.Position(rest, t - 0.6 * window)).norm());
+      const auto at = [&](double time)
+      { return data.Motion.Position(data.Anatomy.tree.points[p], time, shift); };
+      farthest = std::max(
+        farthest, (at(t + 0.6 * window) - at(t)).norm() + (at(t) - at(t - 0.6 * window)).norm());
     }
     count = std::clamp(2 * static_cast<int>(std::ceil(farthest)) + 1, 5, 15);
   }
@@ -637,7 +648,7 @@ void CoronaryPhantom::Render(const ImageGrid& grid, const std::array<int, 6>& pa
   {
     const double u = (m + 0.5) / count - 0.5; // of 1.2 windows
     const double weight = 1.0 - SmoothStep((std::abs(1.2 * u) - 0.4) / 0.2);
-    PhantomMoment moment = data.Moment(t + 1.2 * u * window);
+    PhantomMoment moment = data.Moment(t + 1.2 * u * window, shift);
     moment.weight = weight;
     sum += weight;
     moments.push_back(std::move(moment));
@@ -655,8 +666,9 @@ std::vector<PhantomTube> CoronaryPhantom::Tubes(double t) const
 {
   const PhantomAnatomy& anatomy = this->Data->Anatomy;
   const PhantomSettings& settings = this->Data->Settings;
-  const PhantomTree tree = this->Data->Arteries(t);
-  const std::vector<std::vector<PhantomTube>> parts = this->Data->Parts(t);
+  const Vector3 shift = this->Data->Motion.BeatShift(t);
+  const PhantomTree tree = this->Data->Arteries(t, shift);
+  const std::vector<std::vector<PhantomTube>> parts = this->Data->Parts(t, shift);
   std::vector<PhantomTube> tubes;
   const auto addLayers = [&](PartLayer from, PartLayer to)
   {
@@ -733,7 +745,8 @@ void CoronaryPhantom::RenderMaterials(const ImageGrid& grid, double t,
     [](PhantomPalette& palette, float amount) { palette.muscle = amount; });
   mix(PhantomTissue::Blood, data.Settings.veinHU,
     [](PhantomPalette& palette, float amount) { palette.vein = amount; });
-  data.Image.RenderMaps(grid, data.Moment(t), palettes, { maps[0], maps[1], maps[2] }, progress);
+  data.Image.RenderMaps(grid, data.Moment(t, data.Motion.BeatShift(t)), palettes,
+    { maps[0], maps[1], maps[2] }, progress);
 }
 
 CoronaryPhantom::Box CoronaryPhantom::Body() const
@@ -797,8 +810,8 @@ std::vector<PhantomMotionSummary> CoronaryPhantom::SummarizeMotion() const
       for (int m = 0; m < moments; ++m)
       {
         Vector3 velocity;
-        path[m] =
-          this->Data->Motion.Position(rest.points[p], static_cast<double>(m) / moments, &velocity);
+        path[m] = this->Data->Motion.Position(
+          rest.points[p], static_cast<double>(m) / moments, Vector3::Zero(), &velocity);
         speedSum += velocity.norm();
         summary.peakSpeed = std::max(summary.peakSpeed, velocity.norm());
       }

@@ -61,15 +61,19 @@ struct PhantomSettings
     0.06;                     ///< relative standard deviation of the regional amplitude, 0 to 0.1
   double beatVariation = 0.0; ///< relative amplitude change from beat to beat, 0 to 0.1;
                               ///< above 0 the motion is no longer periodic
-  double areaPulse = 0.08;    ///< systolic increase of the lumen area, 0 to 0.3
+  /// How far the whole heart lies off in the beat of each phase, mm, root mean square in 3-D, 0 to 5.
+  /// Above 0 every time is a phase with a beat of its own: motion is no longer continuous.
+  double beatIrregularity = 0.0;
+  double areaPulse = 0.08; ///< systolic increase of the lumen area, 0 to 0.3
 
   // Image.
-  double temporalWindow = 0.066; ///< seconds: 0 ideal, 0.066 dual source, 0.140 single source
-  double noise = 25.0;           ///< standard deviation in HU at full dose, 0 to 200
-  double noiseCorrelation = 0.4; ///< standard deviation of the noise's kernel, mm, 0 to 2
-  double systolicNoise = 1.5;    ///< factor on the noise where the tube current is reduced, 1 to 4
-  double pointSpread[3] = { 0.25, 0.25, 0.30 }; ///< standard deviation along the image axes, mm
-  double lumenHU = 420.0;                       ///< at the ostia, 0 to 1500
+  double temporalWindow = 0.066;  ///< seconds: 0 ideal, 0.066 dual source, 0.140 single source
+  double noise = 25.0;            ///< standard deviation in HU at full dose, 0 to 200
+  double noiseCorrelation = 0.32; ///< standard deviation of the noise's kernel, mm, 0 to 2
+  double systolicNoise = 1.5;     ///< factor on the noise where the tube current is reduced, 1 to 4
+  /// Standard deviation along the image axes, mm: 0.9, 0.9, 0.8 mm as full width at half maximum.
+  double pointSpread[3] = { 0.38, 0.38, 0.34 };
+  double lumenHU = 420.0;            ///< at the ostia, 0 to 1500
   double attenuationGradient = -1.5; ///< change of the lumen along the vessel, HU per cm, -20 to 5
   double veinHU = 150.0;             ///< great cardiac vein (contrast-poor)
   std::vector<LostPhase> lostPhases;
@@ -222,7 +226,7 @@ public:
   /// Where the material point that rests at `reference` is at time t, mm.
   Vector3 Position(const Vector3& reference, double t) const;
 
-  /// Its velocity, mm/s.
+  /// Its velocity within a beat, mm/s.
   Vector3 Velocity(const Vector3& reference, double t) const;
 
   /// The material point that is at `position` at time t, to 1e-6 mm.

@@ -540,8 +540,8 @@ void AnatomyBuilder::PlaceLesions()
   for (std::size_t n = 0; n < wanted.size(); ++n)
   {
     this->AddLesion(wanted[n],
-      "PhantomSettings: lesions[" + std::to_string(n) + "] (" + LesionKindName(wanted[n].kind) +
-        ") ");
+      "PhantomSettings: lesions[" + std::to_string(n) + "] (" +
+        PhantomLesionKindName(wanted[n].kind) + ") ");
   }
   this->RefuseOverlaps();
   for (const PhantomLesion& spot : this->CountedSpots())
@@ -558,7 +558,7 @@ void AnatomyBuilder::PlaceLesions()
   }
   for (const PlacedLesion& placed : this->Anatomy.lesions)
   {
-    if (placed.lesion.kind == LesionKind::Spot)
+    if (placed.lesion.kind == PhantomLesionKind::Spot)
     {
       this->MakeSpot(placed);
     }
@@ -601,7 +601,7 @@ void AnatomyBuilder::RefuseOverlaps() const
     for (std::size_t a = 0; a < b; ++a)
     {
       const auto spot = [](const PlacedLesion& placed)
-      { return placed.lesion.kind == LesionKind::Spot; };
+      { return placed.lesion.kind == PhantomLesionKind::Spot; };
       const bool apart = lesions[a].vessel != lesions[b].vessel ||
         !(lesions[a].HasWall() || spot(lesions[a])) ||
         !(lesions[b].HasWall() || spot(lesions[b])) || (spot(lesions[a]) && spot(lesions[b])) ||
@@ -609,9 +609,9 @@ void AnatomyBuilder::RefuseOverlaps() const
           lesions[a].HalfExtent() + lesions[b].HalfExtent();
       Require(apart,
         "PhantomSettings: on " + lesions[b].lesion.vessel + " the " +
-          LesionKindName(lesions[a].lesion.kind) + " at " +
+          PhantomLesionKindName(lesions[a].lesion.kind) + " at " +
           std::to_string(std::lround(lesions[a].middle)) + " mm overlaps the " +
-          LesionKindName(lesions[b].lesion.kind) + " at " +
+          PhantomLesionKindName(lesions[b].lesion.kind) + " at " +
           std::to_string(std::lround(lesions[b].middle)) + " mm, with its shoulders");
     }
   }
@@ -703,8 +703,9 @@ std::int64_t AnatomyBuilder::AddPoint(std::size_t v, double arc, double abscissa
     {
       occluded |= placed.Blocks(arc);
       const double profile = placed.Profile(arc);
-      rigid |= placed.lesion.kind == LesionKind::Stent && profile > 0.5;
-      squeeze += placed.lesion.kind == LesionKind::Bridge ? placed.lesion.degree * profile : 0.0;
+      rigid |= placed.lesion.kind == PhantomLesionKind::Stent && profile > 0.5;
+      squeeze +=
+        placed.lesion.kind == PhantomLesionKind::Bridge ? placed.lesion.degree * profile : 0.0;
     }
   }
   this->Anatomy.occluded.push_back(occluded);
@@ -851,11 +852,11 @@ void AnatomyBuilder::LocateLesions()
   for (PlacedLesion& placed : anatomy.lesions)
   {
     placed.point = this->NearestPoint(placed);
-    if (placed.lesion.kind == LesionKind::Spot)
+    if (placed.lesion.kind == PhantomLesionKind::Spot)
     {
       anatomy.plaques[spot++].point = placed.point;
     }
-    if (placed.lesion.kind == LesionKind::Occlusion)
+    if (placed.lesion.kind == PhantomLesionKind::Occlusion)
     {
       this->FillLate(placed);
     }

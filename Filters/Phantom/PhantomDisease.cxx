@@ -240,16 +240,16 @@ const std::vector<LesionNumber>& AllLesionNumbers()
   return numbers;
 }
 
-const std::vector<std::string>& LesionKinds()
+const std::vector<std::string>& PhantomLesionKinds()
 {
   static const std::vector<std::string> names = { "stenosis", "plaque", "calcification", "spot",
     "occlusion", "stent", "ectasia", "bridge" };
   return names;
 }
 
-std::string LesionKindName(LesionKind kind)
+std::string PhantomLesionKindName(PhantomLesionKind kind)
 {
-  return LesionKinds()[static_cast<std::size_t>(kind)];
+  return PhantomLesionKinds()[static_cast<std::size_t>(kind)];
 }
 
 const std::vector<std::string>& OriginNames()
@@ -261,35 +261,35 @@ const std::vector<std::string>& OriginNames()
 
 PhantomLesion UsualLesion(const std::string& kind)
 {
-  const auto& kinds = LesionKinds();
+  const auto& kinds = PhantomLesionKinds();
   const auto found = std::find(kinds.begin(), kinds.end(), kind);
   Require(found != kinds.end(), "'" + kind + "' is none of " + Join(kinds));
   PhantomLesion lesion;
-  lesion.kind = static_cast<LesionKind>(found - kinds.begin());
+  lesion.kind = static_cast<PhantomLesionKind>(found - kinds.begin());
   switch (lesion.kind)
   {
-    case LesionKind::Stenosis:
-    case LesionKind::Plaque:
+    case PhantomLesionKind::Stenosis:
+    case PhantomLesionKind::Plaque:
       lesion.degree = 0.5;
       break;
-    case LesionKind::Calcification:
+    case PhantomLesionKind::Calcification:
       lesion.calciumArc = 90.0;
       lesion.calciumThickness = 1.0;
       break;
-    case LesionKind::Spot:
+    case PhantomLesionKind::Spot:
       lesion.calciumThickness = 1.6;
       lesion.length = lesion.calciumThickness;
       break;
-    case LesionKind::Stent:
+    case PhantomLesionKind::Stent:
       lesion.length = 18.0;
       break;
-    case LesionKind::Occlusion:
+    case PhantomLesionKind::Occlusion:
       lesion.length = 20.0;
       break;
-    case LesionKind::Ectasia:
+    case PhantomLesionKind::Ectasia:
       lesion.degree = 0.8;
       break;
-    case LesionKind::Bridge:
+    case PhantomLesionKind::Bridge:
       lesion.length = 20.0;
       lesion.degree = 0.5;
       break;
@@ -302,12 +302,12 @@ void PhantomDisease::Validate() const
   for (std::size_t n = 0; n < this->lesions.size(); ++n)
   {
     const PhantomLesion& lesion = this->lesions[n];
-    const std::string where =
-      "PhantomSettings: lesions[" + std::to_string(n) + "] (" + LesionKindName(lesion.kind) + ") ";
+    const std::string where = "PhantomSettings: lesions[" + std::to_string(n) + "] (" +
+      PhantomLesionKindName(lesion.kind) + ") ";
     for (const LesionNumber& number : AllLesionNumbers())
     {
       const double value = lesion.*number.member;
-      const bool narrows = number.member == &L::degree && lesion.kind != LesionKind::Ectasia;
+      const bool narrows = number.member == &L::degree && lesion.kind != PhantomLesionKind::Ectasia;
       const double high = narrows ? 0.99 : number.high;
       Require(Within(value, number.low, high),
         where + number.name + " is " + Short(value) + ", it must lie in [" + Short(number.low) +

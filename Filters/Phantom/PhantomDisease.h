@@ -10,7 +10,7 @@
 
 namespace coronary
 {
-enum class LesionKind
+enum class PhantomLesionKind
 {
   Stenosis,      ///< the lumen alone is narrow, like a Gaussian of width `length` at half its depth
   Plaque,        ///< the lumen is narrow, the outer wall has a course of its own
@@ -33,7 +33,7 @@ enum class LesionKind
  */
 struct PhantomLesion
 {
-  LesionKind kind = LesionKind::Plaque;
+  PhantomLesionKind kind = PhantomLesionKind::Plaque;
   std::string vessel;          ///< "LAD" (with the left main), "LCx", "RCA", "D1", ..., a graft
   double position = 0.0;       ///< of the middle, mm from the vessel's origin
   bool relative = false;       ///< `position` is a share of the vessel's length
@@ -69,8 +69,8 @@ const std::vector<LesionNumber>& AllLesionNumbers();
 
 ///@{
 /// "stenosis", "plaque", "calcification", "spot", "occlusion", "stent", "ectasia", "bridge".
-const std::vector<std::string>& LesionKinds();
-std::string LesionKindName(LesionKind kind);
+const std::vector<std::string>& PhantomLesionKinds();
+std::string PhantomLesionKindName(PhantomLesionKind kind);
 ///@}
 
 /// A lesion with the usual numbers of its kind.

@@ -417,7 +417,8 @@ void Rendering::PlaceCorners(const PhantomMotion& motion, const ProgressCallback
           Vector3 guess = world;
           for (std::size_t m = 0; m < momentCount; ++m)
           {
-            guess = motion.ReferencePosition(world, this->Moments[m].t, guess, 2e-3);
+            const PhantomMoment& moment = this->Moments[m];
+            guess = motion.ReferencePosition(world, moment.t, moment.shift, guess, 2e-3);
             this->Rest[(row * columns + i) * momentCount + m] = (guess - world).cast<float>();
           }
         }

@@ -24,6 +24,7 @@ struct PhantomPalette
 struct PhantomMoment
 {
   double t;
+  Vector3 shift; ///< mm, of its beat
   double weight; ///< of all moments together: 1
   PhantomTree tree;
   PhantomTree vein;

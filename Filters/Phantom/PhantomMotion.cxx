@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <cstring>
 
 namespace coronary
 {
@@ -13,6 +14,7 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 constexpr std::uint64_t AmplitudePurpose = 201;
 constexpr std::uint64_t BeatPurpose = 202;
+constexpr std::uint64_t ShiftPurpose = 203;
 
 /// 0 below, u inside, 1 above, without a corner: the clamp of the motion's formula, made smooth.
 double SoftClamp(double u)
@@ -127,7 +129,26 @@ double PhantomMotion::BeatFactor(double t) const
   return 1.0 + this->Settings.beatVariation * random.Normal(2.0);
 }
 
-Vector3 PhantomMotion::Position(const Vector3& reference, double t, Vector3* velocity) const
+Vector3 PhantomMotion::BeatShift(double t) const
+{
+  Vector3 shift = Vector3::Zero();
+  if (this->Settings.beatIrregularity > 0.0)
+  {
+    // A phase is its time to the last bit: no two share a beat.
+    std::uint64_t key = 0;
+    const double exactTime = t == 0.0 ? 0.0 : t; // one zero
+    std::memcpy(&key, &exactTime, sizeof(key));
+    RandomStream random(this->Settings.seed, MixBits(key) + ShiftPurpose);
+    for (double& component : shift)
+    {
+      component = random.Normal() * this->Settings.beatIrregularity / std::sqrt(3.0);
+    }
+  }
+  return shift;
+}
+
+Vector3 PhantomMotion::Position(
+  const Vector3& reference, double t, const Vector3& shift, Vector3* velocity) const
 {
   const Vector3 q = this->Frame.ToHeart(reference);
   const double far = 1.0 - SmoothStep((HeartFrame::Level(q) - 1.3) / 1.2);
@@ -178,28 +199,29 @@ Vector3 PhantomMotion::Position(const Vector3& reference, double t, Vector3* vel
     v << change * this->Frame.size, axial;
     *velocity = this->Frame.axes.transpose() * v * (far * rate);
   }
-  return reference + this->Frame.axes.transpose() * u * far;
+  return reference + (this->Frame.axes.transpose() * u + shift) * far;
 }
 
-Vector3 PhantomMotion::PlaneNormal(const Vector3& reference, const Vector3& normal, double t) const
+Vector3 PhantomMotion::PlaneNormal(
+  const Vector3& reference, const Vector3& normal, double t, const Vector3& shift) const
 {
   constexpr double h = 1e-3;
   const Vector3 u = normal.unitOrthogonal();
   const Vector3 v = normal.cross(u);
   const Vector3 alongU =
-    this->Position(reference + h * u, t) - this->Position(reference - h * u, t);
+    this->Position(reference + h * u, t, shift) - this->Position(reference - h * u, t, shift);
   const Vector3 alongV =
-    this->Position(reference + h * v, t) - this->Position(reference - h * v, t);
+    this->Position(reference + h * v, t, shift) - this->Position(reference - h * v, t, shift);
   return alongU.cross(alongV).normalized();
 }
 
-Vector3 PhantomMotion::ReferencePosition(
-  const Vector3& position, double t, const Vector3& guess, double tolerance) const
+Vector3 PhantomMotion::ReferencePosition(const Vector3& position, double t, const Vector3& shift,
+  const Vector3& guess, double tolerance) const
 {
   Vector3 reference = guess;
   for (int iteration = 0; iteration < 200; ++iteration)
   {
-    const Vector3 residual = position - this->Position(reference, t);
+    const Vector3 residual = position - this->Position(reference, t, shift);
     reference += residual;
     if (residual.squaredNorm() < tolerance * tolerance)
     {

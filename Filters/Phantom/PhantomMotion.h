@@ -50,18 +50,24 @@ class PhantomMotion
 public:
   PhantomMotion(const PhantomSettings& settings, const HeartFrame& frame);
 
-  /// World position of a material point, mm, and its velocity in mm/s when asked for.
-  Vector3 Position(const Vector3& reference, double t, Vector3* velocity = nullptr) const;
+  /// How far the whole heart lies off, mm, in the beat in which the phase `t` is seen; zero without irregularity.
+  Vector3 BeatShift(double t) const;
+
+  /// World position of a material point, mm, in a beat that is off by `shift`; its velocity in mm/s
+  /// when asked for.
+  Vector3 Position(
+    const Vector3& reference, double t, const Vector3& shift, Vector3* velocity = nullptr) const;
 
   /// Unit normal, at time t, of the material plane that rests at `reference` with unit `normal`.
-  Vector3 PlaneNormal(const Vector3& reference, const Vector3& normal, double t) const;
+  Vector3 PlaneNormal(
+    const Vector3& reference, const Vector3& normal, double t, const Vector3& shift) const;
 
   /**
    * Material point at `position`: fixed-point iteration, starting from `guess`.
    * The field's displacement gradient stays below 1, so that the iteration contracts.
    */
-  Vector3 ReferencePosition(
-    const Vector3& position, double t, const Vector3& guess, double tolerance) const;
+  Vector3 ReferencePosition(const Vector3& position, double t, const Vector3& shift,
+    const Vector3& guess, double tolerance) const;
 
   /// Contraction s(t): about 0 at end diastole, 1 at end systole (35 %); periodic.
   static double Activation(double t, double* derivative = nullptr);

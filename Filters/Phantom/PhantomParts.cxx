@@ -118,7 +118,7 @@ public:
     this->AddWall();
     this->AddCore();
     this->AddCalcium();
-    if (this->Lesion.kind == LesionKind::Stent)
+    if (this->Lesion.kind == PhantomLesionKind::Stent)
     {
       this->AddStent();
     }
@@ -314,7 +314,7 @@ private:
 
 double PlacedLesion::Profile(double arc) const
 {
-  if (this->lesion.kind == LesionKind::Stenosis)
+  if (this->lesion.kind == PhantomLesionKind::Stenosis)
   {
     const double width = this->lesion.length / 2.3548;
     const double u = (arc - this->middle) / width;
@@ -328,11 +328,11 @@ double PlacedLesion::LumenFactor(double arc) const
 {
   switch (this->lesion.kind)
   {
-    case LesionKind::Stenosis:
-    case LesionKind::Plaque:
-    case LesionKind::Stent:
+    case PhantomLesionKind::Stenosis:
+    case PhantomLesionKind::Plaque:
+    case PhantomLesionKind::Stent:
       return 1.0 - this->lesion.degree * this->Profile(arc);
-    case LesionKind::Ectasia:
+    case PhantomLesionKind::Ectasia:
       return 1.0 + this->lesion.degree * this->Profile(arc);
     default:
       return 1.0;
@@ -341,20 +341,22 @@ double PlacedLesion::LumenFactor(double arc) const
 
 double PlacedLesion::HalfExtent() const
 {
-  return this->lesion.kind == LesionKind::Stenosis
+  return this->lesion.kind == PhantomLesionKind::Stenosis
     ? 1.5 * this->lesion.length
     : 0.5 * (this->lesion.length + Shoulder(this->lesion));
 }
 
 bool PlacedLesion::HasWall() const
 {
-  return this->lesion.kind == LesionKind::Plaque || this->lesion.kind == LesionKind::Occlusion ||
-    this->lesion.kind == LesionKind::Calcification || this->lesion.kind == LesionKind::Stent;
+  return this->lesion.kind == PhantomLesionKind::Plaque ||
+    this->lesion.kind == PhantomLesionKind::Occlusion ||
+    this->lesion.kind == PhantomLesionKind::Calcification ||
+    this->lesion.kind == PhantomLesionKind::Stent;
 }
 
 bool PlacedLesion::Blocks(double arc) const
 {
-  return this->lesion.kind == LesionKind::Occlusion &&
+  return this->lesion.kind == PhantomLesionKind::Occlusion &&
     std::abs(arc - this->middle) <= 0.5 * this->lesion.length;
 }
 
@@ -371,17 +373,17 @@ WallSection SectionOf(const PlacedLesion& placed, double arc, double lumen, doub
   const double w = placed.Profile(arc);
   double eccentricity = lesion.eccentricity;
   double radius = healthy * (1.0 + (lesion.remodelling - 1.0) * w);
-  if (lesion.kind == LesionKind::Calcification)
+  if (lesion.kind == PhantomLesionKind::Calcification)
   {
     // The thickest place has room for the calcium; the longer its arc, the more even the wall.
     eccentricity = 1.0 - lesion.calciumArc / 360.0;
     radius = healthy + w * lesion.calciumThickness / (1.0 + eccentricity);
   }
-  else if (lesion.kind == LesionKind::Stent)
+  else if (lesion.kind == PhantomLesionKind::Stent)
   {
     radius += 2.0 * lesion.strut * w;
   }
-  else if (lesion.kind == LesionKind::Occlusion)
+  else if (lesion.kind == PhantomLesionKind::Occlusion)
   {
     eccentricity = 0.0;
   }

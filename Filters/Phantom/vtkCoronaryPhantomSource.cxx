@@ -341,6 +341,7 @@ coronarySettingMacro(AxialMotionLeft, double, axialMotionLeft);
 coronarySettingMacro(RegionalLag, double, regionalLag);
 coronarySettingMacro(RegionalAmplitude, double, regionalAmplitude);
 coronarySettingMacro(BeatVariation, double, beatVariation);
+coronarySettingMacro(BeatIrregularity, double, beatIrregularity);
 coronarySettingMacro(AreaPulse, double, areaPulse);
 coronarySettingMacro(TemporalWindow, double, temporalWindow);
 coronarySettingMacro(Noise, double, noise);
@@ -729,6 +730,7 @@ void vtkCoronaryPhantomSource::PrintSelf(ostream& os, vtkIndent indent)
   print("RegionalLag", settings.regionalLag);
   print("RegionalAmplitude", settings.regionalAmplitude);
   print("BeatVariation", settings.beatVariation);
+  print("BeatIrregularity", settings.beatIrregularity);
   print("AreaPulse", settings.areaPulse);
   print("TemporalWindow", settings.temporalWindow);
   print("Noise", settings.noise);

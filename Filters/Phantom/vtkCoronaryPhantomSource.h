@@ -245,6 +245,16 @@ public:
 
   ///@{
   /**
+   * How far the whole heart lies off in the beat of each phase, mm, root mean square in 3-D, 0 to 5.
+   * Above 0 every time is a phase with a beat of its own: image and truth of one time agree, but
+   * there is no motion from one time to the next. Default 0.
+   */
+  void SetBeatIrregularity(double distance);
+  double GetBeatIrregularity();
+  ///@}
+
+  ///@{
+  /**
    * Systolic increase of the lumen's area, 0 to 0.3. Default 0.08.
    */
   void SetAreaPulse(double increase);
@@ -263,7 +273,7 @@ public:
   ///@{
   /**
    * Image noise: standard deviation at full dose, 0 to 200 HU (default 25); standard deviation of
-   * the kernel that correlates it, 0 to 2 mm (default 0.4); factor where the tube current is
+   * the kernel that correlates it, 0 to 2 mm (default 0.32); factor where the tube current is
    * reduced in systole, 1 to 4 (default 1.5).
    */
   void SetNoise(double deviation);
@@ -276,8 +286,8 @@ public:
 
   ///@{
   /**
-   * Standard deviations of the point spread function along the image axes, mm.
-   * Default 0.25, 0.25, 0.30.
+   * Standard deviations of the point spread function along the image axes, mm: 0.42 times the full
+   * width at half maximum. Default 0.38, 0.38, 0.34 (0.9, 0.9, 0.8 mm: medium kernel).
    */
   void SetPointSpread(double i, double j, double k);
   void SetPointSpread(const double deviations[3])

@@ -324,6 +324,12 @@ std::shared_ptr<WallMotion> MakePhantomWallMotion(
     throw std::invalid_argument("beatVariation of the phantom is " +
       std::to_string(settings.beatVariation) + ", and a wall that beats periodically needs 0");
   }
+  if (settings.beatIrregularity != 0.0)
+  {
+    throw std::invalid_argument("beatIrregularity of the phantom is " +
+      std::to_string(settings.beatIrregularity) +
+      " mm, and a wall that beats periodically needs 0");
+  }
   PhantomSettings used = settings;
   used.surfaceSpacing = edgeLength;
   const CoronaryPhantom phantom(used);

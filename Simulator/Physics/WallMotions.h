@@ -106,7 +106,7 @@ WallTopology PhantomAxes(const CoronaryPhantom& phantom);
  * right ostium, 4.. the ends of the branches; a point's group is the place of its branch in Topology().axis.
  * @param edgeLength  mm, instead of settings.surfaceSpacing
  * @param phases      even samples of the cycle, 4 to 200; between them as SampledWallMotion
- * @throws std::invalid_argument as PhantomSettings::Validate; beatVariation is not 0 (no longer periodic);
+ * @throws std::invalid_argument as PhantomSettings::Validate; beatVariation or beatIrregularity is not 0 (no longer periodic);
  *         phases; as CheckWall
  * @throws Cancelled
  */

@@ -636,6 +636,7 @@ TEST(CoronaryPhantomSource, BadSettingsAreNamed)
     { "RegionalLag", [](Source* s) { s->SetRegionalLag(NaN); } },
     { "RegionalAmplitude", [](Source* s) { s->SetRegionalAmplitude(0.5); } },
     { "BeatVariation", [](Source* s) { s->SetBeatVariation(NaN); } },
+    { "BeatIrregularity", [](Source* s) { s->SetBeatIrregularity(6.0); } },
     { "AreaPulse", [](Source* s) { s->SetAreaPulse(NaN); } },
     { "TemporalWindow", [](Source* s) { s->SetTemporalWindow(-1.0); } },
     { "Noise", [](Source* s) { s->SetNoise(NaN); } },
@@ -795,6 +796,6 @@ TEST(CoronaryPhantomSource, DefaultsAreThoseOfTheProxy)
     }
     ++compared;
   }
-  EXPECT_EQ(compared, 25);
+  EXPECT_EQ(compared, 26);
 }
 }

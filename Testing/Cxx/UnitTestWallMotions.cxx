@@ -322,6 +322,9 @@ TEST(WallMotions, RefuseWhatDoesNotFit)
   PhantomSettings settings;
   settings.beatVariation = 0.05;
   ExpectRefusal([&] { MakePhantomWallMotion(settings, 0.5); }, "beatVariation");
+  settings.beatVariation = 0.0;
+  settings.beatIrregularity = 1.5;
+  ExpectRefusal([&] { MakePhantomWallMotion(settings, 0.5); }, "beatIrregularity");
   ExpectRefusal([&] { MakePhantomWallMotion({}, 0.5, 2); }, "phases");
   ExpectRefusal([&] { MakePhantomWallMotion({}, 50.0); }, "surfaceSpacing");
 }
