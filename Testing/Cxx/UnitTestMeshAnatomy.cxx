@@ -401,7 +401,7 @@ TEST(MeshAnatomy, RefusesWhatIsNotASolid)
     ExpectRefusal([&] { MeshAnatomy({ part }, 0.8); }, "part 'ball'", reason);
   };
   refused("surface is open: 3 edges", [](AnatomyPart& part) { part.triangles.pop_back(); });
-  refused("cells", [](AnatomyPart& part) { part.triangles.push_back(part.triangles.back()); });
+  refused("doubled", [](AnatomyPart& part) { part.triangles.push_back(part.triangles.back()); });
   refused("finite", [](AnatomyPart& part) { part.positions[0][3][1] = NAN; });
   refused("as many phases", [](AnatomyPart& part) { part.phases = { 0.0, 0.5 }; });
   refused("different numbers of points",
