@@ -16,7 +16,6 @@ USES = {
     "Formats": [FILTERS],
     "Readers": ["Formats"],
     "Writers": ["Formats"],
-    "Filters/Phantom": ["Filters/Motion", "Filters/Volume"],  # surfaces of others: splines in time, whether they are closed
     "Filters/Skinning": ["Formats"],  # a cache of weights is a file
     "Applications/Common": [FILTERS, "Formats"],
     "Applications/coronary-pipeline": [FILTERS, "Formats", "Readers", "Writers", "Applications/Common"],

@@ -9,6 +9,7 @@
 #include "vtkMessageTrap.h"
 #include "vtkSurfaceFile.h"
 
+#include <algorithm>
 #include <initializer_list>
 #include <optional>
 #include <stdexcept>
