@@ -38,7 +38,7 @@ public:
   [[noreturn]] void Fail(const std::string& reason) const
   {
     throw std::runtime_error(
-      "'" + this->Path + "': " + this->Place + (this->Place.empty() ? "" : " ") + reason);
+      "'" + this->Path + "'" + (this->Place.empty() ? "" : ": " + this->Place) + " " + reason);
   }
 
   void Allow(std::initializer_list<const char*> keys) const
@@ -281,7 +281,7 @@ AnatomyFile ReadAnatomyFile(const std::string& path, vtkMessageTrap& messages)
   }
   catch (const std::invalid_argument& error)
   {
-    whole.Fail(error.what());
+    throw std::runtime_error("'" + path + "': " + error.what());
   }
   return file;
 }
