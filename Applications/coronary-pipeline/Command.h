@@ -33,6 +33,7 @@ using MakeCommand = Command(CLI::App& program);
 
 MakeCommand MakePhantomCommand;
 MakeCommand MakePhantomMotionCommand;
+MakeCommand MakeScanCommand;
 MakeCommand MakeInspectCommand;
 MakeCommand MakeRunCommand;
 MakeCommand MakeConvertCommand;

@@ -4,16 +4,15 @@
 #include "CoronaryPhantom.h"
 #include "DiseaseOptions.h"
 #include "FileSeries.h"
+#include "ImageScan.h"
 #include "Interruption.h"
 #include "MetaImageWriter.h"
 #include "OptionChecks.h"
 #include "PhantomOptions.h"
 #include "ProgressDisplay.h"
-#include "ScanFolder.h"
 #include "ScannerOptions.h"
 #include "SeriesDescription.h"
 #include "StagedFolder.h"
-#include "TextFile.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 
@@ -31,7 +30,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -42,9 +40,6 @@ namespace coronary
 {
 namespace
 {
-constexpr const char* SeriesName = "series.json";
-constexpr const char* ScanName = "scan.json";
-constexpr const char* PartsName = "scan-parts";
 constexpr const char* DiseaseName = "truth/disease.json";
 
 // Share of a phase's time that its parts take, for the progress.
@@ -60,10 +55,8 @@ struct PhantomJob
   ScannerSettings scan; ///< what scanner.Settings() says
   std::vector<ScanVariant> variants;
   std::string given; ///< all options that decide what the images are, as text
-  std::vector<double> spacing = { 0.5 };
-  std::vector<double> origin;
+  GridOptions grid;
   std::vector<double> direction;
-  std::vector<int> dimensions;
   std::string output;
   int threads = 0;
   bool compress = false;
@@ -87,39 +80,19 @@ void PhantomJob::Declare(CLI::App& app)
       [](std::string& text) { return text.empty() ? "a name is needed" : std::string(); }, ""))
     ->required();
   this->phases.AddTo(app);
+  this->phases.AddLostTo(app);
   AddHeartOptions(app, this->settings);
   AddImagingOptions(app, this->settings);
   this->disease.AddTo(app);
 
-  const std::string grid = "Image grid";
-  app
-    .add_option(
-      "--spacing", this->spacing, "Voxel size along the image axes, in mm; one number or three")
-    ->expected(1, 3)
-    ->check(Within(0.05, 20.0))
-    ->type_name("MM")
-    ->group(grid)
-    ->default_str("0.5");
-  app
-    .add_option("--origin", this->origin,
-      "World position (LPS) of the first voxel, in mm; together with --dimensions. Without them "
-      "the image holds the whole tree over the whole cycle")
-    ->expected(3)
-    ->check(Within(-1e5, 1e5))
-    ->type_name("MM")
-    ->group(grid);
-  app.add_option("--dimensions", this->dimensions, "Number of voxels along the image axes")
-    ->expected(3)
-    ->check(WholeWithin(1, 16384))
-    ->type_name("N")
-    ->group(grid);
+  this->grid.AddTo(app, "the whole tree over the whole cycle");
   app
     .add_option("--direction", this->direction,
       "Orthonormal matrix, row by row, whose columns are the world axes (LPS) of the image axes")
     ->expected(9)
     ->check(Within(-1.0, 1.0))
     ->type_name("COSINE")
-    ->group(grid);
+    ->group(GridOptions::Group);
 
   this->scanner.AddTo(app);
   AddTruthOptions(app, this->settings);
@@ -144,16 +117,7 @@ void PhantomJob::CheckCombinations()
       " ms is more than half of the cycle (--cycle-ms " +
       Format(1000.0 * this->settings.cycleLength) + ")");
   }
-  if (this->spacing.size() == 2)
-  {
-    throw UsageError("--spacing: one number or three, not two");
-  }
-  this->spacing.resize(3, this->spacing.front());
-  if (this->origin.empty() != this->dimensions.empty())
-  {
-    throw UsageError(std::string(this->origin.empty() ? "--dimensions" : "--origin") +
-      ": --origin and --dimensions go together");
-  }
+  this->grid.Check();
   if (!this->direction.empty())
   {
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> matrix(this->direction.data());
@@ -217,16 +181,18 @@ void PhantomJob::Configure(vtkCoronaryPhantomSource* source, const std::vector<d
   {
     source->AddPhase(time);
   }
-  source->SetSpacing(this->spacing[0], this->spacing[1], this->spacing[2]);
+  const std::vector<double>& spacing = this->grid.spacing;
+  source->SetSpacing(spacing[0], spacing[1], spacing[2]);
   if (!this->direction.empty())
   {
     source->SetDirection(this->direction.data());
   }
-  if (!this->origin.empty())
+  if (this->grid.Given())
   {
     source->AutomaticGridOff();
-    source->SetOrigin(this->origin[0], this->origin[1], this->origin[2]);
-    source->SetDimensions(this->dimensions[0], this->dimensions[1], this->dimensions[2]);
+    source->SetOrigin(this->grid.origin[0], this->grid.origin[1], this->grid.origin[2]);
+    source->SetDimensions(
+      this->grid.dimensions[0], this->grid.dimensions[1], this->grid.dimensions[2]);
   }
 }
 
@@ -254,39 +220,6 @@ double MeanSpeed(vtkPolyData* tree)
     sum += Eigen::Map<const Vector3>(velocity->GetTuple3(i)).norm();
   }
   return sum / static_cast<double>(std::max<vtkIdType>(1, velocity->GetNumberOfTuples()));
-}
-
-std::string Percent(double fraction)
-{
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.1f %% R-R", 100.0 * fraction);
-  return text;
-}
-
-/// All options that decide what the images are, with the contents of files that they name.
-std::string GivenOptions(const CLI::App& app)
-{
-  std::string text = "version " DYNAMICCORONARY_VERSION "\n";
-  for (const CLI::Option* option : app.get_options())
-  {
-    const std::string name = option->get_name();
-    if (name == "--output" || name == "--threads" || name == "--quiet" || name == "--compress" ||
-      name == "--no-truth" || option->empty())
-    {
-      continue;
-    }
-    text += name;
-    for (const std::string& value : option->results())
-    {
-      text += " " + value;
-      if (std::filesystem::is_regular_file(value))
-      {
-        text += "\n" + ReadTextFile(value, "an option's file") + "\n";
-      }
-    }
-    text += "\n";
-  }
-  return text;
 }
 
 /// Makes the files of one series, phase by phase.
@@ -320,12 +253,14 @@ public:
   {
     if (this->Scanner)
     {
-      this->Scan();
+      this->Progress.BeginStep(0, "views and slices");
+      this->Scanner->Scan(this->Job.output, this->Job.given, this->Job.quiet,
+        [&](double fraction) { return this->Report(fraction); });
     }
     for (std::size_t i = 0; i < this->Times.size(); ++i)
     {
       this->Progress.BeginStep(
-        static_cast<int>(i) + (this->Scanner ? 1 : 0), Percent(this->Times[i]));
+        static_cast<int>(i) + (this->Scanner ? 1 : 0), PhaseText(this->Times[i]));
       SeriesDescription::Phase phase;
       phase.fraction = this->Times[i];
       this->FindSeeds(this->Times[i]);
@@ -358,12 +293,11 @@ public:
     }
     if (this->Scanner)
     {
-      WriteFileAtomically(folder.Add(ScanName),
-        DescribeScan(this->Job.scan, *this->Scanner, this->Times, this->Job.variants));
+      this->Scanner->WriteDescriptions(folder, this->Series);
     }
-    if (!this->Job.truthOnly)
+    else if (!this->Job.truthOnly)
     {
-      this->WriteSeries(folder);
+      WriteSeriesDescription(folder.Add(SeriesName), this->Series);
     }
     ThrowIfInterrupted();
     this->Messages.PrintWarnings();
@@ -381,7 +315,7 @@ public:
       text << " of " << e[1] - e[0] + 1 << " x " << e[3] - e[2] + 1 << " x " << e[5] - e[4] + 1
            << " voxels of " << Format(s[0]) << " x " << Format(s[1]) << " x " << Format(s[2])
            << " mm, cycle " << Format(this->Series.cycleMs) << " ms, seeds at "
-           << Percent(this->ReferenceTime);
+           << PhaseText(this->ReferenceTime);
     }
     return text.str();
   }
@@ -389,9 +323,9 @@ public:
   /// The files are in place: the parts that they were made of are not needed any more.
   void Done()
   {
-    if (this->Parts)
+    if (this->Scanner)
     {
-      this->Parts->Remove();
+      this->Scanner->Done();
     }
   }
 
@@ -406,50 +340,15 @@ private:
     image->Get(vtkDataObject::SPACING(), this->Grid.spacing.data());
     this->Phantom = std::make_unique<CoronaryPhantom>(this->Job.settings);
     this->Anatomy = std::make_unique<ScannedPhantom>(*this->Phantom);
-    this->Scanner = std::make_unique<CtScanner>(
+    this->Scanner = std::make_unique<ImageScan>(
       *this->Anatomy, this->Job.scan, this->Grid, this->Times, this->Job.variants);
   }
 
-  /// All views, and what is made of them; parts of a scan that was stopped are taken over.
-  void Scan()
+  /// Of the step; false when the work is to stop.
+  bool Report(double fraction)
   {
-    const std::string where = this->Job.output + "/" + PartsName;
-    this->Parts =
-      std::make_unique<ScanFolder>(where, this->Job.given + DescribeScanner(this->Job.scan));
-    if (this->Parts->Found() > 0 && !this->Job.quiet)
-    {
-      std::printf(
-        "%s: %d parts of this scan were made before\n", where.c_str(), this->Parts->Found());
-    }
-    this->Progress.BeginStep(0, "views and slices");
-    this->Scanner->Scan(*this->Parts,
-      [&](double fraction)
-      {
-        this->Progress.Update(fraction);
-        return Interruption() == 0;
-      });
-  }
-
-  /// One series.json; of several variants each has one in its folder, the truth is common.
-  void WriteSeries(StagedFolder& folder)
-  {
-    if (this->Job.variants.size() < 2)
-    {
-      WriteSeriesDescription(folder.Add(SeriesName), this->Series);
-      return;
-    }
-    for (const ScanVariant& variant : this->Job.variants)
-    {
-      SeriesDescription series = this->Series;
-      for (SeriesDescription::Phase& phase : series.phases)
-      {
-        for (std::string* truth : { &phase.surface, &phase.centerline })
-        {
-          *truth = truth->empty() ? "" : "../" + *truth;
-        }
-      }
-      WriteSeriesDescription(folder.Add(VariantName(variant) + "/" + SeriesName), series);
-    }
+    this->Progress.Update(fraction);
+    return Interruption() == 0;
   }
 
   /// Brings a port up to date; the progress of the phase goes from `first` to `last`.
@@ -509,40 +408,19 @@ private:
     const double first = this->Job.noTruth ? 0.0 : TruthShare;
     const double written = std::min(1.0, first + RenderShare);
     phase.image = "phase_" + this->Numbers[index] + ".mha";
-    const auto report = [&](double fraction)
-    {
-      this->Progress.Update(fraction);
-      return Interruption() == 0;
-    };
-    const auto write = [&](const std::string& name, const short* values, double begin, double end)
-    {
-      WriteMetaImage(folder.Add(name), this->Grid, values, this->Job.compress,
-        [&](double fraction) { return report(begin + (end - begin) * fraction); });
-    };
     if (this->Scanner)
     {
-      const std::array<int, 6>& e = this->Grid.extent;
-      std::vector<std::int16_t> values(
-        static_cast<std::size_t>(e[1] - e[0] + 1) * (e[3] - e[2] + 1) * (e[5] - e[4] + 1));
-      const std::size_t count = this->Job.variants.size();
-      for (std::size_t v = 0; v < count; ++v)
-      {
-        const auto share = [&](double done) {
-          return first +
-            (1.0 - first) * (static_cast<double>(v) + done) / static_cast<double>(count);
-        };
-        this->Scanner->Image(index, v, *this->Parts, values.data(),
-          [&](double fraction) { return report(share(0.5 * fraction)); });
-        const std::string in = count > 1 ? VariantName(this->Job.variants[v]) + "/" : "";
-        write(in + phase.image, values.data(), share(0.5), share(1.0));
-      }
+      this->Scanner->WriteImages(folder, index, phase.image, this->Job.compress,
+        [&](double fraction) { return this->Report(first + (1.0 - first) * fraction); });
       return;
     }
     this->Update(vtkCoronaryPhantomSource::ImagePort, phase.fraction, first, written);
     auto* image = vtkImageData::SafeDownCast(
       this->Source->GetOutputDataObject(vtkCoronaryPhantomSource::ImagePort));
     this->Grid = vtkCoronary::GridOf(image);
-    write(phase.image, static_cast<const short*>(image->GetScalarPointer()), written, 1.0);
+    WriteMetaImage(folder.Add(phase.image), this->Grid,
+      static_cast<const short*>(image->GetScalarPointer()), this->Job.compress,
+      [&](double fraction) { return this->Report(written + (1.0 - written) * fraction); });
     image->ReleaseData();
   }
 
@@ -557,8 +435,7 @@ private:
   ImageGrid Grid;
   std::unique_ptr<CoronaryPhantom> Phantom; ///< that the scanner sees
   std::unique_ptr<ScannedAnatomy> Anatomy;
-  std::unique_ptr<CtScanner> Scanner; ///< none: images by a formula
-  std::unique_ptr<ScanFolder> Parts;
+  std::unique_ptr<ImageScan> Scanner; ///< none: images by a formula
   double ReferenceTime = 0.0;
   bool ReferenceIsLost = false;
   double MinimumSpeed = 0.0;

@@ -194,7 +194,11 @@ void PhaseOptions::AddTo(CLI::App& app)
     ->delimiter(',')
     ->type_name("LIST")
     ->excludes(even);
-  group
+}
+
+void PhaseOptions::AddLostTo(CLI::App& app)
+{
+  Section(app, "Phases")
     .Add("--lost", this->lost,
       "A phase, counted from 1, in which the vessels can not be tracked, and the share of the "
       "tree's length that is lost: 14 or 14:0.7; may be repeated")
@@ -243,5 +247,42 @@ std::vector<LostPhase> PhaseOptions::LostPhases(const std::vector<double>& phase
     result.push_back({ phases[std::stoul(phase) - 1], std::stod(share) });
   }
   return result;
+}
+
+void GridOptions::AddTo(CLI::App& app, const std::string& automatic)
+{
+  Section group(app, Group);
+  group
+    .Add("--spacing", this->spacing, "Voxel size along the image axes, in mm; one number or three")
+    ->expected(1, 3)
+    ->check(Within(0.05, 20.0))
+    ->type_name("MM")
+    ->default_str("0.5");
+  group
+    .Add("--origin", this->origin,
+      "World position (LPS) of the first voxel, in mm; together with --dimensions. Without them "
+      "the image holds " +
+        automatic)
+    ->expected(3)
+    ->check(Within(-1e5, 1e5))
+    ->type_name("MM");
+  group.Add("--dimensions", this->dimensions, "Number of voxels along the image axes")
+    ->expected(3)
+    ->check(WholeWithin(1, 16384))
+    ->type_name("N");
+}
+
+void GridOptions::Check()
+{
+  if (this->spacing.size() == 2)
+  {
+    throw UsageError("--spacing: one number or three, not two");
+  }
+  this->spacing.resize(3, this->spacing.front());
+  if (this->origin.empty() != this->dimensions.empty())
+  {
+    throw UsageError(std::string(this->origin.empty() ? "--dimensions" : "--origin") +
+      ": --origin and --dimensions go together");
+  }
 }
 }

@@ -34,6 +34,9 @@ struct PhaseOptions
 
   void AddTo(CLI::App& app);
 
+  /// Adds `--lost`.
+  void AddLostTo(CLI::App& app);
+
   /// The phases, strictly increasing.
   /// @throws UsageError
   std::vector<double> Phases() const;
@@ -41,6 +44,24 @@ struct PhaseOptions
   /// The lost ones.
   /// @throws UsageError
   std::vector<LostPhase> LostPhases(const std::vector<double>& phases) const;
+};
+
+/// Voxels of the images.
+struct GridOptions
+{
+  static constexpr const char* Group = "Image grid";
+
+  std::vector<double> spacing = { 0.5 }; ///< mm; three after Check()
+  std::vector<double> origin;            ///< mm; with dimensions, or both empty
+  std::vector<int> dimensions;
+
+  /// @param automatic  what the image holds without an origin
+  void AddTo(CLI::App& app, const std::string& automatic);
+
+  /// @throws UsageError
+  void Check();
+
+  bool Given() const { return !this->origin.empty(); }
 };
 }
 

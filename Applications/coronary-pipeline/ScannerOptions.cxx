@@ -150,7 +150,10 @@ void ScannerOptions::AddTo(CLI::App& app)
   for (const char* formula : { "--window", "--noise", "--noise-correlation", "--systolic-noise",
          "--point-spread", "--lost", "--direction", "--beat-irregularity" })
   {
-    option->excludes(app.get_option(formula));
+    if (CLI::Option* other = app.get_option_no_throw(formula))
+    {
+      option->excludes(other);
+    }
   }
 }
 

@@ -17,6 +17,7 @@ namespace
 constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakePhantomCommand,
   coronary::MakePhantomMotionCommand,
+  coronary::MakeScanCommand,
   coronary::MakeInspectCommand,
   coronary::MakeRunCommand,
   coronary::MakeSequenceCommand,

@@ -347,10 +347,105 @@ END
   [ ! -e out ] || fail "a folder was made for nothing"
 }
 
+# A tetrahedron of 40 mm, or what these triangles leave of it: off FILE TRIANGLE...
+off() {
+  file=$1
+  shift
+  printf 'OFF\n4 %d 0\n0 0 0\n40 0 0\n0 40 0\n0 0 40\n' $# >"$file"
+  for triangle in "$@"; do
+    echo "3 $triangle" >>"$file"
+  done
+}
+
+check_scan() {
+  # The phantom's own surfaces, in water.
+  # shellcheck disable=SC2086
+  run 0 phantom --seed 5 --quiet --truth-only $coarse --fractions 0,0.25,0.5,0.75 --output heart
+  cat >scanner.json <<END
+{ "preset": "single-350", "channels": 111, "channel_pitch_mm": 8.19, "rows": 8, "row_pitch_mm": 8.79,
+  "views_per_turn": 120, "anatomy_spacing_mm": 4, "anatomy_step_s": 0.05 }
+END
+  cat >anatomy.json <<END
+{ "cycle_ms": 900, "trunk": { "material": "water", "width_mm": 260, "depth_mm": 220 },
+  "parts": [
+    { "name": "lumen", "material": "blood", "value": 20, "unit": "mg/mL", "surfaces": "heart/truth/surface.pvd",
+      "truth": true } ] }
+END
+  image="--scanner scanner.json --spacing 4 --fractions 0.25,0.4"
+  # shellcheck disable=SC2086
+  run 0 scan anatomy.json $image --output made
+  expect_text stdout "1 part, 2 phases of"
+  for file in phase_00.mha phase_01.mha truth/surface_01.vtp truth/surface.pvd scan.json series.json; do
+    [ -s "made/$file" ] || fail "no $file"
+  done
+  [ "$(find made -type f | wc -l)" -eq 7 ] || fail "other files than expected: $(find made)"
+  expect_text made/series.json '"cycle_ms": 900.0'
+  expect_text made/series.json '"surface": "truth/surface_01.vtp"'
+  run 0 inspect --all made/series.json
+  # Where a surface is given the truth is that one, elsewhere it is between two.
+  run 0 metrics made/truth/surface_00.vtp heart/truth/surface_01.vtp --json
+  grep -Eq '"HD": ([0-9.]*e-|0\.0,|0\.000)' stdout || fail "another truth than what was scanned: $(cat stdout)"
+  run 0 metrics made/truth/surface_01.vtp heart/truth/surface_01.vtp --json
+  grep -Eq '"HD": [1-9]' stdout || fail "the truth does not move: $(cat stdout)"
+  cmp -s made/phase_00.mha made/phase_01.mha && fail "two phases look the same"
+  # shellcheck disable=SC2086
+  run 0 scan anatomy.json $image --quiet --threads 1 --kernel soft,standard --no-truth --output several
+  cmp made/phase_01.mha several/standard-25/phase_01.mha || fail "several images are others than one alone"
+  expect_text several/soft-25/series.json phase_01.mha
+  [ ! -e several/truth ] || fail "there is a truth"
+
+  # A still part, the usual trunk.
+  off solid.off "0 2 1" "0 1 3" "0 3 2" "1 2 3"
+  off open.off "0 2 1" "0 1 3" "0 3 2"
+  off other.off "0 2 1" "0 1 3" "0 3 2" "2 3 1"
+  echo '{ "cycle_ms": 900, "parts": [ { "name": "bone", "material": "bone", "surfaces": ["solid.off"], "still": true } ] }' >bone.json
+  run 0 scan bone.json --scanner scanner.json --spacing 5 --fractions 0.5 --output bone
+  expect_text stdout "no trunk: an ellipse of soft tissue"
+  [ ! -e bone/truth ] || fail "there is a truth"
+
+  run 1 scan bone.json --scanner scanner.json --origin 100 0 0 --dimensions 9 9 9 --output out
+  expect_one_line "coronary-pipeline scan" "bone.json.: nothing is in the image: along x"
+  run 2 scan bone.json --output out
+  expect_one_line "coronary-pipeline scan" --scanner
+  run 1 scan none.json --scanner single-350 --output out
+  expect_one_line "coronary-pipeline scan" none.json
+  while read -r reason part; do
+    echo "{ \"cycle_ms\": 900, \"parts\": [ { \"name\": \"a\", $part } ] }" >bad.json
+    run 1 scan bad.json --scanner scanner.json --output out
+    expect_one_line "coronary-pipeline scan" "bad.json.: part 'a'.*$reason"
+  done <<END
+is.open "material": "fat", "surfaces": "open.off"
+other.off "material": "fat", "surfaces": ["solid.off", "other.off"], "phases": [0, 0.5]
+2.surfaces.and.0.phases "material": "fat", "surfaces": ["solid.off", "solid.off"]
+0.001 "material": "fat", "surfaces": ["solid.off", "solid.off"], "phases": [0, 1]
+material.'gold' "material": "gold", "surfaces": "solid.off"
+no.material "surfaces": "solid.off"
+unit "material": "fat", "unit": "mg/mL", "value": 3, "surfaces": "solid.off"
+no.surfaces "material": "fat"
+gone.off "material": "fat", "surfaces": "gone.off"
+scanner.json "material": "fat", "surfaces": "scanner.json"
+colour "material": "fat", "surfaces": "solid.off", "colour": 1
+END
+  while read -r reason json; do
+    echo "$json" >bad.json
+    run 1 scan bad.json --scanner scanner.json --output out
+    expect_one_line "coronary-pipeline scan" "bad.json.*$reason"
+  done <<END
+JSON {
+object []
+cycle_ms {}
+cycle_ms { "cycle_ms": 5 }
+parts { "cycle_ms": 900 }
+name { "cycle_ms": 900, "parts": [ {} ] }
+width_mm { "cycle_ms": 900, "parts": [ {} ], "trunk": { "material": "fat" } }
+END
+  [ ! -e out ] || fail "a folder was made for nothing"
+}
+
 check_options() {
   run 0 --version
   run 0 --help
-  for command in phantom phantom-motion inspect; do
+  for command in phantom phantom-motion scan inspect; do
     run 0 "$command" --help
     expect_text stdout "Usage: coronary-pipeline $command"
   done
