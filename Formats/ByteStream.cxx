@@ -97,6 +97,19 @@ struct ByteStream::Internals
     this->Position += produced;
     return produced;
   }
+
+  /// Reads on to the checksum: damage may make other data of it, and more than there should be.
+  void CheckEnd()
+  {
+    while (this->Inflate(this->Skipped.data(), this->Skipped.size()) > 0)
+    {
+    }
+    if (!this->Ended)
+    {
+      throw std::runtime_error(
+        "'" + this->Path + "': the compressed data is damaged (its end is missing).");
+    }
+  }
 };
 
 ByteStream::ByteStream(const std::string& path, std::uint64_t offset, bool compressed)
@@ -170,6 +183,10 @@ void ByteStream::Read(std::uint64_t position, void* destination, std::size_t siz
     const std::uint64_t available = this->Impl->Compressed ? this->Impl->Position : position + got;
     throw std::runtime_error("'" + this->Impl->Path + "' is truncated: expected " +
       std::to_string(expected) + " bytes, got " + std::to_string(available) + ".");
+  }
+  if (this->Impl->Compressed && this->Impl->Position >= expected)
+  {
+    this->Impl->CheckEnd();
   }
 }
 

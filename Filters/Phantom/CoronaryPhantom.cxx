@@ -724,29 +724,17 @@ void CoronaryPhantom::RenderMaterials(const ImageGrid& grid, double t,
       : value > -300.0f   ? PhantomTissue::Fat
                           : PhantomTissue::Lung;
   };
-  std::vector<PhantomPalette> palettes(3);
-  const auto mix = [&](PhantomTissue tissue, double value, const auto& store)
-  {
-    const std::array<float, 3> amounts = materials(tissue, value);
-    for (std::size_t m = 0; m < palettes.size(); ++m)
-    {
-      store(palettes[m], amounts[m]);
-    }
-  };
+  PhantomPalette palette;
+  palette.images = 3;
   for (const Tissues::Layer& layer : Tissues(data.Settings, data.Anatomy).Layers)
   {
-    mix(tissueOf(layer), layer.value,
-      [](PhantomPalette& palette, float amount) { palette.layers.push_back(amount); });
+    palette.layers.push_back(materials(tissueOf(layer), layer.value));
   }
-  mix(PhantomTissue::Lung, Tissues::Background,
-    [](PhantomPalette& palette, float amount) { palette.background = amount; });
-  mix(PhantomTissue::Fat, Fat, [](PhantomPalette& palette, float amount) { palette.fat = amount; });
-  mix(PhantomTissue::Muscle, Muscle,
-    [](PhantomPalette& palette, float amount) { palette.muscle = amount; });
-  mix(PhantomTissue::Blood, data.Settings.veinHU,
-    [](PhantomPalette& palette, float amount) { palette.vein = amount; });
-  data.Image.RenderMaps(grid, data.Moment(t, data.Motion.BeatShift(t)), palettes,
-    { maps[0], maps[1], maps[2] }, progress);
+  palette.background = materials(PhantomTissue::Lung, Tissues::Background);
+  palette.fat = materials(PhantomTissue::Fat, Fat);
+  palette.muscle = materials(PhantomTissue::Muscle, Muscle);
+  palette.vein = materials(PhantomTissue::Blood, data.Settings.veinHU);
+  data.Image.RenderMaps(grid, data.Moment(t, data.Motion.BeatShift(t)), palette, maps, progress);
 }
 
 CoronaryPhantom::Box CoronaryPhantom::Body() const

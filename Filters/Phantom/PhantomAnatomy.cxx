@@ -495,6 +495,7 @@ std::vector<PhantomLesion> AnatomyBuilder::CountedLesions() const
     lesion.vessel = "RCA";
     lesion.length = std::min(15.0, next - origin - 8.0);
     lesion.position = 0.5 * (origin + next);
+    lesion.fill = 1.0; // by collaterals that bring as much contrast
     lesions.push_back(lesion);
   }
   return lesions;

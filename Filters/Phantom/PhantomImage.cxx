@@ -257,7 +257,8 @@ public:
     const CorrelatedNoise& noise, std::int16_t* values, const ProgressCallback& progress) const;
 
   /// Renders all tissues but arteries and plaques, in the palette's colours; k fastest.
-  void RunMap(const PhantomPalette& palette, float* map, const ProgressCallback& progress);
+  void RunMaps(const PhantomPalette& palette, const std::array<float*, 3>& maps,
+    const ProgressCallback& progress);
 
 private:
   /// Tiles of one z and a few y, all x. Big enough that the noise's halo stays small.
@@ -266,8 +267,9 @@ private:
     int tileZ;
     int firstTileY;
     int endTileY;
-    std::array<int, 6> box; ///< inclusive index ranges
-    std::vector<float> signal;
+    std::array<int, 6> box;    ///< inclusive index ranges
+    std::vector<float> signal; ///< of each image
+    std::size_t size;          ///< voxels of an image
 
     std::size_t Place(int j, int k) const
     {
@@ -275,8 +277,14 @@ private:
                (j - this->box[2])) *
         (this->box[1] - this->box[0] + 1);
     }
-    float* Row(int j, int k) { return &this->signal[this->Place(j, k)]; }
-    const float* Row(int j, int k) const { return &this->signal[this->Place(j, k)]; }
+    float* Row(int j, int k, int image = 0)
+    {
+      return &this->signal[image * this->size + this->Place(j, k)];
+    }
+    const float* Row(int j, int k, int image = 0) const
+    {
+      return &this->signal[image * this->size + this->Place(j, k)];
+    }
   };
 
   /// A tile at one moment, and what of the anatomy can matter inside it.
@@ -309,6 +317,25 @@ private:
     }
   };
 
+  /// A row of samples in each image.
+  using PaintedRow = std::array<std::array<float, Tissues::Row::Longest>, 3>;
+
+  /// Paints a share of a sample.
+  void Mix(PaintedRow& painted, int sample, float share, const PhantomColour& colour) const
+  {
+    for (int image = 0; image < this->Palette.images; ++image)
+    {
+      float& value = painted[image][sample];
+      value += share * (colour[image] - value);
+    }
+  }
+  void PaintLayer(
+    const TileLayers::Active& layer, const Tissues::Row& samples, PaintedRow& painted) const;
+  const PhantomColour& Coat(bool inMuscle) const
+  {
+    return inMuscle ? this->Palette.muscle : this->Palette.fat;
+  }
+
   Band RenderBand(std::int64_t number) const;
   void Store(const Band& band, std::int16_t* values) const;
   void Locate(const Band& band, int tileX, int tileY, Tile& tile) const;
@@ -316,10 +343,11 @@ private:
   void Paint(const Tile& tile, Tissues::Row& samples, Band& band) const;
   void PlaceSamples(const Tile& tile, int j, int k, Tissues::Row& samples) const;
   void PaintTissues(const Tile& tile, const Tissues::Row& samples, int j, int k,
-    PhantomLumen::Sample* vessel, float* painted) const;
-  float PaintVein(const Tile& tile, const Vector3& world, float value) const;
+    PhantomLumen::Sample* vessel, PaintedRow& painted) const;
+  float CoverVein(const Tile& tile, const Vector3& world) const;
   float PaintPlaques(const Tile& tile, const Vector3& world, float value) const;
-  float PaintParts(const Tile& tile, const Vector3& world, bool metal, float value) const;
+  void PaintParts(
+    const Tile& tile, const Vector3& world, bool metal, int sample, PaintedRow& painted) const;
   float PaintVessel(
     const PhantomMoment& moment, const PhantomLumen::Sample& sample, float value) const;
 
@@ -357,7 +385,11 @@ Rendering::Rendering(const PhantomSettings& settings, const PhantomAnatomy& anat
   , BandTiles(std::max(1, 48 / this->Grid.size[1]))
   , BandsInY((this->Grid.count[1] + this->BandTiles - 1) / this->BandTiles)
 {
-  this->Palette.vein = static_cast<float>(settings.veinHU);
+  for (const Tissues::Layer& layer : this->Around.Layers)
+  {
+    this->Palette.layers.push_back({ layer.value });
+  }
+  this->Palette.vein[0] = static_cast<float>(settings.veinHU);
   // The voxel is an average over its box: that blurs like a standard deviation of spacing/sqrt(12).
   for (int axis = 0; axis < 3; ++axis)
   {
@@ -444,14 +476,11 @@ void Rendering::Run(
     progress);
 }
 
-void Rendering::RunMap(const PhantomPalette& palette, float* map, const ProgressCallback& progress)
+void Rendering::RunMaps(const PhantomPalette& palette, const std::array<float*, 3>& maps,
+  const ProgressCallback& progress)
 {
   this->Palette = palette;
   this->Vessels = false;
-  for (std::size_t i = 0; i < palette.layers.size(); ++i)
-  {
-    this->Around.Layers[i].value = palette.layers[i];
-  }
   const std::array<int, 6>& part = this->Grid.part;
   const std::int64_t slices = part[5] - part[4] + 1;
   const std::int64_t rows = part[3] - part[2] + 1;
@@ -464,15 +493,18 @@ void Rendering::RunMap(const PhantomPalette& palette, float* map, const Progress
         const Band band = this->RenderBand(number);
         const std::int64_t columns = part[1] - part[0] + 1;
         const std::int64_t plane = columns * (band.box[3] - band.box[2] + 1);
-        for (int j = band.box[2]; j <= band.box[3]; ++j)
+        for (int image = 0; image < palette.images; ++image)
         {
-          const float* in = band.Row(j, band.box[4]);
-          float* out = map + (j - part[2]) * slices + (band.box[4] - part[4]);
-          for (std::int64_t i = 0; i < columns; ++i)
+          for (int j = band.box[2]; j <= band.box[3]; ++j)
           {
-            for (std::int64_t k = 0; k <= band.box[5] - band.box[4]; ++k)
+            const float* in = band.Row(j, band.box[4], image);
+            float* out = maps[image] + (j - part[2]) * slices + (band.box[4] - part[4]);
+            for (std::int64_t i = 0; i < columns; ++i)
             {
-              out[i * rows * slices + k] = in[k * plane + i];
+              for (std::int64_t k = 0; k <= band.box[5] - band.box[4]; ++k)
+              {
+                out[i * rows * slices + k] = in[k * plane + i];
+              }
             }
           }
         }
@@ -495,7 +527,8 @@ Rendering::Band Rendering::RenderBand(std::int64_t number) const
   const int nx = part[1] - part[0] + 1;
   const int ny = band.box[3] - band.box[2] + 1;
   const int nz = band.box[5] - band.box[4] + 1;
-  band.signal.assign(static_cast<std::size_t>(nx) * ny * nz, 0.0f);
+  band.size = static_cast<std::size_t>(nx) * ny * nz;
+  band.signal.assign(band.size * this->Palette.images, 0.0f);
 
   Tile tile;
   Tissues::Row samples;
@@ -618,49 +651,55 @@ void Rendering::Paint(const Tile& tile, Tissues::Row& samples, Band& band) const
   const int ix1 = tile.box[1];
   const std::vector<TileLayers::Active>& layers = tile.layers.layers;
   const bool uniform = tile.Uniform();
-  const float uniformValue =
-    tile.weight * (layers.empty() ? this->Palette.background : layers.back().value);
+  const PhantomColour& even =
+    layers.empty() ? this->Palette.background : this->Palette.layers[layers.back().layer];
   for (int k = tile.box[4]; k <= tile.box[5]; ++k)
   {
     for (int j = tile.box[2]; j <= tile.box[3]; ++j)
     {
-      float* row = band.Row(j, k);
       if (uniform)
       {
-        for (int i = ix0; i <= ix1; ++i)
+        for (int image = 0; image < this->Palette.images; ++image)
         {
-          row[i - band.box[0]] += uniformValue;
+          float* row = band.Row(j, k, image);
+          for (int i = ix0; i <= ix1; ++i)
+          {
+            row[i - band.box[0]] += tile.weight * even[image];
+          }
         }
         continue;
       }
       this->PlaceSamples(tile, j, k, samples);
-      float painted[Tissues::Row::Longest];
+      PaintedRow painted;
       PhantomLumen::Sample vessel[Tissues::Row::Longest];
       this->PaintTissues(tile, samples, j, k, vessel, painted);
-      if (tile.OnlyTissues())
-      {
-        for (int i = ix0; i <= ix1; ++i)
-        {
-          row[i - band.box[0]] += tile.weight * painted[i - tile.base[0]];
-        }
-        continue;
-      }
-      for (int i = ix0; i <= ix1; ++i)
+      for (int i = ix0; i <= ix1 && !tile.OnlyTissues(); ++i)
       {
         const Vector3 world = this->Grid.grid.IndexToWorld(i, j, k);
-        float value = painted[i - tile.base[0]];
-        value = this->PaintVein(tile, world, value);
+        const int sample = i - tile.base[0];
+        if (!tile.vein.empty())
+        {
+          this->Mix(painted, sample, this->CoverVein(tile, world), this->Palette.vein);
+        }
         if (this->Vessels)
         {
+          float& value = painted[0][sample];
           value = this->PaintPlaques(tile, world, value);
-          value = this->PaintParts(tile, world, false, value);
+          this->PaintParts(tile, world, false, sample, painted);
           if (!tile.candidates.Empty())
           {
-            value = this->PaintVessel(this->Moments[tile.moment], vessel[i - tile.base[0]], value);
+            value = this->PaintVessel(this->Moments[tile.moment], vessel[sample], value);
           }
         }
-        value = this->PaintParts(tile, world, true, value);
-        row[i - band.box[0]] += tile.weight * value;
+        this->PaintParts(tile, world, true, sample, painted);
+      }
+      for (int image = 0; image < this->Palette.images; ++image)
+      {
+        float* row = band.Row(j, k, image);
+        for (int i = ix0; i <= ix1; ++i)
+        {
+          row[i - band.box[0]] += tile.weight * painted[image][i - tile.base[0]];
+        }
       }
     }
   }
@@ -703,15 +742,34 @@ void Rendering::PlaceSamples(const Tile& tile, int j, int k, Tissues::Row& sampl
 }
 
 /// Everything but the vessels' content; the coat of the coronary arteries goes below the great vessels.
+void Rendering::PaintLayer(
+  const TileLayers::Active& layer, const Tissues::Row& samples, PaintedRow& painted) const
+{
+  float coverage[Tissues::Row::Longest];
+  CoverRow(this->Around, layer, samples, coverage);
+  const PhantomColour& colour = this->Palette.layers[layer.layer];
+  for (int image = 0; image < this->Palette.images; ++image)
+  {
+    for (int i = 0; i < samples.count; ++i)
+    {
+      float& value = painted[image][i];
+      value += coverage[i] * (colour[image] - value);
+    }
+  }
+}
+
 void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int j, int k,
-  PhantomLumen::Sample* vessel, float* painted) const
+  PhantomLumen::Sample* vessel, PaintedRow& painted) const
 {
   const std::vector<TileLayers::Active>& layers = tile.layers.layers;
-  std::fill(painted, painted + samples.count, this->Palette.background);
+  for (int image = 0; image < this->Palette.images; ++image)
+  {
+    painted[image].fill(this->Palette.background[image]);
+  }
   std::size_t layer = 0;
   for (; layer < layers.size() && layers[layer].content != Tissues::Content::GreatVessel; ++layer)
   {
-    PaintRow(this->Around, layers[layer], samples, painted);
+    this->PaintLayer(layers[layer], samples, painted);
   }
   if (!tile.candidates.Empty() || !tile.walls.Empty())
   {
@@ -730,19 +788,18 @@ void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int 
       const AxisStep& step = this->Anatomy.steps[outer.step];
       const bool inMuscle = step.inMuscle;
       const bool bridged = inMuscle && this->Anatomy.intramural[step.vessel] == 0;
-      float& value = painted[i - tile.base[0]];
       const auto d = static_cast<float>(outer.distance);
       // In the map of a material muscle is not told from blood: there it coats all of the vessel.
-      if (!inMuscle || bridged || !this->Vessels || value > Muscle)
+      if (!inMuscle || bridged || !this->Vessels || painted[0][i - tile.base[0]] > Muscle)
       {
         const float coat = NormalIntegral::Of(inMuscle ? (2.0f - d) / 0.45f : (1.9f - d) / 0.35f);
-        value += coat * ((inMuscle ? this->Palette.muscle : this->Palette.fat) - value);
+        this->Mix(painted, i - tile.base[0], coat, this->Coat(inMuscle));
       }
     }
   }
   for (; layer < layers.size(); ++layer)
   {
-    PaintRow(this->Around, layers[layer], samples, painted);
+    this->PaintLayer(layers[layer], samples, painted);
   }
   if (!this->Vessels && !tile.candidates.Empty())
   {
@@ -752,21 +809,17 @@ void Rendering::PaintTissues(const Tile& tile, const Tissues::Row& samples, int 
       const PhantomLumen::Sample& sample = vessel[i - tile.base[0]];
       if (sample.step >= 0)
       {
-        const bool inMuscle = this->Anatomy.steps[sample.step].inMuscle;
-        float& value = painted[i - tile.base[0]];
-        value += NormalIntegral::Of(static_cast<float>(-sample.distance / this->MeanBlur)) *
-          ((inMuscle ? this->Palette.muscle : this->Palette.fat) - value);
+        this->Mix(painted, i - tile.base[0],
+          NormalIntegral::Of(static_cast<float>(-sample.distance / this->MeanBlur)),
+          this->Coat(this->Anatomy.steps[sample.step].inMuscle));
       }
     }
   }
 }
 
-float Rendering::PaintVein(const Tile& tile, const Vector3& world, float value) const
+/// Share of a place that the great cardiac vein covers.
+float Rendering::CoverVein(const Tile& tile, const Vector3& world) const
 {
-  if (tile.vein.empty())
-  {
-    return value;
-  }
   double nearest = this->Reach;
   double radius = 1.0;
   for (const Extra& piece : tile.vein)
@@ -781,10 +834,8 @@ float Rendering::PaintVein(const Tile& tile, const Vector3& world, float value) 
     }
   }
   const auto scale = static_cast<float>(1.0 / this->MeanBlur);
-  return value +
-    this->Disc(static_cast<float>(std::max(0.0, nearest + radius)) * scale,
-      static_cast<float>(radius) * scale) *
-    (this->Palette.vein - value);
+  return this->Disc(static_cast<float>(std::max(0.0, nearest + radius)) * scale,
+    static_cast<float>(radius) * scale);
 }
 
 float Rendering::PaintPlaques(const Tile& tile, const Vector3& world, float value) const
@@ -803,7 +854,8 @@ float Rendering::PaintPlaques(const Tile& tile, const Vector3& world, float valu
  * The lesions' parts, without metal or of metal alone. In the map of a material all of them are
  * their coat.
  */
-float Rendering::PaintParts(const Tile& tile, const Vector3& world, bool metal, float value) const
+void Rendering::PaintParts(
+  const Tile& tile, const Vector3& world, bool metal, int sample, PaintedRow& painted) const
 {
   for (std::size_t n = 0; n < tile.parts.size();)
   {
@@ -818,13 +870,11 @@ float Rendering::PaintParts(const Tile& tile, const Vector3& world, bool metal, 
     }
     if (coverage > 0.0f)
     {
-      const float colour = this->Vessels ? static_cast<float>(part.value)
-        : part.inMuscle                  ? this->Palette.muscle
-                                         : this->Palette.fat;
-      value += std::min(1.0f, coverage) * (colour - value);
+      const PhantomColour own{ static_cast<float>(part.value) };
+      this->Mix(
+        painted, sample, std::min(1.0f, coverage), this->Vessels ? own : this->Coat(part.inMuscle));
     }
   }
-  return value;
 }
 
 float Rendering::PaintVessel(
@@ -920,20 +970,14 @@ void PhantomImage::Render(const ImageGrid& grid, const std::array<int, 6>& part,
 }
 
 void PhantomImage::RenderMaps(const ImageGrid& grid, const PhantomMoment& moment,
-  const std::vector<PhantomPalette>& palettes, const std::vector<float*>& maps,
+  const PhantomPalette& palette, const std::array<float*, 3>& maps,
   const ProgressCallback& progress) const
 {
   RequireGrid(grid, grid.extent);
   const std::vector<PhantomMoment> moments{ moment };
   Rendering rendering(
     this->Settings, this->Anatomy, grid, grid.extent, moments, {}, Vector3::Zero());
-  rendering.PlaceCorners(this->Motion, PartOf(progress, 0.0, 0.5));
-  for (std::size_t p = 0; p < palettes.size(); ++p)
-  {
-    const double share = 0.5 / static_cast<double>(palettes.size());
-    rendering.RunMap(palettes[p], maps[p],
-      PartOf(
-        progress, 0.5 + share * static_cast<double>(p), 0.5 + share * static_cast<double>(p + 1)));
-  }
+  rendering.PlaceCorners(this->Motion, PartOf(progress, 0.0, 0.4));
+  rendering.RunMaps(palette, maps, PartOf(progress, 0.4, 1.0));
 }
 }

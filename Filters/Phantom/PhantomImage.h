@@ -10,14 +10,18 @@
 
 namespace coronary
 {
-/// What the parts of the anatomy are painted with: Hounsfield units, or the amount of a material.
+/// What something looks like in each of up to three images that are painted together.
+using PhantomColour = std::array<float, 3>;
+
+/// What the parts of the anatomy are painted with: Hounsfield units, or the amounts of materials.
 struct PhantomPalette
 {
-  std::vector<float> layers; ///< of Tissues::Layers; empty: their own values
-  float background = Tissues::Background;
-  float fat = Fat;
-  float muscle = Muscle;
-  float vein = 0.0f;
+  int images = 1;
+  std::vector<PhantomColour> layers; ///< of Tissues::Layers
+  PhantomColour background{ Tissues::Background };
+  PhantomColour fat{ Fat };
+  PhantomColour muscle{ Muscle };
+  PhantomColour vein{};
 };
 
 /// Everything of one moment inside the temporal window.
@@ -53,11 +57,10 @@ public:
   /**
    * Renders the whole grid at one moment, sharp but for the voxels' own size, without arteries and
    * plaques: where they are, there is their coat.
-   * @param maps  one for each palette: [i][j][k], k fastest
+   * @param maps  one for each of the palette's images: [i][j][k], k fastest
    */
-  void RenderMaps(const ImageGrid& grid, const PhantomMoment& moment,
-    const std::vector<PhantomPalette>& palettes, const std::vector<float*>& maps,
-    const ProgressCallback& progress) const;
+  void RenderMaps(const ImageGrid& grid, const PhantomMoment& moment, const PhantomPalette& palette,
+    const std::array<float*, 3>& maps, const ProgressCallback& progress) const;
 
   /// Standard deviation of the noise at time t, HU.
   double NoiseLevel(double t, double wholePhaseLost) const;

@@ -249,10 +249,11 @@ void DecideLayers(const Tissues& tissues, const Vector3& world, const Vector3& h
   double blur, TileLayers& result)
 {
   result.layers.clear();
-  for (const Tissues::Layer& layer : tissues.Layers)
+  for (std::size_t n = 0; n < tissues.Layers.size(); ++n)
   {
+    const Tissues::Layer& layer = tissues.Layers[n];
     const double sigma = std::sqrt(blur * blur + layer.softness * layer.softness);
-    TileLayers::Active active{ {}, {}, 0, layer.value, static_cast<float>(1.0 / sigma),
+    TileLayers::Active active{ {}, {}, 0, static_cast<int>(n), static_cast<float>(1.0 / sigma),
       layer.content };
     bool outside = false;
     for (int i = 0; i < layer.count && !outside; ++i)
@@ -278,10 +279,9 @@ void DecideLayers(const Tissues& tissues, const Vector3& world, const Vector3& h
   }
 }
 
-void PaintRow(
-  const Tissues& tissues, const TileLayers::Active& layer, const Tissues::Row& row, float* values)
+void CoverRow(
+  const Tissues& tissues, const TileLayers::Active& layer, const Tissues::Row& row, float* coverage)
 {
-  float coverage[Tissues::Row::Longest];
   std::fill(coverage, coverage + row.count, 1.0f);
   for (int s = 0; s < layer.count; ++s)
   {
@@ -292,10 +292,6 @@ void PaintRow(
     {
       coverage[i] *= NormalIntegralPolynomial(distance[i]);
     }
-  }
-  for (int i = 0; i < row.count; ++i)
-  {
-    values[i] += coverage[i] * (layer.value - values[i]);
   }
 }
 }

@@ -108,7 +108,7 @@ struct TileLayers
     int shapes[4];
     bool complement[4];
     int count; ///< 0: covers the whole tile
-    float value;
+    int layer; ///< of Tissues::Layers
     float inverseBlur;
     Tissues::Content content;
   };
@@ -122,9 +122,9 @@ struct TileLayers
 void DecideLayers(const Tissues& tissues, const Vector3& world, const Vector3& heart, double ball,
   double blur, TileLayers& result);
 
-/// Paints one layer over the values of a row.
-void PaintRow(
-  const Tissues& tissues, const TileLayers::Active& layer, const Tissues::Row& row, float* values);
+/// Share of each sample of a row that one layer covers.
+void CoverRow(const Tissues& tissues, const TileLayers::Active& layer, const Tissues::Row& row,
+  float* coverage);
 }
 
 #endif

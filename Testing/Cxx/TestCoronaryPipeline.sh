@@ -276,7 +276,7 @@ END
   for file in phase_00.mha phase_01.mha truth/surface_01.vtp scan.json series.json; do
     [ -s "made/$file" ] || fail "no $file"
   done
-  [ "$(find made -type f | wc -l)" -eq 13 ] || fail "other files than expected: $(find made)"
+  [ "$(find made -type f | wc -l)" -eq 17 ] || fail "other files than expected: $(find made)"
   for text in '"channels": 111' '"kernel": "standard"' '"temporal_resolution_ms": 175.0' '"rr_ms": 480.0' '"half_scan_mAs"'; do
     expect_text made/scan.json "$text"
   done

@@ -12,6 +12,7 @@
 #include "VolumeFile.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <Eigen/Geometry>
 
@@ -324,6 +325,43 @@ TEST(MetaImage, WrittenImagesComeBackWithTheirGeometry)
   std::vector<float> part(2);
   series.Source(0).Read(0, { 1, 2, 2, 2, 1, 1 }, part.data());
   EXPECT_EQ(part, std::vector<float>({ reals[21], reals[22] }));
+}
+
+TEST(MetaImage, DamageIsFoundThatMakesOtherData)
+{
+  // Data that can be decoded, and more of it than voxels: only the checksum behind tells.
+  const TemporaryFolder folder;
+  ImageGrid grid;
+  grid.extent = { 0, 3, 0, 2, 0, 1 };
+  const std::vector<short> values(24, 7);
+  const std::vector<unsigned char> more(100, 7);
+  std::vector<unsigned char> packed(200);
+  uLongf size = packed.size();
+  ASSERT_EQ(compress(packed.data(), &size, more.data(), more.size()), Z_OK);
+  const std::string path = folder / "c.mha";
+  WriteMetaImage(path, grid, values.data(), true);
+  const Bytes whole = ReadBytes(path);
+  const std::string text(whole.begin(), whole.end());
+  const std::string last = "ElementDataFile = LOCAL\n";
+  Bytes bytes(
+    whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(text.find(last) + last.size()));
+  bytes.insert(bytes.end(), packed.begin(), packed.begin() + static_cast<std::ptrdiff_t>(size));
+  std::vector<float> read(24);
+  const auto message = [&]
+  {
+    WriteBytes(path, bytes);
+    return MessageOf(
+      [&]
+      {
+        const GatedSeries series({ path });
+        series.Source(0).Read(0, series.Grid().extent, read.data());
+      });
+  };
+  EXPECT_EQ(message(), "no exception");
+  bytes.back() = static_cast<unsigned char>(bytes.back() ^ 1U);
+  ExpectMessage(message(), { "c.mha", "damaged", "data check" });
+  bytes.resize(bytes.size() - 2);
+  ExpectMessage(message(), { "c.mha", "damaged", "end is missing" });
 }
 
 TEST(MetaImage, WritingLeavesNothingHalfDone)
