@@ -333,13 +333,12 @@ TEST(MetaImage, DamageIsFoundThatMakesOtherData)
   const TemporaryFolder folder;
   ImageGrid grid;
   grid.extent = { 0, 3, 0, 2, 0, 1 };
-  const std::vector<short> values(24, 7);
   const std::vector<unsigned char> more(100, 7);
   std::vector<unsigned char> packed(200);
   uLongf size = packed.size();
   ASSERT_EQ(compress(packed.data(), &size, more.data(), more.size()), Z_OK);
   const std::string path = folder / "c.mha";
-  WriteMetaImage(path, grid, values.data(), true);
+  WriteMetaImage(path, grid, std::vector<short>(24, 7).data(), true);
   const Bytes whole = ReadBytes(path);
   const std::string text(whole.begin(), whole.end());
   const std::string last = "ElementDataFile = LOCAL\n";
