@@ -258,7 +258,8 @@ std::vector<GatedStack> ScannerSchedule::Stacks(double phase) const
     }
     if (this->Speed <= 0.0)
     {
-      stack.centre = this->Top - this->Step * (first / step);
+      const int slab = first / step;
+      stack.centre = this->Top - this->Step * slab;
     }
     stack.middle = moments.front();
     stacks.push_back(std::move(stack));

@@ -31,15 +31,15 @@ struct ScannerSettings
   double sourceToAxis = 541.0;
   double sourceToDetector = 949.075;
   int channels = 888; ///< detector columns
+  int rows = 64;
   double channelPitch = 1.0239;
   double channelOffset = 0.25; ///< of the arc's middle from the central ray, columns
-  int rows = 64;
-  double rowPitch = 1.0988; ///< at the detector
-  double fill = 0.85;       ///< active share of a cell's width and height
+  double rowPitch = 1.0988;    ///< at the detector
+  double fill = 0.85;          ///< active share of a cell's width and height
   double focalSpot = 0.9;
   int viewsPerTurn = 984;
-  double turnTime = 0.35;
   int sources = 1; ///< two stand at a right angle
+  double turnTime = 0.35;
 
   // Tube.
   double kilovolts = 120.0;
@@ -53,11 +53,11 @@ struct ScannerSettings
   // Time.
   double pitch = 0.0;          ///< table feed of a turn over the rows' height; 0: step and shoot
   int segments = 1;            ///< beats that share the angles of a half scan
+  int extrasystole = 0;        ///< beat of the scan that is cut short, counted from 1; 0: none
   double overlap = 0.125;      ///< share of a slab that the next one sees again; of a beat's feed
   double beatDeviation = 0.03; ///< relative standard deviation of the R-R intervals
   double heartShift = 0.87;    ///< standard deviation of a beat's shift along each axis
   double breathing = 0.0;      ///< towards the feet over the whole scan
-  int extrasystole = 0;        ///< beat of the scan that is cut short, counted from 1; 0: none
   double contrastLoss = 0.0;   ///< share of the iodine from beat to beat
 
   // Reconstruction.
