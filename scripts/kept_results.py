@@ -4,7 +4,9 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
+import sys
 import time
 
 
@@ -36,6 +38,17 @@ def run(words, log=None, environment=None):
             raise Failed("%s: %s" % (os.path.basename(words[0]), lines[-1] if lines else "exit code %d" % child.returncode))
     return {"seconds": time.monotonic() - start, "cpu_seconds": usage.ru_utime + usage.ru_stime,
             "peak_mb": usage.ru_maxrss / 1024.0}
+
+
+def as_program(main, name):
+    """Runs main; a failure is one line and exit code 1, an interruption 130."""
+    try:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that the program that runs is ended, too
+        main()
+    except Failed as failure:
+        sys.exit("%s: %s" % (name, failure))
+    except KeyboardInterrupt:
+        sys.exit(130)
 
 
 def digest(*parts):

@@ -11,7 +11,6 @@ import argparse
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
 
@@ -265,10 +264,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that the program that runs is ended, too
-        main()
-    except Failed as failure:
-        sys.exit("validate-peers: %s" % failure)
-    except KeyboardInterrupt:
-        sys.exit(130)
+    kept_results.as_program(main, "validate-peers")

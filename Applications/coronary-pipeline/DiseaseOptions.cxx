@@ -120,6 +120,18 @@ PhantomGraft GraftOf(const Json& json, const std::string& where)
   return graft;
 }
 
+/// Adds what `read` makes of each entry of a list.
+template <typename Entry>
+void AddList(const Json& list, const std::string& key,
+  Entry (*read)(const Json& json, const std::string& where), std::vector<Entry>& entries)
+{
+  std::size_t number = 0;
+  for (const Json& one : ListOf(list, key))
+  {
+    entries.push_back(read(one, key + "[" + std::to_string(number++) + "]"));
+  }
+}
+
 void AddJson(const Json& json, PhantomSettings& settings)
 {
   Require(json.is_object(), "it is not a JSON object");
@@ -135,19 +147,11 @@ void AddJson(const Json& json, PhantomSettings& settings)
     }
     else if (key == "lesions")
     {
-      for (const Json& one : ListOf(value, key))
-      {
-        const std::size_t n = &one - &value.front();
-        disease.lesions.push_back(LesionOf(one, "lesions[" + std::to_string(n) + "]"));
-      }
+      AddList(value, key, LesionOf, disease.lesions);
     }
     else if (key == "grafts")
     {
-      for (const Json& one : ListOf(value, key))
-      {
-        const std::size_t n = &one - &value.front();
-        disease.grafts.push_back(GraftOf(one, "grafts[" + std::to_string(n) + "]"));
-      }
+      AddList(value, key, GraftOf, disease.grafts);
     }
     else if (key == "origin")
     {

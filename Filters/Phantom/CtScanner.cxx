@@ -49,7 +49,6 @@ struct CtScanner::Internals
     : Settings(settings)
     , Anatomy(anatomy)
     , Grid(grid)
-    , Phases(phases)
     , Variants(variants)
     , Schedule(
         settings, this->Height(grid.extent[4]), this->Height(grid.extent[5]), anatomy.CycleLength())
@@ -60,6 +59,10 @@ struct CtScanner::Internals
     if (this->Variants.empty())
     {
       this->Variants.push_back({ settings.kernel, settings.imageNoise });
+    }
+    for (const double phase : phases)
+    {
+      this->Stacks.push_back(this->Schedule.Stacks(phase));
     }
     for (const ScanVariant& variant : this->Variants)
     {
@@ -134,9 +137,9 @@ struct CtScanner::Internals
   const ScannerSettings Settings;
   const ScannedAnatomy& Anatomy;
   const ImageGrid Grid;
-  const std::vector<double> Phases;
   std::vector<ScanVariant> Variants;
   const ScannerSchedule Schedule;
+  std::vector<std::vector<GatedStack>> Stacks; ///< of each phase
   const ScannerPhysics Physics;
   std::vector<HalfScanReconstruction> Reconstructions;
   std::vector<double> Currents; ///< share of the settings' current
@@ -163,9 +166,9 @@ bool CtScanner::Internals::Slices(
 std::vector<Job> CtScanner::Internals::Jobs(const ScanStore& store) const
 {
   std::vector<Job> jobs;
-  for (std::size_t p = 0; p < this->Phases.size(); ++p)
+  for (std::size_t p = 0; p < this->Stacks.size(); ++p)
   {
-    const std::vector<GatedStack> stacks = this->Schedule.Stacks(this->Phases[p]);
+    const std::vector<GatedStack>& stacks = this->Stacks[p];
     for (std::size_t n = 0; n < stacks.size(); ++n)
     {
       bool done = true;
@@ -204,7 +207,7 @@ void CtScanner::Internals::FindCurrents(const ProgressCallback& progress)
       [](const ScanVariant& variant) { return variant.imageNoise > 0.0; });
   if (wanted)
   {
-    const std::vector<GatedStack> stacks = this->Schedule.Stacks(this->Phases.front());
+    const std::vector<GatedStack>& stacks = this->Stacks.front();
     const auto stack = std::min_element(stacks.begin(), stacks.end(),
       [&](const GatedStack& a, const GatedStack& b)
       { return std::abs(a.centre - middle) < std::abs(b.centre - middle); });
@@ -226,8 +229,7 @@ void CtScanner::Internals::FindCurrents(const ProgressCallback& progress)
           ScannerView stand = this->Stand({ view.number, view.tube });
           stand.axis[2] = stack->centre;
           patient.Project(stand, state, paths);
-          this->Physics.Transmit(
-            { paths[0].data(), paths[1].data(), paths[2].data() }, transmitted);
+          this->Physics.Transmit(paths, transmitted);
           for (std::size_t v = 0; v < this->Variants.size(); ++v)
           {
             const std::vector<double> weights = this->Reconstructions[v].AxisWeights(view.position);
@@ -288,7 +290,7 @@ void CtScanner::Internals::TakeViews(const std::vector<ViewKey>& views, ScannedP
       {
         const PatientState state = this->Patient(this->Schedule.Seconds(views[n].first));
         patient.Project(this->Stand(views[n]), state, paths);
-        this->Physics.Transmit({ paths[0].data(), paths[1].data(), paths[2].data() }, transmitted);
+        this->Physics.Transmit(paths, transmitted);
         std::vector<std::vector<float>>& levels = taken.at(views[n]);
         for (std::size_t level = 0; level < levels.size(); ++level)
         {
@@ -429,7 +431,7 @@ void CtScanner::Image(std::size_t phase, std::size_t variant, const ScanStore& s
   const std::array<int, 6>& e = data.Grid.extent;
   const std::size_t plane = static_cast<std::size_t>(e[1] - e[0] + 1) * (e[3] - e[2] + 1);
   std::vector<float> image(plane * (e[5] - e[4] + 1));
-  const std::vector<GatedStack> stacks = data.Schedule.Stacks(data.Phases[phase]);
+  const std::vector<GatedStack>& stacks = data.Stacks[phase];
   for (std::size_t n = 0; n < stacks.size(); ++n)
   {
     std::array<int, 2> slices;
@@ -464,7 +466,7 @@ std::vector<ScannedStack> CtScanner::Stacks(std::size_t phase) const
 {
   const Internals& data = *this->Data;
   std::vector<ScannedStack> result;
-  for (GatedStack& stack : data.Schedule.Stacks(data.Phases[phase]))
+  for (const GatedStack& stack : data.Stacks[phase])
   {
     const PatientState middle = data.Patient(stack.middle);
     ScannedStack scanned;
@@ -484,7 +486,7 @@ std::vector<ScannedStack> CtScanner::Stacks(std::size_t phase) const
       weights += view.weight;
     }
     scanned.current /= weights;
-    scanned.stack = std::move(stack);
+    scanned.stack = stack;
     result.push_back(std::move(scanned));
   }
   return result;

@@ -1,9 +1,11 @@
 #include "EdgeSmoothing.h"
 
+#include "Median.h"
 #include "PartialProgress.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace coronary
 {
@@ -97,13 +99,7 @@ double ImageNoise(const std::vector<float>& image, const std::array<int, 3>& siz
       }
     }
   }
-  if (deviations.empty())
-  {
-    return 0.0;
-  }
-  const auto quartile = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 4);
-  std::nth_element(deviations.begin(), quartile, deviations.end());
-  return *quartile;
+  return QuantileOf(std::move(deviations), 0.25);
 }
 
 void SmoothWithinEdges(std::vector<float>& image, const std::array<int, 3>& size, double share,

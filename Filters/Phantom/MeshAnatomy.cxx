@@ -511,6 +511,5 @@ void MeshAnatomy::Render(const PatientState& state, const ImageGrid& grid, Mater
       }
     },
     progress);
-  volume.FindColumns();
 }
 }

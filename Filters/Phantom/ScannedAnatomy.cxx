@@ -65,7 +65,6 @@ void ScannedPhantom::Render(const PatientState& state, const ImageGrid& grid,
       return std::array<float, 3>{ amounts[0], amounts[1], amounts[2] };
     },
     { volume.maps[0].data(), volume.maps[1].data(), volume.maps[2].data() }, progress);
-  volume.FindColumns();
 }
 
 std::vector<ScannedTube> ScannedPhantom::Tubes(const PatientState& state) const

@@ -33,7 +33,8 @@ public:
   /// Around all that moves; its height does not count. What moves beyond it is seen at rest.
   virtual CoronaryPhantom::Box Moving() const { return this->Body(); }
 
-  /// All matter, but what Tubes() and Balls() have, in voxels.
+  /// Fills the maps with all matter, but what Tubes() and Balls() have. Who projects them calls
+  /// FindColumns().
   virtual void Render(const PatientState& state, const ImageGrid& grid, MaterialVolume& volume,
     const ProgressCallback& progress) const = 0;
 

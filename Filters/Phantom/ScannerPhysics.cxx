@@ -281,8 +281,7 @@ void ScannerPhysics::Blur(std::vector<float>& values) const
   }
 }
 
-void ScannerPhysics::Transmit(
-  const std::array<const float*, BasisMaterials>& paths, TransmittedView& view) const
+void ScannerPhysics::Transmit(const ViewPaths& paths, TransmittedView& view) const
 {
   const ScannerSettings& s = this->Settings;
   const int rows = s.rows;
@@ -297,7 +296,7 @@ void ScannerPhysics::Transmit(
   {
     const std::size_t first = static_cast<std::size_t>(c) * rows;
     const auto path = [&](int m)
-    { return Eigen::Map<const Eigen::ArrayXf>(paths[m] + first, rows); };
+    { return Eigen::Map<const Eigen::ArrayXf>(paths[m].data() + first, rows); };
     mean.setZero();
     variance.setZero();
     const bool iodine = path(1).maxCoeff() > 0.0f;

@@ -19,6 +19,8 @@ namespace coronary
 constexpr int BasisMaterials = 3;
 /// How much of each there is at a place, or along a path (times mm).
 using MaterialAmounts = Eigen::Array3f;
+/// Path lengths of a view's rays, in mm times amount: [column][row] for each material.
+using ViewPaths = std::array<std::vector<float>, BasisMaterials>;
 
 /**
  * Tungsten tube: Kramers' law with the anode's own absorption, and the K lines above 69.5 kV whose
@@ -67,8 +69,7 @@ public:
   double Photons(int column, const MaterialAmounts& path) const;
 
   /// What comes through the patient in a view: intensities, blurred by focal spot and cells.
-  /// @param paths  of each basis material, [column][row]
-  void Transmit(const std::array<const float*, BasisMaterials>& paths, TransmittedView& view) const;
+  void Transmit(const ViewPaths& paths, TransmittedView& view) const;
 
   /**
    * Turns it into line integrals of an ideal scanner in water, in units of mm of water: noise,

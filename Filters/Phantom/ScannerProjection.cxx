@@ -220,6 +220,29 @@ private:
   std::vector<float> Totals;
 };
 
+Vector3 SourceOf(const ScannerSettings& s, const ScannerView& view)
+{
+  return view.axis +
+    Vector3(s.sourceToAxis * std::cos(view.angle), s.sourceToAxis * std::sin(view.angle), 0.0);
+}
+
+/// Where the ray through a place meets the detector.
+struct DetectorPlace
+{
+  double way; ///< of the place from the tube in the plane, mm
+  double column;
+  double row;
+};
+
+/// @param to  from the tube to the place, mm
+DetectorPlace PlaceOf(const ScannerSettings& s, const ScannerView& view, const Vector3& to)
+{
+  const double way = std::max(1.0, std::hypot(to[0], to[1]));
+  const double off = std::remainder(std::atan2(to[1], to[0]) - view.angle - Pi, 2.0 * Pi);
+  return { way, off / s.ColumnPitch() + s.MiddleColumn(),
+    to[2] * (s.sourceToDetector / (s.rowPitch * way)) + 0.5 * (s.rows - 1) };
+}
+
 /// Range of sub-rays around the shadow of a ball.
 struct Shadow
 {
@@ -366,8 +389,7 @@ void ScannerProjector::AddThin(
   const ScannedTube& tube, const ScannerView& view, ViewPaths& paths) const
 {
   const ScannerSettings& s = this->Settings;
-  const Vector3 source = view.axis +
-    Vector3(s.sourceToAxis * std::cos(view.angle), s.sourceToAxis * std::sin(view.angle), 0.0);
+  const Vector3 source = SourceOf(s, view);
   const double length = (tube.end - tube.start).norm();
   const int steps = std::max(1, static_cast<int>(std::ceil(length / ThinStep)));
   for (int n = 0; n < steps; ++n)
@@ -375,18 +397,16 @@ void ScannerProjector::AddThin(
     const double u = (n + 0.5) / steps;
     const double radius = (1.0 - u) * tube.startRadius + u * tube.endRadius;
     const Vector3 to = (1.0 - u) * tube.start + u * tube.end - source;
-    const double way = std::max(1.0, std::hypot(to[0], to[1]));
-    const double off = std::remainder(std::atan2(to[1], to[0]) - view.angle - Pi, 2.0 * Pi);
-    const double scale = s.sourceToDetector / way;
-    const long column =
-      std::lround(off / s.ColumnPitch() + 0.5 * (s.channels - 1) + s.channelOffset);
-    const long row = std::lround(to[2] * scale / s.rowPitch + 0.5 * (s.rows - 1));
+    const DetectorPlace place = PlaceOf(s, view, to);
+    const long column = std::lround(place.column);
+    const long row = std::lround(place.row);
     if (column < 0 || column >= s.channels || row < 0 || row >= s.rows)
     {
       continue;
     }
     // The beam's section across the plane's ray; the ray itself is longer by as much as it rises.
-    const double section = s.channelPitch * s.rowPitch / (scale * scale) * way / to.norm();
+    const double scale = s.sourceToDetector / place.way;
+    const double section = s.channelPitch * s.rowPitch / (scale * scale) * place.way / to.norm();
     const auto path = static_cast<float>(Pi * radius * radius * length / steps / section);
     const std::size_t cell = static_cast<std::size_t>(column) * s.rows + row;
     for (int m = 0; m < BasisMaterials; ++m)
@@ -400,8 +420,7 @@ void ScannerProjector::Add(const std::vector<ScannedTube>& tubes,
   const std::vector<ScannedBall>& balls, const ScannerView& view, ViewPaths& paths) const
 {
   const ScannerSettings& s = this->Settings;
-  const Vector3 source = view.axis +
-    Vector3(s.sourceToAxis * std::cos(view.angle), s.sourceToAxis * std::sin(view.angle), 0.0);
+  const Vector3 source = SourceOf(s, view);
   const int columns = SubRays * s.channels;
   const int rows = SubRays * s.rows;
   // Sub-ray n of a line of cells is at cell n / SubRays, off its middle.
@@ -410,12 +429,12 @@ void ScannerProjector::Add(const std::vector<ScannedTube>& tubes,
   const auto shadowOf = [&](const Vector3& centre, double radius, Shadow& shadow)
   {
     const Vector3 to = centre - source;
-    const double way = std::max(1.0, std::hypot(to[0], to[1]));
-    const double off = std::remainder(std::atan2(to[1], to[0]) - view.angle - Pi, 2.0 * Pi);
-    const double column = subOf(off / s.ColumnPitch() + 0.5 * (s.channels - 1) + s.channelOffset);
+    const DetectorPlace place = PlaceOf(s, view, to);
+    const double way = place.way;
+    const double column = subOf(place.column);
     const double width = SubRays * std::asin(std::min(1.0, radius / way)) / s.ColumnPitch() + 1.0;
     const double scale = s.sourceToDetector / (s.rowPitch * way);
-    const double row = subOf(to[2] * scale + 0.5 * (s.rows - 1));
+    const double row = subOf(place.row);
     // What is nearer has a wider shadow, and lies higher.
     const double near = way / std::max(1.0, way - radius);
     const double height =

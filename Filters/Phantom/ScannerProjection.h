@@ -53,9 +53,6 @@ struct ScannedBall
   MaterialAmounts difference;
 };
 
-/// Path lengths of a view's rays, in mm times amount: [column][row] for each material.
-using ViewPaths = std::array<std::vector<float>, BasisMaterials>;
-
 class ScannerProjector
 {
 public:

@@ -152,7 +152,7 @@ std::array<int, 2> HalfScanReconstruction::Columns(const Vector3& axis, const Im
     }
   }
   const double reach = std::asin(std::min(1.0, radius / s.sourceToAxis)) / s.ColumnPitch();
-  const double middle = 0.5 * (s.channels - 1) + s.channelOffset;
+  const double middle = s.MiddleColumn();
   return { std::clamp(static_cast<int>(middle - reach), 0, s.channels - 1),
     std::clamp(static_cast<int>(middle + reach) + 1, 0, s.channels - 1) };
 }
@@ -160,7 +160,7 @@ std::array<int, 2> HalfScanReconstruction::Columns(const Vector3& axis, const Im
 std::vector<double> HalfScanReconstruction::AxisWeights(int view) const
 {
   const ScannerSettings& s = this->Settings;
-  const double middle = 0.5 * (s.channels - 1) + s.channelOffset;
+  const double middle = s.MiddleColumn();
   const int before = std::clamp(static_cast<int>(middle), 0, s.channels - 2);
   const double after = middle - before;
   // A slice lies anywhere between two rows.
@@ -195,12 +195,12 @@ void HalfScanReconstruction::BackProject(const std::vector<FilteredView>& views,
     {
       for (std::int64_t j = first; j < last; ++j)
       {
-        kernels.backProject({ view.values.data(), s.channels, s.rows,
-          0.5 * (s.channels - 1) + s.channelOffset, s.ColumnPitch(),
-          { std::cos(view.angle), std::sin(view.angle) }, s.sourceToAxis, corner[0] - axis[0],
-          grid.spacing[0], corner[1] + static_cast<double>(j) * grid.spacing[1] - axis[1],
-          corner[2] - view.height, grid.spacing[2], s.sourceToDetector / s.rowPitch, nx, nz,
-          line.data(), values + j * nx * nz });
+        kernels.backProject(
+          { view.values.data(), s.channels, s.rows, s.MiddleColumn(), s.ColumnPitch(),
+            { std::cos(view.angle), std::sin(view.angle) }, s.sourceToAxis, corner[0] - axis[0],
+            grid.spacing[0], corner[1] + static_cast<double>(j) * grid.spacing[1] - axis[1],
+            corner[2] - view.height, grid.spacing[2], s.sourceToDetector / s.rowPitch, nx, nz,
+            line.data(), values + j * nx * nz });
       }
     }
     const auto turn = static_cast<float>(s.ViewAngle());

@@ -79,6 +79,8 @@ struct ScannerSettings
   {
     return (column - 0.5 * (this->channels - 1) - this->channelOffset) * this->ColumnPitch();
   }
+  /// Column of the central ray.
+  double MiddleColumn() const { return 0.5 * (this->channels - 1) + this->channelOffset; }
   /// Height of a row on the detector over the central plane, mm.
   double RowHeight(double row) const { return (row - 0.5 * (this->rows - 1)) * this->rowPitch; }
   /// Greatest angle between a ray and the central ray, rad.

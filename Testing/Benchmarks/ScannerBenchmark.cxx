@@ -48,7 +48,7 @@ struct Scene
     view.axis[2] = -20.0;
     patient.Prepare(state, view.axis[2]);
     patient.Project(view, state, paths);
-    physics.Transmit({ paths[0].data(), paths[1].data(), paths[2].data() }, transmitted);
+    physics.Transmit(paths, transmitted);
     line.resize(paths[0].size());
     physics.Detect(transmitted, 1.0, 5, line.data());
   }
@@ -99,8 +99,7 @@ void Transmit(benchmark::State& state)
   TransmittedView transmitted;
   for (auto _ : state)
   {
-    scene.physics.Transmit(
-      { scene.paths[0].data(), scene.paths[1].data(), scene.paths[2].data() }, transmitted);
+    scene.physics.Transmit(scene.paths, transmitted);
     benchmark::DoNotOptimize(transmitted.share.data());
   }
 }

@@ -1,5 +1,6 @@
 // The simulated CT scanner against closed forms: spectrum and materials, line integrals, reconstruction,
 // slabs and beats, and the phantom through all of it.
+#include "CoarseScanner.h"
 #include "CtScanner.h"
 #include "EdgeSmoothing.h"
 #include "ScannerReconstruction.h"
@@ -21,19 +22,6 @@ namespace
 constexpr double Pi = 3.14159265358979323846;
 constexpr double FirstAngle = 0.3; ///< of the tube in the first view, rad
 
-/// The VCT with cells `factor` times as wide and high, and as many fewer views.
-ScannerSettings Coarse(int factor)
-{
-  ScannerSettings s;
-  s.channels /= factor;
-  s.channelPitch *= factor;
-  s.rows /= factor;
-  s.rowPitch *= factor;
-  s.viewsPerTurn = s.viewsPerTurn / factor / 4 * 4;
-  s.noise = 0;
-  return s;
-}
-
 /// Tubes along z that may move from view to view, reconstructed in the central plane; 1 is water.
 std::vector<float> Reconstruct(const ScannerSettings& settings,
   const std::function<std::vector<ScannedTube>(int view)>& tubesOf, const ImageGrid& grid)
@@ -50,7 +38,7 @@ std::vector<float> Reconstruct(const ScannerSettings& settings,
     projector.Clear(paths);
     projector.Add(tubesOf(v), {}, { angle, Vector3::Zero() }, paths);
     std::vector<float> line(paths[0].size());
-    physics.Transmit({ paths[0].data(), paths[1].data(), paths[2].data() }, transmitted);
+    physics.Transmit(paths, transmitted);
     physics.Detect(transmitted, 1.0, MixBits(static_cast<std::uint64_t>(v)), line.data());
     FilteredView& view =
       views.emplace_back(FilteredView{ angle, 0.0, std::vector<float>(line.size()) });
@@ -182,7 +170,7 @@ TEST(CtScanner, PoissonNumbersHaveTheirMeanAndVariance)
 
 TEST(CtScanner, WaterPathsAreCorrected)
 {
-  ScannerSettings settings = Coarse(8);
+  ScannerSettings settings = CoarseScanner(8);
   for (const double kilovolts : { 70.0, 120.0, 140.0 })
   {
     settings.kilovolts = kilovolts;
@@ -221,7 +209,7 @@ TEST(CtScanner, BloodHardensTheBeam)
 
 TEST(CtScanner, TubesAndBallsAreExact)
 {
-  const ScannerSettings settings = Coarse(4);
+  const ScannerSettings settings = CoarseScanner(4);
   const ScannerProjector projector(settings);
   const ScannerView view{ 0.7, Vector3(3.0, -2.0, 10.0) };
   const Vector3 centre(20.0, -15.0, 14.0);
@@ -316,7 +304,7 @@ TEST(CtScanner, MetalIsSteel)
 
 TEST(CtScanner, WhatOverlapsCountsOnce)
 {
-  const ScannerSettings settings = Coarse(4);
+  const ScannerSettings settings = CoarseScanner(4);
   const ScannerProjector projector(settings);
   const ScannerView view;
   const MaterialAmounts one(1.0f, 0.0f, 0.0f);
@@ -339,7 +327,7 @@ TEST(CtScanner, WhatOverlapsCountsOnce)
 
 TEST(CtScanner, VoxelsAreProjectedAsFineAsTheyAre)
 {
-  const ScannerSettings settings = Coarse(4);
+  const ScannerSettings settings = CoarseScanner(4);
   const ScannerProjector projector(settings);
   const Vector3 centre(8.0, -5.0, 2.0);
   constexpr double radius = 25.0;
@@ -389,7 +377,7 @@ TEST(CtScanner, VoxelsAreProjectedAsFineAsTheyAre)
 
 TEST(CtScanner, WeightsOfARayFromBothSidesSumToOne)
 {
-  const ScannerSettings settings = Coarse(2);
+  const ScannerSettings settings = CoarseScanner(2);
   const HalfScanReconstruction reconstruction(settings, settings.kernel);
   const int count = settings.HalfScanViews();
   int pairs = 0;
@@ -418,7 +406,7 @@ TEST(CtScanner, WeightsOfARayFromBothSidesSumToOne)
 
 TEST(CtScanner, WaterIsFlat)
 {
-  ScannerSettings settings = Coarse(4);
+  ScannerSettings settings = CoarseScanner(4);
   settings.rows = 2;
   const ImageGrid grid = Plane(64, 4.0);
   for (const auto kernel :
@@ -577,7 +565,7 @@ TEST(CtScanner, WhatMovesIsASumOverItsPlaces)
 
 TEST(CtScanner, NoiseFollowsKernelAndDose)
 {
-  ScannerSettings settings = Coarse(4);
+  ScannerSettings settings = CoarseScanner(4);
   settings.rows = 2;
   settings.noise = 1;
   const ImageGrid grid = Plane(64, 1.7);
@@ -765,7 +753,7 @@ TEST(CtScanner, WaysOfScanningAgreeOnWhatIsStill)
   for (const auto& [pitch, segments, sources] : { std::tuple{ 0.0, 1, 1 }, std::tuple{ 0.2, 1, 1 },
          std::tuple{ 0.0, 2, 1 }, std::tuple{ 0.15, 2, 1 }, std::tuple{ 0.2, 1, 2 } })
   {
-    ScannerSettings settings = Coarse(8);
+    ScannerSettings settings = CoarseScanner(8);
     settings.pitch = pitch;
     settings.segments = segments;
     settings.sources = sources;
@@ -810,7 +798,7 @@ TEST(CtScanner, TheCurrentIsThatOfTheWantedNoise)
 {
   const StillCylinder anatomy;
   const ImageGrid grid = Plane(48, 0.8);
-  ScannerSettings settings = Coarse(4);
+  ScannerSettings settings = CoarseScanner(4);
   settings.rows = 4;
   settings.noise = 1;
   settings.anatomySpacing = 4.0;
@@ -927,7 +915,7 @@ TEST(CtScanner, SeesTheHeart)
   phantom.Render(grid, grid.extent, 0.7, formula.data());
   for (const int sources : { 1, 2 })
   {
-    ScannerSettings settings = Coarse(6);
+    ScannerSettings settings = CoarseScanner(6);
     settings.sources = sources;
     settings.anatomySpacing = 3.0;
     settings.anatomyStep = 0.06;

@@ -1,4 +1,5 @@
 // Anatomy of closed surfaces for the scanner against closed forms: masses, line integrals, HU, motion.
+#include "CoarseScanner.h"
 #include "CtScanner.h"
 #include "MeshAnatomy.h"
 
@@ -168,20 +169,8 @@ MaterialVolume Rendered(
 {
   MaterialVolume volume;
   anatomy.Render(state, grid, volume, {});
+  volume.FindColumns();
   return volume;
-}
-
-/// The VCT with cells `factor` times as wide and high, without noise.
-ScannerSettings Coarse(int factor)
-{
-  ScannerSettings s;
-  s.channels /= factor;
-  s.channelPitch *= factor;
-  s.rows /= factor;
-  s.rowPitch *= factor;
-  s.viewsPerTurn = s.viewsPerTurn / factor / 4 * 4;
-  s.noise = 0;
-  return s;
 }
 }
 
@@ -217,7 +206,7 @@ TEST(MeshAnatomy, LineIntegralsAreThoseOfABall)
   const Vector3 centre(20.0, -15.0, 4.0);
   constexpr double radius = 12.0;
   const MeshAnatomy anatomy({ Ball(centre, radius, 5) }, 0.8, EmptyTrunk());
-  const ScannerSettings settings = Coarse(4);
+  const ScannerSettings settings = CoarseScanner(4);
   const ScannerProjector projector(settings);
   ImageGrid grid = Voxels(0.5, 16.0);
   grid.origin += centre;
@@ -326,7 +315,7 @@ TEST(MeshAnatomy, TheScannerSeesHounsfieldUnits)
   trunk.depth = 180.0;
   trunk.material = MaterialOf(tissue, "water", {}, "HU");
   const MeshAnatomy anatomy({ blood, lung }, 0.8, trunk);
-  ScannerSettings settings = Coarse(6);
+  ScannerSettings settings = CoarseScanner(6);
   settings.anatomySpacing = 2.0;
   settings.anatomyStep = 0.1;
   settings.heartShift = 0.0;
