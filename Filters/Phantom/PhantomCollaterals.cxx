@@ -55,7 +55,7 @@ std::int64_t PointAt(const PhantomAnatomy& anatomy, int vessel, double fraction)
 
 /**
  * From one place to another along an ellipsoid of the heart, winding like a corkscrew.
- * Collaterals wind: that is what they are told by (Levin, Circulation 1974;50:831).
+ * Collaterals wind, and are 0.3 mm (CC1) to 0.4 mm and more (CC2) wide: Werner, Curr Cardiol Rev 2014;10:57.
  * @param bow  how far the middle is off the shortest way, mm
  */
 std::vector<Vector3> Course(const PhantomAnatomy& anatomy, const Vector3& start, const Vector3& end,
@@ -74,11 +74,12 @@ std::vector<Vector3> Course(const PhantomAnatomy& anatomy, const Vector3& start,
   for (int i = 0; i <= count; ++i)
   {
     const double u = static_cast<double>(i) / count;
-    const double middle = std::min(1.0, 4.0 * u * (1.0 - u));
     Vector3 direction = ((1.0 - u) * from.normalized() + u * to.normalized()).normalized();
-    direction = (direction + bow * middle / layer.radii.mean() * aside).normalized();
-    const double ends = (1.0 - u) * from.norm() + u * to.norm();
-    points.push_back(frame.ToWorld(layer.Unscaled(direction * (ends + middle * (1.0 - ends)))));
+    direction = (direction + bow * 4.0 * u * (1.0 - u) / layer.radii.mean() * aside).normalized();
+    // It goes straight to its layer: beside the septum there is blood.
+    const double within = SmoothStep(std::min(u, 1.0 - u) * whole / 8.0);
+    const double ends = u < 0.5 ? from.norm() : to.norm();
+    points.push_back(frame.ToWorld(layer.Unscaled(direction * (ends + within * (1.0 - ends)))));
   }
   constexpr double amplitude = 1.1; // mm
   constexpr double wave = 7.0;      // mm along the course
