@@ -256,6 +256,22 @@ int vtkMotionRegularizer::RequestData(
       moves->SetTuple(static_cast<vtkIdType>(n), move.data());
     }
     pointData->AddArray(moves);
+    // The tracker's way from rest goes with the points.
+    vtkDataArray* ways = pointData->GetArray(names::Displacement);
+    if (ways && ways->GetNumberOfComponents() == 3)
+    {
+      vtkNew<vtkDoubleArray> moved;
+      moved->DeepCopy(ways);
+      for (vtkIdType n = 0; n < moves->GetNumberOfTuples(); ++n)
+      {
+        for (int axis = 0; axis < 3; ++axis)
+        {
+          moved->SetComponent(n, axis, ways->GetComponent(n, axis) + moves->GetComponent(n, axis));
+        }
+      }
+      moved->SetName(names::Displacement);
+      pointData->AddArray(moved);
+    }
     vtkCoronary::AddArray<vtkDoubleArray>(
       output->GetCellData(), names::AxialStrain, motion.strain[k]);
     vtkCoronary::AddArray<vtkDoubleArray>(
