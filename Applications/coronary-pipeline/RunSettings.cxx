@@ -347,7 +347,8 @@ void RunOptions::DeclareMotion(Declaration& all)
     .Check(OneOf(InterpolationModes()))
     .ShowDefault();
   all.Add("!--no-limits", "limits", settings.limits, "",
-    "Take the tracked motion as it is, neither smoothed where it is known badly nor kept within limits of bending, "
+    "Take the tracked motion as it is, neither smoothed where it is known badly nor kept within "
+    "limits of bending, "
     "strain and steps");
 
   all.Begin("", -1);

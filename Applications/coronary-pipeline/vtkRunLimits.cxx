@@ -140,7 +140,8 @@ Json DescribeFilled(vtkAlgorithm* tracked, vtkPolyData* tree, vtkMessageTrap& me
           }
           list.push_back({ { "vessel", NameOf(branch) }, { "time", time },
             { "status", piece.status == TrackingStatus::Lost ? "lost" : "filled" },
-            { "length_mm", length }, { "confidence", sum / static_cast<double>(piece.points.size()) },
+            { "length_mm", length },
+            { "confidence", sum / static_cast<double>(piece.points.size()) },
             { "place", Place(rest.points[piece.points[piece.points.size() / 2]]) } });
         }
       }
@@ -180,10 +181,10 @@ Json DescribeLimits(vtkMotionRegularizer* lines, vtkMotionRegularizer* skeleton,
           }
           if (!points.empty())
           {
-            clamped.push_back({ { "vessel", NameOf(branch) }, { "time", time },
-              { "limit", LimitNames[bit] }, { "points", points.size() },
-              { "greatest_move_mm", farthest },
-              { "place", Place(rest.points[points[points.size() / 2]]) } });
+            clamped.push_back(
+              { { "vessel", NameOf(branch) }, { "time", time }, { "limit", LimitNames[bit] },
+                { "points", points.size() }, { "greatest_move_mm", farthest },
+                { "place", Place(rest.points[points[points.size() / 2]]) } });
           }
         }
       }

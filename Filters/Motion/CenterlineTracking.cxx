@@ -9,6 +9,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace coronary
 {
@@ -23,6 +24,7 @@ constexpr double TrackedConfidence = 0.5;
 constexpr double WeakConfidence = 0.2;
 constexpr double FilledConfidence = 0.3; ///< at most
 constexpr double LostDeviation = 2.0;    ///< mm
+constexpr double SearchedAgain = 0.5;    ///< mm
 }
 
 ProgressCallback LineTracker::Part(double from, double to) const
@@ -126,47 +128,54 @@ void LineTracker::MeasureContrast()
   }
 }
 
+void LineTracker::Take(Trajectories motion)
+{
+  this->Motion = std::move(motion);
+  for (std::size_t k = 0; k < this->Times.size(); ++k)
+  {
+    for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+    {
+      this->Displacement[k][n] = this->Motion.Displacement(static_cast<int>(n), this->Times[k]);
+    }
+  }
+}
+
 void LineTracker::Fit(const std::vector<const Seen*>& seen)
+{
+  this->Take(
+    FitRobustly(this->Nodes, this->Times, this->ReferenceTime, seen, this->Settings.prior));
+}
+
+double LineTracker::FillLost()
 {
   const std::size_t phases = this->Times.size();
   const std::size_t nodes = this->Nodes.size();
-  std::vector<double> times = this->Times;
-  times.push_back(this->ReferenceTime);
-  // At the reference the lines are where they are.
-  const TrajectoryMeasurement fixed{ static_cast<int>(phases), Vector3::Zero(),
-    Matrix3::Identity() / (0.05 * 0.05) };
-  for (int round = 0; round < 6; ++round)
-  {
-    Measurements measurements(nodes, { fixed });
-    for (const Seen* one : seen)
-    {
-      const double scale = one->robustScale * std::max(1.0, 3.0 - round);
-      for (std::size_t n = 0; n < nodes; ++n)
-      {
-        for (std::size_t k = 0; k < phases; ++k)
-        {
-          const Vector3& displacement = one->displacement[k][n];
-          double share = 1.0;
-          if (round > 0)
-          {
-            const double apart =
-              (this->Motion.Displacement(static_cast<int>(n), times[k]) - displacement).norm();
-            share = 1.0 / (1.0 + apart * apart / (scale * scale));
-          }
-          measurements[n].push_back({ static_cast<int>(k), displacement,
-            one->information[k][n] * share * share }); // Geman & McClure
-        }
-      }
-    }
-    this->Motion = FitTrajectories(this->Nodes, times, measurements, this->Settings.prior);
-  }
+  std::vector<std::vector<bool>> seen(phases, std::vector<bool>(nodes));
+  bool all = true;
   for (std::size_t k = 0; k < phases; ++k)
   {
     for (std::size_t n = 0; n < nodes; ++n)
     {
-      this->Displacement[k][n] = this->Motion.Displacement(static_cast<int>(n), times[k]);
+      seen[k][n] = this->Likeness[k][n] >= TrackedLikeness;
+      all = all && seen[k][n];
     }
   }
+  if (all)
+  {
+    return 0.0;
+  }
+  const PerPhase before = this->Displacement;
+  this->Take(FitFilled(this->Nodes, this->Times, this->ReferenceTime, before, seen,
+    this->WithSurroundings(this->Vessels), this->Settings.prior));
+  double farthest = 0.0;
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    for (std::size_t n = 0; n < nodes; ++n)
+    {
+      farthest = std::max(farthest, (this->Displacement[k][n] - before[k][n]).norm());
+    }
+  }
+  return farthest;
 }
 
 void LineTracker::MeasureRepeatability()
@@ -278,7 +287,13 @@ PoseSequence LineTracker::Run()
   }
   for (int round = 0; round < 4; ++round)
   {
-    this->Align(round < 2 ? 1.0 : 0.5, 0.8 + 0.05 * round);
+    this->Align(round < 2 ? 1.0 : 0.5, 0.8 + 0.04 * round);
+  }
+  // A branch that was looked for in the wrong place may be seen where those around it say that it is.
+  if (this->FillLost() > SearchedAgain)
+  {
+    this->Align(0.5, 0.96);
+    this->FillLost();
   }
   PoseSequence sequence;
   this->Finish(sequence);

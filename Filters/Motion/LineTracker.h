@@ -8,6 +8,7 @@
 #include "CenterlineTracking.h"
 #include "CyclicTime.h"
 #include "LineNodes.h"
+#include "MotionFilling.h"
 #include "PatchMatching.h"
 #include "SparseVolume.h"
 #include "TrajectoryModel.h"
@@ -56,14 +57,8 @@ public:
 
 private:
   using PerPhase = std::vector<std::vector<Vector3>>;
-  using Measurements = std::vector<std::vector<TrajectoryMeasurement>>;
 
-  struct Seen
-  {
-    PerPhase displacement;                         ///< per phase and node, mm
-    std::vector<std::vector<Matrix3>> information; ///< of each, 1/mm^2
-    double robustScale = 1.0;                      ///< mm
-  };
+  using Seen = MotionMeasurements;
 
   /// What is expected to be seen of a node at a phase.
   struct Sight
@@ -118,6 +113,9 @@ private:
   void MeasureRepeatability();
   /// Fits the trajectories to what was measured; what does not agree counts less.
   void Fit(const std::vector<const Seen*>& seen);
+  void Take(Trajectories motion);
+  /// Fits once more, with what was not seen where those that were seen say. @return the greatest change, mm
+  double FillLost();
   std::vector<const Seen*> WithSurroundings(const Seen& seen) const
   {
     return this->Settings.tissue ? std::vector<const Seen*>{ &seen, &this->Surroundings }
