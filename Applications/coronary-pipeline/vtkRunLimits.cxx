@@ -106,13 +106,20 @@ Json DescribeMotion(vtkMotionRegularizer* regularizer)
     const Json values = Numbers(data, name);
     return values.empty() ? Json() : values.front();
   };
-  return { { "greatest_move_mm", one(names::MaximumMove) },
-    { "violations", one(names::LimitViolations) }, { "iterations", one(names::LimitIterations) },
-    { "energies_mm2",
-      { { "temporal", Numbers(data, names::TemporalEnergy) },
-        { "spatial", Numbers(data, names::SpatialEnergy) },
-        { "total", Numbers(data, names::TotalEnergy) },
-        { "objective", Numbers(data, names::MotionObjective) } } } };
+  Json said = { { "greatest_move_mm", one(names::MaximumMove) },
+    { "violations", one(names::LimitViolations) }, { "iterations", one(names::LimitIterations) } };
+  const std::pair<const char*, const char*> energies[] = { { "temporal", names::TemporalEnergy },
+    { "spatial", names::SpatialEnergy }, { "total", names::TotalEnergy },
+    { "objective", names::MotionObjective } };
+  for (const auto& [energy, array] : energies)
+  {
+    const Json values = Numbers(data, array);
+    for (std::size_t n = 0; n < values.size() && n < 2; ++n)
+    {
+      said[std::string(energy) + (n == 0 ? "_before_mm2" : "_after_mm2")] = values[n];
+    }
+  }
+  return said;
 }
 }
 

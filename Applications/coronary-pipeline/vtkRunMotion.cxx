@@ -91,6 +91,14 @@ std::vector<double> TimeSteps(vtkAlgorithm* algorithm)
   return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
 }
 
+/// Weighs acceleration as with 20 phases. Its unit is the distance of phases: what few of them show of a fast motion
+/// would be taken for noise.
+double TemporalWeight(std::size_t phases)
+{
+  const double share = std::min(1.0, static_cast<double>(phases) / 20.0);
+  return 0.005 * share * share * share * share;
+}
+
 /// Mesh, deformation and writer of a run, but for the poses.
 void ConnectMesh(RunStep& step, vtkPolyData* skeleton, MovingMesh& moving)
 {
@@ -206,6 +214,11 @@ Json MakeMotion(RunStep& step)
   vtkNew<vtkMotionRegularizer> keptSkeleton;
   keptSkeleton->SetInputConnection(0, tracker->GetOutputPort(1));
   keptSkeleton->SetInputDataObject(1, skeleton);
+  tracker->UpdateInformation();
+  for (vtkMotionRegularizer* kept : { keptLines.Get(), keptSkeleton.Get() })
+  {
+    kept->SetTemporalWeight(TemporalWeight(TimeSteps(tracker).size()));
+  }
   vtkNew<vtkCardiacPhaseInterpolator> lines;
   lines->SetInputConnection(
     settings.limits ? keptLines->GetOutputPort() : tracker->GetOutputPort(0));

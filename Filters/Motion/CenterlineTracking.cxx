@@ -165,7 +165,7 @@ double LineTracker::FillLost()
     return 0.0;
   }
   const PerPhase before = this->Displacement;
-  this->Take(FitFilled(this->Nodes, this->Times, this->ReferenceTime, before, seen,
+  this->Take(FitFilled(this->Nodes, this->Times, this->ReferenceTime, seen,
     this->WithSurroundings(this->Vessels), this->Settings.prior));
   double farthest = 0.0;
   for (std::size_t k = 0; k < phases; ++k)

@@ -23,6 +23,8 @@ constexpr double SeenDeviation = 0.15;
 constexpr double GuessDeviation = 1.0;
 /// Nothing is filled better than that, mm.
 constexpr double LeastDeviation = 0.3;
+/// Of what was filled, so many nodes tell the same.
+constexpr double AlikeNodes = 10.0;
 /// What was filled counts less when the fit is farther from it, mm.
 constexpr double FilledScale = 2.0;
 constexpr double Turn = 6.283185307179586;
@@ -201,7 +203,7 @@ bool Filler::Fill(std::size_t phase, std::size_t node, Vector3& place, double& d
 
 Trajectories FitRobustly(const LineNodes& nodes, const std::vector<double>& times,
   double referenceTime, const std::vector<const MotionMeasurements*>& measurements,
-  const TrajectoryPrior& prior, const Trajectories* start)
+  const TrajectoryPrior& prior)
 {
   const std::size_t phases = times.size();
   std::vector<double> moments = times;
@@ -211,21 +213,20 @@ Trajectories FitRobustly(const LineNodes& nodes, const std::vector<double>& time
   Trajectories motion;
   for (int round = 0; round < RobustRounds; ++round)
   {
-    const Trajectories* last = round > 0 ? &motion : start;
     std::vector<std::vector<TrajectoryMeasurement>> all(nodes.size(), { fixed });
     for (const MotionMeasurements* one : measurements)
     {
-      const double scale = one->robustScale * (start ? 1.0 : std::max(1.0, 3.0 - round));
+      const double scale = one->robustScale * std::max(1.0, 3.0 - round);
       for (std::size_t n = 0; n < nodes.size(); ++n)
       {
         for (std::size_t k = 0; k < phases; ++k)
         {
           const Vector3& displacement = one->displacement[k][n];
           double share = 1.0;
-          if (last)
+          if (round > 0)
           {
             const double apart =
-              (last->Displacement(static_cast<int>(n), times[k]) - displacement).norm();
+              (motion.Displacement(static_cast<int>(n), times[k]) - displacement).norm();
             share = 1.0 / (1.0 + apart * apart / (scale * scale));
           }
           all[n].push_back({ static_cast<int>(k), displacement,
@@ -264,13 +265,10 @@ MotionMeasurements FillUnseen(const LineNodes& nodes, const std::vector<double>&
 }
 
 Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
-  double referenceTime, const std::vector<std::vector<Vector3>>& displacement,
-  const std::vector<std::vector<bool>>& seen,
+  double referenceTime, const std::vector<std::vector<bool>>& seen,
   const std::vector<const MotionMeasurements*>& measurements, const TrajectoryPrior& prior)
 {
   const std::size_t phases = times.size();
-  MotionMeasurements filled = FillUnseen(nodes, times, referenceTime, displacement, seen, prior);
-  filled.robustScale = FilledScale;
   // A phase at which nothing was seen has nothing but what was measured.
   std::vector<bool> blind(phases);
   for (std::size_t k = 0; k < phases; ++k)
@@ -296,25 +294,48 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
     }
     return result;
   };
-  const auto fit = [&](const std::vector<MotionMeasurements>& measured, const Trajectories* start)
+  const auto fit = [&](const std::vector<MotionMeasurements>& measured)
   {
-    std::vector<const MotionMeasurements*> all{ &filled };
+    std::vector<const MotionMeasurements*> all;
     for (const MotionMeasurements& one : measured)
     {
       all.push_back(&one);
     }
-    return FitRobustly(nodes, times, referenceTime, all, prior, start);
+    return FitRobustly(nodes, times, referenceTime, all, prior);
   };
   const Trajectories known =
-    fit(weighed([](const MotionMeasurements&, std::size_t, std::size_t) { return 0.0; }), nullptr);
-  // By how far it is from that, as far as that is known; for good, or all of a branch could drift there.
+    fit(weighed([](const MotionMeasurements&, std::size_t, std::size_t) { return 0.0; }));
+  std::vector<std::vector<Vector3>> displacement(phases, std::vector<Vector3>(nodes.size()));
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+    {
+      displacement[k][n] = known.Displacement(static_cast<int>(n), times[k]);
+    }
+  }
+  MotionMeasurements filled = FillUnseen(nodes, times, referenceTime, displacement, seen, prior);
+  filled.robustScale = FilledScale;
+  // By how far it is from what was filled, as far as that is known; for good, or all of a branch could drift there.
   const auto agreement = [&](const MotionMeasurements& one, std::size_t k, std::size_t n)
   {
-    const auto node = static_cast<int>(n);
-    const double apart = (known.Displacement(node, times[k]) - one.displacement[k][n]).norm();
-    const double deviation = known.Deviation(node, times[k]);
-    return std::exp(-apart * apart / (one.robustScale * one.robustScale + deviation * deviation));
+    const double information = filled.information[k][n].trace();
+    if (!(information > 0.0))
+    {
+      return 1.0;
+    }
+    const double apart = (filled.displacement[k][n] - one.displacement[k][n]).squaredNorm();
+    return std::exp(-apart / (one.robustScale * one.robustScale + 9.0 / information));
   };
-  return fit(weighed(agreement), &known);
+  std::vector<MotionMeasurements> all = weighed(agreement);
+  // Neighbours are filled from the same, and wrong together: what they say is not said by each anew.
+  for (std::vector<Matrix3>& phase : filled.information)
+  {
+    for (Matrix3& information : phase)
+    {
+      information /= AlikeNodes;
+    }
+  }
+  all.push_back(std::move(filled));
+  return fit(all);
 }
 }

@@ -25,14 +25,11 @@ struct MotionMeasurements
   double robustScale = 1.0;                       ///< mm; what is farther from the fit counts less
 };
 
-/**
- * The most probable trajectories, which are at rest at the reference time. Measurements that do not agree with them count
- * less (Geman & McClure).
- * @param start  what measurements are first compared with; null: first all count fully
- */
+/// The most probable trajectories, which are at rest at the reference time. Measurements that do not agree with them
+/// count less (Geman & McClure).
 Trajectories FitRobustly(const LineNodes& nodes, const std::vector<double>& times,
   double referenceTime, const std::vector<const MotionMeasurements*>& measurements,
-  const TrajectoryPrior& prior, const Trajectories* start = nullptr);
+  const TrajectoryPrior& prior);
 
 /**
  * Places of the nodes that were not seen, with information by their uncertainty; of the others none. A phase at which
@@ -46,12 +43,11 @@ MotionMeasurements FillUnseen(const LineNodes& nodes, const std::vector<double>&
 
 /**
  * FitRobustly with what FillUnseen says. What was measured where nothing was seen may be of the wrong tissue, all of a
- * branch alike: it is first held against what those that were seen say.
- * @param displacement, seen  as of FillUnseen
+ * branch alike: it counts as far as it agrees with that. At a phase where nothing at all was seen it is all that there is.
+ * @param seen  as of FillUnseen
  */
 Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
-  double referenceTime, const std::vector<std::vector<Vector3>>& displacement,
-  const std::vector<std::vector<bool>>& seen,
+  double referenceTime, const std::vector<std::vector<bool>>& seen,
   const std::vector<const MotionMeasurements*>& measurements, const TrajectoryPrior& prior);
 }
 

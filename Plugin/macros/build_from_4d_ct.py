@@ -96,10 +96,14 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
         tracker = add("tracker", tracker)
         poses = simple.OutputPort(made["tracker"], 1)
         if limits:
+            # Acceleration counts as with 20 phases.
+            weight = 0.005 * min(1.0, len(made["tracker"].TimestepValues) / 20.0) ** 4
             tracker = add("limits", simple.MotionRegularizer(
-                Motion=tracker, Rest=tree, registrationName="10 Motion of the lines within limits"))
+                Motion=tracker, Rest=tree, TemporalWeight=weight,
+                registrationName="10 Motion of the lines within limits"))
             poses = add("pose_limits", simple.MotionRegularizer(
-                Motion=poses, Rest=skeleton, registrationName="10 Motion of the skeleton within limits"))
+                Motion=poses, Rest=skeleton, TemporalWeight=weight,
+                registrationName="10 Motion of the skeleton within limits"))
         moments = {"Mode": MODES[interpolation], "TimeSteps": "List", "ListedSteps": times}
         add("lines", simple.CardiacPhaseInterpolator(
             tracker, registrationName="11 Centerlines in time", **moments))

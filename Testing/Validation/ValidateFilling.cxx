@@ -216,16 +216,8 @@ public:
     const std::vector<const MotionMeasurements*> all{ &vessels, &surroundings };
     const Trajectories plain =
       FitRobustly(this->At.nodes, this->Moving.times, this->Moving.reference, all, prior);
-    std::vector<std::vector<Vector3>> now(seen.size(), std::vector<Vector3>(nodes));
-    for (std::size_t k = 0; k < seen.size(); ++k)
-    {
-      for (std::size_t n = 0; n < nodes; ++n)
-      {
-        now[k][n] = plain.Displacement(static_cast<int>(n), this->Moving.times[k]);
-      }
-    }
     const Trajectories filled =
-      FitFilled(this->At.nodes, this->Moving.times, this->Moving.reference, now, seen, all, prior);
+      FitFilled(this->At.nodes, this->Moving.times, this->Moving.reference, seen, all, prior);
     this->Judge(plain, seen, before);
     this->Judge(filled, seen, after);
   }
