@@ -290,7 +290,7 @@ PoseSequence LineTracker::Run()
     this->Align(round < 2 ? 1.0 : 0.5, 0.8 + 0.04 * round);
   }
   // A branch that was looked for in the wrong place may be seen where those around it say that it is.
-  if (this->FillLost() > SearchedAgain)
+  if (this->Settings.fillUnseen && this->FillLost() > SearchedAgain)
   {
     this->Align(0.5, 0.96);
     this->FillLost();
