@@ -23,8 +23,12 @@ constexpr double TrackedLikeness = 0.65;
 constexpr double TrackedConfidence = 0.5;
 constexpr double WeakConfidence = 0.2;
 constexpr double FilledConfidence = 0.3; ///< at most
+constexpr double ChanceConfidence = 0.4; ///< at most
 constexpr double LostDeviation = 2.0;    ///< mm
 constexpr double SearchedAgain = 0.5;    ///< mm
+/// What is seen alone among places that are not seen is seen by chance: mm around it.
+constexpr double SupportingReach = 8.0;
+constexpr double ChanceShare = 1.0 / 3.0;
 }
 
 ProgressCallback LineTracker::Part(double from, double to) const
@@ -146,21 +150,65 @@ void LineTracker::Fit(const std::vector<const Seen*>& seen)
     FitRobustly(this->Nodes, this->Times, this->ReferenceTime, seen, this->Settings.prior));
 }
 
+std::vector<std::vector<bool>> LineTracker::SeenPlaces() const
+{
+  const std::size_t phases = this->Times.size();
+  const std::size_t nodes = this->Nodes.size();
+  std::vector<std::vector<int>> around(nodes);
+  for (std::size_t n = 0; n < nodes; ++n)
+  {
+    const int parent = this->Nodes.parent[n];
+    if (parent >= 0)
+    {
+      around[n].push_back(parent);
+      around[parent].push_back(static_cast<int>(n));
+    }
+  }
+  std::vector<std::vector<bool>> seen(phases, std::vector<bool>(nodes, false));
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    const auto alike = [&](int n) { return this->Likeness[k][n] >= TrackedLikeness; };
+    std::size_t count = 0;
+    for (std::size_t n = 0; n < nodes; ++n)
+    {
+      // Along the vessels, and those that meet there.
+      std::vector<std::pair<int, int>> open{ { static_cast<int>(n), -1 } };
+      int near = 0;
+      int alikeNear = 0;
+      for (std::size_t at = 0; at < open.size(); ++at)
+      {
+        const auto [here, from] = open[at];
+        ++near;
+        alikeNear += alike(here) ? 1 : 0;
+        for (const int next : around[here])
+        {
+          if (next != from &&
+            (this->Nodes.position[next] - this->Nodes.position[n]).norm() <= SupportingReach)
+          {
+            open.emplace_back(next, here);
+          }
+        }
+      }
+      seen[k][n] = alike(static_cast<int>(n)) && 2 * alikeNear >= near;
+      count += seen[k][n] ? 1 : 0;
+    }
+    // So many are alike by chance where there is nothing to be seen.
+    if (static_cast<double>(count) < ChanceShare * static_cast<double>(nodes))
+    {
+      seen[k].assign(nodes, false);
+    }
+  }
+  return seen;
+}
+
 double LineTracker::FillLost()
 {
   const std::size_t phases = this->Times.size();
   const std::size_t nodes = this->Nodes.size();
-  std::vector<std::vector<bool>> seen(phases, std::vector<bool>(nodes));
-  bool all = true;
-  for (std::size_t k = 0; k < phases; ++k)
-  {
-    for (std::size_t n = 0; n < nodes; ++n)
-    {
-      seen[k][n] = this->Likeness[k][n] >= TrackedLikeness;
-      all = all && seen[k][n];
-    }
-  }
-  if (all)
+  const std::vector<std::vector<bool>> seen = this->SeenPlaces();
+  if (std::all_of(seen.begin(), seen.end(),
+        [](const std::vector<bool>& phase)
+        { return std::all_of(phase.begin(), phase.end(), [](bool own) { return own; }); }))
   {
     return 0.0;
   }
@@ -213,7 +261,8 @@ void LineTracker::MeasureRepeatability()
 
 void LineTracker::Finish(PoseSequence& sequence)
 {
-  const std::vector<double> calibre = this->MeasureCalibre();
+  const std::vector<std::vector<bool>> found = this->SeenPlaces();
+  const std::vector<double> calibre = this->MeasureCalibre(found);
   this->MeasureRepeatability();
   const std::size_t phases = this->Times.size();
   const std::size_t nodes = this->Nodes.size();
@@ -232,6 +281,8 @@ void LineTracker::Finish(PoseSequence& sequence)
       const double certain = std::min(1.0, sure * sure);
       seen[n] = certain *
         std::clamp((this->Likeness[k][n] - 0.3) / (2.0 * (TrackedLikeness - 0.3)), 0.0, 1.0);
+      // Alike by chance.
+      seen[n] = found[k][n] ? seen[n] : std::min(seen[n], ChanceConfidence);
       // What was filled well is worth something to those who smooth the motion.
       confidence[n] = std::max(seen[n], FilledConfidence * certain);
       tracked += seen[n] >= TrackedConfidence ? 1.0 : 0.0;
