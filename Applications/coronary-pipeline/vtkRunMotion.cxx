@@ -3,6 +3,7 @@
 #include "AtomicFile.h"
 #include "FileSeries.h"
 #include "MeshSequenceReport.h"
+#include "MotionRegularization.h"
 #include "Ranks.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
@@ -89,14 +90,6 @@ std::vector<double> TimeSteps(vtkAlgorithm* algorithm)
   vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
   const double* steps = info->Get(key);
   return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
-}
-
-/// Weighs acceleration as with 20 phases. Its unit is the distance of phases: what few of them show of a fast motion
-/// would be taken for noise.
-double TemporalWeight(std::size_t phases)
-{
-  const double share = std::min(1.0, static_cast<double>(phases) / 20.0);
-  return 0.005 * share * share * share * share;
 }
 
 /// Mesh, deformation and writer of a run, but for the poses.
@@ -217,7 +210,7 @@ Json MakeMotion(RunStep& step)
   tracker->UpdateInformation();
   for (vtkMotionRegularizer* kept : { keptLines.Get(), keptSkeleton.Get() })
   {
-    kept->SetTemporalWeight(TemporalWeight(TimeSteps(tracker).size()));
+    kept->SetTemporalWeight(TemporalWeightOf(TimeSteps(tracker).size()));
   }
   vtkNew<vtkCardiacPhaseInterpolator> lines;
   lines->SetInputConnection(

@@ -273,7 +273,9 @@ Outcome Run(const Case& test)
   outcome.seconds = since(start) - inImages;
   if (test.regularize)
   {
-    poses = RegularizeMotion(poses, lines).poses;
+    MotionRegularizationSettings limits;
+    limits.temporalWeight = TemporalWeightOf(times.size());
+    poses = RegularizeMotion(poses, lines, limits).poses;
   }
   outcome.repeatability = report.repeatability;
   outcome.imagesRead = report.imagesRead;

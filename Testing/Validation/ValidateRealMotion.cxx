@@ -371,25 +371,13 @@ struct Settings
   bool quick = false;
 };
 
-bool Run(const Settings& options)
+/// How far the vessels are carried.
+void TellMotion(const Settings& options, const Heart& heart, const Polylines& lines,
+  const std::vector<std::vector<Vector3>>& truth)
 {
-  const Heart heart(options.data, options.asMeasured);
-  const CarriedTree tree(heart);
-  const Polylines& lines = tree.Reference();
-  const int hidden = options.hidden.empty()
-    ? -1
-    : static_cast<int>(
-        std::find(VesselNames.begin(), VesselNames.end(), options.hidden) - VesselNames.begin());
-  Scanner scanner(heart, tree, options.spacing, options.window, options.quick ? 3 : 5, hidden);
-
-  std::vector<std::vector<Vector3>> truth;
   double excursion = 0.0;
   double step = 0.0;
   double range = 0.0;
-  for (int k = 0; k < Frames; ++k)
-  {
-    truth.push_back(tree.At(heart.At(TimeOf(k))));
-  }
   for (int k = 0; k < Frames; ++k)
   {
     for (std::size_t n = 0; n < lines.points.size(); ++n)
@@ -402,11 +390,6 @@ bool Run(const Settings& options)
       }
     }
   }
-  std::vector<double> times;
-  for (int k = 0; k < Frames; k += 2)
-  {
-    times.push_back(TimeOf(k));
-  }
   std::printf(
     "A measured heart%s: %zu points on %zu vessels, up to %.1f mm from the reference and "
     "%.1f mm between any two frames, %.1f mm between tracked frames that follow each other\n",
@@ -417,7 +400,30 @@ bool Run(const Settings& options)
     std::printf("Motion without the frames' scatter of %.2f mm: rank %d, order %d\n",
       heart.Fit().residual, heart.Fit().rank, heart.Fit().order);
   }
+}
 
+bool Run(const Settings& options)
+{
+  const Heart heart(options.data, options.asMeasured);
+  const CarriedTree tree(heart);
+  const Polylines& lines = tree.Reference();
+  const int hidden = options.hidden.empty()
+    ? -1
+    : static_cast<int>(
+        std::find(VesselNames.begin(), VesselNames.end(), options.hidden) - VesselNames.begin());
+  Scanner scanner(heart, tree, options.spacing, options.window, options.quick ? 3 : 5, hidden);
+
+  std::vector<std::vector<Vector3>> truth;
+  for (int k = 0; k < Frames; ++k)
+  {
+    truth.push_back(tree.At(heart.At(TimeOf(k))));
+  }
+  TellMotion(options, heart, lines, truth);
+  std::vector<double> times;
+  for (int k = 0; k < Frames; k += 2)
+  {
+    times.push_back(TimeOf(k));
+  }
   CenterlineTrackingSettings settings;
   settings.temporalWindow = options.window;
   settings.cycleLength = CycleSeconds;
