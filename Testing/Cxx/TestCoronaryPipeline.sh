@@ -704,6 +704,8 @@ check_weights() {
     grep -q "Name=\"$name\"" bound/motion/centerline_00.vtp || fail "no $name in centerline_00.vtp"
   done
   expect_text bound/report.json '"tracked_share"'
+  expect_text bound/report.json '"filled"'
+  expect_text bound/report.json '"objective_after_mm2"'
   expect_text bound/motion/mesh.json '"inlet_'
 
   # The beating result for viewers; 125: the validator can not be had.
