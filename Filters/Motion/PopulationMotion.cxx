@@ -668,9 +668,9 @@ std::vector<double> PopulationTimes(
     times.push_back(time);
   }
   const std::size_t fixed = times.size();
-  for (int k = 1; k < count; ++k)
+  for (int k = 0; k < count; ++k)
   {
-    const double time = Modulo(referenceTime + static_cast<double>(k) / count);
+    const double time = static_cast<double>(k) / count;
     if (std::none_of(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(fixed),
           [&](double other) { return CyclicDistance(time, other) < 0.4 / count; }))
     {

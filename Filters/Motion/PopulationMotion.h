@@ -89,8 +89,8 @@ struct PopulationMotionReport
   std::vector<std::string> warnings; ///< one sentence each
 };
 
-/// Twenty moments of a cycle that begins with the reference; where one of `seen` is near, that one. Increasing, in 0 to 1 but
-/// for the reference and the seen ones, which are as given.
+/// `count` even moments from 0 to 1 (excluded), the reference and those of `seen` that count among them, in the place of what
+/// is nearer than 0.4 / count. Increasing.
 std::vector<double> PopulationTimes(
   double referenceTime, const std::vector<double>& seen, int count = 20);
 

@@ -2,7 +2,7 @@
 // against where the material truly is, beside a model that rests. Phantoms that differ in anatomy and in motion, and a
 // measured heart, whose motion no formula made. Tables in Markdown on stdout; the exit code is 1 when a limit is missed.
 
-#include "CarriedTree.h"
+#include "CarriedHeart.h"
 #include "CoronaryPhantom.h"
 #include "CounterRandom.h"
 #include "CyclicTime.h"
@@ -81,13 +81,13 @@ Truth PhantomTruth(std::uint64_t seed, double reference)
   return truth;
 }
 
-Truth MeasuredTruth(const std::shared_ptr<const MeasuredHeart>& heart, double reference)
+Truth MeasuredTruth(const std::shared_ptr<const Heart>& heart, double reference)
 {
   const auto tree = std::make_shared<CarriedTree>(
     *heart, static_cast<int>(std::lround(reference * MeasuredFrames)));
   Truth truth;
   truth.name = "measured heart";
-  truth.heartRate = 60.0 / MeasuredCycleSeconds;
+  truth.heartRate = 60.0 / CycleSeconds;
   const Polylines& lines = tree->Reference();
   Name(truth, lines);
   // Where on the carried lines the named tree's points are.
@@ -305,11 +305,11 @@ int main(int argc, char** argv)
   {
     const std::vector<std::uint64_t> seeds =
       ParseSeeds(quick ? "401..403" : seedText, LoneNumber::Seed);
-    std::shared_ptr<const MeasuredHeart> measured;
+    std::shared_ptr<const Heart> measured;
     HeartSurface first;
     if (ReadHeartSurface(data, "EPICARDIAL", 0, first))
     {
-      measured = std::make_shared<MeasuredHeart>(data, false);
+      measured = std::make_shared<Heart>(data, false);
     }
     std::vector<std::vector<double>> choices = { { 0.75 }, { 0.40 }, { 0.75, 0.40 } };
     if (!quick)

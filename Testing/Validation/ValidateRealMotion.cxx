@@ -1,11 +1,10 @@
 // Tracking under the motion of a measured heart: a coronary tree carried on its epicardial surface, CT-like images
 // of it, tracked, against where it was carried.
-#include "CarriedTree.h"
+#include "CarriedHeart.h"
 #include "CenterlineTracking.h"
 #include "CounterRandom.h"
 #include "DistanceTransform.h"
 #include "PhaseInterpolation.h"
-#include "VesselImage.h"
 
 #include <CLI/CLI.hpp>
 
@@ -16,7 +15,6 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <map>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -25,9 +23,6 @@ namespace
 {
 using namespace coronary;
 
-constexpr int Frames = MeasuredFrames;
-constexpr int ReferenceFrame = MeasuredReferenceFrame;
-constexpr double CycleSeconds = MeasuredCycleSeconds;
 constexpr int NoData = 125; // what CTest takes as skipped
 
 // What must be reached, mm, of the whole run and of the quick one.
@@ -38,8 +33,7 @@ constexpr double MaximumPercentile[2] = { 0.9, 2.0 };
 class Scanner
 {
 public:
-  Scanner(
-    const MeasuredHeart& heart, const CarriedTree& tree, double spacing, double window, int moments)
+  Scanner(const Heart& heart, const CarriedTree& tree, double spacing, double window, int moments)
     : Body(heart)
     , Tree(tree)
     , Window(window)
@@ -251,7 +245,7 @@ private:
     }
   }
 
-  const MeasuredHeart& Body;
+  const Heart& Body;
   const CarriedTree& Tree;
   const double Window;
   const int Moments;
@@ -363,7 +357,7 @@ struct Settings
 
 bool Run(const Settings& options)
 {
-  const MeasuredHeart heart(options.data, options.asMeasured);
+  const Heart heart(options.data, options.asMeasured);
   const CarriedTree tree(heart);
   const Polylines& lines = tree.Reference();
   Scanner scanner(heart, tree, options.spacing, options.window, options.quick ? 3 : 5);

@@ -1,9 +1,9 @@
 /**
- * @file CarriedTree.h
- * @brief A coronary tree that is carried on the epicardium of a measured heart: the truth of a motion that no formula made.
+ * @file CarriedHeart.h
+ * @brief A coronary tree that is carried on the epicardium of a measured heart, at any time of its beat.
  */
-#ifndef DynamicCoronary_CarriedTree_h
-#define DynamicCoronary_CarriedTree_h
+#ifndef DynamicCoronary_CarriedHeart_h
+#define DynamicCoronary_CarriedHeart_h
 
 #include "MeasuredHeart.h"
 #include "PhaseInterpolation.h"
@@ -17,17 +17,19 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace coronary
 {
-constexpr int MeasuredReferenceFrame = 18; // mid-diastole
-constexpr double MeasuredCycleSeconds = 0.83;
+inline constexpr int Frames = MeasuredFrames;
+inline constexpr int ReferenceFrame = 18; // mid-diastole
+inline constexpr double CycleSeconds = 0.83;
+inline constexpr double Pi = 3.14159265358979323846;
 
-/// Fraction of R-R of a frame.
 inline double TimeOf(int frame)
 {
-  return static_cast<double>(frame) / MeasuredFrames;
+  return static_cast<double>(frame) / Frames;
 }
 
 /// Edges that belong to one triangle, as closed loops of points.
@@ -106,13 +108,13 @@ struct Shell
 };
 
 /// Both surfaces at any time: the frames without their scatter, or as they are.
-class MeasuredHeart
+class Heart
 {
 public:
-  MeasuredHeart(const std::string& folder, bool asMeasured)
+  Heart(const std::string& folder, bool asMeasured)
   {
     PoseSequence frames;
-    for (int k = 0; k < MeasuredFrames; ++k)
+    for (int k = 0; k < Frames; ++k)
     {
       frames.times.push_back(TimeOf(k));
       frames.points.emplace_back();
@@ -195,8 +197,8 @@ inline std::vector<Vector3> NormalsOf(
 class CarriedTree
 {
 public:
-  /// @param frame  at which the lines are the reference's
-  explicit CarriedTree(const MeasuredHeart& heart, int frame = MeasuredReferenceFrame)
+  /// @param frame  whose surface the lines are laid on: the reference
+  explicit CarriedTree(const Heart& heart, int frame = coronary::ReferenceFrame)
     : Epicardium(heart.Epicardium)
     , ReferenceFrame(frame)
   {
@@ -252,7 +254,7 @@ private:
     std::vector<std::int64_t> points;
   };
 
-  void Frame(const MeasuredHeart& heart)
+  void Frame(const Heart& heart)
   {
     const std::vector<Vector3> all = heart.At(TimeOf(this->ReferenceFrame));
     this->Rest = all;
@@ -298,8 +300,8 @@ private:
   /// The outermost place in a direction from the axis.
   Attachment PlaceAt(double degrees, double height, double outwards) const
   {
-    const Vector3 direction = std::cos(degrees * EIGEN_PI / 180.0) * this->Right +
-      std::sin(degrees * EIGEN_PI / 180.0) * this->Front;
+    const Vector3 direction =
+      std::cos(degrees * Pi / 180.0) * this->Right + std::sin(degrees * Pi / 180.0) * this->Front;
     const Vector3 from = this->Base + height * this->Down;
     Attachment best;
     best.outwards = outwards;
