@@ -232,6 +232,10 @@ Json MakePopulation(RunStep& step, const MotionPlan& plan)
   }
   step.warnings.push_back(
     poses.Statement() + (plan.reason.empty() ? "" : " (" + plan.reason + ")"));
+  if (!poses.Assumption().empty())
+  {
+    step.warnings.push_back(poses.Assumption());
+  }
   step.summary = std::to_string(times.size()) + " moments, " + poses.Statement();
   Json told = poses.Describe(plan);
   told.update(

@@ -5,7 +5,6 @@
 #include "Ranks.h"
 #include "vtkMessageTrap.h"
 #include "vtkRunTrees.h"
-#include "vtkTimedPolyData.h"
 
 #include "vtkCenterlineTracker.h"
 #include "vtkCoronaryArrayNames.h"
@@ -36,7 +35,7 @@ namespace names = vtkCoronaryArrayNames;
 constexpr int LeastPhases = 4;
 constexpr double SamePhase = 0.02; // of R-R
 
-/// Taken for the phase of masks and surfaces, which do not tell it: most are of mid-diastole.
+/// Taken for the phase of what does not tell it, as masks and surfaces: most are of mid-diastole.
 constexpr double UsualPhase = 0.75;
 
 int DifferentPhases(vtkGatedImageReader* reader)
@@ -54,11 +53,30 @@ int DifferentPhases(vtkGatedImageReader* reader)
   return static_cast<int>(times.size());
 }
 
+/// Whether the input tells where in the cycle its only phase is. A reader that does not know puts it at 0.
+bool TellsPhase(const RunInput& input)
+{
+  const std::vector<std::string>& files = input.Settings.input;
+  return input.Chosen &&
+    (input.Chosen->time != 0.0 || !input.Settings.fractions.empty() ||
+      input.Reader->GetNumberOfPhases() > 1 ||
+      (files.size() == 1 && files.front().size() > 5 &&
+        files.front().substr(files.front().size() - 5) == ".json"));
+}
+
 double ReferenceOf(const RunInput& input)
 {
-  return input.Chosen                    ? input.Chosen->time
+  return TellsPhase(input)               ? input.Chosen->time
     : std::isfinite(input.Settings.time) ? input.Settings.time
                                          : UsualPhase;
+}
+
+std::vector<double> TimesOf(vtkAlgorithm* algorithm)
+{
+  vtkInformation* info = algorithm->GetOutputInformation(0);
+  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
+  const double* steps = info->Get(key);
+  return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
 }
 
 std::string Text(vtkDataSet* data, const char* name, vtkIdType n)
@@ -107,6 +125,7 @@ PopulationPoses::PopulationPoses(
   this->Motion->SetInputDataObject(1, skeleton);
   this->Motion->AutomaticReferenceOff();
   this->Motion->SetReferenceTime(ReferenceOf(step.input));
+  this->Guessed = !TellsPhase(step.input) && !std::isfinite(settings.time);
   this->Motion->SetAmplitude(settings.motionAmplitude);
   this->Motion->SetHeartRate(std::isfinite(settings.heartRate) ? settings.heartRate : 0.0);
   if (plan.hasPhases)
@@ -130,10 +149,14 @@ void PopulationPoses::Update(const RunStep& step, const std::function<void(doubl
 
 std::vector<double> PopulationPoses::Times() const
 {
-  vtkInformation* info = this->Motion->GetOutputInformation(0);
-  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
-  const double* steps = info->Get(key);
-  return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
+  return TimesOf(this->Motion);
+}
+
+std::string PopulationPoses::Assumption() const
+{
+  return this->Guessed ? "the files do not tell their phase: it is taken for 75 % of R-R "
+                         "(--time or --fractions tells it)"
+                       : "";
 }
 
 std::string PopulationPoses::Statement() const
@@ -173,17 +196,21 @@ Json PopulationPoses::Describe(const MotionPlan& plan) const
     { "phases", static_cast<int>(number(names::MotionPhases, 0)) },
     { "heart_rate", 60.0 / number(names::CycleLength, 0) },
     { "amplitude", this->Motion->GetAmplitude() },
-    { "reference_time", this->Motion->GetReferenceTime() }, { "heart", heart },
-    { "parameters", parameters } };
+    { "reference_time", this->Motion->GetReferenceTime() }, { "reference_told", !this->Guessed },
+    { "heart", heart }, { "parameters", parameters } };
   if (lines->GetFieldData()->GetArray(names::PopulationMisfit)->GetNumberOfValues() == 2)
   {
     told["misfit_mm"] = { { "population", number(names::PopulationMisfit, 0) },
       { "bent", number(names::PopulationMisfit, 1) } };
   }
+  // What is not among these is the population's alone.
+  told["tracked_times"] = { this->Motion->GetReferenceTime() };
+  told["tracked_share"] = { 1.0 };
   if (plan.hasPhases)
   {
-    auto* tracked = vtkDataSet::SafeDownCast(this->Tracker->GetOutputDataObject(0));
-    told["tracked_share"] = Numbers(tracked, names::TrackedShare);
+    told["tracked_times"] = TimesOf(this->Tracker);
+    told["tracked_share"] =
+      Numbers(vtkDataSet::SafeDownCast(this->Tracker->GetOutputDataObject(0)), names::TrackedShare);
   }
   return told;
 }

@@ -51,6 +51,9 @@ public:
   /// At which they are given.
   std::vector<double> Times() const;
 
+  /// What had to be assumed, one sentence; empty: nothing.
+  std::string Assumption() const;
+
   /// One sentence for people.
   std::string Statement() const;
 
@@ -61,6 +64,7 @@ public:
 
 private:
   vtkNew<vtkCenterlineTracker> Tracker;
+  bool Guessed = false; ///< the reference
 };
 }
 

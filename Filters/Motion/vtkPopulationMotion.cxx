@@ -190,6 +190,7 @@ void vtkPopulationMotion::Move(vtkInformationVector** inputs, vtkInformation* ou
   Require(this->NumberOfSteps >= 4 && this->NumberOfSteps <= 200, "NumberOfSteps must be 4 to 200");
   Require(this->HeartRate == 0.0 || (this->HeartRate >= 30.0 && this->HeartRate <= 180.0),
     "HeartRate must be 0, or 30 to 180");
+  Require(this->Amplitude >= 0.0 && this->Amplitude <= 2.0, "Amplitude must be 0 to 2");
   data.Reference = this->ReferenceTime;
   if (this->AutomaticReference)
   {
@@ -312,8 +313,7 @@ int vtkPopulationMotion::RequestData(
   }
   catch (...)
   {
-    return vtkCoronary::FinishFailedRequest(
-      this, outputs, "for the motion", { "PopulationMotionSettings: " });
+    return vtkCoronary::FinishFailedRequest(this, outputs, "for the motion");
   }
 }
 
