@@ -74,6 +74,7 @@ private:
   bool PlaceSeeds();
   void MarchFromSeeds();
   void Calibrate(const MeasuredPath& path);
+  void MeasureBlur();
   void CorrectRadii();
   void SettleOstia();
   std::int64_t Append(const MinimalPath& way, int treeId, bool wanted);
@@ -290,33 +291,40 @@ void Extractor::Calibrate(const MeasuredPath& path)
   }
 }
 
-/// Half-maximum radii to true ones. How blurred the image is shows in the small vessels: the less
-/// of the great vessels' contrast they have at their size, the more.
+/// How blurred the image is shows in the small vessels: the less of the great vessels' contrast they have at their size,
+/// the more.
+void Extractor::MeasureBlur()
+{
+  const LumenReference& reference = this->Paths.lumen.reference;
+  const double contrast = reference.lumen - reference.background;
+  if (this->Settings.blur != 0.0 || !this->Input.intensity || !(contrast > 0.0))
+  {
+    return;
+  }
+  std::vector<double> blurs;
+  for (std::size_t p = 0; p < this->Tree.points.size(); ++p)
+  {
+    const double share = (this->PointLumen[p] - reference.background) / contrast;
+    if (this->Tree.confidence[p] > 0.8 && share > 0.4 && share < 0.85)
+    {
+      blurs.push_back(BlurFromContrast(this->Tree.radius[p], share));
+    }
+  }
+  if (blurs.size() >= 20)
+  {
+    this->Blur = std::min(
+      std::max(MedianOf(std::move(blurs)), 0.4 * this->Paths.voxel), 4.0 * this->Paths.voxel);
+  }
+}
+
+/// Half-maximum radii to true ones.
 void Extractor::CorrectRadii()
 {
   if (!this->Input.intensity)
   {
     return;
   }
-  const LumenReference& reference = this->Paths.lumen.reference;
-  const double contrast = reference.lumen - reference.background;
-  if (this->Settings.blur == 0.0 && contrast > 0.0)
-  {
-    std::vector<double> blurs;
-    for (std::size_t p = 0; p < this->Tree.points.size(); ++p)
-    {
-      const double share = (this->PointLumen[p] - reference.background) / contrast;
-      if (this->Tree.confidence[p] > 0.8 && share > 0.4 && share < 0.85)
-      {
-        blurs.push_back(BlurFromContrast(this->Tree.radius[p], share));
-      }
-    }
-    if (blurs.size() >= 20)
-    {
-      this->Blur = std::min(
-        std::max(MedianOf(std::move(blurs)), 0.4 * this->Paths.voxel), 2.0 * this->Paths.voxel);
-    }
-  }
+  this->MeasureBlur();
   this->Result.blur = this->Blur;
   // A vessel thinner than half the blur shows less than 12 % of its contrast: what is seen is wider,
   // and what was measured narrower, or continued into the parent, is not the vessel's width.
@@ -902,6 +910,9 @@ CenterlineResult Extractor::Run()
     if (this->Settings.findTips || this->Input.targets.empty())
     {
       this->FindTips();
+      // What is thinner than the region shows what the blur leaves of it.
+      this->MeasureBlur();
+      this->Paths.lumen.blur = this->Blur;
       this->FollowThinBranches();
       this->TurnBranches();
       this->LengthenTips();

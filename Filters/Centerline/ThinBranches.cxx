@@ -28,8 +28,6 @@ constexpr double MinimumContrast = 0.12;
 constexpr double Significance = 8.0;
 /// Distance of a path's samples, in voxels.
 constexpr double Stride = 0.75;
-/// How far a tip is followed, in voxels.
-constexpr double MostBeyondTip = 30.0;
 
 /// The lumens of a tree, for "how far is the nearest wall".
 class LumenDistance
@@ -49,6 +47,16 @@ public:
     {
       this->Cells[this->Key(tree.points[p], 0, 0, 0)].push_back(static_cast<std::int32_t>(p));
     }
+    this->BranchOf.assign(tree.points.size(), NoBranch);
+    for (std::size_t b = 0; b < tree.branches.size(); ++b)
+    {
+      for (const std::int64_t p : tree.branches[b].points)
+      {
+        // The first point may be its parent's, which comes before.
+        std::int32_t& owner = this->BranchOf[static_cast<std::size_t>(p)];
+        owner = owner == NoBranch ? static_cast<std::int32_t>(b) : owner;
+      }
+    }
   }
 
   struct Nearest
@@ -57,7 +65,10 @@ public:
     std::int32_t point = -1;
   };
 
-  Nearest operator()(const Vector3& position) const
+  static constexpr std::int32_t NoBranch = -1;
+
+  /// @param without  a branch whose lumen does not count
+  Nearest operator()(const Vector3& position, std::int32_t without = NoBranch) const
   {
     Nearest nearest{ this->Reach };
     for (int near = 0; near < 27; ++near)
@@ -70,6 +81,10 @@ public:
       }
       for (const std::int32_t p : cell->second)
       {
+        if (without != NoBranch && this->BranchOf[static_cast<std::size_t>(p)] == without)
+        {
+          continue;
+        }
         const double wall = (this->Tree.points[p] - position).norm() - this->Tree.radius[p];
         if (wall < nearest.wall || (wall == nearest.wall && p < nearest.point))
         {
@@ -96,6 +111,7 @@ private:
   double Reach;
   double Cell = 1.0;
   std::unordered_map<std::int64_t, std::vector<std::int32_t>> Cells;
+  std::vector<std::int32_t> BranchOf; ///< of a point of the tree
 };
 
 class Finder
@@ -116,7 +132,7 @@ public:
   }
 
   std::vector<ThinBranch> Run() const;
-  TipPath FollowTip(const VesselTree::Branch& branch) const;
+  TipPath FollowTip(std::int32_t number) const;
 
 private:
   struct Spot
@@ -137,7 +153,8 @@ private:
   double Core(const Vector3& position, const CrossFrame& frame) const;
   double Profile(const Vector3& position, const Vector3& tangent) const;
   double Ahead(const Vector3& position, const Vector3& direction) const;
-  bool Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const;
+  bool Evidence(
+    const Vector3& position, const Vector3& tangent, std::int32_t own, Sample& sample) const;
   Vector3 Turn(const Vector3& position, const Vector3& direction) const;
   Vector3 Centre(const Vector3& position, const Vector3& tangent) const;
   /// What a path must show.
@@ -157,7 +174,7 @@ private:
     }
   };
   bool Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
-    const Bar& bar, std::vector<Sample>& samples) const;
+    std::int32_t own, const Bar& bar, std::vector<Sample>& samples) const;
   bool IsVessel(const std::vector<Sample>& samples, const Bar& bar, double& contrast,
     double& significance) const;
   bool Follow(const Spot& spot, ThinBranch& branch) const;
@@ -300,7 +317,10 @@ double Finder::Ahead(const Vector3& position, const Vector3& direction) const
   return 0.25 * sum;
 }
 
-bool Finder::Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const
+/// @param own  the branch that it belongs to: its lumen may be wider than the sectors are away
+/// @returns false if too much around it lies in lumens that are known
+bool Finder::Evidence(
+  const Vector3& position, const Vector3& tangent, std::int32_t own, Sample& sample) const
 {
   const double voxel = this->Settings.voxel;
   const CrossFrame frame(tangent);
@@ -312,7 +332,7 @@ bool Finder::Evidence(const Vector3& position, const Vector3& tangent, Sample& s
   {
     const Vector3 side = frame.Ray(i, Sectors);
     const Vector3 place = position + 3.0 * voxel * side;
-    if (this->Lumen(place).wall < 1.5 * voxel)
+    if (this->Lumen(place, own).wall < 1.5 * voxel)
     {
       continue;
     }
@@ -386,16 +406,17 @@ Vector3 Finder::Centre(const Vector3& position, const Vector3& tangent) const
 
 /// Follows the tube, as far as the path speaks for a vessel.
 /// @param ownLumen  so many samples may lie in the tree's lumen
+/// @param own       the branch that goes on, or LumenDistance::NoBranch
 /// @returns false if it leads into a vessel that is known
 bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
-  const Bar& bar, std::vector<Sample>& samples) const
+  std::int32_t own, const Bar& bar, std::vector<Sample>& samples) const
 {
   const double step = Stride * this->Settings.voxel;
   constexpr std::size_t window = 8;
   while (samples.size() < most && this->Image.Contains(position))
   {
     Sample sample;
-    if (!this->Evidence(position, direction, sample))
+    if (!this->Evidence(position, direction, own, sample))
     {
       sample.minimum = bar.unknownGoesOn ? bar.Going(sample) : 0.0;
     }
@@ -500,7 +521,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   bar.minimum = minimum;
   bar.significance = Significance;
   bar.going = 0.5 * minimum;
-  if (!this->Trace(position, direction, most, 0, bar, samples))
+  if (!this->Trace(position, direction, most, 0, LumenDistance::NoBranch, bar, samples))
   {
     return false;
   }
@@ -565,8 +586,9 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   return true;
 }
 
-TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
+TipPath Finder::FollowTip(std::int32_t number) const
 {
+  const VesselTree::Branch& branch = this->Tree.branches[static_cast<std::size_t>(number)];
   const double voxel = this->Settings.voxel;
   const auto index = [&](std::size_t i) { return static_cast<std::size_t>(branch.points[i]); };
   const auto point = [&](std::size_t i) -> const Vector3& { return this->Tree.points[index(i)]; };
@@ -594,7 +616,7 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   for (std::size_t i = far; i < near; ++i)
   {
     Sample sample;
-    if (this->Evidence(point(i), back.normalized(), sample))
+    if (this->Evidence(point(i), back.normalized(), number, sample))
     {
       contrasts.push_back(sample.minimum);
       cores.push_back(sample.core);
@@ -618,8 +640,9 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   std::vector<Sample> samples;
   double contrast = 0.0;
   double significance = 0.0;
-  if (!this->Trace(this->Centre(point(near), direction), direction,
-        own + static_cast<std::size_t>(MostBeyondTip / Stride), own, bar, samples) ||
+  const auto most = own + static_cast<std::size_t>(this->Settings.maximumLength / (Stride * voxel));
+  if (!this->Trace(
+        this->Centre(point(near), direction), direction, most, own, number, bar, samples) ||
     samples.size() < 4 || !this->IsVessel(samples, bar, contrast, significance))
   {
     return {};
@@ -731,7 +754,7 @@ std::vector<TipPath> FollowTips(
       for (std::int64_t b = first; b < last; ++b)
       {
         const auto branch = static_cast<std::size_t>(b);
-        paths[branch] = finder.FollowTip(tree.branches[branch]);
+        paths[branch] = finder.FollowTip(static_cast<std::int32_t>(b));
       }
     });
   return paths;
