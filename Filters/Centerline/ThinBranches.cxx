@@ -174,7 +174,7 @@ private:
     }
   };
   bool Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
-    std::int32_t own, const Bar& bar, std::vector<Sample>& samples) const;
+    const Bar& bar, std::vector<Sample>& samples) const;
   bool IsVessel(const std::vector<Sample>& samples, const Bar& bar, double& contrast,
     double& significance) const;
   bool Follow(const Spot& spot, ThinBranch& branch) const;
@@ -317,7 +317,7 @@ double Finder::Ahead(const Vector3& position, const Vector3& direction) const
   return 0.25 * sum;
 }
 
-/// @param own  the branch that it belongs to: its lumen may be wider than the sectors are away
+/// @param own  the branch that it belongs to: blurred, its lumen comes near the sectors
 /// @returns false if too much around it lies in lumens that are known
 bool Finder::Evidence(
   const Vector3& position, const Vector3& tangent, std::int32_t own, Sample& sample) const
@@ -332,7 +332,10 @@ bool Finder::Evidence(
   {
     const Vector3 side = frame.Ray(i, Sectors);
     const Vector3 place = position + 3.0 * voxel * side;
-    if (this->Lumen(place, own).wall < 1.5 * voxel)
+    const double wall = this->Lumen(place).wall;
+    if (wall < 1.5 * voxel &&
+      (own == LumenDistance::NoBranch || wall < 0.75 * voxel ||
+        this->Lumen(place, own).wall < 1.5 * voxel))
     {
       continue;
     }
@@ -406,17 +409,16 @@ Vector3 Finder::Centre(const Vector3& position, const Vector3& tangent) const
 
 /// Follows the tube, as far as the path speaks for a vessel.
 /// @param ownLumen  so many samples may lie in the tree's lumen
-/// @param own       the branch that goes on, or LumenDistance::NoBranch
 /// @returns false if it leads into a vessel that is known
 bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
-  std::int32_t own, const Bar& bar, std::vector<Sample>& samples) const
+  const Bar& bar, std::vector<Sample>& samples) const
 {
   const double step = Stride * this->Settings.voxel;
   constexpr std::size_t window = 8;
   while (samples.size() < most && this->Image.Contains(position))
   {
     Sample sample;
-    if (!this->Evidence(position, direction, own, sample))
+    if (!this->Evidence(position, direction, LumenDistance::NoBranch, sample))
     {
       sample.minimum = bar.unknownGoesOn ? bar.Going(sample) : 0.0;
     }
@@ -521,7 +523,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   bar.minimum = minimum;
   bar.significance = Significance;
   bar.going = 0.5 * minimum;
-  if (!this->Trace(position, direction, most, 0, LumenDistance::NoBranch, bar, samples))
+  if (!this->Trace(position, direction, most, 0, bar, samples))
   {
     return false;
   }
@@ -641,8 +643,7 @@ TipPath Finder::FollowTip(std::int32_t number) const
   double contrast = 0.0;
   double significance = 0.0;
   const auto most = own + static_cast<std::size_t>(this->Settings.maximumLength / (Stride * voxel));
-  if (!this->Trace(
-        this->Centre(point(near), direction), direction, most, own, number, bar, samples) ||
+  if (!this->Trace(this->Centre(point(near), direction), direction, most, own, bar, samples) ||
     samples.size() < 4 || !this->IsVessel(samples, bar, contrast, significance))
   {
     return {};
