@@ -81,7 +81,7 @@ private:
   void Own(std::size_t branch);
   void FindTips();
   bool ThinBranchesFor(ThinBranchSettings& settings) const;
-  void FollowThinBranches();
+  void FollowThinBranches(std::int64_t from);
   void LengthenTips();
   void TurnBranches();
   void Remove(std::size_t index);
@@ -626,34 +626,52 @@ bool Extractor::ExcludeVeins(
 }
 
 /// What is too thin for the region, by the image alone.
-void Extractor::FollowThinBranches()
+/// @param from  points of the tree before this one are not looked beside
+void Extractor::FollowThinBranches(std::int64_t from)
 {
   ThinBranchSettings settings;
   if (!this->ThinBranchesFor(settings))
   {
     return;
   }
-  // Several spots lead to one vessel: what was followed once, whether to keep or not, is done.
+  // Several spots lead to one vessel: what was followed once is done. What could not be kept may be a vessel that was
+  // entered from a wrong place: it is not followed again from there.
   std::vector<Vector3> done;
-  for (const ThinBranch& branch : FindThinBranches(*this->Paths.image, this->Tree, settings))
+  std::vector<Vector3> refused;
+  for (const ThinBranch& branch : FindThinBranches(*this->Paths.image, this->Tree, settings, from))
   {
-    std::size_t known = 0;
-    for (const Vector3& point : branch.points)
+    const auto isKnown = [&](const std::vector<Vector3>& places, std::size_t first)
     {
-      known += std::any_of(done.begin(), done.end(),
-        [&](const Vector3& other)
-        { return (other - point).squaredNorm() < 4.0 * this->Paths.voxel * this->Paths.voxel; });
-    }
-    if (2 * known > branch.points.size() || this->Excluded.LeadsInside(branch.points))
+      std::size_t known = 0;
+      for (std::size_t i = 0; i < first; ++i)
+      {
+        known += std::any_of(places.begin(), places.end(),
+          [&](const Vector3& other) {
+            return (other - branch.points[i]).squaredNorm() <
+              4.0 * this->Paths.voxel * this->Paths.voxel;
+          });
+      }
+      return 2 * known > first;
+    };
+    const std::size_t beginning = std::max<std::size_t>(4, branch.points.size() / 4);
+    if (isKnown(done, branch.points.size()) || isKnown(refused, beginning) ||
+      this->Excluded.LeadsInside(branch.points))
     {
       continue;
     }
-    done.insert(done.end(), branch.points.begin(), branch.points.end());
     MinimalPath way;
     way.owner = branch.parent;
     way.points.assign(branch.points.rbegin(), branch.points.rend());
     const auto parent = static_cast<std::size_t>(this->BranchOf[branch.parent]);
-    this->Append(way, this->Tree.branches[parent].treeId, false);
+    if (this->Append(way, this->Tree.branches[parent].treeId, false) >= 0)
+    {
+      done.insert(done.end(), branch.points.begin(), branch.points.end());
+    }
+    else
+    {
+      refused.insert(refused.end(), branch.points.begin(),
+        branch.points.begin() + static_cast<std::ptrdiff_t>(beginning));
+    }
   }
 }
 
@@ -913,9 +931,12 @@ CenterlineResult Extractor::Run()
       // What is thinner than the region shows what the blur leaves of it.
       this->MeasureBlur();
       this->Paths.lumen.blur = this->Blur;
-      this->FollowThinBranches();
+      this->FollowThinBranches(0);
       this->TurnBranches();
+      const auto known = static_cast<std::int64_t>(this->Tree.points.size());
       this->LengthenTips();
+      // Beyond the region vessels part as well.
+      this->FollowThinBranches(known);
     }
     this->FollowTargets();
   }

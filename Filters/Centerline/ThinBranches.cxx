@@ -131,7 +131,7 @@ public:
     }
   }
 
-  std::vector<ThinBranch> Run() const;
+  std::vector<ThinBranch> Run(std::int64_t from) const;
   TipPath FollowTip(std::int32_t number) const;
 
 private:
@@ -149,7 +149,7 @@ private:
     double wall; ///< mm from the tree's lumen
   };
 
-  std::vector<Spot> FindSpots() const;
+  std::vector<Spot> FindSpots(std::int64_t from) const;
   double Core(const Vector3& position, const CrossFrame& frame) const;
   double Profile(const Vector3& position, const Vector3& tangent) const;
   double Ahead(const Vector3& position, const Vector3& direction) const;
@@ -188,14 +188,14 @@ private:
 };
 
 /// Local maxima of the image on surfaces beside the lumens.
-std::vector<Finder::Spot> Finder::FindSpots() const
+std::vector<Finder::Spot> Finder::FindSpots(std::int64_t from) const
 {
   const double voxel = this->Settings.voxel;
   std::vector<Spot> spots;
   for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     const std::size_t count = branch.points.size();
-    if (count < 3)
+    if (count < 3 || branch.points.back() < from)
     {
       continue;
     }
@@ -276,6 +276,10 @@ std::vector<Finder::Spot> Finder::FindSpots() const
             continue;
           }
           const auto parent = static_cast<std::int32_t>(branch.points[row * stride]);
+          if (parent < from)
+          {
+            continue;
+          }
           spots.push_back(
             { position, (position - this->Tree.points[parent]).normalized(), parent });
         }
@@ -664,13 +668,13 @@ TipPath Finder::FollowTip(std::int32_t number) const
   return beyond ? path : TipPath();
 }
 
-std::vector<ThinBranch> Finder::Run() const
+std::vector<ThinBranch> Finder::Run(std::int64_t from) const
 {
   if (this->Tree.points.empty())
   {
     return {};
   }
-  const std::vector<Spot> spots = this->FindSpots();
+  const std::vector<Spot> spots = this->FindSpots(from);
   std::vector<ThinBranch> branches(spots.size());
   std::vector<char> found(spots.size(), 0);
   ParallelFor(static_cast<std::int64_t>(spots.size()), 4,
@@ -736,11 +740,11 @@ void ThinBranchSettings::Validate() const
   require(this->contrast > 0.0, "contrast must be positive");
 }
 
-std::vector<ThinBranch> FindThinBranches(
-  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
+std::vector<ThinBranch> FindThinBranches(const ImageInterpolator& image, const VesselTree& tree,
+  const ThinBranchSettings& settings, std::int64_t from)
 {
   settings.Validate();
-  return Finder(image, tree, settings).Run();
+  return Finder(image, tree, settings).Run(from);
 }
 
 std::vector<TipPath> FollowTips(
