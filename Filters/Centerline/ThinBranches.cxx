@@ -26,6 +26,8 @@ constexpr double DeepestValley = 0.1;
 constexpr double MinimumContrast = 0.12;
 /// Standard errors of noise that the path's mean must exceed.
 constexpr double Significance = 8.0;
+/// Contrast of a path that turns to what is brightest in noise alone, in standard deviations of the noise.
+constexpr double NoisePath = 1.5;
 /// Distance of a path's samples, in voxels.
 constexpr double Stride = 0.75;
 
@@ -146,7 +148,9 @@ private:
     Vector3 position;
     double minimum; ///< core over the second brightest sector around it
     double core;
-    double wall; ///< mm from the tree's lumen
+    double wall;        ///< mm from the tree's lumen
+    double going = 0.0; ///< contrast that speaks neither for going on nor against it, there
+    bool known = true;  ///< whether the contrast can be seen
   };
 
   std::vector<Spot> FindSpots(std::int64_t from) const;
@@ -167,6 +171,8 @@ private:
     double goingBright = 0.0;
     double bright = std::numeric_limits<double>::infinity();
     bool unknownGoesOn = false; ///< where the contrast can not be seen
+    /// Above 0: vessels taper, and blur makes thin ones fade. What counts is what the last samples showed, down to this.
+    double least = 0.0;
 
     double Going(const Sample& sample) const
     {
@@ -175,6 +181,7 @@ private:
   };
   bool Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
     const Bar& bar, std::vector<Sample>& samples) const;
+  static void Adapt(const std::vector<Sample>& samples, const Bar& first, Bar& bar);
   bool IsVessel(const std::vector<Sample>& samples, const Bar& bar, double& contrast,
     double& significance) const;
   bool Follow(const Spot& spot, ThinBranch& branch) const;
@@ -411,6 +418,33 @@ Vector3 Finder::Centre(const Vector3& position, const Vector3& tangent) const
   return centre;
 }
 
+/// What a vessel must show to go on, by what it showed some samples before.
+void Finder::Adapt(const std::vector<Sample>& samples, const Bar& first, Bar& bar)
+{
+  constexpr std::size_t begin = 16;
+  constexpr std::size_t end = 4; // of them count: an end is abrupt
+  constexpr std::size_t enough = 6;
+  std::vector<double> contrasts;
+  std::vector<double> cores;
+  for (std::size_t i = samples.size() > begin ? samples.size() - begin : 0;
+       i + end < samples.size(); ++i)
+  {
+    if (samples[i].known)
+    {
+      contrasts.push_back(samples[i].minimum);
+      cores.push_back(samples[i].core);
+    }
+  }
+  if (contrasts.size() < enough)
+  {
+    return;
+  }
+  const double half = 0.5 * MedianOf(std::move(contrasts));
+  bar.going = std::clamp(half, first.least, std::max(first.least, first.going));
+  bar.goingBright = std::min(bar.going, first.goingBright);
+  bar.bright = MedianOf(std::move(cores)) - half;
+}
+
 /// Follows the tube, as far as the path speaks for a vessel.
 /// @param ownLumen  so many samples may lie in the tree's lumen
 /// @returns false if it leads into a vessel that is known
@@ -419,12 +453,19 @@ bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::s
 {
   const double step = Stride * this->Settings.voxel;
   constexpr std::size_t window = 8;
+  Bar now = bar;
   while (samples.size() < most && this->Image.Contains(position))
   {
     Sample sample;
-    if (!this->Evidence(position, direction, LumenDistance::NoBranch, sample))
+    sample.known = this->Evidence(position, direction, LumenDistance::NoBranch, sample);
+    if (bar.least > 0.0)
     {
-      sample.minimum = bar.unknownGoesOn ? bar.Going(sample) : 0.0;
+      Adapt(samples, bar, now);
+    }
+    sample.going = now.Going(sample);
+    if (!sample.known)
+    {
+      sample.minimum = bar.unknownGoesOn ? sample.going : 0.0;
     }
     sample.wall = this->Lumen(position).wall;
     if (sample.wall < 0.0 && samples.size() >= ownLumen)
@@ -437,7 +478,7 @@ bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::s
       double recent = 0.0;
       for (std::size_t i = samples.size() - window; i < samples.size(); ++i)
       {
-        recent += (samples[i].minimum - bar.Going(samples[i])) / static_cast<double>(window);
+        recent += (samples[i].minimum - samples[i].going) / static_cast<double>(window);
       }
       if (recent < 0.0)
       {
@@ -460,7 +501,7 @@ bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::s
   double top = 0.0;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {
-    sum += samples[i].minimum - bar.Going(samples[i]);
+    sum += samples[i].minimum - samples[i].going;
     if (sum > top)
     {
       top = sum;
@@ -481,7 +522,7 @@ bool Finder::IsVessel(
   for (const Sample& sample : samples)
   {
     contrast += sample.minimum / count;
-    clear += sample.minimum >= bar.Going(sample) ? 1 : 0;
+    clear += sample.minimum >= sample.going ? 1 : 0;
   }
   // Samples three voxels apart are independent; four in the core, four in a sector.
   const double independent = std::max(1.0, count * Stride / 3.0);
@@ -633,7 +674,9 @@ TipPath Finder::FollowTip(std::int32_t number) const
   Bar bar;
   bar.minimum = 0.5 * minimum;
   bar.significance = 0.5 * Significance;
-  bar.going = std::max(0.25 * minimum, 0.5 * usual);
+  // A path that follows the noise shows as much as that.
+  bar.least = std::max(0.25 * minimum, NoisePath * this->Noise);
+  bar.going = std::max(bar.least, 0.5 * usual);
   bar.goingBright = std::min(bar.going, 0.5 * minimum);
   if (!cores.empty())
   {

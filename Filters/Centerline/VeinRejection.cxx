@@ -300,7 +300,8 @@ double VeinFinder::TipRadius(const Path& path) const
 {
   const double length = path.empty() ? 0.0 : path.back().passed;
   std::vector<double> radii = this->Radii(path, length - 3.0, length + 1.0);
-  return radii.empty() ? this->Blur : std::max(1e-9, MedianOf(std::move(radii)));
+  // How thin a lumen is that is thinner than the blur its width does not tell.
+  return std::max({ this->Blur, radii.empty() ? 0.0 : MedianOf(std::move(radii)), 1e-9 });
 }
 
 /// Whether there is blood, and no calcium, ahead of a tip.
