@@ -363,6 +363,10 @@ void RunOptions::DeclareMotion(Declaration& all)
       "Between the tracked phases: linear, cubic or low-noise")
     .Check(OneOf(InterpolationModes()))
     .ShowDefault();
+  all.Add("!--no-limits", "limits", settings.limits, "",
+    "Take the tracked motion as it is, neither smoothed where it is known badly nor kept within "
+    "limits of bending, "
+    "strain and steps");
 
   all.Begin("", -1);
   all.Add("--compress", "compress", settings.compress, "", "Compress the image files");

@@ -72,6 +72,7 @@ struct RunSettings
   std::string tracked = "all"; ///< or "even"
   std::vector<double> moments; ///< empty: the phases of the series
   std::string interpolation = "cubic";
+  bool limits = true; ///< of the motion
 
   int threads = 0;
   bool compress = false;

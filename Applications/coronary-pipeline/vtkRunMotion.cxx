@@ -4,11 +4,13 @@
 #include "FileSeries.h"
 #include "Interruption.h"
 #include "MeshSequenceReport.h"
+#include "MotionRegularization.h"
 #include "Ranks.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
+#include "vtkRunLimits.h"
 #include "vtkRunPopulation.h"
 #include "vtkRunTrees.h"
 #include "vtkTimedPolyData.h"
@@ -20,6 +22,7 @@
 #include "vtkInformation.h"
 #include "vtkInformationDoubleVectorKey.h"
 #include "vtkMeshSequenceWriter.h"
+#include "vtkMotionRegularizer.h"
 #include "vtkPolyData.h"
 #include "vtkPopulationMotion.h"
 #include "vtkSkinDeformation.h"
@@ -261,18 +264,33 @@ Json MakeMotion(RunStep& step)
   const auto skeleton = ReadLines(step, "skeleton.vtp");
   vtkNew<vtkCenterlineTracker> tracker;
   tracker->SetInputConnection(step.input.Reader->GetOutputPort());
-  tracker->SetInputDataObject(1, ReadTree(step));
+  const auto tree = ReadTree(step);
+  tracker->SetInputDataObject(1, tree);
   tracker->SetInputDataObject(2, skeleton);
   tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
   tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
                                                        : vtkCenterlineTracker::AllPhases);
   tracker->SetSharing(&Ranks());
   const std::vector<double> times = Moments(step.input);
+  // What was measured is kept to as far as it is known; between the phases and the mesh is what was made of it.
+  vtkNew<vtkMotionRegularizer> keptLines;
+  keptLines->SetInputConnection(0, tracker->GetOutputPort(0));
+  keptLines->SetInputDataObject(1, tree);
+  vtkNew<vtkMotionRegularizer> keptSkeleton;
+  keptSkeleton->SetInputConnection(0, tracker->GetOutputPort(1));
+  keptSkeleton->SetInputDataObject(1, skeleton);
+  tracker->UpdateInformation();
+  for (vtkMotionRegularizer* kept : { keptLines.Get(), keptSkeleton.Get() })
+  {
+    kept->SetTemporalWeight(TemporalWeightOf(TimeSteps(tracker).size()));
+  }
   vtkNew<vtkCardiacPhaseInterpolator> lines;
-  lines->SetInputConnection(tracker->GetOutputPort(0));
+  lines->SetInputConnection(
+    settings.limits ? keptLines->GetOutputPort() : tracker->GetOutputPort(0));
   lines->SetMode(InterpolationMode(settings.interpolation));
   MovingMesh moving;
-  moving.Interpolator->SetInputConnection(tracker->GetOutputPort(1));
+  moving.Interpolator->SetInputConnection(
+    settings.limits ? keptSkeleton->GetOutputPort() : tracker->GetOutputPort(1));
   ConnectMesh(step, skeleton, moving);
 
   // The images are read now.
@@ -289,11 +307,17 @@ Json MakeMotion(RunStep& step)
   }
   vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
   step.summary = std::to_string(times.size()) + " moments";
+  Json limits = { { "applied", settings.limits } };
+  if (settings.limits)
+  {
+    limits.update(DescribeLimits(keptLines, keptSkeleton, tree, messages));
+  }
   return { { "possible", true }, { "motion", "tracked" }, { "file", "motion.pvd" },
     { "series", lists }, { "quality", "motion/mesh.json" }, { "times", times },
     { "tracked_times", TimeSteps(tracker) },
     { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
     { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
+    { "filled", DescribeFilled(tracker, tree, messages) }, { "limits", limits },
     { "inverted_tetrahedra", InvertedTetrahedra(moving) } };
 }
 }

@@ -29,15 +29,26 @@ constexpr int NoData = 125; // what CTest takes as skipped
 constexpr double MaximumMean[2] = { 0.40, 0.6 };
 constexpr double MaximumPercentile[2] = { 0.9, 2.0 };
 
+const std::vector<std::string> VesselNames = { "RCA", "AM", "LAD", "D1", "LCx", "OM1", "OM2" };
+
+/// When a vessel may be hidden: early systole, three of the frames that are tracked.
+bool IsHidden(double time)
+{
+  return time > 0.23 && time < 0.41;
+}
+
 /// What a CT of the moving heart shows.
 class Scanner
 {
 public:
-  Scanner(const Heart& heart, const CarriedTree& tree, double spacing, double window, int moments)
+  /// @param hidden  vessel that is not shown in systole; -1: none
+  Scanner(const Heart& heart, const CarriedTree& tree, double spacing, double window, int moments,
+    int hidden)
     : Body(heart)
     , Tree(tree)
     , Window(window)
     , Moments(window > 0.0 ? moments : 1)
+    , Hidden(hidden)
   {
     Vector3 low = Vector3::Constant(std::numeric_limits<double>::infinity());
     Vector3 high = -low;
@@ -63,10 +74,11 @@ public:
   ScalarImage ImageAt(double time)
   {
     std::vector<float> sum(this->Voxels, 0.0F);
+    const int hidden = IsHidden(time) ? this->Hidden : -1;
     for (int m = 0; m < this->Moments; ++m)
     {
       const double at = time + this->Window / CycleSeconds * ((m + 0.5) / this->Moments - 0.5);
-      this->AddMoment(at, sum);
+      this->AddMoment(at, hidden, sum);
     }
     this->Blur(sum);
     this->Values.resize(this->Voxels);
@@ -144,7 +156,7 @@ private:
     return distance;
   }
 
-  void AddMoment(double time, std::vector<float>& sum) const
+  void AddMoment(double time, int hidden, std::vector<float>& sum) const
   {
     const std::vector<Vector3> points = this->Body.At(time);
     const double spacing = this->Grid.spacing[0];
@@ -153,7 +165,7 @@ private:
     const std::vector<float> outside = this->DistanceTo(heart, true);
     const std::vector<float> depth = this->DistanceTo(heart, false);
     const std::vector<float> fromLeft = this->DistanceTo(left, true);
-    const std::vector<float> lumen = this->LumenOf(this->Tree.At(points));
+    const std::vector<float> lumen = this->LumenOf(this->Tree.At(points), hidden);
     for (std::size_t n = 0; n < sum.size(); ++n)
     {
       // The right ventricle's wall is 4 mm thick, the septum 9 mm.
@@ -168,14 +180,15 @@ private:
     }
   }
 
-  std::vector<float> LumenOf(const std::vector<Vector3>& points) const
+  std::vector<float> LumenOf(const std::vector<Vector3>& points, int hidden) const
   {
     std::vector<float> lumen(this->Voxels, 0.0F);
     const Polylines& lines = this->Tree.Reference();
     const double spacing = this->Grid.spacing[0];
-    for (const std::vector<std::int64_t>& line : lines.lines)
+    for (std::size_t vessel = 0; vessel < lines.lines.size(); ++vessel)
     {
-      for (std::size_t n = 0; n + 1 < line.size(); ++n)
+      const std::vector<std::int64_t>& line = lines.lines[vessel];
+      for (std::size_t n = 0; static_cast<int>(vessel) != hidden && n + 1 < line.size(); ++n)
       {
         const Vector3& a = points[line[n]];
         const Vector3& b = points[line[n + 1]];
@@ -249,6 +262,7 @@ private:
   const CarriedTree& Tree;
   const double Window;
   const int Moments;
+  const int Hidden;
   ImageGrid Grid;
   std::array<int, 3> Size{};
   std::size_t Voxels = 0;
@@ -351,25 +365,19 @@ struct Settings
   double window = 0.066;
   double captureRange = CenterlineTrackingSettings().captureRange;
   double fineRange = CenterlineTrackingSettings().fineRange;
+  std::string hidden; ///< vessel; empty: none
+  bool filling = true;
   bool asMeasured = false;
   bool quick = false;
 };
 
-bool Run(const Settings& options)
+/// How far the vessels are carried.
+void TellMotion(const Settings& options, const Heart& heart, const Polylines& lines,
+  const std::vector<std::vector<Vector3>>& truth)
 {
-  const Heart heart(options.data, options.asMeasured);
-  const CarriedTree tree(heart);
-  const Polylines& lines = tree.Reference();
-  Scanner scanner(heart, tree, options.spacing, options.window, options.quick ? 3 : 5);
-
-  std::vector<std::vector<Vector3>> truth;
   double excursion = 0.0;
   double step = 0.0;
   double range = 0.0;
-  for (int k = 0; k < Frames; ++k)
-  {
-    truth.push_back(tree.At(heart.At(TimeOf(k))));
-  }
   for (int k = 0; k < Frames; ++k)
   {
     for (std::size_t n = 0; n < lines.points.size(); ++n)
@@ -382,11 +390,6 @@ bool Run(const Settings& options)
       }
     }
   }
-  std::vector<double> times;
-  for (int k = 0; k < Frames; k += 2)
-  {
-    times.push_back(TimeOf(k));
-  }
   std::printf(
     "A measured heart%s: %zu points on %zu vessels, up to %.1f mm from the reference and "
     "%.1f mm between any two frames, %.1f mm between tracked frames that follow each other\n",
@@ -397,12 +400,36 @@ bool Run(const Settings& options)
     std::printf("Motion without the frames' scatter of %.2f mm: rank %d, order %d\n",
       heart.Fit().residual, heart.Fit().rank, heart.Fit().order);
   }
+}
 
+bool Run(const Settings& options)
+{
+  const Heart heart(options.data, options.asMeasured);
+  const CarriedTree tree(heart);
+  const Polylines& lines = tree.Reference();
+  const int hidden = options.hidden.empty()
+    ? -1
+    : static_cast<int>(
+        std::find(VesselNames.begin(), VesselNames.end(), options.hidden) - VesselNames.begin());
+  Scanner scanner(heart, tree, options.spacing, options.window, options.quick ? 3 : 5, hidden);
+
+  std::vector<std::vector<Vector3>> truth;
+  for (int k = 0; k < Frames; ++k)
+  {
+    truth.push_back(tree.At(heart.At(TimeOf(k))));
+  }
+  TellMotion(options, heart, lines, truth);
+  std::vector<double> times;
+  for (int k = 0; k < Frames; k += 2)
+  {
+    times.push_back(TimeOf(k));
+  }
   CenterlineTrackingSettings settings;
   settings.temporalWindow = options.window;
   settings.cycleLength = CycleSeconds;
   settings.captureRange = options.captureRange;
   settings.fineRange = options.fineRange;
+  settings.fillUnseen = options.filling;
   CenterlineTrackingReport report;
   const PoseSequence poses = TrackCenterlines(
     lines, TimeOf(ReferenceFrame), times,
@@ -428,6 +455,8 @@ bool Run(const Settings& options)
   double worst = 0.0; // mean of a vessel at a frame
   std::size_t worstVessel = 0;
   int worstFrame = 0;
+  Errors unseen;
+  double confidence = 0.0;
   std::printf("frame: mean distance to the axis, mm (share tracked)\n");
   for (int k = 0; k < Frames; ++k)
   {
@@ -441,6 +470,13 @@ bool Run(const Settings& options)
       const double material = (pose.points[n] - truth[k][n]).norm();
       across[k % 2].values.push_back(errors.back());
       carried[k % 2].values.push_back(material);
+      const std::vector<std::int64_t>* own = hidden >= 0 ? &lines.lines[hidden] : nullptr;
+      if (own && k % 2 == 0 && IsHidden(TimeOf(k)) &&
+        std::find(own->begin() + 1, own->end(), static_cast<std::int64_t>(n)) != own->end())
+      {
+        unseen.values.push_back(material);
+        confidence = std::max(confidence, poses.confidence[k / 2][n]);
+      }
       if (k % 2 == 0 && poses.status[k / 2][n] == TrackingStatus::Tracked)
       {
         ++called;
@@ -481,15 +517,21 @@ bool Run(const Settings& options)
       odd != 0 ? "other" : "tracked", across[odd].Mean(), across[odd].Percentile(0.95),
       carried[odd].Mean(), carried[odd].Percentile(0.95));
   }
-  const char* names[] = { "RCA", "AM", "LAD", "D1", "LCx", "OM1", "OM2" };
-  std::printf(
-    "farthest off: %s at frame %d, mean %.2f mm\n", names[worstVessel], worstFrame, worst);
+  std::printf("farthest off: %s at frame %d, mean %.2f mm\n", VesselNames[worstVessel].c_str(),
+    worstFrame, worst);
   std::printf(
     "called tracked: %.3f of the places, of them within 1 mm of the axis %.3f, of where they were "
     "carried %.3f; %d images read\n",
     called / static_cast<double>(carried[0].values.size()),
     static_cast<double>(nearAxis) / std::max(called, 1),
     static_cast<double>(near) / std::max(called, 1), report.imagesRead);
+  if (hidden >= 0)
+  {
+    std::printf("%s, not shown in tracked frames of systole: from where it was carried mean %.2f, "
+                "median %.2f, 95 %% %.2f, greatest %.2f mm; confidence at most %.2f\n",
+      options.hidden.c_str(), unseen.Mean(), unseen.Percentile(0.5), unseen.Percentile(0.95),
+      unseen.Percentile(1.0), confidence);
+  }
   const int judged = options.asMeasured ? 0 : 1; // frames that scatter cannot be interpolated
   const bool met = across[judged].Mean() <= MaximumMean[options.quick] &&
     across[judged].Percentile(0.95) <= MaximumPercentile[options.quick];
@@ -522,6 +564,11 @@ int main(int argc, char** argv)
     program.add_option("--fine-range", options.fineRange, "mm around what the first search found")
       ->check(CLI::Range(1.0, 12.0))
       ->capture_default_str();
+    program
+      .add_option("--hide", options.hidden, "Vessel that the images of early systole do not show")
+      ->check(CLI::IsMember(VesselNames));
+    program.add_flag(
+      "!--no-filling", options.filling, "What is not seen by the trajectories alone");
     program.add_flag("--frames-as-they-are", options.asMeasured,
       "With the scatter of the frames, which were measured one by one; judged at tracked frames");
     program.add_option("--output", options.output, "Existing folder for lines and slices")
