@@ -274,8 +274,10 @@ void TakeOstia(const VesselTree& tree, const HeartPose& named, PatientHeart& hea
       continue;
     }
     const Vector3& root = tree.points[static_cast<std::size_t>(branch.points.front())];
-    for (const std::int64_t point : branch.points)
+    // The first point may be that of a parent that is no longer there.
+    for (std::size_t n = 1; n < branch.points.size(); ++n)
     {
+      const std::int64_t point = branch.points[n];
       const int segment = SegmentAt(tree, branch, point);
       const bool left = segment == LeftMain || IsLad(segment) || IsLcx(segment);
       if ((tree.points[static_cast<std::size_t>(point)] - root).norm() > NamedFrom)

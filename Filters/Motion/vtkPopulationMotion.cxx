@@ -160,8 +160,9 @@ int vtkPopulationMotion::RequestInformation(
   if (this->AutomaticReference)
   {
     const double told = FieldNumber(vtkPolyData::GetData(inputs[LinesPort], 0), names::PhaseTime);
-    reference = std::isfinite(told) ? told : 0.0;
+    reference = told;
   }
+  reference = std::isfinite(reference) ? reference : 0.0;
   std::vector<double> seen;
   if (vtkInformation* tracked = Connection(inputs, TrackedPort))
   {

@@ -102,6 +102,7 @@ TEST(PopulationMotion, MovesTreeAndSkeleton)
   const auto tree = NamedTree();
   vtkNew<vtkPolyData> skeleton;
   vtkNew<vtkPoints> joints;
+  joints->SetDataTypeToDouble();
   vtkNew<vtkCellArray> bones;
   for (vtkIdType n = 0; n < 3; ++n)
   {
