@@ -46,9 +46,11 @@ tables=(
   "motion-ideal | validate-motion --seeds 101..110 --window 0 | -"
   "motion-140ms | validate-motion --seeds 101..110 --window 140 | -"
   "motion-lost | validate-motion --seeds 101..110 --lost | -"
+  "motion-filling | validate-filling | validate-filling --quick"
   "motion-measured-heart | validate-real-motion | validate-real-motion --quick"
   "evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation --seeds 101 --lost none --spacing 0.6"
   "scanned | scripts/validate-scanned.py --build BUILD --output OUTPUT | scripts/validate-scanned.py --quick --build BUILD --output OUTPUT"
+  "reconstructor | validate-reconstructor | validate-reconstructor --quick"
   "peers | scripts/validate-peers.py --build BUILD --output OUTPUT | scripts/validate-peers.py --quick --build BUILD --output OUTPUT"
   "simulator | scripts/validate-simulator.sh BUILD | scripts/validate-simulator.sh --quick BUILD"
 )

@@ -53,6 +53,7 @@ struct EvaluateJob
   std::vector<std::string> segments; ///< of masks that are the truth
   std::string untracked = "auto";    ///< "auto", "odd" or "none"
   MeshDistanceSettings distance;
+  double foundWithin = BranchMetricsSettings().tolerance;
   double timeTolerance = 1e-3;
   bool noPictures = false;
   bool views = false;
@@ -135,6 +136,13 @@ void EvaluateJob::Declare(CLI::App& app)
     ->check(CLI::IsMember({ "auto", "odd", "none" }))
     ->capture_default_str();
   AddDistanceOptions(app, this->distance);
+  app
+    .add_option("--found-within", this->foundWithin,
+      "How far the model's centerline may be from a true one that it has found, in mm, where the "
+      "vessel's radius is less")
+    ->check(Within(1e-3, 100.0))
+    ->type_name("MM")
+    ->capture_default_str();
   app
     .add_option("--time-tolerance", this->timeTolerance,
       "How far apart two times may be to be one phase, R-R")
@@ -235,23 +243,52 @@ EvaluateJob::CaseFiles EvaluateJob::FindCase(std::size_t number) const
   return files;
 }
 
-/// The tree of a phase: its centerline, or what the surface knows of its branches.
-Polylines ReadTree(const std::string& path, vtkPolyData* surface, const char* side,
-  vtkMessageTrap& messages, std::map<std::int64_t, std::string>* labels)
+/// A side's tree in one phase: its centerline, or what the surface knows of its branches.
+struct PhaseTree
 {
+  Polylines lines;
+  std::map<std::int64_t, std::string> labels;
+  std::vector<double> confidence; ///< empty: not known
+};
+
+/// How sure the model is of each point of its tree: of the vessel, and of the bridges before it.
+std::vector<double> ConfidenceOf(vtkPolyData* tree)
+{
+  std::vector<double> confidence;
+  for (const char* name :
+    { vtkCoronaryArrayNames::Confidence, vtkCoronaryArrayNames::BridgeConfidence })
+  {
+    vtkDataArray* array = tree->GetPointData()->GetArray(name);
+    if (!array || array->GetNumberOfComponents() != 1)
+    {
+      continue;
+    }
+    confidence.resize(static_cast<std::size_t>(tree->GetNumberOfPoints()), 1.0);
+    for (vtkIdType n = 0; n < tree->GetNumberOfPoints(); ++n)
+    {
+      confidence[static_cast<std::size_t>(n)] *= array->GetComponent(n, 0);
+    }
+  }
+  return confidence;
+}
+
+PhaseTree ReadTree(
+  const std::string& path, vtkPolyData* surface, const char* side, vtkMessageTrap& messages)
+{
+  PhaseTree tree;
   if (path.empty())
   {
     vtkPointData* arrays = surface->GetPointData();
     const bool known = arrays->HasArray(vtkCoronaryArrayNames::GroupIds) != 0 &&
       arrays->HasArray(vtkCoronaryArrayNames::Abscissas) != 0;
-    return known ? vtkCoronary::TreeOf(surface, side) : Polylines();
+    tree.lines = known ? vtkCoronary::TreeOf(surface, side) : Polylines();
+    return tree;
   }
   vtkSmartPointer<vtkPolyData> lines = ReadPolyData(path, messages);
-  if (labels)
-  {
-    AddGroupNames(lines, *labels);
-  }
-  return vtkCoronary::TreeOf(lines, side);
+  AddGroupNames(lines, tree.labels);
+  tree.lines = vtkCoronary::TreeOf(lines, side);
+  tree.confidence = ConfidenceOf(lines);
+  return tree;
 }
 
 EvaluationRecord EvaluateJob::Measure(const PhaseFiles& one, const EvaluationSettings& settings,
@@ -267,8 +304,13 @@ EvaluationRecord EvaluateJob::Measure(const PhaseFiles& one, const EvaluationSet
   SurfaceTriangles truth = read(one.truth);
   input.model = std::move(model.mesh);
   input.truth = std::move(truth.mesh);
-  input.modelTree = ReadTree(one.modelLines, model.data, "result", messages, nullptr);
-  input.truthTree = ReadTree(one.truthLines, truth.data, "reference", messages, &input.labels);
+  PhaseTree modelTree = ReadTree(one.modelLines, model.data, "result", messages);
+  PhaseTree truthTree = ReadTree(one.truthLines, truth.data, "reference", messages);
+  input.modelTree = std::move(modelTree.lines);
+  input.modelConfidence = std::move(modelTree.confidence);
+  input.modelLabels = std::move(modelTree.labels);
+  input.truthTree = std::move(truthTree.lines);
+  input.labels = std::move(truthTree.labels);
   PhaseEvaluation phase = one.phase;
   EvaluationRecord record;
   EvaluatePhase(input, settings, phase, record.warnings,
@@ -279,6 +321,7 @@ EvaluationRecord EvaluateJob::Measure(const PhaseFiles& one, const EvaluationSet
     });
   record.measures = phase.measures;
   record.branches = std::move(phase.branches);
+  record.falseBranches = std::move(phase.falseBranches);
   return record;
 }
 
@@ -289,6 +332,7 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
   EvaluationSettings settings;
   settings.distance = this->distance;
   settings.distance.signedDistances = false;
+  settings.branches.tolerance = this->foundWithin;
   std::vector<std::string>& warnings = files.evaluation.warnings;
   const EvaluationCache cache(this->measureCache);
   const auto measure = [&](std::size_t n)
@@ -314,6 +358,7 @@ void EvaluateJob::Evaluate(CaseFiles& files, vtkMessageTrap& messages,
     PhaseEvaluation& phase = files.phases[n].phase;
     phase.measures = record.measures;
     phase.branches = std::move(record.branches);
+    phase.falseBranches = std::move(record.falseBranches);
     warnings.insert(warnings.end(), record.warnings.begin(), record.warnings.end());
     files.evaluation.phases.push_back(phase);
   }
@@ -410,6 +455,9 @@ std::string EvaluateJob::CommandLine() const
   }
   line += this->untracked == "auto" ? "" : " --interpolated " + this->untracked;
   line += this->distance.clipEnds ? " --clip-ends" : "";
+  line += this->foundWithin == BranchMetricsSettings().tolerance
+    ? ""
+    : " --found-within " + Format(this->foundWithin);
   line += this->views ? " --views" : "";
   line += this->webTriangles == 0 ? "" : " --web-triangles " + std::to_string(this->webTriangles);
   return line + " --output " + quoted(this->output);
@@ -421,6 +469,7 @@ ReviewOrigin EvaluateJob::Origin() const
   origin.version = "coronary-pipeline " DYNAMICCORONARY_VERSION;
   origin.command = this->CommandLine();
   origin.settings = { { "Interpolated phases", this->untracked },
+    { "Found", "within " + Format(this->foundWithin) + " mm, or the vessel's radius" },
     { "Hausdorff distance", "at most " + Format(this->distance.errorBound) + " mm too small" },
     { "Ends of vessels",
       this->distance.clipEnds

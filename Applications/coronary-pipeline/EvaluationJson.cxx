@@ -4,13 +4,21 @@
 
 namespace coronary
 {
+namespace
+{
+/// Null: not known.
+nlohmann::ordered_json Known(double value)
+{
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nullptr;
+}
+}
+
 nlohmann::ordered_json MeasuresJson(const EvaluationMeasures& measures)
 {
   nlohmann::ordered_json all;
   for (const EvaluationColumn& column : EvaluationColumns())
   {
-    const double value = measures.*column.value;
-    all[column.key] = std::isfinite(value) ? nlohmann::ordered_json(value) : nullptr;
+    all[column.key] = Known(measures.*column.value);
   }
   return all;
 }
@@ -28,6 +36,12 @@ nlohmann::ordered_json EvaluationJson(const std::vector<CaseEvaluation>& cases)
       nlohmann::ordered_json row = { { "phase", phase.phase }, { "fraction", phase.fraction },
         { "interpolated", phase.interpolated }, { "lost", phase.lost } };
       row.update(MeasuresJson(phase.measures));
+      row["false_branches"] = nlohmann::ordered_json::array();
+      for (const FalseBranch& branch : phase.falseBranches)
+      {
+        row["false_branches"].push_back({ { "group", branch.group }, { "label", branch.label },
+          { "length", branch.length }, { "confidence", Known(branch.confidence) } });
+      }
       entry["phases"].push_back(row);
     }
     for (const bool interpolated : { true, false })
@@ -37,6 +51,15 @@ nlohmann::ordered_json EvaluationJson(const std::vector<CaseEvaluation>& cases)
       entry[kind + "_mean"] = MeasuresJson(summary.mean);
       entry[kind + "_deviation"] = MeasuresJson(summary.deviation);
     }
+    entry["branches"] = nlohmann::ordered_json::array();
+    for (const BranchSummary& branch : SummarizeBranches(one))
+    {
+      entry["branches"].push_back({ { "group", branch.group }, { "label", branch.label },
+        { "length", Known(branch.length) }, { "found", Known(branch.found) },
+        { "found_minimum", Known(branch.minimum) }, { "worst_phase", branch.worstPhase },
+        { "mean", Known(branch.mean) }, { "HD", Known(branch.hausdorff) } });
+    }
+    entry["findings"] = FindingsOf(one);
     entry["warnings"] = one.warnings;
     all["cases"].push_back(entry);
   }

@@ -42,7 +42,7 @@ constexpr double BranchEvaluation::*BranchValues[] = { &BranchEvaluation::length
 std::string EvaluationRecord::Text() const
 {
   Json json = { { "measures", Json::array() }, { "branches", Json::array() },
-    { "warnings", this->warnings } };
+    { "false", Json::array() }, { "warnings", this->warnings } };
   for (const EvaluationColumn& column : EvaluationColumns())
   {
     json["measures"].push_back(JsonOf(this->measures.*column.value));
@@ -55,6 +55,11 @@ std::string EvaluationRecord::Text() const
       row.push_back(JsonOf(branch.*value));
     }
     json["branches"].push_back(row);
+  }
+  for (const FalseBranch& branch : this->falseBranches)
+  {
+    json["false"].push_back(
+      { branch.group, branch.label, JsonOf(branch.length), JsonOf(branch.confidence) });
   }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -82,6 +87,11 @@ EvaluationRecord EvaluationRecord::Of(const std::string& text)
       }
       record.branches.push_back(branch);
     }
+    for (const Json& row : json.at("false"))
+    {
+      record.falseBranches.push_back({ row.at(0).get<std::int64_t>(), row.at(1).get<std::string>(),
+        NumberOf(row.at(2)), NumberOf(row.at(3)) });
+    }
     record.warnings = json.at("warnings").get<std::vector<std::string>>();
     return record;
   }
@@ -104,7 +114,7 @@ std::string EvaluationCache::NameOf(const std::vector<std::string>& files,
   // A warning names the files.
   key << DYNAMICCORONARY_VERSION << '\n'
       << distance.errorBound << ' ' << distance.clipEnds << ' ' << distance.endLength << ' '
-      << settings.relevantRadius << '\n';
+      << settings.relevantRadius << ' ' << settings.branches.tolerance << '\n';
   for (const std::string& segment : segments)
   {
     key << segment << '\n';

@@ -16,6 +16,7 @@ struct EvaluationRecord
 {
   EvaluationMeasures measures;
   std::vector<BranchEvaluation> branches;
+  std::vector<FalseBranch> falseBranches;
   std::vector<std::string> warnings; ///< of this phase
 
   /// All of it, bit by bit, in one line of JSON.

@@ -94,6 +94,10 @@ Json Describe(const ReviewedRun& look, int reference)
   {
     run[kind] = look.result.Findings(kind);
   }
+  for (const char* kind : { "filled", "limits" })
+  {
+    run[kind] = look.result.MotionFindings(kind);
+  }
   run["stages"] = Json::array();
   const Json stages = look.result.report.contains("stages") ? look.result.report["stages"] : Json();
   for (const Json& stage : stages)

@@ -269,8 +269,10 @@ std::string PhaseTitle(const PhaseEvaluation& phase)
 
 std::string Distances(const PhaseEvaluation& phase)
 {
-  return "HD " + Number(phase.measures.hausdorff, 2) + "   MSD " + Number(phase.measures.msd, 2) +
-    " mm";
+  const EvaluationMeasures& m = phase.measures;
+  const std::string found =
+    std::isfinite(m.found) ? "found " + Number(100.0 * m.found, 1) + " %   " : "";
+  return found + "ASSD " + Number(m.assd, 2) + "   HD " + Number(m.hausdorff, 2) + " mm";
 }
 
 /// A length that is round and about a fifth of the view, with its line.

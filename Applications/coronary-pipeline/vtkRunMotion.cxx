@@ -2,12 +2,16 @@
 
 #include "AtomicFile.h"
 #include "FileSeries.h"
+#include "Interruption.h"
 #include "MeshSequenceReport.h"
+#include "MotionRegularization.h"
 #include "Ranks.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
+#include "vtkRunLimits.h"
+#include "vtkRunPopulation.h"
 #include "vtkRunTrees.h"
 #include "vtkTimedPolyData.h"
 
@@ -18,7 +22,9 @@
 #include "vtkInformation.h"
 #include "vtkInformationDoubleVectorKey.h"
 #include "vtkMeshSequenceWriter.h"
+#include "vtkMotionRegularizer.h"
 #include "vtkPolyData.h"
+#include "vtkPopulationMotion.h"
 #include "vtkSkinDeformation.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkTable.h"
@@ -171,9 +177,74 @@ Json MakeRest(RunStep& step, const std::string& reason)
   step.warnings.push_back(
     "motion is not possible: " + reason + "; motion/ holds the model at rest");
   step.summary = "no motion: " + reason;
-  return { { "possible", false }, { "reason", reason }, { "at_rest", true },
+  return { { "possible", false }, { "motion", "none" }, { "reason", reason }, { "at_rest", true },
     { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
     { "times", times } };
+}
+
+std::vector<int> InvertedTetrahedra(const MovingMesh& moving)
+{
+  std::vector<int> inverted;
+  vtkTable* quality = moving.Writer->GetQuality();
+  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
+  {
+    inverted.push_back(
+      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
+  }
+  return inverted;
+}
+
+/// The model with the motion of a population, in the files of a tracked one.
+Json MakePopulation(RunStep& step, const MotionPlan& plan)
+{
+  const auto skeleton = ReadLines(step, "skeleton.vtp");
+  const auto tree = ReadTree(step);
+  PopulationPoses poses(step, tree, skeleton, plan);
+  try
+  {
+    poses.Update(step, [&](double fraction) { step.progress(0.8 * fraction); });
+  }
+  catch (const std::runtime_error& error)
+  {
+    ThrowIfInterrupted();
+    if (plan.asked)
+    {
+      throw;
+    }
+    // Trees without names, or of other vessels, have no heart that they belong to.
+    return MakeRest(step, plan.reason + ", and no population's motion: " + error.what());
+  }
+  std::vector<double> times = step.input.Settings.moments;
+  times = times.empty() ? poses.Times() : times;
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  vtkNew<vtkCardiacPhaseInterpolator> lines;
+  lines->SetInputConnection(poses.Motion->GetOutputPort(0));
+  lines->SetMode(InterpolationMode(step.input.Settings.interpolation));
+  MovingMesh moving;
+  moving.Interpolator->SetInputConnection(poses.Motion->GetOutputPort(1));
+  ConnectMesh(step, skeleton, moving);
+  Json lists;
+  lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
+  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
+  lists.update(WriteMovingMesh(
+    moving, times, step, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); }));
+  if (!Ranks().IsFirst())
+  {
+    return {};
+  }
+  step.warnings.push_back(
+    poses.Statement() + (plan.reason.empty() ? "" : " (" + plan.reason + ")"));
+  if (!poses.Assumption().empty())
+  {
+    step.warnings.push_back(poses.Assumption());
+  }
+  step.summary = std::to_string(times.size()) + " moments, " + poses.Statement();
+  Json told = poses.Describe(plan);
+  told.update(
+    Json{ { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
+      { "times", times }, { "inverted_tetrahedra", InvertedTetrahedra(moving) } });
+  return told;
 }
 }
 
@@ -181,26 +252,45 @@ Json MakeMotion(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
   vtkMessageTrap& messages = step.input.Messages;
-  const std::string still = step.input.ReasonWithoutMotion();
-  if (!still.empty())
+  const MotionPlan plan = PlanMotion(step.input);
+  if (plan.kind == MotionKind::Rest)
   {
-    return MakeRest(step, still);
+    return MakeRest(step, plan.reason);
+  }
+  if (plan.kind == MotionKind::Population)
+  {
+    return MakePopulation(step, plan);
   }
   const auto skeleton = ReadLines(step, "skeleton.vtp");
   vtkNew<vtkCenterlineTracker> tracker;
   tracker->SetInputConnection(step.input.Reader->GetOutputPort());
-  tracker->SetInputDataObject(1, ReadTree(step));
+  const auto tree = ReadTree(step);
+  tracker->SetInputDataObject(1, tree);
   tracker->SetInputDataObject(2, skeleton);
   tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
   tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
                                                        : vtkCenterlineTracker::AllPhases);
   tracker->SetSharing(&Ranks());
   const std::vector<double> times = Moments(step.input);
+  // What was measured is kept to as far as it is known; between the phases and the mesh is what was made of it.
+  vtkNew<vtkMotionRegularizer> keptLines;
+  keptLines->SetInputConnection(0, tracker->GetOutputPort(0));
+  keptLines->SetInputDataObject(1, tree);
+  vtkNew<vtkMotionRegularizer> keptSkeleton;
+  keptSkeleton->SetInputConnection(0, tracker->GetOutputPort(1));
+  keptSkeleton->SetInputDataObject(1, skeleton);
+  tracker->UpdateInformation();
+  for (vtkMotionRegularizer* kept : { keptLines.Get(), keptSkeleton.Get() })
+  {
+    kept->SetTemporalWeight(TemporalWeightOf(TimeSteps(tracker).size()));
+  }
   vtkNew<vtkCardiacPhaseInterpolator> lines;
-  lines->SetInputConnection(tracker->GetOutputPort(0));
+  lines->SetInputConnection(
+    settings.limits ? keptLines->GetOutputPort() : tracker->GetOutputPort(0));
   lines->SetMode(InterpolationMode(settings.interpolation));
   MovingMesh moving;
-  moving.Interpolator->SetInputConnection(tracker->GetOutputPort(1));
+  moving.Interpolator->SetInputConnection(
+    settings.limits ? keptSkeleton->GetOutputPort() : tracker->GetOutputPort(1));
   ConnectMesh(step, skeleton, moving);
 
   // The images are read now.
@@ -216,18 +306,18 @@ Json MakeMotion(RunStep& step)
     return {};
   }
   vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
-  Json inverted = Json::array();
-  vtkTable* quality = moving.Writer->GetQuality();
-  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
-  {
-    inverted.push_back(
-      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
-  }
   step.summary = std::to_string(times.size()) + " moments";
-  return { { "possible", true }, { "file", "motion.pvd" }, { "series", lists },
-    { "quality", "motion/mesh.json" }, { "times", times }, { "tracked_times", TimeSteps(tracker) },
+  Json limits = { { "applied", settings.limits } };
+  if (settings.limits)
+  {
+    limits.update(DescribeLimits(keptLines, keptSkeleton, tree, messages));
+  }
+  return { { "possible", true }, { "motion", "tracked" }, { "file", "motion.pvd" },
+    { "series", lists }, { "quality", "motion/mesh.json" }, { "times", times },
+    { "tracked_times", TimeSteps(tracker) },
     { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
     { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
-    { "inverted_tetrahedra", inverted } };
+    { "filled", DescribeFilled(tracker, tree, messages) }, { "limits", limits },
+    { "inverted_tetrahedra", InvertedTetrahedra(moving) } };
 }
 }

@@ -139,6 +139,11 @@ Json RunResult::Findings(const std::string& name) const
   return Member(Member(this->report, "centerline"), name);
 }
 
+Json RunResult::MotionFindings(const std::string& name) const
+{
+  return Member(Member(this->report, "motion"), name);
+}
+
 std::vector<std::string> RunResult::Warnings() const
 {
   std::vector<std::string> warnings;

@@ -71,6 +71,9 @@ struct RunResult
   /// The member of the stage `centerline` of the report: "bridges", "lesions", "calcium"; null: there is none.
   nlohmann::ordered_json Findings(const std::string& name) const;
 
+  /// The same of the stage `motion`: "filled", "limits".
+  nlohmann::ordered_json MotionFindings(const std::string& name) const;
+
   /// What the stages and the run warned of, and why it stopped, in the order of the stages.
   std::vector<std::string> Warnings() const;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -15,65 +16,177 @@ using Measures = EvaluationMeasures;
 
 constexpr double SampleDistance = 0.25; // mm
 
-/// From samples of lines, where they are wide enough, to the nearest point of other lines.
-std::vector<double> DistancesFrom(
-  const Polylines& lines, const Polylines& others, double minimumRadius)
+/// Lines cut into short pieces, and how far each is from other lines.
+struct LineSamples
+{
+  std::vector<Vector3> middle;
+  std::vector<std::size_t> line;  ///< number of the line that it is a piece of
+  std::vector<double> length;     ///< mm
+  std::vector<double> radius;     ///< infinite where none is known
+  std::vector<double> confidence; ///< NaN where none is known
+  std::vector<double> distance;   ///< of the middle from the other lines; infinite without any
+  std::vector<double>
+    otherRadius; ///< at the nearest place of the other lines; 0 where none is known
+};
+
+LineSamples SamplesOf(const Polylines& lines, const std::vector<double>& confidence)
+{
+  LineSamples samples;
+  for (std::size_t number = 0; number < lines.lines.size(); ++number)
+  {
+    const auto& line = lines.lines[number];
+    for (std::size_t i = 1; i < line.size(); ++i)
+    {
+      const auto a = static_cast<std::size_t>(line[i - 1]);
+      const auto b = static_cast<std::size_t>(line[i]);
+      const double length = (lines.points[b] - lines.points[a]).norm();
+      const int parts = std::max(1, static_cast<int>(std::ceil(length / SampleDistance)));
+      for (int part = 0; part < parts; ++part)
+      {
+        const double t = (part + 0.5) / parts;
+        const auto between = [&](const std::vector<double>& values, double nothing)
+        { return values.empty() ? nothing : (1.0 - t) * values[a] + t * values[b]; };
+        samples.middle.emplace_back((1.0 - t) * lines.points[a] + t * lines.points[b]);
+        samples.line.push_back(number);
+        samples.length.push_back(length / parts);
+        samples.radius.push_back(between(lines.radius, std::numeric_limits<double>::infinity()));
+        samples.confidence.push_back(between(confidence, Measures::NaN));
+      }
+    }
+  }
+  return samples;
+}
+
+void MeasureDistances(LineSamples& samples, const Polylines& others)
 {
   struct Segment
   {
     Vector3 a;
     Vector3 b;
+    double radius;
   };
   std::vector<Segment> segments;
   for (const auto& line : others.lines)
   {
     for (std::size_t i = 1; i < line.size(); ++i)
     {
-      segments.push_back({ others.points[static_cast<std::size_t>(line[i - 1])],
-        others.points[static_cast<std::size_t>(line[i])] });
-    }
-  }
-  std::vector<Vector3> samples;
-  for (const auto& line : lines.lines)
-  {
-    for (std::size_t i = 1; i < line.size(); ++i)
-    {
       const auto a = static_cast<std::size_t>(line[i - 1]);
       const auto b = static_cast<std::size_t>(line[i]);
-      const int parts = std::max(1,
-        static_cast<int>(std::ceil((lines.points[b] - lines.points[a]).norm() / SampleDistance)));
-      for (int part = 0; part < parts; ++part)
-      {
-        const double t = (part + 0.5) / parts;
-        if (lines.radius.empty() ||
-          (1.0 - t) * lines.radius[a] + t * lines.radius[b] >= minimumRadius)
-        {
-          samples.emplace_back((1.0 - t) * lines.points[a] + t * lines.points[b]);
-        }
-      }
+      segments.push_back({ others.points[a], others.points[b],
+        others.radius.empty() ? 0.0 : std::max(others.radius[a], others.radius[b]) });
     }
   }
-  if (segments.empty())
-  {
-    return {};
-  }
-  std::vector<double> distances(samples.size());
-  ParallelFor(static_cast<std::int64_t>(samples.size()), 64,
+  samples.distance.assign(samples.middle.size(), std::numeric_limits<double>::infinity());
+  samples.otherRadius.assign(samples.middle.size(), 0.0);
+  ParallelFor(static_cast<std::int64_t>(samples.middle.size()), 64,
     [&](std::int64_t first, std::int64_t last)
     {
-      for (std::int64_t i = first; i < last; ++i)
+      for (std::int64_t number = first; number < last; ++number)
       {
+        const auto i = static_cast<std::size_t>(number);
         double minimum = std::numeric_limits<double>::infinity();
         for (const Segment& segment : segments)
         {
-          minimum = std::min(minimum,
-            NearestOnSegment(samples[static_cast<std::size_t>(i)], segment.a, segment.b)
-              .squaredDistance);
+          const double squared =
+            NearestOnSegment(samples.middle[i], segment.a, segment.b).squaredDistance;
+          if (squared < minimum)
+          {
+            minimum = squared;
+            samples.otherRadius[i] = segment.radius;
+          }
         }
-        distances[static_cast<std::size_t>(i)] = std::sqrt(minimum);
+        samples.distance[i] = std::sqrt(minimum);
       }
     });
-  return distances;
+}
+
+/// Of the truth: what of it was found, by radius, and how far the model's centerline is.
+void MeasureFound(
+  const LineSamples& truth, const EvaluationSettings& settings, EvaluationMeasures& m)
+{
+  const auto found = [&](double minimumRadius)
+  {
+    double length = 0.0;
+    double covered = 0.0;
+    for (std::size_t i = 0; i < truth.middle.size(); ++i)
+    {
+      if (truth.radius[i] >= minimumRadius)
+      {
+        // Without a radius the tolerance alone counts.
+        const double radius = std::isfinite(truth.radius[i]) ? truth.radius[i] : 0.0;
+        length += truth.length[i];
+        covered += truth.distance[i] <= std::max(settings.branches.tolerance, radius)
+          ? truth.length[i]
+          : 0.0;
+      }
+    }
+    return length > 0.0 ? covered / length : Measures::NaN;
+  };
+  m.found = found(0.0);
+  m.foundHalf = found(0.5);
+  m.foundWide = found(1.0);
+  std::vector<double> distances;
+  double sum = 0.0;
+  double length = 0.0;
+  for (std::size_t i = 0; i < truth.middle.size(); ++i)
+  {
+    if (truth.radius[i] >= settings.relevantRadius)
+    {
+      distances.push_back(truth.distance[i]);
+      sum += truth.length[i] * truth.distance[i];
+      length += truth.length[i];
+    }
+  }
+  if (length > 0.0)
+  {
+    m.centerlineMean = sum / length;
+    m.centerline95 = InclusiveQuantileOf(std::move(distances), 0.95);
+  }
+}
+
+/// Of the model: what of it is no vessel.
+void MeasureFalse(
+  const LineSamples& model, const EvaluationInput& input, double tolerance, PhaseEvaluation& phase)
+{
+  EvaluationMeasures& m = phase.measures;
+  m.falseLength = 0.0;
+  m.falseConfident = input.modelConfidence.empty() ? Measures::NaN : 0.0;
+  struct Sum
+  {
+    double length = 0.0;
+    double wrong = 0.0;
+    double confidence = 0.0;
+  };
+  std::vector<Sum> sums(input.modelTree.lines.size());
+  for (std::size_t i = 0; i < model.middle.size(); ++i)
+  {
+    const double radius = std::isfinite(model.radius[i]) ? model.radius[i] : 0.0;
+    const bool wrong = model.distance[i] > std::max({ tolerance, radius, model.otherRadius[i] });
+    Sum& sum = sums[model.line[i]];
+    sum.length += model.length[i];
+    sum.confidence += model.length[i] * model.confidence[i];
+    if (wrong)
+    {
+      sum.wrong += model.length[i];
+      m.falseLength += model.length[i];
+      m.falseConfident += model.confidence[i] < ConfidentFrom ? 0.0 : model.length[i];
+    }
+  }
+  for (std::size_t line = 0; line < sums.size(); ++line)
+  {
+    const Sum& sum = sums[line];
+    if (sum.wrong > 0.5 * sum.length)
+    {
+      FalseBranch branch;
+      branch.group = input.modelTree.groups.empty() ? static_cast<std::int64_t>(line)
+                                                    : input.modelTree.groups[line];
+      const auto label = input.modelLabels.find(branch.group);
+      branch.label = label == input.modelLabels.end() ? std::string() : label->second;
+      branch.length = sum.length;
+      branch.confidence = sum.confidence / sum.length;
+      phase.falseBranches.push_back(branch);
+    }
+  }
 }
 
 EvaluationMeasures PaperMeasures(double hd, double msd, double bcr, double bcs)
@@ -153,6 +266,13 @@ void AddCsvRow(std::string& table, const std::string& part, const std::string& n
   table += "\n";
 }
 
+/// What leads: the share that was found, the mean of both sides, HD95.
+std::string LeadingTexCells(const EvaluationMeasures& m)
+{
+  return " & " + Number(m.found, 3, "--") + " & " + Number(m.assd, 2, "--") + " & " +
+    Number(m.hausdorff95, 2, "--");
+}
+
 /// The four measures of the paper.
 std::string TexCells(const EvaluationMeasures& m)
 {
@@ -228,8 +348,7 @@ void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& setti
   m.hausdorff = distance.hausdorff;
   m.hausdorff95 = distance.hausdorff95;
   m.msd = distance.ab.vertexMean;
-  m.msdArea = distance.mean;
-  m.rms = distance.rms;
+  m.assd = distance.mean;
   warnings.insert(warnings.end(), distance.warnings.begin(), distance.warnings.end());
 
   std::map<std::int64_t, BranchEvaluation> branches;
@@ -248,8 +367,6 @@ void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& setti
     m.completenessRatio = trees.completenessRatio;
     m.continuityScore = trees.continuityScore;
     m.boundedCompleteness = trees.boundedCompleteness;
-    m.boundedContinuity = trees.boundedContinuity;
-    m.lengthDetected = trees.lengthDetected;
     for (const BranchAgreement& row : trees.rows)
     {
       if (row.reference >= 0)
@@ -268,18 +385,12 @@ void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& setti
         branch.length = length;
       }
     }
-    std::vector<double> distances =
-      DistancesFrom(input.truthTree, input.modelTree, settings.relevantRadius);
-    if (!distances.empty())
-    {
-      double sum = 0.0;
-      for (const double one : distances)
-      {
-        sum += one;
-      }
-      m.centerlineMean = sum / static_cast<double>(distances.size());
-      m.centerline95 = InclusiveQuantileOf(std::move(distances), 0.95);
-    }
+    LineSamples truth = SamplesOf(input.truthTree, {});
+    MeasureDistances(truth, input.modelTree);
+    MeasureFound(truth, settings, m);
+    LineSamples model = SamplesOf(input.modelTree, input.modelConfidence);
+    MeasureDistances(model, input.truthTree);
+    MeasureFalse(model, input, settings.branches.tolerance, phase);
   }
   for (auto& [group, branch] : branches)
   {
@@ -297,18 +408,20 @@ void EvaluatePhase(const EvaluationInput& input, const EvaluationSettings& setti
 const std::vector<EvaluationColumn>& EvaluationColumns()
 {
   static const std::vector<EvaluationColumn> columns = {
-    { "HD", true, "mm", &Measures::hausdorff, 0.0 },
+    { "found", true, "", &Measures::found, 1.0 },
+    { "found_0.5", true, "", &Measures::foundHalf, 1.0 },
+    { "found_1.0", false, "", &Measures::foundWide, 1.0 },
+    { "ASSD", true, "mm", &Measures::assd, 0.0 },
     { "HD95", true, "mm", &Measures::hausdorff95, 0.0 },
-    { "MSD", true, "mm", &Measures::msd, 0.0 },
-    { "MSD_area", true, "mm", &Measures::msdArea, 0.0 },
-    { "RMS", false, "mm", &Measures::rms, 0.0 },
-    { "BCR", true, "", &Measures::completenessRatio, 1.0 },
-    { "BCS", true, "", &Measures::continuityScore, 1.0 },
-    { "BCR_bounded", true, "", &Measures::boundedCompleteness, 1.0 },
-    { "BCS_bounded", true, "", &Measures::boundedContinuity, 1.0 },
-    { "length_detected", false, "", &Measures::lengthDetected, 1.0 },
     { "centerline_mean", true, "mm", &Measures::centerlineMean, 0.0 },
     { "centerline_p95", false, "mm", &Measures::centerline95, 0.0 },
+    { "false_length", true, "mm", &Measures::falseLength, 0.0 },
+    { "false_confident", false, "mm", &Measures::falseConfident, 0.0 },
+    { "HD", true, "mm", &Measures::hausdorff, 0.0 },
+    { "MSD", true, "mm", &Measures::msd, 0.0 },
+    { "BCR", true, "", &Measures::completenessRatio, 1.0 },
+    { "BCS", true, "", &Measures::continuityScore, 1.0 },
+    { "BCR_bounded", false, "", &Measures::boundedCompleteness, 1.0 },
   };
   return columns;
 }
@@ -347,6 +460,108 @@ MeasureSummary Summarize(const std::vector<EvaluationMeasures>& list)
     }
   }
   return summary;
+}
+
+std::vector<BranchSummary> SummarizeBranches(const CaseEvaluation& one)
+{
+  struct Sums
+  {
+    BranchSummary branch;
+    double length = 0.0;
+    double found = 0.0;
+    double mean = 0.0;
+    int compared = 0; ///< phases with a centerline
+    int surfaces = 0; ///< phases with a surface
+  };
+  std::map<std::int64_t, Sums> all;
+  for (const PhaseEvaluation& phase : one.phases)
+  {
+    for (const BranchEvaluation& branch : phase.branches)
+    {
+      Sums& sums = all[branch.group];
+      sums.branch.group = branch.group;
+      sums.branch.label = branch.label;
+      if (std::isfinite(branch.covered))
+      {
+        sums.length += branch.length;
+        sums.found += branch.covered;
+        ++sums.compared;
+        if (!(sums.branch.minimum <= branch.covered))
+        {
+          sums.branch.minimum = branch.covered;
+          sums.branch.worstPhase = phase.phase;
+        }
+      }
+      if (std::isfinite(branch.mean))
+      {
+        sums.mean += branch.mean;
+        ++sums.surfaces;
+        sums.branch.hausdorff = std::fmax(sums.branch.hausdorff, branch.hausdorff);
+      }
+    }
+  }
+  std::vector<BranchSummary> branches;
+  for (auto& [group, sums] : all)
+  {
+    if (sums.compared > 0)
+    {
+      sums.branch.length = sums.length / sums.compared;
+      sums.branch.found = sums.found / sums.compared;
+    }
+    if (sums.surfaces > 0)
+    {
+      sums.branch.mean = sums.mean / sums.surfaces;
+    }
+    branches.push_back(sums.branch);
+  }
+  return branches;
+}
+
+std::vector<std::string> FindingsOf(const CaseEvaluation& one)
+{
+  const std::string all = " of " + std::to_string(one.phases.size()) + " phases";
+  std::vector<std::string> findings;
+  for (const BranchSummary& branch : SummarizeBranches(one))
+  {
+    if (branch.minimum < LostBelow)
+    {
+      const auto lost = std::count_if(one.phases.begin(), one.phases.end(),
+        [&](const PhaseEvaluation& phase)
+        {
+          return std::any_of(phase.branches.begin(), phase.branches.end(),
+            [&](const BranchEvaluation& each)
+            { return each.group == branch.group && each.covered < LostBelow; });
+        });
+      findings.push_back("Lost: " +
+        (branch.label.empty() ? "branch " + std::to_string(branch.group) : branch.label) + " (" +
+        Number(branch.length, 1) + " mm) in " + std::to_string(lost) + all + "; " +
+        Number(100.0 * branch.minimum, 0) + " % of it found in phase " +
+        std::to_string(branch.worstPhase));
+    }
+  }
+  std::map<std::pair<std::int64_t, std::string>, std::vector<FalseBranch>> wrong;
+  for (const PhaseEvaluation& phase : one.phases)
+  {
+    for (const FalseBranch& branch : phase.falseBranches)
+    {
+      wrong[{ branch.group, branch.label }].push_back(branch);
+    }
+  }
+  for (const auto& [name, phases] : wrong)
+  {
+    double confidence = 0.0;
+    double length = 0.0;
+    for (const FalseBranch& branch : phases)
+    {
+      confidence += branch.confidence / static_cast<double>(phases.size());
+      length += branch.length / static_cast<double>(phases.size());
+    }
+    findings.push_back(
+      "False: " + (name.second.empty() ? "branch " + std::to_string(name.first) : name.second) +
+      " (" + Number(length, 1) + " mm, confidence " + Number(confidence, 2, "not known") +
+      ") is no vessel of the truth in " + std::to_string(phases.size()) + all);
+  }
+  return findings;
 }
 
 MeasureSummary SummarizePhases(const CaseEvaluation& one, bool interpolated)
@@ -510,11 +725,12 @@ std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases)
   const MeasureSummary& paperA = PaperSummaryA();
   for (const CaseEvaluation& one : cases)
   {
-    text += "% Part A\n\\begin{tabular}{rrlrrrrrrrr}\n\\hline\n"
-            " & & & \\multicolumn{4}{c}{" +
+    text += "% Part A\n\\begin{tabular}{rrlrrrrrrrrrrr}\n\\hline\n"
+            " & & & \\multicolumn{7}{c}{" +
       Tex(one.name) +
       "} & \\multicolumn{4}{c}{Paper, dataset \\#1} \\\\\n"
-      "Phase & \\% R-R & & HD (mm) & MSD (mm) & BCR & BCS & HD (mm) & MSD (mm) & BCR & BCS \\\\\n" +
+      "Phase & \\% R-R & & found & ASSD (mm) & HD95 (mm) & HD (mm) & MSD (mm) & BCR & BCS & HD "
+      "(mm) & MSD (mm) & BCR & BCS \\\\\n" +
       head;
     for (const PhaseEvaluation& phase : one.phases)
     {
@@ -522,35 +738,41 @@ std::string EvaluationLatex(const std::vector<CaseEvaluation>& cases)
       char first[64];
       std::snprintf(first, sizeof(first), "%02d & %s & %s", phase.phase,
         Number(100.0 * phase.fraction, 1).c_str(), KindOf(phase));
-      text += first + TexCells(phase.measures) + TexCells(paper) + " \\\\\n";
+      text += first + LeadingTexCells(phase.measures) + TexCells(phase.measures) + TexCells(paper) +
+        " \\\\\n";
     }
     text += head;
     const MeasureSummary interpolated = SummarizePhases(one, true);
     const MeasureSummary tracked = SummarizePhases(one, false);
     if (interpolated.count > 0)
     {
-      text += "Mean & & interpolated" + TexCells(interpolated.mean) + TexCells(paperA.mean) +
-        " \\\\\nSTD & & interpolated" + TexCells(interpolated.deviation) +
+      text += "Mean & & interpolated" + LeadingTexCells(interpolated.mean) +
+        TexCells(interpolated.mean) + TexCells(paperA.mean) + " \\\\\nSTD & & interpolated" +
+        LeadingTexCells(interpolated.deviation) + TexCells(interpolated.deviation) +
         TexCells(paperA.deviation) + " \\\\\n";
     }
     if (tracked.count > 0)
     {
-      text += "Mean & & tracked" + TexCells(tracked.mean) + TexCells({}) + " \\\\\n";
+      text += "Mean & & tracked" + LeadingTexCells(tracked.mean) + TexCells(tracked.mean) +
+        TexCells({}) + " \\\\\n";
     }
     text += "\\hline\n\\end{tabular}\n\n";
   }
-  text += "% Part B: means over the interpolated phases\n\\begin{tabular}{lrrrr}\n\\hline\n"
-          "Dataset & HD (mm) & MSD (mm) & BCR & BCS \\\\\n" +
+  text += "% Part B: means over the interpolated phases\n\\begin{tabular}{lrrrrrrr}\n\\hline\n"
+          "Dataset & found & ASSD (mm) & HD95 (mm) & HD (mm) & MSD (mm) & BCR & BCS \\\\\n" +
     head;
   for (const CaseEvaluation& one : cases)
   {
-    text += Tex(one.name) + TexCells(SummarizePhases(one, true).mean) + " \\\\\n";
+    const EvaluationMeasures mean = SummarizePhases(one, true).mean;
+    text += Tex(one.name) + LeadingTexCells(mean) + TexCells(mean) + " \\\\\n";
   }
   const MeasureSummary all = SummarizeCases(cases);
   const MeasureSummary& paperB = PaperSummaryB();
-  text += head + "Mean" + TexCells(all.mean) + " \\\\\nSTD" + TexCells(all.deviation) +
-    " \\\\\n\\hline\nPaper, mean of five" + TexCells(paperB.mean) + " \\\\\nPaper, STD" +
-    TexCells(paperB.deviation) + " \\\\\n\\hline\n\\end{tabular}\n";
+  text += head + "Mean" + LeadingTexCells(all.mean) + TexCells(all.mean) + " \\\\\nSTD" +
+    LeadingTexCells(all.deviation) + TexCells(all.deviation) +
+    " \\\\\n\\hline\nPaper, mean of five" + LeadingTexCells({}) + TexCells(paperB.mean) +
+    " \\\\\nPaper, STD" + LeadingTexCells({}) + TexCells(paperB.deviation) +
+    " \\\\\n\\hline\n\\end{tabular}\n";
   return text;
 }
 
@@ -580,6 +802,10 @@ std::string EvaluationText(const std::vector<CaseEvaluation>& cases)
     {
       text +=
         TextRow("mean, tracked", tracked.mean, {}) + TextRow("deviation", tracked.deviation, {});
+    }
+    for (const std::string& finding : FindingsOf(one))
+    {
+      text += finding + ".\n";
     }
     text += "\n";
   }

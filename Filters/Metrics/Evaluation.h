@@ -25,18 +25,24 @@ struct EvaluationMeasures
 {
   static constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
-  double hausdorff = NaN;           ///< HD, Eq. 15
-  double hausdorff95 = NaN;         ///< HD95
-  double msd = NaN;                 ///< MSD, Eq. 16: from the model's vertices to the truth
-  double msdArea = NaN;             ///< area-weighted, both ways
-  double rms = NaN;                 ///< area-weighted, both ways
-  double completenessRatio = NaN;   ///< BCR, Eq. 17
-  double continuityScore = NaN;     ///< BCS, Eq. 17
-  double boundedCompleteness = NaN; ///< share of the truth's branches that are detected
-  double boundedContinuity = NaN;   ///< mean of their continuity
-  double lengthDetected = NaN;      ///< share of the truth's length
+  // What a model that lacks a vessel, or has one too many, can not make look well.
+  double found = NaN;          ///< share of the true tree's length that the model has
+  double foundHalf = NaN;      ///< the same of what is 0.5 mm in radius or more
+  double foundWide = NaN;      ///< of what is 1 mm in radius or more
+  double assd = NaN;           ///< ASSD: mean distance of the surfaces, area-weighted, both ways
+  double hausdorff95 = NaN;    ///< HD95
   double centerlineMean = NaN; ///< from the truth's centerline to the model's, see relevantRadius
   double centerline95 = NaN;   ///< 95th percentile of the same distances
+  double falseLength = NaN;    ///< of the model's tree, where the truth has no vessel
+  double falseConfident = NaN; ///< of that what the model is confident of
+
+  // The paper's.
+  double hausdorff = NaN;         ///< HD, Eq. 15
+  double msd = NaN;               ///< MSD, Eq. 16: from the model's vertices to the truth
+  double completenessRatio = NaN; ///< BCR, Eq. 17
+  double continuityScore = NaN;   ///< BCS, Eq. 17
+
+  double boundedCompleteness = NaN; ///< share of the truth's branches that are detected
 };
 
 /// One of the measures: what tables and plots call it, and where it is.
@@ -64,6 +70,15 @@ struct BranchEvaluation
   double mean = EvaluationMeasures::NaN;       ///< area-weighted, mm
 };
 
+/// A line of the model that is no vessel of the truth for more than half of its length.
+struct FalseBranch
+{
+  std::int64_t group = -1;
+  std::string label;                           ///< what the model calls it; empty: not named
+  double length = EvaluationMeasures::NaN;     ///< mm
+  double confidence = EvaluationMeasures::NaN; ///< mean along it; NaN: the model has none
+};
+
 struct PhaseEvaluation
 {
   int phase = 0;             ///< number in the series, from 0
@@ -72,7 +87,14 @@ struct PhaseEvaluation
   bool lost = false;         ///< to be tracked, but more than half of the tree was not to be seen
   EvaluationMeasures measures;
   std::vector<BranchEvaluation> branches;
+  std::vector<FalseBranch> falseBranches;
 };
+
+/// From this confidence on a model says that it is sure of a vessel.
+constexpr double ConfidentFrom = 0.5;
+
+/// A branch of which the model has less than this share of its length is lost.
+constexpr double LostBelow = 0.5;
 
 struct CaseEvaluation
 {
@@ -97,11 +119,15 @@ struct EvaluationInput
   SurfaceMesh truth;
   Polylines modelTree;
   Polylines truthTree;
-  std::map<std::int64_t, std::string> labels; ///< names of the truth's groups
+  std::vector<double> modelConfidence; ///< 0 to 1, one a point of modelTree; empty: not known
+  std::map<std::int64_t, std::string> labels;      ///< names of the truth's groups
+  std::map<std::int64_t, std::string> modelLabels; ///< of the model's
 };
 
 /**
- * Fills the measures and branches of a phase.
+ * Fills the measures and branches of a phase. A place of the truth is found where the model's centerline is within the
+ * true radius, or `branches.tolerance` where that is more; a place of the model is false that is further than the tolerance
+ * and than either radius from every true centerline.
  * @param warnings  sentences are added
  * @throws as CompareSurfaces and CompareBranches; std::invalid_argument if relevantRadius is out of range
  */
@@ -118,6 +144,25 @@ struct MeasureSummary
   std::int64_t count = 0;
 };
 MeasureSummary Summarize(const std::vector<EvaluationMeasures>& list);
+
+/// A branch of the truth over all phases.
+struct BranchSummary
+{
+  std::int64_t group = -1;
+  std::string label;                          ///< empty: not known
+  double length = EvaluationMeasures::NaN;    ///< mean, mm
+  double found = EvaluationMeasures::NaN;     ///< mean share of its length that the model has
+  double minimum = EvaluationMeasures::NaN;   ///< that of the worst phase
+  int worstPhase = -1;                        ///< its number
+  double mean = EvaluationMeasures::NaN;      ///< of its surface's distance from the model, mm
+  double hausdorff = EvaluationMeasures::NaN; ///< the greatest, mm
+};
+
+/// In the order of their groups.
+std::vector<BranchSummary> SummarizeBranches(const CaseEvaluation& one);
+
+/// A sentence for each branch of the truth that is lost in some phase, and each false one of the model.
+std::vector<std::string> FindingsOf(const CaseEvaluation& one);
 
 /// Of the phases that are interpolated, or tracked.
 MeasureSummary SummarizePhases(const CaseEvaluation& one, bool interpolated);

@@ -9,6 +9,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace coronary
 {
@@ -22,7 +23,12 @@ constexpr double TrackedLikeness = 0.65;
 constexpr double TrackedConfidence = 0.5;
 constexpr double WeakConfidence = 0.2;
 constexpr double FilledConfidence = 0.3; ///< at most
+constexpr double ChanceConfidence = 0.4; ///< at most
 constexpr double LostDeviation = 2.0;    ///< mm
+constexpr double SearchedAgain = 0.5;    ///< mm
+/// What is seen alone among places that are not seen is seen by chance: mm around it.
+constexpr double SupportingReach = 8.0;
+constexpr double ChanceShare = 1.0 / 3.0;
 }
 
 ProgressCallback LineTracker::Part(double from, double to) const
@@ -126,47 +132,98 @@ void LineTracker::MeasureContrast()
   }
 }
 
+void LineTracker::Take(Trajectories motion)
+{
+  this->Motion = std::move(motion);
+  for (std::size_t k = 0; k < this->Times.size(); ++k)
+  {
+    for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+    {
+      this->Displacement[k][n] = this->Motion.Displacement(static_cast<int>(n), this->Times[k]);
+    }
+  }
+}
+
 void LineTracker::Fit(const std::vector<const Seen*>& seen)
+{
+  this->Take(
+    FitRobustly(this->Nodes, this->Times, this->ReferenceTime, seen, this->Settings.prior));
+}
+
+std::vector<std::vector<bool>> LineTracker::SeenPlaces() const
 {
   const std::size_t phases = this->Times.size();
   const std::size_t nodes = this->Nodes.size();
-  std::vector<double> times = this->Times;
-  times.push_back(this->ReferenceTime);
-  // At the reference the lines are where they are.
-  const TrajectoryMeasurement fixed{ static_cast<int>(phases), Vector3::Zero(),
-    Matrix3::Identity() / (0.05 * 0.05) };
-  for (int round = 0; round < 6; ++round)
+  std::vector<std::vector<int>> around(nodes);
+  for (std::size_t n = 0; n < nodes; ++n)
   {
-    Measurements measurements(nodes, { fixed });
-    for (const Seen* one : seen)
+    const int parent = this->Nodes.parent[n];
+    if (parent >= 0)
     {
-      const double scale = one->robustScale * std::max(1.0, 3.0 - round);
-      for (std::size_t n = 0; n < nodes; ++n)
+      around[n].push_back(parent);
+      around[parent].push_back(static_cast<int>(n));
+    }
+  }
+  std::vector<std::vector<bool>> seen(phases, std::vector<bool>(nodes, false));
+  for (std::size_t k = 0; k < phases; ++k)
+  {
+    const auto alike = [&](int n) { return this->Likeness[k][n] >= TrackedLikeness; };
+    std::size_t count = 0;
+    for (std::size_t n = 0; n < nodes; ++n)
+    {
+      // Along the vessels, and those that meet there.
+      std::vector<std::pair<int, int>> open{ { static_cast<int>(n), -1 } };
+      int near = 0;
+      int alikeNear = 0;
+      for (std::size_t at = 0; at < open.size(); ++at)
       {
-        for (std::size_t k = 0; k < phases; ++k)
+        const auto [here, from] = open[at];
+        ++near;
+        alikeNear += alike(here) ? 1 : 0;
+        for (const int next : around[here])
         {
-          const Vector3& displacement = one->displacement[k][n];
-          double share = 1.0;
-          if (round > 0)
+          if (next != from &&
+            (this->Nodes.position[next] - this->Nodes.position[n]).norm() <= SupportingReach)
           {
-            const double apart =
-              (this->Motion.Displacement(static_cast<int>(n), times[k]) - displacement).norm();
-            share = 1.0 / (1.0 + apart * apart / (scale * scale));
+            open.emplace_back(next, here);
           }
-          measurements[n].push_back({ static_cast<int>(k), displacement,
-            one->information[k][n] * share * share }); // Geman & McClure
         }
       }
+      seen[k][n] = alike(static_cast<int>(n)) && 2 * alikeNear >= near;
+      count += seen[k][n] ? 1 : 0;
     }
-    this->Motion = FitTrajectories(this->Nodes, times, measurements, this->Settings.prior);
+    // So many are alike by chance where there is nothing to be seen.
+    if (static_cast<double>(count) < ChanceShare * static_cast<double>(nodes))
+    {
+      seen[k].assign(nodes, false);
+    }
   }
+  return seen;
+}
+
+double LineTracker::FillLost()
+{
+  const std::size_t phases = this->Times.size();
+  const std::size_t nodes = this->Nodes.size();
+  const std::vector<std::vector<bool>> seen = this->SeenPlaces();
+  if (std::all_of(seen.begin(), seen.end(),
+        [](const std::vector<bool>& phase)
+        { return std::all_of(phase.begin(), phase.end(), [](bool own) { return own; }); }))
+  {
+    return 0.0;
+  }
+  const PerPhase before = this->Displacement;
+  this->Take(FitFilled(this->Nodes, this->Times, this->ReferenceTime, seen,
+    this->WithSurroundings(this->Vessels), this->Settings.prior));
+  double farthest = 0.0;
   for (std::size_t k = 0; k < phases; ++k)
   {
     for (std::size_t n = 0; n < nodes; ++n)
     {
-      this->Displacement[k][n] = this->Motion.Displacement(static_cast<int>(n), times[k]);
+      farthest = std::max(farthest, (this->Displacement[k][n] - before[k][n]).norm());
     }
   }
+  return farthest;
 }
 
 void LineTracker::MeasureRepeatability()
@@ -204,7 +261,8 @@ void LineTracker::MeasureRepeatability()
 
 void LineTracker::Finish(PoseSequence& sequence)
 {
-  const std::vector<double> calibre = this->MeasureCalibre();
+  const std::vector<std::vector<bool>> found = this->SeenPlaces();
+  const std::vector<double> calibre = this->MeasureCalibre(found);
   this->MeasureRepeatability();
   const std::size_t phases = this->Times.size();
   const std::size_t nodes = this->Nodes.size();
@@ -223,6 +281,8 @@ void LineTracker::Finish(PoseSequence& sequence)
       const double certain = std::min(1.0, sure * sure);
       seen[n] = certain *
         std::clamp((this->Likeness[k][n] - 0.3) / (2.0 * (TrackedLikeness - 0.3)), 0.0, 1.0);
+      // Alike by chance.
+      seen[n] = found[k][n] ? seen[n] : std::min(seen[n], ChanceConfidence);
       // What was filled well is worth something to those who smooth the motion.
       confidence[n] = std::max(seen[n], FilledConfidence * certain);
       tracked += seen[n] >= TrackedConfidence ? 1.0 : 0.0;
@@ -278,7 +338,13 @@ PoseSequence LineTracker::Run()
   }
   for (int round = 0; round < 4; ++round)
   {
-    this->Align(round < 2 ? 1.0 : 0.5, 0.8 + 0.05 * round);
+    this->Align(round < 2 ? 1.0 : 0.5, 0.8 + 0.04 * round);
+  }
+  // A branch that was looked for in the wrong place may be seen where those around it say that it is.
+  if (this->Settings.fillUnseen && this->FillLost() > SearchedAgain)
+  {
+    this->Align(0.5, 0.96);
+    this->FillLost();
   }
   PoseSequence sequence;
   this->Finish(sequence);

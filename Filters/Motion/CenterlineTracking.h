@@ -39,6 +39,8 @@ struct CenterlineTrackingSettings
 
   double trackedDeviation = 0.6; ///< mm: nodes less certain than that have less confidence
   TrajectoryPrior prior;
+  /// What was not seen takes the motion of what was seen around it; false: that of the trajectories alone.
+  bool fillUnseen = true;
 
   /// @throws std::invalid_argument naming the setting.
   void Validate() const;

@@ -8,6 +8,7 @@
 #include "CenterlineTracking.h"
 #include "CyclicTime.h"
 #include "LineNodes.h"
+#include "MotionFilling.h"
 #include "PatchMatching.h"
 #include "SparseVolume.h"
 #include "TrajectoryModel.h"
@@ -56,14 +57,8 @@ public:
 
 private:
   using PerPhase = std::vector<std::vector<Vector3>>;
-  using Measurements = std::vector<std::vector<TrajectoryMeasurement>>;
 
-  struct Seen
-  {
-    PerPhase displacement;                         ///< per phase and node, mm
-    std::vector<std::vector<Matrix3>> information; ///< of each, 1/mm^2
-    double robustScale = 1.0;                      ///< mm
-  };
+  using Seen = MotionMeasurements;
 
   /// What is expected to be seen of a node at a phase.
   struct Sight
@@ -109,7 +104,8 @@ private:
     Vector3& measured, Matrix3& information, double& correlation) const;
   void Finish(PoseSequence& sequence);
   /// Per phase: factor of the radius, of all vessels together.
-  std::vector<double> MeasureCalibre() const;
+  /// @param seen  as of SeenPlaces()
+  std::vector<double> MeasureCalibre(const std::vector<std::vector<bool>>& seen) const;
   Widening MeasureWidening(std::size_t k, int n, const WideningField& field) const;
   /// Three harmonics of the cycle, nothing at the reference, through each phase's widening.
   std::vector<double> PulseOf(
@@ -118,6 +114,11 @@ private:
   void MeasureRepeatability();
   /// Fits the trajectories to what was measured; what does not agree counts less.
   void Fit(const std::vector<const Seen*>& seen);
+  void Take(Trajectories motion);
+  /// Per phase and node: whether a vessel is there that is alike, and those around it are.
+  std::vector<std::vector<bool>> SeenPlaces() const;
+  /// Fits once more, with what was not seen where those that were seen say. @return the greatest change, mm
+  double FillLost();
   std::vector<const Seen*> WithSurroundings(const Seen& seen) const
   {
     return this->Settings.tissue ? std::vector<const Seen*>{ &seen, &this->Surroundings }

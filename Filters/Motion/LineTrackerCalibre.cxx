@@ -219,7 +219,7 @@ LineTracker::Widening LineTracker::MeasureWidening(
   return {};
 }
 
-std::vector<double> LineTracker::MeasureCalibre() const
+std::vector<double> LineTracker::MeasureCalibre(const std::vector<std::vector<bool>>& seen) const
 {
   const std::size_t phases = this->Times.size();
   const std::size_t nodes = this->Nodes.size();
@@ -241,7 +241,8 @@ std::vector<double> LineTracker::MeasureCalibre() const
     [&](std::size_t k)
     {
       std::vector<Widening> estimates(nodes);
-      overNodes([&](int n) { estimates[n] = this->MeasureWidening(k, n, *fields[n]); });
+      overNodes([&](int n)
+        { estimates[n] = seen[k][n] ? this->MeasureWidening(k, n, *fields[n]) : Widening(); });
       return Packed(estimates);
     });
   // A node alone is too noisy: the weighted median of all.

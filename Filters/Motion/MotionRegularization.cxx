@@ -944,6 +944,12 @@ MotionEnergies EnergiesOfPositions(const Problem& problem, const Positions& posi
 }
 }
 
+double TemporalWeightOf(std::size_t phases)
+{
+  const double share = std::min(1.0, static_cast<double>(phases) / 20.0);
+  return MotionRegularizationSettings().temporalWeight * share * share * share * share;
+}
+
 void MotionRegularizationSettings::Validate() const
 {
   const auto notNegative = [](double value, const char* name)

@@ -56,6 +56,10 @@ struct MotionRegularizationSettings
   void Validate() const;
 };
 
+/// The default temporal weight, as at 20 phases, for so many. Acceleration is measured in distances of phases: what few of
+/// them show of a fast motion would be taken for noise.
+double TemporalWeightOf(std::size_t phases);
+
 /// Bits of what a point was held back by, at one phase.
 enum MotionClamp : int
 {

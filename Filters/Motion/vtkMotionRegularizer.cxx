@@ -63,6 +63,27 @@ std::size_t Nearest(const std::vector<double>& times, double time, double period
     times.begin());
 }
 
+/// The tracker's way from rest goes with the points.
+void MoveDisplacement(vtkPointData* data, vtkDoubleArray* moves)
+{
+  vtkDataArray* ways = data->GetArray(names::Displacement);
+  if (!ways || ways->GetNumberOfComponents() != 3)
+  {
+    return;
+  }
+  vtkNew<vtkDoubleArray> moved;
+  moved->DeepCopy(ways);
+  for (vtkIdType n = 0; n < moves->GetNumberOfTuples(); ++n)
+  {
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      moved->SetComponent(n, axis, ways->GetComponent(n, axis) + moves->GetComponent(n, axis));
+    }
+  }
+  moved->SetName(names::Displacement);
+  data->AddArray(moved);
+}
+
 void RequireLines(vtkPolyData* data, const std::string& whose)
 {
   Require(data->GetNumberOfCells() == data->GetLines()->GetNumberOfCells(),
@@ -256,6 +277,7 @@ int vtkMotionRegularizer::RequestData(
       moves->SetTuple(static_cast<vtkIdType>(n), move.data());
     }
     pointData->AddArray(moves);
+    MoveDisplacement(pointData, moves);
     vtkCoronary::AddArray<vtkDoubleArray>(
       output->GetCellData(), names::AxialStrain, motion.strain[k]);
     vtkCoronary::AddArray<vtkDoubleArray>(

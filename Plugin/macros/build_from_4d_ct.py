@@ -24,7 +24,7 @@ HOUNSFIELD = (-150.0, 650.0)
 def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_radius=4.5, window=(),
           beyond_mask=False, least_branch=0.0, centerline_steps=5000000, labels=True,
           edges=(0.15, 0.7), open_ends=False, leave_bones_outside=False, temporal_window_ms=66.0,
-          tracked="all", interpolation="cubic", regularized=False, show=True, size=None):
+          tracked="all", interpolation="cubic", limits=True, show=True, size=None):
     """Assembles the pipeline and computes it.
 
     source        image series, or the output port of one; one phase only: a model at rest
@@ -32,7 +32,6 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
     scales, c     vesselness: least and greatest scale in mm, and Frangi's c; c 0: from the image
     seed          x, y, z of each seed one after the other, mm, LPS; none: the ostia are looked for
     window        HU of tissue and of blood; none: from the image
-    regularized   MotionRegularizer between the tracker and what follows (`run` has none)
     show, size    makes a layout of three views, of so many pixels together
     The others are the settings of `coronary-pipeline run` of the same names (docs/programs.md).
 
@@ -96,11 +95,15 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
         tracker.SetPropertyWithName("TemporalWindow", temporal_window_ms / 1000.0)
         tracker = add("tracker", tracker)
         poses = simple.OutputPort(made["tracker"], 1)
-        if regularized:
-            tracker = add("regularizer", simple.MotionRegularizer(
-                tracker, registrationName="10 Motion of the lines, regularised"))
-            poses = add("regularized_poses", simple.MotionRegularizer(
-                poses, registrationName="10 Motion of the skeleton, regularised"))
+        if limits:
+            # Acceleration counts as with 20 phases.
+            weight = 0.005 * min(1.0, len(made["tracker"].TimestepValues) / 20.0) ** 4
+            tracker = add("limits", simple.MotionRegularizer(
+                Motion=tracker, Rest=tree, TemporalWeight=weight,
+                registrationName="10 Motion of the lines within limits"))
+            poses = add("pose_limits", simple.MotionRegularizer(
+                Motion=poses, Rest=skeleton, TemporalWeight=weight,
+                registrationName="10 Motion of the skeleton within limits"))
         moments = {"Mode": MODES[interpolation], "TimeSteps": "List", "ListedSteps": times}
         add("lines", simple.CardiacPhaseInterpolator(
             tracker, registrationName="11 Centerlines in time", **moments))

@@ -163,7 +163,7 @@ protected:
       phase.measures.hausdorff = 2.0 + 0.1 * k;
       phase.measures.msd = 1.0;
       phase.measures.completenessRatio = 1.0;
-      phase.measures.lengthDetected = 0.999 + 0.0002 * k;
+      phase.measures.found = 0.999 + 0.0002 * k;
       this->Case.phases.push_back(phase);
     }
     this->Scene.evaluation = &this->Case;

@@ -55,6 +55,9 @@ protected:
     confidence->SetName("TrackingConfidence");
     vtkNew<vtkIntArray> step;
     step->SetName("Step");
+    vtkNew<vtkDoubleArray> way;
+    way->SetName("Displacement");
+    way->SetNumberOfComponents(3);
     vtkNew<vtkDoubleArray> rotation;
     rotation->SetName("BoneRotation");
     rotation->SetNumberOfComponents(4);
@@ -65,6 +68,7 @@ protected:
       points->InsertNextPoint(4.0 * n, spike ? this->Spike : 0.0, Z(n, time));
       confidence->InsertNextValue(spike ? 0.0 : 1.0);
       step->InsertNextValue(static_cast<int>(std::lround(10.0 * time)));
+      way->InsertNextTuple3(0.0, spike ? this->Spike : 0.0, Z(n, time));
       ids.push_back(n);
       if (this->Bones && n > 0)
       {
@@ -89,6 +93,7 @@ protected:
       output->GetPointData()->AddArray(confidence);
     }
     output->GetPointData()->AddArray(step);
+    output->GetPointData()->AddArray(way);
     if (this->Bones)
     {
       output->GetCellData()->AddArray(rotation);
@@ -131,6 +136,8 @@ TEST(MotionRegularizer, SolvesOnceAndAnswersEveryStep)
   // The spike is gone, and what was done is said.
   EXPECT_NEAR(filter->GetOutput()->GetPoint(5)[1], 0.0, 0.2);
   EXPECT_NEAR(Point(filter, "RegularizationMove", 5, 1), -9.0, 0.2);
+  // The way from rest is that of the point.
+  EXPECT_NEAR(Point(filter, "Displacement", 5, 1), filter->GetOutput()->GetPoint(5)[1], 1e-9);
   EXPECT_NE(static_cast<int>(Point(filter, "MotionClamps", 5)) & 4, 0);
   EXPECT_EQ(Point(filter, "MotionClamps", 1), 0);
   EXPECT_GT(Field(filter, "TemporalEnergy", 0), Field(filter, "TemporalEnergy", 1));

@@ -81,12 +81,10 @@ TEST(Evaluation, TwoSpheresAndShiftedTrees)
   EXPECT_NEAR(m.hausdorff, 0.5, 0.02);
   EXPECT_NEAR(m.hausdorff95, 0.5, 0.02);
   EXPECT_NEAR(m.msd, 0.5, 0.02);
-  EXPECT_NEAR(m.msdArea, 0.5, 0.02);
-  EXPECT_NEAR(m.rms, 0.5, 0.02);
+  EXPECT_NEAR(m.assd, 0.5, 0.02);
   EXPECT_DOUBLE_EQ(m.completenessRatio, 1.0);
   EXPECT_NEAR(m.continuityScore, 1.0, 1e-9);
   EXPECT_DOUBLE_EQ(m.boundedCompleteness, 1.0);
-  EXPECT_DOUBLE_EQ(m.boundedContinuity, 1.0);
   // All of the truth that is wide enough is 0.4 mm away.
   EXPECT_NEAR(m.centerlineMean, 0.4, 1e-12);
   EXPECT_NEAR(m.centerline95, 0.4, 1e-12);
@@ -112,7 +110,10 @@ TEST(Evaluation, MissingBranchesCount)
   // Without the side branch the other two are one.
   EXPECT_NEAR(phase.measures.completenessRatio, 1.0 / 3.0, 1e-12);
   EXPECT_LT(phase.measures.boundedCompleteness, 0.7);
-  EXPECT_NEAR(phase.measures.lengthDetected, 50.0 / 75.0, 0.03);
+  EXPECT_NEAR(phase.measures.found, 51.0 / 75.0, 0.004);
+  EXPECT_NEAR(phase.measures.foundHalf, 51.0 / 75.0, 0.004);
+  EXPECT_DOUBLE_EQ(phase.measures.foundWide, 1.0);
+  EXPECT_DOUBLE_EQ(phase.measures.falseLength, 0.0);
   // The missing branch is thinner than what centerlines are compared at; all of it is when asked for.
   EXPECT_NEAR(phase.measures.centerlineMean, 0.0, 1e-12);
   EvaluationSettings settings;
@@ -121,6 +122,62 @@ TEST(Evaluation, MissingBranchesCount)
   EvaluatePhase(input, settings, all, warnings);
   // 25 mm of 75, at 0 to 25 mm.
   EXPECT_NEAR(all.measures.centerlineMean, 25.0 / 75.0 * 12.5, 0.05);
+}
+
+TEST(Evaluation, FalseBranchesCountByTheirConfidence)
+{
+  EvaluationInput input;
+  input.model = Sphere(10.0, 3);
+  input.truth = input.model;
+  input.truthTree = Tree(0.0, false);
+  input.modelTree = Tree(0.0, true);
+  input.modelLabels = { { 2, "D1" } };
+  // Sure of the first half of the branch that is no vessel.
+  for (const Vector3& point : input.modelTree.points)
+  {
+    input.modelConfidence.push_back(point.y() < 12.5 ? 0.9 : 0.1);
+  }
+  CaseEvaluation one;
+  one.phases.resize(2);
+  std::vector<std::string> warnings;
+  for (PhaseEvaluation& phase : one.phases)
+  {
+    EvaluatePhase(input, {}, phase, warnings);
+  }
+  const EvaluationMeasures& m = one.phases[0].measures;
+  EXPECT_DOUBLE_EQ(m.found, 1.0);
+  // The branch is false where it has left the trunk's lumen of 1.5 mm.
+  EXPECT_NEAR(m.falseLength, 23.5, 0.26);
+  EXPECT_NEAR(m.falseConfident, 11.0, 0.51);
+  ASSERT_EQ(one.phases[0].falseBranches.size(), 1u);
+  EXPECT_NEAR(one.phases[0].falseBranches[0].length, 25.0, 1e-9);
+  EXPECT_NEAR(one.phases[0].falseBranches[0].confidence, 0.5, 0.05);
+  const std::vector<std::string> findings = FindingsOf(one);
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_NE(findings[0].find("False: D1 (25.0 mm, confidence 0.5"), std::string::npos)
+    << findings[0];
+  EXPECT_NE(findings[0].find("in 2 of 2 phases"), std::string::npos);
+
+  // The other way round a branch is lost, in one of the two phases.
+  std::swap(input.modelTree, input.truthTree);
+  input.modelConfidence.clear();
+  input.labels = input.modelLabels;
+  input.modelLabels.clear();
+  CaseEvaluation other;
+  other.phases.resize(2);
+  other.phases[1].phase = 7;
+  EvaluatePhase(input, {}, other.phases[1], warnings);
+  EXPECT_TRUE(std::isnan(other.phases[1].measures.falseConfident));
+  input.modelTree = input.truthTree;
+  EvaluatePhase(input, {}, other.phases[0], warnings);
+  const std::vector<BranchSummary> branches = SummarizeBranches(other);
+  ASSERT_EQ(branches.size(), 3u);
+  EXPECT_EQ(branches[2].worstPhase, 7);
+  EXPECT_LT(branches[2].minimum, 0.1);
+  EXPECT_NEAR(branches[2].found, 0.5 * (1.0 + branches[2].minimum), 1e-12);
+  ASSERT_EQ(FindingsOf(other).size(), 1u);
+  EXPECT_NE(FindingsOf(other)[0].find("Lost: D1 (25.0 mm) in 1 of 2 phases"), std::string::npos)
+    << FindingsOf(other)[0];
 }
 
 TEST(Evaluation, WithoutTreesThereAreNoBranchMeasures)
@@ -134,6 +191,8 @@ TEST(Evaluation, WithoutTreesThereAreNoBranchMeasures)
   EXPECT_NEAR(phase.measures.hausdorff, 0.0, 1e-12);
   EXPECT_TRUE(std::isnan(phase.measures.completenessRatio));
   EXPECT_TRUE(std::isnan(phase.measures.centerlineMean));
+  EXPECT_TRUE(std::isnan(phase.measures.found));
+  EXPECT_TRUE(std::isnan(phase.measures.falseLength));
 }
 
 TEST(Evaluation, RefusesAndStops)
@@ -161,7 +220,7 @@ TEST(Evaluation, MeansAndDeviations)
   EXPECT_EQ(odd.count, 3);
   EXPECT_DOUBLE_EQ(odd.mean.hausdorff, 5.0);
   EXPECT_DOUBLE_EQ(odd.deviation.hausdorff, std::sqrt(13.0)); // (9 + 1 + 16) / 2
-  EXPECT_TRUE(std::isnan(odd.mean.rms));
+  EXPECT_TRUE(std::isnan(odd.mean.found));
   EXPECT_DOUBLE_EQ(SummarizePhases(one, false).mean.hausdorff, 150.0);
   one.phases.resize(2);
   EXPECT_TRUE(std::isnan(SummarizePhases(one, true).deviation.hausdorff));
@@ -213,7 +272,7 @@ TEST(Evaluation, Tables)
       << line;
   }
   EXPECT_EQ(LinesWith(csv, "\"patient_7, \"\"left\"\" & 50%\""), 16u);
-  EXPECT_EQ(LinesWith(csv, ",lost,3.000000"), 2u);
+  EXPECT_EQ(LinesWith(csv, ",lost,,,,,,,,,,3.000000,"), 2u); // HD, after what leads
   EXPECT_EQ(LinesWith(csv, "B,"), 4u);
   EXPECT_EQ(csv.find("nan"), std::string::npos);
 

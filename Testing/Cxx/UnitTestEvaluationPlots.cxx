@@ -30,7 +30,7 @@ CaseEvaluation FourPhases(const std::string& name)
     phase.interpolated = k % 2 == 1;
     phase.lost = k == 2;
     phase.measures.hausdorff = 2.0 + 0.1 * k;
-    phase.measures.lengthDetected = 0.999 + 0.0002 * k;
+    phase.measures.found = 0.999 + 0.0002 * k;
     one.phases.push_back(phase);
   }
   return one;
@@ -96,8 +96,8 @@ TEST(EvaluationPlots, MarksAreWhereTheirValuesAre)
 {
   const std::vector<EvaluationPlot> plots = DrawPlots({ FourPhases("one") });
   ASSERT_EQ(plots.size(), 2U) << "measures that are known";
-  EXPECT_EQ(plots[0].key, "HD");
-  EXPECT_EQ(plots[1].key, "length_detected");
+  EXPECT_EQ(plots[0].key, "found");
+  EXPECT_EQ(plots[1].key, "HD");
   for (const auto& [key, svg] : plots)
   {
     SCOPED_TRACE(key);
@@ -137,8 +137,8 @@ TEST(EvaluationPlots, MarksAreWhereTheirValuesAre)
     EXPECT_GT(places[3][1], part(5));
     EXPECT_LT(places[0][1], part(6));
   }
-  EXPECT_EQ(Count(plots[0].svg, "paper's case 1: 5.42"), 1U);
-  EXPECT_EQ(Count(plots[1].svg, "paper"), 0U) << "a measure that the paper has not";
+  EXPECT_EQ(Count(plots[1].svg, "paper's case 1: 5.42"), 1U);
+  EXPECT_EQ(Count(plots[0].svg, "paper"), 0U) << "a measure that the paper has not";
   EXPECT_EQ(Count(plots[0].svg, "class=\"names\""), 0U);
 }
 
@@ -150,7 +150,7 @@ TEST(EvaluationPlots, SeveralCasesHaveAColourAndANameEach)
     phase.measures.hausdorff *= 1.5;
     phase.fraction = EvaluationMeasures::NaN; // over the number then
   }
-  const std::string svg = DrawPlots({ FourPhases("first " + Nasty), second })[0].svg;
+  const std::string svg = DrawPlots({ FourPhases("first " + Nasty), second })[1].svg;
   EXPECT_EQ(NestingError(svg), "");
   for (const char* part :
     { "data-case=\"0\" color=\"#0072b2\"", "data-case=\"1\" color=\"#d55e00\"", "fill=\"#0072b2\"",

@@ -60,6 +60,7 @@ struct Case
   bool lost = false; ///< a systolic phase, and 40 % of the nodes in two others
   bool allPhases = false;
   bool regularize = false;
+  bool filling = true;
   PhaseInterpolationMode mode = PhaseInterpolationMode::PeriodicCubic;
   std::string cache; ///< folder for images, or empty
 };
@@ -248,6 +249,7 @@ Outcome Run(const Case& test)
   CenterlineTrackingSettings tracking;
   tracking.temporalWindow = settings.temporalWindow;
   tracking.cycleLength = settings.cycleLength;
+  tracking.fillUnseen = test.filling;
   CenterlineTrackingReport report;
   std::vector<std::int16_t> voxels;
   double inImages = 0.0;
@@ -271,7 +273,9 @@ Outcome Run(const Case& test)
   outcome.seconds = since(start) - inImages;
   if (test.regularize)
   {
-    poses = RegularizeMotion(poses, lines).poses;
+    MotionRegularizationSettings limits;
+    limits.temporalWeight = TemporalWeightOf(times.size());
+    poses = RegularizeMotion(poses, lines, limits).poses;
   }
   outcome.repeatability = report.repeatability;
   outcome.imagesRead = report.imagesRead;
@@ -424,6 +428,7 @@ int main(int argc, char** argv)
       ->transform(CLI::CheckedTransformer(modes));
     program.add_flag(
       "--regularize", test.regularize, "with the limits and smoothing of the motion");
+    program.add_flag("!--no-filling", test.filling, "what is not seen by the trajectories alone");
     program.add_flag("--true-tree", test.trueTree, "the true tree, not the one found");
     program
       .add_option("--cache", test.cache, "existing folder that keeps the images for other runs")

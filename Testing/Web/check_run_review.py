@@ -236,7 +236,9 @@ def check_moving(pipeline):
         report = json.load(file)
     report["time"] = 0.5
     report["stages"][0]["warnings"] = ["something"]
-    report["motion"] = {"tracked_times": [-0.05, 1.06], "tracked_share": [1.0, 0.3]}
+    filled = [{"vessel": "D1", "time": 1.06, "status": "lost", "length_mm": 12.5, "confidence": 0.2, "place": [1.0, 2.0, 3.0]}]
+    limits = {"applied": True, "greatest_move_mm": 0.4, "clamped": [{"vessel": "D1", "time": 1.06, "limit": "strain", "points": 2}]}
+    report["motion"] = {"tracked_times": [-0.05, 1.06], "tracked_share": [1.0, 0.3], "filled": filled, "limits": limits}
     with open("beat/report.json", "w", encoding="utf-8") as file:
         json.dump(report, file)
     run("review", "beat", "--no-pictures", "--output", "moving", "--quiet")
@@ -246,6 +248,7 @@ def check_moving(pipeline):
     check([(one["interpolated"], one["lost"]) for one in phases] == [(False, False), (True, False), (False, True)],
           "phases: %s" % [(one["interpolated"], one["lost"]) for one in phases])
     check(case["run"]["reference"] == 1 and case["run"]["warnings"] == ["centerline: something"], "the run says: %s" % case["run"]["warnings"])
+    check(case["run"]["filled"] == filled and case["run"]["limits"] == limits, "the page does not tell of what was filled or held back")
     names = [one["name"] for one in case["run"]["vessels"]]
     check(any(name.startswith("LM, pLAD") for name in names) and any(name.startswith("pRCA") for name in names), "vessels: %s" % names)
     run("evaluate", "--result", "beat", "--truth", "beat", "--no-pictures", "--quiet", "--error-bound", "0.1", "--output", "compared")

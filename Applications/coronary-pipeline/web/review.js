@@ -142,7 +142,7 @@ class Review {
     fillPartA(byId('part-a'), this.data, this.index, all, (k) => this.goTo(k));
     fillPartB(byId('part-b'), this.data, all, (k) => k !== this.index && this.showCase(k));
     byId('part-b').querySelector(`[data-case="${this.index}"]`).setAttribute('aria-current', 'true');
-    byId('warnings').replaceChildren(...[...this.table.warnings, ...this.data.warnings].map((text) => element('li', {}, [text])));
+    byId('warnings').replaceChildren(...[...this.table.findings, ...this.table.warnings, ...this.data.warnings].map((text) => element('li', {}, [text])));
     const keys = columnsOf(this.data, this.table.phases, all).map((column) => column.key);
     this.plots = this.data.plots.filter((plot) => keys.includes(plot.key))
       .map((plot) => new Plot(plot, this.index, this.table.phases, (k) => this.goTo(k)));

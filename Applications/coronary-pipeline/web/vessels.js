@@ -7,9 +7,11 @@ const FINDINGS = [
   ['lesions', ['lesions'], 'Narrowings', 'No narrowing was found.'],
   ['calcium', ['calcium', 'objects'], 'Calcium', 'No calcium was found.'],
   ['hidden', ['calcium', 'radius_interpolated'], 'Radius guessed, behind calcium', 'None was.'],
+  ['filled', ['filled'], 'Not seen at a phase, and filled', 'All that was tracked was seen.'],
+  ['limits', ['limits', 'clamped'], 'Held back by limits of motion', 'Nothing was held back.'],
 ];
 // Columns that come first; the others follow as they are.
-const FIRST_COLUMNS = ['what', 'vessel', 'kind', 'degree', 'diameter_stenosis_percent', 'range_percent', 'confidence', 'length_mm',
+const FIRST_COLUMNS = ['what', 'vessel', 'time', 'status', 'limit', 'kind', 'degree', 'diameter_stenosis_percent', 'range_percent', 'confidence', 'length_mm',
   'least_diameter_mm', 'reference_diameter_mm'];
 const PLACES = ['position', 'place', 'at', 'minimum', 'centre', 'center', 'from', 'begin'];
 const NEAR_VESSEL = 4; // mm from its axis: a click there belongs to it
@@ -132,7 +134,7 @@ class RunPanel {
     const parts = [element('h3', {}, [title])];
     if (around && !Array.isArray(around)) {
       // What is said of all of them together.
-      const all = Object.keys(around).filter((key) => ['number', 'string'].includes(typeof around[key]) && key !== 'file');
+      const all = Object.keys(around).filter((key) => ['number', 'string', 'boolean'].includes(typeof around[key]) && key !== 'file');
       parts.push(element('p', { class: 'none' }, [all.map((key) => {
         const { name, unit } = wordsOf(key);
         return `${name} ${shownValue(key, around[key])}${unit ? ` ${unit}` : ''}`;
