@@ -50,6 +50,7 @@ tables=(
   "motion-measured-heart | validate-real-motion | validate-real-motion --quick"
   "evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation --seeds 101 --lost none --spacing 0.6"
   "scanned | scripts/validate-scanned.py --build BUILD --output OUTPUT | scripts/validate-scanned.py --quick --build BUILD --output OUTPUT"
+  "reconstructor | validate-reconstructor | validate-reconstructor --quick"
   "peers | scripts/validate-peers.py --build BUILD --output OUTPUT | scripts/validate-peers.py --quick --build BUILD --output OUTPUT"
   "simulator | scripts/validate-simulator.sh BUILD | scripts/validate-simulator.sh --quick BUILD"
 )

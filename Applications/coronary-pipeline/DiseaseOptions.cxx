@@ -120,6 +120,37 @@ PhantomGraft GraftOf(const Json& json, const std::string& where)
   return graft;
 }
 
+PhantomCollateral CollateralOf(const Json& json, const std::string& where)
+{
+  Require(json.is_object(), where + " has to be an object");
+  PhantomCollateral collateral;
+  for (const auto& [key, value] : json.items())
+  {
+    const std::string entry = where + "." + key;
+    if (key == "name" || key == "from" || key == "to")
+    {
+      (key == "name"      ? collateral.name
+          : key == "from" ? collateral.from
+                          : collateral.to) = TextOf(value, entry);
+    }
+    else if (key == "from_fraction" || key == "to_fraction" || key == "diameter_mm")
+    {
+      (key == "from_fraction"    ? collateral.fromFraction
+          : key == "to_fraction" ? collateral.toFraction
+                                 : collateral.diameter) = NumberOf(value, entry);
+    }
+    else if (key == "septal")
+    {
+      collateral.septal = FlagOf(value, entry);
+    }
+    else
+    {
+      throw std::invalid_argument(entry + " is not known");
+    }
+  }
+  return collateral;
+}
+
 /// Adds what `read` makes of each entry of a list.
 template <typename Entry>
 void AddList(const Json& list, const std::string& key,
@@ -129,6 +160,34 @@ void AddList(const Json& list, const std::string& key,
   for (const Json& one : ListOf(list, key))
   {
     entries.push_back(read(one, key + "[" + std::to_string(number++) + "]"));
+  }
+}
+
+/// Their courses at each phase, since they are in no other file of the truth.
+void DescribeCollaterals(
+  const CoronaryPhantom& phantom, const std::vector<double>& phases, Json& json)
+{
+  const std::vector<PhantomCollateralTruth> atRest = phantom.Collaterals(0.0);
+  for (std::size_t n = 0; n < atRest.size(); ++n)
+  {
+    const PhantomCollateral& collateral = atRest[n].collateral;
+    Json one = { { "name", collateral.name }, { "from", collateral.from },
+      { "from_fraction", collateral.fromFraction }, { "to", collateral.to },
+      { "to_fraction", collateral.toFraction }, { "septal", collateral.septal },
+      { "diameter_mm", collateral.diameter }, { "hu", atRest[n].value },
+      { "clearance_mm", atRest[n].clearance }, { "phases", Json::array() } };
+    for (const double phase : phases)
+    {
+      const PhantomCollateralTruth truth = phantom.Collaterals(phase)[n];
+      Json course = Json::array();
+      for (const Vector3& place : truth.points)
+      {
+        course.push_back({ place[0], place[1], place[2] });
+      }
+      one["phases"].push_back({ { "fraction", phase }, { "radius_mm", truth.radius },
+        { "length_mm", truth.length }, { "course_mm", course } });
+    }
+    json["collaterals"].push_back(one);
   }
 }
 
@@ -152,6 +211,10 @@ void AddJson(const Json& json, PhantomSettings& settings)
     else if (key == "grafts")
     {
       AddList(value, key, GraftOf, disease.grafts);
+    }
+    else if (key == "collaterals")
+    {
+      AddList(value, key, CollateralOf, disease.collaterals);
     }
     else if (key == "origin")
     {
@@ -241,11 +304,11 @@ bool IsDiseased(const PhantomSettings& settings)
 {
   const PhantomDisease& disease = settings.disease;
   return settings.stenoses > 0 || settings.calcifiedPlaques > 0 || settings.chronicOcclusion ||
-    !disease.lesions.empty() || !disease.grafts.empty() || disease.leads ||
-    disease.origin != CoronaryOrigin::Usual;
+    !disease.lesions.empty() || !disease.grafts.empty() || !disease.collaterals.empty() ||
+    disease.leads || disease.origin != CoronaryOrigin::Usual;
 }
 
-std::string DescribeDisease(const CoronaryPhantom& phantom)
+std::string DescribeDisease(const CoronaryPhantom& phantom, const std::vector<double>& phases)
 {
   const PhantomDisease& disease = phantom.Settings().disease;
   Json json;
@@ -290,6 +353,7 @@ std::string DescribeDisease(const CoronaryPhantom& phantom)
       { "from", graft.mammary ? "mammary" : "aorta" }, { "vessel", graft.vessel },
       { "position_mm", graft.position }, { "diameter_mm", graft.diameter } });
   }
+  DescribeCollaterals(phantom, phases, json);
   for (const PhantomVessel& vessel : phantom.Vessels())
   {
     Json one;

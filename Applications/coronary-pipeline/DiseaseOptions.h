@@ -38,8 +38,9 @@ private:
 /// Whether the arteries differ from healthy ones.
 bool IsDiseased(const PhantomSettings& settings);
 
-/// What a phantom suffers from, how much of it there truly is, and its vessels, as JSON.
-std::string DescribeDisease(const CoronaryPhantom& phantom);
+/// What a phantom suffers from, how much of it there truly is, and its vessels, as JSON; collateral ones with their courses at
+/// these phases of the heart.
+std::string DescribeDisease(const CoronaryPhantom& phantom, const std::vector<double>& phases);
 }
 
 #endif

@@ -288,7 +288,7 @@ public:
       if (IsDiseased(this->Job.settings))
       {
         const CoronaryPhantom phantom(this->Job.settings);
-        WriteFileAtomically(folder.Add(DiseaseName), DescribeDisease(phantom));
+        WriteFileAtomically(folder.Add(DiseaseName), DescribeDisease(phantom, this->Times));
       }
     }
     if (this->Scanner)

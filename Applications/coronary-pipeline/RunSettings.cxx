@@ -331,6 +331,23 @@ void RunOptions::DeclareMotion(Declaration& all)
     .Between(0.0, 1000.0)
     .ShowDefault();
   all
+    .Add("--motion", "motion", settings.motion, "KIND",
+      "tracked: through the phases; population: the mean motion of a population, not of this "
+      "patient, bent to what phases there are; none: at rest; automatic: tracked from four phases "
+      "on, else population")
+    .Check(OneOf({ "automatic", "tracked", "population", "none" }))
+    .ShowDefault();
+  all
+    .Add("--heart-rate", "heart_rate", settings.heartRate, "BPM",
+      "Beats a minute of the population motion; without it, that of the series")
+    .Between(30.0, 180.0)
+    .Optional();
+  all
+    .Add("--motion-amplitude", "motion_amplitude", settings.motionAmplitude, "FACTOR",
+      "Factor on the amplitudes of the population motion")
+    .Between(0.0, 2.0)
+    .ShowDefault();
+  all
     .Add("--tracked", "tracked", settings.tracked, "PHASES",
       "Phases that are tracked: all, or even, every other one, and the others are interpolated")
     .Check(OneOf({ "all", "even" }))

@@ -65,6 +65,10 @@ struct RunSettings
   bool leaveBonesOutside = false;
 
   double temporalWindowMs = 66.0;
+  std::string motion = "automatic"; ///< or "tracked", "population", "none"
+  double heartRate =
+    std::numeric_limits<double>::quiet_NaN(); ///< of the population; NaN: that of the series
+  double motionAmplitude = 1.0;
   std::string tracked = "all"; ///< or "even"
   std::vector<double> moments; ///< empty: the phases of the series
   std::string interpolation = "cubic";

@@ -2,6 +2,7 @@
 
 #include "AtomicFile.h"
 #include "FileSeries.h"
+#include "Interruption.h"
 #include "MeshSequenceReport.h"
 #include "MotionRegularization.h"
 #include "Ranks.h"
@@ -10,6 +11,7 @@
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
 #include "vtkRunLimits.h"
+#include "vtkRunPopulation.h"
 #include "vtkRunTrees.h"
 #include "vtkTimedPolyData.h"
 
@@ -22,6 +24,7 @@
 #include "vtkMeshSequenceWriter.h"
 #include "vtkMotionRegularizer.h"
 #include "vtkPolyData.h"
+#include "vtkPopulationMotion.h"
 #include "vtkSkinDeformation.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkTable.h"
@@ -174,9 +177,74 @@ Json MakeRest(RunStep& step, const std::string& reason)
   step.warnings.push_back(
     "motion is not possible: " + reason + "; motion/ holds the model at rest");
   step.summary = "no motion: " + reason;
-  return { { "possible", false }, { "reason", reason }, { "at_rest", true },
+  return { { "possible", false }, { "motion", "none" }, { "reason", reason }, { "at_rest", true },
     { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
     { "times", times } };
+}
+
+std::vector<int> InvertedTetrahedra(const MovingMesh& moving)
+{
+  std::vector<int> inverted;
+  vtkTable* quality = moving.Writer->GetQuality();
+  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
+  {
+    inverted.push_back(
+      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
+  }
+  return inverted;
+}
+
+/// The model with the motion of a population, in the files of a tracked one.
+Json MakePopulation(RunStep& step, const MotionPlan& plan)
+{
+  const auto skeleton = ReadLines(step, "skeleton.vtp");
+  const auto tree = ReadTree(step);
+  PopulationPoses poses(step, tree, skeleton, plan);
+  try
+  {
+    poses.Update(step, [&](double fraction) { step.progress(0.8 * fraction); });
+  }
+  catch (const std::runtime_error& error)
+  {
+    ThrowIfInterrupted();
+    if (plan.asked)
+    {
+      throw;
+    }
+    // Trees without names, or of other vessels, have no heart that they belong to.
+    return MakeRest(step, plan.reason + ", and no population's motion: " + error.what());
+  }
+  std::vector<double> times = step.input.Settings.moments;
+  times = times.empty() ? poses.Times() : times;
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  vtkNew<vtkCardiacPhaseInterpolator> lines;
+  lines->SetInputConnection(poses.Motion->GetOutputPort(0));
+  lines->SetMode(InterpolationMode(step.input.Settings.interpolation));
+  MovingMesh moving;
+  moving.Interpolator->SetInputConnection(poses.Motion->GetOutputPort(1));
+  ConnectMesh(step, skeleton, moving);
+  Json lists;
+  lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
+  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
+  lists.update(WriteMovingMesh(
+    moving, times, step, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); }));
+  if (!Ranks().IsFirst())
+  {
+    return {};
+  }
+  step.warnings.push_back(
+    poses.Statement() + (plan.reason.empty() ? "" : " (" + plan.reason + ")"));
+  if (!poses.Assumption().empty())
+  {
+    step.warnings.push_back(poses.Assumption());
+  }
+  step.summary = std::to_string(times.size()) + " moments, " + poses.Statement();
+  Json told = poses.Describe(plan);
+  told.update(
+    Json{ { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
+      { "times", times }, { "inverted_tetrahedra", InvertedTetrahedra(moving) } });
+  return told;
 }
 }
 
@@ -184,10 +252,14 @@ Json MakeMotion(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
   vtkMessageTrap& messages = step.input.Messages;
-  const std::string still = step.input.ReasonWithoutMotion();
-  if (!still.empty())
+  const MotionPlan plan = PlanMotion(step.input);
+  if (plan.kind == MotionKind::Rest)
   {
-    return MakeRest(step, still);
+    return MakeRest(step, plan.reason);
+  }
+  if (plan.kind == MotionKind::Population)
+  {
+    return MakePopulation(step, plan);
   }
   const auto skeleton = ReadLines(step, "skeleton.vtp");
   vtkNew<vtkCenterlineTracker> tracker;
@@ -234,24 +306,18 @@ Json MakeMotion(RunStep& step)
     return {};
   }
   vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
-  Json inverted = Json::array();
-  vtkTable* quality = moving.Writer->GetQuality();
-  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
-  {
-    inverted.push_back(
-      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
-  }
   step.summary = std::to_string(times.size()) + " moments";
   Json limits = { { "applied", settings.limits } };
   if (settings.limits)
   {
     limits.update(DescribeLimits(keptLines, keptSkeleton, tree, messages));
   }
-  return { { "possible", true }, { "file", "motion.pvd" }, { "series", lists },
-    { "quality", "motion/mesh.json" }, { "times", times }, { "tracked_times", TimeSteps(tracker) },
+  return { { "possible", true }, { "motion", "tracked" }, { "file", "motion.pvd" },
+    { "series", lists }, { "quality", "motion/mesh.json" }, { "times", times },
+    { "tracked_times", TimeSteps(tracker) },
     { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
     { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
     { "filled", DescribeFilled(tracker, tree, messages) }, { "limits", limits },
-    { "inverted_tetrahedra", inverted } };
+    { "inverted_tetrahedra", InvertedTetrahedra(moving) } };
 }
 }

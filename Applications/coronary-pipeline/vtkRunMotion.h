@@ -1,6 +1,6 @@
 /**
  * @file vtkRunMotion.h
- * @brief The last stage of `run`: the model at all moments, or at rest where there is nothing to track.
+ * @brief The last stage of `run`: the model at all moments.
  */
 #ifndef vtkRunMotion_h
 #define vtkRunMotion_h
@@ -10,8 +10,8 @@
 namespace coronary
 {
 /**
- * Tracks the tree through the phases and writes motion/. Where RunInput::ReasonWithoutMotion() names a reason, every
- * moment has the pose at rest, a warning says so, and the report has `at_rest`.
+ * Tracks the tree through the phases and writes motion/. Where PlanMotion() says so, the motion is that of a population, or
+ * every moment has the pose at rest; a warning and the report say which.
  * @return what the report tells of it, on the first rank @throws std::runtime_error, Cancelled
  */
 nlohmann::ordered_json MakeMotion(RunStep& step);

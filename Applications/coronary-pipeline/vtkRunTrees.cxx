@@ -169,19 +169,9 @@ void AddLooseVessels(
   {
     return;
   }
-  HeartPose heart;
-  Vector3 shift;
-  for (int row = 0; row < 3; ++row)
-  {
-    for (int column = 0; column < 3; ++column)
-    {
-      heart.axes(row, column) = frame->GetComponent(0, 4 * row + column);
-    }
-    shift[row] = frame->GetComponent(0, 4 * row + 3);
-  }
-  heart.size = 1.0 / heart.axes.row(0).norm();
-  heart.axes *= heart.size;
-  heart.origin = -heart.size * (heart.axes.transpose() * shift);
+  std::array<double, 16> matrix{};
+  frame->GetTuple(0, matrix.data());
+  const HeartPose heart = HeartPoseOf(matrix);
   const VesselTree lines = vtkCoronary::TreeOf(tree);
   std::vector<float> imageCopy;
   std::vector<float> copy;

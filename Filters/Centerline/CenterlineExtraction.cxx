@@ -74,13 +74,14 @@ private:
   bool PlaceSeeds();
   void MarchFromSeeds();
   void Calibrate(const MeasuredPath& path);
+  void MeasureBlur();
   void CorrectRadii();
   void SettleOstia();
   std::int64_t Append(const MinimalPath& way, int treeId, bool wanted);
   void Own(std::size_t branch);
   void FindTips();
   bool ThinBranchesFor(ThinBranchSettings& settings) const;
-  void FollowThinBranches();
+  void FollowThinBranches(std::int64_t from);
   void LengthenTips();
   void TurnBranches();
   void Remove(std::size_t index);
@@ -290,33 +291,40 @@ void Extractor::Calibrate(const MeasuredPath& path)
   }
 }
 
-/// Half-maximum radii to true ones. How blurred the image is shows in the small vessels: the less
-/// of the great vessels' contrast they have at their size, the more.
+/// How blurred the image is shows in the small vessels: the less of the great vessels' contrast they have at their size,
+/// the more.
+void Extractor::MeasureBlur()
+{
+  const LumenReference& reference = this->Paths.lumen.reference;
+  const double contrast = reference.lumen - reference.background;
+  if (this->Settings.blur != 0.0 || !this->Input.intensity || !(contrast > 0.0))
+  {
+    return;
+  }
+  std::vector<double> blurs;
+  for (std::size_t p = 0; p < this->Tree.points.size(); ++p)
+  {
+    const double share = (this->PointLumen[p] - reference.background) / contrast;
+    if (this->Tree.confidence[p] > 0.8 && share > 0.4 && share < 0.85)
+    {
+      blurs.push_back(BlurFromContrast(this->Tree.radius[p], share));
+    }
+  }
+  if (blurs.size() >= 20)
+  {
+    this->Blur = std::min(
+      std::max(MedianOf(std::move(blurs)), 0.4 * this->Paths.voxel), 4.0 * this->Paths.voxel);
+  }
+}
+
+/// Half-maximum radii to true ones.
 void Extractor::CorrectRadii()
 {
   if (!this->Input.intensity)
   {
     return;
   }
-  const LumenReference& reference = this->Paths.lumen.reference;
-  const double contrast = reference.lumen - reference.background;
-  if (this->Settings.blur == 0.0 && contrast > 0.0)
-  {
-    std::vector<double> blurs;
-    for (std::size_t p = 0; p < this->Tree.points.size(); ++p)
-    {
-      const double share = (this->PointLumen[p] - reference.background) / contrast;
-      if (this->Tree.confidence[p] > 0.8 && share > 0.4 && share < 0.85)
-      {
-        blurs.push_back(BlurFromContrast(this->Tree.radius[p], share));
-      }
-    }
-    if (blurs.size() >= 20)
-    {
-      this->Blur = std::min(
-        std::max(MedianOf(std::move(blurs)), 0.4 * this->Paths.voxel), 2.0 * this->Paths.voxel);
-    }
-  }
+  this->MeasureBlur();
   this->Result.blur = this->Blur;
   // A vessel thinner than half the blur shows less than 12 % of its contrast: what is seen is wider,
   // and what was measured narrower, or continued into the parent, is not the vessel's width.
@@ -618,34 +626,52 @@ bool Extractor::ExcludeVeins(
 }
 
 /// What is too thin for the region, by the image alone.
-void Extractor::FollowThinBranches()
+/// @param from  points of the tree before this one are not looked beside
+void Extractor::FollowThinBranches(std::int64_t from)
 {
   ThinBranchSettings settings;
   if (!this->ThinBranchesFor(settings))
   {
     return;
   }
-  // Several spots lead to one vessel: what was followed once, whether to keep or not, is done.
+  // Several spots lead to one vessel: what was followed once is done. What could not be kept may be a vessel that was
+  // entered from a wrong place: it is not followed again from there.
   std::vector<Vector3> done;
-  for (const ThinBranch& branch : FindThinBranches(*this->Paths.image, this->Tree, settings))
+  std::vector<Vector3> refused;
+  for (const ThinBranch& branch : FindThinBranches(*this->Paths.image, this->Tree, settings, from))
   {
-    std::size_t known = 0;
-    for (const Vector3& point : branch.points)
+    const auto isKnown = [&](const std::vector<Vector3>& places, std::size_t first)
     {
-      known += std::any_of(done.begin(), done.end(),
-        [&](const Vector3& other)
-        { return (other - point).squaredNorm() < 4.0 * this->Paths.voxel * this->Paths.voxel; });
-    }
-    if (2 * known > branch.points.size() || this->Excluded.LeadsInside(branch.points))
+      std::size_t known = 0;
+      for (std::size_t i = 0; i < first; ++i)
+      {
+        known += std::any_of(places.begin(), places.end(),
+          [&](const Vector3& other) {
+            return (other - branch.points[i]).squaredNorm() <
+              4.0 * this->Paths.voxel * this->Paths.voxel;
+          });
+      }
+      return 2 * known > first;
+    };
+    const std::size_t beginning = std::max<std::size_t>(4, branch.points.size() / 4);
+    if (isKnown(done, branch.points.size()) || isKnown(refused, beginning) ||
+      this->Excluded.LeadsInside(branch.points))
     {
       continue;
     }
-    done.insert(done.end(), branch.points.begin(), branch.points.end());
     MinimalPath way;
     way.owner = branch.parent;
     way.points.assign(branch.points.rbegin(), branch.points.rend());
     const auto parent = static_cast<std::size_t>(this->BranchOf[branch.parent]);
-    this->Append(way, this->Tree.branches[parent].treeId, false);
+    if (this->Append(way, this->Tree.branches[parent].treeId, false) >= 0)
+    {
+      done.insert(done.end(), branch.points.begin(), branch.points.end());
+    }
+    else
+    {
+      refused.insert(refused.end(), branch.points.begin(),
+        branch.points.begin() + static_cast<std::ptrdiff_t>(beginning));
+    }
   }
 }
 
@@ -902,9 +928,15 @@ CenterlineResult Extractor::Run()
     if (this->Settings.findTips || this->Input.targets.empty())
     {
       this->FindTips();
-      this->FollowThinBranches();
+      // What is thinner than the region shows what the blur leaves of it.
+      this->MeasureBlur();
+      this->Paths.lumen.blur = this->Blur;
+      this->FollowThinBranches(0);
       this->TurnBranches();
+      const auto known = static_cast<std::int64_t>(this->Tree.points.size());
       this->LengthenTips();
+      // Beyond the region vessels part as well.
+      this->FollowThinBranches(known);
     }
     this->FollowTargets();
   }

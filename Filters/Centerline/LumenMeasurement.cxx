@@ -171,6 +171,21 @@ const std::vector<double>& HalfMaxima()
   return table;
 }
 
+/// A small lumen is blurred: share of its contrast that a disc with this half-maximum radius shows, at most. Which of the
+/// smallest ones it is its width hardly tells: the thinnest that is looked for shows 30 %.
+double ExpectedShare(double halfMaximum, double blur, double voxel)
+{
+  constexpr double unknown = 1.1;   // voxels
+  constexpr double thinnest = 0.85; // blurs
+  if (!(blur > 0.0))
+  {
+    const double r = halfMaximum / (unknown * voxel);
+    return -std::expm1(-0.5 * r * r);
+  }
+  const double r = std::max(thinnest, RadiusFromHalfMaximum(halfMaximum, blur) / blur);
+  return -std::expm1(-0.5 * r * r);
+}
+
 /// Crossing of a fixed level.
 Wall WallSearch::FindLevel(const Vector3& from, const Vector3& direction, double level) const
 {
@@ -337,12 +352,10 @@ LumenSection MeasureLumen(const ImageInterpolator& image, const Vector3& positio
   section.confidence = ramp(share, 0.45, 0.85) * ramp(spread, 0.4, 0.15);
   if (!fixed)
   {
-    // A small lumen is blurred: a disc of radius r shows 1 - exp(-r^2 / 2 blur^2) of its contrast.
     const double relative = (section.lumen - reference.background) / contrast;
-    const double blur = 1.1 * image.MinimumSpacing();
-    const double expected = 1.0 - std::exp(-section.radius * section.radius / (2.0 * blur * blur));
+    const double expected = ExpectedShare(section.radius, settings.blur, image.MinimumSpacing());
     section.confidence *= ramp(relative / std::min(1.0, expected + 0.05), 0.45, 0.7) *
-      ramp((section.lumen - behind) / contrast, 0.15, 0.3);
+      ramp((section.lumen - behind) / (contrast * std::min(1.0, expected + 0.05)), 0.15, 0.3);
   }
   return section;
 }

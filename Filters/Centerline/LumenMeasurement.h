@@ -46,6 +46,9 @@ struct LumenSettings
   /// what lies behind the wall, for each ray.
   double level = std::numeric_limits<double>::quiet_NaN();
   LumenReference reference; ///< what counts as contrast; unused with a fixed level
+  /// Standard deviation of the image's blur, mm, for what a lumen of a size can show; 0: not known, then it is that of
+  /// the voxels. Unused with a fixed level.
+  double blur = 0.0;
 };
 
 struct LumenSection

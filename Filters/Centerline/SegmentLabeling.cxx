@@ -536,6 +536,24 @@ LabelingResult Labeler::Run(const ProgressCallback& progress)
 }
 }
 
+HeartPose HeartPoseOf(const std::array<double, 16>& matrix)
+{
+  HeartPose heart;
+  Vector3 shift;
+  for (int row = 0; row < 3; ++row)
+  {
+    for (int column = 0; column < 3; ++column)
+    {
+      heart.axes(row, column) = matrix[static_cast<std::size_t>(4 * row + column)];
+    }
+    shift[row] = matrix[static_cast<std::size_t>(4 * row + 3)];
+  }
+  heart.size = 1.0 / heart.axes.row(0).norm();
+  heart.axes *= heart.size;
+  heart.origin = -heart.size * (heart.axes.transpose() * shift);
+  return heart;
+}
+
 void LabelingSettings::Validate() const
 {
   if (!(this->orientationWeight >= 0.0 && this->orientationWeight <= 100.0))

@@ -16,6 +16,8 @@
 #include "CenterlineTopology.h"
 #include "CoronaryAnatomy.h"
 
+#include <array>
+
 namespace coronary
 {
 struct LabelingSettings
@@ -46,6 +48,10 @@ struct HeartPose
     return this->axes * (position - this->origin) / this->size;
   }
 };
+
+/// The pose that a matrix from the world to millimetres of the mean heart holds, row by row (the field array `HeartFrame`).
+/// Of a matrix that is no similarity the axes are no rotation.
+HeartPose HeartPoseOf(const std::array<double, 16>& matrix);
 
 /// The affine fit behind the names: nearer to the individual's proportions than HeartPose.
 struct MeanHeartFit

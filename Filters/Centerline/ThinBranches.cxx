@@ -26,10 +26,10 @@ constexpr double DeepestValley = 0.1;
 constexpr double MinimumContrast = 0.12;
 /// Standard errors of noise that the path's mean must exceed.
 constexpr double Significance = 8.0;
+/// Contrast of a path that turns to what is brightest in noise alone, in standard deviations of the noise.
+constexpr double NoisePath = 1.5;
 /// Distance of a path's samples, in voxels.
 constexpr double Stride = 0.75;
-/// How far a tip is followed, in voxels.
-constexpr double MostBeyondTip = 30.0;
 
 /// The lumens of a tree, for "how far is the nearest wall".
 class LumenDistance
@@ -49,6 +49,16 @@ public:
     {
       this->Cells[this->Key(tree.points[p], 0, 0, 0)].push_back(static_cast<std::int32_t>(p));
     }
+    this->BranchOf.assign(tree.points.size(), NoBranch);
+    for (std::size_t b = 0; b < tree.branches.size(); ++b)
+    {
+      for (const std::int64_t p : tree.branches[b].points)
+      {
+        // The first point may be its parent's, which comes before.
+        std::int32_t& owner = this->BranchOf[static_cast<std::size_t>(p)];
+        owner = owner == NoBranch ? static_cast<std::int32_t>(b) : owner;
+      }
+    }
   }
 
   struct Nearest
@@ -57,7 +67,10 @@ public:
     std::int32_t point = -1;
   };
 
-  Nearest operator()(const Vector3& position) const
+  static constexpr std::int32_t NoBranch = -1;
+
+  /// @param without  a branch whose lumen does not count
+  Nearest operator()(const Vector3& position, std::int32_t without = NoBranch) const
   {
     Nearest nearest{ this->Reach };
     for (int near = 0; near < 27; ++near)
@@ -70,6 +83,10 @@ public:
       }
       for (const std::int32_t p : cell->second)
       {
+        if (without != NoBranch && this->BranchOf[static_cast<std::size_t>(p)] == without)
+        {
+          continue;
+        }
         const double wall = (this->Tree.points[p] - position).norm() - this->Tree.radius[p];
         if (wall < nearest.wall || (wall == nearest.wall && p < nearest.point))
         {
@@ -96,6 +113,7 @@ private:
   double Reach;
   double Cell = 1.0;
   std::unordered_map<std::int64_t, std::vector<std::int32_t>> Cells;
+  std::vector<std::int32_t> BranchOf; ///< of a point of the tree
 };
 
 class Finder
@@ -115,8 +133,8 @@ public:
     }
   }
 
-  std::vector<ThinBranch> Run() const;
-  TipPath FollowTip(const VesselTree::Branch& branch) const;
+  std::vector<ThinBranch> Run(std::int64_t from) const;
+  TipPath FollowTip(std::int32_t number) const;
 
 private:
   struct Spot
@@ -130,14 +148,17 @@ private:
     Vector3 position;
     double minimum; ///< core over the second brightest sector around it
     double core;
-    double wall; ///< mm from the tree's lumen
+    double wall;        ///< mm from the tree's lumen
+    double going = 0.0; ///< contrast that speaks neither for going on nor against it, there
+    bool known = true;  ///< whether the contrast can be seen
   };
 
-  std::vector<Spot> FindSpots() const;
+  std::vector<Spot> FindSpots(std::int64_t from) const;
   double Core(const Vector3& position, const CrossFrame& frame) const;
   double Profile(const Vector3& position, const Vector3& tangent) const;
   double Ahead(const Vector3& position, const Vector3& direction) const;
-  bool Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const;
+  bool Evidence(
+    const Vector3& position, const Vector3& tangent, std::int32_t own, Sample& sample) const;
   Vector3 Turn(const Vector3& position, const Vector3& direction) const;
   Vector3 Centre(const Vector3& position, const Vector3& tangent) const;
   /// What a path must show.
@@ -150,6 +171,8 @@ private:
     double goingBright = 0.0;
     double bright = std::numeric_limits<double>::infinity();
     bool unknownGoesOn = false; ///< where the contrast can not be seen
+    /// Above 0: vessels taper, and blur makes thin ones fade. What counts is what the last samples showed, down to this.
+    double least = 0.0;
 
     double Going(const Sample& sample) const
     {
@@ -158,6 +181,7 @@ private:
   };
   bool Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
     const Bar& bar, std::vector<Sample>& samples) const;
+  static void Adapt(const std::vector<Sample>& samples, const Bar& first, Bar& bar);
   bool IsVessel(const std::vector<Sample>& samples, const Bar& bar, double& contrast,
     double& significance) const;
   bool Follow(const Spot& spot, ThinBranch& branch) const;
@@ -171,14 +195,14 @@ private:
 };
 
 /// Local maxima of the image on surfaces beside the lumens.
-std::vector<Finder::Spot> Finder::FindSpots() const
+std::vector<Finder::Spot> Finder::FindSpots(std::int64_t from) const
 {
   const double voxel = this->Settings.voxel;
   std::vector<Spot> spots;
   for (const VesselTree::Branch& branch : this->Tree.branches)
   {
     const std::size_t count = branch.points.size();
-    if (count < 3)
+    if (count < 3 || branch.points.back() < from)
     {
       continue;
     }
@@ -259,6 +283,10 @@ std::vector<Finder::Spot> Finder::FindSpots() const
             continue;
           }
           const auto parent = static_cast<std::int32_t>(branch.points[row * stride]);
+          if (parent < from)
+          {
+            continue;
+          }
           spots.push_back(
             { position, (position - this->Tree.points[parent]).normalized(), parent });
         }
@@ -300,7 +328,10 @@ double Finder::Ahead(const Vector3& position, const Vector3& direction) const
   return 0.25 * sum;
 }
 
-bool Finder::Evidence(const Vector3& position, const Vector3& tangent, Sample& sample) const
+/// @param own  the branch that it belongs to: blurred, its lumen comes near the sectors
+/// @returns false if too much around it lies in lumens that are known
+bool Finder::Evidence(
+  const Vector3& position, const Vector3& tangent, std::int32_t own, Sample& sample) const
 {
   const double voxel = this->Settings.voxel;
   const CrossFrame frame(tangent);
@@ -312,7 +343,10 @@ bool Finder::Evidence(const Vector3& position, const Vector3& tangent, Sample& s
   {
     const Vector3 side = frame.Ray(i, Sectors);
     const Vector3 place = position + 3.0 * voxel * side;
-    if (this->Lumen(place).wall < 1.5 * voxel)
+    const double wall = this->Lumen(place).wall;
+    if (wall < 1.5 * voxel &&
+      (own == LumenDistance::NoBranch || wall < 0.75 * voxel ||
+        this->Lumen(place, own).wall < 1.5 * voxel))
     {
       continue;
     }
@@ -384,6 +418,33 @@ Vector3 Finder::Centre(const Vector3& position, const Vector3& tangent) const
   return centre;
 }
 
+/// What a vessel must show to go on, by what it showed some samples before.
+void Finder::Adapt(const std::vector<Sample>& samples, const Bar& first, Bar& bar)
+{
+  constexpr std::size_t begin = 16;
+  constexpr std::size_t end = 4; // of them count: an end is abrupt
+  constexpr std::size_t enough = 6;
+  std::vector<double> contrasts;
+  std::vector<double> cores;
+  for (std::size_t i = samples.size() > begin ? samples.size() - begin : 0;
+       i + end < samples.size(); ++i)
+  {
+    if (samples[i].known)
+    {
+      contrasts.push_back(samples[i].minimum);
+      cores.push_back(samples[i].core);
+    }
+  }
+  if (contrasts.size() < enough)
+  {
+    return;
+  }
+  const double half = 0.5 * MedianOf(std::move(contrasts));
+  bar.going = std::clamp(half, first.least, std::max(first.least, first.going));
+  bar.goingBright = std::min(bar.going, first.goingBright);
+  bar.bright = MedianOf(std::move(cores)) - half;
+}
+
 /// Follows the tube, as far as the path speaks for a vessel.
 /// @param ownLumen  so many samples may lie in the tree's lumen
 /// @returns false if it leads into a vessel that is known
@@ -392,12 +453,19 @@ bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::s
 {
   const double step = Stride * this->Settings.voxel;
   constexpr std::size_t window = 8;
+  Bar now = bar;
   while (samples.size() < most && this->Image.Contains(position))
   {
     Sample sample;
-    if (!this->Evidence(position, direction, sample))
+    sample.known = this->Evidence(position, direction, LumenDistance::NoBranch, sample);
+    if (bar.least > 0.0)
     {
-      sample.minimum = bar.unknownGoesOn ? bar.Going(sample) : 0.0;
+      Adapt(samples, bar, now);
+    }
+    sample.going = now.Going(sample);
+    if (!sample.known)
+    {
+      sample.minimum = bar.unknownGoesOn ? sample.going : 0.0;
     }
     sample.wall = this->Lumen(position).wall;
     if (sample.wall < 0.0 && samples.size() >= ownLumen)
@@ -410,7 +478,7 @@ bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::s
       double recent = 0.0;
       for (std::size_t i = samples.size() - window; i < samples.size(); ++i)
       {
-        recent += (samples[i].minimum - bar.Going(samples[i])) / static_cast<double>(window);
+        recent += (samples[i].minimum - samples[i].going) / static_cast<double>(window);
       }
       if (recent < 0.0)
       {
@@ -433,7 +501,7 @@ bool Finder::Trace(Vector3 position, Vector3 direction, std::size_t most, std::s
   double top = 0.0;
   for (std::size_t i = 0; i < samples.size(); ++i)
   {
-    sum += samples[i].minimum - bar.Going(samples[i]);
+    sum += samples[i].minimum - samples[i].going;
     if (sum > top)
     {
       top = sum;
@@ -454,7 +522,7 @@ bool Finder::IsVessel(
   for (const Sample& sample : samples)
   {
     contrast += sample.minimum / count;
-    clear += sample.minimum >= bar.Going(sample) ? 1 : 0;
+    clear += sample.minimum >= sample.going ? 1 : 0;
   }
   // Samples three voxels apart are independent; four in the core, four in a sector.
   const double independent = std::max(1.0, count * Stride / 3.0);
@@ -565,8 +633,9 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   return true;
 }
 
-TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
+TipPath Finder::FollowTip(std::int32_t number) const
 {
+  const VesselTree::Branch& branch = this->Tree.branches[static_cast<std::size_t>(number)];
   const double voxel = this->Settings.voxel;
   const auto index = [&](std::size_t i) { return static_cast<std::size_t>(branch.points[i]); };
   const auto point = [&](std::size_t i) -> const Vector3& { return this->Tree.points[index(i)]; };
@@ -594,7 +663,7 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   for (std::size_t i = far; i < near; ++i)
   {
     Sample sample;
-    if (this->Evidence(point(i), back.normalized(), sample))
+    if (this->Evidence(point(i), back.normalized(), number, sample))
     {
       contrasts.push_back(sample.minimum);
       cores.push_back(sample.core);
@@ -605,7 +674,9 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   Bar bar;
   bar.minimum = 0.5 * minimum;
   bar.significance = 0.5 * Significance;
-  bar.going = std::max(0.25 * minimum, 0.5 * usual);
+  // A path that follows the noise shows as much as that.
+  bar.least = std::max(0.25 * minimum, NoisePath * this->Noise);
+  bar.going = std::max(bar.least, 0.5 * usual);
   bar.goingBright = std::min(bar.going, 0.5 * minimum);
   if (!cores.empty())
   {
@@ -618,8 +689,8 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   std::vector<Sample> samples;
   double contrast = 0.0;
   double significance = 0.0;
-  if (!this->Trace(this->Centre(point(near), direction), direction,
-        own + static_cast<std::size_t>(MostBeyondTip / Stride), own, bar, samples) ||
+  const auto most = own + static_cast<std::size_t>(this->Settings.maximumLength / (Stride * voxel));
+  if (!this->Trace(this->Centre(point(near), direction), direction, most, own, bar, samples) ||
     samples.size() < 4 || !this->IsVessel(samples, bar, contrast, significance))
   {
     return {};
@@ -640,13 +711,13 @@ TipPath Finder::FollowTip(const VesselTree::Branch& branch) const
   return beyond ? path : TipPath();
 }
 
-std::vector<ThinBranch> Finder::Run() const
+std::vector<ThinBranch> Finder::Run(std::int64_t from) const
 {
   if (this->Tree.points.empty())
   {
     return {};
   }
-  const std::vector<Spot> spots = this->FindSpots();
+  const std::vector<Spot> spots = this->FindSpots(from);
   std::vector<ThinBranch> branches(spots.size());
   std::vector<char> found(spots.size(), 0);
   ParallelFor(static_cast<std::int64_t>(spots.size()), 4,
@@ -712,11 +783,11 @@ void ThinBranchSettings::Validate() const
   require(this->contrast > 0.0, "contrast must be positive");
 }
 
-std::vector<ThinBranch> FindThinBranches(
-  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
+std::vector<ThinBranch> FindThinBranches(const ImageInterpolator& image, const VesselTree& tree,
+  const ThinBranchSettings& settings, std::int64_t from)
 {
   settings.Validate();
-  return Finder(image, tree, settings).Run();
+  return Finder(image, tree, settings).Run(from);
 }
 
 std::vector<TipPath> FollowTips(
@@ -731,7 +802,7 @@ std::vector<TipPath> FollowTips(
       for (std::int64_t b = first; b < last; ++b)
       {
         const auto branch = static_cast<std::size_t>(b);
-        paths[branch] = finder.FollowTip(tree.branches[branch]);
+        paths[branch] = finder.FollowTip(static_cast<std::int32_t>(b));
       }
     });
   return paths;

@@ -46,11 +46,12 @@ double MeasureNoise(const ImageInterpolator& image, const VesselTree& tree, doub
 
 /**
  * @param tree  points, radii (mm) and branches; not changed
+ * @param from  points of the tree before this one are not looked beside
  * @returns the branches, most significant first; several may follow the same vessel. The same on any number of threads.
  * @throws std::invalid_argument that names the setting out of range
  */
-std::vector<ThinBranch> FindThinBranches(
-  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings);
+std::vector<ThinBranch> FindThinBranches(const ImageInterpolator& image, const VesselTree& tree,
+  const ThinBranchSettings& settings, std::int64_t from = 0);
 
 /// How a branch goes on beyond its tip.
 struct TipPath

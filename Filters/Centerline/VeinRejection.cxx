@@ -22,7 +22,9 @@ constexpr double Far = 40.0;  ///< mm of a branch that are looked at
 constexpr double Unlimited = std::numeric_limits<double>::infinity();
 constexpr double MinimumLength = 8.0; ///< mm: what is shorter shows too little
 constexpr double MinimumRadius = 2.0; ///< blurs: thinner lumens are darker for the blur alone
-constexpr double Straight = 6.0;      ///< mm along which a direction is measured
+/// The same side by side, where the blur takes about as much from both.
+constexpr double MinimumRadiusBeside = 1.5;
+constexpr double Straight = 6.0; ///< mm along which a direction is measured
 /// Few branches touch by chance: 3 in 100. Behind a lesion it is the chance that what was linked is none of the tree.
 constexpr double Prior = -3.5;
 constexpr double CutReach = 1.0;     ///< mm beyond a tip's wall
@@ -300,7 +302,8 @@ double VeinFinder::TipRadius(const Path& path) const
 {
   const double length = path.empty() ? 0.0 : path.back().passed;
   std::vector<double> radii = this->Radii(path, length - 3.0, length + 1.0);
-  return radii.empty() ? this->Blur : std::max(1e-9, MedianOf(std::move(radii)));
+  // How thin a lumen is that is thinner than the blur its width does not tell.
+  return std::max({ this->Blur, radii.empty() ? 0.0 : MedianOf(std::move(radii)), 1e-9 });
 }
 
 /// Whether there is blood, and no calcium, ahead of a tip.
@@ -377,6 +380,7 @@ void VeinFinder::Beside(Arm& arm) const
     }
   }
   std::vector<double> steps;
+  std::vector<double> given;
   double before = 0.0;
   for (const auto& [point, passed] : path)
   {
@@ -406,18 +410,22 @@ void VeinFinder::Beside(Arm& arm) const
     if (nearest)
     {
       arm.beside += length;
-      const auto clear = [&](std::size_t p)
-      { return this->Tree.radius[p] >= MinimumRadius * this->Blur && !IsBridged(this->Tree, p); };
+      const auto clear = [&](std::size_t p) {
+        return this->Tree.radius[p] >= MinimumRadiusBeside * this->Blur &&
+          !IsBridged(this->Tree, p);
+      };
       if (clear(point) && clear(*nearest))
       {
         steps.push_back(this->Value[point] - this->Value[*nearest]);
+        given.push_back(this->GivenBack[point] - this->GivenBack[*nearest]);
       }
     }
   }
   if (steps.size() >= 16)
   {
     arm.stepBeside = MedianOf(steps);
-    arm.errorBeside = SpreadOfMedian(steps);
+    // What the blur took is known by half.
+    arm.errorBeside = std::hypot(SpreadOfMedian(steps), 0.5 * MedianOf(given));
   }
 }
 

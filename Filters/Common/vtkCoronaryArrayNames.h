@@ -221,6 +221,18 @@ constexpr const char* EllipseMinor = "EllipseMinor"; ///< double, semi-axis, mm
 constexpr const char* ClampedSections = "ClampedSections"; ///< vtkIdType, number of points
 constexpr const char* Repeatability = "Repeatability"; ///< double, mm, of phases that come twice
 constexpr const char* LowNoiseFit = "LowNoiseFit"; ///< double: rank, order, ridge, left-out error
+// Motion of a population, point data.
+constexpr const char* MotionDeviation = "MotionDeviation"; ///< double, mm, standard deviation
+// Motion of a population, field data.
+constexpr const char* MotionSource =
+  "MotionSource"; ///< string, what of the motion is not the patient's
+constexpr const char* MotionPhases = "MotionPhases"; ///< int, phases of the patient that carry it
+constexpr const char* HeartLandmarks = "HeartLandmarks"; ///< string, what the heart's place is from
+constexpr const char* LongAxis = "LongAxis";             ///< double[6], mm: base, apex
+constexpr const char* LongAxisDeviation =
+  "LongAxisDeviation"; ///< double, 3 values: radians, mm at the base, mm of length
+constexpr const char* PopulationValues = "PopulationValues"; ///< double, one a parameter
+constexpr const char* PopulationMisfit = "PopulationMisfit"; ///< double, 2 values, mm
 // Regularised motion, cell data (with AxialStrain).
 constexpr const char* AxialStress = "AxialStress"; ///< double, MPa, Young's modulus times strain
 // Regularised motion, point data.

@@ -6,6 +6,7 @@
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
 #include "vtkCoronaryUpstream.h"
+#include "vtkMovedLines.h"
 #include "vtkPoseSequences.h"
 
 #include "vtkCellArray.h"
@@ -32,6 +33,8 @@
 namespace names = vtkCoronaryArrayNames;
 using coronary::PoseSequence;
 using coronary::Vector3;
+using vtkMovedLines::Connection;
+using vtkMovedLines::NearestIndex;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
 vtkStandardNewMacro(vtkCenterlineTracker);
@@ -52,59 +55,11 @@ constexpr double UsualCycleLength = 0.8;
 constexpr double DrawnSpacing = 0.5;
 constexpr double DrawnMargin = 3.0;
 
-vtkInformation* Connection(vtkInformationVector** inputs, int port)
-{
-  return inputs[port] != nullptr && inputs[port]->GetNumberOfInformationObjects() > 0
-    ? inputs[port]->GetInformationObject(0)
-    : nullptr;
-}
-
 double FieldValue(vtkDataObject* data, const char* name, double otherwise)
 {
   vtkDataArray* array = data != nullptr ? data->GetFieldData()->GetArray(name) : nullptr;
   return array != nullptr && array->GetNumberOfTuples() == 1 ? array->GetComponent(0, 0)
                                                              : otherwise;
-}
-
-std::size_t NearestIndex(const std::vector<double>& times, double wanted)
-{
-  return std::min_element(times.begin(), times.end(),
-           [wanted](double a, double b) { return std::abs(a - wanted) < std::abs(b - wanted); }) -
-    times.begin();
-}
-
-/// Where a point is nearest to the lines.
-struct Foot
-{
-  std::int64_t first = 0;
-  std::int64_t second = 0;
-  double fraction = 0.0;
-};
-
-std::vector<Foot> FeetOf(const coronary::Polylines& lines, vtkPolyData* points)
-{
-  std::vector<Foot> feet;
-  for (vtkIdType n = 0; n < points->GetNumberOfPoints(); ++n)
-  {
-    const Vector3 place(points->GetPoint(n));
-    double minimum = std::numeric_limits<double>::infinity();
-    Foot best;
-    for (const std::vector<std::int64_t>& line : lines.lines)
-    {
-      for (std::size_t i = 0; i + 1 < line.size(); ++i)
-      {
-        const coronary::SegmentPlace nearest =
-          coronary::NearestOnSegment(place, lines.points[line[i]], lines.points[line[i + 1]]);
-        if (nearest.squaredDistance < minimum)
-        {
-          minimum = nearest.squaredDistance;
-          best = { line[i], line[i + 1], nearest.fraction };
-        }
-      }
-    }
-    feet.push_back(best);
-  }
-  return feet;
 }
 
 bool IsSurface(vtkPolyData* shapes)
@@ -158,16 +113,6 @@ coronary::VesselImage Drawn(vtkPolyData* shapes)
     "The series has neither lines nor surfaces");
   return coronary::RenderLines(
     vtkPoseSequences::LinesOf(shapes, vtkCoronary::FindRadius(shapes)), DrawnSpacing, DrawnMargin);
-}
-
-double LengthOf(vtkIdType count, const vtkIdType* points, const std::vector<Vector3>& positions)
-{
-  double length = 0.0;
-  for (vtkIdType i = 0; i + 1 < count; ++i)
-  {
-    length += (positions[points[i + 1]] - positions[points[i]]).norm();
-  }
-  return length;
 }
 }
 
@@ -284,19 +229,7 @@ int vtkCenterlineTracker::RequestInformation(
     vtkErrorMacro(<< error.what());
     return 0;
   }
-  for (int port = 0; port < 2; ++port)
-  {
-    vtkInformation* outInfo = outputs->GetInformationObject(port);
-    outInfo->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
-    outInfo->Remove(SDDP::TIME_STEPS());
-    outInfo->Remove(SDDP::TIME_RANGE());
-    if (!times.empty())
-    {
-      double range[2] = { times.front(), times.back() };
-      outInfo->Set(SDDP::TIME_STEPS(), times.data(), static_cast<int>(times.size()));
-      outInfo->Set(SDDP::TIME_RANGE(), range, 2);
-    }
-  }
+  vtkMovedLines::SetTimes(outputs, times);
   return 1;
 }
 
@@ -463,46 +396,8 @@ int vtkCenterlineTracker::RequestData(
     const auto write =
       [&](vtkPolyData* like, const vtkPoseSequences::Moment& moment, vtkPolyData* out)
     {
-      vtkPoseSequences::Write(like, moment, out);
-      std::vector<Vector3> rest;
-      vtkNew<vtkDoubleArray> displacement;
-      displacement->SetName(names::Displacement);
-      displacement->SetNumberOfComponents(3);
-      displacement->SetNumberOfTuples(like->GetNumberOfPoints());
-      for (vtkIdType n = 0; n < like->GetNumberOfPoints(); ++n)
-      {
-        rest.emplace_back(like->GetPoint(n));
-        const Vector3 moved = (*moment.points)[n] - rest.back();
-        displacement->SetTuple(n, moved.data());
-      }
-      out->GetPointData()->AddArray(displacement);
-      // Cells of poly data: vertices, lines, polygons, strips.
-      vtkNew<vtkDoubleArray> strain;
-      strain->SetName(names::AxialStrain);
-      strain->SetNumberOfValues(like->GetNumberOfCells());
-      strain->FillValue(0.0);
-      vtkIdType cell = like->GetNumberOfVerts();
-      const auto lines =
-        vtkSmartPointer<vtkCellArrayIterator>::Take(like->GetLines()->NewIterator());
-      for (lines->GoToFirstCell(); !lines->IsDoneWithTraversal(); lines->GoToNextCell(), ++cell)
-      {
-        vtkIdType count = 0;
-        const vtkIdType* points = nullptr;
-        lines->GetCurrentCell(count, points);
-        const double before = LengthOf(count, points, rest);
-        strain->SetValue(
-          cell, before > 0.0 ? LengthOf(count, points, *moment.points) / before - 1.0 : 0.0);
-      }
-      out->GetCellData()->AddArray(strain);
+      vtkMovedLines::Write(input, like, moment, data.Cycle, data.Reference, out);
       vtkFieldData* fields = out->GetFieldData();
-      fields->PassData(input->GetFieldData());
-      fields->PassData(like->GetFieldData());
-      vtkCoronary::AddArray<vtkDoubleArray>(
-        fields, names::PhaseTime, std::vector<double>{ moment.time });
-      vtkCoronary::AddArray<vtkDoubleArray>(
-        fields, names::CycleLength, std::vector<double>{ data.Cycle });
-      vtkCoronary::AddArray<vtkDoubleArray>(
-        fields, names::ReferenceTime, std::vector<double>{ data.Reference });
       vtkCoronary::AddArray<vtkDoubleArray>(fields, names::TrackedShare, data.Report.trackedShare);
       if (data.Report.repeatedPhases > 0)
       {
@@ -516,29 +411,9 @@ int vtkCenterlineTracker::RequestData(
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;
     if (skeleton != nullptr && skeleton->GetNumberOfPoints() > 0)
     {
-      const std::vector<Foot> feet = FeetOf(data.Lines, skeleton);
-      std::vector<Vector3> joints;
-      std::vector<double> confidence;
-      std::vector<coronary::TrackingStatus> status;
-      std::vector<double> calibre;
-      for (std::size_t n = 0; n < feet.size(); ++n)
-      {
-        const Foot& foot = feet[n];
-        const auto between = [&foot](const auto& values)
-        { return values[foot.first] + foot.fraction * (values[foot.second] - values[foot.first]); };
-        const Vector3 shift = between(data.Poses.points[phase]) - between(data.Lines.points);
-        joints.push_back(Vector3(skeleton->GetPoint(static_cast<vtkIdType>(n))) + shift);
-        confidence.push_back(between(data.Poses.confidence[phase]));
-        calibre.push_back(between(data.Poses.calibre[phase]));
-        status.push_back(data.Poses.status[phase][foot.fraction < 0.5 ? foot.first : foot.second]);
-      }
-      vtkPoseSequences::Moment posed;
-      posed.time = times[phase];
-      posed.points = &joints;
-      posed.confidence = &confidence;
-      posed.status = &status;
-      posed.calibre = &calibre;
-      write(skeleton, posed, output[1]);
+      const vtkMovedLines::PosedSkeleton posed(
+        vtkMovedLines::Feet(data.Lines, skeleton), data.Lines.points, data.Poses, phase, skeleton);
+      write(skeleton, posed.At(times[phase]), output[1]);
     }
     return 1;
   }

@@ -446,6 +446,26 @@ std::vector<PhantomVessel> CoronaryPhantom::Vessels() const
   return vessels;
 }
 
+std::vector<PhantomCollateralTruth> CoronaryPhantom::Collaterals(double t) const
+{
+  const PhantomAnatomy& anatomy = this->Data->Anatomy;
+  std::vector<PhantomCollateralTruth> result;
+  for (const PlacedCollateral& placed : anatomy.collaterals)
+  {
+    PhantomCollateralTruth truth{ placed.collateral, {},
+      0.5 * placed.collateral.diameter * this->Data->RadiusFactor(t), placed.value, 0.0,
+      placed.clearance };
+    for (const PartNode& node : anatomy.parts[placed.part].nodes)
+    {
+      truth.points.push_back(this->Position(node.axis, t));
+      const std::size_t count = truth.points.size();
+      truth.length += count > 1 ? (truth.points[count - 1] - truth.points[count - 2]).norm() : 0.0;
+    }
+    result.push_back(std::move(truth));
+  }
+  return result;
+}
+
 std::vector<PhantomPlaque> CoronaryPhantom::Plaques(double t) const
 {
   const PhantomAnatomy& anatomy = this->Data->Anatomy;

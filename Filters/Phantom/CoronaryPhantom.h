@@ -161,6 +161,18 @@ struct PhantomLesionTruth
   double agatston = 0.0;        ///< of the calcium alone, see docs/phantom.md
 };
 
+/// A collateral vessel at one moment.
+struct PhantomCollateralTruth
+{
+  PhantomCollateral collateral;
+  std::vector<Vector3> points; ///< mm, from the artery that it leaves
+  double radius;               ///< mm, at that moment
+  double value;                ///< HU
+  double length;               ///< mm, at that moment
+  double
+    clearance; ///< mm to the wall of another artery at rest, away from its ends; below 0: runs into it
+};
+
 /// A vessel by its name.
 struct PhantomVessel
 {
@@ -241,6 +253,9 @@ public:
   std::vector<PhantomLesionTruth> Lesions() const;
 
   std::vector<PhantomVessel> Vessels() const;
+
+  /// They are no part of the tree, nor of the surface.
+  std::vector<PhantomCollateralTruth> Collaterals(double t) const;
 
   std::vector<PhantomOstium> Ostia(double t) const;
 

@@ -1,5 +1,6 @@
 #include "PhantomAnatomy.h"
 
+#include "PhantomCollaterals.h"
 #include "PhantomCourses.h"
 #include "PhantomVesselPlans.h"
 #include "Require.h"
@@ -862,6 +863,7 @@ void AnatomyBuilder::LocateLesions()
       this->FillLate(placed);
     }
   }
+  AddCollaterals(anatomy, this->Settings);
   BuildParts(anatomy);
   if (this->Settings.disease.leads)
   {

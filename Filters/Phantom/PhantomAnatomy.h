@@ -57,6 +57,18 @@ struct AorticRoot
   double radius;                         ///< mm
 };
 
+/// A collateral vessel where it is.
+struct PlacedCollateral
+{
+  PhantomCollateral collateral;
+  std::int64_t from = -1; ///< of the tree, where it leaves and where it ends
+  std::int64_t to = -1;
+  std::size_t part = 0; ///< of the anatomy, with its course
+  double value = 0.0;   ///< HU
+  double clearance =
+    0.0; ///< mm to the wall of another artery, away from its ends; below 0: runs into it
+};
+
 /// Number of the tree that a graft is, beside the left and the right one and the veins.
 constexpr int GraftTree = 3;
 
@@ -83,7 +95,8 @@ struct PhantomAnatomy
   std::vector<VesselEnd> ends;
   std::vector<Plaque> plaques;
   std::vector<PlacedLesion> lesions; ///< counted ones, those of the disease, counted spots
-  std::vector<PhantomPart> parts;    ///< in the order of their layers
+  std::vector<PlacedCollateral> collaterals;
+  std::vector<PhantomPart> parts; ///< in the order of their layers
   std::vector<std::string> vesselNames;
 
   PhantomTree vein;

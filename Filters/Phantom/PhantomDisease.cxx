@@ -162,6 +162,19 @@ std::vector<PhantomLesion> Occluded()
     Make("occlusion", "LCx", 40.0, 12.0, 0.0) };
 }
 
+/// The occluded arteries with what fills them: septal channels from the LAD, an epicardial one beside the circumflex.
+void AddCollateralised(PhantomSettings& s)
+{
+  const std::vector<L> lesions = Occluded();
+  s.disease.lesions.insert(s.disease.lesions.end(), lesions.begin(), lesions.end());
+  // Without a posterior descending branch of the right artery its acute marginal is filled.
+  const bool leftDominant = s.dominance == Dominance::Left;
+  const std::string behind = leftDominant ? "AM1" : "R-PDA";
+  s.disease.collaterals.push_back({ "SC1", "S1", behind, 0.95, 0.4, 0.6, !leftDominant });
+  s.disease.collaterals.push_back({ "SC2", "S2", behind, 0.95, 0.7, 0.4, !leftDominant });
+  s.disease.collaterals.push_back({ "EC1", "OM1", "OM3", 0.7, 0.6, 0.5, false });
+}
+
 using Change = std::function<void(PhantomSettings&)>;
 
 Change Adds(std::vector<PhantomLesion> lesions)
@@ -186,6 +199,7 @@ const std::vector<std::pair<std::string, Change>>& Presets()
       Adds({ Make("plaque", "LAD", 65.0, 70.0, 0.4, [](L& l) { l.remodelling = 1.0; }),
         Make("plaque", "RCA", 36.0, 64.0, 0.35, [](L& l) { l.eccentricity = 0.4; }) }) },
     { "occluded", Adds(Occluded()) },
+    { "collateral", AddCollateralised },
     { "stented", Adds(Stented()) },
     { "graft",
       [](PhantomSettings& s)
@@ -326,6 +340,16 @@ void PhantomDisease::Validate() const
     Require(!graft.name.empty() && !graft.vessel.empty(), where + "needs a name and a vessel");
     Require(Within(graft.position, 0.0, 1000.0) && Within(graft.diameter, 1.0, 6.0),
       where + "needs a position_mm from 0 to 1000 and a diameter_mm from 1 to 6");
+  }
+  for (const PhantomCollateral& one : this->collaterals)
+  {
+    const std::string where = "PhantomSettings: collateral " + one.name + " ";
+    Require(!one.name.empty() && !one.from.empty() && !one.to.empty(),
+      where + "needs a name and the vessels from and to");
+    Require(one.from != one.to, where + "leads from " + one.from + " to itself");
+    Require(Within(one.fromFraction, 0.0, 1.0) && Within(one.toFraction, 0.0, 1.0) &&
+        Within(one.diameter, 0.2, 1.5),
+      where + "needs fractions from 0 to 1 and a diameter_mm from 0.2 to 1.5");
   }
   // The lumen's distances have room for so many vessels.
   Require(this->grafts.size() <= 6, "PhantomSettings: more than 6 grafts");

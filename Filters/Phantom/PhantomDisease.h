@@ -87,6 +87,18 @@ struct PhantomGraft
   double diameter = 3.0;  ///< mm, 1 to 6
 };
 
+/// A thin winding vessel from one artery to what lies behind an occlusion of another.
+struct PhantomCollateral
+{
+  std::string name;          ///< unlike all other vessels
+  std::string from;          ///< the artery that it leaves
+  std::string to;            ///< the artery that it fills
+  double fromFraction = 0.9; ///< of that artery's length
+  double toFraction = 0.7;
+  double diameter = 0.5; ///< mm, 0.2 to 1.5
+  bool septal = false;   ///< in the septum's muscle; else on the heart
+};
+
 /// Where the coronary arteries begin.
 enum class CoronaryOrigin
 {
@@ -101,6 +113,7 @@ struct PhantomDisease
 {
   std::vector<PhantomLesion> lesions;
   std::vector<PhantomGraft> grafts;
+  std::vector<PhantomCollateral> collaterals;
   CoronaryOrigin origin = CoronaryOrigin::Usual;
   bool leads = false;   ///< a pacemaker's, in the right atrium and ventricle
   double bodyFat = 0.0; ///< that the trunk is wider by all around, mm, 0 to 80

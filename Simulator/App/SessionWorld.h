@@ -26,6 +26,7 @@ struct SessionWorld
   std::shared_ptr<const VolumeProjector> background; ///< null: not asked for
   std::string motion;                                ///< for people: "tracked at 20 moments"
   std::vector<std::string> notes;                    ///< what was assumed, a sentence each
+  std::string foreignMotion; ///< what of the motion is not the patient's; empty: nothing
 };
 
 /// @param progress  gets the steps "vessels" and, with the background, "patient", in either order; numbers from 0 on

@@ -17,6 +17,7 @@ struct WindowOptions
 {
   std::vector<std::string> devices; ///< URIs, in the order of their priority
   int igtlPort = 0;                 ///< for 3D Slicer and others; 0: none
+  std::string igtlAddress;          ///< where it listens; empty: this machine only
   std::string script;               ///< of driving; empty: none
   std::string replay;               ///< recording to begin with; empty: none
   std::string record;               ///< recording of the first session; empty: none

@@ -5,6 +5,7 @@
  * Exit codes are those of Program.h.
  */
 #include "HeadlessSession.h"
+#include "IgtlOutput.h"
 #include "OptionChecks.h"
 #include "ParallelFor.h"
 #include "Program.h"
@@ -205,11 +206,20 @@ void Request::DeclareWindow(CLI::App& app)
       "priority. Keys and mouse are always there")
     ->type_name("URI")
     ->group(what);
+  CLI::Option* igtl = app
+                        .add_option("--igtl", this->window.igtlPort,
+                          "Serve the wire's tip and the X-ray images by OpenIGTLink at this port, "
+                          "to programs on this "
+                          "machine; 3D Slicer: 18944")
+                        ->check(WholeWithin(1, 65535))
+                        ->type_name("PORT")
+                        ->group(what);
   app
-    .add_option("--igtl", this->window.igtlPort,
-      "Serve the wire's tip and the X-ray images by OpenIGTLink at this port; 3D Slicer: 18944")
-    ->check(WholeWithin(1, 65535))
-    ->type_name("PORT")
+    .add_option("--igtl-listen", this->window.igtlAddress,
+      "Address of this machine to serve at instead, 0.0.0.0 for all: everybody who reaches it can "
+      "read, the protocol has no authentication")
+    ->needs(igtl)
+    ->type_name("ADDRESS")
     ->group(what);
   app
     .add_option("--triangles", this->window.triangles,
@@ -279,6 +289,14 @@ void Request::RunWindow() const
   for (const std::string& note : world.notes)
   {
     std::fprintf(stderr, "Warning: %s\n", note.c_str());
+  }
+  if (!options.igtlAddress.empty() && !coronary::IgtlOutput::IsLocal(options.igtlAddress))
+  {
+    std::fprintf(stderr,
+      "Warning: the images of this session can be read by everybody who reaches %s: OpenIGTLink "
+      "has "
+      "no authentication.\n",
+      options.igtlAddress.c_str());
   }
   coronary::RunWindow(world, options);
 }

@@ -39,6 +39,7 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, ProgressDispla
   world.wall = model.wall;
   world.motion = model.motion;
   world.notes = model.notes;
+  world.foreignMotion = model.foreignMotion;
   world.wallHash = WallHash(*world.wall);
   const WallTopology& topology = world.wall->Topology();
   world.scenario.imaging.pose = StartPose(topology, scenario.imaging);

@@ -103,8 +103,10 @@ SessionWindow::SessionWindow(const SessionWorld& world, const WindowOptions& opt
   : World(world)
   , Options(options)
 {
+  // For as long as the window is open: nobody should take this motion for the patient's.
+  const std::string foreign = world.foreignMotion.empty() ? "" : " - " + world.foreignMotion;
   this->setWindowTitle(
-    "DynamicCoronary simulator - " + QString::fromStdString(world.scenario.name));
+    "DynamicCoronary simulator - " + QString::fromStdString(world.scenario.name + foreign));
   this->resize(options.width, options.height);
   std::shared_ptr<const HeartShell> heart;
   if (options.heart)
@@ -120,7 +122,8 @@ SessionWindow::SessionWindow(const SessionWorld& world, const WindowOptions& opt
 
   if (options.igtlPort > 0)
   {
-    this->Igtl = std::make_unique<IgtlOutput>(options.igtlPort);
+    this->Igtl = std::make_unique<IgtlOutput>(options.igtlPort,
+      options.igtlAddress.empty() ? IgtlOutput::ThisMachine : options.igtlAddress);
   }
 
   this->Monitor = new FluoroscopyWidget;
@@ -546,7 +549,8 @@ void SessionWindow::ShowNumbers(const SessionSnapshot& now)
 
 void SessionWindow::ShowDevices()
 {
-  QString banner = this->Trouble_;
+  QString banner = QString::fromStdString(this->World.foreignMotion);
+  banner += (banner.isEmpty() || this->Trouble_.isEmpty() ? "" : "\n") + this->Trouble_;
   bool awaits = false;
   for (const std::shared_ptr<Device>& device : this->Hardware)
   {

@@ -3,7 +3,9 @@
 #include <stdexcept>
 
 #ifdef DYNAMICCORONARY_WITH_IGTL
+#include <arpa/inet.h>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
@@ -13,7 +15,9 @@
 #include <igtlServerSocket.h>
 #include <igtlTransformMessage.h>
 #include <mutex>
+#include <netinet/in.h>
 #include <pthread.h>
+#include <sys/socket.h>
 #include <thread>
 #include <utility>
 #endif
@@ -84,6 +88,39 @@ bool Send(igtl::ClientSocket& client, const NamedImage& named)
   return Send(client, *message, named.name, named.seconds);
 }
 
+/// The library's server listens at all addresses.
+class ServerAtAddress : public igtl::ServerSocket
+{
+public:
+  using Self = ServerAtAddress;
+  using Pointer = igtl::SmartPointer<Self>;
+  igtlNewMacro(ServerAtAddress);
+
+  /// @throws std::runtime_error saying why not
+  void Open(const in_addr& address, int port)
+  {
+    this->m_SocketDescriptor = this->CreateSocket();
+    sockaddr_in place = {};
+    place.sin_family = AF_INET;
+    place.sin_addr = address;
+    place.sin_port = htons(static_cast<std::uint16_t>(port));
+    const int again = 1; // the port of a session that has just ended
+    if (this->m_SocketDescriptor < 0 ||
+      setsockopt(this->m_SocketDescriptor, SOL_SOCKET, SO_REUSEADDR, &again, sizeof(again)) != 0 ||
+      bind(this->m_SocketDescriptor, reinterpret_cast<const sockaddr*>(&place), sizeof(place)) !=
+        0 ||
+      listen(this->m_SocketDescriptor, 1) != 0)
+    {
+      const std::string reason = std::strerror(errno);
+      this->CloseSocket();
+      throw std::runtime_error(reason);
+    }
+  }
+
+protected:
+  ServerAtAddress() = default;
+};
+
 /// Writing to a client that has gone must be an error, and not the end of the program.
 void BlockBrokenPipe()
 {
@@ -96,7 +133,7 @@ void BlockBrokenPipe()
 
 struct IgtlOutput::Internals
 {
-  igtl::ServerSocket::Pointer server = igtl::ServerSocket::New();
+  ServerAtAddress::Pointer server = ServerAtAddress::New();
   std::mutex mutex;
   std::condition_variable news;
   NamedPose pose;
@@ -135,6 +172,11 @@ struct IgtlOutput::Internals
         nextPose = std::exchange(this->pose, {});
         nextImage = std::exchange(this->image, {});
       }
+      // Who waits at the port is not left to wait.
+      if (const igtl::ClientSocket::Pointer other = this->server->WaitForConnection(1))
+      {
+        other->CloseSocket();
+      }
       if ((nextPose.fresh && !Send(client, nextPose)) ||
         (nextImage.fresh && !Send(client, nextImage)))
       {
@@ -149,7 +191,7 @@ bool IgtlOutput::IsSupported()
   return true;
 }
 
-IgtlOutput::IgtlOutput(int port)
+IgtlOutput::IgtlOutput(int port, const std::string& address)
   : Data(std::make_unique<Internals>())
 {
   if (port < 1 || port > 65535)
@@ -157,10 +199,20 @@ IgtlOutput::IgtlOutput(int port)
     throw std::invalid_argument(
       "The port " + std::to_string(port) + " of OpenIGTLink is not from 1 to 65535.");
   }
-  if (this->Data->server->CreateServer(port) != 0)
+  in_addr place = {};
+  if (inet_pton(AF_INET, address.c_str(), &place) != 1)
   {
-    throw std::runtime_error(
-      "The port " + std::to_string(port) + " of OpenIGTLink can not be opened: is it taken?");
+    throw std::invalid_argument(
+      "'" + address + "' is no address for OpenIGTLink: four numbers like 127.0.0.1 are wanted.");
+  }
+  try
+  {
+    this->Data->server->Open(place, port);
+  }
+  catch (const std::runtime_error& error)
+  {
+    throw std::runtime_error("OpenIGTLink can not listen at " + address + ", port " +
+      std::to_string(port) + ": " + error.what() + ".");
   }
   this->Data->thread = std::thread([this] { this->Data->Serve(); });
 }
@@ -218,7 +270,7 @@ bool IgtlOutput::IsSupported()
   return false;
 }
 
-IgtlOutput::IgtlOutput(int /*port*/)
+IgtlOutput::IgtlOutput(int /*port*/, const std::string& /*address*/)
 {
   throw std::runtime_error("This build has no OpenIGTLink.");
 }
@@ -239,4 +291,9 @@ bool IgtlOutput::HasClient() const
   return false;
 }
 #endif
+
+bool IgtlOutput::IsLocal(const std::string& address)
+{
+  return address.rfind("127.", 0) == 0;
+}
 }

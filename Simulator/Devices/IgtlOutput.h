@@ -24,8 +24,10 @@ struct ToolPose
 };
 
 /**
- * One client at a time; it gets the latest pose (TRANSFORM) and image (IMAGE), those before are left out when it is
- * slow. Everybody who reaches the port may connect, and only reads. OpenIGTLink has RAS: poses are turned into it.
+ * One client at a time; another one is turned away until it has gone. It gets the latest pose (TRANSFORM) and image
+ * (IMAGE), those before are left out when it is slow, and it is dropped when it takes nothing for a second; who sends never
+ * waits for it. OpenIGTLink has no authentication and no encryption: everybody who reaches the address may read, so that it
+ * is this machine's own unless another is wanted. OpenIGTLink has RAS: poses are turned into it.
  */
 class IgtlOutput
 {
@@ -33,9 +35,13 @@ public:
   /// Whether this build has OpenIGTLink.
   static bool IsSupported();
 
-  /// @param port  1 to 65535; 3D Slicer looks for 18944
-  /// @throws std::invalid_argument for the port, std::runtime_error: it is taken, or a build without OpenIGTLink
-  explicit IgtlOutput(int port);
+  static constexpr const char* ThisMachine = "127.0.0.1";
+
+  /// @param port     1 to 65535; 3D Slicer looks for 18944
+  /// @param address  IPv4, of this machine: where it listens; 0.0.0.0: at all of them
+  /// @throws std::invalid_argument for the port or what is no address, std::runtime_error: they can not be had (taken, not
+  /// of this machine), or a build without OpenIGTLink
+  explicit IgtlOutput(int port, const std::string& address = ThisMachine);
   ~IgtlOutput();
   IgtlOutput(const IgtlOutput&) = delete;
   IgtlOutput& operator=(const IgtlOutput&) = delete;
@@ -49,6 +55,9 @@ public:
   ///@}
 
   bool HasClient() const;
+
+  /// Whether other machines can not reach this IPv4 address.
+  static bool IsLocal(const std::string& address);
 
 private:
   struct Internals;

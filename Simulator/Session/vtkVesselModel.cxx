@@ -11,9 +11,11 @@
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
 #include "vtkDataArray.h"
+#include "vtkFieldData.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
+#include "vtkStringArray.h"
 #include "vtkUnstructuredGrid.h"
 
 #include <algorithm>
@@ -362,6 +364,15 @@ std::shared_ptr<WallMotion> TrackedWall(
     About(skeletonPath, [&] { return vtkSkeletonForms::SkeletonOf(bones, "the rest skeleton"); });
   const PoseSequence poses = PosesOf(list, skeleton, messages);
   model.motion = "tracked at " + std::to_string(poses.times.size()) + " moments";
+  const auto posed = ReadPolyData(ReadFileSeries(list).front().path, messages);
+  auto* source =
+    vtkStringArray::SafeDownCast(posed->GetFieldData()->GetAbstractArray(names::MotionSource));
+  if (source && source->GetNumberOfValues() > 0)
+  {
+    model.foreignMotion = source->GetValue(0);
+    model.motion = model.foreignMotion;
+    model.notes.push_back("'" + folder + "': " + model.foreignMotion + ".");
+  }
   return About(folder,
     [&]() -> std::shared_ptr<WallMotion>
     {

@@ -22,6 +22,8 @@ struct VesselModel
   std::shared_ptr<WallMotion> wall;
   std::string motion;             ///< for people: "tracked at 20 moments"
   std::vector<std::string> notes; ///< what was assumed, a sentence each
+  std::string
+    foreignMotion; ///< what of the motion is not the patient's, for the window; empty: nothing
 };
 
 /**

@@ -650,7 +650,7 @@ expect_same_results() {
 
 check_weights() {
   run 0 phantom --quiet --seed 2 --fractions 0.45,0.74 --spacing 1.2 --no-truth --output series
-  options="--quiet --scales 0.7 2.5 --time 0.74 --edges 0.4 0.8"
+  options="--quiet --scales 0.7 2.5 --time 0.74 --edges 0.4 0.8 --motion tracked"
   # shellcheck disable=SC2086
   run 0 run --input series/series.json $options --threads 1 --weight-cache weights --output bound
   # In pieces, by another number of threads.
@@ -744,10 +744,33 @@ check_weights() {
   [ "$(find bound -type f | sort | tr '\n' ' ')" = \
     "bound/motion/volume_extra.txt bound/report.json bound/vesselness.mha " ] || fail "left: $(find bound)"
 
-  # One phase has no motion: the static model is made.
-  run 0 run series/phase_01.mha --quiet --scales 0.7 2.5 --edges 0.8 1.6 --output still
-  expect_text stderr "Warning: motion is not possible: one phase only"
-  expect_text still/report.json '"reason": "one phase only"'
+  # One phase beats as a population does, and every product says so.
+  run 0 run series/phase_01.mha --quiet --scales 0.7 2.5 --edges 0.8 1.6 --heart-rate 60 --output beating
+  expect_text stderr "Warning: motion not of this patient: the mean of a population, at 60 beats a minute (one phase only)"
+  expect_text beating/report.json '"motion": "population"'
+  expect_text beating/report.json '"statement": "motion not of this patient'
+  expect_text beating/report.json '"phases": 1'
+  expect_text beating/report.json 'atrioventricular groove:'
+  [ "$(grep -c '"time"' beating/motion/skeleton.vtp.series)" = 20 ] || fail "$(cat beating/motion/skeleton.vtp.series)"
+  for name in MotionSource MotionDeviation TrackingConfidence; do
+    grep -q "Name=\"$name\"" beating/motion/centerline_00.vtp || fail "no $name in centerline_00.vtp"
+  done
+  grep -q 'Name="MotionSource"' beating/motion/surface_00.vtp || fail "no MotionSource in surface_00.vtp"
+  cmp -s beating/motion/surface_00.vtp beating/motion/surface_08.vtp && fail "nothing moves"
+  run 0 review beating --no-pictures --quiet --output page
+  expect_text page/review.html "motion not of this patient"
+  # A population needs names.
+  run 0 run series/phase_01.mha --quiet --scales 0.7 2.5 --edges 0.8 1.6 --heart-rate 60 --no-labels --output nameless
+  expect_text stderr "motion is not possible: one phase only, and no population's motion"
+  run 1 run series/phase_01.mha --quiet --scales 0.7 2.5 --edges 0.8 1.6 --heart-rate 60 --no-labels --motion population \
+    --resume --output nameless
+  expect_text stderr "HeartFrame"
+
+  # Or it rests.
+  cp -r beating still
+  run 0 run series/phase_01.mha --quiet --scales 0.7 2.5 --edges 0.8 1.6 --heart-rate 60 --motion none --resume --output still
+  expect_text stderr "Warning: motion is not possible: --motion none"
+  expect_text still/report.json '"motion": "none"'
   [ -s still/weights.vtu ] || fail "no static model: $(ls still)"
   expect_text still/report.json '"at_rest": true'
   [ -s still/motion.pvd ] || fail "no model at rest: $(ls still)"
@@ -768,7 +791,7 @@ check_weights() {
   expect_one_line "coronary-pipeline run" "a mask has no images"
   run 0 run --mask still/mask.mha --quiet --edges 0.8 1.6 --output masked
   expect_text stderr "has no aorta: trees begin at their widest ends"
-  expect_text stderr "motion is not possible: a mask has no images to track"
+  expect_text stderr "motion not of this patient: the mean of a population, at 75 beats a minute (a mask has no images to track)"
   [ -s masked/motion.pvd ] || fail "no model of a mask: $(ls masked)"
   [ "$(grep -c . masked/status.csv)" -ge 3 ] || fail "trees of a mask: $(cat masked/status.csv)"
 
@@ -828,7 +851,7 @@ check_surface() {
   cp made/truth/surface_00.vtp given.vtp
   run 0 run given.vtp --edges 0.8 1.6 --output swept
   expect_text stderr "stage 1 of 5 (centerline)"
-  expect_text stderr "Warning: motion is not possible: a surface has no images to track"
+  expect_text stderr "motion not of this patient: the mean of a population, at 75 beats a minute (a surface has no images to track)"
   for file in given_surface.vtp centerline.vtp surface.vtp volume.vtu skeleton.tgf weights.dmat report.json; do
     [ -s "swept/$file" ] || fail "no $file: $(ls swept)"
   done
@@ -967,7 +990,7 @@ plain_report() {
 
 # A small heart, of which the arteries are found without looking for them, with long edges and few branches.
 moving="--quiet --phases 3 --spacing 1.5 --window 0 $coarse"
-quick="--quiet --scales 0.75 2.5 --edges 0.8 1.5 --least-branch 40 --seed 0.13 0.25 0.33 --seed -19.87 -29.98 -15.7"
+quick="--quiet --scales 0.75 2.5 --edges 0.8 1.5 --least-branch 40 --motion tracked --seed 0.13 0.25 0.33 --seed -19.87 -29.98 -15.7"
 
 check_ranks() {
   command -v mpirun >/dev/null || exit 125
@@ -1049,7 +1072,7 @@ check_cohort() {
   head -c 3000 own/good/phase_00.mha >own/bad/phase_00.mha
   cat >cases.json <<'JSON'
 { "run": { "scales": [0.75, 2.5], "edges": [0.8, 1.5], "least_branch": 40, "tracked": "even",
-           "seed": [[0.13, 0.25, 0.33], [-19.87, -29.98, -15.7]] },
+           "motion": "tracked", "seed": [[0.13, 0.25, 0.33], [-19.87, -29.98, -15.7]] },
   "cases": [
     { "name": "given", "input": "own/good/series.json", "truth": "own/good" },
     { "name": "bad", "input": "own/bad/series.json", "truth": "own/good" },

@@ -142,8 +142,62 @@ TEST(IgtlOutput, PosesAndImages)
   EXPECT_THROW(IgtlOutput{ port }, std::runtime_error); // is taken
 }
 
+TEST(IgtlOutput, OtherMachinesReachItOnlyWhenAsked)
+{
+  int port = 0;
+  const std::unique_ptr<IgtlOutput> local = FreeOutput(port);
+  ASSERT_TRUE(local);
+  // Another address of this machine stands for another machine: what listens at 127.0.0.1 is not there.
+  const igtl::ClientSocket::Pointer client = igtl::ClientSocket::New();
+  EXPECT_NE(client->ConnectToServer("127.0.0.2", port), 0);
+  // At that address the same port is free, and can be had.
+  const IgtlOutput other(port, "127.0.0.2");
+  EXPECT_EQ(igtl::ClientSocket::New()->ConnectToServer("127.0.0.2", port), 0);
+  EXPECT_TRUE(IgtlOutput::IsLocal(IgtlOutput::ThisMachine));
+  EXPECT_FALSE(IgtlOutput::IsLocal("0.0.0.0"));
+  EXPECT_FALSE(IgtlOutput::IsLocal("192.168.0.1"));
+}
+
+TEST(IgtlOutput, ASecondClientIsTurnedAway)
+{
+  int port = 0;
+  const std::unique_ptr<IgtlOutput> output = FreeOutput(port);
+  ASSERT_TRUE(output);
+  const igtl::ClientSocket::Pointer first = Connected(port);
+  ASSERT_TRUE(WaitFor(*output, true));
+  const igtl::ClientSocket::Pointer second = Connected(port);
+  char byte = 0;
+  EXPECT_EQ(second->Receive(&byte, 1), 0); // the end, not a wait
+  output->SendPose("wire tip", ToolPose(), 1.0);
+  EXPECT_EQ(std::string(Header(*first)->GetDeviceType()), "TRANSFORM");
+}
+
+TEST(IgtlOutput, AClientThatReadsNothingIsDropped)
+{
+  int port = 0;
+  const std::unique_ptr<IgtlOutput> output = FreeOutput(port);
+  ASSERT_TRUE(output);
+  const igtl::ClientSocket::Pointer lazy = Connected(port);
+  ASSERT_TRUE(WaitFor(*output, true));
+  GreyImage image;
+  image.columns = 2048;
+  image.rows = 2048;
+  image.values.assign(2048 * 2048, 7);
+  // More than any buffer of the system holds; none of these calls may wait for the client, or the test ends by its limit.
+  for (int n = 0; n < 1000 && output->HasClient(); ++n)
+  {
+    output->SendImage("fluoroscopy", image, 0.2, n);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(WaitFor(*output, false));
+  const igtl::ClientSocket::Pointer next = Connected(port);
+  EXPECT_TRUE(WaitFor(*output, true));
+}
+
 TEST(IgtlOutput, WhatIsRefused)
 {
+  ExpectRefusal([] { IgtlOutput output(28944, "localhost"); }, "'localhost' is no address");
+  ExpectError([] { IgtlOutput output(28944, "203.0.113.7"); }, "203.0.113.7, port 28944");
   ExpectRefusal([] { IgtlOutput output(0); }, "port 0");
   ExpectRefusal([] { IgtlOutput output(70000); }, "port 70000");
   int port = 0;

@@ -476,6 +476,92 @@ TEST(PhantomDisease, GraftsReachTheirVesselAndTouchNoOther)
   }
 }
 
+TEST(PhantomDisease, CollateralsLeadBehindOcclusions)
+{
+  PhantomSettings settings = Quiet();
+  settings.centerlineSpacing = 0.5;
+  settings.areaPulse = 0.0;
+  for (const std::uint64_t seed : { 0, 1, 2, 3 })
+  {
+    settings.seed = seed;
+    settings.disease = PhantomDisease();
+    AddDisease("occluded", settings);
+    const CoronaryPhantom without(settings);
+    EXPECT_TRUE(without.Collaterals(0.0).empty());
+    settings.disease = PhantomDisease();
+    AddDisease("collateral", settings);
+    const CoronaryPhantom phantom(settings);
+    // The tree is what it is without.
+    const PhantomTree tree = phantom.Tree(0.75);
+    const PhantomTree bare = without.Tree(0.75);
+    EXPECT_EQ(tree.points, bare.points);
+    EXPECT_EQ(tree.visibility, bare.visibility);
+    const std::vector<PhantomCollateralTruth> early = phantom.Collaterals(0.35);
+    const std::vector<PhantomCollateralTruth> rest = phantom.Collaterals(0.75);
+    ASSERT_EQ(rest.size(), 3u);
+    for (std::size_t n = 0; n < rest.size(); ++n)
+    {
+      const PhantomCollateralTruth& one = rest[n];
+      const std::string what = "seed " + std::to_string(seed) + " " + one.collateral.name;
+      // Both ends lie on axes of arteries: the last one where contrast is late.
+      double start = 1e9;
+      double end = 1e9;
+      std::size_t filled = 0;
+      for (std::size_t p = 0; p < tree.points.size(); ++p)
+      {
+        start = std::min(start, (tree.points[p] - one.points.front()).norm());
+        if ((tree.points[p] - one.points.back()).norm() < end)
+        {
+          end = (tree.points[p] - one.points.back()).norm();
+          filled = p;
+        }
+      }
+      EXPECT_LT(start, 1e-6) << what;
+      EXPECT_LT(end, 1e-6) << what;
+      const CoronaryPhantom healthy(
+        [&]
+        {
+          PhantomSettings clean = settings;
+          clean.disease = PhantomDisease();
+          return clean;
+        }());
+      EXPECT_LT(tree.visibility[filled], 0.95 * healthy.Tree(0.75).visibility[filled]) << what;
+      EXPECT_GT(tree.visibility[filled], 0.0) << what;
+      // It winds, is thin, moves with the heart, and its middle is as bright as said, where nothing else is.
+      EXPECT_GT(one.length, 1.1 * (one.points.back() - one.points.front()).norm()) << what;
+      EXPECT_NEAR(one.radius, 0.5 * one.collateral.diameter, 1e-9) << what;
+      const std::size_t middle = one.points.size() / 2;
+      EXPECT_GT((one.points[middle] - early[n].points[middle]).norm(), 2.0) << what;
+      EXPECT_GT(one.clearance, -0.3) << what;
+      const double around = one.collateral.septal ? CoronaryPhantom::CoatValue(true)
+                                                  : CoronaryPhantom::CoatValue(false);
+      EXPECT_GT(one.value, around + 100.0) << what;
+    }
+  }
+}
+
+TEST(PhantomDisease, CollateralsAreInTheImageAndInTheTubes)
+{
+  PhantomSettings settings = Quiet();
+  std::fill(std::begin(settings.pointSpread), std::end(settings.pointSpread), 0.05);
+  settings.disease.collaterals.push_back({ "C", "OM1", "D1", 0.7, 0.7, 0.7, false });
+  const CoronaryPhantom phantom(settings);
+  const PhantomCollateralTruth one = phantom.Collaterals(0.75).front();
+  PhantomSettings bare = settings;
+  bare.disease.collaterals.clear();
+  const CoronaryPhantom without(bare);
+  std::vector<double> gained;
+  for (std::size_t n = one.points.size() / 4; n < 3 * one.points.size() / 4; ++n)
+  {
+    EXPECT_NEAR(ValueAt(phantom, one.points[n], 0.75), one.value, 3.0);
+    gained.push_back(ValueAt(phantom, one.points[n], 0.75) - ValueAt(without, one.points[n], 0.75));
+  }
+  EXPECT_GT(*std::min_element(gained.begin(), gained.end()), 100.0);
+  // All of its steps are tubes of blood to the scanner.
+  const std::size_t more = phantom.Tubes(0.75).size() - without.Tubes(0.75).size();
+  EXPECT_EQ(more, one.points.size() - 1);
+}
+
 TEST(PhantomDisease, AnomalousCircumflexPassesBehindTheAorta)
 {
   for (const std::uint64_t seed : { 0, 1, 2 })
@@ -558,4 +644,15 @@ TEST(PhantomDisease, RefusesWhatCanNotBe)
   ExpectRefusal([&] { const CoronaryPhantom phantom(settings); }, "there is no vessel RI");
   settings.disease.grafts = { { "LAD", true, "LAD", 20.0, 2.5 } };
   ExpectRefusal([&] { const CoronaryPhantom phantom(settings); }, "vessel of that name");
+  const auto refusesCollateral = [&](const PhantomCollateral& one, const std::string& part)
+  {
+    settings.disease = PhantomDisease();
+    settings.disease.collaterals = { one };
+    ExpectRefusal([&] { const CoronaryPhantom phantom(settings); }, part);
+  };
+  refusesCollateral(
+    { "C", "LAD", "PDA", 0.5, 0.5, 0.5, false }, "collateral C: there is no vessel PDA");
+  refusesCollateral({ "D1", "LAD", "RCA", 0.5, 0.5, 0.5, false }, "there is a vessel of that name");
+  refusesCollateral({ "C", "LAD", "LAD", 0.5, 0.9, 0.5, false }, "leads from LAD to itself");
+  refusesCollateral({ "C", "LAD", "RCA", 0.5, 0.9, 3.0, false }, "diameter_mm from 0.2 to 1.5");
 }

@@ -197,8 +197,10 @@ inline std::vector<Vector3> NormalsOf(
 class CarriedTree
 {
 public:
-  explicit CarriedTree(const Heart& heart)
+  /// @param frame  whose surface the lines are laid on: the reference
+  explicit CarriedTree(const Heart& heart, int frame = coronary::ReferenceFrame)
     : Epicardium(heart.Epicardium)
+    , ReferenceFrame(frame)
   {
     this->Frame(heart);
     // Degrees from the right ventricle over the front, and the way from the base to the apex.
@@ -254,7 +256,7 @@ private:
 
   void Frame(const Heart& heart)
   {
-    const std::vector<Vector3> all = heart.At(TimeOf(ReferenceFrame));
+    const std::vector<Vector3> all = heart.At(TimeOf(this->ReferenceFrame));
     this->Rest = all;
     this->Surface = this->Epicardium.Own(all);
     this->Normals = NormalsOf(this->Surface, this->Epicardium.triangles);
@@ -429,6 +431,7 @@ private:
   }
 
   const Shell& Epicardium;
+  int ReferenceFrame;
   std::vector<Vector3> Rest;
   std::vector<Vector3> Surface;
   std::vector<Vector3> Normals;
