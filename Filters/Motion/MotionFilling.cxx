@@ -297,6 +297,7 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
   const auto fit = [&](const std::vector<MotionMeasurements>& measured)
   {
     std::vector<const MotionMeasurements*> all;
+    all.reserve(measured.size());
     for (const MotionMeasurements& one : measured)
     {
       all.push_back(&one);

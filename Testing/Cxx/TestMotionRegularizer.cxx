@@ -165,7 +165,7 @@ TEST(MotionRegularizer, InputStaysAsItIs)
   filter->UpdateTimeStep(0.4);
   source->UpdateTimeStep(0.4);
   EXPECT_EQ(source->GetPolyDataOutput()->GetPoint(5)[1], 9.0);
-  EXPECT_EQ(source->GetPolyDataOutput()->GetPointData()->GetNumberOfArrays(), 2);
+  EXPECT_EQ(source->GetPolyDataOutput()->GetPointData()->GetNumberOfArrays(), 3);
   EXPECT_EQ(source->GetPolyDataOutput()->GetFieldData()->GetNumberOfArrays(), 0);
   EXPECT_EQ(source->GetPolyDataOutput()->GetCellData()->GetNumberOfArrays(), 0);
 }
