@@ -18,6 +18,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -80,7 +81,7 @@ private:
   std::int64_t Append(const MinimalPath& way, int treeId, bool wanted);
   void Own(std::size_t branch);
   void FindTips();
-  bool ThinBranchesFor(ThinBranchSettings& settings) const;
+  bool ThinBranchesFor(ThinBranchSettings& settings);
   void FollowThinBranches(std::int64_t from);
   void LengthenTips();
   void TurnBranches();
@@ -97,6 +98,7 @@ private:
   ScalarImage MeasuredImage;
   PathMeasurement Paths;
   double Blur = 0.0;
+  std::optional<NoisePaths> Noise;
   VesselMarch March;
   std::vector<std::uint32_t> SeedMembers;
   std::vector<std::int32_t> Owner; ///< of a member: the point of the tree whose lumen it is in
@@ -581,7 +583,7 @@ void Extractor::FindTips()
 }
 
 /// @returns false if none are to be followed
-bool Extractor::ThinBranchesFor(ThinBranchSettings& settings) const
+bool Extractor::ThinBranchesFor(ThinBranchSettings& settings)
 {
   const double contrast =
     this->Paths.lumen.reference.lumen - this->Paths.lumen.reference.background;
@@ -594,6 +596,11 @@ bool Extractor::ThinBranchesFor(ThinBranchSettings& settings) const
   settings.minimumLength = std::max(this->Settings.minimumBranchLength, 15.0 * this->Paths.voxel);
   settings.maximumLength = 200.0 * this->Paths.voxel;
   settings.contrast = contrast;
+  if (!this->Noise)
+  {
+    this->Noise = LearnNoisePaths(*this->Paths.image, this->Tree, settings);
+  }
+  settings.noise = *this->Noise;
   return true;
 }
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <unordered_map>
 #include <utility>
@@ -26,8 +27,12 @@ constexpr double DeepestValley = 0.1;
 constexpr double MinimumContrast = 0.12;
 /// Standard errors of noise that the path's mean must exceed.
 constexpr double Significance = 8.0;
-/// Contrast of a path that turns to what is brightest in noise alone, in standard deviations of the noise.
-constexpr double NoisePath = 1.5;
+/// Length of the paths that say what noise alone shows, in samples.
+constexpr std::size_t NoiseSamples = 32;
+/// Spreads by which a new branch must exceed them, since it is the best of thousands that were tried, and by which a tip
+/// must that goes on.
+constexpr double BeyondNoise = 5.0;
+constexpr double TipBeyondNoise = 2.0;
 /// Distance of a path's samples, in voxels.
 constexpr double Stride = 0.75;
 
@@ -119,10 +124,13 @@ private:
 class Finder
 {
 public:
-  Finder(const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
+  /// @param sign  -1: dark vessels, of which there are none
+  Finder(const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings,
+    double sign = 1.0)
     : Image(image)
     , Tree(tree)
     , Settings(settings)
+    , Sign(sign)
     , Lumen(tree, 6.0 * settings.voxel)
     , Noise(MeasureNoise(image, tree, settings.voxel))
     , Joint(tree.points.size(), 0)
@@ -133,6 +141,7 @@ public:
     }
   }
 
+  NoisePaths TryPaths() const;
   std::vector<ThinBranch> Run(std::int64_t from) const;
   TipPath FollowTip(std::int32_t number) const;
 
@@ -153,6 +162,7 @@ private:
     bool known = true;  ///< whether the contrast can be seen
   };
 
+  double At(const Vector3& position) const { return this->Sign * this->Image.At(position); }
   std::vector<Spot> FindSpots(std::int64_t from) const;
   double Core(const Vector3& position, const CrossFrame& frame) const;
   double Profile(const Vector3& position, const Vector3& tangent) const;
@@ -166,6 +176,7 @@ private:
   {
     double minimum = 0.0;      ///< contrast to any side, mean of the path
     double significance = 0.0; ///< standard errors, mean of the path
+    double beyondNoise = 0.0;  ///< spreads by which it must exceed what a path in noise shows
     double going = 0.0;        ///< contrast that speaks neither for going on nor against it
     /// The same where the core is this bright: what is beside the vessel changes, not the vessel.
     double goingBright = 0.0;
@@ -182,6 +193,7 @@ private:
   bool Trace(Vector3 position, Vector3 direction, std::size_t most, std::size_t ownLumen,
     const Bar& bar, std::vector<Sample>& samples) const;
   static void Adapt(const std::vector<Sample>& samples, const Bar& first, Bar& bar);
+  Vector3 Away(const Spot& spot, double& ahead) const;
   bool IsVessel(const std::vector<Sample>& samples, const Bar& bar, double& contrast,
     double& significance) const;
   bool Follow(const Spot& spot, ThinBranch& branch) const;
@@ -189,6 +201,7 @@ private:
   const ImageInterpolator& Image;
   const VesselTree& Tree;
   const ThinBranchSettings& Settings;
+  double Sign;
   LumenDistance Lumen;
   double Noise;
   std::vector<char> Joint; ///< of a point of the tree: a branch begins there
@@ -243,7 +256,7 @@ std::vector<Finder::Spot> Finder::FindSpots(std::int64_t from) const
             for (int angle = 0; angle < around; ++angle)
             {
               map[static_cast<std::size_t>(row) * around + static_cast<std::size_t>(angle)] =
-                this->Image.At(place(static_cast<std::size_t>(row), angle));
+                this->At(place(static_cast<std::size_t>(row), angle));
             }
           }
         });
@@ -301,8 +314,8 @@ double Finder::Core(const Vector3& position, const CrossFrame& frame) const
   const Vector3 u = 0.5 * this->Settings.voxel * frame.u;
   const Vector3 v = 0.5 * this->Settings.voxel * frame.v;
   return 0.2 *
-    (this->Image.At(position) + this->Image.At(position + u) + this->Image.At(position - u) +
-      this->Image.At(position + v) + this->Image.At(position - v));
+    (this->At(position) + this->At(position + u) + this->At(position - u) + this->At(position + v) +
+      this->At(position - v));
 }
 
 /// Core over the mean of the ring.
@@ -313,7 +326,7 @@ double Finder::Profile(const Vector3& position, const Vector3& tangent) const
   double sum = 0.0;
   for (int i = 0; i < 6; ++i)
   {
-    sum += this->Image.At(position + ring * frame.Ray(i, 6));
+    sum += this->At(position + ring * frame.Ray(i, 6));
   }
   return this->Core(position, frame) - sum / 6.0;
 }
@@ -351,8 +364,8 @@ bool Finder::Evidence(
       continue;
     }
     sectors[static_cast<std::size_t>(known++)] =
-      (this->Image.At(place) + this->Image.At(place + voxel * tangent) +
-        this->Image.At(place - voxel * tangent) + this->Image.At(place - 0.5 * voxel * side)) /
+      (this->At(place) + this->At(place + voxel * tangent) + this->At(place - voxel * tangent) +
+        this->At(place - 0.5 * voxel * side)) /
       4.0;
   }
   if (known < Sectors / 2)
@@ -528,17 +541,17 @@ bool Finder::IsVessel(
   const double independent = std::max(1.0, count * Stride / 3.0);
   significance =
     contrast / std::max(this->Noise * std::sqrt(0.5 / independent), 1e-9 * this->Settings.contrast);
-  return contrast >= bar.minimum && significance >= bar.significance &&
+  const double noise = this->Settings.noise.contrast +
+    bar.beyondNoise * this->Settings.noise.spread * std::sqrt(NoiseSamples / count);
+  return contrast >= std::max(bar.minimum, noise) && significance >= bar.significance &&
     static_cast<double>(clear) >= 0.8 * count;
 }
 
-bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
+/// Of all directions that lead away from the tree the one that shows most.
+Vector3 Finder::Away(const Spot& spot, double& ahead) const
 {
-  const double voxel = this->Settings.voxel;
-  const double step = Stride * voxel;
-  // The first direction: of all that lead away.
   Vector3 direction = spot.outwards;
-  double maximum = -std::numeric_limits<double>::infinity();
+  ahead = -std::numeric_limits<double>::infinity();
   constexpr int directions = 80;
   for (int i = 0; i < directions; ++i)
   {
@@ -548,12 +561,71 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
       continue;
     }
     const double value = this->Ahead(spot.position, candidate);
-    if (value > maximum)
+    if (value > ahead)
     {
-      maximum = value;
+      ahead = value;
       direction = candidate;
     }
   }
+  return direction;
+}
+
+/// Paths from everywhere beside the tree, wherever they lead.
+NoisePaths Finder::TryPaths() const
+{
+  const std::vector<Spot> spots = this->FindSpots(0);
+  constexpr std::size_t most = 256;
+  const std::size_t count = std::min(most, spots.size());
+  Bar bar;
+  bar.going = -100.0 * this->Settings.contrast;
+  bar.goingBright = bar.going;
+  std::vector<double> tried(count, std::numeric_limits<double>::quiet_NaN());
+  ParallelFor(static_cast<std::int64_t>(count), 4,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const auto number = static_cast<std::size_t>(n);
+        const Spot& spot = spots[number * spots.size() / count];
+        double ahead = 0.0;
+        const Vector3 direction = this->Turn(spot.position, this->Away(spot, ahead));
+        std::vector<Sample> samples;
+        if (this->Trace(
+              this->Centre(spot.position, direction), direction, NoiseSamples, 0, bar, samples) &&
+          samples.size() == NoiseSamples)
+        {
+          tried[number] = 0.0;
+          for (const Sample& sample : samples)
+          {
+            tried[number] += sample.minimum / static_cast<double>(NoiseSamples);
+          }
+        }
+      }
+    });
+  std::vector<double> shown;
+  std::copy_if(tried.begin(), tried.end(), std::back_inserter(shown),
+    [](double one) { return !std::isnan(one); });
+  constexpr std::size_t enough = 16;
+  if (shown.size() < enough)
+  {
+    return {};
+  }
+  NoisePaths noise;
+  noise.contrast = std::max(0.0, MedianOf(shown));
+  for (double& one : shown)
+  {
+    one = std::abs(one - noise.contrast);
+  }
+  noise.spread = 1.4826 * MedianOf(std::move(shown));
+  return noise;
+}
+
+bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
+{
+  const double voxel = this->Settings.voxel;
+  const double step = Stride * voxel;
+  double maximum = 0.0;
+  Vector3 direction = this->Away(spot, maximum);
   const double minimum = MinimumContrast * this->Settings.contrast;
   if (maximum < minimum)
   {
@@ -566,6 +638,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   const auto most = static_cast<std::size_t>(this->Settings.maximumLength / step);
   Bar bar;
   bar.minimum = minimum;
+  bar.beyondNoise = BeyondNoise;
   bar.significance = Significance;
   bar.going = 0.5 * minimum;
   if (!this->Trace(position, direction, most, 0, bar, samples))
@@ -610,8 +683,7 @@ bool Finder::Follow(const Spot& spot, ThinBranch& branch) const
   double lowest = std::numeric_limits<double>::infinity();
   for (int i = 0; i <= pieces; ++i)
   {
-    lowest =
-      std::min(lowest, this->Image.At(from + (root - from) * (static_cast<double>(i) / pieces)));
+    lowest = std::min(lowest, this->At(from + (root - from) * (static_cast<double>(i) / pieces)));
   }
   std::vector<double> cores;
   for (std::size_t i = 0; i < std::min<std::size_t>(end, 10); ++i)
@@ -674,8 +746,8 @@ TipPath Finder::FollowTip(std::int32_t number) const
   Bar bar;
   bar.minimum = 0.5 * minimum;
   bar.significance = 0.5 * Significance;
-  // A path that follows the noise shows as much as that.
-  bar.least = std::max(0.25 * minimum, NoisePath * this->Noise);
+  bar.least = std::max(
+    0.25 * minimum, this->Settings.noise.contrast + TipBeyondNoise * this->Settings.noise.spread);
   bar.going = std::max(bar.least, 0.5 * usual);
   bar.goingBright = std::min(bar.going, 0.5 * minimum);
   if (!cores.empty())
@@ -781,6 +853,14 @@ void ThinBranchSettings::Validate() const
   require(
     this->maximumLength >= this->minimumLength, "maximumLength must not be below minimumLength");
   require(this->contrast > 0.0, "contrast must be positive");
+  require(this->noise.contrast >= 0.0 && this->noise.spread >= 0.0, "noise must not be negative");
+}
+
+NoisePaths LearnNoisePaths(
+  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings)
+{
+  settings.Validate();
+  return Finder(image, tree, settings, -1.0).TryPaths();
 }
 
 std::vector<ThinBranch> FindThinBranches(const ImageInterpolator& image, const VesselTree& tree,

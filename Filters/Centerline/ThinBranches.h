@@ -20,12 +20,20 @@
 
 namespace coronary
 {
+/// What paths show that turn to what is brightest in noise alone: an image value over their surroundings.
+struct NoisePaths
+{
+  double contrast = 0.0; ///< in the middle of many
+  double spread = 0.0;   ///< their standard deviation, for paths of 24 voxels
+};
+
 struct ThinBranchSettings
 {
   double voxel = 0.4;          ///< edge of a voxel (of its cube), mm, > 0
   double minimumLength = 6.0;  ///< mm outside of the parent's lumen, > 0
   double maximumLength = 80.0; ///< mm
   double contrast = 500.0;     ///< image value of a great vessel's lumen over its surroundings, > 0
+  NoisePaths noise;            ///< of the image: LearnNoisePaths
 
   /// @throws std::invalid_argument that names the first setting out of range
   void Validate() const;
@@ -43,6 +51,14 @@ struct ThinBranch
 /// Standard deviation of the image's noise around the vessels, by second differences along them;
 /// robust to edges. 0 if the tree has no room around it.
 double MeasureNoise(const ImageInterpolator& image, const VesselTree& tree, double voxel);
+
+/**
+ * By the paths of dark vessels beside the tree, of which there are none; so that noise counts as it is, however a kernel
+ * has correlated it. Zeros if the tree has no room around it. The same on any number of threads.
+ * @throws std::invalid_argument that names the setting out of range
+ */
+NoisePaths LearnNoisePaths(
+  const ImageInterpolator& image, const VesselTree& tree, const ThinBranchSettings& settings);
 
 /**
  * @param tree  points, radii (mm) and branches; not changed

@@ -387,6 +387,29 @@ TEST(ThinBranches, MeasuresTheNoise)
   EXPECT_NEAR(high / low, 4.0, 0.2);
 }
 
+TEST(ThinBranches, LearnsWhatNoiseShows)
+{
+  const auto flat = [](const Vector3&) { return Fat; };
+  const auto learned = [](const Scene& scene)
+  {
+    ThinBranchSettings settings;
+    settings.contrast = Blood - Fat;
+    return LearnNoisePaths(ImageInterpolator(scene.image), scene.trunk, settings);
+  };
+  const NoisePaths low = learned(Scene(flat, 10.0));
+  const NoisePaths high = learned(Scene(flat, 40.0));
+  EXPECT_GT(low.contrast, 1.0);
+  EXPECT_LT(low.contrast, 10.0);
+  // About in proportion, few paths are tried here; and bright vessels do not count.
+  EXPECT_NEAR(high.contrast / low.contrast, 4.0, 2.0);
+  EXPECT_NEAR(high.spread / low.spread, 4.0, 2.0);
+  const NoisePaths beside =
+    learned(Scene([](const Vector3& p) { return WithBranch(p, 0.45, Fat); }, 40.0));
+  EXPECT_NEAR(beside.contrast / high.contrast, 1.0, 0.3);
+  const NoisePaths none = learned(Scene(flat, 0.0));
+  EXPECT_LT(none.contrast, 1e-3);
+}
+
 TEST(ThinBranches, SettingsOutOfRangeAreNamed)
 {
   const Scene scene([](const Vector3&) { return Fat; }, 25.0);

@@ -24,7 +24,7 @@ def make_run():
     series, result = os.path.join(folder, "series"), os.path.join(folder, "result")
     program("phantom", "--fractions=0,0.35,0.75", "--spacing", "1.2", "--no-truth", "--output", series)
     program("run", os.path.join(series, "series.json"), "--output", result, "--edges", *map(str, EDGES),
-            "--seed", *map(str, SEED), "--least-branch", str(LEAST_BRANCH))
+            "--seed", *map(str, SEED), "--least-branch", str(LEAST_BRANCH), "--motion", "tracked")
     return os.path.join(series, "series.json"), result
 
 
