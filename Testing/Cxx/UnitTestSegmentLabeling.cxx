@@ -4,6 +4,7 @@
 #include "CoronaryPhantom.h"
 #include "CounterRandom.h"
 #include "SegmentLabeling.h"
+#include "TreeAssignment.h"
 
 #include <gtest/gtest.h>
 
@@ -486,6 +487,62 @@ TEST(SegmentLabeling, HeartFrameOfTheMeanAnatomy)
   EXPECT_LT((result.heart.origin - Vector3(-7.8, -9.8, -38.8)).norm(), 4.0);
   EXPECT_NEAR(result.heart.axes.determinant(), 1.0, 1e-9);
   EXPECT_LT(result.meanDistance, 4.0);
+}
+
+TEST(SegmentLabeling, ALeftMainDividesIntoBoth)
+{
+  // A left main of 10 mm, the anterior descending artery, and another branch of 20 mm.
+  Case tree;
+  const auto add = [&](std::int64_t from, const Vector3& course, int steps)
+  {
+    std::vector<std::int64_t> line{ from };
+    for (int n = 1; n <= steps; ++n)
+    {
+      line.push_back(static_cast<std::int64_t>(tree.lines.points.size()));
+      tree.lines.points.emplace_back(
+        tree.lines.points[static_cast<std::size_t>(from)] + n * course);
+      tree.lines.radius.push_back(1.5);
+    }
+    tree.lines.lines.push_back(line);
+  };
+  tree.lines.points.emplace_back(0, 0, 0);
+  tree.lines.radius.push_back(1.5);
+  add(0, Vector3(1, 0, 0), 10);
+  add(10, Vector3(0.7, -0.7, 0), 100);
+  add(10, Vector3(0.7, 0.7, 0), 20);
+  const CenterlineTopology topology = BuildTopology(tree.lines);
+  const LabelPieces pieces(topology);
+  // How badly the branch fits the circumflex' course decides, and whether a left main without one is as rare as that.
+  const auto vesselOfBranch = [&](double misfit)
+  {
+    std::vector<VesselCosts> fit(pieces.pieces.size());
+    std::size_t last = 0;
+    for (std::size_t c = 0; c < fit.size(); ++c)
+    {
+      fit[c].fill(50.0);
+      const auto& branch = topology.branches[pieces.pieces[c].branch];
+      if (branch.parentGroupId < 0)
+      {
+        fit[c][IndexOf(Vessel::LeftMain)] = 0.0;
+      }
+      else if (topology.points[branch.points.back()].y() < 0.0)
+      {
+        fit[c][IndexOf(Vessel::AnteriorDescending)] = 0.0;
+      }
+      else
+      {
+        fit[c][IndexOf(Vessel::Other)] = 0.0;
+        fit[c][IndexOf(Vessel::Circumflex)] = misfit * pieces.pieces[c].length / 20.0;
+        last = c;
+      }
+    }
+    std::vector<Vessel> vessels(fit.size(), Vessel::Other);
+    EXPECT_LT(
+      AssignTree(topology, pieces, 0, TreeSide::Left, Dominance::Right, fit, 0, vessels), 50.0);
+    return vessels[last];
+  };
+  EXPECT_EQ(vesselOfBranch(4.0), Vessel::Circumflex);
+  EXPECT_EQ(vesselOfBranch(30.0), Vessel::Other);
 }
 
 TEST(SegmentLabeling, OneTreeAlone)
