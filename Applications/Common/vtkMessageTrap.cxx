@@ -6,6 +6,7 @@
 #include "vtkCallbackCommand.h"
 #include "vtkCommand.h"
 #include "vtkInformation.h"
+#include "vtkInformationDoubleVectorKey.h"
 #include "vtkInformationVector.h"
 #include "vtkLogger.h"
 #include "vtkObjectFactory.h"
@@ -116,6 +117,14 @@ void WithProgress(vtkAlgorithm* algorithm, const std::function<void(double)>& re
   run();
   algorithm->RemoveObserver(tag);
   coronary::ThrowIfInterrupted();
+}
+
+std::vector<double> TimeSteps(vtkAlgorithm* algorithm)
+{
+  vtkInformation* info = algorithm->GetOutputInformation(0);
+  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
+  const double* steps = info->Get(key);
+  return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
 }
 
 void UpdateAtTime(vtkAlgorithm* algorithm, int port, double time, vtkMessageTrap& messages,

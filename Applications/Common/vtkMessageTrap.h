@@ -48,6 +48,9 @@ private:
 void WithProgress(vtkAlgorithm* algorithm, const std::function<void(double)>& report,
   const std::function<void()>& run);
 
+/// That its first output offers; after its information was updated.
+std::vector<double> TimeSteps(vtkAlgorithm* algorithm);
+
 /**
  * Brings one output port up to date for one time.
  *

@@ -8,12 +8,9 @@
 
 #include "vtkCoronaryArrayNames.h"
 #include "vtkDataArray.h"
-#include "vtkInformation.h"
-#include "vtkInformationDoubleVectorKey.h"
 #include "vtkMotionRegularizer.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
-#include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <algorithm>
 #include <array>
@@ -53,11 +50,7 @@ double Component(vtkDataArray* array, std::int64_t point)
 template <typename Function>
 void AtEachStep(vtkAlgorithm* moving, vtkMessageTrap& messages, const Function& at)
 {
-  vtkInformation* info = moving->GetOutputInformation(0);
-  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
-  const double* first = info->Get(key);
-  const std::vector<double> times(first, first + (first ? info->Length(key) : 0));
-  for (const double time : times)
+  for (const double time : TimeSteps(moving))
   {
     UpdateAtTime(moving, 0, time, messages, [](double) {});
     at(time, vtkPolyData::SafeDownCast(moving->GetOutputDataObject(0)));

@@ -15,18 +15,16 @@
 #include "vtkRunTrees.h"
 #include "vtkTimedPolyData.h"
 
+#include "vtkAlgorithmOutput.h"
 #include "vtkCardiacPhaseInterpolator.h"
 #include "vtkCenterlineTracker.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkGatedImageReader.h"
-#include "vtkInformation.h"
-#include "vtkInformationDoubleVectorKey.h"
 #include "vtkMeshSequenceWriter.h"
 #include "vtkMotionRegularizer.h"
 #include "vtkPolyData.h"
 #include "vtkPopulationMotion.h"
 #include "vtkSkinDeformation.h"
-#include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkTable.h"
 #include "vtkUnstructuredGrid.h"
 
@@ -34,6 +32,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace coronary
@@ -72,40 +71,13 @@ std::string WriteMovingLines(
   return list;
 }
 
-std::vector<double> Moments(const RunInput& input)
+/// The moments that were asked for, or else these; each once, in order.
+std::vector<double> Moments(const RunSettings& settings, std::vector<double> otherwise)
 {
-  std::vector<double> times = input.Settings.moments;
-  if (times.empty())
-  {
-    for (int n = 0; n < input.Reader->GetNumberOfPhases(); ++n)
-    {
-      times.push_back(input.Reader->GetPhaseTime(n));
-    }
-  }
+  std::vector<double> times = settings.moments.empty() ? std::move(otherwise) : settings.moments;
   std::sort(times.begin(), times.end());
   times.erase(std::unique(times.begin(), times.end()), times.end());
   return times;
-}
-
-std::vector<double> TimeSteps(vtkAlgorithm* algorithm)
-{
-  vtkInformation* info = algorithm->GetOutputInformation(0);
-  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
-  const double* steps = info->Get(key);
-  return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
-}
-
-/// Mesh, deformation and writer of a run, but for the poses.
-void ConnectMesh(RunStep& step, vtkPolyData* skeleton, MovingMesh& moving)
-{
-  vtkMessageTrap& messages = step.input.Messages;
-  moving.Interpolator->SetMode(InterpolationMode(step.input.Settings.interpolation));
-  moving.Deformation->SetInputData(0, ReadUnstructuredGrid(PathOf(step, "weights.vtu"), messages));
-  moving.Deformation->SetInputData(1, skeleton);
-  moving.Writer->SetInputData(1, ReadLines(step, "volume_boundary.vtp"));
-  moving.Writer->SetInputData(2, ReadLines(step, "caps.vtp"));
-  moving.Writer->PrefixFilesOff();
-  moving.Writer->SetDigits(PhaseDigits);
 }
 
 /// The moving mesh at these times, with the lists of all that is in motion/; those on the first rank.
@@ -140,6 +112,54 @@ Json WriteMovingMesh(MovingMesh& moving, const std::vector<double>& times, RunSt
   return { { "volume", "motion/volume.vtu.series" }, { "surface", "motion/surface.vtp.series" } };
 }
 
+/// What is in motion/.
+struct MotionFiles
+{
+  Json told; ///< of it in any report; only the first rank has it
+  std::vector<int> invertedTetrahedra;
+};
+
+/// Lines, skeleton and mesh at these moments.
+/// @param lines  of the tree  @param poses  of the skeleton
+/// @param done   share of the stage that is behind
+MotionFiles WriteMotion(RunStep& step, vtkAlgorithmOutput* lines, vtkAlgorithmOutput* poses,
+  const std::vector<double>& times, double done)
+{
+  vtkMessageTrap& messages = step.input.Messages;
+  const int mode = InterpolationMode(step.input.Settings.interpolation);
+  vtkNew<vtkCardiacPhaseInterpolator> movingLines;
+  movingLines->SetInputConnection(lines);
+  movingLines->SetMode(mode);
+  MovingMesh moving;
+  moving.Interpolator->SetInputConnection(poses);
+  moving.Interpolator->SetMode(mode);
+  moving.Deformation->SetInputData(0, ReadUnstructuredGrid(PathOf(step, "weights.vtu"), messages));
+  moving.Deformation->SetInputData(1, ReadLines(step, "skeleton.vtp"));
+  moving.Writer->SetInputData(1, ReadLines(step, "volume_boundary.vtp"));
+  moving.Writer->SetInputData(2, ReadLines(step, "caps.vtp"));
+  moving.Writer->PrefixFilesOff();
+  moving.Writer->SetDigits(PhaseDigits);
+  Json lists;
+  lists["centerline"] = WriteMovingLines(movingLines, "centerline", times, step);
+  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
+  lists.update(WriteMovingMesh(
+    moving, times, step, [&](double fraction) { step.progress(done + (1.0 - done) * fraction); }));
+  MotionFiles files;
+  if (!Ranks().IsFirst())
+  {
+    return files;
+  }
+  files.told = { { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
+    { "times", times } };
+  vtkTable* quality = moving.Writer->GetQuality();
+  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
+  {
+    files.invertedTetrahedra.push_back(
+      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
+  }
+  return files;
+}
+
 /// The model at rest in the files of a moving one, so that all that reads these takes it: every pose is the same.
 Json MakeRest(RunStep& step, const std::string& reason)
 {
@@ -161,15 +181,8 @@ Json MakeRest(RunStep& step, const std::string& reason)
     axes->Add(time, tree);
     poses->Add(time, skeleton);
   }
-  vtkNew<vtkCardiacPhaseInterpolator> lines;
-  lines->SetInputConnection(axes->GetOutputPort());
-  MovingMesh moving;
-  moving.Interpolator->SetInputConnection(poses->GetOutputPort());
-  ConnectMesh(step, skeleton, moving);
-  Json lists;
-  lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
-  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
-  lists.update(WriteMovingMesh(moving, times, step, step.progress));
+  const MotionFiles files =
+    WriteMotion(step, axes->GetOutputPort(), poses->GetOutputPort(), times, 0.0);
   if (!Ranks().IsFirst())
   {
     return {};
@@ -177,29 +190,16 @@ Json MakeRest(RunStep& step, const std::string& reason)
   step.warnings.push_back(
     "motion is not possible: " + reason + "; motion/ holds the model at rest");
   step.summary = "no motion: " + reason;
-  return { { "possible", false }, { "motion", "none" }, { "reason", reason }, { "at_rest", true },
-    { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
-    { "times", times } };
-}
-
-std::vector<int> InvertedTetrahedra(const MovingMesh& moving)
-{
-  std::vector<int> inverted;
-  vtkTable* quality = moving.Writer->GetQuality();
-  for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
-  {
-    inverted.push_back(
-      quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
-  }
-  return inverted;
+  Json told = { { "possible", false }, { "motion", "none" }, { "reason", reason },
+    { "at_rest", true } };
+  told.update(files.told);
+  return told;
 }
 
 /// The model with the motion of a population, in the files of a tracked one.
 Json MakePopulation(RunStep& step, const MotionPlan& plan)
 {
-  const auto skeleton = ReadLines(step, "skeleton.vtp");
-  const auto tree = ReadTree(step);
-  PopulationPoses poses(step, tree, skeleton, plan);
+  PopulationPoses poses(step, ReadTree(step), ReadLines(step, "skeleton.vtp"), plan);
   try
   {
     poses.Update(step, [&](double fraction) { step.progress(0.8 * fraction); });
@@ -214,21 +214,9 @@ Json MakePopulation(RunStep& step, const MotionPlan& plan)
     // Trees without names, or of other vessels, have no heart that they belong to.
     return MakeRest(step, plan.reason + ", and no population's motion: " + error.what());
   }
-  std::vector<double> times = step.input.Settings.moments;
-  times = times.empty() ? poses.Times() : times;
-  std::sort(times.begin(), times.end());
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  vtkNew<vtkCardiacPhaseInterpolator> lines;
-  lines->SetInputConnection(poses.Motion->GetOutputPort(0));
-  lines->SetMode(InterpolationMode(step.input.Settings.interpolation));
-  MovingMesh moving;
-  moving.Interpolator->SetInputConnection(poses.Motion->GetOutputPort(1));
-  ConnectMesh(step, skeleton, moving);
-  Json lists;
-  lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
-  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
-  lists.update(WriteMovingMesh(
-    moving, times, step, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); }));
+  const std::vector<double> times = Moments(step.input.Settings, poses.Times());
+  const MotionFiles files =
+    WriteMotion(step, poses.Motion->GetOutputPort(0), poses.Motion->GetOutputPort(1), times, 0.8);
   if (!Ranks().IsFirst())
   {
     return {};
@@ -241,10 +229,19 @@ Json MakePopulation(RunStep& step, const MotionPlan& plan)
   }
   step.summary = std::to_string(times.size()) + " moments, " + poses.Statement();
   Json told = poses.Describe(plan);
-  told.update(
-    Json{ { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
-      { "times", times }, { "inverted_tetrahedra", InvertedTetrahedra(moving) } });
+  told.update(files.told);
+  told["inverted_tetrahedra"] = files.invertedTetrahedra;
   return told;
+}
+
+std::vector<double> PhaseTimes(vtkGatedImageReader* reader)
+{
+  std::vector<double> times;
+  for (int n = 0; n < reader->GetNumberOfPhases(); ++n)
+  {
+    times.push_back(reader->GetPhaseTime(n));
+  }
+  return times;
 }
 }
 
@@ -262,16 +259,13 @@ Json MakeMotion(RunStep& step)
     return MakePopulation(step, plan);
   }
   const auto skeleton = ReadLines(step, "skeleton.vtp");
-  vtkNew<vtkCenterlineTracker> tracker;
-  tracker->SetInputConnection(step.input.Reader->GetOutputPort());
   const auto tree = ReadTree(step);
-  tracker->SetInputDataObject(1, tree);
+  vtkNew<vtkCenterlineTracker> tracker;
+  ConnectTracker(tracker, step, tree);
   tracker->SetInputDataObject(2, skeleton);
-  tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
-  tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
-                                                       : vtkCenterlineTracker::AllPhases);
-  tracker->SetSharing(&Ranks());
-  const std::vector<double> times = Moments(step.input);
+  const std::vector<double> times = Moments(settings, PhaseTimes(step.input.Reader));
+  tracker->UpdateInformation();
+  const std::vector<double> steps = TimeSteps(tracker);
   // What was measured is kept to as far as it is known; between the phases and the mesh is what was made of it.
   vtkNew<vtkMotionRegularizer> keptLines;
   keptLines->SetInputConnection(0, tracker->GetOutputPort(0));
@@ -279,28 +273,17 @@ Json MakeMotion(RunStep& step)
   vtkNew<vtkMotionRegularizer> keptSkeleton;
   keptSkeleton->SetInputConnection(0, tracker->GetOutputPort(1));
   keptSkeleton->SetInputDataObject(1, skeleton);
-  tracker->UpdateInformation();
   for (vtkMotionRegularizer* kept : { keptLines.Get(), keptSkeleton.Get() })
   {
-    kept->SetTemporalWeight(TemporalWeightOf(TimeSteps(tracker).size()));
+    kept->SetTemporalWeight(TemporalWeightOf(steps.size()));
   }
-  vtkNew<vtkCardiacPhaseInterpolator> lines;
-  lines->SetInputConnection(
-    settings.limits ? keptLines->GetOutputPort() : tracker->GetOutputPort(0));
-  lines->SetMode(InterpolationMode(settings.interpolation));
-  MovingMesh moving;
-  moving.Interpolator->SetInputConnection(
-    settings.limits ? keptSkeleton->GetOutputPort() : tracker->GetOutputPort(1));
-  ConnectMesh(step, skeleton, moving);
 
   // The images are read now.
   UpdateAtTime(
     tracker, 0, times.front(), messages, [&](double fraction) { step.progress(0.8 * fraction); });
-  Json lists;
-  lists["centerline"] = WriteMovingLines(lines, "centerline", times, step);
-  lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
-  lists.update(WriteMovingMesh(
-    moving, times, step, [&](double fraction) { step.progress(0.8 + 0.2 * fraction); }));
+  const MotionFiles files = settings.limits
+    ? WriteMotion(step, keptLines->GetOutputPort(), keptSkeleton->GetOutputPort(), times, 0.8)
+    : WriteMotion(step, tracker->GetOutputPort(0), tracker->GetOutputPort(1), times, 0.8);
   if (!Ranks().IsFirst())
   {
     return {};
@@ -312,12 +295,13 @@ Json MakeMotion(RunStep& step)
   {
     limits.update(DescribeLimits(keptLines, keptSkeleton, tree, messages));
   }
-  return { { "possible", true }, { "motion", "tracked" }, { "file", "motion.pvd" },
-    { "series", lists }, { "quality", "motion/mesh.json" }, { "times", times },
-    { "tracked_times", TimeSteps(tracker) },
+  Json told = { { "possible", true }, { "motion", "tracked" } };
+  told.update(files.told);
+  told.update(Json{ { "tracked_times", steps },
     { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
     { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
     { "filled", DescribeFilled(tracker, tree, messages) }, { "limits", limits },
-    { "inverted_tetrahedra", InvertedTetrahedra(moving) } };
+    { "inverted_tetrahedra", files.invertedTetrahedra } });
+  return told;
 }
 }

@@ -13,12 +13,9 @@
 #include "vtkDoubleArray.h"
 #include "vtkFieldData.h"
 #include "vtkGatedImageReader.h"
-#include "vtkInformation.h"
-#include "vtkInformationDoubleVectorKey.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkPopulationMotion.h"
-#include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 
 #include <algorithm>
@@ -71,14 +68,6 @@ double ReferenceOf(const RunInput& input)
                                          : UsualPhase;
 }
 
-std::vector<double> TimesOf(vtkAlgorithm* algorithm)
-{
-  vtkInformation* info = algorithm->GetOutputInformation(0);
-  vtkInformationDoubleVectorKey* key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
-  const double* steps = info->Get(key);
-  return steps ? std::vector<double>(steps, steps + info->Length(key)) : std::vector<double>();
-}
-
 std::string Text(vtkDataSet* data, const char* name, vtkIdType n)
 {
   auto* array = vtkStringArray::SafeDownCast(data->GetFieldData()->GetAbstractArray(name));
@@ -117,6 +106,17 @@ MotionPlan PlanMotion(const RunInput& input)
   return plan;
 }
 
+void ConnectTracker(vtkCenterlineTracker* tracker, const RunStep& step, vtkPolyData* tree)
+{
+  const RunSettings& settings = step.input.Settings;
+  tracker->SetInputConnection(step.input.Reader->GetOutputPort());
+  tracker->SetInputDataObject(1, tree);
+  tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
+  tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
+                                                       : vtkCenterlineTracker::AllPhases);
+  tracker->SetSharing(&Ranks());
+}
+
 PopulationPoses::PopulationPoses(
   const RunStep& step, vtkPolyData* tree, vtkPolyData* skeleton, const MotionPlan& plan)
 {
@@ -130,12 +130,7 @@ PopulationPoses::PopulationPoses(
   this->Motion->SetHeartRate(std::isfinite(settings.heartRate) ? settings.heartRate : 0.0);
   if (plan.hasPhases)
   {
-    this->Tracker->SetInputConnection(step.input.Reader->GetOutputPort());
-    this->Tracker->SetInputDataObject(1, tree);
-    this->Tracker->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
-    this->Tracker->SetTrackedPhases(settings.tracked == "even" ? vtkCenterlineTracker::EvenPhases
-                                                               : vtkCenterlineTracker::AllPhases);
-    this->Tracker->SetSharing(&Ranks());
+    ConnectTracker(this->Tracker, step, tree);
     this->Motion->SetTrackedConnection(this->Tracker->GetOutputPort(0));
   }
 }
@@ -149,7 +144,7 @@ void PopulationPoses::Update(const RunStep& step, const std::function<void(doubl
 
 std::vector<double> PopulationPoses::Times() const
 {
-  return TimesOf(this->Motion);
+  return TimeSteps(this->Motion);
 }
 
 std::string PopulationPoses::Assumption() const
@@ -208,7 +203,7 @@ Json PopulationPoses::Describe(const MotionPlan& plan) const
   told["tracked_share"] = { 1.0 };
   if (plan.hasPhases)
   {
-    told["tracked_times"] = TimesOf(this->Tracker);
+    told["tracked_times"] = TimeSteps(this->Tracker);
     told["tracked_share"] =
       Numbers(vtkDataSet::SafeDownCast(this->Tracker->GetOutputDataObject(0)), names::TrackedShare);
   }

@@ -37,6 +37,9 @@ struct MotionPlan
 /// What --motion and the input's phases lead to.
 MotionPlan PlanMotion(const RunInput& input);
 
+/// Tracks the tree through the phases of the input, as the settings say. A skeleton is the caller's to give.
+void ConnectTracker(vtkCenterlineTracker* tracker, const RunStep& step, vtkPolyData* tree);
+
 /// The poses of a population motion.
 class PopulationPoses
 {
