@@ -34,6 +34,7 @@ namespace names = vtkCoronaryArrayNames;
 using coronary::PoseSequence;
 using coronary::Vector3;
 using vtkMovedLines::Connection;
+using vtkMovedLines::FieldValue;
 using vtkMovedLines::NearestIndex;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -54,13 +55,6 @@ constexpr double UsualCycleLength = 0.8;
 /// mm: voxels of images of lines and surfaces, and their margin. As fine as a CT's.
 constexpr double DrawnSpacing = 0.5;
 constexpr double DrawnMargin = 3.0;
-
-double FieldValue(vtkDataObject* data, const char* name, double otherwise)
-{
-  vtkDataArray* array = data != nullptr ? data->GetFieldData()->GetArray(name) : nullptr;
-  return array != nullptr && array->GetNumberOfTuples() == 1 ? array->GetComponent(0, 0)
-                                                             : otherwise;
-}
 
 bool IsSurface(vtkPolyData* shapes)
 {
@@ -387,12 +381,8 @@ int vtkCenterlineTracker::RequestData(
       this->Track(inputs);
     }
     const std::vector<double>& times = data.Poses.times;
-    // The executive takes all outputs for those of the time that one of them was asked for.
-    vtkInformation* asked = outputs->GetInformationObject(
-      std::max(0, request->Get(vtkDemandDrivenPipeline::FROM_OUTPUT_PORT())));
-    const double wanted =
-      asked->Has(SDDP::UPDATE_TIME_STEP()) ? asked->Get(SDDP::UPDATE_TIME_STEP()) : times.front();
-    const std::size_t phase = NearestIndex(times, wanted);
+    const std::size_t phase =
+      NearestIndex(times, vtkMovedLines::AskedTime(request, outputs, times.front()));
     const auto write =
       [&](vtkPolyData* like, const vtkPoseSequences::Moment& moment, vtkPolyData* out)
     {

@@ -48,6 +48,25 @@ vtkInformation* Connection(vtkInformationVector** inputs, int port)
     : nullptr;
 }
 
+double FieldValue(vtkDataObject* data, const char* name, double otherwise)
+{
+  vtkDataArray* array = data != nullptr ? data->GetFieldData()->GetArray(name) : nullptr;
+  return array != nullptr && array->GetNumberOfTuples() == 1 ? array->GetComponent(0, 0)
+                                                             : otherwise;
+}
+
+vtkInformation* AskedOutput(vtkInformation* request, vtkInformationVector* outputs)
+{
+  return outputs->GetInformationObject(
+    std::max(0, request->Get(vtkDemandDrivenPipeline::FROM_OUTPUT_PORT())));
+}
+
+double AskedTime(vtkInformation* request, vtkInformationVector* outputs, double otherwise)
+{
+  vtkInformation* asked = AskedOutput(request, outputs);
+  return asked->Has(SDDP::UPDATE_TIME_STEP()) ? asked->Get(SDDP::UPDATE_TIME_STEP()) : otherwise;
+}
+
 std::size_t NearestIndex(const std::vector<double>& times, double wanted)
 {
   return std::min_element(times.begin(), times.end(),

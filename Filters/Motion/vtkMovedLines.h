@@ -10,6 +10,7 @@
 
 #include <vector>
 
+class vtkDataObject;
 class vtkInformation;
 class vtkInformationVector;
 class vtkPolyData;
@@ -18,6 +19,15 @@ namespace vtkMovedLines
 {
 /// Of an input port; null: nothing is connected.
 vtkInformation* Connection(vtkInformationVector** inputs, int port);
+
+/// The value of a field array of one; else another.
+double FieldValue(vtkDataObject* data, const char* name, double otherwise);
+
+/// The output that a request came from: the executive takes all outputs for those of its time.
+vtkInformation* AskedOutput(vtkInformation* request, vtkInformationVector* outputs);
+
+/// The time that it was asked for; else another.
+double AskedTime(vtkInformation* request, vtkInformationVector* outputs, double otherwise);
 
 /// The number of the time nearest to the wanted one; of no times 0.
 std::size_t NearestIndex(const std::vector<double>& times, double wanted);

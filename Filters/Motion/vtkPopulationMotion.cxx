@@ -30,6 +30,7 @@
 namespace names = vtkCoronaryArrayNames;
 using coronary::Vector3;
 using vtkMovedLines::Connection;
+using vtkMovedLines::FieldValue;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
 vtkStandardNewMacro(vtkPopulationMotion);
@@ -45,13 +46,7 @@ enum InputPorts
 
 constexpr double UsualRate = 75.0;
 
-double FieldNumber(vtkPolyData* data, const char* name)
-{
-  vtkDataArray* array = data != nullptr ? data->GetFieldData()->GetArray(name) : nullptr;
-  return array != nullptr && array->GetNumberOfValues() == 1
-    ? array->GetComponent(0, 0)
-    : std::numeric_limits<double>::quiet_NaN();
-}
+constexpr double NotTold = std::numeric_limits<double>::quiet_NaN();
 
 coronary::HeartPose FrameOf(vtkPolyData* lines)
 {
@@ -159,8 +154,7 @@ int vtkPopulationMotion::RequestInformation(
   double reference = this->ReferenceTime;
   if (this->AutomaticReference)
   {
-    const double told = FieldNumber(vtkPolyData::GetData(inputs[LinesPort], 0), names::PhaseTime);
-    reference = told;
+    reference = FieldValue(vtkPolyData::GetData(inputs[LinesPort], 0), names::PhaseTime, NotTold);
   }
   reference = std::isfinite(reference) ? reference : 0.0;
   std::vector<double> seen;
@@ -195,7 +189,7 @@ void vtkPopulationMotion::Move(vtkInformationVector** inputs, vtkInformation* ou
   data.Reference = this->ReferenceTime;
   if (this->AutomaticReference)
   {
-    data.Reference = FieldNumber(input, names::PhaseTime);
+    data.Reference = FieldValue(input, names::PhaseTime, NotTold);
     Require(std::isfinite(data.Reference),
       "The lines have no field array PhaseTime, which says of which phase they are: switch "
       "AutomaticReference off and give ReferenceTime");
@@ -211,7 +205,7 @@ void vtkPopulationMotion::Move(vtkInformationVector** inputs, vtkInformation* ou
   settings.heartRate = this->HeartRate;
   if (this->HeartRate == 0.0)
   {
-    const double cycle = FieldNumber(input, names::CycleLength);
+    const double cycle = FieldValue(input, names::CycleLength, NotTold);
     settings.heartRate = std::isfinite(cycle) && cycle > 0.0 ? 60.0 / cycle : UsualRate;
   }
   data.Cycle = 60.0 / settings.heartRate;
@@ -257,16 +251,12 @@ int vtkPopulationMotion::RequestData(
   Internals& data = *this->Data;
   try
   {
-    // The executive takes all outputs for those of the time that one of them was asked for.
-    vtkInformation* asked = outputs->GetInformationObject(
-      std::max(0, request->Get(vtkDemandDrivenPipeline::FROM_OUTPUT_PORT())));
     if (!data.Knows(this, inputs))
     {
-      this->Move(inputs, asked);
+      this->Move(inputs, vtkMovedLines::AskedOutput(request, outputs));
     }
     const std::vector<double>& times = data.Poses.times;
-    const double wanted =
-      asked->Has(SDDP::UPDATE_TIME_STEP()) ? asked->Get(SDDP::UPDATE_TIME_STEP()) : data.Reference;
+    const double wanted = vtkMovedLines::AskedTime(request, outputs, data.Reference);
     vtkCoronary::Require(std::isfinite(wanted), "UPDATE_TIME_STEP: the time must be finite");
     const std::size_t phase = vtkMovedLines::NearestIndex(times, wanted);
     const auto write = [&](vtkPolyData* like, const vtkPoseSequences::Moment& moment,

@@ -15,13 +15,13 @@ namespace coronary
 {
 struct WindowOptions
 {
-  std::vector<std::string> devices; ///< URIs, in the order of their priority
-  int igtlPort = 0;                 ///< for 3D Slicer and others; 0: none
-  std::string igtlAddress;          ///< where it listens; empty: this machine only
-  std::string script;               ///< of driving; empty: none
-  std::string replay;               ///< recording to begin with; empty: none
-  std::string record;               ///< recording of the first session; empty: none
-  std::string screenshots;          ///< folder of pictures of the window; empty: none by itself
+  std::vector<std::string> devices;      ///< URIs, in the order of their priority
+  int igtlPort = 0;                      ///< for 3D Slicer and others; 0: none
+  std::string igtlAddress = "127.0.0.1"; ///< where it listens
+  std::string script;                    ///< of driving; empty: none
+  std::string replay;                    ///< recording to begin with; empty: none
+  std::string record;                    ///< recording of the first session; empty: none
+  std::string screenshots; ///< folder of pictures of the window; empty: none by itself
   std::vector<double> screenshotSeconds; ///< of simulated time, at which pictures are made
   std::string video;                     ///< .ogv of the first session; empty: none
   double quitAfter = 0.0;                ///< s of simulated time; 0: when it is closed

@@ -220,6 +220,7 @@ void Request::DeclareWindow(CLI::App& app)
       "read, the protocol has no authentication")
     ->needs(igtl)
     ->type_name("ADDRESS")
+    ->capture_default_str()
     ->group(what);
   app
     .add_option("--triangles", this->window.triangles,
@@ -290,7 +291,7 @@ void Request::RunWindow() const
   {
     std::fprintf(stderr, "Warning: %s\n", note.c_str());
   }
-  if (!options.igtlAddress.empty() && !coronary::IgtlOutput::IsLocal(options.igtlAddress))
+  if (options.igtlPort > 0 && !coronary::IgtlOutput::IsLocal(options.igtlAddress))
   {
     std::fprintf(stderr,
       "Warning: the images of this session can be read by everybody who reaches %s: OpenIGTLink "

@@ -122,8 +122,7 @@ SessionWindow::SessionWindow(const SessionWorld& world, const WindowOptions& opt
 
   if (options.igtlPort > 0)
   {
-    this->Igtl = std::make_unique<IgtlOutput>(options.igtlPort,
-      options.igtlAddress.empty() ? IgtlOutput::ThisMachine : options.igtlAddress);
+    this->Igtl = std::make_unique<IgtlOutput>(options.igtlPort, options.igtlAddress);
   }
 
   this->Monitor = new FluoroscopyWidget;

@@ -35,13 +35,11 @@ public:
   /// Whether this build has OpenIGTLink.
   static bool IsSupported();
 
-  static constexpr const char* ThisMachine = "127.0.0.1";
-
   /// @param port     1 to 65535; 3D Slicer looks for 18944
   /// @param address  IPv4, of this machine: where it listens; 0.0.0.0: at all of them
   /// @throws std::invalid_argument for the port or what is no address, std::runtime_error: they can not be had (taken, not
   /// of this machine), or a build without OpenIGTLink
-  explicit IgtlOutput(int port, const std::string& address = ThisMachine);
+  explicit IgtlOutput(int port, const std::string& address = "127.0.0.1");
   ~IgtlOutput();
   IgtlOutput(const IgtlOutput&) = delete;
   IgtlOutput& operator=(const IgtlOutput&) = delete;
