@@ -32,7 +32,6 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace coronary
@@ -72,9 +71,9 @@ std::string WriteMovingLines(
 }
 
 /// The moments that were asked for, or else these; each once, in order.
-std::vector<double> Moments(const RunSettings& settings, std::vector<double> otherwise)
+std::vector<double> Moments(const RunSettings& settings, const std::vector<double>& otherwise)
 {
-  std::vector<double> times = settings.moments.empty() ? std::move(otherwise) : settings.moments;
+  std::vector<double> times = settings.moments.empty() ? otherwise : settings.moments;
   std::sort(times.begin(), times.end());
   times.erase(std::unique(times.begin(), times.end()), times.end());
   return times;
@@ -112,17 +111,10 @@ Json WriteMovingMesh(MovingMesh& moving, const std::vector<double>& times, RunSt
   return { { "volume", "motion/volume.vtu.series" }, { "surface", "motion/surface.vtp.series" } };
 }
 
-/// What is in motion/.
-struct MotionFiles
-{
-  Json told; ///< of it in any report; only the first rank has it
-  std::vector<int> invertedTetrahedra;
-};
-
-/// Lines, skeleton and mesh at these moments.
+/// Writes lines, skeleton and mesh at these moments, and gives what any report tells of them; only the first rank has it.
 /// @param lines  of the tree  @param poses  of the skeleton
 /// @param done   share of the stage that is behind
-MotionFiles WriteMotion(RunStep& step, vtkAlgorithmOutput* lines, vtkAlgorithmOutput* poses,
+Json WriteMotion(RunStep& step, vtkAlgorithmOutput* lines, vtkAlgorithmOutput* poses,
   const std::vector<double>& times, double done)
 {
   vtkMessageTrap& messages = step.input.Messages;
@@ -144,20 +136,19 @@ MotionFiles WriteMotion(RunStep& step, vtkAlgorithmOutput* lines, vtkAlgorithmOu
   lists["skeleton"] = WriteMovingLines(moving.Interpolator, "skeleton", times, step);
   lists.update(WriteMovingMesh(
     moving, times, step, [&](double fraction) { step.progress(done + (1.0 - done) * fraction); }));
-  MotionFiles files;
   if (!Ranks().IsFirst())
   {
-    return files;
+    return {};
   }
-  files.told = { { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
-    { "times", times } };
+  Json inverted = Json::array();
   vtkTable* quality = moving.Writer->GetQuality();
   for (vtkIdType n = 0; n < quality->GetNumberOfRows(); ++n)
   {
-    files.invertedTetrahedra.push_back(
+    inverted.push_back(
       quality->GetValueByName(n, vtkCoronaryArrayNames::InvertedTetrahedra).ToInt());
   }
-  return files;
+  return { { "file", "motion.pvd" }, { "series", lists }, { "quality", "motion/mesh.json" },
+    { "times", times }, { "inverted_tetrahedra", inverted } };
 }
 
 /// The model at rest in the files of a moving one, so that all that reads these takes it: every pose is the same.
@@ -181,8 +172,7 @@ Json MakeRest(RunStep& step, const std::string& reason)
     axes->Add(time, tree);
     poses->Add(time, skeleton);
   }
-  const MotionFiles files =
-    WriteMotion(step, axes->GetOutputPort(), poses->GetOutputPort(), times, 0.0);
+  const Json written = WriteMotion(step, axes->GetOutputPort(), poses->GetOutputPort(), times, 0.0);
   if (!Ranks().IsFirst())
   {
     return {};
@@ -192,7 +182,8 @@ Json MakeRest(RunStep& step, const std::string& reason)
   step.summary = "no motion: " + reason;
   Json told = { { "possible", false }, { "motion", "none" }, { "reason", reason },
     { "at_rest", true } };
-  told.update(files.told);
+  told.update(written);
+  told.erase("inverted_tetrahedra"); // nothing moves
   return told;
 }
 
@@ -215,7 +206,7 @@ Json MakePopulation(RunStep& step, const MotionPlan& plan)
     return MakeRest(step, plan.reason + ", and no population's motion: " + error.what());
   }
   const std::vector<double> times = Moments(step.input.Settings, poses.Times());
-  const MotionFiles files =
+  const Json written =
     WriteMotion(step, poses.Motion->GetOutputPort(0), poses.Motion->GetOutputPort(1), times, 0.8);
   if (!Ranks().IsFirst())
   {
@@ -229,17 +220,16 @@ Json MakePopulation(RunStep& step, const MotionPlan& plan)
   }
   step.summary = std::to_string(times.size()) + " moments, " + poses.Statement();
   Json told = poses.Describe(plan);
-  told.update(files.told);
-  told["inverted_tetrahedra"] = files.invertedTetrahedra;
+  told.update(written);
   return told;
 }
 
 std::vector<double> PhaseTimes(vtkGatedImageReader* reader)
 {
-  std::vector<double> times;
-  for (int n = 0; n < reader->GetNumberOfPhases(); ++n)
+  std::vector<double> times(static_cast<std::size_t>(reader->GetNumberOfPhases()));
+  for (std::size_t n = 0; n < times.size(); ++n)
   {
-    times.push_back(reader->GetPhaseTime(n));
+    times[n] = reader->GetPhaseTime(static_cast<int>(n));
   }
   return times;
 }
@@ -281,7 +271,7 @@ Json MakeMotion(RunStep& step)
   // The images are read now.
   UpdateAtTime(
     tracker, 0, times.front(), messages, [&](double fraction) { step.progress(0.8 * fraction); });
-  const MotionFiles files = settings.limits
+  const Json written = settings.limits
     ? WriteMotion(step, keptLines->GetOutputPort(), keptSkeleton->GetOutputPort(), times, 0.8)
     : WriteMotion(step, tracker->GetOutputPort(0), tracker->GetOutputPort(1), times, 0.8);
   if (!Ranks().IsFirst())
@@ -296,12 +286,11 @@ Json MakeMotion(RunStep& step)
     limits.update(DescribeLimits(keptLines, keptSkeleton, tree, messages));
   }
   Json told = { { "possible", true }, { "motion", "tracked" } };
-  told.update(files.told);
+  told.update(written);
   told.update(Json{ { "tracked_times", steps },
     { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
     { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
-    { "filled", DescribeFilled(tracker, tree, messages) }, { "limits", limits },
-    { "inverted_tetrahedra", files.invertedTetrahedra } });
+    { "filled", DescribeFilled(tracker, tree, messages) }, { "limits", limits } });
   return told;
 }
 }

@@ -344,17 +344,18 @@ public:
       this->Accumulate(bent.values, normal, right);
       bent.covariance = normal.inverse();
       const PopulationVector step = bent.covariance * right;
-      double share = 1.0;
+      // Half the step, until it is none that makes it worse.
+      constexpr int halvings = 5;
+      double share = 2.0;
       double next = best;
-      for (; share > 0.05; share *= 0.5)
+      bool better = false;
+      for (int n = 0; n < halvings && !better; ++n)
       {
+        share *= 0.5;
         next = this->Objective(bent.values + share * step, mean, precision);
-        if (next <= best)
-        {
-          break;
-        }
+        better = next <= best;
       }
-      if (share <= 0.05)
+      if (!better)
       {
         break;
       }
