@@ -77,6 +77,14 @@ def rows_with(option, text):
             if line.startswith("|") and re.search(r"%s(?![\w-])" % option, line.split("|")[1])]
 
 
+def number_or_text(word):
+    """1.0 and 1 are one number; an address of a machine is none."""
+    try:
+        return float(word)
+    except ValueError:
+        return word
+
+
 def check_command(programs, program, command, text, inherited, page, complaints):
     """The options of a command against its text."""
     where = "%s: %s" % (page, " ".join(filter(None, [program, command])))
@@ -90,11 +98,11 @@ def check_command(programs, program, command, text, inherited, page, complaints)
         cells = rows[0].split("|") if rows else []
         alone = rows and len(OPTION.findall(cells[1])) == 1
         if default and alone and re.fullmatch(r"[-+.\de\[\],]+", default):
+            # In the column of defaults, where the table has one.
+            text_of_default = cells[3] if len(cells) >= 6 else rows[0]
+            written = [number_or_text(word) for word in re.findall(r"-?\d+(?:\.\d+)*(?:e[-+]?\d+)?", text_of_default)]
             for value in default.strip("[]").split(","):
-                # In the column of defaults, where the table has one.
-                text_of_default = cells[3] if len(cells) >= 6 else rows[0]
-                written = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", text_of_default)]
-                if float(value) not in written:
+                if number_or_text(value) not in written:
                     complaints.append("%s: the default %s of %s is not there" % (where, value, option))
     for line in text.splitlines():
         if line.startswith("| `--"):
