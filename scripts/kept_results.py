@@ -1,4 +1,5 @@
 """What long validations share: programs that are run and measured, and results that survive an interruption."""
+import fnmatch
 import hashlib
 import json
 import os
@@ -102,3 +103,14 @@ def finished(folder, key):
     except (OSError, ValueError, KeyError):
         pass
     return None
+
+
+def keep_only(folder, patterns):
+    """Removes all files of a folder but those whose path in it is like one of the patterns."""
+    for place, _, files in os.walk(folder, topdown=False):
+        for file in files:
+            path = os.path.join(place, file)
+            if not any(fnmatch.fnmatch(os.path.relpath(path, folder), pattern) for pattern in patterns):
+                os.remove(path)
+        if not os.listdir(place):
+            os.rmdir(place)

@@ -31,11 +31,13 @@ PHASES = {"systole": 0.35, "rest": 0.75}
 KERNELS = ["soft", "sharp"]
 NOISES = [20, 40, 60]  # HU
 GRID = ["--spacing", "0.5"]
-RUN = ["--partial"]  # a lost tree is a row, not an end
+RUN = ["--partial", "--motion", "tracked"]  # a lost tree is a row, not an end
+# Of a run and its evaluation what its confidences are judged by.
+KEPT = ["report.json", "status.csv", "motion/centerline*", "branches.csv"]
 # Wide vessels, since the quick scanner is coarse.
 QUICK = {"HEART": HEART + ["--calibre", "1.4"], "ANATOMIES": {"healthy": []}, "SCANS": {"quick": 66}, "KERNELS": ["sharp"],
          "NOISES": [30], "GRID": ["--spacing", "0.8", "--surface-spacing", "0.8"],
-         "RUN": ["--partial", "--edges", "0.5", "1.5"]}
+         "RUN": RUN + ["--edges", "0.5", "1.5"]}
 
 LOST_BELOW = 0.5    # share of a branch that is found
 FOUND_WITHIN = 1.5  # mm from an axis, beside how far the scan shifts the heart
@@ -68,6 +70,7 @@ class Matrix:
         if not os.access(self.program, os.X_OK):
             raise Failed("no %s: build the tree first (cmake --build --preset paraview)" % self.program)
         self.version = kept_results.digest_of_program(self.program, options.build)
+        self.images_version = "of any program" if options.keep_images else self.version
         self.threads = str(options.threads or os.cpu_count())
 
     def pipeline(self, folder, *words):
@@ -78,10 +81,11 @@ class Matrix:
         return os.path.join(SCANNERS, scan + ".json")
 
     def scan_key(self, anatomy, scan):
-        return digest(self.version, HEART, ANATOMIES[anatomy], kept_results.digest_of_files([self.scanner(scan)]), PHASES, GRID)
+        return digest(self.images_version, HEART, ANATOMIES[anatomy], kept_results.digest_of_files([self.scanner(scan)]), PHASES, GRID)
 
     def key(self, series):
-        return digest(self.scan_key(series.anatomy, series.scan), series.image, SCANS[series.scan], RUN, FOUND_WITHIN, CONFIDENT)
+        return digest(self.version, self.scan_key(series.anatomy, series.scan), series.image, SCANS[series.scan], RUN,
+                      FOUND_WITHIN, CONFIDENT)
 
     def place(self, series):
         return os.path.join(self.folder, series.anatomy, series.scan, series.image)
@@ -144,7 +148,7 @@ class Matrix:
                          "false_branches": measures["false_branches"], "warnings": len(warnings),
                          **{key: measures[key] for key, _, _ in MEASURES if key in measures}})
         for bulk in (run, evaluation):
-            shutil.rmtree(bulk)
+            kept_results.keep_only(bulk, KEPT)
         return {"rows": rows, "warnings": warnings, "tolerance": tolerance, **usage}
 
     def fill(self, chosen):
@@ -159,7 +163,8 @@ class Matrix:
                 self.say(chosen, len(missing) - made, start, made, str(series))
                 kept(self.place(series), self.key(series), lambda folder, series=series: self.measure(series, images, folder))
                 made += 1
-            shutil.rmtree(images)
+            if not self.options.keep_images:
+                shutil.rmtree(images)
 
     @staticmethod
     def say(chosen, missing, start, made, what):
@@ -231,6 +236,8 @@ def main():
     parser.add_argument("--only", nargs="+", metavar="NAME", default=[],
                         help="values of axes, such as `healthy dual-66 soft 20`: of each axis that is named only these")
     parser.add_argument("--table", action="store_true", help="only print what is finished")
+    parser.add_argument("--keep-images", action="store_true",
+                        help="images stay (23 GB for all), and serve the next program, too: for work on methods")
     parser.add_argument("--threads", type=int, default=0, help="0: all cores")
     parser.add_argument("--quick", action="store_true", help="one series of a coarse scan, always anew: whether everything runs")
     options = parser.parse_args()
