@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Weights of odds: logistic regression of artery or not on the signs of branches, links or tips.
+"""Weights of odds: logistic regression of artery or not on the signs of branches, links or tips; of placed or not for branches at
+phases.
 
 Reads tables of `validate-disease --branches FILE` (the odds of a vein, VeinRejection.cxx), `--links FILE` (the odds that
-a link is right, VesselLinking.cxx) or `--tips FILE` (the odds that a vessel goes on, VesselTips.cxx). Prints the weights, and how well weights tell that were fitted without the heart that
+a link is right, VesselLinking.cxx) `--tips FILE` (the odds that a vessel goes on, VesselTips.cxx), or
+of `validate-placement` (that a branch is where it is said to be, BranchPlacement.cxx). Prints the weights, and how well weights tell that were fitted without the heart that
 they judge (eight folds). What is artery only in part, and what lies behind a link, is left out. The penalty is half the
 squared weights, or half the squared difference from what is known before.
 """
@@ -26,6 +28,7 @@ BEFORE = {
                  "beside_unclear": (0.8, 1.0), "(intercept)": (-4.7, 4.0)},
     "links": {"outgrows": (-8.0, 1.0), "abrupt": (1.5, 1.0), "brighter": (-6.0, 1.0)},
     "tips": {},
+    "placements": {},
 }
 
 
@@ -47,7 +50,7 @@ def fit(before, names, signs, truth):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kind", choices=["branches", "links", "tips"])
+    parser.add_argument("kind", choices=sorted(BEFORE))
     parser.add_argument("tables", nargs="+", metavar="table")
     parser.add_argument("--wrong", action="store_true", help="list what is told wrongly")
     arguments = parser.parse_args()
@@ -63,7 +66,7 @@ def main():
     before = BEFORE[arguments.kind]
     names = head[FIRST_SIGN:]
     artery = np.array([float(row[2]) > 0.5 for row in rows])
-    what = {"links": "links", "tips": "vessels that go on", "branches": "veins"}[arguments.kind]
+    what = {"links": "links", "tips": "vessels that go on", "branches": "veins", "placements": "in their places"}[arguments.kind]
     truth = (~artery if arguments.kind == "branches" else artery).astype(float)
     hearts = [row[0] + row[1] for row in rows]
     fold = {heart: n % FOLDS for n, heart in enumerate(dict.fromkeys(hearts))}

@@ -94,7 +94,7 @@ Json Describe(const ReviewedRun& look, int reference)
   {
     run[kind] = look.result.Findings(kind);
   }
-  for (const char* kind : { "filled", "limits" })
+  for (const char* kind : { "placement", "filled", "limits" })
   {
     run[kind] = look.result.MotionFindings(kind);
   }

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <map>
 #include <set>
 #include <string>
@@ -147,6 +148,72 @@ Json DescribeFilled(vtkAlgorithm* tracked, vtkPolyData* tree, vtkMessageTrap& me
       }
     });
   return list;
+}
+
+Json DescribePlacement(vtkAlgorithm* moving, vtkPolyData* tree, vtkMessageTrap& messages)
+{
+  const VesselTree rest = vtkCoronary::BranchesOf(tree, nullptr);
+  std::vector<Json> branches;
+  AtEachStep(moving, messages,
+    [&](double time, vtkPolyData* lines)
+    {
+      vtkDataArray* placement = lines->GetPointData()->GetArray(names::PlacementConfidence);
+      for (std::size_t n = 0; n < rest.branches.size(); ++n)
+      {
+        const VesselTree::Branch& branch = rest.branches[n];
+        // Its first point may be its parent's.
+        const double own = Component(placement, branch.points.back());
+        if (branches.size() == n)
+        {
+          double length = 0.0;
+          for (std::size_t i = 1; i < branch.points.size(); ++i)
+          {
+            length += (rest.points[branch.points[i]] - rest.points[branch.points[i - 1]]).norm();
+          }
+          branches.push_back({ { "vessel", NameOf(branch) }, { "confidence", own },
+            { "time", time }, { "length_mm", length },
+            { "place", Place(rest.points[branch.points[branch.points.size() / 2]]) },
+            { "phases", Json::array() } });
+        }
+        Json& told = branches[n];
+        told["phases"].push_back({ time, own });
+        if (own < told["confidence"].get<double>())
+        {
+          told["confidence"] = own;
+          told["time"] = time;
+        }
+      }
+    });
+  std::stable_sort(branches.begin(), branches.end(),
+    [](const Json& a, const Json& b)
+    { return a["confidence"].get<double>() < b["confidence"].get<double>(); });
+  return branches;
+}
+
+std::string DoubtfulPlaces(const Json& placement)
+{
+  constexpr double Doubtful = 0.5;
+  constexpr int Named = 8;
+  std::string text;
+  int count = 0;
+  for (const Json& branch : placement)
+  {
+    if (branch["confidence"].get<double>() >= Doubtful || ++count > Named)
+    {
+      continue;
+    }
+    char one[80];
+    std::snprintf(one, sizeof one, " (%.2f at %.0f %% R-R)", branch["confidence"].get<double>(),
+      100.0 * branch["time"].get<double>());
+    text += (text.empty() ? "" : ", ") + branch["vessel"].get<std::string>() + one;
+  }
+  if (count == 0)
+  {
+    return {};
+  }
+  return std::to_string(count) + (count == 1 ? " branch is" : " branches are") +
+    " rather more than 1 mm off at some phase, or no artery: " + text +
+    (count > Named ? " and others (motion.placement in report.json)" : "");
 }
 
 Json DescribeLimits(vtkMotionRegularizer* lines, vtkMotionRegularizer* skeleton, vtkPolyData* tree,

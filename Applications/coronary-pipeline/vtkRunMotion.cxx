@@ -190,7 +190,8 @@ Json MakeRest(RunStep& step, const std::string& reason)
 /// The model with the motion of a population, in the files of a tracked one.
 Json MakePopulation(RunStep& step, const MotionPlan& plan)
 {
-  PopulationPoses poses(step, ReadTree(step), ReadLines(step, "skeleton.vtp"), plan);
+  const auto tree = ReadTree(step);
+  PopulationPoses poses(step, tree, ReadLines(step, "skeleton.vtp"), plan);
   try
   {
     poses.Update(step, [&](double fraction) { step.progress(0.8 * fraction); });
@@ -220,6 +221,7 @@ Json MakePopulation(RunStep& step, const MotionPlan& plan)
   }
   step.summary = std::to_string(times.size()) + " moments, " + poses.Statement();
   Json told = poses.Describe(plan);
+  told["placement"] = DescribePlacement(poses.Motion, tree, step.input.Messages);
   told.update(written);
   return told;
 }
@@ -280,6 +282,11 @@ Json MakeMotion(RunStep& step)
   }
   vtkDataSet* tracked = vtkDataSet::SafeDownCast(tracker->GetOutputDataObject(0));
   step.summary = std::to_string(times.size()) + " moments";
+  const Json placement = DescribePlacement(tracker, tree, messages);
+  if (const std::string doubtful = DoubtfulPlaces(placement); !doubtful.empty())
+  {
+    step.warnings.push_back(doubtful);
+  }
   Json limits = { { "applied", settings.limits } };
   if (settings.limits)
   {
@@ -290,7 +297,8 @@ Json MakeMotion(RunStep& step)
   told.update(Json{ { "tracked_times", steps },
     { "tracked_share", Numbers(tracked, vtkCoronaryArrayNames::TrackedShare) },
     { "repeatability_mm", Numbers(tracked, vtkCoronaryArrayNames::TrackingRepeatability) },
-    { "filled", DescribeFilled(tracker, tree, messages) }, { "limits", limits } });
+    { "placement", placement }, { "filled", DescribeFilled(tracker, tree, messages) },
+    { "limits", limits } });
   return told;
 }
 }

@@ -209,6 +209,8 @@ constexpr const char* CalibreFactor = "CalibreFactor";           ///< double, of
 constexpr const char* CalibreRate = "CalibreRate";               ///< double, of CalibreFactor, 1/s
 constexpr const char* TrackingConfidence = "TrackingConfidence"; ///< double, 0 to 1
 constexpr const char* TrackingStatus = "TrackingStatus";         ///< int, coronary::TrackingStatus
+/// double, 0 to 1: probability that the branch is within 1 mm of an artery at this phase (coronary::PlacementConfidence)
+constexpr const char* PlacementConfidence = "PlacementConfidence";
 // Tracked lines, field data.
 constexpr const char* ReferenceTime = "ReferenceTime"; ///< double, fraction of the R-R interval
 constexpr const char* TrackedShare = "TrackedShare";   ///< double, 0 to 1, one value a phase

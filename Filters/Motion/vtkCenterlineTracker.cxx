@@ -1,5 +1,6 @@
 #include "vtkCenterlineTracker.h"
 
+#include "BranchPlacement.h"
 #include "CenterlineTracking.h"
 #include "VesselImage.h"
 #include "vtkCoronaryArrayNames.h"
@@ -396,6 +397,9 @@ int vtkCenterlineTracker::RequestData(
       }
     };
     write(input, vtkPoseSequences::MomentOf(data.Poses, phase), output[0]);
+    vtkCoronary::AddArray<vtkDoubleArray>(output[0]->GetPointData(), names::PlacementConfidence,
+      coronary::PlacementConfidences(
+        data.Lines, vtkMovedLines::CertaintyOf(input), data.Poses, phase));
 
     vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;

@@ -23,6 +23,7 @@
  *
  * @par Output ports:
  * - 0: vtkPolyData, the lines with points moved; cells and other arrays are the input's own. Point data
+ *   `PlacementConfidence` (double, 0 to 1: probability that the branch is within 1 mm of an artery at that phase),
  *   `TrackingConfidence` (double, 0 to 1), `TrackingStatus` (int, coronary::TrackingStatus: 0 tracked, 1 weak, 2 lost,
  *   3 filled), `CalibreFactor` (double, of the radius), `Displacement` (double[3], mm, from the
  *   reference). Cell data `AxialStrain` (double: length / length at the reference - 1).

@@ -2,6 +2,7 @@
 
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
+#include "vtkVesselTree.h"
 
 #include "vtkAlgorithm.h"
 #include "vtkCellArray.h"
@@ -89,6 +90,13 @@ void SetTimes(vtkInformationVector* outputs, const std::vector<double>& times)
       outInfo->Set(SDDP::TIME_RANGE(), range, 2);
     }
   }
+}
+
+coronary::TreeCertainty CertaintyOf(vtkPolyData* lines)
+{
+  coronary::VesselTree values;
+  vtkCoronary::AddPointValues(lines, values);
+  return { values.confidence, values.bridgeConfidence };
 }
 
 Feet::Feet(const coronary::Polylines& lines, vtkPolyData* skeleton)

@@ -5,6 +5,7 @@
 #ifndef vtkMovedLines_h
 #define vtkMovedLines_h
 
+#include "BranchPlacement.h"
 #include "Polylines.h"
 #include "vtkPoseSequences.h"
 
@@ -34,6 +35,9 @@ std::size_t NearestIndex(const std::vector<double>& times, double wanted);
 
 /// TIME_STEPS and TIME_RANGE of all outputs; without times none.
 void SetTimes(vtkInformationVector* outputs, const std::vector<double>& times);
+
+/// How sure a tree is: its point arrays `Confidence` and `BridgeConfidence`, where they are there.
+coronary::TreeCertainty CertaintyOf(vtkPolyData* lines);
 
 /// Where the points of a skeleton are nearest to the lines that it was made of.
 class Feet

@@ -1,5 +1,6 @@
 #include "vtkPopulationMotion.h"
 
+#include "BranchPlacement.h"
 #include "PopulationMotion.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
@@ -80,6 +81,14 @@ struct vtkPopulationMotion::Internals
   double Reference = 0.0;
   double Cycle = 0.0;
   std::string Source;
+
+  /// Whether what is there at a phase is the patient's own.
+  bool IsTracked(std::size_t phase) const
+  {
+    const std::vector<coronary::TrackingStatus>& status = this->Poses.status[phase];
+    return std::any_of(status.begin(), status.end(),
+      [](coronary::TrackingStatus own) { return own != coronary::TrackingStatus::Filled; });
+  }
 
   static vtkMTimeType TimeOf(vtkInformation* info)
   {
@@ -290,6 +299,9 @@ int vtkPopulationMotion::RequestData(
     };
     write(input, vtkPoseSequences::MomentOf(data.Poses, phase), data.Report.deviations[phase],
       output[0]);
+    vtkCoronary::AddArray<vtkDoubleArray>(output[0]->GetPointData(), names::PlacementConfidence,
+      coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input), data.Poses,
+        phase, data.IsTracked(phase) ? std::vector<double>() : data.Report.deviations[phase]));
 
     vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;

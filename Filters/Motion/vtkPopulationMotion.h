@@ -18,6 +18,7 @@
  *
  * @par Output ports:
  * - 0: vtkPolyData, the lines with points moved; cells and other arrays are the input's own. Point data
+ *   `PlacementConfidence` (double, 0 to 1: probability that the branch is within 1 mm of an artery at that phase),
  *   `TrackingConfidence` (double: 1 at the reference, the tracker's at tracked phases, else at most 0.5),
  *   `TrackingStatus` (int, coronary::TrackingStatus; 3 filled, where it is the population's), `CalibreFactor` (double),
  *   `MotionDeviation` (double, mm: one standard deviation of the distance from the truth), `Displacement` (double[3], mm,

@@ -220,12 +220,16 @@ TEST(CenterlineTracker, FollowsThePhantomAndReadsItOnce)
   ASSERT_EQ(output->GetNumberOfPoints(), input->GetNumberOfPoints());
   EXPECT_EQ(
     output->GetCellData()->GetArray("GroupIds"), input->GetCellData()->GetArray("GroupIds"));
-  for (const char* name : { "TrackingConfidence", "TrackingStatus", "CalibreFactor" })
+  for (const char* name :
+    { "PlacementConfidence", "TrackingConfidence", "TrackingStatus", "CalibreFactor" })
   {
     vtkDataArray* array = output->GetPointData()->GetArray(name);
     ASSERT_NE(array, nullptr) << name;
     EXPECT_EQ(array->GetNumberOfTuples(), output->GetNumberOfPoints());
   }
+  // The true tree, seen well.
+  EXPECT_GT(output->GetPointData()->GetArray("PlacementConfidence")->GetRange()[0], 0.5);
+  EXPECT_LE(output->GetPointData()->GetArray("PlacementConfidence")->GetRange()[1], 1.0);
   vtkDataArray* way = output->GetPointData()->GetArray("Displacement");
   ASSERT_NE(way, nullptr);
   double from[3];

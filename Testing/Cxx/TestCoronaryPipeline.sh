@@ -700,10 +700,11 @@ check_weights() {
   done
   grep -q 'timestep="0.45".*file="motion/surface_00.vtp"' bound/motion.pvd || fail "motion.pvd: $(cat bound/motion.pvd)"
   grep -q 'timestep="0.74".*file="motion/surface_01.vtp"' bound/motion.pvd || fail "motion.pvd: $(cat bound/motion.pvd)"
-  for name in TrackingConfidence TrackingStatus CalibreFactor AxialStrain TrackedShare; do
+  for name in PlacementConfidence TrackingConfidence TrackingStatus CalibreFactor AxialStrain TrackedShare; do
     grep -q "Name=\"$name\"" bound/motion/centerline_00.vtp || fail "no $name in centerline_00.vtp"
   done
   expect_text bound/report.json '"tracked_share"'
+  expect_text bound/report.json '"placement"'
   expect_text bound/report.json '"filled"'
   expect_text bound/report.json '"objective_after_mm2"'
   expect_text bound/motion/mesh.json '"inlet_'
@@ -752,7 +753,7 @@ check_weights() {
   expect_text beating/report.json '"phases": 1'
   expect_text beating/report.json 'atrioventricular groove:'
   [ "$(grep -c '"time"' beating/motion/skeleton.vtp.series)" = 20 ] || fail "$(cat beating/motion/skeleton.vtp.series)"
-  for name in MotionSource MotionDeviation TrackingConfidence; do
+  for name in MotionSource MotionDeviation PlacementConfidence TrackingConfidence; do
     grep -q "Name=\"$name\"" beating/motion/centerline_00.vtp || fail "no $name in centerline_00.vtp"
   done
   grep -q 'Name="MotionSource"' beating/motion/surface_00.vtp || fail "no MotionSource in surface_00.vtp"

@@ -127,6 +127,8 @@ TEST(PopulationMotion, MovesTreeAndSkeleton)
       EXPECT_EQ(filter->GetOutput()->GetPoint(n)[axis], tree->GetPoint(n)[axis]);
     }
   }
+  EXPECT_GT(
+    filter->GetOutput()->GetPointData()->GetArray("PlacementConfidence")->GetRange()[0], 0.5);
   filter->UpdateTimeStep(0.35);
   vtkPolyData* moved = filter->GetOutput();
   vtkPolyData* posed = vtkPolyData::SafeDownCast(filter->GetOutputDataObject(1));
@@ -137,6 +139,8 @@ TEST(PopulationMotion, MovesTreeAndSkeleton)
   EXPECT_GT(deviation->GetRange()[0], 0.0);
   EXPECT_LT(deviation->GetRange()[1], 15.0);
   EXPECT_LE(moved->GetPointData()->GetArray("TrackingConfidence")->GetRange()[1], 0.5);
+  // Millimetres off, and it says so.
+  EXPECT_LT(moved->GetPointData()->GetArray("PlacementConfidence")->GetRange()[1], 0.5);
   EXPECT_EQ(moved->GetPointData()->GetArray("TrackingStatus")->GetRange()[0], 3.0);
   ASSERT_EQ(posed->GetNumberOfPoints(), 3);
   for (vtkIdType n = 0; n < 3; ++n)

@@ -7,6 +7,7 @@ const FINDINGS = [
   ['lesions', ['lesions'], 'Narrowings', 'No narrowing was found.'],
   ['calcium', ['calcium', 'objects'], 'Calcium', 'No calcium was found.'],
   ['hidden', ['calcium', 'radius_interpolated'], 'Radius guessed, behind calcium', 'None was.'],
+  ['placement', ['placement'], 'How likely each branch is within 1 mm of an artery, at its worst phase', 'Nothing was followed.'],
   ['filled', ['filled'], 'Not seen at a phase, and filled', 'All that was tracked was seen.'],
   ['limits', ['limits', 'clamped'], 'Held back by limits of motion', 'Nothing was held back.'],
 ];

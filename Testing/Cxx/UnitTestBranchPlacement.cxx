@@ -1,0 +1,143 @@
+// The probability that a branch is where a moving tree has it: its signs in closed form, and what must never be confident.
+
+#include "BranchPlacement.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+using namespace coronary;
+
+namespace
+{
+/// Two lines of 20 mm that meet, with points of 1 mm; the first is 2 mm wide, the second 1 mm.
+Polylines TwoLines()
+{
+  Polylines lines;
+  lines.lines.resize(2);
+  for (int n = 0; n <= 20; ++n)
+  {
+    lines.lines[0].push_back(static_cast<std::int64_t>(lines.points.size()));
+    lines.points.emplace_back(n, 0.0, 0.0);
+    lines.radius.push_back(1.0);
+  }
+  lines.lines[1].push_back(20);
+  for (int n = 1; n <= 20; ++n)
+  {
+    lines.lines[1].push_back(static_cast<std::int64_t>(lines.points.size()));
+    lines.points.emplace_back(20.0, n, 0.0);
+    lines.radius.push_back(0.5);
+  }
+  return lines;
+}
+
+PoseSequence AtRest(const Polylines& lines)
+{
+  PoseSequence poses;
+  poses.times = { 0.5 };
+  poses.points = { lines.points };
+  poses.confidence = { std::vector<double>(lines.points.size(), 1.0) };
+  poses.status = { std::vector<TrackingStatus>(lines.points.size(), TrackingStatus::Tracked) };
+  return poses;
+}
+
+TEST(BranchPlacement, SignsOfWhatIsSeen)
+{
+  const Polylines lines = TwoLines();
+  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, {}, AtRest(lines), 0);
+  ASSERT_EQ(signs.size(), 2U);
+  for (const PlacementSigns& own : signs)
+  {
+    EXPECT_EQ(own.unclear, 0.0);
+    EXPECT_EQ(own.bridged, 0.0);
+    EXPECT_EQ(own.unseen, 0.0);
+    EXPECT_EQ(own.doubt, 0.0);
+    EXPECT_EQ(own.treeUnseen, 0.0);
+    EXPECT_EQ(own.strained, 0.0);
+  }
+  EXPECT_NEAR(signs[0].thin, 0.5, 1e-12);
+  EXPECT_NEAR(
+    signs[1].thin, 21.0 / 22.0, 1e-12); // the point where it leaves is as wide as the first
+  EXPECT_GT(PlacementConfidence(signs[0]), 0.95);
+}
+
+TEST(BranchPlacement, SignsOfWhatIsNot)
+{
+  const Polylines lines = TwoLines();
+  PoseSequence poses = AtRest(lines);
+  TreeCertainty certainty{ std::vector<double>(lines.points.size(), 1.0),
+    std::vector<double>(lines.points.size(), 1.0) };
+  // Half of the second line is filled, and its outer half is 20 % longer.
+  for (int n = 31; n <= 40; ++n)
+  {
+    poses.status[0][n] = n % 2 != 0 ? TrackingStatus::Lost : TrackingStatus::Filled;
+    poses.confidence[0][n] = 0.2;
+    poses.points[0][n][1] += 0.2 * (n - 30);
+    certainty.section[n] = 0.5;
+    certainty.bridge[n] = 0.3;
+  }
+  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, certainty, poses, 0);
+  EXPECT_NEAR(signs[1].unseen, 10.0 / 21.0, 1e-12);
+  EXPECT_NEAR(signs[1].doubt, 0.8 * 10.0 / 21.0, 1e-12);
+  EXPECT_NEAR(signs[1].unclear, 0.5 * 10.0 / 21.0, 1e-12);
+  EXPECT_NEAR(signs[1].bridged, 0.7 * 10.0 / 21.0, 1e-12);
+  EXPECT_NEAR(signs[1].treeUnseen, 10.0 / 41.0, 1e-12);
+  EXPECT_EQ(signs[0].treeUnseen, signs[1].treeUnseen);
+  EXPECT_NEAR(signs[1].strained, 0.2 * std::sqrt(0.5), 1e-12);
+  EXPECT_EQ(signs[0].unseen, 0.0);
+  EXPECT_LT(PlacementConfidence(signs[1]), PlacementConfidence(signs[0]));
+}
+
+TEST(BranchPlacement, WhatIsMostlyUnseenIsNeverConfident)
+{
+  PlacementSigns signs;
+  signs.unseen = 0.51;
+  EXPECT_LE(PlacementConfidence(signs), 0.5);
+  signs.unseen = 1.0;
+  EXPECT_LE(PlacementConfidence(signs), 0.5);
+}
+
+TEST(BranchPlacement, OneNumberForEachLine)
+{
+  const Polylines lines = TwoLines();
+  const PoseSequence poses = AtRest(lines);
+  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, {}, poses, 0);
+  const std::vector<double> result = PlacementConfidences(lines, {}, poses, 0);
+  EXPECT_EQ(result[3], PlacementConfidence(signs[0]));
+  EXPECT_EQ(result[20], PlacementConfidence(signs[0])); // where they meet: the first
+  EXPECT_EQ(result[40], PlacementConfidence(signs[1]));
+}
+
+TEST(BranchPlacement, WhatWasNotTrackedIsAsSureAsItsDeviationTells)
+{
+  const Polylines lines = TwoLines();
+  PoseSequence poses = AtRest(lines);
+  const double sure = PlacementConfidences(lines, {}, poses, 0)[40];
+  poses.status[0].assign(lines.points.size(), TrackingStatus::Filled);
+  poses.confidence[0].assign(lines.points.size(), 0.1);
+  const std::vector<double> deviations(lines.points.size(), 2.0);
+  EXPECT_NEAR(PlacementConfidences(lines, {}, poses, 0, deviations)[40],
+    sure * ConfidenceOfDeviation(2.0), 1e-12);
+}
+
+TEST(BranchPlacement, DeviationsAreMaxwells)
+{
+  EXPECT_EQ(ConfidenceOfDeviation(0.0), 1.0);
+  // Within the deviation itself: 0.608 of three normal coordinates.
+  EXPECT_NEAR(ConfidenceOfDeviation(1.0), 0.6084, 1e-4);
+  EXPECT_NEAR(ConfidenceOfDeviation(3.0), 0.0464, 1e-4);
+  EXPECT_LT(ConfidenceOfDeviation(100.0), 1e-4);
+}
+
+TEST(BranchPlacement, RefusesOtherLines)
+{
+  const Polylines lines = TwoLines();
+  PoseSequence poses = AtRest(lines);
+  poses.status.clear();
+  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0), std::invalid_argument);
+  poses = AtRest(lines);
+  poses.confidence[0].pop_back();
+  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0), std::invalid_argument);
+  EXPECT_THROW(SignsOfPlacement(lines, { { 1.0 }, {} }, AtRest(lines), 0), std::invalid_argument);
+}
+}

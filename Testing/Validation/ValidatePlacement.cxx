@@ -1,0 +1,224 @@
+// How likely each branch of a run's moving tree was said to be where it is, and whether it is: rows for scripts/fit-odds.py and
+// scripts/reliability.py, one a branch and tracked phase.
+#include "BranchPlacement.h"
+#include "CyclicTime.h"
+#include "FileSeries.h"
+#include "Geometry.h"
+#include "vtkCoronaryArrayNames.h"
+#include "vtkCoronaryFilterParts.h"
+#include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
+#include "vtkVesselTree.h"
+
+#include "vtkDataArray.h"
+#include "vtkPointData.h"
+#include "vtkPolyData.h"
+#include "vtkSmartPointer.h"
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace
+{
+using namespace coronary;
+namespace names = vtkCoronaryArrayNames;
+
+constexpr double SameMoment = 1e-4;   // of R-R
+constexpr double MinimumLength = 5.0; // mm, of branches that are judged
+
+class Series
+{
+public:
+  explicit Series(const std::string& list)
+    : Files(ReadFileSeries(list))
+    , List(list)
+  {
+  }
+
+  vtkSmartPointer<vtkPolyData> At(double time)
+  {
+    for (const TimedFile& file : this->Files)
+    {
+      if (CyclicDistance(file.time, time) < SameMoment)
+      {
+        return ReadPolyData(file.path, this->Messages);
+      }
+    }
+    throw std::runtime_error("'" + this->List + "' has nothing at " + std::to_string(time));
+  }
+
+private:
+  std::vector<TimedFile> Files;
+  std::string List;
+  vtkMessageTrap Messages;
+};
+
+Polylines LinesOf(vtkPolyData* data)
+{
+  return vtkCoronary::LinesOf(data, vtkCoronary::FindRadius(data));
+}
+
+std::vector<double> Values(vtkPolyData* data, const char* name)
+{
+  vtkDataArray* array = data->GetPointData()->GetArray(name);
+  if (array == nullptr)
+  {
+    throw std::runtime_error(std::string("the moving tree has no point array ") + name);
+  }
+  std::vector<double> values;
+  for (vtkIdType n = 0; n < array->GetNumberOfTuples(); ++n)
+  {
+    values.push_back(array->GetComponent(n, 0));
+  }
+  return values;
+}
+
+/// The tree at one moment, as what was tracked.
+PoseSequence PosesOf(vtkPolyData* data, double time)
+{
+  PoseSequence poses;
+  poses.times = { time };
+  poses.points = { LinesOf(data).points };
+  poses.confidence = { Values(data, names::TrackingConfidence) };
+  poses.status.emplace_back();
+  for (const double value : Values(data, names::TrackingStatus))
+  {
+    poses.status.back().push_back(static_cast<TrackingStatus>(static_cast<int>(value)));
+  }
+  return poses;
+}
+
+/// Mean distance of a line's points from the nearest true axis, mm.
+double MeanDistance(
+  const std::vector<std::int64_t>& line, const std::vector<Vector3>& points, const Polylines& truth)
+{
+  double sum = 0.0;
+  for (const std::int64_t p : line)
+  {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const std::vector<std::int64_t>& other : truth.lines)
+    {
+      for (std::size_t i = 1; i < other.size(); ++i)
+      {
+        nearest = std::min(nearest,
+          NearestOnSegment(points[p], truth.points[other[i - 1]], truth.points[other[i]])
+            .squaredDistance);
+      }
+    }
+    sum += std::sqrt(nearest);
+  }
+  return sum / static_cast<double>(line.size());
+}
+
+double Length(const std::vector<std::int64_t>& line, const std::vector<Vector3>& points)
+{
+  double length = 0.0;
+  for (std::size_t i = 1; i < line.size(); ++i)
+  {
+    length += (points[line[i]] - points[line[i - 1]]).norm();
+  }
+  return length;
+}
+
+void PrintHead()
+{
+  std::printf("condition,seed,placed,used,probability,x,y,z");
+  for (const std::string& name : PlacementSigns::Names())
+  {
+    std::printf(",%s", name.c_str());
+  }
+  std::printf("\n");
+}
+
+void Judge(const std::string& run, const std::string& truth, const std::string& condition,
+  const std::string& seed, double shift)
+{
+  std::ifstream file(run + "/report.json");
+  if (!file)
+  {
+    throw std::runtime_error("'" + run + "' has no report.json: it is no folder of `run`");
+  }
+  const auto motion = nlohmann::json::parse(file).at("motion");
+  const double limit = PlacedWithin + shift;
+  Series found(run + "/motion/centerline.vtp.series");
+  Series real(truth + "/centerline.pvd");
+  const auto times = motion.at("tracked_times").get<std::vector<double>>();
+  const vtkSmartPointer<vtkPolyData> first = found.At(times.front());
+  vtkDataArray* reference = first->GetFieldData()->GetArray(names::ReferenceTime);
+  if (reference == nullptr)
+  {
+    throw std::runtime_error("the moving tree has no field array ReferenceTime");
+  }
+  const Polylines rest = LinesOf(found.At(reference->GetComponent(0, 0)));
+  VesselTree tree;
+  vtkCoronary::AddPointValues(first, tree);
+  for (const double time : times)
+  {
+    const PoseSequence poses = PosesOf(found.At(time), time);
+    const Polylines truly = LinesOf(real.At(time));
+    const std::vector<PlacementSigns> signs =
+      SignsOfPlacement(rest, { tree.confidence, tree.bridgeConfidence }, poses, 0);
+    for (std::size_t l = 0; l < rest.lines.size(); ++l)
+    {
+      const std::vector<std::int64_t>& line = rest.lines[l];
+      if (Length(line, rest.points) < MinimumLength)
+      {
+        continue;
+      }
+      const bool placed = MeanDistance(line, poses.points[0], truly) <= limit;
+      const Vector3& middle = rest.points[line[line.size() / 2]];
+      std::printf("%s,%s,%d,1,%.4f,%.1f,%.1f,%.1f", condition.c_str(), seed.c_str(), placed ? 1 : 0,
+        PlacementConfidence(signs[l]), middle[0], middle[1], middle[2]);
+      for (const double value : signs[l].Values())
+      {
+        std::printf(",%.4f", value);
+      }
+      std::printf("\n");
+    }
+  }
+}
+}
+
+int main(int argc, char** argv)
+{
+  try
+  {
+    CLI::App program("Whether the branches of a run are where they are said to be, and how "
+                     "likely that was said to be; rows on stdout");
+    std::string run;
+    std::string truth;
+    std::string condition = "case";
+    std::string seed = "0";
+    double shift = 0.0;
+    bool head = false;
+    program.add_option("--run", run, "folder of `coronary-pipeline run`")->required();
+    program.add_option("--truth", truth, "folder with centerline.pvd")->required();
+    program.add_option("--condition", condition, "for the rows")->capture_default_str();
+    program.add_option("--seed", seed, "of the heart, for the rows")->capture_default_str();
+    program.add_option("--shift", shift, "mm that the scan has the heart beside its truth at most")
+      ->capture_default_str();
+    program.add_flag("--head", head, "names of the columns first");
+    CLI11_PARSE(program, argc, argv);
+    if (head)
+    {
+      PrintHead();
+    }
+    Judge(run, truth, condition, seed, shift);
+    return 0;
+  }
+  catch (const std::exception& error)
+  {
+    std::fprintf(stderr, "validate-placement: %s\n", error.what());
+    return 2;
+  }
+}
