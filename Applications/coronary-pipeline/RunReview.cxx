@@ -94,6 +94,8 @@ Json Describe(const ReviewedRun& look, int reference)
   {
     run[kind] = look.result.Findings(kind);
   }
+  // Of a population's motion: whose it is not.
+  run["statement"] = look.result.MotionFindings("statement");
   for (const char* kind : { "placement", "filled", "limits" })
   {
     run[kind] = look.result.MotionFindings(kind);

@@ -15,30 +15,38 @@ import coronary_views as views
 
 # What is wider than so many times the largest radius of a vessel is none, as in `coronary-pipeline run`.
 WIDEST_VESSEL = 2.0
+MOTIONS = ("automatic", "tracked", "population", "none")
 MODES = {"linear": "Linear", "cubic": "Periodic Cubic", "low-noise": "Low Noise"}
 # Quick to compute, all stages together.
 EXAMPLE = {"Seed": 1, "Spacing": [0.8, 0.8, 0.8], "Phases": [0.0, 0.15, 0.35, 0.5, 0.75]}
 HOUNSFIELD = (-150.0, 650.0)
+# Fewer do not show how a heart moves between them; phases nearer than that are one (fraction of R-R). As in `coronary-pipeline run`.
+LEAST_PHASES, SAME_PHASE = 4, 0.02
+USUAL_PHASE = 0.75
 
 
 def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_radius=4.5, window=(),
           beyond_mask=False, least_branch=0.0, centerline_steps=5000000, labels=True,
           edges=(0.15, 0.7), open_ends=False, leave_bones_outside=False, temporal_window_ms=66.0,
-          tracked="all", interpolation="cubic", limits=True, show=True, size=None):
+          tracked="all", interpolation="cubic", limits=True, motion="automatic", heart_rate=0.0, motion_amplitude=1.0,
+          show=True, size=None):
     """Assembles the pipeline and computes it.
 
-    source        image series, or the output port of one; one phase only: a model at rest
+    source        image series, or the output port of one; of fewer than four phases the motion of a population, bent to them
     time          reference phase as a fraction of the R-R interval; None: the quietest one
     scales, c     vesselness: least and greatest scale in mm, and Frangi's c; c 0: from the image
     seed          x, y, z of each seed one after the other, mm, LPS; none: the ostia are looked for
     window        HU of tissue and of blood; none: from the image
     show, size    makes a layout of three views, of so many pixels together
+    heart_rate    of a population's motion, beats a minute; 0: that of the data
     The others are the settings of `coronary-pipeline run` of the same names (docs/programs.md).
 
     Returns the stages by short names ("reference" ... "wall"), with "layout" and "views" when shown. Raises
     RuntimeError with one sentence when a stage finds nothing; the stages before it stay.
     """
     views.require_plugin()
+    if motion not in MOTIONS:
+        raise RuntimeError("motion is %r; it has to be one of %s." % (motion, ", ".join(MOTIONS)))
     times = views.times_of(source)
     made = {"source": source}
 
@@ -83,32 +91,37 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
     weights = add("weights", simple.BiharmonicSkinWeights(
         mesh, registrationName="9 Skin weights", Skeleton=skeleton,
         LeaveBonesOutside=int(leave_bones_outside)))
-    if len(times) < (3 if tracked == "even" else 2):
-        print("Dynamic Coronary: too few phases to track, so this is a model at rest.")
+    kind = kind_of_motion(times, motion, tracked, labels)
+    if kind == "none":
         made["lines"] = made["tree"]
         wall = weights
     else:
-        tracker = simple.CenterlineTracker(
-            source, registrationName="10 Tracker", Centerlines=tree, Skeleton=skeleton,
-            TrackedPhases=tracked.capitalize())
-        # The unit in its label is a part of its name in Python.
-        tracker.SetPropertyWithName("TemporalWindow", temporal_window_ms / 1000.0)
-        tracker = add("tracker", tracker)
-        poses = simple.OutputPort(made["tracker"], 1)
-        if limits:
-            # Acceleration counts as with 20 phases.
-            weight = 0.005 * min(1.0, len(made["tracker"].TimestepValues) / 20.0) ** 4
-            tracker = add("limits", simple.MotionRegularizer(
-                Motion=tracker, Rest=tree, TemporalWeight=weight,
-                registrationName="10 Motion of the lines within limits"))
-            poses = add("pose_limits", simple.MotionRegularizer(
-                Motion=poses, Rest=skeleton, TemporalWeight=weight,
-                registrationName="10 Motion of the skeleton within limits"))
+        if kind == "tracked" or len(times) > 1:
+            tracker = simple.CenterlineTracker(
+                source, registrationName="10 Tracker", Centerlines=tree, Skeleton=skeleton,
+                TrackedPhases=tracked.capitalize())
+            # The unit in its label is a part of its name in Python.
+            tracker.SetPropertyWithName("TemporalWindow", temporal_window_ms / 1000.0)
+            add("tracker", tracker)
+        if kind == "tracked":
+            movers = limited(add, made["tracker"], tree, skeleton) if limits else (
+                simple.OutputPort(made["tracker"], 0), simple.OutputPort(made["tracker"], 1))
+        else:
+            population = simple.PopulationMotion(
+                Centerlines=tree, Skeleton=skeleton, HeartRate=heart_rate, Amplitude=motion_amplitude,
+                registrationName="10 Motion of a population")
+            if len(times) < 2 and not any(times):
+                # What does not tell its phase is taken for mid-diastole, as most scans are.
+                population.AutomaticReference, population.ReferenceTime = 0, time or USUAL_PHASE
+            if "tracker" in made:
+                population.Tracked = simple.OutputPort(made["tracker"], 0)
+            movers = add("population", population), simple.OutputPort(population, 1)
+            times = views.times_of(population)
         moments = {"Mode": MODES[interpolation], "TimeSteps": "List", "ListedSteps": times}
         add("lines", simple.CardiacPhaseInterpolator(
-            tracker, registrationName="11 Centerlines in time", **moments))
+            movers[0], registrationName="11 Centerlines in time", **moments))
         poses = add("poses", simple.CardiacPhaseInterpolator(
-            poses, registrationName="11 Skeleton in time", **moments))
+            movers[1], registrationName="11 Skeleton in time", **moments))
         moved = add("moved", simple.SkinDeformation(
             weights, registrationName="12 Deformation", SkeletonAtRest=skeleton,
             PosedSkeleton=poses, DoublePrecision=1))
@@ -118,6 +131,35 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
     if show:
         made["layout"], made["views"] = show_model(made, times, size)
     return made
+
+
+def kind_of_motion(times, wanted, tracked, labels):
+    """"tracked", "population" or "none", by the phases that there are and what was asked for; says why, when it is none."""
+    phases = []
+    for time in times:
+        if all(min(abs(time - one) % 1.0, -abs(time - one) % 1.0) >= SAME_PHASE for one in phases):
+            phases.append(time)
+    enough = len(times) >= (3 if tracked == "even" else 2)
+    if wanted == "tracked" or (wanted == "automatic" and enough and len(phases) >= LEAST_PHASES):
+        if not enough:
+            print("Dynamic Coronary: too few phases to track, so this is a model at rest.")
+        return "tracked" if enough else "none"
+    if wanted != "none" and not labels:
+        print("Dynamic Coronary: the motion of a population needs a tree with names, so this is a model at rest.")
+        return "none"
+    return "none" if wanted == "none" else "population"
+
+
+def limited(add, tracker, tree, skeleton):
+    """The tracked lines and skeleton within the limits of motion."""
+    # Acceleration counts as with 20 phases.
+    weight = 0.005 * min(1.0, len(tracker.TimestepValues) / 20.0) ** 4
+    return (add("limits", simple.MotionRegularizer(
+        Motion=simple.OutputPort(tracker, 0), Rest=tree, TemporalWeight=weight,
+        registrationName="10 Motion of the lines within limits")),
+            add("pose_limits", simple.MotionRegularizer(
+                Motion=simple.OutputPort(tracker, 1), Rest=skeleton, TemporalWeight=weight,
+                registrationName="10 Motion of the skeleton within limits")))
 
 
 def require_vessels(tree, largest_radius):
@@ -181,7 +223,12 @@ def show_model(made, times, size=None):
     views.look_from_the_front(named, box)
 
     if times:
-        views.note_phase((front, axial, named), made["source"])
+        views.note_phase((front, axial, named), made["lines"])
+    if "population" in made:
+        said = views.fetched(made["population"]).GetFieldData().GetAbstractArray("MotionSource").GetValue(0)
+        for view in (front, axial, named):
+            views.note(view, said.split(":")[0], "Motion", "Lower Left Corner")
+        print("Dynamic Coronary: %s." % said)
     simple.SetActiveView(front)
     simple.SetActiveSource(made["wall"])
     for view in (front, axial, named):

@@ -101,6 +101,9 @@ class RunPanel {
   /** @param run  null: the case is not of a run */
   fill(run) {
     this.run = run;
+    const statement = run && typeof run.statement === 'string' ? run.statement : '';
+    byId('motion-statement').textContent = statement && `${statement[0].toUpperCase()}${statement.slice(1)}.`;
+    byId('motion-statement').hidden = !statement;
     this.observer.disconnect();
     this.figures = [];
     this.sheets = [];
