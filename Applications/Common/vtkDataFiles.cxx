@@ -135,6 +135,7 @@ void WriteXml(const std::string& path, vtkXMLUnstructuredDataWriter* writer, vtk
   // Not appended: with expat's reparse deferral (in Debian 12's since a security update) neither
   // VTK 9.1 nor ParaView 5.11 can read the appended data of any VTK XML file.
   writer->SetDataModeToBinary();
+  writer->SetCompressionLevel(1); // 1.4 % larger than by VTK's own 5, in two thirds of the time
   const int good = writer->Write();
   messages.ThrowIfError();
   if (!good)
