@@ -64,18 +64,18 @@ def rows_of(options, build, kind):
                                       "--temporal-window-ms", str(window), *RUN], os.path.join(folder, "run.log"))
                 except Failed as failure:
                     shutil.rmtree(series)
-                    return str(failure)
+                    return {"failure": str(failure)}
                 for name in os.listdir(series):
                     if name != "truth":
                         path = os.path.join(series, name)
                         (shutil.rmtree if os.path.isdir(path) else os.remove)(path)
                 kept_results.keep_only(run, ["report.json", "motion/centerline*"])
-                return None
+                return {}
 
             folder = os.path.join(options.output, "placement", kind, seed)
-            failure = kept(folder, digest(version, image, window, PHANTOM, RUN), make)
-            if failure:
-                print("No model of %s, %s: %s" % (condition, seed, failure))
+            result = kept(folder, digest(version, image, window, PHANTOM, RUN), make)
+            if "failure" in result:
+                print("No model of %s, %s: %s" % (condition, seed, result["failure"]))
                 continue
             sys.stderr.write("%s: %s, heart %s\n" % (kind, condition, seed))
             # The weights may be other ones by now: judged anew.

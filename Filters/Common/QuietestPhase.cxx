@@ -1,5 +1,7 @@
 #include "QuietestPhase.h"
 
+#include "CyclicTime.h"
+
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -8,6 +10,8 @@ namespace coronary
 {
 namespace
 {
+constexpr double MidDiastole = 0.75;
+
 double MeanDifference(const std::vector<float>& a, const std::vector<float>& b)
 {
   double sum = 0.0;
@@ -49,7 +53,9 @@ std::size_t QuietestPhase(
     const double after = n < last ? MeanDifference(samples[n], samples[n + 1]) : 0.0;
     const double span = times[n < last ? n + 1 : n] - times[n > 0 ? n - 1 : n];
     const double motion = span > 0.0 ? (before + after) / span : 0.0;
-    if (motion < minimum)
+    const double toRest = CyclicDistance(times[n], MidDiastole);
+    if (motion < minimum ||
+      (motion == minimum && toRest < CyclicDistance(times[quietest], MidDiastole)))
     {
       minimum = motion;
       quietest = n;

@@ -12,7 +12,8 @@ namespace coronary
 {
 /**
  * The phase around which the samples change least per unit of time: mean absolute difference to
- * the neighbouring phases, divided by their distance in time. The first of equals.
+ * the neighbouring phases, divided by their distance in time. Of equals, as two phases always are, the one
+ * nearest to mid-diastole (75 % of R-R): most hearts rest there longer than in end systole.
  *
  * Noise adds the same to every phase unless it differs from phase to phase: average the samples
  * over some voxels first.

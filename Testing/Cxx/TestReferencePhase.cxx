@@ -364,6 +364,9 @@ TEST(QuietestPhase, IsWhereTheSamplesChangeLeast)
     coronary::QuietestPhase({ 0.0, 0.1, 0.2, 1.2 }, Samples{ { 0 }, { 1 }, { 2 }, { 4 } }), 3u);
   EXPECT_EQ(
     coronary::QuietestPhase({ 0.0, 0.1, 0.2 }, Samples{ { 0, nan }, { 1, 900 }, { 1, nan } }), 2u);
+  // Two phases say nothing: mid-diastole, also a beat later.
+  EXPECT_EQ(coronary::QuietestPhase({ 0.35, 0.75 }, Samples{ { 0 }, { 1 } }), 1u);
+  EXPECT_EQ(coronary::QuietestPhase({ -0.3, 0.35 }, Samples{ { 0 }, { 1 } }), 0u);
   EXPECT_THROW(coronary::QuietestPhase({}, {}), std::invalid_argument);
   EXPECT_THROW(
     coronary::QuietestPhase({ 0.0, 0.0 }, Samples{ { 0 }, { 0 } }), std::invalid_argument);
