@@ -150,7 +150,7 @@ def main():
     options = parser.parse_args()
     if options.fit:
         tables = rows_of(options, options.build, "fit")
-        subprocess.run([os.path.join(ROOT, "scripts", "fit-odds.py"), "placements", *tables], check=True)
+        subprocess.run(["python3", os.path.join(ROOT, "scripts", "fit-odds.py"), "placements", *tables], check=True)
         return
     rows = read(options.tables or rows_of(options, options.build, "judge"))
     if not rows:

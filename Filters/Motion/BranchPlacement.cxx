@@ -11,10 +11,9 @@ namespace
 {
 constexpr double Stretch = 5.0; ///< mm: shorter ones change their length by noise alone
 
-// scripts/fit-odds.sh, placements.
-constexpr double Intercept = 6.0;
-constexpr std::array<double, PlacementSigns::Count> Weights = { -4.0, -2.0, -1.0, -2.0, -4.0, -1.0,
-  -4.0 };
+// scripts/validate-placement.py --fit, with the scans of scripts/validate-scanned.py.
+constexpr double Intercept = 4.77;
+constexpr std::array<double, PlacementSigns::Count> Weights = { -3.48, -1.96, -0.36, -2.82, -1.60 };
 
 /// More is less likely than a coin's throw, whatever else speaks for it.
 constexpr double LargestUnseen = 0.5;
@@ -64,34 +63,28 @@ double LengthChange(const std::vector<std::int64_t>& line, const std::vector<Vec
 const std::array<std::string, PlacementSigns::Count>& PlacementSigns::Names()
 {
   static const std::array<std::string, Count> names{ "unclear", "bridged", "thin", "unseen",
-    "doubt", "tree_unseen", "strained" };
+    "strained" };
   return names;
 }
 
 std::array<double, PlacementSigns::Count> PlacementSigns::Values() const
 {
-  return { this->unclear, this->bridged, this->thin, this->unseen, this->doubt, this->treeUnseen,
-    this->strained };
+  return { this->unclear, this->bridged, this->thin, this->unseen, this->strained };
 }
 
 std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest, const TreeCertainty& certainty,
   const PoseSequence& poses, std::size_t phase)
 {
   constexpr RequireOf require{ "Placement" };
-  require(phase < poses.confidence.size() && phase < poses.status.size(),
-    "the poses have no confidence or no status");
-  const std::vector<double>& confidence = poses.confidence[phase];
+  require(phase < poses.status.size(), "the poses have no status");
   const std::vector<TrackingStatus>& status = poses.status[phase];
   const std::vector<Vector3>& moved = poses.points[phase];
   const std::size_t count = rest.points.size();
   const auto fits = [count](const std::vector<double>& values)
   { return values.empty() || values.size() == count; };
-  require(moved.size() == count && confidence.size() == count && status.size() == count &&
-      fits(certainty.section) && fits(certainty.bridge),
+  require(moved.size() == count && status.size() == count && fits(certainty.section) &&
+      fits(certainty.bridge),
     "the lines have other points");
-  const double unseenOfTree =
-    static_cast<double>(std::count_if(status.begin(), status.end(), IsUnseen)) /
-    static_cast<double>(std::max<std::size_t>(count, 1));
   std::vector<PlacementSigns> result;
   for (const std::vector<std::int64_t>& line : rest.lines)
   {
@@ -105,8 +98,6 @@ std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest, const TreeCe
     signs.unseen = static_cast<double>(std::count_if(line.begin(), line.end(),
                      [&](std::int64_t p) { return IsUnseen(status[p]); })) /
       static_cast<double>(line.size());
-    signs.doubt = 1.0 - MeanOf(confidence, line);
-    signs.treeUnseen = unseenOfTree;
     signs.strained = LengthChange(line, rest.points, moved);
     result.push_back(signs);
   }
@@ -153,7 +144,7 @@ std::vector<double> PlacementConfidences(const Polylines& rest, const TreeCertai
     if (!within.empty())
     {
       // The tree's own: nothing was tracked.
-      own.unseen = own.doubt = own.treeUnseen = own.strained = 0.0;
+      own.unseen = own.strained = 0.0;
     }
     const double chance = PlacementConfidence(own) * MeanOf(within, rest.lines[l]);
     for (const std::int64_t p : rest.lines[l])

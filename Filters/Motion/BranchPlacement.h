@@ -31,16 +31,13 @@ struct TreeCertainty
 /// What tells whether one branch is where it is said to be at one phase.
 struct PlacementSigns
 {
-  static constexpr std::size_t Count = 7;
+  static constexpr std::size_t Count = 5;
   static const std::array<std::string, Count>& Names();
 
-  double unclear = 0.0; ///< 1 less the mean certainty of its sections
-  double bridged = 0.0; ///< 1 less the mean certainty of the bridges that lead to it
-  double thin = 0.5;    ///< 1/mm, of its mean diameter, 2 at most; without radii 0.5
-  double unseen = 0.0;  ///< share of its points that were filled or lost
-  double doubt = 0.0;   ///< 1 less the mean tracking confidence of its points
-  double treeUnseen =
-    0.0;                 ///< share of all points of the tree that were filled or lost at this phase
+  double unclear = 0.0;  ///< 1 less the mean certainty of its sections
+  double bridged = 0.0;  ///< 1 less the mean certainty of the bridges that lead to it
+  double thin = 0.5;     ///< 1/mm, of its mean diameter, 2 at most; without radii 0.5
+  double unseen = 0.0;   ///< share of its points that were filled or lost
   double strained = 0.0; ///< root mean square change of length, of stretches of 5 mm; 1 at most
 
   std::array<double, Count> Values() const;
@@ -49,9 +46,9 @@ struct PlacementSigns
 /**
  * Of every line at one phase.
  * @param rest   the lines at rest
- * @param poses  the same points at its phases, with confidence and status
+ * @param poses  the same points at its phases, with status
  * @param phase  number of a phase
- * @throws std::invalid_argument when the poses lack confidence or status, or anything is of other points
+ * @throws std::invalid_argument when the poses lack a status, or anything is of other points
  */
 std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest, const TreeCertainty& certainty,
   const PoseSequence& poses, std::size_t phase);

@@ -36,7 +36,6 @@ PoseSequence AtRest(const Polylines& lines)
   PoseSequence poses;
   poses.times = { 0.5 };
   poses.points = { lines.points };
-  poses.confidence = { std::vector<double>(lines.points.size(), 1.0) };
   poses.status = { std::vector<TrackingStatus>(lines.points.size(), TrackingStatus::Tracked) };
   return poses;
 }
@@ -51,8 +50,6 @@ TEST(BranchPlacement, SignsOfWhatIsSeen)
     EXPECT_EQ(own.unclear, 0.0);
     EXPECT_EQ(own.bridged, 0.0);
     EXPECT_EQ(own.unseen, 0.0);
-    EXPECT_EQ(own.doubt, 0.0);
-    EXPECT_EQ(own.treeUnseen, 0.0);
     EXPECT_EQ(own.strained, 0.0);
   }
   EXPECT_NEAR(signs[0].thin, 0.5, 1e-12);
@@ -71,18 +68,14 @@ TEST(BranchPlacement, SignsOfWhatIsNot)
   for (int n = 31; n <= 40; ++n)
   {
     poses.status[0][n] = n % 2 != 0 ? TrackingStatus::Lost : TrackingStatus::Filled;
-    poses.confidence[0][n] = 0.2;
     poses.points[0][n][1] += 0.2 * (n - 30);
     certainty.section[n] = 0.5;
     certainty.bridge[n] = 0.3;
   }
   const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, certainty, poses, 0);
   EXPECT_NEAR(signs[1].unseen, 10.0 / 21.0, 1e-12);
-  EXPECT_NEAR(signs[1].doubt, 0.8 * 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].unclear, 0.5 * 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].bridged, 0.7 * 10.0 / 21.0, 1e-12);
-  EXPECT_NEAR(signs[1].treeUnseen, 10.0 / 41.0, 1e-12);
-  EXPECT_EQ(signs[0].treeUnseen, signs[1].treeUnseen);
   EXPECT_NEAR(signs[1].strained, 0.2 * std::sqrt(0.5), 1e-12);
   EXPECT_EQ(signs[0].unseen, 0.0);
   EXPECT_LT(PlacementConfidence(signs[1]), PlacementConfidence(signs[0]));
@@ -114,7 +107,6 @@ TEST(BranchPlacement, WhatWasNotTrackedIsAsSureAsItsDeviationTells)
   PoseSequence poses = AtRest(lines);
   const double sure = PlacementConfidences(lines, {}, poses, 0)[40];
   poses.status[0].assign(lines.points.size(), TrackingStatus::Filled);
-  poses.confidence[0].assign(lines.points.size(), 0.1);
   const std::vector<double> deviations(lines.points.size(), 2.0);
   EXPECT_NEAR(PlacementConfidences(lines, {}, poses, 0, deviations)[40],
     sure * ConfidenceOfDeviation(2.0), 1e-12);
@@ -136,7 +128,7 @@ TEST(BranchPlacement, RefusesOtherLines)
   poses.status.clear();
   EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0), std::invalid_argument);
   poses = AtRest(lines);
-  poses.confidence[0].pop_back();
+  poses.status[0].pop_back();
   EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0), std::invalid_argument);
   EXPECT_THROW(SignsOfPlacement(lines, { { 1.0 }, {} }, AtRest(lines), 0), std::invalid_argument);
 }

@@ -89,7 +89,6 @@ PoseSequence PosesOf(vtkPolyData* data, double time)
   PoseSequence poses;
   poses.times = { time };
   poses.points = { LinesOf(data).points };
-  poses.confidence = { Values(data, names::TrackingConfidence) };
   poses.status.emplace_back();
   for (const double value : Values(data, names::TrackingStatus))
   {
