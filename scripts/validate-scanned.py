@@ -44,7 +44,7 @@ FOUND_WITHIN = 1.5  # mm from an axis, beside how far the scan shifts the heart
 CONFIDENT = 0.5     # from this confidence on a false branch counts
 AXES = ["anatomy", "scan", "phase", "kernel", "noise"]
 MEASURES = [("found_0.5", "found", "%.3f"), ("centerline_mean", "centerline, mm", "%.2f"), ("ASSD", "ASSD, mm", "%.2f"),
-            ("HD95", "HD95, mm", "%.2f"), ("HD", "HD, mm", "%.1f"), ("MSD", "MSD, mm", "%.2f"), ("lost", "lost branches", "%.0f"),
+            ("HD95", "HD95, mm", "%.2f"), ("HD", "HD, mm", "%.1f"), ("MSD", "MSD, mm", "%.2f"), ("lost_branches", "lost branches", "%.0f"),
             ("false_length", "false, mm", "%.0f"), ("wrong", "false, confident", "%.0f"), ("warnings", "warnings", "%.0f")]
 
 
@@ -142,7 +142,7 @@ class Matrix:
             measures = case["phases"][number]
             lost = [branch for branch in branches if int(branch["phase"]) == number and branch["covered"]
                     and float(branch["covered"]) < LOST_BELOW]
-            rows.append({"phase": name, "reference": report["phase"] == number, "lost": len(lost),
+            rows.append({"phase": name, "reference": report["phase"] == number,
                          "lost_branches": [[branch["label"], float(branch["length_mm"])] for branch in lost],
                          "wrong": sum((branch["confidence"] or 0.0) >= CONFIDENT for branch in measures["false_branches"]),
                          "false_branches": measures["false_branches"], "warnings": len(warnings),
@@ -185,6 +185,11 @@ def line(cells):
     print("| %s |" % " | ".join(cells))
 
 
+def number(row, key):
+    """Of a list how many."""
+    return len(row[key]) if isinstance(row[key], list) else row[key]
+
+
 def texts(values):
     return [form % values[key] if values[key] is not None else "" for key, _, form in MEASURES]
 
@@ -206,7 +211,8 @@ def print_tables(chosen, results):
             for row in result["rows"]:
                 place = dict(zip(AXES, names), phase=row["phase"])
                 rows.append((place, row))
-                line([place[axis] + ("*" if axis == "phase" and row["reference"] else "") for axis in AXES] + texts(row))
+                line([place[axis] + ("*" if axis == "phase" and row["reference"] else "") for axis in AXES] +
+                     texts({key: number(row, key) for key, _, _ in MEASURES}))
     print("\n\\*: the phase that the tree was found in. Found: share of the true length (radius 0.5 mm or more) within %g mm, and "
           "what the scan shifts the heart by, of an axis, or the radius. Lost: branches of which less than half is found. False: "
           "length that is no artery, and branches that are none for more than half of their length, of a mean confidence of %g or "
@@ -216,12 +222,14 @@ def print_tables(chosen, results):
     if not rows:
         return
     print("\nMedians:\n")
-    line(["axis", "value", "images"] + [title for _, title, _ in MEASURES])
-    line(["---"] * (3 + len(MEASURES)))
-    for axis in AXES:
-        for value in dict.fromkeys(place[axis] for place, _ in rows):
-            among = [row for place, row in rows if place[axis] == value]
-            line([axis, value, str(len(among))] + texts({key: median([row[key] for row in among]) for key, _, _ in MEASURES}))
+    line(["of", "images"] + [title for _, title, _ in MEASURES])
+    line(["---"] * (2 + len(MEASURES)))
+    for axes in [[axis] for axis in AXES] + [["anatomy", "scan", "kernel"]]:
+        groups = {}
+        for place, row in rows:
+            groups.setdefault(", ".join(place[axis] + (" HU" if axis == "noise" else "") for axis in axes), []).append(row)
+        for name, among in groups.items():
+            line([name, str(len(among))] + texts({key: median([number(row, key) for row in among]) for key, _, _ in MEASURES}))
 
 
 def median(values):
