@@ -56,6 +56,12 @@ struct LooseVesselInput
  */
 std::vector<LooseVessel> FindLooseVessels(const LooseVesselInput& input);
 
+/**
+ * Takes confidences for what they can be together: a tree lacks a few arteries, not dozens. Where they sum up to more than ten,
+ * the odds of all are divided by the factor with which they sum up to ten: most of them are of noise.
+ */
+void ExpectFewMissing(std::vector<LooseVessel>& vessels);
+
 /// A warning for each one that is rather an artery than not (a confidence of a half or more).
 std::vector<TreeWarning> LooseVesselWarnings(const std::vector<LooseVessel>& vessels);
 }

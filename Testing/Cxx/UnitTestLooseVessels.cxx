@@ -221,6 +221,32 @@ TEST_F(LooseVessels, AShortRestBehindALesionIsTold)
   EXPECT_LT(warnings[0].confidence, 0.85); // it is short
 }
 
+TEST_F(LooseVessels, ATreeLacksAFewNotDozens)
+{
+  std::vector<LooseVessel> vessels(100);
+  for (LooseVessel& vessel : vessels)
+  {
+    vessel.confidence = 0.6;
+    vessel.points = { Vector3::Zero(), Vector3::UnitX() };
+  }
+  vessels[7].confidence = 0.999;
+  std::vector<LooseVessel> few(vessels.begin(), vessels.begin() + 9);
+  ExpectFewMissing(vessels);
+  double sum = 0.0;
+  for (const LooseVessel& vessel : vessels)
+  {
+    sum += vessel.confidence;
+  }
+  EXPECT_NEAR(sum, 10.0, 1e-6);
+  // What is sure stays, and all else is divided alike.
+  EXPECT_GT(vessels[7].confidence, 0.98);
+  EXPECT_EQ(vessels[0].confidence, vessels[99].confidence);
+  ASSERT_EQ(LooseVesselWarnings(few).size(), 9U);
+  ExpectFewMissing(few);
+  EXPECT_EQ(few[0].confidence, 0.6);
+  EXPECT_EQ(few[7].confidence, 0.999);
+}
+
 TEST_F(LooseVessels, WithoutContrastOrTreeThereIsNoMeasure)
 {
   ScalarImage image;
