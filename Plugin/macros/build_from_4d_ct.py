@@ -224,11 +224,11 @@ def show_model(made, times, size=None):
 
     if times:
         views.note_phase((front, axial, named), made["lines"])
-    if "population" in made:
-        said = views.fetched(made["population"]).GetFieldData().GetAbstractArray("MotionSource").GetValue(0)
+    source = views.fetched(made["lines"]).GetFieldData().GetAbstractArray("MotionSource")
+    if source:
         for view in (front, axial, named):
-            views.note(view, said.split(":")[0], "Motion", "Lower Left Corner")
-        print("Dynamic Coronary: %s." % said)
+            views.note(view, source.GetValue(0).split(":")[0], "Motion", "Lower Left Corner")
+        print("Dynamic Coronary: %s." % source.GetValue(0))
     simple.SetActiveView(front)
     simple.SetActiveSource(made["wall"])
     for view in (front, axial, named):
