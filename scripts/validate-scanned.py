@@ -32,8 +32,8 @@ KERNELS = ["soft", "sharp"]
 NOISES = [20, 40, 60]  # HU
 GRID = ["--spacing", "0.5"]
 RUN = ["--partial", "--motion", "tracked"]  # a lost tree is a row, not an end
-# Of a run and its evaluation what its confidences are judged by.
-KEPT = ["report.json", "status.csv", "motion/centerline*", "branches.csv"]
+# Of a run what its confidences are judged by.
+KEPT = ["report.json", "motion/centerline*"]
 # Wide vessels, since the quick scanner is coarse.
 QUICK = {"HEART": HEART + ["--calibre", "1.4"], "ANATOMIES": {"healthy": []}, "SCANS": {"quick": 66}, "KERNELS": ["sharp"],
          "NOISES": [30], "GRID": ["--spacing", "0.8", "--surface-spacing", "0.8"],
@@ -147,8 +147,13 @@ class Matrix:
                          "wrong": sum((branch["confidence"] or 0.0) >= CONFIDENT for branch in measures["false_branches"]),
                          "false_branches": measures["false_branches"], "warnings": len(warnings),
                          **{key: measures[key] for key, _, _ in MEASURES if key in measures}})
-        for bulk in (run, evaluation):
-            kept_results.keep_only(bulk, KEPT)
+        # For validate-placement.py --tables.
+        kept_results.run([os.path.join(self.options.build, "bin", "validate-placement"), "--run", run, "--truth",
+                          os.path.join(images, "truth"), "--condition", "%s %s %s" % (series.anatomy, series.scan, series.image),
+                          "--seed", HEART[1], "--shift", "%g" % greatest_shift(images), "--head"],
+                         os.path.join(folder, "placement.csv"))
+        shutil.rmtree(evaluation)
+        kept_results.keep_only(run, KEPT)
         return {"rows": rows, "warnings": warnings, "tolerance": tolerance, **usage}
 
     def fill(self, chosen):

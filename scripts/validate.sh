@@ -48,6 +48,7 @@ tables=(
   "motion-lost | validate-motion --seeds 101..110 --lost | -"
   "motion-filling | validate-filling | validate-filling --quick"
   "motion-measured-heart | validate-real-motion | validate-real-motion --quick"
+  "placement | scripts/validate-placement.py --build BUILD --output OUTPUT | -"
   "population | validate-population | validate-population --quick"
   "evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation | scripts/validate-evaluation.sh --build BUILD --output OUTPUT/evaluation --seeds 101 --lost none --spacing 0.6"
   "scanned | scripts/validate-scanned.py --build BUILD --output OUTPUT | scripts/validate-scanned.py --quick --build BUILD --output OUTPUT"
