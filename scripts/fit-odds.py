@@ -3,7 +3,7 @@
 phases.
 
 Reads tables of `validate-disease --branches FILE` (the odds of a vein, VeinRejection.cxx), `--links FILE` (the odds that
-a link is right, VesselLinking.cxx) `--tips FILE` (the odds that a vessel goes on, VesselTips.cxx), or
+a link is right, VesselLinking.cxx), `--tips FILE` (the odds that a vessel goes on, VesselTips.cxx), or
 of `validate-placement` (that a branch is where it is said to be, BranchPlacement.cxx). Prints the weights, and how well weights tell that were fitted without the heart that
 they judge (eight folds). What is artery only in part, and what lies behind a link, is left out. The penalty is half the
 squared weights, or half the squared difference from what is known before.
@@ -48,11 +48,24 @@ def fit(before, names, signs, truth):
     return weights
 
 
+def say(weights, source, target):
+    """Writes a table with what the weights say in its column of probabilities."""
+    with open(source, newline="", encoding="utf-8") as file:
+        head, *rows = csv.reader(file)
+    for row in rows:
+        odds = float(np.append(np.array(row[FIRST_SIGN:], float), 1.0) @ weights)
+        row[4] = f"{1.0 / (1.0 + np.exp(-odds)):.4f}"
+    with open(target, "w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([head, *rows])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kind", choices=sorted(BEFORE))
     parser.add_argument("tables", nargs="+", metavar="table")
     parser.add_argument("--wrong", action="store_true", help="list what is told wrongly")
+    parser.add_argument("--say", nargs=2, action="append", default=[], metavar=("TABLE", "RESULT"),
+                        help="a table that is not fitted to, and where it goes with what the weights say; may be repeated")
     arguments = parser.parse_args()
     rows = []
     for name in arguments.tables:
@@ -76,7 +89,10 @@ def main():
     for n in range(min(FOLDS, len(fold))):
         odds[folds == n] = data[folds == n] @ fit(before, names, signs[folds != n], truth[folds != n])
     print(f"{len(rows)} rows of {len(fold)} hearts, {int(truth.sum())} of them {what}")
-    for name, weight in zip(names + ["(intercept)"], fit(before, names, signs, truth)):
+    weights = fit(before, names, signs, truth)
+    for source, target in arguments.say:
+        say(weights, source, target)
+    for name, weight in zip(names + ["(intercept)"], weights):
         print(f"{name:20s} {weight:6.2f}")
     used = np.array([float(row[4]) for row in rows])
     chance = 1.0 / (1.0 + np.exp(-odds))

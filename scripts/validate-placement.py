@@ -102,8 +102,7 @@ def read(tables):
 def bins_of(rows):
     """Rows in bins of equal count, by what was said."""
     rows = sorted(rows, key=lambda row: row[2])
-    return [rows[len(rows) * n // BINS:len(rows) * (n + 1) // BINS] for n in range(BINS) if rows[len(rows) * n // BINS:
-                                                                                                   len(rows) * (n + 1) // BINS]]
+    return list(filter(None, (rows[len(rows) * n // BINS:len(rows) * (n + 1) // BINS] for n in range(BINS))))
 
 
 def calibration_error(rows):

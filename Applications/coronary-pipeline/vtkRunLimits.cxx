@@ -42,6 +42,16 @@ Json Place(const Vector3& place)
   return { place[0], place[1], place[2] };
 }
 
+double LengthOf(const std::vector<std::int64_t>& line, const std::vector<Vector3>& points)
+{
+  double length = 0.0;
+  for (std::size_t n = 1; n < line.size(); ++n)
+  {
+    length += (points[line[n]] - points[line[n - 1]]).norm();
+  }
+  return length;
+}
+
 double Component(vtkDataArray* array, std::int64_t point)
 {
   return array ? array->GetComponent(point, 0) : 0.0;
@@ -73,7 +83,7 @@ std::vector<Piece> UnseenPieces(const VesselTree::Branch& branch, vtkDataArray* 
   for (const std::int64_t point : branch.points)
   {
     const auto own = static_cast<TrackingStatus>(static_cast<int>(Component(status, point)));
-    if (own != TrackingStatus::Filled && own != TrackingStatus::Lost)
+    if (!IsUnseen(own))
     {
       open = false;
       continue;
@@ -130,18 +140,14 @@ Json DescribeFilled(vtkAlgorithm* tracked, vtkPolyData* tree, vtkMessageTrap& me
       {
         for (const Piece& piece : UnseenPieces(branch, status))
         {
-          double length = 0.0;
           double sum = 0.0;
-          for (std::size_t n = 0; n < piece.points.size(); ++n)
+          for (const std::int64_t point : piece.points)
           {
-            sum += Component(confidence, piece.points[n]);
-            length += n == 0
-              ? 0.0
-              : (rest.points[piece.points[n]] - rest.points[piece.points[n - 1]]).norm();
+            sum += Component(confidence, point);
           }
           list.push_back({ { "vessel", NameOf(branch) }, { "time", time },
             { "status", piece.status == TrackingStatus::Lost ? "lost" : "filled" },
-            { "length_mm", length },
+            { "length_mm", LengthOf(piece.points, rest.points) },
             { "confidence", sum / static_cast<double>(piece.points.size()) },
             { "place", Place(rest.points[piece.points[piece.points.size() / 2]]) } });
         }
@@ -165,13 +171,8 @@ Json DescribePlacement(vtkAlgorithm* moving, vtkPolyData* tree, vtkMessageTrap& 
         const double own = Component(placement, branch.points.back());
         if (branches.size() == n)
         {
-          double length = 0.0;
-          for (std::size_t i = 1; i < branch.points.size(); ++i)
-          {
-            length += (rest.points[branch.points[i]] - rest.points[branch.points[i - 1]]).norm();
-          }
           branches.push_back({ { "vessel", NameOf(branch) }, { "confidence", own },
-            { "time", time }, { "length_mm", length },
+            { "time", time }, { "length_mm", LengthOf(branch.points, rest.points) },
             { "place", Place(rest.points[branch.points[branch.points.size() / 2]]) },
             { "phases", Json::array() } });
         }

@@ -16,13 +16,8 @@ constexpr double Intercept = 4.77;
 constexpr std::array<double, PlacementSigns::Count> Weights = { -3.48, -1.96, -0.36, -2.82, -1.60 };
 
 /// More is less likely than a coin's throw, whatever else speaks for it.
-constexpr double LargestUnseen = 0.5;
+constexpr double MaximumUnseen = 0.5;
 constexpr double UnseenConfidence = 0.5;
-
-bool IsUnseen(TrackingStatus status)
-{
-  return status == TrackingStatus::Filled || status == TrackingStatus::Lost;
-}
 
 /// Mean of what is known of a line's points; nothing: 1.
 double MeanOf(const std::vector<double>& values, const std::vector<std::int64_t>& line)
@@ -113,7 +108,7 @@ double PlacementConfidence(const PlacementSigns& signs)
     odds += Weights[n] * values[n];
   }
   const double chance = 1.0 / (1.0 + std::exp(-odds));
-  return signs.unseen > LargestUnseen ? std::min(chance, UnseenConfidence) : chance;
+  return signs.unseen > MaximumUnseen ? std::min(chance, UnseenConfidence) : chance;
 }
 
 double ConfidenceOfDeviation(double deviation)

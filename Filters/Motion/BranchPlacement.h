@@ -2,8 +2,8 @@
  * @file BranchPlacement.h
  * @brief How likely a branch is where a moving tree has it: within 1 mm of an artery, at one phase.
  *
- * A logistic regression on signs of the tree that was found and of its tracking, fitted to trees of phantoms whose truth is
- * known. Calibrated on simulation only (docs/validation.md).
+ * A logistic regression on signs of the tree that was found and of its tracking, fitted to phantoms and to scans of one, whose
+ * truth is known. Calibrated on simulation only (docs/validation.md).
  */
 #ifndef DynamicCoronary_BranchPlacement_h
 #define DynamicCoronary_BranchPlacement_h

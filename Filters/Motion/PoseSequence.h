@@ -22,6 +22,11 @@ enum class TrackingStatus : int
   Filled = 3,  ///< not seen; from its neighbours in space and time
 };
 
+inline bool IsUnseen(TrackingStatus status)
+{
+  return status == TrackingStatus::Filled || status == TrackingStatus::Lost;
+}
+
 /// Positions of the same points at several phases. What is optional may be empty.
 struct PoseSequence
 {

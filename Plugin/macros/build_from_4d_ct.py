@@ -134,7 +134,7 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
 
 
 def kind_of_motion(times, wanted, tracked, labels):
-    """"tracked", "population" or "none", by the phases that there are and what was asked for; says why, when it is none."""
+    """One of MOTIONS but "automatic", by the phases that there are and what was asked for; says why, when it is none."""
     phases = []
     for time in times:
         if all(min(abs(time - one) % 1.0, -abs(time - one) % 1.0) >= SAME_PHASE for one in phases):
