@@ -4,6 +4,7 @@
 
 #include "CenterlineTracking.h"
 #include "CoronaryPhantom.h"
+#include "CounterRandom.h"
 #include "MotionRegularization.h"
 #include "PhantomCases.h"
 #include "PhantomScan.h"
@@ -59,7 +60,8 @@ struct Case
   bool trueTree = false;
   bool lost = false; ///< a systolic phase, and 40 % of the nodes in two others
   bool allPhases = false;
-  bool regularize = false;
+  double trackerNoise =
+    0.0; ///< mm an axis, put on every tracked place; its confidence does not know
   bool filling = true;
   PhaseInterpolationMode mode = PhaseInterpolationMode::PeriodicCubic;
   std::string cache; ///< folder for images, or empty
@@ -108,15 +110,22 @@ struct Outcome
   Errors volume; ///< of branches, relative, all phases
   std::vector<BranchVolume> branchVolumes;
   std::map<std::string, Errors> bySegment;
-  std::vector<double> byPhase; ///< mean, all phases
-  std::vector<double> trackedShare;
+  std::vector<double> byPhase;                       ///< mean, all phases
   std::vector<std::array<double, 2>> calibre;        ///< per tracked phase: found, true, means
   std::array<std::array<int, 2>, 10> byConfidence{}; ///< nodes, of them within 1 mm
   int called = 0;                                    ///< nodes called tracked
   int calledNear = 0;                                ///< of them within 1 mm
-  double seconds = NaN;
-  double repeatability = NaN;
-  int imagesRead = 0;
+  double maximumMove = 0.0;                          ///< mm, by the limits
+};
+
+/// What the tracker found, before it is judged.
+struct Tracked
+{
+  Polylines lines;
+  std::vector<std::string> name; ///< of each point
+  PoseSequence poses;
+  CenterlineTrackingReport report;
+  double seconds = NaN; ///< without the images
 };
 
 std::vector<std::int16_t> ImageAt(
@@ -173,9 +182,8 @@ std::vector<double> EveryOther(const std::vector<double>& all, std::size_t step)
 /// Places of the lines at a phase against the truth. @param phase  of the poses; -1: it was not tracked
 /// @param truly  where the material of a point is
 Errors JudgePoints(const std::vector<Vector3>& points, const std::vector<double>& radius,
-  const std::function<Vector3(std::size_t p)>& truly, const PhantomTree& truth,
-  const std::vector<std::string>& name, const PoseSequence& poses, std::ptrdiff_t phase,
-  Outcome& outcome)
+  const std::vector<Vector3>& truly, const PhantomTree& truth, const std::vector<std::string>& name,
+  const PoseSequence& poses, std::ptrdiff_t phase, Outcome& outcome)
 {
   const bool isTracked = phase >= 0;
   Errors here;
@@ -186,7 +194,7 @@ Errors JudgePoints(const std::vector<Vector3>& points, const std::vector<double>
       continue;
     }
     const double distance = DistanceToAxis(truth, points[p]);
-    const double carried = (points[p] - truly(p)).norm();
+    const double carried = (points[p] - truly[p]).norm();
     here.Add(distance);
     outcome.bySegment[name[p]].Add(carried);
     (isTracked ? outcome.tracked : outcome.between).Add(distance);
@@ -209,56 +217,68 @@ Errors JudgePoints(const std::vector<Vector3>& points, const std::vector<double>
   return here;
 }
 
-Outcome Run(const Case& test)
+PhantomSettings SettingsOf(const Case& test)
 {
-  Outcome outcome;
   PhantomSettings settings;
   settings.seed = test.seed;
   settings.temporalWindow = test.window;
   settings.noise = test.noise;
   settings.beatIrregularity = test.irregularity;
-  const std::vector<double> all = PaperPhases();
-  const std::vector<double> times = EveryOther(all, test.allPhases ? 1 : 2);
   if (test.lost)
   {
+    const std::vector<double> all = PaperPhases();
     settings.lostPhases = { { all[6], 1.0 }, { all[4], 0.4 }, { all[8], 0.4 } };
   }
-  const CoronaryPhantom phantom(settings);
+  return settings;
+}
+
+void AddNoise(double deviation, std::uint64_t seed, PoseSequence& poses)
+{
+  for (std::size_t k = 0; k < poses.points.size(); ++k)
+  {
+    RandomStream random(seed, 7001 + k);
+    for (Vector3& point : poses.points[k])
+    {
+      point += deviation * Vector3(random.Normal(), random.Normal(), random.Normal());
+    }
+  }
+}
+
+Tracked Track(const Case& test, const CoronaryPhantom& phantom)
+{
+  Tracked result;
   const ImageGrid grid = phantom.DefaultGrid(test.spacing, test.margin);
-  Polylines lines;
-  std::vector<std::string> name;
   if (test.trueTree)
   {
     const PhantomTree truth = phantom.Tree(ReferencePhase);
-    lines = LinesOf(truth);
+    result.lines = LinesOf(truth);
     for (const int id : truth.segmentId)
     {
-      name.push_back(SegmentName(id));
+      result.name.push_back(SegmentName(id));
     }
   }
   else
   {
     const CenterlineTopology tree = TreeOf(ScanPhantom(phantom, grid, ReferencePhase, false));
-    lines = LinesOf(tree);
+    result.lines = LinesOf(tree);
     for (const int id : tree.segmentId)
     {
-      name.push_back(SegmentName(id));
+      result.name.push_back(SegmentName(id));
     }
   }
-
+  const PhantomSettings settings = SettingsOf(test);
   CenterlineTrackingSettings tracking;
   tracking.temporalWindow = settings.temporalWindow;
   tracking.cycleLength = settings.cycleLength;
   tracking.fillUnseen = test.filling;
-  CenterlineTrackingReport report;
   std::vector<std::int16_t> voxels;
   double inImages = 0.0;
   const auto now = []() { return std::chrono::steady_clock::now(); };
   const auto since = [&](auto start)
   { return std::chrono::duration<double>(now() - start).count(); };
   const auto start = now();
-  PoseSequence poses = TrackCenterlines(
-    lines, ReferencePhase, times,
+  result.poses = TrackCenterlines(
+    result.lines, ReferencePhase, EveryOther(PaperPhases(), test.allPhases ? 1 : 2),
     [&](double time)
     {
       const auto before = now();
@@ -269,18 +289,53 @@ Outcome Run(const Case& test)
       image.values = static_cast<const std::int16_t*>(voxels.data());
       return image;
     },
-    tracking, &report);
-  outcome.seconds = since(start) - inImages;
-  if (test.regularize)
-  {
-    MotionRegularizationSettings limits;
-    limits.temporalWeight = TemporalWeightOf(times.size());
-    poses = RegularizeMotion(poses, lines, limits).poses;
-  }
-  outcome.repeatability = report.repeatability;
-  outcome.imagesRead = report.imagesRead;
-  outcome.trackedShare = report.trackedShare;
+    tracking, &result.report);
+  result.seconds = since(start) - inImages;
+  AddNoise(test.trackerNoise, test.seed, result.poses);
+  return result;
+}
 
+/// Volumes of the branches as carried, against those of the same lines under the true motion.
+/// @param truly  where the material of each point is. @param widening  true factor of the radius
+void JudgeVolumes(const Tracked& tracked, const std::vector<Vector3>& points,
+  const std::vector<Vector3>& truly, double time, double calibre, double widening, Outcome& outcome)
+{
+  const Polylines& lines = tracked.lines;
+  for (const std::vector<std::int64_t>& line : lines.lines)
+  {
+    double length = 0.0;
+    double found = 0.0;
+    double right = 0.0;
+    double lengthFound = 0.0;
+    double lengthRight = 0.0;
+    for (std::size_t n = 0; n + 1 < line.size(); ++n)
+    {
+      const std::int64_t p = line[n];
+      const std::int64_t q = line[n + 1];
+      const double area = lines.radius[p] * lines.radius[p] + lines.radius[q] * lines.radius[q];
+      length += (lines.points[q] - lines.points[p]).norm();
+      const double carried = (points[q] - points[p]).norm();
+      const double carriedTruly = (truly[q] - truly[p]).norm();
+      lengthFound += carried;
+      lengthRight += carriedTruly;
+      found += area * calibre * calibre * carried;
+      right += area * widening * widening * carriedTruly;
+    }
+    const std::int64_t middle = line[line.size() / 2];
+    if (length >= MinimumLength && lines.radius[middle] >= MinimumRadius)
+    {
+      outcome.volume.Add(std::abs(found / right - 1.0));
+      outcome.branchVolumes.push_back({ tracked.name[middle], time, found / right,
+        lengthFound / lengthRight, calibre / widening, lengthRight / length });
+    }
+  }
+}
+
+Outcome Judge(const Case& test, const CoronaryPhantom& phantom, const Tracked& tracked,
+  const PoseSequence& poses)
+{
+  Outcome outcome;
+  const Polylines& lines = tracked.lines;
   std::vector<Vector3> material(lines.points.size());
   for (std::size_t p = 0; p < material.size(); ++p)
   {
@@ -291,56 +346,32 @@ Outcome Run(const Case& test)
   between.mode = test.mode;
   const PhaseInterpolation interpolation(poses, between);
   InterpolatedPose pose;
-  for (std::size_t k = 0; k < all.size(); ++k)
+  for (const double time : PaperPhases())
   {
-    const PhantomTree truth = phantom.Tree(all[k]);
-    const auto own = std::find(times.begin(), times.end(), all[k]);
-    const bool isTracked = own != times.end();
-    interpolation.Evaluate(all[k], pose);
-    const std::vector<Vector3>& points =
-      isTracked ? poses.points[own - times.begin()] : pose.points;
-    const Errors here = JudgePoints(
-      points, lines.radius, [&](std::size_t p) { return phantom.Position(material[p], all[k]); },
-      truth, name, poses, isTracked ? own - times.begin() : -1, outcome);
+    const PhantomTree truth = phantom.Tree(time);
+    std::vector<Vector3> truly(material.size());
+    for (std::size_t p = 0; p < material.size(); ++p)
+    {
+      truly[p] = phantom.Position(material[p], time);
+    }
+    const auto own = std::find(poses.times.begin(), poses.times.end(), time);
+    const bool isTracked = own != poses.times.end();
+    const std::ptrdiff_t phase = isTracked ? own - poses.times.begin() : -1;
+    interpolation.Evaluate(time, pose);
+    const std::vector<Vector3>& points = isTracked ? poses.points[phase] : pose.points;
+    const Errors here =
+      JudgePoints(points, lines.radius, truly, truth, tracked.name, poses, phase, outcome);
     outcome.byPhase.push_back(here.Mean());
-    // Volumes: what the tracking makes of them, against the true motion of the same lines.
     double widening = 0.0;
     for (std::size_t n = 0; n < truth.radius.size(); ++n)
     {
       widening += truth.radius[n] / reference.radius[n] / static_cast<double>(truth.radius.size());
     }
-    const double calibre = isTracked ? poses.calibre[own - times.begin()][0] : pose.calibre[0];
-    for (const std::vector<std::int64_t>& line : lines.lines)
-    {
-      double length = 0.0;
-      double found = 0.0;
-      double right = 0.0;
-      double lengthFound = 0.0;
-      double lengthRight = 0.0;
-      for (std::size_t n = 0; n + 1 < line.size(); ++n)
-      {
-        const std::int64_t p = line[n];
-        const std::int64_t q = line[n + 1];
-        const double area = lines.radius[p] * lines.radius[p] + lines.radius[q] * lines.radius[q];
-        length += (lines.points[q] - lines.points[p]).norm();
-        const double carried = (points[q] - points[p]).norm();
-        const double truly =
-          (phantom.Position(material[q], all[k]) - phantom.Position(material[p], all[k])).norm();
-        lengthFound += carried;
-        lengthRight += truly;
-        found += area * calibre * calibre * carried;
-        right += area * widening * widening * truly;
-      }
-      if (length >= MinimumLength && lines.radius[line[line.size() / 2]] >= MinimumRadius)
-      {
-        outcome.volume.Add(std::abs(found / right - 1.0));
-        outcome.branchVolumes.push_back({ name[line[line.size() / 2]], all[k], found / right,
-          lengthFound / lengthRight, calibre / widening, lengthRight / length });
-      }
-    }
+    const double calibre = isTracked ? poses.calibre[phase][0] : pose.calibre[0];
+    JudgeVolumes(tracked, points, truly, time, calibre, widening, outcome);
     if (isTracked)
     {
-      const std::vector<double>& found = poses.calibre[own - times.begin()];
+      const std::vector<double>& found = poses.calibre[phase];
       outcome.calibre.push_back(
         { std::accumulate(found.begin(), found.end(), 0.0) / static_cast<double>(found.size()),
           widening });
@@ -349,7 +380,21 @@ Outcome Run(const Case& test)
   return outcome;
 }
 
-void PrintDetails(Outcome& o)
+/// As tracked, and as the limits leave it, which is what `run` goes on with.
+std::array<Outcome, 2> Run(const Case& test, Tracked& tracked)
+{
+  const CoronaryPhantom phantom(SettingsOf(test));
+  tracked = Track(test, phantom);
+  MotionRegularizationSettings limits;
+  limits.temporalWeight = TemporalWeightOf(tracked.poses.NumberOfPhases());
+  const RegularizedMotion limited = RegularizeMotion(tracked.poses, tracked.lines, limits);
+  std::array<Outcome, 2> result{ Judge(test, phantom, tracked, tracked.poses),
+    Judge(test, phantom, tracked, limited.poses) };
+  result[1].maximumMove = limited.maximumMove;
+  return result;
+}
+
+void PrintDetails(Outcome& o, const std::vector<double>& trackedShare)
 {
   std::printf("by phase:");
   for (const double value : o.byPhase)
@@ -357,7 +402,7 @@ void PrintDetails(Outcome& o)
     std::printf(" %.2f", value);
   }
   std::printf("\ntracked share:");
-  for (const double value : o.trackedShare)
+  for (const double value : trackedShare)
   {
     std::printf(" %.2f", value);
   }
@@ -426,8 +471,12 @@ int main(int argc, char** argv)
       { "low-noise", PhaseInterpolationMode::LowNoise } };
     program.add_option("--mode", test.mode, "interpolation: linear, cubic or low-noise")
       ->transform(CLI::CheckedTransformer(modes));
-    program.add_flag(
-      "--regularize", test.regularize, "with the limits and smoothing of the motion");
+    program
+      .add_option("--tracker-noise", test.trackerNoise,
+        "put on every tracked place, standard deviation along each axis, mm; its confidence does "
+        "not know")
+      ->check(CLI::Range(0.0, 5.0))
+      ->capture_default_str();
     program.add_flag("!--no-filling", test.filling, "what is not seen by the trajectories alone");
     program.add_flag("--true-tree", test.trueTree, "the true tree, not the one found");
     program
@@ -451,7 +500,7 @@ int main(int argc, char** argv)
     std::printf(
       "Phantoms in voxels of %.2f mm, %.0f ms, %.0f HU, tracked at %s of the paper's 20 phases "
       "with "
-      "the %s tree%s%s%s.\n"
+      "the %s tree%s%s, noise of %.2f mm put on what was tracked.\n"
       "Distances of tracked points, vessels down to a radius of %.2f mm, to the true axis; and to "
       "where the same material truly is.\n"
       "Called tracked: share of the places with that status, and of them those whose material is "
@@ -461,13 +510,14 @@ int main(int argc, char** argv)
       test.spacing, window, test.noise, test.allPhases ? "all" : "every other one",
       test.trueTree ? "true" : "found",
       test.lost ? ", one systolic phase lost wholly and 40 % of the nodes in two others" : "",
-      test.regularize ? ", regularized" : "",
-      test.irregularity > 0.0 ? ", each phase in a beat of its own" : "", MinimumRadius,
-      MinimumLength);
+      test.irregularity > 0.0 ? ", each phase in a beat of its own" : "", test.trackerNoise,
+      MinimumRadius, MinimumLength);
     std::printf(
-      "| seed | mean between, mm | 95 %% | material, mm | mean tracked, mm | 95 %% | called "
-      "tracked | of them near | repeat, mm | volume error | greatest | images | s |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "| seed | limits | mean between, mm | 95 %% | material, mm | mean tracked, mm | 95 %% | "
+      "material, mm | 95 %% | called tracked | of them near | repeat, mm | volume error | greatest "
+      "| "
+      "moved, mm | images | s |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     const double mean = quick ? MaximumQuickMean
       : test.lost             ? MaximumLossyMean
       : test.window > 0.07    ? MaximumBlurredMean
@@ -479,26 +529,33 @@ int main(int argc, char** argv)
     for (const std::uint64_t seed : seeds)
     {
       test.seed = seed;
-      Outcome o = Run(test);
+      Tracked tracked;
+      std::array<Outcome, 2> outcomes = Run(test, tracked);
+      for (std::size_t limited = 0; limited < 2; ++limited)
+      {
+        Outcome& o = outcomes[limited];
+        const double all = static_cast<double>(o.tracked.values.size());
+        std::printf("| %llu | %s | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | "
+                    "%.2f | %.3f | %.3f | %.2f | %d | %.1f |\n",
+          static_cast<unsigned long long>(seed), limited != 0 ? "yes" : "no", o.between.Mean(),
+          o.between.Percentile(0.95), o.material.Mean(), o.tracked.Mean(),
+          o.tracked.Percentile(0.95), o.materialTracked.Mean(), o.materialTracked.Percentile(0.95),
+          o.called / all, static_cast<double>(o.calledNear) / std::max(o.called, 1),
+          tracked.report.repeatability, o.volume.Mean(), o.volume.Percentile(1.0), o.maximumMove,
+          tracked.report.imagesRead, tracked.seconds);
+        if (details)
+        {
+          PrintDetails(o, tracked.report.trackedShare);
+        }
+      }
+      std::fflush(stdout);
+      Outcome& o = outcomes[1];
       // No phase that was tracked tells how far off the beat of another one was.
       Errors& judged = test.allPhases || test.irregularity > 0.0 ? o.tracked : o.between;
       sumOfMeans += judged.Mean();
       met = met && o.calledNear >= MinimumCalledNear * o.called &&
         (quick || test.lost || test.window > 0.07 || judged.Percentile(0.95) <= MaximumPercentile);
       volumes = std::max(volumes, o.volume.Percentile(1.0));
-      const double all = static_cast<double>(o.tracked.values.size());
-      std::printf("| %llu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.2f | "
-                  "%.3f | %.3f | %d | %.1f |\n",
-        static_cast<unsigned long long>(seed), o.between.Mean(), o.between.Percentile(0.95),
-        o.material.Mean(), o.tracked.Mean(), o.tracked.Percentile(0.95), o.materialTracked.Mean(),
-        o.materialTracked.Percentile(0.95), o.called / all,
-        static_cast<double>(o.calledNear) / std::max(o.called, 1), o.repeatability, o.volume.Mean(),
-        o.volume.Percentile(1.0), o.imagesRead, o.seconds);
-      if (details)
-      {
-        PrintDetails(o);
-      }
-      std::fflush(stdout);
     }
     const double overall = sumOfMeans / static_cast<double>(seeds.size());
     met = met && overall <= mean;
