@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <numeric>
 
 namespace coronary
@@ -27,6 +28,10 @@ constexpr double LeastDeviation = 0.3;
 constexpr double AlikeNodes = 10.0;
 /// What was filled counts less when the fit is farther from it, mm.
 constexpr double FilledScale = 2.0;
+/// By how much of another phase's motion a phase may differ from what the times alone say.
+constexpr double WeightDeviation = 0.3;
+/// So far apart the surroundings of two places, 5 mm around each, have hardly anything in common, mm.
+constexpr double NotAlike = 8.0;
 constexpr double Turn = 6.283185307179586;
 /// Over which what the prediction misses is alike, mm.
 constexpr double FieldLength = 30.0;
@@ -40,6 +45,20 @@ struct Prediction
   std::vector<std::size_t> phases;
   Eigen::VectorXd weights; ///< of these
   double deviation = 0.0;  ///< of the prediction, by the prior, mm
+};
+
+/// What is known of a node at a phase.
+struct Sighting
+{
+  Vector3 displacement = Vector3::Zero();
+  double variance = 0.0; ///< along each axis, mm^2; 0: nothing is known
+};
+
+/// What is known of all nodes at a phase.
+struct Sightings
+{
+  std::vector<Sighting> nodes;
+  double alike = 1.0; ///< so many nodes around each other are wrong together
 };
 
 class Filler
@@ -57,13 +76,31 @@ public:
   {
   }
 
-  /// @return false: too little was seen at the phase
-  bool Fill(std::size_t phase, std::size_t node, Vector3& place, double& deviation) const;
+  /// Adds what is known of all nodes that were not seen at a phase.
+  void FillPhase(std::size_t phase, const std::vector<const MotionMeasurements*>& measurements,
+    MotionMeasurements& filled) const;
 
 private:
+  /// Of all nodes: where those are that were seen; at a phase at which nothing was, what was measured there all the same,
+  /// as far as it agrees with a motion of the whole heart.
+  Sightings SightingsAt(
+    std::size_t phase, const std::vector<const MotionMeasurements*>& measurements) const;
+  Sightings MeasuredAt(
+    std::size_t phase, const std::vector<const MotionMeasurements*>& measurements) const;
+  /// @param sightings  of all nodes at the phase. @return false: too little is known at the phase
+  bool Fill(std::size_t node, const Prediction& prediction, const Sightings& sightings,
+    Vector3& place, double& deviation) const;
   double Covariance(double a, double b) const;
-  Prediction PredictionOf(std::size_t phase, std::size_t node) const;
-  std::vector<std::size_t> NodesAround(std::size_t phase, std::size_t node) const;
+  /// The phases at which a node was seen.
+  std::vector<std::size_t> SeenPhases(std::size_t node) const;
+  Prediction PredictionFrom(std::vector<std::size_t> phases, std::size_t phase) const;
+  Vector3 Predicted(const Prediction& prediction, std::size_t node) const;
+  /// Of what is known of a node, and of what its prediction is made of.
+  double VarianceOf(const Prediction& prediction, std::size_t node, const Sighting& sighting) const;
+  /// A beat may contract more, earlier or otherwise than the times alone say: weights that fit what is known of the
+  /// whole heart at the phase. What hardly moves at any phase is then not moved by those around it.
+  void FitWeights(Prediction& prediction, const Sightings& sightings) const;
+  std::vector<std::size_t> NodesAround(std::size_t node, const Sightings& sightings) const;
 
   const LineNodes& Nodes;
   const std::vector<double>& Times;
@@ -84,17 +121,27 @@ double Filler::Covariance(double a, double b) const
   return sum;
 }
 
-Prediction Filler::PredictionOf(std::size_t phase, std::size_t node) const
+std::vector<std::size_t> Filler::SeenPhases(std::size_t node) const
 {
-  Prediction result;
-  std::vector<double> times;
+  std::vector<std::size_t> phases;
   for (std::size_t k = 0; k < this->Times.size(); ++k)
   {
     if (this->Seen[k][node])
     {
-      result.phases.push_back(k);
-      times.push_back(this->Times[k]);
+      phases.push_back(k);
     }
+  }
+  return phases;
+}
+
+Prediction Filler::PredictionFrom(std::vector<std::size_t> phases, std::size_t phase) const
+{
+  Prediction result;
+  result.phases = std::move(phases);
+  std::vector<double> times;
+  for (const std::size_t k : result.phases)
+  {
+    times.push_back(this->Times[k]);
   }
   times.push_back(this->ReferenceTime); // it has no displacement there
   const auto count = static_cast<Eigen::Index>(times.size());
@@ -117,12 +164,181 @@ Prediction Filler::PredictionOf(std::size_t phase, std::size_t node) const
   return result;
 }
 
-std::vector<std::size_t> Filler::NodesAround(std::size_t phase, std::size_t node) const
+Vector3 Filler::Predicted(const Prediction& prediction, std::size_t node) const
+{
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t s = 0; s < prediction.phases.size(); ++s)
+  {
+    sum += prediction.weights[static_cast<Eigen::Index>(s)] *
+      this->Displacement[prediction.phases[s]][node];
+  }
+  return sum;
+}
+
+double Filler::VarianceOf(
+  const Prediction& prediction, std::size_t node, const Sighting& sighting) const
+{
+  double variance = sighting.variance;
+  for (std::size_t s = 0; s < prediction.phases.size(); ++s)
+  {
+    const double own = this->Seen[prediction.phases[s]][node] ? SeenDeviation : GuessDeviation;
+    const double weight = prediction.weights[static_cast<Eigen::Index>(s)] * own;
+    variance += weight * weight;
+  }
+  return variance;
+}
+
+Sightings Filler::SightingsAt(
+  std::size_t phase, const std::vector<const MotionMeasurements*>& measurements) const
+{
+  Sightings result;
+  result.nodes.resize(this->Nodes.size());
+  bool any = false;
+  for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+  {
+    if (this->Seen[phase][n])
+    {
+      result.nodes[n] = { this->Displacement[phase][n], SeenDeviation * SeenDeviation };
+      any = true;
+    }
+  }
+  return any ? result : this->MeasuredAt(phase, measurements);
+}
+
+Sightings Filler::MeasuredAt(
+  std::size_t phase, const std::vector<const MotionMeasurements*>& measurements) const
+{
+  std::vector<Sighting> measured(this->Nodes.size());
+  for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+  {
+    Matrix3 information = Matrix3::Zero();
+    Vector3 pull = Vector3::Zero();
+    for (const MotionMeasurements* one : measurements)
+    {
+      information += one->information[phase][n];
+      pull += one->information[phase][n] * one->displacement[phase][n];
+    }
+    const double trace = information.trace();
+    if (trace > 0.0)
+    {
+      // Tissue may say nothing of one direction.
+      information += 1e-3 * trace * Matrix3::Identity();
+      measured[n] = { information.llt().solve(pull), 3.0 / trace };
+    }
+  }
+  std::vector<std::size_t> phases;
+  for (std::size_t k = 0; k < this->Times.size(); ++k)
+  {
+    if (std::any_of(this->Seen[k].begin(), this->Seen[k].end(), [](bool own) { return own; }))
+    {
+      phases.push_back(k);
+    }
+  }
+  Sightings result{ measured, AlikeNodes };
+  std::vector<Vector3> missed(this->Nodes.size(), Vector3::Zero());
+  std::vector<double> share(this->Nodes.size(), 0.0);
+  for (int round = 0; round < RobustRounds && !phases.empty(); ++round)
+  {
+    Prediction prediction = this->PredictionFrom(phases, phase);
+    this->FitWeights(prediction, result);
+    const double scale = FilledScale * std::max(1.0, 3.0 - round);
+    for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+    {
+      missed[n] = measured[n].displacement - this->Predicted(prediction, n);
+      share[n] = measured[n].variance > 0.0
+        ? 1.0 / (1.0 + missed[n].squaredNorm() / (scale * scale)) // Geman & McClure
+        : 0.0;
+      result.nodes[n].variance = measured[n].variance / std::max(share[n] * share[n], 1e-12);
+    }
+  }
+  // How much of it differs between places whose surroundings have nothing in common.
+  double differences = 0.0;
+  double pairs = 0.0;
+  for (std::size_t a = 0; a < this->Nodes.size(); ++a)
+  {
+    for (std::size_t b = 0; b < a; ++b)
+    {
+      const double apart = (this->Nodes.position[a] - this->Nodes.position[b]).norm();
+      if (apart > NotAlike && apart < 1.5 * NotAlike)
+      {
+        differences += share[a] * share[b] * (missed[a] - missed[b]).squaredNorm() / 6.0;
+        pairs += share[a] * share[b];
+      }
+    }
+  }
+  const double incoherent = pairs > 0.0 ? differences / pairs : 0.0;
+  for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+  {
+    result.nodes[n].variance =
+      share[n] > 0.0 ? std::max(measured[n].variance, incoherent) / (share[n] * share[n]) : 0.0;
+  }
+  return result;
+}
+
+void Filler::FillPhase(std::size_t phase,
+  const std::vector<const MotionMeasurements*>& measurements, MotionMeasurements& filled) const
+{
+  const Sightings sightings = this->SightingsAt(phase, measurements);
+  // Many nodes were seen at the same phases.
+  std::map<std::vector<std::size_t>, Prediction> predictions;
+  for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+  {
+    std::vector<std::size_t> phases = this->SeenPhases(n);
+    if (!this->Seen[phase][n] && predictions.count(phases) == 0)
+    {
+      Prediction prediction = this->PredictionFrom(phases, phase);
+      this->FitWeights(prediction, sightings);
+      predictions.emplace(std::move(phases), std::move(prediction));
+    }
+  }
+  ParallelFor(static_cast<std::int64_t>(this->Nodes.size()), 8,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      for (std::int64_t i = first; i < last; ++i)
+      {
+        const auto n = static_cast<std::size_t>(i);
+        double deviation = 0.0;
+        if (!this->Seen[phase][n] &&
+          this->Fill(n, predictions.at(this->SeenPhases(n)), sightings,
+            filled.displacement[phase][n], deviation))
+        {
+          filled.information[phase][n] = Matrix3::Identity() / (deviation * deviation);
+        }
+      }
+    });
+}
+
+void Filler::FitWeights(Prediction& prediction, const Sightings& sightings) const
+{
+  const auto count = prediction.weights.size();
+  const double trust = 1.0 / (WeightDeviation * WeightDeviation);
+  Eigen::MatrixXd matrix = trust * Eigen::MatrixXd::Identity(count, count);
+  Eigen::VectorXd right = trust * prediction.weights;
+  Eigen::MatrixXd motions(3, count);
+  for (std::size_t n = 0; n < this->Nodes.size(); ++n)
+  {
+    if (sightings.nodes[n].variance <= 0.0)
+    {
+      continue;
+    }
+    for (Eigen::Index s = 0; s < count; ++s)
+    {
+      motions.col(s) = this->Displacement[prediction.phases[static_cast<std::size_t>(s)]][n];
+    }
+    const double information =
+      1.0 / (AlikeNodes * this->VarianceOf(prediction, n, sightings.nodes[n]));
+    matrix += information * motions.transpose() * motions;
+    right += information * motions.transpose() * sightings.nodes[n].displacement;
+  }
+  prediction.weights = matrix.llt().solve(right);
+}
+
+std::vector<std::size_t> Filler::NodesAround(std::size_t node, const Sightings& sightings) const
 {
   std::vector<std::size_t> around;
   for (std::size_t n = 0; n < this->Nodes.size(); ++n)
   {
-    if (this->Seen[phase][n])
+    if (sightings.nodes[n].variance > 0.0)
     {
       around.push_back(n);
     }
@@ -138,24 +354,14 @@ std::vector<std::size_t> Filler::NodesAround(std::size_t phase, std::size_t node
   return around;
 }
 
-bool Filler::Fill(std::size_t phase, std::size_t node, Vector3& place, double& deviation) const
+bool Filler::Fill(std::size_t node, const Prediction& prediction, const Sightings& sightings,
+  Vector3& place, double& deviation) const
 {
-  const std::vector<std::size_t> around = this->NodesAround(phase, node);
+  const std::vector<std::size_t> around = this->NodesAround(node, sightings);
   if (around.size() < LeastNeighbours)
   {
     return false;
   }
-  const Prediction prediction = this->PredictionOf(phase, node);
-  const auto predicted = [&](std::size_t n)
-  {
-    Vector3 sum = Vector3::Zero();
-    for (std::size_t s = 0; s < prediction.phases.size(); ++s)
-    {
-      sum += prediction.weights[static_cast<Eigen::Index>(s)] *
-        this->Displacement[prediction.phases[s]][n];
-    }
-    return sum;
-  };
   // What the same prediction misses where it can be told.
   const auto count = static_cast<Eigen::Index>(around.size());
   Eigen::MatrixXd missed(count, 3);
@@ -163,17 +369,14 @@ bool Filler::Fill(std::size_t phase, std::size_t node, Vector3& place, double& d
   for (Eigen::Index a = 0; a < count; ++a)
   {
     const std::size_t n = around[static_cast<std::size_t>(a)];
-    missed.row(a) = (this->Displacement[phase][n] - predicted(n)).transpose();
-    double variance = SeenDeviation * SeenDeviation;
-    for (std::size_t s = 0; s < prediction.phases.size(); ++s)
-    {
-      const double own = this->Seen[prediction.phases[s]][n] ? SeenDeviation : GuessDeviation;
-      const double weight = prediction.weights[static_cast<Eigen::Index>(s)] * own;
-      variance += weight * weight;
-    }
-    noise[a] = variance;
+    missed.row(a) = (sightings.nodes[n].displacement - this->Predicted(prediction, n)).transpose();
+    noise[a] = this->VarianceOf(prediction, n, sightings.nodes[n]);
   }
-  const double scale = std::max(missed.squaredNorm() / (3.0 * static_cast<double>(count)), 1e-4);
+  // Without what is noise of it.
+  const Eigen::ArrayXd trust = noise.array().inverse();
+  const double scale = std::max(
+    (trust * (missed.rowwise().squaredNorm().array() / 3.0 - noise.array())).sum() / trust.sum(),
+    1e-4);
   const auto field = [&](std::size_t a, std::size_t b)
   {
     const Vector3 first = (this->Nodes.position[a] - this->Nodes.position[node]) / FieldLength;
@@ -191,10 +394,10 @@ bool Filler::Fill(std::size_t phase, std::size_t node, Vector3& place, double& d
         field(around[static_cast<std::size_t>(a)], around[static_cast<std::size_t>(b)]);
       matrix(b, a) = matrix(a, b);
     }
-    matrix(a, a) += noise[a];
+    matrix(a, a) += sightings.alike * noise[a];
   }
   const Eigen::VectorXd weights = matrix.llt().solve(right);
-  place = predicted(node) + missed.transpose() * weights;
+  place = this->Predicted(prediction, node) + missed.transpose() * weights;
   const double left = std::max(0.0, field(node, node) - right.dot(weights));
   deviation = std::sqrt(left + LeastDeviation * LeastDeviation);
   return true;
@@ -241,26 +444,17 @@ Trajectories FitRobustly(const LineNodes& nodes, const std::vector<double>& time
 
 MotionMeasurements FillUnseen(const LineNodes& nodes, const std::vector<double>& times,
   double referenceTime, const std::vector<std::vector<Vector3>>& displacement,
-  const std::vector<std::vector<bool>>& seen, const TrajectoryPrior& prior)
+  const std::vector<std::vector<bool>>& seen,
+  const std::vector<const MotionMeasurements*>& measurements, const TrajectoryPrior& prior)
 {
   const Filler filler(nodes, times, referenceTime, displacement, seen, prior);
   MotionMeasurements result;
   result.displacement = displacement;
   result.information.assign(times.size(), std::vector<Matrix3>(nodes.size(), Matrix3::Zero()));
-  ParallelFor(static_cast<std::int64_t>(times.size() * nodes.size()), 8,
-    [&](std::int64_t first, std::int64_t last)
-    {
-      for (std::int64_t i = first; i < last; ++i)
-      {
-        const std::size_t k = static_cast<std::size_t>(i) / nodes.size();
-        const std::size_t n = static_cast<std::size_t>(i) % nodes.size();
-        double deviation = 0.0;
-        if (!seen[k][n] && filler.Fill(k, n, result.displacement[k][n], deviation))
-        {
-          result.information[k][n] = Matrix3::Identity() / (deviation * deviation);
-        }
-      }
-    });
+  for (std::size_t k = 0; k < times.size(); ++k)
+  {
+    filler.FillPhase(k, measurements, result);
+  }
   return result;
 }
 
@@ -269,13 +463,13 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
   const std::vector<const MotionMeasurements*>& measurements, const TrajectoryPrior& prior)
 {
   const std::size_t phases = times.size();
-  // A phase at which nothing was seen has nothing but what was measured.
+  // A phase at which nothing was seen has nothing but what was measured at first.
   std::vector<bool> blind(phases);
   for (std::size_t k = 0; k < phases; ++k)
   {
     blind[k] = std::none_of(seen[k].begin(), seen[k].end(), [](bool own) { return own; });
   }
-  const auto weighed = [&](const auto& weight)
+  const auto weighed = [&](bool withBlind, const auto& weight)
   {
     std::vector<MotionMeasurements> result;
     for (const MotionMeasurements* one : measurements)
@@ -283,7 +477,7 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
       result.push_back(*one);
       for (std::size_t k = 0; k < phases; ++k)
       {
-        for (std::size_t n = 0; !blind[k] && n < nodes.size(); ++n)
+        for (std::size_t n = 0; (withBlind || !blind[k]) && n < nodes.size(); ++n)
         {
           if (!seen[k][n])
           {
@@ -305,7 +499,7 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
     return FitRobustly(nodes, times, referenceTime, all, prior);
   };
   const Trajectories known =
-    fit(weighed([](const MotionMeasurements&, std::size_t, std::size_t) { return 0.0; }));
+    fit(weighed(true, [](const MotionMeasurements&, std::size_t, std::size_t) { return 0.0; }));
   std::vector<std::vector<Vector3>> displacement(phases, std::vector<Vector3>(nodes.size()));
   for (std::size_t k = 0; k < phases; ++k)
   {
@@ -314,7 +508,8 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
       displacement[k][n] = known.Displacement(static_cast<int>(n), times[k]);
     }
   }
-  MotionMeasurements filled = FillUnseen(nodes, times, referenceTime, displacement, seen, prior);
+  MotionMeasurements filled =
+    FillUnseen(nodes, times, referenceTime, displacement, seen, measurements, prior);
   filled.robustScale = FilledScale;
   // By how far it is from what was filled, as far as that is known; for good, or all of a branch could drift there.
   const auto agreement = [&](const MotionMeasurements& one, std::size_t k, std::size_t n)
@@ -327,7 +522,7 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
     const double apart = (filled.displacement[k][n] - one.displacement[k][n]).squaredNorm();
     return std::exp(-apart / (one.robustScale * one.robustScale + 9.0 / information));
   };
-  std::vector<MotionMeasurements> all = weighed(agreement);
+  std::vector<MotionMeasurements> all = weighed(true, agreement);
   // Neighbours are filled from the same, and wrong together: what they say is not said by each anew.
   for (std::vector<Matrix3>& phase : filled.information)
   {

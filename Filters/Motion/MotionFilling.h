@@ -39,7 +39,8 @@ Trajectories FitRobustly(const LineNodes& nodes, const std::vector<double>& time
  */
 MotionMeasurements FillUnseen(const LineNodes& nodes, const std::vector<double>& times,
   double referenceTime, const std::vector<std::vector<Vector3>>& displacement,
-  const std::vector<std::vector<bool>>& seen, const TrajectoryPrior& prior);
+  const std::vector<std::vector<bool>>& seen,
+  const std::vector<const MotionMeasurements*>& measurements, const TrajectoryPrior& prior);
 
 /**
  * FitRobustly with what FillUnseen says. What was measured where nothing was seen may be of the wrong tissue, all of a

@@ -158,7 +158,7 @@ TEST(MotionFilling, TakesTheMotionOfTheVesselsAround)
       }
     }
     const MotionMeasurements filled =
-      FillUnseen(nodes, Times(), Reference, guess, seen, TrajectoryPrior());
+      FillUnseen(nodes, Times(), Reference, guess, seen, {}, TrajectoryPrior());
     double farthest = 0.0;
     for (std::size_t k = 0; k < truth.size(); ++k)
     {
@@ -183,7 +183,7 @@ TEST(MotionFilling, IsLessSureFartherAway)
   const LineNodes nodes = PlaceNodes(Vessels(), 2.0);
   const Mask seen = AllBut(nodes, { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9 });
   const MotionMeasurements filled =
-    FillUnseen(nodes, Times(), Reference, Moved(nodes, Affine), seen, TrajectoryPrior());
+    FillUnseen(nodes, Times(), Reference, Moved(nodes, Affine), seen, {}, TrajectoryPrior());
   const std::vector<bool> branch = OnBranch(nodes);
   double best = 0.0;
   double worst = 1e9;
@@ -205,7 +205,7 @@ TEST(MotionFilling, SaysNothingOfAPhaseThatWasLost)
   Mask seen = AllBut(nodes, {});
   std::fill(seen[5].begin(), seen[5].end(), false);
   const TrajectoryPrior prior;
-  const MotionMeasurements filled = FillUnseen(nodes, Times(), Reference, truth, seen, prior);
+  const MotionMeasurements filled = FillUnseen(nodes, Times(), Reference, truth, seen, {}, prior);
   for (const Matrix3& information : filled.information[5])
   {
     EXPECT_TRUE(information.isZero());
