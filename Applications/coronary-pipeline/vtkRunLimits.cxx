@@ -111,7 +111,8 @@ Json DescribeMotion(vtkMotionRegularizer* regularizer)
     return values.empty() ? Json() : values.front();
   };
   Json said = { { "greatest_move_mm", one(names::MaximumMove) },
-    { "violations", one(names::LimitViolations) }, { "iterations", one(names::LimitIterations) } };
+    { "violations", one(names::LimitViolations) }, { "iterations", one(names::LimitIterations) },
+    { "noise_mm", Numbers(data, names::MotionNoise) } };
   const std::pair<const char*, const char*> energies[] = { { "temporal", names::TemporalEnergy },
     { "spatial", names::SpatialEnergy }, { "total", names::TotalEnergy },
     { "objective", names::MotionObjective } };

@@ -250,6 +250,7 @@ constexpr const char* ClampedPoints = "ClampedPoints";     ///< vtkIdType[5], on
 constexpr const char* LimitViolations = "LimitViolations"; ///< vtkIdType, that are left
 constexpr const char* LimitIterations = "LimitIterations"; ///< int
 constexpr const char* MaximumMove = "MaximumMove";         ///< double, mm
+constexpr const char* MotionNoise = "MotionNoise"; ///< double, one a time step, mm along each axis
 // Deformed mesh, cell data.
 constexpr const char* VolumeRatio = "VolumeRatio"; ///< double, against rest, below 0 inverted
 // Deformed mesh, field data.

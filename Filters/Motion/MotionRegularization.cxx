@@ -1,6 +1,7 @@
 #include "MotionRegularization.h"
 
 #include "CyclicTime.h"
+#include "MotionNoise.h"
 #include "Require.h"
 #include "SkeletonPose.h"
 
@@ -39,6 +40,12 @@ constexpr int StaleIterations = 40;
 constexpr double Relaxation = 1.6;
 /// A corner that is beyond a limit at rest may become sharper by this share.
 constexpr double RestSlack = 0.1;
+/// Noise that the weights of the energies are made for, mm.
+constexpr double UsualNoise = 0.05;
+/// How much the displacement of a heart bends along a vessel, per mm.
+constexpr double UsualBending = 0.01;
+/// A well-tracked point of a noisy phase may be moved by so many deviations more.
+constexpr double NoiseTolerance = 3.0;
 constexpr std::int64_t Grain = 512;
 
 struct Segment
@@ -98,6 +105,7 @@ struct Problem
   std::vector<Segment> segments;
   std::vector<Corner> corners;
   std::vector<std::vector<std::pair<std::int64_t, double>>> neighbours; ///< and lengths at rest
+  std::vector<double> noise; ///< of the phases in their order, mm
 
   Problem(const PoseSequence& sequence, const Polylines& lines,
     const MotionRegularizationSettings& wanted);
@@ -112,7 +120,19 @@ struct Problem
     return (phase + this->phases - 1) % this->phases;
   }
   double WeightOf(const PoseSequence& sequence, std::int64_t point, std::int64_t phase) const;
+  /// Of a phase's samples, against those of a phase without noise.
+  double Trust(std::int64_t phase) const
+  {
+    const double ratio = this->noise[phase] / UsualNoise;
+    return 1.0 / (1.0 + ratio * ratio);
+  }
+  double SpatialWeight(std::int64_t point, std::int64_t phase) const;
   bool WellTracked(const PoseSequence& sequence, std::int64_t point, std::int64_t phase) const;
+  /// By how much a well-tracked point may be moved, mm.
+  double Tolerance(std::int64_t phase) const
+  {
+    return this->settings.tolerance + NoiseTolerance * this->noise[phase];
+  }
   Positions PositionsOf(const PoseSequence& sequence) const;
 
   /// Calls row(coefficients, weight, kind) for every term of the energies: a sum of unknowns that is squared.
@@ -143,6 +163,14 @@ Problem::Problem(
     double between = times[this->order[this->Next(k)]] - times[this->order[k]];
     between += k == this->phases - 1 ? 1.0 : 0.0;
     this->gap.push_back(std::max(MinimumGap, between * static_cast<double>(this->phases)));
+  }
+
+  this->noise.assign(times.size(), 0.0);
+  if (wanted.measureNoise && wanted.energy == MotionEnergy::Displacement)
+  {
+    const std::vector<double> ofPhases = NoiseOfPhases(sequence, lines);
+    std::transform(this->order.begin(), this->order.end(), this->noise.begin(),
+      [&](std::size_t k) { return ofPhases[k]; });
   }
 
   this->neighbours.resize(lines.points.size());
@@ -205,10 +233,28 @@ double Problem::WeightOf(const PoseSequence& sequence, std::int64_t point, std::
 {
   if (sequence.confidence.empty())
   {
-    return 1.0;
+    return this->Trust(phase);
   }
   const double confidence = sequence.confidence[this->order[phase]][point];
-  return std::max(MinimumWeight, confidence * confidence);
+  return this->Trust(phase) * std::max(MinimumWeight, confidence * confidence);
+}
+
+double Problem::SpatialWeight(std::int64_t point, std::int64_t phase) const
+{
+  if (this->noise[phase] <= 0.0)
+  {
+    return this->settings.spatialWeight;
+  }
+  // What a bending of the displacement makes of the Laplacian over segments of these lengths.
+  double product = 1.0;
+  for (const auto& [other, length] : this->neighbours[point])
+  {
+    product *= length;
+  }
+  const double own = 0.5 * UsualBending *
+    std::pow(product, 2.0 / static_cast<double>(this->neighbours[point].size()));
+  const double ratio = this->noise[phase] / own;
+  return this->settings.spatialWeight + this->Trust(phase) * ratio * ratio;
 }
 
 bool Problem::WellTracked(
@@ -277,7 +323,7 @@ void Problem::Terms(const Function& row) const
       {
         coefficients.emplace_back(this->Unknown(other, k), (plain ? 1.0 : 1.0 / length) / sum);
       }
-      row(coefficients, this->settings.spatialWeight, 1);
+      row(coefficients, plain ? this->settings.spatialWeight : this->SpatialWeight(point, k), 1);
     }
   }
   double mean = 0.0;
@@ -455,7 +501,8 @@ int Limits::Project(std::size_t n, Vector3 values[2]) const
     case Limit::Tolerance:
     default:
     {
-      const double most = limit.kind == Limit::Step ? settings.maximumStep : settings.tolerance;
+      const double most =
+        limit.kind == Limit::Step ? settings.maximumStep : this->Whole.Tolerance(limit.phase);
       const double length = values[0].norm();
       if (length <= most)
       {
@@ -807,7 +854,7 @@ void FindClamps(const Limits& limits, const Positions& at, std::vector<int>& bit
 
 /// What a well-tracked point may move is kept whatever else is not.
 void KeepTolerance(
-  const Limits& limits, const Positions& input, double tolerance, Positions& positions)
+  const Problem& problem, const Limits& limits, const Positions& input, Positions& positions)
 {
   for (const Limit& limit : limits.List)
   {
@@ -816,6 +863,7 @@ void KeepTolerance(
       continue;
     }
     const Index unknown = limit.unknowns[0];
+    const double tolerance = problem.Tolerance(limit.phase);
     const Eigen::RowVector3d move = positions.row(unknown) - input.row(unknown);
     const double length = move.norm();
     if (length > tolerance)
@@ -1000,6 +1048,11 @@ RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const Polylines
   const Index size = problem.points * problem.phases;
   RegularizedMotion result;
   result.poses = sequence;
+  result.noise.resize(sequence.NumberOfPhases());
+  for (std::int64_t k = 0; k < problem.phases; ++k)
+  {
+    result.noise[problem.order[k]] = problem.noise[k];
+  }
   result.clamps.assign(sequence.NumberOfPhases(), std::vector<int>(lines.points.size(), 0));
   const Positions input = problem.PositionsOf(sequence);
   const Positions origin = OriginOf(problem, lines);
@@ -1029,7 +1082,7 @@ RegularizedMotion RegularizeMotion(const PoseSequence& sequence, const Polylines
       Multipliers multipliers(limits, input, origin, pull, std::move(triplets));
       Report(progress, 0.3);
       result.iterations = multipliers.Run(settings, positions, progress);
-      KeepTolerance(limits, input, settings.tolerance, positions);
+      KeepTolerance(problem, limits, input, positions);
     }
     MarkClamps(problem, limits, positions, bits, result);
     result.after = EnergiesOfPositions(problem, positions, origin, input, sequence);

@@ -46,6 +46,10 @@ struct MotionRegularizationSettings
   double wellTracked = 0.8; ///< from this confidence on a point is moved by no more than ...
   double tolerance = 0.3;   ///< mm, 0 or more
 
+  /// Places of a phase that are noisy (NoiseOfPhases) weigh less, are smoothed along the vessels as the noise asks for, and
+  /// may be moved by three of its deviations more. Not with MotionEnergy::Position.
+  bool measureNoise = true;
+
   /// Elastic modulus of Eq. 12, MPa.
   double youngsModulus = 1.55;
 
@@ -92,8 +96,9 @@ struct RegularizedMotion
   /// Segments, corners and steps that are still beyond a limit by more than the precision allows: the
   /// tolerance of well-tracked points stands against it.
   std::int64_t violations = 0;
-  int iterations = 0;       ///< 0: no limit was touched
-  double maximumMove = 0.0; ///< mm
+  int iterations = 0;        ///< 0: no limit was touched
+  double maximumMove = 0.0;  ///< mm
+  std::vector<double> noise; ///< per phase, mm; 0 where it is not measured
 };
 
 /**

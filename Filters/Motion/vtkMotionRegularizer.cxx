@@ -237,6 +237,7 @@ int vtkMotionRegularizer::RequestData(
       settings.maximumStep = this->MaximumStep == 0.0 ? None : this->MaximumStep;
       settings.wellTracked = this->WellTracked;
       settings.tolerance = this->Tolerance;
+      settings.measureNoise = this->MeasureNoise;
       settings.youngsModulus = this->YoungsModulus;
       settings.iterations = this->Iterations;
       settings.precision = this->Precision;
@@ -292,6 +293,7 @@ int vtkMotionRegularizer::RequestData(
     add(names::TotalEnergy, { motion.before.total, motion.after.total });
     add(names::MotionObjective, { motion.before.objective, motion.after.objective });
     add(names::MaximumMove, { motion.maximumMove });
+    add(names::MotionNoise, motion.noise);
     vtkCoronary::AddArray<vtkIdTypeArray>(fields, names::ClampedPoints,
       std::vector<vtkIdType>(motion.clamped.begin(), motion.clamped.end()));
     vtkCoronary::AddArray<vtkIdTypeArray>(
@@ -320,6 +322,7 @@ void vtkMotionRegularizer::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MaximumStep: " << this->MaximumStep << '\n';
   os << indent << "WellTracked: " << this->WellTracked << '\n';
   os << indent << "Tolerance: " << this->Tolerance << '\n';
+  os << indent << "MeasureNoise: " << this->MeasureNoise << '\n';
   os << indent << "YoungsModulus: " << this->YoungsModulus << '\n';
   os << indent << "Precision: " << this->Precision << '\n';
   os << indent << "Iterations: " << this->Iterations << '\n';

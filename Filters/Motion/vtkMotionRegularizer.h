@@ -23,7 +23,7 @@
  *   Field data, the same at all times: `TemporalEnergy`, `SpatialEnergy`, `TotalEnergy` (double, two values: before and
  *   after; Eq. 14, mm^2), `MotionObjective` (double, two values: what is minimised), `ClampedPoints` (vtkIdType, five
  *   values: points and phases for each bit), `LimitViolations` (vtkIdType, limits that are not kept),
- *   `LimitIterations` (int), `MaximumMove` (double, mm), `PhaseTime` (double, the time step).
+ *   `LimitIterations` (int), `MaximumMove` (double, mm), `MotionNoise` (double, a value for each time step, mm along each axis), `PhaseTime` (double, the time step).
  *
  * The output is whole in piece 0, and empty in every other piece. An empty input gives an empty output.
  *
@@ -136,6 +136,17 @@ public:
 
   ///@{
   /**
+   * Whether the noise of each phase is measured (how far displacements are off a line over 8 mm of vessel): places of a noisy
+   * phase weigh less, are smoothed along the vessels as the noise asks for, and may be moved by three of its
+   * deviations more than the tolerance. Not with the energy of the position. Default true.
+   */
+  vtkSetMacro(MeasureNoise, bool);
+  vtkGetMacro(MeasureNoise, bool);
+  vtkBooleanMacro(MeasureNoise, bool);
+  ///@}
+
+  ///@{
+  /**
    * E of Eq. 12, MPa. Default 1.55, a nominal value of the order of tensile tests of human coronary arteries (Karimi
    * et al., Mater Sci Eng C 2013;33:2550), to be set by who needs stress. Only AxialStress depends on it.
    */
@@ -200,6 +211,7 @@ private:
   double MaximumStep = 15.0;
   double WellTracked = 0.8;
   double Tolerance = 0.3;
+  bool MeasureNoise = true;
   double YoungsModulus = 1.55;
   double Precision = 0.002;
   int Iterations = 400;

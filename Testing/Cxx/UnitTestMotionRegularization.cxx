@@ -134,6 +134,7 @@ MotionRegularizationSettings NoWeights()
 {
   MotionRegularizationSettings settings;
   settings.temporalWeight = settings.spatialWeight = settings.velocityWeight = 0.0;
+  settings.measureNoise = false;
   return settings;
 }
 
@@ -265,7 +266,7 @@ TEST(MotionRegularization, WellTrackedPointsMoveByTheToleranceAtMost)
         const double moved = (result.poses.points[k][n] - motion.points[k][n]).norm();
         if (motion.confidence[k][n] >= 0.6)
         {
-          EXPECT_LE(moved, tolerance + 1e-9);
+          EXPECT_LE(moved, tolerance + 3.0 * result.noise[k] + 1e-9);
         }
         else
         {
@@ -275,6 +276,51 @@ TEST(MotionRegularization, WellTrackedPointsMoveByTheToleranceAtMost)
     }
     EXPECT_GT(others, 0.5);
     EXPECT_GT(result.clamped[4], 0);
+  }
+}
+
+TEST(MotionRegularization, NoiseIsMeasuredAndSmoothed)
+{
+  const Polylines lines = Straight(161, 0.5);
+  const PoseSequence truth = Move(lines, Even(12), Beat);
+  PoseSequence noisy = truth;
+  std::mt19937 random(11);
+  std::normal_distribution<double> any(0.0, 0.6);
+  SetConfidence(noisy, 0.9);
+  const auto isNoisy = [](std::size_t k) { return k % 3 == 0; };
+  for (std::size_t k = 0; k < 12; ++k)
+  {
+    for (Vector3& point : noisy.points[k])
+    {
+      point += isNoisy(k) ? Vector3(any(random), any(random), any(random)) : Vector3::Zero();
+    }
+  }
+  const auto errorOf = [&](const PoseSequence& motion, std::size_t k)
+  {
+    double sum = 0.0;
+    for (std::size_t n = 0; n < lines.points.size(); ++n)
+    {
+      sum += (motion.points[k][n] - truth.points[k][n]).norm();
+    }
+    return sum / static_cast<double>(lines.points.size());
+  };
+  MotionRegularizationSettings settings;
+  const RegularizedMotion result = RegularizeMotion(noisy, lines, settings);
+  settings.measureNoise = false;
+  const RegularizedMotion without = RegularizeMotion(noisy, lines, settings);
+  for (std::size_t k = 0; k < 12; ++k)
+  {
+    EXPECT_NEAR(result.noise[k], isNoisy(k) ? 0.6 : 0.0, 0.1) << k;
+    EXPECT_EQ(without.noise[k], 0.0);
+    if (isNoisy(k))
+    {
+      EXPECT_LT(errorOf(result.poses, k), 0.3 * errorOf(noisy, k)) << k;
+      EXPECT_LT(errorOf(result.poses, k), 0.5 * errorOf(without.poses, k)) << k;
+    }
+    else
+    {
+      EXPECT_LT(errorOf(result.poses, k), 0.1) << k;
+    }
   }
 }
 

@@ -116,6 +116,7 @@ struct Outcome
   int called = 0;                                    ///< nodes called tracked
   int calledNear = 0;                                ///< of them within 1 mm
   double maximumMove = 0.0;                          ///< mm, by the limits
+  std::vector<double> noise; ///< mm, per tracked phase, as the limits take it
 };
 
 /// What the tracker found, before it is judged.
@@ -391,6 +392,7 @@ std::array<Outcome, 2> Run(const Case& test, Tracked& tracked)
   std::array<Outcome, 2> result{ Judge(test, phantom, tracked, tracked.poses),
     Judge(test, phantom, tracked, limited.poses) };
   result[1].maximumMove = limited.maximumMove;
+  result[1].noise = limited.noise;
   return result;
 }
 
@@ -415,6 +417,11 @@ void PrintDetails(Outcome& o, const std::vector<double>& trackedShare)
   for (const std::array<int, 2>& bin : o.byConfidence)
   {
     std::printf(" %.3f of %d,", bin[1] / std::max(1.0, 1.0 * bin[0]), bin[0]);
+  }
+  std::printf("\nnoise, mm:");
+  for (const double value : o.noise)
+  {
+    std::printf(" %.2f", value);
   }
   std::printf("\nvolumes that are off most:");
   std::sort(o.branchVolumes.begin(), o.branchVolumes.end(),
