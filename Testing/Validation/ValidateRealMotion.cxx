@@ -4,7 +4,9 @@
 #include "CenterlineTracking.h"
 #include "CounterRandom.h"
 #include "DistanceTransform.h"
+#include "MotionRegularization.h"
 #include "PhaseInterpolation.h"
+#include "ScannedHeart.h"
 
 #include <CLI/CLI.hpp>
 
@@ -14,7 +16,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -42,9 +46,10 @@ class Scanner
 {
 public:
   /// @param hidden  vessel that is not shown in systole; -1: none
-  Scanner(const Heart& heart, const CarriedTree& tree, double spacing, double window, int moments,
-    int hidden)
+  Scanner(const Heart& heart, const LargerMotion& motion, const CarriedTree& tree, double spacing,
+    double window, int moments, int hidden)
     : Body(heart)
+    , Motion(motion)
     , Tree(tree)
     , Window(window)
     , Moments(window > 0.0 ? moments : 1)
@@ -54,7 +59,7 @@ public:
     Vector3 high = -low;
     for (int k = 0; k < Frames; ++k)
     {
-      for (const Vector3& point : heart.At(TimeOf(k)))
+      for (const Vector3& point : motion.At(TimeOf(k)))
       {
         low = low.cwiseMin(point);
         high = high.cwiseMax(point);
@@ -158,7 +163,7 @@ private:
 
   void AddMoment(double time, int hidden, std::vector<float>& sum) const
   {
-    const std::vector<Vector3> points = this->Body.At(time);
+    const std::vector<Vector3> points = this->Motion.At(time);
     const double spacing = this->Grid.spacing[0];
     const std::vector<float> heart = this->OnGrid(this->Body.Epicardium.Filled(points, spacing));
     const std::vector<float> left = this->OnGrid(this->Body.LeftVentricle.Filled(points, spacing));
@@ -259,6 +264,7 @@ private:
   }
 
   const Heart& Body;
+  const LargerMotion& Motion;
   const CarriedTree& Tree;
   const double Window;
   const int Moments;
@@ -266,6 +272,51 @@ private:
   ImageGrid Grid;
   std::array<int, 3> Size{};
   std::size_t Voxels = 0;
+  std::vector<std::int16_t> Values;
+};
+
+/// What the virtual scanner makes of it, all frames in one scan.
+class ScannerImages
+{
+public:
+  ScannerImages(const MeshAnatomy& anatomy, const std::string& preset, double spacing,
+    const std::vector<double>& times)
+    : Times(times)
+  {
+    const CoronaryPhantom::Box& heart = anatomy.Heart();
+    this->Grid.origin = heart.low - Vector3::Constant(4.0);
+    this->Grid.spacing = Vector3::Constant(spacing);
+    this->Voxels = 1;
+    for (int axis = 0; axis < 3; ++axis)
+    {
+      const auto size = static_cast<int>((heart.high[axis] - heart.low[axis] + 8.0) / spacing) + 1;
+      this->Grid.extent[2 * axis + 1] = size - 1;
+      this->Voxels *= static_cast<std::size_t>(size);
+    }
+    ScannerSettings settings = ScannerPreset(preset);
+    settings.heartShift = 0.0; // the truth has one place for a phase
+    this->Scan = std::make_unique<CtScanner>(anatomy, settings, this->Grid, times);
+    this->Scan->Scan(this->Store);
+  }
+
+  ScalarImage ImageAt(double time)
+  {
+    this->Values.resize(this->Voxels);
+    const auto phase = std::find(this->Times.begin(), this->Times.end(), time);
+    this->Scan->Image(
+      static_cast<std::size_t>(phase - this->Times.begin()), 0, this->Store, this->Values.data());
+    ScalarImage image;
+    image.grid = this->Grid;
+    image.values = static_cast<const std::int16_t*>(this->Values.data());
+    return image;
+  }
+
+private:
+  const std::vector<double> Times;
+  ImageGrid Grid;
+  std::size_t Voxels = 0;
+  MemoryScanStore Store;
+  std::unique_ptr<CtScanner> Scan;
   std::vector<std::int16_t> Values;
 };
 
@@ -365,7 +416,9 @@ struct Settings
   double window = 0.066;
   double captureRange = CenterlineTrackingSettings().captureRange;
   double fineRange = CenterlineTrackingSettings().fineRange;
-  std::string hidden; ///< vessel; empty: none
+  std::string hidden;  ///< vessel; empty: none
+  std::string scanner; ///< preset; empty: images by a formula
+  double larger = 1.0; ///< factor of the motion
   bool filling = true;
   bool asMeasured = false;
   bool quick = false;
@@ -402,27 +455,140 @@ void TellMotion(const Settings& options, const Heart& heart, const Polylines& li
   }
 }
 
+struct Judgement
+{
+  Errors across[2]; ///< tracked frames, others
+  Errors carried[2];
+  Errors unseen;           ///< places of a hidden vessel, from where they were carried
+  Errors unseenAcross;     ///< the same, from its axis
+  double confidence = 0.0; ///< greatest of them
+  int called = 0;
+  int near = 0;
+  int nearAxis = 0;
+  double worst = 0.0; ///< mean of a vessel at a frame
+  std::size_t worstVessel = 0;
+  int worstFrame = 0;
+  std::vector<double> means;                ///< per frame
+  std::vector<std::vector<Vector3>> places; ///< per frame
+  std::vector<std::vector<double>> errors;  ///< per frame and point
+};
+
+Judgement Judge(const Polylines& lines, const std::vector<std::vector<Vector3>>& truth,
+  const PoseSequence& poses, int hidden)
+{
+  const PhaseInterpolation between(poses, {});
+  InterpolatedPose pose;
+  Judgement result;
+  const std::vector<std::int64_t>* own = hidden >= 0 ? &lines.lines[hidden] : nullptr;
+  for (int k = 0; k < Frames; ++k)
+  {
+    between.Evaluate(TimeOf(k), pose);
+    const bool isTracked = k % 2 == 0;
+    std::vector<double> errors;
+    double sum = 0.0;
+    for (std::size_t n = 0; n < pose.points.size(); ++n)
+    {
+      errors.push_back(DistanceToAxis(lines, truth[k], pose.points[n]));
+      sum += errors.back();
+      const double material = (pose.points[n] - truth[k][n]).norm();
+      result.across[k % 2].values.push_back(errors.back());
+      result.carried[k % 2].values.push_back(material);
+      if (own && isTracked && IsHidden(TimeOf(k)) &&
+        std::find(own->begin() + 1, own->end(), static_cast<std::int64_t>(n)) != own->end())
+      {
+        result.unseen.values.push_back(material);
+        result.unseenAcross.values.push_back(errors.back());
+        result.confidence = std::max(result.confidence, poses.confidence[k / 2][n]);
+      }
+      if (isTracked && poses.status[k / 2][n] == TrackingStatus::Tracked)
+      {
+        ++result.called;
+        result.near += material <= 1.0 ? 1 : 0;
+        result.nearAxis += errors.back() <= 1.0 ? 1 : 0;
+      }
+    }
+    for (std::size_t vessel = 0; vessel < lines.lines.size(); ++vessel)
+    {
+      double mean = 0.0;
+      for (const std::int64_t point : lines.lines[vessel])
+      {
+        mean += errors[point] / static_cast<double>(lines.lines[vessel].size());
+      }
+      if (mean > result.worst)
+      {
+        result.worst = mean;
+        result.worstVessel = vessel;
+        result.worstFrame = k;
+      }
+    }
+    result.means.push_back(sum / static_cast<double>(errors.size()));
+    result.places.push_back(pose.points);
+    result.errors.push_back(std::move(errors));
+  }
+  return result;
+}
+
+void Print(const Judgement& one, const std::string& hidden)
+{
+  for (int odd = 0; odd < 2; ++odd)
+  {
+    std::printf("%s frames: to the axis mean %.3f, 95 %% %.3f mm; to where it was carried mean "
+                "%.3f, 95 %% %.3f mm\n",
+      odd != 0 ? "other" : "tracked", one.across[odd].Mean(), one.across[odd].Percentile(0.95),
+      one.carried[odd].Mean(), one.carried[odd].Percentile(0.95));
+  }
+  std::printf("farthest off: %s at frame %d, mean %.2f mm\n", VesselNames[one.worstVessel].c_str(),
+    one.worstFrame, one.worst);
+  if (!hidden.empty())
+  {
+    std::printf("%s, not shown in tracked frames of systole: from where it was carried mean %.2f, "
+                "median %.2f, 95 %% %.2f, greatest %.2f mm; from its axis mean %.2f, 95 %% %.2f "
+                "mm; confidence at most %.2f\n",
+      hidden.c_str(), one.unseen.Mean(), one.unseen.Percentile(0.5), one.unseen.Percentile(0.95),
+      one.unseen.Percentile(1.0), one.unseenAcross.Mean(), one.unseenAcross.Percentile(0.95),
+      one.confidence);
+  }
+}
+
 bool Run(const Settings& options)
 {
   const Heart heart(options.data, options.asMeasured);
   const CarriedTree tree(heart);
+  const LargerMotion motion(heart, options.larger);
   const Polylines& lines = tree.Reference();
   const int hidden = options.hidden.empty()
     ? -1
     : static_cast<int>(
         std::find(VesselNames.begin(), VesselNames.end(), options.hidden) - VesselNames.begin());
-  Scanner scanner(heart, tree, options.spacing, options.window, options.quick ? 3 : 5, hidden);
-
   std::vector<std::vector<Vector3>> truth;
+  std::vector<double> times;
   for (int k = 0; k < Frames; ++k)
   {
-    truth.push_back(tree.At(heart.At(TimeOf(k))));
+    truth.push_back(tree.At(motion.At(TimeOf(k))));
+    if (k % 2 == 0)
+    {
+      times.push_back(TimeOf(k));
+    }
   }
   TellMotion(options, heart, lines, truth);
-  std::vector<double> times;
-  for (int k = 0; k < Frames; k += 2)
+  std::unique_ptr<MeshAnatomy> anatomy;
+  std::function<ScalarImage(double time)> imageAt;
+  if (!options.scanner.empty())
   {
-    times.push_back(TimeOf(k));
+    anatomy = std::make_unique<MeshAnatomy>(AnatomyOf(heart, tree, motion, 400.0));
+    std::vector<double> wanted = times;
+    wanted.push_back(TimeOf(ReferenceFrame));
+    std::sort(wanted.begin(), wanted.end());
+    wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+    const auto images =
+      std::make_shared<ScannerImages>(*anatomy, options.scanner, options.spacing, wanted);
+    imageAt = [images](double time) { return images->ImageAt(time); };
+  }
+  else
+  {
+    const auto scanner = std::make_shared<Scanner>(
+      heart, motion, tree, options.spacing, options.window, options.quick ? 3 : 5, hidden);
+    imageAt = [scanner](double time) { return scanner->ImageAt(time); };
   }
   CenterlineTrackingSettings settings;
   settings.temporalWindow = options.window;
@@ -435,7 +601,7 @@ bool Run(const Settings& options)
     lines, TimeOf(ReferenceFrame), times,
     [&](double time)
     {
-      const ScalarImage image = scanner.ImageAt(time);
+      const ScalarImage image = imageAt(time);
       if (!options.output.empty())
       {
         WriteSlice(
@@ -444,97 +610,39 @@ bool Run(const Settings& options)
       return image;
     },
     settings, &report);
+  MotionRegularizationSettings limits;
+  limits.temporalWeight = TemporalWeightOf(times.size());
 
-  const PhaseInterpolation between(poses, {});
-  InterpolatedPose pose;
-  Errors across[2]; // tracked, between
-  Errors carried[2];
-  int called = 0;
-  int near = 0;
-  int nearAxis = 0;
-  double worst = 0.0; // mean of a vessel at a frame
-  std::size_t worstVessel = 0;
-  int worstFrame = 0;
-  Errors unseen;
-  double confidence = 0.0;
+  const Judgement tracked = Judge(lines, truth, poses, hidden);
+  const Judgement limited =
+    Judge(lines, truth, RegularizeMotion(poses, lines, limits).poses, hidden);
   std::printf("frame: mean distance to the axis, mm (share tracked)\n");
   for (int k = 0; k < Frames; ++k)
   {
-    between.Evaluate(TimeOf(k), pose);
-    std::vector<double> errors;
-    double sum = 0.0;
-    for (std::size_t n = 0; n < pose.points.size(); ++n)
-    {
-      errors.push_back(DistanceToAxis(lines, truth[k], pose.points[n]));
-      sum += errors.back();
-      const double material = (pose.points[n] - truth[k][n]).norm();
-      across[k % 2].values.push_back(errors.back());
-      carried[k % 2].values.push_back(material);
-      const std::vector<std::int64_t>* own = hidden >= 0 ? &lines.lines[hidden] : nullptr;
-      if (own && k % 2 == 0 && IsHidden(TimeOf(k)) &&
-        std::find(own->begin() + 1, own->end(), static_cast<std::int64_t>(n)) != own->end())
-      {
-        unseen.values.push_back(material);
-        confidence = std::max(confidence, poses.confidence[k / 2][n]);
-      }
-      if (k % 2 == 0 && poses.status[k / 2][n] == TrackingStatus::Tracked)
-      {
-        ++called;
-        near += material <= 1.0 ? 1 : 0;
-        nearAxis += errors.back() <= 1.0 ? 1 : 0;
-      }
-    }
-    for (std::size_t vessel = 0; vessel < lines.lines.size(); ++vessel)
-    {
-      double own = 0.0;
-      for (const std::int64_t point : lines.lines[vessel])
-      {
-        own += errors[point] / static_cast<double>(lines.lines[vessel].size());
-      }
-      if (own > worst)
-      {
-        worst = own;
-        worstVessel = vessel;
-        worstFrame = k;
-      }
-    }
-    std::printf("  %2d: %.2f", k, sum / static_cast<double>(errors.size()));
+    std::printf("  %2d: %.2f", k, tracked.means[k]);
     std::printf(
       k % 2 == 0 ? " (%.2f)\n" : "\n", report.trackedShare[static_cast<std::size_t>(k) / 2]);
     if (!options.output.empty())
     {
       char name[32];
       std::snprintf(name, sizeof name, "_%02d.vtk", k);
-      WriteLines(options.output + "/found" + name, lines, pose.points, errors);
+      WriteLines(options.output + "/found" + name, lines, tracked.places[k], tracked.errors[k]);
       WriteLines(options.output + "/carried" + name, lines, truth[k],
-        std::vector<double>(errors.size(), 0.0));
+        std::vector<double>(truth[k].size(), 0.0));
     }
   }
-  for (int odd = 0; odd < 2; ++odd)
-  {
-    std::printf("%s frames: to the axis mean %.3f, 95 %% %.3f mm; to where it was carried mean "
-                "%.3f, 95 %% %.3f mm\n",
-      odd != 0 ? "other" : "tracked", across[odd].Mean(), across[odd].Percentile(0.95),
-      carried[odd].Mean(), carried[odd].Percentile(0.95));
-  }
-  std::printf("farthest off: %s at frame %d, mean %.2f mm\n", VesselNames[worstVessel].c_str(),
-    worstFrame, worst);
+  Print(tracked, options.hidden);
   std::printf(
     "called tracked: %.3f of the places, of them within 1 mm of the axis %.3f, of where they were "
     "carried %.3f; %d images read\n",
-    called / static_cast<double>(carried[0].values.size()),
-    static_cast<double>(nearAxis) / std::max(called, 1),
-    static_cast<double>(near) / std::max(called, 1), report.imagesRead);
-  if (hidden >= 0)
-  {
-    std::printf("%s, not shown in tracked frames of systole: from where it was carried mean %.2f, "
-                "median %.2f, 95 %% %.2f, greatest %.2f mm; confidence at most %.2f\n",
-      options.hidden.c_str(), unseen.Mean(), unseen.Percentile(0.5), unseen.Percentile(0.95),
-      unseen.Percentile(1.0), confidence);
-  }
+    tracked.called / static_cast<double>(tracked.carried[0].values.size()),
+    static_cast<double>(tracked.nearAxis) / std::max(tracked.called, 1),
+    static_cast<double>(tracked.near) / std::max(tracked.called, 1), report.imagesRead);
+  std::printf("Within limits, as `run` goes on with it:\n");
+  Print(limited, options.hidden);
   const int judged = options.asMeasured ? 0 : 1; // frames that scatter cannot be interpolated
-  const bool met = across[judged].Mean() <= MaximumMean[options.quick] &&
-    across[judged].Percentile(0.95) <= MaximumPercentile[options.quick];
+  const bool met = limited.across[judged].Mean() <= MaximumMean[options.quick] &&
+    limited.across[judged].Percentile(0.95) <= MaximumPercentile[options.quick];
   std::printf("%s frames: mean at most %.2f mm, 95 %% at most %.2f mm: %s\n",
     judged != 0 ? "Other" : "Tracked", MaximumMean[options.quick], MaximumPercentile[options.quick],
     met ? "met" : "**MISSED**");
@@ -567,6 +675,16 @@ int main(int argc, char** argv)
     program
       .add_option("--hide", options.hidden, "Vessel that the images of early systole do not show")
       ->check(CLI::IsMember(VesselNames));
+    program
+      .add_option("--scanner", options.scanner,
+        "Preset of the virtual CT scanner, with blood as bright as arteries and veins beside them; "
+        "none: "
+        "images by a formula")
+      ->check(CLI::IsMember(ScannerPresets()))
+      ->excludes("--hide");
+    program.add_option("--larger", options.larger, "Factor of the motion")
+      ->check(CLI::Range(0.1, 3.0))
+      ->capture_default_str();
     program.add_flag(
       "!--no-filling", options.filling, "What is not seen by the trajectories alone");
     program.add_flag("--frames-as-they-are", options.asMeasured,
