@@ -74,6 +74,7 @@ constexpr const char* Area = "Area";                         ///< double, mm^2, 
 constexpr const char* LeastDiameter = "LeastDiameter";       ///< double, mm, over the phases
 constexpr const char* MedianDiameter = "MedianDiameter";     ///< double, mm
 constexpr const char* GreatestDiameter = "GreatestDiameter"; ///< double, mm
+constexpr const char* HealthyDiameter = "HealthyDiameter";   ///< double, mm, of the median
 constexpr const char* MedianDegree = "MedianDegree"; ///< double, 0 to 1, of the median diameter
 
 // Points with a meaning of their own (ostia, seeds), point data.

@@ -58,6 +58,8 @@ enum InputPorts
 
 constexpr double NotKnown = std::numeric_limits<double>::quiet_NaN();
 constexpr double Percent = 100.0;
+/// Fraction of R-R: phases of images and lines that are nearer are one.
+constexpr double SameTime = 1e-3;
 
 /// "35 %", with the fraction where two phases would have one name.
 std::vector<std::string> PhaseNames(const std::vector<double>& times)
@@ -315,6 +317,7 @@ void vtkLumenCycle::Internals::WriteTree(std::size_t phase, vtkPolyData* output)
   add(names::LeastDiameter, [&](std::size_t p) { return 2.0 * cycle.least[p]; });
   add(names::MedianDiameter, [&](std::size_t p) { return 2.0 * cycle.median[p]; });
   add(names::GreatestDiameter, [&](std::size_t p) { return 2.0 * cycle.greatest[p]; });
+  add(names::HealthyDiameter, [&](std::size_t p) { return 2.0 * cycle.medianReference[p]; });
   add(names::MedianDegree, [&](std::size_t p) { return cycle.medianDegree[p]; });
 }
 
@@ -326,6 +329,43 @@ vtkLumenCycle::vtkLumenCycle()
 }
 
 vtkLumenCycle::~vtkLumenCycle() = default;
+
+std::vector<double> vtkLumenCycle::PhasesOf(vtkInformation* lines, vtkInformation* image)
+{
+  const std::vector<double> own = vtkPoseSequences::StepsOf(lines);
+  if (image == nullptr)
+  {
+    return own;
+  }
+  // Lines of another moment would be measured beside their vessels.
+  std::vector<double> phases = vtkPoseSequences::StepsOf(image);
+  const auto alone = [&](double time)
+  {
+    return std::none_of(
+      own.begin(), own.end(), [time](double one) { return std::abs(one - time) < SameTime; });
+  };
+  if (!own.empty())
+  {
+    phases.erase(std::remove_if(phases.begin(), phases.end(), alone), phases.end());
+    Require(!phases.empty(), "The lines have none of the times of the images");
+  }
+  return phases;
+}
+
+std::vector<double> vtkLumenCycle::GetPhases()
+{
+  try
+  {
+    vtkInformation* image = this->GetNumberOfInputConnections(ImagePort) > 0
+      ? this->GetInputInformation(ImagePort, 0)
+      : nullptr;
+    return PhasesOf(this->GetInputInformation(LinesPort, 0), image);
+  }
+  catch (const std::invalid_argument&)
+  {
+    return {};
+  }
+}
 
 int vtkLumenCycle::GetNumberOfMeasurements() const
 {
@@ -352,10 +392,17 @@ int vtkLumenCycle::FillOutputPortInformation(int port, vtkInformation* info)
 int vtkLumenCycle::RequestInformation(
   vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  vtkInformation* image = Connection(inputs, ImagePort);
-  vtkMovedLines::SetTimes(
-    outputs, vtkPoseSequences::StepsOf(image != nullptr ? image : Connection(inputs, LinesPort)));
-  return 1;
+  try
+  {
+    vtkMovedLines::SetTimes(
+      outputs, PhasesOf(Connection(inputs, LinesPort), Connection(inputs, ImagePort)));
+    return 1;
+  }
+  catch (const std::invalid_argument& error)
+  {
+    vtkErrorMacro(<< error.what());
+    return 0;
+  }
 }
 
 int vtkLumenCycle::RequestUpdateExtent(
@@ -399,8 +446,7 @@ void vtkLumenCycle::Measure(vtkInformationVector** inputs)
   vtkInformation* imageInfo = Connection(inputs, ImagePort);
   const vtkMTimeType linesTime = vtkCoronary::UpstreamTime(linesInfo);
   const vtkMTimeType imageTime = imageInfo != nullptr ? vtkCoronary::UpstreamTime(imageInfo) : 0;
-  std::vector<double> times =
-    vtkPoseSequences::StepsOf(imageInfo != nullptr ? imageInfo : linesInfo);
+  std::vector<double> times = PhasesOf(linesInfo, imageInfo);
   data.HasTimes = !times.empty();
   if (!data.HasTimes)
   {

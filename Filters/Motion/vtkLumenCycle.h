@@ -13,7 +13,8 @@
  * - 0: vtkPolyData, a tree of centerlines with or without time steps, with the same points at all of them: polylines with
  *   cell data `GroupIds`, `ParentGroupIds`, and `SegmentIds`, `SegmentLabel` (optional). Point data
  *   `MaximumInscribedSphereRadius` or `Radius`; `TrackingStatus`, `Bridged` (optional). Field data `ImageBlur` (optional).
- * - 1, optional: vtkImageData, the gated images, HU. Their time steps are the phases.
+ * - 1, optional: vtkImageData, the gated images, HU. The phases are those of their time steps at which the lines have
+ *   one, too; lines without time steps are measured where they stand.
  *
  * @par Output ports:
  * - 0: vtkTable, the chosen vessel's profile for line charts, a row a point. Columns: `Position` (double, mm from the
@@ -29,7 +30,7 @@
  *   `LeastStenosis` (double, per cent), `Pulsation` (double, per cent: greatest over least diameter - 1).
  * - 3: vtkPolyData, the lines at the asked time. Point data of the input, and `Diameter` (double, mm), `Area` (double,
  *   mm^2), `StenosisDegree` (double, 0 to 1) at that phase, `ReferenceRadius` (double, mm), `LeastDiameter`,
- *   `MedianDiameter`, `GreatestDiameter` (double, mm), `MedianDegree` (double, 0 to 1).
+ *   `MedianDiameter`, `GreatestDiameter`, `HealthyDiameter` (double, mm), `MedianDegree` (double, 0 to 1).
  * What is not known is NaN in all of them.
  *
  * The outputs are whole in piece 0, and empty in every other piece. Lines without points give empty outputs.
@@ -40,7 +41,7 @@
  *
  * @par Failure:
  * Lines that are no tree or differ from phase to phase, a vessel that the tree does not have, an image without voxels or
- * scalars, an unknown blur: one error that names it, and no output.
+ * scalars, an unknown blur, lines with none of the images' times: one error that names it, and no output.
  *
  * @sa coronary::GradeOverCycle, coronary::MeasureTreeLumen, vtkCurvedReformat
  */
@@ -52,6 +53,7 @@
 
 #include <memory> // for std::unique_ptr
 #include <string> // for std::string
+#include <vector> // for std::vector
 
 class VTKCORONARYMOTION_EXPORT vtkLumenCycle : public vtkPolyDataAlgorithm
 {
@@ -96,6 +98,9 @@ public:
   vtkGetMacro(ImageArrayName, std::string);
   ///@}
 
+  /// The phases, after UpdateInformation: times of the images at which the lines are there, too; of lines alone theirs.
+  std::vector<double> GetPhases();
+
   /// Times that the phases have been read and measured.
   int GetNumberOfMeasurements() const;
 
@@ -116,6 +121,7 @@ private:
   vtkLumenCycle(const vtkLumenCycle&) = delete;
   void operator=(const vtkLumenCycle&) = delete;
 
+  static std::vector<double> PhasesOf(vtkInformation* lines, vtkInformation* image);
   void Measure(vtkInformationVector** inputs);
 
   std::string Vessel;
