@@ -5,6 +5,7 @@ const FINDINGS = [
   ['checks', ['checks'], 'Checks of the whole tree', 'Nothing was noticed.'],
   ['bridges', ['bridges'], 'Guessed across gaps', 'No gap was bridged.'],
   ['lesions', ['lesions'], 'Narrowings', 'No narrowing was found.'],
+  ['cycle', ['cycle', 'lesions'], 'Narrowings over the heart cycle', 'No narrowing was found in the median over the phases.'],
   ['calcium', ['calcium', 'objects'], 'Calcium', 'No calcium was found.'],
   ['hidden', ['calcium', 'radius_interpolated'], 'Radius guessed, behind calcium', 'None was.'],
   ['placement', ['placement'], 'How likely each branch is within 1 mm of an artery, at its worst phase', 'Nothing was followed.'],
@@ -12,7 +13,8 @@ const FINDINGS = [
   ['limits', ['limits', 'clamped'], 'Held back by limits of motion', 'Nothing was held back.'],
 ];
 // Columns that come first; the others follow as they are.
-const FIRST_COLUMNS = ['what', 'vessel', 'time', 'status', 'limit', 'kind', 'degree', 'diameter_stenosis_percent', 'range_percent', 'confidence', 'length_mm',
+const FIRST_COLUMNS = ['what', 'vessel', 'time', 'status', 'limit', 'kind', 'degree', 'diameter_stenosis_percent', 'range_percent', 'worst_percent',
+  'worst_phase_percent', 'mildest_percent', 'pulsation_percent', 'confidence', 'length_mm',
   'least_diameter_mm', 'reference_diameter_mm'];
 const PLACES = ['position', 'place', 'at', 'minimum', 'centre', 'center', 'from', 'begin'];
 const NEAR_VESSEL = 4; // mm from its axis: a click there belongs to it
@@ -126,7 +128,8 @@ class RunPanel {
     byId('sheets').replaceChildren(...run.sheets.map((one) => this.sheet(one)));
     if (pictured) {
       byId('views-note').textContent = `Two cuts at right angles, ±${run.half_width} mm about the axis, then diameter (mm) and the ` +
-        `image’s values on the axis; below them a slab of ${run.thickness} mm that follows the vessel. Black ${run.window[0].toFixed(0)}, ` +
+        `image’s values on the axis; the cross-section at the slider; a curved reformat; a slab of ${run.thickness} mm that follows the vessel; its diameter ` +
+        `over the heart cycle. The outer boundary is drawn where fat shows it. Black ${run.window[0].toFixed(0)}, ` +
         `white ${run.window[1].toFixed(0)} (HU). A click shows the place in the model.`;
     }
   }
@@ -136,7 +139,11 @@ class RunPanel {
     found = Array.isArray(found) ? found.filter((one) => one !== null && typeof one === 'object') : null;
     const around = path.length > 1 && kind === path[0] ? this.run[kind] : null;
     const parts = [element('h3', {}, [title])];
-    if (around && !Array.isArray(around)) {
+    if (kind === 'cycle') {
+      parts.push(element('p', { class: 'none' }, [!this.run.cycle ? 'There is no motion, or it was not measured.' : this.run.cycle.measured
+        ? 'The lumen was measured in the image of each phase; the degree is that of the median over the phases.'
+        : 'Of the radii of the moved lines: no image was measured.']));
+    } else if (around && !Array.isArray(around)) {
       // What is said of all of them together.
       const all = Object.keys(around).filter((key) => ['number', 'string', 'boolean'].includes(typeof around[key]) && key !== 'file');
       parts.push(element('p', { class: 'none' }, [all.map((key) => {
@@ -220,10 +227,24 @@ class RunPanel {
     if (vessel.stenosis > 0) {
       notes.push(element('b', {}, [`narrowed by ${(100 * vessel.stenosis).toFixed(0)} %`]));
     }
+    const goTo = (arc) => this.onPlace(vessel.path[Math.max(0, Math.min(vessel.path.length - 1, arc))], false);
+    const curved = vessel.curved && this.view(vessel.curved, `${vessel.name}, curved reformat`);
+    const section = vessel.sections && new SectionView(vessel, this.observer, goTo);
+    const cycle = this.run.cycle && new CycleView(this.run.cycle, index, goTo);
+    const beating = cycle && !cycle.empty;
     const article = element('article', { 'data-vessel': index }, [
       element('h3', {}, [vessel.name, ...notes.flatMap((one) => [' · ', one]).map((one) =>
         (typeof one === 'string' ? element('small', {}, [one]) : one))]),
-      element('div', { class: 'scroll' }, [straight.made]), element('div', { class: 'scroll' }, [slab.made])]);
+      element('div', { class: 'scroll' }, [straight.made]), ...(section ? [section.made] : []),
+      ...(curved ? [element('div', { class: 'scroll' }, [curved.made])] : []), element('div', { class: 'scroll' }, [slab.made]),
+      ...(beating ? [cycle.made] : [])]);
+    if (curved) {
+      curved.made.addEventListener('click', (event) => {
+        const [x, y] = this.pixelOf(curved, event);
+        const away = vessel.curved.axis.map((place) => Math.hypot(place[0] - x, place[1] - y));
+        goTo(away.indexOf(Math.min(...away)));
+      });
+    }
     straight.made.addEventListener('click', (event) => {
       const arc = (this.pixelOf(straight, event)[0] - vessel.straightened.left) / vessel.straightened.per_mm;
       this.onPlace(vessel.path[Math.max(0, Math.min(vessel.path.length - 1, Math.round(arc)))], false);
@@ -236,7 +257,7 @@ class RunPanel {
       });
       this.onPlace(vessel.path[distances.indexOf(Math.min(...distances))], false);
     });
-    this.figures.push({ vessel, article, straight, slab });
+    this.figures.push({ vessel, article, straight, slab, curved, section, cycle: beating ? cycle : null });
     return article;
   }
 
@@ -288,12 +309,24 @@ class RunPanel {
       view.cursor.style.top = kind === 'across' ? `${100 * view.picture.top / view.picture.rows}%` : `${100 * (y + 0.5) / view.picture.rows}%`;
       view.cursor.style.height = kind === 'across' ? `${100 * (view.picture.bottom - view.picture.top) / view.picture.rows}%` : '';
     };
-    for (const { vessel, article, straight, slab } of this.figures) {
+    for (const { vessel, article, straight, slab, curved, section, cycle } of this.figures) {
       const here = near && near.vessel === vessel;
       article.classList.toggle('here', Boolean(here));
       straight.cursor.hidden = !here;
       slab.cursor.hidden = !here;
+      if (curved) {
+        curved.cursor.hidden = !here;
+      }
       if (here) {
+        if (curved) {
+          put(curved, ...vessel.curved.axis[near.arc], 'ring');
+        }
+        if (section) {
+          section.show(near.arc);
+        }
+        if (cycle) {
+          cycle.show(near.arc);
+        }
         put(straight, straight.picture.left + straight.picture.per_mm * near.arc, 0, 'across');
         const [x, y] = this.project(slab.picture, place);
         put(slab, x, y, 'ring');
