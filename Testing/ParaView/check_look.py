@@ -1,4 +1,4 @@
-"""The macro that looks along a vessel: its views, the vessel by name, the place, the chart; without a vessel one sentence."""
+"""The macro that looks along a vessel: its views, the vessel by name, the place, the chart; without a tree one sentence."""
 import os
 import sys
 
@@ -27,6 +27,11 @@ def length(reformat):
 
 phantom = simple.CoronaryPhantom(Spacing=[1.0, 1.0, 1.0], TemporalWindow=0.0, Phases=[0.05, 0.35, 0.75])
 image, tree = simple.OutputPort(phantom, IMAGE), simple.OutputPort(phantom, CENTERLINES)
+try:
+    look_along_vessel.selected()
+    sys.exit("FAILED: an image alone is enough")
+except RuntimeError as error:
+    require("a tree of centerlines" in str(error), "without a tree it says: %s" % error)
 made = look_along_vessel.look(image, tree, "LAD", size=SIZE)
 reformat, cycle, views = made["reformat"], made["cycle"], made["views"]
 require(len(views) == 4 and all(view is not None for view in views), "not four views")
@@ -52,20 +57,14 @@ require(pixels(path) != before, "the section's picture did not change")
 # The chart's table has the vessel's length, a column a phase, and the phantom's radii.
 table = fetch(cycle, look_along_vessel.PROFILE, 0.35)
 position = table.GetColumnByName("Position")
-require(abs(position.GetValue(table.GetNumberOfRows() - 1) - lad) < 5.0, "the profile has another length")
+# Its distances are those of the first phase: arteries are longer in some phases than in others.
+require(abs(position.GetValue(table.GetNumberOfRows() - 1) / lad - 1.0) < 0.15, "the profile has another length")
 for name in ("5 %", "35 %", "75 %", "Least", "Median", "Greatest", "Healthy"):
     require(table.GetColumnByName(name) is not None, "the profile has no column " + name)
 require(fetch(cycle, look_along_vessel.MAP, 0.35).GetNumberOfPoints() == 3 * table.GetNumberOfRows(), "the map has other points")
 simple.SaveScreenshot(os.path.join(folder, "look.png"), made["layout"])
 
-# Another vessel, and one that is not there.
+# Another vessel.
 reformat.Vessel = "RCA"
 reformat.UpdatePipeline(0.35)
 require(abs(length(reformat) - lad) > 1.0, "the RCA is as long as the LAD")
-before = len(simple.GetSources())
-try:
-    look_along_vessel.look(image, tree, "Aorta")
-    sys.exit("FAILED: there is an aorta")
-except RuntimeError as error:
-    require(str(error).count("\n") == 0, "more than a sentence: %s" % error)
-require(len(simple.GetSources()) == before, "a failed look leaves filters")
