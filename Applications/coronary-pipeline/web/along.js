@@ -1,6 +1,7 @@
 // Along a vessel: its cross-section at a slider, and its diameter over the heart cycle.
 
-const CHART = { width: 720, height: 190, left: 42, right: 8, top: 12, bottom: 26 };
+const CHART = { width: 720, narrow: 380, height: 190, left: 42, right: 8, top: 12, bottom: 26 };
+const NARROW = 700; // CSS pixels of the window: below them charts are drawn narrower, so that their numbers stay readable
 // Of the map: narrow is dark, wide is bright; seen apart also by those who do not see all colours (viridis).
 const MAP_COLOURS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 
@@ -72,6 +73,7 @@ class CycleView {
   /** @param cycle  of the run @param index  of the vessel @param onArc  called with the mm that a click is at */
   constructor(cycle, index, onArc) {
     this.cycle = cycle;
+    this.width = innerWidth < NARROW ? CHART.narrow : CHART.width;
     this.order = cycle.times.map((_, k) => k).sort((a, b) => cycle.times[a] - cycle.times[b]);
     this.vessel = cycle.vessels[index];
     const values = this.vessel.diameter.flat().filter(known);
@@ -89,16 +91,16 @@ class CycleView {
       'aria-label': 'Diameter, place by phase' });
     this.reading = element('p', { class: 'none' });
     this.cursor = element('i', { class: 'cursor across', hidden: '' });
-    const rows = element('ol', { class: 'phases' }, [...this.order].reverse().map((k) =>
+    const rows = element('ol', { class: 'phases', style: `width:${100 * CHART.left / this.width}%` }, [...this.order].reverse().map((k) =>
       element('li', {}, [this.order.length <= 12 ? `${(100 * cycle.times[k]).toFixed(0)} %` : ''])));
     this.made = element('div', { class: 'cycle' }, [
       element('p', { class: 'legend cycle-legend' }, [element('span', { class: 'phase' }, ['each phase']), element('span', { class: 'median' }, ['median']),
         element('span', { class: 'healthy' }, ['were it healthy'])]),
-      this.chart, element('div', { class: 'mapped' }, [rows, element('div', {}, [this.map, this.cursor])]),
+      this.chart, element('div', { class: 'mapped' }, [rows, element('div', { style: `margin-right:${100 * CHART.right / this.width}%` }, [this.map, this.cursor])]),
       element('p', { class: 'none scale-of-map' }, [`${low.toFixed(1)} mm`, element('i', { style: `background:linear-gradient(to right, ${
         MAP_COLOURS.map((one) => `rgb(${one.join(' ')})`).join(', ')})` }), `${high.toFixed(1)} mm; grey: not seen`]), this.reading]);
     this.paint(low, high);
-    this.chart.addEventListener('click', (event) => onArc(this.arcAt(this.chart, event, CHART.left / CHART.width, 1 - CHART.right / CHART.width)));
+    this.chart.addEventListener('click', (event) => onArc(this.arcAt(this.chart, event, CHART.left / this.width, 1 - CHART.right / this.width)));
     this.map.addEventListener('click', (event) => {
       const box = this.map.getBoundingClientRect();
       const row = Math.floor((event.clientY - box.top) / box.height * this.order.length);
@@ -114,7 +116,7 @@ class CycleView {
   }
 
   x(arc) {
-    return CHART.left + (CHART.width - CHART.left - CHART.right) * arc / (this.count - 1);
+    return CHART.left + (this.width - CHART.left - CHART.right) * arc / (this.count - 1);
   }
 
   y(value) {
@@ -128,20 +130,21 @@ class CycleView {
   }
 
   draw() {
+    this.curves = this.vessel.diameter.map((one) => drawing('path', { d: this.path(one), class: 'phase' }));
     const parts = [];
     const step = [0.1, 0.2, 0.5, 1, 2].find((one) => (this.high - this.low) / one < 6) || 5;
     for (let value = Math.ceil(this.low / step) * step; value <= this.high; value += step) {
-      parts.push(drawing('path', { d: `M${CHART.left} ${this.y(value)}H${CHART.width - CHART.right}`, class: 'grid' }),
+      parts.push(drawing('path', { d: `M${CHART.left} ${this.y(value)}H${this.width - CHART.right}`, class: 'grid' }),
         drawing('text', { x: CHART.left - 5, y: this.y(value) + 4, class: 'end' }, [value.toFixed(step < 1 ? 1 : 0)]));
     }
-    const every = this.count > 120 ? 20 : this.count > 40 ? 10 : 5;
+    const every = [5, 10, 20, 50, 100].find((one) => this.count / one < this.width / 60) || 200;
     for (let arc = 0; arc < this.count; arc += every) {
       parts.push(drawing('text', { x: this.x(arc), y: CHART.height - 10, class: 'middle' }, [`${arc}`]));
     }
-    parts.push(drawing('text', { x: 2, y: 12 }, ['mm']), ...this.vessel.diameter.map((one) => drawing('path', { d: this.path(one), class: 'phase' })),
+    parts.push(drawing('text', { x: 2, y: 12 }, ['mm']), ...this.curves,
       drawing('path', { d: this.path(this.vessel.healthy), class: 'healthy' }), drawing('path', { d: this.path(this.vessel.median), class: 'median' }));
     this.line = drawing('path', { class: 'cursor' });
-    return drawing('svg', { viewBox: `0 0 ${CHART.width} ${CHART.height}`, class: 'chart', role: 'img',
+    return drawing('svg', { viewBox: `0 0 ${this.width} ${CHART.height}`, class: 'chart', role: 'img',
       'aria-label': 'Diameter along the vessel at each phase' }, [...parts, this.line]);
   }
 
@@ -161,6 +164,11 @@ class CycleView {
     const degree = this.vessel.degree[phase][arc];
     this.reading.textContent = `${arc} mm, ${(100 * this.cycle.times[phase]).toFixed(0)} %R-R: ${known(diameter)
       ? `${diameter.toFixed(2)} mm${known(degree) && degree > 0 ? `, narrowed by ${(100 * degree).toFixed(0)} %` : ''}` : 'not seen'}`;
+  }
+
+  /** The curve of the phase that the model is shown in. @param fraction  of R-R */
+  atTime(fraction) {
+    this.curves.forEach((curve, k) => curve.classList.toggle('now', Math.abs(this.cycle.times[k] - fraction) < 2e-3));
   }
 
   /** @param arc  mm from the vessel's beginning */

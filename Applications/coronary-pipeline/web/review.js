@@ -301,6 +301,7 @@ class Review {
       // Of a result at rest nothing was tracked.
       this.compared || this.order.length > 1 ? element('em', { class: kindOf(phase) }, [kindOf(phase)]) : '', ...distances);
     this.plots.forEach((plot) => plot.show(this.phase));
+    this.run.atTime(phase.fraction);
   }
 
   play(on) {

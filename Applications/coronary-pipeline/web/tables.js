@@ -95,9 +95,9 @@ function fillPartB(table, data, all, onCase) {
     head, body, paper);
 }
 
-// What the table of branches has: measure, unit, what of its values over the phases, digits.
-const BRANCH_COLUMNS = [['length', 'mm', 'mean', 1], ['covered', '%', 'mean', 0], ['covered', '%', 'least', 0], ['mean', 'mm', 'mean', 2],
-  ['HD', 'mm', 'greatest', 2]];
+// What the table of branches has: measure, unit, what of its values over the phases, digits, and whether there is room only on a wide page.
+const BRANCH_COLUMNS = [['length', 'mm', 'mean', 1, 'wide'], ['covered', '%', 'mean', 0, 'wide'], ['covered', '%', 'least', 0, null],
+  ['mean', 'mm', 'mean', 2, null], ['HD', 'mm', 'greatest', 2, null]];
 const BRANCH_NAMES = { covered: 'found', mean: 'distance' };
 const LOST_SHARE = 0.5; // of a branch's length: less of it is a lost branch
 const OVER_PHASES = {
@@ -130,9 +130,9 @@ function fillBranches(table, phases, names, onBranch) {
     const button = element('button', { type: 'button', 'aria-label': `Show ${branch.label}` }, [branch.label]);
     const row = element('tr', { class: Math.min(...branch.all.map((one) => one.covered)) < LOST_SHARE ? 'goes missed' : 'goes', 'data-branch': branch.group }, [
       element('th', { scope: 'row', class: 'text' }, [button]),
-      ...BRANCH_COLUMNS.map(([key, unit, what, digits]) => {
+      ...BRANCH_COLUMNS.map(([key, unit, what, digits, kind]) => {
         const values = branch.all.map((one) => one[key]).filter(known);
-        return cell(values.length > 0 ? written((unit === '%' ? 100 : 1) * OVER_PHASES[what](values), digits) : '–');
+        return cell(values.length > 0 ? written((unit === '%' ? 100 : 1) * OVER_PHASES[what](values), digits) : '–', kind);
       }), cell(names[branch.worst])]);
     row.addEventListener('click', () => onBranch(branch));
     body.append(row);
@@ -141,7 +141,7 @@ function fillBranches(table, phases, names, onBranch) {
     element('caption', {}, ['The truth’s branches over all phases, the worst first: how much of their length the model has, and how far their surface is from ' +
       'it. A row goes to the branch in its worst phase.']),
     element('thead', {}, [element('tr', {}, [element('th', { scope: 'col', class: 'text' }, ['Branch']),
-      ...BRANCH_COLUMNS.map(([key, unit, what]) => element('th', { scope: 'col' }, [BRANCH_NAMES[key] || key,
+      ...BRANCH_COLUMNS.map(([key, unit, what, , kind]) => element('th', { scope: 'col', class: kind }, [BRANCH_NAMES[key] || key,
         element('small', {}, [` ${what === 'mean' && key === 'length' ? '' : what}${unit ? ` ${unit}` : ''}`])])),
       element('th', { scope: 'col' }, ['worst', element('small', {}, [' phase'])])])]), body);
   return branches.length > 0;

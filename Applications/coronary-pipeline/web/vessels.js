@@ -75,7 +75,7 @@ function fillFindings(table, findings, onPlace) {
   const body = element('tbody');
   findings.forEach((one) => {
     const place = placeOf(one);
-    const cells = keys.map((key) => cell(shownValue(key, one[key]), texts.has(key) ? 'text' : null));
+    const cells = keys.map((key) => cell(shownValue(key, one[key]), !texts.has(key) ? null : `${one[key]}`.length > 40 ? 'text long' : 'text'));
     const button = place ? element('button', { type: 'button' }, ['show']) : '–';
     const row = element('tr', { class: place ? 'goes' : null }, [element('td', { class: 'text' }, [button]), ...cells]);
     if (place) {
@@ -294,6 +294,11 @@ class RunPanel {
       });
     }
     return best && best.distance <= NEAR_VESSEL ? best : null;
+  }
+
+  /** @param fraction  of R-R, of the phase that is shown */
+  atTime(fraction) {
+    this.figures.filter(({ cycle }) => cycle).forEach(({ cycle }) => cycle.atTime(fraction));
   }
 
   /** Cursors in all pictures that have the place in them. */
