@@ -353,6 +353,29 @@ def check_page(page, url):
     return dashed
 
 
+def check_cycle(page, url):
+    """Without pictures: curves and maps of what is known, and a click in them that leads to the place."""
+    page.open(url)
+    page.wait("document.getElementById('stage') && %s.state === 'ready'" % STATE)
+    vessels = page.evaluate("document.querySelectorAll('#vessels tbody tr').length")
+    check(page.evaluate("document.querySelectorAll('#views .cycle').length") == vessels, "not every vessel has its cycle")
+    check(page.evaluate("document.querySelectorAll('#views article:first-child .chart .phase').length") == 3, "not a curve a phase")
+    check(page.evaluate("document.querySelectorAll('#views article:first-child .chart .now').length") == 1, "no curve is of the phase that is shown")
+    ends = "document.querySelector('#views article:first-child .scale-of-map').textContent"
+    diameters = page.evaluate(ends)
+    page.evaluate("(() => { const one = document.querySelector('#views article:first-child .cycle select'); one.value = 1;"
+                  " one.dispatchEvent(new Event('change')); })()")
+    areas = page.evaluate(ends)
+    values = [[float(one) for one in re.findall(r"[0-9.]+(?= mm)", said)] for said in (diameters, areas)]
+    check(all(abs(math.pi / 4 * d * d - a) < 0.1 + math.pi / 2 * d * 0.06 for d, a in zip(*values)) and len(values[1]) == 2,
+          "areas of %s, diameters of %s" % (areas, diameters))
+    page.evaluate("(() => { const one = document.querySelector('#views article:first-child .map'), box = one.getBoundingClientRect();"
+                  " one.dispatchEvent(new MouseEvent('click', { clientX: box.x + 0.5 * box.width, clientY: box.y + 2 })); })()")
+    name = page.evaluate("document.querySelector('#vessels tbody tr').firstChild.textContent")
+    page.wait("document.getElementById('readout').textContent.startsWith(%s)" % json.dumps(name))
+    check("106 %R-R" in text(page, "#views article:first-child .cycle > .none:last-child"), "the map is not read")
+
+
 def main():
     pipeline, folder = sys.argv[1:3]
     os.makedirs(folder, exist_ok=True)
@@ -368,6 +391,7 @@ def main():
         page.open("file://" + os.path.abspath("bare-review/review.html"))
         page.wait("document.getElementById('stage') && %s.state === 'ready'" % STATE)
         check("The run says nothing of it." in text(page, "#findings"), "what a run does not know is not told")
+        check_cycle(page, "file://" + os.path.abspath("moving/review.html"))
         check(not page.complaints, "the browser complains: %s" % page.complaints)
     print("the review of a run is as it should be")
 

@@ -68,7 +68,14 @@ class SectionView {
   }
 }
 
-/** The diameter of a vessel at all phases: curves, and a map of place and phase. */
+// What is drawn over place and phase: name, unit, digits, and its value of a diameter (mm) and a degree (0 to 1).
+const QUANTITIES = [
+  { name: 'Diameter', unit: 'mm', digits: 1, of: (diameter) => diameter },
+  { name: 'Area', unit: 'mm²', digits: 1, of: (diameter) => Math.PI / 4 * diameter * diameter },
+  { name: 'Stenosis', unit: '%', digits: 0, of: (diameter, degree) => (known(degree) ? 100 * degree : null) },
+];
+
+/** Diameter, area or stenosis of a vessel at all phases: curves, and a map of place and phase. */
 class CycleView {
   /** @param cycle  of the run @param index  of the vessel @param onArc  called with the mm that a click is at */
   constructor(cycle, index, onArc) {
@@ -76,37 +83,61 @@ class CycleView {
     this.width = innerWidth < NARROW ? CHART.narrow : CHART.width;
     this.order = cycle.times.map((_, k) => k).sort((a, b) => cycle.times[a] - cycle.times[b]);
     this.vessel = cycle.vessels[index];
-    const values = this.vessel.diameter.flat().filter(known);
     this.count = this.vessel.diameter.length > 0 ? this.vessel.diameter[0].length : 0;
-    this.empty = values.length === 0 || this.count < 2;
+    this.empty = this.count < 2 || !this.vessel.diameter.flat().some(known);
     if (this.empty) {
       return;
     }
-    const all = [...values, ...this.vessel.healthy.filter(known)];
-    const [low, high] = [Math.min(...all), Math.max(...all)];
-    this.low = Math.max(0, low - 0.08 * (high - low));
-    this.high = high + 0.08 * (high - low || 1);
-    this.chart = this.draw();
-    this.map = element('canvas', { width: this.count, height: this.order.length, class: 'map', role: 'img',
-      'aria-label': 'Diameter, place by phase' });
+    this.chart = drawing('svg', { viewBox: `0 0 ${this.width} ${CHART.height}`, class: 'chart', role: 'img' }, []);
+    this.line = drawing('path', { class: 'cursor' });
+    this.map = element('canvas', { width: this.count, height: this.order.length, class: 'map', role: 'img' });
     this.reading = element('p', { class: 'none' });
     this.cursor = element('i', { class: 'cursor across', hidden: '' });
+    this.scale = [element('span'), element('span')];
+    const chooser = element('select', { 'aria-label': 'What is drawn' }, QUANTITIES.map((one, k) => element('option', { value: k }, [`${one.name} (${one.unit})`])));
     const rows = element('ol', { class: 'phases', style: `width:${100 * CHART.left / this.width}%` }, [...this.order].reverse().map((k) =>
       element('li', {}, [this.order.length <= 12 ? `${(100 * cycle.times[k]).toFixed(0)} %` : ''])));
     this.made = element('div', { class: 'cycle' }, [
-      element('p', { class: 'legend cycle-legend' }, [element('span', { class: 'phase' }, ['each phase']), element('span', { class: 'median' }, ['median']),
-        element('span', { class: 'healthy' }, ['were it healthy'])]),
+      element('p', { class: 'legend cycle-legend' }, [chooser, element('span', { class: 'phase' }, ['each phase']), element('span', { class: 'now' }, ['the one shown']),
+        element('span', { class: 'median' }, ['median']), element('span', { class: 'healthy' }, ['were it healthy'])]),
       this.chart, element('div', { class: 'mapped' }, [rows, element('div', { style: `margin-right:${100 * CHART.right / this.width}%` }, [this.map, this.cursor])]),
-      element('p', { class: 'none scale-of-map' }, [`${low.toFixed(1)} mm`, element('i', { style: `background:linear-gradient(to right, ${
-        MAP_COLOURS.map((one) => `rgb(${one.join(' ')})`).join(', ')})` }), `${high.toFixed(1)} mm; grey: not seen`]), this.reading]);
-    this.paint(low, high);
+      element('p', { class: 'none scale-of-map' }, [this.scale[0], element('i', { style: `background:linear-gradient(to right, ${
+        MAP_COLOURS.map((one) => `rgb(${one.join(' ')})`).join(', ')})` }), this.scale[1]]), this.reading]);
+    this.choose(QUANTITIES[0]);
+    chooser.addEventListener('change', () => this.choose(QUANTITIES[Number(chooser.value)]));
     this.chart.addEventListener('click', (event) => onArc(this.arcAt(this.chart, event, CHART.left / this.width, 1 - CHART.right / this.width)));
     this.map.addEventListener('click', (event) => {
       const box = this.map.getBoundingClientRect();
       const row = Math.floor((event.clientY - box.top) / box.height * this.order.length);
-      this.read(this.arcAt(this.map, event, 0, 1), this.order[this.order.length - 1 - Math.max(0, Math.min(this.order.length - 1, row))]);
-      onArc(this.arcAt(this.map, event, 0, 1));
+      const arc = this.arcAt(this.map, event, 0, 1);
+      this.read(arc, this.order[this.order.length - 1 - Math.max(0, Math.min(this.order.length - 1, row))]);
+      onArc(arc);
     });
+  }
+
+  /** Draws a quantity. */
+  choose(quantity) {
+    const { diameter, degree, median, healthy } = this.vessel;
+    const of = (d, share) => (known(d) ? quantity.of(d, share) : null);
+    const narrowed = (k) => (known(median[k]) && healthy[k] > 0 ? Math.max(0, 1 - median[k] / healthy[k]) : null);
+    this.quantity = quantity;
+    this.values = diameter.map((row, phase) => row.map((d, k) => of(d, degree[phase][k])));
+    this.median = median.map((d, k) => of(d, narrowed(k)));
+    this.healthy = healthy.map((d) => of(d, 0));
+    const all = this.values.flat().filter(known);
+    const drawn = [...all, ...this.healthy.filter(known)];
+    const [low, high] = [Math.min(...all), Math.max(...all)];
+    const spare = 0.08 * (Math.max(...drawn) - Math.min(...drawn) || 1);
+    this.low = Math.max(0, Math.min(...drawn) - spare);
+    this.high = Math.max(...drawn) + spare;
+    this.draw();
+    this.paint(low, high);
+    this.scale[0].textContent = `${low.toFixed(quantity.digits)} ${quantity.unit}`;
+    this.scale[1].textContent = `${high.toFixed(quantity.digits)} ${quantity.unit}; grey: not seen`;
+    for (const one of [this.chart, this.map]) {
+      one.setAttribute('aria-label', `${quantity.name}, place by phase`);
+    }
+    this.atTime(this.time);
   }
 
   arcAt(made, event, from, to) {
@@ -130,9 +161,9 @@ class CycleView {
   }
 
   draw() {
-    this.curves = this.vessel.diameter.map((one) => drawing('path', { d: this.path(one), class: 'phase' }));
+    this.curves = this.values.map((one) => drawing('path', { d: this.path(one), class: 'phase' }));
     const parts = [];
-    const step = [0.1, 0.2, 0.5, 1, 2].find((one) => (this.high - this.low) / one < 6) || 5;
+    const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20].find((one) => (this.high - this.low) / one < 6) || 50;
     for (let value = Math.ceil(this.low / step) * step; value <= this.high; value += step) {
       parts.push(drawing('path', { d: `M${CHART.left} ${this.y(value)}H${this.width - CHART.right}`, class: 'grid' }),
         drawing('text', { x: CHART.left - 5, y: this.y(value) + 4, class: 'end' }, [value.toFixed(step < 1 ? 1 : 0)]));
@@ -141,17 +172,14 @@ class CycleView {
     for (let arc = 0; arc < this.count; arc += every) {
       parts.push(drawing('text', { x: this.x(arc), y: CHART.height - 10, class: 'middle' }, [`${arc}`]));
     }
-    parts.push(drawing('text', { x: 2, y: 12 }, ['mm']), ...this.curves,
-      drawing('path', { d: this.path(this.vessel.healthy), class: 'healthy' }), drawing('path', { d: this.path(this.vessel.median), class: 'median' }));
-    this.line = drawing('path', { class: 'cursor' });
-    return drawing('svg', { viewBox: `0 0 ${this.width} ${CHART.height}`, class: 'chart', role: 'img',
-      'aria-label': 'Diameter along the vessel at each phase' }, [...parts, this.line]);
+    this.chart.replaceChildren(...parts, drawing('text', { x: 2, y: 12 }, [this.quantity.unit]), ...this.curves,
+      drawing('path', { d: this.path(this.healthy), class: 'healthy' }), drawing('path', { d: this.path(this.median), class: 'median' }), this.line);
   }
 
   paint(low, high) {
     const context = this.map.getContext('2d');
     const pixels = context.createImageData(this.count, this.order.length);
-    this.order.forEach((phase, row) => this.vessel.diameter[phase].forEach((value, k) => {
+    this.order.forEach((phase, row) => this.values[phase].forEach((value, k) => {
       const colour = known(value) ? mapColour((value - low) / (high - low || 1)) : [128, 128, 128];
       // The last phase is the uppermost row.
       pixels.data.set([...colour, 255], 4 * ((this.order.length - 1 - row) * this.count + k));
@@ -168,6 +196,7 @@ class CycleView {
 
   /** The curve of the phase that the model is shown in. @param fraction  of R-R */
   atTime(fraction) {
+    this.time = fraction;
     this.curves.forEach((curve, k) => curve.classList.toggle('now', Math.abs(this.cycle.times[k] - fraction) < 2e-3));
   }
 

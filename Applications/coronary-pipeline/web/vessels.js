@@ -122,10 +122,13 @@ class RunPanel {
     this.fillVessels();
     byId('findings').replaceChildren(...FINDINGS.map((one) => this.findings(...one)));
     const pictured = run.vessels.some((one) => one.straightened);
-    byId('vessel-views').hidden = !pictured;
+    const along = pictured || Boolean(run.cycle);
+    byId('vessel-views').hidden = !along;
+    byId('vessel-views').querySelectorAll('.all, .views-legend').forEach((one) => { one.hidden = !pictured; });
     byId('heart-sheets').hidden = run.sheets.length === 0;
-    byId('views').replaceChildren(...(pictured ? run.vessels.map((one, k) => this.vessel(one, k)) : []));
+    byId('views').replaceChildren(...(along ? run.vessels.map((one, k) => this.vessel(one, k)) : []));
     byId('sheets').replaceChildren(...run.sheets.map((one) => this.sheet(one)));
+    byId('views-note').textContent = 'The diameter over the heart cycle: the radii of the moved lines, without the image.';
     if (pictured) {
       byId('views-note').textContent = `Two cuts at right angles, ±${run.half_width} mm about the axis, then diameter (mm) and the ` +
         `image’s values on the axis; the cross-section at the slider; a curved reformat; a slab of ${run.thickness} mm that follows the vessel; its diameter ` +
@@ -214,9 +217,26 @@ class RunPanel {
       (event.clientY - box.top) / box.height * view.picture.rows - 0.5];
   }
 
+  /** The pictures of a vessel that there are: each with the mm along it of a pixel, and where the cursor of a place is, x, y and kind. */
+  picturesOf(vessel) {
+    const { straightened, curved, slab } = vessel;
+    const nearest = (points, x, y) => {
+      const distances = points.map((point) => Math.hypot(point[0] - x, point[1] - y));
+      return distances.indexOf(Math.min(...distances));
+    };
+    return [
+      straightened && { view: this.view(straightened, `${vessel.name}, straightened`),
+        arcOf: (x) => Math.round((x - straightened.left) / straightened.per_mm),
+        cursorAt: (arc) => [straightened.left + straightened.per_mm * arc, 0, 'across'] },
+      curved && { view: this.view(curved, `${vessel.name}, curved reformat`),
+        arcOf: (x, y) => nearest(curved.axis, x, y), cursorAt: (arc) => [...curved.axis[arc], 'ring'] },
+      slab && { view: this.view(slab, `${vessel.name} in a slab that follows it`),
+        arcOf: (x, y) => nearest(vessel.path.map((place) => this.project(slab, place)), x, y),
+        cursorAt: (arc, place) => [...this.project(slab, place).slice(0, 2), 'ring'] },
+    ].filter(Boolean);
+  }
+
   vessel(vessel, index) {
-    const straight = this.view(vessel.straightened, `${vessel.name}, straightened`);
-    const slab = this.view(vessel.slab, `${vessel.name} in a slab that follows it`);
     const notes = [`${vessel.length.toFixed(1)} mm`];
     if (vessel.bridged > 0) {
       notes.push(element('b', { class: 'bridged' }, [`${vessel.bridged.toFixed(1)} mm bridged`]));
@@ -228,36 +248,17 @@ class RunPanel {
       notes.push(element('b', {}, [`narrowed by ${(100 * vessel.stenosis).toFixed(0)} %`]));
     }
     const goTo = (arc) => this.onPlace(vessel.path[Math.max(0, Math.min(vessel.path.length - 1, arc))], false);
-    const curved = vessel.curved && this.view(vessel.curved, `${vessel.name}, curved reformat`);
-    const section = vessel.sections && new SectionView(vessel, this.observer, goTo);
-    const cycle = this.run.cycle && new CycleView(this.run.cycle, index, goTo);
-    const beating = cycle && !cycle.empty;
+    const pictures = this.picturesOf(vessel);
+    const section = vessel.sections ? new SectionView(vessel, this.observer, goTo) : null;
+    const measured = this.run.cycle && new CycleView(this.run.cycle, index, goTo);
+    const cycle = measured && !measured.empty ? measured : null;
+    const scrolled = pictures.map(({ view }) => element('div', { class: 'scroll' }, [view.made]));
+    scrolled.splice(1, 0, ...(section ? [section.made] : []));
     const article = element('article', { 'data-vessel': index }, [
       element('h3', {}, [vessel.name, ...notes.flatMap((one) => [' · ', one]).map((one) =>
-        (typeof one === 'string' ? element('small', {}, [one]) : one))]),
-      element('div', { class: 'scroll' }, [straight.made]), ...(section ? [section.made] : []),
-      ...(curved ? [element('div', { class: 'scroll' }, [curved.made])] : []), element('div', { class: 'scroll' }, [slab.made]),
-      ...(beating ? [cycle.made] : [])]);
-    if (curved) {
-      curved.made.addEventListener('click', (event) => {
-        const [x, y] = this.pixelOf(curved, event);
-        const away = vessel.curved.axis.map((place) => Math.hypot(place[0] - x, place[1] - y));
-        goTo(away.indexOf(Math.min(...away)));
-      });
-    }
-    straight.made.addEventListener('click', (event) => {
-      const arc = (this.pixelOf(straight, event)[0] - vessel.straightened.left) / vessel.straightened.per_mm;
-      this.onPlace(vessel.path[Math.max(0, Math.min(vessel.path.length - 1, Math.round(arc)))], false);
-    });
-    slab.made.addEventListener('click', (event) => {
-      const [x, y] = this.pixelOf(slab, event);
-      const distances = vessel.path.map((place) => {
-        const [px, py] = this.project(vessel.slab, place);
-        return Math.hypot(px - x, py - y);
-      });
-      this.onPlace(vessel.path[distances.indexOf(Math.min(...distances))], false);
-    });
-    this.figures.push({ vessel, article, straight, slab, curved, section, cycle: beating ? cycle : null });
+        (typeof one === 'string' ? element('small', {}, [one]) : one))]), ...scrolled, ...(cycle ? [cycle.made] : [])]);
+    pictures.forEach(({ view, arcOf }) => view.made.addEventListener('click', (event) => goTo(arcOf(...this.pixelOf(view, event)))));
+    this.figures.push({ vessel, article, pictures, section, cycle });
     return article;
   }
 
@@ -314,27 +315,15 @@ class RunPanel {
       view.cursor.style.top = kind === 'across' ? `${100 * view.picture.top / view.picture.rows}%` : `${100 * (y + 0.5) / view.picture.rows}%`;
       view.cursor.style.height = kind === 'across' ? `${100 * (view.picture.bottom - view.picture.top) / view.picture.rows}%` : '';
     };
-    for (const { vessel, article, straight, slab, curved, section, cycle } of this.figures) {
+    for (const { vessel, article, pictures, section, cycle } of this.figures) {
       const here = near && near.vessel === vessel;
       article.classList.toggle('here', Boolean(here));
-      straight.cursor.hidden = !here;
-      slab.cursor.hidden = !here;
-      if (curved) {
-        curved.cursor.hidden = !here;
-      }
+      pictures.forEach(({ view }) => { view.cursor.hidden = true; });
       if (here) {
-        if (curved) {
-          put(curved, ...vessel.curved.axis[near.arc], 'ring');
+        pictures.forEach(({ view, cursorAt }) => put(view, ...cursorAt(near.arc, place)));
+        for (const one of [section, cycle].filter(Boolean)) {
+          one.show(near.arc);
         }
-        if (section) {
-          section.show(near.arc);
-        }
-        if (cycle) {
-          cycle.show(near.arc);
-        }
-        put(straight, straight.picture.left + straight.picture.per_mm * near.arc, 0, 'across');
-        const [x, y] = this.project(slab.picture, place);
-        put(slab, x, y, 'ring');
       }
     }
     for (const view of this.sheets) {
