@@ -101,6 +101,14 @@ void SetBlock(vtkMultiBlockDataSet* output, const char* name, vtkDataObject* dat
   output->GetMetaData(block)->Set(vtkCompositeDataSet::NAME(), name);
 }
 
+std::size_t NearestPlace(const std::vector<Vector3>& places, const Vector3& point)
+{
+  return static_cast<std::size_t>(
+    std::min_element(places.begin(), places.end(),
+      [&](const Vector3& a, const Vector3& b) { return (a - point).norm() < (b - point).norm(); }) -
+    places.begin());
+}
+
 /// A picture's rows go down, an image's up.
 template <typename Value>
 std::vector<Value> Upwards(const std::vector<Value>& rows, int width, int height)
@@ -414,6 +422,7 @@ int vtkCurvedReformat::RequestData(
     }
     Require(inside, "The vessel lies outside of the image");
     Require(std::isfinite(this->Position), "Position must be finite");
+    Require(Vector3(this->Point).allFinite(), "Point must be finite");
 
     Writer writer;
     writer.array = values->GetName() != nullptr ? values->GetName() : names::HounsfieldUnits;
@@ -431,8 +440,10 @@ int vtkCurvedReformat::RequestData(
     boundaries.outerLevel = this->OuterLevel;
     writer.boundaries = coronary::TraceBoundaries(
       interpolator, curve, writer.radius, boundaries, vtkCoronary::ProgressOf(this, 0.5, 0.95));
-    writer.place = static_cast<std::size_t>(
-      std::clamp(std::round(this->Position / curve.step), 0.0, double(curve.position.size() - 1)));
+    writer.place = this->FollowPoint
+      ? NearestPlace(curve.position, Vector3(this->Point))
+      : static_cast<std::size_t>(std::clamp(
+          std::round(this->Position / curve.step), 0.0, double(curve.position.size() - 1)));
     // The section's upper side is the straightened sheet's.
     const double turned = this->Kind == Straightened ? this->Angle : 0.0;
     writer.plane =
@@ -471,6 +482,9 @@ void vtkCurvedReformat::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "Kind: " << this->Kind << "\n";
   os << indent << "Angle: " << this->Angle << "\n";
   os << indent << "Position: " << this->Position << "\n";
+  os << indent << "FollowPoint: " << this->FollowPoint << "\n";
+  os << indent << "Point: " << this->Point[0] << " " << this->Point[1] << " " << this->Point[2]
+     << "\n";
   os << indent << "HalfWidth: " << this->HalfWidth << "\n";
   os << indent << "Spacing: " << this->Spacing << "\n";
   os << indent << "OuterLevel: " << this->OuterLevel << "\n";

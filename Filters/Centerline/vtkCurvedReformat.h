@@ -108,6 +108,18 @@ public:
 
   ///@{
   /**
+   * The cross-section stands where the vessel is nearest to a point, and not at Position. Default off; the point is
+   * in mm in the patient, by default the origin.
+   */
+  vtkSetMacro(FollowPoint, bool);
+  vtkGetMacro(FollowPoint, bool);
+  vtkBooleanMacro(FollowPoint, bool);
+  vtkSetVector3Macro(Point, double);
+  vtkGetVector3Macro(Point, double);
+  ///@}
+
+  ///@{
+  /**
    * Half of the pictures' width: mm to each side of the axis, 1 to 50. Default 8.
    */
   vtkSetMacro(HalfWidth, double);
@@ -169,6 +181,8 @@ private:
   int Kind = Straightened;
   double Angle = 0.0;
   double Position = 20.0;
+  bool FollowPoint = false;
+  double Point[3] = { 0.0, 0.0, 0.0 };
   double HalfWidth = 8.0;
   double Spacing = 0.25;
   double OuterLevel = -25.0;

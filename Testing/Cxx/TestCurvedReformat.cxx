@@ -174,6 +174,12 @@ TEST(CurvedReformat, SectionsStandAcrossTheVessel)
     EXPECT_NEAR(there[2], place[2], 1e-9);
   }
   EXPECT_NE(Block<vtkStructuredGrid>(inPlace, "Sheet"), nullptr);
+  // Where a point in the patient is nearest to the vessel.
+  tube.filter->SetPoint(5.0, -3.0, 44.1);
+  tube.filter->FollowPointOn();
+  tube.filter->Update();
+  EXPECT_NEAR(Field(tube.Output(vtkCurvedReformat::SectionPort), "SectionPosition"), 44.0, 1e-9);
+  tube.filter->FollowPointOff();
   // Beyond the end is the end.
   tube.filter->SetPosition(1e6);
   tube.filter->Update();
@@ -223,6 +229,9 @@ TEST(CurvedReformat, RefusesInOneSentence)
   tube.filter->SetPosition(std::nan(""));
   ExpectError(tube.filter, "Position must be finite");
   tube.filter->SetPosition(1.0);
+  tube.filter->SetPoint(0.0, std::nan(""), 0.0);
+  ExpectError(tube.filter, "Point must be finite");
+  tube.filter->SetPoint(0.0, 0.0, 0.0);
   tube.filter->SetImageArrayName("Missing");
   ExpectError(tube.filter, "'Missing'");
   tube.filter->SetImageArrayName("Automatic");
