@@ -17,6 +17,9 @@ coronaryMenuActions::coronaryMenuActions(QObject* parent)
     "build");
   this->Add("coronaryCompare", "Compare Series",
     "The selected model over the selected truth, and its distance from it", "compare");
+  this->Add("coronaryLook", "Look Along the Vessel",
+    "The image along and across a vessel of the selected tree, and its diameter over the cycle",
+    "look");
   this->AddSeparator();
   this->Add(
     "coronaryPhantom", "Example: Phantom", "A beating phantom: surface and gated CT", "phantom");

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A picture of a review page, as Chromium shows it: of an evaluation the phase with the greatest Hausdorff distance, of a run its first vessel.
+"""A picture of a review page, as Chromium shows it: of an evaluation as it opens, the phase with the greatest Hausdorff distance, of a run its first vessel.
 
   python3 scripts/render-review.py EVALUATION/review.html OUTPUT.png
   python3 scripts/render-review.py RUN/review/review.html OUTPUT.png
@@ -14,11 +14,6 @@ import chromium  # noqa: E402
 SIZE = (1360, 880)
 STATE = "document.getElementById('stage').dataset"
 DATA = "JSON.parse(document.getElementById('data').textContent)"
-WORST = """(() => {
-  const rows = %s.table1.cases[0].phases;
-  return rows.reduce((worst, row, k) => (row.HD > rows[worst].HD ? k : worst), 0);
-})()""" % DATA
-
 page_file, output = sys.argv[1:3]
 program = chromium.find()
 if program is None:
@@ -27,13 +22,8 @@ with chromium.Browser(program, *SIZE) as page:
     page.open("file://" + os.path.abspath(page_file))
     page.wait("document.getElementById('stage') && Number(%s.drawn) > 0" % STATE)
     compared = page.evaluate(DATA + ".cases[0].shapes.truth !== null")
-    if compared:
-        worst = page.evaluate(WORST)
-        page.click("#part-a tbody tr:nth-child(%d)" % (worst + 1))
     page.click("#labels")
-    if compared:
-        page.click("#farthest")
-    else:
+    if not compared:
         page.click("#vessels tbody tr")
     drawn = -1
     while drawn != page.evaluate(STATE + ".drawn"):

@@ -18,6 +18,7 @@
 #include "vtkDisplay.h"
 #include "vtkEvaluationPictures.h"
 #include "vtkMessageTrap.h"
+#include "vtkRunCycle.h"
 #include "vtkSurfaceFile.h"
 #include "vtkSurfaceInput.h"
 #include "vtkWebReview.h"
@@ -489,7 +490,12 @@ void EvaluateJob::AddRun(const std::string& result, const CaseEvaluation& evalua
   {
     return;
   }
-  const ReviewedRun run = OpenRun(result, {}, this->views, messages);
+  ReviewedRun run = OpenRun(result, {}, this->views, messages);
+  if (this->views)
+  {
+    run.cycle = MeasureRunCycle(run.result, run.vessels, {}, !run.image.values, messages,
+      [](double) { ThrowIfInterrupted(); });
+  }
   int reference = 0;
   const auto away = [&](int index) {
     return std::abs(evaluation.phases[static_cast<std::size_t>(index)].fraction - run.result.time);

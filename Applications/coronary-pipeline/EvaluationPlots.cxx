@@ -141,6 +141,7 @@ struct PlotData
   std::vector<std::vector<PlotPoint>> cases;
   std::array<bool, MarkShapes.size()> marked = {};
   double paper = EvaluationMeasures::NaN;
+  bool paperInside = false; ///< of the axis
   PlotAxis across{ 0.0, 0.0, Left, Right };
   PlotAxis upwards{ 0.0, 0.0, Bottom, Top };
 };
@@ -159,7 +160,6 @@ PlotData Collect(const std::vector<CaseEvaluation>& cases, const EvaluationColum
   data.paper = paper.mean.*(column.value);
   PlotAxis& across = data.across;
   PlotAxis& upwards = data.upwards;
-  upwards.low = upwards.high = column.best;
   bool first = true;
   const auto include = [](PlotAxis& axis, double value)
   {
@@ -181,6 +181,8 @@ PlotData Collect(const std::vector<CaseEvaluation>& cases, const EvaluationColum
         data.marked[points.back().mark] = true;
         across.low = first ? x : across.low;
         across.high = first ? x : across.high;
+        upwards.low = first ? value : upwards.low;
+        upwards.high = first ? value : upwards.high;
         first = false;
         include(across, x);
         include(upwards, value);
@@ -190,17 +192,21 @@ PlotData Collect(const std::vector<CaseEvaluation>& cases, const EvaluationColum
       [](const PlotPoint& a, const PlotPoint& b) { return a.x < b.x; });
     data.cases.push_back(std::move(points));
   }
-  if (std::isfinite(data.paper))
-  {
-    include(upwards, data.paper);
-  }
   const double aside = std::max(0.03 * (across.high - across.low), 1e-3);
   across.low -= aside;
   across.high += aside;
-  const double span =
-    std::max(upwards.high - upwards.low, 0.02 * std::max(1.0, std::abs(column.best)));
-  upwards.low = column.best == 0.0 ? std::min(0.0, upwards.low) : upwards.low - 0.1 * span;
-  upwards.high += 0.1 * span;
+  // Each measure on its own scale: how it changes over the phases is what is looked for. Changes of less than a fiftieth
+  // of the value stay small, and the best value is there when it is near.
+  const double greatest = std::max(std::abs(upwards.low), std::abs(upwards.high));
+  const double span = std::max({ upwards.high - upwards.low, 0.02 * greatest, 1e-6 });
+  if (column.best >= upwards.low - span && column.best <= upwards.high + span)
+  {
+    include(upwards, column.best);
+  }
+  const double spare = 0.5 * std::max(0.0, span - (upwards.high - upwards.low)) + 0.1 * span;
+  upwards.low = column.best == 0.0 ? std::max(0.0, upwards.low - spare) : upwards.low - spare;
+  upwards.high += spare;
+  data.paperInside = data.paper >= upwards.low && data.paper <= upwards.high;
   return data;
 }
 
@@ -273,9 +279,9 @@ std::string Meanings(const PlotData& data, Legend& legend)
       return "<g stroke=\"#444\" stroke-width=\"1.3\" stroke-dasharray=\"5 4\">" +
         Line(from, y, to, y, "paper") + "</g>\n";
     };
-    text += dashes(Left, Right, data.upwards.Place(data.paper)) +
-      legend.Add((one ? "paper's case 1: " : "paper's five: ") + Text(data.paper, "%.2f"),
-        [&](double x, double y) { return dashes(x - 7.0, x + 11.0, y); });
+    text += data.paperInside ? dashes(Left, Right, data.upwards.Place(data.paper)) : "";
+    text += legend.Add((one ? "paper's case 1: " : "paper's five: ") + Text(data.paper, "%.2f"),
+      [&](double x, double y) { return dashes(x - 7.0, x + 11.0, y); });
   }
   return text + "</g>\n";
 }

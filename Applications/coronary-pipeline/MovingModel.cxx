@@ -187,6 +187,13 @@ MovingModel FindMovingModel(const std::string& path)
   return model;
 }
 
+bool HasMotion(const std::string& folder)
+{
+  std::error_code error;
+  return fs::is_regular_file(fs::path(folder) / "motion.pvd", error) ||
+    fs::is_regular_file(fs::path(folder) / "motion" / "surface.pvd", error);
+}
+
 std::string FolderName(const std::string& path)
 {
   const fs::path folder = fs::absolute(path).lexically_normal();

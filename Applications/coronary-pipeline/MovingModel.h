@@ -43,6 +43,9 @@ struct MovingModel
  */
 MovingModel FindMovingModel(const std::string& path);
 
+/// Whether the folder of a run has what moves.
+bool HasMotion(const std::string& folder);
+
 /// The last name of a path, what a case is called by default.
 std::string FolderName(const std::string& path);
 }

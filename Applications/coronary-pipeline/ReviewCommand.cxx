@@ -12,6 +12,7 @@
 #include "WebReview.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
+#include "vtkRunCycle.h"
 #include "vtkWebReview.h"
 
 #include "vtkPolyData.h"
@@ -122,8 +123,7 @@ std::string ReviewJob::Folder() const
 
 void ReviewJob::FindPhases(Look& look) const
 {
-  const fs::path folder = this->result;
-  if (IsFile(folder / "motion.pvd") || IsFile(folder / "motion" / "surface.pvd"))
+  if (HasMotion(this->result))
   {
     look.model = FindMovingModel(this->result);
   }
@@ -236,13 +236,16 @@ void ReviewJob::Run() const
     messages.ThrowIfError();
     vessels = look.run.vessels.size();
     without = look.run.withoutPictures;
-    ProgressDisplay progress("step", 1 + RunReviewSteps(look.run), this->quiet);
+    ProgressDisplay progress("step", 2 + RunReviewSteps(look.run), this->quiet);
     const auto update = [&](double fraction)
     {
       progress.Update(fraction);
       return Interruption() == 0;
     };
     int step = 0;
+    progress.BeginStep(step++, "lumen over the cycle");
+    look.run.cycle = MeasureRunCycle(look.run.result, look.run.vessels, this->images,
+      !look.run.image.values, messages, [&](double fraction) { progress.Update(fraction); });
     progress.BeginStep(step++, "shapes");
     WebReview review;
     const std::int64_t triangles = this->webTriangles > 0
@@ -283,8 +286,9 @@ Command MakeReviewCommand(CLI::App& program)
   CLI::App* app = program.add_subcommand(
     "review", "A run to look at: straightened views and slabs of its vessels, and a page of all");
   app->footer("Writes DIR/review.html, one file for a web browser, without network; and "
-              "DIR/pictures/ with, for each vessel, NN-NAME.png (straightened) and "
-              "NN-NAME-slab.png, and slabs-axial.png, slabs-coronal.png, slabs-sagittal.png. Needs "
+              "DIR/pictures/ with, for each vessel, NN-NAME.png (straightened), "
+              "NN-NAME-curved.png and NN-NAME-slab.png, and slabs-axial.png, slabs-coronal.png, "
+              "slabs-sagittal.png. Needs "
               "no display.");
   auto job = std::make_shared<ReviewJob>();
   job->Declare(*app);

@@ -100,6 +100,7 @@ Json Describe(const ReviewedRun& look, int reference)
   {
     run[kind] = look.result.MotionFindings(kind);
   }
+  run["cycle"] = look.cycle;
   run["stages"] = Json::array();
   const Json stages = look.result.report.contains("stages") ? look.result.report["stages"] : Json();
   for (const Json& stage : stages)
@@ -181,9 +182,15 @@ std::size_t AddRunReview(const ReviewedRun& run, const ViewSettings& views, int 
       begin(view.name);
       const std::string stem = FileStem(n, view.name);
       entry["straightened"] = NamedPicture(painter->Straightened(view, goOn), stem, review, folder);
+      Report(progress, 0.25);
+      entry["curved"] = NamedPicture(painter->Curved(view, goOn), stem + "-curved", review, folder);
       Report(progress, 0.5);
       entry["slab"] = NamedPicture(painter->Slab(view, goOn), stem + "-slab", review, folder);
-      pictures += 2;
+      Report(progress, 0.75);
+      const ViewPicture sections = painter->Sections(view, goOn);
+      entry["sections"] = sections.layout;
+      entry["sections"]["picture"] = review.AddPicture(sections.picture.PlainPng());
+      pictures += 3;
     }
     said["vessels"].push_back(entry);
   }

@@ -24,9 +24,10 @@ struct ReviewedRun
 {
   RunResult result;
   std::vector<VesselView> vessels;
-  ResultImage image;           ///< without values: there are no pictures
-  ResultLabels calcium;        ///< empty: it was not looked for, or there is none
-  std::string withoutPictures; ///< why, a sentence; empty: they are there, or not wanted
+  ResultImage image;            ///< without values: there are no pictures
+  ResultLabels calcium;         ///< empty: it was not looked for, or there is none
+  nlohmann::ordered_json cycle; ///< of MeasureRunCycle; null: not measured
+  std::string withoutPictures;  ///< why, a sentence; empty: they are there, or not wanted
 };
 
 /**

@@ -233,8 +233,8 @@ RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages)
   return result;
 }
 
-ResultImage ReadRunImage(const RunResult& result, const std::vector<std::string>& files,
-  vtkMessageTrap& messages, const ProgressCallback& progress)
+vtkSmartPointer<vtkGatedImageReader> OpenRunImages(
+  const RunResult& result, const std::vector<std::string>& files, vtkMessageTrap& messages)
 {
   const std::vector<std::string> paths = files.empty() ? InputFiles(result) : files;
   if (paths.empty())
@@ -252,7 +252,7 @@ ResultImage ReadRunImage(const RunResult& result, const std::vector<std::string>
     }
   }
   const Json settings = Member(result.report, "settings");
-  vtkNew<vtkGatedImageReader> reader;
+  auto reader = vtkSmartPointer<vtkGatedImageReader>::New();
   for (const std::string& path : paths)
   {
     reader->AddFileName(path.c_str());
@@ -272,6 +272,13 @@ ResultImage ReadRunImage(const RunResult& result, const std::vector<std::string>
   }
   reader->UpdateInformation();
   messages.ThrowIfError();
+  return reader;
+}
+
+ResultImage ReadRunImage(const RunResult& result, const std::vector<std::string>& files,
+  vtkMessageTrap& messages, const ProgressCallback& progress)
+{
+  const vtkSmartPointer<vtkGatedImageReader> reader = OpenRunImages(result, files, messages);
   UpdateAtTime(
     reader, 0, result.time, messages, [&](double fraction) { Report(progress, fraction); });
   ResultImage image;

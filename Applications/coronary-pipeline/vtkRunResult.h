@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+class vtkGatedImageReader;
 class vtkMessageTrap;
 
 namespace coronary
@@ -83,6 +84,14 @@ struct RunResult
  * @throws std::runtime_error naming the folder or file and what is missing
  */
 RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages);
+
+/**
+ * The images that the run was made of, with their phases.
+ * @param files  as of ReadRunImage
+ * @throws std::runtime_error as ReadRunImage
+ */
+vtkSmartPointer<vtkGatedImageReader> OpenRunImages(
+  const RunResult& result, const std::vector<std::string>& files, vtkMessageTrap& messages);
 
 /**
  * The image that the tree was found in.

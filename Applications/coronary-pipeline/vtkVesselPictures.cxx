@@ -20,9 +20,15 @@ constexpr double PixelsPerMillimetre = 6.0; // of straightened views
 constexpr double SlabPixel = 0.25;          // mm
 constexpr double SheetPixel = 0.5;          // mm
 constexpr double SlabMargin = 10.0;         // mm around a vessel
-constexpr double MostColumns = 6000.0;      // of a straightened view: longer vessels are coarser
-constexpr double MostSlabPixels = 2000.0;   // across; the same
-constexpr double MostSheetPixels = 600.0;   // across a slab of a sheet; the same
+constexpr double CurvedPixel = 0.25;        // mm
+constexpr double CurvedAngle = 45.0;  // degrees: its bends are seen, and little of it is end on
+constexpr double SectionPixel = 0.25; // mm
+constexpr double SectionWidth = 6.0;  // mm to each side of the axis
+constexpr int SectionColumns = 20;
+constexpr int SectionRays = 32;           // of the boundaries around a section
+constexpr double MostColumns = 6000.0;    // of a straightened view: longer vessels are coarser
+constexpr double MostSlabPixels = 2000.0; // across; the same
+constexpr double MostSheetPixels = 600.0; // across a slab of a sheet; the same
 constexpr double SheetMargin = 20.0; // mm around the trees: missed vessels are looked for there
 constexpr int SheetColumns = 5;
 constexpr int MostSlabs = 40;
@@ -43,6 +49,7 @@ constexpr Colour White = { 240, 240, 240 };
 constexpr Colour Soft = { 150, 156, 166 };
 constexpr Colour Dim = { 70, 75, 84 };
 constexpr Colour Wall = { 80, 215, 255 };
+constexpr Colour Outer = { 196, 140, 255 };
 constexpr Colour Bridge = { 255, 150, 20 };
 constexpr Colour Guess = { 190, 190, 200 };
 constexpr Colour Chalk = { 255, 236, 90 };
@@ -378,6 +385,40 @@ void VesselPainter::DrawWalls(
   }
 }
 
+VesselBoundaries VesselPainter::BoundariesOf(
+  const FramedCurve& curve, const VesselView& view, const ProgressCallback& progress) const
+{
+  BoundarySettings settings;
+  settings.rays = SectionRays;
+  return TraceBoundaries(this->Image, curve,
+    curve.Interpolated(Picked(this->Result.tree.radius, view.chain.points)), settings, progress);
+}
+
+/// On both sides of the axis. @param angle  degrees of the upper side
+void VesselPainter::DrawOuter(MarkedPicture& picture, const VesselBoundaries& boundaries,
+  std::size_t places, double angle, double step, int x, int y) const
+{
+  for (const double side : { 1.0, -1.0 })
+  {
+    std::vector<MarkedPicture::Place> line;
+    for (std::size_t k = 0; k <= places; ++k)
+    {
+      const double away = k < places
+        ? boundaries.At(boundaries.outer, k, side > 0.0 ? angle : angle + 180.0)
+        : std::numeric_limits<double>::quiet_NaN();
+      if (!std::isnan(away))
+      {
+        line.push_back({ double(x) + double(k), y - side * away / step });
+      }
+      else if (!line.empty())
+      {
+        picture.Line(line, 0.8, Outer, 0.0, 0.8);
+        line.clear();
+      }
+    }
+  }
+}
+
 void VesselPainter::DrawCalcium(MarkedPicture& picture, const FramedCurve& curve,
   const std::vector<Vector3>& across, int x, int y) const
 {
@@ -569,6 +610,7 @@ ViewPicture VesselPainter::Straightened(
     AxisOf(this->Result, view.chain), std::max(1.0 / PixelsPerMillimetre, whole / MostColumns));
   const auto cuts = StraightenVessel(this->Image, curve, this->Settings.halfWidth, progress);
   const Profile profile = this->ProfileOf(view, curve);
+  const VesselBoundaries boundaries = this->BoundariesOf(curve, view, progress);
   const int columns = cuts[0].width;
   const int rows = cuts[0].height;
   const int gap = 4;
@@ -607,6 +649,8 @@ ViewPicture VesselPainter::Straightened(
       x - 6, row + rows / 2, number == 0 ? "0\xC2\xB0" : "90\xC2\xB0", 11, Soft, Anchor::Right);
     this->DrawCalcium(
       picture, curve, number == 0 ? curve.normal : curve.binormal, x, row + rows / 2);
+    this->DrawOuter(picture, boundaries, curve.position.size(), number == 0 ? 0.0 : 90.0,
+      curve.step, x, row + rows / 2);
     this->DrawWalls(picture, profile, curve.step, x, row + rows / 2);
     if (lead > 0.0)
     {
@@ -687,6 +731,96 @@ void DrawFrame(MarkedPicture& picture, const SlabPlane& plane, int x, int y, boo
     picture.Write(right - 8 - length / 2, bottom - 17, "10 mm", 11, White, Anchor::Centre);
   }
 }
+}
+
+ViewPicture VesselPainter::Curved(const VesselView& view, const ProgressCallback& progress) const
+{
+  ReformatSettings settings;
+  settings.kind = ReformatKind::Curved;
+  settings.angle = CurvedAngle;
+  settings.halfWidth = this->Settings.halfWidth;
+  settings.spacing =
+    std::max(CurvedPixel, (view.chain.arc.back() - view.chain.arc.front()) / MostSlabPixels);
+  const VesselReformat reformat =
+    ReformatVessel(this->Image, AxisOf(this->Result, view.chain), settings, progress);
+  const Profile profile = this->ProfileOf(view, reformat.axis);
+  MarkedPicture picture(
+    std::max(MinimumWidth, reformat.picture.width), reformat.picture.height, Black);
+  this->DrawCut(picture, reformat.picture, 0, 0);
+  const int middle = reformat.picture.height / 2;
+  const auto pixel = [&](const PicturePlace& place) -> MarkedPicture::Place {
+    return { place[0] / settings.spacing, middle - place[1] / settings.spacing };
+  };
+  for (const double side : { 1.0, -1.0 })
+  {
+    DrawBySight(
+      picture, profile.sight,
+      [&](std::size_t k) { return pixel(reformat.Beside(k, side * profile.radius[k])); }, 1.0, 0.9);
+  }
+  const double lead = -view.chain.arc.front();
+  const auto indexAt = [&](double arc)
+  {
+    return std::min(reformat.track.size() - 1,
+      static_cast<std::size_t>(std::lround((arc + lead) / reformat.axis.step)));
+  };
+  for (const VesselPiece& piece : view.chain.pieces)
+  {
+    const auto at = pixel(reformat.track[indexAt(0.5 * (piece.begin + piece.end))]);
+    picture.Write(
+      static_cast<int>(at[0]) + 8, static_cast<int>(at[1]) - 18, Brief(piece.name), 12, White);
+  }
+  Json layout;
+  layout["axis"] = Json::array();
+  for (std::size_t arc = 0; arc < view.path.size(); ++arc)
+  {
+    const auto at = pixel(reformat.track[indexAt(double(arc))]);
+    layout["axis"].push_back({ std::round(10.0 * at[0]) / 10.0, std::round(10.0 * at[1]) / 10.0 });
+  }
+  layout["per_mm"] = 1.0 / settings.spacing;
+  return { std::move(picture), std::move(layout) };
+}
+
+ViewPicture VesselPainter::Sections(const VesselView& view, const ProgressCallback& progress) const
+{
+  const FramedCurve curve = FollowAxis(AxisOf(this->Result, view.chain), SectionPixel);
+  const VesselBoundaries boundaries = this->BoundariesOf(curve, view, progress);
+  const std::vector<double> radius =
+    curve.Interpolated(Picked(this->Result.tree.radius, view.chain.points));
+  const double lead = -view.chain.arc.front();
+  const auto count = static_cast<int>(view.path.size());
+  const int side = 2 * static_cast<int>(std::lround(SectionWidth / SectionPixel)) + 1;
+  const int rows = (count + SectionColumns - 1) / SectionColumns;
+  MarkedPicture picture(std::min(count, SectionColumns) * side, rows * side, Black);
+  const auto rounded = [](double value)
+  { return std::isnan(value) ? Json() : Json(std::round(100.0 * value) / 100.0); };
+  Json layout = { { "tile", side }, { "across", std::min(count, SectionColumns) },
+    { "count", count }, { "half_width", SectionWidth }, { "rays", SectionRays } };
+  for (const char* name : { "radius", "edge", "outer", "edge_area", "outer_area" })
+  {
+    layout[name] = Json::array();
+  }
+  for (int n = 0; n < count; ++n)
+  {
+    const auto place = std::min(curve.position.size() - 1,
+      static_cast<std::size_t>(std::lround((double(n) + lead) / curve.step)));
+    const SlabPlane plane = SectionPlane(curve, place, 0.0, SectionWidth, SectionPixel);
+    this->DrawCut(picture, ProjectSlab(this->Image, plane, {}, 0.0), (n % SectionColumns) * side,
+      (n / SectionColumns) * side);
+    Json edge = Json::array();
+    Json outer = Json::array();
+    for (int ray = 0; ray < SectionRays; ++ray)
+    {
+      const std::size_t at = place * SectionRays + static_cast<std::size_t>(ray);
+      edge.push_back(rounded(boundaries.lumen[at]));
+      outer.push_back(rounded(boundaries.outer[at]));
+    }
+    layout["radius"].push_back(rounded(radius[place]));
+    layout["edge"].push_back(edge);
+    layout["outer"].push_back(outer);
+    layout["edge_area"].push_back(rounded(boundaries.Area(boundaries.lumen, place)));
+    layout["outer_area"].push_back(rounded(boundaries.Area(boundaries.outer, place)));
+  }
+  return { std::move(picture), std::move(layout) };
 }
 
 ViewPicture VesselPainter::Slab(const VesselView& view, const ProgressCallback& progress) const

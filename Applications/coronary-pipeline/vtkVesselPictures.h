@@ -4,12 +4,12 @@
  *
  * What was not seen is drawn so: orange and dashed where a gap was bridged, grey and dashed where a radius was
  * interpolated; calcium is yellow, a narrowing is written with its degree, pixels outside of the image are hatched.
- * None of it needs a display.
+ * The outer boundary, where fat shows it, is violet. None of it needs a display.
  */
 #ifndef vtkVesselPictures_h
 #define vtkVesselPictures_h
 
-#include "StraightenedView.h"
+#include "CurvedReformat.h"
 #include "VesselChains.h"
 #include "vtkMarkedPicture.h"
 #include "vtkRunResult.h"
@@ -75,6 +75,12 @@ public:
   /// A slab that follows the vessel, seen at right angles to the plane in which it is longest.
   ViewPicture Slab(const VesselView& view, const ProgressCallback& progress = {}) const;
 
+  /// On a curved sheet, unrolled: the vessel keeps its length and its bends.
+  ViewPicture Curved(const VesselView& view, const ProgressCallback& progress = {}) const;
+
+  /// Cross-sections 1 mm apart, those of VesselView::path, in rows; without marks: the layout has the boundaries.
+  ViewPicture Sections(const VesselView& view, const ProgressCallback& progress = {}) const;
+
   /// Slabs side by side through all of the heart around the trees. @param direction  0 axial, 1 coronal, 2 sagittal
   ViewPicture Sheet(int direction, const ProgressCallback& progress = {}) const;
 
@@ -85,6 +91,10 @@ private:
   Profile ProfileOf(const VesselView& view, const FramedCurve& curve) const;
   void DrawCut(MarkedPicture& picture, const GreyPicture& cut, int x, int y) const;
   void DrawWalls(MarkedPicture& picture, const Profile& profile, double step, int x, int y) const;
+  void DrawOuter(MarkedPicture& picture, const VesselBoundaries& boundaries, std::size_t places,
+    double angle, double step, int x, int y) const;
+  VesselBoundaries BoundariesOf(
+    const FramedCurve& curve, const VesselView& view, const ProgressCallback& progress) const;
   void DrawCalcium(MarkedPicture& picture, const FramedCurve& curve,
     const std::vector<Vector3>& across, int x, int y) const;
   void DrawRuler(MarkedPicture& picture, const VesselView& view, const FramedCurve& curve,

@@ -411,20 +411,34 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
   return false;
 }
 
-std::vector<Vector3> MeasureWall(const ImageInterpolator& image, const Vector3& position,
-  const Vector3& tangent, double radius, double lumen, const LumenSettings& settings)
+std::vector<double> MeasureWall(const ImageInterpolator& image, const Vector3& position,
+  const Vector3& u, const Vector3& v, double radius, double lumen, const LumenSettings& settings)
 {
   // A fall of less than this share is a neighbour's side.
   const WallSearch search(image, settings, lumen, 0.4, 1.8 * radius + 4.0 * image.MinimumSpacing());
+  std::vector<double> distances;
+  for (int ray = 0; ray < settings.rays; ++ray)
+  {
+    const double angle = 2.0 * M_PI * ray / settings.rays;
+    const Wall wall = search.Find(position, std::cos(angle) * u + std::sin(angle) * v);
+    distances.push_back(
+      wall.distance > 0.0 ? wall.distance : std::numeric_limits<double>::quiet_NaN());
+  }
+  return distances;
+}
+
+std::vector<Vector3> MeasureWall(const ImageInterpolator& image, const Vector3& position,
+  const Vector3& tangent, double radius, double lumen, const LumenSettings& settings)
+{
   const CrossFrame frame(tangent.normalized());
+  const std::vector<double> distances =
+    MeasureWall(image, position, frame.u, frame.v, radius, lumen, settings);
   std::vector<Vector3> points;
   for (int ray = 0; ray < settings.rays; ++ray)
   {
-    const Vector3 direction = frame.Ray(ray, settings.rays);
-    const Wall wall = search.Find(position, direction);
-    if (wall.distance > 0.0)
+    if (!std::isnan(distances[ray]))
     {
-      points.emplace_back(position + wall.distance * direction);
+      points.emplace_back(position + distances[ray] * frame.Ray(ray, settings.rays));
     }
   }
   return points;

@@ -94,6 +94,13 @@ bool MeasureArc(const ImageInterpolator& image, const Vector3& position, const V
 std::vector<Vector3> MeasureWall(const ImageInterpolator& image, const Vector3& position,
   const Vector3& tangent, double radius, double lumen, const LumenSettings& settings);
 
+/**
+ * The same as distances from `position`, one a ray, from `u` towards `v` (unit vectors at right angles to each other).
+ * NaN: no wall was found.
+ */
+std::vector<double> MeasureWall(const ImageInterpolator& image, const Vector3& position,
+  const Vector3& u, const Vector3& v, double radius, double lumen, const LumenSettings& settings);
+
 /// What the surroundings of a seed look like, by rays in all directions.
 /// @returns false if there is no lumen: nothing darker around it
 bool MeasureReference(

@@ -49,6 +49,22 @@ struct VesselChain
  */
 std::vector<VesselChain> JoinVessels(
   const VesselTree& tree, const std::vector<std::string>& names, double leadIn = 8.0);
+
+/**
+ * The same vessels, each as the whole way from its ostium to its tip: arcs are mm from the ostium, pieces and forks those
+ * of the whole way (where it leaves another vessel, the rest of that one is a fork). In the order of JoinVessels.
+ * @throws as JoinVessels
+ */
+std::vector<VesselChain> VesselsFromOstia(
+  const VesselTree& tree, const std::vector<std::string>& names);
+
+/**
+ * One of VesselsFromOstia by name: of a segment ("mLAD", "D1") or of an artery ("LAD", "LCx", "RCA"), whatever the case
+ * of its letters. Of several the one that has most of it; without a name the longest one.
+ * @throws std::invalid_argument for a name that the tree does not have, naming those that it has; as JoinVessels
+ */
+VesselChain FindVessel(
+  const VesselTree& tree, const std::vector<std::string>& names, const std::string& vessel);
 }
 
 #endif

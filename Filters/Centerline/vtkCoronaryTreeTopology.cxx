@@ -43,19 +43,6 @@ constexpr double NoDaughter = -1.0;
 /// As many daughters as the arrays of a bifurcation have room for at least.
 constexpr int MinimumDaughters = 3;
 
-void AddVectors(vtkFieldData* data, const std::string& name, const std::vector<Vector3>& values)
-{
-  vtkNew<vtkDoubleArray> array;
-  array->SetName(name.c_str());
-  array->SetNumberOfComponents(3);
-  array->SetNumberOfTuples(static_cast<vtkIdType>(values.size()));
-  for (std::size_t i = 0; i < values.size(); ++i)
-  {
-    array->SetTypedTuple(static_cast<vtkIdType>(i), values[i].data());
-  }
-  data->AddArray(array);
-}
-
 /// One row of `width` values for each list; what a list does not have is `missing`.
 template <typename Array, typename Value>
 void AddRows(vtkFieldData* data, const std::string& name,
@@ -121,9 +108,9 @@ public:
     }
     vtkCoronary::SetTree(output, tree, vtkCoronary::BranchArrays::Named,
       this->Input->GetPoints() != nullptr ? this->Input->GetPoints()->GetDataType() : VTK_DOUBLE);
-    AddVectors(data, vtkCoronaryArrayNames::FrenetTangent, tree.tangent);
-    AddVectors(data, vtkCoronaryArrayNames::FrenetNormal, tree.normal);
-    AddVectors(data, vtkCoronaryArrayNames::FrenetBinormal, tree.binormal);
+    vtkCoronary::AddVectors(data, vtkCoronaryArrayNames::FrenetTangent, tree.tangent);
+    vtkCoronary::AddVectors(data, vtkCoronaryArrayNames::FrenetNormal, tree.normal);
+    vtkCoronary::AddVectors(data, vtkCoronaryArrayNames::FrenetBinormal, tree.binormal);
     vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Curvature, tree.curvature);
     vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::Torsion, tree.torsion);
     vtkCoronary::AddArray<vtkDoubleArray>(data, vtkCoronaryArrayNames::SectionArea, tree.area);

@@ -58,6 +58,25 @@ constexpr const char* ReferenceRadius = "ReferenceRadius"; ///< double, mm, of t
 constexpr const char* RadiusInterpolated = "RadiusInterpolated"; ///< uchar, 1: hidden by calcium
 constexpr const char* CalciumLabel = "CalciumLabel"; ///< int, object beside the point, 0: none
 
+// Reformats along a vessel, point data (with Abscissas).
+constexpr const char* WorldPosition = "WorldPosition"; ///< double[3], mm, in the patient
+// Reformats along a vessel, field data.
+constexpr const char* VesselPieces = "VesselPieces";       ///< string, names from ostium to tip
+constexpr const char* VesselLength = "VesselLength";       ///< double, mm, from ostium to tip
+constexpr const char* SectionPosition = "SectionPosition"; ///< double, mm from the ostium
+constexpr const char* LumenDiameter = "LumenDiameter";     ///< double, mm, of the tree
+constexpr const char* EdgeArea = "EdgeArea";   ///< double, mm^2, within the edge that the image has
+constexpr const char* OuterArea = "OuterArea"; ///< double, mm^2, within the outer boundary
+
+// Lumen over the cycle, point data (with StenosisDegree, ReferenceRadius).
+constexpr const char* Diameter = "Diameter";                 ///< double, mm, at the phase
+constexpr const char* Area = "Area";                         ///< double, mm^2, of a disc that wide
+constexpr const char* LeastDiameter = "LeastDiameter";       ///< double, mm, over the phases
+constexpr const char* MedianDiameter = "MedianDiameter";     ///< double, mm
+constexpr const char* GreatestDiameter = "GreatestDiameter"; ///< double, mm
+constexpr const char* HealthyDiameter = "HealthyDiameter";   ///< double, mm, of the median
+constexpr const char* MedianDegree = "MedianDegree"; ///< double, 0 to 1, of the median diameter
+
 // Points with a meaning of their own (ostia, seeds), point data.
 constexpr const char* Name = "Name";             ///< string
 constexpr const char* Axis = "Axis";             ///< double[3], unit vector

@@ -36,6 +36,35 @@ coronary::ImageGrid GridOf(vtkImageData* image)
   return grid;
 }
 
+void AddVectors(
+  vtkFieldData* data, const std::string& name, const std::vector<coronary::Vector3>& values)
+{
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(name.c_str());
+  array->SetNumberOfComponents(3);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    array->SetTypedTuple(static_cast<vtkIdType>(i), values[i].data());
+  }
+  data->AddArray(array);
+}
+
+vtkDataArray* ImageArrayOf(vtkImageData* image, const std::string& whose, const std::string& chosen)
+{
+  Require(image != nullptr && image->GetNumberOfPoints() > 0, whose + " has no voxels");
+  const bool automatic = chosen.empty() || chosen == "Automatic";
+  vtkPointData* data = image->GetPointData();
+  vtkDataArray* values = automatic ? data->GetScalars() : data->GetArray(chosen.c_str());
+  Require(values != nullptr,
+    automatic ? whose + " has no scalars" : whose + " has no point array '" + chosen + "'");
+  Require(values->GetNumberOfComponents() == 1 &&
+      values->GetNumberOfTuples() == image->GetNumberOfPoints(),
+    whose + "'s array '" + std::string(values->GetName() ? values->GetName() : "") +
+      "' must have one value a voxel");
+  return values;
+}
+
 coronary::ScalarImage ScalarImageOf(
   vtkImageData* image, vtkDataArray* array, std::vector<float>& copy)
 {

@@ -35,6 +35,14 @@ VTKCORONARYCOMMON_EXPORT coronary::ScalarImage ScalarImageOf(
   vtkImageData* image, vtkDataArray* array, std::vector<float>& copy);
 
 /**
+ * The array of an image that is named; with "Automatic" or without a name its scalars.
+ * @param whose  for messages: "The image"
+ * @throws std::invalid_argument for an image without voxels, an array that is missing, or one of other than one value a voxel
+ */
+VTKCORONARYCOMMON_EXPORT vtkDataArray* ImageArrayOf(
+  vtkImageData* image, const std::string& whose, const std::string& chosen = {});
+
+/**
  * Radii of lines, mm, one value a point: the array `chosen`; when that is empty or "Automatic",
  * `MaximumInscribedSphereRadius`, or `Radius` as some programs call it. Null when neither is there.
  * @throws std::invalid_argument naming `chosen` when it is missing, or the array that has other than one value a point
@@ -75,6 +83,10 @@ VTKCORONARYCOMMON_EXPORT std::string PropertyMessage(
 VTKCORONARYCOMMON_EXPORT int FinishFailedRequest(vtkAlgorithm* filter,
   vtkInformationVector* outputs, const std::string& memory,
   std::initializer_list<const char*> prefixes = {});
+
+/// Adds vectors as a new array of doubles of three components, which replaces one of the same name.
+VTKCORONARYCOMMON_EXPORT void AddVectors(
+  vtkFieldData* data, const std::string& name, const std::vector<coronary::Vector3>& values);
 
 /// Adds `values` as a new array, which replaces one of the same name.
 template <typename Array, typename Value>

@@ -81,12 +81,14 @@ class Reviewer:
         self.after(lambda: self.page.press(key))
 
     def canvas(self):
-        """Left, top, width and height of the canvas in the window."""
+        """Left, top, width and height of the canvas in the window, which is at the page's beginning."""
+        self.page.evaluate("scrollTo(0, 0)")
         return self.page.evaluate("(() => { const box = document.getElementById('canvas').getBoundingClientRect();"
                                   " return [box.x, box.y, box.width, box.height]; })()")
 
     def picture(self):
         """The canvas at a third of its size, without what stands before it, as rows."""
+        self.canvas()
         self.page.evaluate("document.head.append(Object.assign(document.createElement('style'),"
                            " { id: 'bare', textContent: '.stage > :not(canvas) { visibility: hidden }' }))")
         png = self.page.screenshot(selector="#canvas", scale=0.34)
@@ -127,18 +129,46 @@ def check_tables(page, table):
 
 
 def check_branches(page):
-    """Numbers as they are in branches.csv, over the phases, to the digits shown."""
+    """Numbers as they are in branches.csv, over the phases, to the digits shown; the worst branch first."""
     with open("evaluation/branches.csv", encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["case"] == HOSTILE]
-    shown = page.evaluate("[...document.querySelectorAll('#branches tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))")
-    check([row[1] for row in shown] == sorted({row["group"] for row in rows}, key=int), "the branches are %s" % shown)
-    for label, group, phases, length, covered, least, *_, greatest in shown:
+    shown = page.evaluate("[...document.querySelectorAll('#branches tbody tr')].map((row) => [row.dataset.branch,"
+                          " ...[...row.children].map((cell) => cell.textContent)])")
+    check(sorted((row[0] for row in shown), key=int) == sorted({row["group"] for row in rows}, key=int), "the branches are %s" % shown)
+    furthest = []
+    for group, label, length, covered, least, mean, greatest, worst in shown:
         own = [row for row in rows if row["group"] == group]
-        values = {key: [float(row[key]) for row in own] for key in ("length_mm", "covered", "HD_mm")}
-        check((label, phases) == (own[0]["label"], str(len(own))), "a branch is called '%s'" % label)
-        for text, value, digits in ((length, sum(values["length_mm"]) / len(own), 1), (covered, sum(values["covered"]) / len(own), 3),
-                                    (least, min(values["covered"]), 3), (greatest, max(values["HD_mm"]), 3)):
+        values = {key: [float(row[key]) for row in own] for key in ("length_mm", "covered", "mean_mm", "HD_mm")}
+        check(label == own[0]["label"], "a branch is called '%s'" % label)
+        for text, value, digits in ((length, sum(values["length_mm"]) / len(own), 1), (covered, 100 * sum(values["covered"]) / len(own), 0),
+                                    (least, 100 * min(values["covered"]), 0), (mean, sum(values["mean_mm"]) / len(own), 2),
+                                    (greatest, max(values["HD_mm"]), 2)):
             check(abs(float(text) - value) < 0.6 * 0.1 ** digits, "%s says %s, not %g" % (label, text, value))
+        phase = values["HD_mm"].index(max(values["HD_mm"]))
+        check(worst.split(" ")[0] == own[phase]["phase"], "%s is worst in %s, not %s" % (label, worst, own[phase]["phase"]))
+        furthest.append((min(0.5, min(values["covered"])), -max(values["HD_mm"])))
+    check(furthest == sorted(furthest), "the worst branch is not the first")
+
+
+def check_glance(user, table):
+    """What the page opens with, and a branch that is chosen."""
+    page, phases = user.page, table["cases"][0]["phases"]
+    worst = max(range(len(phases)), key=lambda k: phases[k]["HD"])
+    check(user.state("mode") == "model-distance" and user.state("phase") == str(worst), "it opens with %s in phase %s" % (
+        user.state("mode"), user.state("phase")))
+    check("HD %.2f mm" % phases[worst]["HD"] in user.text("#verdict"), "at a glance: " + user.text("#verdict"))
+    check(page.evaluate("[...document.querySelectorAll('#glance-findings li')].map((one) => one.textContent)")
+          == table["cases"][0]["findings"], "what is lost is not told")
+    at_first = user.picture()
+    user.after(lambda: page.click("#branches tbody tr:nth-child(2)"))
+    chosen = page.evaluate("(() => { const row = document.querySelector('#branches tr[aria-current]');"
+                           " return [...row.children].map((one) => one.textContent); })()")
+    check(user.state("phase") == chosen[-1].split(" ")[0], "the branch is shown in phase " + user.state("phase"))
+    check(chosen[0] in user.text("#readout"), "the branch is not read: " + user.text("#readout"))
+    check(page.evaluate("!document.getElementById('mark').hidden") and user.picture() != at_first, "the branch is not shown")
+    user.after(lambda: page.click("#farthest"))
+    check(page.evaluate("document.querySelector('#branches tr[aria-current]') === null"), "the branch stays chosen")
+    user.press("r")
 
 
 def check_origin(page):
@@ -221,6 +251,9 @@ def review(page, url, table):
     check(user.text("#part-a-case") == HOSTILE, "the hostile name is not a text")
     check(page.evaluate("document.scripts.length") == 4, "the hostile name made an element")
     check(page.evaluate("typeof Review + typeof Painter + typeof RED") == "undefined" * 3, "there are globals")
+    check_glance(user, table)
+    user.after(lambda: page.click("#part-a tbody tr:nth-child(1) td:nth-child(4)"))
+    user.press("3")
     page.screenshot("overlay.png")
 
     reds, greens = user.count(red, green)
@@ -321,6 +354,7 @@ def review(page, url, table):
     user.ready()
     page.wait("%s.case === '1'" % STATE)
     user.press("4")
+    user.press("c")  # without the lines, whose edges are as orange
     check(sum(user.count(orange, blue)) == 0, "a surface is not its own truth")
     check_lost_context(user)
     check_print(user)

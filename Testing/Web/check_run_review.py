@@ -172,7 +172,7 @@ def check_pictures(pipeline):
     run("review", "run", "--quiet")
     found = sorted(os.listdir("run/review/pictures"))
     side = "02-d1-script-script-alert-1-script"
-    wanted = ["01-prca-mrca-slab.png", "01-prca-mrca.png", side + "-slab.png", side + ".png",
+    wanted = ["01-prca-mrca-curved.png", side + "-curved.png", "01-prca-mrca-slab.png", "01-prca-mrca.png", side + "-slab.png", side + ".png",
               "slabs-axial.png", "slabs-coronal.png", "slabs-sagittal.png"]
     check(found == sorted(wanted), "pictures: %s" % found)
     check_straightened("run/review")
@@ -249,6 +249,12 @@ def check_moving(pipeline):
           "phases: %s" % [(one["interpolated"], one["lost"]) for one in phases])
     check(case["run"]["reference"] == 1 and case["run"]["warnings"] == ["centerline: something"], "the run says: %s" % case["run"]["warnings"])
     check(case["run"]["filled"] == filled and case["run"]["limits"] == limits, "the page does not tell of what was filled or held back")
+    # Without images the radii of the moved lines, as long as each vessel is, at each phase.
+    cycle = case["run"]["cycle"]
+    check(cycle["measured"] is False and len(cycle["times"]) == 3 and len(cycle["vessels"]) == len(case["run"]["vessels"]), "no cycle")
+    for one, vessel in zip(cycle["vessels"], case["run"]["vessels"]):
+        check([len(row) for row in one["diameter"]] == 3 * [len(vessel["path"])], "%s has other diameters than places" % vessel["name"])
+        check(all(0.3 < value < 8 for row in one["diameter"] for value in row), "diameters of %s" % vessel["name"])
     names = [one["name"] for one in case["run"]["vessels"]]
     check(any(name.startswith("LM, pLAD") for name in names) and any(name.startswith("pRCA") for name in names), "vessels: %s" % names)
     run("evaluate", "--result", "beat", "--truth", "beat", "--no-pictures", "--quiet", "--error-bound", "0.1", "--output", "compared")
@@ -307,6 +313,22 @@ def check_page(page, url):
     page.wait("document.getElementById('readout').textContent.startsWith('pRCA, mRCA12 mm')")
     check("L -8.0, P 0.0, H 0.0" in text(page, "#readout"), "12 mm along it is at " + text(page, "#readout"))
     check(page.evaluate("document.querySelectorAll('#sheets .cursor:not([hidden])').length") == 3, "the slabs do not show the place")
+
+    # The cross-section at the slider: the same place everywhere, the tree's lumen, and the fat's edge, which is the lumen's in this image.
+    slide = ("(() => { const one = document.querySelector('#views article input[type=range]'); one.value = 25;"
+             " one.dispatchEvent(new Event('input')); })()")
+    page.evaluate(slide)
+    page.wait("document.getElementById('readout').textContent.startsWith('pRCA, mRCA25 mm')")
+    check(abs(page.evaluate(cursor) * width - column_of(25)) < 2, "the cursor is not at the slider's place")
+    check(page.evaluate("document.querySelector('#views article .section circle').getAttribute('r')") == str(int(RADIUS)), "another lumen")
+    path = page.evaluate("document.querySelector('#views article .section .outer').getAttribute('d')")
+    away = [math.hypot(float(x), float(y)) for x, y in re.findall(r"(-?[0-9.]+) (-?[0-9.]+)", path)]
+    check(len(away) > 20 and all(abs(one - RADIUS) < 0.5 for one in away), "the outer boundary is at %s" % away)
+    page.wait("document.querySelector('#views article .section img').naturalWidth > 100")
+    tile = page.evaluate("(() => { const one = document.querySelector('#views article .section'), img = one.querySelector('img');"
+                         " return [parseFloat(img.style.left), parseFloat(img.style.top)]; })()")
+    check(tile == [-500.0, -100.0], "the section of 25 mm is at %s" % tile)
+    check("There is no motion" in text(page, "#findings"), "a cycle of nothing")
     page.evaluate("document.querySelector('#sheets .view').scrollIntoView({ block: 'center' })")
     page.wait("[...document.querySelectorAll('#sheets .view:first-child img')].every((one) => one.naturalWidth > 100)")
     layer = "getComputedStyle(document.querySelector('.layer')).visibility"
@@ -331,6 +353,29 @@ def check_page(page, url):
     return dashed
 
 
+def check_cycle(page, url):
+    """Without pictures: curves and maps of what is known, and a click in them that leads to the place."""
+    page.open(url)
+    page.wait("document.getElementById('stage') && %s.state === 'ready'" % STATE)
+    vessels = page.evaluate("document.querySelectorAll('#vessels tbody tr').length")
+    check(page.evaluate("document.querySelectorAll('#views .cycle').length") == vessels, "not every vessel has its cycle")
+    check(page.evaluate("document.querySelectorAll('#views article:first-child .chart .phase').length") == 3, "not a curve a phase")
+    check(page.evaluate("document.querySelectorAll('#views article:first-child .chart .now').length") == 1, "no curve is of the phase that is shown")
+    ends = "document.querySelector('#views article:first-child .scale-of-map').textContent"
+    diameters = page.evaluate(ends)
+    page.evaluate("(() => { const one = document.querySelector('#views article:first-child .cycle select'); one.value = 1;"
+                  " one.dispatchEvent(new Event('change')); })()")
+    areas = page.evaluate(ends)
+    values = [[float(one) for one in re.findall(r"[0-9.]+(?= mm)", said)] for said in (diameters, areas)]
+    check(all(abs(math.pi / 4 * d * d - a) < 0.1 + math.pi / 2 * d * 0.06 for d, a in zip(*values)) and len(values[1]) == 2,
+          "areas of %s, diameters of %s" % (areas, diameters))
+    page.evaluate("(() => { const one = document.querySelector('#views article:first-child .map'), box = one.getBoundingClientRect();"
+                  " one.dispatchEvent(new MouseEvent('click', { clientX: box.x + 0.5 * box.width, clientY: box.y + 2 })); })()")
+    name = page.evaluate("document.querySelector('#vessels tbody tr').firstChild.textContent")
+    page.wait("document.getElementById('readout').textContent.startsWith(%s)" % json.dumps(name))
+    check("106 %R-R" in text(page, "#views article:first-child .cycle > .none:last-child"), "the map is not read")
+
+
 def main():
     pipeline, folder = sys.argv[1:3]
     os.makedirs(folder, exist_ok=True)
@@ -346,6 +391,7 @@ def main():
         page.open("file://" + os.path.abspath("bare-review/review.html"))
         page.wait("document.getElementById('stage') && %s.state === 'ready'" % STATE)
         check("The run says nothing of it." in text(page, "#findings"), "what a run does not know is not told")
+        check_cycle(page, "file://" + os.path.abspath("moving/review.html"))
         check(not page.complaints, "the browser complains: %s" % page.complaints)
     print("the review of a run is as it should be")
 

@@ -5,6 +5,8 @@ const GREEN = [60, 179, 80];
 const LINE_COLOURS = { model: [122, 12, 20], truth: [10, 92, 40] };
 const DARK_LINE_COLOURS = { model: [255, 176, 170], truth: [170, 240, 180] };
 const GUESSED = [232, 128, 0];
+const CHOSEN = [26, 95, 180];
+const DARK_CHOSEN = [255, 214, 80];
 const NEAR_VIEW = 60; // mm that the picture is high when one goes to a place
 const PAPER_WIDTH = 680;  // of the printed picture at most, CSS pixels: 18 cm
 const PAPER_HEIGHT = 530;
@@ -30,6 +32,7 @@ class Review {
     this.shapes = null;   // until they are read
     this.shapesOf = new Map();
     this.picked = null;
+    this.chosen = null;   // branch of the truth
     this.playing = false;
     this.quality = 0;     // while something moves
     this.movedAt = 0;
@@ -91,7 +94,8 @@ class Review {
     if (phases.every((phase) => phase.fraction !== null)) {
       this.order.sort((a, b) => phases[a].fraction - phases[b].fraction || a - b);
     }
-    this.phase = this.data.cases[index].run ? this.data.cases[index].run.reference : this.order[0];
+    const { run } = this.data.cases[index];
+    this.phase = this.compared ? this.worstPhase : run ? run.reference : this.order[0];
     this.setRange(this.data.cases[index].range);
     this.run.fill(this.data.cases[index].run || null);
     this.run.mark(null);
@@ -101,11 +105,14 @@ class Review {
     byId('transport').hidden = phases.length < 2;
     document.querySelectorAll('.of-truth').forEach((one) => { one.hidden = !this.compared; });
     document.querySelectorAll('.of-measures').forEach((one) => { one.hidden = !this.compared; });
+    this.chosen = null;
+    // Where the answer is: the model by its distance from the truth, when that is furthest.
+    this.setMode(this.compared ? 'model-distance' : 'model');
     if (!this.compared) {
-      this.setMode('model');
       byId('lines').checked = true;
     }
     this.fillTables();
+    this.fillGlance();
     this.fillTicks();
     this.showPhase(this.phase);
     if (!this.painter) {
@@ -130,6 +137,86 @@ class Review {
     }
   }
 
+  /** The phase with the greatest Hausdorff distance. */
+  get worstPhase() {
+    const far = this.table.phases.map((phase) => (known(phase.HD) ? phase.HD : -1));
+    return far.indexOf(Math.max(...far));
+  }
+
+  /** "3 (39 %)". */
+  phaseName(index) {
+    const phase = this.table.phases[index];
+    return phase.fraction === null ? `${phase.phase}` : `${phase.phase} (${(100 * phase.fraction).toFixed(0)} %)`;
+  }
+
+  /** One sentence, what is lost, and the branches. */
+  fillGlance() {
+    if (!this.compared) {
+      return;
+    }
+    const { table } = this;
+    byId('glance-case').textContent = this.data.cases.length > 1 ? table.name : '';
+    const worst = table.phases[this.worstPhase];
+    const parts = [`Worst phase ${this.phaseName(this.worstPhase)}: HD ${written(worst.HD, 2)} mm`];
+    if (known(worst.HD95)) {
+      parts.push(`95 % of the surfaces within ${written(worst.HD95, 2)} mm`);
+    }
+    if (known(worst.ASSD)) {
+      parts.push(`mean ${written(worst.ASSD, 2)} mm`);
+    }
+    if (known(worst.found)) {
+      parts.push(`${(100 * worst.found).toFixed(0)} % of the true tree’s length found`);
+    }
+    byId('verdict').textContent = `${parts.join(', ')}.`;
+    byId('glance-findings').replaceChildren(...table.findings.map((text) => element('li', {}, [text])));
+    const { branches } = this.data.cases[this.index];
+    const any = fillBranches(byId('branches'), branches, table.phases.map((_, k) => this.phaseName(k)), (branch) => this.choose(branch));
+    byId('branches').closest('.scroll').hidden = !any;
+  }
+
+  /** Goes to a branch of the truth in its worst phase, near, and to its point that is furthest from the model. */
+  choose(branch) {
+    this.goTo(branch.worst);
+    this.chosen = branch;
+    for (const row of byId('branches').querySelectorAll('tbody tr')) {
+      row.toggleAttribute('aria-current', row.dataset.branch === `${branch.group}`);
+    }
+    const here = branch.all.find((one) => one.phase === branch.worst);
+    // Of what the model lacks only the truth shows where.
+    if (here.covered < LOST_SHARE && !this.sides.includes('truth')) {
+      this.setMode('overlay');
+    }
+    const box = this.shapes && this.boxOf(branch.label);
+    if (box) {
+      this.camera.centre = box.map(([low, high]) => 0.5 * (low + high));
+      this.camera.height = Math.max(30, 1.3 * Math.max(...box.map(([low, high]) => high - low)));
+    }
+    const side = here.covered < LOST_SHARE || !this.sides.includes('model') ? 'truth' : 'model';
+    this.pickFarthest((series, frame, point) => this.shapes[side] === series && series.branch(frame, point) === branch.label);
+    byId('stage').scrollIntoView({ block: 'nearest' });
+    this.dirty = null;
+    this.moved();
+  }
+
+  /** Of a branch's line, or else of its surface, in the phase that is shown: least and greatest along the axes; null: it is not there. */
+  boxOf(label) {
+    for (const series of [this.shapes.truth_lines, this.shapes.truth]) {
+      const frame = series && series.frames[this.phase];
+      const box = [0, 1, 2].map(() => [Infinity, -Infinity]);
+      for (let point = 0; frame && point < frame.topology.points; ++point) {
+        if (series.branch(frame, point) === label) {
+          series.position(frame, point).forEach((value, axis) => {
+            box[axis] = [Math.min(box[axis][0], value), Math.max(box[axis][1], value)];
+          });
+        }
+      }
+      if (box[0][0] <= box[0][1]) {
+        return box;
+      }
+    }
+    return null;
+  }
+
   fillTables() {
     if (!this.compared) {
       this.plots = [];
@@ -142,7 +229,7 @@ class Review {
     fillPartA(byId('part-a'), this.data, this.index, all, (k) => this.goTo(k));
     fillPartB(byId('part-b'), this.data, all, (k) => k !== this.index && this.showCase(k));
     byId('part-b').querySelector(`[data-case="${this.index}"]`).setAttribute('aria-current', 'true');
-    byId('warnings').replaceChildren(...[...this.table.findings, ...this.table.warnings, ...this.data.warnings].map((text) => element('li', {}, [text])));
+    byId('warnings').replaceChildren(...[...this.table.warnings, ...this.data.warnings].map((text) => element('li', {}, [text])));
     const keys = columnsOf(this.data, this.table.phases, all).map((column) => column.key);
     this.plots = this.data.plots.filter((plot) => keys.includes(plot.key))
       .map((plot) => new Plot(plot, this.index, this.table.phases, (k) => this.goTo(k)));
@@ -151,10 +238,9 @@ class Review {
     this.markPhase();
   }
 
-  /** Those for papers, as they are in pictures/, and the branches. */
+  /** Those for papers, as they are in pictures/. */
   fillPictures() {
-    const { pictures, branches } = this.data.cases[this.index];
-    byId('of-branches').hidden = !fillBranches(byId('branches'), branches);
+    const { pictures } = this.data.cases[this.index];
     byId('of-pictures').hidden = pictures.length === 0;
     byId('pictures').replaceChildren(...pictures.map(({ title, file, picture }) => {
       const figure = element('figure', { class: 'later' }, [element('img', { alt: title, 'data-picture': picture }),
@@ -215,6 +301,7 @@ class Review {
       // Of a result at rest nothing was tracked.
       this.compared || this.order.length > 1 ? element('em', { class: kindOf(phase) }, [kindOf(phase)]) : '', ...distances);
     this.plots.forEach((plot) => plot.show(this.phase));
+    this.run.atTime(phase.fraction);
   }
 
   play(on) {
@@ -327,6 +414,23 @@ class Review {
       .filter(({ series }) => series && series.frames[this.phase].topology.points > 0);
   }
 
+  /** The axis of the branch that was chosen, of the truth, in this phase. */
+  get chosenLine() {
+    const series = this.chosen && this.shapes.truth_lines;
+    const frame = series && series.frames[this.phase];
+    if (!frame) {
+      return null;
+    }
+    const { label } = this.chosen;
+    frame.parts = frame.parts || new Map();
+    if (!frame.parts.has(label)) {
+      const cells = frame.topology.cells.filter((_, k, all) =>
+        series.branch(frame, all[k & ~1]) === label && series.branch(frame, all[k | 1]) === label);
+      frame.parts.set(label, { positions: frame.positions, topology: { cells } });
+    }
+    return { series, frame: frame.parts.get(label) };
+  }
+
   get background() {
     return getComputedStyle(this.stage).backgroundColor.match(/[\d.]+/g).slice(0, 3).map((part) => part / 255);
   }
@@ -343,6 +447,10 @@ class Review {
     const guessed = this.shapes.guessed_lines;
     if (guessed) {
       lines.push({ series: guessed, frame: guessed.frames[this.phase], colour: GUESSED, width: 4 });
+    }
+    const chosen = this.chosenLine;
+    if (chosen) {
+      lines.push({ ...chosen, colour: this.dark.matches && !paper ? DARK_CHOSEN : CHOSEN, width: 4 });
     }
     this.painter.draw(this.camera, this.shown, lines, paper ? [1, 1, 1] : this.background, moving ? this.quality : 0);
     this.placeNames();
@@ -465,8 +573,8 @@ class Review {
     this.moved();
   }
 
-  /** To the point of what is shown that is furthest from the other surface. */
-  pickFarthest() {
+  /** To the point of what is shown that is furthest from the other surface. @param wanted  of (series, frame, point); by default all */
+  pickFarthest(wanted = () => true) {
     if (!this.shapes) {
       return;
     }
@@ -476,7 +584,7 @@ class Review {
       const frame = series.frames[this.phase];
       for (let point = 0; point < frame.topology.points; ++point) {
         const distance = Math.abs(series.distance(frame, point));
-        if (distance > (farthest ? farthest.distance : -1)) {
+        if (distance > (farthest ? farthest.distance : -1) && wanted(series, frame, point)) {
           farthest = { distance, series, frame, point };
         }
       }
@@ -537,7 +645,26 @@ class Review {
     readout.replaceChildren(element('strong', {}, [distance]),
       element('span', {}, [now.branch || 'branch not known']),
       element('span', {}, [`on the ${now.side}, phase ${phase.phase}, ${percentOf(phase)}, ${kindOf(phase)}`]),
-      element('span', {}, [place]));
+      element('span', {}, [place]), ...this.reasons(now).map((text) => element('span', { class: 'reason' }, [text])));
+  }
+
+  /** What is known of why a point is far from the other surface. */
+  reasons(now) {
+    const phase = this.table.phases[this.phase];
+    const branches = this.data.cases[this.index].branches[this.phase] || [];
+    // Several pieces of a vessel have one name: the worst of them.
+    const own = branches.filter((one) => one.label && one.label === now.branch).sort((a, b) => a.covered - b.covered)[0];
+    const reasons = [];
+    if (now.side === 'truth' && own && own.covered < LOST_SHARE) {
+      reasons.push(`The model lacks it: ${(100 * own.covered).toFixed(0)} % of ${own.label} (${own.length.toFixed(0)} mm) is found in this phase.`);
+    }
+    if (now.side === 'model' && (phase.false_branches || []).some((one) => (one.label || one.vessel) === now.branch)) {
+      reasons.push('A line of the model that is no vessel.');
+    }
+    if (known(phase.HD) && Math.abs(Math.abs(now.distance) - phase.HD) < 0.05) {
+      reasons.push(`It is the phase’s HD${known(phase.HD95) ? `; 95 % of the surfaces are within ${phase.HD95.toFixed(2)} mm` : ''}.`);
+    }
+    return reasons;
   }
 
   placeMark() {
@@ -640,7 +767,14 @@ class Review {
     this.draw(false);
   }
 
+  /** No branch of the truth is chosen any more. */
+  unchoose() {
+    this.chosen = null;
+    byId('branches').querySelectorAll('[aria-current]').forEach((one) => one.removeAttribute('aria-current'));
+  }
+
   reset() {
+    this.unchoose();
     this.camera.reset(this.data.cases[this.index].view);
     this.moved();
   }
@@ -660,7 +794,10 @@ class Review {
     }
     on('range', 'change', (event) => this.setRange(Number(event.target.value)));
     on('range-reset', 'click', () => this.setRange(this.data.cases[this.index].range));
-    on('farthest', 'click', () => this.pickFarthest());
+    on('farthest', 'click', () => {
+      this.unchoose();
+      this.pickFarthest();
+    });
     on('all-measures', 'change', () => this.fillTables());
     document.querySelectorAll('input[name="mode"]').forEach((one) =>
       one.addEventListener('change', () => this.setMode(one.value)));

@@ -95,37 +95,54 @@ function fillPartB(table, data, all, onCase) {
     head, body, paper);
 }
 
-// What the table of branches has: measure, unit, what of its values over the phases, digits.
-const BRANCH_COLUMNS = [['length', 'mm', 'mean', 1], ['covered', '', 'mean', 3], ['covered', '', 'least', 3],
-  ['continuity', '', 'mean', 3], ['continuity', '', 'least', 3], ['mean', 'mm', 'mean', 3], ['HD', 'mm', 'mean', 3],
-  ['HD', 'mm', 'greatest', 3]];
-const BRANCH_NAMES = { mean: 'distance' };
+// What the table of branches has: measure, unit, what of its values over the phases, digits, and whether there is room only on a wide page.
+const BRANCH_COLUMNS = [['length', 'mm', 'mean', 1, 'wide'], ['covered', '%', 'mean', 0, 'wide'], ['covered', '%', 'least', 0, null],
+  ['mean', 'mm', 'mean', 2, null], ['HD', 'mm', 'greatest', 2, null]];
+const BRANCH_NAMES = { covered: 'found', mean: 'distance' };
+const LOST_SHARE = 0.5; // of a branch's length: less of it is a lost branch
 const OVER_PHASES = {
   mean: (values) => values.reduce((sum, value) => sum + value, 0) / values.length,
   least: (values) => Math.min(...values),
   greatest: (values) => Math.max(...values),
 };
 
-/** A row a branch of the truth, over all phases. @param phases  the branches of each @return whether there are any */
-function fillBranches(table, phases) {
+/** The branches of the truth, the worst first: { group, label, values, worst }; worst is the index of the phase in which it is furthest off. */
+function branchesOf(phases) {
   const branches = new Map();
-  for (const one of phases.flat()) {
-    branches.set(one.group, [...(branches.get(one.group) || []), one]);
-  }
+  phases.forEach((list, phase) => list.forEach((one) => {
+    const branch = branches.get(one.group) || { group: one.group, label: one.label || '–', all: [], worst: phase };
+    const worse = (a, b) => (known(a.HD) ? a.HD : Infinity) > (known(b.HD) ? b.HD : Infinity) || (!known(a.HD) && a.covered < b.covered);
+    const before = branch.all.find((entry) => entry.phase === branch.worst);
+    branch.all.push({ ...one, phase });
+    branch.worst = !before || worse(one, before) ? phase : branch.worst;
+    branches.set(one.group, branch);
+  }));
+  const least = (branch) => Math.min(...branch.all.map((one) => one.covered));
+  const greatest = (branch) => Math.max(...branch.all.map((one) => (known(one.HD) ? one.HD : 0)));
+  return [...branches.values()].sort((a, b) => Math.min(LOST_SHARE, least(a)) - Math.min(LOST_SHARE, least(b)) || greatest(b) - greatest(a));
+}
+
+/** A row a branch of the truth, over all phases; `onBranch` is called with the branch whose row is clicked. @return whether there are any */
+function fillBranches(table, phases, names, onBranch) {
+  const branches = branchesOf(phases);
   const body = element('tbody');
-  for (const [group, all] of [...branches].sort((a, b) => a[0] - b[0])) {
-    const label = (all.find((one) => one.label) || { label: '–' }).label;
-    body.append(element('tr', {}, [element('th', { scope: 'row', class: 'text' }, [label]), cell(`${group}`), cell(`${all.length}`),
-      ...BRANCH_COLUMNS.map(([key, , what, digits]) => {
-        const values = all.map((one) => one[key]).filter(known);
-        return cell(values.length > 0 ? written(OVER_PHASES[what](values), digits) : '–');
-      })]));
+  for (const branch of branches) {
+    const button = element('button', { type: 'button', 'aria-label': `Show ${branch.label}` }, [branch.label]);
+    const row = element('tr', { class: Math.min(...branch.all.map((one) => one.covered)) < LOST_SHARE ? 'goes missed' : 'goes', 'data-branch': branch.group }, [
+      element('th', { scope: 'row', class: 'text' }, [button]),
+      ...BRANCH_COLUMNS.map(([key, unit, what, digits, kind]) => {
+        const values = branch.all.map((one) => one[key]).filter(known);
+        return cell(values.length > 0 ? written((unit === '%' ? 100 : 1) * OVER_PHASES[what](values), digits) : '–', kind);
+      }), cell(names[branch.worst])]);
+    row.addEventListener('click', () => onBranch(branch));
+    body.append(row);
   }
   table.replaceChildren(
-    element('caption', {}, ['Over all phases: what the model has of the truth’s branches, and how far their surface is from it.']),
+    element('caption', {}, ['The truth’s branches over all phases, the worst first: how much of their length the model has, and how far their surface is from ' +
+      'it. A row goes to the branch in its worst phase.']),
     element('thead', {}, [element('tr', {}, [element('th', { scope: 'col', class: 'text' }, ['Branch']),
-      ...['group', 'phases'].map((name) => element('th', { scope: 'col' }, [name])),
-      ...BRANCH_COLUMNS.map(([key, unit, what]) => element('th', { scope: 'col' }, [BRANCH_NAMES[key] || key,
-        element('small', {}, [` ${what}${unit ? `, ${unit}` : ''}`])]))])]), body);
-  return branches.size > 0;
+      ...BRANCH_COLUMNS.map(([key, unit, what, , kind]) => element('th', { scope: 'col', class: kind }, [BRANCH_NAMES[key] || key,
+        element('small', {}, [` ${what === 'mean' && key === 'length' ? '' : what}${unit ? ` ${unit}` : ''}`])])),
+      element('th', { scope: 'col' }, ['worst', element('small', {}, [' phase'])])])]), body);
+  return branches.length > 0;
 }

@@ -5,6 +5,7 @@ const FINDINGS = [
   ['checks', ['checks'], 'Checks of the whole tree', 'Nothing was noticed.'],
   ['bridges', ['bridges'], 'Guessed across gaps', 'No gap was bridged.'],
   ['lesions', ['lesions'], 'Narrowings', 'No narrowing was found.'],
+  ['cycle', ['cycle', 'lesions'], 'Narrowings over the heart cycle', 'No narrowing was found in the median over the phases.'],
   ['calcium', ['calcium', 'objects'], 'Calcium', 'No calcium was found.'],
   ['hidden', ['calcium', 'radius_interpolated'], 'Radius guessed, behind calcium', 'None was.'],
   ['placement', ['placement'], 'How likely each branch is within 1 mm of an artery, at its worst phase', 'Nothing was followed.'],
@@ -12,7 +13,8 @@ const FINDINGS = [
   ['limits', ['limits', 'clamped'], 'Held back by limits of motion', 'Nothing was held back.'],
 ];
 // Columns that come first; the others follow as they are.
-const FIRST_COLUMNS = ['what', 'vessel', 'time', 'status', 'limit', 'kind', 'degree', 'diameter_stenosis_percent', 'range_percent', 'confidence', 'length_mm',
+const FIRST_COLUMNS = ['what', 'vessel', 'time', 'status', 'limit', 'kind', 'degree', 'diameter_stenosis_percent', 'range_percent', 'worst_percent',
+  'worst_phase_percent', 'mildest_percent', 'pulsation_percent', 'confidence', 'length_mm',
   'least_diameter_mm', 'reference_diameter_mm'];
 const PLACES = ['position', 'place', 'at', 'minimum', 'centre', 'center', 'from', 'begin'];
 const NEAR_VESSEL = 4; // mm from its axis: a click there belongs to it
@@ -73,7 +75,7 @@ function fillFindings(table, findings, onPlace) {
   const body = element('tbody');
   findings.forEach((one) => {
     const place = placeOf(one);
-    const cells = keys.map((key) => cell(shownValue(key, one[key]), texts.has(key) ? 'text' : null));
+    const cells = keys.map((key) => cell(shownValue(key, one[key]), !texts.has(key) ? null : `${one[key]}`.length > 40 ? 'text long' : 'text'));
     const button = place ? element('button', { type: 'button' }, ['show']) : '–';
     const row = element('tr', { class: place ? 'goes' : null }, [element('td', { class: 'text' }, [button]), ...cells]);
     if (place) {
@@ -120,13 +122,17 @@ class RunPanel {
     this.fillVessels();
     byId('findings').replaceChildren(...FINDINGS.map((one) => this.findings(...one)));
     const pictured = run.vessels.some((one) => one.straightened);
-    byId('vessel-views').hidden = !pictured;
+    const along = pictured || Boolean(run.cycle);
+    byId('vessel-views').hidden = !along;
+    byId('vessel-views').querySelectorAll('.all, .views-legend').forEach((one) => { one.hidden = !pictured; });
     byId('heart-sheets').hidden = run.sheets.length === 0;
-    byId('views').replaceChildren(...(pictured ? run.vessels.map((one, k) => this.vessel(one, k)) : []));
+    byId('views').replaceChildren(...(along ? run.vessels.map((one, k) => this.vessel(one, k)) : []));
     byId('sheets').replaceChildren(...run.sheets.map((one) => this.sheet(one)));
+    byId('views-note').textContent = 'The diameter over the heart cycle: the radii of the moved lines, without the image.';
     if (pictured) {
       byId('views-note').textContent = `Two cuts at right angles, ±${run.half_width} mm about the axis, then diameter (mm) and the ` +
-        `image’s values on the axis; below them a slab of ${run.thickness} mm that follows the vessel. Black ${run.window[0].toFixed(0)}, ` +
+        `image’s values on the axis; the cross-section at the slider; a curved reformat; a slab of ${run.thickness} mm that follows the vessel; its diameter ` +
+        `over the heart cycle. The outer boundary is drawn where fat shows it. Black ${run.window[0].toFixed(0)}, ` +
         `white ${run.window[1].toFixed(0)} (HU). A click shows the place in the model.`;
     }
   }
@@ -136,7 +142,11 @@ class RunPanel {
     found = Array.isArray(found) ? found.filter((one) => one !== null && typeof one === 'object') : null;
     const around = path.length > 1 && kind === path[0] ? this.run[kind] : null;
     const parts = [element('h3', {}, [title])];
-    if (around && !Array.isArray(around)) {
+    if (kind === 'cycle') {
+      parts.push(element('p', { class: 'none' }, [!this.run.cycle ? 'There is no motion, or it was not measured.' : this.run.cycle.measured
+        ? 'The lumen was measured in the image of each phase; the degree is that of the median over the phases.'
+        : 'Of the radii of the moved lines: no image was measured.']));
+    } else if (around && !Array.isArray(around)) {
       // What is said of all of them together.
       const all = Object.keys(around).filter((key) => ['number', 'string', 'boolean'].includes(typeof around[key]) && key !== 'file');
       parts.push(element('p', { class: 'none' }, [all.map((key) => {
@@ -207,9 +217,26 @@ class RunPanel {
       (event.clientY - box.top) / box.height * view.picture.rows - 0.5];
   }
 
+  /** The pictures of a vessel that there are: each with the mm along it of a pixel, and where the cursor of a place is, x, y and kind. */
+  picturesOf(vessel) {
+    const { straightened, curved, slab } = vessel;
+    const nearest = (points, x, y) => {
+      const distances = points.map((point) => Math.hypot(point[0] - x, point[1] - y));
+      return distances.indexOf(Math.min(...distances));
+    };
+    return [
+      straightened && { view: this.view(straightened, `${vessel.name}, straightened`),
+        arcOf: (x) => Math.round((x - straightened.left) / straightened.per_mm),
+        cursorAt: (arc) => [straightened.left + straightened.per_mm * arc, 0, 'across'] },
+      curved && { view: this.view(curved, `${vessel.name}, curved reformat`),
+        arcOf: (x, y) => nearest(curved.axis, x, y), cursorAt: (arc) => [...curved.axis[arc], 'ring'] },
+      slab && { view: this.view(slab, `${vessel.name} in a slab that follows it`),
+        arcOf: (x, y) => nearest(vessel.path.map((place) => this.project(slab, place)), x, y),
+        cursorAt: (arc, place) => [...this.project(slab, place).slice(0, 2), 'ring'] },
+    ].filter(Boolean);
+  }
+
   vessel(vessel, index) {
-    const straight = this.view(vessel.straightened, `${vessel.name}, straightened`);
-    const slab = this.view(vessel.slab, `${vessel.name} in a slab that follows it`);
     const notes = [`${vessel.length.toFixed(1)} mm`];
     if (vessel.bridged > 0) {
       notes.push(element('b', { class: 'bridged' }, [`${vessel.bridged.toFixed(1)} mm bridged`]));
@@ -220,23 +247,18 @@ class RunPanel {
     if (vessel.stenosis > 0) {
       notes.push(element('b', {}, [`narrowed by ${(100 * vessel.stenosis).toFixed(0)} %`]));
     }
+    const goTo = (arc) => this.onPlace(vessel.path[Math.max(0, Math.min(vessel.path.length - 1, arc))], false);
+    const pictures = this.picturesOf(vessel);
+    const section = vessel.sections ? new SectionView(vessel, this.observer, goTo) : null;
+    const measured = this.run.cycle && new CycleView(this.run.cycle, index, goTo);
+    const cycle = measured && !measured.empty ? measured : null;
+    const scrolled = pictures.map(({ view }) => element('div', { class: 'scroll' }, [view.made]));
+    scrolled.splice(1, 0, ...(section ? [section.made] : []));
     const article = element('article', { 'data-vessel': index }, [
       element('h3', {}, [vessel.name, ...notes.flatMap((one) => [' · ', one]).map((one) =>
-        (typeof one === 'string' ? element('small', {}, [one]) : one))]),
-      element('div', { class: 'scroll' }, [straight.made]), element('div', { class: 'scroll' }, [slab.made])]);
-    straight.made.addEventListener('click', (event) => {
-      const arc = (this.pixelOf(straight, event)[0] - vessel.straightened.left) / vessel.straightened.per_mm;
-      this.onPlace(vessel.path[Math.max(0, Math.min(vessel.path.length - 1, Math.round(arc)))], false);
-    });
-    slab.made.addEventListener('click', (event) => {
-      const [x, y] = this.pixelOf(slab, event);
-      const distances = vessel.path.map((place) => {
-        const [px, py] = this.project(vessel.slab, place);
-        return Math.hypot(px - x, py - y);
-      });
-      this.onPlace(vessel.path[distances.indexOf(Math.min(...distances))], false);
-    });
-    this.figures.push({ vessel, article, straight, slab });
+        (typeof one === 'string' ? element('small', {}, [one]) : one))]), ...scrolled, ...(cycle ? [cycle.made] : [])]);
+    pictures.forEach(({ view, arcOf }) => view.made.addEventListener('click', (event) => goTo(arcOf(...this.pixelOf(view, event)))));
+    this.figures.push({ vessel, article, pictures, section, cycle });
     return article;
   }
 
@@ -275,6 +297,11 @@ class RunPanel {
     return best && best.distance <= NEAR_VESSEL ? best : null;
   }
 
+  /** @param fraction  of R-R, of the phase that is shown */
+  atTime(fraction) {
+    this.figures.filter(({ cycle }) => cycle).forEach(({ cycle }) => cycle.atTime(fraction));
+  }
+
   /** Cursors in all pictures that have the place in them. */
   mark(place) {
     if (!this.run) {
@@ -288,15 +315,15 @@ class RunPanel {
       view.cursor.style.top = kind === 'across' ? `${100 * view.picture.top / view.picture.rows}%` : `${100 * (y + 0.5) / view.picture.rows}%`;
       view.cursor.style.height = kind === 'across' ? `${100 * (view.picture.bottom - view.picture.top) / view.picture.rows}%` : '';
     };
-    for (const { vessel, article, straight, slab } of this.figures) {
+    for (const { vessel, article, pictures, section, cycle } of this.figures) {
       const here = near && near.vessel === vessel;
       article.classList.toggle('here', Boolean(here));
-      straight.cursor.hidden = !here;
-      slab.cursor.hidden = !here;
+      pictures.forEach(({ view }) => { view.cursor.hidden = true; });
       if (here) {
-        put(straight, straight.picture.left + straight.picture.per_mm * near.arc, 0, 'across');
-        const [x, y] = this.project(slab.picture, place);
-        put(slab, x, y, 'ring');
+        pictures.forEach(({ view, cursorAt }) => put(view, ...cursorAt(near.arc, place)));
+        for (const one of [section, cycle].filter(Boolean)) {
+          one.show(near.arc);
+        }
       }
     }
     for (const view of this.sheets) {
