@@ -153,9 +153,8 @@ int vtkSegmentationReader::RequestInformation(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< error.what());
+    return vtkCoronary::ReportFailure(this, error.what());
   }
-  return 0;
 }
 
 int vtkSegmentationReader::RequestData(
