@@ -549,7 +549,7 @@ int vtkGatedImageReader::RequestInformation(
     const std::array<int, 6> empty{ 0, -1, 0, -1, 0, -1 };
     outputVector->GetInformationObject(0)->Set(
       vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), empty.data(), 6);
-    return vtkCoronary::ReportFailure(this, error.what());
+    return vtkCoronary::ReportEmptied(this, error.what());
   }
 
   const coronary::GatedSeries& series = *state.Series;
@@ -624,13 +624,13 @@ int vtkGatedImageReader::RequestData(
   catch (const std::bad_alloc&)
   {
     image->Initialize();
-    return vtkCoronary::ReportFailure(this,
+    return vtkCoronary::ReportEmptied(this,
       "Not enough memory for phase " + std::to_string(phase) + " of '" + series.Name(phase) + "'.");
   }
   catch (const std::exception& error)
   {
     image->Initialize();
-    return vtkCoronary::ReportFailure(this, error.what());
+    return vtkCoronary::ReportEmptied(this, error.what());
   }
 
   vtkInformation* seedInfo = outputVector->GetInformationObject(1);

@@ -99,7 +99,7 @@ int vtkTGFReader::RequestData(
   }
   if (this->FileName == nullptr || *this->FileName == '\0')
   {
-    return vtkCoronary::ReportFailure(this, "FileName is not set");
+    return vtkCoronary::ReportEmptied(this, "FileName is not set");
   }
   try
   {
@@ -122,7 +122,7 @@ int vtkTGFReader::RequestData(
   }
   catch (const std::exception& error)
   {
-    return vtkCoronary::ReportFailure(this, std::string(this->FileName) + ": " + error.what());
+    return vtkCoronary::ReportEmptied(this, std::string(this->FileName) + ": " + error.what());
   }
 }
 

@@ -395,6 +395,7 @@ int vtkFastMarchingCenterline::RequestData(
 {
   const int from = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
   const bool wanted = outputs->GetInformationObject(from)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
+  int result = 1;
   try
   {
     this->Execute(wanted, inputs, outputs);
@@ -402,25 +403,21 @@ int vtkFastMarchingCenterline::RequestData(
   }
   catch (const coronary::Cancelled&)
   {
-    for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
-    {
-      vtkPolyData::GetData(outputs, port)->Initialize();
-    }
-    return 1;
+    vtkDebugMacro("aborted");
   }
   catch (const std::bad_alloc&)
   {
-    vtkCoronary::ReportFailure(this, "Not enough memory for the region to march in.");
+    result = vtkCoronary::ReportEmptied(this, "Not enough memory for the region to march in.");
   }
   catch (const std::exception& error)
   {
-    vtkCoronary::ReportFailure(this, PropertyMessage(error.what()));
+    result = vtkCoronary::ReportEmptied(this, PropertyMessage(error.what()));
   }
   for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
   {
     vtkPolyData::GetData(outputs, port)->Initialize();
   }
-  return 0;
+  return result;
 }
 
 /// What is extracted from, with what was made or copied for it.

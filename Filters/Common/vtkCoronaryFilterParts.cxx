@@ -233,9 +233,9 @@ public:
 
   unsigned long Tag = 0;
 };
-}
 
-int ReportFailure(vtkAlgorithm* filter, const std::string& message)
+/// An error of the filter, but for one that it has reported with everything as it is now, and that nobody observes.
+void Report(vtkAlgorithm* filter, const std::string& message)
 {
   static vtkInformationStringKey* const lastKey =
     vtkInformationStringKey::MakeKey("LAST_FAILURE", "vtkCoronary");
@@ -248,12 +248,30 @@ int ReportFailure(vtkAlgorithm* filter, const std::string& message)
     filter->GetInformation()->Set(lastKey, failure);
     vtkErrorWithObjectMacro(filter, << message);
   }
+}
+}
+
+int ReportFailure(vtkAlgorithm* filter, const std::string& message)
+{
+  Report(filter, message);
+  vtkExecutive* executive = filter->GetExecutive();
   if (executive && !executive->HasObserver(vtkCommand::ErrorEvent))
   {
     vtkNew<EchoSilencer> silencer;
     silencer->Tag = executive->AddObserver(vtkCommand::ErrorEvent, silencer);
   }
   return 0;
+}
+
+int ReportEmptied(vtkAlgorithm* filter, const std::string& message)
+{
+  vtkExecutive* executive = filter->GetExecutive();
+  if (executive && executive->IsA("vtkPVCompositeDataPipeline"))
+  {
+    Report(filter, message);
+    return 1;
+  }
+  return ReportFailure(filter, message);
 }
 
 int FinishFailedRequest(vtkAlgorithm* filter, vtkInformationVector* outputs,
@@ -271,11 +289,11 @@ int FinishFailedRequest(vtkAlgorithm* filter, vtkInformationVector* outputs,
   }
   catch (const std::bad_alloc&)
   {
-    ReportFailure(filter, "Not enough memory " + memory);
+    result = ReportEmptied(filter, "Not enough memory " + memory);
   }
   catch (const std::exception& error)
   {
-    ReportFailure(filter, PropertyMessage(error.what(), prefixes));
+    result = ReportEmptied(filter, PropertyMessage(error.what(), prefixes));
   }
   for (int port = 0; port < outputs->GetNumberOfInformationObjects(); ++port)
   {

@@ -86,9 +86,13 @@ VTKCORONARYCOMMON_EXPORT std::string PropertyMessage(
  * Reports why a request failed as one error of the filter: of ports and times that fail for the same reason, one after
  * the other with nothing changed between, the first one says it, and VTK's executive does not print the request as
  * well. Who observes the filter's errors gets all.
- * @return 0, which the request has to return
+ * @return what the request has to return: 0
  */
 VTKCORONARYCOMMON_EXPORT int ReportFailure(vtkAlgorithm* filter, const std::string& message);
+
+/// The same for a request that leaves empty outputs.
+/// @return 0; in ParaView 1, as its representations print at every picture that they have no data when the filter fails
+VTKCORONARYCOMMON_EXPORT int ReportEmptied(vtkAlgorithm* filter, const std::string& message);
 
 /**
  * For the end of RequestData, inside of `catch (...)`: reports the exception that is being handled as an error of
@@ -96,7 +100,7 @@ VTKCORONARYCOMMON_EXPORT int ReportFailure(vtkAlgorithm* filter, const std::stri
  * request executes again.
  * @param memory    what memory was wanted for: "for the motion"
  * @param prefixes  as of PropertyMessage
- * @return what RequestData has to return: 1 after a cancellation, 0 after an error
+ * @return what RequestData has to return: 1 after a cancellation, that of ReportEmptied after an error
  */
 VTKCORONARYCOMMON_EXPORT int FinishFailedRequest(vtkAlgorithm* filter,
   vtkInformationVector* outputs, const std::string& memory,

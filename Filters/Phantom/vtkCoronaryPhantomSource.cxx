@@ -586,7 +586,7 @@ int vtkCoronaryPhantomSource::RequestData(
     }
     catch (const std::exception& error)
     {
-      result = vtkCoronary::ReportFailure(
+      result = vtkCoronary::ReportEmptied(
         this, vtkCoronary::PropertyMessage(error.what(), { "PhantomSettings: " }));
     }
     if (!complete)

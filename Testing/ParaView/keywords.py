@@ -1,6 +1,6 @@
 """Every proxy made by keywords, in two orders and with different sources active: inputs and settings are the same.
 
-A mistake is one error, however many outputs and times are asked for.
+A mistake is one error, however many outputs and times are asked for and shown.
 """
 import os
 import subprocess
@@ -11,32 +11,40 @@ from paraview import make_name_valid, simple
 from coronary_testing import all_proxies, load_plugin, require, stand_ins
 
 plugin, folder, xml_folder, pvpython = sys.argv[1:5]
-# More than one output, a stage behind it, several times.
+# More than one output, a stage behind it, several times, pictures.
 MISTAKES = {
     "an array that is not there": ("""
 phantom = simple.CoronaryPhantom(Spacing=[2, 2, 2])
 vessels = simple.VesselSegmentation(Image=phantom["Image"], ImageScalars="Density")
 for time in (0.1, 0.5, 0.9):
     vessels.UpdatePipeline(time)
-for port in range(4):
-    simple.OutputPort(vessels, port).GetDataInformation()
+for name in ("Vessel Mask", "Seeds", "Ascending Aorta"):
+    simple.Show(vessels[name])
 lines = simple.FastMarchingCenterline(Input=phantom["Image"], Seeds=vessels["Seeds"], Mask=vessels["Vessel Mask"])
-lines.UpdatePipeline(0.1)
+simple.Show(lines)
+for time in (0.1, 0.5):
+    simple.GetActiveView().ViewTime = time
+    simple.Render()
 """, "The image has no point array 'Density'"),
     "a file that is not there": ("""
 series = simple.GatedImageReader(FileNames=["nothing.json"])
 series.UpdatePipeline(0.1)
 series.UpdatePipeline(0.5)
 phase = simple.ReferencePhase(Input=series)
-phase.UpdatePipeline()
+simple.Show(series)
+simple.Show(phase)
+simple.Render()
 """, "File 'nothing.json' does not exist"),
     "a setting out of range": ("""
 tree = simple.CoronaryPhantom()
 wall = simple.FrenetSweepSurface(Input=tree["Centerlines"], MinimumEdgeLength=2, MaximumEdgeLength=1)
 wall.UpdatePipeline(0.1)
 mesh = simple.TetrahedralMesher(Surface=wall["Surface"])
-mesh.UpdatePipeline(0.1)
-mesh.UpdatePipeline(0.2)
+simple.Show(wall)
+simple.Show(mesh["Volume"])
+for time in (0.1, 0.2):
+    simple.GetActiveView().ViewTime = time
+    simple.Render()
 """, "MaximumEdgeLength")}
 
 
