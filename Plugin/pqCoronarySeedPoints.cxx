@@ -21,6 +21,7 @@
 #include <QCursor>
 #include <QHBoxLayout>
 #include <QHeaderView>
+#include <QLabel>
 #include <QPushButton>
 #include <QSignalBlocker>
 #include <QTableWidget>
@@ -37,6 +38,8 @@ pqCoronarySeedPoints::pqCoronarySeedPoints(
   this->Table->setObjectName("Points");
   this->Table->setHorizontalHeaderLabels({ tr("X (mm)"), tr("Y (mm)"), tr("Z (mm)") });
   this->Table->horizontalHeader()->setSectionResizeMode(QHeaderView::Stretch);
+  this->Table->horizontalHeader()->setMinimumSectionSize(20);
+  this->Table->setMinimumWidth(100);
   this->Table->setSelectionBehavior(QAbstractItemView::SelectRows);
   this->Table->setSelectionMode(QAbstractItemView::SingleSelection);
   this->Table->setMaximumHeight(120);
@@ -58,6 +61,9 @@ pqCoronarySeedPoints::pqCoronarySeedPoints(
   buttons->addWidget(this->ShowHandles);
   auto* rows = new QVBoxLayout(this);
   rows->setContentsMargins(0, 0, 0, 0);
+  // Above the table, which needs the width of the panel for its three columns.
+  this->setShowLabel(false);
+  rows->addWidget(new QLabel(smProperty->GetXMLLabel(), this));
   rows->addWidget(this->Table);
   rows->addLayout(buttons);
 
@@ -71,7 +77,9 @@ pqCoronarySeedPoints::pqCoronarySeedPoints(
     {
       if (auto* render = qobject_cast<pqRenderView*>(shown))
       {
-        shortcut->setContextWidget(render->widget());
+        // Wherever in the window the focus is: nobody has to click into the view before the first pick. Fields that
+        // are typed in take their letters first.
+        shortcut->setContextWidget(render->widget(), Qt::WindowShortcut);
       }
     });
 
@@ -144,7 +152,9 @@ void pqCoronarySeedPoints::fillTable()
         item = new QTableWidgetItem;
         this->Table->setItem(row, column, item);
       }
-      item->setText(QString::number(this->Points[row][column], 'g', 9));
+      // Hundredths of a millimetre: all three fit into a narrow panel.
+      item->setText(QString::number(this->Points[row][column], 'f', 2));
+      item->setToolTip(QString::number(this->Points[row][column], 'g', 9));
     }
   }
   this->RemoveButton->setEnabled(this->chosen() >= 0);

@@ -6,6 +6,7 @@
 #include "VolumeFile.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
+#include "vtkCoronaryFilterParts.h"
 
 #include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
@@ -470,6 +471,11 @@ double vtkGatedImageReader::GetPhaseTime(int phase)
                                                          : std::numeric_limits<double>::quiet_NaN();
 }
 
+double vtkGatedImageReader::GetUsedCycleLength()
+{
+  return this->State->Series ? this->State->Series->CycleSeconds() : 0.0;
+}
+
 std::string vtkGatedImageReader::GetPhaseFileName(int phase)
 {
   return phase >= 0 && phase < this->GetNumberOfPhases() ? this->State->Series->Name(phase)
@@ -543,8 +549,7 @@ int vtkGatedImageReader::RequestInformation(
     const std::array<int, 6> empty{ 0, -1, 0, -1, 0, -1 };
     outputVector->GetInformationObject(0)->Set(
       vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), empty.data(), 6);
-    vtkErrorMacro(<< error.what());
-    return 0;
+    return vtkCoronary::ReportEmptied(this, error.what());
   }
 
   const coronary::GatedSeries& series = *state.Series;
@@ -619,14 +624,13 @@ int vtkGatedImageReader::RequestData(
   catch (const std::bad_alloc&)
   {
     image->Initialize();
-    vtkErrorMacro("Not enough memory for phase " << phase << " of '" << series.Name(phase) << "'.");
-    return 0;
+    return vtkCoronary::ReportEmptied(this,
+      "Not enough memory for phase " + std::to_string(phase) + " of '" + series.Name(phase) + "'.");
   }
   catch (const std::exception& error)
   {
     image->Initialize();
-    vtkErrorMacro(<< error.what());
-    return 0;
+    return vtkCoronary::ReportEmptied(this, error.what());
   }
 
   vtkInformation* seedInfo = outputVector->GetInformationObject(1);

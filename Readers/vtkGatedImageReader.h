@@ -30,6 +30,14 @@
  * @par Failure:
  * Wrong or damaged input gives one error that names the file or property, and no output.
  *
+ * @par Python:
+ * @code{.py}
+ * series = GatedImageReader(FileNames=["series.json"])
+ * print(list(series.TimestepValues), series.UsedCycleLength)
+ * series.UpdatePipeline(series.TimestepValues[-1])
+ * print(series["Image"].PointData["HU"].GetRange())
+ * @endcode
+ *
  * @sa docs/readers.md
  */
 #ifndef vtkGatedImageReader_h
@@ -103,6 +111,10 @@ public:
 
   /// R-R fraction of a phase; NaN when there is no such phase.
   double GetPhaseTime(int phase);
+
+  /// R-R interval in seconds as the files say it, or CycleLength where they do not; 0 before UpdateInformation(), or
+  /// when that failed.
+  double GetUsedCycleLength();
 
   /// File (for DICOM: that of the first slice) of a phase; empty when there is no such phase.
   std::string GetPhaseFileName(int phase);

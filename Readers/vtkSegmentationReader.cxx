@@ -18,6 +18,7 @@
 #include "vtkUnsignedCharArray.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -153,9 +154,11 @@ int vtkSegmentationReader::RequestInformation(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< error.what());
+    // ParaView asks for data even now, and the executive would complain of a missing extent.
+    const std::array<int, 6> empty{ 0, -1, 0, -1, 0, -1 };
+    outputs->GetInformationObject(0)->Set(SDDP::WHOLE_EXTENT(), empty.data(), 6);
+    return vtkCoronary::ReportEmptied(this, error.what());
   }
-  return 0;
 }
 
 int vtkSegmentationReader::RequestData(

@@ -14,6 +14,13 @@
  * @par Failure:
  * Wrong or damaged input gives one error that names the file, and no output.
  *
+ * @par Python:
+ * @code{.py}
+ * mask = SegmentationReader(FileNames=["mask.mha"], Segments=["1"])
+ * mask.UpdatePipeline()
+ * print(mask.PointData["VesselMask"].GetRange())
+ * @endcode
+ *
  * @sa coronary::SegmentationFile, vtkGatedImageReader
  */
 #ifndef vtkSegmentationReader_h

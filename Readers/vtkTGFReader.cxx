@@ -99,8 +99,7 @@ int vtkTGFReader::RequestData(
   }
   if (this->FileName == nullptr || *this->FileName == '\0')
   {
-    vtkErrorMacro("FileName is not set");
-    return 0;
+    return vtkCoronary::ReportEmptied(this, "FileName is not set");
   }
   try
   {
@@ -123,9 +122,8 @@ int vtkTGFReader::RequestData(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< this->FileName << ": " << error.what());
+    return vtkCoronary::ReportEmptied(this, std::string(this->FileName) + ": " + error.what());
   }
-  return 0;
 }
 
 void vtkTGFReader::PrintSelf(ostream& os, vtkIndent indent)

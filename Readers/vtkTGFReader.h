@@ -22,6 +22,13 @@
  * A file that can not be opened, a line that can not be read, a bone without its joints, a loop: one
  * error that names the file and the line, joint or bone, and no output.
  *
+ * @par Python:
+ * @code{.py}
+ * skeleton = TGFSkeletonReader(FileName="tree.tgf", Radius=1.5)
+ * skeleton.UpdatePipeline()
+ * print(skeleton["Tree"].GetDataInformation().GetNumberOfCells(), "vessels")
+ * @endcode
+ *
  * @sa vtkTGFWriter, coronary::ReadTgf
  */
 #ifndef vtkTGFReader_h

@@ -45,6 +45,13 @@
  * range, a file that can not be written: one error that names it, Write() returns 0 and no file is changed.
  * Inverted tetrahedra are no failure: one warning names the phases.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, SurfaceSpacing=1, Phases=[0.0, 0.5])
+ * SaveData("wall.json", proxy=phantom["Surface"], STL=1)
+ * print(open("wall_quality.csv").readline())
+ * @endcode
+ *
  * @sa vtkSkinDeformation, vtkCardiacPhaseInterpolator, vtkTetrahedralMesher, coronary::MeasureTetrahedra
  */
 #ifndef vtkMeshSequenceWriter_h

@@ -24,6 +24,15 @@
  * Without a file name, without lines, for lines that are no tree (a loop), or when the file can not be
  * written: one error that names it, Write() returns 0.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1)
+ * tree = ReferencePhase(Input=phantom["Centerlines"], Automatic=0, Time=0.75)
+ * skeleton = CenterlineSkeleton(Centerlines=tree)
+ * SaveData("bones.tgf", proxy=skeleton)
+ * print(open("bones.tgf").readline())
+ * @endcode
+ *
  * @sa vtkTGFReader, coronary::WriteTgf
  */
 #ifndef vtkTGFWriter_h

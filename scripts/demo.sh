@@ -120,5 +120,5 @@ cat <<EOF
   ${plugin#"$root/"}
                                       the ParaView plugin
 Look at it, and press play:
-  paraview --plugin-search-paths=${plugin%/*} --plugins=DynamicCoronaryPlugin --state=Plugin/states/result.py
+  PV_PLUGIN_CONFIG_FILE=${plugin%/*/*}/dynamiccoronary.plugins.xml paraview --state=Plugin/states/result.py
 EOF

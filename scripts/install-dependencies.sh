@@ -88,11 +88,15 @@ if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
   exit 1
 fi
 
+is_installed() {
+  # "|| true": dpkg-query fails for a package that it has never heard of.
+  [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null || true)" = installed ]
+}
+
 list_missing() {
   local package
   for package in "${wanted[@]}"; do
-    # "|| true": dpkg-query fails for a package that it has never heard of.
-    if [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)" != installed ]; then
+    if ! is_installed "$package"; then
       echo "$package"
     fi
   done
@@ -102,6 +106,12 @@ mapfile -t missing < <(list_missing)
 if [ ${#missing[@]} -eq 0 ]; then
   echo "Nothing to install: all ${#wanted[@]} packages are there."
   exit 0
+fi
+# apt would remove what others work with, or stop with a page of reasons.
+if [[ " ${missing[*]} " == *" python3-paraview "* ]] && is_installed python3-vtk9; then
+  echo "install-dependencies: python3-paraview, which is needed, and python3-vtk9, which is installed, exclude each other" \
+    "in Debian: remove python3-vtk9 (apt-get remove python3-vtk9), or build without ParaView (--tree vtk)." >&2
+  exit 1
 fi
 if [ "$check_only" = yes ]; then
   echo "Missing packages: ${missing[*]}"
@@ -147,20 +157,13 @@ if [ ${#unavailable[@]} -gt 0 ]; then
   exit 1
 fi
 
-# --no-remove: python3-paraview conflicts with python3-vtk9, and apt would silently take
-# libvtk9-dev away from whoever works with it.
+# --no-remove: apt would silently take away what is in the way of a package, from whoever works with it.
 log="$(mktemp)"
 trap 'rm -f "$log"' EXIT
 if ! "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
   apt-get "${apt_options[@]}" -y --no-remove --no-install-recommends install "${missing[@]}" \
   </dev/null >"$log" 2>&1; then
   tail -n 30 "$log" >&2
-  if [ "$(dpkg-query -W -f '${db:Status-Status}' python3-vtk9 2>/dev/null || true)" = installed ]; then
-    {
-      echo "install-dependencies: Debian's python3-vtk9 and python3-paraview exclude each other."
-      echo "Remove it (apt-get remove python3-vtk9), or build the plain VTK tree only (--tree vtk)."
-    } >&2
-  fi
   echo "install-dependencies: apt-get could not install: ${missing[*]}" >&2
   exit 1
 fi

@@ -5,7 +5,7 @@ Usage: make-filter-reference.py [--check]
   --check  write nothing; exit code 1 when a page is not what headers and XML say, or when these leave
            something out. scripts/check-sources.sh asks for that.
 
-From the header: purpose, ports, arrays, time, failure, sources, setters with their meaning. From
+From the header: purpose, ports, arrays, time, failure, sources, setters with their meaning, an example in Python. From
 ServerManagerXML/: labels, Python names, defaults, ranges. Mend these, never the pages.
 """
 import glob
@@ -23,6 +23,7 @@ STAGES = [("Filters/Phantom", "Phantom"), ("Readers", "Readers"), ("Filters/Comm
           ("Filters/Surface", "Surface"), ("Filters/Volume", "Volume"), ("Filters/Skinning", "Skeleton and weights"),
           ("Filters/Motion", "Motion"), ("Filters/Metrics", "Metrics"), ("Writers", "Writers")]
 INHERITED = ("SetInputArrayToProcess",)
+EXAMPLE_BEGINS = ["from paraview.simple import *", ""]
 TIMES = ("TimestepValues", "TimeRange")
 UNIT = re.compile(
     r"(?<![\w`'])(mm\^3|mm\^2|mm/s|1/mm|mm|HU per cm|HU|ms|[Ss]econds|s|degrees|radians|MPa|percent|voxels"
@@ -204,6 +205,9 @@ def default_text(element):
     value = element.get("default_values")
     if value is None or value == "none":
         return ""
+    if element.get("default_values_delimiter"):
+        # What SetInputArrayToProcess takes: the name of the array is the last of five.
+        return "`%s`" % value.split(element.get("default_values_delimiter"))[-1]
     if len(value.split()) > 9:
         return "%d values, %s to %s" % (len(value.split()), number(value.split()[0]), number(value.split()[-1]))
     if element.find("BooleanDomain") is not None:
@@ -359,10 +363,11 @@ class Pages:
                     shown.add(title)
         lines += self.array_table(header)
         for title in list(sections):
-            if title not in shown and not title.startswith(("Time", "Failure", "Source")):
+            if title not in shown and not title.startswith(("Time", "Failure", "Source", "Python")):
                 lines += ["## %s" % title, "", self.prose(sections[title], name), ""]
         for proxy in proxies:
             lines += self.property_table(header, proxy, len(proxies) > 1)
+        lines += self.example(header, proxies)
         lines += self.setters(header)
         for title, heading in (("Time", "Time"), ("Failure", "Errors"), ("Source", "Sources")):
             for key in sections:
@@ -406,6 +411,20 @@ class Pages:
         for member in header.members:
             if len(member.text) < 5 and any(arguments for _, arguments in member.setters):
                 self.complain(header, "no docstring for %s" % member.setters[0][0])
+
+    def example(self, header, proxies):
+        """Lines of Python as they are typed; the test ReferenceExamples runs them."""
+        code = re.search(r"@code\{\.py\}\n(.*?)\n@endcode", header.sections.get("Python", ""), re.S)
+        if not proxies:
+            return []
+        if not code:
+            self.complain(header, "no example: '@par Python:' with @code{.py}")
+            return []
+        lines = ["## In Python", ""]
+        file = re.search(r'FileNames?=\[?"([^"]+)"', code.group(1))
+        if file:
+            lines += ["`%s` is a file of your own." % file.group(1), ""]
+        return lines + ["```python"] + EXAMPLE_BEGINS + [code.group(1), "```", ""]
 
     def ports(self, title, text, proxies, own):
         """The text on ports, with the names that ParaView has for them."""
@@ -527,7 +546,8 @@ class Pages:
                  "ports, arrays, properties with their names in ParaView, Python and C++, time, errors. R-R as a unit is the",
                  "fraction of the R-R interval; a number without a unit is a count, a share or a ratio. What each array is,",
                  "and who makes and takes it: [arrays](arrays.md). Coordinates: [coordinates and units]"
-                 "(../coordinates-and-units.md).", ""]
+                 "(../coordinates-and-units.md). The examples are for `pvpython` and the Python shell of ParaView, with "
+                 "[the plugin](../paraview.md#the-plugin).", ""]
         folders = [folder for folder, _ in STAGES]
         folders += sorted({header.folder for header in self.headers.values()} - set(folders))
         for folder in folders:

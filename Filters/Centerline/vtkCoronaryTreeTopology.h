@@ -74,6 +74,15 @@
  * Names: Raff et al., J Cardiovasc Comput Tomogr 2009;3:122 (SCCT). Exponents of the bifurcations: Murray 1926,
  * Huo and Kassab, Finet et al.; see docs/topology.md.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1)
+ * tree = ReferencePhase(Input=phantom["Centerlines"], Automatic=0, Time=0.75)
+ * named = CoronaryTreeTopology(Input=tree, Dominance="Find out")
+ * named.UpdatePipeline()
+ * print(named["Tree"].GetDataInformation().GetNumberOfCells(), "segments")
+ * @endcode
+ *
  * @sa coronary::BuildTopology, coronary::LabelSegments, docs/topology.md
  */
 #ifndef vtkCoronaryTreeTopology_h

@@ -401,7 +401,8 @@ int vtkCurvedReformat::RequestData(
   try
   {
     using vtkCoronary::Require;
-    vtkDataArray* values = vtkCoronary::ImageArrayOf(image, "The image", this->ImageArrayName);
+    Require(image != nullptr && image->GetNumberOfPoints() > 0, "The image has no voxels");
+    vtkDataArray* values = vtkCoronary::VoxelArrayOf(image, this->ImageArrayName, "the image");
     std::vector<float> copy;
     const coronary::ImageInterpolator interpolator(vtkCoronary::ScalarImageOf(image, values, copy));
     const coronary::VesselTree tree = vtkCoronary::TreeOf(lines);

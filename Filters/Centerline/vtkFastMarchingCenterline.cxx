@@ -45,24 +45,6 @@ vtkStandardNewMacro(vtkFastMarchingCenterline);
 
 namespace
 {
-std::string NameOf(vtkAbstractArray* array)
-{
-  return "array '" + std::string(array->GetName() ? array->GetName() : "") + "'";
-}
-
-vtkDataArray* CheckedArray(vtkAbstractArray* any, vtkImageData* image, const std::string& whose)
-{
-  vtkCoronary::Require(any != nullptr, whose + " has no point array to be used");
-  auto* array = vtkArrayDownCast<vtkDataArray>(any);
-  vtkCoronary::Require(array != nullptr, NameOf(any) + " of " + whose + " is not numeric");
-  vtkCoronary::Require(array->GetNumberOfComponents() == 1,
-    NameOf(any) + " of " + whose + " has " + std::to_string(array->GetNumberOfComponents()) +
-      " components: one is needed");
-  vtkCoronary::Require(array->GetNumberOfTuples() == image->GetNumberOfPoints(),
-    NameOf(any) + " of " + whose + " has not one value a voxel");
-  return array;
-}
-
 /// The values of an array as T: its own memory if it is of that type, else a copy.
 template <typename Array, typename T>
 const T* ValuesAs(vtkDataArray* array, std::vector<T>& copy)
@@ -413,6 +395,7 @@ int vtkFastMarchingCenterline::RequestData(
 {
   const int from = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
   const bool wanted = outputs->GetInformationObject(from)->Get(SDDP::UPDATE_PIECE_NUMBER()) <= 0;
+  int result = 1;
   try
   {
     this->Execute(wanted, inputs, outputs);
@@ -420,25 +403,21 @@ int vtkFastMarchingCenterline::RequestData(
   }
   catch (const coronary::Cancelled&)
   {
-    for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
-    {
-      vtkPolyData::GetData(outputs, port)->Initialize();
-    }
-    return 1;
+    vtkDebugMacro("aborted");
   }
   catch (const std::bad_alloc&)
   {
-    vtkErrorMacro("Not enough memory for the region to march in.");
+    result = vtkCoronary::ReportEmptied(this, "Not enough memory for the region to march in.");
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< PropertyMessage(error.what()));
+    result = vtkCoronary::ReportEmptied(this, PropertyMessage(error.what()));
   }
   for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port)
   {
     vtkPolyData::GetData(outputs, port)->Initialize();
   }
-  return 0;
+  return result;
 }
 
 /// What is extracted from, with what was made or copied for it.
@@ -495,15 +474,8 @@ void vtkFastMarchingCenterline::ReadImage(
 {
   coronary::CenterlineInput& input = source.input;
   input.grid = vtkCoronary::GridOf(image);
-  int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-  const char* name = this->GetInputArrayInformation(0)->Get(vtkDataObject::FIELD_NAME());
-  // ParaView gives an empty name while it does not know the input's arrays.
-  vtkAbstractArray* any = name && *name == '\0'
-    ? image->GetPointData()->GetScalars()
-    : this->GetInputAbstractArrayToProcess(0, inputs, association);
-  vtkCoronary::Require(!any || association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
-    "the image's array belongs to the cells: point data are needed");
-  vtkDataArray* array = CheckedArray(any, image, "the image");
+  vtkDataArray* array =
+    vtkCoronary::VoxelArrayOf(image, vtkCoronary::ChosenPointArray(this, "the image"), "the image");
   if (this->ImageKind == MaskImage)
   {
     input.mask = ValuesAs<vtkUnsignedCharArray>(array, source.maskCopy);
@@ -523,10 +495,7 @@ void vtkFastMarchingCenterline::ReadImage(
         "the mask is on another grid than the image: extent, spacing, origin or direction "
         "differs");
       input.mask = ValuesAs<vtkUnsignedCharArray>(
-        CheckedArray(mask->GetPointData()->GetScalars() ? mask->GetPointData()->GetScalars()
-                                                        : mask->GetPointData()->GetAbstractArray(0),
-          mask, "the mask"),
-        source.maskCopy);
+        vtkCoronary::VoxelArrayOf(mask, {}, "the mask"), source.maskCopy);
     }
   }
 }
@@ -537,13 +506,8 @@ void vtkFastMarchingCenterline::ReadIntensity(vtkImageData* measured, Source& so
   {
     return;
   }
-  vtkPointData* arrays = measured->GetPointData();
-  vtkAbstractArray* any = this->IntensityArrayName.empty()
-    ? arrays->GetScalars()
-    : arrays->GetAbstractArray(this->IntensityArrayName.c_str());
-  vtkCoronary::Require(any != nullptr || this->IntensityArrayName.empty(),
-    "the measured image has no point array '" + this->IntensityArrayName + "'");
-  vtkDataArray* array = CheckedArray(any, measured, "the measured image");
+  vtkDataArray* array =
+    vtkCoronary::VoxelArrayOf(measured, this->IntensityArrayName, "the measured image");
   source.intensity = vtkCoronary::ScalarImageOf(measured, array, source.intensityCopy);
   source.input.intensity = &source.intensity;
 }

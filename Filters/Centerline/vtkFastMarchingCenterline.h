@@ -53,6 +53,17 @@
  * A missing array, seeds that are not there or a setting out of range is one error and no output. An
  * empty image, surface or seed list is a normal piece of a pipeline: empty outputs, no error.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Spacing=[1.0, 1.0, 1.0], TemporalWindow=0)
+ * phase = ReferencePhase(Input=phantom["Image"], Automatic=0, Time=0.75)
+ * vesselness = FrangiVesselness(Input=phase, AutomaticC=0, C=100)
+ * lumen = VesselSegmentation(Image=phase, Vesselness=vesselness)
+ * lines = FastMarchingCenterline(Input=vesselness, Seeds=lumen["Seeds"], CTImage=phase, Mask=lumen["Vessel Mask"])
+ * lines.UpdatePipeline()
+ * print(lines["Centerlines"].GetDataInformation().GetNumberOfCells(), "vessels")
+ * @endcode
+ *
  * @sa coronary::ExtractCenterlines, vtkCoronaryTreeTopology
  */
 #ifndef vtkFastMarchingCenterline_h
@@ -218,7 +229,8 @@ public:
 
   ///@{
   /**
-   * Point array of the image at input 3. Default empty: its active scalars.
+   * Point array of the image at input 3. Default "Automatic", or empty: its active scalars, or its
+   * first numeric array of one component.
    */
   // No SetInputArrayToProcess(1, ...): ParaView 5.11 crashes on arrays of two inputs chosen so.
   vtkSetMacro(IntensityArrayName, std::string);
@@ -271,7 +283,7 @@ private:
   double SnapDistance = 0.0;
   double SurfaceSpacing = 0.0;
   vtkIdType StepLimit = 5000000;
-  std::string IntensityArrayName;
+  std::string IntensityArrayName = "Automatic";
 };
 
 #endif

@@ -4,6 +4,7 @@
 #include "vtkCoronaryArrayNames.h"
 
 #include "vtkAlgorithm.h"
+#include "vtkCommand.h"
 #include "vtkDataArray.h"
 #include "vtkDataArrayRange.h"
 #include "vtkDataObject.h"
@@ -12,8 +13,10 @@
 #include "vtkFloatArray.h"
 #include "vtkImageData.h"
 #include "vtkInformation.h"
+#include "vtkInformationStringKey.h"
 #include "vtkInformationVector.h"
 #include "vtkMatrix3x3.h"
+#include "vtkOutputWindow.h"
 #include "vtkPointData.h"
 #include "vtkPolyData.h"
 #include "vtkShortArray.h"
@@ -50,21 +53,6 @@ void AddVectors(
   data->AddArray(array);
 }
 
-vtkDataArray* ImageArrayOf(vtkImageData* image, const std::string& whose, const std::string& chosen)
-{
-  Require(image != nullptr && image->GetNumberOfPoints() > 0, whose + " has no voxels");
-  const bool automatic = chosen.empty() || chosen == "Automatic";
-  vtkPointData* data = image->GetPointData();
-  vtkDataArray* values = automatic ? data->GetScalars() : data->GetArray(chosen.c_str());
-  Require(values != nullptr,
-    automatic ? whose + " has no scalars" : whose + " has no point array '" + chosen + "'");
-  Require(values->GetNumberOfComponents() == 1 &&
-      values->GetNumberOfTuples() == image->GetNumberOfPoints(),
-    whose + "'s array '" + std::string(values->GetName() ? values->GetName() : "") +
-      "' must have one value a voxel");
-  return values;
-}
-
 coronary::ScalarImage ScalarImageOf(
   vtkImageData* image, vtkDataArray* array, std::vector<float>& copy)
 {
@@ -91,10 +79,56 @@ coronary::ScalarImage ScalarImageOf(
   return result;
 }
 
+bool IsAutomatic(const std::string& arrayName)
+{
+  return arrayName.empty() || arrayName == "Automatic";
+}
+
+vtkDataArray* VoxelArrayOf(vtkImageData* image, const std::string& chosen, const std::string& whose)
+{
+  vtkPointData* data = image->GetPointData();
+  vtkAbstractArray* any =
+    IsAutomatic(chosen) ? data->GetScalars() : data->GetAbstractArray(chosen.c_str());
+  if (IsAutomatic(chosen))
+  {
+    for (int n = 0; !any && n < data->GetNumberOfArrays(); ++n)
+    {
+      vtkDataArray* numbers = data->GetArray(n);
+      any = numbers && numbers->GetNumberOfComponents() == 1 ? numbers : nullptr;
+    }
+  }
+  Require(any != nullptr,
+    whose + " has no point array " +
+      (IsAutomatic(chosen) ? "of one component" : "'" + chosen + "'"));
+  const std::string name =
+    "array '" + std::string(any->GetName() ? any->GetName() : "") + "' of " + whose;
+  auto* array = vtkArrayDownCast<vtkDataArray>(any);
+  Require(array != nullptr, name + " is not numeric");
+  Require(array->GetNumberOfComponents() == 1,
+    name + " has " + std::to_string(array->GetNumberOfComponents()) + " components: one is needed");
+  Require(
+    array->GetNumberOfTuples() == image->GetNumberOfPoints(), name + " has not one value a voxel");
+  return array;
+}
+
+std::string ChosenPointArray(vtkAlgorithm* filter, const std::string& whose)
+{
+  vtkInformation* chosen = filter->GetInputArrayInformation(0);
+  if (!chosen->Has(vtkDataObject::FIELD_NAME()) || !chosen->Get(vtkDataObject::FIELD_NAME()))
+  {
+    return {};
+  }
+  const std::string name = chosen->Get(vtkDataObject::FIELD_NAME());
+  Require(IsAutomatic(name) ||
+      chosen->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_POINTS,
+    "array '" + name + "' of " + whose + " belongs to the cells: point data are needed");
+  return name;
+}
+
 vtkDataArray* FindRadius(vtkPolyData* lines, const std::string& chosen)
 {
   vtkPointData* data = lines->GetPointData();
-  const bool automatic = chosen.empty() || chosen == "Automatic";
+  const bool automatic = IsAutomatic(chosen);
   vtkDataArray* radius = data->GetArray(automatic ? vtkCoronaryArrayNames::Radius : chosen.c_str());
   if (radius == nullptr && automatic)
   {
@@ -193,6 +227,67 @@ std::string PropertyMessage(std::string message, std::initializer_list<const cha
   return message;
 }
 
+namespace
+{
+/// Takes the error by which an executive repeats that a request failed; passes on any other one.
+class EchoSilencer : public vtkCommand
+{
+public:
+  static EchoSilencer* New() { return new EchoSilencer; }
+
+  void Execute(vtkObject* executive, unsigned long, void* data) override
+  {
+    executive->RemoveObserver(this->Tag);
+    const auto* text = static_cast<const char*>(data);
+    if (text && std::string(text).find("returned failure for request") == std::string::npos)
+    {
+      vtkOutputWindowDisplayErrorText(text);
+    }
+  }
+
+  unsigned long Tag = 0;
+};
+
+/// An error of the filter, but for one that it has reported with everything as it is now, and that nobody observes.
+void Report(vtkAlgorithm* filter, const std::string& message)
+{
+  static vtkInformationStringKey* const lastKey =
+    vtkInformationStringKey::MakeKey("LAST_FAILURE", "vtkCoronary");
+  auto* executive = vtkDemandDrivenPipeline::SafeDownCast(filter->GetExecutive());
+  const std::string failure =
+    message + "@" + std::to_string(executive ? executive->GetPipelineMTime() : 0);
+  const char* last = filter->GetInformation()->Get(lastKey);
+  if (!last || failure != last || filter->HasObserver(vtkCommand::ErrorEvent))
+  {
+    filter->GetInformation()->Set(lastKey, failure);
+    vtkErrorWithObjectMacro(filter, << message);
+  }
+}
+}
+
+int ReportFailure(vtkAlgorithm* filter, const std::string& message)
+{
+  Report(filter, message);
+  vtkExecutive* executive = filter->GetExecutive();
+  if (executive && !executive->HasObserver(vtkCommand::ErrorEvent))
+  {
+    vtkNew<EchoSilencer> silencer;
+    silencer->Tag = executive->AddObserver(vtkCommand::ErrorEvent, silencer);
+  }
+  return 0;
+}
+
+int ReportEmptied(vtkAlgorithm* filter, const std::string& message)
+{
+  vtkExecutive* executive = filter->GetExecutive();
+  if (executive && executive->IsA("vtkPVCompositeDataPipeline"))
+  {
+    Report(filter, message);
+    return 1;
+  }
+  return ReportFailure(filter, message);
+}
+
 int FinishFailedRequest(vtkAlgorithm* filter, vtkInformationVector* outputs,
   const std::string& memory, std::initializer_list<const char*> prefixes)
 {
@@ -208,11 +303,11 @@ int FinishFailedRequest(vtkAlgorithm* filter, vtkInformationVector* outputs,
   }
   catch (const std::bad_alloc&)
   {
-    vtkErrorWithObjectMacro(filter, << "Not enough memory " << memory);
+    result = ReportEmptied(filter, "Not enough memory " + memory);
   }
   catch (const std::exception& error)
   {
-    vtkErrorWithObjectMacro(filter, << PropertyMessage(error.what(), prefixes));
+    result = ReportEmptied(filter, PropertyMessage(error.what(), prefixes));
   }
   for (int port = 0; port < outputs->GetNumberOfInformationObjects(); ++port)
   {

@@ -29,18 +29,28 @@ namespace vtkCoronary
 /// Extent, origin, spacing and direction of an image.
 VTKCORONARYCOMMON_EXPORT coronary::ImageGrid GridOf(vtkImageData* image);
 
+/// Whether the name of an array leaves the choice to the filter: it is empty, or "Automatic" as ParaView's panels call it.
+VTKCORONARYCOMMON_EXPORT bool IsAutomatic(const std::string& arrayName);
+
 /// One array of an image, of one value a voxel, as the algorithms take it. Types that they do not know
 /// are copied into `copy`; the result is valid as long as the image and the copy are.
 VTKCORONARYCOMMON_EXPORT coronary::ScalarImage ScalarImageOf(
   vtkImageData* image, vtkDataArray* array, std::vector<float>& copy);
 
 /**
- * The array of an image that is named; with "Automatic" or without a name its scalars.
- * @param whose  for messages: "The image"
- * @throws std::invalid_argument for an image without voxels, an array that is missing, or one of other than one value a voxel
+ * The array of an image that a filter works on, one value a voxel: the point array `chosen`; when that is empty or
+ * "Automatic", the active scalars, or the first numeric array of one component where none are active.
+ * @param whose  for messages: "the image"
+ * @throws std::invalid_argument naming the array and what is wrong with it
  */
-VTKCORONARYCOMMON_EXPORT vtkDataArray* ImageArrayOf(
-  vtkImageData* image, const std::string& whose, const std::string& chosen = {});
+VTKCORONARYCOMMON_EXPORT vtkDataArray* VoxelArrayOf(
+  vtkImageData* image, const std::string& chosen, const std::string& whose);
+
+/// The name of the point array that SetInputArrayToProcess(0, ...) chose; empty when it chose none.
+/// @param whose  for messages: "the image"
+/// @throws std::invalid_argument when the array is to be one of the cells
+VTKCORONARYCOMMON_EXPORT std::string ChosenPointArray(
+  vtkAlgorithm* filter, const std::string& whose);
 
 /**
  * Radii of lines, mm, one value a point: the array `chosen`; when that is empty or "Automatic",
@@ -73,12 +83,24 @@ VTKCORONARYCOMMON_EXPORT std::string PropertyMessage(
   std::string message, std::initializer_list<const char*> prefixes = {});
 
 /**
+ * Reports why a request failed as one error of the filter: of ports and times that fail for the same reason, one after
+ * the other with nothing changed between, the first one says it, and VTK's executive does not print the request as
+ * well. Who observes the filter's errors gets all.
+ * @return what the request has to return: 0
+ */
+VTKCORONARYCOMMON_EXPORT int ReportFailure(vtkAlgorithm* filter, const std::string& message);
+
+/// The same for a request that leaves empty outputs.
+/// @return 0; in ParaView 1, as its representations print at every picture that they have no data when the filter fails
+VTKCORONARYCOMMON_EXPORT int ReportEmptied(vtkAlgorithm* filter, const std::string& message);
+
+/**
  * For the end of RequestData, inside of `catch (...)`: reports the exception that is being handled as an error of
  * the filter (a cancellation is none), empties all outputs, and marks them as not generated, so that the next
  * request executes again.
  * @param memory    what memory was wanted for: "for the motion"
  * @param prefixes  as of PropertyMessage
- * @return what RequestData has to return: 1 after a cancellation, 0 after an error
+ * @return what RequestData has to return: 1 after a cancellation, that of ReportEmptied after an error
  */
 VTKCORONARYCOMMON_EXPORT int FinishFailedRequest(vtkAlgorithm* filter,
   vtkInformationVector* outputs, const std::string& memory,

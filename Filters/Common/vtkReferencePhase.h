@@ -27,6 +27,15 @@
  * A Time that is not finite, or not available in the exact mode; an automatic choice among data
  * that do not compare from phase to phase: one error that says so, and no output.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Spacing=[1.5, 1.5, 1.5], Phases=[0.05, 0.35, 0.75])
+ * phase = ReferencePhase(Input=phantom["Image"], Automatic=1)   # the quietest one
+ * phase.UpdatePipeline()
+ * phase.UpdatePropertyInformation()
+ * print(phase.GetPropertyValue("UsedTime"))
+ * @endcode
+ *
  * @sa coronary::QuietestPhase
  */
 #ifndef vtkReferencePhase_h

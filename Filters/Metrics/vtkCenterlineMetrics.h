@@ -62,6 +62,15 @@
  * @par Sources:
  * Schaap et al., Med Image Anal 2009;13:701 (CAT08); Eq. 17 of Wang et al., arXiv 2503.02218.
  *
+ * @par Python:
+ * @code{.py}
+ * model = CoronaryPhantom(Seed=1)
+ * truth = CoronaryPhantom(Seed=1, Tortuosity=0.9)
+ * agreement = CenterlineMetrics(Result=model["Centerlines"], Reference=truth["Centerlines"], RelevantRadius=0.75)
+ * agreement.UpdatePipeline(0.75)
+ * print(agreement["Branch Measures"].FieldData["OV"].GetRange())
+ * @endcode
+ *
  * @sa coronary::CompareCenterlines, coronary::CompareCenterlineTrees, coronary::CompareBranches,
  * vtkMeshDistanceMetrics, docs/metrics.md
  */

@@ -49,6 +49,15 @@
  * @par Sources:
  * Eq. 15 and 16 of Wang et al., arXiv 2503.02218.
  *
+ * @par Python:
+ * @code{.py}
+ * model = CoronaryPhantom(Seed=1, SurfaceSpacing=1)
+ * truth = CoronaryPhantom(Seed=1, SurfaceSpacing=1.1, Tortuosity=0.9)
+ * distance = MeshDistanceMetrics(Result=model["Surface"], Reference=truth["Surface"])
+ * distance.UpdatePipeline(0.75)
+ * print(distance["Measures"].FieldData["HD95"].GetRange())
+ * @endcode
+ *
  * @sa coronary::CompareSurfaces, vtkBranchMetrics, docs/metrics.md
  */
 #ifndef vtkMeshDistanceMetrics_h

@@ -48,6 +48,14 @@
  * @par Sources:
  * Eq. 8, 10 and 11 of Wang et al., arXiv 2503.02218.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Phases=[0.0, 0.25, 0.5, 0.75])
+ * moment = CardiacPhaseInterpolator(Input=phantom["Centerlines"], Mode="Periodic Cubic")
+ * moment.UpdatePipeline(0.6)
+ * print(moment.GetDataInformation().GetBounds())
+ * @endcode
+ *
  * @sa coronary::PhaseInterpolation, vtkMotionRegularizer
  */
 #ifndef vtkCardiacPhaseInterpolator_h

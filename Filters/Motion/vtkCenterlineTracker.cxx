@@ -221,8 +221,7 @@ int vtkCenterlineTracker::RequestInformation(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< error.what());
-    return 0;
+    return vtkCoronary::ReportFailure(this, error.what());
   }
   vtkMovedLines::SetTimes(outputs, times);
   return 1;
@@ -328,13 +327,8 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
     if (auto* voxels = vtkImageData::SafeDownCast(now))
     {
       Require(voxels->GetNumberOfPoints() > 0, "The image" + where + " has no voxels");
-      vtkDataArray* array = this->ImageArrayName.empty()
-        ? voxels->GetPointData()->GetScalars()
-        : voxels->GetPointData()->GetArray(this->ImageArrayName.c_str());
-      Require(array != nullptr && array->GetNumberOfComponents() == 1,
-        "The image" + where + " has no point array " +
-          (this->ImageArrayName.empty() ? "of scalars" : "'" + this->ImageArrayName + "'") +
-          " with one value a voxel");
+      vtkDataArray* array =
+        vtkCoronary::VoxelArrayOf(voxels, this->ImageArrayName, "the image" + where);
       return vtkCoronary::ScalarImageOf(voxels, array, copy);
     }
     try

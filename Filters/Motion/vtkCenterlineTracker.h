@@ -45,6 +45,15 @@
  * anything was found: one error and no output. Phases in which
  * nothing was found are filled, with a warning.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Spacing=[1.2, 1.2, 1.2], TemporalWindow=0, Phases=[0.05, 0.35, 0.75])
+ * tree = ReferencePhase(Input=phantom["Centerlines"], Automatic=0, Time=0.75)
+ * motion = CenterlineTracker(Series=phantom["Image"], Centerlines=tree, NodeSpacing=5, CaptureRange=14)
+ * motion.UpdatePipeline(0.35)
+ * print(motion["Centerlines"].PointData["TrackingConfidence"].GetRange())
+ * @endcode
+ *
  * @sa coronary::TrackCenterlines, vtkMotionRegularizer, vtkCardiacPhaseInterpolator
  */
 #ifndef vtkCenterlineTracker_h
@@ -130,7 +139,8 @@ public:
 
   ///@{
   /**
-   * The point array of the images; empty (default): their active scalars.
+   * The point array of the images. Default "Automatic", or empty: their active scalars, or their first
+   * numeric array of one component.
    */
   vtkSetMacro(ImageArrayName, std::string);
   vtkGetMacro(ImageArrayName, std::string);
@@ -199,7 +209,7 @@ private:
   int TrackedPhases = AllPhases;
   std::vector<double> TrackedTimes;
   int ImageContent = Tomogram;
-  std::string ImageArrayName;
+  std::string ImageArrayName = "Automatic";
   double TemporalWindow = 0.066;
   double NodeSpacing = 2.0;
   double CaptureRange = 16.0;

@@ -505,9 +505,10 @@ void vtkLumenCycle::Measure(vtkInformationVector** inputs)
       data.ImageAsked = vtkCoronary::NearestMoment(imageInfo, false, times[k]);
       askImage->Ask(&whole, data.ImageAsked);
       vtkImageData* image = vtkImageData::GetData(imageInfo);
+      Require(image != nullptr && image->GetNumberOfPoints() > 0, "The image has no voxels");
       std::vector<float> copy;
       const coronary::ScalarImage voxels = vtkCoronary::ScalarImageOf(
-        image, vtkCoronary::ImageArrayOf(image, "The image", this->ImageArrayName), copy);
+        image, vtkCoronary::VoxelArrayOf(image, this->ImageArrayName, "the image"), copy);
       lumens.push_back(coronary::MeasureTreeLumen(trees[k], paths, voxels, blur,
         vtkCoronary::ProgressOf(this, first, first + 0.9 / double(times.size())))
                          .lumen);

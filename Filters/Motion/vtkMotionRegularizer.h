@@ -39,6 +39,14 @@
  * @par Sources:
  * Eq. 13 and 14 of Wang et al., arXiv 2503.02218.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, CenterlineSpacing=2, Phases=[0.05, 0.2, 0.35, 0.5, 0.75])
+ * motion = MotionRegularizer(Motion=phantom["Centerlines"], MaximumBending=50)
+ * motion.UpdatePipeline(0.35)
+ * print(motion.GetDataInformation().GetBounds())
+ * @endcode
+ *
  * @sa coronary::RegularizeMotion, vtkCardiacPhaseInterpolator
  */
 #ifndef vtkMotionRegularizer_h

@@ -178,8 +178,7 @@ int vtkPopulationMotion::RequestInformation(
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< error.what());
-    return 0;
+    return vtkCoronary::ReportFailure(this, error.what());
   }
   return 1;
 }

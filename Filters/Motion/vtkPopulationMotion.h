@@ -42,6 +42,16 @@
  * where no heart has them; a reference that is not known; tracked lines that are others, or without time steps; a setting out of
  * range: one error and no output.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1)
+ * tree = ReferencePhase(Input=phantom["Centerlines"], Automatic=0, Time=0.75)
+ * named = CoronaryTreeTopology(Input=tree)
+ * motion = PopulationMotion(Centerlines=named["Tree"], HeartRate=70)
+ * motion.UpdatePipeline(0.35)
+ * print(motion["Centerlines"].PointData["MotionDeviation"].GetRange())
+ * @endcode
+ *
  * @sa coronary::MoveByPopulation, coronary::EstimateHeart, vtkCenterlineTracker, vtkCardiacPhaseInterpolator
  */
 #ifndef vtkPopulationMotion_h

@@ -523,8 +523,8 @@ int vtkCoronaryPhantomSource::RequestInformation(vtkInformationVector* outputs)
   }
   catch (const std::exception& error)
   {
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what(), { "PhantomSettings: " }));
-    return 0;
+    return vtkCoronary::ReportFailure(
+      this, vtkCoronary::PropertyMessage(error.what(), { "PhantomSettings: " }));
   }
 }
 
@@ -586,8 +586,8 @@ int vtkCoronaryPhantomSource::RequestData(
     }
     catch (const std::exception& error)
     {
-      vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what(), { "PhantomSettings: " }));
-      result = 0;
+      result = vtkCoronary::ReportEmptied(
+        this, vtkCoronary::PropertyMessage(error.what(), { "PhantomSettings: " }));
     }
     if (!complete)
     {

@@ -56,6 +56,14 @@
  * Anatomy: Dodge et al., Circulation 1988;78:1167 and 1992;86:232. Motion: Shechter et al. 2005 (PMC2396325),
  * Mao et al., J Comput Assist Tomogr 2000;24:253. More in docs/phantom.md.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Spacing=[1.5, 1.5, 1.5], MotionAmplitude=0.8)
+ * phantom.UpdatePipeline(0.35)                     # a fraction of the R-R interval
+ * print(phantom["Image"].PointData["HU"].GetRange())
+ * print(phantom["Surface"].GetDataInformation().GetNumberOfPoints())
+ * @endcode
+ *
  * @sa coronary::CoronaryPhantom
  */
 #ifndef vtkCoronaryPhantomSource_h

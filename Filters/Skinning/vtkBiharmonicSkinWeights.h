@@ -43,6 +43,17 @@
  * Jacobson et al., Bounded biharmonic weights for real-time deformation, ACM Trans Graph (SIGGRAPH) 2011;30:78. Eq. 5 to 7
  * of Wang et al., arXiv 2503.02218.
  *
+ * @par Python:
+ * @code{.py}
+ * tree = TGFSkeletonReader(FileName="tree.tgf", Radius=1.5)
+ * wall = FrenetSweepSurface(Input=tree["Tree"], MinimumEdgeLength=0.4, MaximumEdgeLength=1)
+ * skeleton = CenterlineSkeleton(Centerlines=tree["Tree"])
+ * mesh = TetrahedralMesher(Surface=wall["Surface"], Skeleton=skeleton, LeaveOutPointsOutside=1, MinimumVolume=0)
+ * weights = BiharmonicSkinWeights(Mesh=mesh["Volume"], Skeleton=skeleton, Influences=4)
+ * weights.UpdatePipeline()
+ * print(weights.PointData["BoneWeightsCompact"].GetNumberOfComponents(), "weights a point")
+ * @endcode
+ *
  * @sa coronary::ComputeSkinWeights, vtkCenterlineSkeleton
  */
 #ifndef vtkBiharmonicSkinWeights_h

@@ -32,6 +32,15 @@
  * A setting out of range, lines that are no tree, a radius array that is missing or unfit, a
  * coordinate that is not finite, a branch without length: one error that names it, and no output.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1)
+ * tree = ReferencePhase(Input=phantom["Centerlines"], Automatic=0, Time=0.75)
+ * skeleton = CenterlineSkeleton(Centerlines=tree, LengthPerRadius=2.5)
+ * skeleton.UpdatePipeline()
+ * print(skeleton.GetDataInformation().GetNumberOfCells(), "bones")
+ * @endcode
+ *
  * @sa coronary::MakeCenterlineSkeleton, vtkBiharmonicSkinWeights
  */
 #ifndef vtkCenterlineSkeleton_h

@@ -28,6 +28,16 @@
  * would lose its length, lines that are no bones, a posed skeleton with other bones: one error and no output.
  * An aborted execution leaves an empty output and is started anew by the next request.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1)
+ * tree = ReferencePhase(Input=phantom["Centerlines"], Automatic=0, Time=0.75)
+ * skeleton = CenterlineSkeleton(Centerlines=tree)
+ * pose = SkeletonPose(Skeleton=skeleton, MoveTheChosenJoint=1, ChosenJoint=5, JointRotation=[0, 20, 0])
+ * pose.UpdatePipeline()
+ * print(pose.GetDataInformation().GetBounds())
+ * @endcode
+ *
  * @sa coronary::ApplyPoseEdit, vtkSkinDeformation
  */
 #ifndef vtkSkeletonPose_h

@@ -41,6 +41,19 @@
  * empty mesh gives an empty output. An aborted execution leaves an empty output and is started anew by
  * the next request.
  *
+ * @par Python:
+ * @code{.py}
+ * tree = TGFSkeletonReader(FileName="tree.tgf", Radius=1.5)
+ * wall = FrenetSweepSurface(Input=tree["Tree"], MinimumEdgeLength=0.4, MaximumEdgeLength=1)
+ * skeleton = CenterlineSkeleton(Centerlines=tree["Tree"])
+ * mesh = TetrahedralMesher(Surface=wall["Surface"], Skeleton=skeleton, LeaveOutPointsOutside=1, MinimumVolume=0)
+ * weights = BiharmonicSkinWeights(Mesh=mesh["Volume"], Skeleton=skeleton)
+ * pose = SkeletonPose(Skeleton=skeleton, MoveTheChosenJoint=1, ChosenJoint=5, JointRotation=[0, 20, 0])
+ * moved = SkinDeformation(Mesh=weights, SkeletonAtRest=skeleton, PosedSkeleton=pose)
+ * moved.UpdatePipeline()
+ * print(moved.GetDataInformation().GetBounds())
+ * @endcode
+ *
  * @sa coronary::SkinDeformation, vtkSkeletonPose, vtkBiharmonicSkinWeights
  */
 #ifndef vtkSkinDeformation_h

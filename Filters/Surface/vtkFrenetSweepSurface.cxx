@@ -446,18 +446,7 @@ void vtkFrenetSweepSurface::MeasureContoursIn(vtkInformationVector* images, Read
   using vtkCoronary::Require;
   vtkImageData* image = vtkImageData::GetData(images, 0);
   Require(image != nullptr && image->GetNumberOfPoints() > 0, "The image has no voxels");
-  vtkPointData* data = image->GetPointData();
-  const bool automatic =
-    this->InputImageArrayName.empty() || this->InputImageArrayName == "Automatic";
-  vtkDataArray* values =
-    automatic ? data->GetScalars() : data->GetArray(this->InputImageArrayName.c_str());
-  Require(values != nullptr,
-    automatic ? std::string("The image has no scalars")
-              : "The image has no point array " + this->InputImageArrayName);
-  Require(values->GetNumberOfComponents() == 1 &&
-      values->GetNumberOfTuples() == image->GetNumberOfPoints(),
-    "The image's array " + std::string(values->GetName() ? values->GetName() : "") +
-      " must have one value a voxel");
+  vtkDataArray* values = vtkCoronary::VoxelArrayOf(image, this->InputImageArrayName, "the image");
   std::vector<float> copy;
   const coronary::ScalarImage scalars = vtkCoronary::ScalarImageOf(image, values, copy);
   const coronary::ImageInterpolator interpolator(scalars);

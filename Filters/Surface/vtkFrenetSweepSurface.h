@@ -71,6 +71,15 @@
  * @par Sources:
  * Eq. 4 of Wang et al., arXiv 2503.02218, for the size of the triangles.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1)
+ * tree = ReferencePhase(Input=phantom["Centerlines"], Automatic=0, Time=0.75)
+ * wall = FrenetSweepSurface(Input=tree, MinimumEdgeLength=0.4, MaximumEdgeLength=1.0)
+ * wall.UpdatePipeline()
+ * print(wall["Surface"].GetDataInformation().GetNumberOfCells(), "triangles")
+ * @endcode
+ *
  * @sa coronary::SweepVesselTree, vtkCoronaryTreeTopology, docs/surface.md
  */
 #ifndef vtkFrenetSweepSurface_h
@@ -132,7 +141,7 @@ public:
   ///@{
   /**
    * Name of the image's point array from which contours are measured. `Automatic`, the default: its
-   * scalars.
+   * active scalars, or its first numeric array of one component.
    */
   vtkSetStdStringFromCharMacro(InputImageArrayName);
   vtkGetCharFromStdStringMacro(InputImageArrayName);

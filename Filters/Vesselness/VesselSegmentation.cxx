@@ -15,43 +15,86 @@
 
 namespace coronary
 {
+namespace
+{
+// Around a seed: where its vessel is looked for, and what surrounds it, mm.
+constexpr double NearSeed = 2.5;
+constexpr double FarFromSeed = 12.0;
+}
+
+template <typename T>
+double VoxelSegmentation<T>::BrightestNear(const std::array<int, 3>& place) const
+{
+  double best = -std::numeric_limits<double>::infinity();
+  this->L.Ball(place, NearSeed,
+    [&](std::int64_t, const std::array<int, 3>& at)
+    {
+      double sum = 0.0;
+      int count = 0;
+      for (int dk = -1; dk <= 1; ++dk)
+      {
+        for (int dj = -1; dj <= 1; ++dj)
+        {
+          for (int di = -1; di <= 1; ++di)
+          {
+            if (this->L.Contains(at[0] + di, at[1] + dj, at[2] + dk))
+            {
+              sum +=
+                static_cast<double>(this->Image[this->L.Index(at[0] + di, at[1] + dj, at[2] + dk)]);
+              ++count;
+            }
+          }
+        }
+      }
+      best = std::max(best, sum / count);
+    });
+  return best;
+}
+
+template <typename T>
+double VoxelSegmentation<T>::ContrastToNoise(const std::array<int, 3>& place) const
+{
+  // Farther apart than noise of a reconstruction is alike.
+  const int lag = std::max(1, static_cast<int>(std::lround(1.2 / this->L.Spacing[0])));
+  std::vector<float> values;
+  std::vector<float> differences;
+  this->L.Ball(place, FarFromSeed,
+    [&](std::int64_t p, const std::array<int, 3>& at)
+    {
+      const auto value = static_cast<float>(this->Image[p]);
+      if (!std::isfinite(value))
+      {
+        return;
+      }
+      values.push_back(value);
+      const float other = this->L.Contains(at[0] + lag, at[1], at[2])
+        ? static_cast<float>(this->Image[this->L.Index(at[0] + lag, at[1], at[2])])
+        : std::numeric_limits<float>::quiet_NaN();
+      if (std::isfinite(other))
+      {
+        differences.push_back(std::abs(other - value));
+      }
+    });
+  // The median of differences of normally distributed values, as their standard deviation.
+  constexpr double deviations = 1.0 / (0.6745 * 1.4142);
+  const double noise = deviations * MedianOf(std::move(differences));
+  const double contrast = this->BrightestNear(place) - QuantileOf(std::move(values), 0.25);
+  return noise > 0.0 ? contrast / noise : std::numeric_limits<double>::infinity();
+}
+
 template <typename T>
 BloodWindow VoxelSegmentation<T>::MeasureWindow(const std::vector<std::array<int, 3>>& places) const
 {
   // Blood: the brightest mean of 3 x 3 x 3 voxels near a seed. Tissue: the median of what is
   // darker than half of it a little farther away; fat and air count as none.
-  constexpr double near = 2.5;
-  constexpr double far = 12.0;
   std::vector<double> bloods;
   std::vector<double> values;
   bool darker = false;
   for (const std::array<int, 3>& place : places)
   {
-    double best = -std::numeric_limits<double>::infinity();
-    this->L.Ball(place, near,
-      [&](std::int64_t, const std::array<int, 3>& at)
-      {
-        double sum = 0.0;
-        int count = 0;
-        for (int dk = -1; dk <= 1; ++dk)
-        {
-          for (int dj = -1; dj <= 1; ++dj)
-          {
-            for (int di = -1; di <= 1; ++di)
-            {
-              if (this->L.Contains(at[0] + di, at[1] + dj, at[2] + dk))
-              {
-                sum += static_cast<double>(
-                  this->Image[this->L.Index(at[0] + di, at[1] + dj, at[2] + dk)]);
-                ++count;
-              }
-            }
-          }
-        }
-        best = std::max(best, sum / count);
-      });
+    const double best = this->BrightestNear(place);
     bloods.push_back(best);
-    this->L.Ball(place, far,
+    this->L.Ball(place, FarFromSeed,
       [&](std::int64_t p, const std::array<int, 3>&)
       {
         const auto value = static_cast<float>(this->Image[p]);
@@ -736,6 +779,10 @@ VesselSegmentationResult VoxelSegmentation<T>::Run(
     places.push_back(*place);
   }
   VesselSegmentationResult result;
+  for (const std::array<int, 3>& place : places)
+  {
+    result.seedContrast.push_back(this->ContrastToNoise(place));
+  }
   result.window = this->Settings.window ? *this->Settings.window : this->MeasureWindow(places);
   const double contrast = result.window.blood - result.window.tissue;
   if (!(contrast > 0.0) || !std::isfinite(contrast))

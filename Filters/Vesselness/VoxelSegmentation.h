@@ -69,6 +69,8 @@ private:
       std::min(thin > 0.0f ? thin : 0.0f, 1.0f) * std::min(tube > 0.0f ? tube : 0.0f, 1.0f);
     return std::max(dim, std::min(blood > 0.0f ? blood : 0.0f, 1.0f));
   }
+  double BrightestNear(const std::array<int, 3>& place) const;
+  double ContrastToNoise(const std::array<int, 3>& place) const;
   BloodWindow MeasureWindow(const std::vector<std::array<int, 3>>& places) const;
   double MeasureTubular(const std::vector<std::array<int, 3>>& places) const;
   void FindBodies(const ProgressCallback& progress);

@@ -309,13 +309,6 @@ void Rotate(const coronary::Matrix3& direction, float* vectors, std::int64_t cou
 
 /// The algorithm's complaint, with the setting called by the property's name.
 /// Name of the array that was chosen, empty: the active scalars.
-std::string ChosenArray(vtkInformation* chosen)
-{
-  const char* name =
-    chosen->Has(vtkDataObject::FIELD_NAME()) ? chosen->Get(vtkDataObject::FIELD_NAME()) : nullptr;
-  return name ? name : "";
-}
-
 /// All that the measured extremes depend on.
 struct MeasurementKey
 {
@@ -351,7 +344,15 @@ struct vtkFrangiVesselness::Internals
 
   coronary::VesselnessSettings Settings() const;
   Extent RegionIn(const Extent& whole) const;
-  vtkDataArray* InputArray(vtkInformationVector** inputs, int index, vtkImageData* image) const;
+  vtkDataArray* ImageArray(vtkImageData* image) const
+  {
+    return vtkCoronary::VoxelArrayOf(
+      image, vtkCoronary::ChosenPointArray(this->Self, "the image"), "the image");
+  }
+  vtkDataArray* MaskArray(vtkImageData* mask) const
+  {
+    return vtkCoronary::VoxelArrayOf(mask, this->Self->MaskArrayName, "the mask");
+  }
   vtkImageData* Mask(
     vtkInformationVector** inputs, const Geometry& grid, const Extent& whole) const;
   void Measure(const MeasurementKey& key, const coronary::MultiscaleVesselness& vesselness,
@@ -474,41 +475,6 @@ int vtkFrangiVesselness::RequestUpdateExtent(
   return 1;
 }
 
-vtkDataArray* vtkFrangiVesselness::Internals::InputArray(
-  vtkInformationVector** inputs, int index, vtkImageData* image) const
-{
-  const std::string whose = index == 0 ? "the image" : "the mask";
-  const std::string wanted =
-    index == 0 ? ChosenArray(this->Self->GetInputArrayInformation(0)) : this->Self->MaskArrayName;
-  int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-  vtkAbstractArray* any = nullptr;
-  if (wanted.empty())
-  {
-    // ParaView gives an empty name while it does not know the input's arrays.
-    any = image->GetPointData()->GetScalars();
-  }
-  else
-  {
-    any = index == 0 ? this->Self->GetInputAbstractArrayToProcess(0, inputs, association)
-                     : image->GetPointData()->GetAbstractArray(wanted.c_str());
-  }
-  vtkCoronary::Require(any != nullptr,
-    wanted.empty() ? whose + " has no active point scalars"
-                   : whose + " has no point array '" + wanted + "'");
-  const std::string name =
-    "array '" + std::string(any->GetName() ? any->GetName() : "") + "' of " + whose;
-  vtkCoronary::Require(association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
-    name + " belongs to the cells: point data are needed");
-  auto* array = vtkArrayDownCast<vtkDataArray>(any);
-  vtkCoronary::Require(array != nullptr, name + " is not numeric");
-  vtkCoronary::Require(array->GetNumberOfComponents() == 1,
-    name + " has " + std::to_string(array->GetNumberOfComponents()) +
-      " components: one is needed, an intensity");
-  vtkCoronary::Require(
-    array->GetNumberOfTuples() == image->GetNumberOfPoints(), name + " has not one value a voxel");
-  return array;
-}
-
 vtkImageData* vtkFrangiVesselness::Internals::Mask(
   vtkInformationVector** inputs, const Geometry& grid, const Extent& whole) const
 {
@@ -581,14 +547,14 @@ void vtkFrangiVesselness::Internals::Measure(const MeasurementKey& key,
         ofMask.Ask(&slab, vtkCoronary::NearestMoment(maskInfo, false, key.moment.time));
       }
       vtkImageData* mask = vtkImageData::GetData(maskInfo);
-      vtkDataArray* array = this->InputArray(inputs, 1, mask);
+      vtkDataArray* array = this->MaskArray(mask);
       vtkCoronary::Require(
         Contains(ExtentOf(mask), slab), "the mask lacks part of the requested extent");
       inside.resize(Size(slab));
       Convert<ToMask>(array, ExtentOf(mask), slab, inside.data());
     }
     vtkImageData* image = vtkImageData::GetData(inInfo);
-    vtkDataArray* array = this->InputArray(inputs, 0, image);
+    vtkDataArray* array = this->ImageArray(image);
     vtkCoronary::Require(
       Contains(ExtentOf(image), block), "the image lacks part of the requested extent");
     const FloatBlock floats(image, array, block);
@@ -638,7 +604,7 @@ bool vtkFrangiVesselness::Internals::SetScale(vtkInformationVector** inputs, con
   key.region = region;
   key.whole = whole;
   key.spacing = grid.spacing;
-  key.array = ChosenArray(self.GetInputArrayInformation(0));
+  key.array = vtkCoronary::ChosenPointArray(&self, "the image");
   key.sigmas = settings.sigmas;
   key.method = self.Method;
   key.bright = self.Bright;
@@ -759,11 +725,11 @@ void vtkFrangiVesselness::Internals::Execute(vtkInformationVector** inputs, vtkI
   {
     const coronary::MultiscaleVesselness vesselness(settings, Vector3(grid.spacing.data()), whole);
     const Extent block = Grown(part, vesselness.Halo(), whole);
-    vtkDataArray* array = this->InputArray(inputs, 0, input);
+    vtkDataArray* array = this->ImageArray(input);
     vtkCoronary::Require(
       Contains(ExtentOf(input), block), "the image lacks part of the requested extent");
     vtkImageData* mask = maskInfo ? vtkImageData::GetData(maskInfo) : nullptr;
-    vtkDataArray* maskArray = mask ? this->InputArray(inputs, 1, mask) : nullptr;
+    vtkDataArray* maskArray = mask ? this->MaskArray(mask) : nullptr;
     vtkCoronary::Require(
       !mask || Contains(ExtentOf(mask), part), "the mask lacks part of the requested extent");
     if (structured)

@@ -24,7 +24,7 @@
  *
  * @par Input ports:
  * - 0: vtkImageData, three-dimensional. Any numeric point array of one component: that chosen with
- *   SetInputArrayToProcess(0, ...), by default or with an empty name the active scalars (HU). Computed in float. Voxels
+ *   SetInputArrayToProcess(0, ...), by default, or as "Automatic", the active scalars (HU). Computed in float. Voxels
  *   that are NaN or infinite give 0 as far as the kernels reach around them.
  * - 1, optional: vtkImageData on the same grid; result 0 where its scalars
  *   (MaskArrayName) are 0 or NaN.
@@ -50,6 +50,15 @@
  * @par Sources:
  * Frangi et al., MICCAI 1998, LNCS 1496:130. Sato et al., Med Image Anal 1998;2:143. Jerman et al., IEEE
  * Trans Med Imaging 2016;35:2107.
+ *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Spacing=[1.0, 1.0, 1.0], TemporalWindow=0)
+ * phase = ReferencePhase(Input=phantom["Image"], Automatic=0, Time=0.75)
+ * vesselness = FrangiVesselness(Input=phase, SigmaMin=0.5, SigmaMax=2.0, AutomaticC=0, C=100)
+ * vesselness.UpdatePipeline()
+ * print(vesselness.PointData["Vesselness"].GetRange())
+ * @endcode
  *
  * @sa coronary::MultiscaleVesselness, docs/vesselness.md
  */
@@ -92,7 +101,8 @@ public:
 
   ///@{
   /**
-   * Point array of the mask. Default empty: the active scalars.
+   * Point array of the mask. Default "Automatic", or empty: the active scalars, or its first numeric
+   * array of one component.
    */
   // No SetInputArrayToProcess(1, ...): ParaView 5.11 crashes on arrays of two inputs chosen so.
   vtkSetStdStringFromCharMacro(MaskArrayName);
@@ -268,7 +278,7 @@ private:
   bool GenerateDirection = false;
   bool UseRegion = false;
   int Region[6] = { 0, 0, 0, 0, 0, 0 };
-  std::string MaskArrayName;
+  std::string MaskArrayName = "Automatic";
   double UsedC = 0.0;
 
   struct Internals;

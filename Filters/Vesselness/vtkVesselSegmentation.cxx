@@ -40,6 +40,12 @@ using SDDP = vtkStreamingDemandDrivenPipeline;
 
 namespace
 {
+// What a seed in a vessel has at least: brightness over the noise, mm^3 that hang on it (its own
+// surroundings are 33), but where another seed is as near as so many mm and takes some of them.
+constexpr double MinimumSeedContrast = 4.0;
+constexpr double MinimumSeedVolume = 45.0;
+constexpr double SharedVolume = 10.0;
+
 using Extent = std::array<int, 6>;
 
 // Shares of the work, for the progress.
@@ -422,41 +428,8 @@ int vtkVesselSegmentation::RequestUpdateExtent(
 vtkDataArray* vtkVesselSegmentation::InputArray(vtkInformationVector** inputs, int port)
 {
   const std::string whose = port == 0 ? "the image" : "the vesselness";
-  vtkImageData* data = vtkImageData::GetData(inputs[port]->GetInformationObject(0));
-  int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-  vtkAbstractArray* any = nullptr;
-  std::string wanted;
-  if (port == 0)
-  {
-    vtkInformation* chosen = this->GetInputArrayInformation(0);
-    const char* name = chosen->Get(vtkDataObject::FIELD_NAME());
-    wanted = name ? name : "";
-    // ParaView gives an empty name while it does not know the input's arrays.
-    any = name && wanted.empty() ? data->GetPointData()->GetScalars()
-                                 : this->GetInputAbstractArrayToProcess(0, inputs, association);
-  }
-  else
-  {
-    wanted = this->InputVesselnessArrayName;
-    any = wanted.empty() ? data->GetPointData()->GetScalars()
-                         : data->GetPointData()->GetAbstractArray(wanted.c_str());
-  }
-  vtkCoronary::Require(any != nullptr,
-    whose +
-      (wanted.empty() ? std::string(" has no active point scalars")
-                      : " has no point array '" + wanted + "'"));
-  const std::string name =
-    "array '" + std::string(any->GetName() ? any->GetName() : "") + "' of " + whose;
-  vtkCoronary::Require(association == vtkDataObject::FIELD_ASSOCIATION_POINTS,
-    name + " belongs to the cells: point data are needed");
-  auto* array = vtkArrayDownCast<vtkDataArray>(any);
-  vtkCoronary::Require(array != nullptr, name + " is not numeric");
-  vtkCoronary::Require(array->GetNumberOfComponents() == 1,
-    name + " has " + std::to_string(array->GetNumberOfComponents()) +
-      " components: one is needed, an intensity");
-  vtkCoronary::Require(
-    array->GetNumberOfTuples() == data->GetNumberOfPoints(), name + " has not one value a voxel");
-  return array;
+  return vtkCoronary::VoxelArrayOf(vtkImageData::GetData(inputs[port]->GetInformationObject(0)),
+    port == 0 ? vtkCoronary::ChosenPointArray(this, whose) : this->InputVesselnessArrayName, whose);
 }
 
 coronary::VesselSegmentationSettings vtkVesselSegmentation::MakeSettings() const
@@ -510,6 +483,19 @@ coronary::CoronaryOstia vtkVesselSegmentation::FindOstia(const coronary::ScalarI
                                        << "seeds (Seeds input, AddSeed) where it is wrong.");
   }
   return found;
+}
+
+std::string vtkVesselSegmentation::DoubtOf(const std::vector<coronary::VesselSeed>& seeds,
+  const coronary::VesselSegmentationResult& result, std::size_t s)
+{
+  if (result.seedContrast[s] < MinimumSeedContrast)
+  {
+    return "the brightest place within 2.5 mm of it is only as bright as noise makes tissue";
+  }
+  const bool shared = std::any_of(seeds.begin(), seeds.end(),
+    [&](const coronary::VesselSeed& other)
+    { return &other != &seeds[s] && (other.position - seeds[s].position).norm() < SharedVolume; });
+  return result.seedVolume[s] < MinimumSeedVolume && !shared ? "none leads on from it" : "";
 }
 
 void vtkVesselSegmentation::Execute(
@@ -626,6 +612,13 @@ void vtkVesselSegmentation::Execute(
       vtkWarningMacro(<< "No vessel begins at " << name << " ("
                       << origins.seeds[s].position.transpose()
                       << "): nothing there looks like one within 2 mm.");
+    }
+    else if (const std::string doubt = DoubtOf(origins.seeds, result, s);
+             origins.ostia.empty() && !doubt.empty())
+    {
+      vtkWarningMacro("Seed " << s << " (" << origins.seeds[s].position.transpose()
+                              << ") is in no vessel: " << doubt
+                              << ". Move it into the lumen of an artery.");
     }
   }
 

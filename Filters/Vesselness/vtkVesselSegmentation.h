@@ -14,7 +14,7 @@
  *
  * @par Input ports:
  * - 0: vtkImageData, three-dimensional, one component: the CT image. Array chosen with
- *   SetInputArrayToProcess(0, ...), by default the active scalars.
+ *   SetInputArrayToProcess(0, ...), by default, or as "Automatic", the active scalars.
  * - 1, optional: vtkImageData on the same voxels: vesselness, not negative
  *   (InputVesselnessArrayName). Without it, Frangi's with five scales from 0.5 to 2.5 mm (and
  *   not below half the largest voxel spacing) is computed here.
@@ -46,8 +46,18 @@
  * @par Failure:
  * A setting out of its range, a missing or multi-component array, an image of fewer than three
  * dimensions, a vesselness on another grid, a seed outside the image, no seed and no ostium found:
- * one error that names it, and no output. A seed that reaches no vessel is a warning. An aborted
- * execution leaves an empty output and is started anew by the next request.
+ * one error that names it, and no output. A given seed that is in no vessel is a warning that says
+ * why. An aborted execution leaves an empty output and is started anew by the next request.
+ *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Spacing=[1.0, 1.0, 1.0], TemporalWindow=0)
+ * phase = ReferencePhase(Input=phantom["Image"], Automatic=0, Time=0.75)
+ * vesselness = FrangiVesselness(Input=phase, AutomaticC=0, C=100)
+ * lumen = VesselSegmentation(Image=phase, Vesselness=vesselness)
+ * lumen.UpdatePipeline()
+ * print(lumen["Seeds"].PointData["Confidence"].GetRange())
+ * @endcode
  *
  * @sa coronary::SegmentVessels, coronary::FindCoronaryOstia, vtkFrangiVesselness
  */
@@ -66,6 +76,8 @@ namespace coronary
 {
 struct CoronaryOstia;
 struct ScalarImage;
+struct VesselSeed;
+struct VesselSegmentationResult;
 struct VesselSegmentationSettings;
 }
 
@@ -202,7 +214,8 @@ public:
 
   ///@{
   /**
-   * Point array of the vesselness at input 1. Default empty: its active scalars.
+   * Point array of the vesselness at input 1. Default "Automatic", or empty: its active scalars, or
+   * its first numeric array of one component.
    */
   // No SetInputArrayToProcess(1, ...): ParaView 5.11 crashes on arrays of two inputs chosen so.
   vtkSetStdStringFromCharMacro(InputVesselnessArrayName);
@@ -229,6 +242,9 @@ private:
 
   coronary::VesselSegmentationSettings MakeSettings() const;
   vtkDataArray* InputArray(vtkInformationVector** inputs, int port);
+  /// Why a given seed seems to be in no vessel, for a message; empty when it does not.
+  static std::string DoubtOf(const std::vector<coronary::VesselSeed>& seeds,
+    const coronary::VesselSegmentationResult& result, std::size_t s);
   coronary::CoronaryOstia FindOstia(const coronary::ScalarImage& image);
   void Execute(
     vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs);
@@ -249,7 +265,7 @@ private:
   double LongestPath = 400.0;
   double MinimumIslandVolume = 2.0;
   bool GenerateProbability = false;
-  std::string InputVesselnessArrayName;
+  std::string InputVesselnessArrayName = "Automatic";
 };
 
 #endif

@@ -37,6 +37,15 @@
  * put right is a warning. An aborted execution leaves an empty output and is started anew by the next
  * request.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, SurfaceSpacing=0.8)
+ * wall = ReferencePhase(Input=phantom["Surface"], Automatic=0, Time=0.75)
+ * clean = SurfaceCleaner(Surface=wall, MinimumAngle=10)
+ * clean.UpdatePipeline()
+ * print(clean.GetDataInformation().GetNumberOfCells(), "triangles")
+ * @endcode
+ *
  * @sa coronary::CleanSurface, vtkTetrahedralMesher
  */
 #ifndef vtkSurfaceCleaner_h

@@ -40,6 +40,16 @@
  * with a warning. An aborted execution leaves an empty output and is started anew by the next
  * request.
  *
+ * @par Python:
+ * @code{.py}
+ * tree = TGFSkeletonReader(FileName="tree.tgf", Radius=1.5)
+ * wall = FrenetSweepSurface(Input=tree["Tree"], MinimumEdgeLength=0.4, MaximumEdgeLength=1)
+ * skeleton = CenterlineSkeleton(Centerlines=tree["Tree"])
+ * mesh = TetrahedralMesher(Surface=wall["Surface"], Skeleton=skeleton, LeaveOutPointsOutside=1)
+ * mesh.UpdatePipeline()
+ * print(mesh["Volume"].GetDataInformation().GetNumberOfCells(), "tetrahedra")
+ * @endcode
+ *
  * @sa coronary::MakeTetrahedralMesh
  */
 #ifndef vtkTetrahedralMesher_h

@@ -15,7 +15,7 @@ RADIUS = "MaximumInscribedSphereRadius"
 def require_plugin():
     """Raises RuntimeError without the plugin."""
     if not hasattr(simple, "CoronaryPhantom"):
-        raise RuntimeError("The DynamicCoronary plugin is not loaded (Tools, Manage Plugins).")
+        raise RuntimeError("The DynamicCoronary plugin is not loaded: see docs/paraview.md, The plugin.")
 
 
 def new_layout(name, size=None):

@@ -10,7 +10,7 @@ from paraview import simple
 try:
     import compare_series
 except ImportError:
-    raise RuntimeError("The DynamicCoronary plugin is not loaded (Tools, Manage Plugins).") from None
+    raise RuntimeError("The DynamicCoronary plugin is not loaded: see docs/paraview.md, The plugin.") from None
 
 compare_series.compare(
     simple.PVDReader(registrationName="Model", FileName=os.environ.get("DYNAMICCORONARY_MODEL", "motion.pvd")),

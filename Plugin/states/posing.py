@@ -7,6 +7,6 @@ from paraview import simple  # with it, Python finds the modules of plugins
 try:
     import coronary_examples
 except ImportError:
-    raise RuntimeError("The DynamicCoronary plugin is not loaded (Tools, Manage Plugins).") from None
+    raise RuntimeError("The DynamicCoronary plugin is not loaded: see docs/paraview.md, The plugin.") from None
 
 coronary_examples.posing()

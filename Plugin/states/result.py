@@ -10,7 +10,7 @@ from paraview import simple  # with it, Python finds the modules of plugins
 try:
     import build_from_4d_ct
 except ImportError:
-    raise RuntimeError("The DynamicCoronary plugin is not loaded (Tools, Manage Plugins).") from None
+    raise RuntimeError("The DynamicCoronary plugin is not loaded: see docs/paraview.md, The plugin.") from None
 
 build_from_4d_ct.open_result(os.environ.get("DYNAMICCORONARY_RESULT", "demo-output/run"),
                              os.environ.get("DYNAMICCORONARY_SERIES", "demo-output/phantom/series.json"))

@@ -573,7 +573,7 @@ TEST(CenterlineTracker, RefusesSeriesThatAreNone)
       image->GetPointData()->Initialize();
       return image;
     });
-  ExpectError(scene.tracker, "no point array of scalars");
+  ExpectError(scene.tracker, "The image at the time 0.500000 has no point array of one component");
   {
     atHalf([] { return nullptr; });
     Messages upstream(images);

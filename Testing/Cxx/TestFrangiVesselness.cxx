@@ -786,7 +786,8 @@ TEST(FrangiVesselness, RefusesByName)
     change(changed);
     return MakeFilterOf(changed);
   };
-  ExpectRefusal(ofImage([](vtkImageData* i) { i->GetPointData()->Initialize(); }), "scalars");
+  ExpectRefusal(ofImage([](vtkImageData* i) { i->GetPointData()->Initialize(); }),
+    "The image has no point array of one component");
   ExpectRefusal(ofImage(
                   [](vtkImageData* i)
                   {

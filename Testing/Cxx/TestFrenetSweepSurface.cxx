@@ -438,7 +438,7 @@ TEST(FrenetSweepSurface, ContoursAreMeasuredInTheImage)
   EXPECT_LT(worst, 0.1);
 
   filter->SetInputImageArrayName("Other");
-  ExpectRefusal(filter, "no point array Other");
+  ExpectRefusal(filter, "no point array 'Other'");
   // Where nothing is to be seen it stays round, and that is said.
   const auto dark = EllipticTube();
   dark->GetPointData()->GetScalars()->Fill(40.0);

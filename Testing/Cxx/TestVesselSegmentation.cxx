@@ -360,6 +360,57 @@ TEST(VesselSegmentation, ASeedInTheDarkIsAWarning)
   EXPECT_NE(messages.Warnings.front().find("seed 1"), std::string::npos);
 }
 
+TEST(VesselSegmentation, ASeedInTissueSaysSo)
+{
+  const auto source = MakePhantom();
+  source->UpdateTimeStep(ReferenceTime);
+  const auto update = [&](const std::vector<Vector3>& seeds)
+  {
+    vtkNew<vtkVesselSegmentation> filter;
+    const Messages messages(filter);
+    filter->SetInputConnection(source->GetOutputPort(vtkCoronaryPhantomSource::ImagePort));
+    for (const Vector3& seed : seeds)
+    {
+      filter->AddSeed(seed[0], seed[1], seed[2]);
+    }
+    filter->UpdateTimeStep(ReferenceTime);
+    EXPECT_TRUE(messages.Errors.empty()) << testing::PrintToString(messages.Errors);
+    return messages.Warnings;
+  };
+  // Muscle; blood of a chamber, from which no vessel leads on.
+  const std::vector<std::pair<Vector3, std::string>> places{ { Vector3(-49.0, -22.0, -35.0),
+                                                               "only as bright as noise" },
+    { Vector3(-25.0, 8.0, -35.0), "none leads on" } };
+  for (const auto& [place, reason] : places)
+  {
+    const std::vector<std::string> said = update({ place });
+    ASSERT_EQ(said.size(), 1U) << testing::PrintToString(said);
+    EXPECT_NE(said[0].find("Seed 0"), std::string::npos) << said[0];
+    EXPECT_NE(said[0].find("is in no vessel"), std::string::npos) << said[0];
+    EXPECT_NE(said[0].find(reason), std::string::npos) << said[0];
+  }
+
+  // Seeds all along the arteries, thin ones too, are none of that.
+  auto* lines =
+    vtkPolyData::SafeDownCast(source->GetOutputDataObject(vtkCoronaryPhantomSource::TreePort));
+  source->Update(vtkCoronaryPhantomSource::TreePort);
+  vtkDataArray* radius = lines->GetPointData()->GetArray("MaximumInscribedSphereRadius");
+  std::vector<Vector3> seeds;
+  for (vtkIdType n = 0; n < lines->GetNumberOfPoints(); n += 40)
+  {
+    if (radius->GetTuple1(n) > 0.9)
+    {
+      seeds.emplace_back();
+      lines->GetPoint(n, seeds.back().data());
+    }
+  }
+  ASSERT_GT(seeds.size(), 10U);
+  for (const std::string& warning : update(seeds))
+  {
+    EXPECT_EQ(warning.find("in no vessel"), std::string::npos) << warning;
+  }
+}
+
 TEST(VesselSegmentation, NaNVoxelsAreNoVessel)
 {
   const Tube tube;

@@ -1,8 +1,11 @@
 """What the ParaView tests share: the plugin, data, pictures, and the phantom's usual view."""
+import glob
 import hashlib
+import json
 import os
 import struct
 import sys
+import xml.etree.ElementTree as ElementTree
 
 from paraview import servermanager, simple, smstate, smtrace
 from vtkmodules.vtkIOImage import vtkPNGReader
@@ -74,6 +77,34 @@ def write_skeleton(folder):
         for bone in bones:
             file.write("%d %d\n" % bone)
     return path
+
+
+def write_tree(path, way):
+    """A fork of three vessels, a point each millimetre, as a .tgf file."""
+    joints = [(0.0, z) for z in range(13)]
+    bones = [(n, n + 1) for n in range(1, 13)]
+    for side in (way, -way):
+        first = len(joints) + 1
+        joints += [(side * n / 12.0, 12 + n) for n in range(1, 13)]
+        bones += [(13, first)] + [(n, n + 1) for n in range(first, first + 11)]
+    with open(path, "w") as file:
+        file.writelines("%d %r 0 %r\n" % (n, *joint) for n, joint in enumerate(joints, 1))
+        file.write("#\n")
+        file.writelines("%d %d\n" % bone for bone in bones)
+
+
+def write_series(path, fractions, cycle_ms):
+    """A small image for each phase, and the .json that makes a series of them."""
+    phases = []
+    for number, fraction in enumerate(fractions):
+        name = "phase_%d.mha" % number
+        with open(os.path.join(os.path.dirname(path), name), "wb") as file:
+            file.write(b"ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nElementSpacing = 1 2 3\n"
+                       b"ElementType = MET_SHORT\nBinaryData = True\nElementDataFile = LOCAL\n")
+            file.write(struct.pack("<24h", *(100 * number + 10 * n for n in range(24))))
+        phases.append({"fraction": fraction, "image": name})
+    with open(path, "w") as file:
+        json.dump({"cycle_ms": cycle_ms, "phases": phases}, file)
 
 
 def skinning_pipeline(skeleton_file, **pose_settings):
@@ -187,6 +218,23 @@ def places(data):
 def largest_difference(ones, twos):
     """Between two lists of places, of the movements."""
     return max(abs(a - b) for one, two in zip(ones, twos) for a, b in zip(one[1], two[1]))
+
+
+def all_proxies(xml_folder):
+    """The proxies of sources and filters, as elements of the plugin's XML."""
+    for path in sorted(glob.glob(os.path.join(xml_folder, "*.xml"))):
+        for group in ElementTree.parse(path).getroot().findall("ProxyGroup"):
+            for element in group.findall("SourceProxy"):
+                yield element
+
+
+def stand_ins():
+    """A source for each type of input."""
+    image = simple.Wavelet(registrationName="Image", WholeExtent=[0, 2, 0, 2, 0, 2])
+    lines = simple.Line(registrationName="Lines", Resolution=4)
+    mesh = simple.Tetrahedralize(image, registrationName="Tetrahedra")
+    return {"vtkImageData": image, "vtkDataObject": image, "vtkPolyData": lines, "vtkPointSet": lines,
+            "vtkUnstructuredGrid": mesh}
 
 
 def find(name):

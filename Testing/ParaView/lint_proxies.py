@@ -93,8 +93,9 @@ def lint_panel(name, element):
                 if p.tag.endswith("VectorProperty") and p.get("information_only") != "1"}
     grouped = [p.get("name") for g in element.findall("PropertyGroup") for p in g.findall("Property")]
     inputs = {p.get("name"): p for p in element.findall("InputProperty")}
+    shown = [p.get("name") for p in element if p.get("information_only") == "1" and p.get("panel_visibility")]
     for key in grouped:
-        if key not in settings and key not in inputs or grouped.count(key) > 1:
+        if key not in settings and key not in inputs and key not in shown or grouped.count(key) > 1:
             complaints.append("%s: the group's %s is not there, or twice" % (name, key))
     if len(settings) > UNGROUPED and element.tag == "SourceProxy":
         loose = [key for key in settings if key.endswith("ArrayName") and key not in grouped

@@ -1,14 +1,12 @@
 """Every proxy with other settings than its own, through a state file, a Python state and a trace; outputs too."""
-import glob
 import os
 import sys
-import xml.etree.ElementTree as ElementTree
 
 from paraview import make_name_valid, simple
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
 
-from coronary_testing import (digest, fetch, find, load_plugin, require, require_states_restore,
-                              require_trace_repeats, write_dicom)
+from coronary_testing import (all_proxies, digest, fetch, find, load_plugin, require, require_states_restore,
+                              require_trace_repeats, stand_ins, write_dicom, write_tree)
 
 plugin, folder, xml_folder = sys.argv[1:4]
 # What a value by rule would make senseless: axes that are no rotation, times that do not increase.
@@ -23,20 +21,6 @@ SENSIBLE = {("CoronaryPhantomSource", "Direction"): [0, 1, 0, 1, 0, 0, 0, 0, -1]
             ("CoronaryTGFReader", "FileName"): os.path.join(folder, "tree.tgf")}
 # A file, a folder or an array of the input each has to be there.
 LEFT = ("FileListDomain", "ArrayListDomain", "ExtentDomain")
-
-
-def write_tree(name, way):
-    """A fork of three vessels, a point each millimetre, as a .tgf file."""
-    joints = [(0.0, z) for z in range(13)]
-    bones = [(n, n + 1) for n in range(1, 13)]
-    for side in (way, -way):
-        first = len(joints) + 1
-        joints += [(side * n / 12.0, 12 + n) for n in range(1, 13)]
-        bones += [(13, first)] + [(n, n + 1) for n in range(first, first + 11)]
-    with open(os.path.join(folder, name), "w") as file:
-        file.writelines("%d %r 0 %r\n" % (n, *joint) for n, joint in enumerate(joints, 1))
-        file.write("#\n")
-        file.writelines("%d %d\n" % bone for bone in bones)
 
 
 def write_images():
@@ -94,26 +78,10 @@ def settings(element):
     return values
 
 
-def all_proxies():
-    for path in sorted(glob.glob(os.path.join(xml_folder, "*.xml"))):
-        for group in ElementTree.parse(path).getroot().findall("ProxyGroup"):
-            for element in group.findall("SourceProxy"):
-                yield element
-
-
-def stand_ins():
-    """A source for each type of input."""
-    image = simple.Wavelet(registrationName="Image", WholeExtent=[0, 2, 0, 2, 0, 2])
-    lines = simple.Line(registrationName="Lines", Resolution=4)
-    mesh = simple.Tetrahedralize(image, registrationName="Tetrahedra")
-    return {"vtkImageData": image, "vtkDataObject": image, "vtkPolyData": lines, "vtkPointSet": lines,
-            "vtkUnstructuredGrid": mesh}
-
-
 def make_all():
     """One of each proxy, with all inputs; nothing of it is executed."""
     sources = stand_ins()
-    for element in all_proxies():
+    for element in all_proxies(xml_folder):
         label = make_name_valid(element.get("label"))
         inputs = {make_name_valid(port.get("label")): sources[port.find("DataTypeDomain/DataType").get("value")]
                   for port in element.findall("InputProperty")}
@@ -123,7 +91,7 @@ def make_all():
 def read_all():
     """All settings and inputs of the proxies of make_all."""
     found = {}
-    for element in all_proxies():
+    for element in all_proxies(xml_folder):
         proxy = find(element.get("name"))
         for name in settings(element):
             value = getattr(proxy, name)
@@ -140,14 +108,14 @@ def require_settings():
     """That the values are those which were given, and not the default ones."""
     count = 0
     found = read_all()
-    for element in all_proxies():
+    for element in all_proxies(xml_folder):
         for name, value in settings(element).items():
             there = found[element.get("name"), name]
             require(there == value or there == [value] or
                     all(abs(a - b) < 1e-12 for a, b in zip(there, value)),
                     "%s.%s is %s, not %s" % (element.get("name"), name, there, value))
             count += 1
-    print("%d settings of %d proxies" % (count, len(list(all_proxies()))), flush=True)
+    print("%d settings of %d proxies" % (count, len(list(all_proxies(xml_folder)))), flush=True)
 
 
 def make_wall():
@@ -223,8 +191,8 @@ def require_times():
 
 
 load_plugin(plugin)
-write_tree("tree.tgf", 8.0)
-write_tree("truth.tgf", 8.5)
+write_tree(os.path.join(folder, "tree.tgf"), 8.0)
+write_tree(os.path.join(folder, "truth.tgf"), 8.5)
 write_images()
 write_dicom(folder)
 require_trace_repeats(make_wall, outputs)

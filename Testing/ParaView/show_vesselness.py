@@ -9,9 +9,6 @@ from coronary_testing import (IMAGE, content, fetch, find, load_plugin, quick_ph
 
 plugin, folder = sys.argv[1:3]
 
-# Inputs are given by position: given by name, ParaView takes the array names of the active source
-# first, and keeps them until the input is up to date.
-
 
 def make_pipeline():
     """Phantom, its phase at 0.75, and a vesselness that differs from the default in every way."""

@@ -15,6 +15,14 @@
  * A radius array that is missing, negative or not finite: one error that names it, and no output. An
  * empty input gives an empty output.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1)
+ * volumes = LumenVolume(Input=phantom["Centerlines"])
+ * volumes.UpdatePipeline(0.75)
+ * print(volumes.CellData["LumenVolume"].GetRange())
+ * @endcode
+ *
  * @sa coronary::LumenVolume
  */
 #ifndef vtkLumenVolume_h

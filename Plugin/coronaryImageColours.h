@@ -1,0 +1,10 @@
+#ifndef coronaryImageColours_h
+#define coronaryImageColours_h
+
+/**
+ * From now on images in HU (the array HU of the readers and the phantom) are shown in grey, with a window for the heart
+ * with contrast medium, and keep it from phase to phase. What a user saves as default for that array goes before it.
+ */
+void coronaryShowImagesInGrey();
+
+#endif
