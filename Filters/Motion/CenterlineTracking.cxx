@@ -171,7 +171,7 @@ std::vector<std::vector<bool>> LineTracker::SeenPlaces() const
     std::size_t count = 0;
     for (std::size_t n = 0; n < nodes; ++n)
     {
-      // Along the vessels, and those that meet there.
+      // Along its own vessel: one that meets it is seen or not for itself.
       std::vector<std::pair<int, int>> open{ { static_cast<int>(n), -1 } };
       int near = 0;
       int alikeNear = 0;
@@ -180,9 +180,10 @@ std::vector<std::vector<bool>> LineTracker::SeenPlaces() const
         const auto [here, from] = open[at];
         ++near;
         alikeNear += alike(here) ? 1 : 0;
+        const bool isFork = around[here].size() > 2 && at > 0;
         for (const int next : around[here])
         {
-          if (next != from &&
+          if (next != from && !isFork &&
             (this->Nodes.position[next] - this->Nodes.position[n]).norm() <= SupportingReach)
           {
             open.emplace_back(next, here);

@@ -35,6 +35,9 @@ constexpr double MaximumPercentile[2] = { 0.9, 2.0 };
 
 const std::vector<std::string> VesselNames = { "RCA", "AM", "LAD", "D1", "LCx", "OM1", "OM2" };
 
+/// Nearer to where a hidden vessel leaves another one, that one is seen, mm.
+constexpr double FromFork = 4.0;
+
 /// When a vessel may be hidden: early systole, three of the frames that are tracked.
 bool IsHidden(double time)
 {
@@ -461,7 +464,7 @@ struct Judgement
   Errors carried[2];
   Errors unseen;           ///< places of a hidden vessel, from where they were carried
   Errors unseenAcross;     ///< the same, from its axis
-  double confidence = 0.0; ///< greatest of them
+  double confidence = 0.0; ///< greatest of them, away from the fork
   int called = 0;
   int near = 0;
   int nearAxis = 0;
@@ -498,7 +501,10 @@ Judgement Judge(const Polylines& lines, const std::vector<std::vector<Vector3>>&
       {
         result.unseen.values.push_back(material);
         result.unseenAcross.values.push_back(errors.back());
-        result.confidence = std::max(result.confidence, poses.confidence[k / 2][n]);
+        if ((lines.points[n] - lines.points[own->front()]).norm() > FromFork)
+        {
+          result.confidence = std::max(result.confidence, poses.confidence[k / 2][n]);
+        }
       }
       if (isTracked && poses.status[k / 2][n] == TrackingStatus::Tracked)
       {
