@@ -43,6 +43,14 @@
  * Lines that are no tree or differ from phase to phase, a vessel that the tree does not have, an image without voxels or
  * scalars, an unknown blur, lines with none of the images' times: one error that names it, and no output.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, CenterlineSpacing=2, Phases=[0.05, 0.35, 0.75])
+ * lumen = LumenCycle(Input=phantom["Centerlines"], Vessel="RCA")
+ * lumen.UpdatePipeline()
+ * print(lumen["Profile"].GetDataInformation().GetNumberOfRows(), "places")
+ * @endcode
+ *
  * @sa coronary::GradeOverCycle, coronary::MeasureTreeLumen, vtkCurvedReformat
  */
 #ifndef vtkLumenCycle_h
