@@ -318,6 +318,7 @@ TEST(RealMotion, LostFramesAndLostPoints)
   double lostAfter = 0.0;
   double lost = 0.0;
   double moved = 0.0;
+  double beyond = 0.0; ///< the tolerance of a noisy phase
   for (int k = 0; k < Frames; ++k)
   {
     for (std::size_t n = 0; n < lines.points.size(); ++n)
@@ -335,6 +336,8 @@ TEST(RealMotion, LostFramesAndLostPoints)
       else
       {
         moved = std::max(moved, (result.poses.points[k][n] - spoiled.points[k][n]).norm());
+        beyond = std::max(beyond,
+          (result.poses.points[k][n] - spoiled.points[k][n]).norm() - 0.3 - 3.0 * result.noise[k]);
       }
     }
   }
@@ -344,7 +347,7 @@ TEST(RealMotion, LostFramesAndLostPoints)
     "by %.2f mm at most, %d iterations, %d limits left\n",
     before / all, after / all, lostBefore / lost, lostAfter / lost, moved, result.iterations,
     static_cast<int>(result.violations));
-  EXPECT_LE(moved, 0.3 + 1e-9);
+  EXPECT_LE(beyond, 1e-9);
   EXPECT_LT(lostAfter / lost, 0.7);
   EXPECT_LT(after, 0.5 * before);
 }
