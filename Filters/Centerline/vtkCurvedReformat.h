@@ -39,6 +39,14 @@
  * An image without voxels or scalars, lines that are no tree, a vessel that the tree does not have, a vessel outside of the
  * image, settings out of range: one error that names it, and no output. A Position beyond the vessel's end means its end.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Spacing=[1.0, 1.0, 1.0], TemporalWindow=0)
+ * sheet = CurvedReformat(Input=phantom["Image"], Centerlines=phantom["Centerlines"], Vessel="LAD", Position=40)
+ * sheet.UpdatePipeline(0.75)
+ * print(sheet["Section"].FieldData["LumenDiameter"].GetRange())
+ * @endcode
+ *
  * @sa coronary::ReformatVessel, coronary::TraceBoundaries, vtkLumenCycle
  */
 #ifndef vtkCurvedReformat_h

@@ -43,6 +43,14 @@
  * Lines that are no tree or differ from phase to phase, a vessel that the tree does not have, an image without voxels or
  * scalars, an unknown blur, lines with none of the images' times: one error that names it, and no output.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1, Phases=[0.05, 0.35, 0.75])
+ * cycle = LumenCycle(Input=phantom["Centerlines"], Vessel="LAD")
+ * cycle.UpdatePipeline(0.75)
+ * print(cycle["Map"].PointData["Diameter"].GetRange())
+ * @endcode
+ *
  * @sa coronary::GradeOverCycle, coronary::MeasureTreeLumen, vtkCurvedReformat
  */
 #ifndef vtkLumenCycle_h
