@@ -41,10 +41,10 @@
  *
  * @par Python:
  * @code{.py}
- * phantom = CoronaryPhantom(Seed=1, Spacing=[1.0, 1.0, 1.0], TemporalWindow=0, Phases=[0.35, 0.75])
- * along = CurvedReformat(Input=phantom["Image"], Centerlines=phantom["Centerlines"], Vessel="LAD", Position=30)
- * along.UpdatePipeline(0.75)
- * print(along["Reformat"].GetDataInformation().GetBounds())
+ * phantom = CoronaryPhantom(Seed=1, Spacing=[1.0, 1.0, 1.0], TemporalWindow=0)
+ * sheet = CurvedReformat(Input=phantom["Image"], Centerlines=phantom["Centerlines"], Vessel="LAD", Position=40)
+ * sheet.UpdatePipeline(0.75)
+ * print(sheet["Section"].FieldData["LumenDiameter"].GetRange())
  * @endcode
  *
  * @sa coronary::ReformatVessel, coronary::TraceBoundaries, vtkLumenCycle

@@ -45,10 +45,10 @@
  *
  * @par Python:
  * @code{.py}
- * phantom = CoronaryPhantom(Seed=1, CenterlineSpacing=2, Phases=[0.05, 0.35, 0.75])
- * lumen = LumenCycle(Input=phantom["Centerlines"], Vessel="RCA")
- * lumen.UpdatePipeline()
- * print(lumen["Profile"].GetDataInformation().GetNumberOfRows(), "places")
+ * phantom = CoronaryPhantom(Seed=1, Phases=[0.05, 0.35, 0.75])
+ * cycle = LumenCycle(Input=phantom["Centerlines"], Vessel="LAD")
+ * cycle.UpdatePipeline(0.75)
+ * print(cycle["Map"].PointData["Diameter"].GetRange())
  * @endcode
  *
  * @sa coronary::GradeOverCycle, coronary::MeasureTreeLumen, vtkCurvedReformat
