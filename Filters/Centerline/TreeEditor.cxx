@@ -545,7 +545,7 @@ MeasuredPath TreeEditor::DrawStraight(std::int64_t start, const std::vector<Vect
   return path;
 }
 
-MeasuredPath TreeEditor::Draw(std::int64_t& start, bool goesOn, const std::vector<Vector3>& places,
+MeasuredPath TreeEditor::Draw(std::int64_t& start, bool& goesOn, const std::vector<Vector3>& places,
   const ProgressCallback& progress)
 {
   if (!this->Scene.image)
@@ -563,7 +563,7 @@ MeasuredPath TreeEditor::Draw(std::int64_t& start, bool goesOn, const std::vecto
   MeasuredPath path = drawing.Measured(way, goesOn ? Held : 0.0, this->Ends.empty() ? 0.0 : Held);
   if (path.size() >= 3 && !goesOn)
   {
-    this->JoinToParent(path, start);
+    goesOn = this->JoinToParent(path, start);
   }
   if (path.size() < 3)
   {
@@ -587,7 +587,7 @@ MeasuredPath TreeEditor::Draw(std::int64_t& start, bool goesOn, const std::vecto
   return path;
 }
 
-void TreeEditor::JoinToParent(MeasuredPath& path, std::int64_t& start)
+bool TreeEditor::JoinToParent(MeasuredPath& path, std::int64_t& start)
 {
   const PathMeasurement& measurement = this->Drawing().Measurement();
   // The way runs in the tree first: it leaves where it leaves, not where a person pointed.
@@ -605,10 +605,18 @@ void TreeEditor::JoinToParent(MeasuredPath& path, std::int64_t& start)
   if (leaves + 3 >= path.size())
   {
     path.resize(0);
-    return;
+    return false;
   }
   path.ReplaceStart(leaves, {});
-  for (const VesselPath& vessel : VesselPaths(this->Tree))
+  const std::vector<std::int64_t> owners = BranchesOfPoints(this->Tree);
+  Place place;
+  place.branch = static_cast<std::size_t>(owners[start]);
+  const std::vector<std::int64_t>& points = this->Tree.branches[place.branch].points;
+  place.at =
+    static_cast<std::size_t>(std::find(points.begin(), points.end(), start) - points.begin());
+  const bool goesOn = this->GoesOn(place);
+  start = this->PointOf(place);
+  for (const VesselPath& vessel : goesOn ? std::vector<VesselPath>() : VesselPaths(this->Tree))
   {
     if (std::find(vessel.points.begin() + static_cast<std::ptrdiff_t>(vessel.FirstOwn()),
           vessel.points.end(), start) != vessel.points.end())
@@ -620,9 +628,11 @@ void TreeEditor::JoinToParent(MeasuredPath& path, std::int64_t& start)
   }
   if (path.size() >= 3)
   {
-    measurement.SmoothPositions(path, Held, this->Ends.empty() ? 0.0 : Held);
+    path.points.front() = this->Tree.points[start];
+    this->Drawing().Smooth(path, Held, this->Ends.empty() ? 0.0 : Held);
     path.points.front() = this->Tree.points[start];
   }
+  return goesOn;
 }
 
 int TreeEditor::Append(const MeasuredPath& path, std::int64_t start, std::int64_t end, int segment)
@@ -705,11 +715,7 @@ void TreeEditor::AddBranch(const ProgressCallback& progress)
     this->Fail("no vessel of the tree is within " + Millimetres(SearchReach) + " of " +
       PlaceText(places.front()));
   }
-  const bool goesOn = this->GoesOn(from);
-  const int parentSegment = this->Tree.branches[from.branch].segmentId;
-  const int segment = !this->Now->name.empty() ? SegmentOf(this->Now->name)
-    : goesOn                                   ? parentSegment
-                                               : 0;
+  bool goesOn = this->GoesOn(from);
   std::int64_t start = this->PointOf(from);
   const MeasuredPath path = this->Draw(start, goesOn, places, progress);
   std::size_t inside = 0;
@@ -730,6 +736,9 @@ void TreeEditor::AddBranch(const ProgressCallback& progress)
       ", which the tree has already");
   }
   const std::string parent = this->NameOf(owners[start]);
+  const int segment = !this->Now->name.empty() ? SegmentOf(this->Now->name)
+    : goesOn                                   ? this->Tree.branches[owners[start]].segmentId
+                                               : 0;
   const std::size_t before = this->Tree.branches.size();
   this->Append(path, start, -1, segment);
   const double length = this->LengthOf(before);
@@ -755,7 +764,7 @@ void TreeEditor::Join(const ProgressCallback& progress)
       (from.branch == to.branch ? " is of the same branch as " : " hangs on ") +
       PlaceText(this->Now->points.back()) + ": the way would be a loop");
   }
-  const bool goesOn = this->GoesOn(from);
+  bool goesOn = this->GoesOn(from);
   const VesselTree::Branch old = this->Tree.branches[to.branch];
   const bool root = old.parentGroupId < 0;
   const std::string names = this->NameOf(from.branch) + " to " + this->NameOf(to.branch);

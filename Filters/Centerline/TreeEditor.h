@@ -83,10 +83,12 @@ private:
   std::int64_t LumenAt(const Vector3& place) const;
   VesselDrawing& Drawing();
   /// From A, perhaps not the right one, along the places. @param start  of the path on return: the tree's point
-  MeasuredPath Draw(std::int64_t& start, bool goesOn, const std::vector<Vector3>& places,
+  /// @param goesOn  whether it goes on from a tip, as was known before and as it turned out
+  MeasuredPath Draw(std::int64_t& start, bool& goesOn, const std::vector<Vector3>& places,
     const ProgressCallback& progress);
   MeasuredPath DrawStraight(std::int64_t start, const std::vector<Vector3>& places) const;
-  void JoinToParent(MeasuredPath& path, std::int64_t& start);
+  /// @return whether it goes on from a tip
+  bool JoinToParent(MeasuredPath& path, std::int64_t& start);
   /// A branch of new points. @param end  of the tree, -1: it ends by itself @return its group
   int Append(const MeasuredPath& path, std::int64_t start, std::int64_t end, int segment);
   /// The end that is meant by a place near it. @return whether it is a tip

@@ -18,11 +18,17 @@ constexpr std::uint32_t None = VoxelRegion::notAMember;
 
 /// Where nothing looks like a vessel: a gap is crossed, but no detour through other vessels of more than some ten times
 /// its length is taken instead.
-constexpr double LeastSpeed = 0.05;
-constexpr double Margin = 8.0;       ///< mm around the places that a way may use
-constexpr double MarginShare = 0.3;  ///< of the places' distance, more
+constexpr double LeastSpeed = 0.1;
+constexpr double Margin = 8.0;      ///< mm around the places that a way may use
+constexpr double MarginShare = 0.3; ///< of the places' distance, more
+/// A way may leave the straight line between its ends by about so much: the nearer two clicks are, the more they say.
+constexpr double CorridorShare = 0.35; ///< of their distance
+constexpr double Corridor = 2.5;       ///< mm at least
+constexpr double LeastInCorridor = 0.05;
 constexpr double ClickRadius = 1.25; ///< mm that a click may be beside the axis
 constexpr std::size_t Samples = 400; ///< of the tree, for what is usual in it
+
+constexpr double UnseenWeight = 0.3; ///< of a place of the way without a section, in the smoothing
 
 /// What of an image's extent lies around places; its indices are the image's.
 ImageGrid BoxOf(const ImageGrid& grid, const std::vector<Vector3>& places, double margin)
@@ -174,14 +180,13 @@ Vector3 VesselDrawing::OnVessel(const Vector3& place) const
   return best;
 }
 
-std::unique_ptr<VesselDrawing::Front> VesselDrawing::MarchFrom(const Vector3& from,
-  const std::vector<Vector3>& around, double margin, const ProgressCallback& progress) const
+std::unique_ptr<VesselDrawing::Front> VesselDrawing::MarchFrom(
+  const Vector3& from, const Vector3* to, double margin, const ProgressCallback& progress) const
 {
   auto front = std::make_unique<Front>();
   const ImageGrid& grid = this->Scene.image->grid;
-  std::vector<Vector3> places = around;
-  places.push_back(from);
-  front->input.grid = BoxOf(grid, places, margin);
+  front->input.grid = BoxOf(grid, { from, to ? *to : from }, margin);
+  const double width = to ? std::max(Corridor, CorridorShare * (*to - from).norm()) : 0.0;
   const ImageGrid& box = front->input.grid;
   front->speed.resize(GridSize(box));
   const std::array<int, 6>& e = box.extent;
@@ -196,8 +201,11 @@ std::unique_ptr<VesselDrawing::Front> VesselDrawing::MarchFrom(const Vector3& fr
           {
             const double tube =
               this->Scene.vesselness ? this->Scene.vesselness[GridOffset(grid, i, j, k)] : 0.0;
-            front->speed[GridOffset(box, i, j, k)] =
-              static_cast<float>(this->SpeedAt(box.IndexToWorld(i, j, k), tube));
+            const Vector3 at = box.IndexToWorld(i, j, k);
+            const double beside =
+              to ? NearestOnSegment(at, from, *to).squaredDistance / (width * width) : 0.0;
+            front->speed[GridOffset(box, i, j, k)] = static_cast<float>(
+              this->SpeedAt(at, tube) * std::max(LeastInCorridor, std::exp(-beside)));
           }
         }
       }
@@ -223,7 +231,7 @@ std::vector<Vector3> VesselDrawing::Way(
   const Vector3& from, const Vector3& to, const ProgressCallback& progress) const
 {
   const double margin = Margin + MarginShare * (to - from).norm();
-  std::vector<Vector3> way = this->MarchFrom(from, { to }, margin, progress)->BackFrom(to);
+  std::vector<Vector3> way = this->MarchFrom(from, &to, margin, progress)->BackFrom(to);
   std::reverse(way.begin(), way.end());
   return way;
 }
@@ -232,7 +240,7 @@ std::vector<Vector3> VesselDrawing::WayFromTree(
   const Vector3& to, double reach, std::int64_t& owner, const ProgressCallback& progress) const
 {
   owner = -1;
-  const std::unique_ptr<Front> front = this->MarchFrom(to, {}, reach, progress);
+  const std::unique_ptr<Front> front = this->MarchFrom(to, nullptr, reach, progress);
   const std::vector<float>& arrival = front->march->Marched().Arrival();
   float earliest = std::numeric_limits<float>::infinity();
   for (const VesselTree::Branch& branch : this->Tree.branches)
@@ -264,16 +272,40 @@ MeasuredPath VesselDrawing::Measured(
   }
   // Steps of voxels gone; then the sections.
   this->Paths.SmoothPositions(path, 10.0, 10.0);
-  this->Paths.Measure(path, true);
-  this->Paths.Recentre(path);
+  this->Recentre(path, [this](MeasuredPath& moved) { this->Paths.Measure(moved, true); });
+  this->Recentre(path, [this](MeasuredPath& moved) { this->Paths.Recentre(moved); });
   for (int round = 0; round < 2; ++round)
   {
-    this->Paths.SmoothPositions(path, start, end);
+    this->Smooth(path, start, end);
     path.points = ResampleCurve(path.points, this->Paths.step);
     path.resize(path.points.size());
-    this->Paths.Measure(path, true);
+    this->Recentre(path, [this](MeasuredPath& moved) { this->Paths.Measure(moved, true); });
   }
   return path;
+}
+
+void VesselDrawing::Recentre(
+  MeasuredPath& path, const std::function<void(MeasuredPath&)>& measure) const
+{
+  const std::vector<Vector3> before = path.points;
+  measure(path);
+  // In a dark gap what looks a little like a section is something else's.
+  for (std::size_t i = 0; i < path.size(); ++i)
+  {
+    path.points[i] =
+      path.confidence[i] < this->Settings.minimumConfidence ? before[i] : path.points[i];
+  }
+}
+
+void VesselDrawing::Smooth(MeasuredPath& path, double start, double end) const
+{
+  MeasuredPath held = path;
+  for (double& confidence : held.confidence)
+  {
+    confidence = std::max(confidence, UnseenWeight);
+  }
+  this->Paths.SmoothPositions(held, start, end);
+  path.points = std::move(held.points);
 }
 
 void VesselDrawing::CorrectRadii(MeasuredPath& path) const

@@ -8,6 +8,7 @@
 #include "MeasuredPath.h"
 #include "TreeEdits.h"
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -45,6 +46,9 @@ public:
   /// @param start, end  how firmly its ends are held, 0 to 1e3
   MeasuredPath Measured(const std::vector<Vector3>& way, double start, double end) const;
 
+  /// Smooths the positions: what is not seen stays by the way that was given.
+  void Smooth(MeasuredPath& path, double start, double end) const;
+
   /// Half maxima to true radii. @param path  its points without a section follow the others
   void CorrectRadii(MeasuredPath& path) const;
 
@@ -53,10 +57,12 @@ public:
 
 private:
   struct Front;
-  /// A march from a place through a box around it and others.
-  std::unique_ptr<Front> MarchFrom(const Vector3& from, const std::vector<Vector3>& around,
-    double margin, const ProgressCallback& progress) const;
+  /// A march from a place through a box around it. @param to  where it is to go, rather straight; null: anywhere
+  std::unique_ptr<Front> MarchFrom(
+    const Vector3& from, const Vector3* to, double margin, const ProgressCallback& progress) const;
   void MeasureLevels();
+  /// Measures, and takes over the centres of sections that are clear.
+  void Recentre(MeasuredPath& path, const std::function<void(MeasuredPath&)>& measure) const;
   double SpeedAt(const Vector3& world, double vesselness) const;
 
   const VesselTree& Tree;
