@@ -281,10 +281,10 @@ const char* vtkVesselEdits::Kept(const Make& make)
   {
     this->Text = make();
   }
-  catch (const std::exception& error)
+  catch (const std::exception&)
   {
+    // ParaView asks while somebody writes; the next update says what is wrong.
     this->Text.clear();
-    vtkErrorMacro(<< vtkCoronary::PropertyMessage(error.what()));
   }
   return this->Text.c_str();
 }

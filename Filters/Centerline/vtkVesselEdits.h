@@ -162,10 +162,10 @@ public:
   vtkGetMacro(Reach, double);
   ///@}
 
-  /// All edits together as the text of a file. Empty, with an error, when one of them is none.
+  /// All edits together as the text of a file. Empty when one of them is none: Update() says why.
   const char* GetEditsText();
 
-  /// The edit of the properties alone, as an entry of a file; empty: there is none, or with an error it is none.
+  /// The edit of the properties alone, as an entry of a file; empty: there is none, or it is none.
   const char* GetCurrentEdit();
 
   vtkPolyData* GetBifurcations();
@@ -189,7 +189,7 @@ private:
   vtkVesselEdits(const vtkVesselEdits&) = delete;
   void operator=(const vtkVesselEdits&) = delete;
 
-  /// Keeps a text that is made, or reports why it can not be.
+  /// Keeps a text that is made; empty when it can not be.
   template <typename Make>
   const char* Kept(const Make& make);
   /// @throws std::runtime_error, std::invalid_argument
