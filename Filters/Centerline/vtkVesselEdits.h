@@ -40,6 +40,17 @@
  * has not, a ball outside the image): one error that names the edit and the place, and no output. An empty input gives an
  * empty output. An aborted execution leaves an empty output and is started anew by the next request.
  *
+ * @par Python:
+ * @code{.py}
+ * phantom = CoronaryPhantom(Seed=1)
+ * tree = ReferencePhase(Input=phantom["Centerlines"], Automatic=0, Time=0.75)
+ * named = CoronaryTreeTopology(Input=tree)
+ * edits = VesselEdits(Input=named, Edits=['{"edit": "rename", "name": "D1", "new_name": "D2"}'])
+ * edits.Edit, edits.VesselName = "Delete", "OM1"
+ * edits.UpdatePipeline()
+ * print(edits.PointData["EditNumber"].GetRange()[1], "edits")
+ * @endcode
+ *
  * @sa coronary::EditTree, vtkCoronaryTreeTopology, docs/editing.md
  */
 #ifndef vtkVesselEdits_h
