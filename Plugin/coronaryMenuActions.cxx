@@ -21,6 +21,16 @@ coronaryMenuActions::coronaryMenuActions(QObject* parent)
     "The image along and across a vessel of the selected tree, and its diameter over the cycle",
     "look");
   this->AddSeparator();
+  this->Add("coronaryCorrect", "Correct the Tree",
+    "Vessel Edits behind the selected named tree: branches added by clicks, cut, joined, renamed",
+    "correct");
+  this->Add("coronaryKeepEdit", "Keep the Edit",
+    "The edit that the settings of Vessel Edits make goes into its list", "keep_edit");
+  this->Add("coronaryUndoEdit", "Undo the Last Edit", "The last edit of Vessel Edits is taken back",
+    "undo_edit");
+  this->Add("coronarySaveEdits", "Save Edits",
+    "The edits as edits.json of the run that the tree is from", "save_edits");
+  this->AddSeparator();
   this->Add(
     "coronaryPhantom", "Example: Phantom", "A beating phantom: surface and gated CT", "phantom");
   this->Add("coronaryReview", "Example: Overlay Review",

@@ -16,6 +16,7 @@ USES = {
     "Formats": [FILTERS],
     "Readers": ["Formats"],
     "Writers": ["Formats"],
+    "Filters/Centerline": ["Formats"],  # edits by hand are a file
     "Filters/Motion": ["Filters/Centerline"],  # the names say where the heart is
     "Filters/Skinning": ["Formats"],  # a cache of weights is a file
     "Applications/Common": [FILTERS, "Formats"],

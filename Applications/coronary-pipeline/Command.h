@@ -36,6 +36,7 @@ MakeCommand MakePhantomMotionCommand;
 MakeCommand MakeScanCommand;
 MakeCommand MakeInspectCommand;
 MakeCommand MakeRunCommand;
+MakeCommand MakeEditCommand;
 MakeCommand MakeConvertCommand;
 MakeCommand MakeSequenceCommand;
 MakeCommand MakeSlicerCommand;

@@ -179,10 +179,11 @@ double PeakMemory()
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
-RunReport::RunReport(std::string folder, Json settings, Json input)
+RunReport::RunReport(std::string folder, Json settings, Json input, Json edits)
   : Folder(std::move(folder))
   , Settings(std::move(settings))
   , Input(std::move(input))
+  , Edits(std::move(edits))
   , Started(UtcTime())
 {
   const fs::path path = fs::path(this->Folder) / "report.json";
@@ -222,6 +223,12 @@ std::string RunReport::WhyNot(const RunOptions& options, RunStage stage) const
     {
       return "'" + name + "' was " + before.dump() + " and is " + this->Settings[name].dump();
     }
+  }
+  const Json edits = Member(this->Older, "edits");
+  if (stage == RunStage::Centerline && (edits.is_null() ? Json::array() : edits) != this->Edits)
+  {
+    return "other edits by hand: " + std::to_string(this->Edits.size()) + " instead of " +
+      std::to_string(edits.size());
   }
   const Json files = Member(entry, "files");
   for (const auto& [file, bytes] : files.items())
@@ -339,6 +346,7 @@ std::string RunReport::Text() const
   all["versions"] = Versions();
   all["settings"] = this->Settings;
   all["input"] = this->Input;
+  all["edits"] = this->Edits;
   all["stages"] = this->Stages;
   all["stopped"] = this->Stopped;
   for (const auto& [name, numbers] : this->Numbers.items())

@@ -54,12 +54,14 @@ public:
    * Of a new run; what is kept of an older one comes with Keep().
    * @param settings  as of RunOptions::All()
    * @param input     as of DescribeInput()
+   * @param edits     a list of those by hand, as in their file
    */
-  RunReport(std::string folder, nlohmann::ordered_json settings, nlohmann::ordered_json input);
+  RunReport(std::string folder, nlohmann::ordered_json settings, nlohmann::ordered_json input,
+    nlohmann::ordered_json edits);
 
   /**
    * Keeps the finished stages of the report in the folder, up to the first that is not fit: unfinished, of
-   * another input, of other settings, or with a file that is gone or has another size.
+   * another input, of other settings or edits, or with a file that is gone or has another size.
    * @param last  the last stage that is wanted
    * @return why no more stages are kept; empty when all are, up to the last
    */
@@ -101,6 +103,7 @@ private:
   nlohmann::ordered_json Head;
   nlohmann::ordered_json Settings;
   nlohmann::ordered_json Input;
+  nlohmann::ordered_json Edits;
   nlohmann::ordered_json Stages = nlohmann::ordered_json::array();
   nlohmann::ordered_json Numbers = nlohmann::ordered_json::object(); ///< by stage
   nlohmann::ordered_json Stopped;

@@ -67,8 +67,8 @@ Json DescribeVessel(const VesselView& view)
 {
   Json entry = { { "name", view.name }, { "group", view.chain.groupId },
     { "tree", view.chain.treeId }, { "length", Rounded(view.chain.Length()) },
-    { "bridged", Rounded(view.bridged) }, { "interpolated", Rounded(view.interpolated) },
-    { "stenosis", Rounded(view.narrowest) } };
+    { "bridged", Rounded(view.bridged) }, { "edited", Rounded(view.edited) },
+    { "interpolated", Rounded(view.interpolated) }, { "stenosis", Rounded(view.narrowest) } };
   entry["pieces"] = Json::array();
   for (const VesselPiece& piece : view.chain.pieces)
   {
@@ -90,7 +90,7 @@ Json Describe(const ReviewedRun& look, int reference)
   {
     run["warnings"].push_back(look.withoutPictures);
   }
-  for (const char* kind : { "checks", "bridges", "lesions", "calcium" })
+  for (const char* kind : { "edits", "checks", "bridges", "lesions", "calcium" })
   {
     run[kind] = look.result.Findings(kind);
   }

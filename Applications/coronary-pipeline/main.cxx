@@ -20,6 +20,7 @@ constexpr coronary::MakeCommand* Commands[] = {
   coronary::MakeScanCommand,
   coronary::MakeInspectCommand,
   coronary::MakeRunCommand,
+  coronary::MakeEditCommand,
   coronary::MakeSequenceCommand,
   coronary::MakeSlicerCommand,
   coronary::MakeMetricsCommand,

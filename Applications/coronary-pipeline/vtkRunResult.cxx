@@ -226,6 +226,7 @@ RunResult ReadRunResult(const std::string& folder, vtkMessageTrap& messages)
   TakeNames(data, result);
   result.bridged = PointValues(data, vtkCoronaryArrayNames::Bridged);
   result.bridgeConfidence = PointValues(data, vtkCoronaryArrayNames::BridgeConfidence);
+  result.edited = PointValues(data, vtkCoronaryArrayNames::EditNumber);
   result.interpolated = PointValues(data, vtkCoronaryArrayNames::RadiusInterpolated);
   result.stenosis = PointValues(data, vtkCoronaryArrayNames::StenosisDegree);
   result.reference = PointValues(data, vtkCoronaryArrayNames::ReferenceRadius);

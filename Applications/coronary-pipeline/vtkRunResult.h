@@ -63,6 +63,7 @@ struct RunResult
   /// One a point of the tree; empty: the run says nothing of it.
   std::vector<double> bridged;          ///< 1: guessed across a gap
   std::vector<double> bridgeConfidence; ///< 0 to 1
+  std::vector<double> edited;           ///< above 0: by hand
   std::vector<double> interpolated;     ///< 1: the radius was not measured here
   std::vector<double> stenosis;         ///< 0 to 1, by diameter
   std::vector<double> reference;        ///< radius of the vessel were it healthy, mm

@@ -18,6 +18,7 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
+#include "vtkRunEdits.h"
 #include "vtkRunLesions.h"
 #include "vtkRunMask.h"
 #include "vtkRunMeshes.h"
@@ -552,7 +553,8 @@ Json MakeCenterline(RunStep& step)
 {
   const RunSettings& settings = step.input.Settings;
   Json numbers = { { "file", "centerline.vtp" }, { "bifurcations_file", "bifurcations.vtp" },
-    { "lines_file", "centerline_lines.vtp" }, { "status_file", "status.csv" } };
+    { "lines_file", "centerline_lines.vtp" }, { "status_file", "status.csv" },
+    { "edits", Json::array() } };
   vtkNew<vtkFastMarchingCenterline> centerline;
   centerline->SetMinimumBranchLength(settings.minimumBranch);
   centerline->SetStepLimit(settings.centerlineSteps);
@@ -566,7 +568,7 @@ Json MakeCenterline(RunStep& step)
     NeedGivenMask(step);
     seeds = ReadLines(step, "ostia.vtp");
     centerline->SetImageKind(vtkFastMarchingCenterline::MaskImage);
-    centerline->SetInputDataObject(0, step.input.Mask);
+    centerline->SetInputDataObject(0, EditedMask(step, numbers));
   }
   else
   {
@@ -577,9 +579,10 @@ Json MakeCenterline(RunStep& step)
     if (!settings.beyondMask)
     {
       NeedMask(step);
-      centerline->SetInputDataObject(4, step.input.Mask);
+      centerline->SetInputDataObject(4, EditedMask(step, numbers));
     }
   }
+  RequireMaskOfEdits(step);
   centerline->SetInputDataObject(1, seeds);
   vtkNew<vtkCoronaryTreeTopology> topology;
   topology->SetInputConnection(centerline->GetOutputPort());
@@ -594,7 +597,10 @@ Json MakeCenterline(RunStep& step)
   const double blur = blurs && blurs->GetNumberOfValues() > 0 ? blurs->GetTuple1(0) : 0.0;
   UpdateAtTime(topology, 0, 0.0, step.input.Messages,
     [&](double fraction) { step.progress(0.85 + 0.1 * fraction); });
-  vtkPolyData* tree = topology->GetOutput();
+  vtkSmartPointer<vtkPolyData> tree = topology->GetOutput();
+  vtkSmartPointer<vtkPolyData> forks = vtkPolyData::SafeDownCast(
+    topology->GetOutputDataObject(vtkCoronaryTreeTopology::BifurcationPort));
+  EditTree(step, tree, forks, numbers);
   const bool measured = !step.input.IsSurface() && !step.input.IsMask();
   if (measured)
   {
@@ -613,8 +619,6 @@ Json MakeCenterline(RunStep& step)
     AddLooseVessels(tree, step.input.Reference, step.input.Vesselness,
       segmentation["window"][0].get<double>(), segmentation["window"][1].get<double>());
   }
-  auto* forks = vtkPolyData::SafeDownCast(
-    topology->GetOutputDataObject(vtkCoronaryTreeTopology::BifurcationPort));
   WritePolyData(step.Add("centerline.vtp"), tree, step.input.Messages);
   WritePolyData(step.Add("bifurcations.vtp"), forks, step.input.Messages);
   WritePolyData(step.Add("centerline_lines.vtp"), lines, step.input.Messages);
@@ -624,9 +628,10 @@ Json MakeCenterline(RunStep& step)
     tree->GetFieldData()->GetAbstractArray(vtkCoronaryArrayNames::Dominance));
   vtkDataArray* complete = raw->GetFieldData()->GetArray(vtkCoronaryArrayNames::Complete);
   double length = 0.0;
-  for (const auto& one : trees)
+  vtkDataArray* lengths = tree->GetCellData()->GetArray(vtkCoronaryArrayNames::Length);
+  for (vtkIdType cell = 0; cell < tree->GetNumberOfCells(); ++cell)
   {
-    length += one["length"].get<double>();
+    length += lengths->GetTuple1(cell);
   }
   numbers["trees"] = trees;
   numbers["veins"] = DescribeVeins(raw);
@@ -663,6 +668,10 @@ Json MakeCenterline(RunStep& step)
   numbers["image_blur"] = Numbers(raw, vtkCoronaryArrayNames::ImageBlur);
   step.summary =
     std::to_string(tree->GetNumberOfLines()) + " branches, " + Format(std::round(length)) + " mm";
+  if (!numbers["edits"].empty())
+  {
+    step.summary += "; " + DescribeLastEdit(numbers["edits"]);
+  }
   return numbers;
 }
 
@@ -851,9 +860,11 @@ bool RunInput::HasMasks() const
   return !this->Settings.mask.empty() || !this->Masks.empty();
 }
 
-RunInput::RunInput(const RunSettings& settings, vtkMessageTrap& messages)
+RunInput::RunInput(
+  const RunSettings& settings, vtkMessageTrap& messages, std::vector<TreeEdit> edits)
   : Settings(settings)
   , Messages(messages)
+  , Edits(std::move(edits))
   , Seeds(settings.seeds)
 {
   if (!settings.seedFile.empty())
@@ -1043,7 +1054,7 @@ std::vector<std::string> UsualFiles(const std::string& folder, RunStage from)
     { "vesselness.mha" },
     { "mask.mha", "ostia.vtp", "aorta.vtp", "bridges.vtp" },
     { "given_surface.vtp", "centerline.vtp", "bifurcations.vtp", "centerline_lines.vtp",
-      "status.csv", "lesions.csv", "calcium.mha" },
+      "status.csv", "lesions.csv", "calcium.mha", "edited_mask.mha" },
     { "surface.vtp", "caps.vtp" },
     { "skeleton.vtp", "skeleton.tgf", "volume.vtu", "volume_boundary.vtp", "volume_skeleton.vtp" },
     { "weights.vtu", "weights.dmat" },

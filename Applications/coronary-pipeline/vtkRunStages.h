@@ -10,6 +10,7 @@
 
 #include "RunReport.h"
 #include "RunSettings.h"
+#include "TreeEdits.h"
 
 #include "vtkSmartPointer.h"
 
@@ -37,7 +38,7 @@ class RunInput
 {
 public:
   /// Opens the images, or nothing for a surface. @throws std::runtime_error naming the input
-  RunInput(const RunSettings& settings, vtkMessageTrap& messages);
+  RunInput(const RunSettings& settings, vtkMessageTrap& messages, std::vector<TreeEdit> edits);
   ~RunInput();
 
   /// A mask without images.
@@ -60,6 +61,7 @@ public:
   const RunSettings& Settings;
   vtkMessageTrap& Messages;
   vtkSmartPointer<vtkGatedImageReader> Reader;
+  std::vector<TreeEdit> Edits;    ///< by hand
   std::vector<double> Seeds;      ///< given points, three numbers each
   std::vector<std::string> Masks; ///< of a series.json, one a phase; empty: there are none
 

@@ -51,6 +51,7 @@ constexpr Colour Dim = { 70, 75, 84 };
 constexpr Colour Wall = { 80, 215, 255 };
 constexpr Colour Outer = { 196, 140, 255 };
 constexpr Colour Bridge = { 255, 150, 20 };
+constexpr Colour Hand = { 255, 110, 200 };
 constexpr Colour Guess = { 190, 190, 200 };
 constexpr Colour Chalk = { 255, 236, 90 };
 constexpr Colour Alarm = { 255, 96, 96 };
@@ -107,13 +108,17 @@ const char* SideOf(const Vector3& direction)
 enum class Sight
 {
   Seen,
+  ByHand,
   Interpolated,
   Bridged
 };
 
 Colour ColourOf(Sight sight)
 {
-  return sight == Sight::Bridged ? Bridge : sight == Sight::Interpolated ? Guess : Wall;
+  return sight == Sight::Bridged   ? Bridge
+    : sight == Sight::Interpolated ? Guess
+    : sight == Sight::ByHand       ? Hand
+                                   : Wall;
 }
 
 /// A piece between two places is no surer than the less sure of them.
@@ -141,7 +146,7 @@ void DrawBySight(MarkedPicture& picture, const std::vector<Sight>& sights, At at
       places.push_back(at(k));
     }
     picture.Line(places, sight == Sight::Bridged ? width + 0.6 : width, ColourOf(sight),
-      sight == Sight::Seen ? 0.0 : 4.0, opacity);
+      sight <= Sight::ByHand ? 0.0 : 4.0, opacity);
     begin = end;
   }
 }
@@ -176,8 +181,10 @@ Sight SightOf(const RunResult& result, std::int64_t point)
 {
   const auto marked = [&](const std::vector<double>& values)
   { return HasValues(values, result) && values[static_cast<std::size_t>(point)] > 0.5; };
-  return marked(result.bridged) ? Sight::Bridged
-                                : (marked(result.interpolated) ? Sight::Interpolated : Sight::Seen);
+  return marked(result.bridged)   ? Sight::Bridged
+    : marked(result.interpolated) ? Sight::Interpolated
+    : marked(result.edited)       ? Sight::ByHand
+                                  : Sight::Seen;
 }
 
 /// Of the box around points, mm.
@@ -220,6 +227,7 @@ std::vector<VesselView> ViewsOf(const RunResult& result)
       const Sight sight =
         Between(SightOf(result, chain.points[k - 1]), SightOf(result, chain.points[k]));
       view.bridged += sight == Sight::Bridged ? step : 0.0;
+      view.edited += sight == Sight::ByHand ? step : 0.0;
       view.interpolated += sight == Sight::Interpolated ? step : 0.0;
       if (HasValues(result.stenosis, result))
       {

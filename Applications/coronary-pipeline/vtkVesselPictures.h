@@ -3,8 +3,8 @@
  * @brief Pictures in which a tree is judged by the image it was found in: straightened views and thin slabs.
  *
  * What was not seen is drawn so: orange and dashed where a gap was bridged, grey and dashed where a radius was
- * interpolated; calcium is yellow, a narrowing is written with its degree, pixels outside of the image are hatched.
- * The outer boundary, where fat shows it, is violet. None of it needs a display.
+ * interpolated; what was edited by hand is pink; calcium is yellow, a narrowing is written with its degree, pixels
+ * outside of the image are hatched. The outer boundary, where fat shows it, is violet. None of it needs a display.
  */
 #ifndef vtkVesselPictures_h
 #define vtkVesselPictures_h
@@ -48,6 +48,7 @@ struct VesselView
   VesselChain chain;
   std::string name;          ///< unique among the vessels
   double bridged = 0.0;      ///< mm of it that were guessed across gaps
+  double edited = 0.0;       ///< mm of it that were seen, and edited by hand
   double interpolated = 0.0; ///< mm of it whose radius was interpolated
   double narrowest = 0.0;    ///< greatest degree of a narrowing of 0.25 or more, to 1; 0: none
   std::vector<Vector3> path; ///< places of it, 1 mm apart from its beginning, without the lead-in

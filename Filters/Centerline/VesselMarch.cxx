@@ -177,7 +177,12 @@ void VesselMarch::March(const ImageInterpolator& image, const LumenReference& re
       }
       speed[number] = static_cast<float>(value);
     });
+  this->March(std::move(speed), seedMembers, progress);
+}
 
+void VesselMarch::March(std::vector<float> speed, const std::vector<std::uint32_t>& seedMembers,
+  const ProgressCallback& progress)
+{
   FastMarchingSettings settings;
   settings.spacing = this->Input.grid.spacing;
   std::vector<FastMarchingSource> sources;

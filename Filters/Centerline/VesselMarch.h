@@ -61,6 +61,10 @@ public:
   void March(const ImageInterpolator& image, const LumenReference& reference,
     const std::vector<std::uint32_t>& seedMembers, const ProgressCallback& progress);
 
+  /// The same at given speeds. @param speed  one positive value for each member
+  void March(std::vector<float> speed, const std::vector<std::uint32_t>& seedMembers,
+    const ProgressCallback& progress);
+
   const FastMarching& Marched() const { return *Front; }
 
   /// Against the front.

@@ -215,8 +215,6 @@ private:
   int Dominance = FindDominance;
 
   std::string InputRadiusArrayName = "Automatic";
-
-  class Writer;
 };
 
 #endif

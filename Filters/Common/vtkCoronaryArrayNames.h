@@ -52,6 +52,15 @@ constexpr const char* Velocity = "Velocity";         ///< double[3], mm/s
 
 constexpr const char* Visibility = "Visibility"; ///< double, 0 lost .. 1 full contrast
 
+// Centerline tree that was edited by hand, point data.
+constexpr const char* EditNumber = "EditNumber"; ///< int, the last edit here, from 1; 0: as found
+// And field data, also of an edited mask.
+constexpr const char* EditNotes = "EditNotes";     ///< string, what each edit did
+constexpr const char* EditNumbers = "EditNumbers"; ///< int, of each of these
+constexpr const char* EditPlaces = "EditPlaces";   ///< double[3], mm
+constexpr const char* EditLengths = "EditLengths"; ///< double, mm of vessel that it changed
+constexpr const char* EditSeen = "EditSeen";       ///< double, share of it that the image shows
+
 // Centerline tree in an image, point data.
 constexpr const char* StenosisDegree = "StenosisDegree";   ///< double, 0 to 1, by diameter
 constexpr const char* ReferenceRadius = "ReferenceRadius"; ///< double, mm, of the healthy vessel

@@ -3,6 +3,7 @@ from paraview import print_error
 
 import build_from_4d_ct
 import compare_series
+import correct_tree
 import coronary_examples
 import look_along_vessel
 
@@ -20,6 +21,10 @@ def _entry(work):
 build = _entry(lambda: build_from_4d_ct.build(build_from_4d_ct.selected_series()))
 compare = _entry(lambda: compare_series.compare(*compare_series.selected_series()))
 look = _entry(look_along_vessel.look_at_selected)
+correct = _entry(correct_tree.start)
+keep_edit = _entry(correct_tree.keep)
+undo_edit = _entry(correct_tree.undo)
+save_edits = _entry(correct_tree.save)
 phantom = _entry(coronary_examples.phantom)
 overlay_review = _entry(coronary_examples.overlay_review)
 posing = _entry(coronary_examples.posing)

@@ -2,6 +2,7 @@
 
 // What is found where in what the run says, its title, and what is said of an empty list.
 const FINDINGS = [
+  ['edits', ['edits'], 'Corrected by hand', 'Nothing was.'],
   ['checks', ['checks'], 'Checks of the whole tree', 'Nothing was noticed.'],
   ['bridges', ['bridges'], 'Guessed across gaps', 'No gap was bridged.'],
   ['lesions', ['lesions'], 'Narrowings', 'No narrowing was found.'],
@@ -240,6 +241,9 @@ class RunPanel {
     const notes = [`${vessel.length.toFixed(1)} mm`];
     if (vessel.bridged > 0) {
       notes.push(element('b', { class: 'bridged' }, [`${vessel.bridged.toFixed(1)} mm bridged`]));
+    }
+    if (vessel.edited > 0) {
+      notes.push(element('b', {}, [`${vessel.edited.toFixed(1)} mm by hand`]));
     }
     if (vessel.interpolated > 0) {
       notes.push(`radius guessed on ${vessel.interpolated.toFixed(1)} mm`);
